@@ -1,0 +1,55 @@
+// A material as glTF means it: constants and texture references. surface_params.h turns it into the parameters of
+// one surface point.
+#pragma once
+
+#include "kernel/texture/texture_view.h"
+
+namespace relief {
+
+enum class AlphaMode : std::uint8_t { kOpaque, kMask, kBlend };
+
+/// glTF 2.0 metallic-roughness with KHR_materials_{transmission, ior, volume, clearcoat, sheen, specular,
+/// emissive_strength, unlit}. Defaults are glTF's.
+struct Material {
+  Vec3f base_color{1, 1, 1};  ///< linear Rec.709
+  float base_alpha = 1;
+  TextureRef base_color_texture;  ///< sRGB; alpha in A
+  float metallic = 1, roughness = 1;
+  TextureRef metallic_roughness_texture;  ///< roughness in G, metallic in B, linear
+  TextureRef normal_texture;              ///< tangent space, linear
+  float normal_scale = 1;
+  Vec3f emission{0, 0, 0};  ///< radiance: emissiveFactor × emissiveStrength
+  TextureRef emission_texture;
+  AlphaMode alpha_mode = AlphaMode::kOpaque;
+  float alpha_cutoff = 0.5f;
+  bool double_sided = false;  ///< glTF: back faces are culled for the *camera* only in rasterizers; here emission
+                              ///< is one-sided unless set, and everything else ignores it
+  bool unlit = false;         ///< base colour is emitted, nothing is reflected
+
+  float transmission = 0;
+  TextureRef transmission_texture;  ///< R
+  float ior = 1.5f;
+  float thickness = 0;  ///< 0: thin wall; otherwise the mesh bounds a volume
+  Vec3f attenuation_color{1, 1, 1};
+  float attenuation_distance = kInfinity;  ///< metres, world space
+
+  float clearcoat = 0, clearcoat_roughness = 0;
+  TextureRef clearcoat_texture;            ///< R
+  TextureRef clearcoat_roughness_texture;  ///< G
+  TextureRef clearcoat_normal_texture;
+  float clearcoat_normal_scale = 1;
+
+  Vec3f sheen_color{0, 0, 0};
+  float sheen_roughness = 0;
+  TextureRef sheen_color_texture;      ///< sRGB
+  TextureRef sheen_roughness_texture;  ///< A
+
+  float specular = 1;  ///< KHR_materials_specular factor on the dielectric F0 and F90
+  Vec3f specular_color{1, 1, 1};
+  TextureRef specular_texture;        ///< A
+  TextureRef specular_color_texture;  ///< sRGB
+
+  int displacement_index = -1;  ///< into Scene::displacements; −1: none
+};
+
+}  // namespace relief

@@ -1,0 +1,27 @@
+// Event counters: one plain struct, a copy a thread, summed at the end. Field names are the JSON keys of --stats.
+#pragma once
+
+#include <cstdint>
+
+namespace relief {
+
+// clang-format off
+#define RELIEF_COUNTERS(X) \
+  X(camera_rays) X(bounce_rays) X(shadow_rays) X(surface_hits) X(background_hits) \
+  X(transparent_hits) X(nonfinite_samples) X(texture_lookups)
+// clang-format on
+
+struct Counters {
+#define X(name) std::uint64_t name = 0;
+  RELIEF_COUNTERS(X)
+#undef X
+};
+
+inline void counters_add(Counters& total, const Counters& part)
+{
+#define X(name) total.name += part.name;
+  RELIEF_COUNTERS(X)
+#undef X
+}
+
+}  // namespace relief

@@ -1,0 +1,68 @@
+// Which images (AOVs) a render keeps and where each lies in a pixel's record. One list serves the film, the command
+// line, the EXR writer and the documentation.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+namespace relief {
+
+enum class Aov : std::uint8_t {
+  kBeauty, kDirect, kIndirect, kAlbedo, kNormal, kDepth, kPosition, kUv, kObjectId, kMaterialId, kSampleCount,
+  kVariance, kHalf,
+};
+inline constexpr int kNumAovs = 13;
+
+struct AovInfo {
+  Aov aov;
+  std::string_view name;      ///< command line and EXR layer name
+  std::string_view channels;  ///< one letter a channel
+  bool integer_like;          ///< ids and counts: never stored as half, never averaged
+  std::string_view meaning;
+};
+
+inline constexpr std::array<AovInfo, kNumAovs> kAovInfo = {{
+    {Aov::kBeauty, "beauty", "RGBA", false, "radiance; A = coverage by geometry"},
+    {Aov::kDirect, "direct", "RGB", false, "light after at most one scattering event, emission seen directly included"},
+    {Aov::kIndirect, "indirect", "RGB", false, "light after two or more scattering events"},
+    {Aov::kAlbedo, "albedo", "RGB", false, "base colour of the first non-transparent hit"},
+    {Aov::kNormal, "normal", "XYZ", false, "unit shading normal of the first hit, world space, averaged"},
+    {Aov::kDepth, "depth", "Z", false, "distance along the camera's axis, metres, averaged over samples that hit"},
+    {Aov::kPosition, "position", "XYZ", false, "first hit, world space, metres, averaged over samples that hit"},
+    {Aov::kUv, "uv", "UV", false, "texture coordinates (set 0) of the first hit, averaged"},
+    {Aov::kObjectId, "object_id", "I", true, "instance index + 1 of the pixel's first sample; 0 = background"},
+    {Aov::kMaterialId, "material_id", "I", true, "material index + 1 of the pixel's first sample; 0 = background"},
+    {Aov::kSampleCount, "samples", "N", true, "samples taken in this pixel"},
+    {Aov::kVariance, "variance", "RGB", false, "estimated variance of the pixel's mean radiance"},
+    {Aov::kHalf, "half", "RGB", false, "mean of the pixel's even-numbered samples, an independent half of the estimate"},
+}};
+
+/// Offsets, in floats, of each kept AOV inside one pixel's record; −1 when it is not kept.
+struct FilmLayout {
+  std::array<std::int16_t, kNumAovs> offset{};
+  int num_floats = 0;  ///< per pixel
+};
+
+/// The finished picture: plain floats, row 0 on top, averaged and normalized (no sums), owned elsewhere.
+struct FilmView {
+  const float* pixels = nullptr;  ///< width·height records of layout.num_floats
+  int width = 0, height = 0;      ///< of the stored window (the crop, if there is one)
+  int crop_x = 0, crop_y = 0;     ///< where the window lies in the full image
+  int full_width = 0, full_height = 0;
+  FilmLayout layout;
+};
+
+/// Layout that keeps the AOVs whose bits are set (bit i = enumerator i), in enumerator order.
+inline FilmLayout film_layout_make(std::uint32_t aov_mask)
+{
+  FilmLayout layout;
+  for (int i = 0; i < kNumAovs; ++i) {
+    const bool kept = (aov_mask >> i & 1u) != 0;
+    layout.offset[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(kept ? layout.num_floats : -1);
+    if (kept) layout.num_floats += static_cast<int>(kAovInfo[static_cast<std::size_t>(i)].channels.size());
+  }
+  return layout;
+}
+
+}  // namespace relief

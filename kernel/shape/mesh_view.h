@@ -1,0 +1,42 @@
+// Triangle meshes and their placements as the kernel sees them: spans without ownership.
+#pragma once
+
+#include <cstdint>
+
+#include "kernel/math/affine.h"
+
+namespace relief {
+
+struct TriangleIndices {
+  std::uint32_t v0 = 0, v1 = 0, v2 = 0;
+};
+
+/// One triangle mesh with one material. Optional attributes are null when absent.
+struct MeshView {
+  const Vec3f* P = nullptr;                    ///< object space, metres, num_vertices
+  const Normal3f* N = nullptr;                 ///< shading (and displacement) normals, object space; null: flat
+  const Vec2f* uv[2] = {nullptr, nullptr};     ///< texture coordinate sets
+  const Vec4f* tangent = nullptr;              ///< unit, w = handedness; null: derived from uv
+  const Vec4f* color = nullptr;                ///< COLOR_0, linear, multiplies base colour and alpha
+  const TriangleIndices* triangles = nullptr;  ///< num_triangles
+  std::uint32_t num_vertices = 0, num_triangles = 0;
+};
+
+enum InstanceFlag : std::uint32_t {
+  kVisibleToCamera = 1u << 0,
+  kCastsShadow = 1u << 1,
+  kMirrored = 1u << 2,  ///< world_from_object has a negative determinant
+  kCausticCaster = 1u << 3,
+  kCausticReceiver = 1u << 4,
+};
+
+/// One placement of a mesh.
+struct InstanceView {
+  Affine3 world_from_object, object_from_world;
+  std::int32_t mesh_index = 0;
+  std::int32_t material_index = 0;
+  std::int32_t first_light_index = -1;  ///< lights of an emissive mesh are consecutive, one a triangle; −1: none
+  std::uint32_t flags = kVisibleToCamera | kCastsShadow;
+};
+
+}  // namespace relief

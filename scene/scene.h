@@ -1,0 +1,116 @@
+// A loaded scene: plain immutable data, indices instead of pointers. Made by scene/load.h, read by the integrator
+// through views. Everything is in the units of the scene format: metres, Y up, linear Rec.709.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "kernel/bsdf/material.h"
+#include "kernel/camera/camera.h"
+#include "kernel/light/light.h"
+#include "kernel/shape/mesh_view.h"
+#include "scene/diagnostics.h"
+
+namespace relief {
+
+class TextureStore;  // scene/texture_store.h
+
+/// One glTF primitive: a triangle mesh with one material.
+struct Mesh {
+  std::string name;
+  std::vector<Vec3f> P;
+  std::vector<Normal3f> N;       ///< empty: flat shading
+  std::vector<Vec2f> uv[2];      ///< empty: absent
+  std::vector<Vec4f> tangent;    ///< empty: derived where a normal map needs them
+  std::vector<Vec4f> color;
+  std::vector<TriangleIndices> triangles;
+  int material_index = 0;        ///< always valid: the loader adds glTF's default material where none is named
+
+  MeshView view() const;
+  std::size_t bytes() const;
+};
+
+struct Instance {
+  std::string name;  ///< of the node
+  int mesh_index = 0;
+  int material_index = 0;
+  Affine3 world_from_object;
+  std::uint32_t flags = kVisibleToCamera | kCastsShadow;
+};
+
+struct SceneCamera {
+  std::string name;
+  Camera camera;       ///< half_width is for the aspect ratio `aspect`
+  float aspect = 0;    ///< width / height that the file asks for; 0: follows the image
+};
+
+/// Lat-long map or constant surrounding the scene. See docs/scene_format.md for the orientation.
+struct Environment {
+  Vec3f color{0, 0, 0};     ///< radiance factor, strength included
+  int texture_index = -1;   ///< into TextureStore; −1: constant `color`
+  float rotation = 0;       ///< radians about +Y
+  bool visible_to_camera = true;
+};
+
+enum class PixelFilter : std::uint8_t { kBox, kBlackmanHarris };
+enum class DisplacementMethod : std::uint8_t { kAuto, kRmip, kTfdm, kTessellate, kMicrotriangle, kCone };
+enum class DisplacementSpace : std::uint8_t { kObject, kWorld };
+
+/// RELIEF_displacement of one material: parsed and validated; tracing it is displacement/'s work.
+struct DisplacementSettings {
+  TextureRef height;            ///< linear data; the texture index is into TextureStore
+  float scale = 1;              ///< metres
+  float midlevel = 0.5f;
+  DisplacementSpace space = DisplacementSpace::kObject;
+  DisplacementMethod method = DisplacementMethod::kAuto;
+  float lod = -1;               ///< −1: auto
+  bool smoothing = false;
+  bool weld_seams = false;
+  std::string procedural_json;  ///< empty: none
+};
+
+/// RELIEF_render; the command line overrides single fields.
+struct RenderSettings {
+  int width = 960, height = 540;
+  int samples = 64;
+  float noise_threshold = 0;  ///< 0: off; otherwise target for the estimated error of a block relative to its mean
+  int max_bounces = 12, diffuse_bounces = 12, glossy_bounces = 12, transmission_bounces = 12;
+  int transparent_bounces = 32;
+  std::uint64_t seed = 0;
+  std::string view = "";      ///< OCIO view; empty: the display's default
+  float exposure = 0;         ///< stops, PNG only
+  float clamp_indirect = 0;   ///< 0: off
+  int frame_start = 1, frame_end = 1;
+  float frames_per_second = 24;
+  PixelFilter filter = PixelFilter::kBlackmanHarris;
+  float filter_width = 1.5f;  ///< pixels
+  float luminous_efficacy = 1;  ///< lm/W that divides KHR_lights_punctual's candela and lux
+};
+
+/// What the scene needs; passes, kernels and memory for what is absent are never run or allocated.
+struct FeatureSet {
+  bool textures = false, normal_maps = false, transparency = false, transmission = false, volume = false,
+       clearcoat = false, sheen = false, metal = false, displacement = false, environment_map = false,
+       environment = false, mesh_lights = false, area_lights = false, delta_lights = false, many_lights = false,
+       instances = false, depth_of_field = false, caustic_casters = false;
+};
+
+struct Scene {
+  std::string file;
+  std::vector<Mesh> meshes;
+  std::vector<Instance> instances;
+  std::vector<Material> materials;
+  std::vector<std::string> material_names;
+  std::vector<Light> lights;  ///< everything but mesh triangles and the environment
+  std::vector<SceneCamera> cameras;  ///< never empty: the loader adds a framing camera (and a warning) if need be
+  std::vector<DisplacementSettings> displacements;
+  Environment environment;
+  RenderSettings render;
+  FeatureSet features;
+  std::shared_ptr<const TextureStore> textures;
+  std::vector<std::string> warnings;
+};
+
+}  // namespace relief

@@ -1,0 +1,50 @@
+// Textures of a scene: read through OpenImageIO, kept as mip chains in memory, or served by OpenImageIO's tile cache
+// above a memory budget.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "kernel/texture/texture_view.h"
+#include "scene/diagnostics.h"
+
+namespace relief {
+
+/// How a texture's numbers are to be read.
+enum class TextureColor : std::uint8_t { kSrgb, kLinear };
+
+/// One texture to be loaded: an image (file, or encoded bytes in memory) with its sampler and its reading.
+struct TextureRequest {
+  std::filesystem::path file;           ///< empty when `encoded` is used
+  std::vector<unsigned char> encoded;   ///< PNG, JPEG, … as found in a buffer view or data URI
+  std::string label;                    ///< how messages name it, e.g. "scene.gltf: /images/3 (bark.png)"
+  std::string scene_file, json_path;    ///< for SceneError
+  TextureColor color = TextureColor::kLinear;
+  Wrap wrap_u = Wrap::kRepeat, wrap_v = Wrap::kRepeat;
+  TexelFilter filter = TexelFilter::kLinear;
+};
+
+class TextureStore {
+ public:
+  /// Reads all textures (in parallel). Equal (image, colour) pairs share their texels.
+  /// @error SceneError naming the file and JSON path of an image that is missing, unreadable or absurdly large
+  TextureStore(std::vector<TextureRequest> requests, std::size_t budget_bytes, Warnings& warnings);
+  ~TextureStore();
+  TextureStore(const TextureStore&) = delete;
+  TextureStore& operator=(const TextureStore&) = delete;
+
+  std::span<const TextureView> views() const;
+  std::size_t bytes() const;         ///< resident texels
+  bool is_cached(int index) const;   ///< served by the tile cache
+  const std::string& label(int index) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace relief

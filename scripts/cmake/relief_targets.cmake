@@ -1,0 +1,30 @@
+# Flags and helpers every relief target shares.
+
+find_program(RELIEF_CCACHE ccache)
+if(RELIEF_CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER "${RELIEF_CCACHE}")
+endif()
+
+add_library(relief_options INTERFACE)
+target_include_directories(relief_options INTERFACE "${PROJECT_SOURCE_DIR}")
+target_compile_features(relief_options INTERFACE cxx_std_20)
+target_compile_options(relief_options INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wnon-virtual-dtor -Wold-style-cast -Wcast-qual -Werror
+  # sqrt and friends need not set errno, so they can be inlined; results are unchanged.
+  -fno-math-errno
+  # The renderer never reads floating-point exception flags.
+  -fno-trapping-math)
+target_compile_definitions(relief_options INTERFACE
+  RELIEF_VERSION="${PROJECT_VERSION}"
+  $<$<BOOL:${RELIEF_ASSERTS}>:RELIEF_ENABLE_ASSERTS>)
+if(RELIEF_SANITIZE)
+  target_compile_options(relief_options INTERFACE -fsanitize=${RELIEF_SANITIZE} -fno-omit-frame-pointer
+    -fno-sanitize-recover=all)
+  target_link_options(relief_options INTERFACE -fsanitize=${RELIEF_SANITIZE})
+endif()
+
+# relief_add_library(NAME sources...): a static library with the project's flags.
+function(relief_add_library name)
+  add_library(${name} STATIC ${ARGN})
+  target_link_libraries(${name} PUBLIC relief_options)
+endfunction()
