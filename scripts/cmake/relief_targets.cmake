@@ -28,3 +28,12 @@ function(relief_add_library name)
   add_library(${name} STATIC ${ARGN})
   target_link_libraries(${name} PUBLIC relief_options)
 endfunction()
+
+# relief_add_tests(NAME LABELS l... LIBRARIES t... SOURCES s...): one GoogleTest executable, each TEST a CTest test.
+function(relief_add_tests name)
+  cmake_parse_arguments(arg "" "" "LABELS;LIBRARIES;SOURCES" ${ARGN})
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} GTest::gtest_main)
+  include(GoogleTest)
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES LABELS "${arg_LABELS}" TIMEOUT 600)
+endfunction()
