@@ -8,8 +8,8 @@
 namespace relief {
 
 struct LoadOptions {
-  double frame = 0;         ///< animation time in frames; used only if `has_frame`
-  bool has_frame = false;   ///< false: rest pose
+  double frame = 0;                                         ///< animation time in frames; used only if `has_frame`
+  bool has_frame = false;                                   ///< false: rest pose
   std::size_t texture_budget_bytes = std::size_t{4} << 30;  ///< above it textures go through a tile cache
 };
 

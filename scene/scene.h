@@ -21,12 +21,12 @@ class TextureStore;  // scene/texture_store.h
 struct Mesh {
   std::string name;
   std::vector<Vec3f> P;
-  std::vector<Normal3f> N;       ///< empty: flat shading
-  std::vector<Vec2f> uv[2];      ///< empty: absent
-  std::vector<Vec4f> tangent;    ///< empty: derived where a normal map needs them
+  std::vector<Normal3f> N;     ///< empty: flat shading
+  std::vector<Vec2f> uv[2];    ///< empty: absent
+  std::vector<Vec4f> tangent;  ///< empty: derived where a normal map needs them
   std::vector<Vec4f> color;
   std::vector<TriangleIndices> triangles;
-  int material_index = 0;        ///< always valid: the loader adds glTF's default material where none is named
+  int material_index = 0;  ///< always valid: the loader adds glTF's default material where none is named
 
   MeshView view() const;
   std::size_t bytes() const;
@@ -42,15 +42,15 @@ struct Instance {
 
 struct SceneCamera {
   std::string name;
-  Camera camera;       ///< half_width is for the aspect ratio `aspect`
-  float aspect = 0;    ///< width / height that the file asks for; 0: follows the image
+  Camera camera;     ///< half_width is for the aspect ratio `aspect`
+  float aspect = 0;  ///< width / height that the file asks for; 0: follows the image
 };
 
 /// Lat-long map or constant surrounding the scene. See docs/scene_format.md for the orientation.
 struct Environment {
-  Vec3f color{0, 0, 0};     ///< radiance factor, strength included
-  int texture_index = -1;   ///< into TextureStore; −1: constant `color`
-  float rotation = 0;       ///< radians about +Y
+  Vec3f color{0, 0, 0};    ///< radiance factor, strength included
+  int texture_index = -1;  ///< into TextureStore; −1: constant `color`
+  float rotation = 0;      ///< radians about +Y
   bool visible_to_camera = true;
 };
 
@@ -60,12 +60,12 @@ enum class DisplacementSpace : std::uint8_t { kObject, kWorld };
 
 /// RELIEF_displacement of one material: parsed and validated; tracing it is displacement/'s work.
 struct DisplacementSettings {
-  TextureRef height;            ///< linear data; the texture index is into TextureStore
-  float scale = 1;              ///< metres
+  TextureRef height;  ///< linear data; the texture index is into TextureStore
+  float scale = 1;    ///< metres
   float midlevel = 0.5f;
   DisplacementSpace space = DisplacementSpace::kObject;
   DisplacementMethod method = DisplacementMethod::kAuto;
-  float lod = -1;               ///< −1: auto
+  float lod = -1;  ///< −1: auto
   bool smoothing = false;
   bool weld_seams = false;
   std::string procedural_json;  ///< empty: none
@@ -79,13 +79,13 @@ struct RenderSettings {
   int max_bounces = 12, diffuse_bounces = 12, glossy_bounces = 12, transmission_bounces = 12;
   int transparent_bounces = 32;
   std::uint64_t seed = 0;
-  std::string view = "";      ///< OCIO view; empty: the display's default
-  float exposure = 0;         ///< stops, PNG only
-  float clamp_indirect = 0;   ///< 0: off
+  std::string view = "";     ///< OCIO view; empty: the display's default
+  float exposure = 0;        ///< stops, PNG only
+  float clamp_indirect = 0;  ///< 0: off
   int frame_start = 1, frame_end = 1;
   float frames_per_second = 24;
   PixelFilter filter = PixelFilter::kBlackmanHarris;
-  float filter_width = 1.5f;  ///< pixels
+  float filter_width = 1.5f;    ///< pixels
   float luminous_efficacy = 1;  ///< lm/W that divides KHR_lights_punctual's candela and lux
 };
 
@@ -103,7 +103,7 @@ struct Scene {
   std::vector<Instance> instances;
   std::vector<Material> materials;
   std::vector<std::string> material_names;
-  std::vector<Light> lights;  ///< everything but mesh triangles and the environment
+  std::vector<Light> lights;         ///< everything but mesh triangles and the environment
   std::vector<SceneCamera> cameras;  ///< never empty: the loader adds a framing camera (and a warning) if need be
   std::vector<DisplacementSettings> displacements;
   Environment environment;

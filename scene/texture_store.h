@@ -19,10 +19,10 @@ enum class TextureColor : std::uint8_t { kSrgb, kLinear };
 
 /// One texture to be loaded: an image (file, or encoded bytes in memory) with its sampler and its reading.
 struct TextureRequest {
-  std::filesystem::path file;           ///< empty when `encoded` is used
-  std::vector<unsigned char> encoded;   ///< PNG, JPEG, … as found in a buffer view or data URI
-  std::string label;                    ///< how messages name it, e.g. "scene.gltf: /images/3 (bark.png)"
-  std::string scene_file, json_path;    ///< for SceneError
+  std::filesystem::path file;          ///< empty when `encoded` is used
+  std::vector<unsigned char> encoded;  ///< PNG, JPEG, … as found in a buffer view or data URI
+  std::string label;                   ///< how messages name it, e.g. "scene.gltf: /images/3 (bark.png)"
+  std::string scene_file, json_path;   ///< for SceneError
   TextureColor color = TextureColor::kLinear;
   Wrap wrap_u = Wrap::kRepeat, wrap_v = Wrap::kRepeat;
   TexelFilter filter = TexelFilter::kLinear;
@@ -38,8 +38,8 @@ class TextureStore {
   TextureStore& operator=(const TextureStore&) = delete;
 
   std::span<const TextureView> views() const;
-  std::size_t bytes() const;         ///< resident texels
-  bool is_cached(int index) const;   ///< served by the tile cache
+  std::size_t bytes() const;        ///< resident texels
+  bool is_cached(int index) const;  ///< served by the tile cache
   const std::string& label(int index) const;
 
  private:

@@ -16,8 +16,8 @@ struct Camera {
   float half_width = 0.5f, half_height = 0.5f;
   /// Window shift as a fraction of the whole window's width and height; +x moves the view right, +y up.
   float shift_x = 0, shift_y = 0;
-  float aperture_radius = 0;  ///< lens radius, metres; 0: pinhole
-  float focus_distance = 1;   ///< metres along −Z
+  float aperture_radius = 0;                   ///< lens radius, metres; 0: pinhole
+  float focus_distance = 1;                    ///< metres along −Z
   float clip_start = 0, clip_end = kInfinity;  ///< metres along −Z
 };
 

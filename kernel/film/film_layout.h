@@ -9,8 +9,19 @@
 namespace relief {
 
 enum class Aov : std::uint8_t {
-  kBeauty, kDirect, kIndirect, kAlbedo, kNormal, kDepth, kPosition, kUv, kObjectId, kMaterialId, kSampleCount,
-  kVariance, kHalf,
+  kBeauty,
+  kDirect,
+  kIndirect,
+  kAlbedo,
+  kNormal,
+  kDepth,
+  kPosition,
+  kUv,
+  kObjectId,
+  kMaterialId,
+  kSampleCount,
+  kVariance,
+  kHalf,
 };
 inline constexpr int kNumAovs = 13;
 
@@ -35,7 +46,8 @@ inline constexpr std::array<AovInfo, kNumAovs> kAovInfo = {{
     {Aov::kMaterialId, "material_id", "I", true, "material index + 1 of the pixel's first sample; 0 = background"},
     {Aov::kSampleCount, "samples", "N", true, "samples taken in this pixel"},
     {Aov::kVariance, "variance", "RGB", false, "estimated variance of the pixel's mean radiance"},
-    {Aov::kHalf, "half", "RGB", false, "mean of the pixel's even-numbered samples, an independent half of the estimate"},
+    {Aov::kHalf, "half", "RGB", false,
+     "mean of the pixel's even-numbered samples, an independent half of the estimate"},
 }};
 
 /// Offsets, in floats, of each kept AOV inside one pixel's record; −1 when it is not kept.

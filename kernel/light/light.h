@@ -11,17 +11,17 @@ enum class LightKind : std::uint8_t { kPoint, kSpot, kSun, kRectangle, kDisk, kT
 /// One emitter in world space. Which fields mean something depends on `kind`.
 struct Light {
   LightKind kind = LightKind::kPoint;
-  bool two_sided = false;          ///< rectangle, disk, triangle
-  bool visible_to_camera = true;   ///< rectangle, disk
-  Vec3f P{};                       ///< position or centre, metres (triangle: first vertex)
-  Vec3f axis{0, 0, -1};            ///< unit: spot and sun: direction of travel; rectangle, disk, triangle: emitting side
-  Vec3f edge_u{}, edge_v{};        ///< rectangle, disk: *half* axes, any two independent vectors (disk: an ellipse);
-                                   ///< triangle: P1−P0 and P2−P0
-  Vec3f emission{};                ///< point, spot: radiant intensity (W/sr, on the spot's axis); sun: irradiance on a
-                                   ///< plane across the axis (W/m²); area kinds: radiance (W/m²/sr)
+  bool two_sided = false;         ///< rectangle, disk, triangle
+  bool visible_to_camera = true;  ///< rectangle, disk
+  Vec3f P{};                      ///< position or centre, metres (triangle: first vertex)
+  Vec3f axis{0, 0, -1};           ///< unit: spot and sun: direction of travel; rectangle, disk, triangle: emitting side
+  Vec3f edge_u{}, edge_v{};       ///< rectangle, disk: *half* axes, any two independent vectors (disk: an ellipse);
+                                  ///< triangle: P1−P0 and P2−P0
+  Vec3f emission{};               ///< point, spot: radiant intensity (W/sr, on the spot's axis); sun: irradiance on a
+                                  ///< plane across the axis (W/m²); area kinds: radiance (W/m²/sr)
   float cos_inner = 1, cos_outer = 0;  ///< spot cone
-  float area = 0;                  ///< m², area kinds
-  std::int32_t instance_index = -1;  ///< triangle: whose mesh
+  float area = 0;                      ///< m², area kinds
+  std::int32_t instance_index = -1;    ///< triangle: whose mesh
   std::int32_t triangle_index = -1;
 };
 

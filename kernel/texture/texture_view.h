@@ -27,7 +27,7 @@ struct TextureView {
   const void* levels[kMaxMipLevels] = {};  ///< row-major texels, `num_channels` interleaved; null when cached
   int width = 0, height = 0;               ///< level 0, texels
   int num_levels = 0;
-  int num_channels = 0;  ///< 1, 2, 3 or 4; missing colour channels repeat the first (1, 2: grey, grey+alpha), alpha is 1
+  int num_channels = 0;  ///< 1…4; missing colour channels repeat the first (1, 2: grey, grey+alpha), alpha is 1
   TexelFormat format = TexelFormat::kU8;
   TexelFilter filter = TexelFilter::kLinear;
   Wrap wrap_u = Wrap::kRepeat, wrap_v = Wrap::kRepeat;
