@@ -1,0 +1,223 @@
+#include "integrator/environment_tables.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace relief {
+namespace {
+
+/// Probabilities are integers over this: floats hold all of them up to 1 exactly, so that the difference of two
+/// entries of a cumulative distribution is exact and sampling and density agree to the last bit.
+constexpr std::uint32_t kQuanta = 1u << 24;
+
+/// Integrals over one cell of the interpolation weights of the texels it touches, along one axis.
+struct CellTexels {
+  int first = 0;  ///< may be -1: the caller wraps
+  std::vector<float> weights;
+};
+
+/// Integral of a texel's interpolation weight (a tent of half-width 1 around its centre) from −∞ to x.
+/// @param x  distance from the texel's centre, texels
+double tent_integral(double x)
+{
+  if (x <= -1) return 0;
+  if (x >= 1) return 1;
+  return x < 0 ? 0.5 * (1 + x) * (1 + x) : 1 - 0.5 * (1 - x) * (1 - x);
+}
+
+/// Texels whose interpolation weights reach into each of `num_cells` equal cells.
+std::vector<CellTexels> cell_texels(int num_texels, int num_cells)
+{
+  std::vector<CellTexels> cells(static_cast<std::size_t>(num_cells));
+  for (int i = 0; i < num_cells; ++i) {
+    const double begin = static_cast<double>(i) * num_texels / num_cells;
+    const double end = static_cast<double>(i + 1) * num_texels / num_cells;
+    CellTexels& cell = cells[static_cast<std::size_t>(i)];
+    cell.first = static_cast<int>(std::floor(begin - 0.5));
+    const int last = static_cast<int>(std::ceil(end + 0.5)) - 1;
+    for (int texel = cell.first; texel <= last; ++texel) {
+      const double centre = texel + 0.5;
+      cell.weights.push_back(static_cast<float>(tent_integral(end - centre) - tent_integral(begin - centre)));
+    }
+  }
+  return cells;
+}
+
+/// Luminance of the map at the texels of one mip level.
+struct LuminanceImage {
+  int width = 0, height = 0;
+  std::vector<float> texels;
+};
+
+LuminanceImage luminance_load(const EnvironmentView& environment, int level)
+{
+  const TextureView& map = environment.map;
+  LuminanceImage image{mip_size(map.width, level), mip_size(map.height, level), {}};
+  const auto width = static_cast<std::size_t>(image.width);
+  image.texels.resize(width * static_cast<std::size_t>(image.height));
+  // This footprint selects exactly the level, for textures in memory and in the cache alike.
+  const float footprint =
+      level == 0 ? 0.0f
+                 : std::ldexp(1.0f, level) / std::sqrt(static_cast<float>(map.width) * static_cast<float>(map.height));
+  tbb::parallel_for(tbb::blocked_range<int>(0, image.height), [&](const tbb::blocked_range<int>& rows) {
+    for (int y = rows.begin(); y < rows.end(); ++y) {
+      for (int x = 0; x < image.width; ++x) {
+        const Vec2f centre{(static_cast<float>(x) + 0.5f) / static_cast<float>(image.width),
+                           (static_cast<float>(y) + 0.5f) / static_cast<float>(image.height)};
+        const Vec3f value = xyz(texture_sample(map, centre, footprint));
+        image.texels[static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)] =
+            luminance(environment.color * max(value, Vec3f{}));
+      }
+    }
+  });
+  return image;
+}
+
+/// Writes a cumulative distribution in multiples of 1 / kQuanta.
+/// @param weights  num_cells, >= 0, at least one > 0
+/// @param cdf      num_cells + 1
+/// Every cell with a weight gets a probability, however small its share: a cell of density zero that has radiance
+/// would be a bias. What the least cells are given too much, the greatest cell is given too little.
+void cdf_write(const double* weights, int num_cells, float* cdf)
+{
+  double total = 0;
+  for (int i = 0; i < num_cells; ++i) {
+    total += weights[i];
+  }
+  std::vector<std::int64_t> quanta(static_cast<std::size_t>(num_cells));
+  std::int64_t sum = 0;
+  for (int i = 0; i < num_cells; ++i) {
+    std::int64_t& q = quanta[static_cast<std::size_t>(i)];
+    q = weights[i] > 0 ? std::max<std::int64_t>(1, std::llround(weights[i] / total * kQuanta)) : 0;
+    sum += q;
+  }
+  // The excess is below one quantum a cell, 2^-14 of the whole; the greatest of at most 1024 cells has 2^-10 or more.
+  *std::max_element(quanta.begin(), quanta.end()) += kQuanta - sum;
+  std::int64_t running = 0;
+  for (int i = 0; i < num_cells; ++i) {
+    cdf[i] = static_cast<float>(running) / static_cast<float>(kQuanta);
+    running += quanta[static_cast<std::size_t>(i)];
+  }
+  cdf[num_cells] = 1.0f;
+}
+
+/// A distribution over cells none of which will be asked for: rows without light.
+void cdf_write_uniform(int num_cells, float* cdf)
+{
+  const std::vector<double> equal(static_cast<std::size_t>(num_cells), 1.0);
+  cdf_write(equal.data(), num_cells, cdf);
+}
+
+std::vector<float> row_edges_make(int num_rows)
+{
+  std::vector<float> edges(static_cast<std::size_t>(num_rows) + 1);
+  for (int i = 0; i <= num_rows; ++i) {
+    const double half_theta = 0.5 * std::numbers::pi * i / num_rows;
+    const double value = 2 * i <= num_rows ? std::sin(half_theta) : std::cos(half_theta);
+    edges[static_cast<std::size_t>(i)] = static_cast<float>(value * value);
+  }
+  return edges;
+}
+
+/// Coarsest mip level with at least two texels a cell on both sides: light stays where it is to a quarter of a cell, and
+/// a huge map is read quickly.
+int level_for_cells(const TextureView& map, int num_columns, int num_rows)
+{
+  int level = 0;
+  while (level + 1 < map.num_levels && mip_size(map.width, level + 1) >= 2 * num_columns &&
+         mip_size(map.height, level + 1) >= 2 * num_rows) {
+    ++level;
+  }
+  return level;
+}
+
+void tables_fill(EnvironmentTables& tables)
+{
+  EnvironmentView& environment = tables.environment;
+  const int num_columns = std::clamp(environment.map.width, 1, kMaxEnvironmentColumns);
+  // Even, so that no row lies in both hemispheres.
+  const int num_rows = std::clamp(environment.map.height + environment.map.height % 2, 2, kMaxEnvironmentColumns / 2);
+  const LuminanceImage image = luminance_load(environment, level_for_cells(environment.map, num_columns, num_rows));
+  const std::vector<CellTexels> columns = cell_texels(image.width, num_columns);
+  const std::vector<CellTexels> rows = cell_texels(image.height, num_rows);
+  tables.row_edges = row_edges_make(num_rows);
+  tables.row_cdf.resize(static_cast<std::size_t>(num_rows) + 1);
+  const std::size_t pitch = static_cast<std::size_t>(num_columns) + 1;
+  tables.column_cdf.resize(static_cast<std::size_t>(num_rows) * pitch);
+
+  std::vector<double> row_weights(static_cast<std::size_t>(num_rows));
+  tbb::parallel_for(0, num_rows, [&](int row) {
+    const auto r = static_cast<std::size_t>(row);
+    const auto width = static_cast<std::size_t>(image.width);
+    std::vector<double> row_texels(width);  // integrated over the row's height
+    for (std::size_t k = 0; k < rows[r].weights.size(); ++k) {
+      const int y = std::clamp(rows[r].first + static_cast<int>(k), 0, image.height - 1);
+      const float* texels = image.texels.data() + static_cast<std::size_t>(y) * width;
+      for (std::size_t x = 0; x < width; ++x) {
+        row_texels[x] += static_cast<double>(rows[r].weights[k]) * static_cast<double>(texels[x]);
+      }
+    }
+    std::vector<double> weights(static_cast<std::size_t>(num_columns));
+    double sum = 0;
+    for (std::size_t c = 0; c < weights.size(); ++c) {
+      for (std::size_t k = 0; k < columns[c].weights.size(); ++k) {
+        const int x = (columns[c].first + static_cast<int>(k) + image.width) % image.width;
+        weights[c] += static_cast<double>(columns[c].weights[k]) * row_texels[static_cast<std::size_t>(x)];
+      }
+      sum += weights[c];
+    }
+    row_weights[r] = sum * static_cast<double>(std::abs(tables.row_edges[r + 1] - tables.row_edges[r]));
+    float* cdf = tables.column_cdf.data() + r * pitch;
+    if (sum > 0) {
+      cdf_write(weights.data(), num_columns, cdf);
+    } else {
+      cdf_write_uniform(num_columns, cdf);
+    }
+  });
+  if (*std::max_element(row_weights.begin(), row_weights.end()) > 0) {
+    cdf_write(row_weights.data(), num_rows, tables.row_cdf.data());
+    environment.num_columns = num_columns;
+    environment.num_rows = num_rows;
+  } else {
+    tables.row_cdf.clear();
+    tables.column_cdf.clear();
+    tables.row_edges.clear();
+  }
+}
+
+}  // namespace
+
+EnvironmentView EnvironmentTables::view() const
+{
+  EnvironmentView view = environment;
+  view.row_cdf = row_cdf.data();
+  view.column_cdf = column_cdf.data();
+  view.row_edges = row_edges.data();
+  return view;
+}
+
+std::size_t EnvironmentTables::bytes() const
+{
+  return (row_cdf.size() + column_cdf.size() + row_edges.size()) * sizeof(float);
+}
+
+EnvironmentTables environment_tables_make(const TextureView* map, Vec3f color, float rotation)
+{
+  EnvironmentTables tables;
+  tables.environment.color = color;
+  const double turns = static_cast<double>(rotation) / (2 * std::numbers::pi);
+  tables.environment.rotation_turns = static_cast<float>(turns - std::floor(turns));
+  if (map != nullptr) {
+    tables.environment.has_map = true;
+    tables.environment.map = *map;
+    tables.environment.map.wrap_u = Wrap::kRepeat;
+    tables_fill(tables);
+  }
+  return tables;
+}
+
+}  // namespace relief
