@@ -20,8 +20,8 @@ struct EnvironmentTables {
   std::size_t bytes() const;
 };
 
-/// Most cells along u; half as many along v. 1024 × 512 cells are 2 MiB, a third of a degree each; a finer grid was not
-/// measured to lower the noise of maps up to 16k.
+/// Most cells along u; half as many along v: 2 MiB, about what a core's second-level cache holds; a cell is a third of a
+/// degree wide, less than the sun's disk.
 inline constexpr int kMaxEnvironmentColumns = 1024;
 
 /// Builds the sampling tables, in parallel.

@@ -1,0 +1,168 @@
+// The light that surrounds the scene: a lat-long map or one constant radiance. environment_eval is the light,
+// environment_sample and environment_pdf choose directions in proportion to it; the tables they read are made by
+// integrator/environment_tables.h.
+//
+// Directions: the map's centre looks along −Z, its right half is +X, its top +Y. Direction d of the unrotated map has
+// u = ½ + atan2(d.x, −d.z) / 2π, v = θ / π with θ the angle to +Y; the rotation adds to u.
+#pragma once
+
+#include "kernel/math/vec.h"
+#include "kernel/texture/texture.h"
+
+namespace relief {
+
+/// An environment and its sampling tables. Cells are those of a grid over the map, uniform in u and v; within a cell
+/// directions are uniform in solid angle, so that the density is constant over it and bounded at the poles.
+struct EnvironmentView {
+  Vec3f color{};  ///< radiance factor, strength included; the radiance itself without a map
+  bool has_map = false;
+  float rotation_turns = 0;  ///< rotation about +Y in turns, [0, 1)
+  TextureView map;           ///< repeats in u; copied, so that a look-up needs no further pointer
+
+  int num_columns = 0, num_rows = 0;  ///< of cells; rows even. 0: the map is black, nothing is sampled
+  const float* row_cdf = nullptr;     ///< num_rows + 1, from 0 to 1
+  const float* column_cdf = nullptr;  ///< num_rows × (num_columns + 1), each row from 0 to 1
+  /// num_rows + 1; upper hemisphere: sin²(θ/2) at the row's upper edge, lower hemisphere: cos²(θ/2). Solid angle is
+  /// uniform in either, and either is accurate near its own pole.
+  const float* row_edges = nullptr;
+};
+
+struct EnvironmentSample {
+  Vec3f wi{};                 ///< unit, towards the environment
+  Vec3f radiance{};           ///< of environment_eval(wi)
+  float pdf_solid_angle = 0;  ///< 0: nothing was sampled
+};
+
+/// Position on the map, u in [0, 1], v in [0, 1].
+/// @param wi  unit
+RELIEF_KERNEL Vec2f environment_uv(const EnvironmentView& environment, Vec3f wi)
+{
+  // atan2 of (sine, cosine) instead of acos of the cosine, which has no digits left near the poles.
+  const float sin_theta = __builtin_sqrtf(wi.x * wi.x + wi.z * wi.z);
+  const float v = std::atan2(sin_theta, wi.y) * kInvPi;
+  const float u = 0.5f + std::atan2(wi.x, -wi.z) * (0.5f * kInvPi) + environment.rotation_turns;
+  return {u - __builtin_floorf(u), clamp(v, 0.0f, 1.0f)};
+}
+
+/// Radiance at a position of the map, from environment_uv.
+RELIEF_KERNEL Vec3f environment_eval_uv(const EnvironmentView& environment, Vec2f uv)
+{
+  if (!environment.has_map) {
+    return environment.color;
+  }
+  // Half a texel from the poles the first and last rows are repeated, whatever the texture's own wrap mode.
+  const float half_texel = 0.5f / static_cast<float>(environment.map.height);
+  const Vec2f inside{uv.x, clamp(uv.y, half_texel, 1.0f - half_texel)};
+  const Vec3f value = xyz(texture_sample(environment.map, inside, 0.0f));
+  // Maps resampled with negative lobes have negative texels; light has none.
+  return environment.color * max(value, Vec3f{});
+}
+
+/// Radiance that arrives from a direction.
+/// @param wi  unit, towards the environment, world space
+/// @return    W/m²/sr, >= 0
+RELIEF_KERNEL Vec3f environment_eval(const EnvironmentView& environment, Vec3f wi)
+{
+  return environment_eval_uv(environment, environment_uv(environment, wi));
+}
+
+/// Cell of a cumulative distribution that contains x, and its place in it.
+struct CdfCell {
+  int index = 0;
+  float fraction = 0;     ///< in [0, 1)
+  float probability = 0;  ///< of the cell; > 0
+};
+
+/// @param cdf  num_cells + 1 values from 0 to 1, not decreasing, multiples of 2⁻²⁴ (so that differences are exact)
+/// @param x    in [0, 1)
+/// @return     the cell with cdf[index] <= x < cdf[index + 1]: never one of probability 0
+/// @cost       log2(num_cells) steps
+RELIEF_KERNEL CdfCell cdf_cell(const float* cdf, int num_cells, float x)
+{
+  int low = 0;
+  for (int length = num_cells; length > 1;) {
+    const int half = length / 2;
+    low = cdf[low + half] <= x ? low + half : low;
+    length -= half;
+  }
+  const float probability = cdf[low + 1] - cdf[low];
+  return {low, (x - cdf[low]) / probability, probability};
+}
+
+/// Solid angle of a cell of a row, steradians.
+RELIEF_KERNEL float environment_cell_solid_angle(const EnvironmentView& environment, int row)
+{
+  const float height = __builtin_fabsf(environment.row_edges[row + 1] - environment.row_edges[row]);
+  return 4.0f * kPi * height / static_cast<float>(environment.num_columns);
+}
+
+/// Direction of a place in a cell; inverse of environment_uv with a step from uniform v to uniform solid angle.
+/// @param x, y  place in the cell, in [0, 1); y = 0 is its upper edge
+RELIEF_KERNEL Vec3f environment_direction(const EnvironmentView& environment, int column, int row, float x, float y)
+{
+  const float e = lerp(y, environment.row_edges[row], environment.row_edges[row + 1]);
+  const float cos_theta = 2 * row < environment.num_rows ? 1.0f - 2.0f * e : 2.0f * e - 1.0f;
+  const float sin_theta = 2.0f * safe_sqrt(e * (1.0f - e));
+  const float u = (static_cast<float>(column) + x) / static_cast<float>(environment.num_columns);
+  const float phi = 2.0f * kPi * (u - 0.5f - environment.rotation_turns);
+  return {sin_theta * std::sin(phi), cos_theta, -sin_theta * std::cos(phi)};
+}
+
+/// A direction towards the environment, in proportion to its luminance (averaged over cells).
+/// @param u  uniform in [0, 1)²; u.x chooses the column, u.y the row
+/// @return   uniform over the sphere without a map; pdf 0 for a black map
+RELIEF_KERNEL EnvironmentSample environment_sample(const EnvironmentView& environment, Vec2f u)
+{
+  if (!environment.has_map) {
+    const float z = 1.0f - 2.0f * u.y;
+    const float r = 2.0f * safe_sqrt(u.y * (1.0f - u.y));
+    const float phi = 2.0f * kPi * u.x;
+    return {{r * std::cos(phi), z, r * std::sin(phi)}, environment.color, 0.25f * kInvPi};
+  }
+  if (environment.num_rows == 0) {
+    return {};
+  }
+  const CdfCell row = cdf_cell(environment.row_cdf, environment.num_rows, u.y);
+  const float* column_cdf =
+      environment.column_cdf + static_cast<std::ptrdiff_t>(row.index) * (environment.num_columns + 1);
+  const CdfCell column = cdf_cell(column_cdf, environment.num_columns, u.x);
+  EnvironmentSample sample;
+  sample.wi = environment_direction(environment, column.index, row.index, column.fraction, row.fraction);
+  sample.radiance = environment_eval(environment, sample.wi);
+  sample.pdf_solid_angle = row.probability * column.probability / environment_cell_solid_angle(environment, row.index);
+  return sample;
+}
+
+/// Density of environment_sample at a position of the map.
+RELIEF_KERNEL float environment_pdf_uv(const EnvironmentView& environment, Vec2f uv)
+{
+  if (!environment.has_map) {
+    return 0.25f * kInvPi;
+  }
+  if (environment.num_rows == 0) {
+    return 0.0f;
+  }
+  const int column = axis_nearest(uv.x, environment.num_columns, Wrap::kClamp);
+  const int row = axis_nearest(uv.y, environment.num_rows, Wrap::kClamp);
+  const float* column_cdf = environment.column_cdf + static_cast<std::ptrdiff_t>(row) * (environment.num_columns + 1);
+  const float probability =
+      (environment.row_cdf[row + 1] - environment.row_cdf[row]) * (column_cdf[column + 1] - column_cdf[column]);
+  return probability / environment_cell_solid_angle(environment, row);
+}
+
+/// Density of environment_sample at a direction.
+/// @param wi  unit, world space
+/// @return    1/sr; positive wherever the radiance is
+RELIEF_KERNEL float environment_pdf(const EnvironmentView& environment, Vec3f wi)
+{
+  return environment_pdf_uv(environment, environment_uv(environment, wi));
+}
+
+/// Radiance and density at once, for paths that leave the scene.
+RELIEF_KERNEL EnvironmentSample environment_eval_pdf(const EnvironmentView& environment, Vec3f wi)
+{
+  const Vec2f uv = environment_uv(environment, wi);
+  return {wi, environment_eval_uv(environment, uv), environment_pdf_uv(environment, uv)};
+}
+
+}  // namespace relief
