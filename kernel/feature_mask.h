@@ -1,0 +1,38 @@
+// What shading kernels are instantiated for. A bit that is absent compiles its code and registers away, so a scene
+// pays only for what one of its materials uses. Few bits: every one doubles the number of possible kernels.
+#pragma once
+
+#include "kernel/bsdf/material.h"
+
+namespace relief {
+
+enum FeatureBit : unsigned {
+  kFeatureTextures = 1u << 0,      ///< some material looks a texture up
+  kFeatureNormalMaps = 1u << 1,    ///< normal or clearcoat normal maps
+  kFeatureTransparency = 1u << 2,  ///< alpha below one: masked or blended surfaces
+  kFeatureTransmission = 1u << 3,  ///< glass: solid or thin walls, and absorption inside
+  kFeatureLayers = 1u << 4,        ///< clearcoat or sheen
+  kFeatureMetal = 1u << 5,         ///< metallic above zero
+};
+inline constexpr unsigned kFeatureAll = (1u << 6) - 1u;
+
+/// Bits that one material needs; a scene needs the union over its materials.
+RELIEF_KERNEL unsigned feature_mask_of(const Material& m)
+{
+  const auto has = [](const TextureRef& ref) { return ref.texture_index >= 0; };
+  unsigned mask = 0;
+  if (has(m.base_color_texture) || has(m.metallic_roughness_texture) || has(m.emission_texture) ||
+      has(m.transmission_texture) || has(m.clearcoat_texture) || has(m.clearcoat_roughness_texture) ||
+      has(m.sheen_color_texture) || has(m.sheen_roughness_texture) || has(m.specular_texture) ||
+      has(m.specular_color_texture)) {
+    mask |= kFeatureTextures;
+  }
+  if (has(m.normal_texture) || (m.clearcoat > 0.0f && has(m.clearcoat_normal_texture))) mask |= kFeatureNormalMaps;
+  if (m.alpha_mode != AlphaMode::kOpaque) mask |= kFeatureTransparency;
+  if (m.transmission > 0.0f) mask |= kFeatureTransmission;
+  if (m.clearcoat > 0.0f || max_component(m.sheen_color) > 0.0f) mask |= kFeatureLayers;
+  if (m.metallic > 0.0f) mask |= kFeatureMetal;
+  return mask;
+}
+
+}  // namespace relief
