@@ -78,19 +78,20 @@ RELIEF_KERNEL constexpr float unit_float(std::uint32_t bits) { return static_cas
 /// @param x, y  pixel of the *whole* image, so that a crop has the same numbers
 RELIEF_KERNEL constexpr std::uint32_t sample_pixel_hash(std::uint64_t seed, int x, int y)
 {
-  const std::uint64_t pixel = (static_cast<std::uint64_t>(static_cast<std::uint32_t>(y)) << 32) |
-                              static_cast<std::uint32_t>(x);
+  const std::uint64_t pixel =
+      (static_cast<std::uint64_t>(static_cast<std::uint32_t>(y)) << 32) | static_cast<std::uint32_t>(x);
   return static_cast<std::uint32_t>(hash_mix(hash_mix(seed + 0x9e3779b97f4a7c15u) ^ pixel) >> 32);
 }
 
 /// Scrambling keys of one (pixel, dimension, stream) and the shuffled index of one sample in it.
 struct SampleKeys {
-  std::uint32_t index = 0;    ///< position in the Sobol sequence
+  std::uint32_t index = 0;  ///< position in the Sobol sequence
   std::uint32_t seed_x = 0, seed_y = 0;
 };
 
 /// @param dimension  see dimensions.h; below 2^31
-RELIEF_KERNEL constexpr SampleKeys sample_keys(std::uint32_t pixel_hash, std::uint32_t sample_index,
+RELIEF_KERNEL constexpr SampleKeys sample_keys(std::uint32_t pixel_hash,
+                                               std::uint32_t sample_index,
                                                std::uint32_t dimension)
 {
   const std::uint32_t stream = sample_index & 1u;

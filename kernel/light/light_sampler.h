@@ -1,0 +1,196 @@
+// Chooses a light for next-event estimation and samples it. Three groups compete: the environment, the suns, and the
+// finite lights (light_tree.h). Each is given an estimate of the irradiance it causes at the point,
+//   environment: π × mean radiance;   suns: irradiance × cosine, summed;   finite lights: sum of the cut's importances,
+// and is chosen with probability  ¾ · estimate / sum + ¼ / number of groups whose estimate is not zero.
+// The second term is defensive: none of the estimates knows about shadows, so no group may starve. A group that is alone
+// costs nothing: its probability is 1 and no estimate is made for the environment or a single sun.
+#pragma once
+
+#include "kernel/light/disk.h"
+#include "kernel/light/environment.h"
+#include "kernel/light/light_tree.h"
+#include "kernel/light/mesh_light.h"
+#include "kernel/light/point.h"
+#include "kernel/light/rectangle.h"
+#include "kernel/light/spot.h"
+#include "kernel/light/sun.h"
+#include "kernel/sample/sobol.h"
+
+namespace relief {
+
+/// All light of a scene; LightSet owns what it points to.
+struct LightsView {
+  const Light* lights = nullptr;
+  std::uint32_t num_lights = 0;
+  const LightTreeNode* nodes = nullptr;         ///< the cut, then pairs of children
+  std::uint32_t num_cut = 0;                    ///< 0: no finite light
+  const std::uint32_t* light_trails = nullptr;  ///< one a light, see light_tree_pdf
+  const std::uint32_t* suns = nullptr;          ///< indices into `lights`
+  std::uint32_t num_suns = 0;
+  EnvironmentView environment;
+  float environment_irradiance = 0;  ///< π × mean radiance (mean of R, G, B); 0: no environment
+};
+
+/// How likely each group is, and the estimates needed to go on.
+struct LightGroups {
+  float environment = 0, suns = 0, finite = 0;  ///< probabilities; all 0: nothing can contribute
+  float sun_sum = 0;                            ///< estimate summed over the suns
+  LightCut cut;
+};
+
+/// Mean of the three channels: the scalar by which lights are compared.
+RELIEF_KERNEL float light_scalar(Vec3f rgb) { return (rgb.x + rgb.y + rgb.z) * (1.0f / 3.0f); }
+
+/// Estimate of one sun's irradiance; 0 below the horizon of N.
+RELIEF_KERNEL float light_sun_importance(const Light& sun, Vec3f N)
+{
+  const float cosine = is_zero(N) ? 1.0f : -dot(N, sun.axis);
+  return cosine > 0.0f ? min(light_scalar(sun.emission) * cosine, 1e30f) : 0.0f;
+}
+
+RELIEF_KERNEL LightGroups light_groups_eval(const LightsView& view, Vec3f P, Vec3f N)
+{
+  LightGroups groups;
+  for (std::uint32_t i = 0; i < view.num_suns; ++i) {
+    groups.sun_sum += light_sun_importance(view.lights[view.suns[i]], N);
+  }
+  groups.cut = light_cut_eval(view.nodes, view.num_cut, P, N);
+
+  const float sum = view.environment_irradiance + groups.sun_sum + groups.cut.sum;
+  const int num_groups =
+      (view.environment_irradiance > 0.0f ? 1 : 0) + (groups.sun_sum > 0.0f ? 1 : 0) + (groups.cut.sum > 0.0f ? 1 : 0);
+  if (num_groups == 0) return groups;
+  constexpr float kDefensive = 0.25f;
+  const float share = kDefensive / static_cast<float>(num_groups);
+  const float scale = (1.0f - kDefensive) / sum;
+  if (view.environment_irradiance > 0.0f) groups.environment = scale * view.environment_irradiance + share;
+  if (groups.sun_sum > 0.0f) groups.suns = scale * groups.sun_sum + share;
+  if (groups.cut.sum > 0.0f) groups.finite = scale * groups.cut.sum + share;
+  return groups;
+}
+
+/// Samples a chosen light of any kind; the choice's probability is not in the pdf.
+RELIEF_KERNEL LightSample light_sample(const Light& light, Vec3f P, Vec2f u)
+{
+  switch (light.kind) {
+    case LightKind::kPoint:
+      return point_light_sample(light, P);
+    case LightKind::kSpot:
+      return spot_light_sample(light, P);
+    case LightKind::kSun:
+      return sun_light_sample(light);
+    case LightKind::kRectangle:
+      return rectangle_light_sample(light, P, u);
+    case LightKind::kDisk:
+      return disk_light_sample(light, P, u);
+    case LightKind::kTriangle:
+      return triangle_light_sample(light, P, u);
+    case LightKind::kEnvironment:
+      break;
+  }
+  return {};
+}
+
+/// Solid-angle density of light_sample for a ray that hit the light; 0 for delta kinds.
+RELIEF_KERNEL float light_pdf(const Light& light, Vec3f P, Vec3f wi, float distance)
+{
+  switch (light.kind) {
+    case LightKind::kRectangle:
+      return rectangle_light_pdf(light, P, wi, distance);
+    case LightKind::kDisk:
+      return disk_light_pdf(light, P, wi, distance);
+    case LightKind::kTriangle:
+      return triangle_light_pdf(light, P, wi, distance);
+    default:
+      return 0.0f;
+  }
+}
+
+/// Samples the environment; the choice's probability is not in the pdf.
+RELIEF_KERNEL LightSample light_environment_sample(const EnvironmentView& environment, Vec2f u)
+{
+  const EnvironmentSample found = environment_sample(environment, u);
+  LightSample sample;
+  sample.wi = found.wi;
+  sample.distance = kInfinity;
+  sample.radiance = found.radiance;
+  sample.pdf = found.pdf_solid_angle;
+  return sample;
+}
+
+/// Chooses one light or the environment by estimated contribution at P and samples it.
+/// @param P         world
+/// @param N         unit shading normal when only light from its side matters; zero vector: light from all sides does
+/// @param u_choice  [0, 1)
+/// @param u         [0, 1)²
+/// @return          pdf includes the choice; see LightSample
+RELIEF_KERNEL LightSample lights_sample(const LightsView& view, Vec3f P, Vec3f N, float u_choice, Vec2f u)
+{
+  const LightGroups groups = light_groups_eval(view, P, N);
+  // A deep tree wants more bits than a float has; the ones of the point on the light serve as the missing low ones.
+  const std::uint64_t low_bits = hash_mix((static_cast<std::uint64_t>(__builtin_bit_cast(std::uint32_t, u.x)) << 32) |
+                                          __builtin_bit_cast(std::uint32_t, u.y));
+  double choice = static_cast<double>(u_choice) + static_cast<double>(low_bits >> 32) * 0x1p-56;
+
+  LightSample sample;
+  const double p_environment = static_cast<double>(groups.environment);
+  const double p_suns = static_cast<double>(groups.suns);
+  if (choice < p_environment) {
+    sample = light_environment_sample(view.environment, u);
+    sample.pdf *= groups.environment;
+    return sample;
+  }
+  choice -= p_environment;
+  if (choice < p_suns) {
+    float target = static_cast<float>(choice / p_suns) * groups.sun_sum;
+    for (std::uint32_t i = 0; i < view.num_suns; ++i) {
+      const Light& sun = view.lights[view.suns[i]];
+      const float importance = light_sun_importance(sun, N);
+      if (!(importance > 0.0f)) continue;
+      sample = sun_light_sample(sun);
+      sample.pdf = groups.suns * importance / groups.sun_sum;
+      sample.light_index = static_cast<std::int32_t>(view.suns[i]);
+      if (target < importance) break;
+      target -= importance;
+    }
+    return sample;
+  }
+  if (!(groups.finite > 0.0f)) return sample;
+  const double in_group = (choice - p_suns) / static_cast<double>(groups.finite);
+  const LightChoice chosen =
+      light_tree_sample(view.nodes, view.num_cut, groups.cut, P, N, in_group < 1.0 ? in_group : 0x1.fffffep-1);
+  if (!(chosen.probability > 0.0f)) return sample;
+  sample = light_sample(view.lights[chosen.light_index], P, u);
+  sample.pdf *= groups.finite * chosen.probability;
+  sample.light_index = static_cast<std::int32_t>(chosen.light_index);
+  return sample;
+}
+
+/// Density with which lights_sample, called at P, would have made a ray that hit an area light.
+/// @param N            as handed to lights_sample
+/// @param light_index  rectangle, disk or triangle
+/// @param wi           unit, from P to the light
+/// @param distance     metres, of the hit
+/// @return             solid angle × choice, as LightSample::pdf
+RELIEF_KERNEL float lights_pdf(const LightsView& view,
+                               Vec3f P,
+                               Vec3f N,
+                               std::uint32_t light_index,
+                               Vec3f wi,
+                               float distance)
+{
+  const LightGroups groups = light_groups_eval(view, P, N);
+  const float choice = light_tree_pdf(view.nodes, groups.cut, P, N, light_index, view.light_trails[light_index]);
+  if (!(choice > 0.0f)) return 0.0f;
+  return groups.finite * choice * light_pdf(view.lights[light_index], P, wi, distance);
+}
+
+/// Density with which lights_sample, called at P, would have chosen a direction of the environment.
+RELIEF_KERNEL float lights_environment_pdf(const LightsView& view, Vec3f P, Vec3f N, Vec3f wi)
+{
+  if (!(view.environment_irradiance > 0.0f)) return 0.0f;
+  if (view.num_suns == 0 && view.num_cut == 0) return environment_pdf(view.environment, wi);
+  return light_groups_eval(view, P, N).environment * environment_pdf(view.environment, wi);
+}
+
+}  // namespace relief
