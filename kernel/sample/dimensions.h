@@ -7,31 +7,35 @@
 
 namespace relief {
 
-/// Uses before the first surface. The comment says which of sample_1d, sample_2d the use calls.
-enum class CameraUse : std::uint32_t {
-  kPixelFilter,  ///< 2d
-  kLens,         ///< 2d
-  kNum
+/// Uses before the first surface.
+enum class CameraDimension : std::uint32_t {
+  kFilm,  ///< 2D: place within the pixel filter
+  kLens,  ///< 2D: place on the aperture
+  kCount
 };
 
-/// Uses at every surface a path meets.
-enum class BounceUse : std::uint32_t {
-  kLobe,             ///< 1d, which lobe scatters
-  kBsdf,             ///< 2d, direction within the lobe
-  kLightChoice,      ///< 1d, which light
-  kLight,            ///< 2d, point on the light
-  kRussianRoulette,  ///< 1d
-  kTransparency,     ///< 1d, whether a partly transparent surface is there
-  kNum
+/// Uses at every surface that a path meets.
+enum class BounceDimension : std::uint32_t {
+  kBsdfLobe,      ///< 1D: which lobe scatters
+  kBsdfUv,        ///< 2D: direction within the lobe
+  kLightChoice,   ///< 1D: which light
+  kLightUv,       ///< 2D: place on the light
+  kRoulette,      ///< 1D: whether the path goes on
+  kTransparency,  ///< 1D: whether a partly transparent surface is there
+  kCount
 };
 
-RELIEF_KERNEL constexpr std::uint32_t sample_dimension(CameraUse use) { return static_cast<std::uint32_t>(use); }
+inline constexpr std::uint32_t kDimensionsPerBounce = static_cast<std::uint32_t>(BounceDimension::kCount);
 
-/// @param bounce  surfaces the path has met before, transparent ones included
-RELIEF_KERNEL constexpr std::uint32_t sample_dimension(std::uint32_t bounce, BounceUse use)
+/// @return dimension for sample_2d
+RELIEF_KERNEL constexpr std::uint32_t dimension_camera(CameraDimension use) { return static_cast<std::uint32_t>(use); }
+
+/// @param bounce  scattering events of the path before this surface, >= 0
+/// @return        dimension for sample_1d or sample_2d, as the use says
+RELIEF_KERNEL constexpr std::uint32_t dimension_bounce(int bounce, BounceDimension use)
 {
-  return static_cast<std::uint32_t>(CameraUse::kNum) + bounce * static_cast<std::uint32_t>(BounceUse::kNum) +
-         static_cast<std::uint32_t>(use);
+  return static_cast<std::uint32_t>(CameraDimension::kCount) +
+         static_cast<std::uint32_t>(bounce) * kDimensionsPerBounce + static_cast<std::uint32_t>(use);
 }
 
 }  // namespace relief
