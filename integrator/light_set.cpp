@@ -1,0 +1,492 @@
+#include "integrator/light_set.h"
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "kernel/texture/texture.h"
+
+namespace relief {
+namespace {
+
+constexpr float kPiAngle = std::numbers::pi_v<float>;
+
+/// Cone of directions: unit axis and half angle in radians, [0, π].
+struct Cone {
+  Vec3f axis{0, 0, 1};
+  float angle = 0;
+};
+
+/// Smallest cone around two.
+/// @source Conty Estevez and Kulla 2018, Algorithm 1
+Cone cone_union(const Cone& a, const Cone& b)
+{
+  const Cone& wide = a.angle >= b.angle ? a : b;
+  const Cone& narrow = a.angle >= b.angle ? b : a;
+  const float between = std::atan2(length(cross(wide.axis, narrow.axis)), dot(wide.axis, narrow.axis));
+  if (std::min(between + narrow.angle, kPiAngle) <= wide.angle) return wide;
+  const float angle = 0.5f * (wide.angle + between + narrow.angle);
+  if (angle >= kPiAngle) return {wide.axis, kPiAngle};
+  // Turn the wide cone's axis towards the narrow one's; opposite axes have no direction to turn in.
+  const Vec3f turn = narrow.axis - wide.axis * dot(wide.axis, narrow.axis);
+  const float turn_length = length(turn);
+  if (!(turn_length > 1e-6f)) return {wide.axis, kPiAngle};
+  const float by = angle - wide.angle;
+  return {normalize(wide.axis * std::cos(by) + turn * (std::sin(by) / turn_length)), angle};
+}
+
+/// What the build knows of a light or a group; the tree's nodes are made from these.
+struct LightBounds {
+  Vec3f low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
+  Cone spread;
+  float falloff = 0;    ///< radians
+  float intensity = 0;  ///< 0: empty group
+  bool two_sided = false;
+};
+
+LightBounds bounds_union(const LightBounds& a, const LightBounds& b)
+{
+  if (a.intensity == 0) return b;
+  if (b.intensity == 0) return a;
+  LightBounds both;
+  both.low = min(a.low, b.low);
+  both.high = max(a.high, b.high);
+  both.spread = cone_union(a.spread, b.spread);
+  both.falloff = std::max(a.falloff, b.falloff);
+  both.intensity = std::min(a.intensity + b.intensity, 1e30f);
+  both.two_sided = a.two_sided || b.two_sided;
+  return both;
+}
+
+Vec3f bounds_centre(const LightBounds& bounds) { return bounds.low * 0.5f + bounds.high * 0.5f; }
+
+/// @param scale  mean of the emission texture
+/// @return       intensity 0: the light never needs choosing
+LightBounds light_bounds(const Light& light, float scale)
+{
+  LightBounds bounds;
+  const float emission = light_scalar(light.emission) * scale;
+  const auto include = [&bounds](Vec3f P) {
+    bounds.low = min(bounds.low, P);
+    bounds.high = max(bounds.high, P);
+  };
+  switch (light.kind) {
+    case LightKind::kPoint:
+      include(light.P);
+      bounds.spread = {{0, 0, 1}, kPiAngle};
+      bounds.falloff = 0.5f * kPiAngle;
+      bounds.intensity = emission;
+      break;
+    case LightKind::kSpot: {
+      include(light.P);
+      const float inner = std::acos(std::clamp(light.cos_inner, -1.0f, 1.0f));
+      const float outer = std::acos(std::clamp(light.cos_outer, -1.0f, 1.0f));
+      bounds.spread = {light.axis, std::min(inner, outer)};
+      bounds.falloff = std::max(outer - inner, 0.0f);
+      bounds.intensity = emission;
+      break;
+    }
+    case LightKind::kRectangle:
+    case LightKind::kDisk:
+      for (const float u : {-1.0f, 1.0f}) {
+        for (const float v : {-1.0f, 1.0f})
+          include(light.P + light.edge_u * u + light.edge_v * v);
+      }
+      break;
+    case LightKind::kTriangle:
+      include(light.P);
+      include(light.P + light.edge_u);
+      include(light.P + light.edge_v);
+      break;
+    case LightKind::kSun:
+    case LightKind::kEnvironment:
+      return {};
+  }
+  if (light.kind == LightKind::kRectangle || light.kind == LightKind::kDisk || light.kind == LightKind::kTriangle) {
+    bounds.spread = {light.axis, 0.0f};
+    bounds.falloff = 0.5f * kPiAngle;
+    bounds.intensity = emission * light.area;
+    bounds.two_sided = light.two_sided;
+  }
+  const bool usable = bounds.intensity > 0.0f && is_finite(bounds.low) && is_finite(bounds.high);
+  if (!usable) return {};
+  bounds.intensity = std::min(bounds.intensity, 1e30f);
+  return bounds;
+}
+
+/// Conservative node of a group or light.
+/// @param link  without the two-sided flag
+LightTreeNode node_make(const LightBounds& bounds, std::uint32_t link)
+{
+  LightTreeNode node;
+  const Vec3f centre = bounds_centre(bounds);
+  const Vec3f half = bounds.high * 0.5f - bounds.low * 0.5f;
+  node.cx = centre.x;
+  node.cy = centre.y;
+  node.cz = centre.z;
+  // A few ulps for the roundings of centre, halves and length; a point light at the origin keeps radius 0.
+  const float radius =
+      length(half) * (1.0f + 1e-6f) + 4e-7f * max_component(abs(centre)) * (length(half) > 0 ? 1.0f : 0.0f);
+  node.radius_bits = light_tree_encode_radius(radius);
+  node.intensity = bounds.intensity;
+  const auto quantize = [](float v) {
+    return static_cast<std::int16_t>(std::lround(std::clamp(v, -1.0f, 1.0f) * 32767.0f));
+  };
+  node.ax = quantize(bounds.spread.axis.x);
+  node.ay = quantize(bounds.spread.axis.y);
+  node.az = quantize(bounds.spread.axis.z);
+  node.cos_spread = light_tree_encode_cos(std::cos(std::min(bounds.spread.angle, kPiAngle)));
+  node.cos_falloff = light_tree_encode_cos(std::cos(bounds.falloff));
+  node.link = link | (bounds.two_sided ? kLightTreeTwoSided : 0u);
+  return node;
+}
+
+/// Cost of a group by its orientation: solid angle of its emission, weighted by the cosine it falls off with.
+/// @source Conty Estevez and Kulla 2018, Eq. 1
+float orientation_cost(const LightBounds& bounds)
+{
+  const float spread = bounds.two_sided ? kPiAngle : bounds.spread.angle;
+  const float reach = std::min(spread + bounds.falloff, kPiAngle);
+  const float sin_spread = std::sin(spread), cos_spread = std::cos(spread);
+  return 2.0f * kPiAngle * (1.0f - cos_spread) +
+         0.5f * kPiAngle *
+             (2.0f * reach * sin_spread - std::cos(spread - 2.0f * reach) - 2.0f * spread * sin_spread + cos_spread);
+}
+
+/// Cost of a group in a split: intensity × orientation × surface of the box.
+float group_cost(const LightBounds& bounds)
+{
+  if (bounds.intensity == 0) return 0;
+  const Vec3f d = bounds.high - bounds.low;
+  return bounds.intensity * orientation_cost(bounds) * (d.x * d.y + d.y * d.z + d.z * d.x);
+}
+
+struct BuildLight {
+  LightBounds bounds;
+  Vec3f centre;
+  std::uint32_t light_index = 0;
+};
+
+/// Where a range of lights is cut in two.
+struct Split {
+  std::size_t middle = 0;  ///< lights in the first part
+};
+
+float component(Vec3f v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+
+struct RangeBounds {
+  LightBounds bounds;
+  Vec3f centre_low{kInfinity, kInfinity, kInfinity}, centre_high{-kInfinity, -kInfinity, -kInfinity};
+};
+
+RangeBounds range_bounds(std::span<const BuildLight> lights)
+{
+  RangeBounds range;
+  for (const BuildLight& light : lights) {
+    range.bounds = bounds_union(range.bounds, light.bounds);
+    range.centre_low = min(range.centre_low, light.centre);
+    range.centre_high = max(range.centre_high, light.centre);
+  }
+  return range;
+}
+
+/// Reorders a range so that its first `result` lights are one child: binned by centre on each axis, the least sum of the
+/// children's costs wins.
+/// @param depth_left  levels that may follow; the split is balanced when an unbalanced one might run out of them
+/// @pre               at least two lights, 2^depth_left >= their number
+/// @source Conty Estevez and Kulla 2018, Eq. 2
+std::size_t range_split(std::span<BuildLight> lights, const RangeBounds& range, int depth_left)
+{
+  constexpr int kBins = 16;
+  const Vec3f extent = range.centre_high - range.centre_low;
+  const float longest = max_component(extent);
+  const std::size_t half = lights.size() / 2;
+  float best_cost = kInfinity;
+  int best_axis = -1, best_bin = 0;
+  const auto bin_of = [&](const BuildLight& light, int axis) {
+    const float x = (component(light.centre, axis) - component(range.centre_low, axis)) / component(extent, axis);
+    return std::clamp(static_cast<int>(x * kBins), 0, kBins - 1);
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(component(extent, axis) > 0.0f)) continue;
+    std::array<LightBounds, kBins> bins;
+    for (const BuildLight& light : lights) {
+      LightBounds& bin = bins[static_cast<std::size_t>(bin_of(light, axis))];
+      bin = bounds_union(bin, light.bounds);
+    }
+    std::array<float, kBins> cost_above{};
+    LightBounds above;
+    for (int i = kBins - 1; i > 0; --i) {
+      above = bounds_union(above, bins[static_cast<std::size_t>(i)]);
+      cost_above[static_cast<std::size_t>(i)] = group_cost(above);
+    }
+    LightBounds below;
+    // Splits across the longest side are preferred: thin slabs of lights are poor groups.
+    const float regularity = longest / component(extent, axis);
+    for (int i = 1; i < kBins; ++i) {
+      below = bounds_union(below, bins[static_cast<std::size_t>(i - 1)]);
+      const float cost = regularity * (group_cost(below) + cost_above[static_cast<std::size_t>(i)]);
+      if (below.intensity > 0 && cost < best_cost) {
+        best_cost = cost;
+        best_axis = axis;
+        best_bin = i;
+      }
+    }
+  }
+  if (best_axis >= 0) {
+    const auto middle = std::stable_partition(
+        lights.begin(), lights.end(), [&](const BuildLight& light) { return bin_of(light, best_axis) < best_bin; });
+    const auto first = static_cast<std::size_t>(middle - lights.begin());
+    const std::size_t larger = std::max(first, lights.size() - first);
+    const bool fits = depth_left > 40 || larger <= std::size_t{1} << (depth_left - 1);
+    if (first > 0 && first < lights.size() && fits) return first;
+  }
+  // Coincident centres, costs that overflow, or no depth to spare: halves, by position along the longest side.
+  const int axis = extent.x == longest ? 0 : extent.y == longest ? 1 : 2;
+  std::stable_sort(lights.begin(), lights.end(), [axis](const BuildLight& a, const BuildLight& b) {
+    return component(a.centre, axis) < component(b.centre, axis);
+  });
+  return half;
+}
+
+/// Builds the tree below one node. A range of n lights needs 2n − 2 nodes below it, so every range knows its place in
+/// `nodes` beforehand: threads share nothing and the layout does not depend on them.
+struct TreeBuilder {
+  std::span<LightTreeNode> nodes;
+  std::span<std::uint32_t> trails;
+
+  /// @param node   where the range's own node goes
+  /// @param below  first of the 2n − 2 nodes below it
+  /// @param trail  way to the node; `shift`: its length in bits
+  void build(std::span<BuildLight> lights, std::size_t node, std::size_t below, std::uint32_t trail, int shift) const
+  {
+    if (lights.size() == 1) {
+      nodes[node] = node_make(lights[0].bounds, lights[0].light_index | kLightTreeLeaf);
+      trails[lights[0].light_index] = trail;
+      return;
+    }
+    const RangeBounds range = range_bounds(lights);
+    nodes[node] = node_make(range.bounds, static_cast<std::uint32_t>(below));
+    const std::size_t middle = range_split(lights, range, 32 - shift);
+    const auto first = [&, this] { build(lights.first(middle), below, below + 2, trail, shift + 1); };
+    const auto second = [&, this] {
+      build(lights.subspan(middle), below + 1, below + 2 * middle, trail | 1u << shift, shift + 1);
+    };
+    // Below this size a task costs more than it saves.
+    constexpr std::size_t kParallelLights = 2048;
+    if (lights.size() >= kParallelLights) {
+      tbb::parallel_invoke(first, second);
+    } else {
+      first();
+      second();
+    }
+  }
+};
+
+/// Splits the whole range into the groups of the cut: always the group with the greatest cost, until there are eight.
+std::vector<std::span<BuildLight>> cut_make(std::span<BuildLight> lights)
+{
+  struct Group {
+    std::span<BuildLight> lights;
+    RangeBounds range;
+    float cost = 0;
+  };
+  const auto group_make = [](std::span<BuildLight> part) {
+    Group group{part, range_bounds(part), 0};
+    group.cost = part.size() > 1 ? group_cost(group.range.bounds) : -1.0f;
+    return group;
+  };
+  std::vector<Group> groups;
+  if (!lights.empty()) groups.push_back(group_make(lights));
+  while (!groups.empty() && groups.size() < kLightTreeMaxCut) {
+    const auto worst =
+        std::max_element(groups.begin(), groups.end(), [](const Group& a, const Group& b) { return a.cost < b.cost; });
+    if (worst->lights.size() < 2) break;
+    const Group group = *worst;
+    const std::size_t middle = range_split(group.lights, group.range, 64);
+    *worst = group_make(group.lights.first(middle));
+    groups.insert(worst + 1, group_make(group.lights.subspan(middle)));
+  }
+  std::vector<std::span<BuildLight>> cut;
+  for (const Group& group : groups)
+    cut.push_back(group.lights);
+  return cut;
+}
+
+/// Mean of an emission texture over a triangle, as a scalar.
+/// @param emission  factor that the texture multiplies: channels that do not emit do not count
+/// @cost            ten look-ups, each with the footprint of a tenth of the triangle
+float mean_emission_scale(const TextureView& texture,
+                          const TextureRef& ref,
+                          const MeshView& mesh,
+                          std::uint32_t triangle,
+                          Vec3f emission)
+{
+  const Vec2f* uv = mesh.uv[ref.uv_set];
+  const TriangleIndices tri = mesh.triangles[triangle];
+  const Vec2f zero{};
+  const Vec2f t0 = texture_ref_uv(ref, uv != nullptr ? uv[tri.v0] : zero);
+  const Vec2f t1 = texture_ref_uv(ref, uv != nullptr ? uv[tri.v1] : zero);
+  const Vec2f t2 = texture_ref_uv(ref, uv != nullptr ? uv[tri.v2] : zero);
+  const Vec2f d1 = t1 - t0, d2 = t2 - t0;
+  const float uv_area = 0.5f * std::abs(difference_of_products(d1.x, d2.y, d1.y, d2.x));
+  // Points of a regular lattice of three a side; with footprints that overlap, no texel of the triangle is left out.
+  constexpr int kSide = 3;
+  const float width = std::sqrt(uv_area / (0.5f * kSide * kSide)) * 1.5f;
+  Vec3f sum{};
+  int count = 0;
+  for (int i = 0; i <= kSide; ++i) {
+    for (int j = 0; i + j <= kSide; ++j) {
+      const float b1 = (static_cast<float>(i) + 1.0f / 3.0f) / (kSide + 1.0f);
+      const float b2 = (static_cast<float>(j) + 1.0f / 3.0f) / (kSide + 1.0f);
+      sum += max(xyz(texture_sample(texture, t0 + b1 * d1 + b2 * d2, width)), Vec3f{});
+      ++count;
+    }
+  }
+  const float mean = light_scalar(emission * sum) / (static_cast<float>(count) * light_scalar(emission));
+  return is_finite(mean) ? mean : 1.0f;
+}
+
+Light triangle_light(const Instance& instance, const MeshView& mesh, std::uint32_t triangle, bool two_sided)
+{
+  Light light;
+  light.kind = LightKind::kTriangle;
+  light.two_sided = two_sided;
+  const TriangleIndices tri = mesh.triangles[triangle];
+  light.P = transform_point(instance.world_from_object, mesh.P[tri.v0]);
+  light.edge_u = transform_vector(instance.world_from_object, mesh.P[tri.v1] - mesh.P[tri.v0]);
+  light.edge_v = transform_vector(instance.world_from_object, mesh.P[tri.v2] - mesh.P[tri.v0]);
+  const Vec3f normal = cross(light.edge_u, light.edge_v);
+  const float double_area = length(normal);
+  if (double_area > 0.0f && is_finite(double_area)) {
+    light.area = 0.5f * double_area;
+    light.axis = normal * ((determinant(instance.world_from_object) < 0.0f ? -1.0f : 1.0f) / double_area);
+  }
+  light.triangle_index = static_cast<std::int32_t>(triangle);
+  return light;
+}
+
+bool emits(const Material& material)
+{
+  return !is_zero(material.emission) && !material.unlit && material.displacement_index < 0;
+}
+
+/// π × mean radiance over the sphere, by the environment's own importance sampling: exact up to the variation within the
+/// cells of its tables, so a small sun in the map is not missed.
+float environment_irradiance(const EnvironmentView& environment)
+{
+  if (!environment.has_map) return kPi * light_scalar(environment.color);
+  constexpr std::uint32_t kSamples = 4096;
+  double sum = 0;
+  for (std::uint32_t i = 0; i < kSamples; ++i) {
+    const EnvironmentSample sample = environment_sample(environment, sample_2d(0, 2 * i, 0));
+    if (sample.pdf_solid_angle > 0.0f) {
+      sum += static_cast<double>(light_scalar(sample.radiance)) / static_cast<double>(sample.pdf_solid_angle);
+    }
+  }
+  return std::min(static_cast<float>(sum / kSamples * 0.25), 1e30f);
+}
+
+}  // namespace
+
+void light_set_build_tree(LightSet& set, std::span<const float> intensity_scales)
+{
+  set.suns.clear();
+  set.area_lights.clear();
+  std::vector<BuildLight> finite;
+  for (std::size_t i = 0; i < set.lights.size(); ++i) {
+    const Light& light = set.lights[i];
+    const auto index = static_cast<std::uint32_t>(i);
+    if (light.kind == LightKind::kSun) set.suns.push_back(index);
+    if (light.kind == LightKind::kRectangle || light.kind == LightKind::kDisk) set.area_lights.push_back(index);
+    const LightBounds bounds = light_bounds(light, intensity_scales.empty() ? 1.0f : intensity_scales[i]);
+    if (bounds.intensity > 0.0f) finite.push_back({bounds, bounds_centre(bounds), index});
+  }
+
+  const std::vector<std::span<BuildLight>> cut = cut_make(finite);
+  set.num_cut = static_cast<std::uint32_t>(cut.size());
+  set.light_trails.assign(set.lights.size(), 0u);
+  // Pairs of children start at even indices, so that each lies in one cache line.
+  std::size_t below = (cut.size() + 1) / 2 * 2;
+  std::size_t num_nodes = below;
+  for (const std::span<BuildLight>& group : cut)
+    num_nodes += 2 * group.size() - 2;
+  set.nodes.assign(num_nodes, {});
+  const TreeBuilder builder{set.nodes, set.light_trails};
+  for (std::size_t i = 0; i < cut.size(); ++i) {
+    builder.build(cut[i], i, below, static_cast<std::uint32_t>(i), 3);
+    below += 2 * cut[i].size() - 2;
+  }
+}
+
+LightSet light_set_make(const Scene& scene, std::span<const TextureView> textures)
+{
+  LightSet set;
+  const auto texture_view = [&](int index) {
+    return index >= 0 ? &textures[static_cast<std::size_t>(index)] : nullptr;
+  };
+  set.environment = environment_tables_make(texture_view(scene.environment.texture_index), scene.environment.color,
+                                            scene.environment.rotation);
+  set.environment_irradiance = environment_irradiance(set.environment.view());
+
+  set.lights = scene.lights;
+  set.first_light_index.assign(scene.instances.size(), -1);
+  std::size_t num_lights = scene.lights.size();
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const Instance& instance = scene.instances[i];
+    if (!emits(scene.materials[static_cast<std::size_t>(instance.material_index)])) continue;
+    set.first_light_index[i] = static_cast<std::int32_t>(num_lights);
+    num_lights += scene.meshes[static_cast<std::size_t>(instance.mesh_index)].triangles.size();
+  }
+  set.lights.resize(num_lights);
+  std::vector<float> scales(num_lights, 1.0f);
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    if (set.first_light_index[i] < 0) continue;
+    const Instance& instance = scene.instances[i];
+    const MeshView mesh = scene.meshes[static_cast<std::size_t>(instance.mesh_index)].view();
+    const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
+    const TextureView* texture = texture_view(material.emission_texture.texture_index);
+    const auto first = static_cast<std::size_t>(set.first_light_index[i]);
+    tbb::parallel_for(std::uint32_t{0}, mesh.num_triangles, [&](std::uint32_t triangle) {
+      Light light = triangle_light(instance, mesh, triangle, material.double_sided);
+      light.emission = material.emission;
+      light.instance_index = static_cast<std::int32_t>(i);
+      set.lights[first + triangle] = light;
+      if (texture != nullptr) {
+        scales[first + triangle] =
+            mean_emission_scale(*texture, material.emission_texture, mesh, triangle, material.emission);
+      }
+    });
+  }
+  light_set_build_tree(set, scales);
+  return set;
+}
+
+LightsView LightSet::view() const
+{
+  LightsView v;
+  v.lights = lights.data();
+  v.num_lights = static_cast<std::uint32_t>(lights.size());
+  v.nodes = nodes.data();
+  v.num_cut = num_cut;
+  v.light_trails = light_trails.data();
+  v.suns = suns.data();
+  v.num_suns = static_cast<std::uint32_t>(suns.size());
+  v.environment = environment.view();
+  v.environment_irradiance = environment_irradiance;
+  return v;
+}
+
+std::size_t LightSet::bytes() const
+{
+  return lights.size() * sizeof(Light) + first_light_index.size() * sizeof(std::int32_t) +
+         (area_lights.size() + suns.size() + light_trails.size()) * sizeof(std::uint32_t) +
+         nodes.size() * sizeof(LightTreeNode) + environment.bytes();
+}
+
+}  // namespace relief
