@@ -1,0 +1,210 @@
+#include "scene/mip_chain.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <new>
+#include <vector>
+
+#include "kernel/assert.h"
+
+namespace relief {
+namespace {
+
+/// Levels start at cache lines.
+constexpr std::size_t kLevelAlignment = 64;
+
+/// Nearest 8-bit sRGB code of a linear value, by a first guess from a table and exact comparisons.
+class SrgbEncoder {
+ public:
+  SrgbEncoder()
+  {
+    for (int code = 0; code < 255; ++code) {
+      // "Nearest" is meant in the encoded scale, where codes are equally far apart.
+      const double encoded = (code + 0.5) / 255.0;
+      const double linear = encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
+      upper_bound_[static_cast<std::size_t>(code)] = static_cast<float>(linear);
+    }
+    upper_bound_[255] = kInfinity;
+    int code = 0;
+    for (std::size_t i = 0; i < kGuesses; ++i) {
+      while (static_cast<float>(i) / kGuesses > upper_bound_[static_cast<std::size_t>(code)]) {
+        ++code;
+      }
+      guess_[i] = static_cast<unsigned char>(code);
+    }
+  }
+
+  /// @param linear  in [0, 1]
+  unsigned char encode(float linear) const
+  {
+    const auto i = static_cast<std::size_t>(linear * kGuesses);
+    unsigned char code = guess_[std::min(i, kGuesses - 1)];
+    while (linear > upper_bound_[code]) {
+      ++code;
+    }
+    return code;
+  }
+
+ private:
+  static constexpr std::size_t kGuesses = 4096;
+  std::array<float, 256> upper_bound_{};
+  std::array<unsigned char, kGuesses> guess_{};
+};
+
+/// The texels of the finer level that one texel of the coarser one covers along one side, and their shares.
+struct Coverage {
+  int first = 0, count = 0;
+  float weights[3] = {};
+};
+
+std::vector<Coverage> coverage_make(int fine_size, int coarse_size)
+{
+  std::vector<Coverage> coverage(static_cast<std::size_t>(coarse_size));
+  for (int i = 0; i < coarse_size; ++i) {
+    // In units of 1 / coarse_size of a fine texel all borders are integers.
+    const std::int64_t begin = std::int64_t{i} * fine_size;
+    const std::int64_t end = begin + fine_size;
+    Coverage& c = coverage[static_cast<std::size_t>(i)];
+    c.first = static_cast<int>(begin / coarse_size);
+    for (std::int64_t texel = c.first; texel * coarse_size < end; ++texel) {
+      RELIEF_ASSERT(c.count < 3);
+      const std::int64_t share = std::min(end, (texel + 1) * coarse_size) - std::max(begin, texel * coarse_size);
+      c.weights[c.count++] = static_cast<float>(share) / static_cast<float>(fine_size);
+    }
+  }
+  return coverage;
+}
+
+template <TexelFormat kFormat, int kChannels>
+void texel_write(unsigned char* texel, TexelValue value, const SrgbEncoder& encoder)
+{
+  for (int c = 0; c < kChannels; ++c) {
+    // texel_load moved the alpha of grey textures to the last lane.
+    const float v = value[kChannels == 2 && c == 1 ? 3 : c];
+    const bool is_alpha = (kChannels == 2 || kChannels == 4) && c == kChannels - 1;
+    if constexpr (kFormat == TexelFormat::kHalf) {
+      const std::uint16_t half = half_from_float(v);
+      std::memcpy(texel + 2 * c, &half, sizeof half);
+    } else if (kFormat == TexelFormat::kU8Srgb && !is_alpha) {
+      texel[c] = encoder.encode(v);
+    } else {
+      texel[c] = static_cast<unsigned char>(v + 0.5f);
+    }
+  }
+}
+
+template <TexelFormat kFormat, int kChannels>
+void level_build(MipChain& chain, int level, const SrgbEncoder& encoder)
+{
+  const TexelLayout& layout = chain.layout();
+  const int fine_width = mip_size(layout.width, level - 1);
+  const std::vector<Coverage> columns = coverage_make(fine_width, mip_size(layout.width, level));
+  const std::vector<Coverage> rows = coverage_make(mip_size(layout.height, level - 1), mip_size(layout.height, level));
+  const auto bytes = static_cast<std::size_t>(texel_bytes(kFormat, kChannels));
+  const unsigned char* fine = chain.level(level - 1);
+  unsigned char* coarse = chain.level(level);
+  const std::size_t fine_pitch = static_cast<std::size_t>(fine_width) * bytes;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rows.size()), [&](const tbb::blocked_range<std::size_t>& range) {
+    for (std::size_t y = range.begin(); y < range.end(); ++y) {
+      for (std::size_t x = 0; x < columns.size(); ++x) {
+        TexelValue sum{};
+        for (int j = 0; j < rows[y].count; ++j) {
+          const unsigned char* fine_row = fine + static_cast<std::size_t>(rows[y].first + j) * fine_pitch;
+          TexelValue row_sum{};
+          for (int i = 0; i < columns[x].count; ++i) {
+            row_sum += columns[x].weights[i] * texel_load<kFormat, kChannels>(
+                                                   fine_row + static_cast<std::size_t>(columns[x].first + i) * bytes);
+          }
+          sum += rows[y].weights[j] * row_sum;
+        }
+        texel_write<kFormat, kChannels>(coarse + (y * columns.size() + x) * bytes, sum, encoder);
+      }
+    }
+  });
+}
+
+template <TexelFormat kFormat>
+void level_build(MipChain& chain, int level, const SrgbEncoder& encoder)
+{
+  switch (chain.layout().num_channels) {
+    case 1:
+      return level_build<kFormat, 1>(chain, level, encoder);
+    case 2:
+      return level_build<kFormat, 2>(chain, level, encoder);
+    case 3:
+      return level_build<kFormat, 3>(chain, level, encoder);
+    default:
+      return level_build<kFormat, 4>(chain, level, encoder);
+  }
+}
+
+std::size_t level_bytes(const TexelLayout& layout, int level)
+{
+  return static_cast<std::size_t>(mip_size(layout.width, level)) *
+         static_cast<std::size_t>(mip_size(layout.height, level)) *
+         static_cast<std::size_t>(texel_bytes(layout.format, layout.num_channels));
+}
+
+}  // namespace
+
+std::size_t texel_row_bytes(const TexelLayout& layout)
+{
+  return static_cast<std::size_t>(layout.width) *
+         static_cast<std::size_t>(texel_bytes(layout.format, layout.num_channels));
+}
+
+int mip_num_levels(int width, int height)
+{
+  int levels = 1;
+  while (mip_size(std::max(width, height), levels - 1) > 1) {
+    ++levels;
+  }
+  return levels;
+}
+
+std::size_t mip_chain_bytes(const TexelLayout& layout)
+{
+  std::size_t bytes = 0;
+  for (int level = 0; level < mip_num_levels(layout.width, layout.height); ++level) {
+    bytes += (level_bytes(layout, level) + kLevelAlignment - 1) / kLevelAlignment * kLevelAlignment;
+  }
+  return bytes;
+}
+
+MipChain::MipChain(const TexelLayout& layout)
+    : layout_(layout), num_levels_(mip_num_levels(layout.width, layout.height))
+{
+  RELIEF_ASSERT(num_levels_ <= kMaxMipLevels);
+  for (int i = 0; i < num_levels_; ++i) {
+    offsets_[i + 1] = offsets_[i] + (level_bytes(layout, i) + kLevelAlignment - 1) / kLevelAlignment * kLevelAlignment;
+  }
+  texels_.reset(static_cast<unsigned char*>(std::calloc(bytes(), 1)));
+  if (texels_ == nullptr) {
+    throw std::bad_alloc();
+  }
+}
+
+void mip_chain_build(MipChain& chain)
+{
+  static const SrgbEncoder encoder;
+  for (int level = 1; level < chain.num_levels(); ++level) {
+    switch (chain.layout().format) {
+      case TexelFormat::kU8:
+        level_build<TexelFormat::kU8>(chain, level, encoder);
+        break;
+      case TexelFormat::kU8Srgb:
+        level_build<TexelFormat::kU8Srgb>(chain, level, encoder);
+        break;
+      case TexelFormat::kHalf:
+        level_build<TexelFormat::kHalf>(chain, level, encoder);
+        break;
+    }
+  }
+}
+
+}  // namespace relief
