@@ -15,6 +15,7 @@
 #include "kernel/light/spot.h"
 #include "kernel/light/sun.h"
 #include "kernel/sample/sobol.h"
+#include "kernel/sample/warp.h"
 
 namespace relief {
 
@@ -107,15 +108,30 @@ RELIEF_KERNEL float light_pdf(const Light& light, Vec3f P, Vec3f wi, float dista
 }
 
 /// Samples the environment; the choice's probability is not in the pdf.
-RELIEF_KERNEL LightSample light_environment_sample(const EnvironmentView& environment, Vec2f u)
+/// @param N  as in lights_sample: a constant environment is sampled by the cosine to it, if there is one
+RELIEF_KERNEL LightSample light_environment_sample(const EnvironmentView& environment, Vec3f N, Vec2f u)
 {
-  const EnvironmentSample found = environment_sample(environment, u);
   LightSample sample;
-  sample.wi = found.wi;
   sample.distance = kInfinity;
+  if (!environment.has_map && !is_zero(N)) {
+    const Vec3f local = warp_cosine_hemisphere(u);
+    sample.wi = from_local(frame_from_normal(N), local);
+    sample.radiance = environment.color;
+    sample.pdf = warp_cosine_hemisphere_pdf(local.z);
+    return sample;
+  }
+  const EnvironmentSample found = environment_sample(environment, u);
+  sample.wi = found.wi;
   sample.radiance = found.radiance;
   sample.pdf = found.pdf_solid_angle;
   return sample;
+}
+
+/// Density of light_environment_sample.
+RELIEF_KERNEL float light_environment_pdf(const EnvironmentView& environment, Vec3f N, Vec3f wi)
+{
+  if (!environment.has_map && !is_zero(N)) return warp_cosine_hemisphere_pdf(dot(N, wi));
+  return environment_pdf(environment, wi);
 }
 
 /// Chooses one light or the environment by estimated contribution at P and samples it.
@@ -136,7 +152,7 @@ RELIEF_KERNEL LightSample lights_sample(const LightsView& view, Vec3f P, Vec3f N
   const double p_environment = static_cast<double>(groups.environment);
   const double p_suns = static_cast<double>(groups.suns);
   if (choice < p_environment) {
-    sample = light_environment_sample(view.environment, u);
+    sample = light_environment_sample(view.environment, N, u);
     sample.pdf *= groups.environment;
     return sample;
   }
@@ -189,8 +205,9 @@ RELIEF_KERNEL float lights_pdf(const LightsView& view,
 RELIEF_KERNEL float lights_environment_pdf(const LightsView& view, Vec3f P, Vec3f N, Vec3f wi)
 {
   if (!(view.environment_irradiance > 0.0f)) return 0.0f;
-  if (view.num_suns == 0 && view.num_cut == 0) return environment_pdf(view.environment, wi);
-  return light_groups_eval(view, P, N).environment * environment_pdf(view.environment, wi);
+  const bool alone = view.num_suns == 0 && view.num_cut == 0;
+  const float probability = alone ? 1.0f : light_groups_eval(view, P, N).environment;
+  return probability * light_environment_pdf(view.environment, N, wi);
 }
 
 }  // namespace relief
