@@ -22,6 +22,10 @@ if(RELIEF_SANITIZE)
     -fno-sanitize-recover=all)
   target_link_options(relief_options INTERFACE -fsanitize=${RELIEF_SANITIZE})
 endif()
+if(RELIEF_SANITIZE MATCHES "thread")
+  # Parallel loops whose hand-over of work the sanitizer can see; the files there say more.
+  target_include_directories(relief_options BEFORE INTERFACE "${PROJECT_SOURCE_DIR}/tests/support/tsan")
+endif()
 
 # relief_add_library(NAME sources...): a static library with the project's flags.
 function(relief_add_library name)
