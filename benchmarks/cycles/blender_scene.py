@@ -1,0 +1,266 @@
+"""Builds a relief scene in Blender and renders it with Cycles; runs inside Blender 3.4.
+
+    blender -b --factory-startup --debug-cycles --python blender_scene.py -- SCENE JOB.json
+
+JOB.json is written by render_cycles.py, which says what its fields mean. Facts that the conversion rests on
+(axes, light units, the environment's orientation, one-sidedness) are checked by check_importer.py.
+"""
+
+import json
+import math
+import os
+import sys
+import time
+
+import bpy
+import mathutils
+import numpy as np
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+
+from blender_materials import build_material  # noqa: E402
+from gltf_reader import GltfFile, Unsupported  # noqa: E402
+
+# From glTF's axes (Y up) to Blender's (Z up): x, y, z → x, −z, y. Applied to objects, not to vertices. A camera or
+# a light looks along its own −Z with Y up in both conventions, so it needs nothing more.
+BLENDER_FROM_GLTF = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
+
+
+def _add_object(name, data, matrix):
+    new = bpy.data.objects.new(name, data)
+    new.matrix_world = mathutils.Matrix((BLENDER_FROM_GLTF @ matrix).tolist())
+    bpy.context.scene.collection.objects.link(new)
+    # Both terminator softeners change the radiance; relief is compared with the plain rendering equation.
+    new.cycles.shadow_terminator_offset = 0.0
+    new.cycles.shadow_terminator_geometry_offset = 0.0
+    return new
+
+
+def build_mesh(gltf, primitive, name, material):
+    """A Blender mesh of one primitive: its triangles, texture coordinates, and normals if it has any."""
+    if primitive.get("mode", 4) != 4:
+        raise Unsupported("a primitive that is not triangles")
+    attributes = primitive["attributes"]
+    unknown = set(attributes) - {"POSITION", "NORMAL", "TEXCOORD_0"}
+    if unknown:
+        raise Unsupported(f"attributes {', '.join(sorted(unknown))}")
+    positions = gltf.accessor(attributes["POSITION"])
+    corners = gltf.accessor(primitive["indices"]).astype(np.int32).ravel()
+    num_triangles = len(corners) // 3
+    mesh = bpy.data.meshes.new(name)
+    mesh.vertices.add(len(positions))
+    mesh.vertices.foreach_set("co", positions.ravel())
+    mesh.loops.add(len(corners))
+    mesh.loops.foreach_set("vertex_index", corners)
+    mesh.polygons.add(num_triangles)
+    mesh.polygons.foreach_set("loop_start", np.arange(0, len(corners), 3, dtype=np.int32))
+    mesh.polygons.foreach_set("loop_total", np.full(num_triangles, 3, dtype=np.int32))
+    is_smooth = "NORMAL" in attributes
+    mesh.polygons.foreach_set("use_smooth", np.full(num_triangles, is_smooth))
+    if "TEXCOORD_0" in attributes:
+        uv = gltf.accessor(attributes["TEXCOORD_0"])[corners].astype(np.float32)
+        uv[:, 1] = 1.0 - uv[:, 1]  # Blender's v grows upwards
+        mesh.uv_layers.new(name="TEXCOORD_0").data.foreach_set("uv", uv.ravel())
+    mesh.materials.append(material)
+    mesh.update(calc_edges=True)
+    if is_smooth:
+        mesh.use_auto_smooth = True
+        mesh.auto_smooth_angle = math.pi
+        # Blender keeps custom normals as two 16-bit angles, an error of some 1e-4 radians.
+        mesh.normals_split_custom_set_from_vertices(gltf.accessor(attributes["NORMAL"]).tolist())
+    return mesh
+
+
+def build_camera(gltf, node, matrix):
+    camera = gltf.json["cameras"][node["camera"]]
+    if camera["type"] != "perspective":
+        raise Unsupported("an orthographic camera")
+    lens = camera.get("extensions", {}).get("RELIEF_camera", {})
+    data = bpy.data.cameras.new("camera")
+    data.sensor_fit = "VERTICAL"
+    data.sensor_height = 24.0
+    data.lens = 12.0 / math.tan(camera["perspective"]["yfov"] / 2)
+    if lens.get("shift", [0, 0]) != [0, 0] or "clip" in lens:
+        raise Unsupported("camera shift or clipping")
+    data.clip_start, data.clip_end = 1e-4, 1e6
+    radius = lens.get("apertureRadius", 0)
+    if radius > 0:
+        data.dof.use_dof = True
+        data.dof.focus_distance = lens.get("focusDistance", 1)
+        data.dof.aperture_fstop = data.lens * 1e-3 / (2 * radius)
+    bpy.context.scene.camera = _add_object("camera", data, matrix)
+
+
+def build_area_light(light, matrix):
+    """RELIEF_area_light: Blender spreads its watts evenly, radiance = power / (π · area), one-sided."""
+    if light.get("twoSided", False):
+        raise Unsupported("a two-sided area light")
+    data = bpy.data.lights.new("area light", "AREA")
+    if light["shape"] == "rectangle":
+        data.shape = "RECTANGLE"
+        data.size, data.size_y = light.get("width", 1), light.get("height", 1)
+        area = data.size * data.size_y
+    else:
+        data.shape = "DISK"
+        data.size = 2 * light.get("radius", 0.5)
+        area = math.pi * (data.size / 2) ** 2
+    scales = np.linalg.norm(matrix[:3, :3], axis=0)
+    if not np.allclose(scales, 1, atol=1e-5):
+        raise Unsupported("a scaled area light")
+    data.energy = light["power"] if "power" in light else light["radiance"] * math.pi * area
+    data.color = light.get("color", (1, 1, 1))
+    data.spread = math.pi
+    new = _add_object("area light", data, matrix)
+    new.visible_camera = light.get("visibleToCamera", True)
+
+
+def build_punctual_light(light, matrix, efficacy):
+    """KHR_lights_punctual: a sun's irradiance is Blender's strength; a point of I W/sr is 4π² · I of its watts."""
+    intensity = light.get("intensity", 1) / efficacy
+    if light["type"] == "directional":
+        data = bpy.data.lights.new("sun", "SUN")
+        data.angle = 0.0
+        data.energy = intensity
+    elif light["type"] == "point":
+        data = bpy.data.lights.new("point", "POINT")
+        data.shadow_soft_size = 0.0
+        data.energy = 4 * math.pi * math.pi * intensity
+    else:
+        raise Unsupported("a spot light: its cone fades by another law")
+    data.color = light.get("color", (1, 1, 1))
+    _add_object(data.name, data, matrix)
+
+
+def build_environment(gltf):
+    """A lat-long map as docs/scene_format.md orients it, or a constant; black without one."""
+    settings = gltf.json.get("extensions", {}).get("RELIEF_environment")
+    world = bpy.data.worlds.new("environment")
+    bpy.context.scene.world = world
+    world.use_nodes = True
+    nodes, links = world.node_tree.nodes, world.node_tree.links
+    background = nodes["Background"]
+    if settings is None:
+        background.inputs["Strength"].default_value = 0.0
+        return
+    color = settings.get("color", [1, 1, 1])
+    background.inputs["Strength"].default_value = settings.get("strength", 1)
+    background.inputs["Color"].default_value = (*color, 1)
+    if "uri" in settings or "image" in settings:
+        if color != [1, 1, 1]:
+            raise Unsupported("a tinted environment map")
+        uri = settings.get("uri") or gltf.json["images"][settings["image"]]["uri"]
+        texture = nodes.new("ShaderNodeTexEnvironment")
+        texture.image = bpy.data.images.load(os.path.join(gltf.folder, uri))
+        texture.image.colorspace_settings.name = "Linear"
+        coordinates = nodes.new("ShaderNodeTexCoord")
+        # The centre of Cycles' map looks along Blender's +X, that of ours along glTF's −Z, which is Blender's +Y.
+        mapping = nodes.new("ShaderNodeMapping")
+        mapping.vector_type = "POINT"
+        mapping.inputs["Rotation"].default_value = (0, 0, -math.pi / 2 - settings.get("rotation", 0))
+        links.new(coordinates.outputs["Generated"], mapping.inputs["Vector"])
+        links.new(mapping.outputs["Vector"], texture.inputs["Vector"])
+        links.new(texture.outputs["Color"], background.inputs["Color"])
+    world.cycles_visibility.camera = settings.get("visibleToCamera", True)
+
+
+def build_scene(path):
+    """Makes the whole scene in an empty Blender; returns what of it is only approximate, each reason once."""
+    gltf = GltfFile(path)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    build_environment(gltf)
+    built = [build_material(gltf, i) for i in range(len(gltf.json.get("materials", [])))]
+    top = gltf.json.get("extensions", {})
+    efficacy = top.get("RELIEF_render", {}).get("luminousEfficacy", 1)
+    meshes = {}
+    for node, matrix in gltf.node_matrices():
+        extensions = node.get("extensions", {})
+        if "mesh" in node:
+            if node["mesh"] not in meshes:
+                source = gltf.json["meshes"][node["mesh"]]
+                name = source.get("name", f"mesh {node['mesh']}")
+                meshes[node["mesh"]] = [
+                    build_mesh(gltf, primitive, name, built[primitive["material"]][0])
+                    for primitive in source["primitives"]
+                ]
+            for world in gltf.instance_matrices(node, matrix):
+                for mesh in meshes[node["mesh"]]:
+                    _add_object(node.get("name", "node"), mesh, world)
+        if "camera" in node and bpy.context.scene.camera is None:
+            build_camera(gltf, node, matrix)
+        if "RELIEF_area_light" in extensions:
+            build_area_light(extensions["RELIEF_area_light"], matrix)
+        if "KHR_lights_punctual" in extensions:
+            light = top["KHR_lights_punctual"]["lights"][extensions["KHR_lights_punctual"]["light"]]
+            build_punctual_light(light, matrix, efficacy)
+    set_up_render(top.get("RELIEF_render", {}))
+    return sorted({reason for _, reasons in built for reason in reasons})
+
+
+def set_up_render(settings):
+    """Cycles as an unbiased path tracer: the same filter and limits as relief's, nothing clamped or denoised."""
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_percentage = 100
+    scene.render.resolution_x, scene.render.resolution_y = settings.get("resolution", (960, 540))
+    scene.render.use_compositing = scene.render.use_sequencer = False
+    scene.render.dither_intensity = 0
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_mode = "RGB"
+    scene.render.image_settings.color_depth = "32"
+    scene.render.image_settings.exr_codec = "NONE"
+    cycles = scene.cycles
+    cycles.device = "CPU"
+    cycles.samples = settings.get("samples", 64)
+    cycles.use_adaptive_sampling = False
+    cycles.use_denoising = False
+    cycles.pixel_filter_type = "BOX"
+    cycles.light_sampling_threshold = 0
+    cycles.blur_glossy = 0
+    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0
+    cycles.caustics_reflective = cycles.caustics_refractive = True
+    cycles.use_auto_tile = False
+    bounces = settings.get("maxBounces", 12)
+    cycles.max_bounces = bounces
+    cycles.diffuse_bounces = settings.get("diffuseBounces", bounces)
+    cycles.glossy_bounces = settings.get("glossyBounces", bounces)
+    cycles.transmission_bounces = settings.get("transmissionBounces", bounces)
+    cycles.transparent_max_bounces = settings.get("transparentBounces", 32)
+    cycles.volume_bounces = 0
+
+
+def render(job):
+    """Renders one picture a seed; prints a line `RUN {json}` for each.
+
+    A render of one sample before the timed ones takes what only the first one pays: file and colour set-up.
+    """
+    scene = bpy.context.scene
+    if job.get("resolution"):
+        scene.render.resolution_x, scene.render.resolution_y = job["resolution"]
+    if job.get("threads"):
+        scene.render.threads_mode = "FIXED"
+        scene.render.threads = job["threads"]
+    for run in job["runs"]:
+        scene.cycles.samples = run["samples"]
+        scene.cycles.seed = run["seed"]
+        scene.render.filepath = run["output"]
+        start = time.monotonic()
+        bpy.ops.render.render(write_still=True)
+        run["wall_seconds"] = time.monotonic() - start
+        print("RUN " + json.dumps(run), flush=True)
+
+
+def main():
+    scene_path, job_path = sys.argv[sys.argv.index("--") + 1 :]
+    with open(job_path, encoding="utf-8") as file:
+        job = json.load(file)
+    start = time.monotonic()
+    approximate = build_scene(scene_path)
+    print("SCENE " + json.dumps({"approximate": approximate, "import_seconds": time.monotonic() - start}), flush=True)
+    if job.get("blend"):
+        bpy.ops.wm.save_as_mainfile(filepath=os.path.abspath(job["blend"]))
+    render(job)
+
+
+if __name__ == "__main__":
+    main()
