@@ -1,0 +1,344 @@
+#include "exporters/merge.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <optional>
+#include <sstream>
+
+#include "exporters/errors.h"
+#include "exporters/exr.h"
+
+namespace relief {
+
+namespace {
+
+constexpr const char* kSamplesChannel = "samples.N";
+
+/// How a channel of several renders becomes one.
+enum class Rule { kMean, kMeanOverHits, kHalf, kVariance, kSum, kFirst };
+
+Rule rule_of(const std::string& channel)
+{
+  const std::size_t dot = channel.rfind('.');
+  const std::string layer = dot == std::string::npos ? "" : channel.substr(0, dot);
+  for (const AovInfo& info : kAovInfo) {
+    if (layer != info.name) continue;
+    switch (info.aov) {
+      case Aov::kDepth:
+      case Aov::kPosition:
+        return Rule::kMeanOverHits;
+      case Aov::kHalf:
+        return Rule::kHalf;
+      case Aov::kVariance:
+        return Rule::kVariance;
+      case Aov::kSampleCount:
+        return Rule::kSum;
+      case Aov::kObjectId:
+      case Aov::kMaterialId:
+        return Rule::kFirst;
+      default:
+        return Rule::kMean;
+    }
+  }
+  return Rule::kMean;
+}
+
+std::string attribute_of(const Picture& picture, const std::string& name)
+{
+  const auto found = picture.attributes.find(name);
+  return found == picture.attributes.end() ? std::string() : found->second;
+}
+
+std::optional<double> number_of(const Picture& picture, const std::string& name)
+{
+  const std::string text = attribute_of(picture, name);
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  if (text.empty() || *end != '\0' || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+/// Seeds of a picture, several if it is itself a merge.
+std::vector<std::string> seeds_of(const Picture& picture)
+{
+  std::vector<std::string> seeds;
+  std::istringstream text(attribute_of(picture, "relief:seed"));
+  for (std::string seed; std::getline(text, seed, ',');) {
+    seeds.push_back(seed);
+  }
+  return seeds;
+}
+
+std::string number_text(double value)
+{
+  char text[32];
+  std::snprintf(text, sizeof text, "%.9g", value);
+  return text;
+}
+
+/// Sums over the pictures so far.
+class Merger {
+ public:
+  explicit Merger(const MergeOptions& options) : options_(options) {}
+
+  void add(const Picture& picture)
+  {
+    check_same_image(picture);
+    check_seeds(picture);
+    drop_missing_layers(picture);
+    add_values(picture);
+    add_attributes(picture);
+    ++num_pictures_;
+  }
+
+  MergeResult finish();
+
+ private:
+  struct Sum {
+    std::string name;
+    ChannelType type = ChannelType::kFloat;
+    Rule rule = Rule::kMean;
+    std::vector<double> value;
+    std::vector<double> weight;  ///< only for kMeanOverHits, whose weight is its own
+  };
+
+  struct SeedOrigin {
+    std::string seed, file;
+  };
+
+  void check_same_image(const Picture& picture);
+  void check_seeds(const Picture& picture);
+  void drop_missing_layers(const Picture& picture);
+  void add_values(const Picture& picture);
+  void add_attributes(const Picture& picture);
+  std::vector<double> sample_counts(const Picture& picture) const;
+  [[noreturn]] void refuse(const Picture& picture, const std::string& why) const
+  {
+    throw InputError(picture.file, "cannot be merged with '" + result_.file + "': " + why);
+  }
+
+  MergeOptions options_;
+  int num_pictures_ = 0;
+  Picture result_;  ///< windows and attributes; its channels are made at the end
+  std::vector<Sum> sums_;
+  std::vector<double> num_samples_, num_even_samples_;
+  std::vector<SeedOrigin> seeds_;
+  double samples_ = 0, seconds_ = 0, weighted_square_error_ = 0;
+  bool knows_error_ = true;
+  std::vector<std::string> warnings_;
+};
+
+void Merger::check_same_image(const Picture& picture)
+{
+  if (num_pictures_ == 0) {
+    result_.file = picture.file;
+    result_.width = picture.width;
+    result_.height = picture.height;
+    result_.crop_x = picture.crop_x;
+    result_.crop_y = picture.crop_y;
+    result_.full_width = picture.full_width;
+    result_.full_height = picture.full_height;
+    result_.attributes = picture.attributes;
+    const std::size_t num_pixels = static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height);
+    num_samples_.assign(num_pixels, 0);
+    num_even_samples_.assign(num_pixels, 0);
+    for (const Channel& channel : picture.channels) {
+      const Rule rule = rule_of(channel.name);
+      sums_.push_back({channel.name, channel.type, rule, std::vector<double>(num_pixels),
+                       std::vector<double>(rule == Rule::kMeanOverHits ? num_pixels : 0)});
+    }
+    return;
+  }
+  const auto size_text = [](const Picture& p) {
+    return std::to_string(p.width) + "x" + std::to_string(p.height) + " at " + std::to_string(p.crop_x) + "," +
+           std::to_string(p.crop_y) + " of " + std::to_string(p.full_width) + "x" + std::to_string(p.full_height);
+  };
+  if (size_text(picture) != size_text(result_)) {
+    refuse(picture, "its window is " + size_text(picture) + ", not " + size_text(result_));
+  }
+  if (options_.force) return;
+  for (const char* name : {"relief:scene", "relief:frame"}) {
+    const std::string here = attribute_of(picture, name), there = attribute_of(result_, name);
+    if (here != there) refuse(picture, std::string(name) + " is '" + here + "', not '" + there + "'");
+  }
+}
+
+void Merger::check_seeds(const Picture& picture)
+{
+  const std::vector<std::string> seeds = seeds_of(picture);
+  if (seeds.empty() && !options_.force) {
+    throw InputError(picture.file, "has no attribute relief:seed, so its samples may be those of another file");
+  }
+  for (const std::string& seed : seeds) {
+    for (const SeedOrigin& known : seeds_) {
+      if (known.seed == seed) {
+        throw InputError(picture.file,
+                         "has the same seed, " + seed + ", as '" + known.file + "': the same samples twice");
+      }
+    }
+  }
+  for (const std::string& seed : seeds) {
+    seeds_.push_back({seed, picture.file});
+  }
+}
+
+void Merger::drop_missing_layers(const Picture& picture)
+{
+  std::erase_if(sums_, [&](const Sum& sum) {
+    if (picture.find(sum.name) != nullptr) return false;
+    warnings_.push_back("channel '" + sum.name + "' is left out: '" + picture.file + "' does not have it");
+    return true;
+  });
+  if (num_pictures_ == 0) return;
+  for (const Channel& channel : picture.channels) {
+    const bool is_kept = std::any_of(sums_.begin(), sums_.end(), [&](const Sum& s) { return s.name == channel.name; });
+    const std::string start = "channel '" + channel.name + "' is left out:";
+    const bool is_said = std::any_of(warnings_.begin(), warnings_.end(),
+                                     [&](const std::string& text) { return text.starts_with(start); });
+    if (!is_kept && !is_said) warnings_.push_back(start + " '" + result_.file + "' does not have it");
+  }
+}
+
+std::vector<double> Merger::sample_counts(const Picture& picture) const
+{
+  if (const Channel* counts = picture.find(kSamplesChannel)) {
+    std::vector<double> result(counts->values.begin(), counts->values.end());
+    for (double& n : result) {
+      if (!(n >= 0) || !std::isfinite(n)) throw InputError(picture.file, "has impossible values in samples.N");
+    }
+    return result;
+  }
+  const std::optional<double> samples = number_of(picture, "relief:samples");
+  if (!samples || !(*samples > 0)) {
+    throw InputError(picture.file, "has neither a layer samples.N nor an attribute relief:samples to weight it by");
+  }
+  return std::vector<double>(num_samples_.size(), *samples);
+}
+
+void Merger::add_values(const Picture& picture)
+{
+  const std::vector<double> n = sample_counts(picture);
+  const Channel* coverage = picture.find("A");
+  for (Sum& sum : sums_) {
+    const std::vector<float>& x = picture.find(sum.name)->values;
+    for (std::size_t i = 0; i < n.size(); ++i) {
+      // A pixel without samples has no value, whatever is stored there.
+      if (!(n[i] > 0)) continue;
+      const double value = double{x[i]};
+      switch (sum.rule) {
+        case Rule::kMean:
+          sum.value[i] += n[i] * value;
+          break;
+        case Rule::kMeanOverHits: {
+          const double num_hits = coverage != nullptr ? n[i] * std::max(double{coverage->values[i]}, 0.0) : n[i];
+          if (num_hits > 0) sum.value[i] += num_hits * value;
+          sum.weight[i] += num_hits;
+          break;
+        }
+        case Rule::kHalf:
+          sum.value[i] += std::ceil(n[i] / 2) * value;
+          break;
+        case Rule::kVariance:
+          sum.value[i] += n[i] * n[i] * value;
+          break;
+        case Rule::kSum:
+          sum.value[i] += value;
+          break;
+        case Rule::kFirst:
+          if (!(num_samples_[i] > 0)) sum.value[i] = value;
+          break;
+      }
+    }
+  }
+  double total = 0;
+  for (std::size_t i = 0; i < n.size(); ++i) {
+    num_samples_[i] += n[i];
+    num_even_samples_[i] += std::ceil(n[i] / 2);
+    total += n[i];
+  }
+  const double mean_samples = total / static_cast<double>(n.size());
+  const std::optional<double> error = number_of(picture, "relief:error_rmse");
+  knows_error_ = knows_error_ && error.has_value();
+  weighted_square_error_ += mean_samples * mean_samples * error.value_or(0) * error.value_or(0);
+  samples_ += mean_samples;
+}
+
+void Merger::add_attributes(const Picture& picture)
+{
+  seconds_ += number_of(picture, "relief:seconds").value_or(0);
+  if (num_pictures_ == 0) return;
+  // Warnings are lines; each is kept once.
+  std::string& warnings = result_.attributes["relief:warnings"];
+  std::istringstream lines(attribute_of(picture, "relief:warnings"));
+  for (std::string line; std::getline(lines, line);) {
+    if (("\n" + warnings + "\n").find("\n" + line + "\n") == std::string::npos) {
+      warnings += (warnings.empty() ? "" : "\n") + line;
+    }
+  }
+}
+
+MergeResult Merger::finish()
+{
+  for (Sum& sum : sums_) {
+    Channel channel{sum.name, sum.type, {}};
+    channel.values.reserve(sum.value.size());
+    for (std::size_t i = 0; i < sum.value.size(); ++i) {
+      const double n = num_samples_[i];
+      double divisor = 1;
+      switch (sum.rule) {
+        case Rule::kMean:
+          divisor = n;
+          break;
+        case Rule::kMeanOverHits:
+          divisor = sum.weight[i];
+          break;
+        case Rule::kHalf:
+          divisor = num_even_samples_[i];
+          break;
+        case Rule::kVariance:
+          divisor = n * n;
+          break;
+        case Rule::kSum:
+        case Rule::kFirst:
+          break;
+      }
+      channel.values.push_back(divisor > 0 ? static_cast<float>(sum.value[i] / divisor) : 0.f);
+    }
+    sum.value = {};
+    result_.channels.push_back(std::move(channel));
+  }
+  std::string seeds;
+  for (const SeedOrigin& origin : seeds_) {
+    seeds += (seeds.empty() ? "" : ",") + origin.seed;
+  }
+  // What remains describes the joined render; what was true of one of its parts only (threads, command, …) goes.
+  const Attributes first = std::move(result_.attributes);
+  result_.attributes.clear();
+  for (const char* kept :
+       {"software", "relief:version", "relief:scene", "relief:frame", "relief:view", "relief:warnings"}) {
+    if (const auto found = first.find(kept); found != first.end() && !found->second.empty())
+      result_.attributes.insert(*found);
+  }
+  if (!seeds.empty()) result_.attributes["relief:seed"] = seeds;
+  result_.attributes["relief:samples"] = number_text(samples_);
+  result_.attributes["relief:seconds"] = number_text(seconds_);
+  result_.attributes["relief:merged"] = std::to_string(num_pictures_);
+  if (knows_error_ && samples_ > 0) {
+    result_.attributes["relief:error_rmse"] = number_text(std::sqrt(weighted_square_error_) / samples_);
+  }
+  return {std::move(result_), std::move(warnings_)};
+}
+
+}  // namespace
+
+MergeResult merge_pictures(std::span<const std::filesystem::path> files, const MergeOptions& options)
+{
+  Merger merger(options);
+  for (const std::filesystem::path& file : files) {
+    merger.add(exr_load(file));
+  }
+  return merger.finish();
+}
+
+}  // namespace relief

@@ -1,0 +1,36 @@
+// Joins renders of the same frame with different seeds into the picture that one longer render would have given.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "exporters/picture.h"
+
+namespace relief {
+
+struct MergeOptions {
+  /// Accept pictures whose metadata name another scene or frame, or no seed. Equal seeds are never accepted: the same samples
+  /// twice would only look like less noise.
+  bool force = false;
+};
+
+struct MergeResult {
+  Picture picture;  ///< types and windows of the first; seeds joined by ","; samples and seconds summed
+  std::vector<std::string> warnings;  ///< e.g. layers that not every picture has, and that are therefore left out
+};
+
+/// Reads and joins at least two pictures, one at a time. With n the samples of a pixel (layer samples.N, else the attribute
+/// relief:samples):
+///   means            Σ n·x / Σ n; depth and position, which are means over samples that hit, with n·A
+///   half             likewise with the number of even-numbered samples, ⌈n/2⌉
+///   variance         Σ n²·v / (Σ n)²: that of the mean above, for independent renders
+///   samples          Σ n
+///   ids              of the first picture that sampled the pixel
+/// Sums are in double precision.
+/// @error InputError naming the files: unreadable, different sizes or windows, equal seeds, other scene or frame, no samples
+/// @cost  8 bytes a value for the sums, and one picture more
+MergeResult merge_pictures(std::span<const std::filesystem::path> files, const MergeOptions& options = {});
+
+}  // namespace relief

@@ -1,0 +1,57 @@
+#include "exporters/stats_json.h"
+
+#include <nlohmann/json.hpp>
+
+namespace relief {
+
+std::string stats_json(const Statistics& statistics)
+{
+  const Statistics& s = statistics;
+  const std::uint64_t num_rays = s.counters.camera_rays + s.counters.bounce_rays + s.counters.shadow_rays;
+  nlohmann::ordered_json counters;
+#define X(name) counters[#name] = s.counters.name;
+  RELIEF_COUNTERS(X)
+#undef X
+  nlohmann::ordered_json stages = nlohmann::ordered_json::object();
+  for (const StageSeconds& stage : s.stages) {
+    stages[stage.name] = stage.seconds;
+  }
+  const nlohmann::ordered_json json = {
+      {"scene", s.scene},
+      {"version", s.version},
+      {"isa", s.isa},
+      {"view", s.view},
+      {"seed", s.seed},
+      {"frame", s.frame},
+      {"width", s.width},
+      {"height", s.height},
+      {"threads", s.threads},
+      {"load_seconds", s.load_seconds},
+      {"build_seconds", s.build_seconds},
+      {"render_seconds", s.render_seconds},
+      {"samples_per_pixel", s.samples_per_pixel},
+      {"error_rmse", s.error_rmse},
+      {"error_relmse", s.error_relmse},
+      {"stop_reason", s.stop_reason},
+      {"rays",
+       {{"camera", s.counters.camera_rays},
+        {"bounce", s.counters.bounce_rays},
+        {"shadow", s.counters.shadow_rays},
+        {"total", num_rays}}},
+      {"rays_per_second", s.render_seconds > 0 ? static_cast<double>(num_rays) / s.render_seconds : 0.0},
+      {"peak_memory_bytes", s.peak_memory_bytes},
+      {"bvh_bytes", s.bvh_bytes},
+      {"mesh_bytes", s.mesh_bytes},
+      {"texture_bytes", s.texture_bytes},
+      {"light_bytes", s.light_bytes},
+      {"film_bytes", s.film_bytes},
+      {"path_state_bytes", s.path_state_bytes},
+      {"counters", counters},
+      {"stage_seconds", stages},
+      {"warnings", s.warnings},
+  };
+  // A scene's path may hold bytes that are not UTF-8; they must not cost a finished render its statistics.
+  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace relief
