@@ -111,6 +111,7 @@ struct Scene {
   FeatureSet features;
   std::shared_ptr<const TextureStore> textures;
   std::vector<std::string> warnings;
+  std::vector<std::string> files;  ///< everything that was read: the scene, buffers, images, references
 };
 
 }  // namespace relief

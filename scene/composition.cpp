@@ -1,0 +1,345 @@
+#include "scene/composition.h"
+
+#include <algorithm>
+#include <set>
+#include <system_error>
+#include <utility>
+
+namespace relief {
+namespace {
+
+/// What an override sets on nodes of one name.
+struct NodeOverride {
+  std::optional<Vec3d> translation, scale;
+  std::optional<Quaternion> rotation;
+  std::optional<Transform> matrix;
+  const GltfDocument* material_document = nullptr;
+  int material_index = -1;
+};
+
+/// Overrides of one reference, by node name.
+struct OverrideSet {
+  std::map<std::string, NodeOverride> by_name;
+  std::string file, path;                    ///< for messages
+  mutable std::set<std::string> used_names;  ///< written while walking, to warn about the others
+};
+
+/// A file being walked, and through which references it was reached.
+struct Scope {
+  const GltfDocument* document = nullptr;
+  std::shared_ptr<const Scope> outer;  ///< the scope of the file that refers to it; null for the root
+  std::shared_ptr<const OverrideSet> overrides;
+};
+
+/// A node that waits to be visited.
+struct Pending {
+  std::shared_ptr<const Scope> scope;
+  int node_index = 0;
+  Transform parent_world;
+  ObjectSettings object;
+  bool animated = false;
+  std::string defect_path;
+};
+
+std::string node_path(int index) { return "/nodes/" + std::to_string(index); }
+
+Vec3d to_vec3d(const std::vector<double>& v) { return {v[0], v[1], v[2]}; }
+Quaternion to_quaternion(const std::vector<double>& v) { return {v[0], v[1], v[2], v[3]}; }
+
+Transform matrix_or_fail(const std::vector<double>& m, const std::string& file, const std::string& path)
+{
+  std::array<double, 16> numbers{};
+  std::copy_n(m.begin(), 16, numbers.begin());
+  const std::optional<Transform> t = transform_from_matrix(numbers);
+  if (!t) {
+    throw SceneError(file, path, "an affine matrix (column-major, last row 0 0 0 1)", "a projective one");
+  }
+  return *t;
+}
+
+NodeOverride read_override(const GltfDocument& document, const JsonReader& r, Warnings& warnings)
+{
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  NodeOverride o;
+  if (const auto v = r.numbers("translation", 3, 3, -kLargest, kLargest); !v.empty()) o.translation = to_vec3d(v);
+  if (const auto v = r.numbers("scale", 3, 3, -kLargest, kLargest); !v.empty()) o.scale = to_vec3d(v);
+  if (const auto v = r.numbers("rotation", 4, 4, -1.001, 1.001); !v.empty()) o.rotation = to_quaternion(v);
+  if (const auto v = r.numbers("matrix", 16, 16, -kLargest, kLargest); !v.empty()) {
+    if (o.translation || o.rotation || o.scale) {
+      r.fail("", "either matrix or translation, rotation and scale", "both");
+    }
+    o.matrix = matrix_or_fail(v, r.file(), json_path_join(r.path(), "matrix"));
+  }
+  if (r.has("material")) {
+    const std::string name = r.string("material", "");
+    const auto& materials = document.core.materials;
+    const auto at = std::find_if(materials.begin(), materials.end(), [&](const auto& m) { return m.name == name; });
+    if (at == materials.end()) {
+      r.fail("material", "the name of a material in this file");
+    }
+    o.material_document = &document;
+    o.material_index = static_cast<int>(at - materials.begin());
+  }
+  r.warn_unread(warnings);
+  return o;
+}
+
+/// Root nodes of the default scene; of the first scene, or of the whole file, if it names none.
+std::vector<int> default_roots(const GltfDocument& document)
+{
+  const tinygltf::Model& core = document.core;
+  if (!core.scenes.empty()) {
+    return core.scenes[static_cast<std::size_t>(std::max(core.defaultScene, 0))].nodes;
+  }
+  std::vector<bool> is_child(core.nodes.size(), false);
+  for (const tinygltf::Node& node : core.nodes) {
+    for (const int child : node.children) {
+      is_child[static_cast<std::size_t>(child)] = true;
+    }
+  }
+  std::vector<int> roots;
+  for (std::size_t i = 0; i < core.nodes.size(); ++i) {
+    if (!is_child[i]) {
+      roots.push_back(static_cast<int>(i));
+    }
+  }
+  return roots;
+}
+
+class Walk {
+ public:
+  Walk(DocumentSet& documents,
+       std::optional<double> time,
+       Warnings& warnings,
+       const std::function<void(const PlacedNode&)>& visit)
+      : documents_(documents), time_(time), warnings_(warnings), visit_(visit)
+  {
+  }
+
+  void run(const GltfDocument& root)
+  {
+    auto scope = std::make_shared<Scope>();
+    scope->document = &root;
+    push_all(default_roots(root), Pending{scope, 0, {}, {}, false, {}});
+    // An explicit stack: a file may nest its nodes as deep as it likes.
+    while (!stack_.empty()) {
+      const Pending pending = std::move(stack_.back());
+      stack_.pop_back();
+      step(pending);
+    }
+    for (const auto& [key, overrides] : overrides_of_) {
+      for (const auto& [name, ignored] : overrides->by_name) {
+        if (overrides->used_names.count(name) == 0) {
+          warnings_.add(overrides->file + ": " + json_path_join(overrides->path, name) +
+                        ": no referenced node has this name");
+        }
+      }
+    }
+  }
+
+ private:
+  /// Pushes nodes so that they are visited in the order given.
+  void push_all(const std::vector<int>& nodes, const Pending& like)
+  {
+    for (auto it = nodes.rbegin(); it != nodes.rend(); ++it) {
+      stack_.push_back(like);
+      stack_.back().node_index = *it;
+    }
+  }
+
+  void step(const Pending& pending)
+  {
+    const GltfDocument& document = *pending.scope->document;
+    const std::string path = node_path(pending.node_index);
+    // References that each double the last one multiply faster than any memory.
+    constexpr std::size_t kMostNodes = std::size_t{1} << 24;
+    if (++num_visited_ > kMostNodes) {
+      throw SceneError(document.file, path, "at most " + std::to_string(kMostNodes) + " nodes after composition",
+                       "more");
+    }
+    PlacedNode placed;
+    placed.document = &document;
+    placed.node_index = pending.node_index;
+    placed.animated = pending.animated;
+    placed.defect_path = pending.defect_path;
+    const Transform local = local_transform(pending, placed);
+    placed.world = pending.parent_world * local;
+    if (placed.defect_path.empty() && transform_defect(local) != TransformDefect::kNone) {
+      placed.defect_path = path;
+    }
+    placed.object = relief_object(document, pending.node_index, pending.object, warnings_);
+    visit_(placed);
+
+    const Pending child{pending.scope, 0, placed.world, placed.object, placed.animated, placed.defect_path};
+    push_all(document.core.nodes[static_cast<std::size_t>(pending.node_index)].children, child);
+    push_reference(child, pending.node_index);
+  }
+
+  /// Local transform with animation and overrides; fills the material override and `animated` of `placed` too.
+  Transform local_transform(const Pending& pending, PlacedNode& placed)
+  {
+    const GltfDocument& document = *pending.scope->document;
+    const tinygltf::Node& node = document.core.nodes[static_cast<std::size_t>(pending.node_index)];
+    const std::string path = node_path(pending.node_index);
+    Trs trs;
+    std::optional<Transform> matrix;
+    if (!node.matrix.empty()) {
+      matrix = matrix_or_fail(node.matrix, document.file, path + "/matrix");
+    }
+    if (!node.translation.empty()) trs.translation = to_vec3d(node.translation);
+    if (!node.rotation.empty()) trs.rotation = to_quaternion(node.rotation);
+    if (!node.scale.empty()) trs.scale = to_vec3d(node.scale);
+    if (const AnimatedPose* pose = pose_of(document, pending.node_index)) {
+      placed.animated = true;
+      trs.translation = pose->translation.value_or(trs.translation);
+      trs.rotation = pose->rotation.value_or(trs.rotation);
+      trs.scale = pose->scale.value_or(trs.scale);
+    }
+    // From the innermost reference outwards, so that the outermost file has the last word.
+    for (const Scope* s = pending.scope.get(); s != nullptr && !node.name.empty(); s = s->outer.get()) {
+      if (s->overrides == nullptr) {
+        continue;
+      }
+      const auto it = s->overrides->by_name.find(node.name);
+      if (it != s->overrides->by_name.end()) {
+        s->overrides->used_names.insert(node.name);
+        apply(it->second, trs, matrix, placed, json_path_join(s->overrides->path, node.name), s->overrides->file);
+      }
+    }
+    return matrix ? *matrix : transform_from_trs(trs);
+  }
+
+  static void apply(const NodeOverride& o,
+                    Trs& trs,
+                    std::optional<Transform>& matrix,
+                    PlacedNode& placed,
+                    const std::string& path,
+                    const std::string& file)
+  {
+    if (o.matrix) {
+      matrix = o.matrix;
+    } else if (matrix && (o.rotation || o.scale)) {
+      throw SceneError(file, path, "a matrix or a translation, because the node has a matrix", "rotation or scale");
+    } else if (matrix && o.translation) {
+      matrix->p = *o.translation;
+    }
+    trs.translation = o.translation.value_or(trs.translation);
+    trs.rotation = o.rotation.value_or(trs.rotation);
+    trs.scale = o.scale.value_or(trs.scale);
+    if (o.material_document != nullptr) {
+      placed.material_document = o.material_document;
+      placed.material_index = o.material_index;
+    }
+  }
+
+  const AnimatedPose* pose_of(const GltfDocument& document, int node_index)
+  {
+    if (!time_ || document.core.animations.empty()) {
+      return nullptr;
+    }
+    auto it = poses_.find(&document);
+    if (it == poses_.end()) {
+      it = poses_.emplace(&document, animation_pose(document, *time_, warnings_)).first;
+    }
+    const auto pose = it->second.find(node_index);
+    return pose == it->second.end() ? nullptr : &pose->second;
+  }
+
+  /// If the node refers to another file, pushes that file's nodes as its children.
+  void push_reference(const Pending& child, int node_index)
+  {
+    const GltfDocument& document = *child.scope->document;
+    const auto& node = document.element("nodes", static_cast<std::size_t>(node_index));
+    document.read_extension(node, node_path(node_index), "RELIEF_reference", [&](const JsonReader& r) {
+      const std::string uri_path = json_path_join(r.path(), "uri");
+      if (!r.has("uri")) {
+        r.fail("uri", "a path");
+      }
+      const GltfDocument& target =
+          documents_.load(gltf_resolve_uri(document, r.string("uri", ""), uri_path), warnings_);
+      for (const Scope* s = child.scope.get(); s != nullptr; s = s->outer.get()) {
+        if (s->document == &target) {
+          throw SceneError(document.file, uri_path, "a file that does not lead back here",
+                           '"' + r.string("uri", "") + "\" (a cycle of references)");
+        }
+      }
+      auto scope = std::make_shared<Scope>();
+      scope->document = &target;
+      scope->outer = child.scope;
+      scope->overrides = overrides_of(document, node_index, r);
+      Pending below = child;
+      below.scope = scope;
+      push_all(reference_roots(target, r), below);
+      r.warn_unread(warnings_);
+    });
+  }
+
+  static std::vector<int> reference_roots(const GltfDocument& target, const JsonReader& r)
+  {
+    if (!r.has("node")) {
+      return default_roots(target);
+    }
+    const std::string name = r.string("node", "");
+    const auto& nodes = target.core.nodes;
+    const auto at = std::find_if(nodes.begin(), nodes.end(), [&](const auto& n) { return n.name == name; });
+    if (at == nodes.end()) {
+      r.fail("node", "the name of a node in " + target.file);
+    }
+    return {static_cast<int>(at - nodes.begin())};
+  }
+
+  std::shared_ptr<const OverrideSet> overrides_of(const GltfDocument& document, int node_index, const JsonReader& r)
+  {
+    if (!r.has("overrides")) {
+      return nullptr;
+    }
+    auto& known = overrides_of_[{&document, node_index}];
+    if (known == nullptr) {
+      auto set = std::make_shared<OverrideSet>();
+      const JsonReader overrides = r.object("overrides");
+      set->file = document.file;
+      set->path = overrides.path();
+      for (const auto& item : r.raw("overrides").items()) {
+        set->by_name[item.key()] = read_override(document, overrides.object(item.key()), warnings_);
+      }
+      known = std::move(set);
+    }
+    return known;
+  }
+
+  DocumentSet& documents_;
+  std::optional<double> time_;
+  Warnings& warnings_;
+  const std::function<void(const PlacedNode&)>& visit_;
+  std::vector<Pending> stack_;
+  std::size_t num_visited_ = 0;
+  std::map<const GltfDocument*, std::unordered_map<int, AnimatedPose>> poses_;
+  std::map<std::pair<const GltfDocument*, int>, std::shared_ptr<const OverrideSet>> overrides_of_;
+};
+
+}  // namespace
+
+const GltfDocument& DocumentSet::load(const std::filesystem::path& path, Warnings& warnings)
+{
+  std::error_code error;
+  std::filesystem::path key = std::filesystem::weakly_canonical(path, error);
+  if (error) {
+    key = path;
+  }
+  auto it = documents_.find(key);
+  if (it == documents_.end()) {
+    it = documents_.emplace(key, gltf_document_load(path, warnings)).first;
+  }
+  return *it->second;
+}
+
+void composition_traverse(DocumentSet& documents,
+                          const GltfDocument& root,
+                          std::optional<double> time_seconds,
+                          Warnings& warnings,
+                          const std::function<void(const PlacedNode&)>& visit)
+{
+  Walk(documents, time_seconds, warnings, visit).run(root);
+}
+
+}  // namespace relief

@@ -1,0 +1,49 @@
+// From composed glTF documents to a Scene: placed nodes become instances, lights and cameras; meshes and materials are
+// converted when the first node needs them, and once only.
+#pragma once
+
+#include <map>
+#include <vector>
+
+#include "scene/composition.h"
+#include "scene/gltf_camera.h"
+#include "scene/load.h"
+#include "scene/texture_table.h"
+
+namespace relief {
+
+class GltfLoader {
+ public:
+  explicit GltfLoader(Warnings& warnings) : warnings_(warnings) {}
+
+  /// @return everything but the texture store, features and warnings
+  /// @error SceneError
+  Scene load(const std::filesystem::path& path, const LoadOptions& options);
+
+  /// Textures that the scene refers to, in index order.
+  std::vector<TextureRequest> take_textures() { return textures_.take(); }
+
+ private:
+  void place(const PlacedNode& node);
+  bool is_usable(const PlacedNode& node, const Transform& world, const std::string& path);
+  void place_meshes(const PlacedNode& node);
+  void place_instance(const PlacedNode& node, int mesh_index, const Transform& world, const std::string& path);
+  void place_camera(const PlacedNode& node);
+  void place_lights(const PlacedNode& node);
+  void add_defaults();
+
+  const std::vector<int>& meshes_of(const GltfDocument& document, int mesh_index);
+  int material_of(const GltfDocument& document, int material_index);
+
+  Warnings& warnings_;
+  Scene scene_;
+  TextureTable textures_;
+  Bounds world_bounds_;
+  float image_aspect_ = 1;
+  std::vector<Bounds> mesh_bounds_;
+  std::map<std::pair<const GltfDocument*, int>, std::vector<int>> meshes_of_;
+  std::map<std::pair<const GltfDocument*, int>, int> material_of_;
+  DocumentSet documents_;
+};
+
+}  // namespace relief

@@ -1,0 +1,278 @@
+#include "scene/gltf_mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "scene/gltf_accessor.h"
+#include "scene/tangents.h"
+
+namespace relief {
+namespace {
+
+/// One primitive on its way to a mesh.
+struct PrimitiveReader {
+  const GltfDocument& document;
+  const tinygltf::Primitive& primitive;
+  std::string path;   ///< JSON path of the primitive
+  std::string label;  ///< how warnings name it
+  Warnings& warnings;
+
+  std::string attribute_path(const std::string& name) const { return path + "/attributes/" + name; }
+
+  void warn(const std::string& text) const { warnings.add(document.file + ": " + label + ": " + text); }
+
+  /// Accessor of an attribute; empty if the primitive does not have it.
+  /// @error SceneError for a wrong type, or another count than the positions'
+  std::optional<AccessorView> open(const std::string& name,
+                                   int min_components,
+                                   int max_components,
+                                   std::size_t num_vertices) const
+  {
+    const auto it = primitive.attributes.find(name);
+    if (it == primitive.attributes.end()) {
+      return {};
+    }
+    const AccessorView view = accessor_open(document, it->second, AccessorKind::kVertex, min_components, max_components,
+                                            attribute_path(name));
+    if (view.count != num_vertices) {
+      throw SceneError(document.file, attribute_path(name),
+                       "as many elements as POSITION (" + std::to_string(num_vertices) + ')',
+                       std::to_string(view.count));
+    }
+    return view;
+  }
+};
+
+/// Corner numbers of the primitive: its indices, or 0, 1, 2, …
+std::vector<std::uint32_t> read_corners(const PrimitiveReader& reader, std::size_t num_vertices)
+{
+  if (reader.primitive.indices < 0) {
+    std::vector<std::uint32_t> out(num_vertices);
+    std::iota(out.begin(), out.end(), 0u);
+    return out;
+  }
+  const std::string path = reader.path + "/indices";
+  const AccessorView view = accessor_open(reader.document, reader.primitive.indices, AccessorKind::kIndex, 1, 1, path);
+  std::vector<std::uint32_t> out = accessor_read_indices(view);
+  const std::uint32_t restart = view.component_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE    ? 0xffu
+                                : view.component_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT ? 0xffffu
+                                                                                                : 0xffffffffu;
+  const std::uint32_t largest = *std::max_element(out.begin(), out.end());
+  if (largest >= num_vertices || largest == restart) {
+    const auto bad = std::find(out.begin(), out.end(), largest);
+    throw SceneError(reader.document.file, path,
+                     "indices below " + std::to_string(std::min<std::size_t>(num_vertices, restart)),
+                     std::to_string(largest) + (largest == restart ? " (the restart value)" : "") + " at position " +
+                         std::to_string(bad - out.begin()));
+  }
+  return out;
+}
+
+/// Triangles of a list, strip or fan.
+/// @source glTF 2.0, section 3.7.2.1
+std::vector<TriangleIndices> assemble_triangles(const PrimitiveReader& reader, const std::vector<std::uint32_t>& corner)
+{
+  const std::size_t n = corner.size();
+  const int mode = reader.primitive.mode;
+  std::vector<TriangleIndices> out;
+  if (mode == TINYGLTF_MODE_TRIANGLES) {
+    if (n % 3 != 0) {
+      throw SceneError(reader.document.file, reader.path, "a multiple of 3 corners", std::to_string(n));
+    }
+    out.resize(n / 3);
+    for (std::size_t i = 0; i < out.size(); ++i) {
+      out[i] = {corner[3 * i], corner[3 * i + 1], corner[3 * i + 2]};
+    }
+    return out;
+  }
+  if (n < 3) {
+    throw SceneError(reader.document.file, reader.path, "at least 3 corners", std::to_string(n));
+  }
+  out.resize(n - 2);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const std::size_t odd = i % 2;
+    out[i] = mode == TINYGLTF_MODE_TRIANGLE_STRIP ? TriangleIndices{corner[i], corner[i + 1 + odd], corner[i + 2 - odd]}
+                                                  : TriangleIndices{corner[i + 1], corner[i + 2], corner[0]};
+  }
+  // Strips are stitched with corners that repeat; those triangles are a means, not a mistake.
+  std::erase_if(out, [](const TriangleIndices& t) { return t.v0 == t.v1 || t.v1 == t.v2 || t.v2 == t.v0; });
+  return out;
+}
+
+/// Zero area, judged in double: differences of floats and their products are exact or nearly so there.
+bool has_no_area(Vec3f a, Vec3f b, Vec3f c)
+{
+  const double ux = static_cast<double>(b.x) - static_cast<double>(a.x),
+               uy = static_cast<double>(b.y) - static_cast<double>(a.y),
+               uz = static_cast<double>(b.z) - static_cast<double>(a.z);
+  const double vx = static_cast<double>(c.x) - static_cast<double>(a.x),
+               vy = static_cast<double>(c.y) - static_cast<double>(a.y),
+               vz = static_cast<double>(c.z) - static_cast<double>(a.z);
+  return uy * vz == uz * vy && uz * vx == ux * vz && ux * vy == uy * vx;
+}
+
+void drop_empty_triangles(const PrimitiveReader& reader, Mesh& mesh)
+{
+  const std::size_t dropped = std::erase_if(
+      mesh.triangles, [&](const TriangleIndices& t) { return has_no_area(mesh.P[t.v0], mesh.P[t.v1], mesh.P[t.v2]); });
+  if (dropped > 0) {
+    reader.warn(std::to_string(dropped) + " triangles of zero area dropped");
+  }
+}
+
+/// Makes normals unit. Where one is zero the triangles around say what it is.
+void repair_normals(const PrimitiveReader& reader, Mesh& mesh)
+{
+  std::vector<bool> is_bad;
+  std::size_t num_bad = 0;
+  for (std::size_t v = 0; v < mesh.N.size(); ++v) {
+    const Vec3f n = as_vector(mesh.N[v]);
+    // Scaled first, so that the squares of tiny or huge normals neither vanish nor overflow.
+    const float largest = max_component(abs(n));
+    if (largest > 0) {
+      mesh.N[v] = as_normal(normalize(n * (1.0f / largest)));
+      if (is_finite(as_vector(mesh.N[v]))) {
+        continue;
+      }
+    }
+    is_bad.resize(mesh.N.size(), false);
+    is_bad[v] = true;
+    mesh.N[v] = {};
+    ++num_bad;
+  }
+  if (num_bad == 0) {
+    return;
+  }
+  for (const TriangleIndices& t : mesh.triangles) {
+    const Vec3f across = cross(mesh.P[t.v1] - mesh.P[t.v0], mesh.P[t.v2] - mesh.P[t.v0]);
+    const float size = length(across);
+    for (const std::uint32_t v : {t.v0, t.v1, t.v2}) {
+      if (is_bad[v] && size > 0) {
+        mesh.N[v] = as_normal(as_vector(mesh.N[v]) + across / size);
+      }
+    }
+  }
+  for (std::size_t v = 0; v < mesh.N.size(); ++v) {
+    if (is_bad[v]) {
+      const Vec3f n = normalize(as_vector(mesh.N[v]));
+      mesh.N[v] = is_finite(n) ? as_normal(n) : Normal3f{0, 0, 1};
+    }
+  }
+  reader.warn(std::to_string(num_bad) + " zero normals replaced by those of the triangles around them");
+}
+
+/// Unit tangents with w = ±1.
+void repair_tangents(const PrimitiveReader& reader, Mesh& mesh)
+{
+  std::size_t num_bad = 0;
+  for (std::size_t v = 0; v < mesh.tangent.size(); ++v) {
+    Vec3f t = normalize(xyz(mesh.tangent[v]));
+    if (!is_finite(t)) {
+      t = frame_from_normal(as_vector(mesh.N[v])).s;
+      ++num_bad;
+    }
+    mesh.tangent[v] = {t.x, t.y, t.z, mesh.tangent[v].w < 0 ? -1.0f : 1.0f};
+  }
+  if (num_bad > 0) {
+    reader.warn(std::to_string(num_bad) + " zero tangents replaced");
+  }
+}
+
+std::vector<Vec4f> read_colors(const AccessorView& view, std::size_t first, std::size_t count)
+{
+  std::vector<Vec4f> out(count);
+  if (view.num_components == 4) {
+    out = accessor_read<Vec4f>(view, first, count);
+  } else {
+    const std::vector<Vec3f> rgb = accessor_read<Vec3f>(view, first, count);
+    std::transform(rgb.begin(), rgb.end(), out.begin(), [](Vec3f c) { return Vec4f{c.x, c.y, c.z, 1}; });
+  }
+  for (Vec4f& c : out) {
+    c = {max(c.x, 0.0f), max(c.y, 0.0f), max(c.z, 0.0f), clamp(c.w, 0.0f, 1.0f)};
+  }
+  return out;
+}
+
+/// Vertices [first, first + count) of every attribute.
+void read_attributes(const PrimitiveReader& reader,
+                     const AccessorView& positions,
+                     std::size_t first,
+                     std::size_t count,
+                     Mesh& mesh)
+{
+  const auto normals = reader.open("NORMAL", 3, 3, positions.count);
+  const auto tangents = reader.open("TANGENT", 4, 4, positions.count);
+  const auto colors = reader.open("COLOR_0", 3, 4, positions.count);
+  mesh.P = accessor_read<Vec3f>(positions, first, count);
+  for (int set = 0; set < 2; ++set) {
+    if (const auto uv = reader.open("TEXCOORD_" + std::to_string(set), 2, 2, positions.count)) {
+      mesh.uv[set] = accessor_read<Vec2f>(*uv, first, count);
+    }
+  }
+  if (normals) {
+    mesh.N = accessor_read<Normal3f>(*normals, first, count);
+  }
+  if (colors) {
+    mesh.color = read_colors(*colors, first, count);
+  }
+  // Tangents without normals mean nothing (glTF 2.0, section 3.7.2.1).
+  if (tangents && normals) {
+    mesh.tangent = accessor_read<Vec4f>(*tangents, first, count);
+  }
+}
+
+}  // namespace
+
+std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
+                                   int mesh_index,
+                                   int primitive_index,
+                                   int tangent_uv_set,
+                                   Warnings& warnings)
+{
+  const tinygltf::Mesh& source = document.core.meshes[static_cast<std::size_t>(mesh_index)];
+  const std::string mesh_path = "/meshes/" + std::to_string(mesh_index);
+  PrimitiveReader reader{document, source.primitives[static_cast<std::size_t>(primitive_index)],
+                         mesh_path + "/primitives/" + std::to_string(primitive_index), "", warnings};
+  reader.label = reader.path + (source.name.empty() ? "" : " (" + source.name + ')');
+  if (reader.primitive.mode < TINYGLTF_MODE_TRIANGLES) {
+    reader.warn("points and lines are not rendered");
+    return {};
+  }
+  const auto position = reader.primitive.attributes.find("POSITION");
+  if (position == reader.primitive.attributes.end()) {
+    throw SceneError(document.file, reader.attribute_path("POSITION"), "an accessor", "nothing");
+  }
+  const AccessorView positions =
+      accessor_open(document, position->second, AccessorKind::kVertex, 3, 3, reader.attribute_path("POSITION"));
+  constexpr std::size_t kMostVertices = 0xfffffffe;
+  if (positions.count > kMostVertices) {
+    throw SceneError(document.file, reader.attribute_path("POSITION"),
+                     "at most " + std::to_string(kMostVertices) + " vertices", std::to_string(positions.count));
+  }
+  Mesh mesh;
+  mesh.name = source.name;
+  {
+    const std::vector<std::uint32_t> corners = read_corners(reader, positions.count);
+    mesh.triangles = assemble_triangles(reader, corners);
+    const auto [lowest, highest] = std::minmax_element(corners.begin(), corners.end());
+    const std::uint32_t first = *lowest;
+    for (TriangleIndices& t : mesh.triangles) {
+      t = {t.v0 - first, t.v1 - first, t.v2 - first};
+    }
+    read_attributes(reader, positions, first, *highest - first + 1, mesh);
+  }
+  drop_empty_triangles(reader, mesh);
+  if (mesh.triangles.empty()) {
+    reader.warn("no triangle has an area; nothing is rendered");
+    return {};
+  }
+  repair_normals(reader, mesh);
+  repair_tangents(reader, mesh);
+  if (tangent_uv_set >= 0 && mesh.tangent.empty() && !mesh.uv[tangent_uv_set].empty()) {
+    tangents_derive(mesh, tangent_uv_set);
+  }
+  return mesh;
+}
+
+}  // namespace relief

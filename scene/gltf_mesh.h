@@ -1,0 +1,24 @@
+// From a glTF primitive to a triangle mesh: topology, attributes, repairs that are safe to make.
+#pragma once
+
+#include <optional>
+
+#include "scene/gltf_document.h"
+#include "scene/scene.h"
+
+namespace relief {
+
+/// Reads one primitive.
+/// @param tangent_uv_set  texture coordinates that a normal map needs tangents for; −1: none needed
+/// @return empty, with a warning, for points and lines and when no triangle has an area
+/// @error  SceneError: missing positions, wrong accessor types, counts that differ, indices out of range or equal to the
+///         restart value, NaN or infinity
+/// @post   unit normals, indices in range, no triangle of zero area; only vertices between the lowest and the highest
+///         index, so that primitives that share one large accessor do not copy all of it. `material_index` is not set
+std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
+                                   int mesh_index,
+                                   int primitive_index,
+                                   int tangent_uv_set,
+                                   Warnings& warnings);
+
+}  // namespace relief

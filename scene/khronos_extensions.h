@@ -1,0 +1,52 @@
+// Materials, lights, texture transforms and instancing as glTF and its Khronos extensions define them.
+#pragma once
+
+#include <vector>
+
+#include "kernel/bsdf/material.h"
+#include "kernel/light/light.h"
+#include "scene/gltf_document.h"
+#include "scene/texture_table.h"
+#include "scene/transform.h"
+
+namespace relief {
+
+/// Reads a textureInfo object with its KHR_texture_transform.
+/// @param parent  has the property `name`, or not: then the reference is empty
+/// @error SceneError: texCoord other than 0 or 1, bad index, bad image
+TextureRef khronos_texture_ref(const GltfDocument& document,
+                               const JsonReader& parent,
+                               std::string_view name,
+                               TextureColor color,
+                               TextureTable& textures,
+                               Warnings& warnings);
+
+/// KHR_texture_transform as the 2×3 matrix translation · rotation · scale.
+/// @param rotation  radians, counter-clockwise as seen on the image, whose v points down
+void khronos_texture_transform(TextureRef& ref,
+                               double offset_u,
+                               double offset_v,
+                               double rotation,
+                               double scale_u,
+                               double scale_v);
+
+/// Same, from the extension's JSON; also its texCoord.
+void khronos_texture_transform(TextureRef& ref, const JsonReader& extension, Warnings& warnings);
+
+/// Material `index` of a document: core and KHR_materials_*; RELIEF_displacement is read by relief_displacement.
+Material khronos_material(const GltfDocument& document, int index, TextureTable& textures, Warnings& warnings);
+
+/// The light that a node carries through KHR_lights_punctual, placed by the node's transform.
+/// @param luminous_efficacy  lm/W that divides candela and lux
+/// @return 0 or 1 lights
+std::vector<Light> khronos_node_light(const GltfDocument& document,
+                                      int node_index,
+                                      const Transform& world,
+                                      float luminous_efficacy,
+                                      Warnings& warnings);
+
+/// EXT_mesh_gpu_instancing of a node: transforms relative to the node.
+/// @return empty if the node has no such extension
+std::vector<Transform> khronos_instances(const GltfDocument& document, int node_index, Warnings& warnings);
+
+}  // namespace relief

@@ -1,0 +1,301 @@
+#include "scene/relief_extensions.h"
+
+#include <cmath>
+
+namespace relief {
+namespace {
+
+constexpr double kNoLimit = JsonReader::kNoLimit;
+constexpr std::int64_t kLargestInt = std::numeric_limits<std::int32_t>::max();
+
+int small_integer(const JsonReader& r, std::string_view name, int fallback, std::int64_t low, std::int64_t high)
+{
+  return static_cast<int>(r.integer(name, fallback, low, high));
+}
+
+/// Two integers of an array, or the fallback.
+void integer_pair(const JsonReader& r, std::string_view name, int& first, int& second, double low, double high)
+{
+  const std::vector<double> v = r.numbers(name, 2, 2, low, high);
+  if (v.empty()) {
+    return;
+  }
+  if (v[0] != std::floor(v[0]) || v[1] != std::floor(v[1])) {
+    r.fail(name, "two integers");
+  }
+  first = static_cast<int>(v[0]);
+  second = static_cast<int>(v[1]);
+}
+
+void read_pixel_filter(const JsonReader& r, RenderSettings& s, Warnings& warnings)
+{
+  static constexpr std::string_view kFilters[] = {"box", "blackman-harris"};
+  if (!r.has("pixelFilter")) {
+    return;
+  }
+  const JsonReader filter = r.object("pixelFilter");
+  s.filter = filter.choice("type", kFilters, 1) == 0 ? PixelFilter::kBox : PixelFilter::kBlackmanHarris;
+  s.filter_width = filter.number_f("width", s.filter == PixelFilter::kBox ? 1.0f : 1.5f, 0.01, 100);
+  filter.warn_unread(warnings);
+}
+
+/// Vector of the node scaled by a length, for the half axes of an area light.
+Vec3f half_axis(Vec3f axis, float size) { return axis * (0.5f * size); }
+
+/// Reads one of the two ways of giving the height map: a glTF texture or a plain path.
+TextureRef height_texture(const GltfDocument& document,
+                          const JsonReader& parent,
+                          std::string_view name,
+                          TextureTable& textures,
+                          Warnings& warnings)
+{
+  if (!parent.has(name)) {
+    return {};
+  }
+  const JsonReader info = parent.object(name);
+  if (!info.has("uri")) {
+    const TextureRef ref = khronos_texture_ref(document, parent, name, TextureColor::kLinear, textures, warnings);
+    for (const char* known : {"index", "texCoord"}) {
+      static_cast<void>(info.has(known));
+    }
+    info.warn_unread(warnings);
+    return ref;
+  }
+  if (info.has("index")) {
+    info.fail("", "either index or uri", "both");
+  }
+  TextureRef ref;
+  ref.uv_set = static_cast<int>(info.integer("texCoord", 0, 0, 1));
+  document.read_extension(parent.raw(name), info.path(), "KHR_texture_transform",
+                          [&](const JsonReader& r) { khronos_texture_transform(ref, r, warnings); });
+  const std::string uri = info.string("uri", "");
+  ref.texture_index = textures.add_file(document, uri, json_path_join(info.path(), "uri"), TextureColor::kLinear, {});
+  info.warn_unread(warnings);
+  return ref;
+}
+
+DisplacementSettings read_displacement(const GltfDocument& document,
+                                       const JsonReader& r,
+                                       TextureTable& textures,
+                                       Warnings& warnings)
+{
+  static constexpr std::string_view kSpaces[] = {"object", "world"};
+  static constexpr std::string_view kMethods[] = {"auto", "rmip", "tfdm", "tessellate", "microtriangle", "cone"};
+  static constexpr std::string_view kSeams[] = {"keep", "weld"};
+  DisplacementSettings d;
+  d.height = height_texture(document, r, "heightTexture", textures, warnings);
+  d.scale = r.number_f("scale", 1);
+  d.midlevel = r.number_f("midlevel", 0.5f, 0, 1);
+  d.space = static_cast<DisplacementSpace>(r.choice("space", kSpaces, 0));
+  d.method = static_cast<DisplacementMethod>(r.choice("method", kMethods, 0));
+  if (r.has("lod") && !(r.raw("lod").is_string() && r.string("lod", "") == "auto")) {
+    if (!r.raw("lod").is_number()) {
+      r.fail("lod", "\"auto\" or a number ≥ 0");
+    }
+    d.lod = r.number_f("lod", -1, 0, kNoLimit);
+  }
+  d.smoothing = r.boolean("smoothing", false);
+  d.weld_seams = r.choice("seams", kSeams, 0) == 1;
+  if (r.has("procedural")) {
+    static_cast<void>(r.object("procedural"));
+    d.procedural_json = r.raw("procedural").dump();
+  }
+  if (d.height.texture_index < 0 && d.procedural_json.empty()) {
+    r.fail("", "heightTexture or procedural", "neither");
+  }
+  r.warn_unread(warnings);
+  return d;
+}
+
+/// The unofficial extension stores offset + factor · h along the normal; ours is scale · (h − midlevel).
+DisplacementSettings read_khr_displacement(const GltfDocument& document,
+                                           const JsonReader& r,
+                                           TextureTable& textures,
+                                           Warnings& warnings)
+{
+  DisplacementSettings d;
+  const char* name = r.has("displacementGeometryTexture") ? "displacementGeometryTexture" : "displacementTexture";
+  d.height = height_texture(document, r, name, textures, warnings);
+  if (d.height.texture_index < 0) {
+    r.fail("displacementGeometryTexture", "a texture");
+  }
+  d.scale = r.number_f("displacementGeometryFactor", 1);
+  const float offset = r.number_f("displacementGeometryOffset", 0);
+  d.midlevel = d.scale != 0 ? -offset / d.scale : 0.0f;
+  r.warn_unread(warnings);
+  return d;
+}
+
+}  // namespace
+
+RenderSettings relief_render(const GltfDocument& document, Warnings& warnings)
+{
+  RenderSettings s;
+  document.read_extension(document.json, "", "RELIEF_render", [&](const JsonReader& r) {
+    integer_pair(r, "resolution", s.width, s.height, 1, 65536);
+    s.samples = small_integer(r, "samples", s.samples, 1, kLargestInt);
+    s.noise_threshold = r.number_f("noiseThreshold", 0, 0, kNoLimit);
+    s.max_bounces = small_integer(r, "maxBounces", s.max_bounces, 0, kLargestInt);
+    s.diffuse_bounces = small_integer(r, "diffuseBounces", s.max_bounces, 0, kLargestInt);
+    s.glossy_bounces = small_integer(r, "glossyBounces", s.max_bounces, 0, kLargestInt);
+    s.transmission_bounces = small_integer(r, "transmissionBounces", s.max_bounces, 0, kLargestInt);
+    s.transparent_bounces = small_integer(r, "transparentBounces", s.transparent_bounces, 0, kLargestInt);
+    s.seed = static_cast<std::uint64_t>(r.integer("seed", 0, 0, std::int64_t{1} << 53));
+    s.view = r.string("view", "");
+    s.exposure = r.number_f("exposure", 0, -100, 100);
+    s.clamp_indirect = r.number_f("clampIndirect", 0, 0, kNoLimit);
+    integer_pair(r, "frameRange", s.frame_start, s.frame_end, -1e6, 1e6);
+    if (s.frame_end < s.frame_start) {
+      r.fail("frameRange", "a first frame that is not after the last");
+    }
+    s.frames_per_second = r.number_f("fps", s.frames_per_second, 1e-3, 1e6);
+    read_pixel_filter(r, s, warnings);
+    s.luminous_efficacy = r.number_f("luminousEfficacy", 1, 1e-6, 1e6);
+    if (r.has("caustics")) {
+      static_cast<void>(r.object("caustics"));
+    }
+    r.warn_unread(warnings);
+  });
+  return s;
+}
+
+void relief_camera(const GltfDocument& document, int camera_index, Camera& camera, Warnings& warnings)
+{
+  const auto index = static_cast<std::size_t>(camera_index);
+  const std::string path = "/cameras/" + std::to_string(index);
+  document.read_extension(document.element("cameras", index), path, "RELIEF_camera", [&](const JsonReader& r) {
+    camera.aperture_radius = r.number_f("apertureRadius", 0, 0, kNoLimit);
+    camera.focus_distance = r.number_f("focusDistance", 1, 1e-6, kNoLimit);
+    const std::vector<double> shift = r.numbers("shift", 2, 2, -1e3, 1e3);
+    if (!shift.empty()) {
+      camera.shift_x = static_cast<float>(shift[0]);
+      camera.shift_y = static_cast<float>(shift[1]);
+    }
+    const std::vector<double> clip = r.numbers("clip", 1, 2, 0, 1e30);
+    if (!clip.empty()) {
+      camera.clip_start = static_cast<float>(clip[0]);
+      camera.clip_end = clip.size() == 2 ? static_cast<float>(clip[1]) : kInfinity;
+      if (!(camera.clip_end > camera.clip_start)) {
+        r.fail("clip", "an end beyond the start");
+      }
+    }
+    r.warn_unread(warnings);
+  });
+}
+
+std::optional<Environment> relief_environment(const GltfDocument& document, TextureTable& textures, Warnings& warnings)
+{
+  std::optional<Environment> out;
+  document.read_extension(document.json, "", "RELIEF_environment", [&](const JsonReader& r) {
+    Environment e;
+    e.color = r.color("color", {1, 1, 1}) * r.number_f("strength", 1, 0, kNoLimit);
+    if (!is_finite(e.color)) {
+      r.fail("strength", "a finite radiance");
+    }
+    e.rotation = r.number_f("rotation", 0, -1e6, 1e6);
+    e.visible_to_camera = r.boolean("visibleToCamera", true);
+    if (r.has("image") && r.has("uri")) {
+      r.fail("", "either image or uri", "both");
+    }
+    // Round about there is no border; at the poles there is.
+    const TextureSampling lat_long{Wrap::kRepeat, Wrap::kClamp, TexelFilter::kLinear};
+    if (const int image = r.index("image", document.count("images"), "images"); image >= 0) {
+      e.texture_index = textures.add_image(document, image, TextureColor::kSrgb, lat_long);
+    } else if (r.has("uri")) {
+      e.texture_index = textures.add_file(document, r.string("uri", ""), json_path_join(r.path(), "uri"),
+                                          TextureColor::kSrgb, lat_long);
+    }
+    r.warn_unread(warnings);
+    out = e;
+  });
+  return out;
+}
+
+std::vector<Light> relief_area_light(const GltfDocument& document,
+                                     int node_index,
+                                     const Transform& world,
+                                     Warnings& warnings)
+{
+  static constexpr std::string_view kShapes[] = {"rectangle", "disk"};
+  std::vector<Light> out;
+  const auto index = static_cast<std::size_t>(node_index);
+  const std::string path = "/nodes/" + std::to_string(index);
+  document.read_extension(document.element("nodes", index), path, "RELIEF_area_light", [&](const JsonReader& r) {
+    const Affine3 m = transform_to_affine(world);
+    const bool disk = r.choice("shape", kShapes, 0) == 1;
+    constexpr double kSmallest = 1e-9;
+    Light light;
+    light.kind = disk ? LightKind::kDisk : LightKind::kRectangle;
+    const float diameter = disk ? 2 * r.number_f("radius", 0.5f, kSmallest, kNoLimit) : 0;
+    light.edge_u = half_axis(m.x, disk ? diameter : r.number_f("width", 1, kSmallest, kNoLimit));
+    light.edge_v = half_axis(m.y, disk ? diameter : r.number_f("height", 1, kSmallest, kNoLimit));
+    light.P = m.p;
+    const Vec3f across = cross(light.edge_u, light.edge_v);
+    light.area = length(across) * (disk ? kPi : 4.0f);
+    if (!(light.area > 0 && is_finite(light.area))) {
+      r.fail("", "a light whose area in the world is a number > 0", number_text(static_cast<double>(light.area)));
+    }
+    const Vec3f normal = normalize(across);
+    // A mirroring node turns the edges' winding over, but the light still shines along the node's −Z.
+    light.axis = dot(normal, m.z) > 0 ? -normal : normal;
+    light.two_sided = r.boolean("twoSided", false);
+    light.visible_to_camera = r.boolean("visibleToCamera", true);
+    const Vec3f color = r.color("color", {1, 1, 1});
+    if (r.has("power") == r.has("radiance")) {
+      r.fail("", "exactly one of power and radiance", r.has("power") ? "both" : "neither");
+    }
+    const float sides = light.two_sided ? 2.0f : 1.0f;
+    light.emission = r.has("radiance") ? color * r.number_f("radiance", 0, 0, kNoLimit)
+                                       : color * (r.number_f("power", 0, 0, kNoLimit) / (kPi * light.area * sides));
+    if (!is_finite(light.emission)) {
+      r.fail("", "a finite radiance", "one beyond single precision");
+    }
+    r.warn_unread(warnings);
+    out.push_back(light);
+  });
+  return out;
+}
+
+ObjectSettings relief_object(const GltfDocument& document, int node_index, ObjectSettings inherited, Warnings& warnings)
+{
+  ObjectSettings s = inherited;
+  const auto index = static_cast<std::size_t>(node_index);
+  const std::string path = "/nodes/" + std::to_string(index);
+  document.read_extension(document.element("nodes", index), path, "RELIEF_object", [&](const JsonReader& r) {
+    s.visible_to_camera = r.boolean("visibleToCamera", s.visible_to_camera);
+    s.casts_shadow = r.boolean("castsShadow", s.casts_shadow);
+    s.caustic_receiver = r.boolean("causticReceiver", s.caustic_receiver);
+    if (r.has("causticCaster")) {
+      const nlohmann::json& caster = r.raw("causticCaster");
+      if (!caster.is_boolean() && caster != "auto") {
+        r.fail("causticCaster", "\"auto\", true or false");
+      }
+      s.caustic_caster = !caster.is_boolean() ? CausticCaster::kAuto
+                         : caster.get<bool>() ? CausticCaster::kYes
+                                              : CausticCaster::kNo;
+    }
+    r.warn_unread(warnings);
+  });
+  return s;
+}
+
+std::optional<DisplacementSettings> relief_displacement(const GltfDocument& document,
+                                                        int material_index,
+                                                        TextureTable& textures,
+                                                        Warnings& warnings)
+{
+  std::optional<DisplacementSettings> out;
+  const auto index = static_cast<std::size_t>(material_index);
+  const auto& material = document.element("materials", index);
+  const std::string path = "/materials/" + std::to_string(index);
+  const bool own = document.read_extension(material, path, "RELIEF_displacement", [&](const JsonReader& r) {
+    out = read_displacement(document, r, textures, warnings);
+  });
+  if (!own) {
+    document.read_extension(material, path, "KHR_materials_displacement",
+                            [&](const JsonReader& r) { out = read_khr_displacement(document, r, textures, warnings); });
+  }
+  return out;
+}
+
+}  // namespace relief

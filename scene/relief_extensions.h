@@ -1,0 +1,50 @@
+// relief's own extensions, as docs/scene_format.md defines them: one function each, in the order of that page.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "scene/khronos_extensions.h"
+#include "scene/scene.h"
+
+namespace relief {
+
+/// RELIEF_render of a document; defaults where it is absent.
+RenderSettings relief_render(const GltfDocument& document, Warnings& warnings);
+
+/// RELIEF_camera: lens and window of a camera; `camera` has its glTF part already.
+void relief_camera(const GltfDocument& document, int camera_index, Camera& camera, Warnings& warnings);
+
+/// RELIEF_environment; empty if the document has none.
+std::optional<Environment> relief_environment(const GltfDocument& document, TextureTable& textures, Warnings& warnings);
+
+/// RELIEF_area_light of a node, placed by its transform.
+/// @return 0 or 1 lights
+std::vector<Light> relief_area_light(const GltfDocument& document,
+                                     int node_index,
+                                     const Transform& world,
+                                     Warnings& warnings);
+
+enum class CausticCaster : std::uint8_t { kAuto, kYes, kNo };
+
+/// RELIEF_object as inherited along the node tree.
+struct ObjectSettings {
+  bool visible_to_camera = true;
+  bool casts_shadow = true;
+  CausticCaster caustic_caster = CausticCaster::kAuto;
+  bool caustic_receiver = true;
+};
+
+/// @param inherited  the parent's settings
+ObjectSettings relief_object(const GltfDocument& document,
+                             int node_index,
+                             ObjectSettings inherited,
+                             Warnings& warnings);
+
+/// RELIEF_displacement of a material, or the unofficial KHR_materials_displacement.
+std::optional<DisplacementSettings> relief_displacement(const GltfDocument& document,
+                                                        int material_index,
+                                                        TextureTable& textures,
+                                                        Warnings& warnings);
+
+}  // namespace relief

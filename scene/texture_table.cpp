@@ -1,0 +1,126 @@
+#include "scene/texture_table.h"
+
+#include <cstring>
+#include <utility>
+
+namespace relief {
+namespace {
+
+Wrap wrap_from_gltf(int value)
+{
+  return value == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE     ? Wrap::kClamp
+         : value == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT ? Wrap::kMirror
+                                                          : Wrap::kRepeat;
+}
+
+std::vector<unsigned char> to_bytes(std::span<const std::byte> bytes)
+{
+  std::vector<unsigned char> out(bytes.size());
+  if (!bytes.empty()) {
+    std::memcpy(out.data(), bytes.data(), bytes.size());
+  }
+  return out;
+}
+
+}  // namespace
+
+TextureTable::Key TextureTable::make_key(std::string file,
+                                         const GltfDocument* document,
+                                         int image,
+                                         TextureColor color,
+                                         TextureSampling sampling)
+{
+  return {std::move(file),
+          document,
+          image,
+          static_cast<int>(color),
+          static_cast<int>(sampling.wrap_u),
+          static_cast<int>(sampling.wrap_v),
+          static_cast<int>(sampling.filter)};
+}
+
+int TextureTable::add(Key key, TextureRequest request, TextureColor color, TextureSampling sampling)
+{
+  const auto index = static_cast<int>(requests_.size());
+  request.color = color;
+  request.wrap_u = sampling.wrap_u;
+  request.wrap_v = sampling.wrap_v;
+  request.filter = sampling.filter;
+  requests_.push_back(std::move(request));
+  index_of_.emplace(std::move(key), index);
+  return index;
+}
+
+int TextureTable::add_texture(const GltfDocument& document, int texture_index, TextureColor color)
+{
+  const tinygltf::Texture& texture = document.core.textures[static_cast<std::size_t>(texture_index)];
+  if (texture.source < 0) {
+    throw SceneError(document.file, "/textures/" + std::to_string(texture_index) + "/source", "an image", "nothing");
+  }
+  TextureSampling sampling;
+  if (texture.sampler >= 0) {
+    const tinygltf::Sampler& sampler = document.core.samplers[static_cast<std::size_t>(texture.sampler)];
+    sampling.wrap_u = wrap_from_gltf(sampler.wrapS);
+    sampling.wrap_v = wrap_from_gltf(sampler.wrapT);
+    sampling.filter =
+        sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST ? TexelFilter::kNearest : TexelFilter::kLinear;
+  }
+  return add_image(document, texture.source, color, sampling);
+}
+
+int TextureTable::add_image(const GltfDocument& document, int image_index, TextureColor color, TextureSampling sampling)
+{
+  Key key = make_key("", &document, image_index, color, sampling);
+  if (const auto known = index_of_.find(key); known != index_of_.end()) {
+    return known->second;
+  }
+  const std::string path = "/images/" + std::to_string(image_index);
+  const JsonReader image(document.element("images", static_cast<std::size_t>(image_index)), document.file, path);
+  if (image.has("uri") == image.has("bufferView")) {
+    image.fail("", "either uri or bufferView", image.has("uri") ? "both" : "neither");
+  }
+  TextureRequest request;
+  request.scene_file = document.file;
+  request.json_path = path;
+  std::string name = image.string("name", "");
+  if (image.has("bufferView")) {
+    const int view = image.index("bufferView", document.core.bufferViews.size(), "buffer views");
+    request.encoded = to_bytes(gltf_buffer_view(document, view));
+  } else {
+    const std::string uri = image.string("uri", "");
+    if (gltf_is_data_uri(uri)) {
+      request.encoded = to_bytes(gltf_decode_data_uri(uri, document.file, path + "/uri").span());
+    } else {
+      request.file = gltf_resolve_uri(document, uri, path + "/uri");
+      name = request.file.filename().string();
+    }
+  }
+  request.label = document.file + ": " + path + (name.empty() ? "" : " (" + name + ')');
+  return add(std::move(key), std::move(request), color, sampling);
+}
+
+int TextureTable::add_file(const GltfDocument& document,
+                           const std::string& uri,
+                           const std::string& json_path,
+                           TextureColor color,
+                           TextureSampling sampling)
+{
+  TextureRequest request;
+  request.file = gltf_resolve_uri(document, uri, json_path);
+  Key key = make_key(request.file.string(), nullptr, 0, color, sampling);
+  if (const auto known = index_of_.find(key); known != index_of_.end()) {
+    return known->second;
+  }
+  request.scene_file = document.file;
+  request.json_path = json_path;
+  request.label = document.file + ": " + json_path + " (" + request.file.filename().string() + ')';
+  return add(std::move(key), std::move(request), color, sampling);
+}
+
+std::vector<TextureRequest> TextureTable::take()
+{
+  index_of_.clear();
+  return std::exchange(requests_, {});
+}
+
+}  // namespace relief

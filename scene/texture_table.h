@@ -1,0 +1,56 @@
+// Collects what materials, displacements and the environment ask of textures; equal requests share one index.
+#pragma once
+
+#include <map>
+#include <tuple>
+#include <vector>
+
+#include "scene/gltf_document.h"
+#include "scene/texture_store.h"
+
+namespace relief {
+
+/// Sampler of a texture request.
+struct TextureSampling {
+  Wrap wrap_u = Wrap::kRepeat, wrap_v = Wrap::kRepeat;
+  TexelFilter filter = TexelFilter::kLinear;
+};
+
+/// Each function returns the index that the texture will have in the TextureStore made of `take()`.
+class TextureTable {
+ public:
+  /// A glTF texture: image and sampler.
+  /// @param texture_index  valid (validated core)
+  /// @error SceneError: the texture has no source; see add_image
+  int add_texture(const GltfDocument& document, int texture_index, TextureColor color);
+
+  /// @param image_index  below the number of images
+  /// @error SceneError: neither or both of uri and bufferView, missing file, bad data URI, bad buffer view
+  int add_image(const GltfDocument& document, int image_index, TextureColor color, TextureSampling sampling);
+
+  /// A path beside the file.
+  /// @error SceneError at `json_path` if there is no such file
+  int add_file(const GltfDocument& document,
+               const std::string& uri,
+               const std::string& json_path,
+               TextureColor color,
+               TextureSampling sampling);
+
+  /// The requests, in index order; the table is empty afterwards.
+  std::vector<TextureRequest> take();
+
+ private:
+  /// Image (file path, or document and image number) with everything that makes a request its own.
+  using Key = std::tuple<std::string, const GltfDocument*, int, int, int, int, int>;
+  static Key make_key(std::string file,
+                      const GltfDocument* document,
+                      int image,
+                      TextureColor color,
+                      TextureSampling sampling);
+  int add(Key key, TextureRequest request, TextureColor color, TextureSampling sampling);
+
+  std::map<Key, int> index_of_;
+  std::vector<TextureRequest> requests_;
+};
+
+}  // namespace relief

@@ -1,0 +1,570 @@
+#include "scene/validation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "scene/json_reader.h"
+
+namespace relief {
+
+using nlohmann::json;
+
+namespace {
+
+constexpr double kNoLimit = JsonReader::kNoLimit;
+/// Sizes and offsets: everything below is exact in a double and sums of a few do not overflow 64 bits.
+constexpr double kLargestSize = 9007199254740992.0;
+constexpr double kLargestInt = std::numeric_limits<int>::max();
+constexpr double kLargestFloat = std::numeric_limits<float>::max();
+
+enum class Kind : std::uint8_t {
+  kInteger,  // low…high
+  kIndex,    // into the top-level array `target`
+  kNumber,   // low…high
+  kString,   // any, or one of `labels` (separated by '|')
+  kBoolean,
+  kNumbers,   // array of length shortest…longest, each low…high
+  kIndices,   // array of different indices into `target`
+  kIndexMap,  // object whose values are indices into `target`
+  kObject,    // `fields`
+  kObjects,   // array of objects
+};
+
+/// One property of an object: how it must look.
+struct Field {
+  std::string_view name;
+  Kind kind;
+  bool required = false;
+  double low = -kNoLimit, high = kNoLimit;
+  std::size_t shortest = 0, longest = std::numeric_limits<std::size_t>::max();
+  std::string_view target = {};  ///< kIndex…: array; kString: labels
+  std::span<const Field> fields = {};
+};
+
+constexpr Field integer(std::string_view name, double low, double high, bool required = false)
+{
+  return {.name = name, .kind = Kind::kInteger, .required = required, .low = low, .high = high};
+}
+constexpr Field index(std::string_view name, std::string_view target, bool required = false)
+{
+  return {.name = name, .kind = Kind::kIndex, .required = required, .target = target};
+}
+constexpr Field number(std::string_view name, double low, double high, bool required = false)
+{
+  return {.name = name, .kind = Kind::kNumber, .required = required, .low = low, .high = high};
+}
+constexpr Field string(std::string_view name, std::string_view labels = {}, bool required = false)
+{
+  return {.name = name, .kind = Kind::kString, .required = required, .target = labels};
+}
+constexpr Field boolean(std::string_view name) { return {.name = name, .kind = Kind::kBoolean}; }
+constexpr Field numbers(std::string_view name,
+                        std::size_t count,
+                        double low = -kLargestFloat,
+                        double high = kLargestFloat)
+{
+  return {.name = name, .kind = Kind::kNumbers, .low = low, .high = high, .shortest = count, .longest = count};
+}
+constexpr Field indices(std::string_view name, std::string_view target)
+{
+  return {.name = name, .kind = Kind::kIndices, .target = target};
+}
+constexpr Field object(std::string_view name, std::span<const Field> fields, bool required = false)
+{
+  return {.name = name, .kind = Kind::kObject, .required = required, .fields = fields};
+}
+constexpr Field objects(std::string_view name,
+                        std::span<const Field> fields,
+                        bool required = false,
+                        std::size_t shortest = 0)
+{
+  return {.name = name, .kind = Kind::kObjects, .required = required, .shortest = shortest, .fields = fields};
+}
+
+constexpr Field kAsset[] = {string("version", {}, true), string("generator")};
+constexpr Field kScene[] = {string("name"), indices("nodes", "nodes")};
+constexpr Field kNode[] = {string("name"),
+                           indices("children", "nodes"),
+                           index("mesh", "meshes"),
+                           index("camera", "cameras"),
+                           numbers("matrix", 16),
+                           numbers("translation", 3),
+                           numbers("rotation", 4, -1.001, 1.001),
+                           numbers("scale", 3)};
+constexpr Field kPrimitive[] = {
+    {.name = "attributes", .kind = Kind::kIndexMap, .required = true, .target = "accessors"},
+    index("indices", "accessors"),
+    index("material", "materials"),
+    integer("mode", 0, 6)};
+constexpr Field kMesh[] = {string("name"), objects("primitives", kPrimitive, true, 1)};
+constexpr Field kSparseIndices[] = {index("bufferView", "bufferViews", true), integer("byteOffset", 0, kLargestInt),
+                                    integer("componentType", 5121, 5125, true)};
+constexpr Field kSparseValues[] = {index("bufferView", "bufferViews", true), integer("byteOffset", 0, kLargestInt)};
+constexpr Field kSparse[] = {integer("count", 1, kLargestInt, true), object("indices", kSparseIndices, true),
+                             object("values", kSparseValues, true)};
+constexpr Field kAccessor[] = {index("bufferView", "bufferViews"),
+                               integer("byteOffset", 0, kLargestSize),
+                               integer("componentType", 5120, 5126, true),
+                               boolean("normalized"),
+                               integer("count", 1, kLargestSize, true),
+                               string("type", "SCALAR|VEC2|VEC3|VEC4|MAT2|MAT3|MAT4", true),
+                               object("sparse", kSparse)};
+constexpr Field kBufferView[] = {index("buffer", "buffers", true), integer("byteOffset", 0, kLargestSize),
+                                 integer("byteLength", 1, kLargestSize, true), integer("byteStride", 4, 252)};
+constexpr Field kBuffer[] = {string("uri"), integer("byteLength", 1, kLargestSize, true)};
+constexpr Field kImage[] = {string("name"), string("uri"), string("mimeType"), index("bufferView", "bufferViews")};
+constexpr Field kTexture[] = {index("sampler", "samplers"), index("source", "images")};
+constexpr Field kSampler[] = {integer("magFilter", 9728, 9729), integer("minFilter", 9728, 9987),
+                              integer("wrapS", 10497, 33648), integer("wrapT", 10497, 33648)};
+constexpr Field kTextureInfo[] = {index("index", "textures", true), integer("texCoord", 0, kLargestInt)};
+constexpr Field kNormalTexture[] = {index("index", "textures", true), integer("texCoord", 0, kLargestInt),
+                                    number("scale", -kLargestFloat, kLargestFloat)};
+constexpr Field kPbr[] = {numbers("baseColorFactor", 4, 0, 1), object("baseColorTexture", kTextureInfo),
+                          number("metallicFactor", 0, 1), number("roughnessFactor", 0, 1),
+                          object("metallicRoughnessTexture", kTextureInfo)};
+constexpr Field kMaterial[] = {string("name"),
+                               object("pbrMetallicRoughness", kPbr),
+                               object("normalTexture", kNormalTexture),
+                               object("emissiveTexture", kTextureInfo),
+                               numbers("emissiveFactor", 3, 0),
+                               string("alphaMode", "OPAQUE|MASK|BLEND"),
+                               number("alphaCutoff", 0, kLargestFloat),
+                               boolean("doubleSided")};
+constexpr Field kPerspective[] = {number("aspectRatio", 1e-6, 1e6), number("yfov", 1e-6, 3.14159, true),
+                                  number("zfar", 0, kNoLimit), number("znear", 0, kNoLimit)};
+constexpr Field kOrthographic[] = {number("xmag", -kLargestFloat, kLargestFloat, true),
+                                   number("ymag", -kLargestFloat, kLargestFloat, true), number("zfar", 0, kNoLimit),
+                                   number("znear", 0, kNoLimit)};
+constexpr Field kCamera[] = {string("name"), string("type", "perspective|orthographic", true),
+                             object("perspective", kPerspective), object("orthographic", kOrthographic)};
+constexpr Field kChannelTarget[] = {index("node", "nodes"), string("path", {}, true)};
+constexpr Field kChannel[] = {integer("sampler", 0, kLargestInt, true), object("target", kChannelTarget, true)};
+constexpr Field kAnimationSampler[] = {index("input", "accessors", true),
+                                       string("interpolation", "LINEAR|STEP|CUBICSPLINE"),
+                                       index("output", "accessors", true)};
+constexpr Field kAnimation[] = {string("name"), objects("channels", kChannel, true),
+                                objects("samplers", kAnimationSampler, true)};
+constexpr Field kDocument[] = {object("asset", kAsset, true),
+                               index("scene", "scenes"),
+                               objects("scenes", kScene),
+                               objects("nodes", kNode),
+                               objects("meshes", kMesh),
+                               objects("accessors", kAccessor),
+                               objects("bufferViews", kBufferView),
+                               objects("buffers", kBuffer),
+                               objects("images", kImage),
+                               objects("textures", kTexture),
+                               objects("samplers", kSampler),
+                               objects("materials", kMaterial),
+                               objects("cameras", kCamera),
+                               objects("animations", kAnimation)};
+
+/// Extensions whose data is read.
+constexpr std::string_view kSupportedExtensions[] = {"KHR_lights_punctual",
+                                                     "KHR_materials_transmission",
+                                                     "KHR_materials_ior",
+                                                     "KHR_materials_volume",
+                                                     "KHR_materials_clearcoat",
+                                                     "KHR_materials_sheen",
+                                                     "KHR_materials_specular",
+                                                     "KHR_materials_emissive_strength",
+                                                     "KHR_materials_unlit",
+                                                     "KHR_texture_transform",
+                                                     "KHR_mesh_quantization",
+                                                     "EXT_mesh_gpu_instancing",
+                                                     "KHR_materials_displacement",
+                                                     "RELIEF_displacement",
+                                                     "RELIEF_area_light",
+                                                     "RELIEF_environment",
+                                                     "RELIEF_camera",
+                                                     "RELIEF_render",
+                                                     "RELIEF_object",
+                                                     "RELIEF_reference"};
+
+/// Walks a document along the table above.
+class Conformer {
+ public:
+  Conformer(const json& document, const std::string& file) : document_(document), file_(file) {}
+
+  json conform_object(const json& value, std::span<const Field> fields, const std::string& path) const
+  {
+    if (!value.is_object()) {
+      throw SceneError(file_, path.empty() ? "/" : path, "an object", json_describe(value));
+    }
+    json out = json::object();
+    for (const Field& field : fields) {
+      const auto it = value.find(field.name);
+      if (it != value.end()) {
+        out[std::string(field.name)] = conform_field(*it, field, json_path_join(path, field.name));
+      } else if (field.required) {
+        throw SceneError(file_, json_path_join(path, field.name), "a value (the property is required)", "nothing");
+      }
+    }
+    return out;
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& path, const std::string& expected, const json& found) const
+  {
+    throw SceneError(file_, path, expected, json_describe(found));
+  }
+
+  json conform_field(const json& value, const Field& field, const std::string& path) const
+  {
+    switch (field.kind) {
+      case Kind::kInteger:
+        return conform_integer(value, field.low, field.high, path);
+      case Kind::kIndex:
+        return conform_index(value, field.target, path);
+      case Kind::kNumber:
+        return conform_number(value, field, path);
+      case Kind::kString:
+        return conform_string(value, field, path);
+      case Kind::kBoolean:
+        if (!value.is_boolean()) {
+          fail(path, "true or false", value);
+        }
+        return value;
+      case Kind::kObject:
+        return conform_object(value, field.fields, path);
+      case Kind::kIndexMap:
+        return conform_index_map(value, field, path);
+      case Kind::kNumbers:
+      case Kind::kIndices:
+      case Kind::kObjects:
+        break;
+    }
+    return conform_array(value, field, path);
+  }
+
+  json conform_array(const json& value, const Field& field, const std::string& path) const
+  {
+    if (!value.is_array() || value.size() < field.shortest || value.size() > field.longest) {
+      fail(path,
+           field.longest == field.shortest ? "an array of " + std::to_string(field.shortest)
+           : field.shortest > 0            ? "an array that is not empty"
+                                           : "an array",
+           value);
+    }
+    json out = json::array();
+    for (std::size_t i = 0; i < value.size(); ++i) {
+      const std::string element_path = json_path_join(path, i);
+      switch (field.kind) {
+        case Kind::kNumbers:
+          out.push_back(conform_number(value[i], field, element_path));
+          break;
+        case Kind::kIndices:
+          out.push_back(conform_index(value[i], field.target, element_path));
+          break;
+        default:
+          out.push_back(conform_object(value[i], field.fields, element_path));
+          break;
+      }
+    }
+    return out;
+  }
+
+  json conform_integer(const json& value, double low, double high, const std::string& path) const
+  {
+    const double x = value.is_number() ? value.get<double>() : std::nan("");
+    if (!(x >= low && x <= high && x == std::floor(x))) {
+      fail(path, "an integer within " + number_text(low) + "…" + number_text(high), value);
+    }
+    return static_cast<std::uint64_t>(x);
+  }
+
+  json conform_index(const json& value, std::string_view target, const std::string& path) const
+  {
+    const auto array = document_.find(target);
+    const std::size_t size = array != document_.end() && array->is_array() ? array->size() : 0;
+    const double x = value.is_number() ? value.get<double>() : -1;
+    if (!(x >= 0 && x < static_cast<double>(size) && x == std::floor(x))) {
+      fail(path, "an index into /" + std::string(target) + " (which has " + std::to_string(size) + ")", value);
+    }
+    return static_cast<std::uint64_t>(x);
+  }
+
+  json conform_number(const json& value, const Field& field, const std::string& path) const
+  {
+    const double x = value.is_number() ? value.get<double>() : std::nan("");
+    if (!(std::isfinite(x) && x >= field.low && x <= field.high)) {
+      const bool bounded = field.low > -kLargestFloat || field.high < kLargestFloat;
+      fail(path,
+           bounded ? "a number within " + number_text(field.low) + "…" + number_text(field.high) : "a finite number",
+           value);
+    }
+    return x;
+  }
+
+  json conform_string(const json& value, const Field& field, const std::string& path) const
+  {
+    if (!value.is_string()) {
+      fail(path, "a string", value);
+    }
+    std::string_view labels = field.target;
+    bool known = labels.empty();
+    while (!known && !labels.empty()) {
+      const std::size_t bar = std::min(labels.find('|'), labels.size());
+      known = labels.substr(0, bar) == value.get_ref<const std::string&>();
+      labels.remove_prefix(std::min(bar + 1, labels.size()));
+    }
+    if (!known) {
+      fail(path, "one of " + std::string(field.target), value);
+    }
+    return value;
+  }
+
+  json conform_index_map(const json& value, const Field& field, const std::string& path) const
+  {
+    if (!value.is_object()) {
+      fail(path, "an object", value);
+    }
+    json out = json::object();
+    for (const auto& item : value.items()) {
+      out[item.key()] = conform_index(item.value(), field.target, json_path_join(path, item.key()));
+    }
+    return out;
+  }
+
+  const json& document_;
+  const std::string& file_;
+};
+
+/// Nodes must form trees whose roots are what scenes list.
+void check_node_tree(const json& document, const std::string& file)
+{
+  const auto nodes = document.find("nodes");
+  if (nodes == document.end()) {
+    return;
+  }
+  constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+  std::vector<std::size_t> parent(nodes->size(), kNone);
+  for (std::size_t i = 0; i < nodes->size(); ++i) {
+    const auto children = (*nodes)[i].find("children");
+    for (std::size_t j = 0; children != (*nodes)[i].end() && j < children->size(); ++j) {
+      const auto child = (*children)[j].get<std::size_t>();
+      if (parent[child] != kNone) {
+        throw SceneError(file, "/nodes/" + std::to_string(i) + "/children/" + std::to_string(j),
+                         "a node without another parent",
+                         "node " + std::to_string(child) + ", a child of node " + std::to_string(parent[child]));
+      }
+      parent[child] = i;
+    }
+  }
+  // With at most one parent each, a walk upwards either ends at a root or goes round. `mark` tells this walk from
+  // earlier ones, so every node is visited once.
+  std::vector<std::size_t> mark(nodes->size(), kNone);
+  for (std::size_t i = 0; i < nodes->size(); ++i) {
+    std::size_t at = i;
+    while (at != kNone && mark[at] == kNone) {
+      mark[at] = i;
+      at = parent[at];
+    }
+    if (at != kNone && mark[at] == i) {
+      throw SceneError(file, "/nodes/" + std::to_string(at) + "/children", "a tree of nodes",
+                       "a cycle through node " + std::to_string(at));
+    }
+  }
+  const auto scenes = document.find("scenes");
+  for (std::size_t s = 0; scenes != document.end() && s < scenes->size(); ++s) {
+    const auto roots = (*scenes)[s].find("nodes");
+    std::vector<bool> listed(nodes->size(), false);
+    for (std::size_t j = 0; roots != (*scenes)[s].end() && j < roots->size(); ++j) {
+      const auto root = (*roots)[j].get<std::size_t>();
+      const std::string path = "/scenes/" + std::to_string(s) + "/nodes/" + std::to_string(j);
+      if (parent[root] != kNone) {
+        throw SceneError(file, path, "a root node", "a child of node " + std::to_string(parent[root]));
+      }
+      if (listed[root]) {
+        throw SceneError(file, path, "a node that is not listed yet", "node " + std::to_string(root) + " again");
+      }
+      listed[root] = true;
+    }
+  }
+}
+
+/// Cross-references that tinygltf follows, or that only make sense together.
+void check_references(json& document, const std::string& file)
+{
+  for (std::size_t m = 0; m < document["meshes"].size(); ++m) {
+    const json& primitives = document["meshes"][m]["primitives"];
+    for (std::size_t p = 0; p < primitives.size(); ++p) {
+      const auto i = primitives[p].find("indices");
+      if (i != primitives[p].end() && !document["accessors"][i->get<std::size_t>()].contains("bufferView")) {
+        throw SceneError(file, "/meshes/" + std::to_string(m) + "/primitives/" + std::to_string(p) + "/indices",
+                         "an accessor with a bufferView", "one without");
+      }
+    }
+  }
+  for (std::size_t c = 0; c < document["cameras"].size(); ++c) {
+    const json& camera = document["cameras"][c];
+    const std::string& type = camera["type"].get_ref<const std::string&>();
+    if (!camera.contains(type)) {
+      throw SceneError(file, "/cameras/" + std::to_string(c) + "/" + type, "the camera's properties", "nothing");
+    }
+  }
+  for (std::size_t a = 0; a < document["animations"].size(); ++a) {
+    json& animation = document["animations"][a];
+    for (std::size_t c = 0; c < animation["channels"].size(); ++c) {
+      json& channel = animation["channels"][c];
+      const std::size_t num_samplers = animation["samplers"].size();
+      if (channel["sampler"].get<std::size_t>() >= num_samplers) {
+        throw SceneError(file, "/animations/" + std::to_string(a) + "/channels/" + std::to_string(c) + "/sampler",
+                         "an index below " + std::to_string(num_samplers), channel["sampler"].dump());
+      }
+      // A channel without a node drives something that an extension names; tinygltf would drop it and so shift the
+      // channels after it.
+      if (!channel["target"].contains("node")) {
+        channel["target"]["node"] = -1;
+      }
+    }
+  }
+}
+
+/// Values that are numbers in the file but names in meaning.
+void check_enumerations(const json& document, const std::string& file)
+{
+  const auto require = [&](const json& value, std::initializer_list<int> allowed, const std::string& path,
+                           const std::string& expected) {
+    if (std::find(allowed.begin(), allowed.end(), value.get<int>()) == allowed.end()) {
+      throw SceneError(file, path, expected, value.dump());
+    }
+  };
+  const auto check = [&](const char* array, const char* name, std::initializer_list<int> allowed,
+                         const std::string& expected) {
+    const auto elements = document.find(array);
+    for (std::size_t i = 0; elements != document.end() && i < elements->size(); ++i) {
+      const auto value = (*elements)[i].find(name);
+      if (value != (*elements)[i].end()) {
+        require(*value, allowed, '/' + std::string(array) + '/' + std::to_string(i) + '/' + name, expected);
+      }
+    }
+  };
+  check("accessors", "componentType", {5120, 5121, 5122, 5123, 5125, 5126}, "5120…5123, 5125 or 5126");
+  check("samplers", "wrapS", {10497, 33071, 33648}, "10497, 33071 or 33648");
+  check("samplers", "wrapT", {10497, 33071, 33648}, "10497, 33071 or 33648");
+  const auto views = document.find("bufferViews");
+  for (std::size_t i = 0; views != document.end() && i < views->size(); ++i) {
+    const auto stride = (*views)[i].find("byteStride");
+    if (stride != (*views)[i].end() && stride->get<int>() % 4 != 0) {
+      throw SceneError(file, "/bufferViews/" + std::to_string(i) + "/byteStride", "a multiple of 4", stride->dump());
+    }
+  }
+}
+
+void check_version(const json& document, const std::string& file)
+{
+  const std::string& version = document["asset"]["version"].get_ref<const std::string&>();
+  if (version.rfind("2.", 0) != 0) {
+    throw SceneError(file, "/asset/version", "\"2.0\"", '"' + version + '"');
+  }
+}
+
+/// Deepest nesting of brackets outside strings; the parser and the destructor of a document are iterative, but printing a
+/// value is not.
+int nesting_depth(std::string_view text)
+{
+  int depth = 0, deepest = 0;
+  bool in_string = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (in_string) {
+      if (c == '\\') {
+        ++i;
+      } else if (c == '"') {
+        in_string = false;
+      }
+    } else if (c == '"') {
+      in_string = true;
+    } else if (c == '[' || c == '{') {
+      deepest = std::max(deepest, ++depth);
+    } else if (c == ']' || c == '}') {
+      --depth;
+    }
+  }
+  return deepest;
+}
+
+}  // namespace
+
+json validation_parse(std::string_view text, const std::string& file)
+{
+  constexpr int kDeepest = 100;
+  const int depth = nesting_depth(text);
+  if (depth > kDeepest) {
+    throw SceneError(file, "", "JSON nested at most " + std::to_string(kDeepest) + " levels deep",
+                     std::to_string(depth) + " levels");
+  }
+  json document;
+  try {
+    document = json::parse(text);
+  } catch (const json::exception& e) {
+    // "[json.exception.parse_error.101] parse error at line 1, column 2: …": the position and reason are for the user.
+    const std::string what = e.what();
+    const std::size_t end = what.find("] ");
+    throw SceneError(file, "", "JSON", end == std::string::npos ? what : what.substr(end + 2));
+  }
+  if (!document.is_object()) {
+    throw SceneError(file, "/", "an object", json_describe(document));
+  }
+  return document;
+}
+
+json validation_conform(const json& document, const std::string& file)
+{
+  json out = Conformer(document, file).conform_object(document, kDocument, "");
+  check_version(out, file);
+  check_enumerations(out, file);
+  check_node_tree(out, file);
+  for (const char* array : {"meshes", "cameras", "animations", "accessors"}) {
+    if (!out.contains(array)) {
+      out[array] = json::array();
+    }
+  }
+  check_references(out, file);
+  out.erase("buffers");
+  out.erase("images");
+  return out;
+}
+
+void validation_check_support(const json& document, const std::string& file, Warnings& warnings)
+{
+  const auto for_each_unknown = [&](const char* list, const auto& act) {
+    const auto names = document.find(list);
+    if (names == document.end()) {
+      return;
+    }
+    const std::string path = '/' + std::string(list);
+    if (!names->is_array()) {
+      throw SceneError(file, path, "an array of strings", json_describe(*names));
+    }
+    for (std::size_t i = 0; i < names->size(); ++i) {
+      const json& name = (*names)[i];
+      if (!name.is_string()) {
+        throw SceneError(file, json_path_join(path, i), "a string", json_describe(name));
+      }
+      const std::string& text = name.get_ref<const std::string&>();
+      if (std::find(std::begin(kSupportedExtensions), std::end(kSupportedExtensions), text) ==
+          std::end(kSupportedExtensions)) {
+        act(text, json_path_join(path, i));
+      }
+    }
+  };
+  for_each_unknown("extensionsRequired", [&](const std::string& name, const std::string& path) {
+    throw SceneError(file, path, "an extension that relief reads", '"' + name + '"');
+  });
+  for_each_unknown("extensionsUsed", [&](const std::string& name, const std::string&) {
+    warnings.add(file + ": extension " + name + " is not read");
+  });
+  const auto skins = document.find("skins");
+  if (skins != document.end() && skins->is_array() && !skins->empty()) {
+    warnings.add(file + ": /skins: skins are not read; meshes keep their rest pose");
+  }
+}
+
+}  // namespace relief
