@@ -1,0 +1,107 @@
+#include <algorithm>
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "cli/commands.h"
+#include "integrator/scene_context.h"
+#include "scene/load.h"
+#include "scene/texture_store.h"
+
+namespace relief {
+
+namespace {
+
+struct FeatureName {
+  bool FeatureSet::*present;
+  const char* name;
+};
+
+constexpr FeatureName kFeatureNames[] = {
+    {&FeatureSet::textures, "textures"},         {&FeatureSet::normal_maps, "normal maps"},
+    {&FeatureSet::transparency, "transparency"}, {&FeatureSet::transmission, "transmission"},
+    {&FeatureSet::volume, "volume"},             {&FeatureSet::clearcoat, "clearcoat"},
+    {&FeatureSet::sheen, "sheen"},               {&FeatureSet::metal, "metal"},
+    {&FeatureSet::displacement, "displacement"}, {&FeatureSet::environment_map, "environment map"},
+    {&FeatureSet::environment, "environment"},   {&FeatureSet::mesh_lights, "mesh lights"},
+    {&FeatureSet::area_lights, "area lights"},   {&FeatureSet::delta_lights, "delta lights"},
+    {&FeatureSet::many_lights, "many lights"},   {&FeatureSet::instances, "instances"},
+    {&FeatureSet::depth_of_field, "depth of field"}, {&FeatureSet::caustic_casters, "caustic casters"},
+};
+
+std::string megabytes(std::size_t bytes) { return fmt::format("{:.1f} MiB", static_cast<double>(bytes) / (1 << 20)); }
+
+void print_names(const char* what, const std::vector<std::string>& names)
+{
+  constexpr std::size_t kMost = 12;
+  fmt::print("{} ({}):", what, names.size());
+  for (std::size_t i = 0; i < std::min(names.size(), kMost); ++i) {
+    fmt::print("{} {}", i == 0 ? "" : ",", names[i].empty() ? "(unnamed)" : names[i]);
+  }
+  fmt::print("{}\n", names.size() > kMost ? ", …" : "");
+}
+
+int info(const std::string& file, bool strict)
+{
+  const Scene scene = scene_load(file);
+  const SceneContext context(scene);
+  Statistics stats;
+  context.fill(stats);
+
+  std::size_t triangles = 0;
+  std::size_t placed = 0;
+  for (const Mesh& mesh : scene.meshes) triangles += mesh.triangles.size();
+  for (const Instance& instance : scene.instances) {
+    placed += scene.meshes[static_cast<std::size_t>(instance.mesh_index)].triangles.size();
+  }
+  const RenderSettings& r = scene.render;
+  fmt::print("{}\n", file);
+  fmt::print("image: {}x{}, {} samples, {} bounces, seed {}\n", r.width, r.height, r.samples, r.max_bounces, r.seed);
+  fmt::print("meshes: {} with {} triangles; instances: {} with {} triangles in all\n", scene.meshes.size(), triangles,
+             scene.instances.size(), placed);
+  std::vector<std::string> cameras;
+  for (const SceneCamera& camera : scene.cameras) cameras.push_back(camera.name);
+  print_names("cameras", cameras);
+  print_names("materials", scene.material_names);
+  fmt::print("lights: {} placed, {} emissive triangles, {}\n", scene.lights.size(),
+             context.lights.lights.size() - scene.lights.size(),
+             scene.environment.texture_index >= 0         ? "environment map"
+             : is_zero(scene.environment.color) ? "no environment"
+                                                          : "constant environment");
+  const std::size_t num_textures = scene.textures->views().size();
+  fmt::print("textures: {}\n", num_textures);
+  for (std::size_t i = 0; i < num_textures; ++i) {
+    const TextureView& view = scene.textures->views()[i];
+    fmt::print("  {}: {}x{}, {} channel{}{}\n", scene.textures->label(static_cast<int>(i)), view.width, view.height,
+               view.num_channels, view.num_channels == 1 ? "" : "s",
+               scene.textures->is_cached(static_cast<int>(i)) ? ", through the tile cache" : "");
+  }
+  std::string features;
+  for (const FeatureName& feature : kFeatureNames) {
+    if (scene.features.*feature.present) features += fmt::format("{}{}", features.empty() ? "" : ", ", feature.name);
+  }
+  fmt::print("features: {}\n", features.empty() ? "none" : features);
+  fmt::print("memory: meshes {}, textures {}, acceleration structure {}, lights {}\n", megabytes(stats.mesh_bytes),
+             megabytes(stats.texture_bytes), megabytes(stats.bvh_bytes), megabytes(stats.light_bytes));
+  for (const std::string& warning : scene.warnings) fmt::print("warning: {}\n", warning);
+  if (strict && !scene.warnings.empty()) throw SceneError(file, "", "no warnings (--strict)", scene.warnings.front());
+  return 0;
+}
+
+}  // namespace
+
+void cmd_info_register(CLI::App& app, Run& run)
+{
+  struct Arguments {
+    std::string scene;
+    bool strict = false;
+  };
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = app.add_subcommand("info", "Shows what is in a scene, what it will cost, and every warning");
+  command->add_option("scene", arguments->scene, "Scene file (.gltf, .glb)")->required();
+  command->add_flag("--strict", arguments->strict, "Turn warnings into errors");
+  command->callback([&run, arguments] { run = [arguments] { return info(arguments->scene, arguments->strict); }; });
+}
+
+}  // namespace relief

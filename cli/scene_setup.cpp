@@ -1,0 +1,26 @@
+#include "cli/scene_setup.h"
+
+#include <algorithm>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+namespace relief {
+
+Camera camera_for_image(const Scene& scene, const std::string& name, int width, int height)
+{
+  auto found = scene.cameras.begin();
+  if (!name.empty()) {
+    found = std::find_if(scene.cameras.begin(), scene.cameras.end(), [&](const SceneCamera& c) { return c.name == name; });
+  }
+  if (found == scene.cameras.end()) {
+    std::string names;
+    for (const SceneCamera& camera : scene.cameras) names += fmt::format("{}'{}'", names.empty() ? "" : ", ", camera.name);
+    throw CLI::ValidationError("--camera", fmt::format("expected one of {}, found '{}'", names, name));
+  }
+  Camera camera = found->camera;
+  camera.half_width = camera.half_height * static_cast<float>(width) / static_cast<float>(height);
+  return camera;
+}
+
+}  // namespace relief

@@ -1,0 +1,221 @@
+#include "integrator/accel.h"
+
+#include <stdexcept>
+#include <string>
+
+namespace relief {
+
+namespace {
+
+bool count_bytes(void* user, ssize_t bytes, bool)
+{
+  static_cast<std::atomic<std::ptrdiff_t>*>(user)->fetch_add(bytes, std::memory_order_relaxed);
+  return true;
+}
+
+bool is_identity(const Affine3& m)
+{
+  return m.x == Vec3f{1, 0, 0} && m.y == Vec3f{0, 1, 0} && m.z == Vec3f{0, 0, 1} && m.p == Vec3f{};
+}
+
+std::uint32_t mask_of(std::uint32_t instance_flags)
+{
+  return kRayBounce | ((instance_flags & kVisibleToCamera) != 0 ? std::uint32_t{kRayCamera} : 0u) |
+         ((instance_flags & kCastsShadow) != 0 ? std::uint32_t{kRayShadow} : 0u);
+}
+
+void disk_bounds(const RTCBoundsFunctionArguments* arguments)
+{
+  const Light& light = *static_cast<const Light*>(arguments->geometryUserPtr);
+  // Extent of an ellipse c + a·cos φ + b·sin φ along an axis: √(a² + b²); a relative pad covers the rounding.
+  const auto extent = [](float a, float b) { return __builtin_sqrtf(a * a + b * b) * (1.0f + 8.0f * kUnitRoundoff); };
+  const Vec3f half{extent(light.edge_u.x, light.edge_v.x), extent(light.edge_u.y, light.edge_v.y),
+                   extent(light.edge_u.z, light.edge_v.z)};
+  const Vec3f pad = 4.0f * kUnitRoundoff * (abs(light.P) + half);
+  const Vec3f low = light.P - half - pad;
+  const Vec3f high = light.P + half + pad;
+  RTCBounds* bounds = arguments->bounds_o;
+  bounds->lower_x = low.x;
+  bounds->lower_y = low.y;
+  bounds->lower_z = low.z;
+  bounds->upper_x = high.x;
+  bounds->upper_y = high.y;
+  bounds->upper_z = high.z;
+}
+
+/// Ray against the plane of the ellipse; coordinates within it by the dual basis of its half axes.
+void disk_intersect(const RTCIntersectFunctionNArguments* arguments)
+{
+  const Light& light = *static_cast<const Light*>(arguments->geometryUserPtr);
+  RTCRayHitN* rays = arguments->rayhit;
+  const unsigned count = arguments->N;
+  RTCRayN* ray = RTCRayHitN_RayN(rays, count);
+  RTCHitN* hit = RTCRayHitN_HitN(rays, count);
+  const Vec3f normal = cross(light.edge_u, light.edge_v);
+  const float normal_squared = length_squared(normal);
+  const Vec3f dual_u = cross(light.edge_v, normal) / normal_squared;
+  const Vec3f dual_v = cross(normal, light.edge_u) / normal_squared;
+  for (unsigned i = 0; i < count; ++i) {
+    if (arguments->valid[i] != -1) continue;
+    const Vec3f O{RTCRayN_org_x(ray, count, i), RTCRayN_org_y(ray, count, i), RTCRayN_org_z(ray, count, i)};
+    const Vec3f D{RTCRayN_dir_x(ray, count, i), RTCRayN_dir_y(ray, count, i), RTCRayN_dir_z(ray, count, i)};
+    const float t = dot(light.P - O, normal) / dot(D, normal);
+    if (!(t > RTCRayN_tnear(ray, count, i) && t < RTCRayN_tfar(ray, count, i))) continue;
+    const Vec3f from_center = O + D * t - light.P;
+    if (!(sqr(dot(from_center, dual_u)) + sqr(dot(from_center, dual_v)) <= 1.0f)) continue;
+    RTCRayN_tfar(ray, count, i) = t;
+    RTCHitN_geomID(hit, count, i) = arguments->geomID;
+    RTCHitN_primID(hit, count, i) = 0;
+    RTCHitN_instID(hit, count, i, 0) = RTC_INVALID_GEOMETRY_ID;
+  }
+}
+
+/// Area lights cast no shadows: their mask keeps shadow rays away, so this is never reached with work to do.
+void disk_occluded(const RTCOccludedFunctionNArguments*) {}
+
+}  // namespace
+
+Accel::Accel(const Scene& scene,
+             std::span<const Light> lights,
+             std::span<const std::uint32_t> area_lights,
+             RTCFilterFunctionN shadow_filter)
+    : shadow_filter_(shadow_filter)
+{
+  device_ = rtcNewDevice(nullptr);
+  if (device_ == nullptr) throw std::runtime_error("Embree cannot start on this machine");
+  rtcSetDeviceMemoryMonitorFunction(device_, count_bytes, &bytes_);
+
+  std::vector<int> uses(scene.meshes.size(), 0);
+  std::vector<char> transparent(scene.meshes.size(), 0);
+  for (const Instance& instance : scene.instances) {
+    const auto mesh = static_cast<std::size_t>(instance.mesh_index);
+    ++uses[mesh];
+    const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
+    if (material.alpha_mode != AlphaMode::kOpaque) transparent[mesh] = 1;
+  }
+
+  mesh_scenes_.assign(scene.meshes.size(), nullptr);
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    if (uses[m] < 2) continue;
+    // Spatial splits of HIGH quality would call the shadow filter twice for one triangle.
+    mesh_scenes_[m] = new_scene(transparent[m] != 0 ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
+    attach(mesh_scenes_[m], new_mesh(scene.meshes[m], nullptr, transparent[m] != 0), 0, ~0u);
+    commit(mesh_scenes_[m]);
+  }
+
+  bool any_transparent = false;
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) any_transparent |= uses[m] == 1 && transparent[m] != 0;
+  top_ = new_scene(any_transparent ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const Instance& instance = scene.instances[i];
+    const auto mesh = static_cast<std::size_t>(instance.mesh_index);
+    const RTCGeometry geometry =
+        mesh_scenes_[mesh] != nullptr
+            ? new_instance(mesh_scenes_[mesh], instance.world_from_object)
+            : new_mesh(scene.meshes[mesh], &instance.world_from_object, transparent[mesh] != 0);
+    attach(top_, geometry, static_cast<unsigned>(i), mask_of(instance.flags));
+  }
+  for (std::size_t i = 0; i < area_lights.size(); ++i) {
+    const Light& light = lights[area_lights[i]];
+    attach(top_, light.kind == LightKind::kDisk ? new_disk(light) : new_rectangle(light),
+           static_cast<unsigned>(scene.instances.size() + i),
+           kRayBounce | (light.visible_to_camera ? std::uint32_t{kRayCamera} : 0u));
+  }
+  commit(top_);
+}
+
+Accel::~Accel()
+{
+  if (top_ != nullptr) rtcReleaseScene(top_);
+  for (RTCScene scene : mesh_scenes_) {
+    if (scene != nullptr) rtcReleaseScene(scene);
+  }
+  if (device_ != nullptr) rtcReleaseDevice(device_);
+}
+
+RTCScene Accel::new_scene(RTCBuildQuality quality)
+{
+  RTCScene scene = rtcNewScene(device_);
+  rtcSetSceneBuildQuality(scene, quality);
+  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+  return scene;
+}
+
+RTCGeometry Accel::new_mesh(const Mesh& mesh, const Affine3* world_from_object, bool transparent)
+{
+  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+  const bool in_place = world_from_object == nullptr || is_identity(*world_from_object);
+  // Embree reads 16 bytes a vertex, so a shared buffer needs room behind its last one.
+  if (in_place && mesh.P.capacity() > mesh.P.size()) {
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.P.data(), 0, sizeof(Vec3f),
+                               mesh.P.size());
+  } else {
+    auto* vertices = static_cast<Vec3f*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                                 sizeof(Vec3f), mesh.P.size()));
+    if (vertices == nullptr) throw std::runtime_error("not enough memory for the vertices of mesh '" + mesh.name + "'");
+    for (std::size_t i = 0; i < mesh.P.size(); ++i) {
+      vertices[i] = in_place ? mesh.P[i] : transform_point(*world_from_object, mesh.P[i]);
+    }
+  }
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
+                             sizeof(TriangleIndices), mesh.triangles.size());
+  if (transparent) rtcSetGeometryOccludedFilterFunction(geometry, shadow_filter_);
+  return geometry;
+}
+
+RTCGeometry Accel::new_instance(RTCScene instanced, const Affine3& m)
+{
+  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
+  rtcSetGeometryInstancedScene(geometry, instanced);
+  const float columns[12] = {m.x.x, m.x.y, m.x.z, m.y.x, m.y.y, m.y.z, m.z.x, m.z.y, m.z.z, m.p.x, m.p.y, m.p.z};
+  rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
+  return geometry;
+}
+
+RTCGeometry Accel::new_rectangle(const Light& light)
+{
+  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_QUAD);
+  auto* vertices = static_cast<Vec3f*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), 4));
+  auto* indices = static_cast<std::uint32_t*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, 4 * sizeof(std::uint32_t), 1));
+  vertices[0] = light.P - light.edge_u - light.edge_v;
+  vertices[1] = light.P + light.edge_u - light.edge_v;
+  vertices[2] = light.P + light.edge_u + light.edge_v;
+  vertices[3] = light.P - light.edge_u + light.edge_v;
+  for (std::uint32_t i = 0; i < 4; ++i) indices[i] = i;
+  return geometry;
+}
+
+RTCGeometry Accel::new_disk(const Light& light)
+{
+  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_USER);
+  disks_.push_back(std::make_unique<Light>(light));
+  rtcSetGeometryUserPrimitiveCount(geometry, 1);
+  rtcSetGeometryUserData(geometry, disks_.back().get());
+  rtcSetGeometryBoundsFunction(geometry, disk_bounds, nullptr);
+  rtcSetGeometryIntersectFunction(geometry, disk_intersect);
+  rtcSetGeometryOccludedFunction(geometry, disk_occluded);
+  return geometry;
+}
+
+void Accel::attach(RTCScene target, RTCGeometry geometry, unsigned id, std::uint32_t mask)
+{
+  rtcSetGeometryMask(geometry, mask);
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometryByID(target, geometry, id);
+  rtcReleaseGeometry(geometry);
+}
+
+void Accel::commit(RTCScene target)
+{
+  rtcCommitScene(target);
+  const RTCError error = rtcGetDeviceError(device_);
+  if (error == RTC_ERROR_NONE) return;
+  throw std::runtime_error(error == RTC_ERROR_OUT_OF_MEMORY
+                               ? "not enough memory for the acceleration structure"
+                               : "Embree failed to build the acceleration structure (error " +
+                                     std::to_string(static_cast<int>(error)) + ")");
+}
+
+}  // namespace relief

@@ -1,0 +1,57 @@
+// The scene as Embree sees it: one geometry an instance or area light in the top-level scene, so that a hit's geometry
+// (or instance) number is the object index of the path state.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "integrator/embree.h"
+#include "kernel/light/light.h"
+#include "kernel/math/rounding.h"
+#include "scene/scene.h"
+
+namespace relief {
+
+/// Ray kinds as Embree mask bits.
+enum RayMask : std::uint32_t { kRayCamera = 1u << 0, kRayBounce = 1u << 1, kRayShadow = 1u << 2 };
+
+/// Builds and owns the acceleration structure. Meshes that occur once are placed in world space; a mesh that occurs more
+/// often has one scene of its own and Embree instances of it.
+class Accel {
+ public:
+  /// @param scene         must outlive the Accel: vertex and index buffers are shared where they can be
+  /// @param lights        of which `area_lights` picks rectangles and disks; object num_instances + i is area_lights[i]
+  /// @param shadow_filter called for hits of shadow rays on surfaces that may let light through
+  /// @error std::runtime_error with Embree's message when the build fails (out of memory)
+  Accel(const Scene& scene,
+        std::span<const Light> lights,
+        std::span<const std::uint32_t> area_lights,
+        RTCFilterFunctionN shadow_filter);
+  ~Accel();
+  Accel(const Accel&) = delete;
+  Accel& operator=(const Accel&) = delete;
+
+  RTCScene scene() const { return top_; }
+  std::size_t bytes() const { return static_cast<std::size_t>(bytes_.load()); }  ///< allocated by Embree
+
+ private:
+  RTCScene new_scene(RTCBuildQuality quality);
+  RTCGeometry new_mesh(const Mesh& mesh, const Affine3* world_from_object, bool transparent);
+  RTCGeometry new_instance(RTCScene instanced, const Affine3& world_from_object);
+  RTCGeometry new_rectangle(const Light& light);
+  RTCGeometry new_disk(const Light& light);
+  void attach(RTCScene target, RTCGeometry geometry, unsigned id, std::uint32_t mask);
+  void commit(RTCScene target);
+
+  std::atomic<std::ptrdiff_t> bytes_{0};
+  RTCFilterFunctionN shadow_filter_;
+  RTCDevice device_ = nullptr;
+  RTCScene top_ = nullptr;
+  std::vector<RTCScene> mesh_scenes_;  ///< null for meshes that occur once
+  std::vector<std::unique_ptr<Light>> disks_;  ///< user data of disk geometry: stable addresses
+};
+
+}  // namespace relief

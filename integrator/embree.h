@@ -1,0 +1,71 @@
+// The one place that knows which Embree is installed: 3.13 (Debian 12) or 4. Everything else calls these wrappers.
+#pragma once
+
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#elif __has_include(<embree3/rtcore.h>)
+#include <embree3/rtcore.h>
+#else
+#error "Embree 3.13 or 4 is needed"
+#endif
+
+namespace relief {
+
+/// What a query hands to filter callbacks: Embree's own context first, so that a callback can cast back.
+struct EmbreeContext {
+#if RTC_VERSION_MAJOR >= 4
+  RTCRayQueryContext rtc;
+#else
+  RTCIntersectContext rtc;
+#endif
+};
+
+/// @param coherent  rays come in order from one origin or direction
+inline void embree_context_init(EmbreeContext& context, [[maybe_unused]] bool coherent)
+{
+#if RTC_VERSION_MAJOR >= 4
+  rtcInitRayQueryContext(&context.rtc);
+#else
+  rtcInitIntersectContext(&context.rtc);
+  context.rtc.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+#endif
+}
+
+inline void embree_intersect1(RTCScene scene, EmbreeContext& context, RTCRayHit& ray)
+{
+#if RTC_VERSION_MAJOR >= 4
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.context = &context.rtc;
+  rtcIntersect1(scene, &ray, &arguments);
+#else
+  rtcIntersect1(scene, &context.rtc, &ray);
+#endif
+}
+
+inline void embree_intersect8(const int* valid, RTCScene scene, EmbreeContext& context, RTCRayHit8& rays)
+{
+#if RTC_VERSION_MAJOR >= 4
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+  arguments.context = &context.rtc;
+  rtcIntersect8(valid, scene, &rays, &arguments);
+#else
+  rtcIntersect8(valid, scene, &context.rtc, &rays);
+#endif
+}
+
+inline void embree_occluded1(RTCScene scene, EmbreeContext& context, RTCRay& ray)
+{
+#if RTC_VERSION_MAJOR >= 4
+  RTCOccludedArguments arguments;
+  rtcInitOccludedArguments(&arguments);
+  arguments.context = &context.rtc;
+  rtcOccluded1(scene, &ray, &arguments);
+#else
+  rtcOccluded1(scene, &context.rtc, &ray);
+#endif
+}
+
+}  // namespace relief

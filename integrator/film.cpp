@@ -1,0 +1,238 @@
+#include "integrator/film.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace relief {
+
+namespace {
+
+AccumulatorLayout layout_make(std::uint32_t aov_mask)
+{
+  AccumulatorLayout layout;
+  const auto keep = [&](Aov aov, int channels, int& offset) {
+    if ((aov_mask >> static_cast<int>(aov) & 1u) == 0) return;
+    offset = layout.num_floats;
+    layout.num_floats += channels;
+  };
+  if ((aov_mask >> static_cast<int>(Aov::kIndirect) & 1u) != 0) aov_mask |= 1u << static_cast<int>(Aov::kDirect);
+  keep(Aov::kDirect, 3, layout.direct);
+  keep(Aov::kAlbedo, 3, layout.albedo);
+  keep(Aov::kNormal, 3, layout.normal);
+  keep(Aov::kDepth, 1, layout.depth);
+  keep(Aov::kPosition, 3, layout.position);
+  keep(Aov::kUv, 2, layout.uv);
+  keep(Aov::kObjectId, 1, layout.object_id);
+  keep(Aov::kMaterialId, 1, layout.material_id);
+  return layout;
+}
+
+Vec3f load3(const float* p) { return {p[0], p[1], p[2]}; }
+
+/// Means of the even and odd samples and the variance of the pixel's mean by its samples alone.
+struct PixelEstimate {
+  Vec3f mean, even, half_difference_squared, sample_variance;
+};
+
+PixelEstimate pixel_estimate(const float* record, std::uint32_t samples)
+{
+  PixelEstimate estimate;
+  if (samples == 0) return estimate;
+  const auto n = static_cast<float>(samples);
+  const auto n_even = static_cast<float>((samples + 1) / 2);
+  const float n_odd = n - n_even;
+  const Vec3f sum = load3(record + AccumulatorLayout::kBeauty);
+  const Vec3f sum_even = load3(record + AccumulatorLayout::kEven);
+  estimate.mean = sum / n;
+  estimate.even = sum_even / n_even;
+  if (n_odd > 0) {
+    const Vec3f difference = estimate.even - (sum - sum_even) / n_odd;
+    // Weighted halves: Var(mean) = σ²/n, Var(A − B) = σ²(1/n_even + 1/n_odd), so the factor is n_even·n_odd/n².
+    estimate.half_difference_squared = difference * difference * (n_even * n_odd / (n * n));
+    const Vec3f squares = load3(record + AccumulatorLayout::kSquares);
+    estimate.sample_variance = max((squares - sum * estimate.mean) / ((n - 1.0f) * n), Vec3f{});
+  }
+  return estimate;
+}
+
+}  // namespace
+
+Film::Film(int width, int height, std::uint32_t aov_mask)
+    : width_(width),
+      height_(height),
+      tiles_x_((width + kTileSize - 1) / kTileSize),
+      tiles_y_((height + kTileSize - 1) / kTileSize),
+      aov_mask_(aov_mask | 1u << static_cast<int>(Aov::kBeauty)),
+      layout_(layout_make(aov_mask)),
+      sums_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
+            static_cast<std::size_t>(layout_.num_floats)),
+      samples_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_))
+{
+}
+
+FilmAccumulatorView Film::accumulator() { return {sums_.data(), width_, height_, layout_}; }
+
+const float* Film::record(int x, int y) const
+{
+  return sums_.data() + (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)) *
+                            static_cast<std::size_t>(layout_.num_floats);
+}
+
+void Film::tile_rect(int tile, int* x0, int* y0, int* w, int* h) const
+{
+  *x0 = tile % tiles_x_ * kTileSize;
+  *y0 = tile / tiles_x_ * kTileSize;
+  *w = std::min(kTileSize, width_ - *x0);
+  *h = std::min(kTileSize, height_ - *y0);
+}
+
+double Film::mean_samples() const
+{
+  double sum = 0;
+  for (int tile = 0; tile < num_tiles(); ++tile) {
+    int x0, y0, w, h;
+    tile_rect(tile, &x0, &y0, &w, &h);
+    sum += static_cast<double>(tile_samples(tile)) * w * h;
+  }
+  return sum / (static_cast<double>(width_) * height_);
+}
+
+void Film::tile_variances(int tile, Vec3f* halves, Vec3f* samples) const
+{
+  int x0, y0, w, h;
+  tile_rect(tile, &x0, &y0, &w, &h);
+  *halves = *samples = {};
+  for (int y = y0; y < y0 + h; ++y) {
+    for (int x = x0; x < x0 + w; ++x) {
+      const PixelEstimate pixel = pixel_estimate(record(x, y), tile_samples(tile));
+      *halves += pixel.half_difference_squared;
+      *samples += pixel.sample_variance;
+    }
+  }
+}
+
+double Film::tile_error(int tile, double floor) const
+{
+  int x0, y0, w, h;
+  tile_rect(tile, &x0, &y0, &w, &h);
+  Vec3f halves, samples;
+  tile_variances(tile, &halves, &samples);
+  double mean = 0;
+  for (int y = y0; y < y0 + h; ++y) {
+    for (int x = x0; x < x0 + w; ++x) {
+      mean += luminance(pixel_estimate(record(x, y), tile_samples(tile)).mean);
+    }
+  }
+  const double num_pixels = static_cast<double>(w) * h;
+  // Halves are unbiased but can agree by luck; the samples' variance ignores stratification, so it errs on the high
+  // side. A quarter of it keeps a lucky tile from stopping early.
+  const double variance = std::max(luminance(halves), 0.25f * luminance(samples)) / num_pixels;
+  return std::sqrt(variance) / std::max(mean / num_pixels, floor);
+}
+
+double Film::mean_luminance() const
+{
+  double sum = 0;
+  for (int tile = 0; tile < num_tiles(); ++tile) {
+    int x0, y0, w, h;
+    tile_rect(tile, &x0, &y0, &w, &h);
+    for (int y = y0; y < y0 + h; ++y) {
+      for (int x = x0; x < x0 + w; ++x) sum += luminance(pixel_estimate(record(x, y), tile_samples(tile)).mean);
+    }
+  }
+  return sum / (static_cast<double>(width_) * height_);
+}
+
+ImageError Film::estimate_error() const
+{
+  double squared = 0;
+  double relative = 0;
+  for (int tile = 0; tile < num_tiles(); ++tile) {
+    int x0, y0, w, h;
+    tile_rect(tile, &x0, &y0, &w, &h);
+    for (int y = y0; y < y0 + h; ++y) {
+      for (int x = x0; x < x0 + w; ++x) {
+        const PixelEstimate pixel = pixel_estimate(record(x, y), tile_samples(tile));
+        const Vec3f d = pixel.half_difference_squared;
+        squared += static_cast<double>(d.x) + d.y + d.z;
+        const Vec3f r = d / (pixel.mean * pixel.mean + splat3(0.01f));
+        relative += static_cast<double>(r.x) + r.y + r.z;
+      }
+    }
+  }
+  const double count = 3.0 * width_ * height_;
+  return {std::sqrt(squared / count), relative / count};
+}
+
+RenderedImage Film::resolve(int crop_x, int crop_y, int full_width, int full_height) const
+{
+  RenderedImage picture;
+  picture.view.layout = film_layout_make(aov_mask_);
+  picture.view.width = width_;
+  picture.view.height = height_;
+  picture.view.crop_x = crop_x;
+  picture.view.crop_y = crop_y;
+  picture.view.full_width = full_width;
+  picture.view.full_height = full_height;
+  const FilmLayout& out = picture.view.layout;
+  picture.pixels.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_) *
+                        static_cast<std::size_t>(out.num_floats));
+  picture.view.pixels = picture.pixels.data();
+
+  for (int tile = 0; tile < num_tiles(); ++tile) {
+    int x0, y0, w, h;
+    tile_rect(tile, &x0, &y0, &w, &h);
+    const std::uint32_t samples = tile_samples(tile);
+    if (samples == 0) continue;
+    // The shape of the variance comes from each pixel's own samples, its level from the tile's independent halves: the
+    // former alone is blind to stratification, the latter alone has one degree of freedom a pixel.
+    Vec3f halves, by_samples;
+    tile_variances(tile, &halves, &by_samples);
+    const auto level = [](float half, float sample) { return sample > 0.0f ? half / sample : 1.0f; };
+    const Vec3f calibration{level(halves.x, by_samples.x), level(halves.y, by_samples.y),
+                            level(halves.z, by_samples.z)};
+    for (int y = y0; y < y0 + h; ++y) {
+      for (int x = x0; x < x0 + w; ++x) {
+        const float* in = record(x, y);
+        const PixelEstimate pixel = pixel_estimate(in, samples);
+        float* to = picture.pixels.data() +
+                    (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)) *
+                        static_cast<std::size_t>(out.num_floats);
+        const auto plane = [&](Aov aov) -> float* {
+          const int offset = out.offset[static_cast<std::size_t>(aov)];
+          return offset < 0 ? nullptr : to + offset;
+        };
+        const auto put3 = [](float* p, Vec3f v) {
+          p[0] = v.x;
+          p[1] = v.y;
+          p[2] = v.z;
+        };
+        const float inverse_n = 1.0f / static_cast<float>(samples);
+        const float hits = in[AccumulatorLayout::kCoverage];
+        const float inverse_hits = hits > 0.0f ? 1.0f / hits : 0.0f;
+        if (float* p = plane(Aov::kBeauty)) {
+          put3(p, pixel.mean);
+          p[3] = hits * inverse_n;
+        }
+        if (float* p = plane(Aov::kDirect)) put3(p, load3(in + layout_.direct) * inverse_n);
+        if (float* p = plane(Aov::kIndirect)) put3(p, pixel.mean - load3(in + layout_.direct) * inverse_n);
+        if (float* p = plane(Aov::kAlbedo)) put3(p, load3(in + layout_.albedo) * inverse_n);
+        if (float* p = plane(Aov::kNormal)) put3(p, load3(in + layout_.normal) * inverse_n);
+        if (float* p = plane(Aov::kDepth)) p[0] = hits > 0.0f ? in[layout_.depth] * inverse_hits : kInfinity;
+        if (float* p = plane(Aov::kPosition)) put3(p, load3(in + layout_.position) * inverse_hits);
+        if (float* p = plane(Aov::kUv)) {
+          p[0] = in[layout_.uv] * inverse_hits;
+          p[1] = in[layout_.uv + 1] * inverse_hits;
+        }
+        if (float* p = plane(Aov::kObjectId)) p[0] = in[layout_.object_id];
+        if (float* p = plane(Aov::kMaterialId)) p[0] = in[layout_.material_id];
+        if (float* p = plane(Aov::kSampleCount)) p[0] = static_cast<float>(samples);
+        if (float* p = plane(Aov::kVariance)) put3(p, pixel.sample_variance * calibration);
+        if (float* p = plane(Aov::kHalf)) put3(p, pixel.even);
+      }
+    }
+  }
+  return picture;
+}
+
+}  // namespace relief

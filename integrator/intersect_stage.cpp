@@ -1,0 +1,178 @@
+#include "integrator/intersect_stage.h"
+
+#include "kernel/math/rounding.h"
+#include "kernel/shape/material_lookup.h"
+
+namespace relief {
+
+namespace {
+
+/// Puts a path into the queue of the stage that its hit asks for.
+void classify(const KernelGlobals& g,
+              const PathStateView& state,
+              std::uint32_t path,
+              unsigned object,
+              const std::uint8_t* surface_kernel,
+              QueueView* surfaces,
+              QueueView& lights,
+              QueueView& background)
+{
+  if (object == RTC_INVALID_GEOMETRY_ID) {
+    queue_push(background, path);
+    return;
+  }
+  state.hit_object[path] = object;
+  if (object >= g.num_instances) {
+    queue_push(lights, path);
+    return;
+  }
+  queue_push(surfaces[surface_kernel[g.instances[object].material_index]], path);
+}
+
+std::uint32_t mask_of(const PathStateView& state, std::uint32_t path)
+{
+  return state.bounces[path] == 0 ? kRayCamera : kRayBounce;
+}
+
+void intersect_packet(const KernelGlobals& g,
+                      const Accel& accel,
+                      const PathStateView& state,
+                      const std::uint32_t* paths,
+                      EmbreeContext& context,
+                      const std::uint8_t* surface_kernel,
+                      QueueView* surfaces,
+                      QueueView& lights,
+                      QueueView& background)
+{
+  RTCRayHit8 packet;
+  alignas(32) int valid[8];
+  for (int i = 0; i < 8; ++i) {
+    const std::uint32_t path = paths[i];
+    valid[i] = -1;
+    packet.ray.org_x[i] = state.O_x[path];
+    packet.ray.org_y[i] = state.O_y[path];
+    packet.ray.org_z[i] = state.O_z[path];
+    packet.ray.dir_x[i] = state.D_x[path];
+    packet.ray.dir_y[i] = state.D_y[path];
+    packet.ray.dir_z[i] = state.D_z[path];
+    packet.ray.tnear[i] = state.t_min[path];
+    packet.ray.tfar[i] = state.t_max[path];
+    packet.ray.time[i] = 0.0f;
+    packet.ray.mask[i] = kRayCamera;
+    packet.ray.id[i] = 0;
+    packet.ray.flags[i] = 0;
+    packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
+  embree_intersect8(valid, accel.scene(), context, packet);
+  for (int i = 0; i < 8; ++i) {
+    const std::uint32_t path = paths[i];
+    state.hit_t[path] = packet.ray.tfar[i];
+    state.hit_u[path] = packet.hit.u[i];
+    state.hit_v[path] = packet.hit.v[i];
+    state.hit_triangle[path] = packet.hit.primID[i];
+    const unsigned instance = packet.hit.instID[0][i];
+    const unsigned object = instance != RTC_INVALID_GEOMETRY_ID ? instance : packet.hit.geomID[i];
+    classify(g, state, path, object, surface_kernel, surfaces, lights, background);
+  }
+}
+
+/// Context of one shadow query: Embree's part first, then what the filter needs and gathers.
+struct ShadowContext {
+  EmbreeContext embree;
+  const KernelGlobals* globals = nullptr;
+  float visibility = 1;
+};
+
+}  // namespace
+
+void intersect_closest(const KernelGlobals& g,
+                       const Accel& accel,
+                       const PathStateView& state,
+                       const QueueView& queue,
+                       bool coherent,
+                       const std::uint8_t* surface_kernel,
+                       QueueView* surfaces,
+                       QueueView& lights,
+                       QueueView& background)
+{
+  EmbreeContext context;
+  embree_context_init(context, coherent);
+  std::uint32_t i = 0;
+  if (coherent) {
+    for (; i + 8 <= queue.size; i += 8) {
+      intersect_packet(g, accel, state, queue.paths + i, context, surface_kernel, surfaces, lights, background);
+    }
+  }
+  for (; i < queue.size; ++i) {
+    const std::uint32_t path = queue.paths[i];
+    RTCRayHit ray;
+    ray.ray.org_x = state.O_x[path];
+    ray.ray.org_y = state.O_y[path];
+    ray.ray.org_z = state.O_z[path];
+    ray.ray.dir_x = state.D_x[path];
+    ray.ray.dir_y = state.D_y[path];
+    ray.ray.dir_z = state.D_z[path];
+    ray.ray.tnear = state.t_min[path];
+    ray.ray.tfar = state.t_max[path];
+    ray.ray.time = 0.0f;
+    ray.ray.mask = mask_of(state, path);
+    ray.ray.id = 0;
+    ray.ray.flags = 0;
+    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    embree_intersect1(accel.scene(), context, ray);
+    state.hit_t[path] = ray.ray.tfar;
+    state.hit_u[path] = ray.hit.u;
+    state.hit_v[path] = ray.hit.v;
+    state.hit_triangle[path] = ray.hit.primID;
+    const unsigned object = ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID;
+    classify(g, state, path, object, surface_kernel, surfaces, lights, background);
+  }
+}
+
+void intersect_shadow(const KernelGlobals& g, const Accel& accel, const ShadowQueueView& shadow, float* visibility)
+{
+  ShadowContext context;
+  context.globals = &g;
+  embree_context_init(context.embree, false);
+  for (std::uint32_t i = 0; i < shadow.size; ++i) {
+    context.visibility = 1.0f;
+    RTCRay ray;
+    ray.org_x = shadow.O_x[i];
+    ray.org_y = shadow.O_y[i];
+    ray.org_z = shadow.O_z[i];
+    ray.dir_x = shadow.D_x[i];
+    ray.dir_y = shadow.D_y[i];
+    ray.dir_z = shadow.D_z[i];
+    ray.tnear = kLeastDistance;
+    ray.tfar = shadow.t_max[i];
+    ray.time = 0.0f;
+    ray.mask = kRayShadow;
+    ray.id = 0;
+    ray.flags = 0;
+    embree_occluded1(accel.scene(), context.embree, ray);
+    visibility[i] = ray.tfar < 0.0f ? 0.0f : context.visibility;
+  }
+}
+
+void shadow_filter(const RTCFilterFunctionNArguments* arguments)
+{
+  auto* context = reinterpret_cast<ShadowContext*>(arguments->context);
+  const KernelGlobals& g = *context->globals;
+  for (unsigned i = 0; i < arguments->N; ++i) {
+    if (arguments->valid[i] != -1) continue;
+    const unsigned instance_id = RTCHitN_instID(arguments->hit, arguments->N, i, 0);
+    const unsigned object =
+        instance_id != RTC_INVALID_GEOMETRY_ID ? instance_id : RTCHitN_geomID(arguments->hit, arguments->N, i);
+    const InstanceView& instance = g.instances[object];
+    const float alpha = triangle_alpha(g.materials[instance.material_index], g.textures, g.meshes[instance.mesh_index],
+                                      RTCHitN_primID(arguments->hit, arguments->N, i),
+                                      RTCHitN_u(arguments->hit, arguments->N, i),
+                                      RTCHitN_v(arguments->hit, arguments->N, i));
+    context->visibility *= 1.0f - alpha;
+    if (context->visibility > 0.0f) arguments->valid[i] = 0;
+  }
+}
+
+}  // namespace relief

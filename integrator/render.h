@@ -1,0 +1,41 @@
+// Renders a scene: builds what the kernels need, then samples tiles in passes until a limit is reached.
+#pragma once
+
+#include <atomic>
+#include <functional>
+
+#include "integrator/film.h"
+#include "integrator/scene_context.h"
+#include "kernel/statistics.h"
+#include "scene/scene.h"
+
+namespace relief {
+
+struct RenderOptions {
+  RenderSettings settings;  ///< the scene's, with the command line's changes
+  Camera camera;            ///< half_width already set for the image's aspect ratio
+  int crop_x0 = 0, crop_y0 = 0, crop_x1 = 0, crop_y1 = 0;  ///< pixels, half open; all 0: the whole image
+  double time_limit_seconds = 0;  ///< 0: none; counted from the start of sampling, kept to within one pass
+  std::uint32_t aov_mask = 1;
+};
+
+struct RenderProgress {
+  double fraction = 0;  ///< of the samples (or of the time limit, whichever ends sooner)
+  double samples_per_pixel = 0, seconds = 0, seconds_left = 0, rays_per_second = 0;
+};
+
+/// Kernel globals of a render; the film is left for the caller to fill in.
+/// @param filter  Blackman–Harris table; must outlive the globals
+KernelGlobals render_globals(const SceneContext& context, const RenderOptions& options, const FilterTable& filter);
+
+/// Renders; returns what was sampled when `stop` became true.
+/// @param progress  called a few times a second from any thread, one call at a time; may be empty
+/// @param stats     filled but for what only the caller knows (scene, version, load_seconds, warnings)
+/// @error std::runtime_error out of memory and the like
+RenderedImage render(const Scene& scene,
+                     const RenderOptions& options,
+                     const std::atomic<bool>& stop,
+                     const std::function<void(const RenderProgress&)>& progress,
+                     Statistics& stats);
+
+}  // namespace relief

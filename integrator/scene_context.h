@@ -1,0 +1,38 @@
+// Everything built from a scene that a query or a render needs: views, lights, acceleration structure, kernel globals.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "integrator/accel.h"
+#include "integrator/light_set.h"
+#include "kernel/bsdf/energy_tables.h"
+#include "kernel/globals.h"
+#include "kernel/statistics.h"
+#include "scene/scene.h"
+
+namespace relief {
+
+/// Owner of what KernelGlobals points to. Camera, film, limits and seed are left for the render to fill in.
+struct SceneContext {
+  /// @param scene  must outlive the context
+  /// @error std::runtime_error out of memory and the like
+  explicit SceneContext(const Scene& scene);
+  SceneContext(const SceneContext&) = delete;
+  SceneContext& operator=(const SceneContext&) = delete;
+
+  /// Bytes by part.
+  void fill(Statistics& stats) const;
+
+  const Scene& scene;
+  std::vector<MeshView> meshes;
+  std::vector<InstanceView> instances;
+  LightSet lights;
+  std::vector<std::uint8_t> surface_kernel;  ///< a material
+  std::unique_ptr<BsdfTables> bsdf_tables;
+  std::unique_ptr<Accel> accel;
+  KernelGlobals globals;
+};
+
+}  // namespace relief

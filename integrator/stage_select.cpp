@@ -1,0 +1,29 @@
+#include <cstdlib>
+#include <stdexcept>
+#include <string>
+
+#include "integrator/stages.h"
+
+namespace relief {
+
+namespace {
+
+bool has_avx2()
+{
+  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("f16c");
+}
+
+}  // namespace
+
+const StageTable& stage_table_select()
+{
+  const char* wish = std::getenv("RELIEF_ISA");
+  const std::string isa = wish == nullptr ? "" : wish;
+  if (isa.empty()) return has_avx2() ? stage_table_avx2() : stage_table_baseline();
+  if (isa == "baseline") return stage_table_baseline();
+  if (isa == "avx2" && has_avx2()) return stage_table_avx2();
+  throw std::runtime_error("$RELIEF_ISA: expected 'baseline'" + std::string(has_avx2() ? " or 'avx2'" : "") + ", found '" +
+                           isa + "'");
+}
+
+}  // namespace relief

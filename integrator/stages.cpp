@@ -1,0 +1,115 @@
+// Compiled once an instruction set (see CMakeLists.txt), with RELIEF_STAGE_TABLE naming the function that returns this
+// set's table. Nothing here may have external linkage but that function: see scripts/check_isa.
+#include "integrator/stages.h"
+
+#include "integrator/surface_kernels.h"
+#include "kernel/stage/accumulate_shadow.h"
+#include "kernel/stage/generate_camera_path.h"
+#include "kernel/stage/shade_background.h"
+#include "kernel/stage/shade_light.h"
+#include "kernel/stage/shade_surface.h"
+
+namespace relief {
+
+namespace {
+
+/// Pixels of a batch in blocks of 4×2, so that eight neighbouring camera rays form a packet.
+/// Widths and heights that are no multiples (image borders) go row by row.
+void batch_pixel(const Batch& batch, std::uint32_t index, int* x, int* y)
+{
+  const auto width = static_cast<std::uint32_t>(batch.width);
+  if (width % 4 != 0 || batch.height % 2 != 0) {
+    *x = batch.x0 + static_cast<int>(index % width);
+    *y = batch.y0 + static_cast<int>(index / width);
+    return;
+  }
+  const std::uint32_t block = index / 8;
+  const std::uint32_t blocks_a_row = width / 4;
+  *x = batch.x0 + static_cast<int>(block % blocks_a_row * 4 + index % 4);
+  *y = batch.y0 + static_cast<int>(block / blocks_a_row * 2 + index / 4 % 2);
+}
+
+void generate(const KernelGlobals& g, const PathStateView& state, const Batch& batch)
+{
+  const auto num_pixels = static_cast<std::uint32_t>(batch.width * batch.height);
+  std::uint32_t path = 0;
+  for (std::uint32_t s = 0; s < batch.num_samples; ++s) {
+    for (std::uint32_t p = 0; p < num_pixels; ++p, ++path) {
+      int x = 0;
+      int y = 0;
+      batch_pixel(batch, p, &x, &y);
+      generate_camera_path(g, state, path, x, y, batch.first_sample + s);
+    }
+  }
+}
+
+template <unsigned kFeatures>
+void shade_surfaces(const KernelGlobals& g,
+                    const PathStateView& state,
+                    const QueueView& queue,
+                    QueueView& next,
+                    ShadowQueueView& shadow,
+                    Counters& counters)
+{
+  for (std::uint32_t i = 0; i < queue.size; ++i) {
+    shade_surface<kFeatures>(g, state, queue.paths[i], next, shadow, counters);
+  }
+}
+
+void shade_backgrounds(const KernelGlobals& g, const PathStateView& state, const QueueView& queue, Counters& counters)
+{
+  for (std::uint32_t i = 0; i < queue.size; ++i) shade_background(g, state, queue.paths[i], counters);
+}
+
+void shade_lights(const KernelGlobals& g, const PathStateView& state, const QueueView& queue, QueueView& next)
+{
+  for (std::uint32_t i = 0; i < queue.size; ++i) {
+    shade_light(g, state, queue.paths[i]);
+    queue_push(next, queue.paths[i]);
+  }
+}
+
+void accumulate_shadows(const KernelGlobals& g,
+                        const PathStateView& state,
+                        const ShadowQueueView& shadow,
+                        const float* visibility)
+{
+  for (std::uint32_t i = 0; i < shadow.size; ++i) {
+    if (visibility[i] > 0.0f) accumulate_shadow(g, state, shadow, i, visibility[i]);
+  }
+}
+
+void finish(const KernelGlobals& g,
+            const PathStateView& state,
+            const Batch& batch,
+            Counters& counters,
+            std::uint32_t* nonfinite_path)
+{
+  const std::uint32_t num_paths = static_cast<std::uint32_t>(batch.width * batch.height) * batch.num_samples;
+  for (std::uint32_t i = 0; i < num_paths; ++i) {
+    const bool finite =
+        film_add_sample(g.film, state.pixel[i], state.sample_index[i],
+                        {state.direct_r[i], state.direct_g[i], state.direct_b[i]},
+                        {state.indirect_r[i], state.indirect_g[i], state.indirect_b[i]});
+    if (finite) continue;
+    if (counters.nonfinite_samples++ == 0) *nonfinite_path = i;
+  }
+}
+
+constexpr StageTable kTable = {
+    RELIEF_ISA_NAME,
+    generate,
+    {shade_surfaces<kSurfaceKernelFeatures[0]>, shade_surfaces<kSurfaceKernelFeatures[1]>,
+     shade_surfaces<kSurfaceKernelFeatures[2]>, shade_surfaces<kSurfaceKernelFeatures[3]>,
+     shade_surfaces<kSurfaceKernelFeatures[4]>},
+    shade_backgrounds,
+    shade_lights,
+    accumulate_shadows,
+    finish,
+};
+
+}  // namespace
+
+const StageTable& RELIEF_STAGE_TABLE() { return kTable; }
+
+}  // namespace relief

@@ -1,0 +1,53 @@
+// Entry points of the shading stages. stages.cpp is compiled once for every instruction set; the table is chosen when
+// the program starts.
+#pragma once
+
+#include <cstdint>
+
+#include "kernel/counters.h"
+#include "kernel/globals.h"
+#include "kernel/state/path_state.h"
+
+namespace relief {
+
+/// Surface kernels are instantiated for a few feature masks, in rising order of what they can do.
+inline constexpr int kNumSurfaceKernels = 5;
+
+/// A rectangle of pixels and a run of their samples; path i of a batch is pixel i % (width·height) in the order of
+/// batch_pixel, sample first_sample + i / (width·height).
+struct Batch {
+  int x0 = 0, y0 = 0, width = 0, height = 0;  ///< in the film window
+  std::uint32_t first_sample = 0, num_samples = 0;
+
+  std::uint32_t num_paths() const { return static_cast<std::uint32_t>(width * height) * num_samples; }
+};
+
+struct StageTable {
+  const char* isa;
+  void (*generate)(const KernelGlobals&, const PathStateView&, const Batch&);
+  void (*shade_surface[kNumSurfaceKernels])(const KernelGlobals&,
+                                            const PathStateView&,
+                                            const QueueView& queue,
+                                            QueueView& next,
+                                            ShadowQueueView& shadow,
+                                            Counters&);
+  void (*shade_background)(const KernelGlobals&, const PathStateView&, const QueueView& queue, Counters&);
+  void (*shade_light)(const KernelGlobals&, const PathStateView&, const QueueView& queue, QueueView& next);
+  /// @param visibility  one entry a shadow ray, 0 … 1
+  void (*accumulate_shadow)(const KernelGlobals&,
+                            const PathStateView&,
+                            const ShadowQueueView& shadow,
+                            const float* visibility);
+  /// Adds the batch's finished samples to the film, in path order.
+  /// @param nonfinite_path  index of the first dropped path is written here; untouched if all are finite
+  void (*finish)(const KernelGlobals&, const PathStateView&, const Batch&, Counters&, std::uint32_t* nonfinite_path);
+};
+
+const StageTable& stage_table_baseline();
+const StageTable& stage_table_avx2();
+
+/// The best table for this machine; $RELIEF_ISA (baseline, avx2) overrides.
+/// @error std::runtime_error if $RELIEF_ISA names something else or something this machine lacks
+const StageTable& stage_table_select();
+
+}  // namespace relief

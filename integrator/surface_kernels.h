@@ -1,0 +1,27 @@
+// The feature masks that surface kernels are instantiated for. Few, because each costs code and compile time; a
+// material uses the first that has all its features.
+#pragma once
+
+#include "integrator/stages.h"
+#include "kernel/feature_mask.h"
+
+namespace relief {
+
+inline constexpr unsigned kSurfaceKernelFeatures[kNumSurfaceKernels] = {
+    0,
+    kFeatureMetal,
+    kFeatureTransmission,
+    kFeatureMetal | kFeatureTextures | kFeatureNormalMaps | kFeatureTransparency,
+    kFeatureAll,
+};
+
+/// Kernel for a material.
+inline int surface_kernel_index(const Material& material)
+{
+  const unsigned needed = feature_mask_of(material);
+  int index = 0;
+  while ((needed & ~kSurfaceKernelFeatures[index]) != 0) ++index;
+  return index;
+}
+
+}  // namespace relief

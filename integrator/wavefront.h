@@ -1,0 +1,78 @@
+// One worker's wavefront: path state for a batch, queues between stages, and the loop over stages.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "integrator/accel.h"
+#include "integrator/stages.h"
+#include "kernel/counters.h"
+#include "kernel/globals.h"
+
+namespace relief {
+
+/// Paths of a full batch. State and queues take about 200 bytes a path, so a batch stays in a second-level cache of
+/// 1 MiB.
+inline constexpr std::uint32_t kBatchPaths = 4096;
+
+enum class Stage : int { kGenerate, kIntersectClosest, kShade, kIntersectShadow, kFilm };
+inline constexpr int kNumStages = 5;
+inline constexpr std::array<const char*, kNumStages> kStageNames = {"generate", "intersect_closest", "shade",
+                                                                    "intersect_shadow", "film"};
+
+/// A sample that was dropped because it was not finite: enough to trace it again.
+struct NonfiniteSample {
+  bool found = false;
+  int x = 0, y = 0;  ///< in the film window
+  std::uint32_t sample_index = 0;
+};
+
+/// A ray of a path, as it was traced.
+struct RecordedRay {
+  bool shadow = false;
+  Vec3f O, D;               ///< world; D unit
+  float t_min = 0, t_max = kInfinity;
+  float t = kInfinity;      ///< where it hit; shadow rays: t_max if it reached the light
+};
+
+/// Owned by one thread at a time.
+class Wavefront {
+ public:
+  Wavefront();
+
+  /// Renders a batch of at most kBatchPaths paths into the film.
+  void run(const KernelGlobals& g,
+           const Accel& accel,
+           const StageTable& stages,
+           const std::vector<std::uint8_t>& surface_kernel,
+           const Batch& batch);
+
+  static std::size_t bytes();
+
+  std::vector<RecordedRay>* recorder = nullptr;  ///< receives every ray of the batch, if set
+  Counters counters;
+  std::array<double, kNumStages> seconds{};
+  NonfiniteSample nonfinite;
+
+ private:
+  void record_rays() const;
+  void record_shadow_rays() const;
+
+  struct Free {
+    void operator()(void* p) const;
+  };
+  template <class T>
+  T* column(std::size_t count);
+
+  std::unique_ptr<std::byte, Free> memory_;
+  std::size_t used_ = 0;
+  PathStateView state_;
+  ShadowQueueView shadow_;
+  float* visibility_ = nullptr;
+  QueueView active_, next_, lights_, background_;
+  std::array<QueueView, kNumSurfaceKernels> surfaces_;
+};
+
+}  // namespace relief

@@ -1,0 +1,83 @@
+// The film while it is being rendered: sums per pixel. film_resolve (integrator/film.h) turns it into a FilmView.
+#pragma once
+
+#include "kernel/film/film_layout.h"
+#include "kernel/math/vec.h"
+
+namespace relief {
+
+/// Where each sum lies inside a pixel's record of floats; −1: not kept. The beauty, its even half and the squares are
+/// always kept, because error estimates and adaptive sampling need them.
+struct AccumulatorLayout {
+  static constexpr int kBeauty = 0;    ///< R, G, B
+  static constexpr int kCoverage = 3;  ///< samples that met geometry
+  static constexpr int kEven = 4;      ///< R, G, B of even-numbered samples
+  static constexpr int kSquares = 7;   ///< R², G², B²
+  static constexpr int kAlways = 10;
+
+  int direct = -1, albedo = -1, normal = -1, depth = -1, position = -1, uv = -1, object_id = -1, material_id = -1;
+  int num_floats = kAlways;
+};
+
+/// Sums of all pixels of the window; each pixel is written by one thread at a time.
+struct FilmAccumulatorView {
+  float* pixels = nullptr;  ///< width · height records of layout.num_floats
+  int width = 0, height = 0;
+  AccumulatorLayout layout;
+};
+
+/// What the first opaque-enough surface of a path tells the AOVs; world space, metres.
+struct FirstHit {
+  Vec3f P, N, albedo;
+  Vec2f uv;
+  float depth = 0;
+  std::uint32_t instance_index = 0, material_index = 0;
+  bool is_first_sample = false;
+};
+
+RELIEF_KERNEL void film_add3(float* sum, Vec3f value)
+{
+  sum[0] += value.x;
+  sum[1] += value.y;
+  sum[2] += value.z;
+}
+
+RELIEF_KERNEL void film_add_first_hit(const FilmAccumulatorView& film, std::uint32_t pixel, const FirstHit& hit)
+{
+  const AccumulatorLayout& layout = film.layout;
+  float* record = film.pixels + static_cast<std::size_t>(pixel) * static_cast<std::size_t>(layout.num_floats);
+  record[AccumulatorLayout::kCoverage] += 1.0f;
+  if (layout.albedo >= 0) film_add3(record + layout.albedo, hit.albedo);
+  if (layout.normal >= 0) film_add3(record + layout.normal, hit.N);
+  if (layout.depth >= 0) record[layout.depth] += hit.depth;
+  if (layout.position >= 0) film_add3(record + layout.position, hit.P);
+  if (layout.uv >= 0) {
+    record[layout.uv] += hit.uv.x;
+    record[layout.uv + 1] += hit.uv.y;
+  }
+  if (hit.is_first_sample) {
+    if (layout.object_id >= 0) record[layout.object_id] = static_cast<float>(hit.instance_index + 1);
+    if (layout.material_id >= 0) record[layout.material_id] = static_cast<float>(hit.material_index + 1);
+  }
+}
+
+/// Adds a finished sample.
+/// @return false when the sample is not finite; it then counts as black
+RELIEF_KERNEL bool film_add_sample(const FilmAccumulatorView& film,
+                                   std::uint32_t pixel,
+                                   std::uint32_t sample_index,
+                                   Vec3f direct,
+                                   Vec3f indirect)
+{
+  const AccumulatorLayout& layout = film.layout;
+  float* record = film.pixels + static_cast<std::size_t>(pixel) * static_cast<std::size_t>(layout.num_floats);
+  const Vec3f radiance = direct + indirect;
+  if (!is_finite(radiance)) return false;
+  film_add3(record + AccumulatorLayout::kBeauty, radiance);
+  film_add3(record + AccumulatorLayout::kSquares, radiance * radiance);
+  if ((sample_index & 1u) == 0) film_add3(record + AccumulatorLayout::kEven, radiance);
+  if (layout.direct >= 0) film_add3(record + layout.direct, direct);
+  return true;
+}
+
+}  // namespace relief

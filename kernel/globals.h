@@ -1,0 +1,42 @@
+// Everything a stage may read: views of the scene, fixed for the whole render.
+#pragma once
+
+#include "kernel/bsdf/energy_tables.h"
+#include "kernel/bsdf/material.h"
+#include "kernel/camera/camera.h"
+#include "kernel/film/film_accumulator.h"
+#include "kernel/film/pixel_filter.h"
+#include "kernel/light/light_sampler.h"
+#include "kernel/shape/mesh_view.h"
+#include "kernel/texture/texture_view.h"
+
+namespace relief {
+
+struct BounceLimits {
+  int total = 12, diffuse = 12, glossy = 12, transmission = 12, transparent = 32;
+};
+
+struct KernelGlobals {
+  const MeshView* meshes = nullptr;
+  const InstanceView* instances = nullptr;
+  std::uint32_t num_instances = 0;
+  const Material* materials = nullptr;
+  const TextureView* textures = nullptr;
+  const std::uint32_t* area_light_index = nullptr;  ///< light of object num_instances + i
+  LightsView lights;
+  const BsdfTables* bsdf_tables = nullptr;
+  Camera camera;
+  Vec3f camera_forward;  ///< unit, world: the axis that depths are measured along
+  BounceLimits limits;
+  float clamp_indirect = 0;  ///< 0: off
+  bool has_lights = false;   ///< something can be sampled
+  bool environment_visible_to_camera = true;
+  const FilterTable* filter = nullptr;  ///< null: box
+  float filter_width = 1;  ///< pixels
+  std::uint64_t seed = 0;
+  int full_width = 0, full_height = 0;  ///< of the whole image, pixels
+  int crop_x = 0, crop_y = 0;           ///< the film window's corner in it
+  FilmAccumulatorView film;
+};
+
+}  // namespace relief

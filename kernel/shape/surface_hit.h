@@ -1,0 +1,146 @@
+// From (instance, triangle, barycentric) to everything shading needs to know of the point, with a bound on the error
+// of its position. The position is recomputed from the triangle, never from O + t·D, so that its error does not grow
+// with the distance to the ray's origin (pbrt-v4 §6.8).
+#pragma once
+
+#include "kernel/math/rounding.h"
+#include "kernel/shape/mesh_view.h"
+
+namespace relief {
+
+/// A point on a triangle mesh in world space.
+struct SurfaceHit {
+  Vec3f P;            ///< world, metres
+  Vec3f P_error;      ///< bound on |error of P|, per axis, metres
+  Vec3f Ng;           ///< unit geometric normal, on the front side (counter-clockwise winding)
+  Vec3f Ns;           ///< unit interpolated shading normal, same side as Ng on the whole; = Ng for flat meshes
+  Vec2f uv[2];        ///< texture coordinates; (0, 0) where absent
+  Vec4f color{1, 1, 1, 1};
+  float area_ratio[2] = {0, 0};  ///< √(uv area / world area) of the triangle: uv units a metre, for texture footprints
+  Vec3f P_lift;       ///< vector from P to the smooth surface that Ns suggests, see surface_hit_make; 0 for flat meshes
+};
+
+/// Evaluates the triangle's attributes at a hit.
+/// @param bary_u, bary_v  barycentric weights of vertices 1 and 2
+/// @source position error: pbrt-v4 §6.8.5 and Eq. 6.24; lift: Hanika 2021, "Hacking the Shadow Terminator"
+RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
+                                          const InstanceView& instance,
+                                          std::uint32_t triangle_index,
+                                          float bary_u,
+                                          float bary_v)
+{
+  const TriangleIndices tri = mesh.triangles[triangle_index];
+  const float w0 = 1.0f - bary_u - bary_v;
+  const Affine3& m = instance.world_from_object;
+  const Vec3f p0 = mesh.P[tri.v0];
+  const Vec3f p1 = mesh.P[tri.v1];
+  const Vec3f p2 = mesh.P[tri.v2];
+
+  SurfaceHit hit;
+  const Vec3f P_object = w0 * p0 + bary_u * p1 + bary_v * p2;
+  const Vec3f P_object_error = gamma_bound(7) * (abs(w0 * p0) + abs(bary_u * p1) + abs(bary_v * p2));
+  hit.P = transform_point(m, P_object);
+  const Vec3f ax = abs(m.x), ay = abs(m.y), az = abs(m.z);
+  const auto abs_transform = [&](Vec3f v) { return ax * v.x + ay * v.y + az * v.z; };
+  hit.P_error = (1.0f + gamma_bound(3)) * abs_transform(P_object_error) +
+                gamma_bound(3) * (abs_transform(abs(P_object)) + abs(m.p));
+
+  const Vec3f edge1 = transform_vector(m, p1 - p0);
+  const Vec3f edge2 = transform_vector(m, p2 - p0);
+  Vec3f normal_area = cross(edge1, edge2);
+  if ((instance.flags & kMirrored) != 0) normal_area = -normal_area;
+  const float double_area = length(normal_area);
+  hit.Ng = normal_area / double_area;
+
+  hit.Ns = hit.Ng;
+  hit.P_lift = {};
+  if (mesh.N != nullptr) {
+    const Vec3f n0 = normalize(transform_normal(instance.object_from_world, mesh.N[tri.v0]));
+    const Vec3f n1 = normalize(transform_normal(instance.object_from_world, mesh.N[tri.v1]));
+    const Vec3f n2 = normalize(transform_normal(instance.object_from_world, mesh.N[tri.v2]));
+    const Vec3f n = w0 * n0 + bary_u * n1 + bary_v * n2;
+    const float n_length = length(n);
+    // Opposite vertex normals can cancel; then the flat normal is the only defensible one.
+    if (n_length > 1e-6f) hit.Ns = n / n_length;
+    // Project P onto the plane of each vertex and its normal; the barycentric mean of the projections is a smooth
+    // surface through the vertices. Only the outward part is used: on concave patches P itself is already outside.
+    const Vec3f to0 = -(bary_u * edge1 + bary_v * edge2);
+    const float d0 = max(0.0f, dot(to0, n0));
+    const float d1 = max(0.0f, dot(to0 + edge1, n1));
+    const float d2 = max(0.0f, dot(to0 + edge2, n2));
+    hit.P_lift = w0 * d0 * n0 + bary_u * d1 * n1 + bary_v * d2 * n2;
+  }
+
+  for (int set = 0; set < 2; ++set) {
+    if (mesh.uv[set] == nullptr) continue;
+    const Vec2f t0 = mesh.uv[set][tri.v0];
+    const Vec2f t1 = mesh.uv[set][tri.v1];
+    const Vec2f t2 = mesh.uv[set][tri.v2];
+    hit.uv[set] = w0 * t0 + bary_u * t1 + bary_v * t2;
+    const Vec2f du = t1 - t0;
+    const Vec2f dv = t2 - t0;
+    hit.area_ratio[set] = __builtin_sqrtf(__builtin_fabsf(difference_of_products(du.x, dv.y, du.y, dv.x)) / double_area);
+  }
+  if (mesh.color != nullptr) {
+    const Vec4f a = mesh.color[tri.v0], b = mesh.color[tri.v1], c = mesh.color[tri.v2];
+    hit.color = {w0 * a.x + bary_u * b.x + bary_v * c.x, w0 * a.y + bary_u * b.y + bary_v * c.y,
+                 w0 * a.z + bary_u * b.z + bary_v * c.z, w0 * a.w + bary_u * b.w + bary_v * c.w};
+  }
+  return hit;
+}
+
+/// Interpolated tangent frame of a normal map, world space, orthogonal to Ns.
+/// @return false where the mesh has no tangents or the tangent vanishes
+RELIEF_KERNEL bool surface_hit_tangent_frame(const MeshView& mesh,
+                                             const InstanceView& instance,
+                                             std::uint32_t triangle_index,
+                                             float bary_u,
+                                             float bary_v,
+                                             Vec3f Ns,
+                                             Frame* frame)
+{
+  if (mesh.tangent == nullptr) return false;
+  const TriangleIndices tri = mesh.triangles[triangle_index];
+  const float w0 = 1.0f - bary_u - bary_v;
+  const Vec3f tangent_object =
+      w0 * xyz(mesh.tangent[tri.v0]) + bary_u * xyz(mesh.tangent[tri.v1]) + bary_v * xyz(mesh.tangent[tri.v2]);
+  Vec3f tangent = transform_vector(instance.world_from_object, tangent_object);
+  tangent = tangent - Ns * dot(tangent, Ns);
+  const float squared = length_squared(tangent);
+  if (!(squared > 0.0f)) return false;
+  tangent = tangent * (1.0f / __builtin_sqrtf(squared));
+  float handedness = mesh.tangent[tri.v0].w < 0.0f ? -1.0f : 1.0f;
+  if ((instance.flags & kMirrored) != 0) handedness = -handedness;
+  *frame = {tangent, cross(Ns, tangent) * handedness, Ns};
+  return true;
+}
+
+/// Origin for a ray that leaves the surface on the side of `Ng_side`.
+/// The plane through P may lie anywhere within the error box; the origin is moved out of it along the normal, then each
+/// coordinate is rounded away. Twice the bound, because the tracer meets the triangle with errors of the same size in
+/// its own arithmetic (vertices minus origin; instance transforms).
+/// @param Ng_side  unit geometric normal, turned to the side the ray leaves on
+/// @source pbrt-v4 §6.8.6
+RELIEF_KERNEL Vec3f offset_ray_origin(Vec3f P, Vec3f P_error, Vec3f Ng_side)
+{
+  const float distance = 2.0f * dot(abs(Ng_side), P_error);
+  const Vec3f offset = distance * Ng_side;
+  const auto nudge = [](float p, float o) {
+    const float moved = p + o;
+    // A few ulps further in the direction of the offset covers the rounding of this very sum.
+    return moved + __builtin_copysignf(__builtin_fabsf(moved) * 2.0f * kUnitRoundoff, o);
+  };
+  return {nudge(P.x, offset.x), nudge(P.y, offset.y), nudge(P.z, offset.z)};
+}
+
+/// How much of the lift onto the smooth surface a ray gets: none for directions well above the facet (their shadows are
+/// already right), all for those below it, where a facet would shadow itself along the terminator.
+/// @param cos_g  cosine between the ray and the facet's normal on the side it leaves
+RELIEF_KERNEL float terminator_lift_weight(float cos_g)
+{
+  // 0.1 is the sine of the largest angle between facet and smooth normal on meshes that look smooth (about 6°).
+  constexpr float kLiftedBelow = 0.1f;
+  return clamp(2.0f * (1.0f - cos_g / kLiftedBelow), 0.0f, 1.0f);
+}
+
+}  // namespace relief

@@ -1,0 +1,22 @@
+// Stage: a shadow ray has been traced.
+#pragma once
+
+#include "kernel/globals.h"
+#include "kernel/stage/path_access.h"
+
+namespace relief {
+
+/// Adds what next-event estimation found, if the light is seen.
+/// @param visibility  share of the light that passes, 0 … 1
+RELIEF_KERNEL void accumulate_shadow(const KernelGlobals& g,
+                                     const PathStateView& state,
+                                     const ShadowQueueView& shadow,
+                                     std::uint32_t ray,
+                                     float visibility)
+{
+  const std::uint32_t path = shadow.path[ray];
+  const Vec3f gain = Vec3f{shadow.gain_r[ray], shadow.gain_g[ray], shadow.gain_b[ray]} * visibility;
+  path_add_radiance(state, path, static_cast<int>(shadow.scatterings[ray]), gain, g.clamp_indirect);
+}
+
+}  // namespace relief

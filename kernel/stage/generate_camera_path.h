@@ -1,0 +1,62 @@
+// Stage: one camera path from (pixel, sample).
+#pragma once
+
+#include "kernel/camera/camera_ray.h"
+#include "kernel/counters.h"
+#include "kernel/globals.h"
+#include "kernel/sample/dimensions.h"
+#include "kernel/sample/sobol.h"
+#include "kernel/sample/warp.h"
+#include "kernel/state/path_state.h"
+
+namespace relief {
+
+/// Starts `path` at a sample of a pixel. Writes every column but the hit's and the scatter normal.
+/// Next: intersect closest.
+/// @param pixel_x, pixel_y  in the film window
+RELIEF_KERNEL void generate_camera_path(const KernelGlobals& g,
+                                        const PathStateView& state,
+                                        std::uint32_t path,
+                                        int pixel_x,
+                                        int pixel_y,
+                                        std::uint32_t sample_index)
+{
+  const int image_x = g.crop_x + pixel_x;
+  const int image_y = g.crop_y + pixel_y;
+  // The hash is of the pixel's place in the whole image, so that a crop shows the same noise.
+  const std::uint32_t hash = sample_pixel_hash(g.seed, image_x, image_y);
+  const Vec2f u = sample_2d(hash, sample_index, dimension_camera(CameraDimension::kFilm));
+  const auto filter_offset = [&](float v) {
+    return (g.filter != nullptr ? filter_sample(*g.filter, v) : v - 0.5f) * g.filter_width;
+  };
+  const float film_x = (static_cast<float>(image_x) + 0.5f + filter_offset(u.x)) / static_cast<float>(g.full_width);
+  const float film_y = (static_cast<float>(image_y) + 0.5f + filter_offset(u.y)) / static_cast<float>(g.full_height);
+  Vec2f lens{};
+  if (g.camera.aperture_radius > 0.0f) {
+    lens = warp_disk(sample_2d(hash, sample_index, dimension_camera(CameraDimension::kLens)));
+  }
+  const CameraRay ray = camera_ray_make(g.camera, film_x, film_y, lens, 1.0f / static_cast<float>(g.full_height));
+
+  state.O_x[path] = ray.O.x;
+  state.O_y[path] = ray.O.y;
+  state.O_z[path] = ray.O.z;
+  state.D_x[path] = ray.D.x;
+  state.D_y[path] = ray.D.y;
+  state.D_z[path] = ray.D.z;
+  state.t_min[path] = ray.t_min;
+  state.t_max[path] = ray.t_max;
+  state.throughput_r[path] = state.throughput_g[path] = state.throughput_b[path] = 1.0f;
+  state.direct_r[path] = state.direct_g[path] = state.direct_b[path] = 0.0f;
+  state.indirect_r[path] = state.indirect_g[path] = state.indirect_b[path] = 0.0f;
+  state.pdf[path] = 0.0f;
+  state.pixel[path] = static_cast<std::uint32_t>(pixel_y * g.film.width + pixel_x);
+  state.sample_index[path] = sample_index;
+  state.pixel_hash[path] = hash;
+  state.bounces[path] = 0;
+  state.flags[path] = 0;
+  state.sigma_a_r[path] = state.sigma_a_g[path] = state.sigma_a_b[path] = 0.0f;
+  state.cone_width[path] = ray.cone_width;
+  state.cone_spread[path] = ray.cone_spread;
+}
+
+}  // namespace relief

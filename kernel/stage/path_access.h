@@ -1,0 +1,71 @@
+// Reading and writing groups of path columns.
+#pragma once
+
+#include "kernel/math/affine.h"
+#include "kernel/state/path_state.h"
+
+namespace relief {
+
+RELIEF_KERNEL Vec3f path_origin(const PathStateView& s, std::uint32_t i) { return {s.O_x[i], s.O_y[i], s.O_z[i]}; }
+RELIEF_KERNEL Vec3f path_direction(const PathStateView& s, std::uint32_t i) { return {s.D_x[i], s.D_y[i], s.D_z[i]}; }
+RELIEF_KERNEL Vec3f path_throughput(const PathStateView& s, std::uint32_t i)
+{
+  return {s.throughput_r[i], s.throughput_g[i], s.throughput_b[i]};
+}
+RELIEF_KERNEL Vec3f path_sigma_a(const PathStateView& s, std::uint32_t i)
+{
+  return {s.sigma_a_r[i], s.sigma_a_g[i], s.sigma_a_b[i]};
+}
+RELIEF_KERNEL Vec3f path_scatter_N(const PathStateView& s, std::uint32_t i)
+{
+  return {s.scatter_Nx[i], s.scatter_Ny[i], s.scatter_Nz[i]};
+}
+
+enum class BounceKind : int { kAll = 0, kDiffuse = 8, kGlossy = 16, kTransmission = 24 };
+
+RELIEF_KERNEL int path_bounces(std::uint32_t bounces, BounceKind kind)
+{
+  return static_cast<int>(bounces >> static_cast<int>(kind) & 0xffu);
+}
+
+/// Surfaces the path has met before, transparent ones included: what dimension_bounce counts by, so that no two
+/// surfaces share random numbers.
+RELIEF_KERNEL int path_surface(const PathStateView& s, std::uint32_t i)
+{
+  return path_bounces(s.bounces[i], BounceKind::kAll) + static_cast<int>(s.flags[i] >> kPathTransparentShift);
+}
+
+/// Adds radiance that arrives along the path's present ray, which left its last scattering event: direct light after
+/// at most one event, indirect after more.
+/// @param radiance      as emitted, W/m²/sr
+/// @param scatterings   events between the camera and the emitter
+RELIEF_KERNEL void path_add_radiance(const PathStateView& s,
+                                     std::uint32_t i,
+                                     int scatterings,
+                                     Vec3f contribution,
+                                     float clamp_indirect)
+{
+  if (scatterings <= 1) {
+    s.direct_r[i] += contribution.x;
+    s.direct_g[i] += contribution.y;
+    s.direct_b[i] += contribution.z;
+    return;
+  }
+  if (clamp_indirect > 0.0f) {
+    const float brightest = max_component(contribution);
+    if (brightest > clamp_indirect) contribution *= clamp_indirect / brightest;
+  }
+  s.indirect_r[i] += contribution.x;
+  s.indirect_g[i] += contribution.y;
+  s.indirect_b[i] += contribution.z;
+}
+
+/// Share of light left after a stretch of the path's medium (Beer–Lambert).
+/// @param distance  metres; infinite stretches of an absorbing medium transmit nothing
+RELIEF_KERNEL Vec3f path_transmittance(Vec3f sigma_a, float distance)
+{
+  const auto axis = [distance](float sigma) { return sigma > 0.0f ? std::exp(-sigma * distance) : 1.0f; };
+  return {axis(sigma_a.x), axis(sigma_a.y), axis(sigma_a.z)};
+}
+
+}  // namespace relief

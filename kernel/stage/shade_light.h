@@ -1,0 +1,37 @@
+// Stage: a path whose ray met the surface of an area light (rectangle or disk). Such lights shine and let rays pass,
+// as Blender's do; an emissive mesh is a surface and is shaded by shade_surface.
+#pragma once
+
+#include "kernel/counters.h"
+#include "kernel/globals.h"
+#include "kernel/math/rounding.h"
+#include "kernel/sample/mis.h"
+#include "kernel/stage/path_access.h"
+
+namespace relief {
+
+/// Adds the light's radiance, weighted against next-event estimation, and sends the ray on behind the light.
+/// Reads the ray, hit, throughput, pdf, scatter normal and medium; writes the radiance and t_min.
+/// Next: intersect closest.
+RELIEF_KERNEL void shade_light(const KernelGlobals& g, const PathStateView& state, std::uint32_t path)
+{
+  const std::uint32_t light_index = g.area_light_index[state.hit_object[path] - g.num_instances];
+  const Light& light = g.lights.lights[light_index];
+  const int scatterings = path_bounces(state.bounces[path], BounceKind::kAll);
+  const Vec3f D = path_direction(state, path);
+  const float t = state.hit_t[path];
+  Vec3f radiance = light_emitted(light, D);
+  if (!is_zero(radiance)) {
+    const float pdf = state.pdf[path];
+    if (pdf > 0.0f) {
+      const float pdf_light =
+          lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), light_index, D, t);
+      radiance *= mis_power(pdf, pdf_light);
+    }
+    radiance *= path_transmittance(path_sigma_a(state, path), t);
+    path_add_radiance(state, path, scatterings, path_throughput(state, path) * radiance, g.clamp_indirect);
+  }
+  state.t_min[path] = next_float_up(t);
+}
+
+}  // namespace relief
