@@ -75,9 +75,9 @@ void parallel_for(const Range& range, const Body& body, Partitioner&&...)
   tsan::run(pieces.size(), [&](std::size_t i) { body(pieces[i]); });
 }
 
-template <class Index, class Body>
+template <class Index, class Body, class... Partitioner>
 requires requires(const Body& body, Index index) { body(index); }
-void parallel_for(Index first, Index last, const Body& body)
+void parallel_for(Index first, Index last, const Body& body, Partitioner&&...)
 {
   if (!(first < last)) return;
   tsan::run(static_cast<std::size_t>(last - first),
