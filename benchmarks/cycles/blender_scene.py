@@ -93,7 +93,7 @@ def build_camera(gltf, node, matrix):
 
 
 def build_area_light(light, matrix):
-    """RELIEF_area_light: Blender spreads its watts evenly, radiance = power / (π · area), one-sided."""
+    """RELIEF_area_light. Blender's watts are not ours: its radiance is watts / (4 · area), not power / (π · area)."""
     if light.get("twoSided", False):
         raise Unsupported("a two-sided area light")
     data = bpy.data.lights.new("area light", "AREA")
@@ -108,7 +108,8 @@ def build_area_light(light, matrix):
     scales = np.linalg.norm(matrix[:3, :3], axis=0)
     if not np.allclose(scales, 1, atol=1e-5):
         raise Unsupported("a scaled area light")
-    data.energy = light["power"] if "power" in light else light["radiance"] * math.pi * area
+    radiance = light["power"] / (math.pi * area) if "power" in light else light["radiance"]
+    data.energy = 4 * area * radiance
     data.color = light.get("color", (1, 1, 1))
     data.spread = math.pi
     new = _add_object("area light", data, matrix)
@@ -116,7 +117,7 @@ def build_area_light(light, matrix):
 
 
 def build_punctual_light(light, matrix, efficacy):
-    """KHR_lights_punctual: a sun's irradiance is Blender's strength; a point of I W/sr is 4π² · I of its watts."""
+    """KHR_lights_punctual: a sun's irradiance is Blender's strength; a point of I W/sr has 4π · I watts."""
     intensity = light.get("intensity", 1) / efficacy
     if light["type"] == "directional":
         data = bpy.data.lights.new("sun", "SUN")
@@ -125,7 +126,7 @@ def build_punctual_light(light, matrix, efficacy):
     elif light["type"] == "point":
         data = bpy.data.lights.new("point", "POINT")
         data.shadow_soft_size = 0.0
-        data.energy = 4 * math.pi * math.pi * intensity
+        data.energy = 4 * math.pi * intensity
     else:
         raise Unsupported("a spot light: its cone fades by another law")
     data.color = light.get("color", (1, 1, 1))

@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Renders a relief scene with Blender's Cycles and prints what it cost, as JSON.
 
 Needs Blender 3.4 and, for the python that runs inside it, numpy (Debian: blender python3-numpy). The picture is a
