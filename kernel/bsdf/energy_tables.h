@@ -1,8 +1,9 @@
 // Directional albedos of the microfacet lobes, made once at start. They say how much a lobe loses to bounces that it
 // does not follow, which the surface model puts back, and how much of the light reaches what lies below.
 //
-// Read GgxAlbedo and the look-ups first; bsdf_tables_make and its quadratures fill them. Cosines are tabulated at
-// √cosine, because albedos bend near the horizon, and roughness is perceptual (alpha = roughness²).
+// Read the structs and the look-ups first; bsdf_tables_make and its quadratures fill them. Roughness is perceptual
+// (alpha = roughness²). The cosine's axis is √(µ(1 + alpha)/(µ + alpha)): losses happen where µ is about alpha, and along
+// that axis the tables hardly depend on roughness. (√µ alone left 5 % of error for smooth metal at grazing angles.)
 #pragma once
 
 #include "kernel/assert.h"
@@ -12,10 +13,10 @@
 
 namespace relief {
 
-inline constexpr int kTableCosines = 32, kTableRoughnesses = 32;
-inline constexpr int kGlassCosines = 16, kGlassRoughnesses = 16, kGlassIors = 9;
+inline constexpr int kGgxCosines = 32, kGgxRoughnesses = 32;
+inline constexpr int kGlassCosines = 24, kGlassRoughnesses = 12, kGlassIors = 13;
 inline constexpr int kSheenCosines = 32, kSheenRoughnesses = 16;
-/// Glass is tabulated over (ior − 1) / (ior + 1) up to ior 3; denser glass uses the last entry.
+/// Glass is tabulated over √((ior − 1) / (ior + 1)) up to ior 3; denser glass uses the last entry.
 inline constexpr float kGlassMaxRootF0 = 0.5f;
 
 /// Albedo of GGX reflection, split so that any Schlick Fresnel can be put in afterwards: the albedo of a lobe is
@@ -25,18 +26,24 @@ struct GgxAlbedo {
   float grazing = 0;  ///< with F = (1 − cos)⁵
 };
 
+/// The same as stored: small numbers that vary slowly.
+struct GgxEntry {
+  float lost = 0;   ///< 1 − total
+  float extra = 0;  ///< grazing − total · (1 − µ)⁵
+};
+
 /// Sheen at one direction.
 struct SheenAlbedo {
   float albedo = 0;  ///< with white sheen colour, after `bound`
   float bound = 1;   ///< 1, or less where the published model would reflect more than it receives
 };
 
-/// About 52 kB; a render needs one. Glass and sheen are filled only if asked for.
+/// About 46 kB; a render needs one. Glass and sheen are filled only if asked for.
 struct BsdfTables {
-  GgxAlbedo ggx[kTableRoughnesses][kTableCosines];
-  GgxAlbedo ggx_mean[kTableRoughnesses];                         ///< over the cosine-weighted hemisphere
-  float glass[2][kGlassIors][kGlassRoughnesses][kGlassCosines];  ///< reflection + refraction; [0] from the thin side
-  float glass_mean[2][kGlassIors][kGlassRoughnesses];
+  GgxEntry ggx[kGgxRoughnesses][kGgxCosines];
+  GgxAlbedo ggx_mean[kGgxRoughnesses];                                ///< over the cosine-weighted hemisphere
+  float glass_lost[2][kGlassIors][kGlassRoughnesses][kGlassCosines];  ///< 1 − (reflection + refraction); [0]: thin side
+  float glass_lost_mean[2][kGlassIors][kGlassRoughnesses];
   SheenAlbedo sheen[kSheenRoughnesses][kSheenCosines];
 };
 
@@ -56,50 +63,74 @@ RELIEF_KERNEL TableCoordinate table_coordinate(float x, int size)
   return {lower, scaled - static_cast<float>(lower)};
 }
 
-RELIEF_KERNEL TableCoordinate table_cosine(float cos_theta, int size)
+/// Cosine axis of the microfacet tables.
+RELIEF_KERNEL TableCoordinate microfacet_cosine(float cos_theta, float alpha, int size)
 {
-  return table_coordinate(__builtin_sqrtf(max(cos_theta, 0.0f)), size);
+  return table_coordinate(__builtin_sqrtf(cos_theta * (1.0f + alpha) / (cos_theta + alpha)), size);
 }
 
-RELIEF_KERNEL GgxAlbedo lerp(float t, GgxAlbedo a, GgxAlbedo b)
+/// Cosine of node i of that axis; the horizon itself, where lobes have no value, becomes a direction next to it.
+RELIEF_KERNEL float microfacet_node_cosine(int i, float alpha, int size)
 {
-  return {lerp(t, a.total, b.total), lerp(t, a.grazing, b.grazing)};
+  const float x2 = sqr(static_cast<float>(i) / static_cast<float>(size - 1));
+  return min(1.0f, max(1e-3f, x2) * alpha / (1.0f + alpha - x2));
 }
 
-RELIEF_KERNEL SheenAlbedo lerp(float t, SheenAlbedo a, SheenAlbedo b)
+/// Roughness axis of one surface.
+struct GgxCoordinate {
+  TableCoordinate roughness;
+  float alpha = 1;
+  bool mirror = false;  ///< alpha below kDeltaAlpha: loses nothing, needs no table
+};
+
+RELIEF_KERNEL GgxCoordinate ggx_coordinate(float roughness)
 {
-  return {lerp(t, a.albedo, b.albedo), lerp(t, a.bound, b.bound)};
+  const float alpha = sqr(roughness);
+  return {table_coordinate(roughness, kGgxRoughnesses), alpha, alpha < kDeltaAlpha};
 }
 
-/// @param roughness  table_coordinate(roughness, kTableRoughnesses)
-RELIEF_KERNEL GgxAlbedo ggx_albedo(const BsdfTables& tables, TableCoordinate roughness, float cos_theta)
+/// @param cos_theta  (0, 1]
+RELIEF_KERNEL GgxAlbedo ggx_albedo(const BsdfTables& tables, const GgxCoordinate& g, float cos_theta)
 {
-  const TableCoordinate c = table_cosine(cos_theta, kTableCosines);
-  const auto row = [&](int r) { return lerp(c.t, tables.ggx[r][c.index], tables.ggx[r][c.index + 1]); };
-  return lerp(roughness.t, row(roughness.index), row(roughness.index + 1));
+  if (g.mirror) return {1.0f, schlick_weight(cos_theta)};
+  const TableCoordinate c = microfacet_cosine(cos_theta, g.alpha, kGgxCosines);
+  const GgxEntry* row0 = tables.ggx[g.roughness.index] + c.index;
+  const GgxEntry* row1 = tables.ggx[g.roughness.index + 1] + c.index;
+  const float lost = lerp(g.roughness.t, lerp(c.t, row0[0].lost, row0[1].lost), lerp(c.t, row1[0].lost, row1[1].lost));
+  const float extra =
+      lerp(g.roughness.t, lerp(c.t, row0[0].extra, row0[1].extra), lerp(c.t, row1[0].extra, row1[1].extra));
+  return {1.0f - lost, (1.0f - lost) * schlick_weight(cos_theta) + extra};
 }
 
-RELIEF_KERNEL GgxAlbedo ggx_albedo_mean(const BsdfTables& tables, TableCoordinate roughness)
+RELIEF_KERNEL GgxAlbedo ggx_albedo_mean(const BsdfTables& tables, const GgxCoordinate& g)
 {
-  return lerp(roughness.t, tables.ggx_mean[roughness.index], tables.ggx_mean[roughness.index + 1]);
+  if (g.mirror) return {1.0f, 1.0f / 21.0f};
+  const GgxAlbedo a = tables.ggx_mean[g.roughness.index], b = tables.ggx_mean[g.roughness.index + 1];
+  return {lerp(g.roughness.t, a.total, b.total), lerp(g.roughness.t, a.grazing, b.grazing)};
 }
 
-/// Roughness axis of the sheen table, which starts at kSheenMinRoughness.
+/// Axes of the sheen table. Roughness starts at kSheenMinRoughness and is denser there.
 RELIEF_KERNEL TableCoordinate sheen_table_roughness(float roughness)
 {
-  return table_coordinate((roughness - kSheenMinRoughness) / (1.0f - kSheenMinRoughness), kSheenRoughnesses);
+  const float x = (roughness - kSheenMinRoughness) / (1.0f - kSheenMinRoughness);
+  return table_coordinate(safe_sqrt(x), kSheenRoughnesses);
 }
 
 RELIEF_KERNEL SheenAlbedo sheen_albedo(const BsdfTables& tables, TableCoordinate roughness, float cos_theta)
 {
-  const TableCoordinate c = table_cosine(cos_theta, kSheenCosines);
-  const auto row = [&](int r) { return lerp(c.t, tables.sheen[r][c.index], tables.sheen[r][c.index + 1]); };
-  return lerp(roughness.t, row(roughness.index), row(roughness.index + 1));
+  const TableCoordinate c = table_coordinate(safe_sqrt(cos_theta), kSheenCosines);
+  const auto row = [&](int r) {
+    const SheenAlbedo a = tables.sheen[r][c.index], b = tables.sheen[r][c.index + 1];
+    return SheenAlbedo{lerp(c.t, a.albedo, b.albedo), lerp(c.t, a.bound, b.bound)};
+  };
+  const SheenAlbedo a = row(roughness.index), b = row(roughness.index + 1);
+  return {lerp(roughness.t, a.albedo, b.albedo), lerp(roughness.t, a.bound, b.bound)};
 }
 
 /// Axes of the glass table for one interface.
 struct GlassCoordinate {
   TableCoordinate ior, roughness;
+  float alpha = 1;
   int side = 0;  ///< 0: seen from the thin side
 };
 
@@ -107,16 +138,17 @@ struct GlassCoordinate {
 RELIEF_KERNEL GlassCoordinate glass_coordinate(float eta, float roughness)
 {
   const float root_F0 = __builtin_fabsf(eta - 1.0f) / (eta + 1.0f);
-  return {table_coordinate(root_F0 / kGlassMaxRootF0, kGlassIors), table_coordinate(roughness, kGlassRoughnesses),
-          eta < 1.0f ? 1 : 0};
+  return {table_coordinate(__builtin_sqrtf(root_F0 / kGlassMaxRootF0), kGlassIors),
+          table_coordinate(roughness, kGlassRoughnesses), sqr(roughness), eta < 1.0f ? 1 : 0};
 }
 
-/// Energy that one scattering by rough glass keeps, reflected and refracted together.
-RELIEF_KERNEL float glass_albedo(const BsdfTables& tables, const GlassCoordinate& g, int side, float cos_theta)
+/// Energy that one scattering by rough glass loses, reflection and refraction together.
+/// @param side  0: seen from the thin side, 1: from the dense one
+RELIEF_KERNEL float glass_lost(const BsdfTables& tables, const GlassCoordinate& g, int side, float cos_theta)
 {
-  const TableCoordinate c = table_cosine(cos_theta, kGlassCosines);
+  const TableCoordinate c = microfacet_cosine(cos_theta, g.alpha, kGlassCosines);
   const auto row = [&](int i, int r) {
-    const float* cosines = tables.glass[side][i][r];
+    const float* cosines = tables.glass_lost[side][i][r];
     return lerp(c.t, cosines[c.index], cosines[c.index + 1]);
   };
   const auto plane = [&](int i) {
@@ -125,121 +157,143 @@ RELIEF_KERNEL float glass_albedo(const BsdfTables& tables, const GlassCoordinate
   return lerp(g.ior.t, plane(g.ior.index), plane(g.ior.index + 1));
 }
 
-RELIEF_KERNEL float glass_albedo_mean(const BsdfTables& tables, const GlassCoordinate& g, int side)
+RELIEF_KERNEL float glass_lost_mean(const BsdfTables& tables, const GlassCoordinate& g, int side)
 {
   const auto plane = [&](int i) {
-    const float* roughnesses = tables.glass_mean[side][i];
+    const float* roughnesses = tables.glass_lost_mean[side][i];
     return lerp(g.roughness.t, roughnesses[g.roughness.index], roughnesses[g.roughness.index + 1]);
   };
   return lerp(g.ior.t, plane(g.ior.index), plane(g.ior.index + 1));
 }
 
-/// Cosine of a table's node; the horizon itself, where lobes have no value, is replaced by a direction next to it.
-RELIEF_KERNEL float table_node_cosine(int i, int size)
+/// Mean over the cosine-weighted hemisphere, 2∫ f µ dµ, of a look-up: energy then balances with the values looked up.
+template <typename F>
+RELIEF_KERNEL float cosine_mean(F&& lookup)
 {
-  return max(1e-5f, sqr(static_cast<float>(i) / static_cast<float>(size - 1)));
+  constexpr int kSteps = 128;
+  float sum = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    // µ = y³: look-ups vary most near the horizon.
+    const float y = (static_cast<float>(i) + 0.5f) / kSteps;
+    const float mu = y * y * y;
+    sum += lookup(mu) * mu * y * y;
+  }
+  return sum * (6.0f / kSteps);
 }
 
-/// Mean over the cosine-weighted hemisphere of a function tabulated at √cosine and interpolated linearly there:
-/// 2∫ f µ dµ = 4∫ f(x) x³ dx, exact for the interpolant, so that energy balances with the values looked up.
-template <int kSize, typename F>
-RELIEF_KERNEL float table_mean(F&& value)
-{
-  constexpr float h = 1.0f / static_cast<float>(kSize - 1);
-  float sum = 0;
-  for (int i = 0; i + 1 < kSize; ++i) {
-    const float a = static_cast<float>(i) * h;
-    // ∫ x³ over the cell, and ∫ x³ (x − a)/h: Gauss–Legendre with three points is exact for degree five.
-    const float offsets[3] = {0.5f - 0.38729833462f, 0.5f, 0.5f + 0.38729833462f};
-    const float weights[3] = {5.0f / 18.0f, 4.0f / 9.0f, 5.0f / 18.0f};
-    for (int k = 0; k < 3; ++k) {
-      const float x = a + h * offsets[k];
-      sum += 4.0f * h * weights[k] * x * x * x * lerp(offsets[k], value(i), value(i + 1));
+/// Visible normals that a quadrature visits, the cosines and sines of its azimuths shared by all.
+template <int kPhi, int kCap>
+struct VisibleNormals {
+  float cos_phi[kPhi], sin_phi[kPhi];
+
+  /// Calls visit(wm, weight) for kPhi × kCap normals visible from wo; the weights add up to about 1.
+  template <typename F>
+  void for_each(Vec3f wo, float alpha, F&& visit) const
+  {
+    const Vec3f wo_std = normalize({wo.x * alpha, wo.y * alpha, wo.z});
+    for (int j = 0; j < kCap; ++j) {
+      // u = 1 − w²: denser in the tail of the distribution, where rays are lost and reflection becomes total.
+      const float w = (static_cast<float>(j) + 0.5f) / kCap;
+      const float z = 1.0f - (1.0f - w * w) * (1.0f + wo_std.z);
+      const float r = safe_sqrt((1.0f - z) * (1.0f + z));
+      for (int i = 0; i < kPhi; ++i) {
+        const Vec3f wm_std{r * cos_phi[i] + wo_std.x, r * sin_phi[i] + wo_std.y, z + wo_std.z};
+        visit(normalize({wm_std.x * alpha, wm_std.y * alpha, max(0.0f, wm_std.z)}), 2.0f * w / (kPhi * kCap));
+      }
     }
   }
-  return sum;
+};
+
+template <int kPhi, int kCap>
+RELIEF_KERNEL VisibleNormals<kPhi, kCap> visible_normals_make()
+{
+  VisibleNormals<kPhi, kCap> v;
+  for (int i = 0; i < kPhi; ++i) {
+    // Half the azimuths: the other half mirrors them.
+    const float phi = kPi * (static_cast<float>(i) + 0.5f) / kPhi;
+    v.cos_phi[i] = std::cos(phi);
+    v.sin_phi[i] = std::sin(phi);
+  }
+  return v;
 }
 
+using GgxQuadrature = VisibleNormals<8, 48>;
+using GlassQuadrature = VisibleNormals<8, 24>;
+
 /// Albedo of GGX reflection by quadrature over visible normals: the mean of G2/G1, with and without Schlick's weight.
-/// @cost 512 evaluations
-RELIEF_KERNEL GgxAlbedo ggx_albedo_integrate(float cos_o, float alpha)
+RELIEF_KERNEL GgxAlbedo ggx_albedo_integrate(const GgxQuadrature& normals, float cos_o, float alpha)
 {
-  constexpr int kPhi = 16, kCap = 32;
   const Vec3f wo{safe_sqrt(1.0f - cos_o * cos_o), 0.0f, cos_o};
   const float lambda_o = ggx_lambda(cos_o, alpha);
   GgxAlbedo sum{0, 0};
-  for (int i = 0; i < kPhi; ++i) {
-    for (int j = 0; j < kCap; ++j) {
-      // Half the azimuths: the other half mirrors them.
-      const Vec2f u{0.5f * (static_cast<float>(i) + 0.5f) / kPhi, (static_cast<float>(j) + 0.5f) / kCap};
-      const Vec3f wm = warp_ggx_visible_normal(wo, alpha, u);
-      const float cos_d = dot(wo, wm);
-      const float z = 2.0f * cos_d * wm.z - wo.z;
-      if (!(z > 0.0f)) continue;
-      const float share = ggx_visible_share(lambda_o, ggx_lambda(z, alpha));
-      sum.total += share;
-      sum.grazing += share * schlick_weight(cos_d);
-    }
-  }
-  return {sum.total / (kPhi * kCap), sum.grazing / (kPhi * kCap)};
+  normals.for_each(wo, alpha, [&](Vec3f wm, float weight) {
+    const float cos_d = dot(wo, wm);
+    const float z = 2.0f * cos_d * wm.z - wo.z;
+    if (!(z > 0.0f)) return;
+    const float share = weight * ggx_visible_share(lambda_o, ggx_lambda(z, alpha));
+    sum.total += share;
+    sum.grazing += share * schlick_weight(cos_d);
+  });
+  return sum;
 }
 
 /// Energy kept by one scattering of rough glass.
 /// @param eta  index far / near
-/// @cost       192 evaluations
-RELIEF_KERNEL float glass_albedo_integrate(float cos_o, float alpha, float eta)
+RELIEF_KERNEL float glass_albedo_integrate(const GlassQuadrature& normals, float cos_o, float alpha, float eta)
 {
-  constexpr int kPhi = 12, kCap = 16;
   const Vec3f wo{safe_sqrt(1.0f - cos_o * cos_o), 0.0f, cos_o};
   const float lambda_o = ggx_lambda(cos_o, alpha);
   float sum = 0;
-  for (int i = 0; i < kPhi; ++i) {
-    for (int j = 0; j < kCap; ++j) {
-      const Vec2f u{0.5f * (static_cast<float>(i) + 0.5f) / kPhi, (static_cast<float>(j) + 0.5f) / kCap};
-      const Vec3f wm = warp_ggx_visible_normal(wo, alpha, u);
-      const float cos_d = min(1.0f, dot(wo, wm));
-      const float cos_t = refracted_cosine(cos_d, eta);
-      const float F = fresnel_dielectric(cos_d, cos_t, eta);
-      const float reflected_z = 2.0f * cos_d * wm.z - wo.z;
-      if (reflected_z > 0.0f) sum += F * ggx_visible_share(lambda_o, ggx_lambda(reflected_z, alpha));
-      const float depth = -refract(wo, wm, cos_d, cos_t, eta).z;
-      if (F < 1.0f && depth > 0.0f) sum += (1.0f - F) * ggx_visible_share(lambda_o, ggx_lambda(depth, alpha));
-    }
-  }
-  return sum / (kPhi * kCap);
+  normals.for_each(wo, alpha, [&](Vec3f wm, float weight) {
+    const float cos_d = min(1.0f, dot(wo, wm));
+    const float cos_t = refracted_cosine(cos_d, eta);
+    const float F = fresnel_dielectric(cos_d, cos_t, eta);
+    const float reflected_z = 2.0f * cos_d * wm.z - wo.z;
+    if (reflected_z > 0.0f) sum += weight * F * ggx_visible_share(lambda_o, ggx_lambda(reflected_z, alpha));
+    const float depth = -refract(wo, wm, cos_d, cos_t, eta).z;
+    if (F < 1.0f && depth > 0.0f) sum += weight * (1.0f - F) * ggx_visible_share(lambda_o, ggx_lambda(depth, alpha));
+  });
+  return sum;
 }
 
 RELIEF_KERNEL void ggx_tables_make(BsdfTables& tables)
 {
-  for (int r = 0; r < kTableRoughnesses; ++r) {
-    const float alpha = sqr(static_cast<float>(r) / (kTableRoughnesses - 1));
-    for (int c = 0; c < kTableCosines; ++c) {
-      const float cos_theta = table_node_cosine(c, kTableCosines);
-      // Mirrors lose nothing: no quadrature, no error.
-      tables.ggx[r][c] =
-          alpha < kDeltaAlpha ? GgxAlbedo{1.0f, schlick_weight(cos_theta)} : ggx_albedo_integrate(cos_theta, alpha);
+  const GgxQuadrature normals = visible_normals_make<8, 48>();
+  for (int r = 0; r < kGgxRoughnesses; ++r) {
+    // Mirrors are not looked up; the first row serves the interpolation towards them.
+    const float alpha = max(kDeltaAlpha, sqr(static_cast<float>(r) / (kGgxRoughnesses - 1)));
+    for (int c = 0; c < kGgxCosines; ++c) {
+      const float cos_theta = microfacet_node_cosine(c, alpha, kGgxCosines);
+      const GgxAlbedo e = ggx_albedo_integrate(normals, cos_theta, alpha);
+      tables.ggx[r][c] = {1.0f - e.total, e.grazing - e.total * schlick_weight(cos_theta)};
     }
-    const GgxAlbedo* row = tables.ggx[r];
-    tables.ggx_mean[r] = {table_mean<kTableCosines>([row](int c) { return row[c].total; }),
-                          table_mean<kTableCosines>([row](int c) { return row[c].grazing; })};
+  }
+  for (int r = 0; r < kGgxRoughnesses; ++r) {
+    const GgxCoordinate g{{r < kGgxRoughnesses - 1 ? r : r - 1, r < kGgxRoughnesses - 1 ? 0.0f : 1.0f},
+                          max(kDeltaAlpha, sqr(static_cast<float>(r) / (kGgxRoughnesses - 1)))};
+    tables.ggx_mean[r] = {1.0f - cosine_mean([&](float mu) { return 1.0f - ggx_albedo(tables, g, mu).total; }),
+                          cosine_mean([&](float mu) { return ggx_albedo(tables, g, mu).grazing; })};
   }
 }
 
 RELIEF_KERNEL void glass_tables_make(BsdfTables& tables)
 {
+  const GlassQuadrature normals = visible_normals_make<8, 24>();
   for (int side = 0; side < 2; ++side) {
     for (int i = 0; i < kGlassIors; ++i) {
-      const float root_F0 = kGlassMaxRootF0 * static_cast<float>(i) / (kGlassIors - 1);
+      const float root_F0 = kGlassMaxRootF0 * sqr(static_cast<float>(i) / (kGlassIors - 1));
       const float ior = (1.0f + root_F0) / (1.0f - root_F0);
       for (int r = 0; r < kGlassRoughnesses; ++r) {
-        const float alpha = sqr(static_cast<float>(r) / (kGlassRoughnesses - 1));
-        float* row = tables.glass[side][i][r];
+        const float alpha = max(kDeltaAlpha, sqr(static_cast<float>(r) / (kGlassRoughnesses - 1)));
+        float* row = tables.glass_lost[side][i][r];
         for (int c = 0; c < kGlassCosines; ++c) {
-          const float cos_theta = table_node_cosine(c, kGlassCosines);
-          const float eta = side == 0 ? ior : 1.0f / ior;
-          row[c] = alpha < kDeltaAlpha ? 1.0f : glass_albedo_integrate(cos_theta, alpha, eta);
+          const float cos_theta = microfacet_node_cosine(c, alpha, kGlassCosines);
+          row[c] = 1.0f - glass_albedo_integrate(normals, cos_theta, alpha, side == 0 ? ior : 1.0f / ior);
         }
-        tables.glass_mean[side][i][r] = table_mean<kGlassCosines>([row](int c) { return row[c]; });
+        tables.glass_lost_mean[side][i][r] = cosine_mean([&](float mu) {
+          const TableCoordinate at = microfacet_cosine(mu, alpha, kGlassCosines);
+          return lerp(at.t, row[at.index], row[at.index + 1]);
+        });
       }
     }
   }
@@ -260,7 +314,7 @@ RELIEF_KERNEL void sheen_row_make(SheenAlbedo (&row)[kSheenCosines], float rough
     lambda[i] = sheen_lambda(x[i] * x[i], alpha);
   }
   for (int c = 0; c < kSheenCosines; ++c) {
-    const float cos_o = table_node_cosine(c, kSheenCosines);
+    const float cos_o = max(1e-5f, sqr(static_cast<float>(c) / (kSheenCosines - 1)));
     const Vec3f wo{safe_sqrt(1.0f - cos_o * cos_o), 0.0f, cos_o};
     const float lambda_o = sheen_lambda(cos_o, alpha);
     row[c].albedo = 0.0f;
@@ -289,8 +343,8 @@ RELIEF_KERNEL void sheen_row_make(SheenAlbedo (&row)[kSheenCosines], float rough
 RELIEF_KERNEL void sheen_tables_make(BsdfTables& tables)
 {
   for (int r = 0; r < kSheenRoughnesses; ++r) {
-    const float roughness =
-        kSheenMinRoughness + (1.0f - kSheenMinRoughness) * static_cast<float>(r) / (kSheenRoughnesses - 1);
+    const float x = sqr(static_cast<float>(r) / (kSheenRoughnesses - 1));
+    const float roughness = kSheenMinRoughness + (1.0f - kSheenMinRoughness) * x;
     sheen_row_make(tables.sheen[r], roughness);
   }
 }

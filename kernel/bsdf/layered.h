@@ -76,8 +76,9 @@ RELIEF_KERNEL void closure_add_layers(const SurfaceClosure& c, const BsdfTables&
     e.f += layers.sheen * (layers.coat_transmits * bound * sheen_eval(c.wo, wi, layers.sheen_roughness));
     e.pdf += c.probability.sheen * sheen_pdf(wi);
   }
-  if (c.probability.coat > 0.0f && layers.coat_alpha >= kDeltaAlpha) {
-    const GgxReflection r = clearcoat_eval(layers.coat_wo, to_local(layers.coat_frame, wi), wi.z, layers.coat_alpha);
+  if (c.probability.coat > 0.0f && !layers.coat_table.mirror) {
+    const GgxReflection r =
+        clearcoat_eval(layers.coat_wo, to_local(layers.coat_frame, wi), wi.z, layers.coat_table.alpha);
     e.f += splat3(layers.coat * r.f);
     e.pdf += c.probability.coat * r.pdf;
   }
@@ -89,16 +90,16 @@ RELIEF_KERNEL BsdfEval glass_closure_eval(const SurfaceClosure& c, const BsdfTab
 {
   const GlassClosure& glass = c.glass;
   const bool crosses = wi.z < 0.0f;
-  const DielectricEval single = dielectric_eval(c.wo, wi, c.alpha, glass.eta);
+  const DielectricEval single = dielectric_eval(c.wo, wi, c.ggx.alpha, glass.eta);
   float f = single.f;
   float pdf = single.pdf;
   if (glass.lost > 0.0f) {
     const float cos_i = __builtin_fabsf(wi.z);
     const int side = crosses ? 1 - glass.table.side : glass.table.side;
-    const float lost_i = 1.0f - glass_albedo(tables, glass.table, side, cos_i);
+    const float lost_i = max(0.0f, glass_lost(tables, glass.table, side, cos_i));
     const float share = crosses ? 1.0f - glass.reflect_share : glass.reflect_share;
     f += share * diffuse_coupled_eval(splat3(1.0f), glass.lost, lost_i, crosses ? glass.mean_far : glass.mean_near).x;
-    pdf = lerp(glass.lost, pdf, share * warp_cosine_hemisphere_pdf(cos_i));
+    pdf = lerp(glass.lost, pdf, share * warp_broad_hemisphere_pdf(cos_i));
   }
   f *= glass.weight;
   return {crosses ? c.transmission_color * (f * transmission_scale<kMode>(glass.eta)) : splat3(f), pdf};
@@ -115,31 +116,34 @@ RELIEF_KERNEL BsdfEval closure_eval(const SurfaceClosure& c, const BsdfTables& t
   if (!(c.wo.z > kMinCosine && __builtin_fabsf(wi.z) > kMinCosine)) return e;
 
   if (wi.z > 0.0f) {
-    if (probability.specular > 0.0f && !c.mirror) {
-      const GgxReflection r = ggx_reflection_eval(c.wo, wi, c.alpha);
+    if (probability.specular > 0.0f && !c.ggx.mirror) {
+      const GgxReflection r = ggx_reflection_eval(c.wo, wi, c.ggx.alpha);
       e.f = fresnel_schlick(c.F0, c.F90, r.cos_d) * r.f;
       e.pdf = probability.specular * r.pdf;
     }
     if (probability.diffuse > 0.0f) {
-      if (c.under_F90 > 0.0f || c.has_multiple) {
-        const GgxAlbedo albedo = closure_albedo(c.mirror, tables, c.table, wi.z);
-        e.f += c.diffuse * under_transmits(c.under_F0, c.under_F90, albedo) + c.multiple * (1.0f - albedo.total);
-      } else {
-        e.f += c.diffuse;
+      float transmits = 1.0f;
+      if (c.under_F90 > 0.0f) {
+        transmits = under_transmits(c.under_F0, c.under_F90, ggx_albedo(tables, c.ggx, wi.z));
       }
+      e.f += c.diffuse * transmits;
       e.pdf += probability.diffuse * diffuse_pdf(wi);
+    }
+    if (probability.multiple > 0.0f) {
+      e.f += c.multiple * (1.0f - ggx_albedo(tables, c.ggx, wi.z).total);
+      e.pdf += probability.multiple * warp_broad_hemisphere_pdf(wi.z);
     }
   }
   if constexpr ((kFeatures & kFeatureTransmission) != 0) {
-    if (wi.z < 0.0f && probability.thin > 0.0f && !c.mirror) {
-      const GgxReflection r = thin_wall_eval(c.wo, wi, c.alpha);
+    if (wi.z < 0.0f && probability.thin > 0.0f && !c.ggx.mirror) {
+      const GgxReflection r = thin_wall_eval(c.wo, wi, c.ggx.alpha);
       const float F = fresnel_schlick(splat3(c.under_F0), c.under_F90, r.cos_d).x;
       e.f = c.transmission_color * (c.thin_weight * (1.0f - F) * r.f);
       e.pdf = probability.thin * r.pdf;
     }
-    if (wi.z < 0.0f && probability.thin_diffuse > 0.0f) {
-      e.f += c.thin_multiple * (1.0f - closure_albedo(c.mirror, tables, c.table, -wi.z).total);
-      e.pdf += probability.thin_diffuse * warp_cosine_hemisphere_pdf(-wi.z);
+    if (wi.z < 0.0f && probability.thin_multiple > 0.0f) {
+      e.f += c.thin_multiple * (1.0f - ggx_albedo(tables, c.ggx, -wi.z).total);
+      e.pdf += probability.thin_multiple * warp_broad_hemisphere_pdf(-wi.z);
     }
     if (probability.glass > 0.0f && !c.glass.delta) {
       const BsdfEval g = glass_closure_eval<kMode>(c, tables, wi);
@@ -224,14 +228,17 @@ RELIEF_KERNEL BsdfSample closure_sample(const SurfaceClosure& c, const BsdfTable
   if (chosen(probability.diffuse)) {
     wi = diffuse_sample(u);
     as_diffuse();
+  } else if (chosen(probability.multiple)) {
+    wi = warp_broad_hemisphere(u);
+    as_diffuse();
   } else if (chosen(probability.specular)) {
-    if (c.mirror) {
+    if (c.ggx.mirror) {
       wi = {-c.wo.x, -c.wo.y, c.wo.z};
       const Vec3f F = fresnel_schlick(c.F0, c.F90, c.wo.z) * closure_below<kFeatures>(c, tables, wi);
       return delta_sample(c, wi, F, probability.specular);
     }
-    wi = ggx_reflection_sample(c.wo, c.alpha, u);
-    as_glossy(c.alpha);
+    wi = ggx_reflection_sample(c.wo, c.ggx.alpha, u);
+    as_glossy(c.ggx.alpha);
   } else {
     bool found = false;
     if constexpr ((kFeatures & kFeatureTransmission) != 0) {
@@ -243,30 +250,30 @@ RELIEF_KERNEL BsdfSample closure_sample(const SurfaceClosure& c, const BsdfTable
         if (u_choice < glass.lost) {
           u_choice /= glass.lost;
           transmits = u_choice >= glass.reflect_share;
-          wi = diffuse_sample(u);
+          wi = warp_broad_hemisphere(u);
           if (transmits) wi = -wi;
           as_diffuse();
         } else {
           u_choice = (u_choice - glass.lost) / (1.0f - glass.lost);
-          const DielectricSample d = dielectric_sample(c.wo, c.alpha, glass.eta, u_choice, u);
+          const DielectricSample d = dielectric_sample(c.wo, c.ggx.alpha, glass.eta, u_choice, u);
           transmits = d.transmitted;
           wi = d.wi;
-          as_glossy(c.alpha);
+          as_glossy(c.ggx.alpha);
         }
         if (transmits) s.eta = glass.eta;
       } else if (chosen(probability.thin)) {
         transmits = true;
-        if (c.mirror) {
+        if (c.ggx.mirror) {
           wi = -c.wo;
           const float F = fresnel_schlick(splat3(c.under_F0), c.under_F90, c.wo.z).x;
           const float scale = c.thin_weight * (1.0f - F) * closure_below<kFeatures>(c, tables, wi);
           return delta_sample(c, wi, c.transmission_color * scale, probability.thin);
         }
-        wi = thin_wall_sample(c.wo, c.alpha, u);
-        as_glossy(c.alpha);
-      } else if (chosen(probability.thin_diffuse)) {
+        wi = thin_wall_sample(c.wo, c.ggx.alpha, u);
+        as_glossy(c.ggx.alpha);
+      } else if (chosen(probability.thin_multiple)) {
         transmits = true;
-        wi = thin_wall_mirror(diffuse_sample(u));
+        wi = thin_wall_mirror(warp_broad_hemisphere(u));
         as_diffuse();
       } else {
         found = false;
@@ -277,15 +284,15 @@ RELIEF_KERNEL BsdfSample closure_sample(const SurfaceClosure& c, const BsdfTable
       if (found) {
       } else if (chosen(probability.coat)) {
         found = true;
-        if (layers.coat_alpha < kDeltaAlpha) {
+        if (layers.coat_table.mirror) {
           const Vec3f N = layers.coat_frame.n;
           wi = 2.0f * layers.coat_wo.z * N - c.wo;
           if (!(wi.z > 0.0f)) return {};
           const float F = kClearcoatF0 + (1.0f - kClearcoatF0) * schlick_weight(layers.coat_wo.z);
           return delta_sample(c, wi, splat3(layers.coat * F), probability.coat);
         }
-        wi = from_local(layers.coat_frame, clearcoat_sample(layers.coat_wo, layers.coat_alpha, u));
-        as_glossy(layers.coat_alpha);
+        wi = from_local(layers.coat_frame, clearcoat_sample(layers.coat_wo, layers.coat_table.alpha, u));
+        as_glossy(layers.coat_table.alpha);
       } else if (probability.sheen > 0.0f) {
         found = true;
         wi = sheen_sample(u);

@@ -8,12 +8,16 @@
 
 namespace relief {
 
+/// Mean losses below this are left lost: smaller ones are mostly rounding, and they are divided by.
+inline constexpr float kLeastMeanLost = 1e-5f;
+
 /// What sampling chooses among; each lobe's probability is proportional to an estimate of its largest channel's albedo.
 struct LobeProbabilities {
-  float specular = 0;      ///< GGX reflection
-  float diffuse = 0;       ///< cosine, reflected: diffuse base and multiple scattering
-  float thin = 0;          ///< GGX through a thin wall
-  float thin_diffuse = 0;  ///< cosine, transmitted: multiple scattering in a thin wall
+  float specular = 0;       ///< GGX reflection
+  float diffuse = 0;        ///< cosine
+  float multiple = 0;       ///< multiple scattering, reflected
+  float thin = 0;           ///< GGX through a thin wall
+  float thin_multiple = 0;  ///< multiple scattering, through a thin wall
   float glass = 0;
   float sheen = 0;
   float coat = 0;
@@ -32,10 +36,10 @@ struct GlassClosure {
 
 /// Coat and sheen.
 struct LayersClosure {
-  float coat = 0, coat_alpha = 0;
+  float coat = 0;
   Frame coat_frame;
   Vec3f coat_wo{};  ///< coat's frame
-  TableCoordinate coat_table;
+  GgxCoordinate coat_table;
   Vec3f sheen{};
   float sheen_max = 0, sheen_roughness = 0;
   TableCoordinate sheen_table;
@@ -47,31 +51,19 @@ struct SurfaceClosure {
   Vec3f wo{};           ///< turned so that z > 0
   float side = 1;       ///< −1 where wo was below: the z of every other direction is multiplied by it
   bool inside = false;  ///< wo is inside a solid: coat and sheen lie on the far side
-  bool mirror = false;  ///< the GGX lobes are delta lobes
   LobeProbabilities probability;
 
-  float alpha = 1;  ///< GGX, of all lobes but the coat
-  TableCoordinate table;
-  Vec3f F0{};  ///< of the GGX reflection: metal, dielectric and thin wall together, weighted
+  GgxCoordinate ggx;  ///< of all lobes but the coat
+  Vec3f F0{};         ///< of the GGX reflection: metal, dielectric and thin wall together, weighted
   float F90 = 0;
   Vec3f diffuse{};                    ///< f of the diffuse base over what the interface lets through towards wi
   float under_F0 = 0, under_F90 = 0;  ///< the interface over diffuse base and thin wall; both 0: there is none
-  bool has_multiple = false;
   Vec3f multiple{}, thin_multiple{};  ///< f of multiple scattering, reflected and transmitted, over 1 − E(wi)
   Vec3f transmission_color{};         ///< tint of all that crosses
   float thin_weight = 0;
   GlassClosure glass;
   LayersClosure layers;
 };
-
-/// Albedo of the GGX reflection; mirrors need no table.
-RELIEF_KERNEL GgxAlbedo closure_albedo(bool mirror,
-                                       const BsdfTables& tables,
-                                       TableCoordinate roughness,
-                                       float cos_theta)
-{
-  return mirror ? GgxAlbedo{1.0f, schlick_weight(cos_theta)} : ggx_albedo(tables, roughness, cos_theta);
-}
 
 /// Share of light that passes the dielectric interface to what lies below it.
 RELIEF_KERNEL float under_transmits(float F0, float F90, GgxAlbedo e)
@@ -84,7 +76,7 @@ RELIEF_KERNEL float under_transmits(float F0, float F90, GgxAlbedo e)
 RELIEF_KERNEL float coat_transmits(const LayersClosure& layers, const BsdfTables& tables, float cos_theta)
 {
   if (!(cos_theta > kMinCosine)) return 1.0f;
-  const GgxAlbedo e = closure_albedo(layers.coat_alpha < kDeltaAlpha, tables, layers.coat_table, cos_theta);
+  const GgxAlbedo e = ggx_albedo(tables, layers.coat_table, cos_theta);
   return 1.0f - layers.coat * (kClearcoatF0 * (e.total - e.grazing) + e.grazing);
 }
 
@@ -95,8 +87,7 @@ RELIEF_KERNEL float layers_closure_make(const SurfaceParams& p, const BsdfTables
   LayersClosure& layers = c.layers;
   layers.coat = p.clearcoat;
   if (p.clearcoat > 0.0f) {
-    layers.coat_alpha = sqr(p.clearcoat_roughness);
-    layers.coat_table = table_coordinate(p.clearcoat_roughness, kTableRoughnesses);
+    layers.coat_table = ggx_coordinate(p.clearcoat_roughness);
     layers.coat_frame = frame_from_normal(p.clearcoat_N);
     if (!c.inside) {
       layers.coat_wo = to_local(layers.coat_frame, c.wo);
@@ -129,14 +120,13 @@ RELIEF_KERNEL GlassClosure glass_closure_make(const SurfaceParams& p,
   GlassClosure glass;
   glass.weight = weight;
   glass.eta = c.inside ? 1.0f / p.ior : p.ior;
-  glass.delta = c.mirror || dielectric_is_matched(glass.eta);
+  glass.delta = c.ggx.mirror || dielectric_is_matched(glass.eta);
   if (glass.delta) return glass;
   glass.table = glass_coordinate(glass.eta, p.roughness);
-  glass.mean_near = 1.0f - glass_albedo_mean(tables, glass.table, glass.table.side);
-  glass.mean_far = 1.0f - glass_albedo_mean(tables, glass.table, 1 - glass.table.side);
-  // Nearly smooth glass loses less than rounding; without a mean there is nothing to divide by.
-  if (glass.mean_near > 1e-5f && glass.mean_far > 1e-5f) {
-    glass.lost = 1.0f - glass_albedo(tables, glass.table, glass.table.side, c.wo.z);
+  glass.mean_near = glass_lost_mean(tables, glass.table, glass.table.side);
+  glass.mean_far = glass_lost_mean(tables, glass.table, 1 - glass.table.side);
+  if (min(glass.mean_near, glass.mean_far) > kLeastMeanLost) {
+    glass.lost = max(0.0f, glass_lost(tables, glass.table, glass.table.side, c.wo.z));
     glass.reflect_share = dielectric_multiple_reflect_share(glass.eta, glass.mean_near, glass.mean_far);
   }
   return glass;
@@ -165,9 +155,7 @@ RELIEF_KERNEL SurfaceClosure surface_closure_make(const SurfaceParams& p, const 
   const float interface = 1.0f - metal - glass;
   c.thin_weight = transmission - glass;
   c.inside = solid && wo.z < 0.0f;
-  c.alpha = sqr(p.roughness);
-  c.mirror = c.alpha < kDeltaAlpha;
-  c.table = table_coordinate(p.roughness, kTableRoughnesses);
+  c.ggx = ggx_coordinate(p.roughness);
 
   float below = 1.0f;
   if constexpr (kLayers) {
@@ -181,8 +169,8 @@ RELIEF_KERNEL SurfaceClosure surface_closure_make(const SurfaceParams& p, const 
 
   GgxAlbedo e, mean;
   if (c.F90 > 0.0f || c.thin_weight > 0.0f) {
-    e = closure_albedo(c.mirror, tables, c.table, c.wo.z);
-    mean = c.mirror ? GgxAlbedo{1.0f, 1.0f / 21.0f} : ggx_albedo_mean(tables, c.table);
+    e = ggx_albedo(tables, c.ggx, c.wo.z);
+    mean = ggx_albedo_mean(tables, c.ggx);
     probability.specular = below * max_component(c.F0 * (e.total - e.grazing) + splat3(c.F90 * e.grazing));
   }
   if (interface > 0.0f) {
@@ -197,23 +185,23 @@ RELIEF_KERNEL SurfaceClosure surface_closure_make(const SurfaceParams& p, const 
   }
 
   const float mean_lost = 1.0f - mean.total;
-  if ((metal > 0.0f || c.thin_weight > 0.0f) && !c.mirror && mean_lost > 1e-5f) {
-    c.has_multiple = true;
-    const float lost = 1.0f - e.total;
+  // Nearly smooth surfaces lose less than rounding; without a mean there is nothing to divide by.
+  if ((metal > 0.0f || c.thin_weight > 0.0f) && mean_lost > kLeastMeanLost) {
+    const float lost = max(0.0f, 1.0f - e.total);
     if constexpr (kMetal) {
       // Kulla and Conty 2017, with the square of the mean Fresnel that Hill 2018 restored: the light meets the
       // metal at least twice.
       const Vec3f F = fresnel_schlick_mean(p.base_color, 1.0f);
       const Vec3f kept = F * F * mean.total / (splat3(1.0f) - F * mean_lost);
       c.multiple = diffuse_coupled_eval(metal * kept, lost, 1.0f, mean_lost);
-      probability.diffuse += below * lost * metal * max_component(kept);
+      probability.multiple = below * lost * metal * max_component(kept);
     }
     if constexpr (kTransmission) {
       const float F = fresnel_schlick_mean(splat3(c.under_F0), c.under_F90).x;
       c.multiple += diffuse_coupled_eval(splat3(c.thin_weight * F), lost, 1.0f, mean_lost);
       c.thin_multiple = diffuse_coupled_eval(c.thin_weight * (1.0f - F) * p.base_color, lost, 1.0f, mean_lost);
-      probability.diffuse += below * lost * c.thin_weight * F;
-      probability.thin_diffuse = below * lost * c.thin_weight * (1.0f - F) * max_component(p.base_color);
+      probability.multiple += below * lost * c.thin_weight * F;
+      probability.thin_multiple = below * lost * c.thin_weight * (1.0f - F) * max_component(p.base_color);
     }
   }
   if constexpr (kTransmission) {
@@ -228,13 +216,14 @@ RELIEF_KERNEL SurfaceClosure surface_closure_make(const SurfaceParams& p, const 
     }
   }
 
-  const float sum = probability.specular + probability.diffuse + probability.thin + probability.thin_diffuse +
-                    probability.glass + probability.sheen + probability.coat;
+  const float sum = probability.specular + probability.diffuse + probability.multiple + probability.thin +
+                    probability.thin_multiple + probability.glass + probability.sheen + probability.coat;
   const float scale = sum > 0.0f ? 1.0f / sum : 0.0f;
   probability.specular *= scale;
   probability.diffuse *= scale;
+  probability.multiple *= scale;
   probability.thin *= scale;
-  probability.thin_diffuse *= scale;
+  probability.thin_multiple *= scale;
   probability.glass *= scale;
   probability.sheen *= scale;
   probability.coat *= scale;
