@@ -1,7 +1,6 @@
 #include "integrator/light_set.h"
 
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <array>
@@ -119,31 +118,29 @@ LightBounds light_bounds(const Light& light, float scale)
   return bounds;
 }
 
-/// Conservative node of a group or light.
+/// Writes one child of a node so that it holds all of a group.
 /// @param link  without the two-sided flag
-LightTreeNode node_make(const LightBounds& bounds, std::uint32_t link)
+void child_write(LightTreeNode& node, std::size_t lane, const LightBounds& bounds, std::uint32_t link)
 {
-  LightTreeNode node;
   const Vec3f centre = bounds_centre(bounds);
-  const Vec3f half = bounds.high * 0.5f - bounds.low * 0.5f;
-  node.cx = centre.x;
-  node.cy = centre.y;
-  node.cz = centre.z;
-  // A few ulps for the roundings of centre, halves and length; a point light at the origin keeps radius 0.
-  const float radius =
-      length(half) * (1.0f + 1e-6f) + 4e-7f * max_component(abs(centre)) * (length(half) > 0 ? 1.0f : 0.0f);
-  node.radius_bits = light_tree_encode_radius(radius);
-  node.intensity = bounds.intensity;
+  const float half_diagonal = length(bounds.high * 0.5f - bounds.low * 0.5f);
+  node.cx[lane] = centre.x;
+  node.cy[lane] = centre.y;
+  node.cz[lane] = centre.z;
+  // A few ulps for the roundings of centre and diagonal; a lone point light keeps radius 0.
+  const float rounding = half_diagonal > 0.0f ? 4e-7f * max_component(abs(centre)) : 0.0f;
+  node.radius_bits[lane] = light_tree_encode_radius(half_diagonal * (1.0f + 1e-6f) + rounding);
+  node.intensity[lane] = bounds.intensity;
   const auto quantize = [](float v) {
     return static_cast<std::int16_t>(std::lround(std::clamp(v, -1.0f, 1.0f) * 32767.0f));
   };
-  node.ax = quantize(bounds.spread.axis.x);
-  node.ay = quantize(bounds.spread.axis.y);
-  node.az = quantize(bounds.spread.axis.z);
-  node.cos_spread = light_tree_encode_cos(std::cos(std::min(bounds.spread.angle, kPiAngle)));
-  node.cos_falloff = light_tree_encode_cos(std::cos(bounds.falloff));
-  node.link = link | (bounds.two_sided ? kLightTreeTwoSided : 0u);
-  return node;
+  // The rounding of the axis, 3e-5 rad, is a hundredth of what light_tree_estimate allows for.
+  node.ax[lane] = quantize(bounds.spread.axis.x);
+  node.ay[lane] = quantize(bounds.spread.axis.y);
+  node.az[lane] = quantize(bounds.spread.axis.z);
+  node.cos_spread[lane] = light_tree_encode_cos(std::cos(std::min(bounds.spread.angle, kPiAngle)));
+  node.cos_falloff[lane] = light_tree_encode_cos(std::cos(bounds.falloff));
+  node.link[lane] = link | (bounds.two_sided ? kLightTreeTwoSided : 0u);
 }
 
 /// Cost of a group by its orientation: solid angle of its emission, weighted by the cosine it falls off with.
@@ -172,11 +169,6 @@ struct BuildLight {
   std::uint32_t light_index = 0;
 };
 
-/// Where a range of lights is cut in two.
-struct Split {
-  std::size_t middle = 0;  ///< lights in the first part
-};
-
 float component(Vec3f v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
 struct RangeBounds {
@@ -195,12 +187,12 @@ RangeBounds range_bounds(std::span<const BuildLight> lights)
   return range;
 }
 
-/// Reorders a range so that its first `result` lights are one child: binned by centre on each axis, the least sum of the
-/// children's costs wins.
-/// @param depth_left  levels that may follow; the split is balanced when an unbalanced one might run out of them
-/// @pre               at least two lights, 2^depth_left >= their number
+/// Reorders a range so that its first `result` lights are one part: binned by centre on each axis, the least sum of the
+/// parts' costs wins.
+/// @param balanced  halves instead
+/// @pre             at least two lights
 /// @source Conty Estevez and Kulla 2018, Eq. 2
-std::size_t range_split(std::span<BuildLight> lights, const RangeBounds& range, int depth_left)
+std::size_t range_split(std::span<BuildLight> lights, const RangeBounds& range, bool balanced)
 {
   constexpr int kBins = 16;
   const Vec3f extent = range.centre_high - range.centre_low;
@@ -212,7 +204,7 @@ std::size_t range_split(std::span<BuildLight> lights, const RangeBounds& range, 
     const float x = (component(light.centre, axis) - component(range.centre_low, axis)) / component(extent, axis);
     return std::clamp(static_cast<int>(x * kBins), 0, kBins - 1);
   };
-  for (int axis = 0; axis < 3; ++axis) {
+  for (int axis = 0; axis < 3 && !balanced; ++axis) {
     if (!(component(extent, axis) > 0.0f)) continue;
     std::array<LightBounds, kBins> bins;
     for (const BuildLight& light : lights) {
@@ -242,11 +234,9 @@ std::size_t range_split(std::span<BuildLight> lights, const RangeBounds& range, 
     const auto middle = std::stable_partition(
         lights.begin(), lights.end(), [&](const BuildLight& light) { return bin_of(light, best_axis) < best_bin; });
     const auto first = static_cast<std::size_t>(middle - lights.begin());
-    const std::size_t larger = std::max(first, lights.size() - first);
-    const bool fits = depth_left > 40 || larger <= std::size_t{1} << (depth_left - 1);
-    if (first > 0 && first < lights.size() && fits) return first;
+    if (first > 0 && first < lights.size()) return first;
   }
-  // Coincident centres, costs that overflow, or no depth to spare: halves, by position along the longest side.
+  // Asked for, or coincident centres, or costs that overflow.
   const int axis = extent.x == longest ? 0 : extent.y == longest ? 1 : 2;
   std::stable_sort(lights.begin(), lights.end(), [axis](const BuildLight& a, const BuildLight& b) {
     return component(a.centre, axis) < component(b.centre, axis);
@@ -254,68 +244,82 @@ std::size_t range_split(std::span<BuildLight> lights, const RangeBounds& range, 
   return half;
 }
 
-/// Builds the tree below one node. A range of n lights needs 2n − 2 nodes below it, so every range knows its place in
-/// `nodes` beforehand: threads share nothing and the layout does not depend on them.
-struct TreeBuilder {
-  std::span<LightTreeNode> nodes;
-  std::span<std::uint32_t> trails;
-
-  /// @param node   where the range's own node goes
-  /// @param below  first of the 2n − 2 nodes below it
-  /// @param trail  way to the node; `shift`: its length in bits
-  void build(std::span<BuildLight> lights, std::size_t node, std::size_t below, std::uint32_t trail, int shift) const
-  {
-    if (lights.size() == 1) {
-      nodes[node] = node_make(lights[0].bounds, lights[0].light_index | kLightTreeLeaf);
-      trails[lights[0].light_index] = trail;
-      return;
-    }
-    const RangeBounds range = range_bounds(lights);
-    nodes[node] = node_make(range.bounds, static_cast<std::uint32_t>(below));
-    const std::size_t middle = range_split(lights, range, 32 - shift);
-    const auto first = [&, this] { build(lights.first(middle), below, below + 2, trail, shift + 1); };
-    const auto second = [&, this] {
-      build(lights.subspan(middle), below + 1, below + 2 * middle, trail | 1u << shift, shift + 1);
-    };
-    // Below this size a task costs more than it saves.
-    constexpr std::size_t kParallelLights = 2048;
-    if (lights.size() >= kParallelLights) {
-      tbb::parallel_invoke(first, second);
-    } else {
-      first();
-      second();
-    }
-  }
+/// A part of the lights that becomes one child of a node.
+struct Group {
+  std::span<BuildLight> lights;
+  RangeBounds range;
+  float cost = 0;
 };
 
-/// Splits the whole range into the groups of the cut: always the group with the greatest cost, until there are eight.
-std::vector<std::span<BuildLight>> cut_make(std::span<BuildLight> lights)
+/// Splits a range into up to eight groups: always the one with the greatest cost, until there are enough.
+/// @param balanced  groups of equal numbers of lights instead
+std::vector<Group> range_groups(std::span<BuildLight> lights, bool balanced)
 {
-  struct Group {
-    std::span<BuildLight> lights;
-    RangeBounds range;
-    float cost = 0;
-  };
-  const auto group_make = [](std::span<BuildLight> part) {
-    Group group{part, range_bounds(part), 0};
-    group.cost = part.size() > 1 ? group_cost(group.range.bounds) : -1.0f;
+  const auto group_make = [balanced](std::span<BuildLight> part) {
+    Group group{part, range_bounds(part), -1.0f};
+    if (part.size() > 1) group.cost = balanced ? static_cast<float>(part.size()) : group_cost(group.range.bounds);
     return group;
   };
-  std::vector<Group> groups;
-  if (!lights.empty()) groups.push_back(group_make(lights));
-  while (!groups.empty() && groups.size() < kLightTreeMaxCut) {
+  std::vector<Group> groups{group_make(lights)};
+  while (groups.size() < static_cast<std::size_t>(kLightTreeWidth)) {
     const auto worst =
         std::max_element(groups.begin(), groups.end(), [](const Group& a, const Group& b) { return a.cost < b.cost; });
     if (worst->lights.size() < 2) break;
     const Group group = *worst;
-    const std::size_t middle = range_split(group.lights, group.range, 64);
+    const std::size_t middle = range_split(group.lights, group.range, balanced);
     *worst = group_make(group.lights.first(middle));
     groups.insert(worst + 1, group_make(group.lights.subspan(middle)));
   }
-  std::vector<std::span<BuildLight>> cut;
-  for (const Group& group : groups)
-    cut.push_back(group.lights);
-  return cut;
+  return groups;
+}
+
+/// A node before it has a place: its children, and below each child of several lights another branch.
+struct Branch {
+  std::vector<Group> groups;
+  std::vector<Branch> below;  ///< one a group; empty for single lights
+};
+
+/// @param depth  of the node, root 0
+Branch branch_make(std::span<BuildLight> lights, int depth)
+{
+  // From this depth on groups are balanced: nine more levels hold 8^9 lights, so no trail is too long.
+  constexpr int kBalancedFrom = kLightTreeMaxDepth - 9;
+  // Below this size a task costs more than it saves.
+  constexpr std::size_t kParallelLights = 2048;
+  Branch branch{range_groups(lights, depth >= kBalancedFrom), {}};
+  branch.below.resize(branch.groups.size());
+  const auto descend = [&](std::size_t i) {
+    if (branch.groups[i].lights.size() > 1) branch.below[i] = branch_make(branch.groups[i].lights, depth + 1);
+  };
+  if (lights.size() >= kParallelLights) {
+    tbb::parallel_for(std::size_t{0}, branch.groups.size(), descend);
+  } else {
+    for (std::size_t i = 0; i < branch.groups.size(); ++i)
+      descend(i);
+  }
+  return branch;
+}
+
+/// Gives a branch and all below it their places, depth first, so that the layout does not depend on threads.
+/// @param trail  way to the branch
+/// @param depth  of the branch: the trail's length
+std::uint32_t branch_write(const Branch& branch, LightTrail trail, int depth, LightSet& set)
+{
+  const auto index = static_cast<std::uint32_t>(set.nodes.size());
+  set.nodes.emplace_back();
+  for (std::size_t i = 0; i < branch.groups.size(); ++i) {
+    const Group& group = branch.groups[i];
+    const LightTrail child_trail = trail | static_cast<LightTrail>(i) << (3 * depth);
+    std::uint32_t link = 0;
+    if (group.lights.size() == 1) {
+      link = group.lights[0].light_index | kLightTreeLeaf;
+      set.light_trails[group.lights[0].light_index] = child_trail;
+    } else {
+      link = branch_write(branch.below[i], child_trail, depth + 1, set);
+    }
+    child_write(set.nodes[index], i, group.range.bounds, link);
+  }
+  return index;
 }
 
 /// Mean of an emission texture over a triangle, as a scalar.
@@ -408,20 +412,9 @@ void light_set_build_tree(LightSet& set, std::span<const float> intensity_scales
     if (bounds.intensity > 0.0f) finite.push_back({bounds, bounds_centre(bounds), index});
   }
 
-  const std::vector<std::span<BuildLight>> cut = cut_make(finite);
-  set.num_cut = static_cast<std::uint32_t>(cut.size());
   set.light_trails.assign(set.lights.size(), 0u);
-  // Pairs of children start at even indices, so that each lies in one cache line.
-  std::size_t below = (cut.size() + 1) / 2 * 2;
-  std::size_t num_nodes = below;
-  for (const std::span<BuildLight>& group : cut)
-    num_nodes += 2 * group.size() - 2;
-  set.nodes.assign(num_nodes, {});
-  const TreeBuilder builder{set.nodes, set.light_trails};
-  for (std::size_t i = 0; i < cut.size(); ++i) {
-    builder.build(cut[i], i, below, static_cast<std::uint32_t>(i), 3);
-    below += 2 * cut[i].size() - 2;
-  }
+  set.nodes.clear();
+  if (!finite.empty()) branch_write(branch_make(finite, 0), 0, 0, set);
 }
 
 LightSet light_set_make(const Scene& scene, std::span<const TextureView> textures)
@@ -472,8 +465,7 @@ LightsView LightSet::view() const
   LightsView v;
   v.lights = lights.data();
   v.num_lights = static_cast<std::uint32_t>(lights.size());
-  v.nodes = nodes.data();
-  v.num_cut = num_cut;
+  v.nodes = nodes.empty() ? nullptr : nodes.data();
   v.light_trails = light_trails.data();
   v.suns = suns.data();
   v.num_suns = static_cast<std::uint32_t>(suns.size());
@@ -485,7 +477,7 @@ LightsView LightSet::view() const
 std::size_t LightSet::bytes() const
 {
   return lights.size() * sizeof(Light) + first_light_index.size() * sizeof(std::int32_t) +
-         (area_lights.size() + suns.size() + light_trails.size()) * sizeof(std::uint32_t) +
+         (area_lights.size() + suns.size()) * sizeof(std::uint32_t) + light_trails.size() * sizeof(LightTrail) +
          nodes.size() * sizeof(LightTreeNode) + environment.bytes();
 }
 

@@ -18,14 +18,13 @@ struct LightSet {
   std::vector<std::int32_t> first_light_index;  ///< one an instance: light of its triangle 0; −1: does not emit
   std::vector<std::uint32_t> area_lights;       ///< rectangles and disks: what rays can hit besides meshes
   std::vector<std::uint32_t> suns;
-  std::vector<std::uint32_t> light_trails;  ///< one a light
-  std::vector<LightTreeNode> nodes;
-  std::uint32_t num_cut = 0;
+  std::vector<LightTrail> light_trails;  ///< one a light
+  std::vector<LightTreeNode> nodes;      ///< empty: no finite light can be chosen
   EnvironmentTables environment;
   float environment_irradiance = 0;
 
   /// @return false: nothing can be sampled
-  bool any() const { return num_cut > 0 || !suns.empty() || environment_irradiance > 0; }
+  bool any() const { return !nodes.empty() || !suns.empty() || environment_irradiance > 0; }
   /// Valid while this object is neither changed nor moved.
   LightsView view() const;
   std::size_t bytes() const;
@@ -41,7 +40,7 @@ struct LightSet {
 /// @cost            about 100 bytes a light for the light and 70 for its place in the tree
 LightSet light_set_make(const Scene& scene, std::span<const TextureView> textures);
 
-/// The same from parts, without a scene: fills trails, suns, area_lights, nodes and num_cut from `lights`.
+/// The same from parts, without a scene: fills trails, suns, area_lights, and nodes from `lights`.
 /// @param intensity_scales  one a light, >= 0: mean of the texture that will multiply its emission; empty: all 1. A light
 ///                          whose emission times scale is zero is never chosen
 void light_set_build_tree(LightSet& set, std::span<const float> intensity_scales);

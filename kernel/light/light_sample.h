@@ -50,8 +50,10 @@ RELIEF_KERNEL LightSample light_point_sample(const Light& light, Vec3f P, Vec3f 
 {
   LightSample sample;
   const Vec3f to_light = P_light - P;
-  sample.distance = length(to_light);
-  if (!(sample.distance > 0.0f)) return sample;
+  const float squared = length_squared(to_light);
+  // Closer, squares lose digits to underflow.
+  if (!(squared > 1e-30f)) return sample;
+  sample.distance = __builtin_sqrtf(squared);
   sample.wi = to_light / sample.distance;
   sample.radiance = light.emission;
   sample.pdf = pdf_solid_angle >= 0.0f ? pdf_solid_angle : light_area_pdf(light, sample.wi, sample.distance);

@@ -1,6 +1,6 @@
 // Chooses a light for next-event estimation and samples it. Three groups compete: the environment, the suns, and the
 // finite lights (light_tree.h). Each is given an estimate of the irradiance it causes at the point,
-//   environment: π × mean radiance;   suns: irradiance × cosine, summed;   finite lights: sum of the cut's importances,
+//   environment: π × mean radiance;   suns: irradiance × cosine, summed;   finite lights: sum over the tree's root,
 // and is chosen with probability  ¾ · estimate / sum + ¼ / number of groups whose estimate is not zero.
 // The second term is defensive: none of the estimates knows about shadows, so no group may starve. A group that is alone
 // costs nothing: its probability is 1 and no estimate is made for the environment or a single sun.
@@ -23,10 +23,9 @@ namespace relief {
 struct LightsView {
   const Light* lights = nullptr;
   std::uint32_t num_lights = 0;
-  const LightTreeNode* nodes = nullptr;         ///< the cut, then pairs of children
-  std::uint32_t num_cut = 0;                    ///< 0: no finite light
-  const std::uint32_t* light_trails = nullptr;  ///< one a light, see light_tree_pdf
-  const std::uint32_t* suns = nullptr;          ///< indices into `lights`
+  const LightTreeNode* nodes = nullptr;      ///< light tree, root first; null: no finite light
+  const LightTrail* light_trails = nullptr;  ///< one a light
+  const std::uint32_t* suns = nullptr;       ///< indices into `lights`
   std::uint32_t num_suns = 0;
   EnvironmentView environment;
   float environment_irradiance = 0;  ///< π × mean radiance (mean of R, G, B); 0: no environment
@@ -36,7 +35,7 @@ struct LightsView {
 struct LightGroups {
   float environment = 0, suns = 0, finite = 0;  ///< probabilities; all 0: nothing can contribute
   float sun_sum = 0;                            ///< estimate summed over the suns
-  LightCut cut;
+  LightEstimates finite_root;
 };
 
 /// Mean of the three channels: the scalar by which lights are compared.
@@ -55,18 +54,18 @@ RELIEF_KERNEL LightGroups light_groups_eval(const LightsView& view, Vec3f P, Vec
   for (std::uint32_t i = 0; i < view.num_suns; ++i) {
     groups.sun_sum += light_sun_importance(view.lights[view.suns[i]], N);
   }
-  groups.cut = light_cut_eval(view.nodes, view.num_cut, P, N);
+  if (view.nodes != nullptr) groups.finite_root = light_tree_estimate(view.nodes[0], P, N);
 
-  const float sum = view.environment_irradiance + groups.sun_sum + groups.cut.sum;
-  const int num_groups =
-      (view.environment_irradiance > 0.0f ? 1 : 0) + (groups.sun_sum > 0.0f ? 1 : 0) + (groups.cut.sum > 0.0f ? 1 : 0);
+  const float sum = view.environment_irradiance + groups.sun_sum + groups.finite_root.sum;
+  const int num_groups = (view.environment_irradiance > 0.0f ? 1 : 0) + (groups.sun_sum > 0.0f ? 1 : 0) +
+                         (groups.finite_root.sum > 0.0f ? 1 : 0);
   if (num_groups == 0) return groups;
   constexpr float kDefensive = 0.25f;
   const float share = kDefensive / static_cast<float>(num_groups);
   const float scale = (1.0f - kDefensive) / sum;
   if (view.environment_irradiance > 0.0f) groups.environment = scale * view.environment_irradiance + share;
   if (groups.sun_sum > 0.0f) groups.suns = scale * groups.sun_sum + share;
-  if (groups.cut.sum > 0.0f) groups.finite = scale * groups.cut.sum + share;
+  if (groups.finite_root.sum > 0.0f) groups.finite = scale * groups.finite_root.sum + share;
   return groups;
 }
 
@@ -174,7 +173,7 @@ RELIEF_KERNEL LightSample lights_sample(const LightsView& view, Vec3f P, Vec3f N
   if (!(groups.finite > 0.0f)) return sample;
   const double in_group = (choice - p_suns) / static_cast<double>(groups.finite);
   const LightChoice chosen =
-      light_tree_sample(view.nodes, view.num_cut, groups.cut, P, N, in_group < 1.0 ? in_group : 0x1.fffffep-1);
+      light_tree_sample(view.nodes, groups.finite_root, P, N, in_group < 1.0 ? in_group : 0x1.fffffep-1);
   if (!(chosen.probability > 0.0f)) return sample;
   sample = light_sample(view.lights[chosen.light_index], P, u);
   sample.pdf *= groups.finite * chosen.probability;
@@ -196,7 +195,8 @@ RELIEF_KERNEL float lights_pdf(const LightsView& view,
                                float distance)
 {
   const LightGroups groups = light_groups_eval(view, P, N);
-  const float choice = light_tree_pdf(view.nodes, groups.cut, P, N, light_index, view.light_trails[light_index]);
+  const float choice =
+      light_tree_pdf(view.nodes, groups.finite_root, P, N, light_index, view.light_trails[light_index]);
   if (!(choice > 0.0f)) return 0.0f;
   return groups.finite * choice * light_pdf(view.lights[light_index], P, wi, distance);
 }
@@ -205,7 +205,7 @@ RELIEF_KERNEL float lights_pdf(const LightsView& view,
 RELIEF_KERNEL float lights_environment_pdf(const LightsView& view, Vec3f P, Vec3f N, Vec3f wi)
 {
   if (!(view.environment_irradiance > 0.0f)) return 0.0f;
-  const bool alone = view.num_suns == 0 && view.num_cut == 0;
+  const bool alone = view.num_suns == 0 && view.nodes == nullptr;
   const float probability = alone ? 1.0f : light_groups_eval(view, P, N).environment;
   return probability * light_environment_pdf(view.environment, N, wi);
 }

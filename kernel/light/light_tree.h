@@ -1,9 +1,11 @@
-// Choice among many lights by a tree of bounds: every node knows a sphere around its lights, a cone around their axes and
-// their summed intensity, which give an estimate of the irradiance they cause at a point; the walk goes down by these
-// estimates. Read LightTreeNode, light_importance, then light_tree_sample and its inverse light_tree_pdf.
+// Choice among many lights by a tree of bounds. A child of a node is a light or a group of lights, known by a sphere around
+// them, a cone around their axes and their summed intensity, which give an estimate of the irradiance they cause at a
+// point; the walk goes down by these estimates. Read LightTreeNode, light_tree_estimate, then light_tree_sample and its
+// inverse light_tree_pdf.
 //
-// The walk starts at a *cut* of up to eight nodes instead of the root. A scene with few lights is its own cut and has no
-// tree; in others the cut replaces three levels of estimates for very large groups, which are the least reliable.
+// Nodes have eight children, evaluated together: an estimate of a large group is poor, and where binary trees multiply
+// three poor choices this one compares eight smaller groups at once, in SIMD. Up to eight lights are a single node, so a
+// scene with few lights chooses by the lights' own estimates and walks nothing.
 //
 // Source: Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting", with the
 // angles handled by their cosines as in pbrt-v4 §12.6.3. The build is in integrator/light_set.cpp.
@@ -13,26 +15,27 @@
 
 namespace relief {
 
-/// Bounds of a light or a group of lights; two to a cache line.
-struct alignas(32) LightTreeNode {
-  float cx = 0, cy = 0, cz = 0;         ///< sphere around the lights: centre, world
-  float intensity = 0;                  ///< W/sr in the strongest direction, mean of R, G, B, summed over the lights
-  std::int16_t ax = 0, ay = 0, az = 0;  ///< cone's axis × 32767
-  std::uint16_t radius_bits = 0;        ///< upper half of the radius' float, rounded up
-  std::uint16_t cos_spread = 0;         ///< θo, half angle of the cone that holds all axes; see light_tree_encode_cos
-  std::uint16_t cos_falloff = 0;        ///< θe, how far from its own axis a light emits
-  std::uint32_t link = 0;               ///< leaf: light index; inner: index of the first of two neighbouring children
-                                        ///< in `nodes`; with the flags below
+inline constexpr int kLightTreeWidth = 8;
+
+/// Bounds of up to eight lights or groups, one a lane; 32 bytes each. Unused lanes have intensity 0.
+struct alignas(64) LightTreeNode {
+  float cx[kLightTreeWidth] = {}, cy[kLightTreeWidth] = {}, cz[kLightTreeWidth] = {};  ///< sphere's centre, world
+  float intensity[kLightTreeWidth] = {};     ///< W/sr in the strongest direction, mean of R, G, B, summed
+  std::uint32_t link[kLightTreeWidth] = {};  ///< leaf: light index; otherwise node index; with the flags below
+  std::int16_t ax[kLightTreeWidth] = {}, ay[kLightTreeWidth] = {}, az[kLightTreeWidth] = {};  ///< cone's axis × 32767
+  std::uint16_t radius_bits[kLightTreeWidth] = {};  ///< sphere's radius: upper half of the float, rounded up
+  std::uint16_t cos_spread[kLightTreeWidth] = {};   ///< θo, half angle of the cone that holds all axes
+  std::uint16_t cos_falloff[kLightTreeWidth] = {};  ///< θe, how far from its own axis a light emits
 };
-static_assert(sizeof(LightTreeNode) == 32);
+static_assert(sizeof(LightTreeNode) == 32 * kLightTreeWidth);
 
 inline constexpr std::uint32_t kLightTreeLeaf = 1u << 31;      ///< in `link`
 inline constexpr std::uint32_t kLightTreeTwoSided = 1u << 30;  ///< in `link`: emits along −axis as along +axis
 inline constexpr std::uint32_t kLightTreeIndexMask = kLightTreeTwoSided - 1;
 
-inline constexpr std::uint32_t kLightTreeMaxCut = 8;
-/// Depth below the cut that a trail (29 bits besides the cut's 3) can spell. The build never exceeds it.
-inline constexpr int kLightTreeMaxDepth = 29;
+/// A light's way down from the root: three bits a level, the first level's lowest.
+using LightTrail = std::uint64_t;
+inline constexpr int kLightTreeMaxDepth = 21;
 
 /// Cosine in 16 bits, rounded down so that the decoded angle is never the smaller one.
 RELIEF_KERNEL std::uint16_t light_tree_encode_cos(float cosine)
@@ -54,159 +57,136 @@ RELIEF_KERNEL float light_tree_decode_radius(std::uint16_t bits)
   return __builtin_bit_cast(float, static_cast<std::uint32_t>(bits) << 16);
 }
 
-/// cos and sin of max(0, a − b) for angles in [0, π] given likewise.
+/// An angle in [0, π] by its cosine and sine.
 struct CosSin {
   float cos = 1, sin = 0;
 };
+
+/// max(0, a − b).
 RELIEF_KERNEL CosSin angle_subtract_clamped(CosSin a, CosSin b)
 {
-  if (a.cos > b.cos) return {1.0f, 0.0f};
-  return {a.cos * b.cos + a.sin * b.sin, a.sin * b.cos - a.cos * b.sin};
+  const bool inside = a.cos > b.cos;
+  return {inside ? 1.0f : a.cos * b.cos + a.sin * b.sin, inside ? 0.0f : a.sin * b.cos - a.cos * b.sin};
 }
 
-/// Estimate of the irradiance a node's lights cause at a point: never 0 where one of them contributes.
+RELIEF_KERNEL CosSin angle_from_cos(float cosine) { return {cosine, __builtin_sqrtf(max(1.0f - sqr(cosine), 0.0f))}; }
+
+/// Estimates for the children of one node.
+struct LightEstimates {
+  float value[kLightTreeWidth] = {};  ///< [0, 1e30]; 0: certainly nothing
+  float sum = 0;
+};
+
+/// Estimates the irradiance that each child's lights cause at a point: never 0 where one of them contributes.
 /// @param N  unit normal: light from below its plane does not count; zero vector: light from all sides counts
-/// @return   [0, 1e30]; 0: certainly nothing
 /// @source Conty Estevez and Kulla 2018, Eq. 3; the emission falls off with the cosine of the smallest possible angle
-RELIEF_KERNEL float light_importance(const LightTreeNode& node, Vec3f P, Vec3f N)
+/// @cost   no branches in a lane, so that compilers turn the loop into SIMD
+RELIEF_KERNEL LightEstimates light_tree_estimate(const LightTreeNode& node, Vec3f P, Vec3f N)
 {
   // Cosines this far below zero are still taken as grazing, and none counts for less than the floor: rounding of angles
   // must not turn a sliver of a light into nothing, nor its probability into one that makes fireflies.
   constexpr float kSlack = 2e-3f, kFloor = 1e-2f;
+  const bool has_normal = !is_zero(N);
 
-  const Vec3f from_light = P - Vec3f{node.cx, node.cy, node.cz};
-  const float distance_squared = length_squared(from_light);
-  const float radius = light_tree_decode_radius(node.radius_bits);
-  const float radius_squared = sqr(radius);
-  // A point light's own position would divide by zero; the clamp is far below any distance with a usable answer.
-  float importance = min(node.intensity / max(max(distance_squared, radius_squared), 1e-30f), 1e30f);
-  // Inside the sphere, light may arrive from anywhere.
-  if (!(distance_squared > radius_squared)) return importance;
+  LightEstimates estimates;
+  for (int i = 0; i < kLightTreeWidth; ++i) {
+    const float x = P.x - node.cx[i], y = P.y - node.cy[i], z = P.z - node.cz[i];
+    const float distance_squared = x * x + y * y + z * z;
+    const float radius = light_tree_decode_radius(node.radius_bits[i]);
+    const float radius_squared = radius * radius;
+    // A point light's own position would divide by zero; the clamp is far below any distance with a usable answer.
+    const float estimate = min(node.intensity[i] / max(max(distance_squared, radius_squared), 1e-30f), 1e30f);
 
-  const float inverse_distance = 1.0f / __builtin_sqrtf(distance_squared);
-  const float sin_bound = radius * inverse_distance;
-  const CosSin bound{safe_sqrt(1.0f - sqr(sin_bound)), sin_bound};
+    const float inverse_distance = 1.0f / __builtin_sqrtf(max(distance_squared, 1e-30f));
+    const float sin_bound = min(radius * inverse_distance, 1.0f);
+    const CosSin bound{__builtin_sqrtf(1.0f - sin_bound * sin_bound), sin_bound};
 
-  const Vec3f axis{static_cast<float>(node.ax), static_cast<float>(node.ay), static_cast<float>(node.az)};
-  float cos_axis = dot(axis, from_light) * (inverse_distance * (1.0f / 32767.0f));
-  if ((node.link & kLightTreeTwoSided) != 0) cos_axis = __builtin_fabsf(cos_axis);
-  const float cos_spread = light_tree_decode_cos(node.cos_spread);
-  const CosSin to_axis{cos_axis, safe_sqrt(1.0f - sqr(cos_axis))};
-  const CosSin spread{cos_spread, safe_sqrt(1.0f - sqr(cos_spread))};
-  const float cos_emission = angle_subtract_clamped(angle_subtract_clamped(to_axis, spread), bound).cos;
-  if (cos_emission < light_tree_decode_cos(node.cos_falloff) - kSlack) return 0.0f;
-  importance *= max(cos_emission, kFloor);
+    const float along_axis =
+        static_cast<float>(node.ax[i]) * x + static_cast<float>(node.ay[i]) * y + static_cast<float>(node.az[i]) * z;
+    const float cos_front = along_axis * inverse_distance * (1.0f / 32767.0f);
+    const float cos_axis = (node.link[i] & kLightTreeTwoSided) != 0 ? __builtin_fabsf(cos_front) : cos_front;
+    const CosSin spread = angle_from_cos(light_tree_decode_cos(node.cos_spread[i]));
+    const float cos_emission =
+        angle_subtract_clamped(angle_subtract_clamped(angle_from_cos(cos_axis), spread), bound).cos;
+    const float emission =
+        cos_emission < light_tree_decode_cos(node.cos_falloff[i]) - kSlack ? 0.0f : max(cos_emission, kFloor);
 
-  if (!is_zero(N)) {
-    const float cos_normal = -dot(N, from_light) * inverse_distance;
-    const CosSin to_normal{cos_normal, safe_sqrt(1.0f - sqr(cos_normal))};
-    const float cos_received = angle_subtract_clamped(to_normal, bound).cos;
-    if (cos_received < -kSlack) return 0.0f;
-    importance *= max(cos_received, kFloor);
+    const float cos_normal = -(N.x * x + N.y * y + N.z * z) * inverse_distance;
+    const float cos_received = angle_subtract_clamped(angle_from_cos(cos_normal), bound).cos;
+    const float received = cos_received < -kSlack ? 0.0f : max(cos_received, kFloor);
+
+    // Inside the sphere, light may arrive from anywhere.
+    const float factor = emission * (has_normal ? received : 1.0f);
+    estimates.value[i] = estimate * (distance_squared > radius_squared ? factor : 1.0f);
   }
-  return importance;
-}
-
-/// Estimates for the nodes of the cut.
-struct LightCut {
-  float importance[kLightTreeMaxCut] = {};
-  float sum = 0;
-};
-
-/// @param nodes    the cut is nodes[0 … num_cut)
-/// @param num_cut  up to kLightTreeMaxCut
-RELIEF_KERNEL LightCut light_cut_eval(const LightTreeNode* nodes, std::uint32_t num_cut, Vec3f P, Vec3f N)
-{
-  LightCut cut;
-  for (std::uint32_t i = 0; i < num_cut; ++i) {
-    cut.importance[i] = light_importance(nodes[i], P, N);
-    cut.sum += cut.importance[i];
+  for (int i = 0; i < kLightTreeWidth; ++i) {
+    estimates.sum += estimates.value[i];
   }
-  return cut;
+  return estimates;
 }
 
 struct LightChoice {
   std::uint32_t light_index = 0;
-  float probability = 0;  ///< 0: none
+  float probability = 0;  ///< 0: none; the walk can end in a group none of whose members turns out to contribute
 };
 
 /// Chooses one of the finite lights.
-/// @param cut  from light_cut_eval at the same point
-/// @param u    [0, 1), double: each level uses up some of its bits
-/// @cost       one cache line and two estimates a level
+/// @param root  estimates of nodes[0] at the same point
+/// @param u     [0, 1), double: each level uses up some of its bits
+/// @cost        a node of four cache lines and eight estimates a level
 RELIEF_KERNEL LightChoice
-light_tree_sample(const LightTreeNode* nodes, std::uint32_t num_cut, const LightCut& cut, Vec3f P, Vec3f N, double u)
+light_tree_sample(const LightTreeNode* nodes, const LightEstimates& root, Vec3f P, Vec3f N, double u)
 {
-  if (!(cut.sum > 0.0f)) return {};
-  double target = u * static_cast<double>(cut.sum);
-  // The last node with any importance takes what rounding leaves over.
-  std::uint32_t chosen = 0;
-  double before = 0, chosen_before = 0;
-  for (std::uint32_t i = 0; i < num_cut; ++i) {
-    if (cut.importance[i] > 0.0f && target >= before) {
-      chosen = i;
-      chosen_before = before;
+  LightEstimates estimates = root;
+  const LightTreeNode* node = nodes;
+  float probability = 1.0f;
+  while (estimates.sum > 0.0f) {
+    // The last child with an estimate takes what rounding leaves over.
+    const double target = u * static_cast<double>(estimates.sum);
+    int chosen = 0;
+    double before = 0, chosen_before = 0;
+    for (int i = 0; i < kLightTreeWidth; ++i) {
+      const bool take = estimates.value[i] > 0.0f && target >= before;
+      chosen = take ? i : chosen;
+      chosen_before = take ? before : chosen_before;
+      before += static_cast<double>(estimates.value[i]);
     }
-    before += static_cast<double>(cut.importance[i]);
+    u = (target - chosen_before) / static_cast<double>(estimates.value[chosen]);
+    probability *= estimates.value[chosen] / estimates.sum;
+    const std::uint32_t link = node->link[chosen];
+    if ((link & kLightTreeLeaf) != 0) return {link & kLightTreeIndexMask, probability};
+    node = nodes + (link & kLightTreeIndexMask);
+    estimates = light_tree_estimate(*node, P, N);
   }
-  const double weight = static_cast<double>(cut.importance[chosen]);
-  u = (target - chosen_before) / weight;
-  float probability = cut.importance[chosen] / cut.sum;
-
-  LightTreeNode node = nodes[chosen];
-  while ((node.link & kLightTreeLeaf) == 0) {
-    const LightTreeNode* children = nodes + (node.link & kLightTreeIndexMask);
-    const float first = light_importance(children[0], P, N);
-    const float second = light_importance(children[1], P, N);
-    if (!(first + second > 0.0f)) return {};
-    const float p_first = first / (first + second);
-    const double p = static_cast<double>(p_first);
-    if (u < p) {
-      u = u / p;
-      probability *= p_first;
-      node = children[0];
-    } else {
-      const float p_second = 1.0f - p_first;
-      // u can reach 1 by rounding above; then the second child may have no probability at all.
-      if (!(p_second > 0.0f)) {
-        node = children[0];
-        continue;
-      }
-      u = (u - p) / static_cast<double>(p_second);
-      probability *= p_second;
-      node = children[1];
-    }
-  }
-  return {node.link & kLightTreeIndexMask, probability};
+  return {};
 }
 
 /// Probability with which light_tree_sample chooses a light.
-/// @param trail  the light's way down: its cut node in the low 3 bits, then one bit a level (1: second child)
+/// @param root   estimates of nodes[0] at the same point
+/// @param trail  the light's
 /// @return       0 for lights that are not in the tree
 RELIEF_KERNEL float light_tree_pdf(const LightTreeNode* nodes,
-                                   const LightCut& cut,
+                                   const LightEstimates& root,
                                    Vec3f P,
                                    Vec3f N,
                                    std::uint32_t light_index,
-                                   std::uint32_t trail)
+                                   LightTrail trail)
 {
-  if (!(cut.sum > 0.0f)) return 0.0f;
-  const std::uint32_t start = trail % kLightTreeMaxCut;
-  trail /= kLightTreeMaxCut;
-  float probability = cut.importance[start] / cut.sum;
-  LightTreeNode node = nodes[start];
-  while ((node.link & kLightTreeLeaf) == 0 && probability > 0.0f) {
-    const LightTreeNode* children = nodes + (node.link & kLightTreeIndexMask);
-    const float first = light_importance(children[0], P, N);
-    const float second = light_importance(children[1], P, N);
-    if (!(first + second > 0.0f)) return 0.0f;
-    const float p_first = first / (first + second);
-    probability *= (trail & 1u) == 0 ? p_first : 1.0f - p_first;
-    node = children[trail & 1u];
-    trail >>= 1;
+  LightEstimates estimates = root;
+  const LightTreeNode* node = nodes;
+  float probability = 1.0f;
+  while (estimates.sum > 0.0f) {
+    const int child = static_cast<int>(trail % kLightTreeWidth);
+    trail /= kLightTreeWidth;
+    probability *= estimates.value[child] / estimates.sum;
+    if (!(probability > 0.0f)) return 0.0f;
+    const std::uint32_t link = node->link[child];
+    // Lights of zero intensity have no leaf; whatever trail they carry ends at another light.
+    if ((link & kLightTreeLeaf) != 0) return (link & kLightTreeIndexMask) == light_index ? probability : 0.0f;
+    node = nodes + (link & kLightTreeIndexMask);
+    estimates = light_tree_estimate(*node, P, N);
   }
-  // Lights of zero intensity have no leaf; whatever trail they carry ends at another light.
-  return (node.link & kLightTreeIndexMask) == light_index ? probability : 0.0f;
+  return 0.0f;
 }
 
 }  // namespace relief

@@ -1,5 +1,4 @@
-// One triangle of an emissive mesh: sampled uniformly in the solid angle it covers; tiny ones by area, and those that
-// surround the point, where the spherical triangle's angles are ill-conditioned.
+// One triangle of an emissive mesh: sampled uniformly in the solid angle it covers, tiny ones by area.
 // Source: Arvo 1995, "Stratified Sampling of Spherical Triangles".
 #pragma once
 
@@ -7,10 +6,9 @@
 
 namespace relief {
 
-/// Range of solid angles (sr) sampled as spherical triangles. Below, unit vectors to the vertices differ by less than 1e-2
-/// and their differences keep too few digits; sampling by area is then as good. Above, the point lies almost in the
-/// triangle and opposite arcs nearly close to great circles.
-inline constexpr float kTriangleMinSolidAngle = 1e-4f, kTriangleMaxSolidAngle = 6.2f;
+/// Below this solid angle (sr), unit vectors to the vertices differ by less than 1e-2 and their differences keep too few
+/// digits; sampling by area is then as good.
+inline constexpr float kTriangleMinSolidAngle = 1e-4f;
 
 /// @return steradians; 0: sample by area
 RELIEF_KERNEL float triangle_light_solid_angle(const Light& light, Vec3f P)
@@ -18,7 +16,7 @@ RELIEF_KERNEL float triangle_light_solid_angle(const Light& light, Vec3f P)
   const Vec3f a = light.P - P;
   const float det = 2.0f * light.area * dot(a, light.axis);
   const float omega = triangle_solid_angle(a, a + light.edge_u, a + light.edge_v, det);
-  return omega >= kTriangleMinSolidAngle && omega <= kTriangleMaxSolidAngle ? omega : 0.0f;
+  return omega >= kTriangleMinSolidAngle ? omega : 0.0f;
 }
 
 /// Direction uniform in the solid angle of a triangle.

@@ -13,7 +13,8 @@ RELIEF_KERNEL LightSample point_light_sample(const Light& light, Vec3f P)
   const float squared = length_squared(to_light);
   sample.delta = true;
   sample.radiance = light.emission / squared;
-  if (!(squared > 0.0f) || !is_finite(sample.radiance)) return {};
+  // Closer, squares lose digits to underflow.
+  if (!(squared > 1e-30f) || !is_finite(sample.radiance)) return {};
   sample.distance = __builtin_sqrtf(squared);
   sample.wi = to_light / sample.distance;
   sample.pdf = 1.0f;

@@ -1,0 +1,423 @@
+// The choice among lights: probabilities, densities and the estimator as a whole.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <ctime>
+#include <vector>
+
+#include "integrator/light_set.h"
+
+namespace relief {
+namespace {
+
+struct Random {
+  std::uint64_t state;
+  double next()
+  {
+    state = hash_mix(state + 0x9e3779b97f4a7c15u);
+    return static_cast<double>(state >> 11) * 0x1p-53;
+  }
+  float unit() { return std::min(static_cast<float>(next()), 0x1.fffffep-1f); }
+  float between(double a, double b) { return static_cast<float>(a + (b - a) * next()); }
+  Vec3f in_cube(double half) { return {between(-half, half), between(-half, half), between(-half, half)}; }
+  Vec3f direction()
+  {
+    const double z = 2 * next() - 1, phi = 2 * std::numbers::pi * next(), r = std::sqrt(1 - z * z);
+    return {static_cast<float>(r * std::cos(phi)), static_cast<float>(r * std::sin(phi)), static_cast<float>(z)};
+  }
+};
+
+Light random_light(Random& random, double spread, double size)
+{
+  const LightKind kinds[] = {LightKind::kPoint, LightKind::kSpot, LightKind::kRectangle, LightKind::kDisk,
+                             LightKind::kTriangle};
+  Light light;
+  light.kind = kinds[static_cast<int>(random.next() * 5)];
+  light.P = random.in_cube(spread);
+  light.axis = random.direction();
+  light.emission = splat3(std::exp(random.between(-3, 3)));
+  light.two_sided = random.next() < 0.3;
+  light.cos_outer = random.between(-0.2, 0.99);
+  light.cos_inner = std::min(0.999f, light.cos_outer + random.between(0, 0.5));
+  if (light.kind != LightKind::kPoint && light.kind != LightKind::kSpot) {
+    light.edge_u = random.direction() * static_cast<float>(size) * random.between(0.1, 1);
+    light.edge_v = cross(random.direction(), light.edge_u);
+    const Vec3f n = cross(light.edge_u, light.edge_v);
+    light.axis = normalize(n);
+    light.area = length(n) * (light.kind == LightKind::kRectangle ? 4.0f : light.kind == LightKind::kDisk ? kPi : 0.5f);
+    if (!(light.area > 0.0f)) light.axis = {0, 0, 1};
+  }
+  return light;
+}
+
+LightSet random_set(Random& random, int num_lights, double spread, double size)
+{
+  LightSet set;
+  for (int i = 0; i < num_lights; ++i)
+    set.lights.push_back(random_light(random, spread, size));
+  light_set_build_tree(set, {});
+  return set;
+}
+
+float tree_probability(const LightsView& view, Vec3f P, Vec3f N, std::uint32_t light)
+{
+  return light_tree_pdf(view.nodes, light_tree_estimate(view.nodes[0], P, N), P, N, light, view.light_trails[light]);
+}
+
+Vec3f random_normal(Random& random) { return random.next() < 0.25 ? Vec3f{} : random.direction(); }
+
+TEST(LightTree, ProbabilitiesSumToOne)
+{
+  Random random{1};
+  for (const int num_lights : {1, 2, 5, 8, 9, 33, 700}) {
+    const LightSet set = random_set(random, num_lights, 10, 1);
+    const LightsView view = set.view();
+    for (int k = 0; k < 50; ++k) {
+      const Vec3f P = random.in_cube(k % 2 == 0 ? 10 : 100), N = random_normal(random);
+      double sum = 0;
+      for (std::uint32_t i = 0; i < view.num_lights; ++i)
+        sum += static_cast<double>(tree_probability(view, P, N, i));
+      // A walk ends without a light where a group's bound may contribute but none of its members does; the lights here
+      // face at random and differ in power by a factor of e^6, which is the worst for groups.
+      EXPECT_LT(sum, 1 + 1e-4);
+      if (is_zero(N) && num_lights > 8) {
+        EXPECT_GT(sum, 0.1);
+      }
+      if (num_lights <= 8 && sum > 0) {
+        EXPECT_NEAR(sum, 1, 1e-5);
+      }
+    }
+  }
+}
+
+TEST(LightTree, ChoosesWithTheProbabilityItStates)
+{
+  Random random{2};
+  for (const int num_lights : {1, 2, 8, 9, 40, 3000}) {
+    const LightSet set = random_set(random, num_lights, 10, 1);
+    const LightsView view = set.view();
+    for (int k = 0; k < 20; ++k) {
+      const Vec3f P = random.in_cube(12), N = random_normal(random);
+      const LightEstimates root = light_tree_estimate(view.nodes[0], P, N);
+      for (int i = 0; i < 200; ++i) {
+        const LightChoice choice = light_tree_sample(view.nodes, root, P, N, random.next());
+        if (choice.probability == 0) continue;
+        ASSERT_EQ(tree_probability(view, P, N, choice.light_index), choice.probability);
+      }
+    }
+  }
+}
+
+TEST(LightTree, FrequenciesAreTheProbabilities)
+{
+  // χ² over 40 lights with 10^6 choices on a regular lattice in u: counts differ from their share by rounding alone, so the
+  // bound is a count, not a significance.
+  Random random{3};
+  const LightSet set = random_set(random, 40, 10, 1);
+  const LightsView view = set.view();
+  const Vec3f P{1, 2, 3}, N{};
+  const LightEstimates root = light_tree_estimate(view.nodes[0], P, N);
+  const int n = 1000000;
+  std::vector<int> counts(40, 0);
+  for (int i = 0; i < n; ++i) {
+    const LightChoice choice = light_tree_sample(view.nodes, root, P, N, (i + 0.5) / n);
+    if (choice.probability > 0) ++counts[choice.light_index];
+  }
+  for (std::uint32_t i = 0; i < 40; ++i) {
+    EXPECT_NEAR(counts[i], n * static_cast<double>(tree_probability(view, P, N, i)), 3) << i;
+  }
+}
+
+TEST(LightTree, NeverLeavesOutALightThatContributes)
+{
+  Random random{4};
+  int contributing = 0;
+  for (int k = 0; k < 3000; ++k) {
+    const double size = std::pow(10.0, random.between(-3, 1.5)), far = std::pow(10.0, random.between(0, 4));
+    const LightSet set = random_set(random, 1 + static_cast<int>(random.next() * 30), 5, size);
+    const LightsView view = set.view();
+    for (int j = 0; j < 10; ++j) {
+      Vec3f P = random.in_cube(j % 2 == 0 ? 6 : far);
+      Vec3f N = random_normal(random);
+      const auto index = static_cast<std::uint32_t>(random.next() * view.num_lights);
+      const Light& light = view.lights[index];
+      // Half of the points see the light or are seen by it at a grazing angle, or lie close to it.
+      if (j % 4 == 1) P = light.P + cross(light.axis, random.direction()) * 3.0f + light.axis * random.between(0, 1e-3);
+      if (j % 4 == 2) N = normalize(cross(light.P - P, random.direction()) + random.direction() * 1e-4f);
+      if (j % 4 == 3) P = light.P + random.direction() * static_cast<float>(size) * random.between(1e-4, 1);
+      for (int i = 0; i < 4; ++i) {
+        const LightSample sample = light_sample(light, P, {random.unit(), random.unit()});
+        const bool lit = sample.pdf > 0.0f && !is_zero(sample.radiance) && (is_zero(N) || dot(N, sample.wi) > 0.0f);
+        if (!lit) continue;
+        ++contributing;
+        ASSERT_GT(tree_probability(view, P, N, index), 0.0f) << "set " << k << " point " << j;
+      }
+    }
+  }
+  EXPECT_GT(contributing, 20000);
+}
+
+TEST(LightSampler, DensityOfAHitEqualsTheSamples)
+{
+  Random random{5};
+  int compared = 0;
+  for (int k = 0; k < 60; ++k) {
+    LightSet set = random_set(random, 1 + k, 10, 1);
+    set.lights.push_back({});
+    set.lights.back().kind = LightKind::kSun;
+    set.lights.back().emission = {0.1f, 0.1f, 0.1f};
+    light_set_build_tree(set, {});
+    set.environment.environment.color = {0.01f, 0.02f, 0.03f};
+    set.environment_irradiance = k % 2 == 0 ? 0.06f : 0.0f;
+    const LightsView view = set.view();
+    for (int i = 0; i < 400; ++i) {
+      const Vec3f P = random.in_cube(12), N = random_normal(random);
+      const LightSample sample = lights_sample(view, P, N, random.unit(), {random.unit(), random.unit()});
+      if (sample.pdf == 0.0f || sample.delta) continue;
+      ++compared;
+      const float pdf = sample.light_index < 0 ? lights_environment_pdf(view, P, N, sample.wi)
+                                               : lights_pdf(view, P, N, static_cast<std::uint32_t>(sample.light_index),
+                                                            sample.wi, sample.distance);
+      ASSERT_NEAR(pdf / sample.pdf, 1.0f, 1e-4f) << k << " light " << sample.light_index;
+    }
+  }
+  EXPECT_GT(compared, 10000);
+}
+
+/// Irradiance at P, summed over the lights: each by its own sampling with many points.
+double irradiance(const LightsView& view, Vec3f P, Vec3f N, std::uint32_t samples)
+{
+  double sum = 0;
+  for (std::uint32_t i = 0; i < view.num_lights; ++i) {
+    for (std::uint32_t k = 0; k < samples; ++k) {
+      const LightSample sample = light_sample(view.lights[i], P, sample_2d(i, 2 * k, 0));
+      if (sample.pdf > 0.0f) {
+        sum += static_cast<double>(light_scalar(sample.radiance) * max(0.0f, dot(N, sample.wi)) / sample.pdf) / samples;
+      }
+    }
+  }
+  return sum;
+}
+
+struct Moments {
+  double mean = 0, variance = 0;
+};
+
+/// Moments of one sample of lights_sample as an estimate of irradiance.
+Moments sampler_moments(const LightsView& view, Vec3f P, Vec3f N, int samples)
+{
+  double sum = 0, squares = 0;
+  for (int k = 0; k < samples; ++k) {
+    const std::uint32_t hash = sample_pixel_hash(11, k, 0);
+    const LightSample sample = lights_sample(view, P, N, sample_1d(hash, 0, 1), sample_2d(hash, 0, 2));
+    if (!(sample.pdf > 0.0f)) continue;
+    const double value = static_cast<double>(light_scalar(sample.radiance) * max(0.0f, dot(N, sample.wi)) / sample.pdf);
+    sum += value / samples;
+    squares += value * value / samples;
+  }
+  return {sum, std::max(squares - sum * sum, 0.0)};
+}
+
+TEST(LightSampler, MeanIsTheIrradianceOfAllLights)
+{
+  // 100000 independent samples a point, |z| < 5 (two-sided significance 6e-7); points keep off the lights so that the
+  // variance is finite in practice.
+  Random random{6};
+  for (const int num_lights : {1, 3, 8, 30, 400}) {
+    LightSet set = random_set(random, num_lights, 3, 0.5);
+    Light sun;
+    sun.kind = LightKind::kSun;
+    sun.axis = normalize(Vec3f{1, -2, 3});
+    sun.emission = {0.3f, 0.2f, 0.1f};
+    set.lights.push_back(sun);
+    sun.axis = normalize(Vec3f{-1, -2, 1});
+    sun.emission = {0.1f, 0.2f, 0.3f};
+    set.lights.push_back(sun);
+    light_set_build_tree(set, {});
+    set.environment.environment.color = {0.2f, 0.2f, 0.2f};
+    set.environment_irradiance = kPi * 0.2f;
+    const LightsView view = set.view();
+    for (int k = 0; k < 6; ++k) {
+      const Vec3f P = random.direction() * 7.0f, N = random.direction();
+      // Over the hemisphere a constant environment gives π times its radiance.
+      const double truth = irradiance(view, P, N, 4096) + 0.2 * std::numbers::pi;
+      const int n = 100000;
+      const Moments found = sampler_moments(view, P, N, n);
+      EXPECT_LT(std::abs(found.mean - truth), 5 * std::sqrt(found.variance / n) + 1e-4 * truth)
+          << num_lights << " lights, truth " << truth << " mean " << found.mean;
+    }
+  }
+}
+
+TEST(LightSampler, TreeHasFarLessVarianceThanUniformOrPowerAloneAmongAThousandLights)
+{
+  // Small disks in a flat hall, all facing down, seen from its floor: what light choice is for.
+  Random random{7};
+  LightSet set;
+  for (int i = 0; i < 1000; ++i) {
+    Light light;
+    light.kind = LightKind::kDisk;
+    light.P = {random.between(-50, 50), random.between(2, 4), random.between(-50, 50)};
+    light.axis = {0, -1, 0};
+    light.edge_u = {0.1f, 0, 0};
+    light.edge_v = {0, 0, 0.1f};
+    light.area = kPi * 0.01f;
+    light.emission = splat3(random.between(1, 100));
+    set.lights.push_back(light);
+  }
+  light_set_build_tree(set, {});
+  const LightsView view = set.view();
+  double power = 0, tree_relative = 0, power_relative = 0, uniform_relative = 0;
+  for (const Light& light : set.lights)
+    power += static_cast<double>(light.emission.x);
+  const int points = 40;
+  for (int k = 0; k < points; ++k) {
+    const Vec3f P{random.between(-50, 50), 0, random.between(-50, 50)}, N{0, 1, 0};
+    // Contribution of each light, nearly constant over its own samples.
+    double truth = 0, by_power = 0, by_uniform = 0;
+    for (const Light& light : set.lights) {
+      const LightSample sample = light_sample(light, P, {0.5f, 0.5f});
+      const double value = static_cast<double>(sample.radiance.x * max(0.0f, dot(N, sample.wi)) / sample.pdf);
+      truth += value;
+      by_uniform += value * value * 1000;
+      by_power += value * value * power / static_cast<double>(light.emission.x);
+    }
+    const Moments tree = sampler_moments(view, P, N, 20000);
+    tree_relative += tree.variance / (truth * truth) / points;
+    power_relative += (by_power / (truth * truth) - 1) / points;
+    uniform_relative += (by_uniform / (truth * truth) - 1) / points;
+  }
+  std::printf("relative variance of one sample: tree %.3f, power %.1f, uniform %.1f\n", tree_relative, power_relative,
+              uniform_relative);
+  EXPECT_LT(10 * tree_relative, power_relative);
+  EXPECT_LT(10 * tree_relative, uniform_relative);
+}
+
+TEST(LightSampler, NothingToSampleGivesNoSample)
+{
+  LightSet set;
+  light_set_build_tree(set, {});
+  EXPECT_FALSE(set.any());
+  EXPECT_EQ(lights_sample(set.view(), {}, {}, 0.5f, {}).pdf, 0.0f);
+  EXPECT_EQ(lights_environment_pdf(set.view(), {}, {}, {0, 0, 1}), 0.0f);
+}
+
+TEST(LightSampler, OneLightIsAlwaysChosen)
+{
+  LightSet set;
+  Random random{8};
+  set.lights.push_back(random_light(random, 1, 1));
+  set.lights[0].kind = LightKind::kPoint;
+  light_set_build_tree(set, {});
+  const LightSample sample = lights_sample(set.view(), {5, 5, 5}, {}, 0x1.fffffep-1f, {});
+  EXPECT_EQ(sample.pdf, 1.0f);
+  EXPECT_EQ(sample.light_index, 0);
+}
+
+TEST(LightSampler, LightsWithoutIntensityAreNeverChosenButKeepTheirPlace)
+{
+  Random random{9};
+  LightSet set = random_set(random, 20, 5, 1);
+  for (Light& light : set.lights)
+    light.kind = LightKind::kPoint;
+  std::vector<float> scales(20, 1.0f);
+  scales[0] = scales[7] = scales[19] = 0.0f;
+  light_set_build_tree(set, scales);
+  const LightsView view = set.view();
+  for (const std::uint32_t dark : {0u, 7u, 19u})
+    EXPECT_EQ(tree_probability(view, {9, 9, 9}, {}, dark), 0.0f);
+  EXPECT_GT(tree_probability(view, {9, 9, 9}, {}, 1), 0.0f);
+}
+
+TEST(LightSampler, CoincidentAndDegenerateLightsBuildAWorkingTree)
+{
+  Random random{10};
+  LightSet set;
+  for (int i = 0; i < 5000; ++i) {
+    Light light;
+    light.P = {1, 2, 3};
+    light.emission = {1, 1, 1};
+    if (i % 3 == 0) {
+      light.kind = LightKind::kTriangle;  // of no area
+      light.edge_u = {1, 0, 0};
+      light.edge_v = {2, 0, 0};
+    }
+    set.lights.push_back(light);
+  }
+  // Sizes and places over the whole range of floats.
+  for (const float scale : {1e-30f, 1e-10f, 1e10f, 1e18f}) {
+    Light light;
+    light.kind = LightKind::kDisk;
+    light.P = {scale, scale, scale};
+    light.edge_u = {scale, 0, 0};
+    light.edge_v = {0, scale, 0};
+    light.axis = {0, 0, 1};
+    light.area = kPi * scale * scale;
+    light.emission = {1, 1, 1};
+    set.lights.push_back(light);
+  }
+  light_set_build_tree(set, {});
+  const LightsView view = set.view();
+  for (const Vec3f P : {Vec3f{1, 2, 3}, Vec3f{0, 0, 0}, Vec3f{1e18f, 0, 0}, Vec3f{3, 3, 3}}) {
+    for (int i = 0; i < 1000; ++i) {
+      const LightSample sample =
+          lights_sample(view, P, random_normal(random), random.unit(), {random.unit(), random.unit()});
+      ASSERT_TRUE(is_finite(sample.pdf) && sample.pdf >= 0.0f);
+      if (sample.pdf == 0.0f) continue;
+      ASSERT_TRUE(is_finite(sample.radiance) && is_finite(sample.wi));
+    }
+  }
+  EXPECT_NEAR(tree_probability(view, {2, 2, 3}, {}, 1), tree_probability(view, {2, 2, 3}, {}, 2), 1e-3f);
+}
+
+TEST(LightSampler, AHundredThousandLights)
+{
+  Random random{11};
+  LightSet set;
+  for (int i = 0; i < 100000; ++i)
+    set.lights.push_back(random_light(random, 100, 0.1));
+  // Processor time, so that a busy machine does not fail the test.
+  const std::clock_t begin = std::clock();
+  light_set_build_tree(set, {});
+  const double build_seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+  const LightsView view = set.view();
+  const std::clock_t start = std::clock();
+  double sum = 0;
+  const int n = 200000;
+  for (int i = 0; i < n; ++i) {
+    const Vec3f P{static_cast<float>(i % 100), 3, 4};
+    sum += static_cast<double>(
+        lights_sample(view, P, {0, 1, 0}, sample_1d(1, static_cast<std::uint32_t>(i), 0), {0.3f, 0.4f}).pdf);
+  }
+  const double sample_seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC / n;
+  std::printf("build %.3f s, %.0f bytes a light, %.0f ns a sample (%g)\n", build_seconds,
+              static_cast<double>(set.bytes()) / 1e5, sample_seconds * 1e9, sum);
+  double total = 0;
+  for (std::uint32_t i = 0; i < view.num_lights; ++i)
+    total += static_cast<double>(tree_probability(view, {1, 2, 3}, {}, i));
+  // The rest: walks that end in a group whose members turn out to face away.
+  EXPECT_GT(total, 0.7);
+  EXPECT_LT(total, 1 + 1e-4);
+  EXPECT_LT(build_seconds, 5.0);
+}
+
+TEST(LightTree, SameTreeWhateverTheThreads)
+{
+  // Threads finish in another order every time; three more builds of a tree large enough to be split among them must agree.
+  Random random{12};
+  LightSet first = random_set(random, 20000, 10, 1);
+  for (int k = 0; k < 3; ++k) {
+    LightSet again;
+    again.lights = first.lights;
+    light_set_build_tree(again, {});
+    ASSERT_EQ(again.light_trails, first.light_trails);
+    ASSERT_EQ(again.nodes.size(), first.nodes.size());
+    for (std::size_t i = 0; i < first.nodes.size(); ++i) {
+      ASSERT_EQ(std::memcmp(&again.nodes[i], &first.nodes[i], sizeof(LightTreeNode)), 0);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace relief
