@@ -93,7 +93,8 @@ void texel_write(unsigned char* texel, TexelValue value, const SrgbEncoder& enco
     } else if (kFormat == TexelFormat::kU8Srgb && !is_alpha) {
       texel[c] = encoder.encode(v);
     } else {
-      texel[c] = static_cast<unsigned char>(v + 0.5f);
+      // To even: means of four codes end in .5 a quarter of the time, and always rounding up would brighten each level.
+      texel[c] = static_cast<unsigned char>(std::lrint(v));
     }
   }
 }
