@@ -1,15 +1,11 @@
 #include "exporters/exr.h"
 
-#include <ImfArray.h>
 #include <ImfChannelList.h>
 #include <ImfChromaticities.h>
-#include <ImfDoubleAttribute.h>
-#include <ImfFloatAttribute.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfIO.h>
 #include <ImfInputPart.h>
-#include <ImfIntAttribute.h>
 #include <ImfMultiPartInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfPartType.h>
@@ -202,21 +198,15 @@ std::string number_text(double value)
   return text;
 }
 
-/// The attributes that are text or plain numbers, as text.
+/// The attributes that are text, except those by which OpenEXR itself describes a part.
 Attributes attributes_of(const Imf::Header& header)
 {
   Attributes attributes;
   for (auto entry = header.begin(); entry != header.end(); ++entry) {
-    const Imf::Attribute& attribute = entry.attribute();
-    if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&attribute)) {
-      attributes[entry.name()] = text->value();
-    } else if (const auto* integer = dynamic_cast<const Imf::IntAttribute*>(&attribute)) {
-      attributes[entry.name()] = std::to_string(integer->value());
-    } else if (const auto* single_float = dynamic_cast<const Imf::FloatAttribute*>(&attribute)) {
-      attributes[entry.name()] = number_text(double{single_float->value()});
-    } else if (const auto* double_float = dynamic_cast<const Imf::DoubleAttribute*>(&attribute)) {
-      attributes[entry.name()] = number_text(double_float->value());
-    }
+    const std::string name = entry.name();
+    if (name == "name" || name == "type" || name == "view") continue;
+    const auto* text = dynamic_cast<const Imf::StringAttribute*>(&entry.attribute());
+    if (text != nullptr) attributes[name] = text->value();
   }
   return attributes;
 }

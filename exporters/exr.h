@@ -50,7 +50,7 @@ void exr_write(const std::filesystem::path& path,
                const Picture& picture,
                ExrCompression compression = ExrCompression::kZip);
 
-/// Reads the first part of any flat OpenEXR file, scanline or tiled.
+/// Reads the first part of any flat OpenEXR file, scanline or tiled, with the attributes that are text.
 /// @error InputError for anything else: unreadable, truncated, corrupt, deep, subsampled, or absurdly large
 /// @cost  4 bytes a value; memory grows with what was really read, whatever the header claims
 Picture exr_load(const std::filesystem::path& path);

@@ -185,18 +185,22 @@ void Merger::check_seeds(const Picture& picture)
 
 void Merger::drop_missing_layers(const Picture& picture)
 {
+  const auto warn = [&](const std::string& channel, const std::string& poorer_file) {
+    const std::size_t dot = channel.rfind('.');
+    const std::string what = dot == std::string::npos ? "channel '" + channel : "layer '" + channel.substr(0, dot);
+    const std::string start = what + "' is left out: ";
+    const auto is_said = [&](const std::string& text) { return text.starts_with(start); };
+    if (std::any_of(warnings_.begin(), warnings_.end(), is_said)) return;
+    warnings_.push_back(start + "'" + poorer_file + "' does not have it");
+  };
   std::erase_if(sums_, [&](const Sum& sum) {
     if (picture.find(sum.name) != nullptr) return false;
-    warnings_.push_back("channel '" + sum.name + "' is left out: '" + picture.file + "' does not have it");
+    warn(sum.name, picture.file);
     return true;
   });
-  if (num_pictures_ == 0) return;
   for (const Channel& channel : picture.channels) {
-    const bool is_kept = std::any_of(sums_.begin(), sums_.end(), [&](const Sum& s) { return s.name == channel.name; });
-    const std::string start = "channel '" + channel.name + "' is left out:";
-    const bool is_said = std::any_of(warnings_.begin(), warnings_.end(),
-                                     [&](const std::string& text) { return text.starts_with(start); });
-    if (!is_kept && !is_said) warnings_.push_back(start + " '" + result_.file + "' does not have it");
+    const auto is_kept = [&](const Sum& sum) { return sum.name == channel.name; };
+    if (std::none_of(sums_.begin(), sums_.end(), is_kept)) warn(channel.name, result_.file);
   }
 }
 

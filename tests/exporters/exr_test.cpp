@@ -1,0 +1,250 @@
+#include "exporters/exr.h"
+
+#include <ImfChannelList.h>
+#include <ImfChromaticitiesAttribute.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
+#include <ImfStandardAttributes.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "exporters/errors.h"
+#include "tests/exporters/test_pictures.h"
+
+namespace relief {
+
+namespace {
+
+constexpr ExrCompression kLossless[] = {ExrCompression::kNone, ExrCompression::kZips, ExrCompression::kZip,
+                                        ExrCompression::kPiz};
+
+float film_value(const TestFilm& film, Aov aov, std::size_t channel, int x, int y)
+{
+  return film_layer(film.view, aov).channels.at(channel).at(x, y);
+}
+
+}  // namespace
+
+using ExrTest = FolderTest;
+
+TEST_F(ExrTest, FloatsAndIdsComeBackExactlyThroughEveryLosslessCompression)
+{
+  // More rows than are packed at once, so that the blocks' seams are covered.
+  const TestFilm film(37, 301, 1);
+  ExrOptions options;
+  options.float_color = true;
+  for (const ExrCompression compression : kLossless) {
+    options.compression = compression;
+    exr_write(file("a.exr"), film.view, {}, options);
+    const Picture picture = exr_load(file("a.exr"));
+    EXPECT_FALSE(picture.lossy);
+    for (const AovInfo& info : kAovInfo) {
+      for (std::size_t c = 0; c < info.channels.size(); ++c) {
+        const Channel* channel = picture.find(channel_name(info, c));
+        ASSERT_NE(channel, nullptr) << channel_name(info, c);
+        EXPECT_EQ(channel->type, info.integer_like ? ChannelType::kUint : ChannelType::kFloat);
+        for (int y = 0; y < 301; ++y) {
+          for (int x = 0; x < 37; ++x) {
+            ASSERT_EQ(channel->values[static_cast<std::size_t>(y * 37 + x)], film_value(film, info.aov, c, x, y))
+                << channel->name << " at " << x << "," << y;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST_F(ExrTest, HalvesAreTheNearestOnesAndDataStaysFloat)
+{
+  const TestFilm film(20, 9, 2);
+  exr_write(file("a.exr"), film.view, {});
+  const Picture picture = exr_load(file("a.exr"));
+  EXPECT_EQ(picture.find("R")->type, ChannelType::kHalf);
+  EXPECT_EQ(picture.find("albedo.G")->type, ChannelType::kHalf);
+  for (const char* name : {"depth.Z", "position.X", "uv.U", "variance.B", "half.R"}) {
+    EXPECT_EQ(picture.find(name)->type, ChannelType::kFloat) << name;
+  }
+  for (int y = 0; y < 9; ++y) {
+    for (int x = 0; x < 20; ++x) {
+      const float truth = film_value(film, Aov::kBeauty, 0, x, y);
+      EXPECT_LE(std::abs(picture.find("R")->values[static_cast<std::size_t>(y * 20 + x)] - truth), truth * 0x1p-11f);
+      EXPECT_EQ(picture.find("depth.Z")->values[static_cast<std::size_t>(y * 20 + x)],
+                film_value(film, Aov::kDepth, 0, x, y));
+    }
+  }
+}
+
+TEST_F(ExrTest, ValuesBeyondAHalfBecomeItsLargestAndNanStays)
+{
+  TestFilm film(4, 1, 3, 1u << static_cast<int>(Aov::kBeauty));
+  film.pixels[0] = 1e9f;
+  film.pixels[4] = -1e9f;
+  film.pixels[8] = std::nanf("");
+  film.pixels[12] = std::numeric_limits<float>::infinity();
+  exr_write(file("a.exr"), film.view, {});
+  const Picture picture = exr_load(file("a.exr"));
+  const std::vector<float>& red = picture.find("R")->values;
+  EXPECT_EQ(red[0], 65504.f);
+  EXPECT_EQ(red[1], -65504.f);
+  EXPECT_TRUE(std::isnan(red[2]));
+  EXPECT_TRUE(std::isinf(red[3]));
+}
+
+TEST_F(ExrTest, DwaIsCloseAndSaysWhichLayersItDamages)
+{
+  // A smooth picture, as DWA is made for; its default level keeps such a picture within a hundredth.
+  TestFilm film(64, 64, 4);
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        film.pixels[static_cast<std::size_t>((y * 64 + x) * film.view.layout.num_floats + c)] =
+            .5f + .4f * std::sin(.1f * static_cast<float>(x + (c + 1) * y));
+      }
+    }
+  }
+  ExrOptions options;
+  options.compression = ExrCompression::kDwaa;
+  exr_write(file("a.exr"), film.view, {}, options);
+  const Picture picture = exr_load(file("a.exr"));
+  EXPECT_TRUE(picture.lossy);
+  for (int y = 0; y < 64; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      EXPECT_NEAR(picture.find("R")->values[static_cast<std::size_t>(y * 64 + x)],
+                  film_value(film, Aov::kBeauty, 0, x, y), .01f);
+      EXPECT_EQ(picture.find("object_id.I")->values[static_cast<std::size_t>(y * 64 + x)],
+                film_value(film, Aov::kObjectId, 0, x, y));
+      EXPECT_EQ(picture.find("depth.Z")->values[static_cast<std::size_t>(y * 64 + x)],
+                film_value(film, Aov::kDepth, 0, x, y));
+    }
+  }
+  EXPECT_EQ(exr_damaged_layers(film.view.layout, ExrCompression::kDwaa),
+            (std::vector<std::string>{"normal", "position", "variance", "half"}));
+  EXPECT_TRUE(exr_damaged_layers(film.view.layout, ExrCompression::kZip).empty());
+}
+
+TEST_F(ExrTest, ACropIsTheDataWindowInsideTheFullImage)
+{
+  TestFilm film(12, 7, 5);
+  film.view.crop_x = 30;
+  film.view.crop_y = 11;
+  film.view.full_width = 100;
+  film.view.full_height = 50;
+  exr_write(file("a.exr"), film.view, {});
+  const Imf::InputFile input(file("a.exr").c_str());
+  EXPECT_EQ(input.header().displayWindow(), Imath::Box2i(Imath::V2i(0, 0), Imath::V2i(99, 49)));
+  EXPECT_EQ(input.header().dataWindow(), Imath::Box2i(Imath::V2i(30, 11), Imath::V2i(41, 17)));
+  const Picture picture = exr_load(file("a.exr"));
+  EXPECT_EQ(picture.width, 12);
+  EXPECT_EQ(picture.height, 7);
+  EXPECT_EQ(picture.crop_x, 30);
+  EXPECT_EQ(picture.crop_y, 11);
+  EXPECT_EQ(picture.full_width, 100);
+  EXPECT_EQ(picture.full_height, 50);
+  EXPECT_EQ(picture.find("depth.Z")->values[0], film_value(film, Aov::kDepth, 0, 0, 0));
+}
+
+TEST_F(ExrTest, AttributesComeBackAsText)
+{
+  Statistics statistics;
+  statistics.scene = "scène.glb";
+  statistics.version = "0.1.0";
+  statistics.seed = std::numeric_limits<std::uint64_t>::max();
+  statistics.samples_per_pixel = 64;
+  statistics.render_seconds = 12.5;
+  statistics.error_rmse = .001;
+  statistics.frame = 7;
+  statistics.warnings = {"one", "two"};
+  Attributes attributes = exr_attributes(statistics, "relief render scene.glb");
+  attributes["studio:shot"] = "sq010_sh020";
+  exr_write(file("a.exr"), TestFilm(3, 2, 6).view, attributes);
+  const Picture picture = exr_load(file("a.exr"));
+  for (const auto& [name, text] : attributes) {
+    ASSERT_TRUE(picture.attributes.contains(name)) << name;
+    EXPECT_EQ(picture.attributes.at(name), text);
+  }
+  EXPECT_EQ(picture.attributes.at("relief:seed"), "18446744073709551615");
+  EXPECT_EQ(picture.attributes.at("relief:samples"), "64");
+  EXPECT_EQ(picture.attributes.at("relief:warnings"), "one\ntwo");
+  EXPECT_FALSE(picture.attributes.contains("relief:view"));  // empty ones are left out
+}
+
+TEST_F(ExrTest, SaysItsPrimariesAreRec709)
+{
+  exr_write(file("a.exr"), TestFilm(3, 2, 7).view, {});
+  const Imf::InputFile input(file("a.exr").c_str());
+  ASSERT_TRUE(Imf::hasChromaticities(input.header()));
+  const Imf::Chromaticities primaries = Imf::chromaticities(input.header());
+  EXPECT_FLOAT_EQ(primaries.red.x, .64f);
+  EXPECT_FLOAT_EQ(primaries.green.y, .6f);
+  EXPECT_FLOAT_EQ(primaries.blue.x, .15f);
+  EXPECT_FLOAT_EQ(primaries.white.x, .3127f);
+}
+
+TEST_F(ExrTest, KeepsOnlyTheLayersOfTheFilm)
+{
+  const TestFilm film(3, 2, 8, 1u << static_cast<int>(Aov::kBeauty) | 1u << static_cast<int>(Aov::kNormal));
+  exr_write(file("a.exr"), film.view, {});
+  EXPECT_EQ(picture_layers(exr_load(file("a.exr"))), (std::vector<std::string>{"beauty", "normal"}));
+}
+
+TEST_F(ExrTest, APictureIsWrittenAsItWasRead)
+{
+  const TestFilm film(19, 23, 9);
+  exr_write(file("a.exr"), film.view, {{"relief:seed", "3"}});
+  const Picture a = exr_load(file("a.exr"));
+  exr_write(file("b.exr"), a);
+  EXPECT_EQ(bytes_of_file(file("a.exr")), bytes_of_file(file("b.exr")));
+}
+
+TEST_F(ExrTest, AFailedWriteLeavesTheOldPicture)
+{
+  write_bytes(file("a.exr"), "old");
+  // "channels" is OpenEXR's own attribute and no text.
+  EXPECT_THROW(exr_write(file("a.exr"), TestFilm(3, 2, 10).view, {{"channels", "x"}}), OutputError);
+  EXPECT_THROW(exr_write(file("a.exr"), FilmView{}, {}), OutputError);
+  EXPECT_EQ(bytes_of_file(file("a.exr")), "old");
+  EXPECT_EQ(files_in_folder(), std::vector<std::string>{"a.exr"});
+  EXPECT_THROW(exr_write(file("nowhere/a.exr"), TestFilm(3, 2, 10).view, {}), OutputError);
+}
+
+TEST_F(ExrTest, AFullDiskIsAnError)
+{
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+  EXPECT_THROW(exr_write("/dev/full", TestFilm(300, 300, 11).view, {}), OutputError);
+}
+
+TEST_F(ExrTest, TheSameFilmGivesTheSameBytesWhateverTheThreads)
+{
+  const TestFilm film(200, 300, 12);
+  exr_use_threads(0);
+  exr_write(file("a.exr"), film.view, {});
+  exr_use_threads(4);
+  exr_write(file("b.exr"), film.view, {});
+  EXPECT_EQ(bytes_of_file(file("a.exr")), bytes_of_file(file("b.exr")));
+}
+
+TEST(PictureLayer, PutsRedGreenBlueFirstAndLeavesAlphaOut)
+{
+  Picture picture;
+  picture.width = picture.height = 1;
+  for (const char* name : {"A", "B", "G", "R", "albedo.B", "albedo.G", "albedo.R", "depth.Z", "mask.A"}) {
+    picture.channels.push_back({name, ChannelType::kFloat, {1.f}});
+  }
+  const auto names = [&](std::string_view layer) {
+    std::string text;
+    for (const ChannelView& channel : picture_layer(picture, layer).channels) {
+      text += channel.name + " ";
+    }
+    return text;
+  };
+  EXPECT_EQ(names("beauty"), "R G B ");
+  EXPECT_EQ(names(""), "R G B ");
+  EXPECT_EQ(names("albedo"), "albedo.R albedo.G albedo.B ");
+  EXPECT_EQ(names("depth"), "depth.Z ");
+  EXPECT_EQ(names("mask"), "mask.A ");
+  EXPECT_EQ(names("nothing"), "");
+}
+
+}  // namespace relief

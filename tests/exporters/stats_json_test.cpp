@@ -1,0 +1,53 @@
+#include "exporters/stats_json.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <nlohmann/json.hpp>
+
+namespace relief {
+
+TEST(StatsJson, HasEveryKeyThatProgramsReadAndEveryCounter)
+{
+  Statistics statistics;
+  statistics.load_seconds = 1;
+  statistics.build_seconds = 2;
+  statistics.render_seconds = 4;
+  statistics.samples_per_pixel = 16;
+  statistics.peak_memory_bytes = 123;
+  statistics.counters.camera_rays = 100;
+  statistics.counters.bounce_rays = 200;
+  statistics.counters.shadow_rays = 300;
+  statistics.stages = {{"shade_surface", 1.5}};
+  statistics.warnings = {"a", "b"};
+  const nlohmann::json json = nlohmann::json::parse(stats_json(statistics));
+  EXPECT_EQ(json["load_seconds"], 1);
+  EXPECT_EQ(json["build_seconds"], 2);
+  EXPECT_EQ(json["render_seconds"], 4);
+  EXPECT_EQ(json["samples_per_pixel"], 16);
+  EXPECT_EQ(json["peak_memory_bytes"], 123);
+  EXPECT_EQ(json["rays"]["camera"], 100);
+  EXPECT_EQ(json["rays"]["bounce"], 200);
+  EXPECT_EQ(json["rays"]["shadow"], 300);
+  EXPECT_EQ(json["rays"]["total"], 600);
+  EXPECT_EQ(json["rays_per_second"], 150);
+  EXPECT_EQ(json["stage_seconds"]["shade_surface"], 1.5);
+  EXPECT_EQ(json["warnings"], (std::vector<std::string>{"a", "b"}));
+#define X(name) EXPECT_TRUE(json["counters"].contains(#name));
+  RELIEF_COUNTERS(X)
+#undef X
+}
+
+TEST(StatsJson, KeepsLargeSeedsAndSurvivesWhatJsonCannotSay)
+{
+  Statistics statistics;
+  statistics.seed = std::numeric_limits<std::uint64_t>::max();
+  statistics.error_rmse = std::numeric_limits<double>::quiet_NaN();
+  statistics.scene = "latin-1 \xe9.glb";
+  const nlohmann::json json = nlohmann::json::parse(stats_json(statistics));
+  EXPECT_EQ(json["seed"].get<std::uint64_t>(), statistics.seed);
+  EXPECT_TRUE(json["error_rmse"].is_null());
+  EXPECT_EQ(json["rays_per_second"], 0);
+}
+
+}  // namespace relief
