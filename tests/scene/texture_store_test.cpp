@@ -419,15 +419,13 @@ TEST(MipChain, ConstantImagesStayConstant)
 /// OpenImageIO's bilinear look-up at the finest level.
 class OiioSampler {
  public:
-  OiioSampler() : system_(OIIO::TextureSystem::create(false))
+  // The shared system is never destroyed: OpenImageIO 2.4 deletes private ones through another type (AddressSanitizer).
+  OiioSampler() : system_(OIIO::TextureSystem::create(true))
   {
     system_->attribute("automip", 1);
     system_->attribute("autotile", 64);
     system_->attribute("flip_t", 0);
   }
-  ~OiioSampler() { OIIO::TextureSystem::destroy(system_); }
-  OiioSampler(const OiioSampler&) = delete;
-  OiioSampler& operator=(const OiioSampler&) = delete;
 
   void sample(const fs::path& path, Vec2f uv, OIIO::TextureOpt::Wrap wrap, float* result)
   {
@@ -511,8 +509,9 @@ TEST_P(TextureCacheAgreement, LookUpsEqualThoseInMemory)
         const float width = power_of_two ? static_cast<float>(i % 5) * 0.02f : 0.0f;
         const Vec4f expected = texture_sample(resident.view(), uv, width);
         const Vec4f found = texture_sample(cached.view(), uv, width);
-        // sRGB is kept as halves in the cache (2⁻¹¹), and as rounded codes in the levels in memory (0.0089 / 2 a level).
-        const double tolerance = width == 0.0f ? 1.0 / 2000 : c.color == TextureColor::kSrgb ? 0.0089 : 1.0 / 200;
+        // The cache keeps sRGB as halves (2⁻¹¹). In the levels codes are rounded by half a code at most each time, up
+        // to three times on either side; an sRGB code is up to 0.0089 of linear, on the side of memory only.
+        const double tolerance = width == 0.0f ? 1.0 / 2000 : c.color == TextureColor::kSrgb ? 1.5 * 0.0089 : 3.0 / 255;
         for (int k = 0; k < 4; ++k) {
           ASSERT_NEAR(component(found, k), component(expected, k), tolerance)
               << "uv " << uv.x << ' ' << uv.y << " width " << width << " component " << k;
