@@ -74,6 +74,7 @@ KernelGlobals render_globals(const SceneContext& context, const RenderOptions& o
   g.limits = {settings.max_bounces, settings.diffuse_bounces, settings.glossy_bounces, settings.transmission_bounces,
               settings.transparent_bounces};
   g.clamp_indirect = settings.clamp_indirect;
+  g.light_technique = options.light_technique;
   g.filter = settings.filter == PixelFilter::kBox ? nullptr : &filter;
   g.filter_width = settings.filter_width;
   g.seed = settings.seed;

@@ -17,6 +17,7 @@ struct RenderOptions {
   int crop_x0 = 0, crop_y0 = 0, crop_x1 = 0, crop_y1 = 0;  ///< pixels, half open; all 0: the whole image
   double time_limit_seconds = 0;  ///< 0: none; counted from the start of sampling, kept to within one pass
   std::uint32_t aov_mask = 1;
+  LightTechnique light_technique = LightTechnique::kMis;
 };
 
 struct RenderProgress {

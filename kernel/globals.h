@@ -16,6 +16,10 @@ struct BounceLimits {
   int total = 12, diffuse = 12, glossy = 12, transmission = 12, transparent = 32;
 };
 
+/// How direct light is estimated. All three converge to the same picture, which tests rely on; the default has the least
+/// noise. Delta lights can only be sampled, delta lobes only be followed: each is always done by the one that can.
+enum class LightTechnique : std::uint8_t { kMis, kLightSampling, kBsdfSampling };
+
 struct KernelGlobals {
   const MeshView* meshes = nullptr;
   const InstanceView* instances = nullptr;
@@ -29,6 +33,7 @@ struct KernelGlobals {
   Vec3f camera_forward;  ///< unit, world: the axis that depths are measured along
   BounceLimits limits;
   float clamp_indirect = 0;  ///< 0: off
+  LightTechnique light_technique = LightTechnique::kMis;
   bool has_lights = false;   ///< something can be sampled
   bool environment_visible_to_camera = true;
   const FilterTable* filter = nullptr;  ///< null: box

@@ -1,7 +1,8 @@
 // Reading and writing groups of path columns.
 #pragma once
 
-#include "kernel/math/affine.h"
+#include "kernel/globals.h"
+#include "kernel/sample/mis.h"
 #include "kernel/state/path_state.h"
 
 namespace relief {
@@ -58,6 +59,23 @@ RELIEF_KERNEL void path_add_radiance(const PathStateView& s,
   s.indirect_r[i] += contribution.x;
   s.indirect_g[i] += contribution.y;
   s.indirect_b[i] += contribution.z;
+}
+
+/// Weight of light found by following the BSDF against finding it by light sampling.
+/// @param pdf_bsdf   of the direction at the last scattering event; 0: delta event or camera, no other way
+/// @param pdf_light  of next-event estimation for the same direction
+RELIEF_KERNEL float path_bsdf_weight(LightTechnique technique, float pdf_bsdf, float pdf_light)
+{
+  if (!(pdf_bsdf > 0.0f) || !(pdf_light > 0.0f) || technique == LightTechnique::kBsdfSampling) return 1.0f;
+  return technique == LightTechnique::kMis ? mis_power(pdf_bsdf, pdf_light) : 0.0f;
+}
+
+/// Weight of light found by next-event estimation.
+/// @param delta_light  the BSDF cannot find it
+RELIEF_KERNEL float path_light_weight(LightTechnique technique, float pdf_light, float pdf_bsdf, bool delta_light)
+{
+  if (delta_light || technique == LightTechnique::kLightSampling) return 1.0f;
+  return technique == LightTechnique::kMis ? mis_power(pdf_light, pdf_bsdf) : 0.0f;
 }
 
 /// Share of light left after a stretch of the path's medium (Beer–Lambert).

@@ -3,7 +3,6 @@
 
 #include "kernel/counters.h"
 #include "kernel/globals.h"
-#include "kernel/sample/mis.h"
 #include "kernel/stage/path_access.h"
 
 namespace relief {
@@ -25,7 +24,7 @@ RELIEF_KERNEL void shade_background(const KernelGlobals& g,
   if (pdf > 0.0f) {
     const float pdf_light =
         lights_environment_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), D);
-    radiance *= mis_power(pdf, pdf_light);
+    radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
   }
   radiance *= path_transmittance(path_sigma_a(state, path), kInfinity);
   path_add_radiance(state, path, scatterings, path_throughput(state, path) * radiance, g.clamp_indirect);

@@ -7,7 +7,6 @@
 #include "kernel/feature_mask.h"
 #include "kernel/globals.h"
 #include "kernel/sample/dimensions.h"
-#include "kernel/sample/mis.h"
 #include "kernel/sample/sobol.h"
 #include "kernel/shape/material_lookup.h"
 #include "kernel/shape/surface_hit.h"
@@ -72,7 +71,7 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   const BsdfEval bsdf = surface_eval<kFeatures>(params, *g.bsdf_tables, wo_local, to_local(side.frame, light.wi));
   if (is_zero(bsdf.f)) return;
   const float cos_i = __builtin_fabsf(dot(light.wi, side.frame.n));
-  const float weight = light.delta ? 1.0f : mis_power(light.pdf, bsdf.pdf);
+  const float weight = path_light_weight(g.light_technique, light.pdf, bsdf.pdf, light.delta);
   const Vec3f gain = path_throughput(state, path) * bsdf.f * radiance * (cos_i * weight / light.pdf);
   if (is_zero(gain)) return;
 
@@ -222,7 +221,7 @@ RELIEF_KERNEL void shade_surface(const KernelGlobals& g,
       const float pdf_light =
           lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path),
                      static_cast<std::uint32_t>(instance.first_light_index) + triangle, -wo, t);
-      radiance *= mis_power(pdf, pdf_light);
+      radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
     }
     path_add_radiance(state, path, bounce, throughput * radiance, g.clamp_indirect);
   }
