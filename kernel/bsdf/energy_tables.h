@@ -19,17 +19,16 @@ inline constexpr int kSheenCosines = 32, kSheenRoughnesses = 16;
 /// Glass is tabulated over √((ior − 1) / (ior + 1)) up to ior 3; denser glass uses the last entry.
 inline constexpr float kGlassMaxRootF0 = 0.5f;
 
-/// Albedo of GGX reflection, split so that any Schlick Fresnel can be put in afterwards: the albedo of a lobe is
-/// F0·(total − grazing) + F90·grazing.
+/// Albedo of GGX reflection, split so that any Schlick Fresnel can be put in afterwards.
 struct GgxAlbedo {
-  float total = 1;    ///< with F = 1
-  float grazing = 0;  ///< with F = (1 − cos)⁵
+  float lost = 0;     ///< 1 − albedo with F = 1
+  float grazing = 0;  ///< albedo with F = (1 − cos)⁵
 };
 
-/// The same as stored: small numbers that vary slowly.
+/// The same as stored: numbers that vary slowly.
 struct GgxEntry {
-  float lost = 0;   ///< 1 − total
-  float extra = 0;  ///< grazing − total · (1 − µ)⁵
+  float root_lost = 0;  ///< √lost: losses fall with the square of alpha / µ, their root linearly along the axis
+  float extra = 0;      ///< grazing − (1 − lost) (1 − µ)⁵
 };
 
 /// Sheen at one direction.
@@ -41,9 +40,11 @@ struct SheenAlbedo {
 /// About 46 kB; a render needs one. Glass and sheen are filled only if asked for.
 struct BsdfTables {
   GgxEntry ggx[kGgxRoughnesses][kGgxCosines];
-  GgxAlbedo ggx_mean[kGgxRoughnesses];                                ///< over the cosine-weighted hemisphere
-  float glass_lost[2][kGlassIors][kGlassRoughnesses][kGlassCosines];  ///< 1 − (reflection + refraction); [0]: thin side
-  float glass_lost_mean[2][kGlassIors][kGlassRoughnesses];
+  /// Means over the cosine-weighted hemisphere. Losses grow with alpha² and are stored divided by it, so that rows can be
+  /// interpolated.
+  GgxAlbedo ggx_mean[kGgxRoughnesses];
+  float glass_root_lost[2][kGlassIors][kGlassRoughnesses][kGlassCosines];  ///< √(1 − albedo); [0]: from the thin side
+  float glass_lost_mean[2][kGlassIors][kGlassRoughnesses];                 ///< over alpha²
   SheenAlbedo sheen[kSheenRoughnesses][kSheenCosines];
 };
 
@@ -76,6 +77,12 @@ RELIEF_KERNEL float microfacet_node_cosine(int i, float alpha, int size)
   return min(1.0f, max(1e-3f, x2) * alpha / (1.0f + alpha - x2));
 }
 
+/// Albedo of a GGX lobe with Schlick's Fresnel.
+RELIEF_KERNEL float ggx_albedo_with(float F0, float F90, GgxAlbedo e)
+{
+  return F0 * (1.0f - e.lost - e.grazing) + F90 * e.grazing;
+}
+
 /// Roughness axis of one surface.
 struct GgxCoordinate {
   TableCoordinate roughness;
@@ -92,21 +99,23 @@ RELIEF_KERNEL GgxCoordinate ggx_coordinate(float roughness)
 /// @param cos_theta  (0, 1]
 RELIEF_KERNEL GgxAlbedo ggx_albedo(const BsdfTables& tables, const GgxCoordinate& g, float cos_theta)
 {
-  if (g.mirror) return {1.0f, schlick_weight(cos_theta)};
+  if (g.mirror) return {0.0f, schlick_weight(cos_theta)};
   const TableCoordinate c = microfacet_cosine(cos_theta, g.alpha, kGgxCosines);
   const GgxEntry* row0 = tables.ggx[g.roughness.index] + c.index;
   const GgxEntry* row1 = tables.ggx[g.roughness.index + 1] + c.index;
-  const float lost = lerp(g.roughness.t, lerp(c.t, row0[0].lost, row0[1].lost), lerp(c.t, row1[0].lost, row1[1].lost));
+  const float root_lost = lerp(g.roughness.t, lerp(c.t, row0[0].root_lost, row0[1].root_lost),
+                               lerp(c.t, row1[0].root_lost, row1[1].root_lost));
   const float extra =
       lerp(g.roughness.t, lerp(c.t, row0[0].extra, row0[1].extra), lerp(c.t, row1[0].extra, row1[1].extra));
-  return {1.0f - lost, (1.0f - lost) * schlick_weight(cos_theta) + extra};
+  const float lost = sqr(root_lost);
+  return {lost, (1.0f - lost) * schlick_weight(cos_theta) + extra};
 }
 
 RELIEF_KERNEL GgxAlbedo ggx_albedo_mean(const BsdfTables& tables, const GgxCoordinate& g)
 {
-  if (g.mirror) return {1.0f, 1.0f / 21.0f};
+  if (g.mirror) return {0.0f, 1.0f / 21.0f};
   const GgxAlbedo a = tables.ggx_mean[g.roughness.index], b = tables.ggx_mean[g.roughness.index + 1];
-  return {lerp(g.roughness.t, a.total, b.total), lerp(g.roughness.t, a.grazing, b.grazing)};
+  return {sqr(g.alpha) * lerp(g.roughness.t, a.lost, b.lost), lerp(g.roughness.t, a.grazing, b.grazing)};
 }
 
 /// Axes of the sheen table. Roughness starts at kSheenMinRoughness and is denser there.
@@ -148,13 +157,13 @@ RELIEF_KERNEL float glass_lost(const BsdfTables& tables, const GlassCoordinate& 
 {
   const TableCoordinate c = microfacet_cosine(cos_theta, g.alpha, kGlassCosines);
   const auto row = [&](int i, int r) {
-    const float* cosines = tables.glass_lost[side][i][r];
+    const float* cosines = tables.glass_root_lost[side][i][r];
     return lerp(c.t, cosines[c.index], cosines[c.index + 1]);
   };
   const auto plane = [&](int i) {
     return lerp(g.roughness.t, row(i, g.roughness.index), row(i, g.roughness.index + 1));
   };
-  return lerp(g.ior.t, plane(g.ior.index), plane(g.ior.index + 1));
+  return sqr(lerp(g.ior.t, plane(g.ior.index), plane(g.ior.index + 1)));
 }
 
 RELIEF_KERNEL float glass_lost_mean(const BsdfTables& tables, const GlassCoordinate& g, int side)
@@ -163,7 +172,7 @@ RELIEF_KERNEL float glass_lost_mean(const BsdfTables& tables, const GlassCoordin
     const float* roughnesses = tables.glass_lost_mean[side][i];
     return lerp(g.roughness.t, roughnesses[g.roughness.index], roughnesses[g.roughness.index + 1]);
   };
-  return lerp(g.ior.t, plane(g.ior.index), plane(g.ior.index + 1));
+  return sqr(g.alpha) * lerp(g.ior.t, plane(g.ior.index), plane(g.ior.index + 1));
 }
 
 /// Mean over the cosine-weighted hemisphere, 2∫ f µ dµ, of a look-up: energy then balances with the values looked up.
@@ -217,61 +226,62 @@ RELIEF_KERNEL VisibleNormals<kPhi, kCap> visible_normals_make()
   return v;
 }
 
-using GgxQuadrature = VisibleNormals<8, 48>;
+using GgxQuadrature = VisibleNormals<16, 32>;
 using GlassQuadrature = VisibleNormals<8, 24>;
 
-/// Albedo of GGX reflection by quadrature over visible normals: the mean of G2/G1, with and without Schlick's weight.
+/// Albedo of GGX reflection by quadrature over visible normals. The loss is what is summed: of smooth surfaces it is far
+/// below the rounding of a sum near 1.
 RELIEF_KERNEL GgxAlbedo ggx_albedo_integrate(const GgxQuadrature& normals, float cos_o, float alpha)
 {
   const Vec3f wo{safe_sqrt(1.0f - cos_o * cos_o), 0.0f, cos_o};
   const float lambda_o = ggx_lambda(cos_o, alpha);
-  GgxAlbedo sum{0, 0};
+  GgxAlbedo e;
   normals.for_each(wo, alpha, [&](Vec3f wm, float weight) {
     const float cos_d = dot(wo, wm);
     const float z = 2.0f * cos_d * wm.z - wo.z;
-    if (!(z > 0.0f)) return;
-    const float share = weight * ggx_visible_share(lambda_o, ggx_lambda(z, alpha));
-    sum.total += share;
-    sum.grazing += share * schlick_weight(cos_d);
+    const float hidden = z > 0.0f ? ggx_hidden_share(lambda_o, ggx_lambda(z, alpha)) : 1.0f;
+    e.lost += weight * hidden;
+    e.grazing += weight * (1.0f - hidden) * schlick_weight(cos_d);
   });
-  return sum;
+  return e;
 }
 
-/// Energy kept by one scattering of rough glass.
+/// Energy lost by one scattering of rough glass.
 /// @param eta  index far / near
-RELIEF_KERNEL float glass_albedo_integrate(const GlassQuadrature& normals, float cos_o, float alpha, float eta)
+RELIEF_KERNEL float glass_lost_integrate(const GlassQuadrature& normals, float cos_o, float alpha, float eta)
 {
   const Vec3f wo{safe_sqrt(1.0f - cos_o * cos_o), 0.0f, cos_o};
   const float lambda_o = ggx_lambda(cos_o, alpha);
-  float sum = 0;
+  float lost = 0;
   normals.for_each(wo, alpha, [&](Vec3f wm, float weight) {
     const float cos_d = min(1.0f, dot(wo, wm));
     const float cos_t = refracted_cosine(cos_d, eta);
     const float F = fresnel_dielectric(cos_d, cos_t, eta);
-    const float reflected_z = 2.0f * cos_d * wm.z - wo.z;
-    if (reflected_z > 0.0f) sum += weight * F * ggx_visible_share(lambda_o, ggx_lambda(reflected_z, alpha));
+    const float height = 2.0f * cos_d * wm.z - wo.z;
     const float depth = -refract(wo, wm, cos_d, cos_t, eta).z;
-    if (F < 1.0f && depth > 0.0f) sum += weight * (1.0f - F) * ggx_visible_share(lambda_o, ggx_lambda(depth, alpha));
+    const float reflected_lost = height > 0.0f ? ggx_hidden_share(lambda_o, ggx_lambda(height, alpha)) : 1.0f;
+    const float refracted_lost = depth > 0.0f ? ggx_hidden_share(lambda_o, ggx_lambda(depth, alpha)) : 1.0f;
+    lost += weight * lerp(F, refracted_lost, reflected_lost);
   });
-  return sum;
+  return lost;
 }
 
 RELIEF_KERNEL void ggx_tables_make(BsdfTables& tables)
 {
-  const GgxQuadrature normals = visible_normals_make<8, 48>();
+  const GgxQuadrature normals = visible_normals_make<16, 32>();
   for (int r = 0; r < kGgxRoughnesses; ++r) {
     // Mirrors are not looked up; the first row serves the interpolation towards them.
     const float alpha = max(kDeltaAlpha, sqr(static_cast<float>(r) / (kGgxRoughnesses - 1)));
     for (int c = 0; c < kGgxCosines; ++c) {
       const float cos_theta = microfacet_node_cosine(c, alpha, kGgxCosines);
       const GgxAlbedo e = ggx_albedo_integrate(normals, cos_theta, alpha);
-      tables.ggx[r][c] = {1.0f - e.total, e.grazing - e.total * schlick_weight(cos_theta)};
+      tables.ggx[r][c] = {__builtin_sqrtf(e.lost), e.grazing - (1.0f - e.lost) * schlick_weight(cos_theta)};
     }
   }
   for (int r = 0; r < kGgxRoughnesses; ++r) {
     const GgxCoordinate g{{r < kGgxRoughnesses - 1 ? r : r - 1, r < kGgxRoughnesses - 1 ? 0.0f : 1.0f},
                           max(kDeltaAlpha, sqr(static_cast<float>(r) / (kGgxRoughnesses - 1)))};
-    tables.ggx_mean[r] = {1.0f - cosine_mean([&](float mu) { return 1.0f - ggx_albedo(tables, g, mu).total; }),
+    tables.ggx_mean[r] = {cosine_mean([&](float mu) { return ggx_albedo(tables, g, mu).lost; }) / sqr(g.alpha),
                           cosine_mean([&](float mu) { return ggx_albedo(tables, g, mu).grazing; })};
   }
 }
@@ -285,15 +295,16 @@ RELIEF_KERNEL void glass_tables_make(BsdfTables& tables)
       const float ior = (1.0f + root_F0) / (1.0f - root_F0);
       for (int r = 0; r < kGlassRoughnesses; ++r) {
         const float alpha = max(kDeltaAlpha, sqr(static_cast<float>(r) / (kGlassRoughnesses - 1)));
-        float* row = tables.glass_lost[side][i][r];
+        float* row = tables.glass_root_lost[side][i][r];
         for (int c = 0; c < kGlassCosines; ++c) {
           const float cos_theta = microfacet_node_cosine(c, alpha, kGlassCosines);
-          row[c] = 1.0f - glass_albedo_integrate(normals, cos_theta, alpha, side == 0 ? ior : 1.0f / ior);
+          row[c] = __builtin_sqrtf(glass_lost_integrate(normals, cos_theta, alpha, side == 0 ? ior : 1.0f / ior));
         }
-        tables.glass_lost_mean[side][i][r] = cosine_mean([&](float mu) {
+        const float mean = cosine_mean([&](float mu) {
           const TableCoordinate at = microfacet_cosine(mu, alpha, kGlassCosines);
-          return lerp(at.t, row[at.index], row[at.index + 1]);
+          return sqr(lerp(at.t, row[at.index], row[at.index + 1]));
         });
+        tables.glass_lost_mean[side][i][r] = mean / sqr(alpha);
       }
     }
   }

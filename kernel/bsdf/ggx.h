@@ -35,14 +35,15 @@ RELIEF_KERNEL float ggx_stretched_length(float z, float alpha)
 /// Smith's Λ: microfacet area hidden from w per area seen.
 /// @param z  |cosine|, > 0
 /// @source   [H] Eq. 72
-RELIEF_KERNEL float ggx_lambda(float z, float alpha) { return 0.5f * (ggx_stretched_length(z, alpha) / z - 1.0f); }
-
-/// Share of the microfacets visible from wo that wi sees too: G2 / G1(wo), [H] Eq. 99 over Eq. 43.
-/// @param lambda_o, lambda_i  ggx_lambda of both
-RELIEF_KERNEL float ggx_visible_share(float lambda_o, float lambda_i)
+RELIEF_KERNEL float ggx_lambda(float z, float alpha)
 {
-  return (1.0f + lambda_o) / (1.0f + lambda_o + lambda_i);
+  // (length / z − 1) / 2 without its cancellation, which left smooth surfaces only the first digit.
+  return 0.5f * alpha * alpha * (1.0f - z * z) / (z * (z + ggx_stretched_length(z, alpha)));
 }
+
+/// Share of the microfacets visible from wo that wi does not see: 1 − G2 / G1(wo), [H] Eq. 99 and Eq. 43.
+/// @param lambda_o, lambda_i  ggx_lambda of both
+RELIEF_KERNEL float ggx_hidden_share(float lambda_o, float lambda_i) { return lambda_i / (1.0f + lambda_o + lambda_i); }
 
 /// Reflection by microfacets that are perfect mirrors; times a Fresnel term at `cos_d` it is a lobe.
 struct GgxReflection {

@@ -96,7 +96,7 @@ RELIEF_KERNEL BsdfEval glass_closure_eval(const SurfaceClosure& c, const BsdfTab
   if (glass.lost > 0.0f) {
     const float cos_i = __builtin_fabsf(wi.z);
     const int side = crosses ? 1 - glass.table.side : glass.table.side;
-    const float lost_i = max(0.0f, glass_lost(tables, glass.table, side, cos_i));
+    const float lost_i = glass_lost(tables, glass.table, side, cos_i);
     const float share = crosses ? 1.0f - glass.reflect_share : glass.reflect_share;
     f += share * diffuse_coupled_eval(splat3(1.0f), glass.lost, lost_i, crosses ? glass.mean_far : glass.mean_near).x;
     pdf = lerp(glass.lost, pdf, share * warp_broad_hemisphere_pdf(cos_i));
@@ -124,13 +124,13 @@ RELIEF_KERNEL BsdfEval closure_eval(const SurfaceClosure& c, const BsdfTables& t
     if (probability.diffuse > 0.0f) {
       float transmits = 1.0f;
       if (c.under_F90 > 0.0f) {
-        transmits = under_transmits(c.under_F0, c.under_F90, ggx_albedo(tables, c.ggx, wi.z));
+        transmits = 1.0f - ggx_albedo_with(c.under_F0, c.under_F90, ggx_albedo(tables, c.ggx, wi.z));
       }
       e.f += c.diffuse * transmits;
       e.pdf += probability.diffuse * diffuse_pdf(wi);
     }
     if (probability.multiple > 0.0f) {
-      e.f += c.multiple * (1.0f - ggx_albedo(tables, c.ggx, wi.z).total);
+      e.f += c.multiple * ggx_albedo(tables, c.ggx, wi.z).lost;
       e.pdf += probability.multiple * warp_broad_hemisphere_pdf(wi.z);
     }
   }
@@ -142,7 +142,7 @@ RELIEF_KERNEL BsdfEval closure_eval(const SurfaceClosure& c, const BsdfTables& t
       e.pdf = probability.thin * r.pdf;
     }
     if (wi.z < 0.0f && probability.thin_multiple > 0.0f) {
-      e.f += c.thin_multiple * (1.0f - ggx_albedo(tables, c.ggx, -wi.z).total);
+      e.f += c.thin_multiple * ggx_albedo(tables, c.ggx, -wi.z).lost;
       e.pdf += probability.thin_multiple * warp_broad_hemisphere_pdf(-wi.z);
     }
     if (probability.glass > 0.0f && !c.glass.delta) {
@@ -291,7 +291,10 @@ RELIEF_KERNEL BsdfSample closure_sample(const SurfaceClosure& c, const BsdfTable
           const float F = kClearcoatF0 + (1.0f - kClearcoatF0) * schlick_weight(layers.coat_wo.z);
           return delta_sample(c, wi, splat3(layers.coat * F), probability.coat);
         }
-        wi = from_local(layers.coat_frame, clearcoat_sample(layers.coat_wo, layers.coat_table.alpha, u));
+        const Vec3f wi_coat = clearcoat_sample(layers.coat_wo, layers.coat_table.alpha, u);
+        // Below a tilted coat's horizon can still be above the surface's, where the coat has no density.
+        if (!(wi_coat.z > kMinCosine)) return {};
+        wi = from_local(layers.coat_frame, wi_coat);
         as_glossy(layers.coat_table.alpha);
       } else if (probability.sheen > 0.0f) {
         found = true;

@@ -9,7 +9,7 @@
 namespace relief {
 
 /// Mean losses below this are left lost: smaller ones are mostly rounding, and they are divided by.
-inline constexpr float kLeastMeanLost = 1e-5f;
+inline constexpr float kLeastMeanLost = 1e-6f;
 
 /// What sampling chooses among; each lobe's probability is proportional to an estimate of its largest channel's albedo.
 struct LobeProbabilities {
@@ -65,19 +65,13 @@ struct SurfaceClosure {
   LayersClosure layers;
 };
 
-/// Share of light that passes the dielectric interface to what lies below it.
-RELIEF_KERNEL float under_transmits(float F0, float F90, GgxAlbedo e)
-{
-  return 1.0f - F0 * (e.total - e.grazing) - F90 * e.grazing;
-}
-
 /// What a coat leaves for below.
 /// @param cos_theta  to the coat's normal
 RELIEF_KERNEL float coat_transmits(const LayersClosure& layers, const BsdfTables& tables, float cos_theta)
 {
   if (!(cos_theta > kMinCosine)) return 1.0f;
   const GgxAlbedo e = ggx_albedo(tables, layers.coat_table, cos_theta);
-  return 1.0f - layers.coat * (kClearcoatF0 * (e.total - e.grazing) + e.grazing);
+  return 1.0f - layers.coat * ggx_albedo_with(kClearcoatF0, 1.0f, e);
 }
 
 /// Coat and sheen of a hit, and their unnormalised probabilities.
@@ -126,7 +120,7 @@ RELIEF_KERNEL GlassClosure glass_closure_make(const SurfaceParams& p,
   glass.mean_near = glass_lost_mean(tables, glass.table, glass.table.side);
   glass.mean_far = glass_lost_mean(tables, glass.table, 1 - glass.table.side);
   if (min(glass.mean_near, glass.mean_far) > kLeastMeanLost) {
-    glass.lost = max(0.0f, glass_lost(tables, glass.table, glass.table.side, c.wo.z));
+    glass.lost = glass_lost(tables, glass.table, glass.table.side, c.wo.z);
     glass.reflect_share = dielectric_multiple_reflect_share(glass.eta, glass.mean_near, glass.mean_far);
   }
   return glass;
@@ -171,28 +165,28 @@ RELIEF_KERNEL SurfaceClosure surface_closure_make(const SurfaceParams& p, const 
   if (c.F90 > 0.0f || c.thin_weight > 0.0f) {
     e = ggx_albedo(tables, c.ggx, c.wo.z);
     mean = ggx_albedo_mean(tables, c.ggx);
-    probability.specular = below * max_component(c.F0 * (e.total - e.grazing) + splat3(c.F90 * e.grazing));
+    probability.specular = below * ggx_albedo_with(max_component(c.F0), c.F90, e);
   }
   if (interface > 0.0f) {
     c.under_F0 = max_component(dielectric_F0);
     c.under_F90 = p.specular;
   }
   if (diffuse > 0.0f) {
-    const float transmits = under_transmits(c.under_F0, c.under_F90, e);
-    c.diffuse =
-        diffuse_coupled_eval(diffuse * p.base_color, transmits, 1.0f, under_transmits(c.under_F0, c.under_F90, mean));
+    const float transmits = 1.0f - ggx_albedo_with(c.under_F0, c.under_F90, e);
+    c.diffuse = diffuse_coupled_eval(diffuse * p.base_color, transmits, 1.0f,
+                                     (1.0f - ggx_albedo_with(c.under_F0, c.under_F90, mean)));
     probability.diffuse = below * diffuse * transmits * max_component(p.base_color);
   }
 
-  const float mean_lost = 1.0f - mean.total;
+  const float mean_lost = mean.lost;
   // Nearly smooth surfaces lose less than rounding; without a mean there is nothing to divide by.
   if ((metal > 0.0f || c.thin_weight > 0.0f) && mean_lost > kLeastMeanLost) {
-    const float lost = max(0.0f, 1.0f - e.total);
+    const float lost = e.lost;
     if constexpr (kMetal) {
       // Kulla and Conty 2017, with the square of the mean Fresnel that Hill 2018 restored: the light meets the
       // metal at least twice.
       const Vec3f F = fresnel_schlick_mean(p.base_color, 1.0f);
-      const Vec3f kept = F * F * mean.total / (splat3(1.0f) - F * mean_lost);
+      const Vec3f kept = F * F * (1.0f - mean_lost) / (splat3(1.0f) - F * mean_lost);
       c.multiple = diffuse_coupled_eval(metal * kept, lost, 1.0f, mean_lost);
       probability.multiple = below * lost * metal * max_component(kept);
     }
@@ -207,7 +201,7 @@ RELIEF_KERNEL SurfaceClosure surface_closure_make(const SurfaceParams& p, const 
   if constexpr (kTransmission) {
     c.transmission_color = p.base_color;
     if (c.thin_weight > 0.0f) {
-      const float transmits = e.total - 1.0f + under_transmits(c.under_F0, c.under_F90, e);
+      const float transmits = 1.0f - e.lost - ggx_albedo_with(c.under_F0, c.under_F90, e);
       probability.thin = below * c.thin_weight * transmits * max_component(p.base_color);
     }
     if (glass > 0.0f) {
