@@ -9,11 +9,11 @@ from .meshes import Mesh, box, catmull_rom, icosphere, joined, lathe, quad
 
 # Radiance of each kind of lantern, W/m²/sr.
 LANTERNS = {
-    "candle": (18.0, 8.6, 2.4),
-    "amber": (21.0, 6.6, 0.8),
-    "rose": (19.0, 2.0, 4.6),
-    "pearl": (9.0, 8.4, 7.6),
-    "teal": (1.2, 12.0, 15.5),
+    "candle": (12.0, 5.8, 1.6),
+    "amber": (13.0, 4.3, 0.5),
+    "rose": (13.0, 1.3, 3.0),
+    "pearl": (6.0, 5.7, 5.3),
+    "teal": (0.7, 8.6, 11.5),
 }
 # What winds about the columns, bay by bay; the pearls fly above the aisle.
 BAYS = ("candle", "amber", "teal", "candle", "rose", "amber", "teal", "candle", "rose")
