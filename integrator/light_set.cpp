@@ -467,6 +467,10 @@ LightsView LightSet::view() const
   v.num_lights = static_cast<std::uint32_t>(lights.size());
   v.nodes = nodes.empty() ? nullptr : nodes.data();
   v.light_trails = light_trails.data();
+  const bool one_finite = nodes.size() == 1 && nodes[0].intensity[1] == 0.0f;
+  if (one_finite && suns.empty() && !(environment_irradiance > 0.0f)) {
+    v.only_light = static_cast<std::int32_t>(nodes[0].link[0] & kLightTreeIndexMask);
+  }
   v.suns = suns.data();
   v.num_suns = static_cast<std::uint32_t>(suns.size());
   v.environment = environment.view();

@@ -2,8 +2,8 @@
 // finite lights (light_tree.h). Each is given an estimate of the irradiance it causes at the point,
 //   environment: π × mean radiance;   suns: irradiance × cosine, summed;   finite lights: sum over the tree's root,
 // and is chosen with probability  ¾ · estimate / sum + ¼ / number of groups whose estimate is not zero.
-// The second term is defensive: none of the estimates knows about shadows, so no group may starve. A group that is alone
-// costs nothing: its probability is 1 and no estimate is made for the environment or a single sun.
+// The second term is defensive: none of the estimates knows about shadows, so no group may starve. A finite light that is
+// alone in the scene is taken without any estimate.
 #pragma once
 
 #include "kernel/light/disk.h"
@@ -25,6 +25,7 @@ struct LightsView {
   std::uint32_t num_lights = 0;
   const LightTreeNode* nodes = nullptr;      ///< light tree, root first; null: no finite light
   const LightTrail* light_trails = nullptr;  ///< one a light
+  std::int32_t only_light = -1;              ///< the one finite light, where nothing else can be chosen
   const std::uint32_t* suns = nullptr;       ///< indices into `lights`
   std::uint32_t num_suns = 0;
   EnvironmentView environment;
@@ -141,6 +142,11 @@ RELIEF_KERNEL float light_environment_pdf(const EnvironmentView& environment, Ve
 /// @return          pdf includes the choice; see LightSample
 RELIEF_KERNEL LightSample lights_sample(const LightsView& view, Vec3f P, Vec3f N, float u_choice, Vec2f u)
 {
+  if (view.only_light >= 0) {
+    LightSample sample = light_sample(view.lights[view.only_light], P, u);
+    sample.light_index = view.only_light;
+    return sample;
+  }
   const LightGroups groups = light_groups_eval(view, P, N);
   // A deep tree wants more bits than a float has; the ones of the point on the light serve as the missing low ones.
   const std::uint64_t low_bits = hash_mix((static_cast<std::uint64_t>(__builtin_bit_cast(std::uint32_t, u.x)) << 32) |
@@ -194,6 +200,10 @@ RELIEF_KERNEL float lights_pdf(const LightsView& view,
                                Vec3f wi,
                                float distance)
 {
+  if (view.only_light >= 0) {
+    const bool chosen = static_cast<std::uint32_t>(view.only_light) == light_index;
+    return chosen ? light_pdf(view.lights[light_index], P, wi, distance) : 0.0f;
+  }
   const LightGroups groups = light_groups_eval(view, P, N);
   const float choice =
       light_tree_pdf(view.nodes, groups.finite_root, P, N, light_index, view.light_trails[light_index]);

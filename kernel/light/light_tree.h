@@ -65,8 +65,9 @@ struct CosSin {
 /// max(0, a − b).
 RELIEF_KERNEL CosSin angle_subtract_clamped(CosSin a, CosSin b)
 {
-  const bool inside = a.cos > b.cos;
-  return {inside ? 1.0f : a.cos * b.cos + a.sin * b.sin, inside ? 0.0f : a.sin * b.cos - a.cos * b.sin};
+  const float cosine = a.cos * b.cos + a.sin * b.sin;
+  const float sine = a.sin * b.cos - a.cos * b.sin;
+  return {a.cos > b.cos ? 1.0f : cosine, a.cos > b.cos ? 0.0f : sine};
 }
 
 RELIEF_KERNEL CosSin angle_from_cos(float cosine) { return {cosine, __builtin_sqrtf(max(1.0f - sqr(cosine), 0.0f))}; }
@@ -86,7 +87,7 @@ RELIEF_KERNEL LightEstimates light_tree_estimate(const LightTreeNode& node, Vec3
   // Cosines this far below zero are still taken as grazing, and none counts for less than the floor: rounding of angles
   // must not turn a sliver of a light into nothing, nor its probability into one that makes fireflies.
   constexpr float kSlack = 2e-3f, kFloor = 1e-2f;
-  const bool has_normal = !is_zero(N);
+  const float without_normal = is_zero(N) ? 1.0f : 0.0f;
 
   LightEstimates estimates;
   for (int i = 0; i < kLightTreeWidth; ++i) {
@@ -94,35 +95,49 @@ RELIEF_KERNEL LightEstimates light_tree_estimate(const LightTreeNode& node, Vec3
     const float distance_squared = x * x + y * y + z * z;
     const float radius = light_tree_decode_radius(node.radius_bits[i]);
     const float radius_squared = radius * radius;
-    // A point light's own position would divide by zero; the clamp is far below any distance with a usable answer.
-    const float estimate = min(node.intensity[i] / max(max(distance_squared, radius_squared), 1e-30f), 1e30f);
+    // Not closer than the sphere's surface: inside, only the estimate is used. A point light's own position would divide
+    // by zero; that clamp is far below any distance with a usable answer.
+    const float inverse_distance = 1.0f / __builtin_sqrtf(max(max(distance_squared, radius_squared), 1e-30f));
+    const float estimate = min(node.intensity[i] * inverse_distance * inverse_distance, 1e30f);
 
-    const float inverse_distance = 1.0f / __builtin_sqrtf(max(distance_squared, 1e-30f));
     const float sin_bound = min(radius * inverse_distance, 1.0f);
     const CosSin bound{__builtin_sqrtf(1.0f - sin_bound * sin_bound), sin_bound};
 
     const float along_axis =
         static_cast<float>(node.ax[i]) * x + static_cast<float>(node.ay[i]) * y + static_cast<float>(node.az[i]) * z;
     const float cos_front = along_axis * inverse_distance * (1.0f / 32767.0f);
-    const float cos_axis = (node.link[i] & kLightTreeTwoSided) != 0 ? __builtin_fabsf(cos_front) : cos_front;
+    // Two-sided: the sign is cleared.
+    const std::uint32_t sign_mask = ~((node.link[i] & kLightTreeTwoSided) << 1);
+    const float cos_axis = __builtin_bit_cast(float, __builtin_bit_cast(std::uint32_t, cos_front) & sign_mask);
     const CosSin spread = angle_from_cos(light_tree_decode_cos(node.cos_spread[i]));
     const float cos_emission =
         angle_subtract_clamped(angle_subtract_clamped(angle_from_cos(cos_axis), spread), bound).cos;
-    const float emission =
-        cos_emission < light_tree_decode_cos(node.cos_falloff[i]) - kSlack ? 0.0f : max(cos_emission, kFloor);
+    const float cos_limit = light_tree_decode_cos(node.cos_falloff[i]) - kSlack;
+    const float emission_inside = max(cos_emission, kFloor);
+    const float emission = cos_emission < cos_limit ? 0.0f : emission_inside;
 
     const float cos_normal = -(N.x * x + N.y * y + N.z * z) * inverse_distance;
     const float cos_received = angle_subtract_clamped(angle_from_cos(cos_normal), bound).cos;
-    const float received = cos_received < -kSlack ? 0.0f : max(cos_received, kFloor);
+    const float received_above = max(cos_received, kFloor);
+    const float received = cos_received < -kSlack ? 0.0f : received_above;
 
-    // Inside the sphere, light may arrive from anywhere.
-    const float factor = emission * (has_normal ? received : 1.0f);
+    // Inside the sphere, light may arrive from anywhere. Without a normal, received is between the floor and one.
+    const float factor = emission * max(received, without_normal);
     estimates.value[i] = estimate * (distance_squared > radius_squared ? factor : 1.0f);
   }
-  for (int i = 0; i < kLightTreeWidth; ++i) {
-    estimates.sum += estimates.value[i];
-  }
+  const float* v = estimates.value;
+  estimates.sum = ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
   return estimates;
+}
+
+/// One of two in proportion to their weights.
+/// @param target  in [0, first + second), rounding aside; less what it passed on return
+/// @return        whether it is the second: never one of weight zero if the other has any
+RELIEF_KERNEL bool light_tree_take_second(double& target, float first, float second)
+{
+  const bool take = target >= static_cast<double>(first) && second > 0.0f;
+  target -= take ? static_cast<double>(first) : 0.0;
+  return take;
 }
 
 struct LightChoice {
@@ -141,18 +156,14 @@ light_tree_sample(const LightTreeNode* nodes, const LightEstimates& root, Vec3f 
   const LightTreeNode* node = nodes;
   float probability = 1.0f;
   while (estimates.sum > 0.0f) {
-    // The last child with an estimate takes what rounding leaves over.
-    const double target = u * static_cast<double>(estimates.sum);
+    const float* v = estimates.value;
+    double target = u * static_cast<double>(estimates.sum);
     int chosen = 0;
-    double before = 0, chosen_before = 0;
-    for (int i = 0; i < kLightTreeWidth; ++i) {
-      const bool take = estimates.value[i] > 0.0f && target >= before;
-      chosen = take ? i : chosen;
-      chosen_before = take ? before : chosen_before;
-      before += static_cast<double>(estimates.value[i]);
-    }
-    u = (target - chosen_before) / static_cast<double>(estimates.value[chosen]);
-    probability *= estimates.value[chosen] / estimates.sum;
+    if (light_tree_take_second(target, (v[0] + v[1]) + (v[2] + v[3]), (v[4] + v[5]) + (v[6] + v[7]))) chosen = 4;
+    if (light_tree_take_second(target, v[chosen] + v[chosen + 1], v[chosen + 2] + v[chosen + 3])) chosen += 2;
+    if (light_tree_take_second(target, v[chosen], v[chosen + 1])) chosen += 1;
+    u = target / static_cast<double>(v[chosen]);
+    probability *= v[chosen] / estimates.sum;
     const std::uint32_t link = node->link[chosen];
     if ((link & kLightTreeLeaf) != 0) return {link & kLightTreeIndexMask, probability};
     node = nodes + (link & kLightTreeIndexMask);
