@@ -1,0 +1,192 @@
+// From a scene to its lights.
+#include "integrator/light_set.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "kernel/shape/surface_hit.h"
+
+namespace relief {
+namespace {
+
+/// A square in the xy plane as two triangles with uv = position; front towards +z.
+Mesh square_mesh()
+{
+  Mesh mesh;
+  mesh.P = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  mesh.uv[0] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  return mesh;
+}
+
+/// One emissive square a material, placed at x = 10 · index.
+Scene squares(const std::vector<Material>& materials)
+{
+  Scene scene;
+  scene.meshes.push_back(square_mesh());
+  scene.materials = materials;
+  for (std::size_t i = 0; i < materials.size(); ++i) {
+    Instance instance;
+    instance.material_index = static_cast<int>(i);
+    instance.world_from_object.p = {10.0f * static_cast<float>(i), 0, 0};
+    scene.instances.push_back(instance);
+  }
+  return scene;
+}
+
+Material emissive(Vec3f emission)
+{
+  Material material;
+  material.emission = emission;
+  return material;
+}
+
+float choice_probability(const LightSet& set, Vec3f P, std::uint32_t light)
+{
+  const LightsView view = set.view();
+  return light_tree_pdf(view.nodes, light_tree_estimate(view.nodes[0], P, {}), P, {}, light, view.light_trails[light]);
+}
+
+TEST(LightSet, TrianglesOfAnInstanceAreConsecutiveAfterTheScenesLights)
+{
+  Material displaced = emissive({1, 1, 1});
+  displaced.displacement_index = 0;
+  Material unlit = emissive({1, 1, 1});
+  unlit.unlit = true;
+  Scene scene = squares({emissive({1, 2, 3}), emissive({}), emissive({4, 5, 6}), displaced, unlit});
+  scene.lights.resize(3);
+  const LightSet set = light_set_make(scene, {});
+  EXPECT_EQ(set.first_light_index, (std::vector<std::int32_t>{3, -1, 5, -1, -1}));
+  ASSERT_EQ(set.lights.size(), 7u);
+  for (std::size_t i = 3; i < 7; ++i) {
+    EXPECT_EQ(set.lights[i].kind, LightKind::kTriangle);
+    EXPECT_EQ(set.lights[i].instance_index, i < 5 ? 0 : 2);
+    EXPECT_EQ(set.lights[i].triangle_index, static_cast<int>(i + 1) % 2);
+    EXPECT_EQ(set.lights[i].emission, i < 5 ? (Vec3f{1, 2, 3}) : (Vec3f{4, 5, 6}));
+    EXPECT_FLOAT_EQ(set.lights[i].area, 0.5f);
+  }
+}
+
+TEST(LightSet, FrontIsTheSurfacesFrontUnderEveryTransform)
+{
+  std::uint64_t state = 1;
+  const auto next = [&state] {
+    state = hash_mix(state + 0x9e3779b97f4a7c15u);
+    return static_cast<float>(state >> 40) * 0x1p-23f - 1.0f;
+  };
+  int mirrored = 0;
+  for (int k = 0; k < 200; ++k) {
+    Scene scene = squares({emissive({1, 1, 1})});
+    Affine3& m = scene.instances[0].world_from_object;
+    m = {{next(), next(), next()}, {next(), next(), next()}, {next(), next(), next()}, {next(), next(), next()}};
+    InstanceView instance;
+    instance.world_from_object = m;
+    instance.object_from_world = inverse(m);
+    if (determinant(m) < 0.0f) {
+      instance.flags |= kMirrored;
+      ++mirrored;
+    }
+    const LightSet set = light_set_make(scene, {});
+    for (std::uint32_t triangle = 0; triangle < 2; ++triangle) {
+      const Vec2f b{0.3f, 0.5f};
+      const SurfaceHit hit = surface_hit_make(scene.meshes[0].view(), instance, triangle, b.x, b.y);
+      const Light& light = set.lights[triangle];
+      ASSERT_LT(length(hit.Ng - light.axis), 1e-3f) << k;
+      ASSERT_LT(length(hit.P - (light.P + light.edge_u * b.x + light.edge_v * b.y)), 1e-5f) << k;
+    }
+  }
+  EXPECT_GT(mirrored, 50);
+}
+
+TEST(LightSet, DoubleSidedMaterialsEmitFromBothSides)
+{
+  Material both = emissive({1, 1, 1});
+  both.double_sided = true;
+  const LightSet set = light_set_make(squares({emissive({1, 1, 1}), both}), {});
+  EXPECT_FALSE(set.lights[0].two_sided);
+  EXPECT_TRUE(set.lights[2].two_sided);
+  EXPECT_EQ(lights_sample(set.view(), {0.5f, 0.2f, -1}, {}, 0.0f, {0.5f, 0.5f}).light_index / 2, 1);
+}
+
+TEST(LightSet, TexturesWeighTheChoiceButNotTheEmission)
+{
+  // Left half black, right half white: u < ½ is dark. One mesh has both halves, so its first triangle (below the diagonal,
+  // to the right) is the brighter one.
+  const int size = 64;
+  std::vector<unsigned char> texels(size * size);
+  for (int y = 0; y < size; ++y) {
+    for (int x = 0; x < size; ++x)
+      texels[static_cast<std::size_t>(y * size + x)] = x < size / 2 ? 0 : 255;
+  }
+  TextureView texture;
+  texture.levels[0] = texels.data();
+  texture.width = texture.height = size;
+  texture.num_levels = 1;
+  texture.num_channels = 1;
+
+  Material material = emissive({2, 2, 2});
+  material.emission_texture.texture_index = 0;
+  Material dark = material;  // sees the left quarter of the map only
+  dark.emission_texture.m00 = 0.25f;
+  dark.emission_texture.m02 = 0.1f;
+  const std::vector<TextureView> textures{texture};
+  const LightSet set = light_set_make(squares({material, dark, emissive({2, 2, 2})}), textures);
+  for (const Light& light : set.lights)
+    EXPECT_EQ(light.emission, (Vec3f{2, 2, 2}));
+  const Vec3f P{0.5f, 0.5f, 1000};
+  EXPECT_EQ(choice_probability(set, P, 2), 0.0f);
+  EXPECT_EQ(choice_probability(set, P, 3), 0.0f);
+  // Means over the triangles: ¾ and ¼; ten lattice points know them to a tenth.
+  EXPECT_NEAR(choice_probability(set, P, 0) / choice_probability(set, P, 4), 0.75f, 0.1f);
+  EXPECT_NEAR(choice_probability(set, P, 1) / choice_probability(set, P, 4), 0.25f, 0.1f);
+}
+
+TEST(LightSet, DegenerateTrianglesKeepTheirPlaceAndAreNeverChosen)
+{
+  Scene scene = squares({emissive({1, 1, 1})});
+  scene.meshes[0].triangles = {{0, 0, 1}, {0, 1, 2}, {2, 2, 2}};
+  const LightSet set = light_set_make(scene, {});
+  ASSERT_EQ(set.lights.size(), 3u);
+  EXPECT_EQ(choice_probability(set, {0.5f, 0.5f, 1}, 0), 0.0f);
+  EXPECT_EQ(choice_probability(set, {0.5f, 0.5f, 1}, 1), 1.0f);
+  EXPECT_EQ(choice_probability(set, {0.5f, 0.5f, 1}, 2), 0.0f);
+  EXPECT_EQ(lights_pdf(set.view(), {0.5f, 0.5f, 1}, {}, 2, {0, 0, -1}, 1), 0.0f);
+}
+
+TEST(LightSet, EnvironmentIrradianceFindsASmallSunInTheMap)
+{
+  // 256 × 128 floats would be half floats; one bright texel of 255 among grey 1s in 8 bits, at the equator.
+  const int width = 256, height = 128;
+  std::vector<unsigned char> texels(width * height, 1);
+  texels[64 * width + 100] = 255;
+  TextureView texture;
+  texture.levels[0] = texels.data();
+  texture.width = width;
+  texture.height = height;
+  texture.num_levels = 1;
+  texture.num_channels = 1;
+  Scene scene;
+  scene.environment.color = {1000, 1000, 1000};
+  scene.environment.texture_index = 0;
+  const std::vector<TextureView> textures{texture};
+  const LightSet set = light_set_make(scene, textures);
+  const double texel = 2 * std::numbers::pi / width * std::numbers::pi / height;
+  const double radiance = 1000.0 / 255;
+  const double expected = 0.25 * radiance * (4 * std::numbers::pi + 254 * texel);
+  EXPECT_NEAR(static_cast<double>(set.environment_irradiance), expected, 0.01 * expected);
+  EXPECT_TRUE(set.any());
+}
+
+TEST(LightSet, ConstantEnvironmentsIrradianceIsPiTimesItsRadiance)
+{
+  Scene scene;
+  scene.environment.color = {1, 2, 3};
+  EXPECT_FLOAT_EQ(light_set_make(scene, {}).environment_irradiance, 2 * kPi);
+  scene.environment.color = {};
+  EXPECT_FALSE(light_set_make(scene, {}).any());
+}
+
+}  // namespace
+}  // namespace relief
