@@ -99,7 +99,7 @@ RELIEF_KERNEL BsdfEval glass_closure_eval(const SurfaceClosure& c, const BsdfTab
     const float lost_i = glass_lost(tables, glass.table, side, cos_i);
     const float share = crosses ? 1.0f - glass.reflect_share : glass.reflect_share;
     f += share * diffuse_coupled_eval(splat3(1.0f), glass.lost, lost_i, crosses ? glass.mean_far : glass.mean_near).x;
-    pdf = lerp(glass.lost, pdf, share * warp_broad_hemisphere_pdf(cos_i));
+    pdf = lerp(glass.lost, pdf, share * multiple_scattering_pdf(c.scattering, cos_i));
   }
   f *= glass.weight;
   return {crosses ? c.transmission_color * (f * transmission_scale<kMode>(glass.eta)) : splat3(f), pdf};
@@ -131,7 +131,7 @@ RELIEF_KERNEL BsdfEval closure_eval(const SurfaceClosure& c, const BsdfTables& t
     }
     if (probability.multiple > 0.0f) {
       e.f += c.multiple * ggx_albedo(tables, c.ggx, wi.z).lost;
-      e.pdf += probability.multiple * warp_broad_hemisphere_pdf(wi.z);
+      e.pdf += probability.multiple * multiple_scattering_pdf(c.scattering, wi.z);
     }
   }
   if constexpr ((kFeatures & kFeatureTransmission) != 0) {
@@ -143,7 +143,7 @@ RELIEF_KERNEL BsdfEval closure_eval(const SurfaceClosure& c, const BsdfTables& t
     }
     if (wi.z < 0.0f && probability.thin_multiple > 0.0f) {
       e.f += c.thin_multiple * ggx_albedo(tables, c.ggx, -wi.z).lost;
-      e.pdf += probability.thin_multiple * warp_broad_hemisphere_pdf(-wi.z);
+      e.pdf += probability.thin_multiple * multiple_scattering_pdf(c.scattering, -wi.z);
     }
     if (probability.glass > 0.0f && !c.glass.delta) {
       const BsdfEval g = glass_closure_eval<kMode>(c, tables, wi);
@@ -229,7 +229,7 @@ RELIEF_KERNEL BsdfSample closure_sample(const SurfaceClosure& c, const BsdfTable
     wi = diffuse_sample(u);
     as_diffuse();
   } else if (chosen(probability.multiple)) {
-    wi = warp_broad_hemisphere(u);
+    wi = multiple_scattering_sample(c.scattering, u);
     as_diffuse();
   } else if (chosen(probability.specular)) {
     if (c.ggx.mirror) {
@@ -250,7 +250,7 @@ RELIEF_KERNEL BsdfSample closure_sample(const SurfaceClosure& c, const BsdfTable
         if (u_choice < glass.lost) {
           u_choice /= glass.lost;
           transmits = u_choice >= glass.reflect_share;
-          wi = warp_broad_hemisphere(u);
+          wi = multiple_scattering_sample(c.scattering, u);
           if (transmits) wi = -wi;
           as_diffuse();
         } else {
@@ -273,7 +273,7 @@ RELIEF_KERNEL BsdfSample closure_sample(const SurfaceClosure& c, const BsdfTable
         as_glossy(c.ggx.alpha);
       } else if (chosen(probability.thin_multiple)) {
         transmits = true;
-        wi = thin_wall_mirror(warp_broad_hemisphere(u));
+        wi = thin_wall_mirror(multiple_scattering_sample(c.scattering, u));
         as_diffuse();
       } else {
         found = false;

@@ -4,6 +4,7 @@
 
 #include "kernel/bsdf/diffuse.h"
 #include "kernel/bsdf/energy_tables.h"
+#include "kernel/bsdf/multiple_scattering.h"
 #include "kernel/bsdf/surface_params.h"
 
 namespace relief {
@@ -58,6 +59,7 @@ struct SurfaceClosure {
   float F90 = 0;
   Vec3f diffuse{};                    ///< f of the diffuse base over what the interface lets through towards wi
   float under_F0 = 0, under_F90 = 0;  ///< the interface over diffuse base and thin wall; both 0: there is none
+  MultipleScattering scattering;
   Vec3f multiple{}, thin_multiple{};  ///< f of multiple scattering, reflected and transmitted, over 1 − E(wi)
   Vec3f transmission_color{};         ///< tint of all that crosses
   float thin_weight = 0;
@@ -182,6 +184,7 @@ RELIEF_KERNEL SurfaceClosure surface_closure_make(const SurfaceParams& p, const 
   // Nearly smooth surfaces lose less than rounding; without a mean there is nothing to divide by.
   if ((metal > 0.0f || c.thin_weight > 0.0f) && mean_lost > kLeastMeanLost) {
     const float lost = e.lost;
+    c.scattering = multiple_scattering_make(c.ggx.alpha);
     if constexpr (kMetal) {
       // Kulla and Conty 2017, with the square of the mean Fresnel that Hill 2018 restored: the light meets the
       // metal at least twice.
@@ -206,6 +209,7 @@ RELIEF_KERNEL SurfaceClosure surface_closure_make(const SurfaceParams& p, const 
     }
     if (glass > 0.0f) {
       c.glass = glass_closure_make(p, tables, c, glass);
+      if (c.glass.lost > 0.0f) c.scattering = multiple_scattering_make(c.ggx.alpha);
       probability.glass = below * glass;
     }
   }

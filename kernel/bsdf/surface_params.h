@@ -178,8 +178,9 @@ RELIEF_KERNEL Vec3f shading_normal_consistent(Vec3f Ng, Vec3f Ns, Vec3f wo)
   // Straight down: no side to lift to.
   if (!(squared > 1e-12f)) return Ng;
   const Vec3f lifted = in_plane * (safe_sqrt(1.0f - sqr(height)) / __builtin_sqrtf(squared)) + height * Ng;
-  const Vec3f half = wo + lifted;
-  return normalize(half);
+  const Vec3f N = normalize(wo + lifted);
+  // Where wo grazes and is reflected back on itself, the sum cancels and its rounding may tilt N too far.
+  return 2.0f * dot(N, wo) * dot(N, Ng) > dot(wo, Ng) ? N : Ng;
 }
 
 /// What a denoiser or compositor calls the surface's colour.

@@ -126,25 +126,6 @@ RELIEF_KERNEL Vec2f warp_triangle_inverse(Vec2f barycentric)
 /// @return per unit of the area given
 RELIEF_KERNEL constexpr float warp_triangle_pdf(float area) { return 1.0f / area; }
 
-/// Direction with density half that of the cosine and half uniform on the hemisphere z >= 0: for lobes between the two.
-RELIEF_KERNEL Vec3f warp_broad_hemisphere(Vec2f u)
-{
-  // The distribution of z is (z² + z) / 2.
-  return direction_from_z(0.5f * (__builtin_sqrtf(1.0f + 8.0f * u.x) - 1.0f), u.y);
-}
-
-RELIEF_KERNEL Vec2f warp_broad_hemisphere_inverse(Vec3f w)
-{
-  return {0.5f * w.z * (w.z + 1.0f), turn_from_direction(w)};
-}
-
-/// @param cos_theta  z of the direction
-/// @return           solid angle; 0 below the horizon
-RELIEF_KERNEL constexpr float warp_broad_hemisphere_pdf(float cos_theta)
-{
-  return cos_theta > 0.0f ? (0.5f * cos_theta + 0.25f) * kInvPi : 0.0f;
-}
-
 /// Normal of the isotropic GGX distribution as seen from wo (visible normals).
 /// @param wo     unit, z > 0
 /// @param alpha  > 0

@@ -85,7 +85,7 @@ class Chi2Histogram {
           return pdf(r * std::cos(phi), r * std::sin(phi), z);
         };
         expected[static_cast<std::size_t>(i * num_phi_ + j)] =
-            num_samples_ * integrate(f, z0, z1, phi0, phi1, gauss(f, z0, z1, phi0, phi1), 6);
+            num_samples_ * integrate(f, z0, z1, phi0, phi1, gauss(f, z0, z1, phi0, phi1), kMaxDepth);
       }
     }
     const double total = std::accumulate(expected.begin(), expected.end(), 0.0);
@@ -103,13 +103,6 @@ class Chi2Histogram {
       ++num_terms;
     };
     for (const std::size_t cell : order) {
-      // Quadrature and rounding leave traces of density and of absorption; 1e-6 of all samples is within Poisson noise.
-      if (expected[cell] < 1e-6 * num_samples_ && cell == cells()) expected[cell] = 0.0;
-      if (expected[cell] == 0.0 && counts_[cell] > 1e-5 * num_samples_) {
-        result.failure = "samples where the density is zero, cell " + std::to_string(cell);
-        result.p_value = 0.0;
-        return result;
-      }
       if (expected[cell] < 5.0 || (pooled_expected > 0.0 && pooled_expected < 5.0)) {
         pooled_expected += expected[cell];
         pooled_count += counts_[cell];
@@ -117,7 +110,13 @@ class Chi2Histogram {
         add_term(counts_[cell], expected[cell]);
       }
     }
-    if (pooled_expected > 0.0) add_term(pooled_count, pooled_expected);
+    if (pooled_expected > 0.0) {
+      add_term(pooled_count, pooled_expected);
+    } else if (pooled_count > 0.0) {
+      result.failure = "samples where the density is zero";
+      result.p_value = 0.0;
+      return result;
+    }
     result.degrees_of_freedom = num_terms - 1;
     if (result.degrees_of_freedom > 0) {
       result.p_value = incomplete_gamma_q(0.5 * result.degrees_of_freedom, 0.5 * result.statistic);
@@ -127,6 +126,9 @@ class Chi2Histogram {
 
  private:
   static constexpr double kTurn = 6.283185307179586;
+
+  /// Levels of subdivision; the first ones are unconditional, so that a density's narrow edge is not overlooked.
+  static constexpr int kMaxDepth = 7, kMinDepth = 3;
 
   std::size_t cells() const { return static_cast<std::size_t>(num_z_ * num_phi_); }
 
@@ -153,7 +155,8 @@ class Chi2Histogram {
     const double a = gauss(f, x0, xm, y0, ym), b = gauss(f, xm, x1, y0, ym);
     const double c = gauss(f, x0, xm, ym, y1), d = gauss(f, xm, x1, ym, y1);
     const double sum = a + b + c + d;
-    if (depth == 0 || std::abs(sum - whole) < 1e-7 + 1e-4 * std::abs(sum)) return sum;
+    const bool settled = depth <= kMaxDepth - kMinDepth && std::abs(sum - whole) < 1e-7 + 1e-4 * std::abs(sum);
+    if (depth == 0 || settled) return sum;
     return integrate(f, x0, xm, y0, ym, a, depth - 1) + integrate(f, xm, x1, y0, ym, b, depth - 1) +
            integrate(f, x0, xm, ym, y1, c, depth - 1) + integrate(f, xm, x1, ym, y1, d, depth - 1);
   }

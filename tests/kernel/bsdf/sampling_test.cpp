@@ -55,7 +55,7 @@ TEST(SurfaceSample, FollowsItsDensity)
   for (std::size_t i = 0; i < settings.size(); ++i) {
     const SurfaceClosure closure =
         surface_closure_make<kFeatureAll>(settings[i].params, full_tables(), direction(settings[i].wo_z));
-    Chi2Histogram histogram(24, 32);
+    Chi2Histogram histogram(16, 24);
     TestRandom random(i);
     for (int n = 0; n < 1000000; ++n) {
       const float u_lobe = random.next();
