@@ -19,6 +19,13 @@
 #include "kernel/texture/texture.h"
 #include "scene/mip_chain.h"
 
+#ifdef __SANITIZE_ADDRESS__
+// OpenImageIO 2.4 leaks one string when a PNG ends early: libpng's error jumps over its destructor. The suppression
+// needs the slow unwinder to see the frame.
+extern "C" const char* __asan_default_options() { return "fast_unwind_on_malloc=0:malloc_context_size=12"; }
+extern "C" const char* __lsan_default_suppressions() { return "leak:PngReadCallback"; }
+#endif
+
 namespace relief {
 namespace {
 
@@ -653,7 +660,7 @@ TEST(TextureErrors, AbsurdSizesAreRefusedBeforeMemoryIsAsked)
                                       static_cast<unsigned char>(v >> 8), static_cast<unsigned char>(v)};
   };
   for (const auto& [width, height] :
-       {std::pair<std::uint32_t, std::uint32_t>{900000, 900000}, {70000, 1}, {60000, 60000}}) {
+       {std::pair<std::uint32_t, std::uint32_t>{900000, 900000}, {70000, 1}, {30000, 30000}}) {
     std::vector<unsigned char> chunk = {'I', 'H', 'D', 'R'};
     for (const std::uint32_t v : {width, height}) {
       const auto bytes = big_endian(v);
