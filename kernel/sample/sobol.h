@@ -117,7 +117,8 @@ RELIEF_KERNEL constexpr float sample_1d(std::uint32_t pixel_hash, std::uint32_t 
 
 /// One point of a scrambled (0,2)-sequence: stratified in x, in y and jointly.
 /// @return [0, 1)²
-/// @cost   see BM figures in docs; about thirty integer operations and twelve multiplications, no memory
+/// @cost   about a hundred integer operations, no memory: 12 ns one at a time; in a loop over paths, which compilers turn
+///         into SIMD, 4.5 ns with AVX2 and 1.7 ns with AVX-512 (one EPYC core)
 RELIEF_KERNEL constexpr Vec2f sample_2d(std::uint32_t pixel_hash, std::uint32_t sample_index, std::uint32_t dimension)
 {
   const SampleKeys keys = sample_keys(pixel_hash, sample_index, dimension);
