@@ -19,15 +19,24 @@ struct FeatureName {
 };
 
 constexpr FeatureName kFeatureNames[] = {
-    {&FeatureSet::textures, "textures"},         {&FeatureSet::normal_maps, "normal maps"},
-    {&FeatureSet::transparency, "transparency"}, {&FeatureSet::transmission, "transmission"},
-    {&FeatureSet::volume, "volume"},             {&FeatureSet::clearcoat, "clearcoat"},
-    {&FeatureSet::sheen, "sheen"},               {&FeatureSet::metal, "metal"},
-    {&FeatureSet::displacement, "displacement"}, {&FeatureSet::environment_map, "environment map"},
-    {&FeatureSet::environment, "environment"},   {&FeatureSet::mesh_lights, "mesh lights"},
-    {&FeatureSet::area_lights, "area lights"},   {&FeatureSet::delta_lights, "delta lights"},
-    {&FeatureSet::many_lights, "many lights"},   {&FeatureSet::instances, "instances"},
-    {&FeatureSet::depth_of_field, "depth of field"}, {&FeatureSet::caustic_casters, "caustic casters"},
+    {&FeatureSet::textures, "textures"},
+    {&FeatureSet::normal_maps, "normal maps"},
+    {&FeatureSet::transparency, "transparency"},
+    {&FeatureSet::transmission, "transmission"},
+    {&FeatureSet::volume, "volume"},
+    {&FeatureSet::clearcoat, "clearcoat"},
+    {&FeatureSet::sheen, "sheen"},
+    {&FeatureSet::metal, "metal"},
+    {&FeatureSet::displacement, "displacement"},
+    {&FeatureSet::environment_map, "environment map"},
+    {&FeatureSet::environment, "environment"},
+    {&FeatureSet::mesh_lights, "mesh lights"},
+    {&FeatureSet::area_lights, "area lights"},
+    {&FeatureSet::delta_lights, "delta lights"},
+    {&FeatureSet::many_lights, "many lights"},
+    {&FeatureSet::instances, "instances"},
+    {&FeatureSet::depth_of_field, "depth of field"},
+    {&FeatureSet::caustic_casters, "caustic casters"},
 };
 
 std::string megabytes(std::size_t bytes) { return fmt::format("{:.1f} MiB", static_cast<double>(bytes) / (1 << 20)); }
@@ -51,7 +60,8 @@ int info(const std::string& file, bool strict)
 
   std::size_t triangles = 0;
   std::size_t placed = 0;
-  for (const Mesh& mesh : scene.meshes) triangles += mesh.triangles.size();
+  for (const Mesh& mesh : scene.meshes)
+    triangles += mesh.triangles.size();
   for (const Instance& instance : scene.instances) {
     placed += scene.meshes[static_cast<std::size_t>(instance.mesh_index)].triangles.size();
   }
@@ -61,14 +71,15 @@ int info(const std::string& file, bool strict)
   fmt::print("meshes: {} with {} triangles; instances: {} with {} triangles in all\n", scene.meshes.size(), triangles,
              scene.instances.size(), placed);
   std::vector<std::string> cameras;
-  for (const SceneCamera& camera : scene.cameras) cameras.push_back(camera.name);
+  for (const SceneCamera& camera : scene.cameras)
+    cameras.push_back(camera.name);
   print_names("cameras", cameras);
   print_names("materials", scene.material_names);
   fmt::print("lights: {} placed, {} emissive triangles, {}\n", scene.lights.size(),
              context.lights.lights.size() - scene.lights.size(),
-             scene.environment.texture_index >= 0         ? "environment map"
-             : is_zero(scene.environment.color) ? "no environment"
-                                                          : "constant environment");
+             scene.environment.texture_index >= 0 ? "environment map"
+             : is_zero(scene.environment.color)   ? "no environment"
+                                                  : "constant environment");
   const std::size_t num_textures = scene.textures->views().size();
   fmt::print("textures: {}\n", num_textures);
   for (std::size_t i = 0; i < num_textures; ++i) {
@@ -84,7 +95,8 @@ int info(const std::string& file, bool strict)
   fmt::print("features: {}\n", features.empty() ? "none" : features);
   fmt::print("memory: meshes {}, textures {}, acceleration structure {}, lights {}\n", megabytes(stats.mesh_bytes),
              megabytes(stats.texture_bytes), megabytes(stats.bvh_bytes), megabytes(stats.light_bytes));
-  for (const std::string& warning : scene.warnings) fmt::print("warning: {}\n", warning);
+  for (const std::string& warning : scene.warnings)
+    fmt::print("warning: {}\n", warning);
   if (strict && !scene.warnings.empty()) throw SceneError(file, "", "no warnings (--strict)", scene.warnings.front());
   return 0;
 }

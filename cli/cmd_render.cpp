@@ -11,10 +11,10 @@
 #include <unistd.h>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/task_arena.h>
+#include <nlohmann/json.hpp>
 
 #include "cli/arguments.h"
 #include "cli/commands.h"
@@ -161,7 +161,8 @@ bool render_frame(const RenderArguments& arguments,
                   std::optional<int> frame,
                   ProgressPrinter& progress)
 {
-  const std::filesystem::path output = frame ? frame_path(arguments.output, *frame) : std::filesystem::path(arguments.output);
+  const std::filesystem::path output =
+      frame ? frame_path(arguments.output, *frame) : std::filesystem::path(arguments.output);
   const auto load_start = std::chrono::steady_clock::now();
   LoadOptions load;
   load.has_frame = frame.has_value();
@@ -178,7 +179,8 @@ bool render_frame(const RenderArguments& arguments,
   if (arguments.strict && !stats.warnings.empty()) {
     throw SceneError(arguments.scene, "", "no warnings (--strict)", stats.warnings.front());
   }
-  for (const std::string& warning : stats.warnings) fmt::print(stderr, "relief: warning: {}\n", warning);
+  for (const std::string& warning : stats.warnings)
+    fmt::print(stderr, "relief: warning: {}\n", warning);
 
   const RenderOptions options = options_for(scene, arguments);
   const std::string fingerprint = render_fingerprint(scene, options);
@@ -188,7 +190,9 @@ bool render_frame(const RenderArguments& arguments,
     return true;
   }
   // Open the output's folder and the colour configuration before hours of work, not after.
-  { const AtomicFile probe(output); }
+  {
+    const AtomicFile probe(output);
+  }
   std::optional<ColorView> view;
   if (!arguments.png.empty()) view.emplace(options.settings.view);
 
@@ -212,7 +216,8 @@ bool render_frame(const RenderArguments& arguments,
     png_write(frame ? frame_path(arguments.png, *frame) : std::filesystem::path(arguments.png), image.view, png);
   }
   if (!arguments.stats.empty()) {
-    atomic_write(frame ? frame_path(arguments.stats, *frame) : std::filesystem::path(arguments.stats), stats_json(stats));
+    atomic_write(frame ? frame_path(arguments.stats, *frame) : std::filesystem::path(arguments.stats),
+                 stats_json(stats));
   }
   fmt::print(stderr, "{}: {}x{}, {:.6g} samples a pixel in {:.2f} s, estimated RMSE {:.3g}{}\n", output.string(),
              image.view.width, image.view.height, stats.samples_per_pixel, stats.render_seconds, stats.error_rmse,
@@ -242,7 +247,8 @@ int render_all(const RenderArguments& arguments, const std::string& command)
   if (arguments.frames.empty()) {
     frames.emplace_back();
   } else {
-    for (const int frame : parse_frames(arguments.frames)) frames.emplace_back(frame);
+    for (const int frame : parse_frames(arguments.frames))
+      frames.emplace_back(frame);
   }
 
   std::signal(SIGINT, on_signal);
@@ -282,7 +288,8 @@ void cmd_render_register(CLI::App& app, Run& run, const std::string& command_lin
   command->add_option("--seed", arguments->seed, "Seed of the random numbers (default: the scene's)");
   command->add_option("--threads", arguments->threads, "Threads (default: all processors)")->check(CLI::Range(1, 4096));
   command->add_option("--frames", arguments->frames, "Frames, such as 1-10,20,30-60x2 (default: the rest pose)");
-  command->add_flag("--resume", arguments->resume, "Skip frames whose output is whole and of the same scene and settings");
+  command->add_flag("--resume", arguments->resume,
+                    "Skip frames whose output is whole and of the same scene and settings");
   command->add_flag("--strict", arguments->strict, "Turn warnings into errors");
   command->add_option("--camera", arguments->camera, "Name of the camera (default: the first)");
   command->add_option("--crop", arguments->crop, "X0,Y0,X1,Y1: render this window of the image only");

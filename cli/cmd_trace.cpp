@@ -30,7 +30,8 @@ std::vector<float> parse_numbers(const std::string& line)
   const char* at = line.data();
   const char* end = at + line.size();
   while (true) {
-    while (at != end && (*at == ' ' || *at == '\t' || *at == '\r')) ++at;
+    while (at != end && (*at == ' ' || *at == '\t' || *at == '\r'))
+      ++at;
     if (at == end) return numbers;
     float value = 0;
     const auto result = std::from_chars(at, end, value);
@@ -50,7 +51,8 @@ std::vector<TraceRay> read_rays(const std::string& file)
     if (line.find_first_not_of(" \t\r") == std::string::npos || line[0] == '#') continue;
     const std::vector<float> v = parse_numbers(line);
     if (v.size() != 6 && v.size() != 8) {
-      throw InputError(file, fmt::format("line {}: expected 'ox oy oz dx dy dz [tmin tmax]', found '{}'", number, line));
+      throw InputError(file,
+                       fmt::format("line {}: expected 'ox oy oz dx dy dz [tmin tmax]', found '{}'", number, line));
     }
     TraceRay ray{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}, 0.0f, kInfinity};
     if (v.size() == 8) {
@@ -58,9 +60,10 @@ std::vector<TraceRay> read_rays(const std::string& file)
       ray.t_max = v[7];
     }
     if (!is_finite(ray.O) || !is_finite(ray.D) || is_zero(ray.D) || !(ray.t_min >= 0.0f)) {
-      throw InputError(file, fmt::format("line {}: expected finite numbers, a direction that is not zero and tmin >= 0, "
-                                         "found '{}'",
-                                         number, line));
+      throw InputError(file,
+                       fmt::format("line {}: expected finite numbers, a direction that is not zero and tmin >= 0, "
+                                   "found '{}'",
+                                   number, line));
     }
     rays.push_back(ray);
   }
@@ -93,7 +96,8 @@ std::string hits_csv(const std::vector<TraceHit>& hits)
 int trace(const TraceArguments& arguments)
 {
   const Scene scene = scene_load(arguments.scene);
-  for (const std::string& warning : scene.warnings) fmt::print(stderr, "relief: warning: {}\n", warning);
+  for (const std::string& warning : scene.warnings)
+    fmt::print(stderr, "relief: warning: {}\n", warning);
   if (arguments.pixel.empty()) {
     const std::vector<TraceRay> rays = read_rays(arguments.rays);
     const SceneContext context(scene);
@@ -125,8 +129,10 @@ void cmd_trace_register(CLI::App& app, Run& run)
   auto arguments = std::make_shared<TraceArguments>();
   CLI::App* command = app.add_subcommand("trace", "Traces single rays, or shows the rays of one pixel's path");
   command->add_option("scene", arguments->scene, "Scene file (.gltf, .glb)")->required();
-  CLI::Option* rays = command->add_option("--rays", arguments->rays, "File of rays, one 'ox oy oz dx dy dz [tmin tmax]' a line");
-  CLI::Option* pixel = command->add_option("--pixel", arguments->pixel, "X,Y[,SAMPLE]: print the rays of that path instead");
+  CLI::Option* rays =
+      command->add_option("--rays", arguments->rays, "File of rays, one 'ox oy oz dx dy dz [tmin tmax]' a line");
+  CLI::Option* pixel =
+      command->add_option("--pixel", arguments->pixel, "X,Y[,SAMPLE]: print the rays of that path instead");
   rays->excludes(pixel);
   command->add_option("-o,--output", arguments->output, "CSV of hits, or the path's rays; - is standard output")
       ->capture_default_str();

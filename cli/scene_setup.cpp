@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 namespace relief {
 
@@ -11,11 +11,13 @@ Camera camera_for_image(const Scene& scene, const std::string& name, int width, 
 {
   auto found = scene.cameras.begin();
   if (!name.empty()) {
-    found = std::find_if(scene.cameras.begin(), scene.cameras.end(), [&](const SceneCamera& c) { return c.name == name; });
+    found =
+        std::find_if(scene.cameras.begin(), scene.cameras.end(), [&](const SceneCamera& c) { return c.name == name; });
   }
   if (found == scene.cameras.end()) {
     std::string names;
-    for (const SceneCamera& camera : scene.cameras) names += fmt::format("{}'{}'", names.empty() ? "" : ", ", camera.name);
+    for (const SceneCamera& camera : scene.cameras)
+      names += fmt::format("{}'{}'", names.empty() ? "" : ", ", camera.name);
     throw CLI::ValidationError("--camera", fmt::format("expected one of {}, found '{}'", names, name));
   }
   Camera camera = found->camera;

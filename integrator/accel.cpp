@@ -104,7 +104,8 @@ Accel::Accel(const Scene& scene,
   }
 
   bool any_transparent = false;
-  for (std::size_t m = 0; m < scene.meshes.size(); ++m) any_transparent |= uses[m] == 1 && transparent[m] != 0;
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m)
+    any_transparent |= uses[m] == 1 && transparent[m] != 0;
   top_ = new_scene(any_transparent ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
@@ -150,8 +151,8 @@ RTCGeometry Accel::new_mesh(const Mesh& mesh, const Affine3* world_from_object, 
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.P.data(), 0, sizeof(Vec3f),
                                mesh.P.size());
   } else {
-    auto* vertices = static_cast<Vec3f*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                                                 sizeof(Vec3f), mesh.P.size()));
+    auto* vertices = static_cast<Vec3f*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), mesh.P.size()));
     if (vertices == nullptr) throw std::runtime_error("not enough memory for the vertices of mesh '" + mesh.name + "'");
     for (std::size_t i = 0; i < mesh.P.size(); ++i) {
       vertices[i] = in_place ? mesh.P[i] : transform_point(*world_from_object, mesh.P[i]);
@@ -183,7 +184,8 @@ RTCGeometry Accel::new_rectangle(const Light& light)
   vertices[1] = light.P + light.edge_u - light.edge_v;
   vertices[2] = light.P + light.edge_u + light.edge_v;
   vertices[3] = light.P - light.edge_u + light.edge_v;
-  for (std::uint32_t i = 0; i < 4; ++i) indices[i] = i;
+  for (std::uint32_t i = 0; i < 4; ++i)
+    indices[i] = i;
   return geometry;
 }
 

@@ -50,7 +50,7 @@ class Accel {
   RTCFilterFunctionN shadow_filter_;
   RTCDevice device_ = nullptr;
   RTCScene top_ = nullptr;
-  std::vector<RTCScene> mesh_scenes_;  ///< null for meshes that occur once
+  std::vector<RTCScene> mesh_scenes_;          ///< null for meshes that occur once
   std::vector<std::unique_ptr<Light>> disks_;  ///< user data of disk geometry: stable addresses
 };
 

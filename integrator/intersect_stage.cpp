@@ -166,10 +166,10 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
     const unsigned object =
         instance_id != RTC_INVALID_GEOMETRY_ID ? instance_id : RTCHitN_geomID(arguments->hit, arguments->N, i);
     const InstanceView& instance = g.instances[object];
-    const float alpha = triangle_alpha(g.materials[instance.material_index], g.textures, g.meshes[instance.mesh_index],
-                                      RTCHitN_primID(arguments->hit, arguments->N, i),
-                                      RTCHitN_u(arguments->hit, arguments->N, i),
-                                      RTCHitN_v(arguments->hit, arguments->N, i));
+    const float alpha =
+        triangle_alpha(g.materials[instance.material_index], g.textures, g.meshes[instance.mesh_index],
+                       RTCHitN_primID(arguments->hit, arguments->N, i), RTCHitN_u(arguments->hit, arguments->N, i),
+                       RTCHitN_v(arguments->hit, arguments->N, i));
     context->visibility *= 1.0f - alpha;
     if (context->visibility > 0.0f) arguments->valid[i] = 0;
   }

@@ -134,7 +134,8 @@ RenderedImage render(const Scene& scene,
   };
 
   std::vector<int> active(static_cast<std::size_t>(film.num_tiles()));
-  for (int tile = 0; tile < film.num_tiles(); ++tile) active[static_cast<std::size_t>(tile)] = tile;
+  for (int tile = 0; tile < film.num_tiles(); ++tile)
+    active[static_cast<std::size_t>(tile)] = tile;
 
   stats.stop_reason = "samples";
   for (std::uint32_t done = 0; done < wanted && !active.empty();) {
@@ -145,8 +146,8 @@ RenderedImage render(const Scene& scene,
           if (stop.load(std::memory_order_relaxed)) return;
           const FlushDenormals flush;
           Wavefront& worker = workers.local();
-          const std::uint64_t rays_before = worker.counters.camera_rays + worker.counters.bounce_rays +
-                                            worker.counters.shadow_rays;
+          const std::uint64_t rays_before =
+              worker.counters.camera_rays + worker.counters.bounce_rays + worker.counters.shadow_rays;
           Batch batch;
           film.tile_rect(active[i], &batch.x0, &batch.y0, &batch.width, &batch.height);
           batch.first_sample = done;
@@ -154,8 +155,8 @@ RenderedImage render(const Scene& scene,
           worker.run(g, *context.accel, stages, context.surface_kernel, batch);
           film.add_tile_samples(active[i], samples);
           samples_done += batch.num_paths();
-          rays_done += worker.counters.camera_rays + worker.counters.bounce_rays + worker.counters.shadow_rays -
-                       rays_before;
+          rays_done +=
+              worker.counters.camera_rays + worker.counters.bounce_rays + worker.counters.shadow_rays - rays_before;
           report(false);
         },
         tbb::simple_partitioner());
@@ -191,10 +192,12 @@ RenderedImage render(const Scene& scene,
   stats.film_bytes = film.bytes();
   stats.path_state_bytes = workers.size() * Wavefront::bytes();
   stats.stages.clear();
-  for (const char* name : kStageNames) stats.stages.push_back({name, 0.0});
+  for (const char* name : kStageNames)
+    stats.stages.push_back({name, 0.0});
   for (const Wavefront& worker : workers) {
     counters_add(stats.counters, worker.counters);
-    for (std::size_t s = 0; s < stats.stages.size(); ++s) stats.stages[s].seconds += worker.seconds[s];
+    for (std::size_t s = 0; s < stats.stages.size(); ++s)
+      stats.stages[s].seconds += worker.seconds[s];
     if (worker.nonfinite.found) {
       stats.warnings.push_back("a sample was not finite and counts as black, first at pixel " +
                                std::to_string(crop_x + worker.nonfinite.x) + "," +

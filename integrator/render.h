@@ -12,8 +12,8 @@
 namespace relief {
 
 struct RenderOptions {
-  RenderSettings settings;  ///< the scene's, with the command line's changes
-  Camera camera;            ///< half_width already set for the image's aspect ratio
+  RenderSettings settings;                                 ///< the scene's, with the command line's changes
+  Camera camera;                                           ///< half_width already set for the image's aspect ratio
   int crop_x0 = 0, crop_y0 = 0, crop_x1 = 0, crop_y1 = 0;  ///< pixels, half open; all 0: the whole image
   double time_limit_seconds = 0;  ///< 0: none; counted from the start of sampling, kept to within one pass
   std::uint32_t aov_mask = 1;

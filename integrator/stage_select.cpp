@@ -22,8 +22,8 @@ const StageTable& stage_table_select()
   if (isa.empty()) return has_avx2() ? stage_table_avx2() : stage_table_baseline();
   if (isa == "baseline") return stage_table_baseline();
   if (isa == "avx2" && has_avx2()) return stage_table_avx2();
-  throw std::runtime_error("$RELIEF_ISA: expected 'baseline'" + std::string(has_avx2() ? " or 'avx2'" : "") + ", found '" +
-                           isa + "'");
+  throw std::runtime_error("$RELIEF_ISA: expected 'baseline'" + std::string(has_avx2() ? " or 'avx2'" : "") +
+                           ", found '" + isa + "'");
 }
 
 }  // namespace relief

@@ -58,7 +58,8 @@ void shade_surfaces(const KernelGlobals& g,
 
 void shade_backgrounds(const KernelGlobals& g, const PathStateView& state, const QueueView& queue, Counters& counters)
 {
-  for (std::uint32_t i = 0; i < queue.size; ++i) shade_background(g, state, queue.paths[i], counters);
+  for (std::uint32_t i = 0; i < queue.size; ++i)
+    shade_background(g, state, queue.paths[i], counters);
 }
 
 void shade_lights(const KernelGlobals& g, const PathStateView& state, const QueueView& queue, QueueView& next)
@@ -87,10 +88,9 @@ void finish(const KernelGlobals& g,
 {
   const std::uint32_t num_paths = static_cast<std::uint32_t>(batch.width * batch.height) * batch.num_samples;
   for (std::uint32_t i = 0; i < num_paths; ++i) {
-    const bool finite =
-        film_add_sample(g.film, state.pixel[i], state.sample_index[i],
-                        {state.direct_r[i], state.direct_g[i], state.direct_b[i]},
-                        {state.indirect_r[i], state.indirect_g[i], state.indirect_b[i]});
+    const bool finite = film_add_sample(g.film, state.pixel[i], state.sample_index[i],
+                                        {state.direct_r[i], state.direct_g[i], state.direct_b[i]},
+                                        {state.indirect_r[i], state.indirect_g[i], state.indirect_b[i]});
     if (finite) continue;
     if (counters.nonfinite_samples++ == 0) *nonfinite_path = i;
   }

@@ -31,8 +31,7 @@ std::vector<TraceHit> trace_rays(const SceneContext& context, std::span<const Tr
       query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
       embree_intersect1(context.accel->scene(), embree, query);
       if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) break;
-      const unsigned object =
-          query.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? query.hit.instID[0] : query.hit.geomID;
+      const unsigned object = query.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? query.hit.instID[0] : query.hit.geomID;
       if (object >= context.globals.num_instances) {
         t_min = next_float_up(query.ray.tfar);
         continue;
@@ -40,10 +39,14 @@ std::vector<TraceHit> trace_rays(const SceneContext& context, std::span<const Tr
       const InstanceView& instance = context.instances[object];
       const SurfaceHit surface = surface_hit_make(context.meshes[static_cast<std::size_t>(instance.mesh_index)],
                                                   instance, query.hit.primID, query.hit.u, query.hit.v);
-      result = {true,         query.ray.tfar,
-                surface.P,    surface.Ng,
-                query.hit.u,  query.hit.v,
-                static_cast<std::int32_t>(object), instance.mesh_index,
+      result = {true,
+                query.ray.tfar,
+                surface.P,
+                surface.Ng,
+                query.hit.u,
+                query.hit.v,
+                static_cast<std::int32_t>(object),
+                instance.mesh_index,
                 query.hit.primID};
       break;
     }

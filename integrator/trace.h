@@ -19,7 +19,7 @@ struct TraceRay {
 struct TraceHit {
   bool hit = false;
   float t = 0;
-  Vec3f P, Ng;  ///< world; Ng unit, on the front side
+  Vec3f P, Ng;         ///< world; Ng unit, on the front side
   float u = 0, v = 0;  ///< barycentric weights of vertices 1 and 2
   std::int32_t instance_index = -1, mesh_index = -1;
   std::uint32_t triangle_index = 0;

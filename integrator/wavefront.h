@@ -32,9 +32,9 @@ struct NonfiniteSample {
 /// A ray of a path, as it was traced.
 struct RecordedRay {
   bool shadow = false;
-  Vec3f O, D;               ///< world; D unit
+  Vec3f O, D;  ///< world; D unit
   float t_min = 0, t_max = kInfinity;
-  float t = kInfinity;      ///< where it hit; shadow rays: t_max if it reached the light
+  float t = kInfinity;  ///< where it hit; shadow rays: t_max if it reached the light
 };
 
 /// Owned by one thread at a time.

@@ -34,10 +34,10 @@ struct KernelGlobals {
   BounceLimits limits;
   float clamp_indirect = 0;  ///< 0: off
   LightTechnique light_technique = LightTechnique::kMis;
-  bool has_lights = false;   ///< something can be sampled
+  bool has_lights = false;  ///< something can be sampled
   bool environment_visible_to_camera = true;
   const FilterTable* filter = nullptr;  ///< null: box
-  float filter_width = 1;  ///< pixels
+  float filter_width = 1;               ///< pixels
   std::uint64_t seed = 0;
   int full_width = 0, full_height = 0;  ///< of the whole image, pixels
   int crop_x = 0, crop_y = 0;           ///< the film window's corner in it

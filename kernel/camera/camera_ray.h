@@ -6,10 +6,10 @@
 namespace relief {
 
 struct CameraRay {
-  Vec3f O, D;            ///< world; D is unit
-  float t_min, t_max;    ///< clipping, as distances along D
-  float cone_width;      ///< width of the pixel's cone at O, metres
-  float cone_spread;     ///< growth of the width, radians (tan of the full angle a pixel subtends)
+  Vec3f O, D;          ///< world; D is unit
+  float t_min, t_max;  ///< clipping, as distances along D
+  float cone_width;    ///< width of the pixel's cone at O, metres
+  float cone_spread;   ///< growth of the width, radians (tan of the full angle a pixel subtends)
 };
 
 /// Ray through a point of the image.
@@ -17,7 +17,8 @@ struct CameraRay {
 /// @param lens            point on the unit disk
 /// @param pixel_height    height of a pixel as a fraction of the image's
 /// @source thin lens: pbrt-v4 §5.2.3
-RELIEF_KERNEL CameraRay camera_ray_make(const Camera& camera, float film_x, float film_y, Vec2f lens, float pixel_height)
+RELIEF_KERNEL CameraRay
+camera_ray_make(const Camera& camera, float film_x, float film_y, Vec2f lens, float pixel_height)
 {
   const float x = (2.0f * (film_x + camera.shift_x) - 1.0f) * camera.half_width;
   const float y = (1.0f - 2.0f * (film_y - camera.shift_y)) * camera.half_height;

@@ -8,11 +8,8 @@
 namespace relief {
 
 /// uv of a texture reference at a point of a triangle, texture transform applied.
-RELIEF_KERNEL Vec2f triangle_texture_uv(const MeshView& mesh,
-                                        TriangleIndices tri,
-                                        float bary_u,
-                                        float bary_v,
-                                        const TextureRef& ref)
+RELIEF_KERNEL Vec2f
+triangle_texture_uv(const MeshView& mesh, TriangleIndices tri, float bary_u, float bary_v, const TextureRef& ref)
 {
   const Vec2f* uv = mesh.uv[ref.uv_set];
   if (uv == nullptr) return texture_ref_uv(ref, {});
@@ -44,7 +41,8 @@ RELIEF_KERNEL float triangle_alpha(const Material& material,
   const TriangleIndices tri = mesh.triangles[triangle_index];
   float alpha = material.base_alpha;
   if (mesh.color != nullptr) {
-    alpha *= (1.0f - bary_u - bary_v) * mesh.color[tri.v0].w + bary_u * mesh.color[tri.v1].w + bary_v * mesh.color[tri.v2].w;
+    alpha *=
+        (1.0f - bary_u - bary_v) * mesh.color[tri.v0].w + bary_u * mesh.color[tri.v1].w + bary_v * mesh.color[tri.v2].w;
   }
   const TextureRef& ref = material.base_color_texture;
   if (ref.texture_index >= 0) {

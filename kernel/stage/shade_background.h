@@ -22,8 +22,7 @@ RELIEF_KERNEL void shade_background(const KernelGlobals& g,
   if (is_zero(radiance)) return;
   const float pdf = state.pdf[path];
   if (pdf > 0.0f) {
-    const float pdf_light =
-        lights_environment_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), D);
+    const float pdf_light = lights_environment_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), D);
     radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
   }
   radiance *= path_transmittance(path_sigma_a(state, path), kInfinity);

@@ -17,10 +17,10 @@ namespace relief {
 
 /// The side of a surface that a path is on, and the frame its BSDF is evaluated in.
 struct ShadingSide {
-  Vec3f Ng;       ///< geometric normal on the side of wo
-  Frame frame;    ///< local +z: for a solid dielectric the outward normal, otherwise the shading normal on wo's side
-  Vec3f Ns;       ///< shading normal on wo's side
-  bool front;     ///< wo is on the front side of the triangle
+  Vec3f Ng;     ///< geometric normal on the side of wo
+  Frame frame;  ///< local +z: for a solid dielectric the outward normal, otherwise the shading normal on wo's side
+  Vec3f Ns;     ///< shading normal on wo's side
+  bool front;   ///< wo is on the front side of the triangle
 };
 
 /// Turns the shading normal to wo's side and bends it until wo is above its horizon.
@@ -51,9 +51,9 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   const int surface = path_surface(state, path);
   const std::uint32_t hash = state.pixel_hash[path];
   const std::uint32_t sample = state.sample_index[path];
-  const LightSample light =
-      lights_sample(g.lights, hit.P, light_N, sample_1d(hash, sample, dimension_bounce(surface, BounceDimension::kLightChoice)),
-                    sample_2d(hash, sample, dimension_bounce(surface, BounceDimension::kLightUv)));
+  const LightSample light = lights_sample(
+      g.lights, hit.P, light_N, sample_1d(hash, sample, dimension_bounce(surface, BounceDimension::kLightChoice)),
+      sample_2d(hash, sample, dimension_bounce(surface, BounceDimension::kLightUv)));
   if (!(light.pdf > 0.0f)) return;
   Vec3f radiance = light.radiance;
   const bool is_triangle = light.light_index >= 0 && g.lights.lights[light.light_index].kind == LightKind::kTriangle;
@@ -218,9 +218,8 @@ RELIEF_KERNEL void shade_surface(const KernelGlobals& g,
     Vec3f radiance = params.emission;
     const float pdf = state.pdf[path];
     if (pdf > 0.0f && instance.first_light_index >= 0) {
-      const float pdf_light =
-          lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path),
-                     static_cast<std::uint32_t>(instance.first_light_index) + triangle, -wo, t);
+      const float pdf_light = lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path),
+                                         static_cast<std::uint32_t>(instance.first_light_index) + triangle, -wo, t);
       radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
     }
     path_add_radiance(state, path, bounce, throughput * radiance, g.clamp_indirect);
@@ -273,9 +272,9 @@ RELIEF_KERNEL void shade_surface(const KernelGlobals& g,
   state.scatter_Ny[path] = light_N.y;
   state.scatter_Nz[path] = light_N.z;
   const bool transmitted = (bsdf.lobe & kLobeTransmit) != 0;
-  const BounceKind kind = transmitted                             ? BounceKind::kTransmission
+  const BounceKind kind = transmitted                       ? BounceKind::kTransmission
                           : (bsdf.lobe & kLobeDiffuse) != 0 ? BounceKind::kDiffuse
-                                                                  : BounceKind::kGlossy;
+                                                            : BounceKind::kGlossy;
   state.bounces[path] = bounces + 1u + (1u << static_cast<int>(kind));
   if constexpr ((kFeatures & kFeatureTransmission) != 0) {
     if (transmitted && solid) {

@@ -25,10 +25,10 @@ inline constexpr std::size_t kPathStateBytes = 0
     ;
 
 enum PathFlag : std::uint32_t {
-  kPathSawSurface = 1u << 0,      ///< an opaque-enough surface was met: the AOVs of the first hit are written
-  kPathCounted = 1u << 1,         ///< coverage was added to the film's alpha
-  kPathOnlyDelta = 1u << 2,       ///< every scattering event so far was a delta one
-  kPathTransparentShift = 16,     ///< position of the count of transparent surfaces
+  kPathSawSurface = 1u << 0,   ///< an opaque-enough surface was met: the AOVs of the first hit are written
+  kPathCounted = 1u << 1,      ///< coverage was added to the film's alpha
+  kPathOnlyDelta = 1u << 2,    ///< every scattering event so far was a delta one
+  kPathTransparentShift = 16,  ///< position of the count of transparent surfaces
 };
 
 /// Shadow rays of a batch: where to look, and what the path gains if nothing is in between.
@@ -49,9 +49,6 @@ struct QueueView {
   std::uint32_t size = 0;
 };
 
-RELIEF_KERNEL void queue_push(QueueView& queue, std::uint32_t path)
-{
-  queue.paths[queue.size++] = path;
-}
+RELIEF_KERNEL void queue_push(QueueView& queue, std::uint32_t path) { queue.paths[queue.size++] = path; }
 
 }  // namespace relief

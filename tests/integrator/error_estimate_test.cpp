@@ -57,7 +57,8 @@ Scatter scatter(int samples, int num_runs)
   }
   for (std::size_t i = 0; i < sum.size(); ++i) {
     const double mean = sum[i] / num_runs;
-    result.true_variance += (squares[i] / num_runs - mean * mean) * num_runs / (num_runs - 1) / static_cast<double>(sum.size());
+    result.true_variance +=
+        (squares[i] / num_runs - mean * mean) * num_runs / (num_runs - 1) / static_cast<double>(sum.size());
   }
   return result;
 }

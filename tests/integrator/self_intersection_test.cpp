@@ -58,9 +58,8 @@ TEST_P(SelfIntersection, LeavingRaysDoNotComeBack)
     for (const TraceHit& h : trace_rays(context, rays)) {
       if (!h.hit) continue;
       ++hits;
-      const SurfaceHit surface =
-          surface_hit_make(context.meshes[0], context.instances[static_cast<std::size_t>(h.instance_index)],
-                           h.triangle_index, h.u, h.v);
+      const SurfaceHit surface = surface_hit_make(
+          context.meshes[0], context.instances[static_cast<std::size_t>(h.instance_index)], h.triangle_index, h.u, h.v);
       const Frame frame = frame_from_normal(surface.Ng);
       for (int i = 0; i < 32; ++i) {
         const Vec3f side = i % 2 == 0 ? surface.Ng : -surface.Ng;
