@@ -24,6 +24,14 @@ struct OverrideSet {
   mutable std::set<std::string> used_names;  ///< written while walking, to warn about the others
 };
 
+/// RELIEF_reference of one node, resolved once however often the walk comes by.
+struct Reference {
+  const GltfDocument* target = nullptr;  ///< null: the node has none
+  std::vector<int> roots;
+  std::shared_ptr<const OverrideSet> overrides;
+  std::string uri_path, uri;  ///< for messages
+};
+
 /// A file being walked, and through which references it was reached.
 struct Scope {
   const GltfDocument* document = nullptr;
@@ -127,17 +135,24 @@ class Walk {
       stack_.pop_back();
       step(pending);
     }
-    for (const auto& [key, overrides] : overrides_of_) {
-      for (const auto& [name, ignored] : overrides->by_name) {
-        if (overrides->used_names.count(name) == 0) {
-          warnings_.add(overrides->file + ": " + json_path_join(overrides->path, name) +
-                        ": no referenced node has this name");
-        }
+    for (const auto& [key, reference] : reference_of_) {
+      if (reference.overrides != nullptr) {
+        warn_unused(*reference.overrides);
       }
     }
   }
 
  private:
+  void warn_unused(const OverrideSet& overrides)
+  {
+    for (const auto& [name, ignored] : overrides.by_name) {
+      if (overrides.used_names.count(name) == 0) {
+        warnings_.add(overrides.file + ": " + json_path_join(overrides.path, name) +
+                      ": no referenced node has this name");
+      }
+    }
+  }
+
   /// Pushes nodes so that they are visited in the order given.
   void push_all(const std::vector<int>& nodes, const Pending& like)
   {
@@ -152,7 +167,7 @@ class Walk {
     const GltfDocument& document = *pending.scope->document;
     const std::string path = node_path(pending.node_index);
     // References that each double the last one multiply faster than any memory.
-    constexpr std::size_t kMostNodes = std::size_t{1} << 24;
+    constexpr std::size_t kMostNodes = std::size_t{1} << 22;
     if (++num_visited_ > kMostNodes) {
       throw SceneError(document.file, path, "at most " + std::to_string(kMostNodes) + " nodes after composition",
                        "more");
@@ -250,28 +265,48 @@ class Walk {
   {
     const GltfDocument& document = *child.scope->document;
     const auto& node = document.element("nodes", static_cast<std::size_t>(node_index));
+    if (node.find("extensions") == node.end()) {
+      return;
+    }
+    const Reference& reference = reference_of(document, node_index);
+    if (reference.target == nullptr) {
+      return;
+    }
+    for (const Scope* s = child.scope.get(); s != nullptr; s = s->outer.get()) {
+      if (s->document == reference.target) {
+        throw SceneError(document.file, reference.uri_path, "a file that does not lead back here",
+                         '"' + reference.uri + "\" (a cycle of references)");
+      }
+    }
+    auto scope = std::make_shared<Scope>();
+    scope->document = reference.target;
+    scope->outer = child.scope;
+    scope->overrides = reference.overrides;
+    Pending below = child;
+    below.scope = scope;
+    push_all(reference.roots, below);
+  }
+
+  const Reference& reference_of(const GltfDocument& document, int node_index)
+  {
+    const auto [it, is_new] = reference_of_.try_emplace({&document, node_index});
+    Reference& reference = it->second;
+    if (!is_new) {
+      return reference;
+    }
+    const auto& node = document.element("nodes", static_cast<std::size_t>(node_index));
     document.read_extension(node, node_path(node_index), "RELIEF_reference", [&](const JsonReader& r) {
-      const std::string uri_path = json_path_join(r.path(), "uri");
       if (!r.has("uri")) {
         r.fail("uri", "a path");
       }
-      const GltfDocument& target =
-          documents_.load(gltf_resolve_uri(document, r.string("uri", ""), uri_path), warnings_);
-      for (const Scope* s = child.scope.get(); s != nullptr; s = s->outer.get()) {
-        if (s->document == &target) {
-          throw SceneError(document.file, uri_path, "a file that does not lead back here",
-                           '"' + r.string("uri", "") + "\" (a cycle of references)");
-        }
-      }
-      auto scope = std::make_shared<Scope>();
-      scope->document = &target;
-      scope->outer = child.scope;
-      scope->overrides = overrides_of(document, node_index, r);
-      Pending below = child;
-      below.scope = scope;
-      push_all(reference_roots(target, r), below);
+      reference.uri = r.string("uri", "");
+      reference.uri_path = json_path_join(r.path(), "uri");
+      reference.target = &documents_.load(gltf_resolve_uri(document, reference.uri, reference.uri_path), warnings_);
+      reference.overrides = read_overrides(document, r);
+      reference.roots = reference_roots(*reference.target, r);
       r.warn_unread(warnings_);
     });
+    return reference;
   }
 
   static std::vector<int> reference_roots(const GltfDocument& target, const JsonReader& r)
@@ -288,23 +323,19 @@ class Walk {
     return {static_cast<int>(at - nodes.begin())};
   }
 
-  std::shared_ptr<const OverrideSet> overrides_of(const GltfDocument& document, int node_index, const JsonReader& r)
+  std::shared_ptr<const OverrideSet> read_overrides(const GltfDocument& document, const JsonReader& r)
   {
     if (!r.has("overrides")) {
       return nullptr;
     }
-    auto& known = overrides_of_[{&document, node_index}];
-    if (known == nullptr) {
-      auto set = std::make_shared<OverrideSet>();
-      const JsonReader overrides = r.object("overrides");
-      set->file = document.file;
-      set->path = overrides.path();
-      for (const auto& item : r.raw("overrides").items()) {
-        set->by_name[item.key()] = read_override(document, overrides.object(item.key()), warnings_);
-      }
-      known = std::move(set);
+    auto set = std::make_shared<OverrideSet>();
+    const JsonReader overrides = r.object("overrides");
+    set->file = document.file;
+    set->path = overrides.path();
+    for (const auto& item : r.raw("overrides").items()) {
+      set->by_name[item.key()] = read_override(document, overrides.object(item.key()), warnings_);
     }
-    return known;
+    return set;
   }
 
   DocumentSet& documents_;
@@ -314,7 +345,7 @@ class Walk {
   std::vector<Pending> stack_;
   std::size_t num_visited_ = 0;
   std::map<const GltfDocument*, std::unordered_map<int, AnimatedPose>> poses_;
-  std::map<std::pair<const GltfDocument*, int>, std::shared_ptr<const OverrideSet>> overrides_of_;
+  std::map<std::pair<const GltfDocument*, int>, Reference> reference_of_;
 };
 
 }  // namespace
@@ -326,11 +357,23 @@ const GltfDocument& DocumentSet::load(const std::filesystem::path& path, Warning
   if (error) {
     key = path;
   }
-  auto it = documents_.find(key);
-  if (it == documents_.end()) {
-    it = documents_.emplace(key, gltf_document_load(path, warnings)).first;
+  auto it = by_path_.find(key);
+  if (it == by_path_.end()) {
+    documents_.push_back(gltf_document_load(path, warnings));
+    it = by_path_.emplace(key, documents_.back().get()).first;
   }
   return *it->second;
+}
+
+std::vector<std::string> DocumentSet::files_read() const
+{
+  std::vector<std::string> out;
+  for (const auto& document : documents_) {
+    for (const std::filesystem::path& file : document->files_read) {
+      out.push_back(file.string());
+    }
+  }
+  return out;
 }
 
 void composition_traverse(DocumentSet& documents,

@@ -19,8 +19,12 @@ class DocumentSet {
   /// @error SceneError
   const GltfDocument& load(const std::filesystem::path& path, Warnings& warnings);
 
+  /// Scene files and buffers, in the order they were read.
+  std::vector<std::string> files_read() const;
+
  private:
-  std::map<std::filesystem::path, std::unique_ptr<GltfDocument>> documents_;
+  std::vector<std::unique_ptr<GltfDocument>> documents_;
+  std::map<std::filesystem::path, const GltfDocument*> by_path_;
 };
 
 /// A node at its place in the world.

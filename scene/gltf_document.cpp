@@ -131,6 +131,7 @@ std::span<const std::byte> load_buffer(GltfDocument& document,
     } else {
       const fs::path file = gltf_resolve_uri(document, text, path + "/uri");
       document.storage.push_back(read_file(file, document.file, path + "/uri"));
+      document.files_read.push_back(file);
     }
     bytes = document.storage.back().span();
   }
@@ -285,6 +286,7 @@ std::unique_ptr<GltfDocument> gltf_document_load(const fs::path& path, Warnings&
   auto document = std::make_unique<GltfDocument>();
   document->path = path;
   document->file = path.string();
+  document->files_read.push_back(path);
   document->storage.push_back(read_file(path, document->file, ""));
   const Container container = split_container(document->storage.back().span(), document->file);
   document->json = validation_parse(container.json, document->file);

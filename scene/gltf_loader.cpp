@@ -59,6 +59,7 @@ Scene GltfLoader::load(const std::filesystem::path& path, const LoadOptions& opt
   composition_traverse(documents_, root, time, warnings_, [this](const PlacedNode& node) { place(node); });
   scene_.environment = relief_environment(root, textures_, warnings_).value_or(Environment{});
   add_defaults();
+  scene_.files = documents_.files_read();
   return std::move(scene_);
 }
 
@@ -236,8 +237,13 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
   try {
     GltfLoader loader(warnings);
     Scene scene = loader.load(path, options);
-    scene.textures =
-        std::make_shared<const TextureStore>(loader.take_textures(), options.texture_budget_bytes, warnings);
+    std::vector<TextureRequest> textures = loader.take_textures();
+    for (const TextureRequest& texture : textures) {
+      if (!texture.file.empty()) {
+        scene.files.push_back(texture.file.string());
+      }
+    }
+    scene.textures = std::make_shared<const TextureStore>(std::move(textures), options.texture_budget_bytes, warnings);
     scene.features = feature_set_detect(scene);
     scene.warnings = warnings.texts();
     return scene;

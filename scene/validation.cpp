@@ -281,7 +281,10 @@ class Conformer {
   json conform_index(const json& value, std::string_view target, const std::string& path) const
   {
     const auto array = document_.find(target);
-    const std::size_t size = array != document_.end() && array->is_array() ? array->size() : 0;
+    if (array != document_.end() && !array->is_array()) {
+      fail('/' + std::string(target), "an array", *array);
+    }
+    const std::size_t size = array != document_.end() ? array->size() : 0;
     const double x = value.is_number() ? value.get<double>() : -1;
     if (!(x >= 0 && x < static_cast<double>(size) && x == std::floor(x))) {
       fail(path, "an index into /" + std::string(target) + " (which has " + std::to_string(size) + ")", value);

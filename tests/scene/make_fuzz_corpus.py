@@ -1,0 +1,180 @@
+#!/usr/bin/env python3
+"""Writes the seed corpus of fuzz_scene_load: small scenes that together use everything the loader reads.
+
+usage: make_fuzz_corpus.py FOLDER
+"""
+import base64
+import json
+import pathlib
+import struct
+import sys
+
+PIXEL = ("data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJg"
+         "gg==")
+
+
+class Builder:
+    """A glTF document whose buffer grows with its accessors."""
+
+    def __init__(self):
+        self.json = {"asset": {"version": "2.0"}, "bufferViews": [], "accessors": [], "scene": 0,
+                     "scenes": [{"nodes": []}], "nodes": []}
+        self.binary = b""
+
+    def view(self, data, stride=None):
+        self.binary += b"\0" * (-len(self.binary) % 4)
+        view = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data)}
+        if stride:
+            view["byteStride"] = stride
+        self.binary += data
+        self.json["bufferViews"].append(view)
+        return len(self.json["bufferViews"]) - 1
+
+    def accessor(self, code, values, kind, **more):
+        component = {"b": 5120, "B": 5121, "h": 5122, "H": 5123, "I": 5125, "f": 5126}[code]
+        width = 1 if kind == "SCALAR" else int(kind[-1])
+        accessor = {"bufferView": self.view(struct.pack(f"<{len(values)}{code}", *values)),
+                    "componentType": component, "count": len(values) // width, "type": kind, **more}
+        self.json["accessors"].append(accessor)
+        return len(self.json["accessors"]) - 1
+
+    def node(self, **node):
+        self.json["nodes"].append(node)
+        self.json["scenes"][0]["nodes"].append(len(self.json["nodes"]) - 1)
+
+    def square(self, **primitive):
+        attributes = {"POSITION": self.accessor("f", [0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0], "VEC3"),
+                      "NORMAL": self.accessor("f", [0, 0, 1] * 4, "VEC3"),
+                      "TEXCOORD_0": self.accessor("f", [0, 1, 1, 1, 1, 0, 0, 0], "VEC2")}
+        indices = self.accessor("H", [0, 1, 2, 0, 2, 3], "SCALAR")
+        self.json.setdefault("meshes", []).append(
+            {"primitives": [{"attributes": attributes, "indices": indices, **primitive}]})
+        return len(self.json["meshes"]) - 1
+
+    def gltf(self):
+        out = dict(self.json)
+        uri = "data:application/octet-stream;base64," + base64.b64encode(self.binary).decode()
+        out["buffers"] = [{"byteLength": len(self.binary), "uri": uri}]
+        return json.dumps(out, separators=(",", ":")).encode()
+
+    def glb(self):
+        out = dict(self.json)
+        out["buffers"] = [{"byteLength": len(self.binary)}]
+        text = json.dumps(out, separators=(",", ":")).encode()
+        text += b" " * (-len(text) % 4)
+        binary = self.binary + b"\0" * (-len(self.binary) % 4)
+        chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def plain():
+    b = Builder()
+    b.node(name="square", mesh=b.square())
+    return b
+
+
+def topologies():
+    b = Builder()
+    for mode, code, corners in ((4, "B", [0, 1, 2]), (5, "I", [0, 1, 3, 2]), (6, "H", [0, 1, 2, 3])):
+        primitive = {"mode": mode, "attributes": {
+            "POSITION": b.accessor("h", [0, 0, 0, 9, 0, 0, 9, 9, 0, 0, 9, 0], "VEC3"),
+            "NORMAL": b.accessor("b", [0, 0, 127] * 4, "VEC3", normalized=True),
+            "COLOR_0": b.accessor("B", [255] * 12, "VEC3", normalized=True)},
+            "indices": b.accessor(code, corners, "SCALAR")}
+        b.json.setdefault("meshes", []).append({"primitives": [primitive]})
+        b.node(mesh=len(b.json["meshes"]) - 1)
+    sparse = {"count": 1, "indices": {"bufferView": b.view(struct.pack("<H", 2)), "componentType": 5123},
+              "values": {"bufferView": b.view(struct.pack("<3f", 5, 5, 5))}}
+    position = b.accessor("f", [0, 0, 0, 1, 0, 0, 1, 1, 0], "VEC3", sparse=sparse)
+    b.json["meshes"].append({"primitives": [{"attributes": {"POSITION": position}}]})
+    b.node(mesh=len(b.json["meshes"]) - 1, matrix=[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 3, 0, 0, 1])
+    return b
+
+
+def materials():
+    b = Builder()
+    texture = {"index": 0, "extensions": {"KHR_texture_transform": {"offset": [.5, 0], "rotation": 1, "scale": [2, 3]}}}
+    b.json.update(
+        images=[{"uri": PIXEL}], samplers=[{"wrapS": 33071, "magFilter": 9728}], textures=[{"source": 0, "sampler": 0}],
+        materials=[{"name": "m", "alphaMode": "MASK", "alphaCutoff": .4, "doubleSided": True, "emissiveFactor": [1, 1, 1],
+                    "pbrMetallicRoughness": {"baseColorTexture": texture, "metallicFactor": 0, "roughnessFactor": .2,
+                                             "baseColorFactor": [1, .5, .25, 1]},
+                    "normalTexture": {"index": 0, "scale": 2},
+                    "extensions": {
+                        "KHR_materials_transmission": {"transmissionFactor": 1, "transmissionTexture": texture},
+                        "KHR_materials_ior": {"ior": 1.33},
+                        "KHR_materials_volume": {"thicknessFactor": 1, "attenuationColor": [.5, 1, 1],
+                                                 "attenuationDistance": 1},
+                        "KHR_materials_clearcoat": {"clearcoatFactor": 1, "clearcoatNormalTexture": {"index": 0}},
+                        "KHR_materials_sheen": {"sheenColorFactor": [1, 1, 1], "sheenRoughnessFactor": .5},
+                        "KHR_materials_specular": {"specularFactor": .5, "specularColorFactor": [1, 1, 1]},
+                        "KHR_materials_emissive_strength": {"emissiveStrength": 4}, "KHR_materials_unlit": {},
+                        "RELIEF_displacement": {"heightTexture": texture, "scale": .1, "midlevel": .5, "space": "world",
+                                                "method": "rmip", "lod": 1.5, "smoothing": True, "seams": "weld",
+                                                "procedural": {"noise": "fbm"}}}}])
+    b.node(mesh=b.square(material=0))
+    return b
+
+
+def lights():
+    b = Builder()
+    kinds = [{"type": "point", "intensity": 5}, {"type": "directional", "color": [1, 0, 0]},
+             {"type": "spot", "range": 3, "spot": {"innerConeAngle": .1, "outerConeAngle": .5}}]
+    b.json["extensions"] = {
+        "KHR_lights_punctual": {"lights": kinds},
+        "RELIEF_render": {"resolution": [64, 32], "samples": 4, "fps": 25, "frameRange": [1, 2], "maxBounces": 3,
+                          "pixelFilter": {"type": "box", "width": 1}, "caustics": {}, "seed": 3, "view": "Standard"},
+        "RELIEF_environment": {"color": [1, 1, 1], "strength": 2, "rotation": 1, "image": 0}}
+    b.json["images"] = [{"uri": PIXEL}]
+    b.json["cameras"] = [
+        {"type": "perspective", "perspective": {"yfov": .7, "znear": .1, "aspectRatio": 1.5},
+         "extensions": {"RELIEF_camera": {"apertureRadius": .01, "focusDistance": 2, "shift": [.1, 0], "clip": [.1, 9]}}},
+        {"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 2, "znear": 0, "zfar": 9}}]
+    for i in range(3):
+        b.node(name=f"light {i}", rotation=[0, .7071, 0, .7071], extensions={"KHR_lights_punctual": {"light": i}})
+    b.node(camera=0, translation=[0, 0, 4])
+    b.node(camera=1)
+    b.node(extensions={"RELIEF_area_light": {"shape": "disk", "radius": 2, "power": 10, "twoSided": True}})
+    b.node(mesh=b.square(), extensions={"RELIEF_object": {"castsShadow": False, "causticCaster": "auto"}})
+    return b
+
+
+def animation():
+    b = Builder()
+    mesh = b.square()
+    b.node(mesh=mesh, translation=[1, 2, 3], scale=[1, 2, 1])
+    times = b.accessor("f", [0, 1], "SCALAR")
+    outputs = {"translation": b.accessor("f", [0, 0, 0, 1, 0, 0], "VEC3"),
+               "rotation": b.accessor("h", [0, 0, 0, 32767, 0, 32767, 0, 0], "VEC4", normalized=True),
+               "scale": b.accessor("f", [0, 0, 0, 1, 1, 1, 0, 0, 0] * 2, "VEC3")}
+    modes = {"translation": "LINEAR", "rotation": "STEP", "scale": "CUBICSPLINE"}
+    b.json["animations"] = [{
+        "channels": [{"sampler": i, "target": {"node": 0, "path": path}} for i, path in enumerate(outputs)],
+        "samplers": [{"input": times, "output": output, "interpolation": modes[path]}
+                     for path, output in outputs.items()]}]
+    return b
+
+
+def composition():
+    b = Builder()
+    offsets = b.accessor("f", [0, 0, 0, 2, 0, 0], "VEC3")
+    turns = b.accessor("f", [0, 0, 0, 1, 0, 1, 0, 0], "VEC4")
+    b.node(mesh=b.square(), extensions={
+        "EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": offsets, "ROTATION": turns}}})
+    b.json["materials"] = [{"name": "red"}]
+    override = {"square": {"translation": [1, 1, 1], "rotation": [0, 1, 0, 0], "material": "red"}}
+    b.node(extensions={"RELIEF_reference": {"uri": "other.gltf", "node": "square", "overrides": override}})
+    b.node(extensions={"RELIEF_reference": {"uri": "scene.gltf"}})
+    return b
+
+
+def main():
+    folder = pathlib.Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    for make in (plain, topologies, materials, lights, animation, composition):
+        (folder / f"{make.__name__}.gltf").write_bytes(make().gltf())
+        (folder / f"{make.__name__}.glb").write_bytes(make().glb())
+
+
+if __name__ == "__main__":
+    main()
