@@ -109,8 +109,7 @@ std::uint32_t parse_aovs(const std::string& text)
     const auto* info = std::find_if(kAovInfo.begin(), kAovInfo.end(), [&](const AovInfo& i) { return i.name == name; });
     if (info == kAovInfo.end()) {
       std::string names = "all";
-      for (const AovInfo& i : kAovInfo)
-        names += fmt::format(", {}", i.name);
+      for (const AovInfo& i : kAovInfo) names += fmt::format(", {}", i.name);
       refuse("--aov", names.c_str(), std::string(name));
     }
     mask |= 1u << static_cast<int>(info->aov);
@@ -127,8 +126,7 @@ std::filesystem::path frame_path(const std::filesystem::path& pattern, int frame
            fmt::format("{}.{:04}{}", pattern.stem().string(), frame, pattern.extension().string());
   }
   std::size_t first = last;
-  while (first > 0 && name[first - 1] == '#')
-    --first;
+  while (first > 0 && name[first - 1] == '#') --first;
   name.replace(first, last + 1 - first, fmt::format("{:0{}}", frame, last + 1 - first));
   return pattern.parent_path() / name;
 }

@@ -60,8 +60,7 @@ int info(const std::string& file, bool strict)
 
   std::size_t triangles = 0;
   std::size_t placed = 0;
-  for (const Mesh& mesh : scene.meshes)
-    triangles += mesh.triangles.size();
+  for (const Mesh& mesh : scene.meshes) triangles += mesh.triangles.size();
   for (const Instance& instance : scene.instances) {
     placed += scene.meshes[static_cast<std::size_t>(instance.mesh_index)].triangles.size();
   }
@@ -71,8 +70,7 @@ int info(const std::string& file, bool strict)
   fmt::print("meshes: {} with {} triangles; instances: {} with {} triangles in all\n", scene.meshes.size(), triangles,
              scene.instances.size(), placed);
   std::vector<std::string> cameras;
-  for (const SceneCamera& camera : scene.cameras)
-    cameras.push_back(camera.name);
+  for (const SceneCamera& camera : scene.cameras) cameras.push_back(camera.name);
   print_names("cameras", cameras);
   print_names("materials", scene.material_names);
   fmt::print("lights: {} placed, {} emissive triangles, {}\n", scene.lights.size(),
@@ -95,8 +93,7 @@ int info(const std::string& file, bool strict)
   fmt::print("features: {}\n", features.empty() ? "none" : features);
   fmt::print("memory: meshes {}, textures {}, acceleration structure {}, lights {}\n", megabytes(stats.mesh_bytes),
              megabytes(stats.texture_bytes), megabytes(stats.bvh_bytes), megabytes(stats.light_bytes));
-  for (const std::string& warning : scene.warnings)
-    fmt::print("warning: {}\n", warning);
+  for (const std::string& warning : scene.warnings) fmt::print("warning: {}\n", warning);
   if (strict && !scene.warnings.empty()) throw SceneError(file, "", "no warnings (--strict)", scene.warnings.front());
   return 0;
 }

@@ -179,8 +179,7 @@ bool render_frame(const RenderArguments& arguments,
   if (arguments.strict && !stats.warnings.empty()) {
     throw SceneError(arguments.scene, "", "no warnings (--strict)", stats.warnings.front());
   }
-  for (const std::string& warning : stats.warnings)
-    fmt::print(stderr, "relief: warning: {}\n", warning);
+  for (const std::string& warning : stats.warnings) fmt::print(stderr, "relief: warning: {}\n", warning);
 
   const RenderOptions options = options_for(scene, arguments);
   const std::string fingerprint = render_fingerprint(scene, options);
@@ -247,8 +246,7 @@ int render_all(const RenderArguments& arguments, const std::string& command)
   if (arguments.frames.empty()) {
     frames.emplace_back();
   } else {
-    for (const int frame : parse_frames(arguments.frames))
-      frames.emplace_back(frame);
+    for (const int frame : parse_frames(arguments.frames)) frames.emplace_back(frame);
   }
 
   std::signal(SIGINT, on_signal);

@@ -30,8 +30,7 @@ std::vector<float> parse_numbers(const std::string& line)
   const char* at = line.data();
   const char* end = at + line.size();
   while (true) {
-    while (at != end && (*at == ' ' || *at == '\t' || *at == '\r'))
-      ++at;
+    while (at != end && (*at == ' ' || *at == '\t' || *at == '\r')) ++at;
     if (at == end) return numbers;
     float value = 0;
     const auto result = std::from_chars(at, end, value);
@@ -96,8 +95,7 @@ std::string hits_csv(const std::vector<TraceHit>& hits)
 int trace(const TraceArguments& arguments)
 {
   const Scene scene = scene_load(arguments.scene);
-  for (const std::string& warning : scene.warnings)
-    fmt::print(stderr, "relief: warning: {}\n", warning);
+  for (const std::string& warning : scene.warnings) fmt::print(stderr, "relief: warning: {}\n", warning);
   if (arguments.pixel.empty()) {
     const std::vector<TraceRay> rays = read_rays(arguments.rays);
     const SceneContext context(scene);

@@ -17,8 +17,7 @@ class Hash {
   void add_bytes(const void* data, std::size_t size)
   {
     const auto* bytes = static_cast<const unsigned char*>(data);
-    for (std::size_t i = 0; i < size; ++i)
-      value_ = (value_ ^ bytes[i]) * 0x100000001b3u;
+    for (std::size_t i = 0; i < size; ++i) value_ = (value_ ^ bytes[i]) * 0x100000001b3u;
   }
   template <class T>
   void add(const T& value)
@@ -39,8 +38,7 @@ class Hash {
   }
   void add(const Affine3& m)
   {
-    for (const Vec3f axis : {m.x, m.y, m.z, m.p})
-      add(axis);
+    for (const Vec3f axis : {m.x, m.y, m.z, m.p}) add(axis);
   }
   std::string text() const { return fmt::format("{:016x}", value_); }
 
@@ -60,11 +58,9 @@ std::string render_fingerprint(const Scene& scene, const RenderOptions& options)
     hash.add(std::filesystem::file_size(file, ignored));
     hash.add(std::filesystem::last_write_time(file, ignored).time_since_epoch().count());
   }
-  for (const Instance& instance : scene.instances)
-    hash.add(instance.world_from_object);
+  for (const Instance& instance : scene.instances) hash.add(instance.world_from_object);
   for (const Light& light : scene.lights) {
-    for (const Vec3f v : {light.P, light.axis, light.edge_u, light.edge_v})
-      hash.add(v);
+    for (const Vec3f v : {light.P, light.axis, light.edge_u, light.edge_v}) hash.add(v);
   }
   const Camera& camera = options.camera;
   hash.add(static_cast<int>(camera.projection));
@@ -79,8 +75,7 @@ std::string render_fingerprint(const Scene& scene, const RenderOptions& options)
                       options.crop_y0, options.crop_x1, options.crop_y1}) {
     hash.add(v);
   }
-  for (const float v : {s.noise_threshold, s.clamp_indirect, s.filter_width})
-    hash.add(v);
+  for (const float v : {s.noise_threshold, s.clamp_indirect, s.filter_width}) hash.add(v);
   hash.add(s.seed);
   hash.add(options.time_limit_seconds);
   hash.add(options.aov_mask);

@@ -31,8 +31,7 @@ int main(int argc, char** argv)
   app.set_version_flag("--version", "relief " RELIEF_VERSION);
   app.require_subcommand(1);
   std::string command_line = "relief";
-  for (int i = 1; i < argc; ++i)
-    command_line += std::string(" ") + argv[i];
+  for (int i = 1; i < argc; ++i) command_line += std::string(" ") + argv[i];
   relief::Run run;
   relief::cmd_render_register(app, run, command_line);
   relief::cmd_info_register(app, run);

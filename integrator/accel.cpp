@@ -104,8 +104,7 @@ Accel::Accel(const Scene& scene,
   }
 
   bool any_transparent = false;
-  for (std::size_t m = 0; m < scene.meshes.size(); ++m)
-    any_transparent |= uses[m] == 1 && transparent[m] != 0;
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) any_transparent |= uses[m] == 1 && transparent[m] != 0;
   top_ = new_scene(any_transparent ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
@@ -184,8 +183,7 @@ RTCGeometry Accel::new_rectangle(const Light& light)
   vertices[1] = light.P + light.edge_u - light.edge_v;
   vertices[2] = light.P + light.edge_u + light.edge_v;
   vertices[3] = light.P - light.edge_u + light.edge_v;
-  for (std::uint32_t i = 0; i < 4; ++i)
-    indices[i] = i;
+  for (std::uint32_t i = 0; i < 4; ++i) indices[i] = i;
   return geometry;
 }
 

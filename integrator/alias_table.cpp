@@ -7,8 +7,7 @@ namespace relief {
 std::vector<AliasEntry> alias_table_make(std::span<const float> weights)
 {
   double total = 0;
-  for (const float weight : weights)
-    total += static_cast<double>(weight);
+  for (const float weight : weights) total += static_cast<double>(weight);
   if (!(total > 0)) return {};
 
   std::vector<AliasEntry> entries(weights.size());
@@ -40,8 +39,7 @@ std::vector<AliasEntry> alias_table_make(std::span<const float> weights)
     entries[i].threshold = weights[i] > 0.0f ? 1.0f : 0.0f;
     entries[i].alias = static_cast<std::uint32_t>(greatest);
   }
-  for (const std::uint32_t i : large)
-    entries[i].threshold = 1.0f;
+  for (const std::uint32_t i : large) entries[i].threshold = 1.0f;
   return entries;
 }
 

@@ -137,8 +137,7 @@ double Film::mean_luminance() const
     int x0, y0, w, h;
     tile_rect(tile, &x0, &y0, &w, &h);
     for (int y = y0; y < y0 + h; ++y) {
-      for (int x = x0; x < x0 + w; ++x)
-        sum += luminance(pixel_estimate(record(x, y), tile_samples(tile)).mean);
+      for (int x = x0; x < x0 + w; ++x) sum += luminance(pixel_estimate(record(x, y), tile_samples(tile)).mean);
     }
   }
   return sum / (static_cast<double>(width_) * height_);

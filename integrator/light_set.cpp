@@ -93,8 +93,7 @@ LightBounds light_bounds(const Light& light, float scale)
     case LightKind::kRectangle:
     case LightKind::kDisk:
       for (const float u : {-1.0f, 1.0f}) {
-        for (const float v : {-1.0f, 1.0f})
-          include(light.P + light.edge_u * u + light.edge_v * v);
+        for (const float v : {-1.0f, 1.0f}) include(light.P + light.edge_u * u + light.edge_v * v);
       }
       break;
     case LightKind::kTriangle:
@@ -294,8 +293,7 @@ Branch branch_make(std::span<BuildLight> lights, int depth)
   if (lights.size() >= kParallelLights) {
     tbb::parallel_for(std::size_t{0}, branch.groups.size(), descend);
   } else {
-    for (std::size_t i = 0; i < branch.groups.size(); ++i)
-      descend(i);
+    for (std::size_t i = 0; i < branch.groups.size(); ++i) descend(i);
   }
   return branch;
 }

@@ -134,8 +134,7 @@ RenderedImage render(const Scene& scene,
   };
 
   std::vector<int> active(static_cast<std::size_t>(film.num_tiles()));
-  for (int tile = 0; tile < film.num_tiles(); ++tile)
-    active[static_cast<std::size_t>(tile)] = tile;
+  for (int tile = 0; tile < film.num_tiles(); ++tile) active[static_cast<std::size_t>(tile)] = tile;
 
   stats.stop_reason = "samples";
   for (std::uint32_t done = 0; done < wanted && !active.empty();) {
@@ -192,12 +191,10 @@ RenderedImage render(const Scene& scene,
   stats.film_bytes = film.bytes();
   stats.path_state_bytes = workers.size() * Wavefront::bytes();
   stats.stages.clear();
-  for (const char* name : kStageNames)
-    stats.stages.push_back({name, 0.0});
+  for (const char* name : kStageNames) stats.stages.push_back({name, 0.0});
   for (const Wavefront& worker : workers) {
     counters_add(stats.counters, worker.counters);
-    for (std::size_t s = 0; s < stats.stages.size(); ++s)
-      stats.stages[s].seconds += worker.seconds[s];
+    for (std::size_t s = 0; s < stats.stages.size(); ++s) stats.stages[s].seconds += worker.seconds[s];
     if (worker.nonfinite.found) {
       stats.warnings.push_back("a sample was not finite and counts as black, first at pixel " +
                                std::to_string(crop_x + worker.nonfinite.x) + "," +

@@ -58,8 +58,7 @@ void shade_surfaces(const KernelGlobals& g,
 
 void shade_backgrounds(const KernelGlobals& g, const PathStateView& state, const QueueView& queue, Counters& counters)
 {
-  for (std::uint32_t i = 0; i < queue.size; ++i)
-    shade_background(g, state, queue.paths[i], counters);
+  for (std::uint32_t i = 0; i < queue.size; ++i) shade_background(g, state, queue.paths[i], counters);
 }
 
 void shade_lights(const KernelGlobals& g, const PathStateView& state, const QueueView& queue, QueueView& next)

@@ -20,8 +20,7 @@ inline int surface_kernel_index(const Material& material)
 {
   const unsigned needed = feature_mask_of(material);
   int index = 0;
-  while ((needed & ~kSurfaceKernelFeatures[index]) != 0)
-    ++index;
+  while ((needed & ~kSurfaceKernelFeatures[index]) != 0) ++index;
   return index;
 }
 

@@ -54,8 +54,7 @@ Wavefront::Wavefront() : memory_(static_cast<std::byte*>(std::aligned_alloc(kAli
   for (QueueView* queue : {&active_, &next_, &lights_, &background_}) {
     queue->paths = column<std::uint32_t>(kBatchPaths);
   }
-  for (QueueView& queue : surfaces_)
-    queue.paths = column<std::uint32_t>(kBatchPaths);
+  for (QueueView& queue : surfaces_) queue.paths = column<std::uint32_t>(kBatchPaths);
 }
 
 void Wavefront::record_rays() const
@@ -99,16 +98,14 @@ void Wavefront::run(const KernelGlobals& g,
 
   stages.generate(g, state_, batch);
   active_.size = batch.num_paths();
-  for (std::uint32_t i = 0; i < active_.size; ++i)
-    active_.paths[i] = i;
+  for (std::uint32_t i = 0; i < active_.size; ++i) active_.paths[i] = i;
   counters.camera_rays += active_.size;
   charge(Stage::kGenerate);
 
   for (bool camera = true; active_.size > 0; camera = false) {
     if (!camera) counters.bounce_rays += active_.size;
     lights_.size = background_.size = next_.size = shadow_.size = 0;
-    for (QueueView& queue : surfaces_)
-      queue.size = 0;
+    for (QueueView& queue : surfaces_) queue.size = 0;
     intersect_closest(g, accel, state_, active_, camera, surface_kernel.data(), surfaces_.data(), lights_, background_);
     if (recorder != nullptr) record_rays();
     charge(Stage::kIntersectClosest);

@@ -24,8 +24,7 @@ RELIEF_KERNEL void blackman_harris_table_make(FilterTable& table)
 {
   constexpr int kSteps = 1 << 14;
   double total = 0;
-  for (int i = 0; i < kSteps; ++i)
-    total += blackman_harris((i + 0.5) / kSteps - 0.5);
+  for (int i = 0; i < kSteps; ++i) total += blackman_harris((i + 0.5) / kSteps - 0.5);
   double sum = 0;
   int entry = 0;
   for (int i = 0; i < kSteps; ++i) {
@@ -36,8 +35,7 @@ RELIEF_KERNEL void blackman_harris_table_make(FilterTable& table)
     }
     sum = next;
   }
-  while (entry <= kFilterTableSize)
-    table.inverse_cdf[entry++] = 0.5f;
+  while (entry <= kFilterTableSize) table.inverse_cdf[entry++] = 0.5f;
 }
 
 /// Offset from the pixel's centre in filter widths.

@@ -531,8 +531,7 @@ const BrokenBytes kBrokenBytes[] = {
     {"a hundred thousand objects deep",
      [](const auto&) {
        std::string s;
-       for (int i = 0; i < 100000; ++i)
-         s += "{\"a\":";
+       for (int i = 0; i < 100000; ++i) s += "{\"a\":";
        return s;
      },
      "levels"},

@@ -27,8 +27,7 @@ struct Rendered {
   {
     double sum = 0;
     for (int y = 0; y < image.view.height; ++y) {
-      for (int x = 0; x < image.view.width; ++x)
-        sum += at(Aov::kBeauty, x, y)[channel];
+      for (int x = 0; x < image.view.width; ++x) sum += at(Aov::kBeauty, x, y)[channel];
     }
     return sum / (image.view.width * image.view.height);
   }

@@ -36,8 +36,7 @@ TEST(FresnelDielectric, MatchesTheLawInAngles)
 
 TEST(FresnelDielectric, AtNormalIncidenceIsF0)
 {
-  for (const float eta : {1.2f, 1.5f, 3.0f})
-    EXPECT_NEAR(fresnel_dielectric(1.0f, 1.0f, eta), fresnel_F0(eta), 1e-6f);
+  for (const float eta : {1.2f, 1.5f, 3.0f}) EXPECT_NEAR(fresnel_dielectric(1.0f, 1.0f, eta), fresnel_F0(eta), 1e-6f);
 }
 
 TEST(FresnelMean, OfDielectricsIsWithinItsStatedError)
@@ -175,8 +174,7 @@ TEST(DiffuseCoupled, TurnsWhatIsNotReflectedIntoAlbedo)
   const auto a = [](double mu) { return 0.9 - 0.5 * std::pow(1.0 - mu, 5.0); };
   double mean = 0, albedo = 0;
   constexpr int kSteps = 4000;
-  for (int i = 0; i < kSteps; ++i)
-    mean += 2.0 * (i + 0.5) / kSteps * a((i + 0.5) / kSteps) / kSteps;
+  for (int i = 0; i < kSteps; ++i) mean += 2.0 * (i + 0.5) / kSteps * a((i + 0.5) / kSteps) / kSteps;
   for (int i = 0; i < kSteps; ++i) {
     const double mu = (i + 0.5) / kSteps;
     const Vec3f f = diffuse_coupled_eval(splat3(1.0f), static_cast<float>(a(0.3)), static_cast<float>(a(mu)),

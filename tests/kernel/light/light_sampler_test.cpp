@@ -54,8 +54,7 @@ Light random_light(Random& random, double spread, double size)
 LightSet random_set(Random& random, int num_lights, double spread, double size)
 {
   LightSet set;
-  for (int i = 0; i < num_lights; ++i)
-    set.lights.push_back(random_light(random, spread, size));
+  for (int i = 0; i < num_lights; ++i) set.lights.push_back(random_light(random, spread, size));
   light_set_build_tree(set, {});
   return set;
 }
@@ -76,8 +75,7 @@ TEST(LightTree, ProbabilitiesSumToOne)
     for (int k = 0; k < 50; ++k) {
       const Vec3f P = random.in_cube(k % 2 == 0 ? 10 : 100), N = random_normal(random);
       double sum = 0;
-      for (std::uint32_t i = 0; i < view.num_lights; ++i)
-        sum += static_cast<double>(tree_probability(view, P, N, i));
+      for (std::uint32_t i = 0; i < view.num_lights; ++i) sum += static_cast<double>(tree_probability(view, P, N, i));
       // A walk ends without a light where a group's bound may contribute but none of its members does; the lights here
       // face at random and differ in power by a factor of e^6, which is the worst for groups.
       EXPECT_LT(sum, 1 + 1e-4);
@@ -269,8 +267,7 @@ TEST(LightSampler, TreeHasFarLessVarianceThanUniformOrPowerAloneAmongAThousandLi
   light_set_build_tree(set, {});
   const LightsView view = set.view();
   double power = 0, tree_relative = 0, power_relative = 0, uniform_relative = 0;
-  for (const Light& light : set.lights)
-    power += static_cast<double>(light.emission.x);
+  for (const Light& light : set.lights) power += static_cast<double>(light.emission.x);
   const int points = 40;
   for (int k = 0; k < points; ++k) {
     const Vec3f P{random.between(-50, 50), 0, random.between(-50, 50)}, N{0, 1, 0};
@@ -319,14 +316,12 @@ TEST(LightSampler, LightsWithoutIntensityAreNeverChosenButKeepTheirPlace)
 {
   Random random{9};
   LightSet set = random_set(random, 20, 5, 1);
-  for (Light& light : set.lights)
-    light.kind = LightKind::kPoint;
+  for (Light& light : set.lights) light.kind = LightKind::kPoint;
   std::vector<float> scales(20, 1.0f);
   scales[0] = scales[7] = scales[19] = 0.0f;
   light_set_build_tree(set, scales);
   const LightsView view = set.view();
-  for (const std::uint32_t dark : {0u, 7u, 19u})
-    EXPECT_EQ(tree_probability(view, {9, 9, 9}, {}, dark), 0.0f);
+  for (const std::uint32_t dark : {0u, 7u, 19u}) EXPECT_EQ(tree_probability(view, {9, 9, 9}, {}, dark), 0.0f);
   EXPECT_GT(tree_probability(view, {9, 9, 9}, {}, 1), 0.0f);
 }
 
@@ -375,8 +370,7 @@ TEST(LightSampler, AHundredThousandLights)
 {
   Random random{11};
   LightSet set;
-  for (int i = 0; i < 100000; ++i)
-    set.lights.push_back(random_light(random, 100, 0.1));
+  for (int i = 0; i < 100000; ++i) set.lights.push_back(random_light(random, 100, 0.1));
   // Processor time, so that a busy machine does not fail the test.
   const std::clock_t begin = std::clock();
   light_set_build_tree(set, {});

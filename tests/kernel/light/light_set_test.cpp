@@ -117,8 +117,7 @@ TEST(LightSet, TexturesWeighTheChoiceButNotTheEmission)
   const int size = 64;
   std::vector<unsigned char> texels(size * size);
   for (int y = 0; y < size; ++y) {
-    for (int x = 0; x < size; ++x)
-      texels[static_cast<std::size_t>(y * size + x)] = x < size / 2 ? 0 : 255;
+    for (int x = 0; x < size; ++x) texels[static_cast<std::size_t>(y * size + x)] = x < size / 2 ? 0 : 255;
   }
   TextureView texture;
   texture.levels[0] = texels.data();
@@ -133,8 +132,7 @@ TEST(LightSet, TexturesWeighTheChoiceButNotTheEmission)
   dark.emission_texture.m02 = 0.1f;
   const std::vector<TextureView> textures{texture};
   const LightSet set = light_set_make(squares({material, dark, emissive({2, 2, 2})}), textures);
-  for (const Light& light : set.lights)
-    EXPECT_EQ(light.emission, (Vec3f{2, 2, 2}));
+  for (const Light& light : set.lights) EXPECT_EQ(light.emission, (Vec3f{2, 2, 2}));
   const Vec3f P{0.5f, 0.5f, 1000};
   EXPECT_EQ(choice_probability(set, P, 2), 0.0f);
   EXPECT_EQ(choice_probability(set, P, 3), 0.0f);

@@ -40,8 +40,7 @@ inline std::vector<Vec> clip_to_horizon(const std::vector<Vec>& polygon, Vec N)
 /// @source Lambert 1760; Arvo 1995, Eq. 2
 inline double polygon_irradiance(std::vector<Vec> polygon, Vec P, Vec N)
 {
-  for (Vec& v : polygon)
-    v = sub(v, P);
+  for (Vec& v : polygon) v = sub(v, P);
   polygon = clip_to_horizon(polygon, N);
   double sum = 0;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
@@ -55,8 +54,7 @@ inline double polygon_irradiance(std::vector<Vec> polygon, Vec P, Vec N)
 /// Solid angle of a convex polygon: fan of triangles (Van Oosterom and Strackee 1983).
 inline double polygon_solid_angle(std::vector<Vec> polygon, Vec P)
 {
-  for (Vec& v : polygon)
-    v = sub(v, P);
+  for (Vec& v : polygon) v = sub(v, P);
   double sum = 0;
   for (std::size_t i = 1; i + 1 < polygon.size(); ++i) {
     const Vec a = polygon[0], b = polygon[i], c = polygon[i + 1];

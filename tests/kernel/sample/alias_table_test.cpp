@@ -28,8 +28,7 @@ void expect_exact(const std::vector<float>& weights)
   const std::vector<AliasEntry> entries = alias_table_make(weights);
   ASSERT_EQ(entries.size(), weights.size());
   double total = 0;
-  for (const float w : weights)
-    total += static_cast<double>(w);
+  for (const float w : weights) total += static_cast<double>(w);
   const std::vector<double> p = probabilities(entries);
   for (std::size_t i = 0; i < weights.size(); ++i) {
     const double expected = static_cast<double>(weights[i]) / total;
@@ -48,8 +47,7 @@ TEST(AliasTable, ProbabilitiesAreProportionalToWeights)
   expect_exact({0, 3, 0, 1e-6f, 5, 0});
   expect_exact({1e30f, 1e-30f, 1e30f});
   std::vector<float> many;
-  for (std::uint32_t i = 0; i < 10007; ++i)
-    many.push_back(i % 3 == 0 ? 0.0f : std::exp(8 * sample_1d(1, i, 0)));
+  for (std::uint32_t i = 0; i < 10007; ++i) many.push_back(i % 3 == 0 ? 0.0f : std::exp(8 * sample_1d(1, i, 0)));
   expect_exact(many);
 }
 

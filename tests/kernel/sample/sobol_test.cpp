@@ -31,8 +31,7 @@ double chi_squared_uniform_z(const std::vector<int>& counts, double total)
 {
   const double expected = total / static_cast<double>(counts.size());
   double sum = 0;
-  for (const int count : counts)
-    sum += (count - expected) * (count - expected) / expected;
+  for (const int count : counts) sum += (count - expected) * (count - expected) / expected;
   return chi_squared_z(sum, static_cast<double>(counts.size()) - 1);
 }
 
@@ -82,8 +81,7 @@ double smooth_integral()
 double stream_mean(std::uint32_t hash, std::uint32_t stream, std::uint32_t n, std::uint32_t dimension)
 {
   double sum = 0;
-  for (std::uint32_t i = 0; i < n; ++i)
-    sum += smooth_integrand(sample_2d(hash, in_stream(stream, i), dimension));
+  for (std::uint32_t i = 0; i < n; ++i) sum += smooth_integrand(sample_2d(hash, in_stream(stream, i), dimension));
   return sum / n;
 }
 
@@ -142,8 +140,7 @@ TEST(Sobol, PermutationIsNestedAndMixesEveryLowerBit)
     for (int i = 0; i < 32; ++i) {
       const std::uint32_t changed = output ^ owen_permute_reversed(input ^ (1u << i), seed);
       worst_low_bits |= (changed & ((1u << i) - 1)) != 0;
-      for (int j = 0; j < 32; ++j)
-        flips[static_cast<std::size_t>(32 * i + j)] += (changed >> j) & 1u;
+      for (int j = 0; j < 32; ++j) flips[static_cast<std::size_t>(32 * i + j)] += (changed >> j) & 1u;
     }
   }
   EXPECT_EQ(worst_low_bits, 0);
@@ -239,8 +236,7 @@ TEST(Sobol, DimensionsAndNeighbouringPixelsAreUncorrelated)
     EXPECT_LT(std::abs(correlation_z(reference, column(0, 0, dimension, false))), kMaxZ) << dimension;
     EXPECT_LT(std::abs(correlation_z(reference, column(0, 0, dimension, true))), kMaxZ) << dimension;
   }
-  for (const int shift : {1, 1920})
-    EXPECT_LT(std::abs(correlation_z(reference, column(shift, 0, 4, false))), kMaxZ);
+  for (const int shift : {1, 1920}) EXPECT_LT(std::abs(correlation_z(reference, column(shift, 0, 4, false))), kMaxZ);
 }
 
 TEST(Sobol, DimensionsOfOnePixelAreJointlyUniform)
@@ -268,8 +264,7 @@ TEST(Sobol, ConvergesFasterThanIndependentSamples)
   const int pixels = 1000;
   const auto rms = [&](std::uint32_t n) {
     double sum = 0;
-    for (int p = 0; p < pixels; ++p)
-      sum += std::pow(stream_mean(pixel(p), 0, n, 4) - truth, 2);
+    for (int p = 0; p < pixels; ++p) sum += std::pow(stream_mean(pixel(p), 0, n, 4) - truth, 2);
     return std::sqrt(sum / pixels);
   };
   const double at_16 = rms(16), at_1024 = rms(1024);

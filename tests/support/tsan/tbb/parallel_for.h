@@ -33,8 +33,7 @@ void run(std::size_t num_tasks, const Body& body)
   std::exception_ptr error;
   const auto work = [&] {
     try {
-      for (std::size_t i = next++; i < num_tasks; i = next++)
-        body(i);
+      for (std::size_t i = next++; i < num_tasks; i = next++) body(i);
     } catch (...) {
       next = num_tasks;
       const std::scoped_lock lock(mutex);
@@ -42,11 +41,9 @@ void run(std::size_t num_tasks, const Body& body)
     }
   };
   std::vector<std::thread> threads;
-  for (std::size_t i = 1; i < kNumThreads && i < num_tasks; ++i)
-    threads.emplace_back(work);
+  for (std::size_t i = 1; i < kNumThreads && i < num_tasks; ++i) threads.emplace_back(work);
   work();
-  for (std::thread& thread : threads)
-    thread.join();
+  for (std::thread& thread : threads) thread.join();
   if (error) std::rethrow_exception(error);
 }
 
