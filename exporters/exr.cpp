@@ -191,13 +191,6 @@ std::string one_line(std::string text)
   return text;
 }
 
-std::string number_text(double value)
-{
-  char text[32];
-  std::snprintf(text, sizeof text, "%.9g", value);
-  return text;
-}
-
 /// The attributes that are text, except those by which OpenEXR itself describes a part.
 Attributes attributes_of(const Imf::Header& header)
 {
@@ -312,12 +305,12 @@ Attributes exr_attributes(const Statistics& statistics, std::string_view command
       {"relief:scene", statistics.scene},
       {"relief:seed", std::to_string(statistics.seed)},
       {"relief:frame", std::to_string(statistics.frame)},
-      {"relief:samples", number_text(statistics.samples_per_pixel)},
-      {"relief:seconds", number_text(statistics.render_seconds)},
+      {"relief:samples", attribute_number(statistics.samples_per_pixel)},
+      {"relief:seconds", attribute_number(statistics.render_seconds)},
       {"relief:threads", std::to_string(statistics.threads)},
       {"relief:isa", statistics.isa},
-      {"relief:error_rmse", number_text(statistics.error_rmse)},
-      {"relief:error_relmse", number_text(statistics.error_relmse)},
+      {"relief:error_rmse", attribute_number(statistics.error_rmse)},
+      {"relief:error_relmse", attribute_number(statistics.error_relmse)},
       {"relief:view", statistics.view},
       {"relief:stop_reason", statistics.stop_reason},
       {"relief:warnings", warnings},

@@ -70,13 +70,6 @@ std::vector<std::string> seeds_of(const Picture& picture)
   return seeds;
 }
 
-std::string number_text(double value)
-{
-  char text[32];
-  std::snprintf(text, sizeof text, "%.9g", value);
-  return text;
-}
-
 /// Sums over the pictures so far.
 class Merger {
  public:
@@ -325,11 +318,11 @@ MergeResult Merger::finish()
       result_.attributes.insert(*found);
   }
   if (!seeds.empty()) result_.attributes["relief:seed"] = seeds;
-  result_.attributes["relief:samples"] = number_text(samples_);
-  result_.attributes["relief:seconds"] = number_text(seconds_);
+  result_.attributes["relief:samples"] = attribute_number(samples_);
+  result_.attributes["relief:seconds"] = attribute_number(seconds_);
   result_.attributes["relief:merged"] = std::to_string(num_pictures_);
   if (knows_error_ && samples_ > 0) {
-    result_.attributes["relief:error_rmse"] = number_text(std::sqrt(weighted_square_error_) / samples_);
+    result_.attributes["relief:error_rmse"] = attribute_number(std::sqrt(weighted_square_error_) / samples_);
   }
   return {std::move(result_), std::move(warnings_)};
 }

@@ -1,6 +1,7 @@
 #include "exporters/picture.h"
 
 #include <algorithm>
+#include <cstdio>
 
 namespace relief {
 
@@ -35,6 +36,13 @@ const Channel* Picture::find(std::string_view name) const
   const auto found =
       std::find_if(channels.begin(), channels.end(), [&](const Channel& channel) { return channel.name == name; });
   return found == channels.end() ? nullptr : &*found;
+}
+
+std::string attribute_number(double value)
+{
+  char text[32];
+  std::snprintf(text, sizeof text, "%.9g", value);
+  return text;
 }
 
 std::string channel_name(const AovInfo& info, std::size_t channel)

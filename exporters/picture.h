@@ -42,6 +42,9 @@ struct Channel {
 /// Text that goes with a picture; names without a namespace belong to OpenEXR, ours start with "relief:".
 using Attributes = std::map<std::string, std::string>;
 
+/// A number as the text of an attribute: nine significant digits, so that a float comes back exactly.
+std::string attribute_number(double value);
+
 /// A picture read from a file.
 struct Picture {
   std::string file;            ///< where it came from, for messages
