@@ -12,9 +12,9 @@ inline constexpr float kClearcoatF0 = 0.04f;
 /// @param wo_coat, wi_coat  unit, coat's frame; below its horizon there is no reflection
 /// @param wi_z              cosine of wi to the surface's own normal, > 0
 /// @param alpha             >= kDeltaAlpha
-/// @return f before the coat's strength. The integrator multiplies by the surface's cosine; where the coat faces wi less
-///         than the surface does, f is scaled to the coat's own cosine, so that a tilted coat never reflects more than it
-///         receives
+/// @return f before the coat's strength. The integrator multiplies by the surface's cosine; where the coat faces wi
+///         less than the surface does, f is scaled to the coat's own cosine, so that a tilted coat never reflects more
+///         than it receives
 RELIEF_KERNEL GgxReflection clearcoat_eval(Vec3f wo_coat, Vec3f wi_coat, float wi_z, float alpha)
 {
   if (!(wo_coat.z > kMinCosine && wi_coat.z > kMinCosine)) return {0, 0, 1};

@@ -1,5 +1,5 @@
-// A rough or smooth interface between two dielectrics: reflection and refraction by the same GGX microfacets, with exact
-// Fresnel, and what leaves after several bounces among them.
+// A rough or smooth interface between two dielectrics: reflection and refraction by the same GGX microfacets, with
+// exact Fresnel, and what leaves after several bounces among them.
 //
 // Walter, Marschner, Li, Torrance 2007, "Microfacet Models for Refraction through Rough Surfaces" [W].
 // Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks" [KC].

@@ -8,8 +8,8 @@ namespace relief {
 
 /// f of a lobe that hides behind factors of both directions: color · a(wo) a(wi) / (π · mean of a).
 ///
-/// With a = 1 it is Lambert's. With a = 1 − E, E the directional albedo of what lies on top, it is reciprocal and the sum
-/// of both albedos is 1 for white: what is not reflected is scattered, exactly.
+/// With a = 1 it is Lambert's. With a = 1 − E, E the directional albedo of what lies on top, it is reciprocal and the
+/// sum of both albedos is 1 for white: what is not reflected is scattered, exactly.
 /// @param a_o, a_i  [0, 1]
 /// @param a_mean    mean of a over the cosine-weighted hemisphere, > 0
 /// @source          Kelemen and Szirmay-Kalos 2001 (diffuse base), Kulla and Conty 2017 (microfacets)

@@ -2,8 +2,9 @@
 // does not follow, which the surface model puts back, and how much of the light reaches what lies below.
 //
 // Read the structs and the look-ups first; bsdf_tables_make and its quadratures fill them. Roughness is perceptual
-// (alpha = roughness²). The cosine's axis is √(µ(1 + alpha)/(µ + alpha)): losses happen where µ is about alpha, and along
-// that axis the tables hardly depend on roughness. (√µ alone left 5 % of error for smooth metal at grazing angles.)
+// (alpha = roughness²). The cosine's axis is √(µ(1 + alpha)/(µ + alpha)): losses happen where µ is about alpha, and
+// along that axis the tables hardly depend on roughness. (√µ alone left 5 % of error for smooth metal at grazing
+// angles.)
 #pragma once
 
 #include "kernel/assert.h"
@@ -40,8 +41,8 @@ struct SheenAlbedo {
 /// About 46 kB; a render needs one. Glass and sheen are filled only if asked for.
 struct BsdfTables {
   GgxEntry ggx[kGgxRoughnesses][kGgxCosines];
-  /// Means over the cosine-weighted hemisphere. Losses grow with alpha² and are stored divided by it, so that rows can be
-  /// interpolated.
+  /// Means over the cosine-weighted hemisphere. Losses grow with alpha² and are stored divided by it, so that rows can
+  /// be interpolated.
   GgxAlbedo ggx_mean[kGgxRoughnesses];
   float glass_root_lost[2][kGlassIors][kGlassRoughnesses][kGlassCosines];  ///< √(1 − albedo); [0]: from the thin side
   float glass_lost_mean[2][kGlassIors][kGlassRoughnesses];                 ///< over alpha²
@@ -229,8 +230,8 @@ RELIEF_KERNEL VisibleNormals<kPhi, kCap> visible_normals_make()
 using GgxQuadrature = VisibleNormals<16, 32>;
 using GlassQuadrature = VisibleNormals<8, 24>;
 
-/// Albedo of GGX reflection by quadrature over visible normals. The loss is what is summed: of smooth surfaces it is far
-/// below the rounding of a sum near 1.
+/// Albedo of GGX reflection by quadrature over visible normals. The loss is what is summed: of smooth surfaces it is
+/// far below the rounding of a sum near 1.
 RELIEF_KERNEL GgxAlbedo ggx_albedo_integrate(const GgxQuadrature& normals, float cos_o, float alpha)
 {
   const Vec3f wo{safe_sqrt(1.0f - cos_o * cos_o), 0.0f, cos_o};

@@ -48,7 +48,8 @@ RELIEF_KERNEL Vec3f fresnel_schlick_mean(Vec3f F0, float F90) { return F0 * (20.
 
 /// Mean of the dielectric reflectance over the cosine-weighted hemisphere, from the thin side.
 /// @param ior  dense over thin, >= 1
-/// @source     fit of Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks"; within 0.01 for ior <= 3 (tested)
+/// @source     fit of Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks"; within 0.01 for ior
+///             <= 3 (tested)
 RELIEF_KERNEL float fresnel_dielectric_mean(float ior) { return (ior - 1.0f) / (4.08567f + 1.00071f * ior); }
 
 }  // namespace relief

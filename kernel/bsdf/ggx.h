@@ -10,8 +10,8 @@
 
 namespace relief {
 
-/// Below this a lobe is treated as a perfect mirror (roughness 0.0316): its half width is 0.06°, finer than a pixel, and
-/// light sampling would be left with peaks of 3·10⁵.
+/// Below this a lobe is treated as a perfect mirror (roughness 0.0316): its half width is 0.06°, finer than a pixel,
+/// and light sampling would be left with peaks of 3·10⁵.
 inline constexpr float kDeltaAlpha = 1e-3f;
 
 /// Directions closer to the surface than this scatter nothing; keeps every quotient by a cosine finite.

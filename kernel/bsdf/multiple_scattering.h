@@ -1,5 +1,5 @@
-// Light that leaves a rough interface after several bounces, [KC]: its f is 1 − E(wo) times 1 − E(wi), and it is sampled
-// by an approximation of the latter.
+// Light that leaves a rough interface after several bounces, [KC]: its f is 1 − E(wo) times 1 − E(wi), and it is
+// sampled by an approximation of the latter.
 //
 // Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks" [KC].
 #pragma once
@@ -8,8 +8,9 @@
 
 namespace relief {
 
-/// Density of directions: of a rough surface nearly the cosine's; of a smooth one, which loses light only at µ below about
-/// alpha and like (alpha/µ)² above, uniform in log(µ + alpha). A cosine alone gave factors of up to 200 on the throughput.
+/// Density of directions: of a rough surface nearly the cosine's; of a smooth one, which loses light only at µ below
+/// about alpha and like (alpha/µ)² above, uniform in log(µ + alpha). A cosine alone gave factors of up to 200 on the
+/// throughput.
 struct MultipleScattering {
   float alpha = 1;
   float log_range = 1;  ///< log(1 + 1/alpha)

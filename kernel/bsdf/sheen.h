@@ -50,7 +50,8 @@ RELIEF_KERNEL float sheen_half_sine(Vec3f wo, Vec3f wi)
   return min(1.0f, __builtin_sqrtf((h.x * h.x + h.y * h.y) / length_squared(h)));
 }
 
-/// f before the sheen colour, as published: at low roughness and grazing angles its albedo exceeds one (SheenAlbedo::bound).
+/// f before the sheen colour, as published: at low roughness and grazing angles its albedo exceeds one
+/// (SheenAlbedo::bound).
 /// @param wo, wi  unit, z > 0
 RELIEF_KERNEL float sheen_eval(Vec3f wo, Vec3f wi, float roughness)
 {

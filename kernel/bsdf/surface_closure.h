@@ -2,6 +2,7 @@
 // evaluated and sampled by layered.h, whose head describes the model.
 #pragma once
 
+#include "kernel/bsdf/clearcoat.h"
 #include "kernel/bsdf/diffuse.h"
 #include "kernel/bsdf/energy_tables.h"
 #include "kernel/bsdf/multiple_scattering.h"

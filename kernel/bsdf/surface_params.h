@@ -118,8 +118,8 @@ RELIEF_KERNEL SurfaceParams surface_params_eval(const Material& m,
 
 /// Normal from a tangent-space normal map.
 /// @param scale  factor on x and y (normalTexture.scale)
-/// @return       unit, tangent space (x along the tangent, z along the surface's normal); +z without a map, or where the
-///               map holds no direction
+/// @return       unit, tangent space (x along the tangent, z along the surface's normal); +z without a map, or where
+///               the map holds no direction
 RELIEF_KERNEL Vec3f normal_map_eval(const TextureRef& ref,
                                     float scale,
                                     const TextureView* textures,

@@ -1,4 +1,5 @@
-// What the tests of the surface model share: tables, named surfaces, directions, and a low-discrepancy estimate of albedo.
+// What the tests of the surface model share: tables, named surfaces, directions, and a low-discrepancy estimate of
+// albedo.
 #pragma once
 
 #include <cmath>

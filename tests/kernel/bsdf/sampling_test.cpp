@@ -130,8 +130,9 @@ TEST(SurfaceSample, ReturnsWhatEvalReturns)
       const BsdfSample s = surface_sample<kFeatureAll>(setting.params, full_tables(), wo, point.lobe, point.u);
       if (!(s.pdf > 0.0f)) continue;
       const BsdfEval e = surface_eval<kFeatureAll>(setting.params, full_tables(), wo, s.wi);
-      EXPECT_EQ(s.f, e.f) << setting.name;
-      EXPECT_EQ(s.pdf, e.pdf) << setting.name;
+      // Up to contraction of products and sums, which the compiler chooses anew where it inlines.
+      EXPECT_LE(length(s.f - e.f), 1e-5f * length(e.f)) << setting.name;
+      EXPECT_NEAR(s.pdf, e.pdf, 1e-5f * e.pdf) << setting.name;
       EXPECT_NEAR(static_cast<double>(length(s.wi)), 1.0, 1e-5) << setting.name;
       EXPECT_EQ((s.lobe & kLobeTransmit) != 0, s.wi.z * wo.z < 0.0f) << setting.name;
     }
