@@ -12,6 +12,8 @@ SceneContext::SceneContext(const Scene& loaded)
       bsdf_tables(std::make_unique<BsdfTables>())
 {
   for (const Mesh& mesh : scene.meshes) meshes.push_back(mesh.view());
+  std::vector<int> uses(scene.meshes.size(), 0);
+  for (const Instance& instance : scene.instances) ++uses[static_cast<std::size_t>(instance.mesh_index)];
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
     InstanceView view;
@@ -21,6 +23,7 @@ SceneContext::SceneContext(const Scene& loaded)
     view.material_index = instance.material_index;
     view.first_light_index = lights.first_light_index[i];
     view.flags = instance.flags;
+    if (uses[static_cast<std::size_t>(instance.mesh_index)] > 1) view.flags |= kTracedInObjectSpace;
     instances.push_back(view);
   }
   unsigned features = 0;

@@ -28,6 +28,7 @@ enum InstanceFlag : std::uint32_t {
   kMirrored = 1u << 2,  ///< world_from_object has a negative determinant
   kCausticCaster = 1u << 3,
   kCausticReceiver = 1u << 4,
+  kTracedInObjectSpace = 1u << 5,  ///< an instance of a shared mesh: the tracer transforms the ray, not the triangles
 };
 
 /// One placement of a mesh.

@@ -38,12 +38,17 @@ RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
 
   SurfaceHit hit;
   const Vec3f P_object = w0 * p0 + bary_u * p1 + bary_v * p2;
-  const Vec3f P_object_error = gamma_bound(7) * (abs(w0 * p0) + abs(bary_u * p1) + abs(bary_v * p2));
+  const Vec3f P_object_sum = abs(w0 * p0) + abs(bary_u * p1) + abs(bary_v * p2);
   hit.P = transform_point(m, P_object);
-  const Vec3f ax = abs(m.x), ay = abs(m.y), az = abs(m.z);
-  const auto abs_transform = [&](Vec3f v) { return ax * v.x + ay * v.y + az * v.z; };
-  hit.P_error = (1.0f + gamma_bound(3)) * abs_transform(P_object_error) +
-                gamma_bound(3) * (abs_transform(abs(P_object)) + abs(m.p));
+  const auto abs_transform = [](const Affine3& by, Vec3f v) { return abs(by.x) * v.x + abs(by.y) * v.y + abs(by.z) * v.z; };
+  hit.P_error = (1.0f + gamma_bound(3)) * gamma_bound(7) * abs_transform(m, P_object_sum) +
+                gamma_bound(3) * (abs_transform(m, P_object_sum) + abs(m.p));
+  if ((instance.flags & kTracedInObjectSpace) != 0) {
+    // The tracer brings the ray to object space; its rounding there, seen from the world. Far from the origin this is
+    // more than the error of P itself, and it is not aligned with the world's axes (test SelfIntersection).
+    const Affine3& inverse = instance.object_from_world;
+    hit.P_error += gamma_bound(6) * abs_transform(m, abs_transform(inverse, abs(hit.P)) + abs(inverse.p));
+  }
 
   const Vec3f edge1 = transform_vector(m, p1 - p0);
   const Vec3f edge2 = transform_vector(m, p2 - p0);

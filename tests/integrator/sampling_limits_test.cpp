@@ -32,7 +32,7 @@ TEST(SamplingLimits, NoiseThresholdSpendsSamplesWhereTheNoiseIs)
 {
   const Scene scene = half_noisy_scene();
   RenderOptions options = render_options(scene, 64, 4096);
-  options.settings.noise_threshold = 0.01f;
+  options.settings.noise_threshold = 0.004f;
   const Rendered r = render_scene(scene, options);
   EXPECT_EQ(r.stats.stop_reason, "noise_threshold");
   const float flat = *r.at(Aov::kSampleCount, 2, 2);
