@@ -41,9 +41,8 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
                                        const PathStateView& state,
                                        std::uint32_t path,
                                        const SurfaceHit& hit,
-                                       const SurfaceParams& params,
+                                       const SurfaceClosure& closure,
                                        const ShadingSide& side,
-                                       Vec3f wo_local,
                                        Vec3f light_N,
                                        ShadowQueueView& shadow)
 {
@@ -68,7 +67,7 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
     }
   }
   if (is_zero(radiance)) return;
-  const BsdfEval bsdf = surface_eval<kFeatures>(params, *g.bsdf_tables, wo_local, to_local(side.frame, light.wi));
+  const BsdfEval bsdf = closure_eval<kFeatures>(closure, *g.bsdf_tables, to_local(side.frame, light.wi));
   if (is_zero(bsdf.f)) return;
   const float cos_i = __builtin_fabsf(dot(light.wi, side.frame.n));
   const float weight = path_light_weight(g.light_technique, light.pdf, bsdf.pdf, light.delta);
@@ -229,13 +228,14 @@ RELIEF_KERNEL void shade_surface(const KernelGlobals& g,
                     path_bounces(bounces, BounceKind::kTransmission) > g.limits.transmission;
   if (params.unlit || last) return;
 
+  const SurfaceClosure closure = surface_closure_make<kFeatures>(params, *g.bsdf_tables, wo_local);
   const Vec3f light_N = params.transmission > 0.0f ? Vec3f{} : side.Ns;
   if (g.has_lights && !surface_is_delta(params)) {
-    shade_surface_light<kFeatures>(g, state, path, hit, params, side, wo_local, light_N, shadow);
+    shade_surface_light<kFeatures>(g, state, path, hit, closure, side, light_N, shadow);
   }
 
-  const BsdfSample bsdf = surface_sample<kFeatures>(
-      params, *g.bsdf_tables, wo_local, sample_1d(hash, sample, dimension_bounce(surface, BounceDimension::kBsdfLobe)),
+  const BsdfSample bsdf = closure_sample<kFeatures>(
+      closure, *g.bsdf_tables, sample_1d(hash, sample, dimension_bounce(surface, BounceDimension::kBsdfLobe)),
       sample_2d(hash, sample, dimension_bounce(surface, BounceDimension::kBsdfUv)));
   if (!(bsdf.pdf > 0.0f)) return;
   throughput *= bsdf.f * (__builtin_fabsf(bsdf.wi.z) / bsdf.pdf);
