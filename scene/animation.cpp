@@ -133,7 +133,7 @@ std::unordered_map<int, AnimatedPose> animation_pose(const GltfDocument& documen
       const std::string& target = channel.target_path;
       const bool is_rotation = target == "rotation", is_scale = target == "scale";
       if (channel.target_node < 0 || (!is_rotation && !is_scale && target != "translation")) {
-        warnings.add(document.file + ": " + channel_path + ": animation of \"" + target + "\" is not read");
+        warnings.add(document.file + ": animation of \"" + target + "\" is not read");
         continue;
       }
       const auto node = static_cast<std::size_t>(channel.target_node);

@@ -57,12 +57,11 @@ SceneError::SceneError(std::string file_name, std::string path, std::string want
 void Warnings::add(const std::string& text)
 {
   const std::string line = one_line(text);
-  const auto same = std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.text == line; });
-  if (same != entries_.end()) {
-    ++same->count;
-  } else {
-    entries_.push_back({line, 1});
+  const auto [known, is_new] = entry_of_.try_emplace(line, entries_.size());
+  if (is_new) {
+    entries_.push_back({line, 0});
   }
+  ++entries_[known->second].count;
 }
 
 std::vector<std::string> Warnings::texts() const

@@ -3,6 +3,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 namespace relief {
@@ -30,6 +31,7 @@ class Warnings {
     int count = 0;
   };
   std::vector<Entry> entries_;
+  std::unordered_map<std::string, std::size_t> entry_of_;
 };
 
 }  // namespace relief

@@ -7,22 +7,11 @@ namespace {
 
 bool has_texture(const TextureRef& ref) { return ref.texture_index >= 0; }
 
-bool any_texture(const Material& m)
-{
-  for (const TextureRef* ref :
-       {&m.base_color_texture, &m.metallic_roughness_texture, &m.normal_texture, &m.emission_texture,
-        &m.transmission_texture, &m.clearcoat_texture, &m.clearcoat_roughness_texture, &m.clearcoat_normal_texture,
-        &m.sheen_color_texture, &m.sheen_roughness_texture, &m.specular_texture, &m.specular_color_texture}) {
-    if (has_texture(*ref)) {
-      return true;
-    }
-  }
-  return false;
-}
-
 void add_material(FeatureSet& f, const Material& m)
 {
-  f.textures |= any_texture(m);
+  for (const TextureRef* ref : material_textures(m)) {
+    f.textures |= has_texture(*ref);
+  }
   f.normal_maps |= has_texture(m.normal_texture) || has_texture(m.clearcoat_normal_texture);
   f.transparency |= m.alpha_mode != AlphaMode::kOpaque;
   f.transmission |= m.transmission > 0;
@@ -34,6 +23,22 @@ void add_material(FeatureSet& f, const Material& m)
 }
 
 }  // namespace
+
+std::array<const TextureRef*, 12> material_textures(const Material& m)
+{
+  return {&m.base_color_texture,
+          &m.metallic_roughness_texture,
+          &m.normal_texture,
+          &m.emission_texture,
+          &m.transmission_texture,
+          &m.clearcoat_texture,
+          &m.clearcoat_roughness_texture,
+          &m.clearcoat_normal_texture,
+          &m.sheen_color_texture,
+          &m.sheen_roughness_texture,
+          &m.specular_texture,
+          &m.specular_color_texture};
+}
 
 bool material_casts_caustics(const Material& material)
 {

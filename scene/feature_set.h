@@ -1,9 +1,14 @@
 // What a scene needs, found once at load.
 #pragma once
 
+#include <array>
+
 #include "scene/scene.h"
 
 namespace relief {
+
+/// Every texture reference of a material, absent ones included.
+std::array<const TextureRef*, 12> material_textures(const Material& material);
 
 /// Whether light is bent or mirrored sharply enough by a material for its caustics to be worth photons: transmission or
 /// metal whose roughness factor is at most a quarter.

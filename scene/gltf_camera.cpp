@@ -33,8 +33,8 @@ SceneCamera gltf_camera(const GltfDocument& document,
   SceneCamera out;
   out.name = node.name.empty() ? source.name : node.name;
   Camera& camera = out.camera;
-  const Affine3 m = transform_to_affine(world);
-  camera.world_from_camera = camera_frame(m.z, m.y, m.p);
+  camera.world_from_camera =
+      camera_frame(unit_direction(world.z), unit_direction(world.y), transform_to_affine(world).p);
   if (source.type == "perspective") {
     camera.projection = Projection::kPerspective;
     camera.half_height = static_cast<float>(std::tan(0.5 * source.perspective.yfov));
@@ -43,9 +43,9 @@ SceneCamera gltf_camera(const GltfDocument& document,
     camera.projection = Projection::kOrthographic;
     camera.half_height = static_cast<float>(std::fabs(source.orthographic.ymag));
     const auto half_width = static_cast<float>(std::fabs(source.orthographic.xmag));
-    constexpr float kSmallest = 1e-9f;
-    if (!(camera.half_height >= kSmallest && half_width >= kSmallest)) {
-      throw SceneError(document.file, path + "/orthographic", "xmag and ymag other than 0",
+    constexpr float kSmallest = 1e-9f, kLargest = 1e15f;
+    if (!(min(camera.half_height, half_width) >= kSmallest && max(camera.half_height, half_width) <= kLargest)) {
+      throw SceneError(document.file, path + "/orthographic", "xmag and ymag other than 0 and up to 1e15 m",
                        number_text(source.orthographic.xmag) + " and " + number_text(source.orthographic.ymag));
     }
     out.aspect = half_width / camera.half_height;

@@ -39,8 +39,11 @@ struct GltfDocument {
   bool read_extension(const nlohmann::json& object, const std::string& object_path, const char* name, Read&& read) const
   {
     const auto extensions = object.find("extensions");
-    if (extensions == object.end() || !extensions->is_object()) {
+    if (extensions == object.end()) {
       return false;
+    }
+    if (!extensions->is_object()) {
+      throw SceneError(file, object_path + "/extensions", "an object", json_describe(*extensions));
     }
     const auto extension = extensions->find(name);
     if (extension == extensions->end()) {

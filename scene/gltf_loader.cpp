@@ -164,6 +164,26 @@ void GltfLoader::place_lights(const PlacedNode& node)
   });
 }
 
+/// Says what a material asks of a mesh that the mesh does not have.
+void GltfLoader::warn_missing_attributes(const std::string& label, const Mesh& mesh, const Material& material)
+{
+  const auto check = [&](const TextureRef& ref) {
+    if (ref.texture_index >= 0 && mesh.uv[ref.uv_set].empty()) {
+      warnings_.add(label + ": the material's textures need TEXCOORD_" + std::to_string(ref.uv_set) +
+                    ", which is missing");
+    }
+  };
+  for (const TextureRef* ref : material_textures(material)) {
+    check(*ref);
+  }
+  if (material.displacement_index >= 0) {
+    check(scene_.displacements[static_cast<std::size_t>(material.displacement_index)].height);
+    if (mesh.N.empty()) {
+      warnings_.add(label + ": displaced without normals: triangles move along their own and open cracks");
+    }
+  }
+}
+
 const std::vector<int>& GltfLoader::meshes_of(const GltfDocument& document, int mesh_index)
 {
   const auto [it, is_new] = meshes_of_.try_emplace({&document, mesh_index});
@@ -180,10 +200,7 @@ const std::vector<int>& GltfLoader::meshes_of(const GltfDocument& document, int 
       continue;
     }
     mesh->material_index = material_index;
-    if (material.displacement_index >= 0 && mesh->N.empty()) {
-      warnings_.add(document.file + ": /meshes/" + std::to_string(mesh_index) +
-                    ": displaced without normals: triangles move along their own and open cracks");
-    }
+    warn_missing_attributes(document.file + ": /meshes/" + std::to_string(mesh_index), *mesh, material);
     it->second.push_back(static_cast<int>(scene_.meshes.size()));
     mesh_bounds_.push_back(bounds_of_points(mesh->P));
     scene_.meshes.push_back(std::move(*mesh));
@@ -235,9 +252,14 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
 {
   Warnings warnings;
   try {
-    GltfLoader loader(warnings);
-    Scene scene = loader.load(path, options);
-    std::vector<TextureRequest> textures = loader.take_textures();
+    Scene scene;
+    std::vector<TextureRequest> textures;
+    {
+      // The files go away before texels come: the two need not be in memory together.
+      GltfLoader loader(warnings);
+      scene = loader.load(path, options);
+      textures = loader.take_textures();
+    }
     for (const TextureRequest& texture : textures) {
       if (!texture.file.empty()) {
         scene.files.push_back(texture.file.string());

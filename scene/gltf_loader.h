@@ -31,6 +31,7 @@ class GltfLoader {
   void place_camera(const PlacedNode& node);
   void place_lights(const PlacedNode& node);
   void add_defaults();
+  void warn_missing_attributes(const std::string& label, const Mesh& mesh, const Material& material);
 
   const std::vector<int>& meshes_of(const GltfDocument& document, int mesh_index);
   int material_of(const GltfDocument& document, int material_index);

@@ -44,6 +44,9 @@ struct PrimitiveReader {
   }
 };
 
+/// Vertices and triangles are counted in 32 bits.
+constexpr std::size_t kMostElements = 0xfffffffe;
+
 /// Corner numbers of the primitive: its indices, or 0, 1, 2, …
 std::vector<std::uint32_t> read_corners(const PrimitiveReader& reader, std::size_t num_vertices)
 {
@@ -55,6 +58,10 @@ std::vector<std::uint32_t> read_corners(const PrimitiveReader& reader, std::size
   const std::string path = reader.path + "/indices";
   const AccessorView view = accessor_open(reader.document, reader.primitive.indices, AccessorKind::kIndex, 1, 1, path);
   std::vector<std::uint32_t> out = accessor_read_indices(view);
+  if (out.size() > kMostElements) {
+    throw SceneError(reader.document.file, path, "at most " + std::to_string(kMostElements) + " indices",
+                     std::to_string(out.size()));
+  }
   const std::uint32_t restart = view.component_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE    ? 0xffu
                                 : view.component_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT ? 0xffffu
                                                                                                 : 0xffffffffu;
@@ -239,16 +246,19 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
     reader.warn("points and lines are not rendered");
     return {};
   }
+  const auto& json = document.element("meshes", static_cast<std::size_t>(mesh_index))["primitives"];
+  if (json[static_cast<std::size_t>(primitive_index)].contains("targets")) {
+    reader.warn("morph targets are not read");
+  }
   const auto position = reader.primitive.attributes.find("POSITION");
   if (position == reader.primitive.attributes.end()) {
     throw SceneError(document.file, reader.attribute_path("POSITION"), "an accessor", "nothing");
   }
   const AccessorView positions =
       accessor_open(document, position->second, AccessorKind::kVertex, 3, 3, reader.attribute_path("POSITION"));
-  constexpr std::size_t kMostVertices = 0xfffffffe;
-  if (positions.count > kMostVertices) {
+  if (positions.count > kMostElements) {
     throw SceneError(document.file, reader.attribute_path("POSITION"),
-                     "at most " + std::to_string(kMostVertices) + " vertices", std::to_string(positions.count));
+                     "at most " + std::to_string(kMostElements) + " vertices", std::to_string(positions.count));
   }
   Mesh mesh;
   mesh.name = source.name;

@@ -115,17 +115,6 @@ void read_layers(const MaterialContext& c, Material& m)
   });
 }
 
-/// Where a light stands and looks.
-struct LightFrame {
-  Vec3f P, axis;
-};
-
-LightFrame light_frame(const Transform& world)
-{
-  const Affine3 m = transform_to_affine(world);
-  return {m.p, normalize(-m.z)};
-}
-
 /// Attribute of EXT_mesh_gpu_instancing; empty view (count 0) when absent.
 AccessorView open_instance_attribute(const GltfDocument& document,
                                      const JsonReader& attributes,
@@ -226,9 +215,8 @@ std::vector<Light> khronos_node_light(const GltfDocument& document,
   std::vector<Light> out;
   const auto read_light = [&](const JsonReader& r) {
     Light light;
-    const LightFrame frame = light_frame(world);
-    light.P = frame.P;
-    light.axis = frame.axis;
+    light.P = transform_to_affine(world).p;
+    light.axis = -unit_direction(world.z);
     const int type = r.choice("type", kTypes, -1);
     if (type < 0) {
       r.fail("type", "\"point\", \"spot\" or \"directional\"");

@@ -121,7 +121,10 @@ DisplacementSettings read_khr_displacement(const GltfDocument& document,
   }
   d.scale = r.number_f("displacementGeometryFactor", 1);
   const float offset = r.number_f("displacementGeometryOffset", 0);
-  d.midlevel = d.scale != 0 ? -offset / d.scale : 0.0f;
+  d.midlevel = offset != 0 ? -offset / d.scale : 0.0f;
+  if (!is_finite(d.midlevel)) {
+    r.fail("displacementGeometryOffset", "0, because displacementGeometryFactor is");
+  }
   r.warn_unread(warnings);
   return d;
 }
@@ -232,8 +235,10 @@ std::vector<Light> relief_area_light(const GltfDocument& document,
     light.P = m.p;
     const Vec3f across = cross(light.edge_u, light.edge_v);
     light.area = length(across) * (disk ? kPi : 4.0f);
-    if (!(light.area > 0 && is_finite(light.area))) {
-      r.fail("", "a light whose area in the world is a number > 0", number_text(static_cast<double>(light.area)));
+    // Below, 1 / area and the radiance that belongs to it leave single precision.
+    constexpr float kSmallestArea = 1e-20f;
+    if (!(light.area >= kSmallestArea && is_finite(light.area))) {
+      r.fail("", "a light of at least 1e-20 m² in the world", number_text(static_cast<double>(light.area)));
     }
     const Vec3f normal = normalize(across);
     // A mirroring node turns the edges' winding over, but the light still shines along the node's −Z.

@@ -88,6 +88,12 @@ TransformDefect transform_defect(const Transform& t)
   return invertible ? TransformDefect::kNone : TransformDefect::kSingular;
 }
 
+Vec3f unit_direction(const Vec3d& v)
+{
+  const double size = norm(v);
+  return size > 0 ? to_float({v[0] / size, v[1] / size, v[2] / size}) : Vec3f{};
+}
+
 bool transform_mirrors(const Transform& t) { return determinant(t) < 0; }
 
 }  // namespace relief

@@ -41,6 +41,9 @@ enum class TransformDefect : std::uint8_t { kNone, kNotFinite, kSingular };
 /// Whether a transform can be used in single precision, forwards and backwards.
 TransformDefect transform_defect(const Transform& t);
 
+/// Unit vector along v; computed in double, where no square underflows. Zero stays zero.
+Vec3f unit_direction(const Vec3d& v);
+
 /// Negative determinant.
 bool transform_mirrors(const Transform& t);
 

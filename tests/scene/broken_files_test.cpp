@@ -331,6 +331,12 @@ const BrokenFile kBrokenFiles[] = {
      "perspective"},
     {"field of view 0", [](auto& b) { b.json["cameras"][0]["perspective"]["yfov"] = 0; }, "/cameras/0/perspective/yfov",
      "a number within"},
+    {"orthographic of endless size",
+     [](auto& b) {
+       b.json["cameras"][0] = {{"type", "orthographic"},
+                               {"orthographic", {{"xmag", 1e30}, {"ymag", 1}, {"zfar", 1}, {"znear", 0}}}};
+     },
+     "/cameras/0/orthographic", "1e15"},
     {"orthographic of no size",
      [](auto& b) {
        b.json["cameras"][0] = {{"type", "orthographic"},
@@ -384,6 +390,8 @@ const BrokenFile kBrokenFiles[] = {
      "/materials/0/extensions/KHR_materials_volume/attenuationDistance", "> 0"},
     {"extension is an array", [](auto& b) { material_extension(b, "KHR_materials_ior") = json::array(); },
      "/materials/0/extensions/KHR_materials_ior", "an object"},
+    {"extensions is an array", [](auto& b) { b.json["materials"][0]["extensions"] = json::array(); },
+     "/materials/0/extensions", "an object"},
     // Instancing
     {"instancing without attributes", [](auto& b) { node_extension(b, 4, "EXT_mesh_gpu_instancing") = json::object(); },
      "/nodes/4/extensions/EXT_mesh_gpu_instancing/attributes", "an object"},
@@ -427,10 +435,7 @@ const BrokenFile kBrokenFiles[] = {
      "/extensions/RELIEF_render/resolution/0", "65536"},
     {"resolution of one number", [](auto& b) { b.json["extensions"]["RELIEF_render"]["resolution"] = {5}; },
      "/extensions/RELIEF_render/resolution", "2 numbers"},
-    {"half a pixel",
-     [](auto& b) {
-       b.json["extensions"]["RELIEF_render"]["resolution"] = {5.5, 5};
-     },
+    {"half a pixel", [](auto& b) { b.json["extensions"]["RELIEF_render"]["resolution"] = {5.5, 5}; },
      "/extensions/RELIEF_render/resolution", "two integers"},
     {"samples 0", [](auto& b) { b.json["extensions"]["RELIEF_render"]["samples"] = 0; },
      "/extensions/RELIEF_render/samples", "an integer"},
@@ -448,6 +453,8 @@ const BrokenFile kBrokenFiles[] = {
      "/nodes/3/extensions/RELIEF_area_light", "both"},
     {"area light with neither", [](auto& b) { node_extension(b, 3, "RELIEF_area_light").erase("power"); },
      "/nodes/3/extensions/RELIEF_area_light", "neither"},
+    {"area light beyond single precision", [](auto& b) { b.json["nodes"][3]["scale"] = {1e-30, 1e-30, 1}; },
+     "/nodes/3/extensions/RELIEF_area_light", "1e-20"},
     {"area light of a singular node", [](auto& b) { b.json["nodes"][3]["scale"] = {0, 1, 1}; }, "/nodes/3", "singular"},
     {"object setting is a number", [](auto& b) { node_extension(b, 4, "RELIEF_object")["castsShadow"] = 1; },
      "/nodes/4/extensions/RELIEF_object/castsShadow", "true or false"},

@@ -230,6 +230,15 @@ TEST(Materials, UnknownPropertiesOfKnownExtensionsAreWarnedAbout)
   EXPECT_TRUE(has_warning(scene, "/materials/0/extensions/KHR_materials_ior/iorr"));
 }
 
+TEST(Materials, TexturesWithoutCoordinatesAreWarnedAbout)
+{
+  GltfBuilder b = square_with({{"normalTexture", {{"index", 0}, {"texCoord", 1}}}});
+  b.json["meshes"][0]["primitives"][0]["targets"] = {{{"POSITION", 0}}};
+  const Scene scene = load(b);
+  EXPECT_TRUE(has_warning(scene, "TEXCOORD_1"));
+  EXPECT_TRUE(has_warning(scene, "morph targets"));
+}
+
 TEST(Extensions, UsedButUnknownOnesAreOneWarning)
 {
   GltfBuilder b = test::square_scene();
@@ -322,6 +331,14 @@ TEST(Lights, SpotLooksAlongItsNodesMinusZ)
   expect_near(l.axis, {0, 1, 0});
   EXPECT_FLOAT_EQ(l.cos_inner, std::cos(0.2f));
   EXPECT_FLOAT_EQ(l.cos_outer, std::cos(0.4f));
+}
+
+// A node's scale says nothing about where its light looks, however small.
+TEST(Lights, DirectionsSurviveTinyScales)
+{
+  const Scene scene =
+      load(lit_by({{"type", "directional"}}, {{"rotation", {0, 1, 0, 0}}, {"scale", {1e-25, 1e-25, 1e-25}}}));
+  expect_near(scene.lights.at(0).axis, {0, 0, 1});
 }
 
 TEST(Lights, RectanglePowerIsSpreadOverItsAreaInTheWorld)
