@@ -1,12 +1,14 @@
 #include "cli/arguments.h"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <set>
 #include <string_view>
+#include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
 #include "kernel/film/film_layout.h"
 
@@ -20,7 +22,8 @@ namespace {
 }
 
 /// A whole text as a number; false on anything else.
-bool to_int(std::string_view text, int* value)
+template <class Number>
+bool to_number(std::string_view text, Number* value)
 {
   const char* end = text.data() + text.size();
   const auto result = std::from_chars(text.data(), end, *value);
@@ -40,37 +43,38 @@ std::vector<std::string_view> split(std::string_view text, char separator)
 
 }  // namespace
 
-void parse_resolution(const std::string& text, int* width, int* height)
+Resolution parse_resolution(const std::string& text)
 {
+  Resolution size;
   const auto parts = split(text, 'x');
   const auto fits = [](int v) { return v >= 1 && v <= 65536; };
-  if (parts.size() != 2 || !to_int(parts[0], width) || !to_int(parts[1], height) || !fits(*width) || !fits(*height)) {
+  if (parts.size() != 2 || !to_number(parts[0], &size.width) || !to_number(parts[1], &size.height) ||
+      !fits(size.width) || !fits(size.height)) {
     refuse("--resolution", "WIDTHxHEIGHT, each from 1 to 65536", text);
   }
+  return size;
 }
 
 PixelRect parse_crop(const std::string& text)
 {
   PixelRect rect;
   const auto parts = split(text, ',');
-  if (parts.size() != 4 || !to_int(parts[0], &rect.x0) || !to_int(parts[1], &rect.y0) || !to_int(parts[2], &rect.x1) ||
-      !to_int(parts[3], &rect.y1) || rect.x0 < 0 || rect.y0 < 0 || rect.x1 <= rect.x0 || rect.y1 <= rect.y0) {
+  if (parts.size() != 4 || !to_number(parts[0], &rect.x0) || !to_number(parts[1], &rect.y0) ||
+      !to_number(parts[2], &rect.x1) || !to_number(parts[3], &rect.y1) || rect.x0 < 0 || rect.y0 < 0 ||
+      rect.x1 <= rect.x0 || rect.y1 <= rect.y0) {
     refuse("--crop", "X0,Y0,X1,Y1 in pixels with X0 < X1 and Y0 < Y1", text);
   }
   return rect;
 }
 
-PixelSample parse_pixel(const std::string& text, int width, int height)
+PixelSample parse_pixel(const std::string& text)
 {
   PixelSample pixel;
-  int sample = 0;
   const auto parts = split(text, ',');
-  if (parts.size() < 2 || parts.size() > 3 || !to_int(parts[0], &pixel.x) || !to_int(parts[1], &pixel.y) ||
-      (parts.size() == 3 && !to_int(parts[2], &sample)) || pixel.x < 0 || pixel.y < 0 || pixel.x >= width ||
-      pixel.y >= height || sample < 0) {
-    refuse("--pixel", fmt::format("X,Y or X,Y,SAMPLE inside the image of {}x{}", width, height).c_str(), text);
+  if (parts.size() < 2 || parts.size() > 3 || !to_number(parts[0], &pixel.x) || !to_number(parts[1], &pixel.y) ||
+      (parts.size() == 3 && !to_number(parts[2], &pixel.sample_index)) || pixel.x < 0 || pixel.y < 0) {
+    refuse("--pixel", "X,Y or X,Y,SAMPLE, counted from 0", text);
   }
-  pixel.sample_index = static_cast<std::uint32_t>(sample);
   return pixel;
 }
 
@@ -85,13 +89,13 @@ std::vector<int> parse_frames(const std::string& text)
     int step = 1;
     const std::size_t times = part.find('x');
     if (times != std::string_view::npos) {
-      if (!to_int(part.substr(times + 1), &step) || step < 1) refuse("--frames", kExpected, text);
+      if (!to_number(part.substr(times + 1), &step) || step < 1) refuse("--frames", kExpected, text);
       part = part.substr(0, times);
     }
     const std::size_t dash = part.find('-');
-    if (!to_int(part.substr(0, dash), &first)) refuse("--frames", kExpected, text);
+    if (!to_number(part.substr(0, dash), &first)) refuse("--frames", kExpected, text);
     int last = first;
-    if (dash != std::string_view::npos && !to_int(part.substr(dash + 1), &last)) refuse("--frames", kExpected, text);
+    if (dash != std::string_view::npos && !to_number(part.substr(dash + 1), &last)) refuse("--frames", kExpected, text);
     if (dash == std::string_view::npos && times != std::string_view::npos) refuse("--frames", kExpected, text);
     if (first < 0 || last < first || last > kLastFrame) refuse("--frames", kExpected, text);
     for (int frame = first; frame <= last; frame += step) {
@@ -99,6 +103,13 @@ std::vector<int> parse_frames(const std::string& text)
     }
   }
   return frames;
+}
+
+std::uint64_t parse_seed(const std::string& text)
+{
+  std::uint64_t seed = 0;
+  if (!to_number(text, &seed)) refuse("--seed", "a whole number from 0 to 18446744073709551615", text);
+  return seed;
 }
 
 std::uint32_t parse_aovs(const std::string& text)
@@ -110,11 +121,55 @@ std::uint32_t parse_aovs(const std::string& text)
     if (info == kAovInfo.end()) {
       std::string names = "all";
       for (const AovInfo& i : kAovInfo) names += fmt::format(", {}", i.name);
-      refuse("--aov", names.c_str(), std::string(name));
+      refuse("--aov", ("names among " + names).c_str(), std::string(name));
     }
     mask |= 1u << static_cast<int>(info->aov);
   }
   return mask;
+}
+
+std::string parse_output(const char* option, const std::string& text, const char* suffix)
+{
+  std::string found = std::filesystem::path(text).extension().string();
+  for (char& c : found) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  std::error_code ignored;
+  const auto status = std::filesystem::status(text, ignored);
+  const bool is_device = std::filesystem::exists(status) && !std::filesystem::is_regular_file(status) &&
+                         !std::filesystem::is_directory(status);
+  if (found != suffix && !is_device) refuse(option, fmt::format("a name that ends in {}", suffix).c_str(), text);
+  return text;
+}
+
+CLI::Validator whole_number(int least, int most)
+{
+  const auto check = [=](const std::string& text) -> std::string {
+    int value = 0;
+    if (to_number(text, &value) && value >= least && value <= most) return {};
+    return fmt::format("expected a whole number from {} to {}, found '{}'", least, most, text);
+  };
+  return {check, fmt::format("{}..{}", least, most)};
+}
+
+CLI::Validator number(double least, double most)
+{
+  const auto check = [=](const std::string& text) -> std::string {
+    double value = 0;
+    // Written so that NaN is refused.
+    if (to_number(text, &value) && value >= least && value <= most) return {};
+    return fmt::format("expected a number from {:g} to {:g}, found '{}'", least, most, text);
+  };
+  return {check, fmt::format("{:g}..{:g}", least, most)};
+}
+
+CLI::Validator one_of(std::vector<std::string> words)
+{
+  std::string list;
+  for (const std::string& word : words) list += (list.empty() ? "" : ", ") + word;
+  const auto check = [words = std::move(words), list](const std::string& text) -> std::string {
+    if (std::find(words.begin(), words.end(), text) != words.end()) return {};
+    return fmt::format("expected one of {}, found '{}'", list, text);
+  };
+  return {check, list};
 }
 
 std::filesystem::path frame_path(const std::filesystem::path& pattern, int frame)

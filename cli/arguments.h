@@ -1,4 +1,5 @@
-// Parsing of option values that CLI11 has no type for. All throw CLI::ValidationError (exit code 2) on anything odd.
+// Parsing and checking of option values. Everything odd throws CLI::ValidationError (exit code 2) that says what was
+// expected and what was found; all of it runs while the command line is parsed, before any file is touched.
 #pragma once
 
 #include <cstdint>
@@ -6,14 +7,20 @@
 #include <string>
 #include <vector>
 
+#include <CLI/CLI.hpp>
+
 namespace relief {
 
 struct PixelRect {
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;  ///< half open; all 0: none given
 };
 
+struct Resolution {
+  int width = 0, height = 0;  ///< pixels; 0: none given
+};
+
 /// "WxH", each 1 … 65536.
-void parse_resolution(const std::string& text, int* width, int* height);
+Resolution parse_resolution(const std::string& text);
 
 /// "X0,Y0,X1,Y1" with X0 < X1, Y0 < Y1, all ≥ 0.
 PixelRect parse_crop(const std::string& text);
@@ -23,15 +30,31 @@ struct PixelSample {
   std::uint32_t sample_index = 0;
 };
 
-/// "X,Y" or "X,Y,SAMPLE", inside an image of that size.
-PixelSample parse_pixel(const std::string& text, int width, int height);
+/// "X,Y" or "X,Y,SAMPLE", none negative.
+PixelSample parse_pixel(const std::string& text);
 
 /// "1-10,20,30-60x2": single frames, ranges, ranges with a step; in the order given, each frame once.
+/// @return at least one frame, each 0 … 1000000
 std::vector<int> parse_frames(const std::string& text);
+
+/// A whole number of 64 bits without sign.
+std::uint64_t parse_seed(const std::string& text);
 
 /// Names of AOVs separated by commas, or "all"; beauty is always in.
 /// @return bit i: enumerator i of Aov
 std::uint32_t parse_aovs(const std::string& text);
+
+/// Refuses an output whose name does not end in `suffix` (upper or lower case), so that no format hides under the
+/// name of another. Devices and pipes may have any name.
+/// @param suffix  lower case, with its dot
+std::string parse_output(const char* option, const std::string& text, const char* suffix);
+
+/// Checks of numbers for CLI::Option::check; NaN, infinity and trailing text are refused.
+CLI::Validator whole_number(int least, int most);
+CLI::Validator number(double least, double most);
+
+/// Likewise for a choice among words.
+CLI::Validator one_of(std::vector<std::string> words);
 
 /// Output path of a frame: a run of '#' in the file name becomes the number, padded to the run's length; without one,
 /// ".0001" goes before the extension.

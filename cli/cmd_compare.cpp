@@ -77,7 +77,8 @@ ZTestResult z_test_of_pictures(const CompareArguments& arguments,
   }
   for (const Picture* picture : {&a, &b}) {
     if (picture->lossy) {
-      std::fprintf(stderr, "warning: %s: its lossy compression is not in the variances; the z-test may fail for it\n",
+      std::fprintf(stderr,
+                   "relief: warning: %s: its lossy compression is not in the variances; the z-test may fail for it\n",
                    picture->file.c_str());
     }
   }

@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "cli/scene_setup.h"
 #include "integrator/scene_context.h"
-#include "scene/load.h"
 #include "scene/texture_store.h"
 
 namespace relief {
@@ -53,7 +53,7 @@ void print_names(const char* what, const std::vector<std::string>& names)
 
 int info(const std::string& file, bool strict)
 {
-  const Scene scene = scene_load(file);
+  const Scene scene = scene_load_to_trace(file);
   const SceneContext context(scene);
   Statistics stats;
   context.fill(stats);
@@ -67,6 +67,7 @@ int info(const std::string& file, bool strict)
   const RenderSettings& r = scene.render;
   fmt::print("{}\n", file);
   fmt::print("image: {}x{}, {} samples, {} bounces, seed {}\n", r.width, r.height, r.samples, r.max_bounces, r.seed);
+  fmt::print("frames: {} to {} at {:g} a second\n", r.frame_start, r.frame_end, r.frames_per_second);
   fmt::print("meshes: {} with {} triangles; instances: {} with {} triangles in all\n", scene.meshes.size(), triangles,
              scene.instances.size(), placed);
   std::vector<std::string> cameras;
@@ -94,7 +95,7 @@ int info(const std::string& file, bool strict)
   fmt::print("memory: meshes {}, textures {}, acceleration structure {}, lights {}\n", megabytes(stats.mesh_bytes),
              megabytes(stats.texture_bytes), megabytes(stats.bvh_bytes), megabytes(stats.light_bytes));
   for (const std::string& warning : scene.warnings) fmt::print("warning: {}\n", warning);
-  if (strict && !scene.warnings.empty()) throw SceneError(file, "", "no warnings (--strict)", scene.warnings.front());
+  if (strict) refuse_warnings(file, scene.warnings);
   return 0;
 }
 

@@ -22,7 +22,7 @@ int merge_run(const MergeArguments& arguments)
 {
   const MergeResult merged = merge_pictures(arguments.inputs, arguments.options);
   for (const std::string& warning : merged.warnings) {
-    std::fprintf(stderr, "warning: %s\n", warning.c_str());
+    std::fprintf(stderr, "relief: warning: %s\n", warning.c_str());
   }
   exr_write(arguments.output, merged.picture);
   std::printf("%s: %zu pictures, %s samples a pixel\n", arguments.output.c_str(), arguments.inputs.size(),

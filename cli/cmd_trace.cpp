@@ -1,8 +1,14 @@
+#include <array>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <memory>
+#include <optional>
+#include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -12,60 +18,76 @@
 #include "exporters/atomic_file.h"
 #include "exporters/errors.h"
 #include "integrator/trace.h"
-#include "scene/load.h"
 
 namespace relief {
 
 namespace {
 
+/// Kinds of rays, as --pixel prints them and --rays takes them.
+constexpr std::string_view kPathRay = "path", kShadowRay = "shadow";
+
 struct TraceArguments {
-  std::string scene, rays, output = "-", pixel, camera, resolution;
-  std::uint64_t seed = 0;
+  std::string scene, rays, output = "-", camera;
+  std::optional<PixelSample> pixel;
+  Resolution resolution;
+  std::optional<std::uint64_t> seed;
+  std::optional<int> frame;
 };
 
-/// Numbers of a line separated by blanks; empty if anything else stands in it.
-std::vector<float> parse_numbers(const std::string& line)
+/// Words of a line, separated by blanks.
+std::vector<std::string_view> split_words(std::string_view line)
 {
-  std::vector<float> numbers;
-  const char* at = line.data();
-  const char* end = at + line.size();
+  constexpr std::string_view kBlanks = " \t\r";
+  std::vector<std::string_view> words;
   while (true) {
-    while (at != end && (*at == ' ' || *at == '\t' || *at == '\r')) ++at;
-    if (at == end) return numbers;
-    float value = 0;
-    const auto result = std::from_chars(at, end, value);
-    if (result.ec != std::errc()) return {};
-    numbers.push_back(value);
-    at = result.ptr;
+    const std::size_t first = line.find_first_not_of(kBlanks);
+    if (first == std::string_view::npos) return words;
+    line.remove_prefix(first);
+    words.push_back(line.substr(0, line.find_first_of(kBlanks)));
+    line.remove_prefix(words.back().size());
   }
+}
+
+/// The ray in a line's words: 'ox oy oz dx dy dz [tmin tmax]', perhaps after the kind that --pixel prints.
+std::optional<TraceRay> parse_ray(std::span<const std::string_view> words)
+{
+  if (!words.empty() && (words[0] == kPathRay || words[0] == kShadowRay)) words = words.subspan(1);
+  if (words.size() != 6 && words.size() != 8) return {};
+  // In double precision, so that numbers too small for a float become zero instead of an error.
+  std::array<double, 8> v = {0, 0, 0, 0, 0, 0, 0, HUGE_VAL};
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const char* end = words[i].data() + words[i].size();
+    const auto result = std::from_chars(words[i].data(), end, v[i]);
+    if (result.ec != std::errc() || result.ptr != end) return {};
+  }
+  const auto f = [&](std::size_t i) { return static_cast<float>(v[i]); };
+  const TraceRay ray{{f(0), f(1), f(2)}, {f(3), f(4), f(5)}, f(6), f(7)};
+  // Written so that NaN is refused.
+  const bool is_valid = is_finite(ray.O) && is_finite(ray.D) && !is_zero(ray.D) && ray.t_min >= 0 && ray.t_max >= 0;
+  return is_valid ? std::optional(ray) : std::nullopt;
 }
 
 std::vector<TraceRay> read_rays(const std::string& file)
 {
+  std::error_code ignored;
   std::ifstream in(file);
-  if (!in) throw InputError(file, "expected a readable file of rays, found none");
+  if (!in || std::filesystem::is_directory(file, ignored)) {
+    throw InputError(file, "expected a readable file of rays, found none");
+  }
   std::vector<TraceRay> rays;
   std::string line;
   for (int number = 1; std::getline(in, line); ++number) {
-    if (line.find_first_not_of(" \t\r") == std::string::npos || line[0] == '#') continue;
-    const std::vector<float> v = parse_numbers(line);
-    if (v.size() != 6 && v.size() != 8) {
-      throw InputError(file,
-                       fmt::format("line {}: expected 'ox oy oz dx dy dz [tmin tmax]', found '{}'", number, line));
+    const std::vector<std::string_view> words = split_words(line);
+    if (words.empty() || words[0].front() == '#') continue;
+    const std::optional<TraceRay> ray = parse_ray(words);
+    if (!ray) {
+      throw InputError(file, fmt::format("line {}: expected 'ox oy oz dx dy dz [tmin tmax]', finite, with a direction "
+                                         "that is not zero and tmin, tmax >= 0, found '{}'",
+                                         number, line.substr(0, 200)));
     }
-    TraceRay ray{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}, 0.0f, kInfinity};
-    if (v.size() == 8) {
-      ray.t_min = v[6];
-      ray.t_max = v[7];
-    }
-    if (!is_finite(ray.O) || !is_finite(ray.D) || is_zero(ray.D) || !(ray.t_min >= 0.0f)) {
-      throw InputError(file,
-                       fmt::format("line {}: expected finite numbers, a direction that is not zero and tmin >= 0, "
-                                   "found '{}'",
-                                   number, line));
-    }
-    rays.push_back(ray);
+    rays.push_back(*ray);
   }
+  if (in.bad()) throw InputError(file, "expected a readable file of rays, found an error while reading");
   return rays;
 }
 
@@ -92,31 +114,43 @@ std::string hits_csv(const std::vector<TraceHit>& hits)
   return csv;
 }
 
+/// The rays of one path, in lines that --rays takes back.
+std::string path_rays(const TraceArguments& arguments, const Scene& scene)
+{
+  RenderOptions options;
+  RenderSettings& settings = options.settings;
+  settings = scene.render;
+  if (arguments.seed) settings.seed = *arguments.seed;
+  if (arguments.resolution.width > 0) {
+    settings.width = arguments.resolution.width;
+    settings.height = arguments.resolution.height;
+  }
+  options.camera = camera_for_image(scene, arguments.camera, settings.width, settings.height);
+  const PixelSample& at = *arguments.pixel;
+  if (at.x >= settings.width || at.y >= settings.height) {
+    throw CLI::ValidationError("--pixel", fmt::format("expected a pixel inside the image of {}x{}, found '{},{}'",
+                                                      settings.width, settings.height, at.x, at.y));
+  }
+  std::string text = "# kind ox oy oz dx dy dz tmin tmax: rays of the path in order\n";
+  for (const RecordedRay& r : trace_path(SceneContext(scene), options, at.x, at.y, at.sample_index)) {
+    text += fmt::format("{} {} {} {} {} {} {} {} {}\n", r.shadow ? kShadowRay : kPathRay, r.O.x, r.O.y, r.O.z, r.D.x,
+                        r.D.y, r.D.z, r.t_min, r.t_max);
+  }
+  return text;
+}
+
 int trace(const TraceArguments& arguments)
 {
-  const Scene scene = scene_load(arguments.scene);
+  // Rays first: their mistakes are found before a large scene is loaded.
+  std::vector<TraceRay> rays;
+  if (!arguments.pixel) rays = read_rays(arguments.rays);
+  LoadOptions load;
+  load.has_frame = arguments.frame.has_value();
+  load.frame = arguments.frame.value_or(0);
+  const Scene scene = scene_load_to_trace(arguments.scene, load);
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "relief: warning: {}\n", warning);
-  if (arguments.pixel.empty()) {
-    const std::vector<TraceRay> rays = read_rays(arguments.rays);
-    const SceneContext context(scene);
-    write_text(arguments.output, hits_csv(trace_rays(context, rays)));
-    return 0;
-  }
-  RenderOptions options;
-  options.settings = scene.render;
-  options.settings.seed = arguments.seed;
-  if (!arguments.resolution.empty()) {
-    parse_resolution(arguments.resolution, &options.settings.width, &options.settings.height);
-  }
-  options.camera = camera_for_image(scene, arguments.camera, options.settings.width, options.settings.height);
-  const PixelSample at = parse_pixel(arguments.pixel, options.settings.width, options.settings.height);
-  const SceneContext context(scene);
-  std::string text = "# kind ox oy oz dx dy dz tmin tmax: rays of the path in order; strip the first word for --rays\n";
-  for (const RecordedRay& r : trace_path(context, options, at.x, at.y, at.sample_index)) {
-    text += fmt::format("{} {} {} {} {} {} {} {} {}\n", r.shadow ? "shadow" : "path", r.O.x, r.O.y, r.O.z, r.D.x, r.D.y,
-                        r.D.z, r.t_min, r.t_max);
-  }
-  write_text(arguments.output, text);
+  write_text(arguments.output,
+             arguments.pixel ? path_rays(arguments, scene) : hits_csv(trace_rays(SceneContext(scene), rays)));
   return 0;
 }
 
@@ -125,18 +159,29 @@ int trace(const TraceArguments& arguments)
 void cmd_trace_register(CLI::App& app, Run& run)
 {
   auto arguments = std::make_shared<TraceArguments>();
+  TraceArguments& a = *arguments;
   CLI::App* command = app.add_subcommand("trace", "Traces single rays, or shows the rays of one pixel's path");
-  command->add_option("scene", arguments->scene, "Scene file (.gltf, .glb)")->required();
-  CLI::Option* rays =
-      command->add_option("--rays", arguments->rays, "File of rays, one 'ox oy oz dx dy dz [tmin tmax]' a line");
-  CLI::Option* pixel =
-      command->add_option("--pixel", arguments->pixel, "X,Y[,SAMPLE]: print the rays of that path instead");
+  command->add_option("scene", a.scene, "Scene file (.gltf, .glb)")->required();
+  CLI::Option* rays = command->add_option("--rays", a.rays, "File of rays, one 'ox oy oz dx dy dz [tmin tmax]' a line");
+  CLI::Option* pixel = command->add_option_function<std::string>(
+      "--pixel", [&a](const std::string& text) { a.pixel = parse_pixel(text); },
+      "X,Y[,SAMPLE]: print the rays of that path instead");
   rays->excludes(pixel);
-  command->add_option("-o,--output", arguments->output, "CSV of hits, or the path's rays; - is standard output")
+  command->add_option("-o,--output", a.output, "CSV of hits, or the path's rays; - is standard output")
       ->capture_default_str();
-  command->add_option("--camera", arguments->camera, "Camera of --pixel (default: the first)");
-  command->add_option("--resolution", arguments->resolution, "Image size of --pixel (default: the scene's)");
-  command->add_option("--seed", arguments->seed, "Seed of --pixel")->capture_default_str();
+  command->add_option("--frame", a.frame, "Frame of the animation (default: the rest pose)")
+      ->check(whole_number(0, 1'000'000));
+  command->add_option("--camera", a.camera, "Camera of --pixel (default: the first)")->needs(pixel);
+  command
+      ->add_option_function<std::string>(
+          "--resolution", [&a](const std::string& text) { a.resolution = parse_resolution(text); },
+          "Image size of --pixel (default: the scene's)")
+      ->needs(pixel);
+  command
+      ->add_option_function<std::string>(
+          "--seed", [&a](const std::string& text) { a.seed = parse_seed(text); },
+          "Seed of --pixel (default: the scene's)")
+      ->needs(pixel);
   command->callback([&run, arguments, rays, pixel] {
     if (rays->count() + pixel->count() == 0) throw CLI::RequiredError("--rays or --pixel");
     run = [arguments] { return trace(*arguments); };

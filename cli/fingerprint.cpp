@@ -48,9 +48,10 @@ class Hash {
 
 }  // namespace
 
-std::string render_fingerprint(const Scene& scene, const RenderOptions& options)
+std::string render_fingerprint(const Scene& scene, const RenderOptions& options, const std::string& storage)
 {
   Hash hash;
+  hash.add(storage);
   hash.add(std::string(RELIEF_VERSION));
   for (const std::string& file : scene.files) {
     std::error_code ignored;

@@ -1,0 +1,100 @@
+#include "cli/progress_printer.h"
+
+#include <cstdio>
+
+#include <unistd.h>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "cli/interrupt.h"
+
+namespace relief {
+
+namespace {
+
+/// Unlike fmt::print, a failure is no exception: messages must not cost a finished render its files.
+bool write_text(std::FILE* stream, const std::string& text)
+{
+  return std::fwrite(text.data(), 1, text.size(), stream) == text.size() && std::fflush(stream) == 0;
+}
+
+std::string duration_text(double seconds)
+{
+  if (seconds < 100) return fmt::format("{:.0f} s", seconds);
+  const auto minutes = static_cast<long long>(seconds / 60 + 0.5);
+  return minutes < 100 ? fmt::format("{} min", minutes) : fmt::format("{} h {:02} min", minutes / 60, minutes % 60);
+}
+
+}  // namespace
+
+ProgressPrinter::ProgressPrinter(const std::string& kind)
+{
+  if (kind == "json") kind_ = Kind::kJson;
+  if (kind == "bar" && isatty(STDERR_FILENO) != 0) kind_ = Kind::kBar;
+}
+
+ProgressPrinter::~ProgressPrinter() { clear_bar(); }
+
+std::function<void(const RenderProgress&)> ProgressPrinter::callback(int frame, std::string title)
+{
+  switch (kind_) {
+    case Kind::kNone:
+      return {};
+    case Kind::kBar:
+      return [this, title = std::move(title)](const RenderProgress& p) { draw_bar(title, p); };
+    case Kind::kJson:
+      return [this, frame](const RenderProgress& p) {
+        event({{"event", "progress"},
+               {"frame", frame},
+               {"fraction", p.fraction},
+               {"samples", p.samples_per_pixel},
+               {"seconds", p.seconds},
+               {"seconds_left", p.seconds_left},
+               {"rays_per_second", p.rays_per_second}});
+      };
+  }
+  return {};
+}
+
+void ProgressPrinter::event(const nlohmann::json& object)
+{
+  if (kind_ != Kind::kJson) return;
+  // Paths may hold bytes that are not UTF-8.
+  const std::string line = object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  if (write_text(stdout, line)) return;
+  kind_ = Kind::kNone;
+  interrupt_request();
+  note("relief: nobody reads the progress any more: stopping");
+}
+
+void ProgressPrinter::note(const std::string& line)
+{
+  clear_bar();
+  write_text(stderr, line + "\n");
+}
+
+void ProgressPrinter::warnings(const std::vector<std::string>& texts)
+{
+  for (const std::string& text : texts) {
+    if (shown_.insert(text).second) note("relief: warning: " + text);
+  }
+}
+
+void ProgressPrinter::draw_bar(const std::string& title, const RenderProgress& p)
+{
+  constexpr int kWidth = 30;
+  const int done = static_cast<int>(p.fraction * kWidth);
+  bar_is_drawn_ = true;
+  write_text(stderr, fmt::format("\r{}[{:#<{}}{: <{}}] {:3.0f}%  {:.0f} spp  {} left  {:.2f} Mrays/s\033[K", title, "",
+                                 done, "", kWidth - done, 100 * p.fraction, p.samples_per_pixel,
+                                 duration_text(p.seconds_left), p.rays_per_second * 1e-6));
+}
+
+void ProgressPrinter::clear_bar()
+{
+  if (bar_is_drawn_) write_text(stderr, "\r\033[K");
+  bar_is_drawn_ = false;
+}
+
+}  // namespace relief

@@ -1,0 +1,49 @@
+// What `relief render` says while it works: a bar on a terminal, one JSON object a line for programs, and notes.
+#pragma once
+
+#include <functional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "integrator/render.h"
+
+namespace relief {
+
+class ProgressPrinter {
+ public:
+  /// @param kind  "bar" (drawn on standard error if that is a terminal), "json" (on standard output) or "none"
+  explicit ProgressPrinter(const std::string& kind);
+
+  /// Leaves no half bar behind, whatever ended the render.
+  ~ProgressPrinter();
+  ProgressPrinter(const ProgressPrinter&) = delete;
+  ProgressPrinter& operator=(const ProgressPrinter&) = delete;
+
+  bool is_json() const { return kind_ == Kind::kJson; }
+
+  /// Prints the progress of a frame; empty if nobody is to see it.
+  /// @param title  what stands before the bar, such as "frame 7 "
+  std::function<void(const RenderProgress&)> callback(int frame, std::string title);
+
+  /// Prints a JSON object as a line, in JSON mode only. A reader that has gone away counts as a wish to stop.
+  void event(const nlohmann::json& object);
+
+  /// Prints a line on standard error, above the bar.
+  void note(const std::string& line);
+
+  /// Prints those warnings that this run has not shown yet.
+  void warnings(const std::vector<std::string>& texts);
+
+ private:
+  void draw_bar(const std::string& title, const RenderProgress& progress);
+  void clear_bar();
+
+  enum class Kind { kNone, kBar, kJson } kind_ = Kind::kNone;
+  bool bar_is_drawn_ = false;
+  std::set<std::string> shown_;
+};
+
+}  // namespace relief
