@@ -29,29 +29,47 @@ AccumulatorLayout layout_make(std::uint32_t aov_mask)
 
 Vec3f load3(const float* p) { return {p[0], p[1], p[2]}; }
 
-/// Means of the even and odd samples and the variance of the pixel's mean by its samples alone.
+/// What a pixel's sums say: means, the differences that error_extrapolate wants (D₁, D₂), and the variance of the mean
+/// as if the samples were independent.
 struct PixelEstimate {
-  Vec3f mean, even, half_difference_squared, sample_variance;
+  Vec3f mean, even, d1, d2, sample_variance;
 };
+
+/// Squared difference of the means of two parts of a whole, times their shares: the variance of the whole's mean if the
+/// parts are independent, whatever their sizes (Var(A − B) = σ²(1/n_a + 1/n_b), Var(mean) = σ²/(n_a + n_b)).
+Vec3f split_variance(Vec3f sum_a, float n_a, Vec3f sum_b, float n_b)
+{
+  const Vec3f difference = sum_a / n_a - sum_b / n_b;
+  const float n = n_a + n_b;
+  return difference * difference * (n_a * n_b / (n * n));
+}
 
 PixelEstimate pixel_estimate(const float* record, std::uint32_t samples)
 {
   PixelEstimate estimate;
   if (samples == 0) return estimate;
+  const auto count = [samples](std::uint32_t first, std::uint32_t step) {
+    return static_cast<float>((samples + step - 1 - first) / step);
+  };
   const auto n = static_cast<float>(samples);
-  const auto n_even = static_cast<float>((samples + 1) / 2);
-  const float n_odd = n - n_even;
   const Vec3f sum = load3(record + AccumulatorLayout::kBeauty);
-  const Vec3f sum_even = load3(record + AccumulatorLayout::kEven);
+  const Vec3f even = load3(record + AccumulatorLayout::kEven);
   estimate.mean = sum / n;
-  estimate.even = sum_even / n_even;
-  if (n_odd > 0) {
-    const Vec3f difference = estimate.even - (sum - sum_even) / n_odd;
-    // Weighted halves: Var(mean) = σ²/n, Var(A − B) = σ²(1/n_even + 1/n_odd), so the factor is n_even·n_odd/n².
-    estimate.half_difference_squared = difference * difference * (n_even * n_odd / (n * n));
-    const Vec3f squares = load3(record + AccumulatorLayout::kSquares);
-    estimate.sample_variance = max((squares - sum * estimate.mean) / ((n - 1.0f) * n), Vec3f{});
+  estimate.even = even / count(0, 2);
+  if (samples < 2) return estimate;
+  const Vec3f odd = sum - even;
+  estimate.d1 = split_variance(even, count(0, 2), odd, count(1, 2));
+  const Vec3f squares = load3(record + AccumulatorLayout::kSquares);
+  estimate.sample_variance = max((squares - sum * estimate.mean) / ((n - 1.0f) * n), Vec3f{});
+  if (samples < 4) {
+    // No quarters yet: as independent samples have it.
+    estimate.d2 = 2.0f * estimate.d1;
+    return estimate;
   }
+  const Vec3f quarter0 = load3(record + AccumulatorLayout::kQuarter0);
+  const Vec3f quarter1 = load3(record + AccumulatorLayout::kQuarter1);
+  estimate.d2 = 0.5f * (split_variance(quarter0, count(0, 4), even - quarter0, count(2, 4)) +
+                        split_variance(quarter1, count(1, 4), odd - quarter1, count(3, 4)));
   return estimate;
 }
 
@@ -69,6 +87,8 @@ Film::Film(int width, int height, std::uint32_t aov_mask)
       samples_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_))
 {
 }
+
+double error_extrapolate(double d1, double d2) { return std::max((5.0 * d1 - d2) / 3.0, d1 / 3.0); }
 
 FilmAccumulatorView Film::accumulator() { return {sums_.data(), width_, height_, layout_}; }
 
@@ -97,26 +117,30 @@ double Film::mean_samples() const
   return sum / (static_cast<double>(width_) * height_);
 }
 
-void Film::tile_variances(int tile, Vec3f* halves, Vec3f* samples) const
+void Film::tile_variances(int tile, Vec3f* extrapolated, Vec3f* by_samples) const
 {
   int x0, y0, w, h;
   tile_rect(tile, &x0, &y0, &w, &h);
-  *halves = *samples = {};
+  Vec3f d1, d2;
+  *by_samples = {};
   for (int y = y0; y < y0 + h; ++y) {
     for (int x = x0; x < x0 + w; ++x) {
       const PixelEstimate pixel = pixel_estimate(record(x, y), tile_samples(tile));
-      *halves += pixel.half_difference_squared;
-      *samples += pixel.sample_variance;
+      d1 += pixel.d1;
+      d2 += pixel.d2;
+      *by_samples += pixel.sample_variance;
     }
   }
+  const auto channel = [](float a, float b) { return static_cast<float>(error_extrapolate(a, b)); };
+  *extrapolated = {channel(d1.x, d2.x), channel(d1.y, d2.y), channel(d1.z, d2.z)};
 }
 
 double Film::tile_error(int tile, double floor) const
 {
   int x0, y0, w, h;
   tile_rect(tile, &x0, &y0, &w, &h);
-  Vec3f halves, samples;
-  tile_variances(tile, &halves, &samples);
+  Vec3f extrapolated, by_samples;
+  tile_variances(tile, &extrapolated, &by_samples);
   double mean = 0;
   for (int y = y0; y < y0 + h; ++y) {
     for (int x = x0; x < x0 + w; ++x) {
@@ -124,9 +148,9 @@ double Film::tile_error(int tile, double floor) const
     }
   }
   const double num_pixels = static_cast<double>(w) * h;
-  // Halves are unbiased but can agree by luck; the samples' variance ignores stratification, so it errs on the high
-  // side. A quarter of it keeps a lucky tile from stopping early.
-  const double variance = std::max(luminance(halves), 0.25f * luminance(samples)) / num_pixels;
+  // Parts can agree by luck; the samples' variance ignores stratification, so it errs on the high side. A quarter of it
+  // keeps a lucky tile from stopping early.
+  const double variance = std::max(luminance(extrapolated), 0.25f * luminance(by_samples)) / num_pixels;
   return std::sqrt(variance) / std::max(mean / num_pixels, floor);
 }
 
@@ -145,23 +169,24 @@ double Film::mean_luminance() const
 
 ImageError Film::estimate_error() const
 {
-  double squared = 0;
-  double relative = 0;
+  double d1 = 0, d2 = 0, relative_d1 = 0, relative_d2 = 0;
+  const auto sum = [](Vec3f v) { return static_cast<double>(v.x) + v.y + v.z; };
   for (int tile = 0; tile < num_tiles(); ++tile) {
     int x0, y0, w, h;
     tile_rect(tile, &x0, &y0, &w, &h);
     for (int y = y0; y < y0 + h; ++y) {
       for (int x = x0; x < x0 + w; ++x) {
         const PixelEstimate pixel = pixel_estimate(record(x, y), tile_samples(tile));
-        const Vec3f d = pixel.half_difference_squared;
-        squared += static_cast<double>(d.x) + d.y + d.z;
-        const Vec3f r = d / (pixel.mean * pixel.mean + splat3(0.01f));
-        relative += static_cast<double>(r.x) + r.y + r.z;
+        const Vec3f denominator = pixel.mean * pixel.mean + splat3(0.01f);
+        d1 += sum(pixel.d1);
+        d2 += sum(pixel.d2);
+        relative_d1 += sum(pixel.d1 / denominator);
+        relative_d2 += sum(pixel.d2 / denominator);
       }
     }
   }
   const double count = 3.0 * width_ * height_;
-  return {std::sqrt(squared / count), relative / count};
+  return {std::sqrt(error_extrapolate(d1, d2) / count), error_extrapolate(relative_d1, relative_d2) / count};
 }
 
 RenderedImage Film::resolve(int crop_x, int crop_y, int full_width, int full_height) const
@@ -184,13 +209,13 @@ RenderedImage Film::resolve(int crop_x, int crop_y, int full_width, int full_hei
     tile_rect(tile, &x0, &y0, &w, &h);
     const std::uint32_t samples = tile_samples(tile);
     if (samples == 0) continue;
-    // The shape of the variance comes from each pixel's own samples, its level from the tile's independent halves: the
-    // former alone is blind to stratification, the latter alone has one degree of freedom a pixel.
-    Vec3f halves, by_samples;
-    tile_variances(tile, &halves, &by_samples);
-    const auto level = [](float half, float sample) { return sample > 0.0f ? half / sample : 1.0f; };
-    const Vec3f calibration{level(halves.x, by_samples.x), level(halves.y, by_samples.y),
-                            level(halves.z, by_samples.z)};
+    // The shape of the variance comes from each pixel's own samples, its level from the tile's halves and quarters: the
+    // former alone is blind to stratification, the latter alone are too noisy in a pixel.
+    Vec3f extrapolated, by_samples;
+    tile_variances(tile, &extrapolated, &by_samples);
+    const auto level = [](float variance, float sample) { return sample > 0.0f ? variance / sample : 1.0f; };
+    const Vec3f calibration{level(extrapolated.x, by_samples.x), level(extrapolated.y, by_samples.y),
+                            level(extrapolated.z, by_samples.z)};
     for (int y = y0; y < y0 + h; ++y) {
       for (int x = x0; x < x0 + w; ++x) {
         const float* in = record(x, y);

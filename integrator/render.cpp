@@ -78,6 +78,7 @@ KernelGlobals render_globals(const SceneContext& context, const RenderOptions& o
   g.filter = settings.filter == PixelFilter::kBox ? nullptr : &filter;
   g.filter_width = settings.filter_width;
   g.seed = settings.seed;
+  g.log2_stream = sample_log2_stream(static_cast<std::uint32_t>(settings.samples));
   g.full_width = settings.width;
   g.full_height = settings.height;
   g.crop_x = is_whole(options) ? 0 : options.crop_x0;
@@ -199,7 +200,7 @@ RenderedImage render(const Scene& scene,
       stats.warnings.push_back("a sample was not finite and counts as black, first at pixel " +
                                std::to_string(crop_x + worker.nonfinite.x) + "," +
                                std::to_string(crop_y + worker.nonfinite.y) + " sample " +
-                               std::to_string(worker.nonfinite.sample_index) + " (see relief trace --pixel)");
+                               std::to_string(worker.nonfinite.sample) + " (see relief trace --pixel)");
     }
   }
   return film.resolve(crop_x, crop_y, settings.width, settings.height);

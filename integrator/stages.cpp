@@ -85,9 +85,9 @@ void finish(const KernelGlobals& g,
             Counters& counters,
             std::uint32_t* nonfinite_path)
 {
-  const std::uint32_t num_paths = static_cast<std::uint32_t>(batch.width * batch.height) * batch.num_samples;
-  for (std::uint32_t i = 0; i < num_paths; ++i) {
-    const bool finite = film_add_sample(g.film, state.pixel[i], state.sample_index[i],
+  const auto num_pixels = static_cast<std::uint32_t>(batch.width * batch.height);
+  for (std::uint32_t i = 0; i < num_pixels * batch.num_samples; ++i) {
+    const bool finite = film_add_sample(g.film, state.pixel[i], batch.first_sample + i / num_pixels,
                                         {state.direct_r[i], state.direct_g[i], state.direct_b[i]},
                                         {state.indirect_r[i], state.indirect_g[i], state.indirect_b[i]});
     if (finite) continue;

@@ -130,7 +130,8 @@ void Wavefront::run(const KernelGlobals& g,
   stages.finish(g, state_, batch, counters, &bad_path);
   if (bad_path < kBatchPaths && !nonfinite.found) {
     const int pixel = static_cast<int>(state_.pixel[bad_path]);
-    nonfinite = {true, pixel % g.film.width, pixel / g.film.width, state_.sample_index[bad_path]};
+    const auto num_pixels = static_cast<std::uint32_t>(batch.width * batch.height);
+    nonfinite = {true, pixel % g.film.width, pixel / g.film.width, batch.first_sample + bad_path / num_pixels};
   }
   charge(Stage::kFilm);
 }

@@ -26,7 +26,7 @@ inline constexpr std::array<const char*, kNumStages> kStageNames = {"generate", 
 struct NonfiniteSample {
   bool found = false;
   int x = 0, y = 0;  ///< in the film window
-  std::uint32_t sample_index = 0;
+  std::uint32_t sample = 0;
 };
 
 /// A ray of a path, as it was traced.

@@ -20,7 +20,7 @@ struct Statistics {
   int width = 0, height = 0, threads = 0, frame = 0;
   double load_seconds = 0, build_seconds = 0, render_seconds = 0;
   double samples_per_pixel = 0;
-  double error_rmse = 0;    ///< estimated root mean square error of the beauty image, from its independent halves
+  double error_rmse = 0;    ///< estimated root mean square error of the beauty image, from its halves and quarters
   double error_relmse = 0;  ///< likewise, squared error relative to (radiance² + 0.01), as `relief compare` defines it
   std::uint64_t peak_memory_bytes = 0, bvh_bytes = 0, mesh_bytes = 0, texture_bytes = 0, light_bytes = 0,
                 film_bytes = 0, path_state_bytes = 0;

@@ -6,14 +6,16 @@
 
 namespace relief {
 
-/// Where each sum lies inside a pixel's record of floats; −1: not kept. The beauty, its even half and the squares are
-/// always kept, because error estimates and adaptive sampling need them.
+/// Where each sum lies inside a pixel's record of floats; −1: not kept. The beauty, its parts and the squares are always
+/// kept, because error estimates and adaptive sampling need them.
 struct AccumulatorLayout {
-  static constexpr int kBeauty = 0;    ///< R, G, B
-  static constexpr int kCoverage = 3;  ///< samples that met geometry
-  static constexpr int kEven = 4;      ///< R, G, B of even-numbered samples
-  static constexpr int kSquares = 7;   ///< R², G², B²
-  static constexpr int kAlways = 10;
+  static constexpr int kBeauty = 0;      ///< R, G, B
+  static constexpr int kCoverage = 3;    ///< samples that met geometry
+  static constexpr int kEven = 4;        ///< R, G, B of samples 0, 2, 4, …: the first half
+  static constexpr int kSquares = 7;     ///< R², G², B²
+  static constexpr int kQuarter0 = 10;   ///< R, G, B of samples 0, 4, 8, …: the first quarter of the first half
+  static constexpr int kQuarter1 = 13;   ///< R, G, B of samples 1, 5, 9, …: the first quarter of the second half
+  static constexpr int kAlways = 16;
 
   int direct = -1, albedo = -1, normal = -1, depth = -1, position = -1, uv = -1, object_id = -1, material_id = -1;
   int num_floats = kAlways;
@@ -62,10 +64,11 @@ RELIEF_KERNEL void film_add_first_hit(const FilmAccumulatorView& film, std::uint
 }
 
 /// Adds a finished sample.
+/// @param sample  of the pixel, counted from 0
 /// @return false when the sample is not finite; it then counts as black
 RELIEF_KERNEL bool film_add_sample(const FilmAccumulatorView& film,
                                    std::uint32_t pixel,
-                                   std::uint32_t sample_index,
+                                   std::uint32_t sample,
                                    Vec3f direct,
                                    Vec3f indirect)
 {
@@ -75,7 +78,9 @@ RELIEF_KERNEL bool film_add_sample(const FilmAccumulatorView& film,
   if (!is_finite(radiance)) return false;
   film_add3(record + AccumulatorLayout::kBeauty, radiance);
   film_add3(record + AccumulatorLayout::kSquares, radiance * radiance);
-  if ((sample_index & 1u) == 0) film_add3(record + AccumulatorLayout::kEven, radiance);
+  if ((sample & 1u) == 0) film_add3(record + AccumulatorLayout::kEven, radiance);
+  if ((sample & 3u) == 0) film_add3(record + AccumulatorLayout::kQuarter0, radiance);
+  if ((sample & 3u) == 1) film_add3(record + AccumulatorLayout::kQuarter1, radiance);
   if (layout.direct >= 0) film_add3(record + layout.direct, direct);
   return true;
 }

@@ -3,8 +3,9 @@
 //
 // Every dimension (a pair for sample_2d) is its own copy of the (0,2)-sequence of Sobol's first two dimensions: scrambled
 // by its own hash and visited in its own shuffled order ("padding"), so pairs are stratified and different pairs are
-// independent. Even and odd samples of a pixel come from two *independent* scramblings ("streams"): the difference of
-// the two half means is then an honest measure of the error of their average, although each half is stratified.
+// independent. A pixel's samples visit the sequence in four interleaved streams (sample_sequence_index): its halves and
+// quarters are stratified by themselves, so that their differences show how fast the error falls, and together they fill
+// one larger stratified set.
 //
 // Sources: Burley 2020, "Practical Hash-based Owen Scrambling", JCGT 9(4); Laine and Karras 2011, "Stratified Sampling for
 // Stochastic Transparency", §3.2; permutation: Vegdahl 2021, "Building a Better LK Hash".
@@ -83,30 +84,49 @@ RELIEF_KERNEL constexpr std::uint32_t sample_pixel_hash(std::uint64_t seed, int 
   return static_cast<std::uint32_t>(hash_mix(hash_mix(seed + 0x9e3779b97f4a7c15u) ^ pixel) >> 32);
 }
 
-/// Scrambling keys of one (pixel, dimension, stream) and the shuffled index of one sample in it.
+/// log₂ of the length of a stream for a planned number of samples a pixel, see sample_sequence_index.
+RELIEF_KERNEL constexpr std::uint32_t sample_log2_stream(std::uint32_t num_samples)
+{
+  std::uint32_t log2 = 0;
+  while ((std::uint64_t{4} << log2) < num_samples) ++log2;
+  return log2;
+}
+
+/// Index in the sequence of the i-th sample of a pixel.
+///
+/// Four aligned blocks of the sequence ("streams") are visited in turn: sample i belongs to half i & 1 and, in it, to
+/// quarter (i >> 1) & 1. Whenever 4·2^k samples are done, each stream is a net of 2^k points; when all planned samples
+/// are, and their number is a power of two, halves and whole are nets too.
+/// @param sample       i, below 4·2^log2_stream
+/// @param log2_stream  from sample_log2_stream
+RELIEF_KERNEL constexpr std::uint32_t sample_sequence_index(std::uint32_t sample, std::uint32_t log2_stream)
+{
+  return (sample >> 2) | ((sample >> 1 & 1u) << log2_stream) | ((sample & 1u) << (log2_stream + 1));
+}
+
+/// Scrambling keys of one (pixel, dimension) and the shuffled index of one sample in it.
 struct SampleKeys {
   std::uint32_t index = 0;  ///< position in the Sobol sequence
   std::uint32_t seed_x = 0, seed_y = 0;
 };
 
-/// @param dimension  see dimensions.h; below 2^31
+/// @param dimension  see dimensions.h
 RELIEF_KERNEL constexpr SampleKeys sample_keys(std::uint32_t pixel_hash,
                                                std::uint32_t sample_index,
                                                std::uint32_t dimension)
 {
-  const std::uint32_t stream = sample_index & 1u;
-  const std::uint64_t key = hash_mix((static_cast<std::uint64_t>(dimension * 2u + stream) << 32) | pixel_hash);
+  const std::uint64_t key = hash_mix((static_cast<std::uint64_t>(dimension) << 32) | pixel_hash);
   const std::uint32_t seed_x = static_cast<std::uint32_t>(key);
   const std::uint32_t seed_y = static_cast<std::uint32_t>(key >> 32);
   const std::uint32_t seed_index = (seed_x ^ (seed_y << 13 | seed_y >> 19)) * 0x9e3779b1u;
   // Shuffling by nested scrambling keeps aligned blocks of 2^k indices together, so prefixes stay stratified.
-  const std::uint32_t index = reverse_bits(owen_permute_reversed(reverse_bits(sample_index >> 1), seed_index));
+  const std::uint32_t index = reverse_bits(owen_permute_reversed(reverse_bits(sample_index), seed_index));
   return {index, seed_x, seed_y};
 }
 
 /// One stratified number.
 /// @param pixel_hash    from sample_pixel_hash
-/// @param sample_index  of the pixel; even and odd ones are independent streams
+/// @param sample_index  place in the sequence, see sample_sequence_index
 /// @param dimension     see dimensions.h; numbers of different dimensions are independent
 /// @return              [0, 1)
 RELIEF_KERNEL constexpr float sample_1d(std::uint32_t pixel_hash, std::uint32_t sample_index, std::uint32_t dimension)

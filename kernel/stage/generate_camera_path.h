@@ -14,13 +14,15 @@ namespace relief {
 /// Starts `path` at a sample of a pixel. Writes every column but the hit's and the scatter normal.
 /// Next: intersect closest.
 /// @param pixel_x, pixel_y  in the film window
+/// @param sample            of the pixel, counted from 0
 RELIEF_KERNEL void generate_camera_path(const KernelGlobals& g,
                                         const PathStateView& state,
                                         std::uint32_t path,
                                         int pixel_x,
                                         int pixel_y,
-                                        std::uint32_t sample_index)
+                                        std::uint32_t sample)
 {
+  const std::uint32_t sample_index = sample_sequence_index(sample, g.log2_stream);
   const int image_x = g.crop_x + pixel_x;
   const int image_y = g.crop_y + pixel_y;
   // The hash is of the pixel's place in the whole image, so that a crop shows the same noise.
@@ -55,6 +57,7 @@ RELIEF_KERNEL void generate_camera_path(const KernelGlobals& g,
   state.bounces[path] = 0;
   state.flags[path] = 0;
   state.sigma_a_r[path] = state.sigma_a_g[path] = state.sigma_a_b[path] = 0.0f;
+  state.eta_scale[path] = 1.0f;
   state.cone_width[path] = ray.cone_width;
   state.cone_spread[path] = ray.cone_spread;
 }

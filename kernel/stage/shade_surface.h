@@ -240,10 +240,17 @@ RELIEF_KERNEL void shade_surface(const KernelGlobals& g,
   if (!(bsdf.pdf > 0.0f)) return;
   throughput *= bsdf.f * (__builtin_fabsf(bsdf.wi.z) / bsdf.pdf);
 
+  float eta_scale = 1.0f;
+  if constexpr ((kFeatures & kFeatureTransmission) != 0) {
+    eta_scale = state.eta_scale[path] * sqr(bsdf.eta);
+    state.eta_scale[path] = eta_scale;
+  }
+
   // Russian roulette with the square root of the throughput: a gentler rate than the throughput itself, which measured
-  // less noise at equal time (as Cycles and others found).
+  // less noise at equal time (as Cycles and others found). What refraction takes on entering glass is not a loss: it
+  // comes back on leaving (pbrt-v4 §14.5.4).
   if (bounce > 0) {
-    const float survival = min(1.0f, __builtin_sqrtf(max_component(throughput)));
+    const float survival = min(1.0f, __builtin_sqrtf(max_component(throughput) * eta_scale));
     if (!(sample_1d(hash, sample, dimension_bounce(surface, BounceDimension::kRoulette)) < survival)) return;
     throughput *= 1.0f / survival;
   }

@@ -64,22 +64,42 @@ Scatter scatter(int samples, int num_runs)
 }
 
 // 3,072 values × 48 runs: the relative standard error of a ratio of variances is about √(2/47)·√(4/3072) ≈ 0.7 % for
-// Gaussian pixels; heavy tails and neighbours that share a tile's calibration raise it to some 3 %. 12 % is four of those.
-constexpr double kTolerance = 0.12;
+// Gaussian pixels; heavy tails and neighbours that share a tile's calibration raise it to some 3 %. Upwards the estimate
+// may err by what error_extrapolate does: a third at edges, up to twice where the integrand is smooth and v falls as
+// n^−3 (its docstring derives both); measured over this scene 1.44 at 16 samples, 1.25 at 64.
+constexpr double kLeast = 0.88;
+constexpr double kMost = 1.55;
+
+void expect_honest(const Scatter& s)
+{
+  for (const double ratio : {s.claimed_rmse_squared / s.true_variance, s.claimed_variance / s.true_variance}) {
+    EXPECT_GE(ratio, kLeast);
+    EXPECT_LE(ratio, kMost);
+  }
+}
 
 TEST(ErrorEstimate, ClaimedErrorIsTheScatterOfSeeds)
 {
   for (const int samples : {16, 64}) {
-    const Scatter s = scatter(samples, 48);
-    EXPECT_NEAR(s.claimed_rmse_squared / s.true_variance, 1.0, kTolerance) << samples << " samples";
-    EXPECT_NEAR(s.claimed_variance / s.true_variance, 1.0, kTolerance) << samples << " samples";
+    SCOPED_TRACE(samples);
+    expect_honest(scatter(samples, 48));
   }
 }
 
 TEST(ErrorEstimate, OddCountsOfSamplesAreEstimatedToo)
 {
-  const Scatter s = scatter(7, 48);
-  EXPECT_NEAR(s.claimed_rmse_squared / s.true_variance, 1.0, kTolerance);
+  for (const int samples : {2, 7, 50}) {
+    SCOPED_TRACE(samples);
+    expect_honest(scatter(samples, 48));
+  }
+}
+
+TEST(ErrorEstimate, ExtrapolatesExactlyBetweenRandomAndSmooth)
+{
+  // v(n) = a/n + b/n²; D₁ = v(n/2) − v(n), D₂ = v(n/4) − v(n/2).
+  const double a = 3, b = 40, n = 64;
+  const auto v = [&](double samples) { return a / samples + b / (samples * samples); };
+  EXPECT_NEAR(error_extrapolate(v(n / 2) - v(n), v(n / 4) - v(n / 2)), v(n), 1e-12);
 }
 
 }  // namespace

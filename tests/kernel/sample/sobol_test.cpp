@@ -16,8 +16,8 @@ constexpr double kMaxZ = 4.5;
 
 std::uint32_t pixel(int i) { return sample_pixel_hash(7, i % 1920, i / 1920); }
 
-/// Index of sample i of one stream.
-std::uint32_t in_stream(std::uint32_t stream, std::uint32_t i) { return 2 * i + stream; }
+/// Index of sample i of one of the four streams.
+std::uint32_t in_stream(std::uint32_t stream, std::uint32_t i) { return sample_sequence_index(4 * i + stream, 14); }
 
 /// z value of a χ² statistic.
 /// @source Wilson and Hilferty 1931
@@ -88,7 +88,7 @@ double stream_mean(std::uint32_t hash, std::uint32_t stream, std::uint32_t n, st
 TEST(Sobol, EveryAlignedBlockOfAStreamIsANet)
 {
   for (int p = 0; p < 8; ++p) {
-    for (std::uint32_t stream = 0; stream < 2; ++stream) {
+    for (const std::uint32_t stream : {0u, 3u}) {
       for (std::uint32_t log_n = 0; log_n <= 10; ++log_n) {
         const std::uint32_t n = 1u << log_n;
         for (const std::uint32_t block : {0u, 1u, 5u}) {
@@ -189,33 +189,36 @@ TEST(Sobol, ValuesAreBelowOne)
   EXPECT_EQ(unit_float(0u), 0.0f);
 }
 
-TEST(Sobol, HalfMeansAreUncorrelated)
+TEST(Sobol, HalvesAndWholeOfAPlannedPowerOfTwoAreNets)
 {
-  const int n = 100000;  // pixels
-  for (const std::uint32_t samples : {1u, 2u, 8u, 16u}) {
-    std::vector<double> even, odd, previous;
-    for (int p = 0; p < n; ++p) {
-      even.push_back(stream_mean(pixel(p), 0, samples, 4));
-      odd.push_back(stream_mean(pixel(p), 1, samples, 4));
+  const std::uint32_t n = 256;
+  const std::uint32_t log2_stream = sample_log2_stream(n);
+  EXPECT_EQ(log2_stream, 6u);
+  for (const std::uint32_t step : {1u, 2u, 4u}) {
+    for (std::uint32_t first = 0; first < step; ++first) {
+      const std::uint32_t size = n / step;
+      for (std::uint32_t columns = 1; columns <= size; columns *= 2) {
+        std::vector<int> count(size, 0);
+        for (std::uint32_t i = first; i < n; i += step) {
+          const Vec2f u = sample_2d(pixel(7), sample_sequence_index(i, log2_stream), 3);
+          const auto x = static_cast<std::uint32_t>(u.x * static_cast<float>(columns));
+          const auto y = static_cast<std::uint32_t>(u.y * static_cast<float>(size / columns));
+          ++count[y * columns + x];
+        }
+        EXPECT_EQ(std::count(count.begin(), count.end(), 1), static_cast<std::ptrdiff_t>(size)) << step << " " << first;
+      }
     }
-    EXPECT_LT(std::abs(correlation_z(even, odd)), kMaxZ) << samples << " samples a stream";
   }
 }
 
-TEST(Sobol, DifferenceOfHalfMeansMeasuresTheErrorOfTheirMean)
+TEST(Sobol, SequenceIndexIsAPermutationForAnyPlannedNumber)
 {
-  const int n = 100000;  // pixels
-  const double truth = smooth_integral();
-  for (const std::uint32_t samples : {2u, 8u}) {
-    double estimate = 0, error = 0, spread = 0;
-    for (int p = 0; p < n; ++p) {
-      const double a = stream_mean(pixel(p), 0, samples, 4), b = stream_mean(pixel(p), 1, samples, 4);
-      const double e = 0.25 * (a - b) * (a - b), s = (0.5 * (a + b) - truth) * (0.5 * (a + b) - truth);
-      estimate += e / n;
-      error += s / n;
-      spread += (e - s) * (e - s) / n;
-    }
-    EXPECT_LT(std::abs(estimate - error) / std::sqrt(spread / n), kMaxZ) << samples << " samples a stream";
+  for (const std::uint32_t planned : {1u, 4u, 5u, 50u, 64u, 65u, 1000u}) {
+    const std::uint32_t log2_stream = sample_log2_stream(planned);
+    std::vector<int> count(std::size_t{4} << log2_stream, 0);
+    for (std::uint32_t i = 0; i < count.size(); ++i) ++count[sample_sequence_index(i, log2_stream)];
+    EXPECT_EQ(std::count(count.begin(), count.end(), 1), static_cast<std::ptrdiff_t>(count.size())) << planned;
+    EXPECT_GE(count.size(), planned);
   }
 }
 
