@@ -9,12 +9,12 @@ namespace relief {
 /// Where each sum lies inside a pixel's record of floats; −1: not kept. The beauty, its parts and the squares are always
 /// kept, because error estimates and adaptive sampling need them.
 struct AccumulatorLayout {
-  static constexpr int kBeauty = 0;      ///< R, G, B
-  static constexpr int kCoverage = 3;    ///< samples that met geometry
-  static constexpr int kEven = 4;        ///< R, G, B of samples 0, 2, 4, …: the first half
-  static constexpr int kSquares = 7;     ///< R², G², B²
-  static constexpr int kQuarter0 = 10;   ///< R, G, B of samples 0, 4, 8, …: the first quarter of the first half
-  static constexpr int kQuarter1 = 13;   ///< R, G, B of samples 1, 5, 9, …: the first quarter of the second half
+  static constexpr int kBeauty = 0;     ///< R, G, B
+  static constexpr int kCoverage = 3;   ///< samples that met geometry
+  static constexpr int kEven = 4;       ///< R, G, B of samples 0, 2, 4, …: the first half
+  static constexpr int kSquares = 7;    ///< R², G², B²
+  static constexpr int kQuarter0 = 10;  ///< R, G, B of samples 0, 4, 8, …: the first quarter of the first half
+  static constexpr int kQuarter1 = 13;  ///< R, G, B of samples 1, 5, 9, …: the first quarter of the second half
   static constexpr int kAlways = 16;
 
   int direct = -1, albedo = -1, normal = -1, depth = -1, position = -1, uv = -1, object_id = -1, material_id = -1;

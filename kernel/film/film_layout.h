@@ -46,8 +46,7 @@ inline constexpr std::array<AovInfo, kNumAovs> kAovInfo = {{
     {Aov::kMaterialId, "material_id", "I", true, "material index + 1 of the pixel's first sample; 0 = background"},
     {Aov::kSampleCount, "samples", "N", true, "samples taken in this pixel"},
     {Aov::kVariance, "variance", "RGB", false, "estimated variance of the pixel's mean radiance"},
-    {Aov::kHalf, "half", "RGB", false,
-     "mean of the pixel's even-numbered samples"},
+    {Aov::kHalf, "half", "RGB", false, "mean of the pixel's even-numbered samples"},
 }};
 
 /// Offsets, in floats, of each kept AOV inside one pixel's record; −1 when it is not kept.

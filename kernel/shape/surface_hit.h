@@ -10,14 +10,14 @@ namespace relief {
 
 /// A point on a triangle mesh in world space.
 struct SurfaceHit {
-  Vec3f P;            ///< world, metres
-  Vec3f P_error;      ///< bound on |error of P|, per axis, metres
-  Vec3f Ng;           ///< unit geometric normal, on the front side (counter-clockwise winding)
-  Vec3f Ns;           ///< unit interpolated shading normal, same side as Ng on the whole; = Ng for flat meshes
-  Vec2f uv[2];        ///< texture coordinates; (0, 0) where absent
+  Vec3f P;        ///< world, metres
+  Vec3f P_error;  ///< bound on |error of P|, per axis, metres
+  Vec3f Ng;       ///< unit geometric normal, on the front side (counter-clockwise winding)
+  Vec3f Ns;       ///< unit interpolated shading normal, same side as Ng on the whole; = Ng for flat meshes
+  Vec2f uv[2];    ///< texture coordinates; (0, 0) where absent
   Vec4f color{1, 1, 1, 1};
   float area_ratio[2] = {0, 0};  ///< √(uv area / world area) of the triangle: uv units a metre, for texture footprints
-  Vec3f P_lift;       ///< vector from P to the smooth surface that Ns suggests, see surface_hit_make; 0 for flat meshes
+  Vec3f P_lift;  ///< vector from P to the smooth surface that Ns suggests, see surface_hit_make; 0 for flat meshes
 };
 
 /// Evaluates the triangle's attributes at a hit.
@@ -40,7 +40,9 @@ RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
   const Vec3f P_object = w0 * p0 + bary_u * p1 + bary_v * p2;
   const Vec3f P_object_sum = abs(w0 * p0) + abs(bary_u * p1) + abs(bary_v * p2);
   hit.P = transform_point(m, P_object);
-  const auto abs_transform = [](const Affine3& by, Vec3f v) { return abs(by.x) * v.x + abs(by.y) * v.y + abs(by.z) * v.z; };
+  const auto abs_transform = [](const Affine3& by, Vec3f v) {
+    return abs(by.x) * v.x + abs(by.y) * v.y + abs(by.z) * v.z;
+  };
   hit.P_error = (1.0f + gamma_bound(3)) * gamma_bound(7) * abs_transform(m, P_object_sum) +
                 gamma_bound(3) * (abs_transform(m, P_object_sum) + abs(m.p));
   if ((instance.flags & kTracedInObjectSpace) != 0) {
@@ -84,7 +86,8 @@ RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
     hit.uv[set] = w0 * t0 + bary_u * t1 + bary_v * t2;
     const Vec2f du = t1 - t0;
     const Vec2f dv = t2 - t0;
-    hit.area_ratio[set] = __builtin_sqrtf(__builtin_fabsf(difference_of_products(du.x, dv.y, du.y, dv.x)) / double_area);
+    hit.area_ratio[set] =
+        __builtin_sqrtf(__builtin_fabsf(difference_of_products(du.x, dv.y, du.y, dv.x)) / double_area);
   }
   if (mesh.color != nullptr) {
     const Vec4f a = mesh.color[tri.v0], b = mesh.color[tri.v1], c = mesh.color[tri.v2];

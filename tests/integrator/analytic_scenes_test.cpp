@@ -121,7 +121,8 @@ TEST_P(AnalyticScene, PointLightFallsOffWithTheSquare)
   light.emission = {7, 7, 7};
   scene.lights.push_back(light);
   const double squared = 3.0 * 3.0 + 1.5 * 1.5;
-  EXPECT_NEAR(render_scene(scene, options(scene, 4, 4)).mean(), 7 / squared * (1.5 / std::sqrt(squared)) * 0.6 / kPi, 2e-5);
+  EXPECT_NEAR(render_scene(scene, options(scene, 4, 4)).mean(), 7 / squared * (1.5 / std::sqrt(squared)) * 0.6 / kPi,
+              2e-5);
 }
 
 /// Irradiance on a floor from a parallel rectangle of unit radiance, one corner above the point: Howell's C-11.
@@ -242,8 +243,9 @@ TEST_P(AnalyticScene, SmoothGlassSphereVanishesInAWhiteFurnace)
   expect_mean(estimate_mean(scene, options(scene, 16, 64), kRuns), 1.0, 1e-3);
 }
 
-INSTANTIATE_TEST_SUITE_P(, AnalyticScene, testing::ValuesIn(kConfigurations),
-                         [](const auto& parameter) { return std::string(parameter.param.name); });
+INSTANTIATE_TEST_SUITE_P(, AnalyticScene, testing::ValuesIn(kConfigurations), [](const auto& parameter) {
+  return std::string(parameter.param.name);
+});
 
 }  // namespace
 }  // namespace relief::test
