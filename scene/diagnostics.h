@@ -12,7 +12,7 @@ namespace relief {
 /// "FILE: JSON_PATH: expected EXPECTED, found FOUND".
 class SceneError : public std::runtime_error {
  public:
-  SceneError(std::string file, std::string json_path, std::string expected, std::string found);
+  SceneError(std::string file_name, std::string path, std::string wanted, std::string got);
 
   std::string file, json_path, expected, found;
 };

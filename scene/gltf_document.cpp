@@ -233,11 +233,11 @@ ByteArray gltf_decode_data_uri(const std::string& uri, const std::string& file, 
   std::uint32_t bits = 0;
   int num_bits = 0;
   for (std::size_t i = 0; i < text.size(); ++i) {
-    const int digit = kDigits[static_cast<unsigned char>(text[i])];
+    const std::int8_t digit = kDigits[static_cast<unsigned char>(text[i])];
     if (digit < 0) {
       throw SceneError(file, json_path, "base64", "another character at position " + std::to_string(comma + 1 + i));
     }
-    bits = (bits << 6) | static_cast<std::uint32_t>(digit);
+    bits = (bits << 6) | static_cast<std::uint8_t>(digit);
     num_bits += 6;
     if (num_bits >= 8) {
       num_bits -= 8;
@@ -259,7 +259,7 @@ fs::path gltf_resolve_uri(const GltfDocument& document, const std::string& uri, 
     if (name.empty() || name.find('\0') != std::string::npos) {
       continue;
     }
-    const fs::path path = document.path.parent_path() / name;
+    fs::path path = document.path.parent_path() / name;
     std::error_code error;
     if (fs::is_regular_file(path, error)) {
       return path;

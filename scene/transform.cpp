@@ -48,8 +48,9 @@ Transform transform_from_trs(const Trs& trs)
   return t;
 }
 
-std::optional<Transform> transform_from_matrix(const std::array<double, 16>& m)
+std::optional<Transform> transform_from_matrix(const std::array<double, 16>& column_major)
 {
+  const std::array<double, 16>& m = column_major;
   // Writers that invert matrices leave rounding in the last row.
   constexpr double kRounding = 1e-6;
   if (std::fabs(m[3]) > kRounding || std::fabs(m[7]) > kRounding || std::fabs(m[11]) > kRounding ||
