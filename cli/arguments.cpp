@@ -98,6 +98,8 @@ std::vector<int> parse_frames(const std::string& text)
     if (dash != std::string_view::npos && !to_number(part.substr(dash + 1), &last)) refuse("--frames", kExpected, text);
     if (dash == std::string_view::npos && times != std::string_view::npos) refuse("--frames", kExpected, text);
     if (first < 0 || last < first || last > kLastFrame) refuse("--frames", kExpected, text);
+    // A step beyond the last frame must not overflow.
+    step = std::min(step, kLastFrame);
     for (int frame = first; frame <= last; frame += step) {
       if (seen.insert(frame).second) frames.push_back(frame);
     }
@@ -116,7 +118,10 @@ std::uint32_t parse_aovs(const std::string& text)
 {
   std::uint32_t mask = 1u << static_cast<int>(Aov::kBeauty);
   for (const std::string_view name : split(text, ',')) {
-    if (name == "all") return (1u << kNumAovs) - 1u;
+    if (name == "all") {
+      mask = (1u << kNumAovs) - 1u;
+      continue;
+    }
     const auto* info = std::find_if(kAovInfo.begin(), kAovInfo.end(), [&](const AovInfo& i) { return i.name == name; });
     if (info == kAovInfo.end()) {
       std::string names = "all";

@@ -68,7 +68,8 @@ FramePaths paths_of_frame(const RenderArguments& arguments, std::optional<int> f
     return frame && !pattern.empty() ? frame_path(pattern, *frame) : std::filesystem::path(pattern);
   };
   // One reference may serve all frames; it has a number only where it is asked for.
-  const bool has_references = arguments.reference.find('#') != std::string::npos;
+  const bool has_references =
+      std::filesystem::path(arguments.reference).filename().string().find('#') != std::string::npos;
   return {numbered(arguments.output), numbered(arguments.png), numbered(arguments.stats),
           has_references ? numbered(arguments.reference) : std::filesystem::path(arguments.reference)};
 }
@@ -94,7 +95,7 @@ void check_files_differ(const RenderArguments& arguments)
     for (std::size_t k = i + 1; k < std::size(all); ++k) {
       if (all[i].file.empty() || all[k].file.empty() || !is_same(all[i].file, all[k].file)) continue;
       throw CLI::ValidationError(
-          all[i].option, fmt::format("expected another file than that of {}, found '{}'", all[k].option, all[i].file));
+          all[i].option, fmt::format("expected a file that is not also {}, found '{}'", all[k].option, all[i].file));
     }
   }
 }
@@ -225,7 +226,8 @@ void write_frame(const RenderArguments& arguments,
                  std::string fingerprint,
                  const PngOptions& png,
                  const FilmView& film,
-                 const Statistics& stats)
+                 const Statistics& stats,
+                 ProgressPrinter& progress)
 {
   std::exception_ptr failure;
   try {
@@ -238,7 +240,9 @@ void write_frame(const RenderArguments& arguments,
   Attributes attributes = exr_attributes(stats, command);
   if (!fingerprint.empty()) attributes["relief:fingerprint"] = fingerprint;
   exr_write(paths.exr, film, attributes, {compression_of(arguments), arguments.float_color});
-  if (failure) std::rethrow_exception(failure);
+  if (!failure) return;
+  progress.note(fmt::format("{}: saved, but not all files of its frame could be", paths.exr.string()));
+  std::rethrow_exception(failure);
 }
 
 /// Tells people and programs how a frame came out.
@@ -324,7 +328,7 @@ bool render_frame(const RenderArguments& arguments,
     return false;
   }
   progress.warnings(stats.warnings);
-  write_frame(arguments, paths, command, is_whole ? fingerprint : std::string(), png, image.view, stats);
+  write_frame(arguments, paths, command, is_whole ? fingerprint : std::string(), png, image.view, stats, progress);
   std::optional<ImageErrors> errors;
   if (reference) errors = errors_against(*reference, image.view);
   report_frame(progress, paths, stats, errors);

@@ -50,8 +50,9 @@ AtomicFile::~AtomicFile()
   if (!temporary_.empty()) std::filesystem::remove(temporary_, ignored);
 }
 
-void AtomicFile::fail(int error_number) const
+void AtomicFile::fail(int error_number)
 {
+  if (first_error_ == 0) first_error_ = error_number;
   throw OutputError(path_.string(), std::generic_category().message(error_number));
 }
 
@@ -78,6 +79,8 @@ void AtomicFile::commit()
   file_ = nullptr;
   // Buffered bytes reach the disk here, so this is where a full disk may show first.
   if (std::fclose(file) != 0) fail(errno);
+  // What OpenEXR writes in a destructor fails without a word, and then nothing is left in the buffer to fail above.
+  if (first_error_ != 0) fail(first_error_);
   if (temporary_.empty()) return;
   std::error_code error;
   std::filesystem::rename(temporary_, destination_, error);

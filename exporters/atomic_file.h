@@ -34,17 +34,19 @@ class AtomicFile {
   std::uint64_t position();
 
   /// Closes the file and gives it its name, replacing an older file in one step.
-  /// @error OutputError; the older file is then untouched
+  /// @error OutputError; the older file is then untouched. An earlier failure is reported again: a library in between may
+  ///        have swallowed it
   void commit();
 
   /// Path as the caller gave it, for messages.
   const std::filesystem::path& path() const { return path_; }
 
  private:
-  [[noreturn]] void fail(int error_number) const;
+  [[noreturn]] void fail(int error_number);
 
   std::filesystem::path path_, destination_, temporary_;
   std::FILE* file_ = nullptr;
+  int first_error_ = 0;  ///< errno of the first failure; 0: none
 };
 
 /// Writes a whole file. @error OutputError

@@ -1,0 +1,165 @@
+// The grammar of option values, as tables.
+#include "cli/arguments.h"
+
+#include <gtest/gtest.h>
+
+#include "kernel/film/film_layout.h"
+
+namespace relief {
+namespace {
+
+TEST(Frames, GrammarAndOrder)
+{
+  const std::pair<const char*, std::vector<int>> kCases[] = {
+      {"7", {7}},
+      {"0", {0}},
+      {"1-4", {1, 2, 3, 4}},
+      {"5-5", {5}},
+      {"1-10x4", {1, 5, 9}},
+      {"1-2x9", {1}},
+      {"3,1,2", {3, 1, 2}},
+      {"1-3,2-4,1", {1, 2, 3, 4}},
+      {"1-3,20,30-36x2", {1, 2, 3, 20, 30, 32, 34, 36}},
+      {"007", {7}},
+      {"999999-1000000", {999999, 1000000}},
+      {"999999-1000000x2147483647", {999999}},
+  };
+  for (const auto& [text, frames] : kCases) EXPECT_EQ(parse_frames(text), frames) << text;
+  EXPECT_EQ(parse_frames("0-1000000").size(), 1000001u);
+}
+
+TEST(Frames, AnythingElseIsRefused)
+{
+  for (const char* text : {"",
+                           " ",
+                           ",",
+                           "1,",
+                           ",1",
+                           "1,,2",
+                           "-",
+                           "-1",
+                           "1-",
+                           "1--2",
+                           "5-1",
+                           "1-10x",
+                           "1-10x0",
+                           "1-10x-2",
+                           "1x2",
+                           "x2",
+                           "1-2-3",
+                           "1 - 2",
+                           "1- 2",
+                           " 1",
+                           "1 ",
+                           "+1",
+                           "1.5",
+                           "0x10",
+                           "nan",
+                           "1-1000001",
+                           "99999999999999999999",
+                           "1-2x99999999999",
+                           "a"}) {
+    EXPECT_THROW(parse_frames(text), CLI::ValidationError) << "'" << text << "'";
+  }
+}
+
+TEST(Frames, NameAFile)
+{
+  EXPECT_EQ(frame_path("out/shot.####.exr", 7), "out/shot.0007.exr");
+  EXPECT_EQ(frame_path("shot#.exr", 123), "shot123.exr");
+  EXPECT_EQ(frame_path("shot.##.exr", 123), "shot.123.exr");
+  EXPECT_EQ(frame_path("shot.exr", 7), "shot.0007.exr");
+  EXPECT_EQ(frame_path("a#b.##.exr", 7), "a#b.07.exr");
+  EXPECT_EQ(frame_path("take#2/shot.exr", 7), "take#2/shot.0007.exr");
+  EXPECT_EQ(frame_path("shot", 7), "shot.0007");
+}
+
+TEST(Resolution, IsTwoNumbersInRange)
+{
+  const Resolution size = parse_resolution("1920x1080");
+  EXPECT_EQ(size.width, 1920);
+  EXPECT_EQ(size.height, 1080);
+  EXPECT_EQ(parse_resolution("1x65536").height, 65536);
+  for (const char* text : {"", "x", "10", "10x", "x10", "0x10", "10x0", "-1x1", "65537x1", "10x10x10", "10X10",
+                           "10 x 10", "1e2x1", "99999999999x1"}) {
+    EXPECT_THROW(parse_resolution(text), CLI::ValidationError) << "'" << text << "'";
+  }
+}
+
+TEST(Crop, IsAWindowThatIsNotEmpty)
+{
+  const PixelRect rect = parse_crop("1,2,30,40");
+  EXPECT_EQ(rect.x0, 1);
+  EXPECT_EQ(rect.y0, 2);
+  EXPECT_EQ(rect.x1, 30);
+  EXPECT_EQ(rect.y1, 40);
+  for (const char* text :
+       {"", "1,2,3", "1,2,3,4,5", "5,0,5,9", "6,0,5,9", "0,5,9,5", "-1,0,5,5", "a,b,c,d", "0,0,1.5,2"}) {
+    EXPECT_THROW(parse_crop(text), CLI::ValidationError) << "'" << text << "'";
+  }
+}
+
+TEST(Pixel, HasASampleIfOneIsGiven)
+{
+  const PixelSample pixel = parse_pixel("3,4,4294967295");
+  EXPECT_EQ(pixel.x, 3);
+  EXPECT_EQ(pixel.y, 4);
+  EXPECT_EQ(pixel.sample_index, 4294967295u);
+  EXPECT_EQ(parse_pixel("3,4").sample_index, 0u);
+  for (const char* text : {"", "3", "3,", "3,4,5,6", "-3,4", "3,-4", "3,4,-1", "3,4,4294967296", "x,y"}) {
+    EXPECT_THROW(parse_pixel(text), CLI::ValidationError) << "'" << text << "'";
+  }
+}
+
+TEST(Seed, IsAnyNumberOf64Bits)
+{
+  EXPECT_EQ(parse_seed("0"), 0u);
+  EXPECT_EQ(parse_seed("18446744073709551615"), 18446744073709551615u);
+  for (const char* text : {"", "-1", "18446744073709551616", "1e3", "0x1", "nan"}) {
+    EXPECT_THROW(parse_seed(text), CLI::ValidationError) << "'" << text << "'";
+  }
+}
+
+TEST(Aovs, AlwaysHaveTheBeauty)
+{
+  EXPECT_EQ(parse_aovs("beauty"), 1u);
+  EXPECT_EQ(parse_aovs("depth,depth"), 1u | 1u << static_cast<int>(Aov::kDepth));
+  EXPECT_EQ(parse_aovs("uv,all"), (1u << kNumAovs) - 1);
+  for (const char* text : {"", "foo", "all,foo", "depth,", "Depth", "depth uv"}) {
+    EXPECT_THROW(parse_aovs(text), CLI::ValidationError) << "'" << text << "'";
+  }
+}
+
+TEST(OutputName, HasTheSuffixOfItsFormatOrIsADevice)
+{
+  for (const char* text : {"a.exr", "b/a.EXR", "a.b.exr", "####.exr", "/dev/null"}) {
+    EXPECT_EQ(parse_output("--output", text, ".exr"), text);
+  }
+  for (const char* text : {"", "a", "a.png", "exr", ".exr", "a.exr.png", "/tmp", "."}) {
+    EXPECT_THROW(parse_output("--output", text, ".exr"), CLI::ValidationError) << "'" << text << "'";
+  }
+}
+
+/// Empty if the check accepts the text.
+std::string verdict(const CLI::Validator& check, std::string text) { return check(text); }
+
+TEST(Numbers, AreCheckedWhole)
+{
+  const CLI::Validator samples = whole_number(1, 100);
+  for (const char* text : {"1", "100", "007"}) EXPECT_EQ(verdict(samples, text), "") << text;
+  for (const char* text : {"", "0", "101", "-5", "1.0", "1e1", "nan", "5 ", "99999999999"}) {
+    EXPECT_NE(verdict(samples, text), "") << "'" << text << "'";
+  }
+  EXPECT_EQ(verdict(samples, "0"), "expected a whole number from 1 to 100, found '0'");
+
+  const CLI::Validator threshold = number(0, 1.5);
+  for (const char* text : {"0", "1.5", "1e-3", "-0", ".5"}) EXPECT_EQ(verdict(threshold, text), "") << text;
+  for (const char* text : {"", "nan", "-nan", "inf", "-inf", "-1", "1.6", "1e999", "0.5x", "0,5"}) {
+    EXPECT_NE(verdict(threshold, text), "") << "'" << text << "'";
+  }
+  EXPECT_EQ(verdict(one_of({"bar", "json"}), "foo"), "expected one of bar, json, found 'foo'");
+  EXPECT_EQ(verdict(one_of({"bar", "json"}), "bar"), "");
+}
+
+}  // namespace
+}  // namespace relief

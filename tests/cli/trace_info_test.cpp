@@ -1,0 +1,171 @@
+// `relief trace` and `relief info` against scenes whose answers are known.
+#include <sstream>
+
+#include "tests/cli/program.h"
+
+namespace relief::test {
+namespace {
+
+using TraceInfoProgram = ProgramTest;
+
+std::vector<std::vector<std::string>> csv_rows(const std::string& text)
+{
+  std::vector<std::vector<std::string>> rows;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    rows.emplace_back();
+    std::istringstream fields(line + ",");
+    for (std::string field; std::getline(fields, field, ',');) rows.back().push_back(field);
+  }
+  return rows;
+}
+
+GltfBuilder triangle_scene()
+{
+  GltfBuilder b;
+  const int P = b.accessor<float>({0, 0, 0, 2, 0, 0, 0, 2, 0}, "VEC3");
+  b.mesh({{"attributes", {{"POSITION", P}}}});
+  b.root_node({{"mesh", 0}, {"translation", {10, 0, 0}}});
+  b.push("cameras", {{"type", "perspective"}, {"perspective", {{"yfov", 1}, {"znear", 0.1}}}});
+  b.root_node({{"camera", 0}, {"translation", {10, 0, 5}}});
+  return b;
+}
+
+TEST_F(TraceInfoProgram, TraceOfAKnownTriangle)
+{
+  const std::string scene = folder_.write("t.gltf", triangle_scene().gltf()).string();
+  folder_.write("rays.txt",
+                "# a comment, and an empty line\n\n"
+                "10.5 1 3  0 0 -2\n"
+                "\t10.5 1 3 0 0 -2 0 1.25\r\n"
+                "  # indented\n"
+                "10.5 1 3 0 0 -2 1.6 inf\n"
+                "10.5 1 -3 0 1e-60 2 1 2\n"
+                "11.5 1.5 3 0 0 -1\n"
+                "shadow 10.5 1 3 0 0 -2 0 inf\n");
+  const Outcome outcome = run({"trace", scene, "--rays", file("rays.txt")});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+  const auto rows = csv_rows(outcome.output);
+  ASSERT_EQ(rows.size(), 7u);
+  EXPECT_EQ(outcome.output.substr(0, outcome.output.find('\n')), "hit,t,px,py,pz,nx,ny,nz,u,v,mesh,triangle,steps");
+  const std::vector<double> kHit = {1, 1.5, 10.5, 1, 0, 0, 0, 1, .25, .5, 0, 0};
+  for (const std::size_t r : {1u, 4u, 6u}) {
+    ASSERT_EQ(rows[r].size(), 13u) << r;
+    for (std::size_t i = 0; i < kHit.size(); ++i) {
+      // The second ray comes from behind, where the geometric normal is still that of the front.
+      EXPECT_NEAR(std::stod(rows[r][i]), kHit[i], 1e-6) << "row " << r << " field " << i;
+    }
+    EXPECT_EQ(rows[r][12], "");
+  }
+  // t runs to 1.25, from 1.6, and beside the triangle.
+  for (const std::size_t r : {2u, 3u, 5u}) {
+    ASSERT_EQ(rows[r].size(), 13u);
+    EXPECT_EQ(rows[r][0], "0");
+    for (std::size_t i = 1; i < 13; ++i) EXPECT_EQ(rows[r][i], "");
+  }
+  EXPECT_EQ(run({"trace", scene, "--rays", file("rays.txt"), "-o", file("hits.csv")}).exit_code, 0);
+  EXPECT_EQ(bytes_of_file(file("hits.csv")), outcome.output);
+}
+
+TEST_F(TraceInfoProgram, RaysThatAreNoRaysNameTheirLine)
+{
+  const std::string scene = folder_.write("t.gltf", triangle_scene().gltf()).string();
+  for (const char* line : {"1 2 3 4 5", "1 2 3 4 5 6 7", "1 2 3-4 5 6", "1 2 3 0 0 0", "nan 2 3 4 5 6",
+                           "1 2 3 4 5 6 -1 2", "1 2 3 4 5 6 0 nan", "1,2,3,4,5,6", "1e99 0 0 0 0 1"}) {
+    folder_.write("rays.txt", std::string("0 0 0 0 0 1\n") + line + "\n");
+    const Outcome outcome = run({"trace", scene, "--rays", file("rays.txt"), "-o", file("hits.csv")});
+    EXPECT_EQ(outcome.exit_code, 3) << line;
+    EXPECT_NE(outcome.errors.find("rays.txt: line 2: expected"), std::string::npos) << outcome.errors;
+    EXPECT_FALSE(exists("hits.csv"));
+  }
+  EXPECT_EQ(run({"trace", scene, "--rays", file("nothing.txt")}).exit_code, 3);
+  EXPECT_EQ(run({"trace", scene, "--rays", file("")}).exit_code, 3);
+}
+
+TEST_F(TraceInfoProgram, RaysOfAPixelFedBackHitWhereThePathWentOn)
+{
+  // Two squares face one another, so that paths have several bounces.
+  GltfBuilder b = lit_square();
+  b.root_node({{"mesh", 0}, {"translation", {0, 1, 1}}, {"rotation", {1, 0, 0, 0}}});
+  const std::string scene = folder_.write("s.gltf", b.gltf()).string();
+  int num_followed = 0;
+  for (int sample = 0; sample < 6; ++sample) {
+    const std::string pixel = "48,52," + std::to_string(sample);
+    ASSERT_EQ(run({"trace", scene, "--pixel", pixel, "--resolution", "128x128", "-o", file("p.txt")}).exit_code, 0);
+    std::istringstream lines(bytes_of_file(file("p.txt")));
+    std::string paths;
+    std::vector<std::vector<double>> origins;
+    for (std::string line; std::getline(lines, line);) {
+      if (line.rfind("path ", 0) != 0) continue;
+      paths += line + "\n";
+      std::istringstream numbers(line.substr(5));
+      origins.emplace_back(3);
+      for (double& x : origins.back()) numbers >> x;
+    }
+    ASSERT_GE(origins.size(), 1u);
+    folder_.write("rays.txt", paths);
+    const auto rows = csv_rows(run({"trace", scene, "--rays", file("rays.txt")}).output);
+    ASSERT_EQ(rows.size(), origins.size() + 1);
+    for (std::size_t i = 0; i + 1 < origins.size(); ++i) {
+      ASSERT_EQ(rows[i + 1][0], "1");
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        EXPECT_NEAR(std::stod(rows[i + 1][2 + axis]), origins[i + 1][axis], 1e-5) << pixel << " ray " << i;
+      }
+      ++num_followed;
+    }
+  }
+  EXPECT_GE(num_followed, 4);
+}
+
+TEST_F(TraceInfoProgram, TraceSeesTheFrameItIsAskedFor)
+{
+  GltfBuilder b = triangle_scene();
+  const int times = b.accessor<float>({0, 1}, "SCALAR"), values = b.accessor<float>({0, 0, 0, 0, 0, 1}, "VEC3");
+  b.push("animations", {{"samplers", {{{"input", times}, {"output", values}}}},
+                        {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}}}}});
+  const std::string scene = folder_.write("t.gltf", b.gltf()).string();
+  folder_.write("rays.txt", "0.5 0.5 3 0 0 -1\n");
+  const auto rows = csv_rows(run({"trace", scene, "--rays", file("rays.txt"), "--frame", "12"}).output);
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_NEAR(std::stod(rows[1][1]), 2.5, 1e-6);
+}
+
+TEST_F(TraceInfoProgram, TraceUsage)
+{
+  const std::string scene = folder_.write("t.gltf", triangle_scene().gltf()).string();
+  folder_.write("rays.txt", "0 0 0 0 0 1\n");
+  EXPECT_EQ(run({"trace", scene}).exit_code, 2);
+  EXPECT_EQ(run({"trace", scene, "--rays", file("rays.txt"), "--pixel", "1,1"}).exit_code, 2);
+  EXPECT_EQ(run({"trace", scene, "--rays", file("rays.txt"), "--seed", "1"}).exit_code, 2);
+  EXPECT_EQ(run({"trace", scene, "--pixel", "960,0"}).exit_code, 2);
+  EXPECT_EQ(run({"trace", scene, "--pixel", "959,539"}).exit_code, 0);
+  EXPECT_EQ(run({"trace", scene, "--pixel", "1,1", "--camera", "nobody"}).exit_code, 2);
+}
+
+TEST_F(TraceInfoProgram, InfoCountsWhatIsThere)
+{
+  GltfBuilder b = lit_square();
+  b.root_node({{"mesh", 0}, {"translation", {2, 0, 0}}});
+  b.root_node({{"mesh", 0}, {"translation", {4, 0, 0}}});
+  b.push("materials", {{"name", "glow"}, {"emissiveFactor", {1, 1, 1}}});
+  b.json["meshes"][0]["primitives"][0]["material"] = 0;
+  b.json["extensionsUsed"].push_back("RELIEF_render");
+  b.json["extensions"]["RELIEF_render"] = {{"resolution", {320, 200}}, {"samples", 17}, {"maxBounces", 3}, {"seed", 5},
+                                           {"frameRange", {2, 9}},     {"fps", 25}};
+  const Outcome outcome = run({"info", folder_.write("s.gltf", b.gltf()).string()});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+  for (const char* line : {"image: 320x200, 17 samples, 3 bounces, seed 5\n", "frames: 2 to 9 at 25 a second\n",
+                           "meshes: 1 with 2 triangles; instances: 3 with 6 triangles in all\n", "cameras (1): front\n",
+                           "lights: 0 placed, 6 emissive triangles, constant environment\n", "textures: 0\n"}) {
+    EXPECT_NE(outcome.output.find(line), std::string::npos) << line << outcome.output;
+  }
+  const std::size_t features = outcome.output.find("features: ");
+  const std::string list = outcome.output.substr(features, outcome.output.find('\n', features) - features);
+  EXPECT_NE(list.find("instances"), std::string::npos) << list;
+  EXPECT_NE(list.find("mesh lights"), std::string::npos) << list;
+  EXPECT_EQ(list.find("displacement"), std::string::npos) << list;
+  EXPECT_EQ(list.find("textures"), std::string::npos) << list;
+}
+
+}  // namespace
+}  // namespace relief::test
