@@ -1,0 +1,125 @@
+// Renders small scenes and compares them with pictures of another origin: closed forms, Cycles, another estimator. What
+// made each reference stands in tests/references/README.md; scripts/update_references remakes them.
+#include <array>
+#include <filesystem>
+#include <functional>
+
+#include "exporters/exr.h"
+#include "scene/load.h"
+#include "tests/image/render_runs.h"
+
+namespace relief::test {
+
+namespace {
+
+/// Chance that a correct renderer fails one of these tests under another seed.
+constexpr double kSignificance = 0.001;
+constexpr int kNumRuns = 16;
+
+struct Reference {
+  const char* name;
+  const char* scene;  ///< from the project's root
+  int samples;        ///< a pixel and run
+};
+
+// Samples give each scene about a second on two cores.
+constexpr std::array kReferences = {
+    Reference{"rectangle_floor", "tests/references/rectangle_floor.gltf", 16},
+    Reference{"punctual_floor", "tests/references/punctual_floor.gltf", 16},
+    Reference{"environment_polyhedron", "tests/references/environment_polyhedron.gltf", 32},
+    Reference{"glass_gem", "tests/references/glass_gem.gltf", 16},
+    Reference{"cornell", "examples/cornell/cornell.gltf", 16},
+    Reference{"instances", "examples/instances/instances.gltf", 4},
+    Reference{"many_lights", "examples/many_lights/many_lights.gltf", 4},
+    Reference{"spheres", "examples/spheres/spheres.gltf", 8},
+    Reference{"product", "examples/product/product.gltf", 8},
+    Reference{"glass", "examples/glass/glass.gltf", 8},
+};
+
+const std::filesystem::path kRoot = RELIEF_SOURCE_DIR;
+
+Reference reference_named(const std::string& name)
+{
+  for (const Reference& reference : kReferences) {
+    if (reference.name == name) return reference;
+  }
+  throw std::runtime_error("no reference is called " + name);
+}
+
+Picture reference_load(const Reference& reference)
+{
+  return exr_load(kRoot / "tests" / "references" / (std::string(reference.name) + "_reference.exr"));
+}
+
+/// Renders a scene, changed if `change` is given, and compares it with its reference.
+ZTestResult compare_with_reference(const Reference& reference, const std::function<void(Scene&)>& change = {})
+{
+  const Picture expected = reference_load(reference);
+  Scene scene = scene_load(kRoot / reference.scene);
+  if (change) change(scene);
+  RunOptions run;
+  run.width = expected.width;
+  run.height = expected.height;
+  run.samples = reference.samples;
+  run.num_runs = kNumRuns;
+  return z_test_pictures(render_runs(scene, run), expected, run.samples * run.num_runs, kSignificance);
+}
+
+class ReferenceImage : public testing::TestWithParam<Reference> {};
+
+TEST_P(ReferenceImage, IsWhatTheRendererConvergesTo)
+{
+  const ZTestResult result = compare_with_reference(GetParam());
+  EXPECT_TRUE(result.passed) << z_text(result);
+  std::printf("%s: %s\n", GetParam().name, z_text(result).c_str());
+}
+
+INSTANTIATE_TEST_SUITE_P(All,
+                         ReferenceImage,
+                         testing::ValuesIn(kReferences),
+                         [](const auto& test) { return std::string(test.param.name); });
+
+// A test that cannot fail says nothing: small faults of a renderer, one a test, must be found at the same significance.
+
+TEST(ReferencePower, TwoPercentMoreLightIsSeen)
+{
+  const auto brighter = [](Scene& scene) {
+    for (Light& light : scene.lights) light.emission *= 1.02f;
+    for (Material& material : scene.materials) material.emission *= 1.02f;
+    scene.environment.color *= 1.02f;
+  };
+  for (const char* name : {"rectangle_floor", "environment_polyhedron", "cornell", "spheres"}) {
+    const ZTestResult result = compare_with_reference(reference_named(name), brighter);
+    EXPECT_FALSE(result.passed) << name << ": " << z_text(result);
+  }
+}
+
+TEST(ReferencePower, ATurnedEnvironmentIsSeen)
+{
+  const auto turn = [](Scene& scene) { scene.environment.rotation += 0.05f; };
+  const ZTestResult result = compare_with_reference(reference_named("environment_polyhedron"), turn);
+  EXPECT_FALSE(result.passed) << z_text(result);
+}
+
+TEST(ReferencePower, HalfAPixelOfShiftIsSeen)
+{
+  for (const char* name : {"punctual_floor", "cornell", "product"}) {
+    const Picture expected = reference_load(reference_named(name));
+    const auto shift = [&expected](Scene& scene) {
+      scene.cameras.front().camera.shift_x += 0.5f / static_cast<float>(expected.width);
+    };
+    const ZTestResult result = compare_with_reference(reference_named(name), shift);
+    EXPECT_FALSE(result.passed) << name << ": " << z_text(result);
+  }
+}
+
+TEST(ReferencePower, ALightTwoPercentOffIsSeenAmongOthers)
+{
+  const auto change = [](Scene& scene) { scene.lights.back().emission *= 0.98f; };
+  const ZTestResult result = compare_with_reference(reference_named("punctual_floor"), change);
+  EXPECT_FALSE(result.passed) << z_text(result);
+}
+
+}  // namespace
+
+}  // namespace relief::test
