@@ -34,6 +34,15 @@ RELIEF_KERNEL bool light_faces(const Light& light, Vec3f P)
   return side > 0.0f || (light.two_sided && side < 0.0f);
 }
 
+/// Whether a flat light is seen so wide, or so much from the side, that uniform sampling of its area is noisy and uniform
+/// sampling of its solid angle worth its price (five times as many instructions): when P is nearer to its plane than its
+/// longest edge is long. Farther away the density of area samples varies by less than a factor of three.
+/// @param longest_edge_squared  m²
+RELIEF_KERNEL bool light_is_wide(const Light& light, Vec3f P, float longest_edge_squared)
+{
+  return sqr(dot(light.P - P, light.axis)) < longest_edge_squared;
+}
+
 /// Solid-angle density, at P, of points chosen uniformly by area on a flat light.
 /// @return 0 when the light is seen edge-on or has no area
 RELIEF_KERNEL float light_area_pdf(const Light& light, Vec3f wi, float distance)

@@ -1,4 +1,4 @@
-// One triangle of an emissive mesh: sampled uniformly in the solid angle it covers, tiny ones by area.
+// One triangle of an emissive mesh: sampled by area from afar, uniformly in the solid angle it covers from near.
 // Source: Arvo 1995, "Stratified Sampling of Spherical Triangles".
 #pragma once
 
@@ -13,6 +13,9 @@ inline constexpr float kTriangleMinSolidAngle = 1e-4f;
 /// @return steradians; 0: sample by area
 RELIEF_KERNEL float triangle_light_solid_angle(const Light& light, Vec3f P)
 {
+  const float longest_edge_squared = max(max(length_squared(light.edge_u), length_squared(light.edge_v)),
+                                         length_squared(light.edge_u - light.edge_v));
+  if (!light_is_wide(light, P, longest_edge_squared)) return 0.0f;
   const Vec3f a = light.P - P;
   const float det = 2.0f * light.area * dot(a, light.axis);
   const float omega = triangle_solid_angle(a, a + light.edge_u, a + light.edge_v, det);

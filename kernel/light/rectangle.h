@@ -1,6 +1,6 @@
 // Rectangle light: sampled uniformly in the solid angle it covers, so that neither distance nor tilt across a large
-// light adds variance. Parallelograms with oblique axes, and lights so small that it makes no difference, are sampled by
-// area. Source: Ureña, Fajardo and King 2013, "An Area-Preserving Parametrization for Spherical Rectangles".
+// light adds variance. Parallelograms with oblique axes, and lights so small or far that it makes no difference, are
+// sampled by area. Source: Ureña, Fajardo and King 2013, "An Area-Preserving Parametrization for Spherical Rectangles".
 #pragma once
 
 #include "kernel/light/light_sample.h"
@@ -15,6 +15,8 @@ inline constexpr float kRectangleMinSolidAngle = 5e-4f;
 /// @return      steradians; 0: sample by area
 RELIEF_KERNEL float rectangle_light_solid_angle(const Light& light, Vec3f P, float area)
 {
+  const float longest_edge_squared = 4.0f * max(length_squared(light.edge_u), length_squared(light.edge_v));
+  if (!light_is_wide(light, P, longest_edge_squared)) return 0.0f;
   const float skew = dot(light.edge_u, light.edge_v);
   if (!(sqr(skew) <= 1e-8f * length_squared(light.edge_u) * length_squared(light.edge_v))) return 0.0f;
   const Vec3f centre = light.P - P;

@@ -112,7 +112,7 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
 /// Shades one path. Reads and writes every column but the hit's.
 /// Next: intersect closest (pushed on `next`), or the path ends. At most one ray is added to `shadow`.
 template <unsigned kFeatures>
-RELIEF_KERNEL void shade_surface(const KernelGlobals& g,
+[[gnu::flatten]] RELIEF_KERNEL void shade_surface(const KernelGlobals& g,
                                  const PathStateView& state,
                                  std::uint32_t path,
                                  QueueView& next,
