@@ -17,12 +17,16 @@ struct Example {
 };
 
 constexpr std::array kExamples = {
-    Example{"cornell", 48, 48, 256},    Example{"spheres", 64, 36, 256},  Example{"glass", 64, 36, 256},
-    Example{"product", 64, 36, 256},    Example{"instances", 64, 36, 64}, Example{"many_lights", 64, 36, 256},
+    Example{"cornell", 48, 48, 256}, Example{"spheres", 64, 36, 256},  Example{"glass", 64, 36, 256},
+    Example{"product", 64, 36, 256}, Example{"instances", 64, 36, 64}, Example{"many_lights", 64, 36, 64},
 };
 
 constexpr int kNumRuns = 16;
 constexpr double kSignificance = 0.001;  // of one pair
+
+// A BSDF sample finds a small lamp by luck alone, a light sample a sharp highlight: a pixel that was never lucky in sixteen
+// runs looks certain. In the Cornell box that is one pixel in fifty; blocks and the mean carry the test.
+constexpr double kAllowedOutliers = 0.05;
 
 class EstimatorAgreement : public testing::TestWithParam<Example> {};
 
@@ -30,8 +34,7 @@ TEST_P(EstimatorAgreement, TechniquesAgreePairwise)
 {
   const Example& example = GetParam();
   const std::string name = example.name;
-  const Scene scene =
-      scene_load(std::filesystem::path(RELIEF_SOURCE_DIR) / "examples" / name / (name + ".gltf"));
+  const Scene scene = scene_load(std::filesystem::path(RELIEF_SOURCE_DIR) / "examples" / name / (name + ".gltf"));
   constexpr std::array kTechniques = {LightTechnique::kMis, LightTechnique::kLightSampling,
                                       LightTechnique::kBsdfSampling};
   constexpr std::array kNames = {"mis", "light", "bsdf"};
@@ -49,7 +52,7 @@ TEST_P(EstimatorAgreement, TechniquesAgreePairwise)
   for (std::size_t i = 0; i < pictures.size(); ++i) {
     for (std::size_t k = i + 1; k < pictures.size(); ++k) {
       const ZTestResult result =
-          z_test_pictures(pictures[i], pictures[k], example.samples * kNumRuns, kSignificance);
+          z_test_pictures(pictures[i], pictures[k], example.samples * kNumRuns, kSignificance, kAllowedOutliers);
       const std::string text = std::string(kNames[i]) + " and " + kNames[k] + ": " + z_text(result);
       EXPECT_TRUE(result.passed) << text;
       std::printf("%s: %s\n", example.name, text.c_str());
@@ -57,10 +60,9 @@ TEST_P(EstimatorAgreement, TechniquesAgreePairwise)
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Examples,
-                         EstimatorAgreement,
-                         testing::ValuesIn(kExamples),
-                         [](const auto& test) { return std::string(test.param.name); });
+INSTANTIATE_TEST_SUITE_P(Examples, EstimatorAgreement, testing::ValuesIn(kExamples), [](const auto& test) {
+  return std::string(test.param.name);
+});
 
 }  // namespace
 

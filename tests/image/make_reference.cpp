@@ -36,7 +36,8 @@ int make_reference(char** arguments)
 int main(int argc, char** argv)
 {
   if (argc != 8) {
-    std::fputs("usage: relief_make_reference SCENE WIDTHxHEIGHT SAMPLES RUNS mis|light|bsdf OUTPUT.exr ORIGIN\n", stderr);
+    std::fputs("usage: relief_make_reference SCENE WIDTHxHEIGHT SAMPLES RUNS mis|light|bsdf OUTPUT.exr ORIGIN\n",
+               stderr);
     return 2;
   }
   try {

@@ -81,11 +81,16 @@ inline Picture render_runs(const Scene& scene, const RunOptions& run)
 /// Tests whether two pictures have the same expected value, with options that suit few samples.
 ///
 /// A variance of N runs has N − 1 degrees of freedom, so that a single pixel's z follows Student's distribution and not
-/// the normal one; blocks of 64 pixels and the image's mean average that out. One pixel in fifty may therefore fail by itself.
+/// the normal one; blocks of 64 pixels and the image's mean average that out, single pixels may fail by themselves.
 /// A part of a pixel that none of its samples met, a sliver of shadow say, leaves no variance either: every pixel is at
 /// least as uncertain as one sample of the picture's mean radiance, in or out, makes it.
-/// @param num_samples  a pixel, of all runs of `a`
-inline ZTestResult z_test_pictures(const Picture& a, const Picture& b, int num_samples, double significance)
+/// @param num_samples       a pixel, of all runs of `a`
+/// @param allowed_outliers  share of single pixels that may fail: the more, the rarer the bright samples are
+inline ZTestResult z_test_pictures(const Picture& a,
+                                   const Picture& b,
+                                   int num_samples,
+                                   double significance,
+                                   double allowed_outliers = 0.02)
 {
   double mean = 0;
   for (const char* name : {"R", "G", "B"}) {
@@ -94,7 +99,7 @@ inline ZTestResult z_test_pictures(const Picture& a, const Picture& b, int num_s
   mean /= 3.0 * b.width * b.height;
   ZTestOptions options;
   options.significance = significance;
-  options.allowed_outliers = 0.02;
+  options.allowed_outliers = allowed_outliers;
   options.variance_floor = mean / num_samples * (mean / num_samples);
   return z_test(picture_layer(a, ""), picture_layer(a, "variance"), picture_layer(b, ""), picture_layer(b, "variance"),
                 options);
