@@ -27,11 +27,9 @@ namespace relief {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
 enum class RayKind : std::size_t { kCamera, kBounce, kShadow };
 constexpr std::array kKindNames = {"camera", "bounce", "shadow"};
 constexpr std::array kKindMasks = {kRayCamera, kRayBounce, kRayShadow};
-
 /// Samples of a batch of the renderer, as in render(): tiles of 16 × 16 pixels fill one.
 constexpr std::uint32_t kBatchSamples = kBatchPaths / (kTileSize * kTileSize);
 

@@ -1,5 +1,9 @@
 // Three ways to estimate direct light that share little but the integrand: sampling lights, sampling the BSDF, and both
-// with multiple importance sampling. On every example they must agree within their noise.
+// with multiple importance sampling. On every example they must agree within their noise. What only one technique can find
+// is always left to it: suns, points and spots to light sampling, smooth glass and mirrors to BSDF sampling.
+//
+// Where a technique is poor its noise has heavy tails, and few runs mostly lie a little low: light sampling of the
+// glass example's frosted sphere is 0.3 % down at 16 × 256 samples a pixel and 0.01 % at 24 × 32768.
 #include <array>
 #include <filesystem>
 
@@ -15,6 +19,9 @@ struct Example {
   int width, height;
   int samples;  ///< a pixel and run
 };
+
+/// For GoogleTest's messages, which would print the bytes.
+void PrintTo(const Example& example, std::ostream* out) { *out << example.name; }
 
 constexpr std::array kExamples = {
     Example{"cornell", 48, 48, 256}, Example{"spheres", 64, 36, 256},  Example{"glass", 64, 36, 256},
