@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace relief {
 
@@ -172,6 +173,8 @@ ImageError Film::estimate_error() const
   double d1 = 0, d2 = 0, relative_d1 = 0, relative_d2 = 0;
   const auto sum = [](Vec3f v) { return static_cast<double>(v.x) + v.y + v.z; };
   for (int tile = 0; tile < num_tiles(); ++tile) {
+    constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+    if (tile_samples(tile) < 2) return {kUnknown, kUnknown};
     int x0, y0, w, h;
     tile_rect(tile, &x0, &y0, &w, &h);
     for (int y = y0; y < y0 + h; ++y) {

@@ -19,7 +19,8 @@ struct RenderedImage {
   FilmView view;  ///< into `pixels`
 };
 
-/// Root mean square errors of the whole image, estimated from its halves and quarters.
+/// Root mean square errors of the whole image, estimated from its halves and quarters. NaN where a pixel has less than two
+/// samples: nothing can be known from one.
 struct ImageError {
   double rmse = 0, relmse = 0;
 };

@@ -36,7 +36,7 @@ RELIEF_KERNEL bool light_faces(const Light& light, Vec3f P)
 
 /// Whether a flat light is seen so wide, or so much from the side, that uniform sampling of its area is noisy and uniform
 /// sampling of its solid angle worth its price (five times as many instructions): when P is nearer to its plane than its
-/// longest edge is long. Farther away the density of area samples varies by less than a factor of three.
+/// longest edge is long. Farther away the density of area samples varies by less than a factor of eight across the light.
 /// @param longest_edge_squared  m²
 RELIEF_KERNEL bool light_is_wide(const Light& light, Vec3f P, float longest_edge_squared)
 {

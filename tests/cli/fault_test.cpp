@@ -1,8 +1,6 @@
 // What goes wrong: exit codes, one-line messages, files that are whole or absent, interrupts.
 #include <fstream>
 
-#include <pty.h>
-
 #include "tests/cli/program.h"
 
 namespace relief::test {
@@ -234,9 +232,12 @@ TEST_F(FaultyUse, AReaderThatGoesAwayIsAnInterrupt)
 
 TEST_F(FaultyUse, ATerminalGetsABarAndTheBarGoesAway)
 {
-  int terminal = -1, program_side = -1;
-  ASSERT_EQ(::openpty(&terminal, &program_side, nullptr, nullptr, nullptr), 0);
-  ::fcntl(terminal, F_SETFD, FD_CLOEXEC);
+  const int terminal = ::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+  ASSERT_GE(terminal, 0);
+  ASSERT_EQ(::grantpt(terminal), 0);
+  ASSERT_EQ(::unlockpt(terminal), 0);
+  const int program_side = ::open(::ptsname(terminal), O_RDWR | O_NOCTTY | O_CLOEXEC);
+  ASSERT_GE(program_side, 0);
   Process process({"render", scene_, "-o", file("a.exr"), "--resolution", "16x16", "--spp", "64", "--frames", "5"},
                   open_file("stdout"), program_side);
   std::string text;

@@ -218,6 +218,14 @@ TEST_F(RenderProgram, ProgressIsOneJsonObjectALine)
   EXPECT_EQ(events.back()["stop_reason"], "samples");
 }
 
+TEST_F(RenderProgram, OneSampleSaysNothingAboutItsError)
+{
+  const Outcome outcome = render(write_scene(lit_square()), file("a.exr"), {"--spp", "1", "--stats", file("s.json")});
+  EXPECT_NE(outcome.errors.find("error unknown"), std::string::npos) << outcome.errors;
+  EXPECT_TRUE(outcome.events().back()["error_rmse"].is_null());
+  EXPECT_TRUE(nlohmann::json::parse(bytes_of_file(file("s.json")))["error_rmse"].is_null());
+}
+
 TEST_F(RenderProgram, APipeGetsNoBar)
 {
   const Outcome outcome = run({"render", write_scene(lit_square()), "-o", file("a.exr"), "--resolution", "16x16"});

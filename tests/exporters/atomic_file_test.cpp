@@ -67,6 +67,16 @@ TEST_F(AtomicFileTest, AFullDiskIsAnError)
   EXPECT_TRUE(std::filesystem::exists("/dev/full"));
 }
 
+TEST_F(AtomicFileTest, AFailureThatNobodyListenedToIsReportedAtTheEnd)
+{
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+  AtomicFile file("/dev/full");
+  file.write("x", 1);
+  // The seek flushes, fails, and leaves nothing in the buffer that could fail again.
+  EXPECT_THROW(file.seek(0), OutputError);
+  EXPECT_THROW(file.commit(), OutputError);
+}
+
 TEST_F(AtomicFileTest, ADeviceIsWrittenAndNotReplaced)
 {
   atomic_write("/dev/null", "x");

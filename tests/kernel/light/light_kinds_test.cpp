@@ -322,8 +322,31 @@ TEST(RectangleLight, NarrowOneIsUniformInSolidAngleAlongItsLength)
 TEST(TriangleLight, PositionsAreUniformInSolidAngle)
 {
   const Light light = flat_light(LightKind::kTriangle, {0, 0, 1}, {0, 2, 0}, {1, 0.5f, 0});
-  for (const Vec3f P : {Vec3f{0.3f, 0.6f, 0}, Vec3f{0.4f, 1, 0.97f}, Vec3f{-4, 3, 0.3f}, Vec3f{1.5f, 0, -2}}) {
+  for (const Vec3f P : {Vec3f{0.3f, 0.6f, 0}, Vec3f{0.4f, 1, 0.97f}, Vec3f{-4, 3, 0.3f}, Vec3f{1.5f, 0, -0.9f}}) {
     expect_uniform_in_solid_angle(light, P);
+  }
+}
+
+TEST_P(FlatLight, FarOneHasADensityThatVariesByLessThanEight)
+{
+  // The bound that light_is_wide states: no point farther from the plane than the longest edge is seen more unevenly.
+  Random random{17};
+  for (int k = 0; k < 2000; ++k) {
+    const Configuration c = random_configuration(GetParam(), random, true);
+    const Light& light = c.light;
+    const bool triangle = GetParam() == LightKind::kTriangle;
+    const float longest = std::sqrt(std::max({length_squared(light.edge_u), length_squared(light.edge_v),
+                                              triangle ? length_squared(light.edge_u - light.edge_v) : 0.0f}));
+    const float height = (triangle ? 1.0f : 2.0f) * longest * 1.001f;
+    const Vec3f P = c.P + light.axis * (height - dot(c.P - light.P, light.axis));
+    float least = kInfinity, most = 0;
+    for (int i = 0; i < 64; ++i) {
+      const LightSample sample = light_sample(light, P, {random.between(0, 1), random.between(0, 1)});
+      least = std::min(least, sample.pdf);
+      most = std::max(most, sample.pdf);
+    }
+    ASSERT_GT(least, 0.0f) << k;
+    EXPECT_LT(most, 8.0f * least) << k;
   }
 }
 
