@@ -44,6 +44,26 @@ int normal_map_uv_set(const Material& m)
   return m.clearcoat_normal_texture.texture_index >= 0 ? m.clearcoat_normal_texture.uv_set : -1;
 }
 
+void add_files(Scene& scene, const std::vector<TextureRequest>& requests)
+{
+  for (const TextureRequest& request : requests) {
+    if (!request.file.empty()) {
+      scene.files.push_back(request.file.string());
+    }
+  }
+}
+
+/// Reads the height maps and points the displacements at them.
+void load_height_maps(Scene& scene, const std::vector<TextureRequest>& requests, Warnings& warnings)
+{
+  HeightMapSet heights = height_maps_load(requests, warnings);
+  for (DisplacementSettings& displacement : scene.displacements) {
+    displacement.height.texture_index =
+        heights.map_of_request[static_cast<std::size_t>(displacement.height.texture_index)];
+  }
+  scene.height_maps = std::move(heights.maps);
+}
+
 }  // namespace
 
 Scene GltfLoader::load(const std::filesystem::path& path, const LoadOptions& options)
@@ -222,7 +242,7 @@ int GltfLoader::material_of(const GltfDocument& document, int material_index)
   if (owner != nullptr) {
     material = khronos_material(document, material_index, textures_, warnings_);
     name = document.core.materials[static_cast<std::size_t>(material_index)].name;
-    if (auto displacement = relief_displacement(document, material_index, textures_, warnings_)) {
+    if (auto displacement = relief_displacement(document, material_index, height_maps_, warnings_)) {
       material.displacement_index = static_cast<int>(scene_.displacements.size());
       scene_.displacements.push_back(std::move(*displacement));
     }
@@ -253,18 +273,17 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
   Warnings warnings;
   try {
     Scene scene;
-    std::vector<TextureRequest> textures;
+    std::vector<TextureRequest> textures, height_maps;
     {
       // The files go away before texels come: the two need not be in memory together.
       GltfLoader loader(warnings);
       scene = loader.load(path, options);
       textures = loader.take_textures();
+      height_maps = loader.take_height_maps();
     }
-    for (const TextureRequest& texture : textures) {
-      if (!texture.file.empty()) {
-        scene.files.push_back(texture.file.string());
-      }
-    }
+    add_files(scene, textures);
+    add_files(scene, height_maps);
+    load_height_maps(scene, height_maps, warnings);
     scene.textures = std::make_shared<const TextureStore>(std::move(textures), options.texture_budget_bytes, warnings);
     scene.features = feature_set_detect(scene);
     scene.warnings = warnings.texts();

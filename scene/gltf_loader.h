@@ -16,12 +16,16 @@ class GltfLoader {
  public:
   explicit GltfLoader(Warnings& warnings) : warnings_(warnings) {}
 
-  /// @return everything but the texture store, features and warnings
+  /// @return everything but the texture store, height maps, features and warnings; the displacements' texture indices
+  ///         are those of take_height_maps
   /// @error SceneError
   Scene load(const std::filesystem::path& path, const LoadOptions& options);
 
   /// Textures that the scene refers to, in index order.
   std::vector<TextureRequest> take_textures() { return textures_.take(); }
+
+  /// Height maps that displacements refer to, in index order.
+  std::vector<TextureRequest> take_height_maps() { return height_maps_.take(); }
 
  private:
   void place(const PlacedNode& node);
@@ -38,7 +42,7 @@ class GltfLoader {
 
   Warnings& warnings_;
   Scene scene_;
-  TextureTable textures_;
+  TextureTable textures_, height_maps_;
   Bounds world_bounds_;
   float image_aspect_ = 1;
   std::vector<Bounds> mesh_bounds_;

@@ -46,7 +46,7 @@ Vec3f half_axis(Vec3f axis, float size) { return axis * (0.5f * size); }
 TextureRef height_texture(const GltfDocument& document,
                           const JsonReader& parent,
                           std::string_view name,
-                          TextureTable& textures,
+                          TextureTable& height_maps,
                           Warnings& warnings)
 {
   if (!parent.has(name)) {
@@ -54,7 +54,7 @@ TextureRef height_texture(const GltfDocument& document,
   }
   const JsonReader info = parent.object(name);
   if (!info.has("uri")) {
-    const TextureRef ref = khronos_texture_ref(document, parent, name, TextureColor::kLinear, textures, warnings);
+    const TextureRef ref = khronos_texture_ref(document, parent, name, TextureColor::kLinear, height_maps, warnings);
     for (const char* known : {"index", "texCoord"}) {
       static_cast<void>(info.has(known));
     }
@@ -69,25 +69,26 @@ TextureRef height_texture(const GltfDocument& document,
   document.read_extension(parent.raw(name), info.path(), "KHR_texture_transform",
                           [&](const JsonReader& r) { khronos_texture_transform(ref, r, warnings); });
   const std::string uri = info.string("uri", "");
-  ref.texture_index = textures.add_file(document, uri, json_path_join(info.path(), "uri"), TextureColor::kLinear, {});
+  ref.texture_index =
+      height_maps.add_file(document, uri, json_path_join(info.path(), "uri"), TextureColor::kLinear, {});
   info.warn_unread(warnings);
   return ref;
 }
 
-DisplacementSettings read_displacement(const GltfDocument& document,
-                                       const JsonReader& r,
-                                       TextureTable& textures,
-                                       Warnings& warnings)
+/// @return empty: procedural displacement alone
+std::optional<DisplacementSettings> read_displacement(const GltfDocument& document,
+                                                      const JsonReader& r,
+                                                      TextureTable& height_maps,
+                                                      Warnings& warnings)
 {
   static constexpr std::string_view kSpaces[] = {"object", "world"};
-  static constexpr std::string_view kMethods[] = {"auto", "rmip", "tfdm", "tessellate", "microtriangle", "cone"};
   static constexpr std::string_view kSeams[] = {"keep", "weld"};
   DisplacementSettings d;
-  d.height = height_texture(document, r, "heightTexture", textures, warnings);
+  d.height = height_texture(document, r, "heightTexture", height_maps, warnings);
   d.scale = r.number_f("scale", 1);
   d.midlevel = r.number_f("midlevel", 0.5f, 0, 1);
   d.space = static_cast<DisplacementSpace>(r.choice("space", kSpaces, 0));
-  d.method = static_cast<DisplacementMethod>(r.choice("method", kMethods, 0));
+  d.method = static_cast<DisplacementMethod>(r.choice("method", kDisplacementMethodLabels, 0));
   if (r.has("lod") && !(r.raw("lod").is_string() && r.string("lod", "") == "auto")) {
     if (!r.raw("lod").is_number()) {
       r.fail("lod", "\"auto\" or a number ≥ 0");
@@ -98,24 +99,24 @@ DisplacementSettings read_displacement(const GltfDocument& document,
   d.weld_seams = r.choice("seams", kSeams, 0) == 1;
   if (r.has("procedural")) {
     static_cast<void>(r.object("procedural"));
-    d.procedural_json = r.raw("procedural").dump();
-  }
-  if (d.height.texture_index < 0 && d.procedural_json.empty()) {
-    r.fail("", "heightTexture or procedural", "neither");
+    warnings.add(r.file() + ": " + json_path_join(r.path(), "procedural") +
+                 ": procedural displacement is not supported and left out");
+  } else if (d.height.texture_index < 0) {
+    r.fail("", "a heightTexture", "none");
   }
   r.warn_unread(warnings);
-  return d;
+  return d.height.texture_index >= 0 ? std::optional(d) : std::nullopt;
 }
 
 /// The unofficial extension stores offset + factor · h along the normal; ours is scale · (h − midlevel).
 DisplacementSettings read_khr_displacement(const GltfDocument& document,
                                            const JsonReader& r,
-                                           TextureTable& textures,
+                                           TextureTable& height_maps,
                                            Warnings& warnings)
 {
   DisplacementSettings d;
   const char* name = r.has("displacementGeometryTexture") ? "displacementGeometryTexture" : "displacementTexture";
-  d.height = height_texture(document, r, name, textures, warnings);
+  d.height = height_texture(document, r, name, height_maps, warnings);
   if (d.height.texture_index < 0) {
     r.fail("displacementGeometryTexture", "a texture");
   }
@@ -286,7 +287,7 @@ ObjectSettings relief_object(const GltfDocument& document, int node_index, Objec
 
 std::optional<DisplacementSettings> relief_displacement(const GltfDocument& document,
                                                         int material_index,
-                                                        TextureTable& textures,
+                                                        TextureTable& height_maps,
                                                         Warnings& warnings)
 {
   std::optional<DisplacementSettings> out;
@@ -294,11 +295,12 @@ std::optional<DisplacementSettings> relief_displacement(const GltfDocument& docu
   const auto& material = document.element("materials", index);
   const std::string path = "/materials/" + std::to_string(index);
   const bool own = document.read_extension(material, path, "RELIEF_displacement", [&](const JsonReader& r) {
-    out = read_displacement(document, r, textures, warnings);
+    out = read_displacement(document, r, height_maps, warnings);
   });
   if (!own) {
-    document.read_extension(material, path, "KHR_materials_displacement",
-                            [&](const JsonReader& r) { out = read_khr_displacement(document, r, textures, warnings); });
+    document.read_extension(material, path, "KHR_materials_displacement", [&](const JsonReader& r) {
+      out = read_khr_displacement(document, r, height_maps, warnings);
+    });
   }
   return out;
 }

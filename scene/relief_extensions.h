@@ -42,9 +42,11 @@ ObjectSettings relief_object(const GltfDocument& document,
                              Warnings& warnings);
 
 /// RELIEF_displacement of a material, or the unofficial KHR_materials_displacement.
+/// @param height_maps  gets the height map: the settings' texture index is a request's in this table
+/// @return             empty: none, or one that is not supported (with a warning)
 std::optional<DisplacementSettings> relief_displacement(const GltfDocument& document,
                                                         int material_index,
-                                                        TextureTable& textures,
+                                                        TextureTable& height_maps,
                                                         Warnings& warnings);
 
 }  // namespace relief

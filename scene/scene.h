@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "kernel/bsdf/material.h"
@@ -12,6 +13,7 @@
 #include "kernel/light/light.h"
 #include "kernel/shape/mesh_view.h"
 #include "scene/diagnostics.h"
+#include "scene/height_map.h"
 
 namespace relief {
 
@@ -55,12 +57,27 @@ struct Environment {
 };
 
 enum class PixelFilter : std::uint8_t { kBox, kBlackmanHarris };
-enum class DisplacementMethod : std::uint8_t { kAuto, kRmip, kTfdm, kTessellate, kMicrotriangle, kCone };
+
+/// How displaced meshes are traced; the scene format and the command line know them by the labels below.
+enum class DisplacementMethod : std::uint8_t {
+  kAuto,
+  kRmip,
+  kTfdm,
+  kTessellate,
+  kMicrotriangle,
+  kCone,
+  kChord,
+  kMinmaxRmip,  ///< RMIP's traversal over a minmax mipmap, for comparison
+  kGrid         ///< tessellation into Embree's grids, for comparison
+};
+inline constexpr std::string_view kDisplacementMethodLabels[] = {
+    "auto", "rmip", "tfdm", "tessellate", "microtriangle", "cone", "chord", "rmip-minmax", "tessellate-grid"};
+
 enum class DisplacementSpace : std::uint8_t { kObject, kWorld };
 
 /// RELIEF_displacement of one material: parsed and validated; tracing it is displacement/'s work.
 struct DisplacementSettings {
-  TextureRef height;  ///< linear data; the texture index is into TextureStore
+  TextureRef height;  ///< its texture index is into Scene::height_maps; never −1
   float scale = 1;    ///< metres
   float midlevel = 0.5f;
   DisplacementSpace space = DisplacementSpace::kObject;
@@ -68,7 +85,6 @@ struct DisplacementSettings {
   float lod = -1;  ///< −1: auto
   bool smoothing = false;
   bool weld_seams = false;
-  std::string procedural_json;  ///< empty: none
 };
 
 /// RELIEF_render; the command line overrides single fields.
@@ -106,6 +122,7 @@ struct Scene {
   std::vector<Light> lights;         ///< everything but mesh triangles and the environment
   std::vector<SceneCamera> cameras;  ///< never empty: the loader adds a framing camera (and a warning) if need be
   std::vector<DisplacementSettings> displacements;
+  std::vector<HeightMap> height_maps;
   Environment environment;
   RenderSettings render;
   FeatureSet features;

@@ -1,23 +1,19 @@
-// Reading one image through OpenImageIO: files or encoded bytes, any format, brought to the few texel formats that the
+// Reading one image as a texture: any format that scene/image_reader.h opens, brought to the few texel formats that the
 // kernel knows. Used to fill mip chains, and by the tile cache to read what it needs.
 #pragma once
 
 #include <cstdint>
 #include <memory>
-#include <span>
-#include <string>
 
+#include "scene/image_reader.h"
 #include "scene/mip_chain.h"
 #include "scene/texture_store.h"
 
 namespace relief {
 
-/// An image to be read. Does not own the bytes.
-struct TextureSource {
-  std::string file;                        ///< empty when `encoded` is used
-  std::span<const unsigned char> encoded;  ///< PNG, JPEG, …; must outlive every reader
+/// An image to be read as a texture. Does not own the bytes.
+struct TextureSource : ImageSource {
   TextureColor color = TextureColor::kLinear;
-  std::string scene_file, json_path;  ///< for SceneError
 };
 
 /// What was changed to make an image's values usable.
@@ -25,10 +21,6 @@ struct TexelRepairs {
   std::int64_t num_non_finite = 0;  ///< NaN and infinities, became 0
   std::int64_t num_clamped = 0;     ///< beyond the range of half, became ±kHalfMax
 };
-
-/// Longest side and most channels of an image; beyond it a header is taken to be corrupt.
-inline constexpr int kMaxTextureSide = 65536;
-inline constexpr int kMaxImageChannels = 1024;
 
 /// An open image. The texels' meaning:
 /// - 8-bit integers stay as they are (sRGB ones marked so); other integers and floats become half, other sRGB integers
@@ -39,9 +31,7 @@ inline constexpr int kMaxImageChannels = 1024;
 /// Not for use by several threads at once.
 class TextureReader {
  public:
-  /// Opens the image and reads its header. The format is told by the first bytes; the file's extension counts only for
-  /// formats without a signature (TGA).
-  /// @error SceneError: missing, not an image, or larger than kMaxTextureSide or kMaxImageChannels
+  /// @error SceneError as of ImageReader
   explicit TextureReader(const TextureSource& source);
   ~TextureReader();
   TextureReader(const TextureReader&) = delete;

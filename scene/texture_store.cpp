@@ -1,10 +1,7 @@
 #include "scene/texture_store.h"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cstring>
-#include <exception>
 #include <new>
 #include <numeric>
 #include <optional>
@@ -13,6 +10,7 @@
 #include <unordered_map>
 
 #include "scene/mip_chain.h"
+#include "scene/parallel.h"
 #include "scene/texture_cache.h"
 #include "scene/texture_source.h"
 
@@ -36,24 +34,6 @@ struct Image {
   std::size_t cache_index = 0;
   std::optional<MipChain> chain;
 };
-
-/// Runs a task for each of n things in parallel. If several throw, the error of the first thing is the one reported,
-/// so that the message does not depend on the threads.
-template <class Task>
-void for_each_in_parallel(std::size_t n, const Task& task)
-{
-  std::vector<std::exception_ptr> errors(n);
-  tbb::parallel_for(std::size_t{0}, n, [&](std::size_t i) {
-    try {
-      task(i);
-    } catch (...) {
-      errors[i] = std::current_exception();
-    }
-  });
-  for (const std::exception_ptr& error : errors) {
-    if (error) std::rethrow_exception(error);
-  }
-}
 
 [[noreturn]] void fail_for_memory(const Image& image)
 {
@@ -181,7 +161,7 @@ class ImageGroups {
     }
     Image& image = images.emplace_back();
     image.encoded = std::move(request.encoded);
-    image.source = {file, {}, request.color, request.scene_file, request.json_path};
+    image.source = {{file, {}, request.scene_file, request.json_path}, request.color};
     image.label = request.label;
     by_key_.emplace(key, images.size() - 1);
     return images.size() - 1;

@@ -18,16 +18,16 @@ GltfBuilder full_scene()
 {
   GltfBuilder b = test::square_scene();
   json& j = b.json;
-  j["images"] = {{{"uri", test::kPixelPng}}};
+  j["images"] = {{{"uri", test::kPixelPng}}, {{"uri", test::kGreyPixelPng}}};
   j["samplers"] = {{{"wrapS", 33071}, {"wrapT", 33648}, {"magFilter", 9728}}};
-  j["textures"] = {{{"source", 0}, {"sampler", 0}}};
+  j["textures"] = {{{"source", 0}, {"sampler", 0}}, {{"source", 1}}};
   j["materials"] = {{{"name", "paint"},
                      {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"roughnessFactor", 0.5}}},
                      {"normalTexture", {{"index", 0}, {"scale", 1}}},
                      {"extensions",
                       {{"KHR_materials_ior", {{"ior", 1.4}}},
                        {"KHR_materials_volume", {{"thicknessFactor", 1}, {"attenuationDistance", 2}}},
-                       {"RELIEF_displacement", {{"heightTexture", {{"index", 0}}}, {"scale", 0.1}}}}}}};
+                       {"RELIEF_displacement", {{"heightTexture", {{"index", 1}}}, {"scale", 0.1}}}}}}};
   j["meshes"][0]["primitives"][0]["material"] = 0;
   j["cameras"] = {{{"type", "perspective"},
                    {"perspective", {{"yfov", 0.8}, {"znear", 0.1}}},

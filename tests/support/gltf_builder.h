@@ -64,6 +64,11 @@ inline constexpr std::string_view kPixelPng =
     "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJg"
     "gg==";
 
+/// A PNG of one grey pixel, 128/255.
+inline constexpr std::string_view kGreyPixelPng =
+    "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAAAAAA6fptVAAAACklEQVR42mNoAAAAggCB2kUIOwAAAA"
+    "BJRU5ErkJggg==";
+
 class GltfBuilder {
  public:
   nlohmann::json json = {{"asset", {{"version", "2.0"}}}};

@@ -1,0 +1,304 @@
+#include "scene/height_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <new>
+#include <set>
+#include <string_view>
+#include <tuple>
+#include <utility>
+
+#include "scene/image_reader.h"
+#include "scene/parallel.h"
+#include "scene/texture_store.h"
+
+namespace relief {
+namespace {
+
+/// Larger heights are taken for damage: their squares would leave single precision.
+constexpr float kHighest = 1e30f;
+
+/// Rows are read in bands: few enough to stay small beside the map, enough for whole compression blocks.
+constexpr std::size_t kBandBytes = std::size_t{64} << 20;
+constexpr int kFewestBandRows = 64, kMostBandRows = 256;
+
+std::size_t format_bytes(HeightFormat format)
+{
+  return format == HeightFormat::kU8 ? 1 : format == HeightFormat::kU16 ? 2 : 4;
+}
+
+OIIO::TypeDesc::BASETYPE oiio_type(HeightFormat format)
+{
+  return format == HeightFormat::kU8    ? OIIO::TypeDesc::UINT8
+         : format == HeightFormat::kU16 ? OIIO::TypeDesc::UINT16
+                                        : OIIO::TypeDesc::FLOAT;
+}
+
+/// What was met in an image's values.
+struct HeightFindings {
+  std::int64_t num_replaced = 0;  ///< not finite or too large
+  int first_x = 0, first_y = 0;   ///< the first replaced texel
+  std::int64_t num_coloured = 0;  ///< texels whose channels differ
+};
+
+/// One distinct image and what became of it.
+struct HeightImage {
+  ImageSource source;
+  std::string label;
+  HeightMap map;
+  HeightFindings findings;
+};
+
+/// Channels of an image that count: the one with the heights first, then those that should equal it.
+std::vector<int> height_channels(const OIIO::ImageSpec& spec)
+{
+  const int r = spec.channelindex("R"), g = spec.channelindex("G"), b = spec.channelindex("B");
+  if (r >= 0 && g >= 0 && b >= 0) {
+    return {r, g, b};
+  }
+  constexpr std::size_t kColours = 3;
+  std::vector<int> channels;
+  for (int c = 0; c < spec.nchannels && channels.size() < kColours; ++c) {
+    if (c != spec.alpha_channel) {
+      channels.push_back(c);
+    }
+  }
+  return channels.empty() ? std::vector<int>{0} : channels;
+}
+
+std::shared_ptr<void> texels_allocate(std::size_t bytes)
+{
+  constexpr std::size_t kAlignment = 64;
+  void* block = std::aligned_alloc(kAlignment, (bytes + kAlignment - 1) / kAlignment * kAlignment);
+  if (block == nullptr) {
+    throw std::bad_alloc();
+  }
+  return {block, [](void* texels) { std::free(texels); }};
+}
+
+/// Copies the first of several interleaved channels; counts the texels whose other channels differ from it.
+/// @param channels  offsets within a texel, the wanted one first
+/// @param stride    channels a texel
+template <class T>
+std::int64_t channel_copy(const T* from,
+                          std::size_t num_texels,
+                          std::span<const std::size_t> channels,
+                          std::size_t stride,
+                          T* to)
+{
+  std::int64_t num_different = 0;
+  for (std::size_t i = 0; i < num_texels; ++i, from += stride) {
+    to[i] = from[channels[0]];
+    bool differs = false;
+    for (const std::size_t c : channels.subspan(1)) {
+      // By their bits, so that equal NaN count as equal.
+      differs |= std::memcmp(&from[c], &from[channels[0]], sizeof(T)) != 0;
+    }
+    num_different += differs ? 1 : 0;
+  }
+  return num_different;
+}
+
+/// Reads an image band by band into texels of type T.
+template <class T>
+void texels_load(ImageReader& reader, HeightImage& image, T* texels)
+{
+  const std::vector<int> channels = height_channels(reader.spec());
+  const auto [low, high] = std::minmax_element(channels.begin(), channels.end());
+  const int begin = *low;
+  reader.select(begin, *high + 1, oiio_type(image.map.format));
+  std::vector<std::size_t> offsets;
+  for (const int c : channels) {
+    offsets.push_back(static_cast<std::size_t>(c - begin));
+  }
+  const auto width = static_cast<std::size_t>(image.map.width);
+  const std::size_t stride = reader.row_bytes() / (width * sizeof(T));
+  const int band = std::clamp(static_cast<int>(kBandBytes / reader.row_bytes()), kFewestBandRows, kMostBandRows);
+  for (int y = 0; y < image.map.height; y += band) {
+    const int end = std::min(y + band, image.map.height);
+    const auto num_texels = static_cast<std::size_t>(end - y) * width;
+    const auto* rows = reinterpret_cast<const T*>(reader.load_rows(y, end));
+    image.findings.num_coloured +=
+        channel_copy(rows, num_texels, offsets, stride, texels + static_cast<std::size_t>(y) * width);
+  }
+}
+
+/// Replaces what is not a height by the mean of the others.
+void texels_repair(std::span<float> texels, int width, HeightFindings& findings)
+{
+  // NaN is no height either: it fails the comparison.
+  const auto is_height = [](float h) { return std::abs(h) <= kHighest; };
+  double sum = 0;
+  for (std::size_t i = 0; i < texels.size(); ++i) {
+    if (is_height(texels[i])) {
+      sum += static_cast<double>(texels[i]);
+    } else if (findings.num_replaced++ == 0) {
+      findings.first_x = static_cast<int>(i % static_cast<std::size_t>(width));
+      findings.first_y = static_cast<int>(i / static_cast<std::size_t>(width));
+    }
+  }
+  if (findings.num_replaced == 0) {
+    return;
+  }
+  const auto num_heights = static_cast<double>(texels.size()) - static_cast<double>(findings.num_replaced);
+  const float mean = num_heights > 0 ? static_cast<float>(sum / num_heights) : 0.0f;
+  std::replace_if(
+      texels.begin(), texels.end(), [&](float h) { return !is_height(h); }, mean);
+}
+
+void image_load(HeightImage& image)
+{
+  ImageReader reader(image.source);
+  const OIIO::ImageSpec& spec = reader.spec();
+  HeightMap& map = image.map;
+  map.width = spec.width;
+  map.height = spec.height;
+  map.format = spec.format == OIIO::TypeDesc::UINT8    ? HeightFormat::kU8
+               : spec.format == OIIO::TypeDesc::UINT16 ? HeightFormat::kU16
+                                                       : HeightFormat::kFloat;
+  try {
+    const std::shared_ptr<void> texels = texels_allocate(map.bytes());
+    switch (map.format) {
+      case HeightFormat::kU8:
+        texels_load(reader, image, static_cast<std::uint8_t*>(texels.get()));
+        break;
+      case HeightFormat::kU16:
+        texels_load(reader, image, static_cast<std::uint16_t*>(texels.get()));
+        break;
+      case HeightFormat::kFloat:
+        auto* heights = static_cast<float*>(texels.get());
+        texels_load(reader, image, heights);
+        texels_repair({heights, map.bytes() / sizeof(float)}, map.width, image.findings);
+        break;
+    }
+    map.texels = texels;
+  } catch (const std::bad_alloc&) {
+    throw SceneError(image.source.scene_file, image.source.json_path, "a height map that fits into memory",
+                     std::to_string(map.width) + " x " + std::to_string(map.height) + " texels");
+  }
+}
+
+void warn(const HeightImage& image, Warnings& warnings)
+{
+  const HeightFindings& found = image.findings;
+  if (found.num_replaced > 0) {
+    warnings.add(image.label + ": " + std::to_string(found.num_replaced) +
+                 " heights were not finite or beyond 1e30 and are replaced by the mean of the others, the first at "
+                 "column " +
+                 std::to_string(found.first_x) + ", row " + std::to_string(found.first_y));
+  }
+  if (found.num_coloured > 0) {
+    warnings.add(image.label +
+                 ": a colour image as height map: its first channel is used, though the others differ in " +
+                 std::to_string(found.num_coloured) + " texels");
+  }
+}
+
+/// Finds the distinct images and maps of requests.
+class Grouping {
+ public:
+  explicit Grouping(std::span<const TextureRequest> requests)
+  {
+    for (const TextureRequest& request : requests) {
+      map_of_request.push_back(add_map(request));
+    }
+  }
+
+  std::vector<HeightImage> images;
+  std::vector<HeightMap> maps;  ///< labels and wrap modes only
+  std::vector<std::size_t> image_of_map;
+  std::vector<int> map_of_request;
+
+ private:
+  std::size_t add_image(const TextureRequest& request)
+  {
+    const std::string file =
+        request.file.empty() ? std::string() : std::filesystem::absolute(request.file).lexically_normal().string();
+    const std::string_view bytes(reinterpret_cast<const char*>(request.encoded.data()), request.encoded.size());
+    const auto [known, is_new] = image_of_.try_emplace({file, bytes}, images.size());
+    if (is_new) {
+      HeightImage& image = images.emplace_back();
+      image.source = {file, request.encoded, request.scene_file, request.json_path};
+      image.label = request.label;
+    }
+    return known->second;
+  }
+
+  int add_map(const TextureRequest& request)
+  {
+    const std::size_t image = add_image(request);
+    const auto [known, is_new] =
+        map_of_.try_emplace({image, request.wrap_u, request.wrap_v}, static_cast<int>(maps.size()));
+    if (is_new) {
+      HeightMap& map = maps.emplace_back();
+      map.label = request.label;
+      map.wrap_u = request.wrap_u;
+      map.wrap_v = request.wrap_v;
+      image_of_map.push_back(image);
+    }
+    return known->second;
+  }
+
+  std::map<std::pair<std::string, std::string_view>, std::size_t> image_of_;
+  std::map<std::tuple<std::size_t, Wrap, Wrap>, int> map_of_;
+};
+
+}  // namespace
+
+HeightMapView HeightMap::view() const { return {texels.get(), width, height, format, wrap_u, wrap_v}; }
+
+std::size_t HeightMap::bytes() const
+{
+  return static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * format_bytes(format);
+}
+
+HeightRange height_map_range(const HeightMapView& map)
+{
+  HeightRange range{height_at(map, 0), height_at(map, 0)};
+  const std::int64_t num_texels = std::int64_t{map.width} * map.height;
+  for (std::int64_t i = 1; i < num_texels; ++i) {
+    const float h = height_at(map, i);
+    range = {std::min(range.low, h), std::max(range.high, h)};
+  }
+  return range;
+}
+
+std::size_t height_map_bytes(std::span<const HeightMap> maps)
+{
+  std::set<const void*> counted;
+  std::size_t bytes = 0;
+  for (const HeightMap& map : maps) {
+    bytes += counted.insert(map.texels.get()).second ? map.bytes() : 0;
+  }
+  return bytes;
+}
+
+HeightMapSet height_maps_load(std::span<const TextureRequest> requests, Warnings& warnings)
+{
+  Grouping groups(requests);
+  for_each_in_parallel(groups.images.size(), [&](std::size_t i) { image_load(groups.images[i]); });
+  for (const HeightImage& image : groups.images) {
+    warn(image, warnings);
+  }
+  for (const TextureRequest& request : requests) {
+    if (request.filter == TexelFilter::kNearest) {
+      warnings.add(request.label + ": sampled by nearest texel as a texture, but heights are interpolated");
+    }
+  }
+  for (std::size_t m = 0; m < groups.maps.size(); ++m) {
+    const HeightMap& loaded = groups.images[groups.image_of_map[m]].map;
+    HeightMap& map = groups.maps[m];
+    map.width = loaded.width;
+    map.height = loaded.height;
+    map.format = loaded.format;
+    map.texels = loaded.texels;
+  }
+  return {std::move(groups.maps), std::move(groups.map_of_request)};
+}
+
+}  // namespace relief

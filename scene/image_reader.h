@@ -1,0 +1,68 @@
+// Opening images through OpenImageIO and reading their rows: files or encoded bytes, any format, with the checks that
+// every use of an image needs. What the values mean is up to texture_source.h (colours) and height_map.h (heights).
+#pragma once
+
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace relief {
+
+/// An image to be read. Does not own the bytes.
+struct ImageSource {
+  std::string file;                        ///< empty when `encoded` is used
+  std::span<const unsigned char> encoded;  ///< PNG, JPEG, …; must outlive every reader
+  std::string scene_file, json_path;       ///< for SceneError
+};
+
+/// Longest side and most channels of an image; beyond it a header is taken to be corrupt.
+inline constexpr int kMaxTextureSide = 65536;
+inline constexpr int kMaxImageChannels = 1024;
+
+/// An open image. Values come as the file has them: colours unassociated with alpha where the file says so, never
+/// decoded from sRGB. Not for use by several threads at once.
+class ImageReader {
+ public:
+  /// Opens the image and reads its header. The format is told by the first bytes; the file's extension counts only for
+  /// formats without a signature (TGA).
+  /// @error SceneError: missing, not an image, deep, or larger than kMaxTextureSide or kMaxImageChannels
+  explicit ImageReader(const ImageSource& source);
+
+  const OIIO::ImageSpec& spec() const { return spec_; }
+
+  /// Says what load_rows is to give; called once, before it.
+  /// @param channel_begin, channel_end  0 <= begin < end <= number of channels
+  /// @param type                        of the values; integers are scaled to it, or to 0…1 for floats
+  void select(int channel_begin, int channel_end, OIIO::TypeDesc type);
+
+  /// Bytes of one row of the selected channels.
+  std::size_t row_bytes() const;
+
+  /// Reads rows; going from top to bottom is fastest, and cheap in steps of any size.
+  /// @param begin, end  0 <= begin < end <= height
+  /// @return            rows `begin` to `end`, tightly packed, until the next call
+  /// @error             SceneError: the data is truncated or corrupt
+  const unsigned char* load_rows(int begin, int end);
+
+ private:
+  void open();
+  void check_size() const;
+  void read(int begin, int end);
+
+  ImageSource source_;
+  std::vector<unsigned char> owned_;  ///< of a JPEG file, which is read whole to look for its end
+  std::unique_ptr<OIIO::Filesystem::IOMemReader> memory_;
+  std::unique_ptr<OIIO::ImageInput> input_;
+  OIIO::ImageSpec spec_;
+  int channel_begin_ = 0, channel_end_ = 0;
+  OIIO::TypeDesc type_;
+
+  std::vector<unsigned char> rows_;  ///< rows [rows_begin_, rows_end_) of the selected channels
+  int rows_begin_ = 0, rows_end_ = 0;
+};
+
+}  // namespace relief
