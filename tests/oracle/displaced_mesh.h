@@ -1,6 +1,7 @@
 // Many displaced triangles that share a height map, for tests of closed surfaces.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -27,6 +28,7 @@ class Mesh {
 
  private:
   std::vector<Surface> surfaces_;
+  std::vector<std::array<Interval, 3>> bounds_;
 };
 
 }  // namespace relief::oracle

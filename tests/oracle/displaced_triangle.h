@@ -11,7 +11,7 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "tests/oracle/interval.h"
@@ -38,7 +38,7 @@ struct HeightMap {
 };
 
 struct Ray {
-  Vector3 O, D;              ///< D of any length but zero
+  Vector3 O, D;                 ///< D of any length but zero
   double t_min = 0, t_max = 0;  ///< closed range, in lengths of D; may be infinite
 };
 
@@ -47,9 +47,9 @@ struct Hit {
   double t = 0;                  ///< best value
   Vector2 b{};                   ///< barycentric coordinates of the corners 1 and 2
   Vector2 uv{};
-  Vector3 P{};                   ///< S(b)
-  Vector3 Ng{};                  ///< unit normal of S, on the side of N wherever the displacement does not fold the surface over
-  bool certain = false;          ///< false: a root may or may not exist (tangent, on a triangle's edge or a limit of t, …)
+  Vector3 P{};   ///< S(b)
+  Vector3 Ng{};  ///< unit normal of S, on the side of N wherever the displacement does not fold the surface over
+  bool certain = false;  ///< false: a root may or may not exist (tangent, on a triangle's edge or a limit of t, …)
 };
 
 /// A point of the surface, evaluated without bounds.
@@ -68,6 +68,8 @@ double height_eval(const HeightMap& map, const Vector2& uv);
 /// @return     not finite where N(b) = 0: such points are not part of the surface
 SurfacePoint surface_eval(const DisplacedTriangle& triangle, const HeightMap& map, const Vector2& b);
 
+struct PreparedSurface;
+
 /// A displaced triangle prepared for many rays: a tree of parameter rectangles with boxes around their part of S.
 class Surface {
  public:
@@ -80,56 +82,11 @@ class Surface {
   ///          bracket of an uncertain one. A root on a texel's border is found once.
   std::vector<Hit> intersect_all(const Ray& ray) const;
 
-  /// Box around S, rounded outward: lower and upper corner.
-  const std::array<Interval, 3>& bounds() const { return bounds_; }
+  /// Box around S, rounded outward.
+  std::array<Interval, 3> bounds() const;
 
  private:
-  class Solver;
-
-  /// A function linear in the two parameters.
-  struct Linear {
-    Interval c{0, 0}, p{0, 0}, q{0, 0};
-  };
-  struct Rectangle {
-    Interval p{0, 0}, q{0, 0};
-  };
-  /// S relative to corner 0, and its derivatives; of a number type: double at a point, Interval over a rectangle.
-  template <typename T>
-  struct Patch {
-    std::array<T, 3> S{}, S_p{}, S_q{};
-    bool has_derivatives = false;  ///< false where N may be zero or the rectangle covers too many texels
-  };
-  struct Node {
-    Rectangle domain;
-    std::array<Interval, 3> box{};    ///< around S relative to corner 0
-    std::int32_t first_child = -1;    ///< the second follows it; −1: leaf
-    Patch<Interval> center, patch{};  ///< leaves of one texel: S at the domain's centre, derivatives over all of it
-  };
-
-  template <typename T>
-  T value(const Linear& f, T p, T q) const;
-  std::array<Interval, 3> barycentric(const Rectangle& domain) const;
-  bool is_outside_triangle(const Rectangle& domain) const;
-  Rectangle texels(const Rectangle& domain) const;
-  std::int64_t num_cells(const Rectangle& domain) const;
-  bool split(const Rectangle& domain, Rectangle& first, Rectangle& second) const;
-  double texel(std::int64_t x, std::int64_t y) const;
-  Interval height_range(const Rectangle& texels) const;
-  template <typename T>
-  void height(const T& x, const T& y, T& h, T& h_x, T& h_y) const;
-  template <typename T>
-  Patch<T> evaluate(T p, T q, bool with_derivatives) const;
-  void build(std::int32_t index, int depth);
-
-  DisplacedTriangle triangle_;
-  const HeightMap* map_;
-  Interval map_range_{0, 0};
-  bool parameters_are_texels_ = false;   ///< else they are b1 and b2
-  std::int64_t origin_x_ = 0, origin_y_ = 0;  ///< texel coordinates below are relative to this texel
-  std::array<Linear, 3> b_{}, P_{}, N_{};
-  Linear x_, y_;
-  std::vector<Node> nodes_;
-  std::array<Interval, 3> bounds_{};
+  std::shared_ptr<const PreparedSurface> prepared_;
 };
 
 /// As Surface, for a single ray.

@@ -29,7 +29,10 @@ struct Interval {
   bool overlaps(const Interval& other) const { return low <= other.high && other.low <= high; }
 };
 
-inline Interval hull(const Interval& a, const Interval& b) { return {std::min(a.low, b.low), std::max(a.high, b.high)}; }
+inline Interval hull(const Interval& a, const Interval& b)
+{
+  return {std::min(a.low, b.low), std::max(a.high, b.high)};
+}
 /// @pre  a.overlaps(b)
 inline Interval intersection(const Interval& a, const Interval& b)
 {
