@@ -1,0 +1,183 @@
+#include "displacement/displaced_mesh.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+
+#include "kernel/math/rounding.h"
+
+namespace relief {
+
+namespace {
+
+/// |N| this many times smaller than at a vertex is taken no smaller: around a point where N vanishes there is no surface.
+constexpr double kLeastNormal = 1e-3;
+
+/// Least distance of the triangle abc from the origin.
+/// @source Ericson 2005, "Real-Time Collision Detection", §5.1.5, for the origin
+double distance_to_origin(Vec3d a, Vec3d b, Vec3d c)
+{
+  const auto segment = [](Vec3d p, Vec3d q) {
+    const Vec3d pq = q - p;
+    const double squared = dot(pq, pq);
+    const double u = squared > 0 ? std::clamp(-dot(p, pq) / squared, 0.0, 1.0) : 0.0;
+    return length(p + u * pq);
+  };
+  const double edges = std::min({segment(a, b), segment(b, c), segment(c, a)});
+  const Vec3d n = cross(b - a, c - a);
+  const double squared = dot(n, n);
+  if (!(squared > 0)) return edges;
+  // Is the origin's projection inside?
+  const Vec3d foot = n * (dot(a, n) / squared);
+  const bool inside =
+      dot(cross(b - a, foot - a), n) >= 0 && dot(cross(c - b, foot - b), n) >= 0 && dot(cross(a - c, foot - c), n) >= 0;
+  return inside ? std::min(edges, length(foot)) : edges;
+}
+
+float round_down(double x)
+{
+  const auto f = static_cast<float>(x);
+  return std::nextafter(f, -kInfinity);
+}
+float round_up(double x)
+{
+  const auto f = static_cast<float>(x);
+  return std::nextafter(f, kInfinity);
+}
+
+/// Whether det(∂/∂b1, ∂/∂b2, ∂/∂s) of P + sN keeps its sign over the prism: it is linear in b and quadratic in s, so its
+/// Bernstein coefficients at the three vertices bound it.
+bool is_unfolded(const DisplacedTriangle& tri)
+{
+  const Vec3d Pu = to_double(tri.P[1]) - to_double(tri.P[0]), Pv = to_double(tri.P[2]) - to_double(tri.P[0]);
+  const Vec3d Nu = to_double(tri.N[1]) - to_double(tri.N[0]), Nv = to_double(tri.N[2]) - to_double(tri.N[0]);
+  const double s0 = tri.s_min, s1 = tri.s_max;
+  // At s0, at both (blossom) and at s1.
+  const Vec3d c0 = cross(Pu + s0 * Nu, Pv + s0 * Nv), c2 = cross(Pu + s1 * Nu, Pv + s1 * Nv);
+  const Vec3d c1 = 0.5 * (cross(Pu + s0 * Nu, Pv + s1 * Nv) + cross(Pu + s1 * Nu, Pv + s0 * Nv));
+  bool positive = true, negative = true;
+  for (const Vec3f& n : tri.N) {
+    for (const Vec3d& c : {c0, c1, c2}) {
+      const double det = dot(c, to_double(n));
+      const double margin = 1e-9 * length(c) * length(to_double(n));
+      positive &= det > margin;
+      negative &= det < -margin;
+    }
+  }
+  return positive || negative;
+}
+
+/// Subtracts whole periods, so that digits are left for fractions of a texel where uv are large.
+void rebase(double* x, const LatticeAxis& axis)
+{
+  if (axis.wrap == Wrap::kClamp) return;
+  const double least = std::min({x[0], x[1], x[2]});
+  const double periods = std::floor(least / axis.num_cells) * axis.num_cells;
+  for (int k = 0; k < 3; ++k) x[k] -= periods;
+}
+
+}  // namespace
+
+DisplacedMesh::DisplacedMesh(const MeshView& mesh, const HeightFieldView& field, const DisplacementMapping& mapping)
+    : triangles_(mesh.num_triangles), unfolded_(mesh.num_triangles), field_(&field), mapping_(mapping)
+{
+  std::atomic<std::uint32_t> num_folded{0}, num_short{0}, num_degenerate{0};
+  const TextureRef& m = mapping.height;
+  const Vec2f* uv = mesh.uv[m.uv_set];
+  tbb::parallel_for(std::uint32_t{0}, mesh.num_triangles, [&](std::uint32_t index) {
+    DisplacedTriangle& tri = triangles_[index];
+    const TriangleIndices& v = mesh.triangles[index];
+    const std::uint32_t vertices[3] = {v.v0, v.v1, v.v2};
+    for (int k = 0; k < 3; ++k) tri.P[k] = mesh.P[vertices[k]];
+    const Vec3d facet = cross(to_double(tri.P[1]) - to_double(tri.P[0]), to_double(tri.P[2]) - to_double(tri.P[0]));
+    const double area = length(facet);
+    for (int k = 0; k < 3; ++k) {
+      if (mesh.N != nullptr) {
+        tri.N[k] = as_vector(mesh.N[vertices[k]]);
+      } else {
+        tri.N[k] = area > 0 ? to_float(facet * (1.0 / area)) : Vec3f{0, 0, 0};
+      }
+      const Vec2f t = uv != nullptr ? uv[vertices[k]] : Vec2f{};
+      const double u = static_cast<double>(m.m00) * t.x + static_cast<double>(m.m01) * t.y + m.m02;
+      const double w = static_cast<double>(m.m10) * t.x + static_cast<double>(m.m11) * t.y + m.m12;
+      tri.x[k] = u * field.map.width - 0.5;
+      tri.y[k] = w * field.map.height - 0.5;
+    }
+    rebase(tri.x, field.x);
+    rebase(tri.y, field.y);
+
+    const auto cell = [](double x) { return static_cast<std::int64_t>(std::floor(x)); };
+    const auto [x_low, x_high] = std::minmax({tri.x[0], tri.x[1], tri.x[2]});
+    const auto [y_low, y_high] = std::minmax({tri.y[0], tri.y[1], tri.y[2]});
+    const StoredRange stored =
+        height_field_range(field, cell(x_low - 1e-6), cell(y_low - 1e-6), cell(x_high + 1e-6), cell(y_high + 1e-6));
+    double h_low, h_high;
+    stored_to_heights(field, stored, &h_low, &h_high);
+    double d_low = mapping.scale * (h_low - mapping.midlevel), d_high = mapping.scale * (h_high - mapping.midlevel);
+    if (d_low > d_high) std::swap(d_low, d_high);
+
+    const double longest =
+        std::max({length(to_double(tri.N[0])), length(to_double(tri.N[1])), length(to_double(tri.N[2]))});
+    const double shortest =
+        distance_to_origin(to_double(tri.N[0]), to_double(tri.N[1]), to_double(tri.N[2])) * (1 - 1e-9);
+    if (!(longest > 0)) {
+      num_degenerate.fetch_add(1, std::memory_order_relaxed);
+      tri.s_min = 1;
+      tri.s_max = 0;
+      return;
+    }
+    if (shortest < kLeastNormal * longest) num_short.fetch_add(1, std::memory_order_relaxed);
+    const double least = std::max(shortest, kLeastNormal * longest);
+    tri.s_min = round_down(std::min(d_low / least, d_low / longest));
+    tri.s_max = round_up(std::max(d_high / least, d_high / longest));
+    unfolded_[index] = is_unfolded(tri) ? 1 : 0;
+    if (unfolded_[index] == 0) num_folded.fetch_add(1, std::memory_order_relaxed);
+  });
+  report_ = {num_folded.load(), num_short.load(), num_degenerate.load()};
+}
+
+DisplacedMeshView DisplacedMesh::view() const
+{
+  return {triangles_.data(), unfolded_.data(), static_cast<std::uint32_t>(triangles_.size()), field_,
+          mapping_.scale,    mapping_.midlevel};
+}
+
+Box3f displaced_triangle_bounds(const DisplacedMeshView& mesh, std::uint32_t triangle)
+{
+  const DisplacedTriangle& tri = mesh.triangles[triangle];
+  if (tri.s_min > tri.s_max) {
+    const Vec3f P = tri.P[0];
+    return {P, P};
+  }
+  const auto bounds = [&](float Vec3f::*axis, float* low, float* high) {
+    double prism_low = kInfinity, prism_high = -kInfinity, magnitude = 0;
+    double base_low = kInfinity, base_high = -kInfinity, longest = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double p = tri.P[k].*axis, n = tri.N[k].*axis;
+      for (const double s : {static_cast<double>(tri.s_min), static_cast<double>(tri.s_max)}) {
+        prism_low = std::min(prism_low, p + s * n);
+        prism_high = std::max(prism_high, p + s * n);
+        magnitude = std::max(magnitude, std::abs(p) + std::abs(s * n));
+      }
+      base_low = std::min(base_low, p);
+      base_high = std::max(base_high, p);
+      longest = std::max(longest, length(to_double(tri.N[k])));
+    }
+    // |d| = |s|·|N| is at most this, in any direction.
+    const double reach =
+        std::max(std::abs(static_cast<double>(tri.s_min)), std::abs(static_cast<double>(tri.s_max))) * longest;
+    // Embree tests boxes in floats; a few of their ulps keep grazing rays.
+    const double pad = 4.0 * static_cast<double>(kUnitRoundoff) * magnitude;
+    *low = round_down(std::max(prism_low, base_low - reach) - pad);
+    *high = round_up(std::min(prism_high, base_high + reach) + pad);
+  };
+  Box3f box;
+  bounds(&Vec3f::x, &box.low.x, &box.high.x);
+  bounds(&Vec3f::y, &box.low.y, &box.high.y);
+  bounds(&Vec3f::z, &box.low.z, &box.high.z);
+  return box;
+}
+
+}  // namespace relief

@@ -1,0 +1,54 @@
+// A mesh whose triangles are displaced by a height field: what is prepared once, per mesh and per change of scale.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "displacement/displaced_triangle.h"
+#include "kernel/shape/mesh_view.h"
+
+namespace relief {
+
+/// How a mesh is displaced by a map.
+struct DisplacementMapping {
+  TextureRef height;  ///< uv set and texture transform; the texture index is not used
+  double scale = 1;   ///< metres of object space
+  double midlevel = 0.5;
+};
+
+/// What was met while triangles were prepared.
+struct DisplacedMeshReport {
+  std::uint32_t num_folded = 0;         ///< prisms in which the displacement lines may cross
+  std::uint32_t num_short_normals = 0;  ///< |N| falls below a thousandth of its largest value
+  std::uint32_t num_degenerate = 0;     ///< no area: nothing of them is ever hit
+};
+
+/// Box of a displaced triangle, object space, rounded outward.
+struct Box3f {
+  Vec3f low, high;
+};
+
+class DisplacedMesh {
+ public:
+  DisplacedMesh() = default;
+  /// @param mesh   without normals its triangles move along their own; without the uv set all of it is at uv (0, 0)
+  /// @param field  must outlive the mesh
+  /// @cost  129 bytes a triangle; parallel over triangles
+  DisplacedMesh(const MeshView& mesh, const HeightFieldView& field, const DisplacementMapping& mapping);
+
+  DisplacedMeshView view() const;
+  const DisplacedMeshReport& report() const { return report_; }
+  std::size_t bytes() const { return triangles_.size() * (sizeof(DisplacedTriangle) + 1); }
+
+ private:
+  std::vector<DisplacedTriangle> triangles_;
+  std::vector<std::uint8_t> unfolded_;
+  const HeightFieldView* field_ = nullptr;
+  DisplacementMapping mapping_;
+  DisplacedMeshReport report_;
+};
+
+/// Box around P + s·N for all of a triangle's prism, and at most as far from the base triangle as its displacement.
+Box3f displaced_triangle_bounds(const DisplacedMeshView& mesh, std::uint32_t triangle);
+
+}  // namespace relief

@@ -1,0 +1,223 @@
+#include "displacement/height_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
+
+namespace relief {
+
+namespace {
+
+constexpr StoredRange kEmpty{65535, 0};
+
+StoredRange merge(StoredRange a, StoredRange b) { return {std::min(a.low, b.low), std::max(a.high, b.high)}; }
+
+LatticeAxis lattice_axis(int num_texels, Wrap wrap)
+{
+  switch (wrap) {
+    case Wrap::kRepeat:
+      return {num_texels, wrap, num_texels, 0};
+    case Wrap::kMirror:
+      return {num_texels, wrap, 2 * num_texels, 0};
+    case Wrap::kClamp:
+      break;
+  }
+  return {num_texels, wrap, num_texels + 1, -1};
+}
+
+/// Bounds of one texel's height in stored units.
+StoredRange texel_range(const HeightFieldView& f, std::int64_t at)
+{
+  switch (f.map.format) {
+    case HeightFormat::kU8: {
+      const auto q = static_cast<std::uint16_t>(static_cast<const std::uint8_t*>(f.map.texels)[at] * 257);
+      return {q, q};
+    }
+    case HeightFormat::kU16: {
+      const std::uint16_t q = static_cast<const std::uint16_t*>(f.map.texels)[at];
+      return {q, q};
+    }
+    case HeightFormat::kFloat:
+      break;
+  }
+  const double q = (static_cast<const float*>(f.map.texels)[at] - f.h_offset) / f.h_step;
+  // The quotient is off by less than 2^-30 of a unit.
+  return {static_cast<std::uint16_t>(std::clamp(std::floor(q - 0x1p-30), 0.0, 65535.0)),
+          static_cast<std::uint16_t>(std::clamp(std::ceil(q + 0x1p-30), 0.0, 65535.0))};
+}
+
+StoredRange texel_range_at(const HeightFieldView& f, std::int64_t i, std::int64_t j)
+{
+  return texel_range(f, static_cast<std::int64_t>(lattice_texel(f.y, j)) * f.map.width + lattice_texel(f.x, i));
+}
+
+/// Least and greatest float of a map.
+std::pair<float, float> float_extremes(const float* texels, std::size_t count)
+{
+  using Extremes = std::pair<float, float>;
+  constexpr float kHuge = std::numeric_limits<float>::infinity();
+  return tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, count, 1 << 16), Extremes{kHuge, -kHuge},
+      [&](const tbb::blocked_range<std::size_t>& range, Extremes e) {
+        for (std::size_t k = range.begin(); k < range.end(); ++k) {
+          e = {std::min(e.first, texels[k]), std::max(e.second, texels[k])};
+        }
+        return e;
+      },
+      [](Extremes a, Extremes b) {
+        return Extremes{std::min(a.first, b.first), std::max(a.second, b.second)};
+      });
+}
+
+/// Bounds of 4 × 4 cells: of 5 × 5 texels, as bilinear interpolation stays between its corners.
+StoredRange block_range(const HeightFieldView& f, int column, int row)
+{
+  StoredRange range = kEmpty;
+  const int last_row = std::min(row + 4, f.y.num_cells), last_column = std::min(column + 4, f.x.num_cells);
+  for (int j = row; j <= last_row; ++j) {
+    const std::int64_t row_start = static_cast<std::int64_t>(lattice_texel(f.y, f.y.first_cell + j)) * f.map.width;
+    for (int i = column; i <= last_column; ++i) {
+      range = merge(range, texel_range(f, row_start + lattice_texel(f.x, f.x.first_cell + i)));
+    }
+  }
+  return range;
+}
+
+StoredRange line_range(const PyramidLine& line)
+{
+  return {*std::min_element(line.low, line.low + 16), *std::max_element(line.high, line.high + 16)};
+}
+
+int divide_up(int a, int b) { return (a + b - 1) / b; }
+
+/// Bounds of a rectangle of cells within one period, all inclusive, in pyramid columns and rows.
+StoredRange range_in_period(const HeightFieldView& f, int level, int column, int row, int i0, int j0, int i1, int j1)
+{
+  StoredRange range = kEmpty;
+  const int size = 1 << (2 * level);  // of a child; the node (column, row) has 4 × 4
+  for (int child = 0; child < 16; ++child) {
+    const int i = column + (child & 3) * size, j = row + (child >> 2) * size;
+    const int i_end = std::min(i + size, f.x.num_cells) - 1, j_end = std::min(j + size, f.y.num_cells) - 1;
+    if (i > i1 || j > j1 || i_end < i0 || j_end < j0) continue;
+    if (level == 0) {
+      for (int corner = 0; corner < 4; ++corner) {
+        range = merge(range, texel_range_at(f, f.x.first_cell + i + (corner & 1), f.y.first_cell + j + (corner >> 1)));
+      }
+    } else if (i >= i0 && j >= j0 && i_end <= i1 && j_end <= j1) {
+      const int parent = 2 * (level + 1);
+      const PyramidLine& line =
+          f.lines[level - 1][static_cast<std::ptrdiff_t>(j >> parent) * f.line_columns[level - 1] + (i >> parent)];
+      range = merge(range, {line.low[child], line.high[child]});
+    } else {
+      range = merge(range, range_in_period(f, level - 1, i, j, i0, j0, i1, j1));
+    }
+  }
+  return range;
+}
+
+/// Parts of [first, last] within single periods, in pyramid columns: at most two, or all of it once.
+int split_by_period(const LatticeAxis& axis, std::int64_t first, std::int64_t last, int (*parts)[2])
+{
+  const int n = axis.num_cells;
+  if (axis.wrap == Wrap::kClamp) {
+    parts[0][0] = static_cast<int>(std::clamp<std::int64_t>(first - axis.first_cell, 0, n - 1));
+    parts[0][1] = static_cast<int>(std::clamp<std::int64_t>(last - axis.first_cell, 0, n - 1));
+    return 1;
+  }
+  if (last - first + 1 >= n) {
+    parts[0][0] = 0;
+    parts[0][1] = n - 1;
+    return 1;
+  }
+  const int a = lattice_modulo(first, n), b = lattice_modulo(last, n);
+  if (a <= b) {
+    parts[0][0] = a;
+    parts[0][1] = b;
+    return 1;
+  }
+  parts[0][0] = a;
+  parts[0][1] = n - 1;
+  parts[1][0] = 0;
+  parts[1][1] = b;
+  return 2;
+}
+
+}  // namespace
+
+HeightField::HeightField(const HeightMapView& map)
+{
+  HeightFieldView& f = view_;
+  f.map = map;
+  f.x = lattice_axis(map.width, map.wrap_u);
+  f.y = lattice_axis(map.height, map.wrap_v);
+  f.h_step = 1.0 / 65535.0;
+  if (map.format == HeightFormat::kFloat) {
+    const auto count = static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height);
+    const auto [low, high] = float_extremes(static_cast<const float*>(map.texels), count);
+    f.h_offset = low;
+    f.h_step = high > low ? (static_cast<double>(high) - low) / 65535.0 : 1.0;
+  }
+
+  int columns = divide_up(f.x.num_cells, 4), rows = divide_up(f.y.num_cells, 4);  // nodes of the level below the lines
+  for (int level = 0;; ++level) {
+    const int line_columns = divide_up(columns, 4), line_rows = divide_up(rows, 4);
+    std::vector<PyramidLine> lines(static_cast<std::size_t>(line_columns) * static_cast<std::size_t>(line_rows));
+    const PyramidLine* below = level == 0 ? nullptr : f.lines[level - 1];
+    const int below_columns = level == 0 ? 0 : f.line_columns[level - 1];
+    tbb::parallel_for(0, line_rows, [&](int line_row) {
+      for (int line_column = 0; line_column < line_columns; ++line_column) {
+        PyramidLine& line = lines[static_cast<std::size_t>(line_row) * static_cast<std::size_t>(line_columns) +
+                                  static_cast<std::size_t>(line_column)];
+        for (int child = 0; child < 16; ++child) {
+          const int column = 4 * line_column + (child & 3), row = 4 * line_row + (child >> 2);
+          StoredRange range = kEmpty;
+          if (column < columns && row < rows) {
+            range = level == 0 ? block_range(f, 4 * column, 4 * row)
+                               : line_range(below[static_cast<std::ptrdiff_t>(row) * below_columns + column]);
+          }
+          line.low[child] = range.low;
+          line.high[child] = range.high;
+        }
+      }
+    });
+    levels_.push_back(std::move(lines));
+    f.lines[level] = levels_.back().data();
+    f.line_columns[level] = line_columns;
+    f.num_levels = level + 1;
+    if (line_columns == 1 && line_rows == 1) break;
+    columns = line_columns;
+    rows = line_rows;
+  }
+  f.range = line_range(levels_.back()[0]);
+}
+
+std::size_t HeightField::bytes() const
+{
+  std::size_t sum = 0;
+  for (const auto& level : levels_) sum += level.size() * sizeof(PyramidLine);
+  return sum;
+}
+
+StoredRange height_field_range(const HeightFieldView& f,
+                               std::int64_t i0,
+                               std::int64_t j0,
+                               std::int64_t i1,
+                               std::int64_t j1)
+{
+  int columns[2][2], rows[2][2];
+  const int num_columns = split_by_period(f.x, i0, i1, columns), num_rows = split_by_period(f.y, j0, j1, rows);
+  StoredRange range = kEmpty;
+  for (int a = 0; a < num_columns; ++a) {
+    for (int b = 0; b < num_rows; ++b) {
+      range =
+          merge(range, range_in_period(f, f.num_levels, 0, 0, columns[a][0], rows[b][0], columns[a][1], rows[b][1]));
+    }
+  }
+  return range;
+}
+
+}  // namespace relief

@@ -1,0 +1,76 @@
+// Eight floats side by side, by the compiler's vector types: one AVX2 register, or two SSE registers in the baseline.
+#pragma once
+
+#include <cstdint>
+
+#include <immintrin.h>
+
+#include "kernel/kernel.h"
+
+namespace relief {
+
+using F8 [[gnu::vector_size(32)]] = float;
+using I8 [[gnu::vector_size(32)]] = std::int32_t;
+
+// Vectors go in and out by inlining only; how they would be passed otherwise differs between instruction sets.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpsabi"
+
+RELIEF_KERNEL F8 splat8(float x) { return F8{x, x, x, x, x, x, x, x}; }
+RELIEF_KERNEL F8 min(F8 a, F8 b) { return a < b ? a : b; }
+RELIEF_KERNEL F8 max(F8 a, F8 b) { return a > b ? a : b; }
+RELIEF_KERNEL F8 abs(F8 a)
+{
+  I8 bits;
+  __builtin_memcpy(&bits, &a, sizeof bits);
+  bits &= 0x7fffffff;
+  __builtin_memcpy(&a, &bits, sizeof a);
+  return a;
+}
+RELIEF_KERNEL F8 sqrt(F8 a)
+{
+  for (int k = 0; k < 8; ++k) a[k] = __builtin_sqrtf(a[k]);
+  return a;
+}
+/// Bit k is set where lane k of a comparison is true.
+RELIEF_KERNEL unsigned mask_of(I8 m)
+{
+#ifdef __AVX__
+  return static_cast<unsigned>(_mm256_movemask_ps(__builtin_bit_cast(__m256, m)));
+#else
+  __m128 half[2];
+  __builtin_memcpy(half, &m, sizeof half);
+  return static_cast<unsigned>(_mm_movemask_ps(half[0]) | _mm_movemask_ps(half[1]) << 4);
+#endif
+}
+
+RELIEF_KERNEL F8 load8(const float* from)
+{
+  F8 lanes;
+  __builtin_memcpy(&lanes, from, sizeof lanes);
+  return lanes;
+}
+RELIEF_KERNEL F8 load8(const std::uint16_t* from)
+{
+  using U16 [[gnu::vector_size(16)]] = std::uint16_t;
+  U16 lanes;
+  __builtin_memcpy(&lanes, from, sizeof lanes);
+  return __builtin_convertvector(lanes, F8);
+}
+RELIEF_KERNEL F8 load8(const std::uint8_t* from)
+{
+  using U8 [[gnu::vector_size(8)]] = std::uint8_t;
+  U8 lanes;
+  __builtin_memcpy(&lanes, from, sizeof lanes);
+  return __builtin_convertvector(lanes, F8);
+}
+RELIEF_KERNEL void store8(float* to, F8 lanes) { __builtin_memcpy(to, &lanes, sizeof lanes); }
+
+/// Lane k of the result is lane k + 1; the last is lane 7.
+RELIEF_KERNEL F8 shift_down(F8 a) { return __builtin_shufflevector(a, a, 1, 2, 3, 4, 5, 6, 7, 7); }
+/// Lanes 0…3 of a, then lanes 0…3 of b.
+RELIEF_KERNEL F8 join_low_halves(F8 a, F8 b) { return __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11); }
+
+#pragma GCC diagnostic pop
+
+}  // namespace relief

@@ -1,0 +1,234 @@
+// The leaf test that all methods end in: the first point where a ray's curve meets the bilinear patch of one cell.
+//
+// Along the curve the question is one-dimensional: g(τ) = s·|N| − d, the height of the ray over the surface, measured
+// along the displacement direction. Its roots are isolated by what g can deviate from a straight line over an interval
+// (`curve_deviation`, proven), so that none is lost, then closed in on by bracketing.
+#pragma once
+
+#include "displacement/ray_curve.h"
+
+namespace relief {
+
+/// Where a ray meets a displaced triangle.
+struct DisplacedHit {
+  double t = 0;
+  double b1 = 0, b2 = 0;      ///< barycentric weights of vertices 1 and 2, in [0, 1] up to rounding
+  std::int64_t i = 0, j = 0;  ///< cell; its patch has the hit's normal
+  double tau = 0;             ///< on its segment
+};
+
+/// What one ray counts; the same for all methods, so that they can be compared.
+struct TraversalCounters {
+  std::uint32_t bounds = 0;      ///< 2D or 3D bounds tested, children of pyramid nodes one by one
+  std::uint32_t texels = 0;      ///< cells tested by the leaf
+  std::uint32_t inversions = 0;  ///< iterations of point-wise inversion
+  std::uint32_t prisms = 0;      ///< triangles whose prism the ray enters
+};
+
+/// A point of the curve.
+struct CurvePoint {
+  double tau = 0;
+  double b1 = 0, b2 = 0, W = 1;
+  double x = 0, y = 0;  ///< lattice coordinates
+  Vec3d N;
+  double s = 0, nu = 1;  ///< nu = |N|
+};
+
+RELIEF_KERNEL CurvePoint curve_point(const DisplacedTriangle& tri, const CurveSegment& g, double tau)
+{
+  CurvePoint p;
+  p.tau = tau;
+  const double e0 = quadratic_at(g.e[0], tau), e1 = quadratic_at(g.e[1], tau), e2 = quadratic_at(g.e[2], tau);
+  p.W = e0 + e1 + e2;
+  const double inverse = 1.0 / p.W;
+  const double b0 = e0 * inverse;
+  p.b1 = e1 * inverse;
+  p.b2 = e2 * inverse;
+  p.x = b0 * tri.x[0] + p.b1 * tri.x[1] + p.b2 * tri.x[2];
+  p.y = b0 * tri.y[0] + p.b1 * tri.y[1] + p.b2 * tri.y[2];
+  p.N = b0 * to_double(tri.N[0]) + p.b1 * to_double(tri.N[1]) + p.b2 * to_double(tri.N[2]);
+  p.s = g.s0 + tau * g.ds;
+  p.nu = length(p.N);
+  return p;
+}
+
+/// How far a curve can be from the straight line between two of its points, at equal τ.
+struct CurveDeviation {
+  double x = 0, y = 0;  ///< lattice units
+  double height = 0;    ///< of s·|N|, metres
+};
+
+/// A rational quadratic minus its linear interpolant over [0, 1] is u(1 − u)(α + βu)/W(u), so a quarter of the larger of
+/// |α|, |α + β| over the least W bounds it: exact in b, hence in x, y and N. The length of N along the line is convex and
+/// its second derivative below |ΔN|²/|N|; the product with s adds a quarter of |Δs·Δ|N||.
+/// @param a, b  the ends, a.tau < b.tau
+/// @return      infinite height where the bound breaks down (|N| may vanish in between)
+RELIEF_KERNEL CurveDeviation curve_deviation(const DisplacedTriangle& tri,
+                                             const CurveSegment& g,
+                                             const CurvePoint& a,
+                                             const CurvePoint& b)
+{
+  const double step = b.tau - a.tau;
+  const Quadratic W = quadratic_shift(g.W, a.tau, step);
+  const double quarter_over_W = 0.25 / quadratic_minimum(W);
+  const auto deviation = [&](const Quadratic& e, double from, double to) {
+    const Quadratic p = quadratic_shift(e, a.tau, step);
+    const double slope = to - from;
+    const double alpha = p.b - from * W.b - slope * W.c, beta = slope * W.a;
+    return quarter_over_W * __builtin_fmax(__builtin_fabs(alpha), __builtin_fabs(alpha + beta));
+  };
+  const double b1 = deviation(g.e[1], a.b1, b.b1), b2 = deviation(g.e[2], a.b2, b.b2);
+  CurveDeviation d;
+  d.x = b1 * __builtin_fabs(tri.x[1] - tri.x[0]) + b2 * __builtin_fabs(tri.x[2] - tri.x[0]);
+  d.y = b1 * __builtin_fabs(tri.y[1] - tri.y[0]) + b2 * __builtin_fabs(tri.y[2] - tri.y[0]);
+  const Vec3d N0 = to_double(tri.N[0]);
+  const double N = b1 * length(to_double(tri.N[1]) - N0) + b2 * length(to_double(tri.N[2]) - N0);
+  const double turn = length(b.N - a.N);
+  const double least = 0.5 * (a.nu + b.nu - turn) - N;
+  if (!(least > 0.0)) {
+    d.height = __builtin_huge_val();
+    return d;
+  }
+  const double s = __builtin_fmax(__builtin_fabs(a.s), __builtin_fabs(b.s));
+  d.height = s * (turn * turn / (8.0 * least) + N) + 0.25 * __builtin_fabs((b.s - a.s) * (b.nu - a.nu));
+  return d;
+}
+
+/// A root must lie this close to its cell (lattice units): far more than its rounding error, far less than a texel.
+inline constexpr double kCellTolerance = 1e-9;
+
+/// First root of g in a cell.
+/// @param i, j        the cell, lattice coordinates
+/// @param tau0, tau1  contains every τ at which the curve is in the cell; 0 <= tau0 <= tau1 <= 1
+/// @param hit         t, b, cell of the first root whose t is within (t_min, t_max)
+/// @return            false if there is none
+RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
+                                  const DisplacedTriangle& tri,
+                                  const RayCurve& curve,
+                                  const CurveSegment& g,
+                                  std::int64_t i,
+                                  std::int64_t j,
+                                  double tau0,
+                                  double tau1,
+                                  double t_min,
+                                  double t_max,
+                                  DisplacedHit* hit)
+{
+  const CellHeights cell = cell_heights(*mesh.field, i, j);
+  // Unbounded cells beside a clamped map have one height along the unbounded axis, so their corner may be anywhere.
+  const double corner_x = static_cast<double>(i), corner_y = static_cast<double>(j);
+  const LatticeAxis &axis_x = mesh.field->x, &axis_y = mesh.field->y;
+  const bool clamp_x = axis_x.wrap == Wrap::kClamp, clamp_y = axis_y.wrap == Wrap::kClamp;
+  const double x_low = clamp_x && i < 0 ? -__builtin_huge_val() : corner_x - kCellTolerance;
+  const double x_high = clamp_x && i >= axis_x.num_texels - 1 ? __builtin_huge_val() : corner_x + 1.0 + kCellTolerance;
+  const double y_low = clamp_y && j < 0 ? -__builtin_huge_val() : corner_y - kCellTolerance;
+  const double y_high = clamp_y && j >= axis_y.num_texels - 1 ? __builtin_huge_val() : corner_y + 1.0 + kCellTolerance;
+
+  const auto height_over = [&](const CurvePoint& p) {
+    const double fx = p.x - corner_x, fy = p.y - corner_y;
+    const double h = cell.h00 + cell.hx * fx + (cell.hy + cell.hxy * fx) * fy;
+    return p.s * p.nu - mesh.scale * (h - mesh.midlevel);
+  };
+  const auto deviation = [&](const CurvePoint& a, const CurvePoint& b) {
+    const CurveDeviation d = curve_deviation(tri, g, a, b);
+    const double fx = __builtin_fmax(__builtin_fabs(a.x - corner_x), __builtin_fabs(b.x - corner_x));
+    const double fy = __builtin_fmax(__builtin_fabs(a.y - corner_y), __builtin_fabs(b.y - corner_y));
+    const double twist = __builtin_fabs(cell.hxy);
+    return d.height + __builtin_fabs(mesh.scale) * (0.25 * twist * __builtin_fabs((b.x - a.x) * (b.y - a.y)) +
+                                                    (__builtin_fabs(cell.hx) + twist * fy) * d.x +
+                                                    (__builtin_fabs(cell.hy) + twist * fx) * d.y + twist * d.x * d.y);
+  };
+  const auto accept = [&](const CurvePoint& p) {
+    if (!(p.x >= x_low && p.x <= x_high && p.y >= y_low && p.y <= y_high)) return false;
+    const double t = curve_t(curve, g, p.tau);
+    if (!(t > t_min && t < t_max)) return false;
+    *hit = {t, p.b1, p.b2, i, j, p.tau};
+    return true;
+  };
+
+  // What rounding can do to g: its terms, and the lattice position through the slopes.
+  const double slope =
+      __builtin_fabs(mesh.scale) * ((__builtin_fabs(cell.hx) + __builtin_fabs(cell.hxy)) *
+                                        (__builtin_fabs(tri.x[1] - tri.x[0]) + __builtin_fabs(tri.x[2] - tri.x[0])) +
+                                    (__builtin_fabs(cell.hy) + __builtin_fabs(cell.hxy)) *
+                                        (__builtin_fabs(tri.y[1] - tri.y[0]) + __builtin_fabs(tri.y[2] - tri.y[0])));
+  const double magnitude =
+      __builtin_fabs(mesh.scale) * (__builtin_fabs(cell.h00 - mesh.midlevel) + __builtin_fabs(cell.hx) +
+                                    __builtin_fabs(cell.hy) + __builtin_fabs(cell.hxy));
+  const double rounding = 0x1p-48 * magnitude + 4.0 * g.relative_error * slope;
+
+  struct Interval {
+    CurvePoint a, b;
+    double ga, gb;
+  };
+  // Depth-first from the front: a split pushes its far half, so the stack is as deep as the splits, and those end when
+  // the deviation, which falls by four with each, drowns in rounding: below 60.
+  constexpr int kMaxDepth = 64;
+  Interval stack[kMaxDepth];
+  int depth = 0;
+  stack[0].a = curve_point(tri, g, tau0);
+  stack[0].b = curve_point(tri, g, tau1);
+  stack[0].ga = height_over(stack[0].a);
+  stack[0].gb = height_over(stack[0].b);
+  // A root at a wall may be lost between two triangles that round it differently: both take it.
+  if (tau0 <= 0.0 && __builtin_fabs(stack[0].ga) <= rounding && accept(stack[0].a)) return true;
+  const CurvePoint last = stack[0].b;
+  const double g_last = stack[0].gb;
+  depth = 1;
+  while (depth > 0) {
+    const Interval n = stack[--depth];
+    const bool crosses = (n.ga < 0.0) != (n.gb < 0.0);
+    const double bound = deviation(n.a, n.b);
+    const double width = n.b.tau - n.a.tau;
+    if (!crosses && __builtin_fmin(__builtin_fabs(n.ga), __builtin_fabs(n.gb)) > bound) continue;
+    const bool small = !(bound > rounding) || width <= 0x1p-50;
+    // Once the bend is a small part of the difference of the ends, g is monotone and has one root.
+    if (crosses && (small || 16.0 * bound < __builtin_fabs(n.gb - n.ga))) {
+      CurvePoint a = n.a, b = n.b;
+      double ga = n.ga, gb = n.gb;
+      // Illinois: secant steps; an end that stays twice counts half, so both ends close in.
+      int stayed = 0;
+      for (int k = 0; k < 80 && b.tau - a.tau > 0x1p-51 && ga != 0.0; ++k) {
+        double tau = a.tau + (b.tau - a.tau) * (ga / (ga - gb));
+        if (!(tau > a.tau && tau < b.tau)) tau = 0.5 * (a.tau + b.tau);
+        if (!(tau > a.tau && tau < b.tau)) break;
+        const CurvePoint p = curve_point(tri, g, tau);
+        const double gp = height_over(p);
+        if (__builtin_fabs(gp) <= 0.25 * rounding) {
+          a = p;
+          break;
+        }
+        if ((gp < 0.0) == (n.ga < 0.0)) {
+          a = p;
+          ga = gp;
+          if (stayed == 1) gb *= 0.5;
+          stayed = 1;
+        } else {
+          b = p;
+          gb = gp;
+          if (stayed == 2) ga *= 0.5;
+          stayed = 2;
+        }
+      }
+      if (accept(a)) return true;
+      continue;
+    }
+    if (small || depth + 2 > kMaxDepth) {
+      // Tangent within rounding: the surface is touched.
+      if (__builtin_fabs(n.ga) <= rounding && accept(n.a)) return true;
+      continue;
+    }
+    Interval front = n, back = n;
+    const CurvePoint middle = curve_point(tri, g, 0.5 * (n.a.tau + n.b.tau));
+    const double gm = height_over(middle);
+    front.b = middle;
+    front.gb = gm;
+    back.a = middle;
+    back.ga = gm;
+    stack[depth++] = back;
+    stack[depth++] = front;
+  }
+  return tau1 >= 1.0 && __builtin_fabs(g_last) <= rounding && accept(last);
+}
+
+}  // namespace relief

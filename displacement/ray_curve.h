@@ -1,0 +1,331 @@
+// A ray seen from inside a displaced triangle: a curve in closed form.
+//
+// In a frame in which the ray is the z axis, a point P(b) + s·N(b) is on the ray when its x and y vanish. For a fixed s
+// the three offset vertices v_i(s) = P_i + s·N_i are a plain triangle, and the ray meets its plane at the barycentric
+// weights b_i = e_i(s)/W(s) with the edge functions e_i = v_j × v_k (2D cross products, quadratic in s) and W = Σ e_i.
+// So the whole curve of the ray in (b, s), and with it in the height map, is a rational quadratic in s: no inversion has
+// to be iterated, the walls of the bounding prism are the roots of the e_i, and two triangles that share an edge compute
+// the same wall from the same numbers (Ogaki 2023 parametrizes shells the same way).
+//
+// Where a facet is seen edge-on, W vanishes and s says nothing; the ray then stays at one s and the curve is a straight
+// line in b. Both kinds are kept as one form, homogeneous quadratics of a parameter τ in [0, 1] along the ray.
+#pragma once
+
+#include "displacement/displaced_triangle.h"
+
+namespace relief {
+
+/// The shear that makes a ray the z axis, as in Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection".
+struct RayFrame {
+  double O[3];
+  int kx = 0, ky = 1, kz = 2;  ///< kz: the axis along which the direction is longest
+  double Sx = 0, Sy = 0, Sz = 1;
+};
+
+RELIEF_KERNEL RayFrame ray_frame_make(Vec3f O, Vec3f D)
+{
+  RayFrame f;
+  const double d[3] = {D.x, D.y, D.z};
+  f.O[0] = O.x;
+  f.O[1] = O.y;
+  f.O[2] = O.z;
+  const double ax = __builtin_fabs(d[0]), ay = __builtin_fabs(d[1]), az = __builtin_fabs(d[2]);
+  f.kz = ax > ay ? (ax > az ? 0 : 2) : (ay > az ? 1 : 2);
+  f.kx = f.kz == 2 ? 0 : f.kz + 1;
+  f.ky = f.kx == 2 ? 0 : f.kx + 1;
+  f.Sz = 1.0 / d[f.kz];
+  f.Sx = d[f.kx] * f.Sz;
+  f.Sy = d[f.ky] * f.Sz;
+  return f;
+}
+
+/// a·τ² + b·τ + c
+struct Quadratic {
+  double a = 0, b = 0, c = 0;
+};
+
+RELIEF_KERNEL double quadratic_at(Quadratic p, double tau) { return (p.a * tau + p.b) * tau + p.c; }
+
+RELIEF_KERNEL Quadratic operator+(Quadratic p, Quadratic q) { return {p.a + q.a, p.b + q.b, p.c + q.c}; }
+RELIEF_KERNEL Quadratic operator*(Quadratic p, double k) { return {p.a * k, p.b * k, p.c * k}; }
+/// The polynomial in u with τ = origin + u·step.
+RELIEF_KERNEL Quadratic quadratic_shift(Quadratic p, double origin, double step)
+{
+  return {p.a * step * step, (p.b + 2.0 * p.a * origin) * step, quadratic_at(p, origin)};
+}
+/// Least value over [0, 1].
+RELIEF_KERNEL double quadratic_minimum(Quadratic p)
+{
+  double low = __builtin_fmin(p.c, p.a + p.b + p.c);
+  if (p.a > 0.0 && p.b < 0.0 && p.b > -2.0 * p.a) low = __builtin_fmin(low, p.c - p.b * p.b / (4.0 * p.a));
+  return low;
+}
+
+/// Appends the roots that lie strictly inside (low, high), in no order.
+RELIEF_KERNEL int quadratic_roots_inside(Quadratic p, double low, double high, double* roots, int count)
+{
+  const double discriminant = p.b * p.b - 4.0 * p.a * p.c;
+  if (!(discriminant >= 0.0)) return count;
+  const double q = -0.5 * (p.b + __builtin_copysign(__builtin_sqrt(discriminant), p.b));
+  // Either may be infinite or NaN (a = 0, q = 0); comparisons turn those away.
+  const double r1 = q / p.a, r2 = p.c / q;
+  if (r1 > low && r1 < high) roots[count++] = r1;
+  if (r2 > low && r2 < high) roots[count++] = r2;
+  return count;
+}
+
+/// A stretch of a ray inside a triangle's prism.
+struct CurveSegment {
+  Quadratic e[3];             ///< homogeneous barycentric weights of τ in [0, 1]
+  Quadratic W;                ///< their sum, positive on [0, 1]
+  double s0 = 0, ds = 0;      ///< s = s0 + τ·ds
+  double W_min = 1;           ///< least W on [0, 1], positive
+  double relative_error = 0;  ///< bound on the rounding error of the weights e_i/W
+  double t0 = 0, t1 = 0;      ///< ray parameter at τ = 0 and 1, t0 <= t1
+};
+
+/// At most 4 intervals a sign, and at most two cuts each where the facet turns edge-on.
+inline constexpr int kMaxCurveSegments = 12;
+
+/// A ray in one triangle's prism.
+struct RayCurve {
+  double z[3], nz[3];  ///< ray parameter of P_i + s·N_i: z + s·nz
+  CurveSegment segments[kMaxCurveSegments];
+  int num_segments = 0;
+};
+
+RELIEF_KERNEL double curve_t(const RayCurve& curve, const CurveSegment& g, double tau)
+{
+  const double e0 = quadratic_at(g.e[0], tau), e1 = quadratic_at(g.e[1], tau), e2 = quadratic_at(g.e[2], tau),
+               s = g.s0 + tau * g.ds;
+  return (e0 * (curve.z[0] + s * curve.nz[0]) + e1 * (curve.z[1] + s * curve.nz[1]) +
+          e2 * (curve.z[2] + s * curve.nz[2])) /
+         (e0 + e1 + e2);
+}
+
+/// Part of a segment, by its parameter; empty when tau0 > tau1.
+struct CurveRange {
+  double tau0 = 0, tau1 = 1;
+};
+
+/// The part of a segment that can hold points with t in [t_min, t_max]; a little more than that.
+/// @param monotone  t grows with τ (it does where the prism is not folded); otherwise nothing is cut off
+RELIEF_KERNEL CurveRange
+curve_clip(const RayCurve& curve, const CurveSegment& g, bool monotone, double t_min, double t_max)
+{
+  CurveRange range;
+  if (!monotone) return range;
+  if (g.t1 < t_min || g.t0 > t_max) return {1, 0};
+  // Secant steps, each moved away from the kept side by a part of the bracket so that it closes in on both ends.
+  constexpr int kSteps = 4;
+  if (g.t0 < t_min) {
+    double high = 1, t_low = g.t0, t_high = g.t1;
+    for (int k = 0; k < kSteps; ++k) {
+      const double tau = range.tau0 + (high - range.tau0) * 0.97 * ((t_min - t_low) / (t_high - t_low));
+      const double t = curve_t(curve, g, tau);
+      (t <= t_min ? range.tau0 : high) = tau;
+      (t <= t_min ? t_low : t_high) = t;
+    }
+  }
+  if (g.t1 > t_max) {
+    double low = range.tau0, t_low = curve_t(curve, g, low), t_high = g.t1;
+    for (int k = 0; k < kSteps && t_low < t_max; ++k) {
+      const double tau = range.tau1 - (range.tau1 - low) * 0.97 * ((t_high - t_max) / (t_high - t_low));
+      const double t = curve_t(curve, g, tau);
+      (t >= t_max ? range.tau1 : low) = tau;
+      (t >= t_max ? t_high : t_low) = t;
+    }
+  }
+  return range;
+}
+
+namespace curve_detail {
+
+/// What is needed of the triangle in the ray's frame while its curve is made.
+struct Projected {
+  double x[3], y[3], nx[3], ny[3];
+};
+
+// Contraction to fused multiply-adds is switched off for this folder (see its CMakeLists.txt): a·b − c·d must be exactly
+// the negative of c·d − a·b, or a ray along a wall could be outside of both neighbours.
+RELIEF_KERNEL double cross2(double ax, double ay, double bx, double by) { return ax * by - ay * bx; }
+
+RELIEF_KERNEL void sort_ascending(double* values, int count)
+{
+  for (int i = 1; i < count; ++i) {
+    const double value = values[i];
+    int k = i;
+    for (; k > 0 && values[k - 1] > value; --k) values[k] = values[k - 1];
+    values[k] = value;
+  }
+}
+
+RELIEF_KERNEL void add_segment(RayCurve& curve, CurveSegment g)
+{
+  g.t0 = curve_t(curve, g, 0.0);
+  g.t1 = curve_t(curve, g, 1.0);
+  if (g.t1 < g.t0) {
+    for (Quadratic& e : g.e) e = quadratic_shift(e, 1.0, -1.0);
+    g.s0 += g.ds;
+    g.ds = -g.ds;
+    const double t = g.t0;
+    g.t0 = g.t1;
+    g.t1 = t;
+  }
+  g.W = g.e[0] + g.e[1] + g.e[2];
+  g.W_min = quadratic_minimum(g.W);
+  if (!(g.W_min > 0.0) || curve.num_segments == kMaxCurveSegments) return;
+  curve.segments[curve.num_segments++] = g;
+}
+
+/// The facet at s is edge-on: the ray runs within its plane, from edge to edge.
+RELIEF_KERNEL void add_edge_on_segment(RayCurve& curve, const Projected& v, double s)
+{
+  double x[3], y[3], z[3];
+  double extent_x = 0, extent_y = 0;
+  for (int i = 0; i < 3; ++i) {
+    x[i] = v.x[i] + s * v.nx[i];
+    y[i] = v.y[i] + s * v.ny[i];
+    z[i] = curve.z[i] + s * curve.nz[i];
+    extent_x = __builtin_fmax(extent_x, __builtin_fabs(x[i]));
+    extent_y = __builtin_fmax(extent_y, __builtin_fabs(y[i]));
+  }
+  const double* w = extent_x > extent_y ? x : y;
+  double near_b[3] = {0, 0, 0}, far_b[3] = {0, 0, 0}, near_t = 0, far_t = 0;
+  bool any = false;
+  for (int i = 0; i < 3; ++i) {
+    const int j = i == 2 ? 0 : i + 1;
+    if ((w[i] > 0.0 && w[j] > 0.0) || (w[i] < 0.0 && w[j] < 0.0)) continue;
+    const double span = w[j] - w[i];
+    // Both ends: an edge along the ray crosses it everywhere.
+    const double at[2] = {span != 0.0 ? w[j] / span : 1.0, span != 0.0 ? w[j] / span : 0.0};
+    for (const double weight : at) {
+      const double t = weight * z[i] + (1.0 - weight) * z[j];
+      double b[3] = {0, 0, 0};
+      b[i] = weight;
+      b[j] = 1.0 - weight;
+      if (!any || t < near_t) {
+        near_t = t;
+        for (int k = 0; k < 3; ++k) near_b[k] = b[k];
+      }
+      if (!any || t > far_t) {
+        far_t = t;
+        for (int k = 0; k < 3; ++k) far_b[k] = b[k];
+      }
+      any = true;
+    }
+  }
+  if (!any) return;
+  CurveSegment g;
+  for (int i = 0; i < 3; ++i) g.e[i] = {0.0, far_b[i] - near_b[i], near_b[i]};
+  g.s0 = s;
+  g.relative_error = 0x1p-46;
+  add_segment(curve, g);
+}
+
+}  // namespace curve_detail
+
+/// The ray's curve through the prism {P(b) + s·N(b) : b in the triangle, s in [s_min, s_max]}.
+///
+/// Segments are closed and reach a little over the prism's walls: by the rounding error of the edge functions, so that
+/// a point on a wall is in the segments of both neighbours. They are ordered by t0.
+/// @return  false if there is none
+RELIEF_KERNEL bool ray_curve_make(const RayFrame& frame, const DisplacedTriangle& tri, RayCurve* out)
+{
+  using curve_detail::cross2;
+  RayCurve& curve = *out;
+  curve.num_segments = 0;
+  curve_detail::Projected v;
+  const double low = tri.s_min, high = tri.s_max;
+  const double reach = __builtin_fmax(__builtin_fabs(low), __builtin_fabs(high));
+  double extent = 0;
+  for (int i = 0; i < 3; ++i) {
+    const double p[3] = {tri.P[i].x - frame.O[0], tri.P[i].y - frame.O[1], tri.P[i].z - frame.O[2]};
+    const double n[3] = {tri.N[i].x, tri.N[i].y, tri.N[i].z};
+    curve.z[i] = p[frame.kz] * frame.Sz;
+    curve.nz[i] = n[frame.kz] * frame.Sz;
+    v.x[i] = p[frame.kx] - frame.Sx * p[frame.kz];
+    v.y[i] = p[frame.ky] - frame.Sy * p[frame.kz];
+    v.nx[i] = n[frame.kx] - frame.Sx * n[frame.kz];
+    v.ny[i] = n[frame.ky] - frame.Sy * n[frame.kz];
+    extent = __builtin_fmax(extent, __builtin_fabs(v.x[i]) + __builtin_fabs(v.y[i]) +
+                                        reach * (__builtin_fabs(v.nx[i]) + __builtin_fabs(v.ny[i])));
+  }
+  Quadratic e[3];
+  for (int i = 0; i < 3; ++i) {
+    const int j = i == 2 ? 0 : i + 1, k = j == 2 ? 0 : j + 1;
+    e[i].c = cross2(v.x[j], v.y[j], v.x[k], v.y[k]);
+    e[i].b = cross2(v.x[j], v.y[j], v.nx[k], v.ny[k]) + cross2(v.nx[j], v.ny[j], v.x[k], v.y[k]);
+    e[i].a = cross2(v.nx[j], v.ny[j], v.nx[k], v.ny[k]);
+  }
+  // Each coefficient is a sum of at most four products below extent², in units of its power of s; evaluation and the
+  // roots' own rounding add a few more.
+  const double tolerance = 0x1p-48 * extent * extent;
+  const double edge_on = 1e-8 * extent * extent;
+
+  for (const double sign : {1.0, -1.0}) {
+    Quadratic inside[3];
+    double cuts[8];
+    int num_cuts = 0;
+    bool possible = true;
+    for (int i = 0; i < 3 && possible; ++i) {
+      inside[i] = e[i] * sign;
+      inside[i].c += tolerance;
+      const int before = num_cuts;
+      num_cuts = quadratic_roots_inside(inside[i], low, high, cuts, num_cuts);
+      possible = num_cuts > before || quadratic_at(inside[i], low) >= 0.0 || quadratic_at(inside[i], high) >= 0.0;
+    }
+    if (!possible) continue;
+    cuts[num_cuts++] = high;
+    curve_detail::sort_ascending(cuts, num_cuts);
+
+    double from = low, start = low;
+    bool open = false;
+    for (int c = 0; c < num_cuts; ++c) {
+      const double to = cuts[c], middle = 0.5 * (from + to);
+      const bool accepted = quadratic_at(inside[0], middle) >= 0.0 && quadratic_at(inside[1], middle) >= 0.0 &&
+                            quadratic_at(inside[2], middle) >= 0.0;
+      if (accepted && !open) start = from;
+      const bool ends = open && (!accepted || c + 1 == num_cuts);
+      const double stop = accepted ? to : from;
+      if (ends || (accepted && c + 1 == num_cuts)) {
+        // [start, stop] is inside; where it is edge-on the other form stands for it.
+        Quadratic W = (e[0] + e[1] + e[2]) * sign;
+        W.c -= edge_on;
+        double pieces[4];
+        int num_pieces = quadratic_roots_inside(W, start, stop, pieces, 0);
+        pieces[num_pieces++] = stop;
+        curve_detail::sort_ascending(pieces, num_pieces);
+        double begin = start;
+        for (int k = 0; k < num_pieces; ++k) {
+          const double end = pieces[k];
+          if (quadratic_at(W, 0.5 * (begin + end)) < 0.0) {
+            curve_detail::add_edge_on_segment(curve, v, 0.5 * (begin + end));
+          } else {
+            CurveSegment g;
+            for (int i = 0; i < 3; ++i) g.e[i] = quadratic_shift(e[i] * sign, begin, end - begin);
+            g.s0 = begin;
+            g.ds = end - begin;
+            curve_detail::add_segment(curve, g);
+          }
+          begin = end;
+        }
+      }
+      open = accepted;
+      from = to;
+    }
+  }
+  for (int i = 0; i < curve.num_segments; ++i) {
+    CurveSegment& g = curve.segments[i];
+    if (g.relative_error == 0.0) g.relative_error = tolerance / g.W_min;
+  }
+  for (int i = 1; i < curve.num_segments; ++i) {
+    const CurveSegment g = curve.segments[i];
+    int k = i;
+    for (; k > 0 && curve.segments[k - 1].t0 > g.t0; --k) curve.segments[k] = curve.segments[k - 1];
+    curve.segments[k] = g;
+  }
+  return curve.num_segments > 0;
+}
+
+}  // namespace relief

@@ -1,0 +1,491 @@
+// The fast method: a ray's curve over the height map as straight chords, each a plain ray over a plain height field,
+// which descends a pyramid of 4 × 4 children to single cells.
+//
+// Exact in spite of straight chords: the curve is known in closed form (ray_curve.h), and so is what it can deviate from
+// a chord, in both lattice coordinates and in height. Every rectangle and height interval is widened by that, so no cell
+// is passed over; the leaf test is done on the curve itself. Eight chords, and eight children, are tested side by side.
+//
+// Reading order: traverse_chord, segment_intersect, chords_intersect, chord_intersect, node_intersect.
+#pragma once
+
+#include "displacement/lanes.h"
+#include "displacement/leaf.h"
+
+namespace relief {
+
+namespace chord_detail {
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpsabi"
+
+/// Rounding of a few float operations in sequence on numbers up to the one it is multiplied with.
+inline constexpr float kFloatSlack = 0x1p-20f;
+/// What the float parameter of a chord may be off by.
+inline constexpr float kParameterSlack = 0x1p-18f;
+/// A chord is split while it may deviate by more than this from the curve; a matter of speed only. Lattice units, and
+/// parts of the map's range.
+inline constexpr float kWantedDeviation = 0.5f;
+inline constexpr float kWantedHeightDeviation = 1.0f / 32;
+inline constexpr int kMaxSplits = 4;
+/// Where an unbounded cell beside a clamped map ends.
+inline constexpr float kFarAway = 1e12f;
+
+/// A straight stretch of the curve. Positions are relative to an integer lattice point, heights in stored units.
+struct Chord {
+  std::int64_t origin_x, origin_y;
+  float x0, y0, q0;      ///< at u = 0
+  float dx, dy, dq;      ///< to u = 1
+  float inv_dx, inv_dy;  ///< finite, also where dx or dy is 0
+  float pad_x, pad_y, pad_q;
+  double tau0, dtau;  ///< τ = tau0 + u·dtau
+};
+
+struct Search {
+  const DisplacedMeshView& mesh;
+  const DisplacedTriangle& tri;
+  const RayCurve& curve;
+  TraversalCounters& counters;
+  DisplacedHit& hit;
+  double t_min, t_max;         ///< t_max shrinks with every hit
+  double q_per_metre, q_zero;  ///< stored height = q_zero + q_per_metre · displacement
+  const CurveSegment* segment = nullptr;
+  double tau_end = 1;  ///< nothing beyond matters: a hit is known there
+  bool unfolded = true, any_hit = false;
+  bool found = false;
+};
+
+/// Bounds of the 16 cells of a 4 × 4 node, in two rows of rows.
+/// @param i, j  lattice coordinates of its first cell
+RELIEF_KERNEL void cell_bounds(const HeightFieldView& f, std::int64_t i, std::int64_t j, F8 low[2], F8 high[2])
+{
+  const HeightMapView& map = f.map;
+  const int column = lattice_texel(f.x, i);
+  // Inside the map a row is read at once, three texels further than needed.
+  const bool inside = f.x.wrap != Wrap::kMirror && (f.x.wrap == Wrap::kRepeat || i >= 0) && column + 8 <= map.width;
+  F8 row_low[5], row_high[5];
+  for (int r = 0; r < 5; ++r) {
+    const std::int64_t row = static_cast<std::int64_t>(lattice_texel(f.y, j + r)) * map.width;
+    F8 h;
+    if (inside && map.format == HeightFormat::kU16) {
+      h = load8(static_cast<const std::uint16_t*>(map.texels) + row + column);
+    } else if (inside && map.format == HeightFormat::kU8) {
+      h = load8(static_cast<const std::uint8_t*>(map.texels) + row + column) * 257.0f;
+    } else {
+      alignas(32) float values[8] = {};
+      for (int k = 0; k < 5; ++k) {
+        const std::int64_t at = row + lattice_texel(f.x, i + k);
+        switch (map.format) {
+          case HeightFormat::kU8:
+            values[k] = static_cast<const std::uint8_t*>(map.texels)[at] * 257.0f;
+            break;
+          case HeightFormat::kU16:
+            values[k] = static_cast<const std::uint16_t*>(map.texels)[at];
+            break;
+          case HeightFormat::kFloat:
+            values[k] = static_cast<float>((static_cast<const float*>(map.texels)[at] - f.h_offset) / f.h_step);
+            break;
+        }
+      }
+      h = load8(values);
+    }
+    const F8 next = shift_down(h);
+    row_low[r] = min(h, next);
+    row_high[r] = max(h, next);
+  }
+  // Stored units of float maps are rounded here, by less than 2^-7.
+  const F8 pad = splat8(map.format == HeightFormat::kFloat ? 0x1p-6f : 0.0f);
+  for (int half = 0; half < 2; ++half) {
+    const int r = 2 * half;
+    low[half] = join_low_halves(min(row_low[r], row_low[r + 1]), min(row_low[r + 1], row_low[r + 2])) - pad;
+    high[half] = join_low_halves(max(row_high[r], row_high[r + 1]), max(row_high[r + 1], row_high[r + 2])) + pad;
+  }
+}
+
+/// @return  true when the search is over
+RELIEF_KERNEL bool cell_intersect(Search& c, const Chord& chord, std::int64_t i, std::int64_t j, float u0, float u1)
+{
+  const auto tau_at = [&](double u) { return chord.tau0 + u * chord.dtau; };
+  const double tau0 = __builtin_fmax(0.0, tau_at(static_cast<double>(u0) - kParameterSlack));
+  const double tau1 = __builtin_fmin(1.0, tau_at(static_cast<double>(u1) + kParameterSlack));
+  ++c.counters.texels;
+  if (!leaf_intersect(c.mesh, c.tri, c.curve, *c.segment, i, j, tau0, tau1, c.t_min, c.t_max, &c.hit)) return false;
+  c.found = true;
+  c.t_max = c.hit.t;
+  if (c.unfolded) c.tau_end = c.hit.tau;
+  return c.any_hit;
+}
+
+/// A node of 4^level cells a side in one period of the lattice.
+struct Node {
+  int column, row;  ///< its first cell, in pyramid columns
+  int level;
+  float u0, u1;  ///< where the chord may be inside
+};
+
+/// Descends from one node.
+/// @param period_x, period_y  lattice coordinates of pyramid column and row 0 of this period
+/// @return true when the search is over
+RELIEF_KERNEL bool node_intersect(Search& c,
+                                  const Chord& chord,
+                                  const Node& root,
+                                  std::int64_t period_x,
+                                  std::int64_t period_y)
+{
+  const HeightFieldView& f = *c.mesh.field;
+  // A node leaves at most 15 siblings on the stack while one is descended into.
+  constexpr int kStackSize = 16 * (kMaxPyramidLevels + 1);
+  Node stack[kStackSize];
+  int depth = 0;
+  stack[depth++] = root;
+  const F8 lane_x{0, 1, 2, 3, 0, 1, 2, 3};
+  const F8 lane_y[2] = {F8{0, 0, 0, 0, 1, 1, 1, 1}, F8{2, 2, 2, 2, 3, 3, 3, 3}};
+  const float offset_x = static_cast<float>(period_x - chord.origin_x),
+              offset_y = static_cast<float>(period_y - chord.origin_y);
+  const bool clamp_x = f.x.wrap == Wrap::kClamp, clamp_y = f.y.wrap == Wrap::kClamp;
+  while (depth > 0) {
+    const Node n = stack[--depth];
+    if (chord.tau0 + (static_cast<double>(n.u0) - kParameterSlack) * chord.dtau > c.tau_end) continue;
+    const int child_level = n.level - 1;
+    const int size = 1 << (2 * child_level);
+    F8 low[2], high[2];
+    if (child_level == 0) {
+      cell_bounds(f, period_x + n.column, period_y + n.row, low, high);
+    } else {
+      const int level = child_level - 1;
+      const PyramidLine& line =
+          f.lines[level][static_cast<std::ptrdiff_t>(n.row >> (2 * n.level)) * f.line_columns[level] +
+                         (n.column >> (2 * n.level))];
+      for (int half = 0; half < 2; ++half) {
+        low[half] = load8(line.low + 8 * half);
+        high[half] = load8(line.high + 8 * half);
+      }
+    }
+    c.counters.bounds += 16;
+    const float width = static_cast<float>(size);
+    const F8 x_low = lane_x * width + (offset_x + static_cast<float>(n.column) - chord.x0);
+    F8 x_from = x_low - chord.pad_x, x_to = x_low + (width + chord.pad_x);
+    // Children that begin beyond the period belong to the next one.
+    I8 exists = x_low < splat8(offset_x + static_cast<float>(f.x.num_cells) - chord.x0);
+    if (clamp_x) {
+      x_from = lane_x * width + static_cast<float>(n.column) <= 0.0f ? splat8(-kFarAway) : x_from;
+      x_to = lane_x * width + (static_cast<float>(n.column) + width) >= static_cast<float>(f.x.num_cells)
+                 ? splat8(kFarAway)
+                 : x_to;
+    }
+    const F8 ux0 = x_from * chord.inv_dx, ux1 = x_to * chord.inv_dx;
+    const F8 ux_in = max(min(ux0, ux1), splat8(n.u0)), ux_out = min(max(ux0, ux1), splat8(n.u1));
+    alignas(32) float entry[16], exit[16];
+    unsigned hits = 0;
+    for (int half = 0; half < 2; ++half) {
+      const F8 y_low = lane_y[half] * width + (offset_y + static_cast<float>(n.row) - chord.y0);
+      F8 y_from = y_low - chord.pad_y, y_to = y_low + (width + chord.pad_y);
+      const I8 both_exist = exists & (y_low < splat8(offset_y + static_cast<float>(f.y.num_cells) - chord.y0));
+      if (clamp_y) {
+        y_from = lane_y[half] * width + static_cast<float>(n.row) <= 0.0f ? splat8(-kFarAway) : y_from;
+        y_to = lane_y[half] * width + (static_cast<float>(n.row) + width) >= static_cast<float>(f.y.num_cells)
+                   ? splat8(kFarAway)
+                   : y_to;
+      }
+      const F8 uy0 = y_from * chord.inv_dy, uy1 = y_to * chord.inv_dy;
+      const F8 u_in = max(min(uy0, uy1), ux_in), u_out = min(max(uy0, uy1), ux_out);
+      const F8 q_in = chord.q0 + u_in * chord.dq, q_out = chord.q0 + u_out * chord.dq;
+      const I8 overlaps = (u_in <= u_out + kParameterSlack) & (min(q_in, q_out) - chord.pad_q <= high[half]) &
+                          (max(q_in, q_out) + chord.pad_q >= low[half]) & both_exist;
+      hits |= mask_of(overlaps) << (8 * half);
+      store8(entry + 8 * half, u_in);
+      store8(exit + 8 * half, u_out);
+    }
+    // Nearest first: the survivors are few.
+    int order[16], count = 0;
+    for (; hits != 0; hits &= hits - 1) {
+      const int child = __builtin_ctz(hits);
+      int k = count++;
+      for (; k > 0 && entry[order[k - 1]] > entry[child]; --k) order[k] = order[k - 1];
+      order[k] = child;
+    }
+    if (child_level == 0) {
+      for (int k = 0; k < count; ++k) {
+        const int child = order[k];
+        if (chord.tau0 + (static_cast<double>(entry[child]) - kParameterSlack) * chord.dtau > c.tau_end) break;
+        if (cell_intersect(c, chord, period_x + n.column + (child & 3), period_y + n.row + (child >> 2), entry[child],
+                           exit[child]))
+          return true;
+      }
+    } else {
+      for (int k = count; k-- > 0;) {
+        const int child = order[k];
+        stack[depth++] = {n.column + (child & 3) * size, n.row + (child >> 2) * size, child_level, entry[child],
+                          exit[child]};
+      }
+    }
+  }
+  return false;
+}
+
+/// Where a chord is within [from, to] along one axis.
+RELIEF_KERNEL void clip(float from, float to, float start, float inverse, float* u0, float* u1)
+{
+  const float a = (from - start) * inverse, b = (to - start) * inverse;
+  *u0 = max(*u0, min(a, b) - kParameterSlack);
+  *u1 = min(*u1, max(a, b) + kParameterSlack);
+}
+
+/// Pyramid nodes of one level that a stretch of an axis covers, one after the other, in any direction.
+struct NodeWalk {
+  std::int64_t first, last;  ///< cells left, lattice coordinates
+  int step;                  ///< +1: from first to last; −1: from last to first
+};
+
+struct NodeSpan {
+  std::int64_t period;  ///< lattice coordinate of pyramid column 0
+  int column;           ///< first cell of the node, in pyramid columns
+  float from, to;       ///< its extent relative to the chord's origin
+};
+
+RELIEF_KERNEL bool next_node(NodeWalk& walk, const LatticeAxis& axis, int size, std::int64_t origin, NodeSpan* out)
+{
+  if (walk.first > walk.last) return false;
+  const std::int64_t at = (walk.step > 0 ? walk.first : walk.last) - axis.first_cell;
+  const std::int64_t cell = axis.wrap == Wrap::kClamp ? at : lattice_modulo(at, axis.num_cells);
+  out->period = at - cell + axis.first_cell;
+  out->column = static_cast<int>(cell) & ~(size - 1);
+  const int end = out->column + size < axis.num_cells ? out->column + size : axis.num_cells;
+  const std::int64_t begin_lattice = out->period + out->column, end_lattice = out->period + end;
+  const bool clamped = axis.wrap == Wrap::kClamp;
+  out->from = clamped && out->column == 0 ? -kFarAway : static_cast<float>(begin_lattice - origin);
+  out->to = clamped && end == axis.num_cells ? kFarAway : static_cast<float>(end_lattice - origin);
+  if (walk.step > 0) {
+    walk.first = end_lattice;
+  } else {
+    walk.last = begin_lattice - 1;
+  }
+  return true;
+}
+
+/// Cells that [low, high] reaches into.
+RELIEF_KERNEL NodeWalk walk_over(const LatticeAxis& axis, std::int64_t origin, float low, float high, bool forward)
+{
+  NodeWalk walk{origin + static_cast<std::int64_t>(__builtin_floorf(low)),
+                origin + static_cast<std::int64_t>(__builtin_floorf(high)), forward ? 1 : -1};
+  if (axis.wrap == Wrap::kClamp) {
+    const std::int64_t first = axis.first_cell, last = axis.first_cell + axis.num_cells - 1;
+    walk.first = walk.first < first ? first : (walk.first > last ? last : walk.first);
+    walk.last = walk.last < first ? first : (walk.last > last ? last : walk.last);
+  }
+  return walk;
+}
+
+/// @return true when the search is over
+RELIEF_KERNEL bool chord_intersect(Search& c, const Chord& chord)
+{
+  const HeightFieldView& f = *c.mesh.field;
+  // Nodes about as large as the chord, so that it meets two or three.
+  const float extent =
+      max(__builtin_fabsf(chord.dx) + 2.0f * chord.pad_x, __builtin_fabsf(chord.dy) + 2.0f * chord.pad_y);
+  int level = 1;
+  while (level <= f.num_levels && static_cast<float>(1 << (2 * level)) < extent) ++level;
+  const int size = 1 << (2 * level);
+
+  const float x1 = chord.x0 + chord.dx;
+  NodeWalk columns = walk_over(f.x, chord.origin_x, min(chord.x0, x1) - chord.pad_x, max(chord.x0, x1) + chord.pad_x,
+                               chord.dx >= 0.0f);
+  NodeSpan column;
+  while (next_node(columns, f.x, size, chord.origin_x, &column)) {
+    float u0 = 0.0f, u1 = 1.0f;
+    clip(column.from - chord.pad_x, column.to + chord.pad_x, chord.x0, chord.inv_dx, &u0, &u1);
+    if (!(u0 <= u1)) continue;
+    const float ya = chord.y0 + u0 * chord.dy, yb = chord.y0 + u1 * chord.dy;
+    NodeWalk rows =
+        walk_over(f.y, chord.origin_y, min(ya, yb) - chord.pad_y, max(ya, yb) + chord.pad_y, chord.dy >= 0.0f);
+    NodeSpan row;
+    while (next_node(rows, f.y, size, chord.origin_y, &row)) {
+      float v0 = u0, v1 = u1;
+      clip(row.from - chord.pad_y, row.to + chord.pad_y, chord.y0, chord.inv_dy, &v0, &v1);
+      if (!(v0 <= v1)) continue;
+      if (chord.tau0 + (static_cast<double>(v0) - kParameterSlack) * chord.dtau > c.tau_end) continue;
+      if (node_intersect(c, chord, {column.column, row.column, level, v0, v1}, column.period, row.period)) return true;
+    }
+  }
+  return false;
+}
+
+/// Eight values of a quadratic.
+RELIEF_KERNEL F8 quadratic_lanes(const Quadratic& p, F8 u)
+{
+  return (static_cast<float>(p.a) * u + static_cast<float>(p.b)) * u + static_cast<float>(p.c);
+}
+
+/// Eight chords of the curve between two parameters; those that may deviate too far are split again.
+/// @return true when the search is over
+RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int splits)
+{
+  const DisplacedTriangle& tri = c.tri;
+  const CurveSegment& g = *c.segment;
+  const HeightFieldView& f = *c.mesh.field;
+  const double step = tau1 - tau0;
+  Quadratic W = quadratic_shift(g.W, tau0, step);
+  Quadratic e1 = quadratic_shift(g.e[1], tau0, step), e2 = quadratic_shift(g.e[2], tau0, step);
+  const double inverse = 1.0 / W.c;
+  W = W * inverse;
+  e1 = e1 * inverse;
+  e2 = e2 * inverse;
+  const double xu = tri.x[1] - tri.x[0], xv = tri.x[2] - tri.x[0], yu = tri.y[1] - tri.y[0], yv = tri.y[2] - tri.y[0];
+  const double origin_x = __builtin_floor(tri.x[0] + e1.c * xu + e2.c * xv);
+  const double origin_y = __builtin_floor(tri.y[0] + e1.c * yu + e2.c * yv);
+  const Quadratic X = W * (tri.x[0] - origin_x) + e1 * xu + e2 * xv;
+  const Quadratic Y = W * (tri.y[0] - origin_y) + e1 * yu + e2 * yv;
+
+  // Equal steps of τ crowd where the facet is seen edge-on; equal steps of the parameter whose weights are the same at
+  // both ends do not.
+  const double end_W = W.a + W.b + W.c;
+  const float bend = static_cast<float>(__builtin_sqrt(1.0 / end_W));
+  const auto spread = [&](F8 k) { return bend * k / (bend * k + (1.0f - k)); };
+  const F8 k0{0, 1, 2, 3, 4, 5, 6, 7};
+  F8 u0 = spread(k0 * 0.125f);
+  F8 u1 = spread(k0 * 0.125f + 0.125f);
+  u0[0] = 0.0f;
+  u1[7] = 1.0f;
+
+  struct Points {
+    F8 W, b1, b2, x, y, nu, height;
+    F8 N[3];
+  };
+  const float s0 = static_cast<float>(g.s0 + tau0 * g.ds), ds = static_cast<float>(step * g.ds);
+  const Vec3f N0 = tri.N[0], Nu = tri.N[1] - tri.N[0], Nv = tri.N[2] - tri.N[0];
+  const auto points_at = [&](F8 u) {
+    Points p;
+    p.W = quadratic_lanes(W, u);
+    const F8 inverse_W = 1.0f / p.W;
+    p.b1 = quadratic_lanes(e1, u) * inverse_W;
+    p.b2 = quadratic_lanes(e2, u) * inverse_W;
+    p.x = quadratic_lanes(X, u) * inverse_W;
+    p.y = quadratic_lanes(Y, u) * inverse_W;
+    p.N[0] = N0.x + p.b1 * Nu.x + p.b2 * Nv.x;
+    p.N[1] = N0.y + p.b1 * Nu.y + p.b2 * Nv.y;
+    p.N[2] = N0.z + p.b1 * Nu.z + p.b2 * Nv.z;
+    p.nu = sqrt(p.N[0] * p.N[0] + p.N[1] * p.N[1] + p.N[2] * p.N[2]);
+    p.height = (s0 + u * ds) * p.nu;
+    return p;
+  };
+  const Points a = points_at(u0), b = points_at(u1);
+
+  // As in curve_deviation.
+  const F8 width = u1 - u0;
+  const F8 Wa = static_cast<float>(W.a) * width * width;
+  const F8 Wb = (static_cast<float>(W.b) + 2.0f * static_cast<float>(W.a) * u0) * width;
+  const F8 Wc = a.W;
+  // The vertex of a W that opens upward may lie in between; its value is at least this.
+  const F8 W_least = max(min(a.W, b.W) - 0.25f * abs(Wa), splat8(static_cast<float>(g.W_min * inverse * 0.999)));
+  const F8 quarter_over_W = 0.25f * (1.0f + kFloatSlack) / W_least;
+  const auto deviation = [&](const Quadratic& p, F8 from, F8 to) {
+    const F8 slope = to - from;
+    const F8 alpha = (static_cast<float>(p.b) + 2.0f * static_cast<float>(p.a) * u0) * width - from * Wb - slope * Wc;
+    const F8 beta = slope * Wa;
+    return quarter_over_W * max(abs(alpha), abs(alpha + beta));
+  };
+  const F8 deviation_x = deviation(X, a.x, b.x), deviation_y = deviation(Y, a.y, b.y);
+  const F8 deviation_N = deviation(e1, a.b1, b.b1) * length(Nu) + deviation(e2, a.b2, b.b2) * length(Nv);
+  const F8 dN[3] = {b.N[0] - a.N[0], b.N[1] - a.N[1], b.N[2] - a.N[2]};
+  const F8 turn_squared = dN[0] * dN[0] + dN[1] * dN[1] + dN[2] * dN[2];
+  const F8 least_nu = 0.5f * (a.nu + b.nu - sqrt(turn_squared)) - deviation_N;
+  const F8 s_largest = max(abs(s0 + u0 * ds), abs(s0 + u1 * ds));
+  F8 deviation_height =
+      s_largest * (turn_squared / (8.0f * least_nu) + deviation_N) + 0.25f * abs(width * ds * (b.nu - a.nu));
+  deviation_height = least_nu > 0.0f ? deviation_height : splat8(kInfinity);
+
+  // Rounding of the floats above, by the size of what went in.
+  const float extent_x = static_cast<float>(__builtin_fabs(xu) + __builtin_fabs(xv)),
+              extent_y = static_cast<float>(__builtin_fabs(yu) + __builtin_fabs(yv));
+  const F8 worst_W = splat8(1.0f) / W_least;
+  const float X_size = static_cast<float>(__builtin_fabs(X.a) + __builtin_fabs(X.b) + __builtin_fabs(X.c));
+  const float Y_size = static_cast<float>(__builtin_fabs(Y.a) + __builtin_fabs(Y.b) + __builtin_fabs(Y.c));
+  const float W_size = static_cast<float>(__builtin_fabs(W.a) + __builtin_fabs(W.b) + 1.0);
+  const F8 slack_x = kFloatSlack * worst_W * (X_size + W_size * max(abs(a.x), abs(b.x))) +
+                     static_cast<float>(g.relative_error) * extent_x;
+  const F8 slack_y = kFloatSlack * worst_W * (Y_size + W_size * max(abs(a.y), abs(b.y))) +
+                     static_cast<float>(g.relative_error) * extent_y;
+  const float e_size = static_cast<float>(__builtin_fabs(e1.a) + __builtin_fabs(e1.b) + __builtin_fabs(e1.c) +
+                                          __builtin_fabs(e2.a) + __builtin_fabs(e2.b) + __builtin_fabs(e2.c));
+  const F8 slack_b = kFloatSlack * worst_W * (e_size + 2.0f * W_size);
+  const float q_per_metre = static_cast<float>(c.q_per_metre), q_zero = static_cast<float>(c.q_zero);
+  const F8 pad_x = deviation_x + slack_x, pad_y = deviation_y + slack_y;
+  const F8 q_a = q_zero + q_per_metre * a.height, q_b = q_zero + q_per_metre * b.height;
+  const float q_slope = __builtin_fabsf(q_per_metre);
+  const F8 pad_q = q_slope * (deviation_height + s_largest * (slack_b * (length(Nu) + length(Nv)) + kFloatSlack)) +
+                   kFloatSlack * (__builtin_fabsf(q_zero) + max(abs(q_a), abs(q_b)) + 1.0f);
+
+  // Where the search ends may be known already.
+  unsigned alive =
+      mask_of((min(q_a, q_b) - pad_q <= splat8(f.range.high)) & (max(q_a, q_b) + pad_q >= splat8(f.range.low)));
+  c.counters.bounds += 8;
+  const float wanted_q = kWantedHeightDeviation * static_cast<float>(f.range.high - f.range.low) + 1.0f;
+  for (; alive != 0; alive &= alive - 1) {
+    const int k = __builtin_ctz(alive);
+    const double from = tau0 + static_cast<double>(u0[k]) * step, to = tau0 + static_cast<double>(u1[k]) * step;
+    if (from > c.tau_end) return false;
+    const bool straight = pad_x[k] <= kWantedDeviation && pad_y[k] <= kWantedDeviation && pad_q[k] <= wanted_q;
+    if (!straight && splits < kMaxSplits) {
+      if (chords_intersect(c, from, to, splits + 1)) return true;
+      continue;
+    }
+    Chord chord;
+    chord.origin_x = static_cast<std::int64_t>(origin_x);
+    chord.origin_y = static_cast<std::int64_t>(origin_y);
+    chord.x0 = a.x[k];
+    chord.y0 = a.y[k];
+    chord.q0 = q_a[k];
+    chord.dx = b.x[k] - a.x[k];
+    chord.dy = b.y[k] - a.y[k];
+    chord.dq = q_b[k] - q_a[k];
+    chord.inv_dx = 1.0f / (__builtin_fabsf(chord.dx) > 1e-15f ? chord.dx : 1e-15f);
+    chord.inv_dy = 1.0f / (__builtin_fabsf(chord.dy) > 1e-15f ? chord.dy : 1e-15f);
+    // No point of the curve is outside of the triangle, whatever the bounds say.
+    chord.pad_x = min(pad_x[k], extent_x + 1.0f);
+    chord.pad_y = min(pad_y[k], extent_y + 1.0f);
+    chord.pad_q = pad_q[k];
+    chord.tau0 = from;
+    chord.dtau = to - from;
+    if (chord_intersect(c, chord)) return true;
+  }
+  return false;
+}
+
+#pragma GCC diagnostic pop
+
+}  // namespace chord_detail
+
+/// Nearest (or any) hit of a ray's curve in one displaced triangle.
+/// @param curve  of this ray and triangle
+/// @param hit    written if the result is true
+RELIEF_KERNEL bool traverse_chord(const DisplacedMeshView& mesh,
+                                  std::uint32_t triangle,
+                                  const RayCurve& curve,
+                                  double t_min,
+                                  double t_max,
+                                  bool any_hit,
+                                  DisplacedHit* hit,
+                                  TraversalCounters* counters)
+{
+  const HeightFieldView& f = *mesh.field;
+  chord_detail::Search c{mesh, mesh.triangles[triangle], curve, *counters, *hit, t_min, t_max, 0, 0};
+  // d = scale·(h_offset + h_step·q − midlevel)
+  c.q_per_metre = 1.0 / (mesh.scale * f.h_step);
+  c.q_zero = (mesh.midlevel - f.h_offset) / f.h_step;
+  c.unfolded = mesh.unfolded[triangle] != 0;
+  c.any_hit = any_hit;
+  for (int k = 0; k < curve.num_segments; ++k) {
+    const CurveSegment& g = curve.segments[k];
+    if (g.t0 >= c.t_max) {
+      if (c.unfolded) break;
+    }
+    c.segment = &g;
+    c.tau_end = 1.0;
+    const CurveRange range = curve_clip(curve, g, c.unfolded, c.t_min, c.t_max);
+    if (range.tau0 > range.tau1) continue;
+    if (c.unfolded) c.tau_end = range.tau1;
+    if (chord_detail::chords_intersect(c, range.tau0, range.tau1, 0)) return true;
+  }
+  return c.found;
+}
+
+}  // namespace relief
