@@ -148,11 +148,11 @@ PreparedSurface::PreparedSurface(const DisplacedTriangle& triangle_, const Heigh
 
   const double x1 = x[1].mid() - x[0].mid(), x2 = x[2].mid() - x[0].mid();
   const double y1 = y[1].mid() - y[0].mid(), y2 = y[2].mid() - y[0].mid();
-  const double longest_x = std::max({std::abs(x1), std::abs(x2), std::abs(x1 - x2)});
-  const double longest_y = std::max({std::abs(y1), std::abs(y2), std::abs(y1 - y2)});
-  // Both limits only choose the better conditioned of two sound ways.
-  parameters_are_texels = std::abs(x1 * y2 - x2 * y1) > 1e-4 * (std::abs(x1 * y2) + std::abs(x2 * y1)) &&
-                          std::min(longest_x, longest_y) > .01;
+  const double longest = std::max({std::hypot(x1, y1), std::hypot(x2, y2), std::hypot(x1 - x2, y1 - y2)});
+  // Much thinner triangles fill little of the texels that they cross, and S is far off in the rest. The limit only chooses the
+  // better conditioned of two sound ways.
+  constexpr double kMinHeight = 1;
+  parameters_are_texels = std::abs(x1 * y2 - x2 * y1) > kMinHeight * longest;
   is_mirrored = parameters_are_texels && x1 * y2 < x2 * y1;
   if (parameters_are_texels) {
     set_texel_parameters(x, y);
@@ -209,10 +209,19 @@ std::array<Interval, 3> PreparedSurface::barycentric(const Rectangle& domain) co
           value_of(b_[2], domain.p, domain.q)};
 }
 
-bool PreparedSurface::is_outside_triangle(const Rectangle& domain) const
+bool PreparedSurface::clip(Rectangle& domain) const
 {
-  const std::array<Interval, 3> b = barycentric(domain);
-  return b[0].high < 0 || b[1].high < 0 || b[2].high < 0;
+  for (const Linear& b : b_) {
+    // c + p_slope · p + q_slope · q >= 0
+    const auto clip_one = [](Interval& x, const Interval& slope, const Interval& rest) {
+      if (slope.low > 0) x.low = std::max(x.low, (-rest / slope).low);
+      if (slope.high < 0) x.high = std::min(x.high, (-rest / slope).high);
+    };
+    clip_one(domain.p, b.p_slope, b.c + b.q_slope * domain.q);
+    clip_one(domain.q, b.q_slope, b.c + b.p_slope * domain.p);
+    if (!(domain.p.low <= domain.p.high && domain.q.low <= domain.q.high)) return false;
+  }
+  return true;
 }
 
 Interval PreparedSurface::displacement(const Rectangle& domain) const
@@ -403,8 +412,8 @@ void PreparedSurface::build()
     const Rectangle domain = nodes[index].domain;
     if (nodes.size() >= (is_large(domain) ? kMaxNodes : kMinNodes)) continue;
     nodes[index].first_child = static_cast<std::int32_t>(nodes.size());
-    for (const Rectangle& half : split(domain)) {
-      if (!is_outside_triangle(half)) nodes.push_back({half});
+    for (Rectangle half : split(domain)) {
+      if (clip(half)) nodes.push_back({half});
     }
     nodes[index].num_children = static_cast<std::int32_t>(nodes.size()) - nodes[index].first_child;
   }

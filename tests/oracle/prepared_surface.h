@@ -52,7 +52,9 @@ struct PreparedSurface {
 
   /// @return  bounds of b0, b1, b2
   std::array<Interval, 3> barycentric(const Rectangle& domain) const;
-  bool is_outside_triangle(const Rectangle& domain) const;
+  /// Cuts off what is outside the triangle, as far as the rest is a rectangle.
+  /// @return  false if nothing is left
+  bool clip(Rectangle& domain) const;
 
   /// @return  true if the rectangle covers so many texels that it is to be split before anything else is tried
   bool is_large(const Rectangle& domain) const;

@@ -68,7 +68,7 @@ class RootSearch {
                        const Patch<Interval>& patch,
                        const Interval& t) const;
   std::optional<Root> find_root(const Rectangle& domain) const;
-  std::optional<Root> prove(double p, double q, double radius) const;
+  std::optional<Root> prove(double p_start, double q_start, double radius) const;
   bool is_small(const Rectangle& r) const
   {
     return r.p.width() <= kMinWidth * unit_p_ && r.q.width() <= kMinWidth * unit_q_;
@@ -133,9 +133,9 @@ void RootSearch::search_large(const Rectangle& domain)
 {
   std::vector<Rectangle> stack{domain};
   while (!stack.empty()) {
-    const Rectangle rectangle = stack.back();
+    Rectangle rectangle = stack.back();
     stack.pop_back();
-    if (surface_.is_outside_triangle(rectangle)) continue;
+    if (!surface_.clip(rectangle)) continue;
     Interval t;
     if (!clip(surface_.evaluate(rectangle.p, rectangle.q, false).S, t)) continue;
     if (!surface_.is_large(rectangle)) {
@@ -152,10 +152,11 @@ void RootSearch::search(const Rectangle& domain, const LeafPatch* leaf)
   // First in, first out: what the limit leaves undecided is then equally small everywhere.
   std::vector<Rectangle> queue{domain};
   for (std::size_t index = 0; index < queue.size(); ++index) {
-    const Rectangle rectangle = queue[index];
-    if (surface_.is_outside_triangle(rectangle) || is_covered(rectangle)) continue;
-    ++num_rectangles_;
+    Rectangle rectangle = queue[index];
     const bool is_known = index == 0 && leaf;
+    if (!is_known && !surface_.clip(rectangle)) continue;
+    if (is_covered(rectangle)) continue;
+    ++num_rectangles_;
     const Patch<Interval> patch = is_known ? leaf->patch : surface_.evaluate(rectangle.p, rectangle.q, true);
     Interval t;
     if (!clip(patch.S, t)) continue;
@@ -275,55 +276,56 @@ std::optional<Root> RootSearch::find_root(const Rectangle& domain) const
 }
 
 /// Krawczyk's test of all three equations around a point, in which the triangle and the map go on past their borders.
-std::optional<Root> RootSearch::prove(double p, double q, double radius) const
+std::optional<Root> RootSearch::prove(double p_start, double q_start, double radius) const
 {
-  const Interval3 S = surface_.evaluate(thin(p), thin(q), false).S;
-  const Interval3 S_O{S[0] - O_[0], S[1] - O_[1], S[2] - O_[2]};
-  const double t = dot(ray_.D, mid(S_O)) / dot(ray_.D, ray_.D);
-  Interval3 F;
-  for (std::size_t k = 0; k < 3; ++k) F[k] = S_O[k] - t * D_[k];
-
-  Interval box[3] = {{-radius * unit_p_, radius * unit_p_}, {-radius * unit_q_, radius * unit_q_}, {0, 0}};
   Root root;
-  root.neighbourhood = {thin(p) + box[0], thin(q) + box[1]};
+  root.bracket = {thin(p_start) + Interval{-radius * unit_p_, radius * unit_p_},
+                  thin(q_start) + Interval{-radius * unit_q_, radius * unit_q_}};
+  root.neighbourhood = root.bracket;
   // The first pass proves the root. The others narrow its bracket, slowly while a border of texels runs through it.
   constexpr int kMaxPasses = 64;
   for (int pass = 0; pass < kMaxPasses; ++pass) {
-    const Interval p_range = thin(p) + box[0], q_range = thin(q) + box[1];
+    Interval& p_range = root.bracket.p;
+    Interval& q_range = root.bracket.q;
+    const double p = p_range.mid(), q = q_range.mid();
+    const Interval3 S = surface_.evaluate(thin(p), thin(q), false).S;
     const Patch<Interval> patch = surface_.evaluate(p_range, q_range, true);
     if (!patch.has_derivatives) return {};
+    const Interval3 S_O{S[0] - O_[0], S[1] - O_[1], S[2] - O_[2]};
+    const double t = pass == 0 ? dot(ray_.D, mid(S_O)) / dot(ray_.D, ray_.D) : root.t.mid();
+    const Interval3 F{S_O[0] - t * D_[0], S_O[1] - t * D_[1], S_O[2] - t * D_[2]};
     const Vector3 S_p = mid(patch.S_p), S_q = mid(patch.S_q);
     const Vector3 rows[3] = {cross(S_q, ray_.D), cross(ray_.D, S_p), cross(S_q, S_p)};
     const double determinant = dot(rows[0], S_p);
     if (!(std::abs(determinant) > 0) || !std::isfinite(1 / determinant)) return {};
-    Interval deviation[3][3], start[3];  // 1 − Y F' and −Y F
-    for (std::size_t row = 0; row < 3; ++row) {
-      const Vector3 Y{rows[row][0] / determinant, rows[row][1] / determinant, rows[row][2] / determinant};
-      start[row] = -dot(Y, F);
-      deviation[row][0] = thin(row == 0 ? 1 : 0) - dot(Y, patch.S_p);
-      deviation[row][1] = thin(row == 1 ? 1 : 0) - dot(Y, patch.S_q);
-      deviation[row][2] = thin(row == 2 ? 1 : 0) + dot(Y, D_);
-    }
+
+    Interval offset[3] = {p_range - thin(p), q_range - thin(q), pass == 0 ? thin(0) : root.t - thin(t)};
     const auto image = [&](std::size_t row) {
-      return start[row] + deviation[row][0] * box[0] + deviation[row][1] * box[1] + deviation[row][2] * box[2];
+      const Vector3 Y{rows[row][0] / determinant, rows[row][1] / determinant, rows[row][2] / determinant};
+      return (thin(row == 0 ? 1 : 0) - dot(Y, patch.S_p)) * offset[0] +
+             (thin(row == 1 ? 1 : 0) - dot(Y, patch.S_q)) * offset[1] +
+             (thin(row == 2 ? 1 : 0) + dot(Y, D_)) * offset[2] - dot(Y, F);
     };
     if (pass == 0) {
       // t is not known beforehand: twice what p and q make of it.
-      const double t_radius = image(2).magnitude();
-      box[2] = {-2 * t_radius, 2 * t_radius};
+      const double t_radius = 2 * image(2).magnitude();
+      offset[2] = {-t_radius, t_radius};
+      root.t = widened(thin(t), t_radius);
     }
-    const Interval new_box[3] = {image(0), image(1), image(2)};
-    bool is_narrowing = false;
+    const Interval images[3] = {image(0), image(1), image(2)};
     for (int k = 0; k < 3; ++k) {
-      if (pass == 0 && !box[k].holds_strictly(new_box[k])) return {};
-      if (!box[k].overlaps(new_box[k])) return {};
-      is_narrowing |= new_box[k].width() < .9 * box[k].width();
-      box[k] = intersection(box[k], new_box[k]);
+      if (pass == 0 && !offset[k].holds_strictly(images[k])) return {};
     }
+    const Interval p_new = thin(p) + images[0], q_new = thin(q) + images[1], t_new = thin(t) + images[2];
+    // Outward rounding keeps them together; numbers that overflowed may not be.
+    if (!p_range.overlaps(p_new) || !q_range.overlaps(q_new) || !root.t.overlaps(t_new)) break;
+    const bool is_narrowing = p_new.width() < .9 * p_range.width() || q_new.width() < .9 * q_range.width() ||
+                              t_new.width() < .9 * root.t.width();
+    p_range = intersection(p_range, p_new);
+    q_range = intersection(q_range, q_new);
+    root.t = intersection(root.t, t_new);
     if (!is_narrowing) break;
   }
-  root.bracket = {thin(p) + box[0], thin(q) + box[1]};
-  root.t = thin(t) + box[2];
   return root;
 }
 
