@@ -237,10 +237,16 @@ std::array<Interval, 3> PreparedSurface::base_point(const Rectangle& domain) con
 
 Vector3 PreparedSurface::normals_axis() const
 {
-  const auto slope = [&](std::size_t axis, Interval Linear::*member) { return (N_[axis].*member).mid(); };
-  const Vector3 a{slope(0, &Linear::p_slope), slope(1, &Linear::p_slope), slope(2, &Linear::p_slope)};
-  const Vector3 b{slope(0, &Linear::q_slope), slope(1, &Linear::q_slope), slope(2, &Linear::q_slope)};
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+  const auto slope = [&](Interval Linear::*member) -> Vector3 {
+    return {(N_[0].*member).mid(), (N_[1].*member).mid(), (N_[2].*member).mid()};
+  };
+  const Vector3 a = slope(&Linear::p_slope), b = slope(&Linear::q_slope);
+  const Vector3 axis{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+  const Vector3& N = triangle.N[0];
+  const double along = N[0] * axis[0] + N[1] * axis[1] + N[2] * axis[2];
+  const double size = std::hypot(axis[0], axis[1], axis[2]) * std::hypot(N[0], N[1], N[2]);
+  // The rounding errors of a dozen operations; normals that are perpendicular to nothing are far above.
+  return std::abs(along) <= 1e-13 * size ? axis : Vector3{};
 }
 
 Rectangle PreparedSurface::texels_of(const Rectangle& domain) const

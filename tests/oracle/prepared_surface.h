@@ -65,7 +65,7 @@ struct PreparedSurface {
   /// P without displacement, relative to corner 0.
   std::array<Interval, 3> base_point(const Rectangle& domain) const;
 
-  /// Direction perpendicular to N's derivatives: where N vanishes at a point, N is perpendicular to it everywhere.
+  /// Direction to which all normals are perpendicular; zero if there is none, as unless N vanishes somewhere.
   Vector3 normals_axis() const;
 
   DisplacedTriangle triangle;

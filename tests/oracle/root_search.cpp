@@ -13,10 +13,14 @@ using Interval3 = std::array<Interval, 3>;
 
 /// Rectangles looked at within one leaf, and of one ray, before the rest is called undecided. A ray that lies in the
 /// surface would need all there are.
-constexpr std::size_t kMaxRectanglesInLeaf = 1024, kMaxRectangles = 1 << 16;
+constexpr std::size_t kMaxRectanglesInLeaf = 1024, kMaxRectangles = 1 << 18;
+/// A ray with that many undecided rectangles lies in the surface, and the next leaves are given up sooner.
+constexpr std::size_t kManyUndecided = 512, kMaxRectanglesInLeafAfter = 16;
 /// Smallest rectangle, relative to a texel or to the triangle. Two roots closer to each other than this are one
 /// undecided one; what matters is that it is well above the rounding errors of S.
 constexpr double kMinWidth = 0x1p-34;
+/// The same where N may vanish.
+constexpr double kMinWidthAtSingularity = 0x1p-20;
 
 Interval dot(const Vector3& a, const Interval3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 double dot(const Vector3& a, const Vector3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -69,9 +73,10 @@ class RootSearch {
                        const Interval& t) const;
   std::optional<Root> find_root(const Rectangle& domain) const;
   std::optional<Root> prove(double p_start, double q_start, double radius) const;
-  bool is_small(const Rectangle& r) const
+  bool is_small(const Rectangle& r, const Patch<Interval>& patch) const
   {
-    return r.p.width() <= kMinWidth * unit_p_ && r.q.width() <= kMinWidth * unit_q_;
+    const double width = patch.has_derivatives ? kMinWidth : kMinWidthAtSingularity;
+    return r.p.width() <= width * unit_p_ && r.q.width() <= width * unit_q_;
   }
   bool is_covered(const Rectangle& r) const;
   void add_root(const Root& root);
@@ -178,7 +183,8 @@ void RootSearch::search(const Rectangle& domain, const LeafPatch* leaf)
       }
       if (is_covered(rest)) continue;
     }
-    if (is_small(rest) || queue.size() > kMaxRectanglesInLeaf || num_rectangles_ > kMaxRectangles) {
+    const std::size_t limit = undecided_.size() < kManyUndecided ? kMaxRectanglesInLeaf : kMaxRectanglesInLeafAfter;
+    if (is_small(rest, patch) || queue.size() > limit || num_rectangles_ > kMaxRectangles) {
       add_undecided(rest, patch, t);
       continue;
     }
@@ -372,22 +378,24 @@ Hit RootSearch::make_hit(double p, double q, const Interval& t) const
 void RootSearch::add_undecided(const Rectangle& domain, const Patch<Interval>& patch, const Interval& t)
 {
   const double p = domain.p.mid(), q = domain.q.mid();
-  if (patch.has_derivatives || !is_small(domain)) {
+  if (patch.has_derivatives || !is_small(domain, patch)) {
     undecided_.push_back(make_hit(p, q, t));
     return;
   }
-  // N vanishes at a point, where S is not defined. The closure of S is part of the circle of radius |d| around P that is
-  // perpendicular to all N nearby; only a ray through it is in doubt.
-  const Vector3 center = mid(surface_.base_point(domain)), axis = surface_.normals_axis();
-  const double radius = surface_.displacement(domain).magnitude();
+  // S is not defined where N vanishes. Its closure is part of the circle of radius |d| around P that is perpendicular to the axis
+  // of the normals, or of a sphere if they have none; only a ray through it is in doubt.
+  const Interval3 P = surface_.base_point(domain);
+  const Interval d = surface_.displacement(domain);
+  const Vector3 center = mid(P), axis = surface_.normals_axis();
+  const double radius = std::abs(d.mid());
+  const double tolerance = d.width() + P[0].width() + P[1].width() + P[2].width() + 1e-6 * radius;
   const Vector3 from_center{O_[0].mid() - center[0], O_[1].mid() - center[1], O_[2].mid() - center[2]};
   const double a = dot(ray_.D, ray_.D), half_b = dot(ray_.D, from_center);
   const double discriminant = half_b * half_b - a * (dot(from_center, from_center) - radius * radius);
-  const double tolerance = 1e-6 * radius;
   const double root = std::sqrt(std::max(discriminant, 0.));
   for (const double t_sphere : {(-half_b - root) / a, (-half_b + root) / a}) {
-    Vector3 X;
-    for (std::size_t k = 0; k < 3; ++k) X[k] = from_center[k] + t_sphere * ray_.D[k];
+    const Vector3 X{from_center[0] + t_sphere * ray_.D[0], from_center[1] + t_sphere * ray_.D[1],
+                    from_center[2] + t_sphere * ray_.D[2]};
     const bool is_on_sphere = std::abs(length(X) - radius) <= tolerance;
     const bool is_in_plane = std::abs(dot(X, axis)) <= tolerance * length(axis);
     const Interval t_doubt = widened(thin(t_sphere), tolerance / length(ray_.D));
