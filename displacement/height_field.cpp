@@ -10,26 +10,6 @@
 
 namespace relief {
 
-namespace {
-
-constexpr StoredRange kEmpty{65535, 0};
-
-StoredRange merge(StoredRange a, StoredRange b) { return {std::min(a.low, b.low), std::max(a.high, b.high)}; }
-
-LatticeAxis lattice_axis(int num_texels, Wrap wrap)
-{
-  switch (wrap) {
-    case Wrap::kRepeat:
-      return {num_texels, wrap, num_texels, 0};
-    case Wrap::kMirror:
-      return {num_texels, wrap, 2 * num_texels, 0};
-    case Wrap::kClamp:
-      break;
-  }
-  return {num_texels, wrap, num_texels + 1, -1};
-}
-
-/// Bounds of one texel's height in stored units.
 StoredRange texel_range(const HeightFieldView& f, std::int64_t at)
 {
   switch (f.map.format) {
@@ -48,6 +28,25 @@ StoredRange texel_range(const HeightFieldView& f, std::int64_t at)
   // The quotient is off by less than 2^-30 of a unit.
   return {static_cast<std::uint16_t>(std::clamp(std::floor(q - 0x1p-30), 0.0, 65535.0)),
           static_cast<std::uint16_t>(std::clamp(std::ceil(q + 0x1p-30), 0.0, 65535.0))};
+}
+
+namespace {
+
+constexpr StoredRange kEmpty{65535, 0};
+
+StoredRange merge(StoredRange a, StoredRange b) { return {std::min(a.low, b.low), std::max(a.high, b.high)}; }
+
+LatticeAxis lattice_axis(int num_texels, Wrap wrap)
+{
+  switch (wrap) {
+    case Wrap::kRepeat:
+      return {num_texels, wrap, num_texels, 0};
+    case Wrap::kMirror:
+      return {num_texels, wrap, 2 * num_texels, 0};
+    case Wrap::kClamp:
+      break;
+  }
+  return {num_texels, wrap, num_texels + 1, -1};
 }
 
 StoredRange texel_range_at(const HeightFieldView& f, std::int64_t i, std::int64_t j)

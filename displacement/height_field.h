@@ -117,6 +117,10 @@ class HeightField {
   HeightFieldView view_;
 };
 
+/// Bounds of one texel's height.
+/// @param at  row · width + column
+StoredRange texel_range(const HeightFieldView& field, std::int64_t at);
+
 /// Conservative bounds of the interpolated heights over whole cells.
 /// @param i0, j0  first cell, inclusive; i1, j1  last cell, inclusive; lattice coordinates, any period
 /// @return        bounds, from pyramid nodes and single cells: tight to the cell
