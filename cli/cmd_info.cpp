@@ -7,6 +7,8 @@
 #include "cli/commands.h"
 #include "cli/scene_setup.h"
 #include "integrator/scene_context.h"
+#include "scene/displaced_mesh.h"
+#include "scene/displacement_seams.h"
 #include "scene/texture_store.h"
 
 namespace relief {
@@ -51,6 +53,76 @@ void print_names(const char* what, const std::vector<std::string>& names)
   fmt::print("{}\n", names.size() > kMost ? ", …" : "");
 }
 
+const char* label(HeightFormat format)
+{
+  return format == HeightFormat::kU8 ? "8-bit" : format == HeightFormat::kU16 ? "16-bit" : "float";
+}
+
+const char* label(Wrap wrap) { return wrap == Wrap::kRepeat ? "repeat" : wrap == Wrap::kMirror ? "mirror" : "clamp"; }
+
+void print_height_maps(const Scene& scene, const std::vector<HeightRange>& ranges)
+{
+  fmt::print("height maps: {}\n", scene.height_maps.size());
+  for (std::size_t i = 0; i < scene.height_maps.size(); ++i) {
+    const HeightMap& map = scene.height_maps[i];
+    fmt::print("  {}: {}x{}, {}, {}, heights {:.6g} to {:.6g}, wrap {}, {}\n", map.label, map.width, map.height,
+               label(map.format), megabytes(map.bytes()), ranges[i].low, ranges[i].high, label(map.wrap_u),
+               label(map.wrap_v));
+  }
+}
+
+/// Names of the materials that share the displacement.
+std::string material_names(const Scene& scene, int displacement_index)
+{
+  std::string names;
+  for (std::size_t i = 0; i < scene.materials.size(); ++i) {
+    if (scene.materials[i].displacement_index == displacement_index) {
+      const std::string& name = scene.material_names[i];
+      names += fmt::format("{}{}", names.empty() ? "" : ", ", name.empty() ? "(unnamed)" : name);
+    }
+  }
+  return names;
+}
+
+void print_displacement(const Scene& scene, int index, const std::vector<HeightRange>& ranges)
+{
+  const DisplacementSettings& d = scene.displacements[static_cast<std::size_t>(index)];
+  const auto map_index = static_cast<std::size_t>(d.height.texture_index);
+  std::size_t num_meshes = 0;
+  UvBounds uv;
+  DisplacementSeams seams;
+  for (const DisplacedMesh& displaced : displaced_meshes(scene)) {
+    if (displaced.displacement_index != index) continue;
+    const Mesh& mesh = scene.meshes[static_cast<std::size_t>(displaced.mesh_index)];
+    ++num_meshes;
+    uv = uv_bounds_union(uv, displaced_mesh_uv_bounds(mesh, d.height));
+    const DisplacementSeams found = displacement_seams(mesh, d, scene.height_maps[map_index].view(), ranges[map_index]);
+    seams.num_edges += found.num_edges;
+    seams.length += found.length;
+    seams.largest_gap = std::max(seams.largest_gap, found.largest_gap);
+  }
+  fmt::print("  {}: {}, method {}, scale {:g} m, midlevel {:g}, {} space\n", material_names(scene, index),
+             scene.height_maps[map_index].label, kDisplacementMethodLabels[static_cast<std::size_t>(d.method)], d.scale,
+             d.midlevel, d.space == DisplacementSpace::kWorld ? "world" : "object");
+  fmt::print("    meshes: {}", num_meshes);
+  if (uv.low.x <= uv.high.x) {
+    fmt::print(", uv {:g} to {:g}, {:g} to {:g}", uv.low.x, uv.high.x, uv.low.y, uv.high.y);
+  }
+  fmt::print("\n    uv seams with different heights: {} edges, {:g} m, gap up to {:g} m\n", seams.num_edges,
+             seams.length, seams.largest_gap);
+}
+
+void print_displacements(const Scene& scene)
+{
+  std::vector<HeightRange> ranges;
+  for (const HeightMap& map : scene.height_maps) ranges.push_back(height_map_range(map.view()));
+  print_height_maps(scene, ranges);
+  fmt::print("displacements: {}\n", scene.displacements.size());
+  for (std::size_t i = 0; i < scene.displacements.size(); ++i) {
+    print_displacement(scene, static_cast<int>(i), ranges);
+  }
+}
+
 int info(const std::string& file, bool strict)
 {
   const Scene scene = scene_load_to_trace(file);
@@ -87,13 +159,15 @@ int info(const std::string& file, bool strict)
                view.num_channels, view.num_channels == 1 ? "" : "s",
                scene.textures->is_cached(static_cast<int>(i)) ? ", through the tile cache" : "");
   }
+  if (!scene.displacements.empty()) print_displacements(scene);
   std::string features;
   for (const FeatureName& feature : kFeatureNames) {
     if (scene.features.*feature.present) features += fmt::format("{}{}", features.empty() ? "" : ", ", feature.name);
   }
   fmt::print("features: {}\n", features.empty() ? "none" : features);
-  fmt::print("memory: meshes {}, textures {}, acceleration structure {}, lights {}\n", megabytes(stats.mesh_bytes),
-             megabytes(stats.texture_bytes), megabytes(stats.bvh_bytes), megabytes(stats.light_bytes));
+  fmt::print("memory: meshes {}, textures {}, height maps {}, acceleration structure {}, lights {}\n",
+             megabytes(stats.mesh_bytes), megabytes(stats.texture_bytes),
+             megabytes(height_map_bytes(scene.height_maps)), megabytes(stats.bvh_bytes), megabytes(stats.light_bytes));
   for (const std::string& warning : scene.warnings) fmt::print("warning: {}\n", warning);
   if (strict) refuse_warnings(file, scene.warnings);
   return 0;

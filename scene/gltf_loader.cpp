@@ -3,6 +3,7 @@
 #include <new>
 #include <utility>
 
+#include "scene/displaced_mesh.h"
 #include "scene/feature_set.h"
 #include "scene/gltf_mesh.h"
 #include "scene/khronos_extensions.h"
@@ -157,6 +158,7 @@ void GltfLoader::place_instance(const PlacedNode& node, int mesh_index, const Tr
     throw SceneError(node.document->file, path, "positions within 1e15 m of the origin", "farther ones");
   }
   world_bounds_ = bounds_union(world_bounds_, bounds);
+  check_displacement(node, instance);
   scene_.instances.push_back(std::move(instance));
 }
 
@@ -187,21 +189,25 @@ void GltfLoader::place_lights(const PlacedNode& node)
 /// Says what a material asks of a mesh that the mesh does not have.
 void GltfLoader::warn_missing_attributes(const std::string& label, const Mesh& mesh, const Material& material)
 {
-  const auto check = [&](const TextureRef& ref) {
-    if (ref.texture_index >= 0 && mesh.uv[ref.uv_set].empty()) {
-      warnings_.add(label + ": the material's textures need TEXCOORD_" + std::to_string(ref.uv_set) +
+  for (const TextureRef* ref : material_textures(material)) {
+    if (ref->texture_index >= 0 && mesh.uv[ref->uv_set].empty()) {
+      warnings_.add(label + ": the material's textures need TEXCOORD_" + std::to_string(ref->uv_set) +
                     ", which is missing");
     }
-  };
-  for (const TextureRef* ref : material_textures(material)) {
-    check(*ref);
   }
-  if (material.displacement_index >= 0) {
-    check(scene_.displacements[static_cast<std::size_t>(material.displacement_index)].height);
-    if (mesh.N.empty()) {
-      warnings_.add(label + ": displaced without normals: triangles move along their own and open cracks");
-    }
+}
+
+/// Says what displacement asks of a mesh that the mesh does not have.
+void GltfLoader::check_displacement(const PlacedNode& node, const Instance& instance)
+{
+  const int index = scene_.materials[static_cast<std::size_t>(instance.material_index)].displacement_index;
+  if (index < 0 || !displaced_.emplace(instance.mesh_index, index).second) {
+    return;
   }
+  const int mesh = node.document->core.nodes[static_cast<std::size_t>(node.node_index)].mesh;
+  displaced_mesh_warn(node.document->file + ": /meshes/" + std::to_string(mesh),
+                      scene_.meshes[static_cast<std::size_t>(instance.mesh_index)],
+                      scene_.displacements[static_cast<std::size_t>(index)].height, warnings_);
 }
 
 const std::vector<int>& GltfLoader::meshes_of(const GltfDocument& document, int mesh_index)

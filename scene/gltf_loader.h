@@ -3,6 +3,8 @@
 #pragma once
 
 #include <map>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "scene/composition.h"
@@ -36,6 +38,7 @@ class GltfLoader {
   void place_lights(const PlacedNode& node);
   void add_defaults();
   void warn_missing_attributes(const std::string& label, const Mesh& mesh, const Material& material);
+  void check_displacement(const PlacedNode& node, const Instance& instance);
 
   const std::vector<int>& meshes_of(const GltfDocument& document, int mesh_index);
   int material_of(const GltfDocument& document, int material_index);
@@ -46,6 +49,7 @@ class GltfLoader {
   Bounds world_bounds_;
   float image_aspect_ = 1;
   std::vector<Bounds> mesh_bounds_;
+  std::set<std::pair<int, int>> displaced_;  ///< meshes and displacements that check_displacement has seen
   std::map<std::pair<const GltfDocument*, int>, std::vector<int>> meshes_of_;
   std::map<std::pair<const GltfDocument*, int>, int> material_of_;
   DocumentSet documents_;

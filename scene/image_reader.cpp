@@ -102,7 +102,7 @@ ImageReader::ImageReader(const ImageSource& source) : source_(source)
 {
   try {
     open();
-    check_size();
+    check_header();
   } catch (const SceneError&) {
     throw;
   } catch (const std::exception& e) {
@@ -162,7 +162,7 @@ void ImageReader::open()
   }
 }
 
-void ImageReader::check_size() const
+void ImageReader::check_header() const
 {
   const bool sane = spec_.width >= 1 && spec_.height >= 1 && spec_.width <= kMaxTextureSide &&
                     spec_.height <= kMaxTextureSide && spec_.depth <= 1 && spec_.nchannels >= 1 &&
@@ -176,6 +176,10 @@ void ImageReader::check_size() const
   }
   if (spec_.deep) {
     fail(source_, "a flat image", "a deep image");
+  }
+  // OpenImageIO 2.4 says that it has read such samples, but leaves the buffer as it was.
+  if (spec_.format == OIIO::TypeDesc::DOUBLE && std::string_view(input_->format_name()) == "tiff") {
+    fail(source_, "a TIFF image of at most 32 bits a sample", "64 bits");
   }
 }
 

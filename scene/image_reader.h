@@ -29,7 +29,8 @@ class ImageReader {
  public:
   /// Opens the image and reads its header. The format is told by the first bytes; the file's extension counts only for
   /// formats without a signature (TGA).
-  /// @error SceneError: missing, not an image, deep, or larger than kMaxTextureSide or kMaxImageChannels
+  /// @error SceneError: missing, not an image, deep, larger than kMaxTextureSide or kMaxImageChannels, or of samples that
+  ///        OpenImageIO does not read (TIFF with doubles)
   explicit ImageReader(const ImageSource& source);
 
   const OIIO::ImageSpec& spec() const { return spec_; }
@@ -50,7 +51,7 @@ class ImageReader {
 
  private:
   void open();
-  void check_size() const;
+  void check_header() const;
   void read(int begin, int end);
 
   ImageSource source_;

@@ -248,48 +248,6 @@ TEST(Extensions, UsedButUnknownOnesAreOneWarning)
   EXPECT_FALSE(has_warning(scene, "KHR_materials_ior"));
 }
 
-TEST(Displacement, IsRead)
-{
-  const Scene scene = load(square_with(
-      {{"extensions",
-        {{"RELIEF_displacement",
-          {{"heightTexture", {{"index", 0}, {"extensions", {{"KHR_texture_transform", {{"scale", {8, 8}}}}}}}},
-           {"scale", -0.25},
-           {"midlevel", 0.1},
-           {"space", "world"},
-           {"method", "tfdm"},
-           {"lod", 2},
-           {"smoothing", true},
-           {"seams", "weld"}}}}}}));
-  ASSERT_EQ(scene.displacements.size(), 1u);
-  EXPECT_EQ(scene.materials.at(0).displacement_index, 0);
-  const DisplacementSettings& d = scene.displacements[0];
-  EXPECT_GE(d.height.texture_index, 0);
-  EXPECT_EQ(d.height.m00, 8);
-  EXPECT_EQ(d.scale, -0.25f);
-  EXPECT_EQ(d.midlevel, 0.1f);
-  EXPECT_EQ(d.space, DisplacementSpace::kWorld);
-  EXPECT_EQ(d.method, DisplacementMethod::kTfdm);
-  EXPECT_EQ(d.lod, 2);
-  EXPECT_TRUE(d.smoothing);
-  EXPECT_TRUE(d.weld_seams);
-  EXPECT_TRUE(scene.features.displacement);
-}
-
-// offset + factor · h = scale · (h − midlevel)
-TEST(Displacement, TheUnofficialExtensionMeansTheSame)
-{
-  const Scene scene = load(square_with({{"extensions",
-                                         {{"KHR_materials_displacement",
-                                           {{"displacementGeometryTexture", {{"index", 0}}},
-                                            {"displacementGeometryFactor", 0.5},
-                                            {"displacementGeometryOffset", -0.1}}}}}}));
-  const DisplacementSettings& d = scene.displacements.at(0);
-  for (const float h : {0.0f, 0.3f, 1.0f}) {
-    EXPECT_NEAR(d.scale * (h - d.midlevel), -0.1f + 0.5f * h, 1e-7f);
-  }
-}
-
 // --- lights ---
 
 GltfBuilder lit_by(const json& light, const json& node = json::object())

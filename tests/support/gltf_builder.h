@@ -59,6 +59,24 @@ inline std::string base64(std::string_view bytes)
   return out;
 }
 
+/// Bytes of base64 text without white space.
+inline std::string from_base64(std::string_view text)
+{
+  static constexpr std::string_view kDigits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  unsigned word = 0;
+  int num_bits = 0;
+  for (const char c : text.substr(0, text.find('='))) {
+    word = (word << 6) | static_cast<unsigned>(kDigits.find(c));
+    num_bits += 6;
+    if (num_bits >= 8) {
+      num_bits -= 8;
+      out += static_cast<char>((word >> num_bits) & 0xff);
+    }
+  }
+  return out;
+}
+
 /// A PNG of one opaque pixel.
 inline constexpr std::string_view kPixelPng =
     "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJg"

@@ -1,0 +1,161 @@
+#include "scene/displacement_seams.h"
+
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "kernel/texture/texture.h"
+#include "scene/displaced_mesh.h"
+
+namespace relief {
+namespace {
+
+struct Uv {
+  double u = 0, v = 0;
+};
+
+/// One triangle's edge: its ends by position, the smaller first, and by vertex.
+struct EdgeSide {
+  std::uint32_t position0 = 0, position1 = 0;
+  std::uint32_t vertex0 = 0, vertex1 = 0;
+
+  auto edge() const { return std::tie(position0, position1); }
+  auto key() const { return std::tie(position0, position1, vertex0, vertex1); }
+};
+
+/// Sides of all edges, those of one edge together; equal sides once.
+std::vector<EdgeSide> edge_sides(const Mesh& mesh)
+{
+  const std::vector<std::uint32_t> first_at = weld_positions(mesh.P);
+  std::vector<EdgeSide> sides;
+  sides.reserve(3 * mesh.triangles.size());
+  const auto add = [&](std::uint32_t a, std::uint32_t b) {
+    if (first_at[a] > first_at[b]) {
+      std::swap(a, b);
+    }
+    if (first_at[a] != first_at[b]) {
+      sides.push_back({first_at[a], first_at[b], a, b});
+    }
+  };
+  for (const TriangleIndices& t : mesh.triangles) {
+    add(t.v0, t.v1);
+    add(t.v1, t.v2);
+    add(t.v2, t.v0);
+  }
+  tbb::parallel_sort(sides.begin(), sides.end(),
+                     [](const EdgeSide& a, const EdgeSide& b) { return a.key() < b.key(); });
+  sides.erase(
+      std::unique(sides.begin(), sides.end(), [](const EdgeSide& a, const EdgeSide& b) { return a.key() == b.key(); }),
+      sides.end());
+  return sides;
+}
+
+/// The height map along edges of one mesh.
+class SeamProbe {
+ public:
+  SeamProbe(const Mesh& mesh, const TextureRef& ref, const HeightMapView& map) : mesh_(mesh), ref_(ref), map_(map) {}
+
+  /// Number of points to compare along an edge.
+  int num_points(std::span<const EdgeSide> sides) const
+  {
+    constexpr double kFewest = 16, kMost = 4096, kPointsPerTexel = 2;
+    double texels = 0;
+    for (const EdgeSide& side : sides) {
+      const Uv a = vertex_uv(side.vertex0), b = vertex_uv(side.vertex1);
+      texels = std::max({texels, std::abs(b.u - a.u) * map_.width, std::abs(b.v - a.v) * map_.height});
+    }
+    return static_cast<int>(std::clamp(std::ceil(kPointsPerTexel * texels), kFewest, kMost));
+  }
+
+  /// Largest difference of the sides' heights at fraction t of the edge.
+  double gap(std::span<const EdgeSide> sides, double t) const
+  {
+    double low = static_cast<double>(kInfinity), high = -low;
+    for (const EdgeSide& side : sides) {
+      const Uv a = vertex_uv(side.vertex0), b = vertex_uv(side.vertex1);
+      const double h = height({a.u + t * (b.u - a.u), a.v + t * (b.v - a.v)});
+      low = std::min(low, h);
+      high = std::max(high, h);
+    }
+    return high - low;
+  }
+
+ private:
+  Uv vertex_uv(std::uint32_t vertex) const
+  {
+    const auto d = [](float x) { return static_cast<double>(x); };
+    const Vec2f uv = mesh_.uv[ref_.uv_set][vertex];
+    return {d(ref_.m00) * d(uv.x) + d(ref_.m01) * d(uv.y) + d(ref_.m02),
+            d(ref_.m10) * d(uv.x) + d(ref_.m11) * d(uv.y) + d(ref_.m12)};
+  }
+
+  static AxisTexels axis(double u, int size, Wrap wrap)
+  {
+    // Both periodic modes repeat after two; taken off in double precision, so that a tile far out is as exact as the first.
+    const double near = wrap == Wrap::kClamp ? u : u - 2 * std::floor(u / 2);
+    return axis_linear(static_cast<float>(near), size, wrap);
+  }
+
+  double height(Uv at) const
+  {
+    const AxisTexels x = axis(at.u, map_.width, map_.wrap_u);
+    const AxisTexels y = axis(at.v, map_.height, map_.wrap_v);
+    const auto texel = [&](int i, int j) {
+      return static_cast<double>(height_at(map_, std::int64_t{j} * map_.width + i));
+    };
+    const double top = std::lerp(texel(x.i0, y.i0), texel(x.i1, y.i0), static_cast<double>(x.t));
+    const double bottom = std::lerp(texel(x.i0, y.i1), texel(x.i1, y.i1), static_cast<double>(x.t));
+    return std::lerp(top, bottom, static_cast<double>(y.t));
+  }
+
+  const Mesh& mesh_;
+  const TextureRef& ref_;
+  const HeightMapView& map_;
+};
+
+}  // namespace
+
+DisplacementSeams displacement_seams(const Mesh& mesh,
+                                     const DisplacementSettings& settings,
+                                     const HeightMapView& map,
+                                     HeightRange range)
+{
+  DisplacementSeams seams;
+  if (mesh.uv[settings.height.uv_set].empty()) {
+    return seams;
+  }
+  const double least_gap = 1e-3 * (static_cast<double>(range.high) - static_cast<double>(range.low));
+  const std::vector<EdgeSide> sides = edge_sides(mesh);
+  const SeamProbe probe(mesh, settings.height, map);
+  for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
+    while (end < sides.size() && sides[end].edge() == sides[begin].edge()) {
+      ++end;
+    }
+    const std::span<const EdgeSide> edge(&sides[begin], end - begin);
+    if (edge.size() < 2) {
+      continue;
+    }
+    const int num_points = probe.num_points(edge);
+    int num_gaps = 0;
+    for (int i = 0; i < num_points; ++i) {
+      const double gap = probe.gap(edge, (i + 0.5) / num_points);
+      if (gap > least_gap) {
+        ++num_gaps;
+        seams.largest_gap = std::max(seams.largest_gap, gap * std::abs(static_cast<double>(settings.scale)));
+      }
+    }
+    if (num_gaps > 0) {
+      ++seams.num_edges;
+      const auto edge_length = static_cast<double>(length(mesh.P[edge[0].position1] - mesh.P[edge[0].position0]));
+      seams.length += edge_length * num_gaps / num_points;
+    }
+  }
+  return seams;
+}
+
+}  // namespace relief

@@ -1,0 +1,398 @@
+// Displacement of materials: settings, where the height maps come from, and what is said of the meshes under them.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "scene/displaced_mesh.h"
+#include "scene/displacement_seams.h"
+#include "scene/load.h"
+#include "scene/texture_store.h"
+#include "tests/support/gltf_builder.h"
+
+namespace relief {
+namespace {
+
+using nlohmann::json;
+using test::GltfBuilder;
+
+Scene load(const GltfBuilder& b)
+{
+  const test::TemporaryFolder folder;
+  return scene_load(folder.write("scene.gltf", b.gltf()));
+}
+
+std::size_t num_warnings(const Scene& scene, const std::string& part)
+{
+  return static_cast<std::size_t>(std::count_if(scene.warnings.begin(), scene.warnings.end(),
+                                                [&](const auto& w) { return w.find(part) != std::string::npos; }));
+}
+
+/// The square under one displaced material, whose texture 0 is a grey pixel.
+GltfBuilder square_displaced(const json& settings)
+{
+  GltfBuilder b = test::square_scene();
+  b.json["images"] = {{{"uri", test::kGreyPixelPng}}};
+  b.json["textures"] = {{{"source", 0}}};
+  b.json["materials"] = {{{"name", "bark"}, {"extensions", {{"RELIEF_displacement", settings}}}}};
+  b.json["meshes"][0]["primitives"][0]["material"] = 0;
+  return b;
+}
+
+GltfBuilder square_displaced() { return square_displaced({{"heightTexture", {{"index", 0}}}}); }
+
+const DisplacementSettings& settings(const Scene& scene) { return scene.displacements.at(0); }
+
+const HeightMap& height_map(const Scene& scene)
+{
+  return scene.height_maps.at(static_cast<std::size_t>(settings(scene).height.texture_index));
+}
+
+// --- settings ---
+
+TEST(Displacement, IsRead)
+{
+  const Scene scene = load(square_displaced(
+      {{"heightTexture", {{"index", 0}, {"extensions", {{"KHR_texture_transform", {{"scale", {8, 8}}}}}}}},
+       {"scale", -0.25},
+       {"midlevel", 0.1},
+       {"space", "world"},
+       {"method", "tfdm"},
+       {"lod", 2},
+       {"smoothing", true},
+       {"seams", "weld"}}));
+  ASSERT_EQ(scene.displacements.size(), 1u);
+  EXPECT_EQ(scene.materials.at(0).displacement_index, 0);
+  const DisplacementSettings& d = settings(scene);
+  EXPECT_EQ(d.height.texture_index, 0);
+  EXPECT_EQ(d.height.m00, 8);
+  EXPECT_EQ(d.scale, -0.25f);
+  EXPECT_EQ(d.midlevel, 0.1f);
+  EXPECT_EQ(d.space, DisplacementSpace::kWorld);
+  EXPECT_EQ(d.method, DisplacementMethod::kTfdm);
+  EXPECT_EQ(d.lod, 2);
+  EXPECT_TRUE(d.smoothing);
+  EXPECT_TRUE(d.weld_seams);
+  EXPECT_TRUE(scene.features.displacement);
+  EXPECT_TRUE(scene.textures->views().empty());
+}
+
+TEST(Displacement, EveryMethodHasItsName)
+{
+  using M = DisplacementMethod;
+  const std::pair<const char*, M> methods[] = {{"auto", M::kAuto},           {"rmip", M::kRmip},
+                                               {"tfdm", M::kTfdm},           {"tessellate", M::kTessellate},
+                                               {"chord", M::kChord},         {"rmip-minmax", M::kMinmaxRmip},
+                                               {"cone", M::kCone},           {"microtriangle", M::kMicrotriangle},
+                                               {"tessellate-grid", M::kGrid}};
+  for (const auto& [name, method] : methods) {
+    EXPECT_EQ(settings(load(square_displaced({{"heightTexture", {{"index", 0}}}, {"method", name}}))).method, method)
+        << name;
+  }
+}
+
+// offset + factor · h = scale · (h − midlevel)
+TEST(Displacement, TheUnofficialExtensionMeansTheSame)
+{
+  GltfBuilder b = square_displaced();
+  b.json["materials"][0]["extensions"] = {{"KHR_materials_displacement",
+                                           {{"displacementGeometryTexture", {{"index", 0}}},
+                                            {"displacementGeometryFactor", 0.5},
+                                            {"displacementGeometryOffset", -0.1}}}};
+  const Scene scene = load(b);
+  const DisplacementSettings& d = settings(scene);
+  for (const float h : {0.0f, 0.3f, 1.0f}) {
+    EXPECT_NEAR(d.scale * (h - d.midlevel), -0.1f + 0.5f * h, 1e-7f);
+  }
+  EXPECT_EQ(height_map(scene).width, 1);
+}
+
+TEST(Displacement, ProceduralAloneLeavesTheMeshAndSaysSo)
+{
+  const Scene scene = load(square_displaced({{"procedural", {{"noise", "fbm"}}}}));
+  EXPECT_TRUE(scene.displacements.empty());
+  EXPECT_EQ(scene.materials.at(0).displacement_index, -1);
+  EXPECT_FALSE(scene.features.displacement);
+  EXPECT_EQ(num_warnings(scene, "/procedural: procedural displacement is not supported"), 1u);
+}
+
+TEST(Displacement, ProceduralBesideAMapLeavesTheMapAlone)
+{
+  const Scene scene = load(square_displaced({{"heightTexture", {{"index", 0}}}, {"procedural", json::object()}}));
+  EXPECT_EQ(scene.displacements.size(), 1u);
+  EXPECT_EQ(num_warnings(scene, "procedural displacement is not supported"), 1u);
+}
+
+// --- where height maps come from ---
+
+TEST(Displacement, WrapModesAreTheSamplers)
+{
+  constexpr int kClampToEdge = 33071, kMirroredRepeat = 33648;
+  GltfBuilder b = square_displaced();
+  b.json["samplers"] = {{{"wrapS", kClampToEdge}, {"wrapT", kMirroredRepeat}}};
+  EXPECT_EQ(height_map(load(b)).wrap_u, Wrap::kRepeat);
+  b.json["textures"][0]["sampler"] = 0;
+  const Scene scene = load(b);
+  EXPECT_EQ(height_map(scene).wrap_u, Wrap::kClamp);
+  EXPECT_EQ(height_map(scene).wrap_v, Wrap::kMirror);
+  EXPECT_EQ(num_warnings(scene, "images"), 0u);
+}
+
+TEST(Displacement, NearestFilterIsAWarning)
+{
+  constexpr int kNearest = 9728;
+  GltfBuilder b = square_displaced();
+  b.json["samplers"] = {{{"magFilter", kNearest}}};
+  b.json["textures"][0]["sampler"] = 0;
+  EXPECT_EQ(num_warnings(load(b), "heights are interpolated"), 1u);
+}
+
+TEST(Displacement, AnImageMayBeColourAndHeight)
+{
+  GltfBuilder b = square_displaced();
+  b.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = 0;
+  const Scene scene = load(b);
+  EXPECT_EQ(scene.textures->views().size(), 1u);
+  ASSERT_EQ(scene.height_maps.size(), 1u);
+  EXPECT_EQ(scene.materials.at(0).base_color_texture.texture_index, 0);
+  EXPECT_EQ(scene.textures->views()[0].format, TexelFormat::kU8Srgb);
+  // 128/255 as it is, not its linear value
+  EXPECT_EQ(*static_cast<const std::uint8_t*>(height_map(scene).texels.get()), 128);
+}
+
+TEST(Displacement, MaterialsShareEqualMapsHoweverTheyNameThem)
+{
+  const test::TemporaryFolder folder;
+  const std::string_view uri = test::kGreyPixelPng;
+  GltfBuilder b = square_displaced({{"heightTexture", {{"uri", "h.png"}}}});
+  b.json["images"][0]["uri"] = "h.png";
+  b.push("materials", {{"extensions", {{"RELIEF_displacement", {{"heightTexture", {{"index", 0}}}}}}}});
+  b.json["meshes"].push_back(b.json["meshes"][0]);
+  b.json["meshes"][1]["primitives"][0]["material"] = 1;
+  b.root_node({{"mesh", 1}});
+  folder.write("h.png", test::from_base64(uri.substr(uri.find(',') + 1)));
+  const Scene scene = scene_load(folder.write("scene.gltf", b.gltf()));
+  ASSERT_EQ(scene.displacements.size(), 2u);
+  EXPECT_EQ(scene.height_maps.size(), 1u);
+  EXPECT_EQ(scene.displacements[1].height.texture_index, 0);
+  EXPECT_EQ(height_map(scene).width, 1);
+  EXPECT_NE(std::find(scene.files.begin(), scene.files.end(), (folder / "h.png").string()), scene.files.end());
+}
+
+TEST(Displacement, MapsInBufferViewsAreRead)
+{
+  GltfBuilder b = square_displaced();
+  const std::string_view uri = test::kGreyPixelPng;
+  const std::string png = test::from_base64(uri.substr(uri.find(',') + 1));
+  const int view = b.view(std::vector<char>(png.begin(), png.end()));
+  b.json["images"] = {{{"bufferView", view}, {"mimeType", "image/png"}}};
+  EXPECT_EQ(*static_cast<const std::uint8_t*>(height_map(load(b)).texels.get()), 128);
+}
+
+// --- meshes ---
+
+TEST(DisplacedMesh, ASoundOneGivesNoWarning)
+{
+  const Scene scene = load(square_displaced());
+  EXPECT_EQ(num_warnings(scene, "displaced"), 0u);
+}
+
+TEST(DisplacedMesh, MissingAttributesAreSaidOnceAMesh)
+{
+  GltfBuilder b = square_displaced();
+  json& attributes = b.json["meshes"][0]["primitives"][0]["attributes"];
+  attributes.erase("NORMAL");
+  attributes.erase("TEXCOORD_0");
+  b.root_node({{"mesh", 0}, {"translation", {3, 0, 0}}});
+  const Scene scene = load(b);
+  EXPECT_EQ(num_warnings(scene, "/meshes/0: displaced without normals"), 1u);
+  EXPECT_EQ(num_warnings(scene, "/meshes/0: displaced without TEXCOORD_0"), 1u);
+  EXPECT_EQ(num_warnings(scene, "(×"), 0u);
+}
+
+/// The square as two triangles with vertices of their own: 0 1 2 and 3 4 5, along the diagonal 0–2 = 3–4.
+GltfBuilder split_square(const std::vector<float>& normals, const std::vector<float>& uv)
+{
+  GltfBuilder b = square_displaced();
+  json& primitive = b.json["meshes"][0]["primitives"][0];
+  primitive.erase("indices");
+  json& attributes = primitive["attributes"];
+  attributes["POSITION"] = b.accessor<float>({0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 0, 0, 1, 1, 0, 0, 1, 0}, "VEC3");
+  attributes["NORMAL"] = b.accessor<float>(normals, "VEC3");
+  attributes["TEXCOORD_0"] = b.accessor<float>(uv, "VEC2");
+  return b;
+}
+
+const std::vector<float> kUpNormals = {0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1};
+const std::vector<float> kWholeUv = {0, 0, 1, 0, 1, 1, 0, 0, 1, 1, 0, 1};
+
+TEST(DisplacedMesh, SplitNormalsAreCountedByPosition)
+{
+  EXPECT_EQ(num_warnings(load(split_square(kUpNormals, kWholeUv)), "displaced"), 0u);
+  std::vector<float> normals = kUpNormals;
+  normals[3 * 4 + 1] = 1;  // at (1, 1), 45° from its twin
+  const Scene scene = load(split_square(normals, kWholeUv));
+  EXPECT_EQ(num_warnings(scene, "cracks open at 1 positions, whose normals are up to 45° apart"), 1u);
+}
+
+TEST(DisplacedMesh, TrianglesWithoutUvAreaAreCounted)
+{
+  std::vector<float> uv = kWholeUv;
+  std::fill(uv.begin() + 6, uv.end(), 0.3f);
+  EXPECT_EQ(num_warnings(load(split_square(kUpNormals, uv)), "displaced with 1 triangles that have no area"), 1u);
+}
+
+TEST(DisplacedMesh, UvBoundsAreAfterTheTransform)
+{
+  const Scene scene = load(square_displaced(
+      {{"heightTexture",
+        {{"index", 0}, {"extensions", {{"KHR_texture_transform", {{"scale", {25, 8}}, {"offset", {-1, 0.5}}}}}}}}}));
+  const UvBounds bounds = displaced_mesh_uv_bounds(scene.meshes.at(0), settings(scene).height);
+  EXPECT_EQ(bounds.low, (Vec2f{-1, 0.5f}));
+  EXPECT_EQ(bounds.high, (Vec2f{24, 8.5f}));
+}
+
+TEST(DisplacedMesh, MaterialsOfInstancesCount)
+{
+  Scene scene;
+  scene.materials.resize(3);
+  scene.materials[1].displacement_index = 0;
+  scene.materials[2].displacement_index = 1;
+  for (const auto& [mesh, material] : {std::pair{0, 0}, {0, 1}, {1, 2}, {0, 1}, {0, 2}}) {
+    Instance instance;
+    instance.mesh_index = mesh;
+    instance.material_index = material;
+    scene.instances.push_back(instance);
+  }
+  const std::vector<DisplacedMesh> displaced = displaced_meshes(scene);
+  ASSERT_EQ(displaced.size(), 3u);
+  EXPECT_EQ(displaced[0].mesh_index, 0);
+  EXPECT_EQ(displaced[0].displacement_index, 0);
+  EXPECT_EQ(displaced[1].mesh_index, 1);
+  EXPECT_EQ(displaced[2].displacement_index, 1);
+}
+
+TEST(DisplacedMesh, WeldingFindsTheFirstOfEqualPositions)
+{
+  const std::vector<Vec3f> P = {{1, 2, 3}, {0, 0, 0}, {1, 2, 3}, {-0.0f, 0, 0}, {1, 2, 4}};
+  EXPECT_EQ(weld_positions(P), (std::vector<std::uint32_t>{0, 1, 0, 1, 4}));
+  EXPECT_TRUE(weld_positions({}).empty());
+}
+
+// --- seams ---
+
+/// Two triangles of the unit square, split along the diagonal, over the map h = texel column / (width − 1).
+struct SeamCase {
+  static constexpr int kWidth = 64;
+
+  SeamCase()
+  {
+    mesh.P = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+    mesh.uv[0] = {{0, 0}, {1, 0}, {1, 1}, {0, 0}, {1, 1}, {0, 1}};
+    mesh.triangles = {{0, 1, 2}, {3, 4, 5}};
+    for (int x = 0; x < kWidth; ++x) {
+      texels.push_back(static_cast<float>(x) / (kWidth - 1));
+    }
+    settings.scale = -2;
+  }
+
+  void move_second_triangle(Vec2f by)
+  {
+    for (std::size_t i = 3; i < 6; ++i) {
+      mesh.uv[0][i] = mesh.uv[0][i] + by;
+    }
+  }
+
+  DisplacementSeams find(Wrap wrap) const
+  {
+    const HeightMapView map{texels.data(), kWidth, 1, HeightFormat::kFloat, wrap, wrap};
+    return displacement_seams(mesh, settings, map, height_map_range(map));
+  }
+
+  Mesh mesh;
+  std::vector<float> texels;
+  DisplacementSettings settings;
+};
+
+TEST(DisplacementSeams, EqualCoordinatesHaveNone)
+{
+  const SeamCase seam;
+  const DisplacementSeams found = seam.find(Wrap::kRepeat);
+  EXPECT_EQ(found.num_edges, 0u);
+  EXPECT_EQ(found.length, 0);
+  EXPECT_EQ(found.largest_gap, 0);
+}
+
+// Moved by whole tiles, also along v, where the map is constant.
+TEST(DisplacementSeams, WholeTilesApartAreTheSameUnderRepeat)
+{
+  SeamCase seam;
+  seam.move_second_triangle({1000, -3.25f});
+  EXPECT_EQ(seam.find(Wrap::kRepeat).num_edges, 0u);
+  // Mirrored, even tiles agree.
+  EXPECT_EQ(seam.find(Wrap::kMirror).num_edges, 0u);
+  seam.move_second_triangle({1, 0});
+  EXPECT_EQ(seam.find(Wrap::kRepeat).num_edges, 0u);
+  EXPECT_EQ(seam.find(Wrap::kMirror).num_edges, 1u);
+}
+
+// Under clamping the sides of the diagonal ask for h(u) and h(u + ¼). With x = 64 u − ½ clamped to 0…63 the heights are
+// x / 63: 16/63 apart where neither is clamped, and equal nowhere but at the very end.
+TEST(DisplacementSeams, AShiftedSideOpensAGapOfTheRampsRise)
+{
+  SeamCase seam;
+  seam.move_second_triangle({0.25f, 0});
+  const DisplacementSeams found = seam.find(Wrap::kClamp);
+  EXPECT_EQ(found.num_edges, 1u);
+  EXPECT_NEAR(found.largest_gap, 2 * 16.0 / 63, 1e-6);
+  // The last half texel of 64 is clamped on both sides; one of its points lies in it.
+  EXPECT_NEAR(found.length, std::sqrt(2.0) * (1 - 0.5 / 64), std::sqrt(2.0) / 100);
+}
+
+TEST(DisplacementSeams, TheTransformTakesPart)
+{
+  SeamCase seam;
+  seam.move_second_triangle({0.25f, 0});
+  seam.settings.height.m00 = 4;
+  EXPECT_EQ(seam.find(Wrap::kRepeat).num_edges, 0u);
+}
+
+// The diagonal shared by index has no seam, whatever the other edges do.
+TEST(DisplacementSeams, OpenBordersAreNoSeams)
+{
+  SeamCase seam;
+  seam.mesh.triangles = {{0, 1, 2}};
+  EXPECT_EQ(seam.find(Wrap::kClamp).num_edges, 0u);
+}
+
+// Three triangles on one edge: the gap is that of the two farthest apart.
+TEST(DisplacementSeams, EdgesOfManyTrianglesTakeTheWidestGap)
+{
+  SeamCase seam;
+  seam.mesh.P.insert(seam.mesh.P.end(), {{1, 1, 0}, {0, 0, 0}, {0, 0, 1}});
+  seam.mesh.uv[0].insert(seam.mesh.uv[0].end(), {{1.125f, 1}, {0.125f, 0}, {0, 0}});
+  seam.mesh.triangles.push_back({6, 7, 8});
+  EXPECT_NEAR(seam.find(Wrap::kClamp).largest_gap, 2 * 8.0 / 63, 1e-6);
+  seam.move_second_triangle({0.25f, 0});
+  EXPECT_NEAR(seam.find(Wrap::kClamp).largest_gap, 2 * 16.0 / 63, 1e-6);
+  EXPECT_EQ(seam.find(Wrap::kClamp).num_edges, 1u);
+}
+
+TEST(DisplacementSeams, ConstantMapsHaveNone)
+{
+  SeamCase seam;
+  std::fill(seam.texels.begin(), seam.texels.end(), 0.3f);
+  seam.move_second_triangle({0.3f, 0.1f});
+  EXPECT_EQ(seam.find(Wrap::kClamp).num_edges, 0u);
+}
+
+TEST(DisplacementSeams, WithoutCoordinatesThereIsNothingToCompare)
+{
+  SeamCase seam;
+  seam.mesh.uv[0].clear();
+  EXPECT_EQ(seam.find(Wrap::kRepeat).num_edges, 0u);
+}
+
+}  // namespace
+}  // namespace relief
