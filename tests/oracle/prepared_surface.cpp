@@ -226,7 +226,10 @@ bool PreparedSurface::clip(Rectangle& domain) const
 
 Interval PreparedSurface::displacement(const Rectangle& domain) const
 {
-  return map.scale * (height_range(texels_of(domain)) - thin(map.midlevel));
+  const Rectangle texels = texels_of(domain);
+  Interval h, h_x, h_y;
+  height(texels.p, texels.q, h, h_x, h_y);
+  return map.scale * (h - thin(map.midlevel));
 }
 
 std::array<Interval, 3> PreparedSurface::base_point(const Rectangle& domain) const

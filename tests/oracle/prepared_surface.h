@@ -61,6 +61,7 @@ struct PreparedSurface {
   /// Splits a large rectangle between texels, another one where S is longest.
   std::array<Rectangle, 2> split(const Rectangle& domain) const;
 
+  /// d over a rectangle of a few texels.
   Interval displacement(const Rectangle& domain) const;
   /// P without displacement, relative to corner 0.
   std::array<Interval, 3> base_point(const Rectangle& domain) const;

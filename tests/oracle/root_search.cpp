@@ -58,7 +58,9 @@ class RootSearch {
     }
     unit_p_ = surface.parameters_are_texels ? std::min(1., surface.root.p.width()) : 1;
     unit_q_ = surface.parameters_are_texels ? std::min(1., surface.root.q.width()) : 1;
-    is_valid_ = length(ray.D) > 0 && std::isfinite(length(ray.D)) && std::isfinite(length(ray.O));
+    const bool has_normals =
+        length(surface.triangle.N[0]) > 0 || length(surface.triangle.N[1]) > 0 || length(surface.triangle.N[2]) > 0;
+    is_valid_ = has_normals && length(ray.D) > 0 && std::isfinite(length(ray.D)) && std::isfinite(length(ray.O));
   }
 
   std::vector<Hit> run();
