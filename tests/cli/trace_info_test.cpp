@@ -167,5 +167,33 @@ TEST_F(TraceInfoProgram, InfoCountsWhatIsThere)
   EXPECT_EQ(list.find("textures"), std::string::npos) << list;
 }
 
+// A square of two triangles with vertices of their own. Along the diagonal one side reads u = ¼, the centre of the first
+// texel, the other u = ¾, that of the second.
+TEST_F(TraceInfoProgram, InfoShowsHeightMapsAndTheirSeams)
+{
+  GltfBuilder b;
+  const int P = b.accessor<float>({0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 0, 0, 1, 1, 0, 0, 1, 0}, "VEC3");
+  const int N = b.accessor<float>({0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3");
+  const int uv = b.accessor<float>({.25, 0, 2, 0, .25, 1, .75, 0, .75, 1, 0, 1}, "VEC2");
+  b.mesh({{"attributes", {{"POSITION", P}, {"NORMAL", N}, {"TEXCOORD_0", uv}}}, {"material", 0}});
+  b.root_node({{"mesh", 0}});
+  // P5: two grey texels, 51 and 255.
+  folder_.write("h.pgm", "P5 2 1 255\n\x33\xff");
+  b.push("materials",
+         {{"name", "bark"},
+          {"extensions",
+           {{"RELIEF_displacement", {{"heightTexture", {{"uri", "h.pgm"}}}, {"scale", 0.5}, {"method", "chord"}}}}}});
+  b.json["extensionsUsed"].push_back("RELIEF_displacement");
+  const Outcome outcome = run({"info", folder_.write("s.gltf", b.gltf()).string()});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+  for (const char* text :
+       {"height maps: 1\n", "(h.pgm): 2x1, 8-bit, 0.0 MiB, heights 0.2 to 1, wrap repeat, repeat\n",
+        "displacements: 1\n", "  bark: ", "method chord, scale 0.5 m, midlevel 0.5, object space\n",
+        "meshes: 1, uv 0 to 2, 0 to 1\n", "uv seams with different heights: 1 edges, 1.41421 m, gap up to 0.4 m\n",
+        ", height maps 0.0 MiB, "}) {
+    EXPECT_NE(outcome.output.find(text), std::string::npos) << text << outcome.output;
+  }
+}
+
 }  // namespace
 }  // namespace relief::test
