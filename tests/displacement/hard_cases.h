@@ -22,11 +22,11 @@ struct HardCase {
   std::string name;
   std::vector<oracle::DisplacedTriangle> triangles;
   oracle::HeightMap map;
-  std::vector<oracle::Ray> rays;
+  std::vector<oracle::Ray> rays{};
   /// The triangles enclose a volume without gaps: a line meets the surface an even number of times.
   bool is_closed = false;
   /// Not empty: heights as stored, some not finite; in `map` those are replaced by the mean of the others.
-  std::vector<float> heights_with_nonfinite;
+  std::vector<float> heights_with_nonfinite{};
 };
 
 namespace hard_case_parts {
