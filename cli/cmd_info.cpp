@@ -6,6 +6,7 @@
 
 #include "cli/commands.h"
 #include "cli/scene_setup.h"
+#include "scene/load.h"
 #include "integrator/scene_context.h"
 #include "scene/displaced_mesh.h"
 #include "scene/displacement_seams.h"
@@ -91,7 +92,7 @@ void print_displacement(const Scene& scene, int index, const std::vector<HeightR
   std::size_t num_meshes = 0;
   UvBounds uv;
   DisplacementSeams seams;
-  for (const DisplacedMesh& displaced : displaced_meshes(scene)) {
+  for (const MeshDisplacement& displaced : displaced_meshes(scene)) {
     if (displaced.displacement_index != index) continue;
     const Mesh& mesh = scene.meshes[static_cast<std::size_t>(displaced.mesh_index)];
     ++num_meshes;
@@ -125,7 +126,7 @@ void print_displacements(const Scene& scene)
 
 int info(const std::string& file, bool strict)
 {
-  const Scene scene = scene_load_to_trace(file);
+  const Scene scene = scene_load(file);
   const SceneContext context(scene);
   Statistics stats;
   context.fill(stats);

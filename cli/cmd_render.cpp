@@ -26,6 +26,7 @@
 #include "cli/interrupt.h"
 #include "cli/progress_printer.h"
 #include "cli/scene_setup.h"
+#include "scene/load.h"
 #include "exporters/atomic_file.h"
 #include "exporters/errors.h"
 #include "exporters/exr.h"
@@ -291,7 +292,7 @@ bool render_frame(const RenderArguments& arguments,
   load.has_frame = frame.has_value();
   load.frame = frame.value_or(0);
   load.texture_budget_bytes = static_cast<std::size_t>(arguments.texture_memory_gib * (1u << 30));
-  const Scene scene = scene_load_to_trace(arguments.scene, load);
+  const Scene scene = scene_load(arguments.scene, load);
 
   Statistics stats;
   stats.load_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - load_start).count();

@@ -15,6 +15,7 @@
 #include "cli/arguments.h"
 #include "cli/commands.h"
 #include "cli/scene_setup.h"
+#include "scene/load.h"
 #include "exporters/atomic_file.h"
 #include "exporters/errors.h"
 #include "integrator/trace.h"
@@ -147,7 +148,7 @@ int trace(const TraceArguments& arguments)
   LoadOptions load;
   load.has_frame = arguments.frame.has_value();
   load.frame = arguments.frame.value_or(0);
-  const Scene scene = scene_load_to_trace(arguments.scene, load);
+  const Scene scene = scene_load(arguments.scene, load);
   for (const std::string& warning : scene.warnings) fmt::print(stderr, "relief: warning: {}\n", warning);
   write_text(arguments.output,
              arguments.pixel ? path_rays(arguments, scene) : hits_csv(trace_rays(SceneContext(scene), rays)));

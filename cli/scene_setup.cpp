@@ -9,20 +9,6 @@
 
 namespace relief {
 
-Scene scene_load_to_trace(const std::string& file, const LoadOptions& options)
-{
-  Scene scene = scene_load(file, options);
-  if (!scene.features.displacement) return scene;
-  const auto is_displaced = [](const Material& m) { return m.displacement_index >= 0; };
-  const auto first = std::find_if(scene.materials.begin(), scene.materials.end(), is_displaced);
-  scene.warnings.push_back(fmt::format(
-      "{}: displacement is not rendered by this version: base meshes stand in for displaced ones ({} materials, the "
-      "first '{}')",
-      file, std::count_if(scene.materials.begin(), scene.materials.end(), is_displaced),
-      scene.material_names[static_cast<std::size_t>(first - scene.materials.begin())]));
-  return scene;
-}
-
 void refuse_warnings(const std::string& file, const std::vector<std::string>& warnings)
 {
   if (warnings.empty()) return;

@@ -7,10 +7,6 @@
 
 namespace relief {
 
-/// Loads a scene for anything that traces rays: its warnings include one if the scene asks for displacement, which is
-/// not traced: the base mesh stands in.
-Scene scene_load_to_trace(const std::string& file, const LoadOptions& options = {});
-
 /// --strict: no warning is acceptable.
 /// @error SceneError with the first warning and the number of all
 void refuse_warnings(const std::string& file, const std::vector<std::string>& warnings);

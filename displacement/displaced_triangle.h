@@ -84,4 +84,16 @@ RELIEF_KERNEL SurfacePoint surface_point(const DisplacedMeshView& mesh,
   return point;
 }
 
+/// The same, in the cell that the weights fall into.
+RELIEF_KERNEL SurfacePoint surface_point(const DisplacedMeshView& mesh,
+                                         const DisplacedTriangle& tri,
+                                         double b1,
+                                         double b2)
+{
+  const double x = tri.x[0] + b1 * (tri.x[1] - tri.x[0]) + b2 * (tri.x[2] - tri.x[0]);
+  const double y = tri.y[0] + b1 * (tri.y[1] - tri.y[0]) + b2 * (tri.y[2] - tri.y[0]);
+  return surface_point(mesh, tri, b1, b2, static_cast<std::int64_t>(__builtin_floor(x)),
+                       static_cast<std::int64_t>(__builtin_floor(y)));
+}
+
 }  // namespace relief

@@ -45,7 +45,8 @@ RELIEF_KERNEL int lattice_modulo(std::int64_t a, int n)
 RELIEF_KERNEL int lattice_texel(const LatticeAxis& axis, std::int64_t i)
 {
   const int n = axis.num_texels;
-  if (axis.wrap == Wrap::kClamp) return static_cast<int>(i < 0 ? 0 : (i >= n ? n - 1 : i));
+  if (i >= 0 && i < n) return static_cast<int>(i);  // mostly; divisions are slow
+  if (axis.wrap == Wrap::kClamp) return i < 0 ? 0 : n - 1;
   if (axis.wrap == Wrap::kRepeat) return lattice_modulo(i, n);
   const int r = lattice_modulo(i, 2 * n);
   return r < n ? r : 2 * n - 1 - r;

@@ -12,10 +12,6 @@ namespace relief {
 using F8 [[gnu::vector_size(32)]] = float;
 using I8 [[gnu::vector_size(32)]] = std::int32_t;
 
-// Vectors go in and out by inlining only; how they would be passed otherwise differs between instruction sets.
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpsabi"
-
 RELIEF_KERNEL F8 splat8(float x) { return F8{x, x, x, x, x, x, x, x}; }
 RELIEF_KERNEL F8 min(F8 a, F8 b) { return a < b ? a : b; }
 RELIEF_KERNEL F8 max(F8 a, F8 b) { return a > b ? a : b; }
@@ -70,7 +66,5 @@ RELIEF_KERNEL void store8(float* to, F8 lanes) { __builtin_memcpy(to, &lanes, si
 RELIEF_KERNEL F8 shift_down(F8 a) { return __builtin_shufflevector(a, a, 1, 2, 3, 4, 5, 6, 7, 7); }
 /// Lanes 0…3 of a, then lanes 0…3 of b.
 RELIEF_KERNEL F8 join_low_halves(F8 a, F8 b) { return __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11); }
-
-#pragma GCC diagnostic pop
 
 }  // namespace relief

@@ -19,10 +19,10 @@ struct DisplacedHit {
 
 /// What one ray counts; the same for all methods, so that they can be compared.
 struct TraversalCounters {
-  std::uint32_t bounds = 0;      ///< 2D or 3D bounds tested, children of pyramid nodes one by one
-  std::uint32_t texels = 0;      ///< cells tested by the leaf
-  std::uint32_t inversions = 0;  ///< iterations of point-wise inversion
-  std::uint32_t prisms = 0;      ///< triangles whose prism the ray enters
+  std::uint64_t bounds = 0;      ///< 2D or 3D bounds tested, children of pyramid nodes one by one
+  std::uint64_t texels = 0;      ///< cells tested by the leaf
+  std::uint64_t inversions = 0;  ///< iterations of point-wise inversion
+  std::uint64_t prisms = 0;      ///< triangles whose prism the ray enters
 };
 
 /// A point of the curve.
@@ -100,7 +100,8 @@ inline constexpr double kCellTolerance = 1e-9;
 /// First root of g in a cell.
 /// @param i, j        the cell, lattice coordinates
 /// @param tau0, tau1  contains every τ at which the curve is in the cell; 0 <= tau0 <= tau1 <= 1
-/// @param hit         t, b, cell of the first root whose t is within (t_min, t_max)
+/// @param monotone    t grows with τ; if not, all roots are looked at
+/// @param hit         t, b, cell of the nearest root whose t is within (t_min, t_max)
 /// @return            false if there is none
 RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
                                   const DisplacedTriangle& tri,
@@ -112,8 +113,10 @@ RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
                                   double tau1,
                                   double t_min,
                                   double t_max,
+                                  bool monotone,
                                   DisplacedHit* hit)
 {
+  bool found = false;
   const CellHeights cell = cell_heights(*mesh.field, i, j);
   // Unbounded cells beside a clamped map have one height along the unbounded axis, so their corner may be anywhere.
   const double corner_x = static_cast<double>(i), corner_y = static_cast<double>(j);
@@ -138,12 +141,15 @@ RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
                                                     (__builtin_fabs(cell.hx) + twist * fy) * d.x +
                                                     (__builtin_fabs(cell.hy) + twist * fx) * d.y + twist * d.x * d.y);
   };
+  // Takes a root; true when no other can be nearer.
   const auto accept = [&](const CurvePoint& p) {
     if (!(p.x >= x_low && p.x <= x_high && p.y >= y_low && p.y <= y_high)) return false;
     const double t = curve_t(curve, g, p.tau);
     if (!(t > t_min && t < t_max)) return false;
     *hit = {t, p.b1, p.b2, i, j, p.tau};
-    return true;
+    t_max = t;
+    found = true;
+    return monotone;
   };
 
   // What rounding can do to g: its terms, and the lattice position through the slopes.
@@ -228,7 +234,8 @@ RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
     stack[depth++] = back;
     stack[depth++] = front;
   }
-  return tau1 >= 1.0 && __builtin_fabs(g_last) <= rounding && accept(last);
+  if (tau1 >= 1.0 && __builtin_fabs(g_last) <= rounding) accept(last);
+  return found;
 }
 
 }  // namespace relief

@@ -218,7 +218,20 @@ RELIEF_KERNEL void add_edge_on_segment(RayCurve& curve, const Projected& v, doub
   if (!any) return;
   CurveSegment g;
   for (int i = 0; i < 3; ++i) g.e[i] = {0.0, far_b[i] - near_b[i], near_b[i]};
-  g.s0 = s;
+  // The ray is not exactly parallel to the facet; N is nearly across it, so s is well defined at both ends.
+  const auto s_at = [&](const double* b) {
+    double px = 0, py = 0, nx = 0, ny = 0;
+    for (int k = 0; k < 3; ++k) {
+      px += b[k] * v.x[k];
+      py += b[k] * v.y[k];
+      nx += b[k] * v.nx[k];
+      ny += b[k] * v.ny[k];
+    }
+    const double squared = nx * nx + ny * ny;
+    return squared > 0.0 ? -(px * nx + py * ny) / squared : s;
+  };
+  g.s0 = s_at(near_b);
+  g.ds = s_at(far_b) - g.s0;
   g.relative_error = 0x1p-46;
   add_segment(curve, g);
 }
@@ -261,7 +274,7 @@ RELIEF_KERNEL bool ray_curve_make(const RayFrame& frame, const DisplacedTriangle
   // Each coefficient is a sum of at most four products below extent², in units of its power of s; evaluation and the
   // roots' own rounding add a few more.
   const double tolerance = 0x1p-48 * extent * extent;
-  const double edge_on = 1e-8 * extent * extent;
+  const double edge_on = 1e-7 * extent * extent;
 
   for (const double sign : {1.0, -1.0}) {
     Quadratic inside[3];

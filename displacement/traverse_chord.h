@@ -15,9 +15,6 @@ namespace relief {
 
 namespace chord_detail {
 
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wpsabi"
-
 /// Rounding of a few float operations in sequence on numbers up to the one it is multiplied with.
 inline constexpr float kFloatSlack = 0x1p-20f;
 /// What the float parameter of a chord may be off by.
@@ -108,7 +105,8 @@ RELIEF_KERNEL bool cell_intersect(Search& c, const Chord& chord, std::int64_t i,
   const double tau0 = __builtin_fmax(0.0, tau_at(static_cast<double>(u0) - kParameterSlack));
   const double tau1 = __builtin_fmin(1.0, tau_at(static_cast<double>(u1) + kParameterSlack));
   ++c.counters.texels;
-  if (!leaf_intersect(c.mesh, c.tri, c.curve, *c.segment, i, j, tau0, tau1, c.t_min, c.t_max, &c.hit)) return false;
+  if (!leaf_intersect(c.mesh, c.tri, c.curve, *c.segment, i, j, tau0, tau1, c.t_min, c.t_max, c.unfolded, &c.hit))
+    return false;
   c.found = true;
   c.t_max = c.hit.t;
   if (c.unfolded) c.tau_end = c.hit.tau;
@@ -449,8 +447,6 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
   }
   return false;
 }
-
-#pragma GCC diagnostic pop
 
 }  // namespace chord_detail
 

@@ -78,20 +78,40 @@ void disk_occluded(const RTCOccludedFunctionNArguments*) {}
 Accel::Accel(const Scene& scene,
              std::span<const Light> lights,
              std::span<const std::uint32_t> area_lights,
+             DisplacementSet& displacements,
              RTCFilterFunctionN shadow_filter)
-    : shadow_filter_(shadow_filter)
+    : shadow_filter_(shadow_filter), displacements_(&displacements)
 {
   device_ = rtcNewDevice(nullptr);
   if (device_ == nullptr) throw std::runtime_error("Embree cannot start on this machine");
   rtcSetDeviceMemoryMonitorFunction(device_, count_bytes, &bytes_);
+  try {
+    build(scene, lights, area_lights, displacements);
+  } catch (...) {
+    release();
+    throw;
+  }
+}
 
+void Accel::build(const Scene& scene,
+                  std::span<const Light> lights,
+                  std::span<const std::uint32_t> area_lights,
+                  DisplacementSet& displacements)
+{
   std::vector<int> uses(scene.meshes.size(), 0);
   std::vector<char> transparent(scene.meshes.size(), 0);
-  for (const Instance& instance : scene.instances) {
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const Instance& instance = scene.instances[i];
+    const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
+    const bool lets_light_through = material.alpha_mode != AlphaMode::kOpaque;
+    if (const int displaced = displacements.geometry_index(i); displaced >= 0) {
+      if (lets_light_through)
+        displacements.geometry(static_cast<std::size_t>(displaced)).shadow_filter = shadow_filter_;
+      continue;
+    }
     const auto mesh = static_cast<std::size_t>(instance.mesh_index);
     ++uses[mesh];
-    const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
-    if (material.alpha_mode != AlphaMode::kOpaque) transparent[mesh] = 1;
+    if (lets_light_through) transparent[mesh] = 1;
   }
 
   mesh_scenes_.assign(scene.meshes.size(), nullptr);
@@ -103,14 +123,25 @@ Accel::Accel(const Scene& scene,
     commit(mesh_scenes_[m]);
   }
 
+  const TraversalTable& traversals = traversal_table_select();
+  displaced_scenes_.assign(displacements.size(), nullptr);
+  for (std::size_t d = 0; d < displacements.size(); ++d) {
+    displaced_scenes_[d] = new_scene(RTC_BUILD_QUALITY_HIGH);
+    attach(displaced_scenes_[d], displaced_geometry_make(device_, displacements.geometry(d), traversals), 0, ~0u);
+    commit(displaced_scenes_[d]);
+  }
+
   bool any_transparent = false;
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) any_transparent |= uses[m] == 1 && transparent[m] != 0;
   top_ = new_scene(any_transparent ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
     const auto mesh = static_cast<std::size_t>(instance.mesh_index);
+    const int displaced = displacements.geometry_index(i);
     const RTCGeometry geometry =
-        mesh_scenes_[mesh] != nullptr
+        displaced >= 0
+            ? new_instance(displaced_scenes_[static_cast<std::size_t>(displaced)], instance.world_from_object)
+        : mesh_scenes_[mesh] != nullptr
             ? new_instance(mesh_scenes_[mesh], instance.world_from_object)
             : new_mesh(scene.meshes[mesh], &instance.world_from_object, transparent[mesh] != 0);
     attach(top_, geometry, static_cast<unsigned>(i), mask_of(instance.flags));
@@ -124,10 +155,15 @@ Accel::Accel(const Scene& scene,
   commit(top_);
 }
 
-Accel::~Accel()
+Accel::~Accel() { release(); }
+
+void Accel::release()
 {
   if (top_ != nullptr) rtcReleaseScene(top_);
   for (RTCScene scene : mesh_scenes_) {
+    if (scene != nullptr) rtcReleaseScene(scene);
+  }
+  for (RTCScene scene : displaced_scenes_) {
     if (scene != nullptr) rtcReleaseScene(scene);
   }
   if (device_ != nullptr) rtcReleaseDevice(device_);

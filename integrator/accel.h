@@ -8,7 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "integrator/embree.h"
+#include "displacement/embree.h"
+#include "integrator/displacement_set.h"
 #include "kernel/light/light.h"
 #include "kernel/math/rounding.h"
 #include "scene/scene.h"
@@ -19,22 +20,25 @@ namespace relief {
 enum RayMask : std::uint32_t { kRayCamera = 1u << 0, kRayBounce = 1u << 1, kRayShadow = 1u << 2 };
 
 /// Builds and owns the acceleration structure. Meshes that occur once are placed in world space; a mesh that occurs more
-/// often has one scene of its own and Embree instances of it.
+/// often, or is displaced, has one scene of its own and Embree instances of it.
 class Accel {
  public:
   /// @param scene         must outlive the Accel: vertex and index buffers are shared where they can be
   /// @param lights        of which `area_lights` picks rectangles and disks; object num_instances + i is area_lights[i]
+  /// @param displacements of the scene; must outlive the Accel
   /// @param shadow_filter called for hits of shadow rays on surfaces that may let light through
   /// @error std::runtime_error with Embree's message when the build fails (out of memory)
   Accel(const Scene& scene,
         std::span<const Light> lights,
         std::span<const std::uint32_t> area_lights,
+        DisplacementSet& displacements,
         RTCFilterFunctionN shadow_filter);
   ~Accel();
   Accel(const Accel&) = delete;
   Accel& operator=(const Accel&) = delete;
 
   RTCScene scene() const { return top_; }
+  const DisplacementSet& displacements() const { return *displacements_; }
   std::size_t bytes() const { return static_cast<std::size_t>(bytes_.load()); }  ///< allocated by Embree
 
  private:
@@ -43,14 +47,21 @@ class Accel {
   RTCGeometry new_instance(RTCScene instanced, const Affine3& world_from_object);
   RTCGeometry new_rectangle(const Light& light);
   RTCGeometry new_disk(const Light& light);
+  void build(const Scene& scene,
+             std::span<const Light> lights,
+             std::span<const std::uint32_t> area_lights,
+             DisplacementSet& displacements);
+  void release();
   void attach(RTCScene target, RTCGeometry geometry, unsigned id, std::uint32_t mask);
   void commit(RTCScene target);
 
   std::atomic<std::ptrdiff_t> bytes_{0};
   RTCFilterFunctionN shadow_filter_;
+  const DisplacementSet* displacements_;
   RTCDevice device_ = nullptr;
   RTCScene top_ = nullptr;
   std::vector<RTCScene> mesh_scenes_;          ///< null for meshes that occur once
+  std::vector<RTCScene> displaced_scenes_;     ///< a displaced geometry
   std::vector<std::unique_ptr<Light>> disks_;  ///< user data of disk geometry: stable addresses
 };
 

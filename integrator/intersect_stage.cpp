@@ -7,8 +7,9 @@ namespace relief {
 
 namespace {
 
-/// Puts a path into the queue of the stage that its hit asks for.
+/// Puts a path into the queue of the stage that its hit asks for; displaced hits get their position and normal.
 void classify(const KernelGlobals& g,
+              const Accel& accel,
               const PathStateView& state,
               std::uint32_t path,
               unsigned object,
@@ -26,7 +27,19 @@ void classify(const KernelGlobals& g,
     queue_push(lights, path);
     return;
   }
-  queue_push(surfaces[surface_kernel[g.instances[object].material_index]], path);
+  const InstanceView& instance = g.instances[object];
+  if ((instance.flags & kDisplaced) != 0) {
+    const SurfacePoint point =
+        accel.displacements().point(object, state.hit_triangle[path], state.hit_u[path], state.hit_v[path]);
+    const Vec3f P = to_float(point.P), Ng = to_float(point.Ng);
+    state.hit_P_x[path] = P.x;
+    state.hit_P_y[path] = P.y;
+    state.hit_P_z[path] = P.z;
+    state.hit_Ng_x[path] = Ng.x;
+    state.hit_Ng_y[path] = Ng.y;
+    state.hit_Ng_z[path] = Ng.z;
+  }
+  queue_push(surfaces[surface_kernel[instance.material_index]], path);
 }
 
 std::uint32_t mask_of(const PathStateView& state, std::uint32_t path)
@@ -73,7 +86,7 @@ void intersect_packet(const KernelGlobals& g,
     state.hit_triangle[path] = packet.hit.primID[i];
     const unsigned instance = packet.hit.instID[0][i];
     const unsigned object = instance != RTC_INVALID_GEOMETRY_ID ? instance : packet.hit.geomID[i];
-    classify(g, state, path, object, surface_kernel, surfaces, lights, background);
+    classify(g, accel, state, path, object, surface_kernel, surfaces, lights, background);
   }
 }
 
@@ -94,10 +107,12 @@ void intersect_closest(const KernelGlobals& g,
                        const std::uint8_t* surface_kernel,
                        QueueView* surfaces,
                        QueueView& lights,
-                       QueueView& background)
+                       QueueView& background,
+                       TraversalCounters& displacement)
 {
   EmbreeContext context;
   embree_context_init(context, coherent);
+  context.displacement = &displacement;
   std::uint32_t i = 0;
   if (coherent) {
     for (; i + 8 <= queue.size; i += 8) {
@@ -127,15 +142,20 @@ void intersect_closest(const KernelGlobals& g,
     state.hit_v[path] = ray.hit.v;
     state.hit_triangle[path] = ray.hit.primID;
     const unsigned object = ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID;
-    classify(g, state, path, object, surface_kernel, surfaces, lights, background);
+    classify(g, accel, state, path, object, surface_kernel, surfaces, lights, background);
   }
 }
 
-void intersect_shadow(const KernelGlobals& g, const Accel& accel, const ShadowQueueView& shadow, float* visibility)
+void intersect_shadow(const KernelGlobals& g,
+                      const Accel& accel,
+                      const ShadowQueueView& shadow,
+                      float* visibility,
+                      TraversalCounters& displacement)
 {
   ShadowContext context;
   context.globals = &g;
   embree_context_init(context.embree, false);
+  context.embree.displacement = &displacement;
   for (std::uint32_t i = 0; i < shadow.size; ++i) {
     context.visibility = 1.0f;
     RTCRay ray;

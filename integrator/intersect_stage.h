@@ -14,6 +14,7 @@ namespace relief {
 /// @param coherent         camera rays in batch order: traced in packets of eight
 /// @param surface_kernel   kernel index of each material
 /// @param surfaces         kNumSurfaceKernels queues
+/// @param displacement     counts are added to it
 void intersect_closest(const KernelGlobals& g,
                        const Accel& accel,
                        const PathStateView& state,
@@ -22,11 +23,17 @@ void intersect_closest(const KernelGlobals& g,
                        const std::uint8_t* surface_kernel,
                        QueueView* surfaces,
                        QueueView& lights,
-                       QueueView& background);
+                       QueueView& background,
+                       TraversalCounters& displacement);
 
 /// Traces every waiting shadow ray.
-/// @param visibility  one entry a ray: share of light that passes
-void intersect_shadow(const KernelGlobals& g, const Accel& accel, const ShadowQueueView& shadow, float* visibility);
+/// @param visibility    one entry a ray: share of light that passes
+/// @param displacement  counts are added to it
+void intersect_shadow(const KernelGlobals& g,
+                      const Accel& accel,
+                      const ShadowQueueView& shadow,
+                      float* visibility,
+                      TraversalCounters& displacement);
 
 /// Embree filter of surfaces that let shadow rays through in part; its context is made by intersect_shadow.
 void shadow_filter(const RTCFilterFunctionNArguments* arguments);

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <mutex>
+#include <string>
 
 #include <pmmintrin.h>
 #include <xmmintrin.h>
@@ -57,6 +58,17 @@ std::uint32_t pass_samples(std::uint32_t done, std::uint32_t wanted, double seco
 
 /// A noise threshold is first looked at after this many samples: below, the estimate of the error is itself noise.
 constexpr std::uint32_t kMinAdaptiveSamples = 16;
+
+/// @param sample  pixel of the film << 32 | sample
+std::string nonfinite_warning(std::uint64_t sample, int crop_x, int crop_y, int film_width)
+{
+  const std::uint64_t pixel = sample >> 32;
+  const auto width = static_cast<std::uint64_t>(film_width);
+  return "samples that were not finite count as black, first at pixel " +
+         std::to_string(crop_x + static_cast<int>(pixel % width)) + "," +
+         std::to_string(crop_y + static_cast<int>(pixel / width)) + " sample " + std::to_string(sample & 0xffffffffu) +
+         " (see relief trace --pixel)";
+}
 
 bool is_whole(const RenderOptions& options)
 {
@@ -193,15 +205,14 @@ RenderedImage render(const Scene& scene,
   stats.path_state_bytes = workers.size() * Wavefront::bytes();
   stats.stages.clear();
   for (const char* name : kStageNames) stats.stages.push_back({name, 0.0});
+  std::uint64_t first_nonfinite = kNoSample;
   for (const Wavefront& worker : workers) {
     counters_add(stats.counters, worker.counters);
     for (std::size_t s = 0; s < stats.stages.size(); ++s) stats.stages[s].seconds += worker.seconds[s];
-    if (worker.nonfinite.found) {
-      stats.warnings.push_back("a sample was not finite and counts as black, first at pixel " +
-                               std::to_string(crop_x + worker.nonfinite.x) + "," +
-                               std::to_string(crop_y + worker.nonfinite.y) + " sample " +
-                               std::to_string(worker.nonfinite.sample) + " (see relief trace --pixel)");
-    }
+    first_nonfinite = std::min(first_nonfinite, worker.first_nonfinite);
+  }
+  if (first_nonfinite != kNoSample) {
+    stats.warnings.push_back(nonfinite_warning(first_nonfinite, crop_x, crop_y, film.width()));
   }
   return film.resolve(crop_x, crop_y, settings.width, settings.height);
 }

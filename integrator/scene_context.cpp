@@ -6,10 +6,11 @@
 
 namespace relief {
 
-SceneContext::SceneContext(const Scene& loaded)
+SceneContext::SceneContext(const Scene& loaded, const DisplacementOptions& displacement)
     : scene(loaded),
       lights(light_set_make(loaded, loaded.textures->views())),
-      bsdf_tables(std::make_unique<BsdfTables>())
+      bsdf_tables(std::make_unique<BsdfTables>()),
+      displacements(loaded, displacement)
 {
   for (const Mesh& mesh : scene.meshes) meshes.push_back(mesh.view());
   std::vector<int> uses(scene.meshes.size(), 0);
@@ -24,6 +25,7 @@ SceneContext::SceneContext(const Scene& loaded)
     view.first_light_index = lights.first_light_index[i];
     view.flags = instance.flags;
     if (uses[static_cast<std::size_t>(instance.mesh_index)] > 1) view.flags |= kTracedInObjectSpace;
+    if (displacements.geometry_index(i) >= 0) view.flags |= kDisplaced | kTracedInObjectSpace;
     instances.push_back(view);
   }
   unsigned features = 0;
@@ -32,7 +34,7 @@ SceneContext::SceneContext(const Scene& loaded)
     surface_kernel.push_back(static_cast<std::uint8_t>(surface_kernel_index(material)));
   }
   bsdf_tables_make(*bsdf_tables, features);
-  accel = std::make_unique<Accel>(scene, lights.lights, lights.area_lights, shadow_filter);
+  accel = std::make_unique<Accel>(scene, lights.lights, lights.area_lights, displacements, shadow_filter);
 
   globals.meshes = meshes.data();
   globals.instances = instances.data();
@@ -53,6 +55,7 @@ void SceneContext::fill(Statistics& stats) const
   stats.texture_bytes = scene.textures->bytes();
   stats.light_bytes = lights.bytes();
   stats.bvh_bytes = accel->bytes();
+  stats.displacement_bytes = displacements.bytes();
 }
 
 }  // namespace relief

@@ -18,7 +18,7 @@ namespace relief {
 struct SceneContext {
   /// @param scene  must outlive the context
   /// @error std::runtime_error out of memory and the like
-  explicit SceneContext(const Scene& scene);
+  explicit SceneContext(const Scene& scene, const DisplacementOptions& displacement = {});
   SceneContext(const SceneContext&) = delete;
   SceneContext& operator=(const SceneContext&) = delete;
 
@@ -31,6 +31,7 @@ struct SceneContext {
   LightSet lights;
   std::vector<std::uint8_t> surface_kernel;  ///< a material
   std::unique_ptr<BsdfTables> bsdf_tables;
+  DisplacementSet displacements;
   std::unique_ptr<Accel> accel;
   KernelGlobals globals;
 };

@@ -83,15 +83,18 @@ void finish(const KernelGlobals& g,
             const PathStateView& state,
             const Batch& batch,
             Counters& counters,
-            std::uint32_t* nonfinite_path)
+            std::uint64_t& first_nonfinite)
 {
   const auto num_pixels = static_cast<std::uint32_t>(batch.width * batch.height);
   for (std::uint32_t i = 0; i < num_pixels * batch.num_samples; ++i) {
-    const bool finite = film_add_sample(g.film, state.pixel[i], batch.first_sample + i / num_pixels,
-                                        {state.direct_r[i], state.direct_g[i], state.direct_b[i]},
-                                        {state.indirect_r[i], state.indirect_g[i], state.indirect_b[i]});
+    const std::uint32_t sample = batch.first_sample + i / num_pixels;
+    const bool finite =
+        film_add_sample(g.film, state.pixel[i], sample, {state.direct_r[i], state.direct_g[i], state.direct_b[i]},
+                        {state.indirect_r[i], state.indirect_g[i], state.indirect_b[i]});
     if (finite) continue;
-    if (counters.nonfinite_samples++ == 0) *nonfinite_path = i;
+    ++counters.nonfinite_samples;
+    const std::uint64_t key = std::uint64_t{state.pixel[i]} << 32 | sample;
+    if (key < first_nonfinite) first_nonfinite = key;
   }
 }
 

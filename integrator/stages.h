@@ -39,8 +39,8 @@ struct StageTable {
                             const ShadowQueueView& shadow,
                             const float* visibility);
   /// Adds the batch's finished samples to the film, in path order.
-  /// @param nonfinite_path  index of the first dropped path is written here; untouched if all are finite
-  void (*finish)(const KernelGlobals&, const PathStateView&, const Batch&, Counters&, std::uint32_t* nonfinite_path);
+  /// @param first_nonfinite  pixel << 32 | sample, lowered to the least of the samples that were dropped
+  void (*finish)(const KernelGlobals&, const PathStateView&, const Batch&, Counters&, std::uint64_t& first_nonfinite);
 };
 
 const StageTable& stage_table_baseline();

@@ -102,11 +102,13 @@ void Wavefront::run(const KernelGlobals& g,
   counters.camera_rays += active_.size;
   charge(Stage::kGenerate);
 
+  TraversalCounters displacement;
   for (bool camera = true; active_.size > 0; camera = false) {
     if (!camera) counters.bounce_rays += active_.size;
     lights_.size = background_.size = next_.size = shadow_.size = 0;
     for (QueueView& queue : surfaces_) queue.size = 0;
-    intersect_closest(g, accel, state_, active_, camera, surface_kernel.data(), surfaces_.data(), lights_, background_);
+    intersect_closest(g, accel, state_, active_, camera, surface_kernel.data(), surfaces_.data(), lights_, background_,
+                     displacement);
     if (recorder != nullptr) record_rays();
     charge(Stage::kIntersectClosest);
 
@@ -118,7 +120,7 @@ void Wavefront::run(const KernelGlobals& g,
     charge(Stage::kShade);
 
     counters.shadow_rays += shadow_.size;
-    intersect_shadow(g, accel, shadow_, visibility_);
+    intersect_shadow(g, accel, shadow_, visibility_, displacement);
     if (recorder != nullptr) record_shadow_rays();
     charge(Stage::kIntersectShadow);
     stages.accumulate_shadow(g, state_, shadow_, visibility_);
@@ -126,13 +128,11 @@ void Wavefront::run(const KernelGlobals& g,
     charge(Stage::kShade);
   }
 
-  std::uint32_t bad_path = kBatchPaths;
-  stages.finish(g, state_, batch, counters, &bad_path);
-  if (bad_path < kBatchPaths && !nonfinite.found) {
-    const int pixel = static_cast<int>(state_.pixel[bad_path]);
-    const auto num_pixels = static_cast<std::uint32_t>(batch.width * batch.height);
-    nonfinite = {true, pixel % g.film.width, pixel / g.film.width, batch.first_sample + bad_path / num_pixels};
-  }
+  counters.displaced_prisms += displacement.prisms;
+  counters.displaced_bounds += displacement.bounds;
+  counters.displaced_texels += displacement.texels;
+  counters.displaced_inversions += displacement.inversions;
+  stages.finish(g, state_, batch, counters, first_nonfinite);
   charge(Stage::kFilm);
 }
 

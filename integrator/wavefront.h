@@ -22,12 +22,7 @@ inline constexpr int kNumStages = 5;
 inline constexpr std::array<const char*, kNumStages> kStageNames = {"generate", "intersect_closest", "shade",
                                                                     "intersect_shadow", "film"};
 
-/// A sample that was dropped because it was not finite: enough to trace it again.
-struct NonfiniteSample {
-  bool found = false;
-  int x = 0, y = 0;  ///< in the film window
-  std::uint32_t sample = 0;
-};
+inline constexpr std::uint64_t kNoSample = ~std::uint64_t{0};
 
 /// A ray of a path, as it was traced.
 struct RecordedRay {
@@ -54,7 +49,9 @@ class Wavefront {
   std::vector<RecordedRay>* recorder = nullptr;  ///< receives every ray of the batch, if set
   Counters counters;
   std::array<double, kNumStages> seconds{};
-  NonfiniteSample nonfinite;
+  /// Dropped because it was not finite: pixel of the film << 32 | sample. The least, not the earliest, so that it does
+  /// not depend on the order of batches.
+  std::uint64_t first_nonfinite = kNoSample;
 
  private:
   void record_rays() const;

@@ -23,7 +23,7 @@ struct Statistics {
   double error_rmse = 0;    ///< estimated root mean square error of the beauty image, from its halves and quarters
   double error_relmse = 0;  ///< likewise, squared error relative to (radiance² + 0.01), as `relief compare` defines it
   std::uint64_t peak_memory_bytes = 0, bvh_bytes = 0, mesh_bytes = 0, texture_bytes = 0, light_bytes = 0,
-                film_bytes = 0, path_state_bytes = 0;
+                film_bytes = 0, path_state_bytes = 0, displacement_bytes = 0;
   Counters counters;
   std::vector<StageSeconds> stages;
   std::vector<std::string> warnings;

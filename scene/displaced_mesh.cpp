@@ -89,9 +89,9 @@ void warn_uv_area(const std::string& label, const Mesh& mesh, const TextureRef& 
 
 }  // namespace
 
-std::vector<DisplacedMesh> displaced_meshes(const Scene& scene)
+std::vector<MeshDisplacement> displaced_meshes(const Scene& scene)
 {
-  std::vector<DisplacedMesh> out;
+  std::vector<MeshDisplacement> out;
   std::set<std::pair<int, int>> known;
   for (const Instance& instance : scene.instances) {
     const int displacement = scene.materials[static_cast<std::size_t>(instance.material_index)].displacement_index;

@@ -12,13 +12,13 @@
 namespace relief {
 
 /// A mesh as some instance displaces it.
-struct DisplacedMesh {
+struct MeshDisplacement {
   int mesh_index = 0;
   int displacement_index = 0;  ///< of the instance's material, which need not be the mesh's
 };
 
 /// Distinct pairs, in the order of their first instance.
-std::vector<DisplacedMesh> displaced_meshes(const Scene& scene);
+std::vector<MeshDisplacement> displaced_meshes(const Scene& scene);
 
 /// For each vertex the first one at the same position, itself if there is none before it.
 /// @cost  a parallel sort

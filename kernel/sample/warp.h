@@ -156,7 +156,7 @@ RELIEF_KERNEL float warp_ggx_visible_normal_pdf(Vec3f wo, float alpha, Vec3f wm)
   if (!(cos_om > 0.0f && wm.z > 0.0f)) return 0.0f;
   const float inv_alpha = 1.0f / alpha;
   const Vec3f m = {wm.x * inv_alpha, wm.y * inv_alpha, wm.z};
-  const float o_length = length({wo.x * alpha, wo.y * alpha, wo.z});
+  const float o_length = length(Vec3f{wo.x * alpha, wo.y * alpha, wo.z});
   const float m_squared = length_squared(m);
   // dot(stretched wo, stretched wm) is dot(wo, wm) over both lengths.
   return 2.0f * kInvPi * cos_om * sqr(inv_alpha) / ((o_length + wo.z) * sqr(m_squared));

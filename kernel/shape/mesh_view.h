@@ -29,6 +29,7 @@ enum InstanceFlag : std::uint32_t {
   kCausticCaster = 1u << 3,
   kCausticReceiver = 1u << 4,
   kTracedInObjectSpace = 1u << 5,  ///< an instance of a shared mesh: the tracer transforms the ray, not the triangles
+  kDisplaced = 1u << 6,            ///< hits bring a position and a normal of their own, in object space
 };
 
 /// One placement of a mesh.

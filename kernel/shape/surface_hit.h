@@ -97,6 +97,26 @@ RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
   return hit;
 }
 
+/// Moves a hit from its base triangle onto the displaced surface over it. What depends on the barycentric weights alone
+/// stays; displaced surfaces are traced as they are, so there is no smoother one to lift shadow rays to.
+/// @param P_object   on the displaced surface, rounded once
+/// @param Ng_object  unit geometric normal of the displaced surface, on the side of the displacement normal
+RELIEF_KERNEL void surface_hit_displace(SurfaceHit* hit, const InstanceView& instance, Vec3f P_object, Vec3f Ng_object)
+{
+  const Affine3& m = instance.world_from_object;
+  const Affine3& inverse = instance.object_from_world;
+  const auto abs_transform = [](const Affine3& by, Vec3f v) {
+    return abs(by.x) * v.x + abs(by.y) * v.y + abs(by.z) * v.z;
+  };
+  hit->P = transform_point(m, P_object);
+  // The rounding of P, that of this transform, and of the tracer's when it brings the ray to object space.
+  hit->P_error = gamma_bound(5) * (abs_transform(m, abs(P_object)) + abs(m.p)) +
+                 gamma_bound(6) * abs_transform(m, abs_transform(inverse, abs(hit->P)) + abs(inverse.p));
+  hit->Ng = normalize(transform_normal(inverse, as_normal(Ng_object)));
+  hit->Ns = hit->Ng;
+  hit->P_lift = {};
+}
+
 /// Interpolated tangent frame of a normal map, world space, orthogonal to Ns.
 /// @return false where the mesh has no tangents or the tangent vanishes
 RELIEF_KERNEL bool surface_hit_tangent_frame(const MeshView& mesh,

@@ -132,7 +132,11 @@ template <unsigned kFeatures>
   const int bounce = path_bounces(bounces, BounceKind::kAll);
   const int surface = path_surface(state, path);
 
-  const SurfaceHit hit = surface_hit_make(mesh, instance, triangle, state.hit_u[path], state.hit_v[path]);
+  SurfaceHit hit = surface_hit_make(mesh, instance, triangle, state.hit_u[path], state.hit_v[path]);
+  if ((instance.flags & kDisplaced) != 0) {
+    surface_hit_displace(&hit, instance, {state.hit_P_x[path], state.hit_P_y[path], state.hit_P_z[path]},
+                         {state.hit_Ng_x[path], state.hit_Ng_y[path], state.hit_Ng_z[path]});
+  }
 
   ShadingSide side;
   side.front = dot(wo, hit.Ng) >= 0.0f;

@@ -68,6 +68,30 @@ TEST(Determinism, OneAndManyThreadsGiveTheSameBits)
   }
 }
 
+TEST(Determinism, TheFirstSampleThatIsNotFiniteIsTheFirstOfThePicture)
+{
+  // A reflection beyond the range of floats, on a card that fills the pixels from (16, 38) on.
+  Scene scene = empty_scene();
+  scene.environment.color = {10, 10, 10};
+  add_object(scene, quad_mesh({-0.8f, -1.2f, 0}, {1.2f, 0, 0}, {0, 0.9f, 0}), diffuse_material({3e38f, 3e38f, 3e38f}));
+  RenderOptions options = render_options(scene, 64, 20);
+  options.aov_mask = 1;
+  options.settings.max_bounces = 0;
+  options.crop_x0 = 5;
+  options.crop_y0 = 7;
+  options.crop_x1 = options.crop_y1 = 64;
+  for (const int threads : {1, 2, 4}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+    tbb::task_arena arena(threads);
+    const std::atomic<bool> stop{false};
+    Statistics stats;
+    arena.execute([&] { return render(scene, options, stop, {}, stats); });
+    EXPECT_EQ(stats.counters.nonfinite_samples, 24u * 18u * 20u);
+    ASSERT_EQ(stats.warnings.size(), 1u) << threads << " threads";
+    EXPECT_NE(stats.warnings.front().find("pixel 16,38 sample 0 "), std::string::npos) << stats.warnings.front();
+  }
+}
+
 TEST(Determinism, CropsShowTheWholePicturesPixels)
 {
   const Scene scene = mixed_scene();

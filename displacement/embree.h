@@ -11,13 +11,17 @@
 
 namespace relief {
 
-/// What a query hands to filter callbacks: Embree's own context first, so that a callback can cast back.
+struct TraversalCounters;
+
+/// What a query hands to callbacks: Embree's own context first, so that a callback can cast back. Every query of a scene
+/// with displaced geometry uses one of these.
 struct EmbreeContext {
 #if RTC_VERSION_MAJOR >= 4
   RTCRayQueryContext rtc;
 #else
   RTCIntersectContext rtc;
 #endif
+  TraversalCounters* displacement = nullptr;  ///< where displaced geometry counts; null: nowhere
 };
 
 /// @param coherent  rays come in order from one origin or direction
