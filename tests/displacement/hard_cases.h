@@ -1,7 +1,8 @@
-// The named cases that every method of tracing displaced triangles has to pass. A bug that is found gets a case here first.
+// The named cases that every method of tracing displaced triangles has to pass. A bug that is found gets a case here
+// first.
 //
-// All numbers that the renderer takes are floats kept in doubles, so that it and the oracle are given the same problem. Instances
-// with shear or negative scale transform the ray, not the surface, and are tested where instances are.
+// All numbers that the renderer takes are floats kept in doubles, so that it and the oracle are given the same problem.
+// Instances with shear or negative scale transform the ray, not the surface, and are tested where instances are.
 #pragma once
 
 #include <algorithm>
@@ -118,7 +119,7 @@ inline HardCase special_rays_case(const std::string& name,
 inline Vector3 random_prism_point(std::mt19937_64& random, const DisplacedTriangle& triangle, const HeightMap& map)
 {
   const auto [lowest, highest] = displacement_range(map);
-  return prism_point(triangle, random_barycentric(random), random_between(random, lowest, highest));
+  return relief::random_prism_point(random, triangle, lowest, highest);
 }
 
 inline void add_directions(std::vector<HardCase>& cases)
@@ -183,7 +184,8 @@ inline void add_origins(std::vector<HardCase>& cases)
   }));
   cases.push_back(special_rays_case("origin on the surface", domed, map, [&](std::mt19937_64& random) {
     const Vector3 O = oracle::surface_eval(domed, map, random_barycentric(random)).P;
-    return ray_through(O, combination(1, O, 1, random_direction(random)), random_index(random, 2) == 0 ? 0 : 1e-5);
+    const double t_min = random_index(random, 2) == 0 ? 0 : 1e-5;
+    return ray_through(O, combination(1, O, 1, random_direction(random)), t_min);
   }));
   cases.push_back(special_rays_case("origin a million away", domed, map, [&](std::mt19937_64& random) {
     const Vector3 target = random_prism_point(random, domed, map);
@@ -396,8 +398,8 @@ inline void add_closed_surfaces(std::vector<HardCase>& cases)
   HardCase poles = sphere_case("at the poles of a closed sphere", .2);
   for (int i = 0; i < kNumRays; ++i) {
     const double side = i % 2 == 0 ? 1 : -1;
-    const Vector3 near_pole =
-        combination(std::pow(10, random_between(random, -8, -1)), random_direction(random), 1, {0, 0, side});
+    const double distance = std::pow(10, random_between(random, -8, -1));
+    const Vector3 near_pole = combination(distance, random_direction(random), 1, {0, 0, side});
     poles.rays.push_back(ray_through(combination(1, near_pole, 3, random_direction(random)), near_pole));
     poles.rays.push_back(ray_through({0, 0, 4 * side}, {0, 0, 0}));
   }
@@ -405,7 +407,7 @@ inline void add_closed_surfaces(std::vector<HardCase>& cases)
 
   HardCase across = sphere_case("through a closed sphere", .4);
   for (int i = 0; i < 2 * kNumRays; ++i) {
-    const Vector3 inside = combination(random_between(random, 0, 1.1), random_direction(random), 0, {});
+    const Vector3 inside = random_vector(random, 0, 1.1);
     across.rays.push_back(ray_through(combination(4, random_direction(random), 0, {}), inside));
   }
   cases.push_back(across);
@@ -472,7 +474,8 @@ inline void add_neighbours(std::vector<HardCase>& cases)
   cases.push_back(special_rays_case("twice through a twisted wall", twisted, map, [&](std::mt19937_64& wall_random) {
     // From one point of the wall over an edge to another, on opposite sides of the edge's middle.
     const auto wall_point = [&](double low, double high) {
-      return prism_point(twisted, {random_between(wall_random, low, high), 0}, random_between(wall_random, -.12, .12));
+      const double b1 = random_between(wall_random, low, high);
+      return prism_point(twisted, {b1, 0}, random_between(wall_random, -.12, .12));
     };
     const Vector3 first = wall_point(0, .5), second = wall_point(.5, 1);
     return ray_through(combination(2, first, -1, second), first);

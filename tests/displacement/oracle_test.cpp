@@ -55,7 +55,7 @@ std::vector<Ray> rays_towards(const DisplacedTriangle& triangle, int num_rays, d
   std::mt19937_64 random(seed);
   std::vector<Ray> rays;
   for (int i = 0; i < num_rays; ++i) {
-    const Vector3 target = prism_point(triangle, random_barycentric(random), random_between(random, -height, height));
+    const Vector3 target = random_prism_point(random, triangle, -height, height);
     rays.push_back(ray_through(combination(1, target, 2, random_direction(random)), target));
   }
   return rays;
@@ -92,8 +92,8 @@ TEST(OracleInterval, HoldsTheExactResult)
 {
   std::mt19937_64 random(1);
   for (int i = 0; i < 200000; ++i) {
-    const double a = random_between(random, -1, 1) * std::pow(10, random_between(random, -30, 30));
-    const double b = random_between(random, -1, 1) * std::pow(10, random_between(random, -30, 30));
+    const double a_size = std::pow(10, random_between(random, -30, 30)), a = a_size * random_between(random, -1, 1);
+    const double b_size = std::pow(10, random_between(random, -30, 30)), b = b_size * random_between(random, -1, 1);
     const Interval x = oracle::thin(a), y = oracle::thin(b);
     // Sums, products and quotients of doubles in long double have errors far below the intervals' widths.
     const auto holds = [](const Interval& interval, long double value) {
@@ -216,7 +216,8 @@ TEST(OracleDisplacedTriangle, IsABilinearPatchWithinATexel)
 
 TEST(OracleDisplacedTriangle, IsARadialOffsetForNormalsThatArePositions)
 {
-  // With N = P the surface is the base triangle pushed away from the origin by d: X is on it if X · (1 − d/|X|) is on the triangle.
+  // With N = P the surface is the base triangle pushed away from the origin by d: X is on it if X · (1 − d/|X|) is on
+  // the triangle.
   DisplacedTriangle triangle = hard_case_parts::domed_triangle();
   triangle.P = {{{1, .25, 0}, {0, 1, .125}, {.25, 0, 1}}};
   triangle.N = triangle.P;
@@ -334,7 +335,7 @@ TEST(OracleDisplacedTriangle, MissesNoPointThatARayIsAimedAt)
     for (int k = 0; k < 200; ++k) {
       const Vector3 target =
           oracle::surface_eval(random_input.triangle, random_input.map, random_barycentric(random)).P;
-      const Vector3 O = combination(1, target, size * random_between(random, .1, 3), random_direction(random));
+      const Vector3 O = combination(1, target, size, random_vector(random, .1, 3));
       num_missed += !finds_point(surface, target, O);
       ++num_rays;
     }
@@ -352,7 +353,7 @@ TEST(OracleDisplacedTriangle, MissesNoPointOfHardCases)
       const double size = vector_length(difference(triangle.P[1], triangle.P[0])) + std::abs(hard_case.map.scale);
       for (std::size_t k = 0; k < 200 / hard_case.triangles.size(); ++k) {
         const Vector3 target = oracle::surface_eval(triangle, hard_case.map, random_barycentric(random)).P;
-        const Vector3 O = combination(1, target, size * random_between(random, .1, 3), random_direction(random));
+        const Vector3 O = combination(1, target, size, random_vector(random, .1, 3));
         EXPECT_TRUE(finds_point(surface, target, O)) << hard_case.name;
       }
     }
@@ -407,7 +408,8 @@ class MicroTriangles {
   }
   const Vector3& P(int i, int j) const
   {
-    return P_[static_cast<std::size_t>(i * (num_across_ + 1) - i * (i - 1) / 2 + j)];
+    const int index = i * (num_across_ + 1) - i * (i - 1) / 2 + j;
+    return P_[static_cast<std::size_t>(index)];
   }
   static void add(const Ray& ray, const std::array<Vector3, 3>& corners, const Vector2& b, std::vector<MicroHit>& hits)
   {
@@ -426,9 +428,9 @@ class MicroTriangles {
 
 TEST(OracleDisplacedTriangle, AgreesWithDenseMicroTriangles)
 {
-  // A micro-triangle has its corners on the surface, so the surface is about its longest edge away at most. Hits that graze, or
-  // within a few micro-triangles of the base triangle's edge, of a limit of t or of each other, can differ; of the others none
-  // may be without a partner.
+  // A micro-triangle has its corners on the surface, so the surface is about its longest edge away at most. Hits that
+  // graze, or within a few micro-triangles of the base triangle's edge, of a limit of t or of each other, can differ; of
+  // the others none may be without a partner.
   constexpr int kNumAcross = 300;
   std::mt19937_64 random(9);
   std::size_t num_compared = 0;
@@ -474,7 +476,8 @@ TEST(OracleDisplacedTriangle, AgreesWithDenseMicroTriangles)
 
 TEST(OracleDisplacedTriangle, IsFoundOnceOnTexelBorders)
 {
-  // Rays straight down through texel centres, which are corners of four bilinear patches, and through the lines between them.
+  // Rays straight down through texel centres, which are corners of four bilinear patches, and through the lines between
+  // them.
   DisplacedTriangle triangle = flat_triangle();
   const HeightMap map = hard_case_parts::noise_map(16, 16, .5);
   const oracle::Surface surface(triangle, map);

@@ -1,7 +1,8 @@
-// Random displaced triangles with rays, for comparisons with the oracle. All numbers are floats kept in doubles, so that renderer
-// and oracle are given the same problem.
+// Random displaced triangles with rays, for comparisons with the oracle. All numbers are floats kept in doubles, so that
+// renderer and oracle are given the same problem.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -62,6 +63,14 @@ inline oracle::Vector3 float_rounded(const oracle::Vector3& a)
   return {float_rounded(a[0]), float_rounded(a[1]), float_rounded(a[2])};
 }
 
+/// A vector of random direction and of a length between two.
+/// Random numbers are drawn in separate statements: the order in which arguments are evaluated is the compiler's choice.
+inline oracle::Vector3 random_vector(std::mt19937_64& random, double shortest, double longest)
+{
+  const double length = random_between(random, shortest, longest);
+  return combination(length, random_direction(random), 0, {});
+}
+
 /// A ray through two points, up to the rounding of its numbers.
 inline oracle::Ray ray_through(const oracle::Vector3& from,
                                const oracle::Vector3& to,
@@ -88,6 +97,16 @@ inline oracle::Vector3 prism_point(const oracle::DisplacedTriangle& triangle, co
 {
   oracle::HeightMap constant{1, 1, {offset}};
   return oracle::surface_eval(triangle, constant, b).P;
+}
+
+/// A point of the prism between two displacements.
+inline oracle::Vector3 random_prism_point(std::mt19937_64& random,
+                                          const oracle::DisplacedTriangle& triangle,
+                                          double lowest,
+                                          double highest)
+{
+  const oracle::Vector2 b = random_barycentric(random);
+  return prism_point(triangle, b, random_between(random, lowest, highest));
 }
 
 /// Smooth, noisy, spiky, stepped or constant.
@@ -122,7 +141,8 @@ inline std::array<double, 2> displacement_range(const oracle::HeightMap& map)
   return range;
 }
 
-/// Rays that aim at the prism and at the surface, graze, start inside or on the surface, are parallel to an axis, or end inside.
+/// Rays that aim at the prism and at the surface, graze, start inside or on the surface, are parallel to an axis, or end
+/// inside.
 inline std::vector<oracle::Ray> random_rays(std::mt19937_64& random,
                                             const oracle::DisplacedTriangle& triangle,
                                             const oracle::HeightMap& map,
@@ -130,24 +150,24 @@ inline std::vector<oracle::Ray> random_rays(std::mt19937_64& random,
 {
   const oracle::Vector3 edge1 = combination(1, triangle.P[1], -1, triangle.P[0]);
   const oracle::Vector3 edge2 = combination(1, triangle.P[2], -1, triangle.P[0]);
-  const auto [lowest, highest] = displacement_range(map);
+  const double lowest = displacement_range(map)[0], highest = displacement_range(map)[1];
   const double size = vector_length(edge1) + vector_length(edge2) + std::abs(lowest) + std::abs(highest);
   const auto point_in_prism = [&] {
     const double margin = .1 * (highest - lowest);
-    return prism_point(triangle, random_barycentric(random), random_between(random, lowest - margin, highest + margin));
+    return random_prism_point(random, triangle, lowest - margin, highest + margin);
   };
   std::vector<oracle::Ray> rays;
   for (int i = 0; i < num_rays; ++i) {
     const oracle::Vector3 inside = point_in_prism();
     const oracle::Vector3 on_surface = oracle::surface_eval(triangle, map, random_barycentric(random)).P;
-    const oracle::Vector3 outside =
-        combination(1, inside, size * random_between(random, .5, 4), random_direction(random));
-    const oracle::Vector3 beside =
-        combination(random_between(random, -1, 1), edge1, random_between(random, -1, 1), edge2);
-    const oracle::Vector3 lift =
-        combination(.05 * size * random_between(random, -1, 1), random_direction(random), 0, edge1);
+    const oracle::Vector3 outside = combination(1, inside, size, random_vector(random, .5, 4));
+    const double along1 = random_between(random, -1, 1), along2 = random_between(random, -1, 1);
+    const oracle::Vector3 beside = combination(along1, edge1, along2, edge2);
+    const oracle::Vector3 lift = random_vector(random, 0, .05 * size);
+    const int axis = random_index(random, 3);
     oracle::Vector3 along_axis{};
-    along_axis[static_cast<std::size_t>(random_index(random, 3))] = random_index(random, 2) == 0 ? size : -size;
+    along_axis[static_cast<std::size_t>(axis)] = random_index(random, 2) == 0 ? size : -size;
+    const double t_min = random_between(random, 0, .95), t_max = random_between(random, .95, 1.1);
     switch (i % 8) {
       case 0:
         rays.push_back(ray_through(outside, inside));
@@ -168,7 +188,7 @@ inline std::vector<oracle::Ray> random_rays(std::mt19937_64& random,
         rays.push_back(ray_through(combination(1, inside, -1, along_axis), inside));
         break;
       case 6:
-        rays.push_back(ray_through(outside, inside, random_between(random, 0, .95), random_between(random, .95, 1.1)));
+        rays.push_back(ray_through(outside, inside, t_min, t_max));
         break;
       case 7:
         rays.push_back(ray_through(inside, point_in_prism()));
@@ -194,7 +214,7 @@ inline RandomCase random_case(std::mt19937_64& random, int num_rays)
   map.wrap_v = static_cast<oracle::Wrap>(random_index(random, 3));
 
   const double size = std::pow(10, random_between(random, -2, 2));
-  const oracle::Vector3 center = combination(size * random_between(random, 0, 10), random_direction(random), 0, {});
+  const oracle::Vector3 center = random_vector(random, 0, 10 * size);
   for (oracle::Vector3& corner : triangle.P) {
     corner = float_rounded(combination(1, center, size, random_direction(random)));
   }

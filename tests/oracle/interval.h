@@ -7,8 +7,8 @@
 
 namespace relief::oracle {
 
-/// More than the rounding error of one operation: half a unit in the last place is at most 2^-53 of the value. The second term is
-/// for results below the normal range.
+/// More than the rounding error of one operation: half a unit in the last place is at most 2^-53 of the value. The
+/// second term is for results below the normal range.
 inline double rounding_bound(double value) { return std::abs(value) * 0x1.8p-52 + 1e-300; }
 inline double round_down(double value) { return value - rounding_bound(value); }
 inline double round_up(double value) { return value + rounding_bound(value); }

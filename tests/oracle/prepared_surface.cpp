@@ -43,6 +43,12 @@ std::int64_t to_int(double value) { return static_cast<std::int64_t>(value); }
 struct CellRange {
   std::int64_t first, last;
   std::int64_t count() const { return last - first + 1; }
+  /// A line of the lattice between the cells, if there is more than one.
+  double middle() const
+  {
+    const std::int64_t line = first + count() / 2;
+    return static_cast<double>(line);
+  }
 };
 
 CellRange cells_of(const Interval& x)
@@ -149,8 +155,8 @@ PreparedSurface::PreparedSurface(const DisplacedTriangle& triangle_, const Heigh
   const double x1 = x[1].mid() - x[0].mid(), x2 = x[2].mid() - x[0].mid();
   const double y1 = y[1].mid() - y[0].mid(), y2 = y[2].mid() - y[0].mid();
   const double longest = std::max({std::hypot(x1, y1), std::hypot(x2, y2), std::hypot(x1 - x2, y1 - y2)});
-  // Much thinner triangles fill little of the texels that they cross, and S is far off in the rest. The limit only chooses the
-  // better conditioned of two sound ways.
+  // Much thinner triangles fill little of the texels that they cross, and S is far off in the rest. The limit only
+  // chooses the better conditioned of two sound ways.
   constexpr double kMinHeight = 1;
   parameters_are_texels = std::abs(x1 * y2 - x2 * y1) > kMinHeight * longest;
   is_mirrored = parameters_are_texels && x1 * y2 < x2 * y1;
@@ -277,8 +283,8 @@ std::array<Rectangle, 2> PreparedSurface::split(const Rectangle& domain) const
     const CellRange columns = cells_of(domain.p), rows = cells_of(domain.q);
     p_cost = static_cast<double>(columns.count());
     q_cost = static_cast<double>(rows.count());
-    p_middle = static_cast<double>(columns.first + columns.count() / 2);
-    q_middle = static_cast<double>(rows.first + rows.count() / 2);
+    p_middle = columns.middle();
+    q_middle = rows.middle();
   } else {
     p_cost = domain.p.width() * std::max(x_.p_slope.magnitude(), y_.p_slope.magnitude());
     q_cost = domain.q.width() * std::max(x_.q_slope.magnitude(), y_.q_slope.magnitude());
@@ -430,8 +436,8 @@ void PreparedSurface::build()
     SurfaceNode& node = nodes[index];
     if (node.num_children > 0) {
       node.box = nodes[static_cast<std::size_t>(node.first_child)].box;
-      for (std::int32_t child = 1; child < node.num_children; ++child) {
-        const SurfaceNode& other = nodes[static_cast<std::size_t>(node.first_child + child)];
+      for (std::int32_t child = node.first_child + 1; child < node.first_child + node.num_children; ++child) {
+        const SurfaceNode& other = nodes[static_cast<std::size_t>(child)];
         for (std::size_t k = 0; k < 3; ++k) node.box[k] = hull(node.box[k], other.box[k]);
       }
       continue;

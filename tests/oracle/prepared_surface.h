@@ -1,7 +1,7 @@
 // A displaced triangle as a function of two parameters, with bounds over rectangles of them.
 //
-// The parameters are texel coordinates, so that rectangles fit the lattice on which h is smooth, or the barycentric coordinates
-// b1 and b2 where the triangle has (almost) no area in uv. Points are relative to corner 0.
+// The parameters are texel coordinates, so that rectangles fit the lattice on which h is smooth, or the barycentric
+// coordinates b1 and b2 where the triangle has (almost) no area in uv. Points are relative to corner 0.
 #pragma once
 
 #include <array>

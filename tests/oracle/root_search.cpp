@@ -80,6 +80,7 @@ class RootSearch {
     const double width = patch.has_derivatives ? kMinWidth : kMinWidthAtSingularity;
     return r.p.width() <= width * unit_p_ && r.q.width() <= width * unit_q_;
   }
+  std::array<Rectangle, 2> halves(const Rectangle& r, const Patch<Interval>& patch) const;
   bool is_covered(const Rectangle& r) const;
   void add_root(const Root& root);
   void add_undecided(const Rectangle& domain, const Patch<Interval>& patch, const Interval& t);
@@ -195,23 +196,23 @@ void RootSearch::search(const Rectangle& domain, const LeafPatch* leaf)
       queue.push_back(rest);
       continue;
     }
-    const double p_size = rest.p.width() / unit_p_, q_size = rest.q.width() / unit_q_;
-    double p_cost = p_size, q_cost = q_size;
-    if (patch.has_derivatives) {
-      // A direction along which S does not move is still halved now and then: N may turn there.
-      p_cost = rest.p.width() * length(mid(patch.S_p));
-      q_cost = rest.q.width() * length(mid(patch.S_q));
-      if (p_size > 64 * q_size) q_cost = 0;
-      if (q_size > 64 * p_size) p_cost = 0;
-    }
-    if (p_cost >= q_cost) {
-      queue.push_back({{rest.p.low, rest.p.mid()}, rest.q});
-      queue.push_back({{rest.p.mid(), rest.p.high}, rest.q});
-    } else {
-      queue.push_back({rest.p, {rest.q.low, rest.q.mid()}});
-      queue.push_back({rest.p, {rest.q.mid(), rest.q.high}});
-    }
+    for (const Rectangle& half : halves(rest, patch)) queue.push_back(half);
   }
+}
+
+/// Halves of a rectangle, cut where S is longest.
+std::array<Rectangle, 2> RootSearch::halves(const Rectangle& r, const Patch<Interval>& patch) const
+{
+  const double p_size = r.p.width() / unit_p_, q_size = r.q.width() / unit_q_;
+  double p_cost = p_size, q_cost = q_size;
+  // A direction along which S does not move is still halved now and then: N may turn there.
+  constexpr double kMaxRatio = 64;
+  if (patch.has_derivatives && p_size <= kMaxRatio * q_size && q_size <= kMaxRatio * p_size) {
+    p_cost = r.p.width() * length(mid(patch.S_p));
+    q_cost = r.q.width() * length(mid(patch.S_q));
+  }
+  if (p_cost >= q_cost) return {{{{r.p.low, r.p.mid()}, r.q}, {{r.p.mid(), r.p.high}, r.q}}};
+  return {{{r.p, {r.q.low, r.q.mid()}}, {r.p, {r.q.mid(), r.q.high}}}};
 }
 
 /// One step of Hansen and Sengupta on the two combinations of the equations that do not hold t.
@@ -384,8 +385,8 @@ void RootSearch::add_undecided(const Rectangle& domain, const Patch<Interval>& p
     undecided_.push_back(make_hit(p, q, t));
     return;
   }
-  // S is not defined where N vanishes. Its closure is part of the circle of radius |d| around P that is perpendicular to the axis
-  // of the normals, or of a sphere if they have none; only a ray through it is in doubt.
+  // S is not defined where N vanishes. Its closure is part of the circle of radius |d| around P that is perpendicular
+  // to the axis of the normals, or of a sphere if they have none; only a ray through it is in doubt.
   const Interval3 P = surface_.base_point(domain);
   const Interval d = surface_.displacement(domain);
   const Vector3 center = mid(P), axis = surface_.normals_axis();
