@@ -308,7 +308,7 @@ TEST(OracleDisplacedTriangle, HitsLieOnTheSurfaceAndOnTheRay)
   EXPECT_LT(num_uncertain, 60u);
 }
 
-/// A ray towards a point of the surface has a root there, up to rounding, which moves the point by some 1e-15 of its size.
+/// A ray towards a point of the surface has a root there, up to rounding, which moves it by some 1e-15 of its size.
 /// @return  false if no hit is near
 bool finds_point(const oracle::Surface& surface, const Vector3& target, const Vector3& O)
 {
@@ -429,8 +429,8 @@ class MicroTriangles {
 TEST(OracleDisplacedTriangle, AgreesWithDenseMicroTriangles)
 {
   // A micro-triangle has its corners on the surface, so the surface is about its longest edge away at most. Hits that
-  // graze, or within a few micro-triangles of the base triangle's edge, of a limit of t or of each other, can differ; of
-  // the others none may be without a partner.
+  // graze, or within a few micro-triangles of the base triangle's edge, of a limit of t or of each other, can differ;
+  // of the others none may be without a partner.
   constexpr int kNumAcross = 300;
   std::mt19937_64 random(9);
   std::size_t num_compared = 0;

@@ -1,5 +1,5 @@
-// Random displaced triangles with rays, for comparisons with the oracle. All numbers are floats kept in doubles, so that
-// renderer and oracle are given the same problem.
+// Random displaced triangles with rays, for comparisons with the oracle. All numbers are floats kept in doubles, so
+// that renderer and oracle are given the same problem.
 #pragma once
 
 #include <algorithm>
@@ -64,7 +64,7 @@ inline oracle::Vector3 float_rounded(const oracle::Vector3& a)
 }
 
 /// A vector of random direction and of a length between two.
-/// Random numbers are drawn in separate statements: the order in which arguments are evaluated is the compiler's choice.
+/// Random numbers are drawn in separate statements, because compilers evaluate arguments in orders of their own.
 inline oracle::Vector3 random_vector(std::mt19937_64& random, double shortest, double longest)
 {
   const double length = random_between(random, shortest, longest);
@@ -141,8 +141,8 @@ inline std::array<double, 2> displacement_range(const oracle::HeightMap& map)
   return range;
 }
 
-/// Rays that aim at the prism and at the surface, graze, start inside or on the surface, are parallel to an axis, or end
-/// inside.
+/// Rays that aim at the prism and at the surface, graze, start inside or on the surface, are parallel to an axis, or
+/// end inside.
 inline std::vector<oracle::Ray> random_rays(std::mt19937_64& random,
                                             const oracle::DisplacedTriangle& triangle,
                                             const oracle::HeightMap& map,
