@@ -265,7 +265,7 @@ TEST(DisplacedMesh, MaterialsOfInstancesCount)
     instance.material_index = material;
     scene.instances.push_back(instance);
   }
-  const std::vector<DisplacedMesh> displaced = displaced_meshes(scene);
+  const std::vector<MeshDisplacement> displaced = displaced_meshes(scene);
   ASSERT_EQ(displaced.size(), 3u);
   EXPECT_EQ(displaced[0].mesh_index, 0);
   EXPECT_EQ(displaced[0].displacement_index, 0);
