@@ -75,7 +75,7 @@ RELIEF_KERNEL CurveDeviation curve_deviation(const DisplacedTriangle& tri,
     const Quadratic p = quadratic_shift(e, a.tau, step);
     const double slope = to - from;
     const double alpha = p.b - from * W.b - slope * W.c, beta = slope * W.a;
-    return quarter_over_W * __builtin_fmax(__builtin_fabs(alpha), __builtin_fabs(alpha + beta));
+    return quarter_over_W * max(__builtin_fabs(alpha), __builtin_fabs(alpha + beta));
   };
   const double b1 = deviation(g.e[1], a.b1, b.b1), b2 = deviation(g.e[2], a.b2, b.b2);
   CurveDeviation d;
@@ -89,7 +89,7 @@ RELIEF_KERNEL CurveDeviation curve_deviation(const DisplacedTriangle& tri,
     d.height = __builtin_huge_val();
     return d;
   }
-  const double s = __builtin_fmax(__builtin_fabs(a.s), __builtin_fabs(b.s));
+  const double s = max(__builtin_fabs(a.s), __builtin_fabs(b.s));
   d.height = s * (turn * turn / (8.0 * least) + N) + 0.25 * __builtin_fabs((b.s - a.s) * (b.nu - a.nu));
   return d;
 }
@@ -134,8 +134,8 @@ RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
   };
   const auto deviation = [&](const CurvePoint& a, const CurvePoint& b) {
     const CurveDeviation d = curve_deviation(tri, g, a, b);
-    const double fx = __builtin_fmax(__builtin_fabs(a.x - corner_x), __builtin_fabs(b.x - corner_x));
-    const double fy = __builtin_fmax(__builtin_fabs(a.y - corner_y), __builtin_fabs(b.y - corner_y));
+    const double fx = max(__builtin_fabs(a.x - corner_x), __builtin_fabs(b.x - corner_x));
+    const double fy = max(__builtin_fabs(a.y - corner_y), __builtin_fabs(b.y - corner_y));
     const double twist = __builtin_fabs(cell.hxy);
     return d.height + __builtin_fabs(mesh.scale) * (0.25 * twist * __builtin_fabs((b.x - a.x) * (b.y - a.y)) +
                                                     (__builtin_fabs(cell.hx) + twist * fy) * d.x +
@@ -186,7 +186,7 @@ RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
     const bool crosses = (n.ga < 0.0) != (n.gb < 0.0);
     const double bound = deviation(n.a, n.b);
     const double width = n.b.tau - n.a.tau;
-    if (!crosses && __builtin_fmin(__builtin_fabs(n.ga), __builtin_fabs(n.gb)) > bound) continue;
+    if (!crosses && min(__builtin_fabs(n.ga), __builtin_fabs(n.gb)) > bound) continue;
     const bool small = !(bound > rounding) || width <= 0x1p-50;
     // Once the bend is a small part of the difference of the ends, g is monotone and has one root.
     if (crosses && (small || 16.0 * bound < __builtin_fabs(n.gb - n.ga))) {

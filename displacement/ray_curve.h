@@ -56,8 +56,8 @@ RELIEF_KERNEL Quadratic quadratic_shift(Quadratic p, double origin, double step)
 /// Least value over [0, 1].
 RELIEF_KERNEL double quadratic_minimum(Quadratic p)
 {
-  double low = __builtin_fmin(p.c, p.a + p.b + p.c);
-  if (p.a > 0.0 && p.b < 0.0 && p.b > -2.0 * p.a) low = __builtin_fmin(low, p.c - p.b * p.b / (4.0 * p.a));
+  double low = min(p.c, p.a + p.b + p.c);
+  if (p.a > 0.0 && p.b < 0.0 && p.b > -2.0 * p.a) low = min(low, p.c - p.b * p.b / (4.0 * p.a));
   return low;
 }
 
@@ -150,6 +150,14 @@ struct Projected {
 // the negative of c·d − a·b, or a ray along a wall could be outside of both neighbours.
 RELIEF_KERNEL double cross2(double ax, double ay, double bx, double by) { return ax * by - ay * bx; }
 
+/// The same to about one ulp, also under cancellation (Kahan).
+RELIEF_KERNEL double cross2_exact(double ax, double ay, double bx, double by)
+{
+  const double product = ay * bx;
+  const double error = __builtin_fma(-ay, bx, product);
+  return __builtin_fma(ax, by, -product) + error;
+}
+
 RELIEF_KERNEL void sort_ascending(double* values, int count)
 {
   for (int i = 1; i < count; ++i) {
@@ -178,6 +186,23 @@ RELIEF_KERNEL void add_segment(RayCurve& curve, CurveSegment g)
   curve.segments[curve.num_segments++] = g;
 }
 
+/// Edge functions over s0 + τ·ds for a facet seen almost edge-on: their terms cancel, so they are made anew from the
+/// vertices at s0. Those are rounded alike for all edges, which moves the facet by an ulp and no more.
+RELIEF_KERNEL void nearly_edge_on_functions(const Projected& v, double s0, double ds, Quadratic* e)
+{
+  double x[3], y[3];
+  for (int i = 0; i < 3; ++i) {
+    x[i] = v.x[i] + s0 * v.nx[i];
+    y[i] = v.y[i] + s0 * v.ny[i];
+  }
+  for (int i = 0; i < 3; ++i) {
+    const int j = i == 2 ? 0 : i + 1, k = j == 2 ? 0 : j + 1;
+    e[i].c = cross2_exact(x[j], y[j], x[k], y[k]);
+    e[i].b = (cross2_exact(x[j], y[j], v.nx[k], v.ny[k]) + cross2_exact(v.nx[j], v.ny[j], x[k], y[k])) * ds;
+    e[i].a = cross2_exact(v.nx[j], v.ny[j], v.nx[k], v.ny[k]) * ds * ds;
+  }
+}
+
 /// The facet at s is edge-on: the ray runs within its plane, from edge to edge.
 RELIEF_KERNEL void add_edge_on_segment(RayCurve& curve, const Projected& v, double s)
 {
@@ -187,8 +212,8 @@ RELIEF_KERNEL void add_edge_on_segment(RayCurve& curve, const Projected& v, doub
     x[i] = v.x[i] + s * v.nx[i];
     y[i] = v.y[i] + s * v.ny[i];
     z[i] = curve.z[i] + s * curve.nz[i];
-    extent_x = __builtin_fmax(extent_x, __builtin_fabs(x[i]));
-    extent_y = __builtin_fmax(extent_y, __builtin_fabs(y[i]));
+    extent_x = max(extent_x, __builtin_fabs(x[i]));
+    extent_y = max(extent_y, __builtin_fabs(y[i]));
   }
   const double* w = extent_x > extent_y ? x : y;
   double near_b[3] = {0, 0, 0}, far_b[3] = {0, 0, 0}, near_t = 0, far_t = 0;
@@ -250,7 +275,7 @@ RELIEF_KERNEL bool ray_curve_make(const RayFrame& frame, const DisplacedTriangle
   curve.num_segments = 0;
   curve_detail::Projected v;
   const double low = tri.s_min, high = tri.s_max;
-  const double reach = __builtin_fmax(__builtin_fabs(low), __builtin_fabs(high));
+  const double reach = max(__builtin_fabs(low), __builtin_fabs(high));
   double extent = 0;
   for (int i = 0; i < 3; ++i) {
     const double p[3] = {tri.P[i].x - frame.O[0], tri.P[i].y - frame.O[1], tri.P[i].z - frame.O[2]};
@@ -261,8 +286,8 @@ RELIEF_KERNEL bool ray_curve_make(const RayFrame& frame, const DisplacedTriangle
     v.y[i] = p[frame.ky] - frame.Sy * p[frame.kz];
     v.nx[i] = n[frame.kx] - frame.Sx * n[frame.kz];
     v.ny[i] = n[frame.ky] - frame.Sy * n[frame.kz];
-    extent = __builtin_fmax(extent, __builtin_fabs(v.x[i]) + __builtin_fabs(v.y[i]) +
-                                        reach * (__builtin_fabs(v.nx[i]) + __builtin_fabs(v.ny[i])));
+    extent = max(extent, __builtin_fabs(v.x[i]) + __builtin_fabs(v.y[i]) +
+                             reach * (__builtin_fabs(v.nx[i]) + __builtin_fabs(v.ny[i])));
   }
   Quadratic e[3];
   for (int i = 0; i < 3; ++i) {
@@ -274,7 +299,7 @@ RELIEF_KERNEL bool ray_curve_make(const RayFrame& frame, const DisplacedTriangle
   // Each coefficient is a sum of at most four products below extent², in units of its power of s; evaluation and the
   // roots' own rounding add a few more.
   const double tolerance = 0x1p-48 * extent * extent;
-  const double edge_on = 1e-7 * extent * extent;
+  const double edge_on = 1e-10 * extent * extent;
 
   for (const double sign : {1.0, -1.0}) {
     Quadratic inside[3];
@@ -316,7 +341,13 @@ RELIEF_KERNEL bool ray_curve_make(const RayFrame& frame, const DisplacedTriangle
             curve_detail::add_edge_on_segment(curve, v, 0.5 * (begin + end));
           } else {
             CurveSegment g;
-            for (int i = 0; i < 3; ++i) g.e[i] = quadratic_shift(e[i] * sign, begin, end - begin);
+            const double least_W = min(quadratic_at(W, begin), quadratic_at(W, end));
+            if (least_W < 1e-4 * extent * extent) {
+              curve_detail::nearly_edge_on_functions(v, begin, end - begin, g.e);
+              for (Quadratic& q : g.e) q = q * sign;
+            } else {
+              for (int i = 0; i < 3; ++i) g.e[i] = quadratic_shift(e[i] * sign, begin, end - begin);
+            }
             g.s0 = begin;
             g.ds = end - begin;
             curve_detail::add_segment(curve, g);

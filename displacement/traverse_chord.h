@@ -23,7 +23,7 @@ inline constexpr float kParameterSlack = 0x1p-18f;
 /// parts of the map's range.
 inline constexpr float kWantedDeviation = 0.5f;
 inline constexpr float kWantedHeightDeviation = 1.0f / 32;
-inline constexpr int kMaxSplits = 4;
+inline constexpr int kMaxSplits = 6;
 /// Where an unbounded cell beside a clamped map ends.
 inline constexpr float kFarAway = 1e12f;
 
@@ -102,8 +102,8 @@ RELIEF_KERNEL void cell_bounds(const HeightFieldView& f, std::int64_t i, std::in
 RELIEF_KERNEL bool cell_intersect(Search& c, const Chord& chord, std::int64_t i, std::int64_t j, float u0, float u1)
 {
   const auto tau_at = [&](double u) { return chord.tau0 + u * chord.dtau; };
-  const double tau0 = __builtin_fmax(0.0, tau_at(static_cast<double>(u0) - kParameterSlack));
-  const double tau1 = __builtin_fmin(1.0, tau_at(static_cast<double>(u1) + kParameterSlack));
+  const double tau0 = max(0.0, tau_at(static_cast<double>(u0) - kParameterSlack));
+  const double tau1 = min(1.0, tau_at(static_cast<double>(u1) + kParameterSlack));
   ++c.counters.texels;
   if (!leaf_intersect(c.mesh, c.tri, c.curve, *c.segment, i, j, tau0, tau1, c.t_min, c.t_max, c.unfolded, &c.hit))
     return false;
@@ -158,7 +158,7 @@ RELIEF_KERNEL bool node_intersect(Search& c,
         high[half] = load8(line.high + 8 * half);
       }
     }
-    c.counters.bounds += 16;
+    c.counters.bounds += 1;
     const float width = static_cast<float>(size);
     const F8 x_low = lane_x * width + (offset_x + static_cast<float>(n.column) - chord.x0);
     F8 x_from = x_low - chord.pad_x, x_to = x_low + (width + chord.pad_x);
@@ -244,7 +244,8 @@ RELIEF_KERNEL bool next_node(NodeWalk& walk, const LatticeAxis& axis, int size, 
 {
   if (walk.first > walk.last) return false;
   const std::int64_t at = (walk.step > 0 ? walk.first : walk.last) - axis.first_cell;
-  const std::int64_t cell = axis.wrap == Wrap::kClamp ? at : lattice_modulo(at, axis.num_cells);
+  const bool in_first_period = at >= 0 && at < axis.num_cells;  // mostly; divisions are slow
+  const std::int64_t cell = in_first_period || axis.wrap == Wrap::kClamp ? at : lattice_modulo(at, axis.num_cells);
   out->period = at - cell + axis.first_cell;
   out->column = static_cast<int>(cell) & ~(size - 1);
   const int end = out->column + size < axis.num_cells ? out->column + size : axis.num_cells;
@@ -301,6 +302,16 @@ RELIEF_KERNEL bool chord_intersect(Search& c, const Chord& chord)
       clip(row.from - chord.pad_y, row.to + chord.pad_y, chord.y0, chord.inv_dy, &v0, &v1);
       if (!(v0 <= v1)) continue;
       if (chord.tau0 + (static_cast<double>(v0) - kParameterSlack) * chord.dtau > c.tau_end) continue;
+      if (level <= f.num_levels) {
+        const int parent = 2 * (level + 1), own = 2 * level;
+        const PyramidLine& line =
+            f.lines[level - 1][static_cast<std::ptrdiff_t>(row.column >> parent) * f.line_columns[level - 1] +
+                               (column.column >> parent)];
+        const int child = (column.column >> own & 3) + 4 * (row.column >> own & 3);
+        const float qa = chord.q0 + v0 * chord.dq, qb = chord.q0 + v1 * chord.dq;
+        c.counters.bounds += 1;
+        if (min(qa, qb) - chord.pad_q > line.high[child] || max(qa, qb) + chord.pad_q < line.low[child]) continue;
+      }
       if (node_intersect(c, chord, {column.column, row.column, level, v0, v1}, column.period, row.period)) return true;
     }
   }
@@ -313,7 +324,7 @@ RELIEF_KERNEL F8 quadratic_lanes(const Quadratic& p, F8 u)
   return (static_cast<float>(p.a) * u + static_cast<float>(p.b)) * u + static_cast<float>(p.c);
 }
 
-/// Eight chords of the curve between two parameters; those that may deviate too far are split again.
+/// The curve between two parameters as one, two or four chords; those that may deviate too far are split again.
 /// @return true when the search is over
 RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int splits)
 {
@@ -338,11 +349,10 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
   const double end_W = W.a + W.b + W.c;
   const float bend = static_cast<float>(__builtin_sqrt(1.0 / end_W));
   const auto spread = [&](F8 k) { return bend * k / (bend * k + (1.0f - k)); };
-  const F8 k0{0, 1, 2, 3, 4, 5, 6, 7};
-  F8 u0 = spread(k0 * 0.125f);
-  F8 u1 = spread(k0 * 0.125f + 0.125f);
-  u0[0] = 0.0f;
-  u1[7] = 1.0f;
+  // Lanes: the whole, two halves, four quarters, and the whole once more.
+  const F8 u0 = spread(F8{0, 0, 0.5f, 0, 0.25f, 0.5f, 0.75f, 0});
+  F8 u1 = spread(F8{1, 0.5f, 1, 0.25f, 0.5f, 0.75f, 1, 1});
+  u1[0] = u1[2] = u1[6] = u1[7] = 1.0f;
 
   struct Points {
     F8 W, b1, b2, x, y, nu, height;
@@ -412,17 +422,21 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
   const F8 pad_q = q_slope * (deviation_height + s_largest * (slack_b * (length(Nu) + length(Nv)) + kFloatSlack)) +
                    kFloatSlack * (__builtin_fabsf(q_zero) + max(abs(q_a), abs(q_b)) + 1.0f);
 
-  // Where the search ends may be known already.
   unsigned alive =
       mask_of((min(q_a, q_b) - pad_q <= splat8(f.range.high)) & (max(q_a, q_b) + pad_q >= splat8(f.range.low)));
-  c.counters.bounds += 8;
   const float wanted_q = kWantedHeightDeviation * static_cast<float>(f.range.high - f.range.low) + 1.0f;
+  const unsigned straight =
+      mask_of((pad_x <= splat8(kWantedDeviation)) & (pad_y <= splat8(kWantedDeviation)) & (pad_q <= splat8(wanted_q)));
+  c.counters.bounds += 1;
+  // As few chords as are straight enough; a chord that misses the map's range need not be.
+  constexpr unsigned kWhole = 0x01, kHalves = 0x06, kQuarters = 0x78;
+  const unsigned good = straight | ~alive;
+  alive &= (good & kWhole) == kWhole ? kWhole : ((good & kHalves) == kHalves ? kHalves : kQuarters);
   for (; alive != 0; alive &= alive - 1) {
     const int k = __builtin_ctz(alive);
     const double from = tau0 + static_cast<double>(u0[k]) * step, to = tau0 + static_cast<double>(u1[k]) * step;
     if (from > c.tau_end) return false;
-    const bool straight = pad_x[k] <= kWantedDeviation && pad_y[k] <= kWantedDeviation && pad_q[k] <= wanted_q;
-    if (!straight && splits < kMaxSplits) {
+    if ((straight >> k & 1) == 0 && splits < kMaxSplits) {
       if (chords_intersect(c, from, to, splits + 1)) return true;
       continue;
     }

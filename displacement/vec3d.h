@@ -9,6 +9,10 @@ struct Vec3d {
   double x = 0, y = 0, z = 0;
 };
 
+// Plain comparisons: the library's fmin and fmax are calls.
+RELIEF_KERNEL constexpr double min(double a, double b) { return a < b ? a : b; }
+RELIEF_KERNEL constexpr double max(double a, double b) { return a > b ? a : b; }
+
 RELIEF_KERNEL constexpr Vec3d operator+(Vec3d a, Vec3d b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
 RELIEF_KERNEL constexpr Vec3d operator-(Vec3d a, Vec3d b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 RELIEF_KERNEL constexpr Vec3d operator*(Vec3d a, double s) { return {a.x * s, a.y * s, a.z * s}; }
