@@ -6,10 +6,10 @@
 
 #include "cli/commands.h"
 #include "cli/scene_setup.h"
-#include "scene/load.h"
 #include "integrator/scene_context.h"
 #include "scene/displaced_mesh.h"
 #include "scene/displacement_seams.h"
+#include "scene/load.h"
 #include "scene/texture_store.h"
 
 namespace relief {

@@ -26,7 +26,6 @@
 #include "cli/interrupt.h"
 #include "cli/progress_printer.h"
 #include "cli/scene_setup.h"
-#include "scene/load.h"
 #include "exporters/atomic_file.h"
 #include "exporters/errors.h"
 #include "exporters/exr.h"
@@ -34,6 +33,7 @@
 #include "exporters/png_ocio.h"
 #include "exporters/stats_json.h"
 #include "integrator/render.h"
+#include "scene/load.h"
 
 namespace relief {
 

@@ -15,10 +15,10 @@
 #include "cli/arguments.h"
 #include "cli/commands.h"
 #include "cli/scene_setup.h"
-#include "scene/load.h"
 #include "exporters/atomic_file.h"
 #include "exporters/errors.h"
 #include "integrator/trace.h"
+#include "scene/load.h"
 
 namespace relief {
 

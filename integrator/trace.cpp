@@ -37,11 +37,10 @@ std::vector<TraceHit> trace_rays(const SceneContext& context, std::span<const Tr
         continue;
       }
       const InstanceView& instance = context.instances[object];
-      SurfaceHit surface = surface_hit_make(context.meshes[static_cast<std::size_t>(instance.mesh_index)],
-                                                  instance, query.hit.primID, query.hit.u, query.hit.v);
+      SurfaceHit surface = surface_hit_make(context.meshes[static_cast<std::size_t>(instance.mesh_index)], instance,
+                                            query.hit.primID, query.hit.u, query.hit.v);
       if ((instance.flags & kDisplaced) != 0) {
-        const SurfacePoint point =
-            context.displacements.point(object, query.hit.primID, query.hit.u, query.hit.v);
+        const SurfacePoint point = context.displacements.point(object, query.hit.primID, query.hit.u, query.hit.v);
         surface_hit_displace(&surface, instance, to_float(point.P), to_float(point.Ng));
       }
       result = {true,

@@ -108,7 +108,7 @@ void Wavefront::run(const KernelGlobals& g,
     lights_.size = background_.size = next_.size = shadow_.size = 0;
     for (QueueView& queue : surfaces_) queue.size = 0;
     intersect_closest(g, accel, state_, active_, camera, surface_kernel.data(), surfaces_.data(), lights_, background_,
-                     displacement);
+                      displacement);
     if (recorder != nullptr) record_rays();
     charge(Stage::kIntersectClosest);
 

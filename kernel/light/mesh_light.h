@@ -13,8 +13,8 @@ inline constexpr float kTriangleMinSolidAngle = 1e-4f;
 /// @return steradians; 0: sample by area
 RELIEF_KERNEL float triangle_light_solid_angle(const Light& light, Vec3f P)
 {
-  const float longest_edge_squared = max(max(length_squared(light.edge_u), length_squared(light.edge_v)),
-                                         length_squared(light.edge_u - light.edge_v));
+  const float longest_edge_squared =
+      max(max(length_squared(light.edge_u), length_squared(light.edge_v)), length_squared(light.edge_u - light.edge_v));
   if (!light_is_wide(light, P, longest_edge_squared)) return 0.0f;
   const Vec3f a = light.P - P;
   const float det = 2.0f * light.area * dot(a, light.axis);

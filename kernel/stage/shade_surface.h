@@ -113,11 +113,11 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
 /// Next: intersect closest (pushed on `next`), or the path ends. At most one ray is added to `shadow`.
 template <unsigned kFeatures>
 [[gnu::flatten]] RELIEF_KERNEL void shade_surface(const KernelGlobals& g,
-                                 const PathStateView& state,
-                                 std::uint32_t path,
-                                 QueueView& next,
-                                 ShadowQueueView& shadow,
-                                 Counters& counters)
+                                                  const PathStateView& state,
+                                                  std::uint32_t path,
+                                                  QueueView& next,
+                                                  ShadowQueueView& shadow,
+                                                  Counters& counters)
 {
   ++counters.surface_hits;
   const InstanceView& instance = g.instances[state.hit_object[path]];

@@ -303,7 +303,8 @@ TEST_F(RenderProgram, ADisplacedSquareIsHitWhereItIs)
   folder_.write("rays.txt", "0.5 0.25 3 0 0 -1\n");
   EXPECT_EQ(render(scene, file("a.exr")).exit_code, 0);
   const Outcome outcome = run({"trace", scene, "--rays", file("rays.txt")});
-  EXPECT_NE(outcome.output.find("\n1,3.25,0.5,0.25,-0.25,0,0,1,"), std::string::npos) << outcome.output << outcome.errors;
+  EXPECT_NE(outcome.output.find("\n1,3.25,0.5,0.25,-0.25,0,0,1,"), std::string::npos)
+      << outcome.output << outcome.errors;
 }
 
 TEST_F(RenderProgram, APictureKnowsItsCommandLine)
