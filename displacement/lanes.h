@@ -1,15 +1,17 @@
-// Eight floats side by side, by the compiler's vector types: one AVX2 register, or two SSE registers in the baseline.
+// Eight floats, or four doubles, side by side, by the compiler's vector types: one AVX2 register, or two SSE registers
+// in the baseline.
 #pragma once
 
 #include <cstdint>
 
 #include <immintrin.h>
 
-#include "kernel/kernel.h"
+#include "displacement/vec3d.h"
 
 namespace relief {
 
 using F8 [[gnu::vector_size(32)]] = float;
+using D4 [[gnu::vector_size(32)]] = double;
 using I8 [[gnu::vector_size(32)]] = std::int32_t;
 
 RELIEF_KERNEL F8 splat8(float x) { return F8{x, x, x, x, x, x, x, x}; }
@@ -66,5 +68,21 @@ RELIEF_KERNEL void store8(float* to, F8 lanes) { __builtin_memcpy(to, &lanes, si
 RELIEF_KERNEL F8 shift_down(F8 a) { return __builtin_shufflevector(a, a, 1, 2, 3, 4, 5, 6, 7, 7); }
 /// Lanes 0…3 of a, then lanes 0…3 of b.
 RELIEF_KERNEL F8 join_low_halves(F8 a, F8 b) { return __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11); }
+
+RELIEF_KERNEL D4 abs(D4 a)
+{
+  return a < 0.0 ? -a : a;
+}
+RELIEF_KERNEL D4 max(D4 a, D4 b) { return a > b ? a : b; }
+RELIEF_KERNEL D4 min(D4 a, D4 b) { return a < b ? a : b; }
+RELIEF_KERNEL D4 sqrt(D4 a)
+{
+  for (int k = 0; k < 4; ++k) a[k] = __builtin_sqrt(a[k]);
+  return a;
+}
+/// Lanes 1, 2, 0: the next vertex of a triangle. Lane 3 stays.
+RELIEF_KERNEL D4 next_vertex(D4 a) { return __builtin_shufflevector(a, a, 1, 2, 0, 3); }
+RELIEF_KERNEL double max_of_vertices(D4 a) { return max(max(a[0], a[1]), a[2]); }
+RELIEF_KERNEL double sum_of_vertices(D4 a) { return a[0] + a[1] + a[2]; }
 
 }  // namespace relief

@@ -12,6 +12,7 @@
 #pragma once
 
 #include "displacement/displaced_triangle.h"
+#include "displacement/lanes.h"
 
 namespace relief {
 
@@ -41,7 +42,7 @@ RELIEF_KERNEL RayFrame ray_frame_make(Vec3f O, Vec3f D)
 
 /// a·τ² + b·τ + c
 struct Quadratic {
-  double a = 0, b = 0, c = 0;
+  double a, b, c;
 };
 
 RELIEF_KERNEL double quadratic_at(Quadratic p, double tau) { return (p.a * tau + p.b) * tau + p.c; }
@@ -74,14 +75,14 @@ RELIEF_KERNEL int quadratic_roots_inside(Quadratic p, double low, double high, d
   return count;
 }
 
-/// A stretch of a ray inside a triangle's prism.
+/// A stretch of a ray inside a triangle's prism. Without initial values: a curve has room for many, and most have one.
 struct CurveSegment {
-  Quadratic e[3];             ///< homogeneous barycentric weights of τ in [0, 1]
-  Quadratic W;                ///< their sum, positive on [0, 1]
-  double s0 = 0, ds = 0;      ///< s = s0 + τ·ds
-  double W_min = 1;           ///< least W on [0, 1], positive
-  double relative_error = 0;  ///< bound on the rounding error of the weights e_i/W
-  double t0 = 0, t1 = 0;      ///< ray parameter at τ = 0 and 1, t0 <= t1
+  Quadratic e[3];         ///< homogeneous barycentric weights of τ in [0, 1]
+  Quadratic W;            ///< their sum, positive on [0, 1]
+  double s0, ds;          ///< s = s0 + τ·ds
+  double W_min;           ///< least W on [0, 1], positive
+  double relative_error;  ///< bound on the rounding error of the weights e_i/W
+  double t0, t1;          ///< ray parameter at τ = 0 and 1, t0 <= t1
 };
 
 /// At most 4 intervals a sign, and at most two cuts each where the facet turns edge-on.
@@ -90,8 +91,8 @@ inline constexpr int kMaxCurveSegments = 12;
 /// A ray in one triangle's prism.
 struct RayCurve {
   double z[3], nz[3];  ///< ray parameter of P_i + s·N_i: z + s·nz
+  int num_segments;
   CurveSegment segments[kMaxCurveSegments];
-  int num_segments = 0;
 };
 
 RELIEF_KERNEL double curve_t(const RayCurve& curve, const CurveSegment& g, double tau)
@@ -146,11 +147,7 @@ struct Projected {
   double x[3], y[3], nx[3], ny[3];
 };
 
-// Contraction to fused multiply-adds is switched off for this folder (see its CMakeLists.txt): a·b − c·d must be exactly
-// the negative of c·d − a·b, or a ray along a wall could be outside of both neighbours.
-RELIEF_KERNEL double cross2(double ax, double ay, double bx, double by) { return ax * by - ay * bx; }
-
-/// The same to about one ulp, also under cancellation (Kahan).
+/// a × b to about one ulp, also under cancellation (Kahan).
 RELIEF_KERNEL double cross2_exact(double ax, double ay, double bx, double by)
 {
   const double product = ay * bx;
@@ -168,7 +165,8 @@ RELIEF_KERNEL void sort_ascending(double* values, int count)
   }
 }
 
-RELIEF_KERNEL void add_segment(RayCurve& curve, CurveSegment g)
+/// @param tolerance  absolute error of the edge functions
+RELIEF_KERNEL void add_segment(RayCurve& curve, CurveSegment g, double tolerance)
 {
   g.t0 = curve_t(curve, g, 0.0);
   g.t1 = curve_t(curve, g, 1.0);
@@ -183,6 +181,7 @@ RELIEF_KERNEL void add_segment(RayCurve& curve, CurveSegment g)
   g.W = g.e[0] + g.e[1] + g.e[2];
   g.W_min = quadratic_minimum(g.W);
   if (!(g.W_min > 0.0) || curve.num_segments == kMaxCurveSegments) return;
+  g.relative_error = tolerance / g.W_min;
   curve.segments[curve.num_segments++] = g;
 }
 
@@ -257,8 +256,45 @@ RELIEF_KERNEL void add_edge_on_segment(RayCurve& curve, const Projected& v, doub
   };
   g.s0 = s_at(near_b);
   g.ds = s_at(far_b) - g.s0;
-  g.relative_error = 0x1p-46;
-  add_segment(curve, g);
+  add_segment(curve, g, 0x1p-46);
+}
+
+/// Adds [begin, end] of s, all of which is inside; where it is edge-on the other form stands for it.
+/// @param e     edge functions, turned so that they are positive inside
+/// @param sign  how they were turned
+RELIEF_KERNEL void add_interval(RayCurve& curve,
+                                const Projected& v,
+                                const Quadratic* e,
+                                double sign,
+                                double begin,
+                                double end,
+                                double edge_on,
+                                double tolerance)
+{
+  Quadratic W = e[0] + e[1] + e[2];
+  W.c -= edge_on;
+  double pieces[4];
+  int num_pieces = quadratic_roots_inside(W, begin, end, pieces, 0);
+  pieces[num_pieces++] = end;
+  sort_ascending(pieces, num_pieces);
+  for (int k = 0; k < num_pieces; ++k) {
+    const double stop = pieces[k];
+    if (quadratic_at(W, 0.5 * (begin + stop)) < 0.0) {
+      add_edge_on_segment(curve, v, 0.5 * (begin + stop));
+    } else {
+      CurveSegment g;
+      if (min(quadratic_at(W, begin), quadratic_at(W, stop)) < 1e6 * edge_on) {
+        nearly_edge_on_functions(v, begin, stop - begin, g.e);
+        for (Quadratic& q : g.e) q = q * sign;
+      } else {
+        for (int i = 0; i < 3; ++i) g.e[i] = quadratic_shift(e[i], begin, stop - begin);
+      }
+      g.s0 = begin;
+      g.ds = stop - begin;
+      add_segment(curve, g, tolerance);
+    }
+    begin = stop;
+  }
 }
 
 }  // namespace curve_detail
@@ -270,98 +306,81 @@ RELIEF_KERNEL void add_edge_on_segment(RayCurve& curve, const Projected& v, doub
 /// @return  false if there is none
 RELIEF_KERNEL bool ray_curve_make(const RayFrame& frame, const DisplacedTriangle& tri, RayCurve* out)
 {
-  using curve_detail::cross2;
   RayCurve& curve = *out;
   curve.num_segments = 0;
-  curve_detail::Projected v;
   const double low = tri.s_min, high = tri.s_max;
   const double reach = max(__builtin_fabs(low), __builtin_fabs(high));
-  double extent = 0;
-  for (int i = 0; i < 3; ++i) {
-    const double p[3] = {tri.P[i].x - frame.O[0], tri.P[i].y - frame.O[1], tri.P[i].z - frame.O[2]};
-    const double n[3] = {tri.N[i].x, tri.N[i].y, tri.N[i].z};
-    curve.z[i] = p[frame.kz] * frame.Sz;
-    curve.nz[i] = n[frame.kz] * frame.Sz;
-    v.x[i] = p[frame.kx] - frame.Sx * p[frame.kz];
-    v.y[i] = p[frame.ky] - frame.Sy * p[frame.kz];
-    v.nx[i] = n[frame.kx] - frame.Sx * n[frame.kz];
-    v.ny[i] = n[frame.ky] - frame.Sy * n[frame.kz];
-    extent = max(extent, __builtin_fabs(v.x[i]) + __builtin_fabs(v.y[i]) +
-                             reach * (__builtin_fabs(v.nx[i]) + __builtin_fabs(v.ny[i])));
-  }
-  Quadratic e[3];
-  for (int i = 0; i < 3; ++i) {
-    const int j = i == 2 ? 0 : i + 1, k = j == 2 ? 0 : j + 1;
-    e[i].c = cross2(v.x[j], v.y[j], v.x[k], v.y[k]);
-    e[i].b = cross2(v.x[j], v.y[j], v.nx[k], v.ny[k]) + cross2(v.nx[j], v.ny[j], v.x[k], v.y[k]);
-    e[i].a = cross2(v.nx[j], v.ny[j], v.nx[k], v.ny[k]);
-  }
+
+  // Lane i is vertex i (lane 3 repeats vertex 2), then edge i, which is opposite to it.
+  const auto lanes_of = [](const Vec3f* v, int axis) {
+    const auto at = [axis](const Vec3f& a) { return static_cast<double>(axis == 0 ? a.x : (axis == 1 ? a.y : a.z)); };
+    return D4{at(v[0]), at(v[1]), at(v[2]), at(v[2])};
+  };
+  const D4 pz = lanes_of(tri.P, frame.kz) - frame.O[frame.kz], nz = lanes_of(tri.N, frame.kz);
+  const D4 x = lanes_of(tri.P, frame.kx) - frame.O[frame.kx] - frame.Sx * pz;
+  const D4 y = lanes_of(tri.P, frame.ky) - frame.O[frame.ky] - frame.Sy * pz;
+  const D4 nx = lanes_of(tri.N, frame.kx) - frame.Sx * nz, ny = lanes_of(tri.N, frame.ky) - frame.Sy * nz;
+  const double extent = max_of_vertices(abs(x) + abs(y) + reach * (abs(nx) + abs(ny)));
+  const D4 xj = next_vertex(x), yj = next_vertex(y), nxj = next_vertex(nx), nyj = next_vertex(ny);
+  const D4 xk = next_vertex(xj), yk = next_vertex(yj), nxk = next_vertex(nxj), nyk = next_vertex(nyj);
+  // Contraction to fused multiply-adds is switched off for this folder (see its CMakeLists.txt): a·b − c·d must be
+  // exactly the negative of c·d − a·b, or a ray along a wall could be outside of both neighbours.
+  const D4 ec = xj * yk - yj * xk;
+  const D4 eb = (xj * nyk - yj * nxk) + (nxj * yk - nyj * xk);
+  const D4 ea = nxj * nyk - nyj * nxk;
   // Each coefficient is a sum of at most four products below extent², in units of its power of s; evaluation and the
   // roots' own rounding add a few more.
   const double tolerance = 0x1p-48 * extent * extent;
   const double edge_on = 1e-10 * extent * extent;
+  const D4 at_low = (ea * low + eb) * low + ec, at_high = (ea * high + eb) * high + ec;
+  // Between its ends a quadratic is at most a·Δ²/4 beyond them.
+  const D4 bulge = ea * (0.25 * (high - low) * (high - low));
+  const D4 zero{};
+  const D4 most = max(at_low, at_high) - min(bulge, zero), least = min(at_low, at_high) - max(bulge, zero);
+  bool possible[2] = {most[0] >= -tolerance && most[1] >= -tolerance && most[2] >= -tolerance,
+                      least[0] <= tolerance && least[1] <= tolerance && least[2] <= tolerance};
+  if (!possible[0] && !possible[1]) return false;
+  const D4 z_lanes = pz * frame.Sz, nz_lanes = nz * frame.Sz;
+  for (int i = 0; i < 3; ++i) {
+    curve.z[i] = z_lanes[i];
+    curve.nz[i] = nz_lanes[i];
+  }
 
-  for (const double sign : {1.0, -1.0}) {
-    Quadratic inside[3];
+  for (int side = 0; side < 2; ++side) {
+    if (!possible[side]) continue;
+    const double sign = side == 0 ? 1.0 : -1.0;
+    const D4 a = ea * sign, b = eb * sign, c = ec * sign + tolerance;
+    // Roots of all three, as in quadratic_roots_inside.
+    const D4 discriminant = b * b - 4.0 * a * c;
+    const D4 root = sqrt(max(discriminant, zero));
+    const D4 q = -0.5 * (b < 0.0 ? b - root : b + root);
+    const D4 r1 = q / a, r2 = c / q;
     double cuts[8];
     int num_cuts = 0;
-    bool possible = true;
-    for (int i = 0; i < 3 && possible; ++i) {
-      inside[i] = e[i] * sign;
-      inside[i].c += tolerance;
-      const int before = num_cuts;
-      num_cuts = quadratic_roots_inside(inside[i], low, high, cuts, num_cuts);
-      possible = num_cuts > before || quadratic_at(inside[i], low) >= 0.0 || quadratic_at(inside[i], high) >= 0.0;
+    for (int i = 0; i < 3; ++i) {
+      if (!(discriminant[i] >= 0.0)) continue;
+      if (r1[i] > low && r1[i] < high) cuts[num_cuts++] = r1[i];
+      if (r2[i] > low && r2[i] < high) cuts[num_cuts++] = r2[i];
     }
-    if (!possible) continue;
     cuts[num_cuts++] = high;
     curve_detail::sort_ascending(cuts, num_cuts);
 
+    const double W_sign = sign;
     double from = low, start = low;
     bool open = false;
-    for (int c = 0; c < num_cuts; ++c) {
-      const double to = cuts[c], middle = 0.5 * (from + to);
-      const bool accepted = quadratic_at(inside[0], middle) >= 0.0 && quadratic_at(inside[1], middle) >= 0.0 &&
-                            quadratic_at(inside[2], middle) >= 0.0;
+    for (int n = 0; n < num_cuts; ++n) {
+      const double to = cuts[n], middle = 0.5 * (from + to);
+      const D4 at = (a * middle + b) * middle + c;
+      const bool accepted = at[0] >= 0.0 && at[1] >= 0.0 && at[2] >= 0.0;
       if (accepted && !open) start = from;
-      const bool ends = open && (!accepted || c + 1 == num_cuts);
-      const double stop = accepted ? to : from;
-      if (ends || (accepted && c + 1 == num_cuts)) {
-        // [start, stop] is inside; where it is edge-on the other form stands for it.
-        Quadratic W = (e[0] + e[1] + e[2]) * sign;
-        W.c -= edge_on;
-        double pieces[4];
-        int num_pieces = quadratic_roots_inside(W, start, stop, pieces, 0);
-        pieces[num_pieces++] = stop;
-        curve_detail::sort_ascending(pieces, num_pieces);
-        double begin = start;
-        for (int k = 0; k < num_pieces; ++k) {
-          const double end = pieces[k];
-          if (quadratic_at(W, 0.5 * (begin + end)) < 0.0) {
-            curve_detail::add_edge_on_segment(curve, v, 0.5 * (begin + end));
-          } else {
-            CurveSegment g;
-            const double least_W = min(quadratic_at(W, begin), quadratic_at(W, end));
-            if (least_W < 1e-4 * extent * extent) {
-              curve_detail::nearly_edge_on_functions(v, begin, end - begin, g.e);
-              for (Quadratic& q : g.e) q = q * sign;
-            } else {
-              for (int i = 0; i < 3; ++i) g.e[i] = quadratic_shift(e[i] * sign, begin, end - begin);
-            }
-            g.s0 = begin;
-            g.ds = end - begin;
-            curve_detail::add_segment(curve, g);
-          }
-          begin = end;
-        }
+      if ((open && !accepted) || (accepted && n + 1 == num_cuts)) {
+        const Quadratic e[3] = {{a[0], b[0], W_sign * ec[0]}, {a[1], b[1], W_sign * ec[1]}, {a[2], b[2], W_sign * ec[2]}};
+        const curve_detail::Projected v{{x[0], x[1], x[2]}, {y[0], y[1], y[2]}, {nx[0], nx[1], nx[2]}, {ny[0], ny[1], ny[2]}};
+        curve_detail::add_interval(curve, v, e, sign, start, accepted ? to : from, edge_on, tolerance);
       }
       open = accepted;
       from = to;
     }
-  }
-  for (int i = 0; i < curve.num_segments; ++i) {
-    CurveSegment& g = curve.segments[i];
-    if (g.relative_error == 0.0) g.relative_error = tolerance / g.W_min;
   }
   for (int i = 1; i < curve.num_segments; ++i) {
     const CurveSegment g = curve.segments[i];
