@@ -69,10 +69,7 @@ RELIEF_KERNEL F8 shift_down(F8 a) { return __builtin_shufflevector(a, a, 1, 2, 3
 /// Lanes 0…3 of a, then lanes 0…3 of b.
 RELIEF_KERNEL F8 join_low_halves(F8 a, F8 b) { return __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11); }
 
-RELIEF_KERNEL D4 abs(D4 a)
-{
-  return a < 0.0 ? -a : a;
-}
+RELIEF_KERNEL D4 abs(D4 a) { return a < 0.0 ? -a : a; }
 RELIEF_KERNEL D4 max(D4 a, D4 b) { return a > b ? a : b; }
 RELIEF_KERNEL D4 min(D4 a, D4 b) { return a < b ? a : b; }
 RELIEF_KERNEL D4 sqrt(D4 a)

@@ -374,8 +374,10 @@ RELIEF_KERNEL bool ray_curve_make(const RayFrame& frame, const DisplacedTriangle
       const bool accepted = at[0] >= 0.0 && at[1] >= 0.0 && at[2] >= 0.0;
       if (accepted && !open) start = from;
       if ((open && !accepted) || (accepted && n + 1 == num_cuts)) {
-        const Quadratic e[3] = {{a[0], b[0], W_sign * ec[0]}, {a[1], b[1], W_sign * ec[1]}, {a[2], b[2], W_sign * ec[2]}};
-        const curve_detail::Projected v{{x[0], x[1], x[2]}, {y[0], y[1], y[2]}, {nx[0], nx[1], nx[2]}, {ny[0], ny[1], ny[2]}};
+        const Quadratic e[3] = {
+            {a[0], b[0], W_sign * ec[0]}, {a[1], b[1], W_sign * ec[1]}, {a[2], b[2], W_sign * ec[2]}};
+        const curve_detail::Projected v{
+            {x[0], x[1], x[2]}, {y[0], y[1], y[2]}, {nx[0], nx[1], nx[2]}, {ny[0], ny[1], ny[2]}};
         curve_detail::add_interval(curve, v, e, sign, start, accepted ? to : from, edge_on, tolerance);
       }
       open = accepted;

@@ -51,51 +51,35 @@ struct Search {
   bool found = false;
 };
 
-/// Bounds of the 16 cells of a 4 × 4 node, in two rows of rows.
-/// @param i, j  lattice coordinates of its first cell
-RELIEF_KERNEL void cell_bounds(const HeightFieldView& f, std::int64_t i, std::int64_t j, F8 low[2], F8 high[2])
+/// Heights of five texels in a row, stored units; the other lanes are anything.
+/// @param i, j    lattice coordinates of the first
+/// @param inside  eight texels from there are in the map's row, so that they can be read at once
+RELIEF_KERNEL F8 row_heights(const HeightFieldView& f, std::int64_t i, std::int64_t j, int column, bool inside)
 {
   const HeightMapView& map = f.map;
-  const int column = lattice_texel(f.x, i);
-  // Inside the map a row is read at once, three texels further than needed.
-  const bool inside = f.x.wrap != Wrap::kMirror && (f.x.wrap == Wrap::kRepeat || i >= 0) && column + 8 <= map.width;
-  F8 row_low[5], row_high[5];
-  for (int r = 0; r < 5; ++r) {
-    const std::int64_t row = static_cast<std::int64_t>(lattice_texel(f.y, j + r)) * map.width;
-    F8 h;
-    if (inside && map.format == HeightFormat::kU16) {
-      h = load8(static_cast<const std::uint16_t*>(map.texels) + row + column);
-    } else if (inside && map.format == HeightFormat::kU8) {
-      h = load8(static_cast<const std::uint8_t*>(map.texels) + row + column) * 257.0f;
-    } else {
-      alignas(32) float values[8] = {};
-      for (int k = 0; k < 5; ++k) {
-        const std::int64_t at = row + lattice_texel(f.x, i + k);
-        switch (map.format) {
-          case HeightFormat::kU8:
-            values[k] = static_cast<const std::uint8_t*>(map.texels)[at] * 257.0f;
-            break;
-          case HeightFormat::kU16:
-            values[k] = static_cast<const std::uint16_t*>(map.texels)[at];
-            break;
-          case HeightFormat::kFloat:
-            values[k] = static_cast<float>((static_cast<const float*>(map.texels)[at] - f.h_offset) / f.h_step);
-            break;
-        }
-      }
-      h = load8(values);
+  const std::int64_t row = static_cast<std::int64_t>(lattice_texel(f.y, j)) * map.width;
+  if (inside && map.format == HeightFormat::kU16) {
+    return load8(static_cast<const std::uint16_t*>(map.texels) + row + column);
+  }
+  if (inside && map.format == HeightFormat::kU8) {
+    return load8(static_cast<const std::uint8_t*>(map.texels) + row + column) * 257.0f;
+  }
+  alignas(32) float values[8] = {};
+  for (int k = 0; k < 5; ++k) {
+    const std::int64_t at = row + lattice_texel(f.x, i + k);
+    switch (map.format) {
+      case HeightFormat::kU8:
+        values[k] = static_cast<const std::uint8_t*>(map.texels)[at] * 257.0f;
+        break;
+      case HeightFormat::kU16:
+        values[k] = static_cast<const std::uint16_t*>(map.texels)[at];
+        break;
+      case HeightFormat::kFloat:
+        values[k] = static_cast<float>((static_cast<const float*>(map.texels)[at] - f.h_offset) / f.h_step);
+        break;
     }
-    const F8 next = shift_down(h);
-    row_low[r] = min(h, next);
-    row_high[r] = max(h, next);
   }
-  // Stored units of float maps are rounded here, by less than 2^-7.
-  const F8 pad = splat8(map.format == HeightFormat::kFloat ? 0x1p-6f : 0.0f);
-  for (int half = 0; half < 2; ++half) {
-    const int r = 2 * half;
-    low[half] = join_low_halves(min(row_low[r], row_low[r + 1]), min(row_low[r + 1], row_low[r + 2])) - pad;
-    high[half] = join_low_halves(max(row_high[r], row_high[r + 1]), max(row_high[r + 1], row_high[r + 2])) + pad;
-  }
+  return load8(values);
 }
 
 /// @return  true when the search is over
@@ -140,14 +124,23 @@ RELIEF_KERNEL bool node_intersect(Search& c,
   const float offset_x = static_cast<float>(period_x - chord.origin_x),
               offset_y = static_cast<float>(period_y - chord.origin_y);
   const bool clamp_x = f.x.wrap == Wrap::kClamp, clamp_y = f.y.wrap == Wrap::kClamp;
+  // Rounding of heights up to 65535, and of float maps to stored units.
+  const float cell_slack = chord.pad_q + 65536.0f * 4.0f * kFloatSlack;
+  const float twist_pad =
+      (1.0f + chord.pad_x) * chord.pad_y + (1.0f + chord.pad_y) * chord.pad_x + chord.pad_x * chord.pad_y;
   while (depth > 0) {
     const Node n = stack[--depth];
     if (chord.tau0 + (static_cast<double>(n.u0) - kParameterSlack) * chord.dtau > c.tau_end) continue;
     const int child_level = n.level - 1;
     const int size = 1 << (2 * child_level);
-    F8 low[2], high[2];
+    F8 low[2], high[2];  // of nodes
+    F8 heights[5];       // of cells
     if (child_level == 0) {
-      cell_bounds(f, period_x + n.column, period_y + n.row, low, high);
+      const std::int64_t i = period_x + n.column, j = period_y + n.row;
+      const int column = lattice_texel(f.x, i);
+      const bool inside =
+          f.x.wrap != Wrap::kMirror && (f.x.wrap == Wrap::kRepeat || i >= 0) && column + 8 <= f.map.width;
+      for (int r = 0; r < 5; ++r) heights[r] = row_heights(f, i, j + r, column, inside);
     } else {
       const int level = child_level - 1;
       const PyramidLine& line =
@@ -187,8 +180,26 @@ RELIEF_KERNEL bool node_intersect(Search& c,
       const F8 uy0 = y_from * chord.inv_dy, uy1 = y_to * chord.inv_dy;
       const F8 u_in = max(min(uy0, uy1), ux_in), u_out = min(max(uy0, uy1), ux_out);
       const F8 q_in = chord.q0 + u_in * chord.dq, q_out = chord.q0 + u_out * chord.dq;
-      const I8 overlaps = (u_in <= u_out + kParameterSlack) & (min(q_in, q_out) - chord.pad_q <= high[half]) &
-                          (max(q_in, q_out) + chord.pad_q >= low[half]) & both_exist;
+      I8 overlaps = (u_in <= u_out + kParameterSlack) & both_exist;
+      if (child_level > 0) {
+        overlaps &= (min(q_in, q_out) - chord.pad_q <= high[half]) & (max(q_in, q_out) + chord.pad_q >= low[half]);
+      } else {
+        // Height of the chord over the bilinear patch at both ends; in between it bends by the twist, and the curve
+        // itself is somewhere within the pads.
+        const int r = 2 * half;
+        const F8 h00 = join_low_halves(heights[r], heights[r + 1]);
+        const F8 h01 = join_low_halves(heights[r + 1], heights[r + 2]);
+        const F8 hx = join_low_halves(shift_down(heights[r]), shift_down(heights[r + 1])) - h00;
+        const F8 hy = h01 - h00;
+        const F8 hxy = join_low_halves(shift_down(heights[r + 1]), shift_down(heights[r + 2])) - h01 - hx;
+        const F8 x_in = u_in * chord.dx - x_low, x_out = u_out * chord.dx - x_low;
+        const F8 y_in = u_in * chord.dy - y_low, y_out = u_out * chord.dy - y_low;
+        const F8 g_in = q_in - (h00 + hx * x_in + (hy + hxy * x_in) * y_in);
+        const F8 g_out = q_out - (h00 + hx * x_out + (hy + hxy * x_out) * y_out);
+        const F8 slack = cell_slack + abs(hx) * chord.pad_x + abs(hy) * chord.pad_y +
+                         abs(hxy) * (twist_pad + 0.25f * abs((x_out - x_in) * (y_out - y_in)));
+        overlaps &= (min(g_in, g_out) <= slack) & (max(g_in, g_out) >= -slack);
+      }
       hits |= mask_of(overlaps) << (8 * half);
       store8(entry + 8 * half, u_in);
       store8(exit + 8 * half, u_out);
