@@ -94,7 +94,9 @@ StoredRange line_range(const PyramidLine& line)
 int divide_up(int a, int b) { return (a + b - 1) / b; }
 
 /// Bounds of a rectangle of cells within one period, all inclusive, in pyramid columns and rows.
-StoredRange range_in_period(const HeightFieldView& f, int level, int column, int row, int i0, int j0, int i1, int j1)
+/// @param finest  level at which a node that reaches over the rectangle is taken whole
+StoredRange
+range_in_period(const HeightFieldView& f, int level, int finest, int column, int row, int i0, int j0, int i1, int j1)
 {
   StoredRange range = kEmpty;
   const int size = 1 << (2 * level);  // of a child; the node (column, row) has 4 × 4
@@ -106,13 +108,13 @@ StoredRange range_in_period(const HeightFieldView& f, int level, int column, int
       for (int corner = 0; corner < 4; ++corner) {
         range = merge(range, texel_range_at(f, f.x.first_cell + i + (corner & 1), f.y.first_cell + j + (corner >> 1)));
       }
-    } else if (i >= i0 && j >= j0 && i_end <= i1 && j_end <= j1) {
+    } else if (level <= finest || (i >= i0 && j >= j0 && i_end <= i1 && j_end <= j1)) {
       const int parent = 2 * (level + 1);
       const PyramidLine& line =
           f.lines[level - 1][static_cast<std::ptrdiff_t>(j >> parent) * f.line_columns[level - 1] + (i >> parent)];
       range = merge(range, {line.low[child], line.high[child]});
     } else {
-      range = merge(range, range_in_period(f, level - 1, i, j, i0, j0, i1, j1));
+      range = merge(range, range_in_period(f, level - 1, finest, i, j, i0, j0, i1, j1));
     }
   }
   return range;
@@ -209,11 +211,15 @@ StoredRange height_field_range(const HeightFieldView& f,
 {
   int columns[2][2], rows[2][2];
   const int num_columns = split_by_period(f.x, i0, i1, columns), num_rows = split_by_period(f.y, j0, j1, rows);
+  // Nodes of a sixteenth of the rectangle are fine enough: 4^finest <= side / 16.
+  const std::int64_t side = std::min(i1 - i0, j1 - j0);
+  int finest = 0;
+  while (finest + 1 < f.num_levels && (std::int64_t{16} << (2 * (finest + 1))) <= side) ++finest;
   StoredRange range = kEmpty;
   for (int a = 0; a < num_columns; ++a) {
     for (int b = 0; b < num_rows; ++b) {
-      range =
-          merge(range, range_in_period(f, f.num_levels, 0, 0, columns[a][0], rows[b][0], columns[a][1], rows[b][1]));
+      range = merge(
+          range, range_in_period(f, f.num_levels, finest, 0, 0, columns[a][0], rows[b][0], columns[a][1], rows[b][1]));
     }
   }
   return range;

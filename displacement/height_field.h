@@ -124,7 +124,7 @@ StoredRange texel_range(const HeightFieldView& field, std::int64_t at);
 
 /// Conservative bounds of the interpolated heights over whole cells.
 /// @param i0, j0  first cell, inclusive; i1, j1  last cell, inclusive; lattice coordinates, any period
-/// @return        bounds, from pyramid nodes and single cells: tight to the cell
+/// @return        bounds over the rectangle and at most a sixteenth of its shorter side more
 StoredRange height_field_range(const HeightFieldView& field,
                                std::int64_t i0,
                                std::int64_t j0,

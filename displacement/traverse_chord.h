@@ -21,8 +21,8 @@ inline constexpr float kFloatSlack = 0x1p-20f;
 inline constexpr float kParameterSlack = 0x1p-18f;
 /// A chord is split while it may deviate by more than this from the curve; a matter of speed only. Lattice units, and
 /// parts of the map's range.
-inline constexpr float kWantedDeviation = 0.5f;
-inline constexpr float kWantedHeightDeviation = 1.0f / 32;
+inline constexpr float kWantedDeviation = 0.1f;
+inline constexpr float kWantedHeightDeviation = 1.0f / 256;
 inline constexpr int kMaxSplits = 6;
 /// Where an unbounded cell beside a clamped map ends.
 inline constexpr float kFarAway = 1e12f;
