@@ -1,0 +1,383 @@
+// TFDM, the method that RMIP is measured against: the min-max mipmap as a quadtree in texture space, each node bounded in
+// space on the fly.
+//
+// T. Thonat, F. Beaune, X. Sun, N. Carr, T. Boubekeur, "Tessellation-Free Displacement Mapping for Ray Tracing", ACM TOG
+// 40(6), 2021. Three differences, all in its favour. Nodes are bounded by the exact hull of bounds3d.h instead of affine
+// arithmetic, in a frame of the ray's own: t, and two axes across the ray, one of them level with the base triangle, so
+// that a node misses as soon as its range across the ray excludes 0. The four children of a node are tested side by side.
+// A cell is intersected by the exact leaf test, on the part of the ray's curve inside it. Reading order: traverse_tfdm,
+// root_intersect, children_intersect, cell_on_curve_intersect.
+#pragma once
+
+#include "displacement/traverse_rmip.h"
+
+namespace relief {
+
+namespace tfdm_detail {
+
+using I4 [[gnu::vector_size(32)]] = std::int64_t;
+
+RELIEF_KERNEL unsigned mask_of(I4 m)
+{
+#ifdef __AVX__
+  return static_cast<unsigned>(_mm256_movemask_pd(__builtin_bit_cast(__m256d, m)));
+#else
+  __m128d half[2];
+  __builtin_memcpy(half, &m, sizeof half);
+  return static_cast<unsigned>(_mm_movemask_pd(half[0]) | _mm_movemask_pd(half[1]) << 2);
+#endif
+}
+
+RELIEF_KERNEL D4 splat4(double x) { return D4{x, x, x, x}; }
+
+RELIEF_KERNEL D4 load4(const std::uint16_t* from)
+{
+  using U16 [[gnu::vector_size(8)]] = std::uint16_t;
+  U16 lanes;
+  __builtin_memcpy(&lanes, from, sizeof lanes);
+  return __builtin_convertvector(lanes, D4);
+}
+
+/// One coordinate of P and N as affine functions of the lattice.
+struct Coordinate {
+  double P0, Px, Py, N0, Nx, Ny;
+  double pad;
+};
+
+/// What all nodes are tested with. Lattice coordinates are relative to vertex 0.
+struct NodeFrame {
+  Coordinate level, upright, t;  ///< two axes across the ray, and along it
+  Coordinate weights[3];         ///< barycentric: P0 + Px·x + Py·y
+  double x0, x1, y0, y1;         ///< the triangle's rectangle
+  double origin_x, origin_y;     ///< lattice coordinates of vertex 0
+  double d_zero, d_step;         ///< displacement of stored bounds
+};
+
+RELIEF_KERNEL NodeFrame frame_make(const CurveSearch& c, const LatticeFrame& lattice, const RayFrame& ray)
+{
+  const DisplacedTriangle& tri = c.tri;
+  NodeFrame f;
+  Vec3d D;
+  double d[3];
+  d[ray.kz] = 1.0 / ray.Sz;
+  d[ray.kx] = ray.Sx * d[ray.kz];
+  d[ray.ky] = ray.Sy * d[ray.kz];
+  D = {d[0], d[1], d[2]};
+  const Vec3d Pu = to_double(tri.P[1]) - to_double(tri.P[0]), Pv = to_double(tri.P[2]) - to_double(tri.P[0]);
+  const Vec3d n = cross(Pu, Pv);
+  Vec3d level = cross(n, D);
+  if (!(dot(level, level) > 1e-12 * dot(n, n) * dot(D, D))) {
+    // Straight down: any axis across the ray is level.
+    level = cross(D, __builtin_fabs(D.x) < 0.5 * length(D) ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0});
+  }
+  const auto along = [](Vec3d axis, D4 v) { return axis.x * v[0] + axis.y * v[1] + axis.z * v[2]; };
+  const auto coordinate = [&](Vec3d axis) {
+    return Coordinate{along(axis, lattice.P0),
+                      along(axis, lattice.Px),
+                      along(axis, lattice.Py),
+                      along(axis, lattice.N0),
+                      along(axis, lattice.Nx),
+                      along(axis, lattice.Ny),
+                      4.0 * length(axis) * lattice.pad[0]};
+  };
+  f.level = coordinate(level);
+  f.upright = coordinate(cross(D, level));
+  f.t = coordinate(D * (1.0 / dot(D, D)));
+
+  const double xu = tri.x[1] - tri.x[0], xv = tri.x[2] - tri.x[0];
+  const double yu = tri.y[1] - tri.y[0], yv = tri.y[2] - tri.y[0];
+  const double inverse = 1.0 / (xu * yv - xv * yu);
+  constexpr double kWeightPad = 1e-9;
+  f.weights[1] = {0, yv * inverse, -xv * inverse, 0, 0, 0, kWeightPad};
+  f.weights[2] = {0, -yu * inverse, xu * inverse, 0, 0, 0, kWeightPad};
+  f.weights[0] = {1, -f.weights[1].Px - f.weights[2].Px, -f.weights[1].Py - f.weights[2].Py, 0, 0, 0, kWeightPad};
+  f.x0 = min(0.0, min(xu, xv));
+  f.x1 = max(0.0, max(xu, xv));
+  f.y0 = min(0.0, min(yu, yv));
+  f.y1 = max(0.0, max(yu, yv));
+  f.origin_x = tri.x[0];
+  f.origin_y = tri.y[0];
+  f.d_zero = c.mesh.scale * (c.mesh.field->h_offset - c.mesh.midlevel);
+  f.d_step = c.mesh.scale * c.mesh.field->h_step;
+  return f;
+}
+
+/// Ranges of s of four nodes, see offset_range; |N| as in normal_range.
+struct OffsetLanes {
+  D4 low, high;
+};
+
+RELIEF_KERNEL OffsetLanes
+offset_lanes(const CurveSearch& c, const LatticeFrame& f, D4 x, D4 y, D4 rx, D4 ry, D4 d_low, D4 d_high)
+{
+  const D4 along_x = f.n0x + f.nxx * x + f.nxy * y, along_y = f.n0y + f.nxy * x + f.nyy * y;
+  const D4 squared = f.n00 + (f.n0x + along_x) * x + (f.n0y + along_y) * y;
+  const D4 nu = sqrt(squared), inverse = 1.0 / nu;
+  const D4 slope = (rx * abs(along_x) + ry * abs(along_y) + f.nu_squared_pad) * inverse;
+  const D4 reach = rx * f.length_Nx + ry * f.length_Ny;
+  const auto regular = squared > splat4(4.0 * f.nu_squared_pad);
+  const D4 longest = splat4(f.longest), huge = splat4(__builtin_huge_val());
+  const D4 nu_low = regular ? nu - slope : splat4(0.0);
+  const D4 most = 1.0 / (regular ? min(nu + slope + 0.5 * reach * reach * inverse, longest) : longest);
+  const D4 least = nu_low > 0.0 ? 1.0 / nu_low : huge;
+  // As there, NaN does not replace the prism's bound.
+  return {max(d_low * (d_low < 0.0 ? least : most), splat4(c.tri.s_min)),
+          min(d_high * (d_high > 0.0 ? least : most), splat4(c.tri.s_max))};
+}
+
+struct RangeLanes {
+  D4 low, high;
+};
+
+/// Exact range of a coordinate over four nodes.
+RELIEF_KERNEL RangeLanes coordinate_lanes(const Coordinate& k, D4 x, D4 y, D4 rx, D4 ry, const OffsetLanes& s)
+{
+  const D4 P = k.P0 + k.Px * x + k.Py * y, N = k.N0 + k.Nx * x + k.Ny * y;
+  const D4 a = P + s.low * N, b = P + s.high * N;
+  const D4 radius_a = rx * abs(k.Px + s.low * k.Nx) + ry * abs(k.Py + s.low * k.Ny);
+  const D4 radius_b = rx * abs(k.Px + s.high * k.Nx) + ry * abs(k.Py + s.high * k.Ny);
+  return {min(a - radius_a, b - radius_b) - k.pad, max(a + radius_a, b + radius_b) + k.pad};
+}
+
+/// Leaf test of a cell, on the stretch of each segment that reaches into it.
+/// @param s  of the surface in the cell
+/// @return   true if there was a hit; the search goes on: another cell may be nearer
+RELIEF_KERNEL bool cell_on_curve_intersect(CurveSearch& c,
+                                           const RayProjection* projections,
+                                           std::int64_t i,
+                                           std::int64_t j,
+                                           ScalarRange s)
+{
+  const LatticeAxis &axis_x = c.mesh.field->x, &axis_y = c.mesh.field->y;
+  const auto side = [](const LatticeAxis& axis, std::int64_t cell, bool far_side) {
+    const bool unbounded = axis.wrap == Wrap::kClamp && (far_side ? cell >= axis.num_texels - 1 : cell < 0);
+    return unbounded ? (far_side ? 1.0 : -1.0) * __builtin_huge_val() : static_cast<double>(cell + (far_side ? 1 : 0));
+  };
+  bool any = false;
+  for (int k = 0; k < c.curve.num_segments; ++k) {
+    const CurveSegment& g = c.curve.segments[k];
+    if (c.unfolded && (g.t0 > c.t_max || g.t1 < c.t_min)) continue;
+    const RayProjection& r = projections[k];
+    const double x0 = side(axis_x, i, false) - r.origin_x, x1 = side(axis_x, i, true) - r.origin_x;
+    const double y0 = side(axis_y, j, false) - r.origin_y, y1 = side(axis_y, j, true) - r.origin_y;
+    double cuts[9];
+    int count = 0;
+    const auto cross_line = [&](const Quadratic& P, double at) {
+      if (__builtin_fabs(at) == __builtin_huge_val()) return;
+      count = quadratic_roots_inside(P + r.W * -at, 0.0, 1.0, cuts, count);
+    };
+    cross_line(r.X, x0);
+    cross_line(r.X, x1);
+    cross_line(r.Y, y0);
+    cross_line(r.Y, y1);
+    cuts[count++] = 1.0;
+    curve_detail::sort_ascending(cuts, count);
+    double start = 2.0, end = -1.0, from = 0.0;
+    for (int m = 0; m < count; ++m) {
+      const double middle = 0.5 * (from + cuts[m]), inverse = 1.0 / quadratic_at(r.W, middle);
+      const double x = quadratic_at(r.X, middle) * inverse, y = quadratic_at(r.Y, middle) * inverse;
+      if (x >= x0 - r.pad_x && x <= x1 + r.pad_x && y >= y0 - r.pad_y && y <= y1 + r.pad_y) {
+        start = min(start, from);
+        end = cuts[m];
+      }
+      from = cuts[m];
+    }
+    if (start > end) continue;
+    // A little more than the cell, as in texel_march.
+    const double slack = 0x1p-20 * (end - start) + 0x1p-44;
+    const double s_start = g.s0 + (start - slack) * g.ds, s_end = g.s0 + (end + slack) * g.ds;
+    if (!(min(s_start, s_end) <= s.high && max(s_start, s_end) >= s.low)) continue;
+    any |= cell_intersect(c, g, i, j, start - slack, end + slack);
+  }
+  return any;
+}
+
+/// A node of the quadtree: the parent of a quad.
+struct Node {
+  int level;        ///< of its children
+  int column, row;  ///< among the parents of that level
+  double t;         ///< least t of its bounds
+};
+
+/// One period's nodes, by their place among the triangle's coordinates.
+struct Period {
+  std::int64_t first_x, first_y;  ///< lattice coordinates of its first cell
+};
+
+/// Children that the ray may meet, nearest first.
+struct ChildHits {
+  int order[4];
+  int count = 0;
+  D4 t, s_low, s_high;
+};
+
+RELIEF_KERNEL ChildHits children_intersect(CurveSearch& c,
+                                           const NodeFrame& f,
+                                           const LatticeFrame& lattice,
+                                           const MinmaxMipmapView& mipmap,
+                                           const Period& period,
+                                           const Node& node)
+{
+  const MinmaxQuad& quad = mipmap.quad(node.level, node.column, node.row);
+  const D4 low = load4(quad.low), high = load4(quad.high);
+  const double size = static_cast<double>(std::int64_t{1} << node.level);
+  // Of the children, clipped to the triangle's rectangle; unbounded beside a clamped map.
+  const auto sides = [&](const LatticeAxis& axis, D4 step, int parent, std::int64_t first, double origin, D4* from,
+                         D4* to) {
+    const D4 cell = (2.0 * parent + step) * size;
+    const double start = static_cast<double>(first) - origin, end = start + axis.num_cells;
+    *from = start + cell;
+    *to = min(*from + size, splat4(end));
+    if (axis.wrap == Wrap::kClamp) {
+      *from = cell <= 0.0 ? splat4(-__builtin_huge_val()) : *from;
+      *to = *to >= end ? splat4(__builtin_huge_val()) : *to;
+    }
+  };
+  D4 x0, x1, y0, y1;
+  sides(mipmap.x, D4{0, 1, 0, 1}, node.column, period.first_x, f.origin_x, &x0, &x1);
+  sides(mipmap.y, D4{0, 0, 1, 1}, node.row, period.first_y, f.origin_y, &y0, &y1);
+  const double pad_x = 0x1p-40 * (f.x1 - f.x0) + 0x1p-50 * __builtin_fabs(f.origin_x);
+  const double pad_y = 0x1p-40 * (f.y1 - f.y0) + 0x1p-50 * __builtin_fabs(f.origin_y);
+  x0 = max(x0, splat4(f.x0)) - pad_x;
+  x1 = min(x1, splat4(f.x1)) + pad_x;
+  y0 = max(y0, splat4(f.y0)) - pad_y;
+  y1 = min(y1, splat4(f.y1)) + pad_y;
+  const D4 x = 0.5 * (x0 + x1), y = 0.5 * (y0 + y1), rx = 0.5 * (x1 - x0), ry = 0.5 * (y1 - y0);
+
+  I4 overlaps = (low <= high) & (rx >= 0.0) & (ry >= 0.0);
+  for (const Coordinate& b : f.weights) {
+    overlaps &= b.P0 + b.Px * x + b.Py * y + rx * __builtin_fabs(b.Px) + ry * __builtin_fabs(b.Py) >= -b.pad;
+  }
+  const D4 da = f.d_zero + f.d_step * low, db = f.d_zero + f.d_step * high;
+  const OffsetLanes s = offset_lanes(c, lattice, x, y, rx, ry, min(da, db) - c.d_pad, max(da, db) + c.d_pad);
+  const RangeLanes upright = coordinate_lanes(f.upright, x, y, rx, ry, s);
+  const RangeLanes level = coordinate_lanes(f.level, x, y, rx, ry, s);
+  const RangeLanes t = coordinate_lanes(f.t, x, y, rx, ry, s);
+  overlaps &= (upright.low <= 0.0) & (upright.high >= 0.0) & (level.low <= 0.0) & (level.high >= 0.0);
+  overlaps &= (t.low <= c.t_max) & (t.high >= c.t_min);
+  c.counters.bounds += 4;
+
+  ChildHits hits;
+  hits.t = t.low;
+  hits.s_low = s.low;
+  hits.s_high = s.high;
+  for (unsigned mask = mask_of(overlaps); mask != 0; mask &= mask - 1) {
+    const int child = __builtin_ctz(mask);
+    int k = hits.count++;
+    for (; k > 0 && t.low[hits.order[k - 1]] > t.low[child]; --k) hits.order[k] = hits.order[k - 1];
+    hits.order[k] = child;
+  }
+  return hits;
+}
+
+/// Descends from one node, near children first.
+/// @return  true when the search is over
+RELIEF_KERNEL bool root_intersect(CurveSearch& c,
+                                  const NodeFrame& f,
+                                  const LatticeFrame& lattice,
+                                  const MinmaxMipmapView& mipmap,
+                                  const RayProjection* projections,
+                                  const Period& period,
+                                  const Node& root)
+{
+  // Each level leaves at most three siblings.
+  Node stack[3 * kMaxMipmapLevels + 1];
+  int depth = 0;
+  stack[depth++] = root;
+  while (depth > 0) {
+    const Node node = stack[--depth];
+    if (node.t > c.t_max) continue;
+    const ChildHits hits = children_intersect(c, f, lattice, mipmap, period, node);
+    for (int k = 0; k < hits.count; ++k) {
+      const int child = node.level == 0 ? hits.order[k] : hits.order[hits.count - 1 - k];
+      const int column = 2 * node.column + (child & 1), row = 2 * node.row + (child >> 1);
+      if (node.level > 0) {
+        stack[depth++] = {node.level - 1, column, row, hits.t[child]};
+      } else if (cell_on_curve_intersect(c, projections, period.first_x + column, period.first_y + row,
+                                         {hits.s_low[child], hits.s_high[child]}) &&
+                 c.any_hit) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+/// Parents of one level along an axis, one after the other, over any number of periods.
+struct ParentWalk {
+  std::int64_t next, last;  ///< cells, counted from the first cell of period 0
+};
+
+RELIEF_KERNEL ParentWalk parent_walk_make(const LatticeAxis& axis, double low, double high)
+{
+  auto first = static_cast<std::int64_t>(__builtin_floor(low - 1e-6)) - axis.first_cell;
+  auto last = static_cast<std::int64_t>(__builtin_floor(high + 1e-6)) - axis.first_cell;
+  if (axis.wrap == Wrap::kClamp) {
+    const std::int64_t end = axis.num_cells - 1;
+    first = first < 0 ? 0 : (first > end ? end : first);
+    last = last < 0 ? 0 : (last > end ? end : last);
+  }
+  return {first, last};
+}
+
+/// @param size    of a parent, cells
+/// @param first   lattice coordinate of its period's first cell
+RELIEF_KERNEL bool parent_walk_step(ParentWalk& walk,
+                                    const LatticeAxis& axis,
+                                    int log2_size,
+                                    int* parent,
+                                    std::int64_t* first)
+{
+  if (walk.next > walk.last) return false;
+  const int cell = lattice_modulo(walk.next, axis.num_cells);
+  const std::int64_t period = walk.next - cell;
+  *parent = cell >> log2_size;
+  *first = period + axis.first_cell;
+  const std::int64_t end = (static_cast<std::int64_t>(*parent) + 1) << log2_size;
+  walk.next = period + (end < axis.num_cells ? end : axis.num_cells);
+  return true;
+}
+
+}  // namespace tfdm_detail
+
+/// Nearest (or any) hit of a ray's curve in one displaced triangle.
+/// @param hit  written if the result is true
+RELIEF_KERNEL bool traverse_tfdm(const DisplacedMeshView& mesh,
+                                 std::uint32_t triangle,
+                                 const RayFrame& ray,
+                                 const RayCurve& curve,
+                                 const MinmaxMipmapView& mipmap,
+                                 double t_min,
+                                 double t_max,
+                                 bool any_hit,
+                                 DisplacedHit* hit,
+                                 TraversalCounters* counters)
+{
+  using namespace tfdm_detail;
+  CurveSearch c = curve_search_make(mesh, triangle, curve, t_min, t_max, any_hit, hit, counters);
+  const LatticeFrame lattice = lattice_frame_make(c.tri, ray);
+  // A triangle without area in the map has no quadtree: only the curve says where a ray is.
+  if (!lattice.exists) {
+    return traverse_rmip(mesh, triangle, ray, curve, mipmap, RmipOptions{}, t_min, t_max, any_hit, hit, counters);
+  }
+  const NodeFrame f = frame_make(c, lattice, ray);
+  RayProjection projections[kMaxCurveSegments];
+  for (int k = 0; k < curve.num_segments; ++k) projections[k] = ray_projection_make(c.tri, curve.segments[k]);
+
+  // The smallest nodes of which four cover the triangle.
+  const double extent = max(f.x1 - f.x0, f.y1 - f.y0);
+  int level = 0;
+  while (level + 1 < mipmap.num_levels && static_cast<double>(2 << level) < extent) ++level;
+  ParentWalk rows = parent_walk_make(mipmap.y, f.origin_y + f.y0, f.origin_y + f.y1);
+  Period period;
+  Node root{level, 0, 0, -__builtin_huge_val()};
+  while (parent_walk_step(rows, mipmap.y, level + 1, &root.row, &period.first_y)) {
+    ParentWalk columns = parent_walk_make(mipmap.x, f.origin_x + f.x0, f.origin_x + f.x1);
+    while (parent_walk_step(columns, mipmap.x, level + 1, &root.column, &period.first_x)) {
+      if (root_intersect(c, f, lattice, mipmap, projections, period, root)) return true;
+    }
+  }
+  return c.found;
+}
+
+}  // namespace relief
