@@ -24,6 +24,8 @@ inline constexpr float kParameterSlack = 0x1p-18f;
 inline constexpr float kWantedDeviation = 0.1f;
 inline constexpr float kWantedHeightDeviation = 1.0f / 256;
 inline constexpr int kMaxSplits = 6;
+/// Metres between two stored heights, below which a displacement is taken for none: floats of stored units end there.
+inline constexpr double kLeastHeightStep = 1e-25;
 /// Where an unbounded cell beside a clamped map ends.
 inline constexpr float kFarAway = 1e12f;
 
@@ -43,8 +45,9 @@ struct Search {
   const RayCurve& curve;
   TraversalCounters& counters;
   DisplacedHit& hit;
-  double t_min, t_max;         ///< t_max shrinks with every hit
-  double q_per_metre, q_zero;  ///< stored height = q_zero + q_per_metre · displacement
+  double t_min, t_max;                 ///< t_max shrinks with every hit
+  double q_per_metre = 1, q_zero = 0;  ///< stored height = q_zero + q_per_metre · displacement
+  float q_pad = 0;                     ///< and this much more or less
   const CurveSegment* segment = nullptr;
   double tau_end = 1;  ///< nothing beyond matters: a hit is known there
   bool unfolded = true, any_hit = false;
@@ -433,8 +436,8 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
   const F8 pad_q = q_slope * (deviation_height + s_largest * (slack_b * (length(Nu) + length(Nv)) + kFloatSlack)) +
                    kFloatSlack * (__builtin_fabsf(q_zero) + max(abs(q_a), abs(q_b)) + 1.0f);
 
-  unsigned alive =
-      mask_of((min(q_a, q_b) - pad_q <= splat8(f.range.high)) & (max(q_a, q_b) + pad_q >= splat8(f.range.low)));
+  unsigned alive = mask_of((min(q_a, q_b) - pad_q <= splat8(static_cast<float>(f.range.high) + c.q_pad)) &
+                           (max(q_a, q_b) + pad_q >= splat8(static_cast<float>(f.range.low) - c.q_pad)));
   const float wanted_q = kWantedHeightDeviation * static_cast<float>(f.range.high - f.range.low) + 1.0f;
   const unsigned straight =
       mask_of((pad_x <= splat8(kWantedDeviation)) & (pad_y <= splat8(kWantedDeviation)) & (pad_q <= splat8(wanted_q)));
@@ -465,7 +468,7 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
     // No point of the curve is outside of the triangle, whatever the bounds say.
     chord.pad_x = min(pad_x[k], extent_x + 1.0f);
     chord.pad_y = min(pad_y[k], extent_y + 1.0f);
-    chord.pad_q = pad_q[k];
+    chord.pad_q = pad_q[k] + c.q_pad;
     chord.tau0 = from;
     chord.dtau = to - from;
     if (chord_intersect(c, chord)) return true;
@@ -488,10 +491,14 @@ RELIEF_KERNEL bool traverse_chord(const DisplacedMeshView& mesh,
                                   TraversalCounters* counters)
 {
   const HeightFieldView& f = *mesh.field;
-  chord_detail::Search c{mesh, mesh.triangles[triangle], curve, *counters, *hit, t_min, t_max, 0, 0};
-  // d = scale·(h_offset + h_step·q − midlevel)
-  c.q_per_metre = 1.0 / (mesh.scale * f.h_step);
-  c.q_zero = (mesh.midlevel - f.h_offset) / f.h_step;
+  using chord_detail::kLeastHeightStep;
+  chord_detail::Search c{mesh, mesh.triangles[triangle], curve, *counters, *hit, t_min, t_max};
+  // d = scale·(h_offset + h_step·q − midlevel). A scale of zero says nothing about q: then all of the map is met.
+  const double metres_per_step = mesh.scale * f.h_step;
+  const bool flat = !(__builtin_fabs(metres_per_step) > kLeastHeightStep);
+  c.q_per_metre = flat ? 0.0 : 1.0 / metres_per_step;
+  c.q_zero = flat ? 0.0 : (mesh.midlevel - f.h_offset) / f.h_step;
+  c.q_pad = flat ? 65536.0f : 0.0f;
   c.unfolded = mesh.unfolded[triangle] != 0;
   c.any_hit = any_hit;
   for (int k = 0; k < curve.num_segments; ++k) {
