@@ -1,0 +1,104 @@
+// Pre-tessellation: displaced triangles as micro-triangles with vertices on the surface, traced by Embree as any mesh or
+// grid. Fast and large, and the one method that is an approximation: the surface is left between the vertices.
+//
+// Every base triangle is divided evenly, as finely as its share of the height map asks for. Neighbours use the same
+// points along a shared edge: an edge has a number of segments of its own, the largest that one of its triangles wants,
+// and where a triangle is finer inside, its rows along that edge are snapped to them. One of the two triangles computes
+// the points, so they are equal to the last bit and no ray passes between.
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "displacement/displaced_triangle.h"
+#include "displacement/embree.h"
+
+namespace relief {
+
+enum class TessellationKind : std::uint8_t {
+  kTriangles,  ///< an indexed mesh: n² micro-triangles a base triangle
+  kGrids       ///< three grids a base triangle, one at each vertex, that meet at its centre; less memory, slower
+};
+
+/// How a tessellation's tree is built.
+struct TessellationBuild {
+  RTCBuildQuality quality = RTC_BUILD_QUALITY_MEDIUM;
+  bool compact = false;  ///< leaves refer to the vertices instead of holding copies
+};
+
+/// How finely one base triangle is divided. Edge k runs from vertex k to vertex k + 1.
+struct TessellatedTriangle {
+  std::uint32_t segments = 1;                  ///< of each side; of a grid: of half a side
+  std::uint32_t edge_segments[3] = {1, 1, 1};  ///< at most `segments`; likewise
+  std::uint32_t first_vertex = 0, first_primitive = 0;
+};
+
+/// What will be built, before anything large is allocated.
+struct TessellationLayout {
+  TessellationKind kind = TessellationKind::kTriangles;
+  std::vector<TessellatedTriangle> triangles;
+  /// For every edge (3 · triangle + edge): the one of its group that computes the points; for every corner likewise.
+  std::vector<std::uint32_t> edge_owner, corner_owner;
+  std::uint64_t num_vertices = 0, num_primitives = 0, num_micro_triangles = 0;
+
+  std::uint64_t bytes() const;  ///< of the vertices and indices
+};
+
+/// @param rate  micro-triangle edges a texel, larger than 0: at 1, edges are at most a texel long along both axes
+/// @cost  36 bytes a base triangle; sorting of its edges
+TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh, TessellationKind kind, double rate);
+
+/// Bytes in use while Embree builds the tree: vertices, indices, the tree and what building needs besides.
+/// @source measured, see the definition
+std::uint64_t tessellation_peak_bytes(const TessellationLayout& layout, const TessellationBuild& build);
+
+/// A point on a micro-triangle.
+struct MicroHit {
+  std::uint32_t triangle = 0;  ///< base triangle
+  double b1 = 0, b2 = 0;       ///< its barycentric weights of vertices 1 and 2
+  Vec3d P;                     ///< on the micro-triangle, object space
+  Vec3d Ng;                    ///< unit normal of the micro-triangle, on the side of the displacement normal
+};
+
+class Tessellation {
+ public:
+  /// Evaluates the surface at all vertices.
+  /// @param mesh    what it refers to must outlive the tessellation
+  /// @param layout  of the same mesh
+  /// @error std::length_error if Embree's 32-bit indices are too short; std::bad_alloc
+  Tessellation(const DisplacedMeshView& mesh, TessellationLayout layout);
+
+  const TessellationLayout& layout() const { return layout_; }
+  std::size_t bytes() const { return layout_.bytes() + layout_.triangles.size() * sizeof(TessellatedTriangle); }
+
+  /// A new Embree geometry, not committed. The tessellation must outlive it and stay where it is.
+  RTCGeometry geometry_make(RTCDevice device) const;
+
+  /// The base triangle of a hit and the weights of its vertices 1 and 2; the cheap part of `hit`.
+  /// @param primitive, u, v  as Embree reports them
+  MicroHit locate(std::uint32_t primitive, float u, float v) const;
+  /// The whole point of a hit.
+  MicroHit hit(std::uint32_t primitive, float u, float v) const;
+
+  Vec3f vertex(std::size_t index) const
+  {
+    return {vertices_[3 * index], vertices_[3 * index + 1], vertices_[3 * index + 2]};
+  }
+
+ private:
+  struct MicroTriangle;
+  MicroTriangle micro_triangle(std::uint32_t primitive, float u, float v) const;
+  void fill(std::uint32_t triangle);
+
+  DisplacedMeshView mesh_;
+  TessellationLayout layout_;
+  std::unique_ptr<float[]> vertices_;         ///< xyz
+  std::unique_ptr<std::uint32_t[]> indices_;  ///< three a micro-triangle
+  std::vector<RTCGrid> grids_;
+};
+
+/// A scene for a tessellation, robust, not committed.
+RTCScene tessellation_scene_make(RTCDevice device, const TessellationBuild& build);
+
+}  // namespace relief
