@@ -200,7 +200,7 @@ RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
         if (!(tau > a.tau && tau < b.tau)) break;
         const CurvePoint p = curve_point(tri, g, tau);
         const double gp = height_over(p);
-        if (__builtin_fabs(gp) <= 0.25 * rounding) {
+        if (__builtin_fabs(gp) <= 0x1p-51 * magnitude) {
           a = p;
           break;
         }
