@@ -283,7 +283,9 @@ RELIEF_KERNEL void add_interval(RayCurve& curve,
       add_edge_on_segment(curve, v, 0.5 * (begin + stop));
     } else {
       CurveSegment g;
-      if (min(quadratic_at(W, begin), quadratic_at(W, stop)) < 1e6 * edge_on) {
+      // Seen at less than a hundredth: the other form's points are off the ray by the rounding of the edge functions
+      // over W.
+      if (min(quadratic_at(W, begin), quadratic_at(W, stop)) < 1e8 * edge_on) {
         nearly_edge_on_functions(v, begin, stop - begin, g.e);
         for (Quadratic& q : g.e) q = q * sign;
       } else {
@@ -309,6 +311,7 @@ RELIEF_KERNEL bool ray_curve_make(const RayFrame& frame, const DisplacedTriangle
   RayCurve& curve = *out;
   curve.num_segments = 0;
   const double low = tri.s_min, high = tri.s_max;
+  if (low > high) return false;  // no surface: its normals are zero
   const double reach = max(__builtin_fabs(low), __builtin_fabs(high));
 
   // Lane i is vertex i (lane 3 repeats vertex 2), then edge i, which is opposite to it.
