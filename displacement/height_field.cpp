@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <utility>
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_reduce.h>
 
 namespace relief {
 
@@ -57,19 +55,12 @@ StoredRange texel_range_at(const HeightFieldView& f, std::int64_t i, std::int64_
 /// Least and greatest float of a map.
 std::pair<float, float> float_extremes(const float* texels, std::size_t count)
 {
-  using Extremes = std::pair<float, float>;
-  constexpr float kHuge = std::numeric_limits<float>::infinity();
-  return tbb::parallel_reduce(
-      tbb::blocked_range<std::size_t>(0, count, 1 << 16), Extremes{kHuge, -kHuge},
-      [&](const tbb::blocked_range<std::size_t>& range, Extremes e) {
-        for (std::size_t k = range.begin(); k < range.end(); ++k) {
-          e = {std::min(e.first, texels[k]), std::max(e.second, texels[k])};
-        }
-        return e;
-      },
-      [](Extremes a, Extremes b) {
-        return Extremes{std::min(a.first, b.first), std::max(a.second, b.second)};
-      });
+  float low = texels[0], high = texels[0];
+  for (std::size_t k = 1; k < count; ++k) {
+    low = std::min(low, texels[k]);
+    high = std::max(high, texels[k]);
+  }
+  return {low, high};
 }
 
 /// Bounds of 4 × 4 cells: of 5 × 5 texels, as bilinear interpolation stays between its corners.
