@@ -152,7 +152,8 @@ RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
     return monotone;
   };
 
-  // What rounding can do to g: its terms, and the lattice position through the slopes.
+  // What rounding can do to g at a point of the curve: its terms, and the weights through the slopes. That the curve
+  // itself may be off does not count: it reaches over the walls by more than that.
   const double slope =
       __builtin_fabs(mesh.scale) * ((__builtin_fabs(cell.hx) + __builtin_fabs(cell.hxy)) *
                                         (__builtin_fabs(tri.x[1] - tri.x[0]) + __builtin_fabs(tri.x[2] - tri.x[0])) +
@@ -161,7 +162,7 @@ RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
   const double magnitude =
       __builtin_fabs(mesh.scale) * (__builtin_fabs(cell.h00 - mesh.midlevel) + __builtin_fabs(cell.hx) +
                                     __builtin_fabs(cell.hy) + __builtin_fabs(cell.hxy));
-  const double rounding = 0x1p-48 * magnitude + 4.0 * g.relative_error * slope;
+  const double rounding = 0x1p-49 * (magnitude + slope);
 
   struct Interval {
     CurvePoint a, b;

@@ -344,11 +344,20 @@ inline const oracle::Hit* Judge::required_root(const Question& q)
   return nullptr;
 }
 
-/// Distance of the surface's point with the hit's weights from the ray's point with the hit's t.
+/// Distance of the surface's point with the hit's weights from the ray's point with the hit's t. Measured near the ray's
+/// origin and near uv (0, 0), where fewer digits are lost.
 inline double Judge::distance_from_ray(const Question& q, const DisplacedHit& hit)
 {
-  const oracle::Vector3 on_surface = oracle::surface_eval(q.triangle.triangle, q.triangle.map, {hit.b1, hit.b2}).P;
-  return vector_length(combination(1, on_surface, -1, combination(1, q.ray.O, hit.t, q.ray.D)));
+  oracle::DisplacedTriangle local = q.triangle.triangle;
+  for (oracle::Vector3& P : local.P) P = combination(1, P, -1, q.ray.O);
+  const std::array<oracle::Wrap, 2> wraps{q.triangle.map.wrap_u, q.triangle.map.wrap_v};
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    if (wraps[axis] == oracle::Wrap::kClamp) continue;
+    const double periods = 2 * std::floor(.5 * local.uv[0][axis]);
+    for (oracle::Vector2& uv : local.uv) uv[axis] -= periods;
+  }
+  const oracle::Vector3 on_surface = oracle::surface_eval(local, q.triangle.map, {hit.b1, hit.b2}).P;
+  return vector_length(combination(1, on_surface, -hit.t, q.ray.D));
 }
 
 /// @param root  the nearest one in t, if there is a match
@@ -426,7 +435,8 @@ inline void Judge::record_fault(std::uint64_t& count,
   if (judgement_.faults.size() >= kMostFaults) return;
   std::ostringstream out;
   out.precision(17);
-  out << what << " (" << table_.isa << "): " << case_label << ", triangle " << q.index << ", O " << q.ray.O[0] << " "
+  out << what << " (" << kTraversalMethods[static_cast<std::size_t>(method_)].name << ", " << table_.isa
+      << "): " << case_label << ", triangle " << q.index << ", O " << q.ray.O[0] << " "
       << q.ray.O[1] << " " << q.ray.O[2] << " D " << q.ray.D[0] << " " << q.ray.D[1] << " " << q.ray.D[2] << " t in "
       << q.ray.t_min << " " << q.ray.t_max << "; ";
   if (hit != nullptr) {
