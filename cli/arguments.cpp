@@ -133,6 +133,16 @@ std::uint32_t parse_aovs(const std::string& text)
   return mask;
 }
 
+int parse_lod(const std::string& text)
+{
+  constexpr int kCoarsest = 30;
+  int level = 0;
+  if (text != "auto" && (!to_number(text, &level) || level < 0 || level > kCoarsest)) {
+    refuse("--lod", "auto or a whole level from 0 to 30 (levels in between are not supported)", text);
+  }
+  return level;
+}
+
 std::string parse_output(const char* option, const std::string& text, const char* suffix)
 {
   std::string found = std::filesystem::path(text).extension().string();

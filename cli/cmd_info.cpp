@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -124,10 +126,23 @@ void print_displacements(const Scene& scene)
   }
 }
 
-int info(const std::string& file, bool strict)
+/// What displacement costs to trace, and what of it could not be prepared.
+void print_prepared(const DisplacementSet& displacements, const Statistics& stats)
+{
+  const DisplacedMeshReport report = displacements.report();
+  fmt::print("displaced geometries: {}, traced by {}, {}\n", displacements.size(), stats.displacement.method,
+             megabytes(stats.displacement.bytes));
+  fmt::print("  prisms: {}; folded (slower to trace) {}, with normals that cancel {}, without a normal {}\n",
+             stats.displacement.num_prisms, report.num_folded, report.num_short_normals, report.num_degenerate);
+}
+
+int info(const std::string& file, bool strict, const DisplacementOptions& displacement)
 {
   const Scene scene = scene_load(file);
-  const SceneContext context(scene);
+  const SceneContext context(scene, displacement);
+  std::vector<std::string> warnings = scene.warnings;
+  for (std::string& text : displacement_warnings(scene, displacement)) warnings.push_back(std::move(text));
+  for (std::string& text : context.displacements.warnings()) warnings.push_back(std::move(text));
   Statistics stats;
   context.fill(stats);
 
@@ -161,16 +176,19 @@ int info(const std::string& file, bool strict)
                scene.textures->is_cached(static_cast<int>(i)) ? ", through the tile cache" : "");
   }
   if (!scene.displacements.empty()) print_displacements(scene);
+  if (context.displacements.size() > 0) print_prepared(context.displacements, stats);
   std::string features;
   for (const FeatureName& feature : kFeatureNames) {
     if (scene.features.*feature.present) features += fmt::format("{}{}", features.empty() ? "" : ", ", feature.name);
   }
   fmt::print("features: {}\n", features.empty() ? "none" : features);
-  fmt::print("memory: meshes {}, textures {}, height maps {}, acceleration structure {}, lights {}\n",
+  fmt::print("memory: meshes {}, textures {}, height maps {}, displacement {}, acceleration structure {}, lights "
+             "{}\n",
              megabytes(stats.mesh_bytes), megabytes(stats.texture_bytes),
-             megabytes(height_map_bytes(scene.height_maps)), megabytes(stats.bvh_bytes), megabytes(stats.light_bytes));
-  for (const std::string& warning : scene.warnings) fmt::print("warning: {}\n", warning);
-  if (strict) refuse_warnings(file, scene.warnings);
+             megabytes(height_map_bytes(scene.height_maps)), megabytes(stats.displacement.bytes),
+             megabytes(stats.bvh_bytes), megabytes(stats.light_bytes));
+  for (const std::string& warning : warnings) fmt::print("warning: {}\n", warning);
+  if (strict) refuse_warnings(file, warnings);
   return 0;
 }
 
@@ -181,12 +199,16 @@ void cmd_info_register(CLI::App& app, Run& run)
   struct Arguments {
     std::string scene;
     bool strict = false;
+    DisplacementOptions displacement;
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("info", "Shows what is in a scene, what it will cost, and every warning");
   command->add_option("scene", arguments->scene, "Scene file (.gltf, .glb)")->required();
   command->add_flag("--strict", arguments->strict, "Turn warnings into errors");
-  command->callback([&run, arguments] { run = [arguments] { return info(arguments->scene, arguments->strict); }; });
+  add_displacement_method(*command, arguments->displacement);
+  command->callback([&run, arguments] {
+    run = [arguments] { return info(arguments->scene, arguments->strict, arguments->displacement); };
+  });
 }
 
 }  // namespace relief

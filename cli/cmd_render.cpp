@@ -56,6 +56,7 @@ struct RenderArguments {
   std::string filter, compression = "zip", progress = "bar";
   bool resume = false, strict = false, float_color = false;
   double texture_memory_gib = 4;
+  DisplacementOptions displacement;
 };
 
 /// Files of one frame; empty: not asked for.
@@ -155,6 +156,7 @@ RenderOptions options_for(const Scene& scene, const RenderArguments& arguments)
   options.crop_y1 = crop.y1;
   options.time_limit_seconds = arguments.time_limit;
   options.aov_mask = arguments.aov_mask;
+  options.displacement = arguments.displacement;
   return options;
 }
 
@@ -164,10 +166,10 @@ ExrCompression compression_of(const RenderArguments& arguments)
   return static_cast<ExrCompression>(found - kExrCompressionNames.begin());
 }
 
-/// Settings that do nothing, or more than meets the eye.
-std::vector<std::string> warnings_about(const RenderArguments& arguments)
+/// Settings that do nothing, more than meets the eye, or something else than they say.
+std::vector<std::string> warnings_about(const RenderArguments& arguments, const Scene& scene)
 {
-  std::vector<std::string> texts;
+  std::vector<std::string> texts = displacement_warnings(scene, arguments.displacement);
   if (arguments.png.empty() && arguments.view) texts.emplace_back("--view has no effect without --png");
   if (arguments.png.empty() && arguments.exposure) texts.emplace_back("--exposure has no effect without --png");
   for (const std::string& layer : exr_damaged_layers(film_layout_make(arguments.aov_mask), compression_of(arguments))) {
@@ -300,7 +302,7 @@ bool render_frame(const RenderArguments& arguments,
   stats.version = RELIEF_VERSION;
   stats.frame = frame.value_or(0);
   stats.warnings = scene.warnings;
-  for (std::string& text : warnings_about(arguments)) stats.warnings.push_back(std::move(text));
+  for (std::string& text : warnings_about(arguments, scene)) stats.warnings.push_back(std::move(text));
   progress.warnings(stats.warnings);
   if (arguments.strict) refuse_warnings(arguments.scene, stats.warnings);
 
@@ -400,6 +402,8 @@ void cmd_render_register(CLI::App& app, Run& run, const std::string& command_lin
   add_parsed(*command, "--crop", a.crop, parse_crop, "X0,Y0,X1,Y1: render this window of the image only");
   command->add_option("--max-bounces", a.max_bounces, "Scattering events after the first hit")
       ->check(whole_number(0, 200));
+  add_displacement_method(*command, a.displacement);
+  add_displacement_lod(*command, a.displacement);
   command->add_option("--filter", a.filter, "Pixel filter: box (1 px) or blackman-harris (1.5 px)")
       ->check(one_of({"box", "blackman-harris"}));
   command->add_option("--view", a.view, "OpenColorIO view of the PNG");

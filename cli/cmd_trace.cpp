@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <span>
@@ -33,6 +34,8 @@ struct TraceArguments {
   Resolution resolution;
   std::optional<std::uint64_t> seed;
   std::optional<int> frame;
+  int explain = -1;  ///< ray to explain, −1: none
+  DisplacementOptions displacement;
 };
 
 /// Words of a line, separated by blanks.
@@ -109,10 +112,55 @@ std::string hits_csv(const std::vector<TraceHit>& hits)
       csv += "0,,,,,,,,,,,,\n";
       continue;
     }
-    csv += fmt::format("1,{},{},{},{},{},{},{},{},{},{},{},\n", h.t, h.P.x, h.P.y, h.P.z, h.Ng.x, h.Ng.y, h.Ng.z, h.u,
-                       h.v, h.mesh_index, h.triangle_index);
+    csv += fmt::format("1,{},{},{},{},{},{},{},{},{},{},{},{}\n", h.t, h.P.x, h.P.y, h.P.z, h.Ng.x, h.Ng.y, h.Ng.z,
+                       h.u, h.v, h.mesh_index, h.triangle_index, h.steps ? std::to_string(*h.steps) : "");
   }
   return csv;
+}
+
+/// What one prism did to a ray, several lines.
+std::string visit_text(const Scene& scene, const PrismVisit& visit)
+{
+  const Instance& instance = scene.instances[visit.instance];
+  const PrismExplanation e = prism_explain(visit);
+  std::string text = fmt::format("mesh {} triangle {} (node '{}'): ", instance.mesh_index, visit.triangle, instance.name);
+  if (e.num_stretches == 0) return text + "in its box, beside its prism\n";
+  text += fmt::format("prism{}, searched from t {} to {}\n", e.folded ? " (folded)" : "", visit.t_min, visit.t_max);
+  text += fmt::format("  object space: origin {} {} {}, direction {} {} {}\n", visit.O.x, visit.O.y, visit.O.z,
+                      visit.D.x, visit.D.y, visit.D.z);
+  for (int k = 0; k < e.num_stretches; ++k) {
+    const PrismStretch& s = e.stretches[k];
+    text += fmt::format("  inside: t {} to {}, s {} to {}\n", s.t0, s.t1, s.s0, s.s1);
+  }
+  text += fmt::format("  tested: {} bounds, {} texels, {} inversions\n", visit.counters.bounds, visit.counters.texels,
+                      visit.counters.inversions);
+  if (!visit.found) return text + "  no hit\n";
+  const DisplacedHit& hit = visit.hit;
+  return text + fmt::format("  hit: t {}, b {} {} {}, uv {} {}, cell {} {}, height {}, displacement {} m\n", hit.t,
+                            1.0 - hit.b1 - hit.b2, hit.b1, hit.b2, e.u, e.v, e.i, e.j, e.h, e.d);
+}
+
+/// The traversal of one ray, for people to read.
+std::string explanation_text(const Scene& scene, const SceneContext& context, const TraceRay& ray)
+{
+  const TraceExplanation explained = trace_explain(context, ray);
+  std::string text =
+      fmt::format("ray: origin {} {} {}, direction {} {} {}, t {} to {}\n", ray.O.x, ray.O.y, ray.O.z, ray.D.x,
+                  ray.D.y, ray.D.z, ray.t_min, ray.t_max);
+  TraversalCounters total;
+  for (const PrismVisit& visit : explained.visits) {
+    text += visit_text(scene, visit);
+    total.prisms += visit.counters.prisms;
+    total.bounds += visit.counters.bounds;
+    total.texels += visit.counters.texels;
+    total.inversions += visit.counters.inversions;
+  }
+  text += fmt::format("in all: {} boxes, {} prisms, {} bounds, {} texels, {} inversions\n", explained.visits.size(),
+                      total.prisms, total.bounds, total.texels, total.inversions);
+  const TraceHit& h = explained.hit;
+  if (!h.hit) return text + "nearest: nothing\n";
+  return text + fmt::format("nearest: t {}, mesh {} triangle {}, P {} {} {}, Ng {} {} {}\n", h.t, h.mesh_index,
+                            h.triangle_index, h.P.x, h.P.y, h.P.z, h.Ng.x, h.Ng.y, h.Ng.z);
 }
 
 /// The rays of one path, in lines that --rays takes back.
@@ -133,7 +181,7 @@ std::string path_rays(const TraceArguments& arguments, const Scene& scene)
                                                       settings.width, settings.height, at.x, at.y));
   }
   std::string text = "# kind ox oy oz dx dy dz tmin tmax: rays of the path in order\n";
-  for (const RecordedRay& r : trace_path(SceneContext(scene), options, at.x, at.y, at.sample_index)) {
+  for (const RecordedRay& r : trace_path(SceneContext(scene, arguments.displacement), options, at.x, at.y, at.sample_index)) {
     text += fmt::format("{} {} {} {} {} {} {} {} {}\n", r.shadow ? kShadowRay : kPathRay, r.O.x, r.O.y, r.O.z, r.D.x,
                         r.D.y, r.D.z, r.t_min, r.t_max);
   }
@@ -145,13 +193,27 @@ int trace(const TraceArguments& arguments)
   // Rays first: their mistakes are found before a large scene is loaded.
   std::vector<TraceRay> rays;
   if (!arguments.pixel) rays = read_rays(arguments.rays);
+  if (arguments.explain >= static_cast<int>(rays.size())) {
+    throw CLI::ValidationError("--explain", fmt::format("expected one of {} rays, counted from 0, found '{}'",
+                                                        rays.size(), arguments.explain));
+  }
   LoadOptions load;
   load.has_frame = arguments.frame.has_value();
   load.frame = arguments.frame.value_or(0);
   const Scene scene = scene_load(arguments.scene, load);
-  for (const std::string& warning : scene.warnings) fmt::print(stderr, "relief: warning: {}\n", warning);
+  const auto warn = [](const std::string& text) { fmt::print(stderr, "relief: warning: {}\n", text); };
+  for (const std::string& text : scene.warnings) warn(text);
+  for (const std::string& text : displacement_warnings(scene, arguments.displacement)) warn(text);
+  if (arguments.pixel) {
+    write_text(arguments.output, path_rays(arguments, scene));
+    return 0;
+  }
+  const SceneContext context(scene, arguments.displacement);
+  for (const std::string& text : context.displacements.warnings()) warn(text);
   write_text(arguments.output,
-             arguments.pixel ? path_rays(arguments, scene) : hits_csv(trace_rays(SceneContext(scene), rays)));
+             arguments.explain >= 0
+                 ? explanation_text(scene, context, rays[static_cast<std::size_t>(arguments.explain)])
+                 : hits_csv(trace_rays(context, rays)));
   return 0;
 }
 
@@ -168,10 +230,15 @@ void cmd_trace_register(CLI::App& app, Run& run)
       "--pixel", [&a](const std::string& text) { a.pixel = parse_pixel(text); },
       "X,Y[,SAMPLE]: print the rays of that path instead");
   rays->excludes(pixel);
-  command->add_option("-o,--output", a.output, "CSV of hits, or the path's rays; - is standard output")
+  command->add_option("-o,--output", a.output, "CSV of hits, the explanation, or the path's rays; - is standard output")
       ->capture_default_str();
   command->add_option("--frame", a.frame, "Frame of the animation (default: the rest pose)")
       ->check(whole_number(0, 1'000'000));
+  add_displacement_method(*command, a.displacement);
+  add_displacement_lod(*command, a.displacement);
+  command->add_option("--explain", a.explain, "Tell what this ray did in displaced meshes instead, counted from 0")
+      ->check(whole_number(0, std::numeric_limits<int>::max()))
+      ->needs(rays);
   command->add_option("--camera", a.camera, "Camera of --pixel (default: the first)")->needs(pixel);
   command
       ->add_option_function<std::string>(

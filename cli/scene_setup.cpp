@@ -1,10 +1,11 @@
 #include "cli/scene_setup.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
 
+#include "cli/arguments.h"
 #include "scene/diagnostics.h"
 
 namespace relief {
@@ -31,6 +32,23 @@ Camera camera_for_image(const Scene& scene, const std::string& name, int width, 
   Camera camera = found->camera;
   camera.half_width = camera.half_height * static_cast<float>(width) / static_cast<float>(height);
   return camera;
+}
+
+void add_displacement_method(CLI::App& command, DisplacementOptions& options)
+{
+  const auto set = [&options](const std::string& text) {
+    const auto* found = std::find(std::begin(kDisplacementMethodLabels), std::end(kDisplacementMethodLabels), text);
+    options.method = static_cast<DisplacementMethod>(found - std::begin(kDisplacementMethodLabels));
+  };
+  command.add_option_function<std::string>("--displacement", set, "How displaced meshes are traced (default: the scene's)")
+      ->check(one_of(displacement_method_names()));
+}
+
+void add_displacement_lod(CLI::App& command, DisplacementOptions& options)
+{
+  const auto set = [&options](const std::string& text) { options.level = parse_lod(text); };
+  command.add_option_function<std::string>(
+      "--lod", set, "Level of the height maps, 0 the finest; auto is the finest (default: the scene's)");
 }
 
 }  // namespace relief

@@ -3,6 +3,9 @@
 
 #include <string>
 
+#include <CLI/CLI.hpp>
+
+#include "integrator/displacement_set.h"
 #include "scene/load.h"
 
 namespace relief {
@@ -14,5 +17,11 @@ void refuse_warnings(const std::string& file, const std::vector<std::string>& wa
 /// The named camera (empty: the first), framed for an image.
 /// @error CLI::ValidationError listing the cameras there are
 Camera camera_for_image(const Scene& scene, const std::string& name, int width, int height);
+
+/// Adds --displacement; `options` must outlive the parser.
+void add_displacement_method(CLI::App& command, DisplacementOptions& options);
+
+/// Adds --lod likewise.
+void add_displacement_lod(CLI::App& command, DisplacementOptions& options);
 
 }  // namespace relief

@@ -42,6 +42,49 @@ struct SurfacePoint {
   double d = 0;  ///< metres
 };
 
+/// P and N of a triangle as functions of the barycentric weights of vertices 1 and 2, with their derivatives.
+struct BasePoint {
+  Vec3d P, Pu, Pv;
+  Vec3d N, Nu, Nv;
+  double xu, xv, yu, yv;  ///< of the lattice coordinates
+};
+
+RELIEF_KERNEL BasePoint base_point(const DisplacedTriangle& tri, double b1, double b2)
+{
+  BasePoint p;
+  const Vec3d P0 = to_double(tri.P[0]), N0 = to_double(tri.N[0]);
+  p.Pu = to_double(tri.P[1]) - P0;
+  p.Pv = to_double(tri.P[2]) - P0;
+  p.Nu = to_double(tri.N[1]) - N0;
+  p.Nv = to_double(tri.N[2]) - N0;
+  p.xu = tri.x[1] - tri.x[0];
+  p.xv = tri.x[2] - tri.x[0];
+  p.yu = tri.y[1] - tri.y[0];
+  p.yv = tri.y[2] - tri.y[0];
+  p.P = P0 + b1 * p.Pu + b2 * p.Pv;
+  p.N = N0 + b1 * p.Nu + b2 * p.Nv;
+  return p;
+}
+
+/// Normal of a surface P + d·N/|N| at a point where d has the slopes scale·hx and scale·hy a lattice unit.
+/// @param scale   metres
+/// @return        unit, on the side of N; where the surface has no tangent plane: N/|N|
+RELIEF_KERNEL Vec3d surface_normal(const BasePoint& base, double d, double scale, double hx, double hy)
+{
+  const double inverse_length = 1.0 / length(base.N);
+  const Vec3d n = base.N * inverse_length;
+  // ∂S = ∂P + ∂d·n + d·∂n with ∂n = (∂N − n (n·∂N))/|N|.
+  const auto derivative = [&](Vec3d dP, Vec3d dN, double dx, double dy) {
+    const double dd = scale * (hx * dx + hy * dy);
+    return dP + dd * n + (d * inverse_length) * (dN - dot(n, dN) * n);
+  };
+  const Vec3d normal =
+      cross(derivative(base.Pu, base.Nu, base.xu, base.yu), derivative(base.Pv, base.Nv, base.xv, base.yv));
+  const double squared = dot(normal, normal);
+  if (!(squared > 0.0)) return n;
+  return normal * ((dot(normal, n) < 0.0 ? -1.0 : 1.0) / __builtin_sqrt(squared));
+}
+
 /// Evaluates S and its geometric normal.
 /// @param b1, b2  barycentric weights of vertices 1 and 2
 /// @param i, j    the cell whose bilinear patch is meant: at a texel line the two sides have different normals
@@ -52,35 +95,17 @@ RELIEF_KERNEL SurfacePoint surface_point(const DisplacedMeshView& mesh,
                                          std::int64_t i,
                                          std::int64_t j)
 {
-  const Vec3d P0 = to_double(tri.P[0]), N0 = to_double(tri.N[0]);
-  const Vec3d Pu = to_double(tri.P[1]) - P0, Pv = to_double(tri.P[2]) - P0;
-  const Vec3d Nu = to_double(tri.N[1]) - N0, Nv = to_double(tri.N[2]) - N0;
-  const double xu = tri.x[1] - tri.x[0], xv = tri.x[2] - tri.x[0];
-  const double yu = tri.y[1] - tri.y[0], yv = tri.y[2] - tri.y[0];
-  const double fx = tri.x[0] + b1 * xu + b2 * xv - static_cast<double>(i);
-  const double fy = tri.y[0] + b1 * yu + b2 * yv - static_cast<double>(j);
+  const BasePoint base = base_point(tri, b1, b2);
+  const double fx = tri.x[0] + b1 * base.xu + b2 * base.xv - static_cast<double>(i);
+  const double fy = tri.y[0] + b1 * base.yu + b2 * base.yv - static_cast<double>(j);
   const CellHeights c = cell_heights(*mesh.field, i, j);
   const double h = c.h00 + c.hx * fx + (c.hy + c.hxy * fx) * fy;
-  const double hx = c.hx + c.hxy * fy, hy = c.hy + c.hxy * fx;
-
   SurfacePoint point;
-  point.N = N0 + b1 * Nu + b2 * Nv;
+  point.N = base.N;
   point.d = mesh.scale * (h - mesh.midlevel);
   const double inverse_length = 1.0 / length(point.N);
-  const Vec3d n = point.N * inverse_length;
-  point.P = P0 + b1 * Pu + b2 * Pv + point.d * n;
-  // ∂S = ∂P + ∂d·n + d·∂n with ∂n = (∂N − n (n·∂N))/|N|.
-  const auto derivative = [&](Vec3d dP, Vec3d dN, double dx, double dy) {
-    const double dd = mesh.scale * (hx * dx + hy * dy);
-    return dP + dd * n + (point.d * inverse_length) * (dN - dot(n, dN) * n);
-  };
-  const Vec3d normal = cross(derivative(Pu, Nu, xu, yu), derivative(Pv, Nv, xv, yv));
-  const double squared = dot(normal, normal);
-  if (!(squared > 0.0)) {
-    point.Ng = n;
-    return point;
-  }
-  point.Ng = normal * ((dot(normal, n) < 0.0 ? -1.0 : 1.0) / __builtin_sqrt(squared));
+  point.P = base.P + point.d * (point.N * inverse_length);
+  point.Ng = surface_normal(base, point.d, mesh.scale, c.hx + c.hxy * fy, c.hy + c.hxy * fx);
   return point;
 }
 
@@ -94,6 +119,23 @@ RELIEF_KERNEL SurfacePoint surface_point(const DisplacedMeshView& mesh,
   const double y = tri.y[0] + b1 * (tri.y[1] - tri.y[0]) + b2 * (tri.y[2] - tri.y[0]);
   return surface_point(mesh, tri, b1, b2, static_cast<std::int64_t>(__builtin_floor(x)),
                        static_cast<std::int64_t>(__builtin_floor(y)));
+}
+
+/// Normal for shading a surface whose facets should not show: that of S with the map's slopes taken over one texel to
+/// either side, which makes them continuous where the bilinear patches of two cells meet.
+/// @return unit, on the side of N
+RELIEF_KERNEL Vec3d surface_smooth_normal(const DisplacedMeshView& mesh,
+                                          const DisplacedTriangle& tri,
+                                          double b1,
+                                          double b2)
+{
+  const BasePoint base = base_point(tri, b1, b2);
+  const double x = tri.x[0] + b1 * base.xu + b2 * base.xv;
+  const double y = tri.y[0] + b1 * base.yu + b2 * base.yv;
+  const HeightFieldView& f = *mesh.field;
+  const double hx = 0.5 * (interpolate_height(f, x + 1.0, y) - interpolate_height(f, x - 1.0, y));
+  const double hy = 0.5 * (interpolate_height(f, x, y + 1.0) - interpolate_height(f, x, y - 1.0));
+  return surface_normal(base, displacement_at(mesh, x, y), mesh.scale, hx, hy);
 }
 
 }  // namespace relief

@@ -1,6 +1,8 @@
 // The one place that knows which Embree is installed: 3.13 (Debian 12) or 4. Everything else calls these wrappers.
 #pragma once
 
+#include <cstdint>
+
 #if __has_include(<embree4/rtcore.h>)
 #include <embree4/rtcore.h>
 #elif __has_include(<embree3/rtcore.h>)
@@ -12,6 +14,7 @@
 namespace relief {
 
 struct TraversalCounters;
+struct PrismVisits;
 
 /// What a query hands to callbacks: Embree's own context first, so that a callback can cast back. Every query of a scene
 /// with displaced geometry uses one of these.
@@ -22,6 +25,8 @@ struct EmbreeContext {
   RTCIntersectContext rtc;
 #endif
   TraversalCounters* displacement = nullptr;  ///< where displaced geometry counts; null: nowhere
+  std::uint32_t* steps = nullptr;  ///< bounds and texels a ray, added to the entry of its id; null: not wanted
+  PrismVisits* visits = nullptr;   ///< record of the prisms that are visited (explain.h); null: not wanted
 };
 
 /// @param coherent  rays come in order from one origin or direction

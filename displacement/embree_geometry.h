@@ -6,6 +6,8 @@
 #include "displacement/embree.h"
 #include "displacement/leaf.h"
 #include "displacement/method.h"
+#include "displacement/minmax_mipmap.h"
+#include "displacement/rmip.h"
 
 namespace relief {
 
@@ -13,6 +15,9 @@ namespace relief {
 struct DisplacedGeometry {
   DisplacedMeshView mesh;
   TraversalMethod method = TraversalMethod::kChord;
+  const RmipView* rmip = nullptr;              ///< for kRmip
+  const MinmaxMipmapView* mipmap = nullptr;    ///< for kRmipOnMinmax and kTfdm
+  RmipOptions rmip_options;                    ///< for both of RMIP's
   RTCFilterFunctionN shadow_filter = nullptr;  ///< called for hits of shadow rays; null: all of them are opaque
 };
 

@@ -21,4 +21,10 @@ inline constexpr std::array<TraversalMethodLabel, 4> kTraversalMethods{{
     {TraversalMethod::kTfdm, "tfdm"},
 }};
 
+/// What RMIP's authors studied in their Figs. 10 and 12.
+struct RmipOptions {
+  double marching_scale = 16;       ///< texels; rectangles whose sides are no longer are marched through
+  bool reduce_by_inversion = true;  ///< bounds are tightened by inverting the displacement at the ends of a 3D box
+};
+
 }  // namespace relief

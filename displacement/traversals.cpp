@@ -1,6 +1,9 @@
 // Compiled once an instruction set: RELIEF_TRAVERSAL_TABLE names the function that returns the table.
 #include "displacement/embree_geometry.h"
+#include "displacement/explain.h"
 #include "displacement/traverse_chord.h"
+#include "displacement/traverse_rmip.h"
+#include "displacement/traverse_tfdm.h"
 
 namespace relief {
 
@@ -17,13 +20,19 @@ bool trace(const DisplacedGeometry& geometry,
            TraversalCounters* counters)
 {
   const DisplacedMeshView& mesh = geometry.mesh;
+  const RayFrame frame = ray_frame_make(O, D);
   RayCurve curve;
-  if (!ray_curve_make(ray_frame_make(O, D), mesh.triangles[triangle], &curve)) return false;
+  if (!ray_curve_make(frame, mesh.triangles[triangle], &curve)) return false;
   ++counters->prisms;
   switch (geometry.method) {
     case TraversalMethod::kRmip:
+      return traverse_rmip(mesh, triangle, frame, curve, *geometry.rmip, geometry.rmip_options, t_min, t_max, any_hit,
+                           hit, counters);
     case TraversalMethod::kRmipOnMinmax:
+      return traverse_rmip(mesh, triangle, frame, curve, *geometry.mipmap, geometry.rmip_options, t_min, t_max, any_hit,
+                           hit, counters);
     case TraversalMethod::kTfdm:
+      return traverse_tfdm(mesh, triangle, frame, curve, *geometry.mipmap, t_min, t_max, any_hit, hit, counters);
     case TraversalMethod::kChord:
       break;
   }
@@ -33,26 +42,57 @@ bool trace(const DisplacedGeometry& geometry,
 /// Where queries that bring no counters count.
 thread_local TraversalCounters uncounted;
 
-TraversalCounters* counters_of(void* context)
+/// One ray of a callback, in the geometry's space.
+struct CallbackRay {
+  unsigned id, instance, triangle;
+  Vec3f O, D;
+};
+
+CallbackRay callback_ray(RTCRayN* rays, unsigned count, unsigned lane, unsigned triangle, unsigned instance)
 {
-  TraversalCounters* counters = static_cast<const EmbreeContext*>(context)->displacement;
-  return counters != nullptr ? counters : &uncounted;
+  return {RTCRayN_id(rays, count, lane),
+          instance,
+          triangle,
+          {RTCRayN_org_x(rays, count, lane), RTCRayN_org_y(rays, count, lane), RTCRayN_org_z(rays, count, lane)},
+          {RTCRayN_dir_x(rays, count, lane), RTCRayN_dir_y(rays, count, lane), RTCRayN_dir_z(rays, count, lane)}};
+}
+
+/// Traces one ray and tells those who asked what it did.
+bool trace_observed(const DisplacedGeometry& geometry,
+                    const EmbreeContext& context,
+                    const CallbackRay& ray,
+                    double t_min,
+                    double t_max,
+                    bool any_hit,
+                    DisplacedHit* hit)
+{
+  TraversalCounters& counters = context.displacement != nullptr ? *context.displacement : uncounted;
+  const TraversalCounters before = counters;
+  const bool found = trace(geometry, ray.triangle, ray.O, ray.D, t_min, t_max, any_hit, hit, &counters);
+  if (context.steps == nullptr && context.visits == nullptr) return found;
+  const TraversalCounters spent{counters.bounds - before.bounds, counters.texels - before.texels,
+                                counters.inversions - before.inversions, counters.prisms - before.prisms};
+  if (context.steps != nullptr) context.steps[ray.id] += static_cast<std::uint32_t>(spent.bounds + spent.texels);
+  if (context.visits != nullptr) {
+    prism_visits_add(*context.visits, {&geometry, ray.instance, ray.triangle, ray.O, ray.D, t_min, t_max, spent, found,
+                                       found ? *hit : DisplacedHit{}});
+  }
+  return found;
 }
 
 void intersect(const RTCIntersectFunctionNArguments* arguments)
 {
   const auto& geometry = *static_cast<const DisplacedGeometry*>(arguments->geometryUserPtr);
-  TraversalCounters* counters = counters_of(arguments->context);
+  const auto& context = *reinterpret_cast<const EmbreeContext*>(arguments->context);
   const unsigned count = arguments->N, triangle = arguments->primID;
   RTCRayN* rays = RTCRayHitN_RayN(arguments->rayhit, count);
   RTCHitN* hits = RTCRayHitN_HitN(arguments->rayhit, count);
   for (unsigned k = 0; k < count; ++k) {
     if (arguments->valid[k] != -1) continue;
-    const Vec3f O{RTCRayN_org_x(rays, count, k), RTCRayN_org_y(rays, count, k), RTCRayN_org_z(rays, count, k)};
-    const Vec3f D{RTCRayN_dir_x(rays, count, k), RTCRayN_dir_y(rays, count, k), RTCRayN_dir_z(rays, count, k)};
+    const CallbackRay ray = callback_ray(rays, count, k, triangle, arguments->context->instID[0]);
     DisplacedHit hit;
-    if (!trace(geometry, triangle, O, D, RTCRayN_tnear(rays, count, k), RTCRayN_tfar(rays, count, k), false, &hit,
-               counters)) {
+    if (!trace_observed(geometry, context, ray, RTCRayN_tnear(rays, count, k), RTCRayN_tfar(rays, count, k), false,
+                        &hit)) {
       continue;
     }
     RTCRayN_tfar(rays, count, k) = static_cast<float>(hit.t);
@@ -95,19 +135,18 @@ bool passes(const DisplacedGeometry& geometry,
 void occluded(const RTCOccludedFunctionNArguments* arguments)
 {
   const auto& geometry = *static_cast<const DisplacedGeometry*>(arguments->geometryUserPtr);
-  TraversalCounters* counters = counters_of(arguments->context);
+  const auto& context = *reinterpret_cast<const EmbreeContext*>(arguments->context);
   const unsigned count = arguments->N, triangle = arguments->primID;
   RTCRayN* rays = arguments->ray;
   const bool opaque = geometry.shadow_filter == nullptr;
   for (unsigned k = 0; k < count; ++k) {
     if (arguments->valid[k] != -1) continue;
-    const Vec3f O{RTCRayN_org_x(rays, count, k), RTCRayN_org_y(rays, count, k), RTCRayN_org_z(rays, count, k)};
-    const Vec3f D{RTCRayN_dir_x(rays, count, k), RTCRayN_dir_y(rays, count, k), RTCRayN_dir_z(rays, count, k)};
+    const CallbackRay ray = callback_ray(rays, count, k, triangle, arguments->context->instID[0]);
     const double t_max = RTCRayN_tfar(rays, count, k);
     double t_min = RTCRayN_tnear(rays, count, k);
     DisplacedHit hit;
     // A surface that lets light through is met hit by hit, from the front.
-    while (trace(geometry, triangle, O, D, t_min, t_max, opaque, &hit, counters)) {
+    while (trace_observed(geometry, context, ray, t_min, t_max, opaque, &hit)) {
       if (opaque || !passes(geometry, arguments, k, hit)) {
         RTCRayN_tfar(rays, count, k) = -kInfinity;
         break;

@@ -5,6 +5,7 @@
 // mipmap (their Fig. 10). Reading order: traverse_rmip, segment_intersect, then ray_projection.h and texel_march.h.
 #pragma once
 
+#include "displacement/method.h"
 #include "displacement/inversion.h"
 #include "displacement/minmax_mipmap.h"
 #include "displacement/rmip_query.h"
@@ -12,11 +13,6 @@
 #include "kernel/assert.h"
 
 namespace relief {
-
-struct RmipOptions {
-  double marching_scale = 16;       ///< texels; rectangles whose sides are no longer are marched through
-  bool reduce_by_inversion = true;  ///< the paper's Fig. 12 switches it off
-};
 
 namespace rmip_detail {
 

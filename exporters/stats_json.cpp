@@ -16,6 +16,21 @@ std::string stats_json(const Statistics& statistics)
   for (const StageSeconds& stage : s.stages) {
     stages[stage.name] = stage.seconds;
   }
+  nlohmann::ordered_json displacement;  // null where nothing is displaced
+  if (!s.displacement.method.empty()) {
+    const auto a_ray = [&](std::uint64_t count) {
+      return num_rays > 0 ? static_cast<double>(count) / static_cast<double>(num_rays) : 0.0;
+    };
+    displacement = {{"method", s.displacement.method},
+                    {"geometries", s.displacement.num_geometries},
+                    {"prisms", s.displacement.num_prisms},
+                    {"bytes", s.displacement.bytes},
+                    {"map_bytes", s.displacement.map_bytes},
+                    {"steps_mean", a_ray(s.counters.displaced_bounds + s.counters.displaced_texels)},
+                    {"steps_max", s.displacement.most_steps},
+                    {"texels_mean", a_ray(s.counters.displaced_texels)},
+                    {"prisms_per_ray", a_ray(s.counters.displaced_prisms)}};
+  }
   const nlohmann::ordered_json json = {
       {"scene", s.scene},
       {"version", s.version},
@@ -46,6 +61,7 @@ std::string stats_json(const Statistics& statistics)
       {"light_bytes", s.light_bytes},
       {"film_bytes", s.film_bytes},
       {"path_state_bytes", s.path_state_bytes},
+      {"displacement", displacement},
       {"counters", counters},
       {"stage_seconds", stages},
       {"warnings", s.warnings},

@@ -126,8 +126,16 @@ void Accel::build(const Scene& scene,
   const TraversalTable& traversals = traversal_table_select();
   displaced_scenes_.assign(displacements.size(), nullptr);
   for (std::size_t d = 0; d < displacements.size(); ++d) {
-    displaced_scenes_[d] = new_scene(RTC_BUILD_QUALITY_HIGH);
-    attach(displaced_scenes_[d], displaced_geometry_make(device_, displacements.geometry(d), traversals), 0, ~0u);
+    const DisplacedGeometry& displaced = displacements.geometry(d);
+    if (const Tessellation* tessellation = displacements.tessellation(d)) {
+      displaced_scenes_[d] = tessellation_scene_make(device_, kRenderTessellation);
+      const RTCGeometry geometry = tessellation->geometry_make(device_);
+      rtcSetGeometryOccludedFilterFunction(geometry, displaced.shadow_filter);
+      attach(displaced_scenes_[d], geometry, 0, ~0u);
+    } else {
+      displaced_scenes_[d] = new_scene(RTC_BUILD_QUALITY_HIGH);
+      attach(displaced_scenes_[d], displaced_geometry_make(device_, displaced, traversals), 0, ~0u);
+    }
     commit(displaced_scenes_[d]);
   }
 

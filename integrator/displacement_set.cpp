@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <cstdio>
+#include <iterator>
+#include <stdexcept>
 #include <string_view>
 #include <tuple>
+
+#include <unistd.h>
 
 #include "integrator/stages.h"
 
@@ -15,26 +19,122 @@ namespace {
 /// Mean scale of a transform: the cube root of its determinant.
 double mean_scale(const Affine3& m) { return std::cbrt(std::abs(static_cast<double>(dot(m.x, cross(m.y, m.z))))); }
 
-TraversalMethod method_of(const DisplacementSettings& settings, const DisplacementOptions& options)
+DisplacementMethod method_of(const DisplacementSettings& settings, const DisplacementOptions& options)
 {
-  if (options.method) return *options.method;
-  switch (settings.method) {
+  return options.method.value_or(settings.method);
+}
+
+/// Level of detail; between two levels the finer one.
+int level_of(const DisplacementSettings& settings, const DisplacementOptions& options)
+{
+  constexpr float kCoarsest = 30;
+  return options.level.value_or(static_cast<int>(std::clamp(settings.lod, 0.0f, kCoarsest)));
+}
+
+/// What `auto` means, and methods that this version lacks.
+constexpr TraversalMethod kDefaultTraversal = TraversalMethod::kChord;
+
+bool is_available(DisplacementMethod method)
+{
+  return traversal_method(method).has_value() || tessellation_kind(method).has_value();
+}
+
+std::string gibibytes(std::uint64_t bytes)
+{
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f GiB", static_cast<double>(bytes) / (1 << 30));
+  return text;
+}
+
+/// Refuses what would not fit, before anything large is allocated.
+/// @param bytes  all tessellations so far, this one included
+void check_budget(std::uint64_t bytes,
+                  const TessellationLayout& layout,
+                  const std::string& mesh,
+                  const DisplacementOptions& options)
+{
+  const std::uint64_t half_of_memory =
+      static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) / 2;
+  const std::uint64_t budget = options.tessellation_bytes > 0 ? options.tessellation_bytes : half_of_memory;
+  if (bytes <= budget) return;
+  throw std::runtime_error("tessellating mesh '" + mesh + "' into " +
+                           std::to_string(layout.num_micro_triangles / 1'000'000) + " million triangles would take about " +
+                           gibibytes(bytes) + ", more than the " + gibibytes(budget) +
+                           " that tessellations may have; the other displacement methods do not tessellate");
+}
+
+std::string_view traversal_name(TraversalMethod method)
+{
+  const auto* found = std::find_if(kTraversalMethods.begin(), kTraversalMethods.end(),
+                                   [=](const TraversalMethodLabel& label) { return label.method == method; });
+  return found->name;
+}
+
+}  // namespace
+
+std::optional<TraversalMethod> traversal_method(DisplacementMethod method)
+{
+  switch (method) {
+    case DisplacementMethod::kAuto:
+    case DisplacementMethod::kChord:
+      return TraversalMethod::kChord;
     case DisplacementMethod::kRmip:
       return TraversalMethod::kRmip;
     case DisplacementMethod::kMinmaxRmip:
       return TraversalMethod::kRmipOnMinmax;
     case DisplacementMethod::kTfdm:
       return TraversalMethod::kTfdm;
-    default:
-      return TraversalMethod::kChord;
+    case DisplacementMethod::kTessellate:
+    case DisplacementMethod::kGrid:
+    case DisplacementMethod::kMicrotriangle:
+    case DisplacementMethod::kCone:
+      break;
   }
+  return std::nullopt;
 }
 
-}  // namespace
+std::optional<TessellationKind> tessellation_kind(DisplacementMethod method)
+{
+  if (method == DisplacementMethod::kTessellate) return TessellationKind::kTriangles;
+  if (method == DisplacementMethod::kGrid) return TessellationKind::kGrids;
+  return std::nullopt;
+}
+
+std::vector<std::string> displacement_method_names()
+{
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < std::size(kDisplacementMethodLabels); ++i) {
+    if (is_available(static_cast<DisplacementMethod>(i))) names.emplace_back(kDisplacementMethodLabels[i]);
+  }
+  return names;
+}
+
+std::vector<std::string> displacement_warnings(const Scene& scene, const DisplacementOptions& options)
+{
+  std::vector<std::string> texts;
+  for (std::size_t i = 0; i < scene.materials.size(); ++i) {
+    const int index = scene.materials[i].displacement_index;
+    if (index < 0) continue;
+    const DisplacementSettings& settings = scene.displacements[static_cast<std::size_t>(index)];
+    const std::string material = "material '" + scene.material_names[i] + "': ";
+    if (const DisplacementMethod method = method_of(settings, options); !is_available(method)) {
+      texts.push_back(material + "there is no displacement method '" +
+                      std::string(kDisplacementMethodLabels[static_cast<std::size_t>(method)]) + "' yet; '" +
+                      std::string(traversal_name(kDefaultTraversal)) + "' is used");
+    }
+    if (!options.level && settings.lod > 0 && settings.lod != std::floor(settings.lod)) {
+      texts.push_back(material + "levels of detail between whole ones are not supported yet; level " +
+                      std::to_string(level_of(settings, options)) + " is used");
+    }
+    if (settings.weld_seams) texts.push_back(material + "displacement seams are not welded yet; they stay open");
+  }
+  return texts;
+}
 
 DisplacementSet::DisplacementSet(const Scene& scene, const DisplacementOptions& options)
-    : geometry_of_instance_(scene.instances.size(), -1), fields_(scene.height_maps.size())
+    : geometry_of_instance_(scene.instances.size(), -1)
 {
+  std::uint64_t tessellated_bytes = 0;
   std::map<std::tuple<int, int, double>, int> known;  // mesh, displacement, scale in object space
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
@@ -47,25 +147,96 @@ DisplacementSet::DisplacementSet(const Scene& scene, const DisplacementOptions& 
                                                 static_cast<int>(geometries_.size()));
     geometry_of_instance_[i] = at->second;
     if (!is_new) continue;
-    auto& field = fields_[static_cast<std::size_t>(settings.height.texture_index)];
-    if (field == nullptr) {
-      field = std::make_unique<HeightField>(
-          scene.height_maps[static_cast<std::size_t>(settings.height.texture_index)].view());
-    }
     auto displaced = std::make_unique<Displaced>();
-    displaced->mesh = DisplacedMesh(scene.meshes[static_cast<std::size_t>(instance.mesh_index)].view(), field->view(),
+    displaced->mesh = DisplacedMesh(scene.meshes[static_cast<std::size_t>(instance.mesh_index)].view(),
+                                    field(scene, settings.height.texture_index, level_of(settings, options)),
                                     {settings.height, scale, settings.midlevel});
     displaced->geometry.mesh = displaced->mesh.view();
-    displaced->geometry.method = method_of(settings, options);
+    displaced->name = scene.meshes[static_cast<std::size_t>(instance.mesh_index)].name;
+    displaced->smooth = settings.smoothing;
+    const DisplacementMethod method = method_of(settings, options);
+    displaced->geometry.method = traversal_method(method).value_or(kDefaultTraversal);
+    set_tables(fields_.at({settings.height.texture_index, level_of(settings, options)}), displaced->geometry);
+    if (const std::optional<TessellationKind> kind = tessellation_kind(method)) {
+      TessellationLayout layout = tessellation_layout_make(displaced->geometry.mesh, *kind, options.tessellation_rate);
+      tessellated_bytes += tessellation_peak_bytes(layout, kRenderTessellation);
+      check_budget(tessellated_bytes, layout, displaced->name, options);
+      displaced->tessellation = std::make_unique<Tessellation>(displaced->geometry.mesh, std::move(layout));
+    }
     geometries_.push_back(std::move(displaced));
   }
+}
+
+const HeightFieldView& DisplacementSet::field(const Scene& scene, int map_index, int level)
+{
+  const auto [at, is_new] = fields_.try_emplace({map_index, level});
+  Field& field = at->second;
+  if (is_new) {
+    HeightMapView map = scene.height_maps[static_cast<std::size_t>(map_index)].view();
+    if (level > 0) {
+      field.level = HeightLevel(map, level);
+      map = field.level.view();
+    }
+    field.bounds = HeightField(map);
+  }
+  return field.bounds.view();
+}
+
+void DisplacementSet::set_tables(Field& field, DisplacedGeometry& geometry)
+{
+  switch (geometry.method) {
+    case TraversalMethod::kChord:
+      break;
+    case TraversalMethod::kRmip:
+      if (field.rmip == nullptr) field.rmip = std::make_unique<Rmip>(field.bounds.view());
+      geometry.rmip = &field.rmip->view();
+      break;
+    case TraversalMethod::kRmipOnMinmax:
+    case TraversalMethod::kTfdm:
+      if (field.mipmap == nullptr) field.mipmap = std::make_unique<MinmaxMipmap>(field.bounds.view());
+      geometry.mipmap = &field.mipmap->view();
+      break;
+  }
+}
+
+DisplacedPoint DisplacementSet::point(std::size_t instance, std::uint32_t primitive, float u, float v) const
+{
+  const Displaced& d = displaced(instance);
+  const DisplacedMeshView& mesh = d.geometry.mesh;
+  DisplacedPoint out{primitive, u, v, {}, {}, {}};
+  if (d.tessellation != nullptr) {
+    const MicroHit hit = d.tessellation->hit(primitive, u, v);
+    out = {hit.triangle,      static_cast<float>(hit.b1), static_cast<float>(hit.b2),
+           to_float(hit.P), to_float(hit.Ng),           {}};
+  } else {
+    const SurfacePoint point = surface_point(mesh, mesh.triangles[primitive], u, v);
+    out.P = to_float(point.P);
+    out.Ng = to_float(point.Ng);
+  }
+  out.Ns = d.smooth ? to_float(surface_smooth_normal(mesh, mesh.triangles[out.triangle], out.u, out.v)) : out.Ng;
+  return out;
+}
+
+DisplacedPoint DisplacementSet::locate(std::size_t instance, std::uint32_t primitive, float u, float v) const
+{
+  const Displaced& d = displaced(instance);
+  if (d.tessellation == nullptr) return {primitive, u, v, {}, {}, {}};
+  const MicroHit hit = d.tessellation->locate(primitive, u, v);
+  return {hit.triangle, static_cast<float>(hit.b1), static_cast<float>(hit.b2), {}, {}, {}};
 }
 
 std::size_t DisplacementSet::bytes() const
 {
   std::size_t sum = 0;
-  for (const auto& field : fields_) sum += field != nullptr ? field->bytes() : 0;
-  for (const auto& displaced : geometries_) sum += displaced->mesh.bytes();
+  for (const auto& [key, field] : fields_) {
+    sum += field.level.bytes() + field.bounds.bytes();
+    if (field.rmip != nullptr) sum += field.rmip->bytes();
+    if (field.mipmap != nullptr) sum += field.mipmap->bytes();
+  }
+  for (const auto& displaced : geometries_) {
+    sum += displaced->mesh.bytes();
+    if (displaced->tessellation != nullptr) sum += displaced->tessellation->bytes();
+  }
   return sum;
 }
 
@@ -74,6 +245,57 @@ std::uint64_t DisplacementSet::num_triangles() const
   std::uint64_t sum = 0;
   for (const auto& displaced : geometries_) sum += displaced->geometry.mesh.num_triangles;
   return sum;
+}
+
+DisplacedMeshReport DisplacementSet::report() const
+{
+  DisplacedMeshReport sum;
+  for (const auto& displaced : geometries_) {
+    const DisplacedMeshReport& report = displaced->mesh.report();
+    sum.num_folded += report.num_folded;
+    sum.num_short_normals += report.num_short_normals;
+    sum.num_degenerate += report.num_degenerate;
+  }
+  return sum;
+}
+
+std::string DisplacementSet::method_names() const
+{
+  std::string names;
+  for (const TraversalMethodLabel& label : kTraversalMethods) {
+    const auto uses = [&](const auto& displaced) {
+      return displaced->tessellation == nullptr && displaced->geometry.method == label.method;
+    };
+    if (std::none_of(geometries_.begin(), geometries_.end(), uses)) continue;
+    names += (names.empty() ? "" : ", ") + std::string(label.name);
+  }
+  for (const DisplacementMethod method : {DisplacementMethod::kTessellate, DisplacementMethod::kGrid}) {
+    const auto uses = [&](const auto& displaced) {
+      return displaced->tessellation != nullptr && displaced->tessellation->layout().kind == tessellation_kind(method);
+    };
+    if (std::none_of(geometries_.begin(), geometries_.end(), uses)) continue;
+    names += (names.empty() ? "" : ", ") + std::string(kDisplacementMethodLabels[static_cast<std::size_t>(method)]);
+  }
+  return names;
+}
+
+std::vector<std::string> DisplacementSet::warnings() const
+{
+  std::vector<std::string> texts;
+  for (const auto& displaced : geometries_) {
+    const DisplacedMeshReport& report = displaced->mesh.report();
+    const std::string of = " of " + std::to_string(displaced->geometry.mesh.num_triangles) + " triangles of mesh '" +
+                           displaced->name + "' ";
+    if (report.num_degenerate > 0) {
+      texts.push_back(std::to_string(report.num_degenerate) + of +
+                      "have no normal to be displaced along and are left out");
+    }
+    if (report.num_short_normals > 0) {
+      texts.push_back(std::to_string(report.num_short_normals) + of +
+                      "have normals that cancel inside; around that point their displaced surface is left out");
+    }
+  }
+  return texts;
 }
 
 const TraversalTable& traversal_table_select()

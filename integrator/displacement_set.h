@@ -3,48 +3,101 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "displacement/embree_geometry.h"
+#include "displacement/height_level.h"
+#include "displacement/tessellation.h"
 #include "scene/scene.h"
 
 namespace relief {
 
 /// What overrides the scene's own settings.
 struct DisplacementOptions {
-  std::optional<TraversalMethod> method;
+  std::optional<DisplacementMethod> method;  ///< of all materials
+  std::optional<int> level;                  ///< of all height maps: averaged down by 2^level
+  double tessellation_rate = 1;              ///< micro-triangle edges a texel
+  std::uint64_t tessellation_bytes = 0;      ///< all tessellations may take while they are built; 0: half of the machine's
 };
+
+/// A hit on a displaced instance.
+struct DisplacedPoint {
+  std::uint32_t triangle = 0;  ///< base triangle
+  float u = 0, v = 0;          ///< its barycentric weights of vertices 1 and 2
+  Vec3f P = {}, Ng = {};  ///< on the traced surface, object space; Ng unit, on the side of the displacement normal
+  Vec3f Ns = {};          ///< unit shading normal, object space: Ng, or that of the smoothed map
+};
+
+/// What a method is traced by; nothing if it tessellates, or if this version cannot.
+std::optional<TraversalMethod> traversal_method(DisplacementMethod method);
+
+/// What a method tessellates into; nothing if it does not.
+std::optional<TessellationKind> tessellation_kind(DisplacementMethod method);
+
+/// Names of the methods that can be chosen.
+std::vector<std::string> displacement_method_names();
+
+/// Settings of the scene that are not followed as they are written: what is done instead, a line each.
+std::vector<std::string> displacement_warnings(const Scene& scene, const DisplacementOptions& options);
 
 class DisplacementSet {
  public:
   /// @param scene  must outlive the set
+  /// @error std::runtime_error with the estimate if tessellations would need more memory than they may
   DisplacementSet(const Scene& scene, const DisplacementOptions& options);
 
   /// @return  index of the displaced geometry of an instance; −1: it is not displaced
   int geometry_index(std::size_t instance) const { return geometry_of_instance_[instance]; }
   std::size_t size() const { return geometries_.size(); }
   DisplacedGeometry& geometry(std::size_t index) { return geometries_[index]->geometry; }
+  /// @return null if the geometry is traversed as it is
+  const Tessellation* tessellation(std::size_t index) const { return geometries_[index]->tessellation.get(); }
   /// The point of a hit on a displaced instance.
-  SurfacePoint point(std::size_t instance, std::uint32_t triangle, float u, float v) const
-  {
-    const DisplacedMeshView& mesh =
-        geometries_[static_cast<std::size_t>(geometry_of_instance_[instance])]->geometry.mesh;
-    return surface_point(mesh, mesh.triangles[triangle], u, v);
-  }
+  /// @param primitive, u, v  as Embree reports them
+  DisplacedPoint point(std::size_t instance, std::uint32_t primitive, float u, float v) const;
+  /// The same without P and normals.
+  DisplacedPoint locate(std::size_t instance, std::uint32_t primitive, float u, float v) const;
   std::size_t bytes() const;            ///< besides the maps
   std::uint64_t num_triangles() const;  ///< of all geometries
+  DisplacedMeshReport report() const;   ///< sums over all geometries
+  std::string method_names() const;     ///< of the geometries, separated by commas
+  /// Parts of the surfaces that are missing.
+  std::vector<std::string> warnings() const;
 
  private:
   struct Displaced {
+    std::string name;     ///< of the mesh
+    bool smooth = false;  ///< shading normals come from the map's filtered gradient
     DisplacedMesh mesh;
     DisplacedGeometry geometry;
+    std::unique_ptr<Tessellation> tessellation;
   };
+  const Displaced& displaced(std::size_t instance) const
+  {
+    return *geometries_[static_cast<std::size_t>(geometry_of_instance_[instance])];
+  }
   std::vector<int> geometry_of_instance_;
-  std::vector<std::unique_ptr<HeightField>> fields_;  ///< a height map; null where no instance uses it
+  /// A level of a height map with its bounds.
+  struct Field {
+    HeightLevel level;  ///< empty at level 0, which is the map itself
+    HeightField bounds;
+    std::unique_ptr<Rmip> rmip;            ///< where a method asks for it
+    std::unique_ptr<MinmaxMipmap> mipmap;  ///< likewise
+  };
+  /// Makes the tables that a geometry's method needs, once a field.
+  static void set_tables(Field& field, DisplacedGeometry& geometry);
+  const HeightFieldView& field(const Scene& scene, int map_index, int level);
+  std::map<std::pair<int, int>, Field> fields_;  ///< by height map and level
   std::vector<std::unique_ptr<Displaced>> geometries_;
 };
+
+/// How tessellations of a render are built.
+inline constexpr TessellationBuild kRenderTessellation{RTC_BUILD_QUALITY_MEDIUM, false};
 
 /// The best traversals for this machine; $RELIEF_ISA overrides, as for the stages.
 const TraversalTable& traversal_table_select();

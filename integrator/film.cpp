@@ -25,6 +25,7 @@ AccumulatorLayout layout_make(std::uint32_t aov_mask)
   keep(Aov::kUv, 2, layout.uv);
   keep(Aov::kObjectId, 1, layout.object_id);
   keep(Aov::kMaterialId, 1, layout.material_id);
+  keep(Aov::kDisplacementSteps, 1, layout.displacement_steps);
   return layout;
 }
 
@@ -257,6 +258,7 @@ RenderedImage Film::resolve(int crop_x, int crop_y, int full_width, int full_hei
         if (float* p = plane(Aov::kSampleCount)) p[0] = static_cast<float>(samples);
         if (float* p = plane(Aov::kVariance)) put3(p, pixel.sample_variance * calibration);
         if (float* p = plane(Aov::kHalf)) put3(p, pixel.even);
+        if (float* p = plane(Aov::kDisplacementSteps)) p[0] = in[layout_.displacement_steps] * inverse_n;
       }
     }
   }

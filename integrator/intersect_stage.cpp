@@ -7,6 +7,13 @@ namespace relief {
 
 namespace {
 
+/// Notes the steps of one ray and clears them for the next.
+void note_steps(std::uint32_t& steps, DisplacementWork& work)
+{
+  if (steps > work.most_steps) work.most_steps = steps;
+  steps = 0;
+}
+
 /// Puts a path into the queue of the stage that its hit asks for; displaced hits get their position and normal.
 void classify(const KernelGlobals& g,
               const Accel& accel,
@@ -29,15 +36,20 @@ void classify(const KernelGlobals& g,
   }
   const InstanceView& instance = g.instances[object];
   if ((instance.flags & kDisplaced) != 0) {
-    const SurfacePoint point =
+    const DisplacedPoint point =
         accel.displacements().point(object, state.hit_triangle[path], state.hit_u[path], state.hit_v[path]);
-    const Vec3f P = to_float(point.P), Ng = to_float(point.Ng);
-    state.hit_P_x[path] = P.x;
-    state.hit_P_y[path] = P.y;
-    state.hit_P_z[path] = P.z;
-    state.hit_Ng_x[path] = Ng.x;
-    state.hit_Ng_y[path] = Ng.y;
-    state.hit_Ng_z[path] = Ng.z;
+    state.hit_triangle[path] = point.triangle;
+    state.hit_u[path] = point.u;
+    state.hit_v[path] = point.v;
+    state.hit_P_x[path] = point.P.x;
+    state.hit_P_y[path] = point.P.y;
+    state.hit_P_z[path] = point.P.z;
+    state.hit_Ng_x[path] = point.Ng.x;
+    state.hit_Ng_y[path] = point.Ng.y;
+    state.hit_Ng_z[path] = point.Ng.z;
+    state.hit_Ns_x[path] = point.Ns.x;
+    state.hit_Ns_y[path] = point.Ns.y;
+    state.hit_Ns_z[path] = point.Ns.z;
   }
   queue_push(surfaces[surface_kernel[instance.material_index]], path);
 }
@@ -55,7 +67,8 @@ void intersect_packet(const KernelGlobals& g,
                       const std::uint8_t* surface_kernel,
                       QueueView* surfaces,
                       QueueView& lights,
-                      QueueView& background)
+                      QueueView& background,
+                      DisplacementWork& displacement)
 {
   RTCRayHit8 packet;
   alignas(32) int valid[8];
@@ -72,7 +85,7 @@ void intersect_packet(const KernelGlobals& g,
     packet.ray.tfar[i] = state.t_max[path];
     packet.ray.time[i] = 0.0f;
     packet.ray.mask[i] = kRayCamera;
-    packet.ray.id[i] = 0;
+    packet.ray.id[i] = static_cast<unsigned>(i);
     packet.ray.flags[i] = 0;
     packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
@@ -86,6 +99,10 @@ void intersect_packet(const KernelGlobals& g,
     state.hit_triangle[path] = packet.hit.primID[i];
     const unsigned instance = packet.hit.instID[0][i];
     const unsigned object = instance != RTC_INVALID_GEOMETRY_ID ? instance : packet.hit.geomID[i];
+    if (context.steps != nullptr) {
+      film_add_displacement_steps(g.film, state.pixel[path], context.steps[i]);
+      note_steps(context.steps[i], displacement);
+    }
     classify(g, accel, state, path, object, surface_kernel, surfaces, lights, background);
   }
 }
@@ -94,6 +111,7 @@ void intersect_packet(const KernelGlobals& g,
 struct ShadowContext {
   EmbreeContext embree;
   const KernelGlobals* globals = nullptr;
+  const DisplacementSet* displacements = nullptr;
   float visibility = 1;
 };
 
@@ -108,15 +126,18 @@ void intersect_closest(const KernelGlobals& g,
                        QueueView* surfaces,
                        QueueView& lights,
                        QueueView& background,
-                       TraversalCounters& displacement)
+                       DisplacementWork& displacement)
 {
   EmbreeContext context;
   embree_context_init(context, coherent);
-  context.displacement = &displacement;
+  context.displacement = &displacement.total;
+  std::uint32_t steps[8] = {};
+  if (accel.displacements().size() > 0) context.steps = steps;
   std::uint32_t i = 0;
   if (coherent) {
     for (; i + 8 <= queue.size; i += 8) {
-      intersect_packet(g, accel, state, queue.paths + i, context, surface_kernel, surfaces, lights, background);
+      intersect_packet(g, accel, state, queue.paths + i, context, surface_kernel, surfaces, lights, background,
+                       displacement);
     }
   }
   for (; i < queue.size; ++i) {
@@ -137,6 +158,10 @@ void intersect_closest(const KernelGlobals& g,
     ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     embree_intersect1(accel.scene(), context, ray);
+    if (context.steps != nullptr) {
+      if (state.bounces[path] == 0) film_add_displacement_steps(g.film, state.pixel[path], steps[0]);
+      note_steps(steps[0], displacement);
+    }
     state.hit_t[path] = ray.ray.tfar;
     state.hit_u[path] = ray.hit.u;
     state.hit_v[path] = ray.hit.v;
@@ -150,12 +175,15 @@ void intersect_shadow(const KernelGlobals& g,
                       const Accel& accel,
                       const ShadowQueueView& shadow,
                       float* visibility,
-                      TraversalCounters& displacement)
+                      DisplacementWork& displacement)
 {
   ShadowContext context;
   context.globals = &g;
+  context.displacements = &accel.displacements();
   embree_context_init(context.embree, false);
-  context.embree.displacement = &displacement;
+  context.embree.displacement = &displacement.total;
+  std::uint32_t steps = 0;
+  if (accel.displacements().size() > 0) context.embree.steps = &steps;
   for (std::uint32_t i = 0; i < shadow.size; ++i) {
     context.visibility = 1.0f;
     RTCRay ray;
@@ -172,6 +200,7 @@ void intersect_shadow(const KernelGlobals& g,
     ray.id = 0;
     ray.flags = 0;
     embree_occluded1(accel.scene(), context.embree, ray);
+    if (context.embree.steps != nullptr) note_steps(steps, displacement);
     visibility[i] = ray.tfar < 0.0f ? 0.0f : context.visibility;
   }
 }
@@ -186,10 +215,11 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
     const unsigned object =
         instance_id != RTC_INVALID_GEOMETRY_ID ? instance_id : RTCHitN_geomID(arguments->hit, arguments->N, i);
     const InstanceView& instance = g.instances[object];
-    const float alpha =
-        triangle_alpha(g.materials[instance.material_index], g.textures, g.meshes[instance.mesh_index],
-                       RTCHitN_primID(arguments->hit, arguments->N, i), RTCHitN_u(arguments->hit, arguments->N, i),
-                       RTCHitN_v(arguments->hit, arguments->N, i));
+    DisplacedPoint at{RTCHitN_primID(arguments->hit, arguments->N, i), RTCHitN_u(arguments->hit, arguments->N, i),
+                      RTCHitN_v(arguments->hit, arguments->N, i), {}, {}};
+    if ((instance.flags & kDisplaced) != 0) at = context->displacements->locate(object, at.triangle, at.u, at.v);
+    const float alpha = triangle_alpha(g.materials[instance.material_index], g.textures, g.meshes[instance.mesh_index],
+                                       at.triangle, at.u, at.v);
     context->visibility *= 1.0f - alpha;
     if (context->visibility > 0.0f) arguments->valid[i] = 0;
   }

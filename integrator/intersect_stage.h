@@ -9,12 +9,18 @@
 
 namespace relief {
 
+/// What the rays of a worker did in displaced meshes.
+struct DisplacementWork {
+  TraversalCounters total;
+  std::uint32_t most_steps = 0;  ///< bounds and texels, of any single ray
+};
+
 /// Finds the closest hit of every path in the queue and sorts the paths by what comes next.
-/// Writes the hit columns. Order within each output queue is that of the input.
+/// Writes the hit columns, and to the film the steps of camera rays. Order within each output queue is that of the input.
 /// @param coherent         camera rays in batch order: traced in packets of eight
 /// @param surface_kernel   kernel index of each material
 /// @param surfaces         kNumSurfaceKernels queues
-/// @param displacement     counts are added to it
+/// @param displacement     what these rays did is added to it
 void intersect_closest(const KernelGlobals& g,
                        const Accel& accel,
                        const PathStateView& state,
@@ -24,16 +30,16 @@ void intersect_closest(const KernelGlobals& g,
                        QueueView* surfaces,
                        QueueView& lights,
                        QueueView& background,
-                       TraversalCounters& displacement);
+                       DisplacementWork& displacement);
 
 /// Traces every waiting shadow ray.
 /// @param visibility    one entry a ray: share of light that passes
-/// @param displacement  counts are added to it
+/// @param displacement  what these rays did is added to it
 void intersect_shadow(const KernelGlobals& g,
                       const Accel& accel,
                       const ShadowQueueView& shadow,
                       float* visibility,
-                      TraversalCounters& displacement);
+                      DisplacementWork& displacement);
 
 /// Embree filter of surfaces that let shadow rays through in part; its context is made by intersect_shadow.
 void shadow_filter(const RTCFilterFunctionNArguments* arguments);

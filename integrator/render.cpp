@@ -5,6 +5,7 @@
 #include <cmath>
 #include <mutex>
 #include <string>
+#include <utility>
 
 #include <pmmintrin.h>
 #include <xmmintrin.h>
@@ -106,7 +107,8 @@ RenderedImage render(const Scene& scene,
 {
   const Clock::time_point build_start = Clock::now();
   const RenderSettings& settings = options.settings;
-  SceneContext context(scene);
+  SceneContext context(scene, options.displacement);
+  for (std::string& text : context.displacements.warnings()) stats.warnings.push_back(std::move(text));
   const StageTable& stages = stage_table_select();
 
   const bool whole = is_whole(options);
@@ -208,6 +210,7 @@ RenderedImage render(const Scene& scene,
   std::uint64_t first_nonfinite = kNoSample;
   for (const Wavefront& worker : workers) {
     counters_add(stats.counters, worker.counters);
+    stats.displacement.most_steps = std::max<std::uint64_t>(stats.displacement.most_steps, worker.most_displacement_steps);
     for (std::size_t s = 0; s < stats.stages.size(); ++s) stats.stages[s].seconds += worker.seconds[s];
     first_nonfinite = std::min(first_nonfinite, worker.first_nonfinite);
   }

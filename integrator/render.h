@@ -18,6 +18,7 @@ struct RenderOptions {
   double time_limit_seconds = 0;  ///< 0: none; counted from the start of sampling, kept to within one pass
   std::uint32_t aov_mask = 1;
   LightTechnique light_technique = LightTechnique::kMis;
+  DisplacementOptions displacement;
 };
 
 struct RenderProgress {

@@ -2,9 +2,11 @@
 // stages as a render.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "displacement/explain.h"
 #include "integrator/render.h"
 #include "integrator/scene_context.h"
 #include "integrator/wavefront.h"
@@ -23,10 +25,19 @@ struct TraceHit {
   float u = 0, v = 0;  ///< barycentric weights of vertices 1 and 2
   std::int32_t instance_index = -1, mesh_index = -1;
   std::uint32_t triangle_index = 0;
+  /// Bounds and texels of displaced meshes that were tested; nothing if the ray entered no prism.
+  std::optional<std::uint64_t> steps;
 };
 
 /// Closest hits with surfaces; area lights are passed through.
 std::vector<TraceHit> trace_rays(const SceneContext& context, std::span<const TraceRay> rays);
+
+/// A ray with every prism whose box it entered, in the order of the tracer.
+struct TraceExplanation {
+  TraceHit hit;
+  std::vector<PrismVisit> visits;  ///< their geometries are the context's
+};
+TraceExplanation trace_explain(const SceneContext& context, const TraceRay& ray);
 
 /// Rays of one sample of one pixel, in the order they were traced.
 /// @param x, y  in the whole image

@@ -1,5 +1,6 @@
 #include "integrator/wavefront.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <new>
@@ -102,7 +103,7 @@ void Wavefront::run(const KernelGlobals& g,
   counters.camera_rays += active_.size;
   charge(Stage::kGenerate);
 
-  TraversalCounters displacement;
+  DisplacementWork displacement;
   for (bool camera = true; active_.size > 0; camera = false) {
     if (!camera) counters.bounce_rays += active_.size;
     lights_.size = background_.size = next_.size = shadow_.size = 0;
@@ -128,10 +129,11 @@ void Wavefront::run(const KernelGlobals& g,
     charge(Stage::kShade);
   }
 
-  counters.displaced_prisms += displacement.prisms;
-  counters.displaced_bounds += displacement.bounds;
-  counters.displaced_texels += displacement.texels;
-  counters.displaced_inversions += displacement.inversions;
+  counters.displaced_prisms += displacement.total.prisms;
+  counters.displaced_bounds += displacement.total.bounds;
+  counters.displaced_texels += displacement.total.texels;
+  counters.displaced_inversions += displacement.total.inversions;
+  most_displacement_steps = std::max(most_displacement_steps, displacement.most_steps);
   stages.finish(g, state_, batch, counters, first_nonfinite);
   charge(Stage::kFilm);
 }

@@ -49,6 +49,7 @@ class Wavefront {
   std::vector<RecordedRay>* recorder = nullptr;  ///< receives every ray of the batch, if set
   Counters counters;
   std::array<double, kNumStages> seconds{};
+  std::uint32_t most_displacement_steps = 0;  ///< bounds and texels, of any single ray
   /// Dropped because it was not finite: pixel of the film << 32 | sample. The least, not the earliest, so that it does
   /// not depend on the order of batches.
   std::uint64_t first_nonfinite = kNoSample;

@@ -14,6 +14,16 @@ struct StageSeconds {
   double seconds = 0;  ///< summed over threads
 };
 
+/// Displaced meshes; what their rays cost is in the counters.
+struct DisplacementStatistics {
+  std::string method;              ///< of all geometries, separated by commas; empty: nothing is displaced
+  std::uint64_t num_geometries = 0;  ///< pairs of a mesh and a displacement
+  std::uint64_t num_prisms = 0;      ///< base triangles of all geometries
+  std::uint64_t bytes = 0;           ///< tables and prepared triangles, besides the maps
+  std::uint64_t map_bytes = 0;
+  std::uint64_t most_steps = 0;  ///< bounds and texels tested for a single ray
+};
+
 struct Statistics {
   std::string scene, version, isa, view;
   std::uint64_t seed = 0;
@@ -23,7 +33,8 @@ struct Statistics {
   double error_rmse = 0;    ///< estimated root mean square error of the beauty image, from its halves and quarters
   double error_relmse = 0;  ///< likewise, squared error relative to (radiance² + 0.01), as `relief compare` defines it
   std::uint64_t peak_memory_bytes = 0, bvh_bytes = 0, mesh_bytes = 0, texture_bytes = 0, light_bytes = 0,
-                film_bytes = 0, path_state_bytes = 0, displacement_bytes = 0;
+                film_bytes = 0, path_state_bytes = 0;
+  DisplacementStatistics displacement;
   Counters counters;
   std::vector<StageSeconds> stages;
   std::vector<std::string> warnings;

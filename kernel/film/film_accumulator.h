@@ -17,7 +17,8 @@ struct AccumulatorLayout {
   static constexpr int kQuarter1 = 13;  ///< R, G, B of samples 1, 5, 9, …: the first quarter of the second half
   static constexpr int kAlways = 16;
 
-  int direct = -1, albedo = -1, normal = -1, depth = -1, position = -1, uv = -1, object_id = -1, material_id = -1;
+  int direct = -1, albedo = -1, normal = -1, depth = -1, position = -1, uv = -1, object_id = -1, material_id = -1,
+      displacement_steps = -1;
   int num_floats = kAlways;
 };
 
@@ -61,6 +62,15 @@ RELIEF_KERNEL void film_add_first_hit(const FilmAccumulatorView& film, std::uint
     if (layout.object_id >= 0) record[layout.object_id] = static_cast<float>(hit.instance_index + 1);
     if (layout.material_id >= 0) record[layout.material_id] = static_cast<float>(hit.material_index + 1);
   }
+}
+
+/// Adds what a camera ray cost in displaced meshes, if that is kept.
+RELIEF_KERNEL void film_add_displacement_steps(const FilmAccumulatorView& film, std::uint32_t pixel, std::uint32_t steps)
+{
+  const AccumulatorLayout& layout = film.layout;
+  if (layout.displacement_steps < 0) return;
+  float* record = film.pixels + static_cast<std::size_t>(pixel) * static_cast<std::size_t>(layout.num_floats);
+  record[layout.displacement_steps] += static_cast<float>(steps);
 }
 
 /// Adds a finished sample.

@@ -22,8 +22,9 @@ enum class Aov : std::uint8_t {
   kSampleCount,
   kVariance,
   kHalf,
+  kDisplacementSteps,
 };
-inline constexpr int kNumAovs = 13;
+inline constexpr int kNumAovs = 14;
 
 struct AovInfo {
   Aov aov;
@@ -47,6 +48,8 @@ inline constexpr std::array<AovInfo, kNumAovs> kAovInfo = {{
     {Aov::kSampleCount, "samples", "N", true, "samples taken in this pixel"},
     {Aov::kVariance, "variance", "RGB", false, "estimated variance of the pixel's mean radiance"},
     {Aov::kHalf, "half", "RGB", false, "mean of the pixel's even-numbered samples"},
+    {Aov::kDisplacementSteps, "displacement_steps", "N", false,
+     "bounds and texels of displaced meshes tested for a camera ray, averaged"},
 }};
 
 /// Offsets, in floats, of each kept AOV inside one pixel's record; −1 when it is not kept.

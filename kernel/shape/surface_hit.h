@@ -101,7 +101,12 @@ RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
 /// stays; displaced surfaces are traced as they are, so there is no smoother one to lift shadow rays to.
 /// @param P_object   on the displaced surface, rounded once
 /// @param Ng_object  unit geometric normal of the displaced surface, on the side of the displacement normal
-RELIEF_KERNEL void surface_hit_displace(SurfaceHit* hit, const InstanceView& instance, Vec3f P_object, Vec3f Ng_object)
+/// @param Ns_object  unit shading normal, likewise
+RELIEF_KERNEL void surface_hit_displace(SurfaceHit* hit,
+                                        const InstanceView& instance,
+                                        Vec3f P_object,
+                                        Vec3f Ng_object,
+                                        Vec3f Ns_object)
 {
   const Affine3& m = instance.world_from_object;
   const Affine3& inverse = instance.object_from_world;
@@ -113,7 +118,7 @@ RELIEF_KERNEL void surface_hit_displace(SurfaceHit* hit, const InstanceView& ins
   hit->P_error = gamma_bound(5) * (abs_transform(m, abs(P_object)) + abs(m.p)) +
                  gamma_bound(6) * abs_transform(m, abs_transform(inverse, abs(hit->P)) + abs(inverse.p));
   hit->Ng = normalize(transform_normal(inverse, as_normal(Ng_object)));
-  hit->Ns = hit->Ng;
+  hit->Ns = normalize(transform_normal(inverse, as_normal(Ns_object)));
   hit->P_lift = {};
 }
 

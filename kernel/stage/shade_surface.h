@@ -135,7 +135,8 @@ template <unsigned kFeatures>
   SurfaceHit hit = surface_hit_make(mesh, instance, triangle, state.hit_u[path], state.hit_v[path]);
   if ((instance.flags & kDisplaced) != 0) {
     surface_hit_displace(&hit, instance, {state.hit_P_x[path], state.hit_P_y[path], state.hit_P_z[path]},
-                         {state.hit_Ng_x[path], state.hit_Ng_y[path], state.hit_Ng_z[path]});
+                         {state.hit_Ng_x[path], state.hit_Ng_y[path], state.hit_Ng_z[path]},
+                         {state.hit_Ns_x[path], state.hit_Ns_y[path], state.hit_Ns_z[path]});
   }
 
   ShadingSide side;

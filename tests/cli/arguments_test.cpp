@@ -111,6 +111,16 @@ TEST(Pixel, HasASampleIfOneIsGiven)
   }
 }
 
+TEST(Lod, IsAWholeLevelOrTheFinest)
+{
+  EXPECT_EQ(parse_lod("auto"), 0);
+  EXPECT_EQ(parse_lod("0"), 0);
+  EXPECT_EQ(parse_lod("30"), 30);
+  for (const char* text : {"", "-1", "31", "1.5", "1x", "Auto", "nan"}) {
+    EXPECT_THROW(parse_lod(text), CLI::ValidationError) << "'" << text << "'";
+  }
+}
+
 TEST(Seed, IsAnyNumberOf64Bits)
 {
   EXPECT_EQ(parse_seed("0"), 0u);

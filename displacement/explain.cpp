@@ -1,0 +1,44 @@
+#include "displacement/explain.h"
+
+#include <cmath>
+
+namespace relief {
+
+namespace {
+
+/// Texels before the period that a lattice coordinate lies in.
+double whole_periods(const LatticeAxis& axis, double x)
+{
+  return axis.wrap == Wrap::kClamp ? 0.0 : std::floor(x / axis.num_cells) * axis.num_cells;
+}
+
+}  // namespace
+
+PrismExplanation prism_explain(const PrismVisit& visit)
+{
+  const DisplacedMeshView& mesh = visit.geometry->mesh;
+  const DisplacedTriangle& tri = mesh.triangles[visit.triangle];
+  PrismExplanation out;
+  out.folded = mesh.unfolded[visit.triangle] == 0;
+  RayCurve curve;
+  if (ray_curve_make(ray_frame_make(visit.O, visit.D), tri, &curve)) {
+    for (int k = 0; k < curve.num_segments; ++k) {
+      const CurveSegment& g = curve.segments[k];
+      out.stretches[out.num_stretches++] = {g.t0, g.t1, g.s0, g.s0 + g.ds};
+    }
+  }
+  if (visit.found) {
+    const DisplacedHit& hit = visit.hit;
+    const double x = tri.x[0] + hit.b1 * (tri.x[1] - tri.x[0]) + hit.b2 * (tri.x[2] - tri.x[0]);
+    const double y = tri.y[0] + hit.b1 * (tri.y[1] - tri.y[0]) + hit.b2 * (tri.y[2] - tri.y[0]);
+    out.u = (x + 0.5 - whole_periods(mesh.field->x, x + 0.5)) / mesh.field->map.width;
+    out.v = (y + 0.5 - whole_periods(mesh.field->y, y + 0.5)) / mesh.field->map.height;
+    out.i = hit.i - static_cast<std::int64_t>(whole_periods(mesh.field->x, static_cast<double>(hit.i)));
+    out.j = hit.j - static_cast<std::int64_t>(whole_periods(mesh.field->y, static_cast<double>(hit.j)));
+    out.h = interpolate_height(*mesh.field, x, y);
+    out.d = displacement_at(mesh, x, y);
+  }
+  return out;
+}
+
+}  // namespace relief

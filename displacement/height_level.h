@@ -1,0 +1,30 @@
+// A coarser level of a height map, for displaced surfaces with less detail.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "kernel/shape/height_map_view.h"
+
+namespace relief {
+
+/// Owns the texels of one level. Sides are those of a mip chain: halved `level` times, rounded up.
+class HeightLevel {
+ public:
+  HeightLevel() = default;
+  /// A texel is the mean over the area it covers in the map; along a side that is no multiple it covers parts of texels,
+  /// with their share. Means of integers are rounded to 16 bits, those of floats to floats.
+  /// @param level  > 0; sides end at one texel
+  /// @cost   one pass over the map; parallel over rows
+  HeightLevel(const HeightMapView& map, int level);
+
+  HeightMapView view() const;
+  std::size_t bytes() const { return words_.size() * sizeof(std::uint16_t) + floats_.size() * sizeof(float); }
+
+ private:
+  HeightMapView shape_;  ///< all but the texels
+  std::vector<std::uint16_t> words_;
+  std::vector<float> floats_;
+};
+
+}  // namespace relief

@@ -1,0 +1,276 @@
+// Displacement on the command line: methods, levels, what a ray did, and what statistics and warnings say.
+#include <cmath>
+#include <sstream>
+
+#include "tests/cli/program.h"
+
+namespace relief::test {
+namespace {
+
+/// A square of one metre at z = 0, displaced upward by 0.5 m · height, seen from above; its material is unlit, so that
+/// paths end where they first hit.
+GltfBuilder displaced_square()
+{
+  GltfBuilder b;
+  const int P = b.accessor<float>({0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0}, "VEC3");
+  const int N = b.accessor<float>({0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3");
+  const int uv = b.accessor<float>({0, 0, 1, 0, 0, 1, 1, 1}, "VEC2");
+  const int indices = b.accessor<std::uint16_t>({0, 1, 2, 2, 1, 3}, "SCALAR");
+  b.mesh({{"attributes", {{"POSITION", P}, {"NORMAL", N}, {"TEXCOORD_0", uv}}}, {"indices", indices}, {"material", 0}});
+  b.root_node({{"mesh", 0}, {"name", "ground"}});
+  b.json["extensionsUsed"] = {"RELIEF_displacement", "KHR_materials_unlit"};
+  b.push("materials",
+         {{"name", "bark"},
+          {"extensions",
+           {{"KHR_materials_unlit", nlohmann::json::object()},
+            {"RELIEF_displacement", {{"heightTexture", {{"uri", "h.pgm"}}}, {"scale", 0.5}, {"midlevel", 0}}}}}});
+  b.push("cameras", {{"type", "orthographic"},
+                     {"name", "above"},
+                     {"orthographic", {{"xmag", 0.6}, {"ymag", 0.6}, {"znear", 0.1}, {"zfar", 100}}}});
+  b.root_node({{"name", "above"}, {"camera", 0}, {"translation", {0.5, 0.5, 5}}});
+  return b;
+}
+
+nlohmann::json& displacement_of(GltfBuilder& b)
+{
+  return b.json["materials"][0]["extensions"]["RELIEF_displacement"];
+}
+
+class DisplacementProgram : public ProgramTest {
+ protected:
+  /// Writes the scene and its map; the map is 4x4, 8-bit.
+  std::string write(GltfBuilder b, const std::string& texels)
+  {
+    folder_.write("h.pgm", "P5 4 4 255\n" + texels);
+    return folder_.write("s.gltf", b.gltf()).string();
+  }
+
+  std::string bumpy(const GltfBuilder& b = displaced_square())
+  {
+    return write(b, std::string("\x10\x90\x40\xf0\x80\x20\xc0\x60\x30\xff\x08\xa0\x70\x50\xe0\x18", 16));
+  }
+
+  std::vector<std::vector<std::string>> trace(const std::string& scene, const Arguments& more)
+  {
+    Arguments arguments = {"trace", scene, "--rays", file("rays.txt")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.errors;
+    std::vector<std::vector<std::string>> rows;
+    std::istringstream lines(outcome.output);
+    for (std::string line; std::getline(lines, line);) {
+      rows.emplace_back();
+      std::istringstream fields(line + ",");
+      for (std::string field; std::getline(fields, field, ',');) rows.back().push_back(field);
+    }
+    rows.erase(rows.begin());
+    return rows;
+  }
+};
+
+TEST_F(DisplacementProgram, EveryMethodMeetsTheSameSurface)
+{
+  const std::string scene = bumpy();
+  std::string rays;
+  for (int i = 0; i < 20; ++i) {
+    for (int k = 0; k < 20; ++k) {
+      rays += std::to_string(0.03 + 0.047 * i) + " " + std::to_string(0.02 + 0.048 * k) + " 3 0.05 -0.03 -1\n";
+    }
+  }
+  folder_.write("rays.txt", rays + "5 5 3 0 0 -1\n");
+  const auto expected = trace(scene, {});
+  for (const std::string method : {"auto", "chord", "rmip", "rmip-minmax", "tfdm", "tessellate", "tessellate-grid"}) {
+    const bool approximate = method.rfind("tessellate", 0) == 0;
+    const auto rows = trace(scene, {"--displacement", method});
+    ASSERT_EQ(rows.size(), expected.size()) << method;
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      ASSERT_EQ(rows[r][0], expected[r][0]) << method << " ray " << r;
+      if (rows[r][0] == "0") continue;
+      // A texel is 0.25 m wide and slopes are up to 2: two triangles a texel are that coarse.
+      EXPECT_NEAR(std::stod(rows[r][1]), std::stod(expected[r][1]), approximate ? 0.1 : 1e-6) << method << " ray " << r;
+      EXPECT_EQ(rows[r][10], "0");
+      if (approximate) {
+        EXPECT_EQ(rows[r][12], "") << method;
+      } else {
+        EXPECT_EQ(rows[r][11], expected[r][11]) << method << " ray " << r;
+        EXPECT_GE(std::stoi(rows[r][12]), 1) << method;
+      }
+    }
+    EXPECT_EQ(rows.back()[0], "0");
+    EXPECT_EQ(rows.back()[12], "");
+  }
+}
+
+TEST_F(DisplacementProgram, UnknownMethodsAndLevelsAreRefusedWithTheChoices)
+{
+  const std::string scene = bumpy();
+  folder_.write("rays.txt", "0.3 0.3 3 0 0 -1\n");
+  for (const Arguments& command : {Arguments{"info", scene}, Arguments{"trace", scene, "--rays", file("rays.txt")},
+                                   Arguments{"render", scene, "-o", file("o.exr")}}) {
+    for (const char* method : {"cone", "microtriangle", "CHORD", "", "fast"}) {
+      Arguments arguments = command;
+      arguments.insert(arguments.end(), {"--displacement", method});
+      const Outcome outcome = run(arguments);
+      EXPECT_EQ(outcome.exit_code, 2) << command[0] << " " << method;
+      EXPECT_NE(outcome.errors.find("expected one of auto, rmip, tfdm, tessellate, chord, rmip-minmax, tessellate-grid"),
+                std::string::npos)
+          << outcome.errors;
+    }
+    if (command[0] == "info") continue;
+    for (const char* level : {"1.5", "-1", "31", "fine", ""}) {
+      Arguments arguments = command;
+      arguments.insert(arguments.end(), {"--lod", level});
+      const Outcome outcome = run(arguments);
+      EXPECT_EQ(outcome.exit_code, 2) << command[0] << " " << level;
+      EXPECT_NE(outcome.errors.find("expected auto or a whole level"), std::string::npos) << outcome.errors;
+    }
+  }
+  EXPECT_FALSE(exists("o.exr"));
+}
+
+TEST_F(DisplacementProgram, LevelsAverageTheMap)
+{
+  // Blocks of 2x2 texels with means 0, 64, 128 and 255; the last level is their mean, 111.75.
+  const std::string scene = write(displaced_square(), std::string("\x00\x00\x00\x80\x00\x00\x40\x40"
+                                                                  "\x80\x80\xff\xff\x80\x80\xff\xff",
+                                                                  16));
+  // Through the centres of the blocks.
+  folder_.write("rays.txt", "0.25 0.25 3 0 0 -1\n0.75 0.25 3 0 0 -1\n0.25 0.75 3 0 0 -1\n0.75 0.75 3 0 0 -1\n");
+  const double means[] = {0, 64, 128, 255};
+  const auto level1 = trace(scene, {"--lod", "1"});
+  const auto level2 = trace(scene, {"--lod", "2"});
+  const auto level9 = trace(scene, {"--lod", "9"});
+  for (std::size_t r = 0; r < 4; ++r) {
+    EXPECT_NEAR(std::stod(level1[r][1]), 3 - 0.5 * means[r] / 255, 1e-5) << r;
+    // The block's mean is also its bilinear value in the middle.
+    EXPECT_NEAR(std::stod(level1[r][1]), std::stod(trace(scene, {"--lod", "0"})[r][1]), 1e-5) << r;
+    EXPECT_NEAR(std::stod(level2[r][1]), 3 - 0.5 * 111.75 / 255, 1e-5) << r;
+    EXPECT_EQ(level9[r], level2[r]);
+  }
+  EXPECT_EQ(trace(scene, {"--lod", "auto"}), trace(scene, {}));
+  GltfBuilder b = displaced_square();
+  displacement_of(b)["lod"] = 1;
+  const std::string file = folder_.write("l.gltf", b.gltf()).string();
+  EXPECT_EQ(trace(file, {}), level1);
+  EXPECT_EQ(trace(file, {"--lod", "auto"}), trace(scene, {}));
+}
+
+TEST_F(DisplacementProgram, ExplainTellsOfPrismsAndHits)
+{
+  const std::string scene = write(displaced_square(), std::string(16, '\xff'));
+  folder_.write("rays.txt", "9 9 3 0 0 -1\n0.25 0.125 3 0 0 -1\n");
+  const Outcome hit = run({"trace", scene, "--rays", file("rays.txt"), "--explain", "1"});
+  ASSERT_EQ(hit.exit_code, 0) << hit.errors;
+  for (const char* text :
+       {"ray: origin 0.25 0.125 3, direction 0 0 -1, t 0 to inf\n", "mesh 0 triangle 0 (node 'ground'): prism, searched",
+        "  hit: t 2.5, b 0.625 0.25 0.125, uv 0.25 0.125, cell 0 0, height 1, displacement 0.5 m\n", "in all: ",
+        "nearest: t 2.5, mesh 0 triangle 0, P 0.25 0.125 0.5, Ng 0 0 1\n"}) {
+    EXPECT_NE(hit.output.find(text), std::string::npos) << text << "\n" << hit.output;
+  }
+  const Outcome miss = run({"trace", scene, "--rays", file("rays.txt"), "--explain", "0"});
+  EXPECT_NE(miss.output.find("in all: 0 boxes, 0 prisms, 0 bounds, 0 texels, 0 inversions\nnearest: nothing\n"),
+            std::string::npos)
+      << miss.output;
+  EXPECT_EQ(run({"trace", scene, "--rays", file("rays.txt"), "--explain", "2"}).exit_code, 2);
+  EXPECT_EQ(run({"trace", scene, "--pixel", "1,1", "--explain", "0"}).exit_code, 2);
+}
+
+TEST_F(DisplacementProgram, StepsInPicturesAndStatisticsAgree)
+{
+  const std::string scene = bumpy();
+  for (const std::string method : {"chord", "rmip"}) {
+    const Outcome outcome = render(scene, file("o.exr"),
+                                   {"--displacement", method, "--aov", "displacement_steps", "--stats", file("o.json"),
+                                    "--resolution", "32x32"});
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+    const auto stats = nlohmann::json::parse(bytes_of_file(file("o.json")));
+    const nlohmann::json& d = stats["displacement"];
+    EXPECT_EQ(d["method"], method);
+    EXPECT_EQ(d["geometries"], 1);
+    EXPECT_EQ(d["prisms"], 2);
+    EXPECT_EQ(d["map_bytes"], 16);
+    EXPECT_GT(d["bytes"], 2 * 128);
+    EXPECT_EQ(stats["rays"]["total"], stats["rays"]["camera"]);
+    double sum = 0, largest = 0;
+    for (const float steps : values_of(file("o.exr"), "displacement_steps.N")) {
+      sum += static_cast<double>(steps);
+      largest = std::max(largest, static_cast<double>(steps));
+    }
+    EXPECT_GT(sum, 0);
+    EXPECT_NEAR(d["steps_mean"], sum / (32 * 32), 1e-6 * sum);
+    EXPECT_GE(d["steps_max"], largest);
+    EXPECT_LE(d["texels_mean"], d["steps_mean"]);
+    const double rays = stats["rays"]["total"];
+    EXPECT_NEAR(d["prisms_per_ray"], stats["counters"]["displaced_prisms"].get<double>() / rays, 1e-9);
+  }
+  // The layer is zero, and the object null, where nothing is displaced.
+  ASSERT_EQ(render(folder_.write("p.gltf", lit_square().gltf()).string(), file("p.exr"),
+                   {"--aov", "all", "--stats", file("p.json")})
+                .exit_code,
+            0);
+  EXPECT_TRUE(nlohmann::json::parse(bytes_of_file(file("p.json")))["displacement"].is_null());
+  for (const float steps : values_of(file("p.exr"), "displacement_steps.N")) EXPECT_EQ(steps, 0.0f);
+}
+
+TEST_F(DisplacementProgram, WhatIsNotFollowedIsAWarning)
+{
+  struct Case {
+    const char* key;
+    nlohmann::json value;
+    const char* warning;
+  };
+  folder_.write("rays.txt", "0.3 0.3 3 0 0 -1\n");
+  const auto expected = trace(bumpy(), {});
+  for (const Case& c :
+       {Case{"method", "cone", "material 'bark': there is no displacement method 'cone' yet; 'chord' is used"},
+        Case{"method", "microtriangle", "there is no displacement method 'microtriangle' yet"},
+        Case{"lod", 0.5, "material 'bark': levels of detail between whole ones are not supported yet; level 0 is used"},
+        Case{"seams", "weld", "material 'bark': displacement seams are not welded yet; they stay open"}}) {
+    GltfBuilder b = displaced_square();
+    displacement_of(b)[c.key] = c.value;
+    const std::string scene = bumpy(b);
+    EXPECT_EQ(trace(scene, {}), expected);
+    for (const Arguments& command : {Arguments{"info", scene}, Arguments{"trace", scene, "--rays", file("rays.txt")},
+                                     Arguments{"render", scene, "-o", file("o.exr"), "--resolution", "8x8"}}) {
+      const Outcome outcome = run(command);
+      EXPECT_EQ(outcome.exit_code, 0) << outcome.errors;
+      EXPECT_NE((outcome.output + outcome.errors).find(c.warning), std::string::npos)
+          << command[0] << ": " << outcome.output << outcome.errors;
+    }
+    EXPECT_EQ(run({"info", scene, "--strict"}).exit_code, 3) << c.warning;
+    EXPECT_EQ(run({"render", scene, "-o", file("strict.exr"), "--strict"}).exit_code, 3) << c.warning;
+    EXPECT_FALSE(exists("strict.exr"));
+  }
+  // The command line's choice is followed, so there is nothing to warn about.
+  GltfBuilder b = displaced_square();
+  displacement_of(b)["method"] = "cone";
+  EXPECT_EQ(run({"info", bumpy(b), "--displacement", "tfdm", "--strict"}).exit_code, 0);
+}
+
+TEST_F(DisplacementProgram, InfoSaysHowItIsTraced)
+{
+  // Three copies of one mesh share one geometry; a stray normal of zero in each corner leaves a triangle out.
+  GltfBuilder b = displaced_square();
+  b.root_node({{"mesh", 0}, {"translation", {2, 0, 0}}});
+  const int N = b.accessor<float>({0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1}, "VEC3");
+  b.json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = N;
+  const Outcome outcome = run({"info", bumpy(b), "--displacement", "rmip"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+  for (const char* text : {"displaced geometries: 1, traced by rmip, 0.0 MiB\n", "  prisms: 2; folded (slower to trace) ",
+                           "without a normal 1\n", ", displacement 0.0 MiB, acceleration structure ",
+                           "warning: 1 of 2 triangles of mesh "}) {
+    EXPECT_NE(outcome.output.find(text), std::string::npos) << text << outcome.output;
+  }
+}
+
+TEST_F(DisplacementProgram, ResumeTellsMethodsAndLevelsApart)
+{
+  const std::string scene = bumpy();
+  EXPECT_EQ(render(scene, file("o.exr"), {"--lod", "1"}).count("done"), 1);
+  EXPECT_EQ(render(scene, file("o.exr"), {"--lod", "1", "--resume"}).count("skipped"), 1);
+  EXPECT_EQ(render(scene, file("o.exr"), {"--lod", "0", "--resume"}).count("done"), 1);
+  EXPECT_EQ(render(scene, file("o.exr"), {"--lod", "0", "--displacement", "tessellate", "--resume"}).count("done"), 1);
+}
+
+}  // namespace
+}  // namespace relief::test
