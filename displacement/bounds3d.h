@@ -91,7 +91,9 @@ RELIEF_KERNEL LatticeFrame lattice_frame_make(const DisplacedTriangle& tri, cons
   const double size = length(P0) + length(Pu) + length(Pv) + reach * N_size + length(along_x(Pu, Pv)) * size_x +
                       length(along_y(Pu, Pv)) * size_y;
   const double pad = 0x1p-46 * size;
-  f.pad = D4{pad, pad, pad, pad * length(n)};
+  // Without a normal its lane must bound nothing, not hold the ray to t = 0 ("corners on a line").
+  const double n_length = length(n);
+  f.pad = D4{pad, pad, pad, n_length > 0.0 ? pad * n_length : 1.0};
   return f;
 }
 

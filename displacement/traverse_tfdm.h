@@ -192,17 +192,63 @@ RELIEF_KERNEL bool cell_on_curve_intersect(CurveSearch& c,
   return any;
 }
 
-/// A node of the quadtree: the parent of a quad.
+/// A node of the quadtree: the parent of a quad of the mipmap, of a period of the lattice. Where a triangle spans many
+/// periods the tree goes on above the mipmap: at level num_levels + m the children are 2^m × 2^m periods.
 struct Node {
-  int level;        ///< of its children
-  int column, row;  ///< among the parents of that level
-  double t;         ///< least t of its bounds
+  int level;                      ///< of its children
+  int column, row;                ///< among the parents of that level
+  std::int64_t first_x, first_y;  ///< lattice coordinates of the period's first cell, or of the tree's first period's
+  double t;                       ///< least t of its bounds
 };
 
-/// One period's nodes, by their place among the triangle's coordinates.
-struct Period {
-  std::int64_t first_x, first_y;  ///< lattice coordinates of its first cell
-};
+/// 2^31 periods a side.
+inline constexpr int kMaxTileLevels = 31;
+
+/// One of the four children of a node as a node.
+RELIEF_KERNEL Node child_node(const MinmaxMipmapView& mipmap, const Node& node, int child, double t)
+{
+  const int column = 2 * node.column + (child & 1), row = 2 * node.row + (child >> 1);
+  if (node.level != mipmap.num_levels) return {node.level - 1, column, row, node.first_x, node.first_y, t};
+  return {node.level - 1,
+          0,
+          0,
+          node.first_x + static_cast<std::int64_t>(column) * mipmap.x.num_cells,
+          node.first_y + static_cast<std::int64_t>(row) * mipmap.y.num_cells,
+          t};
+}
+
+/// Sides of the four children along an axis, lattice units from vertex 0; infinite beside a clamped map.
+/// @param step  0 or 1: which of two children
+RELIEF_KERNEL void child_sides(const LatticeAxis& axis,
+                               const D4& step,
+                               int num_levels,
+                               int level,
+                               int parent,
+                               double start,
+                               D4* from,
+                               D4* to)
+{
+  if (level >= num_levels) {
+    if (axis.wrap == Wrap::kClamp) {
+      // There is one period, and it has no end.
+      *from = step > 0.0 ? splat4(__builtin_huge_val()) : splat4(-__builtin_huge_val());
+      *to = splat4(__builtin_huge_val());
+      return;
+    }
+    const double size =
+        static_cast<double>(axis.num_cells) * static_cast<double>(std::int64_t{1} << (level - num_levels));
+    *from = start + (2.0 * parent + step) * size;
+    *to = *from + size;
+    return;
+  }
+  const double size = static_cast<double>(std::int64_t{1} << level), end = start + axis.num_cells;
+  const D4 cell = (2.0 * parent + step) * size;
+  *from = start + cell;
+  *to = min(*from + size, splat4(end));
+  if (axis.wrap != Wrap::kClamp) return;
+  *from = cell <= 0.0 ? splat4(-__builtin_huge_val()) : *from;
+  *to = *to >= end ? splat4(__builtin_huge_val()) : *to;
+}
 
 /// Children that the ray may meet, nearest first.
 struct ChildHits {
@@ -215,27 +261,20 @@ RELIEF_KERNEL ChildHits children_intersect(CurveSearch& c,
                                            const NodeFrame& f,
                                            const LatticeFrame& lattice,
                                            const MinmaxMipmapView& mipmap,
-                                           const Period& period,
                                            const Node& node)
 {
-  const MinmaxQuad& quad = mipmap.quad(node.level, node.column, node.row);
-  const D4 low = load4(quad.low), high = load4(quad.high);
-  const double size = static_cast<double>(std::int64_t{1} << node.level);
-  // Of the children, clipped to the triangle's rectangle; unbounded beside a clamped map.
-  const auto sides = [&](const LatticeAxis& axis, D4 step, int parent, std::int64_t first, double origin, D4* from,
-                         D4* to) {
-    const D4 cell = (2.0 * parent + step) * size;
-    const double start = static_cast<double>(first) - origin, end = start + axis.num_cells;
-    *from = start + cell;
-    *to = min(*from + size, splat4(end));
-    if (axis.wrap == Wrap::kClamp) {
-      *from = cell <= 0.0 ? splat4(-__builtin_huge_val()) : *from;
-      *to = *to >= end ? splat4(__builtin_huge_val()) : *to;
-    }
-  };
+  D4 low = splat4(c.mesh.field->range.low), high = splat4(c.mesh.field->range.high);
+  if (node.level < mipmap.num_levels) {
+    const MinmaxQuad& quad = mipmap.quad(node.level, node.column, node.row);
+    low = load4(quad.low);
+    high = load4(quad.high);
+  }
   D4 x0, x1, y0, y1;
-  sides(mipmap.x, D4{0, 1, 0, 1}, node.column, period.first_x, f.origin_x, &x0, &x1);
-  sides(mipmap.y, D4{0, 0, 1, 1}, node.row, period.first_y, f.origin_y, &y0, &y1);
+  child_sides(mipmap.x, D4{0, 1, 0, 1}, mipmap.num_levels, node.level, node.column,
+              static_cast<double>(node.first_x) - f.origin_x, &x0, &x1);
+  child_sides(mipmap.y, D4{0, 0, 1, 1}, mipmap.num_levels, node.level, node.row,
+              static_cast<double>(node.first_y) - f.origin_y, &y0, &y1);
+  // Clipped to the triangle's rectangle.
   const double pad_x = 0x1p-40 * (f.x1 - f.x0) + 0x1p-50 * __builtin_fabs(f.origin_x);
   const double pad_y = 0x1p-40 * (f.y1 - f.y0) + 0x1p-50 * __builtin_fabs(f.origin_y);
   x0 = max(x0, splat4(f.x0)) - pad_x;
@@ -277,41 +316,44 @@ RELIEF_KERNEL bool root_intersect(CurveSearch& c,
                                   const LatticeFrame& lattice,
                                   const MinmaxMipmapView& mipmap,
                                   const RayProjection* projections,
-                                  const Period& period,
                                   const Node& root)
 {
   // Each level leaves at most three siblings.
-  Node stack[3 * kMaxMipmapLevels + 1];
+  Node stack[3 * (kMaxMipmapLevels + kMaxTileLevels) + 1];
   int depth = 0;
   stack[depth++] = root;
   while (depth > 0) {
     const Node node = stack[--depth];
     if (node.t > c.t_max) continue;
-    const ChildHits hits = children_intersect(c, f, lattice, mipmap, period, node);
-    for (int k = 0; k < hits.count; ++k) {
-      const int child = node.level == 0 ? hits.order[k] : hits.order[hits.count - 1 - k];
-      const int column = 2 * node.column + (child & 1), row = 2 * node.row + (child >> 1);
-      if (node.level > 0) {
-        stack[depth++] = {node.level - 1, column, row, hits.t[child]};
-      } else if (cell_on_curve_intersect(c, projections, period.first_x + column, period.first_y + row,
-                                         {hits.s_low[child], hits.s_high[child]}) &&
-                 c.any_hit) {
-        return true;
+    const ChildHits hits = children_intersect(c, f, lattice, mipmap, node);
+    if (node.level > 0) {
+      for (int k = hits.count; k-- > 0;) {
+        stack[depth++] = child_node(mipmap, node, hits.order[k], hits.t[hits.order[k]]);
       }
+      continue;
+    }
+    for (int k = 0; k < hits.count; ++k) {
+      const int child = hits.order[k];
+      const std::int64_t i = node.first_x + 2 * node.column + (child & 1);
+      const std::int64_t j = node.first_y + 2 * node.row + (child >> 1);
+      if (cell_on_curve_intersect(c, projections, i, j, {hits.s_low[child], hits.s_high[child]}) && c.any_hit)
+        return true;
     }
   }
   return false;
 }
 
-/// Parents of one level along an axis, one after the other, over any number of periods.
+/// Parents of one level along an axis, one after the other, over the periods.
 struct ParentWalk {
   std::int64_t next, last;  ///< cells, counted from the first cell of period 0
 };
 
 RELIEF_KERNEL ParentWalk parent_walk_make(const LatticeAxis& axis, double low, double high)
 {
-  auto first = static_cast<std::int64_t>(__builtin_floor(low - 1e-6)) - axis.first_cell;
-  auto last = static_cast<std::int64_t>(__builtin_floor(high + 1e-6)) - axis.first_cell;
+  // Far more than the rounding of a lattice coordinate.
+  constexpr double kPad = 1e-6;
+  auto first = static_cast<std::int64_t>(__builtin_floor(low - kPad)) - axis.first_cell;
+  auto last = static_cast<std::int64_t>(__builtin_floor(high + kPad)) - axis.first_cell;
   if (axis.wrap == Wrap::kClamp) {
     const std::int64_t end = axis.num_cells - 1;
     first = first < 0 ? 0 : (first > end ? end : first);
@@ -320,8 +362,6 @@ RELIEF_KERNEL ParentWalk parent_walk_make(const LatticeAxis& axis, double low, d
   return {first, last};
 }
 
-/// @param size    of a parent, cells
-/// @param first   lattice coordinate of its period's first cell
 RELIEF_KERNEL bool parent_walk_step(ParentWalk& walk,
                                     const LatticeAxis& axis,
                                     int log2_size,
@@ -336,6 +376,17 @@ RELIEF_KERNEL bool parent_walk_step(ParentWalk& walk,
   const std::int64_t end = (static_cast<std::int64_t>(*parent) + 1) << log2_size;
   walk.next = period + (end < axis.num_cells ? end : axis.num_cells);
   return true;
+}
+
+/// The node over all periods that a walk meets: its place, and the level it takes.
+RELIEF_KERNEL int tile_levels(const ParentWalk& walk, const LatticeAxis& axis, std::int64_t* first)
+{
+  const std::int64_t period = walk.next - lattice_modulo(walk.next, axis.num_cells);
+  *first = period + axis.first_cell;
+  const std::int64_t num_periods = (walk.last - period) / axis.num_cells + 1;
+  int levels = 0;
+  while (levels < kMaxTileLevels && (std::int64_t{2} << levels) < num_periods) ++levels;
+  return levels;
 }
 
 }  // namespace tfdm_detail
@@ -364,17 +415,22 @@ RELIEF_KERNEL bool traverse_tfdm(const DisplacedMeshView& mesh,
   RayProjection projections[kMaxCurveSegments];
   for (int k = 0; k < curve.num_segments; ++k) projections[k] = ray_projection_make(c.tri, curve.segments[k]);
 
-  // The smallest nodes of which four cover the triangle.
-  const double extent = max(f.x1 - f.x0, f.y1 - f.y0);
-  int level = 0;
-  while (level + 1 < mipmap.num_levels && static_cast<double>(2 << level) < extent) ++level;
   ParentWalk rows = parent_walk_make(mipmap.y, f.origin_y + f.y0, f.origin_y + f.y1);
-  Period period;
-  Node root{level, 0, 0, -__builtin_huge_val()};
-  while (parent_walk_step(rows, mipmap.y, level + 1, &root.row, &period.first_y)) {
-    ParentWalk columns = parent_walk_make(mipmap.x, f.origin_x + f.x0, f.origin_x + f.x1);
-    while (parent_walk_step(columns, mipmap.x, level + 1, &root.column, &period.first_x)) {
-      if (root_intersect(c, f, lattice, mipmap, projections, period, root)) return true;
+  const ParentWalk all_columns = parent_walk_make(mipmap.x, f.origin_x + f.x0, f.origin_x + f.x1);
+  Node root{0, 0, 0, 0, 0, -__builtin_huge_val()};
+  const double extent = max(f.x1 - f.x0, f.y1 - f.y0);
+  if (f.x1 - f.x0 > 2.0 * mipmap.x.num_cells || f.y1 - f.y0 > 2.0 * mipmap.y.num_cells) {
+    const int levels_x = tile_levels(all_columns, mipmap.x, &root.first_x);
+    const int levels_y = tile_levels(rows, mipmap.y, &root.first_y);
+    root.level = mipmap.num_levels + (levels_x > levels_y ? levels_x : levels_y);
+    return root_intersect(c, f, lattice, mipmap, projections, root) || c.found;
+  }
+  // The smallest nodes of which four cover the triangle, unless it spans periods.
+  while (root.level + 1 < mipmap.num_levels && static_cast<double>(2 << root.level) < extent) ++root.level;
+  while (parent_walk_step(rows, mipmap.y, root.level + 1, &root.row, &root.first_y)) {
+    ParentWalk columns = all_columns;
+    while (parent_walk_step(columns, mipmap.x, root.level + 1, &root.column, &root.first_x)) {
+      if (root_intersect(c, f, lattice, mipmap, projections, root)) return true;
     }
   }
   return c.found;
