@@ -2,7 +2,7 @@
 //
 // What an exact method may still get wrong. A method computes in doubles from floats, so what it finds is a hit of a
 // problem whose numbers differ from the given ones by rounding: seen from the ray, points move by a few 2^-53 of the
-// distance to the ray's origin, and heights by as much of their terms and of the map's slope times the rounding of the
+// distance to the ray's origin and of the prism's size, and heights by as much of their terms and of the map's slope times the rounding of the
 // weights. `hit_error` adds these up, with kRoundings for the number of operations in sequence: the bound on how far
 // from the ray a point of the surface may be that is called a hit. In t this is hit_error / |D · Ng| (to first order).
 //
@@ -117,12 +117,24 @@ class TracedCase {
     mapping.scale = map.scale;
     mapping.midlevel = map.midlevel;
     mesh_ = DisplacedMesh(mesh, field_.view(), mapping);
+    rmip_ = Rmip(field_.view());
+    mipmap_ = MinmaxMipmap(field_.view());
   }
   TracedCase(const TracedCase&) = delete;
   TracedCase& operator=(const TracedCase&) = delete;
 
   DisplacedMeshView mesh() const { return mesh_.view(); }
   const DisplacedMesh& displaced_mesh() const { return mesh_; }
+  /// What a method is given to trace the triangles with.
+  DisplacedGeometry geometry(TraversalMethod method) const
+  {
+    DisplacedGeometry result;
+    result.mesh = mesh_.view();
+    result.method = method;
+    result.rmip = &rmip_.view();
+    result.mipmap = &mipmap_.view();
+    return result;
+  }
 
   static Vec3f vector3(const oracle::Vector3& a)
   {
@@ -144,6 +156,8 @@ class TracedCase {
   std::vector<std::uint8_t> bytes_;
   HeightField field_;
   DisplacedMesh mesh_;
+  Rmip rmip_;
+  MinmaxMipmap mipmap_;
 };
 
 /// Operations in sequence, and so roundings of 2^-53 relative to the largest operand, that lead from a ray and a triangle
@@ -182,6 +196,12 @@ struct JudgedTriangle {
       longest_N = std::max(longest_N, vector_length(triangle.N[k]));
       N_change = std::max(N_change, vector_length(combination(1, triangle.N[k], -1, triangle.N[(k + 1) % 3])));
     }
+    constexpr int kSteps = 16;
+    double shortest_N = longest_N;
+    for (int k = 0; k <= kSteps; ++k) {
+      for (int m = 0; m <= kSteps - k; ++m) shortest_N = std::min(shortest_N, N_length({1. / kSteps * k, 1. / kSteps * m}));
+    }
+    prism_reach = largest_d * longest_N / std::max(shortest_N, kLeastNormalPart * longest_N);
   }
 
   double N_length(const oracle::Vector2& b) const
@@ -198,14 +218,15 @@ struct JudgedTriangle {
       reach = std::max(reach, vector_length(combination(1, P, -1, ray.O)));
     }
     const double turning = largest_d * N_change / N_length(b);
-    return kRoundings * 0x1p-53 * (reach + largest_d + height_terms + steepness + turning);
+    return kRoundings * 0x1p-53 * (reach + prism_reach + height_terms + steepness + turning);
   }
 
   oracle::DisplacedTriangle triangle;
   const oracle::HeightMap& map;
   oracle::Surface surface;
   double largest_d = 0, height_terms = 0, longest_N = 0, N_change = 0;
-  double steepness = 0;  ///< bound of the change of d with a weight, metres
+  double steepness = 0;    ///< bound of the change of d with a weight, metres
+  double prism_reach = 0;  ///< how far s·N goes: further than d where |N| at a corner is larger than inside; metres
 };
 
 /// What was found wrong, and how large errors were.
@@ -295,8 +316,7 @@ class Judge {
 
   bool trace(const Question& q, bool any_hit, DisplacedHit* hit)
   {
-    const DisplacedGeometry geometry{q.traced.mesh(), method_};
-    return table_.trace(geometry, q.index, TracedCase::vector3(q.ray.O), TracedCase::vector3(q.ray.D), q.ray.t_min,
+    return table_.trace(q.traced.geometry(method_), q.index, TracedCase::vector3(q.ray.O), TracedCase::vector3(q.ray.D), q.ray.t_min,
                         q.ray.t_max, any_hit, hit, &counters_);
   }
   static double t_bound(const Question& q, const oracle::Hit& root);
