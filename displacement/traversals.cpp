@@ -4,6 +4,7 @@
 #include "displacement/traverse_chord.h"
 #include "displacement/traverse_rmip.h"
 #include "displacement/traverse_tfdm.h"
+#include "kernel/math/rounding.h"
 
 namespace relief {
 
@@ -151,7 +152,8 @@ void occluded(const RTCOccludedFunctionNArguments* arguments)
         RTCRayN_tfar(rays, count, k) = -kInfinity;
         break;
       }
-      t_min = hit.t;
+      // As far as a path moves on past a surface: the next search rounds the same hit to another last bit.
+      t_min = next_float_up(static_cast<float>(hit.t));
     }
   }
 }

@@ -1,0 +1,171 @@
+// Tessellated displacement in the renderer: the same scene as by the exact method, within what tessellation leaves out.
+#include <random>
+#include <string>
+
+#include "integrator/trace.h"
+#include "kernel/shape/surface_hit.h"
+#include "tests/support/render_scene.h"
+#include "tests/support/scene_builder.h"
+
+namespace relief::test {
+namespace {
+
+constexpr float kScale = 0.15f;
+
+/// A displaced sphere with a smooth map, tiled, over a large floor, under an even sky; placed by a shear that mirrors.
+Scene displaced_scene(AlphaMode alpha_mode)
+{
+  constexpr int kSize = 64;
+  Scene scene = empty_scene();
+  Mesh sphere = sphere_mesh(1, 24, 12, true);
+  for (int r = 0; r <= 12; ++r) {
+    for (int c = 0; c <= 24; ++c) {
+      sphere.uv[0].push_back({static_cast<float>(c) / 6.0f, static_cast<float>(r) / 6.0f});
+    }
+  }
+  Material material = diffuse_material({0.6f, 0.6f, 0.6f});
+  material.displacement_index = 0;
+  material.alpha_mode = alpha_mode;
+  material.base_alpha = alpha_mode == AlphaMode::kOpaque ? 1.0f : 0.5f;
+  add_object(scene, sphere, material, {{1, 0, 0}, {0.2f, 1, 0}, {0, 0, -1.2f}, {0, 0, 0}});
+  add_object(scene, quad_mesh({-9, -1.4f, 9}, {18, 0, 0}, {0, 0, -18}), diffuse_material({0.5f, 0.5f, 0.5f}));
+
+  auto texels = std::make_shared<std::vector<std::uint16_t>>();
+  for (int y = 0; y < kSize; ++y) {
+    for (int x = 0; x < kSize; ++x) {
+      const double h = 0.5 + 0.4 * std::sin(2 * 3.14159265 * x / kSize) * std::sin(2 * 3.14159265 * y / kSize);
+      texels->push_back(static_cast<std::uint16_t>(65535 * h));
+    }
+  }
+  HeightMap map;
+  map.label = "waves";
+  map.width = map.height = kSize;
+  map.texels = std::shared_ptr<const void>(texels, texels->data());
+  scene.height_maps.push_back(map);
+  DisplacementSettings settings;
+  settings.height.texture_index = 0;
+  settings.scale = kScale;
+  scene.displacements.push_back(settings);
+  scene.environment.color = {1, 1, 1};
+  return scene;
+}
+
+std::vector<TraceRay> random_rays(int count)
+{
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  std::vector<TraceRay> rays;
+  for (int i = 0; i < count; ++i) {
+    const Vec3f O{3 * uniform(random), 3 * uniform(random), 3.5f};
+    rays.push_back({O, normalize(Vec3f{uniform(random), uniform(random), uniform(random)} - O), 0, kInfinity});
+  }
+  return rays;
+}
+
+DisplacementOptions options_of(DisplacementMethod method, double rate)
+{
+  DisplacementOptions options;
+  options.method = method;
+  options.tessellation_rate = rate;
+  return options;
+}
+
+class TessellatedBy : public testing::TestWithParam<DisplacementMethod> {};
+INSTANTIATE_TEST_SUITE_P(Methods,
+                         TessellatedBy,
+                         testing::Values(DisplacementMethod::kTessellate, DisplacementMethod::kGrid),
+                         [](const auto& method) {
+                           return method.param == DisplacementMethod::kGrid ? "Grids" : "Triangles";
+                         });
+
+TEST_P(TessellatedBy, HitsAreThoseOfTheExactMethod)
+{
+  const Scene scene = displaced_scene(AlphaMode::kOpaque);
+  const SceneContext exact(scene, options_of(DisplacementMethod::kChord, 1));
+  const SceneContext tessellated(scene, options_of(GetParam(), 4));
+  const std::vector<TraceRay> rays = random_rays(20'000);
+  const std::vector<TraceHit> expected = trace_rays(exact, rays), found = trace_rays(tessellated, rays);
+  int hits = 0, silhouettes = 0, creases = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (!expected[i].hit || expected[i].instance_index != 0) continue;
+    ++hits;
+    const TraceHit &a = expected[i], &b = found[i];
+    // A facet is at most this far from the surface: a quarter of a texel long, on waves of 64 texels.
+    constexpr float kFacetError = 1e-4f;
+    // t differs by the facet's error over the cosine; a ray that passes close to a ridge may meet either slope.
+    const float cosine = std::abs(dot(a.Ng, rays[i].D));
+    if (b.instance_index != 0 || std::abs(a.t - b.t) * cosine > 2 * kFacetError) {
+      ++silhouettes;
+      continue;
+    }
+    // Facets across a crease of the surface have a normal between its two.
+    if (dot(a.Ng, b.Ng) < 0.99f) ++creases;
+    if (a.triangle_index == b.triangle_index) {
+      EXPECT_NEAR(a.u, b.u, 0.01f);
+      EXPECT_NEAR(a.v, b.v, 0.01f);
+    }
+    // Embree's t has the error of its height over the facet, seen along the ray.
+    EXPECT_LT(length(rays[i].O + b.t * rays[i].D - b.P) * cosine, 1e-5f);
+  }
+  EXPECT_GT(hits, 10'000);
+  EXPECT_LT(silhouettes, hits / 200);
+  EXPECT_LT(creases, hits / 200);
+}
+
+/// Shadows and bounces start at the facets: no ray meets the facet that it leaves.
+TEST_P(TessellatedBy, LeavingRaysDoNotComeBack)
+{
+  const Scene scene = displaced_scene(AlphaMode::kOpaque);
+  const SceneContext context(scene, options_of(GetParam(), 1));
+  std::vector<TraceRay> leaving;
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  for (const TraceHit& h : trace_rays(context, random_rays(20'000))) {
+    if (!h.hit || h.instance_index != 0) continue;
+    const Affine3& inverse = context.instances[0].object_from_world;
+    SurfaceHit surface = surface_hit_make(context.meshes[0], context.instances[0], h.triangle_index, h.u, h.v);
+    surface_hit_displace(&surface, context.instances[0], transform_point(inverse, h.P), {0, 0, 1}, {0, 0, 1});
+    // A facet is a twentieth of a unit long; what lies nearer than a hundredth of that is the facet itself.
+    const Vec3f D = normalize(h.Ng + 0.7f * Vec3f{uniform(random), uniform(random), uniform(random)});
+    leaving.push_back({offset_ray_origin(surface.P, surface.P_error, h.Ng), D, kLeastDistance, 5e-4f});
+  }
+  ASSERT_GT(leaving.size(), 10'000u);
+  int self_hits = 0;
+  for (const TraceHit& h : trace_rays(context, leaving)) self_hits += h.hit ? 1 : 0;
+  // A few leave at a crease, towards the facet on its other side.
+  EXPECT_LT(self_hits, 20);
+}
+
+/// Means of whole images agree within 5 standard errors, shadows through half transparent surfaces included.
+TEST_P(TessellatedBy, RendersTheSameImage)
+{
+  for (const AlphaMode alpha_mode : {AlphaMode::kOpaque, AlphaMode::kBlend}) {
+    Scene scene = displaced_scene(alpha_mode);
+    scene.displacements[0].method = DisplacementMethod::kChord;
+    const Estimate exact = estimate_mean(scene, render_options(scene, 64, 16), 6);
+    scene.displacements[0].method = GetParam();
+    const Estimate tessellated = estimate_mean(scene, render_options(scene, 64, 16), 6);
+    EXPECT_NEAR(exact.mean, tessellated.mean,
+                5 * std::hypot(exact.standard_error, tessellated.standard_error) + 1e-4 * exact.mean);
+    EXPECT_LT(exact.standard_error, 2e-3 * exact.mean);
+  }
+}
+
+TEST_P(TessellatedBy, RefusesWhatDoesNotFitAndSaysHowMuchItWouldTake)
+{
+  const Scene scene = displaced_scene(AlphaMode::kOpaque);
+  DisplacementOptions options = options_of(GetParam(), 100);
+  options.tessellation_bytes = 1 << 28;
+  try {
+    const SceneContext context(scene, options);
+    FAIL() << "was built";
+  } catch (const std::runtime_error& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("GiB"), std::string::npos) << text;
+    EXPECT_NE(text.find("0.2 GiB"), std::string::npos) << text;
+    EXPECT_NE(text.find("million triangles"), std::string::npos) << text;
+  }
+}
+
+}  // namespace
+}  // namespace relief::test
