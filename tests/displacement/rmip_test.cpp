@@ -27,7 +27,7 @@ Cells touched_blocks(const LatticeAxis& axis, int num_blocks, double low, double
     first = 0;
     last = num_blocks;
   }
-  // Rounded towards the nearest sixteenth: block borders are multiples of 1/num_blocks.
+  // Borders of blocks may be those of cells up to rounding.
   return {axis.first_cell + static_cast<std::int64_t>(std::floor(first * width + 1e-9)),
           axis.first_cell + static_cast<std::int64_t>(std::ceil(last * width - 1e-9))};
 }
