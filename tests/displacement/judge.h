@@ -202,6 +202,12 @@ struct JudgedTriangle {
       for (int m = 0; m <= kSteps - k; ++m) shortest_N = std::min(shortest_N, N_length({1. / kSteps * k, 1. / kSteps * m}));
     }
     prism_reach = largest_d * longest_N / std::max(shortest_N, kLeastNormalPart * longest_N);
+    double edge = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      edge = std::max(edge, vector_length(combination(1, triangle.P[(k + 1) % 3], -1, triangle.P[k])));
+    }
+    // Weights are quotients of quadratics in s, whose terms are as large as the square of that.
+    if (prism_reach > edge && edge > 0) prism_reach *= prism_reach / edge;
   }
 
   double N_length(const oracle::Vector2& b) const
