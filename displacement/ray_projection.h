@@ -85,7 +85,7 @@ RELIEF_KERNEL int turning_points(const Quadratic& P,
 /// A stretch of the curve on which both coordinates are monotone, so that its ends span its bounding rectangle: the 2D
 /// ray bound of the paper.
 ///
-/// Its members have no default values: clearing a stack of them took as long as ten bounds.
+/// Its members have no default values: a stack of them need not be cleared for each ray.
 struct ProjectedStretch {
   double tau0, tau1;
   double x0, y0, x1, y1;  ///< at tau0 and tau1, from vertex 0

@@ -5,8 +5,8 @@
 // mipmap (their Fig. 10). Reading order: traverse_rmip, segment_intersect, then ray_projection.h and texel_march.h.
 #pragma once
 
-#include "displacement/method.h"
 #include "displacement/inversion.h"
+#include "displacement/method.h"
 #include "displacement/minmax_mipmap.h"
 #include "displacement/rmip_query.h"
 #include "displacement/texel_march.h"
@@ -172,7 +172,8 @@ RELIEF_KERNEL bool segment_intersect(CurveSearch& c,
     ++c.counters.bounds;
     const CentredRect rect = rectangle_of(r, bound.stretch);
     const ScalarRange nu = normal_range(frame, {rect.x, rect.y, rect.rx + kMargin, rect.ry + kMargin});
-    // The paper tests small bounds texel by texel at once; to test them as a whole first was 3 to 5 % faster.
+    // The paper marches through small bounds at once. To test them as a whole first takes a quarter fewer steps, in no
+    // more time, and allows a larger marching scale.
     if (!bound_intersect(c, segment, frame, bounds, options.reduce_by_inversion, rect, nu, bound)) continue;
     const ProjectedStretch& stretch = bound.stretch;
     const double longest = max(__builtin_fabs(stretch.x1 - stretch.x0), __builtin_fabs(stretch.y1 - stretch.y0));
