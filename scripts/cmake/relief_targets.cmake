@@ -12,6 +12,8 @@ target_compile_options(relief_options INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wnon-virtual-dtor -Wold-style-cast -Wcast-qual -Werror
   # GCC 12 sees overlapping copies in "text" + std::string (its bug 105651); there are none.
   $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>
+  # How vectors of eight lanes (displacement/lanes.h) are passed differs between instruction sets; none crosses a file.
+  -Wno-psabi
   # sqrt and friends need not set errno, so they can be inlined; results are unchanged.
   -fno-math-errno
   # The renderer never reads floating-point exception flags.
