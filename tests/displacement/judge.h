@@ -17,6 +17,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -26,6 +27,13 @@
 #include "tests/oracle/displaced_triangle.h"
 
 namespace relief {
+
+/// Rays of a test: as many as the environment variable RELIEF_TEST_RAYS says, for long runs, or its default.
+inline std::uint64_t num_test_rays(std::uint64_t usual)
+{
+  const char* text = std::getenv("RELIEF_TEST_RAYS");
+  return text != nullptr ? std::strtoull(text, nullptr, 10) : usual;
+}
 
 /// How many values fall between powers of two: quantiles of very many errors in a few bytes.
 class ErrorHistogram {

@@ -1,10 +1,10 @@
 // Every way of tracing displaced triangles, compiled for every instruction set this machine has, against the oracle.
 #include <gtest/gtest.h>
 
+#include <cctype>
+#include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <iostream>
-#include <memory>
 #include <random>
 #include <string>
 #include <vector>
@@ -64,7 +64,7 @@ class TracingMethod : public testing::TestWithParam<TraversalMethodLabel> {};
 TEST_P(TracingMethod, FindsWhatTheOracleFindsOnRandomTriangles)
 {
   std::vector<Judge> judges = judges_of(GetParam().method);
-  judge_random_cases(judges, 1, 200000 / kRaysPerCase);
+  judge_random_cases(judges, 1, num_test_rays(200000) / kRaysPerCase);
   for (const Judge& judge : judges) {
     const Judgement& j = judge.judgement();
     report(std::string(GetParam().name), j);
