@@ -209,15 +209,15 @@ RELIEF_KERNEL bool traverse_rmip(const DisplacedMeshView& mesh,
                                  DisplacedHit* hit,
                                  TraversalCounters* counters)
 {
-  using namespace rmip_detail;
-  RELIEF_ASSERT(options.marching_scale >= kLeastMarchingScale);
+  RELIEF_ASSERT(options.marching_scale >= rmip_detail::kLeastMarchingScale);
   CurveSearch c = curve_search_make(mesh, triangle, curve, t_min, t_max, any_hit, hit, counters);
   const LatticeFrame frame = lattice_frame_make(c.tri, ray);
   for (int k = 0; k < curve.num_segments; ++k) {
     const CurveSegment& g = curve.segments[k];
     const CurveRange range = curve_clip(curve, g, c.unfolded, c.t_min, c.t_max);
     if (range.tau0 > range.tau1) continue;
-    if (segment_intersect(c, segment_make(c.tri, curve, g), frame, bounds, options, range)) return true;
+    if (rmip_detail::segment_intersect(c, rmip_detail::segment_make(c.tri, curve, g), frame, bounds, options, range))
+      return true;
   }
   return c.found;
 }

@@ -404,33 +404,33 @@ RELIEF_KERNEL bool traverse_tfdm(const DisplacedMeshView& mesh,
                                  DisplacedHit* hit,
                                  TraversalCounters* counters)
 {
-  using namespace tfdm_detail;
   CurveSearch c = curve_search_make(mesh, triangle, curve, t_min, t_max, any_hit, hit, counters);
   const LatticeFrame lattice = lattice_frame_make(c.tri, ray);
   // A triangle without area in the map has no quadtree: only the curve says where a ray is.
   if (!lattice.exists) {
     return traverse_rmip(mesh, triangle, ray, curve, mipmap, RmipOptions{}, t_min, t_max, any_hit, hit, counters);
   }
-  const NodeFrame f = frame_make(c, lattice, ray);
+  const tfdm_detail::NodeFrame f = tfdm_detail::frame_make(c, lattice, ray);
   RayProjection projections[kMaxCurveSegments];
   for (int k = 0; k < curve.num_segments; ++k) projections[k] = ray_projection_make(c.tri, curve.segments[k]);
 
-  ParentWalk rows = parent_walk_make(mipmap.y, f.origin_y + f.y0, f.origin_y + f.y1);
-  const ParentWalk all_columns = parent_walk_make(mipmap.x, f.origin_x + f.x0, f.origin_x + f.x1);
-  Node root{0, 0, 0, 0, 0, -__builtin_huge_val()};
+  tfdm_detail::ParentWalk rows = tfdm_detail::parent_walk_make(mipmap.y, f.origin_y + f.y0, f.origin_y + f.y1);
+  const tfdm_detail::ParentWalk all_columns =
+      tfdm_detail::parent_walk_make(mipmap.x, f.origin_x + f.x0, f.origin_x + f.x1);
+  tfdm_detail::Node root{0, 0, 0, 0, 0, -__builtin_huge_val()};
   const double extent = max(f.x1 - f.x0, f.y1 - f.y0);
   if (f.x1 - f.x0 > 2.0 * mipmap.x.num_cells || f.y1 - f.y0 > 2.0 * mipmap.y.num_cells) {
-    const int levels_x = tile_levels(all_columns, mipmap.x, &root.first_x);
-    const int levels_y = tile_levels(rows, mipmap.y, &root.first_y);
+    const int levels_x = tfdm_detail::tile_levels(all_columns, mipmap.x, &root.first_x);
+    const int levels_y = tfdm_detail::tile_levels(rows, mipmap.y, &root.first_y);
     root.level = mipmap.num_levels + (levels_x > levels_y ? levels_x : levels_y);
-    return root_intersect(c, f, lattice, mipmap, projections, root) || c.found;
+    return tfdm_detail::root_intersect(c, f, lattice, mipmap, projections, root) || c.found;
   }
   // The smallest nodes of which four cover the triangle, unless it spans periods.
   while (root.level + 1 < mipmap.num_levels && static_cast<double>(2 << root.level) < extent) ++root.level;
-  while (parent_walk_step(rows, mipmap.y, root.level + 1, &root.row, &root.first_y)) {
-    ParentWalk columns = all_columns;
-    while (parent_walk_step(columns, mipmap.x, root.level + 1, &root.column, &root.first_x)) {
-      if (root_intersect(c, f, lattice, mipmap, projections, root)) return true;
+  while (tfdm_detail::parent_walk_step(rows, mipmap.y, root.level + 1, &root.row, &root.first_y)) {
+    tfdm_detail::ParentWalk columns = all_columns;
+    while (tfdm_detail::parent_walk_step(columns, mipmap.x, root.level + 1, &root.column, &root.first_x)) {
+      if (tfdm_detail::root_intersect(c, f, lattice, mipmap, projections, root)) return true;
     }
   }
   return c.found;
