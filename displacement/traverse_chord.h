@@ -465,9 +465,10 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
     chord.dq = q_b[k] - q_a[k];
     chord.inv_dx = 1.0f / (__builtin_fabsf(chord.dx) > 1e-15f ? chord.dx : 1e-15f);
     chord.inv_dy = 1.0f / (__builtin_fabsf(chord.dy) > 1e-15f ? chord.dy : 1e-15f);
-    // No point of the curve is outside of the triangle, whatever the bounds say.
-    chord.pad_x = min(pad_x[k], extent_x + 1.0f);
-    chord.pad_y = min(pad_y[k], extent_y + 1.0f);
+    // No point of the curve is outside of the triangle, whatever the bounds say. A short chord near a lattice point is
+    // known better than its distance from the borders of nodes, which reach up to four times as far as the chord.
+    chord.pad_x = min(pad_x[k], extent_x + 1.0f) + kFloatSlack * (4.0f + 5.0f * __builtin_fabsf(chord.dx));
+    chord.pad_y = min(pad_y[k], extent_y + 1.0f) + kFloatSlack * (4.0f + 5.0f * __builtin_fabsf(chord.dy));
     chord.pad_q = pad_q[k] + c.q_pad;
     chord.tau0 = from;
     chord.dtau = to - from;
