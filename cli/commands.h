@@ -15,5 +15,6 @@ using Run = std::function<int()>;
 void cmd_render_register(CLI::App& app, Run& run, const std::string& command_line);
 void cmd_info_register(CLI::App& app, Run& run);
 void cmd_trace_register(CLI::App& app, Run& run);
+void cmd_bench_register(CLI::App& app, Run& run);
 
 }  // namespace relief

@@ -62,10 +62,11 @@ int main(int argc, char** argv)
   relief::cmd_trace_register(app, run);
   relief::cmd_compare_register(app, run);
   relief::cmd_merge_register(app, run);
+  relief::cmd_bench_register(app, run);
 
   try {
     app.parse(argc, argv);
-    if (!run) throw CLI::RequiredError("a command (render, info, trace, compare or merge)");
+    if (!run) throw CLI::RequiredError("a command (render, info, trace, compare, merge or bench)");
     return run_command(run);
   } catch (const CLI::ParseError& error) {
     // Help and version come as exceptions too.

@@ -1,0 +1,49 @@
+// Rays of a scene, and what methods make of them: the same rays for all, timed in turns.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "benchmarks/displacement/contender.h"
+
+namespace relief {
+
+struct BenchResolution {
+  int width = 640, height = 360;
+};
+
+/// The rays of one scene by kind, and where the primary rays hit.
+struct BenchRays {
+  std::array<std::vector<BenchRay>, kNumBenchRayKinds> of_kind;
+  std::vector<float> shading;  ///< a pixel: cosine to the light, 0.1 at least, 0 for the background
+
+  const std::vector<BenchRay>& of(BenchRayKind kind) const { return of_kind[static_cast<std::size_t>(kind)]; }
+};
+
+/// One primary ray a pixel, and at each of their hits one bounce ray with cosine-distributed direction and one shadow ray
+/// towards a sun. Secondary rays start on the exact surface, moved off it by the larger of its rounding error and a
+/// twentieth of a texel, so that a tessellation does not end them at once where its facets lie outside of the surface.
+/// @param exact  a method that finds the exact surface
+BenchRays bench_rays_make(const BenchScene& scene, const Contender& exact, BenchResolution resolution);
+
+/// What a method did with one kind of rays.
+struct Measurement {
+  double nanoseconds = 0;                                     ///< of processor time a ray
+  double bounds = 0, texels = 0, inversions = 0, prisms = 0;  ///< counted, a ray
+  double disagreement = 0;  ///< share of rays that end elsewhere than the first contender's
+  double hit_share = 0;
+};
+
+/// Traces the rays by all contenders, chunk after chunk in turns, `rounds` times; a chunk counts with its fastest time,
+/// so that what else the machine does is left out.
+/// @param rounds  0: nothing is timed
+/// @param tolerance  metres by which two hits may differ along the ray
+/// @return  a contender each
+std::vector<Measurement> bench_measure(const std::vector<std::unique_ptr<Contender>>& contenders,
+                                       BenchRayKind kind,
+                                       const std::vector<BenchRay>& rays,
+                                       int rounds,
+                                       double tolerance);
+
+}  // namespace relief

@@ -1,0 +1,346 @@
+#include "benchmarks/displacement/study.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+#include <fmt/format.h>
+
+#include "exporters/png_ocio.h"
+#include "integrator/displacement_set.h"
+
+namespace relief {
+
+namespace {
+
+using Contenders = std::vector<std::unique_ptr<Contender>>;
+
+ContenderSpec traversal_spec(std::string name, TraversalMethod method, int rmip_resolution = 0)
+{
+  ContenderSpec spec;
+  spec.name = std::move(name);
+  spec.traversal = method;
+  spec.rmip_resolution = rmip_resolution;
+  return spec;
+}
+
+ContenderSpec tessellation_spec(std::string name,
+                                TessellationKind kind,
+                                std::uint64_t budget_bytes,
+                                const TessellationBuild& build = {})
+{
+  ContenderSpec spec;
+  spec.name = std::move(name);
+  spec.tessellation = kind;
+  spec.build = build;
+  spec.budget_bytes = budget_bytes;
+  return spec;
+}
+
+/// The paper's three sizes of an RMIP: 64, as large as a mipmap, and 1024. Smaller maps have smaller ones.
+struct RmipSizes {
+  int low, equal, high;
+};
+
+RmipSizes rmip_sizes(const BenchScene& scene)
+{
+  const int equal = rmip_linear_resolution(scene.map_size);
+  return {std::clamp(equal / 4, 1, 64), equal, std::min(4 * equal, 1024)};
+}
+
+Contenders make_all(const BenchSurface& surface, const std::vector<ContenderSpec>& specs)
+{
+  Contenders contenders;
+  for (const ContenderSpec& spec : specs) contenders.push_back(std::make_unique<Contender>(surface, spec));
+  return contenders;
+}
+
+std::vector<ContenderSpec> table_specs(const BenchScene& scene, std::uint64_t tessellation_bytes)
+{
+  const RmipSizes sizes = rmip_sizes(scene);
+  // A grid takes a fifth of the memory of its triangles.
+  const std::uint64_t grid_bytes = tessellation_bytes / 4;
+  return {traversal_spec(std::string(kExactMethod), TraversalMethod::kChord),
+          traversal_spec("rmip", TraversalMethod::kRmip, sizes.equal),
+          traversal_spec("rmip-low", TraversalMethod::kRmip, sizes.low),
+          traversal_spec("rmip-high", TraversalMethod::kRmip, sizes.high),
+          traversal_spec("rmip-minmax", TraversalMethod::kRmipOnMinmax),
+          traversal_spec(std::string(kPublishedMethod), TraversalMethod::kTfdm),
+          tessellation_spec(std::string(kTessellationMethod), TessellationKind::kTriangles,
+                            tessellation_bytes - grid_bytes),
+          tessellation_spec("tessellate-grid", TessellationKind::kGrids, grid_bytes)};
+}
+
+/// Colours from dark blue over green to yellow, which brightens evenly.
+std::array<std::uint8_t, 3> heat_color(double t)
+{
+  constexpr double kStops[][3] = {{68, 1, 84}, {59, 82, 139}, {33, 145, 140}, {94, 201, 98}, {253, 231, 37}};
+  const double at = 4 * std::clamp(t, 0.0, 1.0);
+  const auto stop = static_cast<std::size_t>(std::min(at, 3.999));
+  std::array<std::uint8_t, 3> color{};
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double mixed = kStops[stop][c] + (at - static_cast<double>(stop)) * (kStops[stop + 1][c] - kStops[stop][c]);
+    color[c] = static_cast<std::uint8_t>(std::lround(mixed));
+  }
+  return color;
+}
+
+BenchPicture shaded_picture(const BenchRays& rays, BenchResolution resolution, std::string caption)
+{
+  BenchPicture picture{resolution.width, resolution.height, std::move(caption), {}};
+  for (const float cosine : rays.shading) {
+    const float value = cosine > 0 ? 0.8f * cosine : 0.02f;
+    const auto code = static_cast<std::uint8_t>(std::lround(255 * srgb_from_linear(value)));
+    picture.rgb.insert(picture.rgb.end(), 3, code);
+  }
+  return picture;
+}
+
+/// Fig. 9: bounds and texels of every primary ray, on a logarithmic scale.
+BenchPicture steps_picture(const Contender& contender, const BenchRays& rays, BenchResolution resolution)
+{
+  constexpr double kMostSteps = 1024;
+  const std::vector<BenchRay>& primary = rays.of(BenchRayKind::kPrimary);
+  std::vector<std::uint32_t> steps(primary.size());
+  contender.count_steps(primary, steps.data());
+  BenchPicture picture{resolution.width, resolution.height, {}, {}};
+  double sum = 0, most = 0;
+  for (const std::uint32_t count : steps) {
+    sum += count;
+    most = std::max(most, static_cast<double>(count));
+    const std::array<std::uint8_t, 3> color = heat_color(std::log1p(count) / std::log1p(kMostSteps));
+    picture.rgb.insert(picture.rgb.end(), color.begin(), color.end());
+  }
+  picture.caption = fmt::format("{}: {:.1f} steps a ray, at most {:.0f}; colours: 0 to {:.0f}, logarithmic",
+                                contender.spec().name, sum / static_cast<double>(steps.size()), most, kMostSteps);
+  return picture;
+}
+
+MethodResult method_result(const Contender& contender)
+{
+  MethodResult result;
+  result.name = contender.spec().name;
+  result.rate = contender.rate();
+  result.num_micro_triangles = contender.num_micro_triangles();
+  result.table_bytes = contender.table_bytes();
+  result.triangle_bytes = contender.triangle_bytes();
+  result.bvh_bytes = contender.bvh_bytes();
+  result.build_seconds = contender.build_seconds();
+  return result;
+}
+
+/// The study and what it is asked for.
+struct Study {
+  const BenchOptions& options;
+  BenchResults& results;
+
+  void say(const std::string& line) const
+  {
+    if (options.progress) options.progress(line);
+  }
+
+  BenchScene make_scene(const BenchSceneSpec& spec, BenchSceneChange change = {}) const
+  {
+    change.map *= options.map_scale;
+    return bench_scene_make(spec, change);
+  }
+
+  void add_table(const BenchSceneSpec& spec) const;
+  void add_marching(const BenchSceneSpec& spec) const;
+  void add_sweeps(const BenchSceneSpec& spec) const;
+  void add_inversion(const BenchSceneSpec& spec) const;
+  void add_tessellation(const BenchSceneSpec& spec) const;
+};
+
+void Study::add_table(const BenchSceneSpec& spec) const
+{
+  say(fmt::format("{}: preparing", spec.name));
+  const BenchScene scene = make_scene(spec);
+  const BenchSurface surface(scene);
+  const Contenders contenders = make_all(surface, table_specs(scene, options.tessellation_bytes));
+  const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution);
+
+  SceneResult result;
+  result.name = spec.name;
+  result.like = spec.like;
+  result.paper = spec.paper;
+  result.num_triangles = scene.triangles.size();
+  result.map_size = scene.map_size;
+  result.map_bytes = scene.texels.size() * sizeof(scene.texels[0]);
+  result.tiles_u = scene.tiles_u;
+  result.tiles_v = scene.tiles_v;
+  result.tolerance = scene.texel_metres;
+  for (const auto& contender : contenders) result.methods.push_back(method_result(*contender));
+  for (const BenchRayKind kind : {BenchRayKind::kPrimary, BenchRayKind::kBounce, BenchRayKind::kShadow}) {
+    const auto k = static_cast<std::size_t>(kind);
+    say(fmt::format("{}: {} rays", spec.name, kBenchRayKindNames[k]));
+    result.num_rays[k] = rays.of(kind).size();
+    const std::vector<Measurement> measured =
+        bench_measure(contenders, kind, rays.of(kind), options.rounds, result.tolerance);
+    for (std::size_t m = 0; m < measured.size(); ++m) result.methods[m].of_kind[k] = measured[m];
+  }
+  result.pictures.push_back(shaded_picture(rays, options.resolution, result.name));
+  for (const auto& contender : contenders) {
+    const std::string& name = contender->spec().name;
+    if (name == kPublishedMethod || name == "rmip" || name == kExactMethod) {
+      result.pictures.push_back(steps_picture(*contender, rays, options.resolution));
+    }
+  }
+  results.scenes.push_back(std::move(result));
+}
+
+void Study::add_marching(const BenchSceneSpec& spec) const
+{
+  say(fmt::format("{}: marching scales", spec.name));
+  const BenchScene scene = make_scene(spec);
+  const BenchSurface surface(scene);
+  const RmipSizes sizes = rmip_sizes(scene);
+  const Contenders contenders =
+      make_all(surface, {traversal_spec(std::string(kExactMethod), TraversalMethod::kChord),
+                         traversal_spec(std::string(kPublishedMethod), TraversalMethod::kTfdm),
+                         traversal_spec(fmt::format("rmip {}²", sizes.low), TraversalMethod::kRmip, sizes.low),
+                         traversal_spec(fmt::format("rmip {}²", sizes.equal), TraversalMethod::kRmip, sizes.equal),
+                         traversal_spec(fmt::format("rmip {}²", sizes.high), TraversalMethod::kRmip, sizes.high),
+                         traversal_spec("rmip on minmax mipmap", TraversalMethod::kRmipOnMinmax)});
+  const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution);
+  Sweep sweep;
+  sweep.title = fmt::format("{}: time of primary rays", spec.name);
+  sweep.x_label = "marching scale, texels";
+  sweep.y_label = "ns a ray";
+  sweep.log_y = true;
+  for (const auto& contender : contenders) sweep.lines.push_back({contender->spec().name, {}, {}});
+  for (double marching_scale = 1; marching_scale <= 256; marching_scale *= 2) {
+    for (const auto& contender : contenders) {
+      RmipOptions rmip_options;
+      rmip_options.marching_scale = marching_scale;
+      contender->set_rmip_options(rmip_options);
+    }
+    const std::vector<Measurement> measured = bench_measure(
+        contenders, BenchRayKind::kPrimary, rays.of(BenchRayKind::kPrimary), options.rounds, scene.texel_metres);
+    for (std::size_t m = 0; m < measured.size(); ++m) {
+      sweep.lines[m].x.push_back(marching_scale);
+      sweep.lines[m].y.push_back(measured[m].nanoseconds);
+    }
+  }
+  results.marching.push_back(std::move(sweep));
+}
+
+void Study::add_sweeps(const BenchSceneSpec& spec) const
+{
+  const auto sweep_over = [&](const char* what, const auto& change_of, const std::vector<double>& factors) {
+    Sweep sweep;
+    sweep.title = fmt::format("{}: speed over TFDM, primary rays", spec.name);
+    sweep.x_label = fmt::format("factor of the {}", what);
+    sweep.y_label = "times as fast";
+    sweep.lines = {{std::string(kExactMethod), {}, {}}, {"rmip", {}, {}}, {"tfdm", {}, {}}};
+    for (const double factor : factors) {
+      say(fmt::format("{}: {} × {}", spec.name, what, factor));
+      const BenchScene scene = make_scene(spec, change_of(factor));
+      const BenchSurface surface(scene);
+      const Contenders contenders =
+          make_all(surface, {traversal_spec(std::string(kExactMethod), TraversalMethod::kChord),
+                             traversal_spec("rmip", TraversalMethod::kRmip),
+                             traversal_spec(std::string(kPublishedMethod), TraversalMethod::kTfdm)});
+      const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution);
+      const std::vector<Measurement> measured = bench_measure(
+          contenders, BenchRayKind::kPrimary, rays.of(BenchRayKind::kPrimary), options.rounds, scene.texel_metres);
+      for (std::size_t m = 0; m < measured.size(); ++m) {
+        sweep.lines[m].x.push_back(factor);
+        sweep.lines[m].y.push_back(measured.back().nanoseconds / measured[m].nanoseconds);
+      }
+    }
+    results.sweeps.push_back(std::move(sweep));
+  };
+  sweep_over("displacement", [](double f) { return BenchSceneChange{1, f, 1}; }, {0.5, 1, 2, 4});
+  sweep_over("tiles", [](double f) { return BenchSceneChange{1, 1, f}; }, {0.5, 1, 2, 4, 8});
+}
+
+void Study::add_inversion(const BenchSceneSpec& spec) const
+{
+  say(fmt::format("{}: inversion", spec.name));
+  const BenchScene scene = make_scene(spec);
+  const BenchSurface surface(scene);
+  ContenderSpec with = traversal_spec("with", TraversalMethod::kRmip), without = with;
+  without.name = "without";
+  without.rmip_options.reduce_by_inversion = false;
+  const Contenders contenders = make_all(surface, {with, without});
+  const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution);
+  const auto measured = [&](BenchRayKind kind) {
+    return bench_measure(contenders, kind, rays.of(kind), options.rounds, scene.texel_metres);
+  };
+  const std::vector<Measurement> primary = measured(BenchRayKind::kPrimary), bounce = measured(BenchRayKind::kBounce);
+  for (std::size_t m = 0; m < contenders.size(); ++m) {
+    results.inversion.push_back({std::string(spec.name), contenders[m]->spec().name, 1e3 / primary[m].nanoseconds,
+                                 1e3 / bounce[m].nanoseconds, contenders[m]->build_seconds(), contenders[m]->bytes()});
+  }
+}
+
+void Study::add_tessellation(const BenchSceneSpec& spec) const
+{
+  say(fmt::format("{}: tessellations", spec.name));
+  // All variants are in memory at once, so that they can take turns: smaller maps make room.
+  const BenchScene scene = make_scene(spec, {0.5, 1, 1});
+  const BenchSurface surface(scene);
+  const std::uint64_t share = options.tessellation_bytes / 5;
+  using Kind = TessellationKind;
+  const Contenders contenders = make_all(
+      surface,
+      {tessellation_spec("triangles, medium", Kind::kTriangles, share, {RTC_BUILD_QUALITY_MEDIUM, false}),
+       tessellation_spec("triangles, high", Kind::kTriangles, share, {RTC_BUILD_QUALITY_HIGH, false}),
+       tessellation_spec("triangles, medium, compact", Kind::kTriangles, share, {RTC_BUILD_QUALITY_MEDIUM, true}),
+       tessellation_spec("triangles, high, compact", Kind::kTriangles, share, {RTC_BUILD_QUALITY_HIGH, true}),
+       tessellation_spec("grids", Kind::kGrids, share),
+       traversal_spec(std::string(kExactMethod), TraversalMethod::kChord)});
+  const BenchRays rays = bench_rays_make(scene, *contenders.back(), options.resolution);
+  const auto measured = [&](BenchRayKind kind) {
+    return bench_measure(contenders, kind, rays.of(kind), options.rounds, scene.texel_metres);
+  };
+  const std::vector<Measurement> primary = measured(BenchRayKind::kPrimary), bounce = measured(BenchRayKind::kBounce);
+  for (std::size_t m = 0; m < contenders.size(); ++m) {
+    results.tessellation.push_back({std::string(spec.name), contenders[m]->spec().name, 1e3 / primary[m].nanoseconds,
+                                    1e3 / bounce[m].nanoseconds, contenders[m]->build_seconds(),
+                                    contenders[m]->bytes()});
+  }
+}
+
+std::vector<const BenchSceneSpec*> chosen_scenes(const std::vector<std::string>& names)
+{
+  std::vector<const BenchSceneSpec*> chosen;
+  std::string known;
+  for (const BenchSceneSpec& spec : bench_scene_specs()) {
+    if (names.empty() || std::find(names.begin(), names.end(), spec.name) != names.end()) chosen.push_back(&spec);
+    known += (known.empty() ? "" : ", ") + std::string(spec.name);
+  }
+  for (const std::string& name : names) {
+    const auto is_it = [&](const BenchSceneSpec* spec) { return spec->name == name; };
+    if (std::none_of(chosen.begin(), chosen.end(), is_it)) {
+      throw std::invalid_argument(fmt::format("expected scenes among {}, found '{}'", known, name));
+    }
+  }
+  return chosen;
+}
+
+}  // namespace
+
+BenchResults bench_displacement_run(const BenchOptions& options)
+{
+  BenchResults results;
+  results.isa = traversal_table_select().isa;
+  results.map_scale = options.map_scale;
+  results.resolution = options.resolution;
+  results.rounds = options.rounds;
+  const Study study{options, results};
+  for (const BenchSceneSpec* spec : chosen_scenes(options.scenes)) {
+    // The paper's plots have these scenes; plots of all ten would say the same at ten times the cost.
+    const bool for_marching = spec->name == "armor" || spec->name == "ninja-head";
+    const bool for_sweeps = spec->name == "sphere" || spec->name == "roof";
+    if (options.parts.table) study.add_table(*spec);
+    if (options.parts.marching && for_marching) study.add_marching(*spec);
+    if (options.parts.sweeps && for_sweeps) study.add_sweeps(*spec);
+    if (options.parts.inversion) study.add_inversion(*spec);
+    if (options.parts.tessellation && spec->name == "roof") study.add_tessellation(*spec);
+  }
+  return results;
+}
+
+}  // namespace relief

@@ -1,0 +1,116 @@
+#include <algorithm>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <unistd.h>
+
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include "benchmarks/displacement/report.h"
+#include "cli/arguments.h"
+#include "cli/commands.h"
+#include "exporters/atomic_file.h"
+
+namespace relief {
+
+namespace {
+
+struct BenchArguments {
+  std::vector<std::string> scenes, parts;
+  std::string json, html;
+  double map_scale = 1, memory_gib = 0;
+  int threads = 0, rounds = 3;
+  bool quick = false;
+};
+
+std::vector<std::string> scene_names()
+{
+  std::vector<std::string> names;
+  for (const BenchSceneSpec& spec : bench_scene_specs()) names.emplace_back(spec.name);
+  return names;
+}
+
+BenchParts parts_of(const std::vector<std::string>& names)
+{
+  if (names.empty()) return {};
+  const auto has = [&](const char* name) { return std::find(names.begin(), names.end(), name) != names.end(); };
+  return {has("table"), has("marching"), has("sweeps"), has("inversion"), has("tessellation")};
+}
+
+std::uint64_t half_of_memory()
+{
+  return static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) / 2;
+}
+
+int bench_displacement(const BenchArguments& arguments)
+{
+  std::optional<tbb::global_control> limit;
+  if (arguments.threads > 0) {
+    limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(arguments.threads));
+  }
+  BenchOptions options;
+  options.scenes = arguments.scenes;
+  options.parts = parts_of(arguments.parts);
+  options.map_scale = arguments.map_scale;
+  options.rounds = arguments.rounds;
+  options.tessellation_bytes =
+      arguments.memory_gib > 0 ? static_cast<std::uint64_t>(arguments.memory_gib * (1 << 30)) : half_of_memory();
+  if (arguments.quick) {
+    options.map_scale *= 1.0 / 16;
+    options.resolution = {160, 90};
+    options.rounds = 1;
+    options.tessellation_bytes = std::min<std::uint64_t>(options.tessellation_bytes, 30 << 20);
+  }
+  if (isatty(STDERR_FILENO) != 0) {
+    options.progress = [](const std::string& line) { fmt::print(stderr, "{}\n", line); };
+  }
+  const BenchResults results = bench_displacement_run(options);
+  fmt::print("{}", bench_markdown(results));
+  if (!arguments.json.empty()) atomic_write(arguments.json, bench_json(results));
+  if (!arguments.html.empty()) atomic_write(arguments.html, bench_html(results));
+  return 0;
+}
+
+}  // namespace
+
+void cmd_bench_register(CLI::App& app, Run& run)
+{
+  CLI::App* bench = app.add_subcommand("bench", "Measures methods side by side and reproduces a paper's tables");
+  bench->require_subcommand(1);
+  CLI::App* command =
+      bench->add_subcommand("displacement", "Ways to trace displaced triangles: speed, memory, agreement");
+  auto arguments = std::make_shared<BenchArguments>();
+  BenchArguments& a = *arguments;
+  command->add_option("--scenes", a.scenes, "Scenes, separated by commas (default: all)")
+      ->delimiter(',')
+      ->check(one_of(scene_names()));
+  command
+      ->add_option("--parts", a.parts,
+                   "Parts, separated by commas: table, marching, sweeps, inversion, tessellation (default: all)")
+      ->delimiter(',')
+      ->check(one_of({"table", "marching", "sweeps", "inversion", "tessellation"}));
+  command->add_option("--scale", a.map_scale, "Factor of the height maps' sides")
+      ->check(number(0.01, 8))
+      ->capture_default_str();
+  command->add_option("--rounds", a.rounds, "Times that each chunk of rays is traced; the fastest counts")
+      ->check(whole_number(1, 1000))
+      ->capture_default_str();
+  command->add_option("--memory", a.memory_gib, "GiB for the tessellations of a scene (default: half of the machine's)")
+      ->check(number(0.001, 1e6));
+  command->add_option("--threads", a.threads, "Threads for preparation; rays are traced by one (default: all)")
+      ->check(whole_number(1, 1024));
+  command->add_option_function<std::string>(
+      "--json", [&a](const std::string& text) { a.json = parse_output("--json", text, ".json"); }, "Figures, as JSON");
+  command->add_option_function<std::string>(
+      "--html", [&a](const std::string& text) { a.html = parse_output("--html", text, ".html"); },
+      "One page with tables, plots and pictures");
+  command->add_flag("--quick", a.quick, "Small maps, few rays, one round: whether it works, not how fast");
+  command->callback([&run, arguments] { run = [arguments] { return bench_displacement(*arguments); }; });
+}
+
+}  // namespace relief
