@@ -94,7 +94,8 @@ RELIEF_KERNEL CurveDeviation curve_deviation(const DisplacedTriangle& tri,
   return d;
 }
 
-/// A root must lie this close to its cell (lattice units): far more than its rounding error, far less than a texel.
+/// A root must lie this close to its cell (lattice units): more than rounding moves roots of all but grazing rays, far
+/// less than a texel.
 inline constexpr double kCellTolerance = 1e-9;
 
 /// First root of g in a cell.
@@ -122,10 +123,10 @@ RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
   const double corner_x = static_cast<double>(i), corner_y = static_cast<double>(j);
   const LatticeAxis &axis_x = mesh.field->x, &axis_y = mesh.field->y;
   const bool clamp_x = axis_x.wrap == Wrap::kClamp, clamp_y = axis_y.wrap == Wrap::kClamp;
-  const double x_low = clamp_x && i < 0 ? -__builtin_huge_val() : corner_x - kCellTolerance;
-  const double x_high = clamp_x && i >= axis_x.num_texels - 1 ? __builtin_huge_val() : corner_x + 1.0 + kCellTolerance;
-  const double y_low = clamp_y && j < 0 ? -__builtin_huge_val() : corner_y - kCellTolerance;
-  const double y_high = clamp_y && j >= axis_y.num_texels - 1 ? __builtin_huge_val() : corner_y + 1.0 + kCellTolerance;
+  const double x_low = clamp_x && i < 0 ? -__builtin_huge_val() : corner_x;
+  const double x_high = clamp_x && i >= axis_x.num_texels - 1 ? __builtin_huge_val() : corner_x + 1.0;
+  const double y_low = clamp_y && j < 0 ? -__builtin_huge_val() : corner_y;
+  const double y_high = clamp_y && j >= axis_y.num_texels - 1 ? __builtin_huge_val() : corner_y + 1.0;
 
   const auto height_over = [&](const CurvePoint& p) {
     const double fx = p.x - corner_x, fy = p.y - corner_y;
@@ -141,17 +142,6 @@ RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
                                                     (__builtin_fabs(cell.hx) + twist * fy) * d.x +
                                                     (__builtin_fabs(cell.hy) + twist * fx) * d.y + twist * d.x * d.y);
   };
-  // Takes a root; true when no other can be nearer.
-  const auto accept = [&](const CurvePoint& p) {
-    if (!(p.x >= x_low && p.x <= x_high && p.y >= y_low && p.y <= y_high)) return false;
-    const double t = curve_t(curve, g, p.tau);
-    if (!(t > t_min && t < t_max)) return false;
-    *hit = {t, p.b1, p.b2, i, j, p.tau};
-    t_max = t;
-    found = true;
-    return monotone;
-  };
-
   // What rounding can do to g at a point of the curve: its terms, and the weights through the slopes. That the curve
   // itself may be off does not count: it reaches over the walls by more than that.
   const double slope =
@@ -163,6 +153,20 @@ RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
       __builtin_fabs(mesh.scale) * (__builtin_fabs(cell.h00 - mesh.midlevel) + __builtin_fabs(cell.hx) +
                                     __builtin_fabs(cell.hy) + __builtin_fabs(cell.hxy));
   const double rounding = 0x1p-49 * (magnitude + slope);
+
+  // Takes a root; true when no other can be nearer.
+  const auto accept = [&](const CurvePoint& p) {
+    const double beside = max(max(x_low - p.x, p.x - x_high), max(y_low - p.y, p.y - y_high));
+    if (!(beside <= kCellTolerance)) return false;
+    // There the surface is the neighbour's, which has a root of its own unless rounding took it.
+    if (beside > 0.0 && !(__builtin_fabs(p.s * p.nu - displacement_at(mesh, p.x, p.y)) <= rounding)) return false;
+    const double t = curve_t(curve, g, p.tau);
+    if (!(t > t_min && t < t_max)) return false;
+    *hit = {t, p.b1, p.b2, i, j, p.tau};
+    t_max = t;
+    found = true;
+    return monotone;
+  };
 
   struct Interval {
     CurvePoint a, b;
