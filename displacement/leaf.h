@@ -94,6 +94,52 @@ RELIEF_KERNEL CurveDeviation curve_deviation(const DisplacedTriangle& tri,
   return d;
 }
 
+/// Weights whose error may be larger than this are corrected, see weights_correct.
+inline constexpr double kExactWeights = 0x1p-40;
+
+/// Moves a hit by one step of Newton towards S = O + tD. Weights are quotients, which lose digits where their facet is
+/// seen almost edge-on or the prism reaches far beyond the triangle; the surface itself does not.
+/// @param cell  of corner (i, j), in which the hit is
+/// @param hit   its weights and t; left as they are where the step is larger than their error can be (the ray touches the
+///              surface there)
+RELIEF_KERNEL void weights_correct(const DisplacedMeshView& mesh,
+                                   const DisplacedTriangle& tri,
+                                   const RayFrame& frame,
+                                   const CellHeights& cell,
+                                   double largest_step,
+                                   DisplacedHit* hit)
+{
+  const Vec3d N0 = to_double(tri.N[0]), Nu = to_double(tri.N[1]) - N0, Nv = to_double(tri.N[2]) - N0;
+  const Vec3d P0 = to_double(tri.P[0]), Pu = to_double(tri.P[1]) - P0, Pv = to_double(tri.P[2]) - P0;
+  const double xu = tri.x[1] - tri.x[0], xv = tri.x[2] - tri.x[0], yu = tri.y[1] - tri.y[0], yv = tri.y[2] - tri.y[0];
+  const double fx = tri.x[0] + hit->b1 * xu + hit->b2 * xv - static_cast<double>(hit->i);
+  const double fy = tri.y[0] + hit->b1 * yu + hit->b2 * yv - static_cast<double>(hit->j);
+  const double d = mesh.scale * (cell.h00 + cell.hx * fx + (cell.hy + cell.hxy * fx) * fy - mesh.midlevel);
+  const double dx = mesh.scale * (cell.hx + cell.hxy * fy), dy = mesh.scale * (cell.hy + cell.hxy * fx);
+  const Vec3d N = N0 + hit->b1 * Nu + hit->b2 * Nv;
+  const double inverse_length = 1.0 / length(N);
+  const Vec3d n = N * inverse_length;
+  const Vec3d O{frame.O[0], frame.O[1], frame.O[2]};
+  const Vec3d S = (P0 - O) + hit->b1 * Pu + hit->b2 * Pv + d * n;
+  const Vec3d Su = Pu + (dx * xu + dy * yu) * n + (d * inverse_length) * (Nu - dot(n, Nu) * n);
+  const Vec3d Sv = Pv + (dx * xv + dy * yv) * n + (d * inverse_length) * (Nv - dot(n, Nv) * n);
+  struct Seen {
+    double x, y, t;
+  };
+  const auto seen = [&](const Vec3d& a) {
+    const double axes[3] = {a.x, a.y, a.z};
+    const double z = axes[frame.kz];
+    return Seen{axes[frame.kx] - frame.Sx * z, axes[frame.ky] - frame.Sy * z, z * frame.Sz};
+  };
+  const Seen s = seen(S), u = seen(Su), v = seen(Sv);
+  const double inverse = 1.0 / (u.x * v.y - u.y * v.x);
+  const double db1 = (s.y * v.x - s.x * v.y) * inverse, db2 = (s.x * u.y - s.y * u.x) * inverse;
+  if (!(__builtin_fabs(db1) + __builtin_fabs(db2) <= largest_step)) return;
+  hit->b1 += db1;
+  hit->b2 += db2;
+  hit->t = s.t + db1 * u.t + db2 * v.t;
+}
+
 /// A root must lie this close to its cell (lattice units): more than rounding moves roots of all but grazing rays, far
 /// less than a texel.
 inline constexpr double kCellTolerance = 1e-9;
@@ -160,10 +206,11 @@ RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
     if (!(beside <= kCellTolerance)) return false;
     // There the surface is the neighbour's, which has a root of its own unless rounding took it.
     if (beside > 0.0 && !(__builtin_fabs(p.s * p.nu - displacement_at(mesh, p.x, p.y)) <= rounding)) return false;
-    const double t = curve_t(curve, g, p.tau);
-    if (!(t > t_min && t < t_max)) return false;
-    *hit = {t, p.b1, p.b2, i, j, p.tau};
-    t_max = t;
+    DisplacedHit candidate{curve_t(curve, g, p.tau), p.b1, p.b2, i, j, p.tau};
+    if (g.relative_error > kExactWeights) weights_correct(mesh, tri, curve.frame, cell, g.relative_error, &candidate);
+    if (!(candidate.t > t_min && candidate.t < t_max)) return false;
+    *hit = candidate;
+    t_max = hit->t;
     found = true;
     return monotone;
   };

@@ -90,6 +90,7 @@ inline constexpr int kMaxCurveSegments = 12;
 
 /// A ray in one triangle's prism.
 struct RayCurve {
+  RayFrame frame;
   double z[3], nz[3];  ///< ray parameter of P_i + s·N_i: z + s·nz
   int num_segments;
   CurveSegment segments[kMaxCurveSegments];
@@ -256,7 +257,8 @@ RELIEF_KERNEL void add_edge_on_segment(RayCurve& curve, const Projected& v, doub
   };
   g.s0 = s_at(near_b);
   g.ds = s_at(far_b) - g.s0;
-  add_segment(curve, g, 0x1p-46);
+  // The facet is seen at up to 1e-10, and as far is the straight line from the curve.
+  add_segment(curve, g, 0x1p-30);
 }
 
 /// Adds [begin, end] of s, all of which is inside; where it is edge-on the other form stands for it.
@@ -309,6 +311,7 @@ RELIEF_KERNEL void add_interval(RayCurve& curve,
 RELIEF_KERNEL bool ray_curve_make(const RayFrame& frame, const DisplacedTriangle& tri, RayCurve* out)
 {
   RayCurve& curve = *out;
+  curve.frame = frame;
   curve.num_segments = 0;
   const double low = tri.s_min, high = tri.s_max;
   if (low > high) return false;  // no surface: its normals are zero
