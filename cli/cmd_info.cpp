@@ -182,11 +182,11 @@ int info(const std::string& file, bool strict, const DisplacementOptions& displa
     if (scene.features.*feature.present) features += fmt::format("{}{}", features.empty() ? "" : ", ", feature.name);
   }
   fmt::print("features: {}\n", features.empty() ? "none" : features);
-  fmt::print("memory: meshes {}, textures {}, height maps {}, displacement {}, acceleration structure {}, lights "
-             "{}\n",
-             megabytes(stats.mesh_bytes), megabytes(stats.texture_bytes),
-             megabytes(height_map_bytes(scene.height_maps)), megabytes(stats.displacement.bytes),
-             megabytes(stats.bvh_bytes), megabytes(stats.light_bytes));
+  fmt::print(
+      "memory: meshes {}, textures {}, height maps {}, displacement {}, acceleration structure {}, lights "
+      "{}\n",
+      megabytes(stats.mesh_bytes), megabytes(stats.texture_bytes), megabytes(height_map_bytes(scene.height_maps)),
+      megabytes(stats.displacement.bytes), megabytes(stats.bvh_bytes), megabytes(stats.light_bytes));
   for (const std::string& warning : warnings) fmt::print("warning: {}\n", warning);
   if (strict) refuse_warnings(file, warnings);
   return 0;

@@ -112,8 +112,8 @@ std::string hits_csv(const std::vector<TraceHit>& hits)
       csv += "0,,,,,,,,,,,,\n";
       continue;
     }
-    csv += fmt::format("1,{},{},{},{},{},{},{},{},{},{},{},{}\n", h.t, h.P.x, h.P.y, h.P.z, h.Ng.x, h.Ng.y, h.Ng.z,
-                       h.u, h.v, h.mesh_index, h.triangle_index, h.steps ? std::to_string(*h.steps) : "");
+    csv += fmt::format("1,{},{},{},{},{},{},{},{},{},{},{},{}\n", h.t, h.P.x, h.P.y, h.P.z, h.Ng.x, h.Ng.y, h.Ng.z, h.u,
+                       h.v, h.mesh_index, h.triangle_index, h.steps ? std::to_string(*h.steps) : "");
   }
   return csv;
 }
@@ -123,7 +123,8 @@ std::string visit_text(const Scene& scene, const PrismVisit& visit)
 {
   const Instance& instance = scene.instances[visit.instance];
   const PrismExplanation e = prism_explain(visit);
-  std::string text = fmt::format("mesh {} triangle {} (node '{}'): ", instance.mesh_index, visit.triangle, instance.name);
+  std::string text =
+      fmt::format("mesh {} triangle {} (node '{}'): ", instance.mesh_index, visit.triangle, instance.name);
   if (e.num_stretches == 0) return text + "in its box, beside its prism\n";
   text += fmt::format("prism{}, searched from t {} to {}\n", e.folded ? " (folded)" : "", visit.t_min, visit.t_max);
   text += fmt::format("  object space: origin {} {} {}, direction {} {} {}\n", visit.O.x, visit.O.y, visit.O.z,
@@ -144,9 +145,8 @@ std::string visit_text(const Scene& scene, const PrismVisit& visit)
 std::string explanation_text(const Scene& scene, const SceneContext& context, const TraceRay& ray)
 {
   const TraceExplanation explained = trace_explain(context, ray);
-  std::string text =
-      fmt::format("ray: origin {} {} {}, direction {} {} {}, t {} to {}\n", ray.O.x, ray.O.y, ray.O.z, ray.D.x,
-                  ray.D.y, ray.D.z, ray.t_min, ray.t_max);
+  std::string text = fmt::format("ray: origin {} {} {}, direction {} {} {}, t {} to {}\n", ray.O.x, ray.O.y, ray.O.z,
+                                 ray.D.x, ray.D.y, ray.D.z, ray.t_min, ray.t_max);
   TraversalCounters total;
   for (const PrismVisit& visit : explained.visits) {
     text += visit_text(scene, visit);
@@ -181,7 +181,8 @@ std::string path_rays(const TraceArguments& arguments, const Scene& scene)
                                                       settings.width, settings.height, at.x, at.y));
   }
   std::string text = "# kind ox oy oz dx dy dz tmin tmax: rays of the path in order\n";
-  for (const RecordedRay& r : trace_path(SceneContext(scene, arguments.displacement), options, at.x, at.y, at.sample_index)) {
+  for (const RecordedRay& r :
+       trace_path(SceneContext(scene, arguments.displacement), options, at.x, at.y, at.sample_index)) {
     text += fmt::format("{} {} {} {} {} {} {} {} {}\n", r.shadow ? kShadowRay : kPathRay, r.O.x, r.O.y, r.O.z, r.D.x,
                         r.D.y, r.D.z, r.t_min, r.t_max);
   }
@@ -210,10 +211,9 @@ int trace(const TraceArguments& arguments)
   }
   const SceneContext context(scene, arguments.displacement);
   for (const std::string& text : context.displacements.warnings()) warn(text);
-  write_text(arguments.output,
-             arguments.explain >= 0
-                 ? explanation_text(scene, context, rays[static_cast<std::size_t>(arguments.explain)])
-                 : hits_csv(trace_rays(context, rays)));
+  write_text(arguments.output, arguments.explain >= 0
+                                   ? explanation_text(scene, context, rays[static_cast<std::size_t>(arguments.explain)])
+                                   : hits_csv(trace_rays(context, rays)));
   return 0;
 }
 

@@ -40,7 +40,8 @@ void add_displacement_method(CLI::App& command, DisplacementOptions& options)
     const auto* found = std::find(std::begin(kDisplacementMethodLabels), std::end(kDisplacementMethodLabels), text);
     options.method = static_cast<DisplacementMethod>(found - std::begin(kDisplacementMethodLabels));
   };
-  command.add_option_function<std::string>("--displacement", set, "How displaced meshes are traced (default: the scene's)")
+  command
+      .add_option_function<std::string>("--displacement", set, "How displaced meshes are traced (default: the scene's)")
       ->check(one_of(displacement_method_names()));
 }
 

@@ -12,9 +12,9 @@ namespace relief {
 struct PrismVisit {
   const DisplacedGeometry* geometry = nullptr;
   std::uint32_t instance = 0, triangle = 0;
-  Vec3f O, D;                  ///< object space, as the tracer handed it on
-  double t_min = 0, t_max = 0; ///< what was searched; t_max falls with every hit
-  TraversalCounters counters;  ///< of this call
+  Vec3f O, D;                   ///< object space, as the tracer handed it on
+  double t_min = 0, t_max = 0;  ///< what was searched; t_max falls with every hit
+  TraversalCounters counters;   ///< of this call
   bool found = false;
   DisplacedHit hit;
 };

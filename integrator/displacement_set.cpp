@@ -57,10 +57,10 @@ void check_budget(std::uint64_t bytes,
       static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) / 2;
   const std::uint64_t budget = options.tessellation_bytes > 0 ? options.tessellation_bytes : half_of_memory;
   if (bytes <= budget) return;
-  throw std::runtime_error("tessellating mesh '" + mesh + "' into " +
-                           std::to_string(layout.num_micro_triangles / 1'000'000) + " million triangles would take about " +
-                           gibibytes(bytes) + ", more than the " + gibibytes(budget) +
-                           " that tessellations may have; the other displacement methods do not tessellate");
+  throw std::runtime_error(
+      "tessellating mesh '" + mesh + "' into " + std::to_string(layout.num_micro_triangles / 1'000'000) +
+      " million triangles would take about " + gibibytes(bytes) + ", more than the " + gibibytes(budget) +
+      " that tessellations may have; the other displacement methods do not tessellate");
 }
 
 std::string_view traversal_name(TraversalMethod method)
@@ -206,8 +206,7 @@ DisplacedPoint DisplacementSet::point(std::size_t instance, std::uint32_t primit
   DisplacedPoint out{primitive, u, v, {}, {}, {}};
   if (d.tessellation != nullptr) {
     const MicroHit hit = d.tessellation->hit(primitive, u, v);
-    out = {hit.triangle,      static_cast<float>(hit.b1), static_cast<float>(hit.b2),
-           to_float(hit.P), to_float(hit.Ng),           {}};
+    out = {hit.triangle, static_cast<float>(hit.b1), static_cast<float>(hit.b2), to_float(hit.P), to_float(hit.Ng), {}};
   } else {
     const SurfacePoint point = surface_point(mesh, mesh.triangles[primitive], u, v);
     out.P = to_float(point.P);

@@ -22,15 +22,15 @@ struct DisplacementOptions {
   std::optional<DisplacementMethod> method;  ///< of all materials
   std::optional<int> level;                  ///< of all height maps: averaged down by 2^level
   double tessellation_rate = 1;              ///< micro-triangle edges a texel
-  std::uint64_t tessellation_bytes = 0;      ///< all tessellations may take while they are built; 0: half of the machine's
+  std::uint64_t tessellation_bytes = 0;  ///< all tessellations may take while they are built; 0: half of the machine's
 };
 
 /// A hit on a displaced instance.
 struct DisplacedPoint {
   std::uint32_t triangle = 0;  ///< base triangle
   float u = 0, v = 0;          ///< its barycentric weights of vertices 1 and 2
-  Vec3f P = {}, Ng = {};  ///< on the traced surface, object space; Ng unit, on the side of the displacement normal
-  Vec3f Ns = {};          ///< unit shading normal, object space: Ng, or that of the smoothed map
+  Vec3f P = {}, Ng = {};       ///< on the traced surface, object space; Ng unit, on the side of the displacement normal
+  Vec3f Ns = {};               ///< unit shading normal, object space: Ng, or that of the smoothed map
 };
 
 /// What a method is traced by; nothing if it tessellates, or if this version cannot.

@@ -215,8 +215,11 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
     const unsigned object =
         instance_id != RTC_INVALID_GEOMETRY_ID ? instance_id : RTCHitN_geomID(arguments->hit, arguments->N, i);
     const InstanceView& instance = g.instances[object];
-    DisplacedPoint at{RTCHitN_primID(arguments->hit, arguments->N, i), RTCHitN_u(arguments->hit, arguments->N, i),
-                      RTCHitN_v(arguments->hit, arguments->N, i), {}, {}};
+    DisplacedPoint at{RTCHitN_primID(arguments->hit, arguments->N, i),
+                      RTCHitN_u(arguments->hit, arguments->N, i),
+                      RTCHitN_v(arguments->hit, arguments->N, i),
+                      {},
+                      {}};
     if ((instance.flags & kDisplaced) != 0) at = context->displacements->locate(object, at.triangle, at.u, at.v);
     const float alpha = triangle_alpha(g.materials[instance.material_index], g.textures, g.meshes[instance.mesh_index],
                                        at.triangle, at.u, at.v);

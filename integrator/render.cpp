@@ -210,7 +210,8 @@ RenderedImage render(const Scene& scene,
   std::uint64_t first_nonfinite = kNoSample;
   for (const Wavefront& worker : workers) {
     counters_add(stats.counters, worker.counters);
-    stats.displacement.most_steps = std::max<std::uint64_t>(stats.displacement.most_steps, worker.most_displacement_steps);
+    stats.displacement.most_steps =
+        std::max<std::uint64_t>(stats.displacement.most_steps, worker.most_displacement_steps);
     for (std::size_t s = 0; s < stats.stages.size(); ++s) stats.stages[s].seconds += worker.seconds[s];
     first_nonfinite = std::min(first_nonfinite, worker.first_nonfinite);
   }

@@ -16,7 +16,7 @@ struct StageSeconds {
 
 /// Displaced meshes; what their rays cost is in the counters.
 struct DisplacementStatistics {
-  std::string method;              ///< of all geometries, separated by commas; empty: nothing is displaced
+  std::string method;                ///< of all geometries, separated by commas; empty: nothing is displaced
   std::uint64_t num_geometries = 0;  ///< pairs of a mesh and a displacement
   std::uint64_t num_prisms = 0;      ///< base triangles of all geometries
   std::uint64_t bytes = 0;           ///< tables and prepared triangles, besides the maps

@@ -65,7 +65,9 @@ RELIEF_KERNEL void film_add_first_hit(const FilmAccumulatorView& film, std::uint
 }
 
 /// Adds what a camera ray cost in displaced meshes, if that is kept.
-RELIEF_KERNEL void film_add_displacement_steps(const FilmAccumulatorView& film, std::uint32_t pixel, std::uint32_t steps)
+RELIEF_KERNEL void film_add_displacement_steps(const FilmAccumulatorView& film,
+                                               std::uint32_t pixel,
+                                               std::uint32_t steps)
 {
   const AccumulatorLayout& layout = film.layout;
   if (layout.displacement_steps < 0) return;

@@ -64,6 +64,16 @@ def emitter(name, radiance):
     return material
 
 
+def displaced(material, height_texture, scale, midlevel=0.5, tiles=(1, 1), **properties):
+    """The material with RELIEF_displacement by a texture repeated `tiles` times; further properties by name."""
+    height = {"index": height_texture}
+    if tuple(tiles) != (1, 1):
+        height["extensions"] = {"KHR_texture_transform": {"scale": list(tiles)}}
+    displacement = {"heightTexture": height, "scale": scale, "midlevel": midlevel, **properties}
+    material.setdefault("extensions", {})["RELIEF_displacement"] = displacement
+    return material
+
+
 class Document:
     """A scene being put together. `gltf` is the JSON object, open to what has no function here."""
 

@@ -1,4 +1,4 @@
-"""Image files made by hand: 8-bit PNG, Radiance HDR, and the lat-long environments in it.
+"""Image files made by hand: 8- and 16-bit PNG, Radiance HDR, and the lat-long environments in it.
 
 A picture is a list of rows, top first, of tuples. Also the lattice noise that textures and shapes share.
 """
@@ -10,14 +10,14 @@ import zlib
 from . import vector
 
 
-def png(rows):
-    """An 8-bit PNG of rows of 1- to 4-tuples of integers 0…255 (grey, grey+alpha, RGB, RGBA)."""
-    channels = len(rows[0][0])
-    color_type = {1: 0, 2: 4, 3: 2, 4: 6}[channels]
+def png(rows, bits=8):
+    """A PNG of rows of 1- to 4-tuples of integers of 8 or 16 bits (grey, grey+alpha, RGB, RGBA)."""
+    color_type = {1: 0, 2: 4, 3: 2, 4: 6}[len(rows[0][0])]
+    channels = len(rows[0][0]) * bits // 8  # bytes of a pixel
     previous = bytes(len(rows[0]) * channels)
     data = bytearray()
     for row in rows:
-        line = bytes(value for pixel in row for value in pixel)
+        line = b"".join(value.to_bytes(bits // 8, "big") for pixel in row for value in pixel)
         # PNG's filters 1 (left neighbour) and 2 (row above): the one with the smaller residuals packs better.
         left = bytes((line[i] - (line[i - channels] if i >= channels else 0)) & 255 for i in range(len(line)))
         above = bytes((a - b) & 255 for a, b in zip(line, previous))
@@ -29,7 +29,7 @@ def png(rows):
     def chunk(kind, body):
         return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
 
-    header = struct.pack(">IIBBBBB", len(rows[0]), len(rows), 8, color_type, 0, 0, 0)
+    header = struct.pack(">IIBBBBB", len(rows[0]), len(rows), bits, color_type, 0, 0, 0)
     return (
         b"\x89PNG\r\n\x1a\n"
         + chunk(b"IHDR", header)

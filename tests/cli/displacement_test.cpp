@@ -31,10 +31,7 @@ GltfBuilder displaced_square()
   return b;
 }
 
-nlohmann::json& displacement_of(GltfBuilder& b)
-{
-  return b.json["materials"][0]["extensions"]["RELIEF_displacement"];
-}
+nlohmann::json& displacement_of(GltfBuilder& b) { return b.json["materials"][0]["extensions"]["RELIEF_displacement"]; }
 
 class DisplacementProgram : public ProgramTest {
  protected:
@@ -83,11 +80,13 @@ TEST_F(DisplacementProgram, EveryMethodMeetsTheSameSurface)
     const bool approximate = method.rfind("tessellate", 0) == 0;
     const auto rows = trace(scene, {"--displacement", method});
     ASSERT_EQ(rows.size(), expected.size()) << method;
+    double sum = 0;
     for (std::size_t r = 0; r < rows.size(); ++r) {
       ASSERT_EQ(rows[r][0], expected[r][0]) << method << " ray " << r;
       if (rows[r][0] == "0") continue;
-      // A texel is 0.25 m wide and slopes are up to 2: two triangles a texel are that coarse.
-      EXPECT_NEAR(std::stod(rows[r][1]), std::stod(expected[r][1]), approximate ? 0.1 : 1e-6) << method << " ray " << r;
+      const double difference = std::abs(std::stod(rows[r][1]) - std::stod(expected[r][1]));
+      sum += difference;
+      EXPECT_LT(difference, approximate ? 1 : 1e-6) << method << " ray " << r;
       EXPECT_EQ(rows[r][10], "0");
       if (approximate) {
         EXPECT_EQ(rows[r][12], "") << method;
@@ -96,6 +95,8 @@ TEST_F(DisplacementProgram, EveryMethodMeetsTheSameSurface)
         EXPECT_GE(std::stoi(rows[r][12]), 1) << method;
       }
     }
+    // Two triangles a texel leave out the twist of its bilinear patch, on a map of noise a good part of its height.
+    EXPECT_LT(sum / static_cast<double>(rows.size()), 0.05) << method;
     EXPECT_EQ(rows.back()[0], "0");
     EXPECT_EQ(rows.back()[12], "");
   }
@@ -112,8 +113,9 @@ TEST_F(DisplacementProgram, UnknownMethodsAndLevelsAreRefusedWithTheChoices)
       arguments.insert(arguments.end(), {"--displacement", method});
       const Outcome outcome = run(arguments);
       EXPECT_EQ(outcome.exit_code, 2) << command[0] << " " << method;
-      EXPECT_NE(outcome.errors.find("expected one of auto, rmip, tfdm, tessellate, chord, rmip-minmax, tessellate-grid"),
-                std::string::npos)
+      EXPECT_NE(
+          outcome.errors.find("expected one of auto, rmip, tfdm, tessellate, chord, rmip-minmax, tessellate-grid"),
+          std::string::npos)
           << outcome.errors;
     }
     if (command[0] == "info") continue;
@@ -158,13 +160,14 @@ TEST_F(DisplacementProgram, LevelsAverageTheMap)
 TEST_F(DisplacementProgram, ExplainTellsOfPrismsAndHits)
 {
   const std::string scene = write(displaced_square(), std::string(16, '\xff'));
-  folder_.write("rays.txt", "9 9 3 0 0 -1\n0.25 0.125 3 0 0 -1\n");
+  folder_.write("rays.txt", "9 9 3 0 0 -1\n0.25 0.1875 3 0 0 -1\n");
   const Outcome hit = run({"trace", scene, "--rays", file("rays.txt"), "--explain", "1"});
   ASSERT_EQ(hit.exit_code, 0) << hit.errors;
   for (const char* text :
-       {"ray: origin 0.25 0.125 3, direction 0 0 -1, t 0 to inf\n", "mesh 0 triangle 0 (node 'ground'): prism, searched",
-        "  hit: t 2.5, b 0.625 0.25 0.125, uv 0.25 0.125, cell 0 0, height 1, displacement 0.5 m\n", "in all: ",
-        "nearest: t 2.5, mesh 0 triangle 0, P 0.25 0.125 0.5, Ng 0 0 1\n"}) {
+       {"ray: origin 0.25 0.1875 3, direction 0 0 -1, t 0 to inf\n",
+        "mesh 0 triangle 0 (node 'ground'): prism, searched",
+        "  hit: t 2.5, b 0.5625 0.25 0.1875, uv 0.25 0.1875, cell 0 0, height 1, displacement 0.5 m\n",
+        "in all: ", "nearest: t 2.5, mesh 0 triangle 0, P 0.25 0.1875 0.5, Ng 0 0 1\n"}) {
     EXPECT_NE(hit.output.find(text), std::string::npos) << text << "\n" << hit.output;
   }
   const Outcome miss = run({"trace", scene, "--rays", file("rays.txt"), "--explain", "0"});
@@ -179,9 +182,9 @@ TEST_F(DisplacementProgram, StepsInPicturesAndStatisticsAgree)
 {
   const std::string scene = bumpy();
   for (const std::string method : {"chord", "rmip"}) {
-    const Outcome outcome = render(scene, file("o.exr"),
-                                   {"--displacement", method, "--aov", "displacement_steps", "--stats", file("o.json"),
-                                    "--resolution", "32x32"});
+    const Outcome outcome = render(
+        scene, file("o.exr"),
+        {"--displacement", method, "--aov", "displacement_steps", "--stats", file("o.json"), "--resolution", "32x32"});
     ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
     const auto stats = nlohmann::json::parse(bytes_of_file(file("o.json")));
     const nlohmann::json& d = stats["displacement"];
@@ -249,16 +252,16 @@ TEST_F(DisplacementProgram, WhatIsNotFollowedIsAWarning)
 
 TEST_F(DisplacementProgram, InfoSaysHowItIsTraced)
 {
-  // Three copies of one mesh share one geometry; a stray normal of zero in each corner leaves a triangle out.
+  // Two copies of one mesh share one geometry; on the edges to the second vertex the normals cancel.
   GltfBuilder b = displaced_square();
   b.root_node({{"mesh", 0}, {"translation", {2, 0, 0}}});
-  const int N = b.accessor<float>({0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1}, "VEC3");
+  const int N = b.accessor<float>({0, 0, 1, 0, 0, -1, 0, 0, 1, 0, 0, 1}, "VEC3");
   b.json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = N;
   const Outcome outcome = run({"info", bumpy(b), "--displacement", "rmip"});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
-  for (const char* text : {"displaced geometries: 1, traced by rmip, 0.0 MiB\n", "  prisms: 2; folded (slower to trace) ",
-                           "without a normal 1\n", ", displacement 0.0 MiB, acceleration structure ",
-                           "warning: 1 of 2 triangles of mesh "}) {
+  for (const char* text : {"displaced geometries: 1, traced by rmip, 0.0 MiB\n",
+                           "  prisms: 2; folded (slower to trace) 2, with normals that cancel 2, without a normal 0\n",
+                           ", displacement 0.0 MiB, acceleration structure ", "warning: 2 of 2 triangles of mesh "}) {
     EXPECT_NE(outcome.output.find(text), std::string::npos) << text << outcome.output;
   }
 }

@@ -1,0 +1,121 @@
+// The displaced example is the same picture by every method. The same seed gives the same paths, so methods that trace
+// the same surface differ by nothing but paths that graze an edge; triangles differ by what they approximate.
+#include <filesystem>
+
+#include "scene/load.h"
+#include "tests/image/render_runs.h"
+
+namespace relief::test {
+namespace {
+
+struct Rendered {
+  RenderedImage image;
+  Statistics stats;
+};
+
+Rendered render_displaced(const Scene& scene, DisplacementMethod method, int level)
+{
+  RunOptions run;
+  run.width = 128;
+  run.height = 72;
+  run.samples = 16;
+  RenderOptions options = run_render_options(scene, run);
+  options.aov_mask = 1u << static_cast<int>(Aov::kBeauty) | 1u << static_cast<int>(Aov::kNormal) |
+                     1u << static_cast<int>(Aov::kDepth) | 1u << static_cast<int>(Aov::kDisplacementSteps);
+  options.displacement.method = method;
+  options.displacement.level = level;
+  const std::atomic<bool> stop{false};
+  Rendered rendered;
+  rendered.image = render(scene, options, stop, {}, rendered.stats);
+  return rendered;
+}
+
+struct LayerDifference {
+  double mean = 0;        ///< of the second image, over all channels
+  double mean_error = 0;  ///< of the absolute differences
+  double bias = 0;        ///< mean of the differences
+};
+
+LayerDifference layer_difference(const Rendered& a, const Rendered& b, Aov aov)
+{
+  const ImageView layer_a = film_layer(a.image.view, aov), layer_b = film_layer(b.image.view, aov);
+  LayerDifference d;
+  double count = 0;
+  for (std::size_t c = 0; c < layer_a.channels.size(); ++c) {
+    for (int y = 0; y < layer_a.height; ++y) {
+      for (int x = 0; x < layer_a.width; ++x) {
+        const double value_a = double{layer_a.channels[c].at(x, y)}, value_b = double{layer_b.channels[c].at(x, y)};
+        if (!std::isfinite(value_a) || !std::isfinite(value_b)) continue;  // depth where nothing was hit
+        d.mean += std::abs(value_b);
+        d.mean_error += std::abs(value_a - value_b);
+        d.bias += value_a - value_b;
+        ++count;
+      }
+    }
+  }
+  return {d.mean / count, d.mean_error / count, d.bias / count};
+}
+
+Scene displaced_example()
+{
+  return scene_load(std::filesystem::path(RELIEF_SOURCE_DIR) / "examples" / "displaced" / "displaced.gltf");
+}
+
+TEST(DisplacementMethods, OfOneSurfaceGiveOnePicture)
+{
+  const Scene scene = displaced_example();
+  const Rendered chord = render_displaced(scene, DisplacementMethod::kChord, 0);
+  EXPECT_EQ(chord.stats.displacement.method, "chord");
+  for (const DisplacementMethod method :
+       {DisplacementMethod::kRmip, DisplacementMethod::kMinmaxRmip, DisplacementMethod::kTfdm}) {
+    const Rendered other = render_displaced(scene, method, 0);
+    const std::string name(kDisplacementMethodLabels[static_cast<std::size_t>(method)]);
+    EXPECT_EQ(other.stats.displacement.method, name);
+    const LayerDifference depth = layer_difference(other, chord, Aov::kDepth);
+    EXPECT_LT(depth.mean_error, 1e-6 * depth.mean) << name;
+    EXPECT_LT(layer_difference(other, chord, Aov::kNormal).mean_error, 1e-4) << name;
+    const LayerDifference beauty = layer_difference(other, chord, Aov::kBeauty);
+    std::printf("%s: mean difference %.2g of the mean\n", name.c_str(), beauty.mean_error / beauty.mean);
+    // A hundredth of the noise of 16 samples.
+    EXPECT_LT(beauty.mean_error, 1e-3 * beauty.mean) << name;
+  }
+}
+
+TEST(DisplacementMethods, TessellationApproachesTheSurface)
+{
+  // At level 2 a map has 64 × 64 texels: 1.4 million triangles in all. A texel is then 3 cm on the ground and 1 cm on
+  // the ball, seen from 6 m and more; at the horizon a pixel is many of them.
+  const Scene scene = displaced_example();
+  const Rendered chord = render_displaced(scene, DisplacementMethod::kChord, 2);
+  for (const DisplacementMethod method : {DisplacementMethod::kTessellate, DisplacementMethod::kGrid}) {
+    const Rendered triangles = render_displaced(scene, method, 2);
+    const LayerDifference depth = layer_difference(triangles, chord, Aov::kDepth);
+    const LayerDifference beauty = layer_difference(triangles, chord, Aov::kBeauty);
+    std::printf("%s: depth differs by %.2g of it, radiance by %.2g of the mean, its mean by %.2g\n",
+                kDisplacementMethodLabels[static_cast<std::size_t>(method)].data(), depth.mean_error / depth.mean,
+                beauty.mean_error / beauty.mean, beauty.bias / beauty.mean);
+    EXPECT_LT(depth.mean_error, 3e-3 * depth.mean);
+    EXPECT_LT(std::abs(beauty.bias), 0.01 * beauty.mean);
+    EXPECT_EQ(triangles.stats.counters.displaced_prisms, 0u);
+  }
+}
+
+TEST(DisplacementMethods, StepsOfCameraRaysAreAPartOfAll)
+{
+  const Scene scene = displaced_example();
+  const Rendered chord = render_displaced(scene, DisplacementMethod::kChord, 0);
+  const ImageView steps = film_layer(chord.image.view, Aov::kDisplacementSteps);
+  double sum = 0;
+  for (int y = 0; y < steps.height; ++y) {
+    for (int x = 0; x < steps.width; ++x) sum += double{steps.channels[0].at(x, y)};
+  }
+  const Counters& counters = chord.stats.counters;
+  EXPECT_GT(sum, 0);
+  EXPECT_LT(sum * 16, static_cast<double>(counters.displaced_bounds + counters.displaced_texels));
+  // The sky at the top costs nothing, the ball something.
+  EXPECT_EQ(steps.channels[0].at(2, 2), 0.0f);
+  EXPECT_GT(steps.channels[0].at(64, 36), 1.0f);
+}
+
+}  // namespace
+}  // namespace relief::test
