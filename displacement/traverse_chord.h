@@ -24,6 +24,9 @@ inline constexpr float kParameterSlack = 0x1p-18f;
 inline constexpr float kWantedDeviation = 0.1f;
 inline constexpr float kWantedHeightDeviation = 1.0f / 256;
 inline constexpr int kMaxSplits = 6;
+/// Curves are cut in double precision until the least of their W is at least this part of the largest: floats would
+/// lose it.
+inline constexpr double kLeastFloatW = 0x1p-10;
 /// Metres between two stored heights, below which a displacement is taken for none: floats of stored units end there.
 inline constexpr double kLeastHeightStep = 1e-25;
 /// Where an unbounded cell beside a clamped map ends.
@@ -350,6 +353,19 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
   Quadratic e1 = quadratic_shift(g.e[1], tau0, step), e2 = quadratic_shift(g.e[2], tau0, step);
   const double inverse = 1.0 / W.c;
   W = W * inverse;
+  const double end_W = W.a + W.b + W.c, least_W = quadratic_minimum(W);
+  if (least_W < kLeastFloatW * max(1.0, end_W) && splits < kMaxSplits) {
+    // At its minimum, or else where W is the geometric mean of its ends.
+    double cut = -W.b / (2.0 * W.a);
+    if (!(least_W < kLeastFloatW * min(1.0, end_W))) {
+      double roots[2] = {0.5, 0.5};
+      quadratic_roots_inside({W.a, W.b, W.c - __builtin_sqrt(end_W)}, 0.0, 1.0, roots, 0);
+      cut = roots[0];
+    }
+    const double middle = tau0 + cut * step;
+    if (chords_intersect(c, tau0, middle, splits + 1)) return true;
+    return middle <= c.tau_end && chords_intersect(c, middle, tau1, splits + 1);
+  }
   e1 = e1 * inverse;
   e2 = e2 * inverse;
   const double xu = tri.x[1] - tri.x[0], xv = tri.x[2] - tri.x[0], yu = tri.y[1] - tri.y[0], yv = tri.y[2] - tri.y[0];
@@ -360,7 +376,6 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
 
   // Equal steps of τ crowd where the facet is seen edge-on; equal steps of the parameter whose weights are the same at
   // both ends do not.
-  const double end_W = W.a + W.b + W.c;
   const float bend = static_cast<float>(__builtin_sqrt(1.0 / end_W));
   const auto spread = [&](F8 k) { return bend * k / (bend * k + (1.0f - k)); };
   // Lanes: the whole, two halves, four quarters, and the whole once more.
@@ -436,8 +451,10 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
   const F8 pad_q = q_slope * (deviation_height + s_largest * (slack_b * (length(Nu) + length(Nv)) + kFloatSlack)) +
                    kFloatSlack * (__builtin_fabsf(q_zero) + max(abs(q_a), abs(q_b)) + 1.0f);
 
-  unsigned alive = mask_of((min(q_a, q_b) - pad_q <= splat8(static_cast<float>(f.range.high) + c.q_pad)) &
-                           (max(q_a, q_b) + pad_q >= splat8(static_cast<float>(f.range.low) - c.q_pad)));
+  // What is not a number is not known to miss.
+  unsigned alive =
+      ~mask_of((min(q_a, q_b) - pad_q > splat8(static_cast<float>(f.range.high) + c.q_pad)) |
+               (max(q_a, q_b) + pad_q < splat8(static_cast<float>(f.range.low) - c.q_pad)));
   const float wanted_q = kWantedHeightDeviation * static_cast<float>(f.range.high - f.range.low) + 1.0f;
   const unsigned straight =
       mask_of((pad_x <= splat8(kWantedDeviation)) & (pad_y <= splat8(kWantedDeviation)) & (pad_q <= splat8(wanted_q)));
