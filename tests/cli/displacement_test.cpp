@@ -215,6 +215,23 @@ TEST_F(DisplacementProgram, StepsInPicturesAndStatisticsAgree)
   for (const float steps : values_of(file("p.exr"), "displacement_steps.N")) EXPECT_EQ(steps, 0.0f);
 }
 
+TEST_F(DisplacementProgram, SmoothingTurnsShadingNormalsAndNothingElse)
+{
+  GltfBuilder b = displaced_square();
+  const std::string scene = bumpy(b);
+  displacement_of(b)["smoothing"] = true;
+  const std::string smooth = folder_.write("smooth.gltf", b.gltf()).string();
+  for (const auto& [file_of, name] : {std::pair{scene, "a.exr"}, {smooth, "b.exr"}}) {
+    ASSERT_EQ(render(file_of, file(name), {"--aov", "normal,depth,position", "--filter", "box"}).exit_code, 0);
+  }
+  for (const char* channel : {"depth.Z", "position.X", "position.Y", "position.Z"}) {
+    EXPECT_EQ(values_of(file("a.exr"), channel), values_of(file("b.exr"), channel)) << channel;
+  }
+  EXPECT_NE(values_of(file("a.exr"), "normal.X"), values_of(file("b.exr"), "normal.X"));
+  folder_.write("rays.txt", "0.3 0.4 3 0 0 -1\n");
+  EXPECT_EQ(trace(scene, {}), trace(smooth, {}));
+}
+
 TEST_F(DisplacementProgram, WhatIsNotFollowedIsAWarning)
 {
   struct Case {
