@@ -109,20 +109,18 @@ RELIEF_KERNEL void weights_correct(const DisplacedMeshView& mesh,
                                    double largest_step,
                                    DisplacedHit* hit)
 {
-  const Vec3d N0 = to_double(tri.N[0]), Nu = to_double(tri.N[1]) - N0, Nv = to_double(tri.N[2]) - N0;
-  const Vec3d P0 = to_double(tri.P[0]), Pu = to_double(tri.P[1]) - P0, Pv = to_double(tri.P[2]) - P0;
-  const double xu = tri.x[1] - tri.x[0], xv = tri.x[2] - tri.x[0], yu = tri.y[1] - tri.y[0], yv = tri.y[2] - tri.y[0];
-  const double fx = tri.x[0] + hit->b1 * xu + hit->b2 * xv - static_cast<double>(hit->i);
-  const double fy = tri.y[0] + hit->b1 * yu + hit->b2 * yv - static_cast<double>(hit->j);
+  const BasePoint base = base_point(tri, hit->b1, hit->b2);
+  const double fx = tri.x[0] + hit->b1 * base.xu + hit->b2 * base.xv - static_cast<double>(hit->i);
+  const double fy = tri.y[0] + hit->b1 * base.yu + hit->b2 * base.yv - static_cast<double>(hit->j);
   const double d = mesh.scale * (cell.h00 + cell.hx * fx + (cell.hy + cell.hxy * fx) * fy - mesh.midlevel);
   const double dx = mesh.scale * (cell.hx + cell.hxy * fy), dy = mesh.scale * (cell.hy + cell.hxy * fx);
-  const Vec3d N = N0 + hit->b1 * Nu + hit->b2 * Nv;
-  const double inverse_length = 1.0 / length(N);
-  const Vec3d n = N * inverse_length;
+  const double inverse_length = 1.0 / length(base.N);
+  const Vec3d n = base.N * inverse_length;
+  // The ray's origin is subtracted first: far from the world's origin the point itself has lost digits.
   const Vec3d O{frame.O[0], frame.O[1], frame.O[2]};
-  const Vec3d S = (P0 - O) + hit->b1 * Pu + hit->b2 * Pv + d * n;
-  const Vec3d Su = Pu + (dx * xu + dy * yu) * n + (d * inverse_length) * (Nu - dot(n, Nu) * n);
-  const Vec3d Sv = Pv + (dx * xv + dy * yv) * n + (d * inverse_length) * (Nv - dot(n, Nv) * n);
+  const Vec3d S = (to_double(tri.P[0]) - O) + hit->b1 * base.Pu + hit->b2 * base.Pv + d * n;
+  const Vec3d Su = base.Pu + (dx * base.xu + dy * base.yu) * n + (d * inverse_length) * (base.Nu - dot(n, base.Nu) * n);
+  const Vec3d Sv = base.Pv + (dx * base.xv + dy * base.yv) * n + (d * inverse_length) * (base.Nv - dot(n, base.Nv) * n);
   struct Seen {
     double x, y, t;
   };

@@ -452,9 +452,8 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
                    kFloatSlack * (__builtin_fabsf(q_zero) + max(abs(q_a), abs(q_b)) + 1.0f);
 
   // What is not a number is not known to miss.
-  unsigned alive =
-      ~mask_of((min(q_a, q_b) - pad_q > splat8(static_cast<float>(f.range.high) + c.q_pad)) |
-               (max(q_a, q_b) + pad_q < splat8(static_cast<float>(f.range.low) - c.q_pad)));
+  unsigned alive = ~mask_of((min(q_a, q_b) - pad_q > splat8(static_cast<float>(f.range.high) + c.q_pad)) |
+                            (max(q_a, q_b) + pad_q < splat8(static_cast<float>(f.range.low) - c.q_pad)));
   const float wanted_q = kWantedHeightDeviation * static_cast<float>(f.range.high - f.range.low) + 1.0f;
   const unsigned straight =
       mask_of((pad_x <= splat8(kWantedDeviation)) & (pad_y <= splat8(kWantedDeviation)) & (pad_q <= splat8(wanted_q)));

@@ -464,13 +464,14 @@ inline void add_neighbours(std::vector<HardCase>& cases)
   // Corner 0 is a texel's centre, and rays pass so close to it that the stretch inside the prism is far below a texel.
   const DisplacedTriangle cornered = scaled_uv(domed_triangle(), 1, .46875 - .03, .53125 - .05);
   const HeightMap around_corner = noise_map(16, 16, .25);
-  cases.push_back(special_rays_case("past a corner at a texel's centre", cornered, around_corner, [&](auto& corner_random) {
-    const double away = std::pow(10, random_between(corner_random, -11, -5));
-    const Vector2 direction = random_barycentric(corner_random);
-    const Vector3 target =
-        oracle::surface_eval(cornered, around_corner, {away * direction[0], away * direction[1]}).P;
-    return ray_through(combination(1, target, 1, random_direction(corner_random)), target);
-  }));
+  cases.push_back(
+      special_rays_case("past a corner at a texel's centre", cornered, around_corner, [&](auto& corner_random) {
+        const double away = std::pow(10, random_between(corner_random, -11, -5));
+        const Vector2 direction = random_barycentric(corner_random);
+        const Vector3 target =
+            oracle::surface_eval(cornered, around_corner, {away * direction[0], away * direction[1]}).P;
+        return ray_through(combination(1, target, 1, random_direction(corner_random)), target);
+      }));
 
   // The wall over the edge from corner 0 to corner 1 of the flat triangle is the plane y = 0.
   const DisplacedTriangle flat = flat_triangle(), domed = domed_triangle();

@@ -207,7 +207,8 @@ struct JudgedTriangle {
     constexpr int kSteps = 16;
     double shortest_N = longest_N;
     for (int k = 0; k <= kSteps; ++k) {
-      for (int m = 0; m <= kSteps - k; ++m) shortest_N = std::min(shortest_N, N_length({1. / kSteps * k, 1. / kSteps * m}));
+      for (int m = 0; m <= kSteps - k; ++m)
+        shortest_N = std::min(shortest_N, N_length({1. / kSteps * k, 1. / kSteps * m}));
     }
     prism_reach = largest_d * longest_N / std::max(shortest_N, kLeastNormalPart * longest_N);
     double edge = 0;
@@ -251,10 +252,10 @@ struct Judgement {
   std::uint64_t num_misplaced = 0;        ///< its weights are not those of the ray's point, or the normal is wrong
   std::uint64_t num_any_hit_differs = 0;  ///< a shadow ray sees what the ray does not, or the other way round
   std::uint64_t num_beside = 0;           ///< hits of a surface moved by rounding; no fault
-  ErrorHistogram t_error;       ///< against the oracle's root, relative to the distance of the triangle's farthest corner
-  ErrorHistogram t_over_bound;  ///< the same in units of its bound
-  ErrorHistogram texel_error;   ///< of lattice coordinates
-  ErrorHistogram normal_angle;  ///< radians
+  ErrorHistogram t_error;  ///< against the oracle's root, relative to the distance of the triangle's farthest corner
+  ErrorHistogram t_over_bound;      ///< the same in units of its bound
+  ErrorHistogram texel_error;       ///< of lattice coordinates
+  ErrorHistogram normal_angle;      ///< radians
   std::vector<std::string> faults;  ///< the first ones, with all that is needed to see them again
 
   std::uint64_t num_faults() const { return num_missed + num_invented + num_misplaced + num_any_hit_differs; }
@@ -330,8 +331,8 @@ class Judge {
 
   bool trace(const Question& q, bool any_hit, DisplacedHit* hit)
   {
-    return table_.trace(q.traced.geometry(method_), q.index, TracedCase::vector3(q.ray.O), TracedCase::vector3(q.ray.D), q.ray.t_min,
-                        q.ray.t_max, any_hit, hit, &counters_);
+    return table_.trace(q.traced.geometry(method_), q.index, TracedCase::vector3(q.ray.O), TracedCase::vector3(q.ray.D),
+                        q.ray.t_min, q.ray.t_max, any_hit, hit, &counters_);
   }
   static double t_bound(const Question& q, const oracle::Hit& root);
   static const oracle::Hit* required_root(const Question& q);
@@ -470,13 +471,13 @@ inline void Judge::record_fault(std::uint64_t& count,
   std::ostringstream out;
   out.precision(17);
   out << what << " (" << kTraversalMethods[static_cast<std::size_t>(method_)].name << ", " << table_.isa
-      << "): " << case_label << ", triangle " << q.index << ", O " << q.ray.O[0] << " "
-      << q.ray.O[1] << " " << q.ray.O[2] << " D " << q.ray.D[0] << " " << q.ray.D[1] << " " << q.ray.D[2] << " t in "
-      << q.ray.t_min << " " << q.ray.t_max << "; ";
+      << "): " << case_label << ", triangle " << q.index << ", O " << q.ray.O[0] << " " << q.ray.O[1] << " "
+      << q.ray.O[2] << " D " << q.ray.D[0] << " " << q.ray.D[1] << " " << q.ray.D[2] << " t in " << q.ray.t_min << " "
+      << q.ray.t_max << "; ";
   if (hit != nullptr) {
     out << "t " << hit->t << " b " << hit->b1 << " " << hit->b2 << " cell " << hit->i << " " << hit->j << ", "
-        << distance_from_ray(q, *hit) << " from the ray, allowed "
-        << q.triangle.hit_error(q.ray, {hit->b1, hit->b2}) << ", normal off by " << normal_angle(q, *hit);
+        << distance_from_ray(q, *hit) << " from the ray, allowed " << q.triangle.hit_error(q.ray, {hit->b1, hit->b2})
+        << ", normal off by " << normal_angle(q, *hit);
   } else {
     out << "no hit";
   }

@@ -28,7 +28,8 @@ std::string test_name_of(std::string text)
 std::vector<Judge> judges_of(TraversalMethod method)
 {
   std::vector<Judge> judges{Judge(method, traversal_table_baseline())};
-  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) judges.emplace_back(method, traversal_table_avx2());
+  if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
+    judges.emplace_back(method, traversal_table_avx2());
   return judges;
 }
 
@@ -74,10 +75,9 @@ TEST_P(TracingMethod, FindsWhatTheOracleFindsOnRandomTriangles)
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Displacement,
-                         TracingMethod,
-                         testing::ValuesIn(kTraversalMethods),
-                         [](const auto& each) { return test_name_of(std::string(each.param.name)); });
+INSTANTIATE_TEST_SUITE_P(Displacement, TracingMethod, testing::ValuesIn(kTraversalMethods), [](const auto& each) {
+  return test_name_of(std::string(each.param.name));
+});
 
 /// The hard cases with their names; made once a process.
 const std::vector<HardCase>& all_hard_cases()
