@@ -18,6 +18,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <ostream>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -27,6 +28,9 @@
 #include "tests/oracle/displaced_triangle.h"
 
 namespace relief {
+
+/// How GoogleTest prints a method.
+inline void PrintTo(const TraversalMethodLabel& label, std::ostream* out) { *out << label.name; }
 
 /// Rays of a test: as many as the environment variable RELIEF_TEST_RAYS says, for long runs, or its default.
 inline std::uint64_t num_test_rays(std::uint64_t usual)
