@@ -14,6 +14,7 @@
 #include "displacement/embree.h"
 #include "tests/displacement/hard_cases.h"
 #include "tests/displacement/judge.h"
+#include "tests/oracle/displaced_mesh.h"
 
 namespace relief {
 namespace {
@@ -252,6 +253,37 @@ TEST_P(ClosedDisplacedSurface, IsFoundThroughEmbreeWhereAllTrianglesTogetherFind
       ASSERT_EQ(scene.intersect(ray), nearest) << surface.name << " " << ray_text(ray);
     }
   }
+}
+
+TEST_P(ClosedDisplacedSurface, RootsOnSharedEdgesAreFoundByOneOfTheTriangles)
+{
+  std::uint64_t num_shared = 0;
+  for (const HardCase& hard_case : hard_cases()) {
+    if (hard_case.triangles.size() < 3) continue;
+    const TracedCase traced(hard_case.triangles, hard_case.map);
+    DisplacedScene scene(traced.geometry(GetParam().method), best_table());
+    const oracle::Mesh mesh(hard_case.triangles, hard_case.map);
+    for (const Ray& ray : hard_case.rays) {
+      const std::vector<oracle::MeshHit> roots = mesh.intersect_all(ray);
+      const float t = scene.intersect(ray);
+      const auto cosine = [&](const oracle::MeshHit& root) {
+        const Vector3& Ng = root.hit.Ng;
+        return (Ng[0] * ray.D[0] + Ng[1] * ray.D[1] + Ng[2] * ray.D[2]) / vector_length(ray.D);
+      };
+      for (std::size_t k = 0; k + 1 < roots.size(); ++k) {
+        const oracle::MeshHit &root = roots[k], &next = roots[k + 1];
+        const bool on_edge = !root.hit.certain && !next.hit.certain && root.triangle_index != next.triangle_index;
+        // Both sides of the edge are seen from the same side, and not just touched: the ray goes through.
+        const bool crosses =
+            cosine(root) * cosine(next) > 0 && std::abs(cosine(root)) > 1e-3 && std::abs(cosine(next)) > 1e-3;
+        const double rounding = 1e-6 * std::abs(root.hit.t);
+        if (!on_edge || !crosses || next.hit.t - root.hit.t > rounding) continue;
+        ++num_shared;
+        EXPECT_LE(t, next.hit.t_high + rounding) << hard_case.name << " " << ray_text(ray);
+      }
+    }
+  }
+  EXPECT_GE(num_shared, 100u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Displacement,
