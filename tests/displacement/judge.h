@@ -417,12 +417,14 @@ inline Judge::Match Judge::match(const Question& q, const DisplacedHit& hit, con
 }
 
 /// Angle between the hit's normal and the oracle's for the same weights; on a line between texels the nearest one of
-/// those on its sides.
+/// those on its sides. Normals are on the side of N; the oracle's are on that of the undisplaced triangle, which differs
+/// where all of it is displaced through the points in which displacement lines meet.
 inline double Judge::normal_angle(const Question& q, const DisplacedHit& hit)
 {
   const DisplacedMeshView mesh = q.traced.mesh();
   const DisplacedTriangle& tri = mesh.triangles[q.index];
-  const Vec3d Ng = surface_point(mesh, tri, hit.b1, hit.b2, hit.i, hit.j).Ng;
+  const SurfacePoint point = surface_point(mesh, tri, hit.b1, hit.b2, hit.i, hit.j);
+  if (dot(point.Ng, point.N) < -1e-12 * length(point.N)) return 4;
   const double xu = tri.x[1] - tri.x[0], xv = tri.x[2] - tri.x[0];
   const double yu = tri.y[1] - tri.y[0], yv = tri.y[2] - tri.y[0];
   const double determinant = xu * yv - xv * yu;
@@ -436,12 +438,10 @@ inline double Judge::normal_angle(const Question& q, const DisplacedHit& hit)
       }
       const oracle::Vector3 expected = oracle::surface_eval(q.triangle.triangle, q.triangle.map, b).Ng;
       if (!(vector_length(expected) > .5)) return 0;
-      const oracle::Vector3 actual{Ng.x, Ng.y, Ng.z};
-      double sine = vector_length(cross_product(expected, actual));
+      const oracle::Vector3 actual{point.Ng.x, point.Ng.y, point.Ng.z};
+      const double sine = vector_length(cross_product(expected, actual));
       const double cosine = expected[0] * actual[0] + expected[1] * actual[1] + expected[2] * actual[2];
-      // Which side is the outer one is a matter of definition where the displacement folds the surface over.
-      const bool other_side = mesh.unfolded[q.index] != 0 && cosine < 0;
-      least = std::min(least, std::atan2(sine, other_side ? cosine : std::abs(cosine)));
+      least = std::min(least, std::atan2(sine, std::abs(cosine)));
       if (least <= kLargestNormalAngle) return least;
     }
   }
