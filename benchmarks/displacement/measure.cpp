@@ -89,7 +89,7 @@ BenchRays bench_rays_make(const BenchScene& scene, const Contender& exact, Bench
     if (dot(Ng, ray.D) > 0) Ng = -Ng;
     rays.shading.back() = std::max(0.1f, dot(Ng, kSun));
     const Vec3f P = to_float(hit->P);
-    const auto off = static_cast<float>(0.05 * scene.texel_metres);
+    const auto off = static_cast<float>(0.25 * scene.texel_metres);
     const Vec3f O = offset_ray_origin(P, max(gamma_bound(5) * abs(P), 0.5f * Vec3f{off, off, off}), Ng);
     const std::size_t index = rays.of_kind[1].size();
     const Vec3f local = warp_cosine_hemisphere(quasi_random(index));

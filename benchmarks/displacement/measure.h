@@ -23,7 +23,7 @@ struct BenchRays {
 
 /// One primary ray a pixel, and at each of their hits one bounce ray with cosine-distributed direction and one shadow ray
 /// towards a sun. Secondary rays start on the exact surface, moved off it by the larger of its rounding error and a
-/// twentieth of a texel, so that a tessellation does not end them at once where its facets lie outside of the surface.
+/// quarter of a texel, so that a tessellation does not end them at once where its facets lie outside of the surface.
 /// @param exact  a method that finds the exact surface
 BenchRays bench_rays_make(const BenchScene& scene, const Contender& exact, BenchResolution resolution);
 

@@ -1,0 +1,95 @@
+// `relief bench displacement`: that it runs, what it writes, and that all exact methods find the same hits. Times are not
+// looked at: they belong to the machine.
+#include <set>
+
+#include "tests/cli/program.h"
+
+namespace relief::test {
+namespace {
+
+class Bench : public ProgramTest {};
+
+TEST_F(Bench, QuickRunMeasuresEveryMethodOnEveryScene)
+{
+  const std::string json_file = file("bench.json"), html_file = file("bench.html");
+  const Outcome outcome = run({"bench", "displacement", "--quick", "--json", json_file, "--html", html_file});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+  const nlohmann::json json = nlohmann::json::parse(bytes_of_file(json_file));
+  ASSERT_EQ(json["scenes"].size(), 10u);
+  const std::set<std::string> expected = {"chord",       "rmip", "rmip-low",   "rmip-high",
+                                          "rmip-minmax", "tfdm", "tessellate", "tessellate-grid"};
+  for (const nlohmann::json& scene : json["scenes"]) {
+    std::set<std::string> methods;
+    for (const nlohmann::json& method : scene["methods"]) {
+      const std::string name = method["method"];
+      methods.insert(name);
+      EXPECT_GT(method["bytes"], 0);
+      for (const char* kind : {"primary", "bounce", "shadow"}) {
+        SCOPED_TRACE(scene["scene"].get<std::string>() + " " + name + " " + kind);
+        EXPECT_GT(scene["rays"][kind], 500);
+        EXPECT_GT(method[kind]["nanoseconds_per_ray"], 0);
+        const double share = method[kind]["hit_share"];
+        EXPECT_GE(share, std::string(kind) == "primary" ? 0.2 : 0.001);
+        EXPECT_LE(share, 1.0);
+        if (method.contains("micro_triangles")) {
+          // At full rate facets are close to the surface; coarser ones are only said to be.
+          EXPECT_LT(method[kind]["disagreement"], method["edges_per_texel"] == 1.0 ? 0.25 : 1.0);
+          continue;
+        }
+        // One surface, one answer; a hit may fall on either side of a texel's border or of t_min.
+        EXPECT_LT(method[kind]["disagreement"], 1e-3);
+        EXPECT_GT(method[kind]["bounds"], 0);
+      }
+    }
+    EXPECT_EQ(methods, expected);
+  }
+  EXPECT_EQ(json["marching"].size(), 2u);
+  EXPECT_EQ(json["sweeps"].size(), 4u);
+  EXPECT_EQ(json["inversion"].size(), 20u);
+  EXPECT_EQ(json["tessellation"].size(), 6u);
+
+  const std::string html = bytes_of_file(html_file);
+  EXPECT_NE(html.find("<svg"), std::string::npos);
+  EXPECT_NE(html.find("data:image/png;base64,"), std::string::npos);
+  EXPECT_EQ(html.find("http"), std::string::npos);
+  EXPECT_NE(outcome.output.find("| chord |"), std::string::npos);
+}
+
+TEST_F(Bench, PartsAndScenesAreChosen)
+{
+  const std::string json_file = file("bench.json");
+  const Outcome outcome = run({"bench", "displacement", "--quick", "--scenes", "roof,glass", "--parts",
+                               "inversion,tessellation", "--json", json_file});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+  const nlohmann::json json = nlohmann::json::parse(bytes_of_file(json_file));
+  EXPECT_EQ(json["scenes"].size(), 0u);
+  EXPECT_EQ(json["inversion"].size(), 4u);
+  EXPECT_EQ(json["tessellation"].size(), 6u);
+}
+
+TEST_F(Bench, TessellationsThatDoNotFitAreCoarserAndSaySo)
+{
+  const std::string json_file = file("bench.json");
+  const Outcome outcome = run({"bench", "displacement", "--quick", "--memory", "0.004", "--scenes", "roof", "--parts",
+                               "table", "--json", json_file});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+  EXPECT_NE(outcome.output.find("COARSER"), std::string::npos);
+  const nlohmann::json json = nlohmann::json::parse(bytes_of_file(json_file));
+  for (const nlohmann::json& method : json["scenes"][0]["methods"]) {
+    if (!method.contains("micro_triangles")) continue;
+    EXPECT_LT(method["edges_per_texel"], 1.0);
+    EXPECT_LT(method["bytes"], 4 << 20);
+  }
+}
+
+TEST_F(Bench, WrongUseIsRefused)
+{
+  for (const Arguments& arguments : {Arguments{"bench"}, Arguments{"bench", "displacement", "--scenes", "teapot"},
+                                     Arguments{"bench", "displacement", "--parts", "all"},
+                                     Arguments{"bench", "displacement", "--json", "bench.txt"}}) {
+    EXPECT_EQ(run(arguments).exit_code, 2) << arguments.back();
+  }
+}
+
+}  // namespace
+}  // namespace relief::test
