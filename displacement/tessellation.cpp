@@ -262,6 +262,8 @@ Tessellation::Tessellation(const DisplacedMeshView& mesh, TessellationLayout lay
     grids_.resize(layout_.num_primitives);
   }
   tbb::parallel_for(std::uint32_t{0}, mesh_.num_triangles, [&](std::uint32_t index) { fill(index); });
+  layout_.edge_owner = {};
+  layout_.corner_owner = {};
 }
 
 void Tessellation::fill(std::uint32_t index)

@@ -39,6 +39,7 @@ struct TessellationLayout {
   TessellationKind kind = TessellationKind::kTriangles;
   std::vector<TessellatedTriangle> triangles;
   /// For every edge (3 · triangle + edge): the one of its group that computes the points; for every corner likewise.
+  /// Empty once the points are computed.
   std::vector<std::uint32_t> edge_owner, corner_owner;
   std::uint64_t num_vertices = 0, num_primitives = 0, num_micro_triangles = 0;
 
