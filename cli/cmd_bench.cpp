@@ -39,7 +39,7 @@ BenchParts parts_of(const std::vector<std::string>& names)
 {
   if (names.empty()) return {};
   const auto has = [&](const char* name) { return std::find(names.begin(), names.end(), name) != names.end(); };
-  return {has("table"), has("marching"), has("sweeps"), has("inversion"), has("tessellation")};
+  return {has("table"), has("marching"), has("sweeps"), has("inversion"), has("tessellation"), has("frames")};
 }
 
 std::uint64_t half_of_memory()
@@ -90,10 +90,11 @@ void cmd_bench_register(CLI::App& app, Run& run)
       ->delimiter(',')
       ->check(one_of(scene_names()));
   command
-      ->add_option("--parts", a.parts,
-                   "Parts, separated by commas: table, marching, sweeps, inversion, tessellation (default: all)")
+      ->add_option(
+          "--parts", a.parts,
+          "Parts, separated by commas: table, marching, sweeps, inversion, tessellation, frames (default: all)")
       ->delimiter(',')
-      ->check(one_of({"table", "marching", "sweeps", "inversion", "tessellation"}));
+      ->check(one_of({"table", "marching", "sweeps", "inversion", "tessellation", "frames"}));
   command->add_option("--scale", a.map_scale, "Factor of the height maps' sides")
       ->check(number(0.01, 8))
       ->capture_default_str();

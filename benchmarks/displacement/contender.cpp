@@ -53,24 +53,24 @@ RTCRayHit embree_ray_hit(const BenchRay& ray)
   return out;
 }
 
-/// The finest layout whose building stays within a budget, down to one micro-triangle a base triangle.
-TessellationLayout layout_within(const DisplacedMeshView& mesh, const ContenderSpec& spec, double* rate)
-{
-  *rate = 1;
-  while (true) {
-    TessellationLayout layout = tessellation_layout_make(mesh, *spec.tessellation, *rate);
-    const auto bytes = static_cast<double>(tessellation_peak_bytes(layout, spec.build));
-    const auto budget = static_cast<double>(spec.budget_bytes);
-    if (spec.budget_bytes == 0 || bytes <= budget ||
-        layout.num_micro_triangles <= 6 * std::uint64_t{mesh.num_triangles}) {
-      return layout;
-    }
-    // Memory goes with the square of the rate, nearly.
-    *rate *= std::min(0.99, std::sqrt(budget / bytes));
-  }
-}
-
 }  // namespace
+
+double tessellation_rate_within(const DisplacedMeshView& mesh,
+                                TessellationKind kind,
+                                const TessellationBuild& build,
+                                std::uint64_t budget_bytes)
+{
+  double rate = 1;
+  while (budget_bytes > 0) {
+    const TessellationLayout layout = tessellation_layout_make(mesh, kind, rate);
+    const auto ratio = static_cast<double>(budget_bytes) / static_cast<double>(tessellation_peak_bytes(layout, build));
+    // One segment an edge is as coarse as it gets.
+    if (ratio >= 1 || layout.num_micro_triangles <= 6 * std::uint64_t{mesh.num_triangles}) break;
+    // Memory goes with the square of the rate, nearly.
+    rate *= std::min(0.99, std::sqrt(ratio));
+  }
+  return rate;
+}
 
 BenchSurface::BenchSurface(const BenchScene& s) : scene(s)
 {
@@ -122,7 +122,8 @@ Contender::~Contender()
 void Contender::build_tessellation()
 {
   const DisplacedMeshView mesh = surface_.mesh.view();
-  tessellation_ = std::make_unique<Tessellation>(mesh, layout_within(mesh, spec_, &rate_));
+  rate_ = tessellation_rate_within(mesh, *spec_.tessellation, spec_.build, spec_.budget_bytes);
+  tessellation_ = std::make_unique<Tessellation>(mesh, tessellation_layout_make(mesh, *spec_.tessellation, rate_));
   triangle_bytes_ = tessellation_->bytes();
 }
 

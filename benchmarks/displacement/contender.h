@@ -50,6 +50,13 @@ struct ContenderSpec {
   std::uint64_t budget_bytes = 0;  ///< for building a tessellation; a rate below 1 is taken where it does not fit
 };
 
+/// The largest rate, at most 1, at which building a tessellation stays within a budget.
+/// @param budget_bytes  0: any
+double tessellation_rate_within(const DisplacedMeshView& mesh,
+                                TessellationKind kind,
+                                const TessellationBuild& build,
+                                std::uint64_t budget_bytes);
+
 class Contender {
  public:
   /// @param surface  must outlive the contender

@@ -14,9 +14,6 @@ namespace relief {
 
 namespace {
 
-/// Direction to the sun of all scenes.
-const Vec3f kSun = normalize(Vec3f{0.5f, 0.7f, 0.6f});
-
 /// Seconds of processor time of this thread.
 double processor_seconds()
 {
@@ -53,16 +50,15 @@ Vec2f quasi_random(std::size_t index)
 /// Rays in the order of their pixels, row by row.
 std::vector<BenchRay> primary_rays(const BenchSceneSpec& spec, BenchResolution resolution)
 {
-  const Vec3f eye{static_cast<float>(spec.eye[0]), static_cast<float>(spec.eye[1]), static_cast<float>(spec.eye[2])};
-  const Vec3f forward = normalize(-eye), right = normalize(cross(forward, {0, 1, 0})), up = cross(right, forward);
-  const auto half_height = static_cast<float>(std::tan(spec.field_of_view * 3.141592653589793 / 360));
+  const BenchCamera camera = bench_camera(spec);
   std::vector<BenchRay> rays;
   for (int y = 0; y < resolution.height; ++y) {
     for (int x = 0; x < resolution.width; ++x) {
       const float sx = (2 * (static_cast<float>(x) + 0.5f) - static_cast<float>(resolution.width)) /
                        static_cast<float>(resolution.height);
       const float sy = 1 - 2 * (static_cast<float>(y) + 0.5f) / static_cast<float>(resolution.height);
-      rays.push_back({eye, normalize(forward + half_height * (sx * right + sy * up))});
+      rays.push_back(
+          {camera.eye, normalize(camera.forward + camera.half_height * (sx * camera.right + sy * camera.up))});
     }
   }
   return rays;
@@ -77,6 +73,17 @@ bool differs(const BenchHit& a, const BenchHit& b, double tolerance)
 
 }  // namespace
 
+BenchCamera bench_camera(const BenchSceneSpec& spec)
+{
+  BenchCamera camera;
+  camera.eye = {static_cast<float>(spec.eye[0]), static_cast<float>(spec.eye[1]), static_cast<float>(spec.eye[2])};
+  camera.forward = normalize(-camera.eye);
+  camera.right = normalize(cross(camera.forward, {0, 1, 0}));
+  camera.up = cross(camera.right, camera.forward);
+  camera.half_height = static_cast<float>(std::tan(spec.field_of_view * 3.141592653589793 / 360));
+  return camera;
+}
+
 BenchRays bench_rays_make(const BenchScene& scene, const Contender& exact, BenchResolution resolution)
 {
   BenchRays rays;
@@ -87,7 +94,7 @@ BenchRays bench_rays_make(const BenchScene& scene, const Contender& exact, Bench
     if (!hit) continue;
     Vec3f Ng = to_float(hit->Ng);
     if (dot(Ng, ray.D) > 0) Ng = -Ng;
-    rays.shading.back() = std::max(0.1f, dot(Ng, kSun));
+    rays.shading.back() = std::max(0.1f, dot(Ng, kBenchSun));
     const Vec3f P = to_float(hit->P);
     const auto off = static_cast<float>(0.25 * scene.texel_metres);
     const Vec3f O = offset_ray_origin(P, max(gamma_bound(5) * abs(P), 0.5f * Vec3f{off, off, off}), Ng);
@@ -95,7 +102,7 @@ BenchRays bench_rays_make(const BenchScene& scene, const Contender& exact, Bench
     const Vec3f local = warp_cosine_hemisphere(quasi_random(index));
     const Frame frame = frame_from_normal(Ng);
     rays.of_kind[1].push_back({O, normalize(local.x * frame.s + local.y * frame.t + local.z * frame.n)});
-    if (dot(Ng, kSun) > 0) rays.of_kind[2].push_back({O, kSun});
+    if (dot(Ng, kBenchSun) > 0) rays.of_kind[2].push_back({O, kBenchSun});
   }
   return rays;
 }

@@ -13,6 +13,17 @@ struct BenchResolution {
   int width = 640, height = 360;
 };
 
+/// Direction to the sun of all scenes.
+inline const Vec3f kBenchSun = normalize(Vec3f{0.5f, 0.7f, 0.6f});
+
+/// Where a scene is seen from; axes are unit.
+struct BenchCamera {
+  Vec3f eye, forward, right, up;
+  float half_height = 1;  ///< of the picture, at distance 1
+};
+
+BenchCamera bench_camera(const BenchSceneSpec& spec);
+
 /// The rays of one scene by kind, and where the primary rays hit.
 struct BenchRays {
   std::array<std::vector<BenchRay>, kNumBenchRayKinds> of_kind;

@@ -150,6 +150,7 @@ struct Study {
   void add_sweeps(const BenchSceneSpec& spec) const;
   void add_inversion(const BenchSceneSpec& spec) const;
   void add_tessellation(const BenchSceneSpec& spec) const;
+  void add_frames(const BenchSceneSpec& spec) const;
 };
 
 void Study::add_table(const BenchSceneSpec& spec) const
@@ -303,6 +304,15 @@ void Study::add_tessellation(const BenchSceneSpec& spec) const
   }
 }
 
+void Study::add_frames(const BenchSceneSpec& spec) const
+{
+  say(fmt::format("{}: frames", spec.name));
+  const BenchScene scene = make_scene(spec);
+  for (FrameResult& frame : bench_frames(scene, options.resolution, options.rounds, options.tessellation_bytes)) {
+    results.frames.push_back(std::move(frame));
+  }
+}
+
 std::vector<const BenchSceneSpec*> chosen_scenes(const std::vector<std::string>& names)
 {
   std::vector<const BenchSceneSpec*> chosen;
@@ -339,6 +349,7 @@ BenchResults bench_displacement_run(const BenchOptions& options)
     if (options.parts.sweeps && for_sweeps) study.add_sweeps(*spec);
     if (options.parts.inversion) study.add_inversion(*spec);
     if (options.parts.tessellation && spec->name == "roof") study.add_tessellation(*spec);
+    if (options.parts.frames) study.add_frames(*spec);
   }
   return results;
 }

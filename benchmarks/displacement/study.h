@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "benchmarks/displacement/measure.h"
+#include "benchmarks/displacement/frames.h"
 
 namespace relief {
 
@@ -21,6 +21,7 @@ struct BenchParts {
   bool sweeps = true;     ///< Fig. 11: more displacement, more tiles
   bool inversion = true;  ///< Fig. 12: bounds reduced by inversion or not
   bool tessellation = true;  ///< ways to build a tessellation's tree
+  bool frames = true;        ///< whole path-traced frames
 };
 
 struct BenchOptions {
@@ -98,6 +99,7 @@ struct BenchResults {
   std::vector<SceneResult> scenes;
   std::vector<Sweep> marching, sweeps;
   std::vector<VariantResult> inversion, tessellation;
+  std::vector<FrameResult> frames;
 };
 
 /// Names of the methods in the table; the first is what the others are compared with.

@@ -47,6 +47,14 @@ TEST_F(Bench, QuickRunMeasuresEveryMethodOnEveryScene)
   EXPECT_EQ(json["sweeps"].size(), 4u);
   EXPECT_EQ(json["inversion"].size(), 20u);
   EXPECT_EQ(json["tessellation"].size(), 6u);
+  EXPECT_EQ(json["frames"].size(), 50u);
+  for (const nlohmann::json& frame : json["frames"]) {
+    const std::string method = frame["method"];
+    EXPECT_GT(frame["rays"], 1000);
+    // Exact methods trace the same paths but for hits in the last bit.
+    const bool is_exact = method == "rmip" || method == "tfdm";
+    EXPECT_LT(frame["difference"], is_exact ? 0.02 : 1.0) << frame;
+  }
 
   const std::string html = bytes_of_file(html_file);
   EXPECT_NE(html.find("<svg"), std::string::npos);
