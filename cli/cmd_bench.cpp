@@ -62,7 +62,7 @@ int bench_displacement(const BenchArguments& arguments)
       arguments.memory_gib > 0 ? static_cast<std::uint64_t>(arguments.memory_gib * (1 << 30)) : half_of_memory();
   if (arguments.quick) {
     options.map_scale *= 1.0 / 16;
-    options.resolution = {112, 63};
+    options.resolution = {96, 54};
     options.rounds = 1;
     options.tessellation_bytes = std::min<std::uint64_t>(options.tessellation_bytes, 30 << 20);
   }
