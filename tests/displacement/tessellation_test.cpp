@@ -44,7 +44,7 @@ struct Displaced {
 };
 
 /// A sphere of radius 1 with a map that is random but for its polar rows, where all directions must agree.
-/// @param mean_u  above 1 the columns of the uv grid bunch together, so that triangles differ in texels
+/// @param uneven  above 0 the columns of the uv grid bunch together, so that triangles differ in texels
 void make_sphere(Displaced& d, int columns, int rows, float tiling, int map_size, double uneven, double scale)
 {
   for (int r = 0; r <= rows; ++r) {
