@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's side of relief: a render engine that writes the scene format and runs the `relief` program.
+
+Read in this order: engine.py (what Blender calls), export/scene.py (from Blender's data to a scene file), process.py
+(the program), result.py (its picture back into Blender). What differs between versions of Blender is in compat.py.
+"""
+
+bl_info = {
+    "name": "relief",
+    "description": "Path tracer for scenes whose detail lives in displacement maps",
+    "author": "The relief authors",
+    "version": (0, 1, 0),
+    "blender": (3, 4, 0),
+    "location": "Render properties > Render Engine > relief",
+    "category": "Render",
+}
+
+if "bpy" in locals():  # the add-on is switched on again: Blender keeps modules, their files may have changed
+    import importlib
+
+    for _module in _modules:  # noqa: F821 (defined by the first import)
+        importlib.reload(_module)
+
+import bpy  # noqa: E402
+
+from . import engine, exporter, operators, preferences, properties, session, ui  # noqa: E402
+
+_modules = (session, preferences, properties, engine, operators, exporter, ui)
+
+
+def register():
+    for module in _modules:
+        module.register()
+
+
+def unregister():
+    for module in reversed(_modules):
+        module.unregister()

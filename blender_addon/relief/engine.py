@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The render engine as Blender sees it: forwards to final.py and viewport.py, and tells every failure."""
+
+import traceback
+
+import bpy
+
+from . import compat, final, result
+from .report import ReliefError
+from .viewport import Viewport
+
+
+class ReliefEngine(bpy.types.RenderEngine):
+    bl_idname = "RELIEF"
+    bl_label = "relief"
+    bl_use_preview = False
+    bl_use_postprocess = True
+    bl_use_shading_nodes_custom = False
+    bl_use_eevee_viewport = True  # material preview is Eevee's
+
+    def __init__(self, *arguments, **keywords):
+        compat.engine_init(ReliefEngine, self, *arguments, **keywords)
+        self._viewport = None
+
+    def __del__(self):
+        # Blender may drop an engine whose __init__ it has not run.
+        viewport = getattr(self, "_viewport", None)
+        if viewport is not None:
+            viewport.stop()
+
+    def render(self, depsgraph):
+        self._guard(lambda: final.render(self, depsgraph))
+
+    def update_render_passes(self, scene=None, renderlayer=None):
+        self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
+        for p in result.enabled_passes(renderlayer):
+            self.register_pass(scene, renderlayer, p.name, len(p.ids), p.ids, p.kind)
+
+    def view_update(self, context, depsgraph):
+        if self._viewport is None:
+            self._viewport = Viewport(self)
+        self._guard(lambda: self._viewport.update(context, depsgraph))
+
+    def view_draw(self, context, depsgraph):
+        if self._viewport is not None:
+            self._guard(lambda: self._viewport.draw(context, depsgraph))
+
+    def _guard(self, action):
+        """Runs an action; a failure is reported. An exception that leaves here would leave a black picture and no word."""
+        try:
+            action()
+        except ReliefError as error:
+            self._tell(str(error))
+        except Exception as error:  # whatever it is, the artist must see it
+            traceback.print_exc()
+            self._tell(f"{type(error).__name__}: {error} (a mistake in the add-on; the console has the details)")
+
+    def _tell(self, text):
+        print(f"relief: error: {text}", flush=True)
+        self.error_set(text)
+        self.report({"ERROR"}, text)
+
+
+def register():
+    bpy.utils.register_class(ReliefEngine)
+
+
+def unregister():
+    bpy.utils.unregister_class(ReliefEngine)

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Writes a glTF file and the files it refers to. Knows nothing of Blender.
+
+Buffers and images are named after their content: what is there already is not written again, so that a second frame in
+which only the camera moved costs a few kilobytes.
+"""
+
+import hashlib
+import json
+import os
+from urllib.parse import quote
+
+import numpy as np
+
+_COMPONENT_TYPES = {"float32": 5126, "uint32": 5125}
+_SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+_NAME_BYTES = 16
+
+
+def content_name(*parts):
+    """Name of a file that says what is in it.
+
+    @param  parts  objects with the buffer protocol, C-contiguous
+    """
+    digest = hashlib.blake2b(digest_size=_NAME_BYTES)
+    for part in parts:
+        digest.update(memoryview(part).cast("B"))
+    return digest.hexdigest()
+
+
+class GltfWriter:
+    """Gathers a scene and writes it.
+
+    json           the document so far
+    folder         where the scene file will be; buffers and made images go to `data_folder`, a folder beside it
+    used_files     names in the data folder that this scene refers to
+    bytes_written  of buffers, images and the document
+    """
+
+    def __init__(self, folder, data_folder):
+        self.folder = folder
+        self.data_folder = data_folder
+        self.json = {"asset": {"version": "2.0", "generator": "relief add-on for Blender"}}
+        self.used_files = set()
+        self.bytes_written = 0
+        self._buffers = {}
+        self._samplers = {}
+        self._images = {}
+        self._textures = {}
+        os.makedirs(os.path.join(folder, data_folder), exist_ok=True)
+
+    def add(self, kind, value):
+        """Appends to one of the document's lists; returns its index."""
+        values = self.json.setdefault(kind, [])
+        values.append(value)
+        return len(values) - 1
+
+    def use_extension(self, name):
+        """Lists an extension as used."""
+        used = self.json.setdefault("extensionsUsed", [])
+        if name not in used:
+            used.append(name)
+
+    def extend(self, target, name, value):
+        """Puts an extension on an object of the document."""
+        target.setdefault("extensions", {})[name] = value
+        self.use_extension(name)
+
+    def write_file(self, suffix, *parts):
+        """Writes a file into the data folder unless it is there.
+
+        @return  its URI, relative to the scene file
+        """
+        name = content_name(*parts) + suffix
+        path = os.path.join(self.folder, self.data_folder, name)
+        if name not in self.used_files and not os.path.exists(path):
+            # Whole or not at all: a name promises its content.
+            aside = path + ".part"
+            with open(aside, "wb") as file:
+                for part in parts:
+                    self.bytes_written += file.write(part)
+            os.replace(aside, path)
+        self.used_files.add(name)
+        return f"{self.data_folder}/{name}"
+
+    def file_uri(self, path):
+        """URI of a file anywhere: relative where that is possible, as on one drive, so that scenes can be moved."""
+        path = os.path.abspath(path)
+        try:
+            path = os.path.relpath(path, self.folder)
+        except ValueError:
+            pass
+        return quote(path.replace(os.sep, "/"), safe="/:")
+
+    def add_accessors(self, arrays):
+        """Puts arrays into one buffer.
+
+        @param  arrays  C-contiguous float32 or uint32 arrays of shape (n,) or (n, 1…4) by name
+        @return         accessor indices by the same names
+        """
+        parts = list(arrays.values())
+        uri = self.write_file(".bin", *parts)
+        if uri in self._buffers:
+            return self._buffers[uri]
+        buffer = self.add("buffers", {"uri": uri, "byteLength": sum(a.nbytes for a in parts)})
+        accessors, offset = {}, 0
+        for name, array in arrays.items():
+            view = self.add(
+                "bufferViews", {"buffer": buffer, "byteOffset": offset, "byteLength": array.nbytes}
+            )
+            accessor = {
+                "bufferView": view,
+                "componentType": _COMPONENT_TYPES[array.dtype.name],
+                "count": len(array),
+                "type": _SHAPES[1 if array.ndim == 1 else array.shape[1]],
+            }
+            if name in ("POSITION", "input"):  # glTF asks for bounds of positions and of times
+                rows = array.reshape(len(array), -1)
+                accessor["min"] = rows.min(axis=0).tolist()
+                accessor["max"] = rows.max(axis=0).tolist()
+            accessors[name] = self.add("accessors", accessor)
+            offset += array.nbytes
+        self._buffers[uri] = accessors
+        return accessors
+
+    def add_texture(self, uri, wrap, nearest):
+        """A texture of an image file.
+
+        @param  wrap     glTF's wrap mode for both directions
+        @param  nearest  no interpolation between texels
+        @return          index
+        """
+        key = (uri, wrap, nearest)
+        if key not in self._textures:
+            if uri not in self._images:
+                self._images[uri] = self.add("images", {"uri": uri})
+            if (wrap, nearest) not in self._samplers:
+                filters = {"magFilter": 9728 if nearest else 9729, "wrapS": wrap, "wrapT": wrap}
+                self._samplers[wrap, nearest] = self.add("samplers", filters)
+            texture = {"source": self._images[uri], "sampler": self._samplers[wrap, nearest]}
+            self._textures[key] = self.add("textures", texture)
+        return self._textures[key]
+
+    def write(self, name):
+        """Writes the document; returns its path."""
+        text = json.dumps(self.json, separators=(",", ":"), allow_nan=False).encode()
+        path = os.path.join(self.folder, name)
+        aside = path + ".part"
+        with open(aside, "wb") as file:
+            self.bytes_written += file.write(text)
+        os.replace(aside, path)
+        return path
+
+
+def matrix_property(matrix):
+    """glTF's column-major list of a 4×4 matrix whose rows are given."""
+    return [float(x) for x in np.asarray(matrix, dtype=np.float64).T.ravel()]

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's images as files that the program reads as Blender means them.
+
+The program decides by the use of a texture: colours stored as integers are sRGB, everything else is linear. Where
+Blender's colour space says the same, the file itself is named, and packed files are written out as they are: no value
+passes through Blender's pixels, heights keep their 16 bits. Otherwise the pixels are taken, made linear and written as
+32-bit floats, which no use changes.
+"""
+
+import os
+import struct
+
+import bpy
+import numpy as np
+
+from .. import exr
+
+_LINEAR_SPACES = {"Non-Color", "Raw", "Linear", "Linear Rec.709", "Generic Data", "Utility - Raw"}
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
+_FLOAT_SUFFIXES = {".exr", ".hdr", ".pic", ".rgbe"}
+_TIFF_SUFFIXES = {".tif", ".tiff"}
+_TIFF_SAMPLE_FORMAT, _TIFF_IEEE_FLOAT = 339, 3
+
+
+class ImageExporter:
+    """Finds or makes the file of each image once.
+
+    @param  writer  GltfWriter
+    @param  frame   Blender's current frame, for image sequences
+    """
+
+    def __init__(self, writer, frame):
+        self._writer = writer
+        self._frame = frame
+        self._uris = {}
+
+    def color_uri(self, image, user, warn):
+        """URI of an image used as a colour; None if there is none to use, which is warned about."""
+        return self._uri(image, user, True, warn)
+
+    def data_uri(self, image, user, warn):
+        """URI of an image used as numbers: roughness, normals, heights."""
+        return self._uri(image, user, False, warn)
+
+    def channel_uri(self, image, channel, warn):
+        """URI of a grey image with one channel (0…3) of another, as numbers."""
+        key = (image.name_full, "channel", channel, self._frame if image.source == "SEQUENCE" else 0)
+        if key not in self._uris:
+            plane = self._plane(image, channel, warn)
+            self._uris[key] = None if plane is None else self.write_pixels({"Y": plane})
+        return self._uris[key]
+
+    def combined_uri(self, roughness, metallic, warn):
+        """URI of glTF's packed image: roughness in green, metallic in blue.
+
+        @param  roughness, metallic  (bpy image, channel 0…3 or None for its grey value), or None: 1 everywhere
+        @return                      None if an image has no pixels
+        """
+        key = ("packed", *((p[0].name_full, p[1]) if p else None for p in (roughness, metallic)))
+        if key not in self._uris:
+            self._uris[key] = self._combine(roughness, metallic, warn)
+        return self._uris[key]
+
+    def _combine(self, roughness, metallic, warn):
+        planes = [self._plane(*p, warn) if p else np.ones((1, 1), dtype=np.float32) for p in (roughness, metallic)]
+        if any(p is None for p in planes):
+            return None
+        height, width = (max(p.shape[axis] for p in planes) for axis in (0, 1))
+        green, blue = (_enlarge(p, height, width) for p in planes)
+        return self.write_pixels({"R": np.zeros_like(green), "G": green, "B": blue})
+
+    def alpha_uri(self, image, channel, warn):
+        """URI of a white image whose alpha is a channel of an image, or its grey value."""
+        key = (image.name_full, "alpha", channel)
+        if key not in self._uris:
+            plane = self._plane(image, channel, warn)
+            white = None if plane is None else np.ones_like(plane)
+            uri = None if plane is None else self.write_pixels({"R": white, "G": white, "B": white, "A": plane})
+            self._uris[key] = uri
+        return self._uris[key]
+
+    def _plane(self, image, channel, warn):
+        """One channel, or the grey value: float32 (height, width); None without pixels."""
+        pixels = self._linear_pixels(image, warn)
+        if pixels is None:
+            return None
+        if channel is not None:
+            return pixels[..., min(channel, pixels.shape[-1] - 1)]
+        return pixels[..., :3] @ _LUMINANCE if pixels.shape[-1] >= 3 else pixels[..., 0]
+
+    def write_pixels(self, channels):
+        """Writes float32 planes, bottom row first, as an image of linear floats; returns its URI."""
+        planes = {name: np.ascontiguousarray(plane[::-1], dtype=np.float32) for name, plane in channels.items()}
+        return self._writer.write_file(".exr", exr.encode(planes))
+
+    def _uri(self, image, user, is_color, warn):
+        key = (image.name_full, is_color, self._frame if image.source == "SEQUENCE" else 0)
+        if key not in self._uris:
+            self._uris[key] = self._make(image, user, is_color, warn)
+        return self._uris[key]
+
+    def _make(self, image, user, is_color, warn):
+        if image.source in {"MOVIE", "TILED", "VIEWER"}:
+            warn(f'image "{image.name}": {image.source.lower()} images', "it is left out")
+            return None
+        packed = _packed_bytes(image)
+        if image.source == "GENERATED" or image.is_dirty:
+            return self._make_from_pixels(image, warn)
+        if packed is not None:
+            if self._means_the_same(image, packed[:4096], image.filepath, is_color):
+                return self._writer.write_file(_suffix(packed, image.filepath), packed)
+            return self._make_from_pixels(image, warn)
+        path = self._path(image, user)
+        if not os.path.isfile(path):
+            warn(f'image "{image.name}": no file {path!r}', "it is left out")
+            return None
+        with open(path, "rb") as file:
+            first = file.read(4096)
+        if self._means_the_same(image, first, path, is_color):
+            return self._writer.file_uri(path)
+        return self._make_from_pixels(image, warn)
+
+    def _path(self, image, user):
+        path = bpy.path.abspath(image.filepath, library=image.library)
+        if image.source != "SEQUENCE" or user is None:
+            return path
+        frame = self._frame - user.frame_start + 1
+        frame = (frame - 1) % user.frame_duration + 1 if user.use_cyclic else min(max(frame, 1), user.frame_duration)
+        frame += user.frame_offset
+        folder, name = os.path.split(path)
+        stem, suffix = os.path.splitext(name)
+        digits = len(stem) - len(stem.rstrip("0123456789"))
+        return os.path.join(folder, f"{stem[: len(stem) - digits]}{frame:0{digits}d}{suffix}") if digits else path
+
+    def _means_the_same(self, image, first_bytes, path, is_color):
+        """Whether the program will make of the file what Blender makes of it."""
+        space = image.colorspace_settings.name
+        if _is_float_file(first_bytes, path) or not is_color:
+            return space in _LINEAR_SPACES
+        return space == "sRGB"
+
+    def _make_from_pixels(self, image, warn):
+        pixels = self._linear_pixels(image, warn)
+        if pixels is None:
+            return None
+        names = "RGBA"[: pixels.shape[-1]] if pixels.shape[-1] != 1 else "Y"
+        return self.write_pixels({name: pixels[..., c] for c, name in enumerate(names)})
+
+    def _linear_pixels(self, image, warn):
+        """An image's scene-linear values: float32 of shape (height, width, channels), bottom row first."""
+        width, height = image.size
+        if width * height == 0:
+            warn(f'image "{image.name}" has no pixels', "it is left out")
+            return None
+        pixels = np.empty(width * height * image.channels, dtype=np.float32)
+        image.pixels.foreach_get(pixels)
+        pixels = pixels.reshape(height, width, image.channels)
+        # Blender keeps floats scene-linear, bytes as they were stored.
+        space = image.colorspace_settings.name
+        if not image.is_float and space not in _LINEAR_SPACES:
+            if space != "sRGB":
+                warn(f'image "{image.name}": colour space {space}', "it is read as sRGB")
+            color = pixels[..., :3]
+            pixels[..., :3] = np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
+        return pixels
+
+
+def _packed_bytes(image):
+    if image.packed_file is not None:
+        return image.packed_file.data
+    return None
+
+
+def _suffix(data, name):
+    """Suffix of a file, by its first bytes: the program goes by it."""
+    for start, suffix in (
+        (b"\x89PNG", ".png"),
+        (b"\xff\xd8", ".jpg"),
+        (b"v/1\x01", ".exr"),
+        (b"#?", ".hdr"),
+        (b"II*\0", ".tif"),
+        (b"MM\0*", ".tif"),
+        (b"BM", ".bmp"),
+    ):
+        if data.startswith(start):
+            return suffix
+    return os.path.splitext(name)[1].lower() or ".tga"
+
+
+def _is_float_file(first_bytes, path):
+    suffix = _suffix(first_bytes, path)
+    if suffix in _TIFF_SUFFIXES:
+        return _tiff_is_float(first_bytes)
+    return suffix in _FLOAT_SUFFIXES
+
+
+def _tiff_is_float(data):
+    """Whether a TIFF holds floats. A directory beyond the bytes at hand is taken to be one of integers.
+
+    @source  TIFF 6.0, sections 2 and 19 (SampleFormat)
+    """
+    order = "<" if data.startswith(b"II") else ">"
+    (directory,) = struct.unpack_from(order + "I", data, 4)
+    if directory + 2 > len(data):
+        return False
+    (count,) = struct.unpack_from(order + "H", data, directory)
+    for entry in range(directory + 2, min(directory + 2 + 12 * count, len(data) - 11), 12):
+        tag, _, number, value = struct.unpack_from(order + "HHIH", data, entry)
+        if tag == _TIFF_SAMPLE_FORMAT and number <= 2:
+            return value == _TIFF_IEEE_FLOAT
+    return False
+
+
+def _enlarge(plane, height, width):
+    """A plane at another size, each texel the one of the original that it lies in."""
+    rows = (np.arange(height) * plane.shape[0]) // height
+    columns = (np.arange(width) * plane.shape[1]) // width
+    return plane[rows][:, columns]

@@ -1,0 +1,217 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's lights in relief's units.
+
+What Blender means by power, and what the scene format wants (checked against Cycles, tests/blender/light_test.py):
+
+    point, spot   P watts    radiant intensity P / 4π          a spot is a point behind a screen: P does not depend on its cone
+    sun           E W/m²     irradiance E
+    area          P watts    radiance P / 4A: Lambert's law would say P / πA; Blender's factor is older than its watts
+
+Sizes: a point becomes a glowing sphere, a sun a disk far away, as the format's own points and suns have no size.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Callable
+
+import numpy as np
+
+from .. import compat
+
+#: Distance of a sun's disk in sizes of the scene. Light from its rim differs by (half the scene / distance)² in strength.
+_SUN_DISTANCE = 300.0
+
+#: Levels of subdivision of an icosahedron for a point light: 320 triangles.
+_SPHERE_LEVELS = 2
+
+
+@dataclass
+class Place:
+    """Where a light stands, and what its export needs.
+
+    node               glTF node without scale: its −Z is the light's direction
+    scale              of Blender's object along X and Y: areas follow it
+    visible_to_camera  whether its surface is seen
+    scene_size         metres that the scene's objects extend over
+    writer             GltfWriter
+    warn               called with what is not understood, and what was used instead
+    """
+
+    node: dict
+    scale: tuple
+    visible_to_camera: bool
+    scene_size: float
+    writer: object
+    warn: Callable
+
+
+def export_light(light, place):
+    """Adds a bpy light to the node of its place."""
+    color, strength = _emission(light, place.warn)
+    energy = compat.light_energy(light) * strength
+    if energy < 0 or min(color) < 0:
+        place.warn("negative light", "it is left out")
+        return
+    if not getattr(getattr(light, "cycles", None), "cast_shadow", True):
+        place.warn("a light without shadows", "it casts them")
+    if light.type == "POINT":
+        if light.shadow_soft_size > 0:
+            _add_sphere(place, light.name, light.shadow_soft_size, color, energy)
+        else:
+            _add_punctual(place, {"type": "point", "intensity": energy / (4 * math.pi)}, color)
+    elif light.type == "SPOT":
+        if light.shadow_soft_size > 0:
+            place.warn("the radius of a spot", "its shadows are sharp")
+        _add_punctual(place, {**_spot(light, place.warn), "intensity": energy / (4 * math.pi)}, color)
+    elif light.type == "SUN":
+        if light.angle > 0:
+            _add_sun_disk(place, light.angle, color, energy)
+        else:
+            _add_punctual(place, {"type": "directional", "intensity": energy}, color)
+    else:
+        _add_area(place, light, color, energy)
+        if light.spread < math.pi - 1e-4:
+            place.warn("the spread of an area light", "it shines to all sides")
+
+
+def _emission(light, warn):
+    """(colour, factor of the power) with the light's own nodes considered."""
+    color, strength = tuple(light.color), 1.0
+    if not light.use_nodes:
+        return color, strength
+    nodes = light.node_tree.nodes
+    output = next((n for n in nodes if n.bl_idname == "ShaderNodeOutputLight" and n.is_active_output), None)
+    link = output.inputs["Surface"].links[0] if output and output.inputs["Surface"].is_linked else None
+    if link is None or link.from_node.bl_idname != "ShaderNodeEmission":
+        warn("light nodes other than one Emission", "its power and colour alone were used")
+        return color, strength
+    emission = link.from_node
+    if any(socket.is_linked for socket in emission.inputs):
+        warn("textured light nodes", "the Emission node's unlinked values were used")
+    color = tuple(a * b for a, b in zip(color, emission.inputs["Color"].default_value))
+    return color, emission.inputs["Strength"].default_value
+
+
+def _add_punctual(place, light, color):
+    lights = place.writer.json.setdefault("extensions", {}).setdefault("KHR_lights_punctual", {"lights": []})["lights"]
+    lights.append({**light, "color": list(color)})
+    place.writer.extend(place.node, "KHR_lights_punctual", {"light": len(lights) - 1})
+
+
+def _add_child(place, child, name, value):
+    """Puts a light extension on a node below the light's own."""
+    place.writer.extend(child, name, value)
+    place.node["children"] = [place.writer.add("nodes", child)]
+
+
+def _spot(light, warn):
+    outer = min(light.spot_size / 2, math.pi / 2)
+    if light.spot_size / 2 > math.pi / 2 + 1e-6:
+        warn("a spot wider than 180°", "180° were used")
+    cos_outer = math.cos(outer)
+    # Blender fades over a share of 1 − cos(outer); the format from one angle to the other.
+    cos_inner = cos_outer + (1 - cos_outer) * light.spot_blend
+    if light.spot_blend > 0.01:
+        warn("the soft edge of a spot", "it has the same width but fades by the format's law")
+    # The format asks for an edge of some width; this one is thinner than any pixel.
+    inner = min(math.acos(min(cos_inner, 1.0)), outer * (1 - 1e-6))
+    return {"type": "spot", "spot": {"innerConeAngle": inner, "outerConeAngle": outer}}
+
+
+def _add_area(place, light, color, energy):
+    round_shape = light.shape in {"DISK", "ELLIPSE"}
+    width = light.size * place.scale[0]
+    height = (light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size) * place.scale[1]
+    area = width * height * (math.pi / 4 if round_shape else 1)
+    if area <= 0:
+        return
+    value = {"radiance": energy / (4 * area), "color": list(color), "visibleToCamera": place.visible_to_camera}
+    if round_shape:
+        # A disk of diameter 1, stretched by a node: ellipses have no shape of their own in the format.
+        value.update(shape="disk", radius=0.5)
+        _add_child(place, {"scale": [width, height, 1.0]}, "RELIEF_area_light", value)
+    else:
+        value.update(shape="rectangle", width=width, height=height)
+        place.writer.extend(place.node, "RELIEF_area_light", value)
+
+
+def _add_sun_disk(place, angle, color, energy):
+    """A disk so far away that it is seen under the sun's angle from everywhere."""
+    distance = _SUN_DISTANCE * place.scene_size
+    half = min(angle, math.pi * 0.99) / 2
+    value = {
+        "shape": "disk",
+        "radius": distance * math.tan(half),
+        # Seen from the scene it fills the cone of the half angle; E = π L sin²(half).
+        "radiance": energy / (math.pi * math.sin(half) ** 2),
+        "color": list(color),
+        "visibleToCamera": False,
+    }
+    _add_child(place, {"translation": [0.0, 0.0, distance]}, "RELIEF_area_light", value)
+
+
+def _add_sphere(place, name, radius, color, energy):
+    """A glowing sphere that neither the camera nor other lights see."""
+    positions, triangles = _icosphere(_SPHERE_LEVELS)
+    corners = positions[triangles]
+    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
+    # As large as the round one: from afar both look the same.
+    scale = radius * math.sqrt(4 * math.pi / area)
+    arrays = {"POSITION": (positions * scale).astype(np.float32), "indices": triangles.ravel().astype(np.uint32)}
+    writer = place.writer
+    accessors = writer.add_accessors(arrays)
+    # A sphere of radiance L sends L·πr² into each direction; a point P / 4π.
+    radiance = [c * energy / (4 * math.pi) / (math.pi * radius * radius) for c in color]
+    material = {
+        "name": f"{name} (light)",
+        "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 0, "roughnessFactor": 1},
+        "emissiveFactor": [1, 1, 1],
+    }
+    writer.extend(material, "KHR_materials_specular", {"specularFactor": 0})
+    set_emission(material, radiance, writer)
+    mesh = {
+        "name": name,
+        "primitives": [
+            {
+                "attributes": {"POSITION": accessors["POSITION"]},
+                "indices": accessors["indices"],
+                "material": writer.add("materials", material),
+            }
+        ],
+    }
+    place.node["mesh"] = writer.add("meshes", mesh)
+    settings = {"visibleToCamera": place.visible_to_camera, "castsShadow": False}
+    writer.extend(place.node, "RELIEF_object", settings)
+
+
+def set_emission(material, radiance, writer):
+    """Emission of a material: glTF's factor ends at 1, an extension goes on."""
+    largest = max(radiance)
+    if largest <= 0:
+        material["emissiveFactor"] = [0, 0, 0]
+        return
+    material["emissiveFactor"] = [max(0.0, c / largest) for c in radiance]
+    writer.extend(material, "KHR_materials_emissive_strength", {"emissiveStrength": largest})
+
+
+def _icosphere(levels):
+    """Unit sphere of 20·4^levels triangles: (float64 (n, 3), int (m, 3)), counter-clockwise from outside."""
+    g = (1 + math.sqrt(5)) / 2
+    positions = [(-1, g, 0), (1, g, 0), (-1, -g, 0), (1, -g, 0), (0, -1, g), (0, 1, g)]
+    positions += [(0, -1, -g), (0, 1, -g), (g, 0, -1), (g, 0, 1), (-g, 0, -1), (-g, 0, 1)]
+    triangles = np.array(
+        [(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2), (10, 7, 6)]
+        + [(7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5), (2, 4, 11), (6, 2, 10)]
+        + [(8, 6, 7), (9, 8, 1)]
+    )
+    positions = np.array(positions, dtype=np.float64)
+    for _ in range(levels):
+        edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        unique, middle = np.unique(edges, axis=0, return_inverse=True)
+        middle = middle.reshape(-1, 3) + len(positions)
+        positions = np.concatenate([positions, positions[unique].sum(axis=1)])
+        a, b, c = triangles.T
+        ab, bc, ca = middle.T
+        quarters = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        triangles = np.concatenate([np.stack(t, axis=-1) for t in quarters])
+    return positions / np.linalg.norm(positions, axis=1, keepdims=True), triangles

@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's materials as glTF materials: the surface, its textures, its absorption, its displacement."""
+
+import math
+
+from . import nodes
+from .displacement import export_displacement
+from .light import set_emission
+from .mesh import Wanted
+from .surface import Surface, surface_from
+from .texture import Input, TextureReader
+
+#: The format has two sets of texture coordinates a vertex.
+_MOST_COORDINATES = 2
+
+#: Solid glass is told from thin walls by a thickness that is not zero; its size means nothing to a ray tracer.
+_SOLID = 1.0
+
+
+class MaterialExporter:
+    """Exports each material once.
+
+    @param  writer    GltfWriter
+    @param  images    ImageExporter
+    @param  settings  scene.relief
+    @param  report    Report
+    """
+
+    def __init__(self, writer, images, settings, report):
+        self._writer = writer
+        self._images = images
+        self._settings = settings
+        self._report = report
+        self._exported = {}
+
+    def export(self, material):
+        """(index of the glTF material, Wanted of its meshes); a slot without material is grey."""
+        key = None if material is None else material.as_pointer()
+        if key not in self._exported:
+            job = _MaterialJob(self._writer, self._images, self._settings, self._report, material)
+            self._exported[key] = (self._writer.add("materials", job.json), job.wanted())
+        return self._exported[key]
+
+
+class _MaterialJob:
+    """One material on its way."""
+
+    def __init__(self, writer, images, settings, report, material):
+        self._writer = writer
+        self._images = images
+        self._name = material.name if material else "default"
+        self._report = report
+        self._coordinates = []
+        self._color_map = ""
+        self._displaced = False
+        self.json = {"name": self._name, "doubleSided": True}
+        textures = TextureReader(self._warn)
+        if material is None or not material.use_nodes or material.node_tree is None:
+            color = (0.8, 0.8, 0.8) if material is None else tuple(material.diffuse_color[:3])
+            self._write_surface(Surface(base_color=Input(color)))
+            return
+        output = nodes.active_output(material.node_tree, "ShaderNodeOutputMaterial")
+        source = nodes.follow(output.inputs["Surface"]) if output else None
+        surface = surface_from(source, textures)
+        self._write_surface(surface)
+        if output:
+            self._write_volume(nodes.follow(output.inputs["Volume"]), surface, textures)
+        value = export_displacement(material, settings, textures, self._data_info, images)
+        if value is not None:
+            self._displaced = True
+            writer.extend(self.json, "RELIEF_displacement", value)
+
+    def wanted(self):
+        return Wanted(tuple(self._coordinates), self._color_map, self._displaced)
+
+    def _warn(self, what, instead=""):
+        self._report.warn(f'material "{self._name}"', what, instead)
+
+    def _extend(self, name, value):
+        self._writer.extend(self.json, name, value)
+
+    def _info(self, texture, uri):
+        """glTF's reference to a texture, with its coordinates and transform; None without a file."""
+        if uri is None:
+            return None
+        info = {"index": self._writer.add_texture(uri, texture.wrap, texture.nearest)}
+        source = texture.mapping.source
+        if source not in self._coordinates:
+            if len(self._coordinates) == _MOST_COORDINATES:
+                self._warn("more than two sets of texture coordinates", f"{self._coordinates[0]} was used for {source}")
+                source = self._coordinates[0]
+            else:
+                self._coordinates.append(source)
+        if self._coordinates.index(source) > 0:
+            info["texCoord"] = self._coordinates.index(source)
+        transform = texture.mapping.transform()
+        if transform is not None:
+            self._writer.extend(info, "KHR_texture_transform", transform)
+        return info
+
+    def _color_info(self, texture):
+        uri = self._images.color_uri(texture.node.image, texture.node.image_user, self._warn)
+        return self._info(texture, uri)
+
+    def _data_info(self, texture):
+        node = texture.node
+        if texture.channel is None:
+            uri = self._images.data_uri(node.image, node.image_user, self._warn)
+        else:
+            uri = self._images.channel_uri(node.image, texture.channel, self._warn)
+        return self._info(texture, uri)
+
+    def _without_offset(self, value, what):
+        if value.offset:
+            self._warn(f"a sum with the texture of its {what}", "the texture alone was used")
+
+    def _write_surface(self, surface):
+        pbr = self.json["pbrMetallicRoughness"] = {}
+        pbr["baseColorFactor"] = [*(min(max(c, 0.0), 1.0) for c in surface.base_color.value), 1.0]
+        if surface.base_color.texture:
+            info = self._base_color_info(surface.base_color.texture)
+            if info:
+                pbr["baseColorTexture"] = info
+        self._color_map = surface.base_color.color_map
+        self._write_alpha(surface, pbr)
+        self._write_metallic_roughness(surface, pbr)
+        if surface.normal is not None:
+            info = self._data_info(surface.normal.texture)
+            if info:
+                self.json["normalTexture"] = {**info, "scale": surface.normal.value}
+        self._write_reflection(surface)
+        self._write_layers(surface)
+        if surface.emits():
+            set_emission(self.json, [max(0.0, c) for c in surface.emission.value], self._writer)
+            if surface.emission.texture:
+                info = self._color_info(surface.emission.texture)
+                if info:
+                    self.json["emissiveTexture"] = info
+
+    def _base_color_info(self, texture):
+        if texture.channel is None:
+            return self._color_info(texture)
+        # A grey float image stays linear where colours are read.
+        node = texture.node
+        return self._info(texture, self._images.channel_uri(node.image, texture.channel, self._warn))
+
+    def _write_alpha(self, surface, pbr):
+        alpha = surface.alpha
+        if alpha.is_constant():
+            if alpha.value < 1:
+                self.json["alphaMode"] = "BLEND"
+                pbr["baseColorFactor"][3] = max(0.0, alpha.value)
+            return
+        base = surface.base_color.texture
+        own = alpha.texture
+        if base and own and own.channel == 3 and own.node.image == base.node.image and own.mapping == base.mapping:
+            self.json["alphaMode"] = "BLEND"
+            pbr["baseColorFactor"][3] = min(max(alpha.value, 0.0), 1.0)
+            return
+        if base is None and own is not None:
+            self._write_alpha_image(own, surface, pbr)
+            return
+        self._warn("opacity by another image than its base colour's alpha", "it is opaque")
+
+    def _write_alpha_image(self, texture, surface, pbr):
+        """Opacity by an image of its own over a plain colour: a white image with that alpha."""
+        image = texture.node.image
+        uri = self._images.alpha_uri(image, texture.channel, self._warn)
+        info = self._info(texture, uri)
+        if info:
+            self.json["alphaMode"] = "BLEND"
+            pbr["baseColorTexture"] = info
+            pbr["baseColorFactor"][3] = min(max(surface.alpha.value, 0.0), 1.0)
+
+    def _write_metallic_roughness(self, surface, pbr):
+        metallic, roughness = surface.metallic, surface.roughness
+        for value, what in ((metallic, "metallic"), (roughness, "roughness")):
+            self._without_offset(value, what)
+        pbr["metallicFactor"] = min(max(metallic.value, 0.0), 1.0)
+        pbr["roughnessFactor"] = min(max(roughness.value, 0.0), 1.0)
+        if metallic.texture is None and roughness.texture is None:
+            return
+        info = self._metallic_roughness_info(metallic, roughness, pbr)
+        if info:
+            pbr["metallicRoughnessTexture"] = info
+
+    def _metallic_roughness_info(self, metallic, roughness, pbr):
+        """glTF keeps both in one image, roughness in green and metallic in blue."""
+        rough, metal = roughness.texture, metallic.texture
+        if metal is None and metallic.value == 0:
+            # Blue is multiplied by 0, so a grey image does, and so does one whose green it is.
+            if rough.channel in {None, 1}:
+                node = rough.node
+                return self._info(rough, self._images.data_uri(node.image, node.image_user, self._warn))
+            return self._data_info(rough)
+        if rough and metal and (rough.channel, metal.channel) == (1, 2) and rough.node.image == metal.node.image:
+            node = rough.node
+            return self._info(rough, self._images.data_uri(node.image, node.image_user, self._warn))
+        if rough and metal and rough.mapping != metal.mapping:
+            self._warn("different mappings for roughness and metallic", "the one of the roughness was used for both")
+        texture = rough or metal
+        planes = [(rough.node.image, rough.channel) if rough else None, (metal.node.image, metal.channel) if metal else None]
+        return self._info(texture, self._images.combined_uri(*planes, self._warn))
+
+    def _write_reflection(self, surface):
+        if not surface.transmission.is_constant(0.0):
+            value = {"transmissionFactor": min(max(surface.transmission.value, 0.0), 1.0)}
+            if surface.transmission.texture:
+                info = self._data_info(surface.transmission.texture)
+                if info:
+                    value["transmissionTexture"] = info
+            self._extend("KHR_materials_transmission", value)
+            self._extend("KHR_materials_volume", {"thicknessFactor": _SOLID})
+        if surface.ior != 1.5:
+            self._extend("KHR_materials_ior", {"ior": surface.ior})
+        if surface.specular != 1 or surface.specular_color != (1.0, 1.0, 1.0):
+            value = {"specularFactor": min(surface.specular, 1.0), "specularColorFactor": list(surface.specular_color)}
+            self._extend("KHR_materials_specular", value)
+
+    def _write_layers(self, surface):
+        if not surface.coat.is_constant(0.0):
+            value = {
+                "clearcoatFactor": min(max(surface.coat.value, 0.0), 1.0),
+                "clearcoatRoughnessFactor": min(max(surface.coat_roughness.value, 0.0), 1.0),
+            }
+            for source, name in ((surface.coat, "clearcoatTexture"), (surface.coat_roughness, "clearcoatRoughnessTexture")):
+                info = self._data_info(source.texture) if source.texture else None
+                if info:
+                    value[name] = info
+            self._extend("KHR_materials_clearcoat", value)
+        if max(surface.sheen_color) > 0:
+            color = [min(max(c, 0.0), 1.0) for c in surface.sheen_color]
+            value = {"sheenColorFactor": color, "sheenRoughnessFactor": surface.sheen_roughness}
+            self._extend("KHR_materials_sheen", value)
+
+    def _write_volume(self, source, surface, textures):
+        if source is None:
+            return
+        node = source.node
+        if node.bl_idname != "ShaderNodeVolumeAbsorption" or surface.transmission.is_constant(0.0):
+            self._warn(f'node "{node.name}" ({node.bl_label}) as volume', "it is left out")
+            return
+        color = textures.constant_color(node.inputs["Color"], source.groups)
+        density = max(0.0, textures.constant_number(node.inputs["Density"], source.groups))
+        coefficients = [density * (1.0 - min(max(c, 0.0), 1.0)) for c in color]
+        if max(coefficients) <= 0:
+            return
+        # Absorption a metre; the format wants what is left after some distance: after one mean free path.
+        distance = 1.0 / max(coefficients)
+        value = {
+            "thicknessFactor": _SOLID,
+            "attenuationDistance": distance,
+            "attenuationColor": [math.exp(-c * distance) for c in coefficients],
+        }
+        self._extend("KHR_materials_volume", value)

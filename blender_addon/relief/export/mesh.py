@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender meshes as glTF primitives, one a material.
+
+All data moves by foreach_get into typed arrays. glTF's vertices have one normal and one set of texture coordinates each,
+Blender's have as many as corners, so corners that are equal in everything are joined again.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import compat
+
+#: Odd 64-bit constants for hashing the columns of a corner; any will do, equality is checked afterwards.
+_HASH_FACTORS = np.random.default_rng(1).integers(1, 2**63, size=32, dtype=np.uint64) | np.uint64(1)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a material asks of the meshes that use it.
+
+    coordinates  at most two: ("uv", name of a map or "" for the one active in renders), ("generated", "") or ("object", "")
+    color        name of a colour attribute that multiplies the base colour; "": none
+    displaced    normals say where surfaces go to, so they must not open flat-shaded edges
+    """
+
+    coordinates: tuple = ()
+    color: str = ""
+    displaced: bool = False
+
+
+class _Corners:
+    """A mesh's triangles and the attributes of their corners."""
+
+    def __init__(self, mesh):
+        self.mesh = mesh
+        mesh.calc_loop_triangles()
+        num_triangles, num_loops = len(mesh.loop_triangles), len(mesh.loops)
+        loops = np.empty(3 * num_triangles, dtype=np.int32)
+        mesh.loop_triangles.foreach_get("loops", loops)
+        self.loops = loops.reshape(-1, 3)
+        self.material = np.empty(num_triangles, dtype=np.int32)
+        mesh.loop_triangles.foreach_get("material_index", self.material)
+        self.vertex = np.empty(num_loops, dtype=np.int32)
+        mesh.loops.foreach_get("vertex_index", self.vertex)
+        self.positions = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+        mesh.vertices.foreach_get("co", self.positions)
+        self.positions = self.positions.reshape(-1, 3)
+        self.normals = compat.corner_normals(mesh)
+
+    def displacement_normals(self):
+        """Normals without the edges of flat faces, which displacement would tear open; marked edges stay."""
+        if compat.splits_normals(self.mesh):
+            return self.normals
+        return compat.vertex_normals(self.mesh)[self.vertex]
+
+    def coordinates(self, source):
+        """Texture coordinates in glTF's orientation, v = 0 at the top: float32 (loops, 2); None if there are none."""
+        kind, name = source
+        if kind == "uv":
+            layer = self._uv_layer(name)
+            if layer is None:
+                return None
+            uv = np.empty(2 * len(self.mesh.loops), dtype=np.float32)
+            layer.data.foreach_get("uv", uv)
+            uv = uv.reshape(-1, 2)
+        else:
+            uv = self.positions[self.vertex, :2]
+            if kind == "generated":
+                # Blender's texture space is the box of the mesh before modifiers.
+                location = np.array(self.mesh.texspace_location[:2], dtype=np.float32)
+                size = np.array(self.mesh.texspace_size[:2], dtype=np.float32)
+                uv = (uv - location) / np.where(size == 0, 1, 2 * size) + np.float32(0.5)
+        out = np.empty_like(uv)
+        out[:, 0] = uv[:, 0]
+        out[:, 1] = 1 - uv[:, 1]
+        return out
+
+    def _uv_layer(self, name):
+        if name:
+            return self.mesh.uv_layers.get(name)
+        return next((layer for layer in self.mesh.uv_layers if layer.active_render), None)
+
+    def color(self, name):
+        """A colour attribute, linear: float32 (loops, 4); None if there is none on vertices or corners."""
+        attribute = self.mesh.color_attributes.get(name)
+        if attribute is None or attribute.domain not in {"POINT", "CORNER"}:
+            return None
+        values = np.empty(4 * len(attribute.data), dtype=np.float32)
+        attribute.data.foreach_get("color", values)
+        values = values.reshape(-1, 4)
+        return values[self.vertex] if attribute.domain == "POINT" else values
+
+
+def export_mesh(mesh, materials, writer, warn):
+    """Primitives of a mesh.
+
+    @param  mesh       evaluated bpy mesh; its caches of triangles and normals are filled
+    @param  materials  (index in the glTF, Wanted) of each slot, at least one
+    @param  writer     GltfWriter
+    @param  warn       called with a text
+    @return            index of a glTF mesh; None if there are no triangles
+    """
+    corners = _Corners(mesh)
+    if len(corners.loops) == 0:
+        return None
+    slots = np.clip(corners.material, 0, len(materials) - 1)
+    primitives = []
+    for slot in np.unique(slots):
+        index, wanted = materials[slot]
+        arrays = _primitive_arrays(corners, corners.loops[slots == slot], wanted, warn)
+        accessors = writer.add_accessors(arrays)
+        primitive = {"attributes": {n: a for n, a in accessors.items() if n != "indices"}, "indices": accessors["indices"]}
+        if index is not None:
+            primitive["material"] = index
+        primitives.append(primitive)
+    return writer.add("meshes", {"name": mesh.name, "primitives": primitives})
+
+
+def _primitive_arrays(corners, triangles, wanted, warn):
+    """Attributes and indices of some triangles.
+
+    @param  triangles  loop numbers of shape (n, 3)
+    @return            arrays by glTF's names, "indices" among them
+    """
+    per_loop = {"NORMAL": corners.displacement_normals() if wanted.displaced else corners.normals}
+    for number, source in enumerate(wanted.coordinates):
+        uv = corners.coordinates(source)
+        if uv is None:
+            warn(f'no uv map "{source[1]}"' if source[1] else "a textured material, but no uv map")
+            uv = np.zeros((len(corners.vertex), 2), dtype=np.float32)
+        per_loop[f"TEXCOORD_{number}"] = uv
+    if wanted.color:
+        color = corners.color(wanted.color)
+        if color is None:
+            warn(f'no colour attribute "{wanted.color}" on vertices or corners; its colour is white')
+        else:
+            per_loop["COLOR_0"] = color
+    loops = triangles.ravel()
+    representatives, indices = _join_equal(loops, corners.vertex, list(per_loop.values()))
+    arrays = {"POSITION": np.ascontiguousarray(corners.positions[corners.vertex[representatives]])}
+    for name, values in per_loop.items():
+        arrays[name] = np.ascontiguousarray(values[representatives])
+    arrays["indices"] = indices
+    return arrays
+
+
+def _join_equal(loops, vertex, attributes):
+    """Finds the corners that are equal in vertex and attributes.
+
+    @param  loops       loop numbers of triangle corners
+    @param  vertex      vertex of each loop
+    @param  attributes  float32 arrays of shape (all loops, k)
+    @return             (one loop for each distinct corner, uint32 index into these for each of `loops`)
+    @cost               one sort of the distinct loops
+    """
+    used, inverse = np.unique(loops, return_inverse=True) if len(loops) < len(vertex) else _all_loops(loops, vertex)
+    bits = [vertex[used].astype(np.uint64)]
+    for values in attributes:
+        bits.extend(np.ascontiguousarray(values[used]).view(np.uint32).astype(np.uint64).T)
+    key = np.zeros(len(used), dtype=np.uint64)
+    for column, factor in zip(bits, _HASH_FACTORS):
+        key = (key ^ column) * factor
+        key ^= key >> np.uint64(29)
+    _, first, group = np.unique(key, return_index=True, return_inverse=True)
+    if not all(np.array_equal(column[first][group], column) for column in bits):
+        # Two different corners with one key: about once in 10⁷ meshes of a million vertices.
+        first = group = np.arange(len(used))
+    return used[first], group[inverse].astype(np.uint32)
+
+
+def _all_loops(loops, vertex):
+    """What np.unique would say where every loop is used: no sort."""
+    return np.arange(len(vertex), dtype=np.int32), loops

@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The evaluated depsgraph as a list of distinct things and the places they stand at."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+#: Objects that Blender can turn into a mesh.
+GEOMETRY_TYPES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
+
+#: Evaluated objects that have nothing to render.
+_SILENT_TYPES = {"CAMERA", "EMPTY", "ARMATURE", "LATTICE", "SPEAKER"}
+
+
+@dataclass
+class Things:
+    """One object's data and where it stands.
+
+    object    original bpy object: it outlives the walk
+    name      of the object
+    kind      "geometry" or "light"
+    data      evaluated mesh of an instance that geometry nodes made; None: the object's own
+    matrices  world matrices, row-major, one a place: list of 16 floats each
+    """
+
+    object: object
+    name: str
+    kind: str
+    data: object = None
+    matrices: list = field(default_factory=list)
+
+    def world_matrices(self):
+        """float64 of shape (places, 4, 4)."""
+        return np.array(self.matrices, dtype=np.float64).reshape(-1, 4, 4)
+
+
+def collect(depsgraph, report):
+    """Everything to render, each thing once.
+
+    @param  depsgraph  evaluated for a render or a viewport
+    @param  report     Report
+    @return            list of Things, in the depsgraph's order
+    """
+    things = {}
+    for instance in depsgraph.object_instances:
+        # Blender reuses one object for all instances: only its original and its data tell them apart.
+        shown = instance.object
+        kind = "geometry" if shown.type in GEOMETRY_TYPES else "light" if shown.type == "LIGHT" else None
+        if kind is None:
+            if shown.type not in _SILENT_TYPES:
+                report.warn(f'object "{shown.name}"', f"objects of type {shown.type.lower()}", "it is left out")
+            continue
+        if not (instance.show_self if not instance.is_instance else True):
+            continue
+        original = shown.original
+        data = shown.data
+        key = (original.as_pointer(), data.as_pointer() if data is not None else 0)
+        thing = things.get(key)
+        if thing is None:
+            thing = things[key] = Things(original, shown.name, kind)
+            if instance.is_instance and kind == "geometry" and _is_made(shown, original, depsgraph):
+                thing.data = data
+        matrix = instance.matrix_world
+        thing.matrices.append((*matrix[0], *matrix[1], *matrix[2], *matrix[3]))
+    return list(things.values())
+
+
+def _is_made(shown, original, depsgraph):
+    """Whether an instance shows a mesh of its own, made by geometry nodes, instead of an object's."""
+    return shown.type == "MESH" and shown.data != original.evaluated_get(depsgraph).data
+
+
+def decompose(matrices):
+    """Translations, rotations and scales of matrices.
+
+    @param  matrices  float64 (n, 4, 4)
+    @return           (translation (n, 3), quaternion (n, 4) as x y z w, scale (n, 3), exact (n,): whether the three make
+                      the matrix again to 10⁻⁶ of its size; a sheared one cannot be made)
+    """
+    linear = matrices[:, :3, :3]
+    scale = np.linalg.norm(linear, axis=1)
+    scale[:, 0] *= np.where(np.linalg.det(linear) < 0, -1.0, 1.0)
+    safe = np.where(scale == 0, 1.0, scale)
+    rotation = linear / safe[:, None, :]
+    quaternion = _quaternion(rotation)
+    again = _rotation(quaternion) * scale[:, None, :]
+    size = np.abs(linear).max(axis=(1, 2))
+    exact = np.abs(again - linear).max(axis=(1, 2)) <= 1e-6 * size
+    return matrices[:, :3, 3], quaternion, scale, exact & (scale != 0).all(axis=1)
+
+
+def _quaternion(r):
+    """Unit quaternions (x, y, z, w) of rotations (n, 3, 3): the best conditioned of four equal formulas each.
+
+    @source  K. Shoemake 1985, "Animating rotation with quaternion curves", appendix
+    """
+    xx, yy, zz = r[:, 0, 0], r[:, 1, 1], r[:, 2, 2]
+    squares = 1 + np.stack([xx - yy - zz, yy - zz - xx, zz - xx - yy, xx + yy + zz], axis=-1)
+    sums = np.stack([r[:, 1, 0] + r[:, 0, 1], r[:, 2, 0] + r[:, 0, 2], r[:, 2, 1] + r[:, 1, 2]], axis=-1)
+    turns = np.stack([r[:, 2, 1] - r[:, 1, 2], r[:, 0, 2] - r[:, 2, 0], r[:, 1, 0] - r[:, 0, 1]], axis=-1)
+    rows = np.stack(
+        [
+            np.stack([squares[:, 0], sums[:, 0], sums[:, 1], turns[:, 0]], axis=-1),
+            np.stack([sums[:, 0], squares[:, 1], sums[:, 2], turns[:, 1]], axis=-1),
+            np.stack([sums[:, 1], sums[:, 2], squares[:, 2], turns[:, 2]], axis=-1),
+            np.stack([turns[:, 0], turns[:, 1], turns[:, 2], squares[:, 3]], axis=-1),
+        ],
+        axis=1,
+    )
+    best = rows[np.arange(len(r)), squares.argmax(axis=1)]
+    return best / np.maximum(np.linalg.norm(best, axis=1, keepdims=True), 1e-300)
+
+
+def _rotation(q):
+    """Rotation matrices of unit quaternions."""
+    x, y, z, w = q.T
+    return np.stack(
+        [
+            np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], axis=-1),
+            np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], axis=-1),
+            np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=-1),
+        ],
+        axis=1,
+    )

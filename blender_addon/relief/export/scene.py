@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Exports one evaluated frame: walks the depsgraph and hands each thing to its own exporter."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from .axes import GLTF_FROM_BLENDER
+from .gltf import GltfWriter, matrix_property
+from .image import ImageExporter
+from .light import Place, export_light
+from .material import MaterialExporter
+from .mesh import export_mesh
+from .objects import collect, decompose
+from .settings import render_settings
+from .world import export_world
+
+DATA_FOLDER = "relief_data"
+
+
+@dataclass
+class Exported:
+    """What an export did.
+
+    path           of the scene file
+    used_files     names in its data folder
+    seconds        of wall clock
+    bytes_written  files that were there already are not counted
+    """
+
+    path: str
+    used_files: set
+    seconds: float
+    bytes_written: int
+
+
+@dataclass
+class View:
+    """The camera of a picture.
+
+    camera  glTF camera
+    matrix  its world matrix in Blender's axes (4×4 nested floats); a scale is ignored
+    size    (width, height) in pixels of the whole picture
+    """
+
+    camera: dict
+    matrix: object
+    size: tuple
+
+
+def export_scene(depsgraph, view, folder, name, report):
+    """Writes what a depsgraph holds as a scene file.
+
+    @param  depsgraph  evaluated
+    @param  view       View
+    @param  folder     where to write; made if it is missing
+    @param  name       of the scene file
+    @param  report     Report
+    @return            Exported
+    """
+    begin = time.perf_counter()
+    exporter = SceneExporter(depsgraph, folder, report)
+    exporter.add_view(view)
+    exporter.add_world()
+    exporter.add_objects()
+    path = exporter.write(name)
+    writer = exporter.writer
+    return Exported(path, writer.used_files, time.perf_counter() - begin, writer.bytes_written)
+
+
+class SceneExporter:
+    """A scene file in the making; the root node turns Blender's axes into glTF's.
+
+    writer       GltfWriter
+    camera_node  index of the camera's node; None before there is one
+    """
+
+    def __init__(self, depsgraph, folder, report):
+        self.writer = GltfWriter(folder, DATA_FOLDER)
+        self._depsgraph = depsgraph
+        self._scene = depsgraph.scene
+        self._report = report
+        self._images = ImageExporter(self.writer, self._scene.frame_current)
+        self._materials = MaterialExporter(self.writer, self._images, self._scene.relief, report)
+        self._meshes = {}
+        self._children = []
+        self.camera_node = None
+        self.writer.json["scene"] = 0
+        self.writer.add("scenes", {"nodes": [0]})
+        self.writer.add("nodes", {"name": "Blender", "matrix": matrix_property(GLTF_FROM_BLENDER)})
+
+    def add_node(self, node):
+        """Adds a node in Blender's world; returns its index."""
+        index = self.writer.add("nodes", node)
+        self._children.append(index)
+        return index
+
+    def add_view(self, view):
+        """Sets the camera and the settings of the picture; a later call replaces them."""
+        translation, rotation, _, _ = decompose(np.array([view.matrix], dtype=np.float64).reshape(1, 4, 4))
+        node = {"name": view.camera.get("name", "view"), "camera": 0}
+        node.update(translation=translation[0].tolist(), rotation=rotation[0].tolist())
+        self.writer.use_extension("RELIEF_camera")
+        self.writer.json["cameras"] = [view.camera]
+        if self.camera_node is None:
+            self.camera_node = self.add_node(node)
+        else:
+            self.writer.json["nodes"][self.camera_node] = node
+        self.writer.extend(self.writer.json, "RELIEF_render", render_settings(self._scene, view.size))
+
+    def add_world(self):
+        is_opaque = not self._scene.render.film_transparent
+        export_world(self._scene.world, is_opaque, self.writer, self._images, self._report)
+
+    def add_objects(self):
+        """Adds meshes, instances and lights."""
+        things = collect(self._depsgraph, self._report)
+        for thing in things:
+            if thing.kind == "geometry":
+                self._add_geometry(thing)
+        size = _extent(things)
+        for thing in things:
+            if thing.kind == "light":
+                self._add_lights(thing, size)
+
+    def write(self, name):
+        """Writes the scene file; returns its path."""
+        self.writer.json["nodes"][0]["children"] = self._children
+        return self.writer.write(name)
+
+    def _warner(self, kind, name):
+        return lambda what, instead="": self._report.warn(f'{kind} "{name}"', what, instead)
+
+    def _add_geometry(self, thing):
+        mesh = self.mesh_of(thing)
+        if mesh is None:
+            return
+        base = {"name": thing.name, "mesh": mesh}
+        settings = self._object_settings(thing.object)
+        if settings:
+            self.writer.extend(base, "RELIEF_object", settings)
+        matrices = thing.world_matrices()
+        if len(matrices) == 1:
+            self.add_node({**base, "matrix": matrix_property(matrices[0])})
+            return
+        translation, rotation, scale, exact = decompose(matrices)
+        if exact.any():
+            arrays = {"TRANSLATION": translation[exact], "ROTATION": rotation[exact], "SCALE": scale[exact]}
+            arrays = {key: np.ascontiguousarray(a, dtype=np.float32) for key, a in arrays.items()}
+            node = {**base, "extensions": dict(base.get("extensions", {}))}
+            accessors = self.writer.add_accessors(arrays)
+            self.writer.extend(node, "EXT_mesh_gpu_instancing", {"attributes": dict(accessors)})
+            self.add_node(node)
+        for matrix in matrices[~exact]:
+            self.add_node({**base, "matrix": matrix_property(matrix)})
+
+    def _object_settings(self, original):
+        """RELIEF_object of an object; {} if all is usual."""
+        settings = {}
+        if not original.visible_camera:
+            settings["visibleToCamera"] = False
+        if not original.visible_shadow:
+            settings["castsShadow"] = False
+        hidden = [k for k in ("diffuse", "glossy", "transmission") if not getattr(original, f"visible_{k}")]
+        warn = self._warner("object", original.name)
+        if hidden:
+            warn(f"hidden from {' and '.join(hidden)} rays", "these see it")
+        if original.is_holdout or original.is_shadow_catcher:
+            warn("holdouts and shadow catchers", "it is an ordinary object")
+        return settings
+
+    def mesh_of(self, thing):
+        """Index of the glTF mesh of a thing; None if it has no triangles."""
+        if thing.data is not None:
+            materials = [self._materials.export(m) for m in thing.data.materials] or [self._materials.export(None)]
+            return export_mesh(thing.data, materials, self.writer, self._warner("mesh", thing.data.name))
+        evaluated = thing.object.evaluated_get(self._depsgraph)
+        mesh = evaluated.to_mesh()
+        if mesh is None:
+            return None
+        try:
+            slots = [slot.material for slot in evaluated.material_slots]
+            materials = [self._materials.export(m) for m in slots] or [self._materials.export(None)]
+            return export_mesh(mesh, materials, self.writer, self._warner("object", thing.name))
+        finally:
+            evaluated.to_mesh_clear()
+
+    def _add_lights(self, thing, scene_size):
+        original = thing.object
+        light = original.evaluated_get(self._depsgraph).data
+        translation, rotation, scale, _ = decompose(thing.world_matrices())
+        for t, r, s in zip(translation, rotation, scale):
+            node = {"name": thing.name, "translation": t.tolist(), "rotation": r.tolist()}
+            place = Place(
+                node=node,
+                scale=(abs(s[0]), abs(s[1])),
+                visible_to_camera=original.visible_camera,
+                scene_size=scene_size,
+                writer=self.writer,
+                warn=self._warner("light", thing.name),
+            )
+            export_light(light, place)
+            self.add_node(node)
+
+
+def _extent(things):
+    """Metres that the centres of all things and their own sizes reach over: at least 1."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for thing in things:
+        if thing.kind != "geometry":
+            continue
+        matrices = thing.world_matrices()
+        corners = np.array(thing.object.bound_box, dtype=np.float64)
+        reach = np.abs(corners).max() * np.abs(matrices[:, :3, :3]).sum(axis=2).max()
+        low = np.minimum(low, matrices[:, :3, 3].min(axis=0) - reach)
+        high = np.maximum(high, matrices[:, :3, 3].max(axis=0) + reach)
+    return max(1.0, float((high - low).max())) if np.isfinite(low).all() else 1.0

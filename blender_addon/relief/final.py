@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One final render: export, run the program, take its picture over. Errors are raised, engine.py tells them."""
+
+import json
+import os
+import time
+
+from . import exr, report, result, session
+from .export.camera import camera_json
+from .export.scene import DATA_FOLDER, View, export_scene
+from .preferences import find_checked_binary
+from .process import Process
+from .report import ReliefError, Report
+
+_POLL_SECONDS = 0.05
+_INTERRUPTED = 130
+
+
+def render(engine, depsgraph):
+    """Renders the depsgraph's view layer into Blender's result.
+
+    @param  engine     the RenderEngine, for progress, cancelling and the result
+    @param  depsgraph  evaluated for rendering
+    @error  ReliefError
+    """
+    begin = time.perf_counter()
+    binary = find_checked_binary()
+    scene = depsgraph.scene
+    warnings = Report(strict=scene.relief.strict)
+    _warn_unread(scene, warnings)
+    view, crop = _view(engine, depsgraph, warnings)
+    folder = session.render_folder()
+    layer_name = depsgraph.view_layer.name
+    passes = result.enabled_passes(depsgraph.view_layer)
+
+    engine.update_stats("", "Exporting")
+    exported = export_scene(depsgraph, view, folder, "scene.gltf", warnings)
+    session.remove_stale(os.path.join(folder, DATA_FOLDER), exported.used_files)
+    report.publish(scene.name, warnings.warnings)
+
+    picture_path, stats_path = os.path.join(folder, "picture.exr"), os.path.join(folder, "stats.json")
+    arguments = [binary, "render", exported.path, "-o", picture_path, "--stats", stats_path]
+    arguments += ["--progress", "json", "--compression", "none", "--float", "--aov", result.aov_list(passes)]
+    arguments += command_line(scene.relief, crop)
+    try:
+        with Process(arguments) as process:
+            code = _follow(engine, process)
+            is_cancelled = engine.test_break()
+            if code != 0 and not (is_cancelled and code == _INTERRUPTED):
+                if is_cancelled:
+                    return
+                raise ReliefError(process.failure(code))
+            for message in process.messages():
+                if message.startswith("relief: warning: "):
+                    warnings.warn("program", message.removeprefix("relief: warning: "))
+        if not os.path.exists(picture_path):  # cancelled before the first sample
+            return
+        report.publish_more(scene.name, warnings.warnings)
+        picture = exr.read(picture_path)
+        statistics = _read_statistics(stats_path)
+    finally:
+        for path in (picture_path, stats_path, exported.path):
+            if os.path.exists(path):
+                os.remove(path)
+    seconds = {"export": exported.seconds, "total": time.perf_counter() - begin}
+    metadata = _metadata(statistics, warnings.warnings, seconds, exported.bytes_written)
+    result.fill(engine, picture, layer_name, passes, scene.render.film_transparent, metadata)
+    _log(statistics, seconds, exported.bytes_written)
+
+
+def command_line(settings, crop=None):
+    """Options of the program that the scene format has no place for.
+
+    @param  settings  scene.relief
+    @param  crop      (x0, y0, x1, y1) from the top left, or None
+    """
+    arguments = ["--texture-memory", f"{settings.memory_limit:g}"]
+    if settings.time_limit > 0:
+        arguments += ["--time-limit", f"{settings.time_limit:g}"]
+    if settings.threads > 0:
+        arguments += ["--threads", str(settings.threads)]
+    if settings.strict:
+        arguments.append("--strict")
+    if crop:
+        arguments += ["--crop", ",".join(str(x) for x in crop)]
+    return arguments
+
+
+def focus_distance(camera_object, matrix, depsgraph):
+    """Metres along a camera's axis to what it focuses on."""
+    dof = camera_object.data.dof
+    if dof.focus_object is None:
+        return dof.focus_distance
+    target = dof.focus_object.evaluated_get(depsgraph).matrix_world.translation
+    axis = matrix.to_3x3().col[2].normalized()
+    return abs((target - matrix.translation).dot(axis))
+
+
+def _view(engine, depsgraph, warnings):
+    """(View of the scene's camera, crop or None)."""
+    scene = depsgraph.scene
+    if scene.camera is None:
+        raise ReliefError("the scene has no camera")
+    camera = scene.camera.evaluated_get(depsgraph)
+    if camera.type != "CAMERA":
+        raise ReliefError(f'the scene looks through "{camera.name}", which is not a camera')
+    matrix = engine.camera_model_matrix(camera)
+    render = scene.render
+    if render.pixel_aspect_x != render.pixel_aspect_y:
+        warnings.warn(f'scene "{scene.name}"', "pixels that are not square", "square ones were used")
+    width = int(render.resolution_x * render.resolution_percentage / 100)
+    height = int(render.resolution_y * render.resolution_percentage / 100)
+    distance = focus_distance(camera, camera.matrix_world, depsgraph)
+    lens = camera_json(camera.data, (width, height), distance, lambda *t: warnings.warn(f'camera "{camera.name}"', *t))
+    view = View(lens, [list(row) for row in matrix], (width, height))
+    if not render.use_border:
+        return view, None
+    # Blender has done the rounding: the region has the size that the engine was told.
+    x0 = min(round(render.border_min_x * width), width - engine.resolution_x)
+    top = height - min(round(render.border_min_y * height), height - engine.resolution_y)
+    crop = (max(x0, 0), top - engine.resolution_y, max(x0, 0) + engine.resolution_x, top)
+    return view, crop
+
+
+def _warn_unread(scene, warnings):
+    where = f'scene "{scene.name}"'
+    if scene.render.use_motion_blur:
+        warnings.warn(where, "motion blur", "everything stands still")
+    if scene.render.use_multiview:
+        warnings.warn(where, "stereoscopy", "the scene's camera alone was used")
+
+
+def _follow(engine, process):
+    """Shows progress until the program ends; ends it if the artist cancels. Returns its exit code."""
+    engine.update_stats("", "Loading")
+    while (code := process.wait(_POLL_SECONDS)) is None:
+        for event in process.events():
+            if event.get("event") == "progress":
+                engine.update_progress(event["fraction"])
+                left = event.get("seconds_left")
+                remaining = f" | {left:.0f} s left" if left is not None else ""
+                rays = event.get("rays_per_second") or 0
+                engine.update_stats("", f"Sample {event['samples']:g} | {rays / 1e6:.1f} Mrays/s{remaining}")
+        if engine.test_break():
+            return process.end()
+    return code
+
+
+def _read_statistics(path):
+    with open(path, encoding="utf-8") as file:
+        return json.load(file)
+
+
+def _metadata(statistics, warnings, seconds, bytes_written):
+    """Texts for the image's file: what the render was, took and left out."""
+    out = {f"relief.{key}": f"{statistics[key]:.6g}" for key in _NUMBERS if statistics.get(key) is not None}
+    out.update({f"relief.{key}": str(statistics.get(key)) for key in ("version", "seed", "stop_reason")})
+    out.update({f"relief.{key}_seconds": f"{value:.3f}" for key, value in seconds.items()})
+    out["relief.export_bytes"] = str(bytes_written)
+    out["relief.statistics"] = json.dumps({k: v for k, v in statistics.items() if k != "warnings"})
+    out["relief.warnings"] = "\n".join(warnings)
+    return out
+
+
+_NUMBERS = ("load_seconds", "build_seconds", "render_seconds", "samples_per_pixel", "error_rmse", "peak_memory_bytes")
+
+
+def _log(statistics, seconds, bytes_written):
+    print(
+        f"relief: {seconds['total']:.2f} s in all: export {seconds['export']:.2f} ({bytes_written / 1e6:.2f} MB), "
+        f"load {statistics['load_seconds']:.2f}, build {statistics['build_seconds']:.2f}, "
+        f"render {statistics['render_seconds']:.2f}; {statistics['samples_per_pixel']:.4g} samples a pixel, "
+        f"peak {statistics['peak_memory_bytes'] / 2**20:.0f} MiB",
+        flush=True,
+    )

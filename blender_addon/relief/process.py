@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The `relief` program: finding it, starting it, listening to it, ending it."""
+
+import json
+import os
+import queue
+import shutil
+import subprocess
+import threading
+
+from .report import ReliefError
+
+#: What the add-on speaks: programs of this major and minor version.
+VERSION = (0, 1)
+
+#: How long a program that was asked to end may take before it is killed.
+_PATIENCE_SECONDS = 5.0
+
+_checked_binaries = {}
+
+
+def find_binary(preference):
+    """Path of the program: the preference, then $RELIEF_BINARY, then the PATH.
+
+    @error  ReliefError that names the places looked at
+    """
+    for origin, path in (("the add-on's preferences", preference), ("$RELIEF_BINARY", os.environ.get("RELIEF_BINARY"))):
+        if path:
+            if not (os.path.isfile(path) and os.access(path, os.X_OK)):
+                raise ReliefError(f"{origin} name {path!r} as the relief program, which is not an executable file")
+            return path
+    found = shutil.which("relief")
+    if not found:
+        raise ReliefError(
+            "the relief program was not found. Set its path in Edit > Preferences > Add-ons > relief, "
+            "or in $RELIEF_BINARY, or put it on the PATH"
+        )
+    return found
+
+
+def check_version(binary):
+    """Makes sure that the program is one that this add-on can talk to.
+
+    @return  its version, such as '0.1.0'
+    @error   ReliefError with both versions
+    """
+    stamp = (binary, os.stat(binary).st_mtime_ns)
+    if stamp not in _checked_binaries:
+        try:
+            run = subprocess.run([binary, "--version"], capture_output=True, text=True, timeout=20)
+        except (OSError, subprocess.TimeoutExpired) as cause:
+            raise ReliefError(f"{binary} cannot be run: {cause}") from cause
+        words = run.stdout.split()
+        numbers = words[1].split(".") if len(words) == 2 and words[0] == "relief" else []
+        if run.returncode != 0 or len(numbers) < 2 or not all(n.isdigit() for n in numbers[:2]):
+            raise ReliefError(f"{binary} is not the relief program: `--version` says {run.stdout.strip()!r}")
+        if tuple(int(n) for n in numbers[:2]) != VERSION:
+            wanted = ".".join(str(n) for n in VERSION)
+            raise ReliefError(f"{binary} is relief {words[1]}; this add-on needs {wanted}.x")
+        _checked_binaries[stamp] = words[1]
+    return _checked_binaries[stamp]
+
+
+class Process:
+    """One running program. Use as a context manager: leaving the block ends it, whatever happened.
+
+    @param  arguments  command line, the program first
+    """
+
+    def __init__(self, arguments):
+        self._events = queue.SimpleQueue()
+        self._messages = []
+        try:
+            # A session of its own: Ctrl-C in Blender's terminal reaches Blender alone, which then ends the program.
+            self._popen = subprocess.Popen(
+                arguments,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                encoding="utf-8",
+                errors="replace",
+                start_new_session=True,
+            )
+        except OSError as cause:
+            raise ReliefError(f"{arguments[0]} cannot be started: {cause}") from cause
+        # Pipes that nobody empties would stop the program, and reading them here would stop Blender.
+        self._readers = [
+            threading.Thread(target=self._read_events, daemon=True),
+            threading.Thread(target=self._read_messages, daemon=True),
+        ]
+        for reader in self._readers:
+            reader.start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.end()
+
+    def _read_events(self):
+        for line in self._popen.stdout:
+            try:
+                self._events.put(json.loads(line))
+            except ValueError:
+                self._messages.append(line.rstrip())
+
+    def _read_messages(self):
+        for line in self._popen.stderr:
+            self._messages.append(line.rstrip())
+
+    def events(self):
+        """Progress objects that have arrived since the last call."""
+        out = []
+        while not self._events.empty():
+            out.append(self._events.get())
+        return out
+
+    def wait(self, seconds):
+        """Waits for the program to end, at most so long.
+
+        @return  its exit code; negative: the signal that ended it; None: still running
+        """
+        try:
+            code = self._popen.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return None
+        for reader in self._readers:
+            reader.join(_PATIENCE_SECONDS)
+        return code
+
+    def interrupt(self):
+        """Asks the program to save what it has and end."""
+        if self._popen.poll() is None:
+            self._popen.terminate()
+
+    def end(self):
+        """Makes sure that the program has ended: asks, waits, kills. Returns its exit code."""
+        self.interrupt()
+        code = self.wait(_PATIENCE_SECONDS)
+        if code is None:
+            self._popen.kill()
+            code = self.wait(None)
+        return code
+
+    def kill(self):
+        """Ends the program at once, where what it has rendered does not matter."""
+        if self._popen.poll() is None:
+            self._popen.kill()
+        self.wait(None)
+
+    def messages(self):
+        """Lines of standard error so far."""
+        return list(self._messages)
+
+    def failure(self, code):
+        """Text for an exit code that is not success: the program's own words, or what ended it."""
+        errors = [m for m in self._messages if not m.startswith("relief: warning: ")]
+        said = " ".join(m.strip().removeprefix("relief: ") for m in errors)
+        cause = f"ended by signal {-code}" if code < 0 else f"ended with code {code}"
+        return f"relief {cause}" + (f": {said}" if said else "")

@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""scene.relief and view_layer.relief: the settings, each with its unit and default in the tooltip."""
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
+
+_METHODS = (
+    ("auto", "Automatic", "The program chooses (default)"),
+    ("chord", "Chord", "The fast method: exact, with little memory"),
+    ("rmip", "RMIP", "Ranges of oblong windows of the map (Thonat and others 2023)"),
+    ("rmip-minmax", "RMIP over min-max", "The same over a min-max mipmap, for comparisons"),
+    ("tfdm", "TFDM", "Affine arithmetic over a min-max mipmap (Thonat and others 2021)"),
+    ("tessellate", "Tessellate", "Triangles of the size of a texel: needs much memory"),
+    ("tessellate-grid", "Tessellate to grids", "The same in Embree's grids"),
+)
+
+
+class ReliefSceneSettings(bpy.types.PropertyGroup):
+    samples: IntProperty(
+        name="Samples",
+        description="Samples a pixel; with a noise threshold or a time limit, the most that are taken (default 128)",
+        default=128,
+        min=1,
+        max=16777216,
+    )
+    preview_samples: IntProperty(
+        name="Viewport Samples",
+        description="Samples a pixel after which the viewport's picture is finished (default 256)",
+        default=256,
+        min=1,
+        max=16777216,
+    )
+    seed: IntProperty(
+        name="Seed",
+        description="Of all random numbers: equal seeds give equal pictures (default 0)",
+        default=0,
+        min=0,
+    )
+    time_limit: FloatProperty(
+        name="Time Limit",
+        description="Seconds of sampling after which no further pass is started; 0 is no limit (default 0)",
+        default=0.0,
+        min=0.0,
+        unit="TIME_ABSOLUTE",
+    )
+    noise_threshold: FloatProperty(
+        name="Noise Threshold",
+        description="Estimated error, relative to the mean radiance, at which a tile is finished; 0 is off (default 0)",
+        default=0.0,
+        min=0.0,
+        max=1.0,
+        precision=4,
+    )
+    max_bounces: IntProperty(
+        name="Total",
+        description="Scattering events after the first hit; 0 is direct light only (default 12)",
+        default=12,
+        min=0,
+        max=200,
+    )
+    diffuse_bounces: IntProperty(
+        name="Diffuse", description="Most of the bounces that may be diffuse (default 12)", default=12, min=0, max=200
+    )
+    glossy_bounces: IntProperty(
+        name="Glossy", description="Most of the bounces that may be glossy (default 12)", default=12, min=0, max=200
+    )
+    transmission_bounces: IntProperty(
+        name="Transmission",
+        description="Most of the bounces that may pass through a surface (default 12)",
+        default=12,
+        min=0,
+        max=200,
+    )
+    transparent_bounces: IntProperty(
+        name="Transparent",
+        description="Surfaces of an opacity below one along one path (default 32)",
+        default=32,
+        min=0,
+        max=1024,
+    )
+    clamp_indirect: FloatProperty(
+        name="Clamp Indirect",
+        description="Largest radiance of an indirect sample, in W/m²/sr; 0 is off. Clamping loses light (default 0)",
+        default=0.0,
+        min=0.0,
+    )
+    caustics: EnumProperty(
+        name="Caustics",
+        description="Whether light through glass and from mirrors gets a photon pass of its own. The scene asks for it; "
+        "programs without such a pass path trace this light, with more noise (default Automatic)",
+        items=(
+            ("auto", "Automatic", "Where something focuses light (default)"),
+            ("on", "On", "Always"),
+            ("off", "Off", "Never: it is path traced"),
+        ),
+        default="auto",
+    )
+    displacement_method: EnumProperty(
+        name="Method",
+        description="How displaced meshes are traced. All but the tessellating ones show the same surface (default "
+        "Automatic)",
+        items=_METHODS,
+        default="auto",
+    )
+    lod: IntProperty(
+        name="Level of Detail",
+        description="Level of all height maps: 0 is the map itself, each further one is averaged to half the size a "
+        "side; -1 leaves the choice to the program (default -1)",
+        default=-1,
+        min=-1,
+        max=16,
+    )
+    memory_limit: FloatProperty(
+        name="Texture Memory",
+        description="GiB of textures to keep in memory; what is more is read from its files when needed (default 4)",
+        default=4.0,
+        min=0.01,
+        max=1024.0,
+    )
+    threads: IntProperty(
+        name="Threads", description="Threads to use; 0 is one for each processor (default 0)", default=0, min=0, max=1024
+    )
+    strict: BoolProperty(
+        name="Strict",
+        description="Make an error of each warning, so that nothing is left out in silence (default off)",
+        default=False,
+    )
+    filter_type: EnumProperty(
+        name="Filter",
+        description="How samples make a pixel (default Blackman-Harris)",
+        items=(("blackman-harris", "Blackman-Harris", "Smooth"), ("box", "Box", "Equal weights")),
+        default="blackman-harris",
+    )
+    filter_width: FloatProperty(
+        name="Filter Width",
+        description="Width of the pixel filter in pixels (default 1.5)",
+        default=1.5,
+        min=0.01,
+        max=10.0,
+    )
+
+
+class ReliefViewLayerSettings(bpy.types.PropertyGroup):
+    use_pass_direct: BoolProperty(
+        name="Direct Light", description="Light after at most one scattering event (default off)", default=False
+    )
+    use_pass_indirect: BoolProperty(
+        name="Indirect Light", description="Light after two or more scattering events (default off)", default=False
+    )
+    use_pass_samples: BoolProperty(
+        name="Sample Count", description="Samples taken in each pixel (default off)", default=False
+    )
+    use_pass_variance: BoolProperty(
+        name="Variance", description="Estimated variance of each pixel's radiance (default off)", default=False
+    )
+    use_pass_displacement_steps: BoolProperty(
+        name="Displacement Steps",
+        description="Bounds and texels tested for a camera ray in displaced meshes (default off)",
+        default=False,
+    )
+
+
+_classes = (ReliefSceneSettings, ReliefViewLayerSettings)
+
+
+def register():
+    for cls in _classes:
+        bpy.utils.register_class(cls)
+    bpy.types.Scene.relief = PointerProperty(type=ReliefSceneSettings)
+    bpy.types.ViewLayer.relief = PointerProperty(type=ReliefViewLayerSettings)
+
+
+def unregister():
+    del bpy.types.ViewLayer.relief
+    del bpy.types.Scene.relief
+    for cls in reversed(_classes):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Folders for scenes and pictures on their way between Blender and the program.
+
+They live in Blender's own temporary folder, which Blender removes when it ends. Within one render job (all frames of
+an animation) the folder stays, so that buffers of one frame serve the next; then it is removed.
+"""
+
+import os
+import shutil
+import tempfile
+
+import bpy
+from bpy.app.handlers import persistent
+
+_PREFIX = "relief_"
+_render_folder = None
+
+
+def make_folder():
+    """A new empty folder, to be removed with remove_folder."""
+    return tempfile.mkdtemp(prefix=_PREFIX, dir=bpy.app.tempdir or None)
+
+
+def remove_folder(path):
+    """Removes a folder and what is in it; silent if it is gone."""
+    shutil.rmtree(path, ignore_errors=True)
+
+
+def render_folder():
+    """The folder of the running render job, made when it is first asked for."""
+    global _render_folder
+    if _render_folder is None or not os.path.isdir(_render_folder):
+        _render_folder = make_folder()
+    return _render_folder
+
+
+def remove_stale(folder, keep):
+    """Removes files of a folder whose names are not to be kept: buffers that the last frame did not use."""
+    for name in os.listdir(folder):
+        if name not in keep:
+            os.remove(os.path.join(folder, name))
+
+
+@persistent
+def _end_render_job(*_):
+    global _render_folder
+    if _render_folder is not None:
+        remove_folder(_render_folder)
+        _render_folder = None
+
+
+def register():
+    bpy.app.handlers.render_complete.append(_end_render_job)
+    bpy.app.handlers.render_cancel.append(_end_render_job)
+
+
+def unregister():
+    bpy.app.handlers.render_complete.remove(_end_render_job)
+    bpy.app.handlers.render_cancel.remove(_end_render_job)
+    _end_render_job()

@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The viewport's picture: short runs of the program, each with a seed of its own, joined as they come in.
+
+The first run is a coarse one, so that something is seen soon; then each takes as many samples as all before it, so that
+loading the scene again costs less and less of the time. A change ends the run and starts anew; a change of the view
+alone writes the scene's few kilobytes again, its buffers stay.
+"""
+
+import os
+import weakref
+from dataclasses import dataclass
+
+import bpy
+import gpu
+import numpy as np
+from gpu_extras.presets import draw_texture_2d
+
+from . import exr, final, report, result, session
+from .export.camera import aperture, lens_json
+from .export.scene import SceneExporter, View
+from .preferences import find_checked_binary
+from .process import Process
+from .report import Report, ReliefError
+
+_POLL_SECONDS = 0.05
+
+#: The first run's picture is so many times smaller a side.
+_COARSE = 4
+
+#: A view that moves is rendered once it has rested this long; its old picture would only be thrown away.
+_REST_POLLS = 2
+
+
+@dataclass
+class _Run:
+    """One run: a divisor of the resolution, samples, seed."""
+
+    divisor: int
+    samples: int
+    seed: int
+
+
+class Viewport:
+    """One viewport in rendered shading. All methods are called in Blender's main thread.
+
+    @param  engine  the RenderEngine; only a weak reference is kept, as Blender ends the mode by dropping it
+    """
+
+    def __init__(self, engine):
+        self._engine = weakref.ref(engine)
+        self._folder = session.make_folder()
+        self._exporter = None
+        self._settings = None
+        self._view = None
+        self._process = None
+        self._run = None
+        self._sum = None
+        self._samples = 0
+        self._texture = None
+        self._picture = None
+        self._rest = 0
+        self._is_stopped = False
+        bpy.app.timers.register(self._poll, first_interval=_POLL_SECONDS)
+
+    def update(self, context, depsgraph):
+        """The scene has changed: exports it and starts anew."""
+        self._end_process()
+        scene = depsgraph.scene
+        warnings = Report()
+        exporter = SceneExporter(depsgraph, self._folder, warnings)
+        view = _view(context, depsgraph)
+        exporter.add_view(view)
+        exporter.add_world()
+        exporter.add_objects()
+        self._binary = find_checked_binary()
+        self._options = final.command_line(scene.relief)
+        self._most_samples = scene.relief.preview_samples
+        self._seed = scene.relief.seed
+        self._is_transparent = scene.render.film_transparent
+        self._exporter = exporter
+        report.publish_more(scene.name, warnings.warnings)
+        self._begin(view)
+
+    def draw(self, context, depsgraph):
+        """Draws what there is; a view that has moved starts anew."""
+        if self._exporter is not None:
+            view = _view(context, depsgraph)
+            if view != self._view:
+                self._end_process()
+                self._begin(view)
+        if self._picture is not None:
+            self._upload()
+        if self._texture is None:
+            return
+        gpu.state.blend_set("ALPHA_PREMULT")
+        engine = self._engine()
+        engine.bind_display_space_shader(depsgraph.scene)
+        draw_texture_2d(self._texture, (0, 0), context.region.width, context.region.height)
+        engine.unbind_display_space_shader()
+        gpu.state.blend_set("NONE")
+
+    def stop(self):
+        """Ends the program and removes the files."""
+        self._is_stopped = True
+        self._end_process()
+        session.remove_folder(self._folder)
+
+    def _begin(self, view):
+        self._view = view
+        self._sum, self._samples = None, 0
+        self._run = None
+        self._rest = _REST_POLLS
+        self._exporter.add_view(view)
+        self._exporter.write("scene.gltf")
+
+    def _end_process(self):
+        if self._process is not None:
+            self._process.kill()
+            self._process = None
+
+    def _poll(self):
+        """Blender's timer: the seconds until the next call, None for never again."""
+        engine = self._engine()
+        if self._is_stopped or engine is None:
+            return None
+        try:
+            self._step(engine)
+        except ReliefError as error:
+            self._end_process()
+            self._exporter = None
+            engine.error_set(str(error))
+            print(f"relief: error: {error}", flush=True)
+            engine.tag_redraw()
+        return _POLL_SECONDS
+
+    def _step(self, engine):
+        if self._exporter is None:
+            return
+        if self._process is None:
+            if self._rest > 0:
+                self._rest -= 1
+                return
+            self._run = self._next_run()
+            if self._run is not None:
+                self._start()
+            return
+        code = self._process.wait(0)
+        if code is None:
+            return
+        if code != 0:
+            raise ReliefError(self._process.failure(code))
+        self._process = None
+        self._add(exr.read(self._picture_path()))
+        engine.update_stats("", f"relief: {self._samples} of {self._most_samples} samples")
+        engine.tag_redraw()
+
+    def _next_run(self):
+        """What to render next; None when there are enough samples."""
+        if self._run is None:
+            return _Run(_COARSE, 1, self._seed)
+        if self._samples >= self._most_samples:
+            return None
+        samples = min(max(1, self._samples), self._most_samples - self._samples)
+        return _Run(1, samples, self._run.seed + 1)
+
+    def _start(self):
+        run = self._run
+        width, height = (max(1, side // run.divisor) for side in self._view.size)
+        arguments = [self._binary, "render", os.path.join(self._folder, "scene.gltf"), "-o", self._picture_path()]
+        arguments += ["--resolution", f"{width}x{height}", "--spp", str(run.samples), "--seed", str(run.seed)]
+        arguments += ["--compression", "none", "--float", "--aov", "beauty", "--progress", "none"]
+        self._process = Process(arguments + self._options)
+
+    def _picture_path(self):
+        return os.path.join(self._folder, "picture.exr")
+
+    def _add(self, picture):
+        """Joins a run's picture with those before; a coarse one is only shown."""
+        pixels = result.combined(picture, self._is_transparent).reshape(picture.height, picture.width, 4)
+        if self._run.divisor > 1:
+            self._picture = pixels
+            return
+        weighted = pixels.astype(np.float64) * self._run.samples
+        self._sum = weighted if self._sum is None else self._sum + weighted
+        self._samples += self._run.samples
+        self._picture = (self._sum / self._samples).astype(np.float32)
+
+    def _upload(self):
+        height, width, _ = self._picture.shape
+        values = np.ascontiguousarray(self._picture).ravel()
+        buffer = gpu.types.Buffer("FLOAT", len(values), values)
+        self._texture = gpu.types.GPUTexture((width, height), format="RGBA16F", data=buffer)
+        self._picture = None
+
+
+def _view(context, depsgraph):
+    """What a 3D view shows, by its projection matrix: right for free views and for camera views with zoom and offset."""
+    region, space, view3d = context.region, context.space_data, context.region_data
+    projection = np.array(view3d.window_matrix, dtype=np.float64)
+    matrix = np.array(view3d.view_matrix.inverted(), dtype=np.float64)
+    is_orthographic = not view3d.is_perspective
+    size = (region.width, region.height)
+    shift = -projection[:2, 3] / 2 if is_orthographic else projection[:2, 2] / 2
+    looks_through = space.camera if view3d.view_perspective == "CAMERA" else None
+    has_camera = looks_through is not None and looks_through.type == "CAMERA"
+    lens = looks_through.evaluated_get(depsgraph).data if has_camera else space
+    clip = (lens.clip_start, lens.clip_end)
+    if is_orthographic and not has_camera:
+        # A free orthographic view sees as far behind its centre as before it.
+        matrix[:3, 3] += matrix[:3, 2] * clip[1] / 2
+        clip = (0.0, clip[1])
+    camera = lens_json(is_orthographic, 1 / projection[1, 1], size[0] / size[1], shift.tolist(), clip)
+    if has_camera:
+        distance = final.focus_distance(looks_through.evaluated_get(depsgraph), looks_through.matrix_world, depsgraph)
+        camera["extensions"]["RELIEF_camera"].update(aperture(lens, distance, lambda *_: None))
+    return View(camera, matrix.tolist(), size)

@@ -1,0 +1,100 @@
+"""Lenses: framing, shift, sensor fit, depth of field and clipping are Cycles' own."""
+
+from scenes import add_camera, add_plane, add_sphere, assert_agrees, degrees, diffuse, new_material, new_scene, set_world
+
+
+def _stage(width, height, location=(2, -5, 4), rotation=(55, 0, 22), **settings):
+    """Bright balls under an even sky: edges everywhere."""
+    scene = new_scene(width, height)
+    set_world((0.2, 0.3, 0.5))
+    glow = new_material("glow", "ShaderNodeEmission", Color=(1, 0.6, 0.2, 1), Strength=1.0)[0]
+    add_plane(6, diffuse((0, 0, 0)))
+    for x in range(-2, 3):
+        for y in range(-2, 3):
+            add_sphere(0.25 + 0.04 * x, glow, (x, y, 0.3), segments=64)
+    camera = add_camera(location, degrees(*rotation), **settings)
+    return scene, camera
+
+
+def test_perspective_landscape():
+    assert_agrees(_stage(64, 40, lens=35)[0], block=4)
+
+
+def test_perspective_portrait():
+    assert_agrees(_stage(40, 64, lens=35)[0], block=4)
+
+
+def test_sensor_fit_vertical():
+    assert_agrees(_stage(64, 40, lens=30, sensor_fit="VERTICAL", sensor_height=20)[0], block=4)
+
+
+def test_sensor_fit_horizontal_in_portrait():
+    assert_agrees(_stage(40, 64, lens=30, sensor_fit="HORIZONTAL", sensor_width=30)[0], block=4)
+
+
+def test_shift_landscape():
+    assert_agrees(_stage(64, 40, lens=35, shift_x=0.15, shift_y=-0.1)[0], block=4)
+
+
+def test_shift_portrait():
+    assert_agrees(_stage(40, 64, lens=35, shift_x=-0.15, shift_y=0.2)[0], block=4)
+
+
+def test_orthographic_with_shift():
+    assert_agrees(_stage(64, 40, type="ORTHO", ortho_scale=5, shift_x=0.1, shift_y=0.05)[0], block=4)
+
+
+def test_orthographic_portrait():
+    assert_agrees(_stage(40, 64, type="ORTHO", ortho_scale=5)[0], block=4)
+
+
+def test_clipping():
+    assert_agrees(_stage(64, 40, lens=35, clip_start=5.0, clip_end=7.5)[0], block=4)
+
+
+def test_scaled_camera():
+    scene, camera = _stage(64, 40, lens=35)
+    camera.scale = (2, 0.5, 3)
+    assert_agrees(scene, block=4)
+
+
+def _focus(camera, fstop):
+    camera.data.dof.use_dof = True
+    camera.data.dof.aperture_fstop = fstop
+    camera.data.dof.focus_distance = 5.0
+
+
+def test_depth_of_field():
+    scene, camera = _stage(64, 40, lens=50)
+    _focus(camera, 0.08)
+    assert_agrees(scene, block=4, samples=128)
+
+
+def test_depth_of_field_on_an_object():
+    scene, camera = _stage(64, 40, lens=50)
+    _focus(camera, 0.08)
+    camera.data.dof.focus_object = next(o for o in scene.objects if o.location.y == 1 and o.location.x == 1)
+    assert_agrees(scene, block=4, samples=128)
+
+
+def test_depth_of_field_orthographic():
+    scene, camera = _stage(64, 40, type="ORTHO", ortho_scale=5)
+    _focus(camera, 2.0)
+    assert_agrees(scene, block=4, samples=128)
+
+
+def test_render_region():
+    """A region is the window of the whole picture that it says it is."""
+    import numpy as np
+    from scenes import folder, render
+
+    scene, _ = _stage(64, 40, lens=35)
+    with folder() as path:
+        whole = render(scene, "RELIEF", f"{path}/whole.exr")
+        scene.render.use_border = scene.render.use_crop_to_border = True
+        scene.render.border_min_x, scene.render.border_max_x = 0.25, 0.75
+        scene.render.border_min_y, scene.render.border_max_y = 0.1, 0.6
+        part = render(scene, "RELIEF", f"{path}/part.exr")
+    assert part.shape[:2] == (20, 32), part.shape
+    # Its rows count from the bottom: 4 to 24 of 40.
+    assert np.allclose(part, whole[16:36, 16:48], atol=1e-6)

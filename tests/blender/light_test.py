@@ -1,0 +1,85 @@
+"""Lights: every kind has Cycles' strength, colour and shape."""
+
+import math
+
+from scenes import add_camera, add_light, add_plane, add_sphere, assert_agrees, degrees, diffuse, new_scene
+
+
+def _stage(scene_light):
+    """A floor with a ball on it, seen obliquely: strengths, angles and shadows all show."""
+    scene = new_scene()
+    add_plane(material=diffuse((0.8, 0.5, 0.3)))
+    add_sphere(0.6, location=(0.3, 0.2, 0.6))
+    add_camera((0, -6, 5), degrees(50, 0, 0), lens=40)
+    scene_light()
+    return scene
+
+
+def test_point_without_size():
+    assert_agrees(_stage(lambda: add_light("POINT", (1, -1, 3), energy=300, color=(1, 0.8, 0.4), shadow_soft_size=0)))
+
+
+def test_point_with_radius():
+    assert_agrees(_stage(lambda: add_light("POINT", (1, -1, 3), energy=300, shadow_soft_size=0.5)), samples=128)
+
+
+def test_sun_without_size():
+    assert_agrees(_stage(lambda: add_light("SUN", rotation=degrees(30, 20, 0), energy=3, color=(1, 0.5, 1), angle=0)))
+
+
+def test_sun_with_angle():
+    scene = _stage(lambda: add_light("SUN", rotation=degrees(40, 20, 0), energy=3, angle=math.radians(11)))
+    assert_agrees(scene, samples=128)
+
+
+def test_spot_with_hard_edge():
+    def light():
+        add_light(
+            "SPOT", (0, -1, 4), degrees(-10, 5, 0), energy=500, spot_size=math.radians(50), spot_blend=0, shadow_soft_size=0
+        )
+
+    assert_agrees(_stage(light), samples=64)
+
+
+def test_square_area():
+    assert_agrees(_stage(lambda: add_light("AREA", (1, 0, 3), degrees(10, 15, 30), energy=200, size=1.5)), samples=128)
+
+
+def test_rectangular_area():
+    def light():
+        add_light("AREA", (1, 0, 3), degrees(10, 15, 30), shape="RECTANGLE", energy=200, size=2.0, size_y=0.4)
+
+    assert_agrees(_stage(light), samples=128)
+
+
+def test_disk_area():
+    def light():
+        add_light("AREA", (1, 0, 3), degrees(10, 15, 30), shape="DISK", energy=200, size=1.5)
+
+    assert_agrees(_stage(light), samples=128)
+
+
+def test_elliptic_area_with_scaled_object():
+    def light():
+        made = add_light("AREA", (1, 0, 3), degrees(10, 15, 30), shape="ELLIPSE", energy=200, size=2.0, size_y=0.4)
+        made.scale = (0.7, 1.5, 2.0)
+
+    assert_agrees(_stage(light), samples=128)
+
+
+def test_a_strength_three_percent_off_is_noticed():
+    """The comparison itself: it must be able to fail."""
+    import numpy as np
+    from scenes import assert_same_expectation, render_runs
+
+    scene = _stage(lambda: add_light("POINT", (1, -1, 3), energy=300, shadow_soft_size=0.5))
+    cycles = render_runs(scene, "CYCLES", 5, 128)
+    bpy_light = next(o for o in scene.objects if o.type == "LIGHT")
+    bpy_light.data.energy *= 1.03
+    relief = render_runs(scene, "RELIEF", 5, 128)
+    try:
+        assert_same_expectation(relief, cycles)
+    except AssertionError as error:
+        assert "differ" in str(error), error
+        return
+    raise AssertionError(f"{np.mean(relief) / np.mean(cycles)} was taken for 1")

@@ -1,0 +1,218 @@
+"""What the tests have in common: small scenes made with bpy, rendering them with both engines, judging the pictures."""
+
+import contextlib
+import math
+import os
+import shutil
+import sys
+import tempfile
+
+import bpy
+import numpy as np
+
+_ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
+sys.path.insert(0, os.path.join(_ROOT, "benchmarks", "cycles"))
+
+from agreement import compare_runs  # noqa: E402
+from exr import read_rgb  # noqa: E402
+
+#: Chance that a test fails although both engines agree. Seeds are fixed: a test passes always or never.
+SIGNIFICANCE = 1e-4
+
+#: Standard error of the mean of each engine's pictures: above, a comparison would not notice what it is made to notice.
+LARGEST_STANDARD_ERROR = 0.01
+
+
+@contextlib.contextmanager
+def folder():
+    """A folder for a test's files."""
+    path = tempfile.mkdtemp(prefix="relief_test_")
+    try:
+        yield path
+    finally:
+        shutil.rmtree(path, ignore_errors=True)
+
+
+def new_scene(width=64, height=48):
+    """An empty scene with the add-on switched on; both engines set to the same samples, filter and bounces."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.preferences.addon_enable(module="relief")
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = width, height
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_depth = "32"
+    scene.relief.filter_type, scene.relief.filter_width = "box", 1.0
+    scene.relief.strict = True
+    scene.cycles.pixel_filter_type = "BOX"
+    scene.cycles.use_adaptive_sampling = False
+    scene.cycles.use_denoising = False
+    scene.cycles.light_sampling_threshold = 0.0
+    scene.cycles.sample_clamp_indirect = 0.0
+    scene.cycles.blur_glossy = 0.0
+    set_bounces(scene, 0)
+    return scene
+
+
+def set_bounces(scene, bounces):
+    """The same number of bounces for both engines; 0 is direct light alone."""
+    cycles, relief = scene.cycles, scene.relief
+    cycles.max_bounces = cycles.diffuse_bounces = cycles.glossy_bounces = cycles.transmission_bounces = bounces
+    relief.max_bounces = relief.diffuse_bounces = relief.glossy_bounces = relief.transmission_bounces = bounces
+
+
+def render(scene, engine, path, seed=0, samples=16):
+    """Renders the current frame as F12 does.
+
+    @param  path  of the EXR to write
+    @return       float64 (height, width, 3), row 0 the top one
+    @error        RuntimeError with what the engine reported
+    """
+    scene.render.engine = engine
+    scene.render.filepath = path
+    scene.relief.samples = scene.cycles.samples = samples
+    scene.relief.seed = scene.cycles.seed = seed
+    bpy.ops.render.render(write_still=True)
+    return read_rgb(path)
+
+
+def render_runs(scene, engine, runs, samples):
+    """Renders with different seeds: float64 (runs, height, width, 3)."""
+    with folder() as path:
+        name = os.path.join(path, "picture.exr")
+        return np.stack([render(scene, engine, name, seed, samples) for seed in range(runs)])
+
+
+def assert_agrees(scene, runs=5, samples=32, block=8, least_mean=0.01):
+    """Fails unless relief and Cycles have the same expected picture of a scene.
+
+    @param  runs, samples  of each engine; so many that a difference of the means of 3 % would be found
+    @param  block          side of the blocks of pixels that are compared
+    @param  least_mean     the picture must not be darker on the mean: two black ones agree, too
+    """
+    relief = render_runs(scene, "RELIEF", runs, samples)
+    cycles = render_runs(scene, "CYCLES", runs, samples)
+    assert_same_expectation(relief, cycles, block, least_mean)
+
+
+def assert_same_expectation(relief, cycles, block=8, least_mean=0.01):
+    """The judgement of assert_agrees, for pictures at hand."""
+    agreement = compare_runs(relief, cycles, block, SIGNIFICANCE)
+    print(agreement, "means", relief.mean(axis=(0, 1, 2)), cycles.mean(axis=(0, 1, 2)))
+    assert relief.mean() > least_mean, "the picture is black"
+    assert agreement.relative_standard_error < LARGEST_STANDARD_ERROR, "too noisy to tell anything"
+    assert agreement.passed, "the pictures differ by more than their noise"
+
+
+def link(data, name="object"):
+    """An object of some data, in the scene."""
+    made = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(made)
+    return made
+
+
+def add_camera(location=(0, 0, 6), rotation=(0, 0, 0), **settings):
+    """The scene's camera; without rotation it looks down."""
+    data = bpy.data.cameras.new("camera")
+    for name, value in settings.items():
+        setattr(data, name, value)
+    camera = link(data, "camera")
+    camera.location, camera.rotation_euler = location, rotation
+    bpy.context.scene.camera = camera
+    return camera
+
+
+def add_light(kind, location=(0, 0, 3), rotation=(0, 0, 0), **settings):
+    data = bpy.data.lights.new("light", kind)
+    for name, value in settings.items():
+        setattr(data, name, value)
+    light = link(data, "light")
+    light.location, light.rotation_euler = location, rotation
+    return light
+
+
+def set_world(color, strength=1.0):
+    """A plain background; returns its node tree."""
+    world = bpy.data.worlds.new("world")
+    bpy.context.scene.world = world
+    world.use_nodes = True
+    background = world.node_tree.nodes["Background"]
+    background.inputs["Color"].default_value = (*color, 1)
+    background.inputs["Strength"].default_value = strength
+    return world.node_tree
+
+
+def new_material(name="material", kind="ShaderNodeBsdfDiffuse", **inputs):
+    """A material of one shader node.
+
+    @return  (material, tree, node)
+    """
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    node = tree.nodes.new(kind)
+    for key, value in inputs.items():
+        node.inputs[key.replace("_", " ")].default_value = value
+    tree.links.new(node.outputs[0], output.inputs["Surface"])
+    return material, tree, node
+
+
+def diffuse(color=(0.8, 0.8, 0.8), name="diffuse"):
+    """A Lambertian material, which both engines mean exactly."""
+    return new_material(name, Color=(*color, 1), Roughness=0.0)[0]
+
+
+def add_plane(size=8.0, material=None, location=(0, 0, 0), subdivisions=1):
+    """A square in the xy plane with one uv map over [0, 1]²."""
+    bpy.ops.mesh.primitive_grid_add(
+        x_subdivisions=subdivisions, y_subdivisions=subdivisions, size=size, location=location
+    )
+    plane = bpy.context.object
+    plane.data.materials.append(material or diffuse())
+    return plane
+
+
+def add_sphere(radius=1.0, material=None, location=(0, 0, 0), segments=32):
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=segments // 2, radius=radius, location=location)
+    sphere = bpy.context.object
+    bpy.ops.object.shade_smooth()
+    sphere.data.materials.append(material or diffuse())
+    return sphere
+
+
+def add_image_node(tree, image, color_space, **settings):
+    """An Image Texture node."""
+    image.colorspace_settings.name = color_space
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    for name, value in settings.items():
+        setattr(node, name, value)
+    return node
+
+
+def new_image(pixels, name="image", is_float=True):
+    """A generated image.
+
+    @param  pixels  (height, width, 4), bottom row first
+    """
+    height, width, _ = pixels.shape
+    image = bpy.data.images.new(name, width, height, float_buffer=is_float)
+    image.pixels.foreach_set(np.ascontiguousarray(pixels, dtype=np.float32).ravel())
+    image.update()
+    return image
+
+
+def asymmetric_pixels(width=16, height=8):
+    """A picture without any symmetry: a gradient in each colour along another direction, and one bright corner."""
+    v, u = np.mgrid[0:height, 0:width]
+    pixels = np.ones((height, width, 4), dtype=np.float32)
+    pixels[..., 0] = u / (width - 1)
+    pixels[..., 1] = v / (height - 1)
+    pixels[..., 2] = 0.5 + 0.5 * np.sin(u * 0.9 + v * 0.4)
+    pixels[: height // 4, : width // 4, :3] = 1.0
+    return pixels
+
+
+def degrees(*angles):
+    return tuple(math.radians(a) for a in angles)
