@@ -5,7 +5,7 @@ import traceback
 
 import bpy
 
-from . import compat, final, result
+from . import compat, exporter, final, result
 from .report import ReliefError
 from .viewport import Viewport
 
@@ -29,7 +29,7 @@ class ReliefEngine(bpy.types.RenderEngine):
             viewport.stop()
 
     def render(self, depsgraph):
-        self._guard(lambda: final.render(self, depsgraph))
+        self._guard(lambda: exporter.capture(self, depsgraph) or final.render(self, depsgraph))
 
     def update_render_passes(self, scene=None, renderlayer=None):
         self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")

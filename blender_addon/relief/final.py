@@ -5,6 +5,8 @@ import json
 import os
 import time
 
+import numpy as np
+
 from . import exr, report, result, session
 from .export.camera import camera_json
 from .export.scene import DATA_FOLDER, View, export_scene
@@ -27,8 +29,8 @@ def render(engine, depsgraph):
     binary = find_checked_binary()
     scene = depsgraph.scene
     warnings = Report(strict=scene.relief.strict)
-    _warn_unread(scene, warnings)
-    view, crop = _view(engine, depsgraph, warnings)
+    warn_unread(scene, warnings)
+    view, crop = view_of(engine, depsgraph, warnings)
     folder = session.render_folder()
     layer_name = depsgraph.view_layer.name
     passes = result.enabled_passes(depsgraph.view_layer)
@@ -96,8 +98,8 @@ def focus_distance(camera_object, matrix, depsgraph):
     return abs((target - matrix.translation).dot(axis))
 
 
-def _view(engine, depsgraph, warnings):
-    """(View of the scene's camera, crop or None)."""
+def view_of(engine, depsgraph, warnings):
+    """(View of the scene's camera, render region as (x0, y0, x1, y1) from the top left or None)."""
     scene = depsgraph.scene
     if scene.camera is None:
         raise ReliefError("the scene has no camera")
@@ -115,14 +117,14 @@ def _view(engine, depsgraph, warnings):
     view = View(lens, [list(row) for row in matrix], (width, height))
     if not render.use_border:
         return view, None
-    # Blender has done the rounding: the region has the size that the engine was told.
-    x0 = min(round(render.border_min_x * width), width - engine.resolution_x)
-    top = height - min(round(render.border_min_y * height), height - engine.resolution_y)
-    crop = (max(x0, 0), top - engine.resolution_y, max(x0, 0) + engine.resolution_x, top)
-    return view, crop
+    # Blender truncates the product of two floats; the same here, or the region misses Blender's result by a pixel.
+    x0, x1 = (int(np.float32(x) * np.float32(width)) for x in (render.border_min_x, render.border_max_x))
+    y0, y1 = (int(np.float32(y) * np.float32(height)) for y in (render.border_min_y, render.border_max_y))
+    return view, (x0, height - y1, x1, height - y0)
 
 
-def _warn_unread(scene, warnings):
+def warn_unread(scene, warnings):
+    """Warns about settings of a scene that have no effect."""
     where = f'scene "{scene.name}"'
     if scene.render.use_motion_blur:
         warnings.warn(where, "motion blur", "everything stands still")

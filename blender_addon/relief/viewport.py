@@ -17,7 +17,8 @@ from gpu_extras.presets import draw_texture_2d
 
 from . import exr, final, report, result, session
 from .export.camera import aperture, lens_json
-from .export.scene import SceneExporter, View
+from .export.gltf import GltfWriter
+from .export.scene import DATA_FOLDER, SceneExporter, View, scene_json
 from .preferences import find_checked_binary
 from .process import Process
 from .report import Report, ReliefError
@@ -67,11 +68,10 @@ class Viewport:
         self._end_process()
         scene = depsgraph.scene
         warnings = Report()
-        exporter = SceneExporter(depsgraph, self._folder, warnings)
         view = _view(context, depsgraph)
-        exporter.add_view(view)
-        exporter.add_world()
-        exporter.add_objects()
+        exporter = SceneExporter(depsgraph, GltfWriter(self._folder, DATA_FOLDER), warnings)
+        exporter.add_all(view)
+        session.remove_stale(os.path.join(self._folder, DATA_FOLDER), exporter.writer.used_files)
         self._binary = find_checked_binary()
         self._options = final.command_line(scene.relief)
         self._most_samples = scene.relief.preview_samples
@@ -110,8 +110,10 @@ class Viewport:
         self._sum, self._samples = None, 0
         self._run = None
         self._rest = _REST_POLLS
-        self._exporter.add_view(view)
-        self._exporter.write("scene.gltf")
+        self._exporter.set_view(view)
+        writer = self._exporter.writer
+        writer.json.update(scene_json(self._exporter.nodes))
+        writer.write("scene.gltf")
 
     def _end_process(self):
         if self._process is not None:

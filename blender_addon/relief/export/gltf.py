@@ -43,10 +43,8 @@ class GltfWriter:
         self.json = {"asset": {"version": "2.0", "generator": "relief add-on for Blender"}}
         self.used_files = set()
         self.bytes_written = 0
+        self._unique = {}
         self._buffers = {}
-        self._samplers = {}
-        self._images = {}
-        self._textures = {}
         os.makedirs(os.path.join(folder, data_folder), exist_ok=True)
 
     def add(self, kind, value):
@@ -54,6 +52,13 @@ class GltfWriter:
         values = self.json.setdefault(kind, [])
         values.append(value)
         return len(values) - 1
+
+    def add_unique(self, kind, value):
+        """Appends to one of the document's lists unless an equal value is there; returns its index."""
+        key = (kind, json.dumps(value, sort_keys=True))
+        if key not in self._unique:
+            self._unique[key] = self.add(kind, value)
+        return self._unique[key]
 
     def use_extension(self, name):
         """Lists an extension as used."""
@@ -130,16 +135,9 @@ class GltfWriter:
         @param  nearest  no interpolation between texels
         @return          index
         """
-        key = (uri, wrap, nearest)
-        if key not in self._textures:
-            if uri not in self._images:
-                self._images[uri] = self.add("images", {"uri": uri})
-            if (wrap, nearest) not in self._samplers:
-                filters = {"magFilter": 9728 if nearest else 9729, "wrapS": wrap, "wrapT": wrap}
-                self._samplers[wrap, nearest] = self.add("samplers", filters)
-            texture = {"source": self._images[uri], "sampler": self._samplers[wrap, nearest]}
-            self._textures[key] = self.add("textures", texture)
-        return self._textures[key]
+        filters = {"magFilter": 9728 if nearest else 9729, "wrapS": wrap, "wrapT": wrap}
+        image, sampler = self.add_unique("images", {"uri": uri}), self.add_unique("samplers", filters)
+        return self.add_unique("textures", {"source": image, "sampler": sampler})
 
     def write(self, name):
         """Writes the document; returns its path."""

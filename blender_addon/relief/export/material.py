@@ -38,7 +38,7 @@ class MaterialExporter:
         key = None if material is None else material.as_pointer()
         if key not in self._exported:
             job = _MaterialJob(self._writer, self._images, self._settings, self._report, material)
-            self._exported[key] = (self._writer.add("materials", job.json), job.wanted())
+            self._exported[key] = (self._writer.add_unique("materials", job.json), job.wanted())
         return self._exported[key]
 
 

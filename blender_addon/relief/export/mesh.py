@@ -47,6 +47,14 @@ class _Corners:
         mesh.vertices.foreach_get("co", self.positions)
         self.positions = self.positions.reshape(-1, 3)
         self.normals = compat.corner_normals(mesh)
+        self._drop_empty()
+
+    def _drop_empty(self):
+        """Leaves out triangles without area, which text and bevels are full of: nothing can be seen of them."""
+        a, b, c = (self.positions[self.vertex[self.loops[:, i]]].astype(np.float64) for i in range(3))
+        keep = np.cross(b - a, c - a).any(axis=1)
+        if not keep.all():
+            self.loops, self.material = self.loops[keep], self.material[keep]
 
     def displacement_normals(self):
         """Normals without the edges of flat faces, which displacement would tear open; marked edges stay."""
@@ -114,7 +122,7 @@ def export_mesh(mesh, materials, writer, warn):
         if index is not None:
             primitive["material"] = index
         primitives.append(primitive)
-    return writer.add("meshes", {"name": mesh.name, "primitives": primitives})
+    return writer.add_unique("meshes", {"name": mesh.name, "primitives": primitives})
 
 
 def _primitive_arrays(corners, triangles, wanted, warn):

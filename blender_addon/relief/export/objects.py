@@ -83,7 +83,7 @@ def decompose(matrices):
     safe = np.where(scale == 0, 1.0, scale)
     rotation = linear / safe[:, None, :]
     quaternion = _quaternion(rotation)
-    again = _rotation(quaternion) * scale[:, None, :]
+    again = rotation_matrices(quaternion) * scale[:, None, :]
     size = np.abs(linear).max(axis=(1, 2))
     exact = np.abs(again - linear).max(axis=(1, 2)) <= 1e-6 * size
     return matrices[:, :3, 3], quaternion, scale, exact & (scale != 0).all(axis=1)
@@ -111,7 +111,7 @@ def _quaternion(r):
     return best / np.maximum(np.linalg.norm(best, axis=1, keepdims=True), 1e-300)
 
 
-def _rotation(q):
+def rotation_matrices(q):
     """Rotation matrices of unit quaternions."""
     x, y, z, w = q.T
     return np.stack(

@@ -60,53 +60,65 @@ def export_scene(depsgraph, view, folder, name, report):
     @return            Exported
     """
     begin = time.perf_counter()
-    exporter = SceneExporter(depsgraph, folder, report)
-    exporter.add_view(view)
-    exporter.add_world()
-    exporter.add_objects()
-    path = exporter.write(name)
-    writer = exporter.writer
+    writer = GltfWriter(folder, DATA_FOLDER)
+    exporter = SceneExporter(depsgraph, writer, report)
+    exporter.add_all(view)
+    writer.json.update(scene_json(exporter.nodes))
+    path = writer.write(name)
     return Exported(path, writer.used_files, time.perf_counter() - begin, writer.bytes_written)
 
 
-class SceneExporter:
-    """A scene file in the making; the root node turns Blender's axes into glTF's.
+def scene_json(nodes, index_of=None):
+    """The document's scene and nodes.
 
-    writer       GltfWriter
-    camera_node  index of the camera's node; None before there is one
+    @param  nodes     in Blender's world, their children nodes instead of indices
+    @param  index_of  a dictionary that gets the index of each node by its id()
+    @return        "scene", "scenes", "nodes": the root, which turns Blender's axes into glTF's, is node 0
+    """
+    flat = [{"name": "Blender", "matrix": matrix_property(GLTF_FROM_BLENDER)}]
+
+    def add(node):
+        index = len(flat)
+        if index_of is not None:
+            index_of[id(node)] = index
+        flat.append(node := dict(node))
+        if "children" in node:
+            node["children"] = [add(child) for child in node["children"]]
+        return index
+
+    flat[0]["children"] = [add(node) for node in nodes]
+    return {"scene": 0, "scenes": [{"nodes": [0]}], "nodes": flat}
+
+
+class SceneExporter:
+    """A scene file in the making.
+
+    writer  GltfWriter
+    nodes   of the frame: glTF nodes in Blender's world, their children nodes instead of indices, the camera's first
     """
 
-    def __init__(self, depsgraph, folder, report):
-        self.writer = GltfWriter(folder, DATA_FOLDER)
+    def __init__(self, depsgraph, writer, report):
+        self.writer = writer
+        self.nodes = []
         self._depsgraph = depsgraph
         self._scene = depsgraph.scene
         self._report = report
         self._images = ImageExporter(self.writer, self._scene.frame_current)
         self._materials = MaterialExporter(self.writer, self._images, self._scene.relief, report)
-        self._meshes = {}
-        self._children = []
-        self.camera_node = None
-        self.writer.json["scene"] = 0
-        self.writer.add("scenes", {"nodes": [0]})
-        self.writer.add("nodes", {"name": "Blender", "matrix": matrix_property(GLTF_FROM_BLENDER)})
 
-    def add_node(self, node):
-        """Adds a node in Blender's world; returns its index."""
-        index = self.writer.add("nodes", node)
-        self._children.append(index)
-        return index
+    def add_all(self, view):
+        """Adds the whole frame."""
+        self.set_view(view)
+        self.add_world()
+        self.add_objects()
 
-    def add_view(self, view):
+    def set_view(self, view):
         """Sets the camera and the settings of the picture; a later call replaces them."""
         translation, rotation, _, _ = decompose(np.array([view.matrix], dtype=np.float64).reshape(1, 4, 4))
-        node = {"name": view.camera.get("name", "view"), "camera": 0}
-        node.update(translation=translation[0].tolist(), rotation=rotation[0].tolist())
         self.writer.use_extension("RELIEF_camera")
-        self.writer.json["cameras"] = [view.camera]
-        if self.camera_node is None:
-            self.camera_node = self.add_node(node)
-        else:
-            self.writer.json["nodes"][self.camera_node] = node
+        node = {"name": view.camera.get("name", "view"), "camera": self.writer.add_unique("cameras", view.camera)}
+        node.update(translation=translation[0].tolist(), rotation=rotation[0].tolist())
+        self.nodes[:1] = [node]
         self.writer.extend(self.writer.json, "RELIEF_render", render_settings(self._scene, view.size))
 
     def add_world(self):
@@ -124,11 +136,6 @@ class SceneExporter:
             if thing.kind == "light":
                 self._add_lights(thing, size)
 
-    def write(self, name):
-        """Writes the scene file; returns its path."""
-        self.writer.json["nodes"][0]["children"] = self._children
-        return self.writer.write(name)
-
     def _warner(self, kind, name):
         return lambda what, instead="": self._report.warn(f'{kind} "{name}"', what, instead)
 
@@ -142,7 +149,7 @@ class SceneExporter:
             self.writer.extend(base, "RELIEF_object", settings)
         matrices = thing.world_matrices()
         if len(matrices) == 1:
-            self.add_node({**base, "matrix": matrix_property(matrices[0])})
+            self.nodes.append({**base, "matrix": matrix_property(matrices[0])})
             return
         translation, rotation, scale, exact = decompose(matrices)
         if exact.any():
@@ -151,9 +158,9 @@ class SceneExporter:
             node = {**base, "extensions": dict(base.get("extensions", {}))}
             accessors = self.writer.add_accessors(arrays)
             self.writer.extend(node, "EXT_mesh_gpu_instancing", {"attributes": dict(accessors)})
-            self.add_node(node)
+            self.nodes.append(node)
         for matrix in matrices[~exact]:
-            self.add_node({**base, "matrix": matrix_property(matrix)})
+            self.nodes.append({**base, "matrix": matrix_property(matrix)})
 
     def _object_settings(self, original):
         """RELIEF_object of an object; {} if all is usual."""
@@ -201,7 +208,7 @@ class SceneExporter:
                 warn=self._warner("light", thing.name),
             )
             export_light(light, place)
-            self.add_node(node)
+            self.nodes.append(node)
 
 
 def _extent(things):

@@ -1,0 +1,183 @@
+"""Materials: each shader that both engines mean exactly agrees with Cycles; what is only near is told, or bounded."""
+
+import bpy
+
+from scenes import (
+    add_camera,
+    add_light,
+    add_plane,
+    add_sphere,
+    assert_agrees,
+    assert_warns,
+    degrees,
+    diffuse,
+    new_material,
+    new_scene,
+    set_bounces,
+    set_world,
+)
+
+
+def _stage(material, bounces=4):
+    """A ball of the material on a floor, below a sky and an area light."""
+    scene = new_scene()
+    set_bounces(scene, bounces)
+    set_world((0.4, 0.5, 0.7))
+    add_plane(8, diffuse((0.6, 0.4, 0.3)))
+    add_sphere(1.0, material, (0, 0, 1), segments=64)
+    add_light("AREA", (2, -2, 4), degrees(30, 25, 0), energy=150, size=1.5)
+    add_camera((0, -5, 3), degrees(67, 0, 0), lens=45)
+    return scene
+
+
+def _mixed(kind, first, second, factor=None, factor_node=None):
+    """A material of two shader nodes.
+
+    @param  first, second  (kind, inputs) of the shaders
+    """
+    material, tree, node = new_material("mixed", kind)
+    offset = 1 if kind == "ShaderNodeMixShader" else 0
+    for i, (shader, inputs) in enumerate((first, second)):
+        made = tree.nodes.new(shader)
+        for name, value in inputs.items():
+            made.inputs[name].default_value = value
+        tree.links.new(made.outputs[0], node.inputs[i + offset])
+    if factor is not None:
+        node.inputs[0].default_value = factor
+    if factor_node is not None:
+        made = tree.nodes.new(factor_node)
+        tree.links.new(made.outputs[0], node.inputs[0])
+    return material
+
+
+_RED = ("ShaderNodeBsdfDiffuse", {"Color": (0.8, 0.2, 0.1, 1), "Roughness": 0.0})
+_BLUE = ("ShaderNodeBsdfDiffuse", {"Color": (0.1, 0.2, 0.8, 1), "Roughness": 0.0})
+_CLEAR = ("ShaderNodeBsdfTransparent", {})
+_GLOW = ("ShaderNodeEmission", {"Color": (0.2, 1, 0.3, 1), "Strength": 1.5})
+
+
+def test_diffuse():
+    assert_agrees(_stage(diffuse((0.2, 0.7, 0.4))), samples=128)
+
+
+def test_principled_without_specular():
+    """Only its albedo is looked at: before 4.0 Cycles brightens and darkens grazing angles by Disney's rule."""
+    material, _, node = new_material("principled", "ShaderNodeBsdfPrincipled", Base_Color=(0.2, 0.7, 0.4, 1), Specular=0.0)
+    node.inputs["Roughness"].default_value = 0.5
+    assert_agrees(_stage(material), samples=128, tolerance=0.06)
+
+
+def test_principled_metal():
+    material = new_material(
+        "metal", "ShaderNodeBsdfPrincipled", Base_Color=(0.9, 0.6, 0.2, 1), Metallic=1.0, Roughness=0.2
+    )[0]
+    assert_agrees(_stage(material), samples=256, tolerance=0.03)
+
+
+def test_principled_plastic():
+    """Cycles before 4.0 adds the reflection to the diffuse light, glTF and later versions take it away from that."""
+    material = new_material("plastic", "ShaderNodeBsdfPrincipled", Base_Color=(0.5, 0.1, 0.1, 1), Roughness=0.3)[0]
+    assert_agrees(_stage(material), samples=256, tolerance=0.12)
+
+
+def test_mirror():
+    material, _, node = new_material("mirror", "ShaderNodeBsdfGlossy", Color=(0.9, 0.9, 0.9, 1))
+    node.distribution = "SHARP"
+    # glTF's metals reflect all light at grazing angles, Cycles' glossy node its colour at all of them.
+    assert_agrees(_stage(material), samples=128, tolerance=0.03)
+
+
+def test_white_mirror():
+    material, _, node = new_material("mirror", "ShaderNodeBsdfGlossy", Color=(1, 1, 1, 1))
+    node.distribution = "SHARP"
+    assert_agrees(_stage(material), samples=128)
+
+
+def test_smooth_glass():
+    material, _, node = new_material("glass", "ShaderNodeBsdfGlass", Color=(1, 1, 1, 1), IOR=1.5)
+    node.distribution = "SHARP"
+    scene = _stage(material, 8)
+    # Caustics of the lamp would never settle; the sky's do.
+    bpy.data.objects.remove(next(o for o in scene.objects if o.type == "LIGHT"))
+    assert_agrees(scene, samples=256)
+
+
+def test_absorbing_glass():
+    material, tree, node = new_material("glass", "ShaderNodeBsdfGlass", Color=(1, 1, 1, 1), IOR=1.3)
+    node.distribution = "SHARP"
+    volume = tree.nodes.new("ShaderNodeVolumeAbsorption")
+    volume.inputs["Color"].default_value = (0.2, 0.6, 0.9, 1)
+    volume.inputs["Density"].default_value = 0.7
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    tree.links.new(volume.outputs[0], output.inputs["Volume"])
+    scene = _stage(material, 8)
+    bpy.data.objects.remove(next(o for o in scene.objects if o.type == "LIGHT"))
+    assert_agrees(scene, samples=256)
+
+
+def test_emission():
+    assert_agrees(_stage(new_material("glow", "ShaderNodeEmission", Color=(1, 0.4, 0.1, 1), Strength=2.5)[0]), samples=256)
+
+
+def test_transparency():
+    assert_agrees(_stage(_mixed("ShaderNodeMixShader", _CLEAR, _RED, 0.4)), samples=256)
+
+
+def test_transparency_second():
+    assert_agrees(_stage(_mixed("ShaderNodeMixShader", _RED, _CLEAR, 0.4)), samples=256)
+
+
+def test_mix_of_diffuse_shaders():
+    assert_agrees(_stage(_mixed("ShaderNodeMixShader", _RED, _BLUE, 0.3)), samples=128)
+
+
+def test_diffuse_plus_emission():
+    assert_agrees(_stage(_mixed("ShaderNodeAddShader", _RED, _GLOW)), samples=256)
+
+
+def test_node_group():
+    """Values pass through a group's inputs; the shader sits inside."""
+    group = bpy.data.node_groups.new("paint", "ShaderNodeTree")
+    group.inputs.new("NodeSocketColor", "Paint")
+    group.outputs.new("NodeSocketShader", "Shader")
+    inside, out = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    shader, reroute = group.nodes.new("ShaderNodeBsdfDiffuse"), group.nodes.new("NodeReroute")
+    group.links.new(inside.outputs["Paint"], reroute.inputs[0])
+    group.links.new(reroute.outputs[0], shader.inputs["Color"])
+    group.links.new(shader.outputs[0], out.inputs["Shader"])
+    material, tree, _ = new_material("grouped", "ShaderNodeBsdfDiffuse")
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    node.inputs["Paint"].default_value = (0.1, 0.8, 0.5, 1)
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    tree.links.new(node.outputs[0], output.inputs["Surface"])
+    assert_agrees(_stage(material), samples=128)
+
+
+def test_material_without_nodes():
+    material = bpy.data.materials.new("plain")
+    material.diffuse_color = (0.3, 0.6, 0.2, 1)
+    material.roughness, material.specular_intensity, material.metallic = 1.0, 0.0, 0.0
+    assert_agrees(_stage(material), samples=128, tolerance=0.03)
+
+
+def test_unknown_shader_is_warned_about():
+    assert_warns(_stage(new_material("toon", "ShaderNodeBsdfToon")[0]), 'material "toon"', "Toon", "grey diffuse")
+
+
+def test_unknown_color_node_is_warned_about():
+    material, tree, node = new_material("noisy", "ShaderNodeBsdfDiffuse", Color=(0.3, 0.2, 0.1, 1))
+    noise = tree.nodes.new("ShaderNodeTexNoise")
+    tree.links.new(noise.outputs["Color"], node.inputs["Color"])
+    assert_warns(_stage(material), 'material "noisy"', "Noise Texture", "(0.3, 0.2, 0.1, 1.0) was used")
+
+
+def test_subsurface_is_warned_about():
+    material = new_material("skin", "ShaderNodeBsdfPrincipled", Subsurface=0.5)[0]
+    assert_warns(_stage(material), 'material "skin"', "subsurface")
+
+
+def test_bump_is_warned_about():
+    material, tree, node = new_material("bumpy", "ShaderNodeBsdfDiffuse")
+    tree.links.new(tree.nodes.new("ShaderNodeBump").outputs[0], node.inputs["Normal"])
+    assert_warns(_stage(material), 'material "bumpy"', "Bump")

@@ -1,0 +1,186 @@
+"""Meshes: modifiers, normals, slots and instances look as in Cycles."""
+
+import math
+
+import bpy
+
+from scenes import (
+    add_camera,
+    add_light,
+    add_plane,
+    add_sphere,
+    assert_agrees,
+    degrees,
+    diffuse,
+    link,
+    new_material,
+    new_scene,
+    set_world,
+)
+
+
+def _stage(width=64, height=48):
+    """A floor, a sun and a pale sky."""
+    scene = new_scene(width, height)
+    set_world((0.1, 0.1, 0.15))
+    add_plane(8, diffuse((0.6, 0.6, 0.6)))
+    add_light("SUN", rotation=degrees(35, 25, 0), energy=2, angle=0)
+    add_camera((0, -6, 4), degrees(57, 0, 0), lens=40)
+    return scene
+
+
+def test_flat_and_smooth_faces():
+    scene = _stage()
+    add_sphere(0.9, location=(-1, 0, 1), segments=12)
+    flat = add_sphere(0.9, location=(1, 0, 1), segments=12)
+    flat.data.polygons.foreach_set("use_smooth", [False] * len(flat.data.polygons))
+    assert_agrees(scene)
+
+
+def test_split_normals():
+    scene = _stage()
+    bpy.ops.mesh.primitive_cube_add(size=1.4, location=(0, 0, 1), rotation=degrees(10, 20, 30))
+    cube = bpy.context.object
+    bpy.ops.object.shade_smooth()
+    cube.data.materials.append(diffuse())
+    cube.data.use_auto_smooth = True
+    cube.data.auto_smooth_angle = math.radians(30)
+    assert_agrees(scene)
+
+
+def test_modifiers_at_their_render_level():
+    scene = _stage()
+    bpy.ops.mesh.primitive_cube_add(size=1.6, location=(0, 0, 1))
+    cube = bpy.context.object
+    cube.data.materials.append(diffuse())
+    bpy.ops.object.shade_smooth()
+    modifier = cube.modifiers.new("subdivision", "SUBSURF")
+    modifier.levels, modifier.render_levels = 0, 3
+    assert_agrees(scene)
+
+
+def test_several_materials_on_one_mesh():
+    scene = _stage()
+    ball = add_sphere(1.0, diffuse((0.8, 0.1, 0.1), "red"), (0, 0, 1))
+    ball.data.materials.append(diffuse((0.1, 0.8, 0.1), "green"))
+    ball.data.materials.append(None)
+    slots = [i % 3 for i in range(len(ball.data.polygons))]
+    ball.data.polygons.foreach_set("material_index", slots)
+    assert_agrees(scene)
+
+
+def test_material_of_the_object_instead_of_the_mesh():
+    scene = _stage()
+    first = add_sphere(0.8, diffuse((0.8, 0.1, 0.1), "red"), (-1, 0, 0.8))
+    second = link(first.data, "second")
+    second.location = (1, 0, 0.8)
+    second.material_slots[0].link = "OBJECT"
+    second.material_slots[0].material = diffuse((0.1, 0.1, 0.8), "blue")
+    assert_agrees(scene)
+
+
+def test_curves_and_text():
+    scene = _stage()
+    bpy.ops.curve.primitive_bezier_circle_add(radius=1, location=(0, 0, 1))
+    bpy.context.object.data.bevel_depth = 0.3
+    bpy.context.object.data.materials.append(diffuse((0.7, 0.5, 0.2)))
+    bpy.ops.object.text_add(location=(-1, -2, 0.3))
+    bpy.context.object.data.extrude = 0.2
+    bpy.context.object.data.materials.append(diffuse((0.2, 0.5, 0.7)))
+    assert_agrees(scene)
+
+
+def test_collection_instances_with_shear_and_mirroring():
+    scene = _stage()
+    collection = bpy.data.collections.new("parts")
+    bpy.ops.mesh.primitive_monkey_add(size=1)
+    monkey = bpy.context.object
+    monkey.data.materials.append(diffuse((0.8, 0.6, 0.3)))
+    scene.collection.objects.unlink(monkey)
+    collection.objects.link(monkey)
+    for x in range(-2, 3):
+        empty = link(None, f"instance {x}")
+        empty.instance_type, empty.instance_collection = "COLLECTION", collection
+        empty.location = (1.1 * x, 0.3 * x, 0.7)
+        empty.rotation_euler = (0.2 * x, 0.3, 0.5 * x)
+        empty.scale = (-1 if x == 1 else 0.9, 1, 1.2)
+    # A parent that is scaled unevenly shears what is turned below it.
+    parent = link(None, "parent")
+    parent.scale = (1, 2, 0.7)
+    bpy.data.objects["instance -1"].parent = parent
+    assert_agrees(scene)
+
+
+def test_particles():
+    scene = _stage()
+    pebble = add_sphere(0.12, diffuse((0.9, 0.3, 0.2)), (50, 0, 0), segments=8)
+    emitter = add_plane(5, diffuse((0.3, 0.4, 0.3)), (0, 0, 0.4))
+    emitter.modifiers.new("particles", "PARTICLE_SYSTEM")
+    settings = emitter.particle_systems[0].settings
+    settings.type, settings.count, settings.render_type = "HAIR", 200, "OBJECT"
+    settings.use_advanced_hair = True
+    settings.instance_object, settings.particle_size, settings.size_random = pebble, 1.0, 0.7
+    assert_agrees(scene)
+
+
+def test_geometry_nodes_instances():
+    """Points of a grid carry cubes that geometry nodes make: no object of the scene has that mesh."""
+    scene = _stage()
+    carrier = add_plane(4, diffuse((0.3, 0.3, 0.6)), (0, 0, 0.2), subdivisions=5)
+    tree = bpy.data.node_groups.new("scatter", "GeometryNodeTree")
+    tree.inputs.new("NodeSocketGeometry", "Geometry")
+    tree.outputs.new("NodeSocketGeometry", "Geometry")
+    nodes = {
+        kind: tree.nodes.new(kind)
+        for kind in (
+            "NodeGroupInput",
+            "NodeGroupOutput",
+            "GeometryNodeInstanceOnPoints",
+            "GeometryNodeMeshCube",
+            "GeometryNodeJoinGeometry",
+            "GeometryNodeSetMaterial",
+        )
+    }
+    nodes["GeometryNodeMeshCube"].inputs["Size"].default_value = (0.3, 0.3, 0.9)
+    nodes["GeometryNodeSetMaterial"].inputs["Material"].default_value = diffuse((0.9, 0.7, 0.1), "yellow")
+    on_points, join = nodes["GeometryNodeInstanceOnPoints"], nodes["GeometryNodeJoinGeometry"]
+    set_material = nodes["GeometryNodeSetMaterial"]
+    tree.links.new(nodes["NodeGroupInput"].outputs[0], on_points.inputs["Points"])
+    tree.links.new(nodes["GeometryNodeMeshCube"].outputs["Mesh"], set_material.inputs["Geometry"])
+    tree.links.new(set_material.outputs["Geometry"], on_points.inputs["Instance"])
+    tree.links.new(on_points.outputs["Instances"], join.inputs[0])
+    tree.links.new(nodes["NodeGroupInput"].outputs[0], join.inputs[0])
+    tree.links.new(join.outputs[0], nodes["NodeGroupOutput"].inputs[0])
+    carrier.modifiers.new("scatter", "NODES").node_group = tree
+    assert_agrees(scene)
+
+
+def test_hidden_from_camera_and_shadowless():
+    scene = _stage()
+    add_sphere(0.8, location=(-1, 0, 0.8)).visible_camera = False
+    add_sphere(0.8, location=(1, 0, 0.8)).visible_shadow = False
+    assert_agrees(scene)
+
+
+def test_render_visibility():
+    scene = _stage()
+    add_sphere(0.8, location=(-1, 0, 0.8)).hide_render = True
+    add_sphere(0.8, location=(1, 0, 0.8)).hide_viewport = True
+    assert_agrees(scene)
+
+
+def test_indirect_light():
+    """Several bounces in a coloured box."""
+    from scenes import set_bounces
+
+    scene = new_scene()
+    set_bounces(scene, 8)
+    bpy.ops.mesh.primitive_cube_add(size=4)
+    box = bpy.context.object
+    for color in ((0.8, 0.8, 0.8), (0.8, 0.1, 0.1), (0.1, 0.8, 0.1)):
+        box.data.materials.append(diffuse(color))
+    box.data.polygons.foreach_set("material_index", [0, 1, 2, 0, 0, 0])
+    add_sphere(0.7, location=(0.3, 0.4, -1))
+    add_light("AREA", (0, 0, 1.9), energy=100, size=1.0)
+    add_camera((0, -1.9, 0), degrees(90, 0, 0), lens=20)
+    assert_agrees(scene, samples=256)

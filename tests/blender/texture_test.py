@@ -1,0 +1,263 @@
+"""Textures: orientation, mapping, channels, colour spaces and sources of images are Blender's."""
+
+import os
+
+import bpy
+import numpy as np
+
+from scenes import (
+    add_camera,
+    add_image_node,
+    add_plane,
+    asymmetric_pixels,
+    assert_agrees,
+    degrees,
+    diffuse,
+    folder,
+    new_image,
+    new_material,
+    new_scene,
+    set_bounces,
+    set_world,
+)
+
+
+def _stage(make_image, kind="ShaderNodeEmission", socket="Color", **settings):
+    """A textured square that fills the picture, seen from above; emission shows the texture's values themselves.
+
+    @param  make_image  called in the new scene
+    @param  kind        of the shader whose socket is textured
+    @param  settings    of the Image Texture node
+    @return             (scene, tree, Image Texture node, shader node)
+    """
+    scene = new_scene(64, 48)
+    set_world((1, 1, 1), 1.0 if kind != "ShaderNodeEmission" else 0.0)
+    material, tree, node = new_material("textured", kind)
+    texture = add_image_node(tree, make_image(), **settings)
+    tree.links.new(texture.outputs["Color"], node.inputs[socket])
+    add_plane(4, material)
+    add_camera((0.1, -0.2, 6), degrees(2, 3, 10), type="ORTHO", ortho_scale=3.6)
+    return scene, tree, texture, node
+
+
+def _bytes(color_space="sRGB"):
+    return lambda: new_image(asymmetric_pixels(), color_space, is_float=False)
+
+
+def _mapping(tree, texture, kind="POINT", location=(0, 0, 0), rotation=(0, 0, 0), scale=(1, 1, 1)):
+    """A Mapping node before a texture."""
+    node, coordinate = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
+    node.vector_type = kind
+    node.inputs["Location"].default_value = location
+    node.inputs["Rotation"].default_value = rotation
+    node.inputs["Scale"].default_value = scale
+    tree.links.new(coordinate.outputs["UV"], node.inputs["Vector"])
+    tree.links.new(node.outputs["Vector"], texture.inputs["Vector"])
+
+
+def _assert_shows(scene):
+    # Cycles keeps bytes as bytes and interpolates after decoding them, as relief does; both filter alike up close.
+    assert_agrees(scene, samples=64, block=4, tolerance=0.005)
+
+
+def test_orientation_of_bytes():
+    _assert_shows(_stage(_bytes())[0])
+
+
+def test_orientation_of_floats():
+    _assert_shows(_stage(lambda: new_image(3 * asymmetric_pixels()))[0])
+
+
+def test_non_color_bytes():
+    _assert_shows(_stage(_bytes("Non-Color"))[0])
+
+
+def test_nearest_texels():
+    _assert_shows(_stage(_bytes(), interpolation="Closest")[0])
+
+
+def test_extended_border():
+    scene, tree, texture, node = _stage(_bytes(), extension="EXTEND")
+    _mapping(tree, texture, location=(-0.5, -0.5, 0), scale=(2, 2, 1))
+    _assert_shows(scene)
+
+
+def test_tiling_and_offset():
+    scene, tree, texture, node = _stage(_bytes())
+    _mapping(tree, texture, location=(0.2, 0.35, 0), scale=(3, 2, 1))
+    _assert_shows(scene)
+
+
+def test_rotation():
+    scene, tree, texture, node = _stage(_bytes())
+    _mapping(tree, texture, location=(0.1, 0.3, 0), rotation=degrees(0, 0, 25), scale=(1.5, 0.8, 1))
+    _assert_shows(scene)
+
+
+def test_mapping_as_texture():
+    scene, tree, texture, node = _stage(_bytes())
+    _mapping(tree, texture, "TEXTURE", (0.1, 0.3, 0), degrees(0, 0, 25), (0.5, 0.5, 1))
+    _assert_shows(scene)
+
+
+def test_two_uv_maps():
+    """The second uv map, by name, though the first is active."""
+    scene, tree, texture, node = _stage(_bytes())
+    plane = next(o for o in scene.objects if o.type == "MESH")
+    second = plane.data.uv_layers.new(name="other")
+    uv = np.empty(2 * len(second.data), dtype=np.float32)
+    second.data.foreach_get("uv", uv)
+    second.data.foreach_set("uv", uv.reshape(-1, 2)[:, ::-1].ravel() * 1.7 + 0.2)
+    source = tree.nodes.new("ShaderNodeUVMap")
+    source.uv_map = "other"
+    tree.links.new(source.outputs[0], texture.inputs["Vector"])
+    _assert_shows(scene)
+
+
+def test_generated_coordinates():
+    scene, tree, texture, node = _stage(_bytes())
+    source = tree.nodes.new("ShaderNodeTexCoord")
+    tree.links.new(source.outputs["Generated"], texture.inputs["Vector"])
+    _assert_shows(scene)
+
+
+def test_tinted_texture():
+    scene, tree, texture, node = _stage(_bytes())
+    mix = tree.nodes.new("ShaderNodeMixRGB")
+    mix.blend_type = "MULTIPLY"
+    mix.inputs[0].default_value = 1.0
+    mix.inputs[2].default_value = (0.9, 0.5, 0.2, 1)
+    tree.links.new(texture.outputs["Color"], mix.inputs[1])
+    tree.links.new(mix.outputs[0], node.inputs["Color"])
+    _assert_shows(scene)
+
+
+def test_opacity_from_the_images_alpha():
+    pixels = asymmetric_pixels()
+    pixels[..., 3] = pixels[..., 0]
+    scene, tree, texture, node = _stage(
+        lambda: new_image(pixels, "sRGB", is_float=False), "ShaderNodeBsdfPrincipled", "Base Color"
+    )
+    texture.image.alpha_mode = "CHANNEL_PACKED"
+    node.inputs["Specular"].default_value = 0.0
+    tree.links.new(texture.outputs["Alpha"], node.inputs["Alpha"])
+    set_bounces(scene, 2)
+    assert_agrees(scene, samples=128, tolerance=0.08)
+
+
+def test_roughness_from_a_grey_image():
+    """A mirror whose blur varies over the square: only orientation and strength show, Cycles filters glossy light alike."""
+    pixels = asymmetric_pixels()
+    pixels[..., :3] = (0.15 + 0.5 * pixels[..., :1]) * np.ones(3)
+    scene, tree, texture, node = _stage(
+        lambda: new_image(pixels, "Non-Color", is_float=False), "ShaderNodeBsdfGlossy", "Roughness"
+    )
+    node.inputs["Color"].default_value = (1, 1, 1, 1)
+    node.distribution = "MULTI_GGX"
+    set_bounces(scene, 1)
+    from scenes import add_light
+
+    add_light("AREA", (0, 0, 9), energy=900, size=1.2)
+    assert_agrees(scene, samples=256, tolerance=0.03)
+
+
+def test_normal_map():
+    """Tilted facets under a sun: the tangents' directions show."""
+    pixels = np.ones((4, 4, 4), dtype=np.float32)
+    tilt = np.random.default_rng(3).uniform(-0.4, 0.4, (4, 4, 2))
+    pixels[..., :2] = 0.5 + 0.5 * tilt
+    pixels[..., 2] = 0.5 + 0.5 * np.sqrt(1 - (tilt**2).sum(axis=-1))
+    scene, tree, texture, node = _stage(
+        lambda: new_image(pixels, "Non-Color", is_float=False), "ShaderNodeBsdfDiffuse", interpolation="Closest"
+    )
+    tree.links.remove(node.inputs["Color"].links[0])
+    normal = tree.nodes.new("ShaderNodeNormalMap")
+    tree.links.new(texture.outputs["Color"], normal.inputs["Color"])
+    tree.links.new(normal.outputs["Normal"], node.inputs["Normal"])
+    set_world((0, 0, 0))
+    from scenes import add_light
+
+    add_light("SUN", rotation=degrees(25, 35, 0), energy=2, angle=0)
+    assert_agrees(scene, samples=64, block=4, tolerance=0.01)
+
+
+def test_color_attribute():
+    scene = new_scene()
+    material, tree, node = new_material("painted", "ShaderNodeEmission")
+    plane = add_plane(4, material, subdivisions=6)
+    attribute = plane.data.color_attributes.new("paint", "FLOAT_COLOR", "POINT")
+    colors = np.random.default_rng(5).uniform(0, 1, (len(attribute.data), 4)).astype(np.float32)
+    attribute.data.foreach_set("color", colors.ravel())
+    source = tree.nodes.new("ShaderNodeVertexColor")
+    source.layer_name = "paint"
+    tree.links.new(source.outputs["Color"], node.inputs["Color"])
+    add_camera((0, 0, 6), type="ORTHO", ortho_scale=3.6)
+    assert_agrees(scene, samples=64, tolerance=0.005)
+
+
+def _save(path, file_format="PNG", depth="16"):
+    """Writes the asymmetric picture as a file, by Blender's own means."""
+    scene = new_scene()
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_depth, settings.color_mode = file_format, depth, "RGB"
+    scene.view_settings.view_transform = "Standard"
+    new_image(asymmetric_pixels()).save_render(path)
+    return path
+
+
+def test_files_are_named_not_copied():
+    """An image file reaches the program by its path; only the scene and the mesh are written."""
+    from relief.exporter import export_frames
+
+    with folder() as path:
+        name = _save(f"{path}/image 16.png")
+        scene, _, _, _ = _stage(lambda: bpy.data.images.load(name))
+        export_frames(scene, f"{path}/out/scene.gltf", [1])
+        with open(f"{path}/out/scene.gltf", encoding="utf-8") as file:
+            assert "../image%2016.png" in file.read()
+        assert all(n.endswith(".bin") for n in os.listdir(f"{path}/out/scene_data"))
+        _assert_shows(scene)
+
+
+def test_float_files():
+    with folder() as path:
+        name = _save(f"{path}/image.exr", "OPEN_EXR", "16")
+        _assert_shows(_stage(lambda: bpy.data.images.load(name))[0])
+
+
+def test_files_in_another_color_space_than_their_use_expects():
+    def load():
+        image = bpy.data.images.load(name)
+        image.colorspace_settings.name = "Non-Color"
+        return image
+
+    with folder() as path:
+        name = _save(f"{path}/image.png")
+        _assert_shows(_stage(load)[0])
+
+
+def test_packed_files_keep_their_bytes():
+    from relief.exporter import export_frames
+
+    with folder() as path:
+        name = _save(f"{path}/image.png")
+        with open(name, "rb") as file:
+            data = file.read()
+        scene, _, texture, _ = _stage(lambda: bpy.data.images.load(name))
+        texture.image.pack()
+        os.remove(name)
+        export_frames(scene, f"{path}/out/scene.gltf", [1])
+        written = [n for n in os.listdir(f"{path}/out/scene_data") if n.endswith(".png")]
+        with open(f"{path}/out/scene_data/{written[0]}", "rb") as file:
+            assert file.read() == data
+        _assert_shows(scene)
+
+
+def test_missing_file_is_warned_about():
+    from scenes import assert_warns
+
+    with folder() as path:
+        name = _save(f"{path}/image.png")
+        scene, _, _, _ = _stage(lambda: bpy.data.images.load(name))
+        os.remove(name)
+        assert_warns(scene, 'image "image.png"', "no file")
