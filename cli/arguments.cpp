@@ -133,12 +133,12 @@ std::uint32_t parse_aovs(const std::string& text)
   return mask;
 }
 
-int parse_lod(const std::string& text)
+float parse_lod(const std::string& text)
 {
-  constexpr int kCoarsest = 30;
-  int level = 0;
-  if (text != "auto" && (!to_number(text, &level) || level < 0 || level > kCoarsest)) {
-    refuse("--lod", "auto or a whole level from 0 to 30 (levels in between are not supported)", text);
+  constexpr float kCoarsest = 30;
+  float level = -1;
+  if (text != "auto" && (!to_number(text, &level) || !(level >= 0 && level <= kCoarsest))) {
+    refuse("--lod", "auto or a level from 0 to 30", text);
   }
   return level;
 }

@@ -44,8 +44,8 @@ std::uint64_t parse_seed(const std::string& text);
 /// @return bit i: enumerator i of Aov
 std::uint32_t parse_aovs(const std::string& text);
 
-/// A level of detail of height maps, whole, or "auto", which is the finest: 0.
-int parse_lod(const std::string& text);
+/// A level of detail of height maps, or "auto": −1.
+float parse_lod(const std::string& text);
 
 /// Refuses an output whose name does not end in `suffix` (upper or lower case), so that no format hides under the
 /// name of another. Devices and pipes may have any name.

@@ -47,9 +47,9 @@ void add_displacement_method(CLI::App& command, DisplacementOptions& options)
 
 void add_displacement_lod(CLI::App& command, DisplacementOptions& options)
 {
-  const auto set = [&options](const std::string& text) { options.level = parse_lod(text); };
+  const auto set = [&options](const std::string& text) { options.lod = parse_lod(text); };
   command.add_option_function<std::string>(
-      "--lod", set, "Level of the height maps, 0 the finest; auto is the finest (default: the scene's)");
+      "--lod", set, "Level of the height maps, 0 the finest; auto: what the pixels can show (default: the scene's)");
 }
 
 }  // namespace relief

@@ -6,6 +6,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "displacement/level_of_detail.h"
 #include "kernel/math/rounding.h"
 
 namespace relief {
@@ -69,6 +70,26 @@ bool is_unfolded(const DisplacedTriangle& tri)
   return positive || negative;
 }
 
+/// Bounds of the heights that a triangle meets on one level.
+void widen_by_heights(const DisplacedTriangle& tri, const HeightFieldView& field, double* low, double* high)
+{
+  const auto cell = [](double x) { return static_cast<std::int64_t>(std::floor(x)); };
+  const auto [x_low, x_high] = std::minmax({tri.x[0], tri.x[1], tri.x[2]});
+  const auto [y_low, y_high] = std::minmax({tri.y[0], tri.y[1], tri.y[2]});
+  const StoredRange stored =
+      height_field_range(field, cell(x_low - 1e-6), cell(y_low - 1e-6), cell(x_high + 1e-6), cell(y_high + 1e-6));
+  double h_low, h_high;
+  stored_to_heights(field, stored, &h_low, &h_high);
+  *low = std::min(*low, h_low);
+  *high = std::max(*high, h_high);
+}
+
+/// Area of a triangle in the map, texels.
+double lattice_area(const DisplacedTriangle& tri)
+{
+  return 0.5 * std::abs((tri.x[1] - tri.x[0]) * (tri.y[2] - tri.y[0]) - (tri.y[1] - tri.y[0]) * (tri.x[2] - tri.x[0]));
+}
+
 /// Subtracts whole periods, so that digits are left for fractions of a texel where uv are large.
 void rebase(double* x, const LatticeAxis& axis)
 {
@@ -80,7 +101,10 @@ void rebase(double* x, const LatticeAxis& axis)
 
 }  // namespace
 
-DisplacedMesh::DisplacedMesh(const MeshView& mesh, const HeightFieldView& field, const DisplacementMapping& mapping)
+DisplacedMesh::DisplacedMesh(const MeshView& mesh,
+                             const HeightFieldView& field,
+                             const DisplacementMapping& mapping,
+                             std::span<const HeightFieldView* const> coarser)
     : triangles_(mesh.num_triangles), unfolded_(mesh.num_triangles), field_(&field), mapping_(mapping)
 {
   std::atomic<std::uint32_t> num_folded{0}, num_short{0}, num_degenerate{0};
@@ -108,13 +132,10 @@ DisplacedMesh::DisplacedMesh(const MeshView& mesh, const HeightFieldView& field,
     rebase(tri.x, field.x);
     rebase(tri.y, field.y);
 
-    const auto cell = [](double x) { return static_cast<std::int64_t>(std::floor(x)); };
-    const auto [x_low, x_high] = std::minmax({tri.x[0], tri.x[1], tri.x[2]});
-    const auto [y_low, y_high] = std::minmax({tri.y[0], tri.y[1], tri.y[2]});
-    const StoredRange stored =
-        height_field_range(field, cell(x_low - 1e-6), cell(y_low - 1e-6), cell(x_high + 1e-6), cell(y_high + 1e-6));
-    double h_low, h_high;
-    stored_to_heights(field, stored, &h_low, &h_high);
+    double h_low = static_cast<double>(kInfinity), h_high = -h_low;
+    widen_by_heights(tri, field, &h_low, &h_high);
+    for (const HeightFieldView* level : coarser)
+      widen_by_heights(triangle_on_level(tri, field, *level), *level, &h_low, &h_high);
     double d_low = mapping.scale * (h_low - mapping.midlevel), d_high = mapping.scale * (h_high - mapping.midlevel);
     if (d_low > d_high) std::swap(d_low, d_high);
 
@@ -142,6 +163,33 @@ DisplacedMeshView DisplacedMesh::view() const
 {
   return {triangles_.data(), unfolded_.data(), static_cast<std::uint32_t>(triangles_.size()), field_,
           mapping_.scale,    mapping_.midlevel};
+}
+
+float DisplacedMesh::widest_texel() const
+{
+  double widest = 0;
+  for (const DisplacedTriangle& tri : triangles_) {
+    const Vec3d a = to_double(tri.P[1]) - to_double(tri.P[0]), b = to_double(tri.P[2]) - to_double(tri.P[0]);
+    const double area = 0.5 * length(cross(a, b)), texels = lattice_area(tri);
+    if (texels > 0) widest = std::max(widest, area / texels);
+  }
+  return static_cast<float>(std::sqrt(widest));
+}
+
+double mean_texels_a_side(const MeshView& mesh, const TextureRef& mapping, int width, int height)
+{
+  const Vec2f* uv = mesh.uv[mapping.uv_set];
+  if (uv == nullptr || mesh.num_triangles == 0) return 0;
+  double twice_uv_area = 0;
+  for (std::uint32_t i = 0; i < mesh.num_triangles; ++i) {
+    const TriangleIndices& v = mesh.triangles[i];
+    const Vec2f a = uv[v.v1] - uv[v.v0], b = uv[v.v2] - uv[v.v0];
+    twice_uv_area += std::abs(static_cast<double>(a.x) * b.y - static_cast<double>(a.y) * b.x);
+  }
+  const double texels_a_uv =
+      std::abs(static_cast<double>(mapping.m00) * mapping.m11 - static_cast<double>(mapping.m01) * mapping.m10) *
+      static_cast<double>(width) * static_cast<double>(height);
+  return std::sqrt(twice_uv_area * texels_a_uv / mesh.num_triangles);
 }
 
 Box3f displaced_triangle_bounds(const DisplacedMeshView& mesh, std::uint32_t triangle)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "displacement/displaced_triangle.h"
@@ -23,6 +24,10 @@ struct DisplacedMeshReport {
   std::uint32_t num_degenerate = 0;     ///< no area: nothing of them is ever hit
 };
 
+/// Texels along a triangle's side, about: the root of twice the mean of their areas in a map.
+/// @param width, height  of the map, texels
+double mean_texels_a_side(const MeshView& mesh, const TextureRef& mapping, int width, int height);
+
 /// Box of a displaced triangle, object space, rounded outward.
 struct Box3f {
   Vec3f low, high;
@@ -32,12 +37,18 @@ class DisplacedMesh {
  public:
   DisplacedMesh() = default;
   /// @param mesh   without normals its triangles move along their own; without the uv set all of it is at uv (0, 0)
-  /// @param field  must outlive the mesh
+  /// @param field   must outlive the mesh
+  /// @param coarser levels of the same map that rays may see instead: prisms hold all of their surfaces
   /// @cost  129 bytes a triangle; parallel over triangles
-  DisplacedMesh(const MeshView& mesh, const HeightFieldView& field, const DisplacementMapping& mapping);
+  DisplacedMesh(const MeshView& mesh,
+                const HeightFieldView& field,
+                const DisplacementMapping& mapping,
+                std::span<const HeightFieldView* const> coarser = {});
 
   DisplacedMeshView view() const;
   const DisplacedMeshReport& report() const { return report_; }
+  /// Width of the widest texel on the base mesh, metres of object space: the root of its area. 0 without any.
+  float widest_texel() const;
   std::size_t bytes() const { return triangles_.size() * (sizeof(DisplacedTriangle) + 1); }
 
  private:

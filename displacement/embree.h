@@ -13,8 +13,9 @@
 
 namespace relief {
 
-struct TraversalCounters;
+struct LodCone;
 struct PrismVisits;
+struct TraversalCounters;
 
 /// What a query hands to callbacks: Embree's own context first, so that a callback can cast back. Every query of a scene
 /// with displaced geometry uses one of these.
@@ -26,6 +27,8 @@ struct EmbreeContext {
 #endif
   TraversalCounters* displacement = nullptr;  ///< where displaced geometry counts; null: nowhere
   std::uint32_t* steps = nullptr;  ///< bounds and texels a ray, added to the entry of its id; null: not wanted
+  const LodCone* cones = nullptr;  ///< by the rays' ids; null: the finest detail
+  const float* texels = nullptr;   ///< widths of finest texels by instance, metres, world; null: those of object space
   PrismVisits* visits = nullptr;   ///< record of the prisms that are visited (explain.h); null: not wanted
 };
 

@@ -17,7 +17,37 @@ void bounds(const RTCBoundsFunctionArguments* arguments)
   out->upper_z = box.high.z;
 }
 
+/// A geometry's mesh and one of its triangles, on one level.
+struct OnLevel {
+  DisplacedMeshView mesh;
+  DisplacedTriangle tri;
+
+  OnLevel(const DisplacedGeometry& geometry, std::uint32_t triangle, int level)
+      : mesh(geometry.mesh), tri(geometry.mesh.triangles[triangle])
+  {
+    if (level == 0) return;
+    mesh.field = geometry.levels[level].field;
+    tri = triangle_on_level(tri, *geometry.mesh.field, *mesh.field);
+  }
+};
+
 }  // namespace
+
+SurfacePoint displaced_point(const DisplacedGeometry& geometry, std::uint32_t triangle, int level, double b1, double b2)
+{
+  const OnLevel on(geometry, triangle, level);
+  return surface_point(on.mesh, on.tri, b1, b2);
+}
+
+Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry,
+                              std::uint32_t triangle,
+                              int level,
+                              double b1,
+                              double b2)
+{
+  const OnLevel on(geometry, triangle, level);
+  return surface_smooth_normal(on.mesh, on.tri, b1, b2);
+}
 
 RTCGeometry displaced_geometry_make(RTCDevice device, const DisplacedGeometry& geometry, const TraversalTable& table)
 {

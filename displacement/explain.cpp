@@ -16,8 +16,8 @@ double whole_periods(const LatticeAxis& axis, double x)
 
 PrismExplanation prism_explain(const PrismVisit& visit)
 {
-  const DisplacedMeshView& mesh = visit.geometry->mesh;
-  const DisplacedTriangle& tri = mesh.triangles[visit.triangle];
+  DisplacedMeshView mesh = visit.geometry->mesh;
+  DisplacedTriangle tri = mesh.triangles[visit.triangle];
   PrismExplanation out;
   out.folded = mesh.unfolded[visit.triangle] == 0;
   RayCurve curve;
@@ -29,6 +29,11 @@ PrismExplanation prism_explain(const PrismVisit& visit)
   }
   if (visit.found) {
     const DisplacedHit& hit = visit.hit;
+    if (hit.level > 0) {
+      const HeightFieldView& level = *visit.geometry->levels[hit.level].field;
+      tri = triangle_on_level(tri, *mesh.field, level);
+      mesh.field = &level;
+    }
     const double x = tri.x[0] + hit.b1 * (tri.x[1] - tri.x[0]) + hit.b2 * (tri.x[2] - tri.x[0]);
     const double y = tri.y[0] + hit.b1 * (tri.y[1] - tri.y[0]) + hit.b2 * (tri.y[2] - tri.y[0]);
     out.u = (x + 0.5 - whole_periods(mesh.field->x, x + 0.5)) / mesh.field->map.width;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 #include <tbb/parallel_for.h>
 
@@ -20,10 +21,17 @@ struct Coverage {
   std::int64_t first = 0, last = 0;
   double first_share = 1, last_share = 1;
 
-  double share(std::int64_t texel) const
+  /// Sum over a stretch of texels, each with its share.
+  template <typename Value>
+  double sum(Value value_at) const
   {
-    if (first == last) return first_share;
-    return texel == first ? first_share : texel == last ? last_share : 1.0;
+    if (first == last) return first_share * static_cast<double>(value_at(first));
+    // Integers are summed as such: exact, and fast.
+    using Sum = std::conditional_t<std::is_integral_v<decltype(value_at(first))>, std::uint64_t, double>;
+    Sum whole = 0;
+    for (std::int64_t texel = first + 1; texel < last; ++texel) whole += value_at(texel);
+    return first_share * static_cast<double>(value_at(first)) + static_cast<double>(whole) +
+           last_share * static_cast<double>(value_at(last));
   }
 };
 
@@ -43,56 +51,56 @@ Coverage coverage_of(int texel, int fine_size, int coarse_size)
   return c;
 }
 
+/// Calls `store` with the index of every texel of a level and the mean of the texels that it covers.
+template <typename Texel, typename Store>
+void average(const HeightMapView& map, int width, int height, Store store)
+{
+  const auto* texels = static_cast<const Texel*>(map.texels);
+  const double area = static_cast<double>(map.width) / width * (static_cast<double>(map.height) / height);
+  tbb::parallel_for(0, height, [&](int row) {
+    const Coverage rows = coverage_of(row, map.height, height);
+    for (int column = 0; column < width; ++column) {
+      const Coverage columns = coverage_of(column, map.width, width);
+      const double sum = rows.sum([&](std::int64_t y) {
+        const Texel* line = texels + y * map.width;
+        return columns.sum([line](std::int64_t x) {
+          if constexpr (std::is_integral_v<Texel>) {
+            return std::uint64_t{line[x]};
+          } else {
+            return static_cast<double>(line[x]);
+          }
+        });
+      });
+      store(static_cast<std::size_t>(row) * static_cast<std::size_t>(width) + static_cast<std::size_t>(column),
+            sum / area);
+    }
+  });
+}
+
 }  // namespace
 
 HeightLevel::HeightLevel(const HeightMapView& map, int level) : shape_(map)
 {
+  const int width = level_size(map.width, level), height = level_size(map.height, level);
+  const std::size_t count = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   shape_.texels = nullptr;
-  shape_.width = level_size(map.width, level);
-  shape_.height = level_size(map.height, level);
-  const bool is_float = map.format == HeightFormat::kFloat;
-  shape_.format = is_float ? HeightFormat::kFloat : HeightFormat::kU16;
-  const auto width = static_cast<std::size_t>(shape_.width), count = width * static_cast<std::size_t>(shape_.height);
-  if (is_float) {
+  shape_.width = width;
+  shape_.height = height;
+  if (map.format == HeightFormat::kFloat) {
     floats_.resize(count);
-  } else {
-    words_.resize(count);
+    average<float>(map, width, height, [this](std::size_t at, double mean) { floats_[at] = static_cast<float>(mean); });
+    return;
   }
-  const double area = static_cast<double>(map.width) / shape_.width * (static_cast<double>(map.height) / shape_.height);
-  // Integers are summed as such: no rounding before the last.
-  const double unit = map.format == HeightFormat::kU8 ? 257.0 : 1.0;
-  const auto value_at = [&](std::int64_t index) -> double {
-    switch (map.format) {
-      case HeightFormat::kU8:
-        return static_cast<const std::uint8_t*>(map.texels)[index];
-      case HeightFormat::kU16:
-        return static_cast<const std::uint16_t*>(map.texels)[index];
-      case HeightFormat::kFloat:
-        break;
-    }
-    return static_cast<double>(static_cast<const float*>(map.texels)[index]);
+  shape_.format = HeightFormat::kU16;
+  words_.resize(count);
+  const auto store = [this](std::size_t at, double mean) {
+    words_[at] = static_cast<std::uint16_t>(std::clamp(std::nearbyint(mean), 0.0, 65535.0));
   };
-  tbb::parallel_for(0, shape_.height, [&](int row) {
-    const Coverage rows = coverage_of(row, map.height, shape_.height);
-    for (int column = 0; column < shape_.width; ++column) {
-      const Coverage columns = coverage_of(column, map.width, shape_.width);
-      double sum = 0;
-      for (std::int64_t y = rows.first; y <= rows.last; ++y) {
-        double row_sum = 0;
-        for (std::int64_t x = columns.first; x <= columns.last; ++x) {
-          row_sum += columns.share(x) * value_at(y * map.width + x);
-        }
-        sum += rows.share(y) * row_sum;
-      }
-      const double mean = sum / area;
-      const std::size_t at = static_cast<std::size_t>(row) * width + static_cast<std::size_t>(column);
-      if (is_float) {
-        floats_[at] = static_cast<float>(mean);
-      } else {
-        words_[at] = static_cast<std::uint16_t>(std::clamp(std::nearbyint(mean * unit), 0.0, 65535.0));
-      }
-    }
-  });
+  if (map.format == HeightFormat::kU8) {
+    average<std::uint8_t>(map, width, height, [&](std::size_t at, double mean) { store(at, 257.0 * mean); });
+  } else {
+    average<std::uint16_t>(map, width, height, store);
+  }
 }
 
 HeightMapView HeightLevel::view() const

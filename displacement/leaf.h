@@ -15,6 +15,7 @@ struct DisplacedHit {
   double b1 = 0, b2 = 0;      ///< barycentric weights of vertices 1 and 2, in [0, 1] up to rounding
   std::int64_t i = 0, j = 0;  ///< cell; its patch has the hit's normal
   double tau = 0;             ///< on its segment
+  int level = 0;              ///< of the height map, see level_of_detail.h
 };
 
 /// What one ray counts; the same for all methods, so that they can be compared.
@@ -25,14 +26,16 @@ struct TraversalCounters {
   std::uint64_t prisms = 0;      ///< triangles whose prism the ray enters
 };
 
-/// A point of the curve.
+/// A point of the curve. Without initial values: the leaf has room for many, and uses few.
 struct CurvePoint {
-  double tau = 0;
-  double b1 = 0, b2 = 0, W = 1;
-  double x = 0, y = 0;  ///< lattice coordinates
-  Vec3d N;
-  double s = 0, nu = 1;  ///< nu = |N|
+  double tau;
+  double b1, b2, W;
+  double x, y;  ///< lattice coordinates
+  double Nx, Ny, Nz;
+  double s, nu;  ///< nu = |N|
 };
+
+RELIEF_KERNEL Vec3d curve_normal(const CurvePoint& p) { return {p.Nx, p.Ny, p.Nz}; }
 
 RELIEF_KERNEL CurvePoint curve_point(const DisplacedTriangle& tri, const CurveSegment& g, double tau)
 {
@@ -46,9 +49,12 @@ RELIEF_KERNEL CurvePoint curve_point(const DisplacedTriangle& tri, const CurveSe
   p.b2 = e2 * inverse;
   p.x = b0 * tri.x[0] + p.b1 * tri.x[1] + p.b2 * tri.x[2];
   p.y = b0 * tri.y[0] + p.b1 * tri.y[1] + p.b2 * tri.y[2];
-  p.N = b0 * to_double(tri.N[0]) + p.b1 * to_double(tri.N[1]) + p.b2 * to_double(tri.N[2]);
+  const Vec3d N = b0 * to_double(tri.N[0]) + p.b1 * to_double(tri.N[1]) + p.b2 * to_double(tri.N[2]);
+  p.Nx = N.x;
+  p.Ny = N.y;
+  p.Nz = N.z;
   p.s = g.s0 + tau * g.ds;
-  p.nu = length(p.N);
+  p.nu = length(N);
   return p;
 }
 
@@ -83,7 +89,7 @@ RELIEF_KERNEL CurveDeviation curve_deviation(const DisplacedTriangle& tri,
   d.y = b1 * __builtin_fabs(tri.y[1] - tri.y[0]) + b2 * __builtin_fabs(tri.y[2] - tri.y[0]);
   const Vec3d N0 = to_double(tri.N[0]);
   const double N = b1 * length(to_double(tri.N[1]) - N0) + b2 * length(to_double(tri.N[2]) - N0);
-  const double turn = length(b.N - a.N);
+  const double turn = length(curve_normal(b) - curve_normal(a));
   const double least = 0.5 * (a.nu + b.nu - turn) - N;
   if (!(least > 0.0)) {
     d.height = __builtin_huge_val();

@@ -105,6 +105,19 @@ RELIEF_KERNEL double curve_t(const RayCurve& curve, const CurveSegment& g, doubl
          (e0 + e1 + e2);
 }
 
+/// Where a segment has a ray parameter, t growing with τ.
+/// @param t  within [t0, t1]
+RELIEF_KERNEL double curve_tau(const RayCurve& curve, const CurveSegment& g, double t)
+{
+  double low = 0, high = 1;
+  // Bisection: it is asked for seldom, and needs no care.
+  for (int k = 0; k < 60 && low < high; ++k) {
+    const double middle = 0.5 * (low + high);
+    (curve_t(curve, g, middle) < t ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
 /// Part of a segment, by its parameter; empty when tau0 > tau1.
 struct CurveRange {
   double tau0 = 0, tau1 = 1;
@@ -319,8 +332,9 @@ RELIEF_KERNEL bool ray_curve_make(const RayFrame& frame, const DisplacedTriangle
 
   // Lane i is vertex i (lane 3 repeats vertex 2), then edge i, which is opposite to it.
   const auto lanes_of = [](const Vec3f* v, int axis) {
-    const auto at = [axis](const Vec3f& a) { return static_cast<double>(axis == 0 ? a.x : (axis == 1 ? a.y : a.z)); };
-    return D4{at(v[0]), at(v[1]), at(v[2]), at(v[2])};
+    static_assert(sizeof(Vec3f) == 3 * sizeof(float));
+    const float* f = reinterpret_cast<const float*>(v) + axis;
+    return D4{f[0], f[3], f[6], f[6]};
   };
   const D4 pz = lanes_of(tri.P, frame.kz) - frame.O[frame.kz], nz = lanes_of(tri.N, frame.kz);
   const D4 x = lanes_of(tri.P, frame.kx) - frame.O[frame.kx] - frame.Sx * pz;

@@ -10,10 +10,134 @@ namespace relief {
 
 namespace {
 
+/// Nearest (or any) hit of a ray's curve with one triangle of a mesh on one level.
+bool trace_level(const DisplacedGeometry& geometry,
+                 const DisplacedMeshView& mesh,
+                 std::uint32_t triangle,
+                 int level,
+                 const RayCurve& curve,
+                 double t_min,
+                 double t_max,
+                 bool any_hit,
+                 DisplacedHit* hit,
+                 TraversalCounters* counters)
+{
+  const DisplacementLevel& tables = geometry.levels[level];
+  switch (geometry.method) {
+    case TraversalMethod::kRmip:
+      return traverse_rmip(mesh, triangle, curve.frame, curve, *tables.rmip, geometry.rmip_options, t_min, t_max,
+                           any_hit, hit, counters);
+    case TraversalMethod::kRmipOnMinmax:
+      return traverse_rmip(mesh, triangle, curve.frame, curve, *tables.mipmap, geometry.rmip_options, t_min, t_max,
+                           any_hit, hit, counters);
+    case TraversalMethod::kTfdm:
+      return traverse_tfdm(mesh, triangle, curve.frame, curve, *tables.mipmap, t_min, t_max, any_hit, hit, counters);
+    case TraversalMethod::kChord:
+      break;
+  }
+  return traverse_chord(mesh, triangle, curve, t_min, t_max, any_hit, hit, counters);
+}
+
+/// A mesh of one triangle: one of a geometry's, on one of its levels.
+struct TriangleOnLevel {
+  DisplacedTriangle tri;
+  DisplacedMeshView mesh;
+
+  TriangleOnLevel(const DisplacedGeometry& geometry, std::uint32_t triangle, int level)
+      : tri(triangle_on_level(geometry.mesh.triangles[triangle], *geometry.mesh.field, *geometry.levels[level].field)),
+        mesh{&tri,
+             geometry.mesh.unfolded + triangle,
+             1,
+             geometry.levels[level].field,
+             geometry.mesh.scale,
+             geometry.mesh.midlevel}
+  {
+  }
+  // The mesh points to the triangle.
+  TriangleOnLevel(const TriangleOnLevel&) = delete;
+  TriangleOnLevel& operator=(const TriangleOnLevel&) = delete;
+};
+
+/// Where a ray passes from one level to the next, it may be above the one's surface and below the other's: it meets the
+/// wall in between, there.
+/// @param t  of the change
+bool level_wall_intersect(const TriangleOnLevel& fine,
+                          const TriangleOnLevel& coarse,
+                          const RayCurve& curve,
+                          double t,
+                          DisplacedHit* hit)
+{
+  for (int k = 0; k < curve.num_segments; ++k) {
+    const CurveSegment& g = curve.segments[k];
+    if (t < g.t0 || t > g.t1) continue;
+    const CurvePoint p = curve_point(fine.tri, g, curve_tau(curve, g, t));
+    const CurvePoint q = curve_point(coarse.tri, g, p.tau);
+    const double height = p.s * p.nu;
+    if ((height < displacement_at(fine.mesh, p.x, p.y)) == (height < displacement_at(coarse.mesh, q.x, q.y))) continue;
+    *hit = {t,
+            p.b1,
+            p.b2,
+            static_cast<std::int64_t>(__builtin_floor(q.x)),
+            static_cast<std::int64_t>(__builtin_floor(q.y)),
+            p.tau};
+    return true;
+  }
+  return false;
+}
+
+/// The levels that a ray sees of one triangle, one after the other.
+bool trace_levels(const DisplacedGeometry& geometry,
+                  std::uint32_t triangle,
+                  const RayCurve& curve,
+                  const LodCone& cone,
+                  float texel,
+                  double t_min,
+                  double t_max,
+                  bool any_hit,
+                  DisplacedHit* hit,
+                  TraversalCounters* counters)
+{
+  double begin = __builtin_huge_val(), end = -__builtin_huge_val();
+  for (int k = 0; k < curve.num_segments; ++k) {
+    begin = min(begin, curve.segments[k].t0);
+    end = max(end, curve.segments[k].t1);
+  }
+  begin = max(begin, t_min);
+  end = min(end, t_max);
+  // Where displacement lines cross, t does not grow along the curve: such a triangle has one level.
+  const bool folded = geometry.mesh.unfolded[triangle] == 0;
+  const auto level_end = [&](int level) {
+    return folded ? __builtin_huge_val() : lod_level_end(geometry.lod, cone, texel, level, begin);
+  };
+  int level = lod_level(geometry.lod, cone, texel, begin);
+  double change = level_end(level);
+  if (level == 0 && !(change < end))  // mostly, where detail is wanted
+    return trace_level(geometry, geometry.mesh, triangle, 0, curve, t_min, t_max, any_hit, hit, counters);
+  double from = t_min;
+  while (true) {
+    const TriangleOnLevel fine(geometry, triangle, level);
+    if (trace_level(geometry, fine.mesh, 0, level, curve, from, min(change, t_max), any_hit, hit, counters)) {
+      hit->level = level;
+      return true;
+    }
+    if (!(change < end)) return false;
+    const TriangleOnLevel coarse(geometry, triangle, level + 1);
+    if (change > t_min && level_wall_intersect(fine, coarse, curve, change, hit)) {
+      hit->level = level + 1;
+      return true;
+    }
+    ++level;
+    from = begin = change;
+    change = level_end(level);
+  }
+}
+
 bool trace(const DisplacedGeometry& geometry,
            std::uint32_t triangle,
            Vec3f O,
            Vec3f D,
+           const LodCone& cone,
+           float texel,
            double t_min,
            double t_max,
            bool any_hit,
@@ -21,23 +145,12 @@ bool trace(const DisplacedGeometry& geometry,
            TraversalCounters* counters)
 {
   const DisplacedMeshView& mesh = geometry.mesh;
-  const RayFrame frame = ray_frame_make(O, D);
   RayCurve curve;
-  if (!ray_curve_make(frame, mesh.triangles[triangle], &curve)) return false;
+  if (!ray_curve_make(ray_frame_make(O, D), mesh.triangles[triangle], &curve)) return false;
   ++counters->prisms;
-  switch (geometry.method) {
-    case TraversalMethod::kRmip:
-      return traverse_rmip(mesh, triangle, frame, curve, *geometry.rmip, geometry.rmip_options, t_min, t_max, any_hit,
-                           hit, counters);
-    case TraversalMethod::kRmipOnMinmax:
-      return traverse_rmip(mesh, triangle, frame, curve, *geometry.mipmap, geometry.rmip_options, t_min, t_max, any_hit,
-                           hit, counters);
-    case TraversalMethod::kTfdm:
-      return traverse_tfdm(mesh, triangle, frame, curve, *geometry.mipmap, t_min, t_max, any_hit, hit, counters);
-    case TraversalMethod::kChord:
-      break;
-  }
-  return traverse_chord(mesh, triangle, curve, t_min, t_max, any_hit, hit, counters);
+  if (geometry.lod.num_levels > 1)
+    return trace_levels(geometry, triangle, curve, cone, texel, t_min, t_max, any_hit, hit, counters);
+  return trace_level(geometry, mesh, triangle, 0, curve, t_min, t_max, any_hit, hit, counters);
 }
 
 /// Where queries that bring no counters count.
@@ -69,7 +182,9 @@ bool trace_observed(const DisplacedGeometry& geometry,
 {
   TraversalCounters& counters = context.displacement != nullptr ? *context.displacement : uncounted;
   const TraversalCounters before = counters;
-  const bool found = trace(geometry, ray.triangle, ray.O, ray.D, t_min, t_max, any_hit, hit, &counters);
+  const LodCone cone = context.cones != nullptr ? context.cones[ray.id] : LodCone{};
+  const float texel = context.texels != nullptr ? context.texels[ray.instance] : geometry.lod.texel;
+  const bool found = trace(geometry, ray.triangle, ray.O, ray.D, cone, texel, t_min, t_max, any_hit, hit, &counters);
   if (context.steps == nullptr && context.visits == nullptr) return found;
   const TraversalCounters spent{counters.bounds - before.bounds, counters.texels - before.texels,
                                 counters.inversions - before.inversions, counters.prisms - before.prisms};
@@ -99,6 +214,7 @@ void intersect(const RTCIntersectFunctionNArguments* arguments)
     RTCRayN_tfar(rays, count, k) = static_cast<float>(hit.t);
     RTCHitN_u(hits, count, k) = static_cast<float>(hit.b1);
     RTCHitN_v(hits, count, k) = static_cast<float>(hit.b2);
+    RTCHitN_Ng_x(hits, count, k) = static_cast<float>(hit.level);
     RTCHitN_primID(hits, count, k) = triangle;
     RTCHitN_geomID(hits, count, k) = arguments->geomID;
     RTCHitN_instID(hits, count, k, 0) = arguments->context->instID[0];

@@ -21,8 +21,8 @@ inline constexpr float kFloatSlack = 0x1p-20f;
 inline constexpr float kParameterSlack = 0x1p-18f;
 /// A chord is split while it may deviate by more than this from the curve; a matter of speed only. Lattice units, and
 /// parts of the map's range.
-inline constexpr float kWantedDeviation = 0.1f;
-inline constexpr float kWantedHeightDeviation = 1.0f / 256;
+inline constexpr float kWantedDeviation = 0.3f;
+inline constexpr float kWantedHeightDeviation = 1.0f / 128;
 inline constexpr int kMaxSplits = 6;
 /// Curves are cut in double precision until the least of their W is at least this part of the largest: floats would
 /// lose it.
@@ -299,7 +299,7 @@ RELIEF_KERNEL bool chord_intersect(Search& c, const Chord& chord)
   const float extent =
       max(__builtin_fabsf(chord.dx) + 2.0f * chord.pad_x, __builtin_fabsf(chord.dy) + 2.0f * chord.pad_y);
   int level = 1;
-  while (level <= f.num_levels && static_cast<float>(1 << (2 * level)) < extent) ++level;
+  while (level <= f.num_levels && static_cast<float>(1 << (2 * level)) < 0.25f * extent) ++level;
   const int size = 1 << (2 * level);
 
   const float x1 = chord.x0 + chord.dx;

@@ -24,12 +24,19 @@ DisplacementMethod method_of(const DisplacementSettings& settings, const Displac
   return options.method.value_or(settings.method);
 }
 
-/// Level of detail; between two levels the finer one.
-int level_of(const DisplacementSettings& settings, const DisplacementOptions& options)
+/// Longest column: how much an instance stretches a mesh, at most about.
+float largest_scale(const Affine3& m) { return std::max({length(m.x), length(m.y), length(m.z)}); }
+
+float lod_of(const DisplacementSettings& settings, const DisplacementOptions& options)
 {
-  constexpr float kCoarsest = 30;
-  return options.level.value_or(static_cast<int>(std::clamp(settings.lod, 0.0f, kCoarsest)));
+  return options.lod.value_or(settings.lod);
 }
+
+bool is_whole(float x) { return x == std::floor(x); }
+
+/// Averaged until fewer texels than this are left along a triangle's side, a map is flat between vertices: levels beyond
+/// would only widen the prisms.
+constexpr double kLeastTexelsASide = 4;
 
 /// What `auto` means, and methods that this version lacks.
 constexpr TraversalMethod kDefaultTraversal = TraversalMethod::kChord;
@@ -122,17 +129,45 @@ std::vector<std::string> displacement_warnings(const Scene& scene, const Displac
                       std::string(kDisplacementMethodLabels[static_cast<std::size_t>(method)]) + "' yet; '" +
                       std::string(traversal_name(kDefaultTraversal)) + "' is used");
     }
-    if (!options.level && settings.lod > 0 && settings.lod != std::floor(settings.lod)) {
-      texts.push_back(material + "levels of detail between whole ones are not supported yet; level " +
-                      std::to_string(level_of(settings, options)) + " is used");
+    if (const float lod = lod_of(settings, options);
+        tessellation_kind(method_of(settings, options)).has_value() && lod > 0 && !is_whole(lod)) {
+      texts.push_back(material + "tessellations have whole levels of detail; level " +
+                      std::to_string(static_cast<int>(lod)) + " is used");
     }
     if (settings.weld_seams) texts.push_back(material + "displacement seams are not welded yet; they stay open");
   }
   return texts;
 }
 
+DisplacementSet::Levels DisplacementSet::levels_of(const Scene& scene,
+                                                   const Mesh& mesh,
+                                                   const DisplacementSettings& settings,
+                                                   const DisplacementOptions& options)
+{
+  constexpr float kCoarsest = kMaxLodLevels - 1;
+  const float lod = lod_of(settings, options);
+  const bool tessellates = tessellation_kind(method_of(settings, options)).has_value();
+  Levels levels;
+  if (lod >= 0) {
+    levels.first = static_cast<int>(std::min(lod, kCoarsest));
+    if (tessellates) return levels;
+    levels.fixed = std::min(lod, kCoarsest) - static_cast<float>(levels.first);
+    levels.count = levels.fixed > 0 ? 2 : 1;
+  } else if (!tessellates) {
+    const HeightMapView map = scene.height_maps[static_cast<std::size_t>(settings.height.texture_index)].view();
+    double side = mean_texels_a_side(mesh.view(), settings.height, map.width, map.height);
+    // Levels of the map end too: with one texel it is a constant.
+    for (int texels = std::max(map.width, map.height); side >= 2 * kLeastTexelsASide && texels > 2; side /= 2) {
+      texels = (texels + 1) / 2;
+      ++levels.count;
+    }
+    levels.by_cone = levels.count > 1;
+  }
+  return levels;
+}
+
 DisplacementSet::DisplacementSet(const Scene& scene, const DisplacementOptions& options)
-    : geometry_of_instance_(scene.instances.size(), -1)
+    : geometry_of_instance_(scene.instances.size(), -1), texel_of_instance_(scene.instances.size(), 0.0f)
 {
   std::uint64_t tessellated_bytes = 0;
   std::map<std::tuple<int, int, double>, int> known;  // mesh, displacement, scale in object space
@@ -146,28 +181,38 @@ DisplacementSet::DisplacementSet(const Scene& scene, const DisplacementOptions& 
     const auto [at, is_new] = known.try_emplace({instance.mesh_index, material.displacement_index, scale},
                                                 static_cast<int>(geometries_.size()));
     geometry_of_instance_[i] = at->second;
-    if (!is_new) continue;
-    auto displaced = std::make_unique<Displaced>();
-    displaced->mesh = DisplacedMesh(scene.meshes[static_cast<std::size_t>(instance.mesh_index)].view(),
-                                    field(scene, settings.height.texture_index, level_of(settings, options)),
-                                    {settings.height, scale, settings.midlevel});
-    displaced->geometry.mesh = displaced->mesh.view();
-    displaced->name = scene.meshes[static_cast<std::size_t>(instance.mesh_index)].name;
-    displaced->smooth = settings.smoothing;
-    const DisplacementMethod method = method_of(settings, options);
-    displaced->geometry.method = traversal_method(method).value_or(kDefaultTraversal);
-    set_tables(fields_.at({settings.height.texture_index, level_of(settings, options)}), displaced->geometry);
-    if (const std::optional<TessellationKind> kind = tessellation_kind(method)) {
-      TessellationLayout layout = tessellation_layout_make(displaced->geometry.mesh, *kind, options.tessellation_rate);
-      tessellated_bytes += tessellation_peak_bytes(layout, kRenderTessellation);
-      check_budget(tessellated_bytes, layout, displaced->name, options);
-      displaced->tessellation = std::make_unique<Tessellation>(displaced->geometry.mesh, std::move(layout));
+    if (is_new) {
+      const Mesh& mesh = scene.meshes[static_cast<std::size_t>(instance.mesh_index)];
+      const DisplacementMethod method = method_of(settings, options);
+      auto displaced = std::make_unique<Displaced>();
+      displaced->name = mesh.name;
+      displaced->smooth = settings.smoothing;
+      DisplacedGeometry& geometry = displaced->geometry;
+      geometry.method = traversal_method(method).value_or(kDefaultTraversal);
+      const Levels levels = levels_of(scene, mesh, settings, options);
+      std::vector<const HeightFieldView*> coarser;
+      for (int k = 0; k < levels.count; ++k) {
+        geometry.levels[k] = level(scene, settings.height.texture_index, levels.first + k, geometry.method);
+        if (k > 0) coarser.push_back(geometry.levels[k].field);
+      }
+      displaced->mesh =
+          DisplacedMesh(mesh.view(), *geometry.levels[0].field, {settings.height, scale, settings.midlevel}, coarser);
+      geometry.mesh = displaced->mesh.view();
+      geometry.lod = {levels.count, levels.by_cone, levels.fixed, displaced->mesh.widest_texel()};
+      has_levels_ |= levels.count > 1;
+      if (const std::optional<TessellationKind> kind = tessellation_kind(method)) {
+        TessellationLayout layout = tessellation_layout_make(geometry.mesh, *kind, options.tessellation_rate);
+        tessellated_bytes += tessellation_peak_bytes(layout, kRenderTessellation);
+        check_budget(tessellated_bytes, layout, displaced->name, options);
+        displaced->tessellation = std::make_unique<Tessellation>(geometry.mesh, std::move(layout));
+      }
+      geometries_.push_back(std::move(displaced));
     }
-    geometries_.push_back(std::move(displaced));
+    texel_of_instance_[i] = displaced(i).geometry.lod.texel * largest_scale(instance.world_from_object);
   }
 }
 
-const HeightFieldView& DisplacementSet::field(const Scene& scene, int map_index, int level)
+DisplacementSet::Field& DisplacementSet::field(const Scene& scene, int map_index, int level)
 {
   const auto [at, is_new] = fields_.try_emplace({map_index, level});
   Field& field = at->second;
@@ -179,49 +224,58 @@ const HeightFieldView& DisplacementSet::field(const Scene& scene, int map_index,
     }
     field.bounds = HeightField(map);
   }
-  return field.bounds.view();
+  return field;
 }
 
-void DisplacementSet::set_tables(Field& field, DisplacedGeometry& geometry)
+DisplacementLevel DisplacementSet::level(const Scene& scene, int map_index, int level, TraversalMethod method)
 {
-  switch (geometry.method) {
+  Field& f = field(scene, map_index, level);
+  DisplacementLevel out{&f.bounds.view(), nullptr, nullptr};
+  switch (method) {
     case TraversalMethod::kChord:
       break;
     case TraversalMethod::kRmip:
-      if (field.rmip == nullptr) field.rmip = std::make_unique<Rmip>(field.bounds.view());
-      geometry.rmip = &field.rmip->view();
+      if (f.rmip == nullptr) f.rmip = std::make_unique<Rmip>(f.bounds.view());
+      out.rmip = &f.rmip->view();
       break;
     case TraversalMethod::kRmipOnMinmax:
     case TraversalMethod::kTfdm:
-      if (field.mipmap == nullptr) field.mipmap = std::make_unique<MinmaxMipmap>(field.bounds.view());
-      geometry.mipmap = &field.mipmap->view();
+      if (f.mipmap == nullptr) f.mipmap = std::make_unique<MinmaxMipmap>(f.bounds.view());
+      out.mipmap = &f.mipmap->view();
       break;
   }
+  return out;
 }
 
-DisplacedPoint DisplacementSet::point(std::size_t instance, std::uint32_t primitive, float u, float v) const
+DisplacedPoint DisplacementSet::point(std::size_t instance, std::uint32_t primitive, float u, float v, float Ng_x) const
 {
   const Displaced& d = displaced(instance);
-  const DisplacedMeshView& mesh = d.geometry.mesh;
-  DisplacedPoint out{primitive, u, v, {}, {}, {}};
+  DisplacedPoint out{primitive, u, v};
+  int level = 0;
   if (d.tessellation != nullptr) {
     const MicroHit hit = d.tessellation->hit(primitive, u, v);
-    out = {hit.triangle, static_cast<float>(hit.b1), static_cast<float>(hit.b2), to_float(hit.P), to_float(hit.Ng), {}};
+    out.triangle = hit.triangle;
+    out.u = static_cast<float>(hit.b1);
+    out.v = static_cast<float>(hit.b2);
+    out.P = to_float(hit.P);
+    out.Ng = to_float(hit.Ng);
   } else {
-    const SurfacePoint point = surface_point(mesh, mesh.triangles[primitive], u, v);
+    level = static_cast<int>(Ng_x);
+    const SurfacePoint point = displaced_point(d.geometry, primitive, level, u, v);
     out.P = to_float(point.P);
     out.Ng = to_float(point.Ng);
+    if (d.geometry.lod.by_cone) out.width = lod_width_of_level(texel_of_instance_[instance], level);
   }
-  out.Ns = d.smooth ? to_float(surface_smooth_normal(mesh, mesh.triangles[out.triangle], out.u, out.v)) : out.Ng;
+  out.Ns = d.smooth ? to_float(displaced_smooth_normal(d.geometry, out.triangle, level, out.u, out.v)) : out.Ng;
   return out;
 }
 
 DisplacedPoint DisplacementSet::locate(std::size_t instance, std::uint32_t primitive, float u, float v) const
 {
   const Displaced& d = displaced(instance);
-  if (d.tessellation == nullptr) return {primitive, u, v, {}, {}, {}};
+  if (d.tessellation == nullptr) return {primitive, u, v};
   const MicroHit hit = d.tessellation->locate(primitive, u, v);
-  return {hit.triangle, static_cast<float>(hit.b1), static_cast<float>(hit.b2), {}, {}, {}};
+  return {hit.triangle, static_cast<float>(hit.b1), static_cast<float>(hit.b2)};
 }
 
 std::size_t DisplacementSet::bytes() const

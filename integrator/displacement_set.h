@@ -20,7 +20,7 @@ namespace relief {
 /// What overrides the scene's own settings.
 struct DisplacementOptions {
   std::optional<DisplacementMethod> method;  ///< of all materials
-  std::optional<int> level;                  ///< of all height maps: averaged down by 2^level
+  std::optional<float> lod;                  ///< of all height maps, see DisplacementSettings::lod
   double tessellation_rate = 1;              ///< micro-triangle edges a texel
   std::uint64_t tessellation_bytes = 0;  ///< all tessellations may take while they are built; 0: half of the machine's
 };
@@ -29,6 +29,7 @@ struct DisplacementOptions {
 struct DisplacedPoint {
   std::uint32_t triangle = 0;  ///< base triangle
   float u = 0, v = 0;          ///< its barycentric weights of vertices 1 and 2
+  float width = kInfinity;     ///< widest cone that meets the surface again as it is here, see lod_width_of_level
   Vec3f P = {}, Ng = {};       ///< on the traced surface, object space; Ng unit, on the side of the displacement normal
   Vec3f Ns = {};               ///< unit shading normal, object space: Ng, or that of the smoothed map
 };
@@ -54,12 +55,16 @@ class DisplacementSet {
   /// @return  index of the displaced geometry of an instance; −1: it is not displaced
   int geometry_index(std::size_t instance) const { return geometry_of_instance_[instance]; }
   std::size_t size() const { return geometries_.size(); }
+  /// Whether rays must say what detail they ask for.
+  bool has_levels() const { return has_levels_; }
+  /// Widths of finest texels by instance, metres, world; 0 where it is not displaced.
+  const float* texels() const { return texel_of_instance_.data(); }
   DisplacedGeometry& geometry(std::size_t index) { return geometries_[index]->geometry; }
   /// @return null if the geometry is traversed as it is
   const Tessellation* tessellation(std::size_t index) const { return geometries_[index]->tessellation.get(); }
   /// The point of a hit on a displaced instance.
-  /// @param primitive, u, v  as Embree reports them
-  DisplacedPoint point(std::size_t instance, std::uint32_t primitive, float u, float v) const;
+  /// @param primitive, u, v, Ng_x  as Embree reports them
+  DisplacedPoint point(std::size_t instance, std::uint32_t primitive, float u, float v, float Ng_x) const;
   /// The same without P and normals.
   DisplacedPoint locate(std::size_t instance, std::uint32_t primitive, float u, float v) const;
   std::size_t bytes() const;            ///< besides the maps
@@ -81,7 +86,19 @@ class DisplacementSet {
   {
     return *geometries_[static_cast<std::size_t>(geometry_of_instance_[instance])];
   }
+  /// Levels that the rays of a geometry may see, from the map's own or a coarser one on.
+  struct Levels {
+    int first = 0, count = 1;
+    bool by_cone = false;
+    float fixed = 0;  ///< above `first`
+  };
+  static Levels levels_of(const Scene& scene,
+                          const Mesh& mesh,
+                          const DisplacementSettings& settings,
+                          const DisplacementOptions& options);
   std::vector<int> geometry_of_instance_;
+  std::vector<float> texel_of_instance_;
+  bool has_levels_ = false;
   /// A level of a height map with its bounds.
   struct Field {
     HeightLevel level;  ///< empty at level 0, which is the map itself
@@ -89,9 +106,9 @@ class DisplacementSet {
     std::unique_ptr<Rmip> rmip;            ///< where a method asks for it
     std::unique_ptr<MinmaxMipmap> mipmap;  ///< likewise
   };
-  /// Makes the tables that a geometry's method needs, once a field.
-  static void set_tables(Field& field, DisplacedGeometry& geometry);
-  const HeightFieldView& field(const Scene& scene, int map_index, int level);
+  Field& field(const Scene& scene, int map_index, int level);
+  /// A level with the tables that a method needs, made once a field.
+  DisplacementLevel level(const Scene& scene, int map_index, int level, TraversalMethod method);
   std::map<std::pair<int, int>, Field> fields_;  ///< by height map and level
   std::vector<std::unique_ptr<Displaced>> geometries_;
 };

@@ -1,6 +1,8 @@
 #include "integrator/intersect_stage.h"
 
 #include "kernel/math/rounding.h"
+#include "kernel/sample/dimensions.h"
+#include "kernel/sample/sobol.h"
 #include "kernel/shape/material_lookup.h"
 
 namespace relief {
@@ -14,12 +16,34 @@ void note_steps(std::uint32_t& steps, DisplacementWork& work)
   steps = 0;
 }
 
+/// Width of the texels that a ray meets, as a part of its cone's: at half a pixel the level of detail is hardly seen.
+constexpr float kTexelsPerCone = 0.5f;
+/// Bounced rays stand for wide cones, but what a single one meets must still look like the surface: averaged heights
+/// have lost what was in between.
+constexpr float kWidestLodSpread = 1.0f / 16;
+
+/// The detail that a path's rays ask for.
+struct PathLod {
+  float dither, factor;
+
+  PathLod(const PathStateView& state, std::uint32_t path)
+      : dither(sample_1d(state.pixel_hash[path], state.sample_index[path], kLodDimension)),
+        factor(kTexelsPerCone * __builtin_exp2f(dither))
+  {
+  }
+  LodCone cone(float width, float spread) const
+  {
+    return {factor * width, factor * min(spread, kWidestLodSpread), dither};
+  }
+};
+
 /// Puts a path into the queue of the stage that its hit asks for; displaced hits get their position and normal.
 void classify(const KernelGlobals& g,
               const Accel& accel,
               const PathStateView& state,
               std::uint32_t path,
               unsigned object,
+              float Ng_x,
               const std::uint8_t* surface_kernel,
               QueueView* surfaces,
               QueueView& lights,
@@ -37,7 +61,7 @@ void classify(const KernelGlobals& g,
   const InstanceView& instance = g.instances[object];
   if ((instance.flags & kDisplaced) != 0) {
     const DisplacedPoint point =
-        accel.displacements().point(object, state.hit_triangle[path], state.hit_u[path], state.hit_v[path]);
+        accel.displacements().point(object, state.hit_triangle[path], state.hit_u[path], state.hit_v[path], Ng_x);
     state.hit_triangle[path] = point.triangle;
     state.hit_u[path] = point.u;
     state.hit_v[path] = point.v;
@@ -50,6 +74,7 @@ void classify(const KernelGlobals& g,
     state.hit_Ns_x[path] = point.Ns.x;
     state.hit_Ns_y[path] = point.Ns.y;
     state.hit_Ns_z[path] = point.Ns.z;
+    state.hit_width[path] = point.width < kInfinity ? point.width / PathLod(state, path).factor : kInfinity;
   }
   queue_push(surfaces[surface_kernel[instance.material_index]], path);
 }
@@ -90,6 +115,12 @@ void intersect_packet(const KernelGlobals& g,
     packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
   }
+  LodCone cones[8];
+  if (accel.displacements().has_levels()) {
+    for (int i = 0; i < 8; ++i)
+      cones[i] = PathLod(state, paths[i]).cone(state.cone_width[paths[i]], state.cone_spread[paths[i]]);
+    context.cones = cones;
+  }
   embree_intersect8(valid, accel.scene(), context, packet);
   for (int i = 0; i < 8; ++i) {
     const std::uint32_t path = paths[i];
@@ -103,7 +134,7 @@ void intersect_packet(const KernelGlobals& g,
       film_add_displacement_steps(g.film, state.pixel[path], context.steps[i]);
       note_steps(context.steps[i], displacement);
     }
-    classify(g, accel, state, path, object, surface_kernel, surfaces, lights, background);
+    classify(g, accel, state, path, object, packet.hit.Ng_x[i], surface_kernel, surfaces, lights, background);
   }
 }
 
@@ -131,7 +162,9 @@ void intersect_closest(const KernelGlobals& g,
   EmbreeContext context;
   embree_context_init(context, coherent);
   context.displacement = &displacement.total;
+  const bool has_levels = accel.displacements().has_levels();
   std::uint32_t steps[8] = {};
+  context.texels = accel.displacements().texels();
   if (accel.displacements().size() > 0) context.steps = steps;
   std::uint32_t i = 0;
   if (coherent) {
@@ -157,6 +190,11 @@ void intersect_closest(const KernelGlobals& g,
     ray.ray.flags = 0;
     ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    LodCone cone;
+    if (has_levels) {
+      cone = PathLod(state, path).cone(state.cone_width[path], state.cone_spread[path]);
+      context.cones = &cone;
+    }
     embree_intersect1(accel.scene(), context, ray);
     if (context.steps != nullptr) {
       if (state.bounces[path] == 0) film_add_displacement_steps(g.film, state.pixel[path], steps[0]);
@@ -167,12 +205,13 @@ void intersect_closest(const KernelGlobals& g,
     state.hit_v[path] = ray.hit.v;
     state.hit_triangle[path] = ray.hit.primID;
     const unsigned object = ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID;
-    classify(g, accel, state, path, object, surface_kernel, surfaces, lights, background);
+    classify(g, accel, state, path, object, ray.hit.Ng_x, surface_kernel, surfaces, lights, background);
   }
 }
 
 void intersect_shadow(const KernelGlobals& g,
                       const Accel& accel,
+                      const PathStateView& state,
                       const ShadowQueueView& shadow,
                       float* visibility,
                       DisplacementWork& displacement)
@@ -182,6 +221,8 @@ void intersect_shadow(const KernelGlobals& g,
   context.displacements = &accel.displacements();
   embree_context_init(context.embree, false);
   context.embree.displacement = &displacement.total;
+  context.embree.texels = accel.displacements().texels();
+  const bool has_levels = accel.displacements().has_levels();
   std::uint32_t steps = 0;
   if (accel.displacements().size() > 0) context.embree.steps = &steps;
   for (std::uint32_t i = 0; i < shadow.size; ++i) {
@@ -199,6 +240,11 @@ void intersect_shadow(const KernelGlobals& g,
     ray.mask = kRayShadow;
     ray.id = 0;
     ray.flags = 0;
+    LodCone cone;
+    if (has_levels) {
+      cone = PathLod(state, shadow.path[i]).cone(shadow.cone_width[i], shadow.cone_spread[i]);
+      context.embree.cones = &cone;
+    }
     embree_occluded1(accel.scene(), context.embree, ray);
     if (context.embree.steps != nullptr) note_steps(steps, displacement);
     visibility[i] = ray.tfar < 0.0f ? 0.0f : context.visibility;
@@ -215,11 +261,8 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
     const unsigned object =
         instance_id != RTC_INVALID_GEOMETRY_ID ? instance_id : RTCHitN_geomID(arguments->hit, arguments->N, i);
     const InstanceView& instance = g.instances[object];
-    DisplacedPoint at{RTCHitN_primID(arguments->hit, arguments->N, i),
-                      RTCHitN_u(arguments->hit, arguments->N, i),
-                      RTCHitN_v(arguments->hit, arguments->N, i),
-                      {},
-                      {}};
+    DisplacedPoint at{RTCHitN_primID(arguments->hit, arguments->N, i), RTCHitN_u(arguments->hit, arguments->N, i),
+                      RTCHitN_v(arguments->hit, arguments->N, i)};
     if ((instance.flags & kDisplaced) != 0) at = context->displacements->locate(object, at.triangle, at.u, at.v);
     const float alpha = triangle_alpha(g.materials[instance.material_index], g.textures, g.meshes[instance.mesh_index],
                                        at.triangle, at.u, at.v);

@@ -37,6 +37,7 @@ void intersect_closest(const KernelGlobals& g,
 /// @param displacement  what these rays did is added to it
 void intersect_shadow(const KernelGlobals& g,
                       const Accel& accel,
+                      const PathStateView& state,
                       const ShadowQueueView& shadow,
                       float* visibility,
                       DisplacementWork& displacement);

@@ -40,9 +40,9 @@ TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits
       continue;
     }
     const InstanceView& instance = context.instances[object];
-    DisplacedPoint point{query.hit.primID, query.hit.u, query.hit.v, {}, {}, {}};
+    DisplacedPoint point{query.hit.primID, query.hit.u, query.hit.v};
     const bool displaced = (instance.flags & kDisplaced) != 0;
-    if (displaced) point = context.displacements.point(object, point.triangle, point.u, point.v);
+    if (displaced) point = context.displacements.point(object, point.triangle, point.u, point.v, query.hit.Ng_x);
     SurfaceHit surface = surface_hit_make(context.meshes[static_cast<std::size_t>(instance.mesh_index)], instance,
                                           point.triangle, point.u, point.v);
     if (displaced) surface_hit_displace(&surface, instance, point.P, point.Ng, point.Ns);

@@ -46,8 +46,9 @@ Wavefront::Wavefront() : memory_(static_cast<std::byte*>(std::aligned_alloc(kAli
 #include "kernel/state/path_state_fields.inc"
 #undef X
   state_.capacity = kBatchPaths;
-  for (float** p : {&shadow_.O_x, &shadow_.O_y, &shadow_.O_z, &shadow_.D_x, &shadow_.D_y, &shadow_.D_z, &shadow_.t_max,
-                    &shadow_.gain_r, &shadow_.gain_g, &shadow_.gain_b, &visibility_}) {
+  for (float** p :
+       {&shadow_.O_x, &shadow_.O_y, &shadow_.O_z, &shadow_.D_x, &shadow_.D_y, &shadow_.D_z, &shadow_.t_max,
+        &shadow_.cone_width, &shadow_.cone_spread, &shadow_.gain_r, &shadow_.gain_g, &shadow_.gain_b, &visibility_}) {
     *p = column<float>(kBatchPaths);
   }
   shadow_.path = column<std::uint32_t>(kBatchPaths);
@@ -121,7 +122,7 @@ void Wavefront::run(const KernelGlobals& g,
     charge(Stage::kShade);
 
     counters.shadow_rays += shadow_.size;
-    intersect_shadow(g, accel, shadow_, visibility_, displacement);
+    intersect_shadow(g, accel, state_, shadow_, visibility_, displacement);
     if (recorder != nullptr) record_shadow_rays();
     charge(Stage::kIntersectShadow);
     stages.accumulate_shadow(g, state_, shadow_, visibility_);

@@ -130,6 +130,7 @@ void Contender::build_tessellation()
 void Contender::build_tables()
 {
   geometry_.mesh = surface_.mesh.view();
+  geometry_.levels[0].field = &surface_.field.view();
   geometry_.method = spec_.traversal;
   geometry_.rmip_options = spec_.rmip_options;
   triangle_bytes_ = surface_.mesh.bytes();
@@ -139,13 +140,13 @@ void Contender::build_tables()
       break;
     case TraversalMethod::kRmip:
       rmip_ = std::make_unique<Rmip>(surface_.field.view(), spec_.rmip_resolution);
-      geometry_.rmip = &rmip_->view();
+      geometry_.levels[0].rmip = &rmip_->view();
       table_bytes_ = rmip_->bytes();
       break;
     case TraversalMethod::kRmipOnMinmax:
     case TraversalMethod::kTfdm:
       mipmap_ = std::make_unique<MinmaxMipmap>(surface_.field.view());
-      geometry_.mipmap = &mipmap_->view();
+      geometry_.levels[0].mipmap = &mipmap_->view();
       table_bytes_ = mipmap_->bytes();
       break;
   }

@@ -30,6 +30,9 @@ inline constexpr std::uint32_t kDimensionsPerBounce = static_cast<std::uint32_t>
 /// @return dimension for sample_2d
 RELIEF_KERNEL constexpr std::uint32_t dimension_camera(CameraDimension use) { return static_cast<std::uint32_t>(use); }
 
+/// Dimension for sample_1d that a path's dither between levels of detail is from; no bounce gets so far.
+inline constexpr std::uint32_t kLodDimension = ~0u;
+
 /// @param bounce  scattering events of the path before this surface, >= 0
 /// @return        dimension for sample_1d or sample_2d, as the use says
 RELIEF_KERNEL constexpr std::uint32_t dimension_bounce(int bounce, BounceDimension use)

@@ -44,6 +44,7 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
                                        const SurfaceClosure& closure,
                                        const ShadingSide& side,
                                        Vec3f light_N,
+                                       RayCone cone,
                                        ShadowQueueView& shadow)
 {
   const int bounce = path_bounces(state.bounces[path], BounceKind::kAll);
@@ -102,6 +103,8 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   shadow.D_y[ray] = D.y;
   shadow.D_z[ray] = D.z;
   shadow.t_max[ray] = t_max;
+  shadow.cone_width[ray] = cone.width;
+  shadow.cone_spread[ray] = cone.spread;
   shadow.gain_r[ray] = gain.x;
   shadow.gain_g[ray] = gain.y;
   shadow.gain_b[ray] = gain.z;
@@ -233,10 +236,11 @@ template <unsigned kFeatures>
                     path_bounces(bounces, BounceKind::kTransmission) > g.limits.transmission;
   if (params.unlit || last) return;
 
+  if ((instance.flags & kDisplaced) != 0) cone.width = min(cone.width, state.hit_width[path]);
   const SurfaceClosure closure = surface_closure_make<kFeatures>(params, *g.bsdf_tables, wo_local);
   const Vec3f light_N = params.transmission > 0.0f ? Vec3f{} : side.Ns;
   if (g.has_lights && !surface_is_delta(params)) {
-    shade_surface_light<kFeatures>(g, state, path, hit, closure, side, light_N, shadow);
+    shade_surface_light<kFeatures>(g, state, path, hit, closure, side, light_N, cone, shadow);
   }
 
   const BsdfSample bsdf = closure_sample<kFeatures>(

@@ -35,13 +35,14 @@ enum PathFlag : std::uint32_t {
 struct ShadowQueueView {
   float *O_x, *O_y, *O_z, *D_x, *D_y, *D_z;  ///< world; D unit
   float* t_max;                              ///< metres
+  float *cone_width, *cone_spread;           ///< ray cone at O
   float *gain_r, *gain_g, *gain_b;           ///< radiance × throughput, MIS weight included
   std::uint32_t* path;                       ///< whose
   std::uint32_t* scatterings;                ///< events between the camera and the light
   std::uint32_t size;                        ///< number of rays waiting
 };
 
-inline constexpr std::size_t kShadowRayBytes = 10 * sizeof(float) + 2 * sizeof(std::uint32_t);
+inline constexpr std::size_t kShadowRayBytes = 12 * sizeof(float) + 2 * sizeof(std::uint32_t);
 
 /// Indices of paths waiting for a stage.
 struct QueueView {

@@ -111,12 +111,13 @@ TEST(Pixel, HasASampleIfOneIsGiven)
   }
 }
 
-TEST(Lod, IsAWholeLevelOrTheFinest)
+TEST(Lod, IsALevelOrChosenByRays)
 {
-  EXPECT_EQ(parse_lod("auto"), 0);
+  EXPECT_EQ(parse_lod("auto"), -1);
+  EXPECT_EQ(parse_lod("1.5"), 1.5f);
   EXPECT_EQ(parse_lod("0"), 0);
   EXPECT_EQ(parse_lod("30"), 30);
-  for (const char* text : {"", "-1", "31", "1.5", "1x", "Auto", "nan"}) {
+  for (const char* text : {"", "-1", "31", "1x", "inf", "Auto", "nan"}) {
     EXPECT_THROW(parse_lod(text), CLI::ValidationError) << "'" << text << "'";
   }
 }

@@ -18,12 +18,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <memory>
 #include <ostream>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "displacement/embree_geometry.h"
+#include "displacement/height_level.h"
 #include "tests/displacement/random_cases.h"
 #include "tests/oracle/displaced_triangle.h"
 
@@ -87,10 +89,12 @@ inline oracle::HeightMap stored_heights(oracle::HeightMap map, HeightFormat form
 /// Triangles of the oracle and their map, as the renderer stores them.
 class TracedCase {
  public:
-  /// @param map  what `stored_heights` makes of the format; float heights must be floats
+  /// @param map         what `stored_heights` makes of the format; float heights must be floats
+  /// @param num_levels  of detail, by the rays' cones if there are several
   TracedCase(const std::vector<oracle::DisplacedTriangle>& triangles,
              const oracle::HeightMap& map,
-             HeightFormat format = HeightFormat::kFloat)
+             HeightFormat format = HeightFormat::kFloat,
+             int num_levels = 1)
   {
     for (const oracle::DisplacedTriangle& triangle : triangles) {
       const auto first = static_cast<std::uint32_t>(P_.size());
@@ -116,7 +120,6 @@ class TracedCase {
     if (format == HeightFormat::kFloat) view.texels = floats_.data();
     if (format == HeightFormat::kU16) view.texels = words_.data();
     if (format == HeightFormat::kU8) view.texels = bytes_.data();
-    field_ = HeightField(view);
 
     MeshView mesh;
     mesh.P = P_.data();
@@ -128,9 +131,12 @@ class TracedCase {
     DisplacementMapping mapping;
     mapping.scale = map.scale;
     mapping.midlevel = map.midlevel;
-    mesh_ = DisplacedMesh(mesh, field_.view(), mapping);
-    rmip_ = Rmip(field_.view());
-    mipmap_ = MinmaxMipmap(field_.view());
+    std::vector<const HeightFieldView*> coarser;
+    for (int k = 0; k < num_levels; ++k) {
+      levels_.push_back(std::make_unique<Level>(view, k));
+      if (k > 0) coarser.push_back(&levels_.back()->field.view());
+    }
+    mesh_ = DisplacedMesh(mesh, levels_[0]->field.view(), mapping, coarser);
   }
   TracedCase(const TracedCase&) = delete;
   TracedCase& operator=(const TracedCase&) = delete;
@@ -143,8 +149,12 @@ class TracedCase {
     DisplacedGeometry result;
     result.mesh = mesh_.view();
     result.method = method;
-    result.rmip = &rmip_.view();
-    result.mipmap = &mipmap_.view();
+    for (std::size_t k = 0; k < levels_.size(); ++k) {
+      const Level& level = *levels_[k];
+      result.levels[k] = {&level.field.view(), &level.rmip.view(), &level.mipmap.view()};
+    }
+    const auto num_levels = static_cast<int>(levels_.size());
+    result.lod = {num_levels, num_levels > 1, 0, mesh_.widest_texel()};
     return result;
   }
 
@@ -166,10 +176,22 @@ class TracedCase {
   std::vector<float> floats_;
   std::vector<std::uint16_t> words_;
   std::vector<std::uint8_t> bytes_;
-  HeightField field_;
+  /// A level of the map, and what methods need of it.
+  struct Level {
+    Level(const HeightMapView& map, int level)
+        : texels(level > 0 ? HeightLevel(map, level) : HeightLevel()),
+          field(level > 0 ? texels.view() : map),
+          rmip(field.view()),
+          mipmap(field.view())
+    {
+    }
+    HeightLevel texels;
+    HeightField field;
+    Rmip rmip;
+    MinmaxMipmap mipmap;
+  };
+  std::vector<std::unique_ptr<Level>> levels_;
   DisplacedMesh mesh_;
-  Rmip rmip_;
-  MinmaxMipmap mipmap_;
 };
 
 /// Operations in sequence, and so roundings of 2^-53 relative to the largest operand, that lead from a ray and a triangle
@@ -336,7 +358,7 @@ class Judge {
   bool trace(const Question& q, bool any_hit, DisplacedHit* hit)
   {
     return table_.trace(q.traced.geometry(method_), q.index, TracedCase::vector3(q.ray.O), TracedCase::vector3(q.ray.D),
-                        q.ray.t_min, q.ray.t_max, any_hit, hit, &counters_);
+                        {}, 0, q.ray.t_min, q.ray.t_max, any_hit, hit, &counters_);
   }
   static double t_bound(const Question& q, const oracle::Hit& root);
   static const oracle::Hit* required_root(const Question& q);

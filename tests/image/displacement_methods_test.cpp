@@ -13,7 +13,7 @@ struct Rendered {
   Statistics stats;
 };
 
-Rendered render_displaced(const Scene& scene, DisplacementMethod method, int level)
+Rendered render_displaced(const Scene& scene, DisplacementMethod method, float lod)
 {
   RunOptions run;
   run.width = 128;
@@ -23,7 +23,7 @@ Rendered render_displaced(const Scene& scene, DisplacementMethod method, int lev
   options.aov_mask = 1u << static_cast<int>(Aov::kBeauty) | 1u << static_cast<int>(Aov::kNormal) |
                      1u << static_cast<int>(Aov::kDepth) | 1u << static_cast<int>(Aov::kDisplacementSteps);
   options.displacement.method = method;
-  options.displacement.level = level;
+  options.displacement.lod = lod;
   const std::atomic<bool> stop{false};
   Rendered rendered;
   rendered.image = render(scene, options, stop, {}, rendered.stats);
@@ -98,6 +98,39 @@ TEST(DisplacementMethods, TessellationApproachesTheSurface)
     EXPECT_LT(std::abs(beauty.bias), 0.01 * beauty.mean);
     EXPECT_EQ(triangles.stats.counters.displaced_prisms, 0u);
   }
+}
+
+TEST(DisplacementMethods, DetailThatPixelsCannotShowIsHardlyMissed)
+{
+  const Scene scene = displaced_example();
+  constexpr float kAuto = -1;
+  const Rendered finest = render_displaced(scene, DisplacementMethod::kChord, 0);
+  for (const DisplacementMethod method : {DisplacementMethod::kChord, DisplacementMethod::kRmip}) {
+    const Rendered seen = render_displaced(scene, method, kAuto);
+    const LayerDifference depth = layer_difference(seen, finest, Aov::kDepth);
+    const LayerDifference beauty = layer_difference(seen, finest, Aov::kBeauty);
+    std::printf("%s: depth differs by %.2g of it, radiance by %.2g of the mean, its mean by %.2g\n",
+                kDisplacementMethodLabels[static_cast<std::size_t>(method)].data(), depth.mean_error / depth.mean,
+                beauty.mean_error / beauty.mean, beauty.bias / beauty.mean);
+    EXPECT_GT(depth.mean_error, 0.0);
+    EXPECT_LT(depth.mean_error, 3e-3 * depth.mean);
+    EXPECT_LT(std::abs(beauty.bias), 0.01 * beauty.mean);
+  }
+}
+
+TEST(DisplacementMethods, AFractionalLevelIsAMixtureOfTwo)
+{
+  const Scene scene = displaced_example();
+  const Rendered fine = render_displaced(scene, DisplacementMethod::kChord, 4);
+  const Rendered coarse = render_displaced(scene, DisplacementMethod::kChord, 5);
+  const Rendered between = render_displaced(scene, DisplacementMethod::kChord, 4.25f);
+  // Of 16 samples a pixel exactly a quarter takes the coarser level (the dither is stratified), so first hits are
+  // those of the one or the other.
+  const double to_fine = layer_difference(between, fine, Aov::kDepth).mean_error;
+  const double to_coarse = layer_difference(between, coarse, Aov::kDepth).mean_error;
+  const double whole = layer_difference(fine, coarse, Aov::kDepth).mean_error;
+  EXPECT_NEAR(to_fine, 0.25 * whole, 0.05 * whole);
+  EXPECT_NEAR(to_coarse, 0.75 * whole, 0.05 * whole);
 }
 
 TEST(DisplacementMethods, StepsOfCameraRaysAreAPartOfAll)
