@@ -12,15 +12,14 @@ from scenes import (
     degrees,
     diffuse,
     new_material,
-    new_scene,
     set_bounces,
     set_world,
 )
 
 
 def _stage(material, bounces=4):
-    """A ball of the material on a floor, below a sky and an area light."""
-    scene = new_scene()
+    """A ball of the material on a floor, below a sky and an area light, in the scene that run_test.py has made."""
+    scene = bpy.context.scene
     set_bounces(scene, bounces)
     set_world((0.4, 0.5, 0.7))
     add_plane(8, diffuse((0.6, 0.4, 0.3)))

@@ -11,8 +11,12 @@ import traceback
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
+import scenes  # noqa: E402
+
 module_name, function_name = sys.argv[sys.argv.index("--") + 1 :][:2]
 try:
+    # Tests start in an empty scene with the add-on; those that want another size make another.
+    scenes.new_scene()
     getattr(importlib.import_module(module_name), function_name)()
     code = 0
 except BaseException:  # Blender itself would end with 0

@@ -252,5 +252,14 @@ def asymmetric_pixels(width=16, height=8):
     return pixels
 
 
+def smooth_pixels(width=256, height=128):
+    """A picture without any symmetry whose neighbouring texels differ little, also around its border."""
+    v, u = np.mgrid[0:height, 0:width] * (2 * np.pi)
+    pixels = np.ones((height, width, 4), dtype=np.float32)
+    for channel in range(3):
+        pixels[..., channel] = 0.5 + 0.3 * np.sin(u / width + channel) + 0.15 * np.sin(v / height + 2 * u / width)
+    return pixels
+
+
 def degrees(*angles):
     return tuple(math.radians(a) for a in angles)

@@ -23,10 +23,10 @@ def blender_from_gltf(vectors):
 def environment_rotation(angle):
     """relief's rotation of a lat-long map, for one that Blender's Mapping turns about Z.
 
-    Both put the map's centre somewhere else: Blender at −X … +X's opposite, u = ½ − atan2(y, x) / 2π; relief at −Z,
-    which is Blender's +Y, u = ½ + atan2(x, y) / 2π. So relief's u is Blender's u + ¼, a quarter turn.
+    With a direction's azimuth a = atan2(y, x) in Blender's axes, Blender looks the map up at u = ½ − (a + angle) / 2π;
+    relief, whose map is centred at −Z, Blender's +Y, at u = ¾ − (a − rotation) / 2π.
 
-    @param  angle  radians: the texture coordinate is Blender's direction turned by it about Z
+    @param  angle  radians by which the texture's direction is turned about Z
     @return        radians about glTF's +Y, counter-clockwise seen from above
     """
-    return float(-angle + np.pi / 2)
+    return float(-angle - np.pi / 2)

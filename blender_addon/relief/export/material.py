@@ -130,6 +130,8 @@ class _MaterialJob:
                 self.json["normalTexture"] = {**info, "scale": surface.normal.value}
         self._write_reflection(surface)
         self._write_layers(surface)
+        if surface.emission.color_map:
+            self._warn("a colour attribute as emission", "it is left out: the emission has one colour")
         if surface.emits():
             set_emission(self.json, [max(0.0, c) for c in surface.emission.value], self._writer)
             if surface.emission.texture:

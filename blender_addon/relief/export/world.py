@@ -45,6 +45,8 @@ def _environment(world, images, warn):
         return {"color": [0.0, 0.0, 0.0]}
     if texture.projection != "EQUIRECTANGULAR":
         warn(f'node "{texture.name}": projection {texture.projection.lower()}', "equirectangular was used")
+    if texture.interpolation != "Linear":
+        warn(f'node "{texture.name}": interpolation {texture.interpolation}', "Linear was used")
     uri = images.color_uri(texture.image, texture.image_user, warn)
     if uri is None:
         return {"color": [1.0, 0.0, 1.0], "strength": strength}

@@ -1,0 +1,221 @@
+"""Displacement: height, direction, midlevel, space and mapping are Blender's.
+
+Cycles displaces the vertices of a mesh, so it is given one that is subdivided to several vertices a texel; relief gets
+the coarse one and finds the surface itself. What is left of Cycles' tessellation is smaller than the noise here.
+"""
+
+import bpy
+import numpy as np
+
+from scenes import (
+    add_camera,
+    add_image_node,
+    add_light,
+    add_plane,
+    add_sphere,
+    assert_same_expectation,
+    assert_warns,
+    degrees,
+    new_image,
+    new_material,
+    new_scene,
+    render_runs,
+    set_world,
+)
+
+#: Edges of the square's finest tessellation: 16 to a texel of the map.
+_FINE = 512
+
+
+def _heights(size=32):
+    """A smooth map without symmetry, between 0.1 and 0.9, that tiles."""
+    v, u = np.mgrid[0:size, 0:size] * (2 * np.pi / size)
+    h = 0.5 + 0.2 * np.sin(u + 0.4) * np.cos(2 * v) + 0.15 * np.sin(3 * v + u)
+    pixels = np.ones((size, size, 4), dtype=np.float32)
+    pixels[..., :3] = h[..., None]
+    return pixels
+
+
+def _material(scale=0.4, midlevel=0.5, space="OBJECT", method="DISPLACEMENT", is_float=True):
+    """(material, its tree, Image Texture node, Displacement node) of a displaced diffuse surface."""
+    material, tree, _ = new_material("displaced", Color=(0.8, 0.7, 0.6, 1), Roughness=0.0)
+    texture = add_image_node(tree, new_image(_heights(), "Non-Color", is_float))
+    node = tree.nodes.new("ShaderNodeDisplacement")
+    node.space = space
+    node.inputs["Scale"].default_value, node.inputs["Midlevel"].default_value = scale, midlevel
+    tree.links.new(texture.outputs["Color"], node.inputs["Height"])
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    tree.links.new(node.outputs[0], output.inputs["Displacement"])
+    material.cycles.displacement_method = method
+    return material, tree, texture, node
+
+
+def _stage():
+    scene = new_scene(80, 60)
+    set_world((0.05, 0.05, 0.1))
+    add_light("SUN", rotation=degrees(50, 20, 0), energy=3, angle=0)
+    add_camera((0, -5, 3.2), degrees(57, 0, 0), lens=45)
+    return scene
+
+
+def _assert_agrees(scene, make, tolerance=0.01):
+    """Compares relief's picture of a coarse mesh with Cycles' of a fine one.
+
+    @param  make  called with "coarse" or "fine": makes the displaced object
+    """
+    pictures = {}
+    for engine, detail in (("RELIEF", "coarse"), ("CYCLES", "fine")):
+        made = make(detail)
+        pictures[engine] = render_runs(scene, engine, 4, 64)
+        bpy.data.objects.remove(made)
+    # Cycles' facets shade flat; a texel wide they differ by less than this from a smooth patch.
+    assert_same_expectation(pictures["RELIEF"], pictures["CYCLES"], 10, 0.05, tolerance)
+
+
+def _square(material, scale=(1, 1, 1)):
+    def make(detail):
+        # Cycles takes its shading from the displaced facets either way; smooth ones have no steps.
+        plane = add_plane(4, material, subdivisions=_FINE if detail == "fine" else 2)
+        plane.scale = scale
+        bpy.ops.object.shade_smooth()
+        return plane
+
+    return make
+
+
+def test_height_and_midlevel():
+    scene = _stage()
+    material, _, _, _ = _material(scale=0.4, midlevel=0.3)
+    _assert_agrees(scene, _square(material))
+
+
+def test_negative_scale():
+    scene = _stage()
+    material, _, _, _ = _material(scale=-0.4, midlevel=0.5)
+    _assert_agrees(scene, _square(material))
+
+
+def test_object_space_follows_the_objects_scale():
+    scene = _stage()
+    material, _, _, _ = _material()
+    _assert_agrees(scene, _square(material, (0.9, 1.1, 1.8)))
+
+
+def test_world_space_does_not():
+    scene = _stage()
+    material, _, _, _ = _material(space="WORLD")
+    _assert_agrees(scene, _square(material, (0.9, 1.1, 1.8)))
+
+
+def test_byte_heights():
+    scene = _stage()
+    material, _, _, _ = _material(is_float=False)
+    _assert_agrees(scene, _square(material))
+
+
+def test_tiling_rotation_and_offset():
+    scene = _stage()
+    material, tree, texture, _ = _material(scale=0.25)
+    node, coordinate = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
+    node.inputs["Location"].default_value = (0.2, 0.1, 0)
+    node.inputs["Rotation"].default_value = degrees(0, 0, 30)
+    node.inputs["Scale"].default_value = (1.6, 1.2, 1)
+    tree.links.new(coordinate.outputs["UV"], node.inputs["Vector"])
+    tree.links.new(node.outputs["Vector"], texture.inputs["Vector"])
+    _assert_agrees(scene, _square(material))
+
+
+def test_heights_scaled_and_shifted_by_nodes():
+    """0.5 − 0.8 · h goes into scale and midlevel."""
+    scene = _stage()
+    material, tree, texture, node = _material(scale=0.5, midlevel=0.1)
+    times, minus = tree.nodes.new("ShaderNodeMath"), tree.nodes.new("ShaderNodeMath")
+    times.operation, minus.operation = "MULTIPLY", "SUBTRACT"
+    times.inputs[1].default_value, minus.inputs[0].default_value = 0.8, 0.5
+    tree.links.new(texture.outputs["Color"], times.inputs[0])
+    tree.links.new(times.outputs[0], minus.inputs[1])
+    tree.links.new(minus.outputs[0], node.inputs["Height"])
+    _assert_agrees(scene, _square(material))
+
+
+def test_direction_on_a_sphere():
+    """The normals of the coarse sphere say where points go: the fine one has those normals, interpolated linearly."""
+    scene = _stage()
+    material, _, _, _ = _material(scale=0.25)
+
+    def make(detail):
+        sphere = add_sphere(1.2, material, (0, 0, 1), segments=64)
+        if detail == "fine":
+            modifier = sphere.modifiers.new("fine", "SUBSURF")
+            modifier.subdivision_type, modifier.render_levels = "SIMPLE", 4
+        return sphere
+
+    # The subdivided mesh has the coarse one's facets but new smooth normals: 64 segments keep both within this.
+    _assert_agrees(scene, make, tolerance=0.04)
+
+
+def test_flat_faces_stay_together():
+    """A flat-shaded cube opens no cracks: a light inside it is not seen."""
+    scene = _stage()
+    material, _, _, _ = _material(scale=0.3)
+    scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0.0
+    bpy.data.objects.remove(next(o for o in scene.objects if o.type == "LIGHT"))
+    bpy.ops.mesh.primitive_cube_add(size=1.6, location=(0, 0, 1))
+    cube = bpy.context.object
+    cube.data.materials.append(material)
+    cube.data.uv_layers.remove(cube.data.uv_layers[0])
+    # One map over all sides without a seam.
+    node = material.node_tree.nodes.new("ShaderNodeTexCoord")
+    texture = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeTexImage")
+    material.node_tree.links.new(node.outputs["Generated"], texture.inputs["Vector"])
+    glow = new_material("glow", "ShaderNodeEmission", Strength=100.0)[0]
+    add_sphere(0.2, glow, (0, 0, 1))
+    scene.relief.strict = False
+    assert render_runs(scene, "RELIEF", 1, 64).max() == 0
+
+
+def test_constant_height():
+    scene = _stage()
+    material, tree, texture, node = _material(scale=0.5, midlevel=0.0)
+    tree.links.remove(node.inputs["Height"].links[0])
+    node.inputs["Height"].default_value = 0.7
+    _assert_agrees(scene, _square(material))
+
+
+def test_bump_only_is_warned_about():
+    scene = _stage()
+    material, _, _, _ = _material(method="BUMP")
+    add_plane(4, material)
+    assert_warns(scene, 'material "displaced"', "Bump Only")
+
+
+def test_the_panels_switch():
+    """The button does what the warning asks for."""
+    scene = _stage()
+    material, _, _, _ = _material(method="BUMP")
+    plane = add_plane(4, material)
+    from relief.export.displacement import needs_switch
+
+    assert needs_switch(material)
+    with bpy.context.temp_override(material=material, object=plane):
+        assert bpy.ops.relief.displace() == {"FINISHED"}
+    assert not needs_switch(material) and material.cycles.displacement_method == "DISPLACEMENT"
+
+
+def test_settings_reach_the_program():
+    """Method and level of detail of the scene are in every displaced material, smoothing in those with bump too."""
+    import json
+
+    from relief.exporter import export_frames
+    from scenes import folder
+
+    scene = _stage()
+    material, _, _, _ = _material(method="BOTH")
+    add_plane(4, material)
+    scene.relief.displacement_method, scene.relief.lod = "rmip", 2
+    with folder() as path:
+        export_frames(scene, f"{path}/scene.gltf", [1])
+        with open(f"{path}/scene.gltf", encoding="utf-8") as file:
+            document = json.load(file)
+    value = document["materials"][0]["extensions"]["RELIEF_displacement"]
+    assert (value["method"], value["lod"], value["smoothing"]) == ("rmip", 2, True), value

@@ -1,0 +1,98 @@
+"""The zip: installed, enabled, used, disabled and removed in a profile that nothing has touched."""
+
+import os
+import re
+import subprocess
+
+import bpy
+
+from scenes import _ROOT, folder
+
+_STEPS = """
+import addon_utils, bpy, os, sys
+sys.path.insert(0, {tests!r})
+bpy.ops.preferences.addon_install(filepath={zip!r})
+bpy.ops.preferences.addon_enable(module="relief")
+print("STEP enabled", "relief" in bpy.context.preferences.addons, addon_utils.check("relief"))
+scene = bpy.context.scene
+scene.render.engine = "RELIEF"
+scene.relief.samples = 4
+scene.render.resolution_x, scene.render.resolution_y = 64, 48
+scene.render.filepath = {picture!r}
+bpy.ops.render.render(write_still=True)
+print("STEP rendered", os.path.exists({picture!r}))
+bpy.ops.preferences.addon_disable(module="relief")
+print("STEP disabled", hasattr(bpy.types.Scene, "relief"), scene.render.engine)
+bpy.ops.preferences.addon_enable(module="relief")
+bpy.ops.render.render()
+bpy.ops.preferences.addon_disable(module="relief")
+bpy.ops.preferences.addon_remove(module="relief")
+left = os.path.exists(os.path.join(bpy.utils.user_resource("SCRIPTS"), "addons", "relief"))
+print("STEP removed", left)
+"""
+
+
+def test_install_use_and_remove():
+    with folder() as path:
+        archive, picture = f"{path}/relief.zip", f"{path}/picture.png"
+        subprocess.run([os.path.join(_ROOT, "scripts", "package_addon"), archive], check=True, capture_output=True)
+        script = _STEPS.format(tests=os.path.dirname(os.path.abspath(__file__)), zip=archive, picture=picture)
+        environment = {k: v for k, v in os.environ.items() if k != "BLENDER_USER_SCRIPTS"}
+        environment.update(HOME=path, XDG_CONFIG_HOME=f"{path}/config", BLENDER_USER_CONFIG=f"{path}/config")
+        environment["BLENDER_USER_SCRIPTS"] = f"{path}/scripts"
+        os.makedirs(f"{path}/scripts/addons")
+        command = [bpy.app.binary_path, "-b", "--python-exit-code", "9", "--python-expr", script]
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=100)
+        output = done.stdout + done.stderr
+        assert done.returncode == 0, output
+        assert "STEP enabled True (True, True)" in output, output
+        assert "STEP rendered True" in output, output
+        assert "STEP disabled False BLENDER_" in output or "STEP disabled False CYCLES" in output, output
+        assert "STEP removed False" in output, output
+        assert not re.search("Traceback|Error:|Warning: .*relief", output), output
+
+
+def test_versions_agree():
+    """bl_info, the manifest and the program's own version are one."""
+    import relief
+    from relief.process import VERSION
+
+    with open(os.path.join(_ROOT, "blender_addon", "relief", "blender_manifest.toml"), encoding="utf-8") as file:
+        manifest = re.search(r'^version = "([^"]+)"', file.read(), re.MULTILINE)[1]
+    with open(os.path.join(_ROOT, "CMakeLists.txt"), encoding="utf-8") as file:
+        project = re.search(r"VERSION (\d+\.\d+\.\d+)", file.read())[1]
+    assert manifest == project == ".".join(str(n) for n in relief.bl_info["version"])
+    assert relief.bl_info["version"][:2] == VERSION
+
+
+def test_equal_sources_give_equal_zips():
+    with folder() as path:
+        for name in ("a.zip", "b.zip"):
+            subprocess.run([os.path.join(_ROOT, "scripts", "package_addon"), f"{path}/{name}"], check=True)
+        with open(f"{path}/a.zip", "rb") as a, open(f"{path}/b.zip", "rb") as b:
+            assert a.read() == b.read()
+
+
+def test_every_setting_says_unit_and_default():
+    """Tooltips of scene.relief."""
+    scene = bpy.context.scene
+    for name, setting in scene.relief.bl_rna.properties.items():
+        if name not in {"rna_type", "name"}:
+            assert "default" in setting.description, name
+    for name in (
+        "samples seed time_limit noise_threshold max_bounces diffuse_bounces glossy_bounces transmission_bounces "
+        "displacement_method lod memory_limit caustics"
+    ).split():
+        assert hasattr(scene.relief, name), name
+
+
+def test_panels_are_registered_and_taken_away():
+    before = {p.__name__ for p in bpy.types.Panel.__subclasses__() if "RELIEF" in getattr(p, "COMPAT_ENGINES", ())}
+    assert {"RELIEF_PT_sampling", "RELIEF_PT_displacement", "DATA_PT_lens"} <= before, before
+    bpy.ops.preferences.addon_disable(module="relief")
+    after = {
+        p.__name__
+        for p in bpy.types.Panel.__subclasses__()
+        if "RELIEF" in getattr(p, "COMPAT_ENGINES", ()) and p.is_registered
+    }
+    assert not after, after

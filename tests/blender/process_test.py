@@ -1,0 +1,194 @@
+"""The program fails, hangs, is missing or is cancelled: Blender lives, the artist is told, no files are left."""
+
+import contextlib
+import os
+import signal
+import stat
+import subprocess
+import sys
+import time
+
+import bpy
+
+from scenes import add_camera, add_plane, folder, new_scene, render, set_world
+
+
+def _scene():
+    scene = new_scene()
+    set_world((1, 1, 1))
+    add_plane()
+    add_camera()
+    return scene
+
+
+@contextlib.contextmanager
+def _program(script):
+    """Puts a shell script in the program's place; it answers --version itself."""
+    with folder() as path:
+        name = os.path.join(path, "relief")
+        with open(name, "w", encoding="utf-8") as file:
+            file.write(f'#!/bin/bash\nif [ "$1" = --version ]; then echo relief 0.1.9; exit; fi\n{script}\n')
+        os.chmod(name, stat.S_IRWXU)
+        kept = os.environ.get("RELIEF_BINARY")
+        os.environ["RELIEF_BINARY"] = name
+        try:
+            yield name
+        finally:
+            os.environ["RELIEF_BINARY"] = kept
+
+
+def _failure(scene):
+    """What a render that fails tells the artist."""
+    with folder() as path:
+        try:
+            render(scene, "RELIEF", f"{path}/picture.exr")
+        except RuntimeError as error:
+            assert not os.path.exists(f"{path}/picture.exr"), "a picture was saved all the same"
+            return str(error)
+    raise AssertionError("nothing was reported")
+
+
+def _assert_clean():
+    left = [n for n in os.listdir(bpy.app.tempdir) if n.startswith("relief_")]
+    assert not left, left
+
+
+def test_a_crash_is_reported():
+    scene = _scene()
+    with _program("kill -SEGV $$"):
+        assert "ended by signal 11" in _failure(scene)
+    _assert_clean()
+
+
+def test_an_error_is_reported_in_the_programs_words():
+    scene = _scene()
+    with _program("echo 'relief: the disk is full' >&2; exit 1"):
+        assert "the disk is full" in _failure(scene)
+    _assert_clean()
+
+
+def test_a_broken_picture_is_reported():
+    scene = _scene()
+    with _program('while [ "$1" != -o ]; do shift; done; echo nonsense > "$2"; echo "{}" > "$4"'):
+        assert "not an uncompressed" in _failure(scene)
+    _assert_clean()
+
+
+def test_a_missing_program_is_reported():
+    scene = _scene()
+    kept = os.environ.pop("RELIEF_BINARY")
+    path = os.environ["PATH"]
+    os.environ["PATH"] = "/nowhere"
+    try:
+        assert "was not found" in _failure(scene)
+    finally:
+        os.environ["RELIEF_BINARY"], os.environ["PATH"] = kept, path
+
+
+def test_another_version_is_reported():
+    from relief import process
+
+    with folder() as path:
+        name = os.path.join(path, "relief")
+        with open(name, "w", encoding="utf-8") as file:
+            file.write("#!/bin/sh\necho relief 7.2.0\n")
+        os.chmod(name, stat.S_IRWXU)
+        try:
+            process.check_version(name)
+        except process.ReliefError as error:
+            assert "7.2.0" in str(error) and "0.1" in str(error)
+        else:
+            raise AssertionError("7.2.0 was taken")
+
+
+def test_the_preference_wins():
+    scene = _scene()
+    with _program("echo 'relief: from the preference' >&2; exit 1") as name:
+        os.environ["RELIEF_BINARY"] = "/nowhere/relief"
+        bpy.context.preferences.addons["relief"].preferences.binary = name
+        assert "from the preference" in _failure(scene)
+
+
+def test_a_scene_without_camera_is_reported():
+    scene = _scene()
+    scene.camera = None
+    # Blender asks for a camera before it asks an engine.
+    assert "camera" in _failure(scene).lower()
+
+
+def test_a_mistake_in_the_addon_is_reported():
+    from relief import final
+
+    scene = _scene()
+    kept = final.export_scene
+    final.export_scene = lambda *_: 1 / 0
+    try:
+        assert "ZeroDivisionError" in _failure(scene)
+    finally:
+        final.export_scene = kept
+    _assert_clean()
+
+
+def test_a_program_that_does_not_listen_is_killed():
+    """One that ignores being asked to end is ended within its patience, and soon."""
+    from relief.process import Process
+
+    begin = time.monotonic()
+    with Process(["/bin/bash", "-c", "trap '' TERM; while true; do sleep 0.1; done"]) as process:
+        time.sleep(0.3)
+        code = process.end()
+    assert code == -signal.SIGKILL and time.monotonic() - begin < 8
+
+
+def test_cancel_keeps_what_was_rendered():
+    """Ctrl-C in a rendering Blender: it ends soon, alive, with the picture so far; the program is gone, files too."""
+    with folder() as path:
+        script = (
+            "import sys; sys.path.insert(0, sys.argv[-1]); import process_test, bpy; s = process_test._scene();"
+            f"s.render.engine = 'RELIEF'; s.relief.samples = 16000000; s.render.filepath = '{path}/out.exr';"
+            "bpy.ops.render.render(write_still=True); print('ALIVE', flush=True)"
+        )
+        # Session temporary folders go where TMPDIR says.
+        environment = {**os.environ, "TMPDIR": path}
+        here = os.path.dirname(os.path.abspath(__file__))
+        command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-expr", script, "--", here]
+        blender = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment)
+        try:
+            lines = []
+            for line in blender.stdout:
+                lines.append(line)
+                if "Sample" in line:
+                    blender.send_signal(signal.SIGINT)
+                    break
+            begin = time.monotonic()
+            rest, _ = blender.communicate(timeout=30)
+        finally:
+            blender.kill()
+        assert time.monotonic() - begin < 10, "cancelling took too long"
+        assert "ALIVE" in rest, "".join(lines) + rest
+        assert not [n for n in _all_files(path) if "relief_" in n], _all_files(path)
+
+
+def _all_files(path):
+    return [os.path.join(where, name) for where, _, names in os.walk(path) for name in names]
+
+
+def test_no_files_are_left():
+    scene = _scene()
+    with folder() as path:
+        render(scene, "RELIEF", f"{path}/picture.exr")
+    _assert_clean()
+
+
+def test_numbers_of_the_render_are_in_the_picture():
+    """Seconds, memory, seed and warnings can be read from the image's file."""
+    scene = _scene()
+    scene.relief.strict = False
+    scene.render.use_motion_blur = True
+    with folder() as path:
+        render(scene, "RELIEF", f"{path}/picture.exr", seed=5)
+        with open(f"{path}/picture.exr", "rb") as file:
+            data = file.read(20000)
+    for name in ("relief.render_seconds", "relief.export_seconds", "relief.total_seconds", "relief.peak_memory_bytes"):
+        assert name.encode() in data, name
+    assert b"motion blur" in data
