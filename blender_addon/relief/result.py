@@ -109,6 +109,8 @@ def fill(engine, picture, layer_name, passes, is_transparent, metadata):
         if values is not None and target is not None:
             converted = render_pass.convert(values, coverage)
             target.rect.foreach_set(np.ascontiguousarray(converted, dtype=np.float32))
-    for name, text in metadata.items():
-        result.stamp_data_add_field(name, text)
     engine.end_result(result)
+    # Of what begin_result gives, Blender takes over the pixels alone.
+    whole = engine.get_result()
+    for name, text in metadata.items():
+        whole.stamp_data_add_field(name, text)

@@ -104,7 +104,13 @@ def test_object_space_follows_the_objects_scale():
 def test_world_space_does_not():
     scene = _stage()
     material, _, _, _ = _material(space="WORLD")
-    _assert_agrees(scene, _square(material, (0.9, 1.1, 1.8)))
+    _assert_agrees(scene, _square(material, (1.3, 1.3, 1.3)))
+
+
+def test_world_space_on_an_uneven_scale_is_warned_about():
+    scene = _stage()
+    _square(_material(space="WORLD")[0], (0.9, 1.1, 1.8))("coarse")
+    assert_warns(scene, "world space", "mean")
 
 
 def test_byte_heights():

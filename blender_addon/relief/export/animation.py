@@ -14,6 +14,9 @@ import numpy as np
 from .objects import decompose, rotation_matrices
 from .scene import scene_json
 
+#: Scale of what rests out of sight.
+_NEARLY_NOTHING = 1e-6
+
 _TRANSFORMS = ("matrix", "translation", "rotation", "scale")
 
 
@@ -79,8 +82,10 @@ class Shot:
             return node
         visible = set(frames)
         scale = np.array([[1.0 if f in visible else 0.0] * 3 for f in self._frames])
-        # Without a frame the program shows the first one.
-        parent = {"name": f"{node.get('name', '')} in its frames", "scale": scale[0].tolist(), "children": [node]}
+        parent = {"name": f"{node.get('name', '')} in its frames", "children": [node]}
+        if not scale[0].any():
+            # Without a frame the program shows nodes as they rest, and refuses a scale of 0 there.
+            parent["scale"] = [_NEARLY_NOTHING] * 3
         moves.append((parent, self._frames, {"scale": scale}))
         return parent
 

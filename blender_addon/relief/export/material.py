@@ -52,7 +52,7 @@ class _MaterialJob:
         self._report = report
         self._coordinates = []
         self._color_map = ""
-        self._displaced = False
+        self._displaced = self._world_space = False
         self.json = {"name": self._name, "doubleSided": True}
         textures = TextureReader(self._warn)
         if material is None or not material.use_nodes or material.node_tree is None:
@@ -68,10 +68,13 @@ class _MaterialJob:
         value = export_displacement(material, settings, textures, self._data_info, images)
         if value is not None:
             self._displaced = True
+            self._world_space = value["space"] == "world"
+            if not self._coordinates:  # the map of a constant height
+                self._coordinates.append(("uv", ""))
             writer.extend(self.json, "RELIEF_displacement", value)
 
     def wanted(self):
-        return Wanted(tuple(self._coordinates), self._color_map, self._displaced)
+        return Wanted(tuple(self._coordinates), self._color_map, self._displaced, self._world_space)
 
     def _warn(self, what, instead=""):
         self._report.warn(f'material "{self._name}"', what, instead)

@@ -22,11 +22,13 @@ class Wanted:
     coordinates  at most two: ("uv", name of a map or "" for the one active in renders), ("generated", "") or ("object", "")
     color        name of a colour attribute that multiplies the base colour; "": none
     displaced    normals say where surfaces go to, so they must not open flat-shaded edges
+    world_space  the displacement is measured after the object's transform
     """
 
     coordinates: tuple = ()
     color: str = ""
     displaced: bool = False
+    world_space: bool = False
 
 
 class _Corners:

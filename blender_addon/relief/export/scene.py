@@ -140,14 +140,14 @@ class SceneExporter:
         return lambda what, instead="": self._report.warn(f'{kind} "{name}"', what, instead)
 
     def _add_geometry(self, thing):
-        mesh = self.mesh_of(thing)
+        matrices = thing.world_matrices()
+        mesh = self._mesh_of(thing, matrices)
         if mesh is None:
             return
         base = {"name": thing.name, "mesh": mesh}
         settings = self._object_settings(thing.object)
         if settings:
             self.writer.extend(base, "RELIEF_object", settings)
-        matrices = thing.world_matrices()
         if len(matrices) == 1:
             self.nodes.append({**base, "matrix": matrix_property(matrices[0])})
             return
@@ -177,21 +177,25 @@ class SceneExporter:
             warn("holdouts and shadow catchers", "it is an ordinary object")
         return settings
 
-    def mesh_of(self, thing):
+    def _mesh_of(self, thing, matrices):
         """Index of the glTF mesh of a thing; None if it has no triangles."""
         if thing.data is not None:
-            materials = [self._materials.export(m) for m in thing.data.materials] or [self._materials.export(None)]
-            return export_mesh(thing.data, materials, self.writer, self._warner("mesh", thing.data.name))
+            return self._export_mesh(thing, thing.data, thing.data.materials, matrices)
         evaluated = thing.object.evaluated_get(self._depsgraph)
         mesh = evaluated.to_mesh()
         if mesh is None:
             return None
         try:
-            slots = [slot.material for slot in evaluated.material_slots]
-            materials = [self._materials.export(m) for m in slots] or [self._materials.export(None)]
-            return export_mesh(mesh, materials, self.writer, self._warner("object", thing.name))
+            return self._export_mesh(thing, mesh, [slot.material for slot in evaluated.material_slots], matrices)
         finally:
             evaluated.to_mesh_clear()
+
+    def _export_mesh(self, thing, mesh, materials, matrices):
+        exported = [self._materials.export(m) for m in materials] or [self._materials.export(None)]
+        warn = self._warner("object", thing.name)
+        if any(wanted.world_space for _, wanted in exported) and _is_uneven(matrices):
+            warn("displacement in world space on an uneven scale", "the scale's mean was used")
+        return export_mesh(mesh, exported, self.writer, warn)
 
     def _add_lights(self, thing, scene_size):
         original = thing.object
@@ -209,6 +213,12 @@ class SceneExporter:
             )
             export_light(light, place)
             self.nodes.append(node)
+
+
+def _is_uneven(matrices):
+    """Whether some matrix scales one axis more than another."""
+    lengths = np.linalg.norm(matrices[:, :3, :3], axis=1)
+    return bool((np.ptp(lengths, axis=1) > 1e-3 * lengths.max(axis=1)).any())
 
 
 def _extent(things):

@@ -1,0 +1,132 @@
+"""Runs in a Blender with a window: shows the viewport rendered, edits, moves, leaves the mode; writes what it saw.
+
+Not a test by itself: viewport_test.py starts it. Steps run in Blender's timers, since the window is only drawn between
+them. Pictures are screenshots of the whole window.
+"""
+
+import json
+import os
+import sys
+
+import bpy
+
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+
+from scenes import add_light, add_plane, add_sphere, degrees, diffuse, new_material, set_world  # noqa: E402
+
+_OUTPUT = sys.argv[-1]
+_SECONDS_A_STEP = float(os.environ.get("RELIEF_TEST_STEP_SECONDS", "2.5"))
+_seen = {}
+
+
+def _area():
+    window = bpy.context.window_manager.windows[0]
+    return window, max((a for a in window.screen.areas if a.type == "VIEW_3D"), key=lambda a: a.width * a.height)
+
+
+def _programs():
+    """Process numbers of the program's runs that are children of this Blender."""
+    found = []
+    for entry in os.listdir("/proc"):
+        if not entry.isdigit():
+            continue
+        try:
+            with open(f"/proc/{entry}/stat", encoding="utf-8") as file:
+                fields = file.read().rsplit(")", 1)[1].split()
+            with open(f"/proc/{entry}/cmdline", "rb") as file:
+                command = file.read().split(b"\0")
+        except OSError:
+            continue
+        if int(fields[1]) == os.getpid() and fields[0] != "Z" and b"render" in command:
+            found.append(int(entry))
+    return found
+
+
+def _shot(name):
+    """Notes the picture and the state."""
+    window, area = _area()
+    with bpy.context.temp_override(window=window, area=area):
+        bpy.ops.screen.screenshot_area(filepath=os.path.join(_OUTPUT, f"{name}.png"))
+    folders = [n for n in os.listdir(bpy.app.tempdir) if n.startswith("relief_")]
+    _seen[name] = {"programs": _programs(), "folders": folders}
+
+
+def _start():
+    bpy.ops.preferences.addon_enable(module="relief")
+    scene = bpy.context.scene
+    for made in list(scene.objects):
+        bpy.data.objects.remove(made)
+    set_world((0.6, 0.7, 0.9))
+    add_plane(8, diffuse((0.5, 0.5, 0.5)))
+    add_sphere(1.0, diffuse((0.9, 0.1, 0.1), "red"), (0, 0, 1)).name = "ball"
+    add_light("SUN", rotation=degrees(40, 20, 0), energy=2, angle=0)
+    scene.render.engine = "RELIEF"
+    scene.relief.preview_samples = 100000
+    _, area = _area()
+    space = area.spaces.active
+    space.overlay.show_overlays = False
+    space.region_3d.view_distance = 8
+    space.shading.type = "RENDERED"
+
+
+def _edit():
+    bpy.data.materials["red"].node_tree.nodes["Diffuse BSDF"].inputs["Color"].default_value = (0.1, 0.9, 0.1, 1)
+
+
+def _move():
+    _, area = _area()
+    area.spaces.active.region_3d.view_distance = 16
+
+
+def _mistake():
+    """A program that cannot be found must be told, not end Blender."""
+    bpy.context.preferences.addons["relief"].preferences.binary = "/nowhere/relief"
+    bpy.data.objects["ball"].location.x = 0.5
+
+
+def _repair():
+    bpy.context.preferences.addons["relief"].preferences.binary = ""
+    bpy.data.objects["ball"].location.x = 1.0
+
+
+def _leave():
+    _, area = _area()
+    area.spaces.active.shading.type = "SOLID"
+
+
+def _finish():
+    with open(os.path.join(_OUTPUT, "seen.json"), "w", encoding="utf-8") as file:
+        json.dump(_seen, file)
+    bpy.ops.wm.quit_blender()
+
+
+def _steps():
+    yield _start
+    yield lambda: _shot("rendered")
+    yield _edit
+    yield lambda: _shot("edited")
+    yield _move
+    yield lambda: _shot("moved")
+    yield _mistake
+    yield lambda: _shot("mistake")
+    yield _repair
+    yield lambda: _shot("repaired")
+    yield _leave
+    yield lambda: _shot("left")
+    yield _finish
+
+
+# The welcome screen comes after the command line and would hide the view.
+bpy.context.preferences.view.show_splash = False
+_todo = _steps()
+
+
+def _next():
+    step = next(_todo, None)
+    if step is None:
+        return None
+    step()
+    return _SECONDS_A_STEP
+
+
+bpy.app.timers.register(_next, first_interval=1.0)

@@ -1,0 +1,70 @@
+"""The viewport in a real window, on a display without a screen (Xvfb)."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import bpy
+import numpy as np
+
+from scenes import folder
+
+_HERE = os.path.dirname(os.path.abspath(__file__))
+
+
+def _pixels(path):
+    """A screenshot: float (height, width, 3), bottom row first."""
+    image = bpy.data.images.load(path)
+    width, height = image.size
+    return np.array(image.pixels[:]).reshape(height, width, 4)[..., :3]
+
+
+def _share(pixels, channel):
+    """Share of pixels in which one colour is far above the others."""
+    others = np.delete(pixels, channel, axis=2).max(axis=2)
+    return float((pixels[..., channel] > 1.8 * others + 0.05).mean())
+
+
+def test_rendered_shading_follows_the_scene():
+    """A red ball is shown, painted green, seen from afar; an error is survived; leaving ends the program."""
+    if shutil.which("Xvfb") is None:
+        raise AssertionError("Xvfb is not installed")
+    with folder() as path:
+        read, write = os.pipe()
+        display = subprocess.Popen(
+            ["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp"],
+            pass_fds=[write],
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(write)
+        try:
+            with os.fdopen(read) as number:
+                name = f":{number.readline().strip()}"
+            environment = {**os.environ, "DISPLAY": name, "LIBGL_ALWAYS_SOFTWARE": "1"}
+            command = [bpy.app.binary_path, "--factory-startup", "--no-window-focus", "-p", "0", "0", "800", "600"]
+            command += ["--python-exit-code", "9", "--python", os.path.join(_HERE, "viewport_session.py"), "--", path]
+            done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=110)
+        finally:
+            display.terminate()
+            display.wait()
+        output = done.stdout + done.stderr
+        assert done.returncode == 0 and "Traceback" not in output, output
+        with open(f"{path}/seen.json", encoding="utf-8") as file:
+            seen = json.load(file)
+        kept = os.environ.get("RELIEF_TEST_KEEP")
+        if kept:
+            shutil.copytree(path, kept, dirs_exist_ok=True)
+        pixels = {name: _pixels(f"{path}/{name}.png") for name in seen}
+    red, green = ({n: _share(p, c) for n, p in pixels.items()} for c in (0, 1))
+    print("red", red, "green", green, seen, file=sys.stderr)
+    # Shares of the whole 3D view, its borders included.
+    assert red["rendered"] > 0.005 and green["rendered"] < 0.001
+    assert green["edited"] > 0.005 and red["edited"] < 0.002
+    assert 0.1 < green["moved"] / green["edited"] < 0.5
+    assert "/nowhere/relief" in output
+    assert green["repaired"] > 0.001
+    # Between two runs there may be none: one of the pictures shows one.
+    assert seen["rendered"]["folders"] and any(state["programs"] for state in seen.values())
+    assert not seen["left"]["programs"] and not seen["left"]["folders"], seen["left"]
