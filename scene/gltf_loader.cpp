@@ -268,9 +268,13 @@ void GltfLoader::add_defaults()
     scene_.cameras.push_back(framing_camera(world_bounds_, image_aspect_));
   }
   if (!shows_light(scene_)) {
-    warnings_.add(scene_.file + ": no light, emission or environment: a constant environment of radiance 1 is used");
+    warnings_.add(
+        scene_.file +
+        ": no light, emission or environment: a constant environment of radiance 1, which cameras do not see, is used");
     scene_.environment = Environment{};
     scene_.environment.color = {1, 1, 1};
+    // White things would not show before it.
+    scene_.environment.visible_to_camera = false;
   }
 }
 

@@ -340,6 +340,7 @@ TEST(Lights, WithoutAnyTheSurroundingsAreWhiteAndThisIsSaid)
   EXPECT_EQ(scene.environment.color, (Vec3f{1, 1, 1}));
   EXPECT_EQ(scene.environment.texture_index, -1);
   EXPECT_TRUE(has_warning(scene, "constant environment of radiance 1"));
+  EXPECT_FALSE(scene.environment.visible_to_camera);
 }
 
 TEST(Lights, EmissionIsLightEnough)
