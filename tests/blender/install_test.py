@@ -26,7 +26,10 @@ print("STEP disabled", hasattr(bpy.types.Scene, "relief"), scene.render.engine)
 bpy.ops.preferences.addon_enable(module="relief")
 bpy.ops.render.render()
 bpy.ops.preferences.addon_disable(module="relief")
-bpy.ops.preferences.addon_remove(module="relief")
+# Blender's operator wants an area to redraw, which a background process has to name.
+window = bpy.context.window_manager.windows[0]
+with bpy.context.temp_override(window=window, area=window.screen.areas[0]):
+    bpy.ops.preferences.addon_remove(module="relief")
 left = os.path.exists(os.path.join(bpy.utils.user_resource("SCRIPTS"), "addons", "relief"))
 print("STEP removed", left)
 """

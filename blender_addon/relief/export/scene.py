@@ -2,7 +2,7 @@
 """Exports one evaluated frame: walks the depsgraph and hands each thing to its own exporter."""
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from .settings import render_settings
 from .world import export_world
 
 DATA_FOLDER = "relief_data"
+
+#: What the uv pass shows of a mesh whose materials ask for no coordinates.
+_ACTIVE_UV = (("uv", ""),)
 
 
 @dataclass
@@ -195,6 +198,8 @@ class SceneExporter:
         warn = self._warner("object", thing.name)
         if any(wanted.world_space for _, wanted in exported) and _is_uneven(matrices):
             warn("displacement in world space on an uneven scale", "the scale's mean was used")
+        if self._depsgraph.view_layer.use_pass_uv and mesh.uv_layers:
+            exported = [(i, w if w.coordinates else replace(w, coordinates=_ACTIVE_UV)) for i, w in exported]
         return export_mesh(mesh, exported, self.writer, warn)
 
     def _add_lights(self, thing, scene_size):
