@@ -5,6 +5,8 @@ Read in this order: engine.py (what Blender calls), export/scene.py (from Blende
 (the program), result.py (its picture back into Blender). What differs between versions of Blender is in compat.py.
 """
 
+import sys
+
 bl_info = {
     "name": "relief",
     "description": "Path tracer for scenes whose detail lives in displacement maps",
@@ -15,13 +17,9 @@ bl_info = {
     "category": "Render",
 }
 
-if "bpy" in locals():  # the add-on is switched on again: Blender keeps modules, their files may have changed
-    import importlib
-
-    for _module in _modules:  # noqa: F821 (defined by the first import)
-        importlib.reload(_module)
-
-import bpy  # noqa: E402
+# Blender imports this file anew when an update has been installed; so must be the files below it.
+for _name in [name for name in sys.modules if name.startswith(f"{__name__}.")]:
+    del sys.modules[_name]
 
 from . import engine, exporter, operators, preferences, properties, session, ui  # noqa: E402
 

@@ -46,7 +46,7 @@ class ReliefEngine(bpy.types.RenderEngine):
             self._guard(lambda: self._viewport.draw(context, depsgraph))
 
     def _guard(self, action):
-        """Runs an action; a failure is reported. An exception that leaves here would leave a black picture and no word."""
+        """Runs an action and reports its failure. An exception that left here would leave a black picture and no word."""
         try:
             action()
         except ReliefError as error:

@@ -86,8 +86,8 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
     )
     caustics: EnumProperty(
         name="Caustics",
-        description="Whether light through glass and from mirrors gets a photon pass of its own. The scene asks for it; "
-        "programs without such a pass path trace this light, with more noise (default Automatic)",
+        description="Whether light through glass and from mirrors gets a photon pass of its own. The scene asks for "
+        "it; programs without such a pass path trace this light, with more noise (default Automatic)",
         items=(
             ("auto", "Automatic", "Where something focuses light (default)"),
             ("on", "On", "Always"),
@@ -118,7 +118,11 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
         max=1024.0,
     )
     threads: IntProperty(
-        name="Threads", description="Threads to use; 0 is one for each processor (default 0)", default=0, min=0, max=1024
+        name="Threads",
+        description="Threads to use; 0 is one for each processor (default 0)",
+        default=0,
+        min=0,
+        max=1024,
     )
     strict: BoolProperty(
         name="Strict",

@@ -196,7 +196,7 @@ class Viewport:
 
 
 def _view(context, depsgraph):
-    """What a 3D view shows, by its projection matrix: right for free views and for camera views with zoom and offset."""
+    """What a 3D view shows, by its projection matrix: holds for free views and zoomed or moved camera views."""
     region, space, view3d = context.region, context.space_data, context.region_data
     projection = np.array(view3d.window_matrix, dtype=np.float64)
     matrix = np.array(view3d.view_matrix.inverted(), dtype=np.float64)

@@ -1,6 +1,16 @@
 """Lenses: framing, shift, sensor fit, depth of field and clipping are Cycles' own."""
 
-from scenes import add_camera, add_plane, add_sphere, assert_agrees, degrees, diffuse, new_material, new_scene, set_world
+from scenes import (
+    add_camera,
+    add_plane,
+    add_sphere,
+    assert_agrees,
+    degrees,
+    diffuse,
+    new_material,
+    new_scene,
+    set_world,
+)
 
 
 def _stage(width, height, location=(2, -5, 4), rotation=(55, 0, 22), **settings):

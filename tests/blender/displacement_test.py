@@ -197,7 +197,7 @@ def test_bump_only_is_warned_about():
 
 def test_the_panels_switch():
     """The button does what the warning asks for."""
-    scene = _stage()
+    _stage()
     material, _, _, _ = _material(method="BUMP")
     plane = add_plane(4, material)
     from relief.export.displacement import needs_switch

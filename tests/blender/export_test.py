@@ -15,8 +15,6 @@ from scenes import (
     degrees,
     diffuse,
     folder,
-    link,
-    new_material,
     new_scene,
     read_rgb,
     render,

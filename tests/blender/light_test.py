@@ -20,7 +20,7 @@ def test_point_without_size():
 
 
 def test_point_with_radius():
-    # Cycles before 4.0 has a disk that faces each point in place of a sphere: weaker by (radius / distance)², 0.8 % here.
+    # Cycles before 4.0 has a disk that faces each point, not a sphere: weaker by (radius / distance)², 0.8 % here.
     scene = _stage(lambda: add_light("POINT", (1, -1, 3), energy=300, shadow_soft_size=0.2))
     assert_agrees(scene, samples=128, tolerance=0.01)
 

@@ -61,7 +61,8 @@ def test_diffuse():
 
 def test_principled_without_specular():
     """Only its albedo is looked at: before 4.0 Cycles brightens and darkens grazing angles by Disney's rule."""
-    material, _, node = new_material("principled", "ShaderNodeBsdfPrincipled", Base_Color=(0.2, 0.7, 0.4, 1), Specular=0.0)
+    values = {"Base_Color": (0.2, 0.7, 0.4, 1), "Specular": 0.0}
+    material, _, node = new_material("principled", "ShaderNodeBsdfPrincipled", **values)
     node.inputs["Roughness"].default_value = 0.5
     assert_agrees(_stage(material), samples=128, tolerance=0.06)
 
@@ -115,7 +116,8 @@ def test_absorbing_glass():
 
 
 def test_emission():
-    assert_agrees(_stage(new_material("glow", "ShaderNodeEmission", Color=(1, 0.4, 0.1, 1), Strength=2.5)[0]), samples=256)
+    glow = new_material("glow", "ShaderNodeEmission", Color=(1, 0.4, 0.1, 1), Strength=2.5)[0]
+    assert_agrees(_stage(glow), samples=256)
 
 
 def test_transparency():

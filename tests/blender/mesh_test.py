@@ -13,7 +13,6 @@ from scenes import (
     degrees,
     diffuse,
     link,
-    new_material,
     new_scene,
     set_world,
 )

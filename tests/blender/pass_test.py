@@ -44,7 +44,7 @@ def _stage():
 
 
 def _compared(setting, names):
-    """Channels of one pass, from relief and from Cycles: float (channels, height, width) each, and what is inside both."""
+    """Channels of one pass from relief and Cycles, and how much the latter vary from pixel to pixel: (height, width)."""
     scene = _stage()
     layer = scene.view_layers[0]
     setattr(layer, setting, True)

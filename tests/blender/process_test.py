@@ -5,7 +5,6 @@ import os
 import signal
 import stat
 import subprocess
-import sys
 import time
 
 import bpy
@@ -152,7 +151,8 @@ def test_cancel_keeps_what_was_rendered():
         environment = {**os.environ, "TMPDIR": path}
         here = os.path.dirname(os.path.abspath(__file__))
         command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-expr", script, "--", here]
-        blender = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=environment)
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+        blender = subprocess.Popen(command, text=True, env=environment, **pipes)
         try:
             lines = []
             for line in blender.stdout:

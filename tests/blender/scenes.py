@@ -130,10 +130,8 @@ def assert_warns(scene, *texts):
 def _allowed_shift(relief, cycles, block, tolerance):
     """What may be added to relief's blocks to bring their means nearer to those of Cycles: shape (height, width, 3)."""
     height, width = (side // block * block for side in relief.shape[1:3])
-    means = [
-        runs[:, :height, :width].mean(axis=0).reshape(height // block, block, width // block, block, 3).mean(axis=(1, 3))
-        for runs in (relief, cycles)
-    ]
+    shape = (height // block, block, width // block, block, 3)
+    means = [runs[:, :height, :width].mean(axis=0).reshape(shape).mean(axis=(1, 3)) for runs in (relief, cycles)]
     limit = tolerance * means[1]
     shift = np.zeros(relief.shape[1:])
     shift[:height, :width] = np.clip(means[1] - means[0], -limit, limit).repeat(block, 0).repeat(block, 1)

@@ -12,7 +12,6 @@ from scenes import (
     asymmetric_pixels,
     assert_agrees,
     degrees,
-    diffuse,
     folder,
     new_image,
     new_material,
@@ -166,7 +165,7 @@ def test_opacity_from_another_image():
 
 
 def test_roughness_from_a_grey_image():
-    """A mirror whose blur varies over the square: only orientation and strength show, Cycles filters glossy light alike."""
+    """A mirror whose blur varies over the square."""
     pixels = asymmetric_pixels()
     pixels[..., :3] = (0.15 + 0.5 * pixels[..., :1]) * np.ones(3)
     scene, tree, texture, node = _stage(

@@ -12,7 +12,7 @@ import bpy
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
-from scenes import add_light, add_plane, add_sphere, degrees, diffuse, new_material, set_world  # noqa: E402
+from scenes import add_light, add_plane, add_sphere, degrees, diffuse, set_world  # noqa: E402
 
 _OUTPUT = sys.argv[-1]
 _SECONDS_A_STEP = float(os.environ.get("RELIEF_TEST_STEP_SECONDS", "2.5"))

@@ -2,7 +2,6 @@
 
 from scenes import (
     add_camera,
-    add_plane,
     add_sphere,
     asymmetric_pixels,
     assert_agrees,

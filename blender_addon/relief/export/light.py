@@ -3,7 +3,7 @@
 
 What Blender means by power, and what the scene format wants (checked against Cycles, tests/blender/light_test.py):
 
-    point, spot   P watts    radiant intensity P / 4π          a spot is a point behind a screen: P does not depend on its cone
+    point, spot   P watts    radiant intensity P / 4π   a spot is a point behind a screen: its cone takes from P
     sun           E W/m²     irradiance E
     area          P watts    radiance P / 4A: Lambert's law would say P / πA; Blender's factor is older than its watts
 

@@ -204,7 +204,7 @@ class _MaterialJob:
         if rough and metal and rough.mapping != metal.mapping:
             self._warn("different mappings for roughness and metallic", "the one of the roughness was used for both")
         texture = rough or metal
-        planes = [(rough.node.image, rough.channel) if rough else None, (metal.node.image, metal.channel) if metal else None]
+        planes = [(t.node.image, t.channel) if t else None for t in (rough, metal)]
         return self._info(texture, self._images.combined_uri(*planes, self._warn))
 
     def _write_reflection(self, surface):
@@ -228,7 +228,8 @@ class _MaterialJob:
                 "clearcoatFactor": min(max(surface.coat.value, 0.0), 1.0),
                 "clearcoatRoughnessFactor": min(max(surface.coat_roughness.value, 0.0), 1.0),
             }
-            for source, name in ((surface.coat, "clearcoatTexture"), (surface.coat_roughness, "clearcoatRoughnessTexture")):
+            textured = {"clearcoatTexture": surface.coat, "clearcoatRoughnessTexture": surface.coat_roughness}
+            for name, source in textured.items():
                 info = self._data_info(source.texture) if source.texture else None
                 if info:
                     value[name] = info

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender meshes as glTF primitives, one a material.
 
-All data moves by foreach_get into typed arrays. glTF's vertices have one normal and one set of texture coordinates each,
-Blender's have as many as corners, so corners that are equal in everything are joined again.
+All data moves by foreach_get into typed arrays. A vertex of glTF has one normal and one pair of texture coordinates, one
+of Blender as many as corners; so corners that are equal in everything are joined again.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _HASH_FACTORS = np.random.default_rng(1).integers(1, 2**63, size=32, dtype=np.ui
 class Wanted:
     """What a material asks of the meshes that use it.
 
-    coordinates  at most two: ("uv", name of a map or "" for the one active in renders), ("generated", "") or ("object", "")
+    coordinates  at most two: ("uv", name of a map, or "" for the one active in renders), ("generated", ""), ("object", "")
     color        name of a colour attribute that multiplies the base colour; "": none
     displaced    normals say where surfaces go to, so they must not open flat-shaded edges
     world_space  the displacement is measured after the object's transform
@@ -120,7 +120,8 @@ def export_mesh(mesh, materials, writer, warn):
         index, wanted = materials[slot]
         arrays = _primitive_arrays(corners, corners.loops[slots == slot], wanted, warn)
         accessors = writer.add_accessors(arrays)
-        primitive = {"attributes": {n: a for n, a in accessors.items() if n != "indices"}, "indices": accessors["indices"]}
+        attributes = dict(accessors)
+        primitive = {"indices": attributes.pop("indices"), "attributes": attributes}
         if index is not None:
             primitive["material"] = index
         primitives.append(primitive)

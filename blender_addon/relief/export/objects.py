@@ -74,8 +74,8 @@ def decompose(matrices):
     """Translations, rotations and scales of matrices.
 
     @param  matrices  float64 (n, 4, 4)
-    @return           (translation (n, 3), quaternion (n, 4) as x y z w, scale (n, 3), exact (n,): whether the three make
-                      the matrix again to 10⁻⁶ of its size; a sheared one cannot be made)
+    @return           (translation (n, 3), quaternion (n, 4) as x y z w, scale (n, 3), exact (n,)): exact tells whether
+                      the three make the matrix again to 10⁻⁶ of its size; a sheared one cannot be made
     """
     linear = matrices[:, :3, :3]
     scale = np.linalg.norm(linear, axis=1)

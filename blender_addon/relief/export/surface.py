@@ -269,7 +269,8 @@ def _mix(source, textures):
         textures.warn(f'node "{node.name}": a textured mix with transparency second', "swap its shaders; it is opaque")
         return first
     if not factor.is_constant():
-        if first.base_color == second.base_color and first.metallic.is_constant(0.0) and second.metallic.is_constant(1.0):
+        are_pure = first.metallic.is_constant(0.0) and second.metallic.is_constant(1.0)
+        if first.base_color == second.base_color and are_pure:
             return replace(first, metallic=factor, roughness=second.roughness)
         textures.warn(f'node "{node.name}": a textured mix of shaders', "half of each was used")
         return _blend(0.5, first, second)
