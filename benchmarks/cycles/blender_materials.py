@@ -3,7 +3,7 @@
 Exact (`approximate` stays empty): diffuse surfaces, mirrors (metal of roughness 0), solid smooth glass with
 absorption, one-sided emission. Not exact, and named in the returned list: rough metal (Fresnel at the view's angle
 instead of the half vector's; multiple scattering by Cycles' own random walk), plastic (a mix by Fresnel instead of
-layered energy), rough glass (no energy compensation), clearcoat and sheen.
+layered energy), rough glass (no energy compensation), clearcoat and sheen; displacement, which Cycles dices.
 """
 
 import math
@@ -100,7 +100,43 @@ def build_material(gltf, index):
     if volume is not None:
         tree.connect(output.inputs["Volume"], volume)
         material.cycles.homogeneous_volume = True
+    if is_displaced(source):
+        tree.connect(output.inputs["Displacement"], _displacement(tree, gltf, source))
+        material.cycles.displacement_method = "DISPLACEMENT"
+        approximate.append("displacement: diced")
     return material, approximate
+
+
+def is_displaced(source):
+    """Whether a glTF material moves its surface."""
+    return "RELIEF_displacement" in source.get("extensions", {})
+
+
+def _displacement(tree, gltf, source):
+    """The displacement socket: the map by path, linear between texels, along the interpolated normal."""
+    settings = source["extensions"]["RELIEF_displacement"]
+    unknown = set(settings) - {"heightTexture", "scale", "midlevel"}
+    reference = settings["heightTexture"]
+    transform = reference.get("extensions", {}).get("KHR_texture_transform", {})
+    unknown |= set(transform) - {"scale", "offset"}
+    if unknown or reference.get("texCoord", 0) != 0 or "index" not in reference:
+        raise Unsupported(f"displacement with {', '.join(sorted(unknown)) or 'another texture reference'}")
+    image = bpy.data.images.load(gltf.image_path(reference["index"]), check_existing=True)
+    image.colorspace_settings.name = "Non-Color"
+    scale, offset = transform.get("scale", (1, 1)), transform.get("offset", (0, 0))
+    # glTF's v is 1 − v of Blender, before and after the transform.
+    location = (offset[0], 1 - offset[1] - scale[1], 0)
+    uv = tree.add("ShaderNodeUVMap", uv_map="TEXCOORD_0").outputs["UV"]
+    mapping = tree.add("ShaderNodeMapping", {"Vector": uv}, vector_type="POINT")
+    mapping.inputs["Location"].default_value = location
+    mapping.inputs["Scale"].default_value = (scale[0], scale[1], 1)
+    height = tree.add("ShaderNodeTexImage", {"Vector": mapping.outputs[0]}, image=image, interpolation="Linear")
+    inputs = {
+        "Height": height.outputs["Color"],
+        "Midlevel": settings.get("midlevel", 0.5),
+        "Scale": settings.get("scale", 1),
+    }
+    return tree.add("ShaderNodeDisplacement", inputs, space="OBJECT").outputs[0]
 
 
 def _surface(tree, gltf, source, approximate):

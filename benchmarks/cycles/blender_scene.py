@@ -19,7 +19,7 @@ import numpy as np
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
-from blender_materials import build_material  # noqa: E402
+from blender_materials import build_material, is_displaced  # noqa: E402
 from gltf_reader import GltfFile, Unsupported  # noqa: E402
 
 # From glTF's axes (Y up) to Blender's (Z up): x, y, z → x, −z, y. Applied to objects, not to vertices. A camera or
@@ -38,7 +38,10 @@ def _add_object(name, data, matrix):
 
 
 def build_mesh(gltf, primitive, name, material):
-    """A Blender mesh of one primitive: its triangles, texture coordinates, and normals if it has any."""
+    """A Blender mesh of one primitive: its triangles, texture coordinates, and normals if it has any.
+
+    Of a displaced primitive, vertices at one place become one, so that its seams stay closed when they move.
+    """
     if primitive.get("mode", 4) != 4:
         raise Unsupported("a primitive that is not triangles")
     attributes = primitive["attributes"]
@@ -48,6 +51,11 @@ def build_mesh(gltf, primitive, name, material):
     positions = gltf.accessor(attributes["POSITION"])
     corners = gltf.accessor(primitive["indices"]).astype(np.int32).ravel()
     num_triangles = len(corners) // 3
+    corners_of_attributes = corners
+    displaced = is_displaced(gltf.json["materials"][primitive["material"]])
+    if displaced:
+        positions, first, merged = np.unique(positions, axis=0, return_index=True, return_inverse=True)
+        corners = merged.ravel()[corners].astype(np.int32)
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(positions))
     mesh.vertices.foreach_set("co", positions.ravel())
@@ -59,17 +67,35 @@ def build_mesh(gltf, primitive, name, material):
     is_smooth = "NORMAL" in attributes
     mesh.polygons.foreach_set("use_smooth", np.full(num_triangles, is_smooth))
     if "TEXCOORD_0" in attributes:
-        uv = gltf.accessor(attributes["TEXCOORD_0"])[corners].astype(np.float32)
+        uv = gltf.accessor(attributes["TEXCOORD_0"])[corners_of_attributes].astype(np.float32)
         uv[:, 1] = 1.0 - uv[:, 1]  # Blender's v grows upwards
         mesh.uv_layers.new(name="TEXCOORD_0").data.foreach_set("uv", uv.ravel())
     mesh.materials.append(material)
     mesh.update(calc_edges=True)
-    if is_smooth:
+    if displaced:
+        _check_normals(mesh, gltf.accessor(attributes["NORMAL"])[first] if is_smooth else None)
+    elif is_smooth:
         mesh.use_auto_smooth = True
         mesh.auto_smooth_angle = math.pi
         # Blender keeps custom normals as two 16-bit angles, an error of some 1e-4 radians.
         mesh.normals_split_custom_set_from_vertices(gltf.accessor(attributes["NORMAL"]).tolist())
     return mesh
+
+
+def _check_normals(mesh, normals):
+    """Cycles' subdivision displaces along the normals that Blender computes; others would be another surface."""
+    computed = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("normal", computed)
+    if normals is None or np.abs(computed.reshape(-1, 3) - normals).max() > 1e-4:
+        raise Unsupported("a displaced mesh whose normals are not those that Blender computes")
+
+
+def _dice(displaced_object):
+    """Adaptive subdivision of flat triangles: the last modifier, which Cycles then does itself."""
+    subdivision = displaced_object.modifiers.new("dicing", "SUBSURF")
+    subdivision.subdivision_type = "SIMPLE"
+    displaced_object.cycles.use_adaptive_subdivision = True
+    displaced_object.cycles.dicing_rate = 1.0
 
 
 def build_camera(gltf, node, matrix):
@@ -186,7 +212,9 @@ def build_scene(path):
                 ]
             for world in gltf.instance_matrices(node, matrix):
                 for mesh in meshes[node["mesh"]]:
-                    _add_object(node.get("name", "node"), mesh, world)
+                    new = _add_object(node.get("name", "node"), mesh, world)
+                    if mesh.materials[0].cycles.displacement_method == "DISPLACEMENT":
+                        _dice(new)
         if "camera" in node and bpy.context.scene.camera is None:
             build_camera(gltf, node, matrix)
         if "RELIEF_area_light" in extensions:
@@ -212,6 +240,9 @@ def set_up_render(settings):
     scene.render.image_settings.exr_codec = "NONE"
     cycles = scene.cycles
     cycles.device = "CPU"
+    # Adaptive subdivision is experimental; triangles of one pixel, and of Blender's own four outside the picture.
+    cycles.feature_set = "EXPERIMENTAL"
+    cycles.dicing_rate = 1.0
     cycles.samples = settings.get("samples", 64)
     cycles.use_adaptive_sampling = False
     cycles.use_denoising = False

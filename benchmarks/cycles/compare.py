@@ -45,15 +45,18 @@ class Job:
     relief: str  # path of the binary
 
 
-def render_relief(job, runs):
-    """The counterpart of `render_cycles`: same runs, same keys in the result; one process a run."""
+def render_relief(job, runs, options=()):
+    """The counterpart of `render_cycles`: same runs, same keys in the result; one process a run.
+
+    @param  options  further words of relief's command line
+    """
     result = {"runs": [], "peak_memory_bytes": 0}
     for run in runs:
         stats_path = run["output"] + ".json"
         width, height = job.resolution
         command = [job.relief, "render", job.scene, "-o", run["output"], "--stats", stats_path]
         command += ["--spp", str(run["samples"]), "--seed", str(run["seed"]), "--threads", str(job.threads)]
-        command += ["--resolution", f"{width}x{height}", "--filter", "box", "--progress", "none"]
+        command += ["--resolution", f"{width}x{height}", "--filter", "box", "--progress", "none", *options]
         done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         if done.returncode != 0:
             sys.exit(f"compare: relief ended with {done.returncode}:\n{done.stderr}")
@@ -61,7 +64,12 @@ def render_relief(job, runs):
             stats = json.load(file)
         preparation = stats["load_seconds"] + stats["build_seconds"]
         result["runs"].append(
-            {**run, "render_seconds": stats["render_seconds"], "synchronize_seconds": preparation}
+            {
+                **run,
+                "render_seconds": stats["render_seconds"],
+                "synchronize_seconds": preparation,
+                "preparation_seconds": preparation,
+            }
         )
         result["peak_memory_bytes"] = max(result["peak_memory_bytes"], stats["peak_memory_bytes"])
     return result

@@ -20,8 +20,10 @@ KNOWN_EXTENSIONS = {
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_volume",
+    "KHR_texture_transform",
     "RELIEF_area_light",
     "RELIEF_camera",
+    "RELIEF_displacement",
     "RELIEF_environment",
     "RELIEF_render",
 }

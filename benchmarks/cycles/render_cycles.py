@@ -3,8 +3,8 @@
 
 Needs Blender 3.4 and, for the python that runs inside it, numpy (Debian: blender python3-numpy). The picture is a
 linear float EXR. `render_seconds` is Cycles' own "render time (without synchronization)"; `synchronize_seconds` is
-what it spends on taking the scene over and building its BVH; `peak_memory_bytes` is that of the whole process,
-an empty Blender being about 270 MiB.
+what it spends on taking the scene over, `preparation_seconds` that and dicing, displacing and building its BVH;
+`peak_memory_bytes` is that of the whole process, an empty Blender being about 270 MiB.
 """
 
 import argparse
@@ -18,6 +18,7 @@ import tempfile
 
 _FOLDER = os.path.dirname(os.path.abspath(__file__))
 _SYNCHRONIZE = re.compile(r"Total time spent synchronizing data: ([0-9.e+-]+)")
+_TOTAL = re.compile(r"Total render time: ([0-9.e+-]+)")
 _RENDER = re.compile(r"Render time \(without synchronization\): ([0-9.e+-]+)")
 
 
@@ -33,7 +34,7 @@ def render_cycles(scene, runs, resolution=None, threads=None, blend=None, blende
     @param  resolution  (width, height) instead of the scene's
     @param  threads     number of render threads; None: all
     @param  blend       where to save the scene as a .blend, for looking at it; None: nowhere
-    @return             {"runs": the runs with render_seconds, synchronize_seconds, wall_seconds added,
+    @return             {"runs": the runs with render_seconds, synchronize_seconds, preparation_seconds, wall_seconds added,
                         "approximate": materials that Cycles' closures only come near to, "import_seconds",
                         "peak_memory_bytes"}
     @error              CyclesError
@@ -74,21 +75,23 @@ def _tail(text):
 def _parse_log(text):
     """Joins our own SCENE and RUN lines with the times Cycles logs before each RUN line."""
     result = {"runs": []}
-    synchronize = render = None
+    synchronize = total = render = None
     for line in text.splitlines():
         if match := _SYNCHRONIZE.search(line):
             synchronize = float(match[1])
+        elif match := _TOTAL.search(line):
+            total = float(match[1])
         elif match := _RENDER.search(line):
             render = float(match[1])
         elif line.startswith("SCENE "):
             result.update(json.loads(line[6:]))
         elif line.startswith("RUN "):
-            if render is None or synchronize is None:
+            if None in (synchronize, total, render):
                 raise ValueError("no times before a RUN line")
             run = json.loads(line[4:])
-            run.update(render_seconds=render, synchronize_seconds=synchronize)
+            run.update(render_seconds=render, synchronize_seconds=synchronize, preparation_seconds=total - render)
             result["runs"].append(run)
-            synchronize = render = None
+            synchronize = total = render = None
     return result
 
 
