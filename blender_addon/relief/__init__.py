@@ -20,6 +20,7 @@ bl_info = {
 # Blender imports this file anew when an update has been installed; so must be the files below it.
 for _name in [name for name in sys.modules if name.startswith(f"{__name__}.")]:
     del sys.modules[_name]
+    globals().pop(_name.removeprefix(f"{__name__}."), None)
 
 from . import engine, exporter, operators, preferences, properties, session, ui  # noqa: E402
 

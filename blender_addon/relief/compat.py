@@ -93,6 +93,17 @@ def engine_init(engine_class, engine, *arguments, **keywords):
         super(engine_class, engine).__init__(*arguments, **keywords)
 
 
+def casts_shadow(light):
+    """Whether a light's shadows are on. It was Cycles' property before 4.2."""
+    owner = light if hasattr(light, "use_shadow") and bpy.app.version >= (4, 2, 0) else getattr(light, "cycles", None)
+    return getattr(owner, "use_shadow" if owner is light else "cast_shadow", True)
+
+
+def is_portal(light):
+    """Whether an area light only guides Cycles' sampling and does not shine."""
+    return light.type == "AREA" and getattr(getattr(light, "cycles", None), "is_portal", False)
+
+
 def light_energy(light):
     """Blender's power of a light: watts, for a sun W/m². Since 4.5 lights have an exposure besides."""
     return light.energy * 2.0 ** getattr(light, "exposure", 0.0)

@@ -58,6 +58,22 @@ def test_orthographic_portrait():
     assert_agrees(_stage(40, 64, type="ORTHO", ortho_scale=5)[0], block=4)
 
 
+def test_a_quarter_of_a_pixel_is_noticed():
+    """The comparison itself: framing that is off by so little must fail."""
+    from scenes import assert_same_expectation, render_runs
+
+    scene, camera = _stage(64, 40, lens=35)
+    cycles = render_runs(scene, "CYCLES", 5, 32)
+    camera.data.shift_x += 0.25 / 64
+    relief = render_runs(scene, "RELIEF", 5, 32)
+    try:
+        assert_same_expectation(relief, cycles, 4)
+    except AssertionError as error:
+        assert "differ" in str(error), error
+        return
+    raise AssertionError("a shift of a quarter of a pixel was not noticed")
+
+
 def test_clipping():
     assert_agrees(_stage(64, 40, lens=35, clip_start=5.0, clip_end=7.5)[0], block=4)
 

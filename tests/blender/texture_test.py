@@ -286,6 +286,28 @@ def test_packed_files_keep_their_bytes():
         _assert_shows(scene)
 
 
+def test_image_sequence():
+    """Each frame has its own file."""
+    from relief.exporter import export_frames
+
+    with folder() as path:
+        _save(f"{path}/shot_007.png")
+        _save(f"{path}/shot_008.png")
+
+        def load():
+            image = bpy.data.images.load(f"{path}/shot_007.png")
+            image.source = "SEQUENCE"
+            return image
+
+        scene, _, texture, _ = _stage(load)
+        texture.image_user.frame_start, texture.image_user.frame_duration = 3, 2
+        texture.image_user.frame_offset = 6
+        for frame, name in ((3, "shot_007.png"), (4, "shot_008.png"), (9, "shot_008.png")):
+            export_frames(scene, f"{path}/out/scene.gltf", [frame])
+            with open(f"{path}/out/scene.gltf", encoding="utf-8") as file:
+                assert name in file.read(), frame
+
+
 def test_missing_file_is_warned_about():
     from scenes import assert_warns
 

@@ -99,3 +99,12 @@ def test_transparent_film():
     # The camera looks past the ball, which is to the right of the middle.
     assert rgba[0, 0, 3] == 0 and rgba[24, 41, 3] == 1, (rgba[0, 0], rgba[24, 41])
     assert picture[47, 0].max() == 0 and picture[24, 41].min() > 0.05
+
+
+def test_no_light_is_black():
+    """Without any light a file would get some from the program; Blender's scenes do not."""
+    from scenes import folder, render
+
+    scene = _stage()
+    with folder() as path:
+        assert render(scene, "RELIEF", f"{path}/picture.exr").max() < 1e-15

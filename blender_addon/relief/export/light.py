@@ -60,7 +60,9 @@ def export_light(light, place):
     if energy < 0 or min(color) < 0:
         place.warn("negative light", "it is left out")
         return
-    if not getattr(getattr(light, "cycles", None), "cast_shadow", True):
+    if compat.is_portal(light):
+        return
+    if not compat.casts_shadow(light):
         place.warn("a light without shadows", "it casts them")
     if light.type == "POINT":
         if light.shadow_soft_size > 0:

@@ -51,7 +51,7 @@ class _MaterialJob:
         self._name = material.name if material else "default"
         self._report = report
         self._coordinates = []
-        self._color_map = ""
+        self._color_map = None
         self._displaced = self._world_space = False
         self.json = {"name": self._name, "doubleSided": True}
         textures = TextureReader(self._warn)
@@ -133,7 +133,7 @@ class _MaterialJob:
                 self.json["normalTexture"] = {**info, "scale": surface.normal.value}
         self._write_reflection(surface)
         self._write_layers(surface)
-        if surface.emission.color_map:
+        if surface.emission.color_map is not None:
             self._warn("a colour attribute as emission", "it is left out: the emission has one colour")
         if surface.emits():
             set_emission(self.json, [max(0.0, c) for c in surface.emission.value], self._writer)

@@ -20,13 +20,13 @@ class Wanted:
     """What a material asks of the meshes that use it.
 
     coordinates  at most two: ("uv", name of a map, or "" for the one active in renders), ("generated", ""), ("object", "")
-    color        name of a colour attribute that multiplies the base colour; "": none
+    color        name of a colour attribute that multiplies the base colour, "" for the active one; None: none
     displaced    normals say where surfaces go to, so they must not open flat-shaded edges
     world_space  the displacement is measured after the object's transform
     """
 
     coordinates: tuple = ()
-    color: str = ""
+    color: object = None
     displaced: bool = False
     world_space: bool = False
 
@@ -93,7 +93,10 @@ class _Corners:
 
     def color(self, name):
         """A colour attribute, linear: float32 (loops, 4); None if there is none on vertices or corners."""
-        attribute = self.mesh.color_attributes.get(name)
+        attributes = self.mesh.color_attributes
+        attribute = attributes.get(name)
+        if not name and len(attributes) > 0:
+            attribute = attributes[max(attributes.render_color_index, 0)]
         if attribute is None or attribute.domain not in {"POINT", "CORNER"}:
             return None
         values = np.empty(4 * len(attribute.data), dtype=np.float32)
@@ -141,7 +144,7 @@ def _primitive_arrays(corners, triangles, wanted, warn):
             warn(f'no uv map "{source[1]}"' if source[1] else "a textured material, but no uv map")
             uv = np.zeros((len(corners.vertex), 2), dtype=np.float32)
         per_loop[f"TEXCOORD_{number}"] = uv
-    if wanted.color:
+    if wanted.color is not None:
         color = corners.color(wanted.color)
         if color is None:
             warn(f'no colour attribute "{wanted.color}" on vertices or corners; its colour is white')

@@ -18,6 +18,9 @@ from .world import export_world
 
 DATA_FOLDER = "relief_data"
 
+#: A radiance that no picture shows, but that is not zero.
+_DARKNESS = 1e-20
+
 #: What the uv pass shows of a mesh whose materials ask for no coordinates.
 _ACTIVE_UV = (("uv", ""),)
 
@@ -114,6 +117,7 @@ class SceneExporter:
         self.set_view(view)
         self.add_world()
         self.add_objects()
+        self._keep_dark()
 
     def set_view(self, view):
         """Sets the camera and the settings of the picture; a later call replaces them."""
@@ -139,11 +143,23 @@ class SceneExporter:
             if thing.kind == "light":
                 self._add_lights(thing, size)
 
+    def _keep_dark(self):
+        """Gives a scene without any light one that is as good as none: the program would put up a lamp of its own."""
+        environment = self.writer.json["extensions"]["RELIEF_environment"]
+        has_light = any(_is_light(node) for node in self.nodes) or any(
+            any(material.get("emissiveFactor", ())) for material in self.writer.json.get("materials", ())
+        )
+        if not has_light and "uri" not in environment and not any(environment["color"]):
+            environment["color"] = [_DARKNESS] * 3
+
     def _warner(self, kind, name):
         return lambda what, instead="": self._report.warn(f'{kind} "{name}"', what, instead)
 
     def _add_geometry(self, thing):
         matrices = thing.world_matrices()
+        for system in thing.object.particle_systems:
+            if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
+                self._report.warn(f'object "{thing.name}"', f'hair "{system.name}" as strands', "it is left out")
         mesh = self._mesh_of(thing, matrices)
         if mesh is None:
             return
@@ -218,6 +234,14 @@ class SceneExporter:
             )
             export_light(light, place)
             self.nodes.append(node)
+
+
+def _is_light(node):
+    """Whether a node or a child of it shines."""
+    extensions = node.get("extensions", {})
+    if "KHR_lights_punctual" in extensions or "RELIEF_area_light" in extensions:
+        return True
+    return any(_is_light(child) for child in node.get("children", ()))
 
 
 def _is_uneven(matrices):

@@ -75,17 +75,17 @@ class Input:
     """value · texture + offset. Without a texture, the value.
 
     value      linear RGB or a number
-    color_map  name of a colour attribute in place of a texture; "": none
+    color_map  name of a colour attribute in place of a texture, "" for the one active in renders; None: none
     """
 
     value: object = 1.0
     texture: object = None
     offset: float = 0.0
-    color_map: str = ""
+    color_map: object = None
 
     def is_constant(self, value=None):
         """Whether nothing varies over the surface; with a value, whether it is that one everywhere."""
-        return self.texture is None and not self.color_map and (value is None or self.value == value)
+        return self.texture is None and self.color_map is None and (value is None or self.value == value)
 
 
 @dataclass
@@ -132,9 +132,10 @@ class TextureReader:
         if node.bl_idname in {"ShaderNodeSeparateColor", "ShaderNodeSeparateRGB", "ShaderNodeSeparateXYZ"}:
             if getattr(node, "mode", "RGB") == "RGB":
                 return self._channel(source, one)
-        if node.bl_idname in {"ShaderNodeVertexColor", "ShaderNodeAttribute"} and is_color:
-            name = node.layer_name if node.bl_idname == "ShaderNodeVertexColor" else node.attribute_name
-            return Input(one, color_map=name)
+        if is_color and node.bl_idname == "ShaderNodeVertexColor":
+            return Input(one, color_map=node.layer_name)
+        if is_color and node.bl_idname == "ShaderNodeAttribute" and node.attribute_type == "GEOMETRY":
+            return Input(one, color_map=node.attribute_name)
         factors = self._factors(node)
         return self._product(source, factors, is_color) if factors is not None else None
 

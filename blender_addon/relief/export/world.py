@@ -19,7 +19,6 @@ def export_world(world, visible_to_camera, writer, images, report):
     else:
         environment = _environment(world, images, lambda *text: report.warn(f'world "{world.name}"', *text))
     environment["visibleToCamera"] = visible_to_camera
-    # Black surroundings are said so: without any light the program would put up a lamp of its own.
     writer.extend(writer.json, "RELIEF_environment", environment)
 
 
