@@ -16,6 +16,7 @@ import json
 import math
 import os
 import platform
+import resource
 import subprocess
 import sys
 import tempfile
@@ -51,6 +52,7 @@ def render_relief(job, runs, options=()):
     @param  options  further words of relief's command line
     """
     result = {"runs": [], "peak_memory_bytes": 0}
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     for run in runs:
         stats_path = run["output"] + ".json"
         width, height = job.resolution
@@ -72,6 +74,8 @@ def render_relief(job, runs, options=()):
             }
         )
         result["peak_memory_bytes"] = max(result["peak_memory_bytes"], stats["peak_memory_bytes"])
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    result["processor_seconds"] = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
     return result
 
 

@@ -4,8 +4,9 @@
 Cycles dices to triangles of one pixel (adaptive subdivision, true displacement); relief traces the map itself, at the
 level of detail that it chooses and, as `relief_lod0`, at that of the map. The reference of all is relief's picture of
 every texel (`--lod 0`), other seeds, of the middle of the picture; errors are measured there, what the reference's
-noise adds is taken off. Times are of whole pictures, including preparation (reading, dicing, building). The renderers
-take turns.
+noise adds is taken off. Times are of whole pictures, including preparation (reading, dicing, building); processor seconds, of the
+whole process and both threads, bear other work on the machine better. The renderers take turns, all timed pictures
+come before all references.
 
 Bias is what would be left of the error at infinitely many samples: of two pictures a, b and two halves r, s of the
 reference, all independent, mean (a − r)(b − s) is the squared bias, without the noise of any of them.
@@ -21,7 +22,6 @@ import json
 import math
 import os
 import platform
-import shutil
 import sys
 import tempfile
 
@@ -60,7 +60,7 @@ def _save(name, arguments, folder):
 
 
 def _timed(job, renderer, samples):
-    """One whole picture: (run as of render_cycles with peak_memory_bytes, the picture's window)."""
+    """One whole picture by a process of its own: (run with the process's costs added, the picture's window)."""
     # Every picture has its own seed, so that no two share their noise.
     output = os.path.join(job.folder, f"{renderer}_{samples}.exr")
     runs = [{"samples": samples, "seed": samples, "output": output}]
@@ -69,7 +69,8 @@ def _timed(job, renderer, samples):
     else:
         report = render_relief(job, runs, _RELIEF_OPTIONS[renderer])
     x0, y0, x1, y1 = _window(job.resolution)
-    return {**report["runs"][0], "peak_memory_bytes": report["peak_memory_bytes"]}, read_rgb(output)[y0:y1, x0:x1]
+    costs = {key: report[key] for key in ("peak_memory_bytes", "processor_seconds")}
+    return {**report["runs"][0], **costs}, read_rgb(output)[y0:y1, x0:x1]
 
 
 def _reference(job, samples):
@@ -83,19 +84,26 @@ def _reference(job, samples):
     return np.stack([read_rgb(run["output"]) for run in runs])
 
 
-def compare_scene(job, samples, reference_samples):
-    """Everything about one scene, as a JSON-able dictionary.
+def render_pictures(job, samples):
+    """All timed pictures of a scene, the renderers in turns.
 
-    @param  samples            samples a pixel of the pictures of each renderer, two or more, by name
-    @param  reference_samples  samples a pixel of each of the reference's parts
+    @param  samples  samples a pixel of the pictures of each renderer, two or more, by name
+    @return          lists of what `_timed` returns, by name
     """
     pictures = {renderer: [] for renderer in samples}
     for turn in range(max(map(len, samples.values()))):
         for renderer, counts in samples.items():
             if turn < len(counts):
                 pictures[renderer].append(_timed(job, renderer, counts[turn]))
-    print("timed; now the reference", file=sys.stderr, flush=True)
+    return pictures
 
+
+def compare_scene(job, pictures, reference_samples):
+    """Everything about one scene, as a JSON-able dictionary.
+
+    @param  pictures           as of `render_pictures`
+    @param  reference_samples  samples a pixel of each of the reference's parts
+    """
     parts = _reference(job, reference_samples)
     reference = parts.mean(axis=0)
     variance = float((parts.var(axis=0, ddof=1) / len(parts)).mean())
@@ -110,6 +118,7 @@ def compare_scene(job, samples, reference_samples):
                     "samples": run["samples"],
                     "preparation_seconds": run["preparation_seconds"],
                     "render_seconds": run["render_seconds"],
+                    "processor_seconds": run["processor_seconds"],
                     "peak_memory_bytes": run["peak_memory_bytes"],
                     "rmse": math.sqrt(max(squared, 0)),
                 }
@@ -159,19 +168,13 @@ def _equal_error(points, target):
     }
 
 
-def render_huge(job, samples, keep):
-    """Memory and preparation of a scene that only relief renders.
-
-    @param  keep  folder for its PNG, or None
-    """
+def render_huge(job, samples):
+    """Memory and preparation of a scene that only relief renders; huge.png in its folder is for looking at."""
     output = os.path.join(job.folder, "huge.exr")
-    picture = os.path.join(job.folder, "huge.png")
     runs = [{"samples": samples, "seed": 1, "output": output}]
-    report = render_relief(job, runs, ["--aov", "beauty", "--png", picture])
+    report = render_relief(job, runs, ["--aov", "beauty", "--png", os.path.join(job.folder, "huge.png")])
     with open(output + ".json", encoding="utf-8") as file:
         stats = json.load(file)
-    if keep:
-        shutil.copy(picture, os.path.join(keep, os.path.basename(job.folder) + ".png"))
     return {
         "resolution": job.resolution,
         "samples": samples,
@@ -185,8 +188,8 @@ def render_huge(job, samples, keep):
 
 def _markdown(results):
     lines = [
-        "| scene | renderer | preparation s | peak MiB | spp | s, all included | RMSE | bias RMSE | bias of mean |",
-        "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
+        "| scene | renderer | preparation s | peak MiB | spp | s, all included | processor s | RMSE | bias RMSE | bias of mean |",
+        "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
     ]
     for name, result in results.items():
         for renderer, values in result["renderers"].items():
@@ -194,7 +197,7 @@ def _markdown(results):
                 lines.append(
                     f"| {name} | {renderer} | {point['preparation_seconds']:.2f} "
                     f"| {point['peak_memory_bytes'] / _MIB:.0f} | {point['samples']} | {_seconds(point):.1f} "
-                    f"| {point['rmse']:.4f} | {values['bias_rmse']:.4f} | {100 * values['relative_bias_of_mean']:+.2f} % |"
+                    f"| {point['processor_seconds']:.1f} | {point['rmse']:.4f} | {values['bias_rmse']:.4f} | {100 * values['relative_bias_of_mean']:+.2f} % |"
                 )
     lines += [
         "",
@@ -261,27 +264,27 @@ def main():
     if unknown:
         parser.error(f"no scene is called {unknown[0]}; there are {', '.join(names)}")
 
-    results, huge = {}, {}
+    samples = {**{renderer: arguments.relief_spp for renderer in _RELIEF_OPTIONS}, "cycles": arguments.cycles_spp}
+    jobs, pictures, results, huge = {}, {}, {}, {}
     with tempfile.TemporaryDirectory() as scratch:
         for name in arguments.scenes or COMPARED:
-            folder = os.path.join(arguments.keep or scratch, name)
-            job = _save(name, arguments, folder)
-            print(f"{name}, {job.resolution[0]}x{job.resolution[1]}", file=sys.stderr, flush=True)
+            jobs[name] = _save(name, arguments, os.path.join(arguments.keep or scratch, name))
+            print(f"{name}, {jobs[name].resolution[0]}x{jobs[name].resolution[1]}", file=sys.stderr, flush=True)
             if name in HUGE:
-                huge[name] = render_huge(job, arguments.huge_spp, arguments.keep)
+                huge[name] = render_huge(jobs[name], arguments.huge_spp)
             else:
-                samples = {**{renderer: arguments.relief_spp for renderer in _RELIEF_OPTIONS}, "cycles": arguments.cycles_spp}
-                results[name] = compare_scene(job, samples, arguments.reference_spp)
-            record = {
-                "machine": {"processor": platform.processor() or platform.machine(), "threads": arguments.threads},
-                "settings": vars(arguments),
-                "scenes": results,
-                "huge": huge,
-            }
-            with open(arguments.json, "w", encoding="utf-8") as file:
-                json.dump(record, file, indent=1)
-            if not arguments.keep:
-                shutil.rmtree(folder)
+                pictures[name] = render_pictures(jobs[name], samples)
+        print("references", file=sys.stderr, flush=True)
+        for name, rendered in pictures.items():
+            results[name] = compare_scene(jobs[name], rendered, arguments.reference_spp)
+    record = {
+        "machine": {"processor": platform.processor() or platform.machine(), "threads": arguments.threads},
+        "settings": vars(arguments),
+        "scenes": results,
+        "huge": huge,
+    }
+    with open(arguments.json, "w", encoding="utf-8") as file:
+        json.dump(record, file, indent=1)
     if results:
         print(_markdown(results))
     if huge:

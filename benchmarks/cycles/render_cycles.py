@@ -36,7 +36,7 @@ def render_cycles(scene, runs, resolution=None, threads=None, blend=None, blende
     @param  blend       where to save the scene as a .blend, for looking at it; None: nowhere
     @return             {"runs": the runs with render_seconds, synchronize_seconds, preparation_seconds, wall_seconds added,
                         "approximate": materials that Cycles' closures only come near to, "import_seconds",
-                        "peak_memory_bytes"}
+                        "peak_memory_bytes", "processor_seconds" of the whole process}
     @error              CyclesError
     """
     job = {"runs": runs, "resolution": resolution, "threads": threads, "blend": blend}
@@ -65,6 +65,7 @@ def render_cycles(scene, runs, resolution=None, threads=None, blend=None, blende
     if os.waitstatus_to_exitcode(status) != 0 or len(result["runs"]) != len(runs):
         raise CyclesError(f"Blender ended with {os.waitstatus_to_exitcode(status)}:\n{_tail(log_text)}")
     result["peak_memory_bytes"] = usage.ru_maxrss * 1024
+    result["processor_seconds"] = usage.ru_utime + usage.ru_stime
     return result
 
 
