@@ -39,7 +39,8 @@ BenchParts parts_of(const std::vector<std::string>& names)
 {
   if (names.empty()) return {};
   const auto has = [&](const char* name) { return std::find(names.begin(), names.end(), name) != names.end(); };
-  return {has("table"), has("marching"), has("sweeps"), has("inversion"), has("tessellation"), has("frames")};
+  return {has("table"),        has("marching"), has("sweeps"), has("inversion"),
+          has("tessellation"), has("costs"),    has("frames")};
 }
 
 std::uint64_t half_of_memory()
@@ -92,9 +93,9 @@ void cmd_bench_register(CLI::App& app, Run& run)
   command
       ->add_option(
           "--parts", a.parts,
-          "Parts, separated by commas: table, marching, sweeps, inversion, tessellation, frames (default: all)")
+          "Parts, separated by commas: table, marching, sweeps, inversion, tessellation, costs, frames (default: all)")
       ->delimiter(',')
-      ->check(one_of({"table", "marching", "sweeps", "inversion", "tessellation", "frames"}));
+      ->check(one_of({"table", "marching", "sweeps", "inversion", "tessellation", "costs", "frames"}));
   command->add_option("--scale", a.map_scale, "Factor of the height maps' sides")
       ->check(number(0.01, 8))
       ->capture_default_str();

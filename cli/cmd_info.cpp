@@ -134,11 +134,13 @@ void print_prepared(const DisplacementSet& displacements, const Statistics& stat
              megabytes(stats.displacement.bytes));
   fmt::print("  prisms: {}; folded (slower to trace) {}, with normals that cancel {}, without a normal {}\n",
              stats.displacement.num_prisms, report.num_folded, report.num_short_normals, report.num_degenerate);
+  for (const std::string& reason : displacements.reasons()) fmt::print("  {}\n", reason);
 }
 
-int info(const std::string& file, bool strict, const DisplacementOptions& displacement)
+int info(const std::string& file, bool strict, DisplacementOptions displacement)
 {
   const Scene scene = scene_load(file);
+  displacement.num_rays = expected_rays(scene.render);
   const SceneContext context(scene, displacement);
   std::vector<std::string> warnings = scene.warnings;
   for (std::string& text : displacement_warnings(scene, displacement)) warnings.push_back(std::move(text));
@@ -206,6 +208,7 @@ void cmd_info_register(CLI::App& app, Run& run)
   command->add_option("scene", arguments->scene, "Scene file (.gltf, .glb)")->required();
   command->add_flag("--strict", arguments->strict, "Turn warnings into errors");
   add_displacement_method(*command, arguments->displacement);
+  add_displacement_memory(*command, arguments->displacement);
   command->callback([&run, arguments] {
     run = [arguments] { return info(arguments->scene, arguments->strict, arguments->displacement); };
   });

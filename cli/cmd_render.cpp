@@ -403,6 +403,7 @@ void cmd_render_register(CLI::App& app, Run& run, const std::string& command_lin
   command->add_option("--max-bounces", a.max_bounces, "Scattering events after the first hit")
       ->check(whole_number(0, 200));
   add_displacement_method(*command, a.displacement);
+  add_displacement_memory(*command, a.displacement);
   add_displacement_lod(*command, a.displacement);
   command->add_option("--filter", a.filter, "Pixel filter: box (1 px) or blackman-harris (1.5 px)")
       ->check(one_of({"box", "blackman-harris"}));

@@ -81,6 +81,7 @@ std::string render_fingerprint(const Scene& scene, const RenderOptions& options,
   hash.add(options.time_limit_seconds);
   hash.add(options.aov_mask);
   hash.add(options.displacement.method ? static_cast<int>(*options.displacement.method) : -1);
+  hash.add(options.displacement.auto_bytes);
   hash.add(options.displacement.lod.value_or(-2));
   return hash.text();
 }

@@ -45,6 +45,17 @@ void add_displacement_method(CLI::App& command, DisplacementOptions& options)
       ->check(one_of(displacement_method_names()));
 }
 
+void add_displacement_memory(CLI::App& command, DisplacementOptions& options)
+{
+  const auto set = [&options](double gib) {
+    options.auto_bytes = static_cast<std::uint64_t>(gib * static_cast<double>(1 << 30));
+  };
+  command
+      .add_option_function<double>("--displacement-memory", set,
+                                   "GiB that --displacement auto may use for tessellations where they save time")
+      ->check(number(0, 1e6));
+}
+
 void add_displacement_lod(CLI::App& command, DisplacementOptions& options)
 {
   const auto set = [&options](const std::string& text) { options.lod = parse_lod(text); };

@@ -21,6 +21,8 @@ Camera camera_for_image(const Scene& scene, const std::string& name, int width, 
 /// Adds --displacement; `options` must outlive the parser.
 void add_displacement_method(CLI::App& command, DisplacementOptions& options);
 
+/// Adds --displacement-memory likewise.
+void add_displacement_memory(CLI::App& command, DisplacementOptions& options);
 /// Adds --lod likewise.
 void add_displacement_lod(CLI::App& command, DisplacementOptions& options);
 

@@ -29,7 +29,8 @@ std::string stats_json(const Statistics& statistics)
                     {"steps_mean", a_ray(s.counters.displaced_bounds + s.counters.displaced_texels)},
                     {"steps_max", s.displacement.most_steps},
                     {"texels_mean", a_ray(s.counters.displaced_texels)},
-                    {"prisms_per_ray", a_ray(s.counters.displaced_prisms)}};
+                    {"prisms_per_ray", a_ray(s.counters.displaced_prisms)},
+                    {"reasons", s.displacement.reasons}};
   }
   const nlohmann::ordered_json json = {
       {"scene", s.scene},

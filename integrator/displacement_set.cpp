@@ -170,6 +170,10 @@ DisplacementSet::DisplacementSet(const Scene& scene, const DisplacementOptions& 
     : geometry_of_instance_(scene.instances.size(), -1), texel_of_instance_(scene.instances.size(), 0.0f)
 {
   std::uint64_t tessellated_bytes = 0;
+  const auto num_displaced =
+      static_cast<double>(std::count_if(scene.instances.begin(), scene.instances.end(), [&](const Instance& instance) {
+        return scene.materials[static_cast<std::size_t>(instance.material_index)].displacement_index >= 0;
+      }));
   std::map<std::tuple<int, int, double>, int> known;  // mesh, displacement, scale in object space
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
@@ -200,16 +204,41 @@ DisplacementSet::DisplacementSet(const Scene& scene, const DisplacementOptions& 
       geometry.mesh = displaced->mesh.view();
       geometry.lod = {levels.count, levels.by_cone, levels.fixed, displaced->mesh.widest_texel()};
       has_levels_ |= levels.count > 1;
-      if (const std::optional<TessellationKind> kind = tessellation_kind(method)) {
-        TessellationLayout layout = tessellation_layout_make(geometry.mesh, *kind, options.tessellation_rate);
-        tessellated_bytes += tessellation_peak_bytes(layout, kRenderTessellation);
-        check_budget(tessellated_bytes, layout, displaced->name, options);
-        displaced->tessellation = std::make_unique<Tessellation>(geometry.mesh, std::move(layout));
-      }
+      displaced->tessellation =
+          tessellate(geometry, mesh.name, method, options, options.num_rays / num_displaced, &tessellated_bytes);
       geometries_.push_back(std::move(displaced));
     }
     texel_of_instance_[i] = displaced(i).geometry.lod.texel * largest_scale(instance.world_from_object);
   }
+}
+
+std::unique_ptr<Tessellation> DisplacementSet::tessellate(const DisplacedGeometry& geometry,
+                                                          const std::string& mesh,
+                                                          DisplacementMethod method,
+                                                          const DisplacementOptions& options,
+                                                          double num_rays,
+                                                          std::uint64_t* used_bytes)
+{
+  const auto layout_of = [&](TessellationKind kind) {
+    return tessellation_layout_make(geometry.mesh, kind, options.tessellation_rate);
+  };
+  if (const std::optional<TessellationKind> kind = tessellation_kind(method)) {
+    TessellationLayout layout = layout_of(*kind);
+    *used_bytes += tessellation_peak_bytes(layout, kRenderTessellation);
+    check_budget(*used_bytes, layout, mesh, options);
+    return std::make_unique<Tessellation>(geometry.mesh, std::move(layout));
+  }
+  // Layouts cost time and memory of their own, so nothing is made of them without an allowance.
+  if (method != DisplacementMethod::kAuto || options.auto_bytes <= *used_bytes || geometry.lod.fixed > 0)
+    return nullptr;
+  TessellationLayout triangles = layout_of(TessellationKind::kTriangles), grids = layout_of(TessellationKind::kGrids);
+  const DisplacementChoice choice =
+      displacement_choose(kDisplacementCosts, triangles, grids, num_rays, options.auto_bytes - *used_bytes);
+  reasons_.push_back("mesh '" + mesh + "': " + choice.reason);
+  if (!choice.tessellates) return nullptr;
+  TessellationLayout& chosen = choice.kind == TessellationKind::kTriangles ? triangles : grids;
+  *used_bytes += tessellation_peak_bytes(chosen, kRenderTessellation);
+  return std::make_unique<Tessellation>(geometry.mesh, std::move(chosen));
 }
 
 DisplacementSet::Field& DisplacementSet::field(const Scene& scene, int map_index, int level)

@@ -12,7 +12,7 @@
 
 #include "displacement/embree_geometry.h"
 #include "displacement/height_level.h"
-#include "displacement/tessellation.h"
+#include "integrator/displacement_cost.h"
 #include "scene/scene.h"
 
 namespace relief {
@@ -22,6 +22,8 @@ struct DisplacementOptions {
   std::optional<DisplacementMethod> method;  ///< of all materials
   std::optional<float> lod;                  ///< of all height maps, see DisplacementSettings::lod
   double tessellation_rate = 1;              ///< micro-triangle edges a texel
+  std::uint64_t auto_bytes = 0;              ///< what `auto` may use while it builds tessellations; 0: it builds none
+  double num_rays = 0;                   ///< that will be traced, about, for `auto` to weigh building against tracing
   std::uint64_t tessellation_bytes = 0;  ///< all tessellations may take while they are built; 0: half of the machine's
 };
 
@@ -71,6 +73,8 @@ class DisplacementSet {
   std::uint64_t num_triangles() const;  ///< of all geometries
   DisplacedMeshReport report() const;   ///< sums over all geometries
   std::string method_names() const;     ///< of the geometries, separated by commas
+  /// What `auto` chose by, a line a geometry.
+  const std::vector<std::string>& reasons() const { return reasons_; }
   /// Parts of the surfaces that are missing.
   std::vector<std::string> warnings() const;
 
@@ -96,9 +100,18 @@ class DisplacementSet {
                           const Mesh& mesh,
                           const DisplacementSettings& settings,
                           const DisplacementOptions& options);
+  /// A tessellation's layout where the method, or `auto`, wants one.
+  /// @param used_bytes  by all tessellations so far; grows
+  std::unique_ptr<Tessellation> tessellate(const DisplacedGeometry& geometry,
+                                           const std::string& mesh,
+                                           DisplacementMethod method,
+                                           const DisplacementOptions& options,
+                                           double num_rays,
+                                           std::uint64_t* used_bytes);
   std::vector<int> geometry_of_instance_;
   std::vector<float> texel_of_instance_;
   bool has_levels_ = false;
+  std::vector<std::string> reasons_;
   /// A level of a height map with its bounds.
   struct Field {
     HeightLevel level;  ///< empty at level 0, which is the map itself
@@ -112,9 +125,6 @@ class DisplacementSet {
   std::map<std::pair<int, int>, Field> fields_;  ///< by height map and level
   std::vector<std::unique_ptr<Displaced>> geometries_;
 };
-
-/// How tessellations of a render are built.
-inline constexpr TessellationBuild kRenderTessellation{RTC_BUILD_QUALITY_MEDIUM, false};
 
 /// The best traversals for this machine; $RELIEF_ISA overrides, as for the stages.
 const TraversalTable& traversal_table_select();

@@ -107,7 +107,9 @@ RenderedImage render(const Scene& scene,
 {
   const Clock::time_point build_start = Clock::now();
   const RenderSettings& settings = options.settings;
-  SceneContext context(scene, options.displacement);
+  DisplacementOptions displacement = options.displacement;
+  displacement.num_rays = expected_rays(settings);
+  SceneContext context(scene, displacement);
   for (std::string& text : context.displacements.warnings()) stats.warnings.push_back(std::move(text));
   const StageTable& stages = stage_table_select();
 

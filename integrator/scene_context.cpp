@@ -55,9 +55,13 @@ void SceneContext::fill(Statistics& stats) const
   stats.texture_bytes = scene.textures->bytes();
   stats.light_bytes = lights.bytes();
   stats.bvh_bytes = accel->bytes();
-  stats.displacement = {displacements.method_names(),        displacements.size(),
-                        displacements.num_triangles(),       displacements.bytes(),
-                        height_map_bytes(scene.height_maps), 0};
+  stats.displacement = {displacements.method_names(),
+                        displacements.size(),
+                        displacements.num_triangles(),
+                        displacements.bytes(),
+                        height_map_bytes(scene.height_maps),
+                        0,
+                        displacements.reasons()};
 }
 
 }  // namespace relief

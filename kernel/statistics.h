@@ -21,7 +21,8 @@ struct DisplacementStatistics {
   std::uint64_t num_prisms = 0;      ///< base triangles of all geometries
   std::uint64_t bytes = 0;           ///< tables and prepared triangles, besides the maps
   std::uint64_t map_bytes = 0;
-  std::uint64_t most_steps = 0;  ///< bounds and texels tested for a single ray
+  std::uint64_t most_steps = 0;      ///< bounds and texels tested for a single ray
+  std::vector<std::string> reasons;  ///< for what `auto` chose, a line a geometry that it weighed tessellations for
 };
 
 struct Statistics {

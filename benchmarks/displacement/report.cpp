@@ -203,6 +203,26 @@ Table frame_table(const std::vector<FrameResult>& frames)
   return table;
 }
 
+Table cost_table(const std::vector<CostSample>& samples)
+{
+  const DisplacementCosts fit = fitted_costs(samples);
+  Table table{"What auto chooses by (kDisplacementCosts)",
+              fmt::format("Fitted: {{{:.0f}, {{{:.0f}, {:.0f}, {:.0f}}}, {{{:.0f}, {:.0f}, {:.0f}}}}}", fit.exact_ray,
+                          fit.triangles.ray, fit.triangles.ray_doubling, fit.triangles.build, fit.grids.ray,
+                          fit.grids.ray_doubling, fit.grids.build),
+              {"scene", "million micro-triangles", "chord ns a ray", "triangles ns a ray", "grids ns a ray",
+               "triangles ns a build", "grids ns a build"},
+              {}};
+  for (const CostSample& s : samples) {
+    std::vector<std::string> row = {s.scene, fmt::format("{:.3g}", 1e-6 * static_cast<double>(s.num_micro_triangles))};
+    for (const double ns : {s.exact_ray, s.triangles_ray, s.grids_ray, s.triangles_build, s.grids_build}) {
+      row.push_back(fmt::format("{:.0f}", ns));
+    }
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
 constexpr const char* kMarchingTitle = "Marching scale and resolution of RMIP (the paper's Fig. 10)";
 constexpr const char* kSweepsTitle = "More displacement, more tiles (the paper's Fig. 11)";
 constexpr const char* kInversionTitle = "RMIP with and without inversion (the paper's Fig. 12)";
@@ -402,6 +422,21 @@ nlohmann::ordered_json json_of(const std::vector<VariantResult>& variants)
   return json;
 }
 
+nlohmann::ordered_json json_of(const std::vector<CostSample>& samples)
+{
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const CostSample& s : samples) {
+    json.push_back({{"scene", s.scene},
+                    {"micro_triangles", s.num_micro_triangles},
+                    {"chord_ns_a_ray", s.exact_ray},
+                    {"triangles_ns_a_ray", s.triangles_ray},
+                    {"grids_ns_a_ray", s.grids_ray},
+                    {"triangles_ns_a_build", s.triangles_build},
+                    {"grids_ns_a_build", s.grids_build}});
+  }
+  return json;
+}
+
 }  // namespace
 
 std::string bench_markdown(const BenchResults& results)
@@ -416,6 +451,7 @@ std::string bench_markdown(const BenchResults& results)
   }
   if (!results.inversion.empty()) text += markdown(variant_table(kInversionTitle, results.inversion));
   if (!results.tessellation.empty()) text += markdown(variant_table(kTessellationTitle, results.tessellation));
+  if (!results.costs.empty()) text += markdown(cost_table(results.costs));
   if (!results.frames.empty()) text += markdown(frame_table(results.frames));
   return text;
 }
@@ -435,6 +471,7 @@ std::string bench_json(const BenchResults& results)
                                        {"sweeps", json_of(results.sweeps)},
                                        {"inversion", json_of(results.inversion)},
                                        {"tessellation", json_of(results.tessellation)},
+                                       {"costs", json_of(results.costs)},
                                        {"frames", json_of(results.frames)}};
   return json.dump(2) + "\n";
 }
@@ -462,6 +499,7 @@ std::string bench_html(const BenchResults& results)
   }
   if (!results.inversion.empty()) pieces.push_back(html(variant_table(kInversionTitle, results.inversion)));
   if (!results.tessellation.empty()) pieces.push_back(html(variant_table(kTessellationTitle, results.tessellation)));
+  if (!results.costs.empty()) pieces.push_back(html(cost_table(results.costs)));
   if (!results.frames.empty()) pieces.push_back(html(frame_table(results.frames)));
   return html_page("Displacement: methods side by side", pieces);
 }

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 
 #include "exporters/png_ocio.h"
 #include "integrator/displacement_set.h"
@@ -150,6 +151,7 @@ struct Study {
   void add_sweeps(const BenchSceneSpec& spec) const;
   void add_inversion(const BenchSceneSpec& spec) const;
   void add_tessellation(const BenchSceneSpec& spec) const;
+  void add_costs(const BenchSceneSpec& spec) const;
   void add_frames(const BenchSceneSpec& spec) const;
 };
 
@@ -304,6 +306,34 @@ void Study::add_tessellation(const BenchSceneSpec& spec) const
   }
 }
 
+void Study::add_costs(const BenchSceneSpec& spec) const
+{
+  for (const double factor : {1.0 / 16, 1.0 / 8, 1.0 / 4, 1.0 / 2}) {
+    say(fmt::format("{}: costs, map × {}", spec.name, factor));
+    const BenchScene scene = make_scene(spec, {factor, 1, 1});
+    const BenchSurface surface(scene);
+    const std::uint64_t share = options.tessellation_bytes / 2;
+    const Contenders contenders =
+        make_all(surface, {traversal_spec(std::string(kExactMethod), TraversalMethod::kChord),
+                           tessellation_spec("triangles", TessellationKind::kTriangles, share),
+                           tessellation_spec("grids", TessellationKind::kGrids, share)});
+    const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution);
+    std::array<double, 3> nanoseconds{};
+    for (const BenchRayKind kind : {BenchRayKind::kPrimary, BenchRayKind::kBounce, BenchRayKind::kShadow}) {
+      const std::vector<Measurement> measured =
+          bench_measure(contenders, kind, rays.of(kind), options.rounds, scene.texel_metres);
+      for (std::size_t m = 0; m < measured.size(); ++m) nanoseconds[m] += measured[m].nanoseconds / kNumBenchRayKinds;
+    }
+    const auto threads =
+        static_cast<double>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
+    const auto build = [&](const Contender& contender) {
+      return 1e9 * contender.build_seconds() * threads / static_cast<double>(contender.num_micro_triangles());
+    };
+    results.costs.push_back({std::string(spec.name), contenders[1]->num_micro_triangles(), nanoseconds[0],
+                             nanoseconds[1], nanoseconds[2], build(*contenders[1]), build(*contenders[2])});
+  }
+}
+
 void Study::add_frames(const BenchSceneSpec& spec) const
 {
   say(fmt::format("{}: frames", spec.name));
@@ -332,6 +362,32 @@ std::vector<const BenchSceneSpec*> chosen_scenes(const std::vector<std::string>&
 
 }  // namespace
 
+DisplacementCosts fitted_costs(const std::vector<CostSample>& samples)
+{
+  DisplacementCosts costs;
+  const auto count = static_cast<double>(samples.size());
+  for (const CostSample& sample : samples) {
+    costs.exact_ray += sample.exact_ray / count;
+    costs.triangles.build += sample.triangles_build / count;
+    costs.grids.build += sample.grids_build / count;
+  }
+  const auto fit_line = [&](double CostSample::*ray, TessellationCost& cost) {
+    double x = 0, y = 0, xx = 0, xy = 0;
+    for (const CostSample& sample : samples) {
+      const double doublings = std::log2(static_cast<double>(sample.num_micro_triangles) / (1 << 20));
+      x += doublings / count;
+      y += sample.*ray / count;
+      xx += doublings * doublings / count;
+      xy += doublings * sample.*ray / count;
+    }
+    cost.ray_doubling = (xy - x * y) / (xx - x * x);
+    cost.ray = y - cost.ray_doubling * x;
+  };
+  fit_line(&CostSample::triangles_ray, costs.triangles);
+  fit_line(&CostSample::grids_ray, costs.grids);
+  return costs;
+}
+
 BenchResults bench_displacement_run(const BenchOptions& options)
 {
   BenchResults results;
@@ -349,6 +405,7 @@ BenchResults bench_displacement_run(const BenchOptions& options)
     if (options.parts.sweeps && for_sweeps) study.add_sweeps(*spec);
     if (options.parts.inversion) study.add_inversion(*spec);
     if (options.parts.tessellation && spec->name == "roof") study.add_tessellation(*spec);
+    if (options.parts.costs && (for_sweeps || spec->name == "glass")) study.add_costs(*spec);
     if (options.parts.frames) study.add_frames(*spec);
   }
   return results;

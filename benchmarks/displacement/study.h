@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "benchmarks/displacement/frames.h"
+#include "integrator/displacement_cost.h"
 
 namespace relief {
 
@@ -21,6 +22,7 @@ struct BenchParts {
   bool sweeps = true;     ///< Fig. 11: more displacement, more tiles
   bool inversion = true;  ///< Fig. 12: bounds reduced by inversion or not
   bool tessellation = true;  ///< ways to build a tessellation's tree
+  bool costs = true;         ///< the constants by which `auto` chooses
   bool frames = true;        ///< whole path-traced frames
 };
 
@@ -91,6 +93,14 @@ struct VariantResult {
   std::size_t bytes = 0;
 };
 
+/// What one scene at one map size costs by the methods that `auto` chooses among; a mean over the kinds of rays.
+struct CostSample {
+  std::string scene;
+  std::uint64_t num_micro_triangles = 0;
+  double exact_ray = 0, triangles_ray = 0, grids_ray = 0;  ///< nanoseconds
+  double triangles_build = 0, grids_build = 0;             ///< nanoseconds of processor time a micro-triangle
+};
+
 struct BenchResults {
   std::string isa;
   double map_scale = 1;
@@ -99,8 +109,12 @@ struct BenchResults {
   std::vector<SceneResult> scenes;
   std::vector<Sweep> marching, sweeps;
   std::vector<VariantResult> inversion, tessellation;
+  std::vector<CostSample> costs;
   std::vector<FrameResult> frames;
 };
+
+/// Least squares over the samples.
+DisplacementCosts fitted_costs(const std::vector<CostSample>& samples);
 
 /// Names of the methods in the table; the first is what the others are compared with.
 inline constexpr std::string_view kExactMethod = "chord", kPublishedMethod = "tfdm", kTessellationMethod = "tessellate";

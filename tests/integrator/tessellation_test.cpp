@@ -167,5 +167,60 @@ TEST_P(TessellatedBy, RefusesWhatDoesNotFitAndSaysHowMuchItWouldTake)
   }
 }
 
+TEST(AutomaticDisplacement, TessellatesWhereThatSavesTimeWithinItsAllowance)
+{
+  const Scene scene = displaced_scene(AlphaMode::kOpaque);
+  constexpr std::uint64_t kAmple = std::uint64_t{1} << 31;
+  const auto method = [&](double num_rays, std::uint64_t allowance) {
+    DisplacementOptions options;
+    options.num_rays = num_rays;
+    options.auto_bytes = allowance;
+    const SceneContext context(scene, options);
+    EXPECT_EQ(context.displacements.reasons().size(), allowance > 0 ? 1u : 0u);
+    return context.displacements.method_names();
+  };
+  EXPECT_EQ(method(1e9, kAmple), "tessellate");
+  // A few rays are traced before a tree is built.
+  EXPECT_EQ(method(1000, kAmple), "chord");
+  // Without an allowance nothing is built, and one too small for triangles may do for grids.
+  EXPECT_EQ(method(1e9, 0), "chord");
+  SceneContext context(scene, options_of(DisplacementMethod::kChord, 1));
+  const DisplacedMeshView mesh = context.displacements.geometry(0).mesh;
+  const auto peak = [&](TessellationKind kind) {
+    return tessellation_peak_bytes(tessellation_layout_make(mesh, kind, 1), kRenderTessellation);
+  };
+  const std::uint64_t grids = peak(TessellationKind::kGrids), triangles = peak(TessellationKind::kTriangles);
+  ASSERT_LT(grids, triangles);
+  EXPECT_EQ(method(1e9, triangles), "tessellate");
+  EXPECT_EQ(method(1e9, triangles - 1), "tessellate-grid");
+  EXPECT_EQ(method(1e9, grids - 1), "chord");
+}
+
+TEST(AutomaticDisplacement, ChoosesTheLeastOfTheSumsThatItNames)
+{
+  const DisplacementCosts costs{1000, {300, 50, 500}, {400, 50, 100}};
+  TessellationLayout triangles, grids;
+  triangles.num_micro_triangles = triangles.num_primitives = 4u << 20;
+  triangles.num_vertices = 2u << 20;
+  grids = triangles;
+  grids.kind = TessellationKind::kGrids;
+  constexpr std::uint64_t kAmple = std::uint64_t{1} << 40;
+  // 4 Mi micro-triangles: (300 + 2·50) ns a ray and 2.1 s, or 500 ns and 0.42 s, against 1000 ns.
+  EXPECT_NEAR(exact_seconds(costs, 1e6), 1, 1e-9);
+  EXPECT_NEAR(tessellation_seconds(costs.triangles, 4u << 20, 1e6), 0.4 + 2.097152, 1e-9);
+  EXPECT_NEAR(tessellation_seconds(costs.grids, 4u << 20, 1e6), 0.5 + 0.4194304, 1e-9);
+  const DisplacementChoice few = displacement_choose(costs, triangles, grids, 5e5, kAmple);
+  EXPECT_FALSE(few.tessellates);
+  EXPECT_EQ(few.reason.rfind("0.5 s by chord against 2.3 s by tessellate (", 0), 0u) << few.reason;
+  const DisplacementChoice some = displacement_choose(costs, triangles, grids, 1e6, kAmple);
+  EXPECT_TRUE(some.tessellates);
+  EXPECT_EQ(some.kind, TessellationKind::kGrids);
+  // From 17 million rays on triangles repay their tree.
+  EXPECT_EQ(displacement_choose(costs, triangles, grids, 1.6e7, kAmple).kind, TessellationKind::kGrids);
+  EXPECT_EQ(displacement_choose(costs, triangles, grids, 1.8e7, kAmple).kind, TessellationKind::kTriangles);
+  EXPECT_FALSE(displacement_choose(costs, triangles, grids, 1e9, 1000).tessellates);
+  EXPECT_NE(displacement_choose(costs, triangles, grids, 1e9, 1000).reason.find("too large"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace relief::test
