@@ -7,7 +7,7 @@ import bpy
 
 from . import compat, exporter, final, result
 from .report import ReliefError
-from .viewport import Viewport
+from .viewport import Viewport, stop_all
 
 
 class ReliefEngine(bpy.types.RenderEngine):
@@ -66,4 +66,5 @@ def register():
 
 
 def unregister():
+    stop_all()
     bpy.utils.unregister_class(ReliefEngine)

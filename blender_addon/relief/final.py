@@ -76,7 +76,9 @@ def command_line(settings, crop=None):
     @param  settings  scene.relief
     @param  crop      (x0, y0, x1, y1) from the top left, or None
     """
-    arguments = ["--texture-memory", f"{settings.memory_limit:g}"]
+    arguments = ["--texture-memory", f"{settings.texture_memory:g}"]
+    if settings.memory_limit > 0:
+        arguments += ["--displacement-memory", f"{settings.memory_limit:g}"]
     if settings.time_limit > 0:
         arguments += ["--time-limit", f"{settings.time_limit:g}"]
     if settings.threads > 0:
@@ -128,6 +130,8 @@ def warn_unread(scene, warnings):
     where = f'scene "{scene.name}"'
     if scene.render.use_motion_blur:
         warnings.warn(where, "motion blur", "everything stands still")
+    if scene.render.use_freestyle:
+        warnings.warn(where, "Freestyle lines", "they are left out")
     if scene.render.use_multiview:
         warnings.warn(where, "stereoscopy", "the scene's camera alone was used")
 

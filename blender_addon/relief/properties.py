@@ -102,15 +102,23 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
         items=_METHODS,
         default="auto",
     )
-    lod: IntProperty(
+    lod: FloatProperty(
         name="Level of Detail",
         description="Level of all height maps: 0 is the map itself, each further one is averaged to half the size a "
-        "side; -1 leaves the choice to the program (default -1)",
-        default=-1,
-        min=-1,
-        max=16,
+        "side, between two both are mixed; -1 chooses what a pixel can show (default -1)",
+        default=-1.0,
+        min=-1.0,
+        max=16.0,
     )
     memory_limit: FloatProperty(
+        name="Memory",
+        description="GiB that the automatic method may take for tessellating where that is faster; 0 is none, so that "
+        "nothing is tessellated (default 0)",
+        default=0.0,
+        min=0.0,
+        max=1024.0,
+    )
+    texture_memory: FloatProperty(
         name="Texture Memory",
         description="GiB of textures to keep in memory; what is more is read from its files when needed (default 4)",
         default=4.0,

@@ -96,6 +96,9 @@ class RELIEF_PT_displacement(_RenderPanel, bpy.types.Panel):
         settings, rows = context.scene.relief, self.rows()
         rows.prop(settings, "displacement_method")
         rows.prop(settings, "lod")
+        row = rows.row()
+        row.active = settings.displacement_method == "auto"
+        row.prop(settings, "memory_limit")
         waiting = [m for m in bpy.data.materials if m.users and needs_switch(m)]
         for material in waiting:
             rows.label(text=f'"{material.name}" has a Displacement node, but is set to Bump Only', icon="INFO")
@@ -119,7 +122,7 @@ class RELIEF_PT_performance(_RenderPanel, bpy.types.Panel):
     def draw(self, context):
         settings, rows = context.scene.relief, self.rows()
         rows.prop(settings, "threads")
-        rows.prop(settings, "memory_limit")
+        rows.prop(settings, "texture_memory")
         rows.prop(settings, "strict")
 
 

@@ -32,6 +32,15 @@ _COARSE = 4
 _REST_POLLS = 2
 
 
+_alive = weakref.WeakSet()
+
+
+def stop_all():
+    """Stops all viewports: the add-on is switched off, or Blender ends."""
+    for viewport in list(_alive):
+        viewport.stop()
+
+
 @dataclass
 class _Run:
     """One run: a divisor of the resolution, samples, seed."""
@@ -61,6 +70,7 @@ class Viewport:
         self._picture = None
         self._rest = 0
         self._is_stopped = False
+        _alive.add(self)
         bpy.app.timers.register(self._poll, first_interval=_POLL_SECONDS)
 
     def update(self, context, depsgraph):

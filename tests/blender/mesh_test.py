@@ -193,3 +193,23 @@ def test_indirect_light():
     add_light("AREA", (0, 0, 1.9), energy=100, size=1.0)
     add_camera((0, -1.9, 0), degrees(90, 0, 0), lens=20)
     assert_agrees(scene, samples=256)
+
+
+def test_equal_corners_are_joined_and_no_others():
+    """Against sets of tuples, on random corners."""
+    import numpy as np
+    from relief.export.mesh import _join_equal
+
+    random = np.random.default_rng(0)
+    for _ in range(200):
+        num_loops = random.integers(3, 60)
+        vertex = random.integers(0, random.integers(1, 20), num_loops).astype(np.int32)
+        attributes = [random.integers(0, 2, (num_loops, k)).astype(np.float32) for k in (3, 2)]
+        loops = random.integers(0, num_loops, 3 * random.integers(1, 30))
+        distinct, indices = _join_equal(loops, vertex, attributes)
+
+        def corner(loop):
+            return (vertex[loop], *(tuple(values[loop]) for values in attributes))
+
+        assert [corner(loop) for loop in loops] == [corner(distinct[i]) for i in indices]
+        assert len(distinct) == len({corner(loop) for loop in loops}) == len({corner(loop) for loop in distinct})

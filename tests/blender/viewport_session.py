@@ -1,6 +1,6 @@
 """Runs in a Blender with a window: shows the viewport rendered, edits, moves, leaves the mode; writes what it saw.
 
-Not a test by itself: viewport_test.py starts it. Steps run in Blender's timers, since the window is only drawn between
+Not a test by itself: viewport_test.py starts it, with "follow" or "quit" and a folder. Steps run in Blender's timers, since the window is only drawn between
 them. Pictures are screenshots of the whole window.
 """
 
@@ -14,8 +14,8 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 from scenes import add_light, add_plane, add_sphere, degrees, diffuse, set_world  # noqa: E402
 
-_OUTPUT = sys.argv[-1]
-_SECONDS_A_STEP = float(os.environ.get("RELIEF_TEST_STEP_SECONDS", "2.5"))
+_SESSION, _OUTPUT = sys.argv[-2:]
+_SECONDS_A_STEP = 2.5
 _seen = {}
 
 
@@ -101,7 +101,10 @@ def _finish():
 
 
 def _steps():
+    """What is done, one a timer's turn."""
     yield _start
+    if _SESSION == "quit":
+        yield _finish
     yield lambda: _shot("rendered")
     yield _edit
     yield lambda: _shot("edited")

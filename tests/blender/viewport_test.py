@@ -4,7 +4,6 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 
 import bpy
 import numpy as np
@@ -27,38 +26,64 @@ def _share(pixels, channel):
     return float((pixels[..., channel] > 1.8 * others + 0.05).mean())
 
 
+def _run_session(name, path):
+    """Runs viewport_session.py in a Blender with a window; returns what Blender said."""
+    assert shutil.which("Xvfb"), "Xvfb is not installed"
+    read, write = os.pipe()
+    display = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp"],
+        pass_fds=[write],
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(write)
+    try:
+        with os.fdopen(read) as number:
+            environment = {**os.environ, "DISPLAY": f":{number.readline().strip()}", "LIBGL_ALWAYS_SOFTWARE": "1"}
+        environment["TMPDIR"] = path
+        command = [bpy.app.binary_path, "--factory-startup", "--no-window-focus", "-p", "0", "0", "800", "600"]
+        command += ["--python-exit-code", "9", "--python", os.path.join(_HERE, "viewport_session.py"), "--", name, path]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=200)
+    finally:
+        display.terminate()
+        display.wait()
+    output = done.stdout + done.stderr
+    assert done.returncode == 0 and "Traceback" not in output, output
+    return output
+
+
+def _processes_with(text):
+    """Command lines of running processes that have a text in them."""
+    found = []
+    for entry in os.listdir("/proc"):
+        if entry.isdigit():
+            try:
+                with open(f"/proc/{entry}/cmdline", "rb") as file:
+                    command = file.read().decode("utf-8", "replace")
+            except OSError:
+                continue
+            if text in command:
+                found.append(command)
+    return found
+
+
+def test_quitting_in_the_middle_leaves_nothing():
+    """Blender ends while its viewport renders: so does the program, and its files go."""
+    with folder() as path:
+        _run_session("quit", path)
+        assert not _processes_with(f"{path}/blender_"), _processes_with(path)
+        left = [n for _, folders, _ in os.walk(path) for n in folders if n.startswith("relief_")]
+        assert not left, left
+
+
 def test_rendered_shading_follows_the_scene():
     """A red ball is shown, painted green, seen from afar; an error is survived; leaving ends the program."""
-    if shutil.which("Xvfb") is None:
-        raise AssertionError("Xvfb is not installed")
     with folder() as path:
-        read, write = os.pipe()
-        display = subprocess.Popen(
-            ["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp"],
-            pass_fds=[write],
-            stderr=subprocess.DEVNULL,
-        )
-        os.close(write)
-        try:
-            with os.fdopen(read) as number:
-                name = f":{number.readline().strip()}"
-            environment = {**os.environ, "DISPLAY": name, "LIBGL_ALWAYS_SOFTWARE": "1"}
-            command = [bpy.app.binary_path, "--factory-startup", "--no-window-focus", "-p", "0", "0", "800", "600"]
-            command += ["--python-exit-code", "9", "--python", os.path.join(_HERE, "viewport_session.py"), "--", path]
-            done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=110)
-        finally:
-            display.terminate()
-            display.wait()
-        output = done.stdout + done.stderr
-        assert done.returncode == 0 and "Traceback" not in output, output
+        output = _run_session("follow", path)
         with open(f"{path}/seen.json", encoding="utf-8") as file:
             seen = json.load(file)
-        kept = os.environ.get("RELIEF_TEST_KEEP")
-        if kept:
-            shutil.copytree(path, kept, dirs_exist_ok=True)
         pixels = {name: _pixels(f"{path}/{name}.png") for name in seen}
     red, green = ({n: _share(p, c) for n, p in pixels.items()} for c in (0, 1))
-    print("red", red, "green", green, seen, file=sys.stderr)
+    print("red", red, "green", green, seen)
     # Shares of the whole 3D view, its borders included.
     assert red["rendered"] > 0.005 and green["rendered"] < 0.001
     assert green["edited"] > 0.005 and red["edited"] < 0.002

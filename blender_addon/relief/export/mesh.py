@@ -166,23 +166,37 @@ def _join_equal(loops, vertex, attributes):
     @param  vertex      vertex of each loop
     @param  attributes  float32 arrays of shape (all loops, k)
     @return             (one loop for each distinct corner, uint32 index into these for each of `loops`)
-    @cost               one sort of the distinct loops
+    @cost               linear, but for a sort of the corners that differ from the first one at their vertex
     """
-    used, inverse = np.unique(loops, return_inverse=True) if len(loops) < len(vertex) else _all_loops(loops, vertex)
-    bits = [vertex[used].astype(np.uint64)]
+    is_used = np.zeros(len(vertex), dtype=bool)
+    is_used[loops] = True
+    used = np.flatnonzero(is_used)
+    # The first corner at each vertex: of equal indices, the last assignment stays.
+    first_at = np.full(vertex.max() + 1, -1, dtype=np.int64)
+    first_at[vertex[used[::-1]]] = used[::-1]
+    nominal = first_at[vertex[used]]
+    differs = np.zeros(len(used), dtype=bool)
     for values in attributes:
-        bits.extend(np.ascontiguousarray(values[used]).view(np.uint32).astype(np.uint64).T)
-    key = np.zeros(len(used), dtype=np.uint64)
-    for column, factor in zip(bits, _HASH_FACTORS):
+        differs |= (values[used] != values[nominal]).any(axis=1)
+    others, group = _distinct(used[differs], vertex, attributes)
+    is_at = first_at >= 0
+    slot = np.empty(len(vertex), dtype=np.uint32)
+    slot[used] = (np.cumsum(is_at) - 1)[vertex[used]]
+    slot[used[differs]] = is_at.sum() + group
+    return np.concatenate([first_at[is_at], others]), slot[loops]
+
+
+def _distinct(loops, vertex, attributes):
+    """Distinct corners among some: (a loop for each, index into these for each of `loops`)."""
+    columns = [vertex[loops].astype(np.uint64)]
+    for values in attributes:
+        columns.extend(np.ascontiguousarray(values[loops]).view(np.uint32).astype(np.uint64).T)
+    key = np.zeros(len(loops), dtype=np.uint64)
+    for column, factor in zip(columns, _HASH_FACTORS):
         key = (key ^ column) * factor
         key ^= key >> np.uint64(29)
     _, first, group = np.unique(key, return_index=True, return_inverse=True)
-    if not all(np.array_equal(column[first][group], column) for column in bits):
+    if not all(np.array_equal(column[first][group], column) for column in columns):
         # Two different corners with one key: about once in 10⁷ meshes of a million vertices.
-        first = group = np.arange(len(used))
-    return used[first], group[inverse].astype(np.uint32)
-
-
-def _all_loops(loops, vertex):
-    """What np.unique would say where every loop is used: no sort."""
-    return np.arange(len(vertex), dtype=np.int32), loops
+        first = group = np.arange(len(loops))
+    return loops[first], group
