@@ -15,7 +15,7 @@ from .process import Process
 from .report import ReliefError, Report
 
 _POLL_SECONDS = 0.05
-_INTERRUPTED = 130
+_WARNING = "relief: warning: "
 
 
 def render(engine, depsgraph):
@@ -45,19 +45,10 @@ def render(engine, depsgraph):
     arguments += ["--progress", "json", "--compression", "none", "--float", "--aov", result.aov_list(passes)]
     arguments += command_line(scene.relief, crop)
     try:
-        with Process(arguments) as process:
-            code = _follow(engine, process)
-            is_cancelled = engine.test_break()
-            if code != 0 and not (is_cancelled and code == _INTERRUPTED):
-                if is_cancelled:
-                    return
-                raise ReliefError(process.failure(code))
-            for message in process.messages():
-                if message.startswith("relief: warning: "):
-                    warnings.warn("program", message.removeprefix("relief: warning: "))
+        _run(engine, arguments, warnings)
+        report.publish_more(scene.name, warnings.warnings)
         if not os.path.exists(picture_path):  # cancelled before the first sample
             return
-        report.publish_more(scene.name, warnings.warnings)
         picture = exr.read(picture_path)
         statistics = _read_statistics(stats_path)
     finally:
@@ -68,6 +59,21 @@ def render(engine, depsgraph):
     metadata = _metadata(statistics, warnings.warnings, seconds, exported.bytes_written)
     result.fill(engine, picture, layer_name, passes, scene.render.film_transparent, metadata)
     _log(statistics, seconds, exported.bytes_written)
+
+
+def _run(engine, arguments, warnings):
+    """Runs the program to its end, or to the artist's cancelling.
+
+    @param  warnings  Report that gets the program's own
+    @error            ReliefError if it failed by itself
+    """
+    with Process(arguments) as process:
+        code = _follow(engine, process)
+        if code != 0 and not engine.test_break():
+            raise ReliefError(process.failure(code))
+        for message in process.messages():
+            if message.startswith(_WARNING):
+                warnings.warn("program", message.removeprefix(_WARNING))
 
 
 def command_line(settings, crop=None):

@@ -37,7 +37,8 @@ def _height_map(path, size, kind):
     random = np.random.default_rng(7)
     v, u = np.mgrid[0:size, 0:size].astype(np.float32) / size
     if kind == "woven":
-        h = 0.5 + 0.25 * np.sin(2 * np.pi * 16 * u) * np.sign(np.sin(2 * np.pi * 8 * v)) + 0.2 * np.cos(2 * np.pi * 32 * v)
+        over, under = np.sin(2 * np.pi * 16 * u), np.sign(np.sin(2 * np.pi * 8 * v))
+        h = 0.5 + 0.25 * over * under + 0.2 * np.cos(2 * np.pi * 32 * v)
     else:
         # Waves whose amplitude falls with their frequency, in all directions: stone, or mountains.
         spectrum = np.zeros((size, size), dtype=np.complex64)
@@ -170,7 +171,7 @@ def _measure(name, size, samples, folder):
     run = {"seed": 0, "samples": samples, "output": names["cycles"]}
     log, cycles_bytes = _render({**job, "engine": "CYCLES", "runs": [run]}, program)
     cycles_total = _numbers(r"RUN ([0-9.]+)", log)[0]
-    cycles_sampling = _numbers(r"Path Tracing +([0-9.]+)", log) or _numbers(r"without synchronization\): ([0-9.]+)", log)
+    cycles_sampling = _numbers(r"without synchronization\): ([0-9.]+)", log)
     pictures = {n: read_rgb(path) for n, path in names.items()}
     errors = {}
     for n in ("relief", "cycles"):

@@ -79,7 +79,7 @@ def scene_json(nodes, index_of=None):
 
     @param  nodes     in Blender's world, their children nodes instead of indices
     @param  index_of  a dictionary that gets the index of each node by its id()
-    @return        "scene", "scenes", "nodes": the root, which turns Blender's axes into glTF's, is node 0
+    @return           "scene", "scenes", "nodes": the root, which turns Blender's axes into glTF's, is node 0
     """
     flat = [{"name": "Blender", "matrix": matrix_property(GLTF_FROM_BLENDER)}]
 
@@ -123,7 +123,12 @@ class SceneExporter:
         """Sets the camera and the settings of the picture; a later call replaces them."""
         translation, rotation, _, _ = decompose(np.array([view.matrix], dtype=np.float64).reshape(1, 4, 4))
         self.writer.use_extension("RELIEF_camera")
-        node = {"name": view.camera.get("name", "view"), "camera": self.writer.add_unique("cameras", view.camera)}
+        if self.nodes:
+            index = self.nodes[0]["camera"]
+            self.writer.json["cameras"][index] = view.camera
+        else:
+            index = self.writer.add_unique("cameras", view.camera)
+        node = {"name": view.camera.get("name", "view"), "camera": index}
         node.update(translation=translation[0].tolist(), rotation=rotation[0].tolist())
         self.nodes[:1] = [node]
         self.writer.extend(self.writer.json, "RELIEF_render", render_settings(self._scene, view.size))
