@@ -6,8 +6,11 @@ not, with 1 if it does.
 
 import importlib
 import os
+import shutil
 import sys
 import traceback
+
+import bpy
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
@@ -24,5 +27,6 @@ except BaseException:  # Blender itself would end with 0
     code = 1
 sys.stdout.flush()
 sys.stderr.flush()
-# Without Blender's own end: what it frees then is no part of the test.
+# Without Blender's own end: what it frees then is no part of the test, and its exit code would not be ours.
+shutil.rmtree(bpy.app.tempdir, ignore_errors=True)
 os._exit(code)
