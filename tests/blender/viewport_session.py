@@ -1,6 +1,6 @@
 """Runs in a Blender with a window: shows the viewport rendered, edits, moves, leaves the mode; writes what it saw.
 
-Not a test by itself: viewport_test.py starts it, with "follow" or "quit" and a folder. Steps run in Blender's timers, since the window is only drawn between
+Not a test by itself: viewport_test.py starts it, with "follow", "quit" or "panels" and a folder. Steps run in Blender's timers, since the window is only drawn between
 them. Pictures are screenshots of the whole window.
 """
 
@@ -15,7 +15,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from scenes import add_light, add_plane, add_sphere, degrees, diffuse, set_world  # noqa: E402
 
 _SESSION, _OUTPUT = sys.argv[-2:]
-_SECONDS_A_STEP = 2.5
+_SECONDS_A_STEP = 0.7 if _SESSION == "panels" else 2.5
 _seen = {}
 
 
@@ -94,6 +94,36 @@ def _leave():
     area.spaces.active.shading.type = "SOLID"
 
 
+def _show_panels(active, tab):
+    """Shows one tab of the properties editor for an active object; mistakes in a panel end up on the console."""
+
+    def show():
+        made = bpy.data.objects[active]
+        bpy.context.view_layer.objects.active = made
+        for area in bpy.context.window_manager.windows[0].screen.areas:
+            if area.type == "PROPERTIES":
+                area.spaces.active.context = tab
+                area.tag_redraw()
+        _seen[f"{tab} of {active}"] = {}
+
+    return show
+
+
+def _panels():
+    _start()
+    _leave()
+    material = bpy.data.materials["red"]
+    tree = material.node_tree
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    tree.links.new(tree.nodes.new("ShaderNodeDisplacement").outputs[0], output.inputs["Displacement"])
+    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    bpy.context.scene.collection.objects.link(camera)
+    # Panels are closed at first where there are many; a high editor shows the beginning of all of them.
+    for area in bpy.context.window_manager.windows[0].screen.areas:
+        if area.type == "OUTLINER":
+            area.type = "PROPERTIES"
+
+
 def _finish():
     with open(os.path.join(_OUTPUT, "seen.json"), "w", encoding="utf-8") as file:
         json.dump(_seen, file)
@@ -102,6 +132,22 @@ def _finish():
 
 def _steps():
     """What is done, one a timer's turn."""
+    if _SESSION == "panels":
+        yield _panels
+        for active, tab in (
+            ("ball", "RENDER"),
+            ("ball", "OUTPUT"),
+            ("ball", "VIEW_LAYER"),
+            ("ball", "SCENE"),
+            ("ball", "WORLD"),
+            ("ball", "OBJECT"),
+            ("ball", "DATA"),
+            ("ball", "MATERIAL"),
+            ("light", "DATA"),
+            ("camera", "DATA"),
+        ):
+            yield _show_panels(active, tab)
+        yield _finish
     yield _start
     if _SESSION == "quit":
         yield _finish

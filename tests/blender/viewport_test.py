@@ -93,3 +93,12 @@ def test_rendered_shading_follows_the_scene():
     # Between two runs there may be none: one of the pictures shows one.
     assert seen["rendered"]["folders"] and any(state["programs"] for state in seen.values())
     assert not seen["left"]["programs"] and not seen["left"]["folders"], seen["left"]
+
+
+def test_panels_draw():
+    """Every tab of the properties editor, for a mesh, a light and a camera: no panel fails."""
+    with folder() as path:
+        output = _run_session("panels", path)
+        with open(f"{path}/seen.json", encoding="utf-8") as file:
+            assert len(json.load(file)) == 10
+    assert "rna_uiItemR" not in output and "Error" not in output, output
