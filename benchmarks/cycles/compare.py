@@ -59,6 +59,8 @@ def render_relief(job, runs, options=()):
         command = [job.relief, "render", job.scene, "-o", run["output"], "--stats", stats_path]
         command += ["--spp", str(run["samples"]), "--seed", str(run["seed"]), "--threads", str(job.threads)]
         command += ["--resolution", f"{width}x{height}", "--filter", "box", "--progress", "none", *options]
+        # Linux counts the memory of the process that starts another into the latter's peak; a shell has little.
+        command = ["/bin/sh", "-c", '"$@"; exit $?', "sh", *command]
         done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         if done.returncode != 0:
             sys.exit(f"compare: relief ended with {done.returncode}:\n{done.stderr}")
