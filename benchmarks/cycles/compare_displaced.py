@@ -4,9 +4,9 @@
 Cycles dices to triangles of one pixel (adaptive subdivision, true displacement); relief traces the map itself, at the
 level of detail that it chooses and, as `relief_lod0`, at that of the map. The reference of all is relief's picture of
 every texel (`--lod 0`), other seeds, of the middle of the picture; errors are measured there, what the reference's
-noise adds is taken off. Times are of whole pictures, including preparation (reading, dicing, building); processor seconds, of the
-whole process and both threads, bear other work on the machine better. The renderers take turns, all timed pictures
-come before all references.
+noise adds is taken off. Times are of whole pictures, including preparation (reading, dicing, building); processor
+seconds, of the whole process and both threads, bear other work on the machine better. The renderers take turns, all
+timed pictures come before all references.
 
 Bias is what would be left of the error at infinitely many samples: of two pictures a, b and two halves r, s of the
 reference, all independent, mean (a − r)(b − s) is the squared bias, without the noise of any of them.
@@ -40,7 +40,10 @@ _MIB = 2**20
 _REFERENCE_RUNS = 4
 
 # What relief is told besides; of layers, Cycles writes the picture alone.
-_RELIEF_OPTIONS = {"relief": ["--aov", "beauty", "--float"], "relief_lod0": ["--aov", "beauty", "--float", "--lod", "0"]}
+_RELIEF_OPTIONS = {
+    "relief": ["--aov", "beauty", "--float"],
+    "relief_lod0": ["--aov", "beauty", "--float", "--lod", "0"],
+}
 
 
 def _window(resolution):
@@ -124,7 +127,8 @@ def compare_scene(job, pictures, reference_samples):
                 }
             )
         a, b = rendered[-2][1], rendered[-1][1]
-        bias = (float(((a - halves[0]) * (b - halves[1])).mean()) + float(((a - halves[1]) * (b - halves[0])).mean())) / 2
+        pairings = (a - halves[0]) * (b - halves[1]), (a - halves[1]) * (b - halves[0])
+        bias = float(np.mean(pairings))
         result["renderers"][renderer] = {
             "pictures": points,
             "bias_rmse": math.sqrt(max(bias, 0)),
