@@ -109,13 +109,26 @@ RELIEF_KERNEL double curve_t(const RayCurve& curve, const CurveSegment& g, doubl
 /// @param t  within [t0, t1]
 RELIEF_KERNEL double curve_tau(const RayCurve& curve, const CurveSegment& g, double t)
 {
-  double low = 0, high = 1;
-  // Bisection: it is asked for seldom, and needs no care.
-  for (int k = 0; k < 60 && low < high; ++k) {
-    const double middle = 0.5 * (low + high);
-    (curve_t(curve, g, middle) < t ? low : high) = middle;
+  // Illinois: t is nearly linear in τ, so that a few secant steps do.
+  double low = 0, high = 1, below = g.t0 - t, above = g.t1 - t, tau = 0;
+  int stayed = 0;
+  for (int k = 0; k < 60 && below < 0.0 && above > 0.0; ++k) {
+    tau = low + (high - low) * (below / (below - above));
+    const double off = curve_t(curve, g, tau) - t;
+    if (__builtin_fabs(off) <= 0x1p-50 * __builtin_fabs(t)) return tau;
+    if (off < 0.0) {
+      low = tau;
+      below = off;
+      if (stayed == 1) above *= 0.5;
+      stayed = 1;
+    } else {
+      high = tau;
+      above = off;
+      if (stayed == 2) below *= 0.5;
+      stayed = 2;
+    }
   }
-  return 0.5 * (low + high);
+  return below >= 0.0 ? low : (above <= 0.0 ? high : tau);
 }
 
 /// Part of a segment, by its parameter; empty when tau0 > tau1.

@@ -34,9 +34,9 @@ float lod_of(const DisplacementSettings& settings, const DisplacementOptions& op
 
 bool is_whole(float x) { return x == std::floor(x); }
 
-/// Averaged until fewer texels than this are left along a triangle's side, a map is flat between vertices: levels beyond
-/// would only widen the prisms.
-constexpr double kLeastTexelsASide = 4;
+/// With fewer texels than this along a triangle's side a map has little left to show; levels beyond would only widen the
+/// prisms.
+constexpr double kLeastTexelsASide = 16;
 
 /// What `auto` means, and methods that this version lacks.
 constexpr TraversalMethod kDefaultTraversal = TraversalMethod::kChord;
