@@ -5,9 +5,6 @@
 // The rays of one sample a pixel are recorded from the renderer and then traced again out of a plain array, one thread,
 // one rtcIntersect1 or rtcOccluded1 a ray: the raw rate. Beside it stand the renderer's own stages on the same scene, one
 // thread too. Rounds alternate between both, so that whatever else the machine does hits both alike.
-#include <pmmintrin.h>
-#include <xmmintrin.h>
-
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -19,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "exporters/atomic_file.h"
+#include "integrator/flush_denormals.h"
 #include "integrator/trace.h"
 #include "scene/load.h"
 
@@ -222,8 +220,7 @@ int main(int argc, char** argv)
   app.add_option("--json", json_path, "Write the numbers here");
   CLI11_PARSE(app, argc, argv);
   try {
-    _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);
-    _MM_SET_DENORMALS_ZERO_MODE(_MM_DENORMALS_ZERO_ON);
+    const FlushDenormals flush;
     const Scene scene = scene_load(file);
     RenderOptions options;
     options.settings = scene.render;

@@ -7,13 +7,11 @@
 #include <string>
 #include <utility>
 
-#include <pmmintrin.h>
-#include <xmmintrin.h>
-
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "integrator/flush_denormals.h"
 #include "integrator/scene_context.h"
 #include "integrator/stages.h"
 #include "integrator/wavefront.h"
@@ -25,22 +23,6 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-/// Denormals cost hundreds of cycles and Embree asks for them to be off; restored, because TBB lends us its threads.
-class FlushDenormals {
- public:
-  FlushDenormals() : saved_(_mm_getcsr())
-  {
-    _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);
-    _MM_SET_DENORMALS_ZERO_MODE(_MM_DENORMALS_ZERO_ON);
-  }
-  ~FlushDenormals() { _mm_setcsr(saved_); }
-  FlushDenormals(const FlushDenormals&) = delete;
-  FlushDenormals& operator=(const FlushDenormals&) = delete;
-
- private:
-  unsigned saved_;
-};
 
 /// Samples of the next pass. Passes are as large as a batch holds, but at the start, where the first picture and the
 /// first measure of speed are wanted soon, and towards a time limit, which is kept by asking for less.

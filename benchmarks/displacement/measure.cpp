@@ -4,9 +4,7 @@
 #include <cmath>
 #include <ctime>
 
-#include <pmmintrin.h>
-#include <xmmintrin.h>
-
+#include "integrator/flush_denormals.h"
 #include "kernel/sample/warp.h"
 #include "kernel/shape/surface_hit.h"
 
@@ -21,22 +19,6 @@ double processor_seconds()
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
-
-/// Embree asks for denormals to be off, as they are in a render.
-class FlushDenormals {
- public:
-  FlushDenormals() : saved_(_mm_getcsr())
-  {
-    _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);
-    _MM_SET_DENORMALS_ZERO_MODE(_MM_DENORMALS_ZERO_ON);
-  }
-  ~FlushDenormals() { _mm_setcsr(saved_); }
-  FlushDenormals(const FlushDenormals&) = delete;
-  FlushDenormals& operator=(const FlushDenormals&) = delete;
-
- private:
-  unsigned saved_;
-};
 
 /// Two numbers in [0, 1) of the R2 sequence.
 /// @source Roberts 2018, "The Unreasonable Effectiveness of Quasirandom Sequences"

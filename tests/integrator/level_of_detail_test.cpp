@@ -1,0 +1,61 @@
+// Levels of detail in the renderer: rays that leave a surface see it as the ray that found it did.
+#include <random>
+
+#include "tests/support/render_scene.h"
+#include "tests/support/scene_builder.h"
+
+namespace relief::test {
+namespace {
+
+/// A rough height field, many texels a pixel, seen and lit from above.
+Scene rough_plane()
+{
+  constexpr int kSize = 512;
+  Scene scene = empty_scene();
+  Mesh plane = quad_mesh({-2, -2, 0}, {4, 0, 0}, {0, 4, 0});
+  plane.uv[0] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  Material material = diffuse_material({1, 1, 1});
+  material.displacement_index = 0;
+  add_object(scene, plane, material);
+  std::mt19937 random(3);
+  auto texels = std::make_shared<std::vector<std::uint16_t>>();
+  for (int i = 0; i < kSize * kSize; ++i) texels->push_back(static_cast<std::uint16_t>(random()));
+  HeightMap map;
+  map.label = "noise";
+  map.width = map.height = kSize;
+  map.texels = std::shared_ptr<const void>(texels, texels->data());
+  scene.height_maps.push_back(map);
+  DisplacementSettings settings;
+  settings.height.texture_index = 0;
+  settings.scale = 0.05f;
+  scene.displacements.push_back(settings);
+  Light sun;
+  sun.kind = LightKind::kSun;
+  sun.axis = {0, 0, -1};
+  sun.emission = {1, 1, 1};
+  scene.lights.push_back(sun);
+  scene.render.max_bounces = scene.render.diffuse_bounces = 0;
+  return scene;
+}
+
+TEST(LevelOfDetail, OfShadowRaysIsThatOfTheSurfaceTheyLeave)
+{
+  // Nothing of a height field is in the shade of a sun straight above it, at any level; only a ray that starts on one
+  // level and meets another is.
+  Scene scene = rough_plane();
+  const RenderOptions options = render_options(scene, 16, 256);
+  const Rendered shaded = render_scene(scene, options);
+  scene.instances[0].flags &= ~std::uint32_t{kCastsShadow};
+  const Rendered unshaded = render_scene(scene, options);
+  ASSERT_GT(unshaded.mean(), 0.05);
+  for (int y = 0; y < 16; ++y) {
+    for (int x = 0; x < 16; ++x) EXPECT_EQ(shaded.radiance(x, y), unshaded.radiance(x, y)) << x << ", " << y;
+  }
+  // The pixels did ask for other levels than the finest.
+  RenderOptions finest = options;
+  finest.displacement.lod = 0.0f;
+  EXPECT_GT(unshaded.mean(), 1.1 * render_scene(scene, finest).mean());
+}
+
+}  // namespace
+}  // namespace relief::test
