@@ -89,11 +89,13 @@ std::optional<DisplacementSettings> read_displacement(const GltfDocument& docume
   d.midlevel = r.number_f("midlevel", 0.5f, 0, 1);
   d.space = static_cast<DisplacementSpace>(r.choice("space", kSpaces, 0));
   d.method = static_cast<DisplacementMethod>(r.choice("method", kDisplacementMethodLabels, 0));
-  if (r.has("lod") && !(r.raw("lod").is_string() && r.string("lod", "") == "auto")) {
+  if (r.has("lod") && r.raw("lod").is_string() && r.string("lod", "") == "auto") {
+    d.lod = -1;
+  } else if (r.has("lod")) {
     if (!r.raw("lod").is_number()) {
       r.fail("lod", "\"auto\" or a number ≥ 0");
     }
-    d.lod = r.number_f("lod", -1, 0, kNoLimit);
+    d.lod = r.number_f("lod", 0, 0, kNoLimit);
   }
   d.smoothing = r.boolean("smoothing", false);
   d.weld_seams = r.choice("seams", kSeams, 0) == 1;

@@ -82,7 +82,7 @@ struct DisplacementSettings {
   float midlevel = 0.5f;
   DisplacementSpace space = DisplacementSpace::kObject;
   DisplacementMethod method = DisplacementMethod::kAuto;
-  float lod = -1;  ///< −1: auto
+  float lod = 0;  ///< −1: auto
   bool smoothing = false;
   bool weld_seams = false;
 };

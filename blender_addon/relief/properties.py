@@ -105,8 +105,8 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
     lod: FloatProperty(
         name="Level of Detail",
         description="Level of all height maps: 0 is the map itself, each further one is averaged to half the size a "
-        "side, between two both are mixed; -1 chooses what a pixel can show (default -1)",
-        default=-1.0,
+        "side, between two both are mixed; -1 chooses what a pixel can show (default 0)",
+        default=0.0,
         min=-1.0,
         max=16.0,
     )

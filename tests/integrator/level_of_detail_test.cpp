@@ -28,6 +28,7 @@ Scene rough_plane()
   DisplacementSettings settings;
   settings.height.texture_index = 0;
   settings.scale = 0.05f;
+  settings.lod = -1;
   scene.displacements.push_back(settings);
   Light sun;
   sun.kind = LightKind::kSun;

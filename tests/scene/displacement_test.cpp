@@ -72,6 +72,7 @@ TEST(Displacement, IsRead)
   EXPECT_EQ(d.space, DisplacementSpace::kWorld);
   EXPECT_EQ(d.method, DisplacementMethod::kTfdm);
   EXPECT_EQ(d.lod, 2);
+  EXPECT_EQ(DisplacementSettings{}.lod, 0);
   EXPECT_TRUE(d.smoothing);
   EXPECT_TRUE(d.weld_seams);
   EXPECT_TRUE(scene.features.displacement);
