@@ -105,6 +105,23 @@ inline oracle::Ray ray_from_inside(std::mt19937_64& random, const ClosedSurface&
   }
 }
 
+/// A ray as Embree takes it.
+inline RTCRay embree_ray(const oracle::Ray& ray)
+{
+  RTCRay result{};
+  const Vec3f O = TracedCase::vector3(ray.O), D = TracedCase::vector3(ray.D);
+  result.org_x = O.x;
+  result.org_y = O.y;
+  result.org_z = O.z;
+  result.dir_x = D.x;
+  result.dir_y = D.y;
+  result.dir_z = D.z;
+  result.tnear = static_cast<float>(ray.t_min);
+  result.tfar = static_cast<float>(ray.t_max);
+  result.mask = ~0u;
+  return result;
+}
+
 /// An Embree scene as the renderer makes it.
 class DisplacedScene {
  public:
@@ -154,22 +171,6 @@ class DisplacedScene {
   }
 
  private:
-  static RTCRay embree_ray(const oracle::Ray& ray)
-  {
-    RTCRay result{};
-    const Vec3f O = TracedCase::vector3(ray.O), D = TracedCase::vector3(ray.D);
-    result.org_x = O.x;
-    result.org_y = O.y;
-    result.org_z = O.z;
-    result.dir_x = D.x;
-    result.dir_y = D.y;
-    result.dir_z = D.z;
-    result.tnear = static_cast<float>(ray.t_min);
-    result.tfar = static_cast<float>(ray.t_max);
-    result.mask = ~0u;
-    return result;
-  }
-
   DisplacedGeometry geometry_;
   RTCDevice device_ = nullptr;
   RTCScene scene_ = nullptr;
@@ -183,12 +184,6 @@ inline std::string ray_text(const oracle::Ray& ray)
   out << "O " << ray.O[0] << " " << ray.O[1] << " " << ray.O[2] << " D " << ray.D[0] << " " << ray.D[1] << " "
       << ray.D[2] << " t in " << ray.t_min << " " << ray.t_max;
   return out.str();
-}
-
-inline const TraversalTable& best_table()
-{
-  const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
-  return has_avx2 ? traversal_table_avx2() : traversal_table_baseline();
 }
 
 }  // namespace relief

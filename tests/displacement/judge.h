@@ -77,6 +77,16 @@ class ErrorHistogram {
   double largest_ = 0;
 };
 
+/// Median, 99 %, 99.9 % and largest.
+inline std::string quantiles_text(const ErrorHistogram& errors)
+{
+  std::ostringstream out;
+  out.precision(2);
+  out << "< " << errors.quantile(.5) << ", < " << errors.quantile(.99) << ", < " << errors.quantile(.999) << ", "
+      << errors.largest();
+  return out.str();
+}
+
 /// Heights as an integer format keeps them; of floats: themselves.
 inline oracle::HeightMap stored_heights(oracle::HeightMap map, HeightFormat format)
 {
@@ -309,18 +319,10 @@ struct Judgement {
     std::ostringstream out;
     out << num_rays << " rays, " << num_certain << " with a certain hit; missed " << num_missed << ", invented "
         << num_invented << ", misplaced " << num_misplaced << ", any-hit differs " << num_any_hit_differs << "; beside "
-        << num_beside << "; error (median, 99.9 %, largest): t " << quantiles(t_error) << ", of its bound "
-        << quantiles(t_over_bound) << ", texels " << quantiles(texel_error) << ", normal " << quantiles(normal_angle);
+        << num_beside << "; error (median, 99 %, 99.9 %, largest): t " << quantiles_text(t_error) << ", of its bound "
+        << quantiles_text(t_over_bound) << ", texels " << quantiles_text(texel_error) << ", normal "
+        << quantiles_text(normal_angle);
     for (const std::string& fault : faults) out << "\n  " << fault;
-    return out.str();
-  }
-
- private:
-  static std::string quantiles(const ErrorHistogram& errors)
-  {
-    std::ostringstream out;
-    out.precision(2);
-    out << "< " << errors.quantile(.5) << ", < " << errors.quantile(.999) << ", " << errors.largest();
     return out.str();
   }
 };
@@ -341,6 +343,11 @@ class Judge {
              const std::string& case_label);
 
   const Judgement& judgement() const { return judgement_; }
+  /// Of the method and the instruction set.
+  std::string name() const
+  {
+    return std::string(kTraversalMethods[static_cast<std::size_t>(method_)].name) + ", " + table_.isa;
+  }
   const TraversalCounters& counters() const { return counters_; }
 
  private:
@@ -496,10 +503,9 @@ inline void Judge::record_fault(std::uint64_t& count,
   if (judgement_.faults.size() >= kMostFaults) return;
   std::ostringstream out;
   out.precision(17);
-  out << what << " (" << kTraversalMethods[static_cast<std::size_t>(method_)].name << ", " << table_.isa
-      << "): " << case_label << ", triangle " << q.index << ", O " << q.ray.O[0] << " " << q.ray.O[1] << " "
-      << q.ray.O[2] << " D " << q.ray.D[0] << " " << q.ray.D[1] << " " << q.ray.D[2] << " t in " << q.ray.t_min << " "
-      << q.ray.t_max << "; ";
+  out << what << " (" << name() << "): " << case_label << ", triangle " << q.index << ", O " << q.ray.O[0] << " "
+      << q.ray.O[1] << " " << q.ray.O[2] << " D " << q.ray.D[0] << " " << q.ray.D[1] << " " << q.ray.D[2] << " t in "
+      << q.ray.t_min << " " << q.ray.t_max << "; ";
   if (hit != nullptr) {
     out << "t " << hit->t << " b " << hit->b1 << " " << hit->b2 << " cell " << hit->i << " " << hit->j << ", "
         << distance_from_ray(q, *hit) << " from the ray, allowed " << q.triangle.hit_error(q.ray, {hit->b1, hit->b2})
@@ -562,6 +568,23 @@ inline void Judge::judge(const TracedCase& traced,
   } else if (found) {
     judge_hit(some_hit);
   }
+}
+
+inline const TraversalTable& best_table()
+{
+  const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+  return has_avx2 ? traversal_table_avx2() : traversal_table_baseline();
+}
+
+/// A judge for each method and each instruction set that this machine has.
+inline std::vector<Judge> judges_of_all_methods()
+{
+  std::vector<Judge> judges;
+  for (const TraversalMethodLabel& label : kTraversalMethods) {
+    judges.emplace_back(label.method, traversal_table_baseline());
+    if (&best_table() != &traversal_table_baseline()) judges.emplace_back(label.method, best_table());
+  }
+  return judges;
 }
 
 }  // namespace relief
