@@ -87,6 +87,11 @@ std::string material_names(const Scene& scene, int displacement_index)
   return names;
 }
 
+std::string text(const SeamExtent& seams)
+{
+  return fmt::format("{} edges, {:g} m, gap up to {:g} m", seams.num_edges, seams.length, seams.largest_gap);
+}
+
 void print_displacement(const Scene& scene, int index, const std::vector<HeightRange>& ranges)
 {
   const DisplacementSettings& d = scene.displacements[static_cast<std::size_t>(index)];
@@ -100,9 +105,8 @@ void print_displacement(const Scene& scene, int index, const std::vector<HeightR
     ++num_meshes;
     uv = uv_bounds_union(uv, displaced_mesh_uv_bounds(mesh, d.height));
     const DisplacementSeams found = displacement_seams(mesh, d, scene.height_maps[map_index].view(), ranges[map_index]);
-    seams.num_edges += found.num_edges;
-    seams.length += found.length;
-    seams.largest_gap = std::max(seams.largest_gap, found.largest_gap);
+    seams.all = seam_extent_sum(seams.all, found.all);
+    seams.split = seam_extent_sum(seams.split, found.split);
   }
   fmt::print("  {}: {}, method {}, scale {:g} m, midlevel {:g}, {} space\n", material_names(scene, index),
              scene.height_maps[map_index].label, kDisplacementMethodLabels[static_cast<std::size_t>(d.method)], d.scale,
@@ -111,8 +115,8 @@ void print_displacement(const Scene& scene, int index, const std::vector<HeightR
   if (uv.low.x <= uv.high.x) {
     fmt::print(", uv {:g} to {:g}, {:g} to {:g}", uv.low.x, uv.high.x, uv.low.y, uv.high.y);
   }
-  fmt::print("\n    uv seams with different heights: {} edges, {:g} m, gap up to {:g} m\n", seams.num_edges,
-             seams.length, seams.largest_gap);
+  fmt::print("\n    uv seams with different heights: {}\n", text(seams.all));
+  if (d.weld_seams) fmt::print("      left open by welding: {}\n", text(seams.split));
 }
 
 void print_displacements(const Scene& scene)
@@ -134,6 +138,7 @@ void print_prepared(const DisplacementSet& displacements, const Statistics& stat
              megabytes(stats.displacement.bytes));
   fmt::print("  prisms: {}; folded (slower to trace) {}, with normals that cancel {}, without a normal {}\n",
              stats.displacement.num_prisms, report.num_folded, report.num_short_normals, report.num_degenerate);
+  if (report.num_walls > 0) fmt::print("  walls along seams: {}, one a side\n", report.num_walls);
   for (const std::string& reason : displacements.reasons()) fmt::print("  {}\n", reason);
 }
 

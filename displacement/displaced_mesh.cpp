@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <initializer_list>
 
 #include <tbb/parallel_for.h>
 
 #include "displacement/level_of_detail.h"
+#include "displacement/seam_walls_make.h"
 #include "kernel/math/rounding.h"
 
 namespace relief {
@@ -70,18 +72,27 @@ bool is_unfolded(const DisplacedTriangle& tri)
   return positive || negative;
 }
 
-/// Bounds of the heights that a triangle meets on one level.
-void widen_by_heights(const DisplacedTriangle& tri, const HeightFieldView& field, double* low, double* high)
+/// Bounds of heights.
+struct HeightBounds {
+  double low = static_cast<double>(kInfinity), high = -low;
+};
+
+/// Bounds of the heights between lattice positions on one level.
+/// @param x, y  of the positions
+void widen_by_heights(std::initializer_list<double> x,
+                      std::initializer_list<double> y,
+                      const HeightFieldView& field,
+                      HeightBounds* bounds)
 {
-  const auto cell = [](double x) { return static_cast<std::int64_t>(std::floor(x)); };
-  const auto [x_low, x_high] = std::minmax({tri.x[0], tri.x[1], tri.x[2]});
-  const auto [y_low, y_high] = std::minmax({tri.y[0], tri.y[1], tri.y[2]});
+  const auto cell = [](double at) { return static_cast<std::int64_t>(std::floor(at)); };
+  const auto [x_low, x_high] = std::minmax(x);
+  const auto [y_low, y_high] = std::minmax(y);
   const StoredRange stored =
       height_field_range(field, cell(x_low - 1e-6), cell(y_low - 1e-6), cell(x_high + 1e-6), cell(y_high + 1e-6));
   double h_low, h_high;
   stored_to_heights(field, stored, &h_low, &h_high);
-  *low = std::min(*low, h_low);
-  *high = std::max(*high, h_high);
+  bounds->low = std::min(bounds->low, h_low);
+  bounds->high = std::max(bounds->high, h_high);
 }
 
 /// Area of a triangle in the map, texels.
@@ -99,6 +110,65 @@ void rebase(double* x, const LatticeAxis& axis)
   for (int k = 0; k < 3; ++k) x[k] -= periods;
 }
 
+/// The walls of a triangle's edges.
+std::span<const SeamWall> walls_of(std::span<const SeamWall> walls, std::uint32_t triangle)
+{
+  const auto before = [](const SeamWall& wall, std::uint32_t edge) { return wall.edge < edge; };
+  const auto first = std::lower_bound(walls.begin(), walls.end(), 3 * triangle, before);
+  return {first, std::lower_bound(first, walls.end(), 3 * triangle + 3, before)};
+}
+
+/// Bounds of the heights that a triangle and the walls along it have on all levels.
+HeightBounds height_bounds(const DisplacedTriangle& tri,
+                           std::span<const SeamWall> walls,
+                           const HeightFieldView& field,
+                           std::span<const HeightFieldView* const> coarser)
+{
+  HeightBounds bounds;
+  const auto widen = [&](const HeightFieldView& level) {
+    const auto x = [&](double at) { return lattice_on_level(at, field.map.width, level.map.width); };
+    const auto y = [&](double at) { return lattice_on_level(at, field.map.height, level.map.height); };
+    widen_by_heights({x(tri.x[0]), x(tri.x[1]), x(tri.x[2])}, {y(tri.y[0]), y(tri.y[1]), y(tri.y[2])}, level, &bounds);
+    for (const SeamWall& wall : walls)
+      widen_by_heights({x(wall.x[0]), x(wall.x[1])}, {y(wall.y[0]), y(wall.y[1])}, level, &bounds);
+  };
+  widen(field);
+  for (const HeightFieldView* level : coarser) widen(*level);
+  return bounds;
+}
+
+/// A triangle without the bounds of its displacement.
+DisplacedTriangle place_triangle(const MeshView& mesh,
+                                 std::uint32_t index,
+                                 const HeightFieldView& field,
+                                 const DisplacementMapping& mapping)
+{
+  DisplacedTriangle tri;
+  const TextureRef& m = mapping.height;
+  const Vec2f* uv = mesh.uv[m.uv_set];
+  const TriangleIndices& v = mesh.triangles[index];
+  const std::uint32_t vertices[3] = {v.v0, v.v1, v.v2};
+  for (int k = 0; k < 3; ++k) tri.P[k] = mesh.P[vertices[k]];
+  const Vec3d facet = cross(to_double(tri.P[1]) - to_double(tri.P[0]), to_double(tri.P[2]) - to_double(tri.P[0]));
+  const double area = length(facet);
+  for (int k = 0; k < 3; ++k) {
+    if (mesh.N != nullptr) {
+      tri.N[k] = as_vector(mesh.N[vertices[k]]);
+    } else {
+      tri.N[k] = area > 0 ? to_float(facet * (1.0 / area)) : Vec3f{0, 0, 0};
+    }
+    const Vec2f t = uv != nullptr ? uv[vertices[k]] : Vec2f{};
+    const double u = static_cast<double>(m.m00) * t.x + static_cast<double>(m.m01) * t.y + m.m02;
+    const double w = static_cast<double>(m.m10) * t.x + static_cast<double>(m.m11) * t.y + m.m12;
+    tri.x[k] = u * field.map.width - 0.5;
+    tri.y[k] = w * field.map.height - 0.5;
+  }
+  rebase(tri.x, field.x);
+  rebase(tri.y, field.y);
+  tri.s_min = tri.s_max = 0;
+  return tri;
+}
+
 }  // namespace
 
 DisplacedMesh::DisplacedMesh(const MeshView& mesh,
@@ -107,36 +177,18 @@ DisplacedMesh::DisplacedMesh(const MeshView& mesh,
                              std::span<const HeightFieldView* const> coarser)
     : triangles_(mesh.num_triangles), unfolded_(mesh.num_triangles), field_(&field), mapping_(mapping)
 {
+  tbb::parallel_for(std::uint32_t{0}, mesh.num_triangles,
+                    [&](std::uint32_t index) { triangles_[index] = place_triangle(mesh, index, field, mapping); });
+  if (mapping.weld_seams) {
+    walls_ = seam_walls_make(triangles_, field);
+    seam_edges_.resize(triangles_.size());
+    for (const SeamWall& wall : walls_) seam_edges_[wall.edge / 3] |= static_cast<std::uint8_t>(1u << (wall.edge % 3));
+  }
   std::atomic<std::uint32_t> num_folded{0}, num_short{0}, num_degenerate{0};
-  const TextureRef& m = mapping.height;
-  const Vec2f* uv = mesh.uv[m.uv_set];
   tbb::parallel_for(std::uint32_t{0}, mesh.num_triangles, [&](std::uint32_t index) {
     DisplacedTriangle& tri = triangles_[index];
-    const TriangleIndices& v = mesh.triangles[index];
-    const std::uint32_t vertices[3] = {v.v0, v.v1, v.v2};
-    for (int k = 0; k < 3; ++k) tri.P[k] = mesh.P[vertices[k]];
-    const Vec3d facet = cross(to_double(tri.P[1]) - to_double(tri.P[0]), to_double(tri.P[2]) - to_double(tri.P[0]));
-    const double area = length(facet);
-    for (int k = 0; k < 3; ++k) {
-      if (mesh.N != nullptr) {
-        tri.N[k] = as_vector(mesh.N[vertices[k]]);
-      } else {
-        tri.N[k] = area > 0 ? to_float(facet * (1.0 / area)) : Vec3f{0, 0, 0};
-      }
-      const Vec2f t = uv != nullptr ? uv[vertices[k]] : Vec2f{};
-      const double u = static_cast<double>(m.m00) * t.x + static_cast<double>(m.m01) * t.y + m.m02;
-      const double w = static_cast<double>(m.m10) * t.x + static_cast<double>(m.m11) * t.y + m.m12;
-      tri.x[k] = u * field.map.width - 0.5;
-      tri.y[k] = w * field.map.height - 0.5;
-    }
-    rebase(tri.x, field.x);
-    rebase(tri.y, field.y);
-
-    double h_low = static_cast<double>(kInfinity), h_high = -h_low;
-    widen_by_heights(tri, field, &h_low, &h_high);
-    for (const HeightFieldView* level : coarser)
-      widen_by_heights(triangle_on_level(tri, field, *level), *level, &h_low, &h_high);
-    double d_low = mapping.scale * (h_low - mapping.midlevel), d_high = mapping.scale * (h_high - mapping.midlevel);
+    const HeightBounds h = height_bounds(tri, walls_of(walls_, index), field, coarser);
+    double d_low = mapping.scale * (h.low - mapping.midlevel), d_high = mapping.scale * (h.high - mapping.midlevel);
     if (d_low > d_high) std::swap(d_low, d_high);
 
     const double longest =
@@ -156,13 +208,20 @@ DisplacedMesh::DisplacedMesh(const MeshView& mesh,
     unfolded_[index] = is_unfolded(tri) ? 1 : 0;
     if (unfolded_[index] == 0) num_folded.fetch_add(1, std::memory_order_relaxed);
   });
-  report_ = {num_folded.load(), num_short.load(), num_degenerate.load()};
+  report_ = {num_folded.load(), num_short.load(), num_degenerate.load(), static_cast<std::uint32_t>(walls_.size())};
 }
 
 DisplacedMeshView DisplacedMesh::view() const
 {
-  return {triangles_.data(), unfolded_.data(), static_cast<std::uint32_t>(triangles_.size()), field_,
-          mapping_.scale,    mapping_.midlevel};
+  return {triangles_.data(),
+          unfolded_.data(),
+          static_cast<std::uint32_t>(triangles_.size()),
+          field_,
+          mapping_.scale,
+          mapping_.midlevel,
+          mapping_.weld_seams ? seam_edges_.data() : nullptr,
+          walls_.data(),
+          static_cast<std::uint32_t>(walls_.size())};
 }
 
 float DisplacedMesh::widest_texel() const

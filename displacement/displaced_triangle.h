@@ -19,13 +19,22 @@ struct DisplacedTriangle {
   float s_min, s_max;  ///< bounds of d/|N| over the triangle, rounded outward
 };
 
+/// Where the triangle on the other side of a texture seam reads the height map, see seam_walls.h.
+struct SeamWall {
+  std::uint32_t edge;  ///< 3 · triangle + k: from the triangle's vertex k to the next
+  double x[2], y[2];   ///< lattice coordinates at the edge's start and end
+};
+
 /// A displaced mesh without ownership.
 struct DisplacedMeshView {
   const DisplacedTriangle* triangles = nullptr;
   const std::uint8_t* unfolded = nullptr;  ///< 1: (b, s) ↦ P + sN is proven to be one to one in the triangle's prism
   std::uint32_t num_triangles = 0;
   const HeightFieldView* field = nullptr;
-  double scale = 1, midlevel = 0.5;  ///< metres of object space; 0…1
+  double scale = 1, midlevel = 0.5;          ///< metres of object space; 0…1
+  const std::uint8_t* seam_edges = nullptr;  ///< by triangle, bit k: its edge k has walls; null: seams stay open
+  const SeamWall* walls = nullptr;           ///< in the order of their edges
+  std::uint32_t num_walls = 0;
 };
 
 /// Displacement along the unit normal at a lattice position, metres.

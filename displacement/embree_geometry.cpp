@@ -1,5 +1,7 @@
 #include "displacement/embree_geometry.h"
 
+#include "displacement/seam_walls.h"
+
 namespace relief {
 
 namespace {
@@ -33,10 +35,28 @@ struct OnLevel {
 
 }  // namespace
 
-SurfacePoint displaced_point(const DisplacedGeometry& geometry, std::uint32_t triangle, int level, double b1, double b2)
+ReportedPoint displaced_point(const DisplacedGeometry& geometry, std::uint32_t triangle, ReportedHit hit)
 {
-  const OnLevel on(geometry, triangle, level);
-  return surface_point(on.mesh, on.tri, b1, b2);
+  ReportedPoint out;
+  if (hit.Ng_x >= 0.0f) {
+    out.b1 = hit.u;
+    out.b2 = hit.v;
+    out.level = static_cast<int>(hit.Ng_x);
+    const OnLevel on(geometry, triangle, out.level);
+    out.point = surface_point(on.mesh, on.tri, hit.u, hit.v);
+    return out;
+  }
+  const int code = static_cast<int>(-hit.Ng_x) - 1, edge = code % 3;
+  float b[3] = {0.0f, 0.0f, 0.0f};
+  b[edge] = 1.0f - hit.u;
+  b[edge == 2 ? 0 : edge + 1] = hit.u;
+  out.b1 = b[1];
+  out.b2 = b[2];
+  out.level = code / 3;
+  out.on_wall = true;
+  out.point = seam_wall_point(geometry.mesh, triangle, edge, hit.u, hit.v,
+                              {geometry.mesh.field, geometry.levels[out.level].field});
+  return out;
 }
 
 Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry,

@@ -52,22 +52,40 @@ struct TraversalTable {
 const TraversalTable& traversal_table_baseline();
 const TraversalTable& traversal_table_avx2();
 
-/// A point of the displaced surface, as a level has it.
-SurfacePoint displaced_point(const DisplacedGeometry& geometry,
-                             std::uint32_t triangle,
-                             int level,
-                             double b1,
-                             double b2);
+/// What Embree's record keeps of a hit. On the surface u and v are the weights of vertices 1 and 2 and Ng_x the level; on
+/// the wall of a seam u is the place along its edge, v the displacement and Ng_x = −(1 + 3 · level + edge).
+struct ReportedHit {
+  float u = 0, v = 0, Ng_x = 0;
+};
 
-/// Its shading normal from the smoothed map.
+RELIEF_KERNEL ReportedHit displaced_hit_report(const DisplacedHit& hit)
+{
+  if (hit.edge < 0) return {static_cast<float>(hit.b1), static_cast<float>(hit.b2), static_cast<float>(hit.level)};
+  // The weight of the vertex that the edge leads to.
+  const double fraction = hit.edge == 0 ? hit.b1 : (hit.edge == 1 ? hit.b2 : 1.0 - hit.b1 - hit.b2);
+  return {static_cast<float>(fraction), static_cast<float>(hit.d), static_cast<float>(-(1 + 3 * hit.level + hit.edge))};
+}
+
+/// The point of a hit, and where it is in its triangle.
+struct ReportedPoint {
+  float b1 = 0, b2 = 0;  ///< weights of vertices 1 and 2
+  int level = 0;
+  bool on_wall = false;
+  SurfacePoint point;
+};
+
+/// @param hit  as Embree has it
+ReportedPoint displaced_point(const DisplacedGeometry& geometry, std::uint32_t triangle, ReportedHit hit);
+
+/// The shading normal of a point of the surface from the smoothed map.
 Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry,
                               std::uint32_t triangle,
                               int level,
                               double b1,
                               double b2);
 
-/// A new geometry, one primitive a base triangle, not committed. Hits report the barycentric weights of vertices 1 and 2
-/// as u and v, and their level as the x of Ng; position and normal are left to displaced_point, once the nearest is known.
+/// A new geometry, one primitive a base triangle, not committed. Hits are reported as in ReportedHit; position and normal
+/// are left to displaced_point, once the nearest is known.
 RTCGeometry displaced_geometry_make(RTCDevice device, const DisplacedGeometry& geometry, const TraversalTable& table);
 
 }  // namespace relief

@@ -42,6 +42,7 @@ PrismExplanation prism_explain(const PrismVisit& visit)
     out.j = hit.j - static_cast<std::int64_t>(whole_periods(mesh.field->y, static_cast<double>(hit.j)));
     out.h = interpolate_height(*mesh.field, x, y);
     out.d = displacement_at(mesh, x, y);
+    if (hit.edge >= 0) out.d = hit.d;
   }
   return out;
 }

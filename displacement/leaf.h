@@ -16,6 +16,8 @@ struct DisplacedHit {
   std::int64_t i = 0, j = 0;  ///< cell; its patch has the hit's normal
   double tau = 0;             ///< on its segment
   int level = 0;              ///< of the height map, see level_of_detail.h
+  int edge = -1;              ///< of the triangle, whose seam's wall is hit (seam_walls.h); −1: the surface
+  double d = 0;               ///< of a wall's point: displacement, metres
 };
 
 /// What one ray counts; the same for all methods, so that they can be compared.
@@ -127,21 +129,13 @@ RELIEF_KERNEL void weights_correct(const DisplacedMeshView& mesh,
   const Vec3d S = (to_double(tri.P[0]) - O) + hit->b1 * base.Pu + hit->b2 * base.Pv + d * n;
   const Vec3d Su = base.Pu + (dx * base.xu + dy * base.yu) * n + (d * inverse_length) * (base.Nu - dot(n, base.Nu) * n);
   const Vec3d Sv = base.Pv + (dx * base.xv + dy * base.yv) * n + (d * inverse_length) * (base.Nv - dot(n, base.Nv) * n);
-  struct Seen {
-    double x, y, t;
-  };
-  const auto seen = [&](const Vec3d& a) {
-    const double axes[3] = {a.x, a.y, a.z};
-    const double z = axes[frame.kz];
-    return Seen{axes[frame.kx] - frame.Sx * z, axes[frame.ky] - frame.Sy * z, z * frame.Sz};
-  };
-  const Seen s = seen(S), u = seen(Su), v = seen(Sv);
+  const RaySeen s = ray_seen(frame, S), u = ray_seen(frame, Su), v = ray_seen(frame, Sv);
   const double inverse = 1.0 / (u.x * v.y - u.y * v.x);
   const double db1 = (s.y * v.x - s.x * v.y) * inverse, db2 = (s.x * u.y - s.y * u.x) * inverse;
   if (!(__builtin_fabs(db1) + __builtin_fabs(db2) <= largest_step)) return;
   hit->b1 += db1;
   hit->b2 += db2;
-  hit->t = s.t + db1 * u.t + db2 * v.t;
+  hit->t = s.z + db1 * u.z + db2 * v.z;
 }
 
 /// A root must lie this close to its cell (lattice units): more than rounding moves roots of all but grazing rays, far

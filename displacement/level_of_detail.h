@@ -66,17 +66,22 @@ RELIEF_KERNEL float lod_width_of_level(float texel, int level)
   return lod_texel(texel, level) * kOver;
 }
 
+/// A lattice coordinate as another level of the map has it.
+/// @param finest_size, size  texels along its axis
+RELIEF_KERNEL double lattice_on_level(double x, int finest_size, int size)
+{
+  return (x + 0.5) * (static_cast<double>(size) / finest_size) - 0.5;
+}
+
 /// A triangle as another level of the map has it.
 RELIEF_KERNEL DisplacedTriangle triangle_on_level(const DisplacedTriangle& tri,
                                                   const HeightFieldView& finest,
                                                   const HeightFieldView& level)
 {
   DisplacedTriangle out = tri;
-  const double scale_x = static_cast<double>(level.map.width) / finest.map.width;
-  const double scale_y = static_cast<double>(level.map.height) / finest.map.height;
   for (int k = 0; k < 3; ++k) {
-    out.x[k] = (tri.x[k] + 0.5) * scale_x - 0.5;
-    out.y[k] = (tri.y[k] + 0.5) * scale_y - 0.5;
+    out.x[k] = lattice_on_level(tri.x[k], finest.map.width, level.map.width);
+    out.y[k] = lattice_on_level(tri.y[k], finest.map.height, level.map.height);
   }
   return out;
 }

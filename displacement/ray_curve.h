@@ -40,6 +40,19 @@ RELIEF_KERNEL RayFrame ray_frame_make(Vec3f O, Vec3f D)
   return f;
 }
 
+/// A vector in the frame: the ray is where x = y = 0, and z is its parameter.
+struct RaySeen {
+  double x, y, z;
+};
+
+/// @param a  a direction, or a point with the ray's origin taken off
+RELIEF_KERNEL RaySeen ray_seen(const RayFrame& frame, const Vec3d& a)
+{
+  const double axes[3] = {a.x, a.y, a.z};
+  const double z = axes[frame.kz];
+  return {axes[frame.kx] - frame.Sx * z, axes[frame.ky] - frame.Sy * z, z * frame.Sz};
+}
+
 /// a·τ² + b·τ + c
 struct Quadratic {
   double a, b, c;

@@ -1,12 +1,12 @@
 #include "displacement/tessellation.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numeric>
 #include <stdexcept>
 
 #include <tbb/parallel_for.h>
+
+#include "displacement/shared_edges.h"
 
 namespace relief {
 
@@ -89,34 +89,15 @@ Placed place(const DisplacedMeshView& mesh, const DisplacedTriangle& tri, const 
   return {P + (d / nu) * N, d};
 }
 
-/// Two heights of one point that differ by less are one height with rounding errors, not a seam.
+/// Two heights of one point that differ by less are one height: they have rounding errors, or the seam between them is to
+/// be closed. The row of micro-triangles along the seam then leans towards its other side, where the exact methods have a
+/// wall.
 double seam_tolerance(const DisplacedMeshView& mesh)
 {
+  if (mesh.seam_edges != nullptr) return HUGE_VAL;
   double low, high;
   stored_to_heights(*mesh.field, mesh.field->range, &low, &high);
   return 1e-6 * std::abs(mesh.scale) * (high - low);
-}
-
-/// Numbers the distinct (P, N) of all corners. @return a number a corner
-std::vector<std::uint32_t> weld_corners(const DisplacedMeshView& mesh)
-{
-  const std::size_t count = 3 * std::size_t{mesh.num_triangles};
-  const auto key = [&](std::uint32_t corner) {
-    const DisplacedTriangle& tri = mesh.triangles[corner / 3];
-    const Vec3f P = tri.P[corner % 3], N = tri.N[corner % 3];
-    // −0 and 0 are one place.
-    return std::array<float, 6>{P.x + 0.0f, P.y + 0.0f, P.z + 0.0f, N.x + 0.0f, N.y + 0.0f, N.z + 0.0f};
-  };
-  std::vector<std::uint32_t> order(count), id(count);
-  std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    const auto ka = key(a), kb = key(b);
-    return ka != kb ? ka < kb : a < b;
-  });
-  for (std::size_t k = 0; k < count; ++k) {
-    id[order[k]] = k > 0 && key(order[k]) == key(order[k - 1]) ? id[order[k - 1]] : order[k];
-  }
-  return id;
 }
 
 /// The corner that computes a corner's point: the first one at the same place with the same height.
@@ -143,26 +124,6 @@ std::vector<std::uint32_t> corner_owners(const DisplacedMeshView& mesh, const st
     } else {
       next[at] = corner;
     }
-  }
-  return owner;
-}
-
-/// The first edge between the same two places, for every edge.
-std::vector<std::uint32_t> edge_owners(const std::vector<std::uint32_t>& id)
-{
-  const std::size_t count = id.size();
-  const auto key = [&](std::uint32_t edge) {
-    const std::uint32_t a = id[edge], b = id[edge % 3 == 2 ? edge - 2 : edge + 1];
-    return std::pair(std::min(a, b), std::max(a, b));
-  };
-  std::vector<std::uint32_t> order(count), owner(count);
-  std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    const auto ka = key(a), kb = key(b);
-    return ka != kb ? ka < kb : a < b;
-  });
-  for (std::size_t k = 0; k < count; ++k) {
-    owner[order[k]] = k > 0 && key(order[k]) == key(order[k - 1]) ? owner[order[k - 1]] : order[k];
   }
   return owner;
 }
@@ -195,9 +156,9 @@ TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh, Tesse
   TessellationLayout layout;
   layout.kind = kind;
   layout.triangles.resize(mesh.num_triangles);
-  const std::vector<std::uint32_t> id = weld_corners(mesh);
+  const std::vector<std::uint32_t> id = weld_corners({mesh.triangles, mesh.num_triangles});
   layout.corner_owner = corner_owners(mesh, id);
-  layout.edge_owner = edge_owners(id);
+  layout.edge_owner = weld_edges(id);
 
   std::vector<std::uint32_t> segments(layout.edge_owner.size(), 1);
   for (std::uint32_t edge = 0; edge < segments.size(); ++edge) {

@@ -1,6 +1,7 @@
 // Compiled once an instruction set: RELIEF_TRAVERSAL_TABLE names the function that returns the table.
 #include "displacement/embree_geometry.h"
 #include "displacement/explain.h"
+#include "displacement/seam_walls.h"
 #include "displacement/traverse_chord.h"
 #include "displacement/traverse_rmip.h"
 #include "displacement/traverse_tfdm.h"
@@ -132,6 +133,42 @@ bool trace_levels(const DisplacedGeometry& geometry,
   }
 }
 
+/// Nearest hit of a ray's curve with the walls along a triangle's seams, each at the level that is seen there.
+bool seam_walls_intersect(const DisplacedGeometry& geometry,
+                          std::uint32_t triangle,
+                          const RayCurve& curve,
+                          const LodCone& cone,
+                          float texel,
+                          double t_min,
+                          double t_max,
+                          DisplacedHit* hit)
+{
+  const DisplacedMeshView& mesh = geometry.mesh;
+  // As in trace_levels.
+  const bool folded = mesh.unfolded[triangle] == 0;
+  const double begin = max(curve.segments[0].t0, t_min);
+  bool found = false;
+  for (int k = 0; k < curve.num_segments; ++k) {
+    const CurveSegment& g = curve.segments[k];
+    for (int end = 0; end < 2; ++end) {
+      const double t = end == 0 ? g.t0 : g.t1;
+      const int level = geometry.lod.num_levels > 1 ? lod_level(geometry.lod, cone, texel, folded ? begin : t) : 0;
+      const SeamLevel seam_level{mesh.field, geometry.levels[level].field};
+      for (int edge = 0; edge < 3; ++edge) {
+        if ((mesh.seam_edges[triangle] >> edge & 1) == 0) continue;
+        DisplacedHit candidate;
+        if (!seam_wall_intersect(mesh, triangle, curve, g, end, edge, seam_level, &candidate)) continue;
+        if (!(candidate.t > t_min && candidate.t < t_max)) continue;
+        *hit = candidate;
+        hit->level = level;
+        t_max = hit->t;
+        found = true;
+      }
+    }
+  }
+  return found;
+}
+
 bool trace(const DisplacedGeometry& geometry,
            std::uint32_t triangle,
            Vec3f O,
@@ -148,9 +185,11 @@ bool trace(const DisplacedGeometry& geometry,
   RayCurve curve;
   if (!ray_curve_make(ray_frame_make(O, D), mesh.triangles[triangle], &curve)) return false;
   ++counters->prisms;
-  if (geometry.lod.num_levels > 1)
-    return trace_levels(geometry, triangle, curve, cone, texel, t_min, t_max, any_hit, hit, counters);
-  return trace_level(geometry, mesh, triangle, 0, curve, t_min, t_max, any_hit, hit, counters);
+  const bool found = geometry.lod.num_levels > 1
+                         ? trace_levels(geometry, triangle, curve, cone, texel, t_min, t_max, any_hit, hit, counters)
+                         : trace_level(geometry, mesh, triangle, 0, curve, t_min, t_max, any_hit, hit, counters);
+  if (mesh.seam_edges == nullptr || mesh.seam_edges[triangle] == 0 || (found && any_hit)) return found;
+  return seam_walls_intersect(geometry, triangle, curve, cone, texel, t_min, found ? hit->t : t_max, hit) || found;
 }
 
 /// Where queries that bring no counters count.
@@ -212,9 +251,10 @@ void intersect(const RTCIntersectFunctionNArguments* arguments)
       continue;
     }
     RTCRayN_tfar(rays, count, k) = static_cast<float>(hit.t);
-    RTCHitN_u(hits, count, k) = static_cast<float>(hit.b1);
-    RTCHitN_v(hits, count, k) = static_cast<float>(hit.b2);
-    RTCHitN_Ng_x(hits, count, k) = static_cast<float>(hit.level);
+    const ReportedHit reported = displaced_hit_report(hit);
+    RTCHitN_u(hits, count, k) = reported.u;
+    RTCHitN_v(hits, count, k) = reported.v;
+    RTCHitN_Ng_x(hits, count, k) = reported.Ng_x;
     RTCHitN_primID(hits, count, k) = triangle;
     RTCHitN_geomID(hits, count, k) = arguments->geomID;
     RTCHitN_instID(hits, count, k, 0) = arguments->context->instID[0];

@@ -134,7 +134,6 @@ std::vector<std::string> displacement_warnings(const Scene& scene, const Displac
       texts.push_back(material + "tessellations have whole levels of detail; level " +
                       std::to_string(static_cast<int>(lod)) + " is used");
     }
-    if (settings.weld_seams) texts.push_back(material + "displacement seams are not welded yet; they stay open");
   }
   return texts;
 }
@@ -199,8 +198,8 @@ DisplacementSet::DisplacementSet(const Scene& scene, const DisplacementOptions& 
         geometry.levels[k] = level(scene, settings.height.texture_index, levels.first + k, geometry.method);
         if (k > 0) coarser.push_back(geometry.levels[k].field);
       }
-      displaced->mesh =
-          DisplacedMesh(mesh.view(), *geometry.levels[0].field, {settings.height, scale, settings.midlevel}, coarser);
+      displaced->mesh = DisplacedMesh(mesh.view(), *geometry.levels[0].field,
+                                      {settings.height, scale, settings.midlevel, settings.weld_seams}, coarser);
       geometry.mesh = displaced->mesh.view();
       geometry.lod = {levels.count, levels.by_cone, levels.fixed, displaced->mesh.widest_texel()};
       has_levels_ |= levels.count > 1;
@@ -281,6 +280,7 @@ DisplacedPoint DisplacementSet::point(std::size_t instance, std::uint32_t primit
   const Displaced& d = displaced(instance);
   DisplacedPoint out{primitive, u, v};
   int level = 0;
+  bool on_wall = false;
   if (d.tessellation != nullptr) {
     const MicroHit hit = d.tessellation->hit(primitive, u, v);
     out.triangle = hit.triangle;
@@ -289,13 +289,17 @@ DisplacedPoint DisplacementSet::point(std::size_t instance, std::uint32_t primit
     out.P = to_float(hit.P);
     out.Ng = to_float(hit.Ng);
   } else {
-    level = static_cast<int>(Ng_x);
-    const SurfacePoint point = displaced_point(d.geometry, primitive, level, u, v);
-    out.P = to_float(point.P);
-    out.Ng = to_float(point.Ng);
+    const ReportedPoint reported = displaced_point(d.geometry, primitive, {u, v, Ng_x});
+    level = reported.level;
+    on_wall = reported.on_wall;
+    out.u = reported.b1;
+    out.v = reported.b2;
+    out.P = to_float(reported.point.P);
+    out.Ng = to_float(reported.point.Ng);
     if (d.geometry.lod.by_cone) out.width = lod_width_of_level(texel_of_instance_[instance], level);
   }
-  out.Ns = d.smooth ? to_float(displaced_smooth_normal(d.geometry, out.triangle, level, out.u, out.v)) : out.Ng;
+  out.Ns =
+      d.smooth && !on_wall ? to_float(displaced_smooth_normal(d.geometry, out.triangle, level, out.u, out.v)) : out.Ng;
   return out;
 }
 
@@ -337,6 +341,7 @@ DisplacedMeshReport DisplacementSet::report() const
     sum.num_folded += report.num_folded;
     sum.num_short_normals += report.num_short_normals;
     sum.num_degenerate += report.num_degenerate;
+    sum.num_walls += report.num_walls;
   }
   return sum;
 }

@@ -118,7 +118,52 @@ class SeamProbe {
   const HeightMapView& map_;
 };
 
+/// One edge's part in the seams; none where its sides ask for the same heights.
+SeamExtent seam_extent(const Mesh& mesh,
+                       std::span<const EdgeSide> edge,
+                       const SeamProbe& probe,
+                       double least_gap,
+                       float scale)
+{
+  SeamExtent extent;
+  const int num_points = probe.num_points(edge);
+  int num_gaps = 0;
+  for (int i = 0; i < num_points; ++i) {
+    const double gap = probe.gap(edge, (i + 0.5) / num_points);
+    if (gap > least_gap) {
+      ++num_gaps;
+      extent.largest_gap = std::max(extent.largest_gap, gap * std::abs(static_cast<double>(scale)));
+    }
+  }
+  if (num_gaps > 0) {
+    extent.num_edges = 1;
+    const auto edge_length = static_cast<double>(length(mesh.P[edge[0].position1] - mesh.P[edge[0].position0]));
+    extent.length = edge_length * num_gaps / num_points;
+  }
+  return extent;
+}
+
+/// Whether an edge's sides move along different normals. Without normals triangles move along their own.
+bool has_split_normals(const Mesh& mesh, std::span<const EdgeSide> edge)
+{
+  if (mesh.N.empty()) {
+    return true;
+  }
+  const auto differ = [&](std::uint32_t a, std::uint32_t b) {
+    const Normal3f m = mesh.N[a], n = mesh.N[b];
+    return m.x != n.x || m.y != n.y || m.z != n.z;
+  };
+  return std::any_of(edge.begin(), edge.end(), [&](const EdgeSide& side) {
+    return differ(side.vertex0, edge[0].vertex0) || differ(side.vertex1, edge[0].vertex1);
+  });
+}
+
 }  // namespace
+
+SeamExtent seam_extent_sum(const SeamExtent& a, const SeamExtent& b)
+{
+  return {a.num_edges + b.num_edges, a.length + b.length, std::max(a.largest_gap, b.largest_gap)};
+}
 
 DisplacementSeams displacement_seams(const Mesh& mesh,
                                      const DisplacementSettings& settings,
@@ -140,19 +185,10 @@ DisplacementSeams displacement_seams(const Mesh& mesh,
     if (edge.size() < 2) {
       continue;
     }
-    const int num_points = probe.num_points(edge);
-    int num_gaps = 0;
-    for (int i = 0; i < num_points; ++i) {
-      const double gap = probe.gap(edge, (i + 0.5) / num_points);
-      if (gap > least_gap) {
-        ++num_gaps;
-        seams.largest_gap = std::max(seams.largest_gap, gap * std::abs(static_cast<double>(settings.scale)));
-      }
-    }
-    if (num_gaps > 0) {
-      ++seams.num_edges;
-      const auto edge_length = static_cast<double>(length(mesh.P[edge[0].position1] - mesh.P[edge[0].position0]));
-      seams.length += edge_length * num_gaps / num_points;
+    const SeamExtent extent = seam_extent(mesh, edge, probe, least_gap, settings.scale);
+    seams.all = seam_extent_sum(seams.all, extent);
+    if (has_split_normals(mesh, edge)) {
+      seams.split = seam_extent_sum(seams.split, extent);
     }
   }
   return seams;

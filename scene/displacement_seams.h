@@ -8,11 +8,18 @@
 
 namespace relief {
 
-struct DisplacementSeams {
+struct SeamExtent {
   std::size_t num_edges = 0;  ///< whose two sides ask for different heights somewhere
   double length = 0;          ///< of the parts of these edges where they do, object space, before displacement
   double largest_gap = 0;     ///< between displaced points, metres in the space of the displacement
 };
+
+struct DisplacementSeams {
+  SeamExtent all;
+  SeamExtent split;  ///< those whose normals differ too, so that welding leaves them open
+};
+
+SeamExtent seam_extent_sum(const SeamExtent& a, const SeamExtent& b);
 
 /// Compares the heights along every edge that triangles share by position, exactly, whether by the same vertices or not.
 /// Heights closer than a thousandth of the map's range count as equal: on a steep map, rounded texture coordinates are

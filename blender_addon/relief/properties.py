@@ -110,6 +110,11 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
         min=-1.0,
         max=16.0,
     )
+    weld_seams: BoolProperty(
+        name="Weld Seams",
+        description="Close the gaps along texture seams whose sides are displaced differently, by walls (default on)",
+        default=True,
+    )
     memory_limit: FloatProperty(
         name="Memory",
         description="GiB that the automatic method may take for tessellating where that is faster; 0 is none, so that "

@@ -96,6 +96,7 @@ class RELIEF_PT_displacement(_RenderPanel, bpy.types.Panel):
         settings, rows = context.scene.relief, self.rows()
         rows.prop(settings, "displacement_method")
         rows.prop(settings, "lod")
+        rows.prop(settings, "weld_seams")
         row = rows.row()
         row.active = settings.displacement_method == "auto"
         row.prop(settings, "memory_limit")

@@ -209,7 +209,7 @@ def test_the_panels_switch():
 
 
 def test_settings_reach_the_program():
-    """Method and level of detail of the scene are in every displaced material, smoothing in those with bump too."""
+    """Method, level of detail and seams of the scene are in every displaced material, smoothing where there is bump."""
     import json
 
     from relief.exporter import export_frames
@@ -219,9 +219,11 @@ def test_settings_reach_the_program():
     material, _, _, _ = _material(method="BOTH")
     add_plane(4, material)
     scene.relief.displacement_method, scene.relief.lod = "rmip", 2
+    assert scene.relief.weld_seams
+    scene.relief.weld_seams = False
     with folder() as path:
         export_frames(scene, f"{path}/scene.gltf", [1])
         with open(f"{path}/scene.gltf", encoding="utf-8") as file:
             document = json.load(file)
     value = document["materials"][0]["extensions"]["RELIEF_displacement"]
-    assert (value["method"], value["lod"], value["smoothing"]) == ("rmip", 2, True), value
+    assert (value["method"], value["lod"], value["smoothing"], value["seams"]) == ("rmip", 2, True, "keep"), value

@@ -22,6 +22,7 @@ struct ClosedSurface {
   std::vector<oracle::DisplacedTriangle> triangles;
   oracle::HeightMap map;
   std::function<oracle::Vector3(std::mt19937_64&)> inside;  ///< a point within the surface
+  bool weld_seams = false;                                  ///< it is closed by the walls of its seams only
 };
 
 /// A globe with its poles on the z axis. The map repeats around it and is constant near the poles, where u is not
@@ -66,6 +67,39 @@ inline ClosedSurface closed_torus()
             const double phi = random_between(random, 0, 2 * hard_case_parts::kPi);
             return combination(1, random_vector(random, 0, .1), 1, {std::cos(phi), std::sin(phi), 0});
           }};
+}
+
+/// A box with rounded normals whose sides lie in different places of the map, turned and stretched: seams along all of
+/// its edges, with gaps as wide as the displacement, and three of them at each corner.
+inline ClosedSurface seamed_box()
+{
+  constexpr int kQuads = 3;
+  ClosedSurface box{"seamed box", {}, hard_case_parts::noise_map(19, 23, .6), [](std::mt19937_64& random) {
+                      return random_vector(random, 0, .3);
+                    }};
+  box.weld_seams = true;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (const double side : {-1., 1.}) {
+      const auto P_of = [=](int i, int j) {
+        oracle::Vector3 P{};
+        P[axis] = side;
+        P[(axis + 1) % 3] = 2. * i / kQuads - 1;
+        P[(axis + 2) % 3] = 2. * j / kQuads - 1;
+        return P;
+      };
+      const auto N_of = [=](int i, int j) { return unit_vector(P_of(i, j)); };
+      const double stretch = .6 + .13 * static_cast<double>(axis);
+      for (oracle::DisplacedTriangle& triangle :
+           hard_case_parts::grid_triangles(kQuads, kQuads, stretch, stretch, P_of, N_of)) {
+        for (oracle::Vector2& uv : triangle.uv) {
+          const double turned = side > 0 ? 1 - uv[1] : uv[1];
+          uv = {float_rounded(turned + .31 * static_cast<double>(axis)), float_rounded(uv[0] + .17 * side)};
+        }
+        box.triangles.push_back(triangle);
+      }
+    }
+  }
+  return box;
 }
 
 /// Rays from inside in all directions; at corners, edges and next to them; along axes and along displacement lines.

@@ -104,7 +104,8 @@ class TracedCase {
   TracedCase(const std::vector<oracle::DisplacedTriangle>& triangles,
              const oracle::HeightMap& map,
              HeightFormat format = HeightFormat::kFloat,
-             int num_levels = 1)
+             int num_levels = 1,
+             bool weld_seams = false)
   {
     for (const oracle::DisplacedTriangle& triangle : triangles) {
       const auto first = static_cast<std::uint32_t>(P_.size());
@@ -141,6 +142,7 @@ class TracedCase {
     DisplacementMapping mapping;
     mapping.scale = map.scale;
     mapping.midlevel = map.midlevel;
+    mapping.weld_seams = weld_seams;
     std::vector<const HeightFieldView*> coarser;
     for (int k = 0; k < num_levels; ++k) {
       levels_.push_back(std::make_unique<Level>(view, k));

@@ -20,13 +20,13 @@ class ClosedDisplacedSurface : public testing::TestWithParam<TraversalMethodLabe
 
 TEST_P(ClosedDisplacedSurface, LetsNoRayOut)
 {
-  for (const ClosedSurface& surface : {closed_sphere(), closed_torus()}) {
-    const TracedCase traced(surface.triangles, surface.map);
+  for (const ClosedSurface& surface : {closed_sphere(), closed_torus(), seamed_box()}) {
+    const TracedCase traced(surface.triangles, surface.map, HeightFormat::kFloat, 1, surface.weld_seams);
     DisplacedScene scene(traced.geometry(GetParam().method), best_table());
     std::mt19937_64 random(97);
     std::uint64_t num_leaks = 0, num_dark_leaks = 0;
     std::string first;
-    const std::uint64_t num_rays = num_test_rays(100000) / 2;
+    const std::uint64_t num_rays = num_test_rays(150000) / 3;
     for (std::uint64_t k = 0; k < num_rays; ++k) {
       const Ray ray = ray_from_inside(random, surface);
       const bool leaks = !(scene.intersect(ray) < HUGE_VALF), dark_leaks = !scene.occluded(ray);
@@ -41,8 +41,8 @@ TEST_P(ClosedDisplacedSurface, LetsNoRayOut)
 
 TEST_P(ClosedDisplacedSurface, ShadowRaysSeeWhatRaysHit)
 {
-  for (const ClosedSurface& surface : {closed_sphere(), closed_torus()}) {
-    const TracedCase traced(surface.triangles, surface.map);
+  for (const ClosedSurface& surface : {closed_sphere(), closed_torus(), seamed_box()}) {
+    const TracedCase traced(surface.triangles, surface.map, HeightFormat::kFloat, 1, surface.weld_seams);
     DisplacedScene scene(traced.geometry(GetParam().method), best_table());
     std::mt19937_64 random(98);
     for (int k = 0; k < 30000; ++k) {
@@ -59,8 +59,8 @@ TEST_P(ClosedDisplacedSurface, ShadowRaysSeeWhatRaysHit)
 
 TEST_P(ClosedDisplacedSurface, IsFoundThroughEmbreeWhereAllTrianglesTogetherFindIt)
 {
-  for (const ClosedSurface& surface : {closed_sphere(), closed_torus()}) {
-    const TracedCase traced(surface.triangles, surface.map);
+  for (const ClosedSurface& surface : {closed_sphere(), closed_torus(), seamed_box()}) {
+    const TracedCase traced(surface.triangles, surface.map, HeightFormat::kFloat, 1, surface.weld_seams);
     const DisplacedGeometry geometry = traced.geometry(GetParam().method);
     DisplacedScene scene(geometry, best_table());
     std::mt19937_64 random(99);

@@ -41,7 +41,7 @@ HeightMap level_of(const HeightMap& map, int level)
 /// A closed surface at all of its levels.
 struct Levels {
   explicit Levels(const ClosedSurface& surface)
-      : traced(surface.triangles, surface.map, HeightFormat::kFloat, kNumLevels)
+      : traced(surface.triangles, surface.map, HeightFormat::kFloat, kNumLevels, surface.weld_seams)
   {
     for (int k = 0; k < kNumLevels; ++k) maps.push_back(level_of(surface.map, k));
     for (const HeightMap& map : maps) meshes.emplace_back(surface.triangles, map);
@@ -119,8 +119,8 @@ TEST_P(LevelsOfDetail, AreMetWhereTheConeAsksForThem)
     ASSERT_NEAR(t, expected, 1e-6 * (1 + t)) << ray_text(ray) << " cone " << cone.width << " " << cone.spread;
     const int level = static_cast<int>(found.hit.Ng_x);
     ++num_by_level[level];
-    const SurfacePoint point = displaced_point(geometry, found.hit.primID, level, static_cast<double>(found.hit.u),
-                                               static_cast<double>(found.hit.v));
+    const SurfacePoint point =
+        displaced_point(geometry, found.hit.primID, {found.hit.u, found.hit.v, found.hit.Ng_x}).point;
     const double away =
         length(point.P - Vec3d{ray.O[0] + t * ray.D[0], ray.O[1] + t * ray.D[1], ray.O[2] + t * ray.D[2]});
     if (away > 1e-5) ++num_walls;
@@ -133,14 +133,14 @@ TEST_P(LevelsOfDetail, AreMetWhereTheConeAsksForThem)
 
 TEST_P(LevelsOfDetail, LetNoRayOutOfAClosedSurface)
 {
-  for (const ClosedSurface& surface : {closed_sphere(), closed_torus()}) {
+  for (const ClosedSurface& surface : {closed_sphere(), closed_torus(), seamed_box()}) {
     const Levels levels(surface);
     const DisplacedGeometry geometry = levels.traced.geometry(GetParam().method);
     DisplacedScene scene(geometry, best_table());
     std::mt19937_64 random(6);
     std::string first;
     std::uint64_t num_leaks = 0, num_dark_leaks = 0;
-    for (std::uint64_t k = 0; k < num_test_rays(60000) / 2; ++k) {
+    for (std::uint64_t k = 0; k < num_test_rays(90000) / 3; ++k) {
       const Ray ray = ray_from_inside(random, surface);
       const LodCone cone = random_cone(random, geometry.lod.texel);
       const bool leaks = !(scene.intersect(ray, cone) < HUGE_VALF), dark_leaks = !scene.occluded(ray, cone);

@@ -320,9 +320,9 @@ TEST(DisplacementSeams, EqualCoordinatesHaveNone)
 {
   const SeamCase seam;
   const DisplacementSeams found = seam.find(Wrap::kRepeat);
-  EXPECT_EQ(found.num_edges, 0u);
-  EXPECT_EQ(found.length, 0);
-  EXPECT_EQ(found.largest_gap, 0);
+  EXPECT_EQ(found.all.num_edges, 0u);
+  EXPECT_EQ(found.all.length, 0);
+  EXPECT_EQ(found.all.largest_gap, 0);
 }
 
 // Moved by whole tiles, also along v, where the map is constant.
@@ -330,12 +330,12 @@ TEST(DisplacementSeams, WholeTilesApartAreTheSameUnderRepeat)
 {
   SeamCase seam;
   seam.move_second_triangle({1000, -3.25f});
-  EXPECT_EQ(seam.find(Wrap::kRepeat).num_edges, 0u);
+  EXPECT_EQ(seam.find(Wrap::kRepeat).all.num_edges, 0u);
   // Mirrored, even tiles agree.
-  EXPECT_EQ(seam.find(Wrap::kMirror).num_edges, 0u);
+  EXPECT_EQ(seam.find(Wrap::kMirror).all.num_edges, 0u);
   seam.move_second_triangle({1, 0});
-  EXPECT_EQ(seam.find(Wrap::kRepeat).num_edges, 0u);
-  EXPECT_EQ(seam.find(Wrap::kMirror).num_edges, 1u);
+  EXPECT_EQ(seam.find(Wrap::kRepeat).all.num_edges, 0u);
+  EXPECT_EQ(seam.find(Wrap::kMirror).all.num_edges, 1u);
 }
 
 // Under clamping the sides of the diagonal ask for h(u) and h(u + ¼). With x = 64 u − ½ clamped to 0…63 the heights are
@@ -345,10 +345,10 @@ TEST(DisplacementSeams, AShiftedSideOpensAGapOfTheRampsRise)
   SeamCase seam;
   seam.move_second_triangle({0.25f, 0});
   const DisplacementSeams found = seam.find(Wrap::kClamp);
-  EXPECT_EQ(found.num_edges, 1u);
-  EXPECT_NEAR(found.largest_gap, 2 * 16.0 / 63, 1e-6);
+  EXPECT_EQ(found.all.num_edges, 1u);
+  EXPECT_NEAR(found.all.largest_gap, 2 * 16.0 / 63, 1e-6);
   // The last half texel of 64 is clamped on both sides; one of its points lies in it.
-  EXPECT_NEAR(found.length, std::sqrt(2.0) * (1 - 0.5 / 64), std::sqrt(2.0) / 100);
+  EXPECT_NEAR(found.all.length, std::sqrt(2.0) * (1 - 0.5 / 64), std::sqrt(2.0) / 100);
 }
 
 TEST(DisplacementSeams, TheTransformTakesPart)
@@ -356,7 +356,7 @@ TEST(DisplacementSeams, TheTransformTakesPart)
   SeamCase seam;
   seam.move_second_triangle({0.25f, 0});
   seam.settings.height.m00 = 4;
-  EXPECT_EQ(seam.find(Wrap::kRepeat).num_edges, 0u);
+  EXPECT_EQ(seam.find(Wrap::kRepeat).all.num_edges, 0u);
 }
 
 // The diagonal shared by index has no seam, whatever the other edges do.
@@ -364,7 +364,7 @@ TEST(DisplacementSeams, OpenBordersAreNoSeams)
 {
   SeamCase seam;
   seam.mesh.triangles = {{0, 1, 2}};
-  EXPECT_EQ(seam.find(Wrap::kClamp).num_edges, 0u);
+  EXPECT_EQ(seam.find(Wrap::kClamp).all.num_edges, 0u);
 }
 
 // Three triangles on one edge: the gap is that of the two farthest apart.
@@ -374,10 +374,24 @@ TEST(DisplacementSeams, EdgesOfManyTrianglesTakeTheWidestGap)
   seam.mesh.P.insert(seam.mesh.P.end(), {{1, 1, 0}, {0, 0, 0}, {0, 0, 1}});
   seam.mesh.uv[0].insert(seam.mesh.uv[0].end(), {{1.125f, 1}, {0.125f, 0}, {0, 0}});
   seam.mesh.triangles.push_back({6, 7, 8});
-  EXPECT_NEAR(seam.find(Wrap::kClamp).largest_gap, 2 * 8.0 / 63, 1e-6);
+  EXPECT_NEAR(seam.find(Wrap::kClamp).all.largest_gap, 2 * 8.0 / 63, 1e-6);
   seam.move_second_triangle({0.25f, 0});
-  EXPECT_NEAR(seam.find(Wrap::kClamp).largest_gap, 2 * 16.0 / 63, 1e-6);
-  EXPECT_EQ(seam.find(Wrap::kClamp).num_edges, 1u);
+  EXPECT_NEAR(seam.find(Wrap::kClamp).all.largest_gap, 2 * 16.0 / 63, 1e-6);
+  EXPECT_EQ(seam.find(Wrap::kClamp).all.num_edges, 1u);
+}
+
+// What welding does not close.
+TEST(DisplacementSeams, SplitNormalsAreCountedApart)
+{
+  SeamCase seam;
+  seam.move_second_triangle({0.25f, 0});
+  EXPECT_EQ(seam.find(Wrap::kClamp).split.num_edges, 1u) << "without normals triangles move along their own";
+  seam.mesh.N.assign(6, {0, 0, 1});
+  EXPECT_EQ(seam.find(Wrap::kClamp).split.num_edges, 0u);
+  seam.mesh.N[3] = {0, 0.6f, 0.8f};
+  const DisplacementSeams found = seam.find(Wrap::kClamp);
+  EXPECT_EQ(found.split.num_edges, 1u);
+  EXPECT_EQ(found.split.length, found.all.length);
 }
 
 TEST(DisplacementSeams, ConstantMapsHaveNone)
@@ -385,14 +399,14 @@ TEST(DisplacementSeams, ConstantMapsHaveNone)
   SeamCase seam;
   std::fill(seam.texels.begin(), seam.texels.end(), 0.3f);
   seam.move_second_triangle({0.3f, 0.1f});
-  EXPECT_EQ(seam.find(Wrap::kClamp).num_edges, 0u);
+  EXPECT_EQ(seam.find(Wrap::kClamp).all.num_edges, 0u);
 }
 
 TEST(DisplacementSeams, WithoutCoordinatesThereIsNothingToCompare)
 {
   SeamCase seam;
   seam.mesh.uv[0].clear();
-  EXPECT_EQ(seam.find(Wrap::kRepeat).num_edges, 0u);
+  EXPECT_EQ(seam.find(Wrap::kRepeat).all.num_edges, 0u);
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ def export_displacement(material, settings, textures, texture_info, images):
     """Value of RELIEF_displacement.
 
     @param  material      bpy material with nodes
-    @param  settings      scene.relief: method and level of detail for all materials
+    @param  settings      scene.relief: method, level of detail and seams of all materials
     @param  textures      TextureReader
     @param  texture_info  makes glTF's texture reference of a Texture used as numbers; None if its image is missing
     @param  images        ImageExporter
@@ -75,6 +75,7 @@ def export_displacement(material, settings, textures, texture_info, images):
         "method": settings.displacement_method,
         "lod": "auto" if settings.lod < 0 else settings.lod,
         "smoothing": compat.displacement_method(material) == "BOTH",
+        "seams": "weld" if settings.weld_seams else "keep",
     }
 
 
