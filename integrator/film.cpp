@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
+
+#include "kernel/assert.h"
 
 namespace relief {
 
@@ -193,7 +196,62 @@ ImageError Film::estimate_error() const
   return {std::sqrt(error_extrapolate(d1, d2) / count), error_extrapolate(relative_d1, relative_d2) / count};
 }
 
-RenderedImage Film::resolve(int crop_x, int crop_y, int full_width, int full_height) const
+std::vector<Vec3f> Film::variance_calibrations() const
+{
+  std::vector<Vec3f> calibrations(static_cast<std::size_t>(num_tiles()));
+  for (int tile = 0; tile < num_tiles(); ++tile) {
+    if (tile_samples(tile) == 0) continue;
+    Vec3f extrapolated, by_samples;
+    tile_variances(tile, &extrapolated, &by_samples);
+    const auto level = [](float variance, float sample) { return sample > 0.0f ? variance / sample : 1.0f; };
+    calibrations[static_cast<std::size_t>(tile)] = {
+        level(extrapolated.x, by_samples.x), level(extrapolated.y, by_samples.y), level(extrapolated.z, by_samples.z)};
+  }
+  return calibrations;
+}
+
+void Film::resolve_pixel(const float* in,
+                         std::uint32_t samples,
+                         Vec3f calibration,
+                         const FilmLayout& out,
+                         float* to) const
+{
+  const PixelEstimate pixel = pixel_estimate(in, samples);
+  const auto plane = [&](Aov aov) -> float* {
+    const int offset = out.offset[static_cast<std::size_t>(aov)];
+    return offset < 0 ? nullptr : to + offset;
+  };
+  const auto put3 = [](float* p, Vec3f v) {
+    p[0] = v.x;
+    p[1] = v.y;
+    p[2] = v.z;
+  };
+  const float inverse_n = 1.0f / static_cast<float>(samples);
+  const float hits = in[AccumulatorLayout::kCoverage];
+  const float inverse_hits = hits > 0.0f ? 1.0f / hits : 0.0f;
+  if (float* p = plane(Aov::kBeauty)) {
+    put3(p, pixel.mean);
+    p[3] = hits * inverse_n;
+  }
+  if (float* p = plane(Aov::kDirect)) put3(p, load3(in + layout_.direct) * inverse_n);
+  if (float* p = plane(Aov::kIndirect)) put3(p, pixel.mean - load3(in + layout_.direct) * inverse_n);
+  if (float* p = plane(Aov::kAlbedo)) put3(p, load3(in + layout_.albedo) * inverse_n);
+  if (float* p = plane(Aov::kNormal)) put3(p, load3(in + layout_.normal) * inverse_n);
+  if (float* p = plane(Aov::kDepth)) p[0] = hits > 0.0f ? in[layout_.depth] * inverse_hits : kInfinity;
+  if (float* p = plane(Aov::kPosition)) put3(p, load3(in + layout_.position) * inverse_hits);
+  if (float* p = plane(Aov::kUv)) {
+    p[0] = in[layout_.uv] * inverse_hits;
+    p[1] = in[layout_.uv + 1] * inverse_hits;
+  }
+  if (float* p = plane(Aov::kObjectId)) p[0] = in[layout_.object_id];
+  if (float* p = plane(Aov::kMaterialId)) p[0] = in[layout_.material_id];
+  if (float* p = plane(Aov::kSampleCount)) p[0] = static_cast<float>(samples);
+  if (float* p = plane(Aov::kVariance)) put3(p, pixel.sample_variance * calibration);
+  if (float* p = plane(Aov::kHalf)) put3(p, pixel.even);
+  if (float* p = plane(Aov::kDisplacementSteps)) p[0] = in[layout_.displacement_steps] * inverse_n;
+}
+
+RenderedImage Film::resolve(int crop_x, int crop_y, int full_width, int full_height) &&
 {
   RenderedImage picture;
   picture.view.layout = film_layout_make(aov_mask_);
@@ -204,64 +262,27 @@ RenderedImage Film::resolve(int crop_x, int crop_y, int full_width, int full_hei
   picture.view.full_width = full_width;
   picture.view.full_height = full_height;
   const FilmLayout& out = picture.view.layout;
-  picture.pixels.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_) *
-                        static_cast<std::size_t>(out.num_floats));
-  picture.view.pixels = picture.pixels.data();
-
-  for (int tile = 0; tile < num_tiles(); ++tile) {
-    int x0, y0, w, h;
-    tile_rect(tile, &x0, &y0, &w, &h);
-    const std::uint32_t samples = tile_samples(tile);
-    if (samples == 0) continue;
-    // The shape of the variance comes from each pixel's own samples, its level from the tile's halves and quarters: the
-    // former alone is blind to stratification, the latter alone are too noisy in a pixel.
-    Vec3f extrapolated, by_samples;
-    tile_variances(tile, &extrapolated, &by_samples);
-    const auto level = [](float variance, float sample) { return sample > 0.0f ? variance / sample : 1.0f; };
-    const Vec3f calibration{level(extrapolated.x, by_samples.x), level(extrapolated.y, by_samples.y),
-                            level(extrapolated.z, by_samples.z)};
-    for (int y = y0; y < y0 + h; ++y) {
-      for (int x = x0; x < x0 + w; ++x) {
-        const float* in = record(x, y);
-        const PixelEstimate pixel = pixel_estimate(in, samples);
-        float* to = picture.pixels.data() +
-                    (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)) *
-                        static_cast<std::size_t>(out.num_floats);
-        const auto plane = [&](Aov aov) -> float* {
-          const int offset = out.offset[static_cast<std::size_t>(aov)];
-          return offset < 0 ? nullptr : to + offset;
-        };
-        const auto put3 = [](float* p, Vec3f v) {
-          p[0] = v.x;
-          p[1] = v.y;
-          p[2] = v.z;
-        };
-        const float inverse_n = 1.0f / static_cast<float>(samples);
-        const float hits = in[AccumulatorLayout::kCoverage];
-        const float inverse_hits = hits > 0.0f ? 1.0f / hits : 0.0f;
-        if (float* p = plane(Aov::kBeauty)) {
-          put3(p, pixel.mean);
-          p[3] = hits * inverse_n;
-        }
-        if (float* p = plane(Aov::kDirect)) put3(p, load3(in + layout_.direct) * inverse_n);
-        if (float* p = plane(Aov::kIndirect)) put3(p, pixel.mean - load3(in + layout_.direct) * inverse_n);
-        if (float* p = plane(Aov::kAlbedo)) put3(p, load3(in + layout_.albedo) * inverse_n);
-        if (float* p = plane(Aov::kNormal)) put3(p, load3(in + layout_.normal) * inverse_n);
-        if (float* p = plane(Aov::kDepth)) p[0] = hits > 0.0f ? in[layout_.depth] * inverse_hits : kInfinity;
-        if (float* p = plane(Aov::kPosition)) put3(p, load3(in + layout_.position) * inverse_hits);
-        if (float* p = plane(Aov::kUv)) {
-          p[0] = in[layout_.uv] * inverse_hits;
-          p[1] = in[layout_.uv + 1] * inverse_hits;
-        }
-        if (float* p = plane(Aov::kObjectId)) p[0] = in[layout_.object_id];
-        if (float* p = plane(Aov::kMaterialId)) p[0] = in[layout_.material_id];
-        if (float* p = plane(Aov::kSampleCount)) p[0] = static_cast<float>(samples);
-        if (float* p = plane(Aov::kVariance)) put3(p, pixel.sample_variance * calibration);
-        if (float* p = plane(Aov::kHalf)) put3(p, pixel.even);
-        if (float* p = plane(Aov::kDisplacementSteps)) p[0] = in[layout_.displacement_steps] * inverse_n;
-      }
+  const auto num_in = static_cast<std::size_t>(layout_.num_floats), num_out = static_cast<std::size_t>(out.num_floats);
+  // A pixel's planes are fewer floats than its sums, so pixel after pixel is written where sums have been read.
+  RELIEF_ASSERT(num_out <= num_in);
+  const std::vector<Vec3f> calibrations = variance_calibrations();
+  std::vector<float> sums(num_in);
+  for (int y = 0; y < height_; ++y) {
+    for (int x = 0; x < width_; ++x) {
+      const std::size_t pixel =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
+      const int tile = y / kTileSize * tiles_x_ + x / kTileSize;
+      const auto from = sums_.begin() + static_cast<std::ptrdiff_t>(pixel * num_in);
+      std::copy(from, from + layout_.num_floats, sums.begin());
+      float* to = sums_.data() + pixel * num_out;
+      std::fill(to, to + num_out, 0.0f);
+      if (tile_samples(tile) == 0) continue;
+      resolve_pixel(sums.data(), tile_samples(tile), calibrations[static_cast<std::size_t>(tile)], out, to);
     }
   }
+  sums_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_) * num_out);
+  picture.pixels = std::move(sums_);
+  picture.view.pixels = picture.pixels.data();
   return picture;
 }
 

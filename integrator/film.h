@@ -63,14 +63,24 @@ class Film {
   /// Errors of the image's mean, estimated by error_extrapolate from sums over all pixels.
   ImageError estimate_error() const;
 
-  /// Averages, normalizes and fills in the variance. See docs/usage.md for each plane's meaning.
-  RenderedImage resolve(int crop_x, int crop_y, int full_width, int full_height) const;
+  /// Averages, normalizes and fills in the variance, in place of the sums: they are a third of the memory of a large
+  /// frame, which is not wanted twice. See docs/usage.md for each plane's meaning.
+  RenderedImage resolve(int crop_x, int crop_y, int full_width, int full_height) &&;
   std::size_t bytes() const { return sums_.size() * sizeof(float) + samples_.size() * sizeof(std::uint32_t); }
 
  private:
   const float* record(int x, int y) const;
   /// Sums over a tile's pixels: variance of the mean as extrapolated, and by the spread of single samples.
   void tile_variances(int tile, Vec3f* extrapolated, Vec3f* by_samples) const;
+  /// What a tile's pixels' variances are multiplied by. Their shape comes from each pixel's own samples, their level from
+  /// the tile's halves and quarters: the former alone is blind to stratification, the latter alone are too noisy in a
+  /// pixel.
+  std::vector<Vec3f> variance_calibrations() const;
+  /// One pixel's planes.
+  /// @param in       its sums
+  /// @param samples  that it has, at least one
+  /// @param to       room for out.num_floats
+  void resolve_pixel(const float* in, std::uint32_t samples, Vec3f calibration, const FilmLayout& out, float* to) const;
 
   int width_, height_, tiles_x_, tiles_y_;
   std::uint32_t aov_mask_;

@@ -202,7 +202,7 @@ RenderedImage render(const Scene& scene,
   if (first_nonfinite != kNoSample) {
     stats.warnings.push_back(nonfinite_warning(first_nonfinite, crop_x, crop_y, film.width()));
   }
-  return film.resolve(crop_x, crop_y, settings.width, settings.height);
+  return std::move(film).resolve(crop_x, crop_y, settings.width, settings.height);
 }
 
 }  // namespace relief
