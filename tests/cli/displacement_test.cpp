@@ -243,8 +243,7 @@ TEST_F(DisplacementProgram, WhatIsNotFollowedIsAWarning)
   const auto expected = trace(bumpy(), {});
   for (const Case& c :
        {Case{"method", "cone", "material 'bark': there is no displacement method 'cone' yet; 'chord' is used"},
-        Case{"method", "microtriangle", "there is no displacement method 'microtriangle' yet"},
-        Case{"seams", "weld", "material 'bark': displacement seams are not welded yet; they stay open"}}) {
+        Case{"method", "microtriangle", "there is no displacement method 'microtriangle' yet"}}) {
     GltfBuilder b = displaced_square();
     displacement_of(b)[c.key] = c.value;
     const std::string scene = bumpy(b);
@@ -288,6 +287,43 @@ TEST_F(DisplacementProgram, InfoSaysHowItIsTraced)
                            "  prisms: 2; folded (slower to trace) 2, with normals that cancel 2, without a normal 0\n",
                            ", displacement 0.0 MiB, acceleration structure ", "warning: 2 of 2 triangles of mesh "}) {
     EXPECT_NE(outcome.output.find(text), std::string::npos) << text << outcome.output;
+  }
+}
+
+TEST_F(DisplacementProgram, WeldedSeamsAreClosedByWalls)
+{
+  // The half of the square beyond its diagonal is raised by 0.5 m, because it lies elsewhere in the map.
+  GltfBuilder b = displaced_square();
+  const int P = b.accessor<float>({0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 1, 0, 1, 0, 0, 1, 1, 0}, "VEC3");
+  const int N = b.accessor<float>({0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3");
+  const int uv = b.accessor<float>({.2f, .2f, .3f, .2f, .2f, .3f, .2f, .8f, .3f, .7f, .3f, .8f}, "VEC2");
+  const int indices = b.accessor<std::uint16_t>({0, 1, 2, 3, 4, 5}, "SCALAR");
+  b.json["meshes"][0]["primitives"][0]["attributes"] = {{"POSITION", P}, {"NORMAL", N}, {"TEXCOORD_0", uv}};
+  b.json["meshes"][0]["primitives"][0]["indices"] = indices;
+  const std::string map = std::string(8, '\x00') + std::string(8, '\xff');
+  folder_.write("rays.txt", "0 0 0.25 1 1 0\n1 1 0.25 -1 -1 0\n");
+
+  const std::string open = write(b, map);
+  for (const auto& row : trace(open, {})) EXPECT_EQ(row[0], "0");
+  EXPECT_EQ(run({"info", open}).output.find("walls"), std::string::npos);
+
+  displacement_of(b)["seams"] = "weld";
+  const std::string welded = write(b, map);
+  const std::string info = run({"info", welded}).output;
+  for (const char* text : {"uv seams with different heights: 1 edges, 1.41421 m, gap up to 0.5 m\n",
+                           "left open by welding: 0 edges", "walls along seams: 2, one a side"}) {
+    EXPECT_NE(info.find(text), std::string::npos) << text << info;
+  }
+  for (const std::string method : {"chord", "rmip", "rmip-minmax", "tfdm"}) {
+    const auto rows = trace(welded, {"--displacement", method});
+    for (const auto& row : rows) {
+      ASSERT_EQ(row[0], "1") << method;
+      const double expected[] = {.5, .5, .5, .25, -std::sqrt(.5), -std::sqrt(.5), 0};
+      for (std::size_t k = 0; k < std::size(expected); ++k) EXPECT_NEAR(std::stod(row[1 + k]), expected[k], 1e-6);
+    }
+  }
+  for (const std::string method : {"tessellate", "tessellate-grid"}) {
+    for (const auto& row : trace(welded, {"--displacement", method})) EXPECT_EQ(row[0], "1") << method;
   }
 }
 
