@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 namespace relief {
 namespace {
@@ -135,21 +136,12 @@ int level_for_cells(const TextureView& map, int num_columns, int num_rows)
   return level;
 }
 
-void tables_fill(EnvironmentTables& tables)
+/// Integral of the map over each cell of a grid, in texels × luminance; row after row.
+std::vector<double> cells_integrate(const LuminanceImage& image, int num_columns, int num_rows)
 {
-  EnvironmentView& environment = tables.environment;
-  const int num_columns = std::clamp(environment.map.width, 1, kMaxEnvironmentColumns);
-  // Even, so that no row lies in both hemispheres.
-  const int num_rows = std::clamp(environment.map.height + environment.map.height % 2, 2, kMaxEnvironmentColumns / 2);
-  const LuminanceImage image = luminance_load(environment, level_for_cells(environment.map, num_columns, num_rows));
   const std::vector<CellTexels> columns = cell_texels(image.width, num_columns);
   const std::vector<CellTexels> rows = cell_texels(image.height, num_rows);
-  tables.row_edges = row_edges_make(num_rows);
-  tables.row_cdf.resize(static_cast<std::size_t>(num_rows) + 1);
-  const std::size_t pitch = static_cast<std::size_t>(num_columns) + 1;
-  tables.column_cdf.resize(static_cast<std::size_t>(num_rows) * pitch);
-
-  std::vector<double> row_weights(static_cast<std::size_t>(num_rows));
+  std::vector<double> cells(static_cast<std::size_t>(num_rows) * static_cast<std::size_t>(num_columns));
   tbb::parallel_for(0, num_rows, [&](int row) {
     const auto r = static_cast<std::size_t>(row);
     const auto width = static_cast<std::size_t>(image.width);
@@ -161,19 +153,54 @@ void tables_fill(EnvironmentTables& tables)
         row_texels[x] += static_cast<double>(rows[r].weights[k]) * static_cast<double>(texels[x]);
       }
     }
-    std::vector<double> weights(static_cast<std::size_t>(num_columns));
-    double sum = 0;
-    for (std::size_t c = 0; c < weights.size(); ++c) {
+    double* row_cells = cells.data() + r * static_cast<std::size_t>(num_columns);
+    for (std::size_t c = 0; c < columns.size(); ++c) {
       for (std::size_t k = 0; k < columns[c].weights.size(); ++k) {
         const int x = (columns[c].first + static_cast<int>(k) + image.width) % image.width;
-        weights[c] += static_cast<double>(columns[c].weights[k]) * row_texels[static_cast<std::size_t>(x)];
+        row_cells[c] += static_cast<double>(columns[c].weights[k]) * row_texels[static_cast<std::size_t>(x)];
       }
-      sum += weights[c];
     }
-    row_weights[r] = sum * static_cast<double>(std::abs(tables.row_edges[r + 1] - tables.row_edges[r]));
+  });
+  return cells;
+}
+
+void tables_fill(EnvironmentTables& tables, EnvironmentDensity density)
+{
+  EnvironmentView& environment = tables.environment;
+  const int num_columns = std::clamp(environment.map.width, 1, kMaxEnvironmentColumns);
+  // Even, so that no row lies in both hemispheres.
+  const int num_rows = std::clamp(environment.map.height + environment.map.height % 2, 2, kMaxEnvironmentColumns / 2);
+  const LuminanceImage image = luminance_load(environment, level_for_cells(environment.map, num_columns, num_rows));
+  std::vector<double> cells = cells_integrate(image, num_columns, num_rows);
+  tables.row_edges = row_edges_make(num_rows);
+  const auto height = [&tables](std::size_t row) {
+    return static_cast<double>(std::abs(tables.row_edges[row + 1] - tables.row_edges[row]));
+  };
+  tables.row_cdf.resize(static_cast<std::size_t>(num_rows) + 1);
+  const auto width = static_cast<std::size_t>(num_columns);
+  const std::size_t pitch = width + 1;
+  tables.column_cdf.resize(static_cast<std::size_t>(num_rows) * pitch);
+
+  if (density == EnvironmentDensity::kExcess) {
+    double sum = 0, area = 0;
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      sum += cells[i] * height(i / width);
+      area += height(i / width);
+    }
+    const double mean = sum / area;
+    for (double& cell : cells) cell = std::max(cell - mean, 0.0);
+    const double texels_per_cell = static_cast<double>(image.width) * image.height / static_cast<double>(cells.size());
+    tables.base_luminance = static_cast<float>(mean / texels_per_cell);
+  }
+  std::vector<double> row_weights(static_cast<std::size_t>(num_rows));
+  tbb::parallel_for(0, num_rows, [&](int row) {
+    const auto r = static_cast<std::size_t>(row);
+    const double* weights = cells.data() + r * width;
+    const double sum = std::accumulate(weights, weights + width, 0.0);
+    row_weights[r] = sum * height(r);
     float* cdf = tables.column_cdf.data() + r * pitch;
     if (sum > 0) {
-      cdf_write(weights.data(), num_columns, cdf);
+      cdf_write(weights, num_columns, cdf);
     } else {
       cdf_write_uniform(num_columns, cdf);
     }
@@ -205,7 +232,10 @@ std::size_t EnvironmentTables::bytes() const
   return (row_cdf.size() + column_cdf.size() + row_edges.size()) * sizeof(float);
 }
 
-EnvironmentTables environment_tables_make(const TextureView* map, Vec3f color, float rotation)
+EnvironmentTables environment_tables_make(const TextureView* map,
+                                          Vec3f color,
+                                          float rotation,
+                                          EnvironmentDensity density)
 {
   EnvironmentTables tables;
   tables.environment.color = color;
@@ -215,7 +245,7 @@ EnvironmentTables environment_tables_make(const TextureView* map, Vec3f color, f
     tables.environment.has_map = true;
     tables.environment.map = *map;
     tables.environment.map.wrap_u = Wrap::kRepeat;
-    tables_fill(tables);
+    tables_fill(tables, density);
   }
   return tables;
 }

@@ -4,15 +4,26 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "kernel/light/environment.h"
 
 namespace relief {
 
+/// What directions are chosen in proportion to.
+enum class EnvironmentDensity : std::uint8_t {
+  kRadiance,  ///< all of the light, for those who have no other way to find it
+  /// What exceeds the mean over the sphere; nothing elsewhere. For next-event estimation beside paths that follow the
+  /// BSDF, which find the even part of the light by themselves (Karlík et al. 2019, "MIS Compensation", §5.1): with 16
+  /// samples a pixel, 15 to 40 % less variance in five scenes under five maps.
+  kExcess
+};
+
 /// Owner of an environment's sampling tables.
 struct EnvironmentTables {
   EnvironmentView environment;  ///< everything but the pointers into the vectors
+  float base_luminance = 0;     ///< of the map times its factor: what kExcess takes off; 0 for kRadiance
   std::vector<float> row_cdf, column_cdf, row_edges;
 
   /// The environment with its pointers set; valid while this object is neither changed nor moved.
@@ -28,9 +39,12 @@ inline constexpr int kMaxEnvironmentColumns = 1024;
 /// @param map       lat-long image in memory or in a tile cache; null: constant environment, no tables
 /// @param color     radiance factor, strength included
 /// @param rotation  radians about +Y
-/// @return          a map without any light yields tables without cells
+/// @return          a map without any light yields tables without cells, with kExcess an even one too
 /// @pre             the map's texture repeats in u (the loader's default)
 /// @cost            2 MiB at most; reads the mip level with about twice the cells' resolution once
-EnvironmentTables environment_tables_make(const TextureView* map, Vec3f color, float rotation);
+EnvironmentTables environment_tables_make(const TextureView* map,
+                                          Vec3f color,
+                                          float rotation,
+                                          EnvironmentDensity density = EnvironmentDensity::kRadiance);
 
 }  // namespace relief

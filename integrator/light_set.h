@@ -21,10 +21,11 @@ struct LightSet {
   std::vector<LightTrail> light_trails;  ///< one a light
   std::vector<LightTreeNode> nodes;      ///< empty: no finite light can be chosen
   EnvironmentTables environment;
-  float environment_irradiance = 0;
+  EnvironmentIrradiance environment_irradiance;  ///< of what next-event estimation samples of it
+  float environment_yields_to = kInfinity;       ///< see LightsView
 
   /// @return false: nothing can be sampled
-  bool any() const { return !nodes.empty() || !suns.empty() || environment_irradiance > 0; }
+  bool any() const { return !nodes.empty() || !suns.empty() || environment_irradiance.mean > 0; }
   /// Valid while this object is neither changed nor moved.
   LightsView view() const;
   std::size_t bytes() const;
@@ -36,9 +37,13 @@ struct LightSet {
 /// where the triangles are), and so are unlit ones (they light nothing in glTF's sense): paths that hit them see their
 /// emission all the same. Triangles emit from the side glTF calls front, which a mirroring instance turns with the winding.
 /// @param textures  views of scene.textures, for the mean of emission maps
+/// @param density   of the environment: kExcess where paths that follow the BSDF find what it leaves out, which for a
+///                  constant environment beside suns is all
 /// @return          same bits for the same scene, whatever the thread count
 /// @cost            about 100 bytes a light for the light and 70 for its place in the tree
-LightSet light_set_make(const Scene& scene, std::span<const TextureView> textures);
+LightSet light_set_make(const Scene& scene,
+                        std::span<const TextureView> textures,
+                        EnvironmentDensity density = EnvironmentDensity::kExcess);
 
 /// The same from parts, without a scene: fills trails, suns, area_lights, and nodes from `lights`.
 /// @param intensity_scales  one a light, >= 0: mean of the texture that will multiply its emission; empty: all 1. A light

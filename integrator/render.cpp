@@ -91,7 +91,9 @@ RenderedImage render(const Scene& scene,
   const RenderSettings& settings = options.settings;
   DisplacementOptions displacement = options.displacement;
   displacement.num_rays = expected_rays(settings);
-  SceneContext context(scene, displacement);
+  const bool light_sampling_alone = options.light_technique == LightTechnique::kLightSampling;
+  SceneContext context(scene, displacement,
+                       light_sampling_alone ? EnvironmentDensity::kRadiance : EnvironmentDensity::kExcess);
   for (std::string& text : context.displacements.warnings()) stats.warnings.push_back(std::move(text));
   const StageTable& stages = stage_table_select();
 

@@ -6,9 +6,11 @@
 
 namespace relief {
 
-SceneContext::SceneContext(const Scene& loaded, const DisplacementOptions& displacement)
+SceneContext::SceneContext(const Scene& loaded,
+                           const DisplacementOptions& displacement,
+                           EnvironmentDensity environment_density)
     : scene(loaded),
-      lights(light_set_make(loaded, loaded.textures->views())),
+      lights(light_set_make(loaded, loaded.textures->views(), environment_density)),
       bsdf_tables(std::make_unique<BsdfTables>()),
       displacements(loaded, displacement)
 {

@@ -16,9 +16,12 @@ namespace relief {
 
 /// Owner of what KernelGlobals points to. Camera, film, limits and seed are left for the render to fill in.
 struct SceneContext {
-  /// @param scene  must outlive the context
+  /// @param scene                must outlive the context
+  /// @param environment_density  kRadiance for LightTechnique::kLightSampling, which has no other way to the light
   /// @error std::runtime_error out of memory and the like
-  explicit SceneContext(const Scene& scene, const DisplacementOptions& displacement = {});
+  explicit SceneContext(const Scene& scene,
+                        const DisplacementOptions& displacement = {},
+                        EnvironmentDensity environment_density = EnvironmentDensity::kExcess);
   SceneContext(const SceneContext&) = delete;
   SceneContext& operator=(const SceneContext&) = delete;
 

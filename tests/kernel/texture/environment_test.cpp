@@ -341,6 +341,49 @@ TEST(EnvironmentSampling, DensityIsPositiveWhereverThereIsLight)
   EXPECT_GT(num_lit, 1000);
 }
 
+/// Maps whose cells a midpoint rule resolves.
+bool quadrature_resolves(const MapCase& map_case)
+{
+  return map_case.width <= 1000 && std::string(map_case.name).find("sun") == std::string::npos;
+}
+
+TEST(EnvironmentExcess, DensityIsWhatTheOtherDensityExceedsTheUniformOneBy)
+{
+  for (const MapCase& map_case : map_cases()) {
+    SCOPED_TRACE(map_case.name);
+    const TestMap map(map_case.width, map_case.height, map_case.color);
+    const EnvironmentTables all = environment_tables_make(&map.view, {1, 0.5f, 2}, map_case.rotation);
+    const EnvironmentTables tables =
+        environment_tables_make(&map.view, {1, 0.5f, 2}, map_case.rotation, EnvironmentDensity::kExcess);
+    const EnvironmentView radiance = all.view(), excess = tables.view();
+    if (map_case.width == 1 && map_case.height == 1) {
+      EXPECT_EQ(environment_sample(excess, {0.5f, 0.5f}).pdf_solid_angle, 0.0f);
+      continue;
+    }
+    const auto difference = [&](Vec3f wi) {
+      return std::max(static_cast<double>(environment_pdf(radiance, wi)) - 1 / (4 * M_PI), 0.0);
+    };
+    // Both densities are quantized to 2^-24 of a row or column, and the least cells get more than their share.
+    if (quadrature_resolves(map_case)) {
+      const double sum = sphere_integral(800, 1600, difference);
+      Uniform2 uniform(11);
+      for (int i = 0; i < 2000; ++i) {
+        const Vec2f u = uniform();
+        const Vec3f wi = direction(2 * static_cast<double>(u.x) - 1, 2 * M_PI * static_cast<double>(u.y));
+        const double expected = difference(wi) / sum;
+        ASSERT_NEAR(static_cast<double>(environment_pdf(excess, wi)), expected, 0.01 * expected + 1e-4);
+      }
+    }
+    Uniform2 uniform(12);
+    for (int i = 0; i < 2000; ++i) {
+      const EnvironmentSample s = environment_sample(excess, uniform());
+      ASSERT_GT(s.pdf_solid_angle, 0.0f);
+      ASSERT_EQ(s.radiance, environment_eval(excess, s.wi));
+      ASSERT_GT(difference(s.wi), -1e-6);
+    }
+  }
+}
+
 TEST(EnvironmentPoles, AreFiniteAndTheSeamIsContinuous)
 {
   for_each_map([](const EnvironmentView& environment, const MapCase&) {
