@@ -301,7 +301,7 @@ bool render_frame(const RenderArguments& arguments,
   load.has_frame = frame.has_value();
   load.frame = frame.value_or(0);
   load.texture_budget_bytes = static_cast<std::size_t>(arguments.texture_memory_gib * (1u << 30));
-  const Scene scene = scene_load(arguments.scene, load);
+  Scene scene = scene_load(arguments.scene, load);
 
   Statistics stats;
   stats.load_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - load_start).count();
@@ -332,6 +332,7 @@ bool render_frame(const RenderArguments& arguments,
   const std::string title = frame ? fmt::format("frame {} ", *frame) : std::string();
   const RenderedImage image = render(scene, options, interrupt_flag(), progress.callback(stats.frame, title), stats);
   stats.peak_memory_bytes = peak_memory_bytes();
+  scene = {};  // Pictures are written in the memory of what they were made from.
   const bool is_whole = stats.stop_reason != "interrupted";
   if (!is_whole && stats.samples_per_pixel <= 0) {
     progress.note(fmt::format("{}: interrupted before the first sample, not written", paths.exr.string()));
