@@ -5,8 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include "kernel/assert.h"
-
 namespace relief {
 
 namespace {
@@ -29,6 +27,8 @@ AccumulatorLayout layout_make(std::uint32_t aov_mask)
   keep(Aov::kObjectId, 1, layout.object_id);
   keep(Aov::kMaterialId, 1, layout.material_id);
   keep(Aov::kDisplacementSteps, 1, layout.displacement_steps);
+  // The finished planes take the place of the sums.
+  layout.num_floats = std::max(layout.num_floats, film_layout_make(aov_mask).num_floats);
   return layout;
 }
 
@@ -86,7 +86,7 @@ Film::Film(int width, int height, std::uint32_t aov_mask)
       tiles_x_((width + kTileSize - 1) / kTileSize),
       tiles_y_((height + kTileSize - 1) / kTileSize),
       aov_mask_(aov_mask | 1u << static_cast<int>(Aov::kBeauty)),
-      layout_(layout_make(aov_mask)),
+      layout_(layout_make(aov_mask_)),
       sums_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
             static_cast<std::size_t>(layout_.num_floats)),
       samples_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_))
@@ -263,8 +263,7 @@ RenderedImage Film::resolve(int crop_x, int crop_y, int full_width, int full_hei
   picture.view.full_height = full_height;
   const FilmLayout& out = picture.view.layout;
   const auto num_in = static_cast<std::size_t>(layout_.num_floats), num_out = static_cast<std::size_t>(out.num_floats);
-  // A pixel's planes are fewer floats than its sums, so pixel after pixel is written where sums have been read.
-  RELIEF_ASSERT(num_out <= num_in);
+  // A pixel's planes are no more floats than its sums, so pixel after pixel is written where sums have been read.
   const std::vector<Vec3f> calibrations = variance_calibrations();
   std::vector<float> sums(num_in);
   for (int y = 0; y < height_; ++y) {

@@ -161,6 +161,29 @@ TEST_P(SeamWalls, AreMetWhereTheirRuledSurfaceIs)
   EXPECT_GE(num_walls, 200);
 }
 
+/// Two halves of a square, one at height 0 and the other at 1: all of the wall is outside of both halves' own heights.
+TEST_P(SeamWalls, ReachOverGapsThatNeitherSideReachesInto)
+{
+  oracle::HeightMap map{4, 4, std::vector<double>(16, 0), oracle::Wrap::kRepeat, oracle::Wrap::kRepeat, 1, 0};
+  std::fill(map.h.begin() + 8, map.h.end(), 1);
+  const Vector3 up{0, 0, 1};
+  const auto uv = [](double u, double v) -> Vector2 { return {float_rounded(u), float_rounded(v)}; };
+  const std::vector<oracle::DisplacedTriangle> triangles{
+      {{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}}, {{up, up, up}}, {{uv(.2, .2), uv(.3, .2), uv(.2, .3)}}},
+      {{{{1, 1, 0}, {0, 1, 0}, {1, 0, 0}}}, {{up, up, up}}, {{uv(.3, .8), uv(.2, .8), uv(.3, .7)}}}};
+  for (const bool weld : {false, true}) {
+    const TracedCase traced(triangles, map, HeightFormat::kFloat, 1, weld);
+    DisplacedScene scene(traced.geometry(GetParam().method), best_table());
+    for (const double z : {.01, .3, .5, .99}) {
+      const float t = scene.intersect(ray_through({0, .2, z}, {1, 1.2, z}));
+      EXPECT_EQ(t < HUGE_VALF, weld) << z;
+      if (t < HUGE_VALF) {
+        EXPECT_NEAR(static_cast<double>(t), .4, 1e-6) << z;
+      }
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Displacement, SeamWalls, testing::ValuesIn(kTraversalMethods), [](const auto& test) {
   std::string name(test.param.name);
   std::replace(name.begin(), name.end(), '-', '_');
