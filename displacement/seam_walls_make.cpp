@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 #include "displacement/shared_edges.h"
@@ -42,10 +41,6 @@ bool is_same(const double* a, const double* b, const LatticeAxis& axis)
 std::vector<SeamWall> seam_walls_make(std::span<const DisplacedTriangle> triangles, const HeightFieldView& field)
 {
   const std::vector<std::uint32_t> corners = weld_corners(triangles), first = weld_edges(corners);
-  std::vector<std::uint32_t> order(first.size());
-  std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(),
-            [&](std::uint32_t a, std::uint32_t b) { return std::pair(first[a], a) < std::pair(first[b], b); });
   std::vector<SeamWall> walls;
   const auto add = [&](std::uint32_t edge, std::uint32_t other) {
     const Side own = side_of(triangles, corners, edge, corners[edge]);
@@ -53,14 +48,22 @@ std::vector<SeamWall> seam_walls_make(std::span<const DisplacedTriangle> triangl
     if (is_same(own.x, there.x, field.x) && is_same(own.y, there.y, field.y)) return;
     walls.push_back({edge, {there.x[0], there.x[1]}, {there.y[0], there.y[1]}});
   };
-  for (std::size_t begin = 0, end = 0; begin < order.size(); begin = end) {
-    while (end < order.size() && first[order[end]] == first[order[begin]]) ++end;
-    const std::size_t count = end - begin;
-    const std::uint32_t edge = order[begin];
-    if (count < 2 || corners[edge] == corners[edge_end(edge)]) continue;
+  // Edges between the same ends in a chain that starts at the first of them.
+  constexpr std::uint32_t kNone = ~0u;
+  std::vector<std::uint32_t> next(first.size(), kNone), last(first.size());
+  for (std::uint32_t edge = 0; edge < first.size(); ++edge) {
+    if (first[edge] != edge) next[last[first[edge]]] = edge;
+    last[first[edge]] = edge;
+  }
+  std::vector<std::uint32_t> group;
+  for (std::uint32_t edge = 0; edge < first.size(); ++edge) {
+    if (first[edge] != edge || next[edge] == kNone || corners[edge] == corners[edge_end(edge)]) continue;
+    group.clear();
+    for (std::uint32_t at = edge; at != kNone; at = next[at]) group.push_back(at);
+    const std::size_t count = group.size();
     for (std::size_t k = 0; k < count; ++k) {
-      add(order[begin + k], order[begin + (k + 1) % count]);
-      if (count > 2) add(order[begin + k], order[begin + (k + count - 1) % count]);
+      add(group[k], group[(k + 1) % count]);
+      if (count > 2) add(group[k], group[(k + count - 1) % count]);
     }
   }
   std::sort(walls.begin(), walls.end(), [](const SeamWall& a, const SeamWall& b) { return a.edge < b.edge; });

@@ -2,26 +2,30 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
+#include <bit>
 #include <utility>
+
+#include "kernel/sample/sobol.h"
 
 namespace relief {
 
 namespace {
 
-/// @param key  a function of an index; equal keys are one
-/// @return     for every index the first one with the same key
-template <typename Key>
-std::vector<std::uint32_t> first_equals(std::size_t count, const Key& key)
+/// @param key   a function of an index; equal keys are one
+/// @param hash  of a key
+/// @return      for every index the first one with the same key
+template <typename Key, typename Hash>
+std::vector<std::uint32_t> first_equals(std::size_t count, const Key& key, const Hash& hash)
 {
-  std::vector<std::uint32_t> order(count), first(count);
-  std::iota(order.begin(), order.end(), 0u);
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    const auto ka = key(a), kb = key(b);
-    return ka != kb ? ka < kb : a < b;
-  });
-  for (std::size_t k = 0; k < count; ++k) {
-    first[order[k]] = k > 0 && key(order[k]) == key(order[k - 1]) ? first[order[k - 1]] : order[k];
+  constexpr std::uint32_t kNone = ~0u;
+  const std::size_t num_slots = std::bit_ceil(2 * count + 1);
+  std::vector<std::uint32_t> slots(num_slots, kNone), first(count);
+  for (std::uint32_t index = 0; index < count; ++index) {
+    const auto wanted = key(index);
+    std::size_t slot = hash(wanted) & (num_slots - 1);
+    while (slots[slot] != kNone && key(slots[slot]) != wanted) slot = (slot + 1) & (num_slots - 1);
+    if (slots[slot] == kNone) slots[slot] = index;
+    first[index] = slots[slot];
   }
   return first;
 }
@@ -30,19 +34,29 @@ std::vector<std::uint32_t> first_equals(std::size_t count, const Key& key)
 
 std::vector<std::uint32_t> weld_corners(std::span<const DisplacedTriangle> triangles)
 {
-  return first_equals(3 * triangles.size(), [&](std::uint32_t corner) {
+  using Place = std::array<std::uint32_t, 6>;
+  const auto place_of = [&](std::uint32_t corner) -> Place {
     const DisplacedTriangle& tri = triangles[corner / 3];
     const Vec3f P = tri.P[corner % 3], N = tri.N[corner % 3];
-    // −0 and 0 are one place.
-    return std::array<float, 6>{P.x + 0.0f, P.y + 0.0f, P.z + 0.0f, N.x + 0.0f, N.y + 0.0f, N.z + 0.0f};
+    // By their bits; −0 and 0 are one place.
+    const auto bits = [](float x) { return std::bit_cast<std::uint32_t>(x + 0.0f); };
+    return {bits(P.x), bits(P.y), bits(P.z), bits(N.x), bits(N.y), bits(N.z)};
+  };
+  return first_equals(3 * triangles.size(), place_of, [](const Place& place) {
+    std::uint64_t hash = 0;
+    for (const std::uint32_t part : place) hash = hash_mix(hash ^ part);
+    return hash;
   });
 }
 
 std::vector<std::uint32_t> weld_edges(std::span<const std::uint32_t> corners)
 {
-  return first_equals(corners.size(), [&](std::uint32_t edge) {
+  const auto ends_of = [&](std::uint32_t edge) {
     const std::uint32_t a = corners[edge], b = corners[edge_end(edge)];
     return std::pair(std::min(a, b), std::max(a, b));
+  };
+  return first_equals(corners.size(), ends_of, [](const std::pair<std::uint32_t, std::uint32_t>& ends) {
+    return hash_mix(std::uint64_t{ends.first} << 32 | ends.second);
   });
 }
 
