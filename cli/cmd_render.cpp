@@ -58,6 +58,7 @@ struct RenderArguments {
   bool resume = false, strict = false, float_color = false;
   double texture_memory_gib = 4;
   DisplacementOptions displacement;
+  std::string caustics;
 };
 
 /// Files of one frame; empty: not asked for.
@@ -149,6 +150,10 @@ RenderOptions options_for(const Scene& scene, const RenderArguments& arguments)
   if (!arguments.filter.empty()) {
     settings.filter = arguments.filter == "box" ? PixelFilter::kBox : PixelFilter::kBlackmanHarris;
     settings.filter_width = arguments.filter == "box" ? 1.0f : 1.5f;
+  }
+  if (!arguments.caustics.empty()) {
+    const auto* label = std::find(std::begin(kCausticsModeLabels), std::end(kCausticsModeLabels), arguments.caustics);
+    settings.caustics.mode = static_cast<CausticsMode>(label - std::begin(kCausticsModeLabels));
   }
   options.camera = camera_for_image(scene, arguments.camera, settings.width, settings.height);
   const PixelRect& crop = arguments.crop;
@@ -413,6 +418,10 @@ void cmd_render_register(CLI::App& app, Run& run, const std::string& command_lin
   add_displacement_method(*command, a.displacement);
   add_displacement_memory(*command, a.displacement);
   add_displacement_lod(*command, a.displacement);
+  command
+      ->add_option("--caustics", a.caustics,
+                   "Photons for caustics: auto (where something casts them), on, or off (default: the scene's)")
+      ->check(one_of({std::begin(kCausticsModeLabels), std::end(kCausticsModeLabels)}));
   command->add_option("--filter", a.filter, "Pixel filter: box (1 px) or blackman-harris (1.5 px)")
       ->check(one_of({"box", "blackman-harris"}));
   command->add_option("--view", a.view, "OpenColorIO view of the PNG");

@@ -77,6 +77,9 @@ std::string render_fingerprint(const Scene& scene, const RenderOptions& options,
     hash.add(v);
   }
   for (const float v : {s.noise_threshold, s.clamp_indirect, s.filter_width}) hash.add(v);
+  hash.add(static_cast<int>(s.caustics.mode));
+  for (const double v : {s.caustics.photons, s.caustics.memory_mib}) hash.add(v);
+  for (const float v : {s.caustics.alpha, s.caustics.radius}) hash.add(v);
   hash.add(s.seed);
   hash.add(options.time_limit_seconds);
   hash.add(options.aov_mask);

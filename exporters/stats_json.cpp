@@ -32,6 +32,15 @@ std::string stats_json(const Statistics& statistics)
                     {"prisms_per_ray", a_ray(s.counters.displaced_prisms)},
                     {"reasons", s.displacement.reasons}};
   }
+  nlohmann::ordered_json caustics = {{"reason", s.caustics.reason},
+                                     {"photons", s.caustics.photons},
+                                     {"stored", s.caustics.stored},
+                                     {"passes", s.caustics.passes},
+                                     {"first_radius", s.caustics.first_radius},
+                                     {"radius", s.caustics.radius},
+                                     {"seconds", s.caustics.seconds},
+                                     {"bytes", s.caustics.bytes},
+                                     {"sources", s.caustics.num_sources}};
   const nlohmann::ordered_json json = {
       {"scene", s.scene},
       {"version", s.version},
@@ -63,6 +72,7 @@ std::string stats_json(const Statistics& statistics)
       {"film_bytes", s.film_bytes},
       {"path_state_bytes", s.path_state_bytes},
       {"displacement", displacement},
+      {"caustics", caustics},
       {"counters", counters},
       {"stage_seconds", stages},
       {"warnings", s.warnings},

@@ -73,6 +73,13 @@ void disk_intersect(const RTCIntersectFunctionNArguments* arguments)
 /// Area lights cast no shadows: their mask keeps shadow rays away, so this is never reached with work to do.
 void disk_occluded(const RTCOccludedFunctionNArguments*) {}
 
+Box3 scene_bounds(RTCScene scene)
+{
+  RTCBounds b;
+  rtcGetSceneBounds(scene, &b);
+  return {{b.lower_x, b.lower_y, b.lower_z}, {b.upper_x, b.upper_y, b.upper_z}};
+}
+
 }  // namespace
 
 Accel::Accel(const Scene& scene,
@@ -176,6 +183,10 @@ void Accel::release()
   }
   if (device_ != nullptr) rtcReleaseDevice(device_);
 }
+
+Box3 Accel::bounds() const { return scene_bounds(top_); }
+
+Box3 Accel::displaced_bounds(std::size_t geometry) const { return scene_bounds(displaced_scenes_[geometry]); }
 
 RTCScene Accel::new_scene(RTCBuildQuality quality)
 {

@@ -27,6 +27,7 @@ AccumulatorLayout layout_make(std::uint32_t aov_mask)
   keep(Aov::kObjectId, 1, layout.object_id);
   keep(Aov::kMaterialId, 1, layout.material_id);
   keep(Aov::kDisplacementSteps, 1, layout.displacement_steps);
+  keep(Aov::kCaustic, 3, layout.caustic);
   // The finished planes take the place of the sums.
   layout.num_floats = std::max(layout.num_floats, film_layout_make(aov_mask).num_floats);
   return layout;
@@ -249,6 +250,7 @@ void Film::resolve_pixel(const float* in,
   if (float* p = plane(Aov::kVariance)) put3(p, pixel.sample_variance * calibration);
   if (float* p = plane(Aov::kHalf)) put3(p, pixel.even);
   if (float* p = plane(Aov::kDisplacementSteps)) p[0] = in[layout_.displacement_steps] * inverse_n;
+  if (float* p = plane(Aov::kCaustic)) put3(p, load3(in + layout_.caustic) * inverse_n);
 }
 
 RenderedImage Film::resolve(int crop_x, int crop_y, int full_width, int full_height) &&

@@ -49,6 +49,7 @@ class Film {
   FilmAccumulatorView accumulator();
   int width() const { return width_; }
   int height() const { return height_; }
+  std::size_t num_pixels() const { return static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_); }
   int num_tiles() const { return tiles_x_ * tiles_y_; }
   /// Pixels of a tile, clipped to the window.
   void tile_rect(int tile, int* x0, int* y0, int* w, int* h) const;

@@ -424,6 +424,23 @@ EnvironmentIrradiance environment_irradiance(const EnvironmentTables& tables)
   return irradiance;
 }
 
+/// Fills in what is known of the environment's light as a whole.
+void environment_integrate(LightSet& set)
+{
+  const EnvironmentView environment = set.environment.view();
+  constexpr std::uint32_t kSamples = 4096;
+  double sum = 0;
+  double squares = 0;
+  for (std::uint32_t i = 0; i < kSamples; ++i) {
+    const EnvironmentSample sample = environment_sample_all(environment, sample_2d(0, 2 * i, 0));
+    const double radiance = static_cast<double>(light_scalar(sample.radiance));
+    sum += radiance / static_cast<double>(sample.pdf_solid_angle) / kSamples;
+    squares += radiance * radiance / static_cast<double>(sample.pdf_solid_angle) / kSamples;
+  }
+  set.environment_flux_density = std::min(sum / 4, 1e30);
+  set.environment_solid_angle = squares > 0 ? sum * sum / squares : 0.0;
+}
+
 }  // namespace
 
 void light_set_build_tree(LightSet& set, std::span<const float> intensity_scales)
@@ -454,6 +471,7 @@ LightSet light_set_make(const Scene& scene, std::span<const TextureView> texture
   set.environment = environment_tables_make(texture_view(scene.environment.texture_index), scene.environment.color,
                                             scene.environment.rotation, density);
   set.environment_irradiance = environment_irradiance(set.environment);
+  environment_integrate(set);
 
   set.lights = scene.lights;
   set.first_light_index.assign(scene.instances.size(), -1);
@@ -514,6 +532,7 @@ LightsView LightSet::view() const
   v.environment = environment.view();
   v.environment_irradiance = environment_irradiance;
   v.environment_yields_to = environment_yields_to;
+  v.environment_casts_caustics = environment_casts_caustics;
   return v;
 }
 

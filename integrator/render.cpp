@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -12,6 +13,7 @@
 #include <tbb/task_arena.h>
 
 #include "integrator/flush_denormals.h"
+#include "integrator/photon_pass.h"
 #include "integrator/scene_context.h"
 #include "integrator/stages.h"
 #include "integrator/wavefront.h"
@@ -93,7 +95,8 @@ RenderedImage render(const Scene& scene,
   displacement.num_rays = expected_rays(settings);
   const bool light_sampling_alone = options.light_technique == LightTechnique::kLightSampling;
   SceneContext context(scene, displacement,
-                       light_sampling_alone ? EnvironmentDensity::kRadiance : EnvironmentDensity::kExcess);
+                       light_sampling_alone ? EnvironmentDensity::kRadiance : EnvironmentDensity::kExcess,
+                       settings.caustics);
   for (std::string& text : context.displacements.warnings()) stats.warnings.push_back(std::move(text));
   const StageTable& stages = stage_table_select();
 
@@ -107,10 +110,13 @@ RenderedImage render(const Scene& scene,
   blackman_harris_table_make(filter);
   KernelGlobals g = render_globals(context, options, filter);
   g.film = film.accumulator();
+  const bool caustics = g.caustics.enabled;
+  std::optional<PhotonPass> photons;
+  if (caustics) photons.emplace(context, settings.caustics, film.num_pixels());
   stats.build_seconds = seconds_since(build_start);
 
   const Clock::time_point start = Clock::now();
-  tbb::enumerable_thread_specific<Wavefront> workers;
+  tbb::enumerable_thread_specific<Wavefront> workers([caustics] { return Wavefront(caustics); });
   std::atomic<std::uint64_t> samples_done{0};
   std::atomic<std::uint64_t> rays_done{0};
   std::mutex progress_mutex;
@@ -139,7 +145,10 @@ RenderedImage render(const Scene& scene,
 
   stats.stop_reason = "samples";
   for (std::uint32_t done = 0; done < wanted && !active.empty();) {
-    const std::uint32_t samples = pass_samples(done, wanted, seconds_since(start), options.time_limit_seconds);
+    // Photons are of one sample: see PhotonPass::next.
+    const std::uint32_t samples =
+        caustics ? 1 : pass_samples(done, wanted, seconds_since(start), options.time_limit_seconds);
+    if (photons) photons->next(g, stages, [&]() -> Wavefront& { return workers.local(); });
     tbb::parallel_for(
         std::size_t{0}, active.size(),
         [&](std::size_t i) {
@@ -185,12 +194,14 @@ RenderedImage render(const Scene& scene,
   stats.height = settings.height;
   stats.threads = tbb::this_task_arena::max_concurrency();
   stats.samples_per_pixel = film.mean_samples();
+  stats.caustics.reason = context.caustics_reason;
+  if (photons) photons->fill(stats.caustics);
   const ImageError error = film.estimate_error();
   stats.error_rmse = error.rmse;
   stats.error_relmse = error.relmse;
   context.fill(stats);
   stats.film_bytes = film.bytes();
-  stats.path_state_bytes = workers.size() * Wavefront::bytes();
+  stats.path_state_bytes = workers.size() * Wavefront::bytes(caustics);
   stats.stages.clear();
   for (const char* name : kStageNames) stats.stages.push_back({name, 0.0});
   std::uint64_t first_nonfinite = kNoSample;

@@ -1,19 +1,73 @@
 #include "integrator/scene_context.h"
 
+#include <algorithm>
+#include <utility>
+
 #include "integrator/intersect_stage.h"
 #include "integrator/surface_kernels.h"
+#include "scene/feature_set.h"
 #include "scene/texture_store.h"
 
 namespace relief {
 
+namespace {
+
+/// Whether photons are to be traced, and why.
+struct CausticsDecision {
+  bool enabled = false;
+  std::string reason;
+};
+
+/// A light that covers more of the sky than this, steradians, is found by paths that leave a caster often enough.
+constexpr double kWideLight = 1.0;
+
+CausticsDecision caustics_decide(const Scene& scene, LightSet& lights, CausticsMode mode)
+{
+  if (mode == CausticsMode::kOff) return {false, "off"};
+  const auto any = [&](std::uint32_t flag) {
+    return std::any_of(scene.instances.begin(), scene.instances.end(),
+                       [&](const Instance& instance) { return (instance.flags & flag) != 0; });
+  };
+  if (!any(kCausticCaster)) return {false, "nothing casts caustics"};
+  if (!any(kCausticReceiver)) return {false, "nothing receives caustics"};
+  if (mode == CausticsMode::kAuto && lights.environment_solid_angle > kWideLight) {
+    lights.environment_casts_caustics = false;
+  }
+  const bool any_light = std::any_of(lights.lights.begin(), lights.lights.end(), [](const Light& light) {
+    return light.casts_caustics && !is_zero(light.emission);
+  });
+  const bool environment = lights.environment_flux_density > 0 && lights.environment_casts_caustics;
+  if (!any_light && !environment) return {false, "no light casts caustics"};
+  return {true, std::string(any_light ? "lights" : "") + (any_light && environment ? " and " : "") +
+                    (environment ? "the environment" : "") + " on casters"};
+}
+
+/// Whether photons can show on a material at all, rather than be sent on by sharp lobes alone.
+bool has_soft_lobes(const Material& m, bool caster, float roughness)
+{
+  const bool textured = m.metallic_roughness_texture.texture_index >= 0 || m.transmission_texture.texture_index >= 0;
+  const bool diffuse = m.metallic < 1.0f && m.transmission < 1.0f;
+  const bool rough = !caster && (m.roughness > roughness || (m.clearcoat > 0.0f && m.clearcoat_roughness > roughness));
+  // Microfacets scatter light more than once on all but smooth metal and thin walls.
+  const bool multiple = m.roughness > 0.0f && (m.metallic > 0.0f || m.thickness == 0.0f);
+  return !m.unlit && (textured || diffuse || rough || multiple || !is_zero(m.sheen_color));
+}
+
+}  // namespace
+
 SceneContext::SceneContext(const Scene& loaded,
                            const DisplacementOptions& displacement,
-                           EnvironmentDensity environment_density)
+                           EnvironmentDensity environment_density,
+                           const CausticSettings& caustics)
     : scene(loaded),
       lights(light_set_make(loaded, loaded.textures->views(), environment_density)),
       bsdf_tables(std::make_unique<BsdfTables>()),
       displacements(loaded, displacement)
 {
+  CausticsDecision decision = caustics_decide(scene, lights, caustics.mode);
+  caustics_reason = std::move(decision.reason);
+  globals.caustics.enabled = decision.enabled;
+  globals.caustics.roughness = kCausticRoughness;
   for (const Mesh& mesh : scene.meshes) meshes.push_back(mesh.view());
   std::vector<int> uses(scene.meshes.size(), 0);
   for (const Instance& instance : scene.instances) ++uses[static_cast<std::size_t>(instance.mesh_index)];
@@ -28,12 +82,18 @@ SceneContext::SceneContext(const Scene& loaded,
     view.flags = instance.flags;
     if (uses[static_cast<std::size_t>(instance.mesh_index)] > 1) view.flags |= kTracedInObjectSpace;
     if (displacements.geometry_index(i) >= 0) view.flags |= kDisplaced | kTracedInObjectSpace;
+    const bool caster = (view.flags & kCausticCaster) != 0;
+    const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
+    if (decision.enabled && (view.flags & kCausticReceiver) != 0 &&
+        has_soft_lobes(material, caster, kCausticRoughness)) {
+      view.flags |= kGathersPhotons;
+    }
     instances.push_back(view);
   }
   unsigned features = 0;
   for (const Material& material : scene.materials) {
     features |= feature_mask_of(material);
-    surface_kernel.push_back(static_cast<std::uint8_t>(surface_kernel_index(material)));
+    surface_kernel.push_back(static_cast<std::uint8_t>(surface_kernel_index(material, decision.enabled)));
   }
   bsdf_tables_make(*bsdf_tables, features);
   accel = std::make_unique<Accel>(scene, lights.lights, lights.area_lights, displacements, shadow_filter);

@@ -21,7 +21,9 @@ struct SceneContext {
   /// @error std::runtime_error out of memory and the like
   explicit SceneContext(const Scene& scene,
                         const DisplacementOptions& displacement = {},
-                        EnvironmentDensity environment_density = EnvironmentDensity::kExcess);
+                        EnvironmentDensity environment_density = EnvironmentDensity::kExcess,
+
+                        const CausticSettings& caustics = {CausticsMode::kOff});
   SceneContext(const SceneContext&) = delete;
   SceneContext& operator=(const SceneContext&) = delete;
 
@@ -36,6 +38,7 @@ struct SceneContext {
   std::unique_ptr<BsdfTables> bsdf_tables;
   DisplacementSet displacements;
   std::unique_ptr<Accel> accel;
+  std::string caustics_reason;  ///< why globals.caustics is enabled, or not
   KernelGlobals globals;
 };
 

@@ -4,9 +4,12 @@
 
 #include "integrator/surface_kernels.h"
 #include "kernel/stage/accumulate_shadow.h"
+#include "kernel/stage/emit_photon.h"
+#include "kernel/stage/gather_photons.h"
 #include "kernel/stage/generate_camera_path.h"
 #include "kernel/stage/shade_background.h"
 #include "kernel/stage/shade_light.h"
+#include "kernel/stage/shade_photon.h"
 #include "kernel/stage/shade_surface.h"
 
 namespace relief {
@@ -79,6 +82,33 @@ void accumulate_shadows(const KernelGlobals& g,
   }
 }
 
+void gather(const KernelGlobals& g, const PathStateView& state, const QueueView& queue)
+{
+  for (std::uint32_t i = 0; i < queue.size; ++i) gather_photons(g, state, queue.paths[i]);
+}
+
+void emit(const KernelGlobals& g,
+          const PhotonSourcesView& sources,
+          const PathStateView& state,
+          std::uint64_t first,
+          std::uint32_t count,
+          QueueView& next)
+{
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (emit_photon(g, sources, state, i, first + i)) queue_push(next, i);
+  }
+}
+
+void shade_photons(const KernelGlobals& g,
+                   const PhotonSourcesView& sources,
+                   const PathStateView& state,
+                   const QueueView& queue,
+                   QueueView& next,
+                   PhotonQueueView& photons)
+{
+  for (std::uint32_t i = 0; i < queue.size; ++i) shade_photon(g, sources, state, queue.paths[i], next, photons);
+}
+
 void finish(const KernelGlobals& g,
             const PathStateView& state,
             const Batch& batch,
@@ -88,9 +118,13 @@ void finish(const KernelGlobals& g,
   const auto num_pixels = static_cast<std::uint32_t>(batch.width * batch.height);
   for (std::uint32_t i = 0; i < num_pixels * batch.num_samples; ++i) {
     const std::uint32_t sample = batch.first_sample + i / num_pixels;
+    Vec3f caustic;
+    if (state.caustic.radiance_r != nullptr) {
+      caustic = {state.caustic.radiance_r[i], state.caustic.radiance_g[i], state.caustic.radiance_b[i]};
+    }
     const bool finite =
         film_add_sample(g.film, state.pixel[i], sample, {state.direct_r[i], state.direct_g[i], state.direct_b[i]},
-                        {state.indirect_r[i], state.indirect_g[i], state.indirect_b[i]});
+                        {state.indirect_r[i], state.indirect_g[i], state.indirect_b[i]}, caustic);
     if (finite) continue;
     ++counters.nonfinite_samples;
     const std::uint64_t key = std::uint64_t{state.pixel[i]} << 32 | sample;
@@ -103,10 +137,14 @@ constexpr StageTable kTable = {
     generate,
     {shade_surfaces<kSurfaceKernelFeatures[0]>, shade_surfaces<kSurfaceKernelFeatures[1]>,
      shade_surfaces<kSurfaceKernelFeatures[2]>, shade_surfaces<kSurfaceKernelFeatures[3]>,
-     shade_surfaces<kSurfaceKernelFeatures[4]>},
+     shade_surfaces<kSurfaceKernelFeatures[4]>, shade_surfaces<kSurfaceKernelFeatures[5]>,
+     shade_surfaces<kSurfaceKernelFeatures[6]>},
     shade_backgrounds,
     shade_lights,
     accumulate_shadows,
+    gather,
+    emit,
+    shade_photons,
     finish,
 };
 

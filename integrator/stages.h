@@ -6,12 +6,14 @@
 
 #include "kernel/counters.h"
 #include "kernel/globals.h"
+#include "kernel/photon/sources.h"
+#include "kernel/stage/photon_queue.h"
 #include "kernel/state/path_state.h"
 
 namespace relief {
 
 /// Surface kernels are instantiated for a few feature masks, in rising order of what they can do.
-inline constexpr int kNumSurfaceKernels = 5;
+inline constexpr int kNumSurfaceKernels = 7;
 
 /// A rectangle of pixels and a run of their samples; path i of a batch is pixel i % (width·height) in the order of
 /// batch_pixel, sample first_sample + i / (width·height).
@@ -38,6 +40,21 @@ struct StageTable {
                             const PathStateView&,
                             const ShadowQueueView& shadow,
                             const float* visibility);
+  /// Writes the photons that the paths' hits have around them to the caustic columns.
+  void (*gather_photons)(const KernelGlobals&, const PathStateView&, const QueueView& queue);
+  /// Starts photons `first` … `first + count − 1`; those that carry light are queued, as paths from 0 on.
+  void (*emit_photons)(const KernelGlobals&,
+                       const PhotonSourcesView&,
+                       const PathStateView&,
+                       std::uint64_t first,
+                       std::uint32_t count,
+                       QueueView& next);
+  void (*shade_photons)(const KernelGlobals&,
+                        const PhotonSourcesView&,
+                        const PathStateView&,
+                        const QueueView& queue,
+                        QueueView& next,
+                        PhotonQueueView& photons);
   /// Adds the batch's finished samples to the film, in path order.
   /// @param first_nonfinite  pixel << 32 | sample, lowered to the least of the samples that were dropped
   void (*finish)(const KernelGlobals&, const PathStateView&, const Batch&, Counters&, std::uint64_t& first_nonfinite);

@@ -13,12 +13,15 @@ inline constexpr unsigned kSurfaceKernelFeatures[kNumSurfaceKernels] = {
     kFeatureTransmission,
     kFeatureMetal | kFeatureTextures | kFeatureNormalMaps | kFeatureTransparency,
     kFeatureAll,
+    kFeatureCaustics,
+    kFeatureCaustics | kFeatureAll,
 };
 
 /// Kernel for a material.
-inline int surface_kernel_index(const Material& material)
+/// @param caustics  the render has a photon pass
+inline int surface_kernel_index(const Material& material, bool caustics)
 {
-  const unsigned needed = feature_mask_of(material);
+  const unsigned needed = feature_mask_of(material) | (caustics ? kFeatureCaustics : 0u);
   int index = 0;
   while ((needed & ~kSurfaceKernelFeatures[index]) != 0) ++index;
   return index;

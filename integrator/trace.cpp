@@ -97,7 +97,7 @@ std::vector<RecordedRay> trace_path(const SceneContext& context,
   g.crop_x = x;
   g.crop_y = y;
   g.film = film.accumulator();
-  Wavefront wavefront;
+  Wavefront wavefront(false);
   wavefront.recorder = &rays;
   wavefront.run(g, *context.accel, stage_table_select(), context.surface_kernel, {0, 0, 1, 1, sample_index, 1});
   return rays;

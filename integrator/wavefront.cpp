@@ -6,8 +6,6 @@
 #include <new>
 #include <utility>
 
-#include "integrator/intersect_stage.h"
-
 namespace relief {
 
 namespace {
@@ -29,7 +27,10 @@ using Clock = std::chrono::steady_clock;
 
 void Wavefront::Free::operator()(void* p) const { std::free(p); }
 
-std::size_t Wavefront::bytes() { return kNumColumns * (aligned(kBatchPaths * 4) + kStagger); }
+std::size_t Wavefront::bytes(bool caustics)
+{
+  return (kNumColumns + (caustics ? kNumCausticColumns : 0u)) * (aligned(kBatchPaths * 4) + kStagger);
+}
 
 template <class T>
 T* Wavefront::column(std::size_t count)
@@ -39,7 +40,8 @@ T* Wavefront::column(std::size_t count)
   return start;
 }
 
-Wavefront::Wavefront() : memory_(static_cast<std::byte*>(std::aligned_alloc(kAlignment, bytes())))
+Wavefront::Wavefront(bool caustics)
+    : memory_(static_cast<std::byte*>(std::aligned_alloc(kAlignment, bytes(caustics))))
 {
   if (memory_ == nullptr) throw std::bad_alloc();
 #define X(type, name) state_.name = column<type>(kBatchPaths);
@@ -57,6 +59,27 @@ Wavefront::Wavefront() : memory_(static_cast<std::byte*>(std::aligned_alloc(kAli
     queue->paths = column<std::uint32_t>(kBatchPaths);
   }
   for (QueueView& queue : surfaces_) queue.paths = column<std::uint32_t>(kBatchPaths);
+  if (!caustics) return;
+  CausticStateView& c = state_.caustic;
+  for (float** p : {&c.irradiance_r, &c.irradiance_g, &c.irradiance_b, &c.radiance_r, &c.radiance_g, &c.radiance_b}) {
+    *p = column<float>(kBatchPaths);
+  }
+  c.wi = column<std::uint32_t>(kBatchPaths);
+}
+
+void Wavefront::note_displacement(const DisplacementWork& work)
+{
+  counters.displaced_prisms += work.total.prisms;
+  counters.displaced_bounds += work.total.bounds;
+  counters.displaced_texels += work.total.texels;
+  counters.displaced_inversions += work.total.inversions;
+  most_displacement_steps = std::max(most_displacement_steps, work.most_steps);
+}
+
+void Wavefront::clear_queues()
+{
+  lights_.size = background_.size = next_.size = shadow_.size = 0;
+  for (QueueView& queue : surfaces_) queue.size = 0;
 }
 
 void Wavefront::record_rays() const
@@ -99,6 +122,11 @@ void Wavefront::run(const KernelGlobals& g,
   };
 
   stages.generate(g, state_, batch);
+  if (g.caustics.enabled) {
+    for (float* p : {state_.caustic.radiance_r, state_.caustic.radiance_g, state_.caustic.radiance_b}) {
+      std::fill_n(p, batch.num_paths(), 0.0f);
+    }
+  }
   active_.size = batch.num_paths();
   for (std::uint32_t i = 0; i < active_.size; ++i) active_.paths[i] = i;
   counters.camera_rays += active_.size;
@@ -107,13 +135,16 @@ void Wavefront::run(const KernelGlobals& g,
   DisplacementWork displacement;
   for (bool camera = true; active_.size > 0; camera = false) {
     if (!camera) counters.bounce_rays += active_.size;
-    lights_.size = background_.size = next_.size = shadow_.size = 0;
-    for (QueueView& queue : surfaces_) queue.size = 0;
+    clear_queues();
     intersect_closest(g, accel, state_, active_, camera, surface_kernel.data(), surfaces_.data(), lights_, background_,
                       displacement);
     if (recorder != nullptr) record_rays();
     charge(Stage::kIntersectClosest);
 
+    if (g.caustics.enabled) {
+      for (const QueueView& queue : surfaces_) stages.gather_photons(g, state_, queue);
+      charge(Stage::kGatherPhotons);
+    }
     stages.shade_background(g, state_, background_, counters);
     stages.shade_light(g, state_, lights_, next_);
     for (std::size_t k = 0; k < surfaces_.size(); ++k) {
@@ -130,13 +161,49 @@ void Wavefront::run(const KernelGlobals& g,
     charge(Stage::kShade);
   }
 
-  counters.displaced_prisms += displacement.total.prisms;
-  counters.displaced_bounds += displacement.total.bounds;
-  counters.displaced_texels += displacement.total.texels;
-  counters.displaced_inversions += displacement.total.inversions;
-  most_displacement_steps = std::max(most_displacement_steps, displacement.most_steps);
+  note_displacement(displacement);
   stages.finish(g, state_, batch, counters, first_nonfinite);
   charge(Stage::kFilm);
+}
+
+void Wavefront::trace_photons(const KernelGlobals& g,
+                              const Accel& accel,
+                              const StageTable& stages,
+                              const std::vector<std::uint8_t>& surface_kernel,
+                              const PhotonSourcesView& sources,
+                              std::uint64_t first,
+                              std::uint32_t count,
+                              std::vector<Photon>& out)
+{
+  RELIEF_ASSERT(count <= kBatchPaths);
+  const Clock::time_point start = Clock::now();
+  counters.photon_paths += count;
+  active_.size = 0;
+  stages.emit_photons(g, sources, state_, first, count, active_);
+  DisplacementWork displacement;
+  while (active_.size > 0) {
+    clear_queues();
+    counters.photon_rays += active_.size;
+    intersect_closest(g, accel, state_, active_, false, surface_kernel.data(), surfaces_.data(), lights_, background_,
+                      displacement);
+    const std::size_t before = out.size();
+    out.resize(before + active_.size);
+    PhotonQueueView photons{out.data() + before, 0};
+    for (const QueueView& queue : surfaces_) {
+      stages.shade_photons(g, sources, state_, queue, next_, photons);
+    }
+    out.resize(before + photons.size);
+    // Area lights let rays pass.
+    for (std::uint32_t i = 0; i < lights_.size; ++i) {
+      const std::uint32_t path = lights_.paths[i];
+      state_.t_min[path] = next_float_up(state_.hit_t[path]);
+      queue_push(next_, path);
+    }
+    std::swap(active_, next_);
+  }
+  note_displacement(displacement);
+  seconds[static_cast<std::size_t>(Stage::kTracePhotons)] +=
+      std::chrono::duration<double>(Clock::now() - start).count();
 }
 
 }  // namespace relief

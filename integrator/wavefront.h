@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "integrator/accel.h"
+#include "integrator/intersect_stage.h"
 #include "integrator/stages.h"
 #include "kernel/counters.h"
 #include "kernel/globals.h"
@@ -17,10 +18,10 @@ namespace relief {
 /// 1 MiB.
 inline constexpr std::uint32_t kBatchPaths = 4096;
 
-enum class Stage : int { kGenerate, kIntersectClosest, kShade, kIntersectShadow, kFilm };
-inline constexpr int kNumStages = 5;
-inline constexpr std::array<const char*, kNumStages> kStageNames = {"generate", "intersect_closest", "shade",
-                                                                    "intersect_shadow", "film"};
+enum class Stage : int { kGenerate, kIntersectClosest, kGatherPhotons, kShade, kIntersectShadow, kFilm, kTracePhotons };
+inline constexpr int kNumStages = 7;
+inline constexpr std::array<const char*, kNumStages> kStageNames = {
+    "generate", "intersect_closest", "gather_photons", "shade", "intersect_shadow", "film", "trace_photons"};
 
 inline constexpr std::uint64_t kNoSample = ~std::uint64_t{0};
 
@@ -35,7 +36,8 @@ struct RecordedRay {
 /// Owned by one thread at a time.
 class Wavefront {
  public:
-  Wavefront();
+  /// @param caustics  camera paths will gather photons
+  explicit Wavefront(bool caustics);
 
   /// Renders a batch of at most kBatchPaths paths into the film.
   void run(const KernelGlobals& g,
@@ -44,7 +46,19 @@ class Wavefront {
            const std::vector<std::uint8_t>& surface_kernel,
            const Batch& batch);
 
-  static std::size_t bytes();
+  /// Follows photons `first` … `first + count − 1`.
+  /// @param count  at most kBatchPaths
+  /// @param out    gets those that were kept, in an order that depends on nothing else
+  void trace_photons(const KernelGlobals& g,
+                     const Accel& accel,
+                     const StageTable& stages,
+                     const std::vector<std::uint8_t>& surface_kernel,
+                     const PhotonSourcesView& sources,
+                     std::uint64_t first,
+                     std::uint32_t count,
+                     std::vector<Photon>& out);
+
+  static std::size_t bytes(bool caustics);
 
   std::vector<RecordedRay>* recorder = nullptr;  ///< receives every ray of the batch, if set
   Counters counters;
@@ -55,6 +69,8 @@ class Wavefront {
   std::uint64_t first_nonfinite = kNoSample;
 
  private:
+  void clear_queues();
+  void note_displacement(const DisplacementWork& work);
   void record_rays() const;
   void record_shadow_rays() const;
 

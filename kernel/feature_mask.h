@@ -13,8 +13,9 @@ enum FeatureBit : unsigned {
   kFeatureTransmission = 1u << 3,  ///< glass: solid or thin walls, and absorption inside
   kFeatureLayers = 1u << 4,        ///< clearcoat or sheen
   kFeatureMetal = 1u << 5,         ///< metallic above zero
+  kFeatureCaustics = 1u << 6,      ///< photons bring part of the light: of the render, not of a material
 };
-inline constexpr unsigned kFeatureAll = (1u << 6) - 1u;
+inline constexpr unsigned kFeatureAll = (1u << 6) - 1u;  ///< of materials
 
 /// Bits that one material needs; a scene needs the union over its materials.
 RELIEF_KERNEL unsigned feature_mask_of(const Material& m)

@@ -7,6 +7,7 @@
 #include "kernel/film/film_accumulator.h"
 #include "kernel/film/pixel_filter.h"
 #include "kernel/light/light_sampler.h"
+#include "kernel/photon/photon.h"
 #include "kernel/shape/mesh_view.h"
 #include "kernel/texture/texture_view.h"
 
@@ -29,6 +30,7 @@ struct KernelGlobals {
   const std::uint32_t* area_light_index = nullptr;  ///< light of object num_instances + i
   LightsView lights;
   const BsdfTables* bsdf_tables = nullptr;
+  CausticsView caustics;
   Camera camera;
   Vec3f camera_forward;  ///< unit, world: the axis that depths are measured along
   BounceLimits limits;

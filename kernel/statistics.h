@@ -25,6 +25,16 @@ struct DisplacementStatistics {
   std::vector<std::string> reasons;  ///< for what `auto` chose, a line a geometry that it weighed tessellations for
 };
 
+/// The photon pass; all 0 where there is none.
+struct CausticStatistics {
+  std::string reason;              ///< why there is a pass, or none
+  std::uint64_t photons = 0;       ///< started, of all passes
+  std::uint64_t stored = 0;        ///< kept
+  std::uint64_t passes = 0, num_sources = 0, bytes = 0;
+  double first_radius = 0, radius = 0;  ///< of the first and the last pass, metres
+  double seconds = 0;
+};
+
 struct Statistics {
   std::string scene, version, isa, view;
   std::uint64_t seed = 0;
@@ -36,6 +46,7 @@ struct Statistics {
   std::uint64_t peak_memory_bytes = 0, bvh_bytes = 0, mesh_bytes = 0, texture_bytes = 0, light_bytes = 0,
                 film_bytes = 0, path_state_bytes = 0;
   DisplacementStatistics displacement;
+  CausticStatistics caustics;
   Counters counters;
   std::vector<StageSeconds> stages;
   std::vector<std::string> warnings;

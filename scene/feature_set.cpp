@@ -42,9 +42,8 @@ std::array<const TextureRef*, 12> material_textures(const Material& m)
 
 bool material_casts_caustics(const Material& material)
 {
-  constexpr float kRoughest = 0.25f;
   const bool bends = material.transmission > 0 || material.metallic >= 0.5f;
-  return bends && !material.unlit && material.roughness <= kRoughest;
+  return bends && !material.unlit && material.roughness <= kCausticRoughness;
 }
 
 FeatureSet feature_set_detect(const Scene& scene)

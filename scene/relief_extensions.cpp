@@ -39,6 +39,18 @@ void read_pixel_filter(const JsonReader& r, RenderSettings& s, Warnings& warning
   filter.warn_unread(warnings);
 }
 
+CausticSettings read_caustics(const JsonReader& r, Warnings& warnings)
+{
+  CausticSettings s;
+  s.mode = static_cast<CausticsMode>(r.choice("mode", kCausticsModeLabels, 0));
+  s.photons = r.number("photons", s.photons, 0, 1e8);
+  s.alpha = r.number_f("alpha", s.alpha, 0.01, 1);
+  s.radius = r.number_f("radius", s.radius, 0, kNoLimit);
+  s.memory_mib = r.number("memory", s.memory_mib, 1, 1e6);
+  r.warn_unread(warnings);
+  return s;
+}
+
 /// Vector of the node scaled by a length, for the half axes of an area light.
 Vec3f half_axis(Vec3f axis, float size) { return axis * (0.5f * size); }
 
@@ -157,9 +169,7 @@ RenderSettings relief_render(const GltfDocument& document, Warnings& warnings)
     s.frames_per_second = r.number_f("fps", s.frames_per_second, 1e-3, 1e6);
     read_pixel_filter(r, s, warnings);
     s.luminous_efficacy = r.number_f("luminousEfficacy", 1, 1e-6, 1e6);
-    if (r.has("caustics")) {
-      static_cast<void>(r.object("caustics"));
-    }
+    if (r.has("caustics")) s.caustics = read_caustics(r.object("caustics"), warnings);
     r.warn_unread(warnings);
   });
   return s;

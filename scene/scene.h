@@ -87,6 +87,18 @@ struct DisplacementSettings {
   bool weld_seams = false;
 };
 
+enum class CausticsMode : std::uint8_t { kAuto, kOn, kOff };
+inline constexpr std::string_view kCausticsModeLabels[] = {"auto", "on", "off"};
+
+/// The photon pass, see integrator/photon_pass.h.
+struct CausticSettings {
+  CausticsMode mode = CausticsMode::kAuto;
+  double photons = 0;     ///< started in a pass (a sample a pixel); 0: one a pixel, at least 32,768
+  float alpha = 2.f / 3;  ///< (0, 1]: how fast the radius shrinks, see photon_radius_factor
+  float radius = 0;       ///< of the first pass, metres; 0: by how dense its photons lie
+  double memory_mib = 256;
+};
+
 /// RELIEF_render; the command line overrides single fields.
 struct RenderSettings {
   int width = 960, height = 540;
@@ -102,6 +114,7 @@ struct RenderSettings {
   float frames_per_second = 24;
   PixelFilter filter = PixelFilter::kBlackmanHarris;
   float filter_width = 1.5f;    ///< pixels
+  CausticSettings caustics;
   float luminous_efficacy = 1;  ///< lm/W that divides KHR_lights_punctual's candela and lux
 };
 

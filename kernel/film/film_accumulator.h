@@ -18,7 +18,7 @@ struct AccumulatorLayout {
   static constexpr int kAlways = 16;
 
   int direct = -1, albedo = -1, normal = -1, depth = -1, position = -1, uv = -1, object_id = -1, material_id = -1,
-      displacement_steps = -1;
+      displacement_steps = -1, caustic = -1;
   int num_floats = kAlways;
 };
 
@@ -82,11 +82,12 @@ RELIEF_KERNEL bool film_add_sample(const FilmAccumulatorView& film,
                                    std::uint32_t pixel,
                                    std::uint32_t sample,
                                    Vec3f direct,
-                                   Vec3f indirect)
+                                   Vec3f indirect,
+                                   Vec3f caustic = {})
 {
   const AccumulatorLayout& layout = film.layout;
   float* record = film.pixels + static_cast<std::size_t>(pixel) * static_cast<std::size_t>(layout.num_floats);
-  const Vec3f radiance = direct + indirect;
+  const Vec3f radiance = direct + indirect + caustic;
   if (!is_finite(radiance)) return false;
   film_add3(record + AccumulatorLayout::kBeauty, radiance);
   film_add3(record + AccumulatorLayout::kSquares, radiance * radiance);
@@ -94,6 +95,7 @@ RELIEF_KERNEL bool film_add_sample(const FilmAccumulatorView& film,
   if ((sample & 3u) == 0) film_add3(record + AccumulatorLayout::kQuarter0, radiance);
   if ((sample & 3u) == 1) film_add3(record + AccumulatorLayout::kQuarter1, radiance);
   if (layout.direct >= 0) film_add3(record + layout.direct, direct);
+  if (layout.caustic >= 0) film_add3(record + layout.caustic, caustic);
   return true;
 }
 

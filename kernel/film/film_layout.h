@@ -23,8 +23,9 @@ enum class Aov : std::uint8_t {
   kVariance,
   kHalf,
   kDisplacementSteps,
+  kCaustic,
 };
-inline constexpr int kNumAovs = 14;
+inline constexpr int kNumAovs = 15;
 
 struct AovInfo {
   Aov aov;
@@ -50,6 +51,7 @@ inline constexpr std::array<AovInfo, kNumAovs> kAovInfo = {{
     {Aov::kHalf, "half", "RGB", false, "mean of the pixel's even-numbered samples"},
     {Aov::kDisplacementSteps, "displacement_steps", "N", false,
      "bounds and texels of displaced meshes tested for a camera ray, averaged"},
+    {Aov::kCaustic, "caustic", "RGB", false, "light that the photon pass brought; part of indirect"},
 }};
 
 /// Offsets, in floats, of each kept AOV inside one pixel's record; −1 when it is not kept.

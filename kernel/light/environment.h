@@ -159,6 +159,27 @@ RELIEF_KERNEL float environment_pdf(const EnvironmentView& environment, Vec3f wi
   return environment_pdf_uv(environment, environment_uv(environment, wi));
 }
 
+/// A direction of all of the environment's light, for photons: half of them by environment_sample, whose density may leave
+/// dim parts out, half evenly.
+/// @param u  uniform in [0, 1)²
+RELIEF_KERNEL EnvironmentSample environment_sample_all(const EnvironmentView& environment, Vec2f u)
+{
+  const float even = 0.25f * kInvPi;
+  const bool has_cells = environment.has_map && environment.num_rows > 0;
+  EnvironmentSample sample;
+  if (has_cells && u.x < 0.5f) {
+    sample = environment_sample(environment, {2.0f * u.x, u.y});
+  } else {
+    const float x = has_cells ? 2.0f * u.x - 1.0f : u.x;
+    const float z = 1.0f - 2.0f * u.y;
+    const float r = 2.0f * safe_sqrt(u.y * (1.0f - u.y));
+    sample.wi = {r * std::cos(2.0f * kPi * x), z, r * std::sin(2.0f * kPi * x)};
+    sample.radiance = environment_eval(environment, sample.wi);
+  }
+  sample.pdf_solid_angle = has_cells ? 0.5f * (environment_pdf(environment, sample.wi) + even) : even;
+  return sample;
+}
+
 /// Radiance and density at once, for paths that leave the scene.
 RELIEF_KERNEL EnvironmentSample environment_eval_pdf(const EnvironmentView& environment, Vec3f wi)
 {

@@ -13,6 +13,7 @@ struct Light {
   LightKind kind = LightKind::kPoint;
   bool two_sided = false;         ///< rectangle, disk, triangle
   bool visible_to_camera = true;  ///< rectangle, disk
+  bool casts_caustics = true;     ///< photons start from it, where there is a photon pass
   Vec3f P{};                      ///< position or centre, metres (triangle: first vertex)
   Vec3f axis{0, 0, -1};           ///< unit: spot and sun: direction of travel; rectangle, disk, triangle: emitting side
   Vec3f edge_u{}, edge_v{};       ///< rectangle, disk: *half* axes, any two independent vectors (disk: an ellipse);

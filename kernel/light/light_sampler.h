@@ -60,6 +60,7 @@ struct LightsView {
   EnvironmentIrradiance environment_irradiance;
   /// Where the other lights' estimates sum to more, the environment is left to paths that follow the BSDF.
   float environment_yields_to = kInfinity;
+  bool environment_casts_caustics = true;  ///< as Light::casts_caustics
 };
 
 /// How likely each group is, and the estimates needed to go on.
@@ -68,6 +69,12 @@ struct LightGroups {
   float sun_sum = 0;                            ///< estimate summed over the suns
   LightEstimates finite_root;
 };
+
+/// @param light_index  −1: environment
+RELIEF_KERNEL bool light_casts_caustics(const LightsView& view, std::int32_t light_index)
+{
+  return light_index < 0 ? view.environment_casts_caustics : view.lights[light_index].casts_caustics;
+}
 
 /// Mean of the three channels: the scalar by which lights are compared.
 RELIEF_KERNEL float light_scalar(Vec3f rgb) { return (rgb.x + rgb.y + rgb.z) * (1.0f / 3.0f); }

@@ -78,6 +78,28 @@ RELIEF_KERNEL float path_light_weight(LightTechnique technique, float pdf_light,
   return technique == LightTechnique::kMis ? mis_power(pdf_light, pdf_bsdf) : 0.0f;
 }
 
+/// Whether light that a sharp lobe of this surface brings to the path is the photon pass's.
+RELIEF_KERNEL bool path_caustic_after(std::uint32_t flags, const InstanceView& instance)
+{
+  return (flags & (kPathAfterSoft | kPathCaustic)) != 0 && (instance.flags & kCausticCaster) != 0;
+}
+
+/// The flags of a path after a scattering event.
+/// @param sharp  the event's lobe, see sharp_lobes
+RELIEF_KERNEL std::uint32_t path_caustic_flags(std::uint32_t flags, const InstanceView& instance, bool sharp)
+{
+  const std::uint32_t others = flags & ~std::uint32_t{kPathAfterSoft | kPathCaustic};
+  if (sharp) return others | (path_caustic_after(flags, instance) ? kPathCaustic : 0u);
+  return others | ((instance.flags & kGathersPhotons) != 0 ? kPathAfterSoft : 0u);
+}
+
+/// Whether photons bring the light that lies ahead of the path.
+/// @param light_index  −1: environment
+RELIEF_KERNEL bool path_leaves_to_photons(const KernelGlobals& g, std::uint32_t flags, std::int32_t light_index)
+{
+  return (flags & kPathCaustic) != 0 && light_casts_caustics(g.lights, light_index);
+}
+
 /// Share of light left after a stretch of the path's medium (Beer–Lambert).
 /// @param distance  metres; infinite stretches of an absorbing medium transmit nothing
 RELIEF_KERNEL Vec3f path_transmittance(Vec3f sigma_a, float distance)

@@ -17,6 +17,7 @@ RELIEF_KERNEL void shade_background(const KernelGlobals& g,
   ++counters.background_hits;
   const int scatterings = path_bounces(state.bounces[path], BounceKind::kAll);
   if (scatterings == 0 && !g.environment_visible_to_camera) return;
+  if (path_leaves_to_photons(g, state.flags[path], -1)) return;
   const Vec3f D = path_direction(state, path);
   Vec3f radiance = environment_eval(g.lights.environment, D);
   if (is_zero(radiance)) return;

@@ -20,7 +20,8 @@ RELIEF_KERNEL void shade_light(const KernelGlobals& g, const PathStateView& stat
   const Vec3f D = path_direction(state, path);
   const float t = state.hit_t[path];
   Vec3f radiance = light_emitted(light, D);
-  if (!is_zero(radiance)) {
+  const bool by_photons = path_leaves_to_photons(g, state.flags[path], static_cast<std::int32_t>(light_index));
+  if (!is_zero(radiance) && !by_photons) {
     const float pdf = state.pdf[path];
     if (pdf > 0.0f) {
       const float pdf_light =

@@ -10,11 +10,20 @@
 
 namespace relief {
 
+/// Columns of camera paths that the caustic pass needs; null where it is off.
+struct CausticStateView {
+  float *irradiance_r = nullptr, *irradiance_g = nullptr, *irradiance_b = nullptr;  ///< at the present hit, W/m²
+  std::uint32_t* wi = nullptr;                                                      ///< octahedral: where it comes from
+  float *radiance_r = nullptr, *radiance_g = nullptr, *radiance_b = nullptr;        ///< of the sample so far
+};
+inline constexpr int kNumCausticColumns = 7;
+
 /// Columns of all paths of a batch; each is 64-byte aligned and has `capacity` entries.
 struct PathStateView {
 #define X(type, name) type* name = nullptr;
 #include "kernel/state/path_state_fields.inc"
 #undef X
+  CausticStateView caustic;
   std::uint32_t capacity = 0;
 };
 
@@ -28,6 +37,8 @@ enum PathFlag : std::uint32_t {
   kPathSawSurface = 1u << 0,   ///< an opaque-enough surface was met: the AOVs of the first hit are written
   kPathCounted = 1u << 1,      ///< coverage was added to the film's alpha
   kPathOnlyDelta = 1u << 2,    ///< every scattering event so far was a delta one
+  kPathAfterSoft = 1u << 3,    ///< the last scattering event is one where photons are gathered
+  kPathCaustic = 1u << 4,      ///< after such an event, all were sharp ones at casters: what lights lie ahead, photons bring
   kPathTransparentShift = 16,  ///< position of the count of transparent surfaces
 };
 

@@ -13,7 +13,12 @@ TEST(Dimensions, NoTwoUsesShareOne)
   for (const CameraDimension use : {CameraDimension::kFilm, CameraDimension::kLens}) {
     EXPECT_TRUE(seen.insert(dimension_camera(use)).second);
   }
+  for (const PhotonDimension use : {PhotonDimension::kSource, PhotonDimension::kLight, PhotonDimension::kAim}) {
+    EXPECT_TRUE(seen.insert(dimension_photon(use)).second);
+  }
+  EXPECT_TRUE(seen.insert(kLodDimension).second);
   for (int bounce = 0; bounce < 100; ++bounce) {
+    EXPECT_TRUE(seen.insert(dimension_sharpness(bounce)).second);
     for (std::uint32_t use = 0; use < kDimensionsPerBounce; ++use) {
       EXPECT_TRUE(seen.insert(dimension_bounce(bounce, static_cast<BounceDimension>(use))).second);
     }

@@ -1,0 +1,121 @@
+#include "integrator/photon_map.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+namespace relief {
+
+namespace {
+
+/// Number of the first photon of every chunk; the last entry is their sum.
+std::vector<std::size_t> chunk_offsets(const std::vector<std::vector<Photon>>& chunks)
+{
+  std::vector<std::size_t> first(chunks.size() + 1, 0);
+  for (std::size_t c = 0; c < chunks.size(); ++c) first[c + 1] = first[c] + chunks[c].size();
+  return first;
+}
+
+}  // namespace
+
+void PhotonMap::build(const std::vector<std::vector<Photon>>& chunks, float radius)
+{
+  radius_ = radius;
+  const std::vector<std::size_t> first = chunk_offsets(chunks);
+  const std::size_t count = first.back();
+  const std::uint32_t num_buckets = std::bit_ceil(static_cast<std::uint32_t>(std::max<std::size_t>(count, 1)));
+  const float inverse_cell = 0.5f / radius;
+
+  order_.resize(count);
+  std::vector<const Photon*> photons(count);
+  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
+    for (std::size_t k = 0; k < chunks[c].size(); ++k) {
+      const Photon& photon = chunks[c][k];
+      const std::uint32_t row =
+          photon_row(photon_cell(photon.P.y, inverse_cell), photon_cell(photon.P.z, inverse_cell));
+      const std::uint32_t bucket =
+          (row + static_cast<std::uint32_t>(photon_cell(photon.P.x, inverse_cell))) & (num_buckets - 1);
+      const std::size_t i = first[c] + k;
+      order_[i] = static_cast<std::uint64_t>(bucket) << 32 | i;
+      photons[i] = &photon;
+    }
+  });
+  tbb::parallel_sort(order_.begin(), order_.end());
+
+  x_.resize(count);
+  y_.resize(count);
+  z_.resize(count);
+  arrivals_.resize(count);
+  bucket_begin_.assign(num_buckets + 1, 0);
+  const auto bucket_of = [&](std::size_t i) { return static_cast<std::uint32_t>(order_[i] >> 32); };
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
+    const Photon& photon = *photons[order_[i] & 0xffffffffu];
+    x_[i] = photon.P.x;
+    y_[i] = photon.P.y;
+    z_[i] = photon.P.z;
+    arrivals_[i] = photon.arrival;
+    // The first photon of a bucket also begins the empty ones before it.
+    const std::uint32_t begin = i == 0 ? 0 : bucket_of(i - 1) + 1;
+    for (std::uint32_t b = begin; b <= bucket_of(i); ++b) bucket_begin_[b] = static_cast<std::uint32_t>(i);
+  });
+  for (std::uint32_t b = count > 0 ? bucket_of(count - 1) + 1 : 0; b <= num_buckets; ++b) {
+    bucket_begin_[b] = static_cast<std::uint32_t>(count);
+  }
+}
+
+PhotonMapView PhotonMap::view() const
+{
+  PhotonMapView v;
+  if (arrivals_.empty()) return v;
+  v.x = x_.data();
+  v.y = y_.data();
+  v.z = z_.data();
+  v.arrivals = arrivals_.data();
+  v.bucket_begin = bucket_begin_.data();
+  v.bucket_mask = static_cast<std::uint32_t>(bucket_begin_.size()) - 2;
+  v.radius = radius_;
+  return v;
+}
+
+std::size_t PhotonMap::bytes() const
+{
+  return arrivals_.capacity() * (sizeof(PhotonArrival) + 3 * sizeof(float)) +
+         bucket_begin_.capacity() * sizeof(std::uint32_t) + order_.capacity() * sizeof(std::uint64_t);
+}
+
+float photon_radius_for(const std::vector<std::vector<Photon>>& chunks, double wanted)
+{
+  const std::vector<std::size_t> first = chunk_offsets(chunks);
+  const std::size_t count = first.back();
+  // Every stride-th photon is searched, so that a tenth of what is wanted is still a number to rely on.
+  constexpr std::size_t kSearched = 32768;
+  constexpr std::size_t kQueries = 256;
+  const std::size_t stride = std::max<std::size_t>(1, count / kSearched);
+  std::vector<Vec3f> points;
+  for (const std::vector<Photon>& chunk : chunks) {
+    for (const Photon& photon : chunk) points.push_back(photon.P);
+  }
+  std::vector<Vec3f> searched;
+  for (std::size_t i = 0; i < count; i += stride) searched.push_back(points[i]);
+  const double nth = std::max(4.0, wanted / static_cast<double>(stride));
+  if (static_cast<double>(searched.size()) < 2 * nth) return 0;
+
+  std::vector<float> radii(std::min(kQueries, searched.size()));
+  tbb::parallel_for(std::size_t{0}, radii.size(), [&](std::size_t q) {
+    const std::size_t at = q * searched.size() / radii.size();
+    std::vector<float> squared(searched.size());
+    for (std::size_t i = 0; i < searched.size(); ++i) squared[i] = length_squared(searched[i] - searched[at]);
+    const auto place = squared.begin() + static_cast<std::ptrdiff_t>(nth);
+    std::nth_element(squared.begin(), place, squared.end());
+    radii[q] = std::sqrt(*place);
+  });
+  std::nth_element(radii.begin(), radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2), radii.end());
+  // On a surface, photons within a radius grow with its square.
+  const double found = nth * static_cast<double>(stride);
+  return static_cast<float>(radii[radii.size() / 2] * std::sqrt(wanted / found));
+}
+
+}  // namespace relief

@@ -1,0 +1,236 @@
+#include "integrator/photon_pass.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+
+#include <tbb/parallel_for.h>
+
+#include "integrator/flush_denormals.h"
+
+namespace relief {
+
+namespace {
+
+/// Grows boxes by a little, so that flat ones have an inside and hits on their faces are within.
+constexpr float kBoxMargin = 1e-4f;
+
+Box3 box_union(const Box3& a, const Box3& b) { return {min(a.low, b.low), max(a.high, b.high)}; }
+
+Vec3f box_centre(const Box3& box) { return 0.5f * (box.low + box.high); }
+
+float box_radius(const Box3& box) { return 0.5f * length(box.high - box.low); }
+
+/// World bounds of an instance.
+Box3 instance_bounds(const SceneContext& context, std::size_t index)
+{
+  const Instance& instance = context.scene.instances[index];
+  Box3 box{splat3(kInfinity), splat3(-kInfinity)};
+  const auto add = [&](Vec3f P_object) {
+    const Vec3f P = transform_point(instance.world_from_object, P_object);
+    box = box_union(box, {P, P});
+  };
+  if (const int displaced = context.displacements.geometry_index(index); displaced >= 0) {
+    const Box3 local = context.accel->displaced_bounds(static_cast<std::size_t>(displaced));
+    for (int corner = 0; corner < 8; ++corner) {
+      add({(corner & 1) != 0 ? local.high.x : local.low.x, (corner & 2) != 0 ? local.high.y : local.low.y,
+           (corner & 4) != 0 ? local.high.z : local.low.z});
+    }
+  } else {
+    for (const Vec3f& P : context.scene.meshes[static_cast<std::size_t>(instance.mesh_index)].P) add(P);
+  }
+  const Vec3f margin = splat3(kBoxMargin * box_radius(box));
+  return {box.low - margin, box.high + margin};
+}
+
+struct Caster {
+  std::size_t instance;
+  Box3 box;
+};
+
+/// Splits casters at the median of their widest axis until a group is small enough.
+void group(std::vector<Caster>::iterator begin,
+           std::vector<Caster>::iterator end,
+           std::ptrdiff_t largest,
+           PhotonSources& out)
+{
+  if (end - begin <= largest) {
+    Box3 box = begin->box;
+    for (auto caster = begin; caster != end; ++caster) {
+      box = box_union(box, caster->box);
+      out.target_of[caster->instance] = static_cast<std::int32_t>(out.targets.size());
+    }
+    out.targets.push_back(box);
+    return;
+  }
+  Box3 centres{splat3(kInfinity), splat3(-kInfinity)};
+  for (auto caster = begin; caster != end; ++caster) {
+    const Vec3f c = box_centre(caster->box);
+    centres = box_union(centres, {c, c});
+  }
+  const Vec3f size = centres.high - centres.low;
+  const auto key = [&](const Caster& caster) {
+    const Vec3f c = box_centre(caster.box);
+    return size.x >= size.y && size.x >= size.z ? c.x : size.y >= size.z ? c.y : c.z;
+  };
+  const auto middle = begin + (end - begin) / 2;
+  std::nth_element(begin, middle, end, [&](const Caster& a, const Caster& b) {
+    return key(a) != key(b) ? key(a) < key(b) : a.instance < b.instance;
+  });
+  group(begin, middle, largest, out);
+  group(middle, end, largest, out);
+}
+
+/// Estimate of the flux from a light to a box, W; 0 only where there is none.
+double flux_estimate(const Light& light, const Box3& box)
+{
+  const Vec3f to_box = box_centre(box) - light.P;
+  const float distance = length(to_box);
+  const float radius = box_radius(box);
+  const double emitted = static_cast<double>(light_scalar(light.emission));
+  if (light.kind == LightKind::kSun) return emitted * static_cast<double>(box_shadow_area(box, light.axis));
+
+  const Vec3f D = distance > 0.0f ? to_box / distance : light.axis;
+  const float outside = std::max(distance, radius);
+  const double omega = std::min(2.0 * static_cast<double>(kPi),
+                                static_cast<double>(box_shadow_area(box, D)) / static_cast<double>(sqr(outside)));
+  // How far the box reaches from its centre's direction.
+  const float spread = distance > radius ? std::asin(radius / distance) : kPi;
+  const float angle = std::max(0.0f, std::acos(clamp(dot(D, light.axis), -1.0f, 1.0f)) - spread);
+  if (light.kind == LightKind::kPoint) return emitted * omega;
+  if (light.kind == LightKind::kSpot) return std::cos(angle) > light.cos_outer ? emitted * omega : 0.0;
+  const float extent = length(light.edge_u) + length(light.edge_v);
+  const float slack = distance > extent ? std::asin(extent / distance) : kPi;
+  const float cosine = light.two_sided ? 1.0f : std::cos(std::max(0.0f, angle - slack));
+  return cosine > 0.0f ? emitted * static_cast<double>(light.area * std::max(cosine, 0.05f)) * omega : 0.0;
+}
+
+}  // namespace
+
+PhotonSourcesView PhotonSources::view(double photons_a_pass) const
+{
+  PhotonSourcesView v;
+  v.sources = sources.data();
+  v.cdf = cdf.data();
+  v.num_sources = static_cast<std::uint32_t>(sources.size());
+  v.targets = targets.data();
+  v.target_of = target_of.data();
+  v.scene_centre = scene_centre;
+  v.scene_radius = scene_radius;
+  v.photons_a_pass = photons_a_pass;
+  return v;
+}
+
+PhotonSources photon_sources_make(const SceneContext& context)
+{
+  const Scene& scene = context.scene;
+  PhotonSources out;
+  out.target_of.assign(scene.instances.size(), -1);
+  std::vector<Caster> casters;
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    if ((scene.instances[i].flags & kCausticCaster) != 0) casters.push_back({i, {}});
+  }
+  std::vector<std::int32_t> lights;
+  for (std::size_t i = 0; i < context.lights.lights.size(); ++i) {
+    const Light& light = context.lights.lights[i];
+    if (light.casts_caustics && !is_zero(light.emission)) lights.push_back(static_cast<std::int32_t>(i));
+  }
+  if (context.lights.environment_casts_caustics && context.lights.environment_flux_density > 0) lights.push_back(-1);
+  if (casters.empty() || lights.empty()) return out;
+
+  tbb::parallel_for(std::size_t{0}, casters.size(),
+                    [&](std::size_t i) { casters[i].box = instance_bounds(context, casters[i].instance); });
+  // A choice has 24 random bits: pairs beyond this many would be chosen unevenly.
+  constexpr std::size_t kMostPairs = 1u << 16;
+  const std::size_t most_groups = std::max<std::size_t>(1, kMostPairs / lights.size());
+  group(casters.begin(), casters.end(),
+        static_cast<std::ptrdiff_t>((casters.size() + most_groups - 1) / most_groups), out);
+
+  const Box3 bounds = context.accel->bounds();
+  out.scene_centre = box_centre(bounds);
+  out.scene_radius = 1.01f * box_radius(bounds);
+  for (const std::int32_t light : lights) {
+    for (std::size_t t = 0; t < out.targets.size(); ++t) {
+      const Box3& box = out.targets[t];
+      const Vec3f size = box.high - box.low;
+      const double surface = 2.0 * static_cast<double>(size.x * size.y + size.y * size.z + size.z * size.x);
+      const double flux = light < 0 ? context.lights.environment_flux_density * surface
+                                    : flux_estimate(context.lights.lights[static_cast<std::size_t>(light)], box);
+      if (!(flux > 0)) continue;
+      out.sources.push_back({light, static_cast<std::uint32_t>(t)});
+      out.cdf.push_back(std::min(flux, 1e30));
+    }
+  }
+  if (out.sources.empty()) return out;
+  const double sum = std::accumulate(out.cdf.begin(), out.cdf.end(), 0.0);
+  double before = 0;
+  for (double& entry : out.cdf) {
+    // An estimate may be wrong; none is trusted to be less than a tenth of the mean.
+    const double share = 0.9 * entry / sum + 0.1 / static_cast<double>(out.sources.size());
+    entry = before;
+    before += share;
+  }
+  for (double& entry : out.cdf) entry /= before;
+  out.cdf.push_back(1.0);
+  return out;
+}
+
+PhotonPass::PhotonPass(const SceneContext& context, const CausticSettings& settings, std::size_t num_pixels)
+    : context_(context), settings_(settings), sources_(photon_sources_make(context))
+{
+  // A photon's place in the map, and as it came from the tracer; most paths leave one at most.
+  constexpr double kBytes = 2.0 * sizeof(Photon) + 16;
+  constexpr double kFewest = 1 << 15;
+  const double wanted = settings.photons > 0 ? settings.photons : std::max(static_cast<double>(num_pixels), kFewest);
+  const double most = std::max(4096.0, settings.memory_mib * 1048576.0 / kBytes);
+  photons_a_pass_ = static_cast<std::uint32_t>(std::min({wanted, most, 1e8}));
+}
+
+void PhotonPass::next(KernelGlobals& g, const StageTable& stages, const std::function<Wavefront&()>& worker)
+{
+  const auto start = std::chrono::steady_clock::now();
+  g.caustics.map = {};
+  if (!sources_.sources.empty()) {
+    const PhotonSourcesView view = sources_.view(photons_a_pass_);
+    const std::uint64_t first = std::uint64_t{passes_} * photons_a_pass_;
+    chunks_.resize((photons_a_pass_ + kBatchPaths - 1) / kBatchPaths);
+    tbb::parallel_for(
+        std::size_t{0}, chunks_.size(),
+        [&](std::size_t c) {
+          const FlushDenormals flush;
+          const auto begin = static_cast<std::uint32_t>(c) * kBatchPaths;
+          chunks_[c].clear();
+          worker().trace_photons(g, *context_.accel, stages, context_.surface_kernel, view, first + begin,
+                                 std::min(kBatchPaths, photons_a_pass_ - begin), chunks_[c]);
+        },
+        tbb::simple_partitioner());
+    for (const std::vector<Photon>& chunk : chunks_) stored_ += chunk.size();
+    // Photons that a search is to find in the first pass where light is, at the median.
+    constexpr double kFound = 48;
+    if (!(first_radius_ > 0)) {
+      first_radius_ = settings_.radius > 0 ? settings_.radius : photon_radius_for(chunks_, kFound);
+    }
+    if (first_radius_ > 0) {
+      map_.build(chunks_, first_radius_ * static_cast<float>(photon_radius_factor(passes_, settings_.alpha)));
+      g.caustics.map = map_.view();
+    }
+  }
+  ++passes_;
+  seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+void PhotonPass::fill(CausticStatistics& stats) const
+{
+  stats.passes = passes_;
+  stats.photons = static_cast<std::uint64_t>(passes_) * photons_a_pass_;
+  stats.stored = stored_;
+  stats.num_sources = sources_.sources.size();
+  stats.first_radius = first_radius_;
+  stats.radius = passes_ > 0 ? first_radius_ * photon_radius_factor(passes_ - 1, settings_.alpha) : 0;
+  stats.seconds = seconds_;
+  stats.bytes = map_.bytes();
+  for (const std::vector<Photon>& chunk : chunks_) stats.bytes += chunk.capacity() * sizeof(Photon);
+}
+
+}  // namespace relief

@@ -1,0 +1,60 @@
+// The caustic pass: where photons start, how many, with what radius they are searched; and whether there is a pass at all.
+//
+// A light path belongs to it if, from the light, it meets one or more casters by their sharp lobes and then a soft lobe of
+// a receiver: L S+ D. What comes after, up to the camera, does not matter. All other paths are the path tracer's; see
+// path_caustic_flags and shade_surface_split for how it leaves these out.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "integrator/photon_map.h"
+#include "integrator/scene_context.h"
+#include "integrator/wavefront.h"
+
+namespace relief {
+
+/// Pairs of lights and groups of casters; owner of what a PhotonSourcesView points to.
+struct PhotonSources {
+  std::vector<PhotonSource> sources;
+  std::vector<double> cdf;
+  std::vector<Box3> targets;
+  std::vector<std::int32_t> target_of;
+  Vec3f scene_centre{};
+  float scene_radius = 0;
+
+  PhotonSourcesView view(double photons_a_pass) const;
+};
+
+/// Finds the casters, groups them, and weighs each light's flux to each group.
+/// @return no sources where no light can reach a caster
+PhotonSources photon_sources_make(const SceneContext& context);
+
+class PhotonPass {
+ public:
+  /// @param num_pixels  of the film
+  PhotonPass(const SceneContext& context, const CausticSettings& settings, std::size_t num_pixels);
+
+  /// Traces the next pass's photons and sorts them. Every sample of a pixel has a pass of its own, so that halves of the
+  /// samples know nothing of each other's photons, and the error estimate holds for caustics as for the rest.
+  /// @param g       gets the map
+  /// @param worker  the calling thread's
+  void next(KernelGlobals& g, const StageTable& stages, const std::function<Wavefront&()>& worker);
+
+  void fill(CausticStatistics& stats) const;
+
+ private:
+  const SceneContext& context_;
+  CausticSettings settings_;
+  PhotonSources sources_;
+  std::uint32_t photons_a_pass_;
+  std::uint32_t passes_ = 0;
+  float first_radius_ = 0;
+  std::vector<std::vector<Photon>> chunks_;
+  PhotonMap map_;
+  std::uint64_t stored_ = 0;
+  double seconds_ = 0;
+};
+
+}  // namespace relief

@@ -1,0 +1,63 @@
+// A surface's lobes in two: the sharp ones, which focus light into caustics, and the soft ones, on which caustics are
+// seen. f = f_sharp + f_soft exactly, so that a path counts either for the photon pass or for the path tracer.
+#pragma once
+
+#include "kernel/bsdf/layered.h"
+
+namespace relief {
+
+/// Which of a surface's microfacet lobes are sharp. Diffuse reflection, sheen and what microfacets scatter more than once
+/// never are.
+struct SharpLobes {
+  bool base = false;  ///< reflection, glass and thin wall: all of the same roughness
+  bool coat = false;
+};
+
+/// @param caster     what focuses light by its material or by request does so with all its microfacet lobes: whatever
+///                   textures say of their roughness, since photons and camera paths may read other levels of them
+/// @param roughness  perceptual; lobes of other surfaces are sharp up to here
+RELIEF_KERNEL SharpLobes sharp_lobes(const SurfaceParams& p, bool caster, float roughness)
+{
+  return {caster || p.roughness <= roughness, caster || p.clearcoat_roughness <= roughness};
+}
+
+/// The closure without its soft lobes. What is left is evaluated and sampled as if it were all; probabilities sum to one
+/// where there is anything.
+RELIEF_KERNEL SurfaceClosure closure_sharp(SurfaceClosure c, SharpLobes sharp)
+{
+  LobeProbabilities& p = c.probability;
+  p.diffuse = p.multiple = p.thin_multiple = p.sheen = 0.0f;
+  if (!sharp.base) p.specular = p.thin = p.glass = 0.0f;
+  if (!sharp.coat) p.coat = 0.0f;
+  const float sum = (p.specular + p.thin) + (p.glass + p.coat);
+  const float scale = sum > 0.0f ? 1.0f / sum : 0.0f;
+  p.specular *= scale;
+  p.thin *= scale;
+  p.glass *= scale;
+  p.coat *= scale;
+  return c;
+}
+
+/// The closure without its sharp lobes, to be evaluated: its pdf means nothing.
+RELIEF_KERNEL SurfaceClosure closure_soft(SurfaceClosure c, SharpLobes sharp)
+{
+  LobeProbabilities& p = c.probability;
+  if (sharp.base) p.specular = p.thin = p.glass = 0.0f;
+  if (sharp.coat) p.coat = 0.0f;
+  return c;
+}
+
+RELIEF_KERNEL bool closure_has_sharp(const SurfaceClosure& c, SharpLobes sharp)
+{
+  const LobeProbabilities& p = c.probability;
+  return (sharp.base && (p.specular > 0.0f || p.thin > 0.0f || p.glass > 0.0f)) || (sharp.coat && p.coat > 0.0f);
+}
+
+RELIEF_KERNEL bool closure_has_soft(const SurfaceClosure& c, SharpLobes sharp)
+{
+  const LobeProbabilities& p = c.probability;
+  return p.diffuse > 0.0f || p.multiple > 0.0f || p.thin_multiple > 0.0f || p.sheen > 0.0f ||
+         (!sharp.base && (p.specular > 0.0f || p.thin > 0.0f || p.glass > 0.0f)) || (!sharp.coat && p.coat > 0.0f);
+}
+
+}  // namespace relief

@@ -1,0 +1,149 @@
+// Stage: one photon from its number.
+#pragma once
+
+#include "kernel/globals.h"
+#include "kernel/photon/sources.h"
+#include "kernel/sample/dimensions.h"
+#include "kernel/shape/material_lookup.h"
+#include "kernel/shape/surface_hit.h"
+#include "kernel/state/path_state.h"
+
+namespace relief {
+
+/// A ray that carries light.
+struct EmittedRay {
+  Vec3f O{}, D{};
+  Vec3f power{};  ///< W, over the density of the ray; 0: none
+};
+
+/// Light from a point towards a box.
+/// @param intensity  W/sr
+RELIEF_KERNEL EmittedRay emit_from_point(const Light& light, const Box3& box, Vec2f u)
+{
+  BoxDirection aim;
+  if (box_contains(box, light.P)) {
+    const float z = 1.0f - 2.0f * u.y;
+    const float r = 2.0f * safe_sqrt(u.y * (1.0f - u.y));
+    aim = {{r * std::cos(2.0f * kPi * u.x), r * std::sin(2.0f * kPi * u.x), z}, 0.25f * kInvPi};
+  } else {
+    aim = box_aim_from(box, light.P, u);
+  }
+  if (!(aim.pdf > 0.0f)) return {};
+  const float falloff = light.kind == LightKind::kSpot ? spot_light_falloff(light, dot(aim.D, light.axis)) : 1.0f;
+  return {light.P, aim.D, light.emission * (falloff / aim.pdf)};
+}
+
+/// Light from a flat light towards a box.
+/// @param u_light  place on the light
+RELIEF_KERNEL EmittedRay emit_from_area(const KernelGlobals& g, const Light& light, const Box3& box, Vec2f u_light, Vec2f u)
+{
+  EmittedRay ray;
+  Vec3f radiance = light.emission;
+  if (light.kind == LightKind::kRectangle) {
+    ray.O = light.P + light.edge_u * (2.0f * u_light.x - 1.0f) + light.edge_v * (2.0f * u_light.y - 1.0f);
+  } else if (light.kind == LightKind::kDisk) {
+    const Vec2f q = warp_disk(u_light);
+    ray.O = light.P + light.edge_u * q.x + light.edge_v * q.y;
+  } else {
+    const Vec2f barycentric = warp_triangle(u_light);
+    ray.O = light.P + light.edge_u * barycentric.x + light.edge_v * barycentric.y;
+    const InstanceView& instance = g.instances[light.instance_index];
+    radiance = triangle_emission(g.materials[instance.material_index], g.textures, g.meshes[instance.mesh_index],
+                                 static_cast<std::uint32_t>(light.triangle_index), barycentric);
+  }
+  float pdf = 0.0f;
+  if (box_contains(box, ray.O)) {
+    // By the cosine, on a side chosen by chance where both shine.
+    Vec3f axis = light.axis;
+    if (light.two_sided) {
+      if (u.x >= 0.5f) axis = -axis;
+      u.x = 2.0f * (u.x >= 0.5f ? u.x - 0.5f : u.x);
+    }
+    const Vec3f local = warp_cosine_hemisphere(u);
+    ray.D = from_local(frame_from_normal(axis), local);
+    pdf = warp_cosine_hemisphere_pdf(local.z) * (light.two_sided ? 0.5f : 1.0f);
+  } else {
+    const BoxDirection aim = box_aim_from(box, ray.O, u);
+    ray.D = aim.D;
+    pdf = aim.pdf;
+  }
+  const float cosine = dot(ray.D, light.axis);
+  if (!(pdf > 0.0f) || !(light.two_sided || cosine > 0.0f)) return {};
+  ray.power = radiance * (__builtin_fabsf(cosine) * light.area / pdf);
+  if (light.kind == LightKind::kTriangle) {
+    const Vec3f error = gamma_bound(8) * (abs(light.P) + abs(light.edge_u) + abs(light.edge_v));
+    ray.O = offset_ray_origin(ray.O, error, cosine > 0.0f ? light.axis : -light.axis);
+  }
+  return ray;
+}
+
+/// Parallel light that falls on a box from outside the scene.
+/// @param irradiance  W/m² across D
+RELIEF_KERNEL EmittedRay emit_from_afar(const PhotonSourcesView& sources, const Box3& box, Vec3f D, Vec3f irradiance, Vec2f u)
+{
+  const Vec3f P = box_aim_along(box, D, u);
+  const float back = dot(P - sources.scene_centre, D) + sources.scene_radius;
+  return {P - D * back, D, irradiance * box_shadow_area(box, D)};
+}
+
+/// Starts a photon as path `path`. Its throughput is its power; its pixel, the group of casters it is aimed at.
+/// @return false: it carries nothing
+RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
+                               const PhotonSourcesView& sources,
+                               const PathStateView& state,
+                               std::uint32_t path,
+                               std::uint64_t number)
+{
+  // No pixel of an image is there.
+  const std::uint32_t hash = sample_pixel_hash(g.seed, -1, -1 - static_cast<int>(number >> 32));
+  const auto index = static_cast<std::uint32_t>(number);
+  const auto choice = static_cast<double>(sample_1d(hash, index, dimension_photon(PhotonDimension::kSource)));
+  std::uint32_t low = 0;
+  for (std::uint32_t length = sources.num_sources; length > 1;) {
+    const std::uint32_t half = length / 2;
+    if (sources.cdf[low + half] <= choice) low += half;
+    length -= half;
+  }
+  const double probability = sources.cdf[low + 1] - sources.cdf[low];
+  const PhotonSource& source = sources.sources[low];
+  const Box3& box = sources.targets[source.target];
+  const Vec2f u_light = sample_2d(hash, index, dimension_photon(PhotonDimension::kLight));
+  const Vec2f u = sample_2d(hash, index, dimension_photon(PhotonDimension::kAim));
+
+  EmittedRay ray;
+  if (source.light_index < 0) {
+    const EnvironmentSample sample = environment_sample_all(g.lights.environment, u_light);
+    ray = emit_from_afar(sources, box, -sample.wi, sample.radiance / sample.pdf_solid_angle, u);
+  } else {
+    const Light& light = g.lights.lights[source.light_index];
+    const bool is_point = light.kind == LightKind::kPoint || light.kind == LightKind::kSpot;
+    ray = is_point                         ? emit_from_point(light, box, u)
+          : light.kind == LightKind::kSun ? emit_from_afar(sources, box, light.axis, light.emission, u)
+                                           : emit_from_area(g, light, box, u_light, u);
+  }
+  const Vec3f power = ray.power * static_cast<float>(1.0 / (probability * sources.photons_a_pass));
+  if (is_zero(power) || !is_finite(power)) return false;
+
+  state.O_x[path] = ray.O.x;
+  state.O_y[path] = ray.O.y;
+  state.O_z[path] = ray.O.z;
+  state.D_x[path] = ray.D.x;
+  state.D_y[path] = ray.D.y;
+  state.D_z[path] = ray.D.z;
+  state.t_min[path] = 0.0f;
+  state.t_max[path] = kInfinity;
+  state.throughput_r[path] = power.x;
+  state.throughput_g[path] = power.y;
+  state.throughput_b[path] = power.z;
+  state.pixel[path] = source.target;
+  state.sample_index[path] = index;
+  state.pixel_hash[path] = hash;
+  // One, since none means a camera ray.
+  state.bounces[path] = 1;
+  state.flags[path] = 0;
+  state.sigma_a_r[path] = state.sigma_a_g[path] = state.sigma_a_b[path] = 0.0f;
+  state.cone_width[path] = state.cone_spread[path] = 0.0f;
+  return true;
+}
+
+}  // namespace relief

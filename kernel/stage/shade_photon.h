@@ -1,0 +1,113 @@
+// Stage: a photon met a surface. It is kept where soft lobes can show it, and goes on through sharp lobes of casters.
+#pragma once
+
+#include "kernel/bsdf/lobe_split.h"
+#include "kernel/photon/sources.h"
+#include "kernel/sample/dimensions.h"
+#include "kernel/sample/sobol.h"
+#include "kernel/stage/photon_queue.h"
+#include "kernel/stage/surface_interaction.h"
+
+namespace relief {
+
+/// As path_surface for camera paths: tells the surfaces that a photon meets apart. Its bounces leave out the first.
+RELIEF_KERNEL int photon_surface(const PathStateView& state, std::uint32_t path)
+{
+  return path_surface(state, path) + ((state.flags[path] & kPathCaustic) != 0 ? 1 : 0);
+}
+
+/// Scatters a photon by its surface's sharp lobes.
+/// @return false: its path ends
+RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
+                                        const PathStateView& state,
+                                        std::uint32_t path,
+                                        const SurfaceInteraction& at,
+                                        Vec3f wo,
+                                        Vec3f throughput)
+{
+  const ShadingSide& side = at.side;
+  const Vec3f wo_local = to_local(side.frame, wo);
+  const SurfaceClosure closure =
+      closure_sharp(surface_closure_make<kFeatureAll>(at.params, *g.bsdf_tables, wo_local), {true, true});
+  const int surface = photon_surface(state, path);
+  const std::uint32_t hash = state.pixel_hash[path];
+  const std::uint32_t sample = state.sample_index[path];
+  const BsdfSample bsdf = closure_sample<kFeatureAll, TransportMode::kImportance>(
+      closure, *g.bsdf_tables, sample_1d(hash, sample, dimension_bounce(surface, BounceDimension::kBsdfLobe)),
+      sample_2d(hash, sample, dimension_bounce(surface, BounceDimension::kBsdfUv)));
+  if (!(bsdf.pdf > 0.0f)) return false;
+  const Vec3f wi = from_local(side.frame, bsdf.wi);
+  // The adjoint of a BSDF with shading normals is not symmetric (Veach 1997, Eq. 5.19).
+  const float cos_o = __builtin_fabsf(dot(wo, side.Ng));
+  if (!(cos_o > 0.0f)) return false;
+  const float adjoint = __builtin_fabsf(wo_local.z) * __builtin_fabsf(dot(wi, side.Ng)) / cos_o;
+  const Vec3f scattered = throughput * bsdf.f * (adjoint / bsdf.pdf);
+
+  // Roulette by what the surface takes: photons keep their power.
+  const float survival = min(1.0f, max_component(scattered) / max_component(throughput));
+  if (!(sample_1d(hash, sample, dimension_bounce(surface, BounceDimension::kRoulette)) < survival)) return false;
+  const Vec3f power = scattered / survival;
+  if (is_zero(power) || !is_finite(power)) return false;
+
+  const Vec3f O = surface_ray_origin(at, wi);
+  state.O_x[path] = O.x;
+  state.O_y[path] = O.y;
+  state.O_z[path] = O.z;
+  state.D_x[path] = wi.x;
+  state.D_y[path] = wi.y;
+  state.D_z[path] = wi.z;
+  state.t_min[path] = kLeastDistance;
+  state.t_max[path] = kInfinity;
+  state.throughput_r[path] = power.x;
+  state.throughput_g[path] = power.y;
+  state.throughput_b[path] = power.z;
+  const bool transmitted = (bsdf.lobe & kLobeTransmit) != 0;
+  // A camera path counts the event next to the light, but no surface asks for that count any more.
+  if ((state.flags[path] & kPathCaustic) != 0) {
+    state.bounces[path] +=
+        1u + (1u << static_cast<int>(transmitted ? BounceKind::kTransmission : BounceKind::kGlossy));
+  }
+  state.flags[path] |= kPathCaustic;
+  if (transmitted && at.params.transmission > 0.0f && !at.params.thin) {
+    const Vec3f inside = side.front ? at.params.sigma_a : Vec3f{};
+    state.sigma_a_r[path] = inside.x;
+    state.sigma_a_g[path] = inside.y;
+    state.sigma_a_b[path] = inside.z;
+  }
+  return path_bounces(state.bounces[path], BounceKind::kAll) - 1 <= g.limits.total;
+}
+
+/// Next: intersect closest (pushed on `next`), or the path ends. At most one photon is added to `photons`.
+RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
+                                const PhotonSourcesView& sources,
+                                const PathStateView& state,
+                                std::uint32_t path,
+                                QueueView& next,
+                                PhotonQueueView& photons)
+{
+  const Vec3f wo = -path_direction(state, path);
+  SurfaceInteraction at = surface_interaction_make<kFeatureAll>(g, state, path, wo);
+  if (!surface_is_met<kFeatureAll>(state, path, at.params.alpha, photon_surface(state, path))) {
+    if (path_pass_through(g, state, path)) queue_push(next, path);
+    return;
+  }
+  const bool has_scattered = (state.flags[path] & kPathCaustic) != 0;
+  const std::uint32_t flags = at.instance->flags;
+  const bool aimed_at = sources.target_of[state.hit_object[path]] == static_cast<std::int32_t>(state.pixel[path]);
+  if (at.params.unlit || !(has_scattered || aimed_at)) return;
+
+  Vec3f sigma_a = path_sigma_a(state, path);
+  // A light within glass: camera paths have come in through its surface and know.
+  if (!has_scattered && !at.side.front && at.params.transmission > 0.0f && !at.params.thin) sigma_a = at.params.sigma_a;
+  const Vec3f throughput = path_throughput(state, path) * path_transmittance(sigma_a, state.hit_t[path]);
+  if (is_zero(throughput)) return;
+  surface_interaction_frame<kFeatureAll>(g, state, path, wo, at);
+  if (has_scattered && (flags & kGathersPhotons) != 0) {
+    photons.photons[photons.size++] = {
+        at.hit.P, {throughput, octahedral_encode(wo), octahedral_encode(at.side.Ng), state.bounces[path] - 1u}};
+  }
+  if ((flags & kCausticCaster) == 0) return;
+  if (shade_photon_scatter(g, state, path, at, wo, throughput)) queue_push(next, path);
+}
+
+}  // namespace relief

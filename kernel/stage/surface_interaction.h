@@ -1,0 +1,151 @@
+// What a path meets at a surface, before anything is decided: the point, its material's parameters, and the frame its
+// BSDF is evaluated in. Camera paths (shade_surface.h) and photons (shade_photon.h) see the same.
+#pragma once
+
+#include "kernel/bsdf/surface_params.h"
+#include "kernel/feature_mask.h"
+#include "kernel/globals.h"
+#include "kernel/shape/surface_hit.h"
+#include "kernel/stage/path_access.h"
+#include "kernel/texture/ray_cone.h"
+
+namespace relief {
+
+/// The side of a surface that a path is on, and the frame its BSDF is evaluated in.
+struct ShadingSide {
+  Vec3f Ng;     ///< geometric normal on the side of wo
+  Frame frame;  ///< local +z: for a solid dielectric the outward normal, otherwise the shading normal on wo's side
+  Vec3f Ns;     ///< shading normal on wo's side
+  bool front;   ///< wo is on the front side of the triangle
+};
+
+struct SurfaceInteraction {
+  const InstanceView* instance;
+  const Material* material;
+  std::uint32_t triangle;
+  SurfaceHit hit;
+  ShadingSide side;  ///< Ng and front are known from the start, the rest is made by surface_interaction_frame
+  SurfaceParams params;
+  RayCone cone;       ///< at the hit
+  float uv_width[2];  ///< texture footprint in each set's uv units
+};
+
+/// Turns the shading normal to wo's side and bends it until wo is above its horizon.
+/// Interpolated normals can face away from a viewer who sees the facet; leaving them so makes dark rims.
+RELIEF_KERNEL Vec3f shading_normal_towards(Vec3f Ns, Vec3f Ng_side, Vec3f wo)
+{
+  if (dot(Ns, Ng_side) < 0.0f) Ns = -Ns;
+  const float cos_o = dot(Ns, wo);
+  // The least cosine keeps the local frame's arithmetic away from zero; 1e-3 is 0.06° and cannot be seen.
+  constexpr float kLeastCosine = 1e-3f;
+  if (cos_o >= kLeastCosine) return Ns;
+  return normalize(Ns + (kLeastCosine - cos_o) * wo);
+}
+
+/// The point that a path has hit and its material there.
+/// @param wo  unit, back along the path's ray
+template <unsigned kFeatures>
+RELIEF_KERNEL SurfaceInteraction surface_interaction_make(const KernelGlobals& g,
+                                                          const PathStateView& state,
+                                                          std::uint32_t path,
+                                                          Vec3f wo)
+{
+  SurfaceInteraction at;
+  at.instance = &g.instances[state.hit_object[path]];
+  at.material = &g.materials[at.instance->material_index];
+  at.triangle = state.hit_triangle[path];
+  at.hit = surface_hit_make(g.meshes[at.instance->mesh_index], *at.instance, at.triangle, state.hit_u[path],
+                            state.hit_v[path]);
+  if ((at.instance->flags & kDisplaced) != 0) {
+    surface_hit_displace(&at.hit, *at.instance, {state.hit_P_x[path], state.hit_P_y[path], state.hit_P_z[path]},
+                         {state.hit_Ng_x[path], state.hit_Ng_y[path], state.hit_Ng_z[path]},
+                         {state.hit_Ns_x[path], state.hit_Ns_y[path], state.hit_Ns_z[path]});
+  }
+  at.side.front = dot(wo, at.hit.Ng) >= 0.0f;
+  at.side.Ng = at.side.front ? at.hit.Ng : -at.hit.Ng;
+
+  at.cone = ray_cone_propagate({state.cone_width[path], state.cone_spread[path]}, state.hit_t[path]);
+  at.uv_width[0] = at.uv_width[1] = 0.0f;
+  if constexpr ((kFeatures & kFeatureTextures) != 0) {
+    const float footprint = ray_cone_footprint_world(at.cone, dot(wo, at.side.Ng));
+    at.uv_width[0] = footprint * at.hit.area_ratio[0];
+    at.uv_width[1] = footprint * at.hit.area_ratio[1];
+  }
+  at.params = surface_params_eval<kFeatures>(*at.material, g.textures, at.hit.uv, at.hit.color, at.uv_width);
+  return at;
+}
+
+/// Completes an interaction with its shading frame and, where it has one, the coat's.
+/// @param wo  as given to surface_interaction_make
+template <unsigned kFeatures>
+RELIEF_KERNEL void surface_interaction_frame(const KernelGlobals& g,
+                                             const PathStateView& state,
+                                             std::uint32_t path,
+                                             Vec3f wo,
+                                             SurfaceInteraction& at)
+{
+  const Material& material = *at.material;
+  ShadingSide& side = at.side;
+  side.Ns = shading_normal_towards(at.hit.Ns, side.Ng, wo);
+  Frame tangent_frame;
+  bool has_tangents = false;
+  if constexpr ((kFeatures & kFeatureNormalMaps) != 0) {
+    if (material.normal_texture.texture_index >= 0 || material.clearcoat_normal_texture.texture_index >= 0) {
+      has_tangents = surface_hit_tangent_frame(g.meshes[at.instance->mesh_index], *at.instance, at.triangle,
+                                               state.hit_u[path], state.hit_v[path], at.hit.Ns, &tangent_frame);
+    }
+    if (has_tangents && material.normal_texture.texture_index >= 0) {
+      const Vec3f N = normalize(from_local(tangent_frame, normal_map_eval(material, g.textures, at.hit.uv, at.uv_width)));
+      side.Ns = shading_normal_consistent(side.Ng, side.front ? N : -N, wo);
+    }
+  }
+  const bool solid = at.params.transmission > 0.0f && !at.params.thin;
+  side.frame = frame_from_normal(solid && !side.front ? -side.Ns : side.Ns);
+  if constexpr ((kFeatures & kFeatureLayers) != 0 && (kFeatures & kFeatureNormalMaps) != 0) {
+    if (has_tangents && at.params.clearcoat > 0.0f) {
+      // The coat lies smoothly over the base's normal map unless it has one of its own (KHR_materials_clearcoat).
+      Vec3f N = at.hit.Ns;
+      if (material.clearcoat_normal_texture.texture_index >= 0) {
+        N = normalize(from_local(tangent_frame, clearcoat_normal_map_eval(material, g.textures, at.hit.uv, at.uv_width)));
+      }
+      at.params.clearcoat_N = to_local(side.frame, shading_normal_consistent(side.Ng, side.front ? N : -N, wo));
+    }
+  }
+}
+
+/// Whether the surface is there for this path, or lets it through.
+/// @param surface  of the path, see path_surface
+template <unsigned kFeatures>
+RELIEF_KERNEL bool surface_is_met(const PathStateView& state, std::uint32_t path, float alpha, int surface)
+{
+  if constexpr ((kFeatures & kFeatureTransparency) != 0) {
+    if (alpha < 1.0f) {
+      return sample_1d(state.pixel_hash[path], state.sample_index[path],
+                       dimension_bounce(surface, BounceDimension::kTransparency)) < alpha;
+    }
+  }
+  return true;
+}
+
+/// Sends a path on behind a surface that let it through.
+/// @return false: it has passed as many as it may
+RELIEF_KERNEL bool path_pass_through(const KernelGlobals& g, const PathStateView& state, std::uint32_t path)
+{
+  state.flags[path] += 1u << kPathTransparentShift;
+  state.t_min[path] = next_float_up(state.hit_t[path]);
+  return (state.flags[path] >> kPathTransparentShift) <= static_cast<std::uint32_t>(g.limits.transparent);
+}
+
+/// Origin of a ray that leaves the surface.
+/// @param wi  unit, its direction
+RELIEF_KERNEL Vec3f surface_ray_origin(const SurfaceInteraction& at, Vec3f wi)
+{
+  // Above the surface the ray starts on the lifted side, below it on the other.
+  const bool above = dot(wi, at.side.Ns) > 0.0f;
+  const Vec3f Ng_leave = above ? at.side.Ng : -at.side.Ng;
+  Vec3f P = at.hit.P;
+  if (above && at.side.front) P += at.hit.P_lift * terminator_lift_weight(dot(wi, at.side.Ng));
+  return offset_ray_origin(P, at.hit.P_error, Ng_leave);
+}
+
+}  // namespace relief
