@@ -5,7 +5,6 @@
 
 #include "integrator/intersect_stage.h"
 #include "integrator/surface_kernels.h"
-#include "scene/feature_set.h"
 #include "scene/texture_store.h"
 
 namespace relief {
@@ -17,6 +16,9 @@ struct CausticsDecision {
   bool enabled = false;
   std::string reason;
 };
+
+/// Perceptual roughness of the sharpest lobes that photons are gathered for: sharper ones would meet few of them.
+constexpr float kSharpestGathered = 0.25f;
 
 /// A light that covers more of the sky than this, steradians, is found by paths that leave a caster often enough.
 constexpr double kWideLight = 1.0;
@@ -67,7 +69,7 @@ SceneContext::SceneContext(const Scene& loaded,
   CausticsDecision decision = caustics_decide(scene, lights, caustics.mode);
   caustics_reason = std::move(decision.reason);
   globals.caustics.enabled = decision.enabled;
-  globals.caustics.roughness = kCausticRoughness;
+  globals.caustics.roughness = kSharpestGathered;
   for (const Mesh& mesh : scene.meshes) meshes.push_back(mesh.view());
   std::vector<int> uses(scene.meshes.size(), 0);
   for (const Instance& instance : scene.instances) ++uses[static_cast<std::size_t>(instance.mesh_index)];
@@ -85,7 +87,7 @@ SceneContext::SceneContext(const Scene& loaded,
     const bool caster = (view.flags & kCausticCaster) != 0;
     const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
     if (decision.enabled && (view.flags & kCausticReceiver) != 0 &&
-        has_soft_lobes(material, caster, kCausticRoughness)) {
+        has_soft_lobes(material, caster, kSharpestGathered)) {
       view.flags |= kGathersPhotons;
     }
     instances.push_back(view);

@@ -42,8 +42,9 @@ std::array<const TextureRef*, 12> material_textures(const Material& m)
 
 bool material_casts_caustics(const Material& material)
 {
+  constexpr float kRoughest = 0.5f;
   const bool bends = material.transmission > 0 || material.metallic >= 0.5f;
-  return bends && !material.unlit && material.roughness <= kCausticRoughness;
+  return bends && !material.unlit && material.roughness <= kRoughest;
 }
 
 FeatureSet feature_set_detect(const Scene& scene)

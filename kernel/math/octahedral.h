@@ -7,7 +7,7 @@
 namespace relief {
 
 /// @param v  unit
-/// @return   within 6e-5 rad of v once decoded
+/// @return   within 7e-5 rad of v once decoded
 RELIEF_KERNEL std::uint32_t octahedral_encode(Vec3f v)
 {
   const float scale = 1.0f / (__builtin_fabsf(v.x) + __builtin_fabsf(v.y) + __builtin_fabsf(v.z));

@@ -130,7 +130,7 @@ RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
   state.D_x[path] = ray.D.x;
   state.D_y[path] = ray.D.y;
   state.D_z[path] = ray.D.z;
-  state.t_min[path] = 0.0f;
+  state.t_min[path] = kLeastDistance;
   state.t_max[path] = kInfinity;
   state.throughput_r[path] = power.x;
   state.throughput_g[path] = power.y;
