@@ -146,7 +146,7 @@ int info(const std::string& file, bool strict, DisplacementOptions displacement)
 {
   const Scene scene = scene_load(file);
   displacement.num_rays = expected_rays(scene.render);
-  const SceneContext context(scene, displacement);
+  const SceneContext context(scene, displacement, EnvironmentDensity::kExcess, scene.render.caustics);
   std::vector<std::string> warnings = scene.warnings;
   for (std::string& text : displacement_warnings(scene, displacement)) warnings.push_back(std::move(text));
   for (std::string& text : context.displacements.warnings()) warnings.push_back(std::move(text));
@@ -188,6 +188,7 @@ int info(const std::string& file, bool strict, DisplacementOptions displacement)
   for (const FeatureName& feature : kFeatureNames) {
     if (scene.features.*feature.present) features += fmt::format("{}{}", features.empty() ? "" : ", ", feature.name);
   }
+  fmt::print("caustics: {} ({})\n", context.globals.caustics.enabled ? "photons" : "none", context.caustics_reason);
   fmt::print("features: {}\n", features.empty() ? "none" : features);
   fmt::print(
       "memory: meshes {}, textures {}, height maps {}, displacement {}, acceleration structure {}, lights "

@@ -472,6 +472,7 @@ LightSet light_set_make(const Scene& scene, std::span<const TextureView> texture
                                             scene.environment.rotation, density);
   set.environment_irradiance = environment_irradiance(set.environment);
   environment_integrate(set);
+  set.environment_casts_caustics = scene.environment.casts_caustics;
 
   set.lights = scene.lights;
   set.first_light_index.assign(scene.instances.size(), -1);
@@ -494,6 +495,7 @@ LightSet light_set_make(const Scene& scene, std::span<const TextureView> texture
     tbb::parallel_for(std::uint32_t{0}, mesh.num_triangles, [&](std::uint32_t triangle) {
       Light light = triangle_light(instance, mesh, triangle, material.double_sided);
       light.emission = material.emission;
+      light.casts_caustics = (instance.flags & kNoCausticLight) == 0;
       light.instance_index = static_cast<std::int32_t>(i);
       set.lights[first + triangle] = light;
       if (texture != nullptr) {

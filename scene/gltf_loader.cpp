@@ -33,7 +33,7 @@ std::uint32_t instance_flags(const ObjectSettings& object, const Material& mater
                       (object.caustic_caster == CausticCaster::kAuto && material_casts_caustics(material));
   return (object.visible_to_camera ? kVisibleToCamera : 0u) | (object.casts_shadow ? kCastsShadow : 0u) |
          (transform_mirrors(world) ? kMirrored : 0u) | (caster ? kCausticCaster : 0u) |
-         (object.caustic_receiver ? kCausticReceiver : 0u);
+         (object.caustic_receiver ? kCausticReceiver : 0u) | (object.caustic_light ? 0u : kNoCausticLight);
 }
 
 /// Texture coordinates that a material's normal maps are laid out in; −1: it has none.
@@ -174,6 +174,7 @@ void GltfLoader::place_lights(const PlacedNode& node)
   const auto add = [&](const std::vector<Light>& lights) {
     if (!lights.empty() && is_usable(node, node.world, "/nodes/" + std::to_string(node.node_index))) {
       scene_.lights.insert(scene_.lights.end(), lights.begin(), lights.end());
+      scene_.lights.back().casts_caustics = node.object.caustic_light;
     }
   };
   add(khronos_node_light(*node.document, node.node_index, node.world, scene_.render.luminous_efficacy, warnings_));

@@ -210,6 +210,7 @@ std::optional<Environment> relief_environment(const GltfDocument& document, Text
     }
     e.rotation = r.number_f("rotation", 0, -1e6, 1e6);
     e.visible_to_camera = r.boolean("visibleToCamera", true);
+    e.casts_caustics = r.boolean("causticLight", true);
     if (r.has("image") && r.has("uri")) {
       r.fail("", "either image or uri", "both");
     }
@@ -283,6 +284,7 @@ ObjectSettings relief_object(const GltfDocument& document, int node_index, Objec
     s.visible_to_camera = r.boolean("visibleToCamera", s.visible_to_camera);
     s.casts_shadow = r.boolean("castsShadow", s.casts_shadow);
     s.caustic_receiver = r.boolean("causticReceiver", s.caustic_receiver);
+    s.caustic_light = r.boolean("causticLight", s.caustic_light);
     if (r.has("causticCaster")) {
       const nlohmann::json& caster = r.raw("causticCaster");
       if (!caster.is_boolean() && caster != "auto") {

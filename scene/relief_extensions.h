@@ -33,6 +33,7 @@ struct ObjectSettings {
   bool casts_shadow = true;
   CausticCaster caustic_caster = CausticCaster::kAuto;
   bool caustic_receiver = true;
+  bool caustic_light = true;
 };
 
 /// @param inherited  the parent's settings

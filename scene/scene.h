@@ -54,6 +54,7 @@ struct Environment {
   int texture_index = -1;  ///< into TextureStore; −1: constant `color`
   float rotation = 0;      ///< radians about +Y
   bool visible_to_camera = true;
+  bool casts_caustics = true;  ///< as Light::casts_caustics
 };
 
 enum class PixelFilter : std::uint8_t { kBox, kBlackmanHarris };

@@ -30,6 +30,7 @@ enum InstanceFlag : std::uint32_t {
   kCausticReceiver = 1u << 4,
   kTracedInObjectSpace = 1u << 5,  ///< an instance of a shared mesh: the tracer transforms the ray, not the triangles
   kDisplaced = 1u << 6,            ///< hits bring a position and a normal of their own, in object space
+  kNoCausticLight = 1u << 8,       ///< its emission starts no photons
   kGathersPhotons = 1u << 7,       ///< a receiver that has soft lobes, in a render with a photon pass
 };
 

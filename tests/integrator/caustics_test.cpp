@@ -352,7 +352,7 @@ TEST(Caustics, WhatCastersReceiveIsStoredOrEscapes)
   scene.lights.push_back(point_light({0, 1.5f, 0.4f}, 2));
   // The widest image the light can have: paths of up to 100 scatterings.
   CausticSettings caustics;
-  const SceneContext context(scene, {}, caustics);
+  const SceneContext context(scene, {}, EnvironmentDensity::kExcess, caustics);
   ASSERT_TRUE(context.globals.caustics.enabled);
   RenderOptions options = render_options(scene, 16, 1);
   options.settings.max_bounces = 100;
