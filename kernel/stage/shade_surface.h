@@ -163,13 +163,12 @@ template <unsigned kFeatures>
 
   const Vec3f sigma_a = path_sigma_a(state, path);
   Vec3f throughput = path_throughput(state, path);
-  if constexpr ((kFeatures & kFeatureTransmission) != 0) {
-    if (!is_zero(sigma_a)) {
-      throughput *= path_transmittance(sigma_a, t);
-      state.throughput_r[path] = throughput.x;
-      state.throughput_g[path] = throughput.y;
-      state.throughput_b[path] = throughput.z;
-    }
+  // Whatever stands in a medium, of glass or not.
+  if (!is_zero(sigma_a)) {
+    throughput *= path_transmittance(sigma_a, t);
+    state.throughput_r[path] = throughput.x;
+    state.throughput_g[path] = throughput.y;
+    state.throughput_b[path] = throughput.z;
   }
 
   surface_interaction_frame<kFeatures>(g, state, path, wo, at);

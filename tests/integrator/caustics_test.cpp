@@ -451,10 +451,10 @@ Regions render_regions(const Scene& scene, RenderOptions options, int runs)
 /// @param bias  of the density estimate, of a region's mean
 void expect_same(const Scene& scene, int samples_off, int samples_on, double bias, const char* what)
 {
-  constexpr int kRuns = 12;
+  constexpr int kRuns = 8;
   const Regions off = render_regions(scene, caustic_options(scene, CausticsMode::kOff, 32, samples_off), kRuns);
   RenderOptions options = caustic_options(scene, CausticsMode::kOn, 32, samples_on);
-  options.settings.caustics.photons = 1 << 16;
+  options.settings.caustics.photons = 1 << 15;
   const Regions on = render_regions(scene, options, kRuns);
   for (int r = 0; r < Regions::kSide * Regions::kSide; ++r) {
     const double error = std::sqrt(off.variance[r] + on.variance[r]);
@@ -478,12 +478,12 @@ class CausticAgreement : public testing::Test {
   }
 };
 
-TEST_F(CausticAgreement, SmoothGlass) { expect_same(room(glass_material()), 256, 16, 0.004, "glass"); }
+TEST_F(CausticAgreement, SmoothGlass) { expect_same(room(glass_material()), 128, 8, 0.005, "glass"); }
 
 TEST_F(CausticAgreement, RoughGlassAcrossTheThreshold)
 {
   for (const float roughness : {0.1f, 0.24f, 0.26f, 0.45f}) {
-    expect_same(room(glass_material(roughness)), 128, 16, 0.004, "rough glass");
+    expect_same(room(glass_material(roughness)), 64, 8, 0.005, "rough glass");
   }
 }
 
@@ -492,31 +492,31 @@ TEST_F(CausticAgreement, MetalAndCoatedPlastic)
   Material metal;
   metal.roughness = 0.2f;
   metal.base_color = {0.9f, 0.6f, 0.4f};
-  expect_same(room(metal), 128, 16, 0.004, "metal");
+  expect_same(room(metal), 64, 8, 0.005, "metal");
   // Sharp and soft lobes on one surface, which gathers and casts: the paths are shared out lobe by lobe.
   Material plastic = diffuse_material({0.5f, 0.4f, 0.3f});
   plastic.specular = 1;
   plastic.roughness = 0.3f;
   plastic.clearcoat = 1;
   plastic.clearcoat_roughness = 0.05f;
-  expect_same(room(plastic), 128, 16, 0.004, "coated plastic");
+  expect_same(room(plastic), 64, 8, 0.005, "coated plastic");
 }
 
 TEST_F(CausticAgreement, ThinWallsAbsorptionAndLimits)
 {
   Material pane = glass_material(0.15f);
   pane.thickness = 0;
-  expect_same(room(pane), 128, 16, 0.004, "thin wall");
+  expect_same(room(pane), 64, 8, 0.005, "thin wall");
   Material amber = glass_material();
   amber.attenuation_color = {0.4f, 0.6f, 0.8f};
   amber.attenuation_distance = 0.5f;
-  expect_same(room(amber), 256, 16, 0.004, "amber");
+  expect_same(room(amber), 128, 8, 0.005, "amber");
   // Few bounces: photons and camera paths share them.
   for (const int bounces : {1, 2, 3}) {
     Scene scene = room(glass_material());
     scene.render.max_bounces = scene.render.diffuse_bounces = scene.render.glossy_bounces =
         scene.render.transmission_bounces = bounces;
-    expect_same(scene, 256, 16, 0.004, "few bounces");
+    expect_same(scene, 128, 8, 0.005, "few bounces");
   }
 }
 
@@ -528,14 +528,14 @@ TEST_F(CausticAgreement, EmissiveMeshesEnvironmentsAndRefusals)
   emitter.emission = splat3(4);
   add_object(scene, quad_mesh({-0.5f, 2.1f, -0.5f}, {1, 0, 0}, {0, 0, 1}), emitter);
   scene.environment.color = splat3(0.3f);
-  expect_same(scene, 256, 16, 0.004, "emissive mesh and environment");
+  expect_same(scene, 128, 8, 0.005, "emissive mesh and environment");
   // A lamp that casts none, a floor that receives none: theirs is left to paths, and nothing is lost.
   Scene refused = room(glass_material());
   refused.lights.push_back(square_light({-1, 1.5f, 0}, normalize(Vec3f{0.6f, -0.8f, 0}), 0.5f, 3));
   refused.lights.front().casts_caustics = false;
-  expect_same(refused, 256, 16, 0.004, "a lamp that casts none");
+  expect_same(refused, 128, 8, 0.005, "a lamp that casts none");
   refused.instances.front().flags &= ~std::uint32_t{kCausticReceiver};
-  expect_same(refused, 256, 16, 0.004, "a floor that receives none");
+  expect_same(refused, 128, 8, 0.005, "a floor that receives none");
 }
 
 TEST_F(CausticAgreement, LampInsideAbsorbingGlass)
@@ -550,7 +550,7 @@ TEST_F(CausticAgreement, LampInsideAbsorbingGlass)
   Affine3 place;
   place.p = {0.1f, 0.42f, 0};
   add_object(scene, sphere_mesh(0.15f, 16, 8, false), emitter, place);
-  expect_same(scene, 256, 16, 0.004, "lamp inside glass");
+  expect_same(scene, 128, 8, 0.005, "lamp inside glass");
 }
 
 }  // namespace
