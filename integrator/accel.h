@@ -11,8 +11,8 @@
 #include "displacement/embree.h"
 #include "integrator/displacement_set.h"
 #include "kernel/light/light.h"
-#include "kernel/photon/box_aim.h"
 #include "kernel/math/rounding.h"
+#include "kernel/photon/box_aim.h"
 #include "scene/scene.h"
 
 namespace relief {
@@ -40,7 +40,7 @@ class Accel {
 
   RTCScene scene() const { return top_; }
   const DisplacementSet& displacements() const { return *displacements_; }
-  Box3 bounds() const;                                   ///< of all that rays can hit, world
+  Box3 bounds() const;                                ///< of all that rays can hit, world
   Box3 displaced_bounds(std::size_t geometry) const;  ///< of a displaced geometry's prisms or triangles, object space
   std::size_t bytes() const { return static_cast<std::size_t>(bytes_.load()); }  ///< allocated by Embree
 

@@ -23,7 +23,7 @@ struct LightSet {
   EnvironmentTables environment;
   EnvironmentIrradiance environment_irradiance;  ///< of what next-event estimation samples of it
   float environment_yields_to = kInfinity;       ///< see LightsView
-  double environment_flux_density = 0;     ///< π × mean radiance of all of it, W/m²
+  double environment_flux_density = 0;           ///< π × mean radiance of all of it, W/m²
   double environment_solid_angle = 0;      ///< (∫L)² / ∫L²: how wide an even light of its contrast would be, sr
   bool environment_casts_caustics = true;  ///< as Light::casts_caustics
 

@@ -144,8 +144,8 @@ PhotonSources photon_sources_make(const SceneContext& context)
   // A choice has 24 random bits: pairs beyond this many would be chosen unevenly.
   constexpr std::size_t kMostPairs = 1u << 16;
   const std::size_t most_groups = std::max<std::size_t>(1, kMostPairs / lights.size());
-  group(casters.begin(), casters.end(),
-        static_cast<std::ptrdiff_t>((casters.size() + most_groups - 1) / most_groups), out);
+  group(casters.begin(), casters.end(), static_cast<std::ptrdiff_t>((casters.size() + most_groups - 1) / most_groups),
+        out);
 
   const Box3 bounds = context.accel->bounds();
   out.scene_centre = box_centre(bounds);

@@ -40,8 +40,7 @@ T* Wavefront::column(std::size_t count)
   return start;
 }
 
-Wavefront::Wavefront(bool caustics)
-    : memory_(static_cast<std::byte*>(std::aligned_alloc(kAlignment, bytes(caustics))))
+Wavefront::Wavefront(bool caustics) : memory_(static_cast<std::byte*>(std::aligned_alloc(kAlignment, bytes(caustics))))
 {
   if (memory_ == nullptr) throw std::bad_alloc();
 #define X(type, name) state_.name = column<type>(kBatchPaths);

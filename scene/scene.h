@@ -114,7 +114,7 @@ struct RenderSettings {
   int frame_start = 1, frame_end = 1;
   float frames_per_second = 24;
   PixelFilter filter = PixelFilter::kBlackmanHarris;
-  float filter_width = 1.5f;    ///< pixels
+  float filter_width = 1.5f;  ///< pixels
   CausticSettings caustics;
   float luminous_efficacy = 1;  ///< lm/W that divides KHR_lights_punctual's candela and lux
 };

@@ -86,12 +86,11 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
     )
     caustics: EnumProperty(
         name="Caustics",
-        description="Whether light through glass and from mirrors gets a photon pass of its own. The scene asks for "
-        "it; programs without such a pass path trace this light, with more noise (default Automatic)",
+        description="Whether light through glass and from mirrors gets a photon pass of its own (default Automatic)",
         items=(
-            ("auto", "Automatic", "Where something focuses light (default)"),
-            ("on", "On", "Always"),
-            ("off", "Off", "Never: it is path traced"),
+            ("auto", "Automatic", "Where something focuses the light of lamps, or of a world with a sun (default)"),
+            ("on", "On", "Where something focuses light, even that of an evenly bright world"),
+            ("off", "Off", "Never: it is path traced, with more noise"),
         ),
         default="auto",
     )
@@ -170,6 +169,9 @@ class ReliefViewLayerSettings(bpy.types.PropertyGroup):
     use_pass_variance: BoolProperty(
         name="Variance", description="Estimated variance of each pixel's radiance (default off)", default=False
     )
+    use_pass_caustic: BoolProperty(
+        name="Caustics", description="Light that photons brought, a part of indirect light (default off)", default=False
+    )
     use_pass_displacement_steps: BoolProperty(
         name="Displacement Steps",
         description="Bounds and texels tested for a camera ray in displaced meshes (default off)",
@@ -177,7 +179,38 @@ class ReliefViewLayerSettings(bpy.types.PropertyGroup):
     )
 
 
-_classes = (ReliefSceneSettings, ReliefViewLayerSettings)
+class ReliefObjectSettings(bpy.types.PropertyGroup):
+    caustic_caster: EnumProperty(
+        name="Casts Caustics",
+        description="Whether photons are aimed at the object (default Automatic)",
+        items=(
+            ("auto", "Automatic", "If its material is glass or metal of a roughness of at most 0.5 (default)"),
+            ("yes", "Yes", "Whatever its material is"),
+            ("no", "No", "What it focuses is path traced"),
+        ),
+        default="auto",
+    )
+    caustic_receiver: BoolProperty(
+        name="Receives Caustics",
+        description="Photons show on the object; otherwise caustics on it are path traced (default on)",
+        default=True,
+    )
+    caustic_light: BoolProperty(
+        name="Lights Caustics",
+        description="Photons start from the object's light; otherwise its caustics are path traced (default on)",
+        default=True,
+    )
+
+
+class ReliefWorldSettings(bpy.types.PropertyGroup):
+    caustic_light: BoolProperty(
+        name="Lights Caustics",
+        description="Photons may start from the world; otherwise its caustics are path traced (default on)",
+        default=True,
+    )
+
+
+_classes = (ReliefSceneSettings, ReliefViewLayerSettings, ReliefObjectSettings, ReliefWorldSettings)
 
 
 def register():
@@ -185,9 +218,13 @@ def register():
         bpy.utils.register_class(cls)
     bpy.types.Scene.relief = PointerProperty(type=ReliefSceneSettings)
     bpy.types.ViewLayer.relief = PointerProperty(type=ReliefViewLayerSettings)
+    bpy.types.Object.relief = PointerProperty(type=ReliefObjectSettings)
+    bpy.types.World.relief = PointerProperty(type=ReliefWorldSettings)
 
 
 def unregister():
+    del bpy.types.World.relief
+    del bpy.types.Object.relief
     del bpy.types.ViewLayer.relief
     del bpy.types.Scene.relief
     for cls in reversed(_classes):

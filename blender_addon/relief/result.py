@@ -60,6 +60,7 @@ PASSES = (
     Pass("DiffCol", "use_pass_diffuse_color", False, "albedo", _rgb("albedo"), "RGB", "COLOR"),
     Pass("Direct", "use_pass_direct", True, "direct", _rgb("direct"), "RGB", "COLOR"),
     Pass("Indirect", "use_pass_indirect", True, "indirect", _rgb("indirect"), "RGB", "COLOR"),
+    Pass("Caustics", "use_pass_caustic", True, "caustic", _rgb("caustic"), "RGB", "COLOR"),
     Pass("Samples", "use_pass_samples", True, "samples", ("samples.N",), "X", "VALUE"),
     Pass("Variance", "use_pass_variance", True, "variance", _rgb("variance"), "RGB", "COLOR"),
     Pass("Displacement Steps", "use_pass_displacement_steps", True, "displacement_steps", ("displacement_steps.N",),

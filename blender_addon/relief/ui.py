@@ -191,6 +191,7 @@ class RELIEF_PT_world(_Panel, bpy.types.Panel):
             _draw_output(layout, world.node_tree, "ShaderNodeOutputWorld", "Surface")
         else:
             layout.prop(world, "color")
+        self.rows().prop(world.relief, "caustic_light")
 
 
 class RELIEF_PT_light(_Panel, bpy.types.Panel):
@@ -232,6 +233,19 @@ class RELIEF_PT_object_visibility(_Panel, bpy.types.Panel):
         rows.prop(shown, "visible_shadow", text="Shadow")
 
 
+class RELIEF_PT_object_caustics(_Panel, bpy.types.Panel):
+    bl_label = "Caustics"
+    bl_context = "object"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        settings, rows = context.object.relief, self.rows()
+        if context.object.type != "LIGHT":
+            rows.prop(settings, "caustic_caster")
+            rows.prop(settings, "caustic_receiver")
+        rows.prop(settings, "caustic_light")
+
+
 class RELIEF_PT_camera_dof(_Panel, bpy.types.Panel):
     bl_label = "Depth of Field"
     bl_context = "data"
@@ -266,6 +280,7 @@ _classes = (
     RELIEF_PT_world,
     RELIEF_PT_light,
     RELIEF_PT_object_visibility,
+    RELIEF_PT_object_caustics,
     RELIEF_PT_camera_dof,
 )
 

@@ -71,7 +71,8 @@ RELIEF_KERNEL PhotonGather photon_gather(const PhotonMapView& map, const PhotonQ
           for (std::uint32_t k = 0; k < count; ++k) {
             if (!(distance_squared[k] < radius_squared)) continue;
             const PhotonArrival& photon = map.arrivals[first + k];
-            const Vec3f offset{map.x[first + k] - query.P.x, map.y[first + k] - query.P.y, map.z[first + k] - query.P.z};
+            const Vec3f offset{map.x[first + k] - query.P.x, map.y[first + k] - query.P.y,
+                               map.z[first + k] - query.P.z};
             if (!photon_bounces_allowed(photon.bounces, query.bounces)) continue;
             constexpr float kLeastCosine = 0.26f;
             constexpr float kThickness = 0.5f;
@@ -93,8 +94,7 @@ RELIEF_KERNEL PhotonGather photon_gather(const PhotonMapView& map, const PhotonQ
   }
   if (chosen == nullptr) return gather;
   gather.wi = octahedral_decode(chosen->wi);
-  gather.irradiance =
-      chosen->power * (sum * 2.0f * kInvPi / (sqr(radius_squared) * max_component(chosen->power)));
+  gather.irradiance = chosen->power * (sum * 2.0f * kInvPi / (sqr(radius_squared) * max_component(chosen->power)));
   return gather;
 }
 

@@ -36,7 +36,10 @@ struct CausticsView {
 };
 
 /// Cell of a coordinate.
-RELIEF_KERNEL std::int32_t photon_cell(float x, float inverse_cell) { return static_cast<std::int32_t>(__builtin_floorf(clamp(x * inverse_cell, -1e9f, 1e9f))); }
+RELIEF_KERNEL std::int32_t photon_cell(float x, float inverse_cell)
+{
+  return static_cast<std::int32_t>(__builtin_floorf(clamp(x * inverse_cell, -1e9f, 1e9f)));
+}
 
 /// First bucket of a row of cells; cell (x, y, z) is in bucket (row + x) & mask.
 RELIEF_KERNEL std::uint32_t photon_row(std::int32_t y, std::int32_t z)

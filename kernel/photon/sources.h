@@ -16,10 +16,10 @@ struct PhotonSourcesView {
   const PhotonSource* sources = nullptr;
   const double* cdf = nullptr;  ///< num_sources + 1, from 0 to 1
   std::uint32_t num_sources = 0;
-  const Box3* targets = nullptr;               ///< world bounds of each group of casters
-  const std::int32_t* target_of = nullptr;     ///< of each instance; −1: no caster
-  Vec3f scene_centre{};                        ///< of a sphere around everything that light can hit
-  float scene_radius = 0;                      ///< metres
+  const Box3* targets = nullptr;            ///< world bounds of each group of casters
+  const std::int32_t* target_of = nullptr;  ///< of each instance; −1: no caster
+  Vec3f scene_centre{};                     ///< of a sphere around everything that light can hit
+  float scene_radius = 0;                   ///< metres
   double photons_a_pass = 1;
 };
 

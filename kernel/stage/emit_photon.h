@@ -35,7 +35,8 @@ RELIEF_KERNEL EmittedRay emit_from_point(const Light& light, const Box3& box, Ve
 
 /// Light from a flat light towards a box.
 /// @param u_light  place on the light
-RELIEF_KERNEL EmittedRay emit_from_area(const KernelGlobals& g, const Light& light, const Box3& box, Vec2f u_light, Vec2f u)
+RELIEF_KERNEL EmittedRay
+emit_from_area(const KernelGlobals& g, const Light& light, const Box3& box, Vec2f u_light, Vec2f u)
 {
   EmittedRay ray;
   Vec3f radiance = light.emission;
@@ -79,7 +80,8 @@ RELIEF_KERNEL EmittedRay emit_from_area(const KernelGlobals& g, const Light& lig
 
 /// Parallel light that falls on a box from outside the scene.
 /// @param irradiance  W/m² across D
-RELIEF_KERNEL EmittedRay emit_from_afar(const PhotonSourcesView& sources, const Box3& box, Vec3f D, Vec3f irradiance, Vec2f u)
+RELIEF_KERNEL EmittedRay
+emit_from_afar(const PhotonSourcesView& sources, const Box3& box, Vec3f D, Vec3f irradiance, Vec2f u)
 {
   const Vec3f P = box_aim_along(box, D, u);
   const float back = dot(P - sources.scene_centre, D) + sources.scene_radius;
@@ -117,9 +119,9 @@ RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
   } else {
     const Light& light = g.lights.lights[source.light_index];
     const bool is_point = light.kind == LightKind::kPoint || light.kind == LightKind::kSpot;
-    ray = is_point                         ? emit_from_point(light, box, u)
+    ray = is_point                        ? emit_from_point(light, box, u)
           : light.kind == LightKind::kSun ? emit_from_afar(sources, box, light.axis, light.emission, u)
-                                           : emit_from_area(g, light, box, u_light, u);
+                                          : emit_from_area(g, light, box, u_light, u);
   }
   const Vec3f power = ray.power * static_cast<float>(1.0 / (probability * sources.photons_a_pass));
   if (is_zero(power) || !is_finite(power)) return false;

@@ -54,7 +54,8 @@ RELIEF_KERNEL void gather_photons(const KernelGlobals& g, const PathStateView& s
   query.Ng = hit_geometric_normal(g, state, path);
   if (dot(query.Ng, D) > 0.0f) query.Ng = -query.Ng;
   query.both_sides = g.materials[instance.material_index].transmission > 0.0f;
-  query.hash = state.pixel_hash[path] ^ (state.sample_index[path] + 1u) * 0x9e3779b1u ^ state.bounces[path] * 0x85ebca77u;
+  query.hash =
+      state.pixel_hash[path] ^ (state.sample_index[path] + 1u) * 0x9e3779b1u ^ state.bounces[path] * 0x85ebca77u;
   const PhotonGather gather = photon_gather(g.caustics.map, query);
   caustic.irradiance_r[path] = gather.irradiance.x;
   caustic.irradiance_g[path] = gather.irradiance.y;

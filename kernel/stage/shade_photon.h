@@ -64,8 +64,7 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
   const bool transmitted = (bsdf.lobe & kLobeTransmit) != 0;
   // A camera path counts the event next to the light, but no surface asks for that count any more.
   if ((state.flags[path] & kPathCaustic) != 0) {
-    state.bounces[path] +=
-        1u + (1u << static_cast<int>(transmitted ? BounceKind::kTransmission : BounceKind::kGlossy));
+    state.bounces[path] += 1u + (1u << static_cast<int>(transmitted ? BounceKind::kTransmission : BounceKind::kGlossy));
   }
   state.flags[path] |= kPathCaustic;
   if (transmitted && at.params.transmission > 0.0f && !at.params.thin) {

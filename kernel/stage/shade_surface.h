@@ -99,15 +99,15 @@ RELIEF_KERNEL void shade_surface_photons(const KernelGlobals& g,
   const CausticStateView& caustic = state.caustic;
   const Vec3f irradiance{caustic.irradiance_r[path], caustic.irradiance_g[path], caustic.irradiance_b[path]};
   if (is_zero(irradiance)) return;
-  const SharpLobes sharp =
-      sharp_lobes(at.params, (at.instance->flags & kCausticCaster) != 0, g.caustics.roughness);
+  const SharpLobes sharp = sharp_lobes(at.params, (at.instance->flags & kCausticCaster) != 0, g.caustics.roughness);
   const Vec3f wi = octahedral_decode(caustic.wi[path]);
   const BsdfEval bsdf =
       closure_eval<kFeatures>(closure_soft(closure, sharp), *g.bsdf_tables, to_local(at.side.frame, wi));
   // Photons count light by the area of the true surface, the BSDF by that of the shaded one. The bound keeps single
   // photons that graze the former from shining where the latter faces them.
   constexpr float kLeastCosine = 0.01f;
-  const float by_area = __builtin_fabsf(dot(wi, at.side.frame.n)) / max(__builtin_fabsf(dot(wi, at.side.Ng)), kLeastCosine);
+  const float by_area =
+      __builtin_fabsf(dot(wi, at.side.frame.n)) / max(__builtin_fabsf(dot(wi, at.side.Ng)), kLeastCosine);
   const Vec3f radiance = path_throughput(state, path) * bsdf.f * irradiance * by_area;
   caustic.radiance_r[path] += radiance.x;
   caustic.radiance_g[path] += radiance.y;

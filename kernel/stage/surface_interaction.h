@@ -45,10 +45,8 @@ RELIEF_KERNEL Vec3f shading_normal_towards(Vec3f Ns, Vec3f Ng_side, Vec3f wo)
 /// The point that a path has hit and its material there.
 /// @param wo  unit, back along the path's ray
 template <unsigned kFeatures>
-RELIEF_KERNEL SurfaceInteraction surface_interaction_make(const KernelGlobals& g,
-                                                          const PathStateView& state,
-                                                          std::uint32_t path,
-                                                          Vec3f wo)
+RELIEF_KERNEL SurfaceInteraction
+surface_interaction_make(const KernelGlobals& g, const PathStateView& state, std::uint32_t path, Vec3f wo)
 {
   SurfaceInteraction at;
   at.instance = &g.instances[state.hit_object[path]];
@@ -95,7 +93,8 @@ RELIEF_KERNEL void surface_interaction_frame(const KernelGlobals& g,
                                                state.hit_u[path], state.hit_v[path], at.hit.Ns, &tangent_frame);
     }
     if (has_tangents && material.normal_texture.texture_index >= 0) {
-      const Vec3f N = normalize(from_local(tangent_frame, normal_map_eval(material, g.textures, at.hit.uv, at.uv_width)));
+      const Vec3f N =
+          normalize(from_local(tangent_frame, normal_map_eval(material, g.textures, at.hit.uv, at.uv_width)));
       side.Ns = shading_normal_consistent(side.Ng, side.front ? N : -N, wo);
     }
   }
@@ -106,7 +105,8 @@ RELIEF_KERNEL void surface_interaction_frame(const KernelGlobals& g,
       // The coat lies smoothly over the base's normal map unless it has one of its own (KHR_materials_clearcoat).
       Vec3f N = at.hit.Ns;
       if (material.clearcoat_normal_texture.texture_index >= 0) {
-        N = normalize(from_local(tangent_frame, clearcoat_normal_map_eval(material, g.textures, at.hit.uv, at.uv_width)));
+        N = normalize(
+            from_local(tangent_frame, clearcoat_normal_map_eval(material, g.textures, at.hit.uv, at.uv_width)));
       }
       at.params.clearcoat_N = to_local(side.frame, shading_normal_consistent(side.Ng, side.front ? N : -N, wo));
     }

@@ -254,8 +254,10 @@ TEST(PhotonMap, TheChosenPhotonStandsForAll)
 {
   // Two photons of different colour and direction: over many choices the mean of irradiance · g(wi) is their sum.
   std::vector<std::vector<Photon>> chunks(1);
-  chunks[0].push_back({{0.1f, 0, 0}, {{3, 1, 0}, octahedral_encode(normalize(Vec3f{1, 1, 0})), octahedral_encode({0, 1, 0}), 0}});
-  chunks[0].push_back({{0, 0, 0.2f}, {{0, 2, 1}, octahedral_encode(normalize(Vec3f{0, 1, 1})), octahedral_encode({0, 1, 0}), 0}});
+  chunks[0].push_back(
+      {{0.1f, 0, 0}, {{3, 1, 0}, octahedral_encode(normalize(Vec3f{1, 1, 0})), octahedral_encode({0, 1, 0}), 0}});
+  chunks[0].push_back(
+      {{0, 0, 0.2f}, {{0, 2, 1}, octahedral_encode(normalize(Vec3f{0, 1, 1})), octahedral_encode({0, 1, 0}), 0}});
   PhotonMap map;
   map.build(chunks, 0.5f);
   Vec3d sum{}, expected{};
@@ -270,7 +272,8 @@ TEST(PhotonMap, TheChosenPhotonStandsForAll)
     sum.y += static_cast<double>(gather.irradiance.y) * g(gather.wi) / kChoices;
     sum.z += static_cast<double>(gather.irradiance.z) * g(gather.wi) / kChoices;
   }
-  const double k0 = 2 * (1 - 0.01 / 0.25) / (3.14159265358979 * 0.25), k1 = 2 * (1 - 0.04 / 0.25) / (3.14159265358979 * 0.25);
+  const double k0 = 2 * (1 - 0.01 / 0.25) / (3.14159265358979 * 0.25),
+               k1 = 2 * (1 - 0.04 / 0.25) / (3.14159265358979 * 0.25);
   const double g0 = 1 + std::sqrt(2.0), g1 = 1;
   expected = {3 * k0 * g0, k0 * g0 + 2 * k1 * g1, k1 * g1};
   EXPECT_NEAR(sum.x / expected.x, 1, 0.01);
@@ -458,7 +461,8 @@ void expect_same(const Scene& scene, int samples_off, int samples_on, double bia
   const Regions on = render_regions(scene, options, kRuns);
   for (int r = 0; r < Regions::kSide * Regions::kSide; ++r) {
     const double error = std::sqrt(off.variance[r] + on.variance[r]);
-    EXPECT_NEAR(on.mean[r], off.mean[r], 4 * error + bias * off.mean[r]) << what << ", region " << r << ", standard error " << error;
+    EXPECT_NEAR(on.mean[r], off.mean[r], 4 * error + bias * off.mean[r])
+        << what << ", region " << r << ", standard error " << error;
   }
 }
 

@@ -197,6 +197,13 @@ class SceneExporter:
         warn = self._warner("object", original.name)
         if hidden:
             warn(f"hidden from {' and '.join(hidden)} rays", "these see it")
+        caustics = original.relief
+        if caustics.caustic_caster != "auto":
+            settings["causticCaster"] = caustics.caustic_caster == "yes"
+        if not caustics.caustic_receiver:
+            settings["causticReceiver"] = False
+        if not caustics.caustic_light:
+            settings["causticLight"] = False
         if original.is_holdout or original.is_shadow_catcher:
             warn("holdouts and shadow catchers", "it is an ordinary object")
         return settings
@@ -238,6 +245,9 @@ class SceneExporter:
                 warn=self._warner("light", thing.name),
             )
             export_light(light, place)
+            if not original.relief.caustic_light:
+                settings = node.setdefault("extensions", {}).get("RELIEF_object", {})
+                self.writer.extend(node, "RELIEF_object", {**settings, "causticLight": False})
             self.nodes.append(node)
 
 

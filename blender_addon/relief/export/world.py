@@ -19,6 +19,8 @@ def export_world(world, visible_to_camera, writer, images, report):
     else:
         environment = _environment(world, images, lambda *text: report.warn(f'world "{world.name}"', *text))
     environment["visibleToCamera"] = visible_to_camera
+    if world is not None and not world.relief.caustic_light:
+        environment["causticLight"] = False
     writer.extend(writer.json, "RELIEF_environment", environment)
 
 

@@ -1,0 +1,81 @@
+"""Photons from Blender: a slab of glass under a sun has a known caustic, and objects and lights may stay out of it."""
+
+import math
+import os
+
+import bpy
+import numpy as np
+
+from scenes import (
+    add_camera,
+    add_light,
+    add_plane,
+    diffuse,
+    folder,
+    link,
+    new_material,
+    new_scene,
+    set_bounces,
+    set_world,
+)
+
+_ALBEDO = 0.02
+_SUN = 5.0
+
+
+def _slab():
+    """A floor, a horizontal slab of glass above it, a sun at the zenith, a camera between the two looking down."""
+    scene = new_scene(32, 32)
+    set_bounces(scene, 8)
+    set_world((0, 0, 0))
+    add_plane(8, diffuse((_ALBEDO,) * 3))
+    corners = [(x, y, z) for x in (-2, 2) for y in (-2, 2) for z in (1.5, 1.7)]
+    faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    mesh = bpy.data.meshes.new("slab")
+    mesh.from_pydata(corners, [], faces)
+    mesh.materials.append(new_material("glass", "ShaderNodeBsdfGlass", Roughness=0.0, IOR=1.5)[0])
+    slab = link(mesh, "slab")
+    sun = add_light("SUN", (0, 0, 5), energy=_SUN, angle=0)
+    add_camera((0, 0, 1.2), lens=50)
+    scene.view_layers[0].relief.use_pass_caustic = True
+    return scene, slab, sun
+
+
+def _caustic(scene):
+    """Mean of the caustic pass."""
+    from relief import exr
+
+    scene.render.engine = "RELIEF"
+    scene.relief.samples = 8
+    settings = scene.render.image_settings
+    settings.file_format, settings.exr_codec, settings.color_depth = "OPEN_EXR_MULTILAYER", "NONE", "32"
+    with folder() as path:
+        scene.render.filepath = os.path.join(path, "picture.exr")
+        bpy.ops.render.render(write_still=True)
+        channels = exr.read(scene.render.filepath).channels
+    return float(np.mean([channels[f"{scene.view_layers[0].name}.Caustics.{c}"] for c in "RGB"]))
+
+
+def test_slab_transmits_what_its_two_sides_leave():
+    scene, _, _ = _slab()
+    reflectance = 0.2**2
+    expected = _SUN * (1 - reflectance) / (1 + reflectance) * _ALBEDO / math.pi
+    # The slab shows the floor to itself: at most its albedo times what glass reflects of diffuse light, on two sides.
+    assert 0.99 * expected < _caustic(scene) < (1 + 2 * 0.1 * _ALBEDO + 0.01) * expected
+
+
+def test_objects_and_lights_may_stay_out():
+    scene, slab, sun = _slab()
+    slab.relief.caustic_caster = "no"
+    assert _caustic(scene) == 0
+    slab.relief.caustic_caster = "yes"
+    assert _caustic(scene) > 0
+    sun.relief.caustic_light = False
+    assert _caustic(scene) == 0
+    sun.relief.caustic_light = True
+    scene.relief.caustics = "off"
+    assert _caustic(scene) == 0
+    scene.relief.caustics = "on"
+    for thing in scene.objects:
+        thing.relief.caustic_receiver = False
+    assert _caustic(scene) == 0
