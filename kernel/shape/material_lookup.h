@@ -16,19 +16,6 @@ triangle_texture_uv(const MeshView& mesh, TriangleIndices tri, float bary_u, flo
   return texture_ref_uv(ref, (1.0f - bary_u - bary_v) * uv[tri.v0] + bary_u * uv[tri.v1] + bary_v * uv[tri.v2]);
 }
 
-/// Emitted radiance at a point of a triangle, finest texture level.
-RELIEF_KERNEL Vec3f triangle_emission(const Material& material,
-                                      const TextureView* textures,
-                                      const MeshView& mesh,
-                                      std::uint32_t triangle_index,
-                                      Vec2f barycentric)
-{
-  const TextureRef& ref = material.emission_texture;
-  if (ref.texture_index < 0) return material.emission;
-  const Vec2f uv = triangle_texture_uv(mesh, mesh.triangles[triangle_index], barycentric.x, barycentric.y, ref);
-  return material.emission * xyz(texture_sample(textures[ref.texture_index], uv, 0.0f));
-}
-
 /// Opacity at a point of a triangle, finest texture level: 0 lets everything through.
 RELIEF_KERNEL float triangle_alpha(const Material& material,
                                    const TextureView* textures,
@@ -50,6 +37,26 @@ RELIEF_KERNEL float triangle_alpha(const Material& material,
   }
   if (material.alpha_mode == AlphaMode::kMask) return alpha >= material.alpha_cutoff ? 1.0f : 0.0f;
   return clamp(alpha, 0.0f, 1.0f);
+}
+
+/// Whether emission is the same at all points of a material's triangles.
+RELIEF_KERNEL bool emission_is_even(const Material& material)
+{
+  return material.emission_texture.texture_index < 0 && material.alpha_mode == AlphaMode::kOpaque;
+}
+
+/// Radiance that a point of a triangle sends out, finest texture level: what is transparent emits as little as it stops.
+RELIEF_KERNEL Vec3f triangle_emission(const Material& material,
+                                      const TextureView* textures,
+                                      const MeshView& mesh,
+                                      std::uint32_t triangle_index,
+                                      Vec2f barycentric)
+{
+  const float alpha = triangle_alpha(material, textures, mesh, triangle_index, barycentric.x, barycentric.y);
+  const TextureRef& ref = material.emission_texture;
+  if (ref.texture_index < 0) return material.emission * alpha;
+  const Vec2f uv = triangle_texture_uv(mesh, mesh.triangles[triangle_index], barycentric.x, barycentric.y, ref);
+  return material.emission * xyz(texture_sample(textures[ref.texture_index], uv, 0.0f)) * alpha;
 }
 
 }  // namespace relief

@@ -33,11 +33,11 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   Vec3f radiance = light.radiance;
   const bool is_triangle = light.light_index >= 0 && g.lights.lights[light.light_index].kind == LightKind::kTriangle;
   if (is_triangle) {
-    // Any kernel may sample a textured emitter, so this is not a feature of the surface that is lit.
+    // Any kernel may sample a textured or transparent emitter, so this is not a feature of the surface that is lit.
     const Light& emitter = g.lights.lights[light.light_index];
     const InstanceView& emitting = g.instances[emitter.instance_index];
     const Material& material = g.materials[emitting.material_index];
-    if (material.emission_texture.texture_index >= 0) {
+    if (!emission_is_even(material)) {
       radiance = triangle_emission(material, g.textures, g.meshes[emitting.mesh_index],
                                    static_cast<std::uint32_t>(emitter.triangle_index), light.barycentric);
     }
