@@ -100,8 +100,10 @@ float photon_radius_for(const std::vector<std::vector<Photon>>& chunks, double w
   }
   std::vector<Vec3f> searched;
   for (std::size_t i = 0; i < count; i += stride) searched.push_back(points[i]);
-  const double nth = std::max(4.0, wanted / static_cast<double>(stride));
-  if (static_cast<double>(searched.size()) < 2 * nth) return 0;
+  if (count < 2) return 0;
+  // Of few photons, half: a radius beyond what they cover would say nothing of how dense they lie.
+  wanted = std::min(wanted, static_cast<double>(count) / 2);
+  const double nth = std::min(std::max(4.0, wanted / static_cast<double>(stride)), std::floor(wanted));
 
   std::vector<float> radii(std::min(kQueries, searched.size()));
   tbb::parallel_for(std::size_t{0}, radii.size(), [&](std::size_t q) {

@@ -34,7 +34,8 @@ class PhotonMap {
 
 /// A radius within which photons find `wanted` others of their own, at the median over photons: where light is, not where
 /// space is. Estimated from a part of them.
-/// @return metres; 0 with too few photons to tell
+/// Of fewer than twice as many photons, the radius within which they find half of all.
+/// @return metres; 0 where there is no distance between them
 float photon_radius_for(const std::vector<std::vector<Photon>>& chunks, double wanted);
 
 }  // namespace relief

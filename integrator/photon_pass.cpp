@@ -116,8 +116,7 @@ PhotonSourcesView PhotonSources::view(double photons_a_pass) const
   v.num_sources = static_cast<std::uint32_t>(sources.size());
   v.targets = targets.data();
   v.target_of = target_of.data();
-  v.scene_centre = scene_centre;
-  v.scene_radius = scene_radius;
+  v.scene_box = scene_box;
   v.photons_a_pass = photons_a_pass;
   return v;
 }
@@ -147,9 +146,7 @@ PhotonSources photon_sources_make(const SceneContext& context)
   group(casters.begin(), casters.end(), static_cast<std::ptrdiff_t>((casters.size() + most_groups - 1) / most_groups),
         out);
 
-  const Box3 bounds = context.accel->bounds();
-  out.scene_centre = box_centre(bounds);
-  out.scene_radius = 1.01f * box_radius(bounds);
+  out.scene_box = context.accel->bounds();
   for (const std::int32_t light : lights) {
     for (std::size_t t = 0; t < out.targets.size(); ++t) {
       const Box3& box = out.targets[t];
@@ -176,13 +173,13 @@ PhotonSources photon_sources_make(const SceneContext& context)
   return out;
 }
 
-PhotonPass::PhotonPass(const SceneContext& context, const CausticSettings& settings, std::size_t num_pixels)
+PhotonPass::PhotonPass(const SceneContext& context, const CausticSettings& settings, double num_pixels)
     : context_(context), settings_(settings), sources_(photon_sources_make(context))
 {
   // A photon's place in the map, and as it came from the tracer; most paths leave one at most.
   constexpr double kBytes = 2.0 * sizeof(Photon) + 16;
   constexpr double kFewest = 1 << 15;
-  const double wanted = settings.photons > 0 ? settings.photons : std::max(static_cast<double>(num_pixels), kFewest);
+  const double wanted = settings.photons > 0 ? std::max(settings.photons, 1.0) : std::max(num_pixels, kFewest);
   const double most = std::max(4096.0, settings.memory_mib * 1048576.0 / kBytes);
   photons_a_pass_ = static_cast<std::uint32_t>(std::min({wanted, most, 1e8}));
 }
@@ -211,6 +208,9 @@ void PhotonPass::next(KernelGlobals& g, const StageTable& stages, const std::fun
     if (!(first_radius_ > 0)) {
       first_radius_ = settings_.radius > 0 ? settings_.radius : photon_radius_for(chunks_, kFound);
     }
+    // A single photon, or all at one point: their light is shown all the same.
+    constexpr float kOfCaster = 0.1f;
+    if (!(first_radius_ > 0) && stored_ > 0) first_radius_ = kOfCaster * box_radius(sources_.targets.front());
     if (first_radius_ > 0) {
       map_.build(chunks_, first_radius_ * static_cast<float>(photon_radius_factor(passes_, settings_.alpha)));
       g.caustics.map = map_.view();

@@ -21,8 +21,7 @@ struct PhotonSources {
   std::vector<double> cdf;
   std::vector<Box3> targets;
   std::vector<std::int32_t> target_of;
-  Vec3f scene_centre{};
-  float scene_radius = 0;
+  Box3 scene_box;
 
   PhotonSourcesView view(double photons_a_pass) const;
 };
@@ -33,8 +32,8 @@ PhotonSources photon_sources_make(const SceneContext& context);
 
 class PhotonPass {
  public:
-  /// @param num_pixels  of the film
-  PhotonPass(const SceneContext& context, const CausticSettings& settings, std::size_t num_pixels);
+  /// @param num_pixels  of the whole picture, so that a crop has the same photons
+  PhotonPass(const SceneContext& context, const CausticSettings& settings, double num_pixels);
 
   /// Traces the next pass's photons and sorts them. Every sample of a pixel has a pass of its own, so that halves of the
   /// samples know nothing of each other's photons, and the error estimate holds for caustics as for the rest.

@@ -68,8 +68,10 @@ KernelGlobals render_globals(const SceneContext& context, const RenderOptions& o
   KernelGlobals g = context.globals;
   g.camera = options.camera;
   g.camera_forward = normalize(-options.camera.world_from_camera.z);
-  g.limits = {settings.max_bounces, settings.diffuse_bounces, settings.glossy_bounces, settings.transmission_bounces,
-              settings.transparent_bounces};
+  // A path counts in bytes; between mirrors that take nothing only this ends it.
+  constexpr int kMostBounces = 200;
+  g.limits = {std::min(settings.max_bounces, kMostBounces), settings.diffuse_bounces, settings.glossy_bounces,
+              settings.transmission_bounces, settings.transparent_bounces};
   g.clamp_indirect = settings.clamp_indirect;
   g.light_technique = options.light_technique;
   g.filter = settings.filter == PixelFilter::kBox ? nullptr : &filter;
@@ -112,7 +114,7 @@ RenderedImage render(const Scene& scene,
   g.film = film.accumulator();
   const bool caustics = g.caustics.enabled;
   std::optional<PhotonPass> photons;
-  if (caustics) photons.emplace(context, settings.caustics, film.num_pixels());
+  if (caustics) photons.emplace(context, settings.caustics, static_cast<double>(settings.width) * settings.height);
   stats.build_seconds = seconds_since(build_start);
 
   const Clock::time_point start = Clock::now();

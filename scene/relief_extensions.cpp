@@ -45,7 +45,7 @@ CausticSettings read_caustics(const JsonReader& r, Warnings& warnings)
   s.mode = static_cast<CausticsMode>(r.choice("mode", kCausticsModeLabels, 0));
   s.photons = r.number("photons", s.photons, 0, 1e8);
   s.alpha = r.number_f("alpha", s.alpha, 0.01, 1);
-  s.radius = r.number_f("radius", s.radius, 0, kNoLimit);
+  s.radius = r.number_f("radius", s.radius, 0, 1e6);
   s.memory_mib = r.number("memory", s.memory_mib, 1, 1e6);
   r.warn_unread(warnings);
   return s;

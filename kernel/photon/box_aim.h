@@ -106,6 +106,21 @@ RELIEF_KERNEL Vec3f box_aim_along(const Box3& box, Vec3f D, Vec2f u)
   return face.P + face.edge_u * (2.0f * x - 1.0f) + face.edge_v * (2.0f * u.y - 1.0f);
 }
 
+/// Distance along a ray to where it has left a box that it starts in, a little more rather than less.
+/// @param D  unit
+RELIEF_KERNEL float box_distance_out(const Box3& box, Vec3f P, Vec3f D)
+{
+  const float p[3] = {P.x, P.y, P.z}, d[3] = {D.x, D.y, D.z};
+  const float low[3] = {box.low.x, box.low.y, box.low.z}, high[3] = {box.high.x, box.high.y, box.high.z};
+  float distance = kInfinity;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (d[axis] == 0.0f) continue;
+    distance = min(distance, ((d[axis] > 0.0f ? high[axis] : low[axis]) - p[axis]) / d[axis]);
+  }
+  constexpr float kMore = 1e-3f;
+  return max(distance, 0.0f) * (1.0f + kMore) + kMore * length(box.high - box.low) * 1e-3f;
+}
+
 RELIEF_KERNEL bool box_contains(const Box3& box, Vec3f P)
 {
   return P.x >= box.low.x && P.x <= box.high.x && P.y >= box.low.y && P.y <= box.high.y && P.z >= box.low.z &&

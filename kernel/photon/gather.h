@@ -39,13 +39,15 @@ RELIEF_KERNEL PhotonGather photon_gather(const PhotonMapView& map, const PhotonQ
   PhotonGather gather;
   const float radius = map.radius;
   const float radius_squared = sqr(radius);
+  const float inverse_radius_squared = 1.0f / radius_squared;
   const float inverse_cell = 0.5f / radius;
   const std::int32_t x0 = photon_cell(query.P.x - radius, inverse_cell);
-  const std::int32_t x1 = photon_cell(query.P.x + radius, inverse_cell);
   const std::int32_t y0 = photon_cell(query.P.y - radius, inverse_cell);
-  const std::int32_t y1 = photon_cell(query.P.y + radius, inverse_cell);
   const std::int32_t z0 = photon_cell(query.P.z - radius, inverse_cell);
-  const std::int32_t z1 = photon_cell(query.P.z + radius, inverse_cell);
+  // Two cells are as wide as a search; where coordinates hardly resolve the radius, rounding would make it three or four.
+  const std::int32_t x1 = x0 + (photon_cell(query.P.x + radius, inverse_cell) > x0 ? 1 : 0);
+  const std::int32_t y1 = y0 + (photon_cell(query.P.y + radius, inverse_cell) > y0 ? 1 : 0);
+  const std::int32_t z1 = z0 + (photon_cell(query.P.z + radius, inverse_cell) > z0 ? 1 : 0);
   float sum = 0.0f;
   std::uint32_t random = query.hash | 1u;
   const PhotonArrival* chosen = nullptr;
@@ -59,7 +61,7 @@ RELIEF_KERNEL PhotonGather photon_gather(const PhotonMapView& map, const PhotonQ
         bool again = false;
         for (int i = 0; i < num_seen; ++i) again |= seen[i] == bucket;
         if (again) continue;
-        seen[num_seen++ & 7] = bucket;
+        seen[num_seen++] = bucket;
         const std::uint32_t end = map.bucket_begin[bucket + 1];
         for (std::uint32_t first = map.bucket_begin[bucket]; first < end; first += 8) {
           const std::uint32_t count = end - first < 8 ? end - first : 8;
@@ -79,7 +81,7 @@ RELIEF_KERNEL PhotonGather photon_gather(const PhotonMapView& map, const PhotonQ
             if (__builtin_fabsf(dot(octahedral_decode(photon.Ng), query.Ng)) < kLeastCosine) continue;
             if (__builtin_fabsf(dot(offset, query.Ng)) > kThickness * radius) continue;
             if (!query.both_sides && dot(octahedral_decode(photon.wi), query.Ng) <= 0.0f) continue;
-            const float weight = (radius_squared - distance_squared[k]) * max_component(photon.power);
+            const float weight = (1.0f - distance_squared[k] * inverse_radius_squared) * max_component(photon.power);
             if (!(weight > 0.0f)) continue;
             sum += weight;
             // xorshift32 (Marsaglia 2003): which photon stands for all needs no stratification.
@@ -94,7 +96,7 @@ RELIEF_KERNEL PhotonGather photon_gather(const PhotonMapView& map, const PhotonQ
   }
   if (chosen == nullptr) return gather;
   gather.wi = octahedral_decode(chosen->wi);
-  gather.irradiance = chosen->power * (sum * 2.0f * kInvPi / (sqr(radius_squared) * max_component(chosen->power)));
+  gather.irradiance = chosen->power * (sum / max_component(chosen->power) * (2.0f * kInvPi * inverse_radius_squared));
   return gather;
 }
 

@@ -18,8 +18,7 @@ struct PhotonSourcesView {
   std::uint32_t num_sources = 0;
   const Box3* targets = nullptr;            ///< world bounds of each group of casters
   const std::int32_t* target_of = nullptr;  ///< of each instance; −1: no caster
-  Vec3f scene_centre{};                     ///< of a sphere around everything that light can hit
-  float scene_radius = 0;                   ///< metres
+  Box3 scene_box;                           ///< around everything that light can hit
   double photons_a_pass = 1;
 };
 

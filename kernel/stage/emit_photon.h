@@ -78,14 +78,14 @@ emit_from_area(const KernelGlobals& g, const Light& light, const Box3& box, Vec2
   return ray;
 }
 
-/// Parallel light that falls on a box from outside the scene.
+/// Parallel light that falls on a box from outside the scene, and from no further away: a ray from afar would miss what is
+/// small by its rounding.
 /// @param irradiance  W/m² across D
 RELIEF_KERNEL EmittedRay
 emit_from_afar(const PhotonSourcesView& sources, const Box3& box, Vec3f D, Vec3f irradiance, Vec2f u)
 {
   const Vec3f P = box_aim_along(box, D, u);
-  const float back = dot(P - sources.scene_centre, D) + sources.scene_radius;
-  return {P - D * back, D, irradiance * box_shadow_area(box, D)};
+  return {P - D * box_distance_out(sources.scene_box, P, -D), D, irradiance * box_shadow_area(box, D)};
 }
 
 /// Starts a photon as path `path`. Its throughput is its power; its pixel, the group of casters it is aimed at.

@@ -102,8 +102,10 @@ RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
   if (is_zero(throughput)) return;
   surface_interaction_frame<kFeatureAll>(g, state, path, wo, at);
   if (has_scattered && (flags & kGathersPhotons) != 0) {
+    // Along the ray, as gather_photons: on a triangle that is large against the caustic, at.hit is less exact.
+    const Vec3f P = path_origin(state, path) - wo * state.hit_t[path];
     photons.photons[photons.size++] = {
-        at.hit.P, {throughput, octahedral_encode(wo), octahedral_encode(at.side.Ng), state.bounces[path] - 1u}};
+        P, {throughput, octahedral_encode(wo), octahedral_encode(at.side.Ng), state.bounces[path] - 1u}};
   }
   if ((flags & kCausticCaster) == 0) return;
   if (shade_photon_scatter(g, state, path, at, wo, throughput)) queue_push(next, path);
