@@ -94,9 +94,9 @@ inline constexpr std::string_view kCausticsModeLabels[] = {"auto", "on", "off"};
 /// The photon pass, see integrator/photon_pass.h.
 struct CausticSettings {
   CausticsMode mode = CausticsMode::kAuto;
-  double photons = 0;     ///< started in a pass (a sample a pixel); 0: one a pixel, at least 32,768
-  float alpha = 2.f / 3;  ///< (0, 1]: how fast the radius shrinks, see photon_radius_factor
-  float radius = 0;       ///< of the first pass, metres; 0: by how dense its photons lie
+  double photons = 0;   ///< started in a pass (a sample a pixel); 0: one a pixel, at least 32,768
+  float alpha = 0.75f;  ///< (0, 1]: how fast the radius shrinks, see photon_radius_factor
+  float radius = 0;     ///< of the first pass, metres; 0: by how dense its photons lie
   double memory_mib = 256;
 };
 

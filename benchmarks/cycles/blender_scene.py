@@ -261,6 +261,20 @@ def set_up_render(settings):
     cycles.volume_bounces = 0
 
 
+def use_manifold_sampling():
+    """Cycles' shadow caustics (MNEE): glass casts, everything else receives, all lights take part."""
+    for thing in bpy.context.scene.objects:
+        if thing.type == "LIGHT":
+            thing.data.cycles.is_caustics_light = True
+        elif thing.type == "MESH":
+            casts = any(
+                node.type in {"BSDF_GLASS", "BSDF_REFRACTION"} or (
+                    node.type == "BSDF_PRINCIPLED" and node.inputs["Transmission"].default_value > 0)
+                for slot in thing.material_slots if slot.material for node in slot.material.node_tree.nodes)
+            thing.cycles.is_caustics_caster = casts
+            thing.cycles.is_caustics_receiver = not casts
+
+
 def render(job):
     """Renders one picture a seed; prints a line `RUN {json}` for each.
 
@@ -289,6 +303,8 @@ def main():
     start = time.monotonic()
     approximate = build_scene(scene_path)
     print("SCENE " + json.dumps({"approximate": approximate, "import_seconds": time.monotonic() - start}), flush=True)
+    if job.get("manifold"):
+        use_manifold_sampling()
     if job.get("blend"):
         bpy.ops.wm.save_as_mainfile(filepath=os.path.abspath(job["blend"]))
     render(job)

@@ -26,7 +26,7 @@ class CyclesError(Exception):
     """Blender failed, or said nothing that could be understood; the message ends with its last lines."""
 
 
-def render_cycles(scene, runs, resolution=None, threads=None, blend=None, blender="blender"):
+def render_cycles(scene, runs, resolution=None, threads=None, blend=None, blender="blender", manifold=False):
     """Renders a scene once a run, in one Blender process.
 
     @param  scene       path of a .gltf
@@ -34,12 +34,13 @@ def render_cycles(scene, runs, resolution=None, threads=None, blend=None, blende
     @param  resolution  (width, height) instead of the scene's
     @param  threads     number of render threads; None: all
     @param  blend       where to save the scene as a .blend, for looking at it; None: nowhere
+    @param  manifold    use Cycles' shadow caustics (MNEE)
     @return             {"runs": the runs with render_seconds, synchronize_seconds, preparation_seconds, wall_seconds added,
                         "approximate": materials that Cycles' closures only come near to, "import_seconds",
                         "peak_memory_bytes", "processor_seconds" of the whole process}
     @error              CyclesError
     """
-    job = {"runs": runs, "resolution": resolution, "threads": threads, "blend": blend}
+    job = {"runs": runs, "resolution": resolution, "threads": threads, "blend": blend, "manifold": manifold}
     with tempfile.TemporaryDirectory() as folder:
         job_path = os.path.join(folder, "job.json")
         with open(job_path, "w", encoding="utf-8") as file:
