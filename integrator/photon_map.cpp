@@ -93,8 +93,6 @@ float photon_radius_for(const std::vector<std::vector<Photon>>& chunks, double w
   // Every stride-th photon is searched, so that a tenth of what is wanted is still a number to rely on.
   constexpr std::size_t kSearched = 32768;
   constexpr std::size_t kQueries = 256;
-  // Where light is bright, photons lie close; the dim parts of a caustic are most of what is seen of it.
-  constexpr double kQuantile = 0.8;
   const std::size_t stride = std::max<std::size_t>(1, count / kSearched);
   std::vector<Vec3f> points;
   for (const std::vector<Photon>& chunk : chunks) {
@@ -116,11 +114,11 @@ float photon_radius_for(const std::vector<std::vector<Photon>>& chunks, double w
     std::nth_element(squared.begin(), place, squared.end());
     radii[q] = std::sqrt(*place);
   });
-  const auto chosen = radii.begin() + static_cast<std::ptrdiff_t>(kQuantile * static_cast<double>(radii.size()));
-  std::nth_element(radii.begin(), chosen, radii.end());
+  const auto median = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
+  std::nth_element(radii.begin(), median, radii.end());
   // On a surface, photons within a radius grow with its square.
   const double found = nth * static_cast<double>(stride);
-  return static_cast<float>(static_cast<double>(*chosen) * std::sqrt(wanted / found));
+  return static_cast<float>(static_cast<double>(*median) * std::sqrt(wanted / found));
 }
 
 }  // namespace relief

@@ -32,9 +32,9 @@ class PhotonMap {
   float radius_ = 0;
 };
 
-/// A radius within which photons find `wanted` others of their own, at the median over photons: where light is, not where
-/// space is. Estimated from a part of them.
-/// Of fewer than twice as many photons, the radius within which they find half of all.
+/// A radius within which the median photon finds `wanted` others: where light is, not where space is. Estimated from a part
+/// of them. (That of four of five photons blurred a lamp's caustic by 4 % where an even sky lit the same glass.) Of fewer
+/// than twice as many photons, the radius within which they find half of all.
 /// @return metres; 0 where there is no distance between them
 float photon_radius_for(const std::vector<std::vector<Photon>>& chunks, double wanted);
 

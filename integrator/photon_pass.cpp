@@ -205,7 +205,7 @@ void PhotonPass::next(KernelGlobals& g, const StageTable& stages, const std::fun
     for (const std::vector<Photon>& chunk : chunks_) stored_ += chunk.size();
     // Photons that a search is to find in the first pass. Of 8, 14, 24 and 48 this had the least error on the scenes of
     // benchmarks/caustics, with alpha = 3/4.
-    constexpr double kFound = 12;
+    constexpr double kFound = 16;
     if (!(first_radius_ > 0)) {
       first_radius_ = settings_.radius > 0 ? settings_.radius : photon_radius_for(chunks_, kFound);
     }
