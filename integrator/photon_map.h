@@ -13,8 +13,7 @@ class PhotonMap {
  public:
   /// Sorts photons into cells twice as wide as the radius of searches: a search so meets at most eight.
   ///
-  /// A hash grid, because all searches of a pass have one radius: measured on 200,000 photons of a glass sphere's caustic
-  /// against nanoflann's k-d tree, see benchmarks/photon_map.cpp.
+  /// A hash grid, because all searches of a pass have one radius: a tree would find the same photons in more steps.
   /// @param chunks  in an order that does not depend on threads; the order within cells follows from it
   /// @param radius  metres, > 0
   /// @cost          36 bytes a photon, and 4 to 8 for buckets

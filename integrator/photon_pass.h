@@ -5,6 +5,7 @@
 // path_caustic_flags and shade_surface_split for how it leaves these out.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <vector>
@@ -39,7 +40,11 @@ class PhotonPass {
   /// samples know nothing of each other's photons, and the error estimate holds for caustics as for the rest.
   /// @param g       gets the map
   /// @param worker  the calling thread's
-  void next(KernelGlobals& g, const StageTable& stages, const std::function<Wavefront&()>& worker);
+  /// @param stop    true: photons not begun are left out
+  void next(KernelGlobals& g,
+            const StageTable& stages,
+            const std::function<Wavefront&()>& worker,
+            const std::atomic<bool>& stop);
 
   void fill(CausticStatistics& stats) const;
 

@@ -150,7 +150,9 @@ RenderedImage render(const Scene& scene,
     // Photons are of one sample: see PhotonPass::next.
     const std::uint32_t samples =
         caustics ? 1 : pass_samples(done, wanted, seconds_since(start), options.time_limit_seconds);
-    if (photons) photons->next(g, stages, [&]() -> Wavefront& { return workers.local(); });
+    if (photons)
+      photons->next(
+          g, stages, [&]() -> Wavefront& { return workers.local(); }, stop);
     tbb::parallel_for(
         std::size_t{0}, active.size(),
         [&](std::size_t i) {
