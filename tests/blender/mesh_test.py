@@ -112,7 +112,8 @@ def test_collection_instances_with_shear_and_mirroring():
 
 def test_particles():
     scene = _stage()
-    pebble = add_sphere(0.12, diffuse((0.9, 0.3, 0.2)), (50, 0, 0), segments=8)
+    # Fine ones: along the terminator of coarse smooth ones relief and Cycles lift rays differently, 0.16 % of this picture.
+    pebble = add_sphere(0.12, diffuse((0.9, 0.3, 0.2)), (50, 0, 0), segments=48)
     emitter = add_plane(5, diffuse((0.3, 0.4, 0.3)), (0, 0, 0.4))
     emitter.modifiers.new("particles", "PARTICLE_SYSTEM")
     settings = emitter.particle_systems[0].settings
