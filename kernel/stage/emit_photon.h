@@ -6,7 +6,7 @@
 #include "kernel/sample/dimensions.h"
 #include "kernel/shape/material_lookup.h"
 #include "kernel/shape/surface_hit.h"
-#include "kernel/state/path_state.h"
+#include "kernel/stage/path_access.h"
 
 namespace relief {
 
@@ -126,17 +126,8 @@ RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
   const Vec3f power = ray.power * static_cast<float>(1.0 / (probability * sources.photons_a_pass));
   if (is_zero(power) || !is_finite(power)) return false;
 
-  state.O_x[path] = ray.O.x;
-  state.O_y[path] = ray.O.y;
-  state.O_z[path] = ray.O.z;
-  state.D_x[path] = ray.D.x;
-  state.D_y[path] = ray.D.y;
-  state.D_z[path] = ray.D.z;
-  state.t_min[path] = kLeastDistance;
-  state.t_max[path] = kInfinity;
-  state.throughput_r[path] = power.x;
-  state.throughput_g[path] = power.y;
-  state.throughput_b[path] = power.z;
+  path_set_ray(state, path, ray.O, ray.D);
+  path_set_throughput(state, path, power);
   state.pixel[path] = source.target;
   state.sample_index[path] = index;
   state.pixel_hash[path] = hash;

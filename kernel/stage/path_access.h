@@ -2,6 +2,7 @@
 #pragma once
 
 #include "kernel/globals.h"
+#include "kernel/math/rounding.h"
 #include "kernel/sample/mis.h"
 #include "kernel/state/path_state.h"
 
@@ -20,6 +21,27 @@ RELIEF_KERNEL Vec3f path_sigma_a(const PathStateView& s, std::uint32_t i)
 RELIEF_KERNEL Vec3f path_scatter_N(const PathStateView& s, std::uint32_t i)
 {
   return {s.scatter_Nx[i], s.scatter_Ny[i], s.scatter_Nz[i]};
+}
+
+/// Gives a path a new ray, to be searched from its origin on.
+/// @param D  unit
+RELIEF_KERNEL void path_set_ray(const PathStateView& s, std::uint32_t i, Vec3f O, Vec3f D)
+{
+  s.O_x[i] = O.x;
+  s.O_y[i] = O.y;
+  s.O_z[i] = O.z;
+  s.D_x[i] = D.x;
+  s.D_y[i] = D.y;
+  s.D_z[i] = D.z;
+  s.t_min[i] = kLeastDistance;
+  s.t_max[i] = kInfinity;
+}
+
+RELIEF_KERNEL void path_set_throughput(const PathStateView& s, std::uint32_t i, Vec3f throughput)
+{
+  s.throughput_r[i] = throughput.x;
+  s.throughput_g[i] = throughput.y;
+  s.throughput_b[i] = throughput.z;
 }
 
 enum class BounceKind : int { kAll = 0, kDiffuse = 8, kGlossy = 16, kTransmission = 24 };

@@ -49,18 +49,8 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
   const Vec3f power = scattered / survival;
   if (is_zero(power) || !is_finite(power)) return false;
 
-  const Vec3f O = surface_ray_origin(at, wi);
-  state.O_x[path] = O.x;
-  state.O_y[path] = O.y;
-  state.O_z[path] = O.z;
-  state.D_x[path] = wi.x;
-  state.D_y[path] = wi.y;
-  state.D_z[path] = wi.z;
-  state.t_min[path] = kLeastDistance;
-  state.t_max[path] = kInfinity;
-  state.throughput_r[path] = power.x;
-  state.throughput_g[path] = power.y;
-  state.throughput_b[path] = power.z;
+  path_set_ray(state, path, surface_ray_origin(at, wi), wi);
+  path_set_throughput(state, path, power);
   const bool transmitted = (bsdf.lobe & kLobeTransmit) != 0;
   // A camera path counts the event next to the light, but no surface asks for that count any more.
   if ((state.flags[path] & kPathCaustic) != 0) {

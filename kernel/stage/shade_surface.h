@@ -166,9 +166,7 @@ template <unsigned kFeatures>
   // Whatever stands in a medium, of glass or not.
   if (!is_zero(sigma_a)) {
     throughput *= path_transmittance(sigma_a, t);
-    state.throughput_r[path] = throughput.x;
-    state.throughput_g[path] = throughput.y;
-    state.throughput_b[path] = throughput.z;
+    path_set_throughput(state, path, throughput);
   }
 
   surface_interaction_frame<kFeatures>(g, state, path, wo, at);
@@ -252,18 +250,8 @@ template <unsigned kFeatures>
   if (is_zero(throughput)) return;
 
   const Vec3f wi = from_local(side.frame, bsdf.wi);
-  const Vec3f O = surface_ray_origin(at, wi);
-  state.O_x[path] = O.x;
-  state.O_y[path] = O.y;
-  state.O_z[path] = O.z;
-  state.D_x[path] = wi.x;
-  state.D_y[path] = wi.y;
-  state.D_z[path] = wi.z;
-  state.t_min[path] = kLeastDistance;
-  state.t_max[path] = kInfinity;
-  state.throughput_r[path] = throughput.x;
-  state.throughput_g[path] = throughput.y;
-  state.throughput_b[path] = throughput.z;
+  path_set_ray(state, path, surface_ray_origin(at, wi), wi);
+  path_set_throughput(state, path, throughput);
   const bool delta = (bsdf.lobe & kLobeDelta) != 0;
   state.pdf[path] = delta ? 0.0f : bsdf.pdf;
   state.scatter_Nx[path] = light_N.x;
