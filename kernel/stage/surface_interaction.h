@@ -5,6 +5,8 @@
 #include "kernel/bsdf/surface_params.h"
 #include "kernel/feature_mask.h"
 #include "kernel/globals.h"
+#include "kernel/sample/dimensions.h"
+#include "kernel/sample/sobol.h"
 #include "kernel/shape/surface_hit.h"
 #include "kernel/stage/path_access.h"
 #include "kernel/texture/ray_cone.h"
