@@ -142,15 +142,30 @@ std::span<const std::byte> load_buffer(GltfDocument& document,
   return bytes.first(static_cast<std::size_t>(length));
 }
 
+/// File access for tinygltf that finds nothing and writes nothing. A template, since members differ between versions.
+template <typename Callbacks>
+Callbacks no_files()
+{
+  Callbacks none{};
+  none.FileExists = [](const std::string&, void*) { return false; };
+  none.ExpandFilePath = [](const std::string&, void*) { return std::string(); };
+  none.ReadWholeFile = [](std::vector<unsigned char>*, std::string*, const std::string&, void*) { return false; };
+  none.WriteWholeFile = [](std::string*, const std::string&, const std::vector<unsigned char>&, void*) {
+    return false;
+  };
+  // Since 2.9, which takes none of the others without it.
+  if constexpr (requires { none.GetFileSizeInBytes; }) {
+    none.GetFileSizeInBytes = [](std::size_t*, std::string*, const std::string&, void*) { return false; };
+  }
+  return none;
+}
+
 /// Hands the conforming copy to tinygltf. It sees no URI and no extension, so it opens no file, expands no path (its
 /// default expands shell syntax) and decodes nothing.
 void load_core(GltfDocument& document, const json& conforming)
 {
   tinygltf::TinyGLTF loader;
-  loader.SetFsCallbacks(
-      {[](const std::string&, void*) { return false; }, [](const std::string&, void*) { return std::string(); },
-       [](std::vector<unsigned char>*, std::string*, const std::string&, void*) { return false; },
-       [](std::string*, const std::string&, const std::vector<unsigned char>&, void*) { return false; }, nullptr});
+  loader.SetFsCallbacks(no_files<tinygltf::FsCallbacks>());
   loader.SetImageLoader([](tinygltf::Image*, int, std::string*, std::string*, int, int, const unsigned char*, int,
                            void*) { return false; },
                         nullptr);
