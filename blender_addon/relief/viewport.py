@@ -2,8 +2,9 @@
 """The viewport's picture: short runs of the program, each with a seed of its own, joined as they come in.
 
 The first run is a coarse one, so that something is seen soon; then each takes as many samples as all before it, so that
-loading the scene again costs less and less of the time. A change ends the run and starts anew; a change of the view
-alone writes the scene's few kilobytes again, its buffers stay.
+loading the scene again costs less and less of the time. A change ends the run and starts anew; but a coarse run is let
+come to its end, which is near, so that pictures keep coming while a view is turned or an object dragged. A change of the
+view alone writes the scene's few kilobytes again, its buffers stay.
 """
 
 import os
@@ -23,13 +24,10 @@ from .preferences import find_checked_binary
 from .process import Process
 from .report import Report, ReliefError
 
-_POLL_SECONDS = 0.05
+_POLL_SECONDS = 0.02
 
 #: The first run's picture is so many times smaller a side.
 _COARSE = 4
-
-#: A view that moves is rendered once it has rested this long; its old picture would only be thrown away.
-_REST_POLLS = 2
 
 
 _alive = weakref.WeakSet()
@@ -60,28 +58,26 @@ class Viewport:
         self._engine = weakref.ref(engine)
         self._folder = session.make_folder()
         self._exporter = None
-        self._settings = None
         self._view = None
+        self._is_changed = False
         self._process = None
         self._run = None
         self._sum = None
         self._samples = 0
         self._texture = None
         self._picture = None
-        self._rest = 0
         self._is_stopped = False
         _alive.add(self)
         bpy.app.timers.register(self._poll, first_interval=_POLL_SECONDS)
 
     def update(self, context, depsgraph):
         """The scene has changed: exports it and starts anew."""
-        self._end_process()
+        self._exporter = None  # until it is whole
         scene = depsgraph.scene
         warnings = Report()
         view = _view(context, depsgraph)
         exporter = SceneExporter(depsgraph, GltfWriter(self._folder, DATA_FOLDER), warnings)
         exporter.add_all(view)
-        session.remove_stale(os.path.join(self._folder, DATA_FOLDER), exporter.writer.used_files)
         self._binary = find_checked_binary()
         self._options = final.command_line(scene.relief)
         self._most_samples = scene.relief.preview_samples
@@ -96,7 +92,6 @@ class Viewport:
         if self._exporter is not None:
             view = _view(context, depsgraph)
             if view != self._view:
-                self._end_process()
                 self._begin(view)
         if self._picture is not None:
             self._upload()
@@ -116,14 +111,12 @@ class Viewport:
         session.remove_folder(self._folder)
 
     def _begin(self, view):
+        """Notes what is to be rendered from now on."""
         self._view = view
-        self._sum, self._samples = None, 0
-        self._run = None
-        self._rest = _REST_POLLS
         self._exporter.set_view(view)
-        writer = self._exporter.writer
-        writer.json.update(scene_json(self._exporter.nodes))
-        writer.write("scene.gltf")
+        self._is_changed = True
+        if self._process is not None and self._run.divisor == 1:
+            self._end_process()
 
     def _end_process(self):
         if self._process is not None:
@@ -146,34 +139,36 @@ class Viewport:
         return _POLL_SECONDS
 
     def _step(self, engine):
+        """Takes over what a run has rendered, and starts the next one."""
+        if self._process is not None:
+            code = self._process.wait(0)
+            if code is None:
+                return
+            if code != 0:
+                raise ReliefError(self._process.failure(code))
+            self._process = None
+            self._add(exr.read(self._picture_path()))
+            engine.update_stats("", f"relief: {self._samples} of {self._most_samples} samples")
+            engine.tag_redraw()
         if self._exporter is None:
             return
-        if self._process is None:
-            if self._rest > 0:
-                self._rest -= 1
-                return
-            self._run = self._next_run()
-            if self._run is not None:
-                self._start()
-            return
-        code = self._process.wait(0)
-        if code is None:
-            return
-        if code != 0:
-            raise ReliefError(self._process.failure(code))
-        self._process = None
-        self._add(exr.read(self._picture_path()))
-        engine.update_stats("", f"relief: {self._samples} of {self._most_samples} samples")
-        engine.tag_redraw()
+        if self._is_changed:
+            self._is_changed = False
+            self._write_scene()
+            self._sum, self._samples = None, 0
+            self._run = _Run(_COARSE, 1, self._seed)
+            self._start()
+        elif self._samples < self._most_samples:
+            samples = min(max(1, self._samples), self._most_samples - self._samples)
+            self._run = _Run(1, samples, self._run.seed + 1)
+            self._start()
 
-    def _next_run(self):
-        """What to render next; None when there are enough samples."""
-        if self._run is None:
-            return _Run(_COARSE, 1, self._seed)
-        if self._samples >= self._most_samples:
-            return None
-        samples = min(max(1, self._samples), self._most_samples - self._samples)
-        return _Run(1, samples, self._run.seed + 1)
+    def _write_scene(self):
+        """Writes the scene as it is now. No run may be reading it."""
+        writer = self._exporter.writer
+        writer.json.update(scene_json(self._exporter.nodes))
+        writer.write("scene.gltf")
+        session.remove_stale(os.path.join(self._folder, DATA_FOLDER), writer.used_files)
 
     def _start(self):
         run = self._run
