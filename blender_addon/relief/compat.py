@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What differs between versions of Blender; nothing else in the add-on asks for the version.
 
-Every function was run in 3.4.1. The branches for 4.0 and later follow Blender's release notes and API reference and
-were not run.
+Checked against 3.4.1 and 4.3.2, as Debian 12 and 13 package them. The branch for 4.4 and the exposure of 4.5 follow
+Blender's release notes and were not run.
 """
+
+import math
 
 import bpy
 import numpy as np
@@ -26,10 +28,41 @@ _PRINCIPLED_NAMES_4_0 = {
 #: Before 4.0 the Principled BSDF multiplied its coat by Disney's factor of a quarter.
 COAT_SCALE = 1.0 if IS_4_0 else 0.25
 
+#: Tints of the Principled BSDF are colours; before 4.0 they were mixes towards the base colour's hue.
+TINTS_ARE_COLORS = IS_4_0
+
 
 def principled_socket(node, name):
     """Input of a Principled BSDF by its name in 3.4; None if this version has no such input."""
     return node.inputs.get(_PRINCIPLED_NAMES_4_0.get(name, name) if IS_4_0 else name)
+
+
+def principled_reflection(level, ior, tint, is_glass):
+    """Reflection of a Principled BSDF beside its metal.
+
+    @param  level     "Specular" or "Specular IOR Level"
+    @param  tint      linear RGB, white before 4.0
+    @param  is_glass  whether light passes through
+    @return           (index of refraction, weight, colour that multiplies what the index reflects at normal incidence)
+    """
+    weight = 1.0 if level > 0 else 0.0
+    if IS_4_0:
+        # The index counts everywhere; the level scales its reflection, one half being all of it.
+        return max(1.0, ior), weight, tuple(2 * level * c for c in tint)
+    if is_glass:
+        return max(1.0, ior), 1.0, tint
+    # The level alone tells the reflection: 0.08 · level at normal incidence.
+    root = math.sqrt(0.08 * max(level, 0.0))
+    return (1 + root) / (1 - root), weight, tint
+
+
+def has_uncommon_coat(node):
+    """Whether a Principled BSDF's coat has a colour or an index of refraction of its own, which came with 4.0."""
+    tint, ior = node.inputs.get("Coat Tint"), node.inputs.get("Coat IOR")
+    if tint is None or ior is None:
+        return False
+    is_clear = not tint.is_linked and min(tint.default_value) >= 1.0
+    return not is_clear or ior.is_linked or abs(ior.default_value - 1.5) > 1e-4
 
 
 def sheen_color(base, sheen, tint):
@@ -47,16 +80,19 @@ def sheen_color(base, sheen, tint):
     return tuple(min(1.0, sheen * (1 + tint * (h - 1))) for h in hue)
 
 
+def displacement_owner(material):
+    """What has a material's `displacement_method`: before 4.1 it was Cycles' property."""
+    return material if IS_4_1 else getattr(material, "cycles", None)
+
+
 def displacement_method(material):
-    """'BUMP', 'DISPLACEMENT' or 'BOTH': the material's own setting. It was Cycles' property before 4.1."""
-    owner = material if IS_4_1 else getattr(material, "cycles", None)
-    return getattr(owner, "displacement_method", "BUMP")
+    """'BUMP', 'DISPLACEMENT' or 'BOTH': the material's own setting."""
+    return getattr(displacement_owner(material), "displacement_method", "BUMP")
 
 
 def set_displacement_method(material, method):
     """Sets what displacement_method returns."""
-    owner = material if IS_4_1 else material.cycles
-    owner.displacement_method = method
+    displacement_owner(material).displacement_method = method
 
 
 def corner_normals(mesh):
@@ -83,8 +119,22 @@ def vertex_normals(mesh):
 def splits_normals(mesh):
     """Whether the mesh asks for hard edges besides flat faces: these stay hard under displacement."""
     if IS_4_1:
-        return mesh.normals_domain == "CORNER" and mesh.has_custom_normals
+        sharp = mesh.attributes.get("sharp_edge")
+        if sharp is None or sharp.domain != "EDGE":
+            return mesh.has_custom_normals
+        values = np.empty(len(sharp.data), dtype=bool)
+        sharp.data.foreach_get("value", values)
+        return mesh.has_custom_normals or bool(values.any())
     return mesh.use_auto_smooth
+
+
+def set_pixels(render_pass, values):
+    """Hands pixels to a pass of a render result.
+
+    @param  values  float32 of shape (pixels, channels), C-contiguous, bottom row first
+    """
+    # An assignment, which every version takes, is slower by a factor of 300.
+    render_pass.rect.foreach_set(values.ravel() if IS_4_0 else values)
 
 
 def engine_init(engine_class, engine, *arguments, **keywords):
@@ -93,10 +143,25 @@ def engine_init(engine_class, engine, *arguments, **keywords):
         super(engine_class, engine).__init__(*arguments, **keywords)
 
 
+#: An area light of P watts and area A has the radiance P / (this · A).
+AREA_DIVISOR = math.pi if IS_4_0 else 4.0
+
+
+def sun_divisor(half_angle):
+    """What a sun's irradiance is divided by for the radiance of its disk: steradians, since 4.0 weighted by their cosine."""
+    return math.pi * math.sin(half_angle) ** 2 if IS_4_0 else 2 * math.pi * (1 - math.cos(half_angle))
+
+
 def casts_shadow(light):
     """Whether a light's shadows are on. It was Cycles' property before 4.2."""
     owner = light if hasattr(light, "use_shadow") and bpy.app.version >= (4, 2, 0) else getattr(light, "cycles", None)
     return getattr(owner, "use_shadow" if owner is light else "cast_shadow", True)
+
+
+def links_light(shown):
+    """Whether an object lights, or is shadowed by, some collection alone; it came with 4.0."""
+    linking = getattr(shown, "light_linking", None)
+    return linking is not None and (linking.receiver_collection or linking.blocker_collection) is not None
 
 
 def is_portal(light):

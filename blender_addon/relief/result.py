@@ -6,6 +6,7 @@ from typing import Callable
 
 import numpy as np
 
+from . import compat
 from .export.axes import blender_from_gltf
 
 #: What Blender's depth pass holds where nothing was hit.
@@ -102,14 +103,14 @@ def fill(engine, picture, layer_name, passes, is_transparent, metadata):
             engine.add_pass(render_pass.name, len(render_pass.ids), render_pass.ids, layer=layer_name)
     result = engine.begin_result(0, 0, picture.width, picture.height, layer=layer_name)
     layer = result.layers[0]
-    layer.passes["Combined"].rect.foreach_set(combined(picture, is_transparent))
+    compat.set_pixels(layer.passes["Combined"], combined(picture, is_transparent))
     coverage = picture.channels["A"].ravel()
     for render_pass in passes:
         values = picture.layer(*render_pass.channels)
         target = layer.passes.get(render_pass.name)
         if values is not None and target is not None:
             converted = render_pass.convert(values, coverage)
-            target.rect.foreach_set(np.ascontiguousarray(converted, dtype=np.float32))
+            compat.set_pixels(target, np.ascontiguousarray(converted, dtype=np.float32))
     engine.end_result(result)
     # Of what begin_result gives, Blender takes over the pixels alone.
     whole = engine.get_result()

@@ -168,8 +168,7 @@ class RELIEF_PT_material_displacement(_Panel, bpy.types.Panel):
 
     def draw(self, context):
         material, rows = context.material, self.rows()
-        owner = material if compat.IS_4_1 else material.cycles
-        rows.prop(owner, "displacement_method", text="Displacement")
+        rows.prop(compat.displacement_owner(material), "displacement_method", text="Displacement")
         if needs_switch(material):
             rows.label(text="Bump Only: the Displacement node moves nothing", icon="INFO")
             rows.operator("relief.displace")

@@ -38,6 +38,8 @@ def _heights(size=32):
 
 def _material(scale=0.4, midlevel=0.5, space="OBJECT", method="DISPLACEMENT", is_float=True):
     """(material, its tree, Image Texture node, Displacement node) of a displaced diffuse surface."""
+    from relief import compat
+
     material, tree, _ = new_material("displaced", Color=(0.8, 0.7, 0.6, 1), Roughness=0.0)
     texture = add_image_node(tree, new_image(_heights(), "Non-Color", is_float))
     node = tree.nodes.new("ShaderNodeDisplacement")
@@ -46,7 +48,7 @@ def _material(scale=0.4, midlevel=0.5, space="OBJECT", method="DISPLACEMENT", is
     tree.links.new(texture.outputs["Color"], node.inputs["Height"])
     output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
     tree.links.new(node.outputs[0], output.inputs["Displacement"])
-    material.cycles.displacement_method = method
+    compat.set_displacement_method(material, method)
     return material, tree, texture, node
 
 
@@ -200,12 +202,13 @@ def test_the_panels_switch():
     _stage()
     material, _, _, _ = _material(method="BUMP")
     plane = add_plane(4, material)
+    from relief import compat
     from relief.export.displacement import needs_switch
 
     assert needs_switch(material)
     with bpy.context.temp_override(material=material, object=plane):
         assert bpy.ops.relief.displace() == {"FINISHED"}
-    assert not needs_switch(material) and material.cycles.displacement_method == "DISPLACEMENT"
+    assert not needs_switch(material) and compat.displacement_method(material) == "DISPLACEMENT"
 
 
 def test_settings_reach_the_program():

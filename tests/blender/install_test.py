@@ -55,6 +55,49 @@ def test_install_use_and_remove():
         assert not re.search("Traceback|Error:|Warning: .*relief", output), output
 
 
+_EXTENSION_STEPS = """
+import bpy, os
+module = "bl_ext.user_default.relief"
+print("STEP enabled", module in bpy.context.preferences.addons)
+scene = bpy.context.scene
+scene.render.engine = "RELIEF"
+scene.relief.samples = 4
+scene.render.resolution_x, scene.render.resolution_y = 64, 48
+scene.render.filepath = {picture!r}
+bpy.ops.render.render(write_still=True)
+print("STEP rendered", os.path.exists({picture!r}))
+bpy.ops.preferences.addon_disable(module=module)
+print("STEP disabled", hasattr(bpy.types.Scene, "relief"))
+"""
+
+
+def test_install_use_and_remove_as_an_extension():
+    """The way of 4.2 and later; before, there are no extensions."""
+    if bpy.app.version < (4, 2, 0):
+        return
+    with folder() as path:
+        archive, picture = f"{path}/relief.zip", f"{path}/picture.png"
+        subprocess.run([os.path.join(_ROOT, "scripts", "package_addon"), archive], check=True, capture_output=True)
+        environment = {k: v for k, v in os.environ.items() if k != "BLENDER_USER_SCRIPTS"}
+        environment.update(HOME=path, XDG_CONFIG_HOME=f"{path}/config")
+
+        def blender(*arguments):
+            command = [bpy.app.binary_path, *arguments]
+            done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=100)
+            output = done.stdout + done.stderr
+            assert done.returncode == 0 and not re.search("Traceback|Error:|Warning: .*relief", output), output
+            return output
+
+        blender("--command", "extension", "validate", archive)
+        blender("--command", "extension", "install-file", "-r", "user_default", "--enable", archive)
+        output = blender("-b", "--python-exit-code", "9", "--python-expr", _EXTENSION_STEPS.format(picture=picture))
+        for step in ("enabled True", "rendered True", "disabled False"):
+            assert f"STEP {step}" in output, output
+        blender("--command", "extension", "remove", "relief")
+        left = [n for _, folders, _ in os.walk(f"{path}/config") for n in folders if n == "relief"]
+        assert not left, left
+
+
 def test_versions_agree():
     """bl_info, the manifest and the program's own version are one."""
     import relief

@@ -4,6 +4,7 @@ import bpy
 
 from scenes import (
     add_camera,
+    add_group_socket,
     add_light,
     add_plane,
     add_sphere,
@@ -11,6 +12,7 @@ from scenes import (
     assert_warns,
     degrees,
     diffuse,
+    make_sharp,
     new_material,
     set_bounces,
     set_world,
@@ -82,20 +84,20 @@ def test_principled_plastic():
 
 def test_mirror():
     material, _, node = new_material("mirror", "ShaderNodeBsdfGlossy", Color=(0.9, 0.9, 0.9, 1))
-    node.distribution = "SHARP"
+    make_sharp(node)
     # glTF's metals reflect all light at grazing angles, Cycles' glossy node its colour at all of them.
     assert_agrees(_stage(material), samples=128, tolerance=0.03)
 
 
 def test_white_mirror():
     material, _, node = new_material("mirror", "ShaderNodeBsdfGlossy", Color=(1, 1, 1, 1))
-    node.distribution = "SHARP"
+    make_sharp(node)
     assert_agrees(_stage(material), samples=128)
 
 
 def test_smooth_glass():
     material, _, node = new_material("glass", "ShaderNodeBsdfGlass", Color=(1, 1, 1, 1), IOR=1.5)
-    node.distribution = "SHARP"
+    make_sharp(node)
     scene = _stage(material, 8)
     # Caustics of the lamp would never settle; the sky's do.
     bpy.data.objects.remove(next(o for o in scene.objects if o.type == "LIGHT"))
@@ -104,7 +106,7 @@ def test_smooth_glass():
 
 def test_absorbing_glass():
     material, tree, node = new_material("glass", "ShaderNodeBsdfGlass", Color=(1, 1, 1, 1), IOR=1.3)
-    node.distribution = "SHARP"
+    make_sharp(node)
     volume = tree.nodes.new("ShaderNodeVolumeAbsorption")
     volume.inputs["Color"].default_value = (0.2, 0.6, 0.9, 1)
     volume.inputs["Density"].default_value = 0.7
@@ -139,8 +141,8 @@ def test_diffuse_plus_emission():
 def test_node_group():
     """Values pass through a group's inputs; the shader sits inside."""
     group = bpy.data.node_groups.new("paint", "ShaderNodeTree")
-    group.inputs.new("NodeSocketColor", "Paint")
-    group.outputs.new("NodeSocketShader", "Shader")
+    add_group_socket(group, "Paint", "INPUT", "NodeSocketColor")
+    add_group_socket(group, "Shader", "OUTPUT", "NodeSocketShader")
     inside, out = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
     shader, reroute = group.nodes.new("ShaderNodeBsdfDiffuse"), group.nodes.new("NodeReroute")
     group.links.new(inside.outputs["Paint"], reroute.inputs[0])

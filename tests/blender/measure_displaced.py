@@ -69,6 +69,8 @@ def _build(name, folder):
     path = os.path.join(folder, "heights.png")
     _height_map(path, {"landscape": 4096}.get(name, 2048), "woven" if name == "torus" else "stone")
     scene = scenes.new_scene()
+    from relief import compat  # now that the add-on is on
+
     scenes.set_bounces(scene, 4)
     scenes.set_world((0.4, 0.5, 0.7))
     scenes.add_light("SUN", rotation=scenes.degrees(55, 10, 30), energy=3, angle=0)
@@ -86,7 +88,7 @@ def _build(name, folder):
     tree.links.new(texture.outputs[0], node.inputs["Height"])
     output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
     tree.links.new(node.outputs[0], output.inputs["Displacement"])
-    material.cycles.displacement_method = "DISPLACEMENT"
+    compat.set_displacement_method(material, "DISPLACEMENT")
     if name == "sphere":
         made = scenes.add_sphere(1.0, material, segments=32)
         scenes.add_camera((0, -3.2, 0.6), scenes.degrees(80, 0, 0), lens=50)

@@ -6,6 +6,7 @@ import bpy
 
 from scenes import (
     add_camera,
+    add_group_socket,
     add_light,
     add_plane,
     add_sphere,
@@ -42,8 +43,11 @@ def test_split_normals():
     cube = bpy.context.object
     bpy.ops.object.shade_smooth()
     cube.data.materials.append(diffuse())
-    cube.data.use_auto_smooth = True
-    cube.data.auto_smooth_angle = math.radians(30)
+    if bpy.app.version >= (4, 1, 0):
+        cube.data.set_sharp_from_angle(angle=math.radians(30))
+    else:
+        cube.data.use_auto_smooth = True
+        cube.data.auto_smooth_angle = math.radians(30)
     assert_agrees(scene)
 
 
@@ -138,8 +142,8 @@ def test_geometry_nodes_instances():
     scene = _stage()
     carrier = add_plane(4, diffuse((0.3, 0.3, 0.6)), (0, 0, 0.2), subdivisions=5)
     tree = bpy.data.node_groups.new("scatter", "GeometryNodeTree")
-    tree.inputs.new("NodeSocketGeometry", "Geometry")
-    tree.outputs.new("NodeSocketGeometry", "Geometry")
+    for direction in ("INPUT", "OUTPUT"):
+        add_group_socket(tree, "Geometry", direction, "NodeSocketGeometry")
     nodes = {
         kind: tree.nodes.new(kind)
         for kind in (

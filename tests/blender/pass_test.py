@@ -53,6 +53,8 @@ def _compared(setting, names):
     # Engines average differently over edges: pixels whose neighbours are alike are compared.
     relief, cycles = (np.stack([p[prefix + name] for name in names]).astype(np.float64) for p in pictures)
     spread = np.max([np.abs(np.gradient(c, axis=axis)) for c in np.minimum(cycles, 100) for axis in (0, 1)], axis=0)
+    # At the picture's border only one neighbour is known.
+    spread[[0, -1], :] = spread[:, [0, -1]] = np.inf
     return relief, cycles, spread
 
 

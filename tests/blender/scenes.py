@@ -19,6 +19,12 @@ from exr import read_rgb  # noqa: E402
 #: Chance that a test fails although both engines agree. Seeds are fixed: a test passes always or never.
 SIGNIFICANCE = 1e-4
 
+#: Cycles changed in this version: Principled BSDF, lights, spot edges. Tests that compare with what it was before, ask.
+IS_4_0 = bpy.app.version >= (4, 0, 0)
+
+#: Blender's name of the colour space that pictures are rendered in.
+LINEAR = "Linear Rec.709" if IS_4_0 else "Linear"
+
 #: Standard error of the mean of each engine's pictures: above, a comparison would not notice what it is made to notice.
 LARGEST_STANDARD_ERROR = 0.01
 
@@ -179,8 +185,11 @@ def set_world(color, strength=1.0):
 def new_material(name="material", kind="ShaderNodeBsdfDiffuse", **inputs):
     """A material of one shader node.
 
-    @return  (material, tree, node)
+    @param  inputs  values by the input's name, "_" for a space; those of the Principled BSDF by their names in 3.4
+    @return         (material, tree, node)
     """
+    from relief import compat
+
     material = bpy.data.materials.new(name)
     material.use_nodes = True
     tree = material.node_tree
@@ -188,9 +197,30 @@ def new_material(name="material", kind="ShaderNodeBsdfDiffuse", **inputs):
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     node = tree.nodes.new(kind)
     for key, value in inputs.items():
-        node.inputs[key.replace("_", " ")].default_value = value
+        name = key.replace("_", " ")
+        socket = compat.principled_socket(node, name) if kind == "ShaderNodeBsdfPrincipled" else node.inputs[name]
+        socket.default_value = value
     tree.links.new(node.outputs[0], output.inputs["Surface"])
     return material, tree, node
+
+
+def make_sharp(node):
+    """Makes a Glossy or Glass BSDF perfectly smooth. Since 4.0 that is a roughness, before it was a distribution."""
+    if IS_4_0:
+        node.inputs["Roughness"].default_value = 0.0
+    else:
+        node.distribution = "SHARP"
+
+
+def add_group_socket(tree, name, direction, kind):
+    """Adds an input or output to a node group.
+
+    @param  direction  "INPUT" or "OUTPUT"
+    """
+    if IS_4_0:
+        tree.interface.new_socket(name, in_out=direction, socket_type=kind)
+    else:
+        (tree.inputs if direction == "INPUT" else tree.outputs).new(kind, name)
 
 
 def diffuse(color=(0.8, 0.8, 0.8), name="diffuse"):
@@ -225,7 +255,7 @@ def add_image_node(tree, image, **settings):
     return node
 
 
-def new_image(pixels, color_space="Linear", is_float=True):
+def new_image(pixels, color_space=LINEAR, is_float=True):
     """A generated image.
 
     @param  pixels  (height, width, 4), bottom row first

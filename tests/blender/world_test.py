@@ -1,6 +1,7 @@
 """Worlds: colours and lat-long images light and are seen as in Cycles."""
 
 from scenes import (
+    LINEAR,
     add_camera,
     add_sphere,
     asymmetric_pixels,
@@ -23,7 +24,7 @@ def _stage(width=64, height=48):
     return scene
 
 
-def _image_world(turn=(0, 0, 0), kind="POINT", is_float=True, color_space="Linear", pixels=None):
+def _image_world(turn=(0, 0, 0), kind="POINT", is_float=True, color_space=LINEAR, pixels=None):
     tree = set_world((1, 1, 1), 1.5)
     image = new_image(asymmetric_pixels(32, 16) if pixels is None else pixels, color_space, is_float)
     texture = tree.nodes.new("ShaderNodeTexEnvironment")

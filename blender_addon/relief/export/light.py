@@ -5,7 +5,7 @@ What Blender means by power, and what the scene format wants (checked against Cy
 
     point, spot   P watts    radiant intensity P / 4π   a spot is a point behind a screen: its cone takes from P
     sun           E W/m²     irradiance E
-    area          P watts    radiance P / 4A: Lambert's law would say P / πA; Blender's factor is older than its watts
+    area          P watts    radiance P / πA            before 4.0 P / 4A: a factor older than Blender's watts
 
 Sizes: a point becomes a glowing sphere, a sun a disk far away, as the format's own points and suns have no size.
 """
@@ -138,7 +138,7 @@ def _add_area(place, light, color, energy):
     area = width * height * (math.pi / 4 if round_shape else 1)
     if area <= 0:
         return
-    value = {"radiance": energy / (4 * area), "color": list(color), "visibleToCamera": place.visible_to_camera}
+    value = {"radiance": energy / (compat.AREA_DIVISOR * area), "color": list(color), "visibleToCamera": place.visible_to_camera}
     if round_shape:
         # A disk of diameter 1, stretched by a node: ellipses have no shape of their own in the format.
         value.update(shape="disk", radius=0.5)
@@ -155,8 +155,8 @@ def _add_sun_disk(place, angle, color, energy):
     value = {
         "shape": "disk",
         "radius": distance * math.tan(half),
-        # Seen from the scene it fills the cone of the half angle. E is radiance times solid angle, as in Cycles.
-        "radiance": energy / (2 * math.pi * (1 - math.cos(half))),
+        # Seen from the scene it fills the cone of the half angle.
+        "radiance": energy / compat.sun_divisor(half),
         "color": list(color),
         "visibleToCamera": False,
     }

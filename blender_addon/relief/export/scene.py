@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .. import compat
 from .axes import GLTF_FROM_BLENDER
 from .gltf import GltfWriter, matrix_property
 from .image import ImageExporter
@@ -204,6 +205,8 @@ class SceneExporter:
             settings["causticReceiver"] = False
         if not caustics.caustic_light:
             settings["causticLight"] = False
+        if compat.links_light(original):
+            warn("light linking", "it shines on everything")
         if original.is_holdout or original.is_shadow_catcher:
             warn("holdouts and shadow catchers", "it is an ordinary object")
         return settings
@@ -245,6 +248,8 @@ class SceneExporter:
                 warn=self._warner("light", thing.name),
             )
             export_light(light, place)
+            if compat.links_light(original):
+                place.warn("light linking", "it shines on everything")
             if not original.relief.caustic_light:
                 settings = node.setdefault("extensions", {}).get("RELIEF_object", {})
                 self.writer.extend(node, "RELIEF_object", {**settings, "causticLight": False})

@@ -19,6 +19,7 @@ def render_settings(scene, size):
         "transmissionBounces": min(settings.transmission_bounces, settings.max_bounces),
         "transparentBounces": settings.transparent_bounces,
         "seed": settings.seed,
+        "exposure": scene.view_settings.exposure,
         "clampIndirect": settings.clamp_indirect,
         "pixelFilter": {"type": settings.filter_type, "width": settings.filter_width},
         "caustics": {"mode": settings.caustics},

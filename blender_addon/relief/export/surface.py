@@ -5,7 +5,6 @@ One function a node, listed at the end. Mix and Add Shader are understood where 
 transparency, emission on top, a coat of gloss by Fresnel, metal and plastic. Other mixes are approximated, and say so.
 """
 
-import math
 from dataclasses import dataclass, field, replace
 
 from .. import compat
@@ -96,6 +95,16 @@ def _normal(socket, groups, textures):
     return replace(color, value=textures.constant_number(node.inputs["Strength"], source.groups))
 
 
+#: Inputs of the Principled BSDF that are 0 unless something is asked for that the format cannot say.
+_UNREAD = (
+    ("Subsurface", "subsurface scattering", "its base colour was used as a diffuse one"),
+    ("Anisotropic", "anisotropy", "the roughness was used in all directions"),
+    ("Transmission Roughness", "transmission roughness", "the roughness of the surface was used"),
+    ("Diffuse Roughness", "roughness of the diffuse layer", "Lambert's law was used"),
+    ("Thin Film Thickness", "a thin film", "it is left out"),
+)
+
+
 def _principled(source, textures):
     node, groups = source.node, source.groups
 
@@ -108,12 +117,9 @@ def _principled(source, textures):
     def warn(what, instead):
         textures.warn(f'node "{node.name}": {what}', instead)
 
-    if constant("Subsurface") > 0:
-        warn("subsurface scattering", "its base colour was used as a diffuse one")
-    if constant("Anisotropic") != 0:
-        warn("anisotropy", "the roughness was used in all directions")
-    if constant("Transmission Roughness") > 0:
-        warn("transmission roughness", "the roughness of the surface was used")
+    for name, what, instead in _UNREAD:
+        if constant(name) != 0:
+            warn(what, instead)
     surface = Surface(
         base_color=textures.color(socket("Base Color"), groups),
         alpha=textures.number(socket("Alpha"), groups),
@@ -125,11 +131,17 @@ def _principled(source, textures):
         normal=_normal(socket("Normal"), groups, textures),
     )
     surface.coat = replace(surface.coat, value=surface.coat.value * compat.COAT_SCALE)
-    if socket("Clearcoat Normal") is not None and nodes.follow(socket("Clearcoat Normal"), groups) is not None:
-        warn("a normal of the coat", "that of the surface was used")
-    _set_reflectance(surface, constant("Specular", 0.5), constant("IOR", 1.5))
-    if not compat.IS_4_0 and constant("Specular Tint") > 0:
-        warn("specular tint", "an untinted reflection was used")
+    if not surface.coat.is_constant(0.0):
+        if nodes.follow(socket("Clearcoat Normal"), groups) is not None:
+            warn("a normal of the coat", "that of the surface was used")
+        if compat.has_uncommon_coat(node):
+            warn("a coat with a tint or an index other than 1.5", "a clear one with 1.5 was used")
+    surface.ior, surface.specular, surface.specular_color = compat.principled_reflection(
+        constant("Specular", 0.5),
+        constant("IOR", 1.5),
+        _specular_tint(surface, socket("Specular Tint"), groups, textures, warn),
+        not surface.transmission.is_constant(0.0),
+    )
     _set_sheen(surface, node, groups, constant, textures)
     emission = textures.color(socket("Emission"), groups)
     strength = constant("Emission Strength", 1.0)
@@ -137,20 +149,16 @@ def _principled(source, textures):
     return surface
 
 
-def _set_reflectance(surface, level, ior):
-    """Index and reflection at normal incidence of a Principled BSDF."""
-    surface.specular = 1.0 if level > 0 else 0.0
-    if compat.IS_4_0:
-        # The index counts everywhere; the level scales its reflection, one half being none.
-        surface.ior = max(1.0, ior)
-        surface.specular_color = (2 * level,) * 3
-    elif surface.transmission.is_constant(0.0):
-        # Before 4.0 the level alone tells the reflection: 0.08 · level at normal incidence.
-        root = math.sqrt(0.08 * max(level, 0.0))
-        surface.ior = (1 + root) / (1 - root)
-    else:
-        surface.ior = max(1.0, ior)
-        surface.specular = 1.0
+def _specular_tint(surface, socket, groups, textures, warn):
+    """Colour of a Principled BSDF's reflection at normal incidence."""
+    if not compat.TINTS_ARE_COLORS:
+        if textures.constant_number(socket, groups) > 0:
+            warn("specular tint", "an untinted reflection was used")
+        return _WHITE
+    tint = textures.constant_color(socket, groups)
+    if tint != _WHITE and not surface.metallic.is_constant(0.0):
+        warn("specular tint of a metal", "it reflects all light at grazing angles")
+    return tint
 
 
 def _set_sheen(surface, node, groups, constant, textures):
@@ -158,7 +166,7 @@ def _set_sheen(surface, node, groups, constant, textures):
     if weight <= 0:
         return
     tint_socket = compat.principled_socket(node, "Sheen Tint")
-    reader = textures.constant_color if compat.IS_4_0 else textures.constant_number
+    reader = textures.constant_color if compat.TINTS_ARE_COLORS else textures.constant_number
     base = surface.base_color.value
     surface.sheen_color = compat.sheen_color(base, weight, reader(tint_socket, groups))
     surface.sheen_roughness = constant("Sheen Roughness", surface.sheen_roughness)
@@ -178,13 +186,39 @@ def _diffuse(source, textures):
 
 
 def _glossy(source, textures):
-    color, number, _ = _inputs(source, textures)
+    color, number, constant = _inputs(source, textures)
     node = source.node
     roughness = Input(0.0) if getattr(node, "distribution", "") == "SHARP" else number("Roughness")
     if getattr(node, "distribution", "") in {"BECKMANN", "ASHIKHMIN_SHIRLEY"}:
         textures.warn(f'node "{node.name}": distribution {node.distribution.lower()}', "GGX was used")
+    _warn_anisotropy(node, constant, textures)
     normal = _normal(node.inputs["Normal"], source.groups, textures)
     return Surface(base_color=color("Color"), metallic=Input(1.0), roughness=roughness, specular=1.0, normal=normal)
+
+
+def _warn_anisotropy(node, constant, textures):
+    if "Anisotropy" in node.inputs and constant("Anisotropy") != 0:
+        textures.warn(f'node "{node.name}": anisotropy', "the roughness was used in all directions")
+
+
+def _metallic(source, textures):
+    """The Metallic BSDF, which came with 4.3."""
+    color, number, constant = _inputs(source, textures)
+    node = source.node
+    if node.fresnel_type != "F82":
+        textures.warn(f'node "{node.name}": a metal by its indices', "its base colour was used")
+    elif textures.constant_color(node.inputs["Edge Tint"], source.groups) != _WHITE:
+        textures.warn(f'node "{node.name}": edge tint', "it reflects all light at grazing angles")
+    if node.distribution == "BECKMANN":
+        textures.warn(f'node "{node.name}": distribution beckmann', "GGX was used")
+    _warn_anisotropy(node, constant, textures)
+    return Surface(
+        base_color=color("Base Color"),
+        metallic=Input(1.0),
+        roughness=number("Roughness"),
+        specular=1.0,
+        normal=_normal(node.inputs["Normal"], source.groups, textures),
+    )
 
 
 def _glass(source, textures):
@@ -346,6 +380,7 @@ _NODES = {
     "ShaderNodeBsdfDiffuse": _diffuse,
     "ShaderNodeBsdfGlossy": _glossy,
     "ShaderNodeBsdfAnisotropic": _glossy,
+    "ShaderNodeBsdfMetallic": _metallic,
     "ShaderNodeBsdfGlass": _glass,
     "ShaderNodeBsdfRefraction": _refraction,
     "ShaderNodeBsdfTranslucent": _translucent,
