@@ -1,11 +1,12 @@
 """Runs in a Blender with a window: shows the viewport rendered, edits, moves, leaves the mode; writes what it saw.
 
 Not a test by itself: viewport_test.py starts it, with "follow", "quit" or "panels" and a folder. Steps run in Blender's timers, since the window is only drawn between
-them. Pictures are screenshots of the whole window.
+them. Pictures are copies of what is on the display: Blender's own screenshots are black on some.
 """
 
 import json
 import os
+import shutil
 import sys
 
 import bpy
@@ -15,13 +16,36 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 from scenes import add_light, add_plane, add_sphere, degrees, diffuse, set_world  # noqa: E402
 
 _SESSION, _OUTPUT = sys.argv[-2:]
-_SECONDS_A_STEP = 0.7 if _SESSION == "panels" else 2.5
+
+#: Seconds between two steps: at least, for the window to be drawn; at most, where the viewport has not come to rest.
+_LEAST_SECONDS, _MOST_SECONDS = 1.0, 40.0
+_POLL_SECONDS = 0.1
+
 _seen = {}
 
 
 def _area():
-    window = bpy.context.window_manager.windows[0]
-    return window, max((a for a in window.screen.areas if a.type == "VIEW_3D"), key=lambda a: a.width * a.height)
+    areas = bpy.context.window_manager.windows[0].screen.areas
+    return max((a for a in areas if a.type == "VIEW_3D"), key=lambda a: a.width * a.height)
+
+
+def _viewport():
+    """The add-on's viewport in rendered shading; None outside of it."""
+    if "relief" not in bpy.context.preferences.addons:
+        return None
+    from relief import viewport
+
+    return next((v for v in viewport._alive if not v._is_stopped), None)
+
+
+def _is_shown():
+    """Whether the view shows a picture of the scene as it is, or there is none to come."""
+    shown = _viewport()
+    if shown is None:
+        return True
+    if shown._exporter is None:  # an error
+        return shown._process is None
+    return shown._samples > 0 and shown._picture is None
 
 
 def _programs():
@@ -44,11 +68,10 @@ def _programs():
 
 def _shot(name):
     """Notes the picture and the state."""
-    window, area = _area()
-    with bpy.context.temp_override(window=window, area=area):
-        bpy.ops.screen.screenshot_area(filepath=os.path.join(_OUTPUT, f"{name}.png"))
+    shutil.copy(os.path.join(_OUTPUT, "Xvfb_screen0"), os.path.join(_OUTPUT, f"{name}.xwd"))
+    area = _area()
     folders = [n for n in os.listdir(bpy.app.tempdir) if n.startswith("relief_")]
-    _seen[name] = {"programs": _programs(), "folders": folders}
+    _seen[name] = {"programs": _programs(), "folders": folders, "view": [area.x, area.y, area.width, area.height]}
 
 
 def _start():
@@ -62,8 +85,8 @@ def _start():
     add_light("SUN", rotation=degrees(40, 20, 0), energy=2, angle=0)
     scene.render.engine = "RELIEF"
     scene.relief.preview_samples = 100000
-    _, area = _area()
-    space = area.spaces.active
+    scene.view_settings.view_transform = "Standard"
+    space = _area().spaces.active
     space.overlay.show_overlays = False
     space.region_3d.view_distance = 8
     space.shading.type = "RENDERED"
@@ -74,8 +97,7 @@ def _edit():
 
 
 def _move():
-    _, area = _area()
-    area.spaces.active.region_3d.view_distance = 16
+    _area().spaces.active.region_3d.view_distance = 16
 
 
 def _mistake():
@@ -90,8 +112,7 @@ def _repair():
 
 
 def _leave():
-    _, area = _area()
-    area.spaces.active.shading.type = "SOLID"
+    _area().spaces.active.shading.type = "SOLID"
 
 
 def _show_panels(active, tab):
@@ -170,12 +191,24 @@ bpy.context.preferences.view.show_splash = False
 _todo = _steps()
 
 
+_waited = _LEAST_SECONDS
+
+
 def _next():
+    """Blender's timer: does the next step once the last one's effect is seen."""
+    global _waited
+    _waited += _POLL_SECONDS
+    if _waited < _LEAST_SECONDS or (not _is_shown() and _waited < _MOST_SECONDS):
+        return _POLL_SECONDS
     step = next(_todo, None)
     if step is None:
         return None
+    shown = _viewport()
+    if shown is not None:
+        shown._sum, shown._samples = None, 0  # what comes next has to be taken anew
     step()
-    return _SECONDS_A_STEP
+    _waited = 0.0
+    return _POLL_SECONDS
 
 
 bpy.app.timers.register(_next, first_interval=1.0)

@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import struct
 import subprocess
 
 import bpy
@@ -13,11 +14,21 @@ from scenes import folder
 _HERE = os.path.dirname(os.path.abspath(__file__))
 
 
-def _pixels(path):
-    """A screenshot: float (height, width, 3), bottom row first."""
-    image = bpy.data.images.load(path)
-    width, height = image.size
-    return np.array(image.pixels[:]).reshape(height, width, 4)[..., :3]
+def _pixels(path, view):
+    """What the display showed of a part of the window: float (height, width, 3), top row first.
+
+    @param  path  a copy of Xvfb's frame buffer: X11's XWD format, version 7, 32 bits a pixel
+    @param  view  x, y of the lower left corner in the window, which fills the display; width, height
+    """
+    with open(path, "rb") as file:
+        data = file.read()
+    header_size, _, _, _, _, height = struct.unpack_from(">6I", data)
+    bytes_per_line, num_colors = struct.unpack_from(">I", data, 48)[0], struct.unpack_from(">I", data, 76)[0]
+    first = header_size + 12 * num_colors
+    rows = np.frombuffer(data, np.uint8, height * bytes_per_line, first).reshape(height, bytes_per_line // 4, 4)
+    x, y, view_width, view_height = view
+    # Blue comes first. Blender counts rows from the bottom.
+    return rows[height - y - view_height : height - y, x : x + view_width, 2::-1] / 255.0
 
 
 def _share(pixels, channel):
@@ -31,7 +42,7 @@ def _run_session(name, path):
     assert shutil.which("Xvfb"), "Xvfb is not installed"
     read, write = os.pipe()
     display = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp"],
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp", "-fbdir", path],
         pass_fds=[write],
         stderr=subprocess.DEVNULL,
     )
@@ -81,7 +92,7 @@ def test_rendered_shading_follows_the_scene():
         output = _run_session("follow", path)
         with open(f"{path}/seen.json", encoding="utf-8") as file:
             seen = json.load(file)
-        pixels = {name: _pixels(f"{path}/{name}.png") for name in seen}
+        pixels = {name: _pixels(f"{path}/{name}.xwd", state["view"]) for name, state in seen.items()}
     red, green = ({n: _share(p, c) for n, p in pixels.items()} for c in (0, 1))
     print("red", red, "green", green, seen)
     # Shares of the whole 3D view, its borders included.
