@@ -109,6 +109,12 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
         min=-1.0,
         max=16.0,
     )
+    bump_displaces: BoolProperty(
+        name="Bump Displaces",
+        description="Bump nodes with an image move the surface by their distance in metres, medium grey staying where "
+        "it is, and so do Displacement nodes of materials set to Bump Only (default off)",
+        default=False,
+    )
     weld_seams: BoolProperty(
         name="Weld Seams",
         description="Close the gaps along texture seams whose sides are displaced differently, by walls (default on)",

@@ -96,11 +96,12 @@ class RELIEF_PT_displacement(_RenderPanel, bpy.types.Panel):
         settings, rows = context.scene.relief, self.rows()
         rows.prop(settings, "displacement_method")
         rows.prop(settings, "lod")
+        rows.prop(settings, "bump_displaces")
         rows.prop(settings, "weld_seams")
         row = rows.row()
         row.active = settings.displacement_method == "auto"
         row.prop(settings, "memory_limit")
-        waiting = [m for m in bpy.data.materials if m.users and needs_switch(m)]
+        waiting = [m for m in bpy.data.materials if m.users and needs_switch(m) and not settings.bump_displaces]
         for material in waiting:
             rows.label(text=f'"{material.name}" has a Displacement node, but is set to Bump Only', icon="INFO")
 

@@ -197,6 +197,24 @@ def test_bump_only_is_warned_about():
     assert_warns(scene, 'material "displaced"', "Bump Only")
 
 
+def test_bump_may_displace():
+    """A Bump node that displaces, and a Displacement node that says the same in its own words."""
+    scene = _stage()
+    material, tree, texture, node = _material(scale=0.4 * 0.75, midlevel=0.5, space="WORLD")
+    _square(material)("coarse")
+    meant = render_runs(scene, "RELIEF", 1, 16)
+    tree.nodes.remove(node)
+    bump = tree.nodes.new("ShaderNodeBump")
+    bump.inputs["Distance"].default_value, bump.inputs["Strength"].default_value = 0.4, 0.75
+    tree.links.new(texture.outputs["Color"], bump.inputs["Height"])
+    tree.links.new(bump.outputs[0], next(n for n in tree.nodes if n.bl_idname == "ShaderNodeBsdfDiffuse").inputs["Normal"])
+    scene.relief.bump_displaces = True
+    shown = render_runs(scene, "RELIEF", 1, 16)
+    assert np.array_equal(shown, meant), np.abs(shown - meant).max()
+    bump.invert = True
+    assert np.abs(render_runs(scene, "RELIEF", 1, 16) - meant).max() > 0.1
+
+
 def test_the_panels_switch():
     """The button does what the warning asks for."""
     _stage()

@@ -169,6 +169,42 @@ def test_cancel_keeps_what_was_rendered():
         assert not [n for n in _all_files(path) if "relief_" in n], _all_files(path)
 
 
+def test_a_hung_program_is_ended_by_cancelling():
+    """Ctrl-C while the program neither works nor listens: it is killed, Blender lives on, no files are left."""
+    with _program("trap '' TERM; while true; do sleep 0.1; done") as name, folder() as path:
+        script = (
+            "import sys; sys.path.insert(0, sys.argv[-1]); import process_test, bpy; s = process_test._scene();"
+            "s.render.engine = 'RELIEF'; print('STARTS', flush=True); bpy.ops.render.render(); print('ALIVE', flush=True)"
+        )
+        environment = {**os.environ, "TMPDIR": path}
+        here = os.path.dirname(os.path.abspath(__file__))
+        command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-expr", script, "--", here]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+        blender = subprocess.Popen(command, text=True, env=environment, **pipes)
+        try:
+            while not _programs(name):
+                assert blender.poll() is None
+                time.sleep(0.1)
+            blender.send_signal(signal.SIGINT)
+            output, _ = blender.communicate(timeout=60)
+        finally:
+            blender.kill()
+        assert "ALIVE" in output, output
+        assert not _programs(name)
+        assert not [n for n in _all_files(path) if "relief_" in n], _all_files(path)
+
+
+def _programs(name):
+    """Numbers of the processes that render with a program."""
+    found = []
+    for entry in filter(str.isdigit, os.listdir("/proc")):
+        with contextlib.suppress(OSError), open(f"/proc/{entry}/cmdline", "rb") as file:
+            command = file.read().decode("utf-8", "replace").split("\0")
+            if name in command and "render" in command:
+                found.append(int(entry))
+    return found
+
+
 def _all_files(path):
     return [os.path.join(where, name) for where, _, names in os.walk(path) for name in names]
 

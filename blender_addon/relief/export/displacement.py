@@ -5,6 +5,8 @@ Both move a point along the interpolated normal by scale · (height − midlevel
 the values are taken as they are. A height of value · texture + offset is folded into scale and midlevel.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from .. import compat
@@ -26,52 +28,51 @@ def needs_switch(material):
     return has_displacement_node(material) and compat.displacement_method(material) == "BUMP"
 
 
+@dataclass(frozen=True)
+class _Move:
+    """How far points move: scale · (height − midlevel), in a space, by the Height of a node."""
+
+    node: object
+    groups: tuple
+    scale: float
+    midlevel: float
+    space: str
+
+
+def bump_displaces(material, settings):
+    """Whether a Bump node of a material is to move its surface: the artist wants it, and nothing else moves it."""
+    return settings.bump_displaces and not has_displacement_node(material)
+
+
 def export_displacement(material, settings, textures, texture_info, images):
     """Value of RELIEF_displacement.
 
     @param  material      bpy material with nodes
     @param  settings      scene.relief: method, level of detail and seams of all materials
-    @param  textures      TextureReader
+    @param  textures      TextureReader, which has read the surface
     @param  texture_info  makes glTF's texture reference of a Texture used as numbers; None if its image is missing
     @param  images        ImageExporter
     @return               None if nothing moves
     """
-    output = nodes.active_output(material.node_tree, "ShaderNodeOutputMaterial")
-    source = nodes.follow(output.inputs["Displacement"]) if output else None
-    if source is None:
+    move = _move_of_bump(textures) if textures.bump else _move_of_output(material, settings, textures)
+    if move is None or move.scale == 0:
         return None
-    if compat.displacement_method(material) == "BUMP":
-        textures.warn(
-            'its Displacement node, as its setting is "Bump Only"',
-            'nothing is displaced; choose "Displacement Only" in Material > relief Displacement',
-        )
-        return None
-    node = source.node
-    if node.bl_idname != "ShaderNodeDisplacement":
-        textures.warn(f'node "{node.name}" ({node.bl_label}) as displacement', "nothing is displaced")
-        return None
-    if nodes.follow(node.inputs["Normal"], source.groups) is not None:
-        textures.warn(f'node "{node.name}": a normal for the displacement', "the surface's own was used")
-    scale = textures.constant_number(node.inputs["Scale"], source.groups)
-    midlevel = textures.constant_number(node.inputs["Midlevel"], source.groups)
-    height = textures.number(node.inputs["Height"], source.groups)
-    if scale == 0:
-        return None
+    height = textures.number(move.node.inputs["Height"], move.groups)
     # scale · (value · h + offset − midlevel) = (scale · value) · (h − (midlevel − offset) / value)
     if height.texture is None:
-        return _constant(height.value, scale, midlevel, node, images)
+        return _constant(height.value, move, images)
     info = texture_info(height.texture)
     if info is None or height.value == 0:
         return None
-    folded = (midlevel - height.offset) / height.value
+    folded = (move.midlevel - height.offset) / height.value
     if not 0 <= folded <= 1:
-        textures.warn(f'node "{node.name}": a midlevel of {folded:.4g}', "it was limited to between 0 and 1")
+        textures.warn(f'node "{move.node.name}": a midlevel of {folded:.4g}', "it was limited to between 0 and 1")
         folded = min(max(folded, 0.0), 1.0)
     return {
         "heightTexture": info,
-        "scale": scale * height.value,
+        "scale": move.scale * height.value,
         "midlevel": folded,
-        "space": _SPACES[node.space],
+        "space": move.space,
         "method": settings.displacement_method,
         "lod": "auto" if settings.lod < 0 else settings.lod,
         "smoothing": compat.displacement_method(material) == "BOTH",
@@ -79,14 +80,44 @@ def export_displacement(material, settings, textures, texture_info, images):
     }
 
 
-def _constant(height, scale, midlevel, node, images):
+def _move_of_output(material, settings, textures):
+    """What the Displacement node at a material's output asks for."""
+    output = nodes.active_output(material.node_tree, "ShaderNodeOutputMaterial")
+    source = nodes.follow(output.inputs["Displacement"]) if output else None
+    if source is None:
+        return None
+    if compat.displacement_method(material) == "BUMP" and not settings.bump_displaces:
+        textures.warn(
+            'its Displacement node, as its setting is "Bump Only"',
+            'nothing is displaced; choose "Displacement Only" in Material > relief Displacement',
+        )
+        return None
+    node, groups = source.node, source.groups
+    if node.bl_idname != "ShaderNodeDisplacement":
+        textures.warn(f'node "{node.name}" ({node.bl_label}) as displacement', "nothing is displaced")
+        return None
+    if nodes.follow(node.inputs["Normal"], groups) is not None:
+        textures.warn(f'node "{node.name}": a normal for the displacement', "the surface's own was used")
+    scale = textures.constant_number(node.inputs["Scale"], groups)
+    return _Move(node, groups, scale, textures.constant_number(node.inputs["Midlevel"], groups), _SPACES[node.space])
+
+
+def _move_of_bump(textures):
+    """What a Bump node would look like if it moved the surface: by its Distance in the world, grey staying where it is."""
+    node, groups = textures.bump.node, textures.bump.groups
+    scale = textures.constant_number(node.inputs["Strength"], groups)
+    scale *= textures.constant_number(node.inputs["Distance"], groups)
+    return _Move(node, groups, -scale if node.invert else scale, 0.5, "world")
+
+
+def _constant(height, move, images):
     """Displacement by one height everywhere: a map of one texel."""
-    if height == midlevel:
+    if height == move.midlevel:
         return None
     texel = np.full((1, 1), 1.0, dtype=np.float32)
     return {
         "heightTexture": {"uri": images.write_pixels({"Y": texel})},
-        "scale": scale * (height - midlevel),
+        "scale": move.scale * (height - move.midlevel),
         "midlevel": 0.0,
-        "space": _SPACES[node.space],
+        "space": move.space,
     }

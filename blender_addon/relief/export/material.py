@@ -4,7 +4,7 @@
 import math
 
 from . import nodes
-from .displacement import export_displacement
+from .displacement import bump_displaces, export_displacement
 from .light import set_emission
 from .mesh import Wanted
 from .surface import Surface, surface_from
@@ -59,6 +59,7 @@ class _MaterialJob:
             color = (0.8, 0.8, 0.8) if material is None else tuple(material.diffuse_color[:3])
             self._write_surface(Surface(base_color=Input(color)))
             return
+        textures.takes_bump = bump_displaces(material, settings)
         output = nodes.active_output(material.node_tree, "ShaderNodeOutputMaterial")
         source = nodes.follow(output.inputs["Surface"]) if output else None
         surface = surface_from(source, textures)

@@ -72,11 +72,14 @@ def _inputs(source, textures):
 
 
 def _normal(socket, groups, textures):
-    """Normal map behind a Normal input; Bump and others are warned about."""
+    """Normal map behind a Normal input; others are warned about, unless a Bump is to displace."""
     source = nodes.follow(socket, groups)
     if source is None:
         return None
     node = source.node
+    if node.bl_idname == "ShaderNodeBump" and textures.takes_bump and textures.bump in (None, source):
+        textures.bump = source
+        return _normal(node.inputs["Normal"], source.groups, textures)
     if node.bl_idname != "ShaderNodeNormalMap":
         textures.warn(f'node "{node.name}" ({node.bl_label}) as normal', "the surface's own normal was used")
         return None

@@ -6,7 +6,7 @@ multiplication by a constant (Math, Vector Math, Mix); for heights addition of o
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -92,11 +92,14 @@ class Input:
 class TextureReader:
     """Reads inputs of one material's nodes.
 
-    @param  warn  called with what is not understood, and what was used instead
+    @param  warn        called with what is not understood, and what was used instead
+    @param  takes_bump  whether a Bump node is kept, to displace by, instead of warned about
+    bump                the nodes.Source of that Bump node
     """
 
     warn: object
-    _warned: set = field(default_factory=set)
+    takes_bump: bool = False
+    bump: object = None
 
     def color(self, socket, groups=()):
         """A colour input: Input whose value is linear RGB."""
