@@ -84,6 +84,13 @@ def test_elliptic_area_with_scaled_object():
     assert_agrees(_stage(light), samples=128)
 
 
+def test_a_light_that_some_rays_do_not_see_is_warned_about():
+    from scenes import assert_warns
+
+    scene = _stage(lambda: setattr(add_light("POINT", energy=300), "visible_glossy", False))
+    assert_warns(scene, 'light "light"', "hidden from glossy rays")
+
+
 def test_a_strength_three_percent_off_is_noticed():
     """The comparison itself: it must be able to fail."""
     import numpy as np

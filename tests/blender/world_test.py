@@ -83,6 +83,14 @@ def test_a_turn_about_x_is_warned_about():
     assert_warns(scene, 'world "world"', "turned about X")
 
 
+def test_a_volume_is_warned_about():
+    scene = _stage()
+    tree = set_world((0.2, 0.5, 0.9))
+    volume = tree.nodes.new("ShaderNodeVolumeScatter")
+    tree.links.new(volume.outputs[0], tree.nodes["World Output"].inputs["Volume"])
+    assert_warns(scene, 'world "world"', "a volume")
+
+
 def test_transparent_film():
     """Where nothing is, alpha is 0; elsewhere the picture stays."""
     import numpy as np

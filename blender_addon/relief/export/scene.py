@@ -194,10 +194,8 @@ class SceneExporter:
             settings["visibleToCamera"] = False
         if not original.visible_shadow:
             settings["castsShadow"] = False
-        hidden = [k for k in ("diffuse", "glossy", "transmission") if not getattr(original, f"visible_{k}")]
         warn = self._warner("object", original.name)
-        if hidden:
-            warn(f"hidden from {' and '.join(hidden)} rays", "these see it")
+        _warn_visibility(original, warn)
         caustics = original.relief
         if caustics.caustic_caster != "auto":
             settings["causticCaster"] = caustics.caustic_caster == "yes"
@@ -205,8 +203,6 @@ class SceneExporter:
             settings["causticReceiver"] = False
         if not caustics.caustic_light:
             settings["causticLight"] = False
-        if compat.links_light(original):
-            warn("light linking", "it shines on everything")
         if original.is_holdout or original.is_shadow_catcher:
             warn("holdouts and shadow catchers", "it is an ordinary object")
         return settings
@@ -248,8 +244,7 @@ class SceneExporter:
                 warn=self._warner("light", thing.name),
             )
             export_light(light, place)
-            if compat.links_light(original):
-                place.warn("light linking", "it shines on everything")
+            _warn_visibility(original, place.warn)
             if not original.relief.caustic_light:
                 settings = node.setdefault("extensions", {}).get("RELIEF_object", {})
                 self.writer.extend(node, "RELIEF_object", {**settings, "causticLight": False})
@@ -262,6 +257,15 @@ def _is_light(node):
     if "KHR_lights_punctual" in extensions or "RELIEF_area_light" in extensions:
         return True
     return any(_is_light(child) for child in node.get("children", ()))
+
+
+def _warn_visibility(original, warn):
+    """Warns where an object shines on, or is seen by, some things alone."""
+    hidden = [k for k in ("diffuse", "glossy", "transmission") if not getattr(original, f"visible_{k}")]
+    if hidden:
+        warn(f"hidden from {' and '.join(hidden)} rays", "these see it")
+    if compat.links_light(original):
+        warn("light linking", "it shines on everything")
 
 
 def _is_uneven(matrices):

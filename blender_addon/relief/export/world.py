@@ -28,6 +28,8 @@ def _environment(world, images, warn):
     if not world.use_nodes:
         return {"color": [max(0.0, c) for c in world.color]}
     output = nodes.active_output(world.node_tree, "ShaderNodeOutputWorld")
+    if output and nodes.follow(output.inputs["Volume"]) is not None:
+        warn("a volume", "it is left out")
     source = nodes.follow(output.inputs["Surface"]) if output else None
     if source is None:
         return {"color": [0.0, 0.0, 0.0]}
