@@ -132,6 +132,13 @@ def test_tinted_texture():
     _assert_shows(scene)
 
 
+def test_transparency_that_is_not_used_darkens():
+    """Blender multiplies stored colours by an alpha that is linked to nothing."""
+    pixels = asymmetric_pixels()
+    pixels[..., 3] = 0.2 + 0.8 * pixels[..., 0]
+    _assert_shows(_stage(lambda: new_image(pixels, "sRGB", is_float=False), interpolation="Closest")[0])
+
+
 def test_opacity_from_the_images_alpha():
     pixels = asymmetric_pixels()
     pixels[..., 3] = pixels[..., 0]

@@ -34,8 +34,17 @@ class ImageExporter:
         self._frame = frame
         self._uris = {}
 
-    def color_uri(self, image, user, warn):
-        """URI of an image used as a colour; None if there is none to use, which is warned about."""
+    def color_uri(self, image, user, warn, alpha_is_linked=True):
+        """URI of an image used as a colour; None if there is none to use, which is warned about.
+
+        @param  alpha_is_linked  whether the node's Alpha is used: if not, Blender darkens what is transparent
+        """
+        if not alpha_is_linked and _is_transparent(image):
+            key = (image.name_full, "darkened")
+            if key not in self._uris:
+                pixels = self._linear_pixels(image, warn, darkened=True)
+                self._uris[key] = self.write_pixels({name: pixels[..., c] for c, name in enumerate("RGB")})
+            return self._uris[key]
         return self._uri(image, user, True, warn)
 
     def data_uri(self, image, user, warn):
@@ -146,8 +155,11 @@ class ImageExporter:
         names = "RGBA"[: pixels.shape[-1]] if pixels.shape[-1] != 1 else "Y"
         return self.write_pixels({name: pixels[..., c] for c, name in enumerate(names)})
 
-    def _linear_pixels(self, image, warn):
-        """An image's scene-linear values: float32 of shape (height, width, channels), bottom row first."""
+    def _linear_pixels(self, image, warn, darkened=False):
+        """An image's scene-linear values: float32 of shape (height, width, channels), bottom row first.
+
+        @param  darkened  multiply the stored colours by their alpha
+        """
         width, height = image.size
         if width * height == 0:
             warn(f'image "{image.name}" has no pixels', "it is left out")
@@ -155,6 +167,9 @@ class ImageExporter:
         pixels = np.empty(width * height * image.channels, dtype=np.float32)
         image.pixels.foreach_get(pixels)
         pixels = pixels.reshape(height, width, image.channels)
+        if darkened:
+            # Cycles does it in bytes, rounding down; the little more is for products that are whole numbers.
+            pixels[..., :3] = np.floor(pixels[..., :3] * pixels[..., 3:] * 255 + 1e-3) / 255
         # Blender keeps floats scene-linear, bytes as they were stored.
         space = image.colorspace_settings.name
         if not image.is_float and space not in _LINEAR_SPACES:
@@ -163,6 +178,24 @@ class ImageExporter:
             color = pixels[..., :3]
             pixels[..., :3] = np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
         return pixels
+
+
+#: Whether images have transparent pixels, by what tells an image and its state: looking costs a second at 8k.
+_transparency = {}
+
+
+def _is_transparent(image):
+    """Whether an image has colours that are stored apart from an alpha below one."""
+    if image.is_float or image.channels != 4 or image.alpha_mode != "STRAIGHT" or image.source not in {"FILE", "GENERATED"}:
+        return False
+    path = bpy.path.abspath(image.filepath, library=image.library)
+    stamp = os.stat(path).st_mtime_ns if image.source == "FILE" and os.path.isfile(path) else None
+    key = (image.name_full, path, stamp, tuple(image.size))
+    if image.is_dirty or stamp is None or key not in _transparency:
+        pixels = np.empty(image.size[0] * image.size[1] * 4, dtype=np.float32)
+        image.pixels.foreach_get(pixels)
+        _transparency[key] = bool((pixels[3::4] < 1).any())
+    return _transparency[key]
 
 
 def _packed_bytes(image):

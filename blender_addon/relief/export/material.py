@@ -103,7 +103,8 @@ class _MaterialJob:
         return info
 
     def _color_info(self, texture):
-        uri = self._images.color_uri(texture.node.image, texture.node.image_user, self._warn)
+        node = texture.node
+        uri = self._images.color_uri(node.image, node.image_user, self._warn, node.outputs["Alpha"].is_linked)
         return self._info(texture, uri)
 
     def _data_info(self, texture):
