@@ -76,13 +76,15 @@ LightBounds light_bounds(const Light& light, float scale)
   };
   switch (light.kind) {
     case LightKind::kPoint:
-      include(light.P);
+      include(light.P - Vec3f{light.radius, light.radius, light.radius});
+      include(light.P + Vec3f{light.radius, light.radius, light.radius});
       bounds.spread = {{0, 0, 1}, kPiAngle};
       bounds.falloff = 0.5f * kPiAngle;
       bounds.intensity = emission;
       break;
     case LightKind::kSpot: {
-      include(light.P);
+      include(light.P - Vec3f{light.radius, light.radius, light.radius});
+      include(light.P + Vec3f{light.radius, light.radius, light.radius});
       const float inner = std::acos(std::clamp(light.cos_inner, -1.0f, 1.0f));
       const float outer = std::acos(std::clamp(light.cos_outer, -1.0f, 1.0f));
       bounds.spread = {light.axis, std::min(inner, outer)};

@@ -95,8 +95,9 @@ double flux_estimate(const Light& light, const Box3& box)
   const float outside = std::max(distance, radius);
   const double omega = std::min(2.0 * static_cast<double>(kPi),
                                 static_cast<double>(box_shadow_area(box, D)) / static_cast<double>(sqr(outside)));
-  // How far the box reaches from its centre's direction.
-  const float spread = distance > radius ? std::asin(radius / distance) : kPi;
+  // How far the box, seen from anywhere on a ball, reaches from its centre's direction.
+  const float reach = radius + light.radius;
+  const float spread = distance > reach ? std::asin(reach / distance) : kPi;
   const float angle = std::max(0.0f, std::acos(clamp(dot(D, light.axis), -1.0f, 1.0f)) - spread);
   if (light.kind == LightKind::kPoint) return emitted * omega;
   if (light.kind == LightKind::kSpot) return std::cos(angle) > light.cos_outer ? emitted * omega : 0.0;

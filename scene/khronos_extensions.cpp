@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "scene/gltf_accessor.h"
+#include "scene/relief_extensions.h"
 
 namespace relief {
 namespace {
@@ -258,8 +259,10 @@ std::vector<Light> khronos_node_light(const GltfDocument& document,
     if (light < 0) {
       r.fail("light", "the index of a light");
     }
-    read_light(JsonReader((*lights)[static_cast<std::size_t>(light)], document.file,
-                          "/extensions/KHR_lights_punctual/lights/" + std::to_string(light)));
+    const nlohmann::json& value = (*lights)[static_cast<std::size_t>(light)];
+    const std::string path = "/extensions/KHR_lights_punctual/lights/" + std::to_string(light);
+    read_light(JsonReader(value, document.file, path));
+    relief_light(document, value, path, out.back(), warnings);
   });
   return out;
 }

@@ -228,6 +228,20 @@ std::optional<Environment> relief_environment(const GltfDocument& document, Text
   return out;
 }
 
+void relief_light(const GltfDocument& document,
+                  const nlohmann::json& value,
+                  const std::string& path,
+                  Light& light,
+                  Warnings& warnings)
+{
+  static constexpr std::string_view kFalloffs[] = {"square", "smooth", "smooth-cosine"};
+  document.read_extension(value, path, "RELIEF_light", [&](const JsonReader& r) {
+    if (light.kind != LightKind::kSun) light.radius = r.number_f("radius", 0, 0, kNoLimit);
+    if (light.kind == LightKind::kSpot) light.falloff = static_cast<SpotFalloff>(r.choice("falloff", kFalloffs, 0));
+    r.warn_unread(warnings);
+  });
+}
+
 std::vector<Light> relief_area_light(const GltfDocument& document,
                                      int node_index,
                                      const Transform& world,

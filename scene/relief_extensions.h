@@ -18,6 +18,14 @@ void relief_camera(const GltfDocument& document, int camera_index, Camera& camer
 /// RELIEF_environment; empty if the document has none.
 std::optional<Environment> relief_environment(const GltfDocument& document, TextureTable& textures, Warnings& warnings);
 
+/// Reads RELIEF_light of a punctual light into it.
+/// @param value  the light's object, at `path`
+void relief_light(const GltfDocument& document,
+                  const nlohmann::json& value,
+                  const std::string& path,
+                  Light& light,
+                  Warnings& warnings);
+
 /// RELIEF_area_light of a node, placed by its transform.
 /// @return 0 or 1 lights
 std::vector<Light> relief_area_light(const GltfDocument& document,

@@ -143,6 +143,9 @@ def engine_init(engine_class, engine, *arguments, **keywords):
         super(engine_class, engine).__init__(*arguments, **keywords)
 
 
+#: How spots fade towards their rim, as RELIEF_light calls it.
+SPOT_FALLOFF = "smooth" if IS_4_0 else "smooth-cosine"
+
 #: An area light of P watts and area A has the radiance P / (this · A).
 AREA_DIVISOR = math.pi if IS_4_0 else 4.0
 

@@ -8,9 +8,17 @@ namespace relief {
 
 enum class LightKind : std::uint8_t { kPoint, kSpot, kSun, kRectangle, kDisk, kTriangle, kEnvironment };
 
+/// How a spot fades from its inner to its outer cone, by t = (cos − cos outer) / (cos inner − cos outer) in [0, 1].
+enum class SpotFalloff : std::uint8_t {
+  kSquare,        ///< t², of KHR_lights_punctual
+  kSmooth,        ///< t²(3 − 2t)
+  kSmoothCosine,  ///< the same times the cosine of the angle to the axis
+};
+
 /// One emitter in world space. Which fields mean something depends on `kind`.
 struct Light {
   LightKind kind = LightKind::kPoint;
+  SpotFalloff falloff = SpotFalloff::kSquare;
   bool two_sided = false;         ///< rectangle, disk, triangle
   bool visible_to_camera = true;  ///< rectangle, disk
   bool casts_caustics = true;     ///< photons start from it, where there is a photon pass
@@ -21,6 +29,7 @@ struct Light {
   Vec3f emission{};               ///< point, spot: radiant intensity (W/sr, on the spot's axis); sun: irradiance on a
                                   ///< plane across the axis (W/m²); area kinds: radiance (W/m²/sr)
   float cos_inner = 1, cos_outer = 0;  ///< spot cone
+  float radius = 0;                    ///< point, spot: of the ball that shines in the point's place, metres
   float area = 0;                      ///< m², area kinds
   std::int32_t instance_index = -1;    ///< triangle: whose mesh
   std::int32_t triangle_index = -1;

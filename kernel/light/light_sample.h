@@ -9,7 +9,8 @@ namespace relief {
 struct LightSample {
   Vec3f wi{};          ///< unit, from the point to the light
   float distance = 0;  ///< metres; kInfinity for sun and environment
-  Vec3f radiance{};    ///< incident, before visibility; delta kinds: intensity / distance², or irradiance
+  Vec3f radiance{};    ///< incident, before visibility; delta kinds: times the solid angle, which is all there
+                       ///< is to sample: intensity / distance², or irradiance
   float pdf = 0;       ///< solid angle × probability of the choice; delta kinds: probability of the choice alone
   bool delta = false;
   std::int32_t light_index = -1;  ///< −1: environment

@@ -117,9 +117,9 @@ RELIEF_KERNEL LightSample light_sample(const Light& light, Vec3f P, Vec2f u)
 {
   switch (light.kind) {
     case LightKind::kPoint:
-      return point_light_sample(light, P);
+      return point_light_sample(light, P, u);
     case LightKind::kSpot:
-      return spot_light_sample(light, P);
+      return spot_light_sample(light, P, u);
     case LightKind::kSun:
       return sun_light_sample(light);
     case LightKind::kRectangle:

@@ -16,21 +16,25 @@ struct EmittedRay {
   Vec3f power{};  ///< W, over the density of the ray; 0: none
 };
 
-/// Light from a point towards a box.
-/// @param intensity  W/sr
-RELIEF_KERNEL EmittedRay emit_from_point(const Light& light, const Box3& box, Vec2f u)
+/// Light from a point, or from the ball around it, towards a box.
+/// @param u_light  place on the ball
+RELIEF_KERNEL EmittedRay emit_from_point(const Light& light, const Box3& box, Vec2f u_light, Vec2f u)
 {
+  const Vec3f normal = warp_sphere(u_light);
+  const Vec3f O = light.P + normal * light.radius;
   BoxDirection aim;
-  if (box_contains(box, light.P)) {
+  if (box_contains(box, O)) {
     const float z = 1.0f - 2.0f * u.y;
     const float r = 2.0f * safe_sqrt(u.y * (1.0f - u.y));
     aim = {{r * std::cos(2.0f * kPi * u.x), r * std::sin(2.0f * kPi * u.x), z}, 0.25f * kInvPi};
   } else {
-    aim = box_aim_from(box, light.P, u);
+    aim = box_aim_from(box, O, u);
   }
   if (!(aim.pdf > 0.0f)) return {};
-  const float falloff = light.kind == LightKind::kSpot ? spot_light_falloff(light, dot(aim.D, light.axis)) : 1.0f;
-  return {light.P, aim.D, light.emission * (falloff / aim.pdf)};
+  float falloff = light.kind == LightKind::kSpot ? spot_light_falloff(light, dot(aim.D, light.axis)) : 1.0f;
+  // Radiance I / πr², over the density 1 / 4πr² of the place, by Lambert's cosine.
+  if (light.radius > 0.0f) falloff *= 4.0f * max(0.0f, dot(aim.D, normal));
+  return {O, aim.D, light.emission * (falloff / aim.pdf)};
 }
 
 /// Light from a flat light towards a box.
@@ -119,7 +123,7 @@ RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
   } else {
     const Light& light = g.lights.lights[source.light_index];
     const bool is_point = light.kind == LightKind::kPoint || light.kind == LightKind::kSpot;
-    ray = is_point                        ? emit_from_point(light, box, u)
+    ray = is_point                        ? emit_from_point(light, box, u_light, u)
           : light.kind == LightKind::kSun ? emit_from_afar(sources, box, light.axis, light.emission, u)
                                           : emit_from_area(g, light, box, u_light, u);
   }

@@ -291,6 +291,23 @@ TEST(Lights, SpotLooksAlongItsNodesMinusZ)
   EXPECT_FLOAT_EQ(l.cos_outer, std::cos(0.4f));
 }
 
+TEST(Lights, RadiusAndFalloffAreExtensionsOfOurOwn)
+{
+  const auto spot = [](const json& ours) {
+    return load(lit_by({{"type", "spot"},
+                        {"spot", {{"innerConeAngle", 0.2}, {"outerConeAngle", 0.4}}},
+                        {"extensions", {{"RELIEF_light", ours}}}},
+                       {{"scale", {3, 3, 3}}}))
+        .lights.at(0);
+  };
+  EXPECT_EQ(spot(json::object()).radius, 0.0f);
+  EXPECT_EQ(spot(json::object()).falloff, SpotFalloff::kSquare);
+  EXPECT_EQ(spot({{"radius", 0.25}}).radius, 0.25f);
+  EXPECT_EQ(spot({{"falloff", "smooth-cosine"}}).falloff, SpotFalloff::kSmoothCosine);
+  EXPECT_THROW(spot({{"radius", -1}}), SceneError);
+  EXPECT_THROW(spot({{"falloff", "linear"}}), SceneError);
+}
+
 // A node's scale says nothing about where its light looks, however small.
 TEST(Lights, DirectionsSurviveTinyScales)
 {

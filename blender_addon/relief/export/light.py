@@ -7,7 +7,7 @@ What Blender means by power, and what the scene format wants (checked against Cy
     sun           E W/m²     irradiance E
     area          P watts    radiance P / πA            before 4.0 P / 4A: a factor older than Blender's watts
 
-Sizes: a point becomes a glowing sphere, a sun a disk far away, as the format's own points and suns have no size.
+Sizes: a point becomes a glowing sphere, a spot shines from a ball, a sun is a disk far away.
 """
 
 import math
@@ -21,13 +21,8 @@ from .. import compat
 #: Distance of a sun's disk in sizes of the scene: across the scene its light differs by two in so many.
 _SUN_DISTANCE = 3e4
 
-#: Blender's spots fade by t²(3 − 2t) over the width of their edge, the format's by t². Over this share of the width the
-#: two differ least, by at most 0.15.
-_SPOT_EDGE = 1 / 1.32
-
-#: The narrowest edge of a spot in the format, as a difference of cosines. Its light is a third of a hard edge's: one
-#: that lies by the other two thirds outside lets as much light pass as Blender's.
-_NARROWEST_EDGE = 0.001
+#: The narrowest edge of a spot, as a difference of cosines: the format wants two different cones.
+_NARROWEST_EDGE = 1e-6
 
 #: Levels of subdivision of an icosahedron for a point light: 320 triangles.
 _SPHERE_LEVELS = 2
@@ -70,9 +65,7 @@ def export_light(light, place):
         else:
             _add_punctual(place, {"type": "point", "intensity": energy / (4 * math.pi)}, color)
     elif light.type == "SPOT":
-        if light.shadow_soft_size > 0:
-            place.warn("the radius of a spot", "its shadows are sharp")
-        _add_punctual(place, {**_spot(light, place.warn), "intensity": energy / (4 * math.pi)}, color)
+        _add_punctual(place, _spot(light, energy / (4 * math.pi), place), color)
     elif light.type == "SUN":
         if light.angle > 0:
             _add_sun_disk(place, light.angle, color, energy)
@@ -116,19 +109,16 @@ def _add_child(place, child, name, value):
     place.node["children"] = [child]
 
 
-def _spot(light, warn):
+def _spot(light, intensity, place):
     outer = min(light.spot_size / 2, math.pi / 2)
-    if light.spot_size / 2 > math.pi / 2 + 1e-6:
-        warn("a spot wider than 180°", "180° were used")
     cos_outer = math.cos(outer)
     # Blender's edge takes a share of 1 − cos(outer).
-    cos_inner = cos_outer + (1 - cos_outer) * light.spot_blend * _SPOT_EDGE
-    if light.spot_blend > 0.01:
-        warn("the soft edge of a spot", "one that looks alike was used")
-    if cos_inner - cos_outer < _NARROWEST_EDGE:
-        cos_outer = max(0.0, cos_outer - _NARROWEST_EDGE * 2 / 3)
-        cos_inner = min(1.0, cos_outer + _NARROWEST_EDGE)
-    return {"type": "spot", "spot": {"innerConeAngle": math.acos(cos_inner), "outerConeAngle": math.acos(cos_outer)}}
+    cos_inner = cos_outer + max((1 - cos_outer) * light.spot_blend, _NARROWEST_EDGE)
+    out = {"type": "spot", "intensity": intensity}
+    out["spot"] = {"innerConeAngle": math.acos(min(cos_inner, 1.0)), "outerConeAngle": outer}
+    ours = {"falloff": compat.SPOT_FALLOFF, "radius": light.shadow_soft_size}
+    place.writer.extend(out, "RELIEF_light", ours)
+    return out
 
 
 def _add_area(place, light, color, energy):

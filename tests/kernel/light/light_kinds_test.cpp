@@ -405,6 +405,51 @@ TEST(SpotLight, FalloffIsThatOfTheExtension)
   EXPECT_EQ(light_sample(light, {std::sin(0.61f), 0, -std::cos(0.61f)}, {}).pdf, 0.0f);
 }
 
+TEST(SpotLight, SmoothFalloffsAreCubic)
+{
+  Light light;
+  light.kind = LightKind::kSpot;
+  light.emission = {1, 1, 1};
+  light.cos_inner = std::cos(0.3f);
+  light.cos_outer = std::cos(0.6f);
+  for (float angle = 0.01f; angle < 1.5f; angle += 0.01f) {
+    const Vec3f P{std::sin(angle), 0, -std::cos(angle)};
+    const double cosine = std::cos(double(angle));
+    const double t = std::clamp((cosine - std::cos(0.6)) / (std::cos(0.3) - std::cos(0.6)), 0.0, 1.0);
+    light.falloff = SpotFalloff::kSmooth;
+    EXPECT_NEAR(light_sample(light, P, {}).radiance.x, t * t * (3 - 2 * t), 1e-5) << angle;
+    light.falloff = SpotFalloff::kSmoothCosine;
+    EXPECT_NEAR(light_sample(light, P, {}).radiance.x, t * t * (3 - 2 * t) * cosine, 1e-5) << angle;
+  }
+  light.cos_inner = light.cos_outer;
+  EXPECT_FLOAT_EQ(light_sample(light, {std::sin(0.599f), 0, -std::cos(0.599f)}, {}).radiance.x, std::cos(0.599f));
+}
+
+// A ball that is above the horizon as a whole lights a surface as the point at its centre does.
+TEST(PointLight, BallGivesThePointsIrradiance)
+{
+  Light light;
+  light.P = {0.3f, -0.4f, 1.2f};
+  light.emission = {2, 2, 2};
+  for (const float radius : {1e-4f, 0.1f, 0.7f, 1.1f}) {
+    light.radius = radius;
+    constexpr int kSide = 512;
+    double irradiance = 0;
+    for (int i = 0; i < kSide * kSide; ++i) {
+      const Vec2f u{(static_cast<float>(i % kSide) + 0.5f) / kSide, (static_cast<float>(i / kSide) + 0.5f) / kSide};
+      const LightSample sample = light_sample(light, {}, u);
+      ASSERT_TRUE(sample.delta && sample.pdf == 1.0f);
+      // The sampled point is on the ball, on the side that is seen.
+      ASSERT_NEAR(length(sample.wi * sample.distance - light.P), radius, 2e-6f);
+      ASSERT_LE(sample.distance, length(light.P));
+      irradiance += double(sample.radiance.x) * double(sample.wi.z) / (kSide * kSide);
+    }
+    EXPECT_NEAR(irradiance * std::pow(double(length(light.P)), 3) / (2 * double(light.P.z)), 1.0, 2e-5) << radius;
+  }
+  light.radius = 1.4f;
+  EXPECT_EQ(light_sample(light, {}, {}).pdf, 0.0f) << "inside the ball";
+}
+
 TEST(SunLight, IrradianceIsTheSameEverywhere)
 {
   Light light;
