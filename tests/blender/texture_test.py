@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from scenes import (
+    IS_4_0,
     add_camera,
     add_image_node,
     add_plane,
@@ -184,7 +185,9 @@ def test_roughness_from_a_grey_image():
     from scenes import add_light
 
     add_light("AREA", (0, 0, 9), energy=900, size=1.2)
-    assert_agrees(scene, samples=256, tolerance=0.03)
+    # What bounces more than once between facets leaves in all directions, nearly. Cycles since 4.0 scales the reflection up
+    # by it instead: by 1 / 0.94, the directional albedo, at the roughest end of this square.
+    assert_agrees(scene, samples=256, tolerance=0.07 if IS_4_0 else 0.03)
 
 
 def test_normal_map():
