@@ -3,6 +3,7 @@
 // are a two-sided significance of 1.2e-6; `rounding` is what the light's plane, known in float, leaves open.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
