@@ -19,7 +19,7 @@ from gpu_extras.presets import draw_texture_2d
 from . import exr, final, report, result, session
 from .export.camera import aperture, lens_json
 from .export.gltf import GltfWriter
-from .export.scene import DATA_FOLDER, SceneExporter, View, scene_json
+from .export.scene import DATA_FOLDER, SceneExporter, StoredMeshes, View, scene_json
 from .preferences import find_checked_binary
 from .process import Process
 from .report import Report, ReliefError
@@ -58,6 +58,7 @@ class Viewport:
         self._engine = weakref.ref(engine)
         self._folder = session.make_folder()
         self._exporter = None
+        self._meshes = StoredMeshes()
         self._view = None
         self._is_changed = False
         self._process = None
@@ -76,7 +77,8 @@ class Viewport:
         scene = depsgraph.scene
         warnings = Report()
         view = _view(context, depsgraph)
-        exporter = SceneExporter(depsgraph, GltfWriter(self._folder, DATA_FOLDER), warnings)
+        self._meshes.forget_changed(depsgraph)
+        exporter = SceneExporter(depsgraph, GltfWriter(self._folder, DATA_FOLDER), warnings, self._meshes)
         exporter.add_all(view)
         self._binary = find_checked_binary()
         self._options = final.command_line(scene.relief)

@@ -10,6 +10,7 @@ import shutil
 import sys
 
 import bpy
+from mathutils import Matrix
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
@@ -96,6 +97,13 @@ def _edit():
     bpy.data.materials["red"].node_tree.nodes["Diffuse BSDF"].inputs["Color"].default_value = (0.1, 0.9, 0.1, 1)
 
 
+def _grow():
+    """Changes the mesh itself."""
+    mesh = bpy.data.objects["ball"].data
+    mesh.transform(Matrix.Scale(1.5, 4))
+    mesh.update()
+
+
 def _move():
     _area().spaces.active.region_3d.view_distance = 16
 
@@ -175,6 +183,8 @@ def _steps():
     yield lambda: _shot("rendered")
     yield _edit
     yield lambda: _shot("edited")
+    yield _grow
+    yield lambda: _shot("grown")
     yield _move
     yield lambda: _shot("moved")
     yield _mistake

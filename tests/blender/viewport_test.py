@@ -87,7 +87,7 @@ def test_quitting_in_the_middle_leaves_nothing():
 
 
 def test_rendered_shading_follows_the_scene():
-    """A red ball is shown, painted green, seen from afar; an error is survived; leaving ends the program."""
+    """A red ball is shown, painted green, made larger, seen from afar; an error is survived; leaving ends the program."""
     with folder() as path:
         output = _run_session("follow", path)
         with open(f"{path}/seen.json", encoding="utf-8") as file:
@@ -98,7 +98,8 @@ def test_rendered_shading_follows_the_scene():
     # Shares of the whole 3D view, its borders included.
     assert red["rendered"] > 0.005 and green["rendered"] < 0.001
     assert green["edited"] > 0.005 and red["edited"] < 0.002
-    assert 0.1 < green["moved"] / green["edited"] < 0.5
+    assert 2.0 < green["grown"] / green["edited"] < 2.5
+    assert 0.1 < green["moved"] / green["grown"] < 0.5
     assert "/nowhere/relief" in output
     assert green["repaired"] > 0.001
     # Between two runs there may be none: one of the pictures shows one.

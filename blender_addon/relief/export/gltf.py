@@ -8,6 +8,7 @@ which only the camera moved costs a few kilobytes.
 import hashlib
 import json
 import os
+from dataclasses import dataclass
 from urllib.parse import quote
 
 import numpy as np
@@ -26,6 +27,19 @@ def content_name(*parts):
     for part in parts:
         digest.update(memoryview(part).cast("B"))
     return digest.hexdigest()
+
+
+@dataclass(frozen=True)
+class StoredArrays:
+    """Arrays in a file of the data folder.
+
+    uri        relative to the scene file
+    accessors  by name: (glTF accessor without its buffer view, offset, bytes)
+    """
+
+    uri: str
+    num_bytes: int
+    accessors: dict
 
 
 class GltfWriter:
@@ -103,18 +117,17 @@ class GltfWriter:
         @param  arrays  C-contiguous float32 or uint32 arrays of shape (n,) or (n, 1…4) by name
         @return         accessor indices by the same names
         """
-        parts = list(arrays.values())
-        uri = self.write_file(".bin", *parts)
-        if uri in self._buffers:
-            return self._buffers[uri]
-        buffer = self.add("buffers", {"uri": uri, "byteLength": sum(a.nbytes for a in parts)})
+        return self.add_stored(self.store(arrays))
+
+    def store(self, arrays):
+        """Writes arrays as one file.
+
+        @param  arrays  as for add_accessors
+        @return         StoredArrays, which this document or a later one beside the same data folder may refer to
+        """
         accessors, offset = {}, 0
         for name, array in arrays.items():
-            view = self.add(
-                "bufferViews", {"buffer": buffer, "byteOffset": offset, "byteLength": array.nbytes}
-            )
             accessor = {
-                "bufferView": view,
                 "componentType": _COMPONENT_TYPES[array.dtype.name],
                 "count": len(array),
                 "type": _SHAPES[1 if array.ndim == 1 else array.shape[1]],
@@ -123,10 +136,22 @@ class GltfWriter:
                 rows = array.reshape(len(array), -1)
                 accessor["min"] = rows.min(axis=0).tolist()
                 accessor["max"] = rows.max(axis=0).tolist()
-            accessors[name] = self.add("accessors", accessor)
+            accessors[name] = (accessor, offset, array.nbytes)
             offset += array.nbytes
-        self._buffers[uri] = accessors
-        return accessors
+        return StoredArrays(self.write_file(".bin", *arrays.values()), offset, accessors)
+
+    def add_stored(self, stored):
+        """Refers to stored arrays; returns accessor indices by their names."""
+        if stored.uri in self._buffers:
+            return self._buffers[stored.uri]
+        self.used_files.add(stored.uri.rpartition("/")[2])
+        buffer = self.add("buffers", {"uri": stored.uri, "byteLength": stored.num_bytes})
+        indices = {}
+        for name, (accessor, offset, num_bytes) in stored.accessors.items():
+            view = self.add("bufferViews", {"buffer": buffer, "byteOffset": offset, "byteLength": num_bytes})
+            indices[name] = self.add("accessors", {"bufferView": view, **accessor})
+        self._buffers[stored.uri] = indices
+        return indices
 
     def add_texture(self, uri, wrap, nearest):
         """A texture of an image file.

@@ -105,30 +105,50 @@ class _Corners:
         return values[self.vertex] if attribute.domain == "POINT" else values
 
 
-def export_mesh(mesh, materials, writer, warn):
-    """Primitives of a mesh.
+@dataclass(frozen=True)
+class StoredMesh:
+    """A mesh whose arrays are in files.
 
-    @param  mesh       evaluated bpy mesh; its caches of triangles and normals are filled
-    @param  materials  (index in the glTF, Wanted) of each slot, at least one
-    @param  writer     GltfWriter
-    @param  warn       called with a text
-    @return            index of a glTF mesh; None if there are no triangles
+    wanted      what its slots' materials asked for: tuple of Wanted
+    primitives  (slot, StoredArrays) for each slot that has triangles
+    """
+
+    name: str
+    wanted: tuple
+    primitives: list
+
+
+def store_mesh(mesh, wanted, writer, warn):
+    """Writes a mesh's arrays.
+
+    @param  mesh    evaluated bpy mesh; its caches of triangles and normals are filled
+    @param  wanted  Wanted of each slot's material, at least one
+    @param  writer  GltfWriter
+    @param  warn    called with a text
+    @return         StoredMesh
     """
     corners = _Corners(mesh)
-    if len(corners.loops) == 0:
-        return None
-    slots = np.clip(corners.material, 0, len(materials) - 1)
+    slots = np.clip(corners.material, 0, len(wanted) - 1)
     primitives = []
     for slot in np.unique(slots):
-        index, wanted = materials[slot]
-        arrays = _primitive_arrays(corners, corners.loops[slots == slot], wanted, warn)
-        accessors = writer.add_accessors(arrays)
-        attributes = dict(accessors)
-        primitive = {"indices": attributes.pop("indices"), "attributes": attributes}
-        if index is not None:
-            primitive["material"] = index
-        primitives.append(primitive)
-    return writer.add_unique("meshes", {"name": mesh.name, "primitives": primitives})
+        arrays = _primitive_arrays(corners, corners.loops[slots == slot], wanted[slot], warn)
+        primitives.append((int(slot), writer.store(arrays)))
+    return StoredMesh(mesh.name, tuple(wanted), primitives)
+
+
+def add_mesh(stored, materials, writer):
+    """Refers to a stored mesh.
+
+    @param  materials  index in the glTF of each slot's material
+    @return            index of a glTF mesh; None if it has no triangles
+    """
+    if not stored.primitives:
+        return None
+    primitives = []
+    for slot, arrays in stored.primitives:
+        attributes = dict(writer.add_stored(arrays))
+        primitives.append({"indices": attributes.pop("indices"), "attributes": attributes, "material": materials[slot]})
+    return writer.add_unique("meshes", {"name": stored.name, "primitives": primitives})
 
 
 def _primitive_arrays(corners, triangles, wanted, warn):

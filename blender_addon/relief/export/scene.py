@@ -12,7 +12,7 @@ from .gltf import GltfWriter, matrix_property
 from .image import ImageExporter
 from .light import Place, export_light
 from .material import MaterialExporter
-from .mesh import export_mesh
+from .mesh import add_mesh, store_mesh
 from .objects import collect, decompose
 from .settings import render_settings
 from .world import export_world
@@ -97,19 +97,54 @@ def scene_json(nodes, index_of=None):
     return {"scene": 0, "scenes": [{"nodes": [0]}], "nodes": flat}
 
 
+class StoredMeshes:
+    """Meshes of objects that have been written before, for exports into the same data folder."""
+
+    def __init__(self):
+        self._by_object = {}
+        self._used = set()
+
+    def get(self, original, wanted):
+        """StoredMesh of an object whose materials ask for the same as before; None if there is none."""
+        stored, _ = self._by_object.get(original.as_pointer(), (None, None))
+        if stored is None or stored.wanted != tuple(wanted):
+            return None
+        self._used.add(original.as_pointer())
+        return stored
+
+    def put(self, original, stored):
+        self._by_object[original.as_pointer()] = (stored, original.data.as_pointer())
+        self._used.add(original.as_pointer())
+
+    def forget_unused(self):
+        """Drops what no export has asked for since the last call: its files may be removed."""
+        self._by_object = {key: entry for key, entry in self._by_object.items() if key in self._used}
+        self._used.clear()
+
+    def forget_changed(self, depsgraph):
+        """Drops what the depsgraph says has a new shape, objects and their data alike."""
+        changed = {update.id.original.as_pointer() for update in depsgraph.updates if update.is_updated_geometry}
+        self._by_object = {
+            key: entry for key, entry in self._by_object.items() if key not in changed and entry[1] not in changed
+        }
+
+
 class SceneExporter:
     """A scene file in the making.
+
+    @param  stored  StoredMeshes of earlier exports, of which those that changed have been dropped; None: a single export
 
     writer  GltfWriter
     nodes   of the frame: glTF nodes in Blender's world, their children nodes instead of indices, the camera's first
     """
 
-    def __init__(self, depsgraph, writer, report):
+    def __init__(self, depsgraph, writer, report, stored=None):
         self.writer = writer
         self.nodes = []
         self._depsgraph = depsgraph
         self._scene = depsgraph.scene
         self._report = report
+        self._stored = stored if stored is not None else StoredMeshes()
         self._images = ImageExporter(self.writer, self._scene.frame_current)
         self._materials = MaterialExporter(self.writer, self._images, self._scene.relief, report)
 
@@ -144,6 +179,7 @@ class SceneExporter:
         for thing in things:
             if thing.kind == "geometry":
                 self._add_geometry(thing)
+        self._stored.forget_unused()
         size = _extent(things)
         for thing in things:
             if thing.kind == "light":
@@ -210,24 +246,34 @@ class SceneExporter:
     def _mesh_of(self, thing, matrices):
         """Index of the glTF mesh of a thing; None if it has no triangles."""
         if thing.data is not None:
-            return self._export_mesh(thing, thing.data, thing.data.materials, matrices)
+            materials = self._materials_of(thing, thing.data.materials, thing.data, matrices)
+            stored = store_mesh(thing.data, [w for _, w in materials], self.writer, self._warner("object", thing.name))
+            return add_mesh(stored, [i for i, _ in materials], self.writer)
         evaluated = thing.object.evaluated_get(self._depsgraph)
-        mesh = evaluated.to_mesh()
-        if mesh is None:
-            return None
-        try:
-            return self._export_mesh(thing, mesh, [slot.material for slot in evaluated.material_slots], matrices)
-        finally:
-            evaluated.to_mesh_clear()
+        slots = [slot.material for slot in evaluated.material_slots]
+        materials = self._materials_of(thing, slots, evaluated.data, matrices)
+        wanted = [w for _, w in materials]
+        stored = self._stored.get(thing.object, wanted)
+        if stored is None:
+            mesh = evaluated.to_mesh()
+            if mesh is None:
+                return None
+            try:
+                stored = store_mesh(mesh, wanted, self.writer, self._warner("object", thing.name))
+            finally:
+                evaluated.to_mesh_clear()
+            self._stored.put(thing.object, stored)
+        return add_mesh(stored, [i for i, _ in materials], self.writer)
 
-    def _export_mesh(self, thing, mesh, materials, matrices):
+    def _materials_of(self, thing, materials, data, matrices):
+        """(index in the glTF, Wanted) of a thing's material slots, at least one."""
         exported = [self._materials.export(m) for m in materials] or [self._materials.export(None)]
-        warn = self._warner("object", thing.name)
         if any(wanted.world_space for _, wanted in exported) and _is_uneven(matrices):
+            warn = self._warner("object", thing.name)
             warn("displacement in world space on an uneven scale", "the scale's mean was used")
-        if self._depsgraph.view_layer.use_pass_uv and mesh.uv_layers:
+        if self._depsgraph.view_layer.use_pass_uv and getattr(data, "uv_layers", None):
             exported = [(i, w if w.coordinates else replace(w, coordinates=_ACTIVE_UV)) for i, w in exported]
-        return export_mesh(mesh, exported, self.writer, warn)
+        return exported
 
     def _add_lights(self, thing, scene_size):
         original = thing.object
