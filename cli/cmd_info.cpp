@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -142,9 +143,10 @@ void print_prepared(const DisplacementSet& displacements, const Statistics& stat
   for (const std::string& reason : displacements.reasons()) fmt::print("  {}\n", reason);
 }
 
-int info(const std::string& file, bool strict, DisplacementOptions displacement)
+int info(const std::string& file, bool strict, DisplacementOptions displacement, std::optional<CausticsMode> caustics)
 {
-  const Scene scene = scene_load(file);
+  Scene scene = scene_load(file);
+  if (caustics) scene.render.caustics.mode = *caustics;
   displacement.num_rays = expected_rays(scene.render);
   const SceneContext context(scene, displacement, EnvironmentDensity::kExcess, scene.render.caustics);
   std::vector<std::string> warnings = scene.warnings;
@@ -208,6 +210,7 @@ void cmd_info_register(CLI::App& app, Run& run)
     std::string scene;
     bool strict = false;
     DisplacementOptions displacement;
+    std::optional<CausticsMode> caustics;
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("info", "Shows what is in a scene, what it will cost, and every warning");
@@ -215,8 +218,11 @@ void cmd_info_register(CLI::App& app, Run& run)
   command->add_flag("--strict", arguments->strict, "Turn warnings into errors");
   add_displacement_method(*command, arguments->displacement);
   add_displacement_memory(*command, arguments->displacement);
+  add_caustics_mode(*command, arguments->caustics);
   command->callback([&run, arguments] {
-    run = [arguments] { return info(arguments->scene, arguments->strict, arguments->displacement); };
+    run = [arguments] {
+      return info(arguments->scene, arguments->strict, arguments->displacement, arguments->caustics);
+    };
   });
 }
 

@@ -58,7 +58,7 @@ struct RenderArguments {
   bool resume = false, strict = false, float_color = false;
   double texture_memory_gib = 4;
   DisplacementOptions displacement;
-  std::string caustics;
+  std::optional<CausticsMode> caustics;
 };
 
 /// Files of one frame; empty: not asked for.
@@ -151,10 +151,7 @@ RenderOptions options_for(const Scene& scene, const RenderArguments& arguments)
     settings.filter = arguments.filter == "box" ? PixelFilter::kBox : PixelFilter::kBlackmanHarris;
     settings.filter_width = arguments.filter == "box" ? 1.0f : 1.5f;
   }
-  if (!arguments.caustics.empty()) {
-    const auto* label = std::find(std::begin(kCausticsModeLabels), std::end(kCausticsModeLabels), arguments.caustics);
-    settings.caustics.mode = static_cast<CausticsMode>(label - std::begin(kCausticsModeLabels));
-  }
+  if (arguments.caustics) settings.caustics.mode = *arguments.caustics;
   options.camera = camera_for_image(scene, arguments.camera, settings.width, settings.height);
   const PixelRect& crop = arguments.crop;
   if (crop.x1 > settings.width || crop.y1 > settings.height) {
@@ -418,10 +415,7 @@ void cmd_render_register(CLI::App& app, Run& run, const std::string& command_lin
   add_displacement_method(*command, a.displacement);
   add_displacement_memory(*command, a.displacement);
   add_displacement_lod(*command, a.displacement);
-  command
-      ->add_option("--caustics", a.caustics,
-                   "Photons for caustics: auto (where something casts them), on, or off (default: the scene's)")
-      ->check(one_of({std::begin(kCausticsModeLabels), std::end(kCausticsModeLabels)}));
+  add_caustics_mode(*command, a.caustics);
   command->add_option("--filter", a.filter, "Pixel filter: box (1 px) or blackman-harris (1.5 px)")
       ->check(one_of({"box", "blackman-harris"}));
   command->add_option("--view", a.view, "OpenColorIO view of the PNG");

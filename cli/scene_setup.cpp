@@ -63,4 +63,17 @@ void add_displacement_lod(CLI::App& command, DisplacementOptions& options)
       "--lod", set, "Level of the height maps, 0 the finest; auto: what the pixels can show (default: the scene's)");
 }
 
+void add_caustics_mode(CLI::App& command, std::optional<CausticsMode>& mode)
+{
+  const auto set = [&mode](const std::string& text) {
+    const auto* found = std::find(std::begin(kCausticsModeLabels), std::end(kCausticsModeLabels), text);
+    mode = static_cast<CausticsMode>(found - std::begin(kCausticsModeLabels));
+  };
+  command
+      .add_option_function<std::string>(
+          "--caustics", set,
+          "Photons for caustics: auto (where something casts them), on, or off (default: the scene's)")
+      ->check(one_of({std::begin(kCausticsModeLabels), std::end(kCausticsModeLabels)}));
+}
+
 }  // namespace relief

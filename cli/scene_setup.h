@@ -1,6 +1,7 @@
 // What several sub-commands make of a scene and their arguments.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -25,5 +26,7 @@ void add_displacement_method(CLI::App& command, DisplacementOptions& options);
 void add_displacement_memory(CLI::App& command, DisplacementOptions& options);
 /// Adds --lod likewise.
 void add_displacement_lod(CLI::App& command, DisplacementOptions& options);
+/// Adds --caustics likewise; without it `mode` stays as it is.
+void add_caustics_mode(CLI::App& command, std::optional<CausticsMode>& mode);
 
 }  // namespace relief

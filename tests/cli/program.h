@@ -162,6 +162,24 @@ inline GltfBuilder lit_square()
   return b;
 }
 
+/// The square as a wall, with a mirror for a floor and a lamp between the two, in place of a sky.
+inline GltfBuilder mirrored_lamp()
+{
+  GltfBuilder b = lit_square();
+  b.json["extensions"].erase("RELIEF_environment");
+  b.json["extensionsUsed"] = {"KHR_lights_punctual"};
+  b.json["extensions"]["KHR_lights_punctual"] = {{"lights", {{{"type", "point"}, {"intensity", 1}}}}};
+  b.push("materials", {{"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 1}}}});
+  b.push("materials", {{"pbrMetallicRoughness", {{"metallicFactor", 1}, {"roughnessFactor", 0}}}});
+  b.json["meshes"][0]["primitives"][0]["material"] = 0;
+  nlohmann::json mirror = b.json["meshes"][0];
+  mirror["primitives"][0]["material"] = 1;
+  b.push("meshes", mirror);
+  b.root_node({{"mesh", 1}, {"rotation", {0.70710678, 0, 0, 0.70710678}}});
+  b.root_node({{"translation", {0.5, 0.5, 0.5}}, {"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+  return b;
+}
+
 inline std::vector<float> values_of(const std::string& exr, const char* channel)
 {
   const Picture picture = exr_load(exr);

@@ -167,6 +167,21 @@ TEST_F(TraceInfoProgram, InfoCountsWhatIsThere)
   EXPECT_EQ(list.find("textures"), std::string::npos) << list;
 }
 
+TEST_F(TraceInfoProgram, InfoSaysWhetherThereWillBePhotons)
+{
+  const std::string scene = folder_.write("s.gltf", mirrored_lamp().gltf()).string();
+  const std::string plain = folder_.write("p.gltf", lit_square().gltf()).string();
+  const auto caustics = [&](const Arguments& arguments) {
+    const std::string output = run(arguments).output;
+    const std::size_t line = output.find("caustics: ");
+    return line == std::string::npos ? output : output.substr(line, output.find('\n', line) - line);
+  };
+  EXPECT_EQ(caustics({"info", scene}), "caustics: photons (lights on casters)");
+  EXPECT_EQ(caustics({"info", scene, "--caustics", "off"}), "caustics: none (off)");
+  EXPECT_EQ(caustics({"info", plain, "--caustics", "on"}), "caustics: none (nothing casts caustics)");
+  EXPECT_EQ(run({"info", scene, "--caustics", "sometimes"}).exit_code, 2);
+}
+
 // A square of two triangles with vertices of their own. Along the diagonal one side reads u = ¼, the centre of the first
 // texel, the other u = ¾, that of the second.
 TEST_F(TraceInfoProgram, InfoShowsHeightMapsAndTheirSeams)
