@@ -177,12 +177,26 @@ PhotonSources photon_sources_make(const SceneContext& context)
 PhotonPass::PhotonPass(const SceneContext& context, const CausticSettings& settings, double num_pixels)
     : context_(context), settings_(settings), sources_(photon_sources_make(context))
 {
-  // A photon's place in the map, and as it came from the tracer; most paths leave one at most.
-  constexpr double kBytes = 2.0 * sizeof(Photon) + 16;
   constexpr double kFewest = 1 << 15;
   const double wanted = settings.photons > 0 ? std::max(settings.photons, 1.0) : std::max(num_pixels, kFewest);
-  const double most = std::max(4096.0, settings.memory_mib * 1048576.0 / kBytes);
-  photons_a_pass_ = static_cast<std::uint32_t>(std::min({wanted, most, 1e8}));
+  photons_a_pass_ = static_cast<std::uint32_t>(std::min(wanted, 1e8));
+}
+
+void PhotonPass::keep_to_memory(const KernelGlobals& g, const StageTable& stages, Wavefront& worker)
+{
+  // Of a photon that is kept: as it was traced, its place in the map, which may have grown by doubling, and in its buckets
+  // and while it is sorted.
+  constexpr double kBytes = sizeof(Photon) + 2.0 * (sizeof(Photon) + 16) + 20;
+  const double most_kept = std::max(1.0, settings_.memory_mib * 1048576.0 / kBytes);
+  // A path is kept at each surface that it meets, if they are all casters that show caustics: rough glass for one.
+  if (photons_a_pass_ * (g.limits.total + 1.0) <= most_kept) return;
+  std::vector<Photon> kept;
+  worker.trace_photons(g, *context_.accel, stages, context_.surface_kernel, sources_.view(photons_a_pass_), 0,
+                       kBatchPaths, kept);
+  // What these paths leave out of account: four standard errors of as many that each keep nothing or one.
+  constexpr double kMargin = 1 + 4.0 / 64;
+  const double kept_a_path = kMargin * std::max(1.0, static_cast<double>(kept.size())) / kBatchPaths;
+  photons_a_pass_ = static_cast<std::uint32_t>(std::clamp(most_kept / kept_a_path, 1.0, 1.0 * photons_a_pass_));
 }
 
 void PhotonPass::next(KernelGlobals& g,
@@ -193,6 +207,7 @@ void PhotonPass::next(KernelGlobals& g,
   const auto start = std::chrono::steady_clock::now();
   g.caustics.map = {};
   if (!sources_.sources.empty()) {
+    if (passes_ == 0) keep_to_memory(g, stages, worker());
     const PhotonSourcesView view = sources_.view(photons_a_pass_);
     const std::uint64_t first = std::uint64_t{passes_} * photons_a_pass_;
     chunks_.resize((photons_a_pass_ + kBatchPaths - 1) / kBatchPaths);
@@ -203,8 +218,11 @@ void PhotonPass::next(KernelGlobals& g,
           if (stop.load(std::memory_order_relaxed)) return;
           const FlushDenormals flush;
           const auto begin = static_cast<std::uint32_t>(c) * kBatchPaths;
+          // Tracing wants room for all paths of a batch, of which few may be kept.
+          std::vector<Photon> kept;
           worker().trace_photons(g, *context_.accel, stages, context_.surface_kernel, view, first + begin,
-                                 std::min(kBatchPaths, photons_a_pass_ - begin), chunks_[c]);
+                                 std::min(kBatchPaths, photons_a_pass_ - begin), kept);
+          chunks_[c].assign(kept.begin(), kept.end());
         },
         tbb::simple_partitioner());
     for (const std::vector<Photon>& chunk : chunks_) stored_ += chunk.size();

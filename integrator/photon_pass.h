@@ -49,6 +49,10 @@ class PhotonPass {
   void fill(CausticStatistics& stats) const;
 
  private:
+  /// Starts fewer photons a pass where those that are kept would not fit into the memory that is allowed. How many are
+  /// kept is found out by a batch of them, and only where it matters.
+  void keep_to_memory(const KernelGlobals& g, const StageTable& stages, Wavefront& worker);
+
   const SceneContext& context_;
   CausticSettings settings_;
   PhotonSources sources_;

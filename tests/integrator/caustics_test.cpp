@@ -11,91 +11,10 @@
 
 #include "integrator/photon_pass.h"
 #include "kernel/photon/gather.h"
-#include "tests/support/render_scene.h"
-#include "tests/support/scene_builder.h"
+#include "tests/support/caustic_scene.h"
 
 namespace relief::test {
 namespace {
-
-Material glass_material(float roughness = 0)
-{
-  Material m;
-  m.metallic = 0;
-  m.roughness = roughness;
-  m.transmission = 1;
-  m.thickness = 1;
-  return m;
-}
-
-Material mirror_material()
-{
-  Material m;
-  m.roughness = 0;
-  return m;
-}
-
-void add_caster(Scene& scene, Mesh mesh, const Material& material, const Affine3& place = {})
-{
-  add_object(scene, std::move(mesh), material, place);
-  scene.instances.back().flags |= kCausticCaster | kCausticReceiver;
-}
-
-/// A floor of albedo one half at y = 0 that receives caustics.
-void add_floor(Scene& scene, float half)
-{
-  add_object(scene, quad_mesh({-half, 0, half}, {2 * half, 0, 0}, {0, 0, -2 * half}), diffuse_material(splat3(0.5f)));
-  scene.instances.back().flags |= kCausticReceiver;
-}
-
-Light point_light(Vec3f P, float intensity)
-{
-  Light light;
-  light.kind = LightKind::kPoint;
-  light.P = P;
-  light.emission = splat3(intensity);
-  return light;
-}
-
-Light square_light(Vec3f P, Vec3f axis, float half, float radiance)
-{
-  Light light;
-  light.kind = LightKind::kRectangle;
-  light.P = P;
-  light.axis = axis;
-  const Frame frame = frame_from_normal(axis);
-  light.edge_u = half * frame.s;
-  light.edge_v = half * frame.t;
-  light.area = 4 * half * half;
-  light.emission = splat3(radiance);
-  return light;
-}
-
-/// A camera above, looking down at a square of the floor about `centre`.
-void look_down(Scene& scene, Vec3f centre, float half, float height)
-{
-  Camera& camera = scene.cameras.front().camera;
-  camera.world_from_camera.x = {1, 0, 0};
-  camera.world_from_camera.y = {0, 0, -1};
-  camera.world_from_camera.z = {0, 1, 0};
-  camera.world_from_camera.p = centre + Vec3f{0, height, 0};
-  camera.half_width = camera.half_height = half / height;
-}
-
-RenderOptions caustic_options(const Scene& scene, CausticsMode mode, int size, int samples)
-{
-  RenderOptions options = render_options(scene, size, samples);
-  options.settings.caustics.mode = mode;
-  return options;
-}
-
-double mean_of(const Rendered& picture, Aov aov, int channel = 0)
-{
-  double sum = 0;
-  for (int y = 0; y < picture.image.view.height; ++y) {
-    for (int x = 0; x < picture.image.view.width; ++x) sum += static_cast<double>(picture.at(aov, x, y)[channel]);
-  }
-  return sum / (picture.image.view.width * picture.image.view.height);
-}
 
 TEST(PhotonRadius, FactorIsTheClosedFormOfItsProduct)
 {
@@ -491,6 +410,41 @@ TEST(Caustics, NothingIsDoneWhereNoneCanBe)
   EXPECT_EQ(pixels(CausticsMode::kAuto).stats.caustics.reason, "no light casts caustics");
 }
 
+TEST(Caustics, PhotonsKeepToTheirMemory)
+{
+  // A lamp in a closed room of rough metal, which casts and shows caustics: a path is kept wherever it goes. Under a bare
+  // sky only few of the paths are kept, and more may start.
+  Scene room = empty_scene();
+  Material metal;
+  metal.roughness = 0.4f;
+  add_caster(room, sphere_mesh(2, 32, 16, false), metal);
+  room.lights.push_back(point_light({0, 0.5f, 0}, 1));
+  look_down(room, {}, 0.5f, 1);
+  Scene open = empty_scene();
+  add_floor(open, 0.5f);
+  Affine3 place;
+  place.p = {0, 0.6f, 0};
+  add_caster(open, sphere_mesh(0.3f, 32, 16, true), glass_material(), place);
+  open.lights.push_back(point_light({0, 2, 0}, 1));
+  look_down(open, {}, 0.4f, 0.2f);
+  double started[2];
+  int i = 0;
+  for (const Scene* scene : {&room, &open}) {
+    RenderOptions options = caustic_options(*scene, CausticsMode::kOn, 8, 3);
+    options.settings.caustics.photons = 1e7;
+    for (const double mib : {0.01, 4.0}) {
+      options.settings.caustics.memory_mib = mib;
+      const CausticStatistics stats = render_scene(*scene, options).stats.caustics;
+      EXPECT_LE(static_cast<double>(stats.bytes), mib * 1048576);
+      EXPECT_GT(static_cast<double>(stats.bytes), 0.2 * mib * 1048576);
+      EXPECT_GT(stats.stored, 0u);
+      started[i] = static_cast<double>(stats.photons);
+    }
+    ++i;
+  }
+  EXPECT_GT(started[1], 5 * started[0]);
+}
+
 TEST(Caustics, SameBitsForAnyNumberOfThreads)
 {
   Scene scene = empty_scene();
@@ -510,55 +464,6 @@ TEST(Caustics, SameBitsForAnyNumberOfThreads)
   const std::vector<float> one = with_threads(1);
   EXPECT_EQ(one, with_threads(2));
   EXPECT_EQ(one, with_threads(4));
-}
-
-/// Means of a picture's quarters of each side, over runs.
-struct Regions {
-  static constexpr int kSide = 4;
-  double mean[kSide * kSide] = {}, variance[kSide * kSide] = {};
-};
-
-Regions render_regions(const Scene& scene, RenderOptions options, int runs)
-{
-  Regions regions;
-  double squares[Regions::kSide * Regions::kSide] = {};
-  const int size = options.settings.width;
-  for (int run = 0; run < runs; ++run) {
-    options.settings.seed = 500u + static_cast<std::uint64_t>(run);
-    const Rendered picture = render_scene(scene, options);
-    for (int r = 0; r < Regions::kSide * Regions::kSide; ++r) {
-      const int w = size / Regions::kSide;
-      double sum = 0;
-      for (int y = 0; y < w; ++y) {
-        for (int x = 0; x < w; ++x) {
-          sum += static_cast<double>(picture.radiance(r % Regions::kSide * w + x, r / Regions::kSide * w + y).x);
-        }
-      }
-      const double mean = sum / (w * w);
-      regions.mean[r] += mean / runs;
-      squares[r] += mean * mean / runs;
-    }
-  }
-  for (int r = 0; r < Regions::kSide * Regions::kSide; ++r) {
-    regions.variance[r] = std::max(squares[r] - regions.mean[r] * regions.mean[r], 0.0) / (runs - 1);
-  }
-  return regions;
-}
-
-/// Expects the same picture with photons and without.
-/// @param bias  of the density estimate, of a region's mean
-void expect_same(const Scene& scene, int samples_off, int samples_on, double bias, const char* what)
-{
-  constexpr int kRuns = 8;
-  const Regions off = render_regions(scene, caustic_options(scene, CausticsMode::kOff, 32, samples_off), kRuns);
-  RenderOptions options = caustic_options(scene, CausticsMode::kOn, 32, samples_on);
-  options.settings.caustics.photons = 1 << 15;
-  const Regions on = render_regions(scene, options, kRuns);
-  for (int r = 0; r < Regions::kSide * Regions::kSide; ++r) {
-    const double error = std::sqrt(off.variance[r] + on.variance[r]);
-    EXPECT_NEAR(on.mean[r], off.mean[r], 4 * error + bias * off.mean[r])
-        << what << ", region " << r << ", standard error " << error;
-  }
 }
 
 class CausticAgreement : public testing::Test {

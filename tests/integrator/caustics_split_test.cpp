@@ -1,0 +1,140 @@
+// Each rule by which photons and paths share the light, in a scene where leaving it out shows: every test here fails if the
+// one line that it is about is broken.
+#include "tests/support/caustic_scene.h"
+
+namespace relief::test {
+namespace {
+
+constexpr double kPi_d = 3.14159265358979323846;
+
+Vec3f leaning(float x, float y, float z) { return normalize(Vec3f{x, y, z}); }
+
+/// Shading normals of all corners.
+Mesh with_normal(Mesh mesh, Vec3f N)
+{
+  mesh.N.assign(mesh.P.size(), as_normal(N));
+  return mesh;
+}
+
+/// The wall x = −1 as a mirror, 3 m wide and high, seen from the right.
+Mesh wall() { return quad_mesh({-1, 0, 1.5f}, {0, 0, -3}, {0, 3, 0}); }
+
+TEST(CausticSplit, ShadingNormalsTurnFluxAsTheyTurnRadiance)
+{
+  // A mirror whose shading normals lean down by 20°. Paths find the lamp by its true solid angle; photons count it by
+  // areas, which the two normals measure differently: without the adjoint's factor they bring some 20 % too much or less.
+  Scene scene = empty_scene();
+  add_floor(scene, 3);
+  add_caster(scene, with_normal(wall(), leaning(0.94f, -0.34f, 0)), mirror_material());
+  scene.lights.push_back(square_light({0.2f, 2.0f, 0}, leaning(-1, -0.2f, 0), 0.4f, 10));
+  look_down(scene, {0.9f, 0, 0}, 0.5f, 1.2f);
+  expect_same(scene, 64, 8, 0.005, "mirror that leans");
+}
+
+TEST(CausticSplit, RefractionBringsItsFactorForFluxAlone)
+{
+  // Into glass that ends below the floor: light is refracted once, so that nothing undoes what an index of refraction does
+  // to radiance and must not do to flux. The floor in the glass is what the camera, in the glass as well, looks at.
+  Scene scene = empty_scene();
+  add_floor(scene, 3);
+  add_caster(scene, quad_mesh({-2, 0.6f, 2}, {4, 0, 0}, {0, 0, -4}), glass_material());
+  scene.lights.push_back(square_light({0.3f, 1.5f, 0}, {0, -1, 0}, 0.4f, 10));
+  look_down(scene, {0, 0, 0}, 0.25f, 0.5f);
+  expect_same(scene, 64, 8, 0.005, "under a surface of glass");
+}
+
+/// A wall that is a caster, between a lamp that faces it and a floor that the lamp leaves dark.
+Scene lit_wall(const Material& material)
+{
+  Scene scene = empty_scene();
+  add_floor(scene, 3);
+  add_caster(scene, wall(), material);
+  scene.lights.push_back(square_light({-0.3f, 1.6f, 0}, {-1, 0, 0}, 1.5f, 10));
+  look_down(scene, {0.8f, 0, 0}, 0.5f, 2);
+  return scene;
+}
+
+TEST(CausticSplit, LampsSendACastersSharpLobesPhotonsAlone)
+{
+  // Of the lamp, paths sample at the wall what its soft lobes reflect, and weigh that against all directions to which the
+  // wall scatters: its sharp lobes go there as well, and widely.
+  Material half_metal;
+  half_metal.metallic = 0.5f;
+  half_metal.roughness = 0.3f;
+  half_metal.base_color = {0.9f, 0.5f, 0.1f};
+  expect_same(lit_wall(half_metal), 128, 16, 0.005, "half metal");
+}
+
+TEST(CausticSplit, SharesOfAColourAreItsOwn)
+{
+  // Blue plastic reflects red by its sharp lobe alone, nearly, and most of all light by its soft one: what goes to either by
+  // chance is weighed colour by colour. Red is compared, by paths that sample no lights: these
+  // would hide it.
+  Material plastic;
+  plastic.metallic = 0;
+  plastic.specular = 1;
+  plastic.roughness = 0.4f;
+  plastic.base_color = {0.02f, 0.5f, 0.9f};
+  expect_same(lit_wall(plastic), 128, 16, 0.005, "blue plastic", LightTechnique::kBsdfSampling);
+}
+
+/// The picture of a floor under the light of a lamp's mirror image, over its closed form.
+/// @param N  shading normal of the floor
+double mirrored_over_closed_form(Scene scene, Vec3f N)
+{
+  add_object(scene, with_normal(quad_mesh({-3, 0, 3}, {6, 0, 0}, {0, 0, -6}), N), diffuse_material(splat3(0.5f)));
+  scene.instances.back().flags |= kCausticReceiver;
+  add_caster(scene, wall(), mirror_material());
+  scene.lights.push_back(point_light({0, 1, 0}, 5));
+  look_down(scene, {0.3f, 0, 0.2f}, 0.4f, 2);
+  RenderOptions options = caustic_options(scene, CausticsMode::kAuto, 32, 16);
+  options.settings.diffuse_bounces = 1;
+  options.settings.caustics.photons = 1 << 17;
+  const Rendered picture = render_scene(scene, options);
+  double expected = 0;
+  for (int y = 0; y < 32; ++y) {
+    for (int x = 0; x < 32; ++x) {
+      const float* P = picture.at(Aov::kPosition, x, y);
+      const Vec3f to_image = Vec3f{-2, 1, 0} - Vec3f{P[0], P[1], P[2]};
+      const double d2 = static_cast<double>(length_squared(to_image));
+      expected += 5.0 * static_cast<double>(dot(to_image, N)) / (d2 * std::sqrt(d2)) * 0.5 / kPi_d / (32 * 32);
+    }
+  }
+  return mean_of(picture, Aov::kCaustic) / expected;
+}
+
+TEST(CausticSplit, PhotonsOnALeaningSurfaceShineByItsShadingNormal)
+{
+  EXPECT_NEAR(mirrored_over_closed_form(empty_scene(), {0, 1, 0}), 1.0, 0.01);
+  EXPECT_NEAR(mirrored_over_closed_form(empty_scene(), leaning(-0.4f, 0.9f, 0.1f)), 1.0, 0.01);
+}
+
+TEST(CausticSplit, PhotonsCountForTheCasterTheyWereAimedAt)
+{
+  // Two scraps of mirror that are one caster, so far apart that its box holds everything else: half of all photons are
+  // aimed at that box, and those that meet the wall are the wall's and not its: counted twice, the light would be twice as
+  // much. (Of six seeds the mean is within 0.1 %, a single one within 0.9 %.)
+  Scene scene = empty_scene();
+  Mesh scraps = quad_mesh({-2.5f, -1, -3}, {0.01f, 0, 0}, {0, 0, 0.01f});
+  const Mesh far = quad_mesh({4, 4, 3}, {0.01f, 0, 0}, {0, 0, 0.01f});
+  for (const Vec3f& P : far.P) scraps.P.push_back(P);
+  for (const TriangleIndices& t : far.triangles) scraps.triangles.push_back({t.v0 + 4, t.v1 + 4, t.v2 + 4});
+  add_caster(scene, scraps, mirror_material());
+  EXPECT_NEAR(mirrored_over_closed_form(scene, {0, 1, 0}), 1.0, 0.04);
+}
+
+TEST(CausticSplit, RouletteTakesWhatTheSurfaceTakes)
+{
+  // A mirror that reflects a third.
+  Scene scene = empty_scene();
+  add_floor(scene, 3);
+  Material dark = mirror_material();
+  dark.base_color = splat3(0.3f);
+  add_caster(scene, wall(), dark);
+  scene.lights.push_back(square_light({0.2f, 2.0f, 0}, leaning(-1, -0.2f, 0), 0.4f, 10));
+  look_down(scene, {0.9f, 0, 0}, 0.5f, 1.2f);
+  expect_same(scene, 64, 8, 0.005, "dark mirror");
+}
+
+}  // namespace
+}  // namespace relief::test
