@@ -19,8 +19,8 @@ class ExrError(Exception):
     """Not an EXR file, or one of a kind that is not read here."""
 
 
-def read_rgb(path):
-    """The layer of the channels R, G, B.
+def read_rgb(path, layer=""):
+    """The layer of the channels R, G, B; of a named one, `layer.R` and so on.
 
     @return  float64 array of shape (height, width, 3), row 0 the top one; linear values as stored
     @error   ExrError with the path and what was found
@@ -38,9 +38,10 @@ def read_rgb(path):
     width, height = x1 - x0 + 1, y1 - y0 + 1
     channels = _read_channels(attributes["channels"])
     row_bytes = sum(dtype.itemsize for _, dtype in channels) * width
-    pixels = {name: np.empty((height, width)) for name, _ in channels if name in "RGB"}
+    wanted = [f"{layer}.{c}" if layer else c for c in "RGB"]
+    pixels = {name: np.empty((height, width)) for name, _ in channels if name in wanted}
     if len(pixels) != 3:
-        raise ExrError(f"{path}: no channels R, G, B")
+        raise ExrError(f"{path}: no channels {', '.join(wanted)}")
 
     rows_per_block = _ROWS_PER_BLOCK[compression]
     num_blocks = -(-height // rows_per_block)
@@ -57,7 +58,7 @@ def read_rgb(path):
                 if name in pixels:
                     pixels[name][row] = np.frombuffer(block, dtype, width, start)
                 start += dtype.itemsize * width
-    return np.stack([pixels[name] for name in "RGB"], axis=-1)
+    return np.stack([pixels[name] for name in wanted], axis=-1)
 
 
 def _read_string(data, position):
