@@ -106,11 +106,17 @@ RELIEF_KERNEL bool path_caustic_after(std::uint32_t flags, const InstanceView& i
   return (flags & (kPathAfterSoft | kPathCaustic)) != 0 && (instance.flags & kCausticCaster) != 0;
 }
 
+/// The flags of a path after an event that photons cannot take: whatever lies ahead is the path tracer's.
+RELIEF_KERNEL std::uint32_t path_flags_left_to_paths(std::uint32_t flags)
+{
+  return flags & ~std::uint32_t{kPathAfterSoft | kPathCaustic};
+}
+
 /// The flags of a path after a scattering event.
 /// @param sharp  the event's lobe, see sharp_lobes
 RELIEF_KERNEL std::uint32_t path_caustic_flags(std::uint32_t flags, const InstanceView& instance, bool sharp)
 {
-  const std::uint32_t others = flags & ~std::uint32_t{kPathAfterSoft | kPathCaustic};
+  const std::uint32_t others = path_flags_left_to_paths(flags);
   if (sharp) return others | (path_caustic_after(flags, instance) ? kPathCaustic : 0u);
   return others | ((instance.flags & kGathersPhotons) != 0 ? kPathAfterSoft : 0u);
 }

@@ -37,6 +37,7 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
       sample_2d(hash, sample, dimension_bounce(surface, BounceDimension::kBsdfUv)));
   if (!(bsdf.pdf > 0.0f)) return false;
   const Vec3f wi = from_local(side.frame, bsdf.wi);
+  if (!shading_is_reversible(side, wi)) return false;
   // The adjoint of a BSDF with shading normals is not symmetric (Veach 1997, Eq. 5.19).
   const float cos_o = __builtin_fabsf(dot(wo, side.Ng));
   if (!(cos_o > 0.0f)) return false;

@@ -46,7 +46,8 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   const Vec3f wi = to_local(at.side.frame, light.wi);
   BsdfEval bsdf = closure_eval<kFeatures>(closure, *g.bsdf_tables, wi);
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
-    if (light_casts_caustics(g.lights, light.light_index) && path_caustic_after(state.flags[path], *at.instance)) {
+    if (light_casts_caustics(g.lights, light.light_index) && path_caustic_after(state.flags[path], *at.instance) &&
+        shading_is_reversible(at.side, light.wi)) {
       bsdf.f = closure_eval<kFeatures>(closure_soft(closure, {true, true}), *g.bsdf_tables, wi).f;
     }
   }
@@ -224,11 +225,14 @@ template <unsigned kFeatures>
       closure, *g.bsdf_tables, sample_1d(hash, sample, dimension_bounce(surface, BounceDimension::kBsdfLobe)),
       sample_2d(hash, sample, dimension_bounce(surface, BounceDimension::kBsdfUv)));
   if (!(bsdf.pdf > 0.0f)) return;
+  const Vec3f wi = from_local(side.frame, bsdf.wi);
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
     const SharpLobes sharp = sharp_lobes(params, (instance.flags & kCausticCaster) != 0, g.caustics.roughness);
     const float u = sample_1d(hash, sample, dimension_sharpness(surface));
     const bool is_sharp = shade_surface_split<kFeatures>(closure, *g.bsdf_tables, sharp, u, bsdf);
-    state.flags[path] = path_caustic_flags(state.flags[path], instance, is_sharp);
+    const bool is_paths = is_sharp && !shading_is_reversible(side, wi);
+    state.flags[path] = is_paths ? path_flags_left_to_paths(state.flags[path])
+                                 : path_caustic_flags(state.flags[path], instance, is_sharp);
   }
   throughput *= bsdf.f * (__builtin_fabsf(bsdf.wi.z) / bsdf.pdf);
 
@@ -249,7 +253,6 @@ template <unsigned kFeatures>
   }
   if (is_zero(throughput)) return;
 
-  const Vec3f wi = from_local(side.frame, bsdf.wi);
   path_set_ray(state, path, surface_ray_origin(at, wi), wi);
   path_set_throughput(state, path, throughput);
   const bool delta = (bsdf.lobe & kLobeDelta) != 0;

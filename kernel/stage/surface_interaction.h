@@ -19,6 +19,7 @@ struct ShadingSide {
   Frame frame;  ///< local +z: for a solid dielectric the outward normal, otherwise the shading normal on wo's side
   Vec3f Ns;     ///< shading normal on wo's side
   bool front;   ///< wo is on the front side of the triangle
+  bool bent;    ///< Ns is not the surface's: wo was below its horizon
 };
 
 struct SurfaceInteraction {
@@ -43,6 +44,9 @@ RELIEF_KERNEL Vec3f shading_normal_towards(Vec3f Ns, Vec3f Ng_side, Vec3f wo)
   if (cos_o >= kLeastCosine) return Ns;
   return normalize(Ns + (kLeastCosine - cos_o) * wo);
 }
+
+/// Cosine between a shading normal and what was made of it, less than which it was bent: 1 but for rounding.
+inline constexpr float kUnbent = 1.0f - 1e-6f;
 
 /// The point that a path has hit and its material there.
 /// @param wo  unit, back along the path's ray
@@ -87,6 +91,7 @@ RELIEF_KERNEL void surface_interaction_frame(const KernelGlobals& g,
   const Material& material = *at.material;
   ShadingSide& side = at.side;
   side.Ns = shading_normal_towards(at.hit.Ns, side.Ng, wo);
+  side.bent = !(__builtin_fabsf(dot(side.Ns, at.hit.Ns)) > kUnbent);
   Frame tangent_frame;
   bool has_tangents = false;
   if constexpr ((kFeatures & kFeatureNormalMaps) != 0) {
@@ -98,6 +103,7 @@ RELIEF_KERNEL void surface_interaction_frame(const KernelGlobals& g,
       const Vec3f N =
           normalize(from_local(tangent_frame, normal_map_eval(material, g.textures, at.hit.uv, at.uv_width)));
       side.Ns = shading_normal_consistent(side.Ng, side.front ? N : -N, wo);
+      side.bent = !(dot(side.Ns, side.front ? N : -N) > kUnbent);
     }
   }
   const bool solid = at.params.transmission > 0.0f && !at.params.thin;
@@ -113,6 +119,15 @@ RELIEF_KERNEL void surface_interaction_frame(const KernelGlobals& g,
       at.params.clearcoat_N = to_local(side.frame, shading_normal_consistent(side.Ng, side.front ? N : -N, wo));
     }
   }
+}
+
+/// Whether light comes back as a path went. It does not where a direction is above the surface by its shading normal and
+/// below by its geometric one, or the other way round: from there it meets the other side. Such events of sharp lobes are the
+/// camera paths' alone, and photons end there: on a floor under a coarse mirror 8 % of the light was missing for want of this.
+/// @param wi  unit, where the path goes on
+RELIEF_KERNEL bool shading_is_reversible(const ShadingSide& side, Vec3f wi)
+{
+  return !side.bent && (dot(wi, side.Ns) > 0.0f) == (dot(wi, side.Ng) > 0.0f);
 }
 
 /// Whether the surface is there for this path, or lets it through.

@@ -123,6 +123,31 @@ TEST(CausticSplit, PhotonsCountForTheCasterTheyWereAimedAt)
   EXPECT_NEAR(mirrored_over_closed_form(scene, {0, 1, 0}), 1.0, 0.04);
 }
 
+TEST(CausticSplit, WhatCannotBeGoneBackIsLeftToPaths)
+{
+  // A coarse sphere of mirror, shaded smooth, and the floor below it, seen from underneath. Near the sphere's edges paths
+  // leave below a facet and above the horizon that the shading normal draws, where no photon can come from, or come from
+  // below that horizon. Of the light on the floor's far side this is a tenth.
+  Scene scene = empty_scene();
+  add_floor(scene, 3);
+  Affine3 place;
+  place.p = {0, 0.7f, 0};
+  add_caster(scene, sphere_mesh(0.4f, 8, 4, true), mirror_material(), place);
+  scene.lights.push_back(square_light({1.5f, 1.2f, 0}, {-1, 0, 0}, 0.6f, 10));
+  for (const float x : {-0.4f, 0.0f}) {
+    look_down(scene, {x, 0, 0}, 0.15f, 0.25f);
+    RenderOptions options = caustic_options(scene, CausticsMode::kOn, 8, 64);
+    options.settings.caustics.photons = 1 << 14;
+    const Estimate on = estimate_mean(scene, options, 8);
+    options = caustic_options(scene, CausticsMode::kOff, 8, 512);
+    const Estimate off = estimate_mean(scene, options, 8);
+    const double error = std::hypot(on.standard_error, off.standard_error);
+    std::printf("photons over paths %.4f, standard error %.4f\n", on.mean / off.mean, error / off.mean);
+    EXPECT_NEAR(on.mean, off.mean, 4 * error);
+    EXPECT_LT(error, 0.02 * off.mean);
+  }
+}
+
 TEST(CausticSplit, RouletteTakesWhatTheSurfaceTakes)
 {
   // A mirror that reflects a third.
