@@ -7,6 +7,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
+#include "kernel/sample/sobol.h"
+
 namespace relief {
 
 namespace {
@@ -21,41 +23,58 @@ std::vector<std::size_t> chunk_offsets(const std::vector<std::vector<Photon>>& c
 
 }  // namespace
 
-void PhotonMap::build(const std::vector<std::vector<Photon>>& chunks, float radius)
+void PhotonMap::build(const std::vector<std::vector<Photon>>& chunks, const std::vector<float>& radii)
 {
-  radius_ = radius;
   const std::vector<std::size_t> first = chunk_offsets(chunks);
   const std::size_t count = first.back();
-  const std::uint32_t num_buckets = std::bit_ceil(static_cast<std::uint32_t>(std::max<std::size_t>(count, 1)));
-  const float inverse_cell = 0.5f / radius;
+  const std::uint32_t num_buckets = std::bit_ceil(static_cast<std::uint32_t>(std::max<std::size_t>(count, 2)));
+  largest_radius_ = count > 0 ? *std::max_element(radii.begin(), radii.end()) : 0.0f;
+  const float least_inverse = 1.0f / sqr(largest_radius_);
 
   order_.resize(count);
   std::vector<const Photon*> photons(count);
+  std::vector<std::array<Box3, kPhotonOctaves>> bounds(chunks.size());
   tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
+    bounds[c].fill(box_empty());
     for (std::size_t k = 0; k < chunks[c].size(); ++k) {
       const Photon& photon = chunks[c][k];
+      const std::size_t i = first[c] + k;
+      const int octave = photon_octave(1.0f / sqr(radii[i]), least_inverse);
+      Box3& box = bounds[c][static_cast<std::size_t>(octave)];
+      box = box_union(box, {photon.P, photon.P});
+      const float inverse_cell = 0.5f / std::ldexp(largest_radius_, -octave);
       const std::uint32_t row =
-          photon_row(photon_cell(photon.P.y, inverse_cell), photon_cell(photon.P.z, inverse_cell));
+          photon_row(photon_cell(photon.P.y, inverse_cell), photon_cell(photon.P.z, inverse_cell), octave);
       const std::uint32_t bucket =
           (row + static_cast<std::uint32_t>(photon_cell(photon.P.x, inverse_cell))) & (num_buckets - 1);
-      const std::size_t i = first[c] + k;
       order_[i] = static_cast<std::uint64_t>(bucket) << 32 | i;
       photons[i] = &photon;
     }
   });
+  bounds_.fill(box_empty());
+  octaves_ = 0;
+  for (const auto& of_chunk : bounds) {
+    for (std::size_t octave = 0; octave < kPhotonOctaves; ++octave) {
+      bounds_[octave] = box_union(bounds_[octave], of_chunk[octave]);
+      if (bounds_[octave].low.x <= bounds_[octave].high.x) octaves_ |= 1u << octave;
+    }
+  }
   tbb::parallel_sort(order_.begin(), order_.end());
 
   x_.resize(count);
   y_.resize(count);
   z_.resize(count);
+  inverse_radius_squared_.resize(count);
   arrivals_.resize(count);
   bucket_begin_.assign(num_buckets + 1, 0);
   const auto bucket_of = [&](std::size_t i) { return static_cast<std::uint32_t>(order_[i] >> 32); };
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
-    const Photon& photon = *photons[order_[i] & 0xffffffffu];
+    const std::size_t from = order_[i] & 0xffffffffu;
+    const Photon& photon = *photons[from];
     x_[i] = photon.P.x;
     y_[i] = photon.P.y;
     z_[i] = photon.P.z;
+    inverse_radius_squared_[i] = 1.0f / sqr(radii[from]);
     arrivals_[i] = photon.arrival;
     // The first photon of a bucket also begins the empty ones before it.
     const std::uint32_t begin = i == 0 ? 0 : bucket_of(i - 1) + 1;
@@ -73,16 +92,19 @@ PhotonMapView PhotonMap::view() const
   v.x = x_.data();
   v.y = y_.data();
   v.z = z_.data();
+  v.inverse_radius_squared = inverse_radius_squared_.data();
   v.arrivals = arrivals_.data();
   v.bucket_begin = bucket_begin_.data();
   v.bucket_mask = static_cast<std::uint32_t>(bucket_begin_.size()) - 2;
-  v.radius = radius_;
+  v.largest_radius = largest_radius_;
+  v.bounds = bounds_.data();
+  v.octaves = octaves_;
   return v;
 }
 
 std::size_t PhotonMap::bytes() const
 {
-  return arrivals_.capacity() * (sizeof(PhotonArrival) + 3 * sizeof(float)) +
+  return arrivals_.capacity() * (sizeof(PhotonArrival) + 4 * sizeof(float)) +
          bucket_begin_.capacity() * sizeof(std::uint32_t) + order_.capacity() * sizeof(std::uint64_t);
 }
 
@@ -119,6 +141,55 @@ float photon_radius_for(const std::vector<std::vector<Photon>>& chunks, double w
   // On a surface, photons within a radius grow with its square.
   const double found = nth * static_cast<double>(stride);
   return static_cast<float>(static_cast<double>(*median) * std::sqrt(wanted / found));
+}
+
+std::vector<float> photon_radii(const std::vector<std::vector<Photon>>& chunks,
+                                double wanted,
+                                float typical,
+                                std::uint32_t shift)
+{
+  constexpr float kWidest = 4;
+  constexpr std::size_t kSizes = 8;  // of cells, from twice the widest radius down by halves
+  const std::vector<std::size_t> first = chunk_offsets(chunks);
+  const std::size_t count = first.back();
+  wanted = std::min(wanted, static_cast<double>(count) / 2);
+  const double enough = std::max(2.0, wanted / 2);  // a photon alone says nothing
+  const float widest = kWidest * typical;
+  const auto cell_size = [&](std::size_t size) { return std::ldexp(2 * widest, -static_cast<int>(size)); };
+  const Vec2f u = sample_2d(shift, 0, 0), v = sample_2d(shift, 0, 1);
+  const Vec3f offset = cell_size(0) * Vec3f{u.x, u.y, v.x};
+
+  // Cells that share a counter only matter where they are nearly empty, and such are not asked in the end.
+  const std::size_t mask = std::bit_ceil(std::max<std::size_t>(count / 2, 64)) - 1;
+  const auto counter = [&](Vec3f P, std::size_t size) {
+    const float inverse = 1.0f / cell_size(size);
+    const Vec3f Q = P + offset;
+    return (photon_row(photon_cell(Q.y, inverse), photon_cell(Q.z, inverse), static_cast<int>(size)) +
+            static_cast<std::uint32_t>(photon_cell(Q.x, inverse))) &
+           mask;
+  };
+  std::array<std::vector<std::uint32_t>, kSizes> counts;
+  tbb::parallel_for(std::size_t{0}, kSizes, [&](std::size_t size) {
+    counts[size].assign(mask + 1, 0);
+    for (const std::vector<Photon>& chunk : chunks) {
+      for (const Photon& photon : chunk) ++counts[size][counter(photon.P, size)];
+    }
+  });
+
+  std::vector<float> radii(count);
+  tbb::parallel_for(std::size_t{0}, chunks.size(), [&](std::size_t c) {
+    for (std::size_t k = 0; k < chunks[c].size(); ++k) {
+      std::size_t size = kSizes;
+      double found = 0;
+      do {
+        --size;
+        found = counts[size][counter(chunks[c][k].P, size)];
+      } while (size > 0 && found < enough);
+      const double area = static_cast<double>(sqr(cell_size(size))) / found * wanted;
+      radii[first[c] + k] = std::min(widest, static_cast<float>(std::sqrt(area / 3.14159265358979)));
+    }
+  });
+  return radii;
 }
 
 }  // namespace relief

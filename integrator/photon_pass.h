@@ -1,8 +1,8 @@
 // The caustic pass: where photons start, how many, with what radius they are searched; and whether there is a pass at all.
 //
 // A light path belongs to it if, from the light, it meets one or more casters by their sharp lobes and then a soft lobe of
-// a receiver: L S+ D. What comes after, up to the camera, does not matter. All other paths are the path tracer's; see
-// path_caustic_flags and shade_surface_split for how it leaves these out.
+// a receiver: L S+ D, and again, L S+ D S+ D. What comes after, up to the camera, does not matter. All other paths are the
+// path tracer's; see path_caustic_flags and closure_split for how it leaves these out.
 #pragma once
 
 #include <atomic>

@@ -60,4 +60,27 @@ RELIEF_KERNEL bool closure_has_soft(const SurfaceClosure& c, SharpLobes sharp)
          (!sharp.base && (p.specular > 0.0f || p.thin > 0.0f || p.glass > 0.0f)) || (!sharp.coat && p.coat > 0.0f);
 }
 
+/// Decides whether a sampled event counts as sharp or soft, and weighs it by that part of f alone. Where both have a
+/// share, one is chosen by it: a path is either the photon pass's or the path tracer's.
+/// @param bsdf  sampled from the closure
+/// @param u     [0, 1): chooses
+/// @return whether it is sharp
+template <unsigned kFeatures, TransportMode kMode = TransportMode::kRadiance>
+RELIEF_KERNEL bool closure_split(const SurfaceClosure& closure,
+                                 const BsdfTables& tables,
+                                 SharpLobes sharp,
+                                 float u,
+                                 BsdfSample& bsdf)
+{
+  if ((bsdf.lobe & kLobeDelta) != 0 || !closure_has_soft(closure, sharp)) return true;
+  if (!closure_has_sharp(closure, sharp)) return false;
+  const Vec3f f_sharp = closure_eval<kFeatures, kMode>(closure_sharp(closure, sharp), tables, bsdf.wi).f;
+  const Vec3f f_soft = max(bsdf.f - f_sharp, Vec3f{});
+  const float of_sharp = max_component(f_sharp);
+  const float probability = of_sharp / (of_sharp + max_component(f_soft));
+  const bool is_sharp = u < probability;
+  bsdf.f = is_sharp ? f_sharp / probability : f_soft / (1.0f - probability);
+  return is_sharp;
+}
+
 }  // namespace relief

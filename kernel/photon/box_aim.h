@@ -2,13 +2,10 @@
 #pragma once
 
 #include "kernel/light/rectangle.h"
+#include "kernel/math/box.h"
 #include "kernel/sample/warp.h"
 
 namespace relief {
-
-struct Box3 {
-  Vec3f low{}, high{};
-};
 
 /// A direction towards a box.
 struct BoxDirection {

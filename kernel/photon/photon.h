@@ -1,6 +1,7 @@
 // A photon, the map of a pass as the kernel reads it, and the schedule by which its radius shrinks.
 #pragma once
 
+#include "kernel/math/box.h"
 #include "kernel/math/octahedral.h"
 
 namespace relief {
@@ -18,14 +19,20 @@ struct Photon {
   PhotonArrival arrival;
 };
 
-/// Photons of a pass in a hash grid: those of one cell are consecutive, those of cells that follow each other in x as
-/// well (but for hash wrap-around).
+/// Octaves of radii that have a grid of their own; the last has all smaller ones.
+inline constexpr int kPhotonOctaves = 8;
+
+/// Photons of a pass in hash grids, one for each octave of their radii: those of one cell are consecutive, those of cells
+/// that follow each other in x as well (but for hash wrap-around).
 struct PhotonMapView {
   const float *x = nullptr, *y = nullptr, *z = nullptr;  ///< world, metres
+  const float* inverse_radius_squared = nullptr;         ///< 1/m²
   const PhotonArrival* arrivals = nullptr;
   const std::uint32_t* bucket_begin = nullptr;  ///< bucket_mask + 2 entries
   std::uint32_t bucket_mask = 0;                ///< number of buckets − 1; a power of two
-  float radius = 0;                             ///< of the search, metres; cells are twice as wide. 0: no photons
+  const Box3* bounds = nullptr;                 ///< of photons, for each octave
+  std::uint32_t octaves = 0;  ///< bit i: there are photons of radii in largest_radius · (2^−i−1, 2^−i]
+  float largest_radius = 0;   ///< metres; 0: no photons. Cells are twice as wide as an octave's largest
 };
 
 /// What the stages need of the caustic pass.
@@ -42,9 +49,20 @@ RELIEF_KERNEL std::int32_t photon_cell(float x, float inverse_cell)
 }
 
 /// First bucket of a row of cells; cell (x, y, z) is in bucket (row + x) & mask.
-RELIEF_KERNEL std::uint32_t photon_row(std::int32_t y, std::int32_t z)
+RELIEF_KERNEL std::uint32_t photon_row(std::int32_t y, std::int32_t z, int octave)
 {
-  return static_cast<std::uint32_t>(y) * 0x9e3779b1u ^ static_cast<std::uint32_t>(z) * 0x85ebca77u;
+  return (static_cast<std::uint32_t>(y) * 0x9e3779b1u ^ static_cast<std::uint32_t>(z) * 0x85ebca77u) +
+         static_cast<std::uint32_t>(octave) * 0xc2b2ae35u;
+}
+
+/// Octave of a photon's radius.
+/// @param inverse_squared  1/m², of its radius; least_inverse of the largest
+RELIEF_KERNEL int photon_octave(float inverse_squared, float least_inverse)
+{
+  int octave = 0;
+  for (float next = 4.0f * least_inverse; octave + 1 < kPhotonOctaves && inverse_squared >= next; next *= 4.0f)
+    ++octave;
+  return octave;
 }
 
 /// Factor on the first pass's radius.

@@ -47,7 +47,9 @@ RELIEF_KERNEL void gather_photons(const KernelGlobals& g, const PathStateView& s
   caustic.irradiance_r[path] = caustic.irradiance_g[path] = caustic.irradiance_b[path] = 0.0f;
   const InstanceView& instance = g.instances[state.hit_object[path]];
   PhotonQuery query;
-  if ((instance.flags & kGathersPhotons) == 0 || !(g.caustics.map.radius > 0.0f)) return;
+  if ((instance.flags & kGathersPhotons) == 0 || g.caustics.map.octaves == 0) return;
+  // Photons went on from here to where the path comes from.
+  if ((state.flags[path] & kPathCaustic) != 0) return;
   if (!photon_bounces_left(g.limits, state.bounces[path], &query.bounces)) return;
   const Vec3f D = path_direction(state, path);
   query.P = path_origin(state, path) + D * state.hit_t[path];

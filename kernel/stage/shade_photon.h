@@ -1,4 +1,5 @@
-// Stage: a photon met a surface. It is kept where soft lobes can show it, and goes on through sharp lobes of casters.
+// Stage: a photon met a surface. It is kept where soft lobes can show it, and goes on by sharp lobes of casters. By soft
+// lobes it goes on from where it was kept, if a caster is next: a bright caustic is a lamp to the glass above it.
 #pragma once
 
 #include "kernel/bsdf/lobe_split.h"
@@ -16,26 +17,33 @@ RELIEF_KERNEL int photon_surface(const PathStateView& state, std::uint32_t path)
   return path_surface(state, path) + ((state.flags[path] & kPathCaustic) != 0 ? 1 : 0);
 }
 
-/// Scatters a photon by its surface's sharp lobes.
+/// Scatters a photon.
+/// @param kept  the map has it: soft lobes scatter as well
 /// @return false: its path ends
 RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
                                         const PathStateView& state,
                                         std::uint32_t path,
                                         const SurfaceInteraction& at,
                                         Vec3f wo,
-                                        Vec3f throughput)
+                                        Vec3f throughput,
+                                        bool kept)
 {
   const ShadingSide& side = at.side;
   const Vec3f wo_local = to_local(side.frame, wo);
-  const SurfaceClosure closure =
-      closure_sharp(surface_closure_make<kFeatureAll>(at.params, *g.bsdf_tables, wo_local), {true, true});
+  const bool caster = (at.instance->flags & kCausticCaster) != 0;
+  SurfaceClosure closure = surface_closure_make<kFeatureAll>(at.params, *g.bsdf_tables, wo_local);
+  if (!kept) closure = closure_sharp(closure, {true, true});
   const int surface = photon_surface(state, path);
   const std::uint32_t hash = state.pixel_hash[path];
   const std::uint32_t sample = state.sample_index[path];
-  const BsdfSample bsdf = closure_sample<kFeatureAll, TransportMode::kImportance>(
+  BsdfSample bsdf = closure_sample<kFeatureAll, TransportMode::kImportance>(
       closure, *g.bsdf_tables, sample_1d(hash, sample, dimension_bounce(surface, BounceDimension::kBsdfLobe)),
       sample_2d(hash, sample, dimension_bounce(surface, BounceDimension::kBsdfUv)));
   if (!(bsdf.pdf > 0.0f)) return false;
+  const bool sharp = closure_split<kFeatureAll, TransportMode::kImportance>(
+      closure, *g.bsdf_tables, sharp_lobes(at.params, caster, g.caustics.roughness),
+      sample_1d(hash, sample, dimension_sharpness(surface)), bsdf);
+  if (sharp && !caster) return false;
   const Vec3f wi = from_local(side.frame, bsdf.wi);
   if (!shading_is_reversible(side, wi)) return false;
   // The adjoint of a BSDF with shading normals is not symmetric (Veach 1997, Eq. 5.19).
@@ -55,9 +63,13 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
   const bool transmitted = (bsdf.lobe & kLobeTransmit) != 0;
   // A camera path counts the event next to the light, but no surface asks for that count any more.
   if ((state.flags[path] & kPathCaustic) != 0) {
-    state.bounces[path] += 1u + (1u << static_cast<int>(transmitted ? BounceKind::kTransmission : BounceKind::kGlossy));
+    const BounceKind kind = transmitted                       ? BounceKind::kTransmission
+                            : (bsdf.lobe & kLobeDiffuse) != 0 ? BounceKind::kDiffuse
+                                                              : BounceKind::kGlossy;
+    state.bounces[path] += 1u + (1u << static_cast<int>(kind));
   }
-  state.flags[path] |= kPathCaustic;
+  state.flags[path] =
+      sharp ? (state.flags[path] | kPathCaustic) & ~std::uint32_t{kPathAfterSoft} : state.flags[path] | kPathAfterSoft;
   if (transmitted && at.params.transmission > 0.0f && !at.params.thin) {
     const Vec3f inside = side.front ? at.params.sigma_a : Vec3f{};
     state.sigma_a_r[path] = inside.x;
@@ -92,14 +104,16 @@ RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
   const Vec3f throughput = path_throughput(state, path) * path_transmittance(sigma_a, state.hit_t[path]);
   if (is_zero(throughput)) return;
   surface_interaction_frame<kFeatureAll>(g, state, path, wo, at);
-  if (has_scattered && (flags & kGathersPhotons) != 0) {
+  const bool caster = (flags & kCausticCaster) != 0;
+  const bool kept = has_scattered && (state.flags[path] & kPathAfterSoft) == 0 && (flags & kGathersPhotons) != 0;
+  if (kept) {
     // Along the ray, as gather_photons: on a triangle that is large against the caustic, at.hit is less exact.
     const Vec3f P = path_origin(state, path) - wo * state.hit_t[path];
     photons.photons[photons.size++] = {
         P, {throughput, octahedral_encode(wo), octahedral_encode(at.side.Ng), state.bounces[path] - 1u}};
   }
-  if ((flags & kCausticCaster) == 0) return;
-  if (shade_photon_scatter(g, state, path, at, wo, throughput)) queue_push(next, path);
+  if (!caster && !kept) return;
+  if (shade_photon_scatter(g, state, path, at, wo, throughput, kept)) queue_push(next, path);
 }
 
 }  // namespace relief

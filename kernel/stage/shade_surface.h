@@ -115,27 +115,6 @@ RELIEF_KERNEL void shade_surface_photons(const KernelGlobals& g,
   caustic.radiance_b[path] += radiance.z;
 }
 
-/// Decides whether a sampled event counts as sharp or soft, and weighs it by that part of f alone. Where both have a
-/// share, one is chosen by it: a path is either the photon pass's or the path tracer's.
-/// @param u  [0, 1): chooses
-template <unsigned kFeatures>
-RELIEF_KERNEL bool shade_surface_split(const SurfaceClosure& closure,
-                                       const BsdfTables& tables,
-                                       SharpLobes sharp,
-                                       float u,
-                                       BsdfSample& bsdf)
-{
-  if ((bsdf.lobe & kLobeDelta) != 0 || !closure_has_soft(closure, sharp)) return true;
-  if (!closure_has_sharp(closure, sharp)) return false;
-  const Vec3f f_sharp = closure_eval<kFeatures>(closure_sharp(closure, sharp), tables, bsdf.wi).f;
-  const Vec3f f_soft = max(bsdf.f - f_sharp, Vec3f{});
-  const float of_sharp = max_component(f_sharp);
-  const float probability = of_sharp / (of_sharp + max_component(f_soft));
-  const bool is_sharp = u < probability;
-  bsdf.f = is_sharp ? f_sharp / probability : f_soft / (1.0f - probability);
-  return is_sharp;
-}
-
 /// Shades one path. Reads and writes every column but the hit's.
 /// Next: intersect closest (pushed on `next`), or the path ends. At most one ray is added to `shadow`.
 template <unsigned kFeatures>
@@ -229,7 +208,7 @@ template <unsigned kFeatures>
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
     const SharpLobes sharp = sharp_lobes(params, (instance.flags & kCausticCaster) != 0, g.caustics.roughness);
     const float u = sample_1d(hash, sample, dimension_sharpness(surface));
-    const bool is_sharp = shade_surface_split<kFeatures>(closure, *g.bsdf_tables, sharp, u, bsdf);
+    const bool is_sharp = closure_split<kFeatures>(closure, *g.bsdf_tables, sharp, u, bsdf);
     const bool is_paths = is_sharp && !shading_is_reversible(side, wi);
     state.flags[path] = is_paths ? path_flags_left_to_paths(state.flags[path])
                                  : path_caustic_flags(state.flags[path], instance, is_sharp);

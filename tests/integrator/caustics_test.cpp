@@ -134,9 +134,12 @@ std::vector<std::vector<Photon>> random_photons(std::size_t count)
 TEST(PhotonMap, SearchesAgreeWithBruteForce)
 {
   const std::vector<std::vector<Photon>> chunks = random_photons(20000);
-  for (const float radius : {0.003f, 0.05f, 0.7f, 30.0f}) {
+  for (const float widest : {0.003f, 0.05f, 0.7f, 30.0f}) {
+    // Radii over ten octaves: more than have a grid of their own.
+    std::vector<float> radii;
+    for (std::uint32_t i = 0; i < 20000; ++i) radii.push_back(widest * std::exp2(-10 * sample_2d(21, i, 0).x));
     PhotonMap map;
-    map.build(chunks, radius);
+    map.build(chunks, radii);
     EXPECT_EQ(map.size(), 20000u);
     int found = 0;
     for (std::uint32_t q = 0; q < 300; ++q) {
@@ -149,8 +152,10 @@ TEST(PhotonMap, SearchesAgreeWithBruteForce)
       query.both_sides = q % 5 == 0;
       query.hash = q * 7919u;
       double expected = 0;
+      std::size_t number = 0;
       for (const auto& chunk : chunks) {
         for (const Photon& photon : chunk) {
+          const float radius = radii[number++];
           const Vec3f offset = photon.P - query.P;
           const double d2 = static_cast<double>(length_squared(offset));
           const double r2 = static_cast<double>(radius) * static_cast<double>(radius);
@@ -184,7 +189,7 @@ TEST(PhotonMap, SearchesStayWithinTheirCellsWhereCoordinatesHardlyResolveTheRadi
   for (const float factor : {0.3f, 0.51f, 0.6f, 0.75f, 0.99f}) {
     const float radius = factor * step;
     PhotonMap map;
-    map.build(chunks, radius);
+    map.build(chunks, std::vector<float>(chunks[0].size(), radius));
     for (int i = -4; i <= 4; ++i) {
       PhotonQuery query;
       query.P = {1000 + static_cast<float>(i) * step, 1000, 1000 - static_cast<float>(i) * step};
@@ -205,7 +210,7 @@ TEST(PhotonMap, TheChosenPhotonStandsForAll)
   chunks[0].push_back(
       {{0, 0, 0.2f}, {{0, 2, 1}, octahedral_encode(normalize(Vec3f{0, 1, 1})), octahedral_encode({0, 1, 0}), 0}});
   PhotonMap map;
-  map.build(chunks, 0.5f);
+  map.build(chunks, {0.5f, 0.5f});
   Vec3d sum{}, expected{};
   constexpr int kChoices = 200000;
   const auto g = [](Vec3f wi) { return 1.0 + 2.0 * static_cast<double>(wi.x); };
@@ -225,6 +230,59 @@ TEST(PhotonMap, TheChosenPhotonStandsForAll)
   EXPECT_NEAR(sum.x / expected.x, 1, 0.01);
   EXPECT_NEAR(sum.y / expected.y, 1, 0.01);
   EXPECT_NEAR(sum.z / expected.z, 1, 0.01);
+}
+
+TEST(PhotonRadii, FollowTheDensityAndKeepTheLight)
+{
+  // Squares of side 4 and 0.25 with as many photons each: 256 times as dense.
+  std::vector<std::vector<Photon>> chunks(3);
+  constexpr std::uint32_t kPhotons = 30000;
+  std::vector<bool> dense;
+  for (std::uint32_t c = 0; c < 3; ++c) {
+    for (std::uint32_t i = c; i < kPhotons; i += 3) {
+      const Vec2f u = sample_2d(31, i, 0);
+      const bool small = i % 2 == 0;
+      const float side = small ? 0.25f : 4.0f;
+      const float x = side * (u.x - 0.5f) + (small ? 10.0f : 0.0f);
+      chunks[c].push_back(
+          {{x, 0, side * (u.y - 0.5f)}, {splat3(1), octahedral_encode({0, 1, 0}), octahedral_encode({0, 1, 0}), 0}});
+      dense.push_back(small);
+    }
+  }
+  constexpr double kWanted = 24, kPi64 = 3.14159265358979;
+  std::vector<float> radii;
+  for (std::uint32_t shift = 0; shift < 16; ++shift) {
+    radii = photon_radii(chunks, kWanted, 0.04f, shift);
+    ASSERT_EQ(radii.size(), kPhotons);
+    double area[2] = {};
+    for (std::uint32_t i = 0; i < kPhotons; ++i) {
+      area[dense[i] ? 1 : 0] +=
+          kPi64 * static_cast<double>(radii[i]) * static_cast<double>(radii[i]) / (kPhotons / 2.0);
+      EXPECT_LE(radii[i], 0.16f);
+    }
+    // Cells that a square's edge cuts have fewer photons, so the mean area is above wanted / density.
+    EXPECT_NEAR(area[0] / (kWanted * 16 / (kPhotons / 2)), 1.3, 0.4) << shift;
+    EXPECT_NEAR(area[1] / (kWanted * 0.0625 / (kPhotons / 2)), 1.3, 0.4) << shift;
+  }
+  // The estimate's integral over the plane is all their power, whatever the radii.
+  PhotonMap map;
+  map.build(chunks, radii);
+  double sum = 0;
+  const auto integrate = [&](float x, float side, int steps) {
+    const double step = static_cast<double>(side) / steps;
+    for (int k = 0; k < steps; ++k) {
+      for (int i = 0; i < steps; ++i) {
+        PhotonQuery query;
+        query.P = {x + static_cast<float>((i + 0.5) * step), 0, static_cast<float>((k + 0.5) * step) - 0.5f * side};
+        query.Ng = {0, 1, 0};
+        query.bounces = 0x7f7f7f7fu;
+        sum += static_cast<double>(photon_gather(map.view(), query).irradiance.x) * step * step;
+      }
+    }
+  };
+  integrate(-2.5f, 5, 600);
+  integrate(9.5f, 1, 600);
+  EXPECT_NEAR(sum / kPhotons, 1, 2e-3);
 }
 
 TEST(PhotonBounces, LimitsAreComparedCountByCount)
@@ -560,6 +618,19 @@ TEST_F(CausticAgreement, TransparentEmitters)
   const Regions b = render_regions(opaque, caustic_options(opaque, CausticsMode::kOn, 32, 8), 8);
   for (int r = 0; r < Regions::kSide * Regions::kSide; ++r) {
     EXPECT_NEAR(a.mean[r], b.mean[r], 4 * std::sqrt(a.variance[r] + b.variance[r])) << "region " << r;
+  }
+}
+
+TEST_F(CausticAgreement, CausticsOfCaustics)
+{
+  // On white under glass and metal, the caustic itself is a lamp to what cast it: photons go on from it.
+  for (const bool is_metal : {false, true}) {
+    Material metal;
+    metal.roughness = 0.1f;
+    metal.base_color = splat3(0.95f);
+    Scene scene = room(is_metal ? metal : glass_material());
+    scene.materials.front() = diffuse_material(splat3(0.95f));
+    expect_same(scene, 256, 16, 0.005, is_metal ? "metal over white" : "glass over white");
   }
 }
 
