@@ -182,9 +182,9 @@ PhotonPass::PhotonPass(const SceneContext& context, const CausticSettings& setti
 
 void PhotonPass::keep_to_memory(const KernelGlobals& g, const StageTable& stages, Wavefront& worker)
 {
-  // Of a photon that is kept: as it was traced, its place in the map, which may have grown by doubling, and in its buckets
-  // and while it is sorted.
-  constexpr double kBytes = sizeof(Photon) + 2.0 * (sizeof(Photon) + 16) + 20;
+  // Of a photon that is kept: as it was traced, its place in the map, which may have grown by doubling, and in its buckets,
+  // while it is sorted and while its like are counted.
+  constexpr double kBytes = sizeof(Photon) + 2.0 * (sizeof(PhotonArrival) + 4 * sizeof(float) + 8) + 52;
   const double most_kept = std::max(1.0, settings_.memory_mib * 1048576.0 / kBytes);
   // A path is kept at each surface that it meets, if they are all casters that show caustics: rough glass for one.
   if (photons_a_pass_ * (g.limits.total + 1.0) <= most_kept) return;
