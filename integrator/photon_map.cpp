@@ -136,11 +136,17 @@ float photon_radius_for(const std::vector<std::vector<Photon>>& chunks, double w
     std::nth_element(squared.begin(), place, squared.end());
     radii[q] = std::sqrt(*place);
   });
-  const auto median = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
-  std::nth_element(radii.begin(), median, radii.end());
+  double sum = 0;
+  int apart = 0;
+  for (const float radius : radii) {
+    if (!(radius > 0)) continue;
+    sum += std::log(static_cast<double>(radius));
+    ++apart;
+  }
+  if (apart == 0) return 0;
   // On a surface, photons within a radius grow with its square.
   const double found = nth * static_cast<double>(stride);
-  return static_cast<float>(static_cast<double>(*median) * std::sqrt(wanted / found));
+  return static_cast<float>(std::exp(sum / apart) * std::sqrt(wanted / found));
 }
 
 std::vector<float> photon_radii(const std::vector<std::vector<Photon>>& chunks,

@@ -33,8 +33,9 @@ class PhotonMap {
   float largest_radius_ = 0;
 };
 
-/// A radius within which the median photon finds `wanted` others: where light is, not where space is. Estimated from a part
-/// of them. Of fewer than twice as many photons, the radius within which they find half of all.
+/// The geometric mean of the radii within which photons find `wanted` others: where light is, not where space is. Estimated
+/// from a part of them. (The median jumps where bright and dim caustics have like shares of the photons.) Of fewer than
+/// twice as many photons, the radii within which they find half of all.
 /// @return metres; 0 where there is no distance between them
 float photon_radius_for(const std::vector<std::vector<Photon>>& chunks, double wanted);
 
@@ -42,7 +43,7 @@ float photon_radius_for(const std::vector<std::vector<Photon>>& chunks, double w
 /// are counted in cells of several sizes; the finest that has half as many as wanted around a photon says how dense they
 /// lie. The radius depends on the other photons and not on what this one carries, so the mean is not biased by it
 /// (Silverman 1986, §5.3: bandwidths of the square root of a pilot density).
-/// @param typical  of the median photon, metres: none is more than four times as wide, so that light does not creep far
+/// @param typical  as photon_radius_for, metres: none is more than four times as wide, so that light does not creep far
 /// @param shift    of the cells: others for other passes, so that no border between cells shows in the end
 std::vector<float> photon_radii(const std::vector<std::vector<Photon>>& chunks,
                                 double wanted,

@@ -31,7 +31,7 @@ struct CausticStatistics {
   std::uint64_t photons = 0;  ///< started, of all passes
   std::uint64_t stored = 0;   ///< kept
   std::uint64_t passes = 0, num_sources = 0, bytes = 0;
-  double first_radius = 0, radius = 0;  ///< the median photon's in the first and the last pass, metres
+  double first_radius = 0, radius = 0;  ///< typical, in the first and the last pass, metres
   double seconds = 0;
 };
 
