@@ -146,6 +146,9 @@ def engine_init(engine_class, engine, *arguments, **keywords):
 #: How spots fade towards their rim, as RELIEF_light calls it.
 SPOT_FALLOFF = "smooth" if IS_4_0 else "smooth-cosine"
 
+#: A spot's cone is stretched by the scale of its object.
+SPOTS_ARE_SCALED = IS_4_0
+
 #: An area light of P watts and area A has the radiance P / (this · A).
 AREA_DIVISOR = math.pi if IS_4_0 else 4.0
 

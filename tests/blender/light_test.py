@@ -2,7 +2,18 @@
 
 import math
 
-from scenes import add_camera, add_light, add_plane, add_sphere, assert_agrees, degrees, diffuse, new_scene
+import bpy
+from scenes import (
+    add_camera,
+    add_light,
+    add_plane,
+    add_sphere,
+    assert_agrees,
+    assert_warns,
+    degrees,
+    diffuse,
+    new_scene,
+)
 
 
 def _stage(scene_light):
@@ -54,6 +65,16 @@ def test_spot_that_is_all_edge():
     assert_agrees(_spot(90, 1.0), samples=64)
 
 
+def test_spot_with_uneven_scale():
+    scene = _spot(40, 0.5)
+    bpy.data.objects["light"].scale = (2, 1, 1)
+    # Cones follow the scale since 4.0.
+    if bpy.app.version >= (4, 0, 0):
+        assert_warns(scene, 'light "light"', "uneven scale of a spot")
+    else:
+        assert_agrees(scene, samples=64)
+
+
 def test_spot_with_radius():
     # As for points: a disk that faces each point is weaker by (radius / distance)², 0.5 % here.
     assert_agrees(_spot(40, 0.5, 0.25), samples=256, tolerance=0.006)
@@ -86,8 +107,6 @@ def test_elliptic_area_with_scaled_object():
 
 
 def test_a_light_that_some_rays_do_not_see_is_warned_about():
-    from scenes import assert_warns
-
     scene = _stage(lambda: setattr(add_light("POINT", energy=300), "visible_glossy", False))
     assert_warns(scene, 'light "light"', "hidden from glossy rays")
 

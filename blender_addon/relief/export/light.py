@@ -33,7 +33,7 @@ class Place:
     """Where a light stands, and what its export needs.
 
     node               glTF node without scale: its −Z is the light's direction; its children are nodes, not indices yet
-    scale              of Blender's object along X and Y: areas follow it
+    scale              of Blender's object along X, Y and Z: areas follow the first two
     visible_to_camera  whether its surface is seen
     scene_size         metres that the scene's objects extend over
     writer             GltfWriter
@@ -65,6 +65,8 @@ def export_light(light, place):
         else:
             _add_punctual(place, {"type": "point", "intensity": energy / (4 * math.pi)}, color)
     elif light.type == "SPOT":
+        if compat.SPOTS_ARE_SCALED and max(place.scale) > 1.001 * min(place.scale):
+            place.warn("the uneven scale of a spot", "its cone is round")
         _add_punctual(place, _spot(light, energy / (4 * math.pi), place), color)
     elif light.type == "SUN":
         if light.angle > 0:

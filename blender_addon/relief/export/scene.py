@@ -283,7 +283,7 @@ class SceneExporter:
             node = {"name": thing.name, "translation": t.tolist(), "rotation": r.tolist()}
             place = Place(
                 node=node,
-                scale=(abs(s[0]), abs(s[1])),
+                scale=tuple(np.abs(s).tolist()),
                 visible_to_camera=original.visible_camera,
                 scene_size=scene_size,
                 writer=self.writer,
