@@ -242,7 +242,10 @@ RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
     if (crosses && (small || 16.0 * bound < __builtin_fabs(n.gb - n.ga))) {
       CurvePoint a = n.a, b = n.b;
       double ga = n.ga, gb = n.gb;
-      // Illinois: secant steps; an end that stays twice counts half, so both ends close in.
+      // Secant steps between ends of different sign. An end that stays would keep the other from closing in, so its value is
+      // scaled down as Anderson and Björck 1973, "A new high order method of regula falsi type", do: half as many steps as
+      // by halving it (the Illinois method).
+      const double noise = 0x1p-51 * (magnitude + slope);
       int stayed = 0;
       for (int k = 0; k < 80 && b.tau - a.tau > 0x1p-51 && ga != 0.0; ++k) {
         double tau = a.tau + (b.tau - a.tau) * (ga / (ga - gb));
@@ -250,19 +253,21 @@ RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
         if (!(tau > a.tau && tau < b.tau)) break;
         const CurvePoint p = curve_point(tri, g, tau);
         const double gp = height_over(p);
-        if (__builtin_fabs(gp) <= 0x1p-51 * magnitude) {
+        if (__builtin_fabs(gp) <= noise) {
           a = p;
           break;
         }
-        if ((gp < 0.0) == (n.ga < 0.0)) {
+        const bool replaces_a = (gp < 0.0) == (n.ga < 0.0);
+        const double left = 1.0 - gp / (replaces_a ? ga : gb), factor = left > 0.0 ? left : 0.5;
+        if (replaces_a) {
           a = p;
           ga = gp;
-          if (stayed == 1) gb *= 0.5;
+          if (stayed == 1) gb *= factor;
           stayed = 1;
         } else {
           b = p;
           gb = gp;
-          if (stayed == 2) ga *= 0.5;
+          if (stayed == 2) ga *= factor;
           stayed = 2;
         }
       }

@@ -41,6 +41,14 @@ inline std::uint64_t num_test_rays(std::uint64_t usual)
   return text != nullptr ? std::strtoull(text, nullptr, 10) : usual;
 }
 
+/// Which part of a long run this is: each has rays of its own, the same whenever it is run. The environment variable
+/// RELIEF_TEST_PART, or 0.
+inline std::uint64_t test_part()
+{
+  const char* text = std::getenv("RELIEF_TEST_PART");
+  return text != nullptr ? std::strtoull(text, nullptr, 10) : 0;
+}
+
 /// How many values fall between powers of two: quantiles of very many errors in a few bytes.
 class ErrorHistogram {
  public:
@@ -576,6 +584,14 @@ inline const TraversalTable& best_table()
 {
   const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
   return has_avx2 ? traversal_table_avx2() : traversal_table_baseline();
+}
+
+/// A judge for each method, compiled for one instruction set.
+inline std::vector<Judge> judges_of_all_methods(const TraversalTable& table)
+{
+  std::vector<Judge> judges;
+  for (const TraversalMethodLabel& label : kTraversalMethods) judges.emplace_back(label.method, table);
+  return judges;
 }
 
 /// A judge for each method and each instruction set that this machine has.
