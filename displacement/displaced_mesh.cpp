@@ -251,6 +251,31 @@ double mean_texels_a_side(const MeshView& mesh, const TextureRef& mapping, int w
   return std::sqrt(twice_uv_area * texels_a_uv / mesh.num_triangles);
 }
 
+MapDensity map_density(const MeshView& mesh, const TextureRef& mapping)
+{
+  const Vec2f* uv = mesh.uv[mapping.uv_set];
+  if (uv == nullptr) return {};
+  double u_squares = 0, v_squares = 0, area = 0;
+  for (std::uint32_t i = 0; i < mesh.num_triangles; ++i) {
+    const TriangleIndices& t = mesh.triangles[i];
+    const Vec3d e1 = to_double(mesh.P[t.v1] - mesh.P[t.v0]), e2 = to_double(mesh.P[t.v2] - mesh.P[t.v0]);
+    const double twice_area = length(cross(e1, e2));
+    if (!(twice_area > 0)) continue;
+    const Vec2f a = uv[t.v1] - uv[t.v0], b = uv[t.v2] - uv[t.v0];
+    const double u1 = static_cast<double>(mapping.m00) * a.x + static_cast<double>(mapping.m01) * a.y;
+    const double v1 = static_cast<double>(mapping.m10) * a.x + static_cast<double>(mapping.m11) * a.y;
+    const double u2 = static_cast<double>(mapping.m00) * b.x + static_cast<double>(mapping.m01) * b.y;
+    const double v2 = static_cast<double>(mapping.m10) * b.x + static_cast<double>(mapping.m11) * b.y;
+    // |∇u| = |u1·e2 − u2·e1| / |e1 × e2|.
+    const double u = length(u1 * e2 - u2 * e1), v = length(v1 * e2 - v2 * e1);
+    u_squares += u * u / twice_area;
+    v_squares += v * v / twice_area;
+    area += twice_area;
+  }
+  if (!(area > 0)) return {};
+  return {std::sqrt(u_squares / area), std::sqrt(v_squares / area)};
+}
+
 Box3f displaced_triangle_bounds(const DisplacedMeshView& mesh, std::uint32_t triangle)
 {
   const DisplacedTriangle& tri = mesh.triangles[triangle];

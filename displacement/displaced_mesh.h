@@ -30,6 +30,14 @@ struct DisplacedMeshReport {
 /// @param width, height  of the map, texels
 double mean_texels_a_side(const MeshView& mesh, const TextureRef& mapping, int width, int height);
 
+/// How densely a map lies on a mesh.
+struct MapDensity {
+  double u = 0, v = 0;  ///< sides of the map a metre, along its axes: root of the mean square over the mesh's area
+};
+
+/// @return  zero for a mesh without the uv set or without area
+MapDensity map_density(const MeshView& mesh, const TextureRef& mapping);
+
 /// Box of a displaced triangle, object space, rounded outward.
 struct Box3f {
   Vec3f low, high;

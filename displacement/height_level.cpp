@@ -6,6 +6,9 @@
 
 #include <tbb/parallel_for.h>
 
+#include "displacement/height_field.h"
+#include "displacement/level_of_detail.h"
+
 namespace relief {
 
 namespace {
@@ -77,7 +80,90 @@ void average(const HeightMapView& map, int width, int height, Store store)
   });
 }
 
+/// Where the texels of one level are between those of a coarser one, along one axis.
+struct BetweenTexels {
+  int before, after;
+  float part;  ///< of the way
+};
+
+std::vector<BetweenTexels> between_texels(int fine_size, int coarse_size, Wrap wrap)
+{
+  const LatticeAxis axis{coarse_size, wrap};
+  std::vector<BetweenTexels> out;
+  for (int i = 0; i < fine_size; ++i) {
+    const double x = lattice_on_level(i, fine_size, coarse_size), low = std::floor(x);
+    const auto at = static_cast<std::int64_t>(low);
+    out.push_back({lattice_texel(axis, at), lattice_texel(axis, at + 1), static_cast<float>(x - low)});
+  }
+  return out;
+}
+
+constexpr int kParts = 8;  ///< along a side of the map
+
+/// Sums of squared differences of slopes in the parts of one band of the map.
+struct BandLoss {
+  float height = 0;
+  double squares_u[kParts] = {}, squares_v[kParts] = {};
+};
+
 }  // namespace
+
+LevelLoss level_loss(const HeightMapView& fine, const HeightMapView& coarse)
+{
+  const int width = fine.width, height = fine.height;
+  const std::vector<BetweenTexels> columns = between_texels(width, coarse.width, fine.wrap_u);
+  const std::vector<BetweenTexels> rows = between_texels(height, coarse.height, fine.wrap_v);
+  const auto make_differences = [&](int row, std::vector<float>& out) {
+    const BetweenTexels& y = rows[static_cast<std::size_t>(row)];
+    const std::int64_t before = std::int64_t{y.before} * coarse.width, after = std::int64_t{y.after} * coarse.width;
+    for (int i = 0; i < width; ++i) {
+      const BetweenTexels& x = columns[static_cast<std::size_t>(i)];
+      const auto along = [&](std::int64_t line) {
+        const float a = height_at(coarse, line + x.before), b = height_at(coarse, line + x.after);
+        return a + x.part * (b - a);
+      };
+      const float low = along(before), high = along(after);
+      out[static_cast<std::size_t>(i)] = height_at(fine, std::int64_t{row} * width + i) - (low + y.part * (high - low));
+    }
+  };
+  BandLoss bands[kParts];
+  tbb::parallel_for(0, kParts, [&](int band) {
+    BandLoss& loss = bands[band];
+    std::vector<float> last(static_cast<std::size_t>(width)), here(static_cast<std::size_t>(width));
+    const int first = height * band / kParts, end = height * (band + 1) / kParts;
+    if (first > 0 && first < end) make_differences(first - 1, last);
+    for (int row = first; row < end; ++row) {
+      make_differences(row, here);
+      for (int part = 0; part < kParts; ++part) {
+        const int begin = width * part / kParts, stop = width * (part + 1) / kParts;
+        double u = 0, v = 0;
+        for (int i = begin; i < stop; ++i) {
+          const auto k = static_cast<std::size_t>(i);
+          loss.height = std::max(loss.height, std::abs(here[k]));
+          const float du = i > 0 ? here[k] - here[k - 1] : 0.0f, dv = row > 0 ? here[k] - last[k] : 0.0f;
+          u += static_cast<double>(du * du);
+          v += static_cast<double>(dv * dv);
+        }
+        loss.squares_u[part] += u;
+        loss.squares_v[part] += v;
+      }
+      std::swap(here, last);
+    }
+  });
+  LevelLoss out;
+  for (int band = 0; band < kParts; ++band) {
+    const BandLoss& loss = bands[band];
+    out.height = std::max(out.height, static_cast<double>(loss.height));
+    for (int part = 0; part < kParts; ++part) {
+      const double texels = static_cast<double>(height * (band + 1) / kParts - height * band / kParts) *
+                            (width * (part + 1) / kParts - width * part / kParts);
+      if (!(texels > 0)) continue;
+      out.slope_u = std::max(out.slope_u, width * std::sqrt(loss.squares_u[part] / texels));
+      out.slope_v = std::max(out.slope_v, height * std::sqrt(loss.squares_v[part] / texels));
+    }
+  }
+  return out;
+}
 
 HeightLevel::HeightLevel(const HeightMapView& map, int level) : shape_(map)
 {

@@ -27,4 +27,21 @@ class HeightLevel {
   std::vector<float> floats_;
 };
 
+/// What a surface loses when it shows one level instead of a finer one.
+struct LevelLoss {
+  double height = 0;                ///< largest difference at the centres of the finer level's texels, unit of the map
+  double slope_u = 0, slope_v = 0;  ///< difference of slopes along u and v, unit of the map a side of it: root of the
+                                    ///< mean square, in that of 8 × 8 parts of the map where it is largest
+};
+
+/// By the triangle inequality no more than this is lost over both steps.
+inline LevelLoss operator+(const LevelLoss& a, const LevelLoss& b)
+{
+  return {a.height + b.height, a.slope_u + b.slope_u, a.slope_v + b.slope_v};
+}
+
+/// @param fine, coarse  levels of one map
+/// @cost  one pass over the finer level; parallel over the parts
+LevelLoss level_loss(const HeightMapView& fine, const HeightMapView& coarse);
+
 }  // namespace relief

@@ -38,6 +38,12 @@ bool is_whole(float x) { return x == std::floor(x); }
 /// prisms.
 constexpr double kLeastTexelsASide = 16;
 
+/// Levels that rays may choose by themselves lose no more of the surface's slopes than this, metres a metre, nor move a
+/// point further than this many of their texels: half a pixel, since texels are a quarter as wide as that. A picture's
+/// mean then changes by at most about an eighth of the slope's square (docs/displacement.md), 1.4 %.
+constexpr double kMostSlopeLost = 1.0 / 3;
+constexpr double kMostTexelsLost = 2;
+
 /// What `auto` means, and methods that this version lacks.
 constexpr TraversalMethod kDefaultTraversal = TraversalMethod::kChord;
 
@@ -192,8 +198,12 @@ DisplacementSet::DisplacementSet(const Scene& scene, const DisplacementOptions& 
       displaced->smooth = settings.smoothing;
       DisplacedGeometry& geometry = displaced->geometry;
       geometry.method = traversal_method(method).value_or(kDefaultTraversal);
-      const Levels levels = levels_of(scene, mesh, settings, options);
+      Levels levels = levels_of(scene, mesh, settings, options);
       std::vector<const HeightFieldView*> coarser;
+      if (levels.by_cone) {
+        levels.count = num_faithful_levels(scene, mesh, settings.height, scale, levels.count);
+        levels.by_cone = levels.count > 1;
+      }
       for (int k = 0; k < levels.count; ++k) {
         geometry.levels[k] = level(scene, settings.height.texture_index, levels.first + k, geometry.method);
         if (k > 0) coarser.push_back(geometry.levels[k].field);
@@ -238,6 +248,31 @@ std::unique_ptr<Tessellation> DisplacementSet::tessellate(const DisplacedGeometr
   TessellationLayout& chosen = choice.kind == TessellationKind::kTriangles ? triangles : grids;
   *used_bytes += tessellation_peak_bytes(chosen, kRenderTessellation);
   return std::make_unique<Tessellation>(geometry.mesh, std::move(chosen));
+}
+
+int DisplacementSet::num_faithful_levels(const Scene& scene,
+                                         const Mesh& mesh,
+                                         const TextureRef& mapping,
+                                         double scale,
+                                         int most)
+{
+  const MapDensity density = map_density(mesh.view(), mapping);
+  const HeightMapView map = scene.height_maps[static_cast<std::size_t>(mapping.texture_index)].view();
+  const double texel = 1 / std::sqrt(std::max(density.u * map.width * density.v * map.height, 1e-300));
+  LevelLoss lost;
+  for (int k = 1; k < most; ++k) {
+    const bool is_new = !fields_.contains({mapping.texture_index, k});
+    const HeightMapView fine = k > 1 ? field(scene, mapping.texture_index, k - 1).level.view() : map;
+    Field& coarse = field(scene, mapping.texture_index, k);
+    if (!coarse.loss) coarse.loss = level_loss(fine, coarse.level.view());
+    lost = lost + *coarse.loss;
+    const double slope = std::abs(scale) * (lost.slope_u * density.u + lost.slope_v * density.v);
+    const double texels = std::abs(scale) * lost.height / (texel * (1 << k));
+    if (slope <= kMostSlopeLost && texels <= kMostTexelsLost) continue;
+    if (is_new) fields_.erase({mapping.texture_index, k});
+    return k;
+  }
+  return most;
 }
 
 DisplacementSet::Field& DisplacementSet::field(const Scene& scene, int map_index, int level)

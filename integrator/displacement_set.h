@@ -100,6 +100,10 @@ class DisplacementSet {
                           const Mesh& mesh,
                           const DisplacementSettings& settings,
                           const DisplacementOptions& options);
+  /// How many levels of a map, the finest first, look like the map on a mesh: what they lose of its slopes and heights is
+  /// little.
+  /// @param scale  metres of object space
+  int num_faithful_levels(const Scene& scene, const Mesh& mesh, const TextureRef& mapping, double scale, int most);
   /// A tessellation's layout where the method, or `auto`, wants one.
   /// @param used_bytes  by all tessellations so far; grows
   std::unique_ptr<Tessellation> tessellate(const DisplacedGeometry& geometry,
@@ -116,6 +120,7 @@ class DisplacementSet {
   struct Field {
     HeightLevel level;  ///< empty at level 0, which is the map itself
     HeightField bounds;
+    std::optional<LevelLoss> loss;         ///< against the level before; where it was asked for
     std::unique_ptr<Rmip> rmip;            ///< where a method asks for it
     std::unique_ptr<MinmaxMipmap> mipmap;  ///< likewise
   };

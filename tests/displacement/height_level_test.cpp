@@ -108,6 +108,88 @@ TEST(HeightLevel, OfAConstantMapIsTheMap)
   }
 }
 
+/// Height of a map between texel centres, by its definition.
+double brute_force_height(const HeightMapView& map, double x, double y)
+{
+  const auto wrapped = [](std::int64_t i, int size, Wrap wrap) {
+    if (wrap == Wrap::kClamp) return std::clamp<std::int64_t>(i, 0, size - 1);
+    const std::int64_t period = wrap == Wrap::kRepeat ? size : 2 * size, k = ((i % period) + period) % period;
+    return k < size ? k : 2 * size - 1 - k;
+  };
+  double sum = 0;
+  for (int dy = 0; dy < 2; ++dy) {
+    for (int dx = 0; dx < 2; ++dx) {
+      const auto i = static_cast<std::int64_t>(std::floor(x)) + dx, j = static_cast<std::int64_t>(std::floor(y)) + dy;
+      const double weight = (1 - std::abs(x - static_cast<double>(i))) * (1 - std::abs(y - static_cast<double>(j)));
+      sum += weight * static_cast<double>(height_at(
+                          map, wrapped(j, map.height, map.wrap_v) * map.width + wrapped(i, map.width, map.wrap_u)));
+    }
+  }
+  return sum;
+}
+
+TEST(LevelLoss, IsThatOfEveryTexel)
+{
+  for (const Wrap wrap : {Wrap::kRepeat, Wrap::kMirror, Wrap::kClamp}) {
+    for (const auto& [w, h] : {std::pair{16, 16}, {64, 32}, {37, 51}, {9, 1}, {1, 1}}) {
+      const RandomMap map(w, h, HeightFormat::kU16, wrap);
+      const HeightLevel level(map.view, 1);
+      const HeightMapView coarse = level.view();
+      const auto difference = [&](int i, int j) {
+        const double x = (i + .5) * coarse.width / w - .5, y = (j + .5) * coarse.height / h - .5;
+        return static_cast<double>(height_at(map.view, std::int64_t{j} * w + i)) - brute_force_height(coarse, x, y);
+      };
+      double height = 0, slope_u = 0, slope_v = 0;
+      for (int part_y = 0; part_y < 8; ++part_y) {
+        for (int part_x = 0; part_x < 8; ++part_x) {
+          double u = 0, v = 0;
+          int count = 0;
+          for (int j = h * part_y / 8; j < h * (part_y + 1) / 8; ++j) {
+            for (int i = w * part_x / 8; i < w * (part_x + 1) / 8; ++i) {
+              ++count;
+              height = std::max(height, std::abs(difference(i, j)));
+              if (i > 0) u += std::pow(w * (difference(i, j) - difference(i - 1, j)), 2);
+              if (j > 0) v += std::pow(h * (difference(i, j) - difference(i, j - 1)), 2);
+            }
+          }
+          if (count == 0) continue;
+          slope_u = std::max(slope_u, std::sqrt(u / count));
+          slope_v = std::max(slope_v, std::sqrt(v / count));
+        }
+      }
+      const LevelLoss loss = level_loss(map.view, coarse);
+      EXPECT_NEAR(loss.height, height, 1e-6) << w << "x" << h;
+      EXPECT_NEAR(loss.slope_u, slope_u, 1e-4 * (1 + slope_u)) << w << "x" << h;
+      EXPECT_NEAR(loss.slope_v, slope_v, 1e-4 * (1 + slope_v)) << w << "x" << h;
+    }
+  }
+}
+
+TEST(MapDensity, IsTheMeanOfTheGradientsOfUv)
+{
+  // A rectangle of 2 × 3 metres over 4 × 6 sides of the map turned by 90°, and one of 1 × 1 under 5 × 5; the first has six
+  // times the area.
+  const Vec3f P[8] = {{0, 0, 0}, {2, 0, 0}, {2, 3, 0}, {0, 3, 0}, {5, 0, 1}, {6, 0, 1}, {6, 1, 1}, {5, 1, 1}};
+  const Vec2f uv[8] = {{0, 0}, {0, 4}, {6, 4}, {6, 0}, {0, 0}, {5, 0}, {5, 5}, {0, 5}};
+  const TriangleIndices triangles[4] = {{0, 1, 2}, {0, 2, 3}, {4, 5, 6}, {4, 6, 7}};
+  MeshView mesh;
+  mesh.P = P;
+  mesh.uv[0] = uv;
+  mesh.triangles = triangles;
+  mesh.num_vertices = 8;
+  mesh.num_triangles = 4;
+  const double expected = std::sqrt((6 * 2. * 2 + 1 * 5. * 5) / 7);
+  const MapDensity density = map_density(mesh, {});
+  EXPECT_NEAR(density.u, expected, 1e-6);
+  EXPECT_NEAR(density.v, expected, 1e-6);
+  // The texture's transform counts: u twice as dense, v not at all.
+  TextureRef mapping;
+  mapping.m00 = 2;
+  mapping.m11 = 0;
+  EXPECT_NEAR(map_density(mesh, mapping).u, 2 * expected, 1e-6);
+  EXPECT_EQ(map_density(mesh, mapping).v, 0);
+}
+
 /// One triangle under a map, with normals that lean apart.
 struct OneTriangle {
   explicit OneTriangle(const HeightMapView& map) : field(map)
