@@ -59,6 +59,30 @@ TEST(LevelOfDetail, OfShadowRaysIsThatOfTheSurfaceTheyLeave)
   EXPECT_NE(unshaded.mean(), render_scene(scene, finest).mean());
 }
 
+TEST(LevelOfDetail, OfAHitIsWhatLeavingRaysStartWith)
+{
+  const Scene scene = noisy_plane(0.003f);
+  DisplacementSet displacements(scene, {});
+  const int num_levels = displacements.geometry(0).lod.num_levels;
+  ASSERT_GT(num_levels, 1);
+  const float texel = displacements.texels()[0];
+  for (int level = 0; level < num_levels; ++level) {
+    const DisplacedPoint point = displacements.point(0, 0, 0.2f, 0.3f, static_cast<float>(level));
+    EXPECT_EQ(point.width, lod_width_of_level(texel, level));
+  }
+}
+
+TEST(LevelOfDetail, IsTheFinestWhereSlopesAreThePicture)
+{
+  EXPECT_FALSE(DisplacementSet(noisy_plane(0.03f), {}).has_levels());
+  // Half a pixel: a few spikes have little slope on the mean.
+  Scene spikes = noisy_plane(0.1f);
+  auto texels = std::make_shared<std::vector<std::uint16_t>>(512 * 512);
+  for (std::size_t k = 0; k < texels->size(); k += 32'000) (*texels)[k] = 65535;
+  spikes.height_maps[0].texels = std::shared_ptr<const void>(texels, texels->data());
+  EXPECT_FALSE(DisplacementSet(spikes, {}).has_levels());
+}
+
 TEST(LevelOfDetail, ChangesThePictureByNoMoreThanItsTolerance)
 {
   // From slopes that all levels may lose to some that none may, with bounces and a low sun, whose shadows they change.
