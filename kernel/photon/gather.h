@@ -6,10 +6,11 @@
 
 namespace relief {
 
-/// Irradiance that photons bring, and one direction it comes from, chosen among theirs in proportion to power.
-/// E[irradiance · f(wi)] is the sum over all photons, so one evaluation of a BSDF does for all of them.
+/// Irradiance that photons bring, and one direction it comes from, chosen among theirs in proportion to power and to what
+/// a narrow lobe makes of it, if there is one. E[irradiance · f(wi)] is the sum over all photons, so one evaluation of a BSDF
+/// does for all of them.
 struct PhotonGather {
-  Vec3f irradiance{};  ///< W/m² on the surface
+  Vec3f irradiance{};  ///< W/m² on the surface, as if all photons were as likely as the one chosen
   Vec3f wi{};          ///< unit, towards the light
 };
 
@@ -19,7 +20,21 @@ struct PhotonQuery {
   bool both_sides = false;    ///< light from below passes through to wo
   std::uint32_t bounces = 0;  ///< packed as the path state's: what a photon's may not exceed
   std::uint32_t hash = 0;     ///< chooses
+  Vec3f wo{};                 ///< unit, see alpha
+  float alpha = 0;            ///< > 0: what a lobe of about this width of microfacets reflects to wo is wanted
 };
+
+/// What a photon's direction is worth to a query, up to a factor: Trowbridge and Reitz's distribution of microfacets without
+/// the terms that vary slowly.
+/// @param wi  unit
+RELIEF_KERNEL float photon_lobe(const PhotonQuery& query, Vec3f wi)
+{
+  if (!(query.alpha > 0.0f)) return 1.0f;
+  const Vec3f h = wi + query.wo;
+  const float squared = length_squared(h);
+  const float sine_squared = squared > 0.0f ? max(0.0f, 1.0f - sqr(dot(h, query.Ng)) / squared) : 1.0f;
+  return sqr(sqr(query.alpha) / (sqr(query.alpha) + sine_squared));
+}
 
 /// Whether none of the four counts of `a` exceeds that of `b`.
 RELIEF_KERNEL bool photon_bounces_allowed(std::uint32_t a, std::uint32_t b)
@@ -90,8 +105,10 @@ RELIEF_KERNEL PhotonGather photon_gather(const PhotonMapView& map, const PhotonQ
               constexpr float kThickness = 0.5f;
               if (__builtin_fabsf(dot(octahedral_decode(photon.Ng), query.Ng)) < kLeastCosine) continue;
               if (sqr(dot(offset, query.Ng)) * inverse_squared > sqr(kThickness)) continue;
-              if (!query.both_sides && dot(octahedral_decode(photon.wi), query.Ng) <= 0.0f) continue;
-              const float weight = (1.0f - squared[k]) * inverse_squared * max_component(photon.power);
+              const Vec3f wi = octahedral_decode(photon.wi);
+              if (!query.both_sides && dot(wi, query.Ng) <= 0.0f) continue;
+              const float weight =
+                  (1.0f - squared[k]) * inverse_squared * max_component(photon.power) * photon_lobe(query, wi);
               if (!(weight > 0.0f)) continue;
               sum += weight;
               // xorshift32 (Marsaglia 2003): which photon stands for all needs no stratification.
@@ -107,7 +124,8 @@ RELIEF_KERNEL PhotonGather photon_gather(const PhotonMapView& map, const PhotonQ
   }
   if (chosen == nullptr) return gather;
   gather.wi = octahedral_decode(chosen->wi);
-  gather.irradiance = chosen->power * (sum / max_component(chosen->power) * (2.0f * kInvPi));
+  gather.irradiance =
+      chosen->power * (sum / (max_component(chosen->power) * photon_lobe(query, gather.wi)) * (2.0f * kInvPi));
   return gather;
 }
 

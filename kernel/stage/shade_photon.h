@@ -1,5 +1,6 @@
-// Stage: a photon met a surface. It is kept where soft lobes can show it, and goes on by sharp lobes of casters. By soft
-// lobes it goes on from where it was kept, if a caster is next: a bright caustic is a lamp to the glass above it.
+// Stage: a photon met a surface. It is kept where soft lobes can show it, or rough glass from inside, and goes on by sharp
+// lobes of casters. By soft lobes it goes on from where they show it, if a caster is next: a bright caustic is a lamp to the
+// glass above it.
 #pragma once
 
 #include "kernel/bsdf/lobe_split.h"
@@ -18,7 +19,7 @@ RELIEF_KERNEL int photon_surface(const PathStateView& state, std::uint32_t path)
 }
 
 /// Scatters a photon.
-/// @param kept  the map has it: soft lobes scatter as well
+/// @param soft  the map has it, for soft lobes to show: they scatter as well
 /// @return false: its path ends
 RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
                                         const PathStateView& state,
@@ -26,13 +27,13 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
                                         const SurfaceInteraction& at,
                                         Vec3f wo,
                                         Vec3f throughput,
-                                        bool kept)
+                                        bool soft)
 {
   const ShadingSide& side = at.side;
   const Vec3f wo_local = to_local(side.frame, wo);
   const bool caster = (at.instance->flags & kCausticCaster) != 0;
   SurfaceClosure closure = surface_closure_make<kFeatureAll>(at.params, *g.bsdf_tables, wo_local);
-  if (!kept) closure = closure_sharp(closure, {true, true});
+  if (!soft) closure = closure_sharp(closure, {true, true});
   const int surface = photon_surface(state, path);
   const std::uint32_t hash = state.pixel_hash[path];
   const std::uint32_t sample = state.sample_index[path];
@@ -105,15 +106,16 @@ RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
   if (is_zero(throughput)) return;
   surface_interaction_frame<kFeatureAll>(g, state, path, wo, at);
   const bool caster = (flags & kCausticCaster) != 0;
-  const bool kept = has_scattered && (state.flags[path] & kPathAfterSoft) == 0 && (flags & kGathersPhotons) != 0;
-  if (kept) {
+  const bool arrived = has_scattered && (state.flags[path] & kPathAfterSoft) == 0;
+  const bool soft = arrived && (flags & kGathersPhotons) != 0;
+  if (soft || (arrived && (flags & kGathersInside) != 0 && !at.side.front)) {
     // Along the ray, as gather_photons: on a triangle that is large against the caustic, at.hit is less exact.
     const Vec3f P = path_origin(state, path) - wo * state.hit_t[path];
     photons.photons[photons.size++] = {
         P, {throughput, octahedral_encode(wo), octahedral_encode(at.side.Ng), state.bounces[path] - 1u}};
   }
-  if (!caster && !kept) return;
-  if (shade_photon_scatter(g, state, path, at, wo, throughput, kept)) queue_push(next, path);
+  if (!caster && !soft) return;
+  if (shade_photon_scatter(g, state, path, at, wo, throughput, soft)) queue_push(next, path);
 }
 
 }  // namespace relief

@@ -89,21 +89,41 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   shadow.scatterings[ray] = static_cast<std::uint32_t>(bounce + 1);
 }
 
+/// Which lobes are sharp for this path, between wo and a direction. What cannot be gone back stays sharp: photons end there.
+/// @param wo, wi    in the closure's frame
+/// @param wi_world  the same as wi
+RELIEF_KERNEL SharpLobes path_sharp_lobes(const KernelGlobals& g,
+                                          std::uint32_t flags,
+                                          const SurfaceInteraction& at,
+                                          Vec3f wo,
+                                          Vec3f wi,
+                                          Vec3f wi_world)
+{
+  SharpLobes sharp = sharp_lobes(at.params, (at.instance->flags & kCausticCaster) != 0, g.caustics.roughness);
+  if (wo.z * wi.z > 0.0f && path_gathers_inside(flags, *at.instance, at.side.front) &&
+      shading_is_reversible(at.side, wi_world)) {
+    sharp.base = false;
+  }
+  return sharp;
+}
+
 /// Adds what the photons around the hit bring to it.
+/// @param wo  in the closure's frame
 template <unsigned kFeatures>
 RELIEF_KERNEL void shade_surface_photons(const KernelGlobals& g,
                                          const PathStateView& state,
                                          std::uint32_t path,
                                          const SurfaceInteraction& at,
-                                         const SurfaceClosure& closure)
+                                         const SurfaceClosure& closure,
+                                         Vec3f wo)
 {
   const CausticStateView& caustic = state.caustic;
   const Vec3f irradiance{caustic.irradiance_r[path], caustic.irradiance_g[path], caustic.irradiance_b[path]};
   if (is_zero(irradiance)) return;
-  const SharpLobes sharp = sharp_lobes(at.params, (at.instance->flags & kCausticCaster) != 0, g.caustics.roughness);
   const Vec3f wi = octahedral_decode(caustic.wi[path]);
-  const BsdfEval bsdf =
-      closure_eval<kFeatures>(closure_soft(closure, sharp), *g.bsdf_tables, to_local(at.side.frame, wi));
+  const Vec3f wi_local = to_local(at.side.frame, wi);
+  const SharpLobes sharp = path_sharp_lobes(g, state.flags[path], at, wo, wi_local, wi);
+  const BsdfEval bsdf = closure_eval<kFeatures>(closure_soft(closure, sharp), *g.bsdf_tables, wi_local);
   // Photons count light by the area of the true surface, the BSDF by that of the shaded one. The bound keeps single
   // photons that graze the former from shining where the latter faces them.
   constexpr float kLeastCosine = 0.01f;
@@ -198,7 +218,9 @@ template <unsigned kFeatures>
     shade_surface_light<kFeatures>(g, state, path, at, closure, light_N, cone, shadow);
   }
 
-  if constexpr ((kFeatures & kFeatureCaustics) != 0) shade_surface_photons<kFeatures>(g, state, path, at, closure);
+  if constexpr ((kFeatures & kFeatureCaustics) != 0) {
+    shade_surface_photons<kFeatures>(g, state, path, at, closure, wo_local);
+  }
 
   BsdfSample bsdf = closure_sample<kFeatures>(
       closure, *g.bsdf_tables, sample_1d(hash, sample, dimension_bounce(surface, BounceDimension::kBsdfLobe)),
@@ -206,7 +228,7 @@ template <unsigned kFeatures>
   if (!(bsdf.pdf > 0.0f)) return;
   const Vec3f wi = from_local(side.frame, bsdf.wi);
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
-    const SharpLobes sharp = sharp_lobes(params, (instance.flags & kCausticCaster) != 0, g.caustics.roughness);
+    const SharpLobes sharp = path_sharp_lobes(g, state.flags[path], at, wo_local, bsdf.wi, wi);
     const float u = sample_1d(hash, sample, dimension_sharpness(surface));
     const bool is_sharp = closure_split<kFeatures>(closure, *g.bsdf_tables, sharp, u, bsdf);
     const bool is_paths = is_sharp && !shading_is_reversible(side, wi);

@@ -123,6 +123,16 @@ TEST(CausticSplit, PhotonsCountForTheCasterTheyWereAimedAt)
   EXPECT_NEAR(mirrored_over_closed_form(scene, {0, 1, 0}), 1.0, 0.04);
 }
 
+TEST(CausticSplit, WhatCannotBeGoneBackInsideGlassIsLeftToPaths)
+{
+  // A coarse ball of rough glass, shaded smooth, that shows a lamp behind the camera.
+  Scene scene = empty_scene();
+  add_caster(scene, sphere_mesh(0.4f, 8, 4, true), glass_material(0.4f));
+  scene.lights.push_back(square_light({0.6f, 1.5f, 0}, leaning(-0.4f, -1, 0), 0.4f, 10));
+  look_down(scene, {0, 0, 0}, 0.4f, 1.5f);
+  expect_same(scene, 256, 32, 0.005, "coarse ball of rough glass");
+}
+
 TEST(CausticSplit, WhatCannotBeGoneBackIsLeftToPaths)
 {
   // A coarse sphere of mirror, shaded smooth, and the floor below it, seen from underneath. Near the sphere's edges paths
@@ -146,6 +156,57 @@ TEST(CausticSplit, WhatCannotBeGoneBackIsLeftToPaths)
     EXPECT_NEAR(on.mean, off.mean, 4 * error);
     EXPECT_LT(error, 0.02 * off.mean);
   }
+}
+
+/// A slab of rough glass, seen from above beside a lamp: nearly half of the light has been in the glass and was reflected by
+/// its far side.
+/// @param place  of both faces
+Scene rough_slab(float roughness, const Affine3& place = {})
+{
+  Scene scene = empty_scene();
+  add_caster(scene, quad_mesh({-2, 0.2f, 2}, {4, 0, 0}, {0, 0, -4}), glass_material(roughness), place);
+  add_caster(scene, quad_mesh({-2, 0, -2}, {4, 0, 0}, {0, 0, 4}), glass_material(roughness), place);
+  scene.lights.push_back(square_light({0.5f, 1.2f, 0}, leaning(-0.1f, -1, 0), 0.6f, 2));
+  look_down(scene, {0.25f, 0.2f, 0}, 0.3f, 1);
+  return scene;
+}
+
+TEST(CausticSplit, InsidesOfRoughGlassShowPhotons)
+{
+  for (const float roughness : {0.3f, 0.45f}) expect_same(rough_slab(roughness), 128, 16, 0.005, "slab");
+  Affine3 mirrored;
+  mirrored.x = {-1, 0, 0};
+  expect_same(rough_slab(0.45f, mirrored), 128, 16, 0.005, "mirrored slab");
+}
+
+TEST(CausticSplit, InsidesOfRoughGlassKeepTheLimitsOfBounces)
+{
+  // In, reflected, out. Without reflections, the near side's is all there is. What microfacets reflect more than once counts
+  // as diffuse.
+  Scene scene = rough_slab(0.45f);
+  scene.render.max_bounces = 2;
+  scene.render.transmission_bounces = 1;
+  double light[2] = {};
+  for (const int reflections : {1, 0}) {
+    scene.render.glossy_bounces = scene.render.diffuse_bounces = reflections;
+    expect_same(scene, 128, 16, 0.005, "slab and few bounces");
+    light[reflections] = mean_of(render_scene(scene, caustic_options(scene, CausticsMode::kOn, 32, 16)), Aov::kCaustic);
+  }
+  EXPECT_GT(light[1], 0);
+  EXPECT_EQ(light[0], 0);
+}
+
+TEST(CausticSplit, PathsFromAFloorInGlassDoNotLookInside)
+{
+  // The floor lies in the glass and is lit through its rough surface; half of what it throws back that surface reflects. So
+  // photons go on from the floor to the floor, and paths that come from it have been given their light.
+  Scene scene = empty_scene();
+  add_floor(scene, 3);
+  scene.materials.front() = diffuse_material(splat3(0.9f));
+  add_caster(scene, quad_mesh({-2, 0.6f, 2}, {4, 0, 0}, {0, 0, -4}), glass_material(0.4f));
+  scene.lights.push_back(square_light({0.3f, 1.5f, 0}, {0, -1, 0}, 0.4f, 10));
+  look_down(scene, {0, 0, 0}, 0.25f, 0.5f);
+  expect_same(scene, 128, 16, 0.005, "floor in rough glass");
 }
 
 TEST(CausticSplit, RouletteTakesWhatTheSurfaceTakes)

@@ -174,6 +174,49 @@ TEST(PhotonMap, SearchesAgreeWithBruteForce)
   }
 }
 
+TEST(PhotonMap, LobesChooseWhomTheyWantAndChangeNoSum)
+{
+  // What a lobe of microfacets 0.1 wide reflects of photons that come from everywhere: the mean over many choices is the sum
+  // over all photons, with and without a word on the lobe, which says whom to choose.
+  const std::vector<std::vector<Photon>> chunks = random_photons(3000);
+  PhotonMap map;
+  map.build(chunks, std::vector<float>(3000, 2.0f));
+  PhotonQuery query;
+  query.Ng = {0, 1, 0};
+  query.bounces = 5;
+  query.wo = normalize(Vec3f{0.3f, 1, 0.1f});
+  const auto lobe = [&](Vec3f wi) {
+    const Vec3f h = normalize(wi + query.wo);
+    const double tangent_squared = 1 / (static_cast<double>(h.y) * static_cast<double>(h.y)) - 1;
+    return 1 / std::pow(0.01 + tangent_squared, 2);
+  };
+  double expected = 0;
+  for (const auto& chunk : chunks) {
+    for (const Photon& photon : chunk) {
+      const double q = static_cast<double>(length_squared(photon.P)) / 4;
+      const Vec3f wi = octahedral_decode(photon.arrival.wi);
+      if (q >= 1 || photon.arrival.bounces > 5 || octahedral_decode(photon.arrival.Ng).y < 0.5f || wi.y <= 0) continue;
+      expected += static_cast<double>(photon.arrival.power.x) * 2 * (1 - q) / (3.14159265358979 * 4) * lobe(wi);
+    }
+  }
+  double variance[2] = {};
+  for (const bool told : {false, true}) {
+    query.alpha = told ? 0.15f : 0.0f;
+    constexpr int kChoices = 20000;
+    double sum = 0, squares = 0;
+    for (std::uint32_t i = 0; i < kChoices; ++i) {
+      query.hash = i * 2654435761u;
+      const PhotonGather gather = photon_gather(map.view(), query);
+      const double reflected = static_cast<double>(gather.irradiance.x) * lobe(gather.wi);
+      sum += reflected / kChoices;
+      squares += reflected * reflected / kChoices;
+    }
+    variance[told] = squares - sum * sum;
+    EXPECT_NEAR(sum, expected, 4 * std::sqrt(variance[told] / kChoices)) << told;
+  }
+  EXPECT_LT(variance[1], variance[0] / 10);
+}
+
 TEST(PhotonMap, SearchesStayWithinTheirCellsWhereCoordinatesHardlyResolveTheRadius)
 {
   // A kilometre from the origin floats are 61 µm apart: a search of half that and more reaches over up to three cells by
