@@ -27,7 +27,7 @@ constexpr float kWidestLodSpread = 1.0f / 16;
 struct PathLod {
   float dither, factor;
 
-  PathLod(const PathStateView& state, std::uint32_t path)
+  PathLod(const PathState& state, std::uint32_t path)
       : dither(sample_1d(state.pixel_hash[path], state.sample_index[path], kLodDimension)),
         factor(kTexelsPerCone * __builtin_exp2f(dither))
   {
@@ -41,7 +41,7 @@ struct PathLod {
 /// Puts a path into the queue of the stage that its hit asks for; displaced hits get their position and normal.
 void classify(const KernelGlobals& g,
               const Accel& accel,
-              const PathStateView& state,
+              PathState& state,
               std::uint32_t path,
               unsigned object,
               float Ng_x,
@@ -80,14 +80,14 @@ void classify(const KernelGlobals& g,
   queue_push(surfaces[surface_kernel[instance.material_index]], path);
 }
 
-std::uint32_t mask_of(const PathStateView& state, std::uint32_t path)
+std::uint32_t mask_of(const PathState& state, std::uint32_t path)
 {
   return state.bounces[path] == 0 ? kRayCamera : kRayBounce;
 }
 
 void intersect_packet(const KernelGlobals& g,
                       const Accel& accel,
-                      const PathStateView& state,
+                      PathState& state,
                       const std::uint32_t* paths,
                       EmbreeContext& context,
                       const std::uint8_t* surface_kernel,
@@ -151,7 +151,7 @@ struct ShadowContext {
 
 void intersect_closest(const KernelGlobals& g,
                        const Accel& accel,
-                       const PathStateView& state,
+                       PathState& state,
                        const QueueView& queue,
                        bool coherent,
                        const std::uint8_t* surface_kernel,
@@ -212,8 +212,8 @@ void intersect_closest(const KernelGlobals& g,
 
 void intersect_shadow(const KernelGlobals& g,
                       const Accel& accel,
-                      const PathStateView& state,
-                      const ShadowQueueView& shadow,
+                      const PathState& state,
+                      const ShadowQueue& shadow,
                       float* visibility,
                       DisplacementWork& displacement)
 {

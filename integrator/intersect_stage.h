@@ -23,7 +23,7 @@ struct DisplacementWork {
 /// @param displacement     what these rays did is added to it
 void intersect_closest(const KernelGlobals& g,
                        const Accel& accel,
-                       const PathStateView& state,
+                       PathState& state,
                        const QueueView& queue,
                        bool coherent,
                        const std::uint8_t* surface_kernel,
@@ -37,8 +37,8 @@ void intersect_closest(const KernelGlobals& g,
 /// @param displacement  what these rays did is added to it
 void intersect_shadow(const KernelGlobals& g,
                       const Accel& accel,
-                      const PathStateView& state,
-                      const ShadowQueueView& shadow,
+                      const PathState& state,
+                      const ShadowQueue& shadow,
                       float* visibility,
                       DisplacementWork& displacement);
 

@@ -32,7 +32,7 @@ void batch_pixel(const Batch& batch, std::uint32_t index, int* x, int* y)
   *y = batch.y0 + static_cast<int>(block / blocks_a_row * 2 + index / 4 % 2);
 }
 
-void generate(const KernelGlobals& g, const PathStateView& state, const Batch& batch)
+void generate(const KernelGlobals& g, PathState& state, const Batch& batch)
 {
   const auto num_pixels = static_cast<std::uint32_t>(batch.width * batch.height);
   std::uint32_t path = 0;
@@ -48,10 +48,10 @@ void generate(const KernelGlobals& g, const PathStateView& state, const Batch& b
 
 template <unsigned kFeatures>
 void shade_surfaces(const KernelGlobals& g,
-                    const PathStateView& state,
+                    PathState& state,
                     const QueueView& queue,
                     QueueView& next,
-                    ShadowQueueView& shadow,
+                    ShadowQueue& shadow,
                     Counters& counters)
 {
   for (std::uint32_t i = 0; i < queue.size; ++i) {
@@ -59,12 +59,12 @@ void shade_surfaces(const KernelGlobals& g,
   }
 }
 
-void shade_backgrounds(const KernelGlobals& g, const PathStateView& state, const QueueView& queue, Counters& counters)
+void shade_backgrounds(const KernelGlobals& g, PathState& state, const QueueView& queue, Counters& counters)
 {
   for (std::uint32_t i = 0; i < queue.size; ++i) shade_background(g, state, queue.paths[i], counters);
 }
 
-void shade_lights(const KernelGlobals& g, const PathStateView& state, const QueueView& queue, QueueView& next)
+void shade_lights(const KernelGlobals& g, PathState& state, const QueueView& queue, QueueView& next)
 {
   for (std::uint32_t i = 0; i < queue.size; ++i) {
     shade_light(g, state, queue.paths[i]);
@@ -72,24 +72,21 @@ void shade_lights(const KernelGlobals& g, const PathStateView& state, const Queu
   }
 }
 
-void accumulate_shadows(const KernelGlobals& g,
-                        const PathStateView& state,
-                        const ShadowQueueView& shadow,
-                        const float* visibility)
+void accumulate_shadows(const KernelGlobals& g, PathState& state, const ShadowQueue& shadow, const float* visibility)
 {
   for (std::uint32_t i = 0; i < shadow.size; ++i) {
     if (visibility[i] > 0.0f) accumulate_shadow(g, state, shadow, i, visibility[i]);
   }
 }
 
-void gather(const KernelGlobals& g, const PathStateView& state, const QueueView& queue)
+void gather(const KernelGlobals& g, PathState& state, const QueueView& queue)
 {
   for (std::uint32_t i = 0; i < queue.size; ++i) gather_photons(g, state, queue.paths[i]);
 }
 
 void emit(const KernelGlobals& g,
           const PhotonSourcesView& sources,
-          const PathStateView& state,
+          PathState& state,
           std::uint64_t first,
           std::uint32_t count,
           QueueView& next)
@@ -101,7 +98,7 @@ void emit(const KernelGlobals& g,
 
 void shade_photons(const KernelGlobals& g,
                    const PhotonSourcesView& sources,
-                   const PathStateView& state,
+                   PathState& state,
                    const QueueView& queue,
                    QueueView& next,
                    PhotonQueueView& photons)
@@ -110,7 +107,7 @@ void shade_photons(const KernelGlobals& g,
 }
 
 void finish(const KernelGlobals& g,
-            const PathStateView& state,
+            const PathState& state,
             const Batch& batch,
             Counters& counters,
             std::uint64_t& first_nonfinite)

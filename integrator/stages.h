@@ -26,38 +26,35 @@ struct Batch {
 
 struct StageTable {
   const char* isa;
-  void (*generate)(const KernelGlobals&, const PathStateView&, const Batch&);
+  void (*generate)(const KernelGlobals&, PathState&, const Batch&);
   void (*shade_surface[kNumSurfaceKernels])(const KernelGlobals&,
-                                            const PathStateView&,
+                                            PathState&,
                                             const QueueView& queue,
                                             QueueView& next,
-                                            ShadowQueueView& shadow,
+                                            ShadowQueue& shadow,
                                             Counters&);
-  void (*shade_background)(const KernelGlobals&, const PathStateView&, const QueueView& queue, Counters&);
-  void (*shade_light)(const KernelGlobals&, const PathStateView&, const QueueView& queue, QueueView& next);
+  void (*shade_background)(const KernelGlobals&, PathState&, const QueueView& queue, Counters&);
+  void (*shade_light)(const KernelGlobals&, PathState&, const QueueView& queue, QueueView& next);
   /// @param visibility  one entry a shadow ray, 0 … 1
-  void (*accumulate_shadow)(const KernelGlobals&,
-                            const PathStateView&,
-                            const ShadowQueueView& shadow,
-                            const float* visibility);
+  void (*accumulate_shadow)(const KernelGlobals&, PathState&, const ShadowQueue& shadow, const float* visibility);
   /// Writes the photons that the paths' hits have around them to the caustic columns.
-  void (*gather_photons)(const KernelGlobals&, const PathStateView&, const QueueView& queue);
+  void (*gather_photons)(const KernelGlobals&, PathState&, const QueueView& queue);
   /// Starts photons `first` … `first + count − 1`; those that carry light are queued, as paths from 0 on.
   void (*emit_photons)(const KernelGlobals&,
                        const PhotonSourcesView&,
-                       const PathStateView&,
+                       PathState&,
                        std::uint64_t first,
                        std::uint32_t count,
                        QueueView& next);
   void (*shade_photons)(const KernelGlobals&,
                         const PhotonSourcesView&,
-                        const PathStateView&,
+                        PathState&,
                         const QueueView& queue,
                         QueueView& next,
                         PhotonQueueView& photons);
   /// Adds the batch's finished samples to the film, in path order.
   /// @param first_nonfinite  pixel << 32 | sample, lowered to the least of the samples that were dropped
-  void (*finish)(const KernelGlobals&, const PathStateView&, const Batch&, Counters&, std::uint64_t& first_nonfinite);
+  void (*finish)(const KernelGlobals&, const PathState&, const Batch&, Counters&, std::uint64_t& first_nonfinite);
 };
 
 const StageTable& stage_table_baseline();

@@ -2,68 +2,33 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdlib>
-#include <new>
+#include <iterator>
 #include <utility>
 
 namespace relief {
 
 namespace {
 
-constexpr std::size_t kAlignment = 64;
-
-constexpr std::size_t aligned(std::size_t bytes) { return (bytes + kAlignment - 1) / kAlignment * kAlignment; }
-
-/// Columns are staggered by one cache line each: at equal distances of a power of two they would all fall into the
-/// same few sets of a cache.
-constexpr std::size_t kStagger = kAlignment;
-
-constexpr std::size_t kNumQueues = 4 + kNumSurfaceKernels;
-constexpr std::size_t kNumColumns = kPathStateBytes / 4 + kShadowRayBytes / 4 + 1 + kNumQueues;
-
 using Clock = std::chrono::steady_clock;
 
 }  // namespace
 
-void Wavefront::Free::operator()(void* p) const { std::free(p); }
+std::size_t Wavefront::bytes(bool caustics) { return sizeof(Memory) + (caustics ? sizeof(CausticMemory) : 0u); }
 
-std::size_t Wavefront::bytes(bool caustics)
+Wavefront::Wavefront(bool caustics)
+    : memory_(std::make_unique_for_overwrite<Memory>()), state_(memory_->state), shadow_(memory_->shadow)
 {
-  return (kNumColumns + (caustics ? kNumCausticColumns : 0u)) * (aligned(kBatchPaths * 4) + kStagger);
-}
-
-template <class T>
-T* Wavefront::column(std::size_t count)
-{
-  T* start = reinterpret_cast<T*>(memory_.get() + used_);
-  used_ += aligned(count * sizeof(T)) + kStagger;
-  return start;
-}
-
-Wavefront::Wavefront(bool caustics) : memory_(static_cast<std::byte*>(std::aligned_alloc(kAlignment, bytes(caustics))))
-{
-  if (memory_ == nullptr) throw std::bad_alloc();
-#define X(type, name) state_.name = column<type>(kBatchPaths);
-#include "kernel/state/path_state_fields.inc"
-#undef X
-  state_.capacity = kBatchPaths;
-  for (float** p :
-       {&shadow_.O_x, &shadow_.O_y, &shadow_.O_z, &shadow_.D_x, &shadow_.D_y, &shadow_.D_z, &shadow_.t_max,
-        &shadow_.cone_width, &shadow_.cone_spread, &shadow_.gain_r, &shadow_.gain_g, &shadow_.gain_b, &visibility_}) {
-    *p = column<float>(kBatchPaths);
-  }
-  shadow_.path = column<std::uint32_t>(kBatchPaths);
-  shadow_.scatterings = column<std::uint32_t>(kBatchPaths);
-  for (QueueView* queue : {&active_, &next_, &lights_, &background_}) {
-    queue->paths = column<std::uint32_t>(kBatchPaths);
-  }
-  for (QueueView& queue : surfaces_) queue.paths = column<std::uint32_t>(kBatchPaths);
+  auto queue = std::begin(memory_->queues);
+  for (QueueView* q : {&active_, &next_, &lights_, &background_}) q->paths = *queue++;
+  for (QueueView& q : surfaces_) q.paths = *queue++;
   if (!caustics) return;
+  caustic_memory_ = std::make_unique_for_overwrite<CausticMemory>();
   CausticStateView& c = state_.caustic;
+  auto column = std::begin(caustic_memory_->columns);
   for (float** p : {&c.irradiance_r, &c.irradiance_g, &c.irradiance_b, &c.radiance_r, &c.radiance_g, &c.radiance_b}) {
-    *p = column<float>(kBatchPaths);
+    *p = *column++;
   }
-  c.wi = column<std::uint32_t>(kBatchPaths);
+  c.wi = caustic_memory_->wi;
 }
 
 void Wavefront::note_displacement(const DisplacementWork& work)
@@ -102,7 +67,7 @@ void Wavefront::record_shadow_rays() const
                          {shadow_.D_x[i], shadow_.D_y[i], shadow_.D_z[i]},
                          0.0f,
                          shadow_.t_max[i],
-                         visibility_[i] > 0.0f ? shadow_.t_max[i] : 0.0f});
+                         memory_->visibility[i] > 0.0f ? shadow_.t_max[i] : 0.0f});
   }
 }
 
@@ -152,10 +117,10 @@ void Wavefront::run(const KernelGlobals& g,
     charge(Stage::kShade);
 
     counters.shadow_rays += shadow_.size;
-    intersect_shadow(g, accel, state_, shadow_, visibility_, displacement);
+    intersect_shadow(g, accel, state_, shadow_, memory_->visibility, displacement);
     if (recorder != nullptr) record_shadow_rays();
     charge(Stage::kIntersectShadow);
-    stages.accumulate_shadow(g, state_, shadow_, visibility_);
+    stages.accumulate_shadow(g, state_, shadow_, memory_->visibility);
     std::swap(active_, next_);
     charge(Stage::kShade);
   }

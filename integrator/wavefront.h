@@ -14,10 +14,6 @@
 
 namespace relief {
 
-/// Paths of a full batch. State and queues take about 200 bytes a path, so a batch stays in a second-level cache of
-/// 1 MiB.
-inline constexpr std::uint32_t kBatchPaths = 4096;
-
 enum class Stage : int { kGenerate, kIntersectClosest, kGatherPhotons, kShade, kIntersectShadow, kFilm, kTracePhotons };
 inline constexpr int kNumStages = 7;
 inline constexpr std::array<const char*, kNumStages> kStageNames = {
@@ -74,17 +70,24 @@ class Wavefront {
   void record_rays() const;
   void record_shadow_rays() const;
 
-  struct Free {
-    void operator()(void* p) const;
-  };
-  template <class T>
-  T* column(std::size_t count);
+  static constexpr std::size_t kNumQueues = 4 + kNumSurfaceKernels;
 
-  std::unique_ptr<std::byte, Free> memory_;
-  std::size_t used_ = 0;
-  PathStateView state_;
-  ShadowQueueView shadow_;
-  float* visibility_ = nullptr;
+  /// Everything that is as large as a batch.
+  struct Memory {
+    PathState state;
+    ShadowQueue shadow;
+    float visibility[kColumnEntries];  ///< of the shadow rays
+    std::uint32_t queues[kNumQueues][kColumnEntries];
+  };
+  struct CausticMemory {
+    float columns[kNumCausticColumns - 1][kColumnEntries];
+    std::uint32_t wi[kColumnEntries];
+  };
+
+  std::unique_ptr<Memory> memory_;
+  std::unique_ptr<CausticMemory> caustic_memory_;
+  PathState& state_;
+  ShadowQueue& shadow_;
   QueueView active_, next_, lights_, background_;
   std::array<QueueView, kNumSurfaceKernels> surfaces_;
 };

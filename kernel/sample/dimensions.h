@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "kernel/kernel.h"
+#include "kernel/sample/sobol.h"
 
 namespace relief {
 
@@ -14,13 +14,12 @@ enum class CameraDimension : std::uint32_t {
   kCount
 };
 
-/// Uses at every surface that a path meets.
+/// Uses at every surface that a path meets. The first four are drawn together, see scatter_samples.
 enum class BounceDimension : std::uint32_t {
-  kBsdfLobe,      ///< 1D: which lobe scatters
-  kBsdfUv,        ///< 2D: direction within the lobe
-  kLightChoice,   ///< 1D: which light
+  kChoices,       ///< 2D: which light; which lobe scatters
   kLightUv,       ///< 2D: place on the light
-  kRoulette,      ///< 1D: whether the path goes on
+  kBsdfUv,        ///< 2D: direction within the lobe
+  kFate,          ///< 2D: whether the path goes on; whether sharp or soft lobes have scattered it
   kTransparency,  ///< 1D: whether a partly transparent surface is there
   kCount
 };
@@ -33,13 +32,6 @@ RELIEF_KERNEL constexpr std::uint32_t dimension_camera(CameraDimension use) { re
 /// Dimension for sample_1d that a path's dither between levels of detail is from; no bounce gets so far.
 inline constexpr std::uint32_t kLodDimension = ~0u;
 
-/// Dimension for sample_1d that chooses whether a surface's sharp or soft lobes have scattered a path.
-/// @param surface  see path_surface
-RELIEF_KERNEL constexpr std::uint32_t dimension_sharpness(int surface)
-{
-  return ~1u - static_cast<std::uint32_t>(surface);
-}
-
 /// Uses at the start of a photon; its bounces use the same dimensions as a camera path's.
 enum class PhotonDimension : std::uint32_t {
   kSource,  ///< 1D: which light, towards which caster
@@ -50,15 +42,29 @@ enum class PhotonDimension : std::uint32_t {
 /// @return dimension for sample_1d or sample_2d, as the use says
 RELIEF_KERNEL constexpr std::uint32_t dimension_photon(PhotonDimension use)
 {
-  return 0x80000000u + static_cast<std::uint32_t>(use);
+  return 0x40000000u + static_cast<std::uint32_t>(use);
 }
 
-/// @param bounce  scattering events of the path before this surface, >= 0
+/// @param bounce  surfaces that the path has met before, see path_surface
 /// @return        dimension for sample_1d or sample_2d, as the use says
 RELIEF_KERNEL constexpr std::uint32_t dimension_bounce(int bounce, BounceDimension use)
 {
   return static_cast<std::uint32_t>(CameraDimension::kCount) +
          static_cast<std::uint32_t>(bounce) * kDimensionsPerBounce + static_cast<std::uint32_t>(use);
+}
+
+/// The numbers that one scattering event may ask for, each in [0, 1).
+struct ScatterSamples {
+  float light_choice, bsdf_lobe;
+  Vec2f light_uv, bsdf_uv;
+  float roulette, sharpness;
+};
+
+/// @param bounce  as in dimension_bounce; the rest as in sample_2d
+RELIEF_KERNEL ScatterSamples scatter_samples(std::uint32_t pixel_hash, std::uint32_t sample_index, int bounce)
+{
+  const Sample2dX4 u = sample_2d_x4(pixel_hash, sample_index, dimension_bounce(bounce, BounceDimension::kChoices));
+  return {u.at[0].x, u.at[0].y, u.at[1], u.at[2], u.at[3].x, u.at[3].y};
 }
 
 }  // namespace relief

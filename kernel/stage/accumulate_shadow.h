@@ -9,8 +9,8 @@ namespace relief {
 /// Adds what next-event estimation found, if the light is seen.
 /// @param visibility  share of the light that passes, 0 … 1
 RELIEF_KERNEL void accumulate_shadow(const KernelGlobals& g,
-                                     const PathStateView& state,
-                                     const ShadowQueueView& shadow,
+                                     PathState& state,
+                                     const ShadowQueue& shadow,
                                      std::uint32_t ray,
                                      float visibility)
 {

@@ -96,7 +96,7 @@ emit_from_afar(const PhotonSourcesView& sources, const Box3& box, Vec3f D, Vec3f
 /// @return false: it carries nothing
 RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
                                const PhotonSourcesView& sources,
-                               const PathStateView& state,
+                               PathState& state,
                                std::uint32_t path,
                                std::uint64_t number)
 {

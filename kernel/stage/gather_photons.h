@@ -29,7 +29,7 @@ RELIEF_KERNEL bool photon_bounces_left(const BounceLimits& limits,
 }
 
 /// Unit geometric normal of a path's hit, world space, on the front side.
-RELIEF_KERNEL Vec3f hit_geometric_normal(const KernelGlobals& g, const PathStateView& state, std::uint32_t path)
+RELIEF_KERNEL Vec3f hit_geometric_normal(const KernelGlobals& g, const PathState& state, std::uint32_t path)
 {
   const InstanceView& instance = g.instances[state.hit_object[path]];
   if ((instance.flags & kDisplaced) != 0) {
@@ -45,7 +45,7 @@ RELIEF_KERNEL Vec3f hit_geometric_normal(const KernelGlobals& g, const PathState
 }
 
 /// Writes what photons bring to a path's hit.
-RELIEF_KERNEL void gather_photons(const KernelGlobals& g, const PathStateView& state, std::uint32_t path)
+RELIEF_KERNEL void gather_photons(const KernelGlobals& g, PathState& state, std::uint32_t path)
 {
   const CausticStateView& caustic = state.caustic;
   caustic.irradiance_r[path] = caustic.irradiance_g[path] = caustic.irradiance_b[path] = 0.0f;

@@ -16,7 +16,7 @@ namespace relief {
 /// @param pixel_x, pixel_y  in the film window
 /// @param sample            of the pixel, counted from 0
 RELIEF_KERNEL void generate_camera_path(const KernelGlobals& g,
-                                        const PathStateView& state,
+                                        PathState& state,
                                         std::uint32_t path,
                                         int pixel_x,
                                         int pixel_y,

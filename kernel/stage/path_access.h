@@ -8,24 +8,24 @@
 
 namespace relief {
 
-RELIEF_KERNEL Vec3f path_origin(const PathStateView& s, std::uint32_t i) { return {s.O_x[i], s.O_y[i], s.O_z[i]}; }
-RELIEF_KERNEL Vec3f path_direction(const PathStateView& s, std::uint32_t i) { return {s.D_x[i], s.D_y[i], s.D_z[i]}; }
-RELIEF_KERNEL Vec3f path_throughput(const PathStateView& s, std::uint32_t i)
+RELIEF_KERNEL Vec3f path_origin(const PathState& s, std::uint32_t i) { return {s.O_x[i], s.O_y[i], s.O_z[i]}; }
+RELIEF_KERNEL Vec3f path_direction(const PathState& s, std::uint32_t i) { return {s.D_x[i], s.D_y[i], s.D_z[i]}; }
+RELIEF_KERNEL Vec3f path_throughput(const PathState& s, std::uint32_t i)
 {
   return {s.throughput_r[i], s.throughput_g[i], s.throughput_b[i]};
 }
-RELIEF_KERNEL Vec3f path_sigma_a(const PathStateView& s, std::uint32_t i)
+RELIEF_KERNEL Vec3f path_sigma_a(const PathState& s, std::uint32_t i)
 {
   return {s.sigma_a_r[i], s.sigma_a_g[i], s.sigma_a_b[i]};
 }
-RELIEF_KERNEL Vec3f path_scatter_N(const PathStateView& s, std::uint32_t i)
+RELIEF_KERNEL Vec3f path_scatter_N(const PathState& s, std::uint32_t i)
 {
   return {s.scatter_Nx[i], s.scatter_Ny[i], s.scatter_Nz[i]};
 }
 
 /// Gives a path a new ray, to be searched from its origin on.
 /// @param D  unit
-RELIEF_KERNEL void path_set_ray(const PathStateView& s, std::uint32_t i, Vec3f O, Vec3f D)
+RELIEF_KERNEL void path_set_ray(PathState& s, std::uint32_t i, Vec3f O, Vec3f D)
 {
   s.O_x[i] = O.x;
   s.O_y[i] = O.y;
@@ -37,7 +37,7 @@ RELIEF_KERNEL void path_set_ray(const PathStateView& s, std::uint32_t i, Vec3f O
   s.t_max[i] = kInfinity;
 }
 
-RELIEF_KERNEL void path_set_throughput(const PathStateView& s, std::uint32_t i, Vec3f throughput)
+RELIEF_KERNEL void path_set_throughput(PathState& s, std::uint32_t i, Vec3f throughput)
 {
   s.throughput_r[i] = throughput.x;
   s.throughput_g[i] = throughput.y;
@@ -53,7 +53,7 @@ RELIEF_KERNEL int path_bounces(std::uint32_t bounces, BounceKind kind)
 
 /// Surfaces the path has met before, transparent ones included: what dimension_bounce counts by, so that no two
 /// surfaces share random numbers.
-RELIEF_KERNEL int path_surface(const PathStateView& s, std::uint32_t i)
+RELIEF_KERNEL int path_surface(const PathState& s, std::uint32_t i)
 {
   return path_bounces(s.bounces[i], BounceKind::kAll) + static_cast<int>(s.flags[i] >> kPathTransparentShift);
 }
@@ -62,7 +62,7 @@ RELIEF_KERNEL int path_surface(const PathStateView& s, std::uint32_t i)
 /// at most one event, indirect after more.
 /// @param radiance      as emitted, W/m²/sr
 /// @param scatterings   events between the camera and the emitter
-RELIEF_KERNEL void path_add_radiance(const PathStateView& s,
+RELIEF_KERNEL void path_add_radiance(PathState& s,
                                      std::uint32_t i,
                                      int scatterings,
                                      Vec3f contribution,

@@ -9,10 +9,7 @@ namespace relief {
 
 /// Adds the environment's radiance, weighted against next-event estimation.
 /// Reads the ray, throughput, pdf, scatter normal and medium; writes the radiance. The path ends.
-RELIEF_KERNEL void shade_background(const KernelGlobals& g,
-                                    const PathStateView& state,
-                                    std::uint32_t path,
-                                    Counters& counters)
+RELIEF_KERNEL void shade_background(const KernelGlobals& g, PathState& state, std::uint32_t path, Counters& counters)
 {
   ++counters.background_hits;
   const int scatterings = path_bounces(state.bounces[path], BounceKind::kAll);

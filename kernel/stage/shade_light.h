@@ -12,7 +12,7 @@ namespace relief {
 /// Adds the light's radiance, weighted against next-event estimation, and sends the ray on behind the light.
 /// Reads the ray, hit, throughput, pdf, scatter normal and medium; writes the radiance and t_min.
 /// Next: intersect closest.
-RELIEF_KERNEL void shade_light(const KernelGlobals& g, const PathStateView& state, std::uint32_t path)
+RELIEF_KERNEL void shade_light(const KernelGlobals& g, PathState& state, std::uint32_t path)
 {
   const std::uint32_t light_index = g.area_light_index[state.hit_object[path] - g.num_instances];
   const Light& light = g.lights.lights[light_index];

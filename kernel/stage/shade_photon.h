@@ -13,7 +13,7 @@
 namespace relief {
 
 /// As path_surface for camera paths: tells the surfaces that a photon meets apart. Its bounces leave out the first.
-RELIEF_KERNEL int photon_surface(const PathStateView& state, std::uint32_t path)
+RELIEF_KERNEL int photon_surface(const PathState& state, std::uint32_t path)
 {
   return path_surface(state, path) + ((state.flags[path] & kPathCaustic) != 0 ? 1 : 0);
 }
@@ -22,7 +22,7 @@ RELIEF_KERNEL int photon_surface(const PathStateView& state, std::uint32_t path)
 /// @param soft  the map has it, for soft lobes to show: they scatter as well
 /// @return false: its path ends
 RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
-                                        const PathStateView& state,
+                                        PathState& state,
                                         std::uint32_t path,
                                         const SurfaceInteraction& at,
                                         Vec3f wo,
@@ -35,15 +35,12 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
   SurfaceClosure closure = surface_closure_make<kFeatureAll>(at.params, *g.bsdf_tables, wo_local);
   if (!soft) closure = closure_sharp(closure, {true, true});
   const int surface = photon_surface(state, path);
-  const std::uint32_t hash = state.pixel_hash[path];
-  const std::uint32_t sample = state.sample_index[path];
-  BsdfSample bsdf = closure_sample<kFeatureAll, TransportMode::kImportance>(
-      closure, *g.bsdf_tables, sample_1d(hash, sample, dimension_bounce(surface, BounceDimension::kBsdfLobe)),
-      sample_2d(hash, sample, dimension_bounce(surface, BounceDimension::kBsdfUv)));
+  const ScatterSamples u = scatter_samples(state.pixel_hash[path], state.sample_index[path], surface);
+  BsdfSample bsdf =
+      closure_sample<kFeatureAll, TransportMode::kImportance>(closure, *g.bsdf_tables, u.bsdf_lobe, u.bsdf_uv);
   if (!(bsdf.pdf > 0.0f)) return false;
   const bool sharp = closure_split<kFeatureAll, TransportMode::kImportance>(
-      closure, *g.bsdf_tables, sharp_lobes(at.params, caster, g.caustics.roughness),
-      sample_1d(hash, sample, dimension_sharpness(surface)), bsdf);
+      closure, *g.bsdf_tables, sharp_lobes(at.params, caster, g.caustics.roughness), u.sharpness, bsdf);
   if (sharp && !caster) return false;
   const Vec3f wi = from_local(side.frame, bsdf.wi);
   if (!shading_is_reversible(side, wi)) return false;
@@ -55,7 +52,7 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
 
   // Roulette by what the surface takes: photons keep their power.
   const float survival = min(1.0f, max_component(scattered) / max_component(throughput));
-  if (!(sample_1d(hash, sample, dimension_bounce(surface, BounceDimension::kRoulette)) < survival)) return false;
+  if (!(u.roulette < survival)) return false;
   const Vec3f power = scattered / survival;
   if (is_zero(power) || !is_finite(power)) return false;
 
@@ -83,7 +80,7 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
 /// Next: intersect closest (pushed on `next`), or the path ends. At most one photon is added to `photons`.
 RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
                                 const PhotonSourcesView& sources,
-                                const PathStateView& state,
+                                PathState& state,
                                 std::uint32_t path,
                                 QueueView& next,
                                 PhotonQueueView& photons)

@@ -13,22 +13,18 @@ namespace relief {
 /// Queues a shadow ray towards a light sample taken at the hit.
 template <unsigned kFeatures>
 RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
-                                       const PathStateView& state,
+                                       const PathState& state,
                                        std::uint32_t path,
                                        const SurfaceInteraction& at,
                                        const SurfaceClosure& closure,
                                        Vec3f light_N,
                                        RayCone cone,
-                                       ShadowQueueView& shadow)
+                                       const ScatterSamples& u,
+                                       ShadowQueue& shadow)
 {
   const Vec3f P = at.hit.P;
   const int bounce = path_bounces(state.bounces[path], BounceKind::kAll);
-  const int surface = path_surface(state, path);
-  const std::uint32_t hash = state.pixel_hash[path];
-  const std::uint32_t sample = state.sample_index[path];
-  const LightSample light = lights_sample(
-      g.lights, P, light_N, sample_1d(hash, sample, dimension_bounce(surface, BounceDimension::kLightChoice)),
-      sample_2d(hash, sample, dimension_bounce(surface, BounceDimension::kLightUv)));
+  const LightSample light = lights_sample(g.lights, P, light_N, u.light_choice, u.light_uv);
   if (!(light.pdf > 0.0f)) return;
   Vec3f radiance = light.radiance;
   const bool is_triangle = light.light_index >= 0 && g.lights.lights[light.light_index].kind == LightKind::kTriangle;
@@ -111,7 +107,7 @@ RELIEF_KERNEL SharpLobes path_sharp_lobes(const KernelGlobals& g,
 /// @param wo  in the closure's frame
 template <unsigned kFeatures>
 RELIEF_KERNEL void shade_surface_photons(const KernelGlobals& g,
-                                         const PathStateView& state,
+                                         PathState& state,
                                          std::uint32_t path,
                                          const SurfaceInteraction& at,
                                          const SurfaceClosure& closure,
@@ -139,15 +135,14 @@ RELIEF_KERNEL void shade_surface_photons(const KernelGlobals& g,
 /// Next: intersect closest (pushed on `next`), or the path ends. At most one ray is added to `shadow`.
 template <unsigned kFeatures>
 [[gnu::flatten]] RELIEF_KERNEL void shade_surface(const KernelGlobals& g,
-                                                  const PathStateView& state,
+                                                  PathState& state,
                                                   std::uint32_t path,
                                                   QueueView& next,
-                                                  ShadowQueueView& shadow,
+                                                  ShadowQueue& shadow,
                                                   Counters& counters)
 {
   ++counters.surface_hits;
   const Vec3f wo = -path_direction(state, path);
-  const std::uint32_t hash = state.pixel_hash[path];
   const std::uint32_t sample = state.sample_index[path];
   const std::uint32_t bounces = state.bounces[path];
   const int bounce = path_bounces(bounces, BounceKind::kAll);
@@ -213,24 +208,22 @@ template <unsigned kFeatures>
   RayCone cone = at.cone;
   if ((instance.flags & kDisplaced) != 0) cone.width = min(cone.width, state.hit_width[path]);
   const SurfaceClosure closure = surface_closure_make<kFeatures>(params, *g.bsdf_tables, wo_local);
+  const ScatterSamples u = scatter_samples(state.pixel_hash[path], sample, surface);
   const Vec3f light_N = params.transmission > 0.0f ? Vec3f{} : side.Ns;
   if (g.has_lights && !surface_is_delta(params)) {
-    shade_surface_light<kFeatures>(g, state, path, at, closure, light_N, cone, shadow);
+    shade_surface_light<kFeatures>(g, state, path, at, closure, light_N, cone, u, shadow);
   }
 
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
     shade_surface_photons<kFeatures>(g, state, path, at, closure, wo_local);
   }
 
-  BsdfSample bsdf = closure_sample<kFeatures>(
-      closure, *g.bsdf_tables, sample_1d(hash, sample, dimension_bounce(surface, BounceDimension::kBsdfLobe)),
-      sample_2d(hash, sample, dimension_bounce(surface, BounceDimension::kBsdfUv)));
+  BsdfSample bsdf = closure_sample<kFeatures>(closure, *g.bsdf_tables, u.bsdf_lobe, u.bsdf_uv);
   if (!(bsdf.pdf > 0.0f)) return;
   const Vec3f wi = from_local(side.frame, bsdf.wi);
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
     const SharpLobes sharp = path_sharp_lobes(g, state.flags[path], at, wo_local, bsdf.wi, wi);
-    const float u = sample_1d(hash, sample, dimension_sharpness(surface));
-    const bool is_sharp = closure_split<kFeatures>(closure, *g.bsdf_tables, sharp, u, bsdf);
+    const bool is_sharp = closure_split<kFeatures>(closure, *g.bsdf_tables, sharp, u.sharpness, bsdf);
     const bool is_paths = is_sharp && !shading_is_reversible(side, wi);
     state.flags[path] = is_paths ? path_flags_left_to_paths(state.flags[path])
                                  : path_caustic_flags(state.flags[path], instance, is_sharp);
@@ -249,7 +242,7 @@ template <unsigned kFeatures>
   // most of the noise of many pictures (19 % more variance with an environment, for 9 % less time).
   if (bounce > 1) {
     const float survival = min(1.0f, __builtin_sqrtf(max_component(throughput) * eta_scale));
-    if (!(sample_1d(hash, sample, dimension_bounce(surface, BounceDimension::kRoulette)) < survival)) return;
+    if (!(u.roulette < survival)) return;
     throughput *= 1.0f / survival;
   }
   if (is_zero(throughput)) return;

@@ -52,7 +52,7 @@ inline constexpr float kUnbent = 1.0f - 1e-6f;
 /// @param wo  unit, back along the path's ray
 template <unsigned kFeatures>
 RELIEF_KERNEL SurfaceInteraction
-surface_interaction_make(const KernelGlobals& g, const PathStateView& state, std::uint32_t path, Vec3f wo)
+surface_interaction_make(const KernelGlobals& g, const PathState& state, std::uint32_t path, Vec3f wo)
 {
   SurfaceInteraction at;
   at.instance = &g.instances[state.hit_object[path]];
@@ -83,7 +83,7 @@ surface_interaction_make(const KernelGlobals& g, const PathStateView& state, std
 /// @param wo  as given to surface_interaction_make
 template <unsigned kFeatures>
 RELIEF_KERNEL void surface_interaction_frame(const KernelGlobals& g,
-                                             const PathStateView& state,
+                                             const PathState& state,
                                              std::uint32_t path,
                                              Vec3f wo,
                                              SurfaceInteraction& at)
@@ -133,7 +133,7 @@ RELIEF_KERNEL bool shading_is_reversible(const ShadingSide& side, Vec3f wi)
 /// Whether the surface is there for this path, or lets it through.
 /// @param surface  of the path, see path_surface
 template <unsigned kFeatures>
-RELIEF_KERNEL bool surface_is_met(const PathStateView& state, std::uint32_t path, float alpha, int surface)
+RELIEF_KERNEL bool surface_is_met(const PathState& state, std::uint32_t path, float alpha, int surface)
 {
   if constexpr ((kFeatures & kFeatureTransparency) != 0) {
     if (alpha < 1.0f) {
@@ -146,7 +146,7 @@ RELIEF_KERNEL bool surface_is_met(const PathStateView& state, std::uint32_t path
 
 /// Sends a path on behind a surface that let it through.
 /// @return false: it has passed as many as it may
-RELIEF_KERNEL bool path_pass_through(const KernelGlobals& g, const PathStateView& state, std::uint32_t path)
+RELIEF_KERNEL bool path_pass_through(const KernelGlobals& g, PathState& state, std::uint32_t path)
 {
   state.flags[path] += 1u << kPathTransparentShift;
   state.t_min[path] = next_float_up(state.hit_t[path]);

@@ -2,7 +2,6 @@
 // path_state_fields.inc. Shadow rays wait in a structure of arrays of their own.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 
 #include "kernel/assert.h"
@@ -18,20 +17,21 @@ struct CausticStateView {
 };
 inline constexpr int kNumCausticColumns = 7;
 
-/// Columns of all paths of a batch; each is 64-byte aligned and has `capacity` entries.
-struct PathStateView {
-#define X(type, name) type* name = nullptr;
+/// Paths of a full batch. State and queues take about 270 bytes a path, so a batch nearly stays in a second-level cache of
+/// 1 MiB.
+inline constexpr std::uint32_t kBatchPaths = 4096;
+
+/// Entries of a column. Columns are staggered by one cache line each: at equal distances of a power of two they would all
+/// fall into the same few sets of a cache.
+inline constexpr std::uint32_t kColumnEntries = kBatchPaths + 64 / 4;
+
+/// Columns of all paths of a batch. They lie at fixed places, so that one register reaches them all.
+struct alignas(64) PathState {
+#define X(type, name) type name[kColumnEntries];
 #include "kernel/state/path_state_fields.inc"
 #undef X
   CausticStateView caustic;
-  std::uint32_t capacity = 0;
 };
-
-inline constexpr std::size_t kPathStateBytes = 0
-#define X(type, name) +sizeof(type)
-#include "kernel/state/path_state_fields.inc"
-#undef X
-    ;
 
 enum PathFlag : std::uint32_t {
   kPathSawSurface = 1u << 0,  ///< an opaque-enough surface was met: the AOVs of the first hit are written
@@ -44,17 +44,17 @@ enum PathFlag : std::uint32_t {
 };
 
 /// Shadow rays of a batch: where to look, and what the path gains if nothing is in between.
-struct ShadowQueueView {
-  float *O_x, *O_y, *O_z, *D_x, *D_y, *D_z;  ///< world; D unit
-  float* t_max;                              ///< metres
-  float *cone_width, *cone_spread;           ///< ray cone at O
-  float *gain_r, *gain_g, *gain_b;           ///< radiance × throughput, MIS weight included
-  std::uint32_t* path;                       ///< whose
-  std::uint32_t* scatterings;                ///< events between the camera and the light
-  std::uint32_t size;                        ///< number of rays waiting
+struct alignas(64) ShadowQueue {
+  float O_x[kColumnEntries], O_y[kColumnEntries], O_z[kColumnEntries];  ///< world
+  float D_x[kColumnEntries], D_y[kColumnEntries], D_z[kColumnEntries];  ///< world, unit
+  float t_max[kColumnEntries];                                          ///< metres
+  float cone_width[kColumnEntries], cone_spread[kColumnEntries];        ///< ray cone at O
+  float gain_r[kColumnEntries], gain_g[kColumnEntries],
+      gain_b[kColumnEntries];                 ///< radiance × throughput, MIS weight included
+  std::uint32_t path[kColumnEntries];         ///< whose
+  std::uint32_t scatterings[kColumnEntries];  ///< events between the camera and the light
+  std::uint32_t size;                         ///< number of rays waiting
 };
-
-inline constexpr std::size_t kShadowRayBytes = 12 * sizeof(float) + 2 * sizeof(std::uint32_t);
 
 /// Indices of paths waiting for a stage.
 struct QueueView {

@@ -18,7 +18,6 @@ TEST(Dimensions, NoTwoUsesShareOne)
   }
   EXPECT_TRUE(seen.insert(kLodDimension).second);
   for (int bounce = 0; bounce < 100; ++bounce) {
-    EXPECT_TRUE(seen.insert(dimension_sharpness(bounce)).second);
     for (std::uint32_t use = 0; use < kDimensionsPerBounce; ++use) {
       EXPECT_TRUE(seen.insert(dimension_bounce(bounce, static_cast<BounceDimension>(use))).second);
     }

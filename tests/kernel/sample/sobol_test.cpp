@@ -290,5 +290,14 @@ TEST(Sobol, SameBitsAtCompileTimeAndRunTime)
   EXPECT_NE(sample_pixel_hash(42, 17, 23), sample_pixel_hash(42, 23, 17));
 }
 
+TEST(Sobol, FourDimensionsAtOnceAreThoseOneByOne)
+{
+  for (std::uint32_t i = 0; i < 20000; ++i) {
+    const std::uint32_t hash = pixel(static_cast<int>(i)), sample = i * 2654435761u, dimension = i % 700;
+    const Sample2dX4 u = sample_2d_x4(hash, sample, dimension);
+    for (std::uint32_t k = 0; k < 4; ++k) ASSERT_EQ(u.at[k], sample_2d(hash, sample, dimension + k)) << i << " " << k;
+  }
+}
+
 }  // namespace
 }  // namespace relief
