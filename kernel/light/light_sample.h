@@ -2,6 +2,7 @@
 #pragma once
 
 #include "kernel/light/light.h"
+#include "kernel/math/trigonometry.h"
 
 namespace relief {
 
@@ -79,7 +80,7 @@ RELIEF_KERNEL float triangle_solid_angle(Vec3f a, Vec3f b, Vec3f c, float det)
 {
   const float la = length(a), lb = length(b), lc = length(c);
   const float denominator = la * lb * lc + dot(a, b) * lc + dot(a, c) * lb + dot(b, c) * la;
-  return 2.0f * std::atan2(__builtin_fabsf(det), denominator);
+  return 2.0f * angle_of(__builtin_fabsf(det), denominator);
 }
 
 }  // namespace relief

@@ -5,7 +5,7 @@
 // points of the shape; outside they are zero only where the docstring says so.
 #pragma once
 
-#include "kernel/math/vec.h"
+#include "kernel/math/trigonometry.h"
 
 namespace relief {
 
@@ -16,15 +16,11 @@ RELIEF_KERNEL Vec2f warp_disk(Vec2f u)
   const float x = 2.0f * u.x - 1.0f;
   const float y = 2.0f * u.y - 1.0f;
   if (x == 0.0f && y == 0.0f) return {};
-  float radius, phi;
-  if (__builtin_fabsf(x) > __builtin_fabsf(y)) {
-    radius = x;
-    phi = 0.25f * kPi * (y / x);
-  } else {
-    radius = y;
-    phi = 0.5f * kPi - 0.25f * kPi * (x / y);
-  }
-  return {radius * std::cos(phi), radius * std::sin(phi)};
+  const bool is_x = __builtin_fabsf(x) > __builtin_fabsf(y);
+  const float radius = is_x ? x : y, other = is_x ? y : x;
+  const SinCos phi = sin_cos_octant(0.25f * kPi * (other / radius));
+  const float along = radius * phi.cos, across = radius * phi.sin;
+  return {is_x ? along : across, is_x ? across : along};
 }
 
 RELIEF_KERNEL Vec2f warp_disk_inverse(Vec2f p)
@@ -65,8 +61,8 @@ RELIEF_KERNEL constexpr float warp_cosine_hemisphere_pdf(float cos_theta) { retu
 RELIEF_KERNEL Vec3f direction_from_z(float z, float turn)
 {
   const float r = safe_sqrt((1.0f - z) * (1.0f + z));
-  const float phi = 2.0f * kPi * turn;
-  return {r * std::cos(phi), r * std::sin(phi), z};
+  const SinCos phi = sin_cos_turn(turn);
+  return {r * phi.cos, r * phi.sin, z};
 }
 
 /// Azimuth of a direction as a fraction of a turn, [0, 1].
@@ -94,8 +90,8 @@ RELIEF_KERNEL Vec3f warp_cone(float one_minus_cos, Vec2f u)
 {
   const float h = u.x * one_minus_cos;
   const float r = safe_sqrt(h * (2.0f - h));
-  const float phi = 2.0f * kPi * u.y;
-  return {r * std::cos(phi), r * std::sin(phi), 1.0f - h};
+  const SinCos phi = sin_cos_turn(u.y);
+  return {r * phi.cos, r * phi.sin, 1.0f - h};
 }
 
 /// @param w  unit, inside the cone

@@ -148,6 +148,8 @@ template <unsigned kFeatures>
   const int bounce = path_bounces(bounces, BounceKind::kAll);
   const int surface = path_surface(state, path);
   const float t = state.hit_t[path];
+  // Early: nothing waits for them yet.
+  const ScatterSamples u = scatter_samples(state.pixel_hash[path], sample, surface);
 
   SurfaceInteraction at = surface_interaction_make<kFeatures>(g, state, path, wo);
   if (!surface_is_met<kFeatures>(state, path, at.params.alpha, surface)) {
@@ -208,7 +210,6 @@ template <unsigned kFeatures>
   RayCone cone = at.cone;
   if ((instance.flags & kDisplaced) != 0) cone.width = min(cone.width, state.hit_width[path]);
   const SurfaceClosure closure = surface_closure_make<kFeatures>(params, *g.bsdf_tables, wo_local);
-  const ScatterSamples u = scatter_samples(state.pixel_hash[path], sample, surface);
   const Vec3f light_N = params.transmission > 0.0f ? Vec3f{} : side.Ns;
   if (g.has_lights && !surface_is_delta(params)) {
     shade_surface_light<kFeatures>(g, state, path, at, closure, light_N, cone, u, shadow);
