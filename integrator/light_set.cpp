@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 
+#include "kernel/shape/material_lookup.h"
 #include "kernel/texture/texture.h"
 
 namespace relief {
@@ -375,6 +376,43 @@ Light triangle_light(const Instance& instance, const MeshView& mesh, std::uint32
   return light;
 }
 
+/// Makes one light of two triangles that are a rectangle, as those of most lamps made of meshes are: one choice less, and
+/// its samples are spread over all of it.
+/// @param lights  of a mesh that emits evenly, one a triangle, from index `first` on; pairs are looked for in their order
+void rectangles_join(std::span<Light> lights, std::int32_t first)
+{
+  for (std::size_t t = 0; t + 1 < lights.size(); ++t) {
+    const std::array<Vec3f, 3> a{lights[t].P, lights[t].P + lights[t].edge_u, lights[t].P + lights[t].edge_v};
+    const Light& second = lights[t + 1];
+    const std::array<Vec3f, 3> b{second.P, second.P + second.edge_u, second.P + second.edge_v};
+    const bool has_areas = lights[t].area > 0.0f && second.area > 0.0f;
+    if (!has_areas || !(dot(lights[t].axis, second.axis) > 0.0f)) continue;
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      const Vec3f P = a[corner], u = a[(corner + 1) % 3] - P, v = a[(corner + 2) % 3] - P;
+      const Vec3f opposite = P + u + v;
+      const float size_squared = length_squared(u) + length_squared(v);
+      // Rounding of world coordinates, and as much of a skew as sampling takes for none (rectangle.h).
+      const float near = 1e-5f * __builtin_sqrtf(size_squared);
+      const auto is_vertex = [&](Vec3f Q) {
+        return std::any_of(b.begin(), b.end(), [&](Vec3f q) { return length_squared(q - Q) <= sqr(near); });
+      };
+      const bool is_right = sqr(dot(u, v)) <= 1e-9f * length_squared(u) * length_squared(v);
+      if (!is_right || !is_vertex(opposite) || !is_vertex(P + u) || !is_vertex(P + v)) continue;
+      Light& light = lights[t];
+      light.kind = LightKind::kRectangle;
+      light.P = P + 0.5f * (u + v);
+      light.edge_u = 0.5f * u;
+      light.edge_v = 0.5f * v;
+      light.area = light.area + second.area;
+      Light& part = lights[t + 1];
+      part.emission = {};
+      part.whole_index = first + static_cast<std::int32_t>(t);
+      ++t;
+      break;
+    }
+  }
+}
+
 bool emits(const Material& material)
 {
   return !is_zero(material.emission) && !material.unlit && material.displacement_index < 0;
@@ -454,7 +492,10 @@ void light_set_build_tree(LightSet& set, std::span<const float> intensity_scales
     const Light& light = set.lights[i];
     const auto index = static_cast<std::uint32_t>(i);
     if (light.kind == LightKind::kSun) set.suns.push_back(index);
-    if (light.kind == LightKind::kRectangle || light.kind == LightKind::kDisk) set.area_lights.push_back(index);
+    const bool is_seen = light.instance_index < 0;
+    if (is_seen && (light.kind == LightKind::kRectangle || light.kind == LightKind::kDisk)) {
+      set.area_lights.push_back(index);
+    }
     const LightBounds bounds = light_bounds(light, intensity_scales.empty() ? 1.0f : intensity_scales[i]);
     if (bounds.intensity > 0.0f) finite.push_back({bounds, bounds_centre(bounds), index});
   }
@@ -505,6 +546,9 @@ LightSet light_set_make(const Scene& scene, std::span<const TextureView> texture
             mean_emission_scale(*texture, material.emission_texture, mesh, triangle, material.emission);
       }
     });
+    if (emission_is_even(material)) {
+      rectangles_join(std::span(set.lights).subspan(first, mesh.num_triangles), set.first_light_index[i]);
+    }
   }
   light_set_build_tree(set, scales);
   if (!set.environment.environment.has_map && density == EnvironmentDensity::kExcess) {

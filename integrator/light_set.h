@@ -14,7 +14,7 @@ namespace relief {
 
 /// Owner of everything a LightsView points to.
 struct LightSet {
-  std::vector<Light> lights;                    ///< the scene's, in its order; then emissive triangles
+  std::vector<Light> lights;  ///< the scene's, in its order; then emissive triangles, or rectangles of two
   std::vector<std::int32_t> first_light_index;  ///< one an instance: light of its triangle 0; −1: does not emit
   std::vector<std::uint32_t> area_lights;       ///< rectangles and disks: what rays can hit besides meshes
   std::vector<std::uint32_t> suns;

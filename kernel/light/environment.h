@@ -6,7 +6,7 @@
 // u = ½ + atan2(d.x, −d.z) / 2π, v = θ / π with θ the angle to +Y; the rotation adds to u.
 #pragma once
 
-#include "kernel/math/vec.h"
+#include "kernel/math/trigonometry.h"
 #include "kernel/texture/texture.h"
 
 namespace relief {
@@ -39,8 +39,9 @@ RELIEF_KERNEL Vec2f environment_uv(const EnvironmentView& environment, Vec3f wi)
 {
   // atan2 of (sine, cosine) instead of acos of the cosine, which has no digits left near the poles.
   const float sin_theta = __builtin_sqrtf(wi.x * wi.x + wi.z * wi.z);
-  const float v = std::atan2(sin_theta, wi.y) * kInvPi;
-  const float u = 0.5f + std::atan2(wi.x, -wi.z) * (0.5f * kInvPi) + environment.rotation_turns;
+  const float v = angle_of(sin_theta, wi.y) * kInvPi;
+  const float turn = angle_of(__builtin_fabsf(wi.x), -wi.z) * (0.5f * kInvPi);
+  const float u = 0.5f + __builtin_copysignf(turn, wi.x) + environment.rotation_turns;
   return {u - __builtin_floorf(u), clamp(v, 0.0f, 1.0f)};
 }
 
@@ -104,8 +105,8 @@ RELIEF_KERNEL Vec3f environment_direction(const EnvironmentView& environment, in
   const float cos_theta = 2 * row < environment.num_rows ? 1.0f - 2.0f * e : 2.0f * e - 1.0f;
   const float sin_theta = 2.0f * safe_sqrt(e * (1.0f - e));
   const float u = (static_cast<float>(column) + x) / static_cast<float>(environment.num_columns);
-  const float phi = 2.0f * kPi * (u - 0.5f - environment.rotation_turns);
-  return {sin_theta * std::sin(phi), cos_theta, -sin_theta * std::cos(phi)};
+  const SinCos phi = sin_cos_turn(u - 0.5f - environment.rotation_turns);
+  return {sin_theta * phi.sin, cos_theta, -sin_theta * phi.cos};
 }
 
 /// A direction towards the environment, in proportion to its luminance, or what the tables take of it, averaged over
@@ -117,8 +118,8 @@ RELIEF_KERNEL EnvironmentSample environment_sample(const EnvironmentView& enviro
   if (!environment.has_map) {
     const float z = 1.0f - 2.0f * u.y;
     const float r = 2.0f * safe_sqrt(u.y * (1.0f - u.y));
-    const float phi = 2.0f * kPi * u.x;
-    return {{r * std::cos(phi), z, r * std::sin(phi)}, environment.color, 0.25f * kInvPi};
+    const SinCos phi = sin_cos_turn(u.x);
+    return {{r * phi.cos, z, r * phi.sin}, environment.color, 0.25f * kInvPi};
   }
   if (environment.num_rows == 0) {
     return {};
@@ -173,7 +174,8 @@ RELIEF_KERNEL EnvironmentSample environment_sample_all(const EnvironmentView& en
     const float x = has_cells ? 2.0f * u.x - 1.0f : u.x;
     const float z = 1.0f - 2.0f * u.y;
     const float r = 2.0f * safe_sqrt(u.y * (1.0f - u.y));
-    sample.wi = {r * std::cos(2.0f * kPi * x), z, r * std::sin(2.0f * kPi * x)};
+    const SinCos phi = sin_cos_turn(x);
+    sample.wi = {r * phi.cos, z, r * phi.sin};
     sample.radiance = environment_eval(environment, sample.wi);
   }
   sample.pdf_solid_angle = has_cells ? 0.5f * (environment_pdf(environment, sample.wi) + even) : even;

@@ -31,8 +31,9 @@ struct Light {
   float cos_inner = 1, cos_outer = 0;  ///< spot cone
   float radius = 0;                    ///< point, spot: of the ball that shines in the point's place, metres
   float area = 0;                      ///< m², area kinds
-  std::int32_t instance_index = -1;    ///< triangle: whose mesh
-  std::int32_t triangle_index = -1;
+  std::int32_t instance_index = -1;    ///< triangle, and rectangle that two triangles of a mesh are: whose mesh
+  std::int32_t triangle_index = -1;    ///< likewise (the first of two)
+  std::int32_t whole_index = -1;       ///< second triangle of such a rectangle: that light; nothing else of it counts
 };
 
 }  // namespace relief

@@ -231,7 +231,7 @@ RELIEF_KERNEL LightSample lights_sample(const LightsView& view, Vec3f P, Vec3f N
 
 /// Density with which lights_sample, called at P, would have made a ray that hit an area light.
 /// @param N            as handed to lights_sample
-/// @param light_index  rectangle, disk or triangle
+/// @param light_index  rectangle, disk or triangle; the second triangle of a rectangle stands for it
 /// @param wi           unit, from P to the light
 /// @param distance     metres, of the hit
 /// @return             solid angle × choice, as LightSample::pdf
@@ -242,6 +242,9 @@ RELIEF_KERNEL float lights_pdf(const LightsView& view,
                                Vec3f wi,
                                float distance)
 {
+  if (view.lights[light_index].whole_index >= 0) {
+    light_index = static_cast<std::uint32_t>(view.lights[light_index].whole_index);
+  }
   if (view.only_light >= 0) {
     const bool chosen = static_cast<std::uint32_t>(view.only_light) == light_index;
     return chosen ? light_pdf(view.lights[light_index], P, wi, distance) : 0.0f;

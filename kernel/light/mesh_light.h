@@ -34,9 +34,9 @@ RELIEF_KERNEL Vec3f triangle_light_direction(Vec3f A, Vec3f B, Vec3f C, float om
 {
   const Vec3f T = normalize(C - A * dot(A, C));
   const float half_area = 0.5f * omega * u.x;
-  const float sin_half = std::sin(half_area), cos_half = std::cos(half_area);
-  const float q = (1.0f + dot(A, B)) * sin_half;
-  const float p = __builtin_fabsf(dot(cross(A, B), T)) * cos_half - dot(B, T) * sin_half;
+  const SinCos half = sin_cos_turn(half_area * (0.5f * kInvPi));
+  const float q = (1.0f + dot(A, B)) * half.sin;
+  const float p = __builtin_fabsf(dot(cross(A, B), T)) * half.cos - dot(B, T) * half.sin;
   const float scale = 1.0f / (sqr(p) + sqr(q));
   const Vec3f C_sub = A * ((sqr(p) - sqr(q)) * scale) + T * (2.0f * p * q * scale);
 

@@ -34,8 +34,8 @@ RELIEF_KERNEL SinCos sin_cos_turn(float turn)
 }
 
 /// Angle of the vector (x, y).
-/// @param y  >= 0; not 0 together with x
-/// @return   [0, π], with a relative error below 4e-7, however small
+/// @param y  >= 0
+/// @return   [0, π], with a relative error below 4e-7, however small; 0 of the zero vector
 /// @source   polynomial: Moshier, Cephes library, atanf
 RELIEF_KERNEL float angle_of(float y, float x)
 {
@@ -45,7 +45,7 @@ RELIEF_KERNEL float angle_of(float y, float x)
   // tan(a − π/4) = (tan a − 1) / (tan a + 1) brings what is above π/8 to below it.
   constexpr float kTanPiOver8 = 0.41421356f;
   const bool wide = low > kTanPiOver8 * high;
-  const float t = (wide ? low - high : low) / (wide ? low + high : high);
+  const float t = (wide ? low - high : low) / max(wide ? low + high : high, 1e-37f);
   const float z = t * t;
   const float polynomial =
       -3.33329491539e-1f + z * (1.99777106478e-1f + z * (-1.38776856032e-1f + z * 8.05374449538e-2f));

@@ -75,7 +75,7 @@ emit_from_area(const KernelGlobals& g, const Light& light, const Box3& box, Vec2
   const float cosine = dot(ray.D, light.axis);
   if (!(pdf > 0.0f) || !(light.two_sided || cosine > 0.0f)) return {};
   ray.power = radiance * (__builtin_fabsf(cosine) * light.area / pdf);
-  if (light.kind == LightKind::kTriangle) {
+  if (light.instance_index >= 0) {
     const Vec3f error = gamma_bound(8) * (abs(light.P) + abs(light.edge_u) + abs(light.edge_v));
     ray.O = offset_ray_origin(ray.O, error, cosine > 0.0f ? light.axis : -light.axis);
   }

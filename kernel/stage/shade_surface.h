@@ -27,8 +27,8 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   const LightSample light = lights_sample(g.lights, P, light_N, u.light_choice, u.light_uv);
   if (!(light.pdf > 0.0f)) return;
   Vec3f radiance = light.radiance;
-  const bool is_triangle = light.light_index >= 0 && g.lights.lights[light.light_index].kind == LightKind::kTriangle;
-  if (is_triangle) {
+  const bool is_mesh = light.light_index >= 0 && g.lights.lights[light.light_index].instance_index >= 0;
+  if (is_mesh) {
     // Any kernel may sample a textured or transparent emitter, so this is not a feature of the surface that is lit.
     const Light& emitter = g.lights.lights[light.light_index];
     const InstanceView& emitting = g.instances[emitter.instance_index];
@@ -58,7 +58,7 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   float t_max = light.distance;
   if (t_max < kInfinity) {
     Vec3f target = P + light.wi * light.distance;
-    if (is_triangle) {
+    if (is_mesh) {
       // Stop short of the emitter itself by the error bound of a point on it.
       const Light& emitter = g.lights.lights[light.light_index];
       const Vec3f error = gamma_bound(8) * (abs(emitter.P) + abs(emitter.edge_u) + abs(emitter.edge_v) + abs(P));

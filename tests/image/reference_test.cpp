@@ -35,7 +35,7 @@ constexpr std::array kReferences = {
     Reference{"instances", "examples/instances/instances.gltf", 4},
     Reference{"many_lights", "examples/many_lights/many_lights.gltf", 2},
     Reference{"spheres", "examples/spheres/spheres.gltf", 8},
-    Reference{"product", "examples/product/product.gltf", 8},
+    Reference{"product", "examples/product/product.gltf", 32},
     Reference{"glass", "examples/glass/glass.gltf", 8},
 };
 

@@ -15,7 +15,7 @@ Scene noisy_scene()
   Scene scene = empty_scene();
   add_object(scene, quad_mesh({-5, -1, -5}, {0, 0, 10}, {10, 0, 0}), diffuse_material({0.6f, 0.5f, 0.4f}));
   Material metal;
-  metal.roughness = 0.25f;
+  metal.roughness = 0.6f;
   add_object(scene, sphere_mesh(0.6f, 32, 16, true), metal);
   scene.environment.color = {0.2f, 0.25f, 0.3f};
   Light disk;
@@ -67,15 +67,11 @@ Scatter scatter(int samples, int num_runs)
 }
 
 // 3,072 values × 48 runs: the relative standard error of a ratio of variances is about √(2/47)·√(4/3072) ≈ 0.7 % for
-// Gaussian pixels; heavy tails and neighbours that share a tile's calibration raise it to some 3 %. Upwards the estimate
-// may err by what error_extrapolate does: a third at edges, up to twice where the integrand is smooth and v falls as
-// n^−3 (its docstring derives both).
+// Gaussian pixels of equal variance; unequal ones and neighbours that share a tile's calibration raise it to some 3 % (five
+// sets of seeds: .95 to 1.09 from 7 samples on, 1.14 to 1.19 at 2). A sharp highlight in the picture would make its two or
+// three pixels the whole of the variance, and the ratio as unsure as theirs.
 constexpr double kLeast = 0.88;
-constexpr double kMost = 1.55;
-// From one power of two to the next the claim swings, with the shape of the sampler's cells (same docstring): by .7 to 1.65
-// here, and by .77 to 1.45 when the sky still competed for the lamp's shadow rays and made the swing smaller with its noise.
-constexpr double kLeastOfSwing = 0.65;
-constexpr double kMostOfSwing = 1.75;
+constexpr double kMost = 1.3;
 
 struct ClaimRatios {
   double rmse_squared = 0, variance = 0;
@@ -97,18 +93,9 @@ void expect_between(const ClaimRatios& ratios, double least, double most)
 
 TEST(ErrorEstimate, ClaimedErrorIsTheScatterOfSeeds)
 {
-  std::vector<ClaimRatios> ratios;
   for (const int samples : {16, 32, 64, 128}) {
     SCOPED_TRACE(samples);
-    ratios.push_back(claim_ratios(samples));
-    expect_between(ratios.back(), kLeastOfSwing, kMostOfSwing);
-  }
-  // A whole swing: a power of four and its double.
-  for (std::size_t i = 0; i + 1 < ratios.size(); ++i) {
-    SCOPED_TRACE(i);
-    expect_between({std::sqrt(ratios[i].rmse_squared * ratios[i + 1].rmse_squared),
-                    std::sqrt(ratios[i].variance * ratios[i + 1].variance)},
-                   kLeast, kMost);
+    expect_between(claim_ratios(samples), kLeast, kMost);
   }
 }
 

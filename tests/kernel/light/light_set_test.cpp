@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numeric>
 
@@ -11,17 +12,18 @@
 namespace relief {
 namespace {
 
-/// A square in the xy plane as two triangles with uv = position; front towards +z.
-Mesh square_mesh()
+/// A parallelogram of area 1 in the xy plane as two triangles, with the uv of a square; front towards +z.
+/// @param skew  0: a square
+Mesh square_mesh(float skew = 0.5f)
 {
   Mesh mesh;
-  mesh.P = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  mesh.P = {{0, 0, 0}, {1, 0, 0}, {1 + skew, 1, 0}, {skew, 1, 0}};
   mesh.uv[0] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
   mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
   return mesh;
 }
 
-/// One emissive square a material, placed at x = 10 · index.
+/// One emissive parallelogram a material, placed at x = 10 · index.
 Scene squares(const std::vector<Material>& materials)
 {
   Scene scene;
@@ -67,6 +69,74 @@ TEST(LightSet, TrianglesOfAnInstanceAreConsecutiveAfterTheScenesLights)
     EXPECT_EQ(set.lights[i].emission, i < 5 ? (Vec3f{1, 2, 3}) : (Vec3f{4, 5, 6}));
     EXPECT_FLOAT_EQ(set.lights[i].area, 0.5f);
   }
+}
+
+/// The lights of one mesh that emits, turned, scaled and moved.
+LightSet lights_of(const Mesh& mesh, const Material& material = emissive({1, 2, 3}))
+{
+  Scene scene = squares({material});
+  scene.meshes[0] = mesh;
+  Affine3& m = scene.instances[0].world_from_object;
+  m.x = {0.6f * 3, 0.8f * 3, 0};
+  m.y = {0, 0, 3};
+  m.z = {0.8f * 3, -0.6f * 3, 0};
+  m.p = {7, -5, 2};
+  return light_set_make(scene, {});
+}
+
+TEST(LightSet, TwoTrianglesOfARectangleAreOneLight)
+{
+  for (const std::array<TriangleIndices, 2>& triangles :
+       {std::array<TriangleIndices, 2>{{{0, 1, 2}, {0, 2, 3}}}, {{{1, 2, 3}, {3, 0, 1}}}, {{{3, 1, 2}, {1, 3, 0}}}}) {
+    Mesh mesh = square_mesh(0);
+    for (Vec3f& P : mesh.P) P.x *= 2;
+    mesh.triangles.assign(triangles.begin(), triangles.end());
+    const LightSet set = lights_of(mesh);
+    ASSERT_EQ(set.lights.size(), 2u);
+    const Light& light = set.lights[0];
+    ASSERT_EQ(light.kind, LightKind::kRectangle);
+    EXPECT_FLOAT_EQ(light.area, 18);
+    EXPECT_NEAR(length(cross(2 * light.edge_u, 2 * light.edge_v)), 18, 1e-4);
+    EXPECT_NEAR(length(light.P - (Vec3f{7, -5, 2} + Vec3f{1.8f, 2.4f, 1.5f})), 0, 1e-5);
+    EXPECT_EQ(light.instance_index, 0);
+    EXPECT_TRUE(is_zero(set.lights[1].emission));
+    EXPECT_TRUE(set.area_lights.empty());
+    // Seen from its front, both triangles stand for the whole.
+    const LightsView view = set.view();
+    const Vec3f P = light.P + light.axis * 2;
+    const Vec3f wi = normalize(light.P + 0.3f * light.edge_u - P);
+    const float pdf = lights_pdf(view, P, {}, 0, wi, 2.1f);
+    EXPECT_GT(pdf, 0.0f);
+    EXPECT_EQ(lights_pdf(view, P, {}, 1, wi, 2.1f), pdf);
+    EXPECT_EQ(lights_sample(view, P, {}, 0.4f, {0.3f, 0.9f}).light_index, 0);
+  }
+}
+
+TEST(LightSet, TrianglesThatAreNoEvenRectangleStayApart)
+{
+  const auto expect_apart = [](const LightSet& set, const char* what) {
+    for (const Light& light : set.lights) {
+      EXPECT_EQ(light.kind, LightKind::kTriangle) << what;
+      EXPECT_EQ(light.whole_index, -1) << what;
+    }
+  };
+  expect_apart(lights_of(square_mesh(0.01f)), "skewed");
+  Mesh folded = square_mesh(0);
+  folded.P[3] = {1e-3f, 1, 0.1f};
+  expect_apart(lights_of(folded), "folded");
+  Mesh facing_away = square_mesh(0);
+  facing_away.triangles[1] = {0, 3, 2};
+  expect_apart(lights_of(facing_away), "one triangle faces away");
+  Mesh kite = square_mesh(0);
+  kite.P[3] = {0.5f, 0.5f, 0};
+  kite.triangles = {{0, 1, 2}, {1, 0, 3}};
+  expect_apart(lights_of(kite), "other triangle within the first");
+  Mesh degenerate = square_mesh(0);
+  degenerate.triangles = {{0, 0, 1}, {0, 1, 2}};
+  expect_apart(lights_of(degenerate), "no area");
+  Material blended = emissive({1, 1, 1});
+  blended.alpha_mode = AlphaMode::kBlend;
+  expect_apart(lights_of(square_mesh(0), blended), "transparent");
 }
 
 TEST(LightSet, FrontIsTheSurfacesFrontUnderEveryTransform)
