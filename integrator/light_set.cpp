@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -40,12 +41,24 @@ Cone cone_union(const Cone& a, const Cone& b)
   return {normalize(wide.axis * std::cos(by) + turn * (std::sin(by) / turn_length)), angle};
 }
 
+/// Mean over all directions of the part of its intensity that a light has there, and the same times three and the cosine
+/// to its axis: the expansion of that part to first order is mean + slope × cosine.
+struct LightProfile {
+  float mean = 1, slope = 0;
+};
+constexpr LightProfile kFlatProfile{1.0f / 4.0f, 1.0f / 2.0f};
+constexpr LightProfile kTwoSidedProfile{1.0f / 2.0f, 0.0f};
+/// One within a cone, nothing outside.
+LightProfile cone_profile(float cosine) { return {0.5f * (1.0f - cosine), 0.75f * (1.0f - cosine * cosine)}; }
+
 /// What the build knows of a light or a group; the tree's nodes are made from these.
 struct LightBounds {
   Vec3f low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
   Cone spread;
-  float falloff = 0;    ///< radians
-  float intensity = 0;  ///< 0: empty group
+  float falloff = 0;     ///< radians
+  LightProfile profile;  ///< of a light
+  bool is_flat = false;  ///< a light whose intensity is its cosine
+  float intensity = 0;   ///< 0: empty group
   bool two_sided = false;
 };
 
@@ -90,6 +103,7 @@ LightBounds light_bounds(const Light& light, float scale)
       const float outer = std::acos(std::clamp(light.cos_outer, -1.0f, 1.0f));
       bounds.spread = {light.axis, std::min(inner, outer)};
       bounds.falloff = std::max(outer - inner, 0.0f);
+      bounds.profile = cone_profile(std::cos(0.5f * (inner + outer)));
       bounds.intensity = emission;
       break;
     }
@@ -113,6 +127,8 @@ LightBounds light_bounds(const Light& light, float scale)
     bounds.falloff = 0.5f * kPiAngle;
     bounds.intensity = emission * light.area;
     bounds.two_sided = light.two_sided;
+    bounds.profile = light.two_sided ? kTwoSidedProfile : kFlatProfile;
+    bounds.is_flat = true;
   }
   const bool usable = bounds.intensity > 0.0f && is_finite(bounds.low) && is_finite(bounds.high);
   if (!usable) return {};
@@ -120,29 +136,93 @@ LightBounds light_bounds(const Light& light, float scale)
   return bounds;
 }
 
+struct BuildLight {
+  LightBounds bounds;
+  Vec3f centre;
+  std::uint32_t light_index = 0;
+};
+
+/// Intensity of a group by direction ω as a node keeps it: intensity × min(1, constant + slope · ω).
+struct GroupProfile {
+  float intensity = 0, constant = 1;
+  Vec3f slope{};
+};
+
+/// @param lights  the group's
+/// @param bounds  around all of them
+/// @return        not negative in any direction in which one of the lights emits, but for the points that a sphere around
+///                them covers
+GroupProfile group_profile(std::span<const BuildLight> lights, const LightBounds& bounds)
+{
+  if (lights.size() == 1 && bounds.is_flat) return {bounds.intensity, 0.0f, bounds.spread.axis};
+  const float reach = std::min(bounds.spread.angle + bounds.falloff, kPiAngle);
+  const float cos_reach = std::cos(reach);
+  if (cos_reach > 0.0f) {
+    // Spots: all of it within the inner cone, nothing beyond the outer one; where the two are nearly the same, the ramp is
+    // less steep and begins outside.
+    constexpr float kSteepest = 8.0f;
+    const float cos_full = std::max(std::cos(bounds.spread.angle), cos_reach + 0.5f / kSteepest);
+    const float steepness = std::min(1.0f / (cos_full - cos_reach), kSteepest);
+    return {bounds.intensity, 1.0f - steepness * cos_full, bounds.spread.axis * steepness};
+  }
+  double total = 0, mean = 0, x = 0, y = 0, z = 0;
+  for (const BuildLight& light : lights) {
+    const double weight = static_cast<double>(light.bounds.intensity);
+    const double slope = weight * static_cast<double>(light.bounds.profile.slope);
+    const Vec3f axis = light.bounds.spread.axis;
+    total += weight;
+    mean += weight * static_cast<double>(light.bounds.profile.mean);
+    x += slope * static_cast<double>(axis.x);
+    y += slope * static_cast<double>(axis.y);
+    z += slope * static_cast<double>(axis.z);
+  }
+  mean /= total;
+  const double first_order = std::sqrt(x * x + y * y + z * z) / total;
+  if (!(first_order > 1e-6)) return {bounds.intensity * static_cast<float>(mean), 1.0f, {}};
+  // The expansion is as it should be for lights that face in all directions, and too even for those that face in one,
+  // whose profile is max(0, cos) = 2 slope · ω: between the two we blend by how much the lights agree.
+  const double agreement = std::min(first_order / (2 * mean), 1.0);
+  double constant = mean * (1 - agreement);
+  const double steepness = first_order * (1 + agreement);
+  const Vec3f direction =
+      normalize(Vec3f{static_cast<float>(x / total), static_cast<float>(y / total), static_cast<float>(z / total)});
+  const double between = std::acos(std::clamp(static_cast<double>(dot(direction, bounds.spread.axis)), -1.0, 1.0));
+  constant =
+      std::max(constant, -steepness * std::cos(std::min(between + static_cast<double>(reach), std::numbers::pi)));
+  const double peak = constant + steepness;
+  // Mean over all directions of what is positive of it, which is made that of the lights.
+  const double kept = constant >= steepness ? constant : peak * peak / (4 * steepness);
+  return {static_cast<float>(total * peak * mean / kept), static_cast<float>(constant / peak),
+          direction * static_cast<float>(steepness / peak)};
+}
+
+/// Upper half of a float's bits (sign, exponent, 7 bits of mantissa), to the nearest.
+std::uint32_t upper_half(float v) { return (std::bit_cast<std::uint32_t>(v) + 0x8000u) >> 16; }
+/// The same of a number that is not negative, rounded up.
+std::uint32_t upper_half_above(float v) { return (std::bit_cast<std::uint32_t>(v) + 0xffffu) >> 16; }
+
 /// Writes one child of a node so that it holds all of a group.
 /// @param link  without the two-sided flag
-void child_write(LightTreeNode& node, std::size_t lane, const LightBounds& bounds, std::uint32_t link)
+void child_write(LightTreeBlock& block,
+                 std::size_t lane,
+                 const LightBounds& bounds,
+                 const GroupProfile& profile,
+                 std::uint32_t link)
 {
   const Vec3f centre = bounds_centre(bounds);
   const float half_diagonal = length(bounds.high * 0.5f - bounds.low * 0.5f);
-  node.cx[lane] = centre.x;
-  node.cy[lane] = centre.y;
-  node.cz[lane] = centre.z;
+  block.cx[lane] = centre.x;
+  block.cy[lane] = centre.y;
+  block.cz[lane] = centre.z;
+  block.intensity[lane] = std::min(profile.intensity, 1e30f);
   // A few ulps for the roundings of centre and diagonal; a lone point light keeps radius 0.
   const float rounding = half_diagonal > 0.0f ? 4e-7f * max_component(abs(centre)) : 0.0f;
-  node.radius_bits[lane] = light_tree_encode_radius(half_diagonal * (1.0f + 1e-6f) + rounding);
-  node.intensity[lane] = bounds.intensity;
-  const auto quantize = [](float v) {
-    return static_cast<std::int16_t>(std::lround(std::clamp(v, -1.0f, 1.0f) * 32767.0f));
-  };
-  // The rounding of the axis, 3e-5 rad, is a hundredth of what light_tree_estimate allows for.
-  node.ax[lane] = quantize(bounds.spread.axis.x);
-  node.ay[lane] = quantize(bounds.spread.axis.y);
-  node.az[lane] = quantize(bounds.spread.axis.z);
-  node.cos_spread[lane] = light_tree_encode_cos(std::cos(std::min(bounds.spread.angle, kPiAngle)));
-  node.cos_falloff[lane] = light_tree_encode_cos(std::cos(bounds.falloff));
-  node.link[lane] = link | (bounds.two_sided ? kLightTreeTwoSided : 0u);
+  const float radius = half_diagonal * (1.0f + 1e-6f) + rounding;
+  const float emission_radius = radius * (length(profile.slope) + std::abs(profile.constant));
+  block.radii[lane] = upper_half_above(emission_radius) | upper_half_above(radius) << 16;
+  block.slope_xy[lane] = upper_half(profile.slope.x) | upper_half(profile.slope.y) << 16;
+  block.slope_z_constant[lane] = upper_half(profile.slope.z) | upper_half(profile.constant) << 16;
+  block.link[lane] = link | (bounds.two_sided ? kLightTreeTwoSided : 0u);
 }
 
 /// Cost of a group by its orientation: solid angle of its emission, weighted by the cosine it falls off with.
@@ -164,12 +244,6 @@ float group_cost(const LightBounds& bounds)
   const Vec3f d = bounds.high - bounds.low;
   return bounds.intensity * orientation_cost(bounds) * (d.x * d.y + d.y * d.z + d.z * d.x);
 }
-
-struct BuildLight {
-  LightBounds bounds;
-  Vec3f centre;
-  std::uint32_t light_index = 0;
-};
 
 float component(Vec3f v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
@@ -253,7 +327,7 @@ struct Group {
   float cost = 0;
 };
 
-/// Splits a range into up to eight groups: always the one with the greatest cost, until there are enough.
+/// Splits a range into up to kLightTreeWidth groups: always the one with the greatest cost, until there are enough.
 /// @param balanced  groups of equal numbers of lights instead
 std::vector<Group> range_groups(std::span<BuildLight> lights, bool balanced)
 {
@@ -284,8 +358,8 @@ struct Branch {
 /// @param depth  of the node, root 0
 Branch branch_make(std::span<BuildLight> lights, int depth)
 {
-  // From this depth on groups are balanced: nine more levels hold 8^9 lights, so no trail is too long.
-  constexpr int kBalancedFrom = kLightTreeMaxDepth - 9;
+  // From this depth on groups are balanced: six more levels hold 32^6 lights, so no trail is too long.
+  constexpr int kBalancedFrom = kLightTreeMaxDepth - 6;
   // Below this size a task costs more than it saves.
   constexpr std::size_t kParallelLights = 2048;
   Branch branch{range_groups(lights, depth >= kBalancedFrom), {}};
@@ -304,13 +378,15 @@ Branch branch_make(std::span<BuildLight> lights, int depth)
 /// Gives a branch and all below it their places, depth first, so that the layout does not depend on threads.
 /// @param trail  way to the branch
 /// @param depth  of the branch: the trail's length
+/// @return       link to the branch
 std::uint32_t branch_write(const Branch& branch, LightTrail trail, int depth, LightSet& set)
 {
-  const auto index = static_cast<std::uint32_t>(set.nodes.size());
-  set.nodes.emplace_back();
+  const std::size_t first = set.tree_blocks.size();
+  const std::size_t num_blocks = (branch.groups.size() + kLightTreeLanes - 1) / kLightTreeLanes;
+  set.tree_blocks.resize(first + num_blocks);
   for (std::size_t i = 0; i < branch.groups.size(); ++i) {
     const Group& group = branch.groups[i];
-    const LightTrail child_trail = trail | static_cast<LightTrail>(i) << (3 * depth);
+    const LightTrail child_trail = trail | static_cast<LightTrail>(i) << (kLightTreeTrailBits * depth);
     std::uint32_t link = 0;
     if (group.lights.size() == 1) {
       link = group.lights[0].light_index | kLightTreeLeaf;
@@ -318,9 +394,10 @@ std::uint32_t branch_write(const Branch& branch, LightTrail trail, int depth, Li
     } else {
       link = branch_write(branch.below[i], child_trail, depth + 1, set);
     }
-    child_write(set.nodes[index], i, group.range.bounds, link);
+    child_write(set.tree_blocks[first + i / kLightTreeLanes], i % kLightTreeLanes, group.range.bounds,
+                group_profile(group.lights, group.range.bounds), link);
   }
-  return index;
+  return static_cast<std::uint32_t>(first) | static_cast<std::uint32_t>(num_blocks - 1) << kLightTreeBlocksShift;
 }
 
 /// Mean of an emission texture over a triangle, as a scalar.
@@ -501,8 +578,8 @@ void light_set_build_tree(LightSet& set, std::span<const float> intensity_scales
   }
 
   set.light_trails.assign(set.lights.size(), 0u);
-  set.nodes.clear();
-  if (!finite.empty()) branch_write(branch_make(finite, 0), 0, 0, set);
+  set.tree_blocks.clear();
+  if (!finite.empty()) set.tree_root = branch_write(branch_make(finite, 0), 0, 0, set);
 }
 
 LightSet light_set_make(const Scene& scene, std::span<const TextureView> textures, EnvironmentDensity density)
@@ -538,6 +615,7 @@ LightSet light_set_make(const Scene& scene, std::span<const TextureView> texture
     tbb::parallel_for(std::uint32_t{0}, mesh.num_triangles, [&](std::uint32_t triangle) {
       Light light = triangle_light(instance, mesh, triangle, material.double_sided);
       light.emission = material.emission;
+      light.is_even = emission_is_even(material);
       light.casts_caustics = (instance.flags & kNoCausticLight) == 0;
       light.instance_index = static_cast<std::int32_t>(i);
       set.lights[first + triangle] = light;
@@ -569,11 +647,11 @@ LightsView LightSet::view() const
   LightsView v;
   v.lights = lights.data();
   v.num_lights = static_cast<std::uint32_t>(lights.size());
-  v.nodes = nodes.empty() ? nullptr : nodes.data();
+  v.tree = {tree_blocks.empty() ? nullptr : tree_blocks.data(), tree_root};
   v.light_trails = light_trails.data();
-  const bool one_finite = nodes.size() == 1 && nodes[0].intensity[1] == 0.0f;
+  const bool one_finite = tree_blocks.size() == 1 && tree_blocks[0].intensity[1] == 0.0f;
   if (one_finite && suns.empty() && !(environment_irradiance.mean > 0.0f)) {
-    v.only_light = static_cast<std::int32_t>(nodes[0].link[0] & kLightTreeIndexMask);
+    v.only_light = static_cast<std::int32_t>(tree_blocks[0].link[0] & kLightTreeIndexMask);
   }
   v.suns = suns.data();
   v.num_suns = static_cast<std::uint32_t>(suns.size());
@@ -588,7 +666,7 @@ std::size_t LightSet::bytes() const
 {
   return lights.size() * sizeof(Light) + first_light_index.size() * sizeof(std::int32_t) +
          (area_lights.size() + suns.size()) * sizeof(std::uint32_t) + light_trails.size() * sizeof(LightTrail) +
-         nodes.size() * sizeof(LightTreeNode) + environment.bytes();
+         tree_blocks.size() * sizeof(LightTreeBlock) + environment.bytes();
 }
 
 }  // namespace relief

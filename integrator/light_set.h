@@ -18,8 +18,9 @@ struct LightSet {
   std::vector<std::int32_t> first_light_index;  ///< one an instance: light of its triangle 0; −1: does not emit
   std::vector<std::uint32_t> area_lights;       ///< rectangles and disks: what rays can hit besides meshes
   std::vector<std::uint32_t> suns;
-  std::vector<LightTrail> light_trails;  ///< one a light
-  std::vector<LightTreeNode> nodes;      ///< empty: no finite light can be chosen
+  std::vector<LightTrail> light_trails;     ///< one a light
+  std::vector<LightTreeBlock> tree_blocks;  ///< empty: no finite light can be chosen
+  std::uint32_t tree_root = 0;              ///< as LightTreeBlock::link
   EnvironmentTables environment;
   EnvironmentIrradiance environment_irradiance;  ///< of what next-event estimation samples of it
   float environment_yields_to = kInfinity;       ///< see LightsView
@@ -28,7 +29,7 @@ struct LightSet {
   bool environment_casts_caustics = true;  ///< as Light::casts_caustics
 
   /// @return false: nothing can be sampled
-  bool any() const { return !nodes.empty() || !suns.empty() || environment_irradiance.mean > 0; }
+  bool any() const { return !tree_blocks.empty() || !suns.empty() || environment_irradiance.mean > 0; }
   /// Valid while this object is neither changed nor moved.
   LightsView view() const;
   std::size_t bytes() const;
@@ -43,12 +44,12 @@ struct LightSet {
 /// @param density   of the environment: kExcess where paths that follow the BSDF find what it leaves out, which for a
 ///                  constant environment beside suns is all
 /// @return          same bits for the same scene, whatever the thread count
-/// @cost            about 100 bytes a light for the light and 70 for its place in the tree
+/// @cost            128 bytes a light, and about 80 for its place in the tree
 LightSet light_set_make(const Scene& scene,
                         std::span<const TextureView> textures,
                         EnvironmentDensity density = EnvironmentDensity::kExcess);
 
-/// The same from parts, without a scene: fills trails, suns, area_lights, and nodes from `lights`.
+/// The same from parts, without a scene: fills trails, suns, area_lights, and the tree from `lights`.
 /// @param intensity_scales  one a light, >= 0: mean of the texture that will multiply its emission; empty: all 1. A light
 ///                          whose emission times scale is zero is never chosen
 void light_set_build_tree(LightSet& set, std::span<const float> intensity_scales);

@@ -15,12 +15,13 @@ enum class SpotFalloff : std::uint8_t {
   kSmoothCosine,  ///< the same times the cosine of the angle to the axis
 };
 
-/// One emitter in world space. Which fields mean something depends on `kind`.
-struct Light {
+/// One emitter in world space. Which fields mean something depends on `kind`. Two cache lines.
+struct alignas(64) Light {
   LightKind kind = LightKind::kPoint;
   SpotFalloff falloff = SpotFalloff::kSquare;
   bool two_sided = false;         ///< rectangle, disk, triangle
   bool visible_to_camera = true;  ///< rectangle, disk
+  bool is_even = true;            ///< triangle: all its points send out `emission`, see emission_is_even
   bool casts_caustics = true;     ///< photons start from it, where there is a photon pass
   Vec3f P{};                      ///< position or centre, metres (triangle: first vertex)
   Vec3f axis{0, 0, -1};           ///< unit: spot and sun: direction of travel; rectangle, disk, triangle: emitting side

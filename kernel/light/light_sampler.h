@@ -51,7 +51,7 @@ RELIEF_KERNEL float environment_irradiance_eval(const EnvironmentIrradiance& irr
 struct LightsView {
   const Light* lights = nullptr;
   std::uint32_t num_lights = 0;
-  const LightTreeNode* nodes = nullptr;      ///< light tree, root first; null: no finite light
+  LightTreeView tree;                        ///< without blocks: no finite light
   const LightTrail* light_trails = nullptr;  ///< one a light
   std::int32_t only_light = -1;              ///< the one finite light, where nothing else can be chosen
   const std::uint32_t* suns = nullptr;       ///< indices into `lights`
@@ -92,7 +92,7 @@ RELIEF_KERNEL LightGroups light_groups_eval(const LightsView& view, Vec3f P, Vec
   for (std::uint32_t i = 0; i < view.num_suns; ++i) {
     groups.sun_sum += light_sun_importance(view.lights[view.suns[i]], N);
   }
-  if (view.nodes != nullptr) groups.finite_root = light_tree_estimate(view.nodes[0], P, N);
+  if (view.tree.blocks != nullptr) light_tree_estimate(view.tree, view.tree.root, P, N, groups.finite_root);
 
   float environment = 0.0f;
   if (view.environment_irradiance.mean > 0.0f &&
@@ -176,57 +176,71 @@ RELIEF_KERNEL float light_environment_pdf(const EnvironmentView& environment, Ve
   return environment_pdf(environment, wi);
 }
 
-/// Chooses one light or the environment by estimated contribution at P and samples it.
+/// A light that lights_choose found.
+struct LightsChoice {
+  std::int32_t light_index = -1;  ///< −1: environment
+  float probability = 0;          ///< 0: none
+};
+
+/// Chooses one light or the environment by estimated contribution at P, and starts to fetch it.
 /// @param P         world
 /// @param N         unit shading normal when only light from its side matters; zero vector: light from all sides does
 /// @param u_choice  [0, 1)
-/// @param u         [0, 1)²
-/// @return          pdf includes the choice; see LightSample
-RELIEF_KERNEL LightSample lights_sample(const LightsView& view, Vec3f P, Vec3f N, float u_choice, Vec2f u)
+/// @param u         what lights_sample_chosen will be given
+RELIEF_KERNEL LightsChoice lights_choose(const LightsView& view, Vec3f P, Vec3f N, float u_choice, Vec2f u)
 {
-  if (view.only_light >= 0) {
-    LightSample sample = light_sample(view.lights[view.only_light], P, u);
-    sample.light_index = view.only_light;
-    return sample;
-  }
+  if (view.only_light >= 0) return {view.only_light, 1.0f};
   const LightGroups groups = light_groups_eval(view, P, N);
   // A deep tree wants more bits than a float has; the ones of the point on the light serve as the missing low ones.
   const std::uint64_t low_bits = hash_mix((static_cast<std::uint64_t>(__builtin_bit_cast(std::uint32_t, u.x)) << 32) |
                                           __builtin_bit_cast(std::uint32_t, u.y));
   double choice = static_cast<double>(u_choice) + static_cast<double>(low_bits >> 32) * 0x1p-56;
 
-  LightSample sample;
   const double p_environment = static_cast<double>(groups.environment);
   const double p_suns = static_cast<double>(groups.suns);
-  if (choice < p_environment) {
-    sample = light_environment_sample(view.environment, N, u);
-    sample.pdf *= groups.environment;
-    return sample;
-  }
+  if (choice < p_environment) return {-1, groups.environment};
   choice -= p_environment;
   if (choice < p_suns) {
     float target = static_cast<float>(choice / p_suns) * groups.sun_sum;
+    LightsChoice chosen;
     for (std::uint32_t i = 0; i < view.num_suns; ++i) {
-      const Light& sun = view.lights[view.suns[i]];
-      const float importance = light_sun_importance(sun, N);
+      const float importance = light_sun_importance(view.lights[view.suns[i]], N);
       if (!(importance > 0.0f)) continue;
-      sample = sun_light_sample(sun);
-      sample.pdf = groups.suns * importance / groups.sun_sum;
-      sample.light_index = static_cast<std::int32_t>(view.suns[i]);
+      chosen = {static_cast<std::int32_t>(view.suns[i]), groups.suns * importance / groups.sun_sum};
       if (target < importance) break;
       target -= importance;
     }
-    return sample;
+    return chosen;
   }
-  if (!(groups.finite > 0.0f)) return sample;
+  if (!(groups.finite > 0.0f)) return {};
   const double in_group = (choice - p_suns) / static_cast<double>(groups.finite);
-  const LightChoice chosen =
-      light_tree_sample(view.nodes, groups.finite_root, P, N, in_group < 1.0 ? in_group : 0x1.fffffep-1);
-  if (!(chosen.probability > 0.0f)) return sample;
-  sample = light_sample(view.lights[chosen.light_index], P, u);
-  sample.pdf *= groups.finite * chosen.probability;
-  sample.light_index = static_cast<std::int32_t>(chosen.light_index);
+  const LightChoice chosen = light_tree_sample(view.tree, groups.finite_root, P, N, in_group);
+  // Among thousands of lights this one is in no near cache; what the caller does meanwhile hides half of the wait.
+  const Light* light = &view.lights[chosen.light_index];
+  __builtin_prefetch(light);
+  __builtin_prefetch(reinterpret_cast<const char*>(light) + 64);
+  return {static_cast<std::int32_t>(chosen.light_index), groups.finite * chosen.probability};
+}
+
+/// Samples a light that lights_choose has chosen.
+/// @param N  as handed to it
+/// @param u  [0, 1)²
+/// @return   pdf includes the choice; see LightSample
+RELIEF_KERNEL LightSample lights_sample_chosen(const LightsView& view, LightsChoice chosen, Vec3f P, Vec3f N, Vec2f u)
+{
+  if (!(chosen.probability > 0.0f)) return {};
+  LightSample sample = chosen.light_index < 0 ? light_environment_sample(view.environment, N, u)
+                                              : light_sample(view.lights[chosen.light_index], P, u);
+  sample.pdf *= chosen.probability;
+  sample.light_index = chosen.light_index;
   return sample;
+}
+
+/// Chooses one light or the environment by estimated contribution at P and samples it.
+/// @param P, N, u_choice, u  as in lights_choose
+RELIEF_KERNEL LightSample lights_sample(const LightsView& view, Vec3f P, Vec3f N, float u_choice, Vec2f u)
+{
+  return lights_sample_chosen(view, lights_choose(view, P, N, u_choice, u), P, N, u);
 }
 
 /// Density with which lights_sample, called at P, would have made a ray that hit an area light.
@@ -250,8 +264,7 @@ RELIEF_KERNEL float lights_pdf(const LightsView& view,
     return chosen ? light_pdf(view.lights[light_index], P, wi, distance) : 0.0f;
   }
   const LightGroups groups = light_groups_eval(view, P, N);
-  const float choice =
-      light_tree_pdf(view.nodes, groups.finite_root, P, N, light_index, view.light_trails[light_index]);
+  const float choice = light_tree_pdf(view.tree, groups.finite_root, P, N, light_index, view.light_trails[light_index]);
   if (!(choice > 0.0f)) return 0.0f;
   return groups.finite * choice * light_pdf(view.lights[light_index], P, wi, distance);
 }
@@ -260,7 +273,7 @@ RELIEF_KERNEL float lights_pdf(const LightsView& view,
 RELIEF_KERNEL float lights_environment_pdf(const LightsView& view, Vec3f P, Vec3f N, Vec3f wi)
 {
   if (!(view.environment_irradiance.mean > 0.0f)) return 0.0f;
-  const bool alone = view.num_suns == 0 && view.nodes == nullptr;
+  const bool alone = view.num_suns == 0 && view.tree.blocks == nullptr;
   const float probability = alone ? 1.0f : light_groups_eval(view, P, N).environment;
   return probability * light_environment_pdf(view.environment, N, wi);
 }

@@ -11,30 +11,31 @@
 namespace relief {
 
 /// Queues a shadow ray towards a light sample taken at the hit.
+/// @param chosen, light_u, light_N  from and given to lights_choose
 template <unsigned kFeatures>
 RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
                                        const PathState& state,
                                        std::uint32_t path,
                                        const SurfaceInteraction& at,
                                        const SurfaceClosure& closure,
+                                       LightsChoice chosen,
+                                       Vec2f light_u,
                                        Vec3f light_N,
                                        RayCone cone,
-                                       const ScatterSamples& u,
                                        ShadowQueue& shadow)
 {
   const Vec3f P = at.hit.P;
   const int bounce = path_bounces(state.bounces[path], BounceKind::kAll);
-  const LightSample light = lights_sample(g.lights, P, light_N, u.light_choice, u.light_uv);
+  const LightSample light = lights_sample_chosen(g.lights, chosen, P, light_N, light_u);
   if (!(light.pdf > 0.0f)) return;
   Vec3f radiance = light.radiance;
   const bool is_mesh = light.light_index >= 0 && g.lights.lights[light.light_index].instance_index >= 0;
   if (is_mesh) {
     // Any kernel may sample a textured or transparent emitter, so this is not a feature of the surface that is lit.
     const Light& emitter = g.lights.lights[light.light_index];
-    const InstanceView& emitting = g.instances[emitter.instance_index];
-    const Material& material = g.materials[emitting.material_index];
-    if (!emission_is_even(material)) {
-      radiance = triangle_emission(material, g.textures, g.meshes[emitting.mesh_index],
+    if (!emitter.is_even) {
+      const InstanceView& emitting = g.instances[emitter.instance_index];
+      radiance = triangle_emission(g.materials[emitting.material_index], g.textures, g.meshes[emitting.mesh_index],
                                    static_cast<std::uint32_t>(emitter.triangle_index), light.barycentric);
     }
   }
@@ -209,17 +210,24 @@ template <unsigned kFeatures>
 
   RayCone cone = at.cone;
   if ((instance.flags & kDisplaced) != 0) cone.width = min(cone.width, state.hit_width[path]);
-  const SurfaceClosure closure = surface_closure_make<kFeatures>(params, *g.bsdf_tables, wo_local);
   const Vec3f light_N = params.transmission > 0.0f ? Vec3f{} : side.Ns;
+  LightsChoice chosen;
   if (g.has_lights && !surface_is_delta(params)) {
-    shade_surface_light<kFeatures>(g, state, path, at, closure, light_N, cone, u, shadow);
+    chosen = lights_choose(g.lights, at.hit.P, light_N, u.light_choice, u.light_uv);
+  }
+
+  // While the chosen light is on its way from memory, the BSDF is sampled.
+  const SurfaceClosure closure = surface_closure_make<kFeatures>(params, *g.bsdf_tables, wo_local);
+  BsdfSample bsdf = closure_sample<kFeatures>(closure, *g.bsdf_tables, u.bsdf_lobe, u.bsdf_uv);
+
+  if (chosen.probability > 0.0f) {
+    shade_surface_light<kFeatures>(g, state, path, at, closure, chosen, u.light_uv, light_N, cone, shadow);
   }
 
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
     shade_surface_photons<kFeatures>(g, state, path, at, closure, wo_local);
   }
 
-  BsdfSample bsdf = closure_sample<kFeatures>(closure, *g.bsdf_tables, u.bsdf_lobe, u.bsdf_uv);
   if (!(bsdf.pdf > 0.0f)) return;
   const Vec3f wi = from_local(side.frame, bsdf.wi);
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {

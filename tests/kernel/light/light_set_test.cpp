@@ -48,7 +48,9 @@ Material emissive(Vec3f emission)
 float choice_probability(const LightSet& set, Vec3f P, std::uint32_t light)
 {
   const LightsView view = set.view();
-  return light_tree_pdf(view.nodes, light_tree_estimate(view.nodes[0], P, {}), P, {}, light, view.light_trails[light]);
+  LightEstimates root;
+  light_tree_estimate(view.tree, view.tree.root, P, {}, root);
+  return light_tree_pdf(view.tree, root, P, {}, light, view.light_trails[light]);
 }
 
 TEST(LightSet, TrianglesOfAnInstanceAreConsecutiveAfterTheScenesLights)
