@@ -33,7 +33,7 @@ constexpr std::array kReferences = {
     Reference{"glass_gem", "tests/references/glass_gem.gltf", 16},
     Reference{"cornell", "examples/cornell/cornell.gltf", 16},
     Reference{"instances", "examples/instances/instances.gltf", 4},
-    Reference{"many_lights", "examples/many_lights/many_lights.gltf", 2},
+    Reference{"many_lights", "examples/many_lights/many_lights.gltf", 8},
     Reference{"spheres", "examples/spheres/spheres.gltf", 8},
     Reference{"product", "examples/product/product.gltf", 32},
     Reference{"glass", "examples/glass/glass.gltf", 8},
