@@ -1,7 +1,6 @@
 // Instances of displaced meshes: they share one structure, and are met where their transforms put them.
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <random>
 #include <string>
 #include <vector>
@@ -33,19 +32,7 @@ Scene instances_of_a_sphere(const std::vector<Affine3>& transforms, Displacement
     if (determinant(transforms[k]) < 0) instance.flags |= kMirrored;
     scene.instances.push_back(instance);
   }
-  std::mt19937 random(5);
-  auto texels = std::make_shared<std::vector<std::uint16_t>>();
-  for (int k = 0; k < kSize * kSize; ++k) texels->push_back(static_cast<std::uint16_t>(random()));
-  HeightMap map;
-  map.label = "noise";
-  map.width = map.height = kSize;
-  map.texels = std::shared_ptr<const void>(texels, texels->data());
-  scene.height_maps.push_back(map);
-  DisplacementSettings settings;
-  settings.height.texture_index = 0;
-  settings.scale = 0.1f;
-  settings.method = method;
-  scene.displacements.push_back(settings);
+  add_displacement(scene, kSize, noise_texels(kSize, 5), 0.1f).method = method;
   return scene;
 }
 

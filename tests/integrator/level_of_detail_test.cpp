@@ -1,5 +1,5 @@
 // Levels of detail in the renderer: rays that leave a surface see it as the ray that found it did.
-#include <random>
+#include <memory>
 
 #include "tests/support/render_scene.h"
 #include "tests/support/scene_builder.h"
@@ -18,19 +18,7 @@ Scene noisy_plane(float scale)
   Material material = diffuse_material({1, 1, 1});
   material.displacement_index = 0;
   add_object(scene, plane, material);
-  std::mt19937 random(3);
-  auto texels = std::make_shared<std::vector<std::uint16_t>>();
-  for (int i = 0; i < kSize * kSize; ++i) texels->push_back(static_cast<std::uint16_t>(random()));
-  HeightMap map;
-  map.label = "noise";
-  map.width = map.height = kSize;
-  map.texels = std::shared_ptr<const void>(texels, texels->data());
-  scene.height_maps.push_back(map);
-  DisplacementSettings settings;
-  settings.height.texture_index = 0;
-  settings.scale = scale;
-  settings.lod = -1;
-  scene.displacements.push_back(settings);
+  add_displacement(scene, kSize, noise_texels(kSize, 3), scale).lod = -1;
   Light sun;
   sun.kind = LightKind::kSun;
   sun.axis = {0, 0, -1};

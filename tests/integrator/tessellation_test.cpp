@@ -1,6 +1,7 @@
 // Tessellated displacement in the renderer: the same scene as by the exact method, within what tessellation leaves out.
 #include <random>
 #include <string>
+#include <utility>
 
 #include "integrator/trace.h"
 #include "kernel/shape/surface_hit.h"
@@ -30,22 +31,14 @@ Scene displaced_scene(AlphaMode alpha_mode)
   add_object(scene, sphere, material, {{1, 0, 0}, {0.2f, 1, 0}, {0, 0, -1.2f}, {0, 0, 0}});
   add_object(scene, quad_mesh({-9, -1.4f, 9}, {18, 0, 0}, {0, 0, -18}), diffuse_material({0.5f, 0.5f, 0.5f}));
 
-  auto texels = std::make_shared<std::vector<std::uint16_t>>();
+  std::vector<std::uint16_t> texels;
   for (int y = 0; y < kSize; ++y) {
     for (int x = 0; x < kSize; ++x) {
       const double h = 0.5 + 0.4 * std::sin(2 * 3.14159265 * x / kSize) * std::sin(2 * 3.14159265 * y / kSize);
-      texels->push_back(static_cast<std::uint16_t>(65535 * h));
+      texels.push_back(static_cast<std::uint16_t>(65535 * h));
     }
   }
-  HeightMap map;
-  map.label = "waves";
-  map.width = map.height = kSize;
-  map.texels = std::shared_ptr<const void>(texels, texels->data());
-  scene.height_maps.push_back(map);
-  DisplacementSettings settings;
-  settings.height.texture_index = 0;
-  settings.scale = kScale;
-  scene.displacements.push_back(settings);
+  add_displacement(scene, kSize, std::move(texels), kScale);
   scene.environment.color = {1, 1, 1};
   return scene;
 }

@@ -2,7 +2,11 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 #include <memory>
+#include <random>
+#include <utility>
+#include <vector>
 
 #include "scene/scene.h"
 #include "scene/texture_store.h"
@@ -83,6 +87,33 @@ inline void add_object(Scene& scene, Mesh mesh, const Material& material, const 
   instance.world_from_object = world_from_object;
   if (determinant(world_from_object) < 0) instance.flags |= kMirrored;
   scene.instances.push_back(instance);
+}
+
+/// Adds a square height map and what displaces by it, as displacement and texture 0, 1, … of the scene.
+/// @param texels  16 bit, size² of them, the upper row first
+/// @param scale   metres from black to white
+inline DisplacementSettings& add_displacement(Scene& scene, int size, std::vector<std::uint16_t> texels, float scale)
+{
+  const auto owned = std::make_shared<const std::vector<std::uint16_t>>(std::move(texels));
+  HeightMap map;
+  map.label = "made by a test";
+  map.width = map.height = size;
+  map.texels = std::shared_ptr<const void>(owned, owned->data());
+  scene.height_maps.push_back(map);
+  DisplacementSettings settings;
+  settings.height.texture_index = static_cast<std::int32_t>(scene.height_maps.size()) - 1;
+  settings.scale = scale;
+  scene.displacements.push_back(settings);
+  return scene.displacements.back();
+}
+
+/// Texels of noise.
+inline std::vector<std::uint16_t> noise_texels(int size, unsigned seed)
+{
+  std::mt19937 random(seed);
+  std::vector<std::uint16_t> texels(static_cast<std::size_t>(size) * static_cast<std::size_t>(size));
+  for (std::uint16_t& texel : texels) texel = static_cast<std::uint16_t>(random());
+  return texels;
 }
 
 }  // namespace relief::test
