@@ -247,9 +247,11 @@ template <unsigned kFeatures>
 
   // Russian roulette with the square root of the throughput: a gentler rate than the throughput itself, which measured
   // less noise at equal time (as Cycles and others found). What refraction takes on entering glass is not a loss: it
-  // comes back on leaving (pbrt-v4 §14.5.4). The first indirect ray is spared: what it finds, a lamp in a mirror say, is
-  // most of the noise of many pictures (19 % more variance with an environment, for 9 % less time).
-  if (bounce > 1) {
+  // comes back on leaving (pbrt-v4 §14.5.4). The first indirect ray is spared, and the second if it is no diffuse one: what
+  // such a ray finds, a lamp in a mirror say, is most of the noise of many pictures. (Rolling for the second of every kind
+  // costs 7 % of efficiency under an environment, sparing the second of every kind up to 12 % in crowded scenes.)
+  const bool diffuse = (bsdf.lobe & kLobeDiffuse) != 0;
+  if (bounce > (diffuse ? 0 : 1)) {
     const float survival = min(1.0f, __builtin_sqrtf(max_component(throughput) * eta_scale));
     if (!(u.roulette < survival)) return;
     throughput *= 1.0f / survival;
@@ -264,9 +266,9 @@ template <unsigned kFeatures>
   state.scatter_Ny[path] = light_N.y;
   state.scatter_Nz[path] = light_N.z;
   const bool transmitted = (bsdf.lobe & kLobeTransmit) != 0;
-  const BounceKind kind = transmitted                       ? BounceKind::kTransmission
-                          : (bsdf.lobe & kLobeDiffuse) != 0 ? BounceKind::kDiffuse
-                                                            : BounceKind::kGlossy;
+  const BounceKind kind = transmitted ? BounceKind::kTransmission
+                          : diffuse   ? BounceKind::kDiffuse
+                                      : BounceKind::kGlossy;
   state.bounces[path] = bounces + 1u + (1u << static_cast<int>(kind));
   if constexpr ((kFeatures & kFeatureTransmission) != 0) {
     if (transmitted && solid) {
