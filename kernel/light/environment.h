@@ -48,9 +48,7 @@ RELIEF_KERNEL Vec2f environment_uv(const EnvironmentView& environment, Vec3f wi)
 /// Radiance at a position of the map, from environment_uv.
 RELIEF_KERNEL Vec3f environment_eval_uv(const EnvironmentView& environment, Vec2f uv)
 {
-  if (!environment.has_map) {
-    return environment.color;
-  }
+  if (!environment.has_map) return environment.color;
   // Half a texel from the poles the first and last rows are repeated, whatever the texture's own wrap mode.
   const float half_texel = 0.5f / static_cast<float>(environment.map.height);
   const Vec2f inside{uv.x, clamp(uv.y, half_texel, 1.0f - half_texel)};
@@ -64,6 +62,7 @@ RELIEF_KERNEL Vec3f environment_eval_uv(const EnvironmentView& environment, Vec2
 /// @return    W/m²/sr, >= 0
 RELIEF_KERNEL Vec3f environment_eval(const EnvironmentView& environment, Vec3f wi)
 {
+  if (!environment.has_map) return environment.color;
   return environment_eval_uv(environment, environment_uv(environment, wi));
 }
 

@@ -52,10 +52,18 @@ RELIEF_KERNEL Vec3f rectangle_light_point(const Light& light, Vec3f P, float ome
   const double n0 = -y0 / __builtin_sqrt(z0_squared + y0 * y0);
   const double n2 = y1 / __builtin_sqrt(z0_squared + y1 * y1);
   const double n3 = -x0 / __builtin_sqrt(z0_squared + x0 * x0);
-  const double k = 2.0 * 3.14159265358979323846 - std::acos(-n2 * n3) - std::acos(-n3 * n0);
-
-  const double au = static_cast<double>(u.x) * static_cast<double>(omega) + k;
-  const double fu = (std::cos(au) * n0 - n2) / std::sin(au);
+  // The paper's angles k = 2π − acos(−n2 n3) − acos(−n3 n0) and au = u Ω + k, as sines and cosines.
+  const double cos_2 = -n2 * n3, cos_0 = -n3 * n0;
+  const double sin_2 = __builtin_sqrt(1.0 - cos_2 * cos_2), sin_0 = __builtin_sqrt(1.0 - cos_0 * cos_0);
+  const double cos_k = cos_2 * cos_0 - sin_2 * sin_0;
+  const double sin_k = -sin_2 * cos_0 - cos_2 * sin_0;
+  // Half the angle in float: a relative error stays one, on lights however small.
+  const SinCos half = sin_cos_turn(u.x * omega * (0.25f * kInvPi));
+  const double sin_half = static_cast<double>(half.sin), cos_half = static_cast<double>(half.cos);
+  const double sin_turned = 2.0 * sin_half * cos_half, cos_turned = 1.0 - 2.0 * sin_half * sin_half;
+  const double cos_au = cos_k * cos_turned - sin_k * sin_turned;
+  const double sin_au = sin_k * cos_turned + cos_k * sin_turned;
+  const double fu = (cos_au * n0 - n2) / sin_au;
   // cu is ±1 / √(fu² + n0²), and xu = −cu z0 / √(1 − cu²).
   const double tan_squared = fu * fu + n0 * n0 - 1.0;
   const double reach = -z0 / __builtin_sqrt(tan_squared > 1e-12 ? tan_squared : 1e-12);

@@ -37,6 +37,21 @@ RELIEF_KERNEL constexpr Uint reverse_bits(Uint v)
   return swap_bytes(v);
 }
 
+#ifdef __AVX2__
+/// The same with a table of the sixteen half bytes: half as many instructions.
+RELIEF_KERNEL UintX8 reverse_bits(UintX8 v)
+{
+  using Bytes = char __attribute__((vector_size(32)));
+  constexpr Bytes kReversed = {0, 8, 4, 12, 2, 10, 6, 14, 1, 9, 5, 13, 3, 11, 7, 15,
+                               0, 8, 4, 12, 2, 10, 6, 14, 1, 9, 5, 13, 3, 11, 7, 15};
+  const UintX8 swapped = swap_bytes(v);
+  const Bytes low = __builtin_bit_cast(Bytes, swapped & 0x0f0f0f0fu);
+  const Bytes high = __builtin_bit_cast(Bytes, (swapped >> 4) & 0x0f0f0f0fu);
+  return __builtin_bit_cast(UintX8, __builtin_ia32_pshufb256(kReversed, low)) << 4 |
+         __builtin_bit_cast(UintX8, __builtin_ia32_pshufb256(kReversed, high));
+}
+#endif
+
 /// Permutation in which each output bit depends on the input bits at and below it only: nested uniform scrambling of a
 /// number whose digits are stored least significant first.
 /// @param v     digits after the binary point, first digit in bit 0

@@ -7,7 +7,7 @@
 // of Detail Strategies for Real-Time Ray Tracing", Ray Tracing Gems ch. 20.
 #pragma once
 
-#include "kernel/math/vec.h"
+#include "kernel/math/trigonometry.h"
 
 namespace relief {
 
@@ -48,7 +48,7 @@ RELIEF_KERNEL RayCone ray_cone_propagate(RayCone cone, float t) { return {cone.w
 /// since what is seen through rough glass is blurred anyway.
 /// @param alpha  GGX roughness, square of glTF's; >= 0. Diffuse reflection counts as 1
 /// @return       radians, [0, π)
-RELIEF_KERNEL float ray_cone_spread_from_roughness(float alpha) { return 2.0f * std::atan(alpha); }
+RELIEF_KERNEL float ray_cone_spread_from_roughness(float alpha) { return 2.0f * angle_of(alpha, 1.0f); }
 
 /// The cone after an interaction, at the surface.
 /// @param cone   at the hit (after ray_cone_propagate)
