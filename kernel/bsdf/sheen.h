@@ -26,13 +26,13 @@ RELIEF_KERNEL float sheen_log_lambda(float cos_theta, float alpha)
 }
 
 /// Masking of the fibres.
-/// @param cos_theta  in (0, 1]
+/// @param cos_theta  in (0, 1]; rounding may have put it just above
 RELIEF_KERNEL float sheen_lambda(float cos_theta, float alpha)
 {
   // The fit is for grazing angles and is continued by point symmetry of its logarithm.
-  const float log_lambda = cos_theta < 0.5f
-                               ? sheen_log_lambda(cos_theta, alpha)
-                               : 2.0f * sheen_log_lambda(0.5f, alpha) - sheen_log_lambda(1.0f - cos_theta, alpha);
+  const float log_lambda =
+      cos_theta < 0.5f ? sheen_log_lambda(cos_theta, alpha)
+                       : 2.0f * sheen_log_lambda(0.5f, alpha) - sheen_log_lambda(max(0.0f, 1.0f - cos_theta), alpha);
   return std::exp(log_lambda);
 }
 

@@ -243,6 +243,12 @@ TEST(SurfaceModel, IsFiniteForExtremeParametersAndDirections)
         const BsdfEval straight = surface_eval<kFeatureAll>(p, full_tables(), wo, -wo);
         ASSERT_TRUE(is_finite(straight.f) && is_finite(straight.pdf)) << n;
       }
+      // What a sampler returns is unit but for rounding.
+      const Vec3f upright{0, 0, std::nextafter(1.0f, 2.0f)};
+      const BsdfEval above = surface_eval<kFeatureAll>(p, full_tables(), wo, upright);
+      ASSERT_TRUE(is_finite(above.f) && is_finite(above.pdf)) << n;
+      const BsdfEval from_above = surface_eval<kFeatureAll>(p, full_tables(), upright, wo);
+      ASSERT_TRUE(is_finite(from_above.f) && is_finite(from_above.pdf)) << n;
     }
   }
 }
