@@ -125,9 +125,10 @@ TEST(Determinism, SeedsGiveDifferentNoise)
   EXPECT_NEAR(a.mean(), b.mean(), 0.1 * a.mean());
 }
 
-TEST(Determinism, InstructionSetsAgreeUpToNoise)
+TEST(Determinism, InstructionSetsTakeTheSamePaths)
 {
-  // Fused multiply-adds change single paths, not their mean: both pictures are within their own estimated errors.
+  // Fused multiply-adds change last digits, and through them a path now and then. Other random numbers would change every
+  // pixel by its noise, 1.4 times what is compared with.
   const Scene scene = mixed_scene();
   const RenderOptions options = render_options(scene, 32, 64);
   setenv("RELIEF_ISA", "baseline", 1);
@@ -142,7 +143,7 @@ TEST(Determinism, InstructionSetsAgreeUpToNoise)
       squared += static_cast<double>(dot(d, d));
     }
   }
-  EXPECT_LT(std::sqrt(squared / (3 * 32 * 32)), 2 * baseline.stats.error_rmse);
+  EXPECT_LT(std::sqrt(squared / (3 * 32 * 32)), 0.05 * baseline.stats.error_rmse);
 }
 
 }  // namespace
