@@ -25,8 +25,8 @@ struct Example {
 void PrintTo(const Example& example, std::ostream* out) { *out << example.name; }
 
 constexpr std::array kExamples = {
-    Example{"cornell", 48, 48, 256}, Example{"spheres", 64, 36, 256},  Example{"glass", 64, 36, 256},
-    Example{"product", 64, 36, 256}, Example{"instances", 64, 36, 64}, Example{"many_lights", 64, 36, 64},
+    Example{"cornell", 48, 48, 256},  Example{"spheres", 64, 36, 256},  Example{"glass", 64, 36, 256},
+    Example{"product", 64, 36, 256},  Example{"instances", 64, 36, 64}, Example{"many_lights", 64, 36, 64},
     Example{"displaced", 64, 36, 64},
 };
 
