@@ -1,5 +1,6 @@
 #include "displacement/embree_geometry.h"
 
+#include "displacement/clearance.h"
 #include "displacement/seam_walls.h"
 
 namespace relief {
@@ -67,6 +68,20 @@ Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry,
 {
   const OnLevel on(geometry, triangle, level);
   return surface_smooth_normal(on.mesh, on.tri, b1, b2);
+}
+
+Vec3d displaced_leave(const DisplacedGeometry& geometry,
+                      std::uint32_t triangle,
+                      int level,
+                      double b1,
+                      double b2,
+                      Vec3d reach)
+{
+  const OnLevel on(geometry, triangle, level);
+  const double distance = surface_clearance(on.mesh, on.tri, b1, b2, reach);
+  if (!(distance > 0)) return {};
+  const Vec3d N = base_point(on.tri, b1, b2).N;
+  return N * (distance / length(N));
 }
 
 RTCGeometry displaced_geometry_make(RTCDevice device, const DisplacedGeometry& geometry, const TraversalTable& table)

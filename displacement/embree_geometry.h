@@ -84,6 +84,16 @@ Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry,
                               double b1,
                               double b2);
 
+/// How far a ray's origin has to be moved to leave a point of the surface, see surface_clearance.
+/// @param reach  half sides of the box of errors, object space, metres
+/// @return       to the side of N, object space; zero: it can leave along the normal
+Vec3d displaced_leave(const DisplacedGeometry& geometry,
+                      std::uint32_t triangle,
+                      int level,
+                      double b1,
+                      double b2,
+                      Vec3d reach);
+
 /// A new geometry, one primitive a base triangle, not committed. Hits are reported as in ReportedHit; position and normal
 /// are left to displaced_point, once the nearest is known.
 RTCGeometry displaced_geometry_make(RTCDevice device, const DisplacedGeometry& geometry, const TraversalTable& table);

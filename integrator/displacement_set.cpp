@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "integrator/stages.h"
+#include "kernel/shape/surface_hit.h"
 
 namespace relief {
 
@@ -74,6 +75,19 @@ void check_budget(std::uint64_t bytes,
       "tessellating mesh '" + mesh + "' into " + std::to_string(layout.num_micro_triangles / 1'000'000) +
       " million triangles would take about " + gibibytes(bytes) + ", more than the " + gibibytes(budget) +
       " that tessellations may have; the other displacement methods do not tessellate");
+}
+
+/// Half sides of the box that a point of a displaced surface is in, and the origin of a ray that leaves it along its normal.
+/// @param P, Ng  object space
+/// @return       object space
+Vec3d leaving_reach(const InstanceView& placement, Vec3f P, Vec3f Ng)
+{
+  const DisplacedPointError error =
+      displaced_point_error(placement, P, transform_point(placement.world_from_object, P));
+  const Vec3f N = normalize(transform_normal(placement.object_from_world, as_normal(Ng)));
+  const Vec3f offset = 2.0f * dot(abs(N), error.world) * N;
+  // The origin has as large an error as the point.
+  return to_double(2.0f * error.object + abs(transform_vector(placement.object_from_world, offset)));
 }
 
 std::string_view traversal_name(TraversalMethod method)
@@ -310,7 +324,12 @@ DisplacementLevel DisplacementSet::level(const Scene& scene, int map_index, int 
   return out;
 }
 
-DisplacedPoint DisplacementSet::point(std::size_t instance, std::uint32_t primitive, float u, float v, float Ng_x) const
+DisplacedPoint DisplacementSet::point(std::size_t instance,
+                                      const InstanceView& placement,
+                                      std::uint32_t primitive,
+                                      float u,
+                                      float v,
+                                      float Ng_x) const
 {
   const Displaced& d = displaced(instance);
   DisplacedPoint out{primitive, u, v};
@@ -331,6 +350,10 @@ DisplacedPoint DisplacementSet::point(std::size_t instance, std::uint32_t primit
     out.v = reported.b2;
     out.P = to_float(reported.point.P);
     out.Ng = to_float(reported.point.Ng);
+    if (!on_wall) {
+      out.leave = to_float(
+          displaced_leave(d.geometry, primitive, level, out.u, out.v, leaving_reach(placement, out.P, out.Ng)));
+    }
     if (d.geometry.lod.by_cone) out.width = lod_width_of_level(texel_of_instance_[instance], level);
   }
   out.Ns =

@@ -34,6 +34,7 @@ struct DisplacedPoint {
   float width = kInfinity;     ///< widest cone that meets the surface again as it is here, see lod_width_of_level
   Vec3f P = {}, Ng = {};       ///< on the traced surface, object space; Ng unit, on the side of the displacement normal
   Vec3f Ns = {};               ///< unit shading normal, object space: Ng, or that of the smoothed map
+  Vec3f leave = {};            ///< see SurfaceHit::leave; object space
 };
 
 /// What a method is traced by; nothing if it tessellates, or if this version cannot.
@@ -65,8 +66,14 @@ class DisplacementSet {
   /// @return null if the geometry is traversed as it is
   const Tessellation* tessellation(std::size_t index) const { return geometries_[index]->tessellation.get(); }
   /// The point of a hit on a displaced instance.
+  /// @param placement              the instance's
   /// @param primitive, u, v, Ng_x  as Embree reports them
-  DisplacedPoint point(std::size_t instance, std::uint32_t primitive, float u, float v, float Ng_x) const;
+  DisplacedPoint point(std::size_t instance,
+                       const InstanceView& placement,
+                       std::uint32_t primitive,
+                       float u,
+                       float v,
+                       float Ng_x) const;
   /// The same without P and normals.
   DisplacedPoint locate(std::size_t instance, std::uint32_t primitive, float u, float v) const;
   std::size_t bytes() const;            ///< besides the maps

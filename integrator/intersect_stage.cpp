@@ -61,8 +61,8 @@ void classify(const KernelGlobals& g,
   }
   const InstanceView& instance = g.instances[object];
   if ((instance.flags & kDisplaced) != 0) {
-    const DisplacedPoint point =
-        accel.displacements().point(object, state.hit_triangle[path], state.hit_u[path], state.hit_v[path], Ng_x);
+    const DisplacedPoint point = accel.displacements().point(object, instance, state.hit_triangle[path],
+                                                             state.hit_u[path], state.hit_v[path], Ng_x);
     state.hit_triangle[path] = point.triangle;
     state.hit_u[path] = point.u;
     state.hit_v[path] = point.v;
@@ -75,6 +75,9 @@ void classify(const KernelGlobals& g,
     state.hit_Ns_x[path] = point.Ns.x;
     state.hit_Ns_y[path] = point.Ns.y;
     state.hit_Ns_z[path] = point.Ns.z;
+    state.hit_leave_x[path] = point.leave.x;
+    state.hit_leave_y[path] = point.leave.y;
+    state.hit_leave_z[path] = point.leave.z;
     state.hit_width[path] = point.width < kInfinity ? point.width / PathLod(state, path).factor : kInfinity;
   }
   queue_push(surfaces[surface_kernel[instance.material_index]], path);

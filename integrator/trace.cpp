@@ -42,14 +42,17 @@ TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits
     const InstanceView& instance = context.instances[object];
     DisplacedPoint point{query.hit.primID, query.hit.u, query.hit.v};
     const bool displaced = (instance.flags & kDisplaced) != 0;
-    if (displaced) point = context.displacements.point(object, point.triangle, point.u, point.v, query.hit.Ng_x);
+    if (displaced)
+      point = context.displacements.point(object, instance, point.triangle, point.u, point.v, query.hit.Ng_x);
     SurfaceHit surface = surface_hit_make(context.meshes[static_cast<std::size_t>(instance.mesh_index)], instance,
                                           point.triangle, point.u, point.v);
-    if (displaced) surface_hit_displace(&surface, instance, point.P, point.Ng, point.Ns);
+    if (displaced) surface_hit_displace(&surface, instance, point.P, point.Ng, point.Ns, point.leave);
     result.hit = true;
     result.t = query.ray.tfar;
     result.P = surface.P;
     result.Ng = surface.Ng;
+    result.O_front = surface_hit_origin(surface, surface.P, true);
+    result.O_back = surface_hit_origin(surface, surface.P, false);
     result.u = point.u;
     result.v = point.v;
     result.instance_index = static_cast<std::int32_t>(object);

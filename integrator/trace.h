@@ -21,8 +21,9 @@ struct TraceRay {
 struct TraceHit {
   bool hit = false;
   float t = 0;
-  Vec3f P, Ng;         ///< world; Ng unit, on the front side
-  float u = 0, v = 0;  ///< barycentric weights of vertices 1 and 2
+  Vec3f P, Ng;            ///< world; Ng unit, on the front side
+  Vec3f O_front, O_back;  ///< origins of rays that leave on the front side and on the other
+  float u = 0, v = 0;     ///< barycentric weights of vertices 1 and 2
   std::int32_t instance_index = -1, mesh_index = -1;
   std::uint32_t triangle_index = 0;
   /// Bounds and texels of displaced meshes that were tested; nothing if the ray entered no prism.

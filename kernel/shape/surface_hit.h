@@ -17,7 +17,8 @@ struct SurfaceHit {
   Vec2f uv[2];    ///< texture coordinates; (0, 0) where absent
   Vec4f color{1, 1, 1, 1};
   float area_ratio[2] = {0, 0};  ///< √(uv area / world area) of the triangle: uv units a metre, for texture footprints
-  Vec3f P_lift;  ///< vector from P to the smooth surface that Ns suggests, see surface_hit_make; 0 for flat meshes
+  Vec3f P_lift;   ///< vector from P to the smooth surface that Ns suggests, see surface_hit_make; 0 for flat meshes
+  Vec3f leave{};  ///< how rays' origins are moved to the front side, metres; 0: along Ng, by P_error
 };
 
 /// Evaluates the triangle's attributes at a hit.
@@ -97,29 +98,48 @@ RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
   return hit;
 }
 
-/// Moves a hit from its base triangle onto the displaced surface over it. What depends on the barycentric weights alone
-/// stays; displaced surfaces are traced as they are, so there is no smoother one to lift shadow rays to.
-/// @param P_object   on the displaced surface, rounded once
-/// @param Ng_object  unit geometric normal of the displaced surface, on the side of the displacement normal
-/// @param Ns_object  unit shading normal, likewise
-RELIEF_KERNEL void surface_hit_displace(SurfaceHit* hit,
-                                        const InstanceView& instance,
-                                        Vec3f P_object,
-                                        Vec3f Ng_object,
-                                        Vec3f Ns_object)
+/// Bounds on the error of a point of a displaced surface, per axis, metres.
+struct DisplacedPointError {
+  Vec3f world;
+  Vec3f object;  ///< of the place that the tracer takes it for
+};
+
+/// The rounding of the point, that of its transform, and of the tracer's when it brings a ray from there to object space.
+/// @param P_object  rounded once
+/// @param P_world   the same, transformed
+RELIEF_KERNEL DisplacedPointError displaced_point_error(const InstanceView& instance, Vec3f P_object, Vec3f P_world)
 {
   const Affine3& m = instance.world_from_object;
   const Affine3& inverse = instance.object_from_world;
   const auto abs_transform = [](const Affine3& by, Vec3f v) {
     return abs(by.x) * v.x + abs(by.y) * v.y + abs(by.z) * v.z;
   };
+  const Vec3f forth = gamma_bound(5) * (abs_transform(m, abs(P_object)) + abs(m.p));
+  const Vec3f back = gamma_bound(6) * (abs_transform(inverse, abs(P_world)) + abs(inverse.p));
+  return {forth + abs_transform(m, back), abs_transform(inverse, forth) + back};
+}
+
+/// Moves a hit from its base triangle onto the displaced surface over it. What depends on the barycentric weights alone
+/// stays; displaced surfaces are traced as they are, so there is no smoother one to lift shadow rays to.
+/// @param P_object   on the displaced surface, rounded once
+/// @param Ng_object  unit geometric normal of the displaced surface, on the side of the displacement normal
+/// @param Ns_object  unit shading normal, likewise
+/// @param leave_object  see SurfaceHit::leave
+RELIEF_KERNEL void surface_hit_displace(SurfaceHit* hit,
+                                        const InstanceView& instance,
+                                        Vec3f P_object,
+                                        Vec3f Ng_object,
+                                        Vec3f Ns_object,
+                                        Vec3f leave_object)
+{
+  const Affine3& m = instance.world_from_object;
+  const Affine3& inverse = instance.object_from_world;
   hit->P = transform_point(m, P_object);
-  // The rounding of P, that of this transform, and of the tracer's when it brings the ray to object space.
-  hit->P_error = gamma_bound(5) * (abs_transform(m, abs(P_object)) + abs(m.p)) +
-                 gamma_bound(6) * abs_transform(m, abs_transform(inverse, abs(hit->P)) + abs(inverse.p));
+  hit->P_error = displaced_point_error(instance, P_object, hit->P).world;
   hit->Ng = normalize(transform_normal(inverse, as_normal(Ng_object)));
   hit->Ns = normalize(transform_normal(inverse, as_normal(Ns_object)));
   hit->P_lift = {};
+  hit->leave = transform_vector(m, leave_object);
 }
 
 /// Interpolated tangent frame of a normal map, world space, orthogonal to Ns.
@@ -148,6 +168,16 @@ RELIEF_KERNEL bool surface_hit_tangent_frame(const MeshView& mesh,
   return true;
 }
 
+/// Moves the origin of a ray, each coordinate a few ulps further: that covers the rounding of the sum.
+RELIEF_KERNEL Vec3f move_ray_origin(Vec3f P, Vec3f offset)
+{
+  const auto nudge = [](float p, float o) {
+    const float moved = p + o;
+    return moved + __builtin_copysignf(__builtin_fabsf(moved) * 2.0f * kUnitRoundoff, o);
+  };
+  return {nudge(P.x, offset.x), nudge(P.y, offset.y), nudge(P.z, offset.z)};
+}
+
 /// Origin for a ray that leaves the surface on the side of `Ng_side`.
 /// The plane through P may lie anywhere within the error box; the origin is moved out of it along the normal, then each
 /// coordinate is rounded away. Twice the bound, because the tracer meets the triangle with errors of the same size in
@@ -156,14 +186,16 @@ RELIEF_KERNEL bool surface_hit_tangent_frame(const MeshView& mesh,
 /// @source pbrt-v4 §6.8.6
 RELIEF_KERNEL Vec3f offset_ray_origin(Vec3f P, Vec3f P_error, Vec3f Ng_side)
 {
-  const float distance = 2.0f * dot(abs(Ng_side), P_error);
-  const Vec3f offset = distance * Ng_side;
-  const auto nudge = [](float p, float o) {
-    const float moved = p + o;
-    // A few ulps further in the direction of the offset covers the rounding of this very sum.
-    return moved + __builtin_copysignf(__builtin_fabsf(moved) * 2.0f * kUnitRoundoff, o);
-  };
-  return {nudge(P.x, offset.x), nudge(P.y, offset.y), nudge(P.z, offset.z)};
+  return move_ray_origin(P, 2.0f * dot(abs(Ng_side), P_error) * Ng_side);
+}
+
+/// Origin for a ray that leaves a hit.
+/// @param P      of the hit, lifted or not
+/// @param front  whether it leaves on the front side
+RELIEF_KERNEL Vec3f surface_hit_origin(const SurfaceHit& hit, Vec3f P, bool front)
+{
+  if (!is_zero(hit.leave)) return move_ray_origin(P, front ? hit.leave : -hit.leave);
+  return offset_ray_origin(P, hit.P_error, front ? hit.Ng : -hit.Ng);
 }
 
 /// How much of the lift onto the smooth surface a ray gets: none for directions well above the facet (their shadows are

@@ -63,7 +63,8 @@ surface_interaction_make(const KernelGlobals& g, const PathState& state, std::ui
   if ((at.instance->flags & kDisplaced) != 0) {
     surface_hit_displace(&at.hit, *at.instance, {state.hit_P_x[path], state.hit_P_y[path], state.hit_P_z[path]},
                          {state.hit_Ng_x[path], state.hit_Ng_y[path], state.hit_Ng_z[path]},
-                         {state.hit_Ns_x[path], state.hit_Ns_y[path], state.hit_Ns_z[path]});
+                         {state.hit_Ns_x[path], state.hit_Ns_y[path], state.hit_Ns_z[path]},
+                         {state.hit_leave_x[path], state.hit_leave_y[path], state.hit_leave_z[path]});
   }
   at.side.front = dot(wo, at.hit.Ng) >= 0.0f;
   at.side.Ng = at.side.front ? at.hit.Ng : -at.hit.Ng;
@@ -159,10 +160,9 @@ RELIEF_KERNEL Vec3f surface_ray_origin(const SurfaceInteraction& at, Vec3f wi)
 {
   // Above the surface the ray starts on the lifted side, below it on the other.
   const bool above = dot(wi, at.side.Ns) > 0.0f;
-  const Vec3f Ng_leave = above ? at.side.Ng : -at.side.Ng;
   Vec3f P = at.hit.P;
   if (above && at.side.front) P += at.hit.P_lift * terminator_lift_weight(dot(wi, at.side.Ng));
-  return offset_ray_origin(P, at.hit.P_error, Ng_leave);
+  return surface_hit_origin(at.hit, P, above == at.side.front);
 }
 
 }  // namespace relief

@@ -55,7 +55,7 @@ TEST(LevelOfDetail, OfAHitIsWhatLeavingRaysStartWith)
   ASSERT_GT(num_levels, 1);
   const float texel = displacements.texels()[0];
   for (int level = 0; level < num_levels; ++level) {
-    const DisplacedPoint point = displacements.point(0, 0, 0.2f, 0.3f, static_cast<float>(level));
+    const DisplacedPoint point = displacements.point(0, {}, 0, 0.2f, 0.3f, static_cast<float>(level));
     EXPECT_EQ(point.width, lod_width_of_level(texel, level));
   }
 }

@@ -87,6 +87,58 @@ INSTANTIATE_TEST_SUITE_P(,
                                          Place{1e-3f, 10, true},
                                          Place{1e4f, 1e5f, true}));
 
+/// A height field of noise under transforms whose axes are 1…64 times as long as each other, so that its valleys are narrower
+/// than right angles. Along its displacement direction a height field is met only once, so any hit of a ray that leaves
+/// that way, to either side, is the surface that it leaves.
+TEST(DisplacedSelfIntersection, NoValleyOfAStretchedHeightFieldIsMetFromWithin)
+{
+  constexpr int kSize = 256;
+  const std::vector<std::uint16_t> texels = noise_texels(kSize, 3);
+  std::mt19937 random(12345);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  const auto rotation = [&] {
+    const Frame f = frame_from_normal(normalize(Vec3f{uniform(random), uniform(random), uniform(random)}));
+    return Affine3{f.s, f.t, f.n, {}};
+  };
+  for (const Vec3f scale : {Vec3f{1, 1, 1}, Vec3f{16, 1, 1}, Vec3f{1, 1, 16}, Vec3f{64, 1, 64}, Vec3f{1, 64, 8},
+                            Vec3f{1, 1, 64}, Vec3f{1.0f / 64, 1, 1}}) {
+    for (int place = 0; place < 5; ++place) {
+      const float far = place == 4 ? 100.0f : 0.0f;
+      const Affine3 stretch{{scale.x, 0, 0}, {0, scale.y, 0}, {0, 0, scale.z}, {far, 2 * far, -far}};
+      const Affine3 placement = place == 1   ? rotation() * stretch
+                                : place == 2 ? stretch * rotation()
+                                : place == 3 ? rotation() * stretch * rotation()
+                                             : stretch;
+      Scene scene = empty_scene();
+      Mesh plane = quad_mesh({-2, -2, 0}, {4, 0, 0}, {0, 4, 0});
+      plane.uv[0] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+      Material material = diffuse_material({1, 1, 1});
+      material.displacement_index = 0;
+      add_object(scene, plane, material, placement);
+      add_displacement(scene, kSize, texels, 0.003f);
+      const SceneContext context(scene);
+
+      std::vector<TraceRay> rays, leaving;
+      for (int i = 0; i < 20'000; ++i) {
+        const Vec3f O = transform_point(placement, {3 * uniform(random), 3 * uniform(random), i % 2 ? 2.0f : -2.0f});
+        const Vec3f target = transform_point(placement, {1.9f * uniform(random), 1.9f * uniform(random), 0});
+        rays.push_back({O, target - O, 0, kInfinity});
+      }
+      const Vec3f up = normalize(placement.z);
+      for (const TraceHit& h : trace_rays(context, rays)) {
+        if (!h.hit) continue;
+        const bool upward = dot(h.Ng, up) > 0;
+        leaving.push_back({h.O_front, upward ? up : -up, kLeastDistance, kInfinity});
+        leaving.push_back({h.O_back, upward ? -up : up, kLeastDistance, kInfinity});
+      }
+      EXPECT_GT(leaving.size(), 39'900u);
+      int self_hits = 0;
+      for (const TraceHit& h : trace_rays(context, leaving)) self_hits += h.hit ? 1 : 0;
+      EXPECT_EQ(self_hits, 0) << scale.x << " " << scale.y << " " << scale.z << ", placement " << place;
+    }
+  }
+}
+
 TEST(ShadowTerminator, CoarseSphereIsLitLikeAFineOne)
 {
   // Point light, so that nothing softens the terminator. Without the lift the coarse sphere's facets shadow

@@ -117,7 +117,7 @@ TEST_P(TessellatedBy, LeavingRaysDoNotComeBack)
     if (!h.hit || h.instance_index != 0) continue;
     const Affine3& inverse = context.instances[0].object_from_world;
     SurfaceHit surface = surface_hit_make(context.meshes[0], context.instances[0], h.triangle_index, h.u, h.v);
-    surface_hit_displace(&surface, context.instances[0], transform_point(inverse, h.P), {0, 0, 1}, {0, 0, 1});
+    surface_hit_displace(&surface, context.instances[0], transform_point(inverse, h.P), {0, 0, 1}, {0, 0, 1}, {});
     // A facet is a fortieth of a unit long; what lies nearer than a fiftieth of that is the facet itself.
     const Vec3f D = normalize(h.Ng + 0.7f * Vec3f{uniform(random), uniform(random), uniform(random)});
     if (dot(D, h.Ng) <= 0) continue;

@@ -1,0 +1,66 @@
+#include "displacement/clearance.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace relief {
+
+namespace {
+
+std::int64_t cell_of(double x) { return static_cast<std::int64_t>(std::floor(x)); }
+
+/// Σ |aᵢ|·rᵢ: how much a function with gradient a changes at most within a box.
+double change_within(Vec3d a, Vec3d reach)
+{
+  return std::abs(a.x) * reach.x + std::abs(a.y) * reach.y + std::abs(a.z) * reach.z;
+}
+
+}  // namespace
+
+HeightsBetween heights_between(const HeightFieldView& field, double x0, double y0, double x1, double y1)
+{
+  const std::int64_t i0 = cell_of(x0), j0 = cell_of(y0), i1 = cell_of(x1), j1 = cell_of(y1);
+  if (i1 - i0 > 1 || j1 - j0 > 1) {
+    HeightsBetween all;
+    stored_to_heights(field, height_field_range(field, i0, j0, i1, j1), &all.low, &all.high);
+    return all;
+  }
+  // A bilinear patch is extreme at the corners of any rectangle in it.
+  const double xs[3] = {x0, i1 > i0 ? static_cast<double>(i1) : x0, x1};
+  const double ys[3] = {y0, j1 > j0 ? static_cast<double>(j1) : y0, y1};
+  HeightsBetween out{static_cast<double>(kInfinity), -static_cast<double>(kInfinity)};
+  for (const double y : ys) {
+    for (const double x : xs) {
+      const double h = interpolate_height(field, x, y);
+      out.low = std::min(out.low, h);
+      out.high = std::max(out.high, h);
+    }
+  }
+  return out;
+}
+
+double surface_clearance(const DisplacedMeshView& mesh, const DisplacedTriangle& tri, double b1, double b2, Vec3d reach)
+{
+  const BasePoint base = base_point(tri, b1, b2);
+  const double x = tri.x[0] + b1 * base.xu + b2 * base.xv, y = tri.y[0] + b1 * base.yu + b2 * base.yv;
+  const double h = interpolate_height(*mesh.field, x, y);
+  const double nu = length(base.N), s = mesh.scale * (h - mesh.midlevel) / nu;
+  // Gradients of b1, b2 and s, as functions of a point P(b) + s·N(b): the dual basis of its derivatives.
+  const Vec3d u = base.Pu + s * base.Nu, v = base.Pv + s * base.Nv;
+  const double inverse = 1.0 / dot(cross(u, v), base.N);
+  const Vec3d b1_gradient = cross(v, base.N) * inverse, b2_gradient = cross(base.N, u) * inverse;
+  const double dx = change_within(base.xu * b1_gradient + base.xv * b2_gradient, reach);
+  const double dy = change_within(base.yu * b1_gradient + base.yv * b2_gradient, reach);
+  // A box of so many texels would be one of a triangle without area; also turns away NaN.
+  constexpr double kMostTexels = 1 << 20;
+  if (!(dx + dy < kMostTexels)) return 0;
+  if (cell_of(x - dx) == cell_of(x + dx) && cell_of(y - dy) == cell_of(y + dy)) return 0;
+  const HeightsBetween near = heights_between(*mesh.field, x - dx, y - dy, x + dx, y + dy);
+  // Of the displacement s·|N|.
+  const Vec3d n = base.N * (1.0 / nu);
+  const Vec3d gradient =
+      nu * inverse * cross(u, v) + s * (dot(n, base.Nu) * b1_gradient + dot(n, base.Nv) * b2_gradient);
+  return std::abs(mesh.scale) * std::max(near.high - h, h - near.low) + change_within(gradient, reach);
+}
+
+}  // namespace relief
