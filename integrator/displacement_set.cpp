@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <iterator>
+#include <numbers>
 #include <stdexcept>
 #include <string_view>
 #include <tuple>
@@ -25,8 +26,28 @@ DisplacementMethod method_of(const DisplacementSettings& settings, const Displac
   return options.method.value_or(settings.method);
 }
 
-/// Longest column: how much an instance stretches a mesh, at most about.
-float largest_scale(const Affine3& m) { return std::max({length(m.x), length(m.y), length(m.z)}); }
+/// The most and the least that a transform stretches any direction.
+struct Stretch {
+  double most = 1, least = 1;
+};
+
+/// Singular values: roots of the eigenvalues of MᵀM.
+/// @source Smith 1961, "Eigenvalues of a symmetric 3 × 3 matrix"; the least by the determinant, which cancels nothing
+Stretch stretch_of(const Affine3& m)
+{
+  const Vec3d x = to_double(m.x), y = to_double(m.y), z = to_double(m.z);
+  const double xy = dot(x, y), yz = dot(y, z), zx = dot(z, x);
+  const double mean = (dot(x, x) + dot(y, y) + dot(z, z)) / 3;
+  const double a = dot(x, x) - mean, b = dot(y, y) - mean, c = dot(z, z) - mean;
+  const double radius = std::sqrt((a * a + b * b + c * c) / 6 + (xy * xy + yz * yz + zx * zx) / 3);
+  const double determinant = a * (b * c - yz * yz) - xy * (xy * c - yz * zx) + zx * (xy * yz - b * zx);
+  const double cosine = radius > 0 ? std::clamp(determinant / (2 * radius * radius * radius), -1.0, 1.0) : 1.0;
+  const double angle = std::acos(cosine) / 3;
+  const double first = mean + 2 * radius * std::cos(angle);
+  const double second = mean + 2 * radius * std::cos(angle - 2 * std::numbers::pi / 3);
+  const double most = std::sqrt(first);
+  return {most, std::abs(dot(x, cross(y, z))) / (most * std::sqrt(second))};
+}
 
 float lod_of(const DisplacementSettings& settings, const DisplacementOptions& options)
 {
@@ -188,51 +209,66 @@ DisplacementSet::Levels DisplacementSet::levels_of(const Scene& scene,
 DisplacementSet::DisplacementSet(const Scene& scene, const DisplacementOptions& options)
     : geometry_of_instance_(scene.instances.size(), -1), texel_of_instance_(scene.instances.size(), 0.0f)
 {
-  std::uint64_t tessellated_bytes = 0;
-  const auto num_displaced =
-      static_cast<double>(std::count_if(scene.instances.begin(), scene.instances.end(), [&](const Instance& instance) {
-        return scene.materials[static_cast<std::size_t>(instance.material_index)].displacement_index >= 0;
-      }));
+  std::vector<Use> uses;
   std::map<std::tuple<int, int, double>, int> known;  // mesh, displacement, scale in object space
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
-    const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
-    if (material.displacement_index < 0) continue;
-    const DisplacementSettings& settings = scene.displacements[static_cast<std::size_t>(material.displacement_index)];
+    const int displacement = scene.materials[static_cast<std::size_t>(instance.material_index)].displacement_index;
+    if (displacement < 0) continue;
+    const DisplacementSettings& settings = scene.displacements[static_cast<std::size_t>(displacement)];
     double scale = settings.scale;
     if (settings.space == DisplacementSpace::kWorld) scale /= mean_scale(instance.world_from_object);
-    const auto [at, is_new] = known.try_emplace({instance.mesh_index, material.displacement_index, scale},
-                                                static_cast<int>(geometries_.size()));
+    const auto [at, is_new] =
+        known.try_emplace({instance.mesh_index, displacement, scale}, static_cast<int>(uses.size()));
     geometry_of_instance_[i] = at->second;
-    if (is_new) {
-      const Mesh& mesh = scene.meshes[static_cast<std::size_t>(instance.mesh_index)];
-      const DisplacementMethod method = method_of(settings, options);
-      auto displaced = std::make_unique<Displaced>();
-      displaced->name = mesh.name;
-      displaced->smooth = settings.smoothing;
-      DisplacedGeometry& geometry = displaced->geometry;
-      geometry.method = traversal_method(method).value_or(kDefaultTraversal);
-      Levels levels = levels_of(scene, mesh, settings, options);
-      std::vector<const HeightFieldView*> coarser;
-      if (levels.by_cone) {
-        levels.count = num_faithful_levels(scene, mesh, settings.height, scale, levels.count);
-        levels.by_cone = levels.count > 1;
-      }
-      for (int k = 0; k < levels.count; ++k) {
-        geometry.levels[k] = level(scene, settings.height.texture_index, levels.first + k, geometry.method);
-        if (k > 0) coarser.push_back(geometry.levels[k].field);
-      }
-      displaced->mesh = DisplacedMesh(mesh.view(), *geometry.levels[0].field,
-                                      {settings.height, scale, settings.midlevel, settings.weld_seams}, coarser);
-      geometry.mesh = displaced->mesh.view();
-      geometry.lod = {levels.count, levels.by_cone, levels.fixed, displaced->mesh.widest_texel()};
-      has_levels_ |= levels.count > 1;
-      displaced->tessellation =
-          tessellate(geometry, mesh.name, method, options, options.num_rays / num_displaced, &tessellated_bytes);
-      geometries_.push_back(std::move(displaced));
-    }
-    texel_of_instance_[i] = displaced(i).geometry.lod.texel * largest_scale(instance.world_from_object);
+    if (is_new) uses.push_back({scene.meshes[static_cast<std::size_t>(instance.mesh_index)], settings, scale});
+    const Stretch stretch = stretch_of(instance.world_from_object);
+    double& steepening = uses[static_cast<std::size_t>(at->second)].steepening;
+    steepening = std::max(steepening, stretch.most / stretch.least);
   }
+  const auto num_displaced =
+      std::count_if(geometry_of_instance_.begin(), geometry_of_instance_.end(), [](int index) { return index >= 0; });
+  const double num_rays = options.num_rays / static_cast<double>(num_displaced);
+  std::uint64_t tessellated_bytes = 0;
+  for (const Use& use : uses) {
+    geometries_.push_back(make_displaced(scene, use, options));
+    Displaced& displaced = *geometries_.back();
+    displaced.tessellation = tessellate(displaced.geometry, displaced.name, method_of(use.settings, options), options,
+                                        num_rays, &tessellated_bytes);
+  }
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    if (geometry_of_instance_[i] < 0) continue;
+    texel_of_instance_[i] =
+        displaced(i).geometry.lod.texel * static_cast<float>(stretch_of(scene.instances[i].world_from_object).most);
+  }
+}
+
+std::unique_ptr<DisplacementSet::Displaced> DisplacementSet::make_displaced(const Scene& scene,
+                                                                            const Use& use,
+                                                                            const DisplacementOptions& options)
+{
+  const DisplacementSettings& settings = use.settings;
+  auto displaced = std::make_unique<Displaced>();
+  displaced->name = use.mesh.name;
+  displaced->smooth = settings.smoothing;
+  DisplacedGeometry& geometry = displaced->geometry;
+  geometry.method = traversal_method(method_of(settings, options)).value_or(kDefaultTraversal);
+  Levels levels = levels_of(scene, use.mesh, settings, options);
+  std::vector<const HeightFieldView*> coarser;
+  if (levels.by_cone) {
+    levels.count = num_faithful_levels(scene, use, levels.count);
+    levels.by_cone = levels.count > 1;
+  }
+  for (int k = 0; k < levels.count; ++k) {
+    geometry.levels[k] = level(scene, settings.height.texture_index, levels.first + k, geometry.method);
+    if (k > 0) coarser.push_back(geometry.levels[k].field);
+  }
+  displaced->mesh = DisplacedMesh(use.mesh.view(), *geometry.levels[0].field,
+                                  {settings.height, use.scale, settings.midlevel, settings.weld_seams}, coarser);
+  geometry.mesh = displaced->mesh.view();
+  geometry.lod = {levels.count, levels.by_cone, levels.fixed, displaced->mesh.widest_texel()};
+  has_levels_ |= levels.count > 1;
+  return displaced;
 }
 
 std::unique_ptr<Tessellation> DisplacementSet::tessellate(const DisplacedGeometry& geometry,
@@ -264,13 +300,11 @@ std::unique_ptr<Tessellation> DisplacementSet::tessellate(const DisplacedGeometr
   return std::make_unique<Tessellation>(geometry.mesh, std::move(chosen));
 }
 
-int DisplacementSet::num_faithful_levels(const Scene& scene,
-                                         const Mesh& mesh,
-                                         const TextureRef& mapping,
-                                         double scale,
-                                         int most)
+int DisplacementSet::num_faithful_levels(const Scene& scene, const Use& use, int most)
 {
-  const MapDensity density = map_density(mesh.view(), mapping);
+  const TextureRef& mapping = use.settings.height;
+  const double scale = std::abs(use.scale);
+  const MapDensity density = map_density(use.mesh.view(), mapping);
   const HeightMapView map = scene.height_maps[static_cast<std::size_t>(mapping.texture_index)].view();
   const double texel = 1 / std::sqrt(std::max(density.u * map.width * density.v * map.height, 1e-300));
   LevelLoss lost;
@@ -280,8 +314,8 @@ int DisplacementSet::num_faithful_levels(const Scene& scene,
     Field& coarse = field(scene, mapping.texture_index, k);
     if (!coarse.loss) coarse.loss = level_loss(fine, coarse.level.view());
     lost = lost + *coarse.loss;
-    const double slope = std::abs(scale) * (lost.slope_u * density.u + lost.slope_v * density.v);
-    const double texels = std::abs(scale) * lost.height / (texel * (1 << k));
+    const double slope = use.steepening * scale * (lost.slope_u * density.u + lost.slope_v * density.v);
+    const double texels = scale * lost.height / (texel * (1 << k));
     if (slope <= kMostSlopeLost && texels <= kMostTexelsLost) continue;
     if (is_new) fields_.erase({mapping.texture_index, k});
     return k;

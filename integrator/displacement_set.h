@@ -107,10 +107,17 @@ class DisplacementSet {
                           const Mesh& mesh,
                           const DisplacementSettings& settings,
                           const DisplacementOptions& options);
-  /// How many levels of a map, the finest first, look like the map on a mesh: what they lose of its slopes and heights is
-  /// little.
-  /// @param scale  metres of object space
-  int num_faithful_levels(const Scene& scene, const Mesh& mesh, const TextureRef& mapping, double scale, int most);
+  /// A mesh and a displacement that occur together, on one or more instances.
+  struct Use {
+    const Mesh& mesh;
+    const DisplacementSettings& settings;
+    double scale = 1;       ///< metres of object space
+    double steepening = 1;  ///< how much steeper its instances' slopes are in the world than in object space, at most
+  };
+  std::unique_ptr<Displaced> make_displaced(const Scene& scene, const Use& use, const DisplacementOptions& options);
+  /// How many levels of a map, the finest first, look like the map on a mesh and all its instances: what they lose of its
+  /// slopes and heights is little.
+  int num_faithful_levels(const Scene& scene, const Use& use, int most);
   /// A tessellation's layout where the method, or `auto`, wants one.
   /// @param used_bytes  by all tessellations so far; grows
   std::unique_ptr<Tessellation> tessellate(const DisplacedGeometry& geometry,

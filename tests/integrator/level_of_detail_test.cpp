@@ -1,5 +1,8 @@
 // Levels of detail in the renderer: rays that leave a surface see it as the ray that found it did.
+#include <cmath>
 #include <memory>
+#include <numbers>
+#include <utility>
 
 #include "tests/support/render_scene.h"
 #include "tests/support/scene_builder.h"
@@ -7,18 +10,19 @@
 namespace relief::test {
 namespace {
 
-/// A height field of noise, many texels a pixel, seen and lit from above.
-/// @param scale  metres: the root of its slopes' mean square is 74 times that
-Scene noisy_plane(float scale)
+constexpr int kSize = 512;
+
+/// A height field, many texels a pixel, seen and lit from above.
+/// @param scale  metres: the root of the slopes' mean square of noise is 74 times that
+Scene noisy_plane(float scale, std::vector<std::uint16_t> texels = noise_texels(kSize, 3))
 {
-  constexpr int kSize = 512;
   Scene scene = empty_scene();
   Mesh plane = quad_mesh({-2, -2, 0}, {4, 0, 0}, {0, 4, 0});
   plane.uv[0] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
   Material material = diffuse_material({1, 1, 1});
   material.displacement_index = 0;
   add_object(scene, plane, material);
-  add_displacement(scene, kSize, noise_texels(kSize, 3), scale).lod = -1;
+  add_displacement(scene, kSize, std::move(texels), scale).lod = -1;
   Light sun;
   sun.kind = LightKind::kSun;
   sun.axis = {0, 0, -1};
@@ -28,11 +32,27 @@ Scene noisy_plane(float scale)
   return scene;
 }
 
+/// Hills 64 texels wide, which all levels that rays choose have, with noise of a 250th of their height, which they lose.
+std::vector<std::uint16_t> hill_texels()
+{
+  std::vector<std::uint16_t> texels = noise_texels(kSize, 3);
+  for (int y = 0; y < kSize; ++y) {
+    for (int x = 0; x < kSize; ++x) {
+      std::uint16_t& texel = texels[static_cast<std::size_t>(y * kSize + x)];
+      const double phase = 2 * std::numbers::pi / 64;
+      texel = static_cast<std::uint16_t>(32'000 + 15'000 * (std::sin(phase * x) + std::sin(phase * y)) + texel / 250);
+    }
+  }
+  return texels;
+}
+
 TEST(LevelOfDetail, OfShadowRaysIsThatOfTheSurfaceTheyLeave)
 {
   // Nothing of a height field is in the shade of a sun straight above it, at any level; only a ray that starts on one
-  // level and meets another is.
-  Scene scene = noisy_plane(0.003f);
+  // level and meets another is. A bounced ray's cone grows faster than the levels that it meets get coarser, so that after a
+  // bounce it matters what the surface says of its level.
+  Scene scene = noisy_plane(0.2f, hill_texels());
+  scene.render.max_bounces = scene.render.diffuse_bounces = 2;
   const RenderOptions options = render_options(scene, 16, 256);
   const Rendered shaded = render_scene(scene, options);
   scene.instances[0].flags &= ~std::uint32_t{kCastsShadow};
@@ -69,6 +89,41 @@ TEST(LevelOfDetail, IsTheFinestWhereSlopesAreThePicture)
   for (std::size_t k = 0; k < texels->size(); k += 32'000) (*texels)[k] = 65535;
   spikes.height_maps[0].texels = std::shared_ptr<const void>(texels, texels->data());
   EXPECT_FALSE(DisplacementSet(spikes, {}).has_levels());
+}
+
+TEST(LevelOfDetail, OfAnUnevenInstanceIsThatOfItsSteepestSlopes)
+{
+  const auto num_levels = [](const Scene& scene) { return DisplacementSet(scene, {}).geometry(0).lod.num_levels; };
+  Scene gentle = noisy_plane(0.001f), steep = noisy_plane(0.004f);
+  ASSERT_GT(num_levels(gentle), 1);
+  ASSERT_EQ(num_levels(steep), 1);
+  // Four times as high, turned, and under a shear whose singular values are 4 and 1/4 (its columns are no longer than
+  // 3.9): the same slopes as the steep one's, or possibly so.
+  const Affine3 transforms[] = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 4}, {}},
+                                {{0, 0, 1}, {1, 0, 0}, {0, 4, 0}, {}},
+                                {{1, 0, 0}, {3.75f, 1, 0}, {0, 0, 1}, {}}};
+  for (const Affine3& transform : transforms) {
+    gentle.instances[0].world_from_object = transform;
+    EXPECT_EQ(num_levels(gentle), 1);
+  }
+  const Affine3 even{{0, 0, 300}, {300, 0, 0}, {0, -300, 0}, {1, 2, 3}};
+  gentle.instances[0].world_from_object = even;
+  EXPECT_GT(num_levels(gentle), 1);
+  // The levels are those of all instances.
+  gentle.instances.push_back(gentle.instances[0]);
+  gentle.instances[1].world_from_object = transforms[0];
+  EXPECT_EQ(num_levels(gentle), 1);
+}
+
+TEST(LevelOfDetail, AsksForTexelsAsAnInstanceStretchesThemAtMost)
+{
+  Scene scene = noisy_plane(0.001f);
+  const float texel = DisplacementSet(scene, {}).texels()[0];
+  scene.instances[0].world_from_object = {{0, 0, 300}, {300, 0, 0}, {0, -300, 0}, {1, 2, 3}};
+  EXPECT_FLOAT_EQ(DisplacementSet(scene, {}).texels()[0], 300 * texel);
+  // The columns' lengths are 1, 3.88 and 1.
+  scene.instances[0].world_from_object = {{1, 0, 0}, {3.75f, 1, 0}, {0, 0, 1}, {}};
+  EXPECT_FLOAT_EQ(DisplacementSet(scene, {}).texels()[0], 4 * texel);
 }
 
 TEST(LevelOfDetail, ChangesThePictureByNoMoreThanItsTolerance)
