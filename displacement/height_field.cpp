@@ -84,31 +84,55 @@ StoredRange line_range(const PyramidLine& line)
 
 int divide_up(int a, int b) { return (a + b - 1) / b; }
 
-/// Bounds of a rectangle of cells within one period, all inclusive, in pyramid columns and rows.
-/// @param finest  level at which a node that reaches over the rectangle is taken whole
-StoredRange
-range_in_period(const HeightFieldView& f, int level, int finest, int column, int row, int i0, int j0, int i1, int j1)
+/// A rectangle of cells within one period, all inclusive, in pyramid columns and rows.
+struct CellRect {
+  int i0, j0, i1, j1;
+};
+
+/// Widens bounds by those of a rectangle.
+/// @param column, row  first cell of a node of 4 × 4 children, each 4^level cells a side
+/// @param finest       level at which a child that reaches over the rectangle is taken whole
+void widen_by_node(const HeightFieldView& f,
+                   int level,
+                   int finest,
+                   int column,
+                   int row,
+                   const CellRect& rect,
+                   StoredRange* range)
 {
-  StoredRange range = kEmpty;
-  const int size = 1 << (2 * level);  // of a child; the node (column, row) has 4 × 4
-  for (int child = 0; child < 16; ++child) {
-    const int i = column + (child & 3) * size, j = row + (child >> 2) * size;
-    const int i_end = std::min(i + size, f.x.num_cells) - 1, j_end = std::min(j + size, f.y.num_cells) - 1;
-    if (i > i1 || j > j1 || i_end < i0 || j_end < j0) continue;
-    if (level == 0) {
-      for (int corner = 0; corner < 4; ++corner) {
-        range = merge(range, texel_range_at(f, f.x.first_cell + i + (corner & 1), f.y.first_cell + j + (corner >> 1)));
+  const int shift = 2 * level, size = 1 << shift;
+  const int first_column = std::max(rect.i0 - column, 0) >> shift,
+            last_column = std::min((rect.i1 - column) >> shift, 3);
+  const int first_row = std::max(rect.j0 - row, 0) >> shift, last_row = std::min((rect.j1 - row) >> shift, 3);
+  if (level == 0) {
+    for (int j = row + first_row; j <= row + last_row + 1; ++j) {
+      for (int i = column + first_column; i <= column + last_column + 1; ++i)
+        *range = merge(*range, texel_range_at(f, f.x.first_cell + i, f.y.first_cell + j));
+    }
+    return;
+  }
+  const PyramidLine& line =
+      f.lines[level - 1]
+             [static_cast<std::ptrdiff_t>(row >> (shift + 2)) * f.line_columns[level - 1] + (column >> (shift + 2))];
+  // Children that are taken whole come first: most of the others then have nothing to add, which spares a walk along
+  // the rectangle's border.
+  for (const bool whole : {true, false}) {
+    for (int y = first_row; y <= last_row; ++y) {
+      for (int x = first_column; x <= last_column; ++x) {
+        const int i = column + x * size, j = row + y * size;
+        const int i_end = std::min(i + size, f.x.num_cells) - 1, j_end = std::min(j + size, f.y.num_cells) - 1;
+        const bool is_whole = level <= finest || (i >= rect.i0 && j >= rect.j0 && i_end <= rect.i1 && j_end <= rect.j1);
+        if (is_whole != whole) continue;
+        const StoredRange child{line.low[4 * y + x], line.high[4 * y + x]};
+        if (child.low >= range->low && child.high <= range->high) continue;
+        if (whole) {
+          *range = merge(*range, child);
+        } else {
+          widen_by_node(f, level - 1, finest, i, j, rect, range);
+        }
       }
-    } else if (level <= finest || (i >= i0 && j >= j0 && i_end <= i1 && j_end <= j1)) {
-      const int parent = 2 * (level + 1);
-      const PyramidLine& line =
-          f.lines[level - 1][static_cast<std::ptrdiff_t>(j >> parent) * f.line_columns[level - 1] + (i >> parent)];
-      range = merge(range, {line.low[child], line.high[child]});
-    } else {
-      range = merge(range, range_in_period(f, level - 1, finest, i, j, i0, j0, i1, j1));
     }
   }
-  return range;
 }
 
 /// Parts of [first, last] within single periods, in pyramid columns: at most two, or all of it once.
@@ -209,8 +233,7 @@ StoredRange height_field_range(const HeightFieldView& f,
   StoredRange range = kEmpty;
   for (int a = 0; a < num_columns; ++a) {
     for (int b = 0; b < num_rows; ++b) {
-      range = merge(
-          range, range_in_period(f, f.num_levels, finest, 0, 0, columns[a][0], rows[b][0], columns[a][1], rows[b][1]));
+      widen_by_node(f, f.num_levels, finest, 0, 0, {columns[a][0], rows[b][0], columns[a][1], rows[b][1]}, &range);
     }
   }
   return range;
