@@ -196,6 +196,45 @@ TEST(CausticSplit, InsidesOfRoughGlassKeepTheLimitsOfBounces)
   EXPECT_EQ(light[0], 0);
 }
 
+TEST(CausticSplit, ReflectionsInsideRoughGlassCountAsGlossy)
+{
+  // As above, but with one kind of reflection alone. What is reflected more than once, and is diffuse, is little at this
+  // roughness.
+  Scene scene = rough_slab(0.25f);
+  scene.render.max_bounces = 2;
+  scene.render.transmission_bounces = 1;
+  for (const bool glossy : {true, false}) {
+    scene.render.glossy_bounces = glossy ? 1 : 0;
+    scene.render.diffuse_bounces = glossy ? 0 : 1;
+    expect_same(scene, 128, 16, 0.005, glossy ? "slab that is glossy" : "slab that is diffuse");
+    const double light = mean_of(render_scene(scene, caustic_options(scene, CausticsMode::kOn, 32, 16)), Aov::kCaustic);
+    EXPECT_EQ(light > 0, glossy);
+  }
+}
+
+TEST(CausticSplit, WhatTheShadingNormalHidesInsideGlassIsLeftToPaths)
+{
+  // A facet of very rough glass seen from inside, below the horizon of a shading normal that leans by 70°. What the facet
+  // reflects above the horizon that is drawn for such a path and below its own meets it again and leaves to the lamp: 3 %
+  // of the light. No photon can come that way, nor does any other reach the facet from inside, so that paths with and
+  // without photons are the same: nothing is left to chance.
+  Scene scene = empty_scene();
+  add_caster(scene, with_normal(quad_mesh({-3, 0.6f, 3}, {6, 0, 0}, {0, 0, -6}), leaning(0.94f, 0.34f, 0)),
+             glass_material(1));
+  scene.lights.push_back(square_light({0, 1.6f, 0.7f}, leaning(0, -1, -0.7f), 0.5f, 10));
+  const Vec3f wo = leaning(0.49f, -0.17f, 0.85f);
+  Camera& camera = scene.cameras.front().camera;
+  const Frame frame = frame_from_normal(wo);
+  camera.world_from_camera = {frame.s, frame.t, wo, Vec3f{0, 0.6f, 0} + 2.0f * wo};
+  camera.half_width = camera.half_height = 0.01f;
+  double light[2] = {};
+  for (const bool photons : {false, true}) {
+    const CausticsMode mode = photons ? CausticsMode::kOn : CausticsMode::kOff;
+    light[photons] = render_scene(scene, caustic_options(scene, mode, 32, 64)).mean();
+  }
+  EXPECT_NEAR(light[1], light[0], 1e-3 * light[0]);
+}
+
 TEST(CausticSplit, PathsFromAFloorInGlassDoNotLookInside)
 {
   // The floor lies in the glass and is lit through its rough surface; half of what it throws back that surface reflects. So
