@@ -107,11 +107,12 @@ void shade_photons(const KernelGlobals& g,
 }
 
 void finish(const KernelGlobals& g,
-            const PathState& state,
+            PathState& state,
             const Batch& batch,
             Counters& counters,
             std::uint64_t& first_nonfinite)
 {
+  for (std::uint32_t i = batch.num_paths(); i < state.caustic.num_paths; ++i) path_add_to_root(state, i);
   const auto num_pixels = static_cast<std::uint32_t>(batch.width * batch.height);
   for (std::uint32_t i = 0; i < num_pixels * batch.num_samples; ++i) {
     const std::uint32_t sample = batch.first_sample + i / num_pixels;

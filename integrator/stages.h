@@ -52,9 +52,9 @@ struct StageTable {
                         const QueueView& queue,
                         QueueView& next,
                         PhotonQueueView& photons);
-  /// Adds the batch's finished samples to the film, in path order.
+  /// Adds the batch's finished samples to the film, in path order; what paths that forked have found goes to their root's.
   /// @param first_nonfinite  pixel << 32 | sample, lowered to the least of the samples that were dropped
-  void (*finish)(const KernelGlobals&, const PathState&, const Batch&, Counters&, std::uint64_t& first_nonfinite);
+  void (*finish)(const KernelGlobals&, PathState&, const Batch&, Counters&, std::uint64_t& first_nonfinite);
 };
 
 const StageTable& stage_table_baseline();

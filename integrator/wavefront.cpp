@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
+#include <numeric>
 #include <utility>
 
 namespace relief {
@@ -29,6 +30,7 @@ Wavefront::Wavefront(bool caustics)
     *p = *column++;
   }
   c.wi = caustic_memory_->wi;
+  c.root = caustic_memory_->root;
 }
 
 void Wavefront::note_displacement(const DisplacementWork& work)
@@ -90,6 +92,8 @@ void Wavefront::run(const KernelGlobals& g,
     for (float* p : {state_.caustic.radiance_r, state_.caustic.radiance_g, state_.caustic.radiance_b}) {
       std::fill_n(p, batch.num_paths(), 0.0f);
     }
+    std::iota(state_.caustic.root, state_.caustic.root + batch.num_paths(), 0u);
+    state_.caustic.num_paths = batch.num_paths();
   }
   active_.size = batch.num_paths();
   for (std::uint32_t i = 0; i < active_.size; ++i) active_.paths[i] = i;

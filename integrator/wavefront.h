@@ -80,8 +80,8 @@ class Wavefront {
     std::uint32_t queues[kNumQueues][kColumnEntries];
   };
   struct CausticMemory {
-    float columns[kNumCausticColumns - 1][kColumnEntries];
-    std::uint32_t wi[kColumnEntries];
+    float columns[kNumCausticFloats][kColumnEntries];
+    std::uint32_t wi[kColumnEntries], root[kColumnEntries];
   };
 
   std::unique_ptr<Memory> memory_;

@@ -100,6 +100,37 @@ RELIEF_KERNEL float path_light_weight(LightTechnique technique, float pdf_light,
   return technique == LightTechnique::kMis ? mis_power(pdf_light, pdf_bsdf) : 0.0f;
 }
 
+/// Copies a path that can go on in two ways; the copy has brought nothing yet.
+/// @pre there is room, see path_has_room
+RELIEF_KERNEL std::uint32_t path_fork(PathState& s, std::uint32_t i)
+{
+  const std::uint32_t copy = s.caustic.num_paths++;
+#define X(type, name) s.name[copy] = s.name[i];
+#include "kernel/state/path_state_fields.inc"
+#undef X
+  s.caustic.root[copy] = s.caustic.root[i];
+  s.direct_r[copy] = s.direct_g[copy] = s.direct_b[copy] = 0.0f;
+  s.indirect_r[copy] = s.indirect_g[copy] = s.indirect_b[copy] = 0.0f;
+  s.caustic.radiance_r[copy] = s.caustic.radiance_g[copy] = s.caustic.radiance_b[copy] = 0.0f;
+  return copy;
+}
+
+/// Whether a path can become `ways` of them.
+RELIEF_KERNEL bool path_has_room(const PathState& s, std::uint32_t ways)
+{
+  return s.caustic.num_paths + ways - 1 <= kBatchPaths;
+}
+
+/// Adds what a forked path has brought to its root.
+RELIEF_KERNEL void path_add_to_root(PathState& s, std::uint32_t i)
+{
+  const std::uint32_t root = s.caustic.root[i];
+  for (float* column : {s.direct_r, s.direct_g, s.direct_b, s.indirect_r, s.indirect_g, s.indirect_b,
+                        s.caustic.radiance_r, s.caustic.radiance_g, s.caustic.radiance_b}) {
+    column[root] += column[i];
+  }
+}
+
 /// Whether light that a sharp lobe of this surface brings to the path is the photon pass's.
 RELIEF_KERNEL bool path_caustic_after(std::uint32_t flags, const InstanceView& instance)
 {

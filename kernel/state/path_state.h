@@ -9,13 +9,16 @@
 
 namespace relief {
 
-/// Columns of camera paths that the caustic pass needs; null where it is off.
+/// Columns of camera paths that the caustic pass needs; null where it is off. A batch has one sample of each pixel then, and
+/// so room for paths that fork.
 struct CausticStateView {
   float *irradiance_r = nullptr, *irradiance_g = nullptr, *irradiance_b = nullptr;  ///< at the present hit, W/m²
   std::uint32_t* wi = nullptr;                                                      ///< octahedral: where it comes from
   float *radiance_r = nullptr, *radiance_g = nullptr, *radiance_b = nullptr;        ///< of the sample so far
+  std::uint32_t* root = nullptr;  ///< camera path it forked from, or itself
+  std::uint32_t num_paths = 0;    ///< forked ones included
 };
-inline constexpr int kNumCausticColumns = 7;
+inline constexpr int kNumCausticFloats = 6;
 
 /// Paths of a full batch. State and queues take about 270 bytes a path, so a batch nearly stays in a second-level cache of
 /// 1 MiB.

@@ -404,6 +404,47 @@ double slab_over_closed_form(float size, float floor)
   return mean_of(picture, Aov::kCaustic) / (4 * (1 - F) / (1 + F) * 0.01 / 3.14159265358979);
 }
 
+/// Glass below a lamp that fills what it reflects, from above. All else is black.
+Scene lamp_over_glass(bool far_side, float roughness)
+{
+  Scene scene = empty_scene();
+  add_caster(scene, quad_mesh({-2, 0.2f, 2}, {4, 0, 0}, {0, 0, -4}), glass_material(roughness));
+  if (far_side) add_caster(scene, quad_mesh({-2, 0.1f, -2}, {4, 0, 0}, {0, 0, 4}), glass_material(roughness));
+  scene.lights.push_back(square_light({0, 2, 0}, {0, -1, 0}, 1.5f, 1));
+  look_down(scene, {0, 0.2f, 0}, 0.05f, 1);
+  return scene;
+}
+
+TEST(PathsThatFork, SmoothGlassShowsALampWithoutNoise)
+{
+  // Of a path that goes one way, one sample in 25 would be white.
+  const Scene single = lamp_over_glass(false, 0);
+  const Rendered picture = render_scene(single, caustic_options(single, CausticsMode::kOn, 16, 1));
+  for (int y = 0; y < 16; ++y) {
+    for (int x = 0; x < 16; ++x) EXPECT_NEAR(picture.radiance(x, y).x, 0.04f, 1e-5f);
+  }
+}
+
+TEST(PathsThatFork, FarSidesOfGlassShowALamp)
+{
+  // R + T²R / (1 − R²) where smooth. A sample is R + TR or nearly R, the latter one time in 25: its deviation is 0.008, and
+  // would be 0.27 by chance alone. Rough glass is compared with paths that go one way; means are judged at 4 standard errors.
+  constexpr double kR = 0.04, kT = 0.96;
+  const Scene slab = lamp_over_glass(true, 0);
+  const Estimate smooth = estimate_mean(slab, caustic_options(slab, CausticsMode::kOn, 16, 16), 8);
+  EXPECT_NEAR(smooth.mean, kR + kT * kT * kR / (1 - kR * kR), 4 * smooth.standard_error);
+  EXPECT_LT(smooth.standard_error, 2e-4);
+  // Too smooth for photons to be gathered inside.
+  const Scene rough = lamp_over_glass(true, 0.1f);
+  RenderOptions options = caustic_options(rough, CausticsMode::kOn, 16, 64);
+  options.settings.caustics.photons = 1 << 10;
+  const Estimate on = estimate_mean(rough, options, 8);
+  const Estimate off = estimate_mean(rough, caustic_options(rough, CausticsMode::kOff, 16, 512), 8);
+  const double error = std::hypot(on.standard_error, off.standard_error);
+  EXPECT_NEAR(on.mean, off.mean, 4 * error);
+  EXPECT_LT(error, 0.01 * off.mean);
+}
+
 TEST(Caustics, SunThroughASlabLosesWhatTwoInterfacesReflect)
 {
   EXPECT_NEAR(slab_over_closed_form(2, 3), 1.0, 0.005);

@@ -1,6 +1,7 @@
 // Samplers against their densities (χ²), densities against 1, samples against evaluations, for every lobe and mixture.
 #include <gtest/gtest.h>
 
+#include "kernel/bsdf/glass_branches.h"
 #include "tests/kernel/bsdf/bsdf_fixture.h"
 #include "tests/support/chi2.h"
 
@@ -308,6 +309,50 @@ TEST(SmoothGlass, ReflectsAndRefractsByFresnelAndSnell)
       EXPECT_EQ(other.lobe, kLobeDelta | kLobeReflect);
     }
   }
+}
+
+TEST(GlassBranches, AreWhatChanceWouldChooseBetween)
+{
+  // A sample below the number at which reflection turns into refraction, and one above, for the same microfacet.
+  struct Case {
+    float ior, roughness, wo_z;
+  };
+  for (const Case& c : {Case{1.5f, 0, 0.6f}, Case{1.5f, 0, -0.9f}, Case{1.5f, 0.3f, 0.8f}, Case{1.5f, 1, 0.3f},
+                        Case{1.3f, 0.5f, -0.9f}, Case{2.4f, 0.15f, -0.95f}}) {
+    SCOPED_TRACE(testing::Message() << "index " << c.ior << ", roughness " << c.roughness << ", cosine " << c.wo_z);
+    const SurfaceClosure closure =
+        surface_closure_make<kFeatureAll>(glass(c.ior, c.roughness), full_tables(), direction(c.wo_z));
+    TestRandom random(7);
+    int pairs = 0;
+    for (int n = 0; n < 1000; ++n) {
+      const float u_x = random.next();
+      const Vec2f u{u_x, random.next()};
+      const GlassBranches both = glass_branches_sample<kFeatureAll>(closure, full_tables(), 0.999f, u);
+      const float F = both.reflectance;
+      EXPECT_EQ(
+          glass_branches_sample<kFeatureAll>(closure, full_tables(), 0.99f * closure.glass.lost - 1e-9f, u).reflectance,
+          1.0f);
+      if (!(F < 0.999f)) continue;
+      ++pairs;
+      const float turn = closure.glass.lost + (1 - closure.glass.lost) * F;
+      constexpr float kClose = 1e-5f;
+      const BsdfSample below = closure_sample<kFeatureAll>(closure, full_tables(), turn - kClose, u);
+      const BsdfSample above = closure_sample<kFeatureAll>(closure, full_tables(), turn + kClose, u);
+      for (const auto& [one, other] : {std::pair{below, both.reflected}, std::pair{above, both.refracted}}) {
+        EXPECT_EQ(one.lobe, other.lobe);
+        EXPECT_EQ(one.pdf, other.pdf);
+        EXPECT_EQ(one.f, other.f);
+        EXPECT_EQ(one.wi, other.wi);
+        EXPECT_EQ(one.eta, other.eta);
+      }
+    }
+    EXPECT_GT(pairs, 300);
+  }
+  EXPECT_EQ(glass_branches_sample<kFeatureAll>(
+                surface_closure_make<kFeatureAll>(glass(1.0f, 0.2f), full_tables(), direction(0.5f)), full_tables(),
+                0.5f, {0.5f, 0.5f})
+                .reflectance,
+            1.0f);
 }
 
 TEST(MatchedGlass, IsNotThere)
