@@ -290,9 +290,10 @@ def render(job):
         scene.cycles.samples = run["samples"]
         scene.cycles.seed = run["seed"]
         scene.render.filepath = run["output"]
-        start = time.monotonic()
+        start, processor_start = time.monotonic(), time.process_time()
         bpy.ops.render.render(write_still=True)
         run["wall_seconds"] = time.monotonic() - start
+        run["processor_seconds"] = time.process_time() - processor_start
         print("RUN " + json.dumps(run), flush=True)
 
 

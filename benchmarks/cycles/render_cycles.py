@@ -35,9 +35,10 @@ def render_cycles(scene, runs, resolution=None, threads=None, blend=None, blende
     @param  threads     number of render threads; None: all
     @param  blend       where to save the scene as a .blend, for looking at it; None: nowhere
     @param  manifold    use Cycles' shadow caustics (MNEE)
-    @return             {"runs": the runs with render_seconds, synchronize_seconds, preparation_seconds, wall_seconds added,
-                        "approximate": materials that Cycles' closures only come near to, "import_seconds",
-                        "peak_memory_bytes", "processor_seconds" of the whole process}
+    @return             {"runs": the runs with render_seconds, synchronize_seconds, preparation_seconds, wall_seconds,
+                        processor_seconds (all threads, preparation included) added, "approximate": materials that Cycles'
+                        closures only come near to, "import_seconds", "peak_memory_bytes", "processor_seconds" of the whole
+                        process}
     @error              CyclesError
     """
     job = {"runs": runs, "resolution": resolution, "threads": threads, "blend": blend, "manifold": manifold}
