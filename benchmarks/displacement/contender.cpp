@@ -96,9 +96,9 @@ Contender::Contender(const BenchSurface& surface, const ContenderSpec& spec) : s
   rtcSetDeviceMemoryMonitorFunction(device_, count_bytes, &bytes);
   scene_ = tessellation_scene_make(
       device_, tessellation_ != nullptr ? spec_.build : TessellationBuild{RTC_BUILD_QUALITY_HIGH, false});
-  const RTCGeometry geometry = tessellation_ != nullptr
-                                   ? tessellation_->geometry_make(device_)
-                                   : displaced_geometry_make(device_, geometry_, traversal_table_select());
+  RTCGeometry geometry = tessellation_ != nullptr
+                             ? tessellation_->geometry_make(device_)
+                             : displaced_geometry_make(device_, geometry_, traversal_table_select());
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(scene_, geometry);
   rtcReleaseGeometry(geometry);

@@ -24,7 +24,7 @@ struct FrameResult {
 /// All methods have the same random numbers, so that exact ones give the same picture.
 /// @param tessellation_bytes  what a tessellation may take while it is built; it is made coarser if need be
 /// @return  chord, rmip, tfdm and both tessellations
-std::vector<FrameResult> bench_frames(const BenchScene& scene,
+std::vector<FrameResult> bench_frames(const BenchScene& bench,
                                       BenchResolution resolution,
                                       int rounds,
                                       std::uint64_t tessellation_bytes);

@@ -16,7 +16,7 @@ RELIEF_KERNEL std::uint32_t octahedral_encode(Vec3f v)
     p = {__builtin_copysignf(1.0f - __builtin_fabsf(p.y), p.x), __builtin_copysignf(1.0f - __builtin_fabsf(p.x), p.y)};
   }
   const auto bits = [](float x) {
-    return static_cast<std::uint32_t>((clamp(x, -1.0f, 1.0f) + 1.0f) * 32767.5f + 0.5f);
+    return static_cast<std::uint32_t>(__builtin_lrintf((clamp(x, -1.0f, 1.0f) + 1.0f) * 32767.5f));
   };
   return bits(p.x) << 16 | bits(p.y);
 }
