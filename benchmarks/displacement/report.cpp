@@ -304,7 +304,8 @@ BenchPicture halved(const BenchPicture& picture)
 {
   BenchPicture half{picture.width / 2, picture.height / 2, picture.caption, {}};
   const auto at = [&](int x, int y, int c) {
-    return int{picture.rgb[static_cast<std::size_t>((y * picture.width + x) * 3 + c)]};
+    const int index = (y * picture.width + x) * 3 + c;
+    return int{picture.rgb[static_cast<std::size_t>(index)]};
   };
   for (int y = 0; y < half.height; ++y) {
     for (int x = 0; x < half.width; ++x) {

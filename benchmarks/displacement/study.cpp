@@ -212,7 +212,7 @@ void Study::add_marching(const BenchSceneSpec& spec) const
   sweep.y_label = "ns a ray";
   sweep.log_y = true;
   for (const auto& contender : contenders) sweep.lines.push_back({contender->spec().name, {}, {}});
-  for (double marching_scale = 1; marching_scale <= 256; marching_scale *= 2) {
+  for (int marching_scale = 1; marching_scale <= 256; marching_scale *= 2) {
     for (const auto& contender : contenders) {
       RmipOptions rmip_options;
       rmip_options.marching_scale = marching_scale;
