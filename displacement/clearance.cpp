@@ -39,7 +39,11 @@ HeightsBetween heights_between(const HeightFieldView& field, double x0, double y
   return out;
 }
 
-double surface_clearance(const DisplacedMeshView& mesh, const DisplacedTriangle& tri, double b1, double b2, Vec3d reach)
+SurfaceInBox surface_in_box(const DisplacedMeshView& mesh,
+                            const DisplacedTriangle& tri,
+                            double b1,
+                            double b2,
+                            Vec3d reach)
 {
   const BasePoint base = base_point(tri, b1, b2);
   const double x = tri.x[0] + b1 * base.xu + b2 * base.xv, y = tri.y[0] + b1 * base.yu + b2 * base.yv;
@@ -53,14 +57,22 @@ double surface_clearance(const DisplacedMeshView& mesh, const DisplacedTriangle&
   const double dy = change_within(base.yu * b1_gradient + base.yv * b2_gradient, reach);
   // A box of so many texels would be one of a triangle without area; also turns away NaN.
   constexpr double kMostTexels = 1 << 20;
-  if (!(dx + dy < kMostTexels)) return 0;
-  if (cell_of(x - dx) == cell_of(x + dx) && cell_of(y - dy) == cell_of(y + dy)) return 0;
+  if (!(dx + dy < kMostTexels)) return {};
+  SurfaceInBox out;
+  out.crease = cell_of(x - dx) != cell_of(x + dx) || cell_of(y - dy) != cell_of(y + dy);
+  const double weights[3] = {1.0 - b1 - b2, b1, b2};
+  const Vec3d gradients[3] = {-1.0 * (b1_gradient + b2_gradient), b1_gradient, b2_gradient};
+  for (int k = 0; k < 3; ++k) {
+    if (weights[k] < change_within(gradients[k], reach)) out.sides |= static_cast<std::uint8_t>(1u << k);
+  }
+  if (!out.crease && out.sides == 0) return out;
   const HeightsBetween near = heights_between(*mesh.field, x - dx, y - dy, x + dx, y + dy);
   // Of the displacement s·|N|.
   const Vec3d n = base.N * (1.0 / nu);
   const Vec3d gradient =
       nu * inverse * cross(u, v) + s * (dot(n, base.Nu) * b1_gradient + dot(n, base.Nv) * b2_gradient);
-  return std::abs(mesh.scale) * std::max(near.high - h, h - near.low) + change_within(gradient, reach);
+  out.clearance = std::abs(mesh.scale) * std::max(near.high - h, h - near.low) + change_within(gradient, reach);
+  return out;
 }
 
 }  // namespace relief

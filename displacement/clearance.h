@@ -4,7 +4,8 @@
 // its normal takes a ray's origin out of it (offset_ray_origin). Over a crease, a border between two cells of the map, it
 // does not: in a valley narrower than a right angle the move ends inside the other slope. But along its displacement line
 // a point meets the surface only once, so there the origin is moved along that line instead, past all heights that the
-// surface has within the box.
+// surface has within the box. The same holds along the sides that base triangles share, where the normals of two surfaces
+// meet: there the heights are those of all triangles that the box reaches into (displaced_leave finds them).
 #pragma once
 
 #include "displacement/displaced_triangle.h"
@@ -18,14 +19,21 @@ struct HeightsBetween {
 };
 HeightsBetween heights_between(const HeightFieldView& field, double x0, double y0, double x1, double y1);
 
-/// How far along ±N/|N| a point of the surface has to be moved to be clear of the surface beside it, wherever in a box
-/// around it it really is and comes to lie.
+/// What a box around a point of a triangle's surface holds of that surface.
+struct SurfaceInBox {
+  /// How far along ±N/|N| the point has to be moved to be clear of the surface, wherever in the box it really is and comes
+  /// to lie; metres of object space.
+  double clearance = 0;
+  bool crease = false;     ///< the box may hold a border between cells of the map
+  std::uint8_t sides = 0;  ///< bit k: it reaches over the side of the triangle that is opposite to vertex k
+};
+
 /// @param reach  half sides of the box, object space, metres
-/// @return       metres of object space; 0 where the box holds no crease, and where the triangle has no area over it
-double surface_clearance(const DisplacedMeshView& mesh,
-                         const DisplacedTriangle& tri,
-                         double b1,
-                         double b2,
-                         Vec3d reach);
+/// @return       without creases and sides there is no clearance; nothing of a triangle without area over the point
+SurfaceInBox surface_in_box(const DisplacedMeshView& mesh,
+                            const DisplacedTriangle& tri,
+                            double b1,
+                            double b2,
+                            Vec3d reach);
 
 }  // namespace relief

@@ -1,5 +1,8 @@
 #include "displacement/embree_geometry.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "displacement/clearance.h"
 #include "displacement/seam_walls.h"
 
@@ -33,6 +36,43 @@ struct OnLevel {
     tri = triangle_on_level(tri, *geometry.mesh.field, *mesh.field);
   }
 };
+
+/// A box around a point of the surface that reaches over sides of its triangle.
+struct BoxOverSides {
+  const DisplacedGeometry& geometry;
+  std::uint32_t triangle;
+  int level;
+  double weights[3];  ///< of the triangle's vertices; 0 where the box reaches over the side opposite to them
+  double d;           ///< the point's displacement, metres
+  Vec3d reach;
+  double clearance;  ///< of the triangle itself, then of its neighbours too
+  bool has_neighbors = false;
+};
+
+/// Widens the clearance by that of a triangle that has all vertices between which the point is, if it has the surface in
+/// common there: at a seam it has not.
+bool widen_by_neighbor(RTCPointQueryFunctionArguments* arguments)
+{
+  auto& box = *static_cast<BoxOverSides*>(arguments->userPtr);
+  if (arguments->primID == box.triangle) return false;
+  const DisplacedTriangle& own = box.geometry.mesh.triangles[box.triangle];
+  const OnLevel other(box.geometry, arguments->primID, box.level);
+  double b[3] = {0, 0, 0};
+  for (int k = 0; k < 3; ++k) {
+    if (box.weights[k] == 0) continue;
+    int at = 0;
+    while (at < 3 && !(other.tri.P[at] == own.P[k] && other.tri.N[at] == own.N[k])) ++at;
+    if (at == 3) return false;
+    b[at] = box.weights[k];
+  }
+  // From the point to where it is on the side, and from there once more.
+  const SurfaceInBox near = surface_in_box(other.mesh, other.tri, b[1], b[2], 2.0 * box.reach);
+  const double d = surface_point(other.mesh, other.tri, b[1], b[2]).d;
+  if (!(std::abs(d - box.d) <= near.clearance)) return false;
+  box.clearance = std::max(box.clearance, near.clearance);
+  box.has_neighbors = true;
+  return false;
+}
 
 }  // namespace
 
@@ -78,7 +118,25 @@ Vec3d displaced_leave(const DisplacedGeometry& geometry,
                       Vec3d reach)
 {
   const OnLevel on(geometry, triangle, level);
-  const double distance = surface_clearance(on.mesh, on.tri, b1, b2, reach);
+  const SurfaceInBox own = surface_in_box(on.mesh, on.tri, b1, b2, reach);
+  double distance = own.crease ? own.clearance : 0;
+  // A triangle within the box has no side that it could share.
+  if (own.sides != 0 && own.sides != 7 && geometry.scene != nullptr) {
+    const SurfacePoint point = surface_point(on.mesh, on.tri, b1, b2);
+    BoxOverSides box{geometry, triangle, level, {1.0 - b1 - b2, b1, b2}, point.d, reach, own.clearance};
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) {
+      if ((own.sides >> k & 1) != 0) box.weights[k] = 0;
+      sum += box.weights[k];
+    }
+    for (double& weight : box.weights) weight /= sum;
+    const Vec3f P = to_float(point.P);
+    RTCPointQuery query{P.x, P.y, P.z, 0.0f, static_cast<float>(2.0 * length(reach))};
+    RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    rtcPointQuery(geometry.scene, &query, &context, widen_by_neighbor, &box);
+    if (box.has_neighbors) distance = box.clearance;
+  }
   if (!(distance > 0)) return {};
   const Vec3d N = base_point(on.tri, b1, b2).N;
   return N * (distance / length(N));

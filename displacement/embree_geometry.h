@@ -27,6 +27,7 @@ struct DisplacedGeometry {
   DisplacementLevel levels[kMaxLodLevels];     ///< the finest first; lod.num_levels of them
   RmipOptions rmip_options;                    ///< for both of RMIP's
   RTCFilterFunctionN shadow_filter = nullptr;  ///< called for hits of shadow rays; null: all of them are opaque
+  RTCScene scene = nullptr;                    ///< of this geometry alone, committed; null: see displaced_leave
 };
 
 /// Traversals compiled for one instruction set.
@@ -84,7 +85,8 @@ Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry,
                               double b1,
                               double b2);
 
-/// How far a ray's origin has to be moved to leave a point of the surface, see surface_clearance.
+/// How far a ray's origin has to be moved to leave a point of the surface where it has a crease, see clearance.h. Triangles
+/// beside the point's own are looked up in the geometry's scene; without one there are none.
 /// @param reach  half sides of the box of errors, object space, metres
 /// @return       to the side of N, object space; zero: it can leave along the normal
 Vec3d displaced_leave(const DisplacedGeometry& geometry,

@@ -133,7 +133,7 @@ void Accel::build(const Scene& scene,
   const TraversalTable& traversals = traversal_table_select();
   displaced_scenes_.assign(displacements.size(), nullptr);
   for (std::size_t d = 0; d < displacements.size(); ++d) {
-    const DisplacedGeometry& displaced = displacements.geometry(d);
+    DisplacedGeometry& displaced = displacements.geometry(d);
     if (const Tessellation* tessellation = displacements.tessellation(d)) {
       displaced_scenes_[d] = tessellation_scene_make(device_, kRenderTessellation);
       const RTCGeometry geometry = tessellation->geometry_make(device_);
@@ -142,6 +142,7 @@ void Accel::build(const Scene& scene,
     } else {
       displaced_scenes_[d] = new_scene(RTC_BUILD_QUALITY_HIGH);
       attach(displaced_scenes_[d], displaced_geometry_make(device_, displaced, traversals), 0, ~0u);
+      displaced.scene = displaced_scenes_[d];
     }
     commit(displaced_scenes_[d]);
   }
