@@ -106,6 +106,10 @@ TEST(LevelOfDetail, OfAnUnevenInstanceIsThatOfItsSteepestSlopes)
     gentle.instances[0].world_from_object = transform;
     EXPECT_EQ(num_levels(gentle), 1);
   }
+  for (const float size : {1e-12f, 1.0f, 1e12f}) {
+    gentle.instances[0].world_from_object = {{size, 0, 0}, {0, 1.001f * size, 0}, {0, 0, size}, {}};
+    EXPECT_GT(num_levels(gentle), 1) << size;
+  }
   const Affine3 even{{0, 0, 300}, {300, 0, 0}, {0, -300, 0}, {1, 2, 3}};
   gentle.instances[0].world_from_object = even;
   EXPECT_GT(num_levels(gentle), 1);
@@ -113,6 +117,26 @@ TEST(LevelOfDetail, OfAnUnevenInstanceIsThatOfItsSteepestSlopes)
   gentle.instances.push_back(gentle.instances[0]);
   gentle.instances[1].world_from_object = transforms[0];
   EXPECT_EQ(num_levels(gentle), 1);
+}
+
+/// As much flatter as their instance is uneven, slopes are no steeper than the gentle ones, however little of the largest
+/// stretch's square the squares of the others are: one or two of them are less than its rounding.
+TEST(LevelOfDetail, KnowsTheLeastOfAnyStretches)
+{
+  for (const float most : {1e3f, 1e6f, 1e8f, 1e9f, 1e12f}) {
+    const Affine3 transforms[] = {{{most, 0, 0}, {0, 1, 0}, {0, 0, 1}, {}},
+                                  {{1, 0, 0}, {0, 0, most}, {0, -most, 0}, {}},
+                                  {{0, 0, most}, {1, 0, 0.5f * most}, {0, 1, 0}, {}}};
+    for (const Affine3& transform : transforms) {
+      Scene gentle = noisy_plane(0.001f / most), steep = noisy_plane(0.004f / most);
+      gentle.instances[0].world_from_object = steep.instances[0].world_from_object = transform;
+      EXPECT_GT(DisplacementSet(gentle, {}).geometry(0).lod.num_levels, 1) << most;
+      EXPECT_EQ(DisplacementSet(steep, {}).geometry(0).lod.num_levels, 1) << most;
+    }
+  }
+  Scene line = noisy_plane(0.001f);
+  line.instances[0].world_from_object = {{1, 0, 0}, {0, 0, 0}, {0, 0, 0}, {}};
+  EXPECT_EQ(DisplacementSet(line, {}).geometry(0).lod.num_levels, 1);
 }
 
 TEST(LevelOfDetail, AsksForTexelsAsAnInstanceStretchesThemAtMost)
