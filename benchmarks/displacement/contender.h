@@ -74,6 +74,8 @@ class Contender {
   std::size_t triangle_bytes() const { return triangle_bytes_; }  ///< base triangles, or vertices and indices
   std::size_t bvh_bytes() const { return bvh_bytes_; }
   double build_seconds() const { return build_seconds_; }  ///< of wall clock, what all methods share included
+  /// The part of it that another scale or midlevel asks for again: all but what is made of the map alone.
+  double rescale_seconds() const { return rescale_seconds_; }
 
   /// Has no effect on methods other than RMIP's two.
   void set_rmip_options(const RmipOptions& options) { geometry_.rmip_options = options; }
@@ -96,7 +98,7 @@ class Contender {
   ContenderSpec spec_;
   double rate_ = 1;
   std::size_t table_bytes_ = 0, triangle_bytes_ = 0, bvh_bytes_ = 0;
-  double build_seconds_ = 0;
+  double build_seconds_ = 0, rescale_seconds_ = 0;
   std::unique_ptr<Rmip> rmip_;
   std::unique_ptr<MinmaxMipmap> mipmap_;
   std::unique_ptr<Tessellation> tessellation_;

@@ -86,7 +86,7 @@ Table speed_table(const SceneResult& scene)
       fmt::format("Map {} MiB, not counted. Rays: {} primary, {} bounce, {} shadow. Two methods disagree about a "
                   "ray if only one hits or t differs by more than {:.2g} m, a texel.",
                   mebibytes(scene.map_bytes), scene.num_rays[0], scene.num_rays[1], scene.num_rays[2], scene.tolerance),
-      {"method", "MiB", "prepared in s"},
+      {"method", "MiB", "prepared in s", "for a new scale in s"},
       {}};
   for (const char* what : {"Mrays/s", "over tfdm", "over tessellate", "disagree"}) {
     for (const BenchRayKind kind : kKinds) {
@@ -95,7 +95,8 @@ Table speed_table(const SceneResult& scene)
   }
   for (const MethodResult& method : scene.methods) {
     std::vector<std::string> row = {label_of(method), mebibytes(method.bytes()),
-                                    fmt::format("{:.3g}", method.build_seconds)};
+                                    fmt::format("{:.3g}", method.build_seconds),
+                                    fmt::format("{:.3g}", method.rescale_seconds)};
     for (const BenchRayKind kind : kKinds) {
       row.push_back(method.speed(kind) > 0 ? fmt::format("{:.3g}", method.speed(kind)) : kNone);
     }
@@ -342,7 +343,8 @@ nlohmann::ordered_json json_of(const MethodResult& method)
                                  {"table_bytes", method.table_bytes},
                                  {"triangle_bytes", method.triangle_bytes},
                                  {"bvh_bytes", method.bvh_bytes},
-                                 {"build_seconds", method.build_seconds}};
+                                 {"build_seconds", method.build_seconds},
+                                 {"rescale_seconds", method.rescale_seconds}};
   if (method.is_tessellation()) {
     json["edges_per_texel"] = method.rate;
     json["micro_triangles"] = method.num_micro_triangles;

@@ -127,6 +127,7 @@ MethodResult method_result(const Contender& contender)
   result.triangle_bytes = contender.triangle_bytes();
   result.bvh_bytes = contender.bvh_bytes();
   result.build_seconds = contender.build_seconds();
+  result.rescale_seconds = contender.rescale_seconds();
   return result;
 }
 

@@ -42,7 +42,7 @@ struct MethodResult {
   double rate = 1;  ///< of tessellations: edges a texel
   std::uint64_t num_micro_triangles = 0;
   std::size_t table_bytes = 0, triangle_bytes = 0, bvh_bytes = 0;
-  double build_seconds = 0;
+  double build_seconds = 0, rescale_seconds = 0;  ///< see Contender
   std::array<Measurement, kNumBenchRayKinds> of_kind;
 
   bool is_tessellation() const { return num_micro_triangles > 0; }

@@ -119,10 +119,13 @@ TEST(DisplacementMethods, TessellationApproachesTheSurface)
     const Rendered triangles = render_displaced(scene, method, 2);
     const LayerDifference depth = layer_difference(triangles, chord, Aov::kDepth);
     const LayerDifference beauty = layer_difference(triangles, chord, Aov::kBeauty);
-    std::printf("%s: depth differs by %.2g of it, radiance by %.2g of the mean, its mean by %.2g\n",
+    const LayerDifference normal = layer_difference(triangles, chord, Aov::kNormal);
+    std::printf("%s: depth differs by %.2g of it, normals by %.2g, radiance by %.2g of the mean, its mean by %.2g\n",
                 kDisplacementMethodLabels[static_cast<std::size_t>(method)].data(), depth.mean_error / depth.mean,
-                beauty.mean_error / beauty.mean, beauty.bias / beauty.mean);
+                normal.mean_error, beauty.mean_error / beauty.mean, beauty.bias / beauty.mean);
     EXPECT_LT(depth.mean_error, 3e-3 * depth.mean);
+    // Two facets a texel for one bilinear patch.
+    EXPECT_LT(normal.mean_error, 0.03);
     EXPECT_LT(std::abs(beauty.bias), 0.01 * beauty.mean);
     EXPECT_EQ(triangles.stats.counters.displaced_prisms, 0u);
   }
