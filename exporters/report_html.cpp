@@ -27,9 +27,9 @@ constexpr const char* kStyle =
     "body{font:15px/1.45 system-ui,sans-serif;max-width:1320px;margin:2em auto;padding:0 1em;color:#222}"
     "table{border-collapse:collapse;margin:1em 0;font-size:13px}"
     "th,td{border:1px solid #ccc;padding:2px 8px;text-align:left}th{background:#f0f0f0}"
-    "td.n{text-align:right;font-variant-numeric:tabular-nums}"
+    "td.n{text-align:right;font-variant-numeric:tabular-nums}td:first-child{min-width:10em}"
     ".row{display:flex;flex-wrap:wrap;gap:12px;align-items:flex-start}"
-    "figure{margin:0}figcaption{font-size:12px;color:#555}svg{background:#fff}"
+    "figure{margin:0;width:min-content}figcaption{font-size:12px;color:#555}svg{background:#fff}"
     "h1{font-size:26px}h2{margin-top:2em;border-bottom:1px solid #ccc}";
 
 std::string number_text(double value)
@@ -73,7 +73,11 @@ Scale scale_of(const std::vector<double>& values, bool log, bool from_zero, doub
   }
   if (!(low <= high)) low = high = 1;
   if (log) {
-    if (from_zero) low = std::pow(10.0, std::floor(std::log10(low) - 1e-9));
+    if (from_zero) {
+      // The next of 1, 2, 5, 10, … below, so that the least bar has some height and not most of the plot.
+      const double power = std::pow(10.0, std::floor(std::log10(0.9 * low))), digit = 0.9 * low / power;
+      low = power * (digit >= 5 ? 5 : (digit >= 2 ? 2 : 1));
+    }
     if (low == high) high = 2 * low;
     return {low, high, log, pixel_low, pixel_high};
   }
@@ -87,11 +91,15 @@ std::vector<double> ticks_of(const Scale& scale)
 {
   std::vector<double> ticks;
   if (scale.log) {
-    const bool wide = scale.high / scale.low > 200;
+    constexpr double kDecades[] = {1}, kUsual[] = {1, 2, 5}, kFine[] = {1, 1.5, 2, 3, 4, 5, 6, 8};
+    const double range = scale.high / scale.low;
+    const std::span<const double> steps = range > 200 ? std::span<const double>(kDecades)
+                                          : range > 5 ? std::span<const double>(kUsual)
+                                                      : std::span<const double>(kFine);
     for (double power = std::pow(10.0, std::floor(std::log10(scale.low))); power <= scale.high; power *= 10) {
-      for (const double step : {1.0, 2.0, 5.0}) {
+      for (const double step : steps) {
         const double tick = step * power;
-        if ((step == 1.0 || !wide) && tick >= scale.low * 0.999 && tick <= scale.high * 1.001) ticks.push_back(tick);
+        if (tick >= scale.low * 0.999 && tick <= scale.high * 1.001) ticks.push_back(tick);
       }
     }
     return ticks;

@@ -70,7 +70,7 @@ std::string label_of(const MethodResult& method)
   if (!method.is_tessellation()) return method.name;
   const double millions = 1e-6 * static_cast<double>(method.num_micro_triangles);
   if (method.rate == 1) return fmt::format("{} ({:.3g} M, full rate)", method.name, millions);
-  return fmt::format("{} ({:.3g} M, COARSER: every {:.2g} texels)", method.name, millions, 1 / method.rate);
+  return fmt::format("{} ({:.3g} M, COARSER: every {:.3g} texels)", method.name, millions, 1 / method.rate);
 }
 
 std::string scene_title(const SceneResult& scene)
@@ -146,12 +146,14 @@ Table paper_table(const BenchResults& results)
       return times(frame_ratio(scene, method, kPublishedMethod)) + (coarser ? "*" : "") +
              (paper > 0 ? fmt::format(" ({:g})", paper) : "");
     };
+    const MethodResult* tessellated = find_method(scene, kTessellationMethod);
+    const char* mark = tessellated != nullptr && tessellated->rate < 1 ? "*" : "";
     const MethodResult *chord = find_method(scene, kExactMethod), *tfdm = find_method(scene, kPublishedMethod);
     const bool known = chord != nullptr && tfdm != nullptr;
     table.rows.push_back(
         {scene.name, both(kTessellationMethod, scene.paper.tessellation), both("rmip-low", scene.paper.rmip_low),
          both("rmip", scene.paper.rmip), both("rmip-high", scene.paper.rmip_high), both(kExactMethod, 0),
-         times(frame_ratio(scene, kExactMethod, kTessellationMethod)),
+         times(frame_ratio(scene, kExactMethod, kTessellationMethod)) + mark,
          known ? times(static_cast<double>(chord->bytes()) / static_cast<double>(tfdm->bytes())) : std::string(kNone)});
   }
   return table;
@@ -194,7 +196,7 @@ Table frame_table(const std::vector<FrameResult>& frames)
     });
     table.rows.push_back(
         {frame.scene,
-         frame.rate < 1 ? fmt::format("{} (COARSER: every {:.2g} texels)", frame.method, 1 / frame.rate) : frame.method,
+         frame.rate < 1 ? fmt::format("{} (COARSER: every {:.3g} texels)", frame.method, 1 / frame.rate) : frame.method,
          mebibytes(frame.bytes), fmt::format("{:.3g}", frame.build_seconds),
          fmt::format("{:.3g}", frame.render_seconds),
          fmt::format("{:.3g}", 1e-6 * static_cast<double>(frame.num_rays) / frame.render_seconds),
