@@ -340,14 +340,17 @@ template <unsigned kFeatures>
   float share = 1.0f;
   if constexpr ((kFeatures & kFeatureCaustics) != 0 && (kFeatures & kFeatureTransmission) != 0) {
     const std::uint32_t ways = path_ways_into(state, path, side, closure);
-    share = 1.0f / static_cast<float>(ways);
-    for (std::uint32_t way = 1; way < ways; ++way) {
-      const std::uint32_t copy = path_fork(state, path);
-      state.pixel_hash[copy] = hash_mix_32(state.pixel_hash[path] + way);
-      const ScatterSamples v = scatter_samples(state.pixel_hash[copy], sample, surface);
-      shade_surface_continue<kFeatures>(g, state, copy, at, closure,
-                                        closure_sample<kFeatures>(closure, *g.bsdf_tables, v.bsdf_lobe, v.bsdf_uv),
-                                        share, v, wo_local, throughput, light_N, cone, next);
+    if (ways > 1) {
+      for (std::uint32_t way = ways; way-- > 0;) {
+        // The ways of all samples share one stratified set of points; ahead, each has numbers of its own.
+        const ScatterSamples v = scatter_samples(state.pixel_hash[path], sample * ways + way, surface);
+        const std::uint32_t copy = way > 0 ? path_fork(state, path) : path;
+        if (way > 0) state.pixel_hash[copy] = hash_mix_32(state.pixel_hash[path] + way);
+        shade_surface_continue<kFeatures>(
+            g, state, copy, at, closure, closure_sample<kFeatures>(closure, *g.bsdf_tables, v.bsdf_lobe, v.bsdf_uv),
+            1.0f / static_cast<float>(ways), v, wo_local, throughput, light_N, cone, next);
+      }
+      return;
     }
     if (path_forks_at_glass(state, path, at, closure)) {
       const GlassBranches branches = glass_branches_sample<kFeatures>(closure, *g.bsdf_tables, u.bsdf_lobe, u.bsdf_uv);
@@ -355,7 +358,7 @@ template <unsigned kFeatures>
         shade_surface_continue<kFeatures>(g, state, path_fork(state, path), at, closure, branches.reflected,
                                           branches.reflectance, u, wo_local, throughput, light_N, cone, next);
         bsdf = branches.refracted;
-        share *= 1.0f - branches.reflectance;
+        share = 1.0f - branches.reflectance;
       }
     }
   }
