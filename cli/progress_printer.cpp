@@ -1,5 +1,6 @@
 #include "cli/progress_printer.h"
 
+#include <cmath>
 #include <cstdio>
 
 #include <unistd.h>
@@ -22,7 +23,7 @@ bool write_text(std::FILE* stream, const std::string& text)
 std::string duration_text(double seconds)
 {
   if (seconds < 100) return fmt::format("{:.0f} s", seconds);
-  const auto minutes = static_cast<long long>(seconds / 60 + 0.5);
+  const long long minutes = std::llround(seconds / 60);
   return minutes < 100 ? fmt::format("{} min", minutes) : fmt::format("{} h {:02} min", minutes / 60, minutes % 60);
 }
 

@@ -136,7 +136,7 @@ void Accel::build(const Scene& scene,
     DisplacedGeometry& displaced = displacements.geometry(d);
     if (const Tessellation* tessellation = displacements.tessellation(d)) {
       displaced_scenes_[d] = tessellation_scene_make(device_, kRenderTessellation);
-      const RTCGeometry geometry = tessellation->geometry_make(device_);
+      RTCGeometry geometry = tessellation->geometry_make(device_);
       rtcSetGeometryOccludedFilterFunction(geometry, displaced.shadow_filter);
       attach(displaced_scenes_[d], geometry, 0, ~0u);
     } else {
@@ -154,12 +154,11 @@ void Accel::build(const Scene& scene,
     const Instance& instance = scene.instances[i];
     const auto mesh = static_cast<std::size_t>(instance.mesh_index);
     const int displaced = displacements.geometry_index(i);
-    const RTCGeometry geometry =
-        displaced >= 0
-            ? new_instance(displaced_scenes_[static_cast<std::size_t>(displaced)], instance.world_from_object)
-        : mesh_scenes_[mesh] != nullptr
-            ? new_instance(mesh_scenes_[mesh], instance.world_from_object)
-            : new_mesh(scene.meshes[mesh], &instance.world_from_object, transparent[mesh] != 0);
+    RTCGeometry geometry = displaced >= 0 ? new_instance(displaced_scenes_[static_cast<std::size_t>(displaced)],
+                                                         instance.world_from_object)
+                           : mesh_scenes_[mesh] != nullptr
+                               ? new_instance(mesh_scenes_[mesh], instance.world_from_object)
+                               : new_mesh(scene.meshes[mesh], &instance.world_from_object, transparent[mesh] != 0);
     attach(top_, geometry, static_cast<unsigned>(i), mask_of(instance.flags));
   }
   for (std::size_t i = 0; i < area_lights.size(); ++i) {

@@ -47,7 +47,7 @@ class Accel {
  private:
   RTCScene new_scene(RTCBuildQuality quality);
   RTCGeometry new_mesh(const Mesh& mesh, const Affine3* world_from_object, bool transparent);
-  RTCGeometry new_instance(RTCScene instanced, const Affine3& world_from_object);
+  RTCGeometry new_instance(RTCScene instanced, const Affine3& m);
   RTCGeometry new_rectangle(const Light& light);
   RTCGeometry new_disk(const Light& light);
   void build(const Scene& scene,

@@ -55,7 +55,8 @@ PixelEstimate pixel_estimate(const float* record, std::uint32_t samples)
   PixelEstimate estimate;
   if (samples == 0) return estimate;
   const auto count = [samples](std::uint32_t first, std::uint32_t step) {
-    return static_cast<float>((samples + step - 1 - first) / step);
+    const std::uint32_t whole = (samples + step - 1 - first) / step;
+    return static_cast<float>(whole);
   };
   const auto n = static_cast<float>(samples);
   const Vec3f sum = load3(record + AccumulatorLayout::kBeauty);
