@@ -6,6 +6,10 @@
 // its winding number while the mesh moves out to the displaced surface. So no ray from there can get out, whatever the
 // mesh looks like and however it folds, if its seams are closed; that needs no oracle. Rays go in all directions and, on
 // purpose, at displaced vertices and edges, beside them and along prism walls, each as a closest-hit and a shadow ray.
+//
+// Tessellations are Embree's own triangles. It finds a shared edge on the same side from both of its triangles, but not
+// all edges around a vertex: rays that meet a vertex to the last bit slip through any mesh now and then. What these rays
+// do is counted apart and not held against tessellations.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -125,8 +129,13 @@ std::vector<Vec3f> inner_points(const DisplacedMeshView& mesh, double largest_di
   return points;
 }
 
+struct Target {
+  Vec3d P;
+  bool is_vertex = false;
+};
+
 /// Where a ray is aimed at: the displaced surface's vertices and edges, next to them, prism walls, anywhere.
-Vec3d random_target(const DisplacedMeshView& mesh, Vec3d O, std::mt19937_64& random)
+Target random_target(const DisplacedMeshView& mesh, Vec3d O, std::mt19937_64& random)
 {
   const auto unit = [&] { return std::uniform_real_distribution<double>()(random); };
   const DisplacedTriangle& tri = mesh.triangles[random() % mesh.num_triangles];
@@ -137,31 +146,32 @@ Vec3d random_target(const DisplacedMeshView& mesh, Vec3d O, std::mt19937_64& ran
   const double* edge = edges[k];
   switch (random() % 8) {
     case 0:
-      return surface_point(mesh, tri, corners[k][0], corners[k][1]).P;
+      return {surface_point(mesh, tri, corners[k][0], corners[k][1]).P, true};
     case 1:
-      return surface_point(mesh, tri, edge[0], edge[1]).P;
+      return {surface_point(mesh, tri, edge[0], edge[1]).P};
     case 2:
-      return surface_point(mesh, tri, edge[0] + beside * (1. / 3 - edge[0]), edge[1] + beside * (1. / 3 - edge[1])).P;
+      return {surface_point(mesh, tri, edge[0] + beside * (1. / 3 - edge[0]), edge[1] + beside * (1. / 3 - edge[1])).P};
     case 3: {
       const BasePoint base = base_point(tri, edge[0], edge[1]);
       const double s =
           static_cast<double>(tri.s_min) + unit() * (static_cast<double>(tri.s_max) - static_cast<double>(tri.s_min));
-      return base.P + s * base.N;
+      return {base.P + s * base.N};
     }
     case 4: {
       Vec3d axis{};
       (k == 0 ? axis.x : (k == 1 ? axis.y : axis.z)) = unit() < .5 ? 1 : -1;
-      return O + axis;
+      return {O + axis};
     }
     default:
       break;
   }
   const double z = 2 * unit() - 1, phi = 2 * M_PI * unit(), r = std::sqrt(1 - z * z);
-  return O + Vec3d{r * std::cos(phi), r * std::sin(phi), z};
+  return {O + Vec3d{r * std::cos(phi), r * std::sin(phi), z}};
 }
 
 struct Leaks {
-  std::uint64_t num_closest = 0, num_shadow = 0;
+  std::uint64_t num_closest = 0, num_shadow = 0;  ///< rays not aimed at vertices
+  std::uint64_t num_at_vertices = 0;              ///< of either kind
   double seconds = 0;
 };
 
@@ -169,7 +179,7 @@ Leaks count_leaks(SceneContext& context, const std::vector<Vec3f>& points, std::
 {
   const DisplacedMeshView& mesh = context.displacements.geometry(0).mesh;
   const Affine3& world_from_object = context.instances[0].world_from_object;
-  std::atomic<std::uint64_t> num_closest{0}, num_shadow{0};
+  std::atomic<std::uint64_t> num_closest{0}, num_shadow{0}, num_at_vertices{0};
   constexpr std::uint64_t kChunk = 1 << 16;
   const tbb::tick_count start = tbb::tick_count::now();
   tbb::parallel_for(std::uint64_t{0}, (num_rays + kChunk - 1) / kChunk, [&](std::uint64_t chunk) {
@@ -181,9 +191,9 @@ Leaks count_leaks(SceneContext& context, const std::vector<Vec3f>& points, std::
     embree.displacement = &counters;
     for (std::uint64_t i = chunk * kChunk; i < std::min(num_rays, (chunk + 1) * kChunk); ++i) {
       const Vec3f from = points[random() % points.size()];
-      const Vec3f target = to_float(random_target(mesh, to_double(from), random));
+      const Target target = random_target(mesh, to_double(from), random);
       const Vec3f O = transform_point(world_from_object, from);
-      const Vec3f D = transform_vector(world_from_object, target - from);
+      const Vec3f D = transform_vector(world_from_object, to_float(target.P) - from);
       RTCRayHit query{};
       query.ray.org_x = O.x;
       query.ray.org_y = O.y;
@@ -198,15 +208,15 @@ Leaks count_leaks(SceneContext& context, const std::vector<Vec3f>& points, std::
       embree_intersect1(context.accel->scene(), embree, query);
       embree_occluded1(context.accel->scene(), embree, shadow);
       const bool leaks = query.hit.geomID == RTC_INVALID_GEOMETRY_ID, dark_leaks = !(shadow.tfar < 0);
-      if ((leaks || dark_leaks) && num_closest + num_shadow == 0) {
+      if ((leaks || dark_leaks) && num_closest + num_shadow + num_at_vertices == 0) {
         fmt::print("  first: O {:.9g} {:.9g} {:.9g} D {:.9g} {:.9g} {:.9g}, {} ray\n", O.x, O.y, O.z, D.x, D.y, D.z,
                    leaks ? "closest-hit" : "shadow");
       }
-      num_closest += leaks ? 1 : 0;
-      num_shadow += dark_leaks ? 1 : 0;
+      (target.is_vertex ? num_at_vertices : num_closest) += leaks ? 1 : 0;
+      (target.is_vertex ? num_at_vertices : num_shadow) += dark_leaks ? 1 : 0;
     }
   });
-  return {num_closest, num_shadow, (tbb::tick_count::now() - start).seconds()};
+  return {num_closest, num_shadow, num_at_vertices, (tbb::tick_count::now() - start).seconds()};
 }
 
 /// @return  whether nothing leaks
@@ -239,10 +249,13 @@ bool run(const Settings& settings)
                  context.displacements.num_triangles(), report.num_walls, report.num_folded, points.size());
     }
     const Leaks leaks = count_leaks(context, points, num_rays, settings.part);
-    fmt::print("  {:<16}{} rays: {} closest-hit and {} shadow rays got out; {:.2f} Mrays/s\n", name, num_rays,
-               leaks.num_closest, leaks.num_shadow, 2e-6 * settings.num_rays / leaks.seconds);
+    fmt::print("  {:<16}{} rays: {} closest-hit and {} shadow rays got out, and {} aimed at vertices; {:.2f} Mrays/s\n",
+               name, num_rays, leaks.num_closest, leaks.num_shadow, leaks.num_at_vertices,
+               2e-6 * settings.num_rays / leaks.seconds);
     std::fflush(stdout);
-    tight = tight && leaks.num_closest + leaks.num_shadow == 0;
+    const bool is_tessellation =
+        options.method == DisplacementMethod::kTessellate || options.method == DisplacementMethod::kGrid;
+    tight = tight && leaks.num_closest + leaks.num_shadow + (is_tessellation ? 0 : leaks.num_at_vertices) == 0;
   }
   return tight;
 }
