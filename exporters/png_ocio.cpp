@@ -1,8 +1,6 @@
 #include "exporters/png_ocio.h"
 
 #include <OpenColorIO/OpenColorIO.h>
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,6 +10,7 @@
 
 #include "exporters/atomic_file.h"
 #include "exporters/errors.h"
+#include "exporters/png_encode.h"
 
 namespace relief {
 
@@ -115,27 +114,17 @@ Code code_from(float value)
   return static_cast<Code>(std::floor(limited * kLargest + 0.5f));
 }
 
-OIIO::TypeDesc type_of(std::uint8_t) { return OIIO::TypeDesc::UINT8; }
-OIIO::TypeDesc type_of(std::uint16_t) { return OIIO::TypeDesc::UINT16; }
-
 /// Encodes in memory, where nothing can fail half-way, then writes the file in one go.
 template <typename Code>
-void write_codes(const std::filesystem::path& path, int width, int height, int num_channels, const Code* codes)
+void write_codes(const std::filesystem::path& path, int width, int height, std::span<const Code> codes)
 {
-  std::vector<unsigned char> bytes;
-  OIIO::Filesystem::IOVecOutput memory(bytes);
-  const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create("png");
-  OIIO::ImageSpec spec(width, height, num_channels, type_of(Code{}));
-  spec.attribute("oiio:ColorSpace", "sRGB");
-  // The alpha that we hand over is unassociated already; without this the writer would divide by it.
-  spec.attribute("oiio:UnassociatedAlpha", 1);
-  if (!output || !output->set_ioproxy(&memory) || !output->open(path.string(), spec) ||
-      !output->write_image(type_of(Code{}), codes) || !output->close()) {
-    throw OutputError(path.string(), output ? output->geterror() : OIIO::geterror());
+  std::string bytes;
+  try {
+    bytes = png_encode(width, height, codes);
+  } catch (const OutputError& error) {
+    throw OutputError(path.string(), error.cause);
   }
-  AtomicFile file(path);
-  file.write(bytes.data(), bytes.size());
-  file.commit();
+  atomic_write(path, bytes);
 }
 
 /// Applies exposure and view row by row. @return rows from the top, 3 or 4 codes a pixel
@@ -174,8 +163,7 @@ void write_encoded(const std::filesystem::path& path,
                    const PngOptions& options)
 {
   const std::vector<Code> codes = encode<Code>(image, view, options);
-  const int num_channels = options.alpha && image.channels.size() == 4 ? 4 : 3;
-  write_codes(path, image.width, image.height, num_channels, codes.data());
+  write_codes(path, image.width, image.height, std::span<const Code>(codes));
 }
 
 }  // namespace
@@ -255,7 +243,7 @@ std::string png_write(const std::filesystem::path& path, const FilmView& film, c
 
 void png_write_bytes(const std::filesystem::path& path, int width, int height, std::span<const std::uint8_t> rgb)
 {
-  write_codes(path, width, height, 3, rgb.data());
+  write_codes(path, width, height, rgb);
 }
 
 }  // namespace relief

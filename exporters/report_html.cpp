@@ -1,15 +1,12 @@
 #include "exporters/report_html.h"
 
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
 
-#include "exporters/errors.h"
+#include "exporters/png_encode.h"
 
 namespace relief {
 
@@ -294,21 +291,6 @@ std::string html_page(std::string_view title, const std::vector<std::string>& pi
                      "</title><style>" + kStyle + "</style></head><body>\n<h1>" + html_escape(title) + "</h1>\n";
   for (const std::string& piece : pieces) html += piece;
   return html + "</body></html>\n";
-}
-
-std::string png_encode(int width, int height, std::span<const std::uint8_t> rgb)
-{
-  std::vector<unsigned char> bytes;
-  OIIO::Filesystem::IOVecOutput proxy(bytes);
-  const std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create("picture.png");
-  OIIO::ImageSpec spec(width, height, 3, OIIO::TypeDesc::UINT8);
-  OIIO::Filesystem::IOProxy* pointer = &proxy;
-  spec.attribute("oiio:ioproxy", OIIO::TypeDesc::PTR, &pointer);
-  if (out == nullptr || !out->open("picture.png", spec) || !out->write_image(OIIO::TypeDesc::UINT8, rgb.data()) ||
-      !out->close()) {
-    throw OutputError("a picture of the report", out != nullptr ? out->geterror() : OIIO::geterror());
-  }
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 std::string base64_encode(std::string_view bytes)

@@ -53,9 +53,6 @@ std::string svg_bar_plot(const PlotAxes& axes,
 /// The whole document.
 std::string html_page(std::string_view title, const std::vector<std::string>& pieces);
 
-/// A PNG file in memory. @error OutputError
-std::string png_encode(int width, int height, std::span<const std::uint8_t> rgb);
-
 std::string base64_encode(std::string_view bytes);
 
 }  // namespace relief

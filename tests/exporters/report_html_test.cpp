@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "exporters/png_encode.h"
 #include "exporters/report_html.h"
 
 namespace relief {
