@@ -32,11 +32,11 @@ std::size_t format_bytes(HeightFormat format)
   return format == HeightFormat::kU8 ? 1 : format == HeightFormat::kU16 ? 2 : 4;
 }
 
-OIIO::TypeDesc::BASETYPE oiio_type(HeightFormat format)
+HeightFormat height_format(SampleType type)
 {
-  return format == HeightFormat::kU8    ? OIIO::TypeDesc::UINT8
-         : format == HeightFormat::kU16 ? OIIO::TypeDesc::UINT16
-                                        : OIIO::TypeDesc::FLOAT;
+  return type == SampleType::kU8    ? HeightFormat::kU8
+         : type == SampleType::kU16 ? HeightFormat::kU16
+                                    : HeightFormat::kFloat;
 }
 
 /// What was met in an image's values.
@@ -55,16 +55,16 @@ struct HeightImage {
 };
 
 /// Channels of an image that count: the one with the heights first, then those that should equal it.
-std::vector<int> height_channels(const OIIO::ImageSpec& spec)
+std::vector<int> height_channels(const ImageHeader& header)
 {
-  const int r = spec.channelindex("R"), g = spec.channelindex("G"), b = spec.channelindex("B");
+  const int r = header.channel_index("R"), g = header.channel_index("G"), b = header.channel_index("B");
   if (r >= 0 && g >= 0 && b >= 0) {
     return {r, g, b};
   }
   constexpr std::size_t kColours = 3;
   std::vector<int> channels;
-  for (int c = 0; c < spec.nchannels && channels.size() < kColours; ++c) {
-    if (c != spec.alpha_channel) {
+  for (int c = 0; c < header.num_channels && channels.size() < kColours; ++c) {
+    if (c != header.alpha_channel) {
       channels.push_back(c);
     }
   }
@@ -108,10 +108,10 @@ std::int64_t channel_copy(const T* from,
 template <class T>
 void texels_load(ImageReader& reader, HeightImage& image, T* texels)
 {
-  const std::vector<int> channels = height_channels(reader.spec());
+  const std::vector<int> channels = height_channels(reader.header());
   const auto [low, high] = std::minmax_element(channels.begin(), channels.end());
   const int begin = *low;
-  reader.select(begin, *high + 1, oiio_type(image.map.format));
+  reader.select(begin, *high + 1, reader.header().sample_type);
   std::vector<std::size_t> offsets;
   for (const int c : channels) {
     offsets.push_back(static_cast<std::size_t>(c - begin));
@@ -154,13 +154,11 @@ void texels_repair(std::span<float> texels, int width, HeightFindings& findings)
 void image_load(HeightImage& image)
 {
   ImageReader reader(image.source);
-  const OIIO::ImageSpec& spec = reader.spec();
+  const ImageHeader& header = reader.header();
   HeightMap& map = image.map;
-  map.width = spec.width;
-  map.height = spec.height;
-  map.format = spec.format == OIIO::TypeDesc::UINT8    ? HeightFormat::kU8
-               : spec.format == OIIO::TypeDesc::UINT16 ? HeightFormat::kU16
-                                                       : HeightFormat::kFloat;
+  map.width = header.width;
+  map.height = header.height;
+  map.format = height_format(header.sample_type);
   try {
     const std::shared_ptr<void> texels = texels_allocate(map.bytes());
     switch (map.format) {

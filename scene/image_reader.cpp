@@ -141,51 +141,46 @@ void ImageReader::open()
       fail(source_, "a complete JPEG image", "truncated data");
     }
   }
-  input_ = format.empty() ? nullptr : OIIO::ImageInput::create(format);
-  if (input_ == nullptr) {
-    OIIO::geterror();
+  image_ = format.empty() ? nullptr : image_io().make_file(format);
+  if (image_ == nullptr) {
     fail(source_, "an image that OpenImageIO reads", "format \"" + format + "\"");
   }
-  OIIO::ImageSpec config;
-  config.attribute("oiio:UnassociatedAlpha", 1);
-  if (source_.file.empty() || !owned_.empty()) {
-    if (input_->supports("ioproxy") == 0) {
-      fail(source_, "an image format that can be embedded", "format \"" + format + "\"");
-    }
-    const std::span<const unsigned char> bytes = owned_.empty() ? source_.encoded : owned_;
-    memory_ = std::make_unique<OIIO::Filesystem::IOMemReader>(bytes.data(), bytes.size());
-    input_->set_ioproxy(memory_.get());
+  const std::span<const unsigned char> bytes = owned_.empty() ? source_.encoded : owned_;
+  const bool is_embedded = source_.file.empty() || !owned_.empty();
+  if (is_embedded && !image_->can_be_embedded()) {
+    fail(source_, "an image format that can be embedded", "format \"" + format + "\"");
   }
   const std::string name = source_.file.empty() ? "embedded." + format : source_.file;
-  if (!input_->open(name, spec_, config)) {
-    fail(source_, "a readable image", input_->geterror());
+  const std::string error = image_->open(name, bytes, header_);
+  if (!error.empty()) {
+    fail(source_, "a readable image", error);
   }
 }
 
 void ImageReader::check_header() const
 {
-  const bool sane = spec_.width >= 1 && spec_.height >= 1 && spec_.width <= kMaxTextureSide &&
-                    spec_.height <= kMaxTextureSide && spec_.depth <= 1 && spec_.nchannels >= 1 &&
-                    spec_.nchannels <= kMaxImageChannels;
+  const bool sane = header_.width >= 1 && header_.height >= 1 && header_.width <= kMaxTextureSide &&
+                    header_.height <= kMaxTextureSide && header_.depth <= 1 && header_.num_channels >= 1 &&
+                    header_.num_channels <= kMaxImageChannels;
   if (!sane) {
     fail(source_,
          "a flat image of at most " + std::to_string(kMaxTextureSide) + " texels a side and " +
              std::to_string(kMaxImageChannels) + " channels",
-         std::to_string(spec_.width) + " x " + std::to_string(spec_.height) + " x " + std::to_string(spec_.depth) +
-             " texels, " + std::to_string(spec_.nchannels) + " channels");
+         std::to_string(header_.width) + " x " + std::to_string(header_.height) + " x " +
+             std::to_string(header_.depth) + " texels, " + std::to_string(header_.num_channels) + " channels");
   }
-  if (spec_.deep) {
+  if (header_.is_deep) {
     fail(source_, "a flat image", "a deep image");
   }
   // OpenImageIO 2.4 says that it has read such samples, but leaves the buffer as it was.
-  if (spec_.format == OIIO::TypeDesc::DOUBLE && std::string_view(input_->format_name()) == "tiff") {
+  if (!header_.is_integer && header_.sample_bits == 64 && header_.format_name == "tiff") {
     fail(source_, "a TIFF image of at most 32 bits a sample", "64 bits");
   }
 }
 
-void ImageReader::select(int channel_begin, int channel_end, OIIO::TypeDesc type)
+void ImageReader::select(int channel_begin, int channel_end, SampleType type)
 {
-  RELIEF_ASSERT(0 <= channel_begin && channel_begin < channel_end && channel_end <= spec_.nchannels);
+  RELIEF_ASSERT(0 <= channel_begin && channel_begin < channel_end && channel_end <= header_.num_channels);
   channel_begin_ = channel_begin;
   channel_end_ = channel_end;
   type_ = type;
@@ -193,12 +188,14 @@ void ImageReader::select(int channel_begin, int channel_end, OIIO::TypeDesc type
 
 std::size_t ImageReader::row_bytes() const
 {
-  return static_cast<std::size_t>(spec_.width) * static_cast<std::size_t>(channel_end_ - channel_begin_) * type_.size();
+  const std::size_t sample_bytes = type_ == SampleType::kU8 ? 1 : type_ == SampleType::kU16 ? 2 : 4;
+  return static_cast<std::size_t>(header_.width) * static_cast<std::size_t>(channel_end_ - channel_begin_) *
+         sample_bytes;
 }
 
 const unsigned char* ImageReader::load_rows(int begin, int end)
 {
-  RELIEF_ASSERT(0 <= begin && begin < end && end <= spec_.height);
+  RELIEF_ASSERT(0 <= begin && begin < end && end <= header_.height);
   if (begin < rows_begin_ || end > rows_end_) {
     read(begin, end);
   }
@@ -209,31 +206,15 @@ const unsigned char* ImageReader::load_rows(int begin, int end)
 void ImageReader::read(int begin, int end)
 {
   rows_begin_ = rows_end_ = 0;
-  const bool tiled = spec_.tile_width > 0 && spec_.tile_height > 0;
-  if (tiled) {
-    begin = begin / spec_.tile_height * spec_.tile_height;
-    end = static_cast<int>(std::min<std::int64_t>(
-        (std::int64_t{end} + spec_.tile_height - 1) / spec_.tile_height * spec_.tile_height, spec_.height));
+  if (const int tile = header_.tile_height; tile > 0) {
+    begin = begin / tile * tile;
+    end = static_cast<int>(std::min<std::int64_t>((std::int64_t{end} + tile - 1) / tile * tile, header_.height));
   }
   // Zeroed every time: a reader that gives up silently must not leave an earlier image's texels.
   rows_.assign(static_cast<std::size_t>(end - begin) * row_bytes(), 0);
-  const int y0 = spec_.y + begin, y1 = spec_.y + end;
-  bool ok = false;
-  std::string error;
-  try {
-    ok = tiled ? input_->read_tiles(0, 0, spec_.x, spec_.x + spec_.width, y0, y1, spec_.z, spec_.z + 1, channel_begin_,
-                                    channel_end_, type_, rows_.data())
-               : input_->read_scanlines(0, 0, y0, y1, spec_.z, channel_begin_, channel_end_, type_, rows_.data());
-    if (input_->has_error()) {
-      ok = false;
-      error = input_->geterror();
-    }
-  } catch (const std::exception& e) {
-    ok = false;
-    error = e.what();
-  }
-  if (!ok) {
-    fail(source_, "complete image data", error.empty() ? "truncated or corrupt data" : error);
+  const std::string error = image_->read_rows(begin, end, channel_begin_, channel_end_, type_, rows_.data());
+  if (!error.empty()) {
+    fail(source_, "complete image data", error);
   }
   rows_begin_ = begin;
   rows_end_ = end;

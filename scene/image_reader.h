@@ -1,14 +1,13 @@
-// Opening images through OpenImageIO and reading their rows: files or encoded bytes, any format, with the checks that
-// every use of an image needs. What the values mean is up to texture_source.h (colours) and height_map.h (heights).
+// Opening images through OpenImageIO (image_io.h) and reading their rows: files or encoded bytes, any format, with the
+// checks that every use of an image needs. What the values mean is up to texture_source.h (colours) and height_map.h (heights).
 #pragma once
-
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
 
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
+
+#include "scene/image_io.h"
 
 namespace relief {
 
@@ -33,12 +32,11 @@ class ImageReader {
   ///        OpenImageIO does not read (TIFF with doubles)
   explicit ImageReader(const ImageSource& source);
 
-  const OIIO::ImageSpec& spec() const { return spec_; }
+  const ImageHeader& header() const { return header_; }
 
   /// Says what load_rows is to give; called once, before it.
   /// @param channel_begin, channel_end  0 <= begin < end <= number of channels
-  /// @param type                        of the values; integers are scaled to it, or to 0…1 for floats
-  void select(int channel_begin, int channel_end, OIIO::TypeDesc type);
+  void select(int channel_begin, int channel_end, SampleType type);
 
   /// Bytes of one row of the selected channels.
   std::size_t row_bytes() const;
@@ -56,11 +54,10 @@ class ImageReader {
 
   ImageSource source_;
   std::vector<unsigned char> owned_;  ///< of a JPEG file, which is read whole to look for its end
-  std::unique_ptr<OIIO::Filesystem::IOMemReader> memory_;
-  std::unique_ptr<OIIO::ImageInput> input_;
-  OIIO::ImageSpec spec_;
+  std::unique_ptr<ImageFile> image_;
+  ImageHeader header_;
   int channel_begin_ = 0, channel_end_ = 0;
-  OIIO::TypeDesc type_;
+  SampleType type_ = SampleType::kFloat;
 
   std::vector<unsigned char> rows_;  ///< rows [rows_begin_, rows_end_) of the selected channels
   int rows_begin_ = 0, rows_end_ = 0;

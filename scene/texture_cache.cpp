@@ -1,115 +1,59 @@
 #include "scene/texture_cache.h"
 
-#include <OpenImageIO/imagecache.h>
-#include <OpenImageIO/imageio.h>
-
-#include <algorithm>
-#include <array>
 #include <cstring>
 #include <deque>
-#include <mutex>
 #include <vector>
+
+#include "scene/image_io.h"
 
 namespace relief {
 namespace {
 
 constexpr int kTileSize = 64;
 
-/// Format of the tiles of an image. Linear halves stand for sRGB, whose codes must not be averaged.
-TexelFormat tile_format(const TexelLayout& layout)
-{
-  return layout.format == TexelFormat::kU8 ? TexelFormat::kU8 : TexelFormat::kHalf;
-}
-
-/// Presents a TextureSource to the tile cache as a scanline image with one level.
-class SourceInput final : public OIIO::ImageInput {
+/// A texture as the tile cache reads it: linear halves stand for sRGB, whose codes must not be averaged.
+class LinearRows final : public TileRows {
  public:
-  static constexpr const char* kSourceAttribute = "relief:source";
-  static OIIO::ImageInput* create() { return new SourceInput; }
+  explicit LinearRows(const TextureSource& source) : reader_(source) {}
 
-  const char* format_name() const override { return "relief"; }
-
-  bool open(const std::string&, OIIO::ImageSpec&) override { return false; }
-
-  bool open(const std::string&, OIIO::ImageSpec& spec, const OIIO::ImageSpec& config) override
+  TexelLayout layout() const override
   {
-    const void* source = nullptr;
-    if (!config.getattribute(kSourceAttribute, OIIO::TypeDesc(OIIO::TypeDesc::PTR), &source)) {
-      return false;
-    }
-    try {
-      reader_ = std::make_unique<TextureReader>(*static_cast<const TextureSource*>(source));
-    } catch (const std::exception& e) {
-      errorfmt("{}", e.what());
-      return false;
-    }
-    const TexelLayout& layout = reader_->layout();
-    const bool is_half = tile_format(layout) == TexelFormat::kHalf;
-    m_spec = OIIO::ImageSpec(layout.width, layout.height, layout.num_channels,
-                             is_half ? OIIO::TypeDesc::HALF : OIIO::TypeDesc::UINT8);
-    spec = m_spec;
-    return true;
+    TexelLayout layout = reader_.layout();
+    layout.format = layout.format == TexelFormat::kU8 ? TexelFormat::kU8 : TexelFormat::kHalf;
+    return layout;
   }
 
-  bool close() override
+  void read_rows(int begin, int end, unsigned char* texels) override
   {
-    reader_.reset();
-    return true;
-  }
-
-  bool read_native_scanline(int subimage, int miplevel, int y, int z, void* data) override
-  {
-    return read_native_scanlines(subimage, miplevel, y, y + 1, z, data);
-  }
-
-  bool read_native_scanlines(int subimage, int miplevel, int begin, int end, int, void* data) override
-  {
-    const std::lock_guard<const OIIO::ImageInput> guard(*this);
-    if (reader_ == nullptr || subimage != 0 || miplevel != 0) {
-      return false;
-    }
-    try {
-      read_rows(begin, std::min(end, m_spec.height), static_cast<unsigned char*>(data));
-    } catch (const std::exception& e) {
-      errorfmt("{}", e.what());
-      return false;
-    }
-    return true;
-  }
-
- private:
-  void read_rows(int begin, int end, unsigned char* data)
-  {
-    const TexelLayout& layout = reader_->layout();
+    const TexelLayout& layout = reader_.layout();
     if (layout.format != TexelFormat::kU8Srgb) {
-      reader_->read_rows(begin, end, data);
+      reader_.read_rows(begin, end, texels);
       return;
     }
     codes_.resize(static_cast<std::size_t>(end - begin) * texel_row_bytes(layout));
-    reader_->read_rows(begin, end, codes_.data());
+    reader_.read_rows(begin, end, codes_.data());
     const auto num_channels = static_cast<std::size_t>(layout.num_channels);
     for (std::size_t i = 0; i < codes_.size(); ++i) {
       const bool is_alpha = num_channels % 2 == 0 && i % num_channels == num_channels - 1;
       const float value = is_alpha ? static_cast<float>(codes_[i]) / 255.0f : kLinearFromSrgb8[codes_[i]];
       const std::uint16_t half = half_from_float(value);
-      std::memcpy(data + i * sizeof half, &half, sizeof half);
+      std::memcpy(texels + i * sizeof half, &half, sizeof half);
     }
   }
 
-  std::unique_ptr<TextureReader> reader_;
+ private:
+  TextureReader reader_;
   std::vector<unsigned char> codes_;
 };
 
-struct LevelTiles {
-  int width = 0, height = 0, tile_width = 0, tile_height = 0;
-};
+struct CachedImage final : TileSource {
+  CachedImage(const TextureSource& texture_source, TileCache& tile_cache) : source(texture_source), cache(tile_cache) {}
 
-struct CachedImage {
+  std::unique_ptr<TileRows> open() const override { return std::make_unique<LinearRows>(source); }
+
   TextureSource source;
-  OIIO::ImageCache* cache = nullptr;
-  OIIO::ImageCache::ImageHandle* handle = nullptr;
-  TexelLayout layout;  ///< of the tiles
-  std::vector<LevelTiles> levels;
+  TileCache& cache;
+  TileImage tiles;
 };
 
 /// What a look-up function is handed: an image and a sampler (in `view`, whose look-up this is).
@@ -122,10 +66,7 @@ struct CachedTexture {
 class TileCursor {
  public:
   TileCursor(const CachedImage& image, int level)
-      : image_(image),
-        level_(level),
-        tiles_(image.levels[static_cast<std::size_t>(level)]),
-        thread_(image.cache->get_perthread_info())
+      : image_(image), level_(level), size_(image.tiles.levels[static_cast<std::size_t>(level)])
   {
   }
   ~TileCursor() { release(); }
@@ -135,39 +76,35 @@ class TileCursor {
   /// @return  valid until the next call
   const unsigned char* texel(int x, int y)
   {
-    const int tile_x = x - x % tiles_.tile_width, tile_y = y - y % tiles_.tile_height;
+    const int tile_x = x - x % size_.tile_width, tile_y = y - y % size_.tile_height;
     if (tile_x != tile_x_ || tile_y != tile_y_) {
       release();
-      tile_ = image_.cache->get_tile(image_.handle, thread_, 0, level_, tile_x, tile_y, 0);
-      OIIO::TypeDesc format;
-      texels_ =
-          tile_ == nullptr ? nullptr : static_cast<const unsigned char*>(image_.cache->tile_pixels(tile_, format));
+      tile_ = image_.cache.tile(image_.tiles, level_, tile_x, tile_y);
       tile_x_ = tile_x;
       tile_y_ = tile_y;
     }
     static constexpr unsigned char kBlack[8] = {};
-    if (texels_ == nullptr) {
+    if (tile_.texels == nullptr) {
       return kBlack;
     }
-    const int index = (y - tile_y) * tiles_.tile_width + (x - tile_x);
-    return texels_ + index * texel_bytes(image_.layout.format, image_.layout.num_channels);
+    const int index = (y - tile_y) * size_.tile_width + (x - tile_x);
+    const TexelLayout& layout = image_.tiles.layout;
+    return tile_.texels + index * texel_bytes(layout.format, layout.num_channels);
   }
 
  private:
   void release()
   {
-    if (tile_ != nullptr) {
-      image_.cache->release_tile(tile_);
-      tile_ = nullptr;
+    if (tile_.handle != nullptr) {
+      image_.cache.release(tile_.handle);
+      tile_ = {};
     }
   }
 
   const CachedImage& image_;
   int level_;
-  LevelTiles tiles_;
-  OIIO::ImageCache::Perthread* thread_;
-  OIIO::ImageCache::Tile* tile_ = nullptr;
-  const unsigned char* texels_ = nullptr;
+  TileLevel size_;
+  Tile tile_;
   int tile_x_ = -1, tile_y_ = -1;
 };
 
@@ -176,14 +113,14 @@ template <TexelFormat kFormat, int kChannels>
 TexelValue cached_sample_level(const CachedTexture& texture, int level, Vec2f uv)
 {
   const TextureView& view = texture.view;
-  const LevelTiles& tiles = texture.image->levels[static_cast<std::size_t>(level)];
+  const TileLevel& size = texture.image->tiles.levels[static_cast<std::size_t>(level)];
   TileCursor cursor(*texture.image, level);
   const auto load = [&](int x, int y) { return texel_load<kFormat, kChannels>(cursor.texel(x, y)); };
   if (view.filter == TexelFilter::kNearest) {
-    return load(axis_nearest(uv.x, tiles.width, view.wrap_u), axis_nearest(uv.y, tiles.height, view.wrap_v));
+    return load(axis_nearest(uv.x, size.width, view.wrap_u), axis_nearest(uv.y, size.height, view.wrap_v));
   }
-  const AxisTexels x = axis_linear(uv.x, tiles.width, view.wrap_u);
-  const AxisTexels y = axis_linear(uv.y, tiles.height, view.wrap_v);
+  const AxisTexels x = axis_linear(uv.x, size.width, view.wrap_u);
+  const AxisTexels y = axis_linear(uv.y, size.height, view.wrap_v);
   // Named one by one: the order of arguments is not defined, and this one changes tiles least often.
   const TexelValue v00 = load(x.i0, y.i0), v01 = load(x.i0, y.i1);
   const TexelValue v11 = load(x.i1, y.i1), v10 = load(x.i1, y.i0);
@@ -213,65 +150,30 @@ TextureView::Lookup lookup_for(const TexelLayout& layout)
   return layout.format == TexelFormat::kU8 ? kU8[i] : kHalf[i];
 }
 
-[[noreturn]] void fail(const TextureSource& source, const std::string& cause)
-{
-  throw SceneError(source.scene_file, source.json_path, "an image that the tile cache can read", cause);
-}
-
 }  // namespace
 
 struct TextureCache::Impl {
-  OIIO::ImageCache* cache = nullptr;
   // Deques: the cache and the views hold pointers to the elements.
   std::deque<CachedImage> images;
   std::deque<CachedTexture> textures;
+  std::unique_ptr<TileCache> cache;  ///< last, so that it goes before the images
 };
 
 TextureCache::TextureCache(std::size_t budget_bytes) : impl_(std::make_unique<Impl>())
 {
-  impl_->cache = OIIO::ImageCache::create(false);
-  OIIO::ImageCache& cache = *impl_->cache;
-  cache.attribute("max_memory_MB", static_cast<float>(budget_bytes) / (1024.0f * 1024.0f));
-  cache.attribute("autotile", kTileSize);
-  cache.attribute("automip", 1);
-  // Equal images were joined before they came here.
-  cache.attribute("deduplicate", 0);
+  impl_->cache = image_io().make_tile_cache(budget_bytes, kTileSize);
 }
 
-TextureCache::~TextureCache() { OIIO::ImageCache::destroy(impl_->cache, true); }
+TextureCache::~TextureCache() = default;
 
 std::size_t TextureCache::add(const TextureSource& source)
 {
-  CachedImage& image = impl_->images.emplace_back();
-  image.source = source;
-  image.cache = impl_->cache;
-  const std::size_t index = impl_->images.size() - 1;
-  OIIO::ImageCache& cache = *impl_->cache;
-  OIIO::ImageSpec config;
-  const void* pointer = &image.source;
-  config.attribute(SourceInput::kSourceAttribute, OIIO::TypeDesc(OIIO::TypeDesc::PTR), &pointer);
-  const OIIO::ustring name(OIIO::Strutil::fmt::format("relief:{}", static_cast<const void*>(&image)));
-  if (!cache.add_file(name, SourceInput::create, &config, true)) {
-    fail(source, cache.geterror());
+  CachedImage& image = impl_->images.emplace_back(source, *impl_->cache);
+  const std::string error = impl_->cache->add(image, image.tiles);
+  if (!error.empty()) {
+    throw SceneError(source.scene_file, source.json_path, "an image that the tile cache can read", error);
   }
-  image.handle = cache.get_image_handle(name);
-  int num_levels = 0;
-  if (image.handle == nullptr ||
-      !cache.get_image_info(image.handle, nullptr, 0, 0, OIIO::ustring("miplevels"), OIIO::TypeInt, &num_levels)) {
-    fail(source, cache.geterror());
-  }
-  for (int level = 0; level < std::min(num_levels, kMaxMipLevels); ++level) {
-    const OIIO::ImageSpec* spec = cache.imagespec(image.handle, nullptr, 0, level);
-    if (spec == nullptr) {
-      fail(source, cache.geterror());
-    }
-    image.levels.push_back({spec->width, spec->height, spec->tile_width, spec->tile_height});
-    if (level == 0) {
-      const bool is_u8 = spec->format == OIIO::TypeDesc::UINT8;
-      image.layout = {spec->width, spec->height, spec->nchannels, is_u8 ? TexelFormat::kU8 : TexelFormat::kHalf};
-    }
-  }
-  return index;
+  return impl_->images.size() - 1;
 }
 
 TextureView TextureCache::view(std::size_t index, Wrap wrap_u, Wrap wrap_v, TexelFilter filter)
@@ -280,15 +182,15 @@ TextureView TextureCache::view(std::size_t index, Wrap wrap_u, Wrap wrap_v, Texe
   CachedTexture& texture = impl_->textures.emplace_back();
   texture.image = &image;
   TextureView& view = texture.view;
-  view.width = image.layout.width;
-  view.height = image.layout.height;
-  view.num_levels = static_cast<int>(image.levels.size());
-  view.num_channels = image.layout.num_channels;
-  view.format = image.layout.format;
+  view.width = image.tiles.layout.width;
+  view.height = image.tiles.layout.height;
+  view.num_levels = static_cast<int>(image.tiles.levels.size());
+  view.num_channels = image.tiles.layout.num_channels;
+  view.format = image.tiles.layout.format;
   view.filter = filter;
   view.wrap_u = wrap_u;
   view.wrap_v = wrap_v;
-  view.lookup = lookup_for(image.layout);
+  view.lookup = lookup_for(image.tiles.layout);
   view.lookup_handle = &texture;
   return view;
 }

@@ -11,20 +11,20 @@ namespace relief {
 namespace {
 
 /// Channels of the file that become R, G, B, A (or grey, alpha).
-std::vector<int> select_channels(const OIIO::ImageSpec& spec)
+std::vector<int> select_channels(const ImageHeader& header)
 {
-  if (spec.nchannels == 2 && spec.alpha_channel != 1) {
+  if (header.num_channels == 2 && header.alpha_channel != 1) {
     return {0, 1, -1};
   }
-  if (spec.nchannels <= 4) {
-    std::vector<int> all(static_cast<std::size_t>(spec.nchannels));
-    for (int c = 0; c < spec.nchannels; ++c) {
+  if (header.num_channels <= 4) {
+    std::vector<int> all(static_cast<std::size_t>(header.num_channels));
+    for (int c = 0; c < header.num_channels; ++c) {
       all[static_cast<std::size_t>(c)] = c;
     }
     return all;
   }
-  const int r = spec.channelindex("R"), g = spec.channelindex("G"), b = spec.channelindex("B");
-  const int a = spec.channelindex("A");
+  const int r = header.channel_index("R"), g = header.channel_index("G"), b = header.channel_index("B");
+  const int a = header.channel_index("A");
   std::vector<int> channels = r >= 0 && g >= 0 && b >= 0 ? std::vector<int>{r, g, b} : std::vector<int>{0, 1, 2};
   if (a >= 0) {
     channels.push_back(a);
@@ -55,23 +55,23 @@ struct TextureReader::Impl {
 
 TextureReader::Impl::Impl(const TextureSource& source) : image(source)
 {
-  const OIIO::ImageSpec& spec = image.spec();
-  channels = select_channels(spec);
-  channel_begin = spec.nchannels;
+  const ImageHeader& header = image.header();
+  channels = select_channels(header);
+  channel_begin = header.num_channels;
   for (const int c : channels) {
     if (c >= 0) {
       channel_begin = std::min(channel_begin, c);
       channel_end = std::max(channel_end, c + 1);
     }
   }
-  is_8_bit = spec.format == OIIO::TypeDesc::UINT8;
-  const bool is_srgb = source.color == TextureColor::kSrgb && !spec.format.is_floating_point();
+  is_8_bit = header.sample_type == SampleType::kU8;
+  const bool is_srgb = source.color == TextureColor::kSrgb && header.is_integer;
   decode_srgb = is_srgb && !is_8_bit;
-  layout.width = spec.width;
-  layout.height = spec.height;
+  layout.width = header.width;
+  layout.height = header.height;
   layout.num_channels = static_cast<int>(channels.size());
   layout.format = !is_8_bit ? TexelFormat::kHalf : is_srgb ? TexelFormat::kU8Srgb : TexelFormat::kU8;
-  image.select(channel_begin, channel_end, is_8_bit ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::FLOAT);
+  image.select(channel_begin, channel_end, is_8_bit ? SampleType::kU8 : SampleType::kFloat);
 }
 
 std::uint16_t TextureReader::Impl::convert_value(float value, bool is_alpha)

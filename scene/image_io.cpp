@@ -1,0 +1,52 @@
+#include "scene/image_io.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+
+#include <dlfcn.h>
+
+namespace relief {
+namespace {
+
+// The number counts changes of the interface: an old program that was copied away does not call into a newer build.
+constexpr const char* kEntryPoint = "relief_image_io_1";
+
+const ImageIo& module_load()
+{
+  namespace fs = std::filesystem;
+  std::error_code no_proc;
+  const fs::path program = fs::read_symlink("/proc/self/exe", no_proc);
+  std::string causes;
+  // Beside the program, where a copy of both finds it, or where it was built, for the programs of tests.
+  for (const fs::path& path : {program.parent_path() / "relief_image_io.so", fs::path(RELIEF_IMAGE_IO_MODULE)}) {
+    // Lazily, as at a program's start: looking up every function of 245 libraries takes another 20 ms.
+    void* module = ::dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL);
+    const void* entry = module == nullptr ? nullptr : ::dlsym(module, kEntryPoint);
+    if (entry != nullptr) {
+      return *static_cast<const ImageIo*>(entry);
+    }
+    // The same for both, if they are one or a library is missing.
+    const std::string cause = ::dlerror();
+    if (causes.find(cause) == std::string::npos) {
+      causes += (causes.empty() ? "" : "; ") + cause;
+    }
+  }
+  throw std::runtime_error("the module that reads images cannot be loaded: " + causes);
+}
+
+}  // namespace
+
+int ImageHeader::channel_index(std::string_view name) const
+{
+  const auto found = std::find(channel_names.begin(), channel_names.end(), name);
+  return found == channel_names.end() ? -1 : static_cast<int>(found - channel_names.begin());
+}
+
+const ImageIo& image_io()
+{
+  static const ImageIo& module = module_load();
+  return module;
+}
+
+}  // namespace relief

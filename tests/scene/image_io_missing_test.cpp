@@ -1,0 +1,31 @@
+// What is said when the module that reads images is not there. This program has image_io.cpp with the path of a file that
+// does not exist.
+#include <gtest/gtest.h>
+
+#include "scene/diagnostics.h"
+#include "scene/image_reader.h"
+#include "tests/support/gltf_builder.h"
+
+namespace relief {
+namespace {
+
+TEST(MissingImageModule, IsAnErrorOfTheImageAndNamesTheFile)
+{
+  const test::TemporaryFolder folder;
+  const std::string file = folder.write("a.png", "\x89PNG").string();
+  // Twice: a failure does not make a later image pass.
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    try {
+      ImageReader reader({file, {}, "scene.gltf", "/images/7"});
+      FAIL() << "no error";
+    } catch (const SceneError& e) {
+      EXPECT_EQ(e.file, "scene.gltf");
+      EXPECT_EQ(e.json_path, "/images/7");
+      EXPECT_NE(e.found.find(file), std::string::npos) << e.found;
+      EXPECT_NE(e.found.find(RELIEF_IMAGE_IO_MODULE ": cannot open"), std::string::npos) << e.found;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace relief
