@@ -16,13 +16,12 @@ namespace relief {
 
 /// Owner of what KernelGlobals points to. Camera, film, limits and seed are left for the render to fill in.
 struct SceneContext {
-  /// @param scene                must outlive the context
+  /// @param loaded               must outlive the context
   /// @param environment_density  kRadiance for LightTechnique::kLightSampling, which has no other way to the light
   /// @error std::runtime_error out of memory and the like
-  explicit SceneContext(const Scene& scene,
+  explicit SceneContext(const Scene& loaded,
                         const DisplacementOptions& displacement = {},
                         EnvironmentDensity environment_density = EnvironmentDensity::kExcess,
-
                         const CausticSettings& caustics = {CausticsMode::kOff});
   SceneContext(const SceneContext&) = delete;
   SceneContext& operator=(const SceneContext&) = delete;

@@ -251,7 +251,7 @@ int GltfLoader::material_of(const GltfDocument& document, int material_index)
     name = document.core.materials[static_cast<std::size_t>(material_index)].name;
     if (auto displacement = relief_displacement(document, material_index, height_maps_, warnings_)) {
       material.displacement_index = static_cast<int>(scene_.displacements.size());
-      scene_.displacements.push_back(std::move(*displacement));
+      scene_.displacements.push_back(*displacement);
     }
   }
   scene_.materials.push_back(material);
