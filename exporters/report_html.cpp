@@ -93,9 +93,10 @@ std::vector<double> ticks_of(const Scale& scale)
     const std::span<const double> steps = range > 200 ? std::span<const double>(kDecades)
                                           : range > 5 ? std::span<const double>(kUsual)
                                                       : std::span<const double>(kFine);
-    for (double power = std::pow(10.0, std::floor(std::log10(scale.low))); power <= scale.high; power *= 10) {
+    const auto last = static_cast<int>(std::floor(std::log10(scale.high)));
+    for (auto decade = static_cast<int>(std::floor(std::log10(scale.low))); decade <= last; ++decade) {
       for (const double step : steps) {
-        const double tick = step * power;
+        const double tick = step * std::pow(10.0, decade);
         if (tick >= scale.low * 0.999 && tick <= scale.high * 1.001) ticks.push_back(tick);
       }
     }
@@ -103,8 +104,9 @@ std::vector<double> ticks_of(const Scale& scale)
   }
   const double rough = (scale.high - scale.low) / 5, power = std::pow(10.0, std::floor(std::log10(rough)));
   const double step = rough / power > 5 ? 10 * power : (rough / power > 2 ? 5 * power : 2 * power);
-  for (double tick = std::ceil(scale.low / step) * step; tick <= scale.high; tick += step) {
-    ticks.push_back(std::abs(tick) < 1e-9 * step ? 0 : tick);
+  const auto last = static_cast<std::int64_t>(std::floor(scale.high / step));
+  for (auto i = static_cast<std::int64_t>(std::ceil(scale.low / step)); i <= last; ++i) {
+    ticks.push_back(static_cast<double>(i) * step);
   }
   return ticks;
 }

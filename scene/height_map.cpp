@@ -96,7 +96,7 @@ std::int64_t channel_copy(const T* from,
     to[i] = from[channels[0]];
     bool differs = false;
     for (const std::size_t c : channels.subspan(1)) {
-      // By their bits, so that equal NaN count as equal.
+      // By their bits, so that equal NaN count as equal. NOLINTNEXTLINE(bugprone-suspicious-memory-comparison)
       differs |= std::memcmp(&from[c], &from[channels[0]], sizeof(T)) != 0;
     }
     num_different += differs ? 1 : 0;
@@ -113,6 +113,7 @@ void texels_load(ImageReader& reader, HeightImage& image, T* texels)
   const int begin = *low;
   reader.select(begin, *high + 1, reader.header().sample_type);
   std::vector<std::size_t> offsets;
+  offsets.reserve(channels.size());
   for (const int c : channels) {
     offsets.push_back(static_cast<std::size_t>(c - begin));
   }
