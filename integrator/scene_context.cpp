@@ -20,9 +20,8 @@ struct CausticsDecision {
 /// Perceptual roughness of the sharpest lobes that photons are gathered for: sharper ones would meet few of them.
 constexpr float kSharpestGathered = 0.25f;
 
-/// Perceptual roughness from which on photons are gathered at the inside of glass. What smoother glass reflects is so narrow
-/// that few photons agree with it: at 0.15 they brought about as much noise as they took.
-constexpr float kSharpestGlassGathered = 0.2f;
+/// Perceptual roughness from which on casters show photons by the tails of their lobes. Tails of sharper lobes reach nowhere.
+constexpr float kSharpestTails = 0.12f;
 
 /// A light that covers more of the sky than this, steradians, is found by paths that leave a caster often enough.
 constexpr double kWideLight = 1.0;
@@ -59,11 +58,8 @@ bool has_soft_lobes(const Material& m, bool caster, float roughness)
   return !m.unlit && (textured || diffuse || rough || multiple || !is_zero(m.sheen_color));
 }
 
-/// Whether photons show at the inside of a material without soft lobes, see path_gathers_inside.
-bool reflects_softly_inside(const Material& m, bool caster)
-{
-  return caster && !m.unlit && m.transmission > 0.0f && m.thickness > 0.0f && m.roughness >= kSharpestGlassGathered;
-}
+/// Whether photons show on a material by the tails of its sharp lobes, see path_gathers_tails.
+bool has_tails(const Material& m, bool caster) { return caster && !m.unlit && m.roughness >= kSharpestTails; }
 
 }  // namespace
 
@@ -97,11 +93,8 @@ SceneContext::SceneContext(const Scene& loaded,
     const bool caster = (view.flags & kCausticCaster) != 0;
     const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
     if (decision.enabled && (view.flags & kCausticReceiver) != 0) {
-      if (has_soft_lobes(material, caster, kSharpestGathered)) {
-        view.flags |= kGathersPhotons;
-      } else if (reflects_softly_inside(material, caster)) {
-        view.flags |= kGathersInside;
-      }
+      if (has_soft_lobes(material, caster, kSharpestGathered)) view.flags |= kGathersPhotons;
+      if (has_tails(material, caster)) view.flags |= kGathersTails;
     }
     instances.push_back(view);
   }

@@ -30,6 +30,7 @@ Wavefront::Wavefront(bool caustics)
     *p = *column++;
   }
   c.wi = caustic_memory_->wi;
+  c.bounces = caustic_memory_->bounces;
   c.root = caustic_memory_->root;
 }
 

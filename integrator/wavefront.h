@@ -81,7 +81,7 @@ class Wavefront {
   };
   struct CausticMemory {
     float columns[kNumCausticFloats][kColumnEntries];
-    std::uint32_t wi[kColumnEntries], root[kColumnEntries];
+    std::uint32_t wi[kColumnEntries], bounces[kColumnEntries], root[kColumnEntries];
   };
 
   std::unique_ptr<Memory> memory_;

@@ -32,7 +32,7 @@ enum InstanceFlag : std::uint32_t {
   kDisplaced = 1u << 6,            ///< hits bring a position and a normal of their own, in object space
   kNoCausticLight = 1u << 8,       ///< its emission starts no photons
   kGathersPhotons = 1u << 7,       ///< a receiver that has soft lobes, in a render with a photon pass
-  kGathersInside = 1u << 9,        ///< likewise, without such lobes: rough glass, see path_gathers_inside
+  kGathersTails = 1u << 9,         ///< likewise, a rough caster: see path_gathers_tails
 };
 
 /// One placement of a mesh.

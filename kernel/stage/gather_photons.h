@@ -2,31 +2,9 @@
 #pragma once
 
 #include "kernel/photon/gather.h"
-#include "kernel/stage/path_access.h"
+#include "kernel/stage/surface_interaction.h"
 
 namespace relief {
-
-/// Bounces that photons gathered at a path's present hit may have, so that camera path and photon together keep the limits.
-/// @param diffuse_event  the gathering event, which is one itself, counts as diffuse, else as glossy
-/// @return               false: none may
-RELIEF_KERNEL bool photon_bounces_left(const BounceLimits& limits,
-                                       std::uint32_t bounces,
-                                       bool diffuse_event,
-                                       std::uint32_t* left)
-{
-  const int total = limits.total - path_bounces(bounces, BounceKind::kAll) - 1;
-  const int diffuse = limits.diffuse - path_bounces(bounces, BounceKind::kDiffuse) - (diffuse_event ? 1 : 0);
-  const int glossy = limits.glossy - path_bounces(bounces, BounceKind::kGlossy) - (diffuse_event ? 0 : 1);
-  const int transmission = limits.transmission - path_bounces(bounces, BounceKind::kTransmission);
-  if (total < 0 || diffuse < 0 || glossy < 0 || transmission < 0) return false;
-  const auto byte = [](int count, BounceKind kind) {
-    constexpr int kMost = 127;
-    return static_cast<std::uint32_t>(count < kMost ? count : kMost) << static_cast<int>(kind);
-  };
-  *left = byte(total, BounceKind::kAll) | byte(diffuse, BounceKind::kDiffuse) | byte(glossy, BounceKind::kGlossy) |
-          byte(transmission, BounceKind::kTransmission);
-  return true;
-}
 
 /// Unit geometric normal of a path's hit, world space, on the front side.
 RELIEF_KERNEL Vec3f hit_geometric_normal(const KernelGlobals& g, const PathState& state, std::uint32_t path)
@@ -44,6 +22,37 @@ RELIEF_KERNEL Vec3f hit_geometric_normal(const KernelGlobals& g, const PathState
   return (instance.flags & kMirrored) != 0 ? -Ng : Ng;
 }
 
+/// Unit shading normal of a path's hit, world space, on the front side, without a normal map.
+RELIEF_KERNEL Vec3f hit_shading_normal(const KernelGlobals& g, const PathState& state, std::uint32_t path)
+{
+  const InstanceView& instance = g.instances[state.hit_object[path]];
+  if ((instance.flags & kDisplaced) != 0) {
+    const Vec3f Ns{state.hit_Ns_x[path], state.hit_Ns_y[path], state.hit_Ns_z[path]};
+    return normalize(transform_normal(instance.object_from_world, as_normal(Ns)));
+  }
+  return surface_hit_make(g.meshes[instance.mesh_index], instance, state.hit_triangle[path], state.hit_u[path],
+                          state.hit_v[path])
+      .Ns;
+}
+
+/// The lobe by whose tails a path's hit shows photons.
+/// @param wo  unit
+/// @param Ng  unit, on the side of wo
+RELIEF_KERNEL PhotonLobe
+hit_photon_lobe(const KernelGlobals& g, const PathState& state, std::uint32_t path, Vec3f wo, Vec3f Ng, bool front)
+{
+  const Material& material = g.materials[g.instances[state.hit_object[path]].material_index];
+  PhotonLobe lobe;
+  lobe.alpha = sqr(material.roughness);
+  lobe.frame = frame_from_normal(shading_normal_towards(hit_shading_normal(g, state, path), Ng, wo));
+  lobe.wo = to_local(lobe.frame, wo);
+  const float eta = front ? material.ior : 1.0f / material.ior;
+  const bool glass = material.transmission > 0.0f && material.thickness > 0.0f && material.metallic == 0.0f;
+  if (glass && !dielectric_is_matched(eta)) lobe.eta = eta;
+  lobe.most = kTailDensity;
+  return lobe;
+}
+
 /// Writes what photons bring to a path's hit.
 RELIEF_KERNEL void gather_photons(const KernelGlobals& g, PathState& state, std::uint32_t path)
 {
@@ -51,24 +60,20 @@ RELIEF_KERNEL void gather_photons(const KernelGlobals& g, PathState& state, std:
   caustic.irradiance_r[path] = caustic.irradiance_g[path] = caustic.irradiance_b[path] = 0.0f;
   const InstanceView& instance = g.instances[state.hit_object[path]];
   PhotonQuery query;
-  if ((instance.flags & (kGathersPhotons | kGathersInside)) == 0 || g.caustics.map.octaves == 0) return;
+  const bool tails = path_gathers_tails(state.flags[path], instance);
+  if (((instance.flags & kGathersPhotons) == 0 && !tails) || g.caustics.map.octaves == 0) return;
   // Photons went on from here to where the path comes from.
   if ((state.flags[path] & kPathCaustic) != 0) return;
-  const bool diffuse_event = (instance.flags & kGathersPhotons) != 0;
-  if (!photon_bounces_left(g.limits, state.bounces[path], diffuse_event, &query.bounces)) return;
+  // What the event counts as, where it may be of several kinds, is known when a photon is.
+  const BounceKind event = tails ? BounceKind::kAll : BounceKind::kDiffuse;
+  if (!photon_bounces_left(g.limits, state.bounces[path], event, &query.bounces)) return;
   const Vec3f D = path_direction(state, path);
   query.P = path_origin(state, path) + D * state.hit_t[path];
   query.Ng = hit_geometric_normal(g, state, path);
   const bool front = dot(query.Ng, D) <= 0.0f;
-  if (!diffuse_event && !path_gathers_inside(state.flags[path], instance, front)) return;
   if (!front) query.Ng = -query.Ng;
-  query.both_sides = diffuse_event && g.materials[instance.material_index].transmission > 0.0f;
-  if (!diffuse_event) {
-    // The facets of a smooth mesh lean a little against what shades it.
-    constexpr float kFacets = 0.05f;
-    query.wo = -D;
-    query.alpha = sqr(g.materials[instance.material_index].roughness) + kFacets;
-  }
+  query.both_sides = g.materials[instance.material_index].transmission > 0.0f;
+  if (tails) query.lobe = hit_photon_lobe(g, state, path, -D, query.Ng, front);
   query.hash =
       state.pixel_hash[path] ^ (state.sample_index[path] + 1u) * 0x9e3779b1u ^ state.bounces[path] * 0x85ebca77u;
   const PhotonGather gather = photon_gather(g.caustics.map, query);
@@ -76,6 +81,7 @@ RELIEF_KERNEL void gather_photons(const KernelGlobals& g, PathState& state, std:
   caustic.irradiance_g[path] = gather.irradiance.y;
   caustic.irradiance_b[path] = gather.irradiance.z;
   caustic.wi[path] = octahedral_encode(gather.wi);
+  caustic.bounces[path] = gather.bounces;
 }
 
 }  // namespace relief

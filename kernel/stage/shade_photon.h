@@ -1,5 +1,5 @@
-// Stage: a photon met a surface. It is kept where soft lobes can show it, or rough glass from inside, and goes on by sharp
-// lobes of casters. By soft lobes it goes on from where they show it, if a caster is next: a bright caustic is a lamp to the
+// Stage: a photon met a surface. It is kept where soft lobes can show it, or tails of sharp ones, and goes on by sharp lobes
+// of casters. By soft lobes it goes on from where they show it, if a caster is next: a bright caustic is a lamp to the
 // glass above it.
 #pragma once
 
@@ -105,7 +105,7 @@ RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
   const bool caster = (flags & kCausticCaster) != 0;
   const bool arrived = has_scattered && (state.flags[path] & kPathAfterSoft) == 0;
   const bool soft = arrived && (flags & kGathersPhotons) != 0;
-  if (soft || (arrived && (flags & kGathersInside) != 0 && !at.side.front)) {
+  if (soft || (arrived && (flags & kGathersTails) != 0)) {
     // Along the ray, as gather_photons: on a triangle that is large against the caustic, at.hit is less exact.
     const Vec3f P = path_origin(state, path) - wo * state.hit_t[path];
     photons.photons[photons.size++] = {

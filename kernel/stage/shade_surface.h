@@ -4,6 +4,7 @@
 #include "kernel/bsdf/glass_branches.h"
 #include "kernel/bsdf/lobe_split.h"
 #include "kernel/counters.h"
+#include "kernel/photon/gather.h"
 #include "kernel/sample/dimensions.h"
 #include "kernel/sample/sobol.h"
 #include "kernel/shape/material_lookup.h"
@@ -87,22 +88,49 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   shadow.scatterings[ray] = static_cast<std::uint32_t>(bounce + 1);
 }
 
-/// Which lobes are sharp for this path, between wo and a direction. What cannot be gone back stays sharp: photons end there.
-/// @param wo, wi    in the closure's frame
-/// @param wi_world  the same as wi
-RELIEF_KERNEL SharpLobes path_sharp_lobes(const KernelGlobals& g,
-                                          std::uint32_t flags,
-                                          const SurfaceInteraction& at,
-                                          Vec3f wo,
-                                          Vec3f wi,
-                                          Vec3f wi_world)
+/// Which lobes are sharp for this path towards a direction. What cannot be gone back stays sharp, as photons end there, and
+/// what grazes the facet, where single photons would count for too much.
+/// @param wi   unit, world
+/// @param pdf  of the closure
+RELIEF_KERNEL SharpLobes
+path_sharp_lobes(const KernelGlobals& g, std::uint32_t flags, const SurfaceInteraction& at, Vec3f wi, float pdf)
 {
+  constexpr float kLeastCosine = 0.05f;
   SharpLobes sharp = sharp_lobes(at.params, (at.instance->flags & kCausticCaster) != 0, g.caustics.roughness);
-  if (wo.z * wi.z > 0.0f && path_gathers_inside(flags, *at.instance, at.side.front) &&
-      shading_is_reversible(at.side, wi_world)) {
+  if (path_gathers_tails(flags, *at.instance) && pdf < kTailDensity &&
+      __builtin_fabsf(dot(wi, at.side.Ng)) > kLeastCosine && shading_is_reversible(at.side, wi)) {
     sharp.base = false;
   }
   return sharp;
+}
+
+/// What a rough caster makes of the photon that was gathered, by its soft lobes and by the tails of the sharp ones: each as
+/// far as the limits of bounces allow.
+/// @param wo, wi    in the closure's frame
+/// @param wi_world  the same as wi
+template <unsigned kFeatures>
+RELIEF_KERNEL Vec3f shade_surface_tails(const KernelGlobals& g,
+                                        const PathState& state,
+                                        std::uint32_t path,
+                                        const SurfaceInteraction& at,
+                                        const SurfaceClosure& closure,
+                                        Vec3f wo,
+                                        Vec3f wi,
+                                        Vec3f wi_world)
+{
+  const auto allowed = [&](BounceKind event) {
+    std::uint32_t left = 0;
+    return photon_bounces_left(g.limits, state.bounces[path], event, &left) &&
+           photon_bounces_allowed(state.caustic.bounces[path], left);
+  };
+  const float pdf = closure_eval<kFeatures>(closure, *g.bsdf_tables, wi).pdf;
+  const SharpLobes sharp = path_sharp_lobes(g, state.flags[path], at, wi_world, pdf);
+  const Vec3f soft = closure_eval<kFeatures>(closure_soft(closure, {true, true}), *g.bsdf_tables, wi).f;
+  const Vec3f both = closure_eval<kFeatures>(closure_soft(closure, sharp), *g.bsdf_tables, wi).f;
+  Vec3f f;
+  if (allowed(BounceKind::kDiffuse)) f += soft;
+  if (allowed(wo.z * wi.z > 0.0f ? BounceKind::kGlossy : BounceKind::kTransmission)) f += max(both - soft, Vec3f{});
+  return f;
 }
 
 /// Adds what the photons around the hit bring to it.
@@ -120,52 +148,53 @@ RELIEF_KERNEL void shade_surface_photons(const KernelGlobals& g,
   if (is_zero(irradiance)) return;
   const Vec3f wi = octahedral_decode(caustic.wi[path]);
   const Vec3f wi_local = to_local(at.side.frame, wi);
-  const SharpLobes sharp = path_sharp_lobes(g, state.flags[path], at, wo, wi_local, wi);
-  const BsdfEval bsdf = closure_eval<kFeatures>(closure_soft(closure, sharp), *g.bsdf_tables, wi_local);
+  Vec3f f;
+  if (path_gathers_tails(state.flags[path], *at.instance)) {
+    f = shade_surface_tails<kFeatures>(g, state, path, at, closure, wo, wi_local, wi);
+  } else {
+    const SharpLobes sharp = sharp_lobes(at.params, (at.instance->flags & kCausticCaster) != 0, g.caustics.roughness);
+    f = closure_eval<kFeatures>(closure_soft(closure, sharp), *g.bsdf_tables, wi_local).f;
+  }
   // Photons count light by the area of the true surface, the BSDF by that of the shaded one. The bound keeps single
   // photons that graze the former from shining where the latter faces them.
   constexpr float kLeastCosine = 0.01f;
   const float by_area =
       __builtin_fabsf(dot(wi, at.side.frame.n)) / max(__builtin_fabsf(dot(wi, at.side.Ng)), kLeastCosine);
-  const Vec3f radiance = path_throughput(state, path) * bsdf.f * irradiance * by_area;
+  const Vec3f radiance = path_throughput(state, path) * f * irradiance * by_area;
   caustic.radiance_r[path] += radiance.x;
   caustic.radiance_g[path] += radiance.y;
   caustic.radiance_b[path] += radiance.z;
 }
 
-/// Ways in which a path enters rough glass that the camera sees. What shines there of lamps is met by a small part of the
-/// lobe: of the squared error on benchmarks/caustics' `rough`, glass on a seventh of the picture had two thirds. With 2, 4 and
-/// 8 ways error times processor time is 0.84, 0.75 and 0.75 of what it is with one.
-inline constexpr std::uint32_t kWaysIntoRoughGlass = 4;
+/// Ways in which a path enters rough glass, or leaves rough metal, that the camera sees. What shines there of lamps is met by a
+/// small part of the lobe: of the squared error on benchmarks/caustics' `rough`, glass on a seventh of the picture had two
+/// thirds, and of what photons then left, metal on a fourteenth half. With 2, 4 and 8 ways into glass error times processor time
+/// was 0.84, 0.75 and 0.75 of what it is with one.
+inline constexpr std::uint32_t kWaysAtRough = 4;
 
-RELIEF_KERNEL std::uint32_t path_ways_into(const PathState& state,
-                                           std::uint32_t path,
-                                           const ShadingSide& side,
-                                           const SurfaceClosure& closure)
+RELIEF_KERNEL std::uint32_t path_ways_on(const PathState& state,
+                                         std::uint32_t path,
+                                         const SurfaceInteraction& at,
+                                         const SurfaceClosure& closure)
 {
   const bool seen_first = path_bounces(state.bounces[path], BounceKind::kAll) == 0;
-  const bool rough_glass = closure.probability.glass == 1.0f && !closure.glass.delta;
-  return seen_first && side.front && rough_glass && path_has_room(state, kWaysIntoRoughGlass) ? kWaysIntoRoughGlass : 1;
+  const bool rough_glass = closure.probability.glass == 1.0f && !closure.glass.delta && at.side.front;
+  const bool rough_metal = closure.probability.specular > 0.5f && (at.instance->flags & kGathersTails) != 0;
+  return seen_first && (rough_glass || rough_metal) && path_has_room(state, kWaysAtRough) ? kWaysAtRough : 1;
 }
 
-/// Whether a path follows what glass reflects and what it refracts. By chance it takes the first one time in 25, and lamps
-/// that it finds so are 25 times too bright: those that smooth glass shows on its outside, and all glass by way of its far
-/// side, but where photons bring them.
-RELIEF_KERNEL bool path_forks_at_glass(const PathState& state,
-                                       std::uint32_t path,
-                                       const SurfaceInteraction& at,
-                                       const SurfaceClosure& closure)
+/// Whether a path may follow what glass reflects and what it refracts. By chance it takes the first one time in 25, and lamps
+/// that it finds so are 25 times too bright.
+RELIEF_KERNEL bool path_forks_at_glass(const PathState& state, std::uint32_t path, const SurfaceClosure& closure)
 {
-  const bool early = path_bounces(state.bounces[path], BounceKind::kAll) <= 1 &&
-                     path_bounces(state.bounces[path], BounceKind::kDiffuse) == 0;
-  if (!early || closure.probability.glass < 1.0f || !path_has_room(state, 2)) return false;
-  return at.side.front ? closure.glass.delta : !path_gathers_inside(state.flags[path], *at.instance, false);
+  return path_bounces(state.bounces[path], BounceKind::kAll) <= 1 &&
+         path_bounces(state.bounces[path], BounceKind::kDiffuse) == 0 && closure.probability.glass == 1.0f &&
+         path_has_room(state, 2);
 }
 
 /// Sends a path on by a sample of its surface's BSDF, or ends it.
 /// @param bsdf        pdf 0: none
 /// @param share       of a fork, 1 else
-/// @param wo          in the closure's frame
 /// @param throughput  up to the surface
 /// @param cone        at the surface
 template <unsigned kFeatures>
@@ -177,7 +206,6 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
                                           BsdfSample bsdf,
                                           float share,
                                           const ScatterSamples& u,
-                                          Vec3f wo,
                                           Vec3f throughput,
                                           Vec3f light_N,
                                           RayCone cone,
@@ -188,7 +216,7 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
   if (!(bsdf.pdf > 0.0f)) return;
   const Vec3f wi = from_local(side.frame, bsdf.wi);
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
-    const SharpLobes sharp = path_sharp_lobes(g, state.flags[path], at, wo, bsdf.wi, wi);
+    const SharpLobes sharp = path_sharp_lobes(g, state.flags[path], at, wi, bsdf.pdf);
     const bool is_sharp = closure_split<kFeatures>(closure, *g.bsdf_tables, sharp, u.sharpness, bsdf);
     const bool is_paths = is_sharp && !shading_is_reversible(side, wi);
     state.flags[path] = is_paths ? path_flags_left_to_paths(state.flags[path])
@@ -240,6 +268,38 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
   state.cone_width[path] = cone.width;
   state.cone_spread[path] = cone.spread;
   queue_push(next, path);
+}
+
+/// Sends a path on as shade_surface_continue does, or in both ways that glass has, but where photons bring what it reflects.
+/// @param bsdf  sampled with u
+template <unsigned kFeatures>
+RELIEF_KERNEL void shade_surface_scatter(const KernelGlobals& g,
+                                         PathState& state,
+                                         std::uint32_t path,
+                                         const SurfaceInteraction& at,
+                                         const SurfaceClosure& closure,
+                                         BsdfSample bsdf,
+                                         float share,
+                                         const ScatterSamples& u,
+                                         Vec3f throughput,
+                                         Vec3f light_N,
+                                         RayCone cone,
+                                         QueueView& next)
+{
+  if constexpr ((kFeatures & kFeatureCaustics) != 0 && (kFeatures & kFeatureTransmission) != 0) {
+    if (path_forks_at_glass(state, path, closure)) {
+      const GlassBranches branches = glass_branches_sample<kFeatures>(closure, *g.bsdf_tables, u.bsdf_lobe, u.bsdf_uv);
+      const bool by_photons =
+          path_gathers_tails(state.flags[path], *at.instance) && branches.reflected.pdf < kTailDensity;
+      if (branches.reflectance < 1.0f && !by_photons) {
+        shade_surface_continue<kFeatures>(g, state, path_fork(state, path), at, closure, branches.reflected,
+                                          share * branches.reflectance, u, throughput, light_N, cone, next);
+        bsdf = branches.refracted;
+        share *= 1.0f - branches.reflectance;
+      }
+    }
+  }
+  shade_surface_continue<kFeatures>(g, state, path, at, closure, bsdf, share, u, throughput, light_N, cone, next);
 }
 
 /// Shades one path. Reads and writes every column but the hit's.
@@ -327,7 +387,7 @@ template <unsigned kFeatures>
 
   // While the chosen light is on its way from memory, the BSDF is sampled.
   const SurfaceClosure closure = surface_closure_make<kFeatures>(params, *g.bsdf_tables, wo_local);
-  BsdfSample bsdf = closure_sample<kFeatures>(closure, *g.bsdf_tables, u.bsdf_lobe, u.bsdf_uv);
+  const BsdfSample bsdf = closure_sample<kFeatures>(closure, *g.bsdf_tables, u.bsdf_lobe, u.bsdf_uv);
 
   if (chosen.probability > 0.0f) {
     shade_surface_light<kFeatures>(g, state, path, at, closure, chosen, u.light_uv, light_N, cone, shadow);
@@ -337,33 +397,22 @@ template <unsigned kFeatures>
     shade_surface_photons<kFeatures>(g, state, path, at, closure, wo_local);
   }
 
-  float share = 1.0f;
   if constexpr ((kFeatures & kFeatureCaustics) != 0 && (kFeatures & kFeatureTransmission) != 0) {
-    const std::uint32_t ways = path_ways_into(state, path, side, closure);
+    const std::uint32_t ways = path_ways_on(state, path, at, closure);
     if (ways > 1) {
       for (std::uint32_t way = ways; way-- > 0;) {
         // The ways of all samples share one stratified set of points; ahead, each has numbers of its own.
         const ScatterSamples v = scatter_samples(state.pixel_hash[path], sample * ways + way, surface);
         const std::uint32_t copy = way > 0 ? path_fork(state, path) : path;
         if (way > 0) state.pixel_hash[copy] = hash_mix_32(state.pixel_hash[path] + way);
-        shade_surface_continue<kFeatures>(
-            g, state, copy, at, closure, closure_sample<kFeatures>(closure, *g.bsdf_tables, v.bsdf_lobe, v.bsdf_uv),
-            1.0f / static_cast<float>(ways), v, wo_local, throughput, light_N, cone, next);
+        shade_surface_scatter<kFeatures>(g, state, copy, at, closure,
+                                         closure_sample<kFeatures>(closure, *g.bsdf_tables, v.bsdf_lobe, v.bsdf_uv),
+                                         1.0f / static_cast<float>(ways), v, throughput, light_N, cone, next);
       }
       return;
     }
-    if (path_forks_at_glass(state, path, at, closure)) {
-      const GlassBranches branches = glass_branches_sample<kFeatures>(closure, *g.bsdf_tables, u.bsdf_lobe, u.bsdf_uv);
-      if (branches.reflectance < 1.0f) {
-        shade_surface_continue<kFeatures>(g, state, path_fork(state, path), at, closure, branches.reflected,
-                                          branches.reflectance, u, wo_local, throughput, light_N, cone, next);
-        bsdf = branches.refracted;
-        share = 1.0f - branches.reflectance;
-      }
-    }
   }
-  shade_surface_continue<kFeatures>(g, state, path, at, closure, bsdf, share, u, wo_local, throughput, light_N, cone,
-                                    next);
+  shade_surface_scatter<kFeatures>(g, state, path, at, closure, bsdf, 1.0f, u, throughput, light_N, cone, next);
 }
 
 }  // namespace relief

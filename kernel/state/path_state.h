@@ -15,8 +15,9 @@ struct CausticStateView {
   float *irradiance_r = nullptr, *irradiance_g = nullptr, *irradiance_b = nullptr;  ///< at the present hit, W/m²
   std::uint32_t* wi = nullptr;                                                      ///< octahedral: where it comes from
   float *radiance_r = nullptr, *radiance_g = nullptr, *radiance_b = nullptr;        ///< of the sample so far
-  std::uint32_t* root = nullptr;  ///< camera path it forked from, or itself
-  std::uint32_t num_paths = 0;    ///< forked ones included
+  std::uint32_t* bounces = nullptr;  ///< of the photon that is there for all, see PhotonArrival
+  std::uint32_t* root = nullptr;     ///< camera path it forked from, or itself
+  std::uint32_t num_paths = 0;       ///< forked ones included
 };
 inline constexpr int kNumCausticFloats = 6;
 

@@ -176,45 +176,54 @@ TEST(PhotonMap, SearchesAgreeWithBruteForce)
 
 TEST(PhotonMap, LobesChooseWhomTheyWantAndChangeNoSum)
 {
-  // What a lobe of microfacets 0.1 wide reflects of photons that come from everywhere: the mean over many choices is the sum
-  // over all photons, with and without a word on the lobe, which says whom to choose.
+  // What a lobe of microfacets 0.1 wide reflects, all of it and by its tails, of photons that come from everywhere: the mean
+  // over many choices is the sum over all photons, whatever is said of the lobe: nothing, all, or that its peak is not wanted.
   const std::vector<std::vector<Photon>> chunks = random_photons(3000);
   PhotonMap map;
   map.build(chunks, std::vector<float>(3000, 2.0f));
   PhotonQuery query;
   query.Ng = {0, 1, 0};
   query.bounces = 5;
-  query.wo = normalize(Vec3f{0.3f, 1, 0.1f});
-  const auto lobe = [&](Vec3f wi) {
-    const Vec3f h = normalize(wi + query.wo);
-    const double tangent_squared = 1 / (static_cast<double>(h.y) * static_cast<double>(h.y)) - 1;
-    return 1 / std::pow(0.01 + tangent_squared, 2);
+  query.lobe.frame = frame_from_normal(query.Ng);
+  query.lobe.wo = to_local(query.lobe.frame, normalize(Vec3f{0.3f, 1, 0.1f}));
+  constexpr float kMost = 1;
+  enum Part { kAll, kTails };
+  const auto lobe = [&](Part part, Vec3f wi) {
+    const GgxReflection r = ggx_reflection_eval(query.lobe.wo, to_local(query.lobe.frame, wi), 0.1f);
+    return part == kTails && r.pdf >= kMost ? 0.0 : static_cast<double>(r.f);
   };
-  double expected = 0;
+  double expected[2] = {};
   for (const auto& chunk : chunks) {
     for (const Photon& photon : chunk) {
       const double q = static_cast<double>(length_squared(photon.P)) / 4;
       const Vec3f wi = octahedral_decode(photon.arrival.wi);
       if (q >= 1 || photon.arrival.bounces > 5 || octahedral_decode(photon.arrival.Ng).y < 0.5f || wi.y <= 0) continue;
-      expected += static_cast<double>(photon.arrival.power.x) * 2 * (1 - q) / (3.14159265358979 * 4) * lobe(wi);
+      const double irradiance = static_cast<double>(photon.arrival.power.x) * 2 * (1 - q) / (3.14159265358979 * 4);
+      for (const Part part : {kAll, kTails}) expected[part] += irradiance * lobe(part, wi);
     }
   }
-  double variance[2] = {};
-  for (const bool told : {false, true}) {
-    query.alpha = told ? 0.15f : 0.0f;
+  double variance[2][3] = {};
+  for (const int told : {0, 1, 2}) {
+    query.lobe.alpha = told > 0 ? 0.1f : 0.0f;
+    query.lobe.most = told == 2 ? kMost : kInfinity;
     constexpr int kChoices = 20000;
-    double sum = 0, squares = 0;
+    double sum[2] = {}, squares[2] = {};
     for (std::uint32_t i = 0; i < kChoices; ++i) {
       query.hash = i * 2654435761u;
       const PhotonGather gather = photon_gather(map.view(), query);
-      const double reflected = static_cast<double>(gather.irradiance.x) * lobe(gather.wi);
-      sum += reflected / kChoices;
-      squares += reflected * reflected / kChoices;
+      for (const Part part : {kAll, kTails}) {
+        const double reflected = static_cast<double>(gather.irradiance.x) * lobe(part, gather.wi);
+        sum[part] += reflected / kChoices;
+        squares[part] += reflected * reflected / kChoices;
+      }
     }
-    variance[told] = squares - sum * sum;
-    EXPECT_NEAR(sum, expected, 4 * std::sqrt(variance[told] / kChoices)) << told;
+    for (const Part part : {kAll, kTails}) {
+      variance[part][told] = squares[part] - sum[part] * sum[part];
+      EXPECT_NEAR(sum[part], expected[part], 4 * std::sqrt(variance[part][told] / kChoices)) << part << told;
+    }
   }
-  EXPECT_LT(variance[1], variance[0] / 10);
+  EXPECT_LT(variance[kAll][1], variance[kAll][0] / 10);
+  EXPECT_LT(variance[kTails][2], variance[kTails][1] / 2);
 }
 
 TEST(PhotonMap, SearchesStayWithinTheirCellsWhereCoordinatesHardlyResolveTheRadius)
@@ -434,7 +443,7 @@ TEST(PathsThatFork, FarSidesOfGlassShowALamp)
   const Estimate smooth = estimate_mean(slab, caustic_options(slab, CausticsMode::kOn, 16, 16), 8);
   EXPECT_NEAR(smooth.mean, kR + kT * kT * kR / (1 - kR * kR), 4 * smooth.standard_error);
   EXPECT_LT(smooth.standard_error, 2e-4);
-  // Too smooth for photons to be gathered inside.
+  // Too smooth for photons to be gathered.
   const Scene rough = lamp_over_glass(true, 0.1f);
   RenderOptions options = caustic_options(rough, CausticsMode::kOn, 16, 64);
   options.settings.caustics.photons = 1 << 10;
@@ -445,15 +454,11 @@ TEST(PathsThatFork, FarSidesOfGlassShowALamp)
   EXPECT_LT(error, 0.01 * off.mean);
 }
 
-TEST(PathsThatFork, WaysIntoRoughGlassShareOneSetOfPoints)
+/// Expects that paths go on from a rough surface in four ways that are one stratified set, and bring what single paths do. The
+/// surface fills the picture, and half of its lobe leads to a lamp; paths sample no lights.
+/// @param most  deviation of the pixels over their mean
+void expect_four_ways(const Scene& scene, double most)
 {
-  // A lamp lies behind half of the glass, so that a quarter turn of the lobe sees all of it or nothing, and paths sample no
-  // lights. Of the four ways of a sample two lead there, but for those that the glass reflects or scatters more than once:
-  // the pixels' deviation is 0.2 of their mean. Ways that know nothing of each other lead there none to four times, with 0.5.
-  Scene scene = empty_scene();
-  add_caster(scene, quad_mesh({-2, 0.2f, 2}, {4, 0, 0}, {0, 0, -4}), glass_material(0.4f));
-  scene.lights.push_back(square_light({10, 0, 0}, {0, 1, 0}, 10, 1));
-  look_down(scene, {0, 0.2f, 0}, 0.0005f, 1);
   RenderOptions options = caustic_options(scene, CausticsMode::kOn, 32, 1);
   options.light_technique = LightTechnique::kBsdfSampling;
   const Rendered picture = render_scene(scene, options);
@@ -469,11 +474,35 @@ TEST(PathsThatFork, WaysIntoRoughGlassShareOneSetOfPoints)
   const double mean = sum / (32 * 32);
   const double deviation = std::sqrt(squares / (32 * 32) - mean * mean);
   std::printf("deviation over mean %.3f\n", deviation / mean);
-  EXPECT_LT(deviation, 0.25 * mean);
+  EXPECT_LT(deviation, most * mean);
   options = caustic_options(scene, CausticsMode::kOff, 32, 256);
   options.light_technique = LightTechnique::kBsdfSampling;
   const Estimate off = estimate_mean(scene, options, 8);
   EXPECT_NEAR(mean, off.mean, 4 * std::hypot(deviation / 32, off.standard_error));
+}
+
+TEST(PathsThatFork, WaysIntoRoughGlassShareOneSetOfPoints)
+{
+  // A lamp lies behind half of the glass, so that a quarter turn of the lobe sees all of it or nothing. Of the four ways of a
+  // sample two lead there, but for those that the glass reflects or scatters more than once: the pixels' deviation is 0.2 of
+  // their mean. Ways that know nothing of each other lead there none to four times, with 0.5.
+  Scene scene = empty_scene();
+  add_caster(scene, quad_mesh({-2, 0.2f, 2}, {4, 0, 0}, {0, 0, -4}), glass_material(0.4f));
+  scene.lights.push_back(square_light({10, 0, 0}, {0, 1, 0}, 10, 1));
+  look_down(scene, {0, 0.2f, 0}, 0.0005f, 1);
+  expect_four_ways(scene, 0.25);
+}
+
+TEST(PathsThatFork, WaysFromRoughMetalShareOneSetOfPoints)
+{
+  // Likewise with a lamp above. A single way leads there or not, with a deviation of the mean itself.
+  Scene scene = empty_scene();
+  Material metal;
+  metal.roughness = 0.4f;
+  add_caster(scene, quad_mesh({-2, 0.2f, 2}, {4, 0, 0}, {0, 0, -4}), metal);
+  scene.lights.push_back(square_light({10, 3, 0}, {0, -1, 0}, 10, 1));
+  look_down(scene, {0, 0.2f, 0}, 0.0005f, 1);
+  expect_four_ways(scene, 0.25);
 }
 
 TEST(Caustics, SunThroughASlabLosesWhatTwoInterfacesReflect)
