@@ -61,26 +61,47 @@ def ripples(u, v):
                         + 0.3 * math.sin(turn * (u + 2 * v) + 2.0))
 
 
-def water():
+def grid(size, height, normal):
+    """The water's surface as size × size pairs of triangles, of heights and normals by u and v."""
+    corners = [(column / size, row / size) for row in range(size + 1) for column in range(size + 1)]
+    positions = [(-0.8 + 1.6 * u, height(u, v), 0.8 - 1.6 * v) for u, v in corners]
+    triangles = []
+    for row in range(size):
+        for column in range(size):
+            a = row * (size + 1) + column
+            triangles += [(a, a + 1, a + size + 2), (a, a + size + 2, a + size + 1)]
+    return Mesh(positions, triangles, [normal(u, v) for u, v in corners], corners)
+
+
+def tessellated_ripples(tiles, scale):
+    """What the displaced surface of `water` approximates, a pair of triangles a texel."""
+    step = 1e-4
+
+    def height(u, v):
+        return 0.6 + scale * (ripples(tiles * u, tiles * v) - 0.5)
+
+    def normal(u, v):
+        dhdx = (height(u + step, v) - height(u - step, v)) / (2 * step * 1.6)
+        dhdz = (height(u, v - step) - height(u, v + step)) / (2 * step * 1.6)
+        length = math.sqrt(dhdx * dhdx + 1 + dhdz * dhdz)
+        return (-dhdx / length, 1 / length, -dhdz / length)
+
+    return grid(512, height, normal)
+
+
+def water(tessellated=False):
+    """@param tessellated  as a smooth mesh instead, for who cannot displace as relief does"""
     document = Document("water", dict(RENDER))
     floor(document, 1.2)
-    size = 256
-    rows = [[(round(65535 * ripples((x + 0.5) / size, (y + 0.5) / size)),) for x in range(size)] for y in range(size)]
-    heights = document.add_texture("ripples.png", images.png(rows, bits=16))
-    material = displaced(glass("water", 1.33), heights, 0.03, tiles=(2, 2))
-    grid = 8
-    positions, normals, uvs, triangles = [], [], [], []
-    for row in range(grid + 1):
-        for column in range(grid + 1):
-            u, v = column / grid, row / grid
-            positions.append((-0.8 + 1.6 * u, 0.6, 0.8 - 1.6 * v))
-            normals.append((0.0, 1.0, 0.0))
-            uvs.append((u, v))
-    for row in range(grid):
-        for column in range(grid):
-            a = row * (grid + 1) + column
-            triangles += [(a, a + 1, a + grid + 2), (a, a + grid + 2, a + grid + 1)]
-    place(document, "surface", Mesh(positions, triangles, normals, uvs), material)
+    tiles, scale = 2, 0.03
+    if tessellated:
+        place(document, "surface", tessellated_ripples(tiles, scale), glass("water", 1.33))
+    else:
+        size = 256
+        rows = [[(round(65535 * ripples((x + 0.5) / size, (y + 0.5) / size)),) for x in range(size)] for y in range(size)]
+        heights = document.add_texture("ripples.png", images.png(rows, bits=16))
+        material = displaced(glass("water", 1.33), heights, scale, tiles=(tiles, tiles))
+        place(document, "surface", grid(8, lambda u, v: 0.6, lambda u, v: (0.0, 1.0, 0.0)), material)
     place(document, "bottom", quad((-0.8, 0.45, -0.8), (1.6, 0, 0), (0, 0, 1.6)), glass("water below", 1.33))
     document.add_area_light("lamp", (0.3, 2.6, 0.2), (0, 0, 0), 0.06, 0.06, (900, 860, 800))
     document.add_camera((0.0, 0.42, 2.6), (0, 0.22, 0), 34)
