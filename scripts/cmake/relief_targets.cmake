@@ -29,8 +29,6 @@ endif()
 if(RELIEF_SANITIZE MATCHES "thread")
   # Parallel loops whose hand-over of work the sanitizer can see; the files there say more.
   target_include_directories(relief_options BEFORE INTERFACE "${PROJECT_SOURCE_DIR}/tests/support/tsan")
-  # With it GCC 12 sees accesses past the ends of std::string's inner buffer; there are none.
-  target_compile_options(relief_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds>)
 endif()
 
 # relief_add_library(NAME sources...): a static library with the project's flags.

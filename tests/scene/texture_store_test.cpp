@@ -9,10 +9,12 @@
 #include <tbb/parallel_for.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <random>
 
@@ -675,9 +677,8 @@ TEST(TextureErrors, AbsurdSizesAreRefusedBeforeMemoryIsAsked)
       }
     }
     std::vector<unsigned char> png = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n', 0, 0, 0, 13};
-    png.insert(png.end(), chunk.begin(), chunk.end());
-    const auto crc_bytes = big_endian(~crc);
-    png.insert(png.end(), crc_bytes.begin(), crc_bytes.end());
+    std::ranges::copy(chunk, std::back_inserter(png));
+    std::ranges::copy(big_endian(~crc), std::back_inserter(png));
     for (const std::size_t budget : {std::size_t{4} << 30, std::size_t{1} << 40}) {
       expect_scene_error(embedded_request(png), "found", budget);
     }
