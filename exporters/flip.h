@@ -12,8 +12,7 @@
 namespace relief {
 
 struct FlipOptions {
-  double exposure =
-      0;  ///< stops; linear values times 2^exposure are clamped to [0, 1], which is what the sRGB display shows
+  double exposure = 0;  ///< stops; linear values times 2^exposure, clamped to [0, 1], are what the sRGB display shows
   /// Pixels in a degree of the viewer's sight. The default is the paper's: a 0.7 m wide display of 3840 pixels seen from 0.7 m.
   double pixels_per_degree = 67.02;
 };

@@ -9,8 +9,7 @@ namespace relief {
 /// What a microfacet of glass reflects and what it refracts.
 struct GlassBranches {
   BsdfSample reflected, refracted;
-  float reflectance =
-      1;  ///< of the microfacet: the probability of the first where one is chosen; 1: there is no second
+  float reflectance = 1;  ///< of the microfacet: probability of the first where one is chosen; 1: there is no second
 };
 
 /// Samples a surface of nothing but glass, as closure_sample with the same numbers would, but for the choice between the

@@ -25,11 +25,10 @@ inline constexpr float kTailDensity = 4.0f;
 /// A lobe of microfacets that shows photons, as far as choosing one asks for it.
 struct PhotonLobe {
   float alpha = 0;  ///< 0: all directions are alike
-  float eta =
-      0;  ///< of solid glass, index of the far side / index of wo's; 0: light is reflected, or passes a thin wall
-  Frame frame{};   ///< normal on wo's side
-  Vec3f wo{};      ///< in the frame
-  float most = 0;  ///< density of the lobe from which on photons are not wanted
+  float eta = 0;    ///< of solid glass, far side over wo's; 0: light is reflected, or passes a thin wall
+  Frame frame{};    ///< normal on wo's side
+  Vec3f wo{};       ///< in the frame
+  float most = 0;   ///< density of the lobe from which on photons are not wanted
 };
 
 /// Whom a search wants.

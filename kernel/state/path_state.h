@@ -38,12 +38,11 @@ struct alignas(64) PathState {
 };
 
 enum PathFlag : std::uint32_t {
-  kPathSawSurface = 1u << 0,  ///< an opaque-enough surface was met: the AOVs of the first hit are written
-  kPathCounted = 1u << 1,     ///< coverage was added to the film's alpha
-  kPathOnlyDelta = 1u << 2,   ///< every scattering event so far was a delta one
-  kPathAfterSoft = 1u << 3,   ///< the last scattering event is one where photons are gathered
-  kPathCaustic =
-      1u << 4,  ///< after such an event, all were sharp ones at casters: what lights lie ahead, photons bring
+  kPathSawSurface = 1u << 0,   ///< an opaque-enough surface was met: the AOVs of the first hit are written
+  kPathCounted = 1u << 1,      ///< coverage was added to the film's alpha
+  kPathOnlyDelta = 1u << 2,    ///< every scattering event so far was a delta one
+  kPathAfterSoft = 1u << 3,    ///< the last scattering event is one where photons are gathered
+  kPathCaustic = 1u << 4,      ///< after such an event, only sharp ones at casters: lights ahead are brought by photons
   kPathTransparentShift = 16,  ///< position of the count of transparent surfaces
 };
 

@@ -560,6 +560,38 @@ TEST(Caustics, CropsShowTheWholePicturesPixels)
   }
 }
 
+TEST(Caustics, OfACentimetreAndAKilometreAreTheSame)
+{
+  // All lengths change by powers of two, which rounds nothing: radii, offsets and thresholds that follow the scene's size
+  // give the same bits.
+  const auto picture = [](float scale) {
+    Scene scene = empty_scene();
+    add_floor(scene, scale);
+    Affine3 place;
+    place.p = {0, 0.5f * scale, 0};
+    add_caster(scene, sphere_mesh(0.375f * scale, 48, 24, true), glass_material(), place);
+    Material metal;
+    metal.roughness = 0.3f;
+    place.p = {0.5f * scale, 0.25f * scale, 0.5f * scale};
+    add_caster(scene, sphere_mesh(0.25f * scale, 48, 24, true), metal, place);
+    scene.lights.push_back(square_light({0, 2 * scale, 0}, {0, -1, 0}, 0.125f * scale, 50));
+    scene.lights.push_back(point_light({scale, 2 * scale, 0}, 2 * scale * scale));
+    look_down(scene, {}, scale, 3 * scale);
+    return render_scene(scene, caustic_options(scene, CausticsMode::kAuto, 64, 4));
+  };
+  const Rendered metre = picture(1);
+  EXPECT_GT(mean_of(metre, Aov::kCaustic), 0.01);
+  for (const float scale : {0.0078125f, 1024.0f}) {
+    const Rendered scaled = picture(scale);
+    EXPECT_EQ(scaled.stats.caustics.first_radius, scale * metre.stats.caustics.first_radius);
+    int different = 0;
+    for (int y = 0; y < 64; ++y) {
+      for (int x = 0; x < 64; ++x) different += scaled.radiance(x, y) == metre.radiance(x, y) ? 0 : 1;
+    }
+    EXPECT_EQ(different, 0) << scale;
+  }
+}
+
 TEST(Caustics, WhatCastersReceiveIsStoredOrEscapes)
 {
   // A lamp and a glass sphere in a closed room: nothing absorbs photons, so the walls get what the sphere received, which
