@@ -50,6 +50,7 @@ std::function<void(const RenderProgress&)> ProgressPrinter::callback(int frame, 
                {"frame", frame},
                {"fraction", p.fraction},
                {"samples", p.samples_per_pixel},
+               {"photons", p.photons},
                {"seconds", p.seconds},
                {"seconds_left", p.seconds_left},
                {"rays_per_second", p.rays_per_second}});
@@ -86,9 +87,11 @@ void ProgressPrinter::draw_bar(const std::string& title, const RenderProgress& p
 {
   constexpr int kWidth = 30;
   const int done = static_cast<int>(p.fraction * kWidth);
+  const std::string photons =
+      p.photons > 0 ? fmt::format("  {:.1f} M photons", static_cast<double>(p.photons) * 1e-6) : "";
   bar_is_drawn_ = true;
-  write_text(stderr, fmt::format("\r{}[{:#<{}}{: <{}}] {:3.0f}%  {:.0f} spp  {} left  {:.2f} Mrays/s\033[K", title, "",
-                                 done, "", kWidth - done, 100 * p.fraction, p.samples_per_pixel,
+  write_text(stderr, fmt::format("\r{}[{:#<{}}{: <{}}] {:3.0f}%  {:.0f} spp{}  {} left  {:.2f} Mrays/s\033[K", title,
+                                 "", done, "", kWidth - done, 100 * p.fraction, p.samples_per_pixel, photons,
                                  duration_text(p.seconds_left), p.rays_per_second * 1e-6));
 }
 

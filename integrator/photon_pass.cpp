@@ -200,7 +200,8 @@ void PhotonPass::keep_to_memory(const KernelGlobals& g, const StageTable& stages
 void PhotonPass::next(KernelGlobals& g,
                       const StageTable& stages,
                       const std::function<Wavefront&()>& worker,
-                      const std::atomic<bool>& stop)
+                      const std::atomic<bool>& stop,
+                      const std::function<void()>& report)
 {
   const auto start = std::chrono::steady_clock::now();
   g.caustics.map = {};
@@ -216,11 +217,13 @@ void PhotonPass::next(KernelGlobals& g,
           if (stop.load(std::memory_order_relaxed)) return;
           const FlushDenormals flush;
           const auto begin = static_cast<std::uint32_t>(c) * kBatchPaths;
+          const std::uint32_t count = std::min(kBatchPaths, photons_a_pass_ - begin);
           // Tracing wants room for all paths of a batch, of which few may be kept.
           std::vector<Photon> kept;
-          worker().trace_photons(g, *context_.accel, stages, context_.surface_kernel, view, first + begin,
-                                 std::min(kBatchPaths, photons_a_pass_ - begin), kept);
+          worker().trace_photons(g, *context_.accel, stages, context_.surface_kernel, view, first + begin, count, kept);
           chunks_[c].assign(kept.begin(), kept.end());
+          under_way_ += count;
+          report();
         },
         tbb::simple_partitioner());
     std::size_t stored = 0;
@@ -245,13 +248,19 @@ void PhotonPass::next(KernelGlobals& g,
     }
   }
   ++passes_;
+  under_way_ = 0;
   seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::uint64_t PhotonPass::photons() const
+{
+  return sources_.sources.empty() ? 0 : std::uint64_t{passes_} * photons_a_pass_ + under_way_.load();
 }
 
 void PhotonPass::fill(CausticStatistics& stats) const
 {
   stats.passes = passes_;
-  stats.photons = sources_.sources.empty() ? 0 : static_cast<std::uint64_t>(passes_) * photons_a_pass_;
+  stats.photons = photons();
   stats.stored = stored_;
   stats.num_sources = sources_.sources.size();
   stats.first_radius = first_radius_;

@@ -41,10 +41,20 @@ class PhotonPass {
   /// @param g       gets the map
   /// @param worker  the calling thread's
   /// @param stop    true: photons not begun are left out
+  /// @param report  called by any thread when photons have been traced
   void next(KernelGlobals& g,
             const StageTable& stages,
             const std::function<Wavefront&()>& worker,
-            const std::atomic<bool>& stop);
+            const std::atomic<bool>& stop,
+            const std::function<void()>& report);
+
+  /// Passes so far; of one under way, the part that is traced.
+  double passes() const { return passes_ + static_cast<double>(under_way_.load()) / photons_a_pass_; }
+
+  /// Photons traced so far.
+  std::uint64_t photons() const;
+
+  double seconds() const { return seconds_; }
 
   void fill(CausticStatistics& stats) const;
 
@@ -58,6 +68,7 @@ class PhotonPass {
   PhotonSources sources_;
   std::uint32_t photons_a_pass_;
   std::uint32_t passes_ = 0;
+  std::atomic<std::uint32_t> under_way_{0};  ///< photons of the present pass
   float first_radius_ = 0;
   std::vector<std::vector<Photon>> chunks_;
   PhotonMap map_;

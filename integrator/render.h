@@ -22,8 +22,9 @@ struct RenderOptions {
 };
 
 struct RenderProgress {
-  double fraction = 0;  ///< of the samples (or of the time limit, whichever ends sooner)
+  double fraction = 0;  ///< of the samples and their photons (or of the time limit, whichever ends sooner)
   double samples_per_pixel = 0, seconds = 0, seconds_left = 0, rays_per_second = 0;
+  std::uint64_t photons = 0;  ///< traced so far
 };
 
 /// Kernel globals of a render; the film is left for the caller to fill in.

@@ -152,7 +152,8 @@ def _follow(engine, process):
                 left = event.get("seconds_left")
                 remaining = f" | {left:.0f} s left" if left is not None else ""
                 rays = event.get("rays_per_second") or 0
-                engine.update_stats("", f"Sample {event['samples']:g} | {rays / 1e6:.1f} Mrays/s{remaining}")
+                photons = f" | {event['photons'] / 1e6:.1f} M photons" if event.get("photons") else ""
+                engine.update_stats("", f"Sample {event['samples']:g}{photons} | {rays / 1e6:.1f} Mrays/s{remaining}")
         if engine.test_break():
             return process.end()
     return code

@@ -218,7 +218,7 @@ TEST_F(RenderProgram, ProgressIsOneJsonObjectALine)
   double fraction = 0;
   for (std::size_t i = 0; i + 1 < events.size(); ++i) {
     EXPECT_EQ(events[i]["event"], "progress");
-    for (const char* key : {"frame", "samples", "seconds", "seconds_left", "rays_per_second"}) {
+    for (const char* key : {"frame", "samples", "photons", "seconds", "seconds_left", "rays_per_second"}) {
       EXPECT_TRUE(events[i][key].is_number()) << key;
     }
     EXPECT_GE(events[i]["fraction"], fraction);

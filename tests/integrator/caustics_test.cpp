@@ -592,6 +592,30 @@ TEST(Caustics, OfACentimetreAndAKilometreAreTheSame)
   }
 }
 
+TEST(Caustics, ProgressIsThatOfBothPasses)
+{
+  Scene scene = empty_scene();
+  add_floor(scene, 1);
+  Affine3 place;
+  place.p = {0, 0.5f, 0};
+  add_caster(scene, sphere_mesh(0.4f, 48, 24, true), glass_material(), place);
+  scene.lights.push_back(square_light({0, 2, 0}, {0, -1, 0}, 0.1f, 50));
+  look_down(scene, {}, 1, 3);
+  const std::atomic<bool> stop{false};
+  Statistics stats;
+  RenderProgress last;
+  const auto progress = [&](const RenderProgress& p) {
+    EXPECT_GE(p.fraction, last.fraction);
+    EXPECT_GE(p.photons, last.photons);
+    last = p;
+  };
+  render(scene, caustic_options(scene, CausticsMode::kAuto, 200, 5), stop, progress, stats);
+  EXPECT_EQ(last.fraction, 1);
+  EXPECT_EQ(last.samples_per_pixel, 5);
+  EXPECT_EQ(last.photons, stats.caustics.photons);
+  EXPECT_GT(last.photons, 0u);
+}
+
 TEST(Caustics, WhatCastersReceiveIsStoredOrEscapes)
 {
   // A lamp and a glass sphere in a closed room: nothing absorbs photons, so the walls get what the sphere received, which
