@@ -8,9 +8,11 @@ namespace relief {
 
 namespace {
 
+/// All that the files are compiled with whose table is called avx2.
 bool has_avx2()
 {
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("f16c");
+  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("f16c") &&
+         __builtin_cpu_supports("bmi2");
 }
 
 }  // namespace

@@ -582,7 +582,8 @@ inline void Judge::judge(const TracedCase& traced,
 
 inline const TraversalTable& best_table()
 {
-  const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+  const bool has_avx2 =
+      __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2");
   return has_avx2 ? traversal_table_avx2() : traversal_table_baseline();
 }
 
