@@ -8,6 +8,7 @@
 
 #include "kernel/assert.h"
 #include "scene/diagnostics.h"
+#include "scene/png_file.h"
 
 namespace relief {
 namespace {
@@ -141,7 +142,9 @@ void ImageReader::open()
       fail(source_, "a complete JPEG image", "truncated data");
     }
   }
-  image_ = format.empty() ? nullptr : image_io().make_file(format);
+  if (!format.empty()) {
+    image_ = format == "png" ? png_file_make() : image_io().make_file(format);
+  }
   if (image_ == nullptr) {
     fail(source_, "an image that OpenImageIO reads", "format \"" + format + "\"");
   }

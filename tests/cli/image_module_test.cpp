@@ -1,5 +1,5 @@
-// OpenImageIO is loaded when the first image is opened and not before: it takes longer than many a command. Here it cannot
-// be loaded at all, since a file of its name that is no library comes first in the search path.
+// OpenImageIO is loaded when the first image that is not PNG is opened and not before: it takes longer than many a command.
+// Here it cannot be loaded at all, since a file of its name that is no library comes first in the search path.
 #include "tests/cli/program.h"
 
 namespace relief::test {
@@ -13,11 +13,22 @@ class ImageModule : public ProgramTest {
     ::setenv("LD_LIBRARY_PATH", file("").c_str(), 1);
   }
   void TearDown() override { ::unsetenv("LD_LIBRARY_PATH"); }
+
+  /// A scene with an image as base colour. @return its path
+  std::string scene_write(std::string_view uri)
+  {
+    GltfBuilder b = lit_square();
+    b.push("images", {{"uri", uri}});
+    b.push("textures", {{"source", 0}});
+    b.push("materials", {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}});
+    b.json["meshes"][0]["primitives"][0]["material"] = 0;
+    return folder_.write("scene.gltf", b.gltf()).string();
+  }
 };
 
-TEST_F(ImageModule, IsNotNeededForScenesWithoutImages)
+TEST_F(ImageModule, IsNotNeededForPng)
 {
-  const std::string scene = folder_.write("scene.gltf", lit_square().gltf()).string();
+  const std::string scene = scene_write(kPixelPng);
   EXPECT_EQ(render(scene, file("a.exr"), {"--png", file("a.png")}).exit_code, 0);
   EXPECT_EQ(render(scene, file("b.exr"), {"--seed", "2"}).exit_code, 0);
   for (const Arguments& arguments : {Arguments{"info", scene},
@@ -28,14 +39,10 @@ TEST_F(ImageModule, IsNotNeededForScenesWithoutImages)
   }
 }
 
-TEST_F(ImageModule, IsMissedByNameWhereThereIsAnImage)
+TEST_F(ImageModule, IsMissedByNameWhereThereIsAnotherImage)
 {
-  GltfBuilder b = lit_square();
-  b.push("images", {{"uri", kPixelPng}});
-  b.push("textures", {{"source", 0}});
-  b.push("materials", {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}});
-  b.json["meshes"][0]["primitives"][0]["material"] = 0;
-  const std::string scene = folder_.write("scene.gltf", b.gltf()).string();
+  folder_.write("a.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\nabc\x80");
+  const std::string scene = scene_write("a.hdr");
   const Outcome outcome = render(scene, file("a.exr"));
   EXPECT_EQ(outcome.exit_code, 3);
   for (const char* part :

@@ -15,13 +15,6 @@
 #include "scene/texture_store.h"
 #include "tests/support/gltf_builder.h"
 
-#ifdef __SANITIZE_ADDRESS__
-// OpenImageIO 2.4 leaks one string when a PNG ends early: libpng's error jumps over its destructor. The suppression
-// needs the slow unwinder to see the frame.
-extern "C" const char* __asan_default_options() { return "fast_unwind_on_malloc=0:malloc_context_size=12"; }
-extern "C" const char* __lsan_default_suppressions() { return "leak:PngReadCallback"; }
-#endif
-
 namespace relief {
 namespace {
 

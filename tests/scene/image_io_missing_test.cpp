@@ -12,7 +12,7 @@ namespace {
 TEST(MissingImageModule, IsAnErrorOfTheImageAndNamesTheFile)
 {
   const test::TemporaryFolder folder;
-  const std::string file = folder.write("a.png", "\x89PNG").string();
+  const std::string file = folder.write("a.tif", std::string("II*\0", 4)).string();
   // Twice: a failure does not make a later image pass.
   for (int attempt = 0; attempt < 2; ++attempt) {
     try {

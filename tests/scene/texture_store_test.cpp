@@ -21,13 +21,6 @@
 #include "kernel/texture/texture.h"
 #include "scene/mip_chain.h"
 
-#ifdef __SANITIZE_ADDRESS__
-// OpenImageIO 2.4 leaks one string when a PNG ends early: libpng's error jumps over its destructor. The suppression
-// needs the slow unwinder to see the frame.
-extern "C" const char* __asan_default_options() { return "fast_unwind_on_malloc=0:malloc_context_size=12"; }
-extern "C" const char* __lsan_default_suppressions() { return "leak:PngReadCallback"; }
-#endif
-
 namespace relief {
 namespace {
 
