@@ -2,6 +2,8 @@
 #include <stdexcept>
 #include <string>
 
+#include <cpuid.h>
+
 #include "integrator/stages.h"
 
 namespace relief {
@@ -11,8 +13,10 @@ namespace {
 /// All that the files are compiled with whose table is called avx2.
 bool has_avx2()
 {
-  return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("f16c") &&
-         __builtin_cpu_supports("bmi2");
+  // Clang 14 has no name for F16C.
+  unsigned eax = 0, ebx = 0, ecx = 0, edx = 0;
+  const bool has_f16c = __get_cpuid(1, &eax, &ebx, &ecx, &edx) != 0 && (ecx & bit_F16C) != 0;
+  return has_f16c && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2");
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ nlohmann::json& displacement_of(GltfBuilder& b) { return b.json["materials"][0][
 class DisplacementProgram : public ProgramTest {
  protected:
   /// Writes the scene and its map; the map is 4x4, 8-bit.
-  std::string write(GltfBuilder b, const std::string& texels)
+  std::string write(const GltfBuilder& b, const std::string& texels)
   {
     folder_.write("h.pgm", "P5 4 4 255\n" + texels);
     return folder_.write("s.gltf", b.gltf()).string();

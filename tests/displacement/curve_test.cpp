@@ -148,9 +148,11 @@ TEST(RayCurve, PassesEveryHitOfTheOracle)
           for (int step = 0; step <= kSteps; ++step) {
             if (distance(1. / kSteps * step) < distance(best)) best = 1. / kSteps * step;
           }
-          for (double size = 1. / kSteps; size > 1e-15; size *= .75) {
+          double size = 1. / kSteps;
+          while (size > 1e-15) {
             if (distance(best - size) < distance(best)) best = std::max(0., best - size);
             if (distance(best + size) < distance(best)) best = std::min(1., best + size);
+            size *= .75;
           }
           nearest = std::min(nearest, distance(best));
         }

@@ -18,7 +18,7 @@ namespace {
 /// A map of random texels.
 struct RandomMap {
   RandomMap(int width, int height, HeightFormat format, Wrap wrap = Wrap::kRepeat)
-      : bytes(16 + 4 * std::size_t(width * height))
+      : bytes(16 + 4 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height))
   {
     std::mt19937 random(static_cast<unsigned>(width * 1000 + height));
     const auto count = static_cast<std::size_t>(width * height);
@@ -131,7 +131,8 @@ double brute_force_height(const HeightMapView& map, double x, double y)
 TEST(LevelLoss, IsThatOfEveryTexel)
 {
   for (const Wrap wrap : {Wrap::kRepeat, Wrap::kMirror, Wrap::kClamp}) {
-    for (const auto& [w, h] : {std::pair{16, 16}, {64, 32}, {37, 51}, {9, 1}, {1, 1}}) {
+    for (const auto& size : {std::pair{16, 16}, {64, 32}, {37, 51}, {9, 1}, {1, 1}}) {
+      const int w = size.first, h = size.second;
       const RandomMap map(w, h, HeightFormat::kU16, wrap);
       const HeightLevel level(map.view, 1);
       const HeightMapView coarse = level.view();
@@ -217,7 +218,9 @@ TEST(SmoothNormal, IsTheSurfacesOwnOnASlope)
 {
   // h = x/32 along a map of 32 columns: central differences of a plane are its slopes.
   std::vector<float> texels;
-  for (int k = 0; k < 32 * 32; ++k) texels.push_back(static_cast<float>(k % 32) / 32 + static_cast<float>(k / 32) / 64);
+  for (int row = 0; row < 32; ++row) {
+    for (int k = 0; k < 32; ++k) texels.push_back(static_cast<float>(k) / 32 + static_cast<float>(row) / 64);
+  }
   const HeightMapView map{texels.data(), 32, 32, HeightFormat::kFloat, Wrap::kClamp, Wrap::kClamp};
   const OneTriangle t(map);
   const DisplacedMeshView view = t.displaced.view();

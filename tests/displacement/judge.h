@@ -591,6 +591,7 @@ inline const TraversalTable& best_table()
 inline std::vector<Judge> judges_of_all_methods(const TraversalTable& table)
 {
   std::vector<Judge> judges;
+  judges.reserve(std::size(kTraversalMethods));
   for (const TraversalMethodLabel& label : kTraversalMethods) judges.emplace_back(label.method, table);
   return judges;
 }

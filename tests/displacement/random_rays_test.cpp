@@ -134,6 +134,7 @@ std::vector<Findings> judge_cases(std::uint64_t first, std::uint64_t num_cases)
   std::atomic<std::uint64_t> next{first};
   const std::uint64_t end = first + num_cases;
   std::vector<std::thread> threads;
+  threads.reserve(findings.size());
   for (Findings& mine : findings) {
     threads.emplace_back([&mine, &next, end] {
       RTCDevice device = rtcNewDevice("threads=1");

@@ -202,7 +202,7 @@ std::string read_all(std::span<const unsigned char> bytes)
 {
   const std::unique_ptr<ImageFile> file = png_file_make();
   ImageHeader header;
-  const std::string error = file->open("embedded", bytes, header);
+  std::string error = file->open("embedded", bytes, header);
   if (!error.empty()) return error;
   // What a damaged header asks for is not what this test is about.
   if (std::int64_t{header.width} * header.height > 1 << 20) return "too large";
