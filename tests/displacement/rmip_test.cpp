@@ -113,8 +113,8 @@ TEST(RmipQuery, IsTheRangeOfTheBlocksForRandomRectangles)
 TEST(RmipQuery, RoundsFloatHeightsOutward)
 {
   std::mt19937_64 random(3);
-  std::vector<float> texels;
-  for (int k = 0; k < 24 * 24; ++k) texels.push_back(static_cast<float>(random() >> 40) * 0x1p-20f - 3.0f);
+  std::vector<float> texels(24 * 24);
+  for (float& texel : texels) texel = static_cast<float>(random() >> 40) * 0x1p-20f - 3.0f;
   const HeightField field({texels.data(), 24, 24, HeightFormat::kFloat});
   const Rmip rmip(field.view(), 24);
   for (int j = 0; j < 23; ++j) {

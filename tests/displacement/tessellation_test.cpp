@@ -113,7 +113,7 @@ struct Traced {
     device = rtcNewDevice(nullptr);
     rtcSetDeviceMemoryMonitorFunction(device, count, this);
     scene = tessellation_scene_make(device, build);
-    const RTCGeometry geometry = tessellation.geometry_make(device);
+    RTCGeometry geometry = tessellation.geometry_make(device);
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene, geometry);
     rtcReleaseGeometry(geometry);
@@ -171,9 +171,11 @@ std::vector<std::array<float, 2>> corners_of(const Tessellation& t, std::uint32_
 {
   if (t.layout().kind == TessellationKind::kTriangles) return {{0, 0}, {1, 0}, {0, 1}};
   std::vector<std::array<float, 2>> corners;
-  const auto n = static_cast<float>(t.layout().triangles[triangle].segments);
-  for (float y = 0; y <= n; ++y) {
-    for (float x = 0; x <= n; ++x) corners.push_back({x / n, y / n});
+  const auto n = static_cast<int>(t.layout().triangles[triangle].segments);
+  for (int y = 0; y <= n; ++y) {
+    for (int x = 0; x <= n; ++x) {
+      corners.push_back({static_cast<float>(x) / static_cast<float>(n), static_cast<float>(y) / static_cast<float>(n)});
+    }
   }
   return corners;
 }

@@ -53,7 +53,8 @@ Regions render_regions(const Scene& scene, int samples, std::uint64_t first_seed
       }
     }
     for (std::size_t r = 0; r < mean.size(); ++r) {
-      mean[r] /= kWidth * kHeight / (kSide * kSide);
+      constexpr int kPixels = kWidth * kHeight / (kSide * kSide);
+      mean[r] /= kPixels;
       regions.mean[r] += mean[r] / kRuns;
       regions.variance[r] += mean[r] * mean[r] / kRuns;
     }

@@ -40,7 +40,7 @@ std::vector<std::uint16_t> hill_texels()
     for (int x = 0; x < kSize; ++x) {
       std::uint16_t& texel = texels[static_cast<std::size_t>(y * kSize + x)];
       const double phase = 2 * std::numbers::pi / 64;
-      texel = static_cast<std::uint16_t>(32'000 + 15'000 * (std::sin(phase * x) + std::sin(phase * y)) + texel / 250);
+      texel = static_cast<std::uint16_t>(32'000 + 15'000 * (std::sin(phase * x) + std::sin(phase * y)) + texel / 250.);
     }
   }
   return texels;

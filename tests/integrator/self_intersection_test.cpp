@@ -50,8 +50,7 @@ TEST_P(SelfIntersection, LeavingRaysDoNotComeBack)
     std::vector<TraceRay> rays;
     for (int i = 0; i < 64; ++i) {
       const Vec3f O = center + point() * (3 * place.scale);
-      const Vec3f target = transform_point(placement, place.instanced ? (mesh.P[0] + mesh.P[1] + mesh.P[2]) / 3.0f
-                                                                      : (mesh.P[0] + mesh.P[1] + mesh.P[2]) / 3.0f);
+      const Vec3f target = transform_point(placement, (mesh.P[0] + mesh.P[1] + mesh.P[2]) / 3.0f);
       rays.push_back({O, normalize(target + point() * (0.3f * place.scale) - O), 0, kInfinity});
     }
     std::vector<TraceRay> leaving;
