@@ -60,6 +60,7 @@ std::vector<reference::Vec> outline(const Light& light)
   const int sides = 4000;
   const double step = 2 * std::numbers::pi / sides, radius = std::sqrt(step / std::sin(step));
   std::vector<reference::Vec> points;
+  points.reserve(sides);
   for (int i = 0; i < sides; ++i) {
     points.push_back(add(P, add(mul(u, radius * std::cos(i * step)), mul(v, radius * std::sin(i * step)))));
   }
@@ -437,7 +438,8 @@ TEST(PointLight, BallGivesThePointsIrradiance)
     constexpr int kSide = 512;
     double irradiance = 0;
     for (int i = 0; i < kSide * kSide; ++i) {
-      const Vec2f u{(static_cast<float>(i % kSide) + 0.5f) / kSide, (static_cast<float>(i / kSide) + 0.5f) / kSide};
+      const int column = i % kSide, row = i / kSide;
+      const Vec2f u{(static_cast<float>(column) + 0.5f) / kSide, (static_cast<float>(row) + 0.5f) / kSide};
       const LightSample sample = light_sample(light, {}, u);
       ASSERT_TRUE(sample.delta && sample.pdf == 1.0f);
       // The sampled point is on the ball, on the side that is seen.

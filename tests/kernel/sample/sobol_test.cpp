@@ -198,11 +198,12 @@ TEST(Sobol, HalvesAndWholeOfAPlannedPowerOfTwoAreNets)
     for (std::uint32_t first = 0; first < step; ++first) {
       const std::uint32_t size = n / step;
       for (std::uint32_t columns = 1; columns <= size; columns *= 2) {
+        const std::uint32_t rows = size / columns;
         std::vector<int> count(size, 0);
         for (std::uint32_t i = first; i < n; i += step) {
           const Vec2f u = sample_2d(pixel(7), sample_sequence_index(i, log2_stream), 3);
           const auto x = static_cast<std::uint32_t>(u.x * static_cast<float>(columns));
-          const auto y = static_cast<std::uint32_t>(u.y * static_cast<float>(size / columns));
+          const auto y = static_cast<std::uint32_t>(u.y * static_cast<float>(rows));
           ++count[y * columns + x];
         }
         EXPECT_EQ(std::count(count.begin(), count.end(), 1), static_cast<std::ptrdiff_t>(size)) << step << " " << first;
