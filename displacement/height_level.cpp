@@ -155,8 +155,9 @@ LevelLoss level_loss(const HeightMapView& fine, const HeightMapView& coarse)
     const BandLoss& loss = bands[band];
     out.height = std::max(out.height, static_cast<double>(loss.height));
     for (int part = 0; part < kParts; ++part) {
-      const double texels = static_cast<double>(height * (band + 1) / kParts - height * band / kParts) *
-                            (width * (part + 1) / kParts - width * part / kParts);
+      const auto texel_rows = height * (band + 1) / kParts - height * band / kParts;
+      const auto texel_columns = width * (part + 1) / kParts - width * part / kParts;
+      const double texels = static_cast<double>(texel_rows) * texel_columns;
       if (!(texels > 0)) continue;
       out.slope_u = std::max(out.slope_u, width * std::sqrt(loss.squares_u[part] / texels));
       out.slope_v = std::max(out.slope_v, height * std::sqrt(loss.squares_v[part] / texels));

@@ -90,7 +90,7 @@ class Tessellation {
  private:
   struct MicroTriangle;
   MicroTriangle micro_triangle(std::uint32_t primitive, float u, float v) const;
-  void fill(std::uint32_t triangle);
+  void fill(std::uint32_t index);
 
   DisplacedMeshView mesh_;
   TessellationLayout layout_;

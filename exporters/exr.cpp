@@ -122,6 +122,7 @@ void write_rows(Imf::OutputFile& output, const Windows& windows, const std::vect
 {
   const std::size_t width = static_cast<std::size_t>(windows.width);
   std::vector<std::vector<char>> packed;
+  packed.reserve(channels.size());
   for (const ChannelView& channel : channels) {
     packed.emplace_back(width * kRowsAtOnce * bytes_of(channel.type));
   }
@@ -210,7 +211,7 @@ Picture picture_from_header(const Imf::Header& header, const std::string& file)
   if (header.hasType() && header.type() != Imf::SCANLINEIMAGE && header.type() != Imf::TILEDIMAGE) {
     throw InputError(file, "holds a picture of type '" + one_line(header.type()) + "'; only flat pictures are read");
   }
-  const Imath::Box2i data = header.dataWindow(), display = header.displayWindow();
+  const Imath::Box2i &data = header.dataWindow(), &display = header.displayWindow();
   const auto side = [](int first, int last) { return std::int64_t{last} - first + 1; };
   const std::int64_t width = side(data.min.x, data.max.x), height = side(data.min.y, data.max.y);
   const std::int64_t full_width = side(display.min.x, display.max.x), full_height = side(display.min.y, display.max.y);

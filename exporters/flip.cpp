@@ -90,7 +90,8 @@ Plane convolve(const Plane& plane, int width, int height, const Kernel& along_x,
     float* target = result.data() + static_cast<std::size_t>(y) * row_size;
     for (int k = -radius; k <= radius; ++k) {
       const float* row = rows.data() + static_cast<std::size_t>(std::clamp(y + k, 0, height - 1)) * row_size;
-      const float weight = along_y[static_cast<std::size_t>(k + radius)];
+      const int tap = k + radius;
+      const float weight = along_y[static_cast<std::size_t>(tap)];
       for (std::size_t x = 0; x < row_size; ++x) {
         target[x] += weight * row[x];
       }
