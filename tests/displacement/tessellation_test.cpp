@@ -111,7 +111,7 @@ struct Traced {
   Traced(const Tessellation& tessellation, const TessellationBuild& build)
   {
     device = rtcNewDevice(nullptr);
-    rtcSetDeviceMemoryMonitorFunction(device, count, this);
+    rtcSetDeviceMemoryMonitorFunction(device, count_bytes, this);
     scene = tessellation_scene_make(device, build);
     RTCGeometry geometry = tessellation.geometry_make(device);
     rtcCommitGeometry(geometry);
@@ -144,7 +144,7 @@ struct Traced {
     embree_intersect1(scene, context, ray);
     return ray;
   }
-  static bool count(void* user, ssize_t bytes, bool)
+  static bool count_bytes(void* user, ssize_t bytes, bool)
   {
     auto* self = static_cast<Traced*>(user);
     const std::ptrdiff_t now = self->bytes.fetch_add(bytes) + bytes;
