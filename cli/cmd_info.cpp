@@ -172,7 +172,7 @@ int info(const std::string& file, bool strict, DisplacementOptions displacement,
   print_names("cameras", cameras);
   print_names("materials", scene.material_names);
   fmt::print("lights: {} placed, {} emissive triangles, {}\n", scene.lights.size(),
-             context.lights.lights.size() - scene.lights.size(),
+             context.lights.num_emissive_triangles,
              scene.environment.texture_index >= 0 ? "environment map"
              : is_zero(scene.environment.color)   ? "no environment"
                                                   : "constant environment");

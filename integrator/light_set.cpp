@@ -6,8 +6,11 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <map>
 #include <numbers>
+#include <tuple>
 
 #include "kernel/shape/material_lookup.h"
 #include "kernel/texture/texture.h"
@@ -55,10 +58,11 @@ LightProfile cone_profile(float cosine) { return {0.5f * (1.0f - cosine), 0.75f 
 struct LightBounds {
   Vec3f low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
   Cone spread;
-  float falloff = 0;     ///< radians
-  LightProfile profile;  ///< of a light
-  bool is_flat = false;  ///< a light whose intensity is its cosine
-  float intensity = 0;   ///< 0: empty group
+  float falloff = 0;       ///< radians
+  float profile_mean = 1;  ///< of a light: see LightProfile
+  Vec3f profile_slope;     ///< of a light: LightProfile::slope along its axis
+  bool is_flat = false;    ///< a light whose intensity is its cosine
+  float intensity = 0;     ///< 0: empty group
   bool two_sided = false;
 };
 
@@ -88,6 +92,7 @@ LightBounds light_bounds(const Light& light, float scale)
     bounds.low = min(bounds.low, P);
     bounds.high = max(bounds.high, P);
   };
+  LightProfile profile;
   switch (light.kind) {
     case LightKind::kPoint:
       include(light.P - Vec3f{light.radius, light.radius, light.radius});
@@ -103,7 +108,7 @@ LightBounds light_bounds(const Light& light, float scale)
       const float outer = std::acos(std::clamp(light.cos_outer, -1.0f, 1.0f));
       bounds.spread = {light.axis, std::min(inner, outer)};
       bounds.falloff = std::max(outer - inner, 0.0f);
-      bounds.profile = cone_profile(std::cos(0.5f * (inner + outer)));
+      profile = cone_profile(std::cos(0.5f * (inner + outer)));
       bounds.intensity = emission;
       break;
     }
@@ -127,9 +132,11 @@ LightBounds light_bounds(const Light& light, float scale)
     bounds.falloff = 0.5f * kPiAngle;
     bounds.intensity = emission * light.area;
     bounds.two_sided = light.two_sided;
-    bounds.profile = light.two_sided ? kTwoSidedProfile : kFlatProfile;
+    profile = light.two_sided ? kTwoSidedProfile : kFlatProfile;
     bounds.is_flat = true;
   }
+  bounds.profile_mean = profile.mean;
+  bounds.profile_slope = bounds.spread.axis * profile.slope;
   const bool usable = bounds.intensity > 0.0f && is_finite(bounds.low) && is_finite(bounds.high);
   if (!usable) return {};
   bounds.intensity = std::min(bounds.intensity, 1e30f);
@@ -139,8 +146,28 @@ LightBounds light_bounds(const Light& light, float scale)
 struct BuildLight {
   LightBounds bounds;
   Vec3f centre;
-  std::uint32_t light_index = 0;
+  std::uint32_t link = 0;  ///< as LightTreeBlock::link
 };
+
+/// Sums over a group's lights, weighted by their intensities.
+struct ProfileSum {
+  double intensity = 0, mean = 0, slope[3] = {};
+};
+
+ProfileSum profile_sum(std::span<const BuildLight> lights)
+{
+  ProfileSum sum;
+  for (const BuildLight& light : lights) {
+    const double weight = static_cast<double>(light.bounds.intensity);
+    const Vec3f slope = light.bounds.profile_slope;
+    sum.intensity += weight;
+    sum.mean += weight * static_cast<double>(light.bounds.profile_mean);
+    sum.slope[0] += weight * static_cast<double>(slope.x);
+    sum.slope[1] += weight * static_cast<double>(slope.y);
+    sum.slope[2] += weight * static_cast<double>(slope.z);
+  }
+  return sum;
+}
 
 /// Intensity of a group by direction ω as a node keeps it: intensity × min(1, constant + slope · ω).
 struct GroupProfile {
@@ -165,18 +192,9 @@ GroupProfile group_profile(std::span<const BuildLight> lights, const LightBounds
     const float steepness = std::min(1.0f / (cos_full - cos_reach), kSteepest);
     return {bounds.intensity, 1.0f - steepness * cos_full, bounds.spread.axis * steepness};
   }
-  double total = 0, mean = 0, x = 0, y = 0, z = 0;
-  for (const BuildLight& light : lights) {
-    const double weight = static_cast<double>(light.bounds.intensity);
-    const double slope = weight * static_cast<double>(light.bounds.profile.slope);
-    const Vec3f axis = light.bounds.spread.axis;
-    total += weight;
-    mean += weight * static_cast<double>(light.bounds.profile.mean);
-    x += slope * static_cast<double>(axis.x);
-    y += slope * static_cast<double>(axis.y);
-    z += slope * static_cast<double>(axis.z);
-  }
-  mean /= total;
+  const ProfileSum sum = profile_sum(lights);
+  const double total = sum.intensity, mean = sum.mean / total;
+  const double x = sum.slope[0], y = sum.slope[1], z = sum.slope[2];
   const double first_order = std::sqrt(x * x + y * y + z * z) / total;
   if (!(first_order > 1e-6)) return {bounds.intensity * static_cast<float>(mean), 1.0f, {}};
   // The expansion is as it should be for lights that face in all directions, and too even for those that face in one,
@@ -389,8 +407,9 @@ std::uint32_t branch_write(const Branch& branch, LightTrail trail, int depth, Li
     const LightTrail child_trail = trail | static_cast<LightTrail>(i) << (kLightTreeTrailBits * depth);
     std::uint32_t link = 0;
     if (group.lights.size() == 1) {
-      link = group.lights[0].light_index | kLightTreeLeaf;
-      set.light_trails[group.lights[0].light_index] = child_trail;
+      link = group.lights[0].link;
+      const std::uint32_t index = link & kLightTreeIndexMask;
+      ((link & kLightTreeCopy) != 0 ? set.copies[index].trail : set.light_trails[index]) = child_trail;
     } else {
       link = branch_write(branch.below[i], child_trail, depth + 1, set);
     }
@@ -398,6 +417,57 @@ std::uint32_t branch_write(const Branch& branch, LightTrail trail, int depth, Li
                 group_profile(group.lights, group.range.bounds), link);
   }
   return static_cast<std::uint32_t>(first) | static_cast<std::uint32_t>(num_blocks - 1) << kLightTreeBlocksShift;
+}
+
+/// Builds the part of the tree that instances share.
+/// @return  the lights as one, in object space; intensity 0: none ever needs choosing
+LightBounds shared_build(LightSet& set, const SharedLights& shared, std::span<const float> intensity_scales)
+{
+  std::vector<BuildLight> lights;
+  for (std::uint32_t i = shared.first_light; i < shared.first_light + shared.num_lights; ++i) {
+    const LightBounds bounds = light_bounds(set.lights[i], intensity_scales.empty() ? 1.0f : intensity_scales[i]);
+    if (bounds.intensity > 0.0f) lights.push_back({bounds, bounds_centre(bounds), i | kLightTreeLeaf});
+  }
+  if (lights.empty()) return {};
+  const std::uint32_t root = lights.size() == 1 ? lights[0].link : branch_write(branch_make(lights, 0), 0, 0, set);
+  for (std::uint32_t i = 0; i < shared.num_copies; ++i) set.copies[shared.first_copy + i].root = root;
+  if (lights.size() == 1) return lights[0].bounds;
+  LightBounds bounds = range_bounds(lights).bounds;
+  const ProfileSum sum = profile_sum(lights);
+  bounds.profile_mean = static_cast<float>(sum.mean / sum.intensity);
+  bounds.profile_slope = {static_cast<float>(sum.slope[0] / sum.intensity),
+                          static_cast<float>(sum.slope[1] / sum.intensity),
+                          static_cast<float>(sum.slope[2] / sum.intensity)};
+  return bounds;
+}
+
+/// Bounds in world space of the lights that a copy shares.
+/// @param in_object  of shared_build, intensity > 0
+LightBounds copy_bounds(const LightSet& set,
+                        const SharedLights& shared,
+                        std::uint32_t copy,
+                        const LightBounds& in_object)
+{
+  const Affine3& world_from_object = set.copies[copy].world_from_object;
+  const float scale = set.copies[copy].scale;
+  LightsView view;
+  view.lights = set.lights.data();
+  view.tree.copies = set.copies.data();
+  LightBounds bounds = in_object;
+  bounds.low = splat3(kInfinity);
+  bounds.high = splat3(-kInfinity);
+  for (std::uint32_t i = shared.first_light; i < shared.first_light + shared.num_lights; ++i) {
+    Light storage;
+    const LightRef ref{static_cast<std::int32_t>(i), static_cast<std::int32_t>(copy)};
+    const LightBounds one = light_bounds(lights_at(view, ref, storage), 1.0f);
+    bounds.low = min(bounds.low, one.low);
+    bounds.high = max(bounds.high, one.high);
+  }
+  bounds.spread.axis = transform_vector(world_from_object, in_object.spread.axis) / scale;
+  bounds.profile_slope = transform_vector(world_from_object, in_object.profile_slope) / scale;
+  bounds.intensity = std::min(in_object.intensity * sqr(scale), 1e30f);
+  const bool usable = bounds.intensity > 0.0f && is_finite(bounds.low) && is_finite(bounds.high);
+  return usable ? bounds : LightBounds{};
 }
 
 /// Mean of an emission texture over a triangle, as a scalar.
@@ -434,20 +504,20 @@ float mean_emission_scale(const TextureView& texture,
   return is_finite(mean) ? mean : 1.0f;
 }
 
-Light triangle_light(const Instance& instance, const MeshView& mesh, std::uint32_t triangle, bool two_sided)
+Light triangle_light(const Affine3& placed, const MeshView& mesh, std::uint32_t triangle, bool two_sided)
 {
   Light light;
   light.kind = LightKind::kTriangle;
   light.two_sided = two_sided;
   const TriangleIndices tri = mesh.triangles[triangle];
-  light.P = transform_point(instance.world_from_object, mesh.P[tri.v0]);
-  light.edge_u = transform_vector(instance.world_from_object, mesh.P[tri.v1] - mesh.P[tri.v0]);
-  light.edge_v = transform_vector(instance.world_from_object, mesh.P[tri.v2] - mesh.P[tri.v0]);
+  light.P = transform_point(placed, mesh.P[tri.v0]);
+  light.edge_u = transform_vector(placed, mesh.P[tri.v1] - mesh.P[tri.v0]);
+  light.edge_v = transform_vector(placed, mesh.P[tri.v2] - mesh.P[tri.v0]);
   const Vec3f normal = cross(light.edge_u, light.edge_v);
   const float double_area = length(normal);
   if (double_area > 0.0f && is_finite(double_area)) {
     light.area = 0.5f * double_area;
-    light.axis = normal * ((determinant(instance.world_from_object) < 0.0f ? -1.0f : 1.0f) / double_area);
+    light.axis = normal * ((determinant(placed) < 0.0f ? -1.0f : 1.0f) / double_area);
   }
   light.triangle_index = static_cast<std::int32_t>(triangle);
   return light;
@@ -558,6 +628,116 @@ void environment_integrate(LightSet& set)
   set.environment_solid_angle = squares > 0 ? sum * sum / squares : 0.0;
 }
 
+/// Whether a map keeps shapes, up to what rounding leaves of a rotation and a scale; and by what lengths grow.
+bool is_similarity(const Affine3& m, float* scale)
+{
+  constexpr float kTolerance = 1e-5f;
+  const float x = length(m.x), y = length(m.y), z = length(m.z);
+  *scale = (x + y + z) / 3.0f;
+  const float slack = kTolerance * *scale;
+  return *scale > 0.0f && is_finite(*scale) && std::abs(x - *scale) <= slack && std::abs(y - *scale) <= slack &&
+         std::abs(z - *scale) <= slack && std::abs(dot(m.x, m.y)) <= slack * *scale &&
+         std::abs(dot(m.y, m.z)) <= slack * *scale && std::abs(dot(m.z, m.x)) <= slack * *scale;
+}
+
+/// Instances whose emissive triangles become one piece of LightSet::lights.
+struct EmissiveMesh {
+  std::vector<std::size_t> instances;
+  std::size_t first_light = 0;
+};
+
+/// The emissive instances of a scene, those together that will share their lights; in the order of the first of each.
+std::vector<EmissiveMesh> emissive_meshes(const Scene& scene, LightSet& set)
+{
+  const auto triangles = [&](const Instance& instance) {
+    return scene.meshes[static_cast<std::size_t>(instance.mesh_index)].triangles.size();
+  };
+  std::vector<std::size_t> emissive;
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const Instance& instance = scene.instances[i];
+    if (triangles(instance) == 0 || !emits(scene.materials[static_cast<std::size_t>(instance.material_index)]))
+      continue;
+    emissive.push_back(i);
+    set.num_emissive_triangles += triangles(instance);
+  }
+  const bool may_share = set.num_emissive_triangles > static_cast<std::size_t>(kLightTreeWidth);
+  std::vector<EmissiveMesh> meshes;
+  std::map<std::tuple<int, int, bool>, std::size_t> known;
+  for (const std::size_t i : emissive) {
+    const Instance& instance = scene.instances[i];
+    float scale = 0;
+    if (may_share && is_similarity(instance.world_from_object, &scale)) {
+      const bool no_caustics = (instance.flags & kNoCausticLight) != 0;
+      const auto [place, is_new] =
+          known.try_emplace({instance.mesh_index, instance.material_index, no_caustics}, meshes.size());
+      if (!is_new) {
+        meshes[place->second].instances.push_back(i);
+        continue;
+      }
+    }
+    meshes.push_back({{i}});
+  }
+  return meshes;
+}
+
+/// Adds the lights of emissive instances to a set.
+/// @return  of each light, the mean of its emission texture
+std::vector<float> emissive_meshes_add(const Scene& scene, std::span<const TextureView> textures, LightSet& set)
+{
+  std::vector<EmissiveMesh> meshes = emissive_meshes(scene, set);
+  std::size_t num_lights = set.lights.size();
+  for (EmissiveMesh& emissive : meshes) {
+    emissive.first_light = num_lights;
+    const Instance& instance = scene.instances[emissive.instances[0]];
+    num_lights += scene.meshes[static_cast<std::size_t>(instance.mesh_index)].triangles.size();
+  }
+  set.lights.resize(num_lights);
+  set.first_light_index.assign(scene.instances.size(), -1);
+  set.light_copy_index.assign(scene.instances.size(), -1);
+  std::vector<float> scales(num_lights, 1.0f);
+  for (const EmissiveMesh& emissive : meshes) {
+    const std::size_t i = emissive.instances[0];
+    const Instance& instance = scene.instances[i];
+    const bool is_shared = emissive.instances.size() > 1;
+    const Affine3 placed = is_shared ? Affine3{} : instance.world_from_object;
+    const MeshView mesh = scene.meshes[static_cast<std::size_t>(instance.mesh_index)].view();
+    const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
+    const TextureRef& ref = material.emission_texture;
+    const TextureView* texture =
+        ref.texture_index >= 0 ? &textures[static_cast<std::size_t>(ref.texture_index)] : nullptr;
+    tbb::parallel_for(std::uint32_t{0}, mesh.num_triangles, [&](std::uint32_t triangle) {
+      Light light = triangle_light(placed, mesh, triangle, material.double_sided);
+      light.emission = material.emission;
+      light.is_even = emission_is_even(material);
+      light.casts_caustics = (instance.flags & kNoCausticLight) == 0;
+      light.instance_index = static_cast<std::int32_t>(i);
+      set.lights[emissive.first_light + triangle] = light;
+      if (texture != nullptr) {
+        scales[emissive.first_light + triangle] = mean_emission_scale(*texture, ref, mesh, triangle, material.emission);
+      }
+    });
+    const auto first = static_cast<std::int32_t>(emissive.first_light);
+    if (emission_is_even(material)) {
+      rectangles_join(std::span(set.lights).subspan(emissive.first_light, mesh.num_triangles), first);
+    }
+    for (const std::size_t user : emissive.instances) set.first_light_index[user] = first;
+    if (!is_shared) continue;
+    set.shared.push_back({static_cast<std::uint32_t>(emissive.first_light), mesh.num_triangles,
+                          static_cast<std::uint32_t>(set.copies.size()),
+                          static_cast<std::uint32_t>(emissive.instances.size())});
+    for (const std::size_t user : emissive.instances) {
+      LightCopy copy;
+      copy.world_from_object = scene.instances[user].world_from_object;
+      copy.object_from_world = inverse(copy.world_from_object);
+      is_similarity(copy.world_from_object, &copy.scale);
+      copy.instance_index = static_cast<std::int32_t>(user);
+      set.light_copy_index[user] = static_cast<std::int32_t>(set.copies.size());
+      set.copies.push_back(copy);
+    }
+  }
+  return scales;
+}
+
 }  // namespace
 
 void light_set_build_tree(LightSet& set, std::span<const float> intensity_scales)
@@ -565,6 +745,7 @@ void light_set_build_tree(LightSet& set, std::span<const float> intensity_scales
   set.suns.clear();
   set.area_lights.clear();
   std::vector<BuildLight> finite;
+  std::size_t next_shared = 0;
   for (std::size_t i = 0; i < set.lights.size(); ++i) {
     const Light& light = set.lights[i];
     const auto index = static_cast<std::uint32_t>(i);
@@ -573,12 +754,28 @@ void light_set_build_tree(LightSet& set, std::span<const float> intensity_scales
     if (is_seen && (light.kind == LightKind::kRectangle || light.kind == LightKind::kDisk)) {
       set.area_lights.push_back(index);
     }
+    if (next_shared < set.shared.size() && index == set.shared[next_shared].first_light) {
+      i += set.shared[next_shared++].num_lights - 1;
+      continue;
+    }
     const LightBounds bounds = light_bounds(light, intensity_scales.empty() ? 1.0f : intensity_scales[i]);
-    if (bounds.intensity > 0.0f) finite.push_back({bounds, bounds_centre(bounds), index});
+    if (bounds.intensity > 0.0f) finite.push_back({bounds, bounds_centre(bounds), index | kLightTreeLeaf});
   }
 
   set.light_trails.assign(set.lights.size(), 0u);
   set.tree_blocks.clear();
+  for (const SharedLights& shared : set.shared) {
+    const LightBounds in_object = shared_build(set, shared, intensity_scales);
+    if (!(in_object.intensity > 0.0f)) continue;
+    std::vector<BuildLight> copies(shared.num_copies);
+    tbb::parallel_for(std::uint32_t{0}, shared.num_copies, [&](std::uint32_t i) {
+      const std::uint32_t copy = shared.first_copy + i;
+      const LightBounds bounds = copy_bounds(set, shared, copy, in_object);
+      copies[i] = {bounds, bounds_centre(bounds), copy | kLightTreeLeaf | kLightTreeCopy};
+    });
+    std::copy_if(copies.begin(), copies.end(), std::back_inserter(finite),
+                 [](const BuildLight& light) { return light.bounds.intensity > 0.0f; });
+  }
   if (!finite.empty()) set.tree_root = branch_write(branch_make(finite, 0), 0, 0, set);
 }
 
@@ -595,39 +792,7 @@ LightSet light_set_make(const Scene& scene, std::span<const TextureView> texture
   set.environment_casts_caustics = scene.environment.casts_caustics;
 
   set.lights = scene.lights;
-  set.first_light_index.assign(scene.instances.size(), -1);
-  std::size_t num_lights = scene.lights.size();
-  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
-    const Instance& instance = scene.instances[i];
-    if (!emits(scene.materials[static_cast<std::size_t>(instance.material_index)])) continue;
-    set.first_light_index[i] = static_cast<std::int32_t>(num_lights);
-    num_lights += scene.meshes[static_cast<std::size_t>(instance.mesh_index)].triangles.size();
-  }
-  set.lights.resize(num_lights);
-  std::vector<float> scales(num_lights, 1.0f);
-  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
-    if (set.first_light_index[i] < 0) continue;
-    const Instance& instance = scene.instances[i];
-    const MeshView mesh = scene.meshes[static_cast<std::size_t>(instance.mesh_index)].view();
-    const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
-    const TextureView* texture = texture_view(material.emission_texture.texture_index);
-    const auto first = static_cast<std::size_t>(set.first_light_index[i]);
-    tbb::parallel_for(std::uint32_t{0}, mesh.num_triangles, [&](std::uint32_t triangle) {
-      Light light = triangle_light(instance, mesh, triangle, material.double_sided);
-      light.emission = material.emission;
-      light.is_even = emission_is_even(material);
-      light.casts_caustics = (instance.flags & kNoCausticLight) == 0;
-      light.instance_index = static_cast<std::int32_t>(i);
-      set.lights[first + triangle] = light;
-      if (texture != nullptr) {
-        scales[first + triangle] =
-            mean_emission_scale(*texture, material.emission_texture, mesh, triangle, material.emission);
-      }
-    });
-    if (emission_is_even(material)) {
-      rectangles_join(std::span(set.lights).subspan(first, mesh.num_triangles), set.first_light_index[i]);
-    }
-  }
+  const std::vector<float> scales = emissive_meshes_add(scene, textures, set);
   light_set_build_tree(set, scales);
   if (!set.environment.environment.has_map && density == EnvironmentDensity::kExcess) {
     // Where the other lights are weaker than this, leaving the environment to the BSDF costs more variance than it saves:
@@ -647,9 +812,9 @@ LightsView LightSet::view() const
   LightsView v;
   v.lights = lights.data();
   v.num_lights = static_cast<std::uint32_t>(lights.size());
-  v.tree = {tree_blocks.empty() ? nullptr : tree_blocks.data(), tree_root};
+  v.tree = {tree_blocks.empty() ? nullptr : tree_blocks.data(), tree_root, copies.data()};
   v.light_trails = light_trails.data();
-  const bool one_finite = tree_blocks.size() == 1 && tree_blocks[0].intensity[1] == 0.0f;
+  const bool one_finite = copies.empty() && tree_blocks.size() == 1 && tree_blocks[0].intensity[1] == 0.0f;
   if (one_finite && suns.empty() && !(environment_irradiance.mean > 0.0f)) {
     v.only_light = static_cast<std::int32_t>(tree_blocks[0].link[0] & kLightTreeIndexMask);
   }
@@ -664,7 +829,8 @@ LightsView LightSet::view() const
 
 std::size_t LightSet::bytes() const
 {
-  return lights.size() * sizeof(Light) + first_light_index.size() * sizeof(std::int32_t) +
+  return lights.size() * sizeof(Light) + copies.size() * sizeof(LightCopy) + shared.size() * sizeof(SharedLights) +
+         (first_light_index.size() + light_copy_index.size()) * sizeof(std::int32_t) +
          (area_lights.size() + suns.size()) * sizeof(std::uint32_t) + light_trails.size() * sizeof(LightTrail) +
          tree_blocks.size() * sizeof(LightTreeBlock) + environment.bytes();
 }

@@ -12,11 +12,22 @@
 
 namespace relief {
 
+/// Lights of an emissive mesh, and the instances that share them.
+struct SharedLights {
+  std::uint32_t first_light = 0, num_lights = 0;
+  std::uint32_t first_copy = 0, num_copies = 0;
+};
+
 /// Owner of everything a LightsView points to.
 struct LightSet {
-  std::vector<Light> lights;  ///< the scene's, in its order; then emissive triangles, or rectangles of two
+  /// The scene's, in its order; then emissive triangles, or rectangles of two, each mesh's in one piece: of an instance in
+  /// world space, or of several that share them in object space.
+  std::vector<Light> lights;
   std::vector<std::int32_t> first_light_index;  ///< one an instance: light of its triangle 0; −1: does not emit
-  std::vector<std::uint32_t> area_lights;       ///< rectangles and disks: what rays can hit besides meshes
+  std::vector<std::int32_t> light_copy_index;   ///< one an instance: into `copies`; −1: shares its lights with none
+  std::vector<LightCopy> copies;
+  std::vector<SharedLights> shared;
+  std::vector<std::uint32_t> area_lights;  ///< rectangles and disks: what rays can hit besides meshes
   std::vector<std::uint32_t> suns;
   std::vector<LightTrail> light_trails;     ///< one a light
   std::vector<LightTreeBlock> tree_blocks;  ///< empty: no finite light can be chosen
@@ -30,6 +41,8 @@ struct LightSet {
 
   /// @return false: nothing can be sampled
   bool any() const { return !tree_blocks.empty() || !suns.empty() || environment_irradiance.mean > 0; }
+  /// Emissive triangles of all instances.
+  std::size_t num_emissive_triangles = 0;
   /// Valid while this object is neither changed nor moved.
   LightsView view() const;
   std::size_t bytes() const;
@@ -44,12 +57,15 @@ struct LightSet {
 /// @param density   of the environment: kExcess where paths that follow the BSDF find what it leaves out, which for a
 ///                  constant environment beside suns is all
 /// @return          same bits for the same scene, whatever the thread count
-/// @cost            128 bytes a light, and about 80 for its place in the tree
+/// Instances of one mesh and material share their lights where there are so many lights in the scene that they are chosen in
+/// more than one step, and where they keep the mesh's shape: under another map than a similarity its triangles compare
+/// differently.
+/// @cost            128 bytes a light, and about 80 for its place in the tree; as much for an instance that shares
 LightSet light_set_make(const Scene& scene,
                         std::span<const TextureView> textures,
                         EnvironmentDensity density = EnvironmentDensity::kExcess);
 
-/// The same from parts, without a scene: fills trails, suns, area_lights, and the tree from `lights`.
+/// The same from parts, without a scene: fills trails, suns, area_lights, and the tree from `lights`, `copies` and `shared`.
 /// @param intensity_scales  one a light, >= 0: mean of the texture that will multiply its emission; empty: all 1. A light
 ///                          whose emission times scale is zero is never chosen
 void light_set_build_tree(LightSet& set, std::span<const float> intensity_scales);

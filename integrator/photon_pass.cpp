@@ -129,12 +129,23 @@ PhotonSources photon_sources_make(const SceneContext& context)
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     if ((scene.instances[i].flags & kCausticCaster) != 0) casters.push_back({i, {}});
   }
-  std::vector<std::int32_t> lights;
-  for (std::size_t i = 0; i < context.lights.lights.size(); ++i) {
-    const Light& light = context.lights.lights[i];
-    if (light.casts_caustics && !is_zero(light.emission)) lights.push_back(static_cast<std::int32_t>(i));
+  std::vector<LightRef> lights;
+  const auto add_lights = [&](std::size_t first, std::size_t count, std::int32_t copy) {
+    for (std::size_t i = first; i < first + count; ++i) {
+      const Light& light = context.lights.lights[i];
+      if (light.casts_caustics && !is_zero(light.emission)) lights.push_back({static_cast<std::int32_t>(i), copy});
+    }
+  };
+  std::size_t next = 0;
+  for (const SharedLights& shared : context.lights.shared) {
+    add_lights(next, shared.first_light - next, -1);
+    next = shared.first_light + shared.num_lights;
+    for (std::uint32_t copy = 0; copy < shared.num_copies; ++copy) {
+      add_lights(shared.first_light, shared.num_lights, static_cast<std::int32_t>(shared.first_copy + copy));
+    }
   }
-  if (context.lights.environment_casts_caustics && context.lights.environment_flux_density > 0) lights.push_back(-1);
+  add_lights(next, context.lights.lights.size() - next, -1);
+  if (context.lights.environment_casts_caustics && context.lights.environment_flux_density > 0) lights.push_back({});
   if (casters.empty() || lights.empty()) return out;
 
   tbb::parallel_for(std::size_t{0}, casters.size(),
@@ -146,13 +157,15 @@ PhotonSources photon_sources_make(const SceneContext& context)
         out);
 
   out.scene_box = context.accel->bounds();
-  for (const std::int32_t light : lights) {
+  const LightsView light_view = context.lights.view();
+  for (const LightRef light : lights) {
+    Light storage;
     for (std::size_t t = 0; t < out.targets.size(); ++t) {
       const Box3& box = out.targets[t];
       const Vec3f size = box.high - box.low;
       const double surface = 2.0 * static_cast<double>(size.x * size.y + size.y * size.z + size.z * size.x);
-      const double flux = light < 0 ? context.lights.environment_flux_density * surface
-                                    : flux_estimate(context.lights.lights[static_cast<std::size_t>(light)], box);
+      const double flux = light.light_index < 0 ? context.lights.environment_flux_density * surface
+                                                : flux_estimate(lights_at(light_view, light, storage), box);
       if (!(flux > 0)) continue;
       out.sources.push_back({light, static_cast<std::uint32_t>(t)});
       out.cdf.push_back(std::min(flux, 1e30));

@@ -87,6 +87,7 @@ SceneContext::SceneContext(const Scene& loaded,
     view.mesh_index = instance.mesh_index;
     view.material_index = instance.material_index;
     view.first_light_index = lights.first_light_index[i];
+    view.light_copy_index = lights.light_copy_index[i];
     view.flags = instance.flags;
     if (uses[static_cast<std::size_t>(instance.mesh_index)] > 1) view.flags |= kTracedInObjectSpace;
     if (displacements.geometry_index(i) >= 0) view.flags |= kDisplaced | kTracedInObjectSpace;

@@ -15,7 +15,8 @@ enum class SpotFalloff : std::uint8_t {
   kSmoothCosine,  ///< the same times the cosine of the angle to the axis
 };
 
-/// One emitter in world space. Which fields mean something depends on `kind`. Two cache lines.
+/// One emitter, in world space or, if instances share it, in object space. Which fields mean something depends on `kind`.
+/// Two cache lines.
 struct alignas(64) Light {
   LightKind kind = LightKind::kPoint;
   SpotFalloff falloff = SpotFalloff::kSquare;
@@ -32,9 +33,16 @@ struct alignas(64) Light {
   float cos_inner = 1, cos_outer = 0;  ///< spot cone
   float radius = 0;                    ///< point, spot: of the ball that shines in the point's place, metres
   float area = 0;                      ///< m², area kinds
-  std::int32_t instance_index = -1;    ///< triangle, and rectangle that two triangles of a mesh are: whose mesh
+  std::int32_t instance_index = -1;    ///< triangle, and rectangle that two triangles of a mesh are: whose mesh (of
+                                       ///< shared ones, the first of the instances)
   std::int32_t triangle_index = -1;    ///< likewise (the first of two)
   std::int32_t whole_index = -1;       ///< second triangle of such a rectangle: that light; nothing else of it counts
+};
+
+/// Names a light: the environment, a light of the scene, or one that an instance shares with others.
+struct LightRef {
+  std::int32_t light_index = -1;  ///< −1: environment
+  std::int32_t copy_index = -1;   ///< −1: the light is no copy's
 };
 
 }  // namespace relief

@@ -14,8 +14,8 @@ struct LightSample {
                        ///< is to sample: intensity / distance², or irradiance
   float pdf = 0;       ///< solid angle × probability of the choice; delta kinds: probability of the choice alone
   bool delta = false;
-  std::int32_t light_index = -1;  ///< −1: environment
-  Vec2f barycentric{};            ///< triangle: weights of vertices 1 and 2
+  LightRef ref{};       ///< whose
+  Vec2f barycentric{};  ///< triangle: weights of vertices 1 and 2
 };
 
 /// Radiance an area light sends against a ray that arrives at it.

@@ -76,6 +76,24 @@ RELIEF_KERNEL bool light_casts_caustics(const LightsView& view, std::int32_t lig
   return light_index < 0 ? view.environment_casts_caustics : view.lights[light_index].casts_caustics;
 }
 
+/// A light in world space.
+/// @param ref      not the environment
+/// @param storage  where a copy's is put
+RELIEF_KERNEL const Light& lights_at(const LightsView& view, LightRef ref, Light& storage)
+{
+  const Light& light = view.lights[ref.light_index];
+  if (ref.copy_index < 0) return light;
+  const LightCopy& copy = view.tree.copies[ref.copy_index];
+  storage = light;
+  storage.P = transform_point(copy.world_from_object, light.P);
+  storage.edge_u = transform_vector(copy.world_from_object, light.edge_u);
+  storage.edge_v = transform_vector(copy.world_from_object, light.edge_v);
+  storage.axis = transform_vector(copy.world_from_object, light.axis) / copy.scale;
+  storage.area = light.area * sqr(copy.scale);
+  storage.instance_index = copy.instance_index;
+  return storage;
+}
+
 /// Mean of the three channels: the scalar by which lights are compared.
 RELIEF_KERNEL float light_scalar(Vec3f rgb) { return (rgb.x + rgb.y + rgb.z) * (1.0f / 3.0f); }
 
@@ -178,8 +196,8 @@ RELIEF_KERNEL float light_environment_pdf(const EnvironmentView& environment, Ve
 
 /// A light that lights_choose found.
 struct LightsChoice {
-  std::int32_t light_index = -1;  ///< −1: environment
-  float probability = 0;          ///< 0: none
+  LightRef ref;
+  float probability = 0;  ///< 0: none
 };
 
 /// Chooses one light or the environment by estimated contribution at P, and starts to fetch it.
@@ -189,7 +207,7 @@ struct LightsChoice {
 /// @param u         what lights_sample_chosen will be given
 RELIEF_KERNEL LightsChoice lights_choose(const LightsView& view, Vec3f P, Vec3f N, float u_choice, Vec2f u)
 {
-  if (view.only_light >= 0) return {view.only_light, 1.0f};
+  if (view.only_light >= 0) return {{view.only_light}, 1.0f};
   const LightGroups groups = light_groups_eval(view, P, N);
   // A deep tree wants more bits than a float has; the ones of the point on the light serve as the missing low ones.
   const std::uint64_t low_bits = hash_mix((static_cast<std::uint64_t>(__builtin_bit_cast(std::uint32_t, u.x)) << 32) |
@@ -198,7 +216,7 @@ RELIEF_KERNEL LightsChoice lights_choose(const LightsView& view, Vec3f P, Vec3f 
 
   const double p_environment = static_cast<double>(groups.environment);
   const double p_suns = static_cast<double>(groups.suns);
-  if (choice < p_environment) return {-1, groups.environment};
+  if (choice < p_environment) return {{}, groups.environment};
   choice -= p_environment;
   if (choice < p_suns) {
     float target = static_cast<float>(choice / p_suns) * groups.sun_sum;
@@ -206,7 +224,7 @@ RELIEF_KERNEL LightsChoice lights_choose(const LightsView& view, Vec3f P, Vec3f 
     for (std::uint32_t i = 0; i < view.num_suns; ++i) {
       const float importance = light_sun_importance(view.lights[view.suns[i]], N);
       if (!(importance > 0.0f)) continue;
-      chosen = {static_cast<std::int32_t>(view.suns[i]), groups.suns * importance / groups.sun_sum};
+      chosen = {{static_cast<std::int32_t>(view.suns[i])}, groups.suns * importance / groups.sun_sum};
       if (target < importance) break;
       target -= importance;
     }
@@ -219,20 +237,20 @@ RELIEF_KERNEL LightsChoice lights_choose(const LightsView& view, Vec3f P, Vec3f 
   const Light* light = &view.lights[chosen.light_index];
   __builtin_prefetch(light);
   __builtin_prefetch(reinterpret_cast<const char*>(light) + 64);
-  return {static_cast<std::int32_t>(chosen.light_index), groups.finite * chosen.probability};
+  return {{static_cast<std::int32_t>(chosen.light_index), chosen.copy_index}, groups.finite * chosen.probability};
 }
 
 /// Samples a light that lights_choose has chosen.
-/// @param N  as handed to it
-/// @param u  [0, 1)²
-/// @return   pdf includes the choice; see LightSample
-RELIEF_KERNEL LightSample lights_sample_chosen(const LightsView& view, LightsChoice chosen, Vec3f P, Vec3f N, Vec2f u)
+/// @param light  in world space; null: the environment
+/// @param N      as handed to it
+/// @param u      [0, 1)²
+/// @return       pdf includes the choice; see LightSample
+RELIEF_KERNEL LightSample
+lights_sample_chosen(const LightsView& view, LightsChoice chosen, const Light* light, Vec3f P, Vec3f N, Vec2f u)
 {
-  if (!(chosen.probability > 0.0f)) return {};
-  LightSample sample = chosen.light_index < 0 ? light_environment_sample(view.environment, N, u)
-                                              : light_sample(view.lights[chosen.light_index], P, u);
+  LightSample sample = light == nullptr ? light_environment_sample(view.environment, N, u) : light_sample(*light, P, u);
   sample.pdf *= chosen.probability;
-  sample.light_index = chosen.light_index;
+  sample.ref = chosen.ref;
   return sample;
 }
 
@@ -240,33 +258,31 @@ RELIEF_KERNEL LightSample lights_sample_chosen(const LightsView& view, LightsCho
 /// @param P, N, u_choice, u  as in lights_choose
 RELIEF_KERNEL LightSample lights_sample(const LightsView& view, Vec3f P, Vec3f N, float u_choice, Vec2f u)
 {
-  return lights_sample_chosen(view, lights_choose(view, P, N, u_choice, u), P, N, u);
+  const LightsChoice chosen = lights_choose(view, P, N, u_choice, u);
+  if (!(chosen.probability > 0.0f)) return {};
+  Light storage;
+  const Light* light = chosen.ref.light_index >= 0 ? &lights_at(view, chosen.ref, storage) : nullptr;
+  return lights_sample_chosen(view, chosen, light, P, N, u);
 }
 
 /// Density with which lights_sample, called at P, would have made a ray that hit an area light.
-/// @param N            as handed to lights_sample
-/// @param light_index  rectangle, disk or triangle; the second triangle of a rectangle stands for it
-/// @param wi           unit, from P to the light
-/// @param distance     metres, of the hit
-/// @return             solid angle × choice, as LightSample::pdf
-RELIEF_KERNEL float lights_pdf(const LightsView& view,
-                               Vec3f P,
-                               Vec3f N,
-                               std::uint32_t light_index,
-                               Vec3f wi,
-                               float distance)
+/// @param N         as handed to lights_sample
+/// @param ref       rectangle, disk or triangle; the second triangle of a rectangle stands for it
+/// @param wi        unit, from P to the light
+/// @param distance  metres, of the hit
+/// @return          solid angle × choice, as LightSample::pdf
+RELIEF_KERNEL float lights_pdf(const LightsView& view, Vec3f P, Vec3f N, LightRef ref, Vec3f wi, float distance)
 {
-  if (view.lights[light_index].whole_index >= 0) {
-    light_index = static_cast<std::uint32_t>(view.lights[light_index].whole_index);
-  }
+  if (view.lights[ref.light_index].whole_index >= 0) ref.light_index = view.lights[ref.light_index].whole_index;
   if (view.only_light >= 0) {
-    const bool chosen = static_cast<std::uint32_t>(view.only_light) == light_index;
-    return chosen ? light_pdf(view.lights[light_index], P, wi, distance) : 0.0f;
+    return view.only_light == ref.light_index ? light_pdf(view.lights[ref.light_index], P, wi, distance) : 0.0f;
   }
   const LightGroups groups = light_groups_eval(view, P, N);
-  const float choice = light_tree_pdf(view.tree, groups.finite_root, P, N, light_index, view.light_trails[light_index]);
+  const float choice = light_tree_pdf(view.tree, groups.finite_root, P, N, static_cast<std::uint32_t>(ref.light_index),
+                                      view.light_trails[ref.light_index], ref.copy_index);
   if (!(choice > 0.0f)) return 0.0f;
-  return groups.finite * choice * light_pdf(view.lights[light_index], P, wi, distance);
+  Light storage;
+  return groups.finite * choice * light_pdf(lights_at(view, ref, storage), P, wi, distance);
 }
 
 /// Density with which lights_sample, called at P, would have chosen a direction of the environment.

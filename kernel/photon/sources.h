@@ -8,8 +8,8 @@
 namespace relief {
 
 struct PhotonSource {
-  std::int32_t light_index = -1;  ///< −1: environment
-  std::uint32_t target = 0;       ///< group of casters
+  LightRef light;
+  std::uint32_t target = 0;  ///< group of casters
 };
 
 struct PhotonSourcesView {

@@ -41,6 +41,7 @@ struct InstanceView {
   std::int32_t mesh_index = 0;
   std::int32_t material_index = 0;
   std::int32_t first_light_index = -1;  ///< lights of an emissive mesh are consecutive, one a triangle; −1: none
+  std::int32_t light_copy_index = -1;   ///< of those lights, if it shares them with other instances: see LightRef
   std::uint32_t flags = kVisibleToCamera | kCastsShadow;
 };
 

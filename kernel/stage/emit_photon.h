@@ -117,11 +117,12 @@ RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
   const Vec2f u = sample_2d(hash, index, dimension_photon(PhotonDimension::kAim));
 
   EmittedRay ray;
-  if (source.light_index < 0) {
+  if (source.light.light_index < 0) {
     const EnvironmentSample sample = environment_sample_all(g.lights.environment, u_light);
     ray = emit_from_afar(sources, box, -sample.wi, sample.radiance / sample.pdf_solid_angle, u);
   } else {
-    const Light& light = g.lights.lights[source.light_index];
+    Light storage;
+    const Light& light = lights_at(g.lights, source.light, storage);
     const bool is_point = light.kind == LightKind::kPoint || light.kind == LightKind::kSpot;
     ray = is_point                        ? emit_from_point(light, box, u_light, u)
           : light.kind == LightKind::kSun ? emit_from_afar(sources, box, light.axis, light.emission, u)

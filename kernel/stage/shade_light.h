@@ -14,18 +14,18 @@ namespace relief {
 /// Next: intersect closest.
 RELIEF_KERNEL void shade_light(const KernelGlobals& g, PathState& state, std::uint32_t path)
 {
-  const std::uint32_t light_index = g.area_light_index[state.hit_object[path] - g.num_instances];
+  const auto light_index = static_cast<std::int32_t>(g.area_light_index[state.hit_object[path] - g.num_instances]);
   const Light& light = g.lights.lights[light_index];
   const int scatterings = path_bounces(state.bounces[path], BounceKind::kAll);
   const Vec3f D = path_direction(state, path);
   const float t = state.hit_t[path];
   Vec3f radiance = light_emitted(light, D);
-  const bool by_photons = path_leaves_to_photons(g, state.flags[path], static_cast<std::int32_t>(light_index));
+  const bool by_photons = path_leaves_to_photons(g, state.flags[path], light_index);
   if (!is_zero(radiance) && !by_photons) {
     const float pdf = state.pdf[path];
     if (pdf > 0.0f) {
       const float pdf_light =
-          lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), light_index, D, t);
+          lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), {light_index}, D, t);
       radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
     }
     radiance *= path_transmittance(path_sigma_a(state, path), t);

@@ -28,24 +28,23 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
 {
   const Vec3f P = at.hit.P;
   const int bounce = path_bounces(state.bounces[path], BounceKind::kAll);
-  const LightSample light = lights_sample_chosen(g.lights, chosen, P, light_N, light_u);
+  Light storage;
+  const Light* emitter = chosen.ref.light_index >= 0 ? &lights_at(g.lights, chosen.ref, storage) : nullptr;
+  const LightSample light = lights_sample_chosen(g.lights, chosen, emitter, P, light_N, light_u);
   if (!(light.pdf > 0.0f)) return;
   Vec3f radiance = light.radiance;
-  const bool is_mesh = light.light_index >= 0 && g.lights.lights[light.light_index].instance_index >= 0;
-  if (is_mesh) {
-    // Any kernel may sample a textured or transparent emitter, so this is not a feature of the surface that is lit.
-    const Light& emitter = g.lights.lights[light.light_index];
-    if (!emitter.is_even) {
-      const InstanceView& emitting = g.instances[emitter.instance_index];
-      radiance = triangle_emission(g.materials[emitting.material_index], g.textures, g.meshes[emitting.mesh_index],
-                                   static_cast<std::uint32_t>(emitter.triangle_index), light.barycentric);
-    }
+  const bool is_mesh = emitter != nullptr && emitter->instance_index >= 0;
+  // Any kernel may sample a textured or transparent emitter, so this is not a feature of the surface that is lit.
+  if (is_mesh && !emitter->is_even) {
+    const InstanceView& emitting = g.instances[emitter->instance_index];
+    radiance = triangle_emission(g.materials[emitting.material_index], g.textures, g.meshes[emitting.mesh_index],
+                                 static_cast<std::uint32_t>(emitter->triangle_index), light.barycentric);
   }
   if (is_zero(radiance)) return;
   const Vec3f wi = to_local(at.side.frame, light.wi);
   BsdfEval bsdf = closure_eval<kFeatures>(closure, *g.bsdf_tables, wi);
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
-    if (light_casts_caustics(g.lights, light.light_index) && path_caustic_after(state.flags[path], *at.instance) &&
+    if (light_casts_caustics(g.lights, light.ref.light_index) && path_caustic_after(state.flags[path], *at.instance) &&
         shading_is_reversible(at.side, light.wi)) {
       bsdf.f = closure_eval<kFeatures>(closure_soft(closure, {true, true}), *g.bsdf_tables, wi).f;
     }
@@ -63,9 +62,8 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
     Vec3f target = P + light.wi * light.distance;
     if (is_mesh) {
       // Stop short of the emitter itself by the error bound of a point on it.
-      const Light& emitter = g.lights.lights[light.light_index];
-      const Vec3f error = gamma_bound(8) * (abs(emitter.P) + abs(emitter.edge_u) + abs(emitter.edge_v) + abs(P));
-      target = offset_ray_origin(target, error, dot(emitter.axis, light.wi) < 0.0f ? emitter.axis : -emitter.axis);
+      const Vec3f error = gamma_bound(8) * (abs(emitter->P) + abs(emitter->edge_u) + abs(emitter->edge_v) + abs(P));
+      target = offset_ray_origin(target, error, dot(emitter->axis, light.wi) < 0.0f ? emitter->axis : -emitter->axis);
     }
     const Vec3f to_target = target - O;
     t_max = length(to_target);
@@ -366,8 +364,9 @@ template <unsigned kFeatures>
     Vec3f radiance = params.emission;
     const float pdf = state.pdf[path];
     if (pdf > 0.0f && instance.first_light_index >= 0) {
-      const float pdf_light = lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path),
-                                         static_cast<std::uint32_t>(instance.first_light_index) + at.triangle, -wo, t);
+      const LightRef hit{instance.first_light_index + static_cast<std::int32_t>(at.triangle),
+                         instance.light_copy_index};
+      const float pdf_light = lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), hit, -wo, t);
       radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
     }
     path_add_radiance(state, path, bounce, throughput * radiance, g.clamp_indirect);

@@ -648,6 +648,47 @@ TEST(Caustics, WhatCastersReceiveIsStoredOrEscapes)
   EXPECT_NEAR(stored / received, 1.0, 0.01);
 }
 
+/// Six balls that shine, turned, scaled and one of them mirrored, over a floor beside a mirror.
+/// @param distinct  each has a mesh of its own
+Scene lamps_beside_a_mirror(bool distinct)
+{
+  Scene scene = empty_scene();
+  add_floor(scene, 3);
+  add_caster(scene, quad_mesh({-1, 0, 1.5f}, {0, 0, -3}, {0, 3, 0}), mirror_material());
+  Material lamp;
+  lamp.base_color = {};
+  lamp.emission = {9, 6, 3};
+  for (int i = 0; i < 6; ++i) {
+    const float scale = 0.15f + 0.03f * static_cast<float>(i), angle = 0.9f * static_cast<float>(i);
+    Affine3 place;
+    place.x = Vec3f{std::cos(angle), 0, std::sin(angle)} * scale;
+    place.y = Vec3f{0, i == 2 ? -scale : scale, 0};
+    place.z = Vec3f{-std::sin(angle), 0, std::cos(angle)} * scale;
+    place.p = {0.25f * static_cast<float>(i), 1.0f + 0.1f * static_cast<float>(i % 3),
+               -0.8f + 0.3f * static_cast<float>(i)};
+    add_object(scene, sphere_mesh(1, 6, 4, false), lamp, place);
+    if (distinct || i == 0) continue;
+    scene.instances.back().mesh_index = scene.instances[2].mesh_index;
+    scene.instances.back().material_index = scene.instances[2].material_index;
+  }
+  look_down(scene, {-0.3f, 0, 0}, 0.6f, 0.7f);
+  return scene;
+}
+
+TEST(Caustics, LampsThatShareTheirLightsSendTheSamePhotons)
+{
+  // The same pairs of lights and casters in the same order, so the same photons but for rounding.
+  const auto caustic = [](const Scene& scene) {
+    RenderOptions options = caustic_options(scene, CausticsMode::kOn, 32, 8);
+    options.settings.caustics.photons = 1 << 15;
+    return mean_of(render_scene(scene, options), Aov::kCaustic);
+  };
+  const double shared = caustic(lamps_beside_a_mirror(false)), distinct = caustic(lamps_beside_a_mirror(true));
+  EXPECT_GT(distinct, 0.01);
+  EXPECT_NEAR(shared / distinct, 1, 1e-3);
+  expect_same(lamps_beside_a_mirror(false), 128, 16, 0.005, "lamps beside a mirror");
+}
+
 TEST(Caustics, NothingIsDoneWhereNoneCanBe)
 {
   Scene scene = empty_scene();

@@ -9,26 +9,10 @@
 #include <vector>
 
 #include "integrator/light_set.h"
+#include "tests/kernel/light/light_estimates.h"
 
 namespace relief {
 namespace {
-
-struct Random {
-  std::uint64_t state;
-  double next()
-  {
-    state = hash_mix(state + 0x9e3779b97f4a7c15u);
-    return static_cast<double>(state >> 11) * 0x1p-53;
-  }
-  float unit() { return std::min(static_cast<float>(next()), 0x1.fffffep-1f); }
-  float between(double a, double b) { return static_cast<float>(a + (b - a) * next()); }
-  Vec3f in_cube(double half) { return {between(-half, half), between(-half, half), between(-half, half)}; }
-  Vec3f direction()
-  {
-    const double z = 2 * next() - 1, phi = 2 * std::numbers::pi * next(), r = std::sqrt(1 - z * z);
-    return {static_cast<float>(r * std::cos(phi)), static_cast<float>(r * std::sin(phi)), static_cast<float>(z)};
-  }
-};
 
 Light random_light(Random& random, double spread, double size)
 {
@@ -70,7 +54,7 @@ LightEstimates root_estimates(const LightsView& view, Vec3f P, Vec3f N)
 
 float tree_probability(const LightsView& view, Vec3f P, Vec3f N, std::uint32_t light)
 {
-  return light_tree_pdf(view.tree, root_estimates(view, P, N), P, N, light, view.light_trails[light]);
+  return light_tree_pdf(view.tree, root_estimates(view, P, N), P, N, light, view.light_trails[light], -1);
 }
 
 Vec3f random_normal(Random& random) { return random.next() < 0.25 ? Vec3f{} : random.direction(); }
@@ -314,47 +298,12 @@ TEST(LightSampler, DensityOfAHitEqualsTheSamples)
       const LightSample sample = lights_sample(view, P, N, random.unit(), {random.unit(), random.unit()});
       if (sample.pdf == 0.0f || sample.delta) continue;
       ++compared;
-      const float pdf = sample.light_index < 0 ? lights_environment_pdf(view, P, N, sample.wi)
-                                               : lights_pdf(view, P, N, static_cast<std::uint32_t>(sample.light_index),
-                                                            sample.wi, sample.distance);
-      ASSERT_NEAR(pdf / sample.pdf, 1.0f, 1e-4f) << k << " light " << sample.light_index;
+      const float pdf = sample.ref.light_index < 0 ? lights_environment_pdf(view, P, N, sample.wi)
+                                                   : lights_pdf(view, P, N, sample.ref, sample.wi, sample.distance);
+      ASSERT_NEAR(pdf / sample.pdf, 1.0f, 1e-4f) << k << " light " << sample.ref.light_index;
     }
   }
   EXPECT_GT(compared, 9000);
-}
-
-/// Irradiance at P, summed over the lights: each by its own sampling with many points.
-double irradiance(const LightsView& view, Vec3f P, Vec3f N, std::uint32_t samples)
-{
-  double sum = 0;
-  for (std::uint32_t i = 0; i < view.num_lights; ++i) {
-    for (std::uint32_t k = 0; k < samples; ++k) {
-      const LightSample sample = light_sample(view.lights[i], P, sample_2d(i, 2 * k, 0));
-      if (sample.pdf > 0.0f) {
-        sum += static_cast<double>(light_scalar(sample.radiance) * max(0.0f, dot(N, sample.wi)) / sample.pdf) / samples;
-      }
-    }
-  }
-  return sum;
-}
-
-struct Moments {
-  double mean = 0, variance = 0;
-};
-
-/// Moments of one sample of lights_sample as an estimate of irradiance.
-Moments sampler_moments(const LightsView& view, Vec3f P, Vec3f N, int samples)
-{
-  double sum = 0, squares = 0;
-  for (int k = 0; k < samples; ++k) {
-    const std::uint32_t hash = sample_pixel_hash(11, k, 0);
-    const LightSample sample = lights_sample(view, P, N, sample_1d(hash, 0, 1), sample_2d(hash, 0, 2));
-    if (!(sample.pdf > 0.0f)) continue;
-    const double value = static_cast<double>(light_scalar(sample.radiance) * max(0.0f, dot(N, sample.wi)) / sample.pdf);
-    sum += value / samples;
-    squares += value * value / samples;
-  }
-  return {sum, std::max(squares - sum * sum, 0.0)};
 }
 
 TEST(LightSampler, MeanIsTheIrradianceOfAllLights)
@@ -449,7 +398,7 @@ TEST(LightSampler, OneLightIsAlwaysChosen)
   light_set_build_tree(set, {});
   const LightSample sample = lights_sample(set.view(), {5, 5, 5}, {}, 0x1.fffffep-1f, {});
   EXPECT_EQ(sample.pdf, 1.0f);
-  EXPECT_EQ(sample.light_index, 0);
+  EXPECT_EQ(sample.ref.light_index, 0);
 }
 
 TEST(LightSampler, LightsWithoutIntensityAreNeverChosenButKeepTheirPlace)

@@ -50,7 +50,7 @@ float choice_probability(const LightSet& set, Vec3f P, std::uint32_t light)
   const LightsView view = set.view();
   LightEstimates root;
   light_tree_estimate(view.tree, view.tree.root, P, {}, root);
-  return light_tree_pdf(view.tree, root, P, {}, light, view.light_trails[light]);
+  return light_tree_pdf(view.tree, root, P, {}, light, view.light_trails[light], -1);
 }
 
 TEST(LightSet, TrianglesOfAnInstanceAreConsecutiveAfterTheScenesLights)
@@ -107,10 +107,10 @@ TEST(LightSet, TwoTrianglesOfARectangleAreOneLight)
     const LightsView view = set.view();
     const Vec3f P = light.P + light.axis * 2;
     const Vec3f wi = normalize(light.P + 0.3f * light.edge_u - P);
-    const float pdf = lights_pdf(view, P, {}, 0, wi, 2.1f);
+    const float pdf = lights_pdf(view, P, {}, {0}, wi, 2.1f);
     EXPECT_GT(pdf, 0.0f);
-    EXPECT_EQ(lights_pdf(view, P, {}, 1, wi, 2.1f), pdf);
-    EXPECT_EQ(lights_sample(view, P, {}, 0.4f, {0.3f, 0.9f}).light_index, 0);
+    EXPECT_EQ(lights_pdf(view, P, {}, {1}, wi, 2.1f), pdf);
+    EXPECT_EQ(lights_sample(view, P, {}, 0.4f, {0.3f, 0.9f}).ref.light_index, 0);
   }
 }
 
@@ -179,7 +179,7 @@ TEST(LightSet, DoubleSidedMaterialsEmitFromBothSides)
   const LightSet set = light_set_make(squares({emissive({1, 1, 1}), both}), {});
   EXPECT_FALSE(set.lights[0].two_sided);
   EXPECT_TRUE(set.lights[2].two_sided);
-  EXPECT_EQ(lights_sample(set.view(), {0.5f, 0.2f, -1}, {}, 0.0f, {0.5f, 0.5f}).light_index / 2, 1);
+  EXPECT_EQ(lights_sample(set.view(), {0.5f, 0.2f, -1}, {}, 0.0f, {0.5f, 0.5f}).ref.light_index / 2, 1);
 }
 
 TEST(LightSet, TexturesWeighTheChoiceButNotTheEmission)
@@ -222,7 +222,7 @@ TEST(LightSet, DegenerateTrianglesKeepTheirPlaceAndAreNeverChosen)
   EXPECT_EQ(choice_probability(set, {0.5f, 0.5f, 1}, 0), 0.0f);
   EXPECT_EQ(choice_probability(set, {0.5f, 0.5f, 1}, 1), 1.0f);
   EXPECT_EQ(choice_probability(set, {0.5f, 0.5f, 1}, 2), 0.0f);
-  EXPECT_EQ(lights_pdf(set.view(), {0.5f, 0.5f, 1}, {}, 2, {0, 0, -1}, 1), 0.0f);
+  EXPECT_EQ(lights_pdf(set.view(), {0.5f, 0.5f, 1}, {}, {2}, {0, 0, -1}, 1), 0.0f);
 }
 
 /// An 8-bit map of one channel; 1000 / 255 a step.
