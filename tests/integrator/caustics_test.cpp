@@ -313,8 +313,8 @@ TEST(PhotonRadii, FollowTheDensityAndKeepTheLight)
       EXPECT_LE(radii[i], 0.16f);
     }
     // Cells that a square's edge cuts have fewer photons, so the mean area is above wanted / density.
-    EXPECT_NEAR(area[0] / (kWanted * 16 / (kPhotons / 2)), 1.3, 0.4) << shift;
-    EXPECT_NEAR(area[1] / (kWanted * 0.0625 / (kPhotons / 2)), 1.3, 0.4) << shift;
+    EXPECT_NEAR(area[0] / (kWanted * 16 / (kPhotons / 2.0)), 1.3, 0.4) << shift;
+    EXPECT_NEAR(area[1] / (kWanted * 0.0625 / (kPhotons / 2.0)), 1.3, 0.4) << shift;
   }
   // The estimate's integral over the plane is all their power, whatever the radii.
   PhotonMap map;
