@@ -1,6 +1,9 @@
 #include "integrator/film.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -80,7 +83,41 @@ PixelEstimate pixel_estimate(const float* record, std::uint32_t samples)
   return estimate;
 }
 
+constexpr std::size_t kNumSpreads = 128;
+
+/// Class of a PixelEstimate::sample_variance, ≥ 0: one for each power of two.
+std::size_t spread_class(float sample_variance)
+{
+  constexpr int kLeastExponent = -80;
+  constexpr int kGreatestExponent = kLeastExponent + static_cast<int>(kNumSpreads) - 1;
+  return static_cast<std::size_t>(std::clamp(std::ilogb(sample_variance), kLeastExponent, kGreatestExponent) -
+                                  kLeastExponent);
+}
+
+/// Sums of one channel over pixels, of what PixelEstimate has of them.
+struct SpreadSums {
+  float num_pixels = 0, sample_variance = 0, d1 = 0, d2 = 0;
+
+  void add(const SpreadSums& other)
+  {
+    num_pixels += other.num_pixels;
+    sample_variance += other.sample_variance;
+    d1 += other.d1;
+    d2 += other.d2;
+  }
+};
+
 }  // namespace
+
+/// Of each channel, the pixels by spread_class; those whose samples are all the same are left out.
+struct Film::TileSpreads {
+  std::array<std::array<SpreadSums, kNumSpreads>, 3> channels;
+};
+
+/// Of each channel, by spread_class: what a pixel's sample_variance is multiplied by.
+struct Film::TileLevels {
+  std::array<std::array<float, kNumSpreads>, 3> channels;
+};
 
 Film::Film(int width, int height, std::uint32_t aov_mask)
     : width_(width),
@@ -198,23 +235,65 @@ ImageError Film::estimate_error() const
   return {std::sqrt(error_extrapolate(d1, d2) / count), error_extrapolate(relative_d1, relative_d2) / count};
 }
 
-std::vector<Vec3f> Film::variance_calibrations() const
+Film::TileSpreads Film::tile_spreads(int tile) const
 {
-  std::vector<Vec3f> calibrations(static_cast<std::size_t>(num_tiles()));
-  for (int tile = 0; tile < num_tiles(); ++tile) {
-    if (tile_samples(tile) == 0) continue;
-    Vec3f extrapolated, by_samples;
-    tile_variances(tile, &extrapolated, &by_samples);
-    const auto level = [](float variance, float sample) { return sample > 0.0f ? variance / sample : 1.0f; };
-    calibrations[static_cast<std::size_t>(tile)] = {
-        level(extrapolated.x, by_samples.x), level(extrapolated.y, by_samples.y), level(extrapolated.z, by_samples.z)};
+  int x0, y0, w, h;
+  tile_rect(tile, &x0, &y0, &w, &h);
+  TileSpreads spreads;
+  for (int y = y0; y < y0 + h; ++y) {
+    for (int x = x0; x < x0 + w; ++x) {
+      const PixelEstimate pixel = pixel_estimate(record(x, y), tile_samples(tile));
+      const auto add = [&](std::size_t channel, float sample_variance, float d1, float d2) {
+        if (!(sample_variance > 0.0f)) return;
+        spreads.channels[channel][spread_class(sample_variance)].add({1.0f, sample_variance, d1, d2});
+      };
+      add(0, pixel.sample_variance.x, pixel.d1.x, pixel.d2.x);
+      add(1, pixel.sample_variance.y, pixel.d1.y, pixel.d2.y);
+      add(2, pixel.sample_variance.z, pixel.d1.z, pixel.d2.z);
+    }
   }
-  return calibrations;
+  return spreads;
+}
+
+Film::TileLevels Film::tile_levels(const std::array<std::vector<TileSpreads>, 3>& rows, int tile) const
+{
+  // Fewer pixels leave the level too unsure, and the z of pixels with too long tails.
+  constexpr float kEnoughPixels = 64;
+  const int tile_x = tile % tiles_x_;
+  TileSpreads around{};
+  for (std::size_t row = 0; row < rows.size(); ++row) {
+    if (rows[row].empty()) continue;
+    for (int x = std::max(tile_x - 1, 0); x <= std::min(tile_x + 1, tiles_x_ - 1); ++x) {
+      // The level depends on the number of samples.
+      const int neighbour = tile + (static_cast<int>(row) - 1) * tiles_x_ + x - tile_x;
+      if (tile_samples(neighbour) != tile_samples(tile)) continue;
+      for (std::size_t channel = 0; channel < 3; ++channel) {
+        for (std::size_t i = 0; i < kNumSpreads; ++i) {
+          around.channels[channel][i].add(rows[row][static_cast<std::size_t>(x)].channels[channel][i]);
+        }
+      }
+    }
+  }
+  const TileSpreads& own = rows[1][static_cast<std::size_t>(tile_x)];
+  TileLevels levels{};
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    const std::array<SpreadSums, kNumSpreads>& classes = around.channels[channel];
+    for (std::size_t i = 0; i < kNumSpreads; ++i) {
+      if (!(own.channels[channel][i].num_pixels > 0)) continue;
+      SpreadSums like = classes[i];
+      for (std::size_t reach = 1; reach < kNumSpreads && (reach == 1 || like.num_pixels < kEnoughPixels); ++reach) {
+        if (i >= reach) like.add(classes[i - reach]);
+        if (i + reach < kNumSpreads) like.add(classes[i + reach]);
+      }
+      levels.channels[channel][i] = static_cast<float>(error_extrapolate(like.d1, like.d2)) / like.sample_variance;
+    }
+  }
+  return levels;
 }
 
 void Film::resolve_pixel(const float* in,
                          std::uint32_t samples,
-                         Vec3f calibration,
+                         const TileLevels& levels,
                          const FilmLayout& out,
                          float* to) const
 {
@@ -248,7 +327,11 @@ void Film::resolve_pixel(const float* in,
   if (float* p = plane(Aov::kObjectId)) p[0] = in[layout_.object_id];
   if (float* p = plane(Aov::kMaterialId)) p[0] = in[layout_.material_id];
   if (float* p = plane(Aov::kSampleCount)) p[0] = static_cast<float>(samples);
-  if (float* p = plane(Aov::kVariance)) put3(p, pixel.sample_variance * calibration);
+  if (float* p = plane(Aov::kVariance)) {
+    const Vec3f spread = pixel.sample_variance;
+    const auto level = [&](std::size_t channel, float v) { return levels.channels[channel][spread_class(v)]; };
+    put3(p, spread * Vec3f{level(0, spread.x), level(1, spread.y), level(2, spread.z)});
+  }
   if (float* p = plane(Aov::kHalf)) put3(p, pixel.even);
   if (float* p = plane(Aov::kDisplacementSteps)) p[0] = in[layout_.displacement_steps] * inverse_n;
   if (float* p = plane(Aov::kCaustic)) put3(p, load3(in + layout_.caustic) * inverse_n);
@@ -266,20 +349,37 @@ RenderedImage Film::resolve(int crop_x, int crop_y, int full_width, int full_hei
   picture.view.full_height = full_height;
   const FilmLayout& out = picture.view.layout;
   const auto num_in = static_cast<std::size_t>(layout_.num_floats), num_out = static_cast<std::size_t>(out.num_floats);
-  // A pixel's planes are no more floats than its sums, so pixel after pixel is written where sums have been read.
-  const std::vector<Vec3f> calibrations = variance_calibrations();
+  const bool has_variance = out.offset[static_cast<std::size_t>(Aov::kVariance)] >= 0;
+  const auto row_spreads = [&](int tile_y) {
+    std::vector<TileSpreads> row(has_variance && tile_y < tiles_y_ ? static_cast<std::size_t>(tiles_x_) : 0u);
+    tbb::parallel_for(std::size_t{0}, row.size(),
+                      [&](std::size_t x) { row[x] = tile_spreads(tile_y * tiles_x_ + static_cast<int>(x)); });
+    return row;
+  };
+  // Above, at and below the row of tiles that is written.
+  std::array<std::vector<TileSpreads>, 3> rows{{{}, {}, row_spreads(0)}};
+  std::vector<TileLevels> levels(static_cast<std::size_t>(tiles_x_));
   std::vector<float> sums(num_in);
-  for (int y = 0; y < height_; ++y) {
-    for (int x = 0; x < width_; ++x) {
-      const std::size_t pixel =
-          static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
-      const int tile = y / kTileSize * tiles_x_ + x / kTileSize;
-      const auto from = sums_.begin() + static_cast<std::ptrdiff_t>(pixel * num_in);
-      std::copy(from, from + layout_.num_floats, sums.begin());
-      float* to = sums_.data() + pixel * num_out;
-      std::fill(to, to + num_out, 0.0f);
-      if (tile_samples(tile) == 0) continue;
-      resolve_pixel(sums.data(), tile_samples(tile), calibrations[static_cast<std::size_t>(tile)], out, to);
+  for (int tile_y = 0; tile_y < tiles_y_; ++tile_y) {
+    rows[0] = std::move(rows[1]);
+    rows[1] = std::move(rows[2]);
+    rows[2] = row_spreads(tile_y + 1);
+    tbb::parallel_for(std::size_t{0}, rows[1].size(),
+                      [&](std::size_t x) { levels[x] = tile_levels(rows, tile_y * tiles_x_ + static_cast<int>(x)); });
+    // A pixel's planes are no more floats than its sums, so pixel after pixel is written where sums have been read.
+    for (int y = tile_y * kTileSize; y < std::min((tile_y + 1) * kTileSize, height_); ++y) {
+      for (int x = 0; x < width_; ++x) {
+        const std::size_t pixel =
+            static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
+        const int tile_x = x / kTileSize;
+        const std::uint32_t samples = tile_samples(tile_y * tiles_x_ + tile_x);
+        const auto from = sums_.begin() + static_cast<std::ptrdiff_t>(pixel * num_in);
+        std::copy(from, from + layout_.num_floats, sums.begin());
+        float* to = sums_.data() + pixel * num_out;
+        std::fill(to, to + num_out, 0.0f);
+        if (samples == 0) continue;
+        resolve_pixel(sums.data(), samples, levels[static_cast<std::size_t>(tile_x)], out, to);
+      }
     }
   }
   sums_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_) * num_out);

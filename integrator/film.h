@@ -1,6 +1,7 @@
 // The picture while it is rendered: sums, sample counts per tile, error estimates, and the finished planes.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -76,15 +77,25 @@ class Film {
   const float* record(int x, int y) const;
   /// Sums over a tile's pixels: variance of the mean as extrapolated, and by the spread of single samples.
   void tile_variances(int tile, Vec3f* extrapolated, Vec3f* by_samples) const;
+  struct TileSpreads;
+  struct TileLevels;
+  TileSpreads tile_spreads(int tile) const;
   /// What a tile's pixels' variances are multiplied by. Their shape comes from each pixel's own samples, their level from
-  /// the tile's halves and quarters: the former alone is blind to stratification, the latter alone are too noisy in a
-  /// pixel.
-  std::vector<Vec3f> variance_calibrations() const;
+  /// the halves and quarters of pixels around whose samples spread alike: the former alone is blind to stratification, the
+  /// latter alone are too noisy in a pixel. Alike, because edges gain far more from stratification than what lies between
+  /// them: a lamp's rim that set the level of the wall behind it would make that look a hundred times too sure.
+  /// @param rows  of tiles, above, with and below the tile's
+  TileLevels tile_levels(const std::array<std::vector<TileSpreads>, 3>& rows, int tile) const;
   /// One pixel's planes.
   /// @param in       its sums
   /// @param samples  that it has, at least one
+  /// @param levels   its tile's
   /// @param to       room for out.num_floats
-  void resolve_pixel(const float* in, std::uint32_t samples, Vec3f calibration, const FilmLayout& out, float* to) const;
+  void resolve_pixel(const float* in,
+                     std::uint32_t samples,
+                     const TileLevels& levels,
+                     const FilmLayout& out,
+                     float* to) const;
 
   int width_, height_, tiles_x_, tiles_y_;
   std::uint32_t aov_mask_;
