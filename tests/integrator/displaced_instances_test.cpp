@@ -39,6 +39,7 @@ Scene instances_of_a_sphere(const std::vector<Affine3>& transforms, Displacement
 TEST(DisplacedInstance, SharesOneStructureWithAThousandOthers)
 {
   std::vector<Affine3> transforms;
+  transforms.reserve(1000);
   for (int k = 0; k < 1000; ++k)
     transforms.push_back({{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {3.0f * static_cast<float>(k), 0, 0}});
   const Scene one = instances_of_a_sphere({transforms[0]}, DisplacementMethod::kChord);

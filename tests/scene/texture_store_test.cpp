@@ -68,7 +68,7 @@ TestImage random_image(int width, int height, int num_channels, unsigned seed)
 
 void image_write(const fs::path& path,
                  const TestImage& image,
-                 OIIO::TypeDesc type,
+                 const OIIO::TypeDesc& type,
                  const std::vector<std::pair<std::string, std::string>>& attributes = {},
                  int tile_size = 0)
 {
