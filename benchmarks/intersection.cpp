@@ -121,12 +121,12 @@ double trace_raw(const Accel& accel, const std::vector<RecordedRay>& rays, RayKi
     RTCRayHit query;
     fill(query.ray, ray, mask);
     if (kind == RayKind::kShadow) {
-      embree_occluded1(accel.scene(), context, query.ray);
+      accel.occluded(context, query.ray);
       *num_hits += query.ray.tfar < 0 ? 1 : 0;
       continue;
     }
     query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    embree_intersect1(accel.scene(), context, query);
+    accel.intersect(context, query);
     *num_hits += query.hit.geomID != RTC_INVALID_GEOMETRY_ID ? 1 : 0;
   }
   return std::chrono::duration<double>(Clock::now() - start).count();

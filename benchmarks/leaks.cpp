@@ -1,11 +1,15 @@
 // Rays from inside of real closed meshes under displacement: every one has to hit something.
 //
-//   relief_bench_leaks MESH MAP [--scale S] [--midlevel M] [--tiles T] [--rays N] [--methods LIST] [--part K] [--open-seams]
+//   relief_bench_leaks MESH MAP [--scale S] [--midlevel M] [--tiles T] [--rays N] [--methods LIST] [--part K] [--from LIST]
+//                         [--open-seams]
 //
 // A point whose winding number about the base mesh is not zero, and which is farther from it than any displacement, keeps
 // its winding number while the mesh moves out to the displaced surface. So no ray from there can get out, whatever the
 // mesh looks like and however it folds, if its seams are closed; that needs no oracle. Rays go in all directions and, on
 // purpose, at displaced vertices and edges, beside them and along prism walls, each as a closest-hit and a shadow ray.
+//
+// With --from they start that many sizes of the mesh away and pass, as single precision has them, an inner point by less
+// than its distance from any displacement: the same points are aimed at, but from beyond, or from behind the inner point.
 //
 // Tessellations are Embree's own triangles. It finds a shared edge on the same side from both of its triangles, but not
 // all edges around a vertex: rays that meet a vertex to the last bit slip through any mesh now and then. What these rays
@@ -15,6 +19,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -41,6 +46,7 @@ struct Settings {
   double num_rays = 1e6;
   std::vector<std::string> methods{"chord", "rmip", "rmip-minmax", "tfdm"};
   std::uint64_t part = 0;
+  std::vector<double> distances{0};  ///< sizes of the mesh
   bool open_seams = false;
 };
 
@@ -96,8 +102,14 @@ double triangle_distance(const Triangle& triangle, Vec3d O)
   return above ? std::min(nearest, std::abs(dot(O - triangle[0], n)) / length(n)) : nearest;
 }
 
+/// A point that stays inside, and a ball around it.
+struct InnerPoint {
+  Vec3f P;
+  double radius = 0;
+};
+
 /// Points that stay inside whatever the displacement, in the order of a random walk through the mesh's box.
-std::vector<Vec3f> inner_points(const DisplacedMeshView& mesh, double largest_displacement, std::size_t count)
+std::vector<InnerPoint> inner_points(const DisplacedMeshView& mesh, double largest_displacement, std::size_t count)
 {
   std::vector<Triangle> triangles;
   Vec3d low{HUGE_VAL, HUGE_VAL, HUGE_VAL}, high{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
@@ -109,7 +121,7 @@ std::vector<Vec3f> inner_points(const DisplacedMeshView& mesh, double largest_di
       high = {std::max(high.x, P.x), std::max(high.y, P.y), std::max(high.z, P.z)};
     }
   }
-  std::vector<Vec3f> points;
+  std::vector<InnerPoint> points;
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> unit;
   constexpr int kMostTrials = 100'000;
@@ -124,7 +136,8 @@ std::vector<Vec3f> inner_points(const DisplacedMeshView& mesh, double largest_di
       nearest = std::min(nearest, triangle_distance(triangle, O));
       if (nearest <= 1.001 * largest_displacement) break;
     }
-    if (nearest > 1.001 * largest_displacement && std::abs(std::round(turns)) >= 1) points.push_back(rounded);
+    if (nearest > 1.001 * largest_displacement && std::abs(std::round(turns)) >= 1)
+      points.push_back({rounded, nearest - 1.001 * largest_displacement});
   }
   return points;
 }
@@ -175,10 +188,45 @@ struct Leaks {
   double seconds = 0;
 };
 
-Leaks count_leaks(SceneContext& context, const std::vector<Vec3f>& points, std::uint64_t num_rays, std::uint64_t part)
+struct WorldRay {
+  Vec3f O, D;
+};
+
+/// A ray that passes through a ball, if single precision has one: from within, or from afar.
+/// @param to        where it would go from the ball's centre, object space
+/// @param distance  from the centre, metres of object space; 0: it starts there
+std::optional<WorldRay> world_ray(const Affine3& world_from_object, const InnerPoint& ball, Vec3d to, double distance)
+{
+  const Vec3d centre = to_double(ball.P), along = to - centre;
+  if (distance == 0)
+    return WorldRay{transform_point(world_from_object, ball.P), transform_vector(world_from_object, to_float(along))};
+  const Vec3d O_object = centre + (distance / length(along)) * along;
+  const WorldRay ray{transform_point(world_from_object, to_float(O_object)),
+                     transform_vector(world_from_object, to_float(centre - O_object))};
+  const Affine3& m = world_from_object;
+  const Vec3d centre_world =
+      centre.x * to_double(m.x) + centre.y * to_double(m.y) + centre.z * to_double(m.z) + to_double(m.p);
+  const Vec3d D = to_double(ray.D);
+  const double passes = length(cross(centre_world - to_double(ray.O), D)) / length(D);
+  // The ball is an ellipsoid in the world, whose least axis is no shorter than this.
+  const Affine3 inverse_of_it = inverse(m);
+  const double least =
+      ball.radius / length(Vec3d{length(to_double(inverse_of_it.x)), length(to_double(inverse_of_it.y)),
+                                 length(to_double(inverse_of_it.z))});
+  return passes < least ? std::optional(ray) : std::nullopt;
+}
+
+/// @param distance  of the rays' origins, sizes of the mesh; 0: inside
+Leaks count_leaks(SceneContext& context,
+                  const std::vector<InnerPoint>& points,
+                  std::uint64_t num_rays,
+                  std::uint64_t part,
+                  double distance)
 {
   const DisplacedMeshView& mesh = context.displacements.geometry(0).mesh;
   const Affine3& world_from_object = context.instances[0].world_from_object;
+  const Box3 box = context.accel->displaced_bounds(0);
+  const double metres = distance * static_cast<double>(length(box.high - box.low));
   std::atomic<std::uint64_t> num_closest{0}, num_shadow{0}, num_at_vertices{0};
   constexpr std::uint64_t kChunk = 1 << 16;
   const tbb::tick_count start = tbb::tick_count::now();
@@ -190,10 +238,16 @@ Leaks count_leaks(SceneContext& context, const std::vector<Vec3f>& points, std::
     TraversalCounters counters;
     embree.displacement = &counters;
     for (std::uint64_t i = chunk * kChunk; i < std::min(num_rays, (chunk + 1) * kChunk); ++i) {
-      const Vec3f from = points[random() % points.size()];
-      const Target target = random_target(mesh, to_double(from), random);
-      const Vec3f O = transform_point(world_from_object, from);
-      const Vec3f D = transform_vector(world_from_object, to_float(target.P) - from);
+      Target target;
+      std::optional<WorldRay> ray;
+      while (!ray) {
+        const InnerPoint& from = points[random() % points.size()];
+        target = random_target(mesh, to_double(from.P), random);
+        // From afar, half of them meet what they are aimed at where they come out.
+        const Vec3d to = metres > 0 && random() % 2 == 0 ? 2.0 * to_double(from.P) - target.P : target.P;
+        ray = world_ray(world_from_object, from, to, metres);
+      }
+      const Vec3f O = ray->O, D = ray->D;
       RTCRayHit query{};
       query.ray.org_x = O.x;
       query.ray.org_y = O.y;
@@ -205,8 +259,8 @@ Leaks count_leaks(SceneContext& context, const std::vector<Vec3f>& points, std::
       query.ray.mask = kRayBounce | kRayShadow;
       RTCRay shadow = query.ray;
       query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-      embree_intersect1(context.accel->scene(), embree, query);
-      embree_occluded1(context.accel->scene(), embree, shadow);
+      context.accel->intersect(embree, query);
+      context.accel->occluded(embree, shadow);
       const bool leaks = query.hit.geomID == RTC_INVALID_GEOMETRY_ID, dark_leaks = !(shadow.tfar < 0);
       if ((leaks || dark_leaks) && num_closest + num_shadow + num_at_vertices == 0) {
         fmt::print("  first: O {:.9g} {:.9g} {:.9g} D {:.9g} {:.9g} {:.9g}, {} ray\n", O.x, O.y, O.z, D.x, D.y, D.z,
@@ -229,7 +283,7 @@ bool run(const Settings& settings)
       static_cast<double>(std::abs(settings.scale) *
                           std::max(std::abs(range.low - settings.midlevel), std::abs(range.high - settings.midlevel)));
   const auto num_rays = static_cast<std::uint64_t>(settings.num_rays);
-  std::vector<Vec3f> points;
+  std::vector<InnerPoint> points;
   bool tight = true;
   for (const std::string& name : settings.methods) {
     const auto label = std::find(std::begin(kDisplacementMethodLabels), std::end(kDisplacementMethodLabels), name);
@@ -248,14 +302,18 @@ bool run(const Settings& settings)
       fmt::print("{}: {} triangles, {} walls, {} folded prisms; {} inner points\n", settings.mesh,
                  context.displacements.num_triangles(), report.num_walls, report.num_folded, points.size());
     }
-    const Leaks leaks = count_leaks(context, points, num_rays, settings.part);
-    fmt::print("  {:<16}{} rays: {} closest-hit and {} shadow rays got out, and {} aimed at vertices; {:.2f} Mrays/s\n",
-               name, num_rays, leaks.num_closest, leaks.num_shadow, leaks.num_at_vertices,
-               2e-6 * settings.num_rays / leaks.seconds);
-    std::fflush(stdout);
-    const bool is_tessellation =
-        options.method == DisplacementMethod::kTessellate || options.method == DisplacementMethod::kGrid;
-    tight = tight && leaks.num_closest + leaks.num_shadow + (is_tessellation ? 0 : leaks.num_at_vertices) == 0;
+    for (const double distance : settings.distances) {
+      const Leaks leaks = count_leaks(context, points, num_rays, settings.part, distance);
+      fmt::print(
+          "  {:<16}{} rays from {}: {} closest-hit and {} shadow rays got out, and {} aimed at vertices; {:.2f} "
+          "Mrays/s\n",
+          name, num_rays, distance > 0 ? fmt::format("{} sizes away", distance) : "inside", leaks.num_closest,
+          leaks.num_shadow, leaks.num_at_vertices, 2e-6 * settings.num_rays / leaks.seconds);
+      std::fflush(stdout);
+      const bool is_tessellation =
+          options.method == DisplacementMethod::kTessellate || options.method == DisplacementMethod::kGrid;
+      tight = tight && leaks.num_closest + leaks.num_shadow + (is_tessellation ? 0 : leaks.num_at_vertices) == 0;
+    }
   }
   return tight;
 }
@@ -276,6 +334,9 @@ int main(int argc, char** argv)
   app.add_option("--rays", settings.num_rays, "Rays of each kind for each method")->check(CLI::Range(1.0, 1e12));
   app.add_option("--methods", settings.methods, "Methods, by commas")->delimiter(',');
   app.add_option("--part", settings.part, "Rays of its own for each part of a long run");
+  app.add_option("--from", settings.distances, "Sizes of the mesh that rays start away, by commas; 0: inside")
+      ->delimiter(',')
+      ->check(CLI::Range(0.0, 1e9));
   app.add_flag("--open-seams", settings.open_seams, "Without walls at texture seams, to see that leaks are found");
   CLI11_PARSE(app, argc, argv);
   try {

@@ -99,8 +99,11 @@ int run(int argc, char** argv)
     search[0] = std::min(search[0], seconds_of([&] {
                            sums[0] = 0;
                            const PhotonMapView view = map.view();
+                           PhotonQuery query;
+                           query.Ng = {0, 1, 0};
                            for (const Vec3f& P : searches) {
-                             sums[0] += static_cast<double>(photon_gather(view, {P, {0, 1, 0}}).irradiance.x);
+                             query.P = P;
+                             sums[0] += static_cast<double>(photon_gather(view, query).irradiance.x);
                            }
                          }));
     Tree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(16));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <iterator>
 #include <set>
 #include <string_view>
 #include <system_error>
@@ -78,10 +79,10 @@ PixelSample parse_pixel(const std::string& text)
   return pixel;
 }
 
-std::vector<int> parse_frames(const std::string& text)
+FrameList parse_frames(const std::string& text)
 {
-  constexpr const char* kExpected = "frames such as 1-10,20,30-60x2, from 0 to 1000000";
-  constexpr int kLastFrame = 1'000'000;
+  constexpr const char* kExpected = "frames such as 1-10,20,30-60x2, from 0 to 1000000, or all";
+  if (text == "all") return {true, {}};
   std::vector<int> frames;
   std::set<int> seen;
   for (std::string_view part : split(text, ',')) {
@@ -104,7 +105,20 @@ std::vector<int> parse_frames(const std::string& text)
       if (seen.insert(frame).second) frames.push_back(frame);
     }
   }
-  return frames;
+  return {false, std::move(frames)};
+}
+
+Vec3f parse_point(const char* option, const std::string& text)
+{
+  constexpr float kFarthest = 1e15f;
+  Vec3f point;
+  const auto parts = split(text, ',');
+  const bool is_point = parts.size() == 3 && to_number(parts[0], &point.x) && to_number(parts[1], &point.y) &&
+                        to_number(parts[2], &point.z) && is_finite(point);
+  if (!is_point || max_component(max(point, -point)) > kFarthest) {
+    refuse(option, "X,Y,Z in metres, each within 1e15 of 0", text);
+  }
+  return point;
 }
 
 std::uint64_t parse_seed(const std::string& text)
@@ -133,6 +147,25 @@ std::uint32_t parse_aovs(const std::string& text)
   return mask;
 }
 
+EnvironmentChoice parse_environment(const std::string& text)
+{
+  EnvironmentChoice choice;
+  choice.file = text;
+  const std::size_t comma = text.rfind(',');
+  if (comma != std::string::npos && to_number(std::string_view(text).substr(comma + 1), &choice.strength)) {
+    choice.file = text.substr(0, comma);
+  }
+  constexpr float kGreatest = 1e6f;
+  if (choice.file.empty() || !(choice.strength >= 0 && choice.strength <= kGreatest)) {
+    refuse("--environment", "studio, sky, none or an image, and perhaps a strength from 0 to 1e6 after a comma", text);
+  }
+  const auto* found = std::find(std::begin(kEnvironmentPresetLabels), std::end(kEnvironmentPresetLabels), choice.file);
+  choice.source = found == std::end(kEnvironmentPresetLabels)
+                      ? EnvironmentSource::kFile
+                      : static_cast<EnvironmentSource>(found - std::begin(kEnvironmentPresetLabels));
+  return choice;
+}
+
 float parse_lod(const std::string& text)
 {
   constexpr float kCoarsest = 30;
@@ -151,7 +184,13 @@ std::string parse_output(const char* option, const std::string& text, const char
   const auto status = std::filesystem::status(text, ignored);
   const bool is_device = std::filesystem::exists(status) && !std::filesystem::is_regular_file(status) &&
                          !std::filesystem::is_directory(status);
-  if (found != suffix && !is_device) refuse(option, fmt::format("a name that ends in {}", suffix).c_str(), text);
+  if (found != suffix && !is_device) {
+    // The other option that writes pictures.
+    const std::string hint = suffix == std::string(".exr") && found == ".png"
+                                 ? " (--png NAME.png writes a PNG beside the OpenEXR)"
+                                 : std::string();
+    refuse(option, fmt::format("a name that ends in {}{}", suffix, hint).c_str(), text);
+  }
   return text;
 }
 
@@ -199,6 +238,18 @@ std::filesystem::path frame_path(const std::filesystem::path& pattern, int frame
   while (first > 0 && name[first - 1] == '#') --first;
   name.replace(first, last + 1 - first, fmt::format("{:0{}}", frame, last + 1 - first));
   return pattern.parent_path() / name;
+}
+
+std::string shell_quoted(std::string_view argument)
+{
+  constexpr std::string_view kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=.,:/#@%";
+  // A # begins a comment only where a word begins.
+  if (!argument.empty() && argument.front() != '#' && argument.find_first_not_of(kPlain) == std::string_view::npos) {
+    return std::string(argument);
+  }
+  std::string text = "'";
+  for (const char c : argument) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
 }
 
 }  // namespace relief

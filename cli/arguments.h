@@ -5,9 +5,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <CLI/CLI.hpp>
+
+#include "kernel/math/vec.h"
+#include "kernel/statistics.h"
+#include "scene/environment_preset.h"
 
 namespace relief {
 
@@ -25,17 +30,20 @@ Resolution parse_resolution(const std::string& text);
 /// "X0,Y0,X1,Y1" with X0 < X1, Y0 < Y1, all ≥ 0.
 PixelRect parse_crop(const std::string& text);
 
-struct PixelSample {
-  int x = 0, y = 0;
-  std::uint32_t sample_index = 0;
-};
-
 /// "X,Y" or "X,Y,SAMPLE", none negative.
 PixelSample parse_pixel(const std::string& text);
 
-/// "1-10,20,30-60x2": single frames, ranges, ranges with a step; in the order given, each frame once.
-/// @return at least one frame, each 0 … 1000000
-std::vector<int> parse_frames(const std::string& text);
+struct FrameList {
+  bool all = false;          ///< those of the scene
+  std::vector<int> numbers;  ///< each 0 … kLastFrame; empty only if `all`
+};
+inline constexpr int kLastFrame = 1'000'000;
+
+/// "all", or "1-10,20,30-60x2": single frames, ranges, ranges with a step; in the order given, each frame once.
+FrameList parse_frames(const std::string& text);
+
+/// "X,Y,Z" in metres, within 1e15 of the origin.
+Vec3f parse_point(const char* option, const std::string& text);
 
 /// A whole number of 64 bits without sign.
 std::uint64_t parse_seed(const std::string& text);
@@ -43,6 +51,10 @@ std::uint64_t parse_seed(const std::string& text);
 /// Names of AOVs separated by commas, or "all"; beauty is always in.
 /// @return bit i: enumerator i of Aov
 std::uint32_t parse_aovs(const std::string& text);
+
+/// "studio", "sky", "none" or the name of an image, perhaps with ",STRENGTH". What follows a name's last comma is a strength
+/// if it is a number; "./a,1.hdr,1" is a file "a,1.hdr".
+EnvironmentChoice parse_environment(const std::string& text);
 
 /// A level of detail of height maps, or "auto": −1.
 float parse_lod(const std::string& text);
@@ -58,6 +70,17 @@ CLI::Validator number(double least, double most);
 
 /// Likewise for a choice among words.
 CLI::Validator one_of(std::vector<std::string> words);
+
+/// An argument as a shell would have to be given it again.
+std::string shell_quoted(std::string_view argument);
+
+/// A text option that is parsed into `value` while the command line is read.
+template <class Value, class Parse>
+CLI::Option* add_parsed(CLI::App& command, const char* name, Value& value, Parse parse, const char* description)
+{
+  return command.add_option_function<std::string>(
+      name, [&value, parse](const std::string& text) { value = parse(text); }, description);
+}
 
 /// Output path of a frame: a run of '#' in the file name becomes the number, padded to the run's length; without one,
 /// ".0001" goes before the extension.

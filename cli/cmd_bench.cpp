@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cstdint>
+#include <cstdio>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -14,7 +15,9 @@
 #include "benchmarks/displacement/report.h"
 #include "cli/arguments.h"
 #include "cli/commands.h"
+#include "cli/run_files.h"
 #include "exporters/atomic_file.h"
+#include "scene/diagnostics.h"
 
 namespace relief {
 
@@ -50,6 +53,10 @@ std::uint64_t half_of_memory()
 
 int bench_displacement(const BenchArguments& arguments)
 {
+  RunFiles files;
+  files.add_output("--json", arguments.json);
+  files.add_output("--html", arguments.html);
+  for (const std::string& output : {arguments.json, arguments.html}) check_writable(output);
   std::optional<tbb::global_control> limit;
   if (arguments.threads > 0) {
     limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(arguments.threads));
@@ -68,10 +75,12 @@ int bench_displacement(const BenchArguments& arguments)
     options.tessellation_bytes = std::min<std::uint64_t>(options.tessellation_bytes, 30 << 20);
   }
   if (isatty(STDERR_FILENO) != 0) {
-    options.progress = [](const std::string& line) { fmt::print(stderr, "{}\n", line); };
+    options.progress = [](const std::string& line) { std::fputs((printable_text(line) + "\n").c_str(), stderr); };
   }
   const BenchResults results = bench_displacement_run(options);
   fmt::print("{}", bench_markdown(results));
+  files.check_output("--json", arguments.json);
+  files.check_output("--html", arguments.html);
   if (!arguments.json.empty()) atomic_write(arguments.json, bench_json(results));
   if (!arguments.html.empty()) atomic_write(arguments.html, bench_html(results));
   return 0;

@@ -6,6 +6,9 @@
 #include <optional>
 #include <string>
 
+#include "cli/arguments.h"
+#include "cli/run_files.h"
+#include "cli/standard_streams.h"
 #include "exporters/atomic_file.h"
 #include "exporters/difference_picture.h"
 #include "exporters/errors.h"
@@ -13,6 +16,7 @@
 #include "exporters/flip.h"
 #include "exporters/image_metrics.h"
 #include "exporters/z_test.h"
+#include "scene/diagnostics.h"
 
 namespace relief {
 
@@ -77,9 +81,7 @@ ZTestResult z_test_of_pictures(const CompareArguments& arguments,
   }
   for (const Picture* picture : {&a, &b}) {
     if (picture->lossy) {
-      std::fprintf(stderr,
-                   "relief: warning: %s: its lossy compression is not in the variances; the z-test may fail for it\n",
-                   picture->file.c_str());
+      print_warning(picture->file + ": its lossy compression is not in the variances; the z-test may fail for it");
     }
   }
   const std::string layer(kAovInfo[static_cast<std::size_t>(Aov::kVariance)].name);
@@ -100,7 +102,7 @@ void print_comparison(const CompareArguments& arguments, const Comparison& compa
   std::printf("bias    %+.6g\n", errors.bias);
   std::printf("max     %.6g", errors.max_difference);
   if (errors.max_difference > 0) {
-    std::printf(" at %d,%d in %s", errors.max_x, errors.max_y, errors.max_channel.c_str());
+    std::printf(" at %d,%d in %s", errors.max_x, errors.max_y, printable_text(errors.max_channel).c_str());
   }
   std::printf("\n");
   if (comparison.flip_mean) {
@@ -114,11 +116,11 @@ void print_comparison(const CompareArguments& arguments, const Comparison& compa
   const ZTestResult& z = *comparison.z_test;
   std::printf("z-test  %s: p = %.3g, significance %g\n", z.passed ? "passed" : "FAILED", z.p, z.significance);
   std::printf("        pixels  p = %-9.3g largest z = %+.3g at %d,%d in %s\n", z.pixel_p, z.largest_pixel.z,
-              z.largest_pixel.x, z.largest_pixel.y, z.largest_pixel.channel.c_str());
+              z.largest_pixel.x, z.largest_pixel.y, printable_text(z.largest_pixel.channel).c_str());
   std::printf("        blocks  p = %-9.3g largest z = %+.3g at %d,%d in %s\n", z.block_p, z.largest_block.z,
-              z.largest_block.x, z.largest_block.y, z.largest_block.channel.c_str());
+              z.largest_block.x, z.largest_block.y, printable_text(z.largest_block.channel).c_str());
   std::printf("        mean    p = %-9.3g largest z = %+.3g in %s\n", z.mean_p, z.largest_mean.z,
-              z.largest_mean.channel.c_str());
+              printable_text(z.largest_mean.channel).c_str());
   std::printf("        chi2    p = %.3g\n", z.chi2_p);
 }
 
@@ -149,6 +151,14 @@ bool is_acceptable(const CompareArguments& arguments, const Comparison& comparis
 
 int compare_run(const CompareArguments& arguments)
 {
+  RunFiles files;
+  files.add_output("--diff", arguments.diff);
+  if (arguments.json != "-") files.add_output("--json", arguments.json);
+  files.add_input("the picture to judge", arguments.a);
+  files.add_input("the reference", arguments.b);
+  for (const std::string& output : {arguments.diff, arguments.json}) {
+    if (output != "-") check_writable(output);
+  }
   const Picture a = exr_load(arguments.a), b = exr_load(arguments.b);
   if (window_text(a) != window_text(b)) {
     throw InputError(a.file, "is " + window_text(a) + ", but '" + b.file + "' is " + window_text(b));
@@ -165,6 +175,8 @@ int compare_run(const CompareArguments& arguments)
   }
   if (arguments.wants_z_test) comparison.z_test = z_test_of_pictures(arguments, a, view_a, b, view_b);
 
+  files.check_output("--diff", arguments.diff);
+  if (arguments.json != "-") files.check_output("--json", arguments.json);
   if (!arguments.diff.empty()) difference_picture_write(arguments.diff, view_a, view_b, arguments.flip.exposure);
   const std::string json = metrics_json(a.file, b.file, comparison.errors, comparison.flip_mean, comparison.z_test);
   if (arguments.json == "-") {
@@ -173,7 +185,7 @@ int compare_run(const CompareArguments& arguments)
     if (!arguments.json.empty()) atomic_write(arguments.json, json);
     print_comparison(arguments, comparison);
   }
-  std::fflush(stdout);
+  standard_output_flush();
   return is_acceptable(arguments, comparison) ? 0 : 1;
 }
 
@@ -186,7 +198,9 @@ void cmd_compare_register(CLI::App& app, std::function<int()>& run)
   command->add_option("A", arguments->a, "OpenEXR file to judge")->required();
   command->add_option("B", arguments->b, "OpenEXR file that is the reference")->required();
   command->add_option("--layer", arguments->layer, "Layer to compare")->capture_default_str();
-  command->add_option("--diff", arguments->diff, "PNG to write: A, B and their signed difference with its scale");
+  command->add_option_function<std::string>(
+      "--diff", [arguments](const std::string& text) { arguments->diff = parse_output("--diff", text, ".png"); },
+      "PNG to write: A, B and their signed difference with its scale");
   command->add_option("--max-rmse", arguments->max_rmse, "Fail (exit code 1) above this RMSE");
   command->add_option("--max-relmse", arguments->max_relmse, "Fail above this mean of (a-b)^2 / (b^2 + 0.01)");
   command->add_option("--max-flip", arguments->max_flip, "Fail above this mean FLIP error");

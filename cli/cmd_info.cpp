@@ -9,6 +9,7 @@
 
 #include "cli/commands.h"
 #include "cli/scene_setup.h"
+#include "cli/standard_streams.h"
 #include "integrator/scene_context.h"
 #include "scene/displaced_mesh.h"
 #include "scene/displacement_seams.h"
@@ -45,16 +46,22 @@ constexpr FeatureName kFeatureNames[] = {
     {&FeatureSet::caustic_casters, "caustic casters"},
 };
 
+/// Prints one line; what is in it may come from the scene.
+template <class... Values>
+void line(fmt::format_string<Values...> format, Values&&... values)
+{
+  print_line(fmt::format(format, std::forward<Values>(values)...));
+}
+
 std::string megabytes(std::size_t bytes) { return fmt::format("{:.1f} MiB", static_cast<double>(bytes) / (1 << 20)); }
 
-void print_names(const char* what, const std::vector<std::string>& names)
+void print_names(const char* what, const std::vector<std::string>& names, std::size_t most = 12)
 {
-  constexpr std::size_t kMost = 12;
-  fmt::print("{} ({}):", what, names.size());
-  for (std::size_t i = 0; i < std::min(names.size(), kMost); ++i) {
-    fmt::print("{} {}", i == 0 ? "" : ",", names[i].empty() ? "(unnamed)" : names[i]);
+  std::string list;
+  for (std::size_t i = 0; i < std::min(names.size(), most); ++i) {
+    list += fmt::format("{} {}", i == 0 ? "" : ",", names[i].empty() ? "(unnamed)" : names[i]);
   }
-  fmt::print("{}\n", names.size() > kMost ? ", …" : "");
+  line("{} ({}):{}{}", what, names.size(), list, names.size() > most ? ", …" : "");
 }
 
 const char* label(HeightFormat format)
@@ -66,12 +73,12 @@ const char* label(Wrap wrap) { return wrap == Wrap::kRepeat ? "repeat" : wrap ==
 
 void print_height_maps(const Scene& scene, const std::vector<HeightRange>& ranges)
 {
-  fmt::print("height maps: {}\n", scene.height_maps.size());
+  line("height maps: {}", scene.height_maps.size());
   for (std::size_t i = 0; i < scene.height_maps.size(); ++i) {
     const HeightMap& map = scene.height_maps[i];
-    fmt::print("  {}: {}x{}, {}, {}, heights {:.6g} to {:.6g}, wrap {}, {}\n", map.label, map.width, map.height,
-               label(map.format), megabytes(map.bytes()), ranges[i].low, ranges[i].high, label(map.wrap_u),
-               label(map.wrap_v));
+    line("  {}: {}x{}, {}, {}, heights {:.6g} to {:.6g}, wrap {}, {}", map.label, map.width, map.height,
+         label(map.format), megabytes(map.bytes()), ranges[i].low, ranges[i].high, label(map.wrap_u),
+         label(map.wrap_v));
   }
 }
 
@@ -109,15 +116,16 @@ void print_displacement(const Scene& scene, int index, const std::vector<HeightR
     seams.all = seam_extent_sum(seams.all, found.all);
     seams.split = seam_extent_sum(seams.split, found.split);
   }
-  fmt::print("  {}: {}, method {}, scale {:g} m, midlevel {:g}, {} space\n", material_names(scene, index),
-             scene.height_maps[map_index].label, kDisplacementMethodLabels[static_cast<std::size_t>(d.method)], d.scale,
-             d.midlevel, d.space == DisplacementSpace::kWorld ? "world" : "object");
-  fmt::print("    meshes: {}", num_meshes);
+  line("  {}: {}, method {}, scale {:g} m, midlevel {:g}, {} space", material_names(scene, index),
+       scene.height_maps[map_index].label, kDisplacementMethodLabels[static_cast<std::size_t>(d.method)], d.scale,
+       d.midlevel, d.space == DisplacementSpace::kWorld ? "world" : "object");
+  std::string covered;
   if (uv.low.x <= uv.high.x) {
-    fmt::print(", uv {:g} to {:g}, {:g} to {:g}", uv.low.x, uv.high.x, uv.low.y, uv.high.y);
+    covered = fmt::format(", uv {:g} to {:g}, {:g} to {:g}", uv.low.x, uv.high.x, uv.low.y, uv.high.y);
   }
-  fmt::print("\n    uv seams with different heights: {}\n", text(seams.all));
-  if (d.weld_seams) fmt::print("      left open by welding: {}\n", text(seams.split));
+  line("    meshes: {}{}", num_meshes, covered);
+  line("    uv seams with different heights: {}", text(seams.all));
+  if (d.weld_seams) line("      left open by welding: {}", text(seams.split));
 }
 
 void print_displacements(const Scene& scene)
@@ -125,7 +133,7 @@ void print_displacements(const Scene& scene)
   std::vector<HeightRange> ranges;
   for (const HeightMap& map : scene.height_maps) ranges.push_back(height_map_range(map.view()));
   print_height_maps(scene, ranges);
-  fmt::print("displacements: {}\n", scene.displacements.size());
+  line("displacements: {}", scene.displacements.size());
   for (std::size_t i = 0; i < scene.displacements.size(); ++i) {
     print_displacement(scene, static_cast<int>(i), ranges);
   }
@@ -135,17 +143,21 @@ void print_displacements(const Scene& scene)
 void print_prepared(const DisplacementSet& displacements, const Statistics& stats)
 {
   const DisplacedMeshReport report = displacements.report();
-  fmt::print("displaced geometries: {}, traced by {}, {}\n", displacements.size(), stats.displacement.method,
-             megabytes(stats.displacement.bytes));
-  fmt::print("  prisms: {}; folded (slower to trace) {}, with normals that cancel {}, without a normal {}\n",
-             stats.displacement.num_prisms, report.num_folded, report.num_short_normals, report.num_degenerate);
-  if (report.num_walls > 0) fmt::print("  walls along seams: {}, one a side\n", report.num_walls);
-  for (const std::string& reason : displacements.reasons()) fmt::print("  {}\n", reason);
+  line("displaced geometries: {}, traced by {}, {}", displacements.size(), stats.displacement.method,
+       megabytes(stats.displacement.bytes));
+  line("  prisms: {}; folded (slower to trace) {}, with normals that cancel {}, without a normal {}",
+       stats.displacement.num_prisms, report.num_folded, report.num_short_normals, report.num_degenerate);
+  if (report.num_walls > 0) line("  walls along seams: {}, one a side", report.num_walls);
+  for (const std::string& reason : displacements.reasons()) line("  {}", reason);
 }
 
-int info(const std::string& file, bool strict, DisplacementOptions displacement, std::optional<CausticsMode> caustics)
+int info(const std::string& file,
+         bool strict,
+         const SceneSetup& setup,
+         DisplacementOptions displacement,
+         std::optional<CausticsMode> caustics)
 {
-  Scene scene = scene_load(file);
+  Scene scene = scene_load(file, setup.load_options());
   if (caustics) scene.render.caustics.mode = *caustics;
   displacement.num_rays = expected_rays(scene.render);
   const SceneContext context(scene, displacement, EnvironmentDensity::kExcess, scene.render.caustics);
@@ -162,27 +174,37 @@ int info(const std::string& file, bool strict, DisplacementOptions displacement,
     placed += scene.meshes[static_cast<std::size_t>(instance.mesh_index)].triangles.size();
   }
   const RenderSettings& r = scene.render;
-  fmt::print("{}\n", file);
-  fmt::print("image: {}x{}, {} samples, {} bounces, seed {}\n", r.width, r.height, r.samples, r.max_bounces, r.seed);
-  fmt::print("frames: {} to {} at {:g} a second\n", r.frame_start, r.frame_end, r.frames_per_second);
-  fmt::print("meshes: {} with {} triangles; instances: {} with {} triangles in all\n", scene.meshes.size(), triangles,
-             scene.instances.size(), placed);
+  line("{}", file);
+  line("image: {}x{}, {} samples, {} bounces, seed {}", r.width, r.height, r.samples, r.max_bounces, r.seed);
+  line("frames: {} to {} at {:g} a second", r.frame_start, r.frame_end, r.frames_per_second);
+  line("meshes: {} with {} triangles; instances: {} with {} triangles in all", scene.meshes.size(), triangles,
+       scene.instances.size(), placed);
+  for (const AnimationClip& clip : scene.clips) {
+    line("  clip {}: {:g} s, from {:g} to {:g} s", clip.name.empty() ? "(unnamed)" : clip.name, clip.end - clip.start,
+         clip.start, clip.end);
+  }
+  if (!scene.instances.empty()) {
+    const Vec3f low = scene.bounds_low, high = scene.bounds_high;
+    line("bounding box: {:g} {:g} {:g} to {:g} {:g} {:g} m", low.x, low.y, low.z, high.x, high.y, high.z);
+  }
+  // Those that RELIEF_reference may override.
+  constexpr std::size_t kMostNodes = 100;
+  print_names("named nodes", scene.node_names, kMostNodes);
   std::vector<std::string> cameras;
   for (const SceneCamera& camera : scene.cameras) cameras.push_back(camera.name);
   print_names("cameras", cameras);
   print_names("materials", scene.material_names);
-  fmt::print("lights: {} placed, {} emissive triangles, {}\n", scene.lights.size(),
-             context.lights.num_emissive_triangles,
-             scene.environment.texture_index >= 0 ? "environment map"
-             : is_zero(scene.environment.color)   ? "no environment"
-                                                  : "constant environment");
+  line("lights: {} placed, {} emissive triangles, {}", scene.lights.size(), context.lights.num_emissive_triangles,
+       scene.environment.texture_index >= 0 ? "environment map"
+       : is_zero(scene.environment.color)   ? "no environment"
+                                            : "constant environment");
   const std::size_t num_textures = scene.textures->views().size();
-  fmt::print("textures: {}\n", num_textures);
+  line("textures: {}", num_textures);
   for (std::size_t i = 0; i < num_textures; ++i) {
     const TextureView& view = scene.textures->views()[i];
-    fmt::print("  {}: {}x{}, {} channel{}{}\n", scene.textures->label(static_cast<int>(i)), view.width, view.height,
-               view.num_channels, view.num_channels == 1 ? "" : "s",
-               scene.textures->is_cached(static_cast<int>(i)) ? ", through the tile cache" : "");
+    line("  {}: {}x{}, {} channel{}{}", scene.textures->label(static_cast<int>(i)), view.width, view.height,
+         view.num_channels, view.num_channels == 1 ? "" : "s",
+         scene.textures->is_cached(static_cast<int>(i)) ? ", through the tile cache" : "");
   }
   if (!scene.displacements.empty()) print_displacements(scene);
   if (context.displacements.size() > 0) print_prepared(context.displacements, stats);
@@ -190,14 +212,14 @@ int info(const std::string& file, bool strict, DisplacementOptions displacement,
   for (const FeatureName& feature : kFeatureNames) {
     if (scene.features.*feature.present) features += fmt::format("{}{}", features.empty() ? "" : ", ", feature.name);
   }
-  fmt::print("caustics: {} ({})\n", context.globals.caustics.enabled ? "photons" : "none", context.caustics_reason);
-  fmt::print("features: {}\n", features.empty() ? "none" : features);
-  fmt::print(
+  line("caustics: {} ({})", context.globals.caustics.enabled ? "photons" : "none", context.caustics_reason);
+  line("features: {}", features.empty() ? "none" : features);
+  line(
       "memory: meshes {}, textures {}, height maps {}, displacement {}, acceleration structure {}, lights "
-      "{}\n",
+      "{}",
       megabytes(stats.mesh_bytes), megabytes(stats.texture_bytes), megabytes(height_map_bytes(scene.height_maps)),
       megabytes(stats.displacement.bytes), megabytes(stats.bvh_bytes), megabytes(stats.light_bytes));
-  for (const std::string& warning : warnings) fmt::print("warning: {}\n", warning);
+  for (const std::string& warning : warnings) line("warning: {}", warning);
   if (strict) refuse_warnings(file, warnings);
   return 0;
 }
@@ -209,6 +231,7 @@ void cmd_info_register(CLI::App& app, Run& run)
   struct Arguments {
     std::string scene;
     bool strict = false;
+    SceneSetup setup;
     DisplacementOptions displacement;
     std::optional<CausticsMode> caustics;
   };
@@ -216,12 +239,14 @@ void cmd_info_register(CLI::App& app, Run& run)
   CLI::App* command = app.add_subcommand("info", "Shows what is in a scene, what it will cost, and every warning");
   command->add_option("scene", arguments->scene, "Scene file (.gltf, .glb)")->required();
   command->add_flag("--strict", arguments->strict, "Turn warnings into errors");
+  add_light_options(*command, arguments->setup);
   add_displacement_method(*command, arguments->displacement);
   add_displacement_memory(*command, arguments->displacement);
   add_caustics_mode(*command, arguments->caustics);
+  add_max_memory(*command);
   command->callback([&run, arguments] {
     run = [arguments] {
-      return info(arguments->scene, arguments->strict, arguments->displacement, arguments->caustics);
+      return info(arguments->scene, arguments->strict, arguments->setup, arguments->displacement, arguments->caustics);
     };
   });
 }

@@ -5,6 +5,9 @@
 #include <memory>
 #include <vector>
 
+#include "cli/arguments.h"
+#include "cli/run_files.h"
+#include "cli/standard_streams.h"
 #include "exporters/exr.h"
 #include "exporters/merge.h"
 
@@ -20,13 +23,18 @@ struct MergeArguments {
 
 int merge_run(const MergeArguments& arguments)
 {
+  RunFiles files;
+  files.add_output("--output", arguments.output);
+  for (const std::filesystem::path& input : arguments.inputs) files.add_input("a picture to join", input);
+  check_writable(arguments.output);
   const MergeResult merged = merge_pictures(arguments.inputs, arguments.options);
   for (const std::string& warning : merged.warnings) {
-    std::fprintf(stderr, "relief: warning: %s\n", warning.c_str());
+    print_warning(warning);
   }
+  files.check_output("--output", arguments.output);
   exr_write(arguments.output, merged.picture);
-  std::printf("%s: %zu pictures, %s samples a pixel\n", arguments.output.c_str(), arguments.inputs.size(),
-              merged.picture.attributes.at("relief:samples").c_str());
+  print_line(arguments.output.string() + ": " + std::to_string(arguments.inputs.size()) + " pictures, " +
+             merged.picture.attributes.at("relief:samples") + " samples a pixel");
   return 0;
 }
 
@@ -40,7 +48,12 @@ void cmd_merge_register(CLI::App& app, std::function<int()>& run)
   command->add_option("inputs", arguments->inputs, "OpenEXR files of the same scene, frame and window")
       ->required()
       ->expected(2, -1);
-  command->add_option("-o,--output", arguments->output, "OpenEXR file to write")->required();
+  command
+      ->add_option_function<std::string>(
+          "-o,--output",
+          [arguments](const std::string& text) { arguments->output = parse_output("--output", text, ".exr"); },
+          "OpenEXR file to write")
+      ->required();
   command->add_flag("--force", arguments->options.force,
                     "Accept files that name another scene or frame, or no seed; equal seeds are never accepted");
   command->callback([arguments, &run] { run = [arguments] { return merge_run(*arguments); }; });

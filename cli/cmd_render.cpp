@@ -25,12 +25,17 @@
 #include "cli/commands.h"
 #include "cli/fingerprint.h"
 #include "cli/interrupt.h"
+#include "cli/picture_options.h"
 #include "cli/progress_printer.h"
+#include "cli/run_files.h"
 #include "cli/scene_setup.h"
+#include "cli/standard_streams.h"
 #include "exporters/atomic_file.h"
+#include "exporters/clipping.h"
 #include "exporters/errors.h"
 #include "exporters/exr.h"
 #include "exporters/image_metrics.h"
+#include "exporters/output_lock.h"
 #include "exporters/png_ocio.h"
 #include "exporters/stats_json.h"
 #include "integrator/render.h"
@@ -44,64 +49,55 @@ namespace {
 constexpr int kInterrupted = 130;
 
 struct RenderArguments {
-  std::string scene, output, png, stats, reference, camera;
-  Resolution resolution;
-  PixelRect crop;
-  std::vector<int> frames;  ///< empty: the rest pose
-  int samples = 0, threads = 0, max_bounces = -1;
+  std::string scene, output, png, stats, reference, preview;
+  PictureOptions picture;
+  FrameList frames;  ///< empty: the rest pose
+  int threads = 0;
   double time_limit = 0, noise_threshold = -1;
-  std::optional<std::uint64_t> seed;
   std::optional<std::string> view;
   std::optional<double> exposure;
   std::uint32_t aov_mask = 0;
-  std::string filter, compression = "zip", progress = "bar";
+  std::string compression = "zip", progress = "bar";
   bool resume = false, strict = false, float_color = false;
   double texture_memory_gib = 4;
-  DisplacementOptions displacement;
-  std::optional<CausticsMode> caustics;
-};
-
-/// Files of one frame; empty: not asked for.
-struct FramePaths {
-  std::filesystem::path exr, png, stats, reference;
+  SceneSetup setup;
+  std::vector<std::string> settings;       ///< see settings_given
+  std::vector<std::string> path_settings;  ///< those that decide a path, as words of a command line
 };
 
 FramePaths paths_of_frame(const RenderArguments& arguments, std::optional<int> frame)
 {
   const auto numbered = [&](const std::string& pattern) {
-    return frame && !pattern.empty() ? frame_path(pattern, *frame) : std::filesystem::path(pattern);
+    // A device or a pipe takes one frame after the other; a file beside it, called after it, is nobody's wish.
+    const bool has_number = frame && !pattern.empty() && !is_stream(output_destination(pattern));
+    return has_number ? frame_path(pattern, *frame) : std::filesystem::path(pattern);
   };
   // One reference may serve all frames; it has a number only where it is asked for.
   const bool has_references =
       std::filesystem::path(arguments.reference).filename().string().find('#') != std::string::npos;
   return {numbered(arguments.output), numbered(arguments.png), numbered(arguments.stats),
-          has_references ? numbered(arguments.reference) : std::filesystem::path(arguments.reference)};
+          has_references ? numbered(arguments.reference) : std::filesystem::path(arguments.reference),
+          numbered(arguments.preview)};
 }
 
-/// No file may be written twice or written over before it is read.
-void check_files_differ(const RenderArguments& arguments)
+/// Options of a frame's outputs with their files.
+std::vector<std::pair<const char*, std::filesystem::path>> outputs_of(const FramePaths& paths)
 {
-  struct Named {
-    const char* option;
-    const std::string& file;
-  };
-  const Named all[] = {{"--output", arguments.output},
-                       {"--png", arguments.png},
-                       {"--stats", arguments.stats},
-                       {"--reference", arguments.reference},
-                       {"the scene", arguments.scene}};
-  const auto is_same = [](const std::string& a, const std::string& b) {
-    std::error_code ignored;
-    return std::filesystem::weakly_canonical(a, ignored) == std::filesystem::weakly_canonical(b, ignored);
-  };
-  constexpr std::size_t kNumOutputs = 3;
-  for (std::size_t i = 0; i < kNumOutputs; ++i) {
-    for (std::size_t k = i + 1; k < std::size(all); ++k) {
-      if (all[i].file.empty() || all[k].file.empty() || !is_same(all[i].file, all[k].file)) continue;
-      throw CLI::ValidationError(
-          all[i].option, fmt::format("expected a file that is not also {}, found '{}'", all[k].option, all[i].file));
-    }
+  return {{"--output", paths.exr}, {"--png", paths.png}, {"--stats", paths.stats}, {"--preview", paths.preview}};
+}
+
+/// All that is known of a run's files before anything is read.
+RunFiles files_of_run(const RenderArguments& arguments, const std::vector<std::optional<int>>& frames)
+{
+  RunFiles files;
+  files.add_input("the scene", arguments.scene);
+  files.add_input("the environment", arguments.setup.environment_file());
+  for (const std::optional<int> frame : frames) {
+    const FramePaths paths = paths_of_frame(arguments, frame);
+    for (const auto& [option, path] : outputs_of(paths)) files.add_output(option, path);
+    files.add_input("the reference", paths.reference);
   }
+  return files;
 }
 
 std::uint64_t peak_memory_bytes()
@@ -117,55 +113,15 @@ std::uint64_t peak_memory_bytes()
   return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024u;
 }
 
-/// Fails now if a file could not be written after hours of work. Pipes are left alone: their reader would see an end.
-void check_writable(const std::filesystem::path& path)
-{
-  std::error_code ignored;
-  const auto status = std::filesystem::status(path, ignored);
-  const bool is_file = std::filesystem::is_regular_file(status) || std::filesystem::is_directory(status);
-  if (path.empty() || (std::filesystem::exists(status) && !is_file)) return;
-  const AtomicFile probe(path);
-}
-
 RenderOptions options_for(const Scene& scene, const RenderArguments& arguments)
 {
-  RenderOptions options;
+  RenderOptions options = render_options(scene, arguments.picture);
   RenderSettings& settings = options.settings;
-  settings = scene.render;
-  if (arguments.resolution.width > 0) {
-    settings.width = arguments.resolution.width;
-    settings.height = arguments.resolution.height;
-  }
-  if (arguments.samples > 0) settings.samples = arguments.samples;
   if (arguments.noise_threshold >= 0) settings.noise_threshold = static_cast<float>(arguments.noise_threshold);
-  if (arguments.max_bounces >= 0) {
-    settings.max_bounces = arguments.max_bounces;
-    settings.diffuse_bounces = std::min(settings.diffuse_bounces, arguments.max_bounces);
-    settings.glossy_bounces = std::min(settings.glossy_bounces, arguments.max_bounces);
-    settings.transmission_bounces = std::min(settings.transmission_bounces, arguments.max_bounces);
-  }
-  if (arguments.seed) settings.seed = *arguments.seed;
   if (arguments.view) settings.view = *arguments.view;
   if (arguments.exposure) settings.exposure = static_cast<float>(*arguments.exposure);
-  if (!arguments.filter.empty()) {
-    settings.filter = arguments.filter == "box" ? PixelFilter::kBox : PixelFilter::kBlackmanHarris;
-    settings.filter_width = arguments.filter == "box" ? 1.0f : 1.5f;
-  }
-  if (arguments.caustics) settings.caustics.mode = *arguments.caustics;
-  options.camera = camera_for_image(scene, arguments.camera, settings.width, settings.height);
-  const PixelRect& crop = arguments.crop;
-  if (crop.x1 > settings.width || crop.y1 > settings.height) {
-    throw CLI::ValidationError(
-        "--crop", fmt::format("expected a window inside the image of {}x{}, found '{},{},{},{}'", settings.width,
-                              settings.height, crop.x0, crop.y0, crop.x1, crop.y1));
-  }
-  options.crop_x0 = crop.x0;
-  options.crop_y0 = crop.y0;
-  options.crop_x1 = crop.x1;
-  options.crop_y1 = crop.y1;
   options.time_limit_seconds = arguments.time_limit;
   options.aov_mask = arguments.aov_mask;
-  options.displacement = arguments.displacement;
   return options;
 }
 
@@ -178,7 +134,9 @@ ExrCompression compression_of(const RenderArguments& arguments)
 /// Settings that do nothing, more than meets the eye, or something else than they say.
 std::vector<std::string> warnings_about(const RenderArguments& arguments, const Scene& scene)
 {
-  std::vector<std::string> texts = displacement_warnings(scene, arguments.displacement);
+  // Looked up although nothing shows it: what is misspelt is to be heard of before the frames are rendered.
+  if (arguments.png.empty() && arguments.view) ColorView unused(*arguments.view);
+  std::vector<std::string> texts = displacement_warnings(scene, arguments.picture.displacement);
   if (arguments.png.empty() && arguments.view) texts.emplace_back("--view has no effect without --png");
   if (arguments.png.empty() && arguments.exposure) texts.emplace_back("--exposure has no effect without --png");
   for (const std::string& layer : exr_damaged_layers(film_layout_make(arguments.aov_mask), compression_of(arguments))) {
@@ -230,12 +188,15 @@ ImageErrors errors_against(const Picture& reference, const FilmView& film)
 
 /// Writes a frame's files, the OpenEXR last: its fingerprint says that all of them are there and whole. It is written even
 /// if another file cannot be, since it is worth the most; then without the fingerprint.
+/// @param files        of the run, to look once more before each is written
 /// @param fingerprint  empty: the render was interrupted
 /// @error OutputError of the first file that could not be written
 void write_frame(const RenderArguments& arguments,
+                 const RunFiles& files,
                  const FramePaths& paths,
                  const std::string& command,
                  std::string fingerprint,
+                 const Attributes& cryptomattes,
                  const PngOptions& png,
                  const FilmView& film,
                  const Statistics& stats,
@@ -243,18 +204,58 @@ void write_frame(const RenderArguments& arguments,
 {
   std::exception_ptr failure;
   try {
+    files.check_output("--png", paths.png);
     if (!paths.png.empty()) png_write(paths.png, film, png);
+    files.check_output("--stats", paths.stats);
     if (!paths.stats.empty()) atomic_write(paths.stats, stats_json(stats));
   } catch (...) {
     failure = std::current_exception();
     fingerprint.clear();
   }
   Attributes attributes = exr_attributes(stats, command);
-  if (!fingerprint.empty()) attributes["relief:fingerprint"] = fingerprint;
+  attributes.insert(cryptomattes.begin(), cryptomattes.end());
+  if (!fingerprint.empty()) attributes.merge(frame_attributes(paths, fingerprint));
+  files.check_output("--output", paths.exr);
   exr_write(paths.exr, film, attributes, {compression_of(arguments), arguments.float_color});
   if (!failure) return;
   progress.note(fmt::format("{}: saved, but not all files of its frame could be", paths.exr.string()));
   std::rethrow_exception(failure);
+}
+
+/// Says what to do about a PNG that is mostly white.
+void hint_at_clipping(ProgressPrinter& progress,
+                      const std::filesystem::path& file,
+                      const FilmView& film,
+                      const ColorView& view,
+                      double exposure)
+{
+  constexpr double kMost = 0.5;
+  const Clipping clipping = picture_clipping(film_layer(film, Aov::kBeauty), view, exposure);
+  if (clipping.fraction <= kMost) return;
+  progress.note(
+      fmt::format("{}: {:.0f} % of what is seen is white: try --exposure {:.1f}, or --luminous-efficacy 683 if the "
+                  "scene's lights are in candela and lux",
+                  file.string(), 100 * clipping.fraction, clipping.exposure));
+}
+
+/// Writes a frame's picture as it is while it is rendered, uncompressed, as it does not last, and tells whoever waits for it.
+/// @return false if it cannot be written: a warning says why, the render goes on
+bool write_preview(const RunFiles& files,
+                   const FramePaths& paths,
+                   int frame,
+                   const FilmView& film,
+                   double samples,
+                   ProgressPrinter& progress)
+{
+  try {
+    files.check_output("--preview", paths.preview);
+    exr_write(paths.preview, film, {{"relief:samples", fmt::format("{:g}", samples)}}, {ExrCompression::kNone, true});
+  } catch (const OutputError& error) {
+    progress.warnings({fmt::format("no more previews: {}", error.what())});
+    return false;
+  }
+  progress.event({{"event", "preview"}, {"frame", frame}, {"output", paths.preview.string()}, {"samples", samples}});
+  return true;
 }
 
 /// Tells people and programs how a frame came out.
@@ -282,28 +283,43 @@ void report_frame(ProgressPrinter& progress,
   }
   progress.event(done);
   if (errors && !progress.is_json()) {
-    std::fputs(fmt::format("against {}: RMSE {:.6g}, relMSE {:.6g} after {:.2f} s\n", paths.reference.string(),
-                           errors->rmse, errors->relmse, stats.render_seconds)
-                   .c_str(),
-               stdout);
+    print_line(fmt::format("against {}: RMSE {:.6g}, relMSE {:.6g} after {:.2f} s", paths.reference.string(),
+                           errors->rmse, errors->relmse, stats.render_seconds));
   }
 }
 
+void report_skipped(ProgressPrinter& progress, const FramePaths& paths, int frame, const std::string& reason)
+{
+  progress.note(fmt::format("{}: {}", paths.exr.string(), reason));
+  progress.event({{"event", "skipped"}, {"frame", frame}, {"output", paths.exr.string()}, {"reason", reason}});
+}
+
 /// One frame, from loading to files.
+/// @param files  of the run; what the frame reads is added
 /// @return false if it was interrupted
 bool render_frame(const RenderArguments& arguments,
                   const std::string& command,
                   std::optional<int> frame,
+                  RunFiles& files,
                   ProgressPrinter& progress)
 {
   const FramePaths paths = paths_of_frame(arguments, frame);
-  for (const auto* path : {&paths.exr, &paths.png, &paths.stats}) check_writable(*path);
+  std::vector<std::unique_ptr<OutputLock>> locks;
+  for (const auto& [option, path] : outputs_of(paths)) {
+    check_writable(path);
+    locks.push_back(std::make_unique<OutputLock>(path));
+    const std::string& holder = locks.back()->holder();
+    if (holder.empty()) continue;
+    if (!arguments.resume) throw OutputError(path.string(), "is being made by " + holder);
+    report_skipped(progress, paths, frame.value_or(0), fmt::format("is being made by {}, left out", holder));
+    return true;
+  }
   const auto load_start = std::chrono::steady_clock::now();
-  LoadOptions load;
-  load.has_frame = frame.has_value();
-  load.frame = frame.value_or(0);
+  LoadOptions load = arguments.setup.load_options(frame);
+  load.camera = camera_choice(arguments.picture);
   load.texture_budget_bytes = static_cast<std::size_t>(arguments.texture_memory_gib * (1u << 30));
   Scene scene = scene_load(arguments.scene, load);
+  files.add_inputs("a file of the scene", scene.files);
 
   Statistics stats;
   stats.load_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - load_start).count();
@@ -315,45 +331,82 @@ bool render_frame(const RenderArguments& arguments,
   progress.warnings(stats.warnings);
   if (arguments.strict) refuse_warnings(arguments.scene, stats.warnings);
 
-  const RenderOptions options = options_for(scene, arguments);
-  const PngOptions png{options.settings.view, options.settings.exposure};
-  std::string storage = fmt::format("{} {}", arguments.compression, arguments.float_color);
+  RenderOptions options = options_for(scene, arguments);
+  PngOptions png{options.settings.view, options.settings.exposure};
+  png.alpha = arguments.setup.background == "transparent";
+  std::vector<FileStamp> files_read = std::move(scene.files);
+  std::optional<ColorView> view;
   if (!paths.png.empty()) {
-    stats.view = ColorView(png.view).description();
-    storage += fmt::format(" {} {}", stats.view, png.exposure);
+    view.emplace(png.view);
+    stats.view = view->description();
+    for (const std::string& file : view->files()) files_read.push_back(file_stamp(file));
+    files.add_inputs("a file of the colour view", files_read);
   }
-  const std::string fingerprint = render_fingerprint(scene, options, storage);
-  const auto is_there = [](const std::filesystem::path& path) { return path.empty() || std::filesystem::exists(path); };
-  if (arguments.resume && is_there(paths.png) && is_there(paths.stats) && is_whole_render(paths.exr, fingerprint)) {
-    progress.note(fmt::format("{}: already rendered", paths.exr.string()));
-    progress.event({{"event", "skipped"}, {"frame", stats.frame}, {"output", paths.exr.string()}});
+  const std::string fingerprint = render_fingerprint(arguments.settings, frame, files_read);
+  if (arguments.resume && is_whole_render(paths, fingerprint)) {
+    report_skipped(progress, paths, stats.frame, "already rendered");
     return true;
   }
   const std::optional<Picture> reference = reference_load(paths.reference, options);
 
   const std::string title = frame ? fmt::format("frame {} ", *frame) : std::string();
+  bool shows_previews = true;
+  if (!paths.preview.empty()) {
+    options.preview = [&](const FilmView& film, double samples) {
+      if (shows_previews) shows_previews = write_preview(files, paths, stats.frame, film, samples, progress);
+    };
+  }
   const RenderedImage image = render(scene, options, interrupt_flag(), progress.callback(stats.frame, title), stats);
   stats.peak_memory_bytes = peak_memory_bytes();
+  if (stats.first_nonfinite) {
+    stats.warnings.push_back("samples that were not finite count as black; the first one's rays: " +
+                             replay_command(arguments.scene, arguments.path_settings, frame, *stats.first_nonfinite));
+  }
+  const Attributes cryptomattes = exr_cryptomatte_attributes(scene, options.aov_mask);
   scene = {};  // Pictures are written in the memory of what they were made from.
   const bool is_whole = stats.stop_reason != "interrupted";
-  if (!is_whole && stats.samples_per_pixel <= 0) {
+  if (stats.samples_per_pixel <= 0) {
+    if (is_whole) throw OutputError(paths.exr, "not written: the time limit came before the first sample");
     progress.note(fmt::format("{}: interrupted before the first sample, not written", paths.exr.string()));
     return false;
   }
+  // Textures may be read until here.
+  const std::vector<std::string> changed = files_changed(files_read);
+  for (const std::string& file : changed) {
+    stats.warnings.push_back(file + ": changed after the render had begun: the picture may show either state");
+  }
   progress.warnings(stats.warnings);
-  write_frame(arguments, paths, command, is_whole ? fingerprint : std::string(), png, image.view, stats, progress);
+  write_frame(arguments, files, paths, command, is_whole && changed.empty() ? fingerprint : std::string(), cryptomattes,
+              png, image.view, stats, progress);
   std::optional<ImageErrors> errors;
   if (reference) errors = errors_against(*reference, image.view);
   report_frame(progress, paths, stats, errors);
+  if (view) hint_at_clipping(progress, paths.png, image.view, *view, png.exposure);
   if (arguments.strict) refuse_warnings(arguments.scene, stats.warnings);
   return is_whole;
 }
 
+/// Frames in the order in which they are rendered; nothing stands for the rest pose.
+std::vector<std::optional<int>> frames_of_run(const RenderArguments& arguments)
+{
+  std::vector<int> numbers = arguments.frames.numbers;
+  if (arguments.frames.all) {
+    const auto [first, last] = scene_frame_range(arguments.scene);
+    if (first < 0 || last > kLastFrame) {
+      throw CLI::ValidationError(
+          "--frames",
+          fmt::format("expected a scene whose frames are from 0 to {}, found {} to {}", kLastFrame, first, last));
+    }
+    for (int frame = first; frame <= last; ++frame) numbers.push_back(frame);
+  }
+  if (numbers.empty()) return {std::nullopt};
+  return {numbers.begin(), numbers.end()};
+}
+
 int render_all(const RenderArguments& arguments, const std::string& command)
 {
-  check_files_differ(arguments);
-  std::vector<std::optional<int>> frames(arguments.frames.begin(), arguments.frames.end());
-  if (frames.empty()) frames.emplace_back();
+  const std::vector<std::optional<int>> frames = frames_of_run(arguments);
+  RunFiles files = files_of_run(arguments, frames);
 
   interrupt_watch();
   const int threads = arguments.threads > 0 ? arguments.threads : tbb::info::default_concurrency();
@@ -363,18 +416,10 @@ int render_all(const RenderArguments& arguments, const std::string& command)
   ProgressPrinter progress(arguments.progress);
   for (const std::optional<int> frame : frames) {
     bool is_whole = false;
-    arena.execute([&] { is_whole = render_frame(arguments, command, frame, progress); });
+    arena.execute([&] { is_whole = render_frame(arguments, command, frame, files, progress); });
     if (!is_whole || interrupt_flag()) return kInterrupted;
   }
   return 0;
-}
-
-/// A text option that is parsed into `value` while the command line is read.
-template <class Value, class Parse>
-CLI::Option* add_parsed(CLI::App& command, const char* name, Value& value, Parse parse, const char* description)
-{
-  return command.add_option_function<std::string>(
-      name, [&value, parse](const std::string& text) { value = parse(text); }, description);
 }
 
 }  // namespace
@@ -395,29 +440,22 @@ void cmd_render_register(CLI::App& app, Run& run, const std::string& command_lin
       ->required();
   add_parsed(*command, "--png", a.png, output("--png", ".png"), "PNG to write, through a colour view");
   command->add_option("--stats", a.stats, "JSON file of statistics to write");
-  add_parsed(*command, "--resolution", a.resolution, parse_resolution, "WIDTHxHEIGHT in pixels (default: the scene's)");
-  command->add_option("--spp", a.samples, "Samples a pixel (default: the scene's)")->check(whole_number(1, 1 << 24));
+  add_parsed(*command, "--preview", a.preview, output("--preview", ".exr"),
+             "OpenEXR to write now and then while rendering");
+  std::vector<CLI::Option*> path_options = add_picture_options(*command, a.picture);
+  for (CLI::Option* option : add_ray_options(*command, a.picture)) path_options.push_back(option);
+  for (CLI::Option* option : add_light_options(*command, a.setup)) path_options.push_back(option);
   command->add_option("--time-limit", a.time_limit, "Stop sampling a frame after this many seconds")
       ->check(number(0.001, 1e9));
   command
       ->add_option("--noise-threshold", a.noise_threshold,
                    "Stop a tile at this estimated error relative to its mean (0: off)")
       ->check(number(0, 1e6));
-  add_parsed(*command, "--seed", a.seed, parse_seed, "Seed of the random numbers (default: the scene's)");
   command->add_option("--threads", a.threads, "Threads (default: all processors)")->check(whole_number(1, 4096));
-  add_parsed(*command, "--frames", a.frames, parse_frames, "Frames, such as 1-10,20,30-60x2 (default: the rest pose)");
+  add_parsed(*command, "--frames", a.frames, parse_frames,
+             "Frames, such as 1-10,20,30-60x2, or all of the scene (default: the rest pose)");
   command->add_flag("--resume", a.resume, "Skip frames whose files are whole and of the same scene and settings");
   command->add_flag("--strict", a.strict, "Turn warnings into errors");
-  command->add_option("--camera", a.camera, "Name of the camera (default: the first)");
-  add_parsed(*command, "--crop", a.crop, parse_crop, "X0,Y0,X1,Y1: render this window of the image only");
-  command->add_option("--max-bounces", a.max_bounces, "Scattering events after the first hit")
-      ->check(whole_number(0, 200));
-  add_displacement_method(*command, a.displacement);
-  add_displacement_memory(*command, a.displacement);
-  add_displacement_lod(*command, a.displacement);
-  add_caustics_mode(*command, a.caustics);
-  command->add_option("--filter", a.filter, "Pixel filter: box (1 px) or blackman-harris (1.5 px)")
-      ->check(one_of({"box", "blackman-harris"}));
   command->add_option("--view", a.view, "OpenColorIO view of the PNG");
   command->add_option("--exposure", a.exposure, "Exposure of the PNG in stops")->check(number(-100, 100));
   add_parsed(*command, "--aov", a.aov_mask, parse_aovs, "Layers to keep: names separated by commas, or all")
@@ -435,7 +473,10 @@ void cmd_render_register(CLI::App& app, Run& run, const std::string& command_lin
                    "GiB of textures to keep in memory; more are read through a tile cache")
       ->check(number(0, 1e6))
       ->capture_default_str();
-  command->callback([&run, command_line, arguments] {
+  add_max_memory(*command);
+  command->callback([&run, command_line, arguments, command, path_options] {
+    arguments->settings = settings_given(*command);
+    arguments->path_settings = words_given(path_options);
     run = [command_line, arguments] { return render_all(*arguments, command_line); };
   });
 }

@@ -15,11 +15,16 @@
 
 #include "cli/arguments.h"
 #include "cli/commands.h"
+#include "cli/picture_options.h"
+#include "cli/run_files.h"
 #include "cli/scene_setup.h"
+#include "cli/standard_streams.h"
 #include "exporters/atomic_file.h"
 #include "exporters/errors.h"
 #include "integrator/trace.h"
+#include "scene/diagnostics.h"
 #include "scene/load.h"
+#include "scene/memory.h"
 
 namespace relief {
 
@@ -29,13 +34,12 @@ namespace {
 constexpr std::string_view kPathRay = "path", kShadowRay = "shadow";
 
 struct TraceArguments {
-  std::string scene, rays, output = "-", camera;
+  std::string scene, rays, output = "-";
   std::optional<PixelSample> pixel;
-  Resolution resolution;
-  std::optional<std::uint64_t> seed;
+  PictureOptions picture;
   std::optional<int> frame;
   int explain = -1;  ///< ray to explain, −1: none
-  DisplacementOptions displacement;
+  SceneSetup setup;
 };
 
 /// Words of a line, separated by blanks.
@@ -71,6 +75,23 @@ std::optional<TraceRay> parse_ray(std::span<const std::string_view> words)
   return is_valid ? std::optional(ray) : std::nullopt;
 }
 
+/// Reads a line, which ends: a device or a picture given for a file of rays may have none.
+/// @return  false at the end of the file
+/// @error   InputError
+bool get_line(std::istream& in, const std::string& file, int number, std::string& line)
+{
+  constexpr std::size_t kLongest = 4096;
+  line.clear();
+  for (int c = in.get(); c != std::char_traits<char>::eof(); c = in.get()) {
+    if (c == '\n') return true;
+    line += static_cast<char>(c);
+    if (line.size() > kLongest) {
+      throw InputError(file, fmt::format("line {}: expected at most {} characters, found more", number, kLongest));
+    }
+  }
+  return !line.empty();
+}
+
 std::vector<TraceRay> read_rays(const std::string& file)
 {
   std::error_code ignored;
@@ -80,7 +101,8 @@ std::vector<TraceRay> read_rays(const std::string& file)
   }
   std::vector<TraceRay> rays;
   std::string line;
-  for (int number = 1; std::getline(in, line); ++number) {
+  MemoryWatch memory;
+  for (int number = 1; get_line(in, file, number, line); ++number) {
     const std::vector<std::string_view> words = split_words(line);
     if (words.empty() || words[0].front() == '#') continue;
     const std::optional<TraceRay> ray = parse_ray(words);
@@ -90,7 +112,11 @@ std::vector<TraceRay> read_rays(const std::string& file)
                                          number, line.substr(0, 200)));
     }
     rays.push_back(*ray);
+    memory.add(2 * sizeof(TraceRay), file);
   }
+  // Each has a hit, and a line is written of that, in a text that grows by doubling.
+  constexpr std::size_t kLineBytes = 200;
+  memory_require(rays.size() * (sizeof(TraceHit) + 2 * kLineBytes), file);
   if (in.bad()) throw InputError(file, "expected a readable file of rays, found an error while reading");
   return rays;
 }
@@ -123,12 +149,12 @@ std::string visit_text(const Scene& scene, const PrismVisit& visit)
 {
   const Instance& instance = scene.instances[visit.instance];
   const PrismExplanation e = prism_explain(visit);
-  std::string text =
-      fmt::format("mesh {} triangle {} (node '{}'): ", instance.mesh_index, visit.triangle, instance.name);
+  std::string text = fmt::format("mesh {} triangle {} (node '{}'): ", instance.mesh_index, visit.triangle,
+                                 printable_text(instance.name));
   if (e.num_stretches == 0) return text + "in its box, beside its prism\n";
-  text += fmt::format("prism{}, searched from t {} to {}\n", e.folded ? " (folded)" : "", visit.t_min, visit.t_max);
-  text += fmt::format("  object space: origin {} {} {}, direction {} {} {}\n", visit.O.x, visit.O.y, visit.O.z,
-                      visit.D.x, visit.D.y, visit.D.z);
+  text += fmt::format("prism{}, searched from t {} to {}\n", e.folded ? " (folded)" : "", e.t_min, e.t_max);
+  text += fmt::format("  object space: origin {} {} {}, direction {} {} {}\n", e.ray.O.x, e.ray.O.y, e.ray.O.z,
+                      e.ray.D.x, e.ray.D.y, e.ray.D.z);
   for (int k = 0; k < e.num_stretches; ++k) {
     const PrismStretch& s = e.stretches[k];
     text += fmt::format("  inside: t {} to {}, s {} to {}\n", s.t0, s.t1, s.s0, s.s1);
@@ -137,7 +163,7 @@ std::string visit_text(const Scene& scene, const PrismVisit& visit)
                       visit.counters.inversions);
   if (!visit.found) return text + "  no hit\n";
   const DisplacedHit& hit = visit.hit;
-  return text + fmt::format("  hit: t {}, b {} {} {}, uv {} {}, cell {} {}, height {}, displacement {} m\n", hit.t,
+  return text + fmt::format("  hit: t {}, b {} {} {}, uv {} {}, cell {} {}, height {}, displacement {} m\n", e.t,
                             1.0 - hit.b1 - hit.b2, hit.b1, hit.b2, e.u, e.v, e.i, e.j, e.h, e.d);
 }
 
@@ -163,26 +189,31 @@ std::string explanation_text(const Scene& scene, const SceneContext& context, co
                             h.triangle_index, h.P.x, h.P.y, h.P.z, h.Ng.x, h.Ng.y, h.Ng.z);
 }
 
-/// The rays of one path, in lines that --rays takes back.
-std::string path_rays(const TraceArguments& arguments, const Scene& scene)
+/// The path of --pixel as a render follows it.
+PathReplay replay(const TraceArguments& arguments, const Scene& scene)
 {
-  RenderOptions options;
-  RenderSettings& settings = options.settings;
-  settings = scene.render;
-  if (arguments.seed) settings.seed = *arguments.seed;
-  if (arguments.resolution.width > 0) {
-    settings.width = arguments.resolution.width;
-    settings.height = arguments.resolution.height;
-  }
-  options.camera = camera_for_image(scene, arguments.camera, settings.width, settings.height);
+  const RenderOptions options = render_options(scene, arguments.picture);
   const PixelSample& at = *arguments.pixel;
-  if (at.x >= settings.width || at.y >= settings.height) {
-    throw CLI::ValidationError("--pixel", fmt::format("expected a pixel inside the image of {}x{}, found '{},{}'",
-                                                      settings.width, settings.height, at.x, at.y));
+  const FilmWindow window = render_window(options);
+  const int x1 = window.x0 + window.width, y1 = window.y0 + window.height;
+  if (at.x < window.x0 || at.x >= x1 || at.y < window.y0 || at.y >= y1) {
+    throw CLI::ValidationError(
+        "--pixel", fmt::format("expected a pixel of {},{},{},{} (X1 and Y1 excluded), found '{},{}'", window.x0,
+                               window.y0, x1, y1, at.x, at.y));
   }
-  std::string text = "# kind ox oy oz dx dy dz tmin tmax: rays of the path in order\n";
-  for (const RecordedRay& r :
-       trace_path(SceneContext(scene, arguments.displacement), options, at.x, at.y, at.sample_index)) {
+  if (at.sample_index >= static_cast<std::uint32_t>(options.settings.samples)) {
+    throw CLI::ValidationError("--pixel", fmt::format("expected one of {} samples (--spp), counted from 0, found '{}'",
+                                                      options.settings.samples, at.sample_index));
+  }
+  return trace_path(scene, options, at);
+}
+
+/// What a path brings, and its rays in lines that --rays takes back.
+std::string replay_text(const PathReplay& path)
+{
+  std::string text = fmt::format("# radiance {} {} {}\n", path.radiance.x, path.radiance.y, path.radiance.z);
+  text += "# kind ox oy oz dx dy dz tmin tmax: rays of the path in order\n";
+  for (const RecordedRay& r : path.rays) {
     text += fmt::format("{} {} {} {} {} {} {} {} {}\n", r.shadow ? kShadowRay : kPathRay, r.O.x, r.O.y, r.O.z, r.D.x,
                         r.D.y, r.D.z, r.t_min, r.t_max);
   }
@@ -191,6 +222,13 @@ std::string path_rays(const TraceArguments& arguments, const Scene& scene)
 
 int trace(const TraceArguments& arguments)
 {
+  RunFiles files;
+  const std::string output = arguments.output == "-" ? "" : arguments.output;
+  files.add_output("--output", output);
+  files.add_input("the scene", arguments.scene);
+  files.add_input("the environment", arguments.setup.environment_file());
+  files.add_input("the rays", arguments.rays);
+  check_writable(output);
   // Rays first: their mistakes are found before a large scene is loaded.
   std::vector<TraceRay> rays;
   if (!arguments.pixel) rays = read_rays(arguments.rays);
@@ -198,22 +236,26 @@ int trace(const TraceArguments& arguments)
     throw CLI::ValidationError("--explain", fmt::format("expected one of {} rays, counted from 0, found '{}'",
                                                         rays.size(), arguments.explain));
   }
-  LoadOptions load;
-  load.has_frame = arguments.frame.has_value();
-  load.frame = arguments.frame.value_or(0);
+  LoadOptions load = arguments.setup.load_options(arguments.frame);
+  load.camera = camera_choice(arguments.picture);
   const Scene scene = scene_load(arguments.scene, load);
-  const auto warn = [](const std::string& text) { fmt::print(stderr, "relief: warning: {}\n", text); };
-  for (const std::string& text : scene.warnings) warn(text);
-  for (const std::string& text : displacement_warnings(scene, arguments.displacement)) warn(text);
+  files.add_inputs("a file of the scene", scene.files);
+  for (const std::string& text : scene.warnings) print_warning(text);
+  for (const std::string& text : displacement_warnings(scene, arguments.picture.displacement)) print_warning(text);
   if (arguments.pixel) {
-    write_text(arguments.output, path_rays(arguments, scene));
+    const PathReplay path = replay(arguments, scene);
+    for (const std::string& text : path.warnings) print_warning(text);
+    files.check_output("--output", output);
+    write_text(arguments.output, replay_text(path));
     return 0;
   }
-  const SceneContext context(scene, arguments.displacement);
-  for (const std::string& text : context.displacements.warnings()) warn(text);
-  write_text(arguments.output, arguments.explain >= 0
-                                   ? explanation_text(scene, context, rays[static_cast<std::size_t>(arguments.explain)])
-                                   : hits_csv(trace_rays(context, rays)));
+  const SceneContext context(scene, arguments.picture.displacement);
+  for (const std::string& text : context.displacements.warnings()) print_warning(text);
+  const std::string text = arguments.explain >= 0
+                               ? explanation_text(scene, context, rays[static_cast<std::size_t>(arguments.explain)])
+                               : hits_csv(trace_rays(context, rays));
+  files.check_output("--output", output);
+  write_text(arguments.output, text);
   return 0;
 }
 
@@ -234,22 +276,13 @@ void cmd_trace_register(CLI::App& app, Run& run)
       ->capture_default_str();
   command->add_option("--frame", a.frame, "Frame of the animation (default: the rest pose)")
       ->check(whole_number(0, 1'000'000));
-  add_displacement_method(*command, a.displacement);
-  add_displacement_lod(*command, a.displacement);
+  add_light_options(*command, a.setup);
+  add_ray_options(*command, a.picture);
+  for (CLI::Option* option : add_picture_options(*command, a.picture)) option->needs(pixel);
+  add_max_memory(*command);
   command->add_option("--explain", a.explain, "Tell what this ray did in displaced meshes instead, counted from 0")
       ->check(whole_number(0, std::numeric_limits<int>::max()))
       ->needs(rays);
-  command->add_option("--camera", a.camera, "Camera of --pixel (default: the first)")->needs(pixel);
-  command
-      ->add_option_function<std::string>(
-          "--resolution", [&a](const std::string& text) { a.resolution = parse_resolution(text); },
-          "Image size of --pixel (default: the scene's)")
-      ->needs(pixel);
-  command
-      ->add_option_function<std::string>(
-          "--seed", [&a](const std::string& text) { a.seed = parse_seed(text); },
-          "Seed of --pixel (default: the scene's)")
-      ->needs(pixel);
   command->callback([&run, arguments, rays, pixel] {
     if (rays->count() + pixel->count() == 0) throw CLI::RequiredError("--rays or --pixel");
     run = [arguments] { return trace(*arguments); };

@@ -1,103 +1,103 @@
 #include "cli/fingerprint.h"
 
-#include <cstring>
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <iterator>
+#include <memory>
+#include <string_view>
 
 #include <fmt/format.h>
 
 #include "exporters/errors.h"
 #include "exporters/exr.h"
+#include "exporters/side_file.h"
 
 namespace relief {
 
 namespace {
 
-/// FNV-1a, 64 bits: enough to notice a change; nobody attacks it.
-class Hash {
- public:
-  void add_bytes(const void* data, std::size_t size)
-  {
-    const auto* bytes = static_cast<const unsigned char*>(data);
-    for (std::size_t i = 0; i < size; ++i) value_ = (value_ ^ bytes[i]) * 0x100000001b3u;
-  }
-  template <class T>
-  void add(const T& value)
-  {
-    static_assert(std::has_unique_object_representations_v<T> || std::is_floating_point_v<T>);
-    add_bytes(&value, sizeof(value));
-  }
-  void add(const std::string& text)
-  {
-    add(text.size());
-    add_bytes(text.data(), text.size());
-  }
-  void add(Vec3f v)
-  {
-    add(v.x);
-    add(v.y);
-    add(v.z);
-  }
-  void add(const Affine3& m)
-  {
-    for (const Vec3f axis : {m.x, m.y, m.z, m.p}) add(axis);
-  }
-  std::string text() const { return fmt::format("{:016x}", value_); }
+// Options by which no picture differs: --threads, --progress and --preview change how it comes about, the others which files
+// are read and whether the run fails. The scene counts with its content.
+constexpr std::string_view kUncounted[] = {"--help",    "scene",      "--frames",    "--resume",  "--strict",
+                                           "--threads", "--progress", "--reference", "--preview", "--max-memory"};
+// Only whether they are given counts, and not where the files are.
+constexpr std::string_view kOutputs[] = {"--output", "--png", "--stats"};
 
- private:
-  std::uint64_t value_ = 0xcbf29ce484222325u;
-};
+template <class Names>
+bool is_among(const Names& names, const CLI::Option& option)
+{
+  return std::any_of(std::begin(names), std::end(names),
+                     [&](std::string_view name) { return option.check_name(std::string(name)); });
+}
+
+/// Hash of a file's bytes; empty if there is none, or if it is no file, and so cannot be looked at again.
+std::string file_hash(const std::filesystem::path& path)
+{
+  std::error_code ignored;
+  if (path.empty() || !std::filesystem::is_regular_file(path, ignored)) return {};
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "rb"), &std::fclose);
+  if (!file) return {};
+  std::uint64_t hash = hash_of({});
+  std::array<char, 1 << 16> block;
+  for (std::size_t size = 0; (size = std::fread(block.data(), 1, block.size(), file.get())) > 0;) {
+    hash = hash_of({block.data(), size}, hash);
+  }
+  return fmt::format("{:016x}", hash);
+}
 
 }  // namespace
 
-std::string render_fingerprint(const Scene& scene, const RenderOptions& options, const std::string& storage)
+std::vector<std::string> settings_given(const CLI::App& command)
 {
-  Hash hash;
-  hash.add(storage);
-  hash.add(std::string(RELIEF_VERSION));
-  for (const std::string& file : scene.files) {
-    std::error_code ignored;
-    hash.add(file);
-    hash.add(std::filesystem::file_size(file, ignored));
-    hash.add(std::filesystem::last_write_time(file, ignored).time_since_epoch().count());
+  std::vector<std::string> settings;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->count() == 0 || is_among(kUncounted, *option)) continue;
+    settings.push_back(option->get_name());
+    if (is_among(kOutputs, *option)) continue;
+    settings.insert(settings.end(), option->results().begin(), option->results().end());
   }
-  for (const Instance& instance : scene.instances) hash.add(instance.world_from_object);
-  for (const Light& light : scene.lights) {
-    for (const Vec3f v : {light.P, light.axis, light.edge_u, light.edge_v}) hash.add(v);
-  }
-  const Camera& camera = options.camera;
-  hash.add(static_cast<int>(camera.projection));
-  hash.add(camera.world_from_camera);
-  for (const float v : {camera.half_width, camera.half_height, camera.shift_x, camera.shift_y, camera.aperture_radius,
-                        camera.focus_distance, camera.clip_start, camera.clip_end}) {
-    hash.add(v);
-  }
-  const RenderSettings& s = options.settings;
-  for (const int v : {s.width, s.height, s.samples, s.max_bounces, s.diffuse_bounces, s.glossy_bounces,
-                      s.transmission_bounces, s.transparent_bounces, static_cast<int>(s.filter), options.crop_x0,
-                      options.crop_y0, options.crop_x1, options.crop_y1}) {
-    hash.add(v);
-  }
-  for (const float v : {s.noise_threshold, s.clamp_indirect, s.filter_width}) hash.add(v);
-  hash.add(static_cast<int>(s.caustics.mode));
-  for (const double v : {s.caustics.photons, s.caustics.memory_mib}) hash.add(v);
-  for (const float v : {s.caustics.alpha, s.caustics.radius}) hash.add(v);
-  hash.add(s.seed);
-  hash.add(options.time_limit_seconds);
-  hash.add(options.aov_mask);
-  hash.add(options.displacement.method ? static_cast<int>(*options.displacement.method) : -1);
-  hash.add(options.displacement.auto_bytes);
-  hash.add(options.displacement.lod.value_or(-2));
-  return hash.text();
+  return settings;
 }
 
-bool is_whole_render(const std::filesystem::path& exr, const std::string& fingerprint)
+std::string render_fingerprint(const std::vector<std::string>& settings,
+                               std::optional<int> frame,
+                               const std::vector<FileStamp>& files)
+{
+  // Lengths keep apart what stands side by side.
+  std::string text = fmt::format("{}\n{}\n", RELIEF_VERSION, frame ? std::to_string(*frame) : "rest");
+  for (const std::string& setting : settings) text += fmt::format("{} {}\n", setting.size(), setting);
+  for (const FileStamp& file : files) {
+    text += fmt::format("{} {} {} {}\n", file.inode, file.bytes, file.modified_ns, file.changed_ns);
+  }
+  return fmt::format("{:016x}", hash_of(text));
+}
+
+Attributes frame_attributes(const FramePaths& paths, const std::string& fingerprint)
+{
+  Attributes attributes = {{"relief:fingerprint", fingerprint},
+                           {"relief:png_hash", file_hash(paths.png)},
+                           {"relief:stats_hash", file_hash(paths.stats)}};
+  std::erase_if(attributes, [](const auto& entry) { return entry.second.empty(); });
+  return attributes;
+}
+
+bool is_whole_render(const FramePaths& paths, const std::string& fingerprint)
 {
   std::error_code ignored;
-  if (!std::filesystem::is_regular_file(exr, ignored)) return false;
+  if (!std::filesystem::is_regular_file(paths.exr, ignored)) return false;
+  const auto is_there = [&](const std::filesystem::path& path) {
+    return path.empty() || std::filesystem::exists(path, ignored);
+  };
+  if (!is_there(paths.png) || !is_there(paths.stats)) return false;
   try {
     // Reading all of it also finds a file that was cut short while it was copied.
-    const Attributes attributes = exr_load(exr).attributes;
-    const auto found = attributes.find("relief:fingerprint");
-    return found != attributes.end() && found->second == fingerprint;
+    const Attributes found = exr_load(paths.exr).attributes;
+    const Attributes expected = frame_attributes(paths, fingerprint);
+    return std::all_of(expected.begin(), expected.end(), [&](const auto& entry) {
+      const auto at = found.find(entry.first);
+      return at != found.end() && at->second == entry.second;
+    });
   } catch (const InputError&) {
     return false;
   }

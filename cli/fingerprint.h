@@ -2,18 +2,40 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <vector>
 
-#include "integrator/render.h"
+#include <CLI/CLI.hpp>
+
+#include "exporters/picture.h"
+#include "scene/file_stamp.h"
 
 namespace relief {
 
-/// Hash over every file the scene was read from (path, size, time of last change), the frame's camera, transforms and
-/// the settings that change pixels. 16 hexadecimal digits.
-/// @param storage  how the pixels are stored, as text: whatever changes the files but not the render
-std::string render_fingerprint(const Scene& scene, const RenderOptions& options, const std::string& storage);
+/// Files of one frame; empty: not asked for.
+struct FramePaths {
+  std::filesystem::path exr, png, stats, reference, preview;
+};
 
-/// True if the file is a complete picture that carries the fingerprint. A picture that was interrupted carries none.
-bool is_whole_render(const std::filesystem::path& exr, const std::string& fingerprint);
+/// Every option of the command line that was given, with its values, but for those of which fingerprint.cpp says that they do
+/// not change what is written. So an option that is new counts.
+/// @pre the command line has been parsed
+std::vector<std::string> settings_given(const CLI::App& command);
+
+/// Hash over what decides a frame: this version, the options, the frame, and every file that it was read from (inode, size,
+/// time of the last change of content and of anything else; not the name or the device, which differ between machines that
+/// share a folder). 16 hexadecimal digits.
+/// @param files  stamps from before the files were read
+std::string render_fingerprint(const std::vector<std::string>& settings,
+                               std::optional<int> frame,
+                               const std::vector<FileStamp>& files);
+
+/// Attributes of a whole frame's OpenEXR: its fingerprint, and hashes of the other files as they are on disk.
+Attributes frame_attributes(const FramePaths& paths, const std::string& fingerprint);
+
+/// True if the OpenEXR is a complete picture with the attributes that this frame would get, so that the other files are what
+/// was written with it. A picture that was interrupted has none.
+bool is_whole_render(const FramePaths& paths, const std::string& fingerprint);
 
 }  // namespace relief

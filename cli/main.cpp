@@ -1,17 +1,22 @@
 // The `relief` program: picks the sub-command, prints errors, chooses the exit code. Nothing else prints errors.
-#include <cerrno>
+#include <algorithm>
+#include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <new>
 #include <string>
-#include <string_view>
-#include <system_error>
+#include <vector>
 
+#include "cli/arguments.h"
 #include "cli/cmd_compare.h"
 #include "cli/cmd_merge.h"
 #include "cli/commands.h"
+#include "cli/standard_streams.h"
+#include "cli/suggestion.h"
 #include "exporters/errors.h"
 #include "scene/diagnostics.h"
+#include "scene/memory.h"
 
 namespace {
 
@@ -20,30 +25,57 @@ enum ExitCode : int { kDone = 0, kFailed = 1, kUsage = 2, kInvalidScene = 3 };
 /// Prints an error and a hint (empty: none). Nothing can be done about a message that cannot be written.
 int report(ExitCode code, const std::string& what, const std::string& hint = {})
 {
-  std::string text = "relief: " + what + "\n";
-  if (!hint.empty()) text += "  " + hint + "\n";
+  std::string text = "relief: " + relief::printable_text(what) + "\n";
+  if (!hint.empty()) text += "  " + relief::printable_text(hint) + "\n";
   std::fputs(text.c_str(), stderr);
   return code;
 }
 
-/// An argument as a shell would have to be given it again.
-std::string quoted(std::string_view argument)
+constexpr const char* kMemoryHint =
+    "--max-memory, --texture-memory, --resolution and a shell's ulimit -v set what is needed and what there is";
+
+/// An error that may come of a lack of memory, told by a library's words.
+int report_of_library(ExitCode code, const std::exception& error)
 {
-  constexpr std::string_view kPlain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-+=.,:/#@%";
-  // A # begins a comment only where a word begins.
-  if (!argument.empty() && argument.front() != '#' && argument.find_first_not_of(kPlain) == std::string_view::npos) {
-    return std::string(argument);
+  if (!relief::is_out_of_memory(error.what())) return report(code, error.what());
+  return report(kFailed, std::string("out of memory: ") + error.what(), kMemoryHint);
+}
+
+/// Memory may be short where no exception can pass: a library's threads, functions that must not fail. Those end the program;
+/// what they say of it should be no riddle.
+[[noreturn]] void end_without_memory()
+{
+  try {
+    if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
+  } catch (const std::bad_alloc&) {
+    std::fputs("relief: out of memory\n", stderr);
+    std::_Exit(kFailed);
+  } catch (const std::exception& error) {
+    if (relief::is_out_of_memory(error.what())) {
+      std::fprintf(stderr, "relief: out of memory: %s\n", error.what());
+      std::_Exit(kFailed);
+    }
+    std::fprintf(stderr, "relief: %s\n", error.what());
+  } catch (...) {
   }
-  std::string text = "'";
-  for (const char c : argument) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
+  std::abort();
+}
+
+/// What was typed, without the program's name; `help` is another word for --help.
+std::vector<std::string> arguments_of(int argc, char** argv)
+{
+  std::vector<std::string> arguments(argv + std::min(argc, 1), argv + argc);
+  if (!arguments.empty() && arguments.front() == "help") {
+    arguments.erase(arguments.begin());
+    arguments.emplace_back("--help");
+  }
+  return arguments;
 }
 
 int run_command(const relief::Run& run)
 {
   const int code = run();
-  // What the streams still hold is written here, so this is where a full disk shows.
-  if (std::fflush(stdout) != 0) throw relief::OutputError("standard output", std::generic_category().message(errno));
+  relief::standard_output_flush();
   return code;
 }
 
@@ -51,11 +83,15 @@ int run_command(const relief::Run& run)
 
 int main(int argc, char** argv)
 {
+  relief::standard_streams_reserve();
+  std::set_terminate(end_without_memory);
+  // Beyond the limit of a file's size a write then fails, like any other, instead of ending the program.
+  std::signal(SIGXFSZ, SIG_IGN);
   CLI::App app("relief " RELIEF_VERSION ": renders displacement-mapped glTF scenes", "relief");
   app.set_version_flag("--version", "relief " RELIEF_VERSION);
   app.require_subcommand(0, 1);
   std::string command_line = "relief";
-  for (int i = 1; i < argc; ++i) command_line += " " + quoted(argv[i]);
+  for (int i = 1; i < argc; ++i) command_line += " " + relief::shell_quoted(argv[i]);
   relief::Run run;
   relief::cmd_render_register(app, run, command_line);
   relief::cmd_info_register(app, run);
@@ -64,26 +100,34 @@ int main(int argc, char** argv)
   relief::cmd_merge_register(app, run);
   relief::cmd_bench_register(app, run);
 
+  const std::vector<std::string> arguments = arguments_of(argc, argv);
   try {
-    app.parse(argc, argv);
+    try {
+      // CLI11 takes them from the back.
+      app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
+    } catch (const CLI::Success& help_or_version) {
+      app.exit(help_or_version);
+      relief::standard_output_flush();
+      return kDone;
+    }
     if (!run) throw CLI::RequiredError("a command (render, info, trace, compare, merge or bench)");
     return run_command(run);
   } catch (const CLI::ParseError& error) {
-    // Help and version come as exceptions too.
-    if (error.get_exit_code() == 0) return app.exit(error);
     const auto commands = app.get_subcommands();
+    std::string hint = relief::suggestion(app, arguments);
+    if (!hint.empty()) hint += "; ";
     return report(kUsage, error.what(),
-                  "see relief " + (commands.empty() ? "" : commands.front()->get_name() + " ") + "--help");
+                  hint + "see relief " + (commands.empty() ? "" : commands.front()->get_name() + " ") + "--help");
   } catch (const relief::SceneError& error) {
     return report(kInvalidScene, error.what(),
                   error.json_path.empty() ? "" : "the scene format is described in docs/scene_format.md");
-  } catch (const relief::InputError& error) {
-    return report(kInvalidScene, error.what());
-  } catch (const relief::OutputError& error) {
-    return report(kFailed, error.what());
+  } catch (const relief::OutOfMemory& error) {
+    return report(kFailed, std::string("out of memory: ") + error.what(), kMemoryHint);
   } catch (const std::bad_alloc&) {
-    return report(kFailed, "out of memory", "a lower --texture-memory or --resolution needs less");
+    return report(kFailed, "out of memory", kMemoryHint);
+  } catch (const relief::InputError& error) {
+    return report_of_library(kInvalidScene, error);
   } catch (const std::exception& error) {
-    return report(kFailed, error.what());
+    return report_of_library(kFailed, error);
   }
 }

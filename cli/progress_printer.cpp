@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/interrupt.h"
+#include "scene/diagnostics.h"
 
 namespace relief {
 
@@ -62,10 +63,12 @@ std::function<void(const RenderProgress&)> ProgressPrinter::callback(int frame, 
 void ProgressPrinter::event(const nlohmann::json& object)
 {
   if (kind_ != Kind::kJson) return;
-  // Paths may hold bytes that are not UTF-8.
-  const std::string line = object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  // Paths may hold bytes that are not UTF-8, and characters that command a terminal.
+  const std::string line = object.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace) + "\n";
   if (write_text(stdout, line)) return;
   kind_ = Kind::kNone;
+  // Nobody needs to be told a second time, at the end.
+  std::clearerr(stdout);
   interrupt_request();
   note("relief: nobody reads the progress any more: stopping");
 }
@@ -73,7 +76,7 @@ void ProgressPrinter::event(const nlohmann::json& object)
 void ProgressPrinter::note(const std::string& line)
 {
   clear_bar();
-  write_text(stderr, line + "\n");
+  write_text(stderr, printable_text(line) + "\n");
 }
 
 void ProgressPrinter::warnings(const std::vector<std::string>& texts)

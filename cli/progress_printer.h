@@ -31,7 +31,7 @@ class ProgressPrinter {
   /// Prints a JSON object as a line, in JSON mode only. A reader that has gone away counts as a wish to stop.
   void event(const nlohmann::json& object);
 
-  /// Prints a line on standard error, above the bar.
+  /// Prints a line on standard error, above the bar; what is not fit for a terminal is escaped.
   void note(const std::string& line);
 
   /// Prints those warnings that this run has not shown yet.

@@ -7,6 +7,7 @@
 
 #include "cli/arguments.h"
 #include "scene/diagnostics.h"
+#include "scene/memory.h"
 
 namespace relief {
 
@@ -16,60 +17,87 @@ void refuse_warnings(const std::string& file, const std::vector<std::string>& wa
   throw SceneError(file, "", "no warnings (--strict)", fmt::format("{}, first: {}", warnings.size(), warnings.front()));
 }
 
-Camera camera_for_image(const Scene& scene, const std::string& name, int width, int height)
+LoadOptions SceneSetup::load_options(std::optional<int> frame) const
 {
-  auto found = scene.cameras.begin();
-  if (!name.empty()) {
-    found =
-        std::find_if(scene.cameras.begin(), scene.cameras.end(), [&](const SceneCamera& c) { return c.name == name; });
-  }
-  if (found == scene.cameras.end()) {
-    std::string names;
-    for (const SceneCamera& camera : scene.cameras)
-      names += fmt::format("{}'{}'", names.empty() ? "" : ", ", camera.name);
-    throw CLI::ValidationError("--camera", fmt::format("expected one of {}, found '{}'", names, name));
-  }
-  Camera camera = found->camera;
-  camera.half_width = camera.half_height * static_cast<float>(width) / static_cast<float>(height);
-  return camera;
+  LoadOptions options;
+  options.has_frame = frame.has_value();
+  options.frame = frame.value_or(0);
+  options.luminous_efficacy = static_cast<float>(luminous_efficacy);
+  options.environment = environment;
+  if (!background.empty()) options.environment_visible = background == "world";
+  return options;
 }
 
-void add_displacement_method(CLI::App& command, DisplacementOptions& options)
+std::string SceneSetup::environment_file() const
+{
+  return environment && environment->source == EnvironmentSource::kFile ? environment->file : "";
+}
+
+std::vector<CLI::Option*> add_light_options(CLI::App& command, SceneSetup& setup)
+{
+  return {
+      command
+          .add_option("--luminous-efficacy", setup.luminous_efficacy,
+                      "lm/W that turn the candela and lux of the scene's lights into watts (default: the scene's)")
+          ->check(number(1e-6, 1e6)),
+      add_parsed(command, "--environment", setup.environment, parse_environment,
+                 "studio, sky, none, or a lat-long image: surroundings in place of the scene's; ,STRENGTH may follow"),
+      command
+          .add_option(
+              "--background", setup.background,
+              "What shows beside the scene: its surroundings (world), black, or nothing (transparent, in the PNG too)")
+          ->check(one_of({"world", "black", "transparent"}))};
+}
+
+CLI::Option* add_displacement_method(CLI::App& command, DisplacementOptions& options)
 {
   const auto set = [&options](const std::string& text) {
     const auto* found = std::find(std::begin(kDisplacementMethodLabels), std::end(kDisplacementMethodLabels), text);
     options.method = static_cast<DisplacementMethod>(found - std::begin(kDisplacementMethodLabels));
   };
-  command
+  return command
       .add_option_function<std::string>("--displacement", set, "How displaced meshes are traced (default: the scene's)")
       ->check(one_of(displacement_method_names()));
 }
 
-void add_displacement_memory(CLI::App& command, DisplacementOptions& options)
+CLI::Option* add_displacement_memory(CLI::App& command, DisplacementOptions& options)
 {
   const auto set = [&options](double gib) {
     options.auto_bytes = static_cast<std::uint64_t>(gib * static_cast<double>(1 << 30));
   };
-  command
+  return command
       .add_option_function<double>("--displacement-memory", set,
                                    "GiB that --displacement auto may use for tessellations where they save time")
       ->check(number(0, 1e6));
 }
 
-void add_displacement_lod(CLI::App& command, DisplacementOptions& options)
+void add_max_memory(CLI::App& command)
+{
+  const auto set = [](double gib) {
+    memory_limit_set(static_cast<std::uint64_t>(gib * static_cast<double>(std::uint64_t{1} << 30)));
+  };
+  command
+      .add_option_function<double>(
+          "--max-memory", set,
+          "GiB that the run may take; what would take more is an error (default: what the machine "
+          "and its control groups have)")
+      ->check(number(1e-6, 1e9));
+}
+
+CLI::Option* add_displacement_lod(CLI::App& command, DisplacementOptions& options)
 {
   const auto set = [&options](const std::string& text) { options.lod = parse_lod(text); };
-  command.add_option_function<std::string>(
+  return command.add_option_function<std::string>(
       "--lod", set, "Level of the height maps, 0 the finest; auto: what the pixels can show (default: the scene's)");
 }
 
-void add_caustics_mode(CLI::App& command, std::optional<CausticsMode>& mode)
+CLI::Option* add_caustics_mode(CLI::App& command, std::optional<CausticsMode>& mode)
 {
   const auto set = [&mode](const std::string& text) {
     const auto* found = std::find(std::begin(kCausticsModeLabels), std::end(kCausticsModeLabels), text);
     mode = static_cast<CausticsMode>(found - std::begin(kCausticsModeLabels));
   };
-  command
+  return command
       .add_option_function<std::string>(
           "--caustics", set,
           "Photons for caustics: auto (where something casts them), on, or off (default: the scene's)")

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -15,18 +16,29 @@ namespace relief {
 /// @error SceneError with the first warning and the number of all
 void refuse_warnings(const std::string& file, const std::vector<std::string>& warnings);
 
-/// The named camera (empty: the first), framed for an image.
-/// @error CLI::ValidationError listing the cameras there are
-Camera camera_for_image(const Scene& scene, const std::string& name, int width, int height);
+/// What the command line says of a scene as a whole, whatever is then done with it.
+struct SceneSetup {
+  double luminous_efficacy = 0;  ///< lm/W; 0: the scene says
+  std::optional<EnvironmentChoice> environment;
+  std::string background;  ///< "world", "black" or "transparent"; empty: the scene says
 
-/// Adds --displacement; `options` must outlive the parser.
-void add_displacement_method(CLI::App& command, DisplacementOptions& options);
+  /// @param frame  empty: the rest pose
+  LoadOptions load_options(std::optional<int> frame = {}) const;
 
-/// Adds --displacement-memory likewise.
-void add_displacement_memory(CLI::App& command, DisplacementOptions& options);
-/// Adds --lod likewise.
-void add_displacement_lod(CLI::App& command, DisplacementOptions& options);
-/// Adds --caustics likewise; without it `mode` stays as it is.
-void add_caustics_mode(CLI::App& command, std::optional<CausticsMode>& mode);
+  /// Image that --environment names; empty: none.
+  std::string environment_file() const;
+};
+
+/// Adds the options about light; `setup` must outlive the parser.
+std::vector<CLI::Option*> add_light_options(CLI::App& command, SceneSetup& setup);
+
+/// Each adds one option; `options` must outlive the parser.
+CLI::Option* add_displacement_method(CLI::App& command, DisplacementOptions& options);
+CLI::Option* add_displacement_memory(CLI::App& command, DisplacementOptions& options);
+CLI::Option* add_displacement_lod(CLI::App& command, DisplacementOptions& options);
+/// Without it `mode` stays as it is.
+CLI::Option* add_caustics_mode(CLI::App& command, std::optional<CausticsMode>& mode);
+/// Adds --max-memory, which sets the process's limit.
+void add_max_memory(CLI::App& command);
 
 }  // namespace relief

@@ -5,8 +5,11 @@
 #include <cmath>
 #include <initializer_list>
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
+#include "displacement/far_ray.h"
 #include "displacement/level_of_detail.h"
 #include "displacement/seam_walls_make.h"
 #include "kernel/math/rounding.h"
@@ -138,10 +141,12 @@ HeightBounds height_bounds(const DisplacedTriangle& tri,
 }
 
 /// A triangle without the bounds of its displacement.
+/// @param is_far  becomes true if its texture coordinates are of no use
 DisplacedTriangle place_triangle(const MeshView& mesh,
                                  std::uint32_t index,
                                  const HeightFieldView& field,
-                                 const DisplacementMapping& mapping)
+                                 const DisplacementMapping& mapping,
+                                 bool* is_far)
 {
   DisplacedTriangle tri;
   const TextureRef& m = mapping.height;
@@ -162,6 +167,12 @@ DisplacedTriangle place_triangle(const MeshView& mesh,
     const double w = static_cast<double>(m.m10) * t.x + static_cast<double>(m.m11) * t.y + m.m12;
     tri.x[k] = u * field.map.width - 0.5;
     tri.y[k] = w * field.map.height - 0.5;
+    // NaN is far, too.
+    *is_far |= !(std::abs(tri.x[k]) <= kMostTexels && std::abs(tri.y[k]) <= kMostTexels);
+  }
+  if (*is_far) {
+    std::fill(tri.x, tri.x + 3, -0.5);
+    std::fill(tri.y, tri.y + 3, -0.5);
   }
   rebase(tri.x, field.x);
   rebase(tri.y, field.y);
@@ -177,8 +188,16 @@ DisplacedMesh::DisplacedMesh(const MeshView& mesh,
                              std::span<const HeightFieldView* const> coarser)
     : triangles_(mesh.num_triangles), unfolded_(mesh.num_triangles), field_(&field), mapping_(mapping)
 {
-  tbb::parallel_for(std::uint32_t{0}, mesh.num_triangles,
-                    [&](std::uint32_t index) { triangles_[index] = place_triangle(mesh, index, field, mapping); });
+  std::atomic<std::uint32_t> num_far_uv{0}, first_far_uv{mesh.num_triangles};
+  tbb::parallel_for(std::uint32_t{0}, mesh.num_triangles, [&](std::uint32_t index) {
+    bool is_far = false;
+    triangles_[index] = place_triangle(mesh, index, field, mapping, &is_far);
+    if (!is_far) return;
+    num_far_uv.fetch_add(1, std::memory_order_relaxed);
+    std::uint32_t first = first_far_uv.load(std::memory_order_relaxed);
+    while (index < first && !first_far_uv.compare_exchange_weak(first, index, std::memory_order_relaxed)) {
+    }
+  });
   if (mapping.weld_seams) {
     walls_ = seam_walls_make(triangles_, field);
     seam_edges_.resize(triangles_.size());
@@ -208,7 +227,19 @@ DisplacedMesh::DisplacedMesh(const MeshView& mesh,
     unfolded_[index] = is_unfolded(tri) ? 1 : 0;
     if (unfolded_[index] == 0) num_folded.fetch_add(1, std::memory_order_relaxed);
   });
-  report_ = {num_folded.load(), num_short.load(), num_degenerate.load(), static_cast<std::uint32_t>(walls_.size())};
+  report_ = {num_folded.load(), num_short.load(),   num_degenerate.load(), static_cast<std::uint32_t>(walls_.size()),
+             num_far_uv.load(), first_far_uv.load()};
+  box_ = tbb::parallel_reduce(
+      tbb::blocked_range<std::uint32_t>(0, mesh.num_triangles), box_empty(),
+      [&](const tbb::blocked_range<std::uint32_t>& range, Box3 sum) {
+        for (std::uint32_t index = range.begin(); index < range.end(); ++index) {
+          const Box3f each = displaced_triangle_bounds(view(), index);
+          sum = box_union(sum, {each.low, each.high});
+        }
+        return sum;
+      },
+      box_union);
+  if (mesh.num_triangles > 0) pad_ = ray_target_pad(ray_target_make(box_));
 }
 
 DisplacedMeshView DisplacedMesh::view() const
@@ -221,7 +252,8 @@ DisplacedMeshView DisplacedMesh::view() const
           mapping_.midlevel,
           mapping_.weld_seams ? seam_edges_.data() : nullptr,
           walls_.data(),
-          static_cast<std::uint32_t>(walls_.size())};
+          static_cast<std::uint32_t>(walls_.size()),
+          pad_};
 }
 
 float DisplacedMesh::widest_texel() const
@@ -300,8 +332,8 @@ Box3f displaced_triangle_bounds(const DisplacedMeshView& mesh, std::uint32_t tri
     // |d| = |s|·|N| is at most this, in any direction.
     const double reach =
         std::max(std::abs(static_cast<double>(tri.s_min)), std::abs(static_cast<double>(tri.s_max))) * longest;
-    // Embree tests boxes in floats; a few of their ulps keep grazing rays.
-    const double pad = 4.0 * static_cast<double>(kUnitRoundoff) * magnitude;
+    // A float's ulp covers the rounding of all that.
+    const double pad = static_cast<double>(kUnitRoundoff) * magnitude + mesh.pad;
     *low = round_down(std::max(prism_low, base_low - reach) - pad);
     *high = round_up(std::min(prism_high, base_high + reach) + pad);
   };

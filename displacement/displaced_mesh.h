@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "displacement/displaced_triangle.h"
+#include "kernel/math/box.h"
 #include "kernel/shape/mesh_view.h"
 
 namespace relief {
@@ -24,7 +25,13 @@ struct DisplacedMeshReport {
   std::uint32_t num_short_normals = 0;  ///< |N| falls below a thousandth of its largest value
   std::uint32_t num_degenerate = 0;     ///< no area: nothing of them is ever hit
   std::uint32_t num_walls = 0;          ///< one a side of a seam that is welded
+  std::uint32_t num_far_uv = 0;         ///< texture coordinates beyond kMostTexels, or not finite: all at uv (0, 0)
+  std::uint32_t first_far_uv = 0;       ///< the first of these triangles, if there are any
 };
+
+/// Texels from a map's corner within which triangles are displaced by it: a double still tells a 256th of a texel there,
+/// and nothing that is computed leaves 64-bit integers.
+inline constexpr double kMostTexels = 0x1p44;
 
 /// Texels along a triangle's side, about: the root of twice the mean of their areas in a map.
 /// @param width, height  of the map, texels
@@ -46,7 +53,8 @@ struct Box3f {
 class DisplacedMesh {
  public:
   DisplacedMesh() = default;
-  /// @param mesh   without normals its triangles move along their own; without the uv set all of it is at uv (0, 0)
+  /// @param mesh   without normals its triangles move along their own; without the uv set all of it is at uv (0, 0), as
+  ///               are triangles whose uv are beyond kMostTexels
   /// @param field   must outlive the mesh
   /// @param coarser levels of the same map that rays may see instead: prisms hold all of their surfaces
   /// @cost  129 bytes a triangle, and 40 a side of a welded seam; parallel over triangles
@@ -57,6 +65,8 @@ class DisplacedMesh {
 
   DisplacedMeshView view() const;
   const DisplacedMeshReport& report() const { return report_; }
+  /// Box around all prisms, object space.
+  const Box3& bounds() const { return box_; }
   /// Width of the widest texel on the base mesh, metres of object space: the root of its area. 0 without any.
   float widest_texel() const;
   std::size_t bytes() const
@@ -70,11 +80,14 @@ class DisplacedMesh {
   std::vector<std::uint8_t> seam_edges_;  ///< empty: seams stay open
   std::vector<SeamWall> walls_;
   const HeightFieldView* field_ = nullptr;
+  Box3 box_ = box_empty();
+  float pad_ = 0;
   DisplacementMapping mapping_;
   DisplacedMeshReport report_;
 };
 
-/// Box around P + s·N for all of a triangle's prism, and at most as far from the base triangle as its displacement.
+/// Box around P + s·N for all of a triangle's prism, and at most as far from the base triangle as its displacement;
+/// enlarged by the mesh's pad.
 Box3f displaced_triangle_bounds(const DisplacedMeshView& mesh, std::uint32_t triangle);
 
 }  // namespace relief

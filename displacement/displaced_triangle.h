@@ -35,6 +35,7 @@ struct DisplacedMeshView {
   const std::uint8_t* seam_edges = nullptr;  ///< by triangle, bit k: its edge k has walls; null: seams stay open
   const SeamWall* walls = nullptr;           ///< in the order of their edges
   std::uint32_t num_walls = 0;
+  float pad = 0;  ///< by which the triangles' boxes are enlarged, metres
 };
 
 /// Displacement along the unit normal at a lattice position, metres.

@@ -11,11 +11,26 @@
 #error "Embree 3.13 or 4 is needed"
 #endif
 
+#include "displacement/vec3d.h"
+
 namespace relief {
 
 struct LodCone;
 struct PrismVisits;
 struct TraversalCounters;
+
+/// A ray inside an instance, where Embree has it rounded to floats: t of the world = t_start + t_scale · t.
+struct ObjectRay {
+  Vec3d O, D;  ///< object space; moved to the instance, see far_ray.h
+  double t_start = 0, t_scale = 1;
+};
+
+/// Where a ray of the world starts that was moved near.
+struct FarStart {
+  bool is_far = false;  ///< whether it was moved
+  Vec3d O;              ///< Embree has it rounded
+  double t = 0;         ///< how far it was moved
+};
 
 /// What a query hands to callbacks: Embree's own context first, so that a callback can cast back. Every query of a scene
 /// with displaced geometry uses one of these.
@@ -30,6 +45,8 @@ struct EmbreeContext {
   const LodCone* cones = nullptr;  ///< by the rays' ids; null: the finest detail
   const float* texels = nullptr;   ///< widths of finest texels by instance, metres, world; null: those of object space
   PrismVisits* visits = nullptr;   ///< record of the prisms that are visited (explain.h); null: not wanted
+  FarStart far_start;              ///< of the ray that is traced
+  const ObjectRay* object_ray = nullptr;  ///< of the ray that is traced, inside an instance; null: outside of any
 };
 
 /// @param coherent  rays come in order from one origin or direction

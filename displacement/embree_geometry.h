@@ -37,8 +37,8 @@ struct TraversalTable {
   /// @param texel  width of a texel of the finest level in the space that `cone` is in
   bool (*trace)(const DisplacedGeometry& geometry,
                 std::uint32_t triangle,
-                Vec3f O,
-                Vec3f D,
+                Vec3d O,
+                Vec3d D,
                 const LodCone& cone,
                 float texel,
                 double t_min,

@@ -19,12 +19,19 @@ PrismExplanation prism_explain(const PrismVisit& visit)
   DisplacedMeshView mesh = visit.geometry->mesh;
   DisplacedTriangle tri = mesh.triangles[visit.triangle];
   PrismExplanation out;
+  const ObjectRay& ray = visit.ray;
+  const auto t_world = [&](double t) { return ray.t_start + ray.t_scale * t; };
+  out.ray.D = to_float(ray.D * (1.0 / ray.t_scale));
+  out.ray.O = to_float(ray.O - ray.D * (ray.t_start / ray.t_scale));
+  out.t_min = t_world(visit.t_min);
+  out.t_max = t_world(visit.t_max);
+  out.t = t_world(visit.hit.t);
   out.folded = mesh.unfolded[visit.triangle] == 0;
   RayCurve curve;
-  if (ray_curve_make(ray_frame_make(visit.O, visit.D), tri, &curve)) {
+  if (ray_curve_make(ray_frame_make(ray.O, ray.D), tri, &curve)) {
     for (int k = 0; k < curve.num_segments; ++k) {
       const CurveSegment& g = curve.segments[k];
-      out.stretches[out.num_stretches++] = {g.t0, g.t1, g.s0, g.s0 + g.ds};
+      out.stretches[out.num_stretches++] = {t_world(g.t0), t_world(g.t1), g.s0, g.s0 + g.ds};
     }
   }
   if (visit.found) {

@@ -12,11 +12,16 @@ namespace relief {
 struct PrismVisit {
   const DisplacedGeometry* geometry = nullptr;
   std::uint32_t instance = 0, triangle = 0;
-  Vec3f O, D;                   ///< object space, as the tracer handed it on
+  ObjectRay ray;                ///< all t of the visit are its own
   double t_min = 0, t_max = 0;  ///< what was searched; t_max falls with every hit
   TraversalCounters counters;   ///< of this call
   bool found = false;
   DisplacedHit hit;
+};
+
+/// A ray's origin and direction in the geometry's space, before it was moved.
+struct ExplainedRay {
+  Vec3f O, D;
 };
 
 /// Where a traversal puts its visits: room of the caller's.
@@ -34,12 +39,14 @@ RELIEF_KERNEL void prism_visits_add(PrismVisits& visits, const PrismVisit& visit
 
 /// A stretch of a ray inside a prism.
 struct PrismStretch {
-  double t0 = 0, t1 = 0;
+  double t0 = 0, t1 = 0;  ///< world
   double s0 = 0, s1 = 0;  ///< d/|N| where it begins and ends
 };
 
 /// The geometry behind a visit.
 struct PrismExplanation {
+  ExplainedRay ray;
+  double t_min = 0, t_max = 0, t = 0;         ///< of the visit and its hit, world
   PrismStretch stretches[kMaxCurveSegments];  ///< in the order of t
   int num_stretches = 0;                      ///< 0: the ray enters the box and misses the prism
   bool folded = false;                        ///< displacement lines may cross: every stretch is searched to its end

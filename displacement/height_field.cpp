@@ -209,11 +209,38 @@ HeightField::HeightField(const HeightMapView& map)
     rows = line_rows;
   }
   f.range = line_range(levels_.back()[0]);
+  make_bands();
+}
+
+void HeightField::make_bands()
+{
+  // Of nodes of 4 cells, or of 16 where that takes less time than is worth talking of beside the pyramid.
+  constexpr std::size_t kMostLines = 1 << 14;
+  const int level = levels_.size() > 1 && levels_[0].size() > kMostLines ? 1 : 0;
+  HeightFieldView& f = view_;
+  f.log2_band = 2 * (level + 1);
+  const int band = 1 << f.log2_band;
+  const auto columns = static_cast<std::size_t>(divide_up(f.x.num_cells, band)),
+             rows = static_cast<std::size_t>(divide_up(f.y.num_cells, band));
+  column_bands_.assign(columns, kEmpty);
+  row_bands_.assign(rows, kEmpty);
+  const auto line_columns = static_cast<std::size_t>(f.line_columns[level]);
+  for (std::size_t row = 0; row < rows; ++row) {
+    for (std::size_t column = 0; column < columns; ++column) {
+      const PyramidLine& line = f.lines[level][row / 4 * line_columns + column / 4];
+      const std::size_t child = 4 * (row % 4) + column % 4;
+      const StoredRange range{line.low[child], line.high[child]};
+      column_bands_[column] = merge(column_bands_[column], range);
+      row_bands_[row] = merge(row_bands_[row], range);
+    }
+  }
+  f.row_bands = row_bands_.data();
+  f.column_bands = column_bands_.data();
 }
 
 std::size_t HeightField::bytes() const
 {
-  std::size_t sum = 0;
+  std::size_t sum = (row_bands_.size() + column_bands_.size()) * sizeof(StoredRange);
   for (const auto& level : levels_) sum += level.size() * sizeof(PyramidLine);
   return sum;
 }

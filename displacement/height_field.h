@@ -63,6 +63,11 @@ struct HeightFieldView {
   int line_columns[kMaxPyramidLevels] = {};  ///< lines in a row of a level
   int num_levels = 0;
   StoredRange range;  ///< of the whole map
+  /// Bounds of bands of 2^log2_band cells from one end of the map to the other, in pyramid rows and columns: all that a
+  /// ray along a row of tiles may meet.
+  const StoredRange* row_bands = nullptr;
+  const StoredRange* column_bands = nullptr;
+  int log2_band = 0;
 };
 
 /// Height at an integer lattice coordinate.
@@ -114,7 +119,10 @@ class HeightField {
   std::size_t bytes() const;  ///< besides the map
 
  private:
+  void make_bands();
+
   std::vector<std::vector<PyramidLine>> levels_;
+  std::vector<StoredRange> row_bands_, column_bands_;
   HeightFieldView view_;
 };
 

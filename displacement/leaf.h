@@ -5,6 +5,8 @@
 // (`curve_deviation`, proven), so that none is lost, then closed in on by bracketing.
 #pragma once
 
+#include <atomic>
+
 #include "displacement/ray_curve.h"
 
 namespace relief {
@@ -20,13 +22,37 @@ struct DisplacedHit {
   double d = 0;               ///< of a wall's point: displacement, metres
 };
 
-/// What one ray counts; the same for all methods, so that they can be compared.
+/// What one ray counts; the same for all methods, so that they can be compared. Counters go wherever a ray goes, and so
+/// take the word to stop along.
 struct TraversalCounters {
-  std::uint64_t bounds = 0;      ///< 2D or 3D bounds tested, children of pyramid nodes one by one
-  std::uint64_t texels = 0;      ///< cells tested by the leaf
-  std::uint64_t inversions = 0;  ///< iterations of point-wise inversion
-  std::uint64_t prisms = 0;      ///< triangles whose prism the ray enters
+  std::uint64_t bounds = 0;                 ///< 2D or 3D bounds tested, children of pyramid nodes one by one
+  std::uint64_t texels = 0;                 ///< cells tested by the leaf
+  std::uint64_t inversions = 0;             ///< iterations of point-wise inversion
+  std::uint64_t prisms = 0;                 ///< triangles whose prism the ray enters
+  const std::atomic<bool>* stop = nullptr;  ///< true: nobody waits for an answer any more; null: somebody always does
+  bool stopped = false;                     ///< a search was given up, and its answer is none
 };
+
+/// Whether searches are to be given up; notes that they are.
+RELIEF_KERNEL bool traversal_stop(TraversalCounters& counters)
+{
+  if (counters.stop == nullptr || !counters.stop->load(std::memory_order_relaxed)) return false;
+  counters.stopped = true;
+  return true;
+}
+
+/// Bounds after which one search asks again; they take a few tenths of a millisecond.
+inline constexpr std::uint64_t kBoundsAPoll = 4096;
+
+/// traversal_stop, if it is due.
+/// @param next  counters.bounds at which it is; at the start of a search kBoundsAPoll from there
+RELIEF_KERNEL bool traversal_poll(TraversalCounters& counters, std::uint64_t& next)
+{
+  if (counters.bounds < next) [[likely]]
+    return false;
+  next = counters.bounds + kBoundsAPoll;
+  return traversal_stop(counters);
+}
 
 /// A point of the curve. Without initial values: the leaf has room for many, and uses few.
 struct CurvePoint {

@@ -23,7 +23,7 @@ struct RayFrame {
   double Sx = 0, Sy = 0, Sz = 1;
 };
 
-RELIEF_KERNEL RayFrame ray_frame_make(Vec3f O, Vec3f D)
+RELIEF_KERNEL RayFrame ray_frame_make(Vec3d O, Vec3d D)
 {
   RayFrame f;
   const double d[3] = {D.x, D.y, D.z};

@@ -107,18 +107,43 @@ RELIEF_KERNEL void stretch_end(const RayProjection& r, double tau, ProjectedStre
   stretch->y1 = quadratic_at(r.Y, tau) * inverse;
 }
 
+/// The part of an axis on which heights change, lattice units from vertex 0: beside a clamped map there is one more unit.
+struct VaryingPart {
+  double low = -__builtin_huge_val(), high = __builtin_huge_val();
+};
+
+/// @param origin  lattice coordinate of vertex 0
+RELIEF_KERNEL VaryingPart varying_part(const LatticeAxis& axis, double origin)
+{
+  if (axis.wrap != Wrap::kClamp) return {};
+  return {-1.0 - origin, static_cast<double>(axis.num_texels) - origin};
+}
+
+/// The rectangle of a stretch as far as heights change in it.
+struct VaryingSides {
+  double x0, x1, y0, y1;  ///< at the ends of the stretch
+};
+
+RELIEF_KERNEL VaryingSides varying_sides(const ProjectedStretch& s, const VaryingPart& x, const VaryingPart& y)
+{
+  const auto inside = [](double at, const VaryingPart& part) { return min(max(at, part.low), part.high); };
+  return {inside(s.x0, x), inside(s.x1, x), inside(s.y0, y), inside(s.y1, y)};
+}
+
 /// Splits a stretch where it crosses the line through the middle of the longer side of its rectangle.
 /// @return  false if it is too short to be split
-/// @source  Thonat et al. 2023, §4.3, Fig. 5c
+/// @source  Thonat et al. 2023, §4.3, Fig. 5c; where the map is clamped only what is over the map counts: beside it one
+///          cell is as long as the triangle
 RELIEF_KERNEL bool stretch_split(const RayProjection& r,
                                  const ProjectedStretch& stretch,
+                                 const VaryingSides& sides,
                                  ProjectedStretch* front,
                                  ProjectedStretch* back)
 {
-  const bool along_x = __builtin_fabs(stretch.x1 - stretch.x0) >= __builtin_fabs(stretch.y1 - stretch.y0);
+  const bool along_x = __builtin_fabs(sides.x1 - sides.x0) >= __builtin_fabs(sides.y1 - sides.y0);
   const BernsteinQuadratic P = bernstein_make(along_x ? r.X : r.Y, stretch.tau0, stretch.tau1);
   const BernsteinQuadratic W = bernstein_make(r.W, stretch.tau0, stretch.tau1);
-  const double middle = 0.5 * (along_x ? stretch.x0 + stretch.x1 : stretch.y0 + stretch.y1);
+  const double middle = 0.5 * (along_x ? sides.x0 + sides.x1 : sides.y0 + sides.y1);
   const double tau = stretch.tau0 + bernstein_crossing(P, W, middle) * (stretch.tau1 - stretch.tau0);
   if (!(tau > stretch.tau0 && tau < stretch.tau1)) return false;
   *front = stretch;

@@ -20,6 +20,7 @@ struct CurveSearch {
   bool found = false;
   double d_zero, d_per_texel;  ///< d = d_zero + d_per_texel · texel as stored
   double d_pad;                ///< rounding of a height, and what the curve may change within rounding of its position
+  std::uint64_t next_poll;
 };
 
 RELIEF_KERNEL CurveSearch curve_search_make(const DisplacedMeshView& mesh,
@@ -50,7 +51,8 @@ RELIEF_KERNEL CurveSearch curve_search_make(const DisplacedMeshView& mesh,
           false,
           -mesh.scale * mesh.midlevel,
           d_per_texel,
-          d_pad};
+          d_pad,
+          counters->bounds + kBoundsAPoll};
 }
 
 /// Displacements of stored bounds.
@@ -159,6 +161,7 @@ RELIEF_KERNEL bool texel_march(CurveSearch& c,
     const ScalarRange height{s_low * (s_low < 0.0 ? nu.high : nu.low), s_high * (s_high > 0.0 ? nu.high : nu.low)};
     const ScalarRange cell = cell_displacement_range(c, i, j);
     ++c.counters.bounds;
+    if (traversal_poll(c.counters, c.next_poll)) return true;
     if (height.low <= cell.high && height.high >= cell.low &&
         cell_intersect(c, g, i, j, stretch.tau0 + from * length, stretch.tau0 + to * length) &&
         (c.unfolded || c.any_hit)) {

@@ -171,8 +171,8 @@ bool seam_walls_intersect(const DisplacedGeometry& geometry,
 
 bool trace(const DisplacedGeometry& geometry,
            std::uint32_t triangle,
-           Vec3f O,
-           Vec3f D,
+           Vec3d O,
+           Vec3d D,
            const LodCone& cone,
            float texel,
            double t_min,
@@ -181,6 +181,7 @@ bool trace(const DisplacedGeometry& geometry,
            DisplacedHit* hit,
            TraversalCounters* counters)
 {
+  if (traversal_stop(*counters)) return false;
   const DisplacedMeshView& mesh = geometry.mesh;
   RayCurve curve;
   if (!ray_curve_make(ray_frame_make(O, D), mesh.triangles[triangle], &curve)) return false;
@@ -198,16 +199,19 @@ thread_local TraversalCounters uncounted;
 /// One ray of a callback, in the geometry's space.
 struct CallbackRay {
   unsigned id, instance, triangle;
-  Vec3f O, D;
+  ObjectRay ray;
 };
 
-CallbackRay callback_ray(RTCRayN* rays, unsigned count, unsigned lane, unsigned triangle, unsigned instance)
+CallbackRay callback_ray(RTCRayN* rays, unsigned count, unsigned lane, unsigned triangle, const EmbreeContext& context)
 {
-  return {RTCRayN_id(rays, count, lane),
-          instance,
-          triangle,
-          {RTCRayN_org_x(rays, count, lane), RTCRayN_org_y(rays, count, lane), RTCRayN_org_z(rays, count, lane)},
-          {RTCRayN_dir_x(rays, count, lane), RTCRayN_dir_y(rays, count, lane), RTCRayN_dir_z(rays, count, lane)}};
+  CallbackRay out{RTCRayN_id(rays, count, lane), context.rtc.instID[0], triangle, {}};
+  if (context.object_ray != nullptr) {
+    out.ray = *context.object_ray;
+  } else {
+    out.ray.O = {RTCRayN_org_x(rays, count, lane), RTCRayN_org_y(rays, count, lane), RTCRayN_org_z(rays, count, lane)};
+    out.ray.D = {RTCRayN_dir_x(rays, count, lane), RTCRayN_dir_y(rays, count, lane), RTCRayN_dir_z(rays, count, lane)};
+  }
+  return out;
 }
 
 /// Traces one ray and tells those who asked what it did.
@@ -221,15 +225,22 @@ bool trace_observed(const DisplacedGeometry& geometry,
 {
   TraversalCounters& counters = context.displacement != nullptr ? *context.displacement : uncounted;
   const TraversalCounters before = counters;
-  const LodCone cone = context.cones != nullptr ? context.cones[ray.id] : LodCone{};
+  LodCone cone = context.cones != nullptr ? context.cones[ray.id] : LodCone{};
+  cone.width += cone.spread * static_cast<float>(ray.ray.t_start);
+  cone.spread *= static_cast<float>(ray.ray.t_scale);
   const float texel = context.texels != nullptr ? context.texels[ray.instance] : geometry.lod.texel;
-  const bool found = trace(geometry, ray.triangle, ray.O, ray.D, cone, texel, t_min, t_max, any_hit, hit, &counters);
+  const bool found =
+      trace(geometry, ray.triangle, ray.ray.O, ray.ray.D, cone, texel, t_min, t_max, any_hit, hit, &counters);
   if (context.steps == nullptr && context.visits == nullptr) return found;
-  const TraversalCounters spent{counters.bounds - before.bounds, counters.texels - before.texels,
-                                counters.inversions - before.inversions, counters.prisms - before.prisms};
+  const TraversalCounters spent{counters.bounds - before.bounds,
+                                counters.texels - before.texels,
+                                counters.inversions - before.inversions,
+                                counters.prisms - before.prisms,
+                                nullptr,
+                                false};
   if (context.steps != nullptr) context.steps[ray.id] += static_cast<std::uint32_t>(spent.bounds + spent.texels);
   if (context.visits != nullptr) {
-    prism_visits_add(*context.visits, {&geometry, ray.instance, ray.triangle, ray.O, ray.D, t_min, t_max, spent, found,
+    prism_visits_add(*context.visits, {&geometry, ray.instance, ray.triangle, ray.ray, t_min, t_max, spent, found,
                                        found ? *hit : DisplacedHit{}});
   }
   return found;
@@ -244,7 +255,7 @@ void intersect(const RTCIntersectFunctionNArguments* arguments)
   RTCHitN* hits = RTCRayHitN_HitN(arguments->rayhit, count);
   for (unsigned k = 0; k < count; ++k) {
     if (arguments->valid[k] != -1) continue;
-    const CallbackRay ray = callback_ray(rays, count, k, triangle, arguments->context->instID[0]);
+    const CallbackRay ray = callback_ray(rays, count, k, triangle, context);
     DisplacedHit hit;
     if (!trace_observed(geometry, context, ray, RTCRayN_tnear(rays, count, k), RTCRayN_tfar(rays, count, k), false,
                         &hit)) {
@@ -298,7 +309,7 @@ void occluded(const RTCOccludedFunctionNArguments* arguments)
   const bool opaque = geometry.shadow_filter == nullptr;
   for (unsigned k = 0; k < count; ++k) {
     if (arguments->valid[k] != -1) continue;
-    const CallbackRay ray = callback_ray(rays, count, k, triangle, arguments->context->instID[0]);
+    const CallbackRay ray = callback_ray(rays, count, k, triangle, context);
     const double t_max = RTCRayN_tfar(rays, count, k);
     double t_min = RTCRayN_tnear(rays, count, k);
     DisplacedHit hit;

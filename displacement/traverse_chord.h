@@ -29,8 +29,15 @@ inline constexpr int kMaxSplits = 6;
 inline constexpr double kLeastFloatW = 0x1p-10;
 /// Metres between two stored heights, below which a displacement is taken for none: floats of stored units end there.
 inline constexpr double kLeastHeightStep = 1e-25;
-/// Where an unbounded cell beside a clamped map ends.
-inline constexpr float kFarAway = 1e12f;
+/// Where an unbounded cell beside a clamped map ends: beyond all lattice coordinates.
+inline constexpr float kFarAway = 1e18f;
+/// Chords are split down to so many periods of the map, as long as what they run along (bands_meet) does not rule them
+/// out; below, one tile after the other costs less.
+inline constexpr float kPeriodsAChord = 8;
+/// Lattice units that a float can count with little error, see slack_x.
+inline constexpr float kFloatUnits = 0x1p17f;
+/// A triangle that reaches less far beside a clamped map is traced like any other.
+inline constexpr double kLittleBeside = 16;
 
 /// A straight stretch of the curve. Positions are relative to an integer lattice point, heights in stored units.
 struct Chord {
@@ -52,9 +59,14 @@ struct Search {
   double q_per_metre = 1, q_zero = 0;  ///< stored height = q_zero + q_per_metre · displacement
   float q_pad = 0;                     ///< and this much more or less
   const CurveSegment* segment = nullptr;
-  double tau_end = 1;  ///< nothing beyond matters: a hit is known there
+  const double *x = nullptr,
+               *y = nullptr;     ///< lattice coordinates of the vertices, or of one place for all, see ClampCuts
+  float long_x = 0, long_y = 0;  ///< chords are split while they are longer
+  int max_long_splits = 0;       ///< after which none is
+  double tau_end = 1;            ///< nothing beyond matters: a hit is known there
   bool unfolded = true, any_hit = false;
   bool found = false;
+  std::uint64_t next_poll = counters.bounds + kBoundsAPoll;
 };
 
 /// Heights of five texels in a row, stored units; the other lanes are anything.
@@ -150,8 +162,8 @@ RELIEF_KERNEL bool node_intersect(Search& c,
   stack[depth++] = root;
   const F8 lane_x{0, 1, 2, 3, 0, 1, 2, 3};
   const F8 lane_y[2] = {F8{0, 0, 0, 0, 1, 1, 1, 1}, F8{2, 2, 2, 2, 3, 3, 3, 3}};
-  const float offset_x = static_cast<float>(period_x - chord.origin_x),
-              offset_y = static_cast<float>(period_y - chord.origin_y);
+  const std::int64_t offset_x = period_x - chord.origin_x, offset_y = period_y - chord.origin_y;
+  const float num_columns = static_cast<float>(f.x.num_cells), num_rows = static_cast<float>(f.y.num_cells);
   const bool clamp_x = f.x.wrap == Wrap::kClamp, clamp_y = f.y.wrap == Wrap::kClamp;
   // Rounding of heights up to 65535, and of float maps to stored units.
   const float cell_slack = chord.pad_q + 65536.0f * 4.0f * kFloatSlack;
@@ -178,30 +190,30 @@ RELIEF_KERNEL bool node_intersect(Search& c,
       }
     }
     c.counters.bounds += 1;
+    if (traversal_poll(c.counters, c.next_poll)) return true;
     const float width = static_cast<float>(size);
-    const F8 x_low = lane_x * width + (offset_x + static_cast<float>(n.column) - chord.x0);
+    const F8 column = lane_x * width + static_cast<float>(n.column);
+    const F8 x_low = lane_x * width + (static_cast<float>(offset_x + n.column) - chord.x0);
     F8 x_from = x_low - chord.pad_x, x_to = x_low + (width + chord.pad_x);
-    // Children that begin beyond the period belong to the next one.
-    I8 exists = x_low < splat8(offset_x + static_cast<float>(f.x.num_cells) - chord.x0);
+    // Children that begin beyond the period belong to the next one. Columns are small integers; far beside a clamped map
+    // floats do not tell x_low of one from that of the next (hard cases "clamp at uv …").
+    const I8 exists = column < splat8(num_columns);
     if (clamp_x) {
-      x_from = lane_x * width + static_cast<float>(n.column) <= 0.0f ? splat8(-kFarAway) : x_from;
-      x_to = lane_x * width + (static_cast<float>(n.column) + width) >= static_cast<float>(f.x.num_cells)
-                 ? splat8(kFarAway)
-                 : x_to;
+      x_from = column <= 0.0f ? splat8(-kFarAway) : x_from;
+      x_to = column + width >= num_columns ? splat8(kFarAway) : x_to;
     }
     const F8 ux0 = x_from * chord.inv_dx, ux1 = x_to * chord.inv_dx;
     const F8 ux_in = max(min(ux0, ux1), splat8(n.u0)), ux_out = min(max(ux0, ux1), splat8(n.u1));
     alignas(32) float entry[16], exit[16];
     unsigned hits = 0;
     for (int half = 0; half < 2; ++half) {
-      const F8 y_low = lane_y[half] * width + (offset_y + static_cast<float>(n.row) - chord.y0);
+      const F8 row = lane_y[half] * width + static_cast<float>(n.row);
+      const F8 y_low = lane_y[half] * width + (static_cast<float>(offset_y + n.row) - chord.y0);
       F8 y_from = y_low - chord.pad_y, y_to = y_low + (width + chord.pad_y);
-      const I8 both_exist = exists & (y_low < splat8(offset_y + static_cast<float>(f.y.num_cells) - chord.y0));
+      const I8 both_exist = exists & (row < splat8(num_rows));
       if (clamp_y) {
-        y_from = lane_y[half] * width + static_cast<float>(n.row) <= 0.0f ? splat8(-kFarAway) : y_from;
-        y_to = lane_y[half] * width + (static_cast<float>(n.row) + width) >= static_cast<float>(f.y.num_cells)
-                   ? splat8(kFarAway)
-                   : y_to;
+        y_from = row <= 0.0f ? splat8(-kFarAway) : y_from;
+        y_to = row + width >= num_rows ? splat8(kFarAway) : y_to;
       }
       const F8 uy0 = y_from * chord.inv_dy, uy1 = y_to * chord.inv_dy;
       const F8 u_in = max(min(uy0, uy1), ux_in), u_out = min(max(uy0, uy1), ux_out);
@@ -353,10 +365,34 @@ RELIEF_KERNEL bool chord_intersect(Search& c, const Chord& chord)
         const int child = (column.column >> own & 3) + 4 * (row.column >> own & 3);
         const float qa = chord.q0 + v0 * chord.dq, qb = chord.q0 + v1 * chord.dq;
         c.counters.bounds += 1;
+        if (traversal_poll(c.counters, c.next_poll)) return true;
         if (min(qa, qb) - chord.pad_q > line.high[child] || max(qa, qb) + chord.pad_q < line.low[child]) continue;
       }
       if (node_intersect(c, chord, {column.column, row.column, level, v0, v1}, column.period, row.period)) return true;
     }
+  }
+  return false;
+}
+
+/// Whether the heights of bands along one axis reach into an interval.
+/// @param low, high  stretch of the other axis, from `origin`
+/// @return  true also if it is too wide to be worth looking at, and for NaN
+RELIEF_KERNEL bool band_meets(const LatticeAxis& axis,
+                              const StoredRange* bands,
+                              int log2_band,
+                              std::int64_t origin,
+                              float low,
+                              float high,
+                              float q_low,
+                              float q_high)
+{
+  constexpr int kMostBands = 8;
+  if (!(high - low < static_cast<float>(kMostBands << log2_band))) return true;
+  NodeWalk walk = walk_over(axis, origin, low, high, true);
+  NodeSpan span;
+  while (next_node(walk, axis, 1 << log2_band, origin, &span)) {
+    const StoredRange& range = bands[span.column >> log2_band];
+    if (!(q_low > range.high || q_high < range.low)) return true;
   }
   return false;
 }
@@ -394,11 +430,11 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
   }
   e1 = e1 * inverse;
   e2 = e2 * inverse;
-  const double xu = tri.x[1] - tri.x[0], xv = tri.x[2] - tri.x[0], yu = tri.y[1] - tri.y[0], yv = tri.y[2] - tri.y[0];
-  const double origin_x = __builtin_floor(tri.x[0] + e1.c * xu + e2.c * xv);
-  const double origin_y = __builtin_floor(tri.y[0] + e1.c * yu + e2.c * yv);
-  const Quadratic X = W * (tri.x[0] - origin_x) + e1 * xu + e2 * xv;
-  const Quadratic Y = W * (tri.y[0] - origin_y) + e1 * yu + e2 * yv;
+  const double xu = c.x[1] - c.x[0], xv = c.x[2] - c.x[0], yu = c.y[1] - c.y[0], yv = c.y[2] - c.y[0];
+  const double origin_x = __builtin_floor(c.x[0] + e1.c * xu + e2.c * xv);
+  const double origin_y = __builtin_floor(c.y[0] + e1.c * yu + e2.c * yv);
+  const Quadratic X = W * (c.x[0] - origin_x) + e1 * xu + e2 * xv;
+  const Quadratic Y = W * (c.y[0] - origin_y) + e1 * yu + e2 * yv;
 
   // Equal steps of τ crowd where the facet is seen edge-on; equal steps of the parameter whose weights are the same at
   // both ends do not.
@@ -463,15 +499,16 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
   const float X_size = static_cast<float>(__builtin_fabs(X.a) + __builtin_fabs(X.b) + __builtin_fabs(X.c));
   const float Y_size = static_cast<float>(__builtin_fabs(Y.a) + __builtin_fabs(Y.b) + __builtin_fabs(Y.c));
   const float W_size = static_cast<float>(__builtin_fabs(W.a) + __builtin_fabs(W.b) + 1.0);
-  const F8 slack_x = kFloatSlack * worst_W * (X_size + W_size * max(abs(a.x), abs(b.x))) +
-                     static_cast<float>(g.relative_error) * extent_x;
-  const F8 slack_y = kFloatSlack * worst_W * (Y_size + W_size * max(abs(a.y), abs(b.y))) +
-                     static_cast<float>(g.relative_error) * extent_y;
+  const F8 slack_x = kFloatSlack * worst_W * (X_size + W_size * max(abs(a.x), abs(b.x)));
+  const F8 slack_y = kFloatSlack * worst_W * (Y_size + W_size * max(abs(a.y), abs(b.y)));
   const float e_size = static_cast<float>(__builtin_fabs(e1.a) + __builtin_fabs(e1.b) + __builtin_fabs(e1.c) +
                                           __builtin_fabs(e2.a) + __builtin_fabs(e2.b) + __builtin_fabs(e2.c));
   const F8 slack_b = kFloatSlack * worst_W * (e_size + 2.0f * W_size);
   const float q_per_metre = static_cast<float>(c.q_per_metre), q_zero = static_cast<float>(c.q_zero);
-  const F8 pad_x = deviation_x + slack_x, pad_y = deviation_y + slack_y;
+  const F8 bend_x = deviation_x + slack_x, bend_y = deviation_y + slack_y;
+  // No split makes the curve better known than it is.
+  const F8 pad_x = bend_x + static_cast<float>(g.relative_error) * extent_x,
+           pad_y = bend_y + static_cast<float>(g.relative_error) * extent_y;
   const F8 q_a = q_zero + q_per_metre * a.height, q_b = q_zero + q_per_metre * b.height;
   const float q_slope = __builtin_fabsf(q_per_metre);
   const F8 pad_q = q_slope * (deviation_height + s_largest * (slack_b * (length(Nu) + length(Nv)) + kFloatSlack)) +
@@ -481,9 +518,10 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
   unsigned alive = ~mask_of((min(q_a, q_b) - pad_q > splat8(static_cast<float>(f.range.high) + c.q_pad)) |
                             (max(q_a, q_b) + pad_q < splat8(static_cast<float>(f.range.low) - c.q_pad)));
   const float wanted_q = kWantedHeightDeviation * static_cast<float>(f.range.high - f.range.low) + 1.0f;
-  const unsigned straight =
-      mask_of((pad_x <= splat8(kWantedDeviation)) & (pad_y <= splat8(kWantedDeviation)) & (pad_q <= splat8(wanted_q)));
+  const unsigned straight = mask_of((bend_x <= splat8(kWantedDeviation)) & (bend_y <= splat8(kWantedDeviation)) &
+                                    (pad_q <= splat8(wanted_q)));
   c.counters.bounds += 1;
+  if (traversal_poll(c.counters, c.next_poll)) return true;
   // As few chords as are straight enough; a chord that misses the map's range need not be.
   constexpr unsigned kWhole = 0x01, kHalves = 0x06, kQuarters = 0x78;
   const unsigned good = straight | ~alive;
@@ -492,7 +530,19 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
     const int k = __builtin_ctz(alive);
     const double from = tau0 + static_cast<double>(u0[k]) * step, to = tau0 + static_cast<double>(u1[k]) * step;
     if (from > c.tau_end) return false;
-    if ((straight >> k & 1) == 0 && splits < kMaxSplits) {
+    const bool long_x = __builtin_fabsf(b.x[k] - a.x[k]) > c.long_x,
+               long_y = __builtin_fabsf(b.y[k] - a.y[k]) > c.long_y;
+    if (long_x || long_y) {
+      const auto meets = [&](const LatticeAxis& axis, const StoredRange* bands, double origin, const F8& from_lanes,
+                             const F8& to_lanes, float pad) {
+        return band_meets(axis, bands, f.log2_band, static_cast<std::int64_t>(origin),
+                          min(from_lanes[k], to_lanes[k]) - pad, max(from_lanes[k], to_lanes[k]) + pad,
+                          min(q_a[k], q_b[k]) - pad_q[k] - c.q_pad, max(q_a[k], q_b[k]) + pad_q[k] + c.q_pad);
+      };
+      if (long_x && !meets(f.y, f.row_bands, origin_y, a.y, b.y, pad_y[k])) continue;
+      if (long_y && !meets(f.x, f.column_bands, origin_x, a.x, b.x, pad_x[k])) continue;
+    }
+    if (((straight >> k & 1) == 0 && splits < kMaxSplits) || ((long_x || long_y) && splits < c.max_long_splits)) {
       if (chords_intersect(c, from, to, splits + 1)) return true;
       continue;
     }
@@ -519,6 +569,91 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
   return false;
 }
 
+/// Where a segment passes from over a clamped map to beside it. What is beside the map in one axis varies along the other
+/// only, so that one place stands for all of it: chords of any length then fit into floats.
+struct ClampCuts {
+  double cuts[9];  ///< τ, ascending; the last one is the segment's end
+  int count = 0;
+};
+
+/// How far from the map's last texels the cuts of an axis are: more than rounding may take a point of the curve.
+RELIEF_KERNEL double clamp_margin(const CurveSegment& g, const double* x)
+{
+  return 1.0 + (g.relative_error + 0x1p-40) * (__builtin_fabs(x[1] - x[0]) + __builtin_fabs(x[2] - x[0]));
+}
+
+RELIEF_KERNEL bool reaches_beside(const LatticeAxis& axis, const double* x)
+{
+  return axis.wrap == Wrap::kClamp && (min(x[0], min(x[1], x[2])) < -kLittleBeside ||
+                                       max(x[0], max(x[1], x[2])) > axis.num_texels - 1 + kLittleBeside);
+}
+
+RELIEF_KERNEL void add_clamp_cuts(const LatticeAxis& axis,
+                                  const double* x,
+                                  const CurveSegment& g,
+                                  const CurveRange& range,
+                                  ClampCuts* out)
+{
+  if (!reaches_beside(axis, x)) return;
+  const double margin = clamp_margin(g, x);
+  for (const double at : {-margin, axis.num_texels - 1 + margin}) {
+    const Quadratic p = g.W * (x[0] - at) + g.e[1] * (x[1] - x[0]) + g.e[2] * (x[2] - x[0]);
+    out->count = quadratic_roots_inside(p, range.tau0, range.tau1, out->cuts, out->count);
+  }
+}
+
+/// Lattice coordinates of the vertices, or those of the place that stands for a piece beside the map.
+/// @param beside  room for the latter
+RELIEF_KERNEL const double* seen_coordinates(const LatticeAxis& axis,
+                                             const double* x,
+                                             const CurveSegment& g,
+                                             double tau,
+                                             double* beside)
+{
+  if (!reaches_beside(axis, x)) return x;
+  const double at = (x[0] * quadratic_at(g.W, tau) + (x[1] - x[0]) * quadratic_at(g.e[1], tau) +
+                     (x[2] - x[0]) * quadratic_at(g.e[2], tau)) /
+                    quadratic_at(g.W, tau);
+  const double margin = clamp_margin(g, x), last = axis.num_texels - 1;
+  if (at > -margin && at < last + margin) return x;
+  beside[0] = beside[1] = beside[2] = at < 0.0 ? -0.5 : last + 0.5;
+  return beside;
+}
+
+/// The part of a segment within a range.
+/// @return true when the search is over
+RELIEF_KERNEL bool segment_intersect(Search& c, const CurveSegment& g, const CurveRange& range)
+{
+  const HeightFieldView& f = *c.mesh.field;
+  ClampCuts pieces;
+  add_clamp_cuts(f.x, c.tri.x, g, range, &pieces);
+  add_clamp_cuts(f.y, c.tri.y, g, range, &pieces);
+  pieces.cuts[pieces.count++] = range.tau1;
+  curve_detail::sort_ascending(pieces.cuts, pieces.count);
+  double from = range.tau0;
+  for (int k = 0; k < pieces.count; ++k) {
+    const double to = pieces.cuts[k], middle = 0.5 * (from + to);
+    double beside_x[3], beside_y[3];
+    c.x = seen_coordinates(f.x, c.tri.x, g, middle, beside_x);
+    c.y = seen_coordinates(f.y, c.tri.y, g, middle, beside_y);
+    if (from > c.tau_end) return false;
+    if (chords_intersect(c, from, to, 0)) return true;
+    from = to;
+  }
+  return false;
+}
+
+/// Splits after which no chord along an axis is long any more; each quarters one, unless the curve bends.
+/// @param wanted  length of a chord that is not long
+RELIEF_KERNEL int splits_of_long(const double* x, float wanted)
+{
+  int splits = 0;
+  double length = __builtin_fabs(x[1] - x[0]) + __builtin_fabs(x[2] - x[0]);
+  if (length <= static_cast<double>(wanted)) return splits;
+  for (; length > static_cast<double>(wanted); length *= 0.25) ++splits;
+  return splits + kMaxSplits;
+}
+
 }  // namespace chord_detail
 
 /// Nearest (or any) hit of a ray's curve in one displaced triangle.
@@ -536,6 +671,11 @@ RELIEF_KERNEL bool traverse_chord(const DisplacedMeshView& mesh,
   const HeightFieldView& f = *mesh.field;
   using chord_detail::kLeastHeightStep;
   chord_detail::Search c{mesh, mesh.triangles[triangle], curve, *counters, *hit, t_min, t_max};
+  c.long_x = min(chord_detail::kFloatUnits, chord_detail::kPeriodsAChord * static_cast<float>(f.x.num_cells));
+  c.long_y = min(chord_detail::kFloatUnits, chord_detail::kPeriodsAChord * static_cast<float>(f.y.num_cells));
+  const int splits_x = chord_detail::splits_of_long(c.tri.x, c.long_x),
+            splits_y = chord_detail::splits_of_long(c.tri.y, c.long_y);
+  c.max_long_splits = splits_x > splits_y ? splits_x : splits_y;
   // d = scale·(h_offset + h_step·q − midlevel). A scale of zero says nothing about q: then all of the map is met.
   const double metres_per_step = mesh.scale * f.h_step;
   const bool flat = !(__builtin_fabs(metres_per_step) > kLeastHeightStep);
@@ -554,7 +694,7 @@ RELIEF_KERNEL bool traverse_chord(const DisplacedMeshView& mesh,
     const CurveRange range = curve_clip(curve, g, c.unfolded, c.t_min, c.t_max);
     if (range.tau0 > range.tau1) continue;
     if (c.unfolded) c.tau_end = range.tau1;
-    if (chord_detail::chords_intersect(c, range.tau0, range.tau1, 0)) return true;
+    if (chord_detail::segment_intersect(c, g, range)) break;
   }
   return c.found;
 }

@@ -51,9 +51,10 @@ RELIEF_KERNEL double t_at(const Segment& segment, double tau)
 /// At most two turning points a coordinate.
 inline constexpr int kMaxPieces = 5;
 /// Stretches are split while a side is longer than the marching scale, and each split halves the longer side, so one of
-/// less than 2^31 texels is split at most 2·(31 − log2 scale) times on the way down; each split leaves one on the stack.
+/// 2^45 texels (kMostTexels to either side) is split at most 2·(45 − log2 scale) times on the way down; each split leaves
+/// one on the stack.
 inline constexpr double kLeastMarchingScale = 0x1p-20;
-inline constexpr int kStackSize = kMaxPieces + 2 * (31 + 20);
+inline constexpr int kStackSize = kMaxPieces + 2 * (45 + 20);
 
 /// Cuts a part of a segment at its turning points.
 /// @param bounds  kMaxPieces of them; the last one is the first along the ray
@@ -165,21 +166,25 @@ RELIEF_KERNEL bool segment_intersect(CurveSearch& c,
   // The march needs |N| a little around its stretch.
   constexpr double kMargin = 0.01;
   const RayProjection& r = segment.projection;
+  const VaryingPart varying_x = varying_part(c.mesh.field->x, r.origin_x),
+                    varying_y = varying_part(c.mesh.field->y, r.origin_y);
   RayBound stack[kStackSize];
   int depth = bounds_make(segment, range, stack);
   while (depth > 0) {
     RayBound bound = stack[--depth];
     ++c.counters.bounds;
+    if (traversal_poll(c.counters, c.next_poll)) return true;
     const CentredRect rect = rectangle_of(r, bound.stretch);
     const ScalarRange nu = normal_range(frame, {rect.x, rect.y, rect.rx + kMargin, rect.ry + kMargin});
     // The paper marches through small bounds at once. To test them as a whole first takes a quarter fewer steps, in no
     // more time, and allows a larger marching scale.
     if (!bound_intersect(c, segment, frame, bounds, options.reduce_by_inversion, rect, nu, bound)) continue;
     const ProjectedStretch& stretch = bound.stretch;
-    const double longest = max(__builtin_fabs(stretch.x1 - stretch.x0), __builtin_fabs(stretch.y1 - stretch.y0));
+    const VaryingSides sides = varying_sides(stretch, varying_x, varying_y);
+    const double longest = max(__builtin_fabs(sides.x1 - sides.x0), __builtin_fabs(sides.y1 - sides.y0));
     ProjectedStretch front, back;
     const bool march = longest <= options.marching_scale || depth + 2 > kStackSize;
-    if (march || !stretch_split(r, stretch, &front, &back)) {
+    if (march || !stretch_split(r, stretch, sides, &front, &back)) {
       if (texel_march(c, segment.g, r, stretch, nu)) return true;
       continue;
     }
@@ -217,7 +222,7 @@ RELIEF_KERNEL bool traverse_rmip(const DisplacedMeshView& mesh,
     const CurveRange range = curve_clip(curve, g, c.unfolded, c.t_min, c.t_max);
     if (range.tau0 > range.tau1) continue;
     if (rmip_detail::segment_intersect(c, rmip_detail::segment_make(c.tri, curve, g), frame, bounds, options, range))
-      return true;
+      break;
   }
   return c.found;
 }

@@ -196,24 +196,25 @@ RELIEF_KERNEL bool cell_on_curve_intersect(CurveSearch& c,
 /// periods the tree goes on above the mipmap: at level num_levels + m the children are 2^m × 2^m periods.
 struct Node {
   int level;                      ///< of its children
-  int column, row;                ///< among the parents of that level
-  std::int64_t first_x, first_y;  ///< lattice coordinates of the period's first cell, or of the tree's first period's
+  int column, row;                ///< among the parents of that level in a period; 0 above the mipmap
+  std::int64_t first_x, first_y;  ///< lattice coordinates of the first cell of its period, or of its first one's
   double t;                       ///< least t of its bounds
 };
 
-/// 2^31 periods a side.
-inline constexpr int kMaxTileLevels = 31;
+/// 2^45 periods a side: kMostTexels to either side, of a map of one texel.
+inline constexpr int kMaxTileLevels = 45;
 
 /// One of the four children of a node as a node.
 RELIEF_KERNEL Node child_node(const MinmaxMipmapView& mipmap, const Node& node, int child, double t)
 {
   const int column = 2 * node.column + (child & 1), row = 2 * node.row + (child >> 1);
-  if (node.level != mipmap.num_levels) return {node.level - 1, column, row, node.first_x, node.first_y, t};
+  if (node.level < mipmap.num_levels) return {node.level - 1, column, row, node.first_x, node.first_y, t};
+  const std::int64_t periods = std::int64_t{1} << (node.level - mipmap.num_levels);
   return {node.level - 1,
           0,
           0,
-          node.first_x + static_cast<std::int64_t>(column) * mipmap.x.num_cells,
-          node.first_y + static_cast<std::int64_t>(row) * mipmap.y.num_cells,
+          node.first_x + column * periods * mipmap.x.num_cells,
+          node.first_y + row * periods * mipmap.y.num_cells,
           t};
 }
 
@@ -237,7 +238,7 @@ RELIEF_KERNEL void child_sides(const LatticeAxis& axis,
     }
     const double size =
         static_cast<double>(axis.num_cells) * static_cast<double>(std::int64_t{1} << (level - num_levels));
-    *from = start + (2.0 * parent + step) * size;
+    *from = start + step * size;
     *to = *from + size;
     return;
   }
@@ -326,6 +327,7 @@ RELIEF_KERNEL bool root_intersect(CurveSearch& c,
     const Node node = stack[--depth];
     if (node.t > c.t_max) continue;
     const ChildHits hits = children_intersect(c, f, lattice, mipmap, node);
+    if (traversal_poll(c.counters, c.next_poll)) return true;
     if (node.level > 0) {
       for (int k = hits.count; k-- > 0;) {
         stack[depth++] = child_node(mipmap, node, hits.order[k], hits.t[hits.order[k]]);
@@ -423,14 +425,15 @@ RELIEF_KERNEL bool traverse_tfdm(const DisplacedMeshView& mesh,
     const int levels_x = tfdm_detail::tile_levels(all_columns, mipmap.x, &root.first_x);
     const int levels_y = tfdm_detail::tile_levels(rows, mipmap.y, &root.first_y);
     root.level = mipmap.num_levels + (levels_x > levels_y ? levels_x : levels_y);
-    return tfdm_detail::root_intersect(c, f, lattice, mipmap, projections, root) || c.found;
+    tfdm_detail::root_intersect(c, f, lattice, mipmap, projections, root);
+    return c.found;
   }
   // The smallest nodes of which four cover the triangle, unless it spans periods.
   while (root.level + 1 < mipmap.num_levels && static_cast<double>(2 << root.level) < extent) ++root.level;
   while (tfdm_detail::parent_walk_step(rows, mipmap.y, root.level + 1, &root.row, &root.first_y)) {
     tfdm_detail::ParentWalk columns = all_columns;
     while (tfdm_detail::parent_walk_step(columns, mipmap.x, root.level + 1, &root.column, &root.first_x)) {
-      if (tfdm_detail::root_intersect(c, f, lattice, mipmap, projections, root)) return true;
+      if (tfdm_detail::root_intersect(c, f, lattice, mipmap, projections, root)) return c.found;
     }
   }
   return c.found;

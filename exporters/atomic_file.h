@@ -4,18 +4,29 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <string>
 #include <string_view>
 
 namespace relief {
 
+/// The file that a name stands for: the end of a chain of symbolic links, whether there is a file or not. Names of open
+/// files, such as /dev/stdout and /dev/fd/3, are not followed further.
+/// @error OutputError if the links lead in a circle
+std::filesystem::path output_destination(const std::filesystem::path& path);
+
+/// Whether a destination is written as it is and not replaced: a device, a pipe, or an open file of this process.
+bool is_stream(const std::filesystem::path& destination);
+
 /// A file being written. Nobody sees it under its own name before `commit`; without a commit it leaves nothing behind.
-/// A symbolic link is followed; a device or pipe (such as /dev/stdout) is written directly, since it cannot be renamed.
+/// A symbolic link is followed, also to a file that is not there yet; an older file's owner and permissions are kept. What
+/// is_stream says is written directly and in one go, so that a pipe takes formats that are not written from front to end.
 /// Not synchronized to the disk: it protects against errors, interrupts and parallel writers, not against power cuts.
 class AtomicFile {
  public:
-  /// Opens the temporary file; its name is unique across processes and machines that share the folder.
+  /// Opens the temporary file; its name is unique across processes and machines that share the folder. What killed runs have
+  /// left in the folder is removed, once in the life of the process.
   /// @param target  final path; its folder must exist
-  /// @error OutputError if the temporary file cannot be made or the target is a folder
+  /// @error OutputError if the temporary file cannot be made, or the target is a folder or may not be written to
   explicit AtomicFile(std::filesystem::path target);
 
   /// Removes the temporary file unless it was committed.
@@ -27,7 +38,7 @@ class AtomicFile {
   /// Appends at the current position. @error OutputError, e.g. disk full
   void write(const void* bytes, std::size_t num_bytes);
 
-  /// Moves the position, in bytes from the start. @error OutputError, e.g. for a pipe
+  /// Moves the position, in bytes from the start. @error OutputError
   void seek(std::uint64_t position);
 
   /// Position in bytes from the start. @error OutputError
@@ -43,9 +54,17 @@ class AtomicFile {
 
  private:
   [[noreturn]] void fail(int error_number);
+  void open_stream();
+  void open_temporary();
+  void commit_stream();
+  void commit_temporary();
+  void close_descriptor();
 
   std::filesystem::path path_, destination_, temporary_;
-  std::FILE* file_ = nullptr;
+  std::FILE* file_ = nullptr;  ///< the temporary file; null for a stream
+  int descriptor_ = -1;        ///< of the stream; or holds the temporary file's lock until it has its name
+  std::string stream_bytes_;   ///< written to the stream by commit
+  std::size_t stream_position_ = 0;
   int first_error_ = 0;  ///< errno of the first failure; 0: none
 };
 

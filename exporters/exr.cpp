@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <limits>
 #include <mutex>
@@ -23,6 +24,8 @@
 
 #include "exporters/atomic_file.h"
 #include "exporters/errors.h"
+#include "scene/cryptomatte.h"
+#include "scene/memory.h"
 
 namespace relief {
 
@@ -165,6 +168,8 @@ void write_channels(const std::filesystem::path& path,
     file.commit();
   } catch (const OutputError&) {
     throw;
+  } catch (const std::bad_alloc&) {
+    throw OutOfMemory("writing " + path.string());
   } catch (const std::exception& error) {
     throw OutputError(path.string(), error.what());
   }
@@ -179,6 +184,10 @@ ChannelType film_channel_type(const AovInfo& info, const ExrOptions& options)
     case Aov::kIndirect:
     case Aov::kAlbedo:
     case Aov::kNormal:
+    case Aov::kEmission:
+    case Aov::kEnvironment:
+    case Aov::kDenoisingAlbedo:
+    case Aov::kDenoisingNormal:
       return options.float_color ? ChannelType::kFloat : ChannelType::kHalf;
     default:
       return ChannelType::kFloat;
@@ -239,6 +248,8 @@ Picture picture_from_header(const Imf::Header& header, const std::string& file)
   if (std::abs(crop_x) > 2 * kMaxSide || std::abs(crop_y) > 2 * kMaxSide) {
     throw InputError(file, "its data window lies far outside its display window");
   }
+  constexpr std::int64_t kValueBytes = sizeof(float);
+  memory_require(static_cast<std::uint64_t>(width * height * num_channels * kValueBytes), file);
   picture.file = file;
   picture.width = static_cast<int>(width);
   picture.height = static_cast<int>(height);
@@ -321,14 +332,31 @@ Attributes exr_attributes(const Statistics& statistics, std::string_view command
   return attributes;
 }
 
+Attributes exr_cryptomatte_attributes(const Scene& scene, std::uint32_t aov_mask)
+{
+  Attributes attributes;
+  for (int i = 0; i < kNumCryptomattes; ++i) {
+    if ((aov_mask >> (kFirstCryptomatte + i) & 1u) == 0) continue;
+    const std::string layer(cryptomatte_layer(i));
+    char key[9];
+    std::snprintf(key, sizeof key, "%08x", cryptomatte_hash(layer));
+    const std::string prefix = "cryptomatte/" + std::string(key, 7) + "/";
+    attributes[prefix + "name"] = layer;
+    attributes[prefix + "hash"] = "MurmurHash3_32";
+    attributes[prefix + "conversion"] = "uint32_to_float32";
+    attributes[prefix + "manifest"] = cryptomatte_manifest(scene, i);
+  }
+  return attributes;
+}
+
 std::vector<std::string> exr_damaged_layers(const FilmLayout& layout, ExrCompression compression)
 {
   std::vector<std::string> damaged;
   if (compression != ExrCompression::kDwaa && compression != ExrCompression::kDwab) return damaged;
   for (const AovInfo& info : kAovInfo) {
     const bool kept = layout.offset[static_cast<std::size_t>(info.aov)] >= 0;
-    const bool is_data =
-        info.aov == Aov::kNormal || info.aov == Aov::kPosition || info.aov == Aov::kVariance || info.aov == Aov::kHalf;
+    const bool is_data = info.aov == Aov::kNormal || info.aov == Aov::kPosition || info.aov == Aov::kVariance ||
+                         info.aov == Aov::kHalf || info.aov == Aov::kDenoisingNormal || info.channels.empty();
     if (kept && is_data) damaged.emplace_back(info.name);
   }
   return damaged;
@@ -382,8 +410,10 @@ Picture exr_load(const std::filesystem::path& path)
     return picture;
   } catch (const InputError&) {
     throw;
+  } catch (const OutOfMemory&) {
+    throw;
   } catch (const std::bad_alloc&) {
-    throw InputError(file, "needs more memory than there is");
+    throw OutOfMemory(file);
   } catch (const std::exception& error) {
     throw InputError(file, "not a readable OpenEXR file: " + one_line(error.what()));
   }

@@ -10,6 +10,7 @@
 
 #include "exporters/picture.h"
 #include "kernel/statistics.h"
+#include "scene/scene.h"
 
 namespace relief {
 
@@ -30,6 +31,9 @@ void exr_use_threads(int num_threads);
 /// The facts of a render as attributes: relief:version, scene, seed, frame, samples, seconds, error_rmse, warnings, …
 /// @param command  the command line that made it, or empty
 Attributes exr_attributes(const Statistics& statistics, std::string_view command);
+
+/// What compositors need to know of the Cryptomattes among a film's layers: their names, and whose ids they hold.
+Attributes exr_cryptomatte_attributes(const Scene& scene, std::uint32_t aov_mask);
 
 /// Layers of a film that a compression would change beyond their stored type although their values are data, not
 /// colours: DWA treats every channel called R, G, B or Y as colour. Empty for lossless compressions.

@@ -8,6 +8,7 @@
 
 #include "exporters/errors.h"
 #include "exporters/exr.h"
+#include "scene/cryptomatte.h"
 
 namespace relief {
 
@@ -42,6 +43,18 @@ Rule rule_of(const std::string& channel)
     }
   }
   return Rule::kMean;
+}
+
+/// Whether a channel is one of a Cryptomatte's.
+bool is_cryptomatte(std::string_view channel)
+{
+  for (int i = 0; i < kNumCryptomattes; ++i) {
+    const std::string_view layer = cryptomatte_layer(i);
+    if (!channel.starts_with(layer)) continue;
+    const std::string_view rest = channel.substr(layer.size());
+    if (rest.size() > 2 && rest[2] == '.') return true;
+  }
+  return false;
 }
 
 std::string attribute_of(const Picture& picture, const std::string& name)
@@ -102,6 +115,7 @@ class Merger {
 
   void check_same_image(const Picture& picture);
   void check_seeds(const Picture& picture);
+  void warn_left_out(const std::string& channel, const std::string& why);
   void drop_missing_layers(const Picture& picture);
   void add_values(const Picture& picture);
   void add_attributes(const Picture& picture);
@@ -133,10 +147,15 @@ void Merger::check_same_image(const Picture& picture)
     result_.full_width = picture.full_width;
     result_.full_height = picture.full_height;
     result_.attributes = picture.attributes;
+    std::erase_if(result_.attributes, [](const auto& entry) { return entry.first.starts_with("cryptomatte/"); });
     const std::size_t num_pixels = static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height);
     num_samples_.assign(num_pixels, 0);
     num_even_samples_.assign(num_pixels, 0);
     for (const Channel& channel : picture.channels) {
+      if (is_cryptomatte(channel.name)) {
+        warn_left_out(channel.name, "ids have no mean");
+        continue;
+      }
       const Rule rule = rule_of(channel.name);
       sums_.push_back({channel.name, channel.type, rule, std::vector<double>(num_pixels),
                        std::vector<double>(rule == Rule::kMeanOverHits ? num_pixels : 0)});
@@ -176,15 +195,20 @@ void Merger::check_seeds(const Picture& picture)
   }
 }
 
+void Merger::warn_left_out(const std::string& channel, const std::string& why)
+{
+  const std::size_t dot = channel.rfind('.');
+  const std::string what = dot == std::string::npos ? "channel '" + channel : "layer '" + channel.substr(0, dot);
+  const std::string start = what + "' is left out: ";
+  const auto is_said = [&](const std::string& text) { return text.starts_with(start); };
+  if (std::any_of(warnings_.begin(), warnings_.end(), is_said)) return;
+  warnings_.push_back(start + why);
+}
+
 void Merger::drop_missing_layers(const Picture& picture)
 {
   const auto warn = [&](const std::string& channel, const std::string& poorer_file) {
-    const std::size_t dot = channel.rfind('.');
-    const std::string what = dot == std::string::npos ? "channel '" + channel : "layer '" + channel.substr(0, dot);
-    const std::string start = what + "' is left out: ";
-    const auto is_said = [&](const std::string& text) { return text.starts_with(start); };
-    if (std::any_of(warnings_.begin(), warnings_.end(), is_said)) return;
-    warnings_.push_back(start + "'" + poorer_file + "' does not have it");
+    warn_left_out(channel, "'" + poorer_file + "' does not have it");
   };
   std::erase_if(sums_, [&](const Sum& sum) {
     if (picture.find(sum.name) != nullptr) return false;
@@ -193,6 +217,7 @@ void Merger::drop_missing_layers(const Picture& picture)
   });
   for (const Channel& channel : picture.channels) {
     const auto is_kept = [&](const Sum& sum) { return sum.name == channel.name; };
+    if (is_cryptomatte(channel.name)) continue;
     if (std::none_of(sums_.begin(), sums_.end(), is_kept)) warn(channel.name, result_.file);
   }
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "scene/cryptomatte.h"
+
 namespace relief {
 
 namespace {
@@ -47,6 +49,12 @@ std::string attribute_number(double value)
 
 std::string channel_name(const AovInfo& info, std::size_t channel)
 {
+  if (info.channels.empty()) {
+    // By its specification, one layer for every two levels.
+    const char digits[] = {static_cast<char>('0' + channel / 40), static_cast<char>('0' + channel / 4 % 10), 0};
+    const int index = static_cast<int>(info.aov) - kFirstCryptomatte;
+    return std::string(cryptomatte_layer(index)) + digits + "." + "rgba"[channel % 4];
+  }
   const std::string letter(1, info.channels[channel]);
   return info.aov == Aov::kBeauty ? letter : std::string(info.name) + "." + letter;
 }
@@ -57,10 +65,11 @@ ImageView film_layer(const FilmView& film, Aov aov)
   const int offset = film.layout.offset[static_cast<std::size_t>(aov)];
   if (offset < 0) return view;
   const AovInfo& info = kAovInfo[static_cast<std::size_t>(aov)];
-  for (std::size_t c = 0; c < info.channels.size(); ++c) {
+  const int num_channels = aov_num_channels(info, film.layout.cryptomatte_levels);
+  for (int c = 0; c < num_channels; ++c) {
     const std::ptrdiff_t pixel_stride = film.layout.num_floats;
     view.channels.push_back({film.pixels + offset + c, pixel_stride, pixel_stride * film.width, ChannelType::kFloat,
-                             channel_name(info, c)});
+                             channel_name(info, static_cast<std::size_t>(c))});
   }
   return view;
 }

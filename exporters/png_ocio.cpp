@@ -81,6 +81,7 @@ const char* source_space(const OCIO::ConstConfigRcPtr& config)
 struct FoundView {
   OCIO::ConstCPUProcessorRcPtr cpu;
   std::string description;
+  std::vector<std::string> files;
 };
 
 /// @error InputError if the view is not there; OCIO::Exception if the configuration is broken
@@ -101,8 +102,12 @@ FoundView view_from_config(const std::string& file, const std::string& requested
   transform->setSrc(source_space(config));
   transform->setDisplay(display);
   transform->setView(view.c_str());
-  return {config->getProcessor(transform)->getDefaultCPUProcessor(),
-          "view '" + view + "' of display '" + display + "' from " + file};
+  const OCIO::ConstProcessorRcPtr processor = config->getProcessor(transform);
+  std::vector<std::string> files = {file};
+  const OCIO::ConstProcessorMetadataRcPtr metadata = processor->getProcessorMetadata();
+  for (int i = 0; i < metadata->getNumFiles(); ++i) files.emplace_back(metadata->getFile(i));
+  return {processor->getDefaultCPUProcessor(), "view '" + view + "' of display '" + display + "' from " + file,
+          std::move(files)};
 }
 
 /// From a value in [0, 1] (NaN: 0) to the nearest code.
@@ -173,6 +178,7 @@ ColorView::ColorView(const std::string& view)
   const auto use = [&](FoundView found) {
     processor_ = std::make_unique<Processor>(Processor{std::move(found.cpu)});
     description_ = std::move(found.description);
+    files_ = std::move(found.files);
   };
   if (const char* configured = std::getenv("OCIO"); configured != nullptr && *configured != '\0') {
     try {

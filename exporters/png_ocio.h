@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "exporters/picture.h"
 #include "kernel/film/film_layout.h"
@@ -37,6 +38,9 @@ class ColorView {
   /// One line for a log: view, display, and whose configuration it is.
   const std::string& description() const { return description_; }
 
+  /// Configuration and tables that were read for it.
+  const std::vector<std::string>& files() const { return files_; }
+
   /// Scene-linear RGB triples to display values in [0, 1], in place.
   void apply(std::span<float> rgb) const;
 
@@ -44,6 +48,7 @@ class ColorView {
   struct Processor;
   std::unique_ptr<Processor> processor_;  ///< null: built-in sRGB
   std::string description_;
+  std::vector<std::string> files_;
 };
 
 /// The sRGB encoding of a linear value. @return in [0, 1]; 0 for NaN

@@ -3,6 +3,9 @@
 #include <stdexcept>
 #include <string>
 
+#include "kernel/light/spot.h"
+#include "scene/memory.h"
+
 namespace relief {
 
 namespace {
@@ -70,8 +73,91 @@ void disk_intersect(const RTCIntersectFunctionNArguments* arguments)
   }
 }
 
+void ball_bounds(const RTCBoundsFunctionArguments* arguments)
+{
+  const Light& light = *static_cast<const Light*>(arguments->geometryUserPtr);
+  const float reach = light.radius * (1.0f + 8.0f * kUnitRoundoff);
+  const Vec3f half = Vec3f{reach, reach, reach} + 4.0f * kUnitRoundoff * abs(light.P);
+  RTCBounds* bounds = arguments->bounds_o;
+  bounds->lower_x = light.P.x - half.x;
+  bounds->lower_y = light.P.y - half.y;
+  bounds->lower_z = light.P.z - half.z;
+  bounds->upper_x = light.P.x + half.x;
+  bounds->upper_y = light.P.y + half.y;
+  bounds->upper_z = light.P.z + half.z;
+}
+
+/// A ray meets a ball once: where it enters, or, started inside, where it leaves.
+void ball_intersect(const RTCIntersectFunctionNArguments* arguments)
+{
+  const Light& light = *static_cast<const Light*>(arguments->geometryUserPtr);
+  RTCRayHitN* rays = arguments->rayhit;
+  const unsigned count = arguments->N;
+  RTCRayN* ray = RTCRayHitN_RayN(rays, count);
+  RTCHitN* hit = RTCRayHitN_HitN(rays, count);
+  for (unsigned i = 0; i < count; ++i) {
+    if (arguments->valid[i] != -1) continue;
+    const Vec3f O{RTCRayN_org_x(ray, count, i), RTCRayN_org_y(ray, count, i), RTCRayN_org_z(ray, count, i)};
+    const Vec3f D{RTCRayN_dir_x(ray, count, i), RTCRayN_dir_y(ray, count, i), RTCRayN_dir_z(ray, count, i)};
+    const float t = ball_light_distance(light, light.P - O, D);
+    if (!(t > RTCRayN_tnear(ray, count, i) && t < RTCRayN_tfar(ray, count, i))) continue;
+    RTCRayN_tfar(ray, count, i) = t;
+    RTCHitN_geomID(hit, count, i) = arguments->geomID;
+    RTCHitN_primID(hit, count, i) = 0;
+    RTCHitN_instID(hit, count, i, 0) = RTC_INVALID_GEOMETRY_ID;
+  }
+}
+
 /// Area lights cast no shadows: their mask keeps shadow rays away, so this is never reached with work to do.
-void disk_occluded(const RTCOccludedFunctionNArguments*) {}
+void light_occluded(const RTCOccludedFunctionNArguments*) {}
+
+/// How a ray stands to the box of what it may hit.
+enum class RayStart : std::uint8_t { kNear, kFar, kInvalid };
+
+/// Embree ends the program at rays beyond its limits, among them all that are not numbers.
+RayStart ray_start(const RayTarget& target, Vec3f O, Vec3f D, float t_min, float t_max)
+{
+  constexpr float kLongest = 1e18f;
+  const Vec3f size = abs(D);
+  const bool valid = size.x <= kLongest && size.y <= kLongest && size.z <= kLongest && !is_zero(D) && t_min >= 0.0f &&
+                     t_min <= t_max && t_min < kInfinity;
+  if (!valid) return RayStart::kInvalid;
+  if (ray_starts_near(target, to_double(O))) return RayStart::kNear;
+  return is_finite(O) ? RayStart::kFar : RayStart::kInvalid;
+}
+
+RayStart ray_start(const RayTarget& target, const RTCRay& ray)
+{
+  return ray_start(target, {ray.org_x, ray.org_y, ray.org_z}, {ray.dir_x, ray.dir_y, ray.dir_z}, ray.tnear, ray.tfar);
+}
+
+/// A far ray that is moved near, and its range of t with it, while it is traced.
+class FarRay {
+ public:
+  FarRay(const RayTarget& target, EmbreeContext& context, RTCRay* ray) : start_(context.far_start)
+  {
+    start_.is_far = true;
+    start_.O = to_double(Vec3f{ray->org_x, ray->org_y, ray->org_z});
+    start_.t = ray_move_near(target, &start_.O, to_double(Vec3f{ray->dir_x, ray->dir_y, ray->dir_z}));
+    ray->org_x = static_cast<float>(start_.O.x);
+    ray->org_y = static_cast<float>(start_.O.y);
+    ray->org_z = static_cast<float>(start_.O.z);
+    ray->tnear = static_cast<float>(max(static_cast<double>(ray->tnear) - start_.t, 0.0));
+    ray->tfar = static_cast<float>(static_cast<double>(ray->tfar) - start_.t);
+    meets_ = start_.t >= 0 && ray->tnear <= ray->tfar;
+  }
+  ~FarRay() { start_ = {}; }
+  FarRay(const FarRay&) = delete;
+  FarRay& operator=(const FarRay&) = delete;
+
+  bool meets() const { return meets_; }  ///< the box of what it may hit
+  /// t from where the ray started.
+  float t(float near_t) const { return static_cast<float>(static_cast<double>(near_t) + start_.t); }
+
+ private:
+  FarStart& start_;
+  bool meets_ = false;
+};
 
 Box3 scene_bounds(RTCScene scene)
 {
@@ -90,7 +176,10 @@ Accel::Accel(const Scene& scene,
     : shadow_filter_(shadow_filter), displacements_(&displacements)
 {
   device_ = rtcNewDevice(nullptr);
-  if (device_ == nullptr) throw std::runtime_error("Embree cannot start on this machine");
+  if (device_ == nullptr) {
+    if (rtcGetDeviceError(nullptr) == RTC_ERROR_OUT_OF_MEMORY) throw OutOfMemory("the start of Embree");
+    throw std::runtime_error("Embree cannot start on this machine");
+  }
   rtcSetDeviceMemoryMonitorFunction(device_, count_bytes, &bytes_);
   try {
     build(scene, lights, area_lights, displacements);
@@ -150,24 +239,86 @@ void Accel::build(const Scene& scene,
   bool any_transparent = false;
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) any_transparent |= uses[m] == 1 && transparent[m] != 0;
   top_ = new_scene(any_transparent ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
+  instances_.resize(scene.instances.size());
+  Box3 box = box_empty();
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
     const auto mesh = static_cast<std::size_t>(instance.mesh_index);
     const int displaced = displacements.geometry_index(i);
-    RTCGeometry geometry = displaced >= 0 ? new_instance(displaced_scenes_[static_cast<std::size_t>(displaced)],
-                                                         instance.world_from_object)
-                           : mesh_scenes_[mesh] != nullptr
-                               ? new_instance(mesh_scenes_[mesh], instance.world_from_object)
-                               : new_mesh(scene.meshes[mesh], &instance.world_from_object, transparent[mesh] != 0);
+    RTCScene instanced = displaced >= 0 ? displaced_scenes_[static_cast<std::size_t>(displaced)] : mesh_scenes_[mesh];
+    RTCGeometry geometry = nullptr;
+    if (instanced != nullptr) {
+      instances_[i] = instance_geometry_prepare(instanced, instance.world_from_object, &pad_);
+      box = box_union(box, instance_bounds(instances_[i]));
+      geometry = instance_geometry_make(device_, instances_[i]);
+    } else {
+      for (const Vec3f P : scene.meshes[mesh].P) {
+        const Vec3f P_world = transform_point(instance.world_from_object, P);
+        box = box_union(box, {P_world, P_world});
+      }
+      geometry = new_mesh(scene.meshes[mesh], &instance.world_from_object, transparent[mesh] != 0);
+    }
     attach(top_, geometry, static_cast<unsigned>(i), mask_of(instance.flags));
   }
   for (std::size_t i = 0; i < area_lights.size(); ++i) {
     const Light& light = lights[area_lights[i]];
-    attach(top_, light.kind == LightKind::kDisk ? new_disk(light) : new_rectangle(light),
+    const Vec3f half = light_is_ball(light) ? splat3(light.radius) : abs(light.edge_u) + abs(light.edge_v);
+    box = box_union(box, {light.P - half, light.P + half});
+    attach(top_,
+           light.kind == LightKind::kRectangle ? new_rectangle(light)
+           : light.kind == LightKind::kDisk    ? new_round(light, disk_bounds, disk_intersect)
+                                               : new_round(light, ball_bounds, ball_intersect),
            static_cast<unsigned>(scene.instances.size() + i),
            kRayBounce | (light.visible_to_camera ? std::uint32_t{kRayCamera} : 0u));
   }
+  if (box.low.x <= box.high.x) pad_ = ray_target_pad(ray_target_make(box));
   commit(top_);
+  target_ = ray_target_make(bounds());
+}
+
+void Accel::intersect(EmbreeContext& context, RTCRayHit& ray) const
+{
+  const RayStart start = ray_start(target_, ray.ray);
+  if (start == RayStart::kNear) return embree_intersect1(top_, context, ray);
+  if (start == RayStart::kInvalid) return;
+  RTCRayHit near = ray;
+  const FarRay far(target_, context, &near.ray);
+  if (!far.meets()) return;
+  embree_intersect1(top_, context, near);
+  if (near.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
+  ray.hit = near.hit;
+  ray.ray.tfar = min(ray.ray.tfar, far.t(near.ray.tfar));
+}
+
+void Accel::intersect8(EmbreeContext& context, RTCRayHit8& rays) const
+{
+  alignas(32) int valid[8];
+  bool any = false;
+  for (unsigned i = 0; i < 8; ++i) {
+    const RTCRay8& r = rays.ray;
+    const RayStart start = ray_start(target_, {r.org_x[i], r.org_y[i], r.org_z[i]},
+                                     {r.dir_x[i], r.dir_y[i], r.dir_z[i]}, r.tnear[i], r.tfar[i]);
+    valid[i] = start == RayStart::kNear ? -1 : 0;
+    any |= valid[i] != 0;
+    if (start != RayStart::kFar) continue;
+    RTCRayHit ray = rtcGetRayHitFromRayHitN(reinterpret_cast<RTCRayHitN*>(&rays), 8, i);
+    intersect(context, ray);
+    rtcCopyHitToHitN(RTCRayHitN_HitN(reinterpret_cast<RTCRayHitN*>(&rays), 8), &ray.hit, 8, i);
+    rays.ray.tfar[i] = ray.ray.tfar;
+  }
+  if (any) embree_intersect8(valid, top_, context, rays);
+}
+
+void Accel::occluded(EmbreeContext& context, RTCRay& ray) const
+{
+  const RayStart start = ray_start(target_, ray);
+  if (start == RayStart::kNear) return embree_occluded1(top_, context, ray);
+  if (start == RayStart::kInvalid) return;
+  RTCRay near = ray;
+  const FarRay far(target_, context, &near);
+  if (!far.meets()) return;
+  embree_occluded1(top_, context, near);
+  if (near.tfar < 0.0f) ray.tfar = near.tfar;
 }
 
 Accel::~Accel() { release(); }
@@ -207,7 +358,7 @@ RTCGeometry Accel::new_mesh(const Mesh& mesh, const Affine3* world_from_object, 
   } else {
     auto* vertices = static_cast<Vec3f*>(
         rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), mesh.P.size()));
-    if (vertices == nullptr) throw std::runtime_error("not enough memory for the vertices of mesh '" + mesh.name + "'");
+    if (vertices == nullptr) throw OutOfMemory("the vertices of mesh '" + mesh.name + "'");
     for (std::size_t i = 0; i < mesh.P.size(); ++i) {
       vertices[i] = in_place ? mesh.P[i] : transform_point(*world_from_object, mesh.P[i]);
     }
@@ -218,15 +369,6 @@ RTCGeometry Accel::new_mesh(const Mesh& mesh, const Affine3* world_from_object, 
   return geometry;
 }
 
-RTCGeometry Accel::new_instance(RTCScene instanced, const Affine3& m)
-{
-  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
-  rtcSetGeometryInstancedScene(geometry, instanced);
-  const float columns[12] = {m.x.x, m.x.y, m.x.z, m.y.x, m.y.y, m.y.z, m.z.x, m.z.y, m.z.z, m.p.x, m.p.y, m.p.z};
-  rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
-  return geometry;
-}
-
 RTCGeometry Accel::new_rectangle(const Light& light)
 {
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_QUAD);
@@ -234,6 +376,7 @@ RTCGeometry Accel::new_rectangle(const Light& light)
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), 4));
   auto* indices = static_cast<std::uint32_t*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, 4 * sizeof(std::uint32_t), 1));
+  if (vertices == nullptr || indices == nullptr) throw OutOfMemory("an area light");
   vertices[0] = light.P - light.edge_u - light.edge_v;
   vertices[1] = light.P + light.edge_u - light.edge_v;
   vertices[2] = light.P + light.edge_u + light.edge_v;
@@ -242,15 +385,15 @@ RTCGeometry Accel::new_rectangle(const Light& light)
   return geometry;
 }
 
-RTCGeometry Accel::new_disk(const Light& light)
+RTCGeometry Accel::new_round(const Light& light, RTCBoundsFunction bounds_of, RTCIntersectFunctionN intersect_of)
 {
   RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_USER);
-  disks_.push_back(std::make_unique<Light>(light));
+  round_lights_.push_back(std::make_unique<Light>(light));
   rtcSetGeometryUserPrimitiveCount(geometry, 1);
-  rtcSetGeometryUserData(geometry, disks_.back().get());
-  rtcSetGeometryBoundsFunction(geometry, disk_bounds, nullptr);
-  rtcSetGeometryIntersectFunction(geometry, disk_intersect);
-  rtcSetGeometryOccludedFunction(geometry, disk_occluded);
+  rtcSetGeometryUserData(geometry, round_lights_.back().get());
+  rtcSetGeometryBoundsFunction(geometry, bounds_of, nullptr);
+  rtcSetGeometryIntersectFunction(geometry, intersect_of);
+  rtcSetGeometryOccludedFunction(geometry, light_occluded);
   return geometry;
 }
 
@@ -267,10 +410,9 @@ void Accel::commit(RTCScene target)
   rtcCommitScene(target);
   const RTCError error = rtcGetDeviceError(device_);
   if (error == RTC_ERROR_NONE) return;
-  throw std::runtime_error(error == RTC_ERROR_OUT_OF_MEMORY
-                               ? "not enough memory for the acceleration structure"
-                               : "Embree failed to build the acceleration structure (error " +
-                                     std::to_string(static_cast<int>(error)) + ")");
+  if (error == RTC_ERROR_OUT_OF_MEMORY) throw OutOfMemory("the acceleration structure");
+  throw std::runtime_error("Embree failed to build the acceleration structure (error " +
+                           std::to_string(static_cast<int>(error)) + ")");
 }
 
 }  // namespace relief

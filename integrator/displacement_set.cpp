@@ -13,13 +13,19 @@
 
 #include "integrator/stages.h"
 #include "kernel/shape/surface_hit.h"
+#include "scene/limits.h"
 
 namespace relief {
 
 namespace {
 
-/// Mean scale of a transform: the cube root of its determinant.
-double mean_scale(const Affine3& m) { return std::cbrt(std::abs(static_cast<double>(dot(m.x, cross(m.y, m.z))))); }
+/// By how much a similarity scales: the cube root of its determinant, which can be below single precision. The root is
+/// rounded to it, so that what turning leaves in the last digits of a double does not keep instances from sharing.
+double similarity_scale(const Affine3& m)
+{
+  const double determinant = dot(to_double(m.x), cross(to_double(m.y), to_double(m.z)));
+  return static_cast<double>(static_cast<float>(std::cbrt(std::abs(determinant))));
+}
 
 DisplacementMethod method_of(const DisplacementSettings& settings, const DisplacementOptions& options)
 {
@@ -84,6 +90,19 @@ std::string gibibytes(std::uint64_t bytes)
   char text[32];
   std::snprintf(text, sizeof text, "%.1f GiB", static_cast<double>(bytes) / (1 << 30));
   return text;
+}
+
+/// Embree leaves out what is beyond its limits without a word.
+/// @param box  of an instance's displaced mesh, object space
+void check_positions(const Scene& scene, const Instance& instance, const Box3& box)
+{
+  const Affine3& m = instance.world_from_object;
+  const Vec3f extent = max(abs(box.low), abs(box.high));
+  const Vec3f extent_world = abs(m.x) * extent.x + abs(m.y) * extent.y + abs(m.z) * extent.z + abs(m.p);
+  // A mesh without triangles has a box of infinite extent, turned over.
+  if (!(box.low.x <= box.high.x) || max_component(max(extent, extent_world)) <= 2 * kFarthest) return;
+  throw SceneError(scene.file, "", "displaced positions within 1e15 m of the origin",
+                   "farther ones of node '" + instance.name + "'");
 }
 
 /// Refuses what would not fit, before anything large is allocated.
@@ -222,7 +241,8 @@ DisplacementSet::DisplacementSet(const Scene& scene, const DisplacementOptions& 
     if (displacement < 0) continue;
     const DisplacementSettings& settings = scene.displacements[static_cast<std::size_t>(displacement)];
     double scale = settings.scale;
-    if (settings.space == DisplacementSpace::kWorld) scale /= mean_scale(instance.world_from_object);
+    // The scene has only similarities there, see scene/world_displacement.h.
+    if (settings.space == DisplacementSpace::kWorld) scale /= similarity_scale(instance.world_from_object);
     const auto [at, is_new] =
         known.try_emplace({instance.mesh_index, displacement, scale}, static_cast<int>(uses.size()));
     geometry_of_instance_[i] = at->second;
@@ -243,6 +263,7 @@ DisplacementSet::DisplacementSet(const Scene& scene, const DisplacementOptions& 
   }
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     if (geometry_of_instance_[i] < 0) continue;
+    check_positions(scene, scene.instances[i], displaced(i).mesh.bounds());
     texel_of_instance_[i] =
         displaced(i).geometry.lod.texel * static_cast<float>(stretch_of(scene.instances[i].world_from_object).most);
   }
@@ -439,6 +460,7 @@ DisplacedMeshReport DisplacementSet::report() const
     sum.num_short_normals += report.num_short_normals;
     sum.num_degenerate += report.num_degenerate;
     sum.num_walls += report.num_walls;
+    sum.num_far_uv += report.num_far_uv;
   }
   return sum;
 }
@@ -473,6 +495,15 @@ std::vector<std::string> DisplacementSet::warnings() const
     if (report.num_degenerate > 0) {
       texts.push_back(std::to_string(report.num_degenerate) + of +
                       "have no normal to be displaced along and are left out");
+    }
+    if (report.num_far_uv > 0) {
+      const HeightMapView& map = displaced->geometry.mesh.field->map;
+      char limit[32];
+      std::snprintf(limit, sizeof limit, "%.2g", kMostTexels / std::max(map.width, map.height));
+      texts.push_back(
+          std::to_string(report.num_far_uv) + of + "(the first is triangle " + std::to_string(report.first_far_uv) +
+          ") have texture coordinates beyond " + limit +
+          ", where the texels of their height map cannot be told apart; they are displaced as at uv (0, 0)");
     }
     if (report.num_short_normals > 0) {
       texts.push_back(std::to_string(report.num_short_normals) + of +

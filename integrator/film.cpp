@@ -6,15 +6,19 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <utility>
+
+#include "scene/memory.h"
 
 namespace relief {
 
 namespace {
 
-AccumulatorLayout layout_make(std::uint32_t aov_mask)
+AccumulatorLayout layout_make(std::uint32_t aov_mask, int cryptomatte_levels)
 {
   AccumulatorLayout layout;
+  layout.cryptomatte_levels = cryptomatte_levels;
   const auto keep = [&](Aov aov, int channels, int& offset) {
     if ((aov_mask >> static_cast<int>(aov) & 1u) == 0) return;
     offset = layout.num_floats;
@@ -31,9 +35,40 @@ AccumulatorLayout layout_make(std::uint32_t aov_mask)
   keep(Aov::kMaterialId, 1, layout.material_id);
   keep(Aov::kDisplacementSteps, 1, layout.displacement_steps);
   keep(Aov::kCaustic, 3, layout.caustic);
+  keep(Aov::kHoldout, 1, layout.holdout);
+  keep(Aov::kMist, 1, layout.mist);
+  keep(Aov::kEmission, 3, layout.emission);
+  keep(Aov::kEnvironment, 3, layout.environment);
+  keep(Aov::kAmbientOcclusion, 1, layout.ambient_occlusion);
+  keep(Aov::kDenoisingAlbedo, 3, layout.denoising_albedo);
+  keep(Aov::kDenoisingNormal, 3, layout.denoising_normal);
+  keep(Aov::kDenoisingDepth, 1, layout.denoising_depth);
+  layout.denoising = layout.denoising_albedo >= 0 || layout.denoising_normal >= 0;
+  for (int i = 0; i < kNumCryptomattes; ++i) {
+    keep(static_cast<Aov>(kFirstCryptomatte + i), 2 * cryptomatte_levels, layout.cryptomatte[i]);
+  }
   // The finished planes take the place of the sums.
-  layout.num_floats = std::max(layout.num_floats, film_layout_make(aov_mask).num_floats);
+  layout.num_floats = std::max(layout.num_floats, film_layout_make(aov_mask, cryptomatte_levels).num_floats);
   return layout;
+}
+
+/// Writes one pixel's pairs of id and coverage as Cryptomatte wants them: by falling coverage.
+/// @param sums  as AccumulatorLayout::cryptomatte has them
+/// @param to    room for cryptomatte_num_channels(levels), all 0
+void put_cryptomatte(const float* sums, int levels, float inverse_n, float* to)
+{
+  struct Pair {
+    float id, weight;
+  };
+  std::array<Pair, kMostCryptomatteLevels> pairs{};
+  const auto count = static_cast<std::size_t>(levels);
+  for (std::size_t i = 0; i < count; ++i) pairs[i] = {sums[2 * i], sums[2 * i + 1]};
+  std::stable_sort(pairs.begin(), pairs.begin() + levels,
+                   [](const Pair& a, const Pair& b) { return a.weight > b.weight; });
+  for (std::size_t i = 0; i < count; ++i) {
+    to[2 * i] = pairs[i].id;
+    to[2 * i + 1] = pairs[i].weight * inverse_n;
+  }
 }
 
 Vec3f load3(const float* p) { return {p[0], p[1], p[2]}; }
@@ -119,15 +154,24 @@ struct Film::TileLevels {
   std::array<std::array<float, kNumSpreads>, 3> channels;
 };
 
-Film::Film(int width, int height, std::uint32_t aov_mask)
+/// Number of floats of all pixels. @error OutOfMemory
+static std::size_t sums_size(int width, int height, const AccumulatorLayout& layout)
+{
+  const std::size_t size =
+      static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * static_cast<std::size_t>(layout.num_floats);
+  memory_require(size * sizeof(float),
+                 "a picture of " + std::to_string(width) + " x " + std::to_string(height) + " pixels");
+  return size;
+}
+
+Film::Film(int width, int height, std::uint32_t aov_mask, int cryptomatte_levels)
     : width_(width),
       height_(height),
       tiles_x_((width + kTileSize - 1) / kTileSize),
       tiles_y_((height + kTileSize - 1) / kTileSize),
       aov_mask_(aov_mask | 1u << static_cast<int>(Aov::kBeauty)),
-      layout_(layout_make(aov_mask_)),
-      sums_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) *
-            static_cast<std::size_t>(layout_.num_floats)),
+      layout_(layout_make(aov_mask_, cryptomatte_levels)),
+      sums_(sums_size(width, height, layout_)),
       samples_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_))
 {
 }
@@ -159,6 +203,37 @@ double Film::mean_samples() const
     sum += static_cast<double>(tile_samples(tile)) * w * h;
   }
   return sum / (static_cast<double>(width_) * height_);
+}
+
+double Film::empty_part() const
+{
+  double sum = 0;
+  for (int tile = 0; tile < num_tiles(); ++tile) {
+    int x0, y0, w, h;
+    tile_rect(tile, &x0, &y0, &w, &h);
+    if (tile_samples(tile) == 0) sum += static_cast<double>(w) * h;
+  }
+  return sum / static_cast<double>(num_pixels());
+}
+
+std::vector<float> Film::tile_sums(int tile) const
+{
+  int x0, y0, w, h;
+  tile_rect(tile, &x0, &y0, &w, &h);
+  const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(w) * layout_.num_floats;
+  std::vector<float> sums;
+  sums.reserve(static_cast<std::size_t>(row * h));
+  for (int y = y0; y < y0 + h; ++y) sums.insert(sums.end(), record(x0, y), record(x0, y) + row);
+  return sums;
+}
+
+void Film::put_back_tile_sums(int tile, const std::vector<float>& sums)
+{
+  int x0, y0, w, h;
+  tile_rect(tile, &x0, &y0, &w, &h);
+  const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(w) * layout_.num_floats;
+  for (int y = 0; y < h; ++y)
+    std::copy_n(sums.begin() + y * row, row, sums_.begin() + (record(x0, y0 + y) - sums_.data()));
 }
 
 void Film::tile_variances(int tile, Vec3f* extrapolated, Vec3f* by_samples) const
@@ -295,6 +370,7 @@ void Film::resolve_pixel(const float* in,
                          std::uint32_t samples,
                          const TileLevels& levels,
                          const FilmLayout& out,
+                         float exposure,
                          float* to) const
 {
   const PixelEstimate pixel = pixel_estimate(in, samples);
@@ -308,14 +384,15 @@ void Film::resolve_pixel(const float* in,
     p[2] = v.z;
   };
   const float inverse_n = 1.0f / static_cast<float>(samples);
+  const float light = exposure * inverse_n;
   const float hits = in[AccumulatorLayout::kCoverage];
   const float inverse_hits = hits > 0.0f ? 1.0f / hits : 0.0f;
   if (float* p = plane(Aov::kBeauty)) {
-    put3(p, pixel.mean);
+    put3(p, pixel.mean * exposure);
     p[3] = hits * inverse_n;
   }
-  if (float* p = plane(Aov::kDirect)) put3(p, load3(in + layout_.direct) * inverse_n);
-  if (float* p = plane(Aov::kIndirect)) put3(p, pixel.mean - load3(in + layout_.direct) * inverse_n);
+  if (float* p = plane(Aov::kDirect)) put3(p, load3(in + layout_.direct) * light);
+  if (float* p = plane(Aov::kIndirect)) put3(p, pixel.mean * exposure - load3(in + layout_.direct) * light);
   if (float* p = plane(Aov::kAlbedo)) put3(p, load3(in + layout_.albedo) * inverse_n);
   if (float* p = plane(Aov::kNormal)) put3(p, load3(in + layout_.normal) * inverse_n);
   if (float* p = plane(Aov::kDepth)) p[0] = hits > 0.0f ? in[layout_.depth] * inverse_hits : kInfinity;
@@ -330,23 +407,62 @@ void Film::resolve_pixel(const float* in,
   if (float* p = plane(Aov::kVariance)) {
     const Vec3f spread = pixel.sample_variance;
     const auto level = [&](std::size_t channel, float v) { return levels.channels[channel][spread_class(v)]; };
-    put3(p, spread * Vec3f{level(0, spread.x), level(1, spread.y), level(2, spread.z)});
+    put3(p, spread * Vec3f{level(0, spread.x), level(1, spread.y), level(2, spread.z)} * sqr(exposure));
   }
-  if (float* p = plane(Aov::kHalf)) put3(p, pixel.even);
+  if (float* p = plane(Aov::kHalf)) put3(p, pixel.even * exposure);
   if (float* p = plane(Aov::kDisplacementSteps)) p[0] = in[layout_.displacement_steps] * inverse_n;
-  if (float* p = plane(Aov::kCaustic)) put3(p, load3(in + layout_.caustic) * inverse_n);
+  if (float* p = plane(Aov::kCaustic)) put3(p, load3(in + layout_.caustic) * light);
+  if (float* p = plane(Aov::kHoldout)) p[0] = in[layout_.holdout] * inverse_n;
+  if (float* p = plane(Aov::kMist)) p[0] = 1.0f - in[layout_.mist] * inverse_n;
+  if (float* p = plane(Aov::kEmission)) put3(p, load3(in + layout_.emission) * light);
+  if (float* p = plane(Aov::kEnvironment)) put3(p, load3(in + layout_.environment) * light);
+  if (float* p = plane(Aov::kAmbientOcclusion)) p[0] = in[layout_.ambient_occlusion] * inverse_n;
+  if (float* p = plane(Aov::kDenoisingAlbedo)) put3(p, load3(in + layout_.denoising_albedo) * inverse_n);
+  if (float* p = plane(Aov::kDenoisingNormal)) put3(p, load3(in + layout_.denoising_normal) * inverse_n);
+  if (float* p = plane(Aov::kDenoisingDepth)) p[0] = in[layout_.denoising_depth] * inverse_n;
+  for (int i = 0; i < kNumCryptomattes; ++i) {
+    float* p = plane(static_cast<Aov>(kFirstCryptomatte + i));
+    if (p != nullptr) put_cryptomatte(in + layout_.cryptomatte[i], layout_.cryptomatte_levels, inverse_n, p);
+  }
 }
 
-RenderedImage Film::resolve(int crop_x, int crop_y, int full_width, int full_height) &&
+FilmView Film::window(std::uint32_t aov_mask, int crop_x, int crop_y, int full_width, int full_height) const
+{
+  FilmView view;
+  view.layout = film_layout_make(aov_mask, layout_.cryptomatte_levels);
+  view.width = width_;
+  view.height = height_;
+  view.crop_x = crop_x;
+  view.crop_y = crop_y;
+  view.full_width = full_width;
+  view.full_height = full_height;
+  return view;
+}
+
+RenderedImage Film::beauty(int crop_x, int crop_y, int full_width, int full_height, float exposure) const
 {
   RenderedImage picture;
-  picture.view.layout = film_layout_make(aov_mask_);
-  picture.view.width = width_;
-  picture.view.height = height_;
-  picture.view.crop_x = crop_x;
-  picture.view.crop_y = crop_y;
-  picture.view.full_width = full_width;
-  picture.view.full_height = full_height;
+  picture.view = window(1u << static_cast<int>(Aov::kBeauty), crop_x, crop_y, full_width, full_height);
+  picture.pixels.resize(num_pixels() * 4);
+  picture.view.pixels = picture.pixels.data();
+  tbb::parallel_for(0, height_, [&](int y) {
+    float* to = picture.pixels.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) * 4;
+    for (int x = 0; x < width_; ++x, to += 4) {
+      const std::uint32_t samples = tile_samples(y / kTileSize * tiles_x_ + x / kTileSize);
+      if (samples == 0) continue;
+      const float* sums = record(x, y);
+      const float inverse_n = 1.0f / static_cast<float>(samples);
+      for (int i = 0; i < 3; ++i) to[i] = sums[AccumulatorLayout::kBeauty + i] * (exposure * inverse_n);
+      to[3] = sums[AccumulatorLayout::kCoverage] * inverse_n;
+    }
+  });
+  return picture;
+}
+
+RenderedImage Film::resolve(int crop_x, int crop_y, int full_width, int full_height, float exposure) &&
+{
+  RenderedImage picture;
+  picture.view = window(aov_mask_, crop_x, crop_y, full_width, full_height);
   const FilmLayout& out = picture.view.layout;
   const auto num_in = static_cast<std::size_t>(layout_.num_floats), num_out = static_cast<std::size_t>(out.num_floats);
   const bool has_variance = out.offset[static_cast<std::size_t>(Aov::kVariance)] >= 0;
@@ -378,7 +494,7 @@ RenderedImage Film::resolve(int crop_x, int crop_y, int full_width, int full_hei
         float* to = sums_.data() + pixel * num_out;
         std::fill(to, to + num_out, 0.0f);
         if (samples == 0) continue;
-        resolve_pixel(sums.data(), samples, levels[static_cast<std::size_t>(tile_x)], out, to);
+        resolve_pixel(sums.data(), samples, levels[static_cast<std::size_t>(tile_x)], out, exposure, to);
       }
     }
   }

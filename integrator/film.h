@@ -44,8 +44,9 @@ double error_extrapolate(double d1, double d2);
 
 class Film {
  public:
-  /// @param aov_mask  bit i keeps enumerator i of Aov; beauty is always kept
-  Film(int width, int height, std::uint32_t aov_mask);
+  /// @param aov_mask            bit i keeps enumerator i of Aov; beauty is always kept
+  /// @param cryptomatte_levels  ids that a Cryptomatte keeps of a pixel
+  Film(int width, int height, std::uint32_t aov_mask, int cryptomatte_levels = 6);
 
   FilmAccumulatorView accumulator();
   int width() const { return width_; }
@@ -54,11 +55,20 @@ class Film {
   int num_tiles() const { return tiles_x_ * tiles_y_; }
   /// Pixels of a tile, clipped to the window.
   void tile_rect(int tile, int* x0, int* y0, int* w, int* h) const;
+  /// The tile of a pixel of the window.
+  int tile_at(int x, int y) const { return y / kTileSize * tiles_x_ + x / kTileSize; }
 
   std::uint32_t tile_samples(int tile) const { return samples_[static_cast<std::size_t>(tile)]; }
   /// Called by the one thread that renders the tile.
   void add_tile_samples(int tile, std::uint32_t count) { samples_[static_cast<std::size_t>(tile)] += count; }
   double mean_samples() const;
+  /// Part of the picture that has no sample.
+  double empty_part() const;
+
+  /// A tile's sums, to be put back if what is added to them must not count.
+  std::vector<float> tile_sums(int tile) const;
+  /// @param sums  of the same tile, from tile_sums
+  void put_back_tile_sums(int tile, const std::vector<float>& sums);
 
   /// Estimated root mean square error of a tile's pixels relative to its mean radiance (Rec.709 luminance); tiles darker
   /// than `floor` are judged relative to that.
@@ -68,13 +78,19 @@ class Film {
   /// Errors of the image's mean, estimated by error_extrapolate from sums over all pixels.
   ImageError estimate_error() const;
 
+  /// The beauty so far. Nobody may be adding samples.
+  RenderedImage beauty(int crop_x, int crop_y, int full_width, int full_height, float exposure = 1) const;
+
   /// Averages, normalizes and fills in the variance, in place of the sums: they are a third of the memory of a large
   /// frame, which is not wanted twice. See docs/usage.md for each plane's meaning.
-  RenderedImage resolve(int crop_x, int crop_y, int full_width, int full_height) &&;
+  /// @param exposure  factor on all that is light
+  RenderedImage resolve(int crop_x, int crop_y, int full_width, int full_height, float exposure = 1) &&;
   std::size_t bytes() const { return sums_.size() * sizeof(float) + samples_.size() * sizeof(std::uint32_t); }
 
  private:
   const float* record(int x, int y) const;
+  /// View of a finished picture, without its pixels.
+  FilmView window(std::uint32_t aov_mask, int crop_x, int crop_y, int full_width, int full_height) const;
   /// Sums over a tile's pixels: variance of the mean as extrapolated, and by the spread of single samples.
   void tile_variances(int tile, Vec3f* extrapolated, Vec3f* by_samples) const;
   struct TileSpreads;
@@ -90,11 +106,13 @@ class Film {
   /// @param in       its sums
   /// @param samples  that it has, at least one
   /// @param levels   its tile's
+  /// @param exposure as of resolve
   /// @param to       room for out.num_floats
   void resolve_pixel(const float* in,
                      std::uint32_t samples,
                      const TileLevels& levels,
                      const FilmLayout& out,
+                     float exposure,
                      float* to) const;
 
   int width_, height_, tiles_x_, tiles_y_;

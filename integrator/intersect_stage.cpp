@@ -100,10 +100,8 @@ void intersect_packet(const KernelGlobals& g,
                       DisplacementWork& displacement)
 {
   RTCRayHit8 packet;
-  alignas(32) int valid[8];
   for (int i = 0; i < 8; ++i) {
     const std::uint32_t path = paths[i];
-    valid[i] = -1;
     packet.ray.org_x[i] = state.O_x[path];
     packet.ray.org_y[i] = state.O_y[path];
     packet.ray.org_z[i] = state.O_z[path];
@@ -125,7 +123,7 @@ void intersect_packet(const KernelGlobals& g,
       cones[i] = PathLod(state, paths[i]).cone(state.cone_width[paths[i]], state.cone_spread[paths[i]]);
     context.cones = cones;
   }
-  embree_intersect8(valid, accel.scene(), context, packet);
+  accel.intersect8(context, packet);
   for (int i = 0; i < 8; ++i) {
     const std::uint32_t path = paths[i];
     state.hit_t[path] = packet.ray.tfar[i];
@@ -199,7 +197,7 @@ void intersect_closest(const KernelGlobals& g,
       cone = PathLod(state, path).cone(state.cone_width[path], state.cone_spread[path]);
       context.cones = &cone;
     }
-    embree_intersect1(accel.scene(), context, ray);
+    accel.intersect(context, ray);
     if (context.steps != nullptr) {
       if (state.bounces[path] == 0) film_add_displacement_steps(g.film, state.pixel[path], steps[0]);
       note_steps(steps[0], displacement);
@@ -249,7 +247,7 @@ void intersect_shadow(const KernelGlobals& g,
       cone = PathLod(state, shadow.path[i]).cone(shadow.cone_width[i], shadow.cone_spread[i]);
       context.embree.cones = &cone;
     }
-    embree_occluded1(accel.scene(), context.embree, ray);
+    accel.occluded(context.embree, ray);
     if (context.embree.steps != nullptr) note_steps(steps, displacement);
     visibility[i] = ray.tfar < 0.0f ? 0.0f : context.visibility;
   }

@@ -14,6 +14,7 @@
 
 #include "kernel/shape/material_lookup.h"
 #include "kernel/texture/texture.h"
+#include "scene/world_displacement.h"
 
 namespace relief {
 namespace {
@@ -628,18 +629,6 @@ void environment_integrate(LightSet& set)
   set.environment_solid_angle = squares > 0 ? sum * sum / squares : 0.0;
 }
 
-/// Whether a map keeps shapes, up to what rounding leaves of a rotation and a scale; and by what lengths grow.
-bool is_similarity(const Affine3& m, float* scale)
-{
-  constexpr float kTolerance = 1e-5f;
-  const float x = length(m.x), y = length(m.y), z = length(m.z);
-  *scale = (x + y + z) / 3.0f;
-  const float slack = kTolerance * *scale;
-  return *scale > 0.0f && is_finite(*scale) && std::abs(x - *scale) <= slack && std::abs(y - *scale) <= slack &&
-         std::abs(z - *scale) <= slack && std::abs(dot(m.x, m.y)) <= slack * *scale &&
-         std::abs(dot(m.y, m.z)) <= slack * *scale && std::abs(dot(m.z, m.x)) <= slack * *scale;
-}
-
 /// Instances whose emissive triangles become one piece of LightSet::lights.
 struct EmissiveMesh {
   std::vector<std::size_t> instances;
@@ -751,7 +740,8 @@ void light_set_build_tree(LightSet& set, std::span<const float> intensity_scales
     const auto index = static_cast<std::uint32_t>(i);
     if (light.kind == LightKind::kSun) set.suns.push_back(index);
     const bool is_seen = light.instance_index < 0;
-    if (is_seen && (light.kind == LightKind::kRectangle || light.kind == LightKind::kDisk)) {
+    const bool is_flat = light.kind == LightKind::kRectangle || light.kind == LightKind::kDisk;
+    if (is_seen && (is_flat || light_is_ball(light))) {
       set.area_lights.push_back(index);
     }
     if (next_shared < set.shared.size() && index == set.shared[next_shared].first_light) {
@@ -789,7 +779,9 @@ LightSet light_set_make(const Scene& scene, std::span<const TextureView> texture
                                             scene.environment.rotation, density);
   set.environment_irradiance = environment_irradiance(set.environment);
   environment_integrate(set);
-  set.environment_casts_caustics = scene.environment.casts_caustics;
+  set.environment_casts_caustics = scene.environment.casts_caustics && scene.environment.hidden_from == 0;
+  // Where some kinds of rays alone see it, only a path that goes there knows of which kind it is.
+  if (scene.environment.hidden_from != 0) set.environment_irradiance = {};
 
   set.lights = scene.lights;
   const std::vector<float> scales = emissive_meshes_add(scene, textures, set);

@@ -27,7 +27,7 @@ struct LightSet {
   std::vector<std::int32_t> light_copy_index;   ///< one an instance: into `copies`; −1: shares its lights with none
   std::vector<LightCopy> copies;
   std::vector<SharedLights> shared;
-  std::vector<std::uint32_t> area_lights;  ///< rectangles and disks: what rays can hit besides meshes
+  std::vector<std::uint32_t> area_lights;  ///< rectangles, disks, balls: what rays can hit besides meshes
   std::vector<std::uint32_t> suns;
   std::vector<LightTrail> light_trails;     ///< one a light
   std::vector<LightTreeBlock> tree_blocks;  ///< empty: no finite light can be chosen

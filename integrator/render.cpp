@@ -3,10 +3,14 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <condition_variable>
+#include <cstdio>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
+#include <vector>
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
@@ -17,6 +21,7 @@
 #include "integrator/scene_context.h"
 #include "integrator/stages.h"
 #include "integrator/wavefront.h"
+#include "scene/cryptomatte.h"
 
 namespace relief {
 
@@ -26,15 +31,27 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
+/// Samples of a pass that fills a batch.
+constexpr std::uint32_t kMostSamples = kBatchPaths / (kTileSize * kTileSize);
+
 /// Samples of the next pass. Passes are as large as a batch holds, but at the start, where the first picture and the
 /// first measure of speed are wanted soon, and towards a time limit, which is kept by asking for less.
-std::uint32_t pass_samples(std::uint32_t done, std::uint32_t wanted, double seconds, double time_limit)
+/// @param is_watched  the picture is shown between passes: they begin with one sample, and slow ones are smaller. Some of
+///                    them end where those do that are not watched
+std::uint32_t pass_samples(std::uint32_t done, std::uint32_t wanted, double seconds, double time_limit, bool is_watched)
 {
-  constexpr std::uint32_t kMostSamples = kBatchPaths / (kTileSize * kTileSize);
   std::uint32_t samples = std::min(wanted - done, kMostSamples);
+  const double per_sample = done > 0 ? seconds / done : 0.0;
+  if (is_watched) {
+    constexpr double kLongestSeconds = 4;
+    constexpr std::uint32_t kLeastSamples = 4;  // fewer would leave batches too empty
+    samples = std::min({samples, std::max(done, 1u), kMostSamples - done % kMostSamples});
+    if (per_sample * kMostSamples > kLongestSeconds) {
+      samples = std::min(samples, std::max(kLeastSamples, static_cast<std::uint32_t>(kLongestSeconds / per_sample)));
+    }
+  }
   if (time_limit > 0) {
     samples = std::min(samples, std::max(done, 1u));
-    const double per_sample = done > 0 ? seconds / done : 0.0;
     const double fitting = per_sample > 0 ? (time_limit - seconds) / per_sample : 1.0;
     samples = std::min(samples, static_cast<std::uint32_t>(std::max(1.0, fitting)));
   }
@@ -44,23 +61,92 @@ std::uint32_t pass_samples(std::uint32_t done, std::uint32_t wanted, double seco
 /// A noise threshold is first looked at after this many samples: below, the estimate of the error is itself noise.
 constexpr std::uint32_t kMinAdaptiveSamples = 16;
 
-/// @param sample  pixel of the film << 32 | sample
-std::string nonfinite_warning(std::uint64_t sample, int crop_x, int crop_y, int film_width)
+/// @param sample  pixel of the window << 32 | sample
+PixelSample pixel_sample(std::uint64_t sample, const FilmWindow& window)
 {
   const std::uint64_t pixel = sample >> 32;
-  const auto width = static_cast<std::uint64_t>(film_width);
-  return "samples that were not finite count as black, first at pixel " +
-         std::to_string(crop_x + static_cast<int>(pixel % width)) + "," +
-         std::to_string(crop_y + static_cast<int>(pixel / width)) + " sample " + std::to_string(sample & 0xffffffffu) +
-         " (see relief trace --pixel)";
+  const auto width = static_cast<std::uint64_t>(window.width);
+  return {window.x0 + static_cast<int>(pixel % width), window.y0 + static_cast<int>(pixel / width),
+          static_cast<std::uint32_t>(sample)};
 }
 
-bool is_whole(const RenderOptions& options)
+/// Says when sampling has to end although a pass is under way: when it is interrupted, or when the time is up and no
+/// tile of the pass gets done any more. A thread of its own, because those that sample may be in one long search.
+class SamplingEnd {
+ public:
+  /// @param time_limit  seconds from now; 0: none
+  SamplingEnd(const std::atomic<bool>& interrupted, double time_limit)
+      : interrupted_(interrupted), start_(Clock::now()), time_limit_(time_limit), thread_([this] { watch(); })
+  {
+  }
+  ~SamplingEnd()
+  {
+    {
+      const std::lock_guard lock(mutex_);
+      done_ = true;
+    }
+    wake_.notify_one();
+    thread_.join();
+  }
+  SamplingEnd(const SamplingEnd&) = delete;
+  SamplingEnd& operator=(const SamplingEnd&) = delete;
+
+  const std::atomic<bool>& reached() const { return reached_; }
+  /// Called by any thread that has finished a tile, or as much.
+  void note_progress() { last_progress_ = seconds_since(start_); }
+
+ private:
+  void watch()
+  {
+    // A signal is answered within the one, a pass that no longer moves ended after the other.
+    constexpr auto kInterval = std::chrono::milliseconds(50);
+    constexpr double kPatience = 0.5;
+    std::unique_lock lock(mutex_);
+    while (!wake_.wait_for(lock, kInterval, [this] { return done_; })) {
+      const double now = seconds_since(start_);
+      const bool is_stuck = time_limit_ > 0 && now >= time_limit_ && now - last_progress_ >= kPatience;
+      if (interrupted_ || is_stuck) reached_ = true;
+    }
+  }
+
+  const std::atomic<bool>& interrupted_;
+  const Clock::time_point start_;
+  const double time_limit_;
+  std::atomic<double> last_progress_{0};  ///< seconds from the start
+  std::atomic<bool> reached_{false};
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool done_ = false;
+  std::thread thread_;  ///< the last member: it uses all others
+};
+
+/// @param part  of the picture, 0…1
+std::string empty_part_warning(double part)
 {
-  return options.crop_x1 <= options.crop_x0 || options.crop_y1 <= options.crop_y0;
+  char percent[16];
+  std::snprintf(percent, sizeof percent, "%.2g", 100 * part);
+  return "the time limit ended the first pass: " + std::string(percent) +
+         " % of the picture has no sample and is black";
 }
 
 }  // namespace
+
+FilmWindow render_window(const RenderOptions& options)
+{
+  const bool is_whole = options.crop_x1 <= options.crop_x0 || options.crop_y1 <= options.crop_y0;
+  if (is_whole) return {0, 0, options.settings.width, options.settings.height};
+  return {options.crop_x0, options.crop_y0, options.crop_x1 - options.crop_x0, options.crop_y1 - options.crop_y0};
+}
+
+SceneContext render_context(const Scene& scene, const RenderOptions& options)
+{
+  DisplacementOptions displacement = options.displacement;
+  displacement.num_rays = expected_rays(options.settings);
+  const bool light_sampling_alone = options.light_technique == LightTechnique::kLightSampling;
+  return SceneContext(scene, displacement,
+                      light_sampling_alone ? EnvironmentDensity::kRadiance : EnvironmentDensity::kExcess,
+                      options.settings.caustics);
+}
 
 KernelGlobals render_globals(const SceneContext& context, const RenderOptions& options, const FilterTable& filter)
 {
@@ -77,12 +163,24 @@ KernelGlobals render_globals(const SceneContext& context, const RenderOptions& o
   g.filter = settings.filter == PixelFilter::kBox ? nullptr : &filter;
   g.filter_width = settings.filter_width;
   g.seed = settings.seed;
+  g.mist = settings.mist;
+  g.occlusion_distance = settings.occlusion_distance;
   g.log2_stream = sample_log2_stream(static_cast<std::uint32_t>(settings.samples));
   g.full_width = settings.width;
   g.full_height = settings.height;
-  g.crop_x = is_whole(options) ? 0 : options.crop_x0;
-  g.crop_y = is_whole(options) ? 0 : options.crop_y0;
+  const FilmWindow window = render_window(options);
+  g.crop_x = window.x0;
+  g.crop_y = window.y0;
   return g;
+}
+
+Batch tile_batch(const Film& film, int tile, std::uint32_t first_sample, std::uint32_t num_samples)
+{
+  Batch batch;
+  film.tile_rect(tile, &batch.x0, &batch.y0, &batch.width, &batch.height);
+  batch.first_sample = first_sample;
+  batch.num_samples = num_samples;
+  return batch;
 }
 
 RenderedImage render(const Scene& scene,
@@ -93,32 +191,32 @@ RenderedImage render(const Scene& scene,
 {
   const Clock::time_point build_start = Clock::now();
   const RenderSettings& settings = options.settings;
-  DisplacementOptions displacement = options.displacement;
-  displacement.num_rays = expected_rays(settings);
-  const bool light_sampling_alone = options.light_technique == LightTechnique::kLightSampling;
-  SceneContext context(scene, displacement,
-                       light_sampling_alone ? EnvironmentDensity::kRadiance : EnvironmentDensity::kExcess,
-                       settings.caustics);
+  SceneContext context = render_context(scene, options);
   for (std::string& text : context.displacements.warnings()) stats.warnings.push_back(std::move(text));
   const StageTable& stages = stage_table_select();
 
-  const bool whole = is_whole(options);
-  const int crop_x = whole ? 0 : options.crop_x0;
-  const int crop_y = whole ? 0 : options.crop_y0;
-  Film film(whole ? settings.width : options.crop_x1 - crop_x, whole ? settings.height : options.crop_y1 - crop_y,
-            options.aov_mask);
+  const FilmWindow window = render_window(options);
+  Film film(window.width, window.height, options.aov_mask, settings.cryptomatte_levels);
 
   FilterTable filter;
   blackman_harris_table_make(filter);
   KernelGlobals g = render_globals(context, options, filter);
   g.film = film.accumulator();
+  const CryptomatteIds ids = cryptomatte_ids(scene, options.aov_mask);
+  for (std::size_t i = 0; i < kNumCryptomattes; ++i) g.cryptomatte_ids[i] = ids[i].data();
   const bool caustics = g.caustics.enabled;
   std::optional<PhotonPass> photons;
   if (caustics) photons.emplace(context, settings.caustics, static_cast<double>(settings.width) * settings.height);
   stats.build_seconds = seconds_since(build_start);
 
   const Clock::time_point start = Clock::now();
-  tbb::enumerable_thread_specific<Wavefront> workers([caustics] { return Wavefront(caustics); });
+  SamplingEnd end(stop, options.time_limit_seconds);
+  tbb::enumerable_thread_specific<Wavefront> workers([&] {
+    Wavefront worker(caustics);
+    worker.stop = &end.reached();
+    return worker;
+  });
+  const bool has_long_searches = context.displacements.size() > 0;
   std::atomic<std::uint64_t> samples_done{0};
   std::atomic<std::uint64_t> rays_done{0};
   std::mutex progress_mutex;
@@ -151,31 +249,51 @@ RenderedImage render(const Scene& scene,
     progress(p);
   };
 
+  // Previews get a hundredth of the time, and a little more, for the first ones, which change the most.
+  double preview_seconds = 0, next_preview = 0;
+  const auto preview = [&] {
+    constexpr double kInterval = 0.5, kShare = 0.01, kFirstSeconds = 0.2;
+    const double before = seconds_since(start);
+    if (!options.preview || before < next_preview || preview_seconds > kFirstSeconds + kShare * before) return;
+    options.preview(film.beauty(window.x0, window.y0, settings.width, settings.height, settings.film_exposure).view,
+                    film.mean_samples());
+    const double after = seconds_since(start);
+    preview_seconds += after - before;
+    next_preview = after + kInterval;
+  };
+
   std::vector<int> active(static_cast<std::size_t>(film.num_tiles()));
   for (int tile = 0; tile < film.num_tiles(); ++tile) active[static_cast<std::size_t>(tile)] = tile;
 
+  const bool is_watched = static_cast<bool>(options.preview);
   stats.stop_reason = "samples";
   for (std::uint32_t done = 0; done < wanted && !active.empty();) {
     // Photons are of one sample: see PhotonPass::next.
     const std::uint32_t samples =
-        caustics ? 1 : pass_samples(done, wanted, seconds_since(start), options.time_limit_seconds);
+        caustics ? 1 : pass_samples(done, wanted, seconds_since(start), options.time_limit_seconds, is_watched);
     if (photons) {
       photons->next(
-          g, stages, [&]() -> Wavefront& { return workers.local(); }, stop, [&] { report(false); });
+          g, stages, [&]() -> Wavefront& { return workers.local(); }, end.reached(),
+          [&] {
+            end.note_progress();
+            report(false);
+          });
     }
     tbb::parallel_for(
         std::size_t{0}, active.size(),
         [&](std::size_t i) {
-          if (stop.load(std::memory_order_relaxed)) return;
+          if (stop.load(std::memory_order_relaxed) || end.reached().load(std::memory_order_relaxed)) return;
           const FlushDenormals flush;
           Wavefront& worker = workers.local();
           const std::uint64_t rays_before =
               worker.counters.camera_rays + worker.counters.bounce_rays + worker.counters.shadow_rays;
-          Batch batch;
-          film.tile_rect(active[i], &batch.x0, &batch.y0, &batch.width, &batch.height);
-          batch.first_sample = done;
-          batch.num_samples = samples;
-          worker.run(g, *context.accel, stages, context.surface_kernel, batch);
+          const Batch batch = tile_batch(film, active[i], done, samples);
+          const std::vector<float> sums = has_long_searches ? film.tile_sums(active[i]) : std::vector<float>();
+          if (!worker.run(g, *context.accel, stages, context.surface_kernel, batch)) {
+            film.put_back_tile_sums(active[i], sums);
+            return;
+          }
+          end.note_progress();
           film.add_tile_samples(active[i], samples);
           samples_done += batch.num_paths();
           rays_done +=
@@ -183,13 +301,16 @@ RenderedImage render(const Scene& scene,
           report(false);
         },
         tbb::simple_partitioner());
-    if (stop.load()) {
-      stats.stop_reason = "interrupted";
+    if (stop.load() || end.reached().load()) {
+      stats.stop_reason = stop.load() ? "interrupted" : "time_limit";
+      if (!stop.load() && film.empty_part() > 0) stats.warnings.push_back(empty_part_warning(film.empty_part()));
       break;
     }
     done += samples;
     if (photons) photon_share = photons->seconds() / seconds_since(start);
-    if (settings.noise_threshold > 0 && done >= kMinAdaptiveSamples) {
+    // Where passes are smaller because somebody watches, tiles are judged when they would be otherwise.
+    const bool is_judged = !is_watched || caustics || done % kMostSamples == 0;
+    if (settings.noise_threshold > 0 && done >= kMinAdaptiveSamples && is_judged) {
       // A tenth of the picture's mean: dark corners need not be cleaner than the eye can tell.
       const double floor = 0.1 * film.mean_luminance();
       std::erase_if(active, [&](int tile) { return film.tile_error(tile, floor) <= settings.noise_threshold; });
@@ -199,6 +320,7 @@ RenderedImage render(const Scene& scene,
       stats.stop_reason = "time_limit";
       break;
     }
+    if (done < wanted && !active.empty()) preview();
   }
   report(true);
 
@@ -212,7 +334,7 @@ RenderedImage render(const Scene& scene,
   stats.caustics.reason = context.caustics_reason;
   if (photons) photons->fill(stats.caustics);
   const ImageError error = film.estimate_error();
-  stats.error_rmse = error.rmse;
+  stats.error_rmse = error.rmse * static_cast<double>(settings.film_exposure);
   stats.error_relmse = error.relmse;
   context.fill(stats);
   stats.film_bytes = film.bytes();
@@ -227,10 +349,8 @@ RenderedImage render(const Scene& scene,
     for (std::size_t s = 0; s < stats.stages.size(); ++s) stats.stages[s].seconds += worker.seconds[s];
     first_nonfinite = std::min(first_nonfinite, worker.first_nonfinite);
   }
-  if (first_nonfinite != kNoSample) {
-    stats.warnings.push_back(nonfinite_warning(first_nonfinite, crop_x, crop_y, film.width()));
-  }
-  return std::move(film).resolve(crop_x, crop_y, settings.width, settings.height);
+  if (first_nonfinite != kNoSample) stats.first_nonfinite = pixel_sample(first_nonfinite, window);
+  return std::move(film).resolve(window.x0, window.y0, settings.width, settings.height, settings.film_exposure);
 }
 
 }  // namespace relief

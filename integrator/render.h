@@ -6,6 +6,7 @@
 
 #include "integrator/film.h"
 #include "integrator/scene_context.h"
+#include "integrator/stages.h"
 #include "kernel/statistics.h"
 #include "scene/scene.h"
 
@@ -15,10 +16,14 @@ struct RenderOptions {
   RenderSettings settings;                                 ///< the scene's, with the command line's changes
   Camera camera;                                           ///< half_width already set for the image's aspect ratio
   int crop_x0 = 0, crop_y0 = 0, crop_x1 = 0, crop_y1 = 0;  ///< pixels, half open; all 0: the whole image
-  double time_limit_seconds = 0;  ///< 0: none; counted from the start of sampling, kept to within one pass
+  /// 0: none; counted from the start of sampling. The pass under way is finished, as long as its tiles are.
+  double time_limit_seconds = 0;
   std::uint32_t aov_mask = 1;
   LightTechnique light_technique = LightTechnique::kMis;
   DisplacementOptions displacement;
+  /// Gets the beauty so far and its samples a pixel, soon after the start and then as often as takes a hundredth of the
+  /// time, at most twice a second; may be empty. Sampling waits meanwhile. The picture is the same with it, if no time limit counts what it takes.
+  std::function<void(const FilmView&, double)> preview;
 };
 
 struct RenderProgress {
@@ -27,11 +32,24 @@ struct RenderProgress {
   std::uint64_t photons = 0;  ///< traced so far
 };
 
+/// The pixels that are rendered: the crop, or the whole image.
+struct FilmWindow {
+  int x0 = 0, y0 = 0, width = 0, height = 0;
+};
+FilmWindow render_window(const RenderOptions& options);
+
+/// What a render needs of its scene, which must outlive it.
+/// @error std::runtime_error out of memory and the like
+SceneContext render_context(const Scene& scene, const RenderOptions& options);
+
 /// Kernel globals of a render; the film is left for the caller to fill in.
 /// @param filter  Blackman–Harris table; must outlive the globals
 KernelGlobals render_globals(const SceneContext& context, const RenderOptions& options, const FilterTable& filter);
 
-/// Renders; returns what was sampled when `stop` became true.
+/// Samples of a tile's pixels.
+Batch tile_batch(const Film& film, int tile, std::uint32_t first_sample, std::uint32_t num_samples);
+
+/// Renders; returns what was sampled when `stop` became true. Tiles that are searching displaced meshes then are dropped.
 /// @param progress  called a few times a second from any thread, one call at a time; may be empty
 /// @param stats     filled but for what only the caller knows (scene, version, load_seconds, warnings)
 /// @error std::runtime_error out of memory and the like

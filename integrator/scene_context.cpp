@@ -117,6 +117,7 @@ SceneContext::SceneContext(const Scene& loaded,
   globals.has_lights = lights.any();
   globals.bsdf_tables = bsdf_tables.get();
   globals.environment_visible_to_camera = scene.environment.visible_to_camera;
+  globals.environment_hidden_from = scene.environment.hidden_from;
 }
 
 void SceneContext::fill(Statistics& stats) const

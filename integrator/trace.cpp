@@ -1,5 +1,13 @@
 #include "integrator/trace.h"
 
+#include <cmath>
+#include <optional>
+
+#include <tbb/enumerable_thread_specific.h>
+
+#include "integrator/flush_denormals.h"
+#include "integrator/photon_pass.h"
+#include "integrator/stages.h"
 #include "kernel/shape/surface_hit.h"
 
 namespace relief {
@@ -15,24 +23,29 @@ TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits
   embree.displacement = &counters;
   embree.visits = visits;
   TraceHit result;
-  float t_min = ray.t_min;
+  // Directions of any length, to a power of two: as long as Embree takes them.
+  const int exponent = std::ilogb(max_component(abs(ray.D)));
+  const auto scaled = [exponent](float v, int by) { return std::ldexp(v, by * exponent); };
+  const Vec3f D{scaled(ray.D.x, -1), scaled(ray.D.y, -1), scaled(ray.D.z, -1)};
+  const float t_max = scaled(ray.t_max, 1);
+  float t_min = scaled(ray.t_min, 1);
   while (true) {
     RTCRayHit query;
     query.ray.org_x = ray.O.x;
     query.ray.org_y = ray.O.y;
     query.ray.org_z = ray.O.z;
-    query.ray.dir_x = ray.D.x;
-    query.ray.dir_y = ray.D.y;
-    query.ray.dir_z = ray.D.z;
+    query.ray.dir_x = D.x;
+    query.ray.dir_y = D.y;
+    query.ray.dir_z = D.z;
     query.ray.tnear = t_min;
-    query.ray.tfar = ray.t_max;
+    query.ray.tfar = t_max;
     query.ray.time = 0.0f;
     query.ray.mask = kRayBounce;
     query.ray.id = 0;
     query.ray.flags = 0;
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    embree_intersect1(context.accel->scene(), embree, query);
+    context.accel->intersect(embree, query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) break;
     const unsigned object = query.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? query.hit.instID[0] : query.hit.geomID;
     if (object >= context.globals.num_instances) {
@@ -48,7 +61,7 @@ TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits
                                           point.triangle, point.u, point.v);
     if (displaced) surface_hit_displace(&surface, instance, point.P, point.Ng, point.Ns, point.leave);
     result.hit = true;
-    result.t = query.ray.tfar;
+    result.t = scaled(query.ray.tfar, -1);
     result.P = surface.P;
     result.Ng = surface.Ng;
     result.O_front = surface_hit_origin(surface, surface.P, true);
@@ -56,7 +69,8 @@ TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits
     result.u = point.u;
     result.v = point.v;
     result.instance_index = static_cast<std::int32_t>(object);
-    result.mesh_index = instance.mesh_index;
+    const int copy_of = context.scene.meshes[static_cast<std::size_t>(instance.mesh_index)].copy_of;
+    result.mesh_index = copy_of >= 0 ? copy_of : instance.mesh_index;
     result.triangle_index = point.triangle;
     break;
   }
@@ -86,24 +100,46 @@ TraceExplanation trace_explain(const SceneContext& context, const TraceRay& ray)
   return out;
 }
 
-std::vector<RecordedRay> trace_path(const SceneContext& context,
-                                    const RenderOptions& options,
-                                    int x,
-                                    int y,
-                                    std::uint32_t sample_index)
+PathReplay trace_path(const Scene& scene, const RenderOptions& options, const PixelSample& at)
 {
-  std::vector<RecordedRay> rays;
-  Film film(1, 1, options.aov_mask);
+  const SceneContext context = render_context(scene, options);
+  const StageTable& stages = stage_table_select();
+  const FilmWindow window = render_window(options);
+  RELIEF_ASSERT(at.x >= window.x0 && at.x < window.x0 + window.width);
+  RELIEF_ASSERT(at.y >= window.y0 && at.y < window.y0 + window.height);
+  // Layers beside the beauty do not change a path.
+  Film film(window.width, window.height, 1u << static_cast<int>(Aov::kBeauty));
   FilterTable filter;
   blackman_harris_table_make(filter);
   KernelGlobals g = render_globals(context, options, filter);
-  g.crop_x = x;
-  g.crop_y = y;
   g.film = film.accumulator();
-  Wavefront wavefront(false);
-  wavefront.recorder = &rays;
-  wavefront.run(g, *context.accel, stage_table_select(), context.surface_kernel, {0, 0, 1, 1, sample_index, 1});
-  return rays;
+
+  const bool caustics = g.caustics.enabled;
+  std::optional<PhotonPass> photons;
+  if (caustics) {
+    const RenderSettings& settings = options.settings;
+    photons.emplace(context, settings.caustics, static_cast<double>(settings.width) * settings.height);
+    const std::atomic<bool> stop{false};
+    tbb::enumerable_thread_specific<Wavefront> workers([] { return Wavefront(true); });
+    for (std::uint32_t pass = 0; pass <= at.sample_index; ++pass) {
+      photons->next(
+          g, stages, [&]() -> Wavefront& { return workers.local(); }, stop, [] {});
+    }
+  }
+
+  PathReplay replay;
+  replay.warnings = context.displacements.warnings();
+  Wavefront wavefront(caustics);
+  wavefront.recorder = &replay.rays;
+  // The whole tile, as in the render: forks of its paths share the room of its batch.
+  const int x = at.x - window.x0, y = at.y - window.y0;
+  const Batch batch = tile_batch(film, film.tile_at(x, y), at.sample_index, 1);
+  const FlushDenormals flush;
+  wavefront.run(g, *context.accel, stages, context.surface_kernel, batch);
+  const auto pixel = static_cast<std::uint32_t>(y * window.width + x);
+  std::erase_if(replay.rays, [&](const RecordedRay& ray) { return ray.pixel != pixel; });
+  replay.radiance = wavefront.first_radiance(pixel);
+  return replay;
 }
 
 }  // namespace relief

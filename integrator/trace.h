@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "displacement/explain.h"
@@ -40,12 +41,17 @@ struct TraceExplanation {
 };
 TraceExplanation trace_explain(const SceneContext& context, const TraceRay& ray);
 
-/// Rays of one sample of one pixel, in the order they were traced.
-/// @param x, y  in the whole image
-std::vector<RecordedRay> trace_path(const SceneContext& context,
-                                    const RenderOptions& options,
-                                    int x,
-                                    int y,
-                                    std::uint32_t sample_index);
+/// One sample of a render, followed again.
+struct PathReplay {
+  std::vector<RecordedRay> rays;  ///< in the order they were traced; those of forks among them
+  Vec3f radiance;                 ///< what the sample adds to its pixel, finite or not; linear Rec.709
+  std::vector<std::string> warnings;
+};
+
+/// Follows the very path that `render` follows with these options: with the photons that it meets, which takes as many passes
+/// as it has predecessors, and in a batch as full of forks.
+/// @param at  a pixel of the render's window, a sample below options.settings.samples
+/// @error std::runtime_error out of memory and the like
+PathReplay trace_path(const Scene& scene, const RenderOptions& options, const PixelSample& at);
 
 }  // namespace relief

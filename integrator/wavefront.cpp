@@ -58,7 +58,8 @@ void Wavefront::record_rays() const
                          {state_.D_x[p], state_.D_y[p], state_.D_z[p]},
                          state_.t_min[p],
                          state_.t_max[p],
-                         state_.hit_t[p]});
+                         state_.hit_t[p],
+                         state_.pixel[p]});
   }
 }
 
@@ -70,11 +71,24 @@ void Wavefront::record_shadow_rays() const
                          {shadow_.D_x[i], shadow_.D_y[i], shadow_.D_z[i]},
                          0.0f,
                          shadow_.t_max[i],
-                         memory_->visibility[i] > 0.0f ? shadow_.t_max[i] : 0.0f});
+                         memory_->visibility[i] > 0.0f ? shadow_.t_max[i] : 0.0f,
+                         state_.pixel[shadow_.path[i]]});
   }
 }
 
-void Wavefront::run(const KernelGlobals& g,
+Vec3f Wavefront::first_radiance(std::uint32_t pixel) const
+{
+  const std::uint32_t i =
+      static_cast<std::uint32_t>(std::find(state_.pixel, state_.pixel + kBatchPaths, pixel) - state_.pixel);
+  RELIEF_ASSERT(i < kBatchPaths);
+  Vec3f radiance = Vec3f{state_.direct_r[i], state_.direct_g[i], state_.direct_b[i]} +
+                   Vec3f{state_.indirect_r[i], state_.indirect_g[i], state_.indirect_b[i]};
+  const CausticStateView& c = state_.caustic;
+  if (c.radiance_r != nullptr) radiance += Vec3f{c.radiance_r[i], c.radiance_g[i], c.radiance_b[i]};
+  return radiance;
+}
+
+bool Wavefront::run(const KernelGlobals& g,
                     const Accel& accel,
                     const StageTable& stages,
                     const std::vector<std::uint8_t>& surface_kernel,
@@ -102,7 +116,8 @@ void Wavefront::run(const KernelGlobals& g,
   charge(Stage::kGenerate);
 
   DisplacementWork displacement;
-  for (bool camera = true; active_.size > 0; camera = false) {
+  displacement.total.stop = stop;
+  for (bool camera = true; active_.size > 0 && !displacement.total.stopped; camera = false) {
     if (!camera) counters.bounce_rays += active_.size;
     clear_queues();
     intersect_closest(g, accel, state_, active_, camera, surface_kernel.data(), surfaces_.data(), lights_, background_,
@@ -131,8 +146,10 @@ void Wavefront::run(const KernelGlobals& g,
   }
 
   note_displacement(displacement);
+  if (displacement.total.stopped) return false;
   stages.finish(g, state_, batch, counters, first_nonfinite);
   charge(Stage::kFilm);
+  return true;
 }
 
 void Wavefront::trace_photons(const KernelGlobals& g,
@@ -150,7 +167,8 @@ void Wavefront::trace_photons(const KernelGlobals& g,
   active_.size = 0;
   stages.emit_photons(g, sources, state_, first, count, active_);
   DisplacementWork displacement;
-  while (active_.size > 0) {
+  displacement.total.stop = stop;
+  while (active_.size > 0 && !displacement.total.stopped) {
     clear_queues();
     counters.photon_rays += active_.size;
     intersect_closest(g, accel, state_, active_, false, surface_kernel.data(), surfaces_.data(), lights_, background_,

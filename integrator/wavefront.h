@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -26,7 +27,8 @@ struct RecordedRay {
   bool shadow = false;
   Vec3f O, D;  ///< world; D unit
   float t_min = 0, t_max = kInfinity;
-  float t = kInfinity;  ///< where it hit; shadow rays: t_max if it reached the light
+  float t = kInfinity;      ///< where it hit; shadow rays: t_max if it reached the light
+  std::uint32_t pixel = 0;  ///< of the film window
 };
 
 /// Owned by one thread at a time.
@@ -36,7 +38,8 @@ class Wavefront {
   explicit Wavefront(bool caustics);
 
   /// Renders a batch of at most kBatchPaths paths into the film.
-  void run(const KernelGlobals& g,
+  /// @return  false if `stop` ended it: what the film got of it must not count
+  bool run(const KernelGlobals& g,
            const Accel& accel,
            const StageTable& stages,
            const std::vector<std::uint8_t>& surface_kernel,
@@ -44,7 +47,7 @@ class Wavefront {
 
   /// Follows photons `first` … `first + count − 1`.
   /// @param count  at most kBatchPaths
-  /// @param out    gets those that were kept, in an order that depends on nothing else
+  /// @param out    gets those that were kept, in an order that depends on nothing else; some of them if `stop` ends it
   void trace_photons(const KernelGlobals& g,
                      const Accel& accel,
                      const StageTable& stages,
@@ -54,9 +57,14 @@ class Wavefront {
                      std::uint32_t count,
                      std::vector<Photon>& out);
 
+  /// What the first sample of a pixel of the last batch was worth, finite or not; linear Rec.709.
+  /// @param pixel  of the film window, in the batch
+  Vec3f first_radiance(std::uint32_t pixel) const;
+
   static std::size_t bytes(bool caustics);
 
   std::vector<RecordedRay>* recorder = nullptr;  ///< receives every ray of the batch, if set
+  const std::atomic<bool>* stop = nullptr;       ///< true: searches in displaced meshes are given up; null: never
   Counters counters;
   std::array<double, kNumStages> seconds{};
   std::uint32_t most_displacement_steps = 0;  ///< bounds and texels, of any single ray
@@ -76,7 +84,7 @@ class Wavefront {
   struct Memory {
     PathState state;
     ShadowQueue shadow;
-    float visibility[kColumnEntries];  ///< of the shadow rays
+    float visibility[kShadowEntries];  ///< of the shadow rays
     std::uint32_t queues[kNumQueues][kColumnEntries];
   };
   struct CausticMemory {

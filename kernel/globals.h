@@ -5,6 +5,7 @@
 #include "kernel/bsdf/material.h"
 #include "kernel/camera/camera.h"
 #include "kernel/film/film_accumulator.h"
+#include "kernel/film/mist.h"
 #include "kernel/film/pixel_filter.h"
 #include "kernel/light/light_sampler.h"
 #include "kernel/photon/photon.h"
@@ -38,6 +39,11 @@ struct KernelGlobals {
   LightTechnique light_technique = LightTechnique::kMis;
   bool has_lights = false;  ///< something can be sampled
   bool environment_visible_to_camera = true;
+  std::uint32_t environment_hidden_from = 0;  ///< bit PathEvent: rays that started so do not see it
+  Mist mist;
+  float occlusion_distance = 10;  ///< metres, for Aov::kAmbientOcclusion
+  /// Of instances, materials, and instances' assets: what Cryptomattes call them. Null: not kept.
+  const float* cryptomatte_ids[kNumCryptomattes] = {};
   const FilterTable* filter = nullptr;  ///< null: box
   float filter_width = 1;               ///< pixels
   std::uint64_t seed = 0;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,12 @@ struct CausticStatistics {
   double seconds = 0;
 };
 
+/// One sample of a pixel; x and y in the whole image.
+struct PixelSample {
+  int x = 0, y = 0;
+  std::uint32_t sample_index = 0;
+};
+
 struct Statistics {
   std::string scene, version, isa, view;
   std::uint64_t seed = 0;
@@ -49,6 +56,8 @@ struct Statistics {
   CausticStatistics caustics;
   Counters counters;
   std::vector<StageSeconds> stages;
+  /// Of the samples that were dropped because they were not finite, the first in the picture's order.
+  std::optional<PixelSample> first_nonfinite;
   std::vector<std::string> warnings;
   std::string stop_reason;  ///< "samples", "noise_threshold", "time_limit", "interrupted"
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "scene/gltf_accessor.h"
 
@@ -160,6 +161,27 @@ std::unordered_map<int, AnimatedPose> animation_pose(const GltfDocument& documen
     }
   }
   return poses;
+}
+
+std::vector<AnimationClip> animation_clips(const GltfDocument& document)
+{
+  std::vector<AnimationClip> clips;
+  for (std::size_t a = 0; a < document.core.animations.size(); ++a) {
+    const tinygltf::Animation& animation = document.core.animations[a];
+    AnimationClip clip{animation.name, std::numeric_limits<double>::infinity(), 0};
+    for (std::size_t s = 0; s < animation.samplers.size(); ++s) {
+      const std::string path = "/animations/" + std::to_string(a) + "/samplers/" + std::to_string(s) + "/input";
+      const AccessorView input =
+          accessor_open(document, animation.samplers[s].input, AccessorKind::kFloatOrNormalized, 1, 1, path);
+      for (const float time : accessor_read<float>(input)) {
+        clip.start = std::min(clip.start, static_cast<double>(time));
+        clip.end = std::max(clip.end, static_cast<double>(time));
+      }
+    }
+    clip.start = std::min(clip.start, clip.end);
+    clips.push_back(std::move(clip));
+  }
+  return clips;
 }
 
 }  // namespace relief

@@ -5,6 +5,7 @@
 #include <unordered_map>
 
 #include "scene/gltf_document.h"
+#include "scene/scene.h"
 #include "scene/transform.h"
 
 namespace relief {
@@ -37,5 +38,9 @@ std::array<double, 4> animation_sample(const AnimationCurve& curve, double time_
 std::unordered_map<int, AnimatedPose> animation_pose(const GltfDocument& document,
                                                      double time_seconds,
                                                      Warnings& warnings);
+
+/// A document's animations, with their first and last keys.
+/// @error SceneError: wrong accessor types or sizes
+std::vector<AnimationClip> animation_clips(const GltfDocument& document);
 
 }  // namespace relief

@@ -5,23 +5,25 @@
 #include <system_error>
 #include <utility>
 
+#include "scene/memory.h"
+
 namespace relief {
 namespace {
 
-/// What an override sets on nodes of one name.
+/// What an override sets on nodes of one name, or on the node of an index.
 struct NodeOverride {
   std::optional<Vec3d> translation, scale;
   std::optional<Quaternion> rotation;
   std::optional<Transform> matrix;
-  const GltfDocument* material_document = nullptr;
-  int material_index = -1;
+  std::shared_ptr<const MaterialRule> material;  ///< null: none
 };
 
-/// Overrides of one reference, by node name.
+/// Overrides of one reference.
 struct OverrideSet {
-  std::map<std::string, NodeOverride> by_name;
-  std::string file, path;                    ///< for messages
-  mutable std::set<std::string> used_names;  ///< written while walking, to warn about the others
+  std::map<std::string, NodeOverride> by_name;    ///< of nodes; "/nodes/3" is the one of that index
+  std::shared_ptr<const MaterialRule> materials;  ///< null: none
+  std::string file, path, materials_path;         ///< for messages
+  mutable std::set<std::string> used_names;       ///< written while walking, to warn about the others
 };
 
 /// RELIEF_reference of one node, resolved once however often the walk comes by.
@@ -65,6 +67,18 @@ Transform matrix_or_fail(const std::vector<double>& m, const std::string& file, 
   return *t;
 }
 
+/// The material of this file that a property names.
+MaterialChoice read_material(const GltfDocument& document, const JsonReader& r, const std::string& property)
+{
+  const std::string name = r.string(property, "");
+  const auto& materials = document.core.materials;
+  const auto at = std::find_if(materials.begin(), materials.end(), [&](const auto& m) { return m.name == name; });
+  if (at == materials.end()) {
+    r.fail(property, "the name of a material in this file");
+  }
+  return {&document, static_cast<int>(at - materials.begin())};
+}
+
 NodeOverride read_override(const GltfDocument& document, const JsonReader& r, Warnings& warnings)
 {
   constexpr double kLargest = std::numeric_limits<float>::max();
@@ -79,14 +93,9 @@ NodeOverride read_override(const GltfDocument& document, const JsonReader& r, Wa
     o.matrix = matrix_or_fail(v, r.file(), json_path_join(r.path(), "matrix"));
   }
   if (r.has("material")) {
-    const std::string name = r.string("material", "");
-    const auto& materials = document.core.materials;
-    const auto at = std::find_if(materials.begin(), materials.end(), [&](const auto& m) { return m.name == name; });
-    if (at == materials.end()) {
-      r.fail("material", "the name of a material in this file");
-    }
-    o.material_document = &document;
-    o.material_index = static_cast<int>(at - materials.begin());
+    auto rule = std::make_shared<MaterialRule>();
+    rule->of_node = read_material(document, r, "material");
+    o.material = std::move(rule);
   }
   r.warn_unread(warnings);
   return o;
@@ -145,10 +154,18 @@ class Walk {
  private:
   void warn_unused(const OverrideSet& overrides)
   {
+    if (overrides.materials != nullptr) {
+      for (const auto& [name, ignored] : overrides.materials->by_name) {
+        if (overrides.materials->used_names.count(name) == 0) {
+          warnings_.add(overrides.file + ": " + json_path_join(overrides.materials_path, name) +
+                        ": no referenced mesh has a material of this name");
+        }
+      }
+    }
     for (const auto& [name, ignored] : overrides.by_name) {
       if (overrides.used_names.count(name) == 0) {
         warnings_.add(overrides.file + ": " + json_path_join(overrides.path, name) +
-                      ": no referenced node has this name");
+                      ": no referenced node has this name or index");
       }
     }
   }
@@ -172,6 +189,7 @@ class Walk {
       throw SceneError(document.file, path, "at most " + std::to_string(kMostNodes) + " nodes after composition",
                        "more");
     }
+    memory_.add(sizeof(Pending) + sizeof(Scope), document.file + ": " + path);
     PlacedNode placed;
     placed.document = &document;
     placed.node_index = pending.node_index;
@@ -211,14 +229,21 @@ class Walk {
       trs.scale = pose->scale.value_or(trs.scale);
     }
     // From the innermost reference outwards, so that the outermost file has the last word.
-    for (const Scope* s = pending.scope.get(); s != nullptr && !node.name.empty(); s = s->outer.get()) {
+    for (const Scope* s = pending.scope.get(); s != nullptr; s = s->outer.get()) {
       if (s->overrides == nullptr) {
         continue;
       }
-      const auto it = s->overrides->by_name.find(node.name);
-      if (it != s->overrides->by_name.end()) {
-        s->overrides->used_names.insert(node.name);
-        apply(it->second, trs, matrix, placed, json_path_join(s->overrides->path, node.name), s->overrides->file);
+      if (s->overrides->materials != nullptr) {
+        placed.material_rules.push_back(s->overrides->materials);
+      }
+      // Indices are of the file that is referred to, and not of those that it refers to itself.
+      const bool has_index = s->outer != nullptr && s == pending.scope.get();
+      for (const std::string& name : {node.name, has_index ? path : std::string()}) {
+        const auto it = s->overrides->by_name.find(name);
+        if (!name.empty() && it != s->overrides->by_name.end()) {
+          s->overrides->used_names.insert(name);
+          apply(it->second, trs, matrix, placed, json_path_join(s->overrides->path, name), s->overrides->file);
+        }
       }
     }
     return matrix ? *matrix : transform_from_trs(trs);
@@ -241,9 +266,8 @@ class Walk {
     trs.translation = o.translation.value_or(trs.translation);
     trs.rotation = o.rotation.value_or(trs.rotation);
     trs.scale = o.scale.value_or(trs.scale);
-    if (o.material_document != nullptr) {
-      placed.material_document = o.material_document;
-      placed.material_index = o.material_index;
+    if (o.material != nullptr) {
+      placed.material_rules.push_back(o.material);
     }
   }
 
@@ -314,26 +338,40 @@ class Walk {
     if (!r.has("node")) {
       return default_roots(target);
     }
+    if (r.raw("node").is_number()) {
+      return {r.index("node", target.core.nodes.size(), "nodes")};
+    }
     const std::string name = r.string("node", "");
     const auto& nodes = target.core.nodes;
     const auto at = std::find_if(nodes.begin(), nodes.end(), [&](const auto& n) { return n.name == name; });
     if (at == nodes.end()) {
-      r.fail("node", "the name of a node in " + target.file);
+      r.fail("node", "the name or the index of a node in " + target.file);
     }
     return {static_cast<int>(at - nodes.begin())};
   }
 
   std::shared_ptr<const OverrideSet> read_overrides(const GltfDocument& document, const JsonReader& r)
   {
-    if (!r.has("overrides")) {
+    if (!r.has("overrides") && !r.has("materials")) {
       return nullptr;
     }
     auto set = std::make_shared<OverrideSet>();
-    const JsonReader overrides = r.object("overrides");
     set->file = document.file;
-    set->path = overrides.path();
-    for (const auto& item : r.raw("overrides").items()) {
-      set->by_name[item.key()] = read_override(document, overrides.object(item.key()), warnings_);
+    if (r.has("overrides")) {
+      const JsonReader overrides = r.object("overrides");
+      set->path = overrides.path();
+      for (const auto& item : r.raw("overrides").items()) {
+        set->by_name[item.key()] = read_override(document, overrides.object(item.key()), warnings_);
+      }
+    }
+    if (r.has("materials")) {
+      const JsonReader materials = r.object("materials");
+      auto rule = std::make_shared<MaterialRule>();
+      for (const auto& item : r.raw("materials").items()) {
+        rule->by_name[item.key()] = read_material(document, materials, item.key());
+      }
+      set->materials_path = materials.path();
+      set->materials = std::move(rule);
     }
     return set;
   }
@@ -344,6 +382,7 @@ class Walk {
   const std::function<void(const PlacedNode&)>& visit_;
   std::vector<Pending> stack_;
   std::size_t num_visited_ = 0;
+  MemoryWatch memory_;
   std::map<const GltfDocument*, std::unordered_map<int, AnimatedPose>> poses_;
   std::map<std::pair<const GltfDocument*, int>, Reference> reference_of_;
 };
@@ -365,15 +404,27 @@ const GltfDocument& DocumentSet::load(const std::filesystem::path& path, Warning
   return *it->second;
 }
 
-std::vector<std::string> DocumentSet::files_read() const
+std::vector<FileStamp> DocumentSet::files_read() const
 {
-  std::vector<std::string> out;
+  std::vector<FileStamp> out;
   for (const auto& document : documents_) {
-    for (const std::filesystem::path& file : document->files_read) {
-      out.push_back(file.string());
-    }
+    out.insert(out.end(), document->files_read.begin(), document->files_read.end());
   }
   return out;
+}
+
+std::optional<MaterialChoice> material_choice(const PlacedNode& node, const std::string& name)
+{
+  std::optional<MaterialChoice> choice;
+  for (const auto& rule : node.material_rules) {
+    if (rule->of_node.document != nullptr) choice = rule->of_node;
+    auto found = rule->by_name.find(name);
+    if (found == rule->by_name.end()) found = rule->by_name.find("*");
+    if (found == rule->by_name.end()) continue;
+    rule->used_names.insert(found->first);
+    choice = found->second;
+  }
+  return choice;
 }
 
 void composition_traverse(DocumentSet& documents,

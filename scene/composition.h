@@ -4,7 +4,10 @@
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <optional>
+#include <set>
+#include <vector>
 
 #include "scene/animation.h"
 #include "scene/gltf_document.h"
@@ -19,12 +22,28 @@ class DocumentSet {
   /// @error SceneError
   const GltfDocument& load(const std::filesystem::path& path, Warnings& warnings);
 
-  /// Scene files and buffers, in the order they were read.
-  std::vector<std::string> files_read() const;
+  /// Scene files, each with its buffers and images, in the order they were read.
+  std::vector<FileStamp> files_read() const;
+
+  /// In the order they were read.
+  const std::vector<std::unique_ptr<GltfDocument>>& all() const { return documents_; }
 
  private:
   std::vector<std::unique_ptr<GltfDocument>> documents_;
   std::map<std::filesystem::path, const GltfDocument*> by_path_;
+};
+
+/// A material that one file puts in the place of others.
+struct MaterialChoice {
+  const GltfDocument* document = nullptr;
+  int index = -1;
+};
+
+/// What one reference says about materials: of one node, or of all that have a name, "*" standing for any.
+struct MaterialRule {
+  MaterialChoice of_node;
+  std::map<std::string, MaterialChoice> by_name;
+  mutable std::set<std::string> used_names;  ///< written while the scene is built, to warn about the others
 };
 
 /// A node at its place in the world.
@@ -33,11 +52,15 @@ struct PlacedNode {
   int node_index = 0;
   Transform world;
   ObjectSettings object;
-  const GltfDocument* material_document = nullptr;  ///< null: the primitives' own materials
-  int material_index = -1;                          ///< override, in material_document
-  bool animated = false;                            ///< the node or one above it is animated at the time asked for
+  /// Of the references that lead here, the innermost first: the last one that says something counts.
+  std::vector<std::shared_ptr<const MaterialRule>> material_rules;
+  bool animated = false;    ///< the node or one above it is animated at the time asked for
   std::string defect_path;  ///< JSON path of the topmost node here that has a singular transform; empty: none
 };
+
+/// What stands in the place of a primitive's material; nothing: that one itself.
+/// @param name  the material's
+std::optional<MaterialChoice> material_choice(const PlacedNode& node, const std::string& name);
 
 /// Visits every node of the root file's default scene and of what it refers to, parents before children, in file order.
 /// @param time_seconds  animation time; empty: rest pose

@@ -3,10 +3,16 @@
 
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <unordered_map>
 #include <vector>
 
 namespace relief {
+
+/// A text as a terminal may be shown it: control characters (escape sequences, newlines, those that turn the direction of
+/// writing) and bytes that are not UTF-8 become \\x1b or \\u202e. Names come from files, and a file must neither command a
+/// terminal nor forge a line of what we say.
+std::string printable_text(std::string_view text);
 
 /// The scene is invalid. what() is the one line the user sees:
 /// "FILE: JSON_PATH: expected EXPECTED, found FOUND".

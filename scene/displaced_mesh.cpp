@@ -95,7 +95,9 @@ std::vector<MeshDisplacement> displaced_meshes(const Scene& scene)
   std::set<std::pair<int, int>> known;
   for (const Instance& instance : scene.instances) {
     const int displacement = scene.materials[static_cast<std::size_t>(instance.material_index)].displacement_index;
-    if (displacement >= 0 && known.emplace(instance.mesh_index, displacement).second) {
+    const int copy_of = scene.meshes[static_cast<std::size_t>(instance.mesh_index)].copy_of;
+    const int mesh = copy_of >= 0 ? copy_of : instance.mesh_index;
+    if (displacement >= 0 && known.emplace(mesh, displacement).second) {
       out.push_back({instance.mesh_index, displacement});
     }
   }

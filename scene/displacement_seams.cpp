@@ -1,5 +1,6 @@
 #include "scene/displacement_seams.h"
 
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
@@ -60,16 +61,28 @@ class SeamProbe {
  public:
   SeamProbe(const Mesh& mesh, const TextureRef& ref, const HeightMapView& map) : mesh_(mesh), ref_(ref), map_(map) {}
 
-  /// Number of points to compare along an edge.
-  int num_points(std::span<const EdgeSide> sides) const
+  /// Whether the sides have different coordinates at all.
+  bool is_split(std::span<const EdgeSide> sides) const
   {
-    constexpr double kFewest = 16, kMost = 4096, kPointsPerTexel = 2;
+    const auto differ = [&](std::uint32_t a, std::uint32_t b) {
+      const Vec2f p = mesh_.uv[ref_.uv_set][a], q = mesh_.uv[ref_.uv_set][b];
+      return p.x != q.x || p.y != q.y;
+    };
+    return std::any_of(sides.begin(), sides.end(), [&](const EdgeSide& side) {
+      return differ(side.vertex0, sides[0].vertex0) || differ(side.vertex1, sides[0].vertex1);
+    });
+  }
+
+  /// Points along an edge that meet every texel of both sides twice.
+  double points_wanted(std::span<const EdgeSide> sides) const
+  {
+    constexpr double kPointsPerTexel = 2;
     double texels = 0;
     for (const EdgeSide& side : sides) {
       const Uv a = vertex_uv(side.vertex0), b = vertex_uv(side.vertex1);
       texels = std::max({texels, std::abs(b.u - a.u) * map_.width, std::abs(b.v - a.v) * map_.height});
     }
-    return static_cast<int>(std::clamp(std::ceil(kPointsPerTexel * texels), kFewest, kMost));
+    return std::ceil(kPointsPerTexel * texels);
   }
 
   /// Largest difference of the sides' heights at fraction t of the edge.
@@ -118,18 +131,42 @@ class SeamProbe {
   const HeightMapView& map_;
 };
 
+constexpr double kFewestPoints = 16, kMostPoints = 4096;  // along an edge
+
+/// An edge that triangles share with different texture coordinates.
+struct SeamEdge {
+  std::span<const EdgeSide> sides;
+  double points_wanted = 0;  ///< without the bounds
+  double first_point = 0;    ///< number of points that edges before it want
+};
+
+/// Number of points to compare along an edge.
+/// @param share  of what it wants within the bounds
+int num_points_of(const SeamEdge& edge, double share)
+{
+  const double wanted = std::clamp(edge.points_wanted, kFewestPoints, kMostPoints);
+  return static_cast<int>(std::max(std::ceil(share * wanted), kFewestPoints));
+}
+
 /// One edge's part in the seams; none where its sides ask for the same heights.
 SeamExtent seam_extent(const Mesh& mesh,
-                       std::span<const EdgeSide> edge,
+                       const SeamEdge& edge,
                        const SeamProbe& probe,
+                       double share,
                        double least_gap,
                        float scale)
 {
   SeamExtent extent;
-  const int num_points = probe.num_points(edge);
+  const int num_points = num_points_of(edge, share);
+  // Where tiles and points are in step, fewer points than texels would all see the same one; and the edges of a regular mesh
+  // would all see the same few.
+  constexpr double kGoldenRatio = 0.6180339887498949;
+  const bool is_sparse = num_points < edge.points_wanted;
   int num_gaps = 0;
   for (int i = 0; i < num_points; ++i) {
-    const double gap = probe.gap(edge, (i + 0.5) / num_points);
+    const double turn = (edge.first_point + i) * kGoldenRatio;
+    const double within = is_sparse ? turn - std::floor(turn) : 0.5;
+    const double gap = probe.gap(edge.sides, (i + within) / num_points);
     if (gap > least_gap) {
       ++num_gaps;
       extent.largest_gap = std::max(extent.largest_gap, gap * std::abs(static_cast<double>(scale)));
@@ -137,10 +174,27 @@ SeamExtent seam_extent(const Mesh& mesh,
   }
   if (num_gaps > 0) {
     extent.num_edges = 1;
-    const auto edge_length = static_cast<double>(length(mesh.P[edge[0].position1] - mesh.P[edge[0].position0]));
-    extent.length = edge_length * num_gaps / num_points;
+    const EdgeSide& side = edge.sides[0];
+    extent.length =
+        static_cast<double>(length(mesh.P[side.position1] - mesh.P[side.position0])) * num_gaps / num_points;
   }
   return extent;
+}
+
+/// Edges whose sides have different texture coordinates.
+std::vector<SeamEdge> seam_edges(std::span<const EdgeSide> sides, const SeamProbe& probe)
+{
+  std::vector<SeamEdge> edges;
+  for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
+    while (end < sides.size() && sides[end].edge() == sides[begin].edge()) {
+      ++end;
+    }
+    const std::span<const EdgeSide> edge = sides.subspan(begin, end - begin);
+    if (probe.is_split(edge)) {
+      edges.push_back({edge, probe.points_wanted(edge)});
+    }
+  }
+  return edges;
 }
 
 /// Whether an edge's sides move along different normals. Without normals triangles move along their own.
@@ -177,18 +231,25 @@ DisplacementSeams displacement_seams(const Mesh& mesh,
   const double least_gap = 1e-3 * (static_cast<double>(range.high) - static_cast<double>(range.low));
   const std::vector<EdgeSide> sides = edge_sides(mesh);
   const SeamProbe probe(mesh, settings.height, map);
-  for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
-    while (end < sides.size() && sides[end].edge() == sides[begin].edge()) {
-      ++end;
-    }
-    const std::span<const EdgeSide> edge(&sides[begin], end - begin);
-    if (edge.size() < 2) {
-      continue;
-    }
-    const SeamExtent extent = seam_extent(mesh, edge, probe, least_gap, settings.scale);
-    seams.all = seam_extent_sum(seams.all, extent);
-    if (has_split_normals(mesh, edge)) {
-      seams.split = seam_extent_sum(seams.split, extent);
+  std::vector<SeamEdge> edges = seam_edges(sides, probe);
+  // Many tiles along many edges could ask for any number of points. A mesh has its share of them, a third of a second of
+  // one processor; where that is less than wanted, what is found is an estimate.
+  constexpr double kMostPointsOfMesh = 1 << 22;
+  double wanted = 0;
+  for (SeamEdge& edge : edges) {
+    edge.first_point = wanted;
+    wanted += std::clamp(edge.points_wanted, kFewestPoints, kMostPoints);
+  }
+  const double share = std::min(1.0, kMostPointsOfMesh / wanted);
+  std::vector<SeamExtent> extents(edges.size());
+  tbb::parallel_for(std::size_t{0}, edges.size(), [&](std::size_t i) {
+    extents[i] = seam_extent(mesh, edges[i], probe, share, least_gap, settings.scale);
+  });
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    seams.num_points += static_cast<std::size_t>(num_points_of(edges[i], share));
+    seams.all = seam_extent_sum(seams.all, extents[i]);
+    if (has_split_normals(mesh, edges[i].sides)) {
+      seams.split = seam_extent_sum(seams.split, extents[i]);
     }
   }
   return seams;

@@ -16,7 +16,8 @@ struct SeamExtent {
 
 struct DisplacementSeams {
   SeamExtent all;
-  SeamExtent split;  ///< those whose normals differ too, so that welding leaves them open
+  SeamExtent split;            ///< those whose normals differ too, so that welding leaves them open
+  std::size_t num_points = 0;  ///< at which heights were compared
 };
 
 SeamExtent seam_extent_sum(const SeamExtent& a, const SeamExtent& b);
@@ -27,7 +28,8 @@ SeamExtent seam_extent_sum(const SeamExtent& a, const SeamExtent& b);
 /// @param range  of the map's heights
 /// @return       zero if the mesh lacks the texture coordinates
 /// @cost         a sort of the edges; on seams two heights a texel of length, at least 16 and at most 4096 an edge: the
-///               largest gap is the largest of these
+///               largest gap is the largest of these. Where the edges of a mesh would come to more than four million, each
+///               has its share, 16 at least
 DisplacementSeams displacement_seams(const Mesh& mesh,
                                      const DisplacementSettings& settings,
                                      const HeightMapView& map,

@@ -2,24 +2,10 @@
 
 #include <cmath>
 
+#include "scene/framing.h"
 #include "scene/relief_extensions.h"
 
 namespace relief {
-namespace {
-
-/// Right-handed orthonormal frame that looks along −z, its y as near as possible to `up`.
-Affine3 camera_frame(Vec3f z, Vec3f up, Vec3f P)
-{
-  Affine3 m;
-  m.z = normalize(z);
-  m.x = normalize(cross(up, m.z));
-  m.y = cross(m.z, m.x);
-  m.p = P;
-  return m;
-}
-
-}  // namespace
-
 SceneCamera gltf_camera(const GltfDocument& document,
                         int node_index,
                         const Transform& world,
@@ -79,24 +65,5 @@ Bounds bounds_transform(const Affine3& m, const Bounds& box)
 }
 
 Bounds bounds_union(const Bounds& a, const Bounds& b) { return {min(a.low, b.low), max(a.high, b.high)}; }
-
-SceneCamera framing_camera(const Bounds& bounds, float image_aspect)
-{
-  const Bounds box = bounds.empty() ? Bounds{{-1, -1, -1}, {1, 1, 1}} : bounds;
-  const Vec3f centre = (box.low + box.high) * 0.5f;
-  const float radius = max(0.5f * length(box.high - box.low), 1e-6f);
-  SceneCamera out;
-  out.name = "framing";
-  Camera& camera = out.camera;
-  constexpr float kHalfField = 0.35f;  // radians: a normal lens, 40° in all
-  camera.half_height = std::tan(kHalfField);
-  camera.half_width = camera.half_height * image_aspect;
-  const float half_field = image_aspect < 1 ? std::atan(camera.half_width) : kHalfField;
-  const float distance = 1.05f * radius / std::sin(half_field);
-  const Vec3f direction = normalize(Vec3f{0.5f, 0.4f, 1.0f});
-  camera.world_from_camera = camera_frame(direction, {0, 1, 0}, centre + direction * distance);
-  camera.focus_distance = distance;
-  return out;
-}
 
 }  // namespace relief

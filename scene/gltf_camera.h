@@ -1,4 +1,4 @@
-// Cameras: what a file has, or one that shows everything.
+// Cameras of a file; framing.h has those that are not in a file.
 #pragma once
 
 #include "scene/gltf_document.h"
@@ -19,17 +19,11 @@ SceneCamera gltf_camera(const GltfDocument& document,
 /// Axis-aligned box in world space.
 struct Bounds {
   Vec3f low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
-
-  bool empty() const { return !(low.x <= high.x); }
 };
 
 Bounds bounds_of_points(const std::vector<Vec3f>& points);
 /// Box of a transformed box.
 Bounds bounds_transform(const Affine3& m, const Bounds& box);
 Bounds bounds_union(const Bounds& a, const Bounds& b);
-
-/// Perspective camera in front of, above and to the right of a box, so far that its circumscribed sphere fits the image.
-/// @param bounds  an empty one stands for a cube of 2 m around the origin
-SceneCamera framing_camera(const Bounds& bounds, float image_aspect);
 
 }  // namespace relief

@@ -1,13 +1,17 @@
 #include "scene/gltf_document.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
+#include <limits>
 #include <optional>
 #include <system_error>
 
+#include "scene/file_kind.h"
+#include "scene/memory.h"
 #include "scene/validation.h"
 
 namespace relief {
@@ -17,8 +21,9 @@ using nlohmann::json;
 
 namespace {
 
-/// Reads a regular file whole; pipes and devices are refused, since they may have no end.
-ByteArray read_file(const fs::path& path, const std::string& file, const std::string& json_path)
+/// Reads a regular file; pipes and devices are refused, since they may have no end.
+/// @param most  bytes to read; the file may be longer
+ByteArray read_file(const fs::path& path, const std::string& file, const std::string& json_path, std::uint64_t most)
 {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
@@ -35,7 +40,8 @@ ByteArray read_file(const fs::path& path, const std::string& file, const std::st
                      error ? error.message() : std::strerror(errno));
   }
   ByteArray bytes;
-  bytes.size = static_cast<std::size_t>(size);
+  bytes.size = static_cast<std::size_t>(std::min<std::uint64_t>(size, most));
+  memory_require(bytes.size, path.string());
   bytes.data = std::make_unique_for_overwrite<std::byte[]>(bytes.size);
   if (std::fread(bytes.data.get(), 1, bytes.size, stream.get()) != bytes.size) {
     throw SceneError(file, json_path, std::to_string(bytes.size) + " bytes in \"" + path.string() + '"', "fewer");
@@ -130,12 +136,15 @@ std::span<const std::byte> load_buffer(GltfDocument& document,
       *uri = "data:";
     } else {
       const fs::path file = gltf_resolve_uri(document, text, path + "/uri");
-      document.storage.push_back(read_file(file, document.file, path + "/uri"));
-      document.files_read.push_back(file);
+      document.files_read.push_back(file_stamp(file));
+      document.storage.push_back(read_file(file, document.file, path + "/uri", length));
     }
     bytes = document.storage.back().span();
   }
   if (bytes.size() < length) {
+    if (const std::string_view kind = file_kind(as_text(bytes)); !kind.empty()) {
+      throw SceneError(document.file, path, "a buffer of " + std::to_string(length) + " bytes", std::string(kind));
+    }
     throw SceneError(document.file, path + "/byteLength",
                      "at most the " + std::to_string(bytes.size()) + " bytes that there are", std::to_string(length));
   }
@@ -218,6 +227,39 @@ std::string percent_decode(const std::string& uri)
   return out;
 }
 
+/// The file that a reference names, percent-encoded or plain; nothing if there is none.
+std::optional<fs::path> file_of_uri(const GltfDocument& document, const std::string& uri)
+{
+  for (const std::string& name : {percent_decode(uri), uri}) {
+    // A string with a zero byte is another, shorter name for the operating system.
+    if (name.empty() || name.find('\0') != std::string::npos) {
+      continue;
+    }
+    fs::path path = document.path.parent_path() / name;
+    std::error_code error;
+    if (fs::is_regular_file(path, error)) {
+      return path;
+    }
+  }
+  return {};
+}
+
+/// The images that a file names, whether a material uses them or not: they are the scene's, and no output may replace them.
+void add_images(GltfDocument& document)
+{
+  const std::size_t num_images = document.count("images");
+  for (std::size_t i = 0; i < num_images; ++i) {
+    const json& image = document.element("images", i);
+    const auto uri = image.find("uri");
+    if (uri == image.end() || !uri->is_string() || gltf_is_data_uri(uri->get_ref<const std::string&>())) {
+      continue;
+    }
+    if (const auto file = file_of_uri(document, uri->get_ref<const std::string&>())) {
+      document.files_read.push_back(file_stamp(*file));
+    }
+  }
+}
+
 }  // namespace
 
 std::size_t GltfDocument::count(const char* array) const
@@ -269,16 +311,8 @@ fs::path gltf_resolve_uri(const GltfDocument& document, const std::string& uri, 
   if (colon != std::string::npos) {
     throw SceneError(document.file, json_path, "a path relative to the file", '"' + uri + '"');
   }
-  for (const std::string& name : {percent_decode(uri), uri}) {
-    // A string with a zero byte is another, shorter name for the operating system.
-    if (name.empty() || name.find('\0') != std::string::npos) {
-      continue;
-    }
-    fs::path path = document.path.parent_path() / name;
-    std::error_code error;
-    if (fs::is_regular_file(path, error)) {
-      return path;
-    }
+  if (auto file = file_of_uri(document, uri)) {
+    return *std::move(file);
   }
   throw SceneError(document.file, json_path, "an existing file", '"' + uri + '"');
 }
@@ -301,17 +335,18 @@ std::unique_ptr<GltfDocument> gltf_document_load(const fs::path& path, Warnings&
   auto document = std::make_unique<GltfDocument>();
   document->path = path;
   document->file = path.string();
-  document->files_read.push_back(path);
-  document->storage.push_back(read_file(path, document->file, ""));
+  document->files_read.push_back(file_stamp(path));
+  document->storage.push_back(read_file(path, document->file, "", std::numeric_limits<std::uint64_t>::max()));
   const Container container = split_container(document->storage.back().span(), document->file);
   document->json = validation_parse(container.json, document->file);
   validation_check_support(document->json, document->file, warnings);
-  const json conforming = validation_conform(document->json, document->file);
+  const json conforming = validation_conform(document->json, document->file, warnings);
   load_core(*document, conforming);
   const std::size_t num_buffers = document->count("buffers");
   for (std::size_t i = 0; i < num_buffers; ++i) {
     document->buffers.push_back(load_buffer(*document, i, container.binary));
   }
+  add_images(*document);
   return document;
 }
 

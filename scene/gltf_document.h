@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "scene/diagnostics.h"
+#include "scene/file_stamp.h"
 #include "scene/json_reader.h"
 
 namespace relief {
@@ -30,7 +31,7 @@ struct GltfDocument {
   nlohmann::json json;                              ///< as written, minus the text of data URIs of buffers
   tinygltf::Model core;                             ///< validated; without buffers and images
   std::vector<std::span<const std::byte>> buffers;  ///< `byteLength` bytes each
-  std::vector<std::filesystem::path> files_read;    ///< this file and those of its buffers
+  std::vector<FileStamp> files_read;                ///< this file, its buffers and its images, as before they were read
   std::vector<ByteArray> storage;                   ///< what `buffers` look into
 
   /// Reader for an extension of an object, e.g. ("/nodes/3", json["nodes"][3], "RELIEF_object").

@@ -1,31 +1,24 @@
 #include "scene/gltf_loader.h"
 
+#include <algorithm>
+#include <cmath>
 #include <new>
+#include <set>
 #include <utility>
 
 #include "scene/displaced_mesh.h"
 #include "scene/feature_set.h"
+#include "scene/framing.h"
 #include "scene/gltf_mesh.h"
 #include "scene/khronos_extensions.h"
+#include "scene/limits.h"
+#include "scene/memory.h"
 #include "scene/relief_extensions.h"
 #include "scene/texture_store.h"
+#include "scene/world_displacement.h"
 
 namespace relief {
 namespace {
-
-bool shows_light(const Scene& scene)
-{
-  if (!scene.lights.empty() || !is_zero(scene.environment.color)) {
-    return true;
-  }
-  for (const Instance& instance : scene.instances) {
-    const Material& m = scene.materials[static_cast<std::size_t>(instance.material_index)];
-    if (m.unlit || !is_zero(m.emission)) {
-      return true;
-    }
-  }
-  return false;
-}
 
 std::uint32_t instance_flags(const ObjectSettings& object, const Material& material, const Transform& world)
 {
@@ -33,7 +26,8 @@ std::uint32_t instance_flags(const ObjectSettings& object, const Material& mater
                       (object.caustic_caster == CausticCaster::kAuto && material_casts_caustics(material));
   return (object.visible_to_camera ? kVisibleToCamera : 0u) | (object.casts_shadow ? kCastsShadow : 0u) |
          (transform_mirrors(world) ? kMirrored : 0u) | (caster ? kCausticCaster : 0u) |
-         (object.caustic_receiver ? kCausticReceiver : 0u) | (object.caustic_light ? 0u : kNoCausticLight);
+         (object.caustic_receiver ? kCausticReceiver : 0u) | (object.caustic_light ? 0u : kNoCausticLight) |
+         (object.holdout ? kHoldout : 0u);
 }
 
 /// Texture coordinates that a material's normal maps are laid out in; −1: it has none.
@@ -45,11 +39,30 @@ int normal_map_uv_set(const Material& m)
   return m.clearcoat_normal_texture.texture_index >= 0 ? m.clearcoat_normal_texture.uv_set : -1;
 }
 
+/// Where RELIEF_render says nothing of frames, they are those that the animations last for.
+void frame_range_from_clips(const GltfDocument& root, const std::vector<AnimationClip>& clips, RenderSettings& settings)
+{
+  bool is_given = false;
+  root.read_extension(root.json, "", "RELIEF_render", [&](const JsonReader& r) { is_given = r.has("frameRange"); });
+  if (is_given || clips.empty()) return;
+  double start = clips.front().start, end = clips.front().end;
+  for (const AnimationClip& clip : clips) {
+    start = std::min(start, clip.start);
+    end = std::max(end, clip.end);
+  }
+  // A key may stand a rounding error beside its frame.
+  constexpr double kMargin = 1e-3, kLastFrame = 1e6;
+  const auto fps = static_cast<double>(settings.frames_per_second);
+  settings.frame_start = static_cast<int>(std::clamp(std::floor(start * fps + kMargin), 0.0, kLastFrame));
+  settings.frame_end = static_cast<int>(std::clamp(std::ceil(end * fps - kMargin), 0.0, kLastFrame));
+}
+
+/// Before texels are read.
 void add_files(Scene& scene, const std::vector<TextureRequest>& requests)
 {
   for (const TextureRequest& request : requests) {
     if (!request.file.empty()) {
-      scene.files.push_back(request.file.string());
+      scene.files.push_back(file_stamp(request.file));
     }
   }
 }
@@ -70,18 +83,90 @@ void load_height_maps(Scene& scene, const std::vector<TextureRequest>& requests,
 Scene GltfLoader::load(const std::filesystem::path& path, const LoadOptions& options)
 {
   const GltfDocument& root = documents_.load(path, warnings_);
+  root_ = &root;
   scene_.file = root.file;
   scene_.render = relief_render(root, warnings_);
-  image_aspect_ = static_cast<float>(scene_.render.width) / static_cast<float>(scene_.render.height);
+  if (options.luminous_efficacy > 0) scene_.render.luminous_efficacy = options.luminous_efficacy;
+  image_aspect_ = options.camera.image_aspect > 0
+                      ? options.camera.image_aspect
+                      : static_cast<float>(scene_.render.width) / static_cast<float>(scene_.render.height);
   std::optional<double> time;
   if (options.has_frame) {
     time = options.frame / static_cast<double>(scene_.render.frames_per_second);
   }
   composition_traverse(documents_, root, time, warnings_, [this](const PlacedNode& node) { place(node); });
-  scene_.environment = relief_environment(root, textures_, warnings_).value_or(Environment{});
-  add_defaults();
-  scene_.files = documents_.files_read();
+  set_environment(options);
+  if (!says_light_) unlit_ = placements({});
+  // What is made of each later: 440 bytes an instance with 10^6 of one triangle, of which 90 are Embree's; 220 a light.
+  constexpr std::uint64_t kInstanceBytes = 512, kLightBytes = 256;
+  memory_require(scene_.instances.size() * kInstanceBytes + scene_.lights.size() * kLightBytes,
+                 root.file + ": " + std::to_string(scene_.instances.size()) + " instances and " +
+                     std::to_string(scene_.lights.size()) + " lights");
+  describe();
+  set_camera(options);
+  const std::vector<FileStamp> files = documents_.files_read();
+  scene_.files.insert(scene_.files.begin(), files.begin(), files.end());
   return std::move(scene_);
+}
+
+void GltfLoader::set_environment(const LoadOptions& options)
+{
+  std::optional<Environment> environment;
+  if (!options.environment) {
+    environment = relief_environment(*root_, textures_, warnings_);
+  } else {
+    environment.emplace();
+    // The scene's own is not read, and may well be what is missing; but no output may take its place.
+    try {
+      TextureTable replaced;
+      relief_environment(*root_, replaced, warnings_);
+      add_files(scene_, replaced.take());
+    } catch (const SceneError&) {
+    }
+    if (options.environment->source == EnvironmentSource::kFile) {
+      environment->color = splat3(options.environment->strength);
+      environment->texture_index = textures_.add_path(options.environment->file, "--environment", TextureColor::kSrgb,
+                                                      {Wrap::kRepeat, Wrap::kClamp, TexelFilter::kLinear});
+    }
+  }
+  says_light_ = says_light_ || environment.has_value();
+  scene_.environment = environment.value_or(Environment{});
+}
+
+std::vector<Placement> GltfLoader::placements(std::optional<double> time_seconds)
+{
+  std::vector<Placement> out;
+  Warnings said;  // when the scene was loaded
+  composition_traverse(documents_, *root_, time_seconds, said, [&](const PlacedNode& node) {
+    const int mesh = node.document->core.nodes[static_cast<std::size_t>(node.node_index)].mesh;
+    if (mesh < 0) return;
+    std::vector<Transform> copies = khronos_instances(*node.document, node.node_index, said);
+    if (copies.empty()) copies.emplace_back();
+    for (const Primitive& primitive : primitives_of(*node.document, mesh)) {
+      const int material_index = placed_material(node, primitive.material_index);
+      for (const Transform& copy : copies) {
+        const Transform world = node.world * copy;
+        if (transform_defect(world) != TransformDefect::kNone) continue;
+        out.push_back({primitive.mesh_index, material_index, transform_to_affine(world)});
+      }
+    }
+  });
+  return out;
+}
+
+void GltfLoader::describe()
+{
+  std::set<std::string> seen;
+  for (const auto& document : documents_.all()) {
+    for (const tinygltf::Node& node : document->core.nodes) {
+      if (!node.name.empty() && seen.insert(node.name).second) scene_.node_names.push_back(node.name);
+    }
+    std::vector<AnimationClip> clips = animation_clips(*document);
+    scene_.clips.insert(scene_.clips.end(), clips.begin(), clips.end());
+  }
+  scene_.bounds_low = world_bounds_.low;
+  scene_.bounds_high = world_bounds_.high;
+  frame_range_from_clips(*documents_.all().front(), scene_.clips, scene_.render);
 }
 
 void GltfLoader::place(const PlacedNode& node)
@@ -113,24 +198,35 @@ bool GltfLoader::is_usable(const PlacedNode& node, const Transform& world, const
                    defect == TransformDefect::kSingular ? "a singular one" : "one beyond single precision");
 }
 
+/// @param extent  largest coordinates, metres
+void GltfLoader::check_positions(const PlacedNode& node, const std::string& path, Vec3f extent)
+{
+  if (!(max_component(extent) <= kFarthest)) {
+    throw SceneError(node.document->file, path, "positions within 1e15 m of the origin", "farther ones");
+  }
+}
+
 void GltfLoader::place_meshes(const PlacedNode& node)
 {
   const GltfDocument& document = *node.document;
   const tinygltf::Node& source = document.core.nodes[static_cast<std::size_t>(node.node_index)];
   const std::string path = "/nodes/" + std::to_string(node.node_index);
-  const std::vector<int>& meshes = meshes_of(document, source.mesh);
+  const std::vector<Primitive>& primitives = primitives_of(document, source.mesh);
   const std::vector<Transform> copies = khronos_instances(document, node.node_index, warnings_);
-  for (const int mesh : meshes) {
+  for (const Primitive& primitive : primitives) {
     if (copies.empty()) {
-      place_instance(node, mesh, node.world, path);
+      place_instance(node, primitive, node.world, path);
     }
     for (const Transform& copy : copies) {
-      place_instance(node, mesh, node.world * copy, path + "/extensions/EXT_mesh_gpu_instancing");
+      place_instance(node, primitive, node.world * copy, path + "/extensions/EXT_mesh_gpu_instancing");
     }
   }
 }
 
-void GltfLoader::place_instance(const PlacedNode& node, int mesh_index, const Transform& world, const std::string& path)
+void GltfLoader::place_instance(const PlacedNode& node,
+                                const Primitive& primitive,
+                                const Transform& world,
+                                const std::string& path)
 {
   if (!is_usable(node, world, path)) {
     return;
@@ -143,45 +239,74 @@ void GltfLoader::place_instance(const PlacedNode& node, int mesh_index, const Tr
   const std::string& name = node.document->core.nodes[static_cast<std::size_t>(node.node_index)].name;
   constexpr std::size_t kLongestName = 255;  // every instance holds a copy
   instance.name = name.substr(0, kLongestName);
-  instance.mesh_index = mesh_index;
-  instance.material_index = node.material_document != nullptr
-                                ? material_of(*node.material_document, node.material_index)
-                                : scene_.meshes[static_cast<std::size_t>(mesh_index)].material_index;
+  instance.asset = node.object.asset.substr(0, kLongestName);
+  instance.mesh_index = primitive.mesh_index;
+  instance.material_index = placed_material(node, primitive.material_index);
   instance.world_from_object = transform_to_affine(world);
   instance.flags =
       instance_flags(node.object, scene_.materials[static_cast<std::size_t>(instance.material_index)], world);
-  const Bounds bounds =
-      bounds_transform(instance.world_from_object, mesh_bounds_[static_cast<std::size_t>(mesh_index)]);
-  // A tenth of a light-year: squares of such distances still fit single precision.
-  constexpr float kFarthest = 1e15f;
-  if (!(max_component(max(abs(bounds.low), abs(bounds.high))) <= kFarthest)) {
-    throw SceneError(node.document->file, path, "positions within 1e15 m of the origin", "farther ones");
+  const Affine3 inverse_of_it = inverse(instance.world_from_object);
+  if (!(max_component(max(abs(inverse_of_it.x), max(abs(inverse_of_it.y), abs(inverse_of_it.z)))) <= kFarthest)) {
+    if (node.animated) {
+      warnings_.add(node.document->file + ": " + path + ": scaled to less than 1e-15 at this frame, left out");
+      return;
+    }
+    throw SceneError(node.document->file, path, "a transform that shrinks to no less than 1e-15", "a smaller scale");
+  }
+  const Bounds& own_bounds = mesh_bounds_[static_cast<std::size_t>(primitive.mesh_index)];
+  const Bounds bounds = bounds_transform(instance.world_from_object, own_bounds);
+  for (const Bounds& each : {own_bounds, bounds}) {
+    check_positions(node, path, max(abs(each.low), abs(each.high)));
   }
   world_bounds_ = bounds_union(world_bounds_, bounds);
   check_displacement(node, instance);
+  memory_.add(sizeof(Instance), node.document->file + ": instances");
   scene_.instances.push_back(std::move(instance));
+}
+
+int GltfLoader::placed_material(const PlacedNode& node, int own)
+{
+  const std::optional<MaterialChoice> choice =
+      material_choice(node, scene_.material_names[static_cast<std::size_t>(own)]);
+  return choice ? material_of(*choice->document, choice->index) : own;
 }
 
 void GltfLoader::place_camera(const PlacedNode& node)
 {
-  if (is_usable(node, node.world, "/nodes/" + std::to_string(node.node_index))) {
+  const std::string path = "/nodes/" + std::to_string(node.node_index);
+  if (is_usable(node, node.world, path)) {
+    check_positions(node, path, abs(transform_to_affine(node.world).p));
     scene_.cameras.push_back(gltf_camera(*node.document, node.node_index, node.world, image_aspect_, warnings_));
   }
 }
 
 void GltfLoader::place_lights(const PlacedNode& node)
 {
+  const std::string path = "/nodes/" + std::to_string(node.node_index);
   const auto add = [&](const std::vector<Light>& lights) {
-    if (!lights.empty() && is_usable(node, node.world, "/nodes/" + std::to_string(node.node_index))) {
+    says_light_ = says_light_ || !lights.empty();
+    if (!lights.empty() && is_usable(node, node.world, path)) {
+      for (const Light& light : lights) {
+        check_positions(node, path, abs(light.P) + abs(light.edge_u) + abs(light.edge_v) + splat3(light.radius));
+      }
+      memory_.add(sizeof(Light) * lights.size(), node.document->file + ": lights");
       scene_.lights.insert(scene_.lights.end(), lights.begin(), lights.end());
       scene_.lights.back().casts_caustics = node.object.caustic_light;
     }
   };
-  add(khronos_node_light(*node.document, node.node_index, node.world, scene_.render.luminous_efficacy, warnings_));
+  const auto [units, is_new] = light_units_of_.try_emplace(node.document);
+  if (is_new) units->second = light_units(*node.document, scene_.render.luminous_efficacy);
+  const std::vector<Light> lights =
+      khronos_node_light(*node.document, node.node_index, node.world, units->second, warnings_);
+  if (!lights.empty() && !units->second.assumed.empty()) {
+    warnings_.add(node.document->file + ": " + std::exchange(units->second.assumed, {}));
+  }
+  add(lights);
   const auto& json = node.document->element("nodes", static_cast<std::size_t>(node.node_index));
   // An area light divides by its area, so it must not be made before its transform is known to be good.
   node.document->read_extension(json, "", "RELIEF_area_light", [&](const JsonReader&) {
-    if (is_usable(node, node.world, "/nodes/" + std::to_string(node.node_index))) {
+    says_light_ = true;
+    if (is_usable(node, node.world, path)) {
       add(relief_area_light(*node.document, node.node_index, node.world, warnings_));
     }
   });
@@ -211,24 +336,42 @@ void GltfLoader::check_displacement(const PlacedNode& node, const Instance& inst
                       scene_.displacements[static_cast<std::size_t>(index)].height, warnings_);
 }
 
-const std::vector<int>& GltfLoader::meshes_of(const GltfDocument& document, int mesh_index)
+const std::vector<GltfLoader::Primitive>& GltfLoader::primitives_of(const GltfDocument& document, int mesh_index)
 {
-  const auto [it, is_new] = meshes_of_.try_emplace({&document, mesh_index});
+  const auto [it, is_new] = primitives_of_.try_emplace({&document, mesh_index});
   if (!is_new) {
     return it->second;
   }
   const tinygltf::Mesh& source = document.core.meshes[static_cast<std::size_t>(mesh_index)];
   for (std::size_t p = 0; p < source.primitives.size(); ++p) {
-    const int material_index = material_of(document, source.primitives[p].material);
-    const Material& material = scene_.materials[static_cast<std::size_t>(material_index)];
-    std::optional<Mesh> mesh =
-        gltf_mesh_load(document, mesh_index, static_cast<int>(p), normal_map_uv_set(material), warnings_);
-    if (!mesh) {
-      continue;
+    const int material = material_of(document, source.primitives[p].material);
+    const int mesh = mesh_of(document, mesh_index, static_cast<int>(p), material);
+    if (mesh >= 0) {
+      warn_missing_attributes(document.file + ": /meshes/" + std::to_string(mesh_index),
+                              scene_.meshes[static_cast<std::size_t>(mesh)],
+                              scene_.materials[static_cast<std::size_t>(material)]);
+      it->second.push_back({mesh, material});
     }
+  }
+  return it->second;
+}
+
+/// Index of a primitive's mesh; −1: it has no triangles.
+int GltfLoader::mesh_of(const GltfDocument& document, int mesh_index, int primitive_index, int material_index)
+{
+  const tinygltf::Mesh& source = document.core.meshes[static_cast<std::size_t>(mesh_index)];
+  const tinygltf::Primitive& primitive = source.primitives[static_cast<std::size_t>(primitive_index)];
+  const int tangent_uv_set = normal_map_uv_set(scene_.materials[static_cast<std::size_t>(material_index)]);
+  const auto [it, is_new] =
+      mesh_of_.try_emplace({&document, primitive.attributes, primitive.indices, primitive.mode, tangent_uv_set}, -1);
+  if (!is_new) {
+    return it->second;
+  }
+  std::optional<Mesh> mesh = gltf_mesh_load(document, mesh_index, primitive_index, tangent_uv_set, warnings_);
+  if (mesh) {
+    memory_.add(mesh->bytes(), document.file + ": /meshes/" + std::to_string(mesh_index));
     mesh->material_index = material_index;
-    warn_missing_attributes(document.file + ": /meshes/" + std::to_string(mesh_index), *mesh, material);
-    it->second.push_back(static_cast<int>(scene_.meshes.size()));
+    it->second = static_cast<int>(scene_.meshes.size());
     mesh_bounds_.push_back(bounds_of_points(mesh->P));
     scene_.meshes.push_back(std::move(*mesh));
   }
@@ -259,24 +402,75 @@ int GltfLoader::material_of(const GltfDocument& document, int material_index)
   return it->second;
 }
 
-void GltfLoader::add_defaults()
+/// Times at which everything must be in view. The camera must not follow what moves, nor depend on which frames a run renders:
+/// they are those of the whole animation, whatever frame this is.
+std::vector<std::optional<double>> GltfLoader::framed_times(const LoadOptions& options)
+{
+  if (!options.has_frame) return {std::nullopt};
+  double end = 0;
+  for (const AnimationClip& clip : scene_.clips) end = std::max(end, clip.end);
+  // So many that what moves evenly leaves the picture by little, and that large scenes are walked through for a second or two.
+  constexpr double kMost = 128, kLeast = 8, kMostPlacements = 1e6;
+  const double num_placements = static_cast<double>(placements({}).size()) + 1;
+  const double most = std::clamp(kMostPlacements / num_placements, kLeast, kMost);
+  const double frames = std::ceil(end * static_cast<double>(scene_.render.frames_per_second));
+  const int num_steps = static_cast<int>(std::min(frames, most));
+  std::vector<std::optional<double>> times = {0.0};
+  for (int i = 1; i <= num_steps; ++i) times.emplace_back(end * i / num_steps);
+  return times;
+}
+
+void GltfLoader::set_camera(const LoadOptions& options)
 {
   if (scene_.instances.empty()) {
     warnings_.add(scene_.file + ": nothing to render: no node has a mesh with triangles");
   }
-  if (scene_.cameras.empty()) {
-    warnings_.add(scene_.file + ": no camera: one that frames everything is used");
-    scene_.cameras.push_back(framing_camera(world_bounds_, image_aspect_));
+  const CameraChoice& choice = options.camera;
+  if (choice.look_from && choice.look_at) {
+    scene_.cameras = {look_camera(*choice.look_from, *choice.look_at, choice.fov, image_aspect_)};
+    return;
   }
-  if (!shows_light(scene_)) {
-    warnings_.add(
-        scene_.file +
-        ": no light, emission or environment: a constant environment of radiance 1, which cameras do not see, is used");
-    scene_.environment = Environment{};
-    scene_.environment.color = {1, 1, 1};
-    // White things would not show before it.
-    scene_.environment.visible_to_camera = false;
+  if (!choice.look_from && !scene_.cameras.empty()) return;
+  Framing framing(choice.fov, image_aspect_);
+  std::map<int, std::vector<Vec3f>> points_of;
+  for (const std::optional<double> time : framed_times(options)) {
+    for (const Placement& p : placements(time)) {
+      const auto [points, is_new] = points_of.try_emplace(p.mesh_index);
+      if (is_new) points->second = extreme_points(scene_.meshes[static_cast<std::size_t>(p.mesh_index)].P);
+      const Material& material = scene_.materials[static_cast<std::size_t>(p.material_index)];
+      float reach = 0;
+      bool in_world = false;
+      if (material.displacement_index >= 0) {
+        // Heights are not read yet; those of images lie between 0 and 1.
+        const DisplacementSettings& d = scene_.displacements[static_cast<std::size_t>(material.displacement_index)];
+        reach = std::fabs(d.scale) * max(std::fabs(d.midlevel), std::fabs(1 - d.midlevel));
+        in_world = d.space == DisplacementSpace::kWorld;
+      }
+      framing.add(p.world_from_object, points->second, in_world ? 0 : reach, in_world ? reach : 0);
+    }
   }
+  if (choice.look_from) {
+    scene_.cameras = {look_camera(*choice.look_from, framing.middle(), choice.fov, image_aspect_)};
+    return;
+  }
+  warnings_.add(scene_.file + ": no camera: one that frames everything is used");
+  scene_.cameras.push_back(framing.camera());
+}
+
+std::pair<int, int> scene_frame_range(const std::filesystem::path& path)
+{
+  Warnings unheard;  // the load has the same
+  DocumentSet documents;
+  const GltfDocument& root = documents.load(path, unheard);
+  RenderSettings settings = relief_render(root, unheard);
+  composition_traverse(documents, root, {}, unheard, [](const PlacedNode&) {});
+  std::vector<AnimationClip> all;
+  for (const auto& document : documents.all()) {
+    const std::vector<AnimationClip> clips = animation_clips(*document);
+    all.insert(all.end(), clips.begin(), clips.end());
+  }
+  frame_range_from_clips(root, all, settings);
+  return {settings.frame_start, settings.frame_end};
 }
 
 Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
@@ -285,24 +479,35 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
   try {
     Scene scene;
     std::vector<TextureRequest> textures, height_maps;
+    std::vector<Placement> unlit;
     {
       // The files go away before texels come: the two need not be in memory together.
       GltfLoader loader(warnings);
       scene = loader.load(path, options);
+      unlit = loader.take_unlit();
       textures = loader.take_textures();
       height_maps = loader.take_height_maps();
     }
     add_files(scene, textures);
     add_files(scene, height_maps);
     load_height_maps(scene, height_maps, warnings);
-    scene.textures = std::make_shared<const TextureStore>(std::move(textures), options.texture_budget_bytes, warnings);
+    const auto store = std::make_shared<TextureStore>(std::move(textures), options.texture_budget_bytes, warnings);
+    scene.textures = store;
+    if (!unlit.empty()) default_light_add(scene, unlit, *store, warnings);
+    if (options.environment && options.environment->source != EnvironmentSource::kFile) {
+      environment_set(scene, *options.environment, *store);
+    }
+    scene.environment.visible_to_camera = options.environment_visible.value_or(scene.environment.visible_to_camera);
+    world_displacement_bake(scene);
     scene.features = feature_set_detect(scene);
     scene.warnings = warnings.texts();
     return scene;
+  } catch (const OutOfMemory&) {
+    throw;
   } catch (const std::bad_alloc&) {
-    throw SceneError(path.string(), "", "a scene that fits in memory", "one that does not");
+    throw OutOfMemory(path.string());
   } catch (const std::length_error&) {
-    throw SceneError(path.string(), "", "a scene that fits in memory", "one that does not");
+    throw OutOfMemory(path.string());
   }
 }
 

@@ -2,14 +2,19 @@
 // converted when the first node needs them, and once only.
 #pragma once
 
+#include <compare>
 #include <map>
 #include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "scene/composition.h"
+#include "scene/default_light.h"
 #include "scene/gltf_camera.h"
+#include "scene/light_units.h"
 #include "scene/load.h"
+#include "scene/memory.h"
 #include "scene/texture_table.h"
 
 namespace relief {
@@ -23,6 +28,11 @@ class GltfLoader {
   /// @error SceneError
   Scene load(const std::filesystem::path& path, const LoadOptions& options);
 
+  /// For default_light_add: meshes of a file that does not say what lights it. It says so by a light, be it one that an
+  /// animation has shrunk to nothing, or by an environment, be it a black one; emission is not looked at.
+  /// @return all meshes where they stand when no animation moves them; empty for a file that says it
+  std::vector<Placement> take_unlit() { return std::exchange(unlit_, {}); }
+
   /// Textures that the scene refers to, in index order.
   std::vector<TextureRequest> take_textures() { return textures_.take(); }
 
@@ -30,29 +40,61 @@ class GltfLoader {
   std::vector<TextureRequest> take_height_maps() { return height_maps_.take(); }
 
  private:
+  /// A primitive: a mesh of the scene, which equal primitives share, and its own material.
+  struct Primitive {
+    int mesh_index = 0, material_index = 0;
+  };
+  /// What a primitive's mesh is made of.
+  struct MeshSource {
+    const GltfDocument* document = nullptr;
+    std::map<std::string, int> attributes;  ///< accessors
+    int indices = -1, mode = 0, tangent_uv_set = -1;
+    auto operator<=>(const MeshSource&) const = default;
+  };
+
+  /// All meshes where they stand; those without a usable transform are left out.
+  /// @param time_seconds  of the animations; empty: rest pose
+  std::vector<Placement> placements(std::optional<double> time_seconds);
+  void set_camera(const LoadOptions& options);
+  std::vector<std::optional<double>> framed_times(const LoadOptions& options);
+  void set_environment(const LoadOptions& options);
   void place(const PlacedNode& node);
   bool is_usable(const PlacedNode& node, const Transform& world, const std::string& path);
+  static void check_positions(const PlacedNode& node, const std::string& path, Vec3f extent);
   void place_meshes(const PlacedNode& node);
-  void place_instance(const PlacedNode& node, int mesh_index, const Transform& world, const std::string& path);
+  void place_instance(const PlacedNode& node,
+                      const Primitive& primitive,
+                      const Transform& world,
+                      const std::string& path);
   void place_camera(const PlacedNode& node);
   void place_lights(const PlacedNode& node);
-  void add_defaults();
+  void describe();
   void warn_missing_attributes(const std::string& label, const Mesh& mesh, const Material& material);
   void check_displacement(const PlacedNode& node, const Instance& instance);
 
-  const std::vector<int>& meshes_of(const GltfDocument& document, int mesh_index);
+  const std::vector<Primitive>& primitives_of(const GltfDocument& document, int mesh_index);
+  int mesh_of(const GltfDocument& document, int mesh_index, int primitive_index, int material_index);
   int material_of(const GltfDocument& document, int material_index);
+  /// Of a primitive where it stands, after what references say about it.
+  /// @param own  index of its own material
+  int placed_material(const PlacedNode& node, int own);
 
   Warnings& warnings_;
   Scene scene_;
+  const GltfDocument* root_ = nullptr;
+  bool says_light_ = false;
+  std::vector<Placement> unlit_;
   TextureTable textures_, height_maps_;
   Bounds world_bounds_;
   float image_aspect_ = 1;
   std::vector<Bounds> mesh_bounds_;
   std::set<std::pair<int, int>> displaced_;  ///< meshes and displacements that check_displacement has seen
-  std::map<std::pair<const GltfDocument*, int>, std::vector<int>> meshes_of_;
+  std::map<std::pair<const GltfDocument*, int>, std::vector<Primitive>> primitives_of_;
+  std::map<MeshSource, int> mesh_of_;  ///< −1: a primitive without a triangle
   std::map<std::pair<const GltfDocument*, int>, int> material_of_;
+  std::map<const GltfDocument*, LightUnits> light_units_of_;
   DocumentSet documents_;
+  MemoryWatch memory_;
 };
 
 }  // namespace relief

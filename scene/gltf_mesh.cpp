@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "scene/gltf_accessor.h"
+#include "scene/memory.h"
 #include "scene/tangents.h"
 
 namespace relief {
@@ -229,6 +231,52 @@ void read_attributes(const PrimitiveReader& reader,
   }
 }
 
+template <typename T>
+void keep(std::vector<T>& values, const std::vector<std::uint32_t>& kept)
+{
+  if (values.empty()) {
+    return;
+  }
+  std::vector<T> out;
+  out.reserve(kept.size());
+  for (const std::uint32_t v : kept) {
+    out.push_back(values[v]);
+  }
+  values = std::move(out);
+}
+
+/// Drops the vertices that no triangle has, where they are the most: many primitives may share one large accessor.
+void drop_unused_vertices(Mesh& mesh)
+{
+  constexpr std::uint32_t kUnused = 0xffffffff;
+  std::vector<std::uint32_t> new_index(mesh.P.size(), kUnused), kept;
+  for (const TriangleIndices& t : mesh.triangles) {
+    for (const std::uint32_t v : {t.v0, t.v1, t.v2}) {
+      if (new_index[v] == kUnused) {
+        new_index[v] = 0;
+        kept.push_back(v);
+      }
+    }
+  }
+  if (2 * kept.size() >= mesh.P.size()) {
+    return;
+  }
+  std::sort(kept.begin(), kept.end());
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    new_index[kept[i]] = static_cast<std::uint32_t>(i);
+  }
+  for (TriangleIndices& t : mesh.triangles) {
+    t = {new_index[t.v0], new_index[t.v1], new_index[t.v2]};
+  }
+  keep(mesh.P, kept);
+  keep(mesh.N, kept);
+  keep(mesh.tangent, kept);
+  keep(mesh.color, kept);
+  for (std::vector<Vec2f>& uv : mesh.uv) {
+    keep(uv, kept);
+  }
+}
+
 }  // namespace
 
 std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
@@ -270,8 +318,15 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
     for (TriangleIndices& t : mesh.triangles) {
       t = {t.v0 - first, t.v1 - first, t.v2 - first};
     }
-    read_attributes(reader, positions, first, *highest - first + 1, mesh);
+    const std::size_t num_vertices = *highest - first + 1;
+    constexpr std::size_t kMostVertexBytes = sizeof(Vec3f) + sizeof(Normal3f) + 2 * sizeof(Vec2f) + 2 * sizeof(Vec4f);
+    constexpr std::size_t kWorthALook = std::size_t{1} << 20;
+    if (num_vertices > kWorthALook / kMostVertexBytes) {
+      memory_require(num_vertices * kMostVertexBytes, document.file + ": " + reader.path);
+    }
+    read_attributes(reader, positions, first, num_vertices, mesh);
   }
+  drop_unused_vertices(mesh);
   drop_empty_triangles(reader, mesh);
   if (mesh.triangles.empty()) {
     reader.warn("no triangle has an area; nothing is rendered");

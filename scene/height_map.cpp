@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "scene/image_reader.h"
+#include "scene/memory.h"
 #include "scene/parallel.h"
 #include "scene/texture_store.h"
 
@@ -160,7 +161,12 @@ void image_load(HeightImage& image)
   map.width = header.width;
   map.height = header.height;
   map.format = height_format(header.sample_type);
+  image.findings = {};
+  const std::string label =
+      image.label + ", " + std::to_string(map.width) + " x " + std::to_string(map.height) + " texels";
   try {
+    // What is traced adds to the map a quarter of a byte a texel, and levels of detail a third of it.
+    const MemoryReservation room(2 * map.bytes(), label);
     const std::shared_ptr<void> texels = texels_allocate(map.bytes());
     switch (map.format) {
       case HeightFormat::kU8:
@@ -176,9 +182,10 @@ void image_load(HeightImage& image)
         break;
     }
     map.texels = texels;
+  } catch (const OutOfMemory&) {
+    throw;
   } catch (const std::bad_alloc&) {
-    throw SceneError(image.source.scene_file, image.source.json_path, "a height map that fits into memory",
-                     std::to_string(map.width) + " x " + std::to_string(map.height) + " texels");
+    throw OutOfMemory(label);
   }
 }
 

@@ -3,18 +3,37 @@
 #include <algorithm>
 #include <filesystem>
 #include <stdexcept>
+#include <thread>
 
 #include <dlfcn.h>
+#include <sys/mman.h>
+
+#include "scene/memory.h"
 
 namespace relief {
 namespace {
 
 // The number counts changes of the interface: an old program that was copied away does not call into a newer build.
-constexpr const char* kEntryPoint = "relief_image_io_1";
+constexpr const char* kEntryPoint = "relief_image_io_2";
+
+/// Makes sure of the address space that linking needs, where a shell bounds it (ulimit -v). Without it some of the 245
+/// libraries abort in their initialization, or wait for ever for threads that could not be started.
+/// @error OutOfMemory
+void address_space_require()
+{
+  // 565 MiB were measured on two processors: code, data, and what threads reserve that libraries start.
+  const std::size_t bytes = (std::size_t{480} << 20) + std::thread::hardware_concurrency() * (std::size_t{80} << 20);
+  void* room = ::mmap(nullptr, bytes, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (room == MAP_FAILED) {
+    throw OutOfMemory("the module that reads images needs " + memory_text(bytes) + " of address space (ulimit -v)");
+  }
+  ::munmap(room, bytes);
+}
 
 const ImageIo& module_load()
 {
   namespace fs = std::filesystem;
+  address_space_require();
   std::error_code no_proc;
   const fs::path program = fs::read_symlink("/proc/self/exe", no_proc);
   std::string causes;

@@ -23,7 +23,8 @@ enum class SampleType { kU8, kU16, kFloat };
 /// What an image says of itself; nothing is checked.
 struct ImageHeader {
   int width = 0, height = 0, depth = 0, num_channels = 0;
-  int tile_height = 0;                          ///< 0: stored by rows, not by tiles
+  int tile_width = 0, tile_height = 0;          ///< 0: stored by rows, not by tiles
+  int strip_height = 0;                         ///< rows that are stored together; 0: not known
   SampleType sample_type = SampleType::kFloat;  ///< kU8 and kU16 where the image has them; kFloat for everything else
   int sample_bits = 0;
   bool is_integer = false, is_deep = false;
@@ -113,7 +114,7 @@ class TileCache {
 
 /// What the module gives.
 struct ImageIo {
-  /// @param format  OpenImageIO's name of it, or a file's extension
+  /// @param format  OpenImageIO's name of it (image_format.h)
   /// @return        null: no such format is known
   std::unique_ptr<ImageFile> (*make_file)(const std::string& format);
 

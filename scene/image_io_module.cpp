@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <exception>
 #include <mutex>
+#include <new>
 
 #include "scene/image_io.h"
 
@@ -47,6 +48,8 @@ class OiioFile final : public ImageFile {
       if (!input_->open(name, spec_, config)) {
         return error_or(input_->geterror(), "cannot be opened");
       }
+    } catch (const std::bad_alloc&) {
+      throw;
     } catch (const std::exception& e) {
       return e.what();
     }
@@ -54,7 +57,9 @@ class OiioFile final : public ImageFile {
               spec_.height,
               spec_.depth,
               spec_.nchannels,
+              spec_.tile_height > 0 ? spec_.tile_width : 0,
               spec_.tile_width > 0 ? spec_.tile_height : 0,
+              spec_.get_int_attribute("tiff:RowsPerStrip"),
               sample_type(spec_.format),
               static_cast<int>(spec_.format.size()) * 8,
               !spec_.format.is_floating_point(),
@@ -80,6 +85,8 @@ class OiioFile final : public ImageFile {
                                      channel_end, oiio_type(type), rows)
                 : input_->read_scanlines(0, 0, y0, y1, spec_.z, channel_begin, channel_end, oiio_type(type), rows);
       return ok && !input_->has_error() ? std::string() : error_or(input_->geterror(), "truncated or corrupt data");
+    } catch (const std::bad_alloc&) {
+      throw;
     } catch (const std::exception& e) {
       return e.what();
     }
@@ -161,6 +168,18 @@ class SourceInput final : public OIIO::ImageInput {
   std::unique_ptr<TileRows> rows_;
 };
 
+/// What the cache keeps of a level. OpenImageIO 3 has told it apart from what the file holds.
+bool level_spec(OIIO::ImageCache& cache, OIIO::ImageCache::ImageHandle* handle, int level, OIIO::ImageSpec& spec)
+{
+#if OIIO_VERSION_MAJOR >= 3
+  return cache.get_cache_dimensions(handle, nullptr, spec, 0, level);
+#else
+  const OIIO::ImageSpec* found = cache.imagespec(handle, nullptr, 0, level);
+  if (found != nullptr) spec = *found;
+  return found != nullptr;
+#endif
+}
+
 class OiioTileCache final : public TileCache {
  public:
   OiioTileCache(std::size_t budget_bytes, int tile_size) : cache_(OIIO::ImageCache::create(false))
@@ -192,14 +211,14 @@ class OiioTileCache final : public TileCache {
     }
     image.handle = handle;
     for (int level = 0; level < std::min(num_levels, kMaxMipLevels); ++level) {
-      const OIIO::ImageSpec* spec = cache_->imagespec(handle, nullptr, 0, level);
-      if (spec == nullptr) {
+      OIIO::ImageSpec spec;
+      if (!level_spec(*cache_, handle, level, spec)) {
         return error_or(cache_->geterror(), "no reason is known");
       }
-      image.levels.push_back({spec->width, spec->height, spec->tile_width, spec->tile_height});
+      image.levels.push_back({spec.width, spec.height, spec.tile_width, spec.tile_height});
       if (level == 0) {
-        const bool is_u8 = spec->format == OIIO::TypeDesc::UINT8;
-        image.layout = {spec->width, spec->height, spec->nchannels, is_u8 ? TexelFormat::kU8 : TexelFormat::kHalf};
+        const bool is_u8 = spec.format == OIIO::TypeDesc::UINT8;
+        image.layout = {spec.width, spec.height, spec.nchannels, is_u8 ? TexelFormat::kU8 : TexelFormat::kHalf};
       }
     }
     return {};
@@ -216,7 +235,7 @@ class OiioTileCache final : public TileCache {
   void release(void* tile) override { cache_->release_tile(static_cast<OIIO::ImageCache::Tile*>(tile)); }
 
  private:
-  OIIO::ImageCache* cache_;
+  decltype(OIIO::ImageCache::create(false)) cache_;  // a pointer, since OpenImageIO 3 a shared one
 };
 
 std::unique_ptr<TileCache> tile_cache_make(std::size_t budget_bytes, int tile_size)
@@ -227,4 +246,4 @@ std::unique_ptr<TileCache> tile_cache_make(std::size_t budget_bytes, int tile_si
 }  // namespace
 }  // namespace relief
 
-extern "C" const relief::ImageIo relief_image_io_1 = {relief::file_make, relief::tile_cache_make};
+extern "C" const relief::ImageIo relief_image_io_2 = {relief::file_make, relief::tile_cache_make};

@@ -4,10 +4,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <string_view>
 
 #include "kernel/assert.h"
 #include "scene/diagnostics.h"
+#include "scene/image_format.h"
+#include "scene/image_memory.h"
+#include "scene/memory.h"
 #include "scene/png_file.h"
 
 namespace relief {
@@ -21,42 +23,90 @@ namespace {
   throw SceneError(source.scene_file, source.json_path, expected, found);
 }
 
-/// OpenImageIO's name of the format with this signature; empty: unknown.
-std::string format_from_signature(std::span<const unsigned char> bytes)
+/// What messages about memory call an image.
+std::string label_of(const ImageSource& source)
 {
-  const std::string_view head(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  struct Signature {
-    std::string_view bytes, format;
-  };
-  using namespace std::string_view_literals;
-  constexpr Signature kSignatures[] = {
-      {"\x89PNG"sv, "png"},
-      {"\xff\xd8\xff"sv, "jpeg"},
-      {"\x76\x2f\x31\x01"sv, "openexr"},
-      {"#?"sv, "hdr"},
-      {"II*\0"sv, "tiff"},
-      {"MM\0*"sv, "tiff"},
-      {"II+\0"sv, "tiff"},
-      {"MM\0+"sv, "tiff"},
-      {"BM"sv, "bmp"},
-      {"GIF8"sv, "gif"},
-      {"8BPS"sv, "psd"},
-      {"DDS "sv, "dds"},
-      {"\0\0\0\x0cjP"sv, "jpeg2000"},
-      {"\xab"
-       "KTX"sv,
-       "KTX"},
-  };
-  for (const Signature& signature : kSignatures) {
-    if (head.substr(0, signature.bytes.size()) == signature.bytes) {
-      return std::string(signature.format);
-    }
-  }
-  if (head.substr(0, 4) == "RIFF" && head.size() >= 12 && head.substr(8, 4) == "WEBP") {
-    return "webp";
-  }
-  return {};
+  return source.scene_file + ": " + source.json_path + (source.file.empty() ? "" : " (" + source.file + ')');
 }
+
+/// For errors of libraries, which may mean a lack of memory.
+[[noreturn]] void fail_to_read(const ImageSource& source, const std::string& expected, const std::string& error)
+{
+  if (is_out_of_memory(error)) {
+    throw OutOfMemory(label_of(source) + ": " + error);
+  }
+  fail(source, expected, error);
+}
+
+/// The first and last bytes of an image.
+struct Ends {
+  std::vector<unsigned char> head, tail;
+};
+
+Ends ends_of_bytes(std::span<const unsigned char> bytes)
+{
+  const std::size_t head = std::min(bytes.size(), ImageEnds::kHeadBytes);
+  const std::size_t tail = std::min(bytes.size(), ImageEnds::kTailBytes);
+  return {{bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(head)},
+          {bytes.end() - static_cast<std::ptrdiff_t>(tail), bytes.end()}};
+}
+
+Ends ends_of_file(const ImageSource& source)
+{
+  std::ifstream stream(source.file, std::ios::binary | std::ios::ate);
+  const auto size = static_cast<std::size_t>(std::max<std::streamoff>(stream.tellg(), 0));
+  Ends ends;
+  ends.head.resize(std::min(size, ImageEnds::kHeadBytes));
+  ends.tail.resize(std::min(size, ImageEnds::kTailBytes));
+  stream.seekg(0);
+  stream.read(reinterpret_cast<char*>(ends.head.data()), static_cast<std::streamsize>(ends.head.size()));
+  stream.seekg(static_cast<std::streamoff>(size - ends.tail.size()));
+  stream.read(reinterpret_cast<char*>(ends.tail.data()), static_cast<std::streamsize>(ends.tail.size()));
+  if (!stream) {
+    fail(source, "an image file", "cannot be read");
+  }
+  return ends;
+}
+
+class BytesOfMemory final : public ImageBytes {
+ public:
+  explicit BytesOfMemory(std::span<const unsigned char> bytes) : bytes_(bytes) {}
+
+  bool read(std::uint64_t offset, std::span<unsigned char> bytes) override
+  {
+    if (offset > bytes_.size() || bytes.size() > bytes_.size() - offset) {
+      return false;
+    }
+    std::ranges::copy(bytes_.subspan(static_cast<std::size_t>(offset), bytes.size()), bytes.begin());
+    return true;
+  }
+
+ private:
+  std::span<const unsigned char> bytes_;
+};
+
+class BytesOfFile final : public ImageBytes {
+ public:
+  explicit BytesOfFile(const std::string& file) : stream_(file, std::ios::binary) {}
+
+  bool read(std::uint64_t offset, std::span<unsigned char> bytes) override
+  {
+    // Steps within what is buffered stay there; seeking would read anew.
+    if (offset < position_ || offset > position_ + kStep) {
+      stream_.seekg(static_cast<std::streamoff>(offset));
+    } else {
+      stream_.ignore(static_cast<std::streamsize>(offset - position_));
+    }
+    stream_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    position_ = offset + bytes.size();
+    return static_cast<bool>(stream_);
+  }
+
+ private:
+  static constexpr std::uint64_t kStep = 4096;
+  std::ifstream stream_;
+  std::uint64_t position_ = 0;
+};
 
 /// Whether a JPEG stream reaches its end marker. The decoder itself fills what is missing with grey and says nothing.
 bool jpeg_is_complete(std::span<const unsigned char> bytes)
@@ -88,6 +138,7 @@ std::vector<unsigned char> file_load(const ImageSource& source)
 {
   std::ifstream stream(source.file, std::ios::binary | std::ios::ate);
   const std::streamoff size = stream.tellg();
+  memory_require(static_cast<std::uint64_t>(std::max<std::streamoff>(size, 0)), label_of(source));
   std::vector<unsigned char> bytes(static_cast<std::size_t>(std::max<std::streamoff>(size, 0)));
   stream.seekg(0);
   stream.read(reinterpret_cast<char*>(bytes.data()), size);
@@ -106,33 +157,35 @@ ImageReader::ImageReader(const ImageSource& source) : source_(source)
     check_header();
   } catch (const SceneError&) {
     throw;
+  } catch (const OutOfMemory&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw OutOfMemory(label_of(source_));
   } catch (const std::exception& e) {
-    fail(source_, "a readable image", e.what());
+    fail_to_read(source_, "a readable image", e.what());
   }
 }
 
 void ImageReader::open()
 {
-  std::vector<unsigned char> head(16);
   if (!source_.file.empty()) {
     std::error_code error;
     if (!std::filesystem::is_regular_file(source_.file, error)) {
       fail(source_, "an image file", std::filesystem::exists(source_.file, error) ? "not a file" : "no such file");
     }
-    std::ifstream stream(source_.file, std::ios::binary);
-    stream.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
-    head.resize(static_cast<std::size_t>(stream.gcount()));
-  } else {
-    head.assign(source_.encoded.begin(), source_.encoded.begin() + static_cast<std::ptrdiff_t>(std::min<std::size_t>(
-                                                                       head.size(), source_.encoded.size())));
   }
-  std::string format = format_from_signature(head);
-  if (format.empty()) {
-    if (source_.file.empty()) {
-      fail(source_, "an image that OpenImageIO reads", head.empty() ? "no data" : "bytes of an unknown format");
-    }
-    format = std::filesystem::path(source_.file).extension().string();
-    format.erase(0, 1);
+  const Ends ends = source_.file.empty() ? ends_of_bytes(source_.encoded) : ends_of_file(source_);
+  const ImageFormat found = image_format({ends.head, ends.tail}, source_.file);
+  if (found.reader == nullptr) {
+    fail(source_, kImageFormats, found.found);
+  }
+  const std::string format = found.reader;
+  if (source_.file.empty()) {
+    BytesOfMemory bytes(source_.encoded);
+    decoder_room_ = MemoryReservation(decoder_bytes(format, bytes), label_of(source_));
+  } else {
+    BytesOfFile bytes(source_.file);
+    decoder_room_ = MemoryReservation(decoder_bytes(format, bytes), label_of(source_));
   }
   if (format == "jpeg") {
     if (!source_.file.empty()) {
@@ -142,11 +195,9 @@ void ImageReader::open()
       fail(source_, "a complete JPEG image", "truncated data");
     }
   }
-  if (!format.empty()) {
-    image_ = format == "png" ? png_file_make() : image_io().make_file(format);
-  }
+  image_ = format == "png" ? png_file_make() : image_io().make_file(format);
   if (image_ == nullptr) {
-    fail(source_, "an image that OpenImageIO reads", "format \"" + format + "\"");
+    fail(source_, "an image that OpenImageIO reads", "format \"" + format + "\", which it was built without");
   }
   const std::span<const unsigned char> bytes = owned_.empty() ? source_.encoded : owned_;
   const bool is_embedded = source_.file.empty() || !owned_.empty();
@@ -156,11 +207,11 @@ void ImageReader::open()
   const std::string name = source_.file.empty() ? "embedded." + format : source_.file;
   const std::string error = image_->open(name, bytes, header_);
   if (!error.empty()) {
-    fail(source_, "a readable image", error);
+    fail_to_read(source_, "a readable image", error);
   }
 }
 
-void ImageReader::check_header() const
+void ImageReader::check_header()
 {
   const bool sane = header_.width >= 1 && header_.height >= 1 && header_.width <= kMaxTextureSide &&
                     header_.height <= kMaxTextureSide && header_.depth <= 1 && header_.num_channels >= 1 &&
@@ -179,6 +230,7 @@ void ImageReader::check_header() const
   if (!header_.is_integer && header_.sample_bits == 64 && header_.format_name == "tiff") {
     fail(source_, "a TIFF image of at most 32 bits a sample", "64 bits");
   }
+  block_room_ = MemoryReservation(decoder_block_bytes(header_), label_of(source_));
 }
 
 void ImageReader::select(int channel_begin, int channel_end, SampleType type)
@@ -214,10 +266,14 @@ void ImageReader::read(int begin, int end)
     end = static_cast<int>(std::min<std::int64_t>((std::int64_t{end} + tile - 1) / tile * tile, header_.height));
   }
   // Zeroed every time: a reader that gives up silently must not leave an earlier image's texels.
-  rows_.assign(static_cast<std::size_t>(end - begin) * row_bytes(), 0);
+  const std::size_t num_bytes = static_cast<std::size_t>(end - begin) * row_bytes();
+  if (num_bytes > rows_.capacity()) {
+    rows_room_ = MemoryReservation(num_bytes, label_of(source_));
+  }
+  rows_.assign(num_bytes, 0);
   const std::string error = image_->read_rows(begin, end, channel_begin_, channel_end_, type_, rows_.data());
   if (!error.empty()) {
-    fail(source_, "complete image data", error);
+    fail_to_read(source_, "complete image data", error);
   }
   rows_begin_ = begin;
   rows_end_ = end;

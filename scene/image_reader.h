@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "scene/image_io.h"
+#include "scene/memory.h"
 
 namespace relief {
 
@@ -27,10 +28,9 @@ inline constexpr int kMaxImageChannels = 1024;
 /// decoded from sRGB. Not for use by several threads at once.
 class ImageReader {
  public:
-  /// Opens the image and reads its header. The format is told by the first bytes; the file's extension counts only for
-  /// formats without a signature (TGA).
-  /// @error SceneError: missing, not an image, deep, larger than kMaxTextureSide or kMaxImageChannels, or of samples that
-  ///        OpenImageIO does not read (TIFF with doubles)
+  /// Opens the image and reads its header. Its content decides which format it has (image_format.h).
+  /// @error SceneError: missing, not an image of a format that is read, deep, larger than kMaxTextureSide or kMaxImageChannels, or of samples that
+  ///        OpenImageIO does not read (TIFF with doubles). OutOfMemory: decoding it would take more than there is
   explicit ImageReader(const ImageSource& source);
 
   const ImageHeader& header() const { return header_; }
@@ -45,15 +45,16 @@ class ImageReader {
   /// Reads rows; going from top to bottom is fastest, and cheap in steps of any size.
   /// @param begin, end  0 <= begin < end <= height
   /// @return            rows `begin` to `end`, tightly packed, until the next call
-  /// @error             SceneError: the data is truncated or corrupt
+  /// @error             SceneError: the data is truncated or corrupt; OutOfMemory
   const unsigned char* load_rows(int begin, int end);
 
  private:
   void open();
-  void check_header() const;
+  void check_header();
   void read(int begin, int end);
 
   ImageSource source_;
+  MemoryReservation decoder_room_, block_room_, rows_room_;  ///< for what the decoder allocates, and for rows_
   std::vector<unsigned char> owned_;  ///< of a JPEG file, which is read whole to look for its end
   std::unique_ptr<ImageFile> image_;
   ImageHeader header_;

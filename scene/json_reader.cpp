@@ -125,6 +125,18 @@ float JsonReader::number_f(std::string_view name, float fallback, double low, do
       number(name, static_cast<double>(fallback), std::max(low, -kLargest), std::min(high, kLargest)));
 }
 
+float JsonReader::factor(std::string_view name, float fallback, Warnings& warnings) const
+{
+  const float value = number_f(name, fallback);
+  if (value >= 0 && value <= 1) {
+    return value;
+  }
+  const float used = std::clamp(value, 0.0f, 1.0f);
+  warnings.add(file_ + ": " + json_path_join(path_, name) + ": expected a number within 0…1, found " +
+               number_text(static_cast<double>(value)) + "; " + number_text(static_cast<double>(used)) + " is used");
+  return used;
+}
+
 std::int64_t JsonReader::integer(std::string_view name,
                                  std::int64_t fallback,
                                  std::int64_t low,

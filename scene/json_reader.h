@@ -41,6 +41,8 @@ class JsonReader {
   /// @error SceneError for a wrong type, a non-finite number, or a value outside [low, high]
   double number(std::string_view name, double fallback, double low = -kNoLimit, double high = kNoLimit) const;
   float number_f(std::string_view name, float fallback, double low = -kNoLimit, double high = kNoLimit) const;
+  /// A number within 0…1; what is beyond counts as the end it is beyond, with a warning.
+  float factor(std::string_view name, float fallback, Warnings& warnings) const;
   std::int64_t integer(std::string_view name, std::int64_t fallback, std::int64_t low, std::int64_t high) const;
   bool boolean(std::string_view name, bool fallback) const;
   std::string string(std::string_view name, const std::string& fallback) const;

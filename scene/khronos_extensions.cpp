@@ -63,7 +63,7 @@ void read_core(const MaterialContext& c, Material& m, int index)
 void read_transmission(const MaterialContext& c, Material& m)
 {
   c.extension("KHR_materials_transmission", [&](const JsonReader& r) {
-    m.transmission = r.number_f("transmissionFactor", 0, 0, 1);
+    m.transmission = r.factor("transmissionFactor", 0, c.warnings);
     m.transmission_texture = c.texture(r, "transmissionTexture", TextureColor::kLinear);
   });
   c.extension("KHR_materials_ior", [&](const JsonReader& r) {
@@ -81,7 +81,9 @@ void read_transmission(const MaterialContext& c, Material& m)
       r.fail("attenuationDistance", "a number > 0");
     }
     if (max_component(m.attenuation_color) > 1) {
-      r.fail("attenuationColor", "numbers within 0…1");
+      c.warnings.add(r.file() + ": " + json_path_join(r.path(), "attenuationColor") +
+                     ": expected numbers within 0…1; those above count as 1");
+      m.attenuation_color = min(m.attenuation_color, splat3(1));
     }
     if (r.has("thicknessTexture")) {
       // The texture scales a thickness that rasterizers pretend; a ray measures the real one.
@@ -93,9 +95,9 @@ void read_transmission(const MaterialContext& c, Material& m)
 void read_layers(const MaterialContext& c, Material& m)
 {
   c.extension("KHR_materials_clearcoat", [&](const JsonReader& r) {
-    m.clearcoat = r.number_f("clearcoatFactor", 0, 0, 1);
+    m.clearcoat = r.factor("clearcoatFactor", 0, c.warnings);
     m.clearcoat_texture = c.texture(r, "clearcoatTexture", TextureColor::kLinear);
-    m.clearcoat_roughness = r.number_f("clearcoatRoughnessFactor", 0, 0, 1);
+    m.clearcoat_roughness = r.factor("clearcoatRoughnessFactor", 0, c.warnings);
     m.clearcoat_roughness_texture = c.texture(r, "clearcoatRoughnessTexture", TextureColor::kLinear);
     m.clearcoat_normal_texture = c.texture(r, "clearcoatNormalTexture", TextureColor::kLinear);
     if (m.clearcoat_normal_texture.texture_index >= 0) {
@@ -105,11 +107,11 @@ void read_layers(const MaterialContext& c, Material& m)
   c.extension("KHR_materials_sheen", [&](const JsonReader& r) {
     m.sheen_color = r.color("sheenColorFactor", {0, 0, 0});
     m.sheen_color_texture = c.texture(r, "sheenColorTexture", TextureColor::kSrgb);
-    m.sheen_roughness = r.number_f("sheenRoughnessFactor", 0, 0, 1);
+    m.sheen_roughness = r.factor("sheenRoughnessFactor", 0, c.warnings);
     m.sheen_roughness_texture = c.texture(r, "sheenRoughnessTexture", TextureColor::kLinear);
   });
   c.extension("KHR_materials_specular", [&](const JsonReader& r) {
-    m.specular = r.number_f("specularFactor", 1, 0, 1);
+    m.specular = r.factor("specularFactor", 1, c.warnings);
     m.specular_texture = c.texture(r, "specularTexture", TextureColor::kLinear);
     m.specular_color = r.color("specularColorFactor", {1, 1, 1});
     m.specular_color_texture = c.texture(r, "specularColorTexture", TextureColor::kSrgb);
@@ -208,7 +210,7 @@ Material khronos_material(const GltfDocument& document, int index, TextureTable&
 std::vector<Light> khronos_node_light(const GltfDocument& document,
                                       int node_index,
                                       const Transform& world,
-                                      float luminous_efficacy,
+                                      const LightUnits& units,
                                       Warnings& warnings)
 {
   static constexpr std::string_view kTypes[] = {"point", "spot", "directional"};
@@ -224,7 +226,8 @@ std::vector<Light> khronos_node_light(const GltfDocument& document,
     }
     light.kind = type == 0 ? LightKind::kPoint : type == 1 ? LightKind::kSpot : LightKind::kSun;
     const float intensity = r.number_f("intensity", 1, 0, kNoLimit);
-    light.emission = r.color("color", {1, 1, 1}) * (intensity / luminous_efficacy);
+    light.emission = r.color("color", {1, 1, 1}) *
+                     (intensity / (light.kind == LightKind::kSun ? units.irradiance : units.intensity));
     if (!is_finite(light.emission)) {
       r.fail("intensity", "a finite emission");
     }

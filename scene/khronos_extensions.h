@@ -6,6 +6,7 @@
 #include "kernel/bsdf/material.h"
 #include "kernel/light/light.h"
 #include "scene/gltf_document.h"
+#include "scene/light_units.h"
 #include "scene/texture_table.h"
 #include "scene/transform.h"
 
@@ -37,12 +38,11 @@ void khronos_texture_transform(TextureRef& ref, const JsonReader& extension, War
 Material khronos_material(const GltfDocument& document, int index, TextureTable& textures, Warnings& warnings);
 
 /// The light that a node carries through KHR_lights_punctual, placed by the node's transform.
-/// @param luminous_efficacy  lm/W that divides candela and lux
 /// @return 0 or 1 lights
 std::vector<Light> khronos_node_light(const GltfDocument& document,
                                       int node_index,
                                       const Transform& world,
-                                      float luminous_efficacy,
+                                      const LightUnits& units,
                                       Warnings& warnings);
 
 /// EXT_mesh_gpu_instancing of a node: transforms relative to the node.

@@ -2,14 +2,22 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
+#include <utility>
 
+#include "scene/environment_preset.h"
+#include "scene/framing.h"
 #include "scene/scene.h"
 
 namespace relief {
 
 struct LoadOptions {
-  double frame = 0;                                         ///< animation time in frames; used only if `has_frame`
-  bool has_frame = false;                                   ///< false: rest pose
+  double frame = 0;        ///< animation time in frames; used only if `has_frame`
+  bool has_frame = false;  ///< false: rest pose
+  CameraChoice camera;
+  float luminous_efficacy = 0;                              ///< lm/W of the scene's lights; 0: the scene says
+  std::optional<EnvironmentChoice> environment;             ///< empty: the scene's
+  std::optional<bool> environment_visible;                  ///< to cameras; empty: as the environment has it
   std::size_t texture_budget_bytes = std::size_t{4} << 30;  ///< above it textures go through a tile cache
 };
 
@@ -17,5 +25,9 @@ struct LoadOptions {
 /// @param path  .gltf or .glb
 /// @error SceneError for anything wrong with the file or what it refers to; never crashes on any input
 Scene scene_load(const std::filesystem::path& path, const LoadOptions& options = {});
+
+/// First and last frame of a scene, as its RenderSettings would have them, without loading what it shows.
+/// @error SceneError
+std::pair<int, int> scene_frame_range(const std::filesystem::path& path);
 
 }  // namespace relief

@@ -5,13 +5,15 @@
 
 #include <cstddef>
 #include <exception>
+#include <new>
 #include <vector>
 
 namespace relief {
 
 /// Runs a task for each of n things in parallel. If several throw, the error of the first thing is the one reported,
-/// so that the message does not depend on the threads.
-/// @param task  callable with the index of the thing
+/// so that the message does not depend on the threads. What memory did not suffice for side by side is done again, one after
+/// the other.
+/// @param task  callable with the index of the thing, also a second time
 template <class Task>
 void for_each_in_parallel(std::size_t n, const Task& task)
 {
@@ -23,8 +25,13 @@ void for_each_in_parallel(std::size_t n, const Task& task)
       errors[i] = std::current_exception();
     }
   });
-  for (const std::exception_ptr& error : errors) {
-    if (error) std::rethrow_exception(error);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (!errors[i]) continue;
+    try {
+      std::rethrow_exception(errors[i]);
+    } catch (const std::bad_alloc&) {
+      task(i);
+    }
   }
 }
 

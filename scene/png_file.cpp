@@ -8,7 +8,6 @@
 #include <cstdio>
 #include <cstring>
 #include <limits>
-#include <new>
 #include <type_traits>
 
 #include "kernel/assert.h"
@@ -113,12 +112,8 @@ class PngFile final : public ImageFile {
     RELIEF_ASSERT(0 <= row_begin && row_begin < row_end && row_end <= height_);
     const std::size_t type_bytes = type == SampleType::kU8 ? 1 : type == SampleType::kU16 ? 2 : 4;
     const int num_copied = channel_end - channel_begin;
-    try {
-      // The passes of an interlaced image go over all of it.
-      rows_.resize(row_bytes_ * static_cast<std::size_t>(num_passes_ > 1 ? height_ : 1));
-    } catch (const std::bad_alloc&) {
-      return "an interlaced image that does not fit into memory";
-    }
+    // The passes of an interlaced image go over all of it.
+    rows_.resize(row_bytes_ * static_cast<std::size_t>(num_passes_ > 1 ? height_ : 1));
     for (int row = row_begin; row < row_end; ++row) {
       const bool is_past = row < next_row_ && num_passes_ == 1;
       failed_ = failed_ || (is_past && !restart()) || !decode_to(row);

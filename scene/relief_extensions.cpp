@@ -1,6 +1,11 @@
 #include "scene/relief_extensions.h"
 
+#include "kernel/film/film_layout.h"
+#include "kernel/state/path_event.h"
+
 #include <cmath>
+
+#include "scene/limits.h"
 
 namespace relief {
 namespace {
@@ -51,6 +56,31 @@ CausticSettings read_caustics(const JsonReader& r, Warnings& warnings)
   return s;
 }
 
+Mist read_mist(const JsonReader& r, Warnings& warnings)
+{
+  static constexpr std::string_view kFalloffs[] = {"linear", "quadratic", "inverse-quadratic"};
+  Mist mist;
+  mist.start = r.number_f("start", mist.start, 0, 1e15);
+  mist.depth = r.number_f("depth", mist.depth, 1e-6, 1e15);
+  mist.falloff = static_cast<MistFalloff>(r.choice("falloff", kFalloffs, 1));
+  r.warn_unread(warnings);
+  return mist;
+}
+
+/// Environment::hidden_from.
+std::uint32_t read_hidden_from(const JsonReader& r)
+{
+  static constexpr std::pair<std::string_view, PathEvent> kRays[] = {
+      {"visibleToDiffuse", PathEvent::kDiffuse},
+      {"visibleToGlossy", PathEvent::kGlossy},
+      {"visibleToTransmission", PathEvent::kTransmission}};
+  std::uint32_t hidden = 0;
+  for (const auto& [name, event] : kRays) {
+    if (!r.boolean(name, true)) hidden |= 1u << static_cast<std::uint32_t>(event);
+  }
+  return hidden;
+}
+
 /// Vector of the node scaled by a length, for the half axes of an area light.
 Vec3f half_axis(Vec3f axis, float size) { return axis * (0.5f * size); }
 
@@ -98,7 +128,7 @@ std::optional<DisplacementSettings> read_displacement(const GltfDocument& docume
   DisplacementSettings d;
   d.height = height_texture(document, r, "heightTexture", height_maps, warnings);
   d.scale = r.number_f("scale", 1);
-  d.midlevel = r.number_f("midlevel", 0.5f, 0, 1);
+  d.midlevel = r.number_f("midlevel", 0.5f);
   d.space = static_cast<DisplacementSpace>(r.choice("space", kSpaces, 0));
   d.method = static_cast<DisplacementMethod>(r.choice("method", kDisplacementMethodLabels, 0));
   if (r.has("lod") && r.raw("lod").is_string() && r.string("lod", "") == "auto") {
@@ -162,14 +192,18 @@ RenderSettings relief_render(const GltfDocument& document, Warnings& warnings)
     s.view = r.string("view", "");
     s.exposure = r.number_f("exposure", 0, -100, 100);
     s.clamp_indirect = r.number_f("clampIndirect", 0, 0, kNoLimit);
+    s.film_exposure = r.number_f("filmExposure", 1, 0, 1e15);
     integer_pair(r, "frameRange", s.frame_start, s.frame_end, -1e6, 1e6);
     if (s.frame_end < s.frame_start) {
       r.fail("frameRange", "a first frame that is not after the last");
     }
     s.frames_per_second = r.number_f("fps", s.frames_per_second, 1e-3, 1e6);
     read_pixel_filter(r, s, warnings);
-    s.luminous_efficacy = r.number_f("luminousEfficacy", 1, 1e-6, 1e6);
+    s.luminous_efficacy = r.number_f("luminousEfficacy", s.luminous_efficacy, 1e-6, 1e6);
     if (r.has("caustics")) s.caustics = read_caustics(r.object("caustics"), warnings);
+    if (r.has("mist")) s.mist = read_mist(r.object("mist"), warnings);
+    s.occlusion_distance = r.number_f("occlusionDistance", s.occlusion_distance, 0, kNoLimit);
+    s.cryptomatte_levels = small_integer(r, "cryptomatteLevels", s.cryptomatte_levels, 1, kMostCryptomatteLevels);
     r.warn_unread(warnings);
   });
   return s;
@@ -180,8 +214,14 @@ void relief_camera(const GltfDocument& document, int camera_index, Camera& camer
   const auto index = static_cast<std::size_t>(camera_index);
   const std::string path = "/cameras/" + std::to_string(index);
   document.read_extension(document.element("cameras", index), path, "RELIEF_camera", [&](const JsonReader& r) {
-    camera.aperture_radius = r.number_f("apertureRadius", 0, 0, kNoLimit);
+    camera.aperture_radius = r.number_f("apertureRadius", 0, 0, 1e15);
     camera.focus_distance = r.number_f("focusDistance", 1, 1e-6, kNoLimit);
+    const float reach = camera.projection == Projection::kPerspective
+                            ? camera.focus_distance * max(1.0f, max(camera.half_width, camera.half_height))
+                            : camera.focus_distance;
+    if (camera.aperture_radius > 0 && !(reach <= kFarthest)) {
+      r.fail("focusDistance", "a distance at which all that is in focus is within 1e15 m");
+    }
     const std::vector<double> shift = r.numbers("shift", 2, 2, -1e3, 1e3);
     if (!shift.empty()) {
       camera.shift_x = static_cast<float>(shift[0]);
@@ -211,6 +251,7 @@ std::optional<Environment> relief_environment(const GltfDocument& document, Text
     e.rotation = r.number_f("rotation", 0, -1e6, 1e6);
     e.visible_to_camera = r.boolean("visibleToCamera", true);
     e.casts_caustics = r.boolean("causticLight", true);
+    e.hidden_from = read_hidden_from(r);
     if (r.has("image") && r.has("uri")) {
       r.fail("", "either image or uri", "both");
     }
@@ -235,8 +276,17 @@ void relief_light(const GltfDocument& document,
                   Warnings& warnings)
 {
   static constexpr std::string_view kFalloffs[] = {"square", "smooth", "smooth-cosine"};
+  static constexpr std::string_view kShapes[] = {"ball", "disk"};
   document.read_extension(value, path, "RELIEF_light", [&](const JsonReader& r) {
-    if (light.kind != LightKind::kSun) light.radius = r.number_f("radius", 0, 0, kNoLimit);
+    if (light.kind != LightKind::kSun) {
+      constexpr double kLargestRadius = 1e15;
+      light.radius = r.number_f("radius", 0, 0, kLargestRadius);
+      // Its square would leave single precision; so small a ball is a point.
+      constexpr float kSmallestRadius = 1e-9f;
+      if (light.radius < kSmallestRadius) light.radius = 0;
+      light.faces_viewer = r.choice("shape", kShapes, 0) == 1;
+      light.visible_to_camera = r.boolean("visibleToCamera", false);
+    }
     if (light.kind == LightKind::kSpot) light.falloff = static_cast<SpotFalloff>(r.choice("falloff", kFalloffs, 0));
     r.warn_unread(warnings);
   });
@@ -299,6 +349,8 @@ ObjectSettings relief_object(const GltfDocument& document, int node_index, Objec
     s.casts_shadow = r.boolean("castsShadow", s.casts_shadow);
     s.caustic_receiver = r.boolean("causticReceiver", s.caustic_receiver);
     s.caustic_light = r.boolean("causticLight", s.caustic_light);
+    s.holdout = r.boolean("holdout", s.holdout);
+    s.asset = r.string("asset", s.asset);
     if (r.has("causticCaster")) {
       const nlohmann::json& caster = r.raw("causticCaster");
       if (!caster.is_boolean() && caster != "auto") {
@@ -310,6 +362,8 @@ ObjectSettings relief_object(const GltfDocument& document, int node_index, Objec
     }
     r.warn_unread(warnings);
   });
+  // Unless one is named, what hangs together below one node of the scene is one asset.
+  if (s.asset.empty()) s.asset = document.core.nodes[index].name;
   return s;
 }
 

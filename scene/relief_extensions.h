@@ -42,6 +42,8 @@ struct ObjectSettings {
   CausticCaster caustic_caster = CausticCaster::kAuto;
   bool caustic_receiver = true;
   bool caustic_light = true;
+  bool holdout = false;
+  std::string asset;  ///< empty: none is named
 };
 
 /// @param inherited  the parent's settings

@@ -10,9 +10,11 @@
 
 #include "kernel/bsdf/material.h"
 #include "kernel/camera/camera.h"
+#include "kernel/film/mist.h"
 #include "kernel/light/light.h"
 #include "kernel/shape/mesh_view.h"
 #include "scene/diagnostics.h"
+#include "scene/file_stamp.h"
 #include "scene/height_map.h"
 
 namespace relief {
@@ -29,13 +31,15 @@ struct Mesh {
   std::vector<Vec4f> color;
   std::vector<TriangleIndices> triangles;
   int material_index = 0;  ///< always valid: the loader adds glTF's default material where none is named
+  int copy_of = -1;        ///< mesh of the file that this is under some transform, see world_displacement.h; −1: none
 
   MeshView view() const;
   std::size_t bytes() const;
 };
 
 struct Instance {
-  std::string name;  ///< of the node
+  std::string name;   ///< of the node
+  std::string asset;  ///< RELIEF_object's, or the name of the topmost node above
   int mesh_index = 0;
   int material_index = 0;
   Affine3 world_from_object;
@@ -54,7 +58,8 @@ struct Environment {
   int texture_index = -1;  ///< into TextureStore; −1: constant `color`
   float rotation = 0;      ///< radians about +Y
   bool visible_to_camera = true;
-  bool casts_caustics = true;  ///< as Light::casts_caustics
+  bool casts_caustics = true;     ///< as Light::casts_caustics
+  std::uint32_t hidden_from = 0;  ///< bit PathEvent: bounced rays that do not see it
 };
 
 enum class PixelFilter : std::uint8_t { kBox, kBlackmanHarris };
@@ -108,15 +113,19 @@ struct RenderSettings {
   int max_bounces = 12, diffuse_bounces = 12, glossy_bounces = 12, transmission_bounces = 12;
   int transparent_bounces = 32;
   std::uint64_t seed = 0;
-  std::string view = "";     ///< OCIO view; empty: the display's default
-  float exposure = 0;        ///< stops, PNG only
-  float clamp_indirect = 0;  ///< 0: off
-  int frame_start = 1, frame_end = 1;
+  std::string view = "";               ///< OCIO view; empty: the display's default
+  float exposure = 0;                  ///< stops, PNG only
+  float clamp_indirect = 0;            ///< 0: off
+  float film_exposure = 1;             ///< factor on all light of the picture
+  int frame_start = 1, frame_end = 1;  ///< inclusive; what no file says follows from the clips
   float frames_per_second = 24;
   PixelFilter filter = PixelFilter::kBlackmanHarris;
   float filter_width = 1.5f;  ///< pixels
   CausticSettings caustics;
-  float luminous_efficacy = 1;  ///< lm/W that divides KHR_lights_punctual's candela and lux
+  Mist mist;
+  float occlusion_distance = 10;  ///< metres
+  int cryptomatte_levels = 6;
+  float luminous_efficacy = 0;  ///< lm/W that divides KHR_lights_punctual's candela and lux; 0: see light_units.h
 };
 
 /// What the scene needs; passes, kernels and memory for what is absent are never run or allocated.
@@ -127,14 +136,23 @@ struct FeatureSet {
        instances = false, depth_of_field = false, caustic_casters = false;
 };
 
+/// One animation of a file; all of them play at once.
+struct AnimationClip {
+  std::string name;
+  double start = 0, end = 0;  ///< seconds: its first and last key
+};
+
 struct Scene {
   std::string file;
   std::vector<Mesh> meshes;
   std::vector<Instance> instances;
   std::vector<Material> materials;
   std::vector<std::string> material_names;
-  std::vector<Light> lights;         ///< everything but mesh triangles and the environment
-  std::vector<SceneCamera> cameras;  ///< never empty: the loader adds a framing camera (and a warning) if need be
+  std::vector<Light> lights;            ///< everything but mesh triangles and the environment
+  std::vector<std::string> node_names;  ///< of all files, as far as they have names, each once, in file order
+  std::vector<AnimationClip> clips;     ///< of all files
+  Vec3f bounds_low, bounds_high;        ///< box of all instances, undisplaced, world; low > high without any
+  std::vector<SceneCamera> cameras;     ///< never empty: the loader adds a framing camera (and a warning) if need be
   std::vector<DisplacementSettings> displacements;
   std::vector<HeightMap> height_maps;
   Environment environment;
@@ -142,7 +160,7 @@ struct Scene {
   FeatureSet features;
   std::shared_ptr<const TextureStore> textures;
   std::vector<std::string> warnings;
-  std::vector<std::string> files;  ///< everything that was read: the scene, buffers, images, references
+  std::vector<FileStamp> files;  ///< everything that was read: the scene, buffers, images, references; as before that
 };
 
 }  // namespace relief

@@ -9,6 +9,7 @@
 #include <tuple>
 #include <unordered_map>
 
+#include "scene/memory.h"
 #include "scene/mip_chain.h"
 #include "scene/parallel.h"
 #include "scene/texture_cache.h"
@@ -35,10 +36,11 @@ struct Image {
   std::optional<MipChain> chain;
 };
 
-[[noreturn]] void fail_for_memory(const Image& image)
+/// What messages about memory call an image.
+std::string label_with_size(const Image& image)
 {
-  throw SceneError(image.source.scene_file, image.source.json_path, "an image that fits into memory",
-                   std::to_string(image.layout.width) + " x " + std::to_string(image.layout.height) + " texels");
+  return image.label + ", " + std::to_string(image.layout.width) + " x " + std::to_string(image.layout.height) +
+         " texels";
 }
 
 /// Reads all rows, in bands: to keep them, or only to know that they can be read.
@@ -73,11 +75,14 @@ void image_load(Image& image)
       rows_load(image, nullptr);
       return;
     }
+    const MemoryReservation room(mip_chain_bytes(image.layout), label_with_size(image));
     image.chain.emplace(image.layout);
     rows_load(image, image.chain->level(0));
     mip_chain_build(*image.chain);
+  } catch (const OutOfMemory&) {
+    throw;
   } catch (const std::bad_alloc&) {
-    fail_for_memory(image);
+    throw OutOfMemory(label_with_size(image));
   }
 }
 
@@ -198,7 +203,9 @@ TextureStore::TextureStore(std::vector<TextureRequest> requests, std::size_t bud
     images[i].source.encoded = images[i].encoded;
     images[i].layout = TextureReader(images[i].source).layout();
   });
-  if (const std::size_t cache_bytes = choose_cached(images, budget_bytes); cache_bytes > 0) {
+  // Where memory is short, the tile cache is better than an end.
+  const auto budget = static_cast<std::size_t>(std::min<std::uint64_t>(budget_bytes, memory_left() / 2));
+  if (const std::size_t cache_bytes = choose_cached(images, budget); cache_bytes > 0) {
     impl_->cache = std::make_unique<TextureCache>(cache_bytes);
   }
   for_each_in_parallel(images.size(), [&](std::size_t i) { image_load(images[i]); });
@@ -221,6 +228,32 @@ TextureStore::TextureStore(std::vector<TextureRequest> requests, std::size_t bud
 }
 
 TextureStore::~TextureStore() = default;
+
+int TextureStore::add_image(std::string label,
+                            int width,
+                            int height,
+                            std::span<const float> rgb,
+                            Wrap wrap_u,
+                            Wrap wrap_v)
+{
+  Image image;
+  image.label = label;
+  image.layout = {width, height, 3, TexelFormat::kHalf};
+  image.chain.emplace(image.layout);
+  auto* texels = reinterpret_cast<std::uint16_t*>(image.chain->level(0));
+  std::transform(rgb.begin(), rgb.end(), texels,
+                 [](float value) { return half_from_float(clamp(value, -kHalfMax, kHalfMax)); });
+  mip_chain_build(*image.chain);
+  TextureRequest request;
+  request.wrap_u = wrap_u;
+  request.wrap_v = wrap_v;
+  // Views look into the chain's own block, which stays where it is when the images move.
+  impl_->views.push_back(resident_view(*image.chain, request));
+  impl_->image_of_texture.push_back(impl_->images.size());
+  impl_->images.push_back(std::move(image));
+  impl_->labels.push_back(std::move(label));
+  return static_cast<int>(impl_->views.size()) - 1;
+}
 
 std::span<const TextureView> TextureStore::views() const { return impl_->views; }
 

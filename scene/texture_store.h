@@ -31,11 +31,17 @@ struct TextureRequest {
 class TextureStore {
  public:
   /// Reads all textures (in parallel). Equal (image, colour) pairs share their texels.
+  /// @param budget_bytes  of texels that stay in memory; half of what memory is left, if that is less
   /// @error SceneError naming the file and JSON path of an image that is missing, unreadable or absurdly large
   TextureStore(std::vector<TextureRequest> requests, std::size_t budget_bytes, Warnings& warnings);
   ~TextureStore();
   TextureStore(const TextureStore&) = delete;
   TextureStore& operator=(const TextureStore&) = delete;
+
+  /// Adds an image that was computed; it is never served by the tile cache.
+  /// @param rgb  linear, rows from the top, 3 × width × height; kept at half precision
+  /// @return     its index
+  int add_image(std::string label, int width, int height, std::span<const float> rgb, Wrap wrap_u, Wrap wrap_v);
 
   std::span<const TextureView> views() const;
   std::size_t bytes() const;        ///< resident texels

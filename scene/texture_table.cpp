@@ -117,6 +117,19 @@ int TextureTable::add_file(const GltfDocument& document,
   return add(std::move(key), std::move(request), color, sampling);
 }
 
+int TextureTable::add_path(const std::filesystem::path& file,
+                           const std::string& option,
+                           TextureColor color,
+                           TextureSampling sampling)
+{
+  TextureRequest request;
+  request.file = file;
+  request.scene_file = file.string();
+  request.json_path = option;
+  request.label = file.string();
+  return add(make_key(option + ' ' + file.string(), nullptr, 0, color, sampling), std::move(request), color, sampling);
+}
+
 std::vector<TextureRequest> TextureTable::take()
 {
   index_of_.clear();

@@ -36,6 +36,13 @@ class TextureTable {
                TextureColor color,
                TextureSampling sampling);
 
+  /// A file that the user names.
+  /// @param option  that names it, for messages
+  int add_path(const std::filesystem::path& file,
+               const std::string& option,
+               TextureColor color,
+               TextureSampling sampling);
+
   /// The requests, in index order; the table is empty afterwards.
   std::vector<TextureRequest> take();
 

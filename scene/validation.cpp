@@ -4,10 +4,12 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <set>
 #include <span>
 #include <string_view>
 #include <vector>
 
+#include "scene/file_kind.h"
 #include "scene/json_reader.h"
 
 namespace relief {
@@ -42,7 +44,9 @@ struct Field {
   bool required = false;
   double low = -kNoLimit, high = kNoLimit;
   std::size_t shortest = 0, longest = std::numeric_limits<std::size_t>::max();
-  std::string_view target = {};  ///< kIndex…: array; kString: labels
+  std::string_view target = {};     ///< kIndex…: array; kString: labels
+  std::string_view otherwise = {};  ///< kString: what any other value means, after a warning; empty: that is an error
+  bool clamps = false;              ///< kNumber, kNumbers: what is out of range counts as its end, after a warning
   std::span<const Field> fields = {};
 };
 
@@ -61,6 +65,26 @@ constexpr Field number(std::string_view name, double low, double high, bool requ
 constexpr Field string(std::string_view name, std::string_view labels = {}, bool required = false)
 {
   return {.name = name, .kind = Kind::kString, .required = required, .target = labels};
+}
+/// One of some labels; what else files have there counts as `otherwise`.
+constexpr Field choice(std::string_view name, std::string_view labels, std::string_view otherwise)
+{
+  return {.name = name, .kind = Kind::kString, .target = labels, .otherwise = otherwise};
+}
+/// Factors of materials, which files have a little beyond their range.
+constexpr Field factor(std::string_view name, double high)
+{
+  return {.name = name, .kind = Kind::kNumber, .low = 0, .high = high, .clamps = true};
+}
+constexpr Field factors(std::string_view name, std::size_t count, double high)
+{
+  return {.name = name,
+          .kind = Kind::kNumbers,
+          .low = 0,
+          .high = high,
+          .shortest = count,
+          .longest = count,
+          .clamps = true};
 }
 constexpr Field boolean(std::string_view name) { return {.name = name, .kind = Kind::kBoolean}; }
 constexpr Field numbers(std::string_view name,
@@ -124,16 +148,16 @@ constexpr Field kSampler[] = {integer("magFilter", 9728, 9729), integer("minFilt
 constexpr Field kTextureInfo[] = {index("index", "textures", true), integer("texCoord", 0, kLargestInt)};
 constexpr Field kNormalTexture[] = {index("index", "textures", true), integer("texCoord", 0, kLargestInt),
                                     number("scale", -kLargestFloat, kLargestFloat)};
-constexpr Field kPbr[] = {numbers("baseColorFactor", 4, 0, 1), object("baseColorTexture", kTextureInfo),
-                          number("metallicFactor", 0, 1), number("roughnessFactor", 0, 1),
+constexpr Field kPbr[] = {factors("baseColorFactor", 4, 1), object("baseColorTexture", kTextureInfo),
+                          factor("metallicFactor", 1), factor("roughnessFactor", 1),
                           object("metallicRoughnessTexture", kTextureInfo)};
 constexpr Field kMaterial[] = {string("name"),
                                object("pbrMetallicRoughness", kPbr),
                                object("normalTexture", kNormalTexture),
                                object("emissiveTexture", kTextureInfo),
-                               numbers("emissiveFactor", 3, 0),
-                               string("alphaMode", "OPAQUE|MASK|BLEND"),
-                               number("alphaCutoff", 0, kLargestFloat),
+                               factors("emissiveFactor", 3, kLargestFloat),
+                               choice("alphaMode", "OPAQUE|MASK|BLEND", "OPAQUE"),
+                               factor("alphaCutoff", kLargestFloat),
                                boolean("doubleSided")};
 constexpr Field kPerspective[] = {number("aspectRatio", 1e-6, 1e6), number("yfov", 1e-6, 3.14159, true),
                                   number("zfar", 0, kNoLimit), number("znear", 0, kNoLimit)};
@@ -145,7 +169,7 @@ constexpr Field kCamera[] = {string("name"), string("type", "perspective|orthogr
 constexpr Field kChannelTarget[] = {index("node", "nodes"), string("path", {}, true)};
 constexpr Field kChannel[] = {integer("sampler", 0, kLargestInt, true), object("target", kChannelTarget, true)};
 constexpr Field kAnimationSampler[] = {index("input", "accessors", true),
-                                       string("interpolation", "LINEAR|STEP|CUBICSPLINE"),
+                                       choice("interpolation", "LINEAR|STEP|CUBICSPLINE", "LINEAR"),
                                        index("output", "accessors", true)};
 constexpr Field kAnimation[] = {string("name"), objects("channels", kChannel, true),
                                 objects("samplers", kAnimationSampler, true)};
@@ -190,7 +214,10 @@ constexpr std::string_view kSupportedExtensions[] = {"KHR_lights_punctual",
 /// Walks a document along the table above.
 class Conformer {
  public:
-  Conformer(const json& document, const std::string& file) : document_(document), file_(file) {}
+  Conformer(const json& document, const std::string& file, Warnings& warnings)
+      : document_(document), file_(file), warnings_(warnings)
+  {
+  }
 
   json conform_object(const json& value, std::span<const Field> fields, const std::string& path) const
   {
@@ -213,6 +240,12 @@ class Conformer {
   [[noreturn]] void fail(const std::string& path, const std::string& expected, const json& found) const
   {
     throw SceneError(file_, path, expected, json_describe(found));
+  }
+
+  void warn(const std::string& path, const std::string& expected, const json& found, const std::string& used) const
+  {
+    warnings_.add(file_ + ": " + path + ": expected " + expected + ", found " + json_describe(found) + "; " + used +
+                  " is used");
   }
 
   json conform_field(const json& value, const Field& field, const std::string& path) const
@@ -296,6 +329,11 @@ class Conformer {
   json conform_number(const json& value, const Field& field, const std::string& path) const
   {
     const double x = value.is_number() ? value.get<double>() : std::nan("");
+    if (field.clamps && std::isfinite(x) && !(x >= field.low && x <= field.high)) {
+      const double used = std::clamp(x, field.low, field.high);
+      warn(path, "a number within " + number_text(field.low) + "…" + number_text(field.high), value, number_text(used));
+      return used;
+    }
     if (!(std::isfinite(x) && x >= field.low && x <= field.high)) {
       const bool bounded = field.low > -kLargestFloat || field.high < kLargestFloat;
       fail(path,
@@ -307,20 +345,25 @@ class Conformer {
 
   json conform_string(const json& value, const Field& field, const std::string& path) const
   {
-    if (!value.is_string()) {
+    if (!value.is_string() && field.otherwise.empty()) {
       fail(path, "a string", value);
     }
     std::string_view labels = field.target;
     bool known = labels.empty();
     while (!known && !labels.empty()) {
       const std::size_t bar = std::min(labels.find('|'), labels.size());
-      known = labels.substr(0, bar) == value.get_ref<const std::string&>();
+      known = value.is_string() && labels.substr(0, bar) == value.get_ref<const std::string&>();
       labels.remove_prefix(std::min(bar + 1, labels.size()));
     }
-    if (!known) {
-      fail(path, "one of " + std::string(field.target), value);
+    if (known) {
+      return value;
     }
-    return value;
+    const std::string expected = "one of " + std::string(field.target);
+    if (field.otherwise.empty()) {
+      fail(path, expected, value);
+    }
+    warn(path, expected, value, std::string(field.otherwise));
+    return std::string(field.otherwise);
   }
 
   json conform_index_map(const json& value, const Field& field, const std::string& path) const
@@ -337,10 +380,12 @@ class Conformer {
 
   const json& document_;
   const std::string& file_;
+  Warnings& warnings_;
 };
 
-/// Nodes must form trees whose roots are what scenes list.
-void check_node_tree(const json& document, const std::string& file)
+/// Nodes must form trees. What a scene lists must be their roots: of other nodes, those that stand in the scene anyhow are
+/// taken off the list, the others are roots there.
+void conform_node_tree(json& document, const std::string& file, Warnings& warnings)
 {
   const auto nodes = document.find("nodes");
   if (nodes == document.end()) {
@@ -377,18 +422,35 @@ void check_node_tree(const json& document, const std::string& file)
   const auto scenes = document.find("scenes");
   for (std::size_t s = 0; scenes != document.end() && s < scenes->size(); ++s) {
     const auto roots = (*scenes)[s].find("nodes");
-    std::vector<bool> listed(nodes->size(), false);
-    for (std::size_t j = 0; roots != (*scenes)[s].end() && j < roots->size(); ++j) {
+    if (roots == (*scenes)[s].end()) continue;
+    // 1: listed; 2: a descendant of such a node, or one already kept.
+    std::vector<char> state(nodes->size(), 0);
+    for (const json& root : *roots) state[root.get<std::size_t>()] = 1;
+    json kept = json::array();
+    for (std::size_t j = 0; j < roots->size(); ++j) {
       const auto root = (*roots)[j].get<std::size_t>();
-      const std::string path = "/scenes/" + std::to_string(s) + "/nodes/" + std::to_string(j);
+      const auto warn = [&](const std::string& what) {
+        warnings.add(file + ": /scenes/" + std::to_string(s) + "/nodes/" + std::to_string(j) + ": " + what);
+      };
+      if (state[root] == 2) {
+        warn("node " + std::to_string(root) + " is listed twice, and counts once");
+        continue;
+      }
+      std::size_t above = parent[root];
+      while (above != kNone && state[above] == 0) above = parent[above];
+      if (above != kNone) {
+        warn("node " + std::to_string(root) + " is no root: it stands below node " + std::to_string(above) +
+             ", and counts there alone");
+        continue;
+      }
       if (parent[root] != kNone) {
-        throw SceneError(file, path, "a root node", "a child of node " + std::to_string(parent[root]));
+        warn("node " + std::to_string(root) + " is no root, but a child of node " + std::to_string(parent[root]) +
+             ", which is not in the scene: it counts as a root, without that node's transform");
       }
-      if (listed[root]) {
-        throw SceneError(file, path, "a node that is not listed yet", "node " + std::to_string(root) + " again");
-      }
-      listed[root] = true;
+      state[root] = 2;
+      kept.push_back(root);
     }
+    *roots = std::move(kept);
   }
 }
 
@@ -461,11 +523,23 @@ void check_enumerations(const json& document, const std::string& file)
   }
 }
 
+/// First of all, since a glTF of version 1 differs in everything.
 void check_version(const json& document, const std::string& file)
 {
-  const std::string& version = document["asset"]["version"].get_ref<const std::string&>();
-  if (version.rfind("2.", 0) != 0) {
-    throw SceneError(file, "/asset/version", "\"2.0\"", '"' + version + '"');
+  const auto asset = document.find("asset");
+  const bool has_asset = asset != document.end() && asset->is_object();
+  const auto version = has_asset ? asset->find("version") : document.end();
+  const bool has_version = has_asset && version != asset->end() && version->is_string();
+  const std::string text = has_version ? version->get<std::string>() : std::string();
+  const auto nodes = document.find("nodes");
+  // Its arrays were objects by name; early files name no version.
+  const bool is_1 = has_version ? text.rfind("1.", 0) == 0 : nodes != document.end() && nodes->is_object();
+  if (is_1) {
+    throw SceneError(file, "/asset/version", "glTF 2.0",
+                     "glTF 1.0, which another program (Blender up to 2.79, glTF-Pipeline up to 3) has to convert");
+  }
+  if (has_version && text.rfind("2.", 0) != 0) {
+    throw SceneError(file, "/asset/version", "\"2.0\"", '"' + text + '"');
   }
 }
 
@@ -494,10 +568,49 @@ int nesting_depth(std::string_view text)
   return deepest;
 }
 
+/// Names of all extensions that a value and what is in it have; `extras` are nobody's business.
+void collect_extensions(const json& value, std::set<std::string>& names)
+{
+  if (value.is_object()) {
+    for (const auto& item : value.items()) {
+      if (item.key() == "extras") continue;
+      if (item.key() == "extensions" && item.value().is_object()) {
+        for (const auto& extension : item.value().items()) names.insert(extension.key());
+      }
+      collect_extensions(item.value(), names);
+    }
+  } else if (value.is_array()) {
+    for (const json& element : value) collect_extensions(element, names);
+  }
+}
+
+bool is_supported(const std::string& extension)
+{
+  return std::find(std::begin(kSupportedExtensions), std::end(kSupportedExtensions), extension) !=
+         std::end(kSupportedExtensions);
+}
+
+/// Extensions that are there although extensionsUsed does not list them.
+void warn_undeclared(const json& document, const std::string& file, Warnings& warnings)
+{
+  std::set<std::string> names;
+  collect_extensions(document, names);
+  if (const auto used = document.find("extensionsUsed"); used != document.end()) {
+    for (const json& name : *used) names.erase(name.get<std::string>());
+  }
+  for (const std::string& name : names) {
+    warnings.add(file + ": /extensionsUsed: does not list " + name + ", which the file has; it is " +
+                 (is_supported(name) ? "read all the same" : "not read"));
+  }
+}
+
 }  // namespace
 
 json validation_parse(std::string_view text, const std::string& file)
 {
+  if (const std::string_view kind = file_kind(text); !kind.empty()) {
+    throw SceneError(file, "", "glTF 2.0 (.gltf, .glb)", std::string(kind));
+  }
   constexpr int kDeepest = 100;
   const int depth = nesting_depth(text);
   if (depth > kDeepest) {
@@ -519,12 +632,12 @@ json validation_parse(std::string_view text, const std::string& file)
   return document;
 }
 
-json validation_conform(const json& document, const std::string& file)
+json validation_conform(const json& document, const std::string& file, Warnings& warnings)
 {
-  json out = Conformer(document, file).conform_object(document, kDocument, "");
-  check_version(out, file);
+  check_version(document, file);
+  json out = Conformer(document, file, warnings).conform_object(document, kDocument, "");
   check_enumerations(out, file);
-  check_node_tree(out, file);
+  conform_node_tree(out, file, warnings);
   for (const char* array : {"meshes", "cameras", "animations", "accessors"}) {
     if (!out.contains(array)) {
       out[array] = json::array();
@@ -553,8 +666,7 @@ void validation_check_support(const json& document, const std::string& file, War
         throw SceneError(file, json_path_join(path, i), "a string", json_describe(name));
       }
       const std::string& text = name.get_ref<const std::string&>();
-      if (std::find(std::begin(kSupportedExtensions), std::end(kSupportedExtensions), text) ==
-          std::end(kSupportedExtensions)) {
+      if (!is_supported(text)) {
         act(text, json_path_join(path, i));
       }
     }
@@ -565,6 +677,7 @@ void validation_check_support(const json& document, const std::string& file, War
   for_each_unknown("extensionsUsed", [&](const std::string& name, const std::string&) {
     warnings.add(file + ": extension " + name + " is not read");
   });
+  warn_undeclared(document, file, warnings);
   const auto skins = document.find("skins");
   if (skins != document.end() && skins->is_array() && !skins->empty()) {
     warnings.add(file + ": /skins: skins are not read; meshes keep their rest pose");

@@ -234,6 +234,8 @@ def set_up_render(settings):
     scene.render.resolution_x, scene.render.resolution_y = settings.get("resolution", (960, 540))
     scene.render.use_compositing = scene.render.use_sequencer = False
     scene.render.dither_intensity = 0
+    if bpy.app.version >= (5, 0, 0):
+        scene.render.image_settings.media_type = "IMAGE"
     scene.render.image_settings.file_format = "OPEN_EXR"
     scene.render.image_settings.color_mode = "RGB"
     scene.render.image_settings.color_depth = "32"

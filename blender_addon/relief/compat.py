@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What differs between versions of Blender; nothing else in the add-on asks for the version.
 
-Checked against 3.4.1 and 4.3.2, as Debian 12 and 13 package them. The branch for 4.4 and the exposure of 4.5 follow
-Blender's release notes and were not run.
+Checked against 3.4.1, 4.3.2 and 5.2.2, as Debian 12, 13 and unstable package them.
 """
 
 import math
@@ -12,6 +11,7 @@ import numpy as np
 
 IS_4_0 = bpy.app.version >= (4, 0, 0)
 IS_4_1 = bpy.app.version >= (4, 1, 0)
+IS_5_0 = bpy.app.version >= (5, 0, 0)
 
 #: Names that sockets of the Principled BSDF got in 4.0, by the names of 3.4.
 _PRINCIPLED_NAMES_4_0 = {
@@ -25,6 +25,18 @@ _PRINCIPLED_NAMES_4_0 = {
     "Emission": "Emission Color",
 }
 
+#: Names that passes got in 5.0, by the names before.
+_PASS_NAMES_5_0 = {
+    "DiffCol": "Diffuse Color",
+    "Emit": "Emission",
+    "Env": "Environment",
+    "AO": "Ambient Occlusion",
+}
+
+#: What faces without a material look like, as arguments of export.surface.Surface. Since 5.0 it is the plastic of a new
+#: material, before a diffuse grey.
+DEFAULT_SURFACE = {"roughness": 0.5, "specular": 1.0} if IS_5_0 else {}
+
 #: Before 4.0 the Principled BSDF multiplied its coat by Disney's factor of a quarter.
 COAT_SCALE = 1.0 if IS_4_0 else 0.25
 
@@ -35,6 +47,11 @@ TINTS_ARE_COLORS = IS_4_0
 def principled_socket(node, name):
     """Input of a Principled BSDF by its name in 3.4; None if this version has no such input."""
     return node.inputs.get(_PRINCIPLED_NAMES_4_0.get(name, name) if IS_4_0 else name)
+
+
+def pass_name(name):
+    """This version's name of a render pass, by its name in 3.4."""
+    return _PASS_NAMES_5_0.get(name, name) if IS_5_0 else name
 
 
 def principled_reflection(level, ior, tint, is_glass):
@@ -178,3 +195,26 @@ def is_portal(light):
 def light_energy(light):
     """Blender's power of a light: watts, for a sun W/m². Since 4.5 lights have an exposure besides."""
     return light.energy * 2.0 ** getattr(light, "exposure", 0.0)
+
+
+def faces_viewer(light):
+    """Whether a point or spot with a radius is a disk that faces each point; later it is a ball, unless asked."""
+    return not IS_4_0 or getattr(light, "use_soft_falloff", False)
+
+
+def film_exposure(scene):
+    """Factor on all light of the picture, a setting of Cycles."""
+    return getattr(getattr(scene, "cycles", None), "film_exposure", 1.0)
+
+
+def world_of(scene, view_layer):
+    """The world of a picture; later versions let a view layer have its own."""
+    return getattr(view_layer, "world_override", None) or scene.world
+
+
+def sees_world(world, ray):
+    """Whether rays of a kind ('camera', 'diffuse', 'glossy', 'transmission') see the world."""
+    for owner, name in ((world, f"visible_{ray}"), (getattr(world, "cycles_visibility", None), ray)):
+        if hasattr(owner, name):
+            return getattr(owner, name)
+    return True

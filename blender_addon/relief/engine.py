@@ -6,7 +6,7 @@ import traceback
 import bpy
 
 from . import compat, exporter, final, result
-from .report import ReliefError
+from .report import ReliefError, say
 from .viewport import Viewport, stop_all
 
 
@@ -52,11 +52,11 @@ class ReliefEngine(bpy.types.RenderEngine):
         except ReliefError as error:
             self._tell(str(error))
         except Exception as error:  # whatever it is, the artist must see it
-            traceback.print_exc()
+            say("".join(traceback.format_exception(error)))
             self._tell(f"{type(error).__name__}: {error} (a mistake in the add-on; the console has the details)")
 
     def _tell(self, text):
-        print(f"relief: error: {text}", flush=True)
+        say(f"error: {text}")
         self.error_set(text)
         self.report({"ERROR"}, text)
 

@@ -5,17 +5,21 @@ import json
 import os
 import time
 
+import bpy
 import numpy as np
 
 from . import exr, report, result, session
 from .export.camera import camera_json
 from .export.scene import DATA_FOLDER, View, export_scene
+from .export.settings import sampling_of, warn_unread_settings
 from .preferences import find_checked_binary
 from .process import Process
-from .report import ReliefError, Report
+from .report import ReliefError, Report, say
 
 _POLL_SECONDS = 0.05
-_WARNING = "relief: warning: "
+
+#: Part of the time that pictures may take that are shown while rendering, and seconds more for the first ones.
+_PREVIEW_SHARE, _FIRST_PREVIEW_SECONDS = 0.02, 0.5
 
 
 def render(engine, depsgraph):
@@ -34,25 +38,33 @@ def render(engine, depsgraph):
     folder = session.render_folder()
     layer_name = depsgraph.view_layer.name
     passes = result.enabled_passes(depsgraph.view_layer)
+    result.warn_missing_passes(depsgraph.view_layer, warnings)
 
     engine.update_stats("", "Exporting")
     exported = export_scene(depsgraph, view, folder, "scene.gltf", warnings)
     session.remove_stale(os.path.join(folder, DATA_FOLDER), exported.used_files)
+    known = set(warnings.warnings)
     report.publish(scene.name, warnings.warnings)
 
+    aovs = result.aov_list(passes, exported.has_holdouts and not scene.render.film_transparent)
     picture_path, stats_path = os.path.join(folder, "picture.exr"), os.path.join(folder, "stats.json")
     arguments = [binary, "render", exported.path, "-o", picture_path, "--stats", stats_path]
-    arguments += ["--progress", "json", "--compression", "none", "--float", "--aov", result.aov_list(passes)]
-    arguments += command_line(scene.relief, crop)
+    arguments += ["--progress", "json", "--compression", "none", "--float", "--aov", aovs]
+    arguments += command_line(scene, crop)
+    preview = None
+    if _is_watched():
+        preview_path = os.path.join(folder, "preview.exr")
+        arguments += ["--preview", preview_path]
+        preview = _Preview(preview_path, lambda p: result.show(engine, p, layer_name, scene.render.film_transparent))
     try:
-        _run(engine, arguments, warnings)
-        report.publish_more(scene.name, warnings.warnings)
+        _run(engine, arguments, warnings, preview)
+        report.publish(scene.name, warnings.warnings, known)
         if not os.path.exists(picture_path):  # cancelled before the first sample
             return
         picture = exr.read(picture_path)
         statistics = _read_statistics(stats_path)
     finally:
-        for path in (picture_path, stats_path, exported.path):
+        for path in (picture_path, stats_path, exported.path, preview.path if preview else ""):
             if os.path.exists(path):
                 os.remove(path)
     seconds = {"export": exported.seconds, "total": time.perf_counter() - begin}
@@ -61,32 +73,59 @@ def render(engine, depsgraph):
     _log(statistics, seconds, exported.bytes_written)
 
 
-def _run(engine, arguments, warnings):
+def _is_watched():
+    """Whether somebody may look at the picture while it is rendered."""
+    return not bpy.app.background
+
+
+class _Preview:
+    """The picture so far, shown as often as takes a small part of the time.
+
+    @param  path  of the file that the program writes it to, again and again and each time whole
+    @param  show  called with it, an exr.Picture
+    """
+
+    def __init__(self, path, show):
+        self.path = path
+        self._show = show
+        self._begin = time.perf_counter()
+        self._spent = 0.0
+
+    def refresh(self):
+        """Called when there is a new one."""
+        now = time.perf_counter()
+        if self._spent > _FIRST_PREVIEW_SECONDS + _PREVIEW_SHARE * (now - self._begin):
+            return
+        self._show(exr.read(self.path))
+        self._spent += time.perf_counter() - now
+
+
+def _run(engine, arguments, warnings, preview=None):
     """Runs the program to its end, or to the artist's cancelling.
 
     @param  warnings  Report that gets the program's own
+    @param  preview   _Preview, or None where nobody looks
     @error            ReliefError if it failed by itself
     """
     with Process(arguments) as process:
-        code = _follow(engine, process)
+        code = _follow(engine, process, preview)
         if code != 0 and not engine.test_break():
             raise ReliefError(process.failure(code))
-        for message in process.messages():
-            if message.startswith(_WARNING):
-                warnings.warn("program", message.removeprefix(_WARNING))
+        for text in process.warnings():
+            warnings.warn("program", text)
 
 
-def command_line(settings, crop=None):
+def command_line(scene, crop=None):
     """Options of the program that the scene format has no place for.
 
-    @param  settings  scene.relief
-    @param  crop      (x0, y0, x1, y1) from the top left, or None
+    @param  crop  (x0, y0, x1, y1) from the top left, or None
     """
+    settings, time_limit = scene.relief, sampling_of(scene).time_limit
     arguments = ["--texture-memory", f"{settings.texture_memory:g}"]
     if settings.memory_limit > 0:
         arguments += ["--displacement-memory", f"{settings.memory_limit:g}"]
-    if settings.time_limit > 0:
-        arguments += ["--time-limit", f"{settings.time_limit:g}"]
+    if time_limit > 0:
+        arguments += ["--time-limit", f"{time_limit:g}"]
     if settings.threads > 0:
         arguments += ["--threads", str(settings.threads)]
     if settings.strict:
@@ -140,13 +179,16 @@ def warn_unread(scene, warnings):
         warnings.warn(where, "Freestyle lines", "they are left out")
     if scene.render.use_multiview:
         warnings.warn(where, "stereoscopy", "the scene's camera alone was used")
+    warn_unread_settings(scene, lambda *text: warnings.warn(where, *text))
 
 
-def _follow(engine, process):
+def _follow(engine, process, preview):
     """Shows progress until the program ends; ends it if the artist cancels. Returns its exit code."""
     engine.update_stats("", "Loading")
     while (code := process.wait(_POLL_SECONDS)) is None:
         for event in process.events():
+            if event.get("event") == "preview" and preview is not None:
+                preview.refresh()
             if event.get("event") == "progress":
                 engine.update_progress(event["fraction"])
                 left = event.get("seconds_left")
@@ -179,10 +221,9 @@ _NUMBERS = ("load_seconds", "build_seconds", "render_seconds", "samples_per_pixe
 
 
 def _log(statistics, seconds, bytes_written):
-    print(
-        f"relief: {seconds['total']:.2f} s in all: export {seconds['export']:.2f} ({bytes_written / 1e6:.2f} MB), "
+    say(
+        f"{seconds['total']:.2f} s in all: export {seconds['export']:.2f} ({bytes_written / 1e6:.2f} MB), "
         f"load {statistics['load_seconds']:.2f}, build {statistics['build_seconds']:.2f}, "
         f"render {statistics['render_seconds']:.2f}; {statistics['samples_per_pixel']:.4g} samples a pixel, "
-        f"peak {statistics['peak_memory_bytes'] / 2**20:.0f} MiB",
-        flush=True,
+        f"peak {statistics['peak_memory_bytes'] / 2**20:.0f} MiB"
     )

@@ -16,6 +16,9 @@ VERSION = (0, 1)
 #: How long a program that was asked to end may take before it is killed.
 _PATIENCE_SECONDS = 5.0
 
+#: How the program begins lines that are warnings.
+_WARNING = "relief: warning: "
+
 _checked_binaries = {}
 
 
@@ -149,13 +152,13 @@ class Process:
             self._popen.kill()
         self.wait(None)
 
-    def messages(self):
-        """Lines of standard error so far."""
-        return list(self._messages)
+    def warnings(self):
+        """Texts of the program's warnings so far."""
+        return [m.removeprefix(_WARNING) for m in self._messages if m.startswith(_WARNING)]
 
     def failure(self, code):
         """Text for an exit code that is not success: the program's own words, or what ended it."""
-        errors = [m for m in self._messages if not m.startswith("relief: warning: ")]
+        errors = [m for m in self._messages if not m.startswith(_WARNING)]
         said = " ".join(m.strip().removeprefix("relief: ") for m in errors)
         cause = f"ended by signal {-code}" if code < 0 else f"ended with code {code}"
         return f"relief {cause}" + (f": {said}" if said else "")

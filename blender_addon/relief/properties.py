@@ -4,6 +4,8 @@
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
 
+from .export.settings import SHARED
+
 _METHODS = (
     ("auto", "Automatic", "The program chooses (default)"),
     ("chord", "Chord", "The fast method: exact, with little memory"),
@@ -15,7 +17,36 @@ _METHODS = (
 )
 
 
+def _uses_cycles_settings(settings):
+    if settings.settings_source == "auto":
+        return not any(settings.is_property_set(name) for name in SHARED)
+    return settings.settings_source == "cycles"
+
+
+def _use_cycles_settings(settings, value):
+    settings.settings_source = "cycles" if value else "relief"
+
+
 class ReliefSceneSettings(bpy.types.PropertyGroup):
+    # Files and scripts that know nothing of Cycles' settings, but have set relief's, mean these.
+    settings_source: EnumProperty(
+        name="Settings",
+        description="Whose settings of sampling, bounces, clamping and filter are used (default Automatic)",
+        items=(
+            ("auto", "Automatic", "Those of Cycles, unless one of relief's has been set (default)"),
+            ("cycles", "Cycles", "The scene's settings for Cycles"),
+            ("relief", "relief", "Settings of its own"),
+        ),
+        default="auto",
+        options={"HIDDEN"},
+    )
+    use_cycles_settings: BoolProperty(
+        name="Use Cycles Settings",
+        description="Take samples, noise threshold, time limit, seed, bounces, clamping and pixel filter from the "
+        "scene's settings for Cycles (default on, unless one of relief's own has been set)",
+        get=_uses_cycles_settings,
+        set=_use_cycles_settings,
+    )
     samples: IntProperty(
         name="Samples",
         description="Samples a pixel; with a noise threshold or a time limit, the most that are taken (default 128)",

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What was not understood, and what was used instead: collected during an export, then shown by whoever ran it."""
 
+import contextlib
+import re
+from dataclasses import dataclass
+
 
 class ReliefError(Exception):
     """A failure that is told to the artist; its text says what, where, and what to do."""
@@ -10,6 +14,19 @@ class StrictError(ReliefError):
     """A warning, where the scene's settings ask for warnings to be errors."""
 
 
+class Warned(str):
+    """Text of a warning.
+
+    where  kind and name of what it is about
+    cause  what is not understood, and what was used instead
+    """
+
+    def __new__(cls, where, cause):
+        text = super().__new__(cls, f"{where}: {cause}")
+        text.where, text.cause = where, cause
+        return text
+
+
 class Report:
     """Warnings of one export, each once and in the order they came up.
 
@@ -17,8 +34,13 @@ class Report:
     """
 
     def __init__(self, strict=False):
-        self.warnings = []
+        self._texts = {}
         self._strict = strict
+
+    @property
+    def warnings(self):
+        """A list of Warned."""
+        return list(self._texts)
 
     def warn(self, where, what, instead=""):
         """Notes a warning.
@@ -28,27 +50,65 @@ class Report:
         @param  instead  what was used in its place
         @error           StrictError in strict mode
         """
-        text = f"{where}: {what}" + (f"; {instead}" if instead else "")
+        text = Warned(where, what + (f"; {instead}" if instead else ""))
         if self._strict:
             raise StrictError(f"{text} (an error because warnings are: Render > Performance > Strict)")
-        if text not in self.warnings:
-            self.warnings.append(text)
+        self._texts.setdefault(text)
 
 
-#: Warnings of the scene's last render, by the scene's name: what the panel shows.
+@dataclass(frozen=True)
+class Group:
+    """Warnings of one cause.
+
+    label     the cause; names and numbers that differ are left out of it
+    warnings  list of Warned, at least one
+    """
+
+    label: str
+    warnings: list
+
+    def text(self, most=None):
+        """All of them in full.
+
+        @param  most  that are named; None: no limit
+        """
+        is_common = all(w.cause == self.label for w in self.warnings)
+        lines = [w.where if is_common else w for w in self.warnings[:most]]
+        if len(lines) < len(self.warnings):
+            lines.append(f"and {len(self.warnings) - len(lines)} more")
+        return self.label + "".join(f"\n    {line}" for line in lines)
+
+
+def group(warnings):
+    """Groups of warnings, those of many first."""
+    by_pattern = {}
+    for warning in warnings:
+        pattern = re.sub(r'"[^"]*"', '"…"', warning.cause)
+        by_pattern.setdefault(re.sub(r"\d[\d.,e+]*", "…", pattern), []).append(warning)
+    groups = [
+        Group(members[0].cause if len({w.cause for w in members}) == 1 else pattern, members)
+        for pattern, members in by_pattern.items()
+    ]
+    return sorted(groups, key=lambda g: -len(g.warnings))
+
+
+#: Warnings of the scene's last render, or its viewport's, by the scene's name: what the panel shows.
 last_warnings = {}
 
 
-def publish(scene_name, warnings):
-    """Shows warnings in the panel and on the console."""
-    last_warnings[scene_name] = list(warnings)
+def say(text):
+    """Prints a line on the console. A render does not fail because nobody listens any more."""
+    with contextlib.suppress(OSError):
+        print(f"relief: {text}", flush=True)
+
+
+def publish(scene_name, warnings, known=()):
+    """Shows warnings in the panel, and on the console.
+
+    @param  warnings  list of Warned: all there are
+    @param  known     those that are on the console already
+    """
+    last_warnings[scene_name] = warnings
     for text in warnings:
-        print(f"relief: warning: {text}", flush=True)
-
-
-def publish_more(scene_name, warnings):
-    """Publishes those of some warnings that are new."""
-    known = last_warnings.get(scene_name, [])
-    new = [w for w in warnings if w not in known]
-    publish(scene_name, new)
-    last_warnings[scene_name] = known + new
+        if text not in known:
+            say(f"warning: {text}")

@@ -6,7 +6,7 @@ from typing import Callable
 
 import numpy as np
 
-from . import compat
+from . import compat, cryptomatte
 from .export.axes import blender_from_gltf
 
 #: What Blender's depth pass holds where nothing was hit.
@@ -17,9 +17,10 @@ _FAR = 1e10
 class Pass:
     """One render pass.
 
-    name      Blender's, or our own
-    setting   property that switches it on: of the view layer, or of view_layer.relief
-    is_own    our own passes have to be registered and added; Blender makes the others itself
+    name      this Blender's (see compat.pass_name), or our own
+    setting   property that switches it on
+    owner     whose property: "" for the view layer, or "relief" or "cycles" of it
+    is_own    our own passes, and those that Cycles adds, have to be registered and added; Blender makes the others itself
     aov       layer of the program's picture
     channels  names of channels there
     ids       Blender's channel names
@@ -35,6 +36,11 @@ class Pass:
     ids: str
     kind: str
     convert: Callable = lambda values, coverage: values
+    owner: str = ""
+
+    def is_enabled(self, view_layer):
+        holder = getattr(view_layer, self.owner, None) if self.owner else view_layer
+        return getattr(holder, self.setting, False)
 
 
 def _rgb(layer):
@@ -49,45 +55,103 @@ def _with_zero(values, _):
     return np.concatenate([values, np.zeros((len(values), 1), dtype=np.float32)], axis=1)
 
 
+def _grey(values, _):
+    return np.repeat(values, 3, axis=1)
+
+
 PASSES = (
     Pass("Depth", "use_pass_z", False, "depth", ("depth.Z",), "Z", "VALUE",
          lambda z, coverage: np.where(coverage[:, None] > 0, z, np.float32(_FAR))),
+    Pass("Mist", "use_pass_mist", False, "mist", ("mist.Z",), "Z", "VALUE"),
     Pass("Normal", "use_pass_normal", False, "normal", _xyz("normal"), "XYZ", "VECTOR",
          lambda n, _: blender_from_gltf(n)),
     Pass("Position", "use_pass_position", False, "position", _xyz("position"), "XYZ", "VECTOR",
          lambda p, _: blender_from_gltf(p)),
     Pass("UV", "use_pass_uv", False, "uv", ("uv.U", "uv.V"), "UVA", "VECTOR",
          lambda uv, coverage: _with_zero(uv * (1, -1) + (0, 1) * (coverage[:, None] > 0), coverage)),
-    Pass("DiffCol", "use_pass_diffuse_color", False, "albedo", _rgb("albedo"), "RGB", "COLOR"),
-    Pass("Direct", "use_pass_direct", True, "direct", _rgb("direct"), "RGB", "COLOR"),
-    Pass("Indirect", "use_pass_indirect", True, "indirect", _rgb("indirect"), "RGB", "COLOR"),
-    Pass("Caustics", "use_pass_caustic", True, "caustic", _rgb("caustic"), "RGB", "COLOR"),
-    Pass("Samples", "use_pass_samples", True, "samples", ("samples.N",), "X", "VALUE"),
-    Pass("Variance", "use_pass_variance", True, "variance", _rgb("variance"), "RGB", "COLOR"),
+    Pass(compat.pass_name("DiffCol"), "use_pass_diffuse_color", False, "albedo", _rgb("albedo"), "RGB", "COLOR"),
+    Pass(compat.pass_name("Emit"), "use_pass_emit", False, "emission", _rgb("emission"), "RGB", "COLOR"),
+    Pass(compat.pass_name("Env"), "use_pass_environment", False, "environment", _rgb("environment"), "RGB", "COLOR"),
+    Pass(compat.pass_name("AO"), "use_pass_ambient_occlusion", False, "ambient_occlusion", ("ambient_occlusion.Y",), "RGB",
+         "COLOR", _grey),
+    Pass("Denoising Normal", "denoising_store_passes", True, "denoising_normal", _xyz("denoising_normal"), "XYZ", "VECTOR",
+         owner="cycles"),
+    Pass("Denoising Albedo", "denoising_store_passes", True, "denoising_albedo", _rgb("denoising_albedo"), "RGB", "COLOR",
+         owner="cycles"),
+    Pass("Denoising Depth", "denoising_store_passes", True, "denoising_depth", ("denoising_depth.Z",), "Z", "VALUE",
+         owner="cycles"),
+    Pass("Direct", "use_pass_direct", True, "direct", _rgb("direct"), "RGB", "COLOR", owner="relief"),
+    Pass("Indirect", "use_pass_indirect", True, "indirect", _rgb("indirect"), "RGB", "COLOR", owner="relief"),
+    Pass("Caustics", "use_pass_caustic", True, "caustic", _rgb("caustic"), "RGB", "COLOR", owner="relief"),
+    Pass("Samples", "use_pass_samples", True, "samples", ("samples.N",), "X", "VALUE", owner="relief"),
+    Pass("Variance", "use_pass_variance", True, "variance", _rgb("variance"), "RGB", "COLOR", owner="relief"),
     Pass("Displacement Steps", "use_pass_displacement_steps", True, "displacement_steps", ("displacement_steps.N",),
-         "X", "VALUE"),
+         "X", "VALUE", owner="relief"),
 )  # fmt: skip
+
+#: Cryptomattes that a view layer may ask for.
+CRYPTOMATTES = ("object", "material", "asset")
+
+#: Passes that a view layer cannot be without, or that are no part of a picture.
+_NO_PASSES = {"use_pass_combined", "use_pass_cryptomatte_accurate"}
 
 
 def enabled_passes(view_layer):
     """Passes that a view layer asks for, besides the combined one."""
-    return [p for p in PASSES if getattr(view_layer.relief if p.is_own else view_layer, p.setting, False)]
+    passes = [p for p in PASSES if p.is_enabled(view_layer)]
+    for kind in CRYPTOMATTES:
+        setting = f"use_pass_cryptomatte_{kind}"
+        if not getattr(view_layer, setting):
+            continue
+        for i in range((view_layer.pass_cryptomatte_depth + 1) // 2):
+            name = f"Crypto{kind.capitalize()}{i:02d}"
+            channels = tuple(f"{name}.{c}" for c in "rgba")
+            passes.append(Pass(name, setting, True, f"crypto_{kind}", channels, "RGBA", "COLOR"))
+    return passes
 
 
-def aov_list(passes):
-    """Value of --aov for some passes."""
-    return ",".join(["beauty", *(p.aov for p in passes)])
+def warn_missing_passes(view_layer, warnings):
+    """Warns about passes that a view layer asks for and does not get."""
+    known = {(p.owner, p.setting) for p in PASSES} | {("", f"use_pass_cryptomatte_{kind}") for kind in CRYPTOMATTES}
+    where = f'view layer "{view_layer.name}"'
+    for owner in ("", "cycles"):
+        holder = getattr(view_layer, owner, None) if owner else view_layer
+        if holder is None:
+            continue
+        for setting, rna in holder.bl_rna.properties.items():
+            is_pass = setting.startswith("use_pass_") or setting.startswith("pass_debug_")
+            if is_pass and setting not in _NO_PASSES and (owner, setting) not in known and getattr(holder, setting) is True:
+                warnings.warn(where, f'the pass "{rna.name}"', "it is left empty")
+    for text, name in (("shader AOV", "aovs"), ("light group", "lightgroups")):
+        for item in getattr(view_layer, name, ()):
+            warnings.warn(where, f'the {text} "{item.name}"', "it has no pass")
+
+
+def aov_list(passes, has_holdouts=False):
+    """Value of --aov for some passes.
+
+    @param  has_holdouts  the combined pass has holes that its coverage does not tell from the world
+    """
+    return ",".join(["beauty", *(p.aov for p in passes), *(["holdout"] if has_holdouts else [])])
 
 
 def combined(picture, is_transparent):
     """Blender's combined pass: float32 of shape (pixels, 4), bottom row first.
 
-    @param  is_transparent  whether the film shows nothing where nothing was hit; elsewhere alpha is one
+    @param  is_transparent  whether the film shows nothing where nothing was hit; elsewhere alpha is one, but in holdouts
     """
     pixels = picture.layer("R", "G", "B", "A")
     if not is_transparent:
-        pixels[:, 3] = 1.0
+        holdout = picture.layer("holdout.A")
+        pixels[:, 3] = 1.0 if holdout is None else 1.0 - holdout[:, 0]
     return pixels
+
+
+def show(engine, picture, layer_name, is_transparent):
+    """Shows a picture that is not finished: its combined pass alone. Arguments as for fill."""
+    result = engine.begin_result(0, 0, picture.width, picture.height, layer=layer_name)
+    compat.set_pixels(result.layers[0].passes["Combined"], combined(picture, is_transparent))
+    engine.end_result(result)
 
 
 def fill(engine, picture, layer_name, passes, is_transparent, metadata):
@@ -114,5 +178,5 @@ def fill(engine, picture, layer_name, passes, is_transparent, metadata):
     engine.end_result(result)
     # Of what begin_result gives, Blender takes over the pixels alone.
     whole = engine.get_result()
-    for name, text in metadata.items():
+    for name, text in {**metadata, **cryptomatte.metadata(picture.attributes, layer_name)}.items():
         whole.stamp_data_add_field(name, text)

@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panels, where a Cycles user looks for them. Those of Blender that make sense for any engine are shared."""
 
+import textwrap
+
 import bpy
 
 from . import compat
 from .export.displacement import has_displacement_node, needs_switch
+from .export.settings import cycles_settings
 from .preferences import find_checked_binary
-from .report import ReliefError, last_warnings
+from .report import ReliefError, group, last_warnings
+from .result import CRYPTOMATTES, PASSES
 
 _ENGINE = "RELIEF"
 
@@ -56,11 +60,28 @@ class RELIEF_PT_warnings(_RenderPanel, bpy.types.Panel):
     def poll(cls, context):
         return super().poll(context) and (last_warnings.get(context.scene.name) or _binary_problem())
 
+    def draw_header(self, context):
+        warnings = last_warnings.get(context.scene.name)
+        if warnings:
+            self.layout.label(text=f"{len(warnings)}")
+
     def draw(self, context):
         column = self.layout.column(align=True)
+        width = _characters_in(context.region)
         problem = _binary_problem()
-        for text in ([problem] if problem else []) + last_warnings.get(context.scene.name, []):
-            column.label(text=text, icon="ERROR")
+        for line, text in enumerate(textwrap.wrap(problem, width)):
+            column.label(text=text, icon="BLANK1" if line else "CANCEL")
+        groups = group(last_warnings.get(context.scene.name, []))
+        for index, members in enumerate(groups):
+            number = len(members.warnings)
+            origin = members.warnings[0].where if number == 1 else f"{number} ×"
+            for line, text in enumerate(textwrap.wrap(f"{origin}: {members.label}", width)):
+                row = column.row()
+                row.alignment = "LEFT"
+                icon = "BLANK1" if line else "ERROR"
+                row.operator("relief.show_warnings", text=text, icon=icon, emboss=False).index = index
+        if groups:
+            self.layout.operator("relief.show_warnings", text="Show All as Text", icon="TEXT").index = -1
 
 
 class RELIEF_PT_sampling(_RenderPanel, bpy.types.Panel):
@@ -68,6 +89,12 @@ class RELIEF_PT_sampling(_RenderPanel, bpy.types.Panel):
 
     def draw(self, context):
         settings, rows = context.scene.relief, self.rows()
+        if hasattr(context.scene, "cycles"):
+            rows.prop(settings, "use_cycles_settings")
+        cycles = cycles_settings(context.scene)
+        if cycles is not None:
+            _draw_cycles_sampling(cycles, rows)
+            return
         rows.prop(settings, "samples")
         rows.prop(settings, "noise_threshold")
         rows.prop(settings, "time_limit")
@@ -82,10 +109,13 @@ class RELIEF_PT_light_paths(_RenderPanel, bpy.types.Panel):
 
     def draw(self, context):
         settings, rows = context.scene.relief, self.rows()
-        for name in ("max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces", "transparent_bounces"):
-            rows.prop(settings, name)
+        cycles = cycles_settings(context.scene)
+        owner = settings if cycles is None else cycles
+        for name in ("max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces"):
+            rows.prop(owner, name)
+        rows.prop(owner, "transparent_bounces" if cycles is None else "transparent_max_bounces")
         rows.separator()
-        rows.prop(settings, "clamp_indirect")
+        rows.prop(owner, "clamp_indirect" if cycles is None else "sample_clamp_indirect", text="Clamp Indirect")
         rows.prop(settings, "caustics")
 
 
@@ -112,9 +142,13 @@ class RELIEF_PT_film(_RenderPanel, bpy.types.Panel):
 
     def draw(self, context):
         settings, rows = context.scene.relief, self.rows()
-        rows.prop(settings, "filter_type")
-        rows.prop(settings, "filter_width")
+        cycles = cycles_settings(context.scene)
+        rows.prop(*(settings, "filter_type") if cycles is None else (cycles, "pixel_filter_type"), text="Filter")
+        if cycles is None or cycles.pixel_filter_type != "BOX":
+            rows.prop(settings if cycles is None else cycles, "filter_width")
         rows.prop(context.scene.render, "film_transparent")
+        if hasattr(context.scene, "cycles"):
+            rows.prop(context.scene.cycles, "film_exposure")
 
 
 class RELIEF_PT_performance(_RenderPanel, bpy.types.Panel):
@@ -134,8 +168,14 @@ class RELIEF_PT_passes(_Panel, bpy.types.Panel):
 
     def draw(self, context):
         layer, rows = context.view_layer, self.rows()
-        for name in ("use_pass_z", "use_pass_position", "use_pass_normal", "use_pass_uv", "use_pass_diffuse_color"):
+        for name in dict.fromkeys(p.setting for p in PASSES if not p.owner):
             rows.prop(layer, name)
+        if hasattr(layer, "cycles"):
+            rows.prop(layer.cycles, "denoising_store_passes")
+        rows.separator()
+        for kind in CRYPTOMATTES:
+            rows.prop(layer, f"use_pass_cryptomatte_{kind}")
+        rows.prop(layer, "pass_cryptomatte_depth")
         rows.separator()
         for name in layer.relief.bl_rna.properties.keys():
             if name.startswith("use_pass_"):
@@ -283,6 +323,26 @@ _classes = (
     RELIEF_PT_object_caustics,
     RELIEF_PT_camera_dof,
 )
+
+
+def _characters_in(region):
+    """How many characters of a text are sure to be seen beside an icon."""
+    pixels = region.width / bpy.context.preferences.system.ui_scale
+    return max(20, int((pixels - 90) / 6.2))
+
+
+def _draw_cycles_sampling(cycles, rows):
+    rows.prop(cycles, "use_adaptive_sampling", text="Noise Threshold")
+    row = rows.row()
+    row.active = cycles.use_adaptive_sampling
+    row.prop(cycles, "adaptive_threshold", text="Threshold")
+    rows.prop(cycles, "samples", text="Max Samples" if cycles.use_adaptive_sampling else "Samples")
+    rows.prop(cycles, "time_limit")
+    rows.separator()
+    rows.prop(cycles, "preview_samples", text="Viewport Samples")
+    row = rows.row(align=True)
+    row.prop(cycles, "seed")
+    row.prop(cycles, "use_animated_seed", text="", icon="TIME")
 
 
 def _binary_problem():

@@ -20,6 +20,7 @@ from . import exr, final, report, result, session
 from .export.camera import aperture, lens_json
 from .export.gltf import GltfWriter
 from .export.scene import DATA_FOLDER, SceneExporter, StoredMeshes, View, scene_json
+from .export.settings import sampling_of
 from .preferences import find_checked_binary
 from .process import Process
 from .report import Report, ReliefError
@@ -81,12 +82,15 @@ class Viewport:
         exporter = SceneExporter(depsgraph, GltfWriter(self._folder, DATA_FOLDER), warnings, self._meshes)
         exporter.add_all(view)
         self._binary = find_checked_binary()
-        self._options = final.command_line(scene.relief)
-        self._most_samples = scene.relief.preview_samples
-        self._seed = scene.relief.seed
+        sampling = sampling_of(scene)
+        self._options = final.command_line(scene)
+        self._most_samples = sampling.preview_samples
+        self._seed = sampling.seed
         self._is_transparent = scene.render.film_transparent
         self._exporter = exporter
-        report.publish_more(scene.name, warnings.warnings)
+        final.warn_unread(scene, warnings)
+        self._scene_name, self._warnings = scene.name, warnings
+        self._publish()
         self._begin(view)
 
     def draw(self, context, depsgraph):
@@ -136,7 +140,7 @@ class Viewport:
             self._end_process()
             self._exporter = None
             engine.error_set(str(error))
-            print(f"relief: error: {error}", flush=True)
+            report.say(f"error: {error}")
             engine.tag_redraw()
         return _POLL_SECONDS
 
@@ -148,9 +152,12 @@ class Viewport:
                 return
             if code != 0:
                 raise ReliefError(self._process.failure(code))
+            for text in self._process.warnings():
+                self._warnings.warn("program", text)
             self._process = None
+            self._publish()
             self._add(exr.read(self._picture_path()))
-            engine.update_stats("", f"relief: {self._samples} of {self._most_samples} samples")
+            engine.update_stats("", self._status())
             engine.tag_redraw()
         if self._exporter is None:
             return
@@ -164,6 +171,25 @@ class Viewport:
             samples = min(max(1, self._samples), self._most_samples - self._samples)
             self._run = _Run(1, samples, self._run.seed + 1)
             self._start()
+
+    def _publish(self):
+        """Shows the warnings there are, if these are others than before."""
+        warnings = self._warnings.warnings
+        known = report.last_warnings.get(self._scene_name, [])
+        if warnings == known:
+            return
+        report.publish(self._scene_name, warnings, set(known))
+        for window in bpy.context.window_manager.windows:
+            for area in window.screen.areas:
+                if area.type == "PROPERTIES":
+                    area.tag_redraw()
+
+    def _status(self):
+        """What the view's corner says."""
+        number = len(self._warnings.warnings)
+        noun = "warning" if number == 1 else "warnings"
+        hint = f" | {number} {noun}: see Render Properties" if number else ""
+        return f"relief: {self._samples} of {self._most_samples} samples{hint}"
 
     def _write_scene(self):
         """Writes the scene as it is now. No run may be reading it."""

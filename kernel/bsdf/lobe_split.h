@@ -76,8 +76,13 @@ RELIEF_KERNEL bool closure_split(const SurfaceClosure& closure,
   if (!closure_has_sharp(closure, sharp)) return false;
   const Vec3f f_sharp = closure_eval<kFeatures, kMode>(closure_sharp(closure, sharp), tables, bsdf.wi).f;
   const Vec3f f_soft = max(bsdf.f - f_sharp, Vec3f{});
-  const float of_sharp = max_component(f_sharp);
-  const float probability = of_sharp / (of_sharp + max_component(f_soft));
+  const float of_sharp = max_component(f_sharp), of_both = of_sharp + max_component(f_soft);
+  // A black tint leaves nothing of either (test MaterialCorners.GlassThatPassesNoLightIsFinite).
+  if (!(of_both > 0.0f)) {
+    bsdf.f = {};
+    return false;
+  }
+  const float probability = of_sharp / of_both;
   const bool is_sharp = u < probability;
   bsdf.f = is_sharp ? f_sharp / probability : f_soft / (1.0f - probability);
   return is_sharp;

@@ -18,7 +18,11 @@ struct AccumulatorLayout {
   static constexpr int kAlways = 16;
 
   int direct = -1, albedo = -1, normal = -1, depth = -1, position = -1, uv = -1, object_id = -1, material_id = -1,
-      displacement_steps = -1, caustic = -1;
+      displacement_steps = -1, caustic = -1, holdout = -1, mist = -1, emission = -1, environment = -1,
+      ambient_occlusion = -1, denoising_albedo = -1, denoising_normal = -1, denoising_depth = -1;
+  int cryptomatte[kNumCryptomattes] = {-1, -1, -1};  ///< pairs of an id and its weight, the first of weight 0 is free
+  int cryptomatte_levels = 0;
+  bool denoising = false;  ///< denoising_albedo or denoising_normal is kept
   int num_floats = kAlways;
 };
 
@@ -34,6 +38,9 @@ struct FirstHit {
   Vec3f P, N, albedo;
   Vec2f uv;
   float depth = 0;
+  float mist = 0;
+  float ray_length = 0;
+  float cryptomatte_ids[kNumCryptomattes] = {};
   std::uint32_t instance_index = 0, material_index = 0;
   bool is_first_sample = false;
 };
@@ -45,10 +52,28 @@ RELIEF_KERNEL void film_add3(float* sum, Vec3f value)
   sum[2] += value.z;
 }
 
+RELIEF_KERNEL float* film_record(const FilmAccumulatorView& film, std::uint32_t pixel)
+{
+  return film.pixels + static_cast<std::size_t>(pixel) * static_cast<std::size_t>(film.layout.num_floats);
+}
+
+/// Counts a sample for an id. One for which no place is left is dropped: its coverage is missing, nobody else has too much.
+/// @param pairs  id and weight by level
+RELIEF_KERNEL void film_add_cryptomatte(float* pairs, int levels, float id)
+{
+  for (int i = 0; i < levels; ++i) {
+    float* pair = pairs + 2 * i;
+    if (pair[1] == 0.0f) pair[0] = id;
+    if (pair[0] != id) continue;
+    pair[1] += 1.0f;
+    return;
+  }
+}
+
 RELIEF_KERNEL void film_add_first_hit(const FilmAccumulatorView& film, std::uint32_t pixel, const FirstHit& hit)
 {
   const AccumulatorLayout& layout = film.layout;
-  float* record = film.pixels + static_cast<std::size_t>(pixel) * static_cast<std::size_t>(layout.num_floats);
+  float* record = film_record(film, pixel);
   record[AccumulatorLayout::kCoverage] += 1.0f;
   if (layout.albedo >= 0) film_add3(record + layout.albedo, hit.albedo);
   if (layout.normal >= 0) film_add3(record + layout.normal, hit.N);
@@ -58,10 +83,51 @@ RELIEF_KERNEL void film_add_first_hit(const FilmAccumulatorView& film, std::uint
     record[layout.uv] += hit.uv.x;
     record[layout.uv + 1] += hit.uv.y;
   }
+  if (layout.mist >= 0) record[layout.mist] += 1.0f - hit.mist;
+  if (layout.denoising_depth >= 0) record[layout.denoising_depth] += hit.ray_length;
+  for (int i = 0; i < kNumCryptomattes; ++i) {
+    if (layout.cryptomatte[i] < 0) continue;
+    film_add_cryptomatte(record + layout.cryptomatte[i], layout.cryptomatte_levels, hit.cryptomatte_ids[i]);
+  }
   if (hit.is_first_sample) {
     if (layout.object_id >= 0) record[layout.object_id] = static_cast<float>(hit.instance_index + 1);
     if (layout.material_id >= 0) record[layout.material_id] = static_cast<float>(hit.material_index + 1);
   }
+}
+
+/// Counts a sample that met a holdout, if that is kept.
+RELIEF_KERNEL void film_add_holdout(const FilmAccumulatorView& film, std::uint32_t pixel)
+{
+  if (film.layout.holdout >= 0) film_record(film, pixel)[film.layout.holdout] += 1.0f;
+}
+
+/// Adds what something that the camera sees sends out, if that is kept.
+RELIEF_KERNEL void film_add_emission(const FilmAccumulatorView& film, std::uint32_t pixel, Vec3f radiance)
+{
+  if (film.layout.emission >= 0) film_add3(film_record(film, pixel) + film.layout.emission, radiance);
+}
+
+/// Adds the environment that the camera sees, if that is kept.
+RELIEF_KERNEL void film_add_environment(const FilmAccumulatorView& film, std::uint32_t pixel, Vec3f radiance)
+{
+  if (film.layout.environment >= 0) film_add3(film_record(film, pixel) + film.layout.environment, radiance);
+}
+
+/// Adds what a ray for ambient occlusion has found.
+/// @param visibility  0 … 1
+RELIEF_KERNEL void film_add_ambient(const FilmAccumulatorView& film, std::uint32_t pixel, float visibility)
+{
+  film_record(film, pixel)[film.layout.ambient_occlusion] += visibility;
+}
+
+/// Adds what a denoiser is told of a sample.
+/// @param N  unit, along the camera's axes: see Aov::kDenoisingNormal; zero vector: nothing was met
+RELIEF_KERNEL void film_add_denoising(const FilmAccumulatorView& film, std::uint32_t pixel, Vec3f albedo, Vec3f N)
+{
+  const AccumulatorLayout& layout = film.layout;
+  float* record = film_record(film, pixel);
+  if (layout.denoising_albedo >= 0) film_add3(record + layout.denoising_albedo, albedo);
+  if (layout.denoising_normal >= 0) film_add3(record + layout.denoising_normal, N);
 }
 
 /// Adds what a camera ray cost in displaced meshes, if that is kept.
@@ -71,7 +137,7 @@ RELIEF_KERNEL void film_add_displacement_steps(const FilmAccumulatorView& film,
 {
   const AccumulatorLayout& layout = film.layout;
   if (layout.displacement_steps < 0) return;
-  float* record = film.pixels + static_cast<std::size_t>(pixel) * static_cast<std::size_t>(layout.num_floats);
+  float* record = film_record(film, pixel);
   record[layout.displacement_steps] += static_cast<float>(steps);
 }
 
@@ -86,7 +152,7 @@ RELIEF_KERNEL bool film_add_sample(const FilmAccumulatorView& film,
                                    Vec3f caustic = {})
 {
   const AccumulatorLayout& layout = film.layout;
-  float* record = film.pixels + static_cast<std::size_t>(pixel) * static_cast<std::size_t>(layout.num_floats);
+  float* record = film_record(film, pixel);
   const Vec3f radiance = direct + indirect + caustic;
   if (!is_finite(radiance)) return false;
   film_add3(record + AccumulatorLayout::kBeauty, radiance);

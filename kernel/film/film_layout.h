@@ -24,13 +24,31 @@ enum class Aov : std::uint8_t {
   kHalf,
   kDisplacementSteps,
   kCaustic,
+  kHoldout,
+  kMist,
+  kEmission,
+  kEnvironment,
+  kAmbientOcclusion,
+  kDenoisingAlbedo,
+  kDenoisingNormal,
+  kDenoisingDepth,
+  kCryptoObject,
+  kCryptoMaterial,
+  kCryptoAsset,
 };
-inline constexpr int kNumAovs = 15;
+inline constexpr int kNumAovs = 26;
+
+/// The three Cryptomattes, which follow one another in Aov.
+inline constexpr int kNumCryptomattes = 3;
+inline constexpr int kFirstCryptomatte = static_cast<int>(Aov::kCryptoObject);
+
+/// Ids that a Cryptomatte keeps of a pixel.
+inline constexpr int kMostCryptomatteLevels = 16;
 
 struct AovInfo {
   Aov aov;
   std::string_view name;      ///< command line and EXR layer name
-  std::string_view channels;  ///< one letter a channel
+  std::string_view channels;  ///< one letter a channel; empty: a Cryptomatte, which has as many as its levels ask for
   bool integer_like;          ///< ids and counts: never stored as half, never averaged
   std::string_view meaning;
 };
@@ -52,13 +70,37 @@ inline constexpr std::array<AovInfo, kNumAovs> kAovInfo = {{
     {Aov::kDisplacementSteps, "displacement_steps", "N", false,
      "bounds and texels of displaced meshes tested for a camera ray, averaged"},
     {Aov::kCaustic, "caustic", "RGB", false, "light that the photon pass brought; part of indirect"},
+    {Aov::kHoldout, "holdout", "A", false, "share of the samples that met a holdout, where the picture has a hole"},
+    {Aov::kMist, "mist", "Z", false, "0 at RELIEF_render's mist.start … 1 at its end and where nothing is met"},
+    {Aov::kEmission, "emission", "RGB", false, "what surfaces and lights send straight to the camera"},
+    {Aov::kEnvironment, "environment", "RGB", false, "the surroundings where the camera meets them, shown or not"},
+    {Aov::kAmbientOcclusion, "ambient_occlusion", "Y", false,
+     "share of the hemisphere over the first hit that is open up to RELIEF_render's occlusionDistance"},
+    {Aov::kDenoisingAlbedo, "denoising_albedo", "RGB", false,
+     "base colour and emission of the first hit that is no mirror or glass, times what those on the way take"},
+    {Aov::kDenoisingNormal, "denoising_normal", "XYZ", false,
+     "shading normal of the same hit along the camera's axes: right, up, and into the picture"},
+    {Aov::kDenoisingDepth, "denoising_depth", "Z", false,
+     "distance of the first hit from the camera, metres, averaged with 0 for none"},
+    {Aov::kCryptoObject, "crypto_object", "", false, "Cryptomatte of the nodes' names"},
+    {Aov::kCryptoMaterial, "crypto_material", "", false, "Cryptomatte of the materials' names"},
+    {Aov::kCryptoAsset, "crypto_asset", "", false, "Cryptomatte of RELIEF_object's asset names"},
 }};
 
 /// Offsets, in floats, of each kept AOV inside one pixel's record; −1 when it is not kept.
 struct FilmLayout {
   std::array<std::int16_t, kNumAovs> offset{};
   int num_floats = 0;  ///< per pixel
+  int cryptomatte_levels = 0;
 };
+
+/// Channels of one Cryptomatte: pairs of an id and its coverage, two pairs to a layer of four channels.
+constexpr int cryptomatte_num_channels(int levels) { return (levels + 1) / 2 * 4; }
+
+constexpr int aov_num_channels(const AovInfo& info, int cryptomatte_levels)
+{
+  return info.channels.empty() ? cryptomatte_num_channels(cryptomatte_levels) : static_cast<int>(info.channels.size());
+}
 
 /// The finished picture: plain floats, row 0 on top, averaged and normalized (no sums), owned elsewhere.
 struct FilmView {
@@ -70,13 +112,15 @@ struct FilmView {
 };
 
 /// Layout that keeps the AOVs whose bits are set (bit i = enumerator i), in enumerator order.
-inline FilmLayout film_layout_make(std::uint32_t aov_mask)
+/// @param cryptomatte_levels  1 … kMostCryptomatteLevels
+inline FilmLayout film_layout_make(std::uint32_t aov_mask, int cryptomatte_levels = 6)
 {
   FilmLayout layout;
+  layout.cryptomatte_levels = cryptomatte_levels;
   for (int i = 0; i < kNumAovs; ++i) {
     const bool kept = (aov_mask >> i & 1u) != 0;
     layout.offset[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(kept ? layout.num_floats : -1);
-    if (kept) layout.num_floats += static_cast<int>(kAovInfo[static_cast<std::size_t>(i)].channels.size());
+    if (kept) layout.num_floats += aov_num_channels(kAovInfo[static_cast<std::size_t>(i)], cryptomatte_levels);
   }
   return layout;
 }

@@ -21,23 +21,30 @@ struct alignas(64) Light {
   LightKind kind = LightKind::kPoint;
   SpotFalloff falloff = SpotFalloff::kSquare;
   bool two_sided = false;         ///< rectangle, disk, triangle
-  bool visible_to_camera = true;  ///< rectangle, disk
+  bool visible_to_camera = true;  ///< rectangle, disk, ball
   bool is_even = true;            ///< triangle: all its points send out `emission`, see emission_is_even
   bool casts_caustics = true;     ///< photons start from it, where there is a photon pass
-  Vec3f P{};                      ///< position or centre, metres (triangle: first vertex)
-  Vec3f axis{0, 0, -1};           ///< unit: spot and sun: direction of travel; rectangle, disk, triangle: emitting side
-  Vec3f edge_u{}, edge_v{};       ///< rectangle, disk: *half* axes, any two independent vectors (disk: an ellipse);
-                                  ///< triangle: P1−P0 and P2−P0
-  Vec3f emission{};               ///< point, spot: radiant intensity (W/sr, on the spot's axis); sun: irradiance on a
-                                  ///< plane across the axis (W/m²); area kinds: radiance (W/m²/sr)
+  bool faces_viewer = false;  ///< point, spot with a radius: a disk that faces whoever looks at it instead of a ball
+  Vec3f P{};                  ///< position or centre, metres (triangle: first vertex)
+  Vec3f axis{0, 0, -1};       ///< unit: spot and sun: direction of travel; rectangle, disk, triangle: emitting side
+  Vec3f edge_u{}, edge_v{};   ///< rectangle, disk: *half* axes, any two independent vectors (disk: an ellipse);
+                              ///< triangle: P1−P0 and P2−P0
+  Vec3f emission{};           ///< point, spot: radiant intensity (W/sr, on the spot's axis); sun: irradiance on a
+                              ///< plane across the axis (W/m²); area kinds: radiance (W/m²/sr)
   float cos_inner = 1, cos_outer = 0;  ///< spot cone
-  float radius = 0;                    ///< point, spot: of the ball that shines in the point's place, metres
+  float radius = 0;                    ///< point, spot: of the ball or disk that shines in the point's place, metres
   float area = 0;                      ///< m², area kinds
   std::int32_t instance_index = -1;    ///< triangle, and rectangle that two triangles of a mesh are: whose mesh (of
                                        ///< shared ones, the first of the instances)
   std::int32_t triangle_index = -1;    ///< likewise (the first of two)
   std::int32_t whole_index = -1;       ///< second triangle of such a rectangle: that light; nothing else of it counts
 };
+
+/// Whether a light is a ball (or a disk that faces everyone): a point or spot that has a size.
+RELIEF_KERNEL bool light_is_ball(const Light& light)
+{
+  return light.radius > 0.0f && (light.kind == LightKind::kPoint || light.kind == LightKind::kSpot);
+}
 
 /// Names a light: the environment, a light of the scene, or one that an instance shares with others.
 struct LightRef {

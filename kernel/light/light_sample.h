@@ -20,7 +20,7 @@ struct LightSample {
 
 /// Radiance an area light sends against a ray that arrives at it.
 /// @param wi  unit, direction of travel of the ray, towards the light
-/// @return    0 on the back of a one-sided light and for delta kinds, which no ray can hit
+/// @return    0 on the back of a one-sided light and for the other kinds: see ball_light_emitted for points and spots
 RELIEF_KERNEL Vec3f light_emitted(const Light& light, Vec3f wi)
 {
   const bool area_kind =

@@ -162,6 +162,9 @@ RELIEF_KERNEL float light_pdf(const Light& light, Vec3f P, Vec3f wi, float dista
       return disk_light_pdf(light, P, wi, distance);
     case LightKind::kTriangle:
       return triangle_light_pdf(light, P, wi, distance);
+    case LightKind::kPoint:
+    case LightKind::kSpot:
+      return point_light_pdf(light, P);
     default:
       return 0.0f;
   }

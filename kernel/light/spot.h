@@ -1,4 +1,4 @@
-// Spot light: a point light with a cone. A ball, too, sends into each direction what the cone says of that direction.
+// Spot light: a point light with a cone. A ball or disk, too, sends into each direction what the cone says of that direction.
 #pragma once
 
 #include "kernel/light/point.h"
@@ -28,6 +28,14 @@ RELIEF_KERNEL LightSample spot_light_sample(const Light& light, Vec3f P, Vec2f u
   if (!(falloff > 0.0f)) return {};
   sample.radiance *= falloff;
   return sample;
+}
+
+/// Radiance that a point or spot with a size sends against a ray that arrives at it.
+/// @param wi  unit, direction of travel of the ray, towards the light
+RELIEF_KERNEL Vec3f ball_light_emitted(const Light& light, Vec3f wi)
+{
+  const float falloff = light.kind == LightKind::kSpot ? spot_light_falloff(light, -dot(wi, light.axis)) : 1.0f;
+  return light.emission * (falloff * kInvPi / sqr(light.radius));
 }
 
 }  // namespace relief

@@ -32,6 +32,9 @@ RELIEF_KERNEL constexpr std::uint32_t dimension_camera(CameraDimension use) { re
 /// Dimension for sample_1d that a path's dither between levels of detail is from; no bounce gets so far.
 inline constexpr std::uint32_t kLodDimension = ~0u;
 
+/// Dimension for sample_2d of a camera path's ray for ambient occlusion; no bounce gets so far.
+inline constexpr std::uint32_t kAmbientDimension = ~0u - 1;
+
 /// Uses at the start of a photon; its bounces use the same dimensions as a camera path's.
 enum class PhotonDimension : std::uint32_t {
   kSource,  ///< 1D: which light, towards which caster

@@ -33,6 +33,7 @@ enum InstanceFlag : std::uint32_t {
   kNoCausticLight = 1u << 8,       ///< its emission starts no photons
   kGathersPhotons = 1u << 7,       ///< a receiver that has soft lobes, in a render with a photon pass
   kGathersTails = 1u << 9,         ///< likewise, a rough caster: see path_gathers_tails
+  kHoldout = 1u << 10,             ///< a hole in the picture where the camera sees it; an object for all other rays
 };
 
 /// One placement of a mesh.

@@ -6,7 +6,7 @@
 
 namespace relief {
 
-/// Adds what next-event estimation found, if the light is seen.
+/// Adds what next-event estimation found, if the light is seen, or how open the surroundings are.
 /// @param visibility  share of the light that passes, 0 … 1
 RELIEF_KERNEL void accumulate_shadow(const KernelGlobals& g,
                                      PathState& state,
@@ -15,6 +15,10 @@ RELIEF_KERNEL void accumulate_shadow(const KernelGlobals& g,
                                      float visibility)
 {
   const std::uint32_t path = shadow.path[ray];
+  if (shadow.scatterings[ray] == kAmbientRay) {
+    film_add_ambient(g.film, state.pixel[path], visibility);
+    return;
+  }
   const Vec3f gain = Vec3f{shadow.gain_r[ray], shadow.gain_g[ray], shadow.gain_b[ray]} * visibility;
   path_add_radiance(state, path, static_cast<int>(shadow.scatterings[ray]), gain, g.clamp_indirect);
 }

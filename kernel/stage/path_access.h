@@ -51,6 +51,14 @@ RELIEF_KERNEL int path_bounces(std::uint32_t bounces, BounceKind kind)
   return static_cast<int>(bounces >> static_cast<int>(kind) & 0xffu);
 }
 
+/// PathEvent of a path's present ray, as an index.
+RELIEF_KERNEL std::uint32_t path_event(std::uint32_t flags) { return flags >> kPathEventShift & 3u; }
+
+RELIEF_KERNEL std::uint32_t path_flags_after(std::uint32_t flags, PathEvent event)
+{
+  return (flags & ~(3u << kPathEventShift)) | static_cast<std::uint32_t>(event) << kPathEventShift;
+}
+
 /// Surfaces the path has met before, transparent ones included: what dimension_bounce counts by, so that no two
 /// surfaces share random numbers.
 RELIEF_KERNEL int path_surface(const PathState& s, std::uint32_t i)
@@ -81,6 +89,13 @@ RELIEF_KERNEL void path_add_radiance(PathState& s,
   s.indirect_r[i] += contribution.x;
   s.indirect_g[i] += contribution.y;
   s.indirect_b[i] += contribution.z;
+}
+
+/// Adds light to the albedo that a denoiser is told of, where it is seen by the camera or in mirrors alone.
+RELIEF_KERNEL void path_add_denoising(const KernelGlobals& g, const PathState& s, std::uint32_t i, Vec3f contribution)
+{
+  if (!g.film.layout.denoising || (s.flags[i] & kPathSawFeature) != 0) return;
+  film_add_denoising(g.film, s.pixel[i], contribution, {});
 }
 
 /// Weight of light found by following the BSDF against finding it by light sampling.

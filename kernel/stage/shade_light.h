@@ -1,4 +1,4 @@
-// Stage: a path whose ray met the surface of an area light (rectangle or disk). Such lights shine and let rays pass,
+// Stage: a path whose ray met the surface of an area light (rectangle, disk, or ball). Such lights shine and let rays pass,
 // as Blender's do; an emissive mesh is a surface and is shaded by shade_surface.
 #pragma once
 
@@ -19,16 +19,19 @@ RELIEF_KERNEL void shade_light(const KernelGlobals& g, PathState& state, std::ui
   const int scatterings = path_bounces(state.bounces[path], BounceKind::kAll);
   const Vec3f D = path_direction(state, path);
   const float t = state.hit_t[path];
-  Vec3f radiance = light_emitted(light, D);
+  Vec3f radiance = light_is_ball(light) ? ball_light_emitted(light, D) : light_emitted(light, D);
   const bool by_photons = path_leaves_to_photons(g, state.flags[path], light_index);
   if (!is_zero(radiance) && !by_photons) {
+    radiance *= path_transmittance(path_sigma_a(state, path), t);
+    const Vec3f seen = path_throughput(state, path) * radiance;
+    if (scatterings == 0) film_add_emission(g.film, state.pixel[path], seen);
+    path_add_denoising(g, state, path, seen);
     const float pdf = state.pdf[path];
     if (pdf > 0.0f) {
       const float pdf_light =
           lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), {light_index}, D, t);
       radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
     }
-    radiance *= path_transmittance(path_sigma_a(state, path), t);
     path_add_radiance(state, path, scatterings, path_throughput(state, path) * radiance, g.clamp_indirect);
   }
   state.t_min[path] = next_float_up(t);

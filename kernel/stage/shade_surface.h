@@ -254,6 +254,9 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
                           : diffuse   ? BounceKind::kDiffuse
                                       : BounceKind::kGlossy;
   state.bounces[path] = bounces + 1u + (1u << static_cast<int>(kind));
+  state.flags[path] = path_flags_after(state.flags[path], transmitted ? PathEvent::kTransmission
+                                                          : diffuse   ? PathEvent::kDiffuse
+                                                                      : PathEvent::kGlossy);
   if constexpr ((kFeatures & kFeatureTransmission) != 0) {
     if (transmitted && at.params.transmission > 0.0f && !at.params.thin) {
       const Vec3f inside = side.front ? at.params.sigma_a : Vec3f{};
@@ -300,8 +303,92 @@ RELIEF_KERNEL void shade_surface_scatter(const KernelGlobals& g,
   shade_surface_continue<kFeatures>(g, state, path, at, closure, bsdf, share, u, throughput, light_N, cone, next);
 }
 
+/// Queues a ray that sees whether the surroundings of a first hit are open.
+RELIEF_KERNEL void shade_surface_ambient(const KernelGlobals& g,
+                                         const PathState& state,
+                                         std::uint32_t path,
+                                         const SurfaceInteraction& at,
+                                         ShadowQueue& shadow)
+{
+  const Vec2f u = sample_2d(state.pixel_hash[path], state.sample_index[path], kAmbientDimension);
+  const Vec3f D = from_local(frame_from_normal(at.side.Ns), warp_cosine_hemisphere(u));
+  if (!(dot(D, at.side.Ng) > 0.0f)) return;
+  const Vec3f O = surface_ray_origin(at, D);
+  const RayCone cone = ray_cone_scatter(at.cone, 1.0f);
+  const std::uint32_t ray = shadow.size++;
+  shadow.O_x[ray] = O.x;
+  shadow.O_y[ray] = O.y;
+  shadow.O_z[ray] = O.z;
+  shadow.D_x[ray] = D.x;
+  shadow.D_y[ray] = D.y;
+  shadow.D_z[ray] = D.z;
+  shadow.t_max[ray] = g.occlusion_distance;
+  shadow.cone_width[ray] = cone.width;
+  shadow.cone_spread[ray] = cone.spread;
+  shadow.gain_r[ray] = shadow.gain_g[ray] = shadow.gain_b[ray] = 0.0f;
+  shadow.path[ray] = path;
+  shadow.scatterings[ray] = kAmbientRay;
+}
+
+/// Writes what the film keeps of a path's first hit.
+RELIEF_KERNEL void shade_surface_first_hit(const KernelGlobals& g,
+                                           const PathState& state,
+                                           std::uint32_t path,
+                                           const SurfaceInteraction& at,
+                                           ShadowQueue& shadow)
+{
+  const AccumulatorLayout& layout = g.film.layout;
+  FirstHit first;
+  first.P = at.hit.P;
+  first.N = at.side.Ns;
+  first.albedo = surface_albedo(at.params);
+  first.uv = at.hit.uv[0];
+  const Vec3f from_camera = at.hit.P - g.camera.world_from_camera.p;
+  first.depth = dot(from_camera, g.camera_forward);
+  const bool is_perspective = g.camera.projection == Projection::kPerspective;
+  if (layout.mist >= 0) first.mist = mist_eval(g.mist, is_perspective ? length(from_camera) : first.depth);
+  first.ray_length = state.hit_t[path];
+  first.instance_index = state.hit_object[path];
+  first.material_index = static_cast<std::uint32_t>(at.instance->material_index);
+  for (int i = 0; i < kNumCryptomattes; ++i) {
+    const bool by_material = kFirstCryptomatte + i == static_cast<int>(Aov::kCryptoMaterial);
+    if (layout.cryptomatte[i] >= 0)
+      first.cryptomatte_ids[i] = g.cryptomatte_ids[i][by_material ? first.material_index : first.instance_index];
+  }
+  first.is_first_sample = state.sample_index[path] == 0;
+  film_add_first_hit(g.film, state.pixel[path], first);
+  if (layout.ambient_occlusion >= 0) shade_surface_ambient(g, state, path, at, shadow);
+}
+
+/// Whether a denoiser is better told of what is behind or mirrored by a surface. The same bounds as Cycles': a width of the
+/// lobe α of .075, and less than a quarter of the light scattered otherwise.
+RELIEF_KERNEL bool surface_is_seen_through(const SurfaceParams& p)
+{
+  constexpr float kSharpest = 0.27386f;  // √.075
+  constexpr float kLeastReflection = 0.04f;
+  if (p.unlit || p.roughness > kSharpest) return false;
+  const float base = max_component(p.base_color);
+  const float diffuse = (1.0f - p.metallic) * (1.0f - p.transmission) * base;
+  const float sharp = p.metallic * base + (1.0f - p.metallic) * (p.specular * kLeastReflection + p.transmission * base);
+  return 4.0f * diffuse < diffuse + sharp;
+}
+
+/// Writes what a denoiser is told of a path, unless that is to be found further on.
+RELIEF_KERNEL void shade_surface_denoising(const KernelGlobals& g,
+                                           PathState& state,
+                                           std::uint32_t path,
+                                           const SurfaceInteraction& at)
+{
+  if (surface_is_seen_through(at.params)) return;
+  state.flags[path] |= kPathSawFeature;
+  const Affine3& camera = g.camera.world_from_camera;
+  const Vec3f N{dot(at.side.Ns, normalize(camera.x)), dot(at.side.Ns, normalize(camera.y)),
+                dot(at.side.Ns, g.camera_forward)};
+  film_add_denoising(g.film, state.pixel[path], path_throughput(state, path) * surface_albedo(at.params), N);
+}
+
 /// Shades one path. Reads and writes every column but the hit's.
-/// Next: intersect closest (pushed on `next`), or the path ends; it may fork. At most one ray is added to `shadow`.
+/// Next: intersect closest (pushed on `next`), or the path ends; it may fork. At most one ray is added to `shadow`, at a first hit two.
 template <unsigned kFeatures>
 [[gnu::flatten]] RELIEF_KERNEL void shade_surface(const KernelGlobals& g,
                                                   PathState& state,
@@ -342,17 +429,12 @@ template <unsigned kFeatures>
   const Vec3f wo_local = to_local(side.frame, wo);
 
   if ((state.flags[path] & kPathSawSurface) == 0) {
+    if ((instance.flags & kHoldout) != 0) {
+      film_add_holdout(g.film, state.pixel[path]);
+      return;
+    }
     state.flags[path] |= kPathSawSurface;
-    FirstHit first;
-    first.P = at.hit.P;
-    first.N = side.Ns;
-    first.albedo = surface_albedo(params);
-    first.uv = at.hit.uv[0];
-    first.depth = dot(at.hit.P - g.camera.world_from_camera.p, g.camera_forward);
-    first.instance_index = state.hit_object[path];
-    first.material_index = static_cast<std::uint32_t>(instance.material_index);
-    first.is_first_sample = sample == 0;
-    film_add_first_hit(g.film, state.pixel[path], first);
+    shade_surface_first_hit(g, state, path, at, shadow);
   }
 
   bool emits = !is_zero(params.emission) && (side.front || at.material->double_sided || params.unlit);
@@ -362,6 +444,7 @@ template <unsigned kFeatures>
   }
   if (emits) {
     Vec3f radiance = params.emission;
+    if (!params.unlit) path_add_denoising(g, state, path, throughput * radiance);
     const float pdf = state.pdf[path];
     if (pdf > 0.0f && instance.first_light_index >= 0) {
       const LightRef hit{instance.first_light_index + static_cast<std::int32_t>(at.triangle),
@@ -369,7 +452,11 @@ template <unsigned kFeatures>
       const float pdf_light = lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), hit, -wo, t);
       radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
     }
+    if (bounce == 0) film_add_emission(g.film, state.pixel[path], throughput * radiance);
     path_add_radiance(state, path, bounce, throughput * radiance, g.clamp_indirect);
+  }
+  if (g.film.layout.denoising && (state.flags[path] & kPathSawFeature) == 0) {
+    shade_surface_denoising(g, state, path, at);
   }
   const bool last = bounce > g.limits.total || path_bounces(bounces, BounceKind::kDiffuse) > g.limits.diffuse ||
                     path_bounces(bounces, BounceKind::kGlossy) > g.limits.glossy ||

@@ -6,6 +6,7 @@
 
 #include "kernel/assert.h"
 #include "kernel/math/vec.h"
+#include "kernel/state/path_event.h"
 
 namespace relief {
 
@@ -43,19 +44,27 @@ enum PathFlag : std::uint32_t {
   kPathOnlyDelta = 1u << 2,    ///< every scattering event so far was a delta one
   kPathAfterSoft = 1u << 3,    ///< the last scattering event is one where photons are gathered
   kPathCaustic = 1u << 4,      ///< after such an event, only sharp ones at casters: lights ahead are brought by photons
+  kPathSawFeature = 1u << 5,   ///< what a denoiser is told is written, see Aov::kDenoisingAlbedo
+  kPathEventShift = 6,         ///< position of the two bits of PathEvent
   kPathTransparentShift = 16,  ///< position of the count of transparent surfaces
 };
 
+/// Entries of a column of shadow rays. A camera path's first hit may ask for a second one, for ambient occlusion.
+inline constexpr std::uint32_t kShadowEntries = 2 * kBatchPaths + 64 / 4;
+
+/// In place of `scatterings`: a ray that looks for ambient occlusion.
+inline constexpr std::uint32_t kAmbientRay = ~0u;
+
 /// Shadow rays of a batch: where to look, and what the path gains if nothing is in between.
 struct alignas(64) ShadowQueue {
-  float O_x[kColumnEntries], O_y[kColumnEntries], O_z[kColumnEntries];  ///< world
-  float D_x[kColumnEntries], D_y[kColumnEntries], D_z[kColumnEntries];  ///< world, unit
-  float t_max[kColumnEntries];                                          ///< metres
-  float cone_width[kColumnEntries], cone_spread[kColumnEntries];        ///< ray cone at O
-  float gain_r[kColumnEntries], gain_g[kColumnEntries],
-      gain_b[kColumnEntries];                 ///< radiance × throughput, MIS weight included
-  std::uint32_t path[kColumnEntries];         ///< whose
-  std::uint32_t scatterings[kColumnEntries];  ///< events between the camera and the light
+  float O_x[kShadowEntries], O_y[kShadowEntries], O_z[kShadowEntries];  ///< world
+  float D_x[kShadowEntries], D_y[kShadowEntries], D_z[kShadowEntries];  ///< world, unit
+  float t_max[kShadowEntries];                                          ///< metres
+  float cone_width[kShadowEntries], cone_spread[kShadowEntries];        ///< ray cone at O
+  float gain_r[kShadowEntries], gain_g[kShadowEntries],
+      gain_b[kShadowEntries];                 ///< radiance × throughput, MIS weight included
+  std::uint32_t path[kShadowEntries];         ///< whose
+  std::uint32_t scatterings[kShadowEntries];  ///< events between the camera and the light, or kAmbientRay
   std::uint32_t size;                         ///< number of rays waiting
 };
 

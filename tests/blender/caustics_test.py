@@ -16,6 +16,7 @@ from scenes import (
     new_material,
     new_scene,
     set_bounces,
+    set_file_format,
     set_world,
 )
 
@@ -47,8 +48,7 @@ def _caustic(scene):
 
     scene.render.engine = "RELIEF"
     scene.relief.samples = 8
-    settings = scene.render.image_settings
-    settings.file_format, settings.exr_codec, settings.color_depth = "OPEN_EXR_MULTILAYER", "NONE", "32"
+    set_file_format("OPEN_EXR_MULTILAYER", "32")
     with folder() as path:
         scene.render.filepath = os.path.join(path, "picture.exr")
         bpy.ops.render.render(write_still=True)

@@ -6,7 +6,7 @@ import subprocess
 
 import bpy
 
-from scenes import _ROOT, folder
+from scenes import _ROOT, add_camera, add_plane, folder
 
 _STEPS = """
 import addon_utils, bpy, os, sys
@@ -142,3 +142,34 @@ def test_panels_are_registered_and_taken_away():
         if "RELIEF" in getattr(p, "COMPAT_ENGINES", ()) and p.is_registered
     }
     assert not after, after
+
+
+def test_the_documented_commands_run_without_complaint():
+    """The command lines of docs/blender.md, in their order and word for word but for where the programs are."""
+    with open(os.path.join(_ROOT, "docs", "blender.md"), encoding="utf-8") as file:
+        commands = re.findall(r"^    (\S.*)$", file.read(), re.MULTILINE)
+    scene = bpy.context.scene
+    scene.render.engine, scene.relief.samples = "RELIEF", 1
+    add_plane()
+    add_camera()
+    with folder() as path:
+        os.makedirs(f"{path}/scripts/addons")
+        os.symlink(os.path.join(_ROOT, "blender_addon", "relief"), f"{path}/scripts/addons/relief")
+        bpy.ops.wm.save_as_mainfile(filepath=f"{path}/scene.blend")
+        bpy.ops.export_scene.relief(filepath=f"{path}/shot.gltf", use_range=True, frame_start=1, frame_end=48)
+        program = os.environ["RELIEF_BINARY"]
+        places = (
+            (r"^scripts/package_addon", f"{_ROOT}/scripts/package_addon {path}/relief.zip"),
+            (r"build/release/cli/relief", program),
+            (r"\bblender -b", f"{bpy.app.binary_path} --factory-startup -b"),
+            (r"^relief ", f"{program} "),
+        )
+        for command in commands:
+            for documented, here in places:
+                command = re.sub(documented, here, command)
+            done = subprocess.run(command, shell=True, cwd=path, capture_output=True, text=True, timeout=100)
+            output = done.stdout + done.stderr
+            assert done.returncode == 0, (command, output)
+            assert not re.search("(?i)not available|not found|warning:|error:|traceback", output), (command, output)
+        made = {"relief.zip", "out0001.exr", "shot.0001.exr", "shot.0048.exr"}
+        assert len(commands) == 3 and made <= set(os.listdir(path)), (commands, os.listdir(path))

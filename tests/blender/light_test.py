@@ -12,7 +12,11 @@ from scenes import (
     assert_warns,
     degrees,
     diffuse,
+    make_sharp,
+    new_material,
     new_scene,
+    set_bounces,
+    set_world,
 )
 
 
@@ -31,9 +35,49 @@ def test_point_without_size():
 
 
 def test_point_with_radius():
-    # Cycles before 4.0 has a disk that faces each point, not a sphere: weaker by (radius / distance)², 0.8 % here.
     scene = _stage(lambda: add_light("POINT", (1, -1, 3), energy=300, shadow_soft_size=0.2))
-    assert_agrees(scene, samples=128, tolerance=0.01)
+    assert_agrees(scene, samples=128)
+
+
+def test_point_whose_radius_reaches_geometry():
+    """What lay inside was black: a disc on the floor, and a part of the ball."""
+    scene = _stage(lambda: add_light("POINT", (1.5, -0.5, 0.4), energy=300, shadow_soft_size=1.2))
+    assert_agrees(scene, samples=256)
+
+
+def test_spot_whose_radius_reaches_geometry():
+    def light():
+        spot = {"energy": 500, "spot_size": math.radians(120), "spot_blend": 0.5, "shadow_soft_size": 1.0}
+        add_light("SPOT", (1.5, -0.5, 0.7), **spot)
+
+    assert_agrees(_stage(light), samples=256)
+
+
+def test_a_large_point_lets_other_light_pass():
+    """Rays that start inside see the world; they ended at the sphere that the point was."""
+    scene = _stage(lambda: add_light("POINT", (0.5, -0.5, 1.0), energy=30, shadow_soft_size=2.0))
+    set_world((0.6, 0.8, 1.0))
+    set_bounces(scene, 2)
+    assert_agrees(scene, samples=128)
+
+
+def test_points_and_spots_in_a_mirror():
+    """Both are seen where a smooth metal mirrors them: as a disk of their radius."""
+    scene = new_scene()
+    material, _, node = new_material("mirror", "ShaderNodeBsdfGlossy", Color=(0.9, 0.7, 0.5, 1))
+    make_sharp(node)
+    add_plane(material=material)
+    add_light("POINT", (-0.8, 0, 2), energy=60, shadow_soft_size=0.5)
+    add_light("SPOT", (0.8, 0, 2), energy=60, spot_size=math.radians(80), shadow_soft_size=0.4)
+    add_camera((0, 0, 4), lens=50)
+    set_bounces(scene, 1)
+    assert_agrees(scene, samples=64, block=4)
+
+
+def test_a_point_that_the_camera_sees():
+    scene = _stage(lambda: add_light("POINT", (0.5, 1, 1.5), energy=60, shadow_soft_size=0.5))
+    bpy.data.objects["light"].visible_camera = True
+    assert_agrees(scene, samples=128, block=4)
 
 
 def test_sun_without_size():
@@ -76,8 +120,7 @@ def test_spot_with_uneven_scale():
 
 
 def test_spot_with_radius():
-    # As for points: a disk that faces each point is weaker by (radius / distance)², 0.5 % here.
-    assert_agrees(_spot(40, 0.5, 0.25), samples=256, tolerance=0.006)
+    assert_agrees(_spot(40, 0.5, 0.25), samples=256)
 
 
 def test_square_area():

@@ -33,6 +33,7 @@ def _height_map(path, size, kind):
     """Saves a tiling 16-bit height map."""
     import bpy
     import numpy as np
+    from scenes import set_file_format
 
     random = np.random.default_rng(7)
     v, u = np.mgrid[0:size, 0:size].astype(np.float32) / size
@@ -54,8 +55,7 @@ def _height_map(path, size, kind):
     pixels = np.ones((size, size, 4), dtype=np.float32)
     pixels[..., :3] = np.clip(h, 0, 1)[..., None]
     image.pixels.foreach_set(pixels.ravel())
-    settings = bpy.context.scene.render.image_settings
-    settings.file_format, settings.color_depth, settings.color_mode = "PNG", "16", "BW"
+    set_file_format("PNG", "16", color_mode="BW")
     bpy.context.scene.view_settings.view_transform = "Raw"
     image.save_render(path)
     bpy.data.images.remove(image)

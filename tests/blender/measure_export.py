@@ -23,6 +23,13 @@ def _instances(side):
     carrier.instance_type = "FACES"
 
 
+def _duplicates(number):
+    """Objects that share a ball of 2,048 faces."""
+    ball = scenes.add_sphere(0.3, segments=64)
+    for x in range(number - 1):
+        scenes.link(ball.data, "ball").location.x = x
+
+
 def _peak_bytes():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
@@ -50,4 +57,5 @@ print("| scene | seconds | MB written | MiB more |")
 print("| --- | --- | --- | --- |")
 for count, side in ((9, 3), (1024, 32), (99856, 316)):
     _measure(f"{count:,} instances", lambda: _instances(side))
+_measure("2,000 linked duplicates", lambda: _duplicates(2000))
 _measure("1,002,001 vertices with uv", lambda: scenes.add_plane(8, subdivisions=1000))

@@ -5,6 +5,7 @@ import math
 import bpy
 
 from scenes import (
+    IS_5_0,
     add_camera,
     add_group_socket,
     add_light,
@@ -69,7 +70,8 @@ def test_several_materials_on_one_mesh():
     ball.data.materials.append(None)
     slots = [i % 3 for i in range(len(ball.data.polygons))]
     ball.data.polygons.foreach_set("material_index", slots)
-    assert_agrees(scene)
+    # Since 5.0 the empty slot is plastic, of which Cycles makes up for the light lost between its layers.
+    assert_agrees(scene, tolerance=0.02 if IS_5_0 else 0)
 
 
 def test_material_of_the_object_instead_of_the_mesh():

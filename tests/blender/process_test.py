@@ -8,8 +8,9 @@ import subprocess
 import time
 
 import bpy
+import numpy as np
 
-from scenes import add_camera, add_plane, folder, new_scene, render, set_world
+from scenes import IS_5_0, add_camera, add_plane, folder, new_scene, render, set_world
 
 
 def _scene():
@@ -150,7 +151,9 @@ def test_cancel_keeps_what_was_rendered():
         # Session temporary folders go where TMPDIR says.
         environment = {**os.environ, "TMPDIR": path}
         here = os.path.dirname(os.path.abspath(__file__))
-        command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-expr", script, "--", here]
+        # Blender 5 tells how a render comes on only when asked.
+        log = ["--log", "render", "--log-level", "info"] if IS_5_0 else []
+        command = [bpy.app.binary_path, "-b", "--factory-startup", *log, "--python-expr", script, "--", here]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
         blender = subprocess.Popen(command, text=True, env=environment, **pipes)
         try:
@@ -213,6 +216,38 @@ def test_no_files_are_left():
     scene = _scene()
     with folder() as path:
         render(scene, "RELIEF", f"{path}/picture.exr")
+    _assert_clean()
+
+
+def test_the_picture_is_shown_while_it_is_rendered():
+    """It is the one that is there in the end, with its passes, however often it was shown; nothing is left behind."""
+    from relief import exr, final, result
+
+    scene = _scene()
+    scene.view_layers[0].use_pass_normal = scene.view_layers[0].relief.use_pass_samples = True
+    scene.render.use_border, scene.render.border_min_x = True, 0.3
+    scene.relief.samples = 200
+    settings = scene.render.image_settings
+    settings.file_format, settings.exr_codec = "OPEN_EXR_MULTILAYER", "NONE"
+    shown, kept = [], (final._is_watched, result.show)
+
+    def show(engine, picture, *arguments):
+        shown.append(picture.attributes["relief:samples"])
+        kept[1](engine, picture, *arguments)
+
+    with folder() as path:
+        scene.render.engine, pictures = "RELIEF", []
+        for is_watched in (False, True):
+            final._is_watched, result.show = (lambda w=is_watched: w), show
+            scene.render.filepath = f"{path}/{is_watched}.exr"
+            bpy.ops.render.render(write_still=True)
+            assert bool(shown) == is_watched, shown
+            pictures.append(exr.read(scene.render.filepath).channels)
+        final._is_watched, result.show = kept
+    assert shown[0] == "1", shown
+    assert pictures[0].keys() == pictures[1].keys() and len(pictures[0]) > 4, (pictures[0].keys(), pictures[1].keys())
+    for name, values in pictures[0].items():
+        assert np.array_equal(values, pictures[1][name]), name
     _assert_clean()
 
 

@@ -21,6 +21,7 @@ SIGNIFICANCE = 1e-4
 
 #: Cycles changed in this version: Principled BSDF, lights, spot edges. Tests that compare with what it was before, ask.
 IS_4_0 = bpy.app.version >= (4, 0, 0)
+IS_5_0 = bpy.app.version >= (5, 0, 0)
 
 #: Blender's name of the colour space that pictures are rendered in.
 LINEAR = "Linear Rec.709" if IS_4_0 else "Linear"
@@ -45,8 +46,7 @@ def new_scene(width=64, height=48):
     bpy.ops.preferences.addon_enable(module="relief")
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = width, height
-    scene.render.image_settings.file_format = "OPEN_EXR"
-    scene.render.image_settings.color_depth = "32"
+    set_file_format("OPEN_EXR", "32")
     scene.relief.filter_type, scene.relief.filter_width = "box", 1.0
     scene.relief.strict = True
     scene.cycles.pixel_filter_type = "BOX"
@@ -57,6 +57,21 @@ def new_scene(width=64, height=48):
     scene.cycles.blur_glossy = 0.0
     set_bounces(scene, 0)
     return scene
+
+
+def set_file_format(file_format, color_depth, **others):
+    """What pictures of the current scene are saved as; a multilayer EXR is not compressed and has one part."""
+    settings = bpy.context.scene.render.image_settings
+    is_multilayer = file_format == "OPEN_EXR_MULTILAYER"
+    if IS_5_0:
+        settings.media_type = "MULTI_LAYER_IMAGE" if is_multilayer else "IMAGE"
+    settings.file_format, settings.color_depth = file_format, color_depth
+    if is_multilayer:
+        settings.exr_codec = "NONE"
+        if IS_5_0:
+            settings.use_exr_interleave = True
+    for name, value in others.items():
+        setattr(settings, name, value)
 
 
 def set_bounces(scene, bounces):

@@ -8,6 +8,7 @@ import numpy as np
 from scenes import (
     IS_4_0,
     add_camera,
+    add_light,
     add_image_node,
     add_plane,
     asymmetric_pixels,
@@ -18,6 +19,7 @@ from scenes import (
     new_material,
     new_scene,
     set_bounces,
+    set_file_format,
     set_world,
 )
 
@@ -70,7 +72,7 @@ def test_orientation_of_bytes():
 
 
 def test_orientation_of_floats():
-    _assert_shows(_stage(lambda: new_image(3 * asymmetric_pixels()))[0])
+    _assert_shows(_stage(lambda: new_image(asymmetric_pixels() * (3, 3, 3, 1)))[0])
 
 
 def test_non_color_bytes():
@@ -241,8 +243,7 @@ def test_color_attribute_of_emission_is_warned_about():
 def _save(path, file_format="PNG", depth="16"):
     """Writes the asymmetric picture as a file, by Blender's own means."""
     scene = new_scene()
-    settings = scene.render.image_settings
-    settings.file_format, settings.color_depth, settings.color_mode = file_format, depth, "RGB"
+    set_file_format(file_format, depth, color_mode="RGB")
     scene.view_settings.view_transform = "Standard"
     new_image(asymmetric_pixels()).save_render(path)
     return path
@@ -327,3 +328,21 @@ def test_missing_file_is_warned_about():
         scene, _, _, _ = _stage(lambda: bpy.data.images.load(name))
         os.remove(name)
         assert_warns(scene, 'image "image.png"', "no file")
+
+
+def test_an_image_node_without_image_is_magenta():
+    """As a colour, as a number, and by its channels and alpha."""
+    scene = new_scene()
+    for i, output in enumerate(("Color", "Red", "Green", "Alpha")):
+        material, tree, node = new_material(f"material {i}")
+        image = tree.nodes.new("ShaderNodeTexImage")
+        source = image.outputs["Alpha" if output == "Alpha" else "Color"]
+        if output in {"Red", "Green"}:
+            separate = tree.nodes.new("ShaderNodeSeparateColor")
+            tree.links.new(source, separate.inputs["Color"])
+            source = separate.outputs[output]
+        tree.links.new(source, node.inputs["Color"])
+        add_plane(1.8, material, (2 * i - 3, 0, 0))
+    add_light("SUN", energy=3, angle=0)
+    add_camera((0, 0, 9))
+    assert_agrees(scene, block=4)

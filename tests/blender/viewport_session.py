@@ -1,6 +1,6 @@
 """Runs in a Blender with a window: shows the viewport rendered, edits, moves, leaves the mode; writes what it saw.
 
-Not a test by itself: viewport_test.py starts it, with "follow", "quit" or "panels" and a folder. Steps run in Blender's timers, since the window is only drawn between
+Not a test by itself: viewport_test.py starts it, with "follow", "quit", "panels", "warnings" or "render" and a folder. Steps run in Blender's timers, since the window is only drawn between
 them. Pictures are copies of what is on the display: Blender's own screenshots are black on some.
 """
 
@@ -27,7 +27,9 @@ _seen = {}
 
 def _area():
     areas = bpy.context.window_manager.windows[0].screen.areas
-    return max((a for a in areas if a.type == "VIEW_3D"), key=lambda a: a.width * a.height)
+    # A render that fills the window hides them.
+    views = [a for a in areas if a.type == "VIEW_3D"] or list(areas)
+    return max(views, key=lambda a: a.width * a.height)
 
 
 def _viewport():
@@ -153,6 +155,56 @@ def _panels():
             area.type = "PROPERTIES"
 
 
+def _warn():
+    """Materials of several balls have what relief does not know; the Render tab is shown."""
+    bpy.context.scene.relief.use_cycles_settings = True
+    for index in range(12):
+        material = diffuse((0.2, 0.3, 0.8), f"pattern {index}")
+        tree = material.node_tree
+        tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], tree.nodes["Diffuse BSDF"].inputs["Color"])
+        add_sphere(0.2, material, (index * 0.3 - 2, -2, 0.2))
+    _show_panels("ball", "RENDER")()
+    _area().spaces.active.shading.type = "RENDERED"
+
+
+def _note_status():
+    _shot("warned")
+    _seen["warned"]["status"] = _viewport()._status()
+
+
+def _click():
+    bpy.ops.relief.show_warnings("EXEC_DEFAULT", index=0)
+    editors = [a for w in bpy.context.window_manager.windows for a in w.screen.areas if a.type == "TEXT_EDITOR"]
+    _seen["editors"] = [editor.spaces.active.text.as_string() for editor in editors]
+
+
+def _render():
+    """F12 with so many samples that it does not end by itself; the picture fills the window."""
+    _start()
+    _leave()
+    scene = bpy.context.scene
+    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    camera.location, camera.rotation_euler = (0, -7, 5), degrees(57, 0, 0)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    scene.render.resolution_x, scene.render.resolution_y = 480, 320
+    scene.relief.samples = 1000000
+    bpy.context.preferences.view.render_display_type = "SCREEN"
+    bpy.ops.render.render("INVOKE_DEFAULT")
+
+
+def _note_job(name):
+    """Notes the whole window, and whether a render is at work."""
+
+    def note():
+        _shot(name)
+        window = bpy.context.window_manager.windows[0]
+        _seen[name]["view"] = [0, 0, window.width, window.height]
+        _seen[name]["is_rendering"] = bpy.app.is_job_running("RENDER")
+
+    return note
+
+
 def _finish():
     with open(os.path.join(_OUTPUT, "seen.json"), "w", encoding="utf-8") as file:
         json.dump(_seen, file)
@@ -176,6 +228,18 @@ def _steps():
             ("camera", "DATA"),
         ):
             yield _show_panels(active, tab)
+        yield _finish
+    if _SESSION == "warnings":
+        yield _panels
+        yield _warn
+        yield _note_status
+        yield _click
+        yield lambda: _shot("clicked")
+        yield _finish
+    if _SESSION == "render":
+        yield _render
+        for number in range(4):
+            yield _note_job(f"shot {number}")
         yield _finish
     yield _start
     if _SESSION == "quit":

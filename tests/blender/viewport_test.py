@@ -107,6 +107,38 @@ def test_rendered_shading_follows_the_scene():
     assert not seen["left"]["programs"] and not seen["left"]["folders"], seen["left"]
 
 
+def test_the_viewport_and_the_panel_tell_of_warnings():
+    """The status says how many there are; the panel draws them; a click shows all in a text editor."""
+    with folder() as path:
+        output = _run_session("warnings", path)
+        with open(f"{path}/seen.json", encoding="utf-8") as file:
+            seen = json.load(file)
+    assert "13 warnings" in seen["warned"]["status"], seen
+    assert len(seen["editors"]) == 1 and seen["editors"][0].count("pattern ") == 12, seen
+    assert output.count("relief: warning: ") == 13, output  # each once, however often the view is drawn
+    assert "rna_uiItemR" not in output and "Error" not in output, output
+
+
+def _noise(pixels):
+    """How much pixels differ from their neighbours."""
+    return float(np.abs(np.diff(pixels, axis=1)).mean())
+
+
+def test_f12_shows_the_picture_as_it_refines():
+    """While a render is at work, the window shows a red ball, with less and less noise. Then Blender is ended."""
+    with folder() as path:
+        _run_session("render", path)
+        assert not _processes_with(f"{path}/blender_"), _processes_with(path)
+        with open(f"{path}/seen.json", encoding="utf-8") as file:
+            seen = json.load(file)
+        shots = [_pixels(f"{path}/{name}.xwd", s["view"]) for name, s in seen.items() if s["is_rendering"]]
+    assert len(shots) == 4, seen
+    red, noise = [_share(shot, 0) for shot in shots], [_noise(shot) for shot in shots]
+    print("red", red, "noise", noise)
+    assert red[-1] > 0.02, "the picture is not shown"
+    assert noise[-1] < noise[0] or red[0] < 0.01, "the picture does not change"
+
+
 def test_panels_draw():
     """Every tab of the properties editor, for a mesh, a light and a camera: no panel fails."""
     with folder() as path:

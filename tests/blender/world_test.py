@@ -1,16 +1,22 @@
 """Worlds: colours and lat-long images light and are seen as in Cycles."""
 
+import bpy
+
 from scenes import (
     LINEAR,
     add_camera,
+    add_light,
     add_sphere,
     asymmetric_pixels,
     assert_agrees,
     assert_warns,
     degrees,
     diffuse,
+    make_sharp,
     new_image,
+    new_material,
     new_scene,
+    set_bounces,
     set_world,
     smooth_pixels,
 )
@@ -94,7 +100,6 @@ def test_a_volume_is_warned_about():
 def test_transparent_film():
     """Where nothing is, alpha is 0; elsewhere the picture stays."""
     import numpy as np
-    import bpy
     from scenes import folder, render
 
     scene = _stage()
@@ -111,9 +116,67 @@ def test_transparent_film():
 
 
 def test_no_light_is_black():
-    """Without any light a file would get some from the program; Blender's scenes do not."""
+    """Without any light a file would get some from the program; Blender's scenes do not, whatever makes the world dark."""
     from scenes import folder, render
 
+    def image_without_strength():
+        _image_world()
+        bpy.context.scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = 0
+
+    for make in (lambda: None, lambda: set_world((0, 0, 0)), lambda: set_world((0.5, 0.4, 0.3), 0), image_without_strength):
+        scene = _stage()
+        make()
+        with folder() as path:
+            assert render(scene, "RELIEF", f"{path}/picture.exr").max() < 1e-15
+
+
+def test_an_environment_node_without_image_is_magenta():
     scene = _stage()
-    with folder() as path:
-        assert render(scene, "RELIEF", f"{path}/picture.exr").max() < 1e-15
+    tree = set_world((1, 1, 1), 0.5)
+    texture = tree.nodes.new("ShaderNodeTexEnvironment")
+    tree.links.new(texture.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+    assert_agrees(scene)
+
+
+#: What the engines make of the coarse facets of smooth balls where light grazes them; a hidden world is a third and more.
+_FACETS = 0.04
+
+
+def _hidden_from(*rays):
+    """A diffuse, a glossy and a glass ball, and a world that some rays do not see."""
+    from relief import compat
+
+    scene = new_scene()
+    glossy, _, glossy_node = new_material("glossy", "ShaderNodeBsdfGlossy", Color=(1, 1, 1, 1))
+    glass, _, glass_node = new_material("glass", "ShaderNodeBsdfGlass", Color=(1, 1, 1, 1), IOR=1.3)
+    for node in (glossy_node, glass_node):
+        make_sharp(node)
+    add_sphere(0.9, diffuse((0.7, 0.5, 0.3)), (-2, 0, 0))
+    add_sphere(0.9, glossy)
+    add_sphere(0.9, glass, (2, 0, 0))
+    add_light("SUN", rotation=degrees(40, 20, 0), energy=1, angle=0)
+    add_camera((0, -9, 0), degrees(90, 0, 0), lens=40)
+    tree = set_world((0.3, 0.6, 0.9))
+    world = bpy.context.scene.world
+    for ray in rays:
+        owner = getattr(world, "cycles_visibility", None)
+        setattr(*((owner, ray) if owner is not None else (world, f"visible_{ray}")), False)
+        assert not compat.sees_world(world, ray)
+    set_bounces(scene, 8)
+    return scene
+
+
+def test_a_world_hidden_from_the_camera():
+    assert_agrees(_hidden_from("camera"), samples=128, tolerance=_FACETS)
+
+
+def test_a_world_hidden_from_diffuse_rays():
+    assert_agrees(_hidden_from("diffuse"), samples=128, tolerance=_FACETS)
+
+
+def test_a_world_hidden_from_glossy_rays():
+    assert_agrees(_hidden_from("glossy"), samples=128, tolerance=_FACETS)
+
+
+def test_a_world_hidden_from_transmission_rays():
+    assert_agrees(_hidden_from("transmission"), samples=128, tolerance=_FACETS)

@@ -24,8 +24,8 @@ TEST(Frames, GrammarAndOrder)
       {"999999-1000000", {999999, 1000000}},
       {"999999-1000000x2147483647", {999999}},
   };
-  for (const auto& [text, frames] : kCases) EXPECT_EQ(parse_frames(text), frames) << text;
-  EXPECT_EQ(parse_frames("0-1000000").size(), 1000001u);
+  for (const auto& [text, frames] : kCases) EXPECT_EQ(parse_frames(text).numbers, frames) << text;
+  EXPECT_EQ(parse_frames("0-1000000").numbers.size(), 1000001u);
 }
 
 TEST(Frames, AnythingElseIsRefused)
@@ -119,6 +119,36 @@ TEST(Lod, IsALevelOrChosenByRays)
   EXPECT_EQ(parse_lod("30"), 30);
   for (const char* text : {"", "-1", "31", "1x", "inf", "Auto", "nan"}) {
     EXPECT_THROW(parse_lod(text), CLI::ValidationError) << "'" << text << "'";
+  }
+}
+
+TEST(Point, IsThreeNumbersInReach)
+{
+  EXPECT_EQ(parse_point("--look-at", "1,-2.5,3e4"), (Vec3f{1, -2.5f, 3e4f}));
+  for (const char* text : {"", "1,2", "1,2,3,4", "1,2,x", "1,2,nan", "1,2,inf", "1,2,1e16", "1;2;3", " 1,2,3"}) {
+    EXPECT_THROW(parse_point("--look-at", text), CLI::ValidationError) << "'" << text << "'";
+  }
+}
+
+TEST(Environment, IsAWordOrAnImagePerhapsWithAStrength)
+{
+  const auto is = [](const char* text, EnvironmentSource source, const char* file, float strength) {
+    const EnvironmentChoice c = parse_environment(text);
+    EXPECT_EQ(c.source, source) << text;
+    if (source == EnvironmentSource::kFile) {
+      EXPECT_EQ(c.file, file);
+    }
+    EXPECT_EQ(c.strength, strength) << text;
+  };
+  is("studio", EnvironmentSource::kStudio, "", 1);
+  is("sky,0.5", EnvironmentSource::kSky, "", 0.5f);
+  is("none", EnvironmentSource::kNone, "", 1);
+  is("a.hdr", EnvironmentSource::kFile, "a.hdr", 1);
+  is("./studio,2", EnvironmentSource::kFile, "./studio", 2);
+  is("a,b.hdr", EnvironmentSource::kFile, "a,b.hdr", 1);
+  is("a,1.hdr,3e2", EnvironmentSource::kFile, "a,1.hdr", 300);
+  for (const char* text : {"", ",1", "sky,-1", "sky,inf", "sky,nan", "sky,1e7"}) {
+    EXPECT_THROW(parse_environment(text), CLI::ValidationError) << "'" << text << "'";
   }
 }
 

@@ -1,8 +1,13 @@
 // Displacement on the command line: methods, levels, what a ray did, and what statistics and warnings say.
+#include <chrono>
 #include <cmath>
+#include <functional>
+#include <random>
 #include <sstream>
+#include <thread>
 
 #include "tests/cli/program.h"
+#include "tests/support/image_bytes.h"
 
 namespace relief::test {
 namespace {
@@ -23,7 +28,7 @@ GltfBuilder displaced_square()
          {{"name", "bark"},
           {"extensions",
            {{"KHR_materials_unlit", nlohmann::json::object()},
-            {"RELIEF_displacement", {{"heightTexture", {{"uri", "h.pgm"}}}, {"scale", 0.5}, {"midlevel", 0}}}}}});
+            {"RELIEF_displacement", {{"heightTexture", {{"uri", "h.tga"}}}, {"scale", 0.5}, {"midlevel", 0}}}}}});
   b.push("cameras", {{"type", "orthographic"},
                      {"name", "above"},
                      {"orthographic", {{"xmag", 0.6}, {"ymag", 0.6}, {"znear", 0.1}, {"zfar", 100}}}});
@@ -38,7 +43,7 @@ class DisplacementProgram : public ProgramTest {
   /// Writes the scene and its map; the map is 4x4, 8-bit.
   std::string write(const GltfBuilder& b, const std::string& texels)
   {
-    folder_.write("h.pgm", "P5 4 4 255\n" + texels);
+    folder_.write("h.tga", tga_grey(4, 4, texels));
     return folder_.write("s.gltf", b.gltf()).string();
   }
 
@@ -64,6 +69,136 @@ class DisplacementProgram : public ProgramTest {
     return rows;
   }
 };
+
+TEST_F(DisplacementProgram, SizesBeyondTheLimitsAreErrorsOfTheScene)
+{
+  struct Beyond {
+    const char* path;
+    std::function<void(GltfBuilder&)> make;
+  };
+  const auto optics = [](const char* name, double value) {
+    return [=](GltfBuilder& b) {
+      b.json["cameras"][0]["extensions"]["RELIEF_camera"] = {{"apertureRadius", 0.1}};
+      b.json["cameras"][0]["extensions"]["RELIEF_camera"][name] = value;
+    };
+  };
+  const auto number = [](const char* pointer, const nlohmann::json& value) {
+    return [=](GltfBuilder& b) { b.json[nlohmann::json::json_pointer(pointer)] = value; };
+  };
+  for (const Beyond& beyond : std::vector<Beyond>{
+           {"/nodes/0: ", number("/nodes/0/scale", {1e-18, 1e-18, 1e-18})},
+           {"/nodes/0: ", number("/nodes/0/scale", {1, 1, 1e-18})},
+           {"/nodes/1: ", number("/nodes/1/translation", {0, 0, 2e18})},
+           {"/cameras/0/extensions/RELIEF_camera/focusDistance: ", optics("focusDistance", 1e30)},
+           {"/cameras/0/extensions/RELIEF_camera/apertureRadius: ", optics("apertureRadius", 1e19)},
+           {"/cameras/0/orthographic: ", number("/cameras/0/orthographic/xmag", 1e18)},
+       }) {
+    GltfBuilder b = displaced_square();
+    b.json["extensionsUsed"].push_back("RELIEF_camera");
+    beyond.make(b);
+    const Outcome outcome = render(bumpy(b), file("o.exr"));
+    EXPECT_EQ(outcome.exit_code, 3) << beyond.path << outcome.errors;
+    EXPECT_NE(outcome.errors.find(beyond.path), std::string::npos) << beyond.path << outcome.errors;
+    EXPECT_FALSE(exists("o.exr"));
+  }
+}
+
+TEST_F(DisplacementProgram, ScenesAtTheLimitsAreRendered)
+{
+  const auto optics = [](const nlohmann::json& camera) {
+    return [=](GltfBuilder& b) { b.json["cameras"][0]["extensions"]["RELIEF_camera"] = camera; };
+  };
+  const std::function<void(GltfBuilder&)> kMakes[] = {
+      [](GltfBuilder& b) {
+        b.json["nodes"][0]["scale"] = {2e-15, 2e-15, 2e-15};
+      },
+      [](GltfBuilder& b) {
+        b.json["nodes"][0]["scale"] = {2e-15, 2e-15, 2e-15};
+        b.json["nodes"][0]["translation"] = {0.5, 0.5, 0};
+      },
+      [](GltfBuilder& b) {
+        b.json["nodes"][0]["scale"] = {9e14, 9e14, 9e14};
+      },
+      [](GltfBuilder& b) {
+        b.json["nodes"][1]["translation"] = {.5, .5, 9e14};
+      },
+      optics({{"apertureRadius", 0.1}, {"focusDistance", 1e15}}),
+      optics({{"apertureRadius", 1e15}, {"focusDistance", 5}}),
+      optics({{"clip", {1e30}}}),
+      [&](GltfBuilder& b) {
+        b.json["cameras"][0]["orthographic"]["xmag"] = b.json["cameras"][0]["orthographic"]["ymag"] = 1e15;
+        optics({{"shift", {1000, -1000}}})(b);
+      },
+  };
+  for (const auto& make : kMakes) {
+    GltfBuilder b = displaced_square();
+    b.json["extensionsUsed"].push_back("RELIEF_camera");
+    make(b);
+    const Outcome outcome = render(bumpy(b), file("o.exr"), {"--resolution", "16x16", "--spp", "2"});
+    EXPECT_EQ(outcome.exit_code, 0) << b.json["nodes"] << b.json["cameras"] << outcome.errors;
+  }
+}
+
+TEST_F(DisplacementProgram, RaysMeetTheSurfaceFromAnywhereAndWithDirectionsOfAnyLength)
+{
+  const std::string scene = bumpy();
+  folder_.write("rays.txt",
+                ".3 .4 3 0 0 -1\n.3 .4 1e7 0 0 -1\n.3 .4 1e19 0 0 -1\n.3 .4 3e38 0 0 -1\n"
+                ".3 .4 3 0 0 -1e19\n.3 .4 3 0 0 -3e38\n.3 .4 3 0 0 -1e-30\n.3 .4 1e19 0 0 -1e30\n");
+  for (const std::string method : {"chord", "rmip", "rmip-minmax", "tfdm", "tessellate"}) {
+    const auto rows = trace(scene, {"--displacement", method});
+    ASSERT_EQ(rows.size(), 8u);
+    for (const auto& row : rows) {
+      ASSERT_EQ(row[0], "1") << method << " t of the ray " << rows[0][1];
+      for (std::size_t i = 2; i < 10; ++i) EXPECT_NEAR(std::stod(row[i]), std::stod(rows[0][i]), 1e-6) << method;
+    }
+    const double distance = std::stod(rows[0][1]), tolerance = 1e-6;
+    const double expected[] = {distance, 1e7, 1e19, 3e38, distance / 1e19, distance / 3e38, distance / 1e-30, 1e-11};
+    for (std::size_t r = 0; r < rows.size(); ++r)
+      EXPECT_NEAR(std::stod(rows[r][1]) / expected[r], 1, tolerance) << method << " ray " << r;
+  }
+}
+
+TEST_F(DisplacementProgram, NoRayFromAfarGetsThroughAPlane)
+{
+  constexpr int kQuads = 32;
+  std::vector<float> P, uv;
+  std::vector<std::uint16_t> indices;
+  for (int k = 0; k <= kQuads; ++k) {
+    for (int i = 0; i <= kQuads; ++i) {
+      uv.insert(uv.end(), {static_cast<float>(i) / kQuads, static_cast<float>(k) / kQuads});
+      P.insert(P.end(), {2 * uv[uv.size() - 2] - 1, 2 * uv.back() - 1, 0});
+      if (i == kQuads || k == kQuads) continue;
+      const int corner = k * (kQuads + 1) + i;
+      for (const int step : {0, 1, kQuads + 2, 0, kQuads + 2, kQuads + 1})
+        indices.push_back(static_cast<std::uint16_t>(corner + step));
+    }
+  }
+  GltfBuilder b = displaced_square();
+  nlohmann::json& primitive = b.json["meshes"][0]["primitives"][0];
+  primitive["attributes"] = {{"POSITION", b.accessor<float>(P, "VEC3")}, {"TEXCOORD_0", b.accessor<float>(uv, "VEC2")}};
+  primitive["indices"] = b.accessor<std::uint16_t>(indices, "SCALAR");
+  displacement_of(b)["scale"] = 0;
+  b.json["nodes"][0]["rotation"] = {0, 0, 0.6, 0.8};
+  const std::string scene = bumpy(b);
+  std::mt19937 random(4);
+  std::uniform_real_distribution<float> inside(-0.6f, 0.6f), slope(-1, 1);
+  std::string rays;
+  constexpr int kRays = 50'000;
+  for (int k = 0; k < kRays; ++k) {
+    // Multiples of this are floats also 8 km away, and six digits say them: every ray is aimed right.
+    const auto rounded = [](float v) { return std::round(v * 64) / 64; };
+    const float D[2] = {rounded(slope(random)), rounded(slope(random))};
+    for (const float d : D) rays += std::to_string(rounded(inside(random)) - 8192 * d) + " ";
+    rays += "8192 " + std::to_string(D[0]) + " " + std::to_string(D[1]) + " -1\n";
+  }
+  folder_.write("rays.txt", rays);
+  for (const std::string method : {"chord", "rmip", "tfdm"}) {
+    int num_missed = 0;
+    for (const auto& row : trace(scene, {"--displacement", method})) num_missed += row[0] == "0" ? 1 : 0;
+    EXPECT_EQ(num_missed, 0) << method;
+  }
+}
 
 TEST_F(DisplacementProgram, EveryMethodMeetsTheSameSurface)
 {
@@ -288,6 +423,91 @@ TEST_F(DisplacementProgram, InfoSaysHowItIsTraced)
                            ", displacement 0.0 MiB, acceleration structure ", "warning: 2 of 2 triangles of mesh "}) {
     EXPECT_NE(outcome.output.find(text), std::string::npos) << text << outcome.output;
   }
+}
+
+TEST_F(DisplacementProgram, TextureCoordinatesBeyondCountingAreSaidAndTheirTriangleStays)
+{
+  const std::string usual = bumpy();
+  // Below the diagonal; the other triangle is as it was.
+  folder_.write("rays.txt", "0.2 0.2 3 0 0 -1\n0.7 0.6 3 0 0 -1\n");
+  const auto expected = trace(usual, {});
+  for (const float far_uv : {1e20f, -1e20f, 1e30f}) {
+    GltfBuilder b = displaced_square();
+    const int uv = b.accessor<float>({far_uv, 0, 1, 0, 0, 1, 1, 1}, "VEC2");
+    b.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = uv;
+    const std::string scene = bumpy(b);
+    const Outcome info = run({"info", scene});
+    EXPECT_NE(info.output.find("1 of 2 triangles of mesh"), std::string::npos) << info.output;
+    EXPECT_NE(info.output.find("(the first is triangle 0) have texture coordinates beyond"), std::string::npos)
+        << info.output;
+    for (const char* method : {"chord", "rmip", "rmip-minmax", "tfdm", "tessellate", "tessellate-grid"}) {
+      const auto rows = trace(scene, {"--displacement", method});
+      EXPECT_EQ(rows[0][0], "1") << method;
+      // The mean of the map's corners, which uv (0, 0) is between.
+      EXPECT_NEAR(std::stod(rows[0][1]), 3 - 0.5 * (0x10 + 0xf0 + 0x70 + 0x18) / (4 * 255.0), 1e-5) << method;
+      EXPECT_EQ(rows[1][0], "1") << method;
+      if (std::string(method).rfind("tessellate", 0) == 0) continue;
+      EXPECT_EQ(rows[1][1], expected[1][1]) << method;
+    }
+  }
+}
+
+/// Half of the picture, 16x32, is free; in the other half rays run through 10⁹ tiles just below their highest points.
+GltfBuilder endless_tiles()
+{
+  GltfBuilder b = displaced_square();
+  const int uv = b.accessor<float>({0, 0, 1e9f, 0, 0, 1e9f, 1e9f, 1e9f}, "VEC2");
+  b.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = uv;
+  displacement_of(b)["scale"] = 0.001;
+  displacement_of(b)["frobnicate"] = 1;  // warned of before the frame is begun
+  b.json["cameras"][0]["orthographic"] = {{"xmag", 2e-7}, {"ymag", 4e-7}, {"znear", 0.1}, {"zfar", 100}};
+  nlohmann::json& camera = b.json["nodes"].back();
+  camera["translation"] = {-0.5, 0.5, 0.0010001};
+  camera["rotation"] = {0.5, -0.5, -0.5, 0.5};  // along x, z upward
+  return b;
+}
+
+TEST_F(DisplacementProgram, ATimeLimitOrASignalEndsRaysThroughTilesWithoutEnd)
+{
+  // One peak in every second row of texels, so that every row of cells has some.
+  const std::string scene = write(endless_tiles(), std::string("\xff\0\0\0\0\0\0\0\0\0\xff\0\0\0\0\0", 16));
+  // Generous: it is a second or two, and would be hours.
+  constexpr double kMostSeconds = 300;
+  for (const char* method : {"chord", "rmip", "rmip-minmax", "tfdm"}) {
+    const Arguments options = {"--displacement", method, "--resolution", "16x32",
+                               "--spp",          "1",    "--stats",      file("a.json")};
+    const auto start = std::chrono::steady_clock::now();
+    Arguments limited = options;
+    limited.insert(limited.end(), {"--time-limit", "0.2"});
+    const Outcome outcome = render(scene, file("a.exr"), limited);
+    EXPECT_EQ(outcome.exit_code, 0) << method << outcome.errors;
+    EXPECT_NE(outcome.errors.find("50 % of the picture has no sample"), std::string::npos) << method << outcome.errors;
+    const nlohmann::json stats = nlohmann::json::parse(bytes_of_file(file("a.json")));
+    EXPECT_EQ(stats["stop_reason"], "time_limit") << method;
+    EXPECT_EQ(stats["samples_per_pixel"], 0.5) << method;
+
+    Process process(render_arguments(scene, file("b.exr"), options), open_file("stdout"), open_file("stderr"));
+    // The warning says that the scene is loaded.
+    const auto pause = [] { std::this_thread::sleep_for(std::chrono::milliseconds(300)); };
+    pause();
+    for (int k = 0; k < 200 && bytes_of_file(file("stderr")).find("frobnicate") == std::string::npos; ++k) pause();
+    pause();
+    process.signal(SIGINT);
+    EXPECT_EQ(process.wait(), 130) << method;
+    EXPECT_LT(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), kMostSeconds) << method;
+  }
+}
+
+TEST_F(DisplacementProgram, ATimeLimitBeforeAnySampleIsAnError)
+{
+  GltfBuilder b = endless_tiles();
+  b.json["nodes"].back()["translation"] = {-0.5, 0.5, 0.0009997};
+  b.json["cameras"][0]["orthographic"]["ymag"] = 2e-7;
+  const std::string scene = write(b, std::string("\xff\0\0\0\0\0\0\0\0\0\xff\0\0\0\0\0", 16));
+  const Outcome outcome = render(scene, file("a.exr"), {"--time-limit", "0.2", "--spp", "1"});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.errors.find("the time limit came before the first sample"), std::string::npos) << outcome.errors;
+  EXPECT_FALSE(exists("a.exr"));
 }
 
 TEST_F(DisplacementProgram, WeldedSeamsAreClosedByWalls)

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <fcntl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -32,8 +33,10 @@ inline std::string bytes_of_file(const std::filesystem::path& path)
 /// A running `relief`. Its standard error goes to a file, its standard output to where `output` says.
 class Process {
  public:
-  /// @param output  descriptor of the new process's standard output, closed here afterwards
-  Process(const Arguments& arguments, int output, int error) : pid_(::fork())
+  /// @param output         descriptor of the new process's standard output, closed here afterwards
+  /// @param address_bytes  bound on the new process's address space, as a shell sets by `ulimit -v`
+  Process(const Arguments& arguments, int output, int error, std::uint64_t address_bytes = RLIM_INFINITY)
+      : pid_(::fork())
   {
     if (pid_ == 0) {
       ::dup2(output, STDOUT_FILENO);
@@ -41,6 +44,8 @@ class Process {
       std::vector<char*> argv = {const_cast<char*>("relief")};
       for (const std::string& a : arguments) argv.push_back(const_cast<char*>(a.c_str()));
       argv.push_back(nullptr);
+      const rlimit bound{address_bytes, address_bytes};
+      ::setrlimit(RLIMIT_AS, &bound);
       ::execv(RELIEF_PROGRAM, argv.data());
       std::_Exit(127);
     }
@@ -117,9 +122,9 @@ class ProgramTest : public ::testing::Test {
     return ::open(file(name).c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   }
 
-  Outcome run(const Arguments& arguments) const
+  Outcome run(const Arguments& arguments, std::uint64_t address_bytes = RLIM_INFINITY) const
   {
-    Process process(arguments, open_file("stdout"), open_file("stderr"));
+    Process process(arguments, open_file("stdout"), open_file("stderr"), address_bytes);
     Outcome outcome;
     outcome.exit_code = process.wait();
     outcome.output = bytes_of_file(file("stdout"));

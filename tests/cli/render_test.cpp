@@ -71,6 +71,50 @@ TEST_F(RenderProgram, CausticsStandStillFromFrameToFrame)
   EXPECT_EQ(values_of(file("f.3.exr"), "R"), values_of(file("f.4.exr"), "R"));
 }
 
+TEST_F(RenderProgram, PreviewsShowThePictureSoFarAndChangeNothing)
+{
+  const std::string scene = write_scene(lit_square());
+  for (const Arguments& more : {Arguments{}, {"--noise-threshold", "0.02"}, {"--crop", "3,5,60,40"}}) {
+    Arguments settings = {"--resolution", "96x96", "--spp", "100"};
+    settings.insert(settings.end(), more.begin(), more.end());
+    ASSERT_EQ(render(scene, file("plain.exr"), settings).exit_code, 0);
+    settings.insert(settings.end(), {"--preview", file("p.exr")});
+    const Outcome outcome = render(scene, file("watched.exr"), settings);
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+    for (const char* channel : {"R", "G", "B", "A", "samples.N", "half.R"}) {
+      EXPECT_EQ(values_of(file("plain.exr"), channel), values_of(file("watched.exr"), channel)) << channel;
+    }
+    // The first comes with the first sample, another not within half a second.
+    ASSERT_GE(outcome.count("preview"), 1) << outcome.output;
+    for (const nlohmann::json& event : outcome.events()) {
+      if (event["event"] != "preview") continue;
+      EXPECT_EQ(event["samples"], 1);
+      EXPECT_EQ(event["output"], file("p.exr"));
+      break;
+    }
+    const Picture preview = exr_load(file("p.exr")), picture = exr_load(file("watched.exr"));
+    EXPECT_EQ(preview.width, picture.width);
+    EXPECT_EQ(preview.crop_x, picture.crop_x);
+    ASSERT_EQ(preview.channels.size(), 4u);
+    double sums[2] = {};
+    for (const float v : preview.find("G")->values) sums[0] += double{v};
+    for (const float v : picture.find("G")->values) sums[1] += double{v};
+    EXPECT_NEAR(sums[0], sums[1], .02 * sums[1]);
+  }
+}
+
+TEST_F(RenderProgram, APreviewThatCannotBeWrittenCostsAWarning)
+{
+  const std::string scene = write_scene(lit_square());
+  std::filesystem::create_symlink("/dev/full", file("p.exr"));
+  const Outcome outcome = render(scene, file("a.exr"), {"--preview", file("p.exr"), "--spp", "40"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_NE(outcome.errors.find("no more previews"), std::string::npos) << outcome.errors;
+  EXPECT_TRUE(exists("a.exr"));
+  // It is an output like the others.
+  EXPECT_EQ(render(scene, file("a.exr"), {"--preview", file("a.exr")}).exit_code, 2);
+}
+
 TEST_F(RenderProgram, EveryOutputOfAFrameHasItsNumber)
 {
   const Outcome outcome = render(write_scene(lit_square()), file("a.exr"),

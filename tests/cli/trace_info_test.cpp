@@ -1,7 +1,10 @@
 // `relief trace` and `relief info` against scenes whose answers are known.
+#include <cmath>
+#include <cstdlib>
 #include <sstream>
 
 #include "tests/cli/program.h"
+#include "tests/support/image_bytes.h"
 
 namespace relief::test {
 namespace {
@@ -117,6 +120,106 @@ TEST_F(TraceInfoProgram, RaysOfAPixelFedBackHitWhereThePathWentOn)
   EXPECT_GE(num_followed, 4);
 }
 
+/// What `relief trace --pixel` says a path brings.
+std::vector<double> radiance_of(const std::string& text)
+{
+  std::istringstream words(text);
+  std::string hash, name, value;
+  words >> hash >> name;
+  EXPECT_EQ(name, "radiance") << text;
+  std::vector<double> radiance;
+  while (radiance.size() < 3 && words >> value) radiance.push_back(std::stod(value));
+  return radiance;
+}
+
+TEST_F(TraceInfoProgram, PathsOfAPixelAreThoseOfThePicture)
+{
+  const std::string scene = folder_.write("s.gltf", mirrored_lamp().gltf()).string();
+  for (const char* caustics : {"on", "off"}) {
+    const Arguments options = {"--resolution",  "24x24", "--spp",  "4",         "--seed",   "7",
+                               "--max-bounces", "5",     "--crop", "2,3,22,23", "--filter", "blackman-harris",
+                               "--caustics",    caustics};
+    Arguments render = {"render", scene, "-o", file("s.exr"), "--float"};
+    render.insert(render.end(), options.begin(), options.end());
+    ASSERT_EQ(run(render).exit_code, 0);
+    const Picture picture = exr_load(file("s.exr"));
+    for (const auto& [x, y] : {std::pair{8, 11}, {10, 13}}) {
+      std::vector<double> mean(3);
+      for (int sample = 0; sample < 4; ++sample) {
+        Arguments trace = {"trace", scene, "--pixel",
+                           std::to_string(x) + "," + std::to_string(y) + "," + std::to_string(sample)};
+        trace.insert(trace.end(), options.begin(), options.end());
+        const Outcome outcome = run(trace);
+        ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+        const std::vector<double> radiance = radiance_of(outcome.output);
+        ASSERT_EQ(radiance.size(), 3u);
+        for (std::size_t c = 0; c < 3; ++c) mean[c] += radiance[c] / 4;
+      }
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double expected = picture_layer(picture, "").channels[c].at(x - 2, y - 3);
+        EXPECT_GT(expected, 0);
+        EXPECT_NEAR(mean[c], expected, 2e-6 * expected) << x << ',' << y << " caustics " << caustics;
+      }
+    }
+  }
+}
+
+TEST_F(TraceInfoProgram, ACommandIsPrintedThatFollowsASampleThatWasNotFinite)
+{
+  // What the square emits, and what it reflects of a sky as bright, are together more than a float holds.
+  GltfBuilder b = lit_square();
+  b.json["extensionsUsed"].push_back("KHR_materials_emissive_strength");
+  b.json["extensions"]["RELIEF_environment"]["color"] = {3e38, 3e38, 3e38};
+  b.push("materials", {{"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 1}}},
+                       {"emissiveFactor", {1, 1, 1}},
+                       {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 3e38}}}}}});
+  b.json["meshes"][0]["primitives"][0]["material"] = 0;
+  const std::string scene = folder_.write("it's a scene.gltf", b.gltf()).string();
+  const Outcome rendered = run({"render",
+                                scene,
+                                "-o",
+                                file("s.exr"),
+                                "--frames",
+                                "3",
+                                "--resolution",
+                                "33x21",
+                                "--spp",
+                                "5",
+                                "--seed",
+                                "12345678901",
+                                "--crop",
+                                "3,2,30,20",
+                                "--filter",
+                                "box",
+                                "--max-bounces",
+                                "1",
+                                "--caustics",
+                                "off",
+                                "--camera",
+                                "front",
+                                "--displacement",
+                                "chord",
+                                "--lod",
+                                "0",
+                                "--displacement-memory",
+                                "0.5"});
+  ASSERT_EQ(rendered.exit_code, 0) << rendered.errors;
+  const std::size_t at = rendered.errors.find("relief trace ");
+  ASSERT_NE(at, std::string::npos) << rendered.errors;
+  const std::string command = rendered.errors.substr(at, rendered.errors.find('\n', at) - at);
+  for (const char* given : {"--resolution 33x21", "--spp 5", "--seed 12345678901", "--crop 3,2,30,20", "--filter box",
+                            "--max-bounces 1", "--caustics off", "--camera front", "--displacement chord", "--lod 0",
+                            "--displacement-memory 0.5", "--frame 3", "--pixel "}) {
+    EXPECT_NE(command.find(given), std::string::npos) << command;
+  }
+  const std::string shell = "relief() { '" RELIEF_PROGRAM "' \"$@\"; }\n" + command + " > '" + file("path.txt") + "'\n";
+  folder_.write("replay.sh", shell);
+  ASSERT_EQ(std::system(("sh '" + file("replay.sh") + "'").c_str()), 0) << command;
+  const std::vector<double> radiance = radiance_of(bytes_of_file(file("path.txt")));
+  ASSERT_EQ(radiance.size(), 3u);
+  EXPECT_FALSE(std::isfinite(radiance[0]));
+}
+
 TEST_F(TraceInfoProgram, TraceSeesTheFrameItIsAskedFor)
 {
   GltfBuilder b = triangle_scene();
@@ -139,6 +242,18 @@ TEST_F(TraceInfoProgram, TraceUsage)
   EXPECT_EQ(run({"trace", scene, "--rays", file("rays.txt"), "--seed", "1"}).exit_code, 2);
   EXPECT_EQ(run({"trace", scene, "--pixel", "960,0"}).exit_code, 2);
   EXPECT_EQ(run({"trace", scene, "--pixel", "959,539"}).exit_code, 0);
+  EXPECT_EQ(run({"trace", scene, "--pixel", "5,5", "--crop", "6,0,9,9"}).exit_code, 2);
+  EXPECT_EQ(run({"trace", scene, "--pixel", "5,5,8", "--spp", "8"}).exit_code, 2);
+  for (const Arguments& option : {Arguments{"--spp", "4"},
+                                  {"--crop", "0,0,1,1"},
+                                  {"--filter", "box"},
+                                  {"--caustics", "on"},
+                                  {"--max-bounces", "1"},
+                                  {"--displacement-memory", "1"}}) {
+    Arguments trace = {"trace", scene, "--rays", file("rays.txt")};
+    trace.insert(trace.end(), option.begin(), option.end());
+    EXPECT_EQ(run(trace).exit_code, 2) << option[0];
+  }
   EXPECT_EQ(run({"trace", scene, "--pixel", "1,1", "--camera", "nobody"}).exit_code, 2);
 }
 
@@ -192,17 +307,16 @@ TEST_F(TraceInfoProgram, InfoShowsHeightMapsAndTheirSeams)
   const int uv = b.accessor<float>({.25, 0, 2, 0, .25, 1, .75, 0, .75, 1, 0, 1}, "VEC2");
   b.mesh({{"attributes", {{"POSITION", P}, {"NORMAL", N}, {"TEXCOORD_0", uv}}}, {"material", 0}});
   b.root_node({{"mesh", 0}});
-  // P5: two grey texels, 51 and 255.
-  folder_.write("h.pgm", "P5 2 1 255\n\x33\xff");
+  folder_.write("h.tga", tga_grey(2, 1, "\x33\xff"));
   b.push("materials",
          {{"name", "bark"},
           {"extensions",
-           {{"RELIEF_displacement", {{"heightTexture", {{"uri", "h.pgm"}}}, {"scale", 0.5}, {"method", "chord"}}}}}});
+           {{"RELIEF_displacement", {{"heightTexture", {{"uri", "h.tga"}}}, {"scale", 0.5}, {"method", "chord"}}}}}});
   b.json["extensionsUsed"].push_back("RELIEF_displacement");
   const Outcome outcome = run({"info", folder_.write("s.gltf", b.gltf()).string()});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
   for (const char* text :
-       {"height maps: 1\n", "(h.pgm): 2x1, 8-bit, 0.0 MiB, heights 0.2 to 1, wrap repeat, repeat\n",
+       {"height maps: 1\n", "(h.tga): 2x1, 8-bit, 0.0 MiB, heights 0.2 to 1, wrap repeat, repeat\n",
         "displacements: 1\n", "  bark: ", "method chord, scale 0.5 m, midlevel 0.5, object space\n",
         "meshes: 1, uv 0 to 2, 0 to 1\n", "uv seams with different heights: 1 edges, 1.41421 m, gap up to 0.4 m\n",
         ", height maps 0.0 MiB, "}) {

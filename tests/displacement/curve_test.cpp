@@ -32,7 +32,8 @@ struct CurveProblem {
   const DisplacedTriangle& triangle() const { return traced.mesh().triangles[0]; }
   bool curve(const Ray& ray, RayCurve* out) const
   {
-    return ray_curve_make(ray_frame_make(TracedCase::vector3(ray.O), TracedCase::vector3(ray.D)), triangle(), out);
+    return ray_curve_make(ray_frame_make(to_double(TracedCase::vector3(ray.O)), to_double(TracedCase::vector3(ray.D))),
+                          triangle(), out);
   }
 
  private:

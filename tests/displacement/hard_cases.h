@@ -81,6 +81,15 @@ inline DisplacedTriangle scaled_uv(DisplacedTriangle triangle, double scale, dou
   return float_rounded(triangle);
 }
 
+/// Barycentric weights of the corners 1 and 2 at a place of the map.
+inline Vector2 weights_at_uv(const DisplacedTriangle& triangle, const Vector2& uv)
+{
+  const Vector2 a = triangle.uv[0], b = triangle.uv[1], c = triangle.uv[2];
+  const double bu = b[0] - a[0], bv = b[1] - a[1], cu = c[0] - a[0], cv = c[1] - a[1];
+  const double u = uv[0] - a[0], v = uv[1] - a[1], determinant = bu * cv - bv * cu;
+  return {(u * cv - v * cu) / determinant, (bu * v - bv * u) / determinant};
+}
+
 inline DisplacedTriangle scaled(DisplacedTriangle triangle, double scale, const Vector3& shift)
 {
   for (Vector3& P : triangle.P) P = combination(scale, P, 1, shift);
@@ -256,6 +265,34 @@ inline void add_texture_coordinates(std::vector<HardCase>& cases)
   for (Vector2& uv : triangle.uv) uv[0] = -uv[0];
   cases.push_back(random_rays_case("mirrored uv", triangle, map));
   cases.push_back(random_rays_case("uv at 10000", scaled_uv(domed, 1, 10000, -10000), map));
+  // So far beside a clamped map that floats do not count the texels in between. What varies is the other axis.
+  for (const auto& [size, far_uv] : {std::pair{1024, 10000.}, std::pair{4096, 10000.}, std::pair{16384, 1100.}}) {
+    const std::string at = "clamp at uv " + std::to_string(static_cast<int>(far_uv)) + " on a map of ";
+    const double span = 256. / size;
+    HeightMap across = noise_map(size, 4, .1), down = noise_map(4, size, .1);
+    across.wrap_u = down.wrap_v = Wrap::kClamp;
+    triangle = domed;
+    triangle.uv = {{{far_uv, 0}, {far_uv + span, 0}, {far_uv, 1}}};
+    cases.push_back(random_rays_case(at + std::to_string(size) + " x 4", float_rounded(triangle), across));
+    triangle.uv = {{{0, far_uv}, {0, far_uv + span}, {1, far_uv}}};
+    cases.push_back(random_rays_case(at + "4 x " + std::to_string(size), float_rounded(triangle), down));
+    across.wrap_v = Wrap::kClamp;
+    triangle.uv = {{{-far_uv, far_uv}, {span - far_uv, far_uv}, {-far_uv, 1 + far_uv}}};
+    cases.push_back(random_rays_case(at + std::to_string(size) + " x 4, both axes", float_rounded(triangle), across));
+  }
+  // From beside a clamped map over it to the other side. (Farther spans take the oracle minutes: see EveryTraversal.)
+  HeightMap island = noise_map(64, 16, .1);
+  island.wrap_u = island.wrap_v = Wrap::kClamp;
+  triangle = domed;
+  triangle.uv = {{{-20, -20}, {20, -6}, {4, 20}}};
+  cases.push_back(random_rays_case("clamp over a uv span of 40", triangle, island));
+  // Half of the rays at the little that is over the map.
+  std::mt19937_64 random(kSeed);
+  for (std::size_t i = 0; i < kNumRays; i += 2) {
+    const Vector2 b = weights_at_uv(triangle, {random_unit(random), random_unit(random)});
+    const Vector3 target = oracle::surface_eval(triangle, island, b).P;
+    cases.back().rays[i] = ray_through(combination(1, target, 1, random_direction(random)), target);
+  }
   cases.push_back(random_rays_case("uv far below a texel", scaled_uv(domed, 1. / 512, .25, .25), map));
   HardCase tiled = random_rays_case("tiled 1000 times", scaled_uv(domed, 1000, 0, 0), noise_map(8, 8, .002));
   cases.push_back(tiled);

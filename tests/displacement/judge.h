@@ -28,26 +28,12 @@
 #include "displacement/height_level.h"
 #include "tests/displacement/random_cases.h"
 #include "tests/oracle/displaced_triangle.h"
+#include "tests/support/test_rays.h"
 
 namespace relief {
 
 /// How GoogleTest prints a method.
 inline void PrintTo(const TraversalMethodLabel& label, std::ostream* out) { *out << label.name; }
-
-/// Rays of a test: as many as the environment variable RELIEF_TEST_RAYS says, for long runs, or its default.
-inline std::uint64_t num_test_rays(std::uint64_t usual)
-{
-  const char* text = std::getenv("RELIEF_TEST_RAYS");
-  return text != nullptr ? std::strtoull(text, nullptr, 10) : usual;
-}
-
-/// Which part of a long run this is: each has rays of its own, the same whenever it is run. The environment variable
-/// RELIEF_TEST_PART, or 0.
-inline std::uint64_t test_part()
-{
-  const char* text = std::getenv("RELIEF_TEST_PART");
-  return text != nullptr ? std::strtoull(text, nullptr, 10) : 0;
-}
 
 /// How many values fall between powers of two: quantiles of very many errors in a few bytes.
 class ErrorHistogram {
@@ -374,8 +360,9 @@ class Judge {
 
   bool trace(const Question& q, bool any_hit, DisplacedHit* hit)
   {
-    return table_.trace(q.traced.geometry(method_), q.index, TracedCase::vector3(q.ray.O), TracedCase::vector3(q.ray.D),
-                        {}, 0, q.ray.t_min, q.ray.t_max, any_hit, hit, &counters_);
+    return table_.trace(q.traced.geometry(method_), q.index, to_double(TracedCase::vector3(q.ray.O)),
+                        to_double(TracedCase::vector3(q.ray.D)), {}, 0, q.ray.t_min, q.ray.t_max, any_hit, hit,
+                        &counters_);
   }
   static double t_bound(const Question& q, const oracle::Hit& root);
   static const oracle::Hit* required_root(const Question& q);

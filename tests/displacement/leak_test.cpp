@@ -71,8 +71,9 @@ TEST_P(ClosedDisplacedSurface, IsFoundThroughEmbreeWhereAllTrianglesTogetherFind
       float nearest = HUGE_VALF;
       for (std::uint32_t index = 0; index < geometry.mesh.num_triangles; ++index) {
         DisplacedHit hit;
-        if (best_table().trace(geometry, index, TracedCase::vector3(ray.O), TracedCase::vector3(ray.D), {}, 0,
-                               ray.t_min, ray.t_max, false, &hit, &counters)) {
+        if (best_table().trace(geometry, index, to_double(TracedCase::vector3(ray.O)),
+                               to_double(TracedCase::vector3(ray.D)), {}, 0, ray.t_min, ray.t_max, false, &hit,
+                               &counters)) {
           nearest = std::min(nearest, static_cast<float>(hit.t));
         }
       }

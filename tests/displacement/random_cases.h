@@ -130,6 +130,28 @@ inline std::vector<double> random_heights(std::mt19937_64& random, int width, in
   return h;
 }
 
+/// Heights for a large map, in which nodes of many texels differ: hills, hills with noise, or plateaus whose edges are
+/// those of nodes.
+inline std::vector<double> random_landscape(std::mt19937_64& random, int width, int height)
+{
+  std::vector<double> h;
+  const int kind = random_index(random, 3), side = 4 << random_index(random, 5);
+  const double frequency_x = random_between(random, 5, 60) / width,
+               frequency_y = random_between(random, 5, 60) / height;
+  const int columns = (width + side - 1) / side, rows = (height + side - 1) / side;
+  std::vector<double> plateaus;
+  for (int k = 0; k < columns * rows; ++k) plateaus.push_back(random_unit(random));
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      double value = .5 + .4 * std::sin(frequency_x * x) * std::cos(frequency_y * y);
+      if (kind == 1) value += .05 * random_between(random, -1, 1);
+      if (kind == 2) value = plateaus[static_cast<std::size_t>(y / side * columns + x / side)];
+      h.push_back(float_rounded(value));
+    }
+  }
+  return h;
+}
+
 /// Lowest and highest displacement of a map.
 inline std::array<double, 2> displacement_range(const oracle::HeightMap& map)
 {
@@ -200,20 +222,10 @@ inline std::vector<oracle::Ray> random_rays(std::mt19937_64& random,
   return rays;
 }
 
-/// @param random    its state decides everything
-/// @return          a triangle of 1 to about 200 texels, normals up to 60° apart, and a map of up to 32 × 32 texels
-inline RandomCase random_case(std::mt19937_64& random, int num_rays)
+/// Corners around a centre, and normals up to 60° apart.
+inline oracle::DisplacedTriangle random_base_triangle(std::mt19937_64& random, double size)
 {
-  RandomCase result;
-  oracle::DisplacedTriangle& triangle = result.triangle;
-  oracle::HeightMap& map = result.map;
-  map.width = 1 + random_index(random, 32);
-  map.height = 1 + random_index(random, 32);
-  map.h = random_heights(random, map.width, map.height);
-  map.wrap_u = static_cast<oracle::Wrap>(random_index(random, 3));
-  map.wrap_v = static_cast<oracle::Wrap>(random_index(random, 3));
-
-  const double size = std::pow(10, random_between(random, -2, 2));
+  oracle::DisplacedTriangle triangle;
   const oracle::Vector3 center = random_vector(random, 0, 10 * size);
   for (oracle::Vector3& corner : triangle.P) {
     corner = float_rounded(combination(1, center, size, random_direction(random)));
@@ -228,17 +240,73 @@ inline RandomCase random_case(std::mt19937_64& random, int num_rays)
     N = float_rounded(
         combination(N_length, unit_vector(combination(1, base_normal, lean, random_direction(random))), 0, {}));
   }
-  const double amplitude = size * std::pow(10, random_between(random, -2, -.3));
-  map.scale = float_rounded(random_index(random, 4) == 0 ? -amplitude : amplitude);
-  map.midlevel = random_index(random, 2) == 0 ? .5 : float_rounded(random_unit(random));
+  return triangle;
+}
 
-  const double texels_across = std::pow(10, random_between(random, 0, 1.2));
+/// Scale of either sign, and midlevel.
+inline void set_random_scale(std::mt19937_64& random, double amplitude, oracle::HeightMap* map)
+{
+  map->scale = float_rounded(random_index(random, 4) == 0 ? -amplitude : amplitude);
+  map->midlevel = random_index(random, 2) == 0 ? .5 : float_rounded(random_unit(random));
+}
+
+/// Places a triangle in a map, anywhere up to three periods from its corner.
+inline void set_random_uv(std::mt19937_64& random,
+                          const oracle::HeightMap& map,
+                          double texels_across,
+                          oracle::DisplacedTriangle* triangle)
+{
   const double shift_u = random_between(random, -3, 3), shift_v = random_between(random, -3, 3);
-  for (oracle::Vector2& uv : triangle.uv) {
+  for (oracle::Vector2& uv : triangle->uv) {
     uv = {float_rounded(shift_u + texels_across / map.width * random_between(random, -1, 1)),
           float_rounded(shift_v + texels_across / map.height * random_between(random, -1, 1))};
   }
-  result.rays = random_rays(random, triangle, map, num_rays);
+}
+
+/// @param random    its state decides everything
+/// @return          a triangle of 1 to about 200 texels, normals up to 60° apart, and a map of up to 32 × 32 texels
+inline RandomCase random_case(std::mt19937_64& random, int num_rays)
+{
+  RandomCase result;
+  oracle::HeightMap& map = result.map;
+  map.width = 1 + random_index(random, 32);
+  map.height = 1 + random_index(random, 32);
+  map.h = random_heights(random, map.width, map.height);
+  map.wrap_u = static_cast<oracle::Wrap>(random_index(random, 3));
+  map.wrap_v = static_cast<oracle::Wrap>(random_index(random, 3));
+  const double size = std::pow(10, random_between(random, -2, 2));
+  result.triangle = random_base_triangle(random, size);
+  set_random_scale(random, size * std::pow(10, random_between(random, -2, -.3)), &map);
+  set_random_uv(random, map, std::pow(10, random_between(random, 0, 1.2)), &result.triangle);
+  result.rays = random_rays(random, result.triangle, map, num_rays);
+  return result;
+}
+
+/// A map with several triangles, and rays for each of them.
+struct RandomLargeCase {
+  oracle::HeightMap map;
+  std::vector<oracle::DisplacedTriangle> triangles;
+  std::vector<std::vector<oracle::Ray>> rays;  ///< by triangle
+};
+
+/// @return  triangles of 10 to about 1000 texels a side on a map of 256 to 1024 texels a side
+inline RandomLargeCase random_large_case(std::mt19937_64& random, int num_triangles, int num_rays)
+{
+  RandomLargeCase result;
+  oracle::HeightMap& map = result.map;
+  map.width = 256 + random_index(random, 769);
+  map.height = 256 + random_index(random, 769);
+  map.h = random_landscape(random, map.width, map.height);
+  map.wrap_u = static_cast<oracle::Wrap>(random_index(random, 3));
+  map.wrap_v = static_cast<oracle::Wrap>(random_index(random, 3));
+  const double size = std::pow(10, random_between(random, -2, 2));
+  set_random_scale(random, size * std::pow(10, random_between(random, -3, -.6)), &map);
+  for (int k = 0; k < num_triangles; ++k) {
+    oracle::DisplacedTriangle triangle = random_base_triangle(random, size);
+    set_random_uv(random, map, std::pow(10, random_between(random, 1, 2.7)), &triangle);
+    result.rays.push_back(random_rays(random, triangle, map, num_rays));
+    result.triangles.push_back(triangle);
+  }
   return result;
 }
 

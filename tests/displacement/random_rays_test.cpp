@@ -127,8 +127,32 @@ void judge_case(std::uint64_t number, RTCDevice device, Findings* findings)
     compare_tessellation(traced, drawn.rays, roots, device, kKinds[k], &findings->tessellations[k]);
 }
 
+constexpr int kTrianglesPerLargeMap = 8;
+constexpr int kRaysPerTriangle = 40;
+
+void judge_large_case(std::uint64_t number, RTCDevice, Findings* findings)
+{
+  std::mt19937_64 random(number);
+  RandomLargeCase drawn = random_large_case(random, kTrianglesPerLargeMap, kRaysPerTriangle);
+  const HeightFormat format = kFormats[number % 4];
+  drawn.map = stored_heights(drawn.map, format);
+  const TracedCase traced(drawn.triangles, drawn.map, format);
+  for (std::uint32_t index = 0; index < drawn.triangles.size(); ++index) {
+    const JudgedTriangle triangle(drawn.triangles[index], drawn.map);
+    for (std::size_t k = 0; k < drawn.rays[index].size(); ++k) {
+      const oracle::Ray& ray = drawn.rays[index][k];
+      const std::vector<oracle::Hit> roots = triangle.surface.intersect_all(ray);
+      const std::string label = "large case " + std::to_string(number) + " ray " + std::to_string(k);
+      for (Judge& judge : findings->judges) judge.judge(traced, index, triangle, ray, roots, label);
+    }
+  }
+}
+
 /// Judges as many cases, from number `first` on, on all processors.
-std::vector<Findings> judge_cases(std::uint64_t first, std::uint64_t num_cases)
+/// @param judge  judge_case or judge_large_case
+std::vector<Findings> judge_cases(std::uint64_t first,
+                                  std::uint64_t num_cases,
+                                  void (*judge)(std::uint64_t, RTCDevice, Findings*))
 {
   std::vector<Findings> findings(std::max(1u, std::thread::hardware_concurrency()));
   std::atomic<std::uint64_t> next{first};
@@ -136,9 +160,9 @@ std::vector<Findings> judge_cases(std::uint64_t first, std::uint64_t num_cases)
   std::vector<std::thread> threads;
   threads.reserve(findings.size());
   for (Findings& mine : findings) {
-    threads.emplace_back([&mine, &next, end] {
+    threads.emplace_back([&mine, &next, end, judge] {
       RTCDevice device = rtcNewDevice("threads=1");
-      for (std::uint64_t number = next++; number < end; number = next++) judge_case(number, device, &mine);
+      for (std::uint64_t number = next++; number < end; number = next++) judge(number, device, &mine);
       rtcReleaseDevice(device);
     });
   }
@@ -146,10 +170,8 @@ std::vector<Findings> judge_cases(std::uint64_t first, std::uint64_t num_cases)
   return findings;
 }
 
-TEST(RandomDisplacedTriangles, AreFoundByEveryMethodAsByTheOracle)
+void expect_no_faults(const std::vector<Findings>& findings)
 {
-  const std::uint64_t num_cases = num_test_rays(200000) / kRaysPerCase;
-  const std::vector<Findings> findings = judge_cases(1 + test_part() * num_cases, num_cases);
   const std::vector<Judge>& judges = findings[0].judges;
   for (std::size_t k = 0; k < judges.size(); ++k) {
     Judgement sum;
@@ -159,6 +181,19 @@ TEST(RandomDisplacedTriangles, AreFoundByEveryMethodAsByTheOracle)
     // One ray in ten thousand may be decided by rounding: most of those start on the surface.
     EXPECT_LE(sum.num_beside, sum.num_rays / 10000) << judges[k].name() << " " << sum.text();
   }
+}
+
+TEST(RandomTrianglesOnLargeMaps, AreFoundByEveryMethodAsByTheOracle)
+{
+  const std::uint64_t num_cases = num_test_rays(16000) / (kTrianglesPerLargeMap * kRaysPerTriangle);
+  expect_no_faults(judge_cases(1 + test_part() * num_cases, num_cases, judge_large_case));
+}
+
+TEST(RandomDisplacedTriangles, AreFoundByEveryMethodAsByTheOracle)
+{
+  const std::uint64_t num_cases = num_test_rays(200000) / kRaysPerCase;
+  const std::vector<Findings> findings = judge_cases(1 + test_part() * num_cases, num_cases, judge_case);
+  expect_no_faults(findings);
   for (std::size_t k = 0; k < std::size(kKinds); ++k) {
     TessellationErrors sum;
     for (const Findings& each : findings) sum.add(each.tessellations[k]);

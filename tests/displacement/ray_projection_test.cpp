@@ -9,6 +9,7 @@
 #include "displacement/bounds3d.h"
 #include "displacement/inversion.h"
 #include "displacement/leaf.h"
+#include "displacement/traverse_rmip.h"
 #include "tests/displacement/judge.h"
 #include "tests/displacement/random_cases.h"
 
@@ -25,7 +26,8 @@ void for_random_segments(std::uint64_t seed, int num_cases, const Function& do_s
     const TracedCase traced({drawn.triangle}, drawn.map);
     const DisplacedMeshView mesh = traced.mesh();
     for (const oracle::Ray& ray : drawn.rays) {
-      const RayFrame frame = ray_frame_make(TracedCase::vector3(ray.O), TracedCase::vector3(ray.D));
+      const RayFrame frame =
+          ray_frame_make(to_double(TracedCase::vector3(ray.O)), to_double(TracedCase::vector3(ray.D)));
       RayCurve curve;
       if (!ray_curve_make(frame, mesh.triangles[0], &curve)) continue;
       for (int s = 0; s < curve.num_segments; ++s) {
@@ -90,25 +92,70 @@ TEST(RayProjection, IsMonotoneBetweenTurningPoints)
 
 TEST(RayProjection, IsSplitInTheMiddleOfTheLongerSide)
 {
-  for_random_segments(3, 500,
-                      [](const DisplacedTriangle& tri, const RayCurve&, const CurveSegment& g, const RayFrame&, bool) {
-                        const RayProjection r = ray_projection_make(tri, g);
-                        double cuts[6];
-                        const int num_stretches = stretches_of(r, cuts);
-                        for (int k = 0; k < num_stretches; ++k) {
-                          ProjectedStretch b, front, back;
-                          stretch_start(r, cuts[k], &b);
-                          stretch_end(r, cuts[k + 1], &b);
-                          const double width = std::abs(b.x1 - b.x0), height = std::abs(b.y1 - b.y0);
-                          if (max(width, height) < 1e-6 || !stretch_split(r, b, &front, &back)) continue;
-                          EXPECT_EQ(front.tau1, back.tau0);
-                          if (width >= height) {
-                            EXPECT_NEAR(front.x1, 0.5 * (b.x0 + b.x1), r.pad_x + 1e-12 * width);
-                          } else {
-                            EXPECT_NEAR(front.y1, 0.5 * (b.y0 + b.y1), r.pad_y + 1e-12 * height);
-                          }
-                        }
-                      });
+  for_random_segments(
+      3, 500, [](const DisplacedTriangle& tri, const RayCurve&, const CurveSegment& g, const RayFrame&, bool) {
+        const RayProjection r = ray_projection_make(tri, g);
+        double cuts[6];
+        const int num_stretches = stretches_of(r, cuts);
+        for (int k = 0; k < num_stretches; ++k) {
+          ProjectedStretch b, front, back;
+          stretch_start(r, cuts[k], &b);
+          stretch_end(r, cuts[k + 1], &b);
+          const double width = std::abs(b.x1 - b.x0), height = std::abs(b.y1 - b.y0);
+          if (max(width, height) < 1e-6 || !stretch_split(r, b, {b.x0, b.x1, b.y0, b.y1}, &front, &back)) continue;
+          EXPECT_EQ(front.tau1, back.tau0);
+          if (width >= height) {
+            EXPECT_NEAR(front.x1, 0.5 * (b.x0 + b.x1), r.pad_x + 1e-12 * width);
+          } else {
+            EXPECT_NEAR(front.y1, 0.5 * (b.y0 + b.y1), r.pad_y + 1e-12 * height);
+          }
+        }
+      });
+}
+
+TEST(RayProjection, IsSplitInTheMiddleOfWhatIsOverAClampedMap)
+{
+  const LatticeAxis clamped{64, Wrap::kClamp, 65, -1}, repeated{64, Wrap::kRepeat, 64, 0};
+  // A ray from (−1000, 0) to (5000, 20), counted from a vertex at (10, 0).
+  const RayProjection r{{0, 6000, -1010}, {0, 20, 0}, {0, 0, 1}, 10, 0, 0, 0};
+  ProjectedStretch whole, front, back;
+  stretch_start(r, 0, &whole);
+  stretch_end(r, 1, &whole);
+  const VaryingPart y = varying_part(repeated, r.origin_y);
+  const VaryingSides over_map = varying_sides(whole, varying_part(clamped, r.origin_x), y);
+  ASSERT_TRUE(stretch_split(r, whole, over_map, &front, &back));
+  EXPECT_NEAR(front.x1 + r.origin_x, 31.5, 1e-9);
+  EXPECT_EQ(over_map.y1, 20);
+  ASSERT_TRUE(stretch_split(r, whole, varying_sides(whole, varying_part(repeated, r.origin_x), y), &front, &back));
+  EXPECT_NEAR(front.x1 + r.origin_x, 2000, 1e-9);
+}
+
+TEST(RmipTraversal, RectanglesHoldTheirStretchInSpiteOfRounding)
+{
+  // The same quotients in a longer format; without the pads one position in four would be outside.
+  for_random_segments(
+      12, 500, [](const DisplacedTriangle& tri, const RayCurve&, const CurveSegment& g, const RayFrame&, bool) {
+        const RayProjection r = ray_projection_make(tri, g);
+        const auto at = [](const Quadratic& p, long double tau) {
+          return (static_cast<long double>(p.a) * tau + static_cast<long double>(p.b)) * tau +
+                 static_cast<long double>(p.c);
+        };
+        double cuts[6];
+        const int num_stretches = stretches_of(r, cuts);
+        for (int k = 0; k < num_stretches; ++k) {
+          ProjectedStretch b;
+          stretch_start(r, cuts[k], &b);
+          stretch_end(r, cuts[k + 1], &b);
+          const CentredRect rect = rmip_detail::rectangle_of(r, b);
+          for (const double tau : {cuts[k], cuts[k + 1]}) {
+            const long double W = at(r.W, static_cast<long double>(tau));
+            const long double x = at(r.X, static_cast<long double>(tau)) / W;
+            const long double y = at(r.Y, static_cast<long double>(tau)) / W;
+            EXPECT_LE(std::abs(x - static_cast<long double>(rect.x)), static_cast<long double>(rect.rx));
+            EXPECT_LE(std::abs(y - static_cast<long double>(rect.y)), static_cast<long double>(rect.ry));
+          }
+        }
+      });
 }
 
 TEST(BernsteinCrossing, NeedsNoDiscriminantNorOrder)
@@ -220,7 +267,7 @@ TEST(SurfaceBounds, AreMetByRaysThroughPointsInside)
     const oracle::Vector3 away = random_direction(random);
     const double distance = length(X - to_double(tri.P[0])) + length(to_double(tri.P[1]) - to_double(tri.P[0]));
     const Vec3f O = to_float(X + Vec3d{away[0], away[1], away[2]} * distance), D = to_float(X - to_double(O));
-    const LatticeFrame f = lattice_frame_make(tri, ray_frame_make(O, D));
+    const LatticeFrame f = lattice_frame_make(tri, ray_frame_make(to_double(O), to_double(D)));
     const ScalarRange t = surface_bounds_intersect(f, rect, s);
     // The float ray passes the point within 1e-6 of the distance; bounds thinner than that prove nothing.
     const double thickness = (s.high - s.low) * length(at(tri.N));

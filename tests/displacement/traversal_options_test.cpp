@@ -1,7 +1,11 @@
 // The published traversals with every option, table and direction of a limit, against the fast one, which methods_test.cpp
 // compares with the oracle.
+#include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <iostream>
 #include <string>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -39,7 +43,7 @@ void compare_with_chord(std::uint64_t seed, int num_cases, const Tables& make_ta
     Query q{traced.mesh(), {}, {}, 0, 0};
     const auto tables = make_tables(*q.mesh.field);
     for (const oracle::Ray& ray : drawn.rays) {
-      q.frame = ray_frame_make(TracedCase::vector3(ray.O), TracedCase::vector3(ray.D));
+      q.frame = ray_frame_make(to_double(TracedCase::vector3(ray.O)), to_double(TracedCase::vector3(ray.D)));
       if (!ray_curve_make(q.frame, q.mesh.triangles[0], &q.curve)) continue;
       q.t_min = ray.t_min;
       q.t_max = ray.t_max;
@@ -122,7 +126,7 @@ TEST(PublishedTraversals, FindTheFirstOfThousandsOfTiles)
     const Vec3f O{-1, -1, 0.01f + 0.1f * static_cast<float>(random_unit(random))};
     const Vec3f target{0.8f * static_cast<float>(random_unit(random)), 0.2f * static_cast<float>(random_unit(random)),
                        0};
-    const RayFrame frame = ray_frame_make(O, target - O);
+    const RayFrame frame = ray_frame_make(to_double(O), to_double(target - O));
     RayCurve curve;
     if (!ray_curve_make(frame, mesh.triangles[0], &curve)) continue;
     TraversalCounters counters, tfdm_counters;
@@ -135,6 +139,119 @@ TEST(PublishedTraversals, FindTheFirstOfThousandsOfTiles)
     // Tiles are skipped as nodes are, not one by one: there are 179 200 periods.
     EXPECT_LT(tfdm_counters.bounds, 20000u);
   }
+}
+
+/// A flat triangle over much of a map, and what traversals need besides.
+class WideTriangle {
+ public:
+  WideTriangle(double span_u, double span_v, oracle::HeightMap map)
+      : traced_({{{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}},
+                  {{{0, 0, 1}, {0, 0, 1}, {0, 0, 1}}},
+                  {{{-span_u, -span_v}, {span_u, -span_v}, {-span_u, span_v}}}}},
+                std::move(map)),
+        rmip_(*traced_.mesh().field),
+        mipmap_(*traced_.mesh().field)
+  {
+  }
+
+  /// @param stop  as TraversalCounters has it
+  bool trace(TraversalMethod method,
+             const oracle::Ray& ray,
+             DisplacedHit* hit,
+             TraversalCounters* counters,
+             const std::atomic<bool>* stop = nullptr) const
+  {
+    const DisplacedMeshView mesh = traced_.mesh();
+    const RayFrame frame = ray_frame_make(to_double(TracedCase::vector3(ray.O)), to_double(TracedCase::vector3(ray.D)));
+    counters->stop = stop;
+    RayCurve curve;
+    if (!ray_curve_make(frame, mesh.triangles[0], &curve)) return false;
+    switch (method) {
+      case TraversalMethod::kChord:
+        break;
+      case TraversalMethod::kRmip:
+        return traverse_rmip(mesh, 0, frame, curve, rmip_.view(), {}, 0, 1e30, false, hit, counters);
+      case TraversalMethod::kRmipOnMinmax:
+        return traverse_rmip(mesh, 0, frame, curve, mipmap_.view(), {}, 0, 1e30, false, hit, counters);
+      case TraversalMethod::kTfdm:
+        return traverse_tfdm(mesh, 0, frame, curve, mipmap_.view(), 0, 1e30, false, hit, counters);
+    }
+    return traverse_chord(mesh, 0, curve, 0, 1e30, false, hit, counters);
+  }
+
+ private:
+  TracedCase traced_;
+  Rmip rmip_;
+  MinmaxMipmap mipmap_;
+};
+
+class EveryTraversal : public testing::TestWithParam<TraversalMethodLabel> {};
+
+TEST_P(EveryTraversal, TakesAsLongAsAClampedMapIsLarge)
+{
+  std::mt19937_64 random(9);
+  oracle::HeightMap map{64, 64, {}, oracle::Wrap::kClamp, oracle::Wrap::kClamp, 0.01, 0.5};
+  for (int k = 0; k < 64 * 64; ++k) map.h.push_back(float_rounded(random_unit(random)));
+  const WideTriangle wide(1e7, 1e7, map);
+  std::uint64_t most = 0;
+  for (int k = 0; k < 2000; ++k) {
+    // Grazing: through what varies along one axis beside the map, over it, and far from it.
+    const oracle::Vector3 target{.5 + random_between(random, -1, 1) * std::pow(10, random_between(random, -8, -1)),
+                                 .5 + random_between(random, -1, 1) * std::pow(10, random_between(random, -8, -1)),
+                                 random_between(random, -.005, .005)};
+    const double phi = random_between(random, 0, 6.283), tilt = std::pow(10, random_between(random, -6, 0));
+    const oracle::Vector3 away{std::cos(phi), std::sin(phi), tilt};
+    const oracle::Ray ray = ray_through(combination(1, target, 1, away), target);
+    DisplacedHit hit, expected;
+    TraversalCounters counters, others;
+    const bool found = wide.trace(GetParam().method, ray, &hit, &counters);
+    ASSERT_EQ(found, wide.trace(TraversalMethod::kTfdm, ray, &expected, &others)) << k;
+    if (found) {
+      EXPECT_NEAR(hit.t, expected.t, 1e-7) << k;
+    }
+    most = std::max(most, counters.bounds + counters.texels);
+  }
+  std::cout << "[ figures  ] " << GetParam().name << ": at most " << most << " bounds and texels a ray\n";
+  // Along an edge there are 64 cells, and as many nodes and marches; the triangle has 1.3 · 10⁹ texels a side.
+  EXPECT_LT(most, 3000u);
+}
+
+TEST_P(EveryTraversal, IsGivenUpWhenNobodyWaits)
+{
+  oracle::HeightMap map{4, 4, std::vector<double>(16, 0.), oracle::Wrap::kRepeat, oracle::Wrap::kRepeat, 0.001, 0};
+  for (std::size_t k = 0; k < 16; k += 5) map.h[k] = 1;
+  const WideTriangle wide(5e8, 5e8, map);
+  const std::atomic<bool> stop{true};
+  // Just below the highest points of 10⁹ tiles that it passes by.
+  const oracle::Ray ray = ray_through({-1, .1, .0009995}, {1, .27, .0009993});
+  DisplacedHit hit;
+  TraversalCounters counters;
+  EXPECT_FALSE(wide.trace(GetParam().method, ray, &hit, &counters, &stop));
+  EXPECT_TRUE(counters.stopped);
+  EXPECT_LT(counters.bounds, 10000u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Displacement, EveryTraversal, testing::ValuesIn(kTraversalMethods), [](const auto& each) {
+  std::string name(each.param.name);
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+});
+
+TEST(ChordTraversal, SkipsARowOfAMillionTilesThatItPassesOver)
+{
+  // Every row of texels has a height of its own, and one ray runs along a low row, far below the highest.
+  oracle::HeightMap map{64, 64, {}, oracle::Wrap::kRepeat, oracle::Wrap::kRepeat, 1e-3, 0};
+  std::mt19937_64 random(10);
+  for (int row = 0; row < 64; ++row) {
+    for (int column = 0; column < 64; ++column)
+      map.h.push_back(float_rounded(row < 48 ? .5 * random_unit(random) : .5 + .5 * random_unit(random)));
+  }
+  const WideTriangle wide(5e5, .5, map);
+  DisplacedHit hit;
+  TraversalCounters over, into;
+  EXPECT_FALSE(wide.trace(TraversalMethod::kChord, ray_through({-1, .1, 6e-4}, {1, .1001, 6e-4}), &hit, &over));
+  EXPECT_LT(over.bounds, 1000u);
+  EXPECT_TRUE(wide.trace(TraversalMethod::kChord, ray_through({-1, .4, 6e-4}, {1, .4001, 6e-4}), &hit, &into));
 }
 
 }  // namespace

@@ -1,12 +1,20 @@
 #include "exporters/atomic_file.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <atomic>
+#include <csignal>
 #include <thread>
 
 #include "exporters/errors.h"
+#include "exporters/output_lock.h"
+#include "exporters/side_file.h"
 #include "tests/exporters/test_pictures.h"
 
 namespace relief {
@@ -69,12 +77,20 @@ TEST_F(AtomicFileTest, AFullDiskIsAnError)
 
 TEST_F(AtomicFileTest, AFailureThatNobodyListenedToIsReportedAtTheEnd)
 {
-  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
-  AtomicFile file("/dev/full");
-  file.write("x", 1);
-  // The seek flushes, fails, and leaves nothing in the buffer that could fail again.
-  EXPECT_THROW(file.seek(0), OutputError);
-  EXPECT_THROW(file.commit(), OutputError);
+  std::signal(SIGXFSZ, SIG_IGN);
+  rlimit old{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &old), 0);
+  const rlimit nothing = {0, old.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &nothing), 0);
+  {
+    AtomicFile output(file("a.txt"));
+    output.write("x", 1);
+    // The seek flushes, fails, and leaves nothing in the buffer that could fail again.
+    EXPECT_THROW(output.seek(0), OutputError);
+    EXPECT_THROW(output.commit(), OutputError);
+  }
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &old), 0);
+  EXPECT_TRUE(files_in_folder().empty());
 }
 
 TEST_F(AtomicFileTest, ADeviceIsWrittenAndNotReplaced)
@@ -90,6 +106,172 @@ TEST_F(AtomicFileTest, FollowsASymbolicLink)
   atomic_write(file("link.txt"), "new");
   EXPECT_TRUE(std::filesystem::is_symlink(file("link.txt")));
   EXPECT_EQ(bytes_of_file(file("real.txt")), "new");
+}
+
+TEST_F(AtomicFileTest, MakesTheFileThatALinkAsksFor)
+{
+  std::filesystem::create_directory(file("there"));
+  std::filesystem::create_symlink("second.txt", file("first.txt"));
+  std::filesystem::create_symlink("there/new.txt", file("second.txt"));
+  atomic_write(file("first.txt"), "new");
+  EXPECT_TRUE(std::filesystem::is_symlink(file("first.txt")));
+  EXPECT_TRUE(std::filesystem::is_symlink(file("second.txt")));
+  EXPECT_EQ(bytes_of_file(file("there/new.txt")), "new");
+  std::filesystem::create_symlink("b.txt", file("a.txt"));
+  std::filesystem::create_symlink("a.txt", file("b.txt"));
+  EXPECT_THROW(atomic_write(file("a.txt"), "x"), OutputError);
+}
+
+TEST_F(AtomicFileTest, KeepsPermissionsAndOwnerAndMakesNewFilesAsTheMaskSays)
+{
+  const auto mode_of = [&](const char* name) {
+    struct stat status {};
+    EXPECT_EQ(::stat(file(name).c_str(), &status), 0);
+    return status.st_mode & 07777u;
+  };
+  const mode_t old_mask = ::umask(027);
+  atomic_write(file("new.txt"), "x");
+  ::umask(old_mask);
+  EXPECT_EQ(mode_of("new.txt"), 0640u);
+  for (const mode_t mode : {mode_t{0600}, mode_t{0666}, mode_t{0640}}) {
+    write_bytes(file("old.txt"), "old");
+    ASSERT_EQ(::chmod(file("old.txt").c_str(), mode), 0);
+    const bool may_give_away = ::chown(file("old.txt").c_str(), 1234, 1235) == 0;
+    atomic_write(file("old.txt"), "new");
+    EXPECT_EQ(mode_of("old.txt"), mode);
+    struct stat status {};
+    ASSERT_EQ(::stat(file("old.txt").c_str(), &status), 0);
+    if (may_give_away) {
+      EXPECT_EQ(status.st_uid, 1234u);
+      EXPECT_EQ(status.st_gid, 1235u);
+    }
+  }
+}
+
+TEST_F(AtomicFileTest, AFileThatMayNotBeWrittenIsLeftAlone)
+{
+  std::filesystem::permissions(folder_, std::filesystem::perms::all);
+  write_bytes(file("a.txt"), "old");
+  ASSERT_EQ(::chmod(file("a.txt").c_str(), 0444), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    // The superuser may write anything.
+    if (::geteuid() == 0 && (::setgid(65534) != 0 || ::setuid(65534) != 0)) _exit(2);
+    try {
+      atomic_write(file("a.txt"), "new");
+    } catch (const OutputError& error) {
+      _exit(error.cause == "Permission denied" ? 0 : 3);
+    }
+    _exit(4);
+  }
+  int status = -1;
+  waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
+  EXPECT_EQ(bytes_of_file(file("a.txt")), "old");
+}
+
+TEST_F(AtomicFileTest, TakesNamesOfEveryLength)
+{
+  for (const std::size_t length : {1u, 233u, 234u, 254u, 255u}) {
+    atomic_write(file(std::string(length, 'n')), "x");
+    EXPECT_EQ(bytes_of_file(file(std::string(length, 'n'))), "x") << length;
+  }
+  try {
+    AtomicFile output(file(std::string(256, 'n')));
+    FAIL() << "found too late";
+  } catch (const OutputError& error) {
+    EXPECT_EQ(error.cause, "File name too long");
+  }
+}
+
+TEST_F(AtomicFileTest, AnOpenFileIsWrittenAtItsPosition)
+{
+  write_bytes(file("log.txt"), "first\n");
+  const int log = ::open(file("log.txt").c_str(), O_WRONLY | O_APPEND);
+  AtomicFile output("/dev/fd/" + std::to_string(log));
+  output.write("??cond\n", 7);
+  output.seek(0);
+  output.write("se", 2);
+  output.commit();
+  EXPECT_EQ(::close(log), 0);
+  EXPECT_EQ(bytes_of_file(file("log.txt")), "first\nsecond\n");
+  EXPECT_EQ(files_in_folder(), std::vector<std::string>{"log.txt"});
+}
+
+TEST_F(AtomicFileTest, LeftoversOfTheDeadAreRemovedAndNothingElse)
+{
+  const pid_t child = fork();
+  if (child == 0) {
+    AtomicFile unfinished(file("a.txt"));
+    _exit(0);
+  }
+  int status = -1;
+  waitpid(child, &status, 0);
+  ASSERT_EQ(files_in_folder().size(), 1u);
+  const std::string leftover = files_in_folder().front();
+  // Another machine's, whose process may live; a name that only looks like it; a link; somebody's own.
+  std::string foreign = leftover;
+  foreign[8] = foreign[8] == '0' ? '1' : '0';
+  write_bytes(file(foreign), "");
+  write_bytes(file(leftover.substr(0, leftover.size() - 5) + "x.tmp"), "");
+  write_bytes(file("precious"), "mine");
+  std::string link = leftover;
+  link[20] = link[20] == '0' ? '1' : '0';
+  std::filesystem::create_symlink("precious", file(link));
+  AtomicFile alive(file("b.txt"));
+  EXPECT_FALSE(std::filesystem::exists(file(leftover)));
+  side_files_clean(folder_);
+  EXPECT_EQ(files_in_folder().size(), 5u);
+  alive.commit();
+  EXPECT_TRUE(std::filesystem::exists(file("b.txt")));
+  EXPECT_EQ(bytes_of_file(file("precious")), "mine");
+}
+
+TEST_F(AtomicFileTest, CleaningNeverTakesAFileFromItsWriter)
+{
+  std::atomic<bool> is_done = false;
+  std::thread cleaner([&] {
+    while (!is_done) side_files_clean(folder_);
+  });
+  for (int i = 0; i < 2000; ++i) EXPECT_NO_THROW(atomic_write(file("a.txt"), "x"));
+  is_done = true;
+  cleaner.join();
+  EXPECT_EQ(files_in_folder(), std::vector<std::string>{"a.txt"});
+}
+
+TEST_F(AtomicFileTest, ALockHasOneHolderAndSaysWho)
+{
+  {
+    const OutputLock first(file("a.txt"));
+    EXPECT_EQ(first.holder(), "");
+    std::filesystem::create_symlink("a.txt", file("link.txt"));
+    const OutputLock second(file("link.txt")), other(file("b.txt")), none("/dev/null"), empty("");
+    EXPECT_EQ(second.holder(), "process " + std::to_string(::getpid()) + " on " + host_name());
+    EXPECT_EQ(other.holder() + none.holder() + empty.holder(), "");
+  }
+  EXPECT_EQ(OutputLock(file("a.txt")).holder(), "");
+  EXPECT_EQ(files_in_folder(), std::vector<std::string>{"link.txt"});
+  EXPECT_THROW(OutputLock(file("nowhere/a.txt")), OutputError);
+}
+
+TEST_F(AtomicFileTest, ALockIsNeverHeldTwice)
+{
+  std::atomic<int> num_holders = 0, most = 0, num_times = 0;
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 4; ++i) {
+    threads.emplace_back([&] {
+      for (int round = 0; round < 1000; ++round) {
+        const OutputLock lock(file("a.txt"));
+        if (!lock.holder().empty()) continue;
+        most = std::max(most.load(), ++num_holders);
+        ++num_times;
+        --num_holders;
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(most, 1);
+  EXPECT_GT(num_times, 100);
 }
 
 TEST_F(AtomicFileTest, ParallelThreadsAndProcessesNeverMix)

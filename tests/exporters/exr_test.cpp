@@ -120,7 +120,7 @@ TEST_F(ExrTest, DwaIsCloseAndSaysWhichLayersItDamages)
     }
   }
   EXPECT_EQ(exr_damaged_layers(film.view.layout, ExrCompression::kDwaa),
-            (std::vector<std::string>{"normal", "position", "variance", "half"}));
+            (std::vector<std::string>{"normal", "position", "variance", "half", "denoising_normal"}));
   EXPECT_TRUE(exr_damaged_layers(film.view.layout, ExrCompression::kZip).empty());
 }
 
@@ -245,6 +245,43 @@ TEST(PictureLayer, PutsRedGreenBlueFirstAndLeavesAlphaOut)
   EXPECT_EQ(names("depth"), "depth.Z ");
   EXPECT_EQ(names("mask"), "mask.A ");
   EXPECT_EQ(names("nothing"), "");
+}
+
+TEST_F(ExrTest, CryptomattesAreLaidOutAsTheirSpecificationSays)
+{
+  Scene scene;
+  for (const char* name : {"ball", "floor"}) {
+    scene.instances.emplace_back();
+    scene.instances.back().name = name;
+  }
+  scene.material_names = {"say \"cheese\"\n", "\xff"};
+  const TestFilm film(4, 3, 1,
+                      1u | 1u << static_cast<int>(Aov::kCryptoObject) | 1u << static_cast<int>(Aov::kCryptoMaterial));
+  exr_write(file("a.exr"), film.view, exr_cryptomatte_attributes(scene, ~0u));
+  const Picture picture = exr_load(file("a.exr"));
+  for (const char* layer : {"CryptoObject00.", "CryptoObject01.", "CryptoObject02.", "CryptoMaterial02."}) {
+    for (const char* channel : {"r", "g", "b", "a"}) {
+      const Channel* found = picture.find(std::string(layer) + channel);
+      ASSERT_NE(found, nullptr) << layer << channel;
+      EXPECT_EQ(found->type, ChannelType::kFloat);
+    }
+  }
+  EXPECT_EQ(picture.find("CryptoObject03.r"), nullptr);
+  // Ids are bits, not numbers: none may be rounded.
+  const std::size_t offset =
+      static_cast<std::size_t>(film.view.layout.offset[static_cast<std::size_t>(Aov::kCryptoObject)]);
+  EXPECT_EQ(picture.find("CryptoObject00.r")->values[0], film.pixels[offset]);
+  EXPECT_EQ(picture.find("CryptoObject02.a")->values[0], film.pixels[offset + 11]);
+
+  // Keys are the first seven digits of the layer's hash.
+  const auto text = [&](const std::string& name) { return picture.attributes.at("cryptomatte/" + name); };
+  EXPECT_EQ(text("3ae39a5/name"), "CryptoObject");
+  EXPECT_EQ(text("3ae39a5/hash"), "MurmurHash3_32");
+  EXPECT_EQ(text("3ae39a5/conversion"), "uint32_to_float32");
+  EXPECT_EQ(text("3ae39a5/manifest"), R"({"ball":"645d3bc4","floor":"7819c83c"})");
+  EXPECT_EQ(text("be359d6/name"), "CryptoMaterial");
+  EXPECT_NE(text("be359d6/manifest").find(R"("say \"cheese\"\n":")"), std::string::npos);
+  EXPECT_EQ(text("f42029d/name"), "CryptoAsset");
 }
 
 }  // namespace relief

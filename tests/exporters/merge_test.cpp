@@ -184,7 +184,7 @@ TEST_F(Merge, LeavesOutLayersThatNotAllHaveAndSaysSo)
   for (const auto& files : {std::vector{rich, poor}, std::vector{poor, rich}}) {
     const MergeResult result = merge(files);
     EXPECT_EQ(picture_layers(result.picture), (std::vector<std::string>{"beauty", "samples"}));
-    EXPECT_EQ(result.warnings.size(), static_cast<std::size_t>(kNumAovs - 2));
+    EXPECT_EQ(result.warnings.size(), static_cast<std::size_t>(kFirstCryptomatte - 2));
     EXPECT_TRUE(std::any_of(result.warnings.begin(), result.warnings.end(), [](const std::string& text) {
       return text.find("'albedo' is left out") != std::string::npos;
     }));
@@ -216,6 +216,19 @@ TEST_F(Merge, HalvesTheVarianceOfTwoEqualRenders)
   for (const float v : merged.find("variance.R")->values) {
     EXPECT_EQ(v, .25f);
   }
+}
+
+TEST_F(Merge, CryptomattesAreLeftOutAndSaid)
+{
+  const std::uint32_t aovs =
+      1u | 1u << static_cast<int>(Aov::kSampleCount) | 1u << static_cast<int>(Aov::kCryptoObject);
+  TestFilm film(kWidth, kHeight, 1, aovs);
+  const Attributes name = {{"cryptomatte/3ae39a5/name", "CryptoObject"}};
+  const MergeResult result = merge({write("1.exr", film, "1", name), write("2.exr", film, "2", name)});
+  EXPECT_EQ(result.picture.find("CryptoObject00.r"), nullptr);
+  EXPECT_EQ(result.picture.attributes.count("cryptomatte/3ae39a5/name"), 0u);
+  ASSERT_EQ(result.warnings.size(), 3u);
+  EXPECT_EQ(result.warnings[0], "layer 'CryptoObject00' is left out: ids have no mean");
 }
 
 }  // namespace relief

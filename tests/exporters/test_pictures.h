@@ -51,12 +51,15 @@ inline void write_bytes(const std::filesystem::path& path, const std::string& by
   std::ofstream(path, std::ios::binary) << bytes;
 }
 
+/// Bits of all AOVs but the Cryptomattes, whose channels are no numbers.
+inline constexpr std::uint32_t kNumericAovs = (1u << kFirstCryptomatte) - 1;
+
 /// A film with plausible values in every AOV: ids and counts are integers, the rest is uniform in [0, 2).
 struct TestFilm {
   std::vector<float> pixels;
   FilmView view;
 
-  TestFilm(int width, int height, std::uint32_t seed, std::uint32_t aov_mask = (1u << kNumAovs) - 1)
+  TestFilm(int width, int height, std::uint32_t seed, std::uint32_t aov_mask = kNumericAovs)
   {
     view.width = view.full_width = width;
     view.height = view.full_height = height;
@@ -67,7 +70,7 @@ struct TestFilm {
     for (int i = 0; i < width * height; ++i) {
       for (const AovInfo& info : kAovInfo) {
         if (view.layout.offset[static_cast<std::size_t>(info.aov)] < 0) continue;
-        for (std::size_t c = 0; c < info.channels.size(); ++c) {
+        for (int c = 0; c < aov_num_channels(info, view.layout.cryptomatte_levels); ++c) {
           pixels.push_back(info.integer_like ? static_cast<float>(integer(random)) : uniform(random));
         }
       }

@@ -88,8 +88,10 @@ TEST(Determinism, TheFirstSampleThatIsNotFiniteIsTheFirstOfThePicture)
     Statistics stats;
     arena.execute([&] { return render(scene, options, stop, {}, stats); });
     EXPECT_EQ(stats.counters.nonfinite_samples, 24u * 18u * 20u);
-    ASSERT_EQ(stats.warnings.size(), 1u) << threads << " threads";
-    EXPECT_NE(stats.warnings.front().find("pixel 16,38 sample 0 "), std::string::npos) << stats.warnings.front();
+    ASSERT_TRUE(stats.first_nonfinite) << threads << " threads";
+    EXPECT_EQ(stats.first_nonfinite->x, 16);
+    EXPECT_EQ(stats.first_nonfinite->y, 38);
+    EXPECT_EQ(stats.first_nonfinite->sample_index, 0u);
   }
 }
 

@@ -216,7 +216,7 @@ TEST(References, BringInAnotherFilesRoots)
   EXPECT_EQ(scene.instances[0].name, "square");
   expect_near(scene.instances[0].world_from_object.p, {0, 0, 7});
   ASSERT_EQ(scene.files.size(), 2u);
-  EXPECT_EQ(scene.files[1], (folder / "square.gltf").string());
+  EXPECT_EQ(scene.files[1].path, (folder / "square.gltf").string());
 }
 
 TEST(References, AFileReferredToTwiceSharesItsMeshes)
@@ -326,6 +326,63 @@ TEST(References, OverridesOfNobodyAreWarnedAbout)
   folder.write("square.gltf", test::square_scene().gltf());
   const GltfBuilder b = reference_to({{"uri", "square.gltf"}, {"overrides", {{"sqare", {{"scale", {1, 1, 1}}}}}}});
   EXPECT_TRUE(has_warning(scene_load(folder.write("scene.gltf", b.gltf())), "overrides/sqare"));
+}
+
+TEST(References, OverridesReachNodesByIndex)
+{
+  const test::TemporaryFolder folder;
+  GltfBuilder library = test::square_scene();
+  library.json["nodes"][0].erase("name");
+  library.root_node({{"mesh", 0}});
+  folder.write("square.gltf", library.gltf());
+  const GltfBuilder b =
+      reference_to({{"uri", "square.gltf"},
+                    {"overrides", {{"/nodes/1", {{"translation", {9, 0, 0}}}}, {"/nodes/7", json::object()}}}});
+  const Scene scene = scene_load(folder.write("scene.gltf", b.gltf()));
+  ASSERT_EQ(scene.instances.size(), 2u);
+  expect_near(scene.instances[0].world_from_object.p, {0, 0, 0});
+  expect_near(scene.instances[1].world_from_object.p, {9, 0, 0});
+  EXPECT_TRUE(has_warning(scene, "~1nodes~17: no referenced node has this name or index"));
+  const Scene one = scene_load(folder.write("one.gltf", reference_to({{"uri", "square.gltf"}, {"node", 1}}).gltf()));
+  EXPECT_EQ(one.instances.size(), 1u);
+}
+
+TEST(References, MaterialsAreReplacedByNameOrAll)
+{
+  const test::TemporaryFolder folder;
+  GltfBuilder library = test::square_scene();
+  library.json["materials"] = {{{"name", "wood"}}, {{"name", "paint"}}};
+  json& primitives = library.json["meshes"][0]["primitives"];
+  primitives.push_back(primitives[0]);
+  primitives.push_back(primitives[0]);
+  primitives[0]["material"] = 0;
+  primitives[1]["material"] = 1;
+  folder.write("square.gltf", library.gltf());
+  const auto names = [&](const json& reference) {
+    GltfBuilder b = reference_to(reference);
+    b.json["materials"] = {{{"name", "blue"}}, {{"name", "red"}}, {{"name", "gold"}}};
+    const Scene scene = scene_load(folder.write("scene.gltf", b.gltf()));
+    std::string text;
+    for (const Instance& i : scene.instances)
+      text += scene.material_names[static_cast<std::size_t>(i.material_index)] + ' ';
+    for (const std::string& warning : scene.warnings) {
+      if (warning.find("no referenced mesh has a material") != std::string::npos) text += "(unused)";
+    }
+    return text;
+  };
+  EXPECT_EQ(names({{"uri", "square.gltf"}, {"materials", {{"paint", "red"}}}}), "wood red default ");
+  EXPECT_EQ(names({{"uri", "square.gltf"}, {"materials", {{"paint", "red"}, {"*", "blue"}}}}), "blue red blue ");
+  EXPECT_EQ(names({{"uri", "square.gltf"}, {"materials", {{"pint", "red"}}}}), "wood paint default (unused)");
+  // What is said of the node is said of less, and so counts more.
+  EXPECT_EQ(names({{"uri", "square.gltf"},
+                   {"materials", {{"*", "blue"}}},
+                   {"overrides", {{"square", {{"material", "gold"}}}}}}),
+            "gold gold gold ");
+  // The outermost file has the last word.
+  GltfBuilder middle = reference_to({{"uri", "square.gltf"}, {"overrides", {{"square", {{"material", "own"}}}}}});
+  middle.json["materials"] = {{{"name", "own"}}};
+  folder.write("middle.gltf", middle.gltf());
+  EXPECT_EQ(names({{"uri", "middle.gltf"}, {"materials", {{"wood", "red"}}}}), "red own own ");
 }
 
 TEST(References, AnOverrideWithAnUnknownMaterialIsAnError)

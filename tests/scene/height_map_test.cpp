@@ -269,12 +269,10 @@ TEST(HeightMap, HalvesAreExact)
   EXPECT_TRUE(loaded.warnings.empty());
 }
 
-TEST(HeightMap, WideIntegersAndDoublesBecomeFloats)
+TEST(HeightMap, WideIntegersBecomeFloats)
 {
   const TestImage<std::uint32_t> integers{2, 2, 1, {0, 1u << 30, 3u << 30, 4294967295u}};
   EXPECT_EQ(texels_of<float>(load("h.tif", integers).map), (std::vector<float>{0, 0.25f, 0.75f, 1}));
-  const TestImage<double> doubles{2, 1, 1, {0.1, -1e20}};
-  EXPECT_EQ(texels_of<float>(load("h.fits", doubles).map), (std::vector<float>{0.1f, -1e20f}));
 }
 
 // Bands of rows, rows of tiles and the map's own size go into each other in no way.
@@ -339,11 +337,10 @@ TEST(HeightMap, WithoutAnyHeightIsFlat)
   EXPECT_EQ(loaded.warnings.size(), 1u);
 }
 
-TEST(HeightMap, InfiniteHalvesAndHugeDoublesAreReplacedToo)
+TEST(HeightMap, InfiniteHalvesAreReplacedToo)
 {
   EXPECT_EQ(texels_of<float>(load("h.exr", TestImage<float>{2, 1, 1, {kInfinity, 3}, OIIO::TypeDesc::HALF}).map),
             (std::vector<float>{3, 3}));
-  EXPECT_EQ(texels_of<float>(load("h.fits", TestImage<double>{2, 1, 1, {1e300, 3}}).map), (std::vector<float>{3, 3}));
 }
 
 TEST(HeightMap, RangeIsThatOfTheTexels)

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -91,6 +92,7 @@ class GltfBuilder {
  public:
   nlohmann::json json = {{"asset", {{"version", "2.0"}}}};
   std::string binary;
+  bool declares_extensions = true;  ///< whether extensionsUsed gets the names that it lacks
 
   /// Appends bytes, aligned to four, and a buffer view of them.
   template <typename T>
@@ -156,7 +158,7 @@ class GltfBuilder {
   /// The file as text, its buffer inside as a data URI.
   std::string gltf() const
   {
-    nlohmann::json out = json;
+    nlohmann::json out = with_extensions_used();
     if (!binary.empty() && !out.contains("buffers")) {
       out["buffers"] = {
           {{"byteLength", binary.size()}, {"uri", "data:application/octet-stream;base64," + base64(binary)}}};
@@ -167,7 +169,7 @@ class GltfBuilder {
   /// The file as GLB, its buffer in the BIN chunk.
   std::string glb() const
   {
-    nlohmann::json with_buffer = json;
+    nlohmann::json with_buffer = with_extensions_used();
     if (!binary.empty()) {
       with_buffer["buffers"] = {{{"byteLength", binary.size()}}};
     }
@@ -183,6 +185,33 @@ class GltfBuilder {
       chunks += u32(bin.size()) + std::string("BIN\0", 4) + bin;
     }
     return "glTF" + u32(2) + u32(12 + chunks.size()) + chunks;
+  }
+
+ private:
+  static void add_extensions(const nlohmann::json& value, std::set<std::string>& names)
+  {
+    for (const auto& item : value.items()) {
+      if (value.is_object() && item.key() == "extensions" && item.value().is_object()) {
+        for (const auto& extension : item.value().items()) names.insert(extension.key());
+      }
+      if (item.value().is_structured()) add_extensions(item.value(), names);
+    }
+  }
+
+  nlohmann::json with_extensions_used() const
+  {
+    nlohmann::json out = json;
+    const bool has_list = json.contains("extensionsUsed");
+    if (!declares_extensions || (has_list && !json["extensionsUsed"].is_array())) return out;
+    std::set<std::string> names;
+    add_extensions(json, names);
+    if (has_list) {
+      for (const nlohmann::json& name : json["extensionsUsed"]) {
+        if (name.is_string()) names.erase(name.get<std::string>());
+      }
+    }
+    for (const std::string& name : names) out["extensionsUsed"].push_back(name);
+    return out;
   }
 };
 

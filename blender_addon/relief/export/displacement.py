@@ -64,17 +64,14 @@ def export_displacement(material, settings, textures, texture_info, images):
     info = texture_info(height.texture)
     if info is None or height.value == 0:
         return None
-    folded = (move.midlevel - height.offset) / height.value
-    if not 0 <= folded <= 1:
-        textures.warn(f'node "{move.node.name}": a midlevel of {folded:.4g}', "it was limited to between 0 and 1")
-        folded = min(max(folded, 0.0), 1.0)
     return {
         "heightTexture": info,
         "scale": move.scale * height.value,
-        "midlevel": folded,
+        "midlevel": (move.midlevel - height.offset) / height.value,
         "space": move.space,
         "method": settings.displacement_method,
         "lod": "auto" if settings.lod < 0 else settings.lod,
+        # That of smooth faces is set when they are met; bump smooths flat ones, too.
         "smoothing": compat.displacement_method(material) == "BOTH",
         "seams": "weld" if settings.weld_seams else "keep",
     }
@@ -120,4 +117,5 @@ def _constant(height, move, images):
         "scale": move.scale * (height - move.midlevel),
         "midlevel": 0.0,
         "space": move.space,
+        "smoothing": False,
     }

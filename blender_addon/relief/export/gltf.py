@@ -7,11 +7,14 @@ which only the camera moved costs a few kilobytes.
 
 import hashlib
 import json
+import math
 import os
 from dataclasses import dataclass
 from urllib.parse import quote
 
 import numpy as np
+
+from ..report import ReliefError
 
 _COMPONENT_TYPES = {"float32": 5126, "uint32": 5125}
 _SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
@@ -166,13 +169,25 @@ class GltfWriter:
 
     def write(self, name):
         """Writes the document; returns its path."""
-        text = json.dumps(self.json, separators=(",", ":"), allow_nan=False).encode()
+        try:
+            text = json.dumps(self.json, separators=(",", ":"), allow_nan=False).encode()
+        except ValueError as cause:
+            raise ReliefError(f"{_place_of_nonfinite(self.json)}: a number that is not finite") from cause
         path = os.path.join(self.folder, name)
         aside = path + ".part"
         with open(aside, "wb") as file:
             self.bytes_written += file.write(text)
         os.replace(aside, path)
         return path
+
+
+def _place_of_nonfinite(value, path=""):
+    """Where in a document a number is not finite: keys and indices, names of what has one; "" if all are."""
+    if isinstance(value, float):
+        return path if not math.isfinite(value) else ""
+    name = f' "{value["name"]}"' if isinstance(value, dict) and "name" in value else ""
+    parts = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    return next(filter(None, (_place_of_nonfinite(part, f"{path}{name}/{key}") for key, part in parts)), "")
 
 
 def matrix_property(matrix):

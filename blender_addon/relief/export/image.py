@@ -17,8 +17,7 @@ from .. import exr
 
 _LINEAR_SPACES = {"Non-Color", "Raw", "Linear", "Linear Rec.709", "Generic Data", "Utility - Raw"}
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
-_FLOAT_SUFFIXES = {".exr", ".hdr", ".pic", ".rgbe"}
-_TIFF_SUFFIXES = {".tif", ".tiff"}
+_FLOAT_SUFFIXES = {".exr", ".hdr"}
 _TIFF_SAMPLE_FORMAT, _TIFF_IEEE_FLOAT = 339, 3
 
 
@@ -142,7 +141,9 @@ class ImageExporter:
         return os.path.join(folder, f"{stem[: len(stem) - digits]}{frame:0{digits}d}{suffix}") if digits else path
 
     def _means_the_same(self, image, first_bytes, path, is_color):
-        """Whether the program will make of the file what Blender makes of it."""
+        """Whether the program reads the file and makes of it what Blender makes of it."""
+        if _suffix(first_bytes, path) is None:
+            return False
         space = image.colorspace_settings.name
         if _is_float_file(first_bytes, path) or not is_color:
             return space in _LINEAR_SPACES
@@ -205,7 +206,7 @@ def _packed_bytes(image):
 
 
 def _suffix(data, name):
-    """Suffix of a file, by its first bytes: the program goes by it."""
+    """Suffix of a file, by its first bytes, as the program sees them; None for what it does not read."""
     for start, suffix in (
         (b"\x89PNG", ".png"),
         (b"\xff\xd8", ".jpg"),
@@ -217,12 +218,14 @@ def _suffix(data, name):
     ):
         if data.startswith(start):
             return suffix
-    return os.path.splitext(name)[1].lower() or ".tga"
+    if data.startswith(b"RIFF") and data[8:12] == b"WEBP":
+        return ".webp"
+    return ".tga" if os.path.splitext(name)[1].lower() == ".tga" else None
 
 
 def _is_float_file(first_bytes, path):
     suffix = _suffix(first_bytes, path)
-    if suffix in _TIFF_SUFFIXES:
+    if suffix == ".tif":
         return _tiff_is_float(first_bytes)
     return suffix in _FLOAT_SUFFIXES
 

@@ -7,14 +7,12 @@ What Blender means by power, and what the scene format wants (checked against Cy
     sun           E W/m²     irradiance E
     area          P watts    radiance P / πA            before 4.0 P / 4A: a factor older than Blender's watts
 
-Sizes: a point becomes a glowing sphere, a spot shines from a ball, a sun is a disk far away.
+Sizes: points and spots shine from a ball or from a disk that faces each point, a sun is a disk far away.
 """
 
 import math
 from dataclasses import dataclass
 from typing import Callable
-
-import numpy as np
 
 from .. import compat
 
@@ -23,9 +21,6 @@ _SUN_DISTANCE = 3e4
 
 #: The narrowest edge of a spot, as a difference of cosines: the format wants two different cones.
 _NARROWEST_EDGE = 1e-6
-
-#: Levels of subdivision of an icosahedron for a point light: 320 triangles.
-_SPHERE_LEVELS = 2
 
 
 @dataclass
@@ -52,6 +47,10 @@ def export_light(light, place):
     """Adds a bpy light to the node of its place."""
     color, strength = _emission(light, place.warn)
     energy = compat.light_energy(light) * strength
+    sizes = [getattr(light, name, 0.0) for name in ("shadow_soft_size", "size", "size_y", "angle", "spot_size")]
+    if not all(math.isfinite(value) for value in (energy, *color, *sizes)):
+        place.warn("a power, colour or size that is not finite", "it is left out")
+        return
     if energy < 0 or min(color) < 0:
         place.warn("negative light", "it is left out")
         return
@@ -60,10 +59,10 @@ def export_light(light, place):
     if not compat.casts_shadow(light):
         place.warn("a light without shadows", "it casts them")
     if light.type == "POINT":
+        value = {"type": "point", "intensity": energy / (4 * math.pi)}
         if light.shadow_soft_size > 0:
-            _add_sphere(place, light.name, light.shadow_soft_size, color, energy)
-        else:
-            _add_punctual(place, {"type": "point", "intensity": energy / (4 * math.pi)}, color)
+            place.writer.extend(value, "RELIEF_light", _size(light, place))
+        _add_punctual(place, value, color)
     elif light.type == "SPOT":
         if compat.SPOTS_ARE_SCALED and max(place.scale) > 1.001 * min(place.scale):
             place.warn("the uneven scale of a spot", "its cone is round")
@@ -118,9 +117,17 @@ def _spot(light, intensity, place):
     cos_inner = cos_outer + max((1 - cos_outer) * light.spot_blend, _NARROWEST_EDGE)
     out = {"type": "spot", "intensity": intensity}
     out["spot"] = {"innerConeAngle": math.acos(min(cos_inner, 1.0)), "outerConeAngle": outer}
-    ours = {"falloff": compat.SPOT_FALLOFF, "radius": light.shadow_soft_size}
-    place.writer.extend(out, "RELIEF_light", ours)
+    place.writer.extend(out, "RELIEF_light", {"falloff": compat.SPOT_FALLOFF, **_size(light, place)})
     return out
+
+
+def _size(light, place):
+    """The part of RELIEF_light that is the size of a point or spot."""
+    return {
+        "radius": light.shadow_soft_size,
+        "shape": "disk" if compat.faces_viewer(light) else "ball",
+        "visibleToCamera": place.visible_to_camera,
+    }
 
 
 def _add_area(place, light, color, energy):
@@ -155,40 +162,6 @@ def _add_sun_disk(place, angle, color, energy):
     _add_child(place, {"translation": [0.0, 0.0, distance]}, "RELIEF_area_light", value)
 
 
-def _add_sphere(place, name, radius, color, energy):
-    """A glowing sphere that neither the camera nor other lights see."""
-    positions, triangles = _icosphere(_SPHERE_LEVELS)
-    corners = positions[triangles]
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum()
-    # As large as the round one: from afar both look the same.
-    scale = radius * math.sqrt(4 * math.pi / area)
-    arrays = {"POSITION": (positions * scale).astype(np.float32), "indices": triangles.ravel().astype(np.uint32)}
-    writer = place.writer
-    accessors = writer.add_accessors(arrays)
-    # A sphere of radiance L sends L·πr² into each direction; a point P / 4π.
-    radiance = [c * energy / (4 * math.pi) / (math.pi * radius * radius) for c in color]
-    material = {
-        "name": f"{name} (light)",
-        "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1], "metallicFactor": 0, "roughnessFactor": 1},
-        "emissiveFactor": [1, 1, 1],
-    }
-    writer.extend(material, "KHR_materials_specular", {"specularFactor": 0})
-    set_emission(material, radiance, writer)
-    mesh = {
-        "name": name,
-        "primitives": [
-            {
-                "attributes": {"POSITION": accessors["POSITION"]},
-                "indices": accessors["indices"],
-                "material": writer.add_unique("materials", material),
-            }
-        ],
-    }
-    place.node["mesh"] = writer.add_unique("meshes", mesh)
-    settings = {"visibleToCamera": place.visible_to_camera, "castsShadow": False}
-    writer.extend(place.node, "RELIEF_object", settings)
-
-
 def set_emission(material, radiance, writer):
     """Emission of a material: glTF's factor ends at 1, an extension goes on."""
     largest = max(radiance)
@@ -197,26 +170,3 @@ def set_emission(material, radiance, writer):
         return
     material["emissiveFactor"] = [max(0.0, c / largest) for c in radiance]
     writer.extend(material, "KHR_materials_emissive_strength", {"emissiveStrength": largest})
-
-
-def _icosphere(levels):
-    """Unit sphere of 20·4^levels triangles: (float64 (n, 3), int (m, 3)), counter-clockwise from outside."""
-    g = (1 + math.sqrt(5)) / 2
-    positions = [(-1, g, 0), (1, g, 0), (-1, -g, 0), (1, -g, 0), (0, -1, g), (0, 1, g)]
-    positions += [(0, -1, -g), (0, 1, -g), (g, 0, -1), (g, 0, 1), (-g, 0, -1), (-g, 0, 1)]
-    triangles = np.array(
-        [(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2), (10, 7, 6)]
-        + [(7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5), (2, 4, 11), (6, 2, 10)]
-        + [(8, 6, 7), (9, 8, 1)]
-    )
-    positions = np.array(positions, dtype=np.float64)
-    for _ in range(levels):
-        edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        unique, middle = np.unique(edges, axis=0, return_inverse=True)
-        middle = middle.reshape(-1, 3) + len(positions)
-        positions = np.concatenate([positions, positions[unique].sum(axis=1)])
-        a, b, c = triangles.T
-        ab, bc, ca = middle.T
-        quarters = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-        triangles = np.concatenate([np.stack(t, axis=-1) for t in quarters])
-    return positions / np.linalg.norm(positions, axis=1, keepdims=True), triangles

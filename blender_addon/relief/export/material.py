@@ -3,11 +3,12 @@
 
 import math
 
+from .. import compat
 from . import nodes
 from .displacement import bump_displaces, export_displacement
 from .light import set_emission
 from .mesh import Wanted
-from .surface import Surface, surface_from
+from .surface import TRANSPARENT, Surface, surface_from
 from .texture import Input, TextureReader
 
 #: The format has two sets of texture coordinates a vertex.
@@ -34,12 +35,34 @@ class MaterialExporter:
         self._exported = {}
 
     def export(self, material):
-        """(index of the glTF material, Wanted of its meshes); a slot without material is grey."""
+        """(what add_mesh asks for the index of the glTF material, Wanted of its meshes); a slot without material is grey."""
         key = None if material is None else material.as_pointer()
         if key not in self._exported:
             job = _MaterialJob(self._writer, self._images, self._settings, self._report, material)
-            self._exported[key] = (self._writer.add_unique("materials", job.json), job.wanted())
+            wanted = job.wanted()
+            self._exported[key] = (_Indices(self._writer, job.json, wanted.by_shading), wanted)
         return self._exported[key]
+
+
+class _Indices:
+    """A material's place in the document, which it gets when a mesh uses it.
+
+    @param  by_shading  whether faces that are shaded smooth have one of their own: the slopes of its displacement are smooth
+    """
+
+    def __init__(self, writer, json, by_shading):
+        self._writer = writer
+        self._json = json
+        self._by_shading = by_shading
+
+    def __call__(self, is_smooth):
+        """Index of the glTF material of smooth or of flat faces."""
+        json = self._json
+        if self._by_shading and is_smooth:
+            extensions = json["extensions"]
+            displacement = {**extensions["RELIEF_displacement"], "smoothing": True}
+            json = {**json, "extensions": {**extensions, "RELIEF_displacement": displacement}}
+        return self._writer.add_unique("materials", json)
 
 
 class _MaterialJob:
@@ -52,30 +75,33 @@ class _MaterialJob:
         self._report = report
         self._coordinates = []
         self._color_map = None
-        self._displaced = self._world_space = False
+        self._displaced = self._by_shading = False
         self.json = {"name": self._name, "doubleSided": True}
         textures = TextureReader(self._warn)
         if material is None or not material.use_nodes or material.node_tree is None:
             color = (0.8, 0.8, 0.8) if material is None else tuple(material.diffuse_color[:3])
-            self._write_surface(Surface(base_color=Input(color)))
+            color = nodes.finite(color, "its colour", self._warn)
+            layers = compat.DEFAULT_SURFACE if material is None else {}
+            layers = {name: Input(value) if name == "roughness" else value for name, value in layers.items()}
+            self._write_surface(Surface(base_color=Input(color), **layers))
             return
         textures.takes_bump = bump_displaces(material, settings)
         output = nodes.active_output(material.node_tree, "ShaderNodeOutputMaterial")
         source = nodes.follow(output.inputs["Surface"]) if output else None
-        surface = surface_from(source, textures)
+        volume = nodes.follow(output.inputs["Volume"]) if output else None
+        surface = surface_from(source, textures) if source or not volume else TRANSPARENT
         self._write_surface(surface)
-        if output:
-            self._write_volume(nodes.follow(output.inputs["Volume"]), surface, textures)
+        self._write_volume(volume, surface, textures)
         value = export_displacement(material, settings, textures, self._data_info, images)
         if value is not None:
             self._displaced = True
-            self._world_space = value["space"] == "world"
+            self._by_shading = not value["smoothing"]
             if not self._coordinates:  # the map of a constant height
                 self._coordinates.append(("uv", ""))
             writer.extend(self.json, "RELIEF_displacement", value)
 
     def wanted(self):
-        return Wanted(tuple(self._coordinates), self._color_map, self._displaced, self._world_space)
+        return Wanted(tuple(self._coordinates), self._color_map, self._displaced, self._by_shading)
 
     def _warn(self, what, instead=""):
         self._report.warn(f'material "{self._name}"', what, instead)

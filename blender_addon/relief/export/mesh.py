@@ -15,6 +15,10 @@ from .. import compat
 _HASH_FACTORS = np.random.default_rng(1).integers(1, 2**63, size=32, dtype=np.uint64) | np.uint64(1)
 
 
+#: Metres from the origin beyond which the program refuses geometry.
+FARTHEST = 1e15
+
+
 @dataclass(frozen=True)
 class Wanted:
     """What a material asks of the meshes that use it.
@@ -22,20 +26,21 @@ class Wanted:
     coordinates  at most two: ("uv", name of a map, or "" for the one active in renders), ("generated", ""), ("object", "")
     color        name of a colour attribute that multiplies the base colour, "" for the active one; None: none
     displaced    normals say where surfaces go to, so they must not open flat-shaded edges
-    world_space  the displacement is measured after the object's transform
+    by_shading   smooth and flat faces have materials of their own
     """
 
     coordinates: tuple = ()
     color: object = None
     displaced: bool = False
-    world_space: bool = False
+    by_shading: bool = False
 
 
 class _Corners:
     """A mesh's triangles and the attributes of their corners."""
 
-    def __init__(self, mesh):
+    def __init__(self, mesh, warn):
         self.mesh = mesh
+        self._warn = warn
         mesh.calc_loop_triangles()
         num_triangles, num_loops = len(mesh.loop_triangles), len(mesh.loops)
         loops = np.empty(3 * num_triangles, dtype=np.int32)
@@ -43,26 +48,46 @@ class _Corners:
         self.loops = loops.reshape(-1, 3)
         self.material = np.empty(num_triangles, dtype=np.int32)
         mesh.loop_triangles.foreach_get("material_index", self.material)
+        self.is_smooth = np.empty(num_triangles, dtype=bool)
+        mesh.loop_triangles.foreach_get("use_smooth", self.is_smooth)
         self.vertex = np.empty(num_loops, dtype=np.int32)
         mesh.loops.foreach_get("vertex_index", self.vertex)
         self.positions = np.empty(3 * len(mesh.vertices), dtype=np.float32)
         mesh.vertices.foreach_get("co", self.positions)
         self.positions = self.positions.reshape(-1, 3)
-        self.normals = compat.corner_normals(mesh)
+        self.normals = _zero_where_not_finite(compat.corner_normals(mesh))
+        self._drop_unplaced()
         self._drop_empty()
+
+    def _drop_unplaced(self):
+        """Leaves out triangles with a corner that is nowhere."""
+        with np.errstate(invalid="ignore"):
+            is_placed = (np.abs(self.positions) < FARTHEST).all(axis=1)
+        if is_placed.all():
+            return
+        keep = is_placed[self.vertex[self.loops]].all(axis=1)
+        number = f"{(~is_placed).sum()} of {len(is_placed)} vertices are not finite, or {FARTHEST:.0e} m away"
+        self._warn(number, "its triangles there are left out" if keep.any() else "it is left out of this frame")
+        self._keep(keep)
+        # Of unused vertices, too, nothing that is not finite may reach the files or the sums below.
+        self.positions[~is_placed] = 0
 
     def _drop_empty(self):
         """Leaves out triangles without area, which text and bevels are full of: nothing can be seen of them."""
         a, b, c = (self.positions[self.vertex[self.loops[:, i]]].astype(np.float64) for i in range(3))
         keep = np.cross(b - a, c - a).any(axis=1)
         if not keep.all():
-            self.loops, self.material = self.loops[keep], self.material[keep]
+            self._keep(keep)
+
+    def _keep(self, keep):
+        """Leaves out triangles: those for which a boolean is not true."""
+        self.loops, self.material, self.is_smooth = self.loops[keep], self.material[keep], self.is_smooth[keep]
 
     def displacement_normals(self):
         """Normals without the edges of flat faces, which displacement would tear open; marked edges stay."""
         if compat.splits_normals(self.mesh):
             return self.normals
-        return compat.vertex_normals(self.mesh)[self.vertex]
+        return _zero_where_not_finite(compat.vertex_normals(self.mesh))[self.vertex]
 
     def coordinates(self, source):
         """Texture coordinates in glTF's orientation, v = 0 at the top: float32 (loops, 2); None if there are none."""
@@ -84,7 +109,14 @@ class _Corners:
         out = np.empty_like(uv)
         out[:, 0] = uv[:, 0]
         out[:, 1] = 1 - uv[:, 1]
-        return out
+        return self._finite(out, "texture coordinates")
+
+    def _finite(self, values, what):
+        """Values with 0 where they are not finite."""
+        finite = _zero_where_not_finite(values)
+        if finite is not values:
+            self._warn(f"{what} that are not finite", "0 was used")
+        return finite
 
     def _uv_layer(self, name):
         if name:
@@ -101,8 +133,14 @@ class _Corners:
             return None
         values = np.empty(4 * len(attribute.data), dtype=np.float32)
         attribute.data.foreach_get("color", values)
-        values = values.reshape(-1, 4)
+        values = self._finite(values.reshape(-1, 4), "colours")
         return values[self.vertex] if attribute.domain == "POINT" else values
+
+
+def _zero_where_not_finite(values):
+    """The same array if all is finite. Normals of length 0, as they are around a vertex that is nowhere, the program replaces."""
+    is_finite = np.isfinite(values)
+    return values if is_finite.all() else np.where(is_finite, values, np.float32(0))
 
 
 @dataclass(frozen=True)
@@ -110,44 +148,62 @@ class StoredMesh:
     """A mesh whose arrays are in files.
 
     wanted      what its slots' materials asked for: tuple of Wanted
-    primitives  (slot, StoredArrays) for each slot that has triangles
+    primitives  (slot, whether its faces are smooth, StoredArrays) for each slot that has triangles; smooth and flat faces
+                are told apart where the slot's material wants it
+    warnings    what is to be said of each object that has it: arguments of a warning's function
     """
 
     name: str
     wanted: tuple
     primitives: list
+    warnings: tuple
+
+    def reach(self):
+        """Largest coordinate of a vertex, metres in object space."""
+        bounds = [arrays.accessors["POSITION"][0] for _, _, arrays in self.primitives]
+        return max((abs(x) for accessor in bounds for x in accessor["min"] + accessor["max"]), default=0.0)
 
 
-def store_mesh(mesh, wanted, writer, warn):
+def store_mesh(mesh, wanted, writer):
     """Writes a mesh's arrays.
 
     @param  mesh    evaluated bpy mesh; its caches of triangles and normals are filled
-    @param  wanted  Wanted of each slot's material, at least one
+    @param  wanted  tuple of the Wanted of each slot's material, at least one
     @param  writer  GltfWriter
-    @param  warn    called with a text
     @return         StoredMesh
     """
-    corners = _Corners(mesh)
+    warnings = []
+
+    def warn(*text):
+        warnings.append(text)
+
+    corners = _Corners(mesh, warn)
     slots = np.clip(corners.material, 0, len(wanted) - 1)
     primitives = []
-    for slot in np.unique(slots):
-        arrays = _primitive_arrays(corners, corners.loops[slots == slot], wanted[slot], warn)
-        primitives.append((int(slot), writer.store(arrays)))
-    return StoredMesh(mesh.name, tuple(wanted), primitives)
+    parts = 2 * slots
+    if any(w.by_shading for w in wanted):
+        parts += corners.is_smooth & np.array([w.by_shading for w in wanted])[slots]
+    for part in np.unique(parts):
+        (slot, smooth), own = divmod(part, 2), parts == part
+        arrays = _primitive_arrays(corners, corners.loops[own], wanted[slot], warn)
+        primitives.append((int(slot), bool(smooth), writer.store(arrays)))
+    return StoredMesh(mesh.name, wanted, primitives, tuple(warnings))
 
 
 def add_mesh(stored, materials, writer):
     """Refers to a stored mesh.
 
-    @param  materials  index in the glTF of each slot's material
+    @param  materials  for each slot what gives its material's index in the glTF, for smooth faces or for flat ones
     @return            index of a glTF mesh; None if it has no triangles
     """
     if not stored.primitives:
         return None
     primitives = []
-    for slot, arrays in stored.primitives:
+    for slot, is_smooth, arrays in stored.primitives:
         attributes = dict(writer.add_stored(arrays))
-        primitives.append({"indices": attributes.pop("indices"), "attributes": attributes, "material": materials[slot]})
+        primitives.append(
+            {"indices": attributes.pop("indices"), "attributes": attributes, "material": materials[slot](is_smooth)}
+        )
     return writer.add_unique("meshes", {"name": stored.name, "primitives": primitives})
 
 

@@ -78,13 +78,11 @@ class Reader:
 
     def number(self, socket):
         """A socket's constant number."""
-        value = self.constant(socket)
-        return _gray(value) if isinstance(value, tuple) else value
+        return as_number(self.constant(socket))
 
     def color(self, socket):
         """A socket's constant linear RGB."""
-        value = self.constant(socket)
-        return value[:3] if isinstance(value, tuple) else (value,) * 3
+        return as_color(self.constant(socket))
 
     vector = color
 
@@ -96,7 +94,16 @@ class Reader:
             value = own_value(socket)
             shown = tuple(round(v, 4) for v in value) if isinstance(value, tuple) else round(value, 4)
             self._warn(f'node "{node.name}" ({node.bl_label}) as {socket.name}', f"the value {shown} was used")
+        return finite(value, socket.name, self._warn)
+
+
+def finite(value, name, warn):
+    """A number or a tuple with 0 for what is not finite, which is warned about."""
+    is_tuple = isinstance(value, tuple)
+    if all(math.isfinite(v) for v in (value if is_tuple else (value,))):
         return value
+    warn(f"{name}: a value that is not finite", "0 was used")
+    return tuple(v if math.isfinite(v) else 0.0 for v in value) if is_tuple else 0.0
 
 
 def own_value(socket):
@@ -118,7 +125,7 @@ def fold(socket, groups=()):
     if node.bl_idname == "ShaderNodeMath" and node.operation in _MATH:
         values = [fold(i, source.groups) for i in node.inputs]
         if all(v is not None for v in values):
-            numbers = [_gray(v) if isinstance(v, tuple) else v for v in values]
+            numbers = [as_number(v) for v in values]
             result = _MATH[node.operation](*numbers)
             return min(max(result, 0.0), 1.0) if node.use_clamp else result
     if node.bl_idname == "ShaderNodeCombineXYZ":
@@ -126,6 +133,16 @@ def fold(socket, groups=()):
         if all(isinstance(v, float) for v in values):
             return tuple(values)
     return None
+
+
+def as_color(value):
+    """A number or a tuple where Blender wants a colour: linear RGB."""
+    return tuple(value[:3]) if isinstance(value, tuple) else (value,) * 3
+
+
+def as_number(value):
+    """A number or a tuple where Blender wants a number."""
+    return _gray(value) if isinstance(value, tuple) else value
 
 
 def _gray(color):

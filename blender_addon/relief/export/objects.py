@@ -8,8 +8,29 @@ import numpy as np
 #: Objects that Blender can turn into a mesh.
 GEOMETRY_TYPES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 
+#: Scale below which nothing is seen of an object: its inverse would leave the range of single precision.
+_NOTHING = 1e-30
+
+#: Volume of three unit axes below which they lie in a plane but for rounding: the program asks for 4e-7.
+_FLAT = 1e-6
+
+#: Thickness of what is flat, as a part of its smaller extent.
+_THICKNESS = 1e-4
+
 #: Evaluated objects that have nothing to render.
 _SILENT_TYPES = {"CAMERA", "EMPTY", "ARMATURE", "LATTICE", "SPEAKER"}
+
+
+@dataclass(frozen=True)
+class Role:
+    """What collections of a view layer make of an object.
+
+    holdout        it is a hole in the picture
+    indirect_only  the camera does not see it
+    """
+
+    holdout: bool = False
+    indirect_only: bool = False
 
 
 @dataclass
@@ -20,6 +41,7 @@ class Things:
     name      of the object
     kind      "geometry" or "light"
     data      evaluated mesh of an instance that geometry nodes made; None: the object's own
+    role      Role in the view layer
     matrices  world matrices, row-major, one a place: list of 16 floats each
     """
 
@@ -27,6 +49,7 @@ class Things:
     name: str
     kind: str
     data: object = None
+    role: Role = Role()
     matrices: list = field(default_factory=list)
 
     def world_matrices(self):
@@ -42,6 +65,7 @@ def collect(depsgraph, report):
     @return            list of Things, in the depsgraph's order
     """
     things = {}
+    roles = _roles(depsgraph.view_layer)
     for instance in depsgraph.object_instances:
         # Blender reuses one object for all instances: only its original and its data tell them apart.
         shown = instance.object
@@ -54,20 +78,77 @@ def collect(depsgraph, report):
             continue
         original = shown.original
         data = shown.data
-        key = (original.as_pointer(), data.as_pointer() if data is not None else 0)
+        role = Role()
+        if roles:  # an instance has the role of what makes it
+            owner = instance.parent if instance.is_instance else shown
+            role = roles.get(owner.original.as_pointer(), role)
+        key = (original.as_pointer(), data.as_pointer() if data is not None else 0, role)
         thing = things.get(key)
         if thing is None:
-            thing = things[key] = Things(original, shown.name, kind)
+            thing = things[key] = Things(original, shown.name, kind, role=role)
             if instance.is_instance and kind == "geometry" and _is_made(shown, original, depsgraph):
                 thing.data = data
         matrix = instance.matrix_world
         thing.matrices.append((*matrix[0], *matrix[1], *matrix[2], *matrix[3]))
-    return list(things.values())
+    # The mesh of a curve or a text comes as an instance besides, and must not stand there twice.
+    twice = {pointer for (pointer, *_), thing in things.items() if thing.data is not None and thing.object.type != "MESH"}
+    return [thing for (pointer, *_), thing in things.items() if thing.data is not None or pointer not in twice]
+
+
+def _roles(view_layer):
+    """Roles of a view layer's objects by pointer, but of those that have none."""
+
+    def is_special(collection):
+        own = not collection.exclude and (collection.holdout or collection.indirect_only)
+        return own or any(is_special(child) for child in collection.children)
+
+    objects = view_layer.objects
+    if not is_special(view_layer.layer_collection) and not any(shown.is_holdout for shown in objects):
+        return {}
+    roles = {}
+    for shown in objects:
+        holdout = shown.holdout_get(view_layer=view_layer)
+        role = Role(holdout, not holdout and shown.indirect_only_get(view_layer=view_layer))
+        if role != Role():
+            roles[shown.as_pointer()] = role
+    return roles
 
 
 def _is_made(shown, original, depsgraph):
     """Whether an instance shows a mesh of its own, made by geometry nodes, instead of an object's."""
     return shown.type == "MESH" and shown.data != original.evaluated_get(depsgraph).data
+
+
+def usable_places(matrices):
+    """The places at which something can be seen.
+
+    What is flat along one axis stays visible and is given a thickness that nobody sees, as the program's transforms have
+    an inverse; what has shrunk to a line or a point is not to be seen.
+
+    @param  matrices  float64 (n, 4, 4)
+    @return           (matrices of the places that stay, number of those that have shrunk to nothing, number of those that
+                      are not finite)
+    """
+    is_finite = np.isfinite(matrices).all(axis=(1, 2))
+    finite = matrices[is_finite]
+    linear = finite[:, :3, :3]
+    if not len(linear):
+        return finite, 0, len(matrices)
+    lengths = np.linalg.norm(linear, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        volume = np.abs(np.linalg.det(linear / np.where(lengths == 0, 1, lengths)[:, None, :]))
+    is_solid = (lengths > _NOTHING).all(axis=1) & (volume > _FLAT)
+    places = list(finite[is_solid])
+    num_shrunk = 0
+    for matrix in finite[~is_solid]:
+        u, s, v = np.linalg.svd(matrix[:3, :3])
+        if s[1] <= max(_NOTHING, _FLAT * s[0]):
+            num_shrunk += 1
+            continue
+        matrix = matrix.copy()
+        matrix[:3, :3] = (u * (s[0], s[1], _THICKNESS * s[1])) @ v
+        places.append(matrix)
+    return np.array(places).reshape(-1, 4, 4), num_shrunk, int((~is_finite).sum())
 
 
 def decompose(matrices):

@@ -3,17 +3,19 @@
 
 import time
 from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 import numpy as np
 
 from .. import compat
+from ..report import ReliefError
 from .axes import GLTF_FROM_BLENDER
 from .gltf import GltfWriter, matrix_property
 from .image import ImageExporter
 from .light import Place, export_light
 from .material import MaterialExporter
-from .mesh import add_mesh, store_mesh
-from .objects import collect, decompose
+from .mesh import FARTHEST, add_mesh, store_mesh
+from .objects import collect, decompose, usable_places
 from .settings import render_settings
 from .world import export_world
 
@@ -34,12 +36,14 @@ class Exported:
     used_files     names in its data folder
     seconds        of wall clock
     bytes_written  files that were there already are not counted
+    has_holdouts   something is a hole in the picture
     """
 
     path: str
     used_files: set
     seconds: float
     bytes_written: int
+    has_holdouts: bool
 
 
 @dataclass
@@ -72,7 +76,8 @@ def export_scene(depsgraph, view, folder, name, report):
     exporter.add_all(view)
     writer.json.update(scene_json(exporter.nodes))
     path = writer.write(name)
-    return Exported(path, writer.used_files, time.perf_counter() - begin, writer.bytes_written)
+    seconds = time.perf_counter() - begin
+    return Exported(path, writer.used_files, seconds, writer.bytes_written, exporter.has_holdouts)
 
 
 def scene_json(nodes, index_of=None):
@@ -107,7 +112,7 @@ class StoredMeshes:
     def get(self, original, wanted):
         """StoredMesh of an object whose materials ask for the same as before; None if there is none."""
         stored, _ = self._by_object.get(original.as_pointer(), (None, None))
-        if stored is None or stored.wanted != tuple(wanted):
+        if stored is None or stored.wanted != wanted:
             return None
         self._used.add(original.as_pointer())
         return stored
@@ -134,17 +139,20 @@ class SceneExporter:
 
     @param  stored  StoredMeshes of earlier exports, of which those that changed have been dropped; None: a single export
 
-    writer  GltfWriter
-    nodes   of the frame: glTF nodes in Blender's world, their children nodes instead of indices, the camera's first
+    writer        GltfWriter
+    has_holdouts  something is a hole in the picture
+    nodes         of the frame: glTF nodes in Blender's world, their children nodes instead of indices, the camera's first
     """
 
     def __init__(self, depsgraph, writer, report, stored=None):
         self.writer = writer
         self.nodes = []
+        self.has_holdouts = False
         self._depsgraph = depsgraph
         self._scene = depsgraph.scene
         self._report = report
         self._stored = stored if stored is not None else StoredMeshes()
+        self._by_shape = {}
         self._images = ImageExporter(self.writer, self._scene.frame_current)
         self._materials = MaterialExporter(self.writer, self._images, self._scene.relief, report)
 
@@ -157,7 +165,11 @@ class SceneExporter:
 
     def set_view(self, view):
         """Sets the camera and the settings of the picture; a later call replaces them."""
-        translation, rotation, _, _ = decompose(np.array([view.matrix], dtype=np.float64).reshape(1, 4, 4))
+        matrices, num_shrunk, num_bad = usable_places(np.array([view.matrix], dtype=np.float64).reshape(1, 4, 4))
+        if num_shrunk or num_bad:
+            why = "its scale is 0" if num_shrunk else "its transform is not finite"
+            raise ReliefError(f'nothing tells where the camera "{view.camera.get("name", "view")}" looks: {why}')
+        translation, rotation, _, _ = decompose(matrices)
         self.writer.use_extension("RELIEF_camera")
         if self.nodes:
             index = self.nodes[0]["camera"]
@@ -167,11 +179,12 @@ class SceneExporter:
         node = {"name": view.camera.get("name", "view"), "camera": index}
         node.update(translation=translation[0].tolist(), rotation=rotation[0].tolist())
         self.nodes[:1] = [node]
-        self.writer.extend(self.writer.json, "RELIEF_render", render_settings(self._scene, view.size))
+        self.writer.extend(self.writer.json, "RELIEF_render", render_settings(self._scene, self._depsgraph.view_layer, view.size))
 
     def add_world(self):
         is_opaque = not self._scene.render.film_transparent
-        export_world(self._scene.world, is_opaque, self.writer, self._images, self._report)
+        world = compat.world_of(self._scene, self._depsgraph.view_layer)
+        export_world(world, is_opaque, self.writer, self._images, self._report)
 
     def add_objects(self):
         """Adds meshes, instances and lights."""
@@ -198,15 +211,23 @@ class SceneExporter:
         return lambda what, instead="": self._report.warn(f'{kind} "{name}"', what, instead)
 
     def _add_geometry(self, thing):
-        matrices = thing.world_matrices()
+        matrices = self._usable(thing, thing.world_matrices())
+        if not len(matrices):
+            return
         for system in thing.object.particle_systems:
             if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
                 self._report.warn(f'object "{thing.name}"', f'hair "{system.name}" as strands', "it is left out")
-        mesh = self._mesh_of(thing, matrices)
+        mesh, reach = self._mesh_of(thing)
         if mesh is None:
             return
+        is_near = np.abs(matrices[:, :3, 3]).max(axis=1) + np.abs(matrices[:, :3, :3]).sum(axis=(1, 2)) * reach < FARTHEST
+        if not is_near.all():
+            self._leave_out(thing, f"{FARTHEST:.0e} m and more from the origin", (~is_near).sum())
+            matrices = matrices[is_near]
+            if not len(matrices):
+                return
         base = {"name": thing.name, "mesh": mesh}
-        settings = self._object_settings(thing.object)
+        settings = self._object_settings(thing)
         if settings:
             self.writer.extend(base, "RELIEF_object", settings)
         if len(matrices) == 1:
@@ -223,11 +244,30 @@ class SceneExporter:
         for matrix in matrices[~exact]:
             self.nodes.append({**base, "matrix": matrix_property(matrix)})
 
-    def _object_settings(self, original):
-        """RELIEF_object of an object; {} if all is usual."""
-        settings = {}
-        if not original.visible_camera:
+    def _usable(self, thing, matrices):
+        """Those of a thing's matrices that can be rendered; what is left out is warned about."""
+        matrices, num_shrunk, num_bad = usable_places(matrices)
+        if num_shrunk:
+            self._leave_out(thing, "a scale of 0", num_shrunk)
+        if num_bad:
+            self._leave_out(thing, "a transform that is not finite", num_bad)
+        return matrices
+
+    def _leave_out(self, thing, why, number):
+        where = f" at {number} of {len(thing.matrices)} places" if len(thing.matrices) > 1 else ""
+        kind = "light" if thing.kind == "light" else "object"
+        self._report.warn(f'{kind} "{thing.name}"', why + where, "it is left out of this frame")
+
+    def _object_settings(self, thing):
+        """RELIEF_object of a thing; {} if all is usual."""
+        original, settings = thing.object, {}
+        if not original.visible_camera or thing.role.indirect_only:
             settings["visibleToCamera"] = False
+        if thing.role.holdout:
+            self.has_holdouts = True
+            settings["holdout"] = True
+        if self._depsgraph.view_layer.use_pass_cryptomatte_asset:
+            settings["asset"] = _asset_name(original)
         if not original.visible_shadow:
             settings["castsShadow"] = False
         warn = self._warner("object", original.name)
@@ -239,38 +279,51 @@ class SceneExporter:
             settings["causticReceiver"] = False
         if not caustics.caustic_light:
             settings["causticLight"] = False
-        if original.is_holdout or original.is_shadow_catcher:
-            warn("holdouts and shadow catchers", "it is an ordinary object")
+        if original.is_shadow_catcher:
+            warn("a shadow catcher", "it is an ordinary object")
         return settings
 
-    def _mesh_of(self, thing, matrices):
-        """Index of the glTF mesh of a thing; None if it has no triangles."""
-        if thing.data is not None:
-            materials = self._materials_of(thing, thing.data.materials, thing.data, matrices)
-            stored = store_mesh(thing.data, [w for _, w in materials], self.writer, self._warner("object", thing.name))
-            return add_mesh(stored, [i for i, _ in materials], self.writer)
+    def _mesh_of(self, thing):
+        """(index of the glTF mesh of a thing, largest coordinate of its vertices); index None: it has no triangles."""
         evaluated = thing.object.evaluated_get(self._depsgraph)
-        slots = [slot.material for slot in evaluated.material_slots]
-        materials = self._materials_of(thing, slots, evaluated.data, matrices)
-        wanted = [w for _, w in materials]
-        stored = self._stored.get(thing.object, wanted)
+        data = thing.data if thing.data is not None else evaluated.data
+        materials = self._materials_of(_slots(thing, evaluated), data)
+        wanted = tuple(w for _, w in materials)
+        stored = self._stored.get(thing.object, wanted) if thing.data is None else None
         if stored is None:
-            mesh = evaluated.to_mesh()
+            stored = self._store(thing, evaluated, wanted)
+            if stored is None:
+                return None, 0.0
+            if thing.data is None:
+                self._stored.put(thing.object, stored)
+        for text in stored.warnings:
+            self._warner("object", thing.name)(*text)
+        return add_mesh(stored, [i for i, _ in materials], self.writer), stored.reach()
+
+    def _store(self, thing, evaluated, wanted):
+        """StoredMesh of a thing; None if it has none. Things of one shape whose materials want the same share theirs."""
+        key = (_shape(thing, evaluated), wanted)
+        if key not in self._by_shape:
+            try:
+                mesh = thing.data if thing.data is not None else evaluated.to_mesh()
+            except RuntimeError as error:
+                self._leave_out(thing, f"Blender makes no mesh of it ({str(error).strip()})", len(thing.matrices))
+                return None
             if mesh is None:
                 return None
             try:
-                stored = store_mesh(mesh, wanted, self.writer, self._warner("object", thing.name))
+                self._by_shape[key] = store_mesh(mesh, wanted, self.writer)
             finally:
-                evaluated.to_mesh_clear()
-            self._stored.put(thing.object, stored)
-        return add_mesh(stored, [i for i, _ in materials], self.writer)
+                if thing.data is None:
+                    evaluated.to_mesh_clear()
+        return self._by_shape[key]
 
-    def _materials_of(self, thing, materials, data, matrices):
-        """(index in the glTF, Wanted) of a thing's material slots, at least one."""
-        exported = [self._materials.export(m) for m in materials] or [self._materials.export(None)]
-        if any(wanted.world_space for _, wanted in exported) and _is_uneven(matrices):
-            warn = self._warner("object", thing.name)
-            warn("displacement in world space on an uneven scale", "the scale's mean was used")
+    def _materials_of(self, materials, data):
+        """(what gives the index in the glTF, Wanted) of material slots, at least one."""
+        override = self._depsgraph.view_layer.material_override
+        if override is not None:
+            materials = [override] * len(materials)
+        exported = [self._materials.export(m) for m in materials] or [self._materials.export(override)]
         if self._depsgraph.view_layer.use_pass_uv and getattr(data, "uv_layers", None):
             exported = [(i, w if w.coordinates else replace(w, coordinates=_ACTIVE_UV)) for i, w in exported]
         return exported
@@ -278,7 +331,10 @@ class SceneExporter:
     def _add_lights(self, thing, scene_size):
         original = thing.object
         light = original.evaluated_get(self._depsgraph).data
-        translation, rotation, scale, _ = decompose(thing.world_matrices())
+        matrices = thing.world_matrices()
+        if light.type == "POINT":  # has no direction that a scale of 0 could take from it
+            matrices[:, :3, :3] = np.eye(3)
+        translation, rotation, scale, _ = decompose(self._usable(thing, matrices))
         for t, r, s in zip(translation, rotation, scale):
             node = {"name": thing.name, "translation": t.tolist(), "rotation": r.tolist()}
             place = Place(
@@ -295,6 +351,33 @@ class SceneExporter:
                 settings = node.setdefault("extensions", {}).get("RELIEF_object", {})
                 self.writer.extend(node, "RELIEF_object", {**settings, "causticLight": False})
             self.nodes.append(node)
+
+
+def _slots(thing, evaluated):
+    """Materials of a thing: those of its data, but for slots that its object has of its own."""
+    slots = list(evaluated.material_slots)
+    if thing.data is None:
+        return [slot.material for slot in slots]
+    pairs = zip_longest(thing.data.materials, slots)
+    return [slot.material if slot is not None and slot.link == "OBJECT" else material for material, slot in pairs]
+
+
+def _shape(thing, evaluated):
+    """What things with the same mesh have in common, as long as the depsgraph stays as it is."""
+    original = thing.object
+    if original.type in {"CURVE", "SURFACE", "FONT"} and not original.modifiers and not original.show_only_shape_key:
+        return original.data.as_pointer()
+    if thing.data is not None:
+        return thing.data.as_pointer()
+    # Blender evaluates a mesh once for all objects that do nothing of their own to it. Metaballs join with their kin.
+    return (evaluated.data if original.type == "MESH" else original).as_pointer()
+
+
+def _asset_name(original):
+    """What Cycles calls the asset that an object belongs to: the topmost of its parents."""
+    while original.parent is not None:
+        original = original.parent
+    return original.name
 
 
 def _is_light(node):
@@ -314,12 +397,6 @@ def _warn_visibility(original, warn):
         warn("light linking", "it shines on everything")
 
 
-def _is_uneven(matrices):
-    """Whether some matrix scales one axis more than another."""
-    lengths = np.linalg.norm(matrices[:, :3, :3], axis=1)
-    return bool((np.ptp(lengths, axis=1) > 1e-3 * lengths.max(axis=1)).any())
-
-
 def _extent(things):
     """Metres that the centres of all things and their own sizes reach over: at least 1."""
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
@@ -328,7 +405,10 @@ def _extent(things):
             continue
         matrices = thing.world_matrices()
         corners = np.array(thing.object.bound_box, dtype=np.float64)
-        reach = np.abs(corners).max() * np.abs(matrices[:, :3, :3]).sum(axis=2).max()
-        low = np.minimum(low, matrices[:, :3, 3].min(axis=0) - reach)
-        high = np.maximum(high, matrices[:, :3, 3].max(axis=0) + reach)
+        reach = np.abs(corners).max() * np.abs(matrices[:, :3, :3]).sum(axis=2).max(axis=1)
+        first, last = matrices[:, :3, 3] - reach[:, None], matrices[:, :3, 3] + reach[:, None]
+        # What is not finite or out of bounds is left out of the picture, too.
+        is_seen = np.isfinite(first + last).all(axis=1) & (np.maximum(np.abs(first), np.abs(last)) < FARTHEST).all(axis=1)
+        low = np.minimum(low, first[is_seen].min(axis=0, initial=np.inf))
+        high = np.maximum(high, last[is_seen].max(axis=0, initial=-np.inf))
     return max(1.0, float((high - low).max())) if np.isfinite(low).all() else 1.0

@@ -1,28 +1,135 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""scene.relief and Blender's own render settings as RELIEF_render."""
+"""What a picture is sampled by, from scene.relief or from scene.cycles, and all of it as RELIEF_render."""
+
+import zlib
+from dataclasses import dataclass, fields
+
+from .. import compat
+
+#: Widths of Cycles are of its own functions. Relief's is where Blackman-Harris ends; that has the spread of a Gaussian
+#: whose standard deviation is a quarter of Cycles' width.
+_WIDTHS = {"BLACKMAN_HARRIS": 2.0, "GAUSSIAN": 0.25 / 0.138507}
+
+#: Cycles' 0, where it means no end.
+_ENDLESS = 16777216
+
+#: Cycles' least threshold of those that it chooses itself.
+_LEAST_THRESHOLD = 0.001
+
+#: The format's names of how mist thickens.
+_MIST_FALLOFFS = {"LINEAR": "linear", "QUADRATIC": "quadratic", "INVERSE_QUADRATIC": "inverse-quadratic"}
 
 
-def render_settings(scene, size):
+@dataclass(frozen=True)
+class Sampling:
+    """Settings that Cycles has, too: as scene.relief's, which have these names."""
+
+    samples: int
+    preview_samples: int
+    noise_threshold: float
+    time_limit: float
+    seed: int
+    max_bounces: int
+    diffuse_bounces: int
+    glossy_bounces: int
+    transmission_bounces: int
+    transparent_bounces: int
+    clamp_indirect: float
+    filter_type: str
+    filter_width: float
+
+
+#: Names of scene.relief's settings that Cycles has, too.
+SHARED = tuple(field.name for field in fields(Sampling))
+
+
+def cycles_settings(scene):
+    """Cycles' settings of a scene if they are to be used; None if the artist wants others, or Cycles is switched off."""
+    return getattr(scene, "cycles", None) if scene.relief.use_cycles_settings else None
+
+
+def sampling_of(scene):
+    """Sampling of a scene in its current frame."""
+    cycles = cycles_settings(scene)
+    if cycles is None:
+        return Sampling(**{name: getattr(scene.relief, name) for name in SHARED})
+    threshold = 0.0
+    if cycles.use_adaptive_sampling:
+        threshold = cycles.adaptive_threshold or max(_LEAST_THRESHOLD, 1 / cycles.samples)
+    is_box = cycles.pixel_filter_type == "BOX"
+    return Sampling(
+        samples=cycles.samples,
+        preview_samples=cycles.preview_samples or _ENDLESS,
+        noise_threshold=threshold,
+        time_limit=cycles.time_limit,
+        seed=_seed_of_frame(cycles.seed, scene.frame_current) if cycles.use_animated_seed else cycles.seed,
+        max_bounces=cycles.max_bounces,
+        diffuse_bounces=cycles.diffuse_bounces,
+        glossy_bounces=cycles.glossy_bounces,
+        transmission_bounces=cycles.transmission_bounces,
+        transparent_bounces=cycles.transparent_max_bounces,
+        clamp_indirect=cycles.sample_clamp_indirect,
+        filter_type="box" if is_box else "blackman-harris",
+        filter_width=1.0 if is_box else cycles.filter_width * _WIDTHS[cycles.pixel_filter_type],
+    )
+
+
+def _seed_of_frame(seed, frame):
+    """A seed that tells nothing of those of other frames."""
+    return zlib.crc32(f"{seed} {frame}".encode()) >> 1
+
+
+def warn_unread_settings(scene, warn):
+    """Warns about those of Cycles' settings that change the picture, but not relief's.
+
+    @param  warn  called with what is not understood, and what was used instead
+    """
+    cycles = cycles_settings(scene)
+    if cycles is None:
+        return
+    if cycles.sample_clamp_direct > 0:
+        warn("Clamp Direct", "direct light was not clamped")
+    if cycles.pixel_filter_type == "GAUSSIAN":
+        warn("the Gaussian pixel filter", "a Blackman-Harris one that spreads as far was used")
+
+
+def render_settings(scene, view_layer, size):
     """Value of RELIEF_render.
 
-    @param  scene  bpy scene
-    @param  size   (width, height) of the whole picture in pixels
+    @param  scene       bpy scene
+    @param  view_layer  of the picture
+    @param  size        (width, height) of the whole picture in pixels
     """
-    settings = scene.relief
+    sampling = sampling_of(scene)
     return {
+        **_pass_settings(compat.world_of(scene, view_layer), view_layer),
+        "filmExposure": compat.film_exposure(scene),
         "resolution": list(size),
-        "samples": settings.samples,
-        "noiseThreshold": settings.noise_threshold,
-        "maxBounces": settings.max_bounces,
-        "diffuseBounces": min(settings.diffuse_bounces, settings.max_bounces),
-        "glossyBounces": min(settings.glossy_bounces, settings.max_bounces),
-        "transmissionBounces": min(settings.transmission_bounces, settings.max_bounces),
-        "transparentBounces": settings.transparent_bounces,
-        "seed": settings.seed,
+        "samples": sampling.samples,
+        "noiseThreshold": sampling.noise_threshold,
+        "maxBounces": sampling.max_bounces,
+        "diffuseBounces": min(sampling.diffuse_bounces, sampling.max_bounces),
+        "glossyBounces": min(sampling.glossy_bounces, sampling.max_bounces),
+        "transmissionBounces": min(sampling.transmission_bounces, sampling.max_bounces),
+        "transparentBounces": sampling.transparent_bounces,
+        "seed": sampling.seed,
         "exposure": scene.view_settings.exposure,
-        "clampIndirect": settings.clamp_indirect,
-        "pixelFilter": {"type": settings.filter_type, "width": settings.filter_width},
-        "caustics": {"mode": settings.caustics},
+        "clampIndirect": sampling.clamp_indirect,
+        "pixelFilter": {"type": sampling.filter_type, "width": sampling.filter_width},
+        "caustics": {"mode": scene.relief.caustics},
         "frameRange": [scene.frame_start, scene.frame_end],
         "fps": scene.render.fps / scene.render.fps_base,
     }
+
+
+def _pass_settings(world, view_layer):
+    """What some passes ask for; {} without them."""
+    out = {}
+    if view_layer.use_pass_mist and world is not None:
+        mist = world.mist_settings
+        out["mist"] = {"start": mist.start, "depth": max(mist.depth, 1e-5), "falloff": _MIST_FALLOFFS[mist.falloff]}
+    if view_layer.use_pass_ambient_occlusion and world is not None:
+        out["occlusionDistance"] = world.light_settings.distance
+    if any(getattr(view_layer, f"use_pass_cryptomatte_{kind}") for kind in ("object", "material", "asset")):
+        out["cryptomatteLevels"] = view_layer.pass_cryptomatte_depth
+    return out

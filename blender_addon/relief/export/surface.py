@@ -44,6 +44,10 @@ class Surface:
         return not self.emission.is_constant(_BLACK)
 
 
+#: What is not there, such as the surface of a volume that has none of its own.
+TRANSPARENT = Surface(base_color=Input(_BLACK), alpha=Input(0.0))
+
+
 def surface_from(source, textures):
     """The layered surface of a shader output.
 
@@ -100,7 +104,7 @@ def _normal(socket, groups, textures):
 
 #: Inputs of the Principled BSDF that are 0 unless something is asked for that the format cannot say.
 _UNREAD = (
-    ("Subsurface", "subsurface scattering", "its base colour was used as a diffuse one"),
+    ("Subsurface", "subsurface scattering", "its colour was used as a diffuse one"),
     ("Anisotropic", "anisotropy", "the roughness was used in all directions"),
     ("Transmission Roughness", "transmission roughness", "the roughness of the surface was used"),
     ("Diffuse Roughness", "roughness of the diffuse layer", "Lambert's law was used"),
@@ -133,6 +137,7 @@ def _principled(source, textures):
         coat_roughness=textures.number(socket("Clearcoat Roughness"), groups),
         normal=_normal(socket("Normal"), groups, textures),
     )
+    surface.base_color = _with_subsurface_color(surface, constant("Subsurface"), socket("Subsurface Color"), groups, textures)
     surface.coat = replace(surface.coat, value=surface.coat.value * compat.COAT_SCALE)
     if not surface.coat.is_constant(0.0):
         if nodes.follow(socket("Clearcoat Normal"), groups) is not None:
@@ -150,6 +155,29 @@ def _principled(source, textures):
     strength = constant("Emission Strength", 1.0)
     surface.emission = _scaled(emission, strength)
     return surface
+
+
+def _with_subsurface_color(surface, weight, socket, groups, textures):
+    """Base colour of a Principled BSDF with its Subsurface Color, which was there before 4.0.
+
+    Cycles takes the colour of all diffuse light from between both, by the weight of the subsurface scattering; what metal
+    reflects and glass lets through keeps the base colour.
+    """
+    base = surface.base_color
+    weight = min(max(weight, 0.0), 1.0)
+    if socket is None or weight == 0:
+        return base
+    if not surface.metallic.is_constant(0.0) or not surface.transmission.is_constant(0.0):
+        textures.warn("the Subsurface Color of a surface that is in part metal or glass", "its base colour was used")
+        return base
+    below = textures.color(socket, groups)
+    mixed = tuple((1 - weight) * a + weight * b for a, b in zip(base.value, below.value))
+    if base.texture == below.texture and base.color_map == below.color_map:
+        return replace(base, value=mixed)
+    heavier = below if weight >= 0.5 else base
+    if weight < 1:
+        textures.warn("a mix of base and Subsurface Color of which one is textured", "the heavier one was used")
+    return heavier
 
 
 def _specular_tint(surface, socket, groups, textures, warn):

@@ -18,6 +18,10 @@ _WRAP = {"REPEAT": 10497, "EXTEND": 33071, "CLIP": 33071, "MIRROR": 33648}
 _CHANNELS = {"Red": 0, "Green": 1, "Blue": 2, "R": 0, "G": 1, "B": 2, "X": 0, "Y": 1, "Z": 2, "Alpha": 3}
 
 
+#: Colour of an image node without image.
+MISSING = (1.0, 0.0, 1.0)
+
+
 @dataclass(frozen=True)
 class Mapping:
     """Texture coordinates: rotation · scale · coordinate + location, in Blender's orientation (v up).
@@ -128,8 +132,9 @@ class TextureReader:
         """Input of a source that varies; None if it is not understood."""
         node, one = source.node, (1.0, 1.0, 1.0) if is_color else 1.0
         if node.bl_idname == "ShaderNodeTexImage":
-            if node.image is None:  # Blender shows such a node black
-                return Input((0.0, 0.0, 0.0) if is_color else 0.0)
+            if node.image is None:
+                value = 1.0 if source.socket.name == "Alpha" else MISSING
+                return Input(nodes.as_color(value) if is_color else nodes.as_number(value))
             channel = 3 if source.socket.name == "Alpha" else None
             return Input(one, Texture(node, channel, self._mapping(node, source.groups)))
         if node.bl_idname in {"ShaderNodeSeparateColor", "ShaderNodeSeparateRGB", "ShaderNodeSeparateXYZ"}:
@@ -147,7 +152,8 @@ class TextureReader:
         if inner is None or inner.node.bl_idname != "ShaderNodeTexImage" or inner.socket.name == "Alpha":
             return None
         if inner.node.image is None:
-            return None
+            value = MISSING[_CHANNELS[source.socket.name]]
+            return Input((value,) * 3 if isinstance(one, tuple) else value)
         mapping = self._mapping(inner.node, inner.groups)
         return Input(one, Texture(inner.node, _CHANNELS[source.socket.name], mapping))
 
@@ -170,6 +176,8 @@ class TextureReader:
         if (left is None) == (right is None):
             return None
         constant = right if left is None else left
+        if not np.isfinite(constant).all():
+            return None
         varying = nodes.follow(first if left is None else second, source.groups)
         inner = self._textured(varying, is_color)
         if inner is None:

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender's world as RELIEF_environment: a colour, or a lat-long image turned about Z."""
 
+from .. import compat
 from . import nodes
 from .axes import environment_rotation
+from .texture import MISSING
 
 
 def export_world(world, visible_to_camera, writer, images, report):
@@ -18,7 +20,10 @@ def export_world(world, visible_to_camera, writer, images, report):
         environment = {"color": [0.0, 0.0, 0.0]}
     else:
         environment = _environment(world, images, lambda *text: report.warn(f'world "{world.name}"', *text))
-    environment["visibleToCamera"] = visible_to_camera
+    environment["visibleToCamera"] = visible_to_camera and (world is None or compat.sees_world(world, "camera"))
+    for ray in ("diffuse", "glossy", "transmission"):
+        if world is not None and not compat.sees_world(world, ray):
+            environment[f"visibleTo{ray.capitalize()}"] = False
     if world is not None and not world.relief.caustic_light:
         environment["causticLight"] = False
     writer.extend(writer.json, "RELIEF_environment", environment)
@@ -26,7 +31,7 @@ def export_world(world, visible_to_camera, writer, images, report):
 
 def _environment(world, images, warn):
     if not world.use_nodes:
-        return {"color": [max(0.0, c) for c in world.color]}
+        return {"color": [max(0.0, c) for c in nodes.finite(tuple(world.color), "its colour", warn)]}
     output = nodes.active_output(world.node_tree, "ShaderNodeOutputWorld")
     if output and nodes.follow(output.inputs["Volume"]) is not None:
         warn("a volume", "it is left out")
@@ -39,20 +44,22 @@ def _environment(world, images, warn):
         return {"color": [0.0, 0.0, 0.0]}
     reader = nodes.Reader(warn, source.groups)
     strength = max(0.0, reader.number(node.inputs["Strength"]))
+    if strength == 0:
+        return {"color": [0.0, 0.0, 0.0]}
     color = nodes.follow(node.inputs["Color"], source.groups)
     if color is None or color.node.bl_idname != "ShaderNodeTexEnvironment":
         value = reader.color(node.inputs["Color"])
         return {"color": [max(0.0, c) for c in value], "strength": strength}
     texture = color.node
     if texture.image is None:
-        return {"color": [0.0, 0.0, 0.0]}
+        return {"color": list(MISSING), "strength": strength}
     if texture.projection != "EQUIRECTANGULAR":
         warn(f'node "{texture.name}": projection {texture.projection.lower()}', "equirectangular was used")
     if texture.interpolation != "Linear":
         warn(f'node "{texture.name}": interpolation {texture.interpolation}', "Linear was used")
     uri = images.color_uri(texture.image, texture.image_user, warn)
     if uri is None:
-        return {"color": [1.0, 0.0, 1.0], "strength": strength}
+        return {"color": list(MISSING), "strength": strength}
     rotation = environment_rotation(_turn_about_z(texture, color.groups, warn))
     return {"uri": uri, "strength": strength, "rotation": rotation}
 

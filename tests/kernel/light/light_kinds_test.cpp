@@ -441,16 +441,61 @@ TEST(PointLight, BallGivesThePointsIrradiance)
       const int column = i % kSide, row = i / kSide;
       const Vec2f u{(static_cast<float>(column) + 0.5f) / kSide, (static_cast<float>(row) + 0.5f) / kSide};
       const LightSample sample = light_sample(light, {}, u);
-      ASSERT_TRUE(sample.delta && sample.pdf == 1.0f);
+      ASSERT_FALSE(sample.delta);
+      ASSERT_EQ(sample.pdf, light_pdf(light, {}, sample.wi, sample.distance));
       // The sampled point is on the ball, on the side that is seen.
       ASSERT_NEAR(length(sample.wi * sample.distance - light.P), radius, 2e-6f);
       ASSERT_LE(sample.distance, length(light.P));
-      irradiance += double(sample.radiance.x) * double(sample.wi.z) / (kSide * kSide);
+      irradiance += double(sample.radiance.x) / double(sample.pdf) * double(sample.wi.z) / (kSide * kSide);
     }
     EXPECT_NEAR(irradiance * std::pow(double(length(light.P)), 3) / (2 * double(light.P.z)), 1.0, 2e-5) << radius;
   }
-  light.radius = 1.4f;
-  EXPECT_EQ(light_sample(light, {}, {}).pdf, 0.0f) << "inside the ball";
+}
+
+// Radiance I / πr² from a cone of half angle α about the normal is the irradiance I sin²α / r²: a ball fills asin(r / d) and,
+// from inside, everything; a disk that faces the point fills atan(r / d).
+TEST(PointLight, PointsInsideAreLitAsFromAllAround)
+{
+  Light light;
+  light.P = {0, 0, 0.5f};
+  light.emission = {2, 2, 2};
+  for (const bool faces_viewer : {false, true}) {
+    light.faces_viewer = faces_viewer;
+    for (const float radius : {0.1f, 0.499f, 0.501f, 2.0f, 1e4f}) {
+      light.radius = radius;
+      constexpr int kSide = 256;
+      double irradiance = 0;
+      for (int i = 0; i < kSide * kSide; ++i) {
+        const int column = i % kSide, row = i / kSide;
+        const Vec2f u{(static_cast<float>(column) + 0.5f) / kSide, (static_cast<float>(row) + 0.5f) / kSide};
+        const LightSample sample = light_sample(light, {}, u);
+        ASSERT_GT(sample.pdf, 0.0f);
+        ASSERT_NEAR(sample.distance, ball_light_distance(light, light.P, sample.wi), 1e-5f * sample.distance);
+        irradiance +=
+            double(sample.radiance.x) / double(sample.pdf) * std::max(0.0, double(sample.wi.z)) / (kSide * kSide);
+      }
+      const double ratio = std::pow(double(radius) / double(light.P.z), 2);
+      const double sin_squared = faces_viewer ? ratio / (1 + ratio) : std::min(ratio, 1.0);
+      EXPECT_NEAR(irradiance * std::pow(double(radius), 2) / (2 * sin_squared), 1.0, 1e-4) << radius;
+    }
+  }
+}
+
+// A ray meets a ball where it enters, or, from inside, where it leaves; behind it there is nothing.
+TEST(PointLight, RaysMeetABallOnce)
+{
+  Light light;
+  light.radius = 1;
+  EXPECT_EQ(ball_light_distance(light, {0, 0, 3}, {0, 0, 1}), 2.0f);
+  EXPECT_LT(ball_light_distance(light, {0, 0, 3}, {0, 0, -1}), 0.0f);
+  EXPECT_LT(ball_light_distance(light, {0, 1.01f, 3}, {0, 0, 1}), 0.0f);
+  EXPECT_EQ(ball_light_distance(light, {0, 0, 0.5f}, {0, 0, 1}), 1.5f);
+  EXPECT_EQ(ball_light_distance(light, {0, 0, 0.5f}, {0, 0, -1}), 0.5f);
+  light.faces_viewer = true;
+  EXPECT_EQ(ball_light_distance(light, {0, 0, 3}, {0, 0, 1}), 3.0f);
+  EXPECT_LT(ball_light_distance(light, {0, 0, 3}, {0, 0, -1}), 0.0f);
+  EXPECT_NEAR(ball_light_distance(light, {0, 0, 0.5f}, normalize(Vec3f{1, 0, 1})), 0.70710678f, 1e-6f);
+  EXPECT_LT(ball_light_distance(light, {0, 0, 0.5f}, {1, 0, 0}), 0.0f);
 }
 
 TEST(SunLight, IrradianceIsTheSameEverywhere)

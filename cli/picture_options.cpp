@@ -1,0 +1,154 @@
+#include "cli/picture_options.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <numbers>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "cli/scene_setup.h"
+
+namespace relief {
+
+namespace {
+
+/// Position of the camera of that name, or of that number if no camera is called so.
+std::size_t camera_index(const Scene& scene, const std::string& text)
+{
+  const auto named =
+      std::find_if(scene.cameras.begin(), scene.cameras.end(), [&](const SceneCamera& c) { return c.name == text; });
+  if (named != scene.cameras.end()) return static_cast<std::size_t>(named - scene.cameras.begin());
+  std::size_t index = 0;
+  const auto read = std::from_chars(text.data(), text.data() + text.size(), index);
+  if (read.ec == std::errc() && read.ptr == text.data() + text.size() && index < scene.cameras.size()) return index;
+  std::string names;
+  for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
+    names += fmt::format("{}{} ('{}')", i == 0 ? "" : ", ", i, scene.cameras[i].name);
+  }
+  throw CLI::ValidationError("--camera", fmt::format("expected one of {}, found '{}'", names, text));
+}
+
+/// The camera that was chosen, for an image of that size.
+Camera camera_for_image(const Scene& scene, const PictureOptions& options, int width, int height)
+{
+  Camera camera = scene.cameras[options.camera.empty() ? 0 : camera_index(scene, options.camera)].camera;
+  if (options.fov > 0) {
+    if (camera.projection != Projection::kPerspective) {
+      throw CLI::ValidationError("--fov", "expected a perspective camera, found an orthographic one");
+    }
+    camera.half_height = static_cast<float>(std::tan(options.fov * std::numbers::pi / 360));
+  }
+  camera.half_width = camera.half_height * static_cast<float>(width) / static_cast<float>(height);
+  return camera;
+}
+
+}  // namespace
+
+CameraChoice camera_choice(const PictureOptions& options)
+{
+  CameraChoice choice{options.look_from, options.look_at, options.fov, 0};
+  if (options.resolution.width > 0) {
+    choice.image_aspect = static_cast<float>(options.resolution.width) / static_cast<float>(options.resolution.height);
+  }
+  return choice;
+}
+
+std::vector<CLI::Option*> add_ray_options(CLI::App& command, PictureOptions& options)
+{
+  return {add_displacement_method(command, options.displacement), add_displacement_lod(command, options.displacement)};
+}
+
+std::vector<CLI::Option*> add_picture_options(CLI::App& command, PictureOptions& options)
+{
+  const auto point = [](const char* option) {
+    return [option](const std::string& text) { return parse_point(option, text); };
+  };
+  CLI::Option* camera =
+      command.add_option("--camera", options.camera, "Name of the camera, or its number from 0 (default: the first)");
+  CLI::Option* from =
+      add_parsed(command, "--look-from", options.look_from, point("--look-from"), "X,Y,Z: a camera there instead");
+  CLI::Option* at = add_parsed(command, "--look-at", options.look_at, point("--look-at"),
+                               "X,Y,Z: what it looks at (default: the middle of everything)");
+  from->excludes(camera);
+  at->needs(from);
+  return {
+      camera,
+      from,
+      at,
+      command.add_option("--fov", options.fov, "Vertical field of view of the camera in degrees")
+          ->check(number(0.01, 179)),
+      add_parsed(command, "--resolution", options.resolution, parse_resolution,
+                 "WIDTHxHEIGHT in pixels (default: the scene's)"),
+      command.add_option("--spp", options.samples, "Samples a pixel (default: the scene's)")
+          ->check(whole_number(1, 1 << 24)),
+      add_parsed(command, "--seed", options.seed, parse_seed, "Seed of the random numbers (default: the scene's)"),
+      add_parsed(command, "--crop", options.crop, parse_crop, "X0,Y0,X1,Y1: render this window of the image only"),
+      command.add_option("--max-bounces", options.max_bounces, "Scattering events after the first hit")
+          ->check(whole_number(0, 200)),
+      add_displacement_memory(command, options.displacement),
+      add_caustics_mode(command, options.caustics),
+      command.add_option("--filter", options.filter, "Pixel filter: box (1 px) or blackman-harris (1.5 px)")
+          ->check(one_of({"box", "blackman-harris"})),
+  };
+}
+
+RenderOptions render_options(const Scene& scene, const PictureOptions& given)
+{
+  RenderOptions options;
+  RenderSettings& settings = options.settings;
+  settings = scene.render;
+  if (given.resolution.width > 0) {
+    settings.width = given.resolution.width;
+    settings.height = given.resolution.height;
+  }
+  if (given.samples > 0) settings.samples = given.samples;
+  if (given.max_bounces >= 0) {
+    settings.max_bounces = given.max_bounces;
+    settings.diffuse_bounces = std::min(settings.diffuse_bounces, given.max_bounces);
+    settings.glossy_bounces = std::min(settings.glossy_bounces, given.max_bounces);
+    settings.transmission_bounces = std::min(settings.transmission_bounces, given.max_bounces);
+  }
+  if (given.seed) settings.seed = *given.seed;
+  if (!given.filter.empty()) {
+    settings.filter = given.filter == "box" ? PixelFilter::kBox : PixelFilter::kBlackmanHarris;
+    settings.filter_width = given.filter == "box" ? 1.0f : 1.5f;
+  }
+  if (given.caustics) settings.caustics.mode = *given.caustics;
+  options.camera = camera_for_image(scene, given, settings.width, settings.height);
+  const PixelRect& crop = given.crop;
+  if (crop.x1 > settings.width || crop.y1 > settings.height) {
+    throw CLI::ValidationError(
+        "--crop", fmt::format("expected a window inside the image of {}x{}, found '{},{},{},{}'", settings.width,
+                              settings.height, crop.x0, crop.y0, crop.x1, crop.y1));
+  }
+  options.crop_x0 = crop.x0;
+  options.crop_y0 = crop.y0;
+  options.crop_x1 = crop.x1;
+  options.crop_y1 = crop.y1;
+  options.displacement = given.displacement;
+  return options;
+}
+
+std::vector<std::string> words_given(const std::vector<CLI::Option*>& options)
+{
+  std::vector<std::string> words;
+  for (const CLI::Option* option : options) {
+    for (const std::string& value : option->results()) words.insert(words.end(), {option->get_name(), value});
+  }
+  return words;
+}
+
+std::string replay_command(const std::string& scene,
+                           const std::vector<std::string>& given,
+                           std::optional<int> frame,
+                           const PixelSample& at)
+{
+  std::string text = "relief trace " + shell_quoted(scene);
+  for (const std::string& word : given) text += ' ' + shell_quoted(word);
+  if (frame) text += fmt::format(" --frame {}", *frame);
+  return text + fmt::format(" --pixel {},{},{}", at.x, at.y, at.sample_index);
+}
+
+}  // namespace relief

@@ -1,0 +1,206 @@
+#include "integrator/instance_geometry.h"
+
+#include <cmath>
+
+#include "kernel/math/rounding.h"
+
+namespace relief {
+
+namespace {
+
+void bounds(const RTCBoundsFunctionArguments* arguments)
+{
+  const auto& instance = *static_cast<const InstanceGeometry*>(arguments->geometryUserPtr);
+  const Box3 box = instance_bounds(instance);
+  const float pad = *instance.pad;
+  RTCBounds* out = arguments->bounds_o;
+  out->lower_x = box.low.x - pad;
+  out->lower_y = box.low.y - pad;
+  out->lower_z = box.low.z - pad;
+  out->upper_x = box.high.x + pad;
+  out->upper_y = box.high.y + pad;
+  out->upper_z = box.high.z + pad;
+}
+
+/// A ray of the scene above in an instance: t above = t_start + t_scale · t inside.
+struct InstanceRay {
+  ObjectRay exact;
+  double t_start = 0;  ///< that of `exact` counts from the far origin, where there is one
+
+  /// @param ray  is turned into that of the instance's scene
+  /// @return     false: it meets nothing there
+  bool enter(const InstanceGeometry& instance, const EmbreeContext& context, RTCRay* ray)
+  {
+    const Vec3d O = context.far_start.is_far ? context.far_start.O : Vec3d{ray->org_x, ray->org_y, ray->org_z};
+    exact.O = O.x * instance.x + O.y * instance.y + O.z * instance.z + instance.p;
+    exact.D = static_cast<double>(ray->dir_x) * instance.x + static_cast<double>(ray->dir_y) * instance.y +
+              static_cast<double>(ray->dir_z) * instance.z;
+    double t_min = ray->tnear, t_max = ray->tfar;
+    const double size = max(std::abs(exact.D.x), max(std::abs(exact.D.y), std::abs(exact.D.z)));
+    // Embree's tests are for directions that are neither tiny nor huge. A power of two rounds nothing.
+    if (!(size > 0x1p-20 && size < 0x1p20)) {
+      if (!(size > 0)) return false;
+      const double scale = std::ldexp(1.0, std::ilogb(size));
+      exact.D = exact.D * (1.0 / scale);
+      exact.t_scale = 1.0 / scale;
+      t_min *= scale;
+      t_max *= scale;
+    }
+    if (!ray_starts_near(instance.target, exact.O)) {
+      const double moved = ray_move_near(instance.target, &exact.O, exact.D);
+      if (!(moved >= 0 && moved <= t_max)) return false;
+      t_start = moved * exact.t_scale;
+      t_min = max(t_min - moved, 0.0);
+      t_max -= moved;
+    }
+    exact.t_start = context.far_start.t + t_start;
+    ray->org_x = static_cast<float>(exact.O.x);
+    ray->org_y = static_cast<float>(exact.O.y);
+    ray->org_z = static_cast<float>(exact.O.z);
+    ray->dir_x = static_cast<float>(exact.D.x);
+    ray->dir_y = static_cast<float>(exact.D.y);
+    ray->dir_z = static_cast<float>(exact.D.z);
+    ray->tnear = static_cast<float>(t_min);
+    ray->tfar = static_cast<float>(t_max);
+    return ray->tnear <= ray->tfar;
+  }
+};
+
+/// Sets what a query inside an instance needs of its context, for as long as it lives.
+class InsideInstance {
+ public:
+  InsideInstance(EmbreeContext& context, unsigned instance, const ObjectRay& ray) : context_(context)
+  {
+    context_.rtc.instID[0] = instance;
+    context_.object_ray = &ray;
+  }
+  ~InsideInstance()
+  {
+    context_.rtc.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    context_.object_ray = nullptr;
+  }
+  InsideInstance(const InsideInstance&) = delete;
+  InsideInstance& operator=(const InsideInstance&) = delete;
+
+ private:
+  EmbreeContext& context_;
+};
+
+/// Traces one ray in place.
+/// @param id  the instance's geometry number
+void intersect1(const InstanceGeometry& instance, EmbreeContext& context, unsigned id, RTCRayHit& query)
+{
+  const RTCRay outside = query.ray;
+  InstanceRay ray;
+  if (!ray.enter(instance, context, &query.ray)) {
+    query.ray = outside;
+    return;
+  }
+  const unsigned hit_before = query.hit.geomID;
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  {
+    const InsideInstance inside(context, id, ray.exact);
+    embree_intersect1(instance.scene, context, query);
+  }
+  const double t = ray.t_start + ray.exact.t_scale * static_cast<double>(query.ray.tfar);
+  query.ray = outside;
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
+    query.hit.geomID = hit_before;
+  } else {
+    query.ray.tfar = min(outside.tfar, static_cast<float>(t));
+  }
+}
+
+void intersect(const RTCIntersectFunctionNArguments* arguments)
+{
+  const auto& instance = *static_cast<const InstanceGeometry*>(arguments->geometryUserPtr);
+  auto& context = *reinterpret_cast<EmbreeContext*>(arguments->context);
+  const unsigned count = arguments->N;
+  if (count == 1) {
+    if (arguments->valid[0] == -1)
+      intersect1(instance, context, arguments->geomID, *reinterpret_cast<RTCRayHit*>(arguments->rayhit));
+    return;
+  }
+  RTCRayN* rays = RTCRayHitN_RayN(arguments->rayhit, count);
+  RTCHitN* hits = RTCRayHitN_HitN(arguments->rayhit, count);
+  for (unsigned k = 0; k < count; ++k) {
+    if (arguments->valid[k] != -1) continue;
+    RTCRayHit query;
+    query.ray = rtcGetRayFromRayN(rays, count, k);
+    query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    intersect1(instance, context, arguments->geomID, query);
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
+    RTCRayN_tfar(rays, count, k) = query.ray.tfar;
+    rtcCopyHitToHitN(hits, &query.hit, count, k);
+  }
+}
+
+void occluded(const RTCOccludedFunctionNArguments* arguments)
+{
+  const auto& instance = *static_cast<const InstanceGeometry*>(arguments->geometryUserPtr);
+  auto& context = *reinterpret_cast<EmbreeContext*>(arguments->context);
+  const unsigned count = arguments->N;
+  for (unsigned k = 0; k < count; ++k) {
+    if (arguments->valid[k] != -1) continue;
+    RTCRay query =
+        count == 1 ? *reinterpret_cast<const RTCRay*>(arguments->ray) : rtcGetRayFromRayN(arguments->ray, count, k);
+    InstanceRay ray;
+    if (!ray.enter(instance, context, &query)) continue;
+    const InsideInstance inside(context, arguments->geomID, ray.exact);
+    embree_occluded1(instance.scene, context, query);
+    if (query.tfar < 0.0f) RTCRayN_tfar(arguments->ray, count, k) = -kInfinity;
+  }
+}
+
+}  // namespace
+
+InstanceGeometry instance_geometry_prepare(RTCScene scene, const Affine3& world_from_object, const float* pad)
+{
+  InstanceGeometry out;
+  out.scene = scene;
+  out.world_from_object = world_from_object;
+  out.pad = pad;
+  const Vec3d x = to_double(world_from_object.x), y = to_double(world_from_object.y),
+              z = to_double(world_from_object.z), p = to_double(world_from_object.p);
+  const Vec3d rows[3] = {cross(y, z), cross(z, x), cross(x, y)};
+  const double d = 1.0 / dot(x, rows[0]);
+  out.x = d * Vec3d{rows[0].x, rows[1].x, rows[2].x};
+  out.y = d * Vec3d{rows[0].y, rows[1].y, rows[2].y};
+  out.z = d * Vec3d{rows[0].z, rows[1].z, rows[2].z};
+  out.p = -1.0 * (p.x * out.x + p.y * out.y + p.z * out.z);
+  RTCBounds b;
+  rtcGetSceneBounds(scene, &b);
+  out.target = ray_target_make({{b.lower_x, b.lower_y, b.lower_z}, {b.upper_x, b.upper_y, b.upper_z}});
+  return out;
+}
+
+Box3 instance_bounds(const InstanceGeometry& instance)
+{
+  const Box3& box = instance.target.box;
+  Box3 out = box_empty();
+  if (!(box.low.x <= box.high.x)) return out;
+  const Affine3& m = instance.world_from_object;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3f at{(corner & 1) != 0 ? box.high.x : box.low.x, (corner & 2) != 0 ? box.high.y : box.low.y,
+                   (corner & 4) != 0 ? box.high.z : box.low.z};
+    const Vec3f P = transform_point(m, at);
+    // The rounding of P.
+    const Vec3f size = abs(at);
+    const Vec3f error = gamma_bound(4) * (abs(m.x) * size.x + abs(m.y) * size.y + abs(m.z) * size.z + abs(m.p));
+    out = box_union(out, {P - error, P + error});
+  }
+  return out;
+}
+
+RTCGeometry instance_geometry_make(RTCDevice device, InstanceGeometry& instance)
+{
+  RTCGeometry out = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
+  rtcSetGeometryUserPrimitiveCount(out, 1);
+  rtcSetGeometryUserData(out, &instance);
+  rtcSetGeometryBoundsFunction(out, bounds, nullptr);
+  rtcSetGeometryIntersectFunction(out, intersect);
+  rtcSetGeometryOccludedFunction(out, occluded);
+  return out;
+}
+
+}  // namespace relief

@@ -1,0 +1,140 @@
+"""View layers and film: holdouts, what the camera alone does not see, overrides, exposure."""
+
+import os
+
+import bpy
+import numpy as np
+
+from scenes import (
+    add_camera,
+    add_light,
+    add_plane,
+    add_sphere,
+    assert_agrees,
+    assert_warns,
+    degrees,
+    diffuse,
+    folder,
+    new_material,
+    new_scene,
+    render,
+    set_bounces,
+    set_world,
+)
+
+
+def _stage():
+    """A floor, and a ball in a collection of its own, which is returned as the view layer has it."""
+    scene = new_scene()
+    add_plane(6, diffuse((0.8, 0.5, 0.3)))
+    ball = add_sphere(0.8, diffuse((0.2, 0.7, 0.4)), (0.2, 0.2, 0.8))
+    collection = bpy.data.collections.new("ball")
+    scene.collection.children.link(collection)
+    for owner in ball.users_collection:
+        owner.objects.unlink(ball)
+    collection.objects.link(ball)
+    set_world((0.3, 0.4, 0.5))
+    add_light("SUN", rotation=degrees(40, 20, 0), energy=2, angle=0)
+    add_camera((0, -6, 4), degrees(58, 0, 0), lens=40)
+    set_bounces(scene, 2)
+    return scene, scene.view_layers[0].layer_collection.children["ball"]
+
+
+def _alpha(scene, engine):
+    """Alpha of a picture: (height, width)."""
+    from relief import exr
+
+    settings = scene.render.image_settings
+    settings.color_mode, settings.exr_codec = "RGBA", "NONE"
+    with folder() as path:
+        name = os.path.join(path, "picture.exr")
+        render(scene, engine, name, samples=64)
+        return exr.read(name).channels["A"]
+
+
+def _assert_same_alpha(scene):
+    for is_transparent in (False, True):
+        scene.render.film_transparent = is_transparent
+        relief, cycles = _alpha(scene, "RELIEF"), _alpha(scene, "CYCLES")
+        assert np.abs(relief - cycles).max() < 0.25 and abs(relief.mean() - cycles.mean()) < 0.005, is_transparent
+        assert relief.min() < 0.01 < 0.99 < relief.max()
+
+
+def test_collection_holdout():
+    """A hole in the picture, which still casts its shadow and colours its surroundings."""
+    scene, collection = _stage()
+    collection.holdout = True
+    assert_agrees(scene, samples=64)
+    _assert_same_alpha(scene)
+
+
+def test_object_holdout():
+    scene, _ = _stage()
+    next(o for o in scene.objects if o.name.startswith("Sphere")).is_holdout = True
+    assert_agrees(scene, samples=64)
+
+
+def test_collection_indirect_only():
+    scene, collection = _stage()
+    collection.indirect_only = True
+    assert_agrees(scene, samples=64)
+
+
+def test_an_instance_is_held_out_with_what_makes_it():
+    """Two instances of a collection, of which one is a hole."""
+    scene, collection = _stage()
+    collection.exclude = True
+    held = bpy.data.collections.new("held")
+    scene.collection.children.link(held)
+    for place, owner in ((-1.2, scene.collection), (1.2, held)):
+        empty = bpy.data.objects.new("empty", None)
+        empty.instance_type, empty.instance_collection = "COLLECTION", bpy.data.collections["ball"]
+        empty.location = (place, 0, 0)
+        owner.objects.link(empty)
+    scene.view_layers[0].layer_collection.children["held"].holdout = True
+    assert_agrees(scene, samples=64)
+
+
+def test_material_override():
+    """Of all slots, and of objects without a material."""
+    scene, _ = _stage()
+    bpy.ops.mesh.primitive_cube_add(size=0.6, location=(-1.5, 0, 0.3))
+    scene.view_layers[0].material_override = diffuse((0.9, 0.2, 0.6), "override")
+    assert_agrees(scene, samples=64)
+
+
+def test_film_exposure():
+    scene, _ = _stage()
+    scene.cycles.film_exposure = 2.5
+    assert_agrees(scene, samples=64)
+
+
+def test_film_exposure_of_passes():
+    """All that is light is multiplied, its variance twice, and nothing else."""
+    from relief import exr
+
+    scene, _ = _stage()
+    layer = scene.view_layers[0]
+    for name in ("direct", "indirect", "variance", "samples"):
+        setattr(layer.relief, f"use_pass_{name}", True)
+    layer.use_pass_diffuse_color = layer.use_pass_environment = True
+    scene.render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
+    scene.render.image_settings.exr_codec = "NONE"
+    scene.render.engine, scene.relief.samples = "RELIEF", 16
+    pictures = []
+    with folder() as path:
+        scene.render.filepath = os.path.join(path, "picture.exr")
+        for scene.cycles.film_exposure in (1.0, 4.0):
+            bpy.ops.render.render(write_still=True)
+            pictures.append(exr.read(scene.render.filepath).channels)
+    for name, first in pictures[0].items():
+        layer_name = name.split(".")[-2]
+        factor = {"Variance": 16, "Samples": 1, "DiffCol": 1, "Diffuse Color": 1}.get(layer_name, 4)
+        factor = 1 if name.endswith(".A") else factor
+        assert np.allclose(factor * first, pictures[1][name], rtol=1e-5, atol=1e-7), name
+
+
+def test_a_shadow_catcher_is_warned_about():
+    scene, _ = _stage()
+    next(o for o in scene.objects if o.name.startswith("Sphere")).is_shadow_catcher = True
+    assert_warns(scene, "shadow catcher", "ordinary object")

@@ -1,0 +1,181 @@
+"""Settings: those of Cycles are taken over unless relief's own are wanted, and mean what they mean there."""
+
+import json
+import os
+
+import bpy
+import numpy as np
+
+from scenes import (
+    add_camera,
+    add_light,
+    add_plane,
+    add_sphere,
+    degrees,
+    diffuse,
+    folder,
+    read_rgb,
+    set_world,
+)
+
+
+def _fresh_scene():
+    """A scene in which nobody has touched a setting of either engine's, but for a small picture."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.preferences.addon_enable(module="relief")
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = 64, 48
+    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
+    set_world((0.4, 0.5, 0.6))
+    add_plane(6, diffuse((0.7, 0.7, 0.7)))
+    add_sphere(1.0, diffuse((0.8, 0.2, 0.1), "red"), (0, 0, 1))
+    add_light("SUN", rotation=degrees(40, 20, 0), energy=2, angle=0)
+    add_camera((0, -6, 4), degrees(57, 0, 0))
+    return scene
+
+
+def _exported(scene):
+    """(RELIEF_render of the scene, warnings)."""
+    from relief.exporter import export_frames
+
+    with folder() as path:
+        warnings, _ = export_frames(scene, f"{path}/scene.gltf", [scene.frame_current])
+        with open(f"{path}/scene.gltf", encoding="utf-8") as file:
+            return json.load(file)["extensions"]["RELIEF_render"], warnings
+
+
+def test_cycles_settings_are_taken_over():
+    from relief import final
+    from relief.export.settings import sampling_of
+
+    scene = _fresh_scene()
+    cycles = scene.cycles
+    cycles.samples, cycles.preview_samples, cycles.seed, cycles.time_limit = 77, 0, 5, 33
+    cycles.use_adaptive_sampling, cycles.adaptive_threshold = True, 0.0625
+    cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = 9, 2, 3
+    cycles.transmission_bounces, cycles.transparent_max_bounces, cycles.sample_clamp_indirect = 5, 6, 7.5
+    assert scene.relief.use_cycles_settings
+    found, warnings = _exported(scene)
+    expected = {
+        "samples": 77,
+        "noiseThreshold": 0.0625,
+        "maxBounces": 9,
+        "diffuseBounces": 2,
+        "glossyBounces": 3,
+        "transmissionBounces": 5,
+        "transparentBounces": 6,
+        "seed": 5,
+        "clampIndirect": 7.5,
+        "pixelFilter": {"type": "blackman-harris", "width": 3.0},
+    }
+    assert {key: found[key] for key in expected} == expected and not warnings, (found, warnings)
+    assert "--time-limit 33" in " ".join(final.command_line(scene))
+    assert sampling_of(scene).preview_samples == 16777216  # Cycles' 0 is no end
+    cycles.adaptive_threshold = 0  # Cycles chooses
+    assert _exported(scene)[0]["noiseThreshold"] == 1 / 77
+    cycles.use_adaptive_sampling = False
+    assert _exported(scene)[0]["noiseThreshold"] == 0
+
+
+def test_animated_seeds_differ_from_frame_to_frame():
+    scene = _fresh_scene()
+    scene.cycles.use_animated_seed = True
+    seeds = set()
+    for frame in range(1, 6):
+        scene.frame_set(frame)
+        seeds.add(_exported(scene)[0]["seed"])
+    assert len(seeds) == 5, seeds
+
+
+def test_what_cycles_alone_can_do_is_warned_about():
+    scene = _fresh_scene()
+    scene.cycles.sample_clamp_direct = 2
+    scene.cycles.pixel_filter_type = "GAUSSIAN"
+    found, warnings = _exported(scene)
+    assert abs(found["pixelFilter"]["width"] - 2.7075) < 1e-3, found
+    for text in ("Clamp Direct", "Gaussian"):
+        assert any(text in warning for warning in warnings), warnings
+
+
+def test_own_settings_are_kept():
+    """What files and scripts have set before there was a choice counts, also after saving and loading."""
+    scene = _fresh_scene()
+    scene.relief.samples = 21
+    assert not scene.relief.use_cycles_settings
+    assert _exported(scene)[0]["samples"] == 21
+    with folder() as path:
+        bpy.ops.wm.save_as_mainfile(filepath=f"{path}/scene.blend")
+        bpy.ops.wm.read_homefile(use_empty=True)
+        bpy.ops.wm.open_mainfile(filepath=f"{path}/scene.blend")
+        scene = bpy.context.scene
+        assert not scene.relief.use_cycles_settings
+        found = _exported(scene)[0]
+        assert found["samples"] == 21 and found["maxBounces"] == 12 and found["clampIndirect"] == 0, found
+        scene.relief.use_cycles_settings = True  # a choice outweighs them, whatever comes later
+        scene.relief.max_bounces = 3
+        scene.cycles.samples = 34
+        bpy.ops.wm.save_as_mainfile(filepath=f"{path}/scene.blend")
+        bpy.ops.wm.open_mainfile(filepath=f"{path}/scene.blend")
+        scene = bpy.context.scene
+        assert scene.relief.use_cycles_settings
+        found = _exported(scene)[0]
+        assert found["samples"] == 34 and found["maxBounces"] == scene.cycles.max_bounces, found
+        scene.relief.use_cycles_settings = False
+        assert _exported(scene)[0]["maxBounces"] == 3
+
+
+def test_without_cycles_relief_has_its_own():
+    scene = _fresh_scene()
+    bpy.ops.preferences.addon_disable(module="cycles")
+    assert not hasattr(scene, "cycles")
+    assert _exported(scene)[0]["samples"] == 128
+
+
+def test_pixel_filters_are_as_wide_as_those_of_cycles():
+    """The picture of a lit square before black, by each filter: its edge is as soft as that of Cycles."""
+    for kind, width in (("BLACKMAN_HARRIS", 1.5), ("BLACKMAN_HARRIS", 4.0), ("GAUSSIAN", 3.0), ("BOX", 5.0)):
+        scene = _fresh_scene()
+        for shown in list(scene.objects):
+            bpy.data.objects.remove(shown)
+        set_world((0, 0, 0))
+        glow = bpy.data.materials.new("glow")
+        glow.use_nodes = True
+        glow.node_tree.nodes.clear()
+        emission = glow.node_tree.nodes.new("ShaderNodeEmission")
+        output = glow.node_tree.nodes.new("ShaderNodeOutputMaterial")
+        glow.node_tree.links.new(emission.outputs[0], output.inputs["Surface"])
+        add_plane(3, glow)
+        add_camera()
+        scene.cycles.samples, scene.cycles.use_adaptive_sampling, scene.cycles.use_denoising = 1024, False, False
+        scene.cycles.pixel_filter_type, scene.cycles.filter_width = kind, width
+        pictures = []
+        with folder() as path:
+            for engine in ("RELIEF", "CYCLES"):
+                scene.render.engine, scene.render.filepath = engine, os.path.join(path, "picture.exr")
+                bpy.ops.render.render(write_still=True)
+                pictures.append(read_rgb(scene.render.filepath)[..., 0])
+        relief, cycles = pictures
+        difference = np.abs(relief - cycles).max()
+        print(kind, width, difference)
+        # A width that is wrong by a fifth shows as 0.04. A Gaussian has other flanks.
+        assert difference < (0.03 if kind == "GAUSSIAN" else 0.015), (kind, width, difference)
+        assert relief.max() > 0.99
+
+
+def test_cycles_defaults_end_at_the_noise_threshold():
+    """Of the 4,096 samples that Cycles would take at most, a plain scene needs few; its error is about the threshold."""
+    scene = _fresh_scene()
+    scene.render.engine = "RELIEF"
+    scene.cycles.use_denoising = False
+    with folder() as path:
+        scene.render.filepath = f"{path}/picture.exr"
+        bpy.ops.render.render(write_still=True)
+        picture = read_rgb(scene.render.filepath)
+        with open(scene.render.filepath, "rb") as file:
+            assert b"noise_threshold" in file.read(20000)
+        scene.cycles.use_adaptive_sampling, scene.cycles.samples, scene.cycles.seed = False, 8192, 1
+        bpy.ops.render.render(write_still=True)
+        reference = read_rgb(scene.render.filepath)
+    error = np.sqrt(((picture - reference) ** 2).mean()) / reference.mean()
+    print("relative error", error)
+    assert error < 0.015, error
