@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <string_view>
 #include <system_error>
+#include <thread>
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -46,7 +48,9 @@ OutputLock::OutputLock(const std::filesystem::path& output)
   const std::filesystem::path destination = output_destination(output);
   if (is_stream(destination)) return;
   path_ = destination.parent_path() / lock_name_of(destination.filename().string());
-  while (true) {
+  // side_files_clean holds a lock for a moment to see whether anybody else does.
+  constexpr int kMostTries = 20;
+  for (int try_number = 1;; ++try_number) {
     descriptor_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
     // Another user's lock cannot be written to, but it can be asked.
     if (descriptor_ < 0 && errno == EACCES) descriptor_ = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
@@ -55,6 +59,11 @@ OutputLock::OutputLock(const std::filesystem::path& output)
     if (error == 0 && !is_file_at(descriptor_, path_)) {
       // Its last holder removed it between our opening and locking it.
       ::close(descriptor_);
+      continue;
+    }
+    if (error == EWOULDBLOCK && try_number < kMostTries) {
+      ::close(descriptor_);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
       continue;
     }
     if (error == EWOULDBLOCK) {

@@ -6,8 +6,8 @@
 
 namespace relief {
 
-/// The right to make a file, as long as the object lives; a process that is killed loses it. Never waits. The lock is a file
-/// beside the output (side_file.h), which goes away with it.
+/// The right to make a file, as long as the object lives; a process that is killed loses it. Waits some milliseconds at most.
+/// The lock is a file beside the output (side_file.h), which goes away with it.
 class OutputLock {
  public:
   /// Tries to get the right.

@@ -49,13 +49,14 @@ bool is_lock(std::string_view name)
          name.ends_with(kLockSuffix) && is_hexadecimal(name.substr(kPrefix.size(), kNumberDigits));
 }
 
-/// Whether a lock's text says that a process of this machine made it.
+/// Whether a lock's text says that a process of this machine made it. One that was killed before it wrote says nothing: its
+/// lock is anybody's, since a living one would make another.
 bool is_lock_of_this_host(int descriptor)
 {
   std::array<char, 512> text{};
   const ssize_t size = ::pread(descriptor, text.data(), text.size(), 0);
   const std::string end = " on " + host_name() + "\n";
-  return size > 0 && std::string_view(text.data(), static_cast<std::size_t>(size)).ends_with(end);
+  return size == 0 || (size > 0 && std::string_view(text.data(), static_cast<std::size_t>(size)).ends_with(end));
 }
 
 void remove_if_abandoned(const std::filesystem::path& path, bool is_a_lock)

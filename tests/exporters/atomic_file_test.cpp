@@ -239,6 +239,28 @@ TEST_F(AtomicFileTest, CleaningNeverTakesAFileFromItsWriter)
   EXPECT_EQ(files_in_folder(), std::vector<std::string>{"a.txt"});
 }
 
+TEST_F(AtomicFileTest, LocksOfTheDeadAreRemovedThoughTheyDiedBeforeTheySigned)
+{
+  const std::string start = ".relief-0123456789abcde";
+  write_bytes(file(start + "0.lock"), "");
+  write_bytes(file(start + "1.lock"), "process 1 on " + host_name() + "\n");
+  write_bytes(file(start + "2.lock"), "process 1 on another machine\n");
+  side_files_clean(folder_);
+  EXPECT_EQ(files_in_folder(), std::vector<std::string>{start + "2.lock"});
+}
+
+TEST_F(AtomicFileTest, CleaningNeverTakesALockFromItsHolder)
+{
+  std::atomic<bool> is_done = false;
+  std::thread cleaner([&] {
+    while (!is_done) side_files_clean(folder_);
+  });
+  for (int i = 0; i < 2000; ++i) EXPECT_EQ(OutputLock(file("a.txt")).holder(), "");
+  is_done = true;
+  cleaner.join();
+  EXPECT_TRUE(files_in_folder().empty());
+}
+
 TEST_F(AtomicFileTest, ALockHasOneHolderAndSaysWho)
 {
   {
