@@ -1,4 +1,5 @@
-// libFuzzer target: whatever bytes a scene file holds, scene_load returns a scene or throws a SceneError.
+// libFuzzer target: whatever bytes a scene file holds, scene_load returns a scene, throws a SceneError, or says that the
+// file asks for more memory than there is.
 //
 // The file is always called scene.gltf and has two neighbours, other.gltf and data.bin, that it may refer to; the GLB
 // container is recognized by content, so both forms are reached. tinygltf is compiled in (fuzz_tinygltf.cpp) so that it
@@ -8,6 +9,7 @@
 #include <string_view>
 
 #include "scene/load.h"
+#include "scene/memory.h"
 #include "tests/support/gltf_builder.h"
 
 namespace {
@@ -39,6 +41,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     relief::scene_load(file, options);
   } catch (const relief::SceneError&) {
+  } catch (const relief::OutOfMemory&) {
   }
   return 0;
 }
