@@ -159,6 +159,16 @@ class FarRay {
   bool meets_ = false;
 };
 
+Box3 points_box(std::span<const Vec3f> points, const Affine3& m)
+{
+  Box3 box = box_empty();
+  for (const Vec3f P : points) {
+    const Vec3f P_there = transform_point(m, P);
+    box = box_union(box, {P_there, P_there});
+  }
+  return box;
+}
+
 Box3 scene_bounds(RTCScene scene)
 {
   RTCBounds b;
@@ -216,7 +226,6 @@ void Accel::build(const Scene& scene,
     // Spatial splits of HIGH quality would call the shadow filter twice for one triangle.
     mesh_scenes_[m] = new_scene(transparent[m] != 0 ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
     attach(mesh_scenes_[m], new_mesh(scene.meshes[m], nullptr, transparent[m] != 0), 0, ~0u);
-    commit(mesh_scenes_[m]);
   }
 
   const TraversalTable& traversals = traversal_table_select();
@@ -236,34 +245,63 @@ void Accel::build(const Scene& scene,
     commit(displaced_scenes_[d]);
   }
 
-  bool any_transparent = false;
-  for (std::size_t m = 0; m < scene.meshes.size(); ++m) any_transparent |= uses[m] == 1 && transparent[m] != 0;
-  top_ = new_scene(any_transparent ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
-  instances_.resize(scene.instances.size());
+  std::vector<Box3> mesh_boxes(scene.meshes.size());
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) mesh_boxes[m] = points_box(scene.meshes[m].P, {});
+
   Box3 box = box_empty();
+  instances_.resize(scene.instances.size());
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
     const auto mesh = static_cast<std::size_t>(instance.mesh_index);
     const int displaced = displacements.geometry_index(i);
-    RTCScene instanced = displaced >= 0 ? displaced_scenes_[static_cast<std::size_t>(displaced)] : mesh_scenes_[mesh];
-    RTCGeometry geometry = nullptr;
-    if (instanced != nullptr) {
-      instances_[i] = instance_geometry_prepare(instanced, instance.world_from_object, &pad_);
-      box = box_union(box, instance_bounds(instances_[i]));
-      geometry = instance_geometry_make(device_, instances_[i]);
-    } else {
-      for (const Vec3f P : scene.meshes[mesh].P) {
-        const Vec3f P_world = transform_point(instance.world_from_object, P);
-        box = box_union(box, {P_world, P_world});
-      }
-      geometry = new_mesh(scene.meshes[mesh], &instance.world_from_object, transparent[mesh] != 0);
+    const auto d = static_cast<std::size_t>(displaced);
+    if (displaced < 0 && mesh_scenes_[mesh] == nullptr) {
+      box = box_union(box, points_box(scene.meshes[mesh].P, instance.world_from_object));
+      continue;
     }
-    attach(top_, geometry, static_cast<unsigned>(i), mask_of(instance.flags));
+    instances_[i] = instance_geometry_prepare(displaced >= 0 ? displaced_scenes_[d] : mesh_scenes_[mesh],
+                                              displaced >= 0 ? displaced_bounds(d) : mesh_boxes[mesh],
+                                              instance.world_from_object, &pad_);
+    box = box_union(box, instance_bounds(instances_[i]));
+  }
+  for (const std::uint32_t index : area_lights) {
+    const Light& light = lights[index];
+    const Vec3f half = light_is_ball(light) ? splat3(light.radius) : abs(light.edge_u) + abs(light.edge_v);
+    box = box_union(box, {light.P - half, light.P + half});
+  }
+  if (box.low.x <= box.high.x) pad_ = ray_target_pad(ray_target_make(box));
+
+  // The boxes of Embree's own instances are as large as those of what they show.
+  std::vector<Vec3f> mesh_pads(scene.meshes.size());
+  const auto is_embrees = [&](std::size_t i) {
+    return displacements.geometry_index(i) < 0 && instance_is_accurate_in_single_precision(instances_[i]);
+  };
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    Vec3f& pad = mesh_pads[static_cast<std::size_t>(scene.instances[i].mesh_index)];
+    if (instances_[i].scene != nullptr && is_embrees(i)) pad = max(pad, instance_pad(instances_[i]));
+  }
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    if (mesh_scenes_[m] == nullptr) continue;
+    const Box3 padded{mesh_boxes[m].low - mesh_pads[m], mesh_boxes[m].high + mesh_pads[m]};
+    if (!is_zero(mesh_pads[m])) attach(mesh_scenes_[m], new_corners(padded), 1, 0);
+    commit(mesh_scenes_[m]);
+  }
+
+  bool any_transparent = false;
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) any_transparent |= uses[m] == 1 && transparent[m] != 0;
+  top_ = new_scene(any_transparent ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const Instance& instance = scene.instances[i];
+    const auto mesh = static_cast<std::size_t>(instance.mesh_index);
+    attach(top_,
+           instances_[i].scene == nullptr
+               ? new_mesh(scene.meshes[mesh], &instance.world_from_object, transparent[mesh] != 0)
+           : is_embrees(i) ? new_instance(mesh_scenes_[mesh], instance.world_from_object)
+                           : instance_geometry_make(device_, instances_[i]),
+           static_cast<unsigned>(i), mask_of(instance.flags));
   }
   for (std::size_t i = 0; i < area_lights.size(); ++i) {
     const Light& light = lights[area_lights[i]];
-    const Vec3f half = light_is_ball(light) ? splat3(light.radius) : abs(light.edge_u) + abs(light.edge_v);
-    box = box_union(box, {light.P - half, light.P + half});
     attach(top_,
            light.kind == LightKind::kRectangle ? new_rectangle(light)
            : light.kind == LightKind::kDisk    ? new_round(light, disk_bounds, disk_intersect)
@@ -271,7 +309,6 @@ void Accel::build(const Scene& scene,
            static_cast<unsigned>(scene.instances.size() + i),
            kRayBounce | (light.visible_to_camera ? std::uint32_t{kRayCamera} : 0u));
   }
-  if (box.low.x <= box.high.x) pad_ = ray_target_pad(ray_target_make(box));
   commit(top_);
   target_ = ray_target_make(bounds());
 }
@@ -366,6 +403,31 @@ RTCGeometry Accel::new_mesh(const Mesh& mesh, const Affine3* world_from_object, 
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
                              sizeof(TriangleIndices), mesh.triangles.size());
   if (transparent) rtcSetGeometryOccludedFilterFunction(geometry, shadow_filter_);
+  return geometry;
+}
+
+/// Two points that no ray hits, but that the box of a scene holds.
+RTCGeometry Accel::new_corners(const Box3& box)
+{
+  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+  auto* vertices = static_cast<Vec3f*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), 2));
+  auto* triangles = static_cast<TriangleIndices*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(TriangleIndices), 2));
+  if (vertices == nullptr || triangles == nullptr) throw OutOfMemory("the box of a mesh");
+  vertices[0] = box.low;
+  vertices[1] = box.high;
+  triangles[0] = {0, 0, 0};
+  triangles[1] = {1, 1, 1};
+  return geometry;
+}
+
+RTCGeometry Accel::new_instance(RTCScene instanced, const Affine3& m)
+{
+  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
+  rtcSetGeometryInstancedScene(geometry, instanced);
+  const float columns[12] = {m.x.x, m.x.y, m.x.z, m.y.x, m.y.y, m.y.z, m.z.x, m.z.y, m.z.z, m.p.x, m.p.y, m.p.z};
+  rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
   return geometry;
 }
 

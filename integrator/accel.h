@@ -23,7 +23,8 @@ namespace relief {
 enum RayMask : std::uint32_t { kRayCamera = 1u << 0, kRayBounce = 1u << 1, kRayShadow = 1u << 2 };
 
 /// Builds and owns the acceleration structure. Meshes that occur once are placed in world space; a mesh that occurs more
-/// often, or is displaced, has one scene of its own and Embree instances of it.
+/// often, or is displaced, has one scene of its own and instances of it: Embree's, or where single precision would not do,
+/// those of instance_geometry.h.
 class Accel {
  public:
   /// @param scene         must outlive the Accel: vertex and index buffers are shared where they can be
@@ -56,8 +57,10 @@ class Accel {
  private:
   RTCScene new_scene(RTCBuildQuality quality);
   RTCGeometry new_mesh(const Mesh& mesh, const Affine3* world_from_object, bool transparent);
+  RTCGeometry new_corners(const Box3& box);
+  RTCGeometry new_instance(RTCScene instanced, const Affine3& world_from_object);
   RTCGeometry new_rectangle(const Light& light);
-  RTCGeometry new_round(const Light& light, RTCBoundsFunction bounds_of, RTCIntersectFunctionN intersect);
+  RTCGeometry new_round(const Light& light, RTCBoundsFunction bounds_of, RTCIntersectFunctionN intersect_of);
   void build(const Scene& scene,
              std::span<const Light> lights,
              std::span<const std::uint32_t> area_lights,
@@ -71,7 +74,7 @@ class Accel {
   const DisplacementSet* displacements_;
   RayTarget target_;                         ///< all that rays can hit, world
   float pad_ = 0;                            ///< of its boxes, metres
-  std::vector<InstanceGeometry> instances_;  ///< an instance; unused where a mesh is in place
+  std::vector<InstanceGeometry> instances_;  ///< an instance; unused where a mesh is in place or Embree's instance
   RTCDevice device_ = nullptr;
   RTCScene top_ = nullptr;
   std::vector<RTCScene> mesh_scenes_;                 ///< null for meshes that occur once

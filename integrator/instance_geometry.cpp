@@ -154,7 +154,10 @@ void occluded(const RTCOccludedFunctionNArguments* arguments)
 
 }  // namespace
 
-InstanceGeometry instance_geometry_prepare(RTCScene scene, const Affine3& world_from_object, const float* pad)
+InstanceGeometry instance_geometry_prepare(RTCScene scene,
+                                           const Box3& box,
+                                           const Affine3& world_from_object,
+                                           const float* pad)
 {
   InstanceGeometry out;
   out.scene = scene;
@@ -168,10 +171,20 @@ InstanceGeometry instance_geometry_prepare(RTCScene scene, const Affine3& world_
   out.y = d * Vec3d{rows[0].y, rows[1].y, rows[2].y};
   out.z = d * Vec3d{rows[0].z, rows[1].z, rows[2].z};
   out.p = -1.0 * (p.x * out.x + p.y * out.y + p.z * out.z);
-  RTCBounds b;
-  rtcGetSceneBounds(scene, &b);
-  out.target = ray_target_make({{b.lower_x, b.lower_y, b.lower_z}, {b.upper_x, b.upper_y, b.upper_z}});
+  out.target = ray_target_make(box);
   return out;
+}
+
+Vec3f instance_pad(const InstanceGeometry& instance)
+{
+  return *instance.pad * (abs(to_float(instance.x)) + abs(to_float(instance.y)) + abs(to_float(instance.z)));
+}
+
+bool instance_is_accurate_in_single_precision(const InstanceGeometry& instance)
+{
+  // The pad is several times what rays err by.
+  const Box3& box = instance.target.box;
+  return max_component(instance_pad(instance)) <= 0x1p-6f * max_component(box.high - box.low);
 }
 
 Box3 instance_bounds(const InstanceGeometry& instance)
