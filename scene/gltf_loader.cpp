@@ -67,9 +67,12 @@ void add_files(Scene& scene, const std::vector<TextureRequest>& requests)
   }
 }
 
-/// Reads the height maps and points the displacements at them.
+/// Reads the height maps, once, and points the displacements at them.
+/// @param requests  empty: done before
 void load_height_maps(Scene& scene, const std::vector<TextureRequest>& requests, Warnings& warnings)
 {
+  if (requests.empty()) return;
+  add_files(scene, requests);
   HeightMapSet heights = height_maps_load(requests, warnings);
   for (DisplacementSettings& displacement : scene.displacements) {
     displacement.height.texture_index =
@@ -431,6 +434,14 @@ void GltfLoader::set_camera(const LoadOptions& options)
     return;
   }
   if (!choice.look_from && !scene_.cameras.empty()) return;
+  // Heights of float maps may be anything.
+  load_height_maps(scene_, height_maps_.take(), warnings_);
+  std::vector<float> reach_of;
+  for (const DisplacementSettings& d : scene_.displacements) {
+    const auto map = static_cast<std::size_t>(d.height.texture_index);
+    const HeightRange range = height_map_range(scene_.height_maps[map].view());
+    reach_of.push_back(std::fabs(d.scale) * max(std::fabs(range.low - d.midlevel), std::fabs(range.high - d.midlevel)));
+  }
   Framing framing(choice.fov, image_aspect_);
   std::map<int, std::vector<Vec3f>> points_of;
   for (const std::optional<double> time : framed_times(options)) {
@@ -441,10 +452,9 @@ void GltfLoader::set_camera(const LoadOptions& options)
       float reach = 0;
       bool in_world = false;
       if (material.displacement_index >= 0) {
-        // Heights are not read yet; those of images lie between 0 and 1.
-        const DisplacementSettings& d = scene_.displacements[static_cast<std::size_t>(material.displacement_index)];
-        reach = std::fabs(d.scale) * max(std::fabs(d.midlevel), std::fabs(1 - d.midlevel));
-        in_world = d.space == DisplacementSpace::kWorld;
+        const auto d = static_cast<std::size_t>(material.displacement_index);
+        reach = reach_of[d];
+        in_world = scene_.displacements[d].space == DisplacementSpace::kWorld;
       }
       framing.add(p.world_from_object, points->second, in_world ? 0 : reach, in_world ? reach : 0);
     }
@@ -489,7 +499,6 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
       height_maps = loader.take_height_maps();
     }
     add_files(scene, textures);
-    add_files(scene, height_maps);
     load_height_maps(scene, height_maps, warnings);
     const auto store = std::make_shared<TextureStore>(std::move(textures), options.texture_budget_bytes, warnings);
     scene.textures = store;

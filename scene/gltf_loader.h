@@ -23,8 +23,8 @@ class GltfLoader {
  public:
   explicit GltfLoader(Warnings& warnings) : warnings_(warnings) {}
 
-  /// @return everything but the texture store, height maps, features and warnings; the displacements' texture indices
-  ///         are those of take_height_maps
+  /// @return everything but the texture store, features and warnings; without the height maps, unless the camera had to know
+  ///         them: the displacements' texture indices are those of take_height_maps then
   /// @error SceneError
   Scene load(const std::filesystem::path& path, const LoadOptions& options);
 
@@ -36,7 +36,7 @@ class GltfLoader {
   /// Textures that the scene refers to, in index order.
   std::vector<TextureRequest> take_textures() { return textures_.take(); }
 
-  /// Height maps that displacements refer to, in index order.
+  /// Height maps that displacements refer to, in index order; empty once they are loaded.
   std::vector<TextureRequest> take_height_maps() { return height_maps_.take(); }
 
  private:

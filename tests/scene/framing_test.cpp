@@ -156,7 +156,27 @@ TEST(Framing, LeavesRoomForDisplacement)
   b.json["meshes"][0]["primitives"][0]["material"] = 0;
   const Scene scene = load(b);
   Reach reach = reach_of(scene);
-  for (const Vec3f p : scene.meshes[0].P) reach.add(scene.cameras[0].camera, p + Vec3f{0, 0, 2});
+  const float height = height_map_range(scene.height_maps.at(0).view()).high;
+  for (const Vec3f p : scene.meshes[0].P) reach.add(scene.cameras[0].camera, p + Vec3f{0, 0, 2 * height});
+  EXPECT_LT(reach.most(), 0.9f);
+}
+
+TEST(Framing, LeavesRoomForHeightsInMetres)
+{
+  GltfBuilder b = square_scene();
+  // One texel of Radiance's format: 128 / 256 · 2^(131 − 128) = 4.
+  b.json["images"] = {{{"uri", "data:image/vnd.radiance;base64," +
+                                   base64("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\n\x80\x80\x80\x83")}}};
+  b.json["textures"] = {{{"source", 0}}};
+  b.push(
+      "materials",
+      {{"extensions", {{"RELIEF_displacement", {{"heightTexture", {{"index", 0}}}, {"scale", 1}, {"midlevel", 0}}}}}});
+  b.json["meshes"][0]["primitives"][0]["material"] = 0;
+  const Scene scene = load(b);
+  ASSERT_EQ(scene.height_maps.size(), 1u);
+  EXPECT_EQ(scene.displacements[0].height.texture_index, 0);
+  Reach reach = reach_of(scene);
+  for (const Vec3f p : scene.meshes[0].P) reach.add(scene.cameras[0].camera, p + Vec3f{0, 0, 4});
   EXPECT_LT(reach.most(), 0.9f);
 }
 
