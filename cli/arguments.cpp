@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "kernel/film/film_layout.h"
+#include "scene/limits.h"
 
 namespace relief {
 
@@ -110,7 +111,6 @@ FrameList parse_frames(const std::string& text)
 
 Vec3f parse_point(const char* option, const std::string& text)
 {
-  constexpr float kFarthest = 1e15f;
   Vec3f point;
   const auto parts = split(text, ',');
   const bool is_point = parts.size() == 3 && to_number(parts[0], &point.x) && to_number(parts[1], &point.y) &&

@@ -100,8 +100,8 @@ void check_positions(const Scene& scene, const Instance& instance, const Box3& b
   const Vec3f extent = max(abs(box.low), abs(box.high));
   const Vec3f extent_world = abs(m.x) * extent.x + abs(m.y) * extent.y + abs(m.z) * extent.z + abs(m.p);
   // A mesh without triangles has a box of infinite extent, turned over.
-  if (!(box.low.x <= box.high.x) || max_component(max(extent, extent_world)) <= 2 * kFarthest) return;
-  throw SceneError(scene.file, "", "displaced positions within 1e15 m of the origin",
+  if (!(box.low.x <= box.high.x) || max_component(max(extent, extent_world)) <= kFarthestDisplaced) return;
+  throw SceneError(scene.file, "", "displaced positions within 2e15 m of the origin",
                    "farther ones of node '" + instance.name + "'");
 }
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "scene/framing.h"
+#include "scene/limits.h"
 #include "scene/relief_extensions.h"
 
 namespace relief {
@@ -29,8 +30,8 @@ SceneCamera gltf_camera(const GltfDocument& document,
     camera.projection = Projection::kOrthographic;
     camera.half_height = static_cast<float>(std::fabs(source.orthographic.ymag));
     const auto half_width = static_cast<float>(std::fabs(source.orthographic.xmag));
-    constexpr float kSmallest = 1e-9f, kLargest = 1e15f;
-    if (!(min(camera.half_height, half_width) >= kSmallest && max(camera.half_height, half_width) <= kLargest)) {
+    constexpr float kSmallest = 1e-9f;
+    if (!(min(camera.half_height, half_width) >= kSmallest && max(camera.half_height, half_width) <= kFarthest)) {
       throw SceneError(document.file, path + "/orthographic", "xmag and ymag other than 0 and up to 1e15 m",
                        number_text(source.orthographic.xmag) + " and " + number_text(source.orthographic.ymag));
     }

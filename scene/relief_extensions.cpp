@@ -60,8 +60,8 @@ Mist read_mist(const JsonReader& r, Warnings& warnings)
 {
   static constexpr std::string_view kFalloffs[] = {"linear", "quadratic", "inverse-quadratic"};
   Mist mist;
-  mist.start = r.number_f("start", mist.start, 0, 1e15);
-  mist.depth = r.number_f("depth", mist.depth, 1e-6, 1e15);
+  mist.start = r.number_f("start", mist.start, 0, kFarthest);
+  mist.depth = r.number_f("depth", mist.depth, 1e-6, kFarthest);
   mist.falloff = static_cast<MistFalloff>(r.choice("falloff", kFalloffs, 1));
   r.warn_unread(warnings);
   return mist;
@@ -214,7 +214,7 @@ void relief_camera(const GltfDocument& document, int camera_index, Camera& camer
   const auto index = static_cast<std::size_t>(camera_index);
   const std::string path = "/cameras/" + std::to_string(index);
   document.read_extension(document.element("cameras", index), path, "RELIEF_camera", [&](const JsonReader& r) {
-    camera.aperture_radius = r.number_f("apertureRadius", 0, 0, 1e15);
+    camera.aperture_radius = r.number_f("apertureRadius", 0, 0, kFarthest);
     camera.focus_distance = r.number_f("focusDistance", 1, 1e-6, kNoLimit);
     const float reach = camera.projection == Projection::kPerspective
                             ? camera.focus_distance * max(1.0f, max(camera.half_width, camera.half_height))
@@ -279,8 +279,7 @@ void relief_light(const GltfDocument& document,
   static constexpr std::string_view kShapes[] = {"ball", "disk"};
   document.read_extension(value, path, "RELIEF_light", [&](const JsonReader& r) {
     if (light.kind != LightKind::kSun) {
-      constexpr double kLargestRadius = 1e15;
-      light.radius = r.number_f("radius", 0, 0, kLargestRadius);
+      light.radius = r.number_f("radius", 0, 0, kFarthest);
       // Its square would leave single precision; so small a ball is a point.
       constexpr float kSmallestRadius = 1e-9f;
       if (light.radius < kSmallestRadius) light.radius = 0;

@@ -73,7 +73,7 @@ class DisplacementProgram : public ProgramTest {
 TEST_F(DisplacementProgram, SizesBeyondTheLimitsAreErrorsOfTheScene)
 {
   struct Beyond {
-    const char* path;
+    const char* message;
     std::function<void(GltfBuilder&)> make;
   };
   const auto optics = [](const char* name, double value) {
@@ -85,6 +85,7 @@ TEST_F(DisplacementProgram, SizesBeyondTheLimitsAreErrorsOfTheScene)
   const auto number = [](const char* pointer, const nlohmann::json& value) {
     return [=](GltfBuilder& b) { b.json[nlohmann::json::json_pointer(pointer)] = value; };
   };
+  const char* kScale = "/materials/0/extensions/RELIEF_displacement/scale";
   for (const Beyond& beyond : std::vector<Beyond>{
            {"/nodes/0: ", number("/nodes/0/scale", {1e-18, 1e-18, 1e-18})},
            {"/nodes/0: ", number("/nodes/0/scale", {1, 1, 1e-18})},
@@ -92,13 +93,14 @@ TEST_F(DisplacementProgram, SizesBeyondTheLimitsAreErrorsOfTheScene)
            {"/cameras/0/extensions/RELIEF_camera/focusDistance: ", optics("focusDistance", 1e30)},
            {"/cameras/0/extensions/RELIEF_camera/apertureRadius: ", optics("apertureRadius", 1e19)},
            {"/cameras/0/orthographic: ", number("/cameras/0/orthographic/xmag", 1e18)},
+           {"displaced positions within 2e15 m", number(kScale, 2.01e15)},
        }) {
     GltfBuilder b = displaced_square();
     b.json["extensionsUsed"].push_back("RELIEF_camera");
     beyond.make(b);
     const Outcome outcome = render(bumpy(b), file("o.exr"));
-    EXPECT_EQ(outcome.exit_code, 3) << beyond.path << outcome.errors;
-    EXPECT_NE(outcome.errors.find(beyond.path), std::string::npos) << beyond.path << outcome.errors;
+    EXPECT_EQ(outcome.exit_code, 3) << beyond.message << outcome.errors;
+    EXPECT_NE(outcome.errors.find(beyond.message), std::string::npos) << beyond.message << outcome.errors;
     EXPECT_FALSE(exists("o.exr"));
   }
 }
@@ -122,6 +124,7 @@ TEST_F(DisplacementProgram, ScenesAtTheLimitsAreRendered)
       [](GltfBuilder& b) {
         b.json["nodes"][1]["translation"] = {.5, .5, 9e14};
       },
+      [](GltfBuilder& b) { displacement_of(b)["scale"] = 1.99e15; },
       optics({{"apertureRadius", 0.1}, {"focusDistance", 1e15}}),
       optics({{"apertureRadius", 1e15}, {"focusDistance", 5}}),
       optics({{"clip", {1e30}}}),
