@@ -2,50 +2,16 @@
 
 #include <algorithm>
 #include <cctype>
-#include <iterator>
 #include <string_view>
+
+#include "scene/file_kind.h"
 
 namespace relief {
 namespace {
 
 using namespace std::string_view_literals;
 
-struct Signature {
-  std::string_view bytes;
-  const char* name;  ///< OpenImageIO's for what is read, ours for what is not
-  std::size_t offset = 0;
-};
-
-constexpr Signature kRead[] = {
-    {"\x89PNG"sv, "png"}, {"\xff\xd8\xff"sv, "jpeg"}, {"\x76\x2f\x31\x01"sv, "openexr"},
-    {"#?"sv, "hdr"},      {"II*\0"sv, "tiff"},        {"MM\0*"sv, "tiff"},
-    {"II+\0"sv, "tiff"},  {"MM\0+"sv, "tiff"},        {"BM"sv, "bmp"},
-};
-
-constexpr Signature kNotRead[] = {
-    {"GIF8"sv, "a GIF image"},
-    {"8BPS"sv, "a Photoshop image"},
-    {"DDS "sv, "a DDS image"},
-    {"\0\0\0\x0cjP"sv, "a JPEG 2000 image"},
-    {"\xff\x4f\xff\x51"sv, "a JPEG 2000 image"},
-    {"\xff\x0a"sv, "a JPEG XL image"},
-    {"\0\0\0\x0cJXL"sv, "a JPEG XL image"},
-    {"\xabKTX"sv, "a KTX image"},
-    {"SDPX"sv, "a DPX image"},
-    {"XPDS"sv, "a DPX image"},
-    {"\x80\x2a\x5f\xd7"sv, "a Cineon image"},
-    {"FOR4"sv, "an IFF image"},
-    {"\x01\xda"sv, "an SGI image"},
-    {"ftypavif"sv, "an AVIF image", 4},
-    {"ftyphei"sv, "a HEIF image", 4},
-    {"glTF"sv, "a GLB scene"},
-    {"version https://g"sv, "a Git LFS pointer, which stands for a file that was not fetched"},
-};
-
-bool has(std::string_view bytes, const Signature& s)
-{
-  return bytes.size() >= s.offset && bytes.substr(s.offset, s.bytes.size()) == s.bytes;
-}
+static_assert(ImageEnds::kHeadBytes >= FileSignature::kReach);
 
 /// Whether 18 bytes are a TGA header of a picture.
 /// @source Truevision TGA File Format Specification 2.0, "TGA File Header"
@@ -80,21 +46,18 @@ ImageFormat image_format(const ImageEnds& ends, const std::filesystem::path& nam
   if (head.empty()) {
     return {nullptr, "no data"};
   }
-  for (const Signature& signature : kRead) {
-    if (has(head, signature)) {
-      return {signature.name, {}};
-    }
+  const FileSignature* signature = file_signature(head);
+  if (signature != nullptr && signature->reader != nullptr) {
+    return {signature->reader, {}};
   }
-  if (has(head, {"RIFF"sv, ""}) && has(head, {"WEBP"sv, "", 8})) {
+  if (head.starts_with("RIFF"sv) && head.find("WEBP"sv, 8) == 8) {
     return {"webp", {}};
   }
   const bool may_be_tga = tail == "TRUEVISION-XFILE.\0"sv || lower_case_extension(name) == ".tga";
   if (may_be_tga && is_tga_header(ends.head)) {
     return {"targa", {}};
   }
-  const auto* known =
-      std::find_if(std::begin(kNotRead), std::end(kNotRead), [&](const Signature& s) { return has(head, s); });
-  return {nullptr, known != std::end(kNotRead) ? known->name : "bytes of an unknown format"};
+  return {nullptr, signature != nullptr ? std::string(signature->kind) : "bytes of an unknown format"};
 }
 
 }  // namespace relief

@@ -558,8 +558,8 @@ const BrokenBytes kBrokenBytes[] = {
        return std::string("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n");
      },
      "git lfs pull"},
-    {"an OpenEXR picture", [](const auto&) { return std::string("\x76\x2f\x31\x01\2\0\0\0", 8); },
-     "an OpenEXR picture"},
+    {"an OpenEXR image", [](const auto&) { return std::string("\x76\x2f\x31\x01\2\0\0\0", 8); }, "an OpenEXR image"},
+    {"a GIF image", [](const auto&) { return std::string("GIF89a"); }, "a GIF image"},
     {"a Blender file", [](const auto&) { return std::string("BLENDER-v304RENDH"); }, "a Blender file"},
     {"glTF 1.0 without a version",
      [](const auto&) { return std::string("{\"nodes\": {\"n\": {}}, \"scene\": \"s\"}"); }, "glTF 1.0"},

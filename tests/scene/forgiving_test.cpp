@@ -121,18 +121,32 @@ TEST(Forgiving, ExtensionsThatAreNotDeclaredAreReadOrNamed)
   EXPECT_FALSE(has_warning(scene, "NOT_one"));
 }
 
-TEST(Forgiving, ABufferThatIsAGitLfsPointerIsNamed)
+/// The error of a scene whose buffer's file holds too few bytes.
+std::string error_of_buffer(const std::string& bytes)
 {
   GltfBuilder b = test::square_scene();
   const test::TemporaryFolder folder;
-  folder.write("mesh.bin", "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n");
+  folder.write("mesh.bin", bytes);
   b.json["buffers"] = {{{"byteLength", b.binary.size()}, {"uri", "mesh.bin"}}};
   try {
     scene_load(folder.write("scene.gltf", b.gltf()));
-    FAIL();
   } catch (const SceneError& e) {
-    EXPECT_NE(std::string(e.what()).find("git lfs pull"), std::string::npos) << e.what();
+    return e.what();
   }
+  return "none";
+}
+
+TEST(Forgiving, ABufferThatIsAGitLfsPointerIsNamed)
+{
+  const std::string error =
+      error_of_buffer("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n");
+  EXPECT_NE(error.find("git lfs pull"), std::string::npos) << error;
+}
+
+TEST(Forgiving, ABufferThatBeginsLikeABitmapIsOnlyShort)
+{
+  const std::string error = error_of_buffer("BM\1\2\3\4");
+  EXPECT_NE(error.find("byteLength: expected at most the 6 bytes that there are"), std::string::npos) << error;
 }
 
 }  // namespace

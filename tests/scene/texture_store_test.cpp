@@ -639,6 +639,8 @@ TEST(TextureErrors, OtherFormatsAreRefusedByContentWhateverTheirNames)
   for (const Case& c : {Case{"GIF89a"sv, "a GIF image"}, Case{"SDPX\0\0\x08\0"sv, "a DPX image"},
                         Case{"FOR4\0\0\0\x10"sv, "an IFF image"}, Case{"8BPS"sv, "a Photoshop image"},
                         Case{"version https://git-lfs.github.com/spec/v1\n"sv, "a Git LFS pointer"},
+                        Case{"PK\x03\x04"sv, "a ZIP archive"}, Case{"\x01\xda"sv, "an SGI image"},
+                        Case{"\0\0\0 ftypavif"sv, "an AVIF image"}, Case{"RIFF"sv, "unknown format"},
                         Case{"nothing at all, in more than eighteen bytes"sv, "unknown format"}}) {
     std::vector<unsigned char> bytes(c.head.begin(), c.head.end());
     bytes.resize(300, 0);
