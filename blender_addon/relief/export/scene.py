@@ -305,7 +305,7 @@ class SceneExporter:
         key = (_shape(thing, evaluated), wanted)
         if key not in self._by_shape:
             try:
-                mesh = thing.data if thing.data is not None else evaluated.to_mesh()
+                mesh = _evaluated_mesh(thing, evaluated)
             except RuntimeError as error:
                 self._leave_out(thing, f"Blender makes no mesh of it ({str(error).strip()})", len(thing.matrices))
                 return None
@@ -360,6 +360,11 @@ def _slots(thing, evaluated):
         return [slot.material for slot in slots]
     pairs = zip_longest(thing.data.materials, slots)
     return [slot.material if slot is not None and slot.link == "OBJECT" else material for material, slot in pairs]
+
+
+def _evaluated_mesh(thing, evaluated):
+    """The mesh of a thing, which Blender makes here unless geometry nodes have; None if there is none."""
+    return thing.data if thing.data is not None else evaluated.to_mesh()
 
 
 def _shape(thing, evaluated):
