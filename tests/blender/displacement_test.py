@@ -88,6 +88,18 @@ def _square(material, scale=(1, 1, 1)):
     return make
 
 
+def _sphere(material, radius, scale=(1, 1, 1)):
+    def make(detail):
+        sphere = add_sphere(radius, material, (0, 0, 1), segments=64)
+        sphere.scale = scale
+        if detail == "fine":
+            modifier = sphere.modifiers.new("fine", "SUBSURF")
+            modifier.subdivision_type, modifier.render_levels = "SIMPLE", 4
+        return sphere
+
+    return make
+
+
 def test_height_and_midlevel():
     scene = _stage()
     material, _, _, _ = _material(scale=0.4, midlevel=0.3)
@@ -122,16 +134,7 @@ def test_world_space_on_a_squeezed_sphere():
     """Its normals are not what the object's scale makes of lengths."""
     scene = _stage()
     material, _, _, _ = _material(scale=0.2, space="WORLD")
-
-    def make(detail):
-        sphere = add_sphere(1.0, material, (0, 0, 1), segments=64)
-        sphere.scale = (1.6, -0.9, 0.5)
-        if detail == "fine":
-            modifier = sphere.modifiers.new("fine", "SUBSURF")
-            modifier.subdivision_type, modifier.render_levels = "SIMPLE", 4
-        return sphere
-
-    _assert_agrees(scene, make, tolerance=0.04)
+    _assert_agrees(scene, _sphere(material, 1.0, (1.6, -0.9, 0.5)), tolerance=0.04)
 
 
 def test_midlevel_in_metres():
@@ -177,16 +180,8 @@ def test_direction_on_a_sphere():
     """The normals of the coarse sphere say where points go: the fine one has those normals, interpolated linearly."""
     scene = _stage()
     material, _, _, _ = _material(scale=0.25)
-
-    def make(detail):
-        sphere = add_sphere(1.2, material, (0, 0, 1), segments=64)
-        if detail == "fine":
-            modifier = sphere.modifiers.new("fine", "SUBSURF")
-            modifier.subdivision_type, modifier.render_levels = "SIMPLE", 4
-        return sphere
-
     # The subdivided mesh has the coarse one's facets but new smooth normals: 64 segments keep both within this.
-    _assert_agrees(scene, make, tolerance=0.04)
+    _assert_agrees(scene, _sphere(material, 1.2), tolerance=0.04)
 
 
 def test_flat_faces_stay_together():

@@ -427,6 +427,21 @@ TEST(SpotLight, SmoothFalloffsAreCubic)
   EXPECT_FLOAT_EQ(light_sample(light, {std::sin(0.599f), 0, -std::cos(0.599f)}, {}).radiance.x, std::cos(0.599f));
 }
 
+/// Irradiance at the origin, on a plane across z, by samples of a light on a regular grid.
+/// @param check  called with each sample; a fatal failure in it ends the sum
+template <typename Check>
+double irradiance_on_grid(const Light& light, int side, const Check& check)
+{
+  double sum = 0;
+  for (int i = 0; i < side * side && !testing::Test::HasFatalFailure(); ++i) {
+    const Vec2f cell{static_cast<float>(i % side), static_cast<float>(i / side)};
+    const LightSample sample = light_sample(light, {}, (cell + Vec2f{0.5f, 0.5f}) * (1.0f / static_cast<float>(side)));
+    check(sample);
+    sum += double(sample.radiance.x) / double(sample.pdf) * std::max(0.0, double(sample.wi.z));
+  }
+  return sum / (side * side);
+}
+
 // A ball that is above the horizon as a whole lights a surface as the point at its centre does.
 TEST(PointLight, BallGivesThePointsIrradiance)
 {
@@ -435,19 +450,13 @@ TEST(PointLight, BallGivesThePointsIrradiance)
   light.emission = {2, 2, 2};
   for (const float radius : {1e-4f, 0.1f, 0.7f, 1.1f}) {
     light.radius = radius;
-    constexpr int kSide = 512;
-    double irradiance = 0;
-    for (int i = 0; i < kSide * kSide; ++i) {
-      const int column = i % kSide, row = i / kSide;
-      const Vec2f u{(static_cast<float>(column) + 0.5f) / kSide, (static_cast<float>(row) + 0.5f) / kSide};
-      const LightSample sample = light_sample(light, {}, u);
+    const double irradiance = irradiance_on_grid(light, 512, [&](const LightSample& sample) {
       ASSERT_FALSE(sample.delta);
       ASSERT_EQ(sample.pdf, light_pdf(light, {}, sample.wi, sample.distance));
       // The sampled point is on the ball, on the side that is seen.
       ASSERT_NEAR(length(sample.wi * sample.distance - light.P), radius, 2e-6f);
       ASSERT_LE(sample.distance, length(light.P));
-      irradiance += double(sample.radiance.x) / double(sample.pdf) * double(sample.wi.z) / (kSide * kSide);
-    }
+    });
     EXPECT_NEAR(irradiance * std::pow(double(length(light.P)), 3) / (2 * double(light.P.z)), 1.0, 2e-5) << radius;
   }
 }
@@ -463,17 +472,10 @@ TEST(PointLight, PointsInsideAreLitAsFromAllAround)
     light.faces_viewer = faces_viewer;
     for (const float radius : {0.1f, 0.499f, 0.501f, 2.0f, 1e4f}) {
       light.radius = radius;
-      constexpr int kSide = 256;
-      double irradiance = 0;
-      for (int i = 0; i < kSide * kSide; ++i) {
-        const int column = i % kSide, row = i / kSide;
-        const Vec2f u{(static_cast<float>(column) + 0.5f) / kSide, (static_cast<float>(row) + 0.5f) / kSide};
-        const LightSample sample = light_sample(light, {}, u);
+      const double irradiance = irradiance_on_grid(light, 256, [&](const LightSample& sample) {
         ASSERT_GT(sample.pdf, 0.0f);
         ASSERT_NEAR(sample.distance, ball_light_distance(light, light.P, sample.wi), 1e-5f * sample.distance);
-        irradiance +=
-            double(sample.radiance.x) / double(sample.pdf) * std::max(0.0, double(sample.wi.z)) / (kSide * kSide);
-      }
+      });
       const double ratio = std::pow(double(radius) / double(light.P.z), 2);
       const double sin_squared = faces_viewer ? ratio / (1 + ratio) : std::min(ratio, 1.0);
       EXPECT_NEAR(irradiance * std::pow(double(radius), 2) / (2 * sin_squared), 1.0, 1e-4) << radius;
