@@ -1,10 +1,11 @@
-// Reading and writing groups of path columns.
+// Reading and writing groups of path columns, and adding to the columns of shadow rays.
 #pragma once
 
 #include "kernel/globals.h"
 #include "kernel/math/rounding.h"
 #include "kernel/sample/mis.h"
 #include "kernel/state/path_state.h"
+#include "kernel/texture/ray_cone.h"
 
 namespace relief {
 
@@ -42,6 +43,38 @@ RELIEF_KERNEL void path_set_throughput(PathState& s, std::uint32_t i, Vec3f thro
   s.throughput_r[i] = throughput.x;
   s.throughput_g[i] = throughput.y;
   s.throughput_b[i] = throughput.z;
+}
+
+/// Queues a shadow ray.
+/// @param O, D         world; D unit
+/// @param t_max        metres
+/// @param cone         at O
+/// @param gain         of the path if nothing is in between: radiance × throughput, MIS weight included
+/// @param scatterings  events between the camera and the light, or kAmbientRay
+RELIEF_KERNEL void shadow_queue_push(ShadowQueue& shadow,
+                                     std::uint32_t path,
+                                     Vec3f O,
+                                     Vec3f D,
+                                     float t_max,
+                                     RayCone cone,
+                                     Vec3f gain,
+                                     std::uint32_t scatterings)
+{
+  const std::uint32_t ray = shadow.size++;
+  shadow.O_x[ray] = O.x;
+  shadow.O_y[ray] = O.y;
+  shadow.O_z[ray] = O.z;
+  shadow.D_x[ray] = D.x;
+  shadow.D_y[ray] = D.y;
+  shadow.D_z[ray] = D.z;
+  shadow.t_max[ray] = t_max;
+  shadow.cone_width[ray] = cone.width;
+  shadow.cone_spread[ray] = cone.spread;
+  shadow.gain_r[ray] = gain.x;
+  shadow.gain_g[ray] = gain.y;
+  shadow.gain_b[ray] = gain.z;
+  shadow.path[ray] = path;
+  shadow.scatterings[ray] = scatterings;
 }
 
 enum class BounceKind : int { kAll = 0, kDiffuse = 8, kGlossy = 16, kTransmission = 24 };

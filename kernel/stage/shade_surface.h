@@ -69,21 +69,7 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
     t_max = length(to_target);
     D = to_target / t_max;
   }
-  const std::uint32_t ray = shadow.size++;
-  shadow.O_x[ray] = O.x;
-  shadow.O_y[ray] = O.y;
-  shadow.O_z[ray] = O.z;
-  shadow.D_x[ray] = D.x;
-  shadow.D_y[ray] = D.y;
-  shadow.D_z[ray] = D.z;
-  shadow.t_max[ray] = t_max;
-  shadow.cone_width[ray] = cone.width;
-  shadow.cone_spread[ray] = cone.spread;
-  shadow.gain_r[ray] = gain.x;
-  shadow.gain_g[ray] = gain.y;
-  shadow.gain_b[ray] = gain.z;
-  shadow.path[ray] = path;
-  shadow.scatterings[ray] = static_cast<std::uint32_t>(bounce + 1);
+  shadow_queue_push(shadow, path, O, D, t_max, cone, gain, static_cast<std::uint32_t>(bounce + 1));
 }
 
 /// Which lobes are sharp for this path towards a direction. What cannot be gone back stays sharp, as photons end there, and
@@ -314,20 +300,7 @@ RELIEF_KERNEL void shade_surface_ambient(const KernelGlobals& g,
   const Vec3f D = from_local(frame_from_normal(at.side.Ns), warp_cosine_hemisphere(u));
   if (!(dot(D, at.side.Ng) > 0.0f)) return;
   const Vec3f O = surface_ray_origin(at, D);
-  const RayCone cone = ray_cone_scatter(at.cone, 1.0f);
-  const std::uint32_t ray = shadow.size++;
-  shadow.O_x[ray] = O.x;
-  shadow.O_y[ray] = O.y;
-  shadow.O_z[ray] = O.z;
-  shadow.D_x[ray] = D.x;
-  shadow.D_y[ray] = D.y;
-  shadow.D_z[ray] = D.z;
-  shadow.t_max[ray] = g.occlusion_distance;
-  shadow.cone_width[ray] = cone.width;
-  shadow.cone_spread[ray] = cone.spread;
-  shadow.gain_r[ray] = shadow.gain_g[ray] = shadow.gain_b[ray] = 0.0f;
-  shadow.path[ray] = path;
-  shadow.scatterings[ray] = kAmbientRay;
+  shadow_queue_push(shadow, path, O, D, g.occlusion_distance, ray_cone_scatter(at.cone, 1.0f), {}, kAmbientRay);
 }
 
 /// Writes what the film keeps of a path's first hit.
