@@ -5,36 +5,20 @@
 
 #include <cmath>
 
-#include "scene/load.h"
-#include "tests/support/gltf_builder.h"
+#include "tests/support/loaded_scene.h"
 
 namespace relief {
 namespace {
 
 using nlohmann::json;
 using test::GltfBuilder;
-
-Scene load(const GltfBuilder& b)
-{
-  const test::TemporaryFolder folder;
-  return scene_load(folder.write("scene.gltf", b.gltf()));
-}
+using test::has_warning;
 
 void expect_near(Vec3f a, Vec3f b, float tolerance = 1e-6f)
 {
   EXPECT_NEAR(a.x, b.x, tolerance);
   EXPECT_NEAR(a.y, b.y, tolerance);
   EXPECT_NEAR(a.z, b.z, tolerance);
-}
-
-bool has_warning(const Scene& scene, const std::string& part)
-{
-  for (const std::string& w : scene.warnings) {
-    if (w.find(part) != std::string::npos) {
-      return true;
-    }
-  }
-  return false;
 }
 
 /// A file without meshes whose one root node refers to another.

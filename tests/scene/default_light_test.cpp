@@ -6,8 +6,7 @@
 
 #include "kernel/texture/half.h"
 #include "scene/default_light.h"
-#include "scene/load.h"
-#include "tests/support/gltf_builder.h"
+#include "tests/support/loaded_scene.h"
 #include "tests/support/scene_builder.h"
 
 namespace relief::test {
@@ -130,22 +129,10 @@ TEST(DefaultLight, OneLargeLampAmongManySmallOnesCounts)
   EXPECT_TRUE(is_lit(scene));
 }
 
-Scene load(const GltfBuilder& b, const LoadOptions& options = {})
-{
-  const TemporaryFolder folder;
-  return scene_load(folder.write("s.gltf", b.gltf()), options);
-}
-
-bool warns(const Scene& scene, const std::string& part)
-{
-  return std::any_of(scene.warnings.begin(), scene.warnings.end(),
-                     [&](const std::string& w) { return w.find(part) != std::string::npos; });
-}
-
 bool has_studio(const Scene& scene)
 {
   const bool has = scene.environment.texture_index >= 0 && !is_zero(scene.environment.color);
-  EXPECT_EQ(has, warns(scene, "a soft studio lights it"));
+  EXPECT_EQ(has, has_warning(scene, "a soft studio lights it"));
   if (has) {
     EXPECT_EQ(scene.textures->label(scene.environment.texture_index), "studio");
     EXPECT_FALSE(scene.environment.visible_to_camera);
@@ -185,7 +172,7 @@ TEST(DefaultLight, EmissionIsEnoughWhereItIsAllThatIsSeen)
   EXPECT_FALSE(has_studio(load(glowing_square({{"emissiveFactor", {1, 1, 1}}}))));
   EXPECT_TRUE(has_studio(load(glowing_square({{"emissiveFactor", {0.01, 0.01, 0.01}}}))));
   const Scene dim = load(glowing_square({{"emissiveFactor", {0.01, 0.01, 0.01}}}));
-  EXPECT_TRUE(warns(dim, "emission that leaves most of the scene dark"));
+  EXPECT_TRUE(has_warning(dim, "emission that leaves most of the scene dark"));
 }
 
 TEST(DefaultLight, NothingIsThereForWhatIsUnlit)

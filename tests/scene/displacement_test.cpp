@@ -7,27 +7,15 @@
 
 #include "scene/displaced_mesh.h"
 #include "scene/displacement_seams.h"
-#include "scene/load.h"
 #include "scene/texture_store.h"
-#include "tests/support/gltf_builder.h"
+#include "tests/support/loaded_scene.h"
 
 namespace relief {
 namespace {
 
 using nlohmann::json;
 using test::GltfBuilder;
-
-Scene load(const GltfBuilder& b)
-{
-  const test::TemporaryFolder folder;
-  return scene_load(folder.write("scene.gltf", b.gltf()));
-}
-
-std::size_t num_warnings(const Scene& scene, const std::string& part)
-{
-  return static_cast<std::size_t>(std::count_if(scene.warnings.begin(), scene.warnings.end(),
-                                                [&](const auto& w) { return w.find(part) != std::string::npos; }));
-}
+using test::num_warnings;
 
 /// The square under one displaced material, whose texture 0 is a grey pixel.
 GltfBuilder square_displaced(const json& settings)

@@ -1,28 +1,14 @@
 // What is wrong with a file but has an obvious meaning is given it, with a warning that names the place.
 #include <gtest/gtest.h>
 
-#include "scene/load.h"
-#include "tests/support/gltf_builder.h"
+#include "tests/support/loaded_scene.h"
 
 namespace relief {
 namespace {
 
 using nlohmann::json;
 using test::GltfBuilder;
-
-Scene load(const GltfBuilder& b)
-{
-  const test::TemporaryFolder folder;
-  return scene_load(folder.write("scene.gltf", b.gltf()));
-}
-
-bool has_warning(const Scene& scene, const std::string& part)
-{
-  for (const std::string& w : scene.warnings) {
-    if (w.find(part) != std::string::npos) return true;
-  }
-  return false;
-}
+using test::has_warning;
 
 GltfBuilder square_with(const json& material)
 {

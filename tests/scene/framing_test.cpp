@@ -6,8 +6,7 @@
 #include <random>
 
 #include "scene/framing.h"
-#include "scene/load.h"
-#include "tests/support/gltf_builder.h"
+#include "tests/support/loaded_scene.h"
 #include "tests/support/scene_builder.h"
 
 namespace relief::test {
@@ -38,12 +37,6 @@ Reach reach_of(const Scene& scene)
     }
   }
   return reach;
-}
-
-Scene load(const GltfBuilder& b, const LoadOptions& options = {})
-{
-  const TemporaryFolder folder;
-  return scene_load(folder.write("s.gltf", b.gltf()), options);
 }
 
 TEST(Framing, FillsThePictureInTheTighterDirection)

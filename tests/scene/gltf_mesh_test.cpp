@@ -3,16 +3,16 @@
 
 #include <cmath>
 
-#include "scene/load.h"
-#include "tests/support/gltf_builder.h"
+#include "tests/support/loaded_scene.h"
 
 namespace relief {
 namespace {
 
 using nlohmann::json;
 using test::GltfBuilder;
+using test::has_warning;
 
-Scene load(const GltfBuilder& b)
+Scene load_glb(const GltfBuilder& b)
 {
   const test::TemporaryFolder folder;
   return scene_load(folder.write("scene.glb", b.glb()));
@@ -22,19 +22,9 @@ Scene load(const GltfBuilder& b)
 Mesh load_mesh(GltfBuilder& b, const json& primitive)
 {
   b.root_node({{"mesh", b.mesh(primitive)}});
-  Scene scene = load(b);
+  Scene scene = load_glb(b);
   EXPECT_EQ(scene.meshes.size(), 1u);
   return scene.meshes.at(0);
-}
-
-bool has_warning(const Scene& scene, const std::string& part)
-{
-  for (const std::string& w : scene.warnings) {
-    if (w.find(part) != std::string::npos) {
-      return true;
-    }
-  }
-  return false;
 }
 
 void expect_near(Vec3f a, Vec3f b, float tolerance)
@@ -111,7 +101,7 @@ TEST(GltfMesh, StitchedStripsGiveNoWarning)
   const int indices = b.accessor<std::uint16_t>({0, 1, 3, 2, 2, 0, 0, 1, 3}, "SCALAR");
   b.json["meshes"][0]["primitives"][0]["indices"] = indices;
   b.json["meshes"][0]["primitives"][0]["mode"] = 5;
-  const Scene scene = load(b);
+  const Scene scene = load_glb(b);
   EXPECT_FALSE(has_warning(scene, "zero area"));
 }
 
@@ -184,7 +174,7 @@ TEST(GltfMesh, DropsOnlyTrianglesWithoutArea)
   const int P = b.accessor<float>({0, 0, 0, 1, 0, 0, 2, 0, 0, 1, 1e-30f, 0}, "VEC3");
   const int indices = b.accessor<std::uint16_t>({0, 1, 2, 0, 2, 3, 1, 1, 3}, "SCALAR");
   b.root_node({{"mesh", b.mesh({{"attributes", {{"POSITION", P}}}, {"indices", indices}})}});
-  const Scene scene = load(b);
+  const Scene scene = load_glb(b);
   EXPECT_EQ(scene.meshes.at(0).triangles.size(), 1u);
   EXPECT_TRUE(has_warning(scene, "2 triangles of zero area"));
 }
@@ -195,7 +185,7 @@ TEST(GltfMesh, MakesNormalsUnitAndReplacesZeroOnes)
   const int P = b.accessor<float>({0, 0, 0, 1, 0, 0, 0, 1, 0}, "VEC3");
   const int N = b.accessor<float>({0, 0, 0, 0, 3, 4, 1e-30f, 0, 0}, "VEC3");
   b.root_node({{"mesh", b.mesh({{"attributes", {{"POSITION", P}, {"NORMAL", N}}}})}});
-  const Scene scene = load(b);
+  const Scene scene = load_glb(b);
   const Mesh& mesh = scene.meshes.at(0);
   EXPECT_EQ(as_vector(mesh.N[0]), (Vec3f{0, 0, 1}));  // the triangle's own
   expect_near(as_vector(mesh.N[1]), {0, 0.6f, 0.8f}, 1e-7f);
@@ -222,7 +212,7 @@ TEST(GltfMesh, SkipsPointsAndLinesWithAWarning)
   GltfBuilder b;
   const int P = b.accessor(kSquare, "VEC3");
   b.root_node({{"mesh", b.mesh({{"attributes", {{"POSITION", P}}}, {"mode", 1}})}});
-  const Scene scene = load(b);
+  const Scene scene = load_glb(b);
   EXPECT_TRUE(scene.meshes.empty());
   EXPECT_TRUE(has_warning(scene, "points and lines"));
   EXPECT_TRUE(has_warning(scene, "nothing to render"));
@@ -231,7 +221,7 @@ TEST(GltfMesh, SkipsPointsAndLinesWithAWarning)
 TEST(GltfMesh, ViewAndBytesMatchTheVectors)
 {
   GltfBuilder b = test::square_scene();
-  const Scene scene = load(b);
+  const Scene scene = load_glb(b);
   const Mesh& mesh = scene.meshes.at(0);
   const MeshView view = mesh.view();
   EXPECT_EQ(view.P, mesh.P.data());
@@ -256,14 +246,14 @@ GltfBuilder normal_mapped_square()
 
 TEST(Tangents, AreMadeForNormalMapsOnly)
 {
-  EXPECT_TRUE(load(test::square_scene()).meshes.at(0).tangent.empty());
-  EXPECT_EQ(load(normal_mapped_square()).meshes.at(0).tangent.size(), 4u);
+  EXPECT_TRUE(load_glb(test::square_scene()).meshes.at(0).tangent.empty());
+  EXPECT_EQ(load_glb(normal_mapped_square()).meshes.at(0).tangent.size(), 4u);
 }
 
 // u runs along +x, and v down the square: the bitangent w · N × T must point up.
 TEST(Tangents, OfAnUprightSquareAreRightAndUp)
 {
-  const Mesh mesh = load(normal_mapped_square()).meshes.at(0);
+  const Mesh mesh = load_glb(normal_mapped_square()).meshes.at(0);
   for (std::size_t v = 0; v < 4; ++v) {
     expect_near(xyz(mesh.tangent[v]), {1, 0, 0}, 1e-6f);
     const Vec3f bitangent = cross(as_vector(mesh.N[v]), xyz(mesh.tangent[v])) * mesh.tangent[v].w;
@@ -276,7 +266,7 @@ TEST(Tangents, GivenOnesAreKeptAndMadeUnit)
   GltfBuilder b = normal_mapped_square();
   const int T = b.accessor<float>({0, 2, 0, -1, 0, 2, 0, -1, 0, 2, 0, -1, 0, 2, 0, 1}, "VEC4");
   b.json["meshes"][0]["primitives"][0]["attributes"]["TANGENT"] = T;
-  const Mesh mesh = load(b).meshes.at(0);
+  const Mesh mesh = load_glb(b).meshes.at(0);
   expect_near(xyz(mesh.tangent[0]), {0, 1, 0}, 1e-6f);
   EXPECT_EQ(mesh.tangent[0].w, -1.0f);
   EXPECT_EQ(mesh.tangent[3].w, 1.0f);
@@ -288,7 +278,7 @@ TEST(Tangents, MirroredUvSplitVertices)
   GltfBuilder b = normal_mapped_square();
   const int uv = b.accessor<float>({0, 1, 1, 1, 1, 0, 1, 1}, "VEC2");  // vertex 3 takes vertex 1's place: mirrored
   b.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = uv;
-  const Mesh mesh = load(b).meshes.at(0);
+  const Mesh mesh = load_glb(b).meshes.at(0);
   EXPECT_EQ(mesh.P.size(), 6u);
   EXPECT_EQ(mesh.tangent.size(), 6u);
   EXPECT_EQ(mesh.N.size(), 6u);
@@ -342,7 +332,7 @@ TEST(Tangents, FlatMeshesGetVerticesOfTheirOwn)
 {
   GltfBuilder b = normal_mapped_square();
   b.json["meshes"][0]["primitives"][0]["attributes"].erase("NORMAL");
-  const Mesh mesh = load(b).meshes.at(0);
+  const Mesh mesh = load_glb(b).meshes.at(0);
   EXPECT_TRUE(mesh.N.empty());
   EXPECT_EQ(mesh.P.size(), 6u);
   EXPECT_EQ(mesh.tangent.size(), 6u);
@@ -353,7 +343,7 @@ TEST(Tangents, OfUvWithoutAreaAreStillUnitAndAcross)
   GltfBuilder b = normal_mapped_square();
   const int uv = b.accessor<float>({0, 0, 0, 0, 0, 0, 0, 0}, "VEC2");
   b.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = uv;
-  const Mesh mesh = load(b).meshes.at(0);
+  const Mesh mesh = load_glb(b).meshes.at(0);
   for (std::size_t v = 0; v < mesh.P.size(); ++v) {
     EXPECT_NEAR(length(xyz(mesh.tangent[v])), 1.0f, 1e-6f);
     EXPECT_NEAR(dot(xyz(mesh.tangent[v]), as_vector(mesh.N[v])), 0.0f, 1e-6f);
