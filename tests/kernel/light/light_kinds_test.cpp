@@ -434,7 +434,8 @@ double irradiance_on_grid(const Light& light, int side, const Check& check)
 {
   double sum = 0;
   for (int i = 0; i < side * side && !testing::Test::HasFatalFailure(); ++i) {
-    const Vec2f cell{static_cast<float>(i % side), static_cast<float>(i / side)};
+    const int column = i % side, row = i / side;
+    const Vec2f cell{static_cast<float>(column), static_cast<float>(row)};
     const LightSample sample = light_sample(light, {}, (cell + Vec2f{0.5f, 0.5f}) * (1.0f / static_cast<float>(side)));
     check(sample);
     sum += double(sample.radiance.x) / double(sample.pdf) * std::max(0.0, double(sample.wi.z));
