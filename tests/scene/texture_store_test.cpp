@@ -680,8 +680,8 @@ TEST(TextureFormatsByContent, TgaWithoutAFooterGoesByNameAndHeader)
   const TemporaryFolder folder;
   image_write(folder / "image.tga", random_image(19, 11, 3, 1), OIIO::TypeDesc::UINT8);
   std::vector<unsigned char> bytes = file_bytes(folder / "image.tga");
-  constexpr std::size_t kFooterBytes = 26;
-  bytes.resize(bytes.size() - kFooterBytes);
+  constexpr std::ptrdiff_t kFooterBytes = 26;
+  bytes.erase(bytes.end() - kFooterBytes, bytes.end());
   bytes_write(folder / "image.TGA", bytes, bytes.size());
   EXPECT_EQ(load(request_for(folder / "image.TGA")).view().width, 19);
   bytes_write(folder / "image.iff", bytes, bytes.size());
