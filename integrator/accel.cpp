@@ -246,7 +246,9 @@ void Accel::build(const Scene& scene,
   }
 
   std::vector<Box3> mesh_boxes(scene.meshes.size());
-  for (std::size_t m = 0; m < scene.meshes.size(); ++m) mesh_boxes[m] = points_box(scene.meshes[m].P, {});
+  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
+    if (mesh_scenes_[m] != nullptr) mesh_boxes[m] = points_box(scene.meshes[m].P, {});
+  }
 
   Box3 box = box_empty();
   instances_.resize(scene.instances.size());
@@ -259,10 +261,10 @@ void Accel::build(const Scene& scene,
       box = box_union(box, points_box(scene.meshes[mesh].P, instance.world_from_object));
       continue;
     }
-    instances_[i] = instance_geometry_prepare(displaced >= 0 ? displaced_scenes_[d] : mesh_scenes_[mesh],
-                                              displaced >= 0 ? displaced_bounds(d) : mesh_boxes[mesh],
-                                              instance.world_from_object, &pad_);
-    box = box_union(box, instance_bounds(instances_[i]));
+    instances_[i] = std::make_unique<InstanceGeometry>(instance_geometry_prepare(
+        displaced >= 0 ? displaced_scenes_[d] : mesh_scenes_[mesh],
+        displaced >= 0 ? displaced_bounds(d) : mesh_boxes[mesh], instance.world_from_object, &pad_));
+    box = box_union(box, instance_bounds(*instances_[i]));
   }
   for (const std::uint32_t index : area_lights) {
     const Light& light = lights[index];
@@ -273,12 +275,14 @@ void Accel::build(const Scene& scene,
 
   // The boxes of Embree's own instances are as large as those of what they show.
   std::vector<Vec3f> mesh_pads(scene.meshes.size());
-  const auto is_embrees = [&](std::size_t i) {
-    return displacements.geometry_index(i) < 0 && instance_is_accurate_in_single_precision(instances_[i]);
-  };
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    if (instances_[i] == nullptr || displacements.geometry_index(i) >= 0 ||
+        !instance_is_accurate_in_single_precision(*instances_[i])) {
+      continue;
+    }
     Vec3f& pad = mesh_pads[static_cast<std::size_t>(scene.instances[i].mesh_index)];
-    if (instances_[i].scene != nullptr && is_embrees(i)) pad = max(pad, instance_pad(instances_[i]));
+    pad = max(pad, instance_pad(*instances_[i]));
+    instances_[i].reset();
   }
   for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
     if (mesh_scenes_[m] == nullptr) continue;
@@ -294,10 +298,10 @@ void Accel::build(const Scene& scene,
     const Instance& instance = scene.instances[i];
     const auto mesh = static_cast<std::size_t>(instance.mesh_index);
     attach(top_,
-           instances_[i].scene == nullptr
-               ? new_mesh(scene.meshes[mesh], &instance.world_from_object, transparent[mesh] != 0)
-           : is_embrees(i) ? new_instance(mesh_scenes_[mesh], instance.world_from_object)
-                           : instance_geometry_make(device_, instances_[i]),
+           instances_[i] != nullptr ? instance_geometry_make(device_, *instances_[i])
+           : mesh_scenes_[mesh] != nullptr
+               ? new_instance(mesh_scenes_[mesh], instance.world_from_object)
+               : new_mesh(scene.meshes[mesh], &instance.world_from_object, transparent[mesh] != 0),
            static_cast<unsigned>(i), mask_of(instance.flags));
   }
   for (std::size_t i = 0; i < area_lights.size(); ++i) {

@@ -72,9 +72,9 @@ class Accel {
   std::atomic<std::ptrdiff_t> bytes_{0};
   RTCFilterFunctionN shadow_filter_;
   const DisplacementSet* displacements_;
-  RayTarget target_;                         ///< all that rays can hit, world
-  float pad_ = 0;                            ///< of its boxes, metres
-  std::vector<InstanceGeometry> instances_;  ///< an instance; unused where a mesh is in place or Embree's instance
+  RayTarget target_;                                          ///< all that rays can hit, world
+  float pad_ = 0;                                             ///< of its boxes, metres
+  std::vector<std::unique_ptr<InstanceGeometry>> instances_;  ///< an instance; null: in place, or Embree's own
   RTCDevice device_ = nullptr;
   RTCScene top_ = nullptr;
   std::vector<RTCScene> mesh_scenes_;                 ///< null for meshes that occur once
