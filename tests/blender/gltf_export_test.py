@@ -5,7 +5,7 @@ import subprocess
 
 import bpy
 import numpy as np
-from scenes import add_camera, add_light, add_plane, folder, new_material, new_scene, read_rgb, render_runs
+from scenes import IS_5_0, add_camera, add_light, add_plane, folder, new_material, new_scene, read_rgb, render_runs
 
 
 def _stage():
@@ -15,7 +15,12 @@ def _stage():
     add_plane(material=material[0])
     add_camera((0, 0, 6))
     add_light("POINT", (1, -1, 3), energy=300, shadow_soft_size=0)
-    add_light("SUN", energy=0.5, angle=0)
+    sun = add_light("SUN", energy=0.5, angle=0)
+    if IS_5_0:
+        # Lights have nodes always, and outside of Eevee the exporter writes the strength of a sun's Emission node alone,
+        # without its energy: the file of a sun of energy 0.5 and strength 1 says 1 W/m². The other way round it is right.
+        sun.data.energy = 1
+        sun.data.node_tree.nodes["Emission"].inputs["Strength"].default_value = 0.5
     return scene
 
 
