@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from scenes import (
+    IS_5_2,
     add_camera,
     add_light,
     add_plane,
@@ -111,14 +112,20 @@ def _blocks(channel, size=8):
     return channel[:height, :width].reshape(height // size, size, width // size, size).mean(axis=(1, 3))
 
 
-def _assert_blocks_agree(setting, names, tolerance, owner=None, stage=_stage, samples=64):
-    """Fails unless a pass of both engines has the same means over blocks of pixels, and is not the same everywhere."""
+def _assert_blocks_agree(setting, names, tolerance, owner=None, stage=_stage, samples=64, far=np.inf):
+    """Fails unless a pass of both engines has the same means over blocks of pixels, and is not the same everywhere.
+
+    @param  far  where Cycles' values are not below it, it saw nothing: relief's are left out, and have to be mostly 0
+    """
     scene = stage()
     layer = scene.view_layers[0]
     setattr(getattr(layer, owner) if owner else layer, setting, True)
     relief, cycles = (passes(scene, engine, samples) for engine in ("RELIEF", "CYCLES"))
     for name in names:
-        ours, theirs = (_blocks(picture[f"{layer.name}.{name}"].astype(np.float64)) for picture in (relief, cycles))
+        ours, theirs = (picture[f"{layer.name}.{name}"].astype(np.float64) for picture in (relief, cycles))
+        is_near = theirs < far
+        assert is_near.all() or (ours[~is_near] == 0).mean() > 0.8, name
+        ours, theirs = (_blocks(np.where(is_near, values, 0)) for values in (ours, theirs))
         assert np.ptp(theirs) > 3 * tolerance, f"{name} shows nothing"
         assert np.abs(ours - theirs).max() < tolerance, (name, np.abs(ours - theirs).max())
 
@@ -180,9 +187,12 @@ def _mirror_stage(color):
     return scene
 
 
-def _assert_denoising(name, channels, tolerance, color=(0.9, 0.8, 0.7, 1)):
+def _assert_denoising(name, channels, tolerance, color=(0.9, 0.8, 0.7, 1), far=np.inf):
+    """@param color  of the mirror"""
     names = [f"Denoising {name}.{c}" for c in channels]
-    _assert_blocks_agree("denoising_store_passes", names, tolerance, owner="cycles", stage=lambda: _mirror_stage(color))
+    _assert_blocks_agree(
+        "denoising_store_passes", names, tolerance, owner="cycles", stage=lambda: _mirror_stage(color), far=far
+    )
 
 
 def test_denoising_albedo():
@@ -191,11 +201,14 @@ def test_denoising_albedo():
 
 
 def test_denoising_normal():
-    _assert_denoising("Normal", "XYZ", 0.06)
+    # Since 5.2 Cycles multiplies normals by the mean colour of the mirrors that show them; relief's are of length one.
+    color = (1, 1, 1, 1) if IS_5_2 else (0.9, 0.8, 0.7, 1)
+    _assert_denoising("Normal", "XYZ", 0.06, color)
 
 
 def test_denoising_depth():
-    _assert_denoising("Depth", "Z", 0.3)
+    # Since 5.2 one sample that hits nothing makes the sum of Cycles' pixel the largest float; before it counted as 0.
+    _assert_denoising("Depth", "Z", 0.3, far=1e30 if IS_5_2 else np.inf)
 
 
 def test_passes_that_are_not_there_are_warned_about():

@@ -22,6 +22,7 @@ SIGNIFICANCE = 1e-4
 #: Cycles changed in this version: Principled BSDF, lights, spot edges. Tests that compare with what it was before, ask.
 IS_4_0 = bpy.app.version >= (4, 0, 0)
 IS_5_0 = bpy.app.version >= (5, 0, 0)
+IS_5_2 = bpy.app.version >= (5, 2, 0)
 
 #: Blender's name of the colour space that pictures are rendered in.
 LINEAR = "Linear Rec.709" if IS_4_0 else "Linear"
