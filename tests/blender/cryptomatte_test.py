@@ -17,6 +17,7 @@ from scenes import (
     folder,
     new_material,
     new_scene,
+    set_file_format,
 )
 
 _KINDS = ("object", "material", "asset")
@@ -90,8 +91,7 @@ def test_metadata_is_that_of_cycles():
     for engine in ("RELIEF", "CYCLES"):
         scene = _stage()
         scene.render.engine, scene.relief.samples, scene.cycles.samples = engine, 1, 1
-        settings = scene.render.image_settings
-        settings.file_format, settings.exr_codec = "OPEN_EXR_MULTILAYER", "NONE"
+        set_file_format("OPEN_EXR_MULTILAYER", "32")
         with folder() as path:
             scene.render.filepath = os.path.join(path, "picture.exr")
             bpy.ops.render.render(write_still=True)

@@ -19,6 +19,7 @@ from scenes import (
     new_scene,
     render,
     set_bounces,
+    set_file_format,
     set_world,
 )
 
@@ -118,8 +119,7 @@ def test_film_exposure_of_passes():
     for name in ("direct", "indirect", "variance", "samples"):
         setattr(layer.relief, f"use_pass_{name}", True)
     layer.use_pass_diffuse_color = layer.use_pass_environment = True
-    scene.render.image_settings.file_format = "OPEN_EXR_MULTILAYER"
-    scene.render.image_settings.exr_codec = "NONE"
+    set_file_format("OPEN_EXR_MULTILAYER", "32")
     scene.render.engine, scene.relief.samples = "RELIEF", 16
     pictures = []
     with folder() as path:

@@ -10,7 +10,7 @@ import time
 import bpy
 import numpy as np
 
-from scenes import IS_5_0, add_camera, add_plane, folder, new_scene, render, set_world
+from scenes import IS_5_0, add_camera, add_plane, folder, new_scene, render, set_file_format, set_world
 
 
 def _scene():
@@ -227,8 +227,7 @@ def test_the_picture_is_shown_while_it_is_rendered():
     scene.view_layers[0].use_pass_normal = scene.view_layers[0].relief.use_pass_samples = True
     scene.render.use_border, scene.render.border_min_x = True, 0.3
     scene.relief.samples = 200
-    settings = scene.render.image_settings
-    settings.file_format, settings.exr_codec = "OPEN_EXR_MULTILAYER", "NONE"
+    set_file_format("OPEN_EXR_MULTILAYER", "32")
     shown, kept = [], (final._is_watched, result.show)
 
     def show(engine, picture, *arguments):
