@@ -6,6 +6,7 @@ import signal
 import stat
 import subprocess
 import time
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -248,6 +249,30 @@ def test_the_picture_is_shown_while_it_is_rendered():
     for name, values in pictures[0].items():
         assert np.array_equal(values, pictures[1][name]), name
     _assert_clean()
+
+
+def test_waiting_does_not_hold_previews_up():
+    """A picture that is long in coming, as on a busy machine, is followed by the next; one that takes work is not."""
+    from relief import final
+
+    def work():
+        end = time.thread_time() + 0.8
+        while time.thread_time() < end:
+            pass
+
+    def times_shown(action):
+        shown = []
+        preview = final._Preview("", lambda picture: shown.append(picture) or action())
+        for _ in range(2):
+            preview.refresh()
+        return len(shown)
+
+    kept, final.exr = final.exr, SimpleNamespace(read=lambda path: path)
+    try:
+        assert times_shown(lambda: time.sleep(0.8)) == 2
+        assert times_shown(work) == 1
+    finally:
+        final.exr = kept
 
 
 def test_numbers_of_the_render_are_in_the_picture():
