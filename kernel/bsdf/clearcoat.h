@@ -2,7 +2,8 @@
 // normal of its own.
 #pragma once
 
-#include "kernel/bsdf/ggx.h"
+#include "kernel/bsdf/base_interface.h"
+#include "kernel/bsdf/lobe.h"
 
 namespace relief {
 
@@ -27,6 +28,48 @@ RELIEF_KERNEL GgxReflection clearcoat_eval(Vec3f wo_coat, Vec3f wi_coat, float w
 RELIEF_KERNEL Vec3f clearcoat_sample(Vec3f wo_coat, float alpha, Vec2f u)
 {
   return ggx_reflection_sample(wo_coat, alpha, u);
+}
+
+struct CoatLobe : Lobe {
+  static constexpr unsigned kFeatures = kFeatureLayers;
+  static constexpr LobeSides kSides = LobeSides::kReflect;
+  static constexpr LobeSharpness kSharpness = LobeSharpness::kCoat;
+  static constexpr bool kIsLayer = true;
+  float strength = 0;  ///< of the coat, whether it reflects towards wo or not
+  Frame frame;
+  Vec3f wo{};  ///< coat's frame
+  GgxCoordinate ggx;
+};
+
+/// What a coat leaves for below.
+/// @param cos_theta  to the coat's normal
+RELIEF_KERNEL float coat_transmits(const CoatLobe& coat, const BsdfTables& tables, float cos_theta)
+{
+  if (!(cos_theta > kMinCosine)) return 1.0f;
+  return 1.0f - coat.strength * ggx_albedo_with(kClearcoatF0, 1.0f, ggx_albedo(tables, coat.ggx, cos_theta));
+}
+
+template <TransportMode kMode>
+RELIEF_KERNEL BsdfEval lobe_eval(const CoatLobe& coat, const BaseInterface&, const BsdfTables&, Vec3f wi)
+{
+  if (coat.ggx.mirror) return {};
+  const GgxReflection r = clearcoat_eval(coat.wo, to_local(coat.frame, wi), wi.z, coat.ggx.alpha);
+  return {splat3(coat.strength * r.f), r.pdf};
+}
+
+template <TransportMode kMode>
+RELIEF_KERNEL LobeSample lobe_sample(const CoatLobe& coat, const BaseInterface& base, const BsdfTables&, float, Vec2f u)
+{
+  if (coat.ggx.mirror) {
+    const Vec3f wi = 2.0f * coat.wo.z * coat.frame.n - base.wo;
+    if (!(wi.z > 0.0f)) return {};
+    const float F = kClearcoatF0 + (1.0f - kClearcoatF0) * schlick_weight(coat.wo.z);
+    return lobe_sample_delta(wi, splat3(coat.strength * F));
+  }
+  const Vec3f wi = clearcoat_sample(coat.wo, coat.ggx.alpha, u);
+  // Below a tilted coat's horizon can still be above the surface's, where the coat has no density.
+  if (!(wi.z > kMinCosine)) return {};
+  return lobe_sample_glossy(from_local(coat.frame, wi), false, coat.ggx.alpha);
 }
 
 }  // namespace relief

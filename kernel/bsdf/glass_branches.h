@@ -21,15 +21,16 @@ RELIEF_KERNEL GlassBranches
 glass_branches_sample(const SurfaceClosure& c, const BsdfTables& tables, float u_lobe, Vec2f u)
 {
   GlassBranches branches;
-  const float eta = c.glass.eta;
-  if (u_lobe < c.glass.lost || dielectric_is_matched(eta)) return branches;
-  const Vec3f wm = c.glass.delta ? Vec3f{0, 0, 1} : warp_ggx_visible_normal(c.wo, c.ggx.alpha, u);
-  const float cos_o = min(1.0f, dot(c.wo, wm));
+  const GlassLobe& glass = c.lobes;
+  const float eta = glass.eta;
+  if (u_lobe < glass.lost || dielectric_is_matched(eta)) return branches;
+  const Vec3f wm = glass.delta ? Vec3f{0, 0, 1} : warp_ggx_visible_normal(c.base.wo, c.base.ggx.alpha, u);
+  const float cos_o = min(1.0f, dot(c.base.wo, wm));
   const float F = fresnel_dielectric(cos_o, refracted_cosine(cos_o, eta), eta);
   if (!(F < 1.0f)) return branches;
   constexpr float kLargestBelowOne = 1.0f - kUnitRoundoff;
   branches.reflectance = F;
-  branches.reflected = closure_sample<kFeatures>(c, tables, c.glass.lost, u);
+  branches.reflected = closure_sample<kFeatures>(c, tables, glass.lost, u);
   branches.refracted = closure_sample<kFeatures>(c, tables, kLargestBelowOne, u);
   return branches;
 }

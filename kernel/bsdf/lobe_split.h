@@ -21,43 +21,46 @@ RELIEF_KERNEL SharpLobes sharp_lobes(const SurfaceParams& p, bool caster, float 
   return {caster || p.roughness <= roughness, caster || p.clearcoat_roughness <= roughness};
 }
 
+template <typename L>
+RELIEF_KERNEL bool lobe_is_sharp(SharpLobes sharp)
+{
+  if constexpr (L::kSharpness == LobeSharpness::kBase) return sharp.base;
+  if constexpr (L::kSharpness == LobeSharpness::kCoat) return sharp.coat;
+  return false;
+}
+
+/// The closure without its soft lobes, or without its sharp ones.
+template <bool kSharp>
+RELIEF_KERNEL SurfaceClosure closure_without(SurfaceClosure c, SharpLobes sharp)
+{
+  lobes_visit<kFeatureAll>(c.lobes, [sharp]<typename L>(L& lobe) {
+    if (lobe_is_sharp<L>(sharp) == kSharp) lobe.probability = 0.0f;
+  });
+  return c;
+}
+
 /// The closure without its soft lobes. What is left is evaluated and sampled as if it were all; probabilities sum to one
 /// where there is anything.
-RELIEF_KERNEL SurfaceClosure closure_sharp(SurfaceClosure c, SharpLobes sharp)
+RELIEF_KERNEL SurfaceClosure closure_sharp(const SurfaceClosure& c, SharpLobes sharp)
 {
-  LobeProbabilities& p = c.probability;
-  p.diffuse = p.multiple = p.thin_multiple = p.sheen = 0.0f;
-  if (!sharp.base) p.specular = p.thin = p.glass = 0.0f;
-  if (!sharp.coat) p.coat = 0.0f;
-  const float sum = (p.specular + p.thin) + (p.glass + p.coat);
-  const float scale = sum > 0.0f ? 1.0f / sum : 0.0f;
-  p.specular *= scale;
-  p.thin *= scale;
-  p.glass *= scale;
-  p.coat *= scale;
-  return c;
+  SurfaceClosure without = closure_without<false>(c, sharp);
+  lobes_normalize<kFeatureAll>(without.lobes);
+  return without;
 }
 
 /// The closure without its sharp lobes, to be evaluated: its pdf means nothing.
-RELIEF_KERNEL SurfaceClosure closure_soft(SurfaceClosure c, SharpLobes sharp)
+RELIEF_KERNEL SurfaceClosure closure_soft(const SurfaceClosure& c, SharpLobes sharp)
 {
-  LobeProbabilities& p = c.probability;
-  if (sharp.base) p.specular = p.thin = p.glass = 0.0f;
-  if (sharp.coat) p.coat = 0.0f;
-  return c;
+  return closure_without<true>(c, sharp);
 }
 
-RELIEF_KERNEL bool closure_has_sharp(const SurfaceClosure& c, SharpLobes sharp)
+/// Whether a closure has lobes that are sharp, or that are soft.
+template <bool kSharp>
+RELIEF_KERNEL bool closure_has(const SurfaceClosure& c, SharpLobes sharp)
 {
-  const LobeProbabilities& p = c.probability;
-  return (sharp.base && (p.specular > 0.0f || p.thin > 0.0f || p.glass > 0.0f)) || (sharp.coat && p.coat > 0.0f);
-}
-
-RELIEF_KERNEL bool closure_has_soft(const SurfaceClosure& c, SharpLobes sharp)
-{
-  const LobeProbabilities& p = c.probability;
-  return p.diffuse > 0.0f || p.multiple > 0.0f || p.thin_multiple > 0.0f || p.sheen > 0.0f ||
-         (!sharp.base && (p.specular > 0.0f || p.thin > 0.0f || p.glass > 0.0f)) || (!sharp.coat && p.coat > 0.0f);
+  return lobes_visit_until<kFeatureAll>(c.lobes, [sharp]<typename L>(const L& lobe) {
+    return lobe_is_sharp<L>(sharp) == kSharp && lobe.probability > 0.0f;
+  });
 }
 
 /// Decides whether a sampled event counts as sharp or soft, and weighs it by that part of f alone. Where both have a
@@ -72,8 +75,8 @@ RELIEF_KERNEL bool closure_split(const SurfaceClosure& closure,
                                  float u,
                                  BsdfSample& bsdf)
 {
-  if ((bsdf.lobe & kLobeDelta) != 0 || !closure_has_soft(closure, sharp)) return true;
-  if (!closure_has_sharp(closure, sharp)) return false;
+  if ((bsdf.lobe & kLobeDelta) != 0 || !closure_has<false>(closure, sharp)) return true;
+  if (!closure_has<true>(closure, sharp)) return false;
   const Vec3f f_sharp = closure_eval<kFeatures, kMode>(closure_sharp(closure, sharp), tables, bsdf.wi).f;
   const Vec3f f_soft = max(bsdf.f - f_sharp, Vec3f{});
   const float of_sharp = max_component(f_sharp), of_both = of_sharp + max_component(f_soft);

@@ -1,40 +1,33 @@
-// Light that leaves a rough interface after several bounces, [KC]: its f is 1 − E(wo) times 1 − E(wi), and it is
-// sampled by an approximation of the latter.
+// Light that leaves a rough interface on the side it came from, after several bounces among the microfacets: its f is
+// 1 − E(wo) times 1 − E(wi).
 //
-// Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks" [KC].
+// Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks".
 #pragma once
 
-#include "kernel/sample/warp.h"
+#include "kernel/bsdf/base_interface.h"
+#include "kernel/bsdf/lobe.h"
 
 namespace relief {
 
-/// Density of directions: of a rough surface nearly the cosine's; of a smooth one, which loses light only at µ below
-/// about alpha and like (alpha/µ)² above, uniform in log(µ + alpha). A cosine alone gave factors of up to 200 on the
-/// throughput.
-struct MultipleScattering {
-  float alpha = 1;
-  float log_range = 1;  ///< log(1 + 1/alpha)
+struct MultipleLobe : Lobe {
+  static constexpr unsigned kFeatures = kFeatureMetal | kFeatureTransmission;
+  static constexpr LobeSides kSides = LobeSides::kReflect;
+  static constexpr LobeSharpness kSharpness = LobeSharpness::kNever;
+  static constexpr bool kIsLayer = false;
+  Vec3f f{};  ///< over 1 − E(wi)
 };
 
-RELIEF_KERNEL MultipleScattering multiple_scattering_make(float alpha)
+template <TransportMode kMode>
+RELIEF_KERNEL BsdfEval
+lobe_eval(const MultipleLobe& lobe, const BaseInterface& base, const BsdfTables& tables, Vec3f wi)
 {
-  return {alpha, std::log(1.0f + 1.0f / alpha)};
+  return {lobe.f * ggx_albedo(tables, base.ggx, wi.z).lost, multiple_scattering_pdf(base.scattering, wi.z)};
 }
 
-/// @return unit, z >= 0
-RELIEF_KERNEL Vec3f multiple_scattering_sample(const MultipleScattering& m, Vec2f u)
+template <TransportMode kMode>
+RELIEF_KERNEL LobeSample lobe_sample(const MultipleLobe&, const BaseInterface& base, const BsdfTables&, float, Vec2f u)
 {
-  if (u.x < m.alpha) return warp_cosine_hemisphere({u.x / m.alpha, u.y});
-  const float v = (u.x - m.alpha) / (1.0f - m.alpha);
-  return direction_from_z(min(1.0f, m.alpha * (std::exp(v * m.log_range) - 1.0f)), u.y);
-}
-
-/// @param cos_i  |cosine|
-/// @return       solid angle, on one hemisphere
-RELIEF_KERNEL float multiple_scattering_pdf(const MultipleScattering& m, float cos_i)
-{
-  const float logarithmic = 0.5f * kInvPi / ((cos_i + m.alpha) * m.log_range);
-  return lerp(m.alpha, logarithmic, warp_cosine_hemisphere_pdf(cos_i));
+  return lobe_sample_diffuse(multiple_scattering_sample(base.scattering, u), false);
 }
 
 }  // namespace relief

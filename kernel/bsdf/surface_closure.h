@@ -4,129 +4,114 @@
 
 #include "kernel/bsdf/clearcoat.h"
 #include "kernel/bsdf/diffuse.h"
-#include "kernel/bsdf/energy_tables.h"
+#include "kernel/bsdf/glass.h"
 #include "kernel/bsdf/multiple_scattering.h"
+#include "kernel/bsdf/sheen_lobe.h"
+#include "kernel/bsdf/specular.h"
 #include "kernel/bsdf/surface_params.h"
+#include "kernel/bsdf/thin_wall.h"
 
 namespace relief {
 
 /// Mean losses below this are left lost: smaller ones are mostly rounding, and they are divided by.
 inline constexpr float kLeastMeanLost = 1e-6f;
 
-/// What sampling chooses among; each lobe's probability is proportional to an estimate of its largest channel's albedo.
-struct LobeProbabilities {
-  float specular = 0;       ///< GGX reflection
-  float diffuse = 0;        ///< cosine
-  float multiple = 0;       ///< multiple scattering, reflected
-  float thin = 0;           ///< GGX through a thin wall
-  float thin_multiple = 0;  ///< multiple scattering, through a thin wall
-  float glass = 0;
-  float sheen = 0;
-  float coat = 0;
-};
+/// The one list of lobes, in the order in which sampling chooses among them.
+using SurfaceLobes =
+    LobeList<DiffuseLobe, MultipleLobe, SpecularLobe, GlassLobe, ThinLobe, ThinMultipleLobe, CoatLobe, SheenLobe>;
 
-/// Solid glass: exact Fresnel, refraction.
-struct GlassClosure {
-  float weight = 0;  ///< share of the surface
-  float eta = 1;     ///< index of the far side / index of wo's side
-  bool delta = false;
-  GlassCoordinate table;
-  float lost = 0;                     ///< 1 − E(wo): to be scattered again
-  float reflect_share = 1;            ///< of what is scattered again
-  float mean_near = 0, mean_far = 0;  ///< mean of 1 − E on wo's side and on the other
-};
-
-/// Coat and sheen.
-struct LayersClosure {
-  float coat = 0;
-  Frame coat_frame;
-  Vec3f coat_wo{};  ///< coat's frame
-  GgxCoordinate coat_table;
-  Vec3f sheen{};
-  float sheen_max = 0, sheen_roughness = 0;
-  TableCoordinate sheen_table;
-  SheenAlbedo sheen_o;
-  float coat_transmits = 1;  ///< what the coat leaves for below, seen from wo
-};
-
+/// Each lobe's probability is proportional to an estimate of its largest channel's albedo.
 struct SurfaceClosure {
-  Vec3f wo{};           ///< turned so that z > 0
-  float side = 1;       ///< −1 where wo was below: the z of every other direction is multiplied by it
-  bool inside = false;  ///< wo is inside a solid: coat and sheen lie on the far side
-  LobeProbabilities probability;
-
-  GgxCoordinate ggx;  ///< of all lobes but the coat
-  Vec3f F0{};         ///< of the GGX reflection: metal, dielectric and thin wall together, weighted
-  float F90 = 0;
-  Vec3f diffuse{};                    ///< f of the diffuse base over what the interface lets through towards wi
-  float under_F0 = 0, under_F90 = 0;  ///< the interface over diffuse base and thin wall; both 0: there is none
-  MultipleScattering scattering;
-  Vec3f multiple{}, thin_multiple{};  ///< f of multiple scattering, reflected and transmitted, over 1 − E(wi)
-  Vec3f transmission_color{};         ///< tint of all that crosses
-  float thin_weight = 0;
-  GlassClosure glass;
-  LayersClosure layers;
+  BaseInterface base;
+  float side = 1;            ///< −1 where wo was below: the z of every other direction is multiplied by it
+  bool inside = false;       ///< wo is inside a solid: coat and sheen lie on the far side
+  float coat_transmits = 1;  ///< what the coat leaves for below, seen from wo
+  SurfaceLobes lobes;
 };
-
-/// What a coat leaves for below.
-/// @param cos_theta  to the coat's normal
-RELIEF_KERNEL float coat_transmits(const LayersClosure& layers, const BsdfTables& tables, float cos_theta)
-{
-  if (!(cos_theta > kMinCosine)) return 1.0f;
-  const GgxAlbedo e = ggx_albedo(tables, layers.coat_table, cos_theta);
-  return 1.0f - layers.coat * ggx_albedo_with(kClearcoatF0, 1.0f, e);
-}
 
 /// Coat and sheen of a hit, and their unnormalised probabilities.
 /// @return what they leave for below, seen from wo
 RELIEF_KERNEL float layers_closure_make(const SurfaceParams& p, const BsdfTables& tables, SurfaceClosure& c)
 {
-  LayersClosure& layers = c.layers;
-  layers.coat = p.clearcoat;
+  CoatLobe& coat = c.lobes;
+  coat.strength = p.clearcoat;
   if (p.clearcoat > 0.0f) {
-    layers.coat_table = ggx_coordinate(p.clearcoat_roughness);
-    layers.coat_frame = frame_from_normal(p.clearcoat_N);
+    coat.ggx = ggx_coordinate(p.clearcoat_roughness);
+    coat.frame = frame_from_normal(p.clearcoat_N);
     if (!c.inside) {
-      layers.coat_wo = to_local(layers.coat_frame, c.wo);
-      layers.coat_transmits = coat_transmits(layers, tables, layers.coat_wo.z);
-      c.probability.coat = 1.0f - layers.coat_transmits;
+      coat.wo = to_local(coat.frame, c.base.wo);
+      c.coat_transmits = coat_transmits(coat, tables, coat.wo.z);
+      coat.probability = 1.0f - c.coat_transmits;
     }
   }
-  layers.sheen = p.sheen_color;
-  layers.sheen_max = max_component(p.sheen_color);
+  SheenLobe& sheen = c.lobes;
+  sheen.strength = max_component(p.sheen_color);
   float sheen_transmits = 1.0f;
-  if (layers.sheen_max > 0.0f) {
-    layers.sheen_roughness = p.sheen_roughness;
-    layers.sheen_table = sheen_table_roughness(p.sheen_roughness);
+  if (sheen.strength > 0.0f) {
+    sheen.color = p.sheen_color * c.coat_transmits;
+    sheen.roughness = p.sheen_roughness;
+    sheen.table = sheen_table_roughness(p.sheen_roughness);
     if (!c.inside) {
-      layers.sheen_o = sheen_albedo(tables, layers.sheen_table, c.wo.z);
-      const float albedo = layers.sheen_max * layers.sheen_o.albedo;
-      c.probability.sheen = layers.coat_transmits * albedo;
+      sheen.albedo_o = sheen_albedo(tables, sheen.table, c.base.wo.z);
+      const float albedo = sheen.strength * sheen.albedo_o.albedo;
+      sheen.probability = c.coat_transmits * albedo;
       sheen_transmits = 1.0f - albedo;
     }
   }
-  return layers.coat_transmits * sheen_transmits;
+  return c.coat_transmits * sheen_transmits;
 }
 
-/// Solid glass of a hit.
-RELIEF_KERNEL GlassClosure glass_closure_make(const SurfaceParams& p,
-                                              const BsdfTables& tables,
-                                              const SurfaceClosure& c,
-                                              float weight)
+/// What coat and sheen leave for the lobes below them.
+/// @param wi  turned to wo's side
+template <unsigned kFeatures>
+RELIEF_KERNEL float closure_below(const SurfaceClosure& c, const BsdfTables& tables, Vec3f wi)
 {
-  GlassClosure glass;
+  if constexpr ((kFeatures & kFeatureLayers) == 0) return 1.0f;
+  const CoatLobe& coat = c.lobes;
+  const SheenLobe& sheen = c.lobes;
+  float transmits = c.coat_transmits;
+  float sheen_albedo_both = sheen.albedo_o.albedo;
+  // From inside a solid the layers lie on the side that wi leaves on.
+  const float outer_z = c.inside ? -wi.z : wi.z;
+  if (outer_z > 0.0f) {
+    if (c.inside && coat.strength > 0.0f) {
+      transmits = coat_transmits(coat, tables, dot(coat.frame.n, {wi.x, wi.y, outer_z}));
+    }
+    if (sheen.strength > 0.0f) {
+      sheen_albedo_both = max(sheen_albedo_both, sheen_albedo(tables, sheen.table, outer_z).albedo);
+    }
+  }
+  return transmits * (1.0f - sheen.strength * sheen_albedo_both);
+}
+
+/// Solid glass of a hit, but for its probability.
+/// @param base  wo and ggx are known
+RELIEF_KERNEL GlassLobe
+glass_lobe_make(const SurfaceParams& p, const BsdfTables& tables, const BaseInterface& base, bool inside, float weight)
+{
+  GlassLobe glass;
   glass.weight = weight;
-  glass.eta = c.inside ? 1.0f / p.ior : p.ior;
-  glass.delta = c.ggx.mirror || dielectric_is_matched(glass.eta);
+  glass.eta = inside ? 1.0f / p.ior : p.ior;
+  glass.delta = base.ggx.mirror || dielectric_is_matched(glass.eta);
   if (glass.delta) return glass;
   glass.table = glass_coordinate(glass.eta, p.roughness);
   glass.mean_near = glass_lost_mean(tables, glass.table, glass.table.side);
   glass.mean_far = glass_lost_mean(tables, glass.table, 1 - glass.table.side);
   if (min(glass.mean_near, glass.mean_far) > kLeastMeanLost) {
-    glass.lost = glass_lost(tables, glass.table, glass.table.side, c.wo.z);
+    glass.lost = glass_lost(tables, glass.table, glass.table.side, base.wo.z);
     glass.reflect_share = dielectric_multiple_reflect_share(glass.eta, glass.mean_near, glass.mean_far);
   }
   return glass;
+}
+
+/// Makes the lobes' probabilities sum to one, where there is anything.
+template <unsigned kFeatures>
+RELIEF_KERNEL void lobes_normalize(SurfaceLobes& lobes)
+{
+  float sum = 0.0f;
+  lobes_visit<kFeatures>(lobes, [&](const Lobe& lobe) { sum += lobe.probability; });
+  const float scale = sum > 0.0f ? 1.0f / sum : 0.0f;
+  lobes_visit<kFeatures>(lobes, [&](Lobe& lobe) { lobe.probability *= scale; });
 }
 
 /// Resolves a surface for one direction.
@@ -140,92 +125,88 @@ RELIEF_KERNEL SurfaceClosure surface_closure_make(const SurfaceParams& p, const 
   constexpr bool kLayers = (kFeatures & kFeatureLayers) != 0;
 
   SurfaceClosure c;
+  BaseInterface& base = c.base;
   c.side = wo.z < 0.0f ? -1.0f : 1.0f;
-  c.wo = {wo.x, wo.y, wo.z * c.side};
-  if (p.unlit || !(c.wo.z > kMinCosine)) return c;
+  base.wo = {wo.x, wo.y, wo.z * c.side};
+  if (p.unlit || !(base.wo.z > kMinCosine)) return c;
 
   const float metal = kMetal ? p.metallic : 0.0f;
   const float transmission = kTransmission ? (1.0f - metal) * p.transmission : 0.0f;
   const bool solid = transmission > 0.0f && !p.thin;
-  const float glass = solid ? transmission : 0.0f;
-  const float diffuse = 1.0f - metal - transmission;
-  const float interface = 1.0f - metal - glass;
-  c.thin_weight = transmission - glass;
+  const float glass_weight = solid ? transmission : 0.0f;
+  const float thin_weight = transmission - glass_weight;
+  const float diffuse_weight = 1.0f - metal - transmission;
+  const float interface = 1.0f - metal - glass_weight;
   c.inside = solid && wo.z < 0.0f;
-  c.ggx = ggx_coordinate(p.roughness);
+  base.ggx = ggx_coordinate(p.roughness);
 
   float below = 1.0f;
   if constexpr (kLayers) {
     if (p.clearcoat > 0.0f || !is_zero(p.sheen_color)) below = layers_closure_make(p, tables, c);
   }
 
+  SpecularLobe& specular = c.lobes;
   const Vec3f dielectric_F0 = min(fresnel_F0(p.ior) * p.specular_color, splat3(1.0f)) * p.specular;
-  c.F0 = interface * dielectric_F0 + metal * p.base_color;
-  c.F90 = interface * p.specular + metal;
-  LobeProbabilities& probability = c.probability;
+  specular.F0 = interface * dielectric_F0 + metal * p.base_color;
+  specular.F90 = interface * p.specular + metal;
 
   GgxAlbedo e, mean;
-  if (c.F90 > 0.0f || c.thin_weight > 0.0f) {
-    e = ggx_albedo(tables, c.ggx, c.wo.z);
-    mean = ggx_albedo_mean(tables, c.ggx);
-    probability.specular = below * ggx_albedo_with(max_component(c.F0), c.F90, e);
+  if (specular.F90 > 0.0f || thin_weight > 0.0f) {
+    e = ggx_albedo(tables, base.ggx, base.wo.z);
+    mean = ggx_albedo_mean(tables, base.ggx);
+    specular.probability = below * ggx_albedo_with(max_component(specular.F0), specular.F90, e);
   }
   if (interface > 0.0f) {
-    c.under_F0 = max_component(dielectric_F0);
-    c.under_F90 = p.specular;
+    base.under_F0 = max_component(dielectric_F0);
+    base.under_F90 = p.specular;
   }
-  if (diffuse > 0.0f) {
-    const float transmits = 1.0f - ggx_albedo_with(c.under_F0, c.under_F90, e);
-    c.diffuse = diffuse_coupled_eval(diffuse * p.base_color, transmits, 1.0f,
-                                     (1.0f - ggx_albedo_with(c.under_F0, c.under_F90, mean)));
-    probability.diffuse = below * diffuse * transmits * max_component(p.base_color);
+  if (diffuse_weight > 0.0f) {
+    DiffuseLobe& diffuse = c.lobes;
+    const float transmits = 1.0f - ggx_albedo_with(base.under_F0, base.under_F90, e);
+    diffuse.f = diffuse_coupled_eval(diffuse_weight * p.base_color, transmits, 1.0f,
+                                     (1.0f - ggx_albedo_with(base.under_F0, base.under_F90, mean)));
+    diffuse.probability = below * diffuse_weight * transmits * max_component(p.base_color);
   }
 
   const float mean_lost = mean.lost;
   // Nearly smooth surfaces lose less than rounding; without a mean there is nothing to divide by.
-  if ((metal > 0.0f || c.thin_weight > 0.0f) && mean_lost > kLeastMeanLost) {
+  if ((metal > 0.0f || thin_weight > 0.0f) && mean_lost > kLeastMeanLost) {
     const float lost = e.lost;
-    c.scattering = multiple_scattering_make(c.ggx.alpha);
+    base.scattering = multiple_scattering_make(base.ggx.alpha);
+    MultipleLobe& multiple = c.lobes;
     if constexpr (kMetal) {
       // Kulla and Conty 2017, with the square of the mean Fresnel that Hill 2018 restored: the light meets the
       // metal at least twice.
       const Vec3f F = fresnel_schlick_mean(p.base_color, 1.0f);
       const Vec3f kept = F * F * (1.0f - mean_lost) / (splat3(1.0f) - F * mean_lost);
-      c.multiple = diffuse_coupled_eval(metal * kept, lost, 1.0f, mean_lost);
-      probability.multiple = below * lost * metal * max_component(kept);
+      multiple.f = diffuse_coupled_eval(metal * kept, lost, 1.0f, mean_lost);
+      multiple.probability = below * lost * metal * max_component(kept);
     }
     if constexpr (kTransmission) {
-      const float F = fresnel_schlick_mean(splat3(c.under_F0), c.under_F90).x;
-      c.multiple += diffuse_coupled_eval(splat3(c.thin_weight * F), lost, 1.0f, mean_lost);
-      c.thin_multiple = diffuse_coupled_eval(c.thin_weight * (1.0f - F) * p.base_color, lost, 1.0f, mean_lost);
-      probability.multiple += below * lost * c.thin_weight * F;
-      probability.thin_multiple = below * lost * c.thin_weight * (1.0f - F) * max_component(p.base_color);
+      ThinMultipleLobe& thin_multiple = c.lobes;
+      const float F = fresnel_schlick_mean(splat3(base.under_F0), base.under_F90).x;
+      multiple.f += diffuse_coupled_eval(splat3(thin_weight * F), lost, 1.0f, mean_lost);
+      multiple.probability += below * lost * thin_weight * F;
+      thin_multiple.f = diffuse_coupled_eval(thin_weight * (1.0f - F) * p.base_color, lost, 1.0f, mean_lost);
+      thin_multiple.probability = below * lost * thin_weight * (1.0f - F) * max_component(p.base_color);
     }
   }
   if constexpr (kTransmission) {
-    c.transmission_color = p.base_color;
-    if (c.thin_weight > 0.0f) {
-      const float transmits = 1.0f - e.lost - ggx_albedo_with(c.under_F0, c.under_F90, e);
-      probability.thin = below * c.thin_weight * transmits * max_component(p.base_color);
+    base.transmission_color = p.base_color;
+    if (thin_weight > 0.0f) {
+      ThinLobe& thin = c.lobes;
+      const float transmits = 1.0f - e.lost - ggx_albedo_with(base.under_F0, base.under_F90, e);
+      thin.weight = thin_weight;
+      thin.probability = below * thin_weight * transmits * max_component(p.base_color);
     }
-    if (glass > 0.0f) {
-      c.glass = glass_closure_make(p, tables, c, glass);
-      if (c.glass.lost > 0.0f) c.scattering = multiple_scattering_make(c.ggx.alpha);
-      probability.glass = below * glass;
+    if (glass_weight > 0.0f) {
+      GlassLobe& glass = c.lobes;
+      glass = glass_lobe_make(p, tables, base, c.inside, glass_weight);
+      if (glass.lost > 0.0f) base.scattering = multiple_scattering_make(base.ggx.alpha);
+      glass.probability = below * glass_weight;
     }
   }
-
-  const float sum = probability.specular + probability.diffuse + probability.multiple + probability.thin +
-                    probability.thin_multiple + probability.glass + probability.sheen + probability.coat;
-  const float scale = sum > 0.0f ? 1.0f / sum : 0.0f;
-  probability.specular *= scale;
-  probability.diffuse *= scale;
-  probability.multiple *= scale;
-  probability.thin *= scale;
-  probability.thin_multiple *= scale;
-  probability.glass *= scale;
-  probability.sheen *= scale;
-  probability.coat *= scale;
+  lobes_normalize<kFeatures>(c.lobes);
   return c;
 }
 

@@ -162,8 +162,10 @@ RELIEF_KERNEL std::uint32_t path_ways_on(const PathState& state,
                                          const SurfaceClosure& closure)
 {
   const bool seen_first = path_bounces(state.bounces[path], BounceKind::kAll) == 0;
-  const bool rough_glass = closure.probability.glass == 1.0f && !closure.glass.delta && at.side.front;
-  const bool rough_metal = closure.probability.specular > 0.5f && (at.instance->flags & kGathersTails) != 0;
+  const GlassLobe& glass = closure.lobes;
+  const bool rough_glass = glass.probability == 1.0f && !glass.delta && at.side.front;
+  const bool rough_metal =
+      lobe_of<SpecularLobe>(closure.lobes).probability > 0.5f && (at.instance->flags & kGathersTails) != 0;
   return seen_first && (rough_glass || rough_metal) && path_has_room(state, kWaysAtRough) ? kWaysAtRough : 1;
 }
 
@@ -172,8 +174,8 @@ RELIEF_KERNEL std::uint32_t path_ways_on(const PathState& state,
 RELIEF_KERNEL bool path_forks_at_glass(const PathState& state, std::uint32_t path, const SurfaceClosure& closure)
 {
   return path_bounces(state.bounces[path], BounceKind::kAll) <= 1 &&
-         path_bounces(state.bounces[path], BounceKind::kDiffuse) == 0 && closure.probability.glass == 1.0f &&
-         path_has_room(state, 2);
+         path_bounces(state.bounces[path], BounceKind::kDiffuse) == 0 &&
+         lobe_of<GlassLobe>(closure.lobes).probability == 1.0f && path_has_room(state, 2);
 }
 
 /// Sends a path on by a sample of its surface's BSDF, or ends it.

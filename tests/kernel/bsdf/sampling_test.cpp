@@ -322,6 +322,7 @@ TEST(GlassBranches, AreWhatChanceWouldChooseBetween)
     SCOPED_TRACE(testing::Message() << "index " << c.ior << ", roughness " << c.roughness << ", cosine " << c.wo_z);
     const SurfaceClosure closure =
         surface_closure_make<kFeatureAll>(glass(c.ior, c.roughness), full_tables(), direction(c.wo_z));
+    const GlassLobe& glass_lobe = closure.lobes;
     TestRandom random(7);
     int pairs = 0;
     for (int n = 0; n < 1000; ++n) {
@@ -330,11 +331,11 @@ TEST(GlassBranches, AreWhatChanceWouldChooseBetween)
       const GlassBranches both = glass_branches_sample<kFeatureAll>(closure, full_tables(), 0.999f, u);
       const float F = both.reflectance;
       EXPECT_EQ(
-          glass_branches_sample<kFeatureAll>(closure, full_tables(), 0.99f * closure.glass.lost - 1e-9f, u).reflectance,
+          glass_branches_sample<kFeatureAll>(closure, full_tables(), 0.99f * glass_lobe.lost - 1e-9f, u).reflectance,
           1.0f);
       if (!(F < 0.999f)) continue;
       ++pairs;
-      const float turn = closure.glass.lost + (1 - closure.glass.lost) * F;
+      const float turn = glass_lobe.lost + (1 - glass_lobe.lost) * F;
       constexpr float kClose = 1e-5f;
       const BsdfSample below = closure_sample<kFeatureAll>(closure, full_tables(), turn - kClose, u);
       const BsdfSample above = closure_sample<kFeatureAll>(closure, full_tables(), turn + kClose, u);
