@@ -1,46 +1,12 @@
-// Eight floats, or four doubles, side by side, by the compiler's vector types: one AVX2 register, or two SSE registers
-// in the baseline.
+// What traversals need of lanes besides kernel/math/lanes.h: small integers as floats, shuffles, four doubles side by side.
 #pragma once
 
-#include <cstdint>
-
-#include <immintrin.h>
-
 #include "displacement/vec3d.h"
+#include "kernel/math/lanes.h"
 
 namespace relief {
 
-using F8 [[gnu::vector_size(32)]] = float;
 using D4 [[gnu::vector_size(32)]] = double;
-using I8 [[gnu::vector_size(32)]] = std::int32_t;
-
-RELIEF_KERNEL F8 splat8(float x) { return F8{x, x, x, x, x, x, x, x}; }
-RELIEF_KERNEL F8 min(F8 a, F8 b) { return a < b ? a : b; }
-RELIEF_KERNEL F8 max(F8 a, F8 b) { return a > b ? a : b; }
-RELIEF_KERNEL F8 abs(F8 a)
-{
-  I8 bits;
-  __builtin_memcpy(&bits, &a, sizeof bits);
-  bits &= 0x7fffffff;
-  __builtin_memcpy(&a, &bits, sizeof a);
-  return a;
-}
-RELIEF_KERNEL F8 sqrt(F8 a)
-{
-  for (int k = 0; k < 8; ++k) a[k] = __builtin_sqrtf(a[k]);
-  return a;
-}
-/// Bit k is set where lane k of a comparison is true.
-RELIEF_KERNEL unsigned mask_of(I8 m)
-{
-#ifdef __AVX__
-  return static_cast<unsigned>(_mm256_movemask_ps(__builtin_bit_cast(__m256, m)));
-#else
-  __m128 half[2];
-  __builtin_memcpy(half, &m, sizeof half);
-  return static_cast<unsigned>(_mm_movemask_ps(half[0]) | _mm_movemask_ps(half[1]) << 4);
-#endif
-}
 
 /// Small integers as floats; by way of 32 bits, which is one instruction less than GCC makes of it by itself.
 template <typename Small>
@@ -49,12 +15,6 @@ RELIEF_KERNEL F8 widen(Small lanes)
   return __builtin_convertvector(__builtin_convertvector(lanes, I8), F8);
 }
 
-RELIEF_KERNEL F8 load8(const float* from)
-{
-  F8 lanes;
-  __builtin_memcpy(&lanes, from, sizeof lanes);
-  return lanes;
-}
 RELIEF_KERNEL F8 load8(const std::uint16_t* from)
 {
   using U16 [[gnu::vector_size(16)]] = std::uint16_t;
@@ -69,8 +29,6 @@ RELIEF_KERNEL F8 load8(const std::uint8_t* from)
   __builtin_memcpy(&lanes, from, sizeof lanes);
   return widen(lanes);
 }
-RELIEF_KERNEL void store8(float* to, F8 lanes) { __builtin_memcpy(to, &lanes, sizeof lanes); }
-
 /// Lane k of the result is lane k + 1; the last is lane 7.
 RELIEF_KERNEL F8 shift_down(F8 a) { return __builtin_shufflevector(a, a, 1, 2, 3, 4, 5, 6, 7, 7); }
 /// Lanes 0…3 of a, then lanes 0…3 of b.

@@ -1,5 +1,6 @@
 #include "integrator/intersect_stage.h"
 
+#include "kernel/graph/graph_material.h"
 #include "kernel/math/rounding.h"
 #include "kernel/sample/dimensions.h"
 #include "kernel/sample/sobol.h"
@@ -146,6 +147,7 @@ struct ShadowContext {
   const KernelGlobals* globals = nullptr;
   const DisplacementSet* displacements = nullptr;
   float visibility = 1;
+  Vec3f D;  ///< of the ray, world: filters see it in the space of the instance
 };
 
 }  // namespace
@@ -229,6 +231,7 @@ void intersect_shadow(const KernelGlobals& g,
   if (accel.displacements().size() > 0) context.embree.steps = &steps;
   for (std::uint32_t i = 0; i < shadow.size; ++i) {
     context.visibility = 1.0f;
+    context.D = {shadow.D_x[i], shadow.D_y[i], shadow.D_z[i]};
     RTCRay ray;
     ray.org_x = shadow.O_x[i];
     ray.org_y = shadow.O_y[i];
@@ -266,8 +269,16 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
     DisplacedPoint at{RTCHitN_primID(arguments->hit, arguments->N, i), RTCHitN_u(arguments->hit, arguments->N, i),
                       RTCHitN_v(arguments->hit, arguments->N, i)};
     if ((instance.flags & kDisplaced) != 0) at = context->displacements->locate(object, at.triangle, at.u, at.v);
-    const float alpha = triangle_alpha(g.materials[instance.material_index], g.textures, g.meshes[instance.mesh_index],
-                                       at.triangle, at.u, at.v);
+    const Material& material = g.materials[instance.material_index];
+    const MeshView& mesh = g.meshes[instance.mesh_index];
+    float alpha = 0.0f;
+    if ((material.graph_outputs >> static_cast<int>(GraphOutput::alpha) & 1u) != 0) {
+      const SurfaceHit hit = surface_hit_make(mesh, instance, at.triangle, at.u, at.v);
+      alpha = graph_alpha(material, g.graphs[material.graph_index], g.textures,
+                          {&mesh, &instance, at.triangle, at.u, at.v, &hit, -context->D, {0.0f, 0.0f}});
+    } else {
+      alpha = triangle_alpha(material, g.textures, mesh, at.triangle, at.u, at.v);
+    }
     context->visibility *= 1.0f - alpha;
     if (context->visibility > 0.0f) arguments->valid[i] = 0;
   }

@@ -50,7 +50,8 @@ CausticsDecision caustics_decide(const Scene& scene, LightSet& lights, CausticsM
 /// Whether photons can show on a material at all, rather than be sent on by sharp lobes alone.
 bool has_soft_lobes(const Material& m, bool caster, float roughness)
 {
-  const bool textured = m.metallic_roughness_texture.texture_index >= 0 || m.transmission_texture.texture_index >= 0;
+  const bool textured = m.metallic_roughness_texture.texture_index >= 0 || m.transmission_texture.texture_index >= 0 ||
+                        m.graph_index >= 0;
   const bool diffuse = m.metallic < 1.0f && m.transmission < 1.0f;
   const bool rough = !caster && (m.roughness > roughness || (m.clearcoat > 0.0f && m.clearcoat_roughness > roughness));
   // Microfacets scatter light more than once on all but smooth metal and thin walls.
@@ -110,7 +111,9 @@ SceneContext::SceneContext(const Scene& loaded,
   globals.meshes = meshes.data();
   globals.instances = instances.data();
   globals.num_instances = static_cast<std::uint32_t>(instances.size());
+  for (const GraphProgram& graph : scene.graphs) graphs.push_back(graph.view());
   globals.materials = scene.materials.data();
+  globals.graphs = graphs.data();
   globals.textures = scene.textures->views().data();
   globals.area_light_index = lights.area_lights.data();
   globals.lights = lights.view();

@@ -32,6 +32,7 @@ struct SceneContext {
   const Scene& scene;
   std::vector<MeshView> meshes;
   std::vector<InstanceView> instances;
+  std::vector<GraphProgramView> graphs;
   LightSet lights;
   std::vector<std::uint8_t> surface_kernel;  ///< a material
   std::unique_ptr<BsdfTables> bsdf_tables;

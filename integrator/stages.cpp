@@ -2,6 +2,8 @@
 // set's table. Nothing here may have external linkage but that function: see scripts/check_isa.
 #include "integrator/stages.h"
 
+#include <algorithm>
+
 #include "integrator/surface_kernels.h"
 #include "kernel/stage/accumulate_shadow.h"
 #include "kernel/stage/emit_photon.h"
@@ -46,6 +48,46 @@ void generate(const KernelGlobals& g, PathState& state, const Batch& batch)
   }
 }
 
+/// Runs the graphs of up to eight paths that have hit one material, then shades each.
+template <unsigned kFeatures>
+void shade_surfaces_by_graph(const KernelGlobals& g,
+                             PathState& state,
+                             const QueueView& queue,
+                             QueueView& next,
+                             ShadowQueue& shadow,
+                             Counters& counters)
+{
+  const auto material_of = [&](std::uint32_t path) { return g.instances[state.hit_object[path]].material_index; };
+  std::sort(queue.paths, queue.paths + queue.size, [&](std::uint32_t a, std::uint32_t b) {
+    const std::int32_t of_a = material_of(a), of_b = material_of(b);
+    return of_a != of_b ? of_a < of_b : a < b;
+  });
+  constexpr std::uint32_t kLanes = 8;
+  GraphRegisters registers;
+  for (std::uint32_t first = 0; first < queue.size;) {
+    const Material& material = g.materials[material_of(queue.paths[first])];
+    if (material.graph_index < 0) {
+      shade_surface<kFeatures>(g, state, queue.paths[first++], next, shadow, counters);
+      continue;
+    }
+    const GraphProgramView& program = g.graphs[material.graph_index];
+    std::uint32_t count = 0;
+    for (; count < kLanes && first + count < queue.size; ++count) {
+      const std::uint32_t path = queue.paths[first + count];
+      if (&g.materials[material_of(path)] != &material) break;
+      const Vec3f wo = -path_direction(state, path);
+      const SurfaceInteraction at = surface_interaction_locate<kFeatures>(g, state, path, wo);
+      graph_load_point(program, surface_graph_point(g, state, path, at, wo), static_cast<int>(count), registers);
+    }
+    graph_run(program, g.textures, registers);
+    for (std::uint32_t lane = 0; lane < count; ++lane) {
+      const GraphValues values = graph_values(program, registers, static_cast<int>(lane));
+      shade_surface<kFeatures>(g, state, queue.paths[first + lane], next, shadow, counters, &values);
+    }
+    first += count;
+  }
+}
+
 template <unsigned kFeatures>
 void shade_surfaces(const KernelGlobals& g,
                     PathState& state,
@@ -54,8 +96,12 @@ void shade_surfaces(const KernelGlobals& g,
                     ShadowQueue& shadow,
                     Counters& counters)
 {
-  for (std::uint32_t i = 0; i < queue.size; ++i) {
-    shade_surface<kFeatures>(g, state, queue.paths[i], next, shadow, counters);
+  if constexpr ((kFeatures & kFeatureGraphs) != 0) {
+    shade_surfaces_by_graph<kFeatures>(g, state, queue, next, shadow, counters);
+  } else {
+    for (std::uint32_t i = 0; i < queue.size; ++i) {
+      shade_surface<kFeatures>(g, state, queue.paths[i], next, shadow, counters);
+    }
   }
 }
 
@@ -136,7 +182,8 @@ constexpr StageTable kTable = {
     {shade_surfaces<kSurfaceKernelFeatures[0]>, shade_surfaces<kSurfaceKernelFeatures[1]>,
      shade_surfaces<kSurfaceKernelFeatures[2]>, shade_surfaces<kSurfaceKernelFeatures[3]>,
      shade_surfaces<kSurfaceKernelFeatures[4]>, shade_surfaces<kSurfaceKernelFeatures[5]>,
-     shade_surfaces<kSurfaceKernelFeatures[6]>},
+     shade_surfaces<kSurfaceKernelFeatures[6]>, shade_surfaces<kSurfaceKernelFeatures[7]>,
+     shade_surfaces<kSurfaceKernelFeatures[8]>, shade_surfaces<kSurfaceKernelFeatures[9]>},
     shade_backgrounds,
     shade_lights,
     accumulate_shadows,

@@ -13,7 +13,7 @@
 namespace relief {
 
 /// Surface kernels are instantiated for a few feature masks, in rising order of what they can do.
-inline constexpr int kNumSurfaceKernels = 7;
+inline constexpr int kNumSurfaceKernels = 10;
 
 /// A rectangle of pixels and a run of their samples; path i of a batch is pixel i % (width·height) in the order of
 /// batch_pixel, sample first_sample + i / (width·height).

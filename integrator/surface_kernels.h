@@ -13,8 +13,11 @@ inline constexpr unsigned kSurfaceKernelFeatures[kNumSurfaceKernels] = {
     kFeatureTransmission,
     kFeatureMetal | kFeatureTextures | kFeatureNormalMaps | kFeatureTransparency,
     kFeatureAll,
+    kFeatureGraphs | kFeatureMetal | kFeatureTextures | kFeatureNormalMaps | kFeatureTransparency,
+    kFeatureGraphs | kFeatureAll,
     kFeatureCaustics,
     kFeatureCaustics | kFeatureAll,
+    kFeatureCaustics | kFeatureGraphs | kFeatureAll,
 };
 
 /// Kernel for a material.

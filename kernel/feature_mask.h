@@ -3,6 +3,7 @@
 #pragma once
 
 #include "kernel/bsdf/material.h"
+#include "kernel/graph/graph_program.h"
 
 namespace relief {
 
@@ -14,8 +15,9 @@ enum FeatureBit : unsigned {
   kFeatureLayers = 1u << 4,        ///< clearcoat or sheen
   kFeatureMetal = 1u << 5,         ///< metallic above zero
   kFeatureCaustics = 1u << 6,      ///< photons bring part of the light: of the render, not of a material
+  kFeatureGraphs = 1u << 7,        ///< value graphs give factors
 };
-inline constexpr unsigned kFeatureAll = (1u << 6) - 1u;  ///< of materials
+inline constexpr unsigned kFeatureAll = (1u << 6) - 1u;  ///< of materials, but for graphs
 
 /// Bits that one material needs; a scene needs the union over its materials.
 RELIEF_KERNEL unsigned feature_mask_of(const Material& m)
@@ -33,6 +35,13 @@ RELIEF_KERNEL unsigned feature_mask_of(const Material& m)
   if (m.transmission > 0.0f) mask |= kFeatureTransmission;
   if (m.clearcoat > 0.0f || max_component(m.sheen_color) > 0.0f) mask |= kFeatureLayers;
   if (m.metallic > 0.0f) mask |= kFeatureMetal;
+  if (m.graph_index >= 0) {
+    const auto gives = [&m](GraphOutput output) { return (m.graph_outputs >> static_cast<int>(output) & 1u) != 0; };
+    mask |= kFeatureGraphs;
+    if (gives(GraphOutput::metallic)) mask |= kFeatureMetal;
+    if (gives(GraphOutput::transmission)) mask |= kFeatureTransmission;
+    if (gives(GraphOutput::clearcoat) || gives(GraphOutput::sheen_color)) mask |= kFeatureLayers;
+  }
   return mask;
 }
 

@@ -10,6 +10,7 @@
 #include "scene/feature_set.h"
 #include "scene/framing.h"
 #include "scene/gltf_mesh.h"
+#include "scene/graph/graph_reader.h"
 #include "scene/khronos_extensions.h"
 #include "scene/limits.h"
 #include "scene/memory.h"
@@ -395,6 +396,15 @@ int GltfLoader::material_of(const GltfDocument& document, int material_index)
   if (owner != nullptr) {
     material = khronos_material(document, material_index, textures_, warnings_);
     name = document.core.materials[static_cast<std::size_t>(material_index)].name;
+    const std::string path = "/materials/" + std::to_string(material_index);
+    document.read_extension(document.element("materials", static_cast<std::size_t>(material_index)), path, "RELIEF_graph",
+                            [&](const JsonReader& reader) {
+                              scene_.graphs.push_back(graph_read(document, reader, textures_, warnings_));
+                              material.graph_index = static_cast<int>(scene_.graphs.size()) - 1;
+                              material.graph_outputs = scene_.graphs.back().given;
+                              constexpr auto kEmission = static_cast<unsigned>(GraphOutput::emission);
+                              says_light_ = says_light_ || (material.graph_outputs >> kEmission & 1u) != 0;
+                            });
     if (auto displacement = relief_displacement(document, material_index, height_maps_, warnings_)) {
       material.displacement_index = static_cast<int>(scene_.displacements.size());
       scene_.displacements.push_back(*displacement);

@@ -213,7 +213,11 @@ void read_attributes(const PrimitiveReader& reader,
   const auto normals = reader.open("NORMAL", 3, 3, positions.count);
   const auto tangents = reader.open("TANGENT", 4, 4, positions.count);
   const auto colors = reader.open("COLOR_0", 3, 4, positions.count);
+  const auto generated = reader.open("_GENERATED", 3, 3, positions.count);
   mesh.P = accessor_read<Vec3f>(positions, first, count);
+  if (generated) {
+    mesh.generated = accessor_read<Vec3f>(*generated, first, count);
+  }
   for (int set = 0; set < 2; ++set) {
     if (const auto uv = reader.open("TEXCOORD_" + std::to_string(set), 2, 2, positions.count)) {
       mesh.uv[set] = accessor_read<Vec2f>(*uv, first, count);
@@ -272,6 +276,7 @@ void drop_unused_vertices(Mesh& mesh)
   keep(mesh.N, kept);
   keep(mesh.tangent, kept);
   keep(mesh.color, kept);
+  keep(mesh.generated, kept);
   for (std::vector<Vec2f>& uv : mesh.uv) {
     keep(uv, kept);
   }
@@ -319,7 +324,7 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
       t = {t.v0 - first, t.v1 - first, t.v2 - first};
     }
     const std::size_t num_vertices = *highest - first + 1;
-    constexpr std::size_t kMostVertexBytes = sizeof(Vec3f) + sizeof(Normal3f) + 2 * sizeof(Vec2f) + 2 * sizeof(Vec4f);
+    constexpr std::size_t kMostVertexBytes = 2 * sizeof(Vec3f) + sizeof(Normal3f) + 2 * sizeof(Vec2f) + 2 * sizeof(Vec4f);
     constexpr std::size_t kWorthALook = std::size_t{1} << 20;
     if (num_vertices > kWorthALook / kMostVertexBytes) {
       memory_require(num_vertices * kMostVertexBytes, document.file + ": " + reader.path);

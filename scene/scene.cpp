@@ -26,6 +26,7 @@ MeshView Mesh::view() const
   m.uv[1] = data_or_null(uv[1]);
   m.tangent = data_or_null(tangent);
   m.color = data_or_null(color);
+  m.generated = data_or_null(generated);
   m.triangles = data_or_null(triangles);
   m.num_vertices = static_cast<std::uint32_t>(P.size());
   m.num_triangles = static_cast<std::uint32_t>(triangles.size());
@@ -35,7 +36,7 @@ MeshView Mesh::view() const
 std::size_t Mesh::bytes() const
 {
   return vector_bytes(P) + vector_bytes(N) + vector_bytes(uv[0]) + vector_bytes(uv[1]) + vector_bytes(tangent) +
-         vector_bytes(color) + vector_bytes(triangles);
+         vector_bytes(color) + vector_bytes(generated) + vector_bytes(triangles);
 }
 
 }  // namespace relief

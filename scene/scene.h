@@ -15,6 +15,7 @@
 #include "kernel/shape/mesh_view.h"
 #include "scene/diagnostics.h"
 #include "scene/file_stamp.h"
+#include "scene/graph/graph_program.h"
 #include "scene/height_map.h"
 
 namespace relief {
@@ -29,6 +30,7 @@ struct Mesh {
   std::vector<Vec2f> uv[2];    ///< empty: absent
   std::vector<Vec4f> tangent;  ///< empty: derived where a normal map needs them
   std::vector<Vec4f> color;
+  std::vector<Vec3f> generated;  ///< _GENERATED, see MeshView; empty: absent
   std::vector<TriangleIndices> triangles;
   int material_index = 0;  ///< always valid: the loader adds glTF's default material where none is named
   int copy_of = -1;        ///< mesh of the file that this is under some transform, see world_displacement.h; −1: none
@@ -148,6 +150,7 @@ struct Scene {
   std::vector<Instance> instances;
   std::vector<Material> materials;
   std::vector<std::string> material_names;
+  std::vector<GraphProgram> graphs;     ///< of materials, by Material::graph_index
   std::vector<Light> lights;            ///< everything but mesh triangles and the environment
   std::vector<std::string> node_names;  ///< of all files, as far as they have names, each once, in file order
   std::vector<AnimationClip> clips;     ///< of all files

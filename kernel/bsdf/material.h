@@ -49,6 +49,9 @@ struct Material {
   TextureRef specular_texture;        ///< A
   TextureRef specular_color_texture;  ///< sRGB
 
+  int graph_index = -1;            ///< into KernelGlobals::graphs, which gives factors in place of those above; −1: none
+  std::uint32_t graph_outputs = 0;  ///< bit GraphOutput: what it gives
+
   int displacement_index = -1;  ///< into Scene::displacements; −1: none
 };
 

@@ -18,6 +18,7 @@ struct MeshView {
   const Vec2f* uv[2] = {nullptr, nullptr};     ///< texture coordinate sets
   const Vec4f* tangent = nullptr;              ///< unit, w = handedness; null: derived from uv
   const Vec4f* color = nullptr;                ///< COLOR_0, linear, multiplies base colour and alpha
+  const Vec3f* generated = nullptr;            ///< coordinates that value graphs call so; null: absent
   const TriangleIndices* triangles = nullptr;  ///< num_triangles
   std::uint32_t num_vertices = 0, num_triangles = 0;
 };

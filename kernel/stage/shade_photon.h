@@ -86,7 +86,7 @@ RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
                                 PhotonQueueView& photons)
 {
   const Vec3f wo = -path_direction(state, path);
-  SurfaceInteraction at = surface_interaction_make<kFeatureAll>(g, state, path, wo);
+  SurfaceInteraction at = surface_interaction_make<kFeatureAll | kFeatureGraphs>(g, state, path, wo);
   if (!surface_is_met<kFeatureAll>(state, path, at.params.alpha, photon_surface(state, path))) {
     if (path_pass_through(g, state, path)) queue_push(next, path);
     return;

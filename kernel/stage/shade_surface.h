@@ -363,6 +363,7 @@ RELIEF_KERNEL void shade_surface_denoising(const KernelGlobals& g,
 }
 
 /// Shades one path. Reads and writes every column but the hit's.
+/// @param graph_values  of the material's graph at the hit; null: it has none, or it is run here
 /// Next: intersect closest (pushed on `next`), or the path ends; it may fork. At most one ray is added to `shadow`, at a first hit two.
 template <unsigned kFeatures>
 [[gnu::flatten]] RELIEF_KERNEL void shade_surface(const KernelGlobals& g,
@@ -370,7 +371,8 @@ template <unsigned kFeatures>
                                                   std::uint32_t path,
                                                   QueueView& next,
                                                   ShadowQueue& shadow,
-                                                  Counters& counters)
+                                                  Counters& counters,
+                                                  const GraphValues* graph_values = nullptr)
 {
   ++counters.surface_hits;
   const Vec3f wo = -path_direction(state, path);
@@ -382,7 +384,7 @@ template <unsigned kFeatures>
   // Early: nothing waits for them yet.
   const ScatterSamples u = scatter_samples(state.pixel_hash[path], sample, surface);
 
-  SurfaceInteraction at = surface_interaction_make<kFeatures>(g, state, path, wo);
+  SurfaceInteraction at = surface_interaction_make<kFeatures>(g, state, path, wo, graph_values);
   if (!surface_is_met<kFeatures>(state, path, at.params.alpha, surface)) {
     ++counters.transparent_hits;
     if (path_pass_through(g, state, path)) queue_push(next, path);

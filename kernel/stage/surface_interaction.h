@@ -5,6 +5,7 @@
 #include "kernel/bsdf/surface_params.h"
 #include "kernel/feature_mask.h"
 #include "kernel/globals.h"
+#include "kernel/graph/graph_material.h"
 #include "kernel/sample/dimensions.h"
 #include "kernel/sample/sobol.h"
 #include "kernel/shape/surface_hit.h"
@@ -48,11 +49,11 @@ RELIEF_KERNEL Vec3f shading_normal_towards(Vec3f Ns, Vec3f Ng_side, Vec3f wo)
 /// Cosine between a shading normal and what was made of it, less than which it was bent: 1 but for rounding.
 inline constexpr float kUnbent = 1.0f - 1e-6f;
 
-/// The point that a path has hit and its material there.
+/// The point that a path has hit; its material's parameters there are left open.
 /// @param wo  unit, back along the path's ray
 template <unsigned kFeatures>
 RELIEF_KERNEL SurfaceInteraction
-surface_interaction_make(const KernelGlobals& g, const PathState& state, std::uint32_t path, Vec3f wo)
+surface_interaction_locate(const KernelGlobals& g, const PathState& state, std::uint32_t path, Vec3f wo)
 {
   SurfaceInteraction at;
   at.instance = &g.instances[state.hit_object[path]];
@@ -75,6 +76,41 @@ surface_interaction_make(const KernelGlobals& g, const PathState& state, std::ui
     const float footprint = ray_cone_footprint_world(at.cone, dot(wo, at.side.Ng));
     at.uv_width[0] = footprint * at.hit.area_ratio[0];
     at.uv_width[1] = footprint * at.hit.area_ratio[1];
+  }
+  return at;
+}
+
+/// What a graph may read of a located point.
+RELIEF_KERNEL GraphPoint surface_graph_point(const KernelGlobals& g,
+                                             const PathState& state,
+                                             std::uint32_t path,
+                                             const SurfaceInteraction& at,
+                                             Vec3f wo)
+{
+  return {
+      &g.meshes[at.instance->mesh_index], at.instance, at.triangle, state.hit_u[path], state.hit_v[path], &at.hit, wo,
+      {at.uv_width[0], at.uv_width[1]}};
+}
+
+/// The point that a path has hit and its material there.
+/// @param wo      unit, back along the path's ray
+/// @param values  of the material's graph there; null: it is run, if there is one
+template <unsigned kFeatures>
+RELIEF_KERNEL SurfaceInteraction surface_interaction_make(const KernelGlobals& g,
+                                                          const PathState& state,
+                                                          std::uint32_t path,
+                                                          Vec3f wo,
+                                                          const GraphValues* values = nullptr)
+{
+  SurfaceInteraction at = surface_interaction_locate<kFeatures>(g, state, path, wo);
+  if constexpr ((kFeatures & kFeatureGraphs) != 0) {
+    if (at.material->graph_index >= 0) {
+      const GraphValues given = values != nullptr ? *values
+                                                  : graph_at_point(g.graphs[at.material->graph_index], g.textures,
+                                                                   surface_graph_point(g, state, path, at, wo));
+      at.params = graph_surface_params<kFeatures>(*at.material, given, g.textures, at.hit, at.uv_width);
+      return at;
+    }
   }
   at.params = surface_params_eval<kFeatures>(*at.material, g.textures, at.hit.uv, at.hit.color, at.uv_width);
   return at;

@@ -57,7 +57,11 @@ def export_displacement(material, settings, textures, texture_info, images):
     move = _move_of_bump(textures) if textures.bump else _move_of_output(material, settings, textures)
     if move is None or move.scale == 0:
         return None
-    height = textures.number(move.node.inputs["Height"], move.groups)
+    height = textures.image(move.node.inputs["Height"], move.groups)
+    if height is None:
+        node = move.node
+        textures.warn(f'node "{node.name}" ({node.bl_label}): a height that is no image', "nothing is displaced")
+        return None
     # scale · (value · h + offset − midlevel) = (scale · value) · (h − (midlevel − offset) / value)
     if height.texture is None:
         return _constant(height.value, move, images)

@@ -6,10 +6,11 @@ import math
 from .. import compat
 from . import nodes
 from .displacement import bump_displaces, export_displacement
+from .graph import GraphWriter
 from .light import set_emission
 from .mesh import Wanted
 from .surface import TRANSPARENT, Surface, surface_from
-from .texture import Input, TextureReader
+from .texture import Input, Mapping, Texture, TextureReader
 
 #: The format has two sets of texture coordinates a vertex.
 _MOST_COORDINATES = 2
@@ -77,7 +78,8 @@ class _MaterialJob:
         self._color_map = None
         self._displaced = self._by_shading = False
         self.json = {"name": self._name, "doubleSided": True}
-        textures = TextureReader(self._warn)
+        self._graph = GraphWriter(self._coordinate_set, self._graph_texture)
+        textures = TextureReader(self._warn, self._graph)
         if material is None or not material.use_nodes or material.node_tree is None:
             color = (0.8, 0.8, 0.8) if material is None else tuple(material.diffuse_color[:3])
             color = nodes.finite(color, "its colour", self._warn)
@@ -101,7 +103,11 @@ class _MaterialJob:
             writer.extend(self.json, "RELIEF_displacement", value)
 
     def wanted(self):
-        return Wanted(tuple(self._coordinates), self._color_map, self._displaced, self._by_shading)
+        color_map = self._color_map
+        if color_map is None and self._graph.outputs:
+            color_map = self._graph.color_map
+        generated = bool(self._graph.outputs) and self._graph.uses_generated
+        return Wanted(tuple(self._coordinates), color_map, self._displaced, self._by_shading, generated)
 
     def _warn(self, what, instead=""):
         self._report.warn(f'material "{self._name}"', what, instead)
@@ -115,18 +121,35 @@ class _MaterialJob:
             return None
         info = {"index": self._writer.add_texture(uri, texture.wrap, texture.nearest)}
         source = texture.mapping.source
-        if source not in self._coordinates:
-            if len(self._coordinates) == _MOST_COORDINATES:
-                self._warn("more than two sets of texture coordinates", f"{self._coordinates[0]} was used for {source}")
-                source = self._coordinates[0]
-            else:
-                self._coordinates.append(source)
-        if self._coordinates.index(source) > 0:
-            info["texCoord"] = self._coordinates.index(source)
+        number = self._coordinate_set(source)
+        if number is None:
+            self._warn("more than two sets of texture coordinates", f"{self._coordinates[0]} was used for {source}")
+        elif number > 0:
+            info["texCoord"] = number
         transform = texture.mapping.transform()
         if transform is not None:
             self._writer.extend(info, "KHR_texture_transform", transform)
         return info
+
+    def _coordinate_set(self, source):
+        """Number of the set that coordinates are in; None: there is no room for another."""
+        if source not in self._coordinates:
+            if len(self._coordinates) == _MOST_COORDINATES:
+                return None
+            self._coordinates.append(source)
+        return self._coordinates.index(source)
+
+    def _graph_texture(self, node):
+        """(glTF's reference to an Image Texture node's image without its coordinates, whether it is sRGB); None without a file."""
+        is_data = node.image.colorspace_settings.is_data
+        if is_data:
+            uri = self._images.data_uri(node.image, node.image_user, self._warn)
+        else:
+            uri = self._images.color_uri(node.image, node.image_user, self._warn, node.outputs["Alpha"].is_linked)
+        if uri is None:
+            return None
+        texture = Texture(node, None, Mapping())
+        return {"index": self._writer.add_texture(uri, texture.wrap, texture.nearest)}, not is_data
 
     def _color_info(self, texture):
         node = texture.node
@@ -142,7 +165,7 @@ class _MaterialJob:
         return self._info(texture, uri)
 
     def _without_offset(self, value, what):
-        if value.offset:
+        if value.offset and value.graph is None:
             self._warn(f"a sum with the texture of its {what}", "the texture alone was used")
 
     def _write_surface(self, surface):
@@ -163,12 +186,35 @@ class _MaterialJob:
         self._write_layers(surface)
         if surface.emission.color_map is not None:
             self._warn("a colour attribute as emission", "it is left out: the emission has one colour")
-        if surface.emits():
+        self._write_graph(surface)
+        if surface.emits() and surface.emission.graph is None:
             set_emission(self.json, [max(0.0, c) for c in surface.emission.value], self._writer)
             if surface.emission.texture:
                 info = self._color_info(surface.emission.texture)
                 if info:
                     self.json["emissiveTexture"] = info
+
+    def _write_graph(self, surface):
+        """What a graph gives of a surface."""
+        given = {
+            "baseColor": surface.base_color,
+            "alpha": surface.alpha,
+            "metallic": surface.metallic,
+            "roughness": surface.roughness,
+            "transmission": surface.transmission,
+            "clearcoat": surface.coat,
+            "clearcoatRoughness": surface.coat_roughness,
+            "emission": surface.emission,
+        }
+        graph = self._graph
+        for name, source in given.items():
+            if source.graph is None:
+                continue
+            is_color = isinstance(source.value, tuple)
+            reference = graph.scaled(source.graph, source.value, is_color)
+            graph.outputs[name] = reference if is_color else graph.shifted(reference, source.offset)
+        if graph.outputs:
+            self._extend("RELIEF_graph", {"nodes": graph.nodes, "outputs": graph.outputs})
 
     def _base_color_info(self, texture):
         if texture.channel is None:
@@ -179,6 +225,9 @@ class _MaterialJob:
 
     def _write_alpha(self, surface, pbr):
         alpha = surface.alpha
+        if alpha.graph is not None:
+            self.json["alphaMode"] = "BLEND"
+            return
         if alpha.is_constant():
             if alpha.value < 1:
                 self.json["alphaMode"] = "BLEND"

@@ -27,12 +27,14 @@ class Wanted:
     color        name of a colour attribute that multiplies the base colour, "" for the active one; None: none
     displaced    normals say where surfaces go to, so they must not open flat-shaded edges
     by_shading   smooth and flat faces have materials of their own
+    generated    value graphs read the coordinates that Blender generates
     """
 
     coordinates: tuple = ()
     color: object = None
     displaced: bool = False
     by_shading: bool = False
+    generated: bool = False
 
 
 class _Corners:
@@ -102,14 +104,18 @@ class _Corners:
         else:
             uv = self.positions[self.vertex, :2]
             if kind == "generated":
-                # Blender's texture space is the box of the mesh before modifiers.
-                location = np.array(self.mesh.texspace_location[:2], dtype=np.float32)
-                size = np.array(self.mesh.texspace_size[:2], dtype=np.float32)
-                uv = (uv - location) / np.where(size == 0, 1, 2 * size) + np.float32(0.5)
+                uv = self.generated()[:, :2]
         out = np.empty_like(uv)
         out[:, 0] = uv[:, 0]
         out[:, 1] = 1 - uv[:, 1]
         return self._finite(out, "texture coordinates")
+
+    def generated(self):
+        """Generated coordinates: float32 (loops, 3)."""
+        # Blender's texture space is the box of the mesh before modifiers.
+        location = np.array(self.mesh.texspace_location, dtype=np.float32)
+        size = np.array(self.mesh.texspace_size, dtype=np.float32)
+        return (self.positions[self.vertex] - location) / np.where(size == 0, 1, 2 * size) + np.float32(0.5)
 
     def _finite(self, values, what):
         """Values with 0 where they are not finite."""
@@ -220,6 +226,8 @@ def _primitive_arrays(corners, triangles, wanted, warn):
             warn(f'no uv map "{source[1]}"' if source[1] else "a textured material, but no uv map")
             uv = np.zeros((len(corners.vertex), 2), dtype=np.float32)
         per_loop[f"TEXCOORD_{number}"] = uv
+    if wanted.generated:
+        per_loop["_GENERATED"] = corners.generated()
     if wanted.color is not None:
         color = corners.color(wanted.color)
         if color is None:

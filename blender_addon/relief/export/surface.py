@@ -90,8 +90,10 @@ def _normal(socket, groups, textures):
     if node.space != "TANGENT":
         textures.warn(f'node "{node.name}": space {node.space.lower()}', "the surface's own normal was used")
         return None
-    color = textures.color(node.inputs["Color"], source.groups)
-    if color.texture is None:
+    color = textures.image(node.inputs["Color"], source.groups, is_color=True)
+    if color is None:
+        textures.warn(f'node "{node.name}": a normal map that is no image', "the surface's own normal was used")
+    if color is None or color.texture is None:
         return None
     if node.uv_map:
         mapping = replace(color.texture.mapping, source=("uv", node.uv_map))
@@ -172,7 +174,7 @@ def _with_subsurface_color(surface, weight, socket, groups, textures):
         return base
     below = textures.color(socket, groups)
     mixed = tuple((1 - weight) * a + weight * b for a, b in zip(base.value, below.value))
-    if base.texture == below.texture and base.color_map == below.color_map:
+    if (base.texture, base.color_map, base.graph) == (below.texture, below.color_map, below.graph):
         return replace(base, value=mixed)
     heavier = below if weight >= 0.5 else base
     if weight < 1:
@@ -329,8 +331,9 @@ def _mix(source, textures):
     if _is_transparent(first):
         return replace(second, alpha=_times(factor, second.alpha, node, textures))
     if _is_transparent(second):
-        if factor.is_constant():
-            return replace(first, alpha=_times(Input(1.0 - factor.value), first.alpha, node, textures))
+        if factor.texture is None:
+            rest = replace(factor, value=-factor.value, offset=1.0 - factor.offset) if factor.graph else Input(1.0 - factor.value)
+            return replace(first, alpha=_times(rest, first.alpha, node, textures))
         textures.warn(f'node "{node.name}": a textured mix with transparency second', "swap its shaders; it is opaque")
         return first
     if not factor.is_constant():

@@ -1,0 +1,450 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's value nodes as RELIEF_graph, one to one: an input that varies in a way that no texture can say.
+
+One function a kind of node, listed at the end with the names of its outputs. The program does the mathematics
+(docs/graphs.md); what is said here is which socket is which, and what an unlinked one means.
+"""
+
+from .. import compat
+from . import nodes
+
+#: Entries of the tables that stand for ramps and curves: as many as Cycles'.
+_TABLE = 256
+
+
+class NotUnderstood(Exception):
+    """A node that graphs do not know; its text names it."""
+
+
+class GraphWriter:
+    """Collects the nodes of one material's graph.
+
+    @param  coordinate_set  gives the number, 0 or 1, of the set that a ("uv", name) is in; None: no room for it
+    @param  texture         gives glTF's reference to an Image Texture node's image, and whether it is stored as sRGB; None
+                            without a file
+    nodes          JSON of the nodes so far
+    outputs        JSON of what the graph gives
+    uses_generated whether meshes need _GENERATED
+    color_map      colour attribute that is read; None: none
+    """
+
+    def __init__(self, coordinate_set, texture):
+        self.coordinate_set = coordinate_set
+        self.texture = texture
+        self.nodes = []
+        self.outputs = {}
+        self.uses_generated = False
+        self.color_map = None
+        self._known = {}
+
+    def value(self, socket, groups=()):
+        """An input as graphs have it: numbers, or a reference.
+
+        @error  NotUnderstood
+        """
+        source = nodes.follow(socket, groups)
+        constant = nodes.fold(socket, groups)
+        if constant is not None:
+            finite = nodes.finite(constant, socket.name, lambda *_: None)
+            return list(finite[:3]) if isinstance(finite, tuple) else finite
+        return self.output(source)
+
+    def output(self, source):
+        """Reference to what a nodes.Source gives."""
+        node = source.node
+        if node.bl_idname == "ShaderNodeUVMap":
+            return self.uv(node.uv_map)
+        if node.bl_idname == "ShaderNodeTexCoord" and source.socket.identifier == "UV":
+            return self.uv("")
+        write, names = _NODES.get(node.bl_idname, (None, {}))
+        name = names.get(source.socket.identifier, names.get(source.socket.name))
+        if write is None or name is None:
+            raise NotUnderstood(f'node "{node.name}" ({node.bl_label}), {source.socket.name}')
+        key = (node.as_pointer(), tuple(group.as_pointer() for group in source.groups))
+        if key not in self._known:
+            self._known[key] = write(self, node, source.groups)
+        index = self._known[key]
+        return {"node": index, "output": name}
+
+    def add(self, kind, inputs=None, **options):
+        """Adds a node; equal ones become one.
+
+        @return  its index
+        """
+        json = {"type": kind, **{k: v for k, v in options.items() if v is not None}}
+        if inputs:
+            json["inputs"] = inputs
+        if json in self.nodes:
+            return self.nodes.index(json)
+        self.nodes.append(json)
+        return len(self.nodes) - 1
+
+    def inputs(self, node, groups, names):
+        """Inputs of a node by our names.
+
+        @param  names  our name by Blender's, or by the number of the socket
+        """
+        out = {}
+        for theirs, ours in names.items():
+            socket = node.inputs[theirs] if isinstance(theirs, int) else node.inputs.get(theirs)
+            if socket is not None:
+                out[ours] = self.value(socket, groups)
+        return out
+
+    def vector(self, node, groups, implicit):
+        """A texture's Vector, or what Blender takes where nothing is linked: generated or uv."""
+        socket = node.inputs["Vector"]
+        if nodes.follow(socket, groups) is not None:
+            return self.value(socket, groups)
+        if implicit == "generated":
+            self.uses_generated = True
+            return {"node": self.add("texture-coordinate"), "output": "generated"}
+        return self.uv("")
+
+    def uv(self, name):
+        number = self.coordinate_set(("uv", name))
+        if number is None:
+            raise NotUnderstood(f'a third uv map, "{name}"')
+        return {"node": self.add("texture-coordinate"), "output": "uv1" if number else "uv"}
+
+    def scaled(self, reference, factor, is_color):
+        """A value times a number, or times a colour."""
+        if is_color:
+            if tuple(factor) == (1.0, 1.0, 1.0):
+                return reference
+            inputs = {"factor": 1.0, "a": reference, "b": list(factor)}
+            return {"node": self.add("mix-color", inputs, blend="multiply"), "output": "color"}
+        if factor == 1.0:
+            return reference
+        return {"node": self.add("math", {"a": reference, "b": factor}, operation="multiply"), "output": "value"}
+
+    def shifted(self, reference, offset):
+        if offset == 0.0:
+            return reference
+        return {"node": self.add("math", {"a": reference, "b": offset}, operation="add"), "output": "value"}
+
+
+def _label(name):
+    """Blender's name of a choice as graphs spell it."""
+    return name.lower().replace("_", "-")
+
+
+def _choice(node, value, labels):
+    """A choice by Blender's name.
+
+    @error  NotUnderstood
+    """
+    if value not in labels:
+        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): {_label(value)}')
+    return labels[value]
+
+
+def _texture_coordinate(g, node, groups):
+    if node.from_instancer:
+        raise NotUnderstood(f'node "{node.name}": coordinates from an instancer')
+    if node.object is not None:
+        raise NotUnderstood(f'node "{node.name}": coordinates of another object')
+    g.uses_generated = True
+    return g.add("texture-coordinate")
+
+
+def _geometry(g, node, groups):
+    return g.add("geometry")
+
+
+def _color_attribute(g, node, groups):
+    name = node.layer_name if node.bl_idname == "ShaderNodeVertexColor" else node.attribute_name
+    if node.bl_idname == "ShaderNodeAttribute" and node.attribute_type != "GEOMETRY":
+        raise NotUnderstood(f'node "{node.name}": an attribute of the {node.attribute_type.lower()}')
+    if g.color_map not in {None, name}:
+        raise NotUnderstood(f'a second colour attribute, "{name}"')
+    g.color_map = name
+    return g.add("vertex-color")
+
+
+def _fresnel(g, node, groups):
+    _without_normal(node, groups)
+    return g.add("fresnel", g.inputs(node, groups, {"IOR": "ior"}))
+
+
+def _layer_weight(g, node, groups):
+    _without_normal(node, groups)
+    return g.add("layer-weight", g.inputs(node, groups, {"Blend": "blend"}))
+
+
+def _without_normal(node, groups):
+    if nodes.follow(node.inputs["Normal"], groups) is not None:
+        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): a normal of its own')
+
+
+_DIMENSIONS = {"1D": 1, "2D": 2, "3D": 3, "4D": 4}
+
+
+def _point(g, node, groups):
+    """Inputs and options of a texture over 1 to 4 dimensions."""
+    dimensions = _DIMENSIONS[node.noise_dimensions]
+    inputs = {"vector": g.vector(node, groups, "generated")} if dimensions > 1 else {}
+    if dimensions in {1, 4}:
+        inputs["w"] = g.value(node.inputs["W"], groups)
+    return inputs, dimensions
+
+
+def _noise(g, node, groups):
+    if getattr(node, "noise_type", "FBM") != "FBM":
+        raise NotUnderstood(f'node "{node.name}": type {_label(node.noise_type)}')
+    inputs, dimensions = _point(g, node, groups)
+    names = {"Scale": "scale", "Detail": "detail", "Roughness": "roughness", "Lacunarity": "lacunarity"}
+    inputs.update(g.inputs(node, groups, {**names, "Distortion": "distortion"}))
+    if compat.CLAMPS_NOISE_ROUGHNESS:
+        inputs["roughness"] = _clamped(g, inputs["roughness"])
+    return g.add("noise-texture", inputs, dimensions=dimensions, normalize=getattr(node, "normalize", True))
+
+
+def _clamped(g, value):
+    if isinstance(value, dict):
+        return {"node": g.add("clamp", {"value": value}), "output": "value"}
+    return min(max(value, 0.0), 1.0)
+
+
+def _white_noise(g, node, groups):
+    dimensions = _DIMENSIONS[node.noise_dimensions]
+    inputs = {"vector": g.value(node.inputs["Vector"], groups)} if dimensions > 1 else {}
+    if dimensions in {1, 4}:
+        inputs["w"] = g.value(node.inputs["W"], groups)
+    return g.add("white-noise-texture", inputs, dimensions=dimensions)
+
+
+def _image(g, node, groups):
+    if node.projection != "FLAT" or node.extension == "CLIP" or node.interpolation in {"Cubic", "Smart"}:
+        raise NotUnderstood(f'node "{node.name}": a projection, extension or interpolation of its own')
+    if node.image is None:
+        magenta = {"red": 1.0, "green": 0.0, "blue": 1.0}
+        return g.add("combine-color", magenta)
+    found = g.texture(node)
+    if found is None:
+        raise NotUnderstood(f'node "{node.name}": an image without file')
+    info, is_srgb = found
+    vector = g.vector(node, groups, "uv")
+    space = "srgb" if is_srgb else "linear"
+    return g.add("image-texture", {"vector": vector}, texture=info, colorSpace=space)
+
+
+def _gradient(g, node, groups):
+    kinds = {
+        "LINEAR": "linear",
+        "QUADRATIC": "quadratic",
+        "EASING": "easing",
+        "DIAGONAL": "diagonal",
+        "RADIAL": "radial",
+        "QUADRATIC_SPHERE": "quadratic-sphere",
+        "SPHERICAL": "spherical",
+    }
+    kind = _choice(node, node.gradient_type, kinds)
+    return g.add("gradient-texture", {"vector": g.vector(node, groups, "generated")}, gradient=kind)
+
+
+def _checker(g, node, groups):
+    inputs = {"vector": g.vector(node, groups, "generated")}
+    inputs.update(g.inputs(node, groups, {"Color1": "color1", "Color2": "color2", "Scale": "scale"}))
+    return g.add("checker-texture", inputs)
+
+
+def _magic(g, node, groups):
+    inputs = {"vector": g.vector(node, groups, "generated")}
+    inputs.update(g.inputs(node, groups, {"Scale": "scale", "Distortion": "distortion"}))
+    return g.add("magic-texture", inputs, depth=node.turbulence_depth)
+
+
+def _wave(g, node, groups):
+    inputs = {"vector": g.vector(node, groups, "generated")}
+    names = {"Scale": "scale", "Distortion": "distortion", "Detail": "detail", "Detail Scale": "detailScale"}
+    names.update({"Detail Roughness": "detailRoughness", "Phase Offset": "phaseOffset"})
+    inputs.update(g.inputs(node, groups, names))
+    if compat.CLAMPS_NOISE_ROUGHNESS:
+        inputs["detailRoughness"] = _clamped(g, inputs["detailRoughness"])
+    are_rings = node.wave_type == "RINGS"
+    direction = node.rings_direction if are_rings else node.bands_direction
+    return g.add(
+        "wave-texture",
+        inputs,
+        wave="rings" if are_rings else "bands",
+        direction=_label(direction),
+        profile=_choice(node, node.wave_profile, {"SIN": "sine", "SAW": "saw", "TRI": "triangle"}),
+    )
+
+
+def _ramp(g, node, groups):
+    table = [c for i in range(_TABLE) for c in node.color_ramp.evaluate(i / (_TABLE - 1))]
+    interpolated = node.color_ramp.interpolation != "CONSTANT"
+    inputs = g.inputs(node, groups, {0: "factor"})
+    return g.add("color-ramp", inputs, table=table, interpolate=interpolated)
+
+
+_BLENDS = (
+    "MIX DARKEN MULTIPLY BURN LIGHTEN SCREEN DODGE ADD OVERLAY SOFT_LIGHT LINEAR_LIGHT DIFFERENCE EXCLUSION SUBTRACT DIVIDE"
+    " HUE SATURATION COLOR VALUE"
+).split()
+
+
+def _mix_rgb(g, node, groups):
+    """The node of before 3.4."""
+    inputs = g.inputs(node, groups, {0: "factor", 1: "a", 2: "b"})
+    blend = _choice(node, node.blend_type, {name: _label(name) for name in _BLENDS})
+    return g.add("mix-color", inputs, blend=blend, clampResult=node.use_clamp)
+
+
+def _mix(g, node, groups):
+    shown = {socket.name: socket for socket in node.inputs if socket.enabled}
+    inputs = {ours: g.value(shown[theirs], groups) for theirs, ours in (("Factor", "factor"), ("A", "a"), ("B", "b"))}
+    if node.data_type == "RGBA":
+        blend = _choice(node, node.blend_type, {name: _label(name) for name in _BLENDS})
+        return g.add("mix-color", inputs, blend=blend, clampFactor=node.clamp_factor, clampResult=node.clamp_result)
+    kind = {"FLOAT": "mix-number", "VECTOR": "mix-vector"}
+    return g.add(_choice(node, node.data_type, kind), inputs, clampFactor=node.clamp_factor)
+
+
+def _simple(kind, names, **options):
+    """Writer of a node that is the same here, but for the names of its inputs.
+
+    @param  options  attributes of Blender's node by the names of ours
+    """
+
+    def write(g, node, groups):
+        values = {ours: _label(getattr(node, theirs)) for ours, theirs in options.items()}
+        return g.add(kind, g.inputs(node, groups, names), **values)
+
+    return write
+
+
+def _clamp(g, node, groups):
+    inputs = g.inputs(node, groups, {"Value": "value", "Min": "min", "Max": "max"})
+    return g.add("clamp", inputs, clamp="range" if node.clamp_type == "RANGE" else "min-max")
+
+
+def _map_range(g, node, groups):
+    is_vector = getattr(node, "data_type", "FLOAT") == "FLOAT_VECTOR"
+    shown = {socket.name: socket for socket in node.inputs if socket.enabled}
+    names = {"From Min": "fromMin", "From Max": "fromMax", "To Min": "toMin", "To Max": "toMax", "Steps": "steps"}
+    names["Vector" if is_vector else "Value"] = "vector" if is_vector else "value"
+    inputs = {ours: g.value(shown[theirs], groups) for theirs, ours in names.items() if theirs in shown}
+    return g.add(
+        "map-range-vector" if is_vector else "map-range",
+        inputs,
+        interpolation=_label(node.interpolation_type),
+        clamp=node.clamp,
+    )
+
+
+#: Blender's names of operations, where ours are not the same in small letters.
+_OPERATIONS = {
+    "LOGARITHM": "logarithm",
+    "SQRT": "square-root",
+    "INVERSE_SQRT": "inverse-square-root",
+    "SMOOTH_MIN": "smooth-minimum",
+    "SMOOTH_MAX": "smooth-maximum",
+    "TRUNC": "truncate",
+    "FRACT": "fraction",
+    "PINGPONG": "ping-pong",
+    "ARCTAN2": "arctangent2",
+    "CROSS_PRODUCT": "cross",
+    "DOT_PRODUCT": "dot",
+}
+
+
+def _math(g, node, groups):
+    operation = _OPERATIONS.get(node.operation, _label(node.operation))
+    inputs = {name: g.value(socket, groups) for name, socket in zip("abc", node.inputs) if socket.enabled}
+    return g.add("math", inputs, operation=operation, clamp=node.use_clamp or None)
+
+
+def _vector_math(g, node, groups):
+    operation = _OPERATIONS.get(node.operation, _label(node.operation))
+    if operation == "power":
+        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): power')
+    inputs = {name: g.value(socket, groups) for name, socket in zip("abc", node.inputs) if socket.enabled}
+    if node.operation in {"SCALE", "REFRACT"}:
+        inputs["scale"] = g.value(node.inputs["Scale"], groups)
+    return g.add("vector-math", inputs, operation=operation)
+
+
+def _separate_rgb(g, node, groups):
+    return g.add("separate-color", g.inputs(node, groups, {0: "color"}), space=_label(getattr(node, "mode", "RGB")))
+
+
+def _combine_rgb(g, node, groups):
+    inputs = g.inputs(node, groups, {0: "red", 1: "green", 2: "blue"})
+    return g.add("combine-color", inputs, space=_label(getattr(node, "mode", "RGB")))
+
+
+def _hue(g, node, groups):
+    names = {"Hue": "hue", "Saturation": "saturation", "Value": "value", "Fac": "factor", "Color": "color"}
+    if "Factor" in node.inputs:
+        names["Factor"] = "factor"
+    return g.add("hue-saturation", g.inputs(node, groups, names))
+
+
+_FACTOR = {"Fac": "factor", "Factor": "factor", "Color": "color"}
+_XYZ = {"X": "x", "Y": "y", "Z": "z"}
+_RGB = {
+    **{"R": "red", "G": "green", "B": "blue"},
+    **{"Red": "red", "Green": "green", "Blue": "blue"},
+    **{"Hue": "red", "Saturation": "green", "Value": "blue", "Lightness": "blue"},
+}
+
+#: What writes a node, and our name of each of its outputs by Blender's.
+_NODES = {
+    "ShaderNodeTexCoord": (_texture_coordinate, {"Generated": "generated", "Object": "object"}),
+    "ShaderNodeNewGeometry": (
+        _geometry,
+        {
+            "Position": "position",
+            "Normal": "normal",
+            "True Normal": "trueNormal",
+            "Incoming": "incoming",
+            "Backfacing": "backfacing",
+        },
+    ),
+    "ShaderNodeVertexColor": (_color_attribute, {"Color": "color", "Alpha": "alpha"}),
+    "ShaderNodeAttribute": (_color_attribute, {"Color": "color", "Alpha": "alpha"}),
+    "ShaderNodeFresnel": (_fresnel, _FACTOR),
+    "ShaderNodeLayerWeight": (_layer_weight, {"Fresnel": "fresnel", "Facing": "facing"}),
+    "ShaderNodeTexNoise": (_noise, _FACTOR),
+    "ShaderNodeTexWhiteNoise": (_white_noise, {"Value": "value", "Color": "color"}),
+    "ShaderNodeTexImage": (_image, {"Color": "color", "Alpha": "alpha"}),
+    "ShaderNodeTexGradient": (_gradient, _FACTOR),
+    "ShaderNodeTexChecker": (_checker, _FACTOR),
+    "ShaderNodeTexMagic": (_magic, _FACTOR),
+    "ShaderNodeTexWave": (_wave, _FACTOR),
+    "ShaderNodeValToRGB": (_ramp, {"Color": "color", "Alpha": "alpha"}),
+    "ShaderNodeMixRGB": (_mix_rgb, {"Color": "color"}),
+    "ShaderNodeInvert": (_simple("invert", {0: "factor", "Color": "color"}), {"Color": "color"}),
+    "ShaderNodeGamma": (_simple("gamma", {"Color": "color", "Gamma": "gamma"}), {"Color": "color"}),
+    "ShaderNodeBrightContrast": (
+        _simple("bright-contrast", {"Color": "color", 1: "bright", "Contrast": "contrast"}),
+        {"Color": "color"},
+    ),
+    "ShaderNodeHueSaturation": (_hue, {"Color": "color"}),
+    "ShaderNodeSeparateColor": (_separate_rgb, _RGB),
+    "ShaderNodeSeparateRGB": (_separate_rgb, _RGB),
+    "ShaderNodeCombineColor": (_combine_rgb, {"Color": "color"}),
+    "ShaderNodeCombineRGB": (_combine_rgb, {"Image": "color"}),
+    "ShaderNodeRGBToBW": (_simple("rgb-to-bw", {"Color": "color"}), {"Val": "value"}),
+    "ShaderNodeSeparateXYZ": (_simple("separate", {"Vector": "vector"}), _XYZ),
+    "ShaderNodeCombineXYZ": (_simple("combine", {"X": "x", "Y": "y", "Z": "z"}), {"Vector": "vector"}),
+    "ShaderNodeClamp": (_clamp, {"Result": "value"}),
+    "ShaderNodeMapRange": (_map_range, {"Result": "value", "Vector": "vector"}),
+    "ShaderNodeMapping": (
+        _simple(
+            "mapping",
+            {"Vector": "vector", "Location": "location", "Rotation": "rotation", "Scale": "scale"},
+            mapping="vector_type",
+        ),
+        {"Vector": "vector"},
+    ),
+    "ShaderNodeMath": (_math, {"Value": "value"}),
+    "ShaderNodeVectorMath": (_vector_math, {"Vector": "vector", "Value": "value"}),
+    "ShaderNodeMix": (
+        _mix,
+        {"Result_Color": "color", "Result_Vector": "vector", "Result_Float": "value"},
+    ),
+}

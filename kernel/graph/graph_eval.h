@@ -1,0 +1,321 @@
+// Runs a compiled value graph over eight points at a time. One function an opcode of graph_ops.inc, then graph_run, which
+// decodes each instruction once for all lanes.
+//
+// Numbers are Blender's: a division by zero gives 0, roots and logarithms of what has none give 0.
+#pragma once
+
+#include <cmath>
+
+#include "kernel/bsdf/fresnel.h"
+#include "kernel/graph/color_spaces.h"
+#include "kernel/graph/graph_program.h"
+#include "kernel/graph/noise.h"
+#include "kernel/texture/texture.h"
+
+namespace relief {
+
+/// Registers of one run; its inputs are written before, its outputs read after.
+struct GraphRegisters {
+  F8 lanes[kMostGraphRegisters];
+};
+
+/// One instruction's operands.
+struct GraphOperands {
+  const GraphProgramView& program;
+  const TextureView* textures;
+  GraphRegisters& registers;
+  const std::uint16_t* immediates;
+  const std::uint16_t* outputs;
+  const std::uint16_t* inputs;
+};
+
+RELIEF_KERNEL F8 graph_operand(const GraphProgramView& program, const GraphRegisters& registers, std::uint16_t operand)
+{
+  return operand < kMostGraphRegisters ? registers.lanes[operand]
+                                       : splat8(program.constants[operand - kMostGraphRegisters]);
+}
+
+RELIEF_KERNEL F8 graph_in(const GraphOperands& o, int i) { return graph_operand(o.program, o.registers, o.inputs[i]); }
+RELIEF_KERNEL void graph_set(const GraphOperands& o, int i, F8 value) { o.registers.lanes[o.outputs[i]] = value; }
+
+template <typename F>
+RELIEF_KERNEL F8 each_lane(F8 a, F&& f)
+{
+  for (int k = 0; k < 8; ++k) a[k] = f(a[k]);
+  return a;
+}
+
+template <typename F>
+RELIEF_KERNEL F8 each_lane(F8 a, F8 b, F&& f)
+{
+  for (int k = 0; k < 8; ++k) a[k] = f(a[k], b[k]);
+  return a;
+}
+
+RELIEF_KERNEL F8 one_where(I8 is) { return is ? splat8(1.0f) : F8{}; }
+
+/// Power of a number that may be negative where the exponent is whole.
+RELIEF_KERNEL float graph_power(float a, float b)
+{
+  if (a < 0.0f && b != std::trunc(b)) return 0.0f;
+  if (b == 0.0f) return 1.0f;
+  return a == 0.0f ? 0.0f : std::pow(a, b);
+}
+
+RELIEF_KERNEL float graph_logarithm(float a, float base)
+{
+  if (!(a > 0.0f && base > 0.0f)) return 0.0f;
+  const float scale = std::log(base);
+  return scale != 0.0f ? std::log(a) / scale : 0.0f;
+}
+
+RELIEF_KERNEL void graph_copy(const GraphOperands& o) { graph_set(o, 0, graph_in(o, 0)); }
+RELIEF_KERNEL void graph_add(const GraphOperands& o) { graph_set(o, 0, graph_in(o, 0) + graph_in(o, 1)); }
+RELIEF_KERNEL void graph_subtract(const GraphOperands& o) { graph_set(o, 0, graph_in(o, 0) - graph_in(o, 1)); }
+RELIEF_KERNEL void graph_multiply(const GraphOperands& o) { graph_set(o, 0, graph_in(o, 0) * graph_in(o, 1)); }
+RELIEF_KERNEL void graph_divide(const GraphOperands& o)
+{
+  const F8 b = graph_in(o, 1);
+  graph_set(o, 0, b != 0.0f ? graph_in(o, 0) / b : F8{});
+}
+RELIEF_KERNEL void graph_multiply_add(const GraphOperands& o)
+{
+  graph_set(o, 0, graph_in(o, 0) * graph_in(o, 1) + graph_in(o, 2));
+}
+RELIEF_KERNEL void graph_minimum(const GraphOperands& o) { graph_set(o, 0, min(graph_in(o, 0), graph_in(o, 1))); }
+RELIEF_KERNEL void graph_maximum(const GraphOperands& o) { graph_set(o, 0, max(graph_in(o, 0), graph_in(o, 1))); }
+RELIEF_KERNEL void graph_less_than(const GraphOperands& o)
+{
+  graph_set(o, 0, one_where(graph_in(o, 0) < graph_in(o, 1)));
+}
+RELIEF_KERNEL void graph_greater_than(const GraphOperands& o)
+{
+  graph_set(o, 0, one_where(graph_in(o, 0) > graph_in(o, 1)));
+}
+RELIEF_KERNEL void graph_equal(const GraphOperands& o) { graph_set(o, 0, one_where(graph_in(o, 0) == graph_in(o, 1))); }
+/// The second where the first is not 0, else the third.
+RELIEF_KERNEL void graph_select(const GraphOperands& o)
+{
+  graph_set(o, 0, graph_in(o, 0) != 0.0f ? graph_in(o, 1) : graph_in(o, 2));
+}
+RELIEF_KERNEL void graph_floor(const GraphOperands& o) { graph_set(o, 0, floor(graph_in(o, 0))); }
+RELIEF_KERNEL void graph_ceil(const GraphOperands& o) { graph_set(o, 0, -floor(-graph_in(o, 0))); }
+RELIEF_KERNEL void graph_absolute(const GraphOperands& o) { graph_set(o, 0, abs(graph_in(o, 0))); }
+RELIEF_KERNEL void graph_sign(const GraphOperands& o)
+{
+  const F8 a = graph_in(o, 0);
+  graph_set(o, 0, one_where(a > 0.0f) - one_where(a < 0.0f));
+}
+RELIEF_KERNEL void graph_square_root(const GraphOperands& o) { graph_set(o, 0, sqrt(max(graph_in(o, 0), F8{}))); }
+RELIEF_KERNEL void graph_power(const GraphOperands& o)
+{
+  graph_set(o, 0, each_lane(graph_in(o, 0), graph_in(o, 1), [](float a, float b) { return graph_power(a, b); }));
+}
+RELIEF_KERNEL void graph_logarithm(const GraphOperands& o)
+{
+  graph_set(o, 0, each_lane(graph_in(o, 0), graph_in(o, 1), [](float a, float b) { return graph_logarithm(a, b); }));
+}
+RELIEF_KERNEL void graph_exponent(const GraphOperands& o)
+{
+  graph_set(o, 0, each_lane(graph_in(o, 0), [](float a) { return std::exp(a); }));
+}
+RELIEF_KERNEL void graph_modulo(const GraphOperands& o)
+{
+  graph_set(o, 0, each_lane(graph_in(o, 0), graph_in(o, 1), [](float a, float b) {
+              return b != 0.0f ? std::fmod(a, b) : 0.0f;
+            }));
+}
+RELIEF_KERNEL void graph_sine(const GraphOperands& o)
+{
+  graph_set(o, 0, each_lane(graph_in(o, 0), [](float a) { return std::sin(a); }));
+}
+RELIEF_KERNEL void graph_cosine(const GraphOperands& o)
+{
+  graph_set(o, 0, each_lane(graph_in(o, 0), [](float a) { return std::cos(a); }));
+}
+RELIEF_KERNEL void graph_tangent(const GraphOperands& o)
+{
+  graph_set(o, 0, each_lane(graph_in(o, 0), [](float a) { return std::tan(a); }));
+}
+RELIEF_KERNEL void graph_arcsine(const GraphOperands& o)
+{
+  graph_set(o, 0, each_lane(graph_in(o, 0), [](float a) { return std::asin(clamp(a, -1.0f, 1.0f)); }));
+}
+RELIEF_KERNEL void graph_arccosine(const GraphOperands& o)
+{
+  graph_set(o, 0, each_lane(graph_in(o, 0), [](float a) { return std::acos(clamp(a, -1.0f, 1.0f)); }));
+}
+RELIEF_KERNEL void graph_arctangent(const GraphOperands& o)
+{
+  graph_set(o, 0, each_lane(graph_in(o, 0), [](float a) { return std::atan(a); }));
+}
+RELIEF_KERNEL void graph_arctangent2(const GraphOperands& o)
+{
+  graph_set(o, 0, each_lane(graph_in(o, 0), graph_in(o, 1), [](float a, float b) { return std::atan2(a, b); }));
+}
+RELIEF_KERNEL void graph_sinh(const GraphOperands& o)
+{
+  graph_set(o, 0, each_lane(graph_in(o, 0), [](float a) { return std::sinh(a); }));
+}
+RELIEF_KERNEL void graph_cosh(const GraphOperands& o)
+{
+  graph_set(o, 0, each_lane(graph_in(o, 0), [](float a) { return std::cosh(a); }));
+}
+RELIEF_KERNEL void graph_tanh(const GraphOperands& o)
+{
+  graph_set(o, 0, each_lane(graph_in(o, 0), [](float a) { return std::tanh(a); }));
+}
+
+/// Applies a function from Vec3f to Vec3f.
+template <typename F>
+RELIEF_KERNEL void graph_each_color(const GraphOperands& o, F&& f)
+{
+  alignas(32) float c[3][8];
+  for (int i = 0; i < 3; ++i) store8(c[i], graph_in(o, i));
+  for (int k = 0; k < 8; ++k) {
+    const Vec3f out = f(Vec3f{c[0][k], c[1][k], c[2][k]});
+    c[0][k] = out.x;
+    c[1][k] = out.y;
+    c[2][k] = out.z;
+  }
+  for (int i = 0; i < 3; ++i) graph_set(o, i, load8(c[i]));
+}
+RELIEF_KERNEL void graph_rgb_to_hsv(const GraphOperands& o) { graph_each_color(o, rgb_to_hsv); }
+RELIEF_KERNEL void graph_hsv_to_rgb(const GraphOperands& o) { graph_each_color(o, hsv_to_rgb); }
+RELIEF_KERNEL void graph_rgb_to_hsl(const GraphOperands& o) { graph_each_color(o, rgb_to_hsl); }
+RELIEF_KERNEL void graph_hsl_to_rgb(const GraphOperands& o) { graph_each_color(o, hsl_to_rgb); }
+
+/// Octaves of noise at a point of kDims coordinates; then detail, roughness, lacunarity. Immediate: whether normalized.
+template <int kDims>
+RELIEF_KERNEL void graph_noise(const GraphOperands& o)
+{
+  F8 p[kDims];
+  for (int i = 0; i < kDims; ++i) p[i] = graph_in(o, i);
+  const NoiseOctaves octaves{clamp(graph_in(o, kDims), 0.0f, 15.0f), max(graph_in(o, kDims + 1), F8{}),
+                             graph_in(o, kDims + 2)};
+  graph_set(o, 0, noise_fractal<kDims>(p, octaves, o.immediates[0] != 0));
+}
+RELIEF_KERNEL void graph_noise_1d(const GraphOperands& o) { graph_noise<1>(o); }
+RELIEF_KERNEL void graph_noise_2d(const GraphOperands& o) { graph_noise<2>(o); }
+RELIEF_KERNEL void graph_noise_3d(const GraphOperands& o) { graph_noise<3>(o); }
+RELIEF_KERNEL void graph_noise_4d(const GraphOperands& o) { graph_noise<4>(o); }
+
+template <int kDims>
+RELIEF_KERNEL void graph_signed_noise(const GraphOperands& o)
+{
+  F8 p[kDims];
+  for (int i = 0; i < kDims; ++i) p[i] = graph_in(o, i);
+  graph_set(o, 0, noise_signed<kDims>(p));
+}
+RELIEF_KERNEL void graph_signed_noise_1d(const GraphOperands& o) { graph_signed_noise<1>(o); }
+RELIEF_KERNEL void graph_signed_noise_2d(const GraphOperands& o) { graph_signed_noise<2>(o); }
+RELIEF_KERNEL void graph_signed_noise_3d(const GraphOperands& o) { graph_signed_noise<3>(o); }
+RELIEF_KERNEL void graph_signed_noise_4d(const GraphOperands& o) { graph_signed_noise<4>(o); }
+
+template <int kDims>
+RELIEF_KERNEL void graph_hash(const GraphOperands& o)
+{
+  F8 key[kDims];
+  for (int i = 0; i < kDims; ++i) key[i] = graph_in(o, i);
+  graph_set(o, 0, hash_unit(key));
+}
+RELIEF_KERNEL void graph_hash_1d(const GraphOperands& o) { graph_hash<1>(o); }
+RELIEF_KERNEL void graph_hash_2d(const GraphOperands& o) { graph_hash<2>(o); }
+RELIEF_KERNEL void graph_hash_3d(const GraphOperands& o) { graph_hash<3>(o); }
+RELIEF_KERNEL void graph_hash_4d(const GraphOperands& o) { graph_hash<4>(o); }
+
+/// Image at u, v (v up) with a footprint's width; linear RGBA. Immediate: texture.
+RELIEF_KERNEL void graph_image(const GraphOperands& o)
+{
+  const TextureView& texture = o.textures[o.immediates[0]];
+  const F8 u = graph_in(o, 0), v = graph_in(o, 1), width = graph_in(o, 2);
+  F8 rgba[4];
+  for (int k = 0; k < 8; ++k) {
+    const Vec4f texel = texture_sample(texture, {u[k], 1.0f - v[k]}, width[k]);
+    rgba[0][k] = texel.x;
+    rgba[1][k] = texel.y;
+    rgba[2][k] = texel.z;
+    rgba[3][k] = texel.w;
+  }
+  for (int c = 0; c < 4; ++c) graph_set(o, c, rgba[c]);
+}
+
+/// Value of a table over 0…1. Immediates: its first float by low and high word, its entries, whether between two of them it
+/// is interpolated.
+RELIEF_KERNEL void graph_table(const GraphOperands& o)
+{
+  const float* table = o.program.tables + (o.immediates[0] | std::uint32_t{o.immediates[1]} << 16);
+  const int last = o.immediates[2] - 1;
+  const bool interpolated = o.immediates[3] != 0;
+  // A comparison that NaN fails comes first.
+  const F8 x = min(max(graph_in(o, 0), F8{}), splat8(1.0f)) * static_cast<float>(last);
+  graph_set(o, 0, each_lane(x, [=](float at) {
+              const int i = at < static_cast<float>(last) ? static_cast<int>(at) : last;
+              const float t = at - static_cast<float>(i);
+              return interpolated && t > 0.0f ? (1.0f - t) * table[i] + t * table[i + 1] : table[i];
+            }));
+}
+
+/// 1 in every other cell of a lattice of unit cubes, but not in the one at the origin.
+RELIEF_KERNEL void graph_checker(const GraphOperands& o)
+{
+  F8 sum{};
+  for (int i = 0; i < 3; ++i) {
+    // Keeps what lies on the border of two cells from flickering between them.
+    const F8 p = (graph_in(o, i) + 1e-6f) * 0.999999f;
+    sum += abs(floor(p));
+  }
+  graph_set(o, 0, sum - 2.0f * floor(0.5f * sum));
+}
+
+/// Reflectance of a dielectric for a cosine and an index of refraction.
+RELIEF_KERNEL void graph_fresnel(const GraphOperands& o)
+{
+  graph_set(o, 0, each_lane(graph_in(o, 0), graph_in(o, 1), [](float cos_i, float eta) {
+              const float c = min(1.0f, __builtin_fabsf(cos_i));
+              return fresnel_dielectric(c, refracted_cosine(c, eta), eta);
+            }));
+}
+
+/// Runs a program.
+/// @param textures   those of the scene
+/// @param registers  the program's inputs are filled; lanes that mean nothing may hold anything
+/// @cost             not inlined: shading stages would get a copy each
+[[gnu::noinline]] RELIEF_KERNEL void graph_run(const GraphProgramView& program,
+                                               const TextureView* textures,
+                                               GraphRegisters& registers)
+{
+  const std::uint16_t* word = program.code;
+  const std::uint16_t* const end = word + program.num_words;
+  while (word < end) {
+    const auto op = static_cast<GraphOp>(*word++);
+    const GraphOpShape& shape = kGraphOpShapes[static_cast<int>(op)];
+    const std::uint16_t* outputs = word + shape.num_immediates;
+    const GraphOperands o{program, textures, registers, word, outputs, outputs + shape.num_outputs};
+    switch (op) {
+#define X(name, num_outputs, num_inputs, num_immediates) \
+  case GraphOp::name:                                    \
+    graph_##name(o);                                     \
+    break;
+#include "kernel/graph/graph_ops.inc"
+#undef X
+    }
+    word = o.inputs + shape.num_inputs;
+  }
+}
+
+/// What a program that has run gives at one lane's point.
+RELIEF_KERNEL GraphValues graph_values(const GraphProgramView& program, const GraphRegisters& registers, int lane)
+{
+  GraphValues values;
+  for (int i = 0; i < kNumGraphOutputs; ++i) {
+    const std::uint16_t* operands = program.outputs[i];
+    if (operands[0] == kNoGraphOperand) continue;
+    const auto number = [&](int c) { return graph_operand(program, registers, operands[c])[lane]; };
+    values.of[i] = {number(0), number(1), number(2)};
+    values.given |= 1u << i;
+  }
+  return values;
+}
+
+}  // namespace relief

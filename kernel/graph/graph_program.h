@@ -1,0 +1,71 @@
+// A compiled value graph as the kernel sees it: a list of instructions over eight points at a time.
+//
+// An instruction is a run of 16-bit words: its opcode, its immediates, its output registers, its inputs. An input below
+// kMostGraphRegisters is a register, one above a constant of the program. scene/graph/ makes programs; graph_eval.h runs
+// them.
+#pragma once
+
+#include <cstdint>
+
+#include "kernel/math/vec.h"
+
+namespace relief {
+
+enum class GraphOp : std::uint16_t {
+#define X(name, outputs, inputs, immediates) name,
+#include "kernel/graph/graph_ops.inc"
+#undef X
+};
+
+struct GraphOpShape {
+  const char* name;
+  int num_outputs, num_inputs, num_immediates;
+};
+inline constexpr GraphOpShape kGraphOpShapes[] = {
+#define X(name, outputs, inputs, immediates) {#name, outputs, inputs, immediates},
+#include "kernel/graph/graph_ops.inc"
+#undef X
+};
+
+enum class GraphQuantity : std::uint16_t {
+#define X(name) name,
+#include "kernel/graph/graph_quantities.inc"
+#undef X
+  kCount
+};
+
+enum class GraphOutput : std::uint8_t {
+#define X(name, json, components) name,
+#include "kernel/graph/graph_outputs.inc"
+#undef X
+  kCount
+};
+inline constexpr int kNumGraphOutputs = static_cast<int>(GraphOutput::kCount);
+
+inline constexpr std::uint16_t kMostGraphRegisters = 512;
+inline constexpr std::uint16_t kNoGraphOperand = 0xffff;
+
+/// Register that is filled before a program runs.
+struct GraphInput {
+  GraphQuantity quantity;
+  std::uint16_t register_index;
+};
+
+struct GraphProgramView {
+  const std::uint16_t* code = nullptr;
+  std::uint32_t num_words = 0;
+  const float* constants = nullptr;
+  const float* tables = nullptr;  ///< of `table` instructions: rows of floats, one after the other
+  const GraphInput* inputs = nullptr;
+  std::uint32_t num_inputs = 0;
+  /// Operands of each output's components; kNoGraphOperand: the graph does not give it.
+  std::uint16_t outputs[kNumGraphOutputs][3] = {};
+};
+
+/// What a graph gives at one point.
+struct GraphValues {
+  Vec3f of[kNumGraphOutputs];  ///< numbers are in x
+  std::uint32_t given = 0;     ///< bit GraphOutput
+};
+
+}  // namespace relief

@@ -1,0 +1,353 @@
+#include "scene/graph/graph_builder.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <string>
+
+#include "kernel/graph/graph_eval.h"
+
+namespace relief {
+namespace {
+
+const GraphOpShape& shape_of(GraphOp op) { return kGraphOpShapes[static_cast<int>(op)]; }
+
+/// Whether an operation gives the same whatever the scene.
+bool can_fold(GraphOp op) { return op != GraphOp::image; }
+
+}  // namespace
+
+GraphProgramView GraphProgram::view() const
+{
+  GraphProgramView v;
+  v.code = code.data();
+  v.num_words = static_cast<std::uint32_t>(code.size());
+  v.constants = constants.data();
+  v.tables = tables.data();
+  v.inputs = inputs.data();
+  v.num_inputs = static_cast<std::uint32_t>(inputs.size());
+  std::copy(&outputs[0][0], &outputs[0][0] + std::size(outputs) * 3, &v.outputs[0][0]);
+  return v;
+}
+
+std::size_t GraphProgram::bytes() const
+{
+  return code.size() * sizeof(std::uint16_t) + (constants.size() + tables.size()) * sizeof(float) +
+         inputs.size() * sizeof(GraphInput) + sizeof(GraphProgram);
+}
+
+GraphScalar GraphBuilder::add(const Node& node, const Key& key)
+{
+  const auto [it, is_new] = known_.try_emplace(key, static_cast<std::int32_t>(nodes_.size()));
+  if (is_new) nodes_.push_back(node);
+  return {it->second};
+}
+
+GraphScalar GraphBuilder::constant(float value)
+{
+  Node node{Node::Kind::kConstant};
+  node.value = value;
+  return add(node, {-1, std::bit_cast<std::int32_t>(value)});
+}
+
+GraphScalar GraphBuilder::quantity(GraphQuantity quantity)
+{
+  Node node{Node::Kind::kQuantity};
+  node.quantity = quantity;
+  return add(node, {-2, static_cast<std::int64_t>(quantity)});
+}
+
+bool GraphBuilder::is_constant(GraphScalar a, float* value) const
+{
+  const Node& node = nodes_[static_cast<std::size_t>(a.index)];
+  if (node.kind != Node::Kind::kConstant) return false;
+  if (value != nullptr) *value = node.value;
+  return true;
+}
+
+/// What needs no operation: products with 1, sums with 0 and the like.
+bool GraphBuilder::simplify(GraphOp op, std::span<const GraphScalar> in, GraphScalar* out) const
+{
+  const auto is = [&](std::size_t i, float wanted) {
+    float value = 0;
+    return is_constant(in[i], &value) && value == wanted;
+  };
+  switch (op) {
+    case GraphOp::copy:
+      *out = in[0];
+      return true;
+    case GraphOp::add:
+      if (!is(0, 0) && !is(1, 0)) return false;
+      *out = is(0, 0) ? in[1] : in[0];
+      return true;
+    case GraphOp::subtract:
+      *out = in[0];
+      return is(1, 0);
+    case GraphOp::multiply:
+      if (!is(0, 1) && !is(1, 1)) return false;
+      *out = is(0, 1) ? in[1] : in[0];
+      return true;
+    case GraphOp::divide:
+      *out = in[0];
+      return is(1, 1);
+    case GraphOp::multiply_add:
+      *out = in[0];
+      return is(1, 1) && is(2, 0);
+    case GraphOp::select: {
+      float value = 0;
+      if (!is_constant(in[0], &value)) {
+        *out = in[1];
+        return in[1] == in[2];
+      }
+      *out = value != 0 ? in[1] : in[2];
+      return true;
+    }
+    default:
+      return false;
+  }
+}
+
+std::vector<GraphScalar> GraphBuilder::fold(GraphOp op,
+                                            std::span<const GraphScalar> inputs,
+                                            std::span<const std::uint16_t> immediates)
+{
+  const GraphOpShape& shape = shape_of(op);
+  GraphProgram program;
+  if (op == GraphOp::table) program.tables = tables_;
+  program.code.push_back(static_cast<std::uint16_t>(op));
+  program.code.insert(program.code.end(), immediates.begin(), immediates.end());
+  for (int i = 0; i < shape.num_outputs; ++i) program.code.push_back(static_cast<std::uint16_t>(i));
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    program.code.push_back(static_cast<std::uint16_t>(kMostGraphRegisters + i));
+    program.constants.push_back(nodes_[static_cast<std::size_t>(inputs[i].index)].value);
+  }
+  GraphRegisters registers;
+  graph_run(program.view(), nullptr, registers);
+  std::vector<GraphScalar> out;
+  for (int i = 0; i < shape.num_outputs; ++i) out.push_back(constant(registers.lanes[i][0]));
+  return out;
+}
+
+std::vector<GraphScalar> GraphBuilder::apply(GraphOp op,
+                                             std::span<const GraphScalar> inputs,
+                                             std::span<const std::uint16_t> immediates)
+{
+  const GraphOpShape& shape = shape_of(op);
+  if (can_fold(op) && std::all_of(inputs.begin(), inputs.end(), [this](GraphScalar a) { return is_constant(a); })) {
+    return fold(op, inputs, immediates);
+  }
+  if (GraphScalar simple; simplify(op, inputs, &simple)) return {simple};
+  Key key{static_cast<std::int64_t>(op)};
+  key.insert(key.end(), immediates.begin(), immediates.end());
+  for (const GraphScalar a : inputs) key.push_back(a.index);
+  if (const auto it = known_.find(key); it != known_.end()) {
+    const Node& node = nodes_[static_cast<std::size_t>(it->second)];
+    return operations_[static_cast<std::size_t>(node.operation)].outputs;
+  }
+  const auto operation = static_cast<std::int32_t>(operations_.size());
+  known_.emplace(std::move(key), static_cast<std::int32_t>(nodes_.size()));
+  std::vector<GraphScalar> outputs;
+  for (int i = 0; i < shape.num_outputs; ++i) {
+    outputs.push_back({static_cast<std::int32_t>(nodes_.size())});
+    Node node{Node::Kind::kOperation};
+    node.operation = operation;
+    node.output = i;
+    nodes_.push_back(node);
+  }
+  operations_.push_back({op, {immediates.begin(), immediates.end()}, {inputs.begin(), inputs.end()}, outputs});
+  return outputs;
+}
+
+GraphScalar GraphBuilder::operator()(GraphOp op, std::initializer_list<GraphScalar> inputs)
+{
+  return apply(op, std::span(inputs.begin(), inputs.size())).front();
+}
+
+std::optional<std::array<double, 2>> GraphBuilder::linear_part(GraphScalar a, GraphScalar u, GraphScalar v) const
+{
+  // a = first · u + second · v + rest, gathered by following sums and known factors down to u and v.
+  struct Term {
+    GraphScalar of;
+    double factor;
+  };
+  constexpr int kMostTerms = 256;
+  std::vector<Term> open{{a, 1.0}};
+  std::array<double, 2> out{};
+  for (int taken = 0; !open.empty(); ++taken) {
+    if (taken == kMostTerms) return {};
+    const auto [of, factor] = open.back();
+    open.pop_back();
+    if (of == u || of == v) {
+      out[of == u ? 0 : 1] += factor;
+      continue;
+    }
+    const Node& node = nodes_[static_cast<std::size_t>(of.index)];
+    if (node.kind == Node::Kind::kConstant) continue;
+    if (node.kind == Node::Kind::kQuantity) return {};
+    const auto& [op, immediates, in, outputs] = operations_[static_cast<std::size_t>(node.operation)];
+    float known = 0;
+    if (op == GraphOp::add || op == GraphOp::subtract) {
+      open.push_back({in[0], factor});
+      open.push_back({in[1], op == GraphOp::add ? factor : -factor});
+    } else if (op == GraphOp::divide && is_constant(in[1], &known) && known != 0) {
+      open.push_back({in[0], factor / static_cast<double>(known)});
+    } else if ((op == GraphOp::multiply || op == GraphOp::multiply_add) &&
+               (is_constant(in[0], &known) || is_constant(in[1], &known))) {
+      open.push_back({is_constant(in[0]) ? in[1] : in[0], factor * static_cast<double>(known)});
+      if (op == GraphOp::multiply_add) open.push_back({in[2], factor});
+    } else {
+      return {};
+    }
+  }
+  return out;
+}
+
+std::uint32_t GraphBuilder::add_table(std::span<const float> values)
+{
+  const auto [it, is_new] =
+      table_places_.try_emplace({values.begin(), values.end()}, static_cast<std::uint32_t>(tables_.size()));
+  if (is_new) tables_.insert(tables_.end(), values.begin(), values.end());
+  return it->second;
+}
+
+void GraphBuilder::set_output(GraphOutput output, const GraphVector& value)
+{
+  outputs_[static_cast<std::size_t>(output)] = value;
+}
+
+/// The operations that outputs need, each after what it needs itself; of several inputs the one that needs most registers
+/// comes first.
+std::vector<std::int32_t> GraphBuilder::order() const
+{
+  // Inputs have lower numbers than what uses them, so one pass each way does.
+  std::vector<int> registers(operations_.size(), 0);
+  const auto operation_of = [this](GraphScalar a) { return nodes_[static_cast<std::size_t>(a.index)].operation; };
+  const auto inputs_by_need = [&](const Operation& operation) {
+    std::vector<std::int32_t> needed;
+    for (const GraphScalar a : operation.inputs) {
+      if (operation_of(a) >= 0) needed.push_back(operation_of(a));
+    }
+    std::sort(needed.begin(), needed.end());
+    needed.erase(std::unique(needed.begin(), needed.end()), needed.end());
+    std::stable_sort(needed.begin(), needed.end(), [&](std::int32_t a, std::int32_t b) {
+      return registers[static_cast<std::size_t>(a)] > registers[static_cast<std::size_t>(b)];
+    });
+    return needed;
+  };
+  for (std::size_t i = 0; i < operations_.size(); ++i) {
+    int most = static_cast<int>(operations_[i].outputs.size()), held = 0;
+    for (const std::int32_t input : inputs_by_need(operations_[i])) {
+      const auto n = static_cast<std::size_t>(input);
+      most = std::max(most, held + registers[n]);
+      held += static_cast<int>(operations_[n].outputs.size());
+    }
+    registers[i] = most;
+  }
+
+  std::vector<std::int32_t> ordered;
+  std::vector<char> is_placed(operations_.size(), 0);
+  std::vector<std::pair<std::int32_t, bool>> stack;  // operation, whether its inputs are done
+  for (const GraphVector& output : outputs_) {
+    for (const GraphScalar component : output) {
+      if (component.index < 0 || operation_of(component) < 0) continue;
+      stack.emplace_back(operation_of(component), false);
+      while (!stack.empty()) {
+        const auto [operation, are_inputs_done] = stack.back();
+        stack.pop_back();
+        const auto n = static_cast<std::size_t>(operation);
+        if (is_placed[n] != 0) continue;
+        if (are_inputs_done) {
+          is_placed[n] = 1;
+          ordered.push_back(operation);
+          continue;
+        }
+        stack.emplace_back(operation, true);
+        const std::vector<std::int32_t> needed = inputs_by_need(operations_[n]);
+        for (auto it = needed.rbegin(); it != needed.rend(); ++it) stack.emplace_back(*it, false);
+      }
+    }
+  }
+  return ordered;
+}
+
+GraphProgram GraphBuilder::compile() const
+{
+  const std::vector<std::int32_t> ordered = order();
+  // Last use of every value: position in the order, or beyond it for outputs.
+  constexpr auto kEver = std::numeric_limits<std::int32_t>::max();
+  std::vector<std::int32_t> last_use(nodes_.size(), -1);
+  for (std::size_t position = 0; position < ordered.size(); ++position) {
+    for (const GraphScalar a : operations_[static_cast<std::size_t>(ordered[position])].inputs) {
+      last_use[static_cast<std::size_t>(a.index)] = static_cast<std::int32_t>(position);
+    }
+  }
+  for (const GraphVector& output : outputs_) {
+    for (const GraphScalar a : output) {
+      if (a.index >= 0) last_use[static_cast<std::size_t>(a.index)] = kEver;
+    }
+  }
+
+  GraphProgram program;
+  program.tables = tables_;
+  std::vector<std::uint16_t> operand_of(nodes_.size(), kNoGraphOperand);
+  std::vector<std::uint16_t> free_registers;
+  const auto take_register = [&] {
+    if (!free_registers.empty()) {
+      const std::uint16_t taken = free_registers.back();
+      free_registers.pop_back();
+      return taken;
+    }
+    if (program.num_registers == kMostGraphRegisters) {
+      throw GraphTooLarge("one that needs at most " + std::to_string(kMostGraphRegisters) + " values at a time");
+    }
+    return static_cast<std::uint16_t>(program.num_registers++);
+  };
+  for (std::size_t i = 0; i < nodes_.size(); ++i) {
+    if (last_use[i] < 0) continue;
+    if (nodes_[i].kind == Node::Kind::kQuantity) {
+      operand_of[i] = take_register();
+      program.inputs.push_back({nodes_[i].quantity, operand_of[i]});
+    } else if (nodes_[i].kind == Node::Kind::kConstant) {
+      constexpr std::size_t kMostConstants = kNoGraphOperand - kMostGraphRegisters;
+      if (program.constants.size() == kMostConstants) {
+        throw GraphTooLarge("one with at most " + std::to_string(kMostConstants) + " different constants");
+      }
+      operand_of[i] = static_cast<std::uint16_t>(kMostGraphRegisters + program.constants.size());
+      program.constants.push_back(nodes_[i].value);
+    }
+  }
+  for (std::size_t position = 0; position < ordered.size(); ++position) {
+    const Operation& operation = operations_[static_cast<std::size_t>(ordered[position])];
+    // Outputs first: an operation may write one before it has read all that it reads.
+    for (const GraphScalar a : operation.outputs) operand_of[static_cast<std::size_t>(a.index)] = take_register();
+    program.code.push_back(static_cast<std::uint16_t>(operation.op));
+    program.code.insert(program.code.end(), operation.immediates.begin(), operation.immediates.end());
+    for (const GraphScalar a : operation.outputs) program.code.push_back(operand_of[static_cast<std::size_t>(a.index)]);
+    for (const GraphScalar a : operation.inputs) program.code.push_back(operand_of[static_cast<std::size_t>(a.index)]);
+    std::vector<std::int32_t> ended;
+    for (const GraphScalar a : operation.inputs) {
+      if (last_use[static_cast<std::size_t>(a.index)] == static_cast<std::int32_t>(position)) ended.push_back(a.index);
+    }
+    for (const GraphScalar a : operation.outputs) {
+      if (last_use[static_cast<std::size_t>(a.index)] < 0) ended.push_back(a.index);
+    }
+    std::sort(ended.begin(), ended.end());
+    ended.erase(std::unique(ended.begin(), ended.end()), ended.end());
+    for (const std::int32_t i : ended) {
+      const std::uint16_t operand = operand_of[static_cast<std::size_t>(i)];
+      if (operand < kMostGraphRegisters) free_registers.push_back(operand);
+    }
+  }
+  for (std::size_t i = 0; i < outputs_.size(); ++i) {
+    const bool is_given = outputs_[i][0].index >= 0;
+    if (is_given) program.given |= 1u << i;
+    for (std::size_t c = 0; c < 3; ++c) {
+      program.outputs[i][c] = is_given ? operand_of[static_cast<std::size_t>(outputs_[i][c].index)] : kNoGraphOperand;
+    }
+  }
+  return program;
+}
+
+}  // namespace relief

@@ -1,0 +1,97 @@
+// Builds a value graph of scalar operations and compiles it. Operations whose inputs are known are computed at once, equal
+// ones become one, and what no output needs is left out; what remains is put into an order that needs few registers.
+//
+// Sethi and Ullman 1970, "The Generation of Optimal Code for Arithmetic Expressions": the order. It is optimal for trees;
+// graphs share values, and for these it is a heuristic.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include "scene/graph/graph_program.h"
+
+namespace relief {
+
+/// A number of the graph.
+struct GraphScalar {
+  std::int32_t index = -1;
+  bool operator==(const GraphScalar&) const = default;
+};
+
+/// A vector or colour.
+using GraphVector = std::array<GraphScalar, 3>;
+
+/// A graph that no program can be made of. what() says why, without its place.
+class GraphTooLarge : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+class GraphBuilder {
+ public:
+  GraphScalar constant(float value);
+  GraphScalar quantity(GraphQuantity quantity);
+
+  /// @param inputs      as many as the operation has
+  /// @param immediates  likewise
+  /// @return            its outputs
+  std::vector<GraphScalar> apply(GraphOp op,
+                                 std::span<const GraphScalar> inputs,
+                                 std::span<const std::uint16_t> immediates = {});
+
+  /// An operation with one output and no immediates.
+  GraphScalar operator()(GraphOp op, std::initializer_list<GraphScalar> inputs);
+
+  /// Whether a number is known, and which it is.
+  bool is_constant(GraphScalar a, float* value = nullptr) const;
+
+  /// How often two numbers go into a third, where it is a sum of multiples of both and something known; else empty.
+  std::optional<std::array<double, 2>> linear_part(GraphScalar a, GraphScalar u, GraphScalar v) const;
+
+  /// Adds floats that `table` operations read.
+  /// @return place of the first; equal tables are kept once
+  std::uint32_t add_table(std::span<const float> values);
+
+  void set_output(GraphOutput output, const GraphVector& value);
+
+  /// @error GraphTooLarge
+  GraphProgram compile() const;
+
+ private:
+  /// One output of an operation; or a constant, or a quantity.
+  struct Node {
+    enum class Kind : std::uint8_t { kConstant, kQuantity, kOperation } kind;
+    std::int32_t operation = -1;  ///< into operations_
+    int output = 0;
+    float value = 0;
+    GraphQuantity quantity{};
+  };
+  struct Operation {
+    GraphOp op;
+    std::vector<std::uint16_t> immediates;
+    std::vector<GraphScalar> inputs;
+    std::vector<GraphScalar> outputs;
+  };
+  using Key = std::vector<std::int64_t>;
+
+  GraphScalar add(const Node& node, const Key& key);
+  bool simplify(GraphOp op, std::span<const GraphScalar> in, GraphScalar* out) const;
+  std::vector<GraphScalar> fold(GraphOp op,
+                                std::span<const GraphScalar> inputs,
+                                std::span<const std::uint16_t> immediates);
+  std::vector<std::int32_t> order() const;
+
+  std::vector<Node> nodes_;
+  std::vector<Operation> operations_;
+  std::map<Key, std::int32_t> known_;  ///< first node of what a key says
+  std::vector<float> tables_;
+  std::map<std::vector<float>, std::uint32_t> table_places_;
+  std::array<GraphVector, kNumGraphOutputs> outputs_;
+};
+
+}  // namespace relief

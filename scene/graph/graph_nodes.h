@@ -1,0 +1,56 @@
+// The kinds of nodes that value graphs are made of: what they are called, what goes in and out, and which operations they
+// become. docs/graphs.md is the user's list.
+#pragma once
+
+#include <functional>
+#include <map>
+#include <span>
+#include <string_view>
+
+#include "scene/graph/graph_builder.h"
+#include "scene/json_reader.h"
+
+namespace relief {
+
+enum class GraphType : std::uint8_t { kNumber, kVector, kColor };
+
+/// A value on its way between nodes; numbers stand in all three components.
+struct GraphValue {
+  GraphType type = GraphType::kNumber;
+  GraphVector v;
+};
+
+/// A value as another type: colours become numbers by their luminance, vectors by their mean.
+GraphValue graph_convert(GraphBuilder& build, const GraphValue& value, GraphType type);
+
+struct GraphSocket {
+  std::string_view name;
+  GraphType type;
+  float value[3] = {0, 0, 0};  ///< of an input that is not given
+};
+
+/// One node while it is turned into operations.
+struct GraphNode {
+  GraphBuilder& build;
+  const JsonReader& reader;                              ///< its object, for options
+  const std::map<std::string_view, GraphValue>& inputs;  ///< all of its kind's, converted
+  std::map<std::string_view, GraphValue>& outputs;
+  /// Texture that an option names, as an index into the scene's.
+  const std::function<int(const JsonReader&)>& texture;
+
+  GraphScalar number(std::string_view name) const { return inputs.at(name).v[0]; }
+  const GraphVector& vector(std::string_view name) const { return inputs.at(name).v; }
+  void set(std::string_view name, GraphScalar a) { outputs[name] = {GraphType::kNumber, {a, a, a}}; }
+  void set(std::string_view name, const GraphVector& v, GraphType type) { outputs[name] = {type, v}; }
+};
+
+struct GraphNodeKind {
+  std::string_view name;
+  std::span<const GraphSocket> inputs;
+  void (*lower)(GraphNode&);  ///< sets every output
+};
+
+/// @return null: there is none of that name
+const GraphNodeKind* graph_node_kind(std::string_view name);
+
+}  // namespace relief

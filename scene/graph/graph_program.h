@@ -1,0 +1,22 @@
+// A compiled value graph, which owns what a GraphProgramView looks at.
+#pragma once
+
+#include <vector>
+
+#include "kernel/graph/graph_program.h"
+
+namespace relief {
+
+struct GraphProgram {
+  std::vector<std::uint16_t> code;
+  std::vector<float> constants, tables;
+  std::vector<GraphInput> inputs;
+  std::uint16_t outputs[kNumGraphOutputs][3] = {};
+  std::uint32_t given = 0;  ///< bit GraphOutput
+  int num_registers = 0;
+
+  GraphProgramView view() const;
+  std::size_t bytes() const;
+};
+
+}  // namespace relief

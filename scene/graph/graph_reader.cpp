@@ -1,0 +1,206 @@
+#include "scene/graph/graph_reader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "scene/graph/graph_nodes.h"
+#include "scene/khronos_extensions.h"
+
+namespace relief {
+namespace {
+
+constexpr std::size_t kMostNodes = 65536;
+
+/// Where a value comes from.
+struct Reference {
+  std::size_t node = 0;
+  std::string output;
+};
+
+/// One node as the file has it.
+struct Source {
+  const GraphNodeKind* kind = nullptr;
+  JsonReader reader;
+  std::vector<std::pair<std::string_view, Reference>> references;
+  std::vector<std::pair<std::string_view, GraphValue>> literals;
+};
+
+struct Reader {
+  const GltfDocument& document;
+  const JsonReader& graph;
+  TextureTable& textures;
+  Warnings& warnings;
+  GraphBuilder build;
+  std::vector<Source> sources;
+  std::vector<std::map<std::string_view, GraphValue>> values;  ///< outputs of each node
+
+  GraphValue literal(const JsonReader& parent, std::string_view name, GraphType type);
+  Reference reference(const JsonReader& parent, std::string_view name, std::size_t num_nodes) const;
+  void read_node(std::size_t index, const nlohmann::json& json, std::size_t num_nodes);
+  std::vector<std::size_t> order() const;
+  GraphValue look_up(const JsonReader& parent, std::string_view name, const Reference& reference) const;
+  void lower(std::size_t index);
+  void read_outputs();
+};
+
+/// A number, or three of them; numbers do for vectors and colours.
+GraphValue Reader::literal(const JsonReader& parent, std::string_view name, GraphType type)
+{
+  const nlohmann::json& json = parent.raw(name);
+  GraphValue value{type, {}};
+  if (json.is_number()) {
+    value.v.fill(build.constant(parent.number_f(name, 0)));
+    return value;
+  }
+  if (type == GraphType::kNumber) parent.fail(name, "a number, or {\"node\": …}", json_describe(json));
+  if (!json.is_array()) parent.fail(name, "three numbers, or {\"node\": …}", json_describe(json));
+  const std::vector<double> numbers = parent.numbers(name, 3, 3, -1e30, 1e30);
+  for (std::size_t c = 0; c < 3; ++c) value.v[c] = build.constant(static_cast<float>(numbers[c]));
+  return value;
+}
+
+Reference Reader::reference(const JsonReader& parent, std::string_view name, std::size_t num_nodes) const
+{
+  const JsonReader r = parent.object(name);
+  const int node = r.index("node", num_nodes, "nodes");
+  if (node < 0) r.fail("node", "the index of a node");
+  Reference out{static_cast<std::size_t>(node), r.string("output", "")};
+  r.warn_unread(warnings);
+  return out;
+}
+
+void Reader::read_node(std::size_t index, const nlohmann::json& json, std::size_t num_nodes)
+{
+  const std::string path = json_path_join(json_path_join(graph.path(), "nodes"), index);
+  Source source{nullptr, JsonReader(json, graph.file(), path), {}, {}};
+  const std::string type = source.reader.string("type", "");
+  source.kind = graph_node_kind(type);
+  if (source.kind == nullptr) source.reader.fail("type", "the type of a node (docs/graphs.md)", '"' + type + '"');
+  if (source.reader.has("inputs")) {
+    const JsonReader inputs = source.reader.object("inputs");
+    for (const GraphSocket& socket : source.kind->inputs) {
+      if (!inputs.has(socket.name)) continue;
+      if (inputs.raw(socket.name).is_object()) {
+        source.references.emplace_back(socket.name, reference(inputs, socket.name, num_nodes));
+      } else {
+        source.literals.emplace_back(socket.name, literal(inputs, socket.name, socket.type));
+      }
+    }
+    inputs.warn_unread(warnings);
+  }
+  sources.push_back(std::move(source));
+}
+
+/// Nodes, each after those it refers to.
+std::vector<std::size_t> Reader::order() const
+{
+  std::vector<std::vector<std::size_t>> users(sources.size());
+  std::vector<std::size_t> waits_for(sources.size(), 0), ready;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    waits_for[i] = sources[i].references.size();
+    for (const auto& [name, from] : sources[i].references) users[from.node].push_back(i);
+    if (waits_for[i] == 0) ready.push_back(i);
+  }
+  for (std::size_t done = 0; done < ready.size(); ++done) {
+    for (const std::size_t user : users[ready[done]]) {
+      if (--waits_for[user] == 0) ready.push_back(user);
+    }
+  }
+  if (ready.size() < sources.size()) {
+    const auto stuck = std::find_if(waits_for.begin(), waits_for.end(), [](std::size_t n) { return n > 0; });
+    sources[static_cast<std::size_t>(stuck - waits_for.begin())].reader.fail(
+        "inputs", "nodes without a cycle", "one that leads back to this node, or to one that it needs");
+  }
+  return ready;
+}
+
+GraphValue Reader::look_up(const JsonReader& parent, std::string_view name, const Reference& from) const
+{
+  const auto& outputs = values[from.node];
+  if (from.output.empty() && outputs.size() == 1) return outputs.begin()->second;
+  const auto it = outputs.find(from.output);
+  if (it == outputs.end()) {
+    std::string known;
+    for (const auto& [output, value] : outputs) known += (known.empty() ? "\"" : ", \"") + std::string(output) + '"';
+    parent.fail(name, "an output of node " + std::to_string(from.node) + " (" + known + ')',
+                from.output.empty() ? "none named" : '"' + from.output + '"');
+  }
+  return it->second;
+}
+
+void Reader::lower(std::size_t index)
+{
+  const Source& source = sources[index];
+  std::map<std::string_view, GraphValue> inputs;
+  for (const GraphSocket& socket : source.kind->inputs) {
+    inputs[socket.name] = {
+        socket.type,
+        {build.constant(socket.value[0]), build.constant(socket.value[1]), build.constant(socket.value[2])}};
+  }
+  for (const auto& [name, value] : source.literals) inputs[name] = value;
+  for (const auto& [name, from] : source.references) {
+    inputs[name] = graph_convert(build, look_up(source.reader.object("inputs"), name, from), inputs[name].type);
+  }
+  const std::function<int(const JsonReader&)> texture = [this](const JsonReader& r) {
+    static constexpr std::string_view kSpaces[] = {"srgb", "linear"};
+    const bool is_linear = r.choice("colorSpace", kSpaces, 0) == 1;
+    const TextureRef ref = khronos_texture_ref(
+        document, r, "texture", is_linear ? TextureColor::kLinear : TextureColor::kSrgb, textures, warnings);
+    if (ref.texture_index < 0) r.fail("texture", "{\"index\": …}");
+    return ref.texture_index;
+  };
+  GraphNode node{build, source.reader, inputs, values[index], texture};
+  source.kind->lower(node);
+  source.reader.warn_unread(warnings);
+}
+
+void Reader::read_outputs()
+{
+  struct Named {
+    std::string_view name;
+    GraphType type;
+  };
+  static constexpr Named kOutputs[] = {
+#define X(name, json, components) {json, (components) == 1 ? GraphType::kNumber : GraphType::kColor},
+#include "kernel/graph/graph_outputs.inc"
+#undef X
+  };
+  if (!graph.has("outputs")) graph.fail("outputs", "an object");
+  const JsonReader outputs = graph.object("outputs");
+  for (int i = 0; i < kNumGraphOutputs; ++i) {
+    const auto& [name, type] = kOutputs[i];
+    if (!outputs.has(name)) continue;
+    if (!outputs.raw(name).is_object()) outputs.fail(name, "{\"node\": …}", json_describe(outputs.raw(name)));
+    const GraphValue value = look_up(outputs, name, reference(outputs, name, sources.size()));
+    build.set_output(static_cast<GraphOutput>(i), graph_convert(build, value, type).v);
+  }
+  outputs.warn_unread(warnings);
+}
+
+}  // namespace
+
+GraphProgram graph_read(const GltfDocument& document,
+                        const JsonReader& reader,
+                        TextureTable& textures,
+                        Warnings& warnings)
+{
+  Reader r{document, reader, textures, warnings, {}, {}, {}};
+  if (!reader.has("nodes") || !reader.raw("nodes").is_array()) reader.fail("nodes", "an array");
+  const nlohmann::json& nodes = reader.raw("nodes");
+  if (nodes.size() > kMostNodes) {
+    reader.fail("nodes", "at most " + std::to_string(kMostNodes), std::to_string(nodes.size()));
+  }
+  for (std::size_t i = 0; i < nodes.size(); ++i) r.read_node(i, nodes[i], nodes.size());
+  r.values.resize(nodes.size());
+  try {
+    for (const std::size_t node : r.order()) r.lower(node);
+    r.read_outputs();
+    reader.warn_unread(warnings);
+    return r.build.compile();
+  } catch (const GraphTooLarge& error) {
+    reader.fail("", error.what(), "one that needs more");
+  }
+}
+
+}  // namespace relief

@@ -1,0 +1,384 @@
+"""Value nodes give the numbers that Cycles gives, point by point, and pictures by them are Cycles' pictures.
+
+Node by node: a sheet of small faces, each as large as a pixel and with coordinates that are the same all over it; what
+interpolation leaves of them is cut off by a node, so that both engines evaluate at the very same points. The output is
+emitted, and in other rows its negative, as emission of less than nothing is none; each row of faces has a material, and
+so a mode of the node, of its own.
+"""
+
+import os
+
+import bpy
+import numpy as np
+from scenes import (
+    add_camera,
+    add_light,
+    add_plane,
+    assert_agrees,
+    assert_warns,
+    folder,
+    link,
+    new_material,
+    new_scene,
+    render,
+)
+
+#: Coordinates are this far apart: a power of two, so that they are exact.
+_STEP = 2.0**-12
+
+#: Faces, and so points, along a side of the sheet: 102,400 in all.
+_SIDE = 320
+
+
+def _sheet(materials, low, high, seed=1):
+    """A square of faces with random coordinates, in rows of the materials' own.
+
+    @param  low, high  limits of the coordinates: uv map "xy" has two, "zw" two more
+    """
+    count = _SIDE * _SIDE
+    x, y = np.meshgrid(np.arange(_SIDE), np.arange(_SIDE))
+    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+    points = np.zeros((count, 4, 3), dtype=np.float32)
+    points[..., :2] = np.stack([x, y], axis=-1).reshape(-1, 1, 2) + corners
+    mesh = bpy.data.meshes.new("sheet")
+    mesh.from_pydata(points.reshape(-1, 3).tolist(), [], np.arange(4 * count).reshape(-1, 4).tolist())
+    random = np.random.default_rng(seed)
+    for name in ("xy", "zw"):
+        steps = random.integers(low / _STEP, high / _STEP, (count, 1, 2)) + 0.5
+        values = (_STEP * steps).astype(np.float32).repeat(4, axis=1)
+        mesh.uv_layers.new(name=name).data.foreach_set("uv", values.ravel())
+    rows = np.minimum(y.ravel() * len(materials) // _SIDE, len(materials) - 1)
+    mesh.polygons.foreach_set("material_index", rows.astype(np.int32))
+    for material in materials:
+        mesh.materials.append(material)
+    return link(mesh, "sheet")
+
+
+def _emitter(name, build, sign):
+    """A material that emits the socket that build(tree, xyz, w) gives, or its negative.
+
+    xyz  a vector socket, random over the sheet
+    w    a number likewise
+    """
+    material = bpy.data.materials.new(name)
+    material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    first, second = tree.nodes.new("ShaderNodeUVMap"), tree.nodes.new("ShaderNodeUVMap")
+    first.uv_map, second.uv_map = "xy", "zw"
+    xy, zw = tree.nodes.new("ShaderNodeSeparateXYZ"), tree.nodes.new("ShaderNodeSeparateXYZ")
+    for uv_map, parts in ((first, xy), (second, zw)):
+        snap = tree.nodes.new("ShaderNodeVectorMath")
+        snap.operation = "SNAP"
+        snap.inputs[1].default_value = (_STEP, _STEP, _STEP)
+        tree.links.new(uv_map.outputs[0], snap.inputs[0])
+        tree.links.new(snap.outputs[0], parts.inputs[0])
+    xyz = tree.nodes.new("ShaderNodeCombineXYZ")
+    for number, source in enumerate((xy.outputs[0], xy.outputs[1], zw.outputs[0])):
+        tree.links.new(source, xyz.inputs[number])
+    emission = tree.nodes.new("ShaderNodeEmission")
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    signed = tree.nodes.new("ShaderNodeVectorMath")
+    signed.operation = "MULTIPLY"
+    signed.inputs[1].default_value = (sign, sign, sign)
+    tree.links.new(build(tree, xyz.outputs[0], zw.outputs[1]), signed.inputs[0])
+    tree.links.new(signed.outputs[0], emission.inputs["Color"])
+    tree.links.new(emission.outputs[0], output.inputs["Surface"])
+    return material
+
+
+def _assert_nodes_agree(builders, low=-2.0, high=2.0, relative=1e-5, absolute=1e-6, most_off=0.0):
+    """Fails where an engine's picture of a sheet of nodes differs from the other's.
+
+    @param  builders  by name, see _emitter; those of one name share a row
+    @param  most_off  share of the points of a row that may be further off: nodes that jump do so at points that rounding moves
+    """
+    scene = new_scene(_SIDE, _SIDE)
+    rows_of = [(name, build, sign) for name, build in builders.items() for sign in (1, -1)]
+    materials = [_emitter(*row) for row in rows_of]
+    sheet = _sheet(materials, low, high)
+    sheet.location = (-_SIDE / 2, -_SIDE / 2, 0)
+    add_camera((0, 0, 10), type="ORTHO", ortho_scale=_SIDE)
+    with folder() as path:
+        ours = render(scene, "RELIEF", os.path.join(path, "relief.exr"), samples=1)[::-1].reshape(-1, 3)
+        theirs = render(scene, "CYCLES", os.path.join(path, "cycles.exr"), samples=1)[::-1].reshape(-1, 3)
+    rows = np.minimum(np.arange(_SIDE) * len(materials) // _SIDE, len(materials) - 1).repeat(_SIDE)
+    wrong = []
+    for number, (name, _, sign) in enumerate(rows_of):
+        a, b = ours[rows == number], np.maximum(theirs[rows == number], 0)
+        error = np.abs(a - b)
+        off = (error > absolute + relative * np.abs(b)).any(axis=1)
+        largest = (error / np.maximum(np.abs(b), 0.1)).max()
+        print(f"{sign} {name}: largest difference {largest:.2g}, {off.mean():.3%} beyond {relative}, mean {b.mean():.4f}")
+        if off.mean() > most_off:
+            worst = int(error.max(axis=1).argmax())
+            wrong.append(f"{sign} {name}: {off.mean():.3%}, worst {a[worst]} for {b[worst]}")
+    assert not wrong, wrong
+
+
+def _node(kind, inputs=None, out=0, **settings):
+    """A builder of one node.
+
+    @param  inputs  by the socket's name or number: "xyz", "w", or a value
+    @param  out     number or name of the output
+    """
+
+    def build(tree, xyz, w):
+        node = tree.nodes.new(kind)
+        for name, value in settings.items():
+            setattr(node, name, value)
+        given = inputs if inputs is not None else {"Vector": "xyz"}
+        for name, value in given.items():
+            socket = node.inputs.get(name) if isinstance(name, str) else node.inputs[name]
+            if socket is None:
+                continue
+            if value == "xyz":
+                tree.links.new(xyz, socket)
+            elif value == "w":
+                tree.links.new(w, socket)
+            elif isinstance(value, tuple) and value[0] == "component":
+                parts = tree.nodes.new("ShaderNodeSeparateXYZ")
+                tree.links.new(xyz, parts.inputs[0])
+                tree.links.new(parts.outputs[value[1]], socket)
+            else:
+                socket.default_value = value
+        return node.outputs[out]
+
+    return build
+
+
+_X, _Y, _Z = (("component", i) for i in range(3))
+
+
+def test_noise_textures():
+    noise = "ShaderNodeTexNoise"
+    builders = {}
+    for dimensions in ("1D", "2D", "3D", "4D"):
+        base = {"Vector": "xyz", "W": "w", "Scale": 1.3, "Detail": 2.6, "Roughness": 0.55, "Distortion": 0.0}
+        for out in (0, 1):
+            builders[f"{dimensions} {out}"] = _node(noise, base, out, noise_dimensions=dimensions)
+            bent = {**base, "Distortion": 0.8, "Detail": 4.0}
+            builders[f"{dimensions} {out} bent"] = _node(noise, bent, out, noise_dimensions=dimensions)
+    builders["smooth"] = _node(noise, {"Vector": "xyz", "Detail": 0.0})
+    builders["varying detail"] = _node(noise, {"Vector": "xyz", "Scale": 2.0, "Detail": "w"})
+    builders["varying roughness"] = _node(noise, {"Vector": "xyz", "Scale": 2.0, "Roughness": "w"})
+    builders["far"] = _node(noise, {"Vector": "xyz", "Scale": 64.0, "Detail": 0.0})
+    # Colours are noises 100 to 200 units away, where a bent coordinate has lost seven bits more.
+    _assert_nodes_agree(builders, relative=5e-5)
+
+
+def test_white_noise_textures():
+    builders = {}
+    for dimensions in ("1D", "2D", "3D", "4D"):
+        for out in (0, 1):
+            inputs = {"Vector": "xyz", "W": "w"}
+            builders[f"{dimensions} {out}"] = _node("ShaderNodeTexWhiteNoise", inputs, out, noise_dimensions=dimensions)
+    _assert_nodes_agree(builders, most_off=0.0)
+
+
+def test_other_textures():
+    builders = {}
+    for kind in ("LINEAR", "QUADRATIC", "EASING", "DIAGONAL", "RADIAL", "QUADRATIC_SPHERE", "SPHERICAL"):
+        builders[f"gradient {kind}"] = _node("ShaderNodeTexGradient", gradient_type=kind)
+    builders["checker"] = _node("ShaderNodeTexChecker", {"Vector": "xyz", "Scale": 3.0})
+    for depth in (0, 1, 2, 3, 5, 7, 10):
+        inputs = {"Vector": "xyz", "Scale": 0.7, "Distortion": 1.3}
+        builders[f"magic {depth}"] = _node("ShaderNodeTexMagic", inputs, turbulence_depth=depth)
+    for profile in ("SIN", "SAW", "TRI"):
+        for direction in ("X", "Y", "Z", "DIAGONAL"):
+            inputs = {"Vector": "xyz", "Scale": 0.3, "Distortion": 1.5, "Phase Offset": 0.3}
+            builders[f"bands {profile} {direction}"] = _node(
+                "ShaderNodeTexWave", inputs, wave_type="BANDS", bands_direction=direction, wave_profile=profile
+            )
+    for direction in ("X", "Y", "Z", "SPHERICAL"):
+        builders[f"rings {direction}"] = _node(
+            "ShaderNodeTexWave", {"Vector": "xyz", "Scale": 0.3}, wave_type="RINGS", rings_direction=direction
+        )
+    _assert_nodes_agree(builders, relative=1e-4, absolute=1e-5, most_off=2e-3)
+
+
+def test_math():
+    operations = bpy.types.ShaderNodeMath.bl_rna.properties["operation"].enum_items.keys()
+    builders = {
+        name: _node("ShaderNodeMath", {0: _X, 1: _Y, 2: "w"}, operation=name, use_clamp=False) for name in operations
+    }
+    builders["clamped"] = _node("ShaderNodeMath", {0: _X, 1: _Y}, operation="ADD", use_clamp=True)
+    _assert_nodes_agree(builders, relative=1e-5, most_off=1e-3)
+
+
+def test_vector_math():
+    operations = bpy.types.ShaderNodeVectorMath.bl_rna.properties["operation"].enum_items.keys()
+    builders = {}
+    for name in operations:
+        out = 1 if name in {"DOT_PRODUCT", "DISTANCE", "LENGTH"} else 0
+        inputs = {0: "xyz", 1: (0.7, -0.4, 1.1), 2: (0.3, 0.2, -0.9), "Scale": 0.8}
+        if name == "POWER":  # there is none yet
+            continue
+        builders[name] = _node("ShaderNodeVectorMath", inputs, out, operation=name)
+    _assert_nodes_agree(builders, relative=1e-5, absolute=2e-6, most_off=1e-3)
+
+
+def test_mixes():
+    builders = {}
+    for name in bpy.types.ShaderNodeMixRGB.bl_rna.properties["blend_type"].enum_items.keys():
+        inputs = {"Factor_Float": 0.7}
+
+        def build(tree, xyz, w, name=name):
+            node = tree.nodes.new("ShaderNodeMix")
+            node.data_type, node.blend_type = "RGBA", name
+            sockets = {socket.identifier: socket for socket in node.inputs}
+            sockets["Factor_Float"].default_value = 0.7
+            sockets["B_Color"].default_value = (0.2, 0.6, 0.4, 1.0)
+            tree.links.new(xyz, sockets["A_Color"])
+            return next(socket for socket in node.outputs if socket.identifier == "Result_Color")
+
+        builders[name] = build
+    _assert_nodes_agree(builders, low=0.0, high=1.0, relative=1e-5, most_off=1e-3)
+
+
+def test_mixes_of_numbers_and_vectors():
+    def build(kind, clamped):
+        def builder(tree, xyz, w):
+            node = tree.nodes.new("ShaderNodeMix")
+            node.data_type, node.clamp_factor = kind, clamped
+            part = {"FLOAT": "Float", "VECTOR": "Vector"}[kind]
+            sockets = {socket.identifier: socket for socket in node.inputs}
+            tree.links.new(w, sockets["Factor_Float"])
+            tree.links.new(xyz, sockets[f"A_{part}"])
+            tree.links.new(w, sockets[f"B_{part}"])
+            return next(socket for socket in node.outputs if socket.identifier == f"Result_{part}")
+
+        return builder
+
+    _assert_nodes_agree({f"{k} {c}": build(k, c) for k in ("FLOAT", "VECTOR") for c in (True, False)})
+
+
+def test_colors():
+    builders = {
+        "invert": _node("ShaderNodeInvert", {0: 0.7, "Color": "xyz"}),
+        "gamma": _node("ShaderNodeGamma", {"Color": "xyz", "Gamma": 1.7}),
+        "contrast": _node("ShaderNodeBrightContrast", {"Color": "xyz", 1: 0.2, "Contrast": 0.4}),
+        "hue": _node("ShaderNodeHueSaturation", {"Hue": 0.7, "Saturation": 1.3, "Value": 0.8, "Color": "xyz"}),
+        "grey": _node("ShaderNodeRGBToBW", {"Color": "xyz"}),
+    }
+    for mode in ("RGB", "HSV", "HSL"):
+        for out in range(3):
+            builders[f"separate {mode} {out}"] = _node("ShaderNodeSeparateColor", {0: "xyz"}, out, mode=mode)
+        builders[f"combine {mode}"] = _node("ShaderNodeCombineColor", {0: _X, 1: _Y, 2: _Z}, mode=mode)
+    _assert_nodes_agree(builders, low=0.0, high=1.0, absolute=2e-6, most_off=1e-3)
+
+
+def test_ramps():
+    def build(interpolation, mode):
+        def builder(tree, xyz, w):
+            node = tree.nodes.new("ShaderNodeValToRGB")
+            ramp = node.color_ramp
+            ramp.color_mode = mode
+            ramp.interpolation = interpolation
+            ramp.elements[0].position, ramp.elements[0].color = 0.2, (0.1, 0.7, 0.3, 1)
+            ramp.elements[1].position, ramp.elements[1].color = 0.8, (0.9, 0.2, 0.5, 1)
+            ramp.elements.new(0.55).color = (0.2, 0.1, 0.8, 1)
+            tree.links.new(w, node.inputs[0])
+            return node.outputs[0]
+
+        return builder
+
+    kinds = ("LINEAR", "CONSTANT", "EASE", "CARDINAL", "B_SPLINE")
+    builders = {f"{kind} {mode}": build(kind, mode) for kind in kinds for mode in ("RGB", "HSV", "HSL")}
+    _assert_nodes_agree(builders, low=-0.2, high=1.2, most_off=1e-3)
+
+
+def test_ranges():
+    builders = {}
+    for kind in ("LINEAR", "STEPPED", "SMOOTHSTEP", "SMOOTHERSTEP"):
+        for clamp in (True, False):
+            inputs = {0: "w", 1: -0.5, 2: 1.2, 3: 0.3, 4: 1.4, 5: 4.0}
+            builders[f"{kind} {clamp}"] = _node("ShaderNodeMapRange", inputs, interpolation_type=kind, clamp=clamp)
+    for kind in ("MINMAX", "RANGE"):
+        inputs = {"Value": "w", "Min": 0.9, "Max": 0.2}
+        builders[f"clamp {kind}"] = _node("ShaderNodeClamp", inputs, clamp_type=kind)
+    _assert_nodes_agree(builders, most_off=1e-3)
+
+
+def test_mappings():
+    builders = {}
+    for kind in ("POINT", "TEXTURE", "VECTOR", "NORMAL"):
+        inputs = {"Vector": "xyz", "Rotation": (0.4, -0.7, 1.1), "Scale": (0.7, 1.3, -0.8)}
+        if kind in {"POINT", "TEXTURE"}:
+            inputs["Location"] = (0.3, 0.5, -0.2)
+        builders[kind] = _node("ShaderNodeMapping", inputs, vector_type=kind)
+    _assert_nodes_agree(builders, absolute=3e-6)
+
+
+def _procedural_scene():
+    """A sphere of wood on a chequered floor, of which nothing is an image; both engines mean its lobes exactly."""
+    scene = new_scene(96, 72)
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, location=(0, 0, 1))
+    sphere = bpy.context.object
+    bpy.ops.object.shade_smooth()
+    wood, tree, surface = new_material("wood")
+    point = tree.nodes.new("ShaderNodeTexCoord")
+    mapping = tree.nodes.new("ShaderNodeMapping")
+    noise = tree.nodes.new("ShaderNodeTexNoise")
+    ramp = tree.nodes.new("ShaderNodeValToRGB")
+    mapping.inputs["Scale"].default_value = (1, 1, 4)
+    mapping.inputs["Rotation"].default_value = (0.3, 0.2, 0.1)
+    for name, value in (("Scale", 3), ("Detail", 4.5), ("Distortion", 0.7)):
+        noise.inputs[name].default_value = value
+    first, last = ramp.color_ramp.elements
+    first.position, first.color, last.position, last.color = 0.35, (0.05, 0.02, 0.01, 1), 0.65, (0.8, 0.4, 0.1, 1)
+    tree.links.new(point.outputs["Object"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs[0], noise.inputs["Vector"])
+    tree.links.new(noise.outputs[0], ramp.inputs[0])
+    tree.links.new(ramp.outputs[0], surface.inputs["Color"])
+    sphere.data.materials.append(wood)
+
+    floor, tree, surface = new_material("floor")
+    checker = tree.nodes.new("ShaderNodeTexChecker")
+    checker.inputs["Scale"].default_value = 10
+    tree.links.new(checker.outputs[0], surface.inputs["Color"])
+    add_plane(8, floor)
+    add_light("AREA", (2, -2, 4), (0.6, 0.3, 0.4), energy=300, size=1)
+    add_camera((0, -5, 2.2), (1.35, 0, 0))
+    return scene
+
+
+def test_a_procedural_scene():
+    assert_agrees(_procedural_scene(), runs=4, samples=64)
+
+
+def test_it_is_bent_with_its_object():
+    """Coordinates of an object that is turned, scaled unevenly and moved stay its own; generated ones follow its box."""
+    scene = _procedural_scene()
+    sphere = next(o for o in bpy.data.objects if o.type == "MESH" and o.data.materials[0].name == "wood")
+    sphere.rotation_euler, sphere.scale, sphere.location = (0.5, 0.3, 0.9), (1.2, 0.7, 0.5), (0.3, 0.2, 1.1)
+    tree = bpy.data.materials["wood"].node_tree
+    point = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeTexCoord")
+    mapping = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeMapping")
+    tree.links.new(point.outputs["Generated"], mapping.inputs["Vector"])
+    assert_agrees(scene, runs=4, samples=64)
+
+
+def test_opacity_by_noise():
+    """Shadows, too, are let through."""
+    scene = _procedural_scene()
+    tree = bpy.data.materials["wood"].node_tree
+    new = tree.nodes.new
+    noise = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeTexNoise")
+    surface = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeBsdfDiffuse")
+    output = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeOutputMaterial")
+    mix, clear = new("ShaderNodeMixShader"), new("ShaderNodeBsdfTransparent")
+    tree.links.new(noise.outputs[0], mix.inputs[0])
+    tree.links.new(clear.outputs[0], mix.inputs[1])
+    tree.links.new(surface.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    assert_agrees(scene, runs=4, samples=64)
+
+
+def test_what_is_behind_a_ramp_is_named():
+    scene = _procedural_scene()
+    tree = bpy.data.materials["wood"].node_tree
+    brick = tree.nodes.new("ShaderNodeTexBrick")
+    ramp = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeValToRGB")
+    tree.links.new(brick.outputs["Fac"], ramp.inputs[0])
+    assert_warns(scene, 'node "Brick Texture"', "as Color")
