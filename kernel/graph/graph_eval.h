@@ -9,7 +9,9 @@
 #include "kernel/bsdf/fresnel.h"
 #include "kernel/graph/color_spaces.h"
 #include "kernel/graph/graph_program.h"
+#include "kernel/graph/musgrave.h"
 #include "kernel/graph/noise.h"
+#include "kernel/graph/voronoi.h"
 #include "kernel/texture/texture.h"
 
 namespace relief {
@@ -224,6 +226,86 @@ RELIEF_KERNEL void graph_hash_2d(const GraphOperands& o) { graph_hash<2>(o); }
 RELIEF_KERNEL void graph_hash_3d(const GraphOperands& o) { graph_hash<3>(o); }
 RELIEF_KERNEL void graph_hash_4d(const GraphOperands& o) { graph_hash<4>(o); }
 
+/// Cells at a point; then smoothness, exponent, randomness. Immediates: feature, metric. Outputs: distance, colour, position
+/// as x, y, z, w, radius; in one dimension the position is w.
+template <int kDims>
+RELIEF_KERNEL void graph_voronoi(const GraphOperands& o)
+{
+  F8 p[kDims];
+  for (int i = 0; i < kDims; ++i) p[i] = graph_in(o, i);
+  const VoronoiSettings<kDims> settings{static_cast<VoronoiFeature>(o.immediates[0]),
+                                        static_cast<VoronoiMetric>(o.immediates[1]), graph_in(o, kDims),
+                                        graph_in(o, kDims + 1), graph_in(o, kDims + 2)};
+  const Voronoi<kDims> cells = voronoi_eval<kDims>(p, settings);
+  graph_set(o, 0, cells.distance);
+  for (int i = 0; i < 3; ++i) graph_set(o, 1 + i, cells.color[i]);
+  for (int i = 0; i < 4; ++i) {
+    const int axis = kDims == 1 ? i - 3 : i;
+    graph_set(o, 4 + i, axis >= 0 && axis < kDims ? cells.position[axis] : F8{});
+  }
+  graph_set(o, 8, cells.distance);
+}
+RELIEF_KERNEL void graph_voronoi_1d(const GraphOperands& o) { graph_voronoi<1>(o); }
+RELIEF_KERNEL void graph_voronoi_2d(const GraphOperands& o) { graph_voronoi<2>(o); }
+RELIEF_KERNEL void graph_voronoi_3d(const GraphOperands& o) { graph_voronoi<3>(o); }
+RELIEF_KERNEL void graph_voronoi_4d(const GraphOperands& o) { graph_voronoi<4>(o); }
+
+/// Musgrave's noises at a point; then octaves, falloff, lacunarity, offset, gain. Immediate: type.
+template <int kDims>
+RELIEF_KERNEL void graph_musgrave(const GraphOperands& o)
+{
+  F8 p[kDims];
+  for (int i = 0; i < kDims; ++i) p[i] = graph_in(o, i);
+  const MusgraveSettings settings{clamp(graph_in(o, kDims), 0.0f, 16.0f), graph_in(o, kDims + 1),
+                                  graph_in(o, kDims + 2), graph_in(o, kDims + 3), graph_in(o, kDims + 4)};
+  graph_set(o, 0, musgrave_eval<kDims>(p, static_cast<MusgraveType>(o.immediates[0]), settings));
+}
+RELIEF_KERNEL void graph_musgrave_1d(const GraphOperands& o) { graph_musgrave<1>(o); }
+RELIEF_KERNEL void graph_musgrave_2d(const GraphOperands& o) { graph_musgrave<2>(o); }
+RELIEF_KERNEL void graph_musgrave_3d(const GraphOperands& o) { graph_musgrave<3>(o); }
+RELIEF_KERNEL void graph_musgrave_4d(const GraphOperands& o) { graph_musgrave<4>(o); }
+
+/// One brick's random tint.
+RELIEF_KERNEL float brick_tint(std::uint32_t row, std::uint32_t column)
+{
+  std::uint32_t n = ((row << 16) + (column & 0xffffu) + 1013u) & 0x7fffffffu;
+  n ^= n >> 13;
+  n = (n * (n * n * 60493u + 19990303u) + 1376312589u) & 0x7fffffffu;
+  return 0.5f * static_cast<float>(n) / 1073741824.0f;
+}
+
+/// Bricks at x, y; then mortar size and smoothness, bias, width, height, offset, squash. Immediates: every how many rows are
+/// shifted, and squashed; 0: none. Outputs: tint, share of mortar.
+RELIEF_KERNEL void graph_brick(const GraphOperands& o)
+{
+  alignas(32) float in[9][8], tint[8], mortar[8];
+  for (int i = 0; i < 9; ++i) store8(in[i], graph_in(o, i));
+  const auto row_of = [](float a) {
+    return static_cast<int>(clamp(__builtin_floorf(a), -2147483648.0f, 2147483520.0f));
+  };
+  for (int k = 0; k < 8; ++k) {
+    const float x_all = in[0][k], y_all = in[1][k], size = in[2][k], smooth = in[3][k], height = in[6][k];
+    float width = in[5][k], shift = 0.0f;
+    const int row = row_of(y_all / height);
+    const int shifted_rows = o.immediates[0], squashed_rows = o.immediates[1];
+    if (shifted_rows != 0 && squashed_rows != 0) {
+      width *= row % squashed_rows != 0 ? 1.0f : in[8][k];
+      shift = row % shifted_rows != 0 ? 0.0f : width * in[7][k];
+    }
+    const int column = row_of((x_all + shift) / width);
+    const float x = x_all + shift - width * static_cast<float>(column);
+    const float y = y_all - height * static_cast<float>(row);
+    tint[k] =
+        clamp(brick_tint(static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(column)) + in[4][k], 0.0f, 1.0f);
+    const float inside = min(min(x, y), min(width - x, height - y));
+    const float depth = 1.0f - inside / size;
+    const float t = clamp(depth / smooth, 0.0f, 1.0f);
+    mortar[k] = inside >= size ? 0.0f : smooth == 0.0f ? 1.0f : depth < smooth ? t * t * (3.0f - 2.0f * t) : 1.0f;
+  }
+  graph_set(o, 0, load8(tint));
+  graph_set(o, 1, load8(mortar));
+}
+
 /// Image at u, v (v up) with a footprint's width; linear RGBA. Immediate: texture.
 RELIEF_KERNEL void graph_image(const GraphOperands& o)
 {
@@ -241,15 +323,19 @@ RELIEF_KERNEL void graph_image(const GraphOperands& o)
 }
 
 /// Value of a table over 0…1. Immediates: its first float by low and high word, its entries, whether between two of them it
-/// is interpolated.
+/// is interpolated, whether it goes on beyond its ends.
 RELIEF_KERNEL void graph_table(const GraphOperands& o)
 {
   const float* table = o.program.tables + (o.immediates[0] | std::uint32_t{o.immediates[1]} << 16);
   const int last = o.immediates[2] - 1;
   const bool interpolated = o.immediates[3] != 0;
-  // A comparison that NaN fails comes first.
-  const F8 x = min(max(graph_in(o, 0), F8{}), splat8(1.0f)) * static_cast<float>(last);
-  graph_set(o, 0, each_lane(x, [=](float at) {
+  const bool goes_on = o.immediates[4] != 0 && last > 0;
+  graph_set(o, 0, each_lane(graph_in(o, 0), [=](float x) {
+              if (goes_on && x < 0.0f) return table[0] + (table[0] - table[1]) * -x * static_cast<float>(last);
+              if (goes_on && x > 1.0f) {
+                return table[last] + (table[last] - table[last - 1]) * (x - 1.0f) * static_cast<float>(last);
+              }
+              const float at = clamp(x, 0.0f, 1.0f) * static_cast<float>(last);
               const int i = at < static_cast<float>(last) ? static_cast<int>(at) : last;
               const float t = at - static_cast<float>(i);
               return interpolated && t > 0.0f ? (1.0f - t) * table[i] + t * table[i + 1] : table[i];

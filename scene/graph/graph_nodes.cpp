@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string>
 #include <tuple>
 
 namespace relief {
@@ -439,30 +440,159 @@ void lower_wave(GraphNode& n)
   n.set("color", splat(value), kColor);
 }
 
+constexpr GraphSocket kVoronoiInputs[] = {{"vector", kVector},           {"w", kNumber},
+                                          {"scale", kNumber, {5}},       {"smoothness", kNumber, {1}},
+                                          {"exponent", kNumber, {0.5f}}, {"randomness", kNumber, {1}}};
+void lower_voronoi(GraphNode& n)
+{
+  static constexpr std::string_view kFeatures[] = {"f1", "f2", "smooth-f1", "distance-to-edge", "n-sphere-radius"};
+  static constexpr std::string_view kMetrics[] = {"euclidean", "manhattan", "chebychev", "minkowski"};
+  GraphBuilder& b = n.build;
+  const int dimensions = static_cast<int>(n.reader.integer("dimensions", 3, 1, 4));
+  std::vector<GraphScalar> in = texture_point(n, dimensions);
+  for (GraphScalar& x : in) x = b(Op::multiply, {x, n.number("scale")});
+  // Of no smoothness nothing can be divided by.
+  const GraphScalar smoothness = clamped(b, scaled(b, n.number("smoothness"), 0.5f), 1e-6f, 0.5f);
+  in.insert(in.end(), {smoothness, n.number("exponent"), clamped(b, n.number("randomness"))});
+  const std::uint16_t immediates[] = {static_cast<std::uint16_t>(n.reader.choice("feature", kFeatures, 0)),
+                                      static_cast<std::uint16_t>(n.reader.choice("metric", kMetrics, 0))};
+  const std::vector<GraphScalar> out = b.apply(op_of_dimensions(Op::voronoi_1d, dimensions), in, immediates);
+  n.set("distance", out[0]);
+  n.set("color", {out[1], out[2], out[3]}, kColor);
+  n.set("position", each(b, Op::divide, GraphVector{out[4], out[5], out[6]}, splat(n.number("scale"))), kVector);
+  n.set("w", b(Op::divide, {out[7], n.number("scale")}));
+  n.set("radius", out[8]);
+}
+
+constexpr GraphSocket kMusgraveInputs[] = {{"vector", kVector},         {"w", kNumber},
+                                           {"scale", kNumber, {5}},     {"detail", kNumber, {2}},
+                                           {"dimension", kNumber, {2}}, {"lacunarity", kNumber, {2}},
+                                           {"offset", kNumber},         {"gain", kNumber, {1}}};
+void lower_musgrave(GraphNode& n)
+{
+  static constexpr std::string_view kTypes[] = {"multifractal", "fbm", "hybrid-multifractal", "ridged-multifractal",
+                                                "hetero-terrain"};
+  GraphBuilder& b = n.build;
+  const int dimensions = static_cast<int>(n.reader.integer("dimensions", 3, 1, 4));
+  std::vector<GraphScalar> in = texture_point(n, dimensions);
+  for (GraphScalar& x : in) x = b(Op::multiply, {x, n.number("scale")});
+  const GraphScalar least = b.constant(1e-5f);
+  const GraphScalar lacunarity = b(Op::maximum, {n.number("lacunarity"), least});
+  const GraphScalar dimension = b(Op::maximum, {n.number("dimension"), least});
+  const GraphScalar falloff = b(Op::power, {lacunarity, scaled(b, dimension, -1)});
+  in.insert(in.end(),
+            {clamped(b, n.number("detail"), 0, 15), falloff, lacunarity, n.number("offset"), n.number("gain")});
+  const auto type = static_cast<std::uint16_t>(n.reader.choice("musgrave", kTypes, 1));
+  n.set("factor", b.apply(op_of_dimensions(Op::musgrave_1d, dimensions), in, {&type, 1})[0]);
+}
+
+constexpr GraphSocket kBrickInputs[] = {{"vector", kVector},
+                                        {"color1", kColor, {0.8f, 0.8f, 0.8f}},
+                                        {"color2", kColor, {0.2f, 0.2f, 0.2f}},
+                                        {"mortar", kColor, {0, 0, 0}},
+                                        {"scale", kNumber, {5}},
+                                        {"mortarSize", kNumber, {0.02f}},
+                                        {"mortarSmooth", kNumber, {0.1f}},
+                                        {"bias", kNumber},
+                                        {"brickWidth", kNumber, {0.5f}},
+                                        {"rowHeight", kNumber, {0.25f}}};
+void lower_brick(GraphNode& n)
+{
+  GraphBuilder& b = n.build;
+  const auto option = [&](std::string_view name, float fallback) {
+    return b.constant(n.reader.number_f(name, fallback, -1e6, 1e6));
+  };
+  const GraphVector p = each(b, Op::multiply, n.vector("vector"), splat(n.number("scale")));
+  const GraphScalar in[] = {p[0],
+                            p[1],
+                            n.number("mortarSize"),
+                            n.number("mortarSmooth"),
+                            n.number("bias"),
+                            n.number("brickWidth"),
+                            n.number("rowHeight"),
+                            option("offset", 0.5f),
+                            option("squash", 1)};
+  const auto rows = [&](std::string_view name) {
+    return static_cast<std::uint16_t>(n.reader.integer(name, 2, 0, 1000));
+  };
+  const std::uint16_t immediates[] = {rows("offsetFrequency"), rows("squashFrequency")};
+  const std::vector<GraphScalar> out = b.apply(Op::brick, in, immediates);
+  const GraphVector bricks = mixed(b, out[0], n.vector("color1"), n.vector("color2"));
+  n.set("color", mixed(b, out[1], bricks, n.vector("mortar")), kColor);
+  n.set("factor", out[1]);
+}
+
 // ---- colour
+
+/// The tables of an option, interleaved: `channels` numbers an entry.
+/// @return  for each channel a function of the number that it is looked up by, 0…1 from the first entry to the last
+std::vector<std::function<GraphScalar(GraphScalar)>> read_tables(GraphNode& n,
+                                                                 std::size_t channels,
+                                                                 bool interpolate,
+                                                                 bool extrapolate)
+{
+  GraphBuilder& b = n.build;
+  constexpr std::size_t kMostEntries = 4096;
+  const std::vector<double> table = n.reader.numbers("table", channels, channels * kMostEntries, -1e30, 1e30);
+  if (table.empty() || table.size() % channels != 0) {
+    n.reader.fail("table", std::to_string(channels) + " numbers for every entry",
+                  std::to_string(table.size()) + " numbers");
+  }
+  const std::size_t num_entries = table.size() / channels;
+  std::vector<std::function<GraphScalar(GraphScalar)>> out;
+  for (std::size_t c = 0; c < channels; ++c) {
+    std::vector<float> row(num_entries);
+    for (std::size_t i = 0; i < num_entries; ++i) row[i] = static_cast<float>(table[channels * i + c]);
+    const std::uint32_t place = b.add_table(row);
+    const std::array<std::uint16_t, 5> immediates = {
+        static_cast<std::uint16_t>(place & 0xffffu), static_cast<std::uint16_t>(place >> 16),
+        static_cast<std::uint16_t>(num_entries), interpolate ? std::uint16_t{1} : std::uint16_t{0},
+        extrapolate ? std::uint16_t{1} : std::uint16_t{0}};
+    out.emplace_back([&b, immediates](GraphScalar at) { return b.apply(Op::table, {&at, 1}, immediates)[0]; });
+  }
+  return out;
+}
 
 constexpr GraphSocket kRampInputs[] = {{"factor", kNumber, {0.5f}}};
 void lower_color_ramp(GraphNode& n)
 {
+  const auto channels = read_tables(n, 4, n.reader.boolean("interpolate", true), false);
+  const GraphScalar at = n.number("factor");
+  n.set("color", {channels[0](at), channels[1](at), channels[2](at)}, kColor);
+  n.set("alpha", channels[3](at));
+}
+
+/// Values through curves, mixed with what they were.
+GraphVector through_curves(GraphNode& n, std::size_t channels, GraphScalar factor, const GraphVector& values)
+{
   GraphBuilder& b = n.build;
-  constexpr std::size_t kMostEntries = 4096;
-  const std::vector<double> table = n.reader.numbers("table", 4, 4 * kMostEntries, -1e30, 1e30);
-  if (table.empty() || table.size() % 4 != 0) n.reader.fail("table", "red, green, blue and alpha of every entry");
-  const std::size_t num_entries = table.size() / 4;
-  const bool is_interpolated = n.reader.boolean("interpolate", true);
-  GraphScalar out[4];
-  for (std::size_t c = 0; c < 4; ++c) {
-    std::vector<float> row(num_entries);
-    for (std::size_t i = 0; i < num_entries; ++i) row[i] = static_cast<float>(table[4 * i + c]);
-    const std::uint32_t place = b.add_table(row);
-    const std::uint16_t immediates[] = {
-        static_cast<std::uint16_t>(place & 0xffffu), static_cast<std::uint16_t>(place >> 16),
-        static_cast<std::uint16_t>(num_entries), is_interpolated ? std::uint16_t{1} : std::uint16_t{0}};
-    const GraphScalar at[] = {n.number("factor")};
-    out[c] = b.apply(Op::table, at, immediates)[0];
+  const auto curves = read_tables(n, channels, true, n.reader.boolean("extrapolate", true));
+  const float low = n.reader.number_f("min", 0, -1e6, 1e6), high = n.reader.number_f("max", 1, -1e6, 1e6);
+  if (!(high > low)) n.reader.fail("max", "a number > min");
+  GraphVector out;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const GraphScalar at = b(Op::divide, {b(Op::subtract, {values[c], b.constant(low)}), b.constant(high - low)});
+    out[c] = mixed(b, factor, values[c], curves[channels == 1 ? 0 : c](at));
   }
-  n.set("color", {out[0], out[1], out[2]}, kColor);
-  n.set("alpha", out[3]);
+  return out;
+}
+
+constexpr GraphSocket kColorCurvesInputs[] = {{"factor", kNumber, {1}}, {"color", kColor, {1, 1, 1}}};
+void lower_color_curves(GraphNode& n)
+{
+  n.set("color", through_curves(n, 3, n.number("factor"), n.vector("color")), kColor);
+}
+
+constexpr GraphSocket kVectorCurvesInputs[] = {{"factor", kNumber, {1}}, {"vector", kVector}};
+void lower_vector_curves(GraphNode& n)
+{
+  n.set("vector", through_curves(n, 3, n.number("factor"), n.vector("vector")), kVector);
+}
+
+constexpr GraphSocket kNumberCurveInputs[] = {{"factor", kNumber, {1}}, {"value", kNumber, {1}}};
+void lower_number_curve(GraphNode& n)
+{
+  n.set("value", through_curves(n, 1, n.number("factor"), splat(n.number("value")))[0]);
 }
 
 GraphScalar sum3(GraphBuilder& b, GraphScalar x, GraphScalar y, GraphScalar z)
@@ -983,7 +1113,13 @@ constexpr GraphNodeKind kKinds[] = {
     {"checker-texture", kCheckerInputs, lower_checker},
     {"magic-texture", kMagicInputs, lower_magic},
     {"wave-texture", kWaveInputs, lower_wave},
+    {"voronoi-texture", kVoronoiInputs, lower_voronoi},
+    {"musgrave-texture", kMusgraveInputs, lower_musgrave},
+    {"brick-texture", kBrickInputs, lower_brick},
     {"color-ramp", kRampInputs, lower_color_ramp},
+    {"color-curves", kColorCurvesInputs, lower_color_curves},
+    {"vector-curves", kVectorCurvesInputs, lower_vector_curves},
+    {"number-curve", kNumberCurveInputs, lower_number_curve},
     {"mix-color", kMixColorInputs, lower_mix_color},
     {"mix-vector", kMixVectorInputs, lower_mix_vector},
     {"mix-number", kMixNumberInputs, lower_mix_number},

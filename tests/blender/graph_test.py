@@ -197,6 +197,87 @@ def test_other_textures():
     _assert_nodes_agree(builders, relative=1e-4, absolute=1e-5, most_off=2e-3)
 
 
+def test_voronoi_textures():
+    builders = {}
+    for dimensions in ("1D", "2D", "3D", "4D"):
+        for feature in ("F1", "F2", "SMOOTH_F1", "DISTANCE_TO_EDGE", "N_SPHERE_RADIUS"):
+            outs = ("Distance", "Color", "Position", "W") if "F" in feature.split("_")[-1] else ("Distance",)
+            if feature == "N_SPHERE_RADIUS":
+                outs = ("Radius",)
+            for out in outs:
+                if (out == "W" and dimensions not in {"1D", "4D"}) or (out == "Position" and dimensions == "1D"):
+                    continue
+                inputs = {"Vector": "xyz", "W": "w", "Scale": 1.7, "Smoothness": 0.6, "Randomness": 0.8}
+                builders[f"{dimensions} {feature} {out}"] = _node(
+                    "ShaderNodeTexVoronoi", inputs, out, voronoi_dimensions=dimensions, feature=feature
+                )
+    for metric in ("MANHATTAN", "CHEBYCHEV", "MINKOWSKI"):
+        inputs = {"Vector": "xyz", "Scale": 1.7, "Exponent": 1.6}
+        builders[metric] = _node("ShaderNodeTexVoronoi", inputs, 0, distance=metric)
+    _assert_nodes_agree(builders, absolute=1e-5, most_off=2e-3)
+
+
+def test_musgrave_textures():
+    builders = {}
+    for dimensions in ("1D", "2D", "3D", "4D"):
+        for kind in ("MULTIFRACTAL", "RIDGED_MULTIFRACTAL", "HYBRID_MULTIFRACTAL", "FBM", "HETERO_TERRAIN"):
+            inputs = {"Vector": "xyz", "W": "w", "Scale": 1.3, "Detail": 3.4, "Dimension": 0.9, "Lacunarity": 1.8}
+            inputs.update({"Offset": 0.7, "Gain": 1.3})
+            builders[f"{dimensions} {kind}"] = _node(
+                "ShaderNodeTexMusgrave", inputs, musgrave_dimensions=dimensions, musgrave_type=kind
+            )
+    for kind in ("RIDGED_MULTIFRACTAL", "HYBRID_MULTIFRACTAL", "HETERO_TERRAIN"):
+        inputs = {"Vector": "xyz", "Scale": 1.3, "Detail": 0.6, "Offset": 0.7, "Gain": 1.3}
+        builders[f"{kind} of little detail"] = _node("ShaderNodeTexMusgrave", inputs, musgrave_type=kind)
+    _assert_nodes_agree(builders)
+
+
+def test_brick_textures():
+    builders = {}
+    for out in (0, 1):
+        inputs = {"Vector": "xyz", "Scale": 1.3, "Mortar Size": 0.05, "Mortar Smooth": 0.3, "Bias": -0.2}
+        builders[f"bricks {out}"] = _node("ShaderNodeTexBrick", inputs, out)
+        shifted = {"offset": 0.3, "offset_frequency": 3, "squash": 0.6, "squash_frequency": 2}
+        builders[f"squashed {out}"] = _node("ShaderNodeTexBrick", inputs, out, **shifted)
+    sharp = {"Vector": "xyz", "Scale": 1.3, "Mortar Size": 0.05, "Mortar Smooth": 0.0}
+    builders["sharp"] = _node("ShaderNodeTexBrick", sharp, 1)
+    _assert_nodes_agree(builders, absolute=1e-5, most_off=2e-3)
+
+
+def test_curves():
+    def bent(mapping, curves):
+        for number, curve in enumerate(curves):
+            curve.points[0].location = (0.1, 0.05 * number)
+            curve.points.new(0.4, 0.7 - 0.1 * number)
+        mapping.update()
+
+    def rgb(extend, factor):
+        def builder(tree, xyz, w):
+            node = tree.nodes.new("ShaderNodeRGBCurve")
+            node.mapping.extend = extend
+            bent(node.mapping, node.mapping.curves)
+            node.inputs[0].default_value = factor
+            tree.links.new(xyz, node.inputs["Color"])
+            return node.outputs[0]
+
+        return builder
+
+    def number(tree, xyz, w):
+        node = tree.nodes.new("ShaderNodeFloatCurve")
+        bent(node.mapping, node.mapping.curves)
+        tree.links.new(w, node.inputs["Value"])
+        return node.outputs[0]
+
+    def vector(tree, xyz, w):
+        node = tree.nodes.new("ShaderNodeVectorCurve")
+        bent(node.mapping, node.mapping.curves)
+        tree.links.new(xyz, node.inputs["Vector"])
+        return node.outputs[0]
+
+    builders = {f"{extend} {f}": rgb(extend, f) for extend in ("EXTRAPOLATED", "HORIZONTAL") for f in (1.0, 0.6)}
+    _assert_nodes_agree({**builders, "number": number, "vector": vector}, low=-1.2, high=1.4, absolute=1e-5)
+
+
 def test_math():
     operations = bpy.types.ShaderNodeMath.bl_rna.properties["operation"].enum_items.keys()
     builders = {
@@ -378,7 +459,7 @@ def test_opacity_by_noise():
 def test_what_is_behind_a_ramp_is_named():
     scene = _procedural_scene()
     tree = bpy.data.materials["wood"].node_tree
-    brick = tree.nodes.new("ShaderNodeTexBrick")
+    sky = tree.nodes.new("ShaderNodeTexSky")
     ramp = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeValToRGB")
-    tree.links.new(brick.outputs["Fac"], ramp.inputs[0])
-    assert_warns(scene, 'node "Brick Texture"', "as Color")
+    tree.links.new(sky.outputs[0], ramp.inputs[0])
+    assert_warns(scene, 'node "Sky Texture"', "as Color")

@@ -229,6 +229,56 @@ def _image(g, node, groups):
     return g.add("image-texture", {"vector": vector}, texture=info, colorSpace=space)
 
 
+_VORONOI = {
+    "F1": "f1",
+    "F2": "f2",
+    "SMOOTH_F1": "smooth-f1",
+    "DISTANCE_TO_EDGE": "distance-to-edge",
+    "N_SPHERE_RADIUS": "n-sphere-radius",
+}
+
+
+def _voronoi(g, node, groups):
+    if compat.IS_5_0:
+        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): the cells of 5.0')
+    node_detail = node.inputs.get("Detail")
+    if node_detail is not None and nodes.fold(node_detail, groups) != 0.0 or getattr(node, "normalize", False):
+        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): detail or normalisation')
+    dimensions = _DIMENSIONS[node.voronoi_dimensions]
+    inputs = {"vector": g.vector(node, groups, "generated")} if dimensions > 1 else {}
+    if dimensions in {1, 4}:
+        inputs["w"] = g.value(node.inputs["W"], groups)
+    names = {"Scale": "scale", "Smoothness": "smoothness", "Exponent": "exponent", "Randomness": "randomness"}
+    inputs.update(g.inputs(node, groups, names))
+    feature = _choice(node, node.feature, _VORONOI)
+    return g.add("voronoi-texture", inputs, dimensions=dimensions, feature=feature, metric=_label(node.distance))
+
+
+def _musgrave(g, node, groups):
+    dimensions = _DIMENSIONS[node.musgrave_dimensions]
+    inputs = {"vector": g.vector(node, groups, "generated")} if dimensions > 1 else {}
+    if dimensions in {1, 4}:
+        inputs["w"] = g.value(node.inputs["W"], groups)
+    names = {"Scale": "scale", "Detail": "detail", "Dimension": "dimension", "Lacunarity": "lacunarity"}
+    inputs.update(g.inputs(node, groups, {**names, "Offset": "offset", "Gain": "gain"}))
+    return g.add("musgrave-texture", inputs, dimensions=dimensions, musgrave=_label(node.musgrave_type))
+
+
+def _brick(g, node, groups):
+    inputs = {"vector": g.vector(node, groups, "generated")}
+    names = {"Color1": "color1", "Color2": "color2", "Mortar": "mortar", "Scale": "scale", "Mortar Size": "mortarSize"}
+    names.update({"Mortar Smooth": "mortarSmooth", "Bias": "bias", "Brick Width": "brickWidth", "Row Height": "rowHeight"})
+    inputs.update(g.inputs(node, groups, names))
+    return g.add(
+        "brick-texture",
+        inputs,
+        offset=node.offset,
+        offsetFrequency=node.offset_frequency,
+        squash=node.squash,
+        squashFrequency=node.squash_frequency,
+    )
+
+
 def _gradient(g, node, groups):
     kinds = {
         "LINEAR": "linear",
@@ -278,6 +328,40 @@ def _ramp(g, node, groups):
     interpolated = node.color_ramp.interpolation != "CONSTANT"
     inputs = g.inputs(node, groups, {0: "factor"})
     return g.add("color-ramp", inputs, table=table, interpolate=interpolated)
+
+
+def _curve_table(mapping, curves, combined=None):
+    """Options of curves: their tables over the range that they are drawn in.
+
+    @param  curves    one or three CurveMap
+    @param  combined  CurveMap that values pass before; None: none
+    """
+    mapping.initialize()
+    ends = [point.location[0] for curve in (*curves, *([combined] if combined else [])) for point in curve.points]
+    low, high = min(ends), max(ends)
+    table = []
+    for i in range(_TABLE):
+        x = low + (high - low) * i / (_TABLE - 1)
+        if combined is not None:
+            x = mapping.evaluate(combined, x)
+        table.extend(mapping.evaluate(curve, x) for curve in curves)
+    return {"table": table, "min": low, "max": high, "extrapolate": mapping.extend == "EXTRAPOLATED"}
+
+
+def _rgb_curves(g, node, groups):
+    inputs = g.inputs(node, groups, {0: "factor", "Color": "color"})
+    curves = node.mapping.curves
+    return g.add("color-curves", inputs, **_curve_table(node.mapping, curves[:3], curves[3]))
+
+
+def _vector_curves(g, node, groups):
+    inputs = g.inputs(node, groups, {0: "factor", "Vector": "vector"})
+    return g.add("vector-curves", inputs, **_curve_table(node.mapping, node.mapping.curves[:3]))
+
+
+def _float_curve(g, node, groups):
+    inputs = g.inputs(node, groups, {0: "factor", "Value": "value"})
+    return g.add("number-curve", inputs, **_curve_table(node.mapping, node.mapping.curves[:1]))
 
 
 _BLENDS = (
@@ -415,6 +499,15 @@ _NODES = {
     "ShaderNodeTexChecker": (_checker, _FACTOR),
     "ShaderNodeTexMagic": (_magic, _FACTOR),
     "ShaderNodeTexWave": (_wave, _FACTOR),
+    "ShaderNodeTexVoronoi": (
+        _voronoi,
+        {"Distance": "distance", "Color": "color", "Position": "position", "W": "w", "Radius": "radius"},
+    ),
+    "ShaderNodeTexMusgrave": (_musgrave, _FACTOR),
+    "ShaderNodeTexBrick": (_brick, _FACTOR),
+    "ShaderNodeRGBCurve": (_rgb_curves, {"Color": "color"}),
+    "ShaderNodeVectorCurve": (_vector_curves, {"Vector": "vector"}),
+    "ShaderNodeFloatCurve": (_float_curve, {"Value": "value"}),
     "ShaderNodeValToRGB": (_ramp, {"Color": "color", "Alpha": "alpha"}),
     "ShaderNodeMixRGB": (_mix_rgb, {"Color": "color"}),
     "ShaderNodeInvert": (_simple("invert", {0: "factor", "Color": "color"}), {"Color": "color"}),

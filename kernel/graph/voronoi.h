@@ -1,0 +1,285 @@
+// Cell noise in 1 to 4 dimensions, eight points at a time: a random point in each cell of a lattice, and what is near of them.
+// The numbers are those of Blender's Voronoi Texture.
+//
+// Worley 1996, "A Cellular Texture Basis Function". Quilez 2012, "Voronoi edges": the distance to borders.
+#pragma once
+
+#include <cmath>
+
+#include "kernel/graph/noise.h"
+
+namespace relief {
+
+enum class VoronoiFeature : std::uint16_t { kF1, kF2, kSmoothF1, kDistanceToEdge, kSphereRadius };
+enum class VoronoiMetric : std::uint16_t { kEuclidean, kManhattan, kChebychev, kMinkowski };
+
+template <int kDims>
+struct VoronoiSettings {
+  VoronoiFeature feature;
+  VoronoiMetric metric;
+  F8 smoothness;  ///< (0, ½]
+  F8 exponent;    ///< of Minkowski's metric
+  F8 randomness;  ///< [0, 1]: of the points in their cells
+};
+
+template <int kDims>
+struct Voronoi {
+  F8 distance{};         ///< or radius
+  F8 color[3]{};         ///< random colour of the cell
+  F8 position[kDims]{};  ///< of its point
+};
+
+/// The point of a cell, [0, 1] along each axis.
+/// @param cell  its lower corner
+template <int kDims>
+RELIEF_KERNEL void voronoi_point(const F8 (&cell)[kDims], F8 (&point)[kDims])
+{
+  if constexpr (kDims == 1) {
+    point[0] = hash_unit(cell);
+  } else if constexpr (kDims == 4) {
+    const F8 x = cell[0], y = cell[1], z = cell[2], w = cell[3];
+    point[0] = hash_unit({x, y, z, w});
+    point[1] = hash_unit({w, x, y, z});
+    point[2] = hash_unit({z, w, x, y});
+    point[3] = hash_unit({y, z, w, x});
+  } else {
+    point[0] = hash_unit(cell);
+    for (int i = 1; i < kDims; ++i) {
+      F8 key[kDims + 1];
+      for (int k = 0; k < kDims; ++k) key[k] = cell[k];
+      key[kDims] = splat8(static_cast<float>(i));
+      point[i] = hash_unit(key);
+    }
+  }
+}
+
+/// The colour of a cell.
+template <int kDims>
+RELIEF_KERNEL void voronoi_color(const F8 (&cell)[kDims], F8 (&color)[3])
+{
+  color[0] = hash_unit(cell);
+  if constexpr (kDims == 4) {
+    const F8 x = cell[0], y = cell[1], z = cell[2], w = cell[3];
+    color[1] = hash_unit({z, x, w, y});
+    color[2] = hash_unit({w, z, y, x});
+  } else {
+    for (int i = 1; i < 3; ++i) {
+      F8 key[kDims + 1];
+      for (int k = 0; k < kDims; ++k) key[k] = cell[k];
+      key[kDims] = splat8(static_cast<float>(i));
+      color[i] = hash_unit(key);
+    }
+  }
+}
+
+template <int kDims>
+RELIEF_KERNEL F8 voronoi_distance(const F8 (&a)[kDims], const F8 (&b)[kDims], const VoronoiSettings<kDims>& settings)
+{
+  F8 sum{};
+  if (kDims == 1) return abs(a[0] - b[0]);
+  switch (settings.metric) {
+    case VoronoiMetric::kEuclidean:
+      for (int i = 0; i < kDims; ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
+      return sqrt(sum);
+    case VoronoiMetric::kManhattan:
+      for (int i = 0; i < kDims; ++i) sum += abs(a[i] - b[i]);
+      return sum;
+    case VoronoiMetric::kChebychev:
+      for (int i = 0; i < kDims; ++i) sum = max(sum, abs(a[i] - b[i]));
+      return sum;
+    case VoronoiMetric::kMinkowski:
+      break;
+  }
+  for (int lane = 0; lane < 8; ++lane) {
+    const float exponent = settings.exponent[lane];
+    float of_lane = 0.0f;
+    for (int i = 0; i < kDims; ++i) of_lane += std::pow(__builtin_fabsf(a[i][lane] - b[i][lane]), exponent);
+    sum[lane] = std::pow(of_lane, 1.0f / exponent);
+  }
+  return sum;
+}
+
+/// Calls visit(offset, point) for all cells up to `reach` away: the offset of a cell and its point from the corner of the
+/// middle one. The first axis moves fastest.
+template <int kDims, typename F>
+RELIEF_KERNEL void voronoi_cells(const F8 (&cell)[kDims], F8 randomness, int reach, F&& visit)
+{
+  const int side = 2 * reach + 1;
+  int count = 1;
+  for (int i = 0; i < kDims; ++i) count *= side;
+  for (int n = 0; n < count; ++n) {
+    F8 offset[kDims], corner[kDims], point[kDims];
+    for (int i = 0, rest = n; i < kDims; ++i, rest /= side) {
+      offset[i] = splat8(static_cast<float>(rest % side - reach));
+      corner[i] = cell[i] + offset[i];
+    }
+    voronoi_point<kDims>(corner, point);
+    for (int i = 0; i < kDims; ++i) point[i] = offset[i] + point[i] * randomness;
+    visit(offset, point);
+  }
+}
+
+template <int kDims>
+RELIEF_KERNEL void assign_where(I8 is, F8 (&to)[kDims], const F8 (&from)[kDims])
+{
+  for (int i = 0; i < kDims; ++i) to[i] = is ? from[i] : to[i];
+}
+
+/// The nearest point, or the second, and its cell.
+template <int kDims>
+RELIEF_KERNEL Voronoi<kDims> voronoi_nearest(const F8 (&cell)[kDims],
+                                             const F8 (&local)[kDims],
+                                             const VoronoiSettings<kDims>& settings)
+{
+  constexpr float kFar = 8.0f;
+  F8 first = splat8(kFar), second = splat8(kFar);
+  F8 offset1[kDims]{}, offset2[kDims]{}, point1[kDims]{}, point2[kDims]{};
+  voronoi_cells<kDims>(cell, settings.randomness, 1, [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
+    const F8 distance = voronoi_distance<kDims>(point, local, settings);
+    const I8 is_first = distance < first, is_second = ~is_first & (distance < second);
+    second = is_first ? first : is_second ? distance : second;
+    assign_where(is_first, offset2, offset1);
+    assign_where(is_first, point2, point1);
+    assign_where(is_second, offset2, offset);
+    assign_where(is_second, point2, point);
+    first = is_first ? distance : first;
+    assign_where(is_first, offset1, offset);
+    assign_where(is_first, point1, point);
+  });
+  const bool is_f2 = settings.feature == VoronoiFeature::kF2;
+  Voronoi<kDims> out;
+  out.distance = is_f2 ? second : first;
+  F8 at[kDims];
+  for (int i = 0; i < kDims; ++i) {
+    at[i] = cell[i] + (is_f2 ? offset2[i] : offset1[i]);
+    out.position[i] = (is_f2 ? point2[i] : point1[i]) + cell[i];
+  }
+  voronoi_color<kDims>(at, out.color);
+  return out;
+}
+
+/// All points near, the nearer the more.
+template <int kDims>
+RELIEF_KERNEL Voronoi<kDims> voronoi_smooth(const F8 (&cell)[kDims],
+                                            const F8 (&local)[kDims],
+                                            const VoronoiSettings<kDims>& settings)
+{
+  Voronoi<kDims> out;
+  out.distance = splat8(8.0f);
+  const F8 smoothness = settings.smoothness;
+  voronoi_cells<kDims>(cell, settings.randomness, 2, [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
+    const F8 distance = voronoi_distance<kDims>(point, local, settings);
+    const F8 t = clamp(0.5f + 0.5f * (out.distance - distance) / smoothness, 0.0f, 1.0f);
+    const F8 h = t * t * (3.0f - 2.0f * t);
+    F8 correction = smoothness * h * (1.0f - h);
+    out.distance = (out.distance + h * (distance - out.distance)) - correction;
+    correction /= 1.0f + 3.0f * smoothness;
+    F8 corner[kDims], color[3];
+    for (int i = 0; i < kDims; ++i) corner[i] = cell[i] + offset[i];
+    voronoi_color<kDims>(corner, color);
+    for (int i = 0; i < 3; ++i) out.color[i] = (out.color[i] + h * (color[i] - out.color[i])) - correction;
+    for (int i = 0; i < kDims; ++i) out.position[i] = (out.position[i] + h * (point[i] - out.position[i])) - correction;
+  });
+  for (int i = 0; i < kDims; ++i) out.position[i] += cell[i];
+  return out;
+}
+
+/// Distance to the nearest border between two cells.
+template <int kDims>
+RELIEF_KERNEL F8 voronoi_edge(const F8 (&cell)[kDims], const F8 (&local)[kDims], const VoronoiSettings<kDims>& settings)
+{
+  F8 nearest = splat8(8.0f);
+  F8 to_nearest[kDims]{};
+  const auto squared = [](const F8(&v)[kDims]) {
+    F8 sum{};
+    for (int i = 0; i < kDims; ++i) sum += v[i] * v[i];
+    return sum;
+  };
+  voronoi_cells<kDims>(cell, settings.randomness, 1, [&](const F8(&)[kDims], const F8(&point)[kDims]) {
+    F8 to_point[kDims];
+    for (int i = 0; i < kDims; ++i) to_point[i] = point[i] - local[i];
+    const F8 distance = squared(to_point);
+    const I8 is_nearer = distance < nearest;
+    nearest = is_nearer ? distance : nearest;
+    assign_where(is_nearer, to_nearest, to_point);
+  });
+  F8 edge = splat8(8.0f);
+  voronoi_cells<kDims>(cell, settings.randomness, 1, [&](const F8(&)[kDims], const F8(&point)[kDims]) {
+    F8 across[kDims], middle[kDims];
+    for (int i = 0; i < kDims; ++i) {
+      const F8 to_point = point[i] - local[i];
+      across[i] = to_point - to_nearest[i];
+      middle[i] = 0.5f * (to_nearest[i] + to_point);
+    }
+    // Another point than the nearest.
+    constexpr float kApart = 1e-4f;
+    const F8 length_squared = squared(across);
+    F8 distance{};
+    for (int i = 0; i < kDims; ++i) distance += middle[i] * across[i];
+    distance /= sqrt(length_squared);
+    edge = length_squared > kApart ? min(edge, distance) : edge;
+  });
+  return edge;
+}
+
+/// Half the distance from the nearest point to the point nearest to that.
+template <int kDims>
+RELIEF_KERNEL F8 voronoi_radius(const F8 (&cell)[kDims],
+                                const F8 (&local)[kDims],
+                                const VoronoiSettings<kDims>& settings)
+{
+  const auto distance_of = [](const F8(&a)[kDims], const F8(&b)[kDims]) {
+    F8 sum{};
+    for (int i = 0; i < kDims; ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
+    return sqrt(sum);
+  };
+  F8 nearest = splat8(8.0f);
+  F8 own_offset[kDims]{}, own_point[kDims]{};
+  voronoi_cells<kDims>(cell, settings.randomness, 1, [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
+    const F8 distance = distance_of(point, local);
+    const I8 is_nearer = distance < nearest;
+    nearest = is_nearer ? distance : nearest;
+    assign_where(is_nearer, own_offset, offset);
+    assign_where(is_nearer, own_point, point);
+  });
+  F8 own_cell[kDims], from_own[kDims];
+  for (int i = 0; i < kDims; ++i) {
+    own_cell[i] = cell[i] + own_offset[i];
+    from_own[i] = own_point[i] - own_offset[i];
+  }
+  F8 radius = splat8(8.0f);
+  voronoi_cells<kDims>(own_cell, settings.randomness, 1, [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
+    bool is_own = true;
+    for (int i = 0; i < kDims; ++i) is_own = is_own && offset[i][0] == 0.0f;
+    if (!is_own) radius = min(radius, distance_of(point, from_own));
+  });
+  return 0.5f * radius;
+}
+
+/// @param p  any floats
+template <int kDims>
+RELIEF_KERNEL Voronoi<kDims> voronoi_eval(const F8 (&p)[kDims], const VoronoiSettings<kDims>& settings)
+{
+  F8 cell[kDims], local[kDims];
+  for (int i = 0; i < kDims; ++i) {
+    cell[i] = floor(p[i]);
+    local[i] = p[i] - cell[i];
+  }
+  Voronoi<kDims> out;
+  switch (settings.feature) {
+    case VoronoiFeature::kF1:
+    case VoronoiFeature::kF2:
+      return voronoi_nearest<kDims>(cell, local, settings);
+    case VoronoiFeature::kSmoothF1:
+      return voronoi_smooth<kDims>(cell, local, settings);
+    case VoronoiFeature::kDistanceToEdge:
+      out.distance = voronoi_edge<kDims>(cell, local, settings);
+      break;
+    case VoronoiFeature::kSphereRadius:
+      out.distance = voronoi_radius<kDims>(cell, local, settings);
+      break;
+  }
+  return out;
+}
+
+}  // namespace relief
