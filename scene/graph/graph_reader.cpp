@@ -148,6 +148,8 @@ void Reader::lower(std::size_t index)
     const TextureRef ref = khronos_texture_ref(
         document, r, "texture", is_linear ? TextureColor::kLinear : TextureColor::kSrgb, textures, warnings);
     if (ref.texture_index < 0) r.fail("texture", "{\"index\": …}");
+    // Programs have 16 bits for it.
+    if (ref.texture_index > 0xffff) r.fail("texture", "one of the scene's first 65,536 textures");
     return ref.texture_index;
   };
   GraphNode node{build, source.reader, inputs, values[index], texture};
