@@ -170,10 +170,10 @@ def test_unknown_shader_is_warned_about():
 
 
 def test_unknown_color_node_is_warned_about():
-    material, tree, node = new_material("noisy", "ShaderNodeBsdfDiffuse", Color=(0.3, 0.2, 0.1, 1))
-    noise = tree.nodes.new("ShaderNodeTexNoise")
-    tree.links.new(noise.outputs["Color"], node.inputs["Color"])
-    assert_warns(_stage(material), 'material "noisy"', "Noise Texture", "(0.3, 0.2, 0.1, 1.0) was used")
+    material, tree, node = new_material("sky", "ShaderNodeBsdfDiffuse", Color=(0.3, 0.2, 0.1, 1))
+    sky = tree.nodes.new("ShaderNodeTexSky")
+    tree.links.new(sky.outputs["Color"], node.inputs["Color"])
+    assert_warns(_stage(material), 'material "sky"', "Sky Texture", "(0.3, 0.2, 0.1, 1.0) was used")
 
 
 def test_subsurface_is_warned_about():

@@ -161,7 +161,7 @@ def _warn():
     for index in range(12):
         material = diffuse((0.2, 0.3, 0.8), f"pattern {index}")
         tree = material.node_tree
-        tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], tree.nodes["Diffuse BSDF"].inputs["Color"])
+        tree.links.new(tree.nodes.new("ShaderNodeTexSky").outputs["Color"], tree.nodes["Diffuse BSDF"].inputs["Color"])
         add_sphere(0.2, material, (index * 0.3 - 2, -2, 0.2))
     _show_panels("ball", "RENDER")()
     _area().spaces.active.shading.type = "RENDERED"
