@@ -17,12 +17,12 @@ enum class GraphOp : std::uint16_t {
 #undef X
 };
 
+/// Without the name: data that points to something is not the same for every instruction set.
 struct GraphOpShape {
-  const char* name;
   int num_outputs, num_inputs, num_immediates;
 };
 inline constexpr GraphOpShape kGraphOpShapes[] = {
-#define X(name, outputs, inputs, immediates) {#name, outputs, inputs, immediates},
+#define X(name, outputs, inputs, immediates) {outputs, inputs, immediates},
 #include "kernel/graph/graph_ops.inc"
 #undef X
 };
