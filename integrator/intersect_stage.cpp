@@ -274,7 +274,7 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
     float alpha = 0.0f;
     if ((material.graph_outputs >> static_cast<int>(GraphOutput::alpha) & 1u) != 0) {
       const SurfaceHit hit = surface_hit_make(mesh, instance, at.triangle, at.u, at.v);
-      alpha = graph_alpha(material, g.graphs[material.graph_index], g.textures,
+      alpha = graph_alpha(material, g.run_graph, g.graphs[material.graph_index], g.textures,
                           {&mesh, &instance, at.triangle, at.u, at.v, &hit, -context->D, {0.0f, 0.0f}});
     } else {
       alpha = triangle_alpha(material, g.textures, mesh, at.triangle, at.u, at.v);

@@ -114,6 +114,7 @@ SceneContext::SceneContext(const Scene& loaded,
   for (const GraphProgram& graph : scene.graphs) graphs.push_back(graph.view());
   globals.materials = scene.materials.data();
   globals.graphs = graphs.data();
+  globals.run_graph = stage_table_select().run_graph;
   globals.textures = scene.textures->views().data();
   globals.area_light_index = lights.area_lights.data();
   globals.lights = lights.view();

@@ -79,7 +79,7 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
       const SurfaceInteraction at = surface_interaction_locate<kFeatures>(g, state, path, wo);
       graph_load_point(program, surface_graph_point(g, state, path, at, wo), static_cast<int>(count), registers);
     }
-    graph_run(program, g.textures, registers);
+    g.run_graph(program, g.textures, registers);
     for (std::uint32_t lane = 0; lane < count; ++lane) {
       const GraphValues values = graph_values(program, registers, static_cast<int>(lane));
       shade_surface<kFeatures>(g, state, queue.paths[first + lane], next, shadow, counters, &values);
@@ -176,7 +176,7 @@ void finish(const KernelGlobals& g,
   }
 }
 
-constexpr StageTable kTable = {
+const StageTable kTable = {
     RELIEF_ISA_NAME,
     generate,
     {shade_surfaces<kSurfaceKernelFeatures[0]>, shade_surfaces<kSurfaceKernelFeatures[1]>,
@@ -191,6 +191,7 @@ constexpr StageTable kTable = {
     emit,
     shade_photons,
     finish,
+    RELIEF_GRAPH_RUN,
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Entry points of the shading stages. stages.cpp is compiled once for every instruction set; the table is chosen when
+// Entry points of the shading stages. stages.cpp and graph_stage.cpp are compiled once for every instruction set; the table is chosen when
 // the program starts.
 #pragma once
 
@@ -55,7 +55,12 @@ struct StageTable {
   /// Adds the batch's finished samples to the film, in path order; what paths that forked have found goes to their root's.
   /// @param first_nonfinite  pixel << 32 | sample, lowered to the least of the samples that were dropped
   void (*finish)(const KernelGlobals&, PathState&, const Batch&, Counters&, std::uint64_t& first_nonfinite);
+  GraphRun run_graph;
 };
+
+/// The interpreter of value graphs: see GraphRun.
+void graph_run_baseline(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers);
+void graph_run_avx2(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers);
 
 const StageTable& stage_table_baseline();
 const StageTable& stage_table_avx2();

@@ -7,7 +7,7 @@
 #include "kernel/film/film_accumulator.h"
 #include "kernel/film/mist.h"
 #include "kernel/film/pixel_filter.h"
-#include "kernel/graph/graph_program.h"
+#include "kernel/graph/graph_registers.h"
 #include "kernel/light/light_sampler.h"
 #include "kernel/photon/photon.h"
 #include "kernel/shape/mesh_view.h"
@@ -29,6 +29,7 @@ struct KernelGlobals {
   std::uint32_t num_instances = 0;
   const Material* materials = nullptr;
   const GraphProgramView* graphs = nullptr;  ///< by Material::graph_index
+  GraphRun run_graph = nullptr;
   const TextureView* textures = nullptr;
   const std::uint32_t* area_light_index = nullptr;  ///< light of object num_instances + i
   LightsView lights;

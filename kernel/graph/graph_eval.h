@@ -8,18 +8,13 @@
 
 #include "kernel/bsdf/fresnel.h"
 #include "kernel/graph/color_spaces.h"
-#include "kernel/graph/graph_program.h"
+#include "kernel/graph/graph_registers.h"
 #include "kernel/graph/musgrave.h"
 #include "kernel/graph/noise.h"
 #include "kernel/graph/voronoi.h"
 #include "kernel/texture/texture.h"
 
 namespace relief {
-
-/// Registers of one run; its inputs are written before, its outputs read after.
-struct GraphRegisters {
-  F8 lanes[kMostGraphRegisters];
-};
 
 /// One instruction's operands.
 struct GraphOperands {
@@ -30,12 +25,6 @@ struct GraphOperands {
   const std::uint16_t* outputs;
   const std::uint16_t* inputs;
 };
-
-RELIEF_KERNEL F8 graph_operand(const GraphProgramView& program, const GraphRegisters& registers, std::uint16_t operand)
-{
-  return operand < kMostGraphRegisters ? registers.lanes[operand]
-                                       : splat8(program.constants[operand - kMostGraphRegisters]);
-}
 
 RELIEF_KERNEL F8 graph_in(const GraphOperands& o, int i) { return graph_operand(o.program, o.registers, o.inputs[i]); }
 RELIEF_KERNEL void graph_set(const GraphOperands& o, int i, F8 value) { o.registers.lanes[o.outputs[i]] = value; }
@@ -363,13 +352,8 @@ RELIEF_KERNEL void graph_fresnel(const GraphOperands& o)
             }));
 }
 
-/// Runs a program.
-/// @param textures   those of the scene
-/// @param registers  the program's inputs are filled; lanes that mean nothing may hold anything
-/// @cost             not inlined: shading stages would get a copy each
-[[gnu::noinline]] RELIEF_KERNEL void graph_run(const GraphProgramView& program,
-                                               const TextureView* textures,
-                                               GraphRegisters& registers)
+/// Runs a program: see GraphRun.
+RELIEF_KERNEL void graph_run(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers)
 {
   const std::uint16_t* word = program.code;
   const std::uint16_t* const end = word + program.num_words;
@@ -389,19 +373,4 @@ RELIEF_KERNEL void graph_fresnel(const GraphOperands& o)
     word = o.inputs + shape.num_inputs;
   }
 }
-
-/// What a program that has run gives at one lane's point.
-RELIEF_KERNEL GraphValues graph_values(const GraphProgramView& program, const GraphRegisters& registers, int lane)
-{
-  GraphValues values;
-  for (int i = 0; i < kNumGraphOutputs; ++i) {
-    const std::uint16_t* operands = program.outputs[i];
-    if (operands[0] == kNoGraphOperand) continue;
-    const auto number = [&](int c) { return graph_operand(program, registers, operands[c])[lane]; };
-    values.of[i] = {number(0), number(1), number(2)};
-    values.given |= 1u << i;
-  }
-  return values;
-}
-
 }  // namespace relief

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "kernel/bsdf/surface_params.h"
-#include "kernel/graph/graph_eval.h"
+#include "kernel/graph/graph_registers.h"
 #include "kernel/shape/surface_hit.h"
 
 namespace relief {
@@ -100,13 +100,14 @@ RELIEF_KERNEL void graph_load_point(const GraphProgramView& program,
 }
 
 /// A graph at one point alone.
-RELIEF_KERNEL GraphValues graph_at_point(const GraphProgramView& program,
+RELIEF_KERNEL GraphValues graph_at_point(GraphRun run,
+                                         const GraphProgramView& program,
                                          const TextureView* textures,
                                          const GraphPoint& at)
 {
   GraphRegisters registers;
   for (int lane = 0; lane < 8; ++lane) graph_load_point(program, at, lane, registers);
-  graph_run(program, textures, registers);
+  run(program, textures, registers);
   return graph_values(program, registers, 0);
 }
 
@@ -143,11 +144,12 @@ RELIEF_KERNEL SurfaceParams graph_surface_params(Material m,
 
 /// Opacity by a graph, finest texture level.
 RELIEF_KERNEL float graph_alpha(const Material& material,
+                                GraphRun run,
                                 const GraphProgramView& program,
                                 const TextureView* textures,
                                 const GraphPoint& at)
 {
-  const GraphValues values = graph_at_point(program, textures, at);
+  const GraphValues values = graph_at_point(run, program, textures, at);
   return graph_surface_params<kFeatureTextures | kFeatureTransparency>(material, values, textures, *at.hit, at.uv_width)
       .alpha;
 }

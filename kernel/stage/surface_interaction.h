@@ -106,7 +106,8 @@ RELIEF_KERNEL SurfaceInteraction surface_interaction_make(const KernelGlobals& g
   if constexpr ((kFeatures & kFeatureGraphs) != 0) {
     if (at.material->graph_index >= 0) {
       const GraphValues given = values != nullptr ? *values
-                                                  : graph_at_point(g.graphs[at.material->graph_index], g.textures,
+                                                  : graph_at_point(g.run_graph, g.graphs[at.material->graph_index],
+                                                                   g.textures,
                                                                    surface_graph_point(g, state, path, at, wo));
       at.params = graph_surface_params<kFeatures>(*at.material, given, g.textures, at.hit, at.uv_width);
       return at;

@@ -1,0 +1,41 @@
+// What a run of a value graph reads and leaves: eight points' registers.
+#pragma once
+
+#include "kernel/graph/graph_program.h"
+#include "kernel/math/lanes.h"
+#include "kernel/texture/texture_view.h"
+
+namespace relief {
+
+/// Registers of one run; its inputs are written before, its outputs read after.
+struct GraphRegisters {
+  F8 lanes[kMostGraphRegisters];
+};
+
+/// Runs a program over eight points. A pointer, as the interpreter is compiled once for every instruction set, and apart from
+/// the stages.
+/// @param textures   those of the scene
+/// @param registers  the program's inputs are filled; lanes that mean nothing may hold anything
+using GraphRun = void (*)(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers);
+
+RELIEF_KERNEL F8 graph_operand(const GraphProgramView& program, const GraphRegisters& registers, std::uint16_t operand)
+{
+  return operand < kMostGraphRegisters ? registers.lanes[operand]
+                                       : splat8(program.constants[operand - kMostGraphRegisters]);
+}
+
+/// What a program that has run gives at one lane's point.
+RELIEF_KERNEL GraphValues graph_values(const GraphProgramView& program, const GraphRegisters& registers, int lane)
+{
+  GraphValues values;
+  for (int i = 0; i < kNumGraphOutputs; ++i) {
+    const std::uint16_t* operands = program.outputs[i];
+    if (operands[0] == kNoGraphOperand) continue;
+    const auto number = [&](int c) { return graph_operand(program, registers, operands[c])[lane]; };
+    values.of[i] = {number(0), number(1), number(2)};
+    values.given |= 1u << i;
+  }
+  return values;
+}
+
+}  // namespace relief
