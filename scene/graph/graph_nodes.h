@@ -50,6 +50,12 @@ struct GraphNodeKind {
   void (*lower)(GraphNode&);  ///< sets every output
 };
 
+/// All kinds, by what they are about: input_nodes.cpp and so on.
+std::span<const GraphNodeKind> graph_input_nodes();
+std::span<const GraphNodeKind> graph_texture_nodes();
+std::span<const GraphNodeKind> graph_color_nodes();
+std::span<const GraphNodeKind> graph_math_nodes();
+
 /// @return null: there is none of that name
 const GraphNodeKind* graph_node_kind(std::string_view name);
 
