@@ -11,7 +11,6 @@ namespace {
 using Op = GraphOp;
 constexpr auto kNumber = GraphType::kNumber;
 constexpr auto kVector = GraphType::kVector;
-constexpr auto kColor = GraphType::kColor;
 
 constexpr GraphSocket kSeparateInputs[] = {{"vector", kVector}};
 void lower_separate(GraphNode& n)
