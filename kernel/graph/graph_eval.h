@@ -8,6 +8,7 @@
 
 #include "kernel/bsdf/fresnel.h"
 #include "kernel/graph/color_spaces.h"
+#include "kernel/graph/graph_op.h"
 #include "kernel/graph/graph_registers.h"
 #include "kernel/graph/musgrave.h"
 #include "kernel/graph/noise.h"

@@ -1,8 +1,8 @@
 // A compiled value graph as the kernel sees it: a list of instructions over eight points at a time.
 //
-// An instruction is a run of 16-bit words: its opcode, its immediates, its output registers, its inputs. An input below
-// kMostGraphRegisters is a register, one above a constant of the program. scene/graph/ makes programs; graph_eval.h runs
-// them.
+// An instruction is a run of 16-bit words: its opcode (graph_op.h), its immediates, its output registers, its inputs. An
+// input below kMostGraphRegisters is a register, one above a constant of the program. scene/graph/ makes programs;
+// graph_eval.h runs them.
 #pragma once
 
 #include <cstdint>
@@ -10,22 +10,6 @@
 #include "kernel/math/vec.h"
 
 namespace relief {
-
-enum class GraphOp : std::uint16_t {
-#define X(name, outputs, inputs, immediates) name,
-#include "kernel/graph/graph_ops.inc"
-#undef X
-};
-
-/// Without the name: data that points to something is not the same for every instruction set.
-struct GraphOpShape {
-  int num_outputs, num_inputs, num_immediates;
-};
-inline constexpr GraphOpShape kGraphOpShapes[] = {
-#define X(name, outputs, inputs, immediates) {outputs, inputs, immediates},
-#include "kernel/graph/graph_ops.inc"
-#undef X
-};
 
 enum class GraphQuantity : std::uint16_t {
 #define X(name) name,

@@ -13,6 +13,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "kernel/graph/graph_op.h"
 #include "scene/graph/graph_program.h"
 
 namespace relief {
