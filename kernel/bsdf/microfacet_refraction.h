@@ -1,0 +1,72 @@
+// Refraction alone through rough surfaces, by GGX or Beckmann: what Cycles' Refraction node does. There is no Fresnel
+// term, except that what is totally reflected is lost.
+//
+// Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces" [W].
+#pragma once
+
+#include "kernel/bsdf/beckmann.h"
+#include "kernel/bsdf/dielectric.h"
+
+namespace relief {
+
+/// eta is index transmitted / index incident, seen from wo (Cycles' `ior`, inverted by it on back faces).
+struct MicrofacetRefraction {
+  float alpha = 1;
+  float eta = 1.45f;  ///< not matched (dielectric_is_matched)
+  bool is_beckmann = false;
+  SmithMasking masking = SmithMasking::kSeparable;
+};
+
+/// f in the flux convention, in which a furnace is closed. Cycles leaves it at that; transmission_scale makes it radiance.
+///
+/// Pairs of directions that no microfacet connects are dark. Cycles evaluates them by the mirrored half vector, but
+/// never samples them.
+/// @param wo, wi  unit; wo.z > 0
+/// @param pdf     solid angle of wi under microfacet_refraction_sample
+/// @source        [W] Eq. 16, 17 and 21 without (1 − F)
+RELIEF_KERNEL float microfacet_refraction_eval(const MicrofacetRefraction& lobe, Vec3f wo, Vec3f wi, float* pdf)
+{
+  *pdf = 0.0f;
+  if (!(wi.z < 0.0f)) return 0.0f;
+  Vec3f h = wo + lobe.eta * wi;
+  if (lobe.eta > 1.0f) h = -h;
+  if (!(h.z > 0.0f)) return 0.0f;
+  const float inv_length = 1.0f / length(h);
+  const float cos_o = dot(wo, h) * inv_length;
+  const float cos_i = -dot(wi, h) * inv_length;
+  if (!(cos_o > 0.0f && cos_i > 0.0f)) return 0.0f;
+  const AnisotropicAlpha a{lobe.alpha, lobe.alpha};
+  const Vec3f below = -wi;
+  float D, lambda_o, lambda_i, one_plus_lambda_pdf;
+  if (lobe.is_beckmann) {
+    D = beckmann_D(a, h);
+    const float tan_o = beckmann_alpha_tan(a, wo);
+    lambda_o = beckmann_lambda(tan_o);
+    lambda_i = beckmann_lambda(beckmann_alpha_tan(a, below));
+    one_plus_lambda_pdf = beckmann_exact_one_plus_lambda(tan_o);
+  } else {
+    D = ggx_D(h, lobe.alpha);
+    lambda_o = ggx_lambda(wo.z, lobe.alpha);
+    lambda_i = ggx_lambda(below.z, lobe.alpha);
+    one_plus_lambda_pdf = 1.0f + lambda_o;
+  }
+  const float masking =
+      lobe.masking == SmithMasking::kSeparable ? (1.0f + lambda_o) * (1.0f + lambda_i) : 1.0f + lambda_o + lambda_i;
+  const float common = D * cos_o * cos_i * sqr(lobe.eta * inv_length) / wo.z;
+  *pdf = common / one_plus_lambda_pdf;
+  return common / (below.z * masking);
+}
+
+/// @return unit; zero at total reflection, z >= 0 where the microfacets lose the ray
+RELIEF_KERNEL Vec3f microfacet_refraction_sample(const MicrofacetRefraction& lobe, Vec3f wo, Vec2f u)
+{
+  const Vec3f wm = lobe.is_beckmann ? beckmann_visible_normal({lobe.alpha, lobe.alpha}, wo, u)
+                                    : warp_ggx_visible_normal(wo, lobe.alpha, u);
+  const float cos_o = min(1.0f, dot(wo, wm));
+  if (!(cos_o > 0.0f)) return {};
+  const float cos_t = refracted_cosine(cos_o, lobe.eta);
+  if (!(cos_t > 0.0f)) return {};
+  return normalize(refract(wo, wm, cos_o, cos_t, lobe.eta));
+}
+
+}  // namespace relief

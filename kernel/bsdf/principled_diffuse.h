@@ -1,0 +1,32 @@
+// Diffuse base and sheen of Blender's Principled shader up to 3.6, both after Disney and both sampled by the cosine.
+//
+// Burley 2012, "Physically Based Shading at Disney" [B12]; Burley 2015, "Extending the Disney BRDF to a BSDF with
+// Integrated Subsurface Scattering" [B15].
+#pragma once
+
+#include "kernel/bsdf/diffuse.h"
+
+namespace relief {
+
+struct PrincipledDiffuse {
+  float roughness = 0.5f;  ///< not clamped, as in Cycles
+};
+
+/// f before the colour. Bright at grazing angles: roughness 0.5 reflects up to 1.02 of what it receives, roughness
+/// 1 up to 1.52 (BlenderLobe tests).
+/// @param wo, wi  unit; wo.z > 0
+/// @source        [B15] Eq. 4: Lambert and retro-reflection apart, each with its own Schlick terms
+RELIEF_KERNEL float principled_diffuse_eval(const PrincipledDiffuse& lobe, Vec3f wo, Vec3f wi, float* pdf)
+{
+  *pdf = diffuse_pdf(wi);
+  if (!(wi.z > 0.0f)) return 0.0f;
+  const float F_o = schlick_weight(wo.z), F_i = schlick_weight(wi.z);
+  // 2 cos² of half the angle between both directions is one plus their cosine.
+  const float retro = lobe.roughness * (1.0f + dot(wo, wi));
+  const float lambert = (1.0f - 0.5f * F_o) * (1.0f - 0.5f * F_i);
+  return kInvPi * (lambert + retro * (F_o + F_i + F_o * F_i * (retro - 1.0f)));
+}
+
+RELIEF_KERNEL Vec3f principled_diffuse_sample(const PrincipledDiffuse&, Vec3f, Vec2f u) { return diffuse_sample(u); }
+
+}  // namespace relief

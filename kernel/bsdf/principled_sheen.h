@@ -1,0 +1,25 @@
+// Sheen of Blender's Principled shader up to 3.6: a Schlick term of the half vector, and nothing else.
+//
+// Burley 2012, "Physically Based Shading at Disney".
+#pragma once
+
+#include "kernel/bsdf/diffuse.h"
+
+namespace relief {
+
+/// Has no parameters: the strength and the tint are its colour.
+struct PrincipledSheen {};
+
+/// f before the colour, (1 − cos)⁵ of the half angle. It has no 1/π; the albedo at grazing angles is 0.08, on top of the
+/// diffuse base.
+/// @param wo, wi  unit; wo.z > 0
+RELIEF_KERNEL float principled_sheen_eval(const PrincipledSheen&, Vec3f wo, Vec3f wi, float* pdf)
+{
+  *pdf = diffuse_pdf(wi);
+  if (!(wi.z > 0.0f)) return 0.0f;
+  return schlick_weight(0.5f * length(wo + wi));
+}
+
+RELIEF_KERNEL Vec3f principled_sheen_sample(const PrincipledSheen&, Vec3f, Vec2f u) { return diffuse_sample(u); }
+
+}  // namespace relief
