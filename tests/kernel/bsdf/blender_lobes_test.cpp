@@ -9,6 +9,7 @@
 #include "kernel/bsdf/oren_nayar.h"
 #include "kernel/bsdf/principled_diffuse.h"
 #include "kernel/bsdf/principled_sheen.h"
+#include "kernel/bsdf/sheen_microfibre.h"
 #include "kernel/bsdf/toon.h"
 #include "kernel/bsdf/translucent.h"
 #include "kernel/bsdf/velvet.h"
@@ -84,6 +85,17 @@ std::vector<LobeTrio> lobes()
   }
   for (const float sigma : {0.3f, 1.0f, 3.0f}) {
     add({"Velvet " + number(sigma), RELIEF_TEST_TRIO(velvet, velvet_make(sigma))});
+  }
+  for (const float roughness : {0.2f, 0.5f, 1.0f}) {
+    LobeTrio trio{"Microfibre sheen " + number(roughness),
+                  [roughness](Vec3f wo, Vec3f wi, float* pdf) {
+                    return sheen_microfibre_eval(sheen_microfibre_make(wo.z, roughness), wo, wi, pdf);
+                  },
+                  [roughness](Vec3f wo, Vec2f u) {
+                    return sheen_microfibre_sample(sheen_microfibre_make(wo.z, roughness), wo, u);
+                  }};
+    trio.is_reciprocal = false;
+    add(trio);
   }
   const float toons[][2] = {{0.5f, 0.0f}, {0.3f, 0.4f}, {0.9f, 0.6f}};
   for (const auto& t : toons) {
