@@ -164,5 +164,59 @@ TEST(BlenderLobe, IsReciprocal)
   }
 }
 
+/// Lobes as sharp as they get, beside the others.
+std::vector<LobeTrio> extreme_lobes()
+{
+  std::vector<LobeTrio> all = lobes();
+  const AnisotropicAlpha alphas[] = {{kDeltaAlpha, kDeltaAlpha}, {kDeltaAlpha, 1.0f}, {1.0f, kDeltaAlpha}};
+  for (const AnisotropicAlpha a : alphas) {
+    all.push_back({"GGX", RELIEF_TEST_TRIO(ggx_anisotropic, (GgxAnisotropic{a, SmithMasking::kSeparable}))});
+    all.push_back({"Beckmann", RELIEF_TEST_TRIO(beckmann, (Beckmann{a, SmithMasking::kCorrelated}))});
+    all.push_back({"Ashikhmin-Shirley", RELIEF_TEST_TRIO(ashikhmin_shirley, ashikhmin_shirley_make(a))});
+  }
+  all.push_back({"GTR1", RELIEF_TEST_TRIO(clearcoat_gtr1, ClearcoatGtr1{kDeltaAlpha})});
+  all.push_back({"Velvet 0", RELIEF_TEST_TRIO(velvet, velvet_make(0.0f))});
+  all.push_back({"Toon 0", RELIEF_TEST_TRIO(toon, toon_make(0.0f, 0.0f, true))});
+  for (const bool is_beckmann : {false, true}) {
+    LobeTrio trio{"Refraction",
+                  RELIEF_TEST_TRIO(microfacet_refraction, (MicrofacetRefraction{kDeltaAlpha, 1.01f, is_beckmann}))};
+    trio.is_below = true;
+    all.push_back(trio);
+  }
+  return all;
+}
+
+TEST(BlenderLobe, IsFiniteFromTheNormalToTheHorizon)
+{
+  const float edges[] = {0.0f, 0x1p-24f, 1e-3f, 0.5f, 0.999f, 1.0f - 0x1p-24f};
+  for (const LobeTrio& lobe : extreme_lobes()) {
+    for (const float z : {kMinCosine, 1e-3f, 0.3f, 0.9999999f, 1.0f}) {
+      const Vec3f wo = direction(z);
+      const auto check = [&](Vec3f wi) {
+        if (!is_on_side(lobe, wi)) return;
+        float pdf = -1;
+        const float f = lobe.eval(wo, wi, &pdf);
+        EXPECT_TRUE(is_finite(f * wi.z) && is_finite(pdf) && f >= 0.0f && pdf >= 0.0f)
+            << lobe.name << " wo.z " << z << " wi.z " << wi.z << " f " << f << " pdf " << pdf;
+      };
+      for (const float u : edges) {
+        for (const float v : edges) {
+          const Vec3f wi = lobe.sample(wo, {u, v});
+          ASSERT_TRUE(is_finite(wi)) << lobe.name << " wo.z " << z << " u " << u << " " << v;
+          if (!is_on_side(lobe, wi)) continue;
+          EXPECT_NEAR(length(wi), 1.0f, 1e-4f) << lobe.name << " wo.z " << z;
+          check(wi);
+        }
+      }
+      const float side = lobe.is_below ? -1.0f : 1.0f;
+      for (const float z_i : {kMinCosine, 0.5f, 1.0f}) {
+        check(direction(side * z_i));
+        check(direction(side * z_i, 0.7f + kPi));
+      }
+      check({-wo.x, -wo.y, side * wo.z});
+    }
+  }
+}
+
 }  // namespace
 }  // namespace relief
