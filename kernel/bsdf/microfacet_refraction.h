@@ -15,8 +15,8 @@ struct MicrofacetRefraction {
   float eta = 1.45f;  ///< not matched (dielectric_is_matched)
   bool is_beckmann = false;
   SmithMasking masking = SmithMasking::kSeparable;
-  /// Also light pairs of directions that no microfacet connects, as if their half vector's mirror image did: Cycles of
-  /// all versions does for light that it samples. It adds energy (0.25 of a sun that it cannot refract, at wo.z 0.2).
+  /// Also light pairs of directions that no microfacet connects, as if their half vector's mirror image did: Cycles
+  /// 3.4 and 4.3 do for light that they sample. It adds energy (0.25 of a sun that it cannot refract, at wo.z 0.2).
   bool lights_unconnected = false;
 };
 
