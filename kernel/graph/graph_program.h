@@ -53,6 +53,8 @@ struct GraphProgramView {
   const std::uint16_t* results = nullptr;  ///< operands, see SurfaceClosureSpec; kNoGraphOperand: 0
   const SurfaceClosureSpec* closures = nullptr;
   std::uint32_t num_closures = 0;
+  /// First of three results: the shading normal, Z up, in place of the surface's; kNoGraphOperand: that stays.
+  std::uint16_t surface_normal = kNoGraphOperand;
 };
 
 /// What a graph gives at one point.

@@ -115,6 +115,12 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   ShadingSide& side = at.side;
   side.Ns = shading_normal_towards(at.hit.Ns, side.Ng, wo);
   side.bent = !(__builtin_fabsf(dot(side.Ns, at.hit.Ns)) > kUnbent);
+  if (const std::uint16_t first = lane.program->surface_normal; first != kNoGraphOperand) {
+    const Vec3f given{graph_result(lane, first), graph_result(lane, first + 1), graph_result(lane, first + 2)};
+    const Vec3f N = closure_normal({wo, side.Ng, side.Ns, side.front, nullptr, nullptr}, given);
+    side.bent = side.bent || !(dot(N, side.Ns) > kUnbent);
+    side.Ns = N;
+  }
   side.frame = frame_from_normal(side.Ns);
   lobes.size = 0;
   MixtureBuild build{wo, side.Ng, side.Ns, side.front, g.bsdf_tables, &lobes};

@@ -134,10 +134,8 @@ std::vector<SurfaceClosureSpec> closures_read(const JsonReader& reader,
     }
     r.warn_unread(warnings);
     if (is_nothing) continue;
-    for (const GraphScalar a : results) {
-      const std::uint16_t place = build.add_result(a);
-      if (&a == results.data()) spec.first_result = place;
-    }
+    spec.first_result = build.add_result(results.front());
+    for (std::size_t n = 1; n < results.size(); ++n) build.add_result(results[n]);
     closures.push_back(spec);
   }
   reader.warn_unread(warnings);

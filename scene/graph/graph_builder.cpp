@@ -33,6 +33,7 @@ GraphProgramView GraphProgram::view() const
   v.results = results.data();
   v.closures = closures.data();
   v.num_closures = static_cast<std::uint32_t>(closures.size());
+  v.surface_normal = surface_normal;
   std::copy(&outputs[0][0], &outputs[0][0] + std::size(outputs) * 3, &v.outputs[0][0]);
   return v;
 }

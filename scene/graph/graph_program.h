@@ -15,6 +15,7 @@ struct GraphProgram {
   std::uint32_t given = 0;  ///< bit GraphOutput
   std::vector<std::uint16_t> results;
   std::vector<SurfaceClosureSpec> closures;
+  std::uint16_t surface_normal = kNoGraphOperand;  ///< see GraphProgramView
   int num_registers = 0;
 
   GraphProgramView view() const;

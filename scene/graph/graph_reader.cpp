@@ -226,14 +226,22 @@ GraphPrograms graph_read(const GltfDocument& document,
       graph->warn_unread(warnings);
     }
     std::vector<SurfaceClosureSpec> closures;
+    std::uint16_t surface_normal = kNoGraphOperand;
     if (surface != nullptr) {
       const auto input = [&r](const JsonReader& parent, std::string_view name, GraphType type) {
         return r.input(parent, name, type);
       };
+      const GraphValue normal = input(*surface, "normal", GraphType::kVector);
       closures = closures_read(*surface, input, r.build, warnings);
+      if (normal.v[0].index >= 0) {
+        surface_normal = r.build.add_result(normal.v[0]);
+        r.build.add_result(normal.v[1]);
+        r.build.add_result(normal.v[2]);
+      }
     }
     programs.surface = r.build.compile();
     programs.surface.closures = closures;
+    programs.surface.surface_normal = surface_normal;
     std::erase_if(closures, [](const SurfaceClosureSpec& c) { return c.kind != ClosureKind::transparent; });
     if (!closures.empty()) {
       constexpr int kNumbers = 1 + sizeof(TransparentInputs) / sizeof(float);
