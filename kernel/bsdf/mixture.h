@@ -30,6 +30,7 @@ struct Mixture {
   Frame frame;           ///< of the surface: directions are given in it
   std::uint64_t chosen;  ///< bit by lobe
   float scale;           ///< of the chosen lobes' probabilities, which then sum to one
+  float gain;            ///< factor on f: what makes up for the chance of a path to meet the lobes at all
 };
 
 /// Calls f(lobe) for the chosen lobes, in their order.
@@ -40,9 +41,9 @@ RELIEF_KERNEL void mixture_visit(const Mixture& m, F&& f)
 }
 
 /// All lobes of a hit.
-RELIEF_KERNEL Mixture mixture_of(const MixtureLobes& lobes, const Frame& frame)
+RELIEF_KERNEL Mixture mixture_of(const MixtureLobes& lobes, const Frame& frame, float gain = 1.0f)
 {
-  Mixture m{&lobes, frame, lobes.size < 64 ? (std::uint64_t{1} << lobes.size) - 1 : ~std::uint64_t{0}, 0.0f};
+  Mixture m{&lobes, frame, lobes.size < 64 ? (std::uint64_t{1} << lobes.size) - 1 : ~std::uint64_t{0}, 0.0f, gain};
   float sum = 0.0f;
   mixture_visit(m, [&](const MixtureLobe& lobe) { sum += lobe.probability; });
   m.scale = sum > 0.0f ? 1.0f / sum : 0.0f;
@@ -53,7 +54,7 @@ RELIEF_KERNEL Mixture mixture_of(const MixtureLobes& lobes, const Frame& frame)
 template <bool kSharp>
 RELIEF_KERNEL Mixture mixture_part(const Mixture& m, SharpLobes sharp)
 {
-  Mixture part{m.all, m.frame, 0, 0.0f};
+  Mixture part{m.all, m.frame, 0, 0.0f, m.gain};
   float sum = 0.0f;
   for (std::uint64_t left = m.chosen; left != 0; left &= left - 1) {
     const MixtureLobe& lobe = m.all->lobes[__builtin_ctzll(left)];
@@ -78,7 +79,7 @@ RELIEF_KERNEL BsdfEval closure_eval(const Mixture& m, const BsdfTables&, Vec3f w
     e.f += lobe.weight * one.f;
     e.pdf += lobe.probability * one.pdf;
   });
-  e.f *= 1.0f / cos_i;
+  e.f *= m.gain / cos_i;
   e.pdf *= m.scale;
   return e;
 }
@@ -112,7 +113,7 @@ RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tabl
   s.eta = d.eta;
   s.lobe = d.bits;
   if ((d.bits & kLobeDelta) != 0) {
-    s.f = chosen->weight * d.reflectance / __builtin_fabsf(s.wi.z);
+    s.f = chosen->weight * d.reflectance * (m.gain / __builtin_fabsf(s.wi.z));
     s.pdf = chosen->probability * m.scale * d.probability;
     return s;
   }

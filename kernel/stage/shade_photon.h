@@ -118,7 +118,7 @@ RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
   if (!caster && !soft) return;
   const bool goes_on =
       has_mixture<kFeatures>(at)
-          ? shade_photon_scatter(g, state, path, at, wo, throughput, mixture_of(lobes, at.side.frame), soft)
+          ? shade_photon_scatter(g, state, path, at, wo, throughput, mixture_of(lobes, at.side.frame, 1.0f / at.params.alpha), soft)
           : shade_photon_scatter(
                 g, state, path, at, wo, throughput,
                 surface_closure_make<kFeatureAll>(at.params, *g.bsdf_tables, to_local(at.side.frame, wo)), soft);

@@ -432,8 +432,27 @@ template <unsigned kFeatures>
     const Vec3f sigma_a = path_sigma_a(state, path);
     return is_zero(sigma_a) ? Vec3f{1, 1, 1} : path_transmittance(sigma_a, t);
   };
-  // Closures emit whether or not others let the path through.
-  if constexpr (kMixture) shade_surface_emission<kFeatures>(g, state, path, at, path_throughput(state, path) * transmittance());
+  const ShadingSide& side = at.side;
+  RayCone cone = at.cone;
+  if ((at.instance->flags & kDisplaced) != 0) cone.width = min(cone.width, state.hit_width[path]);
+  const bool last = bounce > g.limits.total || path_bounces(bounces, BounceKind::kDiffuse) > g.limits.diffuse ||
+                    path_bounces(bounces, BounceKind::kGlossy) > g.limits.glossy ||
+                    path_bounces(bounces, BounceKind::kTransmission) > g.limits.transmission;
+  // Closures emit, and are lit, whether or not others let the path through.
+  if constexpr (kMixture) {
+    const Vec3f before = path_throughput(state, path);
+    path_set_throughput(state, path, before * transmittance());
+    shade_surface_emission<kFeatures>(g, state, path, at, path_throughput(state, path));
+    const Mixture closure = mixture_of(lobes, side.frame);
+    if (g.has_lights && !last && !mixture_is_delta(closure)) {
+      const Vec3f light_N = at.params.transmission > 0.0f ? Vec3f{} : side.Ns;
+      const LightsChoice chosen = lights_choose(g.lights, at.hit.P, light_N, u.light_choice, u.light_uv);
+      if (chosen.probability > 0.0f) {
+        shade_surface_light<kFeatures>(g, state, path, at, closure, chosen, u.light_uv, light_N, cone, shadow);
+      }
+    }
+    path_set_throughput(state, path, before);
+  }
   if (!surface_is_met<kFeatures>(state, path, at.params.alpha, surface)) {
     ++counters.transparent_hits;
     if (path_pass_through(g, state, path, at.passed)) queue_push(next, path);
@@ -449,7 +468,6 @@ template <unsigned kFeatures>
   surface_interaction_frame<kFeatures>(g, state, path, wo, at);
   const InstanceView& instance = *at.instance;
   const SurfaceParams& params = at.params;
-  const ShadingSide& side = at.side;
   const Vec3f wo_local = to_local(side.frame, wo);
 
   if ((state.flags[path] & kPathSawSurface) == 0) {
@@ -465,27 +483,20 @@ template <unsigned kFeatures>
   if (g.film.layout.denoising && (state.flags[path] & kPathSawFeature) == 0) {
     shade_surface_denoising(g, state, path, at);
   }
-  const bool last = bounce > g.limits.total || path_bounces(bounces, BounceKind::kDiffuse) > g.limits.diffuse ||
-                    path_bounces(bounces, BounceKind::kGlossy) > g.limits.glossy ||
-                    path_bounces(bounces, BounceKind::kTransmission) > g.limits.transmission;
   if (params.unlit || last) return;
 
-  RayCone cone = at.cone;
-  if ((instance.flags & kDisplaced) != 0) cone.width = min(cone.width, state.hit_width[path]);
   const Vec3f light_N = params.transmission > 0.0f ? Vec3f{} : side.Ns;
-  bool is_delta;
-  if constexpr (kMixture) {
-    is_delta = mixture_is_delta(mixture_of(lobes, side.frame));
-  } else {
-    is_delta = surface_is_delta(params);
-  }
   LightsChoice chosen;
-  if (g.has_lights && !is_delta) chosen = lights_choose(g.lights, at.hit.P, light_N, u.light_choice, u.light_uv);
+  if constexpr (!kMixture) {
+    if (g.has_lights && !surface_is_delta(params)) {
+      chosen = lights_choose(g.lights, at.hit.P, light_N, u.light_choice, u.light_uv);
+    }
+  }
 
   // While the chosen light is on its way from memory, the BSDF is sampled.
   const auto closure = [&] {
     if constexpr (kMixture) {
-      return mixture_of(lobes, side.frame);
+      return mixture_of(lobes, side.frame, 1.0f / params.alpha);
     } else {
       return surface_closure_make<kFeatures>(params, *g.bsdf_tables, wo_local);
     }

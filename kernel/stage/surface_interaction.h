@@ -151,8 +151,6 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   const float chance = passing / (passing + scattered);
   p.alpha = 1.0f - chance;
   at.passed = build.transparency / chance;
-  if (!(chance < 1.0f)) return;
-  for (int i = 0; i < lobes.size; ++i) lobes.lobes[i].weight *= 1.0f / (1.0f - chance);
 }
 
 /// The point that a path has hit and its material there.
