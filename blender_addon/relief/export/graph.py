@@ -5,6 +5,8 @@ One function a kind of node, listed at the end with the names of its outputs. Th
 (docs/graphs.md); what is said here is which socket is which, and what an unlinked one means.
 """
 
+from json import dumps
+
 from .. import compat
 from . import nodes
 
@@ -13,7 +15,12 @@ _TABLE = 256
 
 
 class NotUnderstood(Exception):
-    """A node that graphs do not know; its text names it."""
+    """A node that graphs do not know; its text names it.
+
+    key  of the node, as nodes.Source has it; None: not known yet
+    """
+
+    key = None
 
 
 class GraphWriter:
@@ -26,6 +33,8 @@ class GraphWriter:
     outputs        JSON of what the graph gives
     uses_generated whether meshes need _GENERATED
     color_map      colour attribute that is read; None: none
+    own_normal     reference to the surface's normal as a displacement bumps it; None: it is the mesh's
+    not_understood texts by the keys of the nodes that they are about
     """
 
     def __init__(self, coordinate_set, texture):
@@ -35,19 +44,54 @@ class GraphWriter:
         self.outputs = {}
         self.uses_generated = False
         self.color_map = None
+        self.own_normal = None
+        self.not_understood = {}
+        self._indices = {}
         self._known = {}
+        self._folded = {}
+
+    def constant(self, socket, groups=()):
+        """An input's number or list, finite and of the socket's type; None if it varies."""
+        value = nodes.fold(socket, groups, self._folded)
+        if value is None:
+            return None
+        value = nodes.finite(value, socket.name, lambda *_: None)
+        if socket.type in {"VALUE", "INT", "BOOLEAN"}:
+            return nodes.as_number(value)
+        return list(nodes.as_color(value))
 
     def value(self, socket, groups=()):
         """An input as graphs have it: numbers, or a reference.
 
         @error  NotUnderstood
         """
-        source = nodes.follow(socket, groups)
-        constant = nodes.fold(socket, groups)
-        if constant is not None:
-            finite = nodes.finite(constant, socket.name, lambda *_: None)
-            return list(finite[:3]) if isinstance(finite, tuple) else finite
-        return self.output(source)
+        constant = self.constant(socket, groups)
+        return constant if constant is not None else self.output(nodes.follow(socket, groups))
+
+    def normal(self, socket, groups=()):
+        """Reference to a Normal input, in the world; None: nothing is linked, and the surface has the mesh's own.
+
+        @error  NotUnderstood
+        """
+        source = self._normal_source(nodes.linked(socket, groups))
+        if source is None:
+            return self.own_normal
+        constant = self.constant(socket, groups)
+        if constant is None:
+            return self.output(source)
+        return {"node": self.add("combine", dict(zip("xyz", constant))), "output": "vector"}
+
+    def bends(self, socket, groups=()):
+        """Whether a Normal input has a normal of its own."""
+        return self._normal_source(nodes.linked(socket, groups)) is not None
+
+    def _normal_source(self, source):
+        """What gives a normal, past Bump nodes whose height is the same everywhere."""
+        while source is not None and source.node.bl_idname == "ShaderNodeBump":
+            if self.constant(source.node.inputs["Height"], source.groups) is None:
+                break
+            source = nodes.linked(source.node.inputs["Normal"], source.groups)
+        return source
 
     def output(self, source):
         """Reference to what a nodes.Source gives."""
@@ -56,15 +100,35 @@ class GraphWriter:
             return self.uv(node.uv_map)
         if node.bl_idname == "ShaderNodeTexCoord" and source.socket.identifier == "UV":
             return self.uv("")
+        if node.bl_idname == "ShaderNodeBump" and self._normal_source(source) != source:
+            return self.normal(node.inputs["Normal"], source.groups) or self.geometry_normal()
+        if node.bl_idname == "ShaderNodeNewGeometry" and source.socket.identifier == "Normal":
+            return self.own_normal or self.geometry_normal()
         write, names = _NODES.get(node.bl_idname, (None, {}))
         name = names.get(source.socket.identifier, names.get(source.socket.name))
         if write is None or name is None:
-            raise NotUnderstood(f'node "{node.name}" ({node.bl_label}), {source.socket.name}')
-        key = (node.as_pointer(), tuple(group.as_pointer() for group in source.groups))
-        if key not in self._known:
-            self._known[key] = write(self, node, source.groups)
-        index = self._known[key]
-        return {"node": index, "output": name}
+            raise self._failure(source, NotUnderstood(f'node "{node.name}" ({node.bl_label}), {source.socket.name}'))
+        if source.key not in self._known:
+            try:
+                self._known[source.key] = write(self, node, source.groups)
+            except NotUnderstood as error:
+                self._known[source.key] = self._failure(source, error)
+            except RecursionError:
+                error = NotUnderstood(f'node "{node.name}": more nodes one after another than can be followed')
+                raise self._failure(source, error) from None
+        if isinstance(self._known[source.key], NotUnderstood):
+            raise self._known[source.key]
+        return {"node": self._known[source.key], "output": name}
+
+    def _failure(self, source, error):
+        """Notes which node an error is about: the one that met it first."""
+        if error.key is None:
+            error.key = source.key
+            self.not_understood[source.key] = str(error)
+        return error
+
+    def geometry_normal(self):
+        return {"node": self.add("geometry"), "output": "normal"}
 
     def add(self, kind, inputs=None, **options):
         """Adds a node; equal ones become one.
@@ -74,27 +138,34 @@ class GraphWriter:
         json = {"type": kind, **{k: v for k, v in options.items() if v is not None}}
         if inputs:
             json["inputs"] = inputs
-        if json in self.nodes:
-            return self.nodes.index(json)
-        self.nodes.append(json)
-        return len(self.nodes) - 1
+        key = dumps(json, sort_keys=True)
+        if key not in self._indices:
+            self._indices[key] = len(self.nodes)
+            self.nodes.append(json)
+        return self._indices[key]
 
     def inputs(self, node, groups, names):
         """Inputs of a node by our names.
 
         @param  names  our name by Blender's, or by the number of the socket
         """
-        out = {}
+        out, failure = {}, None
         for theirs, ours in names.items():
             socket = node.inputs[theirs] if isinstance(theirs, int) else node.inputs.get(theirs)
-            if socket is not None:
+            if socket is None:
+                continue
+            try:
                 out[ours] = self.value(socket, groups)
+            except NotUnderstood as error:  # the others may have something to tell, too
+                failure = failure or error
+        if failure is not None:
+            raise failure
         return out
 
     def vector(self, node, groups, implicit):
         """A texture's Vector, or what Blender takes where nothing is linked: generated or uv."""
         socket = node.inputs["Vector"]
-        if nodes.follow(socket, groups) is not None:
+        if nodes.linked(socket, groups) is not None:
             return self.value(socket, groups)
         if implicit == "generated":
             self.uses_generated = True
@@ -467,6 +538,64 @@ def _hue(g, node, groups):
     return g.add("hue-saturation", g.inputs(node, groups, names))
 
 
+def _bump(g, node, groups):
+    names = {"Strength": "strength", "Distance": "distance", "Filter Width": "filterWidth", "Height": "height"}
+    inputs = g.inputs(node, groups, names)
+    normal = g.normal(node.inputs["Normal"], groups)
+    if normal is not None:
+        inputs["normal"] = normal
+    return g.add("bump", inputs, invert=node.invert or None)
+
+
+def bump_of_displacement(g, source):
+    """Reference to the normal that Blender's "Bump Only" makes of what is linked to a material's Displacement.
+
+    Cycles bumps by how far the displacement goes along the normal. The scale of objects is not counted: that of materials
+    knows no objects.
+
+    @return  None: the displacement is the same everywhere
+    @error   NotUnderstood
+    """
+    node, groups = source.node, source.groups
+    kind = node.bl_idname
+    if kind == "ShaderNodeDisplacement":
+        parts = [g.value(node.inputs[name], groups) for name in ("Height", "Midlevel", "Scale")]
+        if not any(isinstance(part, dict) for part in parts):
+            return None
+        height = _times_shifted(g, *parts)
+        other = nodes.linked(node.inputs["Normal"], groups)
+        if other is not None:
+            along = {"a": g.normal(node.inputs["Normal"], groups), "b": g.geometry_normal()}
+            cosine = {"node": g.add("vector-math", along, operation="dot"), "output": "value"}
+            height = {"node": g.add("math", {"a": height, "b": cosine}, operation="multiply"), "output": "value"}
+    elif kind == "ShaderNodeVectorDisplacement" and node.space != "WORLD":
+        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}) as bump: space {_label(node.space)}')
+    else:
+        vector = _world_displacement(g, source)
+        along = {"a": vector, "b": g.geometry_normal()}
+        height = {"node": g.add("vector-math", along, operation="dot"), "output": "value"}
+    return {"node": g.add("bump", {"height": height, "strength": 1.0, "distance": 1.0}), "output": "normal"}
+
+
+def _times_shifted(g, height, midlevel, scale):
+    """(height − midlevel) · scale"""
+    if midlevel != 0:
+        inputs = {"a": height, "b": midlevel}
+        height = {"node": g.add("math", inputs, operation="subtract"), "output": "value"}
+    if scale != 1:
+        height = {"node": g.add("math", {"a": height, "b": scale}, operation="multiply"), "output": "value"}
+    return height
+
+
+def _world_displacement(g, source):
+    node, groups = source.node, source.groups
+    if node.bl_idname != "ShaderNodeVectorDisplacement":
+        return g.output(source)
+    vector, midlevel, scale = (g.value(node.inputs[name], groups) for name in ("Vector", "Midlevel", "Scale"))
+    moved = {"node": g.add("vector-math", {"a": vector, "b": midlevel}, operation="subtract"), "output": "vector"}
+    return {"node": g.add("vector-math", {"a": moved, "scale": scale}, operation="scale"), "output": "vector"}
+
+
 _FACTOR = {"Fac": "factor", "Factor": "factor", "Color": "color"}
 _XYZ = {"X": "x", "Y": "y", "Z": "z"}
 _RGB = {
@@ -540,4 +669,10 @@ _NODES = {
         _mix,
         {"Result_Color": "color", "Result_Vector": "vector", "Result_Float": "value"},
     ),
+    "ShaderNodeBump": (_bump, {"Normal": "normal"}),
 }
+
+
+def knows(node):
+    """Whether a node that gives values can be written, if what it is set to can."""
+    return node.bl_idname in _NODES or node.bl_idname in {"ShaderNodeUVMap", "ShaderNodeValue", "ShaderNodeRGB"}

@@ -58,25 +58,6 @@ class ImageExporter:
             self._uris[key] = None if plane is None else self.write_pixels({"Y": plane})
         return self._uris[key]
 
-    def combined_uri(self, roughness, metallic, warn):
-        """URI of glTF's packed image: roughness in green, metallic in blue.
-
-        @param  roughness, metallic  (bpy image, channel 0…3 or None for its grey value), or None: 1 everywhere
-        @return                      None if an image has no pixels
-        """
-        key = ("packed", *((p[0].name_full, p[1]) if p else None for p in (roughness, metallic)))
-        if key not in self._uris:
-            self._uris[key] = self._combine(roughness, metallic, warn)
-        return self._uris[key]
-
-    def _combine(self, roughness, metallic, warn):
-        planes = [self._plane(*p, warn) if p else np.ones((1, 1), dtype=np.float32) for p in (roughness, metallic)]
-        if any(p is None for p in planes):
-            return None
-        height, width = (max(p.shape[axis] for p in planes) for axis in (0, 1))
-        green, blue = (_enlarge(p, height, width) for p in planes)
-        return self.write_pixels({"R": np.zeros_like(green), "G": green, "B": blue})
-
     def alpha_uri(self, image, channel, warn):
         """URI of a white image whose alpha is a channel of an image, or its grey value."""
         key = (image.name_full, "alpha", channel)
@@ -245,10 +226,3 @@ def _tiff_is_float(data):
         if tag == _TIFF_SAMPLE_FORMAT and number <= 2:
             return value == _TIFF_IEEE_FLOAT
     return False
-
-
-def _enlarge(plane, height, width):
-    """A plane at another size, each texel the one of the original that it lies in."""
-    rows = (np.arange(height) * plane.shape[0]) // height
-    columns = (np.arange(width) * plane.shape[1]) // width
-    return plane[rows][:, columns]
