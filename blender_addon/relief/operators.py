@@ -17,7 +17,7 @@ _MOST_IN_TOOLTIP = 25
 
 
 class RELIEF_OT_displace(bpy.types.Operator):
-    """Let the material's Displacement node move the surface; with "Bump Only" it does nothing in relief"""
+    """Let the material's Displacement node move the surface; with "Bump Only" it bends normals alone"""
 
     bl_idname = "relief.displace"
     bl_label = "Use Displacement"

@@ -228,7 +228,7 @@ class RELIEF_PT_material_displacement(_Panel, bpy.types.Panel):
         material, rows = context.material, self.rows()
         rows.prop(compat.displacement_owner(material), "displacement_method", text="Displacement")
         if needs_switch(material):
-            rows.label(text="Bump Only: the Displacement node moves nothing", icon="INFO")
+            rows.label(text="Bump Only: it bends normals, but moves nothing", icon="INFO")
             rows.operator("relief.displace")
         _draw_output(self.layout, material.node_tree, "ShaderNodeOutputMaterial", "Displacement")
 

@@ -449,6 +449,37 @@ def test_groups_and_muted_nodes_are_followed():
     assert len(closures) == 1, closures
 
 
+def test_links_that_blender_leaves_out():
+    """Muted ones, and those of a circle: the input has its own value."""
+    material, tree, output = _material("circle")
+    node = _shader(tree, "ShaderNodeBsdfGlossy", Roughness=0.25)
+    tree.links.new(node.outputs[0], output.inputs["Surface"])
+    noise = _value_node(tree, node.inputs["Roughness"])
+    noise_link = node.inputs["Roughness"].links[0]
+    noise_link.is_muted = True
+    (closure,), _, _ = _closures(material)
+    assert _near(closure["roughness"], 0.25), closure
+    noise_link.is_muted = False
+    first = _value_node(tree, noise.inputs["Scale"], "ShaderNodeMath")
+    tree.links.new(first.outputs[0], first.inputs[0])
+    _closures(material, _GRAPHED)
+
+
+def test_long_chains_are_followed():
+    material, tree, output = _material("long")
+    node = _shader(tree, "ShaderNodeBsdfGlossy")
+    tree.links.new(node.outputs[0], output.inputs["Surface"])
+    before = tree.nodes.new("ShaderNodeTexNoise")
+    for _ in range(700):
+        after = tree.nodes.new("ShaderNodeMath")
+        for index in (0, 1):
+            tree.links.new(before.outputs[0], after.inputs[index])
+        before = after
+    tree.links.new(before.outputs[0], node.inputs["Roughness"])
+    _, graph, _ = _closures(material, _GRAPHED)
+    assert len(graph) == 702, len(graph)
+
+
 def test_nodes_are_counted():
     """What is not understood is named with its reason, what lies behind it counts, and so does each use of a group."""
     from relief.export.dry_run import try_material

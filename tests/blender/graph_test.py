@@ -459,7 +459,7 @@ def test_opacity_by_noise():
 def test_what_is_behind_a_ramp_is_named():
     scene = _procedural_scene()
     tree = bpy.data.materials["wood"].node_tree
-    sky = tree.nodes.new("ShaderNodeTexSky")
+    odd = tree.nodes.new("ShaderNodeShaderToRGB")
     ramp = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeValToRGB")
-    tree.links.new(sky.outputs[0], ramp.inputs[0])
-    assert_warns(scene, 'node "Sky Texture"', "as Color")
+    tree.links.new(odd.outputs[0], ramp.inputs[0])
+    assert_warns(scene, 'node "Shader to RGB"', "as Color")

@@ -48,6 +48,12 @@ class MaterialExporter:
         return self._exported[key]
 
 
+def emits(material):
+    """Whether a glTF material gives light."""
+    closures = material.get("extensions", {}).get("RELIEF_surface", {}).get("closures", ())
+    return any(material.get("emissiveFactor", ())) or any(closure["type"] == "emission" for closure in closures)
+
+
 class _Indices:
     """A material's place in the document, which it gets when a mesh uses it.
 
@@ -90,7 +96,8 @@ class MaterialJob:
         self._graph = GraphWriter(self._coordinate_set, self._graph_texture)
         self._textures = TextureReader(self._warn)
         if material is not None and material.use_nodes and material.node_tree is not None:
-            self._export_nodes(material, settings)
+            with nodes.reading():
+                self._export_nodes(material, settings)
         elif material is None and compat.DEFAULT_CLOSURE is not None:
             self._extend("RELIEF_surface", {"closures": [compat.DEFAULT_CLOSURE]})
         else:

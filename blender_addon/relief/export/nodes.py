@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reading node graphs: following links through reroutes, groups and muted nodes, and folding constants."""
 
+import contextlib
 import math
+import sys
 from dataclasses import dataclass
 
 import bpy
@@ -35,10 +37,46 @@ def active_output(tree, idname):
     return next((n for n in outputs if n.is_active_output), outputs[0] if outputs else None)
 
 
+#: Frames of Python that a material may take: a node takes up to six.
+_DEEPEST = 30000
+
+_tables = None
+
+
+@contextlib.contextmanager
+def reading():
+    """While no tree changes: links are looked up in tables, where Blender goes through all of a tree, and long chains are
+    followed to their end."""
+    global _tables
+    before, deepest = _tables, sys.getrecursionlimit()
+    _tables = {}
+    if sys.version_info >= (3, 11):  # before, each frame takes of the thread's stack
+        sys.setrecursionlimit(max(deepest, _DEEPEST))
+    try:
+        yield
+    finally:
+        _tables = before
+        sys.setrecursionlimit(deepest)
+
+
+def _link(socket):
+    """The link to an input that has one."""
+    if _tables is None:
+        return socket.links[0]
+    tree = socket.id_data
+    table = _tables.get(tree.as_pointer())
+    if table is None:
+        table = {link.to_socket.as_pointer(): link for link in tree.links}
+        _tables[tree.as_pointer()] = table
+    return table[socket.as_pointer()]
+
+
 def follow(socket, groups=()):
     """What is linked to an input socket; None: nothing, so that its own value counts."""
     while socket is not None and socket.is_linked:
-        link = socket.links[0]
+        link = _link(socket)
+        if not link.is_valid or link.is_muted or not link.from_socket.enabled:
+            return None
         node, output = link.from_node, link.from_socket
         if node.mute:
             passed = next((i.from_socket for i in node.internal_links if i.to_socket == output), None)
@@ -156,7 +194,10 @@ def fold(socket, groups=(), known=None):
     known = {} if known is None else known
     key = (source.key, source.socket.identifier)
     if key not in known:
-        known[key] = build(source, lambda i: fold(i, source.groups, known))
+        try:
+            known[key] = build(source, lambda i: fold(i, source.groups, known))
+        except RecursionError:
+            known[key] = None
     return known[key]
 
 

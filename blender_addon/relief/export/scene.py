@@ -13,7 +13,7 @@ from .axes import GLTF_FROM_BLENDER
 from .gltf import GltfWriter, matrix_property
 from .image import ImageExporter
 from .light import Place, export_light
-from .material import MaterialExporter
+from .material import MaterialExporter, emits
 from .mesh import FARTHEST, add_mesh, store_mesh
 from .objects import collect, decompose, usable_places
 from .settings import render_settings
@@ -201,9 +201,7 @@ class SceneExporter:
     def _keep_dark(self):
         """Gives a scene without any light one that is as good as none: the program would put up a lamp of its own."""
         environment = self.writer.json["extensions"]["RELIEF_environment"]
-        has_light = any(_is_light(node) for node in self.nodes) or any(
-            any(material.get("emissiveFactor", ())) for material in self.writer.json.get("materials", ())
-        )
+        has_light = any(map(_is_light, self.nodes)) or any(map(emits, self.writer.json.get("materials", ())))
         if not has_light and "uri" not in environment and not any(environment["color"]):
             environment["color"] = [_DARKNESS] * 3
 

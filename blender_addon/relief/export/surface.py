@@ -538,6 +538,10 @@ def _colored(what):
     return write
 
 
+def _volume(w, source, weight):
+    w.unread(source, "a volume as surface", "nothing is there, as in Cycles")
+
+
 def _portal(w, source, weight):
     w.unread(source, "a portal for rays", "a transparent surface of its colour was used")
     w.add("transparent", weight, **w.inputs(source, {"Color": "color"}))
@@ -583,6 +587,10 @@ _NODES = {
     "ShaderNodeEmission": _emission,
     "ShaderNodeBackground": _emission,
     "ShaderNodeHoldout": _holdout,
+    "ShaderNodeVolumeAbsorption": _volume,
+    "ShaderNodeVolumeScatter": _volume,
+    "ShaderNodeVolumePrincipled": _volume,
+    "ShaderNodeVolumeCoefficients": _volume,
 }
 
 
