@@ -5,6 +5,7 @@ import json
 import bpy
 from scenes import (
     IS_4_0,
+    IS_5_0,
     add_camera,
     add_group_socket,
     add_image_node,
@@ -134,7 +135,6 @@ def test_many_ways_to_one_shader_are_one_closure():
 def test_every_shader_node():
     """One closure a node, with its inputs by our names, its choices by ours, and no weight."""
     maths = {"maths": "4.3"} if IS_4_0 else {}
-    normal = []
 
     def check(kind, expected, settings=(), **inputs):
         material, tree, output = _material(kind)
@@ -147,7 +147,6 @@ def test_every_shader_node():
         for name, value in expected.items():
             found = closure[name]
             assert found == value if isinstance(value, str) else _near(found, value), (kind, name, closure)
-        normal.append(closure)
 
     color, values = (0.1, 0.2, 0.3, 1), {"color": (0.1, 0.2, 0.3)}
     check("ShaderNodeBsdfDiffuse", {"type": "diffuse", **values, "roughness": 0.4, **maths}, Color=color, Roughness=0.4)
@@ -156,9 +155,9 @@ def test_every_shader_node():
         distribution = [("distribution", theirs)]
         expected = {"type": "glossy", **rough, "distribution": ours}
         check("ShaderNodeBsdfGlossy", expected, distribution, Color=color, Roughness=0.4)
-        expected = {"type": "glass", **rough, "ior": 1.3, "distribution": ours}
-        if "Thin Film Thickness" not in bpy.types.ShaderNodeBsdfGlass.bl_rna.properties and not _has_film():
-            check("ShaderNodeBsdfGlass", expected, distribution, Color=color, Roughness=0.4, IOR=1.3)
+        film = {"thinFilmThickness": 0, "thinFilmIor": 1.33} if IS_5_0 else {}
+        expected = {"type": "glass", **rough, **film, "ior": 1.3, "distribution": ours}
+        check("ShaderNodeBsdfGlass", expected, distribution, Color=color, Roughness=0.4, IOR=1.3)
     check(
         "ShaderNodeBsdfRefraction",
         {"type": "refraction", **rough, "ior": 1.3, "distribution": "beckmann"},
@@ -178,14 +177,16 @@ def test_every_shader_node():
         check("ShaderNodeBsdfSheen", expected, [("distribution", "MICROFIBER")], Color=color, Roughness=0.4)
         expected = {"type": "velvet", **values, "sigma": 0.4}
         check("ShaderNodeBsdfSheen", expected, [("distribution", "ASHIKHMIN")], Color=color, Roughness=0.4)
+        metal = {"type": "metallic", "roughness": 0.4, "distribution": "ggx", **maths}
+        expected = {**metal, "baseColor": color[:3], "edgeTint": (1, 0.5, 1), "fresnel": "f82"}
+        settings = [("distribution", "GGX"), ("fresnel_type", "F82")]
+        values = {"Base_Color": color, "Edge_Tint": (1, 0.5, 1, 1), "Roughness": 0.4}
+        check("ShaderNodeBsdfMetallic", expected, settings, **values)
+        expected = {**metal, "ior": (1, 2, 3), "extinction": (4, 5, 6), "fresnel": "physical"}
+        settings = [("distribution", "GGX"), ("fresnel_type", "PHYSICAL_CONDUCTOR")]
+        check("ShaderNodeBsdfMetallic", expected, settings, IOR=(1, 2, 3), Extinction=(4, 5, 6), Roughness=0.4)
     else:
         check("ShaderNodeBsdfVelvet", {"type": "velvet", **values, "sigma": 0.4}, Color=color, Sigma=0.4)
-
-
-def _has_film():
-    tree = bpy.data.materials.new("m")
-    tree.use_nodes = True
-    return "Thin Film Thickness" in tree.node_tree.nodes.new("ShaderNodeBsdfGlass").inputs
 
 
 def test_anisotropy_comes_with_a_tangent():
@@ -201,16 +202,9 @@ def test_anisotropy_comes_with_a_tangent():
     assert not {"anisotropy", "rotation", "tangent"} & set(closure), closure
 
 
-def _principled(name, **inputs):
-    material, tree, node = new_material(name, "ShaderNodeBsdfPrincipled", **inputs)
-    if not IS_4_0:
-        return material, tree, node
-    return material, tree, node
-
-
 def test_principled():
     """All inputs by this version's names; alpha and emission apart."""
-    material, _, node = _principled("p", Base_Color=(0.1, 0.2, 0.3, 1), Metallic=0.25, Roughness=0.7, IOR=1.6)
+    material, _, node = new_material("p", "ShaderNodeBsdfPrincipled", Base_Color=(0.1, 0.2, 0.3, 1), Metallic=0.25, Roughness=0.7, IOR=1.6)
     (closure,), _, found = _closures(material)
     assert (closure["type"], closure["maths"]) == ("principled", "4.3" if IS_4_0 else "3.4")
     assert _near(closure["baseColor"], (0.1, 0.2, 0.3)) and _near(closure["metallic"], 0.25), closure
@@ -229,7 +223,7 @@ def test_principled():
 
 
 def test_inputs_that_vary_are_nodes():
-    material, tree, node = _principled("p")
+    material, tree, node = new_material("p", "ShaderNodeBsdfPrincipled")
     _value_node(tree, node.inputs["Base Color"], output=1)
     texture = add_image_node(tree, new_image(asymmetric_pixels()))
     tree.links.new(texture.outputs["Color"], node.inputs["Roughness"])

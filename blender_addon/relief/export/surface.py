@@ -232,7 +232,7 @@ class ClosureWriter:
         self.transmits = False
         self._past_bump = past_bump
         self._fail = fail
-        self._emitters = []
+        self._emitters = []  # (radiance without a graph or None, (Source, its sockets), weight)
 
     def write(self, source):
         """Adds the closures of a shader output.
@@ -395,8 +395,7 @@ class ClosureWriter:
         plain = None
         if not isinstance(weight, dict):
             plain = _unless_refused(lambda textures: scaled(_plain_emission(color, strength, groups, textures), weight))
-        values = lambda: {"color": self.input(color, source), "strength": self.input(strength, source)}
-        self._emitters.append((plain, values, weight))
+        self._emitters.append((plain, (source, color, strength), weight))
 
     def _shine(self, source, weight):
         """A value in place of a shader is emitted."""
@@ -414,9 +413,10 @@ class ClosureWriter:
         """Emission that no graph gives is the core's: all constants, or else one image."""
         plain = [p for p, _, _ in self._emitters if p is not None]
         kept = [p for p in plain if p.is_constant()] or plain[:1]
-        for radiance, values, weight in self._emitters:
+        for radiance, node, weight in self._emitters:
             if not any(radiance is k for k in kept):
-                self.add("emission", weight, **values())
+                source, color, strength = node
+                self.add("emission", weight, color=self.input(color, source), strength=self.input(strength, source))
         if kept:
             total = tuple(sum(channels) for channels in zip(*(k.value for k in kept)))
             self.emission = replace(kept[0], value=total)
