@@ -138,9 +138,11 @@ def test_every_shader_node():
 
     def check(kind, expected, settings=(), **inputs):
         material, tree, output = _material(kind)
-        node = _shader(tree, kind, **inputs)
+        node = tree.nodes.new(kind)
         for name, value in settings:
             setattr(node, name, value)
+        for name, value in inputs.items():
+            node.inputs[name.replace("_", " ")].default_value = value
         tree.links.new(node.outputs[0], output.inputs["Surface"])
         (closure,), _, _ = _closures(material)
         assert set(closure) == set(expected), (kind, closure)
@@ -444,7 +446,9 @@ def test_groups_and_muted_nodes_are_followed():
 
 
 def test_links_that_blender_leaves_out():
-    """Muted ones, and those of a circle: the input has its own value."""
+    """Muted ones: the input has its own value. Circles end, whatever the version makes of them."""
+    from relief.export.dry_run import try_material
+
     material, tree, output = _material("circle")
     node = _shader(tree, "ShaderNodeBsdfGlossy", Roughness=0.25)
     tree.links.new(node.outputs[0], output.inputs["Surface"])
@@ -456,7 +460,15 @@ def test_links_that_blender_leaves_out():
     noise_link.is_muted = False
     first = _value_node(tree, noise.inputs["Scale"], "ShaderNodeMath")
     tree.links.new(first.outputs[0], first.inputs[0])
-    _closures(material, _GRAPHED)
+    bumps = [tree.nodes.new("ShaderNodeBump") for _ in range(2)]
+    mixes = [tree.nodes.new("ShaderNodeMixShader") for _ in range(2)]
+    tree.links.new(bumps[0].outputs[0], node.inputs["Normal"])
+    for nodes, socket in ((bumps, "Normal"), (mixes, 1)):
+        for one, other in (nodes, reversed(nodes)):
+            tree.links.new(one.outputs[0], other.inputs[socket])
+    tree.links.new(node.outputs[0], mixes[0].inputs[2])
+    tree.links.new(mixes[0].outputs[0], output.inputs["Surface"])
+    assert try_material(material, bpy.context.scene.relief)[0].num_nodes >= 4
 
 
 def test_long_chains_are_followed():

@@ -87,7 +87,9 @@ class GraphWriter:
 
     def _normal_source(self, source):
         """What gives a normal, past Bump nodes whose height is the same everywhere."""
-        while source is not None and source.node.bl_idname == "ShaderNodeBump":
+        seen = set()
+        while source is not None and source.node.bl_idname == "ShaderNodeBump" and source.key not in seen:
+            seen.add(source.key)
             if self.constant(source.node.inputs["Height"], source.groups) is None:
                 break
             source = nodes.linked(source.node.inputs["Normal"], source.groups)
@@ -109,6 +111,10 @@ class GraphWriter:
         if write is None or name is None:
             raise self._failure(source, NotUnderstood(f'node "{node.name}" ({node.bl_label}), {source.socket.name}'))
         if source.key not in self._known:
+            # Stays only if the node depends on itself.
+            circle = NotUnderstood(f'node "{node.name}" ({node.bl_label}), which is linked in a circle')
+            circle.key = source.key
+            self._known[source.key] = circle
             try:
                 self._known[source.key] = write(self, node, source.groups)
             except NotUnderstood as error:
@@ -116,8 +122,10 @@ class GraphWriter:
             except RecursionError:
                 error = NotUnderstood(f'node "{node.name}": more nodes one after another than can be followed')
                 raise self._failure(source, error) from None
-        if isinstance(self._known[source.key], NotUnderstood):
-            raise self._known[source.key]
+        error = self._known[source.key]
+        if isinstance(error, NotUnderstood):
+            self.not_understood.setdefault(error.key, str(error))
+            raise error
         return {"node": self._known[source.key], "output": name}
 
     def _failure(self, source, error):

@@ -194,10 +194,11 @@ def fold(socket, groups=(), known=None):
     known = {} if known is None else known
     key = (source.key, source.socket.identifier)
     if key not in known:
+        known[key] = None  # what depends on itself is no constant
         try:
             known[key] = build(source, lambda i: fold(i, source.groups, known))
         except RecursionError:
-            known[key] = None
+            pass
     return known[key]
 
 
