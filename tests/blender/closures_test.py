@@ -260,7 +260,7 @@ def test_bumps_are_chained():
     flat = _value_node(tree, outer.inputs["Normal"], "ShaderNodeBump")
     inner = _value_node(tree, flat.inputs["Normal"], "ShaderNodeBump")
     _value_node(tree, outer.inputs["Height"])
-    _value_node(tree, inner.inputs["Height"], "ShaderNodeTexVoronoi")
+    _value_node(tree, inner.inputs["Height"], "ShaderNodeTexMagic", 1)
     outer.invert, inner.inputs["Strength"].default_value, inner.inputs["Distance"].default_value = True, 0.3, 0.2
     (closure,), graph, _ = _closures(material, _GRAPHED)
     first = graph[closure["normal"]["node"]]
@@ -268,7 +268,7 @@ def test_bumps_are_chained():
     assert graph[first["inputs"]["height"]["node"]]["type"] == "noise-texture", graph
     # The one in between has the same height everywhere, and so does nothing.
     second = graph[first["inputs"]["normal"]["node"]]
-    assert graph[second["inputs"]["height"]["node"]]["type"] == "voronoi-texture" and "normal" not in second["inputs"], graph
+    assert graph[second["inputs"]["height"]["node"]]["type"] == "magic-texture" and "normal" not in second["inputs"], graph
     assert _near(second["inputs"]["strength"], 0.3) and _near(second["inputs"]["distance"], 0.2), graph
     # A bump that has a height alone is no bump, and the surface stays plain.
     tree.links.remove(node.inputs["Normal"].links[0])
@@ -310,7 +310,7 @@ def test_bump_only_bends_every_normal():
     assert shifted["operation"] == "subtract" and _near(shifted["inputs"]["b"], 0.25), graph
     shader = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeBsdfDiffuse")
     own = _value_node(tree, shader.inputs["Normal"], "ShaderNodeBump")
-    _value_node(tree, own.inputs["Height"], "ShaderNodeTexVoronoi")
+    _value_node(tree, own.inputs["Height"], "ShaderNodeTexMagic", 1)
     (second,), graph, _ = _closures(material, _GRAPHED)
     assert graph[second["normal"]["node"]]["inputs"]["normal"] == closure["normal"], graph
     # A height that is the same everywhere bends nothing.

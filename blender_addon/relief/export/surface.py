@@ -532,8 +532,8 @@ def _colored(what):
 
     def write(w, source, weight):
         w.unread(source, what, "a diffuse surface of its colour was used")
-        name = next(n for n in ("Color", "Base Color") if n in source.node.inputs)
-        w.add("diffuse", weight, **w.inputs(source, {name: "color", "Normal": "normal"}))
+        # Only the sockets that a node shows are found: hair by absorption has no colour.
+        w.add("diffuse", weight, **w.inputs(source, {"Color": "color", "Base Color": "color", "Normal": "normal"}))
 
     return write
 
