@@ -304,10 +304,16 @@ def test_bump_only_bends_every_normal():
     (closure,), graph, _ = _closures(material, _GRAPHED)
     bump = graph[closure["normal"]["node"]]
     assert bump["type"] == "bump" and (bump["inputs"]["strength"], bump["inputs"]["distance"]) == (1, 1), graph
-    scaled = graph[bump["inputs"]["height"]["node"]]
+    # In object space a height is as long as the object's scale makes it.
+    height = graph[bump["inputs"]["height"]["node"]]["inputs"]
+    assert graph[height["b"]["node"]]["operation"] == "dot", graph
+    scaled = graph[height["a"]["node"]]
     assert scaled["operation"] == "multiply" and _near(scaled["inputs"]["b"], 0.3), graph
     shifted = graph[scaled["inputs"]["a"]["node"]]
     assert shifted["operation"] == "subtract" and _near(shifted["inputs"]["b"], 0.25), graph
+    node.space = "WORLD"
+    (closure,), graph, _ = _closures(material, _GRAPHED)
+    assert graph[graph[closure["normal"]["node"]]["inputs"]["height"]["node"]] ["operation"] == "multiply", graph
     shader = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeBsdfDiffuse")
     own = _value_node(tree, shader.inputs["Normal"], "ShaderNodeBump")
     _value_node(tree, own.inputs["Height"], "ShaderNodeTexMagic", 1)

@@ -30,7 +30,6 @@ class GraphWriter:
     @param  texture         gives glTF's reference to an Image Texture node's image, and whether it is stored as sRGB; None
                             without a file
     nodes          JSON of the nodes so far
-    outputs        JSON of what the graph gives
     uses_generated whether meshes need _GENERATED
     color_map      colour attribute that is read; None: none
     own_normal     reference to the surface's normal as a displacement bumps it; None: it is the mesh's
@@ -41,7 +40,6 @@ class GraphWriter:
         self.coordinate_set = coordinate_set
         self.texture = texture
         self.nodes = []
-        self.outputs = {}
         self.uses_generated = False
         self.color_map = None
         self.own_normal = None
@@ -79,7 +77,7 @@ class GraphWriter:
         constant = self.constant(socket, groups)
         if constant is None:
             return self.output(source)
-        return {"node": self.add("combine", dict(zip("xyz", constant))), "output": "vector"}
+        return self.op("combine", dict(zip("xyz", constant)), "vector")
 
     def bends(self, socket, groups=()):
         """Whether a Normal input has a normal of its own."""
@@ -152,6 +150,10 @@ class GraphWriter:
             self.nodes.append(json)
         return self._indices[key]
 
+    def op(self, kind, inputs, output, **options):
+        """Adds a node; returns a reference to one of its outputs."""
+        return {"node": self.add(kind, inputs, **options), "output": output}
+
     def inputs(self, node, groups, names):
         """Inputs of a node by our names.
 
@@ -185,22 +187,6 @@ class GraphWriter:
         if number is None:
             raise NotUnderstood(f'a third uv map, "{name}"')
         return {"node": self.add("texture-coordinate"), "output": "uv1" if number else "uv"}
-
-    def scaled(self, reference, factor, is_color):
-        """A value times a number, or times a colour."""
-        if is_color:
-            if tuple(factor) == (1.0, 1.0, 1.0):
-                return reference
-            inputs = {"factor": 1.0, "a": reference, "b": list(factor)}
-            return {"node": self.add("mix-color", inputs, blend="multiply"), "output": "color"}
-        if factor == 1.0:
-            return reference
-        return {"node": self.add("math", {"a": reference, "b": factor}, operation="multiply"), "output": "value"}
-
-    def shifted(self, reference, offset):
-        if offset == 0.0:
-            return reference
-        return {"node": self.add("math", {"a": reference, "b": offset}, operation="add"), "output": "value"}
 
 
 def _label(name):
@@ -558,50 +544,64 @@ def _bump(g, node, groups):
 def bump_of_displacement(g, source):
     """Reference to the normal that Blender's "Bump Only" makes of what is linked to a material's Displacement.
 
-    Cycles bumps by how far the displacement goes along the normal. The scale of objects is not counted: that of materials
-    knows no objects.
+    Cycles bumps by how far the displacement goes along the normal.
 
     @return  None: the displacement is the same everywhere
     @error   NotUnderstood
     """
     node, groups = source.node, source.groups
-    kind = node.bl_idname
-    if kind == "ShaderNodeDisplacement":
+    if node.bl_idname == "ShaderNodeDisplacement":
         parts = [g.value(node.inputs[name], groups) for name in ("Height", "Midlevel", "Scale")]
         if not any(isinstance(part, dict) for part in parts):
             return None
+        direction = _direction(g, node, groups)
         height = _times_shifted(g, *parts)
-        other = nodes.linked(node.inputs["Normal"], groups)
-        if other is not None:
-            along = {"a": g.normal(node.inputs["Normal"], groups), "b": g.geometry_normal()}
-            cosine = {"node": g.add("vector-math", along, operation="dot"), "output": "value"}
-            height = {"node": g.add("math", {"a": height, "b": cosine}, operation="multiply"), "output": "value"}
-    elif kind == "ShaderNodeVectorDisplacement" and node.space != "WORLD":
-        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}) as bump: space {_label(node.space)}')
+        if direction is not None:
+            height = g.op("math", {"a": height, "b": _along_normal(g, direction)}, "value", operation="multiply")
     else:
-        vector = _world_displacement(g, source)
-        along = {"a": vector, "b": g.geometry_normal()}
-        height = {"node": g.add("vector-math", along, operation="dot"), "output": "value"}
-    return {"node": g.add("bump", {"height": height, "strength": 1.0, "distance": 1.0}), "output": "normal"}
+        height = _along_normal(g, _displacement(g, source))
+    return g.op("bump", {"height": height, "strength": 1.0, "distance": 1.0}, "normal")
+
+
+def _direction(g, node, groups):
+    """Where a Displacement node moves points by a height of 1, in the world; None: along the normal."""
+    is_bent = g.bends(node.inputs["Normal"], groups)
+    normal = g.normal(node.inputs["Normal"], groups) if is_bent else None
+    if node.space == "WORLD":
+        return normal
+    if is_bent:
+        normal = g.op("vector-transform", {"vector": normal}, "vector", transform="normal", **{"from": "world", "to": "object"})
+    else:
+        normal = {"node": g.add("texture-coordinate"), "output": "normal"}
+    return _to_world(g, normal)
+
+
+def _to_world(g, vector):
+    return g.op("vector-transform", {"vector": vector}, "vector", transform="vector", **{"from": "object", "to": "world"})
+
+
+def _along_normal(g, vector):
+    return g.op("vector-math", {"a": vector, "b": g.geometry_normal()}, "value", operation="dot")
 
 
 def _times_shifted(g, height, midlevel, scale):
     """(height − midlevel) · scale"""
     if midlevel != 0:
-        inputs = {"a": height, "b": midlevel}
-        height = {"node": g.add("math", inputs, operation="subtract"), "output": "value"}
-    if scale != 1:
-        height = {"node": g.add("math", {"a": height, "b": scale}, operation="multiply"), "output": "value"}
-    return height
+        height = g.op("math", {"a": height, "b": midlevel}, "value", operation="subtract")
+    return height if scale == 1 else g.op("math", {"a": height, "b": scale}, "value", operation="multiply")
 
 
-def _world_displacement(g, source):
+def _displacement(g, source):
+    """A displacement that is no Displacement node's, in the world."""
     node, groups = source.node, source.groups
     if node.bl_idname != "ShaderNodeVectorDisplacement":
         return g.output(source)
+    if node.space == "TANGENT":
+        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}) as bump: space tangent')
     vector, midlevel, scale = (g.value(node.inputs[name], groups) for name in ("Vector", "Midlevel", "Scale"))
-    moved = {"node": g.add("vector-math", {"a": vector, "b": midlevel}, operation="subtract"), "output": "vector"}
-    return {"node": g.add("vector-math", {"a": moved, "scale": scale}, operation="scale"), "output": "vector"}
+    moved = g.op("vector-math", {"a": vector, "b": midlevel}, "vector", operation="subtract")
+    moved = g.op("vector-math", {"a": moved, "scale": scale}, "vector", operation="scale")
+    return moved if node.space == "WORLD" else _to_world(g, moved)
 
 
 _FACTOR = {"Fac": "factor", "Factor": "factor", "Color": "color"}

@@ -294,7 +294,7 @@ class ClosureWriter:
 
     def _saturated(self, value):
         if isinstance(value, dict):
-            return {"node": self.graph.add("clamp", {"value": value}), "output": "value"}
+            return self.graph.op("clamp", {"value": value}, "value")
         return min(max(value, 0.0), 1.0)
 
     def _rest(self, share):
@@ -314,7 +314,7 @@ class ClosureWriter:
         return first + second if are_numbers else self._math("add", first, second)
 
     def _math(self, operation, a, b):
-        return {"node": self.graph.add("math", {"a": a, "b": b}, operation=operation), "output": "value"}
+        return self.graph.op("math", {"a": a, "b": b}, "value", operation=operation)
 
     def add(self, kind, weight, **values):
         """Adds a closure; what is None is left out, and so is a weight of 1."""
@@ -374,7 +374,7 @@ class ClosureWriter:
             values["tangent"] = self._tangent(node.inputs["Tangent"], source)
         else:
             self.graph.uses_generated = True
-            values["tangent"] = {"node": self.graph.add("tangent", direction="radial-z"), "output": "tangent"}
+            values["tangent"] = self.graph.op("tangent", {}, "tangent", direction="radial-z")
         return values
 
     def _tangent(self, socket, source):
