@@ -29,6 +29,7 @@ class GraphWriter:
     @param  coordinate_set  gives the number, 0 or 1, of the set that a ("uv", name) is in; None: no room for it
     @param  texture         gives glTF's reference to an Image Texture node's image, and whether it is stored as sRGB; None
                             without a file
+    @param  warn            called with what a value is, if it is no number, and what was used instead
     nodes          JSON of the nodes so far
     uses_generated whether meshes need _GENERATED
     color_map      colour attribute that is read; None: none
@@ -36,9 +37,10 @@ class GraphWriter:
     not_understood texts by the keys of the nodes that they are about
     """
 
-    def __init__(self, coordinate_set, texture):
+    def __init__(self, coordinate_set, texture, warn=lambda what, instead: None):
         self.coordinate_set = coordinate_set
         self.texture = texture
+        self.warn = warn
         self.nodes = []
         self.uses_generated = False
         self.color_map = None
@@ -53,7 +55,7 @@ class GraphWriter:
         value = nodes.fold(socket, groups, self._folded)
         if value is None:
             return None
-        value = nodes.finite(value, socket.name, lambda *_: None)
+        value = nodes.finite(value, socket.name, self.warn)
         if socket.type in {"VALUE", "INT", "BOOLEAN"}:
             return nodes.as_number(value)
         return list(nodes.as_color(value))

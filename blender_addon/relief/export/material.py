@@ -93,7 +93,7 @@ class MaterialJob:
         self._problems = {}
         self.json = {"name": self._name, "doubleSided": True}
         self.coverage = None
-        self._graph = GraphWriter(self._coordinate_set, self._graph_texture)
+        self._graph = GraphWriter(self._coordinate_set, self._graph_texture, self._warn)
         self._textures = TextureReader(self._warn)
         if material is not None and material.use_nodes and material.node_tree is not None:
             with nodes.reading():
