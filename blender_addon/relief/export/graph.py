@@ -685,4 +685,4 @@ _NODES = {
 
 def knows(node):
     """Whether a node that gives values can be written, if what it is set to can."""
-    return node.bl_idname in _NODES or node.bl_idname in {"ShaderNodeUVMap", "ShaderNodeValue", "ShaderNodeRGB"}
+    return node.bl_idname in _NODES or node.bl_idname in {"ShaderNodeUVMap", "ShaderNodeValue", "ShaderNodeRGB", "ShaderNodeNormal"}

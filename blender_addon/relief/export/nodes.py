@@ -257,7 +257,16 @@ def _fold_mix(source, value):
     return (*mixed, 1.0) if kind == "RGBA" else mixed
 
 
+def _fold_normal(source, value):
+    if source.socket.name != "Normal":
+        return None
+    direction = own_value(source.socket)
+    length = math.sqrt(sum(x * x for x in direction))
+    return tuple(x / length for x in direction) if length else direction
+
+
 _FOLDS = {
+    "ShaderNodeNormal": _fold_normal,
     "ShaderNodeMath": _fold_math,
     "ShaderNodeCombineXYZ": _fold_combine,
     "ShaderNodeCombineColor": _fold_combine,

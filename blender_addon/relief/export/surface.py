@@ -83,7 +83,7 @@ def _unless_refused(read):
 
 def _plain_color(socket, groups, textures):
     color = textures.color(socket, groups)
-    if color.texture is not None and color.texture.channel is not None:
+    if color.texture is not None and (color.texture.channel is not None or color.texture.node.image.source == "TILED"):
         raise _NotPlain
     return color
 
