@@ -133,6 +133,13 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity)
     case Q::dpdy_y:
     case Q::dpdy_z:
       return component(graph_z_up(graph_footprint(at).dPdy), axis_of(Q::dpdy_x));
+    case Q::object_normal_x:
+    case Q::object_normal_y:
+    case Q::object_normal_z: {
+      // A normal goes back by the transpose of what points go there by.
+      const Vec3f n = normalize(transform_normal(at.instance->world_from_object, as_normal(hit.Ns)));
+      return component(n, axis_of(Q::object_normal_x)) * to_viewer;
+    }
     case Q::kCount:
       break;
   }

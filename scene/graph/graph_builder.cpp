@@ -15,7 +15,10 @@ namespace {
 const GraphOpShape& shape_of(GraphOp op) { return kGraphOpShapes[static_cast<int>(op)]; }
 
 /// Whether an operation gives the same whatever the scene.
-bool can_fold(GraphOp op) { return op != GraphOp::image; }
+bool can_fold(GraphOp op)
+{
+  return op != GraphOp::image && op != GraphOp::image_box && op != GraphOp::image_tiles;
+}
 
 }  // namespace
 
