@@ -40,6 +40,9 @@ DEFAULT_SURFACE = {"roughness": 0.5, "specular": 1.0} if IS_5_0 else {}
 #: Before 4.0 the octaves of a Noise Texture never grew.
 CLAMPS_NOISE_ROUGHNESS = not IS_4_0
 
+#: Whose numbers the textures of this version have, as RELIEF_graph calls them; None: those of 3.4.
+TEXTURE_MATHS = "5.2" if IS_5_0 else "4.3" if IS_4_0 else None
+
 #: Before 4.0 the Principled BSDF multiplied its coat by Disney's factor of a quarter.
 COAT_SCALE = 1.0 if IS_4_0 else 0.25
 

@@ -52,6 +52,20 @@ def follow(socket, groups=()):
     return None
 
 
+def is_used(output):
+    """Whether an output socket leads, through whichever nodes, to where a tree ends."""
+    seen, waiting = set(), [output]
+    while waiting:
+        for link in waiting.pop().links:
+            node = link.to_node
+            if not node.outputs:
+                return True
+            if node.as_pointer() not in seen:
+                seen.add(node.as_pointer())
+                waiting.extend(node.outputs)
+    return False
+
+
 _MATH = {
     "ADD": lambda a, b, _: a + b,
     "SUBTRACT": lambda a, b, _: a - b,
@@ -128,6 +142,10 @@ def fold(socket, groups=()):
             numbers = [as_number(v) for v in values]
             result = _MATH[node.operation](*numbers)
             return min(max(result, 0.0), 1.0) if node.use_clamp else result
+    if node.bl_idname == "ShaderNodeNormal" and source.socket.name == "Normal":
+        direction = own_value(source.socket)
+        length = math.sqrt(sum(x * x for x in direction))
+        return tuple(x / length for x in direction) if length else direction
     if node.bl_idname == "ShaderNodeCombineXYZ":
         values = [fold(i, source.groups) for i in node.inputs]
         if all(isinstance(v, float) for v in values):

@@ -95,6 +95,10 @@ class Input:
         return self.texture is None and self.color_map is None and self.graph is None and (value is None or self.value == value)
 
 
+class _BeyondTextures(Exception):
+    """An image that no texture of glTF shows as its node does."""
+
+
 @dataclass
 class TextureReader:
     """Reads inputs of one material's nodes.
@@ -109,6 +113,7 @@ class TextureReader:
     graph: object = None
     takes_bump: bool = False
     bump: object = None
+    _refuses: bool = False
 
     def color(self, socket, groups=()):
         """A colour input: Input whose value is linear RGB."""
@@ -133,18 +138,39 @@ class TextureReader:
 
     def _input(self, socket, groups, is_color):
         if nodes.fold(socket, groups) is None:
-            found = self._textured(nodes.follow(socket, groups), is_color)
+            source = nodes.follow(socket, groups)
+            found, is_beyond = self._exactly_textured(source, is_color)
             if found is not None:
                 return found
             if self.graph is not None:
-                return self._graph(socket, groups, is_color)
+                found = self._graph(socket, groups, is_color, source if is_beyond else None)
+                if found is not None:
+                    return found
         reader = nodes.Reader(self.warn, groups)
         return Input(reader.color(socket) if is_color else reader.number(socket))
 
-    def _graph(self, socket, groups, is_color):
+    def _exactly_textured(self, source, is_color):
+        """Input of a source by a texture, None if there is none that is the same; and whether there is one that is similar."""
+        self._refuses = self.graph is not None
+        try:
+            return self._textured(source, is_color), False
+        except _BeyondTextures:
+            return None, True
+        finally:
+            self._refuses = False
+
+    def _beyond(self, what, instead):
+        """Says what a texture cannot do: to graphs, which can; where there are none, to the user."""
+        if self._refuses:
+            raise _BeyondTextures
+        self.warn(what, instead)
+
+    def _graph(self, socket, groups, is_color, similar=None):
         try:
             return Input((1.0, 1.0, 1.0) if is_color else 1.0, graph=self.graph.value(socket, groups))
         except NotUnderstood as error:
+            if similar is not None:
+                return self._textured(similar, is_color)
             value = nodes.finite(nodes.own_value(socket), socket.name, self.warn)
             shown = tuple(round(v, 4) for v in value) if isinstance(value, tuple) else round(value, 4)
             self.warn(f"{error} as {socket.name}", f"the value {shown} was used")
@@ -218,12 +244,14 @@ class TextureReader:
         return replace(inner, offset=inner.offset + (constant if kind == "ADD" else -constant))
 
     def _mapping(self, node, groups):
+        if node.image.source == "TILED" and self._refuses:
+            raise _BeyondTextures
         if node.projection != "FLAT":
-            self.warn(f'node "{node.name}": projection {node.projection.lower()}', "flat was used")
+            self._beyond(f'node "{node.name}": projection {node.projection.lower()}', "flat was used")
         if node.extension == "CLIP":
-            self.warn(f'node "{node.name}": extension Clip', "Extend was used")
+            self._beyond(f'node "{node.name}": extension Clip', "Extend was used")
         if node.interpolation in {"Cubic", "Smart"}:
-            self.warn(f'node "{node.name}": interpolation {node.interpolation}', "Linear was used")
+            self._beyond(f'node "{node.name}": interpolation {node.interpolation}', "Linear was used")
         return self._coordinates(nodes.follow(node.inputs["Vector"], groups), Mapping())
 
     def _coordinates(self, source, mapping):
@@ -237,21 +265,21 @@ class TextureReader:
             return replace(mapping, source=("uv", node.attribute_name))
         if node.bl_idname == "ShaderNodeTexCoord" and source.socket.name in {"UV", "Generated", "Object"}:
             if source.socket.name == "Object" and node.object is not None:
-                self.warn(f'node "{node.name}": coordinates of another object', "the object's own were used")
+                self._beyond(f'node "{node.name}": coordinates of another object', "the object's own were used")
             return replace(mapping, source=(source.socket.name.lower(), ""))
         if node.bl_idname == "ShaderNodeMapping" and mapping == Mapping():
             inner = self._coordinates(nodes.follow(node.inputs["Vector"], source.groups), Mapping())
             if inner.transform() is None:
                 return self._mapped(node, source.groups, inner.source)
-        self.warn(f'node "{node.name}" ({node.bl_label}) as texture coordinates', "the uv map was used")
+        self._beyond(f'node "{node.name}" ({node.bl_label}) as texture coordinates', "the uv map was used")
         return mapping
 
     def _mapped(self, node, groups, source):
-        reader = nodes.Reader(self.warn, groups)
+        reader = nodes.Reader(self._beyond, groups)
         location = reader.vector(node.inputs["Location"])[:2] if "Location" in node.inputs else (0.0, 0.0)
         turn, scale = reader.vector(node.inputs["Rotation"]), reader.vector(node.inputs["Scale"])[:2]
         if abs(turn[0]) + abs(turn[1]) > 1e-7:
-            self.warn(f'node "{node.name}": rotation about X or Y', "the one about Z alone was used")
+            self._beyond(f'node "{node.name}": rotation about X or Y', "the one about Z alone was used")
         if node.vector_type in {"POINT", "VECTOR"}:
             return Mapping(source, tuple(location), turn[2], tuple(scale))
         # TEXTURE is the inverse; NORMAL lengthens to unit, which no texture wants.
@@ -261,5 +289,5 @@ class TextureReader:
             if turn[2] == 0 or scale[0] == scale[1]:
                 moved = tuple(float(x) for x in -inverse @ np.array(location))
                 return Mapping(source, moved, -turn[2], (1 / scale[0], 1 / scale[1]))
-        self.warn(f'node "{node.name}": a mapping that shears ({node.vector_type.lower()})', "the uv map was used")
+        self._beyond(f'node "{node.name}": a mapping that shears ({node.vector_type.lower()})', "the uv map was used")
         return Mapping(source)
