@@ -43,6 +43,9 @@ CLAMPS_NOISE_ROUGHNESS = not IS_4_0
 #: Whose numbers the textures of this version have, as RELIEF_graph calls them; None: those of 3.4.
 TEXTURE_MATHS = "5.2" if IS_5_0 else "4.3" if IS_4_0 else None
 
+#: Entries of the tables that stand for ramps and curves, as many as Cycles'. Checked in 3.4 and 4.3.
+TABLE_ENTRIES = 257 if IS_4_0 else 256
+
 #: Before 4.0 the Principled BSDF multiplied its coat by Disney's factor of a quarter.
 COAT_SCALE = 1.0 if IS_4_0 else 0.25
 

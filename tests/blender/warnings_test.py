@@ -20,9 +20,12 @@ def _clumsy_scene(number=30):
         sky.name = f"sky {index}"
         tree.links.new(sky.outputs["Color"], node.inputs["Color"])
         add_sphere(0.1, material, (index * 0.1, 0, 0), segments=4)
-    material, tree, node = new_material("boxy")
-    image = add_image_node(tree, bpy.data.images.new("image", 4, 4), projection="BOX", interpolation="Cubic")
-    tree.links.new(image.outputs["Color"], node.inputs["Color"])
+    material, tree, node = new_material("lost")
+    picture = bpy.data.images.new("image", 4, 4)
+    picture.source, picture.filepath = "FILE", "//missing.png"
+    image, inverted = add_image_node(tree, picture), tree.nodes.new("ShaderNodeInvert")
+    tree.links.new(image.outputs["Color"], inverted.inputs["Color"])
+    tree.links.new(inverted.outputs["Color"], node.inputs["Color"])
     add_plane(2, material)
     return scene
 

@@ -10,9 +10,6 @@ import math
 from .. import compat
 from . import nodes
 
-#: Entries of the tables that stand for ramps and curves: as many as Cycles'.
-_TABLE = 256
-
 
 class NotUnderstood(Exception):
     """A node that graphs do not know; its text names it."""
@@ -352,7 +349,7 @@ def _wave(g, node, groups):
 
 
 def _ramp(g, node, groups):
-    table = [c for i in range(_TABLE) for c in node.color_ramp.evaluate(i / (_TABLE - 1))]
+    table = [c for i in range(compat.TABLE_ENTRIES) for c in node.color_ramp.evaluate(i / (compat.TABLE_ENTRIES - 1))]
     interpolated = node.color_ramp.interpolation != "CONSTANT"
     inputs = g.inputs(node, groups, {0: "factor"})
     return g.add("color-ramp", inputs, table=table, interpolate=interpolated)
@@ -368,8 +365,8 @@ def _curve_table(mapping, curves, combined=None):
     ends = [point.location[0] for curve in (*curves, *([combined] if combined else [])) for point in curve.points]
     low, high = min(ends), max(ends)
     table = []
-    for i in range(_TABLE):
-        x = low + (high - low) * i / (_TABLE - 1)
+    for i in range(compat.TABLE_ENTRIES):
+        x = low + (high - low) * i / (compat.TABLE_ENTRIES - 1)
         if combined is not None:
             x = mapping.evaluate(combined, x)
         table.extend(mapping.evaluate(curve, x) for curve in curves)
