@@ -253,15 +253,20 @@ RELIEF_KERNEL void graph_voronoi(const GraphOperands& o)
 {
   F8 p[kDims];
   for (int i = 0; i < kDims; ++i) p[i] = graph_in(o, i);
-  const VoronoiSettings<kDims> settings{static_cast<VoronoiFeature>(o.immediates[0]),
-                                        static_cast<VoronoiMetric>(o.immediates[1]),
-                                        graph_in(o, kDims),
-                                        graph_in(o, kDims + 1),
-                                        graph_in(o, kDims + 2),
-                                        o.immediates[2]};
+  const unsigned flags = o.immediates[2];
   const NoiseOctaves octaves{clamp(graph_in(o, kDims + 3), 0.0f, 15.0f), clamp(graph_in(o, kDims + 4), 0.0f, 1.0f),
                              graph_in(o, kDims + 5)};
-  const Voronoi<kDims> cells = voronoi_fractal<kDims>(p, settings, octaves);
+  const auto eval = [&]<bool kPcg>() {
+    const VoronoiSettings<kDims, kPcg> settings{static_cast<VoronoiFeature>(o.immediates[0]),
+                                                static_cast<VoronoiMetric>(o.immediates[1]),
+                                                graph_in(o, kDims),
+                                                graph_in(o, kDims + 1),
+                                                graph_in(o, kDims + 2),
+                                                flags};
+    return voronoi_fractal<kDims>(p, settings, octaves);
+  };
+  const bool is_pcg = (flags & kVoronoiPcg) != 0 && kDims > 1;
+  const Voronoi<kDims> cells = is_pcg ? eval.template operator()<true>() : eval.template operator()<false>();
   graph_set(o, 0, cells.distance);
   for (int i = 0; i < 3; ++i) graph_set(o, 1 + i, cells.color[i]);
   for (int i = 0; i < 4; ++i) {

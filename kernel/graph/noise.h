@@ -59,7 +59,7 @@ RELIEF_KERNEL F8 unit_of_word(W8 word)
 
 /// Hash of numbers by their bits, in [0, 1].
 template <int kCount>
-RELIEF_KERNEL F8 hash_unit(const F8 (&key)[kCount])
+[[gnu::always_inline]] RELIEF_KERNEL F8 hash_unit(const F8 (&key)[kCount])
 {
   W8 words[kCount];
   for (int i = 0; i < kCount; ++i) words[i] = bits_of(key[i]);

@@ -19,7 +19,8 @@ enum VoronoiFlags : std::uint16_t {
   kVoronoiNormalize = 1u << 2,  ///< distances and colours in 0…1
 };
 
-template <int kDims>
+/// @tparam kPcg  the cells of 5.0 on; a parameter, as a choice in the innermost loop costs a third more
+template <int kDims, bool kPcg = false>
 struct VoronoiSettings {
   VoronoiFeature feature;
   VoronoiMetric metric;
@@ -29,7 +30,6 @@ struct VoronoiSettings {
   unsigned flags = 0;
 
   F8 far() const { return splat8((flags & kVoronoiFar) != 0 ? 3.402823466e38f : 8.0f); }
-  bool is_pcg() const { return (flags & kVoronoiPcg) != 0; }
 };
 
 template <int kDims>
@@ -68,15 +68,16 @@ RELIEF_KERNEL void hash_pcg(const F8 (&key)[kCount], F8 (&unit)[kCount])
   }
 }
 
+// What is done for each cell is inlined by force: the cells of 5.0 on are a second caller, and calls cost a third.
+
 /// The point of a cell, [0, 1] along each axis.
 /// @param cell  its lower corner
-template <int kDims>
-RELIEF_KERNEL void voronoi_point(const F8 (&cell)[kDims], bool is_pcg, F8 (&point)[kDims])
+template <int kDims, bool kPcg>
+[[gnu::always_inline]] RELIEF_KERNEL void voronoi_point(const F8 (&cell)[kDims], F8 (&point)[kDims])
 {
-  if constexpr (kDims > 1) {
-    if (is_pcg) return hash_pcg<kDims>(cell, point);
-  }
-  if constexpr (kDims == 1) {
+  if constexpr (kPcg && kDims > 1) {
+    hash_pcg<kDims>(cell, point);
+  } else if constexpr (kDims == 1) {
     point[0] = hash_unit(cell);
   } else if constexpr (kDims == 4) {
     const F8 x = cell[0], y = cell[1], z = cell[2], w = cell[3];
@@ -96,18 +97,16 @@ RELIEF_KERNEL void voronoi_point(const F8 (&cell)[kDims], bool is_pcg, F8 (&poin
 }
 
 /// The colour of a cell.
-template <int kDims>
-RELIEF_KERNEL void voronoi_color(const F8 (&cell)[kDims], bool is_pcg, F8 (&color)[3])
+template <int kDims, bool kPcg>
+RELIEF_KERNEL void voronoi_color(const F8 (&cell)[kDims], F8 (&color)[3])
 {
-  if constexpr (kDims > 1) {
-    if (is_pcg) {
-      constexpr int kCount = kDims == 4 ? 4 : 3;
-      F8 key[kCount]{}, unit[kCount];
-      for (int i = 0; i < kDims; ++i) key[i] = cell[i];
-      hash_pcg<kCount>(key, unit);
-      for (int i = 0; i < 3; ++i) color[i] = unit[i];
-      return;
-    }
+  if constexpr (kPcg && kDims > 1) {
+    constexpr int kCount = kDims == 4 ? 4 : 3;
+    F8 key[kCount]{}, unit[kCount];
+    for (int i = 0; i < kDims; ++i) key[i] = cell[i];
+    hash_pcg<kCount>(key, unit);
+    for (int i = 0; i < 3; ++i) color[i] = unit[i];
+    return;
   }
   color[0] = hash_unit(cell);
   if constexpr (kDims == 4) {
@@ -124,8 +123,10 @@ RELIEF_KERNEL void voronoi_color(const F8 (&cell)[kDims], bool is_pcg, F8 (&colo
   }
 }
 
-template <int kDims>
-RELIEF_KERNEL F8 voronoi_distance(const F8 (&a)[kDims], const F8 (&b)[kDims], const VoronoiSettings<kDims>& settings)
+template <int kDims, bool kPcg>
+[[gnu::always_inline]] RELIEF_KERNEL F8 voronoi_distance(const F8 (&a)[kDims],
+                                                         const F8 (&b)[kDims],
+                                                         const VoronoiSettings<kDims, kPcg>& settings)
 {
   F8 sum{};
   if (kDims == 1) return abs(a[0] - b[0]);
@@ -153,8 +154,11 @@ RELIEF_KERNEL F8 voronoi_distance(const F8 (&a)[kDims], const F8 (&b)[kDims], co
 
 /// Calls visit(offset, point) for all cells up to `reach` away: the offset of a cell and its point from the corner of the
 /// middle one. The first axis moves fastest.
-template <int kDims, typename F>
-RELIEF_KERNEL void voronoi_cells(const F8 (&cell)[kDims], const VoronoiSettings<kDims>& settings, int reach, F&& visit)
+template <int kDims, bool kPcg, typename F>
+[[gnu::always_inline]] RELIEF_KERNEL void voronoi_cells(const F8 (&cell)[kDims],
+                                                        const VoronoiSettings<kDims, kPcg>& settings,
+                                                        int reach,
+                                                        F&& visit)
 {
   const int side = 2 * reach + 1;
   int count = 1;
@@ -165,7 +169,7 @@ RELIEF_KERNEL void voronoi_cells(const F8 (&cell)[kDims], const VoronoiSettings<
       offset[i] = splat8(static_cast<float>(rest % side - reach));
       corner[i] = cell[i] + offset[i];
     }
-    voronoi_point<kDims>(corner, settings.is_pcg(), point);
+    voronoi_point<kDims, kPcg>(corner, point);
     for (int i = 0; i < kDims; ++i) point[i] = offset[i] + point[i] * settings.randomness;
     visit(offset, point);
   }
@@ -178,10 +182,10 @@ RELIEF_KERNEL void assign_where(I8 is, F8 (&to)[kDims], const F8 (&from)[kDims])
 }
 
 /// The nearest point, or the second, and its cell.
-template <int kDims>
+template <int kDims, bool kPcg>
 RELIEF_KERNEL Voronoi<kDims> voronoi_nearest(const F8 (&cell)[kDims],
                                              const F8 (&local)[kDims],
-                                             const VoronoiSettings<kDims>& settings)
+                                             const VoronoiSettings<kDims, kPcg>& settings)
 {
   F8 first = settings.far(), second = settings.far();
   F8 offset1[kDims]{}, offset2[kDims]{}, point1[kDims]{}, point2[kDims]{};
@@ -205,32 +209,33 @@ RELIEF_KERNEL Voronoi<kDims> voronoi_nearest(const F8 (&cell)[kDims],
     at[i] = cell[i] + (is_f2 ? offset2[i] : offset1[i]);
     out.position[i] = (is_f2 ? point2[i] : point1[i]) + cell[i];
   }
-  voronoi_color<kDims>(at, settings.is_pcg(), out.color);
+  voronoi_color<kDims, kPcg>(at, out.color);
   return out;
 }
 
 /// All points near, the nearer the more.
-template <int kDims>
+template <int kDims, bool kPcg>
 RELIEF_KERNEL Voronoi<kDims> voronoi_smooth(const F8 (&cell)[kDims],
                                             const F8 (&local)[kDims],
-                                            const VoronoiSettings<kDims>& settings)
+                                            const VoronoiSettings<kDims, kPcg>& settings)
 {
   Voronoi<kDims> out;
   // Where no distance is too far, the first cell counts whole.
-  bool is_first = (settings.flags & kVoronoiFar) != 0;
-  out.distance = splat8(is_first ? 0.0f : 8.0f);
+  const bool counts_first = (settings.flags & kVoronoiFar) != 0;
+  F8 least = splat8(counts_first ? 1.0f : 0.0f);
+  out.distance = splat8(counts_first ? 0.0f : 8.0f);
   const F8 smoothness = settings.smoothness;
   voronoi_cells<kDims>(cell, settings, 2, [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
     const F8 distance = voronoi_distance<kDims>(point, local, settings);
-    const F8 t = clamp(0.5f + 0.5f * (out.distance - distance) / smoothness, 0.0f, 1.0f);
-    const F8 h = is_first ? splat8(1.0f) : t * t * (3.0f - 2.0f * t);
-    is_first = false;
+    const F8 t = max(clamp(0.5f + 0.5f * (out.distance - distance) / smoothness, 0.0f, 1.0f), least);
+    const F8 h = t * t * (3.0f - 2.0f * t);
+    least = F8{};
     F8 correction = smoothness * h * (1.0f - h);
     out.distance = (out.distance + h * (distance - out.distance)) - correction;
     correction /= 1.0f + 3.0f * smoothness;
     F8 corner[kDims], color[3];
     for (int i = 0; i < kDims; ++i) corner[i] = cell[i] + offset[i];
-    voronoi_color<kDims>(corner, settings.is_pcg(), color);
+    voronoi_color<kDims, kPcg>(corner, color);
     for (int i = 0; i < 3; ++i) out.color[i] = (out.color[i] + h * (color[i] - out.color[i])) - correction;
     for (int i = 0; i < kDims; ++i) out.position[i] = (out.position[i] + h * (point[i] - out.position[i])) - correction;
   });
@@ -239,8 +244,10 @@ RELIEF_KERNEL Voronoi<kDims> voronoi_smooth(const F8 (&cell)[kDims],
 }
 
 /// Distance to the nearest border between two cells.
-template <int kDims>
-RELIEF_KERNEL F8 voronoi_edge(const F8 (&cell)[kDims], const F8 (&local)[kDims], const VoronoiSettings<kDims>& settings)
+template <int kDims, bool kPcg>
+RELIEF_KERNEL F8 voronoi_edge(const F8 (&cell)[kDims],
+                              const F8 (&local)[kDims],
+                              const VoronoiSettings<kDims, kPcg>& settings)
 {
   F8 nearest = settings.far();
   F8 to_nearest[kDims]{};
@@ -277,10 +284,10 @@ RELIEF_KERNEL F8 voronoi_edge(const F8 (&cell)[kDims], const F8 (&local)[kDims],
 }
 
 /// Half the distance from the nearest point to the point nearest to that.
-template <int kDims>
+template <int kDims, bool kPcg>
 RELIEF_KERNEL F8 voronoi_radius(const F8 (&cell)[kDims],
                                 const F8 (&local)[kDims],
-                                const VoronoiSettings<kDims>& settings)
+                                const VoronoiSettings<kDims, kPcg>& settings)
 {
   const auto distance_of = [](const F8(&a)[kDims], const F8(&b)[kDims]) {
     F8 sum{};
@@ -311,8 +318,8 @@ RELIEF_KERNEL F8 voronoi_radius(const F8 (&cell)[kDims],
 }
 
 /// @param p  any floats
-template <int kDims>
-RELIEF_KERNEL Voronoi<kDims> voronoi_eval(const F8 (&p)[kDims], const VoronoiSettings<kDims>& settings)
+template <int kDims, bool kPcg>
+RELIEF_KERNEL Voronoi<kDims> voronoi_eval(const F8 (&p)[kDims], const VoronoiSettings<kDims, kPcg>& settings)
 {
   F8 cell[kDims], local[kDims];
   for (int i = 0; i < kDims; ++i) {
@@ -340,9 +347,9 @@ RELIEF_KERNEL F8 mixed(F8 a, F8 b, F8 t) { return a + t * (b - a); }
 
 /// Octaves of cells, each finer than the one before: sums of distances and colours, mixes of positions; the least distance
 /// to a border.
-template <int kDims>
+template <int kDims, bool kPcg>
 RELIEF_KERNEL Voronoi<kDims> voronoi_fractal(const F8 (&p)[kDims],
-                                             const VoronoiSettings<kDims>& settings,
+                                             const VoronoiSettings<kDims, kPcg>& settings,
                                              const NoiseOctaves& octaves)
 {
   const bool is_edge = settings.feature == VoronoiFeature::kDistanceToEdge;

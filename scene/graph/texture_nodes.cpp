@@ -46,13 +46,15 @@ std::vector<GraphScalar> texture_point(GraphNode& n, int dimensions)
 }
 
 /// A point far from another: what decorrelates noises of one point, by hashes of a number and of the axis.
-std::vector<GraphScalar> moved(GraphBuilder& b, const std::vector<GraphScalar>& p, float number)
+/// @param is_fused  offsets are rounded once, as Cycles 5.2 is compiled
+std::vector<GraphScalar> moved(GraphBuilder& b, const std::vector<GraphScalar>& p, float number, bool is_fused)
 {
   std::vector<GraphScalar> out;
   for (std::size_t i = 0; i < p.size(); ++i) {
     const GraphScalar hash = p.size() == 1 ? b(Op::hash_1d, {b.constant(number)})
                                            : b(Op::hash_2d, {b.constant(number), b.constant(static_cast<float>(i))});
-    const GraphScalar offset = b(Op::add, {b.constant(100), scaled(b, hash, 100)});
+    GraphScalar offset = b(Op::add, {b.constant(100), scaled(b, hash, 100)});
+    if (float known = 0; is_fused && b.is_constant(hash, &known)) offset = b.constant(std::fma(known, 100.0f, 100.0f));
     out.push_back(b(Op::add, {p[i], offset}));
   }
   return out;
@@ -70,7 +72,9 @@ void lower_noise(GraphNode& n)
   const int dimensions = static_cast<int>(n.reader.integer("dimensions", 3, 1, 4));
   const bool is_normalized = n.reader.boolean("normalize", true);
   const int type = n.reader.choice("noise", kMusgraveTypes, kFbm);
-  const std::uint16_t repeats = read_maths(n) != kMaths34 ? 1 : 0;
+  const int maths = read_maths(n);
+  const std::uint16_t repeats = maths != kMaths34 ? 1 : 0;
+  const bool is_fused = maths == kMaths52;
   std::vector<GraphScalar> p = texture_point(n, dimensions);
   for (GraphScalar& x : p) x = b(Op::multiply, {x, n.number("scale")});
   float known = 1;
@@ -79,7 +83,7 @@ void lower_noise(GraphNode& n)
     std::vector<GraphScalar> bent;
     for (int i = 0; i < dimensions; ++i) {
       const GraphScalar noise = b.apply(op_of_dimensions(Op::signed_noise_1d, dimensions),
-                                        moved(b, p, static_cast<float>(i)), {&repeats, 1})[0];
+                                        moved(b, p, static_cast<float>(i), is_fused), {&repeats, 1})[0];
       bent.push_back(b(Op::add, {p[static_cast<std::size_t>(i)], b(Op::multiply, {noise, n.number("distortion")})}));
     }
     p = bent;
@@ -100,7 +104,7 @@ void lower_noise(GraphNode& n)
   };
   const GraphScalar value = fractal(p);
   n.set("factor", value);
-  n.set("color", {value, fractal(moved(b, p, number)), fractal(moved(b, p, number + 1))}, kColor);
+  n.set("color", {value, fractal(moved(b, p, number, is_fused)), fractal(moved(b, p, number + 1, is_fused))}, kColor);
 }
 
 constexpr GraphSocket kWhiteNoiseInputs[] = {{"vector", kVector}, {"w", kNumber}};

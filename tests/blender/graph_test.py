@@ -26,6 +26,10 @@ from scenes import (
 #: Coordinates are this far apart: a power of two, so that they are exact.
 _STEP = 2.0**-12
 
+#: Whether Cycles' colours are those of Rec. 709 exactly. In 5.2 it takes its matrices from the configuration of colours, whose
+#: primaries are 2·10⁻⁴ off.
+_IS_REC_709 = bpy.app.version < (5, 0, 0)
+
 #: Faces, and so points, along a side of the sheet: 102,400 in all.
 _SIDE = 320
 
@@ -520,7 +524,8 @@ def test_colors():
         for out in range(3):
             builders[f"separate {mode} {out}"] = _node("ShaderNodeSeparateColor", {0: "xyz"}, out, mode=mode)
         builders[f"combine {mode}"] = _node("ShaderNodeCombineColor", {0: _X, 1: _Y, 2: _Z}, mode=mode)
-    _assert_nodes_agree(builders, low=0.0, high=1.0, absolute=2e-6, most_off=1e-3)
+    absolute = 2e-6 if _IS_REC_709 else 1e-4
+    _assert_nodes_agree(builders, low=0.0, high=1.0, absolute=absolute, most_off=1e-3)
 
 
 def test_temperatures_and_wavelengths():
@@ -541,7 +546,8 @@ def test_temperatures_and_wavelengths():
         "embers": build("ShaderNodeBlackbody", "Temperature", 700.0, 1800.0),
         "wavelength": build("ShaderNodeWavelength", "Wavelength", 110.0, 580.0),
     }
-    _assert_nodes_agree(builders, absolute=1e-5, most_off=1e-3)
+    relative = 1e-5 if _IS_REC_709 else 3e-4
+    _assert_nodes_agree(builders, relative=relative, absolute=1e-5, most_off=1e-3)
 
 
 def test_turns():
@@ -568,6 +574,8 @@ def test_turns():
 
 
 def test_old_nodes_of_hsv():
+    if not hasattr(bpy.types, "ShaderNodeCombineHSV"):
+        return
     builders = {"combine": _node("ShaderNodeCombineHSV", {0: _X, 1: _Y, 2: _Z})}
     for out in range(3):
         builders[f"separate {out}"] = _node("ShaderNodeSeparateHSV", {0: "xyz"}, out)
