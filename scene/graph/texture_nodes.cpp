@@ -181,7 +181,9 @@ std::pair<std::uint32_t, std::uint16_t> read_tiles(GraphNode& n)
     if (number < 0) tile.fail("tile", "a number from 1001 on");
     const auto rows = static_cast<std::size_t>(number / kImageTileColumns + 1);
     if (table.size() < rows * kImageTileColumns) table.resize(rows * kImageTileColumns, -1.0f);
-    table[static_cast<std::size_t>(number)] = static_cast<float>(n.texture(tile));
+    float& place = table[static_cast<std::size_t>(number)];
+    if (place >= 0) tile.fail("tile", "every number once");
+    place = static_cast<float>(n.texture(tile));
   }
   if (table.empty()) n.reader.fail("tiles", "at least one tile");
   return {n.build.add_table(table), static_cast<std::uint16_t>(table.size() / kImageTileColumns)};
