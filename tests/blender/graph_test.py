@@ -624,6 +624,30 @@ def test_mappings():
     _assert_nodes_agree(builders, absolute=3e-6)
 
 
+def test_mappings_of_textures():
+    """Textures' own, which no panel shows."""
+    def build(kind, **settings):
+        def builder(tree, xyz, w):
+            node = tree.nodes.new(kind)
+            mapping = node.texture_mapping
+            mapping.rotation, mapping.scale = (0.4, -0.7, 1.1), (0.7, 1.3, -0.8)
+            mapping.translation = (0.3, 0.5, -0.2)
+            for name, value in settings.items():
+                setattr(mapping, name, value)
+            tree.links.new(xyz, node.inputs["Vector"])
+            return node.outputs[0]
+
+        return builder
+
+    builders = {
+        f"{kind} {mapping}": build(kind, vector_type=mapping)
+        for kind in ("ShaderNodeTexNoise", "ShaderNodeTexVoronoi", "ShaderNodeTexGradient")
+        for mapping in ("POINT", "TEXTURE", "VECTOR")
+    }
+    builders["axes"] = build("ShaderNodeTexGradient", vector_type="POINT", mapping_x="Y", mapping_y="NONE", mapping_z="X")
+    _assert_nodes_agree(builders, relative=5e-5, absolute=2e-5, most_off=2e-3)
+
+
 def _procedural_scene():
     """A sphere of wood on a chequered floor, of which nothing is an image; both engines mean its lobes exactly."""
     scene = new_scene(96, 72)

@@ -93,11 +93,28 @@ class GraphWriter:
         """A texture's Vector, or what Blender takes where nothing is linked: generated or uv."""
         socket = node.inputs["Vector"]
         if nodes.follow(socket, groups) is not None:
-            return self.value(socket, groups)
+            return self.mapped(node, self.value(socket, groups))
         if implicit == "generated":
             self.uses_generated = True
-            return {"node": self.add("texture-coordinate"), "output": "generated"}
-        return self.uv("")
+            return self.mapped(node, {"node": self.add("texture-coordinate"), "output": "generated"})
+        return self.mapped(node, self.uv(""))
+
+    def mapped(self, node, vector):
+        """A texture's vector after the mapping that the node itself has, in files from before Mapping nodes had sockets."""
+        if nodes.has_plain_mapping(node):
+            return vector
+        mapping = node.texture_mapping
+        if mapping.vector_type == "NORMAL" or mapping.use_min or mapping.use_max:
+            raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): its own mapping as a normal or with limits')
+        axes = [mapping.mapping_x, mapping.mapping_y, mapping.mapping_z]
+        if axes != ["X", "Y", "Z"]:
+            parts = self.add("separate", {"vector": vector})
+            chosen = [0.0 if axis == "NONE" else {"node": parts, "output": axis.lower()} for axis in axes]
+            vector = {"node": self.add("combine", dict(zip("xyz", chosen))), "output": "vector"}
+        inputs = {"vector": vector, "rotation": list(mapping.rotation), "scale": list(mapping.scale)}
+        if mapping.vector_type != "VECTOR":
+            inputs["location"] = list(mapping.translation)
+        return {"node": self.add("mapping", inputs, mapping=_label(mapping.vector_type)), "output": "vector"}
 
     def uv(self, name):
         number = self.coordinate_set(("uv", name))

@@ -246,6 +246,8 @@ class TextureReader:
     def _mapping(self, node, groups):
         if node.image.source == "TILED" and self._refuses:
             raise _BeyondTextures
+        if not nodes.has_plain_mapping(node):
+            self._beyond(f'node "{node.name}": its own mapping', "it is left out")
         if node.projection != "FLAT":
             self._beyond(f'node "{node.name}": projection {node.projection.lower()}', "flat was used")
         if node.extension == "CLIP":
