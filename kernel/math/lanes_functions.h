@@ -25,7 +25,7 @@ RELIEF_KERNEL SinCos8 sin_cos_octant(F8 x, F8 quarters)
   const I8 quadrant = __builtin_convertvector(quarters, I8) & 3;
   const I8 is_odd = (quadrant & 1) != 0;
   const F8 s = is_odd ? cosine : sine, c = is_odd ? sine : cosine;
-  return {(quadrant & 2) != 0 ? -s : s, (quadrant == 1) | (quadrant == 2) ? -c : c};
+  return {(quadrant & 2) != 0 ? -s : s, ((quadrant == 1) | (quadrant == 2)) ? -c : c};
 }
 
 /// @param turn  angles as fractions of a turn, |turn| < 2^20

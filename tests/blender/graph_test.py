@@ -365,6 +365,24 @@ def test_images_of_encoded_colors():
         _assert_nodes_agree(builders, most_off=2e-3)
 
 
+def test_images_of_floats():
+    """Generated ones, whose colours Blender keeps multiplied by alpha; halves keep eleven bits."""
+
+    def load():
+        image = bpy.data.images.new("floats", 9, 5, alpha=True, float_buffer=True)
+        pixels = np.random.default_rng(5).integers(0, 64, (5, 9, 4)).astype(np.float32) / 32
+        pixels[..., 3] = np.minimum(pixels[..., 3], 1)
+        image.pixels.foreach_set(pixels.ravel())
+        return image
+
+    builders = {}
+    for interpolation in ("Closest", "Linear"):
+        for both in (False, True):
+            settings = {"space": bpy.data.images.new("space", 1, 1, float_buffer=True).colorspace_settings.name, "both": both}
+            builders[f"{interpolation} {both}"] = _image(load, interpolation=interpolation, **settings)
+    _assert_nodes_agree(builders, absolute=1e-5, most_off=2e-3)
+
+
 def test_boxes_of_images():
     with folder() as path:
         file = os.path.join(path, "image.png")

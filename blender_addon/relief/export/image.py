@@ -32,6 +32,7 @@ class ImageExporter:
         self._writer = writer
         self._frame = frame
         self._uris = {}
+        self._of_pixels = set()
 
     def color_uri(self, image, user, warn, alpha_is_linked=True):
         """URI of an image used as a colour; None if there is none to use, which is warned about.
@@ -52,7 +53,8 @@ class ImageExporter:
         @return  (URI, or None without a file; whether the colours are multiplied by alpha already)
         """
         uri = self._uri(image, user, is_color, warn)
-        return uri, image.is_float and image.alpha_mode == "PREMUL"
+        # Blender's own floats always are.
+        return uri, image.is_float and (image.alpha_mode == "PREMUL" or image.name_full in self._of_pixels)
 
     def tile_uris(self, image, is_color, warn):
         """URIs of a tiled image's files by the number of the tile; empty without any, which is warned about."""
@@ -181,6 +183,7 @@ class ImageExporter:
         pixels = self._linear_pixels(image, warn)
         if pixels is None:
             return None
+        self._of_pixels.add(image.name_full)
         names = "RGBA"[: pixels.shape[-1]] if pixels.shape[-1] != 1 else "Y"
         return self.write_pixels({name: pixels[..., c] for c, name in enumerate(names)})
 
