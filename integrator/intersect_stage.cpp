@@ -146,7 +146,7 @@ struct ShadowContext {
   EmbreeContext embree;
   const KernelGlobals* globals = nullptr;
   const DisplacementSet* displacements = nullptr;
-  float visibility = 1;
+  Vec3f visibility{1, 1, 1};
   Vec3f D;  ///< of the ray, world: filters see it in the space of the instance
 };
 
@@ -217,7 +217,7 @@ void intersect_shadow(const KernelGlobals& g,
                       const Accel& accel,
                       const PathState& state,
                       const ShadowQueue& shadow,
-                      float* visibility,
+                      Vec3f* visibility,
                       DisplacementWork& displacement)
 {
   ShadowContext context;
@@ -230,7 +230,7 @@ void intersect_shadow(const KernelGlobals& g,
   std::uint32_t steps = 0;
   if (accel.displacements().size() > 0) context.embree.steps = &steps;
   for (std::uint32_t i = 0; i < shadow.size; ++i) {
-    context.visibility = 1.0f;
+    context.visibility = {1, 1, 1};
     context.D = {shadow.D_x[i], shadow.D_y[i], shadow.D_z[i]};
     RTCRay ray;
     ray.org_x = shadow.O_x[i];
@@ -252,7 +252,7 @@ void intersect_shadow(const KernelGlobals& g,
     }
     accel.occluded(context.embree, ray);
     if (context.embree.steps != nullptr) note_steps(steps, displacement);
-    visibility[i] = ray.tfar < 0.0f ? 0.0f : context.visibility;
+    visibility[i] = ray.tfar < 0.0f ? Vec3f{} : context.visibility;
   }
 }
 
@@ -271,16 +271,20 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
     if ((instance.flags & kDisplaced) != 0) at = context->displacements->locate(object, at.triangle, at.u, at.v);
     const Material& material = g.materials[instance.material_index];
     const MeshView& mesh = g.meshes[instance.mesh_index];
-    float alpha = 0.0f;
-    if ((material.graph_outputs >> static_cast<int>(GraphOutput::alpha) & 1u) != 0) {
+    Vec3f passes;
+    if (material.transparency_index >= 0) {
       const SurfaceHit hit = surface_hit_make(mesh, instance, at.triangle, at.u, at.v);
-      alpha = graph_alpha(material, g.run_graph, g.graphs[material.graph_index], g.textures,
-                          {&mesh, &instance, at.triangle, at.u, at.v, &hit, -context->D, {0.0f, 0.0f}});
+      passes = graph_transparency(g.run_graph, g.graphs[material.transparency_index], g.textures,
+                                  {&mesh, &instance, at.triangle, at.u, at.v, &hit, -context->D, {0.0f, 0.0f}, 0.0f});
+    } else if ((material.graph_outputs >> static_cast<int>(GraphOutput::alpha) & 1u) != 0) {
+      const SurfaceHit hit = surface_hit_make(mesh, instance, at.triangle, at.u, at.v);
+      passes = splat3(1.0f - graph_alpha(material, g.run_graph, g.graphs[material.graph_index], g.textures,
+                                         {&mesh, &instance, at.triangle, at.u, at.v, &hit, -context->D, {0.0f, 0.0f}, 0.0f}));
     } else {
-      alpha = triangle_alpha(material, g.textures, mesh, at.triangle, at.u, at.v);
+      passes = splat3(1.0f - triangle_alpha(material, g.textures, mesh, at.triangle, at.u, at.v));
     }
-    context->visibility *= 1.0f - alpha;
-    if (context->visibility > 0.0f) arguments->valid[i] = 0;
+    context->visibility *= passes;
+    if (!is_zero(context->visibility)) arguments->valid[i] = 0;
   }
 }
 

@@ -39,7 +39,7 @@ void intersect_shadow(const KernelGlobals& g,
                       const Accel& accel,
                       const PathState& state,
                       const ShadowQueue& shadow,
-                      float* visibility,
+                      Vec3f* visibility,
                       DisplacementWork& displacement);
 
 /// Embree filter of surfaces that let shadow rays through in part; its context is made by intersect_shadow.

@@ -50,6 +50,7 @@ CausticsDecision caustics_decide(const Scene& scene, LightSet& lights, CausticsM
 /// Whether photons can show on a material at all, rather than be sent on by sharp lobes alone.
 bool has_soft_lobes(const Material& m, bool caster, float roughness)
 {
+  if (m.has_closures) return true;
   const bool textured = m.metallic_roughness_texture.texture_index >= 0 || m.transmission_texture.texture_index >= 0 ||
                         m.graph_index >= 0;
   const bool diffuse = m.metallic < 1.0f && m.transmission < 1.0f;
@@ -60,7 +61,10 @@ bool has_soft_lobes(const Material& m, bool caster, float roughness)
 }
 
 /// Whether photons show on a material by the tails of its sharp lobes, see path_gathers_tails.
-bool has_tails(const Material& m, bool caster) { return caster && !m.unlit && m.roughness >= kSharpestTails; }
+bool has_tails(const Material& m, bool caster)
+{
+  return caster && !m.unlit && !m.has_closures && m.roughness >= kSharpestTails;
+}
 
 }  // namespace
 

@@ -81,7 +81,7 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
     }
     g.run_graph(program, g.textures, registers);
     for (std::uint32_t lane = 0; lane < count; ++lane) {
-      const GraphValues values = graph_values(program, registers, static_cast<int>(lane));
+      const GraphLane values{&program, &registers, static_cast<int>(lane)};
       shade_surface<kFeatures>(g, state, queue.paths[first + lane], next, shadow, counters, &values);
     }
     first += count;
@@ -118,10 +118,10 @@ void shade_lights(const KernelGlobals& g, PathState& state, const QueueView& que
   }
 }
 
-void accumulate_shadows(const KernelGlobals& g, PathState& state, const ShadowQueue& shadow, const float* visibility)
+void accumulate_shadows(const KernelGlobals& g, PathState& state, const ShadowQueue& shadow, const Vec3f* visibility)
 {
   for (std::uint32_t i = 0; i < shadow.size; ++i) {
-    if (visibility[i] > 0.0f) accumulate_shadow(g, state, shadow, i, visibility[i]);
+    if (!is_zero(visibility[i])) accumulate_shadow(g, state, shadow, i, visibility[i]);
   }
 }
 
@@ -183,7 +183,8 @@ const StageTable kTable = {
      shade_surfaces<kSurfaceKernelFeatures[2]>, shade_surfaces<kSurfaceKernelFeatures[3]>,
      shade_surfaces<kSurfaceKernelFeatures[4]>, shade_surfaces<kSurfaceKernelFeatures[5]>,
      shade_surfaces<kSurfaceKernelFeatures[6]>, shade_surfaces<kSurfaceKernelFeatures[7]>,
-     shade_surfaces<kSurfaceKernelFeatures[8]>, shade_surfaces<kSurfaceKernelFeatures[9]>},
+     shade_surfaces<kSurfaceKernelFeatures[8]>, shade_surfaces<kSurfaceKernelFeatures[9]>,
+     shade_surfaces<kSurfaceKernelFeatures[10]>, shade_surfaces<kSurfaceKernelFeatures[11]>},
     shade_backgrounds,
     shade_lights,
     accumulate_shadows,

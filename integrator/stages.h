@@ -13,7 +13,7 @@
 namespace relief {
 
 /// Surface kernels are instantiated for a few feature masks, in rising order of what they can do.
-inline constexpr int kNumSurfaceKernels = 10;
+inline constexpr int kNumSurfaceKernels = 12;
 
 /// A rectangle of pixels and a run of their samples; path i of a batch is pixel i % (width·height) in the order of
 /// batch_pixel, sample first_sample + i / (width·height).
@@ -35,8 +35,8 @@ struct StageTable {
                                             Counters&);
   void (*shade_background)(const KernelGlobals&, PathState&, const QueueView& queue, Counters&);
   void (*shade_light)(const KernelGlobals&, PathState&, const QueueView& queue, QueueView& next);
-  /// @param visibility  one entry a shadow ray, 0 … 1
-  void (*accumulate_shadow)(const KernelGlobals&, PathState&, const ShadowQueue& shadow, const float* visibility);
+  /// @param visibility  one entry a shadow ray
+  void (*accumulate_shadow)(const KernelGlobals&, PathState&, const ShadowQueue& shadow, const Vec3f* visibility);
   /// Writes the photons that the paths' hits have around them to the caustic columns.
   void (*gather_photons)(const KernelGlobals&, PathState&, const QueueView& queue);
   /// Starts photons `first` … `first + count − 1`; those that carry light are queued, as paths from 0 on.

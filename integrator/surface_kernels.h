@@ -7,6 +7,10 @@
 
 namespace relief {
 
+/// Materials of closures; what glTF's lobes need is left out.
+inline constexpr unsigned kMixtureFeatures =
+    kFeatureMixture | kFeatureGraphs | kFeatureTextures | kFeatureTransparency | kFeatureTransmission;
+
 inline constexpr unsigned kSurfaceKernelFeatures[kNumSurfaceKernels] = {
     0,
     kFeatureMetal,
@@ -15,9 +19,11 @@ inline constexpr unsigned kSurfaceKernelFeatures[kNumSurfaceKernels] = {
     kFeatureAll,
     kFeatureGraphs | kFeatureMetal | kFeatureTextures | kFeatureNormalMaps | kFeatureTransparency,
     kFeatureGraphs | kFeatureAll,
+    kMixtureFeatures,
     kFeatureCaustics,
     kFeatureCaustics | kFeatureAll,
     kFeatureCaustics | kFeatureGraphs | kFeatureAll,
+    kFeatureCaustics | kMixtureFeatures,
 };
 
 /// Kernel for a material.

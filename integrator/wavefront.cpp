@@ -71,7 +71,7 @@ void Wavefront::record_shadow_rays() const
                          {shadow_.D_x[i], shadow_.D_y[i], shadow_.D_z[i]},
                          0.0f,
                          shadow_.t_max[i],
-                         memory_->visibility[i] > 0.0f ? shadow_.t_max[i] : 0.0f,
+                         !is_zero(memory_->visibility[i]) ? shadow_.t_max[i] : 0.0f,
                          state_.pixel[shadow_.path[i]]});
   }
 }

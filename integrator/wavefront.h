@@ -84,7 +84,7 @@ class Wavefront {
   struct Memory {
     PathState state;
     ShadowQueue shadow;
-    float visibility[kShadowEntries];  ///< of the shadow rays
+    Vec3f visibility[kShadowEntries];  ///< of the shadow rays
     std::uint32_t queues[kNumQueues][kColumnEntries];
   };
   struct CausticMemory {

@@ -16,6 +16,7 @@ enum FeatureBit : unsigned {
   kFeatureMetal = 1u << 5,         ///< metallic above zero
   kFeatureCaustics = 1u << 6,      ///< photons bring part of the light: of the render, not of a material
   kFeatureGraphs = 1u << 7,        ///< value graphs give factors
+  kFeatureMixture = 1u << 8,       ///< closures scatter, in place of glTF's layered material
 };
 inline constexpr unsigned kFeatureAll = (1u << 6) - 1u;  ///< of materials, but for graphs
 
@@ -24,6 +25,10 @@ RELIEF_KERNEL unsigned feature_mask_of(const Material& m)
 {
   const auto has = [](const TextureRef& ref) { return ref.texture_index >= 0; };
   unsigned mask = 0;
+  if (m.has_closures) {
+    mask = kFeatureGraphs | kFeatureMixture | kFeatureTransmission | kFeatureTextures;
+    return m.alpha_mode != AlphaMode::kOpaque ? mask | kFeatureTransparency : mask;
+  }
   if (has(m.base_color_texture) || has(m.metallic_roughness_texture) || has(m.emission_texture) ||
       has(m.transmission_texture) || has(m.clearcoat_texture) || has(m.clearcoat_roughness_texture) ||
       has(m.sheen_color_texture) || has(m.sheen_roughness_texture) || has(m.specular_texture) ||

@@ -10,6 +10,7 @@
 #include "scene/feature_set.h"
 #include "scene/framing.h"
 #include "scene/gltf_mesh.h"
+#include "scene/graph/closure_reader.h"
 #include "scene/graph/graph_reader.h"
 #include "scene/khronos_extensions.h"
 #include "scene/limits.h"
@@ -382,6 +383,44 @@ int GltfLoader::mesh_of(const GltfDocument& document, int mesh_index, int primit
   return it->second;
 }
 
+void GltfLoader::read_programs(const GltfDocument& document,
+                               const nlohmann::json& json,
+                               const std::string& path,
+                               Material& material)
+{
+  // The closures' reader stands within the graph's, for they refer to its nodes.
+  const auto read = [&](const JsonReader* graph, const JsonReader* surface) {
+    GraphPrograms programs = graph_read(document, graph, surface, textures_, warnings_);
+    const auto add = [this](GraphProgram&& program) {
+      scene_.graphs.push_back(std::move(program));
+      return static_cast<int>(scene_.graphs.size()) - 1;
+    };
+    material.graph_index = add(std::move(programs.surface));
+    const GraphProgram& program = scene_.graphs.back();
+    material.graph_outputs = program.given;
+    material.has_closures = surface != nullptr;
+    if (material.has_closures) {
+      const ClosureSummary known = closures_summarize(program);
+      material.transmission = known.transmission;
+      material.metallic = known.metallic;
+      material.roughness = known.roughness;
+    }
+    const bool emits = std::any_of(program.closures.begin(), program.closures.end(),
+                                   [](const SurfaceClosureSpec& c) { return c.kind == ClosureKind::emission; });
+    constexpr auto kEmission = static_cast<unsigned>(GraphOutput::emission);
+    says_light_ = says_light_ || emits || (material.graph_outputs >> kEmission & 1u) != 0;
+    if (material.has_closures) material.alpha_mode = programs.transparency ? AlphaMode::kBlend : AlphaMode::kOpaque;
+    if (programs.transparency) material.transparency_index = add(std::move(*programs.transparency));
+  };
+  const auto read_with = [&](const JsonReader* surface) {
+    return document.read_extension(json, path, "RELIEF_graph", [&](const JsonReader& graph) { read(&graph, surface); });
+  };
+  const bool has_surface = document.read_extension(json, path, "RELIEF_surface", [&](const JsonReader& surface) {
+    if (!read_with(&surface)) read(nullptr, &surface);
+  });
+  if (!has_surface) read_with(nullptr);
+}
+
 int GltfLoader::material_of(const GltfDocument& document, int material_index)
 {
   // All files share glTF's default material.
@@ -397,14 +436,7 @@ int GltfLoader::material_of(const GltfDocument& document, int material_index)
     material = khronos_material(document, material_index, textures_, warnings_);
     name = document.core.materials[static_cast<std::size_t>(material_index)].name;
     const std::string path = "/materials/" + std::to_string(material_index);
-    document.read_extension(document.element("materials", static_cast<std::size_t>(material_index)), path, "RELIEF_graph",
-                            [&](const JsonReader& reader) {
-                              scene_.graphs.push_back(graph_read(document, reader, textures_, warnings_));
-                              material.graph_index = static_cast<int>(scene_.graphs.size()) - 1;
-                              material.graph_outputs = scene_.graphs.back().given;
-                              constexpr auto kEmission = static_cast<unsigned>(GraphOutput::emission);
-                              says_light_ = says_light_ || (material.graph_outputs >> kEmission & 1u) != 0;
-                            });
+    read_programs(document, document.element("materials", static_cast<std::size_t>(material_index)), path, material);
     if (auto displacement = relief_displacement(document, material_index, height_maps_, warnings_)) {
       material.displacement_index = static_cast<int>(scene_.displacements.size());
       scene_.displacements.push_back(*displacement);

@@ -75,6 +75,12 @@ class GltfLoader {
   const std::vector<Primitive>& primitives_of(const GltfDocument& document, int mesh_index);
   int mesh_of(const GltfDocument& document, int mesh_index, int primitive_index, int material_index);
   int material_of(const GltfDocument& document, int material_index);
+  /// Value graph and closures of a material.
+  /// @param json, path  the material's object
+  void read_programs(const GltfDocument& document,
+                     const nlohmann::json& json,
+                     const std::string& path,
+                     Material& material);
   /// Of a primitive where it stands, after what references say about it.
   /// @param own  index of its own material
   int placed_material(const PlacedNode& node, int own);

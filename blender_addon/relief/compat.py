@@ -88,6 +88,13 @@ PRINCIPLED_INPUTS = (
 #: Before 4.0 the octaves of a Noise Texture never grew.
 CLAMPS_NOISE_ROUGHNESS = not IS_4_0
 
+#: Whose numbers the textures of this version have, as RELIEF_graph calls them; None: those of 3.4.
+TEXTURE_MATHS = "5.2" if IS_5_0 else "4.3" if IS_4_0 else None
+
+#: Entries of the tables that stand for ramps and curves, as many as Cycles'. Checked in 3.4 and 4.3.
+TABLE_ENTRIES = 257 if IS_4_0 else 256
+
+
 def principled_socket(node, name):
     """Input of a Principled BSDF by its name in 3.4; None if this version has no such input."""
     return node.inputs.get(_PRINCIPLED_NAMES_4_0.get(name, name) if IS_4_0 else name)

@@ -11,14 +11,19 @@ namespace relief {
 struct SharpLobes {
   bool base = false;  ///< reflection, glass and thin wall: all of the same roughness
   bool coat = false;
+  float most_roughness = -1;  ///< of mixtures, whose lobes have a roughness each
 };
+
+/// All that can be.
+inline constexpr SharpLobes kAllSharp{true, true, kInfinity};
 
 /// @param caster     what focuses light by its material or by request does so with all its microfacet lobes: whatever
 ///                   textures say of their roughness, since photons and camera paths may read other levels of them
 /// @param roughness  perceptual; lobes of other surfaces are sharp up to here
 RELIEF_KERNEL SharpLobes sharp_lobes(const SurfaceParams& p, bool caster, float roughness)
 {
-  return {caster || p.roughness <= roughness, caster || p.clearcoat_roughness <= roughness};
+  return {caster || p.roughness <= roughness, caster || p.clearcoat_roughness <= roughness,
+          caster ? kInfinity : roughness};
 }
 
 template <typename L>
@@ -68,8 +73,8 @@ RELIEF_KERNEL bool closure_has(const SurfaceClosure& c, SharpLobes sharp)
 /// @param bsdf  sampled from the closure
 /// @param u     [0, 1): chooses
 /// @return whether it is sharp
-template <unsigned kFeatures, TransportMode kMode = TransportMode::kRadiance>
-RELIEF_KERNEL bool closure_split(const SurfaceClosure& closure,
+template <unsigned kFeatures, TransportMode kMode = TransportMode::kRadiance, typename Closure>
+RELIEF_KERNEL bool closure_split(const Closure& closure,
                                  const BsdfTables& tables,
                                  SharpLobes sharp,
                                  float u,

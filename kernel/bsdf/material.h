@@ -51,6 +51,9 @@ struct Material {
 
   int graph_index = -1;            ///< into KernelGlobals::graphs, which gives factors in place of those above; −1: none
   std::uint32_t graph_outputs = 0;  ///< bit GraphOutput: what it gives
+  bool has_closures = false;        ///< the graph's closures scatter, in place of everything above but the emission and
+                                    ///< what absorbs; transmission, metallic, roughness sum them up
+  int transparency_index = -1;      ///< into KernelGlobals::graphs: its transparent closures alone; −1: none
 
   int displacement_index = -1;  ///< into Scene::displacements; −1: none
 };

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "kernel/bsdf/surface_params.h"
+#include "kernel/graph/graph_mixture.h"
 #include "kernel/graph/graph_registers.h"
 #include "kernel/shape/surface_hit.h"
 
@@ -19,7 +20,50 @@ struct GraphPoint {
   const SurfaceHit* hit;
   Vec3f wo;           ///< unit, world
   float uv_width[2];  ///< footprint in each set's uv units
+  float footprint;    ///< metres
 };
+
+/// Two vectors along the surface as long as the footprint, as Cycles has them: which way they point is left to chance.
+struct GraphFootprint {
+  Vec3f dPdx, dPdy;  ///< world
+};
+
+RELIEF_KERNEL GraphFootprint graph_footprint(const GraphPoint& at)
+{
+  const Vec3f Ng = dot(at.hit->Ng, at.wo) < 0.0f ? -at.hit->Ng : at.hit->Ng;
+  const Frame frame = frame_from_normal(Ng);
+  // A ray without width still needs slopes: over what rounding leaves of its point.
+  constexpr float kRoundings = 256.0f;
+  const float width = max(at.footprint, kRoundings * max_component(at.hit->P_error));
+  return {frame.s * width, frame.t * width};
+}
+
+/// A point a footprint away.
+/// @param moved  its hit, which the result points to
+RELIEF_KERNEL GraphPoint graph_point_shifted(const GraphPoint& at, Vec3f by, SurfaceHit& moved)
+{
+  const TriangleIndices tri = at.mesh->triangles[at.triangle];
+  const Affine3& m = at.instance->world_from_object;
+  const Vec3f edge1 = transform_vector(m, at.mesh->P[tri.v1] - at.mesh->P[tri.v0]);
+  const Vec3f edge2 = transform_vector(m, at.mesh->P[tri.v2] - at.mesh->P[tri.v0]);
+  // Least squares: on a displaced surface the vector does not lie in the triangle.
+  const float a = dot(edge1, edge1), b = dot(edge1, edge2), c = dot(edge2, edge2);
+  const float determinant = difference_of_products(a, c, b, b);
+  GraphPoint out = at;
+  if (determinant > 0.0f) {
+    const float p = dot(edge1, by), q = dot(edge2, by);
+    out.bary_u += difference_of_products(c, p, b, q) / determinant;
+    out.bary_v += difference_of_products(a, q, b, p) / determinant;
+  }
+  const SurfaceHit there = surface_hit_make(*at.mesh, *at.instance, at.triangle, out.bary_u, out.bary_v);
+  moved = *at.hit;
+  moved.P += by;
+  moved.uv[0] = there.uv[0];
+  moved.uv[1] = there.uv[1];
+  moved.color = there.color;
+  out.hit = &moved;
+  return out;
+}
 
 /// @return world space turns as graph_z_up; components of vectors by `axis`
 RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity)
@@ -81,6 +125,21 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity)
       return hit.color.w;
     case Q::backfacing:
       return to_viewer < 0.0f ? 1.0f : 0.0f;
+    case Q::dpdx_x:
+    case Q::dpdx_y:
+    case Q::dpdx_z:
+      return component(graph_z_up(graph_footprint(at).dPdx), axis_of(Q::dpdx_x));
+    case Q::dpdy_x:
+    case Q::dpdy_y:
+    case Q::dpdy_z:
+      return component(graph_z_up(graph_footprint(at).dPdy), axis_of(Q::dpdy_x));
+    case Q::object_normal_x:
+    case Q::object_normal_y:
+    case Q::object_normal_z: {
+      // A normal goes back by the transpose of what points go there by.
+      const Vec3f n = normalize(transform_normal(at.instance->world_from_object, as_normal(hit.Ns)));
+      return component(n, axis_of(Q::object_normal_x)) * to_viewer;
+    }
     case Q::kCount:
       break;
   }
@@ -93,22 +152,31 @@ RELIEF_KERNEL void graph_load_point(const GraphProgramView& program,
                                     int lane,
                                     GraphRegisters& registers)
 {
+  SurfaceHit moved[2];
+  GraphPoint points[3] = {at, at, at};
+  if (program.is_shifted) {
+    const GraphFootprint footprint = graph_footprint(at);
+    points[1] = graph_point_shifted(at, footprint.dPdx, moved[0]);
+    points[2] = graph_point_shifted(at, footprint.dPdy, moved[1]);
+  }
   for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
     const GraphInput input = program.inputs[i];
-    registers.lanes[input.register_index][lane] = graph_quantity(at, input.quantity);
+    registers.lanes[input.register_index][lane] =
+        graph_quantity(points[static_cast<int>(input.shift)], input.quantity);
   }
 }
 
 /// A graph at one point alone.
-RELIEF_KERNEL GraphValues graph_at_point(GraphRun run,
-                                         const GraphProgramView& program,
-                                         const TextureView* textures,
-                                         const GraphPoint& at)
+/// @param registers  what the result reads
+RELIEF_KERNEL GraphLane graph_at_point(GraphRun run,
+                                       const GraphProgramView& program,
+                                       const TextureView* textures,
+                                       const GraphPoint& at,
+                                       GraphRegisters& registers)
 {
-  GraphRegisters registers;
   for (int lane = 0; lane < 8; ++lane) graph_load_point(program, at, lane, registers);
   run(program, textures, registers);
-  return graph_values(program, registers, 0);
+  return {&program, &registers, 0};
 }
 
 /// A material at a point with what its graph gives in place of its factors; textures of the same places multiply them still.
@@ -149,9 +217,21 @@ RELIEF_KERNEL float graph_alpha(const Material& material,
                                 const TextureView* textures,
                                 const GraphPoint& at)
 {
-  const GraphValues values = graph_at_point(run, program, textures, at);
+  GraphRegisters registers;
+  const GraphValues values = graph_values(graph_at_point(run, program, textures, at, registers));
   return graph_surface_params<kFeatureTextures | kFeatureTransparency>(material, values, textures, *at.hit, at.uv_width)
       .alpha;
+}
+
+/// What a material's transparent closures let through, finest texture level.
+/// @param program  see Material::transparency_index
+RELIEF_KERNEL Vec3f graph_transparency(GraphRun run,
+                                       const GraphProgramView& program,
+                                       const TextureView* textures,
+                                       const GraphPoint& at)
+{
+  GraphRegisters registers;
+  return closures_transparency(graph_at_point(run, program, textures, at, registers));
 }
 
 }  // namespace relief

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 
+#include "kernel/bsdf/closure_kinds.h"
 #include "kernel/math/vec.h"
 
 namespace relief {
@@ -29,9 +30,13 @@ inline constexpr int kNumGraphOutputs = static_cast<int>(GraphOutput::kCount);
 inline constexpr std::uint16_t kMostGraphRegisters = 512;
 inline constexpr std::uint16_t kNoGraphOperand = 0xffff;
 
+/// Where a quantity is read: at the point, or a footprint away from it along the surface. Bumps ask for all three.
+enum class GraphShift : std::uint16_t { kNone, kAlongX, kAlongY };
+
 /// Register that is filled before a program runs.
 struct GraphInput {
   GraphQuantity quantity;
+  GraphShift shift;
   std::uint16_t register_index;
 };
 
@@ -42,8 +47,12 @@ struct GraphProgramView {
   const float* tables = nullptr;  ///< of `table` instructions: rows of floats, one after the other
   const GraphInput* inputs = nullptr;
   std::uint32_t num_inputs = 0;
+  bool is_shifted = false;  ///< some input is read away from the point
   /// Operands of each output's components; kNoGraphOperand: the graph does not give it.
   std::uint16_t outputs[kNumGraphOutputs][3] = {};
+  const std::uint16_t* results = nullptr;  ///< operands, see SurfaceClosureSpec; kNoGraphOperand: 0
+  const SurfaceClosureSpec* closures = nullptr;
+  std::uint32_t num_closures = 0;
 };
 
 /// What a graph gives at one point.

@@ -24,14 +24,29 @@ RELIEF_KERNEL F8 graph_operand(const GraphProgramView& program, const GraphRegis
                                        : splat8(program.constants[operand - kMostGraphRegisters]);
 }
 
+/// One point's lane of a program that has run.
+struct GraphLane {
+  const GraphProgramView* program;
+  const GraphRegisters* registers;
+  int lane;
+};
+
+/// A number that closures ask for.
+/// @param result  into the program's results
+RELIEF_KERNEL float graph_result(const GraphLane& at, int result)
+{
+  const std::uint16_t operand = at.program->results[result];
+  return operand == kNoGraphOperand ? 0.0f : graph_operand(*at.program, *at.registers, operand)[at.lane];
+}
+
 /// What a program that has run gives at one lane's point.
-RELIEF_KERNEL GraphValues graph_values(const GraphProgramView& program, const GraphRegisters& registers, int lane)
+RELIEF_KERNEL GraphValues graph_values(const GraphLane& at)
 {
   GraphValues values;
   for (int i = 0; i < kNumGraphOutputs; ++i) {
-    const std::uint16_t* operands = program.outputs[i];
+    const std::uint16_t* operands = at.program->outputs[i];
     if (operands[0] == kNoGraphOperand) continue;
-    const auto number = [&](int c) { return graph_operand(program, registers, operands[c])[lane]; };
+    const auto number = [&](int c) { return graph_operand(*at.program, *at.registers, operands[c])[at.lane]; };
     values.of[i] = {number(0), number(1), number(2)};
     values.given |= 1u << i;
   }

@@ -7,16 +7,16 @@
 namespace relief {
 
 /// Adds what next-event estimation found, if the light is seen, or how open the surroundings are.
-/// @param visibility  share of the light that passes, 0 … 1
+/// @param visibility  share of the light that passes
 RELIEF_KERNEL void accumulate_shadow(const KernelGlobals& g,
                                      PathState& state,
                                      const ShadowQueue& shadow,
                                      std::uint32_t ray,
-                                     float visibility)
+                                     Vec3f visibility)
 {
   const std::uint32_t path = shadow.path[ray];
   if (shadow.scatterings[ray] == kAmbientRay) {
-    film_add_ambient(g.film, state.pixel[path], visibility);
+    film_add_ambient(g.film, state.pixel[path], (visibility.x + visibility.y + visibility.z) / 3.0f);
     return;
   }
   const Vec3f gain = Vec3f{shadow.gain_r[ray], shadow.gain_g[ray], shadow.gain_b[ray]} * visibility;

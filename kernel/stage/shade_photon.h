@@ -19,21 +19,23 @@ RELIEF_KERNEL int photon_surface(const PathState& state, std::uint32_t path)
 }
 
 /// Scatters a photon.
-/// @param soft  the map has it, for soft lobes to show: they scatter as well
+/// @param closure  of the surface for wo
+/// @param soft     the map has it, for soft lobes to show: they scatter as well
 /// @return false: its path ends
+template <typename Closure>
 RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
                                         PathState& state,
                                         std::uint32_t path,
                                         const SurfaceInteraction& at,
                                         Vec3f wo,
                                         Vec3f throughput,
+                                        Closure closure,
                                         bool soft)
 {
   const ShadingSide& side = at.side;
   const Vec3f wo_local = to_local(side.frame, wo);
   const bool caster = (at.instance->flags & kCausticCaster) != 0;
-  SurfaceClosure closure = surface_closure_make<kFeatureAll>(at.params, *g.bsdf_tables, wo_local);
-  if (!soft) closure = closure_sharp(closure, {true, true});
+  if (!soft) closure = closure_sharp(closure, kAllSharp);
   const int surface = photon_surface(state, path);
   const ScatterSamples u = scatter_samples(state.pixel_hash[path], state.sample_index[path], surface);
   BsdfSample bsdf =
@@ -86,9 +88,11 @@ RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
                                 PhotonQueueView& photons)
 {
   const Vec3f wo = -path_direction(state, path);
-  SurfaceInteraction at = surface_interaction_make<kFeatureAll | kFeatureGraphs>(g, state, path, wo);
-  if (!surface_is_met<kFeatureAll>(state, path, at.params.alpha, photon_surface(state, path))) {
-    if (path_pass_through(g, state, path)) queue_push(next, path);
+  constexpr unsigned kFeatures = kFeatureAll | kFeatureGraphs | kFeatureMixture;
+  MixtureLobes lobes;
+  SurfaceInteraction at = surface_interaction_make<kFeatures>(g, state, path, wo, lobes);
+  if (!surface_is_met<kFeatures>(state, path, at.params.alpha, photon_surface(state, path))) {
+    if (path_pass_through(g, state, path, at.passed)) queue_push(next, path);
     return;
   }
   const bool has_scattered = (state.flags[path] & kPathCaustic) != 0;
@@ -101,7 +105,7 @@ RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
   if (!has_scattered && !at.side.front && at.params.transmission > 0.0f && !at.params.thin) sigma_a = at.params.sigma_a;
   const Vec3f throughput = path_throughput(state, path) * path_transmittance(sigma_a, state.hit_t[path]);
   if (is_zero(throughput)) return;
-  surface_interaction_frame<kFeatureAll>(g, state, path, wo, at);
+  surface_interaction_frame<kFeatures>(g, state, path, wo, at);
   const bool caster = (flags & kCausticCaster) != 0;
   const bool arrived = has_scattered && (state.flags[path] & kPathAfterSoft) == 0;
   const bool soft = arrived && (flags & kGathersPhotons) != 0;
@@ -112,7 +116,13 @@ RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
         P, {throughput, octahedral_encode(wo), octahedral_encode(at.side.Ng), state.bounces[path] - 1u}};
   }
   if (!caster && !soft) return;
-  if (shade_photon_scatter(g, state, path, at, wo, throughput, soft)) queue_push(next, path);
+  const bool goes_on =
+      has_mixture<kFeatures>(at)
+          ? shade_photon_scatter(g, state, path, at, wo, throughput, mixture_of(lobes, at.side.frame), soft)
+          : shade_photon_scatter(
+                g, state, path, at, wo, throughput,
+                surface_closure_make<kFeatureAll>(at.params, *g.bsdf_tables, to_local(at.side.frame, wo)), soft);
+  if (goes_on) queue_push(next, path);
 }
 
 }  // namespace relief

@@ -3,6 +3,7 @@
 
 #include "kernel/bsdf/glass_branches.h"
 #include "kernel/bsdf/lobe_split.h"
+#include "kernel/bsdf/mixture.h"
 #include "kernel/counters.h"
 #include "kernel/photon/gather.h"
 #include "kernel/sample/dimensions.h"
@@ -14,12 +15,12 @@ namespace relief {
 
 /// Queues a shadow ray towards a light sample taken at the hit.
 /// @param chosen, light_u, light_N  from and given to lights_choose
-template <unsigned kFeatures>
+template <unsigned kFeatures, typename Closure>
 RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
                                        const PathState& state,
                                        std::uint32_t path,
                                        const SurfaceInteraction& at,
-                                       const SurfaceClosure& closure,
+                                       const Closure& closure,
                                        LightsChoice chosen,
                                        Vec2f light_u,
                                        Vec3f light_N,
@@ -46,7 +47,7 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
     if (light_casts_caustics(g.lights, light.ref.light_index) && path_caustic_after(state.flags[path], *at.instance) &&
         shading_is_reversible(at.side, light.wi)) {
-      bsdf.f = closure_eval<kFeatures>(closure_soft(closure, {true, true}), *g.bsdf_tables, wi).f;
+      bsdf.f = closure_eval<kFeatures>(closure_soft(closure, kAllSharp), *g.bsdf_tables, wi).f;
     }
   }
   if (is_zero(bsdf.f)) return;
@@ -84,6 +85,7 @@ path_sharp_lobes(const KernelGlobals& g, std::uint32_t flags, const SurfaceInter
   if (path_gathers_tails(flags, *at.instance) && pdf < kTailDensity &&
       __builtin_fabsf(dot(wi, at.side.Ng)) > kLeastCosine && shading_is_reversible(at.side, wi)) {
     sharp.base = false;
+    sharp.most_roughness = -1.0f;
   }
   return sharp;
 }
@@ -92,12 +94,12 @@ path_sharp_lobes(const KernelGlobals& g, std::uint32_t flags, const SurfaceInter
 /// far as the limits of bounces allow.
 /// @param wo, wi    in the closure's frame
 /// @param wi_world  the same as wi
-template <unsigned kFeatures>
+template <unsigned kFeatures, typename Closure>
 RELIEF_KERNEL Vec3f shade_surface_tails(const KernelGlobals& g,
                                         const PathState& state,
                                         std::uint32_t path,
                                         const SurfaceInteraction& at,
-                                        const SurfaceClosure& closure,
+                                        const Closure& closure,
                                         Vec3f wo,
                                         Vec3f wi,
                                         Vec3f wi_world)
@@ -109,7 +111,7 @@ RELIEF_KERNEL Vec3f shade_surface_tails(const KernelGlobals& g,
   };
   const float pdf = closure_eval<kFeatures>(closure, *g.bsdf_tables, wi).pdf;
   const SharpLobes sharp = path_sharp_lobes(g, state.flags[path], at, wi_world, pdf);
-  const Vec3f soft = closure_eval<kFeatures>(closure_soft(closure, {true, true}), *g.bsdf_tables, wi).f;
+  const Vec3f soft = closure_eval<kFeatures>(closure_soft(closure, kAllSharp), *g.bsdf_tables, wi).f;
   const Vec3f both = closure_eval<kFeatures>(closure_soft(closure, sharp), *g.bsdf_tables, wi).f;
   Vec3f f;
   if (allowed(BounceKind::kDiffuse)) f += soft;
@@ -119,12 +121,12 @@ RELIEF_KERNEL Vec3f shade_surface_tails(const KernelGlobals& g,
 
 /// Adds what the photons around the hit bring to it.
 /// @param wo  in the closure's frame
-template <unsigned kFeatures>
+template <unsigned kFeatures, typename Closure>
 RELIEF_KERNEL void shade_surface_photons(const KernelGlobals& g,
                                          PathState& state,
                                          std::uint32_t path,
                                          const SurfaceInteraction& at,
-                                         const SurfaceClosure& closure,
+                                         const Closure& closure,
                                          Vec3f wo)
 {
   const CausticStateView& caustic = state.caustic;
@@ -169,6 +171,12 @@ RELIEF_KERNEL std::uint32_t path_ways_on(const PathState& state,
   return seen_first && (rough_glass || rough_metal) && path_has_room(state, kWaysAtRough) ? kWaysAtRough : 1;
 }
 
+/// Lobes of mixtures do not fork.
+RELIEF_KERNEL std::uint32_t path_ways_on(const PathState&, std::uint32_t, const SurfaceInteraction&, const Mixture&)
+{
+  return 1;
+}
+
 /// Whether a path may follow what glass reflects and what it refracts. By chance it takes the first one time in 25, and lamps
 /// that it finds so are 25 times too bright.
 RELIEF_KERNEL bool path_forks_at_glass(const PathState& state, std::uint32_t path, const SurfaceClosure& closure)
@@ -183,12 +191,12 @@ RELIEF_KERNEL bool path_forks_at_glass(const PathState& state, std::uint32_t pat
 /// @param share       of a fork, 1 else
 /// @param throughput  up to the surface
 /// @param cone        at the surface
-template <unsigned kFeatures>
+template <unsigned kFeatures, typename Closure>
 RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
                                           PathState& state,
                                           std::uint32_t path,
                                           const SurfaceInteraction& at,
-                                          const SurfaceClosure& closure,
+                                          const Closure& closure,
                                           BsdfSample bsdf,
                                           float share,
                                           const ScatterSamples& u,
@@ -261,12 +269,12 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
 
 /// Sends a path on as shade_surface_continue does, or in both ways that glass has, but where photons bring what it reflects.
 /// @param bsdf  sampled with u
-template <unsigned kFeatures>
+template <unsigned kFeatures, typename Closure>
 RELIEF_KERNEL void shade_surface_scatter(const KernelGlobals& g,
                                          PathState& state,
                                          std::uint32_t path,
                                          const SurfaceInteraction& at,
-                                         const SurfaceClosure& closure,
+                                         const Closure& closure,
                                          BsdfSample bsdf,
                                          float share,
                                          const ScatterSamples& u,
@@ -275,7 +283,8 @@ RELIEF_KERNEL void shade_surface_scatter(const KernelGlobals& g,
                                          RayCone cone,
                                          QueueView& next)
 {
-  if constexpr ((kFeatures & kFeatureCaustics) != 0 && (kFeatures & kFeatureTransmission) != 0) {
+  if constexpr ((kFeatures & kFeatureCaustics) != 0 && (kFeatures & kFeatureTransmission) != 0 &&
+                (kFeatures & kFeatureMixture) == 0) {
     if (path_forks_at_glass(state, path, closure)) {
       const GlassBranches branches = glass_branches_sample<kFeatures>(closure, *g.bsdf_tables, u.bsdf_lobe, u.bsdf_uv);
       const bool by_photons =
@@ -362,8 +371,39 @@ RELIEF_KERNEL void shade_surface_denoising(const KernelGlobals& g,
   film_add_denoising(g.film, state.pixel[path], path_throughput(state, path) * surface_albedo(at.params), N);
 }
 
+/// Adds what a surface emits to a path that has met it.
+/// @param throughput  up to the surface
+template <unsigned kFeatures>
+RELIEF_KERNEL void shade_surface_emission(const KernelGlobals& g,
+                                          PathState& state,
+                                          std::uint32_t path,
+                                          const SurfaceInteraction& at,
+                                          Vec3f throughput)
+{
+  const int bounce = path_bounces(state.bounces[path], BounceKind::kAll);
+  const Vec3f wi = path_direction(state, path);
+  bool emits = !is_zero(at.params.emission) && (at.side.front || at.material->double_sided || at.params.unlit);
+  if constexpr ((kFeatures & kFeatureCaustics) != 0) {
+    const bool is_light = at.instance->first_light_index >= 0;
+    emits = emits && !(is_light && path_leaves_to_photons(g, state.flags[path], at.instance->first_light_index));
+  }
+  if (emits) {
+    Vec3f radiance = at.params.emission;
+    if (!at.params.unlit) path_add_denoising(g, state, path, throughput * radiance);
+    const float pdf = state.pdf[path];
+    if (pdf > 0.0f && at.instance->first_light_index >= 0) {
+      const LightRef hit{at.instance->first_light_index + static_cast<std::int32_t>(at.triangle),
+                         at.instance->light_copy_index};
+      const float pdf_light = lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), hit, wi, state.hit_t[path]);
+      radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
+    }
+    if (bounce == 0) film_add_emission(g.film, state.pixel[path], throughput * radiance);
+    path_add_radiance(state, path, bounce, throughput * radiance, g.clamp_indirect);
+  }
+}
+
 /// Shades one path. Reads and writes every column but the hit's.
-/// @param graph_values  of the material's graph at the hit; null: it has none, or it is run here
+/// @param lane  of the material's program at the hit, which has run; null: it has none
 /// Next: intersect closest (pushed on `next`), or the path ends; it may fork. At most one ray is added to `shadow`, at a first hit two.
 template <unsigned kFeatures>
 [[gnu::flatten]] RELIEF_KERNEL void shade_surface(const KernelGlobals& g,
@@ -372,7 +412,7 @@ template <unsigned kFeatures>
                                                   QueueView& next,
                                                   ShadowQueue& shadow,
                                                   Counters& counters,
-                                                  const GraphValues* graph_values = nullptr)
+                                                  const GraphLane* lane = nullptr)
 {
   ++counters.surface_hits;
   const Vec3f wo = -path_direction(state, path);
@@ -384,18 +424,25 @@ template <unsigned kFeatures>
   // Early: nothing waits for them yet.
   const ScatterSamples u = scatter_samples(state.pixel_hash[path], sample, surface);
 
-  SurfaceInteraction at = surface_interaction_make<kFeatures>(g, state, path, wo, graph_values);
+  constexpr bool kMixture = (kFeatures & kFeatureMixture) != 0;
+  MixtureLobes lobes;
+  SurfaceInteraction at = surface_interaction_make<kFeatures>(g, state, path, wo, lobes, lane);
+  // Whatever stands in a medium, of glass or not.
+  const auto transmittance = [&] {
+    const Vec3f sigma_a = path_sigma_a(state, path);
+    return is_zero(sigma_a) ? Vec3f{1, 1, 1} : path_transmittance(sigma_a, t);
+  };
+  // Closures emit whether or not others let the path through.
+  if constexpr (kMixture) shade_surface_emission<kFeatures>(g, state, path, at, path_throughput(state, path) * transmittance());
   if (!surface_is_met<kFeatures>(state, path, at.params.alpha, surface)) {
     ++counters.transparent_hits;
-    if (path_pass_through(g, state, path)) queue_push(next, path);
+    if (path_pass_through(g, state, path, at.passed)) queue_push(next, path);
     return;
   }
 
-  const Vec3f sigma_a = path_sigma_a(state, path);
   Vec3f throughput = path_throughput(state, path);
-  // Whatever stands in a medium, of glass or not.
-  if (!is_zero(sigma_a)) {
-    throughput *= path_transmittance(sigma_a, t);
+  if (!is_zero(path_sigma_a(state, path))) {
+    throughput *= transmittance();
     path_set_throughput(state, path, throughput);
   }
 
@@ -406,7 +453,7 @@ template <unsigned kFeatures>
   const Vec3f wo_local = to_local(side.frame, wo);
 
   if ((state.flags[path] & kPathSawSurface) == 0) {
-    if ((instance.flags & kHoldout) != 0) {
+    if ((instance.flags & kHoldout) != 0 || u.sharpness < at.holdout) {
       film_add_holdout(g.film, state.pixel[path]);
       return;
     }
@@ -414,24 +461,7 @@ template <unsigned kFeatures>
     shade_surface_first_hit(g, state, path, at, shadow);
   }
 
-  bool emits = !is_zero(params.emission) && (side.front || at.material->double_sided || params.unlit);
-  if constexpr ((kFeatures & kFeatureCaustics) != 0) {
-    const bool is_light = instance.first_light_index >= 0;
-    emits = emits && !(is_light && path_leaves_to_photons(g, state.flags[path], instance.first_light_index));
-  }
-  if (emits) {
-    Vec3f radiance = params.emission;
-    if (!params.unlit) path_add_denoising(g, state, path, throughput * radiance);
-    const float pdf = state.pdf[path];
-    if (pdf > 0.0f && instance.first_light_index >= 0) {
-      const LightRef hit{instance.first_light_index + static_cast<std::int32_t>(at.triangle),
-                         instance.light_copy_index};
-      const float pdf_light = lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), hit, -wo, t);
-      radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
-    }
-    if (bounce == 0) film_add_emission(g.film, state.pixel[path], throughput * radiance);
-    path_add_radiance(state, path, bounce, throughput * radiance, g.clamp_indirect);
-  }
+  if constexpr (!kMixture) shade_surface_emission<kFeatures>(g, state, path, at, throughput);
   if (g.film.layout.denoising && (state.flags[path] & kPathSawFeature) == 0) {
     shade_surface_denoising(g, state, path, at);
   }
@@ -443,13 +473,23 @@ template <unsigned kFeatures>
   RayCone cone = at.cone;
   if ((instance.flags & kDisplaced) != 0) cone.width = min(cone.width, state.hit_width[path]);
   const Vec3f light_N = params.transmission > 0.0f ? Vec3f{} : side.Ns;
-  LightsChoice chosen;
-  if (g.has_lights && !surface_is_delta(params)) {
-    chosen = lights_choose(g.lights, at.hit.P, light_N, u.light_choice, u.light_uv);
+  bool is_delta;
+  if constexpr (kMixture) {
+    is_delta = mixture_is_delta(mixture_of(lobes, side.frame));
+  } else {
+    is_delta = surface_is_delta(params);
   }
+  LightsChoice chosen;
+  if (g.has_lights && !is_delta) chosen = lights_choose(g.lights, at.hit.P, light_N, u.light_choice, u.light_uv);
 
   // While the chosen light is on its way from memory, the BSDF is sampled.
-  const SurfaceClosure closure = surface_closure_make<kFeatures>(params, *g.bsdf_tables, wo_local);
+  const auto closure = [&] {
+    if constexpr (kMixture) {
+      return mixture_of(lobes, side.frame);
+    } else {
+      return surface_closure_make<kFeatures>(params, *g.bsdf_tables, wo_local);
+    }
+  }();
   const BsdfSample bsdf = closure_sample<kFeatures>(closure, *g.bsdf_tables, u.bsdf_lobe, u.bsdf_uv);
 
   if (chosen.probability > 0.0f) {

@@ -32,7 +32,17 @@ struct SurfaceInteraction {
   SurfaceParams params;
   RayCone cone;       ///< at the hit
   float uv_width[2];  ///< texture footprint in each set's uv units
+  Vec3f passed{1, 1, 1};  ///< of closures: factor on the throughput of what passes, by a chance of 1 − alpha
+  float holdout = 0;      ///< of closures: share that is a hole in the picture
 };
+
+/// A material of closures, where the kernel has any.
+template <unsigned kFeatures>
+RELIEF_KERNEL bool has_mixture(const SurfaceInteraction& at)
+{
+  if constexpr ((kFeatures & kFeatureMixture) != 0) return at.material->has_closures;
+  return false;
+}
 
 /// Turns the shading normal to wo's side and bends it until wo is above its horizon.
 /// Interpolated normals can face away from a viewer who sees the facet; leaving them so makes dark rims.
@@ -89,27 +99,80 @@ RELIEF_KERNEL GraphPoint surface_graph_point(const KernelGlobals& g,
 {
   return {
       &g.meshes[at.instance->mesh_index], at.instance, at.triangle, state.hit_u[path], state.hit_v[path], &at.hit, wo,
-      {at.uv_width[0], at.uv_width[1]}};
+      {at.uv_width[0], at.uv_width[1]}, at.cone.width};
+}
+
+/// Resolves the closures of a located point: its lobes, its frame, and the parameters that stages ask for.
+/// @param lane   of the material's program
+/// @param lobes  gets the lobes
+template <unsigned kFeatures>
+RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
+                                           Vec3f wo,
+                                           const GraphLane& lane,
+                                           SurfaceInteraction& at,
+                                           MixtureLobes& lobes)
+{
+  ShadingSide& side = at.side;
+  side.Ns = shading_normal_towards(at.hit.Ns, side.Ng, wo);
+  side.bent = !(__builtin_fabsf(dot(side.Ns, at.hit.Ns)) > kUnbent);
+  side.frame = frame_from_normal(side.Ns);
+  lobes.size = 0;
+  MixtureBuild build{wo, side.Ng, side.Ns, side.front, g.bsdf_tables, &lobes};
+  closures_resolve(lane, build);
+
+  const Material& m = *at.material;
+  SurfaceParams& p = at.params;
+  p = {};
+  p.emission = build.emission +
+               max(Vec3f{}, m.emission * xyz(material_texture_sample<kFeatures>(m.emission_texture, g.textures, at.hit.uv,
+                                                                                at.uv_width)));
+  p.transmission = build.transmits ? 1.0f : 0.0f;
+  p.thin = false;
+  if (build.transmits && m.attenuation_distance < kInfinity) {
+    p.sigma_a = volume_sigma_a(m.attenuation_color, m.attenuation_distance);
+  }
+  at.holdout = clamp(build.holdout, 0.0f, 1.0f);
+  float scattered = at.holdout;
+  p.base_color = {};
+  for (int i = 0; i < lobes.size; ++i) {
+    scattered += lobes.lobes[i].probability;
+    p.base_color += lobes.lobes[i].weight;
+  }
+  p.base_color = min(p.base_color, splat3(1.0f));
+  const float passing = max_component(build.transparency);
+  if (!(passing > 0.0f)) return;
+  // Whichever way a path takes, it takes by its share of the light; what it then carries makes up for the chance.
+  const float chance = passing / (passing + scattered);
+  p.alpha = 1.0f - chance;
+  at.passed = build.transparency / chance;
+  if (!(chance < 1.0f)) return;
+  for (int i = 0; i < lobes.size; ++i) lobes.lobes[i].weight *= 1.0f / (1.0f - chance);
 }
 
 /// The point that a path has hit and its material there.
 /// @param wo      unit, back along the path's ray
-/// @param values  of the material's graph there; null: it is run, if there is one
+/// @param lane    of the material's program, which has run; null: it is run, if there is one
+/// @param lobes   gets those of a material of closures
 template <unsigned kFeatures>
 RELIEF_KERNEL SurfaceInteraction surface_interaction_make(const KernelGlobals& g,
                                                           const PathState& state,
                                                           std::uint32_t path,
                                                           Vec3f wo,
-                                                          const GraphValues* values = nullptr)
+                                                          MixtureLobes& lobes,
+                                                          const GraphLane* lane = nullptr)
 {
   SurfaceInteraction at = surface_interaction_locate<kFeatures>(g, state, path, wo);
   if constexpr ((kFeatures & kFeatureGraphs) != 0) {
     if (at.material->graph_index >= 0) {
-      const GraphValues given = values != nullptr ? *values
-                                                  : graph_at_point(g.run_graph, g.graphs[at.material->graph_index],
-                                                                   g.textures,
-                                                                   surface_graph_point(g, state, path, at, wo));
-      at.params = graph_surface_params<kFeatures>(*at.material, given, g.textures, at.hit, at.uv_width);
+      GraphRegisters registers;
+      const GraphLane ran = lane != nullptr ? *lane
+                                            : graph_at_point(g.run_graph, g.graphs[at.material->graph_index], g.textures,
+                                                             surface_graph_point(g, state, path, at, wo), registers);
+      if (has_mixture<kFeatures>(at)) {
+        surface_interaction_mix<kFeatures>(g, wo, ran, at, lobes);
+      } else {
+        at.params = graph_surface_params<kFeatures>(*at.material, graph_values(ran), g.textures, at.hit, at.uv_width);
+      }
       return at;
     }
   }
@@ -126,6 +189,7 @@ RELIEF_KERNEL void surface_interaction_frame(const KernelGlobals& g,
                                              Vec3f wo,
                                              SurfaceInteraction& at)
 {
+  if (has_mixture<kFeatures>(at)) return;
   const Material& material = *at.material;
   ShadingSide& side = at.side;
   side.Ns = shading_normal_towards(at.hit.Ns, side.Ng, wo);
@@ -183,9 +247,11 @@ RELIEF_KERNEL bool surface_is_met(const PathState& state, std::uint32_t path, fl
 }
 
 /// Sends a path on behind a surface that let it through.
+/// @param passed  see SurfaceInteraction
 /// @return false: it has passed as many as it may
-RELIEF_KERNEL bool path_pass_through(const KernelGlobals& g, PathState& state, std::uint32_t path)
+RELIEF_KERNEL bool path_pass_through(const KernelGlobals& g, PathState& state, std::uint32_t path, Vec3f passed)
 {
+  if (passed != Vec3f{1, 1, 1}) path_set_throughput(state, path, path_throughput(state, path) * passed);
   state.flags[path] += 1u << kPathTransparentShift;
   state.t_min[path] = next_float_up(state.hit_t[path]);
   return (state.flags[path] >> kPathTransparentShift) <= static_cast<std::uint32_t>(g.limits.transparent);

@@ -15,7 +15,10 @@ namespace {
 const GraphOpShape& shape_of(GraphOp op) { return kGraphOpShapes[static_cast<int>(op)]; }
 
 /// Whether an operation gives the same whatever the scene.
-bool can_fold(GraphOp op) { return op != GraphOp::image; }
+bool can_fold(GraphOp op)
+{
+  return op != GraphOp::image && op != GraphOp::image_box && op != GraphOp::image_tiles;
+}
 
 }  // namespace
 
@@ -28,6 +31,11 @@ GraphProgramView GraphProgram::view() const
   v.tables = tables.data();
   v.inputs = inputs.data();
   v.num_inputs = static_cast<std::uint32_t>(inputs.size());
+  v.is_shifted = std::any_of(inputs.begin(), inputs.end(),
+                             [](const GraphInput& input) { return input.shift != GraphShift::kNone; });
+  v.results = results.data();
+  v.closures = closures.data();
+  v.num_closures = static_cast<std::uint32_t>(closures.size());
   std::copy(&outputs[0][0], &outputs[0][0] + std::size(outputs) * 3, &v.outputs[0][0]);
   return v;
 }
@@ -35,7 +43,8 @@ GraphProgramView GraphProgram::view() const
 std::size_t GraphProgram::bytes() const
 {
   return code.size() * sizeof(std::uint16_t) + (constants.size() + tables.size()) * sizeof(float) +
-         inputs.size() * sizeof(GraphInput) + sizeof(GraphProgram);
+         inputs.size() * sizeof(GraphInput) + results.size() * sizeof(std::uint16_t) +
+         closures.size() * sizeof(SurfaceClosureSpec) + sizeof(GraphProgram);
 }
 
 GraphScalar GraphBuilder::add(const Node& node, const Key& key)
@@ -52,11 +61,12 @@ GraphScalar GraphBuilder::constant(float value)
   return add(node, {-1, std::bit_cast<std::int32_t>(value)});
 }
 
-GraphScalar GraphBuilder::quantity(GraphQuantity quantity)
+GraphScalar GraphBuilder::quantity(GraphQuantity quantity, GraphShift shift)
 {
   Node node{Node::Kind::kQuantity};
   node.quantity = quantity;
-  return add(node, {-2, static_cast<std::int64_t>(quantity)});
+  node.shift = shift;
+  return add(node, {-2, static_cast<std::int64_t>(quantity), static_cast<std::int64_t>(shift)});
 }
 
 bool GraphBuilder::is_constant(GraphScalar a, float* value) const
@@ -217,6 +227,76 @@ void GraphBuilder::set_output(GraphOutput output, const GraphVector& value)
   outputs_[static_cast<std::size_t>(output)] = value;
 }
 
+std::uint16_t GraphBuilder::add_result(GraphScalar a)
+{
+  if (results_.size() == kNoGraphOperand) {
+    throw GraphTooLarge("closures with at most " + std::to_string(kNoGraphOperand) + " inputs");
+  }
+  results_.push_back(a);
+  return static_cast<std::uint16_t>(results_.size() - 1);
+}
+
+void GraphBuilder::keep_results(std::vector<SurfaceClosureSpec>& closures, int numbers)
+{
+  outputs_ = {};
+  std::vector<GraphScalar> kept;
+  for (SurfaceClosureSpec& closure : closures) {
+    const auto first = results_.begin() + closure.first_result;
+    closure.first_result = static_cast<std::uint16_t>(kept.size());
+    kept.insert(kept.end(), first, first + numbers);
+  }
+  results_ = std::move(kept);
+}
+
+GraphScalar GraphBuilder::shifted(GraphScalar a, GraphShift shift)
+{
+  // Inputs have lower numbers than what uses them, but graphs are deep: no recursion.
+  std::vector<std::int32_t> stack{a.index};
+  const auto known = [&](GraphScalar of) -> GraphScalar {
+    const auto it = shifted_.find({of.index, shift});
+    return it == shifted_.end() ? GraphScalar{} : it->second;
+  };
+  while (!stack.empty()) {
+    const GraphScalar of{stack.back()};
+    if (known(of).index >= 0) {
+      stack.pop_back();
+      continue;
+    }
+    const Node node = nodes_[static_cast<std::size_t>(of.index)];
+    if (node.kind != Node::Kind::kOperation) {
+      // What a bump within a bump has moved already stays where it is.
+      const bool moves = node.kind == Node::Kind::kQuantity && node.shift == GraphShift::kNone;
+      shifted_[{of.index, shift}] = moves ? quantity(node.quantity, shift) : of;
+      stack.pop_back();
+      continue;
+    }
+    const Operation operation = operations_[static_cast<std::size_t>(node.operation)];
+    std::vector<GraphScalar> inputs;
+    bool are_known = true;
+    for (const GraphScalar input : operation.inputs) {
+      inputs.push_back(known(input));
+      if (inputs.back().index >= 0) continue;
+      are_known = false;
+      stack.push_back(input.index);
+    }
+    if (!are_known) continue;
+    const std::vector<GraphScalar> outputs = apply(operation.op, inputs, operation.immediates);
+    for (std::size_t i = 0; i < outputs.size(); ++i) shifted_[{operation.outputs[i].index, shift}] = outputs[i];
+    stack.pop_back();
+  }
+  return known(a);
+}
+
+/// All numbers that the program has to give.
+std::vector<GraphScalar> GraphBuilder::wanted() const
+{
+  std::vector<GraphScalar> all;
+  for (const GraphVector& output : outputs_) all.insert(all.end(), output.begin(), output.end());
+  all.insert(all.end(), results_.begin(), results_.end());
+  std::erase_if(all, [](GraphScalar a) { return a.index < 0; });
+  return all;
+}
+
 /// The operations that outputs need, each after what it needs itself; of several inputs the one that needs most registers
 /// comes first.
 std::vector<std::int32_t> GraphBuilder::order() const
@@ -249,24 +329,22 @@ std::vector<std::int32_t> GraphBuilder::order() const
   std::vector<std::int32_t> ordered;
   std::vector<char> is_placed(operations_.size(), 0);
   std::vector<std::pair<std::int32_t, bool>> stack;  // operation, whether its inputs are done
-  for (const GraphVector& output : outputs_) {
-    for (const GraphScalar component : output) {
-      if (component.index < 0 || operation_of(component) < 0) continue;
-      stack.emplace_back(operation_of(component), false);
-      while (!stack.empty()) {
-        const auto [operation, are_inputs_done] = stack.back();
-        stack.pop_back();
-        const auto n = static_cast<std::size_t>(operation);
-        if (is_placed[n] != 0) continue;
-        if (are_inputs_done) {
-          is_placed[n] = 1;
-          ordered.push_back(operation);
-          continue;
-        }
-        stack.emplace_back(operation, true);
-        const std::vector<std::int32_t> needed = inputs_by_need(operations_[n]);
-        for (auto it = needed.rbegin(); it != needed.rend(); ++it) stack.emplace_back(*it, false);
+  for (const GraphScalar component : wanted()) {
+    if (operation_of(component) < 0) continue;
+    stack.emplace_back(operation_of(component), false);
+    while (!stack.empty()) {
+      const auto [operation, are_inputs_done] = stack.back();
+      stack.pop_back();
+      const auto n = static_cast<std::size_t>(operation);
+      if (is_placed[n] != 0) continue;
+      if (are_inputs_done) {
+        is_placed[n] = 1;
+        ordered.push_back(operation);
+        continue;
       }
+      stack.emplace_back(operation, true);
+      const std::vector<std::int32_t> needed = inputs_by_need(operations_[n]);
+      for (auto it = needed.rbegin(); it != needed.rend(); ++it) stack.emplace_back(*it, false);
     }
   }
   return ordered;
@@ -283,11 +361,7 @@ GraphProgram GraphBuilder::compile() const
       last_use[static_cast<std::size_t>(a.index)] = static_cast<std::int32_t>(position);
     }
   }
-  for (const GraphVector& output : outputs_) {
-    for (const GraphScalar a : output) {
-      if (a.index >= 0) last_use[static_cast<std::size_t>(a.index)] = kEver;
-    }
-  }
+  for (const GraphScalar a : wanted()) last_use[static_cast<std::size_t>(a.index)] = kEver;
 
   GraphProgram program;
   program.tables = tables_;
@@ -308,7 +382,7 @@ GraphProgram GraphBuilder::compile() const
     if (last_use[i] < 0) continue;
     if (nodes_[i].kind == Node::Kind::kQuantity) {
       operand_of[i] = take_register();
-      program.inputs.push_back({nodes_[i].quantity, operand_of[i]});
+      program.inputs.push_back({nodes_[i].quantity, nodes_[i].shift, operand_of[i]});
     } else if (nodes_[i].kind == Node::Kind::kConstant) {
       constexpr std::size_t kMostConstants = kNoGraphOperand - kMostGraphRegisters;
       if (program.constants.size() == kMostConstants) {
@@ -346,6 +420,9 @@ GraphProgram GraphBuilder::compile() const
     for (std::size_t c = 0; c < 3; ++c) {
       program.outputs[i][c] = is_given ? operand_of[static_cast<std::size_t>(outputs_[i][c].index)] : kNoGraphOperand;
     }
+  }
+  for (const GraphScalar a : results_) {
+    program.results.push_back(a.index < 0 ? kNoGraphOperand : operand_of[static_cast<std::size_t>(a.index)]);
   }
   return program;
 }

@@ -36,7 +36,7 @@ class GraphTooLarge : public std::runtime_error {
 class GraphBuilder {
  public:
   GraphScalar constant(float value);
-  GraphScalar quantity(GraphQuantity quantity);
+  GraphScalar quantity(GraphQuantity quantity, GraphShift shift = GraphShift::kNone);
 
   /// @param inputs      as many as the operation has
   /// @param immediates  likewise
@@ -60,6 +60,18 @@ class GraphBuilder {
 
   void set_output(GraphOutput output, const GraphVector& value);
 
+  /// Adds a number that the program gives beside its outputs.
+  /// @param a  index −1: 0
+  /// @return   its place among the results
+  std::uint16_t add_result(GraphScalar a);
+
+  /// Leaves out all outputs, and all results but these closures'; their places are moved.
+  /// @param numbers  of results that each has
+  void keep_results(std::vector<SurfaceClosureSpec>& closures, int numbers);
+
+  /// A number as it is a footprint away: everything that leads to it is asked for there.
+  GraphScalar shifted(GraphScalar a, GraphShift shift);
+
   /// @error GraphTooLarge
   GraphProgram compile() const;
 
@@ -71,6 +83,7 @@ class GraphBuilder {
     int output = 0;
     float value = 0;
     GraphQuantity quantity{};
+    GraphShift shift{};
   };
   struct Operation {
     GraphOp op;
@@ -81,6 +94,7 @@ class GraphBuilder {
   using Key = std::vector<std::int64_t>;
 
   GraphScalar add(const Node& node, const Key& key);
+  std::vector<GraphScalar> wanted() const;
   bool simplify(GraphOp op, std::span<const GraphScalar> in, GraphScalar* out) const;
   std::vector<GraphScalar> fold(GraphOp op,
                                 std::span<const GraphScalar> inputs,
@@ -93,6 +107,8 @@ class GraphBuilder {
   std::vector<float> tables_;
   std::map<std::vector<float>, std::uint32_t> table_places_;
   std::array<GraphVector, kNumGraphOutputs> outputs_;
+  std::vector<GraphScalar> results_;
+  std::map<std::pair<std::int32_t, GraphShift>, GraphScalar> shifted_;
 };
 
 }  // namespace relief

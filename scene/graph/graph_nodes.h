@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <map>
+#include <set>
 #include <span>
 #include <string_view>
 
@@ -35,11 +36,13 @@ struct GraphNode {
   const JsonReader& reader;                              ///< its object, for options
   const std::map<std::string_view, GraphValue>& inputs;  ///< all of its kind's, converted
   std::map<std::string_view, GraphValue>& outputs;
+  const std::set<std::string_view>& given;  ///< inputs that the file gives
   /// Texture that an option names, as an index into the scene's.
   const std::function<int(const JsonReader&)>& texture;
 
   GraphScalar number(std::string_view name) const { return inputs.at(name).v[0]; }
   const GraphVector& vector(std::string_view name) const { return inputs.at(name).v; }
+  bool is_given(std::string_view name) const { return given.contains(name); }
   void set(std::string_view name, GraphScalar a) { outputs[name] = {GraphType::kNumber, {a, a, a}}; }
   void set(std::string_view name, const GraphVector& v, GraphType type) { outputs[name] = {type, v}; }
 };

@@ -13,6 +13,8 @@ struct GraphProgram {
   std::vector<GraphInput> inputs;
   std::uint16_t outputs[kNumGraphOutputs][3] = {};
   std::uint32_t given = 0;  ///< bit GraphOutput
+  std::vector<std::uint16_t> results;
+  std::vector<SurfaceClosureSpec> closures;
   int num_registers = 0;
 
   GraphProgramView view() const;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "scene/graph/closure_reader.h"
 #include "scene/graph/graph_nodes.h"
 #include "scene/khronos_extensions.h"
 
@@ -28,7 +29,7 @@ struct Source {
 
 struct Reader {
   const GltfDocument& document;
-  const JsonReader& graph;
+  std::string file, path;  ///< of the graph
   TextureTable& textures;
   Warnings& warnings;
   GraphBuilder build;
@@ -40,8 +41,10 @@ struct Reader {
   void read_node(std::size_t index, const nlohmann::json& json, std::size_t num_nodes);
   std::vector<std::size_t> order() const;
   GraphValue look_up(const JsonReader& parent, std::string_view name, const Reference& reference) const;
+  GraphValue input(const JsonReader& parent, std::string_view name, GraphType type);
   void lower(std::size_t index);
-  void read_outputs();
+  void read_nodes(const JsonReader& graph);
+  void read_outputs(const JsonReader& graph);
 };
 
 /// A number, or three of them; numbers do for vectors and colours.
@@ -72,8 +75,8 @@ Reference Reader::reference(const JsonReader& parent, std::string_view name, std
 
 void Reader::read_node(std::size_t index, const nlohmann::json& json, std::size_t num_nodes)
 {
-  const std::string path = json_path_join(json_path_join(graph.path(), "nodes"), index);
-  Source source{nullptr, JsonReader(json, graph.file(), path), {}, {}};
+  const std::string node_path = json_path_join(json_path_join(path, "nodes"), index);
+  Source source{nullptr, JsonReader(json, file, node_path), {}, {}};
   const std::string type = source.reader.string("type", "");
   source.kind = graph_node_kind(type);
   if (source.kind == nullptr) source.reader.fail("type", "the type of a node (docs/graphs.md)", '"' + type + '"');
@@ -129,6 +132,14 @@ GraphValue Reader::look_up(const JsonReader& parent, std::string_view name, cons
   return it->second;
 }
 
+/// An input outside of the graph's nodes; index −1 where it is not given.
+GraphValue Reader::input(const JsonReader& parent, std::string_view name, GraphType type)
+{
+  if (!parent.has(name)) return {type, {}};
+  if (!parent.raw(name).is_object()) return literal(parent, name, type);
+  return graph_convert(build, look_up(parent, name, reference(parent, name, sources.size())), type);
+}
+
 void Reader::lower(std::size_t index)
 {
   const Source& source = sources[index];
@@ -138,8 +149,13 @@ void Reader::lower(std::size_t index)
         socket.type,
         {build.constant(socket.value[0]), build.constant(socket.value[1]), build.constant(socket.value[2])}};
   }
-  for (const auto& [name, value] : source.literals) inputs[name] = value;
+  std::set<std::string_view> given;
+  for (const auto& [name, value] : source.literals) {
+    inputs[name] = value;
+    given.insert(name);
+  }
   for (const auto& [name, from] : source.references) {
+    given.insert(name);
     inputs[name] = graph_convert(build, look_up(source.reader.object("inputs"), name, from), inputs[name].type);
   }
   const std::function<int(const JsonReader&)> texture = [this](const JsonReader& r) {
@@ -152,12 +168,12 @@ void Reader::lower(std::size_t index)
     if (ref.texture_index > 0xffff) r.fail("texture", "one of the scene's first 65,536 textures");
     return ref.texture_index;
   };
-  GraphNode node{build, source.reader, inputs, values[index], texture};
+  GraphNode node{build, source.reader, inputs, values[index], given, texture};
   source.kind->lower(node);
   source.reader.warn_unread(warnings);
 }
 
-void Reader::read_outputs()
+void Reader::read_outputs(const JsonReader& graph)
 {
   struct Named {
     std::string_view name;
@@ -180,26 +196,52 @@ void Reader::read_outputs()
   outputs.warn_unread(warnings);
 }
 
+void Reader::read_nodes(const JsonReader& graph)
+{
+  if (!graph.has("nodes") || !graph.raw("nodes").is_array()) graph.fail("nodes", "an array");
+  const nlohmann::json& nodes = graph.raw("nodes");
+  if (nodes.size() > kMostNodes) {
+    graph.fail("nodes", "at most " + std::to_string(kMostNodes), std::to_string(nodes.size()));
+  }
+  for (std::size_t i = 0; i < nodes.size(); ++i) read_node(i, nodes[i], nodes.size());
+  values.resize(nodes.size());
+  for (const std::size_t node : order()) lower(node);
+}
+
 }  // namespace
 
-GraphProgram graph_read(const GltfDocument& document,
-                        const JsonReader& reader,
-                        TextureTable& textures,
-                        Warnings& warnings)
+GraphPrograms graph_read(const GltfDocument& document,
+                         const JsonReader* graph,
+                         const JsonReader* surface,
+                         TextureTable& textures,
+                         Warnings& warnings)
 {
-  Reader r{document, reader, textures, warnings, {}, {}, {}};
-  if (!reader.has("nodes") || !reader.raw("nodes").is_array()) reader.fail("nodes", "an array");
-  const nlohmann::json& nodes = reader.raw("nodes");
-  if (nodes.size() > kMostNodes) {
-    reader.fail("nodes", "at most " + std::to_string(kMostNodes), std::to_string(nodes.size()));
-  }
-  for (std::size_t i = 0; i < nodes.size(); ++i) r.read_node(i, nodes[i], nodes.size());
-  r.values.resize(nodes.size());
+  const JsonReader& reader = graph != nullptr ? *graph : *surface;
+  Reader r{document, reader.file(), reader.path(), textures, warnings, {}, {}, {}};
+  GraphPrograms programs;
   try {
-    for (const std::size_t node : r.order()) r.lower(node);
-    r.read_outputs();
-    reader.warn_unread(warnings);
-    return r.build.compile();
+    if (graph != nullptr) {
+      r.read_nodes(*graph);
+      if (surface == nullptr || graph->has("outputs")) r.read_outputs(*graph);
+      graph->warn_unread(warnings);
+    }
+    std::vector<SurfaceClosureSpec> closures;
+    if (surface != nullptr) {
+      const auto input = [&r](const JsonReader& parent, std::string_view name, GraphType type) {
+        return r.input(parent, name, type);
+      };
+      closures = closures_read(*surface, input, r.build, warnings);
+    }
+    programs.surface = r.build.compile();
+    programs.surface.closures = closures;
+    std::erase_if(closures, [](const SurfaceClosureSpec& c) { return c.kind != ClosureKind::transparent; });
+    if (!closures.empty()) {
+      constexpr int kNumbers = 1 + sizeof(TransparentInputs) / sizeof(float);
+      r.build.keep_results(closures, kNumbers);
+      programs.transparency = r.build.compile();
+      programs.transparency->closures = closures;
+    }
+    return programs;
   } catch (const GraphTooLarge& error) {
     reader.fail("", error.what(), "one that needs more");
   }

@@ -1,5 +1,7 @@
-// Reads RELIEF_graph of a material: checks its nodes, types and references, and compiles it.
+// Reads RELIEF_graph and RELIEF_surface of a material: checks nodes, types and references, and compiles them.
 #pragma once
+
+#include <optional>
 
 #include "scene/gltf_document.h"
 #include "scene/graph/graph_program.h"
@@ -7,12 +9,20 @@
 
 namespace relief {
 
-/// @param reader    the extension's object
+/// The programs of a material.
+struct GraphPrograms {
+  GraphProgram surface;
+  std::optional<GraphProgram> transparency;  ///< of its transparent closures alone, for shadow rays; none: it has none
+};
+
+/// @param graph     RELIEF_graph's object; null: no nodes
+/// @param surface   RELIEF_surface's object; null: the graph gives factors of glTF's material alone
 /// @param textures  gets the images that the graph reads; their indices stand in the program
 /// @error SceneError: a node of unknown type, a reference to none, a cycle, a value of another type; a graph too large
-GraphProgram graph_read(const GltfDocument& document,
-                        const JsonReader& reader,
-                        TextureTable& textures,
-                        Warnings& warnings);
+GraphPrograms graph_read(const GltfDocument& document,
+                         const JsonReader* graph,
+                         const JsonReader* surface,
+                         TextureTable& textures,
+                         Warnings& warnings);
 
 }  // namespace relief

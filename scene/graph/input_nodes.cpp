@@ -77,12 +77,43 @@ void lower_layer_weight(GraphNode& n)
   n.set("facing", b(Op::subtract, {one, b(Op::power, {b(Op::absolute, {cosine}), exponent})}));
 }
 
+constexpr GraphSocket kBumpInputs[] = {
+    {"strength", kNumber, {1}}, {"distance", kNumber, {1}}, {"height", kNumber, {1}}, {"normal", kVector}};
+/// A normal turned by the slopes of a height, which is asked for at the point and a footprint away from it on two sides.
+/// @source Mikkelsen 2010, "Bump Mapping Unparametrized Surfaces on the GPU": the surface gradient
+void lower_bump(GraphNode& n)
+{
+  GraphBuilder& b = n.build;
+  const GraphScalar height = n.number("height");
+  const auto rise = [&](GraphShift shift) { return b(Op::subtract, {b.shifted(height, shift), height}); };
+  GraphVector N = n.vector("normal");
+  if (!n.is_given("normal")) N = quantities(b, Q::normal_x, Q::normal_y, Q::normal_z);
+  const GraphVector dPdx = quantities(b, Q::dpdx_x, Q::dpdx_y, Q::dpdx_z);
+  const GraphVector dPdy = quantities(b, Q::dpdy_x, Q::dpdy_y, Q::dpdy_z);
+  const GraphVector Rx = cross(b, dPdy, N), Ry = cross(b, N, dPdx);
+  const GraphScalar determinant = dot(b, dPdx, Rx);
+  GraphScalar distance = n.number("distance");
+  if (n.reader.boolean("invert", false)) distance = scaled(b, distance, -1);
+  const GraphScalar slope = b(Op::multiply, {distance, b(Op::sign, {determinant})});
+  const GraphScalar along_x = b(Op::multiply, {slope, rise(GraphShift::kAlongX)});
+  const GraphScalar along_y = b(Op::multiply, {slope, rise(GraphShift::kAlongY)});
+  const GraphScalar size = b(Op::absolute, {determinant});
+  GraphVector bent;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const GraphScalar gradient = b(Op::add, {b(Op::multiply, {along_x, Rx[c]}), b(Op::multiply, {along_y, Ry[c]})});
+    bent[c] = b(Op::subtract, {b(Op::multiply, {size, N[c]}), gradient});
+  }
+  const GraphScalar strength = b(Op::maximum, {n.number("strength"), b.constant(0)});
+  n.set("normal", normalized(b, mixed(b, strength, N, normalized(b, bent))), kVector);
+}
+
 constexpr GraphNodeKind kKinds[] = {
     {"texture-coordinate", {}, lower_texture_coordinate},
     {"geometry", {}, lower_geometry},
     {"vertex-color", {}, lower_vertex_color},
     {"fresnel", kFresnelInputs, lower_fresnel},
     {"layer-weight", kLayerWeightInputs, lower_layer_weight},
+    {"bump", kBumpInputs, lower_bump},
 };
 
 }  // namespace

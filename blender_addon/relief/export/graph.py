@@ -5,13 +5,11 @@ One function a kind of node, listed at the end with the names of its outputs. Th
 (docs/graphs.md); what is said here is which socket is which, and what an unlinked one means.
 """
 
+import math
 from json import dumps
 
 from .. import compat
 from . import nodes
-
-#: Entries of the tables that stand for ramps and curves: as many as Cycles'.
-_TABLE = 256
 
 
 class NotUnderstood(Exception):
@@ -27,8 +25,7 @@ class GraphWriter:
     """Collects the nodes of one material's graph.
 
     @param  coordinate_set  gives the number, 0 or 1, of the set that a ("uv", name) is in; None: no room for it
-    @param  texture         gives glTF's reference to an Image Texture node's image, and whether it is stored as sRGB; None
-                            without a file
+    @param  texture         gives the options of image-texture that say which image a node reads; None without a file
     @param  warn            called with what a value is, if it is no number, and what was used instead
     nodes          JSON of the nodes so far
     uses_generated whether meshes need _GENERATED
@@ -178,11 +175,28 @@ class GraphWriter:
         """A texture's Vector, or what Blender takes where nothing is linked: generated or uv."""
         socket = node.inputs["Vector"]
         if nodes.linked(socket, groups) is not None:
-            return self.value(socket, groups)
+            return self.mapped(node, self.value(socket, groups))
         if implicit == "generated":
             self.uses_generated = True
-            return {"node": self.add("texture-coordinate"), "output": "generated"}
-        return self.uv("")
+            return self.mapped(node, {"node": self.add("texture-coordinate"), "output": "generated"})
+        return self.mapped(node, self.uv(""))
+
+    def mapped(self, node, vector):
+        """A texture's vector after the mapping that the node itself has, in files from before Mapping nodes had sockets."""
+        if nodes.has_plain_mapping(node):
+            return vector
+        mapping = node.texture_mapping
+        if mapping.vector_type == "NORMAL" or mapping.use_min or mapping.use_max:
+            raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): its own mapping as a normal or with limits')
+        axes = [mapping.mapping_x, mapping.mapping_y, mapping.mapping_z]
+        if axes != ["X", "Y", "Z"]:
+            parts = self.add("separate", {"vector": vector})
+            chosen = [0.0 if axis == "NONE" else {"node": parts, "output": axis.lower()} for axis in axes]
+            vector = {"node": self.add("combine", dict(zip("xyz", chosen))), "output": "vector"}
+        inputs = {"vector": vector, "rotation": list(mapping.rotation), "scale": list(mapping.scale)}
+        if mapping.vector_type != "VECTOR":
+            inputs["location"] = list(mapping.translation)
+        return {"node": self.add("mapping", inputs, mapping=_label(mapping.vector_type)), "output": "vector"}
 
     def uv(self, name):
         number = self.coordinate_set(("uv", name))
@@ -257,14 +271,21 @@ def _point(g, node, groups):
 
 
 def _noise(g, node, groups):
-    if getattr(node, "noise_type", "FBM") != "FBM":
-        raise NotUnderstood(f'node "{node.name}": type {_label(node.noise_type)}')
     inputs, dimensions = _point(g, node, groups)
     names = {"Scale": "scale", "Detail": "detail", "Roughness": "roughness", "Lacunarity": "lacunarity"}
+    names.update({"Offset": "offset", "Gain": "gain"})
     inputs.update(g.inputs(node, groups, {**names, "Distortion": "distortion"}))
     if compat.CLAMPS_NOISE_ROUGHNESS:
         inputs["roughness"] = _clamped(g, inputs["roughness"])
-    return g.add("noise-texture", inputs, dimensions=dimensions, normalize=getattr(node, "normalize", True))
+    kind = _label(getattr(node, "noise_type", "FBM"))
+    return g.add(
+        "noise-texture",
+        inputs,
+        dimensions=dimensions,
+        noise=kind if kind != "fbm" else None,
+        normalize=getattr(node, "normalize", True),
+        maths=compat.TEXTURE_MATHS,
+    )
 
 
 def _clamped(g, value):
@@ -282,18 +303,24 @@ def _white_noise(g, node, groups):
 
 
 def _image(g, node, groups):
-    if node.projection != "FLAT" or node.extension == "CLIP" or node.interpolation in {"Cubic", "Smart"}:
-        raise NotUnderstood(f'node "{node.name}": a projection, extension or interpolation of its own')
     if node.image is None:
         magenta = {"red": 1.0, "green": 0.0, "blue": 1.0}
         return g.add("combine-color", magenta)
-    found = g.texture(node)
-    if found is None:
+    options = g.texture(node)
+    if options is None:
         raise NotUnderstood(f'node "{node.name}": an image without file')
-    info, is_srgb = found
-    vector = g.vector(node, groups, "uv")
-    space = "srgb" if is_srgb else "linear"
-    return g.add("image-texture", {"vector": vector}, texture=info, colorSpace=space)
+    if node.projection != "FLAT":
+        options["projection"] = _label(node.projection)
+    if node.projection == "BOX":
+        options["blend"] = node.projection_blend
+        if "tiles" in options:  # as Cycles, which reads the first alone
+            first = options.pop("tiles")[0]
+            options.update({"texture": first["texture"], "colorSpace": first["colorSpace"]})
+    if node.extension == "CLIP":
+        options["clip"] = True
+    if node.interpolation in {"Cubic", "Smart"}:
+        options["filter"] = "cubic"
+    return g.add("image-texture", {"vector": g.vector(node, groups, "uv")}, **options)
 
 
 _VORONOI = {
@@ -306,19 +333,32 @@ _VORONOI = {
 
 
 def _voronoi(g, node, groups):
-    if compat.IS_5_0:
-        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): the cells of 5.0')
-    node_detail = node.inputs.get("Detail")
-    if node_detail is not None and nodes.fold(node_detail, groups) != 0.0 or getattr(node, "normalize", False):
-        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): detail or normalisation')
     dimensions = _DIMENSIONS[node.voronoi_dimensions]
     inputs = {"vector": g.vector(node, groups, "generated")} if dimensions > 1 else {}
     if dimensions in {1, 4}:
         inputs["w"] = g.value(node.inputs["W"], groups)
     names = {"Scale": "scale", "Smoothness": "smoothness", "Exponent": "exponent", "Randomness": "randomness"}
+    names.update({"Detail": "detail", "Roughness": "roughness", "Lacunarity": "lacunarity"})
     inputs.update(g.inputs(node, groups, names))
-    feature = _choice(node, node.feature, _VORONOI)
-    return g.add("voronoi-texture", inputs, dimensions=dimensions, feature=feature, metric=_label(node.distance))
+    return g.add(
+        "voronoi-texture",
+        inputs,
+        dimensions=dimensions,
+        feature=_choice(node, node.feature, _VORONOI),
+        metric=_label(node.distance),
+        normalize=getattr(node, "normalize", False) or None,
+        maths=compat.TEXTURE_MATHS,
+    )
+
+
+def _gabor(g, node, groups):
+    inputs = {"vector": g.vector(node, groups, "generated")}
+    names = {"Scale": "scale", "Frequency": "frequency", "Anisotropy": "anisotropy"}
+    is_3d = node.gabor_type == "3D"
+    sockets = {socket.identifier: socket for socket in node.inputs}
+    inputs["direction" if is_3d else "orientation"] = g.value(sockets["Orientation 3D" if is_3d else "Orientation 2D"], groups)
+    inputs.update(g.inputs(node, groups, names))
+    return g.add("gabor-texture", inputs, dimensions=3 if is_3d else 2)
 
 
 def _musgrave(g, node, groups):
@@ -369,7 +409,7 @@ def _checker(g, node, groups):
 def _magic(g, node, groups):
     inputs = {"vector": g.vector(node, groups, "generated")}
     inputs.update(g.inputs(node, groups, {"Scale": "scale", "Distortion": "distortion"}))
-    return g.add("magic-texture", inputs, depth=node.turbulence_depth)
+    return g.add("magic-texture", inputs, depth=node.turbulence_depth, maths=compat.TEXTURE_MATHS)
 
 
 def _wave(g, node, groups):
@@ -387,11 +427,12 @@ def _wave(g, node, groups):
         wave="rings" if are_rings else "bands",
         direction=_label(direction),
         profile=_choice(node, node.wave_profile, {"SIN": "sine", "SAW": "saw", "TRI": "triangle"}),
+        maths=compat.TEXTURE_MATHS,
     )
 
 
 def _ramp(g, node, groups):
-    table = [c for i in range(_TABLE) for c in node.color_ramp.evaluate(i / (_TABLE - 1))]
+    table = [c for i in range(compat.TABLE_ENTRIES) for c in node.color_ramp.evaluate(i / (compat.TABLE_ENTRIES - 1))]
     interpolated = node.color_ramp.interpolation != "CONSTANT"
     inputs = g.inputs(node, groups, {0: "factor"})
     return g.add("color-ramp", inputs, table=table, interpolate=interpolated)
@@ -407,8 +448,8 @@ def _curve_table(mapping, curves, combined=None):
     ends = [point.location[0] for curve in (*curves, *([combined] if combined else [])) for point in curve.points]
     low, high = min(ends), max(ends)
     table = []
-    for i in range(_TABLE):
-        x = low + (high - low) * i / (_TABLE - 1)
+    for i in range(compat.TABLE_ENTRIES):
+        x = low + (high - low) * i / (compat.TABLE_ENTRIES - 1)
         if combined is not None:
             x = mapping.evaluate(combined, x)
         table.extend(mapping.evaluate(curve, x) for curve in curves)
@@ -510,8 +551,6 @@ def _math(g, node, groups):
 
 def _vector_math(g, node, groups):
     operation = _OPERATIONS.get(node.operation, _label(node.operation))
-    if operation == "power":
-        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): power')
     inputs = {name: g.value(socket, groups) for name, socket in zip("abc", node.inputs) if socket.enabled}
     if node.operation in {"SCALE", "REFRACT"}:
         inputs["scale"] = g.value(node.inputs["Scale"], groups)
@@ -525,6 +564,34 @@ def _separate_rgb(g, node, groups):
 def _combine_rgb(g, node, groups):
     inputs = g.inputs(node, groups, {0: "red", 1: "green", 2: "blue"})
     return g.add("combine-color", inputs, space=_label(getattr(node, "mode", "RGB")))
+
+
+def _separate_hsv(g, node, groups):
+    return g.add("separate-color", g.inputs(node, groups, {0: "color"}), space="hsv")
+
+
+def _combine_hsv(g, node, groups):
+    inputs = g.inputs(node, groups, {0: "red", 1: "green", 2: "blue"})
+    return g.add("combine-color", inputs, space="hsv")
+
+
+def _vector_rotate(g, node, groups):
+    kinds = {"AXIS_ANGLE": "axis", "X_AXIS": "x", "Y_AXIS": "y", "Z_AXIS": "z", "EULER_XYZ": "euler"}
+    kind = _choice(node, node.rotation_type, kinds)
+    names = {"Vector": "vector", "Center": "center"}
+    names.update({"Rotation": "rotation"} if kind == "euler" else {"Angle": "angle"})
+    if kind == "axis":
+        names["Axis"] = "axis"
+    return g.add("vector-rotate", g.inputs(node, groups, names), rotate=kind, invert=node.invert or None)
+
+
+def _normal(g, node, groups):
+    """The dot product with a direction that the node keeps; that direction itself is folded."""
+    direction = list(node.outputs["Normal"].default_value)
+    length = math.sqrt(sum(x * x for x in direction)) or 1.0
+    inputs = {"a": g.value(node.inputs["Normal"], groups)}
+    unit = {"node": g.add("vector-math", inputs, operation="normalize"), "output": "vector"}
+    return g.add("vector-math", {"a": unit, "b": [x / length for x in direction]}, operation="dot")
 
 
 def _hue(g, node, groups):
@@ -643,6 +710,13 @@ _NODES = {
         {"Distance": "distance", "Color": "color", "Position": "position", "W": "w", "Radius": "radius"},
     ),
     "ShaderNodeTexMusgrave": (_musgrave, _FACTOR),
+    "ShaderNodeTexGabor": (_gabor, {"Value": "value", "Phase": "phase", "Intensity": "intensity"}),
+    "ShaderNodeBlackbody": (_simple("blackbody", {"Temperature": "temperature"}), {"Color": "color"}),
+    "ShaderNodeWavelength": (_simple("wavelength", {"Wavelength": "wavelength"}), {"Color": "color"}),
+    "ShaderNodeSeparateHSV": (_separate_hsv, {"H": "red", "S": "green", "V": "blue"}),
+    "ShaderNodeCombineHSV": (_combine_hsv, {"Color": "color"}),
+    "ShaderNodeVectorRotate": (_vector_rotate, {"Vector": "vector"}),
+    "ShaderNodeNormal": (_normal, {"Dot": "value"}),
     "ShaderNodeTexBrick": (_brick, _FACTOR),
     "ShaderNodeRGBCurve": (_rgb_curves, {"Color": "color"}),
     "ShaderNodeVectorCurve": (_vector_curves, {"Vector": "vector"}),

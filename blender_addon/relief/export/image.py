@@ -32,6 +32,7 @@ class ImageExporter:
         self._writer = writer
         self._frame = frame
         self._uris = {}
+        self._of_pixels = set()
 
     def color_uri(self, image, user, warn, alpha_is_linked=True):
         """URI of an image used as a colour; None if there is none to use, which is warned about.
@@ -45,6 +46,35 @@ class ImageExporter:
                 self._uris[key] = self.write_pixels({name: pixels[..., c] for c, name in enumerate("RGB")})
             return self._uris[key]
         return self._uri(image, user, True, warn)
+
+    def stored_uri(self, image, user, is_color, warn):
+        """URI of an image with its colours as they are stored, whatever its alpha.
+
+        @return  (URI, or None without a file; whether the colours are multiplied by alpha already)
+        """
+        uri = self._uri(image, user, is_color, warn)
+        # Blender's own floats always are.
+        return uri, image.is_float and (image.alpha_mode == "PREMUL" or image.name_full in self._of_pixels)
+
+    def tile_uris(self, image, is_color, warn):
+        """URIs of a tiled image's files by the number of the tile; empty without any, which is warned about."""
+        path = bpy.path.abspath(image.filepath, library=image.library)
+        if "<UDIM>" not in path and "<UVTILE>" not in path or image.packed_files:
+            warn(f'image "{image.name}": tiles that are not files', "it is left out")
+            return {}
+        found = {}
+        for number in (tile.number for tile in image.tiles):
+            column, row = (number - 1001) % 10, (number - 1001) // 10
+            tile = path.replace("<UDIM>", str(number)).replace("<UVTILE>", f"u{column + 1}_v{row + 1}")
+            if not os.path.isfile(tile):
+                warn(f'image "{image.name}": no file {tile!r}', "the tile is left out")
+                continue
+            with open(tile, "rb") as file:
+                if not self._means_the_same(image, file.read(4096), tile, is_color):
+                    space = image.colorspace_settings.name
+                    warn(f'image "{image.name}": tiles in colour space {space}', "they are read as their files say")
+            found[number] = self._writer.file_uri(tile)
+        return found
 
     def data_uri(self, image, user, warn):
         """URI of an image used as numbers: roughness, normals, heights."""
@@ -134,6 +164,7 @@ class ImageExporter:
         pixels = self._linear_pixels(image, warn)
         if pixels is None:
             return None
+        self._of_pixels.add(image.name_full)
         names = "RGBA"[: pixels.shape[-1]] if pixels.shape[-1] != 1 else "Y"
         return self.write_pixels({name: pixels[..., c] for c, name in enumerate(names)})
 

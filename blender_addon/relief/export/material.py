@@ -220,16 +220,35 @@ class MaterialJob:
         return self._coordinates.index(source)
 
     def _graph_texture(self, node):
-        """(glTF's reference to an Image Texture node's image without its coordinates, whether it is sRGB); None without a file."""
-        is_data = node.image.colorspace_settings.is_data
-        if is_data:
-            uri = self._images.data_uri(node.image, node.image_user, self._warn)
-        else:
-            uri = self._images.color_uri(node.image, node.image_user, self._warn, node.outputs["Alpha"].is_linked)
-        if uri is None:
-            return None
+        """Options of image-texture that say which image an Image Texture node reads, and what of it; None without a file."""
+        image = node.image
+        is_data = image.colorspace_settings.is_data
         texture = Texture(node, None, Mapping())
-        return {"index": self._writer.add_texture(uri, texture.wrap, texture.nearest)}, not is_data
+
+        def info(uri):
+            return {"index": self._writer.add_texture(uri, texture.wrap, texture.nearest)}
+
+        options = {"colorSpace": "linear" if is_data else "srgb"}
+        is_multiplied = image.is_float and image.alpha_mode == "PREMUL"
+        if image.source == "TILED":
+            uris = self._images.tile_uris(image, not is_data, self._warn)
+            tiles = [{"tile": number, "texture": info(uri), **options} for number, uri in sorted(uris.items())]
+            if not tiles:
+                return None
+            # One tile is an image like any other, as in Cycles.
+            options = {"tiles": tiles} if len(tiles) > 1 else {**options, "texture": tiles[0]["texture"]}
+        else:
+            uri, is_multiplied = self._images.stored_uri(image, node.image_user, not is_data, self._warn)
+            if uri is None:
+                return None
+            options["texture"] = info(uri)
+        if image.alpha_mode == "NONE":
+            options["alpha"] = "opaque"
+        elif not is_data and image.alpha_mode != "CHANNEL_PACKED" and image.channels in {2, 4}:
+            options["alpha"] = "associated" if is_multiplied else "straight"
+            if nodes.is_used(node.outputs["Alpha"]):
+                options["unassociate"] = True
+        return options
 
     def _color_info(self, texture):
         node = texture.node

@@ -109,6 +109,30 @@ def linked(socket, groups=()):
     return None if source is None or source.is_value else source
 
 
+def has_plain_mapping(node):
+    """Whether a texture node's own mapping, which the user interface shows no longer, changes nothing."""
+    mapping = getattr(node, "texture_mapping", None)
+    if mapping is None:
+        return True
+    is_moved = any(mapping.translation) or any(mapping.rotation) or tuple(mapping.scale) != (1.0, 1.0, 1.0)
+    axes = (mapping.mapping_x, mapping.mapping_y, mapping.mapping_z)
+    return not is_moved and axes == ("X", "Y", "Z") and not mapping.use_min and not mapping.use_max
+
+
+def is_used(output):
+    """Whether an output socket leads, through whichever nodes, to where a tree ends."""
+    seen, waiting = set(), [output]
+    while waiting:
+        for link in waiting.pop().links:
+            node = link.to_node
+            if not node.outputs:
+                return True
+            if node.as_pointer() not in seen:
+                seen.add(node.as_pointer())
+                waiting.extend(node.outputs)
+    return False
+
+
 def _power(base, exponent):
     """What is no number, Blender takes for 0; what is too large, for infinite."""
     try:

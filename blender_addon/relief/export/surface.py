@@ -83,9 +83,14 @@ def _unless_refused(read):
 
 def _plain_color(socket, groups, textures):
     color = textures.color(socket, groups)
-    if color.texture is not None and (color.texture.channel is not None or color.texture.node.image.source == "TILED"):
+    if color.texture is not None and color.texture.channel is not None or _is_tiled(color):
         raise _NotPlain
     return color
+
+
+def _is_tiled(value):
+    """Whether an Input is of an image of several tiles, of which glTF's textures have one."""
+    return value.texture is not None and value.texture.node.image.source == "TILED"
 
 
 def _plain_emission(color, strength, groups, textures):
@@ -169,6 +174,7 @@ class _Plain:
             return self._mix_by(min(max(factor.value, 0.0), 1.0), first, second)
         first, second = self.surface(first), self.surface(second)
         self._require(first.is_transparent() and second.alpha.is_constant(1.0))
+        self._require(not _is_tiled(factor))
         self._require(factor.offset == 0 and factor.value == 1 and self._holds_alpha(second, factor.texture))
         return replace(second, alpha=factor)
 

@@ -202,6 +202,8 @@ class TextureReader:
         return replace(inner, offset=inner.offset + (constant if kind == "ADD" else -constant))
 
     def _mapping(self, node, groups):
+        if not nodes.has_plain_mapping(node):
+            self.warn(f'node "{node.name}": its own mapping', "it is left out")
         if node.projection != "FLAT":
             self.warn(f'node "{node.name}": projection {node.projection.lower()}', "flat was used")
         if node.extension == "CLIP":

@@ -1,0 +1,53 @@
+// The closures that a surface may be a weighted list of: their kinds, their inputs, and which of their variants are meant.
+// What they scatter stands in mixture_make.h.
+#pragma once
+
+#include <cstdint>
+
+#include "kernel/math/vec.h"
+
+namespace relief {
+
+enum class ClosureKind : std::uint8_t {
+#define CLOSURE(name, Type) name,
+#define COLOR(name, json, r, g, b)
+#define NUMBER(name, json, value)
+#define VECTOR(name, json)
+#define END()
+#include "kernel/bsdf/closure_inputs.inc"
+#undef CLOSURE
+#undef COLOR
+#undef NUMBER
+#undef VECTOR
+#undef END
+  kCount
+};
+
+// Inputs of each kind at a point: floats alone, in the order of the list.
+#define CLOSURE(name, Type) struct Type##Inputs {
+#define COLOR(name, json, r, g, b) Vec3f name{r, g, b};
+#define NUMBER(name, json, value) float name = value;
+#define VECTOR(name, json) Vec3f name{};
+#define END() \
+  }           \
+  ;
+#include "kernel/bsdf/closure_inputs.inc"
+#undef CLOSURE
+#undef COLOR
+#undef NUMBER
+#undef VECTOR
+#undef END
+
+/// Microfacets of glossy, refraction, glass, metallic and Principled closures.
+enum class ClosureDistribution : std::uint8_t { kGgx, kMultiscatterGgx, kBeckmann, kAshikhminShirley, kSharp };
+
+/// One closure of a material.
+struct SurfaceClosureSpec {
+  ClosureKind kind = ClosureKind::diffuse;
+  ClosureDistribution distribution = ClosureDistribution::kGgx;
+  bool is_4 = false;      ///< the maths of Blender 4.3, not of 3.4
+  bool is_other = false;  ///< toon: glossy; metallic: by complex index
+  std::uint16_t first_result = 0;  ///< its weight among the program's results, then its inputs, float by float
+};
+
+}  // namespace relief

@@ -1,0 +1,142 @@
+// A surface that is a weighted list of lobes, each about a normal of its own: what Mix and Add Shader, and the Principled
+// BSDF, mean. Sampled and evaluated as one mixture. mixture_make.h fills it from a material's closures.
+//
+// Closures of glTF's layered material (surface_closure.h) have the same functions, so that stages need not ask which of the
+// two they have.
+#pragma once
+
+#include "kernel/bsdf/lobe_split.h"
+#include "kernel/bsdf/mixture_lobe.h"
+#include "kernel/math/rounding.h"
+
+namespace relief {
+
+/// Lobes that a surface may have at a point; loading refuses materials that may have more.
+inline constexpr int kMostMixtureLobes = 64;
+
+/// The lobes of one hit.
+struct MixtureLobes {
+  MixtureLobes() : none(0) {}
+  int size = 0;
+  union {  // room for many, of which few are filled
+    char none;
+    MixtureLobe lobes[kMostMixtureLobes];
+  };
+};
+
+/// Those of a hit's lobes that are asked for.
+struct Mixture {
+  const MixtureLobes* all;
+  Frame frame;           ///< of the surface: directions are given in it
+  std::uint64_t chosen;  ///< bit by lobe
+  float scale;           ///< of the chosen lobes' probabilities, which then sum to one
+};
+
+/// Calls f(lobe) for the chosen lobes, in their order.
+template <typename F>
+RELIEF_KERNEL void mixture_visit(const Mixture& m, F&& f)
+{
+  for (std::uint64_t left = m.chosen; left != 0; left &= left - 1) f(m.all->lobes[__builtin_ctzll(left)]);
+}
+
+/// All lobes of a hit.
+RELIEF_KERNEL Mixture mixture_of(const MixtureLobes& lobes, const Frame& frame)
+{
+  Mixture m{&lobes, frame, lobes.size < 64 ? (std::uint64_t{1} << lobes.size) - 1 : ~std::uint64_t{0}, 0.0f};
+  float sum = 0.0f;
+  mixture_visit(m, [&](const MixtureLobe& lobe) { sum += lobe.probability; });
+  m.scale = sum > 0.0f ? 1.0f / sum : 0.0f;
+  return m;
+}
+
+/// The lobes that are sharp, or those that are soft; the same for both.
+template <bool kSharp>
+RELIEF_KERNEL Mixture mixture_part(const Mixture& m, SharpLobes sharp)
+{
+  Mixture part{m.all, m.frame, 0, 0.0f};
+  float sum = 0.0f;
+  for (std::uint64_t left = m.chosen; left != 0; left &= left - 1) {
+    const MixtureLobe& lobe = m.all->lobes[__builtin_ctzll(left)];
+    if (mixture_lobe_is_sharp(lobe, sharp.most_roughness) != kSharp) continue;
+    part.chosen |= left & -left;
+    sum += lobe.probability;
+  }
+  part.scale = sum > 0.0f ? 1.0f / sum : 0.0f;
+  return part;
+}
+
+/// As closure_eval of a SurfaceClosure; pdf of the chosen lobes.
+template <unsigned kFeatures, TransportMode kMode = TransportMode::kRadiance>
+RELIEF_KERNEL BsdfEval closure_eval(const Mixture& m, const BsdfTables&, Vec3f wi_local)
+{
+  BsdfEval e;
+  const float cos_i = __builtin_fabsf(wi_local.z);
+  if (!(cos_i > kMinCosine)) return e;
+  const Vec3f wi = from_local(m.frame, wi_local);
+  mixture_visit(m, [&](const MixtureLobe& lobe) {
+    const BsdfEval one = mixture_lobe_eval<kMode>(lobe, to_local(lobe.frame, wi));
+    e.f += lobe.weight * one.f;
+    e.pdf += lobe.probability * one.pdf;
+  });
+  e.f *= 1.0f / cos_i;
+  e.pdf *= m.scale;
+  return e;
+}
+
+/// As closure_sample of a SurfaceClosure.
+template <unsigned kFeatures, TransportMode kMode = TransportMode::kRadiance>
+RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tables, float u_lobe, Vec2f u)
+{
+  const MixtureLobe* chosen = nullptr;
+  for (std::uint64_t left = m.chosen; left != 0; left &= left - 1) {
+    const MixtureLobe& lobe = m.all->lobes[__builtin_ctzll(left)];
+    const float probability = lobe.probability * m.scale;
+    if (!(probability > 0.0f)) continue;
+    chosen = &lobe;
+    if (u_lobe < probability) {
+      u_lobe /= probability;
+      break;
+    }
+    u_lobe -= probability;
+  }
+  if (chosen == nullptr) return {};
+  // Rounding may leave a little over behind the last lobe.
+  u_lobe = min(u_lobe, 1.0f - kUnitRoundoff);
+  const LobeSample d = mixture_lobe_sample<kMode>(*chosen, u_lobe, u);
+  if (d.bits == 0 || (d.wi.z < 0.0f) != ((d.bits & kLobeTransmit) != 0)) return {};
+  BsdfSample s;
+  s.wi = to_local(m.frame, from_local(chosen->frame, d.wi));
+  // A lobe about a bent normal may send light to where its side of the surface is not.
+  if ((s.wi.z < 0.0f) != (d.wi.z < 0.0f) || !(__builtin_fabsf(s.wi.z) > kMinCosine)) return {};
+  s.roughness = d.roughness;
+  s.eta = d.eta;
+  s.lobe = d.bits;
+  if ((d.bits & kLobeDelta) != 0) {
+    s.f = chosen->weight * d.reflectance / __builtin_fabsf(s.wi.z);
+    s.pdf = chosen->probability * m.scale * d.probability;
+    return s;
+  }
+  const BsdfEval e = closure_eval<kFeatures, kMode>(m, tables, s.wi);
+  s.f = e.f;
+  s.pdf = e.pdf;
+  return s;
+}
+
+RELIEF_KERNEL Mixture closure_sharp(const Mixture& m, SharpLobes sharp) { return mixture_part<true>(m, sharp); }
+RELIEF_KERNEL Mixture closure_soft(const Mixture& m, SharpLobes sharp) { return mixture_part<false>(m, sharp); }
+
+template <bool kSharp>
+RELIEF_KERNEL bool closure_has(const Mixture& m, SharpLobes sharp)
+{
+  return mixture_part<kSharp>(m, sharp).scale > 0.0f;
+}
+
+/// Whether there is nothing but delta lobes, so that lights need not be sampled.
+RELIEF_KERNEL bool mixture_is_delta(const Mixture& m)
+{
+  bool is_delta = true;
+  mixture_visit(m, [&](const MixtureLobe& lobe) { is_delta = is_delta && lobe.is_delta; });
+  return is_delta;
+}
+
+}  // namespace relief

@@ -1,0 +1,527 @@
+// Closures of a material, with their inputs at a point, as the lobes of a mixture. One function a kind of closure; each says
+// what Cycles of Blender 3.4, or with `is_4` that of 4.3, makes of it.
+//
+// Subsurface scattering is diffuse reflection of the subsurface colour here.
+#pragma once
+
+#include "kernel/bsdf/closure_kinds.h"
+#include "kernel/bsdf/microfacet_energy.h"
+#include "kernel/bsdf/mixture.h"
+#include "kernel/bsdf/surface_params.h"
+
+namespace relief {
+
+/// Closures and lobes that weigh less are left out, as Cycles leaves them.
+inline constexpr float kLeastClosureWeight = 1e-5f;
+
+/// What closures are resolved for, and what they have come to so far.
+struct MixtureBuild {
+  Vec3f wo;   ///< unit, world
+  Vec3f Ng;   ///< geometric normal on wo's side
+  Vec3f Ns;   ///< shading normal on wo's side
+  bool front;
+  const BsdfTables* tables;
+  MixtureLobes* lobes;
+  Vec3f emission{};
+  Vec3f transparency{};
+  float holdout = 0;
+  bool transmits = false;  ///< some lobe sends light through the surface
+};
+
+RELIEF_KERNEL float mean_component(Vec3f v) { return (v.x + v.y + v.z) * (1.0f / 3.0f); }
+
+/// A vector of a graph, which has Z up, in the scene's world.
+RELIEF_KERNEL Vec3f world_from_z_up(Vec3f v) { return {v.x, v.z, -v.y}; }
+
+/// A closure's normal.
+/// @param given  Z up; 0: the surface's
+RELIEF_KERNEL Vec3f closure_normal(const MixtureBuild& b, Vec3f given)
+{
+  const float squared = length_squared(given);
+  if (!(squared > 0.0f && squared < kInfinity)) return b.Ns;
+  return shading_normal_consistent(b.Ng, world_from_z_up(given) / __builtin_sqrtf(squared), b.wo);
+}
+
+/// Frame about a normal whose x is turned from a tangent.
+/// @param tangent  Z up, any length; 0: any direction
+/// @param turns    about the normal, of the whole circle
+RELIEF_KERNEL Frame closure_tangent_frame(Vec3f N, Vec3f tangent, float turns)
+{
+  const Vec3f T = world_from_z_up(tangent);
+  const Vec3f across = cross(N, T);
+  const float squared = length_squared(across);
+  if (!(squared > 0.0f && squared < kInfinity)) return frame_from_normal(N);
+  const Vec3f t = across / __builtin_sqrtf(squared);
+  const Vec3f s = cross(t, N);
+  if (turns == 0.0f) return {s, t, N};
+  const SinCos turned = sin_cos_turn(turns);
+  return {turned.cos * s + turned.sin * t, turned.cos * t - turned.sin * s, N};
+}
+
+/// Adds a lobe, unless it weighs nothing: Lambert's, which the caller may make another. It is sampled by its weight.
+RELIEF_KERNEL MixtureLobe* mixture_add(MixtureBuild& b, Vec3f weight, const Frame& frame)
+{
+  const Vec3f bounded = max(weight, Vec3f{});
+  const float mean = mean_component(bounded);
+  MixtureLobes& all = *b.lobes;
+  const Vec3f wo = to_local(frame, b.wo);
+  if (!(mean > kLeastClosureWeight && mean < kInfinity && wo.z > kMinCosine && all.size < kMostMixtureLobes)) {
+    return nullptr;
+  }
+  MixtureLobe& lobe = all.lobes[all.size++];
+  lobe = {};
+  lobe.weight = bounded;
+  lobe.probability = mean;
+  lobe.frame = frame;
+  lobe.wo = wo;
+  lobe.is_bent = !(dot(frame.n, b.Ns) > 1.0f - 1e-6f);
+  if (lobe.is_bent) lobe.surface_N = to_local(frame, b.Ns);
+  return &lobe;
+}
+
+/// Makes a lobe one of reflection by microfacets.
+/// @param alpha  before it is bounded
+RELIEF_KERNEL void lobe_set_microfacets(MixtureLobe& lobe, const SurfaceClosureSpec& spec, float roughness, AnisotropicAlpha alpha)
+{
+  const SmithMasking masking = spec.is_4 ? SmithMasking::kCorrelated : SmithMasking::kSeparable;
+  lobe.roughness = clamp(roughness, 0.0f, 1.0f);
+  lobe.is_delta = spec.distribution == ClosureDistribution::kSharp || sqr(lobe.roughness) < kDeltaAlpha;
+  switch (spec.distribution) {
+    case ClosureDistribution::kBeckmann:
+      lobe.kind = MixtureLobeKind::kBeckmann;
+      lobe.shape.beckmann = {alpha, masking};
+      break;
+    case ClosureDistribution::kAshikhminShirley:
+      lobe.kind = MixtureLobeKind::kAshikhminShirley;
+      lobe.shape.ashikhmin_shirley = ashikhmin_shirley_make(alpha);
+      break;
+    default:
+      lobe.kind = MixtureLobeKind::kGgx;
+      // What the tables of lost light are for.
+      const bool gives_back = spec.distribution == ClosureDistribution::kMultiscatterGgx;
+      lobe.shape.ggx = {alpha, gives_back ? SmithMasking::kCorrelated : masking};
+      break;
+  }
+}
+
+/// Multiplies a lobe's weight, and its chance to be sampled.
+RELIEF_KERNEL void lobe_scale(MixtureLobe& lobe, Vec3f by)
+{
+  lobe.weight *= by;
+  lobe.probability *= mean_component(by);
+}
+
+/// Gives a reflection back what its microfacets would reflect more than once, if its distribution says so.
+/// @param F_mean  see ggx_energy_factor
+RELIEF_KERNEL void lobe_give_back(const MixtureBuild& b, const SurfaceClosureSpec& spec, MixtureLobe& lobe, Vec3f F_mean)
+{
+  if (spec.distribution != ClosureDistribution::kMultiscatterGgx || lobe.is_delta) return;
+  const AnisotropicAlpha alpha = lobe.shape.ggx.alpha;
+  const float roughness = __builtin_sqrtf(__builtin_sqrtf(alpha.x * alpha.y));
+  const EnergyModel model = spec.is_4 ? EnergyModel::kTable : EnergyModel::kWalk;
+  lobe_scale(lobe, ggx_energy_factor(*b.tables, model, F_mean, roughness, lobe.wo.z));
+}
+
+RELIEF_KERNEL float saturated(float x) { return clamp(x, 0.0f, 1.0f); }
+RELIEF_KERNEL Vec3f saturated(Vec3f c) { return {saturated(c.x), saturated(c.y), saturated(c.z)}; }
+
+/// Index of refraction as wo meets it.
+RELIEF_KERNEL float closure_eta(const MixtureBuild& b, float ior)
+{
+  const float bounded = max(ior, 1e-5f);
+  return b.front ? bounded : 1.0f / bounded;
+}
+
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const DiffuseInputs& in)
+{
+  MixtureLobe* lobe = mixture_add(b, weight * in.color, frame_from_normal(closure_normal(b, in.normal)));
+  if (lobe == nullptr || !(in.roughness > 0.0f)) return;
+  if (spec.is_4) {
+    lobe->kind = MixtureLobeKind::kOrenNayarMultiple;
+    lobe->shape.oren_nayar_multiple = oren_nayar_multiple_make(saturated(in.color), in.roughness, lobe->wo);
+  } else {
+    lobe->kind = MixtureLobeKind::kOrenNayar;
+    lobe->shape.oren_nayar = oren_nayar_make(in.roughness);
+  }
+}
+
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec&, float weight, const TranslucentInputs& in)
+{
+  MixtureLobe* lobe = mixture_add(b, weight * in.color, frame_from_normal(closure_normal(b, in.normal)));
+  if (lobe == nullptr) return;
+  lobe->kind = MixtureLobeKind::kTranslucent;
+  b.transmits = true;
+}
+
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec&, float weight, const TransparentInputs& in)
+{
+  b.transparency += weight * max(in.color, Vec3f{});
+}
+
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec&, float weight, const EmissionInputs& in)
+{
+  b.emission += max(in.color * (weight * in.strength), Vec3f{});
+}
+
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec&, float weight, const HoldoutInputs&)
+{
+  b.holdout += weight;
+}
+
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const GlossyInputs& in)
+{
+  const Vec3f N = closure_normal(b, in.normal);
+  MixtureLobe* lobe = mixture_add(b, weight * in.color, closure_tangent_frame(N, in.tangent, in.rotation));
+  if (lobe == nullptr) return;
+  const float roughness = saturated(in.roughness);
+  lobe_set_microfacets(*lobe, spec, roughness, anisotropic_alpha_of_glossy(roughness, in.anisotropy));
+  lobe_give_back(b, spec, *lobe, saturated(in.color));
+}
+
+/// Refraction by microfacets, without what they reflect.
+RELIEF_KERNEL void refraction_add(MixtureBuild& b,
+                                  const SurfaceClosureSpec& spec,
+                                  Vec3f weight,
+                                  Vec3f N,
+                                  float roughness,
+                                  float eta)
+{
+  MixtureLobe* lobe = mixture_add(b, weight, frame_from_normal(N));
+  if (lobe == nullptr) return;
+  lobe->kind = MixtureLobeKind::kRefraction;
+  lobe->roughness = saturated(roughness);
+  const float alpha = sqr(lobe->roughness);
+  lobe->is_delta = spec.distribution == ClosureDistribution::kSharp || alpha < kDeltaAlpha || dielectric_is_matched(eta);
+  lobe->shape.refraction = {alpha, eta, spec.distribution == ClosureDistribution::kBeckmann,
+                      spec.is_4 ? SmithMasking::kCorrelated : SmithMasking::kSeparable, false};
+  b.transmits = true;
+}
+
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const RefractionInputs& in)
+{
+  refraction_add(b, spec, weight * in.color, closure_normal(b, in.normal), in.roughness, closure_eta(b, in.ior));
+}
+
+/// Glass whose microfacets choose between reflection and refraction.
+/// @param fresnel  its eta is the surface's
+RELIEF_KERNEL void glass_add(MixtureBuild& b,
+                             const SurfaceClosureSpec& spec,
+                             float weight,
+                             Vec3f N,
+                             float roughness,
+                             const MicrofacetFresnel& fresnel,
+                             Vec3f reflection_tint,
+                             Vec3f transmission_tint)
+{
+  MixtureLobe* lobe = mixture_add(b, splat3(weight), frame_from_normal(N));
+  if (lobe == nullptr) return;
+  lobe->kind = MixtureLobeKind::kGlass;
+  lobe->roughness = saturated(roughness);
+  const float alpha = sqr(lobe->roughness);
+  lobe->fresnel = fresnel;
+  lobe->is_delta = spec.distribution == ClosureDistribution::kSharp || alpha < kDeltaAlpha ||
+                   dielectric_is_matched(fresnel.eta);
+  lobe->shape.glass = {alpha, spec.distribution == ClosureDistribution::kBeckmann, reflection_tint, transmission_tint};
+  if (spec.distribution == ClosureDistribution::kMultiscatterGgx && !lobe->is_delta) {
+    const GlassCoordinate at = glass_coordinate(fresnel.eta, lobe->roughness);
+    const float lost = glass_lost(*b.tables, at, at.side, lobe->wo.z);
+    const float lost_mean = glass_lost_mean(*b.tables, at, at.side);
+    lobe_scale(*lobe, microfacet_energy_factor(saturated(transmission_tint), max(1.0f - lost, 1e-3f), 1.0f - lost_mean));
+  }
+  lobe->probability = weight * mean_component(max(reflection_tint, transmission_tint));
+  b.transmits = true;
+}
+
+/// A dielectric's microfacets, under a film where there is one.
+RELIEF_KERNEL MicrofacetFresnel dielectric_fresnel(float eta, float film_nm, float film_ior)
+{
+  MicrofacetFresnel f;
+  f.kind = film_nm > 0.1f ? MixtureFresnel::kThinFilm : MixtureFresnel::kDielectric;
+  f.eta = eta;
+  f.a = splat3(fresnel_F0(eta));
+  f.film_nm = film_nm;
+  f.film_ior = film_ior;
+  return f;
+}
+
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const GlassInputs& in)
+{
+  const Vec3f N = closure_normal(b, in.normal);
+  const float eta = closure_eta(b, in.ior);
+  const Vec3f color = max(in.color, Vec3f{});
+  if (spec.is_4 || spec.distribution == ClosureDistribution::kMultiscatterGgx) {
+    const float film_ior = b.front ? in.thin_film_ior : in.thin_film_ior / max(in.ior, 1e-5f);
+    glass_add(b, spec, weight, N, in.roughness, dielectric_fresnel(eta, in.thin_film_thickness, film_ior), color, color);
+    return;
+  }
+  // Up to 3.6 the surface's own normal decides how much is reflected, whatever its microfacets are.
+  const float F = fresnel_dielectric_at(saturated(dot(N, b.wo)), eta);
+  if (MixtureLobe* lobe = mixture_add(b, color * (weight * F), frame_from_normal(N))) {
+    const float roughness = saturated(in.roughness);
+    lobe_set_microfacets(*lobe, spec, roughness, anisotropic_alpha_of_glossy(roughness, 0.0f));
+  }
+  refraction_add(b, spec, color * (weight * (1.0f - F)), N, in.roughness, eta);
+}
+
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const MetallicInputs& in)
+{
+  const Vec3f N = closure_normal(b, in.normal);
+  MixtureLobe* lobe = mixture_add(b, splat3(weight), closure_tangent_frame(N, in.tangent, in.rotation));
+  if (lobe == nullptr) return;
+  const float roughness = saturated(in.roughness);
+  lobe_set_microfacets(*lobe, spec, roughness, anisotropic_alpha_of_principled(roughness, saturated(in.anisotropy)));
+  Vec3f F_mean;
+  if (spec.is_other) {
+    lobe->fresnel = {MixtureFresnel::kConductor, 1.0f, max(in.ior, Vec3f{}), max(in.extinction, Vec3f{}), 1.0f, 0.0f};
+    F_mean = saturated(fresnel_f82_mean(fresnel_f82_of_conductor(lobe->fresnel.a, lobe->fresnel.b)));
+  } else {
+    const FresnelF82 f = fresnel_f82_make(saturated(in.base_color), saturated(in.edge_tint));
+    lobe->fresnel = {MixtureFresnel::kF82, 1.0f, f.F0, f.B, 1.0f, 0.0f};
+    F_mean = fresnel_f82_mean(f);
+  }
+  lobe->probability *= mean_component(mixture_fresnel(lobe->fresnel, lobe->wo.z));
+  lobe_give_back(b, spec, *lobe, F_mean);
+}
+
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec&, float weight, const VelvetInputs& in)
+{
+  MixtureLobe* lobe = mixture_add(b, weight * in.color, frame_from_normal(closure_normal(b, in.normal)));
+  if (lobe == nullptr) return;
+  lobe->kind = MixtureLobeKind::kVelvet;
+  lobe->shape.velvet = velvet_make(saturated(in.sigma));
+}
+
+/// @return  albedo before the weight; 0: none was added
+RELIEF_KERNEL float microfibre_add(MixtureBuild& b, Vec3f weight, Vec3f N, float roughness)
+{
+  MixtureLobe* lobe = mixture_add(b, weight, frame_from_normal(N));
+  if (lobe == nullptr) return 0.0f;
+  lobe->kind = MixtureLobeKind::kMicrofibre;
+  lobe->shape.microfibre = sheen_microfibre_make(lobe->wo.z, roughness);
+  const float albedo = lobe->shape.microfibre.albedo;
+  lobe->probability *= albedo;
+  if (!(albedo > 0.0f)) --b.lobes->size;
+  return albedo;
+}
+
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec&, float weight, const SheenInputs& in)
+{
+  microfibre_add(b, weight * in.color, closure_normal(b, in.normal), saturated(in.roughness));
+}
+
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const ToonInputs& in)
+{
+  const Toon toon = toon_make(in.size, in.smooth, spec.is_other);
+  if (toon_is_empty(toon)) return;
+  MixtureLobe* lobe = mixture_add(b, weight * in.color, frame_from_normal(closure_normal(b, in.normal)));
+  if (lobe == nullptr) return;
+  lobe->kind = MixtureLobeKind::kToon;
+  lobe->shape.toon = toon;
+}
+
+/// The hue and saturation of a colour. @param luminance  of it, by weights of the caller's
+RELIEF_KERNEL Vec3f tint_of(Vec3f color, float luminance)
+{
+  return luminance > 0.0f ? color / luminance : Vec3f{1, 1, 1};
+}
+
+/// What lies over the base of the Principled BSDF up to 3.6: its reflection, without anything taken from below.
+RELIEF_KERNEL void principled3_specular_add(MixtureBuild& b,
+                                            const SurfaceClosureSpec& spec,
+                                            float weight,
+                                            Vec3f N,
+                                            const Principled3Inputs& in)
+{
+  if (!(in.specular > kLeastClosureWeight || in.metallic > kLeastClosureWeight)) return;
+  MixtureLobe* lobe = mixture_add(b, splat3(weight), closure_tangent_frame(N, in.tangent, in.anisotropic_rotation));
+  if (lobe == nullptr) return;
+  SurfaceClosureSpec own = spec;
+  // As Cycles does: smooth surfaces lose nothing worth giving back.
+  if (in.roughness <= 0.075f) own.distribution = ClosureDistribution::kGgx;
+  lobe_set_microfacets(*lobe, own, in.roughness,
+                       anisotropic_alpha_of_principled(saturated(in.roughness), saturated(in.anisotropic)));
+  const float luminance = 0.3f * in.base_color.x + 0.6f * in.base_color.y + 0.1f * in.base_color.z;
+  const Vec3f tint = lerp(in.specular_tint, Vec3f{1, 1, 1}, tint_of(in.base_color, luminance));
+  const Vec3f F0 = saturated(lerp(in.metallic, tint * (0.08f * in.specular), in.base_color));
+  const float eta = ior_of_specular(max(in.specular, 0.0f));
+  lobe->fresnel = {MixtureFresnel::kInterpolated, eta, F0, {}, 1.0f, 0.0f};
+  lobe->probability *= mean_component(mixture_fresnel(lobe->fresnel, lobe->wo.z));
+  lobe_give_back(b, own, *lobe, saturated(fresnel_interpolated_mean(F0, {1, 1, 1}, eta)));
+}
+
+/// Its glass: two lobes, between which the surface's own normal decides; one where microfacets scatter more than once.
+RELIEF_KERNEL void principled3_glass_add(MixtureBuild& b,
+                                         const SurfaceClosureSpec& spec,
+                                         float weight,
+                                         Vec3f N,
+                                         const Principled3Inputs& in)
+{
+  const float eta = closure_eta(b, in.ior);
+  const Vec3f base_color = max(in.base_color, Vec3f{});
+  MicrofacetFresnel fresnel;
+  fresnel.kind = MixtureFresnel::kInterpolated;
+  fresnel.eta = eta;
+  fresnel.a = saturated(lerp(in.specular_tint, Vec3f{1, 1, 1}, base_color));
+  const bool gives_back = spec.distribution == ClosureDistribution::kMultiscatterGgx && in.roughness > 0.05f;
+  if (gives_back) {
+    glass_add(b, spec, weight, N, in.roughness, dielectric_fresnel(eta, 0.0f, 1.0f), {1, 1, 1}, base_color);
+    return;
+  }
+  SurfaceClosureSpec own = spec;
+  own.distribution = ClosureDistribution::kGgx;
+  const float F = fresnel_dielectric_at(saturated(dot(N, b.wo)), eta);
+  if (MixtureLobe* lobe = mixture_add(b, splat3(weight * F), frame_from_normal(N))) {
+    const float roughness = saturated(in.roughness);
+    lobe_set_microfacets(*lobe, own, roughness, anisotropic_alpha_of_glossy(roughness, 0.0f));
+    lobe->fresnel = fresnel;
+    lobe->probability *= mean_component(mixture_fresnel(fresnel, lobe->wo.z));
+  }
+  const bool is_single = spec.distribution == ClosureDistribution::kGgx;
+  const float transmission_roughness =
+      is_single ? 1.0f - (1.0f - in.roughness) * (1.0f - in.transmission_roughness) : in.roughness;
+  refraction_add(b, own, base_color * (weight * (1.0f - F)), N, transmission_roughness, eta);
+}
+
+/// A sum of lobes, of which none takes from another.
+/// @source  Burley 2012 and 2015, as Cycles 3.4 has them
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const Principled3Inputs& in)
+{
+  const Vec3f N = closure_normal(b, in.normal);
+  const float metallic = saturated(in.metallic), transmission = saturated(in.transmission);
+  const float diffuse_weight = (1.0f - metallic) * (1.0f - transmission);
+  const float glass_weight = transmission * (1.0f - metallic);
+  const bool scatters_below = in.subsurface > kLeastClosureWeight;
+  const Vec3f below = scatters_below ? lerp(in.subsurface, in.base_color, in.subsurface_color) : in.base_color;
+  if (diffuse_weight > kLeastClosureWeight) {
+    MixtureLobe* lobe = mixture_add(b, max(below, Vec3f{}) * (weight * diffuse_weight), frame_from_normal(N));
+    // What comes out of a medium has been scattered in all directions.
+    if (lobe != nullptr && !scatters_below) {
+      lobe->kind = MixtureLobeKind::kPrincipledDiffuse;
+      lobe->shape.principled_diffuse = {in.roughness};
+    }
+    if (in.sheen > kLeastClosureWeight) {
+      constexpr Vec3f kLuminance{0.2126729f, 0.7151522f, 0.0721750f};
+      const Vec3f tint = lerp(in.sheen_tint, Vec3f{1, 1, 1}, tint_of(in.base_color, dot(in.base_color, kLuminance)));
+      MixtureLobe* sheen = mixture_add(b, tint * (weight * in.sheen * diffuse_weight), frame_from_normal(N));
+      if (sheen != nullptr) sheen->kind = MixtureLobeKind::kPrincipledSheen;
+    }
+  }
+  principled3_specular_add(b, spec, weight * (1.0f - glass_weight), N, in);
+  if (glass_weight > kLeastClosureWeight) principled3_glass_add(b, spec, weight * glass_weight, N, in);
+  if (in.clearcoat > kLeastClosureWeight) {
+    const Vec3f coat_N = closure_normal(b, in.clearcoat_normal);
+    MixtureLobe* coat = mixture_add(b, splat3(weight * kGtr1Strength * in.clearcoat), frame_from_normal(coat_N));
+    if (coat == nullptr) return;
+    coat->kind = MixtureLobeKind::kClearcoat;
+    coat->roughness = saturated(in.clearcoat_roughness);
+    coat->shape.clearcoat = {max(sqr(coat->roughness), kDeltaAlpha)};
+    coat->is_delta = sqr(coat->roughness) < kDeltaAlpha;
+    coat->fresnel = {MixtureFresnel::kInterpolated, kGtr1Ior, splat3(0.04f), {}, 1.0f, 0.0f};
+    coat->probability *= mean_component(mixture_fresnel(coat->fresnel, coat->wo.z));
+  }
+}
+
+/// What a layer leaves for those below.
+RELIEF_KERNEL Vec3f layered_weight(Vec3f weight, Vec3f albedo)
+{
+  return weight * clamp(1.0f - max_component(albedo), 0.0f, 1.0f);
+}
+
+/// Albedo of a reflection that gives back what it loses, between F0 and 1 along a dielectric's curve.
+RELIEF_KERNEL Vec3f reflection_albedo(const MixtureBuild& b, Vec3f F0, float roughness, float cos_o)
+{
+  const GgxAlbedo e = ggx_albedo(*b.tables, ggx_coordinate(saturated(roughness)), cos_o);
+  const float of_F90 = ggx_albedo_with(0.0f, 1.0f, e), of_both = ggx_albedo_with(1.0f, 1.0f, e);
+  return lerp(of_both > 0.0f ? of_F90 / of_both : 0.0f, F0, Vec3f{1, 1, 1});
+}
+
+/// Layers, of which each takes from those below: sheen, coat, metal, glass, reflection, diffuse base.
+/// @source  Cycles 4.3
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float start, const Principled4Inputs& in)
+{
+  const Vec3f N = closure_normal(b, in.normal);
+  const Vec3f coat_N = closure_normal(b, in.coat_normal);
+  const float metallic = saturated(in.metallic), roughness = saturated(in.roughness);
+  const float coat = max(in.coat_weight, 0.0f), coat_ior = max(in.coat_ior, 1.0f), ior = max(in.ior, 1e-5f);
+  const Vec3f base_color = max(in.base_color, Vec3f{}), specular_tint = max(in.specular_tint, Vec3f{});
+  Vec3f weight = splat3(start);
+  if (in.sheen_weight > kLeastClosureWeight) {
+    const Vec3f own = weight * max(in.sheen_tint, Vec3f{}) * in.sheen_weight;
+    const Vec3f middle = lerp(saturated(coat), N, coat_N);
+    const float squared = length_squared(middle);
+    const float albedo = microfibre_add(b, own, squared > 0.0f ? middle / __builtin_sqrtf(squared) : N, saturated(in.sheen_roughness));
+    weight = layered_weight(weight, max(in.sheen_tint, Vec3f{}) * (in.sheen_weight * albedo));
+  }
+  if (coat > kLeastClosureWeight) {
+    MixtureLobe* lobe = mixture_add(b, weight * coat, frame_from_normal(coat_N));
+    if (lobe != nullptr) {
+      SurfaceClosureSpec own = spec;
+      own.distribution = ClosureDistribution::kGgx;
+      const float coat_roughness = saturated(in.coat_roughness);
+      lobe_set_microfacets(*lobe, own, coat_roughness, anisotropic_alpha_of_glossy(coat_roughness, 0.0f));
+      lobe->fresnel = dielectric_fresnel(coat_ior, 0.0f, 1.0f);
+      const float F = fresnel_dielectric_at(lobe->wo.z, coat_ior);
+      lobe->probability *= F;
+      weight = layered_weight(weight, splat3(coat * F));
+    }
+    if (in.coat_tint != Vec3f{1, 1, 1}) {
+      // Beer's law along the refracted ray, a coat of thickness 1.
+      const float cos_o = saturated(dot(coat_N, b.wo));
+      const float depth = 1.0f / __builtin_sqrtf(1.0f - (1.0f - sqr(cos_o)) / sqr(coat_ior));
+      const auto absorbed = [&](float c) { return lerp(coat, 1.0f, std::pow(max(c, 0.0f), depth)); };
+      weight *= max(Vec3f{}, {absorbed(in.coat_tint.x), absorbed(in.coat_tint.y), absorbed(in.coat_tint.z)});
+    }
+  }
+  const Frame base_frame = closure_tangent_frame(N, in.tangent, in.anisotropic_rotation);
+  const AnisotropicAlpha alpha = anisotropic_alpha_of_principled(roughness, saturated(in.anisotropic));
+  if (metallic > kLeastClosureWeight) {
+    if (MixtureLobe* lobe = mixture_add(b, weight * metallic, base_frame)) {
+      lobe_set_microfacets(*lobe, spec, roughness, alpha);
+      const FresnelF82 f = fresnel_f82_make(saturated(base_color), min(specular_tint, splat3(1.0f)));
+      lobe->fresnel = {MixtureFresnel::kF82, 1.0f, f.F0, f.B, 1.0f, 0.0f};
+      lobe->probability *= mean_component(mixture_fresnel(lobe->fresnel, lobe->wo.z));
+      lobe_give_back(b, spec, *lobe, fresnel_f82_mean(f));
+    }
+    weight *= 1.0f - metallic;
+  }
+  const float transmission = saturated(in.transmission_weight);
+  const float film_nm = max(in.thin_film_thickness, 0.0f), film_ior = max(in.thin_film_ior, 1e-5f);
+  if (transmission > kLeastClosureWeight) {
+    MicrofacetFresnel fresnel = dielectric_fresnel(closure_eta(b, ior), film_nm, b.front ? film_ior : film_ior / ior);
+    fresnel.a = saturated(specular_tint * fresnel_F0(ior));
+    if (fresnel.kind == MixtureFresnel::kDielectric && specular_tint != Vec3f{1, 1, 1}) {
+      fresnel.kind = MixtureFresnel::kInterpolated;
+    }
+    const Vec3f through = saturated(base_color);
+    const Vec3f root{__builtin_sqrtf(through.x), __builtin_sqrtf(through.y), __builtin_sqrtf(through.z)};
+    const float mean = mean_component(weight);
+    glass_add(b, spec, transmission * mean, N, roughness, fresnel, weight / max(mean, 1e-20f), root * weight / max(mean, 1e-20f));
+    weight *= 1.0f - transmission;
+  }
+  float F0 = fresnel_F0(ior), eta = ior;
+  if (in.specular_ior_level != 0.5f) {
+    F0 *= 2.0f * max(in.specular_ior_level, 0.0f);
+    eta = ior < 1.0f ? 1.0f / ior_of_F0(F0) : ior_of_F0(F0);
+  }
+  if (eta != 1.0f || film_nm > 0.1f) {
+    if (MixtureLobe* lobe = mixture_add(b, weight, base_frame)) {
+      lobe_set_microfacets(*lobe, spec, roughness, alpha);
+      lobe->fresnel = dielectric_fresnel(eta, film_nm, film_ior);
+      lobe->fresnel.a = saturated(specular_tint * F0);
+      if (lobe->fresnel.kind == MixtureFresnel::kDielectric) lobe->fresnel.kind = MixtureFresnel::kInterpolated;
+      const Vec3f seen = mixture_fresnel(lobe->fresnel, lobe->wo.z);
+      const bool has_film = lobe->fresnel.kind == MixtureFresnel::kThinFilm;
+      const Vec3f albedo = has_film ? seen : reflection_albedo(b, lobe->fresnel.a, roughness, lobe->wo.z);
+      lobe->probability *= mean_component(seen);
+      lobe_give_back(b, spec, *lobe, saturated(fresnel_interpolated_mean(lobe->fresnel.a, {1, 1, 1}, eta)));
+      weight = layered_weight(weight, albedo);
+    }
+  }
+  const bool is_rough = in.diffuse_roughness > kLeastClosureWeight;
+  MixtureLobe* lobe = mixture_add(b, weight * base_color, frame_from_normal(N));
+  if (lobe == nullptr || !is_rough) return;
+  lobe->kind = MixtureLobeKind::kOrenNayarMultiple;
+  lobe->shape.oren_nayar_multiple = oren_nayar_multiple_make(saturated(base_color), in.diffuse_roughness, lobe->wo);
+}
+
+}  // namespace relief

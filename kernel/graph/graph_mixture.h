@@ -1,0 +1,68 @@
+// A material's closures at a point, their inputs read from its program: a mixture of lobes, emission and transparency.
+#pragma once
+
+#include <cstring>
+#include <type_traits>
+
+#include "kernel/bsdf/mixture_make.h"
+#include "kernel/graph/graph_registers.h"
+
+namespace relief {
+
+/// Inputs of one closure.
+template <typename Inputs>
+RELIEF_KERNEL Inputs closure_inputs(const GraphLane& at, const SurfaceClosureSpec& spec)
+{
+  Inputs inputs;
+  // Structs of nothing but floats, in the order in which they were read.
+  if constexpr (!std::is_empty_v<Inputs>) {
+    constexpr int kNumbers = sizeof(Inputs) / sizeof(float);
+    float numbers[kNumbers];
+    for (int i = 0; i < kNumbers; ++i) numbers[i] = graph_result(at, spec.first_result + 1 + i);
+    std::memcpy(&inputs, numbers, sizeof(Inputs));
+  }
+  return inputs;
+}
+
+/// Resolves all closures that have a weight at the point.
+RELIEF_KERNEL void closures_resolve(const GraphLane& at, MixtureBuild& build)
+{
+  for (std::uint32_t i = 0; i < at.program->num_closures; ++i) {
+    const SurfaceClosureSpec& spec = at.program->closures[i];
+    const float weight = graph_result(at, spec.first_result);
+    if (!(weight > kLeastClosureWeight && weight < kInfinity)) continue;
+    switch (spec.kind) {
+#define CLOSURE(name, Type)                                                 \
+  case ClosureKind::name:                                                   \
+    closure_add(build, spec, weight, closure_inputs<Type##Inputs>(at, spec)); \
+    break;
+#define COLOR(name, json, r, g, b)
+#define NUMBER(name, json, value)
+#define VECTOR(name, json)
+#define END()
+#include "kernel/bsdf/closure_inputs.inc"
+#undef CLOSURE
+#undef COLOR
+#undef NUMBER
+#undef VECTOR
+#undef END
+      case ClosureKind::kCount:
+        break;
+    }
+  }
+}
+
+/// What transparent closures alone let through.
+RELIEF_KERNEL Vec3f closures_transparency(const GraphLane& at)
+{
+  Vec3f sum;
+  for (std::uint32_t i = 0; i < at.program->num_closures; ++i) {
+    const SurfaceClosureSpec& spec = at.program->closures[i];
+    if (spec.kind != ClosureKind::transparent) continue;
+    const float weight = graph_result(at, spec.first_result);
+    if (weight > kLeastClosureWeight) sum += weight * max(closure_inputs<TransparentInputs>(at, spec).color, Vec3f{});
+  }
+  return sum;
+}
+
+}  // namespace relief

@@ -1,0 +1,191 @@
+#include "scene/graph/closure_reader.h"
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "kernel/bsdf/mixture.h"
+
+namespace relief {
+namespace {
+
+enum class InputKind : std::uint8_t { kNumber, kColor, kVector };
+
+struct ClosureInput {
+  std::string_view name;
+  InputKind kind;
+  float value[3];
+};
+
+struct ClosureTable {
+  std::string_view name;
+  std::vector<ClosureInput> inputs;
+};
+
+/// The list of closures with their inputs; the two Principled ones share a name in files.
+const std::vector<ClosureTable>& closure_tables()
+{
+  static const std::vector<ClosureTable> tables = {
+#define CLOSURE(name, Type) {#name, {
+#define COLOR(name, json, r, g, b) {json, InputKind::kColor, {r, g, b}},
+#define NUMBER(name, json, value) {json, InputKind::kNumber, {value, value, value}},
+#define VECTOR(name, json) {json, InputKind::kVector, {0, 0, 0}},
+#define END() }},
+#include "kernel/bsdf/closure_inputs.inc"
+#undef CLOSURE
+#undef COLOR
+#undef NUMBER
+#undef VECTOR
+#undef END
+  };
+  return tables;
+}
+
+/// Lobes that a closure becomes at most.
+int most_lobes(ClosureKind kind)
+{
+  switch (kind) {
+    case ClosureKind::transparent:
+    case ClosureKind::emission:
+    case ClosureKind::holdout:
+      return 0;
+    case ClosureKind::glass:
+      return 2;
+    case ClosureKind::principled3:
+    case ClosureKind::principled4:
+      return 6;
+    default:
+      return 1;
+  }
+}
+
+SurfaceClosureSpec read_closure(const JsonReader& r)
+{
+  static constexpr std::string_view kDistributions[] = {"ggx", "multiscatter-ggx", "beckmann", "ashikhmin-shirley",
+                                                        "sharp"};
+  static constexpr std::string_view kMaths[] = {"3.4", "4.3"};
+  static constexpr std::string_view kComponents[] = {"diffuse", "glossy"};
+  static constexpr std::string_view kFresnels[] = {"f82", "physical"};
+  SurfaceClosureSpec spec;
+  spec.is_4 = r.choice("maths", kMaths, 0) == 1;
+  std::string type = r.string("type", "");
+  const std::string given = type;
+  if (type == "principled") type = spec.is_4 ? "principled4" : "principled3";
+  const auto& tables = closure_tables();
+  const auto it = std::find_if(tables.begin(), tables.end(), [&](const ClosureTable& t) { return t.name == type; });
+  if (it == tables.end() || given == "principled3" || given == "principled4") {
+    r.fail("type", "the type of a closure (docs/graphs.md)", '"' + given + '"');
+  }
+  spec.kind = static_cast<ClosureKind>(it - tables.begin());
+  using K = ClosureKind;
+  switch (spec.kind) {
+    case K::glossy:
+    case K::refraction:
+    case K::glass:
+    case K::metallic:
+    case K::principled3:
+    case K::principled4:
+      spec.distribution = static_cast<ClosureDistribution>(r.choice("distribution", kDistributions, 0));
+      break;
+    case K::toon:
+      spec.is_other = r.choice("component", kComponents, 0) == 1;
+      break;
+    default:
+      break;
+  }
+  if (spec.kind == K::metallic) spec.is_other = r.choice("fresnel", kFresnels, 0) == 1;
+  return spec;
+}
+
+}  // namespace
+
+std::vector<SurfaceClosureSpec> closures_read(const JsonReader& reader,
+                                              const GraphInputReader& input,
+                                              GraphBuilder& build,
+                                              Warnings& warnings)
+{
+  if (!reader.has("closures") || !reader.raw("closures").is_array()) reader.fail("closures", "an array");
+  const nlohmann::json& list = reader.raw("closures");
+  std::vector<SurfaceClosureSpec> closures;
+  int lobes = 0;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const JsonReader r(list[i], reader.file(), json_path_join(json_path_join(reader.path(), "closures"), i));
+    SurfaceClosureSpec spec = read_closure(r);
+    lobes += most_lobes(spec.kind);
+    if (lobes > kMostMixtureLobes) {
+      r.fail("", "closures of at most " + std::to_string(kMostMixtureLobes) + " lobes together", "one that is too many");
+    }
+    const GraphValue weight = input(r, "weight", GraphType::kNumber);
+    float known = 0;
+    const GraphScalar w = weight.v[0].index >= 0 ? weight.v[0] : build.constant(1.0f);
+    const bool is_nothing = build.is_constant(w, &known) && known == 0.0f;
+    const ClosureTable& table = closure_tables()[static_cast<std::size_t>(spec.kind)];
+    std::vector<GraphScalar> results{w};
+    for (const ClosureInput& socket : table.inputs) {
+      const bool is_number = socket.kind == InputKind::kNumber;
+      const GraphType type = is_number                          ? GraphType::kNumber
+                             : socket.kind == InputKind::kColor ? GraphType::kColor
+                                                                : GraphType::kVector;
+      const GraphValue value = input(r, socket.name, type);
+      for (std::size_t c = 0; c < (is_number ? 1u : 3u); ++c) {
+        const bool is_given = value.v[c].index >= 0;
+        results.push_back(is_given ? value.v[c] : build.constant(socket.value[c]));
+      }
+    }
+    r.warn_unread(warnings);
+    if (is_nothing) continue;
+    for (const GraphScalar a : results) {
+      const std::uint16_t place = build.add_result(a);
+      if (&a == results.data()) spec.first_result = place;
+    }
+    closures.push_back(spec);
+  }
+  reader.warn_unread(warnings);
+  return closures;
+}
+
+ClosureSummary closures_summarize(const GraphProgram& program)
+{
+  ClosureSummary summary;
+  for (const SurfaceClosureSpec& closure : program.closures) {
+    /// A closure's input, or `otherwise` where it varies.
+    const auto known = [&](std::string_view name, float otherwise) {
+      std::size_t place = closure.first_result + 1u;
+      for (const ClosureInput& input : closure_tables()[static_cast<std::size_t>(closure.kind)].inputs) {
+        if (input.name == name) break;
+        place += input.kind == InputKind::kNumber ? 1 : 3;
+      }
+      const std::uint16_t operand = program.results[place];
+      return operand < kMostGraphRegisters ? otherwise : program.constants[operand - kMostGraphRegisters];
+    };
+    bool reflects = false, refracts = false;
+    switch (closure.kind) {
+      case ClosureKind::glossy:
+      case ClosureKind::metallic:
+        reflects = true;
+        break;
+      case ClosureKind::glass:
+      case ClosureKind::refraction:
+        refracts = true;
+        break;
+      case ClosureKind::principled3:
+        reflects = known("metallic", 0) >= 0.5f;
+        refracts = known("transmission", 1) > 0;
+        break;
+      case ClosureKind::principled4:
+        reflects = known("metallic", 0) >= 0.5f;
+        refracts = known("transmissionWeight", 1) > 0;
+        break;
+      default:
+        break;
+    }
+    if (!reflects && !refracts) continue;
+    if (refracts) summary.transmission = 1;
+    if (reflects) summary.metallic = 1;
+    const bool is_sharp = closure.distribution == ClosureDistribution::kSharp;
+    summary.roughness = std::min(summary.roughness, is_sharp ? 0.0f : known("roughness", 0));
+  }
+  return summary;
+}
+
+}  // namespace relief
