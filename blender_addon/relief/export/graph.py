@@ -46,7 +46,7 @@ class GraphWriter:
         constant = nodes.fold(socket, groups)
         if constant is not None:
             finite = nodes.finite(constant, socket.name, lambda *_: None)
-            return list(finite[:3]) if isinstance(finite, tuple) else finite
+            return nodes.as_number(finite) if socket.type == "VALUE" else list(nodes.as_color(finite))
         return self.output(source)
 
     def output(self, source):
@@ -383,6 +383,9 @@ def _mix(g, node, groups):
     if node.data_type == "RGBA":
         blend = _choice(node, node.blend_type, {name: _label(name) for name in _BLENDS})
         return g.add("mix-color", inputs, blend=blend, clampFactor=node.clamp_factor, clampResult=node.clamp_result)
+    if node.data_type == "VECTOR" and node.factor_mode == "UNIFORM" and isinstance(inputs["factor"], dict):
+        # One number for all components, also of a colour or vector: ours takes one a component.
+        inputs["factor"] = {"node": g.add("math", {"a": inputs["factor"], "b": 0.0}, operation="add"), "output": "value"}
     kind = {"FLOAT": "mix-number", "VECTOR": "mix-vector"}
     return g.add(_choice(node, node.data_type, kind), inputs, clampFactor=node.clamp_factor)
 

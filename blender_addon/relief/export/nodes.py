@@ -141,12 +141,9 @@ def as_color(value):
 
 
 def as_number(value):
-    """A number or a tuple where Blender wants a number."""
-    return _gray(value) if isinstance(value, tuple) else value
-
-
-def _gray(color):
-    """What Blender makes of a colour where it wants a number: its luminance."""
-    if len(color) < 3:
-        return color[0]
-    return 0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2]
+    """A number or a tuple where Blender wants a number: of colours, which have four, the luminance, of vectors the mean."""
+    if not isinstance(value, tuple):
+        return value
+    if len(value) < 4:
+        return sum(value) / len(value)
+    return 0.2126 * value[0] + 0.7152 * value[1] + 0.0722 * value[2]
