@@ -40,6 +40,9 @@ DEFAULT_SURFACE = {"roughness": 0.5, "specular": 1.0} if IS_5_0 else {}
 #: Before 4.0 the octaves of a Noise Texture never grew.
 CLAMPS_NOISE_ROUGHNESS = not IS_4_0
 
+#: Before 4 the Hue/Saturation node cut whole turns off towards 0, so that hues below 0 stayed below.
+HUE_GOES_ROUND = IS_4_0
+
 #: Before 4.0 the Principled BSDF multiplied its coat by Disney's factor of a quarter.
 COAT_SCALE = 1.0 if IS_4_0 else 0.25
 

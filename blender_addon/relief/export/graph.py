@@ -467,7 +467,7 @@ def _hue(g, node, groups):
     names = {"Hue": "hue", "Saturation": "saturation", "Value": "value", "Fac": "factor", "Color": "color"}
     if "Factor" in node.inputs:
         names["Factor"] = "factor"
-    return g.add("hue-saturation", g.inputs(node, groups, names))
+    return g.add("hue-saturation", g.inputs(node, groups, names), hueGoesRound=compat.HUE_GOES_ROUND or None)
 
 
 _FACTOR = {"Fac": "factor", "Factor": "factor", "Color": "color"}
