@@ -15,7 +15,8 @@ that have these shares:
 - Nodes are linked to one another by their types, until all of them reach the output.
 
 The 0.8, and the chance of a kind in another material, are those by which the made up files have the known shares of _STEPS as
-near as may be: within 5 per cent points on average. The script prints both shares. A material is understood if its export warns of nothing, a file if all of its materials are. Worlds are not counted.
+near as may be: within 5 per cent points on average. The script prints both shares. A material is understood if its export
+warns of nothing, a file if all of its materials are. Worlds are not counted.
 """
 
 import collections
@@ -140,7 +141,11 @@ def _file(rng, others):
     normal = statistics.NormalDist()
     richness = rng.gauss(0, 1)
     rest = math.sqrt(1 - _RICHNESS**2)
-    kinds = [k for k, share in _KINDS.items() if _RICHNESS * richness + rest * rng.gauss(0, 1) > normal.inv_cdf(1 - share / 100)]
+    kinds = [
+        kind
+        for kind, share in _KINDS.items()
+        if _RICHNESS * richness + rest * rng.gauss(0, 1) > normal.inv_cdf(1 - share / 100)
+    ]
     number = min(20, 1 + int(rng.expovariate(1 / 3.0)))
     materials = [[] for _ in range(number)]
     for kind in kinds:
@@ -284,8 +289,9 @@ class _Builder:
         elif kind in {"ShaderNodeNormalMap", "ShaderNodeBump", "ShaderNodeBevel"}:
             self.normals.append(outputs[0])
         elif output or kind in {"ShaderNodeMapping", "ShaderNodeVectorMath", "ShaderNodeVectorTransform", "ShaderNodeUVMap"}:
-            vector = node.outputs.get(output or "Vector") or outputs[0]
-            (self.vectors if vector.enabled and vector.type == "VECTOR" else self.values).append(vector if vector.enabled else outputs[0])
+            given = node.outputs.get(output or "Vector")
+            given = given if given is not None and given.enabled else outputs[0]
+            (self.vectors if given.type == "VECTOR" else self.values).append(given)
         elif kind == "ShaderNodeTangent":
             self.normals.append(outputs[0])
         else:
@@ -383,7 +389,8 @@ def main():
         for causes_of in found.values():
             causes.update({cause.split(";")[0] for cause in causes_of})
     flat = [whole for file in wholes for whole in file]
-    print(f"understood: {_share(flat):.1f} % of {len(flat)} materials, {_share([all(f) for f in wholes]):.1f} % of {len(wholes)} files")
+    whole_files = _share([all(file) for file in wholes])
+    print(f"understood: {_share(flat):.1f} % of {len(flat)} materials, {whole_files:.1f} % of {len(wholes)} files")
     print(f"exports that failed: {failures}")
     for cause, number in causes.most_common(40):
         print(f"{number:5} {cause}")
