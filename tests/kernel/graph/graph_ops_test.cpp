@@ -264,6 +264,7 @@ std::vector<std::vector<std::uint16_t>> immediates_of(Op op)
   std::vector<std::vector<std::uint16_t>> out;
   if (op >= Op::noise_1d && op <= Op::noise_4d) return {{0}, {1}};
   if (op >= Op::musgrave_1d && op <= Op::musgrave_4d) return {{0}, {1}, {2}, {3}, {4}};
+  if (op == Op::table) return {{0, 0, 4, 1, 1}, {0, 0, 4, 0, 0}};
   if (op == Op::brick) return {{0, 2}, {2, 0}, {1, 1}, {2, 3}, {1000, 1000}};
   if (op >= Op::voronoi_1d && op <= Op::voronoi_4d) {
     for (std::uint16_t feature = 0; feature < 5; ++feature) {
@@ -278,17 +279,19 @@ std::vector<std::vector<std::uint16_t>> immediates_of(Op op)
 TEST(GraphInterpreters, TakeAnyNumbers)
 {
   HardNumbers numbers(6);
-  for (int i = 0; i <= static_cast<int>(Op::fresnel); ++i) {
+  TextureView texture;
+  texture.lookup = [](const void*, Vec2f, float) { return Vec4f{0.1f, 0.2f, 0.3f, 0.4f}; };
+  const std::vector<float> table(4096, 0.0f);
+  for (int i = 0; i < static_cast<int>(std::size(kGraphOpShapes)); ++i) {
     const Op op = static_cast<Op>(i);
-    if (op == Op::image || op == Op::table) continue;
     const bool is_slow = op >= Op::voronoi_1d && op <= Op::musgrave_4d;
     for (const std::vector<std::uint16_t>& immediates : immediates_of(op)) {
       int num_apart = 0, num_all = 0;
       for (int round = 0; round < (is_slow ? 100 : 1000); ++round) {
         const auto in = numbers.lanes(static_cast<std::size_t>(test::shape_of(op).num_inputs));
-        const test::Outputs baseline = run_one(graph_run_baseline, op, in, immediates);
+        const test::Outputs baseline = run_one(graph_run_baseline, op, in, immediates, &texture, table);
         if (!test::has_avx2()) continue;
-        const test::Outputs avx2 = run_one(graph_run_avx2, op, in, immediates);
+        const test::Outputs avx2 = run_one(graph_run_avx2, op, in, immediates, &texture, table);
         for (std::size_t o = 0; o < baseline.size(); ++o) {
           for (std::size_t k = 0; k < 8; ++k) {
             const double a = static_cast<double>(baseline[o][k]), b = static_cast<double>(avx2[o][k]);

@@ -20,7 +20,8 @@ inline const GraphOpShape& shape_of(GraphOp op) { return kGraphOpShapes[static_c
 /// Outputs of an operation over eight points: [output][lane].
 using Outputs = std::vector<std::vector<float>>;
 
-/// @param in  [input][lane]
+/// @param in          [input][lane]
+/// @param immediates  those that are left out, and inputs, are 0
 inline Outputs run_one(GraphRun run,
                        GraphOp op,
                        const std::vector<std::vector<float>>& in,
@@ -31,10 +32,15 @@ inline Outputs run_one(GraphRun run,
   GraphRegisters registers;
   std::vector<std::uint16_t> code = {static_cast<std::uint16_t>(op)};
   code.insert(code.end(), immediates.begin(), immediates.end());
+  code.resize(1 + static_cast<std::size_t>(shape_of(op).num_immediates), 0);
   std::uint16_t next = 0;
   for (int i = 0; i < shape_of(op).num_outputs; ++i) code.push_back(next++);
   for (const std::vector<float>& lanes : in) {
     registers.lanes[next] = load8(lanes.data());
+    code.push_back(next++);
+  }
+  for (auto i = static_cast<int>(in.size()); i < shape_of(op).num_inputs; ++i) {
+    registers.lanes[next] = F8{};
     code.push_back(next++);
   }
   GraphProgramView program;
