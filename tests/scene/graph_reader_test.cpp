@@ -132,6 +132,19 @@ TEST(GraphReader, ATableOfOneEntryIsAConstant)
   expect_color(color_of({ramp, {{"type", "geometry"}}}, of(0, "color")), {1, 2, 3});
 }
 
+// Whole turns are cut off towards 0; a quarter turn below is the end of the wheel, or goes on from its other end.
+TEST(GraphReader, HuesBelowNoneStayBelowOrGoRound)
+{
+  json node = {{"type", "hue-saturation"}, {"inputs", {{"hue", -1.75}, {"color", {0.8, 0.2, 0.2}}}}};
+  expect_color(color_of(json::array({node}), of(0)), {0.8f, 0.2f, 0.5f});
+  node["hueGoesRound"] = true;
+  expect_color(color_of(json::array({node}), of(0)), {0.5f, 0.2f, 0.8f});
+  node["inputs"]["hue"] = 0.25;
+  expect_color(color_of(json::array({node}), of(0)), {0.5f, 0.2f, 0.8f});
+  node.erase("hueGoesRound");
+  expect_color(color_of(json::array({node}), of(0)), {0.5f, 0.2f, 0.8f});
+}
+
 TEST(GraphReader, TheLargestNumbersAreRead)
 {
   EXPECT_EQ(number_of({{{"type", "math"}, {"inputs", {{"a", 3.4e38}, {"b", 0}}}}}, of(0)), 3.4e38f);
