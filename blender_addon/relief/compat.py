@@ -88,6 +88,9 @@ PRINCIPLED_INPUTS = (
 #: Before 4.0 the octaves of a Noise Texture never grew.
 CLAMPS_NOISE_ROUGHNESS = not IS_4_0
 
+#: Before 4 the Hue/Saturation node cut whole turns off towards 0, so that hues below 0 stayed below.
+HUE_GOES_ROUND = IS_4_0
+
 #: Whose numbers the textures of this version have, as RELIEF_graph calls them; None: those of 3.4.
 TEXTURE_MATHS = "5.2" if IS_5_0 else "4.3" if IS_4_0 else None
 

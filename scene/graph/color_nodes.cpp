@@ -237,7 +237,15 @@ void lower_hue_saturation(GraphNode& n)
   GraphBuilder& b = n.build;
   GraphVector hsv = colors(b, Op::rgb_to_hsv, n.vector("color"));
   const GraphScalar hue = b(Op::add, {b(Op::add, {hsv[0], n.number("hue")}), b.constant(0.5f)});
-  hsv[0] = b(Op::subtract, {hue, b(Op::floor, {hue})});
+  // Blender before 4 cuts off whole turns towards 0, so that hues below 0 stay below: no colour wheel has them.
+  const bool goes_round = n.reader.boolean("hueGoesRound", false);
+  float known = -1;
+  const bool is_above = b.is_constant(n.number("hue"), &known) && known >= -0.5f;
+  GraphScalar turns = b(Op::floor, {hue});
+  if (!goes_round && !is_above) {
+    turns = b(Op::select, {b(Op::less_than, {hue, b.constant(0)}), b(Op::ceil, {hue}), turns});
+  }
+  hsv[0] = b(Op::subtract, {hue, turns});
   hsv[1] = clamped(b, b(Op::multiply, {hsv[1], n.number("saturation")}));
   hsv[2] = b(Op::multiply, {hsv[2], n.number("value")});
   const GraphVector out = mixed(b, n.number("factor"), n.vector("color"), colors(b, Op::hsv_to_rgb, hsv));

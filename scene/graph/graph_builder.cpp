@@ -8,6 +8,7 @@
 #include <string>
 
 #include "kernel/graph/graph_eval.h"
+#include "kernel/graph/image.h"
 
 namespace relief {
 namespace {
@@ -125,7 +126,6 @@ std::vector<GraphScalar> GraphBuilder::fold(GraphOp op,
 {
   const GraphOpShape& shape = shape_of(op);
   GraphProgram program;
-  if (op == GraphOp::table) program.tables = tables_;
   program.code.push_back(static_cast<std::uint16_t>(op));
   program.code.insert(program.code.end(), immediates.begin(), immediates.end());
   for (int i = 0; i < shape.num_outputs; ++i) program.code.push_back(static_cast<std::uint16_t>(i));
@@ -133,8 +133,10 @@ std::vector<GraphScalar> GraphBuilder::fold(GraphOp op,
     program.code.push_back(static_cast<std::uint16_t>(kMostGraphRegisters + i));
     program.constants.push_back(nodes_[static_cast<std::size_t>(inputs[i].index)].value);
   }
+  GraphProgramView view = program.view();
+  view.tables = tables_.data();
   GraphRegisters registers;
-  graph_run(program.view(), nullptr, registers);
+  graph_run(view, nullptr, registers);
   std::vector<GraphScalar> out;
   for (int i = 0; i < shape.num_outputs; ++i) out.push_back(constant(registers.lanes[i][0]));
   return out;
@@ -220,6 +222,28 @@ std::uint32_t GraphBuilder::add_table(std::span<const float> values)
       table_places_.try_emplace({values.begin(), values.end()}, static_cast<std::uint32_t>(tables_.size()));
   if (is_new) tables_.insert(tables_.end(), values.begin(), values.end());
   return it->second;
+}
+
+/// Immediates of an operation in a program, which gets the table that it reads.
+/// @param places  of the tables that the program has, by those in tables_
+std::vector<std::uint16_t> GraphBuilder::placed(const Operation& operation,
+                                                std::map<std::uint32_t, std::uint32_t>& places,
+                                                GraphProgram& program) const
+{
+  std::vector<std::uint16_t> immediates = operation.immediates;
+  const bool are_tiles = operation.op == GraphOp::image_tiles;
+  if (!are_tiles && operation.op != GraphOp::table) return immediates;
+  const std::size_t low = are_tiles ? 2 : 0;  // where the place stands
+  const int size = are_tiles ? immediates[1] * kImageTileColumns : immediates[2];
+  const std::uint32_t from = immediates[low] | std::uint32_t{immediates[low + 1]} << 16;
+  const auto [it, is_new] = places.try_emplace(from, static_cast<std::uint32_t>(program.tables.size()));
+  if (is_new) {
+    const auto row = tables_.begin() + from;
+    program.tables.insert(program.tables.end(), row, row + size);
+  }
+  immediates[low] = static_cast<std::uint16_t>(it->second & 0xffffu);
+  immediates[low + 1] = static_cast<std::uint16_t>(it->second >> 16);
+  return immediates;
 }
 
 void GraphBuilder::set_output(GraphOutput output, const GraphVector& value)
@@ -364,7 +388,7 @@ GraphProgram GraphBuilder::compile() const
   for (const GraphScalar a : wanted()) last_use[static_cast<std::size_t>(a.index)] = kEver;
 
   GraphProgram program;
-  program.tables = tables_;
+  std::map<std::uint32_t, std::uint32_t> table_places;
   std::vector<std::uint16_t> operand_of(nodes_.size(), kNoGraphOperand);
   std::vector<std::uint16_t> free_registers;
   const auto take_register = [&] {
@@ -397,7 +421,8 @@ GraphProgram GraphBuilder::compile() const
     // Outputs first: an operation may write one before it has read all that it reads.
     for (const GraphScalar a : operation.outputs) operand_of[static_cast<std::size_t>(a.index)] = take_register();
     program.code.push_back(static_cast<std::uint16_t>(operation.op));
-    program.code.insert(program.code.end(), operation.immediates.begin(), operation.immediates.end());
+    const std::vector<std::uint16_t> immediates = placed(operation, table_places, program);
+    program.code.insert(program.code.end(), immediates.begin(), immediates.end());
     for (const GraphScalar a : operation.outputs) program.code.push_back(operand_of[static_cast<std::size_t>(a.index)]);
     for (const GraphScalar a : operation.inputs) program.code.push_back(operand_of[static_cast<std::size_t>(a.index)]);
     std::vector<std::int32_t> ended;

@@ -100,6 +100,9 @@ class GraphBuilder {
                                 std::span<const GraphScalar> inputs,
                                 std::span<const std::uint16_t> immediates);
   std::vector<std::int32_t> order() const;
+  std::vector<std::uint16_t> placed(const Operation& operation,
+                                    std::map<std::uint32_t, std::uint32_t>& places,
+                                    GraphProgram& program) const;
 
   std::vector<Node> nodes_;
   std::vector<Operation> operations_;

@@ -491,6 +491,9 @@ def _mix(g, node, groups):
     if node.data_type == "RGBA":
         blend = _choice(node, node.blend_type, {name: _label(name) for name in _BLENDS})
         return g.add("mix-color", inputs, blend=blend, clampFactor=node.clamp_factor, clampResult=node.clamp_result)
+    if node.data_type == "VECTOR" and node.factor_mode == "UNIFORM" and isinstance(inputs["factor"], dict):
+        # One number for all components, also of a colour or vector: ours takes one a component.
+        inputs["factor"] = {"node": g.add("math", {"a": inputs["factor"], "b": 0.0}, operation="add"), "output": "value"}
     kind = {"FLOAT": "mix-number", "VECTOR": "mix-vector"}
     return g.add(_choice(node, node.data_type, kind), inputs, clampFactor=node.clamp_factor)
 
@@ -598,7 +601,7 @@ def _hue(g, node, groups):
     names = {"Hue": "hue", "Saturation": "saturation", "Value": "value", "Fac": "factor", "Color": "color"}
     if "Factor" in node.inputs:
         names["Factor"] = "factor"
-    return g.add("hue-saturation", g.inputs(node, groups, names))
+    return g.add("hue-saturation", g.inputs(node, groups, names), hueGoesRound=compat.HUE_GOES_ROUND or None)
 
 
 def _bump(g, node, groups):
