@@ -7,6 +7,7 @@ One function a kind of node, listed at the end with the names of its outputs. Th
 
 from .. import compat
 from . import nodes
+from .graph_inputs import OUTPUTS, mesh_attribute
 
 #: Entries of the tables that stand for ramps and curves: as many as Cycles'.
 _TABLE = 256
@@ -22,19 +23,25 @@ class GraphWriter:
     @param  coordinate_set  gives the number, 0 or 1, of the set that a ("uv", name) is in; None: no room for it
     @param  texture         gives glTF's reference to an Image Texture node's image, and whether it is stored as sRGB; None
                             without a file
+    @param  material_index  Pass Index of the material
+    @param  view_layer      gives the things whose properties are the view layer's attributes, the first one first
     nodes          JSON of the nodes so far
     outputs        JSON of what the graph gives
     uses_generated whether meshes need _GENERATED
-    color_map      colour attribute that is read; None: none
+    attributes     attributes of meshes that are read: see attributes.py
+    values         values of objects that are read: see instance_values.py
     """
 
-    def __init__(self, coordinate_set, texture):
+    def __init__(self, coordinate_set, texture, material_index=0, view_layer=tuple):
         self.coordinate_set = coordinate_set
         self.texture = texture
         self.nodes = []
         self.outputs = {}
         self.uses_generated = False
-        self.color_map = None
+        self.material_index = material_index
+        self.view_layer = view_layer
+        self.attributes = []
+        self.values = []
         self._known = {}
 
     def value(self, socket, groups=()):
@@ -52,10 +59,8 @@ class GraphWriter:
     def output(self, source):
         """Reference to what a nodes.Source gives."""
         node = source.node
-        if node.bl_idname == "ShaderNodeUVMap":
-            return self.uv(node.uv_map)
-        if node.bl_idname == "ShaderNodeTexCoord" and source.socket.identifier == "UV":
-            return self.uv("")
+        if node.bl_idname in OUTPUTS:
+            return OUTPUTS[node.bl_idname](self, source)
         write, names = _NODES.get(node.bl_idname, (None, {}))
         name = names.get(source.socket.identifier, names.get(source.socket.name))
         if write is None or name is None:
@@ -104,7 +109,7 @@ class GraphWriter:
     def uv(self, name):
         number = self.coordinate_set(("uv", name))
         if number is None:
-            raise NotUnderstood(f'a third uv map, "{name}"')
+            return mesh_attribute(self, "uv", name, "vector")
         return {"node": self.add("texture-coordinate"), "output": "uv1" if number else "uv"}
 
     def scaled(self, reference, factor, is_color):
@@ -137,44 +142,6 @@ def _choice(node, value, labels):
     if value not in labels:
         raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): {_label(value)}')
     return labels[value]
-
-
-def _texture_coordinate(g, node, groups):
-    if node.from_instancer:
-        raise NotUnderstood(f'node "{node.name}": coordinates from an instancer')
-    if node.object is not None:
-        raise NotUnderstood(f'node "{node.name}": coordinates of another object')
-    g.uses_generated = True
-    return g.add("texture-coordinate")
-
-
-def _geometry(g, node, groups):
-    return g.add("geometry")
-
-
-def _color_attribute(g, node, groups):
-    name = node.layer_name if node.bl_idname == "ShaderNodeVertexColor" else node.attribute_name
-    if node.bl_idname == "ShaderNodeAttribute" and node.attribute_type != "GEOMETRY":
-        raise NotUnderstood(f'node "{node.name}": an attribute of the {node.attribute_type.lower()}')
-    if g.color_map not in {None, name}:
-        raise NotUnderstood(f'a second colour attribute, "{name}"')
-    g.color_map = name
-    return g.add("vertex-color")
-
-
-def _fresnel(g, node, groups):
-    _without_normal(node, groups)
-    return g.add("fresnel", g.inputs(node, groups, {"IOR": "ior"}))
-
-
-def _layer_weight(g, node, groups):
-    _without_normal(node, groups)
-    return g.add("layer-weight", g.inputs(node, groups, {"Blend": "blend"}))
-
-
-def _without_normal(node, groups):
-    if nodes.follow(node.inputs["Normal"], groups) is not None:
-        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): a normal of its own')
 
 
 _DIMENSIONS = {"1D": 1, "2D": 2, "3D": 3, "4D": 4}
@@ -477,21 +444,6 @@ _RGB = {
 
 #: What writes a node, and our name of each of its outputs by Blender's.
 _NODES = {
-    "ShaderNodeTexCoord": (_texture_coordinate, {"Generated": "generated", "Object": "object"}),
-    "ShaderNodeNewGeometry": (
-        _geometry,
-        {
-            "Position": "position",
-            "Normal": "normal",
-            "True Normal": "trueNormal",
-            "Incoming": "incoming",
-            "Backfacing": "backfacing",
-        },
-    ),
-    "ShaderNodeVertexColor": (_color_attribute, {"Color": "color", "Alpha": "alpha"}),
-    "ShaderNodeAttribute": (_color_attribute, {"Color": "color", "Alpha": "alpha"}),
-    "ShaderNodeFresnel": (_fresnel, _FACTOR),
-    "ShaderNodeLayerWeight": (_layer_weight, {"Fresnel": "fresnel", "Facing": "facing"}),
     "ShaderNodeTexNoise": (_noise, _FACTOR),
     "ShaderNodeTexWhiteNoise": (_white_noise, {"Value": "value", "Color": "color"}),
     "ShaderNodeTexImage": (_image, {"Color": "color", "Alpha": "alpha"}),

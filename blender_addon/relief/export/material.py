@@ -26,9 +26,11 @@ class MaterialExporter:
     @param  images    ImageExporter
     @param  settings  scene.relief
     @param  report    Report
+    @param  view_layer  gives the things whose properties are the view layer's attributes, the first one first
     """
 
-    def __init__(self, writer, images, settings, report):
+    def __init__(self, writer, images, settings, report, view_layer=tuple):
+        self._view_layer = view_layer
         self._writer = writer
         self._images = images
         self._settings = settings
@@ -39,7 +41,7 @@ class MaterialExporter:
         """(what add_mesh asks for the index of the glTF material, Wanted of its meshes); a slot without material is grey."""
         key = None if material is None else material.as_pointer()
         if key not in self._exported:
-            job = _MaterialJob(self._writer, self._images, self._settings, self._report, material)
+            job = _MaterialJob(self._writer, self._images, self._settings, self._report, material, self._view_layer)
             wanted = job.wanted()
             self._exported[key] = (_Indices(self._writer, job.json, wanted.by_shading), wanted)
         return self._exported[key]
@@ -69,7 +71,7 @@ class _Indices:
 class _MaterialJob:
     """One material on its way."""
 
-    def __init__(self, writer, images, settings, report, material):
+    def __init__(self, writer, images, settings, report, material, view_layer):
         self._writer = writer
         self._images = images
         self._name = material.name if material else "default"
@@ -78,7 +80,7 @@ class _MaterialJob:
         self._color_map = None
         self._displaced = self._by_shading = False
         self.json = {"name": self._name, "doubleSided": True}
-        self._graph = GraphWriter(self._coordinate_set, self._graph_texture)
+        self._graph = GraphWriter(self._coordinate_set, self._graph_texture, material.pass_index if material else 0, view_layer)
         textures = TextureReader(self._warn, self._graph)
         if material is None or not material.use_nodes or material.node_tree is None:
             color = (0.8, 0.8, 0.8) if material is None else tuple(material.diffuse_color[:3])
@@ -103,11 +105,16 @@ class _MaterialJob:
             writer.extend(self.json, "RELIEF_displacement", value)
 
     def wanted(self):
-        color_map = self._color_map
-        if color_map is None and self._graph.outputs:
-            color_map = self._graph.color_map
-        generated = bool(self._graph.outputs) and self._graph.uses_generated
-        return Wanted(tuple(self._coordinates), color_map, self._displaced, self._by_shading, generated)
+        graph, has_graph = self._graph, "RELIEF_graph" in self.json.get("extensions", {})
+        return Wanted(
+            tuple(self._coordinates),
+            self._color_map,
+            self._displaced,
+            self._by_shading,
+            has_graph and graph.uses_generated,
+            tuple(sorted(graph.attributes)) if has_graph else (),
+            tuple(sorted(graph.values)) if has_graph else (),
+        )
 
     def _warn(self, what, instead=""):
         self._report.warn(f'material "{self._name}"', what, instead)
