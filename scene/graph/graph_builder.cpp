@@ -62,12 +62,13 @@ GraphScalar GraphBuilder::constant(float value)
   return add(node, {-1, std::bit_cast<std::int32_t>(value)});
 }
 
-GraphScalar GraphBuilder::quantity(GraphQuantity quantity, GraphShift shift)
+GraphScalar GraphBuilder::quantity(GraphQuantity quantity, std::uint16_t index, GraphShift shift)
 {
   Node node{Node::Kind::kQuantity};
   node.quantity = quantity;
+  node.index = index;
   node.shift = shift;
-  return add(node, {-2, static_cast<std::int64_t>(quantity), static_cast<std::int64_t>(shift)});
+  return add(node, {-2, static_cast<std::int64_t>(quantity), static_cast<std::int64_t>(shift), index});
 }
 
 bool GraphBuilder::is_constant(GraphScalar a, float* value) const
@@ -290,7 +291,7 @@ GraphScalar GraphBuilder::shifted(GraphScalar a, GraphShift shift)
     if (node.kind != Node::Kind::kOperation) {
       // What a bump within a bump has moved already stays where it is.
       const bool moves = node.kind == Node::Kind::kQuantity && node.shift == GraphShift::kNone;
-      shifted_[{of.index, shift}] = moves ? quantity(node.quantity, shift) : of;
+      shifted_[{of.index, shift}] = moves ? quantity(node.quantity, node.index, shift) : of;
       stack.pop_back();
       continue;
     }
@@ -406,7 +407,7 @@ GraphProgram GraphBuilder::compile() const
     if (last_use[i] < 0) continue;
     if (nodes_[i].kind == Node::Kind::kQuantity) {
       operand_of[i] = take_register();
-      program.inputs.push_back({nodes_[i].quantity, nodes_[i].shift, operand_of[i]});
+      program.inputs.push_back({nodes_[i].quantity, nodes_[i].shift, operand_of[i], nodes_[i].index});
     } else if (nodes_[i].kind == Node::Kind::kConstant) {
       constexpr std::size_t kMostConstants = kNoGraphOperand - kMostGraphRegisters;
       if (program.constants.size() == kMostConstants) {

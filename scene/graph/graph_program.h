@@ -16,6 +16,7 @@ struct GraphProgram {
   std::vector<std::uint16_t> results;
   std::vector<SurfaceClosureSpec> closures;
   int num_registers = 0;
+  std::vector<std::uint16_t> attributes;  ///< places in Scene::attribute_names that it reads, sorted
 
   GraphProgramView view() const;
   std::size_t bytes() const;

@@ -323,44 +323,6 @@ void lower_vector_math(GraphNode& n)
   n.set("value", value);
 }
 
-constexpr GraphSocket kRotateInputs[] = {{"vector", kVector},
-                                         {"center", kVector},
-                                         {"axis", kVector, {0, 0, 1}},
-                                         {"angle", kNumber},
-                                         {"rotation", kVector}};
-void lower_rotate(GraphNode& n)
-{
-  static constexpr std::string_view kKinds[] = {"axis", "x", "y", "z", "euler"};
-  GraphBuilder& b = n.build;
-  const int kind = n.reader.choice("rotate", kKinds, 0);
-  const bool is_inverse = n.reader.boolean("invert", false);
-  const GraphVector p = each(b, Op::subtract, n.vector("vector"), n.vector("center"));
-  GraphVector turned;
-  if (kind == 4) {
-    turned = rotated(b, p, n.vector("rotation"), is_inverse);
-  } else {
-    const GraphScalar one = b.constant(1);
-    GraphVector axis = splat(b.constant(0));
-    if (kind == 0) {
-      axis = normalized(b, n.vector("axis"));
-    } else {
-      axis[static_cast<std::size_t>(kind - 1)] = one;
-    }
-    // Rodrigues' formula.
-    const GraphScalar angle = scaled(b, n.number("angle"), is_inverse ? -1.0f : 1.0f);
-    const GraphScalar c = b(Op::cosine, {angle}), s = b(Op::sine, {angle});
-    const GraphScalar along = b(Op::multiply, {dot(b, axis, p), b(Op::subtract, {one, c})});
-    const GraphVector across = cross(b, axis, p);
-    const GraphScalar length = dot(b, axis, axis);
-    for (std::size_t i = 0; i < 3; ++i) {
-      const GraphScalar sum =
-          sum3(b, b(Op::multiply, {c, p[i]}), b(Op::multiply, {s, across[i]}), b(Op::multiply, {along, axis[i]}));
-      turned[i] = b(Op::select, {length, sum, p[i]});
-    }
-  }
-  n.set("vector", each(b, Op::add, turned, n.vector("center")), kVector);
-}
-
 constexpr GraphNodeKind kKinds[] = {
     {"separate", kSeparateInputs, lower_separate},
     {"combine", kCombineInputs, lower_combine},
@@ -370,7 +332,6 @@ constexpr GraphNodeKind kKinds[] = {
     {"mapping", kMappingInputs, lower_mapping},
     {"math", kMathInputs, lower_math},
     {"vector-math", kVectorMathInputs, lower_vector_math},
-    {"vector-rotate", kRotateInputs, lower_rotate},
 };
 
 }  // namespace

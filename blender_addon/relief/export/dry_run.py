@@ -18,6 +18,12 @@ class _NoWriter:
 class _NoImages:
     """An ImageExporter that finds every image."""
 
+    def stored_uri(self, *_):
+        return "image", False
+
+    def tile_uris(self, image, *_):
+        return {tile.number: "image" for tile in image.tiles}
+
     def __getattr__(self, _):
         return lambda *_, **__: "image"
 

@@ -5,11 +5,11 @@ One function a kind of node, listed at the end with the names of its outputs. Th
 (docs/graphs.md); what is said here is which socket is which, and what an unlinked one means.
 """
 
-import math
 from json import dumps
 
 from .. import compat
 from . import nodes
+from .graph_inputs import OUTPUTS, mesh_attribute
 
 
 class NotUnderstood(Exception):
@@ -27,20 +27,26 @@ class GraphWriter:
     @param  coordinate_set  gives the number, 0 or 1, of the set that a ("uv", name) is in; None: no room for it
     @param  texture         gives the options of image-texture that say which image a node reads; None without a file
     @param  warn            called with what a value is, if it is no number, and what was used instead
+    @param  material_index  Pass Index of the material
+    @param  view_layer      gives the things whose properties are the view layer's attributes, the first one first
     nodes          JSON of the nodes so far
     uses_generated whether meshes need _GENERATED
-    color_map      colour attribute that is read; None: none
+    attributes     attributes of meshes that are read: see attributes.py
+    values         values of objects that are read: see instance_values.py
     own_normal     reference to the surface's normal as a displacement bumps it; None: it is the mesh's
     not_understood texts by the keys of the nodes that they are about
     """
 
-    def __init__(self, coordinate_set, texture, warn=lambda what, instead: None):
+    def __init__(self, coordinate_set, texture, warn=lambda what, instead: None, material_index=0, view_layer=tuple):
         self.coordinate_set = coordinate_set
         self.texture = texture
         self.warn = warn
         self.nodes = []
         self.uses_generated = False
-        self.color_map = None
+        self.material_index = material_index
+        self.view_layer = view_layer
+        self.attributes = []
+        self.values = []
         self.own_normal = None
         self.not_understood = {}
         self._indices = {}
@@ -95,35 +101,33 @@ class GraphWriter:
     def output(self, source):
         """Reference to what a nodes.Source gives."""
         node = source.node
-        if node.bl_idname == "ShaderNodeUVMap":
-            return self.uv(node.uv_map)
-        if node.bl_idname == "ShaderNodeTexCoord" and source.socket.identifier == "UV":
-            return self.uv("")
         if node.bl_idname == "ShaderNodeBump" and self._normal_source(source) != source:
             return self.normal(node.inputs["Normal"], source.groups) or self.geometry_normal()
         if node.bl_idname == "ShaderNodeNewGeometry" and source.socket.identifier == "Normal":
             return self.own_normal or self.geometry_normal()
+        give = OUTPUTS.get(node.bl_idname)
         write, names = _NODES.get(node.bl_idname, (None, {}))
         name = names.get(source.socket.identifier, names.get(source.socket.name))
-        if write is None or name is None:
+        if give is None and (write is None or name is None):
             raise self._failure(source, NotUnderstood(f'node "{node.name}" ({node.bl_label}), {source.socket.name}'))
-        if source.key not in self._known:
+        key = source.key if give is None else (*source.key, source.socket.identifier)
+        if key not in self._known:
             # Stays only if the node depends on itself.
             circle = NotUnderstood(f'node "{node.name}" ({node.bl_label}), which is linked in a circle')
             circle.key = source.key
-            self._known[source.key] = circle
+            self._known[key] = circle
             try:
-                self._known[source.key] = write(self, node, source.groups)
+                self._known[key] = write(self, node, source.groups) if give is None else give(self, source)
             except NotUnderstood as error:
-                self._known[source.key] = self._failure(source, error)
+                self._known[key] = self._failure(source, error)
             except RecursionError:
                 error = NotUnderstood(f'node "{node.name}": more nodes one after another than can be followed')
                 raise self._failure(source, error) from None
-        error = self._known[source.key]
-        if isinstance(error, NotUnderstood):
-            self.not_understood.setdefault(error.key, str(error))
-            raise error
-        return {"node": self._known[source.key], "output": name}
+        found = self._known[key]
+        if isinstance(found, NotUnderstood):
+            self.not_understood.setdefault(found.key, str(found))
+            raise found
+        return {"node": found, "output": name} if give is None else found
 
     def _failure(self, source, error):
         """Notes which node an error is about: the one that met it first."""
@@ -201,7 +205,7 @@ class GraphWriter:
     def uv(self, name):
         number = self.coordinate_set(("uv", name))
         if number is None:
-            raise NotUnderstood(f'a third uv map, "{name}"')
+            return mesh_attribute(self, "uv", name, "vector")
         return {"node": self.add("texture-coordinate"), "output": "uv1" if number else "uv"}
 
 
@@ -218,44 +222,6 @@ def _choice(node, value, labels):
     if value not in labels:
         raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): {_label(value)}')
     return labels[value]
-
-
-def _texture_coordinate(g, node, groups):
-    if node.from_instancer:
-        raise NotUnderstood(f'node "{node.name}": coordinates from an instancer')
-    if node.object is not None:
-        raise NotUnderstood(f'node "{node.name}": coordinates of another object')
-    g.uses_generated = True
-    return g.add("texture-coordinate")
-
-
-def _geometry(g, node, groups):
-    return g.add("geometry")
-
-
-def _color_attribute(g, node, groups):
-    name = node.layer_name if node.bl_idname == "ShaderNodeVertexColor" else node.attribute_name
-    if node.bl_idname == "ShaderNodeAttribute" and node.attribute_type != "GEOMETRY":
-        raise NotUnderstood(f'node "{node.name}": an attribute of the {node.attribute_type.lower()}')
-    if g.color_map not in {None, name}:
-        raise NotUnderstood(f'a second colour attribute, "{name}"')
-    g.color_map = name
-    return g.add("vertex-color")
-
-
-def _fresnel(g, node, groups):
-    _without_normal(node, groups)
-    return g.add("fresnel", g.inputs(node, groups, {"IOR": "ior"}))
-
-
-def _layer_weight(g, node, groups):
-    _without_normal(node, groups)
-    return g.add("layer-weight", g.inputs(node, groups, {"Blend": "blend"}))
-
-
-def _without_normal(node, groups):
-    if nodes.follow(node.inputs["Normal"], groups) is not None:
-        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): a normal of its own')
 
 
 _DIMENSIONS = {"1D": 1, "2D": 2, "3D": 3, "4D": 4}
@@ -588,15 +554,6 @@ def _vector_rotate(g, node, groups):
     return g.add("vector-rotate", g.inputs(node, groups, names), rotate=kind, invert=node.invert or None)
 
 
-def _normal(g, node, groups):
-    """The dot product with a direction that the node keeps; that direction itself is folded."""
-    direction = list(node.outputs["Normal"].default_value)
-    length = math.sqrt(sum(x * x for x in direction)) or 1.0
-    inputs = {"a": g.value(node.inputs["Normal"], groups)}
-    unit = {"node": g.add("vector-math", inputs, operation="normalize"), "output": "vector"}
-    return g.add("vector-math", {"a": unit, "b": [x / length for x in direction]}, operation="dot")
-
-
 def _hue(g, node, groups):
     names = {"Hue": "hue", "Saturation": "saturation", "Value": "value", "Fac": "factor", "Color": "color"}
     if "Factor" in node.inputs:
@@ -686,21 +643,6 @@ _RGB = {
 
 #: What writes a node, and our name of each of its outputs by Blender's.
 _NODES = {
-    "ShaderNodeTexCoord": (_texture_coordinate, {"Generated": "generated", "Object": "object"}),
-    "ShaderNodeNewGeometry": (
-        _geometry,
-        {
-            "Position": "position",
-            "Normal": "normal",
-            "True Normal": "trueNormal",
-            "Incoming": "incoming",
-            "Backfacing": "backfacing",
-        },
-    ),
-    "ShaderNodeVertexColor": (_color_attribute, {"Color": "color", "Alpha": "alpha"}),
-    "ShaderNodeAttribute": (_color_attribute, {"Color": "color", "Alpha": "alpha"}),
-    "ShaderNodeFresnel": (_fresnel, _FACTOR),
-    "ShaderNodeLayerWeight": (_layer_weight, {"Fresnel": "fresnel", "Facing": "facing"}),
     "ShaderNodeTexNoise": (_noise, _FACTOR),
     "ShaderNodeTexWhiteNoise": (_white_noise, {"Value": "value", "Color": "color"}),
     "ShaderNodeTexImage": (_image, {"Color": "color", "Alpha": "alpha"}),
@@ -719,7 +661,6 @@ _NODES = {
     "ShaderNodeSeparateHSV": (_separate_hsv, {"H": "red", "S": "green", "V": "blue"}),
     "ShaderNodeCombineHSV": (_combine_hsv, {"Color": "color"}),
     "ShaderNodeVectorRotate": (_vector_rotate, {"Vector": "vector"}),
-    "ShaderNodeNormal": (_normal, {"Dot": "value"}),
     "ShaderNodeTexBrick": (_brick, _FACTOR),
     "ShaderNodeRGBCurve": (_rgb_curves, {"Color": "color"}),
     "ShaderNodeVectorCurve": (_vector_curves, {"Vector": "vector"}),
@@ -762,4 +703,4 @@ _NODES = {
 
 def knows(node):
     """Whether a node that gives values can be written, if what it is set to can."""
-    return node.bl_idname in _NODES or node.bl_idname in {"ShaderNodeUVMap", "ShaderNodeValue", "ShaderNodeRGB", "ShaderNodeNormal"}
+    return node.bl_idname in _NODES or node.bl_idname in OUTPUTS or node.bl_idname in {"ShaderNodeValue", "ShaderNodeRGB"}

@@ -27,9 +27,11 @@ class MaterialExporter:
     @param  images    ImageExporter
     @param  settings  scene.relief
     @param  report    Report
+    @param  view_layer  gives the things whose properties are the view layer's attributes, the first one first
     """
 
-    def __init__(self, writer, images, settings, report):
+    def __init__(self, writer, images, settings, report, view_layer=tuple):
+        self._view_layer = view_layer
         self._writer = writer
         self._images = images
         self._settings = settings
@@ -40,7 +42,7 @@ class MaterialExporter:
         """(what add_mesh asks for the index of the glTF material, Wanted of its meshes); a slot without material is grey."""
         key = None if material is None else material.as_pointer()
         if key not in self._exported:
-            job = MaterialJob(self._writer, self._images, self._settings, self._report, material)
+            job = MaterialJob(self._writer, self._images, self._settings, self._report, material, self._view_layer)
             if job.coverage is not None:
                 self._report.count(material.name, job.coverage)
             wanted = job.wanted()
@@ -82,7 +84,7 @@ class MaterialJob:
     coverage  Coverage of its nodes; None without nodes
     """
 
-    def __init__(self, writer, images, settings, report, material):
+    def __init__(self, writer, images, settings, report, material, view_layer=tuple):
         self._writer = writer
         self._images = images
         self._name = material.name if material else "default"
@@ -93,7 +95,13 @@ class MaterialJob:
         self._problems = {}
         self.json = {"name": self._name, "doubleSided": True}
         self.coverage = None
-        self._graph = GraphWriter(self._coordinate_set, self._graph_texture, self._warn)
+        self._graph = GraphWriter(
+            self._coordinate_set,
+            self._graph_texture,
+            warn=self._warn,
+            material_index=material.pass_index if material else 0,
+            view_layer=view_layer,
+        )
         self._textures = TextureReader(self._warn)
         if material is not None and material.use_nodes and material.node_tree is not None:
             with nodes.reading():
@@ -178,10 +186,16 @@ class MaterialJob:
         return self._graph.own_normal is not None or self._graph.bends(*self._past_bump(socket, groups))
 
     def wanted(self):
-        color_map, generated = self._color_map, False
-        if self._uses_graph:
-            color_map, generated = self._graph.color_map, self._graph.uses_generated
-        return Wanted(tuple(self._coordinates), color_map, self._displaced, self._by_shading, generated)
+        graph, has_graph = self._graph, self._uses_graph
+        return Wanted(
+            tuple(self._coordinates),
+            self._color_map,
+            self._displaced,
+            self._by_shading,
+            has_graph and graph.uses_generated,
+            tuple(sorted(graph.attributes)) if has_graph else (),
+            tuple(sorted(graph.values)) if has_graph else (),
+        )
 
     def _fail(self, source, what, instead, error=None):
         """Notes what is not understood of a node, unless an error has noted it of another one."""

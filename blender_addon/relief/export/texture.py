@@ -146,10 +146,8 @@ class TextureReader:
         if node.bl_idname in {"ShaderNodeSeparateColor", "ShaderNodeSeparateRGB", "ShaderNodeSeparateXYZ"}:
             if getattr(node, "mode", "RGB") == "RGB":
                 return self._channel(source, one)
-        if is_color and node.bl_idname == "ShaderNodeVertexColor":
+        if is_color and node.bl_idname == "ShaderNodeVertexColor" and source.socket.name == "Color":
             return Input(one, color_map=node.layer_name)
-        if is_color and node.bl_idname == "ShaderNodeAttribute" and node.attribute_type == "GEOMETRY":
-            return Input(one, color_map=node.attribute_name)
         factors = self._factors(node)
         return self._product(source, factors, is_color) if factors is not None else None
 
@@ -217,9 +215,11 @@ class TextureReader:
         if source is None:
             return mapping
         node = source.node
+        if getattr(node, "from_instancer", False):
+            self.warn(f'node "{node.name}": coordinates from an instancer', "the object's own were used")
         if node.bl_idname == "ShaderNodeUVMap":
             return replace(mapping, source=("uv", node.uv_map))
-        if node.bl_idname == "ShaderNodeAttribute":
+        if node.bl_idname == "ShaderNodeAttribute" and node.attribute_type == "GEOMETRY":
             return replace(mapping, source=("uv", node.attribute_name))
         if node.bl_idname == "ShaderNodeTexCoord" and source.socket.name in {"UV", "Generated", "Object"}:
             if source.socket.name == "Object" and node.object is not None:
