@@ -5,6 +5,7 @@
 #include "kernel/sample/dimensions.h"
 #include "kernel/sample/sobol.h"
 #include "kernel/shape/material_lookup.h"
+#include "kernel/stage/path_access.h"
 
 namespace relief {
 
@@ -147,8 +148,35 @@ struct ShadowContext {
   const KernelGlobals* globals = nullptr;
   const DisplacementSet* displacements = nullptr;
   Vec3f visibility{1, 1, 1};
-  Vec3f D;  ///< of the ray, world: filters see it in the space of the instance
+  Vec3f O, D;                                 ///< of the ray, world: filters see it in the space of the instance
+  std::uint32_t depths = 0, transparent = 0;  ///< see GraphRay
 };
+
+/// Events before a shadow ray, as GraphRay::depths: it counts as one more, of no kind. Its path may have gone on since.
+std::uint32_t shadow_ray_depths(const PathState& state, const ShadowQueue& shadow, std::uint32_t ray)
+{
+  const std::uint32_t path = shadow.path[ray], depths = state.bounces[path];
+  if (static_cast<std::uint32_t>(path_bounces(depths, BounceKind::kAll)) != shadow.scatterings[ray]) return depths + 1u;
+  const auto event = static_cast<PathEvent>(path_event(state.flags[path]));
+  const BounceKind kind = event == PathEvent::kDiffuse  ? BounceKind::kDiffuse
+                          : event == PathEvent::kGlossy ? BounceKind::kGlossy
+                                                        : BounceKind::kTransmission;
+  return depths - (1u << static_cast<int>(kind));
+}
+
+/// What a graph may read where a shadow ray meets a surface.
+GraphPoint shadow_graph_point(const ShadowContext& context,
+                              const MeshView& mesh,
+                              const InstanceView& instance,
+                              const DisplacedPoint& at,
+                              const SurfaceHit& hit)
+{
+  const GraphRay ray{1u << static_cast<int>(GraphRayKind::kShadow), context.depths, context.transparent,
+                     length(hit.P - context.O)};
+  return {&mesh, &instance,  at.triangle,  at.u, at.v,
+          &hit,  -context.D, {0.0f, 0.0f}, 0.0f, &context.globals->graph_scene,
+          ray};
+}
 
 }  // namespace
 
@@ -232,6 +260,9 @@ void intersect_shadow(const KernelGlobals& g,
   for (std::uint32_t i = 0; i < shadow.size; ++i) {
     context.visibility = {1, 1, 1};
     context.D = {shadow.D_x[i], shadow.D_y[i], shadow.D_z[i]};
+    context.O = {shadow.O_x[i], shadow.O_y[i], shadow.O_z[i]};
+    context.depths = shadow_ray_depths(state, shadow, i);
+    context.transparent = state.flags[shadow.path[i]] >> kPathTransparentShift;
     RTCRay ray;
     ray.org_x = shadow.O_x[i];
     ray.org_y = shadow.O_y[i];
@@ -275,11 +306,11 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
     if (material.transparency_index >= 0) {
       const SurfaceHit hit = surface_hit_make(mesh, instance, at.triangle, at.u, at.v);
       passes = graph_transparency(g.run_graph, g.graphs[material.transparency_index], g.textures,
-                                  {&mesh, &instance, at.triangle, at.u, at.v, &hit, -context->D, {0.0f, 0.0f}, 0.0f});
+                                  shadow_graph_point(*context, mesh, instance, at, hit));
     } else if ((material.graph_outputs >> static_cast<int>(GraphOutput::alpha) & 1u) != 0) {
       const SurfaceHit hit = surface_hit_make(mesh, instance, at.triangle, at.u, at.v);
       passes = splat3(1.0f - graph_alpha(material, g.run_graph, g.graphs[material.graph_index], g.textures,
-                                         {&mesh, &instance, at.triangle, at.u, at.v, &hit, -context->D, {0.0f, 0.0f}, 0.0f}));
+                                         shadow_graph_point(*context, mesh, instance, at, hit)));
     } else {
       passes = splat3(1.0f - triangle_alpha(material, g.textures, mesh, at.triangle, at.u, at.v));
     }

@@ -154,6 +154,8 @@ KernelGlobals render_globals(const SceneContext& context, const RenderOptions& o
   KernelGlobals g = context.globals;
   g.camera = options.camera;
   g.camera_forward = normalize(-options.camera.world_from_camera.z);
+  g.graph_scene.camera = options.camera;
+  g.graph_scene.camera_from_world = inverse(options.camera.world_from_camera);
   // A path counts in bytes; between mirrors that take nothing only this ends it.
   constexpr int kMostBounces = 200;
   g.limits = {std::min(settings.max_bounces, kMostBounces), settings.diffuse_bounces, settings.glossy_bounces,

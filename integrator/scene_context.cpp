@@ -116,6 +116,29 @@ SceneContext::SceneContext(const Scene& loaded,
   globals.instances = instances.data();
   globals.num_instances = static_cast<std::uint32_t>(instances.size());
   for (const GraphProgram& graph : scene.graphs) graphs.push_back(graph.view());
+  std::size_t num_columns = 0;
+  for (const Mesh& mesh : scene.meshes) num_columns += mesh.columns.size();
+  mesh_columns.reserve(num_columns);  // views point into it
+  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
+    meshes[i].columns = mesh_columns.data() + mesh_columns.size();
+    meshes[i].num_columns = static_cast<std::uint32_t>(scene.meshes[i].columns.size());
+    for (const AttributeColumn& column : scene.meshes[i].columns) {
+      mesh_columns.push_back({column.values.data(), column.name, static_cast<std::uint16_t>(column.num_components)});
+    }
+  }
+  instance_values.reserve(scene.instance_columns.size());
+  for (const InstanceColumn& column : scene.instance_columns) {
+    const float* values = column.values.data();
+    if (column.values.size() < 4 * instances.size()) {
+      instance_values.push_back(column.values);
+      instance_values.back().resize(4 * instances.size());
+      values = instance_values.back().data();
+    }
+    instance_columns.push_back({column.name, values});
+  }
+  globals.graph_scene.instances = instances.data();
+  globals.graph_scene.columns = instance_columns.data();
+  globals.graph_scene.num_columns = static_cast<std::uint32_t>(instance_columns.size());
   globals.materials = scene.materials.data();
   globals.graphs = graphs.data();
   globals.run_graph = stage_table_select().run_graph;

@@ -33,6 +33,9 @@ struct SceneContext {
   std::vector<MeshView> meshes;
   std::vector<InstanceView> instances;
   std::vector<GraphProgramView> graphs;
+  std::vector<MeshColumn> mesh_columns;             ///< of all meshes, one mesh's side by side
+  std::vector<std::vector<float>> instance_values;  ///< columns that do not reach all instances in the scene
+  std::vector<GraphInstanceColumn> instance_columns;
   LightSet lights;
   std::vector<std::uint8_t> surface_kernel;  ///< a material
   std::unique_ptr<BsdfTables> bsdf_tables;

@@ -8,6 +8,7 @@
 #include "kernel/film/mist.h"
 #include "kernel/film/pixel_filter.h"
 #include "kernel/graph/graph_registers.h"
+#include "kernel/graph/graph_scene.h"
 #include "kernel/light/light_sampler.h"
 #include "kernel/photon/photon.h"
 #include "kernel/shape/mesh_view.h"
@@ -30,6 +31,7 @@ struct KernelGlobals {
   const Material* materials = nullptr;
   const GraphProgramView* graphs = nullptr;  ///< by Material::graph_index
   GraphRun run_graph = nullptr;
+  GraphScene graph_scene;
   const TextureView* textures = nullptr;
   const std::uint32_t* area_light_index = nullptr;  ///< light of object num_instances + i
   LightsView lights;

@@ -218,13 +218,54 @@ void GltfLoader::place_meshes(const PlacedNode& node)
   const std::string path = "/nodes/" + std::to_string(node.node_index);
   const std::vector<Primitive>& primitives = primitives_of(document, source.mesh);
   const std::vector<Transform> copies = khronos_instances(document, node.node_index, warnings_);
+  const InstanceValues own = node_values(node);
+  std::map<std::uint16_t, std::vector<std::array<float, 4>>> of_copies;
+  if (!copies.empty()) {
+    for (std::size_t place = 0; place < scene_.attribute_names.size(); ++place) {
+      auto values = khronos_instance_values(document, node.node_index, scene_.attribute_names[place], copies.size());
+      if (!values.empty()) of_copies.emplace(static_cast<std::uint16_t>(place), std::move(values));
+    }
+  }
   for (const Primitive& primitive : primitives) {
     if (copies.empty()) {
+      const std::size_t next = scene_.instances.size();
       place_instance(node, primitive, node.world, path);
+      if (scene_.instances.size() > next) set_values(next, own);
     }
-    for (const Transform& copy : copies) {
-      place_instance(node, primitive, node.world * copy, path + "/extensions/EXT_mesh_gpu_instancing");
+    for (std::size_t copy = 0; copy < copies.size(); ++copy) {
+      const std::size_t next = scene_.instances.size();
+      place_instance(node, primitive, node.world * copies[copy], path + "/extensions/EXT_mesh_gpu_instancing");
+      if (scene_.instances.size() == next) continue;
+      set_values(next, own);
+      for (const auto& [place, values] : of_copies) set_values(next, {{place, values[copy]}});
     }
+  }
+}
+
+/// Values of a node's RELIEF_object that graphs read.
+GltfLoader::InstanceValues GltfLoader::node_values(const PlacedNode& node) const
+{
+  InstanceValues out;
+  if (node.object.values == nullptr) return out;
+  for (const auto& [name, value] : *node.object.values) {
+    const auto it = std::find(scene_.attribute_names.begin(), scene_.attribute_names.end(), name);
+    if (it == scene_.attribute_names.end()) continue;
+    out.emplace(static_cast<std::uint16_t>(it - scene_.attribute_names.begin()), value);
+  }
+  return out;
+}
+
+void GltfLoader::set_values(std::size_t instance_index, const InstanceValues& values)
+{
+  for (const auto& [place, value] : values) {
+    auto column = std::find_if(scene_.instance_columns.begin(), scene_.instance_columns.end(),
+                               [name = place](const InstanceColumn& c) { return c.name == name; });
+    if (column == scene_.instance_columns.end()) {
+      column = scene_.instance_columns.insert(column, {place, {}});
+    }
+    memory_.add(sizeof(value), scene_.file + ": values of instances");
+    column->values.resize(4 * instance_index);
+    column->values.insert(column->values.end(), value.begin(), value.end());
   }
 }
 
@@ -367,12 +408,17 @@ int GltfLoader::mesh_of(const GltfDocument& document, int mesh_index, int primit
   const tinygltf::Mesh& source = document.core.meshes[static_cast<std::size_t>(mesh_index)];
   const tinygltf::Primitive& primitive = source.primitives[static_cast<std::size_t>(primitive_index)];
   const int tangent_uv_set = normal_map_uv_set(scene_.materials[static_cast<std::size_t>(material_index)]);
-  const auto [it, is_new] =
-      mesh_of_.try_emplace({&document, primitive.attributes, primitive.indices, primitive.mode, tangent_uv_set}, -1);
+  const int graph = scene_.materials[static_cast<std::size_t>(material_index)].graph_index;
+  const std::vector<std::uint16_t> columns =
+      graph >= 0 ? scene_.graphs[static_cast<std::size_t>(graph)].attributes : std::vector<std::uint16_t>{};
+  const auto [it, is_new] = mesh_of_.try_emplace(
+      {&document, primitive.attributes, primitive.indices, primitive.mode, tangent_uv_set, columns}, -1);
   if (!is_new) {
     return it->second;
   }
-  std::optional<Mesh> mesh = gltf_mesh_load(document, mesh_index, primitive_index, tangent_uv_set, warnings_);
+  std::map<std::string, std::uint16_t> wanted;
+  for (const std::uint16_t place : columns) wanted.emplace(scene_.attribute_names[place], place);
+  std::optional<Mesh> mesh = gltf_mesh_load(document, mesh_index, primitive_index, tangent_uv_set, wanted, warnings_);
   if (mesh) {
     memory_.add(mesh->bytes(), document.file + ": /meshes/" + std::to_string(mesh_index));
     mesh->material_index = material_index;
@@ -390,7 +436,7 @@ void GltfLoader::read_programs(const GltfDocument& document,
 {
   // The closures' reader stands within the graph's, for they refer to its nodes.
   const auto read = [&](const JsonReader* graph, const JsonReader* surface) {
-    GraphPrograms programs = graph_read(document, graph, surface, textures_, warnings_);
+    GraphPrograms programs = graph_read(document, graph, surface, textures_, scene_.attribute_names, warnings_);
     const auto add = [this](GraphProgram&& program) {
       scene_.graphs.push_back(std::move(program));
       return static_cast<int>(scene_.graphs.size()) - 1;

@@ -2,6 +2,7 @@
 // converted when the first node needs them, and once only.
 #pragma once
 
+#include <array>
 #include <compare>
 #include <map>
 #include <set>
@@ -49,6 +50,7 @@ class GltfLoader {
     const GltfDocument* document = nullptr;
     std::map<std::string, int> attributes;  ///< accessors
     int indices = -1, mode = 0, tangent_uv_set = -1;
+    std::vector<std::uint16_t> columns;  ///< that its material's graph reads
     auto operator<=>(const MeshSource&) const = default;
   };
 
@@ -66,6 +68,10 @@ class GltfLoader {
                       const Primitive& primitive,
                       const Transform& world,
                       const std::string& path);
+  /// Values by name, as graphs read them, of an instance.
+  using InstanceValues = std::map<std::uint16_t, std::array<float, 4>>;
+  InstanceValues node_values(const PlacedNode& node) const;
+  void set_values(std::size_t instance_index, const InstanceValues& values);
   void place_camera(const PlacedNode& node);
   void place_lights(const PlacedNode& node);
   void describe();

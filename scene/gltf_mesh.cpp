@@ -208,6 +208,7 @@ void read_attributes(const PrimitiveReader& reader,
                      const AccessorView& positions,
                      std::size_t first,
                      std::size_t count,
+                     const std::map<std::string, std::uint16_t>& columns,
                      Mesh& mesh)
 {
   const auto normals = reader.open("NORMAL", 3, 3, positions.count);
@@ -215,6 +216,15 @@ void read_attributes(const PrimitiveReader& reader,
   const auto colors = reader.open("COLOR_0", 3, 4, positions.count);
   const auto generated = reader.open("_GENERATED", 3, 3, positions.count);
   mesh.P = accessor_read<Vec3f>(positions, first, count);
+  for (const auto& [name, place] : columns) {
+    if (const auto view = reader.open(name, 1, 4, positions.count)) {
+      AttributeColumn& column = mesh.columns.emplace_back();
+      column.name = place;
+      column.num_components = view->num_components;
+      column.values.resize(count * static_cast<std::size_t>(view->num_components));
+      if (count > 0) accessor_read_floats(*view, first, count, column.values.data());
+    }
+  }
   if (generated) {
     mesh.generated = accessor_read<Vec3f>(*generated, first, count);
   }
@@ -232,6 +242,29 @@ void read_attributes(const PrimitiveReader& reader,
   // Tangents without normals mean nothing (glTF 2.0, section 3.7.2.1).
   if (tangents && normals) {
     mesh.tangent = accessor_read<Vec4f>(*tangents, first, count);
+  }
+}
+
+/// Tangents that graphs read, as columns.
+void derive_tangent_columns(const std::map<std::string, std::uint16_t>& columns, Mesh& mesh)
+{
+  for (int set = 0; set < 2; ++set) {
+    const auto it = columns.find(tangent_attribute_name(set));
+    if (it == columns.end() || mesh.uv[set].empty()) continue;
+    std::vector<Vec4f> own = std::move(mesh.tangent);
+    const bool is_own = set == 0 && !own.empty();
+    if (!is_own) tangents_derive(mesh, set);
+    const std::vector<Vec4f>& tangents = is_own ? own : mesh.tangent;
+    AttributeColumn column{it->second, 4, {}};
+    column.values.reserve(4 * tangents.size());
+    for (const Vec4f& t : tangents) column.values.insert(column.values.end(), {t.x, t.y, t.z, t.w});
+    mesh.columns.push_back(std::move(column));
+    // Deriving may have given some vertices a copy; what the file has is as good as what is derived then.
+    if (is_own || own.size() == mesh.tangent.size()) {
+      mesh.tangent = std::move(own);
+    } else {
+      mesh.tangent.clear();
+    }
   }
 }
 
@@ -277,6 +310,14 @@ void drop_unused_vertices(Mesh& mesh)
   keep(mesh.tangent, kept);
   keep(mesh.color, kept);
   keep(mesh.generated, kept);
+  for (AttributeColumn& column : mesh.columns) {
+    const auto n = static_cast<std::uint32_t>(column.num_components);
+    std::vector<std::uint32_t> numbers;
+    for (const std::uint32_t v : kept) {
+      for (std::uint32_t c = 0; c < n; ++c) numbers.push_back(v * n + c);
+    }
+    keep(column.values, numbers);
+  }
   for (std::vector<Vec2f>& uv : mesh.uv) {
     keep(uv, kept);
   }
@@ -288,6 +329,7 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
                                    int mesh_index,
                                    int primitive_index,
                                    int tangent_uv_set,
+                                   const std::map<std::string, std::uint16_t>& columns,
                                    Warnings& warnings)
 {
   const tinygltf::Mesh& source = document.core.meshes[static_cast<std::size_t>(mesh_index)];
@@ -326,10 +368,11 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
     const std::size_t num_vertices = *highest - first + 1;
     constexpr std::size_t kMostVertexBytes = 2 * sizeof(Vec3f) + sizeof(Normal3f) + 2 * sizeof(Vec2f) + 2 * sizeof(Vec4f);
     constexpr std::size_t kWorthALook = std::size_t{1} << 20;
-    if (num_vertices > kWorthALook / kMostVertexBytes) {
-      memory_require(num_vertices * kMostVertexBytes, document.file + ": " + reader.path);
+    const std::size_t vertex_bytes = kMostVertexBytes + columns.size() * sizeof(Vec4f);
+    if (num_vertices > kWorthALook / vertex_bytes) {
+      memory_require(num_vertices * vertex_bytes, document.file + ": " + reader.path);
     }
-    read_attributes(reader, positions, first, num_vertices, mesh);
+    read_attributes(reader, positions, first, num_vertices, columns, mesh);
   }
   drop_unused_vertices(mesh);
   drop_empty_triangles(reader, mesh);
@@ -339,6 +382,7 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
   }
   repair_normals(reader, mesh);
   repair_tangents(reader, mesh);
+  derive_tangent_columns(columns, mesh);
   if (tangent_uv_set >= 0 && mesh.tangent.empty() && !mesh.uv[tangent_uv_set].empty()) {
     tangents_derive(mesh, tangent_uv_set);
   }

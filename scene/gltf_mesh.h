@@ -1,15 +1,21 @@
 // From a glTF primitive to a triangle mesh: topology, attributes, repairs that are safe to make.
 #pragma once
 
+#include <map>
 #include <optional>
+#include <string>
 
 #include "scene/gltf_document.h"
 #include "scene/scene.h"
 
 namespace relief {
 
+/// Tangents of uv set i as an attribute that graphs read: no name of a file's begins so.
+inline std::string tangent_attribute_name(int uv_set) { return "tangent:" + std::to_string(uv_set); }
+
 /// Reads one primitive.
 /// @param tangent_uv_set  texture coordinates that a normal map needs tangents for; −1: none needed
+/// @param columns         names of the attributes to keep for graphs, with their places; those that are missing are warned about
 /// @return empty, with a warning, for points and lines and when no triangle has an area
 /// @error  SceneError: missing positions, wrong accessor types, counts that differ, indices out of range or equal to the
 ///         restart value, NaN or infinity
@@ -19,6 +25,7 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
                                    int mesh_index,
                                    int primitive_index,
                                    int tangent_uv_set,
+                                   const std::map<std::string, std::uint16_t>& columns,
                                    Warnings& warnings);
 
 }  // namespace relief

@@ -311,4 +311,34 @@ std::vector<Transform> khronos_instances(const GltfDocument& document, int node_
   return out;
 }
 
+std::vector<std::array<float, 4>> khronos_instance_values(const GltfDocument& document,
+                                                          int node_index,
+                                                          const std::string& name,
+                                                          std::size_t count)
+{
+  std::vector<std::array<float, 4>> out;
+  const auto read = [&](const JsonReader& r) {
+    const JsonReader attributes = r.object("attributes");
+    if (!attributes.has(name)) return;
+    const int index = attributes.index(name, document.core.accessors.size(), "accessors");
+    const AccessorView view =
+        accessor_open(document, index, AccessorKind::kFloatOrNormalized, 1, 4, json_path_join(attributes.path(), name));
+    if (view.count != count) {
+      attributes.fail(name, std::to_string(count) + " elements, as TRANSLATION has", std::to_string(view.count));
+    }
+    const auto n = static_cast<std::size_t>(view.num_components);
+    std::vector<float> numbers(count * n);
+    accessor_read_floats(view, 0, count, numbers.data());
+    out.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      out[i] = {0, 0, 0, 1};
+      std::copy_n(numbers.begin() + static_cast<std::ptrdiff_t>(i * n), n, out[i].begin());
+      if (n == 1) out[i] = {numbers[i], numbers[i], numbers[i], 1};
+    }
+  };
+  document.read_extension(document.element("nodes", static_cast<std::size_t>(node_index)),
+                          "/nodes/" + std::to_string(node_index), "EXT_mesh_gpu_instancing", read);
+  return out;
+}
+
 }  // namespace relief

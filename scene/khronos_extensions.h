@@ -1,6 +1,8 @@
 // Materials, lights, texture transforms and instancing as glTF and its Khronos extensions define them.
 #pragma once
 
+#include <array>
+#include <string>
 #include <vector>
 
 #include "kernel/bsdf/material.h"
@@ -48,5 +50,13 @@ std::vector<Light> khronos_node_light(const GltfDocument& document,
 /// EXT_mesh_gpu_instancing of a node: transforms relative to the node.
 /// @return empty if the node has no such extension
 std::vector<Transform> khronos_instances(const GltfDocument& document, int node_index, Warnings& warnings);
+
+/// An attribute of a node's instances that graphs read: three components and alpha.
+/// @param count  of its instances
+/// @return       empty if they have none of that name
+std::vector<std::array<float, 4>> khronos_instance_values(const GltfDocument& document,
+                                                          int node_index,
+                                                          const std::string& name,
+                                                          std::size_t count);
 
 }  // namespace relief

@@ -338,6 +338,34 @@ std::vector<Light> relief_area_light(const GltfDocument& document,
   return out;
 }
 
+namespace {
+
+/// RELIEF_object's values: a number each, or two to four.
+/// @param inherited  the parent's; null: none
+std::shared_ptr<const std::map<std::string, std::array<float, 4>>> read_object_values(
+    const JsonReader& object,
+    const std::map<std::string, std::array<float, 4>>* inherited)
+{
+  auto out = std::make_shared<std::map<std::string, std::array<float, 4>>>();
+  if (inherited != nullptr) *out = *inherited;
+  const JsonReader values = object.object("values");
+  for (const auto& [name, json] : object.raw("values").items()) {
+    if (json.is_number()) {
+      const float value = values.number_f(name, 0);
+      (*out)[name] = {value, value, value, 1};
+      continue;
+    }
+    if (!json.is_array()) values.fail(name, "a number, or two to four numbers", json_describe(json));
+    std::array<float, 4> value{0, 0, 0, 1};
+    const std::vector<double> numbers = values.numbers(name, 2, 4, -1e30, 1e30);
+    for (std::size_t c = 0; c < numbers.size(); ++c) value[c] = static_cast<float>(numbers[c]);
+    (*out)[name] = value;
+  }
+  return out;
+}
+
+}  // namespace
+
 ObjectSettings relief_object(const GltfDocument& document, int node_index, ObjectSettings inherited, Warnings& warnings)
 {
   ObjectSettings s = inherited;
@@ -350,6 +378,7 @@ ObjectSettings relief_object(const GltfDocument& document, int node_index, Objec
     s.caustic_light = r.boolean("causticLight", s.caustic_light);
     s.holdout = r.boolean("holdout", s.holdout);
     s.asset = r.string("asset", s.asset);
+    if (r.has("values")) s.values = read_object_values(r, s.values.get());
     if (r.has("causticCaster")) {
       const nlohmann::json& caster = r.raw("causticCaster");
       if (!caster.is_boolean() && caster != "auto") {

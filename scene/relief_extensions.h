@@ -1,7 +1,11 @@
 // relief's own extensions, as docs/scene_format.md defines them: one function each, in the order of that page.
 #pragma once
 
+#include <array>
+#include <map>
+#include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "scene/khronos_extensions.h"
@@ -44,6 +48,8 @@ struct ObjectSettings {
   bool caustic_light = true;
   bool holdout = false;
   std::string asset;  ///< empty: none is named
+  /// Values by name that graphs read as attributes: three components and alpha. Null: none.
+  std::shared_ptr<const std::map<std::string, std::array<float, 4>>> values;
 };
 
 /// @param inherited  the parent's settings

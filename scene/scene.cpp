@@ -35,8 +35,10 @@ MeshView Mesh::view() const
 
 std::size_t Mesh::bytes() const
 {
-  return vector_bytes(P) + vector_bytes(N) + vector_bytes(uv[0]) + vector_bytes(uv[1]) + vector_bytes(tangent) +
-         vector_bytes(color) + vector_bytes(generated) + vector_bytes(triangles);
+  std::size_t of_columns = 0;
+  for (const AttributeColumn& column : columns) of_columns += vector_bytes(column.values);
+  return of_columns + vector_bytes(P) + vector_bytes(N) + vector_bytes(uv[0]) + vector_bytes(uv[1]) +
+         vector_bytes(tangent) + vector_bytes(color) + vector_bytes(generated) + vector_bytes(triangles);
 }
 
 }  // namespace relief

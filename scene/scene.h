@@ -22,6 +22,19 @@ namespace relief {
 
 class TextureStore;  // scene/texture_store.h
 
+/// A named vertex attribute that value graphs read.
+struct AttributeColumn {
+  std::uint16_t name = 0;  ///< place in Scene::attribute_names
+  int num_components = 0;
+  std::vector<float> values;  ///< num_components a vertex
+};
+
+/// Values that instances have by one name.
+struct InstanceColumn {
+  std::uint16_t name = 0;     ///< place in Scene::attribute_names
+  std::vector<float> values;  ///< four an instance, see GraphInstanceColumn; those at the end may be missing
+};
+
 /// One glTF primitive: a triangle mesh with one material.
 struct Mesh {
   std::string name;
@@ -30,7 +43,8 @@ struct Mesh {
   std::vector<Vec2f> uv[2];    ///< empty: absent
   std::vector<Vec4f> tangent;  ///< empty: derived where a normal map needs them
   std::vector<Vec4f> color;
-  std::vector<Vec3f> generated;  ///< _GENERATED, see MeshView; empty: absent
+  std::vector<Vec3f> generated;          ///< _GENERATED, see MeshView; empty: absent
+  std::vector<AttributeColumn> columns;  ///< what graphs read by name
   std::vector<TriangleIndices> triangles;
   int material_index = 0;  ///< always valid: the loader adds glTF's default material where none is named
   int copy_of = -1;        ///< mesh of the file that this is under some transform, see world_displacement.h; −1: none
@@ -150,7 +164,9 @@ struct Scene {
   std::vector<Instance> instances;
   std::vector<Material> materials;
   std::vector<std::string> material_names;
-  std::vector<GraphProgram> graphs;     ///< of materials, by Material::graph_index
+  std::vector<GraphProgram> graphs;          ///< of materials, by Material::graph_index
+  std::vector<std::string> attribute_names;  ///< of attributes that graphs read
+  std::vector<InstanceColumn> instance_columns;
   std::vector<Light> lights;            ///< everything but mesh triangles and the environment
   std::vector<std::string> node_names;  ///< of all files, as far as they have names, each once, in file order
   std::vector<AnimationClip> clips;     ///< of all files

@@ -69,6 +69,17 @@ void gather_vertices(Mesh& mesh, const std::vector<std::uint32_t>& from)
   gather(mesh.uv[0], from);
   gather(mesh.uv[1], from);
   gather(mesh.color, from);
+  gather(mesh.generated, from);
+  for (AttributeColumn& column : mesh.columns) {
+    std::vector<float> values;
+    const auto n = static_cast<std::size_t>(column.num_components);
+    values.reserve(from.size() * n);
+    for (const std::uint32_t v : from) {
+      const auto first = column.values.begin() + static_cast<std::ptrdiff_t>(v * n);
+      values.insert(values.end(), first, first + static_cast<std::ptrdiff_t>(n));
+    }
+    column.values = std::move(values);
+  }
 }
 
 /// Gives every triangle vertices of its own.

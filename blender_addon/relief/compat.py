@@ -33,18 +33,69 @@ _PASS_NAMES_5_0 = {
     "AO": "Ambient Occlusion",
 }
 
-#: What faces without a material look like, as arguments of export.surface.Surface. Since 5.0 it is the plastic of a new
-#: material, before a diffuse grey.
-DEFAULT_SURFACE = {"roughness": 0.5, "specular": 1.0} if IS_5_0 else {}
+#: What faces of a slot without material look like, as a closure; None: diffuse grey. Since 5.0 it is the plastic of a new
+#: material.
+DEFAULT_CLOSURE = {"type": "principled", "maths": "4.3", "roughness": 0.5} if IS_5_0 else None
+
+#: The version whose closures Cycles has, as RELIEF_surface calls it.
+MATHS = "4.3" if IS_4_0 else "3.4"
+
+#: Inputs of the principled closure by Blender's names: what there is besides anisotropy, emission and alpha.
+PRINCIPLED_INPUTS = (
+    {
+        "Base Color": "baseColor",
+        "Metallic": "metallic",
+        "Roughness": "roughness",
+        "IOR": "ior",
+        "Diffuse Roughness": "diffuseRoughness",
+        "Subsurface Weight": "subsurfaceWeight",
+        "Specular IOR Level": "specularIorLevel",
+        "Specular Tint": "specularTint",
+        "Transmission Weight": "transmissionWeight",
+        "Coat Weight": "coatWeight",
+        "Coat Roughness": "coatRoughness",
+        "Coat IOR": "coatIor",
+        "Coat Tint": "coatTint",
+        "Sheen Weight": "sheenWeight",
+        "Sheen Roughness": "sheenRoughness",
+        "Sheen Tint": "sheenTint",
+        "Thin Film Thickness": "thinFilmThickness",
+        "Thin Film IOR": "thinFilmIor",
+        "Normal": "normal",
+        "Coat Normal": "coatNormal",
+    }
+    if IS_4_0
+    else {
+        "Base Color": "baseColor",
+        "Subsurface": "subsurface",
+        "Subsurface Color": "subsurfaceColor",
+        "Metallic": "metallic",
+        "Specular": "specular",
+        "Specular Tint": "specularTint",
+        "Roughness": "roughness",
+        "Sheen": "sheen",
+        "Sheen Tint": "sheenTint",
+        "Clearcoat": "clearcoat",
+        "Clearcoat Roughness": "clearcoatRoughness",
+        "IOR": "ior",
+        "Transmission": "transmission",
+        "Transmission Roughness": "transmissionRoughness",
+        "Normal": "normal",
+        "Clearcoat Normal": "clearcoatNormal",
+    }
+)
 
 #: Before 4.0 the octaves of a Noise Texture never grew.
 CLAMPS_NOISE_ROUGHNESS = not IS_4_0
 
-#: Before 4.0 the Principled BSDF multiplied its coat by Disney's factor of a quarter.
-COAT_SCALE = 1.0 if IS_4_0 else 0.25
+#: Before 4 the Hue/Saturation node cut whole turns off towards 0, so that hues below 0 stayed below.
+HUE_GOES_ROUND = IS_4_0
 
-#: Tints of the Principled BSDF are colours; before 4.0 they were mixes towards the base colour's hue.
-TINTS_ARE_COLORS = IS_4_0
+#: Whose numbers the textures of this version have, as RELIEF_graph calls them; None: those of 3.4.
+TEXTURE_MATHS = "5.2" if IS_5_0 else "4.3" if IS_4_0 else None
+
+#: Entries of the tables that stand for ramps and curves, as many as Cycles'. Checked in 3.4 and 4.3.
+TABLE_ENTRIES = 257 if IS_4_0 else 256
 
 
 def principled_socket(node, name):
@@ -55,49 +106,6 @@ def principled_socket(node, name):
 def pass_name(name):
     """This version's name of a render pass, by its name in 3.4."""
     return _PASS_NAMES_5_0.get(name, name) if IS_5_0 else name
-
-
-def principled_reflection(level, ior, tint, is_glass):
-    """Reflection of a Principled BSDF beside its metal.
-
-    @param  level     "Specular" or "Specular IOR Level"
-    @param  tint      linear RGB, white before 4.0
-    @param  is_glass  whether light passes through
-    @return           (index of refraction, weight, colour that multiplies what the index reflects at normal incidence)
-    """
-    weight = 1.0 if level > 0 else 0.0
-    if IS_4_0:
-        # The index counts everywhere; the level scales its reflection, one half being all of it.
-        return max(1.0, ior), weight, tuple(2 * level * c for c in tint)
-    if is_glass:
-        return max(1.0, ior), 1.0, tint
-    # The level alone tells the reflection: 0.08 · level at normal incidence.
-    root = math.sqrt(0.08 * max(level, 0.0))
-    return (1 + root) / (1 - root), weight, tint
-
-
-def has_uncommon_coat(node):
-    """Whether a Principled BSDF's coat has a colour or an index of refraction of its own, which came with 4.0."""
-    tint, ior = node.inputs.get("Coat Tint"), node.inputs.get("Coat IOR")
-    if tint is None or ior is None:
-        return False
-    is_clear = not tint.is_linked and min(tint.default_value) >= 1.0
-    return not is_clear or ior.is_linked or abs(ior.default_value - 1.5) > 1e-4
-
-
-def sheen_color(base, sheen, tint):
-    """Colour of the sheen layer.
-
-    @param  base   base colour, linear RGB
-    @param  sheen  weight
-    @param  tint   before 4.0 a mix towards the base colour's hue; a colour since
-    @return        linear RGB
-    """
-    if IS_4_0:
-        return tuple(sheen * c for c in tint[:3])
-    luminance = 0.2126 * base[0] + 0.7152 * base[1] + 0.0722 * base[2]
-    hue = [c / luminance for c in base] if luminance > 0 else [1.0] * 3
-    return tuple(min(1.0, sheen * (1 + tint * (h - 1))) for h in hue)
 
 
 def displacement_owner(material):

@@ -46,6 +46,7 @@ class Capture:
             self.report.warn(f'scene "{scene.name}"', "a render region", "whole pictures; use --crop")
         exporter = SceneExporter(depsgraph, self._writer, self.report)
         exporter.add_all(view)
+        report.last_coverage[scene.name] = self.report.coverage
         self._shot.add_frame(scene.frame_current, exporter.nodes)
         extensions = self._writer.json["extensions"]
         fixed = {name: extensions[name] for name in ("RELIEF_render", "RELIEF_environment")}

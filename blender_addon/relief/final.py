@@ -44,6 +44,7 @@ def render(engine, depsgraph):
     exported = export_scene(depsgraph, view, folder, "scene.gltf", warnings)
     session.remove_stale(os.path.join(folder, DATA_FOLDER), exported.used_files)
     known = set(warnings.warnings)
+    report.last_coverage[scene.name] = warnings.coverage
     report.publish(scene.name, warnings.warnings)
 
     aovs = result.aov_list(passes, exported.has_holdouts and not scene.render.film_transparent)

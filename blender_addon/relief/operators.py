@@ -6,7 +6,8 @@ from bpy.props import IntProperty
 
 from . import compat
 from .export.displacement import needs_switch
-from .report import group, last_warnings
+from .export.dry_run import try_material
+from .report import group, last_coverage, last_warnings
 
 #: Name of the text that warnings are written to.
 _TEXT_NAME = "relief warnings"
@@ -16,7 +17,7 @@ _MOST_IN_TOOLTIP = 25
 
 
 class RELIEF_OT_displace(bpy.types.Operator):
-    """Let the material's Displacement node move the surface; with "Bump Only" it does nothing in relief"""
+    """Let the material's Displacement node move the surface; with "Bump Only" it bends normals alone"""
 
     bl_idname = "relief.displace"
     bl_label = "Use Displacement"
@@ -29,6 +30,19 @@ class RELIEF_OT_displace(bpy.types.Operator):
 
     def execute(self, context):
         compat.set_displacement_method(context.material, "DISPLACEMENT")
+        return {"FINISHED"}
+
+
+class RELIEF_OT_check_materials(bpy.types.Operator):
+    """Count which nodes of the file's materials relief understands, without rendering"""
+
+    bl_idname = "relief.check_materials"
+    bl_label = "Check Materials"
+
+    def execute(self, context):
+        scene = context.scene
+        checked = {m.name: try_material(m, scene.relief)[0] for m in bpy.data.materials if m.users}
+        last_coverage[scene.name] = {name: coverage for name, coverage in checked.items() if coverage is not None}
         return {"FINISHED"}
 
 
@@ -74,7 +88,7 @@ def _show_text(context, text):
         space.top = max(0, text.current_line_index - 3)
 
 
-_classes = (RELIEF_OT_displace, RELIEF_OT_show_warnings)
+_classes = (RELIEF_OT_displace, RELIEF_OT_check_materials, RELIEF_OT_show_warnings)
 
 
 def register():

@@ -31,11 +31,13 @@ class Report:
     """Warnings of one export, each once and in the order they came up.
 
     @param  strict  make each warning an error
+    coverage  export.coverage.Coverage by names of materials
     """
 
     def __init__(self, strict=False):
         self._texts = {}
         self._strict = strict
+        self.coverage = {}
 
     @property
     def warnings(self):
@@ -54,6 +56,10 @@ class Report:
         if self._strict:
             raise StrictError(f"{text} (an error because warnings are: Render > Performance > Strict)")
         self._texts.setdefault(text)
+
+    def count(self, material, coverage):
+        """Notes how much of a material's nodes is understood."""
+        self.coverage[material] = coverage
 
 
 @dataclass(frozen=True)
@@ -94,6 +100,20 @@ def group(warnings):
 
 #: Warnings of the scene's last render, or its viewport's, by the scene's name: what the panel shows.
 last_warnings = {}
+
+#: Report.coverage of the same, or of the last check of all materials, by the scene's name.
+last_coverage = {}
+
+
+def total(coverage):
+    """What is understood of all materials, in words.
+
+    @param  coverage  as Report.coverage
+    """
+    understood = sum(c.num_understood for c in coverage.values())
+    nodes = sum(c.num_nodes for c in coverage.values())
+    whole = sum(not c.not_understood for c in coverage.values())
+    return f"{understood} of {nodes} nodes understood, {whole} of {len(coverage)} materials whole"
 
 
 def say(text):

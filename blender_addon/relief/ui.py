@@ -9,7 +9,7 @@ from . import compat
 from .export.displacement import has_displacement_node, needs_switch
 from .export.settings import cycles_settings
 from .preferences import find_checked_binary
-from .report import ReliefError, group, last_warnings
+from .report import ReliefError, group, last_coverage, last_warnings, total
 from .result import CRYPTOMATTES, PASSES
 
 _ENGINE = "RELIEF"
@@ -82,6 +82,22 @@ class RELIEF_PT_warnings(_RenderPanel, bpy.types.Panel):
                 row.operator("relief.show_warnings", text=text, icon=icon, emboss=False).index = index
         if groups:
             self.layout.operator("relief.show_warnings", text="Show All as Text", icon="TEXT").index = -1
+
+
+class RELIEF_PT_materials(_RenderPanel, bpy.types.Panel):
+    bl_label = "Materials"
+    bl_order = 0
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        coverage = last_coverage.get(context.scene.name, {})
+        column = self.layout.column(align=True)
+        if coverage:
+            column.label(text=total(coverage))
+        for name, members in coverage.items():
+            if members.not_understood:
+                column.label(text=f'"{name}": {members}', icon="ERROR")
+        self.layout.operator("relief.check_materials")
 
 
 class RELIEF_PT_sampling(_RenderPanel, bpy.types.Panel):
@@ -194,6 +210,7 @@ class RELIEF_PT_material_surface(_Panel, bpy.types.Panel):
         material, layout = context.material, self.layout
         layout.prop(material, "use_nodes", icon="NODETREE")
         if material.use_nodes:
+            _draw_coverage(layout, last_coverage.get(context.scene.name, {}).get(material.name))
             _draw_output(layout, material.node_tree, "ShaderNodeOutputMaterial", "Surface")
         else:
             layout.prop(material, "diffuse_color", text="Base Color")
@@ -211,7 +228,7 @@ class RELIEF_PT_material_displacement(_Panel, bpy.types.Panel):
         material, rows = context.material, self.rows()
         rows.prop(compat.displacement_owner(material), "displacement_method", text="Displacement")
         if needs_switch(material):
-            rows.label(text="Bump Only: the Displacement node moves nothing", icon="INFO")
+            rows.label(text="Bump Only: it bends normals, but moves nothing", icon="INFO")
             rows.operator("relief.displace")
         _draw_output(self.layout, material.node_tree, "ShaderNodeOutputMaterial", "Displacement")
 
@@ -309,6 +326,7 @@ class RELIEF_PT_camera_dof(_Panel, bpy.types.Panel):
 
 _classes = (
     RELIEF_PT_warnings,
+    RELIEF_PT_materials,
     RELIEF_PT_sampling,
     RELIEF_PT_light_paths,
     RELIEF_PT_displacement,
@@ -352,6 +370,16 @@ def _binary_problem():
     except ReliefError as error:
         return str(error)
     return ""
+
+
+def _draw_coverage(layout, coverage):
+    """How much of a material is understood, and what is not; nothing before it has been looked at."""
+    if coverage is None:
+        return
+    column = layout.column(align=True)
+    column.label(text=str(coverage), icon="ERROR" if coverage.not_understood else "CHECKMARK")
+    for _, reason in coverage.not_understood:
+        column.label(text=reason, icon="BLANK1")
 
 
 def _draw_output(layout, tree, idname, socket_name):

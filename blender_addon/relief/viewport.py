@@ -90,6 +90,7 @@ class Viewport:
         self._exporter = exporter
         final.warn_unread(scene, warnings)
         self._scene_name, self._warnings = scene.name, warnings
+        report.last_coverage[scene.name] = warnings.coverage
         self._publish()
         self._begin(view)
 

@@ -75,7 +75,10 @@ RELIEF_KERNEL BsdfEval closure_eval(const Mixture& m, const BsdfTables&, Vec3f w
   if (!(cos_i > kMinCosine)) return e;
   const Vec3f wi = from_local(m.frame, wi_local);
   mixture_visit(m, [&](const MixtureLobe& lobe) {
-    const BsdfEval one = mixture_lobe_eval<kMode>(lobe, to_local(lobe.frame, wi));
+    const Vec3f wi_lobe = to_local(lobe.frame, wi);
+    // What is above a bent normal and below the surface's would leave on the wrong side; sampling loses it, too.
+    if ((wi_lobe.z < 0.0f) != (wi_local.z < 0.0f)) return;
+    const BsdfEval one = mixture_lobe_eval<kMode>(lobe, wi_lobe);
     e.f += lobe.weight * one.f;
     e.pdf += lobe.probability * one.pdf;
   });

@@ -7,13 +7,16 @@
 #include <cmath>
 
 #include "kernel/bsdf/fresnel.h"
+#include "kernel/graph/blackbody.h"
 #include "kernel/graph/color_spaces.h"
+#include "kernel/graph/gabor.h"
 #include "kernel/graph/graph_op.h"
 #include "kernel/graph/graph_registers.h"
+#include "kernel/graph/image.h"
 #include "kernel/graph/musgrave.h"
 #include "kernel/graph/noise.h"
 #include "kernel/graph/voronoi.h"
-#include "kernel/texture/texture.h"
+#include "kernel/math/lanes_functions.h"
 
 namespace relief {
 
@@ -101,7 +104,18 @@ RELIEF_KERNEL void graph_sign(const GraphOperands& o)
 RELIEF_KERNEL void graph_square_root(const GraphOperands& o) { graph_set(o, 0, sqrt(max(graph_in(o, 0), F8{}))); }
 RELIEF_KERNEL void graph_power(const GraphOperands& o)
 {
-  graph_set(o, 0, each_lane(graph_in(o, 0), graph_in(o, 1), [](float a, float b) { return graph_power(a, b); }));
+  const F8 a = graph_in(o, 0), b = graph_in(o, 1);
+  // In single precision the product has the digits for a small power only.
+  constexpr float kMostExact = 4.0f, kLeastNormal = 1.17549435e-38f;
+  const I8 is_normal = (a >= kLeastNormal) & (a < kInfinity);
+  const F8 exponent = b * log8(is_normal ? a : splat8(1.0f));
+  const I8 is_exact = is_normal & (abs(exponent) <= kMostExact);
+  F8 out = exp8(is_exact ? exponent : F8{});
+  const unsigned exact = mask_of(is_exact);
+  for (int k = 0; k < 8; ++k) {
+    if ((exact >> k & 1u) == 0) out[k] = graph_power(a[k], b[k]);
+  }
+  graph_set(o, 0, out);
 }
 RELIEF_KERNEL void graph_logarithm(const GraphOperands& o)
 {
@@ -109,7 +123,14 @@ RELIEF_KERNEL void graph_logarithm(const GraphOperands& o)
 }
 RELIEF_KERNEL void graph_exponent(const GraphOperands& o)
 {
-  graph_set(o, 0, each_lane(graph_in(o, 0), [](float a) { return std::exp(a); }));
+  const F8 a = graph_in(o, 0);
+  constexpr float kLargest = 87.0f;
+  F8 out = exp8(a);
+  const unsigned far = mask_of(~(abs(a) <= kLargest));
+  for (int k = 0; far != 0 && k < 8; ++k) {
+    if ((far >> k & 1u) != 0) out[k] = std::exp(a[k]);
+  }
+  graph_set(o, 0, out);
 }
 RELIEF_KERNEL void graph_modulo(const GraphOperands& o)
 {
@@ -117,14 +138,21 @@ RELIEF_KERNEL void graph_modulo(const GraphOperands& o)
               return b != 0.0f ? std::fmod(a, b) : 0.0f;
             }));
 }
-RELIEF_KERNEL void graph_sine(const GraphOperands& o)
+/// Sines and cosines; those of large angles one by one.
+RELIEF_KERNEL SinCos8 graph_sin_cos(F8 a)
 {
-  graph_set(o, 0, each_lane(graph_in(o, 0), [](float a) { return std::sin(a); }));
+  const I8 is_near = abs(a) <= kLargestAngle;
+  SinCos8 out = sin_cos(is_near ? a : F8{});
+  const unsigned far = mask_of(~is_near);
+  for (int k = 0; far != 0 && k < 8; ++k) {
+    if ((far >> k & 1u) == 0) continue;
+    out.sin[k] = std::sin(a[k]);
+    out.cos[k] = std::cos(a[k]);
+  }
+  return out;
 }
-RELIEF_KERNEL void graph_cosine(const GraphOperands& o)
-{
-  graph_set(o, 0, each_lane(graph_in(o, 0), [](float a) { return std::cos(a); }));
-}
+RELIEF_KERNEL void graph_sine(const GraphOperands& o) { graph_set(o, 0, graph_sin_cos(graph_in(o, 0)).sin); }
+RELIEF_KERNEL void graph_cosine(const GraphOperands& o) { graph_set(o, 0, graph_sin_cos(graph_in(o, 0)).cos); }
 RELIEF_KERNEL void graph_tangent(const GraphOperands& o)
 {
   graph_set(o, 0, each_lane(graph_in(o, 0), [](float a) { return std::tan(a); }));
@@ -177,7 +205,8 @@ RELIEF_KERNEL void graph_hsv_to_rgb(const GraphOperands& o) { graph_each_color(o
 RELIEF_KERNEL void graph_rgb_to_hsl(const GraphOperands& o) { graph_each_color(o, rgb_to_hsl); }
 RELIEF_KERNEL void graph_hsl_to_rgb(const GraphOperands& o) { graph_each_color(o, hsl_to_rgb); }
 
-/// Octaves of noise at a point of kDims coordinates; then detail, roughness, lacunarity. Immediate: whether normalized.
+/// Octaves of noise at a point of kDims coordinates; then detail, roughness, lacunarity. Immediates: whether normalized,
+/// whether it repeats.
 template <int kDims>
 RELIEF_KERNEL void graph_noise(const GraphOperands& o)
 {
@@ -185,19 +214,20 @@ RELIEF_KERNEL void graph_noise(const GraphOperands& o)
   for (int i = 0; i < kDims; ++i) p[i] = graph_in(o, i);
   const NoiseOctaves octaves{clamp(graph_in(o, kDims), 0.0f, 15.0f), max(graph_in(o, kDims + 1), F8{}),
                              graph_in(o, kDims + 2)};
-  graph_set(o, 0, noise_fractal<kDims>(p, octaves, o.immediates[0] != 0));
+  graph_set(o, 0, noise_fractal<kDims>(p, octaves, o.immediates[0] != 0, o.immediates[1] != 0));
 }
 RELIEF_KERNEL void graph_noise_1d(const GraphOperands& o) { graph_noise<1>(o); }
 RELIEF_KERNEL void graph_noise_2d(const GraphOperands& o) { graph_noise<2>(o); }
 RELIEF_KERNEL void graph_noise_3d(const GraphOperands& o) { graph_noise<3>(o); }
 RELIEF_KERNEL void graph_noise_4d(const GraphOperands& o) { graph_noise<4>(o); }
 
+/// Immediate: whether it repeats.
 template <int kDims>
 RELIEF_KERNEL void graph_signed_noise(const GraphOperands& o)
 {
   F8 p[kDims];
   for (int i = 0; i < kDims; ++i) p[i] = graph_in(o, i);
-  graph_set(o, 0, noise_signed<kDims>(p));
+  graph_set(o, 0, noise_signed<kDims>(p, o.immediates[0] != 0));
 }
 RELIEF_KERNEL void graph_signed_noise_1d(const GraphOperands& o) { graph_signed_noise<1>(o); }
 RELIEF_KERNEL void graph_signed_noise_2d(const GraphOperands& o) { graph_signed_noise<2>(o); }
@@ -216,17 +246,27 @@ RELIEF_KERNEL void graph_hash_2d(const GraphOperands& o) { graph_hash<2>(o); }
 RELIEF_KERNEL void graph_hash_3d(const GraphOperands& o) { graph_hash<3>(o); }
 RELIEF_KERNEL void graph_hash_4d(const GraphOperands& o) { graph_hash<4>(o); }
 
-/// Cells at a point; then smoothness, exponent, randomness. Immediates: feature, metric. Outputs: distance, colour, position
-/// as x, y, z, w, radius; in one dimension the position is w.
+/// Cells at a point; then smoothness, exponent, randomness, detail, roughness, lacunarity. Immediates: feature, metric,
+/// VoronoiFlags. Outputs: distance, colour, position as x, y, z, w, radius; in one dimension the position is w.
 template <int kDims>
 RELIEF_KERNEL void graph_voronoi(const GraphOperands& o)
 {
   F8 p[kDims];
   for (int i = 0; i < kDims; ++i) p[i] = graph_in(o, i);
-  const VoronoiSettings<kDims> settings{static_cast<VoronoiFeature>(o.immediates[0]),
-                                        static_cast<VoronoiMetric>(o.immediates[1]), graph_in(o, kDims),
-                                        graph_in(o, kDims + 1), graph_in(o, kDims + 2)};
-  const Voronoi<kDims> cells = voronoi_eval<kDims>(p, settings);
+  const unsigned flags = o.immediates[2];
+  const NoiseOctaves octaves{clamp(graph_in(o, kDims + 3), 0.0f, 15.0f), clamp(graph_in(o, kDims + 4), 0.0f, 1.0f),
+                             graph_in(o, kDims + 5)};
+  const auto eval = [&]<bool kPcg>() {
+    const VoronoiSettings<kDims, kPcg> settings{static_cast<VoronoiFeature>(o.immediates[0]),
+                                                static_cast<VoronoiMetric>(o.immediates[1]),
+                                                graph_in(o, kDims),
+                                                graph_in(o, kDims + 1),
+                                                graph_in(o, kDims + 2),
+                                                flags};
+    return voronoi_fractal<kDims>(p, settings, octaves);
+  };
+  const bool is_pcg = (flags & kVoronoiPcg) != 0 && kDims > 1;
+  const Voronoi<kDims> cells = is_pcg ? eval.template operator()<true>() : eval.template operator()<false>();
   graph_set(o, 0, cells.distance);
   for (int i = 0; i < 3; ++i) graph_set(o, 1 + i, cells.color[i]);
   for (int i = 0; i < 4; ++i) {
@@ -240,14 +280,18 @@ RELIEF_KERNEL void graph_voronoi_2d(const GraphOperands& o) { graph_voronoi<2>(o
 RELIEF_KERNEL void graph_voronoi_3d(const GraphOperands& o) { graph_voronoi<3>(o); }
 RELIEF_KERNEL void graph_voronoi_4d(const GraphOperands& o) { graph_voronoi<4>(o); }
 
-/// Musgrave's noises at a point; then octaves, falloff, lacunarity, offset, gain. Immediate: type.
+/// Musgrave's noises at a point; then octaves, falloff, lacunarity, offset, gain. Immediates: type, whether noise repeats.
 template <int kDims>
 RELIEF_KERNEL void graph_musgrave(const GraphOperands& o)
 {
   F8 p[kDims];
   for (int i = 0; i < kDims; ++i) p[i] = graph_in(o, i);
-  const MusgraveSettings settings{clamp(graph_in(o, kDims), 0.0f, 16.0f), graph_in(o, kDims + 1),
-                                  graph_in(o, kDims + 2), graph_in(o, kDims + 3), graph_in(o, kDims + 4)};
+  const MusgraveSettings settings{clamp(graph_in(o, kDims), 0.0f, 16.0f),
+                                  graph_in(o, kDims + 1),
+                                  graph_in(o, kDims + 2),
+                                  graph_in(o, kDims + 3),
+                                  graph_in(o, kDims + 4),
+                                  o.immediates[1] != 0};
   graph_set(o, 0, musgrave_eval<kDims>(p, static_cast<MusgraveType>(o.immediates[0]), settings));
 }
 RELIEF_KERNEL void graph_musgrave_1d(const GraphOperands& o) { graph_musgrave<1>(o); }
@@ -296,20 +340,53 @@ RELIEF_KERNEL void graph_brick(const GraphOperands& o)
   graph_set(o, 1, load8(mortar));
 }
 
-/// Image at u, v (v up) with a footprint's width; linear RGBA. Immediate: texture.
+/// Writes four numbers a lane.
+template <typename F>
+RELIEF_KERNEL void graph_set_rgba(const GraphOperands& o, F&& of_lane)
+{
+  F8 rgba[4];
+  for (int k = 0; k < 8; ++k) {
+    const Vec4f v = of_lane(k);
+    rgba[0][k] = v.x;
+    rgba[1][k] = v.y;
+    rgba[2][k] = v.z;
+    rgba[3][k] = v.w;
+  }
+  for (int c = 0; c < 4; ++c) graph_set(o, c, rgba[c]);
+}
+
+/// Image at u, v (v up) with a footprint's width; linear RGBA. Immediates: texture, ImageFlags.
 RELIEF_KERNEL void graph_image(const GraphOperands& o)
 {
   const TextureView& texture = o.textures[o.immediates[0]];
   const F8 u = graph_in(o, 0), v = graph_in(o, 1), width = graph_in(o, 2);
-  F8 rgba[4];
-  for (int k = 0; k < 8; ++k) {
-    const Vec4f texel = texture_sample(texture, {u[k], 1.0f - v[k]}, width[k]);
-    rgba[0][k] = texel.x;
-    rgba[1][k] = texel.y;
-    rgba[2][k] = texel.z;
-    rgba[3][k] = texel.w;
-  }
-  for (int c = 0; c < 4; ++c) graph_set(o, c, rgba[c]);
+  graph_set_rgba(o, [&](int k) { return image_sample(texture, u[k], v[k], width[k], o.immediates[1]); });
+}
+
+/// Image on the sides of a box: at a point, by a normal and the width of seams. Immediates: texture, ImageFlags.
+RELIEF_KERNEL void graph_image_box(const GraphOperands& o)
+{
+  const TextureView& texture = o.textures[o.immediates[0]];
+  F8 in[7];
+  for (int i = 0; i < 7; ++i) in[i] = graph_in(o, i);
+  graph_set_rgba(o, [&](int k) {
+    return image_box(texture, {in[0][k], in[1][k], in[2][k]}, {in[3][k], in[4][k], in[5][k]}, in[6][k],
+                     o.immediates[1]);
+  });
+}
+
+/// Tiled image at u, v (v up) with a footprint's width. Immediates: ImageFlags, rows of tiles, and by low and high word
+/// the place of their textures' indices in the tables; −1: no such tile.
+RELIEF_KERNEL void graph_image_tiles(const GraphOperands& o)
+{
+  const float* tiles = o.program.tables + (o.immediates[2] | std::uint32_t{o.immediates[3]} << 16);
+  const F8 u = graph_in(o, 0), v = graph_in(o, 1), width = graph_in(o, 2);
+  graph_set_rgba(o, [&](int k) {
+    float x = u[k], y = v[k];
+    const int tile = image_tile(x, y, o.immediates[1]);
+    if (tile < 0 || tiles[tile] < 0.0f) return kMissingImage;
+    return image_sample(o.textures[static_cast<int>(tiles[tile])], x, y, width[k], o.immediates[0]);
+  });
 }
 
 /// Value of a table over 0…1. Immediates: its first float by low and high word, its entries, whether between two of them it
@@ -342,6 +419,47 @@ RELIEF_KERNEL void graph_checker(const GraphOperands& o)
     sum += abs(floor(p));
   }
   graph_set(o, 0, sum - 2.0f * floor(0.5f * sum));
+}
+
+/// Waves at x, y; then frequency, isotropy and the direction's angle as a fraction of a turn. Outputs: sums of cosines and sines.
+RELIEF_KERNEL void graph_gabor_2d(const GraphOperands& o)
+{
+  const F8 p[2] = {graph_in(o, 0), graph_in(o, 1)};
+  GaborWaves waves{};
+  waves.frequency = graph_in(o, 2);
+  waves.isotropy = graph_in(o, 3);
+  waves.azimuth_turns = graph_in(o, 4);
+  const SinCos8 sum = gabor_noise<2>(p, waves);
+  graph_set(o, 0, sum.cos);
+  graph_set(o, 1, sum.sin);
+}
+
+/// Waves at x, y, z; then frequency, isotropy and the unit direction. Outputs: sums of cosines and sines.
+RELIEF_KERNEL void graph_gabor_3d(const GraphOperands& o)
+{
+  const F8 p[3] = {graph_in(o, 0), graph_in(o, 1), graph_in(o, 2)};
+  GaborWaves waves{graph_in(o, 3), graph_in(o, 4), {graph_in(o, 5), graph_in(o, 6), graph_in(o, 7)}, {}, {}};
+  const auto turns_of = [](float y, float x) { return std::atan2(y, x) / (2.0f * kPi); };
+  const F8 *d = waves.direction, flat = sqrt(d[0] * d[0] + d[1] * d[1]);
+  waves.azimuth_turns = each_lane(d[1], d[0], turns_of);
+  waves.inclination_turns = each_lane(flat, d[2], turns_of);
+  const SinCos8 sum = gabor_noise<3>(p, waves);
+  graph_set(o, 0, sum.cos);
+  graph_set(o, 1, sum.sin);
+}
+
+/// Linear colour of a black body of some kelvins, with the luminance of white; may be below 0.
+RELIEF_KERNEL void graph_blackbody(const GraphOperands& o)
+{
+  alignas(32) float kelvins[8], c[3][8];
+  store8(kelvins, graph_in(o, 0));
+  for (int k = 0; k < 8; ++k) {
+    const Vec3f color = blackbody_color(kelvins[k]);
+    c[0][k] = color.x;
+    c[1][k] = color.y;
+    c[2][k] = color.z;
+  }
+  for (int i = 0; i < 3; ++i) graph_set(o, i, load8(c[i]));
 }
 
 /// Reflectance of a dielectric for a cosine and an index of refraction.

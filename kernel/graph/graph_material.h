@@ -4,6 +4,7 @@
 #include "kernel/bsdf/surface_params.h"
 #include "kernel/graph/graph_mixture.h"
 #include "kernel/graph/graph_registers.h"
+#include "kernel/graph/graph_scene.h"
 #include "kernel/shape/surface_hit.h"
 
 namespace relief {
@@ -21,6 +22,8 @@ struct GraphPoint {
   Vec3f wo;           ///< unit, world
   float uv_width[2];  ///< footprint in each set's uv units
   float footprint;    ///< metres
+  const GraphScene* scene;
+  GraphRay ray;
 };
 
 /// Two vectors along the surface as long as the footprint, as Cycles has them: which way they point is left to chance.
@@ -65,8 +68,96 @@ RELIEF_KERNEL GraphPoint graph_point_shifted(const GraphPoint& at, Vec3f by, Sur
   return out;
 }
 
+/// A named attribute at a point: of the mesh, else of the instance, else 0.
+/// @param component  0 to 2; 3: alpha; 4: as one number
+RELIEF_KERNEL float graph_attribute(const GraphPoint& at, std::uint32_t name, int component)
+{
+  const MeshView& mesh = *at.mesh;
+  for (std::uint32_t i = 0; i < mesh.num_columns; ++i) {
+    const MeshColumn& column = mesh.columns[i];
+    if (column.name != name) continue;
+    const TriangleIndices tri = mesh.triangles[at.triangle];
+    const float w0 = 1.0f - at.bary_u - at.bary_v;
+    const std::uint32_t n = column.num_components;
+    const auto number = [&](std::uint32_t c) {
+      const float* v = column.values + c;
+      return w0 * v[std::size_t{tri.v0} * n] + at.bary_u * v[std::size_t{tri.v1} * n] +
+             at.bary_v * v[std::size_t{tri.v2} * n];
+    };
+    if (component == 4) return n < 3 ? number(0) : (number(0) + number(1) + number(2)) * (1.0f / 3.0f);
+    if (component == 3) return n == 4 ? number(3) : 1.0f;
+    if (n == 1) return number(0);
+    return static_cast<std::uint32_t>(component) < n ? number(static_cast<std::uint32_t>(component)) : 0.0f;
+  }
+  for (std::uint32_t i = 0; i < at.scene->num_columns; ++i) {
+    if (at.scene->columns[i].name != name) continue;
+    const float* v = at.scene->columns[i].values + 4 * (at.instance - at.scene->instances);
+    return component == 4 ? (v[0] + v[1] + v[2]) * (1.0f / 3.0f) : v[component];
+  }
+  return component == 3 ? 1.0f : 0.0f;
+}
+
+/// The mesh's normal at a point, interpolated and not made unit, object space.
+RELIEF_KERNEL Vec3f graph_vertex_normal(const GraphPoint& at)
+{
+  if (at.mesh->N != nullptr) {
+    const TriangleIndices tri = at.mesh->triangles[at.triangle];
+    const float w0 = 1.0f - at.bary_u - at.bary_v;
+    const Vec3f n = w0 * as_vector(at.mesh->N[tri.v0]) + at.bary_u * as_vector(at.mesh->N[tri.v1]) +
+                    at.bary_v * as_vector(at.mesh->N[tri.v2]);
+    if (!is_zero(n)) return n;
+  }
+  return normalize(transform_normal(at.instance->world_from_object, as_normal(at.hit->Ng)));
+}
+
+/// Element of the matrix between a space and the world, both with Z up, of 3 rows and 4 columns.
+/// @param m        takes the world, Y up, to the space
+/// @param element  row by row
+RELIEF_KERNEL float graph_from_world(const Affine3& m, int element)
+{
+  const int column = element & 3;
+  const Vec3f v = column == 0 ? m.x : column == 1 ? -m.z : column == 2 ? m.y : m.p;
+  const int row = element >> 2;
+  return row == 0 ? v.x : row == 1 ? v.y : v.z;
+}
+
+/// @param m  takes the space to the world, Y up
+RELIEF_KERNEL float graph_to_world(const Affine3& m, int element)
+{
+  const int column = element & 3;
+  const Vec3f v = graph_z_up(column == 0 ? m.x : column == 1 ? m.y : column == 2 ? m.z : m.p);
+  const int row = element >> 2;
+  return row == 0 ? v.x : row == 1 ? v.y : v.z;
+}
+
+/// Place of a point in the picture.
+/// @param axis  0: from the left; 1: from the bottom; 0 to 1
+RELIEF_KERNEL float graph_window(const GraphScene& scene, Vec3f P, int axis)
+{
+  const Vec3f p = transform_point(scene.camera_from_world, P);
+  float seen = axis == 0 ? p.x / scene.camera.half_width : p.y / scene.camera.half_height;
+  if (scene.camera.projection == Projection::kPerspective) seen /= -p.z;
+  return 0.5f + 0.5f * seen - (axis == 0 ? scene.camera.shift_x : scene.camera.shift_y);
+}
+
+/// Distance of a point to the nearest of the lines along a triangle's edges, metres.
+RELIEF_KERNEL float graph_edge_distance(const GraphPoint& at)
+{
+  const TriangleIndices tri = at.mesh->triangles[at.triangle];
+  const std::uint32_t corner[3] = {tri.v0, tri.v1, tri.v2};
+  Vec3f p[3];
+  for (int i = 0; i < 3; ++i) p[i] = transform_point(at.instance->world_from_object, at.mesh->P[corner[i]]);
+  float nearest = kInfinity;
+  for (int i = 0; i < 3; ++i) {
+    const Vec3f edge = p[(i + 1) % 3] - p[i];
+    nearest = min(nearest, length_squared(cross(edge, at.hit->P - p[i])) / length_squared(edge));
+  }
+  return __builtin_sqrtf(nearest);
+}
+
+/// @param  index  of quantities that are many
 /// @return world space turns as graph_z_up; components of vectors by `axis`
-RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity)
+RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity, std::uint16_t index)
 {
   using Q = GraphQuantity;
   const auto axis_of = [quantity](Q first) { return static_cast<int>(quantity) - static_cast<int>(first); };
@@ -133,6 +224,53 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity)
     case Q::dpdy_y:
     case Q::dpdy_z:
       return component(graph_z_up(graph_footprint(at).dPdy), axis_of(Q::dpdy_x));
+    case Q::object_normal_x:
+    case Q::object_normal_y:
+    case Q::object_normal_z: {
+      // A normal goes back by the transpose of what points go there by.
+      const Vec3f n = normalize(transform_normal(at.instance->world_from_object, as_normal(hit.Ns)));
+      return component(n, axis_of(Q::object_normal_x)) * to_viewer;
+    }
+    case Q::vertex_normal_x:
+    case Q::vertex_normal_y:
+    case Q::vertex_normal_z:
+      return component(graph_vertex_normal(at), axis_of(Q::vertex_normal_x));
+    case Q::attribute_value:
+      return graph_attribute(at, index, 4);
+    case Q::attribute_x:
+    case Q::attribute_y:
+    case Q::attribute_z:
+    case Q::attribute_alpha:
+      return graph_attribute(at, index, axis_of(Q::attribute_x));
+    case Q::world_from_object:
+      return graph_to_world(at.instance->world_from_object, index);
+    case Q::object_from_world:
+      return graph_from_world(at.instance->object_from_world, index);
+    case Q::camera_from_world: {
+      const float element = graph_from_world(at.scene->camera_from_world, index);
+      return index >= 8 ? -element : element;
+    }
+    case Q::world_from_camera: {
+      const float element = graph_to_world(at.scene->camera.world_from_camera, index);
+      return (index & 3) == 2 ? -element : element;
+    }
+    case Q::ray_kind:
+      return (at.ray.kinds >> index & 1u) != 0 ? 1.0f : 0.0f;
+    case Q::ray_depth:
+      return static_cast<float>(index == static_cast<int>(GraphRayDepth::kTransparent)
+                                    ? at.ray.transparent
+                                    : at.ray.depths >> (8 * index) & 0xffu);
+    case Q::ray_length:
+      return at.ray.length;
+    case Q::window_x:
+    case Q::window_y:
+      return graph_window(*at.scene, hit.P, axis_of(Q::window_x));
+    case Q::parametric_x:
+      return 1.0f - at.bary_u - at.bary_v;
+    case Q::parametric_y:
+      return at.bary_u;
+    case Q::edge_distance:
+      return graph_edge_distance(at);
     case Q::kCount:
       break;
   }
@@ -155,7 +293,7 @@ RELIEF_KERNEL void graph_load_point(const GraphProgramView& program,
   for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
     const GraphInput input = program.inputs[i];
     registers.lanes[input.register_index][lane] =
-        graph_quantity(points[static_cast<int>(input.shift)], input.quantity);
+        graph_quantity(points[static_cast<int>(input.shift)], input.quantity, input.index);
   }
 }
 

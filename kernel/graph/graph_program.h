@@ -38,6 +38,7 @@ struct GraphInput {
   GraphQuantity quantity;
   GraphShift shift;
   std::uint16_t register_index;
+  std::uint16_t index = 0;  ///< which, of a quantity that is many
 };
 
 struct GraphProgramView {

@@ -14,6 +14,7 @@ struct MusgraveSettings {
   F8 falloff;     ///< size of an octave against the one before
   F8 lacunarity;  ///< its frequency against that
   F8 offset, gain;
+  bool repeats;  ///< see noise_signed
 };
 
 template <int kDims>
@@ -35,7 +36,7 @@ RELIEF_KERNEL F8 musgrave_eval(const F8 (&point)[kDims], MusgraveType type, cons
     // The first octave of these two is always there.
     const bool is_base = octave == 0 && (is_hetero || is_ridged);
     const F8 share = is_base ? splat8(1.0f) : n < whole ? splat8(1.0f) : n == rest_at ? rest : F8{};
-    const F8 noise = noise_signed<kDims>(p);
+    const F8 noise = noise_signed<kDims>(p, s.repeats);
     switch (type) {
       case MusgraveType::kMultifractal:
         value *= share * size * noise + 1.0f;

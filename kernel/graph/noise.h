@@ -4,6 +4,8 @@
 // Perlin 2002, "Improving Noise" [P]. Jenkins 2006, "lookup3.c, by Bob Jenkins, May 2006, Public Domain" [J].
 #pragma once
 
+#include <cmath>
+
 #include "kernel/math/lanes.h"
 #include "kernel/math/vec.h"
 
@@ -57,7 +59,7 @@ RELIEF_KERNEL F8 unit_of_word(W8 word)
 
 /// Hash of numbers by their bits, in [0, 1].
 template <int kCount>
-RELIEF_KERNEL F8 hash_unit(const F8 (&key)[kCount])
+[[gnu::always_inline]] RELIEF_KERNEL F8 hash_unit(const F8 (&key)[kCount])
 {
   W8 words[kCount];
   for (int i = 0; i < kCount; ++i) words[i] = bits_of(key[i]);
@@ -99,11 +101,28 @@ RELIEF_KERNEL F8 noise_gradient(W8 hash, const F8 (&d)[kDims])
   }
 }
 
-/// Signed gradient noise, about −1 … 1; 0 where it is not finite.
-/// @param p  any floats
-template <int kDims>
-RELIEF_KERNEL F8 noise_signed(const F8 (&p)[kDims])
+/// A coordinate of noise that repeats, so that there is a lattice however far away a point is.
+RELIEF_KERNEL F8 noise_repeated(F8 x)
 {
+  constexpr float kPeriod = 100000.0f, kWhole = 1000000.0f;
+  const I8 is_far = abs(x) >= kPeriod;
+  if (mask_of(is_far) == 0) return x;
+  for (int k = 0; k < 8; ++k) {
+    // Where floats are whole numbers, points would all lie on the lattice, where noise is 0.
+    const float off_lattice = __builtin_fabsf(x[k]) >= kWhole ? 0.5f : 0.0f;
+    x[k] = std::fmod(x[k], kPeriod) + off_lattice;
+  }
+  return x;
+}
+
+/// Signed gradient noise, about −1 … 1; 0 where it is not finite.
+/// @param at       any floats
+/// @param repeats  every 100,000 units along each axis
+template <int kDims>
+RELIEF_KERNEL F8 noise_signed(const F8 (&at)[kDims], bool repeats = false)
+{
+  F8 p[kDims];
+  for (int i = 0; i < kDims; ++i) p[i] = repeats ? noise_repeated(at[i]) : at[i];
   // Brings the ranges of the dimensions to one.
   constexpr float kScale[] = {0.25f, 0.6616f, 0.9820f, 0.8344f};
   W8 cell[kDims];
@@ -145,8 +164,9 @@ struct NoiseOctaves {
 
 /// Sum of octaves of signed noise.
 /// @param normalize  in [0, 1] around ½, whatever the octaves; else as it comes
+/// @param repeats    see noise_signed
 template <int kDims>
-RELIEF_KERNEL F8 noise_fractal(const F8 (&p)[kDims], const NoiseOctaves& octaves, bool normalize)
+RELIEF_KERNEL F8 noise_fractal(const F8 (&p)[kDims], const NoiseOctaves& octaves, bool normalize, bool repeats)
 {
   const F8 whole = floor(octaves.detail);
   const F8 rest = octaves.detail - whole;
@@ -159,7 +179,7 @@ RELIEF_KERNEL F8 noise_fractal(const F8 (&p)[kDims], const NoiseOctaves& octaves
   for (int octave = 0; octave <= last; ++octave) {
     F8 scaled[kDims];
     for (int i = 0; i < kDims; ++i) scaled[i] = p[i] * frequency;
-    const F8 noise = noise_signed<kDims>(scaled) * amplitude;
+    const F8 noise = noise_signed<kDims>(scaled, repeats) * amplitude;
     const F8 n = splat8(static_cast<float>(octave));
     const I8 is_whole = n <= whole, is_rest = n == whole + 1.0f;
     sum_with_rest = is_rest ? sum + noise : sum_with_rest;

@@ -13,13 +13,23 @@ namespace relief {
 enum class VoronoiFeature : std::uint16_t { kF1, kF2, kSmoothF1, kDistanceToEdge, kSphereRadius };
 enum class VoronoiMetric : std::uint16_t { kEuclidean, kManhattan, kChebychev, kMinkowski };
 
-template <int kDims>
+enum VoronoiFlags : std::uint16_t {
+  kVoronoiFar = 1u << 0,        ///< cells count however far they are (4.0 on), not to a distance of 8
+  kVoronoiPcg = 1u << 1,        ///< the cells of 5.0 on
+  kVoronoiNormalize = 1u << 2,  ///< distances and colours in 0…1
+};
+
+/// @tparam kPcg  the cells of 5.0 on; a parameter, as a choice in the innermost loop costs a third more
+template <int kDims, bool kPcg = false>
 struct VoronoiSettings {
   VoronoiFeature feature;
   VoronoiMetric metric;
   F8 smoothness;  ///< (0, ½]
   F8 exponent;    ///< of Minkowski's metric
   F8 randomness;  ///< [0, 1]: of the points in their cells
+  unsigned flags = 0;
+
+  F8 far() const { return splat8((flags & kVoronoiFar) != 0 ? 3.402823466e38f : 8.0f); }
 };
 
 template <int kDims>
@@ -29,12 +39,45 @@ struct Voronoi {
   F8 position[kDims]{};  ///< of its point
 };
 
+/// Numbers in [0, 1] of whole ones, as many.
+/// @source Jarzynski and Olano 2020, "Hash Functions for GPU Rendering": pcg2d, pcg3d, pcg4d, with a signed shift
+template <int kCount>
+RELIEF_KERNEL void hash_pcg(const F8 (&key)[kCount], F8 (&unit)[kCount])
+{
+  W8 v[kCount];
+  for (int i = 0; i < kCount; ++i) {
+    const F8 bounded = clamp(key[i], -2147483648.0f, 2147483520.0f);
+    v[i] = __builtin_bit_cast(W8, __builtin_convertvector(bounded, I8)) * 1664525u + 1013904223u;
+  }
+  const auto stir = [&v] {
+    if constexpr (kCount == 2) {
+      v[0] += v[1] * 1664525u;
+      v[1] += v[0] * 1664525u;
+    } else {
+      v[0] += v[1] * v[kCount - 1];
+      v[1] += v[2] * v[0];
+      v[2] += v[0] * v[1];
+      if constexpr (kCount == 4) v[3] += v[1] * v[2];
+    }
+  };
+  stir();
+  for (W8& x : v) x ^= __builtin_bit_cast(W8, __builtin_bit_cast(I8, x) >> 16);
+  stir();
+  for (int i = 0; i < kCount; ++i) {
+    unit[i] = __builtin_convertvector(__builtin_bit_cast(I8, v[i] & 0x7fffffffu), F8) / 2147483648.0f;
+  }
+}
+
+// What is done for each cell is inlined by force: the cells of 5.0 on are a second caller, and calls cost a third.
+
 /// The point of a cell, [0, 1] along each axis.
 /// @param cell  its lower corner
-template <int kDims>
-RELIEF_KERNEL void voronoi_point(const F8 (&cell)[kDims], F8 (&point)[kDims])
+template <int kDims, bool kPcg>
+[[gnu::always_inline]] RELIEF_KERNEL void voronoi_point(const F8 (&cell)[kDims], F8 (&point)[kDims])
 {
-  if constexpr (kDims == 1) {
+  if constexpr (kPcg && kDims > 1) {
+    hash_pcg<kDims>(cell, point);
+  } else if constexpr (kDims == 1) {
     point[0] = hash_unit(cell);
   } else if constexpr (kDims == 4) {
     const F8 x = cell[0], y = cell[1], z = cell[2], w = cell[3];
@@ -54,9 +97,17 @@ RELIEF_KERNEL void voronoi_point(const F8 (&cell)[kDims], F8 (&point)[kDims])
 }
 
 /// The colour of a cell.
-template <int kDims>
+template <int kDims, bool kPcg>
 RELIEF_KERNEL void voronoi_color(const F8 (&cell)[kDims], F8 (&color)[3])
 {
+  if constexpr (kPcg && kDims > 1) {
+    constexpr int kCount = kDims == 4 ? 4 : 3;
+    F8 key[kCount]{}, unit[kCount];
+    for (int i = 0; i < kDims; ++i) key[i] = cell[i];
+    hash_pcg<kCount>(key, unit);
+    for (int i = 0; i < 3; ++i) color[i] = unit[i];
+    return;
+  }
   color[0] = hash_unit(cell);
   if constexpr (kDims == 4) {
     const F8 x = cell[0], y = cell[1], z = cell[2], w = cell[3];
@@ -72,8 +123,10 @@ RELIEF_KERNEL void voronoi_color(const F8 (&cell)[kDims], F8 (&color)[3])
   }
 }
 
-template <int kDims>
-RELIEF_KERNEL F8 voronoi_distance(const F8 (&a)[kDims], const F8 (&b)[kDims], const VoronoiSettings<kDims>& settings)
+template <int kDims, bool kPcg>
+[[gnu::always_inline]] RELIEF_KERNEL F8 voronoi_distance(const F8 (&a)[kDims],
+                                                         const F8 (&b)[kDims],
+                                                         const VoronoiSettings<kDims, kPcg>& settings)
 {
   F8 sum{};
   if (kDims == 1) return abs(a[0] - b[0]);
@@ -101,8 +154,11 @@ RELIEF_KERNEL F8 voronoi_distance(const F8 (&a)[kDims], const F8 (&b)[kDims], co
 
 /// Calls visit(offset, point) for all cells up to `reach` away: the offset of a cell and its point from the corner of the
 /// middle one. The first axis moves fastest.
-template <int kDims, typename F>
-RELIEF_KERNEL void voronoi_cells(const F8 (&cell)[kDims], F8 randomness, int reach, F&& visit)
+template <int kDims, bool kPcg, typename F>
+[[gnu::always_inline]] RELIEF_KERNEL void voronoi_cells(const F8 (&cell)[kDims],
+                                                        const VoronoiSettings<kDims, kPcg>& settings,
+                                                        int reach,
+                                                        F&& visit)
 {
   const int side = 2 * reach + 1;
   int count = 1;
@@ -113,8 +169,8 @@ RELIEF_KERNEL void voronoi_cells(const F8 (&cell)[kDims], F8 randomness, int rea
       offset[i] = splat8(static_cast<float>(rest % side - reach));
       corner[i] = cell[i] + offset[i];
     }
-    voronoi_point<kDims>(corner, point);
-    for (int i = 0; i < kDims; ++i) point[i] = offset[i] + point[i] * randomness;
+    voronoi_point<kDims, kPcg>(corner, point);
+    for (int i = 0; i < kDims; ++i) point[i] = offset[i] + point[i] * settings.randomness;
     visit(offset, point);
   }
 }
@@ -126,15 +182,14 @@ RELIEF_KERNEL void assign_where(I8 is, F8 (&to)[kDims], const F8 (&from)[kDims])
 }
 
 /// The nearest point, or the second, and its cell.
-template <int kDims>
+template <int kDims, bool kPcg>
 RELIEF_KERNEL Voronoi<kDims> voronoi_nearest(const F8 (&cell)[kDims],
                                              const F8 (&local)[kDims],
-                                             const VoronoiSettings<kDims>& settings)
+                                             const VoronoiSettings<kDims, kPcg>& settings)
 {
-  constexpr float kFar = 8.0f;
-  F8 first = splat8(kFar), second = splat8(kFar);
+  F8 first = settings.far(), second = settings.far();
   F8 offset1[kDims]{}, offset2[kDims]{}, point1[kDims]{}, point2[kDims]{};
-  voronoi_cells<kDims>(cell, settings.randomness, 1, [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
+  voronoi_cells<kDims>(cell, settings, 1, [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
     const F8 distance = voronoi_distance<kDims>(point, local, settings);
     const I8 is_first = distance < first, is_second = ~is_first & (distance < second);
     second = is_first ? first : is_second ? distance : second;
@@ -154,29 +209,33 @@ RELIEF_KERNEL Voronoi<kDims> voronoi_nearest(const F8 (&cell)[kDims],
     at[i] = cell[i] + (is_f2 ? offset2[i] : offset1[i]);
     out.position[i] = (is_f2 ? point2[i] : point1[i]) + cell[i];
   }
-  voronoi_color<kDims>(at, out.color);
+  voronoi_color<kDims, kPcg>(at, out.color);
   return out;
 }
 
 /// All points near, the nearer the more.
-template <int kDims>
+template <int kDims, bool kPcg>
 RELIEF_KERNEL Voronoi<kDims> voronoi_smooth(const F8 (&cell)[kDims],
                                             const F8 (&local)[kDims],
-                                            const VoronoiSettings<kDims>& settings)
+                                            const VoronoiSettings<kDims, kPcg>& settings)
 {
   Voronoi<kDims> out;
-  out.distance = splat8(8.0f);
+  // Where no distance is too far, the first cell counts whole.
+  const bool counts_first = (settings.flags & kVoronoiFar) != 0;
+  F8 least = splat8(counts_first ? 1.0f : 0.0f);
+  out.distance = splat8(counts_first ? 0.0f : 8.0f);
   const F8 smoothness = settings.smoothness;
-  voronoi_cells<kDims>(cell, settings.randomness, 2, [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
+  voronoi_cells<kDims>(cell, settings, 2, [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
     const F8 distance = voronoi_distance<kDims>(point, local, settings);
-    const F8 t = clamp(0.5f + 0.5f * (out.distance - distance) / smoothness, 0.0f, 1.0f);
+    const F8 t = max(clamp(0.5f + 0.5f * (out.distance - distance) / smoothness, 0.0f, 1.0f), least);
     const F8 h = t * t * (3.0f - 2.0f * t);
+    least = F8{};
     F8 correction = smoothness * h * (1.0f - h);
     out.distance = (out.distance + h * (distance - out.distance)) - correction;
     correction /= 1.0f + 3.0f * smoothness;
     F8 corner[kDims], color[3];
     for (int i = 0; i < kDims; ++i) corner[i] = cell[i] + offset[i];
-    voronoi_color<kDims>(corner, color);
+    voronoi_color<kDims, kPcg>(corner, color);
     for (int i = 0; i < 3; ++i) out.color[i] = (out.color[i] + h * (color[i] - out.color[i])) - correction;
     for (int i = 0; i < kDims; ++i) out.position[i] = (out.position[i] + h * (point[i] - out.position[i])) - correction;
   });
@@ -185,17 +244,19 @@ RELIEF_KERNEL Voronoi<kDims> voronoi_smooth(const F8 (&cell)[kDims],
 }
 
 /// Distance to the nearest border between two cells.
-template <int kDims>
-RELIEF_KERNEL F8 voronoi_edge(const F8 (&cell)[kDims], const F8 (&local)[kDims], const VoronoiSettings<kDims>& settings)
+template <int kDims, bool kPcg>
+RELIEF_KERNEL F8 voronoi_edge(const F8 (&cell)[kDims],
+                              const F8 (&local)[kDims],
+                              const VoronoiSettings<kDims, kPcg>& settings)
 {
-  F8 nearest = splat8(8.0f);
+  F8 nearest = settings.far();
   F8 to_nearest[kDims]{};
   const auto squared = [](const F8(&v)[kDims]) {
     F8 sum{};
     for (int i = 0; i < kDims; ++i) sum += v[i] * v[i];
     return sum;
   };
-  voronoi_cells<kDims>(cell, settings.randomness, 1, [&](const F8(&)[kDims], const F8(&point)[kDims]) {
+  voronoi_cells<kDims>(cell, settings, 1, [&](const F8(&)[kDims], const F8(&point)[kDims]) {
     F8 to_point[kDims];
     for (int i = 0; i < kDims; ++i) to_point[i] = point[i] - local[i];
     const F8 distance = squared(to_point);
@@ -203,8 +264,8 @@ RELIEF_KERNEL F8 voronoi_edge(const F8 (&cell)[kDims], const F8 (&local)[kDims],
     nearest = is_nearer ? distance : nearest;
     assign_where(is_nearer, to_nearest, to_point);
   });
-  F8 edge = splat8(8.0f);
-  voronoi_cells<kDims>(cell, settings.randomness, 1, [&](const F8(&)[kDims], const F8(&point)[kDims]) {
+  F8 edge = settings.far();
+  voronoi_cells<kDims>(cell, settings, 1, [&](const F8(&)[kDims], const F8(&point)[kDims]) {
     F8 across[kDims], middle[kDims];
     for (int i = 0; i < kDims; ++i) {
       const F8 to_point = point[i] - local[i];
@@ -223,19 +284,19 @@ RELIEF_KERNEL F8 voronoi_edge(const F8 (&cell)[kDims], const F8 (&local)[kDims],
 }
 
 /// Half the distance from the nearest point to the point nearest to that.
-template <int kDims>
+template <int kDims, bool kPcg>
 RELIEF_KERNEL F8 voronoi_radius(const F8 (&cell)[kDims],
                                 const F8 (&local)[kDims],
-                                const VoronoiSettings<kDims>& settings)
+                                const VoronoiSettings<kDims, kPcg>& settings)
 {
   const auto distance_of = [](const F8(&a)[kDims], const F8(&b)[kDims]) {
     F8 sum{};
     for (int i = 0; i < kDims; ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
     return sqrt(sum);
   };
-  F8 nearest = splat8(8.0f);
+  F8 nearest = settings.far();
   F8 own_offset[kDims]{}, own_point[kDims]{};
-  voronoi_cells<kDims>(cell, settings.randomness, 1, [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
+  voronoi_cells<kDims>(cell, settings, 1, [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
     const F8 distance = distance_of(point, local);
     const I8 is_nearer = distance < nearest;
     nearest = is_nearer ? distance : nearest;
@@ -247,8 +308,8 @@ RELIEF_KERNEL F8 voronoi_radius(const F8 (&cell)[kDims],
     own_cell[i] = cell[i] + own_offset[i];
     from_own[i] = own_point[i] - own_offset[i];
   }
-  F8 radius = splat8(8.0f);
-  voronoi_cells<kDims>(own_cell, settings.randomness, 1, [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
+  F8 radius = settings.far();
+  voronoi_cells<kDims>(own_cell, settings, 1, [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
     bool is_own = true;
     for (int i = 0; i < kDims; ++i) is_own = is_own && offset[i][0] == 0.0f;
     if (!is_own) radius = min(radius, distance_of(point, from_own));
@@ -257,8 +318,8 @@ RELIEF_KERNEL F8 voronoi_radius(const F8 (&cell)[kDims],
 }
 
 /// @param p  any floats
-template <int kDims>
-RELIEF_KERNEL Voronoi<kDims> voronoi_eval(const F8 (&p)[kDims], const VoronoiSettings<kDims>& settings)
+template <int kDims, bool kPcg>
+RELIEF_KERNEL Voronoi<kDims> voronoi_eval(const F8 (&p)[kDims], const VoronoiSettings<kDims, kPcg>& settings)
 {
   F8 cell[kDims], local[kDims];
   for (int i = 0; i < kDims; ++i) {
@@ -280,6 +341,61 @@ RELIEF_KERNEL Voronoi<kDims> voronoi_eval(const F8 (&p)[kDims], const VoronoiSet
       break;
   }
   return out;
+}
+
+RELIEF_KERNEL F8 mixed(F8 a, F8 b, F8 t) { return a + t * (b - a); }
+
+/// Octaves of cells, each finer than the one before: sums of distances and colours, mixes of positions; the least distance
+/// to a border.
+template <int kDims, bool kPcg>
+RELIEF_KERNEL Voronoi<kDims> voronoi_fractal(const F8 (&p)[kDims],
+                                             const VoronoiSettings<kDims, kPcg>& settings,
+                                             const NoiseOctaves& octaves)
+{
+  const bool is_edge = settings.feature == VoronoiFeature::kDistanceToEdge;
+  const bool is_radius = settings.feature == VoronoiFeature::kSphereRadius;
+  const F8 detail = octaves.roughness == 0.0f || is_radius ? F8{} : octaves.detail;
+  const I8 is_single = detail == 0.0f;
+  const F8 rest = detail - floor(detail), last_octave = -floor(-detail);
+  float last = 0.0f;
+  for (int k = 0; k < 8; ++k) last = last_octave[k] > last ? last_octave[k] : last;
+  F8 corner[kDims], origin[kDims]{};
+  for (F8& x : corner) x = 0.5f + 0.5f * settings.randomness;
+  F8 most = is_edge ? corner[0] : voronoi_distance<kDims>(origin, corner, settings);
+  if (settings.feature == VoronoiFeature::kF2) most *= 2.0f;
+  F8 amplitude = splat8(1.0f), scale = splat8(1.0f), size = is_edge ? most : F8{};
+  Voronoi<kDims> sum;
+  if (is_edge) sum.distance = splat8(8.0f);
+  for (int n = 0; n <= static_cast<int>(last); ++n) {
+    F8 scaled[kDims];
+    for (int i = 0; i < kDims; ++i) scaled[i] = p[i] * scale;
+    Voronoi<kDims> octave = voronoi_eval<kDims>(scaled, settings);
+    const F8 number = splat8(static_cast<float>(n));
+    const I8 is_whole = number <= detail, is_there = number <= last_octave;
+    const F8 share = is_whole ? splat8(1.0f) : is_there ? rest : F8{};
+    if (is_edge) {
+      const F8 distance = mixed(sum.distance, min(sum.distance, octave.distance / scale), amplitude);
+      const F8 mixed_distance = is_whole ? distance : mixed(sum.distance, min(sum.distance, distance), share);
+      const F8 mixed_size = mixed(size, mixed(size, most / scale, amplitude), share);
+      sum.distance = is_single ? (n == 0 ? octave.distance : sum.distance) : mixed_distance;
+      size = is_single ? size : mixed_size;
+    } else {
+      sum.distance += share * octave.distance * amplitude;
+      for (int c = 0; c < 3; ++c) sum.color[c] += share * octave.color[c] * amplitude;
+      for (int i = 0; i < kDims; ++i) {
+        const F8 position = mixed(sum.position[i], octave.position[i] / scale, amplitude);
+        sum.position[i] = is_whole ? position : mixed(sum.position[i], position, share);
+      }
+      size += share * amplitude;
+    }
+    amplitude = is_whole ? amplitude * octaves.roughness : amplitude;
+    scale = is_whole ? scale * octaves.lacunarity : scale;
+  }
+  if ((settings.flags & kVoronoiNormalize) != 0 && !is_radius) {
+    sum.distance /= is_edge ? size : size * most;
+    for (F8& c : sum.color) c /= size;
+  }
+  return sum;
 }
 
 }  // namespace relief

@@ -11,6 +11,13 @@ struct TriangleIndices {
   std::uint32_t v0 = 0, v1 = 0, v2 = 0;
 };
 
+/// A named vertex attribute that value graphs read.
+struct MeshColumn {
+  const float* values = nullptr;  ///< num_components a vertex
+  std::uint16_t name = 0;         ///< place in Scene::attribute_names
+  std::uint16_t num_components = 0;
+};
+
 /// One triangle mesh with one material. Optional attributes are null when absent.
 struct MeshView {
   const Vec3f* P = nullptr;                    ///< object space, metres, num_vertices
@@ -19,8 +26,9 @@ struct MeshView {
   const Vec4f* tangent = nullptr;              ///< unit, w = handedness; null: derived from uv
   const Vec4f* color = nullptr;                ///< COLOR_0, linear, multiplies base colour and alpha
   const Vec3f* generated = nullptr;            ///< coordinates that value graphs call so; null: absent
+  const MeshColumn* columns = nullptr;         ///< num_columns
   const TriangleIndices* triangles = nullptr;  ///< num_triangles
-  std::uint32_t num_vertices = 0, num_triangles = 0;
+  std::uint32_t num_vertices = 0, num_triangles = 0, num_columns = 0;
 };
 
 enum InstanceFlag : std::uint32_t {

@@ -90,6 +90,18 @@ surface_interaction_locate(const KernelGlobals& g, const PathState& state, std::
   return at;
 }
 
+/// What kinds of ray a path's present one is: bits GraphRayKind.
+RELIEF_KERNEL std::uint32_t path_ray_kinds(const PathState& state, std::uint32_t path)
+{
+  const auto bit = [](GraphRayKind kind) { return 1u << static_cast<int>(kind); };
+  const auto event = static_cast<PathEvent>(path_event(state.flags[path]));
+  if (event == PathEvent::kCamera) return bit(GraphRayKind::kCamera);
+  const std::uint32_t side =
+      bit(event == PathEvent::kTransmission ? GraphRayKind::kTransmission : GraphRayKind::kReflection);
+  if (event == PathEvent::kDiffuse) return side | bit(GraphRayKind::kDiffuse);
+  return side | bit(GraphRayKind::kGlossy) | (state.pdf[path] > 0.0f ? 0u : bit(GraphRayKind::kSingular));
+}
+
 /// What a graph may read of a located point.
 RELIEF_KERNEL GraphPoint surface_graph_point(const KernelGlobals& g,
                                              const PathState& state,
@@ -97,9 +109,23 @@ RELIEF_KERNEL GraphPoint surface_graph_point(const KernelGlobals& g,
                                              const SurfaceInteraction& at,
                                              Vec3f wo)
 {
-  return {
-      &g.meshes[at.instance->mesh_index], at.instance, at.triangle, state.hit_u[path], state.hit_v[path], &at.hit, wo,
-      {at.uv_width[0], at.uv_width[1]}, at.cone.width};
+  const std::uint32_t kinds = path_ray_kinds(state, path);
+  float ray_length = state.hit_t[path];
+  // Camera rays are measured from the near clipping plane, as Cycles does.
+  if (kinds == 1u << static_cast<int>(GraphRayKind::kCamera) && g.camera.clip_start > 0.0f) {
+    ray_length -= g.camera.clip_start / -dot(wo, g.camera_forward);
+  }
+  return {&g.meshes[at.instance->mesh_index],
+          at.instance,
+          at.triangle,
+          state.hit_u[path],
+          state.hit_v[path],
+          &at.hit,
+          wo,
+          {at.uv_width[0], at.uv_width[1]},
+          at.cone.width,
+          &g.graph_scene,
+          {kinds, state.bounces[path], state.flags[path] >> kPathTransparentShift, ray_length}};
 }
 
 /// Resolves the closures of a located point: its lobes, its frame, and the parameters that stages ask for.

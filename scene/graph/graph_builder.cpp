@@ -8,6 +8,7 @@
 #include <string>
 
 #include "kernel/graph/graph_eval.h"
+#include "kernel/graph/image.h"
 
 namespace relief {
 namespace {
@@ -15,7 +16,10 @@ namespace {
 const GraphOpShape& shape_of(GraphOp op) { return kGraphOpShapes[static_cast<int>(op)]; }
 
 /// Whether an operation gives the same whatever the scene.
-bool can_fold(GraphOp op) { return op != GraphOp::image; }
+bool can_fold(GraphOp op)
+{
+  return op != GraphOp::image && op != GraphOp::image_box && op != GraphOp::image_tiles;
+}
 
 }  // namespace
 
@@ -59,12 +63,13 @@ GraphScalar GraphBuilder::constant(float value)
   return add(node, {-1, std::bit_cast<std::int32_t>(value)});
 }
 
-GraphScalar GraphBuilder::quantity(GraphQuantity quantity, GraphShift shift)
+GraphScalar GraphBuilder::quantity(GraphQuantity quantity, std::uint16_t index, GraphShift shift)
 {
   Node node{Node::Kind::kQuantity};
   node.quantity = quantity;
+  node.index = index;
   node.shift = shift;
-  return add(node, {-2, static_cast<std::int64_t>(quantity), static_cast<std::int64_t>(shift)});
+  return add(node, {-2, static_cast<std::int64_t>(quantity), static_cast<std::int64_t>(shift), index});
 }
 
 bool GraphBuilder::is_constant(GraphScalar a, float* value) const
@@ -123,7 +128,6 @@ std::vector<GraphScalar> GraphBuilder::fold(GraphOp op,
 {
   const GraphOpShape& shape = shape_of(op);
   GraphProgram program;
-  if (op == GraphOp::table) program.tables = tables_;
   program.code.push_back(static_cast<std::uint16_t>(op));
   program.code.insert(program.code.end(), immediates.begin(), immediates.end());
   for (int i = 0; i < shape.num_outputs; ++i) program.code.push_back(static_cast<std::uint16_t>(i));
@@ -131,8 +135,10 @@ std::vector<GraphScalar> GraphBuilder::fold(GraphOp op,
     program.code.push_back(static_cast<std::uint16_t>(kMostGraphRegisters + i));
     program.constants.push_back(nodes_[static_cast<std::size_t>(inputs[i].index)].value);
   }
+  GraphProgramView view = program.view();
+  view.tables = tables_.data();
   GraphRegisters registers;
-  graph_run(program.view(), nullptr, registers);
+  graph_run(view, nullptr, registers);
   std::vector<GraphScalar> out;
   for (int i = 0; i < shape.num_outputs; ++i) out.push_back(constant(registers.lanes[i][0]));
   return out;
@@ -220,6 +226,28 @@ std::uint32_t GraphBuilder::add_table(std::span<const float> values)
   return it->second;
 }
 
+/// Immediates of an operation in a program, which gets the table that it reads.
+/// @param places  of the tables that the program has, by those in tables_
+std::vector<std::uint16_t> GraphBuilder::placed(const Operation& operation,
+                                                std::map<std::uint32_t, std::uint32_t>& places,
+                                                GraphProgram& program) const
+{
+  std::vector<std::uint16_t> immediates = operation.immediates;
+  const bool are_tiles = operation.op == GraphOp::image_tiles;
+  if (!are_tiles && operation.op != GraphOp::table) return immediates;
+  const std::size_t low = are_tiles ? 2 : 0;  // where the place stands
+  const int size = are_tiles ? immediates[1] * kImageTileColumns : immediates[2];
+  const std::uint32_t from = immediates[low] | std::uint32_t{immediates[low + 1]} << 16;
+  const auto [it, is_new] = places.try_emplace(from, static_cast<std::uint32_t>(program.tables.size()));
+  if (is_new) {
+    const auto row = tables_.begin() + from;
+    program.tables.insert(program.tables.end(), row, row + size);
+  }
+  immediates[low] = static_cast<std::uint16_t>(it->second & 0xffffu);
+  immediates[low + 1] = static_cast<std::uint16_t>(it->second >> 16);
+  return immediates;
+}
+
 void GraphBuilder::set_output(GraphOutput output, const GraphVector& value)
 {
   outputs_[static_cast<std::size_t>(output)] = value;
@@ -264,7 +292,7 @@ GraphScalar GraphBuilder::shifted(GraphScalar a, GraphShift shift)
     if (node.kind != Node::Kind::kOperation) {
       // What a bump within a bump has moved already stays where it is.
       const bool moves = node.kind == Node::Kind::kQuantity && node.shift == GraphShift::kNone;
-      shifted_[{of.index, shift}] = moves ? quantity(node.quantity, shift) : of;
+      shifted_[{of.index, shift}] = moves ? quantity(node.quantity, node.index, shift) : of;
       stack.pop_back();
       continue;
     }
@@ -362,7 +390,7 @@ GraphProgram GraphBuilder::compile() const
   for (const GraphScalar a : wanted()) last_use[static_cast<std::size_t>(a.index)] = kEver;
 
   GraphProgram program;
-  program.tables = tables_;
+  std::map<std::uint32_t, std::uint32_t> table_places;
   std::vector<std::uint16_t> operand_of(nodes_.size(), kNoGraphOperand);
   std::vector<std::uint16_t> free_registers;
   const auto take_register = [&] {
@@ -380,7 +408,7 @@ GraphProgram GraphBuilder::compile() const
     if (last_use[i] < 0) continue;
     if (nodes_[i].kind == Node::Kind::kQuantity) {
       operand_of[i] = take_register();
-      program.inputs.push_back({nodes_[i].quantity, nodes_[i].shift, operand_of[i]});
+      program.inputs.push_back({nodes_[i].quantity, nodes_[i].shift, operand_of[i], nodes_[i].index});
     } else if (nodes_[i].kind == Node::Kind::kConstant) {
       constexpr std::size_t kMostConstants = kNoGraphOperand - kMostGraphRegisters;
       if (program.constants.size() == kMostConstants) {
@@ -395,7 +423,8 @@ GraphProgram GraphBuilder::compile() const
     // Outputs first: an operation may write one before it has read all that it reads.
     for (const GraphScalar a : operation.outputs) operand_of[static_cast<std::size_t>(a.index)] = take_register();
     program.code.push_back(static_cast<std::uint16_t>(operation.op));
-    program.code.insert(program.code.end(), operation.immediates.begin(), operation.immediates.end());
+    const std::vector<std::uint16_t> immediates = placed(operation, table_places, program);
+    program.code.insert(program.code.end(), immediates.begin(), immediates.end());
     for (const GraphScalar a : operation.outputs) program.code.push_back(operand_of[static_cast<std::size_t>(a.index)]);
     for (const GraphScalar a : operation.inputs) program.code.push_back(operand_of[static_cast<std::size_t>(a.index)]);
     std::vector<std::int32_t> ended;

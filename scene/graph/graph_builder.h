@@ -36,7 +36,8 @@ class GraphTooLarge : public std::runtime_error {
 class GraphBuilder {
  public:
   GraphScalar constant(float value);
-  GraphScalar quantity(GraphQuantity quantity, GraphShift shift = GraphShift::kNone);
+  /// @param index  of quantities that are many, see GraphInput
+  GraphScalar quantity(GraphQuantity quantity, std::uint16_t index = 0, GraphShift shift = GraphShift::kNone);
 
   /// @param inputs      as many as the operation has
   /// @param immediates  likewise
@@ -84,6 +85,7 @@ class GraphBuilder {
     float value = 0;
     GraphQuantity quantity{};
     GraphShift shift{};
+    std::uint16_t index = 0;  ///< of the quantity
   };
   struct Operation {
     GraphOp op;
@@ -100,6 +102,9 @@ class GraphBuilder {
                                 std::span<const GraphScalar> inputs,
                                 std::span<const std::uint16_t> immediates);
   std::vector<std::int32_t> order() const;
+  std::vector<std::uint16_t> placed(const Operation& operation,
+                                    std::map<std::uint32_t, std::uint32_t>& places,
+                                    GraphProgram& program) const;
 
   std::vector<Node> nodes_;
   std::vector<Operation> operations_;

@@ -28,6 +28,7 @@ struct GraphSocket {
   std::string_view name;
   GraphType type;
   float value[3] = {0, 0, 0};  ///< of an input that is not given
+  bool is_normal = false;      ///< that value is the shading normal instead
 };
 
 /// One node while it is turned into operations.
@@ -39,6 +40,8 @@ struct GraphNode {
   const std::set<std::string_view>& given;  ///< inputs that the file gives
   /// Texture that an option names, as an index into the scene's.
   const std::function<int(const JsonReader&)>& texture;
+  /// Place of an attribute's name, for quantities.
+  const std::function<std::uint16_t(const JsonReader&, const std::string&)>& attribute;
 
   GraphScalar number(std::string_view name) const { return inputs.at(name).v[0]; }
   const GraphVector& vector(std::string_view name) const { return inputs.at(name).v; }

@@ -17,6 +17,7 @@ struct GraphProgram {
   std::vector<SurfaceClosureSpec> closures;
   std::uint16_t surface_normal = kNoGraphOperand;  ///< see GraphProgramView
   int num_registers = 0;
+  std::vector<std::uint16_t> attributes;  ///< places in Scene::attribute_names that it reads, sorted
 
   GraphProgramView view() const;
   std::size_t bytes() const;

@@ -2,16 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <vector>
 
 #include "scene/graph/closure_reader.h"
 #include "scene/graph/graph_nodes.h"
+#include "scene/graph/graph_vectors.h"
 #include "scene/khronos_extensions.h"
 
 namespace relief {
 namespace {
 
 constexpr std::size_t kMostNodes = 65536;
+
+/// Every point looks its attributes up among those of its mesh.
+constexpr std::size_t kMostAttributes = 1024;
 
 /// Where a value comes from.
 struct Reference {
@@ -31,10 +36,12 @@ struct Reader {
   const GltfDocument& document;
   std::string file, path;  ///< of the graph
   TextureTable& textures;
+  std::vector<std::string>& attribute_names;
   Warnings& warnings;
   GraphBuilder build;
   std::vector<Source> sources;
   std::vector<std::map<std::string_view, GraphValue>> values;  ///< outputs of each node
+  std::set<std::uint16_t> attributes;                          ///< places of the names that are read
 
   GraphValue literal(const JsonReader& parent, std::string_view name, GraphType type);
   Reference reference(const JsonReader& parent, std::string_view name, std::size_t num_nodes) const;
@@ -42,6 +49,7 @@ struct Reader {
   std::vector<std::size_t> order() const;
   GraphValue look_up(const JsonReader& parent, std::string_view name, const Reference& reference) const;
   GraphValue input(const JsonReader& parent, std::string_view name, GraphType type);
+  std::uint16_t attribute(const JsonReader& node, const std::string& name);
   void lower(std::size_t index);
   void read_nodes(const JsonReader& graph);
   void read_outputs(const JsonReader& graph);
@@ -140,11 +148,29 @@ GraphValue Reader::input(const JsonReader& parent, std::string_view name, GraphT
   return graph_convert(build, look_up(parent, name, reference(parent, name, sources.size())), type);
 }
 
+/// Place of an attribute's name.
+std::uint16_t Reader::attribute(const JsonReader& node, const std::string& name)
+{
+  const auto it = std::find(attribute_names.begin(), attribute_names.end(), name);
+  const auto place = static_cast<std::size_t>(it - attribute_names.begin());
+  if (it == attribute_names.end()) {
+    if (place == kMostAttributes) node.fail("name", "one of the scene's first 1,024 names of attributes");
+    attribute_names.push_back(name);
+  }
+  attributes.insert(static_cast<std::uint16_t>(place));
+  return static_cast<std::uint16_t>(place);
+}
+
 void Reader::lower(std::size_t index)
 {
   const Source& source = sources[index];
   std::map<std::string_view, GraphValue> inputs;
   for (const GraphSocket& socket : source.kind->inputs) {
+    if (socket.is_normal) {
+      inputs[socket.name] = {
+          socket.type, quantities(build, GraphQuantity::normal_x, GraphQuantity::normal_y, GraphQuantity::normal_z)};
+      continue;
+    }
     inputs[socket.name] = {
         socket.type,
         {build.constant(socket.value[0]), build.constant(socket.value[1]), build.constant(socket.value[2])}};
@@ -168,7 +194,9 @@ void Reader::lower(std::size_t index)
     if (ref.texture_index > 0xffff) r.fail("texture", "one of the scene's first 65,536 textures");
     return ref.texture_index;
   };
-  GraphNode node{build, source.reader, inputs, values[index], given, texture};
+  const std::function<std::uint16_t(const JsonReader&, const std::string&)> named =
+      [this](const JsonReader& r, const std::string& name) { return attribute(r, name); };
+  GraphNode node{build, source.reader, inputs, values[index], given, texture, named};
   source.kind->lower(node);
   source.reader.warn_unread(warnings);
 }
@@ -214,10 +242,11 @@ GraphPrograms graph_read(const GltfDocument& document,
                          const JsonReader* graph,
                          const JsonReader* surface,
                          TextureTable& textures,
+                         std::vector<std::string>& attribute_names,
                          Warnings& warnings)
 {
   const JsonReader& reader = graph != nullptr ? *graph : *surface;
-  Reader r{document, reader.file(), reader.path(), textures, warnings, {}, {}, {}};
+  Reader r{document, reader.file(), reader.path(), textures, attribute_names, warnings, {}, {}, {}, {}};
   GraphPrograms programs;
   try {
     if (graph != nullptr) {
@@ -242,6 +271,7 @@ GraphPrograms graph_read(const GltfDocument& document,
     programs.surface = r.build.compile();
     programs.surface.closures = closures;
     programs.surface.surface_normal = surface_normal;
+    programs.surface.attributes.assign(r.attributes.begin(), r.attributes.end());
     std::erase_if(closures, [](const SurfaceClosureSpec& c) { return c.kind != ClosureKind::transparent; });
     if (!closures.empty()) {
       constexpr int kNumbers = 1 + sizeof(TransparentInputs) / sizeof(float);

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "scene/gltf_document.h"
 #include "scene/graph/graph_program.h"
@@ -18,11 +20,13 @@ struct GraphPrograms {
 /// @param graph     RELIEF_graph's object; null: no nodes
 /// @param surface   RELIEF_surface's object; null: the graph gives factors of glTF's material alone
 /// @param textures  gets the images that the graph reads; their indices stand in the program
+/// @param attribute_names  likewise, the names of attributes
 /// @error SceneError: a node of unknown type, a reference to none, a cycle, a value of another type; a graph too large
 GraphPrograms graph_read(const GltfDocument& document,
                          const JsonReader* graph,
                          const JsonReader* surface,
                          TextureTable& textures,
+                         std::vector<std::string>& attribute_names,
                          Warnings& warnings);
 
 }  // namespace relief

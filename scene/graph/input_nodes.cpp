@@ -1,6 +1,11 @@
 // Nodes that read something of the point that is shaded.
-#include "scene/graph/graph_nodes.h"
+#include <string>
+#include <string_view>
+#include <vector>
 
+#include "kernel/graph/graph_scene.h"
+#include "scene/gltf_mesh.h"
+#include "scene/graph/graph_nodes.h"
 #include "scene/graph/graph_vectors.h"
 
 namespace relief {
@@ -12,10 +17,103 @@ constexpr auto kNumber = GraphType::kNumber;
 constexpr auto kVector = GraphType::kVector;
 constexpr auto kColor = GraphType::kColor;
 
+GraphVector shading_normal(GraphBuilder& b) { return quantities(b, Q::normal_x, Q::normal_y, Q::normal_z); }
+GraphVector incoming(GraphBuilder& b) { return quantities(b, Q::incoming_x, Q::incoming_y, Q::incoming_z); }
+GraphVector position(GraphBuilder& b) { return quantities(b, Q::position_x, Q::position_y, Q::position_z); }
+GraphVector generated(GraphBuilder& b) { return quantities(b, Q::generated_x, Q::generated_y, Q::generated_z); }
+
+GraphScalar negative(GraphBuilder& b, GraphScalar a) { return b(Op::subtract, {b.constant(0), a}); }
+GraphVector sum(GraphBuilder& b, const GraphVector& x, const GraphVector& y) { return each(b, Op::add, x, y); }
+GraphVector difference(GraphBuilder& b, const GraphVector& x, const GraphVector& y)
+{
+  return each(b, Op::subtract, x, y);
+}
+GraphVector product(GraphBuilder& b, const GraphVector& x, GraphScalar a) { return each(b, Op::multiply, x, splat(a)); }
+GraphVector selected(GraphBuilder& b, GraphScalar which, const GraphVector& x, const GraphVector& y)
+{
+  return {b(Op::select, {which, x[0], y[0]}), b(Op::select, {which, x[1], y[1]}), b(Op::select, {which, x[2], y[2]})};
+}
+
+/// A vector by a matrix of the point.
+/// @param is_point  whether the matrix's last column is added
+GraphVector transformed(GraphBuilder& b, Q matrix, const GraphVector& v, bool is_point)
+{
+  GraphVector out;
+  for (std::size_t row = 0; row < 3; ++row) {
+    const auto element = [&](std::size_t c) { return b.quantity(matrix, static_cast<std::uint16_t>(4 * row + c)); };
+    out[row] = dot(b, {element(0), element(1), element(2)}, v);
+    if (is_point) out[row] = b(Op::add, {out[row], element(3)});
+  }
+  return out;
+}
+
+/// A normal of object space in the world, unit.
+GraphVector normal_to_world(GraphBuilder& b, const GraphVector& v)
+{
+  GraphVector out;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const auto element = [&](std::size_t r) {
+      return b.quantity(Q::object_from_world, static_cast<std::uint16_t>(4 * r + c));
+    };
+    out[c] = dot(b, {element(0), element(1), element(2)}, v);
+  }
+  return normalized(b, out);
+}
+
+/// The part of a tangent of object space that lies in the surface, unit, world.
+GraphVector tangent_to_world(GraphBuilder& b, const GraphVector& tangent)
+{
+  const GraphVector normal = shading_normal(b);
+  return cross(b, normal, normalized(b, cross(b, normal_to_world(b, tangent), normal)));
+}
+
+/// Around an axis of the box of generated coordinates.
+GraphVector radial_tangent(GraphBuilder& b, std::size_t axis)
+{
+  const GraphVector at = generated(b);
+  const std::size_t first = axis == 0 ? 1 : 0, second = axis == 2 ? 1 : 2;
+  const auto centred = [&](std::size_t c) { return b(Op::subtract, {at[c], b.constant(0.5f)}); };
+  GraphVector tangent = splat(b.constant(0));
+  tangent[first] = negative(b, centred(second));
+  tangent[second] = centred(first);
+  return tangent_to_world(b, tangent);
+}
+
+/// A named attribute: three components, and the fourth.
+struct Attribute {
+  GraphVector xyz;
+  GraphScalar w;
+};
+Attribute attribute(GraphBuilder& b, std::uint16_t place)
+{
+  return {{b.quantity(Q::attribute_x, place), b.quantity(Q::attribute_y, place), b.quantity(Q::attribute_z, place)},
+          b.quantity(Q::attribute_alpha, place)};
+}
+
+/// Numbers of an option that must be there.
+std::vector<double> numbers(const GraphNode& n, std::string_view name, std::size_t count)
+{
+  if (!n.reader.has(name)) n.reader.fail(name, std::to_string(count) + " numbers");
+  return n.reader.numbers(name, count, count, -1e30, 1e30);
+}
+
+/// Tangents of the uv set that an option names, and their handedness.
+Attribute uv_tangent(GraphNode& n)
+{
+  const int set = static_cast<int>(n.reader.integer("uvSet", 0, 0, 1));
+  return attribute(n.build, n.attribute(n.reader, tangent_attribute_name(set)));
+}
+
 void lower_texture_coordinate(GraphNode& n)
 {
   GraphBuilder& b = n.build;
-  n.set("generated", quantities(b, Q::generated_x, Q::generated_y, Q::generated_z), kVector);
+  n.set("normal", quantities(b, Q::object_normal_x, Q::object_normal_y, Q::object_normal_z), kVector);
+  n.set("camera", transformed(b, Q::camera_from_world, position(b), true), kVector);
+  n.set("window", {b.quantity(Q::window_x), b.quantity(Q::window_y), b.constant(0)}, kVector);
+  const GraphVector normal = shading_normal(b);
+  const GraphScalar twice = scaled(b, dot(b, normal, incoming(b)), 2);
+  n.set("reflection", difference(b, product(b, normal, twice), incoming(b)), kVector);
+  n.set("generated", generated(b), kVector);
   n.set("object", quantities(b, Q::object_x, Q::object_y, Q::object_z), kVector);
   n.set("uv", {b.quantity(Q::uv0_u), b.quantity(Q::uv0_v), b.constant(0)}, kVector);
   n.set("uv1", {b.quantity(Q::uv1_u), b.quantity(Q::uv1_v), b.constant(0)}, kVector);
@@ -24,11 +122,213 @@ void lower_texture_coordinate(GraphNode& n)
 void lower_geometry(GraphNode& n)
 {
   GraphBuilder& b = n.build;
-  n.set("position", quantities(b, Q::position_x, Q::position_y, Q::position_z), kVector);
-  n.set("normal", quantities(b, Q::normal_x, Q::normal_y, Q::normal_z), kVector);
+  n.set("position", position(b), kVector);
+  n.set("normal", shading_normal(b), kVector);
   n.set("trueNormal", quantities(b, Q::true_normal_x, Q::true_normal_y, Q::true_normal_z), kVector);
-  n.set("incoming", quantities(b, Q::incoming_x, Q::incoming_y, Q::incoming_z), kVector);
+  n.set("incoming", incoming(b), kVector);
   n.set("backfacing", b.quantity(Q::backfacing));
+  n.set("tangent", radial_tangent(b, 2), kVector);
+  n.set("parametric", {b.quantity(Q::parametric_x), b.quantity(Q::parametric_y), b.constant(0)}, kVector);
+}
+
+void lower_object_info(GraphNode& n)
+{
+  GraphBuilder& b = n.build;
+  const auto element = [&](std::uint16_t i) { return b.quantity(Q::world_from_object, i); };
+  n.set("location", {element(3), element(7), element(11)}, kVector);
+}
+
+void lower_attribute(GraphNode& n)
+{
+  const std::string name = n.reader.string("name", "");
+  if (!name.starts_with('_')) n.reader.fail("name", "a name that begins with _", '"' + name + '"');
+  const std::uint16_t place = n.attribute(n.reader, name);
+  const auto [xyz, w] = attribute(n.build, place);
+  n.set("value", n.build.quantity(Q::attribute_value, place));
+  n.set("vector", xyz, kVector);
+  n.set("color", xyz, kColor);
+  n.set("alpha", w);
+}
+
+void lower_light_path(GraphNode& n)
+{
+  GraphBuilder& b = n.build;
+  struct Kind {
+    std::string_view name;
+    GraphRayKind kind;
+  };
+  constexpr Kind kKinds[] = {
+      {"camera", GraphRayKind::kCamera},
+      {"shadow", GraphRayKind::kShadow},
+      {"diffuse", GraphRayKind::kDiffuse},
+      {"glossy", GraphRayKind::kGlossy},
+      {"singular", GraphRayKind::kSingular},
+      {"reflection", GraphRayKind::kReflection},
+      {"transmission", GraphRayKind::kTransmission},
+  };
+  for (const auto& [name, kind] : kKinds) n.set(name, b.quantity(Q::ray_kind, static_cast<std::uint16_t>(kind)));
+  struct Depth {
+    std::string_view name;
+    GraphRayDepth depth;
+  };
+  constexpr Depth kDepths[] = {
+      {"depth", GraphRayDepth::kAll},
+      {"diffuseDepth", GraphRayDepth::kDiffuse},
+      {"glossyDepth", GraphRayDepth::kGlossy},
+      {"transmissionDepth", GraphRayDepth::kTransmission},
+      {"transparentDepth", GraphRayDepth::kTransparent},
+  };
+  for (const auto& [name, depth] : kDepths) n.set(name, b.quantity(Q::ray_depth, static_cast<std::uint16_t>(depth)));
+  n.set("length", b.quantity(Q::ray_length));
+}
+
+void lower_camera_data(GraphNode& n)
+{
+  GraphBuilder& b = n.build;
+  const GraphVector seen = transformed(b, Q::camera_from_world, position(b), true);
+  n.set("vector", normalized(b, seen), kVector);
+  n.set("depth", seen[2]);
+  n.set("distance", b(Op::square_root, {dot(b, seen, seen)}));
+}
+
+void lower_tangent(GraphNode& n)
+{
+  static constexpr std::string_view kDirections[] = {"radial-x", "radial-y", "radial-z", "uv"};
+  const int direction = n.reader.choice("direction", kDirections, 2);
+  if (direction < 3) {
+    n.set("tangent", radial_tangent(n.build, static_cast<std::size_t>(direction)), kVector);
+    return;
+  }
+  n.set("tangent", tangent_to_world(n.build, uv_tangent(n).xyz), kVector);
+}
+
+constexpr GraphSocket kNormalMapInputs[] = {{"strength", kNumber, {1}}, {"color", kColor, {0.5f, 0.5f, 1}}};
+void lower_normal_map(GraphNode& n)
+{
+  static constexpr std::string_view kSpaces[] = {"tangent", "object", "world", "blender-object", "blender-world"};
+  GraphBuilder& b = n.build;
+  const int space = n.reader.choice("space", kSpaces, 0);
+  const GraphVector own = shading_normal(b);
+  GraphVector color = n.vector("color");
+  for (GraphScalar& c : color) c = scaled(b, b(Op::subtract, {c, b.constant(0.5f)}), 2);
+  GraphVector normal;
+  GraphScalar is_given = b.constant(1);
+  if (space == 0) {
+    const auto [tangent, handedness] = uv_tangent(n);
+    const GraphVector below = quantities(b, Q::vertex_normal_x, Q::vertex_normal_y, Q::vertex_normal_z);
+    const GraphVector bitangent = product(b, cross(b, below, tangent), handedness);
+    normal =
+        sum(b, sum(b, product(b, tangent, color[0]), product(b, bitangent, color[1])), product(b, below, color[2]));
+    normal = normal_to_world(b, normal);
+    is_given = b(Op::less_than, {b.constant(0), dot(b, tangent, tangent)});
+  } else {
+    if (space > 2) color = {color[0], negative(b, color[1]), negative(b, color[2])};
+    normal = space % 2 == 1 ? normal_to_world(b, color) : normalized(b, color);
+  }
+  const GraphVector back = {negative(b, normal[0]), negative(b, normal[1]), negative(b, normal[2])};
+  normal = selected(b, b.quantity(Q::backfacing), back, normal);
+  const GraphScalar strength = b(Op::maximum, {n.number("strength"), b.constant(0)});
+  if (float known = 0; !b.is_constant(strength, &known) || known != 1) {
+    normal = normalized(b, sum(b, own, product(b, difference(b, normal, own), strength)));
+  }
+  is_given = b(Op::multiply, {is_given, b(Op::less_than, {b.constant(0), dot(b, normal, normal)})});
+  n.set("normal", selected(b, is_given, normal, own), kVector);
+}
+
+constexpr GraphSocket kWireframeInputs[] = {{"size", kNumber, {0.01f}}};
+void lower_wireframe(GraphNode& n)
+{
+  // Half of it: the face beyond the edge shows the other half.
+  const GraphScalar half = scaled(n.build, n.number("size"), 0.5f);
+  n.set("factor", n.build(Op::less_than, {n.build.quantity(Q::edge_distance), n.build(Op::absolute, {half})}));
+}
+
+constexpr GraphSocket kLightFalloffInputs[] = {{"strength", kNumber, {100}}, {"smooth", kNumber}};
+void lower_light_falloff(GraphNode& n)
+{
+  GraphBuilder& b = n.build;
+  const GraphScalar length = b.quantity(Q::ray_length), smooth = n.number("smooth");
+  const GraphScalar squared = b(Op::multiply, {length, length});
+  const GraphScalar smoothed = b(Op::divide, {squared, b(Op::add, {smooth, squared})});
+  const GraphScalar is_smooth = b(Op::less_than, {b.constant(0), smooth});
+  const GraphScalar factor = b(Op::select, {is_smooth, smoothed, b.constant(1)});
+  const GraphScalar quadratic = b(Op::multiply, {n.number("strength"), factor});
+  n.set("quadratic", quadratic);
+  n.set("linear", b(Op::multiply, {quadratic, length}));
+  n.set("constant", b(Op::multiply, {quadratic, squared}));
+}
+
+constexpr GraphSocket kTransformInputs[] = {{"vector", kVector}};
+void lower_transform(GraphNode& n)
+{
+  GraphBuilder& b = n.build;
+  const std::vector<double> matrix = numbers(n, "matrix", 12);
+  GraphVector out;
+  for (std::size_t row = 0; row < 3; ++row) {
+    const auto element = [&](std::size_t c) { return b.constant(static_cast<float>(matrix[4 * row + c])); };
+    out[row] = b(Op::add, {dot(b, {element(0), element(1), element(2)}, n.vector("vector")), element(3)});
+  }
+  n.set("vector", out, kVector);
+}
+
+void lower_vector_transform(GraphNode& n)
+{
+  static constexpr std::string_view kTypes[] = {"point", "vector", "normal"};
+  static constexpr std::string_view kSpaces[] = {"world", "object", "camera"};
+  constexpr Q kToWorld[] = {Q::kCount, Q::world_from_object, Q::world_from_camera};
+  constexpr Q kFromWorld[] = {Q::kCount, Q::object_from_world, Q::camera_from_world};
+  GraphBuilder& b = n.build;
+  const int type = n.reader.choice("transform", kTypes, 1);
+  const int from = n.reader.choice("from", kSpaces, 0), to = n.reader.choice("to", kSpaces, 1);
+  GraphVector v = n.vector("vector");
+  if (from != to && from != 0) v = transformed(b, kToWorld[from], v, type == 0);
+  if (from != to && to != 0) v = transformed(b, kFromWorld[to], v, type == 0);
+  n.set("vector", type == 2 ? normalized(b, v) : v, kVector);
+}
+
+constexpr GraphSocket kVectorRotateInputs[] = {{"vector", kVector},
+                                               {"center", kVector},
+                                               {"axis", kVector, {0, 0, 1}},
+                                               {"angle", kNumber},
+                                               {"rotation", kVector}};
+void lower_vector_rotate(GraphNode& n)
+{
+  static constexpr std::string_view kKinds[] = {"axis", "x", "y", "z", "euler"};
+  GraphBuilder& b = n.build;
+  const int kind = n.reader.choice("rotate", kKinds, 0);
+  const bool is_inverse = n.reader.boolean("invert", false);
+  const GraphVector v = difference(b, n.vector("vector"), n.vector("center"));
+  if (kind == 4) {
+    n.set("vector", sum(b, rotated(b, v, n.vector("rotation"), is_inverse), n.vector("center")), kVector);
+    return;
+  }
+  GraphVector axis = n.vector("axis");
+  if (kind > 0) {
+    axis = splat(b.constant(0));
+    axis[static_cast<std::size_t>(kind - 1)] = b.constant(1);
+  }
+  const GraphScalar size = dot(b, axis, axis);
+  axis = normalized(b, axis);
+  const GraphScalar angle = is_inverse ? negative(b, n.number("angle")) : n.number("angle");
+  const GraphScalar c = b(Op::cosine, {angle}), s = b(Op::sine, {angle});
+  // Rodrigues: what lies along the axis stays.
+  const GraphScalar along = b(Op::multiply, {dot(b, axis, v), b(Op::subtract, {b.constant(1), c})});
+  const GraphVector turned =
+      sum(b, sum(b, product(b, v, c), product(b, cross(b, axis, v), s)), product(b, axis, along));
+  const GraphScalar has_axis = b(Op::less_than, {b.constant(0), size});
+  n.set("vector", selected(b, has_axis, sum(b, turned, n.vector("center")), n.vector("vector")), kVector);
+}
+
+constexpr GraphSocket kNormalInputs[] = {{"normal", kVector, {0, 0, 1}}};
+void lower_normal(GraphNode& n)
+{
+  GraphBuilder& b = n.build;
+  const std::vector<double> given = numbers(n, "direction", 3);
+  GraphVector direction;
+  for (std::size_t c = 0; c < 3; ++c) direction[c] = b.constant(static_cast<float>(given[c]));
+  direction = normalized(b, direction);
+  n.set("normal", direction, kVector);
+  n.set("dot", dot(b, direction, normalized(b, n.vector("normal"))));
 }
 
 void lower_vertex_color(GraphNode& n)
@@ -38,12 +338,8 @@ void lower_vertex_color(GraphNode& n)
   n.set("alpha", b.quantity(Q::color_a));
 }
 
-/// Cosine between the viewer and the shading normal.
-GraphScalar facing_cosine(GraphBuilder& b)
-{
-  return dot(b, quantities(b, Q::incoming_x, Q::incoming_y, Q::incoming_z),
-             quantities(b, Q::normal_x, Q::normal_y, Q::normal_z));
-}
+/// Cosine between the viewer and the normal.
+GraphScalar facing_cosine(GraphNode& n) { return dot(n.build, incoming(n.build), n.vector("normal")); }
 
 /// Index of refraction as the ray meets it.
 GraphScalar facing_ior(GraphBuilder& b, GraphScalar ior)
@@ -52,20 +348,20 @@ GraphScalar facing_ior(GraphBuilder& b, GraphScalar ior)
   return b(Op::select, {b.quantity(Q::backfacing), inside, ior});
 }
 
-constexpr GraphSocket kFresnelInputs[] = {{"ior", kNumber, {1.45f}}};
+constexpr GraphSocket kFresnelInputs[] = {{"ior", kNumber, {1.45f}}, {"normal", kVector, {}, true}};
 void lower_fresnel(GraphNode& n)
 {
   GraphBuilder& b = n.build;
   const GraphScalar ior = b(Op::maximum, {n.number("ior"), b.constant(1e-5f)});
-  n.set("factor", b(Op::fresnel, {facing_cosine(b), facing_ior(b, ior)}));
+  n.set("factor", b(Op::fresnel, {facing_cosine(n), facing_ior(b, ior)}));
 }
 
-constexpr GraphSocket kLayerWeightInputs[] = {{"blend", kNumber, {0.5f}}};
+constexpr GraphSocket kLayerWeightInputs[] = {{"blend", kNumber, {0.5f}}, {"normal", kVector, {}, true}};
 void lower_layer_weight(GraphNode& n)
 {
   GraphBuilder& b = n.build;
   const GraphScalar blend = n.number("blend");
-  const GraphScalar cosine = facing_cosine(b);
+  const GraphScalar cosine = facing_cosine(n);
   const GraphScalar one = b.constant(1);
   const GraphScalar ior = b(Op::divide, {one, b(Op::maximum, {b(Op::subtract, {one, blend}), b.constant(1e-5f)})});
   n.set("fresnel", b(Op::fresnel, {cosine, facing_ior(b, ior)}));
@@ -114,6 +410,18 @@ constexpr GraphNodeKind kKinds[] = {
     {"fresnel", kFresnelInputs, lower_fresnel},
     {"layer-weight", kLayerWeightInputs, lower_layer_weight},
     {"bump", kBumpInputs, lower_bump},
+    {"object-info", {}, lower_object_info},
+    {"attribute", {}, lower_attribute},
+    {"light-path", {}, lower_light_path},
+    {"camera-data", {}, lower_camera_data},
+    {"tangent", {}, lower_tangent},
+    {"normal-map", kNormalMapInputs, lower_normal_map},
+    {"wireframe", kWireframeInputs, lower_wireframe},
+    {"light-falloff", kLightFalloffInputs, lower_light_falloff},
+    {"transform", kTransformInputs, lower_transform},
+    {"vector-transform", kTransformInputs, lower_vector_transform},
+    {"vector-rotate", kVectorRotateInputs, lower_vector_rotate},
+    {"normal", kNormalInputs, lower_normal},
 };
 
 }  // namespace

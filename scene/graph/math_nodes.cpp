@@ -271,9 +271,10 @@ void lower_math(GraphNode& n)
 }
 
 constexpr std::string_view kVectorMathLabels[] = {
-    "add",         "subtract", "multiply", "divide",   "multiply-add", "cross",     "project", "reflect", "refract",
-    "faceforward", "dot",      "distance", "length",   "scale",        "normalize", "wrap",    "snap",    "floor",
-    "ceil",        "modulo",   "fraction", "absolute", "minimum",      "maximum",   "sine",    "cosine",  "tangent"};
+    "add",     "subtract",    "multiply", "divide",   "multiply-add", "cross",    "project",   "reflect",
+    "refract", "faceforward", "dot",      "distance", "length",       "scale",    "normalize", "wrap",
+    "snap",    "floor",       "ceil",     "modulo",   "fraction",     "absolute", "minimum",   "maximum",
+    "sine",    "cosine",      "tangent",  "power",    "sign",         "round"};
 
 constexpr GraphSocket kVectorMathInputs[] = {{"a", kVector}, {"b", kVector}, {"c", kVector}, {"scale", kNumber, {1}}};
 void lower_vector_math(GraphNode& n)

@@ -3,6 +3,8 @@
 #include <array>
 #include <cmath>
 
+#include "kernel/graph/image.h"
+#include "kernel/graph/voronoi.h"
 #include "scene/graph/graph_nodes.h"
 #include "scene/graph/graph_vectors.h"
 
@@ -15,13 +17,23 @@ constexpr auto kNumber = GraphType::kNumber;
 constexpr auto kVector = GraphType::kVector;
 constexpr auto kColor = GraphType::kColor;
 
+/// Which Blender's numbers a texture has, where later ones changed them.
+enum Maths { kMaths34, kMaths43, kMaths52 };
+int read_maths(const GraphNode& n)
+{
+  static constexpr std::string_view kVersions[] = {"3.4", "4.3", "5.2"};
+  return n.reader.choice("maths", kVersions, kMaths34);
+}
+
 constexpr GraphSocket kNoiseInputs[] = {{"vector", kVector},
                                         {"w", kNumber},
                                         {"scale", kNumber, {5}},
                                         {"detail", kNumber, {2}},
                                         {"roughness", kNumber, {0.5f}},
                                         {"lacunarity", kNumber, {2}},
-                                        {"distortion", kNumber}};
+                                        {"distortion", kNumber},
+                                        {"offset", kNumber},
+                                        {"gain", kNumber, {1}}};
 
 /// Point that a texture of some dimensions looks at: 1: w; 2: x, y; 3: all; 4: all and w.
 std::vector<GraphScalar> texture_point(GraphNode& n, int dimensions)
@@ -34,13 +46,15 @@ std::vector<GraphScalar> texture_point(GraphNode& n, int dimensions)
 }
 
 /// A point far from another: what decorrelates noises of one point, by hashes of a number and of the axis.
-std::vector<GraphScalar> moved(GraphBuilder& b, const std::vector<GraphScalar>& p, float number)
+/// @param is_fused  offsets are rounded once, as Cycles 5.2 is compiled
+std::vector<GraphScalar> moved(GraphBuilder& b, const std::vector<GraphScalar>& p, float number, bool is_fused)
 {
   std::vector<GraphScalar> out;
   for (std::size_t i = 0; i < p.size(); ++i) {
     const GraphScalar hash = p.size() == 1 ? b(Op::hash_1d, {b.constant(number)})
                                            : b(Op::hash_2d, {b.constant(number), b.constant(static_cast<float>(i))});
-    const GraphScalar offset = b(Op::add, {b.constant(100), scaled(b, hash, 100)});
+    GraphScalar offset = b(Op::add, {b.constant(100), scaled(b, hash, 100)});
+    if (float known = 0; is_fused && b.is_constant(hash, &known)) offset = b.constant(std::fma(known, 100.0f, 100.0f));
     out.push_back(b(Op::add, {p[i], offset}));
   }
   return out;
@@ -48,11 +62,19 @@ std::vector<GraphScalar> moved(GraphBuilder& b, const std::vector<GraphScalar>& 
 
 Op op_of_dimensions(Op first, int dimensions) { return static_cast<Op>(static_cast<int>(first) + dimensions - 1); }
 
+constexpr std::string_view kMusgraveTypes[] = {"multifractal", "fbm", "hybrid-multifractal", "ridged-multifractal",
+                                               "hetero-terrain"};
+constexpr int kFbm = 1;
+
 void lower_noise(GraphNode& n)
 {
   GraphBuilder& b = n.build;
   const int dimensions = static_cast<int>(n.reader.integer("dimensions", 3, 1, 4));
   const bool is_normalized = n.reader.boolean("normalize", true);
+  const int type = n.reader.choice("noise", kMusgraveTypes, kFbm);
+  const int maths = read_maths(n);
+  const std::uint16_t repeats = maths != kMaths34 ? 1 : 0;
+  const bool is_fused = maths == kMaths52;
   std::vector<GraphScalar> p = texture_point(n, dimensions);
   for (GraphScalar& x : p) x = b(Op::multiply, {x, n.number("scale")});
   float known = 1;
@@ -60,21 +82,29 @@ void lower_noise(GraphNode& n)
   if (!b.is_constant(n.number("distortion"), &known) || known != 0) {
     std::vector<GraphScalar> bent;
     for (int i = 0; i < dimensions; ++i) {
-      const GraphScalar noise =
-          b.apply(op_of_dimensions(Op::signed_noise_1d, dimensions), moved(b, p, static_cast<float>(i)))[0];
+      const GraphScalar noise = b.apply(op_of_dimensions(Op::signed_noise_1d, dimensions),
+                                        moved(b, p, static_cast<float>(i), is_fused), {&repeats, 1})[0];
       bent.push_back(b(Op::add, {p[static_cast<std::size_t>(i)], b(Op::multiply, {noise, n.number("distortion")})}));
     }
     p = bent;
   }
   number = static_cast<float>(dimensions);
   const auto fractal = [&](std::vector<GraphScalar> at) {
-    at.insert(at.end(), {n.number("detail"), n.number("roughness"), n.number("lacunarity")});
-    const std::uint16_t normalize = is_normalized ? 1 : 0;
-    return b.apply(op_of_dimensions(Op::noise_1d, dimensions), at, {&normalize, 1})[0];
+    if (type == kFbm) {
+      at.insert(at.end(), {n.number("detail"), n.number("roughness"), n.number("lacunarity")});
+      const std::uint16_t immediates[] = {is_normalized ? std::uint16_t{1} : std::uint16_t{0}, repeats};
+      return b.apply(op_of_dimensions(Op::noise_1d, dimensions), at, immediates)[0];
+    }
+    // Details are octaves beyond the first.
+    const GraphScalar octaves = b(Op::add, {clamped(b, n.number("detail"), 0, 15), b.constant(1)});
+    const GraphScalar roughness = b(Op::maximum, {n.number("roughness"), b.constant(0)});
+    at.insert(at.end(), {octaves, roughness, n.number("lacunarity"), n.number("offset"), n.number("gain")});
+    const std::uint16_t immediates[] = {static_cast<std::uint16_t>(type), repeats};
+    return b.apply(op_of_dimensions(Op::musgrave_1d, dimensions), at, immediates)[0];
   };
   const GraphScalar value = fractal(p);
   n.set("factor", value);
-  n.set("color", {value, fractal(moved(b, p, number)), fractal(moved(b, p, number + 1))}, kColor);
+  n.set("color", {value, fractal(moved(b, p, number, is_fused)), fractal(moved(b, p, number + 1, is_fused))}, kColor);
 }
 
 constexpr GraphSocket kWhiteNoiseInputs[] = {{"vector", kVector}, {"w", kNumber}};
@@ -102,29 +132,107 @@ void lower_white_noise(GraphNode& n)
   n.set("color", color, kColor);
 }
 
-constexpr GraphSocket kImageInputs[] = {{"vector", kVector}};
-void lower_image(GraphNode& n)
+/// Footprint of texture coordinates. It is known where they are a map's, scaled and turned; the finest level is read elsewhere.
+GraphScalar coordinate_width(GraphBuilder& b, GraphScalar u, GraphScalar v)
 {
-  GraphBuilder& b = n.build;
-  const int texture = n.texture(n.reader);
-  const GraphVector& at = n.vector("vector");
-  // The footprint is known where the coordinates are a map's, scaled and turned; the finest level is read elsewhere.
-  GraphScalar width = b.constant(0);
   const std::pair<std::array<Q, 2>, Q> sets[] = {{{Q::uv0_u, Q::uv0_v}, Q::uv0_width},
                                                  {{Q::uv1_u, Q::uv1_v}, Q::uv1_width}};
   for (const auto& [uv, of] : sets) {
-    const auto x = b.linear_part(at[0], b.quantity(uv[0]), b.quantity(uv[1]));
-    const auto y = b.linear_part(at[1], b.quantity(uv[0]), b.quantity(uv[1]));
+    const auto x = b.linear_part(u, b.quantity(uv[0]), b.quantity(uv[1]));
+    const auto y = b.linear_part(v, b.quantity(uv[0]), b.quantity(uv[1]));
     if (!x || !y) continue;
     const double area = std::abs((*x)[0] * (*y)[1] - (*x)[1] * (*y)[0]);
-    if (area > 0) {
-      width = scaled(b, b.quantity(of), static_cast<float>(std::sqrt(area)));
-      break;
+    if (area > 0) return scaled(b, b.quantity(of), static_cast<float>(std::sqrt(area)));
+  }
+  return b.constant(0);
+}
+
+/// Longitude and latitude, or longitude and height, of a point around the middle of the unit cube, 0…1.
+std::array<GraphScalar, 2> around(GraphBuilder& b, const GraphVector& at, bool is_sphere)
+{
+  constexpr float kHalfTurn = 3.14159265358979f;
+  GraphVector p;
+  for (std::size_t i = 0; i < 3; ++i) p[i] = scaled(b, b(Op::subtract, {at[i], b.constant(0.5f)}), 2);
+  const GraphScalar zero = b.constant(0), half = b.constant(0.5f);
+  const GraphScalar radius_squared = b(Op::add, {b(Op::multiply, {p[0], p[0]}), b(Op::multiply, {p[1], p[1]})});
+  const GraphScalar turn = scaled(b, b(Op::arctangent2, {p[0], p[1]}), 0.5f / kHalfTurn);
+  const GraphScalar u = b(Op::select, {radius_squared, b(Op::subtract, {half, turn}), zero});
+  if (!is_sphere) {
+    const GraphScalar height = scaled(b, b(Op::add, {p[2], b.constant(1)}), 0.5f);
+    return {u, b(Op::select, {radius_squared, height, zero})};
+  }
+  const GraphScalar length = b(Op::square_root, {dot(b, p, p)});
+  const GraphScalar polar = b(Op::arccosine, {b(Op::divide, {p[2], length})});
+  const GraphScalar v = b(Op::subtract, {b.constant(1), scaled(b, polar, 1 / kHalfTurn)});
+  return {u, b(Op::select, {length, v, zero})};
+}
+
+/// Puts the textures of option "tiles" into a table.
+/// @return  its place and rows
+std::pair<std::uint32_t, std::uint16_t> read_tiles(GraphNode& n)
+{
+  constexpr int kFirst = 1001, kRows = 100;
+  const nlohmann::json& tiles = n.reader.raw("tiles");
+  if (!tiles.is_array()) n.reader.fail("tiles", "an array", json_describe(tiles));
+  std::vector<float> table;
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const JsonReader tile(tiles[i], n.reader.file(), json_path_join(json_path_join(n.reader.path(), "tiles"), i));
+    const auto number = tile.integer("tile", -1, kFirst, kFirst + kImageTileColumns * kRows - 1) - kFirst;
+    if (number < 0) tile.fail("tile", "a number from 1001 on");
+    const auto rows = static_cast<std::size_t>(number / kImageTileColumns + 1);
+    if (table.size() < rows * kImageTileColumns) table.resize(rows * kImageTileColumns, -1.0f);
+    float& place = table[static_cast<std::size_t>(number)];
+    if (place >= 0) tile.fail("tile", "every number once");
+    place = static_cast<float>(n.texture(tile));
+  }
+  if (table.empty()) n.reader.fail("tiles", "at least one tile");
+  return {n.build.add_table(table), static_cast<std::uint16_t>(table.size() / kImageTileColumns)};
+}
+
+constexpr GraphSocket kImageInputs[] = {{"vector", kVector}};
+void lower_image(GraphNode& n)
+{
+  static constexpr std::string_view kProjections[] = {"flat", "sphere", "tube", "box"};
+  static constexpr std::string_view kFilters[] = {"texture", "cubic"};
+  static constexpr std::string_view kAlphas[] = {"separate", "straight", "associated", "opaque"};
+  GraphBuilder& b = n.build;
+  const int projection = n.reader.choice("projection", kProjections, 0);
+  const int alpha = n.reader.choice("alpha", kAlphas, 0);
+  unsigned flags = 0;
+  if (n.reader.boolean("clip", false)) flags |= kImageClip;
+  if (n.reader.choice("filter", kFilters, 0) == 1) flags |= kImageCubic;
+  if (alpha == 1) flags |= kImageMultiply;
+  if (alpha == 3) flags |= kImageOpaque;
+  if (n.reader.boolean("unassociate", false)) flags |= kImageDivide;
+  const auto flag_word = static_cast<std::uint16_t>(flags);
+  const GraphVector& at = n.vector("vector");
+  const bool is_tiled = n.reader.has("tiles");
+  if (is_tiled && projection == 3) n.reader.fail("tiles", "none of a box");
+  std::vector<GraphScalar> rgba;
+  if (projection == 3) {
+    const GraphScalar blend = b.constant(n.reader.number_f("blend", 0, 0, 1));
+    const GraphScalar inputs[] = {at[0],
+                                  at[1],
+                                  at[2],
+                                  b.quantity(Q::object_normal_x),
+                                  b.quantity(Q::object_normal_y),
+                                  b.quantity(Q::object_normal_z),
+                                  blend};
+    const std::uint16_t immediates[] = {static_cast<std::uint16_t>(n.texture(n.reader)), flag_word};
+    rgba = b.apply(Op::image_box, inputs, immediates);
+  } else {
+    const std::array<GraphScalar, 2> uv = projection == 0 ? std::array{at[0], at[1]} : around(b, at, projection == 1);
+    const GraphScalar inputs[] = {uv[0], uv[1], coordinate_width(b, uv[0], uv[1])};
+    if (is_tiled) {
+      const auto [place, rows] = read_tiles(n);
+      const std::uint16_t immediates[] = {flag_word, rows, static_cast<std::uint16_t>(place & 0xffffu),
+                                          static_cast<std::uint16_t>(place >> 16)};
+      rgba = b.apply(Op::image_tiles, inputs, immediates);
+    } else {
+      const std::uint16_t immediates[] = {static_cast<std::uint16_t>(n.texture(n.reader)), flag_word};
+      rgba = b.apply(Op::image, inputs, immediates);
     }
   }
-  const GraphScalar inputs[] = {at[0], at[1], width};
-  const auto immediate = static_cast<std::uint16_t>(texture);
-  const std::vector<GraphScalar> rgba = b.apply(Op::image, inputs, {&immediate, 1});
   n.set("color", {rgba[0], rgba[1], rgba[2]}, kColor);
   n.set("alpha", rgba[3]);
 }
@@ -196,10 +304,13 @@ void lower_magic(GraphNode& n)
   GraphBuilder& b = n.build;
   const int depth = static_cast<int>(n.reader.integer("depth", 2, 0, 10));
   GraphVector p;
-  // Sines of large numbers lose their digits; one turn is as good.
-  const GraphScalar turn = b.constant(static_cast<float>(2 * 3.14159265358979));
+  // Sines of large numbers lose their digits; one turn is as good. Before 5.0 it was one of what is scaled after that.
+  const GraphScalar turn = b.constant(static_cast<float>(2 * 3.14159265358979)), scale = n.number("scale");
+  const bool scales_first = read_maths(n) == kMaths52;
   for (std::size_t c = 0; c < 3; ++c) {
-    p[c] = b(Op::modulo, {b(Op::multiply, {n.vector("vector")[c], n.number("scale")}), turn});
+    const GraphScalar at = n.vector("vector")[c];
+    p[c] = scales_first ? b(Op::modulo, {b(Op::multiply, {at, scale}), turn})
+                        : b(Op::multiply, {b(Op::modulo, {at, turn}), scale});
   }
   const auto sum = [&](float sx, float sy, float sz) {
     return b(Op::add, {b(Op::add, {scaled(b, p[0], sx), scaled(b, p[1], sy)}), scaled(b, p[2], sz)});
@@ -252,6 +363,7 @@ void lower_wave(GraphNode& n)
   const bool are_rings = n.reader.choice("wave", kKinds, 0) == 1;
   const int direction = n.reader.choice("direction", kDirections, 0);
   const int profile = n.reader.choice("profile", kProfiles, 0);
+  const std::uint16_t repeats = read_maths(n) != kMaths34 ? 1 : 0;
   GraphVector p = each(b, Op::multiply, n.vector("vector"), splat(n.number("scale")));
   // Keeps borders of unit cells from flickering.
   for (GraphScalar& x : p) x = b(Op::multiply, {b(Op::add, {x, b.constant(1e-6f)}), b.constant(0.999999f)});
@@ -271,8 +383,8 @@ void lower_wave(GraphNode& n)
     std::vector<GraphScalar> q;
     for (const GraphScalar x : p) q.push_back(b(Op::multiply, {x, n.number("detailScale")}));
     q.insert(q.end(), {n.number("detail"), n.number("detailRoughness"), b.constant(2)});
-    const std::uint16_t normalize = 1;
-    const GraphScalar noise = b.apply(Op::noise_3d, q, {&normalize, 1})[0];
+    const std::uint16_t immediates[] = {1, repeats};
+    const GraphScalar noise = b.apply(Op::noise_3d, q, immediates)[0];
     const GraphScalar around_zero = b(Op::subtract, {scaled(b, noise, 2), b.constant(1)});
     at = b(Op::add, {at, b(Op::multiply, {n.number("distortion"), around_zero})});
   }
@@ -296,7 +408,9 @@ void lower_wave(GraphNode& n)
 
 constexpr GraphSocket kVoronoiInputs[] = {{"vector", kVector},           {"w", kNumber},
                                           {"scale", kNumber, {5}},       {"smoothness", kNumber, {1}},
-                                          {"exponent", kNumber, {0.5f}}, {"randomness", kNumber, {1}}};
+                                          {"exponent", kNumber, {0.5f}}, {"randomness", kNumber, {1}},
+                                          {"detail", kNumber},           {"roughness", kNumber, {0.5f}},
+                                          {"lacunarity", kNumber, {2}}};
 void lower_voronoi(GraphNode& n)
 {
   static constexpr std::string_view kFeatures[] = {"f1", "f2", "smooth-f1", "distance-to-edge", "n-sphere-radius"};
@@ -307,9 +421,16 @@ void lower_voronoi(GraphNode& n)
   for (GraphScalar& x : in) x = b(Op::multiply, {x, n.number("scale")});
   // Of no smoothness nothing can be divided by.
   const GraphScalar smoothness = clamped(b, scaled(b, n.number("smoothness"), 0.5f), 1e-6f, 0.5f);
-  in.insert(in.end(), {smoothness, n.number("exponent"), clamped(b, n.number("randomness"))});
+  in.insert(in.end(), {smoothness, n.number("exponent"), clamped(b, n.number("randomness")), n.number("detail"),
+                       n.number("roughness"), n.number("lacunarity")});
+  const int maths = read_maths(n);
+  unsigned flags = 0;
+  if (n.reader.boolean("normalize", false)) flags |= kVoronoiNormalize;
+  if (maths != kMaths34) flags |= kVoronoiFar;
+  if (maths == kMaths52) flags |= kVoronoiPcg;
   const std::uint16_t immediates[] = {static_cast<std::uint16_t>(n.reader.choice("feature", kFeatures, 0)),
-                                      static_cast<std::uint16_t>(n.reader.choice("metric", kMetrics, 0))};
+                                      static_cast<std::uint16_t>(n.reader.choice("metric", kMetrics, 0)),
+                                      static_cast<std::uint16_t>(flags)};
   const std::vector<GraphScalar> out = b.apply(op_of_dimensions(Op::voronoi_1d, dimensions), in, immediates);
   n.set("distance", out[0]);
   n.set("color", {out[1], out[2], out[3]}, kColor);
@@ -324,8 +445,6 @@ constexpr GraphSocket kMusgraveInputs[] = {{"vector", kVector},         {"w", kN
                                            {"offset", kNumber},         {"gain", kNumber, {1}}};
 void lower_musgrave(GraphNode& n)
 {
-  static constexpr std::string_view kTypes[] = {"multifractal", "fbm", "hybrid-multifractal", "ridged-multifractal",
-                                                "hetero-terrain"};
   GraphBuilder& b = n.build;
   const int dimensions = static_cast<int>(n.reader.integer("dimensions", 3, 1, 4));
   std::vector<GraphScalar> in = texture_point(n, dimensions);
@@ -336,8 +455,8 @@ void lower_musgrave(GraphNode& n)
   const GraphScalar falloff = b(Op::power, {lacunarity, scaled(b, dimension, -1)});
   in.insert(in.end(),
             {clamped(b, n.number("detail"), 0, 15), falloff, lacunarity, n.number("offset"), n.number("gain")});
-  const auto type = static_cast<std::uint16_t>(n.reader.choice("musgrave", kTypes, 1));
-  n.set("factor", b.apply(op_of_dimensions(Op::musgrave_1d, dimensions), in, {&type, 1})[0]);
+  const std::uint16_t immediates[] = {static_cast<std::uint16_t>(n.reader.choice("musgrave", kMusgraveTypes, kFbm)), 0};
+  n.set("factor", b.apply(op_of_dimensions(Op::musgrave_1d, dimensions), in, immediates)[0]);
 }
 
 constexpr GraphSocket kBrickInputs[] = {{"vector", kVector},
@@ -376,6 +495,40 @@ void lower_brick(GraphNode& n)
   n.set("factor", out[1]);
 }
 
+constexpr GraphSocket kGaborInputs[] = {{"vector", kVector},
+                                        {"scale", kNumber, {5}},
+                                        {"frequency", kNumber, {2}},
+                                        {"anisotropy", kNumber, {1}},
+                                        {"orientation", kNumber, {0.785398163f}},
+                                        {"direction", kVector, {1.41421356f, 1.41421356f, 0}}};
+void lower_gabor(GraphNode& n)
+{
+  GraphBuilder& b = n.build;
+  constexpr double kTurn = 2 * 3.14159265358979, kSpotsACell = 8;
+  const bool is_3d = n.reader.integer("dimensions", 2, 2, 3) == 3;
+  const GraphVector p = each(b, Op::multiply, n.vector("vector"), splat(n.number("scale")));
+  const GraphScalar isotropy = b(Op::subtract, {b.constant(1), clamped(b, n.number("anisotropy"))});
+  std::vector<GraphScalar> in(p.begin(), p.begin() + (is_3d ? 3 : 2));
+  in.insert(in.end(), {b(Op::maximum, {n.number("frequency"), b.constant(0.001f)}), isotropy});
+  if (is_3d) {
+    const GraphVector direction = normalized(b, n.vector("direction"));
+    in.insert(in.end(), direction.begin(), direction.end());
+  } else {
+    in.push_back(scaled(b, n.number("orientation"), static_cast<float>(1 / kTurn)));
+  }
+  const std::vector<GraphScalar> wave = b.apply(is_3d ? Op::gabor_3d : Op::gabor_2d, in);
+  // Six standard deviations of sums of spots of weight ±1.
+  const double power = is_3d ? 0.25 / std::sqrt(2.0) : 0.25;
+  const auto range = static_cast<float>(6 * std::sqrt(0.5 * kSpotsACell * power));
+  const GraphScalar half = b.constant(0.5f);
+  n.set("value", b(Op::add, {scaled(b, b(Op::divide, {wave[1], b.constant(range)}), 0.5f), half}));
+  const GraphScalar angle =
+      b(Op::add, {b(Op::arctangent2, {wave[1], wave[0]}), b.constant(static_cast<float>(kTurn / 2))});
+  n.set("phase", b(Op::divide, {angle, b.constant(static_cast<float>(kTurn))}));
+  const GraphScalar squared = b(Op::add, {b(Op::multiply, {wave[0], wave[0]}), b(Op::multiply, {wave[1], wave[1]})});
+  n.set("intensity", b(Op::divide, {b(Op::square_root, {squared}), b.constant(range)}));
+}
+
 constexpr GraphNodeKind kKinds[] = {
     {"noise-texture", kNoiseInputs, lower_noise},
     {"white-noise-texture", kWhiteNoiseInputs, lower_white_noise},
@@ -387,6 +540,7 @@ constexpr GraphNodeKind kKinds[] = {
     {"voronoi-texture", kVoronoiInputs, lower_voronoi},
     {"musgrave-texture", kMusgraveInputs, lower_musgrave},
     {"brick-texture", kBrickInputs, lower_brick},
+    {"gabor-texture", kGaborInputs, lower_gabor},
 };
 
 }  // namespace

@@ -15,7 +15,6 @@ from scenes import (
     add_plane,
     add_sphere,
     assert_same_expectation,
-    assert_warns,
     degrees,
     new_image,
     new_material,
@@ -210,13 +209,6 @@ def test_constant_height():
     tree.links.remove(node.inputs["Height"].links[0])
     node.inputs["Height"].default_value = 0.7
     _assert_agrees(scene, _square(material))
-
-
-def test_bump_only_is_warned_about():
-    scene = _stage()
-    material, _, _, _ = _material(method="BUMP")
-    add_plane(4, material)
-    assert_warns(scene, 'material "displaced"', "Bump Only")
 
 
 def test_bump_may_displace():

@@ -26,23 +26,31 @@ from scenes import (
 #: Coordinates are this far apart: a power of two, so that they are exact.
 _STEP = 2.0**-12
 
+#: Whether Cycles' colours are those of Rec. 709 exactly. In 5.2 it takes its matrices from the configuration of colours, whose
+#: primaries are 2·10⁻⁴ off.
+_IS_REC_709 = bpy.app.version < (5, 0, 0)
+
 #: Faces, and so points, along a side of the sheet: 102,400 in all.
 _SIDE = 320
 
 
-def _sheet(materials, low, high, seed=1):
+def _sheet(materials, low, high, seed=1, tilted=False):
     """A square of faces with random coordinates, in rows of the materials' own.
 
     @param  low, high  limits of the coordinates: uv map "xy" has two, "zw" two more
+    @param  tilted     faces have random normals
     """
     count = _SIDE * _SIDE
     x, y = np.meshgrid(np.arange(_SIDE), np.arange(_SIDE))
     corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
     points = np.zeros((count, 4, 3), dtype=np.float32)
     points[..., :2] = np.stack([x, y], axis=-1).reshape(-1, 1, 2) + corners
+    random = np.random.default_rng(seed)
+    if tilted:
+        slopes = random.uniform(-2, 2, (count, 1, 2))
+        points[..., 2] = (slopes * (corners - 0.5)).sum(axis=-1)
     mesh = bpy.data.meshes.new("sheet")
     mesh.from_pydata(points.reshape(-1, 3).tolist(), [], np.arange(4 * count).reshape(-1, 4).tolist())
-    random = np.random.default_rng(seed)
     for name in ("xy", "zw"):
         steps = random.integers(low / _STEP, high / _STEP, (count, 1, 2)) + 0.5
         values = (_STEP * steps).astype(np.float32).repeat(4, axis=1)
@@ -87,7 +95,7 @@ def _emitter(name, build, sign):
     return material
 
 
-def _assert_nodes_agree(builders, low=-2.0, high=2.0, relative=1e-5, absolute=1e-6, most_off=0.0):
+def _assert_nodes_agree(builders, low=-2.0, high=2.0, relative=1e-5, absolute=1e-6, most_off=0.0, tilted=False):
     """Fails where an engine's picture of a sheet of nodes differs from the other's.
 
     @param  builders  by name, see _emitter; those of one name share a row
@@ -96,7 +104,9 @@ def _assert_nodes_agree(builders, low=-2.0, high=2.0, relative=1e-5, absolute=1e
     scene = new_scene(_SIDE, _SIDE)
     rows_of = [(name, build, sign) for name, build in builders.items() for sign in (1, -1)]
     materials = [_emitter(*row) for row in rows_of]
-    sheet = _sheet(materials, low, high)
+    sheet = _sheet(materials, low, high, tilted=tilted)
+    if tilted:
+        sheet.scale = (1, 1, 0.7)
     sheet.location = (-_SIDE / 2, -_SIDE / 2, 0)
     add_camera((0, 0, 10), type="ORTHO", ortho_scale=_SIDE)
     with folder() as path:
@@ -217,7 +227,195 @@ def test_voronoi_textures():
     _assert_nodes_agree(builders, absolute=1e-5, most_off=2e-3)
 
 
+def test_fractal_cells():
+    """Octaves of cells, of 4.0 on."""
+    if "detail" not in {name.lower() for name in _input_names("ShaderNodeTexVoronoi")}:
+        return
+    builders = {}
+    for feature in ("F1", "F2", "SMOOTH_F1", "DISTANCE_TO_EDGE"):
+        for dimensions in ("1D", "2D", "3D", "4D"):
+            for normalize in (False, True):
+                inputs = {"Vector": "xyz", "W": "w", "Scale": 1.7, "Randomness": 0.8, "Smoothness": 0.6}
+                inputs.update({"Detail": 2.4, "Roughness": 0.6, "Lacunarity": 1.9})
+                settings = {"voronoi_dimensions": dimensions, "feature": feature, "normalize": normalize}
+                for out in ("Distance", "Color")[: 1 if feature == "DISTANCE_TO_EDGE" else 2]:
+                    name = f"{dimensions} {feature} {normalize} {out}"
+                    builders[name] = _node("ShaderNodeTexVoronoi", inputs, out, **settings)
+    varying = {"Vector": "xyz", "Scale": 1.7, "Detail": "w", "Roughness": 0.6}
+    builders["varying detail"] = _node("ShaderNodeTexVoronoi", varying, 0)
+    builders["position"] = _node("ShaderNodeTexVoronoi", {**varying, "Detail": 1.5}, "Position")
+    _assert_nodes_agree(builders, absolute=1e-5, most_off=4e-3)
+
+
+def _input_names(kind):
+    material = bpy.data.materials.new("names")
+    material.use_nodes = True
+    return [socket.name for socket in material.node_tree.nodes.new(kind).inputs]
+
+
+def test_noise_types():
+    """Musgrave's noises as types of Noise, of 4.1 on; and noise that repeats."""
+    builders = {}
+    types = bpy.types.ShaderNodeTexNoise.bl_rna.properties.get("noise_type")
+    for kind in types.enum_items.keys() if types else ():
+        for dimensions in ("1D", "2D", "3D", "4D"):
+            inputs = {"Vector": "xyz", "W": "w", "Scale": 1.3, "Detail": 3.4, "Roughness": 0.7, "Lacunarity": 1.8}
+            inputs.update({"Offset": 0.7, "Gain": 1.3, "Distortion": 0.0})
+            settings = {"noise_dimensions": dimensions, "noise_type": kind, "normalize": False}
+            builders[f"{dimensions} {kind}"] = _node("ShaderNodeTexNoise", inputs, 0, **settings)
+        builders[f"{kind} colour"] = _node("ShaderNodeTexNoise", inputs, 1, noise_type=kind)
+        smooth = {**inputs, "Detail": 0.0}
+        builders[f"{kind} smooth"] = _node("ShaderNodeTexNoise", smooth, 0, noise_type=kind)
+    # Where floats are eighths, quarters, …: far from the lattice's middle.
+    for scale in (2.0**16, 2.0**18, 2.0**20) if types else ():
+        builders[f"far {scale}"] = _node("ShaderNodeTexNoise", {"Vector": "xyz", "Scale": scale, "Detail": 0.0})
+    if builders:
+        _assert_nodes_agree(builders, relative=5e-5, absolute=5e-6)
+
+
+def test_gabor_textures():
+    if not hasattr(bpy.types, "ShaderNodeTexGabor"):
+        return
+    builders = {}
+    for kind in ("2D", "3D"):
+        for anisotropy in (1.0, 0.6, 0.0):
+            for out in ("Value", "Phase", "Intensity"):
+                inputs = {"Vector": "xyz", "Scale": 1.3, "Frequency": 2.3, "Anisotropy": anisotropy}
+                builders[f"{kind} {anisotropy} {out}"] = _node("ShaderNodeTexGabor", inputs, out, gabor_type=kind)
+    _assert_nodes_agree(builders, relative=1e-4, absolute=1e-5, most_off=1e-3)
+
+
+def _write_image(path, width, height, is_transparent=False, seed=3):
+    """Writes random bytes as a PNG file."""
+    image = bpy.data.images.new("random", width, height, alpha=is_transparent)
+    pixels = np.random.default_rng(seed).integers(0, 256, (height, width, 4)).astype(np.float32) / 255
+    if not is_transparent:
+        pixels[..., 3] = 1
+    image.pixels.foreach_set(pixels.ravel())
+    image.filepath_raw, image.file_format = path, "PNG"
+    image.save()
+    bpy.data.images.remove(image)
+
+
+def _image(load, inputs=None, out=0, space="Non-Color", alpha_mode="STRAIGHT", both=False, **settings):
+    """A builder of an Image Texture.
+
+    @param  load  gives its image
+    @param  both  whether the other output is linked, too
+    """
+
+    def build(tree, xyz, w):
+        node = tree.nodes.new("ShaderNodeTexImage")
+        node.image = load()
+        node.image.colorspace_settings.name, node.image.alpha_mode = space, alpha_mode
+        for name, value in settings.items():
+            setattr(node, name, value)
+        tree.links.new(xyz, node.inputs["Vector"])
+        if both:
+            little = tree.nodes.new("ShaderNodeVectorMath")
+            little.operation = "MULTIPLY_ADD"
+            little.inputs[1].default_value = (1e-12, 1e-12, 1e-12)
+            tree.links.new(node.outputs[1 - out], little.inputs[0])
+            tree.links.new(node.outputs[out], little.inputs[2])
+            return little.outputs[0]
+        return node.outputs[out]
+
+    return build
+
+
+def _extensions():
+    return bpy.types.ShaderNodeTexImage.bl_rna.properties["extension"].enum_items.keys()
+
+
+def test_images():
+    with folder() as path:
+        opaque, clear = os.path.join(path, "opaque.png"), os.path.join(path, "clear.png")
+        _write_image(opaque, 13, 7)
+        _write_image(clear, 7, 11, True)
+        loaders = {
+            name: lambda file=file: bpy.data.images.load(file) for name, file in (("opaque", opaque), ("clear", clear))
+        }
+        builders = {}
+        for projection in ("FLAT", "SPHERE", "TUBE"):
+            for extension in _extensions():
+                for interpolation in ("Closest", "Linear", "Cubic"):
+                    settings = {"projection": projection, "extension": extension, "interpolation": interpolation}
+                    builders[" ".join(settings.values())] = _image(loaders["opaque"], **settings)
+        builders["smart"] = _image(loaders["opaque"], interpolation="Smart")
+        for out in (0, 1):
+            for mode in ("STRAIGHT", "CHANNEL_PACKED", "NONE"):
+                for space in ("Non-Color", "sRGB"):
+                    options = {"space": space, "alpha_mode": mode, "interpolation": "Closest"}
+                    builders[f"clear {out} {mode} {space}"] = _image(loaders["clear"], out=out, extension="CLIP", **options)
+        _assert_nodes_agree(builders, absolute=1e-5, most_off=2e-3)
+
+
+def test_images_of_encoded_colors():
+    """Cycles filters what sRGB files store, multiplied by alpha in whole bytes, and decodes the sum."""
+    with folder() as path:
+        opaque, clear = os.path.join(path, "opaque.png"), os.path.join(path, "clear.png")
+        _write_image(opaque, 13, 7)
+        _write_image(clear, 7, 11, True)
+        builders = {}
+        for interpolation in ("Closest", "Linear", "Cubic"):
+            for both in (False, True):
+                for name, file in (("opaque", opaque), ("clear", clear)):
+                    options = {"space": "sRGB", "interpolation": interpolation, "both": both}
+                    builders[f"{name} {interpolation} {both}"] = _image(lambda f=file: bpy.data.images.load(f), **options)
+        _assert_nodes_agree(builders, most_off=2e-3)
+
+
+def test_images_of_floats():
+    """Generated ones, whose colours Blender keeps multiplied by alpha; halves keep eleven bits."""
+
+    def load():
+        image = bpy.data.images.new("floats", 9, 5, alpha=True, float_buffer=True)
+        pixels = np.random.default_rng(5).integers(0, 64, (5, 9, 4)).astype(np.float32) / 32
+        pixels[..., 3] = np.minimum(pixels[..., 3], 1)
+        image.pixels.foreach_set(pixels.ravel())
+        return image
+
+    builders = {}
+    for interpolation in ("Closest", "Linear"):
+        for both in (False, True):
+            settings = {"space": bpy.data.images.new("space", 1, 1, float_buffer=True).colorspace_settings.name, "both": both}
+            builders[f"{interpolation} {both}"] = _image(load, interpolation=interpolation, **settings)
+    _assert_nodes_agree(builders, absolute=1e-5, most_off=2e-3)
+
+
+def test_boxes_of_images():
+    with folder() as path:
+        file = os.path.join(path, "image.png")
+        _write_image(file, 13, 7)
+        builders = {
+            f"{blend}": _image(lambda: bpy.data.images.load(file), projection="BOX", projection_blend=blend)
+            for blend in (0.0, 0.2, 0.6, 1.0)
+        }
+        _assert_nodes_agree(builders, absolute=2e-5, most_off=2e-3, tilted=True)
+
+
+def test_tiled_images():
+    def load(numbers):
+        image = bpy.data.images.load(os.path.join(path, "tile.1001.png"))
+        image.source = "TILED"
+        image.filepath = os.path.join(path, "tile.<UDIM>.png")
+        for number in numbers:
+            image.tiles.new(number)
+        return image
+
+    with folder() as path:
+        for seed, number in enumerate((1001, 1002, 1011)):
+            _write_image(os.path.join(path, f"tile.{number}.png"), 8 + seed, 7, seed=seed)
+        builders = {
+            name: _image(lambda n=numbers: load(n), extension="EXTEND", interpolation="Linear")
+            for name, numbers in (("three", (1002, 1011)), ("two", (1011,)))
+        }
+        _assert_nodes_agree(builders, low=-0.5, high=2.5, absolute=1e-5, most_off=2e-3)
+
+
 def test_musgrave_textures():
+    if not hasattr(bpy.types, "ShaderNodeTexMusgrave"):
+        return
     builders = {}
     for dimensions in ("1D", "2D", "3D", "4D"):
         for kind in ("MULTIFRACTAL", "RIDGED_MULTIFRACTAL", "HYBRID_MULTIFRACTAL", "FBM", "HETERO_TERRAIN"):
@@ -293,8 +491,6 @@ def test_vector_math():
     for name in operations:
         out = 1 if name in {"DOT_PRODUCT", "DISTANCE", "LENGTH"} else 0
         inputs = {0: "xyz", 1: (0.7, -0.4, 1.1), 2: (0.3, 0.2, -0.9), "Scale": 0.8}
-        if name == "POWER":  # there is none yet
-            continue
         builders[name] = _node("ShaderNodeVectorMath", inputs, out, operation=name)
     _assert_nodes_agree(builders, relative=1e-5, absolute=2e-6, most_off=1e-3)
 
@@ -346,6 +542,61 @@ def test_colors():
         for out in range(3):
             builders[f"separate {mode} {out}"] = _node("ShaderNodeSeparateColor", {0: "xyz"}, out, mode=mode)
         builders[f"combine {mode}"] = _node("ShaderNodeCombineColor", {0: _X, 1: _Y, 2: _Z}, mode=mode)
+    absolute = 2e-6 if _IS_REC_709 else 1e-4
+    _assert_nodes_agree(builders, low=0.0, high=1.0, absolute=absolute, most_off=1e-3)
+
+
+def test_temperatures_and_wavelengths():
+    def build(kind, name, scale, offset):
+        def builder(tree, xyz, w):
+            scaled = tree.nodes.new("ShaderNodeMath")
+            scaled.operation = "MULTIPLY_ADD"
+            scaled.inputs[1].default_value, scaled.inputs[2].default_value = scale, offset
+            node = tree.nodes.new(kind)
+            tree.links.new(w, scaled.inputs[0])
+            tree.links.new(scaled.outputs[0], node.inputs[name])
+            return node.outputs[0]
+
+        return builder
+
+    builders = {
+        "blackbody": build("ShaderNodeBlackbody", "Temperature", 3400.0, 6500.0),
+        "embers": build("ShaderNodeBlackbody", "Temperature", 700.0, 1800.0),
+        "wavelength": build("ShaderNodeWavelength", "Wavelength", 110.0, 580.0),
+    }
+    relative = 1e-5 if _IS_REC_709 else 3e-4
+    _assert_nodes_agree(builders, relative=relative, absolute=1e-5, most_off=1e-3)
+
+
+def test_turns():
+    builders = {}
+    for kind in ("AXIS_ANGLE", "X_AXIS", "Y_AXIS", "Z_AXIS", "EULER_XYZ"):
+        for invert in (False, True):
+            inputs = {"Vector": "xyz", "Center": (0.3, -0.2, 0.5)}
+            inputs.update({"Rotation": (0.4, -0.7, 1.1)} if kind == "EULER_XYZ" else {"Angle": "w"})
+            if kind == "AXIS_ANGLE":
+                inputs["Axis"] = (0.4, -0.8, 0.6)
+            builders[f"{kind} {invert}"] = _node("ShaderNodeVectorRotate", inputs, rotation_type=kind, invert=invert)
+
+    def normal(out):
+        def builder(tree, xyz, w):
+            node = tree.nodes.new("ShaderNodeNormal")
+            node.outputs[0].default_value = (0.6, -0.3, 0.7)
+            tree.links.new(xyz, node.inputs[0])
+            return node.outputs[out]
+
+        return builder
+
+    builders.update({"normal": normal(0), "dot": normal(1)})
+    _assert_nodes_agree(builders, absolute=3e-6)
+
+
+def test_old_nodes_of_hsv():
+    if not hasattr(bpy.types, "ShaderNodeCombineHSV"):
+        return
+    builders = {"combine": _node("ShaderNodeCombineHSV", {0: _X, 1: _Y, 2: _Z})}
+    for out in range(3):
+        builders[f"separate {out}"] = _node("ShaderNodeSeparateHSV", {0: "xyz"}, out)
     _assert_nodes_agree(builders, low=0.0, high=1.0, absolute=2e-6, most_off=1e-3)
 
 
@@ -389,6 +640,30 @@ def test_mappings():
             inputs["Location"] = (0.3, 0.5, -0.2)
         builders[kind] = _node("ShaderNodeMapping", inputs, vector_type=kind)
     _assert_nodes_agree(builders, absolute=3e-6)
+
+
+def test_mappings_of_textures():
+    """Textures' own, which no panel shows."""
+    def build(kind, **settings):
+        def builder(tree, xyz, w):
+            node = tree.nodes.new(kind)
+            mapping = node.texture_mapping
+            mapping.rotation, mapping.scale = (0.4, -0.7, 1.1), (0.7, 1.3, -0.8)
+            mapping.translation = (0.3, 0.5, -0.2)
+            for name, value in settings.items():
+                setattr(mapping, name, value)
+            tree.links.new(xyz, node.inputs["Vector"])
+            return node.outputs[0]
+
+        return builder
+
+    builders = {
+        f"{kind} {mapping}": build(kind, vector_type=mapping)
+        for kind in ("ShaderNodeTexNoise", "ShaderNodeTexVoronoi", "ShaderNodeTexGradient")
+        for mapping in ("POINT", "TEXTURE", "VECTOR")
+    }
+    builders["axes"] = build("ShaderNodeTexGradient", vector_type="POINT", mapping_x="Y", mapping_y="NONE", mapping_z="X")
+    _assert_nodes_agree(builders, relative=5e-5, absolute=2e-5, most_off=2e-3)
 
 
 def _procedural_scene():
@@ -459,7 +734,7 @@ def test_opacity_by_noise():
 def test_what_is_behind_a_ramp_is_named():
     scene = _procedural_scene()
     tree = bpy.data.materials["wood"].node_tree
-    sky = tree.nodes.new("ShaderNodeTexSky")
+    odd = tree.nodes.new("ShaderNodeShaderToRGB")
     ramp = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeValToRGB")
-    tree.links.new(sky.outputs[0], ramp.inputs[0])
-    assert_warns(scene, 'node "Sky Texture"', "as Color")
+    tree.links.new(odd.outputs[0], ramp.inputs[0])
+    assert_warns(scene, 'node "Shader to RGB"', "as Color")

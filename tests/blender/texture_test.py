@@ -234,10 +234,8 @@ def test_color_attribute():
     assert_agrees(_painted("ShaderNodeBsdfDiffuse"), samples=64, tolerance=0.005)
 
 
-def test_color_attribute_of_emission_is_warned_about():
-    from scenes import assert_warns
-
-    assert_warns(_painted("ShaderNodeEmission"), 'material "painted"', "colour attribute", "emission")
+def test_color_attribute_of_emission():
+    assert_agrees(_painted("ShaderNodeEmission"), samples=64, tolerance=0.005)
 
 
 def _save(path, file_format="PNG", depth="16"):

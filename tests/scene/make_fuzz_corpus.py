@@ -116,6 +116,56 @@ def materials():
     return b
 
 
+def graphs():
+    """Materials of value graphs: a chain of textures and colours, mathematics, and what every kind of error is near to."""
+    b = Builder()
+
+    def material(nodes, outputs):
+        graph = {"nodes": nodes, "outputs": outputs}
+        b.json.setdefault("materials", []).append({"extensions": {"RELIEF_graph": graph}})
+        b.node(mesh=b.square(material=len(b.json["materials"]) - 1))
+
+    def of(node, output=None):
+        return {"node": node, **({"output": output} if output else {})}
+
+    b.json.update(images=[{"uri": PIXEL}], textures=[{"source": 0}])
+    material(
+        [{"type": "texture-coordinate"},
+         {"type": "mapping", "inputs": {"vector": of(0, "uv"), "rotation": [0, 0, 1], "scale": 2}, "mapping": "texture"},
+         {"type": "image-texture", "inputs": {"vector": of(1)}, "texture": {"index": 0}, "colorSpace": "linear"},
+         {"type": "noise-texture", "inputs": {"vector": of(0, "object"), "detail": 4.5, "distortion": .1}},
+         {"type": "color-ramp", "inputs": {"factor": of(3, "factor")}, "table": [0, 0, 0, 1, 1, .5, 0, 1]},
+         {"type": "mix-color", "inputs": {"factor": .3, "a": of(2, "color"), "b": of(4, "color")}, "blend": "overlay"},
+         {"type": "layer-weight", "inputs": {"blend": .2}},
+         {"type": "color-curves", "inputs": {"color": of(5)}, "table": [0, 0, 0, 1, .5, .2], "max": 2, "extrapolate": False}],
+        {"baseColor": of(7), "roughness": of(6, "facing"), "emission": of(2, "color"), "alpha": of(2, "alpha")})
+    material(
+        [{"type": "geometry"},
+         {"type": "math", "inputs": {"a": of(0, "backfacing"), "b": -1e38, "c": 0}, "operation": "wrap", "clamp": True},
+         {"type": "vector-math", "inputs": {"a": of(0, "position"), "b": [1, 0, -2], "scale": of(1)}, "operation": "refract"},
+         {"type": "voronoi-texture", "inputs": {"vector": of(2, "vector"), "w": of(1), "exponent": 0}, "dimensions": 4,
+          "feature": "smooth-f1", "metric": "minkowski"},
+         {"type": "musgrave-texture", "inputs": {"vector": of(3, "position"), "w": 1e30}, "dimensions": 4,
+          "musgrave": "ridged-multifractal"},
+         {"type": "brick-texture", "inputs": {"vector": of(0, "position"), "rowHeight": 0}, "squashFrequency": 0},
+         {"type": "map-range", "inputs": {"value": of(4), "fromMax": 0, "steps": 0}, "interpolation": "stepped"},
+         {"type": "vertex-color"},
+         {"type": "hue-saturation", "inputs": {"color": of(7, "color"), "hue": of(6)}},
+         {"type": "wave-texture", "inputs": {"vector": of(8)}, "wave": "rings", "profile": "saw"},
+         {"type": "magic-texture", "inputs": {"scale": of(9, "factor")}, "depth": 10}],
+        {"metallic": of(10, "factor"), "sheenColor": of(5, "color"), "specular": of(8), "transmission": of(1)})
+    # Nothing here depends on the point: all of it is computed while it is read.
+    material(
+        [{"type": kind, **more} for kind, more in (
+            ("noise-texture", {"dimensions": 1}), ("white-noise-texture", {"dimensions": 2}), ("checker-texture", {}),
+            ("gradient-texture", {"gradient": "radial"}), ("separate-color", {"space": "hsl"}),
+            ("combine-color", {"space": "hsv"}), ("number-curve", {"table": [0, 1]}), ("clamp", {"clamp": "range"}),
+            ("bright-contrast", {}), ("gamma", {}), ("invert", {}), ("rgb-to-bw", {}), ("combine", {}),
+            ("mix-number", {"clampFactor": False}), ("voronoi-texture", {"feature": "distance-to-edge"}))],
+        {"baseColor": of(5), "clearcoat": of(7), "clearcoatRoughness": of(0, "factor"), "specularColor": of(1, "color")})
+    return b
+
+
 def lights():
     b = Builder()
     kinds = [{"type": "point", "intensity": 5}, {"type": "directional", "color": [1, 0, 0]},
@@ -171,7 +221,7 @@ def composition():
 def main():
     folder = pathlib.Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
-    for make in (plain, topologies, materials, lights, animation, composition):
+    for make in (plain, topologies, materials, graphs, lights, animation, composition):
         (folder / f"{make.__name__}.gltf").write_bytes(make().gltf())
         (folder / f"{make.__name__}.glb").write_bytes(make().glb())
 

@@ -88,10 +88,6 @@ def _move_of_output(material, settings, textures):
     if source is None:
         return None
     if compat.displacement_method(material) == "BUMP" and not settings.bump_displaces:
-        textures.warn(
-            'its Displacement node, as its setting is "Bump Only"',
-            'nothing is displaced; choose "Displacement Only" in Material > relief Displacement',
-        )
         return None
     node, groups = source.node, source.groups
     if node.bl_idname != "ShaderNodeDisplacement":

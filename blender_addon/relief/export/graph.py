@@ -5,66 +5,139 @@ One function a kind of node, listed at the end with the names of its outputs. Th
 (docs/graphs.md); what is said here is which socket is which, and what an unlinked one means.
 """
 
+from json import dumps
+
 from .. import compat
 from . import nodes
-
-#: Entries of the tables that stand for ramps and curves: as many as Cycles'.
-_TABLE = 256
+from .graph_inputs import OUTPUTS, mesh_attribute
 
 
 class NotUnderstood(Exception):
-    """A node that graphs do not know; its text names it."""
+    """A node that graphs do not know; its text names it.
+
+    key  of the node, as nodes.Source has it; None: not known yet
+    """
+
+    key = None
 
 
 class GraphWriter:
     """Collects the nodes of one material's graph.
 
     @param  coordinate_set  gives the number, 0 or 1, of the set that a ("uv", name) is in; None: no room for it
-    @param  texture         gives glTF's reference to an Image Texture node's image, and whether it is stored as sRGB; None
-                            without a file
+    @param  texture         gives the options of image-texture that say which image a node reads; None without a file
+    @param  warn            called with what a value is, if it is no number, and what was used instead
+    @param  material_index  Pass Index of the material
+    @param  view_layer      gives the things whose properties are the view layer's attributes, the first one first
     nodes          JSON of the nodes so far
-    outputs        JSON of what the graph gives
     uses_generated whether meshes need _GENERATED
-    color_map      colour attribute that is read; None: none
+    attributes     attributes of meshes that are read: see attributes.py
+    values         values of objects that are read: see instance_values.py
+    own_normal     reference to the surface's normal as a displacement bumps it; None: it is the mesh's
+    not_understood texts by the keys of the nodes that they are about
     """
 
-    def __init__(self, coordinate_set, texture):
+    def __init__(self, coordinate_set, texture, warn=lambda what, instead: None, material_index=0, view_layer=tuple):
         self.coordinate_set = coordinate_set
         self.texture = texture
+        self.warn = warn
         self.nodes = []
-        self.outputs = {}
         self.uses_generated = False
-        self.color_map = None
+        self.material_index = material_index
+        self.view_layer = view_layer
+        self.attributes = []
+        self.values = []
+        self.own_normal = None
+        self.not_understood = {}
+        self._indices = {}
         self._known = {}
+        self._folded = {}
+
+    def constant(self, socket, groups=()):
+        """An input's number or list, finite and of the socket's type; None if it varies."""
+        value = nodes.fold(socket, groups, self._folded)
+        if value is None:
+            return None
+        value = nodes.finite(value, socket.name, self.warn)
+        if socket.type in {"VALUE", "INT", "BOOLEAN"}:
+            return nodes.as_number(value)
+        return list(nodes.as_color(value))
 
     def value(self, socket, groups=()):
         """An input as graphs have it: numbers, or a reference.
 
         @error  NotUnderstood
         """
-        source = nodes.follow(socket, groups)
-        constant = nodes.fold(socket, groups)
-        if constant is not None:
-            finite = nodes.finite(constant, socket.name, lambda *_: None)
-            return list(finite[:3]) if isinstance(finite, tuple) else finite
-        return self.output(source)
+        constant = self.constant(socket, groups)
+        return constant if constant is not None else self.output(nodes.follow(socket, groups))
+
+    def normal(self, socket, groups=()):
+        """Reference to a Normal input, in the world; None: nothing is linked, and the surface has the mesh's own.
+
+        @error  NotUnderstood
+        """
+        source = self._normal_source(nodes.linked(socket, groups))
+        if source is None:
+            return self.own_normal
+        constant = self.constant(socket, groups)
+        if constant is None:
+            return self.output(source)
+        return self.op("combine", dict(zip("xyz", constant)), "vector")
+
+    def bends(self, socket, groups=()):
+        """Whether a Normal input has a normal of its own."""
+        return self._normal_source(nodes.linked(socket, groups)) is not None
+
+    def _normal_source(self, source):
+        """What gives a normal, past Bump nodes whose height is the same everywhere."""
+        seen = set()
+        while source is not None and source.node.bl_idname == "ShaderNodeBump" and source.key not in seen:
+            seen.add(source.key)
+            if self.constant(source.node.inputs["Height"], source.groups) is None:
+                break
+            source = nodes.linked(source.node.inputs["Normal"], source.groups)
+        return source
 
     def output(self, source):
         """Reference to what a nodes.Source gives."""
         node = source.node
-        if node.bl_idname == "ShaderNodeUVMap":
-            return self.uv(node.uv_map)
-        if node.bl_idname == "ShaderNodeTexCoord" and source.socket.identifier == "UV":
-            return self.uv("")
+        if node.bl_idname == "ShaderNodeBump" and self._normal_source(source) != source:
+            return self.normal(node.inputs["Normal"], source.groups) or self.geometry_normal()
+        if node.bl_idname == "ShaderNodeNewGeometry" and source.socket.identifier == "Normal":
+            return self.own_normal or self.geometry_normal()
+        give = OUTPUTS.get(node.bl_idname)
         write, names = _NODES.get(node.bl_idname, (None, {}))
         name = names.get(source.socket.identifier, names.get(source.socket.name))
-        if write is None or name is None:
-            raise NotUnderstood(f'node "{node.name}" ({node.bl_label}), {source.socket.name}')
-        key = (node.as_pointer(), tuple(group.as_pointer() for group in source.groups))
+        if give is None and (write is None or name is None):
+            raise self._failure(source, NotUnderstood(f'node "{node.name}" ({node.bl_label}), {source.socket.name}'))
+        key = source.key if give is None else (*source.key, source.socket.identifier)
         if key not in self._known:
-            self._known[key] = write(self, node, source.groups)
-        index = self._known[key]
-        return {"node": index, "output": name}
+            # Stays only if the node depends on itself.
+            circle = NotUnderstood(f'node "{node.name}" ({node.bl_label}), which is linked in a circle')
+            circle.key = source.key
+            self._known[key] = circle
+            try:
+                self._known[key] = write(self, node, source.groups) if give is None else give(self, source)
+            except NotUnderstood as error:
+                self._known[key] = self._failure(source, error)
+            except RecursionError:
+                error = NotUnderstood(f'node "{node.name}": more nodes one after another than can be followed')
+                raise self._failure(source, error) from None
+        found = self._known[key]
+        if isinstance(found, NotUnderstood):
+            self.not_understood.setdefault(found.key, str(found))
+            raise found
+        return {"node": found, "output": name} if give is None else found
+
+    def _failure(self, source, error):
+        """Notes which node an error is about: the one that met it first."""
+        if error.key is None:
+            error.key = source.key
+            self.not_understood[source.key] = str(error)
+        return error
+
+    def geometry_normal(self):
+        return {"node": self.add("geometry"), "output": "normal"}
 
     def add(self, kind, inputs=None, **options):
         """Adds a node; equal ones become one.
@@ -74,54 +147,66 @@ class GraphWriter:
         json = {"type": kind, **{k: v for k, v in options.items() if v is not None}}
         if inputs:
             json["inputs"] = inputs
-        if json in self.nodes:
-            return self.nodes.index(json)
-        self.nodes.append(json)
-        return len(self.nodes) - 1
+        key = dumps(json, sort_keys=True)
+        if key not in self._indices:
+            self._indices[key] = len(self.nodes)
+            self.nodes.append(json)
+        return self._indices[key]
+
+    def op(self, kind, inputs, output, **options):
+        """Adds a node; returns a reference to one of its outputs."""
+        return {"node": self.add(kind, inputs, **options), "output": output}
 
     def inputs(self, node, groups, names):
         """Inputs of a node by our names.
 
         @param  names  our name by Blender's, or by the number of the socket
         """
-        out = {}
+        out, failure = {}, None
         for theirs, ours in names.items():
             socket = node.inputs[theirs] if isinstance(theirs, int) else node.inputs.get(theirs)
-            if socket is not None:
+            if socket is None:
+                continue
+            try:
                 out[ours] = self.value(socket, groups)
+            except NotUnderstood as error:  # the others may have something to tell, too
+                failure = failure or error
+        if failure is not None:
+            raise failure
         return out
 
     def vector(self, node, groups, implicit):
         """A texture's Vector, or what Blender takes where nothing is linked: generated or uv."""
         socket = node.inputs["Vector"]
-        if nodes.follow(socket, groups) is not None:
-            return self.value(socket, groups)
+        if nodes.linked(socket, groups) is not None:
+            return self.mapped(node, self.value(socket, groups))
         if implicit == "generated":
             self.uses_generated = True
-            return {"node": self.add("texture-coordinate"), "output": "generated"}
-        return self.uv("")
+            return self.mapped(node, {"node": self.add("texture-coordinate"), "output": "generated"})
+        return self.mapped(node, self.uv(""))
+
+    def mapped(self, node, vector):
+        """A texture's vector after the mapping that the node itself has, in files from before Mapping nodes had sockets."""
+        if nodes.has_plain_mapping(node):
+            return vector
+        mapping = node.texture_mapping
+        if mapping.vector_type == "NORMAL" or mapping.use_min or mapping.use_max:
+            raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): its own mapping as a normal or with limits')
+        axes = [mapping.mapping_x, mapping.mapping_y, mapping.mapping_z]
+        if axes != ["X", "Y", "Z"]:
+            parts = self.add("separate", {"vector": vector})
+            chosen = [0.0 if axis == "NONE" else {"node": parts, "output": axis.lower()} for axis in axes]
+            vector = {"node": self.add("combine", dict(zip("xyz", chosen))), "output": "vector"}
+        inputs = {"vector": vector, "rotation": list(mapping.rotation), "scale": list(mapping.scale)}
+        if mapping.vector_type != "VECTOR":
+            inputs["location"] = list(mapping.translation)
+        return {"node": self.add("mapping", inputs, mapping=_label(mapping.vector_type)), "output": "vector"}
 
     def uv(self, name):
         number = self.coordinate_set(("uv", name))
         if number is None:
-            raise NotUnderstood(f'a third uv map, "{name}"')
+            return mesh_attribute(self, "uv", name, "vector")
         return {"node": self.add("texture-coordinate"), "output": "uv1" if number else "uv"}
-
-    def scaled(self, reference, factor, is_color):
-        """A value times a number, or times a colour."""
-        if is_color:
-            if tuple(factor) == (1.0, 1.0, 1.0):
-                return reference
-            inputs = {"factor": 1.0, "a": reference, "b": list(factor)}
-            return {"node": self.add("mix-color", inputs, blend="multiply"), "output": "color"}
-        if factor == 1.0:
-            return reference
-        return {"node": self.add("math", {"a": reference, "b": factor}, operation="multiply"), "output": "value"}
-
-    def shifted(self, reference, offset):
-        if offset == 0.0:
-            return reference
-        return {"node": self.add("math", {"a": reference, "b": offset}, operation="add"), "output": "value"}
 
 
 def _label(name):
@@ -139,44 +224,6 @@ def _choice(node, value, labels):
     return labels[value]
 
 
-def _texture_coordinate(g, node, groups):
-    if node.from_instancer:
-        raise NotUnderstood(f'node "{node.name}": coordinates from an instancer')
-    if node.object is not None:
-        raise NotUnderstood(f'node "{node.name}": coordinates of another object')
-    g.uses_generated = True
-    return g.add("texture-coordinate")
-
-
-def _geometry(g, node, groups):
-    return g.add("geometry")
-
-
-def _color_attribute(g, node, groups):
-    name = node.layer_name if node.bl_idname == "ShaderNodeVertexColor" else node.attribute_name
-    if node.bl_idname == "ShaderNodeAttribute" and node.attribute_type != "GEOMETRY":
-        raise NotUnderstood(f'node "{node.name}": an attribute of the {node.attribute_type.lower()}')
-    if g.color_map not in {None, name}:
-        raise NotUnderstood(f'a second colour attribute, "{name}"')
-    g.color_map = name
-    return g.add("vertex-color")
-
-
-def _fresnel(g, node, groups):
-    _without_normal(node, groups)
-    return g.add("fresnel", g.inputs(node, groups, {"IOR": "ior"}))
-
-
-def _layer_weight(g, node, groups):
-    _without_normal(node, groups)
-    return g.add("layer-weight", g.inputs(node, groups, {"Blend": "blend"}))
-
-
-def _without_normal(node, groups):
-    if nodes.follow(node.inputs["Normal"], groups) is not None:
-        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): a normal of its own')
-
-
 _DIMENSIONS = {"1D": 1, "2D": 2, "3D": 3, "4D": 4}
 
 
@@ -190,14 +237,21 @@ def _point(g, node, groups):
 
 
 def _noise(g, node, groups):
-    if getattr(node, "noise_type", "FBM") != "FBM":
-        raise NotUnderstood(f'node "{node.name}": type {_label(node.noise_type)}')
     inputs, dimensions = _point(g, node, groups)
     names = {"Scale": "scale", "Detail": "detail", "Roughness": "roughness", "Lacunarity": "lacunarity"}
+    names.update({"Offset": "offset", "Gain": "gain"})
     inputs.update(g.inputs(node, groups, {**names, "Distortion": "distortion"}))
     if compat.CLAMPS_NOISE_ROUGHNESS:
         inputs["roughness"] = _clamped(g, inputs["roughness"])
-    return g.add("noise-texture", inputs, dimensions=dimensions, normalize=getattr(node, "normalize", True))
+    kind = _label(getattr(node, "noise_type", "FBM"))
+    return g.add(
+        "noise-texture",
+        inputs,
+        dimensions=dimensions,
+        noise=kind if kind != "fbm" else None,
+        normalize=getattr(node, "normalize", True),
+        maths=compat.TEXTURE_MATHS,
+    )
 
 
 def _clamped(g, value):
@@ -215,18 +269,24 @@ def _white_noise(g, node, groups):
 
 
 def _image(g, node, groups):
-    if node.projection != "FLAT" or node.extension == "CLIP" or node.interpolation in {"Cubic", "Smart"}:
-        raise NotUnderstood(f'node "{node.name}": a projection, extension or interpolation of its own')
     if node.image is None:
         magenta = {"red": 1.0, "green": 0.0, "blue": 1.0}
         return g.add("combine-color", magenta)
-    found = g.texture(node)
-    if found is None:
+    options = g.texture(node)
+    if options is None:
         raise NotUnderstood(f'node "{node.name}": an image without file')
-    info, is_srgb = found
-    vector = g.vector(node, groups, "uv")
-    space = "srgb" if is_srgb else "linear"
-    return g.add("image-texture", {"vector": vector}, texture=info, colorSpace=space)
+    if node.projection != "FLAT":
+        options["projection"] = _label(node.projection)
+    if node.projection == "BOX":
+        options["blend"] = node.projection_blend
+        if "tiles" in options:  # as Cycles, which reads the first alone
+            first = options.pop("tiles")[0]
+            options.update({"texture": first["texture"], "colorSpace": first["colorSpace"]})
+    if node.extension == "CLIP":
+        options["clip"] = True
+    if node.interpolation in {"Cubic", "Smart"}:
+        options["filter"] = "cubic"
+    return g.add("image-texture", {"vector": g.vector(node, groups, "uv")}, **options)
 
 
 _VORONOI = {
@@ -239,19 +299,32 @@ _VORONOI = {
 
 
 def _voronoi(g, node, groups):
-    if compat.IS_5_0:
-        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): the cells of 5.0')
-    node_detail = node.inputs.get("Detail")
-    if node_detail is not None and nodes.fold(node_detail, groups) != 0.0 or getattr(node, "normalize", False):
-        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): detail or normalisation')
     dimensions = _DIMENSIONS[node.voronoi_dimensions]
     inputs = {"vector": g.vector(node, groups, "generated")} if dimensions > 1 else {}
     if dimensions in {1, 4}:
         inputs["w"] = g.value(node.inputs["W"], groups)
     names = {"Scale": "scale", "Smoothness": "smoothness", "Exponent": "exponent", "Randomness": "randomness"}
+    names.update({"Detail": "detail", "Roughness": "roughness", "Lacunarity": "lacunarity"})
     inputs.update(g.inputs(node, groups, names))
-    feature = _choice(node, node.feature, _VORONOI)
-    return g.add("voronoi-texture", inputs, dimensions=dimensions, feature=feature, metric=_label(node.distance))
+    return g.add(
+        "voronoi-texture",
+        inputs,
+        dimensions=dimensions,
+        feature=_choice(node, node.feature, _VORONOI),
+        metric=_label(node.distance),
+        normalize=getattr(node, "normalize", False) or None,
+        maths=compat.TEXTURE_MATHS,
+    )
+
+
+def _gabor(g, node, groups):
+    inputs = {"vector": g.vector(node, groups, "generated")}
+    names = {"Scale": "scale", "Frequency": "frequency", "Anisotropy": "anisotropy"}
+    is_3d = node.gabor_type == "3D"
+    sockets = {socket.identifier: socket for socket in node.inputs}
+    inputs["direction" if is_3d else "orientation"] = g.value(sockets["Orientation 3D" if is_3d else "Orientation 2D"], groups)
+    inputs.update(g.inputs(node, groups, names))
+    return g.add("gabor-texture", inputs, dimensions=3 if is_3d else 2)
 
 
 def _musgrave(g, node, groups):
@@ -302,7 +375,7 @@ def _checker(g, node, groups):
 def _magic(g, node, groups):
     inputs = {"vector": g.vector(node, groups, "generated")}
     inputs.update(g.inputs(node, groups, {"Scale": "scale", "Distortion": "distortion"}))
-    return g.add("magic-texture", inputs, depth=node.turbulence_depth)
+    return g.add("magic-texture", inputs, depth=node.turbulence_depth, maths=compat.TEXTURE_MATHS)
 
 
 def _wave(g, node, groups):
@@ -320,11 +393,12 @@ def _wave(g, node, groups):
         wave="rings" if are_rings else "bands",
         direction=_label(direction),
         profile=_choice(node, node.wave_profile, {"SIN": "sine", "SAW": "saw", "TRI": "triangle"}),
+        maths=compat.TEXTURE_MATHS,
     )
 
 
 def _ramp(g, node, groups):
-    table = [c for i in range(_TABLE) for c in node.color_ramp.evaluate(i / (_TABLE - 1))]
+    table = [c for i in range(compat.TABLE_ENTRIES) for c in node.color_ramp.evaluate(i / (compat.TABLE_ENTRIES - 1))]
     interpolated = node.color_ramp.interpolation != "CONSTANT"
     inputs = g.inputs(node, groups, {0: "factor"})
     return g.add("color-ramp", inputs, table=table, interpolate=interpolated)
@@ -340,8 +414,8 @@ def _curve_table(mapping, curves, combined=None):
     ends = [point.location[0] for curve in (*curves, *([combined] if combined else [])) for point in curve.points]
     low, high = min(ends), max(ends)
     table = []
-    for i in range(_TABLE):
-        x = low + (high - low) * i / (_TABLE - 1)
+    for i in range(compat.TABLE_ENTRIES):
+        x = low + (high - low) * i / (compat.TABLE_ENTRIES - 1)
         if combined is not None:
             x = mapping.evaluate(combined, x)
         table.extend(mapping.evaluate(curve, x) for curve in curves)
@@ -383,6 +457,9 @@ def _mix(g, node, groups):
     if node.data_type == "RGBA":
         blend = _choice(node, node.blend_type, {name: _label(name) for name in _BLENDS})
         return g.add("mix-color", inputs, blend=blend, clampFactor=node.clamp_factor, clampResult=node.clamp_result)
+    if node.data_type == "VECTOR" and node.factor_mode == "UNIFORM" and isinstance(inputs["factor"], dict):
+        # One number for all components, also of a colour or vector: ours takes one a component.
+        inputs["factor"] = {"node": g.add("math", {"a": inputs["factor"], "b": 0.0}, operation="add"), "output": "value"}
     kind = {"FLOAT": "mix-number", "VECTOR": "mix-vector"}
     return g.add(_choice(node, node.data_type, kind), inputs, clampFactor=node.clamp_factor)
 
@@ -443,8 +520,6 @@ def _math(g, node, groups):
 
 def _vector_math(g, node, groups):
     operation = _OPERATIONS.get(node.operation, _label(node.operation))
-    if operation == "power":
-        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): power')
     inputs = {name: g.value(socket, groups) for name, socket in zip("abc", node.inputs) if socket.enabled}
     if node.operation in {"SCALE", "REFRACT"}:
         inputs["scale"] = g.value(node.inputs["Scale"], groups)
@@ -460,11 +535,102 @@ def _combine_rgb(g, node, groups):
     return g.add("combine-color", inputs, space=_label(getattr(node, "mode", "RGB")))
 
 
+def _separate_hsv(g, node, groups):
+    return g.add("separate-color", g.inputs(node, groups, {0: "color"}), space="hsv")
+
+
+def _combine_hsv(g, node, groups):
+    inputs = g.inputs(node, groups, {0: "red", 1: "green", 2: "blue"})
+    return g.add("combine-color", inputs, space="hsv")
+
+
+def _vector_rotate(g, node, groups):
+    kinds = {"AXIS_ANGLE": "axis", "X_AXIS": "x", "Y_AXIS": "y", "Z_AXIS": "z", "EULER_XYZ": "euler"}
+    kind = _choice(node, node.rotation_type, kinds)
+    names = {"Vector": "vector", "Center": "center"}
+    names.update({"Rotation": "rotation"} if kind == "euler" else {"Angle": "angle"})
+    if kind == "axis":
+        names["Axis"] = "axis"
+    return g.add("vector-rotate", g.inputs(node, groups, names), rotate=kind, invert=node.invert or None)
+
+
 def _hue(g, node, groups):
     names = {"Hue": "hue", "Saturation": "saturation", "Value": "value", "Fac": "factor", "Color": "color"}
     if "Factor" in node.inputs:
         names["Factor"] = "factor"
-    return g.add("hue-saturation", g.inputs(node, groups, names))
+    return g.add("hue-saturation", g.inputs(node, groups, names), hueGoesRound=compat.HUE_GOES_ROUND or None)
+
+
+def _bump(g, node, groups):
+    names = {"Strength": "strength", "Distance": "distance", "Filter Width": "filterWidth", "Height": "height"}
+    inputs = g.inputs(node, groups, names)
+    normal = g.normal(node.inputs["Normal"], groups)
+    if normal is not None:
+        inputs["normal"] = normal
+    return g.add("bump", inputs, invert=node.invert or None)
+
+
+def bump_of_displacement(g, source):
+    """Reference to the normal that Blender's "Bump Only" makes of what is linked to a material's Displacement.
+
+    Cycles bumps by how far the displacement goes along the normal.
+
+    @return  None: the displacement is the same everywhere
+    @error   NotUnderstood
+    """
+    node, groups = source.node, source.groups
+    if node.bl_idname == "ShaderNodeDisplacement":
+        parts = [g.value(node.inputs[name], groups) for name in ("Height", "Midlevel", "Scale")]
+        if not any(isinstance(part, dict) for part in parts):
+            return None
+        direction = _direction(g, node, groups)
+        height = _times_shifted(g, *parts)
+        if direction is not None:
+            height = g.op("math", {"a": height, "b": _along_normal(g, direction)}, "value", operation="multiply")
+    else:
+        height = _along_normal(g, _displacement(g, source))
+    return g.op("bump", {"height": height, "strength": 1.0, "distance": 1.0}, "normal")
+
+
+def _direction(g, node, groups):
+    """Where a Displacement node moves points by a height of 1, in the world; None: along the normal."""
+    is_bent = g.bends(node.inputs["Normal"], groups)
+    normal = g.normal(node.inputs["Normal"], groups) if is_bent else None
+    if node.space == "WORLD":
+        return normal
+    if is_bent:
+        normal = g.op("vector-transform", {"vector": normal}, "vector", transform="normal", **{"from": "world", "to": "object"})
+    else:
+        normal = {"node": g.add("texture-coordinate"), "output": "normal"}
+    return _to_world(g, normal)
+
+
+def _to_world(g, vector):
+    return g.op("vector-transform", {"vector": vector}, "vector", transform="vector", **{"from": "object", "to": "world"})
+
+
+def _along_normal(g, vector):
+    return g.op("vector-math", {"a": vector, "b": g.geometry_normal()}, "value", operation="dot")
+
+
+def _times_shifted(g, height, midlevel, scale):
+    """(height − midlevel) · scale"""
+    if midlevel != 0:
+        height = g.op("math", {"a": height, "b": midlevel}, "value", operation="subtract")
+    return height if scale == 1 else g.op("math", {"a": height, "b": scale}, "value", operation="multiply")
+
+
+def _displacement(g, source):
+    """A displacement that is no Displacement node's, in the world."""
+    node, groups = source.node, source.groups
+    if node.bl_idname != "ShaderNodeVectorDisplacement":
+        return g.output(source)
+    if node.space == "TANGENT":
+        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}) as bump: space tangent')
+    vector, midlevel, scale = (g.value(node.inputs[name], groups) for name in ("Vector", "Midlevel", "Scale"))
+    moved = g.op("vector-math", {"a": vector, "b": midlevel}, "vector", operation="subtract")
+    moved = g.op("vector-math", {"a": moved, "scale": scale}, "vector", operation="scale")
+    return moved if node.space == "WORLD" else _to_world(g, moved)
 
 
 _FACTOR = {"Fac": "factor", "Factor": "factor", "Color": "color"}
@@ -477,21 +643,6 @@ _RGB = {
 
 #: What writes a node, and our name of each of its outputs by Blender's.
 _NODES = {
-    "ShaderNodeTexCoord": (_texture_coordinate, {"Generated": "generated", "Object": "object"}),
-    "ShaderNodeNewGeometry": (
-        _geometry,
-        {
-            "Position": "position",
-            "Normal": "normal",
-            "True Normal": "trueNormal",
-            "Incoming": "incoming",
-            "Backfacing": "backfacing",
-        },
-    ),
-    "ShaderNodeVertexColor": (_color_attribute, {"Color": "color", "Alpha": "alpha"}),
-    "ShaderNodeAttribute": (_color_attribute, {"Color": "color", "Alpha": "alpha"}),
-    "ShaderNodeFresnel": (_fresnel, _FACTOR),
-    "ShaderNodeLayerWeight": (_layer_weight, {"Fresnel": "fresnel", "Facing": "facing"}),
     "ShaderNodeTexNoise": (_noise, _FACTOR),
     "ShaderNodeTexWhiteNoise": (_white_noise, {"Value": "value", "Color": "color"}),
     "ShaderNodeTexImage": (_image, {"Color": "color", "Alpha": "alpha"}),
@@ -504,6 +655,12 @@ _NODES = {
         {"Distance": "distance", "Color": "color", "Position": "position", "W": "w", "Radius": "radius"},
     ),
     "ShaderNodeTexMusgrave": (_musgrave, _FACTOR),
+    "ShaderNodeTexGabor": (_gabor, {"Value": "value", "Phase": "phase", "Intensity": "intensity"}),
+    "ShaderNodeBlackbody": (_simple("blackbody", {"Temperature": "temperature"}), {"Color": "color"}),
+    "ShaderNodeWavelength": (_simple("wavelength", {"Wavelength": "wavelength"}), {"Color": "color"}),
+    "ShaderNodeSeparateHSV": (_separate_hsv, {"H": "red", "S": "green", "V": "blue"}),
+    "ShaderNodeCombineHSV": (_combine_hsv, {"Color": "color"}),
+    "ShaderNodeVectorRotate": (_vector_rotate, {"Vector": "vector"}),
     "ShaderNodeTexBrick": (_brick, _FACTOR),
     "ShaderNodeRGBCurve": (_rgb_curves, {"Color": "color"}),
     "ShaderNodeVectorCurve": (_vector_curves, {"Vector": "vector"}),
@@ -540,4 +697,10 @@ _NODES = {
         _mix,
         {"Result_Color": "color", "Result_Vector": "vector", "Result_Float": "value"},
     ),
+    "ShaderNodeBump": (_bump, {"Normal": "normal"}),
 }
+
+
+def knows(node):
+    """Whether a node that gives values can be written, if what it is set to can."""
+    return node.bl_idname in _NODES or node.bl_idname in OUTPUTS or node.bl_idname in {"ShaderNodeValue", "ShaderNodeRGB"}

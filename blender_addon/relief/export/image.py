@@ -32,6 +32,7 @@ class ImageExporter:
         self._writer = writer
         self._frame = frame
         self._uris = {}
+        self._of_pixels = set()
 
     def color_uri(self, image, user, warn, alpha_is_linked=True):
         """URI of an image used as a colour; None if there is none to use, which is warned about.
@@ -46,6 +47,35 @@ class ImageExporter:
             return self._uris[key]
         return self._uri(image, user, True, warn)
 
+    def stored_uri(self, image, user, is_color, warn):
+        """URI of an image with its colours as they are stored, whatever its alpha.
+
+        @return  (URI, or None without a file; whether the colours are multiplied by alpha already)
+        """
+        uri = self._uri(image, user, is_color, warn)
+        # Blender's own floats always are.
+        return uri, image.is_float and (image.alpha_mode == "PREMUL" or image.name_full in self._of_pixels)
+
+    def tile_uris(self, image, is_color, warn):
+        """URIs of a tiled image's files by the number of the tile; empty without any, which is warned about."""
+        path = bpy.path.abspath(image.filepath, library=image.library)
+        if "<UDIM>" not in path and "<UVTILE>" not in path or image.packed_files:
+            warn(f'image "{image.name}": tiles that are not files', "it is left out")
+            return {}
+        found = {}
+        for number in (tile.number for tile in image.tiles):
+            column, row = (number - 1001) % 10, (number - 1001) // 10
+            tile = path.replace("<UDIM>", str(number)).replace("<UVTILE>", f"u{column + 1}_v{row + 1}")
+            if not os.path.isfile(tile):
+                warn(f'image "{image.name}": no file {tile!r}', "the tile is left out")
+                continue
+            with open(tile, "rb") as file:
+                if not self._means_the_same(image, file.read(4096), tile, is_color):
+                    space = image.colorspace_settings.name
+                    warn(f'image "{image.name}": tiles in colour space {space}', "they are read as their files say")
+            found[number] = self._writer.file_uri(tile)
+        return found
+
     def data_uri(self, image, user, warn):
         """URI of an image used as numbers: roughness, normals, heights."""
         return self._uri(image, user, False, warn)
@@ -57,25 +87,6 @@ class ImageExporter:
             plane = self._plane(image, channel, warn)
             self._uris[key] = None if plane is None else self.write_pixels({"Y": plane})
         return self._uris[key]
-
-    def combined_uri(self, roughness, metallic, warn):
-        """URI of glTF's packed image: roughness in green, metallic in blue.
-
-        @param  roughness, metallic  (bpy image, channel 0…3 or None for its grey value), or None: 1 everywhere
-        @return                      None if an image has no pixels
-        """
-        key = ("packed", *((p[0].name_full, p[1]) if p else None for p in (roughness, metallic)))
-        if key not in self._uris:
-            self._uris[key] = self._combine(roughness, metallic, warn)
-        return self._uris[key]
-
-    def _combine(self, roughness, metallic, warn):
-        planes = [self._plane(*p, warn) if p else np.ones((1, 1), dtype=np.float32) for p in (roughness, metallic)]
-        if any(p is None for p in planes):
-            return None
-        height, width = (max(p.shape[axis] for p in planes) for axis in (0, 1))
-        green, blue = (_enlarge(p, height, width) for p in planes)
-        return self.write_pixels({"R": np.zeros_like(green), "G": green, "B": blue})
 
     def alpha_uri(self, image, channel, warn):
         """URI of a white image whose alpha is a channel of an image, or its grey value."""
@@ -153,6 +164,7 @@ class ImageExporter:
         pixels = self._linear_pixels(image, warn)
         if pixels is None:
             return None
+        self._of_pixels.add(image.name_full)
         names = "RGBA"[: pixels.shape[-1]] if pixels.shape[-1] != 1 else "Y"
         return self.write_pixels({name: pixels[..., c] for c, name in enumerate(names)})
 
@@ -245,10 +257,3 @@ def _tiff_is_float(data):
         if tag == _TIFF_SAMPLE_FORMAT and number <= 2:
             return value == _TIFF_IEEE_FLOAT
     return False
-
-
-def _enlarge(plane, height, width):
-    """A plane at another size, each texel the one of the original that it lies in."""
-    rows = (np.arange(height) * plane.shape[0]) // height
-    columns = (np.arange(width) * plane.shape[1]) // width
-    return plane[rows][:, columns]

@@ -5,11 +5,12 @@ import math
 
 from .. import compat
 from . import nodes
+from .coverage import coverage_of
 from .displacement import bump_displaces, export_displacement
-from .graph import GraphWriter
+from .graph import GraphWriter, NotUnderstood, bump_of_displacement
 from .light import set_emission
 from .mesh import Wanted
-from .surface import TRANSPARENT, Surface, surface_from
+from .surface import TRANSPARENT, ClosureWriter, Surface, plain_surface
 from .texture import Input, Mapping, Texture, TextureReader
 
 #: The format has two sets of texture coordinates a vertex.
@@ -26,9 +27,11 @@ class MaterialExporter:
     @param  images    ImageExporter
     @param  settings  scene.relief
     @param  report    Report
+    @param  view_layer  gives the things whose properties are the view layer's attributes, the first one first
     """
 
-    def __init__(self, writer, images, settings, report):
+    def __init__(self, writer, images, settings, report, view_layer=tuple):
+        self._view_layer = view_layer
         self._writer = writer
         self._images = images
         self._settings = settings
@@ -39,10 +42,18 @@ class MaterialExporter:
         """(what add_mesh asks for the index of the glTF material, Wanted of its meshes); a slot without material is grey."""
         key = None if material is None else material.as_pointer()
         if key not in self._exported:
-            job = _MaterialJob(self._writer, self._images, self._settings, self._report, material)
+            job = MaterialJob(self._writer, self._images, self._settings, self._report, material, self._view_layer)
+            if job.coverage is not None:
+                self._report.count(material.name, job.coverage)
             wanted = job.wanted()
             self._exported[key] = (_Indices(self._writer, job.json, wanted.by_shading), wanted)
         return self._exported[key]
+
+
+def emits(material):
+    """Whether a glTF material gives light."""
+    closures = material.get("extensions", {}).get("RELIEF_surface", {}).get("closures", ())
+    return any(material.get("emissiveFactor", ())) or any(closure["type"] == "emission" for closure in closures)
 
 
 class _Indices:
@@ -66,48 +77,134 @@ class _Indices:
         return self._writer.add_unique("materials", json)
 
 
-class _MaterialJob:
-    """One material on its way."""
+class MaterialJob:
+    """One material on its way.
 
-    def __init__(self, writer, images, settings, report, material):
+    json      the glTF material
+    coverage  Coverage of its nodes; None without nodes
+    """
+
+    def __init__(self, writer, images, settings, report, material, view_layer=tuple):
         self._writer = writer
         self._images = images
         self._name = material.name if material else "default"
         self._report = report
         self._coordinates = []
         self._color_map = None
-        self._displaced = self._by_shading = False
+        self._displaced = self._by_shading = self._uses_graph = False
+        self._problems = {}
         self.json = {"name": self._name, "doubleSided": True}
-        self._graph = GraphWriter(self._coordinate_set, self._graph_texture)
-        textures = TextureReader(self._warn, self._graph)
-        if material is None or not material.use_nodes or material.node_tree is None:
+        self.coverage = None
+        self._graph = GraphWriter(
+            self._coordinate_set,
+            self._graph_texture,
+            warn=self._warn,
+            material_index=material.pass_index if material else 0,
+            view_layer=view_layer,
+        )
+        self._textures = TextureReader(self._warn)
+        if material is not None and material.use_nodes and material.node_tree is not None:
+            with nodes.reading():
+                self._export_nodes(material, settings)
+        elif material is None and compat.DEFAULT_CLOSURE is not None:
+            self._extend("RELIEF_surface", {"closures": [compat.DEFAULT_CLOSURE]})
+        else:
             color = (0.8, 0.8, 0.8) if material is None else tuple(material.diffuse_color[:3])
-            color = nodes.finite(color, "its colour", self._warn)
-            layers = compat.DEFAULT_SURFACE if material is None else {}
-            layers = {name: Input(value) if name == "roughness" else value for name, value in layers.items()}
-            self._write_surface(Surface(base_color=Input(color), **layers))
-            return
-        textures.takes_bump = bump_displaces(material, settings)
+            self._write_surface(Surface(base_color=Input(nodes.finite(color, "its colour", self._warn))))
+
+    def _export_nodes(self, material, settings):
+        self._textures.takes_bump = bump_displaces(material, settings)
         output = nodes.active_output(material.node_tree, "ShaderNodeOutputMaterial")
-        source = nodes.follow(output.inputs["Surface"]) if output else None
-        volume = nodes.follow(output.inputs["Volume"]) if output else None
-        surface = surface_from(source, textures) if source or not volume else TRANSPARENT
-        self._write_surface(surface)
-        self._write_volume(volume, surface, textures)
-        value = export_displacement(material, settings, textures, self._data_info, images)
+        source, volume, displacement = (
+            nodes.linked(output.inputs[name]) if output else None for name in ("Surface", "Volume", "Displacement")
+        )
+        if displacement and compat.displacement_method(material) == "BUMP" and not settings.bump_displaces:
+            self._bump_by(displacement)
+        transmits = self._export_surface(source, volume is not None)
+        self._write_volume(volume, transmits)
+        warned = self._displace(material, settings)
+        if warned and displacement:
+            self._problems.setdefault(displacement.key, warned[0])
+        problems = {**self._graph.not_understood, **self._problems}
+        self.coverage = coverage_of([s for s in (source, volume, displacement) if s], problems)
+
+    def _bump_by(self, displacement):
+        """Bends the surface's own normal."""
+        try:
+            self._graph.own_normal = bump_of_displacement(self._graph, displacement)
+        except NotUnderstood as error:
+            self._fail(displacement, f"{error} as displacement", "nothing is displaced", error)
+
+    def _export_surface(self, source, has_volume):
+        """Whether light may pass into what the surface bounds."""
+        plain = plain_surface(source, self._bends) if source or not has_volume else TRANSPARENT
+        if plain is not None:
+            self._write_surface(plain)
+            return plain.ior is not None
+        closures = ClosureWriter(self._graph, self._past_bump, self._fail)
+        closures.write(source)
+        if not closures.closures:  # black, or shining in the core's words
+            self._write_surface(Surface(emission=closures.emission))
+            return False
+        surface = {"closures": closures.closures}
+        if self._graph.own_normal is not None:
+            surface["normal"] = self._graph.own_normal
+        self._extend("RELIEF_surface", surface)
+        self._uses_graph = any(isinstance(value, dict) for closure in closures.closures for value in closure.values())
+        if self._uses_graph:
+            self._extend("RELIEF_graph", {"nodes": self._graph.nodes})
+        self._write_emission(closures.emission)
+        return closures.transmits
+
+    def _displace(self, material, settings):
+        """Adds the displacement; returns what was warned about."""
+        warned = []
+
+        def warn(what, instead=""):
+            warned.append(what)
+            self._warn(what, instead)
+
+        self._textures.warn = warn
+        value = export_displacement(material, settings, self._textures, self._data_info, self._images)
         if value is not None:
             self._displaced = True
             self._by_shading = not value["smoothing"]
             if not self._coordinates:  # the map of a constant height
                 self._coordinates.append(("uv", ""))
-            writer.extend(self.json, "RELIEF_displacement", value)
+            self._extend("RELIEF_displacement", value)
+        return warned
+
+    def _past_bump(self, socket, groups):
+        """The Normal input and its groups that count: behind a Bump that moves the surface instead."""
+        source = nodes.linked(socket, groups)
+        textures = self._textures
+        if source is None or source.node.bl_idname != "ShaderNodeBump" or not textures.takes_bump:
+            return socket, groups
+        if textures.bump not in (None, source) or textures.image(source.node.inputs["Height"], source.groups) is None:
+            return socket, groups
+        textures.bump = source
+        return source.node.inputs["Normal"], source.groups
+
+    def _bends(self, socket, groups):
+        return self._graph.own_normal is not None or self._graph.bends(*self._past_bump(socket, groups))
 
     def wanted(self):
-        color_map = self._color_map
-        if color_map is None and self._graph.outputs:
-            color_map = self._graph.color_map
-        generated = bool(self._graph.outputs) and self._graph.uses_generated
-        return Wanted(tuple(self._coordinates), color_map, self._displaced, self._by_shading, generated)
+        graph, has_graph = self._graph, self._uses_graph
+        return Wanted(
+            tuple(self._coordinates),
+            self._color_map,
+            self._displaced,
+            self._by_shading,
+            has_graph and graph.uses_generated,
+            tuple(sorted(graph.attributes)) if has_graph else (),
+            tuple(sorted(graph.values)) if has_graph else (),
+        )
+
+    def _fail(self, source, what, instead, error=None):
+        """Notes what is not understood of a node, unless an error has noted it of another one."""
+        if error is None:
+            self._problems.setdefault(source.key, what)
+        self._warn(what, instead)
 
     def _warn(self, what, instead=""):
         self._report.warn(f'material "{self._name}"', what, instead)
@@ -140,16 +237,35 @@ class _MaterialJob:
         return self._coordinates.index(source)
 
     def _graph_texture(self, node):
-        """(glTF's reference to an Image Texture node's image without its coordinates, whether it is sRGB); None without a file."""
-        is_data = node.image.colorspace_settings.is_data
-        if is_data:
-            uri = self._images.data_uri(node.image, node.image_user, self._warn)
-        else:
-            uri = self._images.color_uri(node.image, node.image_user, self._warn, node.outputs["Alpha"].is_linked)
-        if uri is None:
-            return None
+        """Options of image-texture that say which image an Image Texture node reads, and what of it; None without a file."""
+        image = node.image
+        is_data = image.colorspace_settings.is_data
         texture = Texture(node, None, Mapping())
-        return {"index": self._writer.add_texture(uri, texture.wrap, texture.nearest)}, not is_data
+
+        def info(uri):
+            return {"index": self._writer.add_texture(uri, texture.wrap, texture.nearest)}
+
+        options = {"colorSpace": "linear" if is_data else "srgb"}
+        is_multiplied = image.is_float and image.alpha_mode == "PREMUL"
+        if image.source == "TILED":
+            uris = self._images.tile_uris(image, not is_data, self._warn)
+            tiles = [{"tile": number, "texture": info(uri), **options} for number, uri in sorted(uris.items())]
+            if not tiles:
+                return None
+            # One tile is an image like any other, as in Cycles.
+            options = {"tiles": tiles} if len(tiles) > 1 else {**options, "texture": tiles[0]["texture"]}
+        else:
+            uri, is_multiplied = self._images.stored_uri(image, node.image_user, not is_data, self._warn)
+            if uri is None:
+                return None
+            options["texture"] = info(uri)
+        if image.alpha_mode == "NONE":
+            options["alpha"] = "opaque"
+        elif not is_data and image.alpha_mode != "CHANNEL_PACKED" and image.channels in {2, 4}:
+            options["alpha"] = "associated" if is_multiplied else "straight"
+            if nodes.is_used(node.outputs["Alpha"]):
+                options["unassociate"] = True
+        return options
 
     def _color_info(self, texture):
         node = texture.node
@@ -164,164 +280,58 @@ class _MaterialJob:
             uri = self._images.channel_uri(node.image, texture.channel, self._warn)
         return self._info(texture, uri)
 
-    def _without_offset(self, value, what):
-        if value.offset and value.graph is None:
-            self._warn(f"a sum with the texture of its {what}", "the texture alone was used")
-
     def _write_surface(self, surface):
         pbr = self.json["pbrMetallicRoughness"] = {}
         pbr["baseColorFactor"] = [*(min(max(c, 0.0), 1.0) for c in surface.base_color.value), 1.0]
         if surface.base_color.texture:
-            info = self._base_color_info(surface.base_color.texture)
+            info = self._color_info(surface.base_color.texture)
             if info:
                 pbr["baseColorTexture"] = info
         self._color_map = surface.base_color.color_map
         self._write_alpha(surface, pbr)
-        self._write_metallic_roughness(surface, pbr)
-        if surface.normal is not None:
-            info = self._data_info(surface.normal.texture)
+        pbr["metallicFactor"] = 1.0 if surface.is_mirror else 0.0
+        is_smooth = surface.is_mirror or surface.ior is not None
+        pbr["roughnessFactor"] = 0.0 if is_smooth else 1.0
+        if not is_smooth:
+            self._extend("KHR_materials_specular", {"specularFactor": 0.0})
+        if surface.ior is not None:
+            self._extend("KHR_materials_transmission", {"transmissionFactor": 1.0})
+            self._extend("KHR_materials_volume", {"thicknessFactor": _SOLID})
+            self._extend("KHR_materials_ior", {"ior": surface.ior})
+        self._write_emission(surface.emission)
+
+    def _write_emission(self, emission):
+        if emission.is_constant((0.0, 0.0, 0.0)):
+            return
+        set_emission(self.json, [max(0.0, c) for c in emission.value], self._writer)
+        if emission.texture:
+            info = self._color_info(emission.texture)
             if info:
-                self.json["normalTexture"] = {**info, "scale": surface.normal.value}
-        self._write_reflection(surface)
-        self._write_layers(surface)
-        if surface.emission.color_map is not None:
-            self._warn("a colour attribute as emission", "it is left out: the emission has one colour")
-        self._write_graph(surface)
-        if surface.emits() and surface.emission.graph is None:
-            set_emission(self.json, [max(0.0, c) for c in surface.emission.value], self._writer)
-            if surface.emission.texture:
-                info = self._color_info(surface.emission.texture)
-                if info:
-                    self.json["emissiveTexture"] = info
-
-    def _write_graph(self, surface):
-        """What a graph gives of a surface."""
-        given = {
-            "baseColor": surface.base_color,
-            "alpha": surface.alpha,
-            "metallic": surface.metallic,
-            "roughness": surface.roughness,
-            "transmission": surface.transmission,
-            "clearcoat": surface.coat,
-            "clearcoatRoughness": surface.coat_roughness,
-            "emission": surface.emission,
-        }
-        graph = self._graph
-        for name, source in given.items():
-            if source.graph is None:
-                continue
-            is_color = isinstance(source.value, tuple)
-            reference = graph.scaled(source.graph, source.value, is_color)
-            graph.outputs[name] = reference if is_color else graph.shifted(reference, source.offset)
-        if graph.outputs:
-            self._extend("RELIEF_graph", {"nodes": graph.nodes, "outputs": graph.outputs})
-
-    def _base_color_info(self, texture):
-        if texture.channel is None:
-            return self._color_info(texture)
-        # A grey float image stays linear where colours are read.
-        node = texture.node
-        return self._info(texture, self._images.channel_uri(node.image, texture.channel, self._warn))
+                self.json["emissiveTexture"] = info
 
     def _write_alpha(self, surface, pbr):
         alpha = surface.alpha
-        if alpha.graph is not None:
-            self.json["alphaMode"] = "BLEND"
+        if alpha.is_constant(1.0):
             return
-        if alpha.is_constant():
-            if alpha.value < 1:
-                self.json["alphaMode"] = "BLEND"
-                pbr["baseColorFactor"][3] = max(0.0, alpha.value)
-            return
-        base = surface.base_color.texture
-        own = alpha.texture
-        if base and own and own.channel == 3 and own.node.image == base.node.image and own.mapping == base.mapping:
-            self.json["alphaMode"] = "BLEND"
-            pbr["baseColorFactor"][3] = min(max(alpha.value, 0.0), 1.0)
-            return
-        if base is None and own is not None:
-            self._write_alpha_image(own, surface, pbr)
-            return
-        self._warn("opacity by another image than its base colour's alpha", "it is opaque")
+        self.json["alphaMode"] = "BLEND"
+        pbr["baseColorFactor"][3] = min(max(alpha.value, 0.0), 1.0)
+        if alpha.texture is not None and surface.base_color.texture is None:
+            self._write_alpha_image(alpha.texture, pbr)
 
-    def _write_alpha_image(self, texture, surface, pbr):
+    def _write_alpha_image(self, texture, pbr):
         """Opacity by an image of its own over a plain colour: a white image with that alpha."""
-        image = texture.node.image
-        uri = self._images.alpha_uri(image, texture.channel, self._warn)
-        info = self._info(texture, uri)
+        info = self._info(texture, self._images.alpha_uri(texture.node.image, texture.channel, self._warn))
         if info:
-            self.json["alphaMode"] = "BLEND"
             pbr["baseColorTexture"] = info
-            pbr["baseColorFactor"][3] = min(max(surface.alpha.value, 0.0), 1.0)
+        else:
+            del self.json["alphaMode"]
 
-    def _write_metallic_roughness(self, surface, pbr):
-        metallic, roughness = surface.metallic, surface.roughness
-        for value, what in ((metallic, "metallic"), (roughness, "roughness")):
-            self._without_offset(value, what)
-        pbr["metallicFactor"] = min(max(metallic.value, 0.0), 1.0)
-        pbr["roughnessFactor"] = min(max(roughness.value, 0.0), 1.0)
-        if metallic.texture is None and roughness.texture is None:
-            return
-        info = self._metallic_roughness_info(metallic, roughness, pbr)
-        if info:
-            pbr["metallicRoughnessTexture"] = info
-
-    def _metallic_roughness_info(self, metallic, roughness, pbr):
-        """glTF keeps both in one image, roughness in green and metallic in blue."""
-        rough, metal = roughness.texture, metallic.texture
-        if metal is None and metallic.value == 0:
-            # Blue is multiplied by 0, so a grey image does, and so does one whose green it is.
-            if rough.channel in {None, 1}:
-                node = rough.node
-                return self._info(rough, self._images.data_uri(node.image, node.image_user, self._warn))
-            return self._data_info(rough)
-        if rough and metal and (rough.channel, metal.channel) == (1, 2) and rough.node.image == metal.node.image:
-            node = rough.node
-            return self._info(rough, self._images.data_uri(node.image, node.image_user, self._warn))
-        if rough and metal and rough.mapping != metal.mapping:
-            self._warn("different mappings for roughness and metallic", "the one of the roughness was used for both")
-        texture = rough or metal
-        planes = [(t.node.image, t.channel) if t else None for t in (rough, metal)]
-        return self._info(texture, self._images.combined_uri(*planes, self._warn))
-
-    def _write_reflection(self, surface):
-        if not surface.transmission.is_constant(0.0):
-            value = {"transmissionFactor": min(max(surface.transmission.value, 0.0), 1.0)}
-            if surface.transmission.texture:
-                info = self._data_info(surface.transmission.texture)
-                if info:
-                    value["transmissionTexture"] = info
-            self._extend("KHR_materials_transmission", value)
-            self._extend("KHR_materials_volume", {"thicknessFactor": _SOLID})
-        if surface.ior != 1.5:
-            self._extend("KHR_materials_ior", {"ior": surface.ior})
-        if surface.specular != 1 or surface.specular_color != (1.0, 1.0, 1.0):
-            value = {"specularFactor": min(surface.specular, 1.0), "specularColorFactor": list(surface.specular_color)}
-            self._extend("KHR_materials_specular", value)
-
-    def _write_layers(self, surface):
-        if not surface.coat.is_constant(0.0):
-            value = {
-                "clearcoatFactor": min(max(surface.coat.value, 0.0), 1.0),
-                "clearcoatRoughnessFactor": min(max(surface.coat_roughness.value, 0.0), 1.0),
-            }
-            textured = {"clearcoatTexture": surface.coat, "clearcoatRoughnessTexture": surface.coat_roughness}
-            for name, source in textured.items():
-                info = self._data_info(source.texture) if source.texture else None
-                if info:
-                    value[name] = info
-            self._extend("KHR_materials_clearcoat", value)
-        if max(surface.sheen_color) > 0:
-            color = [min(max(c, 0.0), 1.0) for c in surface.sheen_color]
-            value = {"sheenColorFactor": color, "sheenRoughnessFactor": surface.sheen_roughness}
-            self._extend("KHR_materials_sheen", value)
-
-    def _write_volume(self, source, surface, textures):
+    def _write_volume(self, source, transmits):
         if source is None:
             return
-        node = source.node
-        if node.bl_idname != "ShaderNodeVolumeAbsorption" or surface.transmission.is_constant(0.0):
-            self._warn(f'node "{node.name}" ({node.bl_label}) as volume', "it is left out")
+        node, textures = source.node, self._textures
+        if node.bl_idname != "ShaderNodeVolumeAbsorption" or not transmits:
+            self._fail(source, f'node "{node.name}" ({node.bl_label}) as volume', "it is left out")
             return
         color = textures.constant_color(node.inputs["Color"], source.groups)
         density = max(0.0, textures.constant_number(node.inputs["Density"], source.groups))

@@ -5,11 +5,12 @@ All data moves by foreach_get into typed arrays. A vertex of glTF has one normal
 of Blender as many as corners; so corners that are equal in everything are joined again.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from .. import compat
+from . import attributes
 
 #: Odd 64-bit constants for hashing the columns of a corner; any will do, equality is checked afterwards.
 _HASH_FACTORS = np.random.default_rng(1).integers(1, 2**63, size=32, dtype=np.uint64) | np.uint64(1)
@@ -28,6 +29,8 @@ class Wanted:
     displaced    normals say where surfaces go to, so they must not open flat-shaded edges
     by_shading   smooth and flat faces have materials of their own
     generated    value graphs read the coordinates that Blender generates
+    attributes   that value graphs read by name: see attributes.py
+    values       of objects that value graphs read: see instance_values.py; the mesh does not depend on them
     """
 
     coordinates: tuple = ()
@@ -35,6 +38,8 @@ class Wanted:
     displaced: bool = False
     by_shading: bool = False
     generated: bool = False
+    attributes: tuple = ()
+    values: tuple = field(default=(), compare=False)
 
 
 class _Corners:
@@ -128,6 +133,11 @@ class _Corners:
         if name:
             return self.mesh.uv_layers.get(name)
         return next((layer for layer in self.mesh.uv_layers if layer.active_render), None)
+
+    def attribute(self, source):
+        """An attribute that graphs read by name: float32 (loops, 1 to 4); None if there is none."""
+        values = attributes.read(source, self.mesh, self.vertex)
+        return None if values is None else self._finite(values, f"values of the attribute {source[1]}")
 
     def color(self, name):
         """A colour attribute, linear: float32 (loops, 4); None if there is none on vertices or corners."""
@@ -234,6 +244,10 @@ def _primitive_arrays(corners, triangles, wanted, warn):
             warn(f'no colour attribute "{wanted.color}" on vertices or corners; its colour is white')
         else:
             per_loop["COLOR_0"] = color
+    for source in wanted.attributes:
+        values = corners.attribute(source)
+        if values is not None:  # where it is not, it is 0 for Blender, too
+            per_loop[attributes.file_name(source)] = values
     loops = triangles.ravel()
     representatives, indices = _join_equal(loops, corners.vertex, list(per_loop.values()))
     arrays = {"POSITION": np.ascontiguousarray(corners.positions[corners.vertex[representatives]])}

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reading node graphs: following links through reroutes, groups and muted nodes, and folding constants."""
 
+import contextlib
 import math
+import sys
 from dataclasses import dataclass
 
 import bpy
@@ -18,6 +20,16 @@ class Source:
     socket: bpy.types.NodeSocket
     groups: tuple = ()
 
+    @property
+    def key(self):
+        """What tells the node from others, and from itself in another use of its group."""
+        return (self.node.as_pointer(), *(group.as_pointer() for group in self.groups))
+
+    @property
+    def is_value(self):
+        """Whether it is only an unlinked input of a group, with a value of its own."""
+        return not self.socket.is_output
+
 
 def active_output(tree, idname):
     """The tree's active output node of a kind; None if there is none. Outputs for another engine alone do not count."""
@@ -25,10 +37,46 @@ def active_output(tree, idname):
     return next((n for n in outputs if n.is_active_output), outputs[0] if outputs else None)
 
 
+#: Frames of Python that a material may take: a node takes up to six.
+_DEEPEST = 30000
+
+_tables = None
+
+
+@contextlib.contextmanager
+def reading():
+    """While no tree changes: links are looked up in tables, where Blender goes through all of a tree, and long chains are
+    followed to their end."""
+    global _tables
+    before, deepest = _tables, sys.getrecursionlimit()
+    _tables = {}
+    if sys.version_info >= (3, 11):  # before, each frame takes of the thread's stack
+        sys.setrecursionlimit(max(deepest, _DEEPEST))
+    try:
+        yield
+    finally:
+        _tables = before
+        sys.setrecursionlimit(deepest)
+
+
+def _link(socket):
+    """The link to an input that has one."""
+    if _tables is None:
+        return socket.links[0]
+    tree = socket.id_data
+    table = _tables.get(tree.as_pointer())
+    if table is None:
+        table = {link.to_socket.as_pointer(): link for link in tree.links}
+        _tables[tree.as_pointer()] = table
+    return table[socket.as_pointer()]
+
+
 def follow(socket, groups=()):
     """What is linked to an input socket; None: nothing, so that its own value counts."""
     while socket is not None and socket.is_linked:
-        link = socket.links[0]
+        link = _link(socket)
+        if not link.is_valid or link.is_muted or not link.from_socket.enabled:
+            return None
         node, output = link.from_node, link.from_socket
         if node.mute:
             passed = next((i.from_socket for i in node.internal_links if i.to_socket == output), None)
@@ -52,13 +100,55 @@ def follow(socket, groups=()):
     return None
 
 
+def linked(socket, groups=()):
+    """What is linked to an input that means something else where nothing is: a normal, texture coordinates.
+
+    @return  Source; None: nothing, an unlinked input of a group counting as such
+    """
+    source = follow(socket, groups)
+    return None if source is None or source.is_value else source
+
+
+def has_plain_mapping(node):
+    """Whether a texture node's own mapping, which the user interface shows no longer, changes nothing."""
+    mapping = getattr(node, "texture_mapping", None)
+    if mapping is None:
+        return True
+    is_moved = any(mapping.translation) or any(mapping.rotation) or tuple(mapping.scale) != (1.0, 1.0, 1.0)
+    axes = (mapping.mapping_x, mapping.mapping_y, mapping.mapping_z)
+    return not is_moved and axes == ("X", "Y", "Z") and not mapping.use_min and not mapping.use_max
+
+
+def is_used(output):
+    """Whether an output socket leads, through whichever nodes, to where a tree ends."""
+    seen, waiting = set(), [output]
+    while waiting:
+        for link in waiting.pop().links:
+            node = link.to_node
+            if not node.outputs:
+                return True
+            if node.as_pointer() not in seen:
+                seen.add(node.as_pointer())
+                waiting.extend(node.outputs)
+    return False
+
+
+def _power(base, exponent):
+    """What is no number, Blender takes for 0; what is too large, for infinite."""
+    try:
+        result = base**exponent
+    except (OverflowError, ZeroDivisionError):
+        return math.inf
+    return 0.0 if isinstance(result, complex) else result
+
+
 _MATH = {
     "ADD": lambda a, b, _: a + b,
     "SUBTRACT": lambda a, b, _: a - b,
     "MULTIPLY": lambda a, b, _: a * b,
     "DIVIDE": lambda a, b, _: a / b if b else 0.0,
     "MULTIPLY_ADD": lambda a, b, c: a * b + c,
-    "POWER": lambda a, b, _: a**b if a > 0 else 0.0,
+    "POWER": lambda a, b, _: _power(a, b),
     "MINIMUM": lambda a, b, _: min(a, b),
     "MAXIMUM": lambda a, b, _: max(a, b),
     "SQRT": lambda a, *_: math.sqrt(max(a, 0.0)),
@@ -112,27 +202,106 @@ def own_value(socket):
     return tuple(value) if hasattr(value, "__len__") else float(value)
 
 
-def fold(socket, groups=()):
-    """Value of an input that depends on constants alone: a number or a tuple; None if it does not."""
+def fold(socket, groups=(), known=None):
+    """Value of an input that depends on constants alone: a number or a tuple; None if it does not.
+
+    @param  known  values of nodes from calls before, which is added to; without, each call finds out anew
+    """
     source = follow(socket, groups)
     if source is None:
         return own_value(socket)
+    if source.is_value or source.node.bl_idname in {"ShaderNodeValue", "ShaderNodeRGB"}:
+        return own_value(source.socket)
+    build = _FOLDS.get(source.node.bl_idname)
+    if build is None:
+        return None
+    known = {} if known is None else known
+    key = (source.key, source.socket.identifier)
+    if key not in known:
+        known[key] = None  # what depends on itself is no constant
+        try:
+            known[key] = build(source, lambda i: fold(i, source.groups, known))
+        except RecursionError:
+            pass
+    return known[key]
+
+
+def _fold_math(source, value):
     node = source.node
-    if node.bl_idname in {"ShaderNodeValue", "ShaderNodeRGB"}:
-        return own_value(source.socket)
-    if not source.socket.is_output:  # an unlinked input of a group
-        return own_value(source.socket)
-    if node.bl_idname == "ShaderNodeMath" and node.operation in _MATH:
-        values = [fold(i, source.groups) for i in node.inputs]
-        if all(v is not None for v in values):
-            numbers = [as_number(v) for v in values]
-            result = _MATH[node.operation](*numbers)
-            return min(max(result, 0.0), 1.0) if node.use_clamp else result
-    if node.bl_idname == "ShaderNodeCombineXYZ":
-        values = [fold(i, source.groups) for i in node.inputs]
-        if all(isinstance(v, float) for v in values):
-            return tuple(values)
-    return None
+    if node.operation not in _MATH:
+        return None
+    values = [value(socket) for socket in node.inputs]
+    if None in values:
+        return None
+    result = _MATH[node.operation](*(as_number(v) for v in values))
+    return min(max(result, 0.0), 1.0) if node.use_clamp else result
+
+
+def _fold_combine(source, value):
+    values = [value(socket) for socket in source.node.inputs]
+    if None in values or getattr(source.node, "mode", "RGB") != "RGB":
+        return None
+    parts = tuple(as_number(v) for v in values)
+    return parts if source.node.bl_idname == "ShaderNodeCombineXYZ" else (*parts, 1.0)
+
+
+def _fold_separate(source, value):
+    node, whole = source.node, value(source.node.inputs[0])
+    if whole is None or getattr(node, "mode", "RGB") != "RGB":
+        return None
+    index = next(i for i, socket in enumerate(node.outputs) if socket == source.socket)
+    return as_color(whole)[index]
+
+
+def _fold_clamp(source, value):
+    values = [value(socket) for socket in source.node.inputs]
+    if None in values or source.node.clamp_type != "MINMAX":
+        return None
+    number, low, high = (as_number(v) for v in values)
+    return min(max(number, low), high)
+
+
+def _fold_mix(source, value):
+    node = source.node
+    is_old = node.bl_idname == "ShaderNodeMixRGB"
+    kind = "RGBA" if is_old else node.data_type
+    if kind == "RGBA" and node.blend_type != "MIX" or kind == "VECTOR" and node.factor_mode != "UNIFORM":
+        return None
+    values = [value(socket) for socket in node.inputs if socket.enabled]
+    if None in values or len(values) != 3:
+        return None
+    factor = as_number(values[0])
+    if is_old or node.clamp_factor:
+        factor = min(max(factor, 0.0), 1.0)
+    if kind == "FLOAT":
+        return (1 - factor) * as_number(values[1]) + factor * as_number(values[2])
+    mixed = tuple((1 - factor) * a + factor * b for a, b in zip(as_color(values[1]), as_color(values[2])))
+    if kind == "RGBA" and (node.use_clamp if is_old else node.clamp_result):
+        mixed = tuple(min(max(c, 0.0), 1.0) for c in mixed)
+    return (*mixed, 1.0) if kind == "RGBA" else mixed
+
+
+def _fold_normal(source, value):
+    if source.socket.name != "Normal":
+        return None
+    direction = own_value(source.socket)
+    length = math.sqrt(sum(x * x for x in direction))
+    return tuple(x / length for x in direction) if length else direction
+
+
+_FOLDS = {
+    "ShaderNodeNormal": _fold_normal,
+    "ShaderNodeMath": _fold_math,
+    "ShaderNodeCombineXYZ": _fold_combine,
+    "ShaderNodeCombineColor": _fold_combine,
+    "ShaderNodeCombineRGB": _fold_combine,
+    "ShaderNodeSeparateXYZ": _fold_separate,
+    "ShaderNodeSeparateColor": _fold_separate,
+    "ShaderNodeSeparateRGB": _fold_separate,
+    "ShaderNodeClamp": _fold_clamp,
+    "ShaderNodeMix": _fold_mix,
+    "ShaderNodeMixRGB": _fold_mix,
+}
 
 
 def as_color(value):
@@ -141,12 +310,9 @@ def as_color(value):
 
 
 def as_number(value):
-    """A number or a tuple where Blender wants a number."""
-    return _gray(value) if isinstance(value, tuple) else value
-
-
-def _gray(color):
-    """What Blender makes of a colour where it wants a number: its luminance."""
-    if len(color) < 3:
-        return color[0]
-    return 0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2]
+    """A number or a tuple where Blender wants a number: of colours, which have four, the luminance, of vectors the mean."""
+    if not isinstance(value, tuple):
+        return value
+    if len(value) < 4:
+        return sum(value) / len(value)
+    return 0.2126 * value[0] + 0.7152 * value[1] + 0.0722 * value[2]

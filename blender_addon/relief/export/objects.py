@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .instance_values import Place, are_read
+
 #: Objects that Blender can turn into a mesh.
 GEOMETRY_TYPES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 
@@ -43,6 +45,7 @@ class Things:
     data      evaluated mesh of an instance that geometry nodes made; None: the object's own
     role      Role in the view layer
     matrices  world matrices, row-major, one a place: list of 16 floats each
+    places    Place of each, where value graphs may read them; else empty
     """
 
     object: object
@@ -51,6 +54,7 @@ class Things:
     data: object = None
     role: Role = Role()
     matrices: list = field(default_factory=list)
+    places: list = field(default_factory=list)
 
     def world_matrices(self):
         """float64 of shape (places, 4, 4)."""
@@ -66,6 +70,7 @@ def collect(depsgraph, report):
     """
     things = {}
     roles = _roles(depsgraph.view_layer)
+    looks_at_places, frame = are_read(), depsgraph.scene.frame_current_final
     for instance in depsgraph.object_instances:
         # Blender reuses one object for all instances: only its original and its data tell them apart.
         shown = instance.object
@@ -90,6 +95,8 @@ def collect(depsgraph, report):
                 thing.data = data
         matrix = instance.matrix_world
         thing.matrices.append((*matrix[0], *matrix[1], *matrix[2], *matrix[3]))
+        if looks_at_places:
+            thing.places.append(Place(instance, frame))
     # The mesh of a curve or a text comes as an instance besides, and must not stand there twice.
     twice = {pointer for (pointer, *_), thing in things.items() if thing.data is not None and thing.object.type != "MESH"}
     return [thing for (pointer, *_), thing in things.items() if thing.data is not None or pointer not in twice]
@@ -126,21 +133,22 @@ def usable_places(matrices):
     an inverse; what has shrunk to a line or a point is not to be seen.
 
     @param  matrices  float64 (n, 4, 4)
-    @return           (matrices of the places that stay, number of those that have shrunk to nothing, number of those that
-                      are not finite)
+    @return           (matrices of the places that stay, their numbers among all, number of those that have shrunk to
+                      nothing, number of those that are not finite)
     """
     is_finite = np.isfinite(matrices).all(axis=(1, 2))
     finite = matrices[is_finite]
     linear = finite[:, :3, :3]
+    numbers = np.flatnonzero(is_finite)
     if not len(linear):
-        return finite, 0, len(matrices)
+        return finite, numbers, 0, len(matrices)
     lengths = np.linalg.norm(linear, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
         volume = np.abs(np.linalg.det(linear / np.where(lengths == 0, 1, lengths)[:, None, :]))
     is_solid = (lengths > _NOTHING).all(axis=1) & (volume > _FLAT)
-    places = list(finite[is_solid])
+    places, stay = list(finite[is_solid]), list(numbers[is_solid])
     num_shrunk = 0
-    for matrix in finite[~is_solid]:
+    for number, matrix in zip(numbers[~is_solid], finite[~is_solid]):
         u, s, v = np.linalg.svd(matrix[:3, :3])
         if s[1] <= max(_NOTHING, _FLAT * s[0]):
             num_shrunk += 1
@@ -148,7 +156,8 @@ def usable_places(matrices):
         matrix = matrix.copy()
         matrix[:3, :3] = (u * (s[0], s[1], _THICKNESS * s[1])) @ v
         places.append(matrix)
-    return np.array(places).reshape(-1, 4, 4), num_shrunk, int((~is_finite).sum())
+        stay.append(number)
+    return np.array(places).reshape(-1, 4, 4), np.array(stay, dtype=np.int64), num_shrunk, int((~is_finite).sum())
 
 
 def decompose(matrices):

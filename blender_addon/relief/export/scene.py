@@ -9,11 +9,12 @@ import numpy as np
 
 from .. import compat
 from ..report import ReliefError
+from . import instance_values
 from .axes import GLTF_FROM_BLENDER
 from .gltf import GltfWriter, matrix_property
 from .image import ImageExporter
 from .light import Place, export_light
-from .material import MaterialExporter
+from .material import MaterialExporter, emits
 from .mesh import FARTHEST, add_mesh, store_mesh
 from .objects import collect, decompose, usable_places
 from .settings import render_settings
@@ -154,7 +155,8 @@ class SceneExporter:
         self._stored = stored if stored is not None else StoredMeshes()
         self._by_shape = {}
         self._images = ImageExporter(self.writer, self._scene.frame_current)
-        self._materials = MaterialExporter(self.writer, self._images, self._scene.relief, report)
+        view_layer = (depsgraph.view_layer, depsgraph.scene)
+        self._materials = MaterialExporter(self.writer, self._images, self._scene.relief, report, lambda: view_layer)
 
     def add_all(self, view):
         """Adds the whole frame."""
@@ -165,7 +167,7 @@ class SceneExporter:
 
     def set_view(self, view):
         """Sets the camera and the settings of the picture; a later call replaces them."""
-        matrices, num_shrunk, num_bad = usable_places(np.array([view.matrix], dtype=np.float64).reshape(1, 4, 4))
+        matrices, _, num_shrunk, num_bad = usable_places(np.array([view.matrix], dtype=np.float64).reshape(1, 4, 4))
         if num_shrunk or num_bad:
             why = "its scale is 0" if num_shrunk else "its transform is not finite"
             raise ReliefError(f'nothing tells where the camera "{view.camera.get("name", "view")}" looks: {why}')
@@ -201,9 +203,7 @@ class SceneExporter:
     def _keep_dark(self):
         """Gives a scene without any light one that is as good as none: the program would put up a lamp of its own."""
         environment = self.writer.json["extensions"]["RELIEF_environment"]
-        has_light = any(_is_light(node) for node in self.nodes) or any(
-            any(material.get("emissiveFactor", ())) for material in self.writer.json.get("materials", ())
-        )
+        has_light = any(map(_is_light, self.nodes)) or any(map(emits, self.writer.json.get("materials", ())))
         if not has_light and "uri" not in environment and not any(environment["color"]):
             environment["color"] = [_DARKNESS] * 3
 
@@ -211,47 +211,76 @@ class SceneExporter:
         return lambda what, instead="": self._report.warn(f'{kind} "{name}"', what, instead)
 
     def _add_geometry(self, thing):
-        matrices = self._usable(thing, thing.world_matrices())
+        matrices, numbers = self._usable(thing, thing.world_matrices())
         if not len(matrices):
             return
         for system in thing.object.particle_systems:
             if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
                 self._report.warn(f'object "{thing.name}"', f'hair "{system.name}" as strands', "it is left out")
-        mesh, reach = self._mesh_of(thing)
+        mesh, reach, read = self._mesh_of(thing)
         if mesh is None:
             return
         is_near = np.abs(matrices[:, :3, 3]).max(axis=1) + np.abs(matrices[:, :3, :3]).sum(axis=(1, 2)) * reach < FARTHEST
         if not is_near.all():
             self._leave_out(thing, f"{FARTHEST:.0e} m and more from the origin", (~is_near).sum())
-            matrices = matrices[is_near]
+            matrices, numbers = matrices[is_near], numbers[is_near]
             if not len(matrices):
                 return
         base = {"name": thing.name, "mesh": mesh}
         settings = self._object_settings(thing)
-        if settings:
-            self.writer.extend(base, "RELIEF_object", settings)
+        values = self._values_of(thing, read, numbers)
         if len(matrices) == 1:
-            self.nodes.append({**base, "matrix": matrix_property(matrices[0])})
+            self._add_alone(base, settings, matrices[0], values, 0)
             return
         translation, rotation, scale, exact = decompose(matrices)
         if exact.any():
             arrays = {"TRANSLATION": translation[exact], "ROTATION": rotation[exact], "SCALE": scale[exact]}
+            arrays.update({key: v[exact] for key, v in values.items()})
             arrays = {key: np.ascontiguousarray(a, dtype=np.float32) for key, a in arrays.items()}
-            node = {**base, "extensions": dict(base.get("extensions", {}))}
+            node = dict(base)
+            if settings:
+                self.writer.extend(node, "RELIEF_object", settings)
             accessors = self.writer.add_accessors(arrays)
             self.writer.extend(node, "EXT_mesh_gpu_instancing", {"attributes": dict(accessors)})
             self.nodes.append(node)
-        for matrix in matrices[~exact]:
-            self.nodes.append({**base, "matrix": matrix_property(matrix)})
+        for i in np.flatnonzero(~exact):
+            self._add_alone(base, settings, matrices[i], values, i)
+
+    def _add_alone(self, base, settings, matrix, values, i):
+        """Adds a node of one place.
+
+        @param  values  of all places by name, of which it has number i
+        """
+        node = {**base, "matrix": matrix_property(matrix)}
+        if values:
+            own = {name: v[i].tolist() if v.shape[1] > 1 else float(v[i, 0]) for name, v in values.items()}
+            settings = {**settings, "values": own}
+        if settings:
+            self.writer.extend(node, "RELIEF_object", settings)
+        self.nodes.append(node)
+
+    def _values_of(self, thing, read, numbers):
+        """Values that graphs read of a thing's places: float32 (places, 1 to 4) by name.
+
+        @param  read     see instance_values.py
+        @param  numbers  of the places
+        """
+        if not read:
+            return {}
+        evaluated = thing.object.evaluated_get(self._depsgraph)
+        data = thing.data if thing.data is not None else evaluated.data
+        places = [thing.places[number] for number in numbers]
+        values = {instance_values.file_name(v): instance_values.read(v, evaluated, data, places) for v in sorted(read)}
+        return {name: np.where(np.isfinite(v), v, np.float32(0)) for name, v in values.items()}
 
     def _usable(self, thing, matrices):
-        """Those of a thing's matrices that can be rendered; what is left out is warned about."""
-        matrices, num_shrunk, num_bad = usable_places(matrices)
+        """(those of a thing's matrices that can be rendered, their numbers); what is left out is warned about."""
+        matrices, numbers, num_shrunk, num_bad = usable_places(matrices)
         if num_shrunk:
             self._leave_out(thing, "a scale of 0", num_shrunk)
         if num_bad:
             self._leave_out(thing, "a transform that is not finite", num_bad)
-        return matrices
+        return matrices, numbers
 
     def _leave_out(self, thing, why, number):
         where = f" at {number} of {len(thing.matrices)} places" if len(thing.matrices) > 1 else ""
@@ -284,7 +313,8 @@ class SceneExporter:
         return settings
 
     def _mesh_of(self, thing):
-        """(index of the glTF mesh of a thing, largest coordinate of its vertices); index None: it has no triangles."""
+        """(index of the glTF mesh of a thing, largest coordinate of its vertices, values of objects that graphs read); index
+        None: it has no triangles."""
         evaluated = thing.object.evaluated_get(self._depsgraph)
         data = thing.data if thing.data is not None else evaluated.data
         materials = self._materials_of(_slots(thing, evaluated), data)
@@ -293,12 +323,13 @@ class SceneExporter:
         if stored is None:
             stored = self._store(thing, evaluated, wanted)
             if stored is None:
-                return None, 0.0
+                return None, 0.0, set()
             if thing.data is None:
                 self._stored.put(thing.object, stored)
         for text in stored.warnings:
             self._warner("object", thing.name)(*text)
-        return add_mesh(stored, [i for i, _ in materials], self.writer), stored.reach()
+        read = {value for w in wanted for value in w.values}
+        return add_mesh(stored, [i for i, _ in materials], self.writer), stored.reach(), read
 
     def _store(self, thing, evaluated, wanted):
         """StoredMesh of a thing; None if it has none. Things of one shape whose materials want the same share theirs."""
@@ -334,7 +365,7 @@ class SceneExporter:
         matrices = thing.world_matrices()
         if light.type == "POINT":  # has no direction that a scale of 0 could take from it
             matrices[:, :3, :3] = np.eye(3)
-        translation, rotation, scale, _ = decompose(self._usable(thing, matrices))
+        translation, rotation, scale, _ = decompose(self._usable(thing, matrices)[0])
         for t, r, s in zip(translation, rotation, scale):
             node = {"name": thing.name, "translation": t.tolist(), "rotation": r.tolist()}
             place = Place(

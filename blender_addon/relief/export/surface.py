@@ -1,412 +1,577 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's shader nodes as one layered surface: what glTF's material with its extensions can say.
+"""Blender's shader trees: as the closures of RELIEF_surface, or in glTF's own words where these say exactly the same.
 
-One function a node, listed at the end. Mix and Add Shader are understood where the result is again one layered surface:
-transparency, emission on top, a coat of gloss by Fresnel, metal and plastic. Other mixes are approximated, and say so.
+A tree of Mix and Add Shaders is a weighted sum of closures. Each shader node becomes one closure (the Principled BSDF's
+emission and alpha one each besides), with the weight that the mixes give it; inputs and weights that vary are references
+into the material's graph. One entry a node, listed at the end.
+
+What glTF's core means exactly as Cycles does stays there: it costs less, and emission is sampled as a light.
 """
 
 from dataclasses import dataclass, field, replace
 
 from .. import compat
 from . import nodes
-from .texture import Input
+from .graph import NotUnderstood
+from .texture import Input, TextureReader
 
 _WHITE = (1.0, 1.0, 1.0)
 _BLACK = (0.0, 0.0, 0.0)
 
+#: Up to this roughness Cycles takes gloss and glass for perfectly smooth.
+_SHARP = 1e-4
+
 
 @dataclass
 class Surface:
-    """glTF's parameters. Colours are linear RGB; every Input may be textured.
+    """A surface in the words of glTF's core. Colours are linear RGB; every Input may be textured.
 
-    specular        weight of the dielectric's reflection; 0: diffuse alone
-    specular_color  multiplies the reflection at normal incidence that `ior` gives
-    normal          Input of a tangent-space normal map, whose value is its strength; None: none
-    emission        radiance
+    is_mirror  a white, perfectly smooth mirror
+    ior        of white, perfectly smooth glass; None: it is none
+    emission   radiance
     """
 
-    base_color: Input = field(default_factory=lambda: Input(_WHITE))
+    base_color: Input = field(default_factory=lambda: Input(_BLACK))
     alpha: Input = field(default_factory=lambda: Input(1.0))
-    metallic: Input = field(default_factory=lambda: Input(0.0))
-    roughness: Input = field(default_factory=lambda: Input(1.0))
-    transmission: Input = field(default_factory=lambda: Input(0.0))
-    ior: float = 1.5
-    specular: float = 0.0
-    specular_color: tuple = _WHITE
-    coat: Input = field(default_factory=lambda: Input(0.0))
-    coat_roughness: Input = field(default_factory=lambda: Input(0.0))
-    sheen_color: tuple = _BLACK
-    sheen_roughness: float = 0.5
-    normal: object = None
+    is_mirror: bool = False
+    ior: object = None
     emission: Input = field(default_factory=lambda: Input(_BLACK))
 
     def emits(self):
         return not self.emission.is_constant(_BLACK)
 
+    def is_transparent(self):
+        return self.alpha.is_constant(0.0) and not self.emits()
+
+    def is_black(self):
+        return self.base_color.is_constant(_BLACK) and not self.is_mirror and self.ior is None and self.alpha.is_constant(1.0)
+
+    def is_lambertian(self):
+        """Whether it is diffuse and emits, or less: sums of such are such."""
+        return not self.is_mirror and self.ior is None and self.alpha.is_constant(1.0)
+
 
 #: What is not there, such as the surface of a volume that has none of its own.
-TRANSPARENT = Surface(base_color=Input(_BLACK), alpha=Input(0.0))
+TRANSPARENT = Surface(alpha=Input(0.0))
 
 
-def surface_from(source, textures):
-    """The layered surface of a shader output.
+class _NotPlain(Exception):
+    """Something that glTF's core cannot say, or does not mean as Cycles does."""
 
-    @param  source    nodes.Source of a shader, None: nothing linked, which is black
-    @param  textures  TextureReader
-    @return           Surface
+
+def plain_surface(source, bends):
+    """A shader output in glTF's core.
+
+    @param  source  nodes.Source of a shader, None: nothing linked, which is black
+    @param  bends   tells of a Normal input and its groups whether it gives another normal than the mesh's
+    @return         Surface; None if the core cannot say it
     """
-    if source is None:
-        return Surface(base_color=Input(_BLACK))
-    build = _NODES.get(source.node.bl_idname)
-    if build is None:
-        node = source.node
-        textures.warn(f'node "{node.name}" ({node.bl_label}) as surface', "a grey diffuse surface was used")
-        return Surface(base_color=Input((0.8, 0.8, 0.8)))
-    return build(source, textures)
+    return _unless_refused(lambda textures: _Plain(textures, bends).surface(source))
 
 
-def _inputs(source, textures):
-    """(color, number, constant number): readers of the node's inputs by name."""
-    node, groups = source.node, source.groups
-    return (
-        lambda name: textures.color(node.inputs[name], groups),
-        lambda name: textures.number(node.inputs[name], groups),
-        lambda name: textures.constant_number(node.inputs[name], groups),
-    )
+def _unless_refused(read):
+    """What a function makes of a TextureReader; None if that has something to warn about."""
+
+    def refuse(*_):
+        raise _NotPlain
+
+    try:
+        return read(TextureReader(refuse))
+    except (_NotPlain, RecursionError):
+        return None
 
 
-def _normal(socket, groups, textures):
-    """Normal map behind a Normal input; others are warned about, unless a Bump is to displace."""
-    source = nodes.follow(socket, groups)
-    if source is None:
-        return None
-    node = source.node
-    if node.bl_idname == "ShaderNodeBump" and textures.takes_bump and textures.bump in (None, source):
-        textures.bump = source
-        return _normal(node.inputs["Normal"], source.groups, textures)
-    if node.bl_idname != "ShaderNodeNormalMap":
-        textures.warn(f'node "{node.name}" ({node.bl_label}) as normal', "the surface's own normal was used")
-        return None
-    if node.space != "TANGENT":
-        textures.warn(f'node "{node.name}": space {node.space.lower()}', "the surface's own normal was used")
-        return None
-    color = textures.image(node.inputs["Color"], source.groups, is_color=True)
-    if color is None:
-        textures.warn(f'node "{node.name}": a normal map that is no image', "the surface's own normal was used")
-    if color is None or color.texture is None:
-        return None
-    if node.uv_map:
-        mapping = replace(color.texture.mapping, source=("uv", node.uv_map))
-        if color.texture.mapping.source not in {("uv", ""), ("uv", node.uv_map)}:
-            textures.warn(f'node "{node.name}": tangents of another uv map than its texture', "the texture's were used")
+def _plain_color(socket, groups, textures):
+    color = textures.color(socket, groups)
+    if color.texture is not None and color.texture.channel is not None or _is_tiled(color):
+        raise _NotPlain
+    return color
+
+
+def _is_tiled(value):
+    """Whether an Input is of an image of several tiles, of which glTF's textures have one."""
+    return value.texture is not None and value.texture.node.image.source == "TILED"
+
+
+def _plain_emission(color, strength, groups, textures):
+    emission = _plain_color(color, groups, textures)
+    if emission.color_map is not None:
+        raise _NotPlain
+    return scaled(emission, textures.constant_number(strength, groups))
+
+
+class _Plain:
+    def __init__(self, textures, bends):
+        self._textures = textures
+        self._bends = bends
+
+    def surface(self, source):
+        if source is None or source.is_value:
+            return Surface()
+        if source.node.bl_idname not in self._NODES or source.socket.type != "SHADER":
+            raise _NotPlain
+        return self._NODES[source.node.bl_idname](self, source.node, source.groups)
+
+    def _color(self, socket, groups):
+        return _plain_color(socket, groups, self._textures)
+
+    def _base_color(self, socket, groups):
+        color = self._color(socket, groups)
+        if not all(0.0 <= c <= 1.0 for c in color.value):
+            raise _NotPlain
+        return color
+
+    def _constant(self, socket, groups):
+        return self._textures.constant_number(socket, groups)
+
+    def _require(self, condition):
+        if not condition:
+            raise _NotPlain
+
+    def _diffuse(self, node, groups):
+        self._require(self._constant(node.inputs["Roughness"], groups) == 0)
+        self._require(not self._bends(node.inputs["Normal"], groups))
+        return Surface(base_color=self._base_color(node.inputs["Color"], groups))
+
+    def _emission(self, node, groups):
+        color, strength = node.inputs["Color"], node.inputs["Strength"]
+        return Surface(emission=_plain_emission(color, strength, groups, self._textures))
+
+    def _transparent(self, node, groups):
+        self._require(self._color(node.inputs["Color"], groups).is_constant(_WHITE))
+        return replace(TRANSPARENT)
+
+    def _require_sharp_white(self, node, groups):
+        self._require(not self._bends(node.inputs["Normal"], groups))
+        self._require(self._color(node.inputs["Color"], groups).is_constant(_WHITE))
+        if node.distribution != "SHARP":
+            self._require(self._constant(node.inputs["Roughness"], groups) <= _SHARP)
+
+    def _mirror(self, node, groups):
+        self._require_sharp_white(node, groups)
+        return Surface(base_color=Input(_WHITE), is_mirror=True)
+
+    def _glass(self, node, groups):
+        self._require_sharp_white(node, groups)
+        film = node.inputs.get("Thin Film Thickness")
+        self._require(film is None or self._constant(film, groups) == 0)
+        ior = self._constant(node.inputs["IOR"], groups)
+        self._require(ior >= 1)
+        return Surface(base_color=Input(_WHITE), ior=ior)
+
+    def _add(self, node, groups):
+        first, second = (self.surface(nodes.follow(socket, groups)) for socket in node.inputs[:2])
+        for one, other in ((first, second), (second, first)):
+            if other.is_black() and not (one.emits() and other.emits()):
+                self._require(one.is_lambertian() or not other.emits())
+                return replace(one, emission=other.emission) if other.emits() else one
+        raise _NotPlain
+
+    def _mix(self, node, groups):
+        factor = self._textures.number(node.inputs[0], groups)
+        first, second = (nodes.follow(socket, groups) for socket in node.inputs[1:3])
+        if factor.is_constant():
+            return self._mix_by(min(max(factor.value, 0.0), 1.0), first, second)
+        first, second = self.surface(first), self.surface(second)
+        self._require(first.is_transparent() and second.alpha.is_constant(1.0))
+        self._require(not _is_tiled(factor))
+        self._require(factor.offset == 0 and factor.value == 1 and self._holds_alpha(second, factor.texture))
+        return replace(second, alpha=factor)
+
+    def _mix_by(self, weight, first, second):
+        if weight in {0.0, 1.0}:
+            return self.surface(second if weight else first)
+        first, second = self.surface(first), self.surface(second)
+        for one, other, share in ((second, first, weight), (first, second, 1 - weight)):
+            if other.is_transparent() and (one.alpha.is_constant() or one.alpha.texture):
+                return replace(one, alpha=replace(one.alpha, value=one.alpha.value * share))
+        self._require(first.is_lambertian() and second.is_lambertian())
+        base = self._sum(scaled(first.base_color, 1 - weight), scaled(second.base_color, weight))
+        emission = self._sum(scaled(first.emission, 1 - weight), scaled(second.emission, weight))
+        return Surface(base_color=base, emission=emission)
+
+    def _sum(self, first, second):
+        if first.is_constant() and second.is_constant():
+            return Input(tuple(a + b for a, b in zip(first.value, second.value)))
+        self._require(first.is_constant(_BLACK) or second.is_constant(_BLACK))
+        return second if first.is_constant(_BLACK) else first
+
+    def _holds_alpha(self, surface, own):
+        """Whether an opacity has room beside a base colour: in its image, or in place of one."""
+        base = surface.base_color.texture
+        if base is None:
+            return True
+        return own.channel == 3 and own.node.image == base.node.image and own.mapping == base.mapping
+
+    _NODES = {
+        "ShaderNodeBsdfDiffuse": _diffuse,
+        "ShaderNodeBsdfGlossy": _mirror,
+        "ShaderNodeBsdfAnisotropic": _mirror,
+        "ShaderNodeBsdfGlass": _glass,
+        "ShaderNodeBsdfTransparent": _transparent,
+        "ShaderNodeEmission": _emission,
+        "ShaderNodeBackground": _emission,
+        "ShaderNodeMixShader": _mix,
+        "ShaderNodeAddShader": _add,
+    }
+
+
+def scaled(color, factor):
+    return replace(color, value=tuple(c * factor for c in color.value))
+
+
+class ClosureWriter:
+    """Collects the closures of one material's shader tree.
+
+    @param  graph      GraphWriter, which gets what varies
+    @param  past_bump  gives the Normal input and its groups that count in place of others: behind a Bump that displaces
+    @param  fail       called with a nodes.Source, what is not understood of it, and what was used instead
+    closures   JSON of the closures
+    emission   Input of the radiance that no graph gives, which stays in the core
+    transmits  whether light may pass into what the surface bounds
+    """
+
+    def __init__(self, graph, past_bump, fail):
+        self.graph = graph
+        self.closures = []
+        self.emission = Input(_BLACK)
+        self.transmits = False
+        self._past_bump = past_bump
+        self._fail = fail
+        self._emitters = []  # (radiance without a graph or None, (Source, its sockets), weight)
+
+    def write(self, source):
+        """Adds the closures of a shader output.
+
+        @param  source  nodes.Source
+        """
+        for part, weight in self._parts(source):
+            if part.socket.type != "SHADER":
+                self._shine(part, weight)
+            elif part.node.bl_idname in _NODES:
+                _NODES[part.node.bl_idname](self, part, weight)
+            else:
+                label = f'node "{part.node.name}" ({part.node.bl_label})'
+                self._fail(part, f"{label} as surface", "a grey diffuse surface was used")
+                self.add("diffuse", weight)
+        self._add_emission()
+
+    def _parts(self, source):
+        """(nodes.Source, weight) of all shaders of a tree that are not mixes, each once, in the order that they stand in.
+
+        Weights are summed over all ways to a node, the later nodes after the earlier ones: so the number of ways does
+        not matter.
+        """
+        order = []
+        self._visit(source, order, set())
+        weights = {(source.key, source.socket.identifier): 1.0}
+        parts = []
+        for part in reversed(order):
+            weight = weights[part.key, part.socket.identifier]
+            if part.node.bl_idname not in _COMBINATIONS or part.socket.type != "SHADER":
+                parts.append((part, weight))
+                continue
+            for child, share in self._children(part):
+                key = child.key, child.socket.identifier
+                weights[key] = self._plus(weights.get(key, 0.0), self._times(weight, share))
+        return parts
+
+    def _visit(self, source, order, seen):
+        key = source.key, source.socket.identifier
+        if key in seen:
+            return
+        seen.add(key)
+        if source.node.bl_idname in _COMBINATIONS and source.socket.type == "SHADER":
+            # The last first, as the order is read from its end.
+            for child, _ in reversed(self._children(source)):
+                self._visit(child, order, seen)
+        order.append(source)
+
+    def _children(self, source):
+        """[(nodes.Source, its share)] of a Mix or Add Shader, those of no weight left out."""
+        node, groups = source.node, source.groups
+        if node.bl_idname == "ShaderNodeAddShader":
+            sockets, shares = node.inputs[:2], (1.0, 1.0)
         else:
-            color = replace(color, texture=replace(color.texture, mapping=mapping))
-    return replace(color, value=textures.constant_number(node.inputs["Strength"], source.groups))
+            factor = self._saturated(self.input(node.inputs[0], source))
+            sockets, shares = node.inputs[1:3], (self._rest(factor), factor)
+        children = ((nodes.linked(socket, groups), share) for socket, share in zip(sockets, shares))
+        return [(child, share) for child, share in children if child is not None and share != 0]
+
+    def _saturated(self, value):
+        if isinstance(value, dict):
+            return self.graph.op("clamp", {"value": value}, "value")
+        return min(max(value, 0.0), 1.0)
+
+    def _rest(self, share):
+        return 1.0 - share if not isinstance(share, dict) else self._math("subtract", 1.0, share)
+
+    def _times(self, first, second):
+        for one, other in ((first, second), (second, first)):
+            if one == 1:
+                return other
+        are_numbers = not isinstance(first, dict) and not isinstance(second, dict)
+        return first * second if are_numbers else self._math("multiply", first, second)
+
+    def _plus(self, first, second):
+        if first == 0:
+            return second
+        are_numbers = not isinstance(first, dict) and not isinstance(second, dict)
+        return first + second if are_numbers else self._math("add", first, second)
+
+    def _math(self, operation, a, b):
+        return self.graph.op("math", {"a": a, "b": b}, "value", operation=operation)
+
+    def add(self, kind, weight, **values):
+        """Adds a closure; what is None is left out, and so is a weight of 1."""
+        closure = {"type": kind}
+        if weight != 1:
+            closure["weight"] = weight
+        closure.update((name, value) for name, value in values.items() if value is not None)
+        self.closures.append(closure)
+
+    def input(self, socket, source):
+        """Number, numbers or reference of a node's input; its own value where its graph is not understood."""
+        try:
+            return self.graph.value(socket, source.groups)
+        except NotUnderstood as error:
+            value = nodes.finite(nodes.own_value(socket), socket.name, lambda *_: None)
+            value = nodes.as_number(value) if socket.type == "VALUE" else list(nodes.as_color(value))
+            shown = [round(v, 4) for v in value] if isinstance(value, list) else round(value, 4)
+            self._fail(source, f"{error} as {socket.name}", f"the value {shown} was used", error)
+            return value
+
+    def inputs(self, source, names):
+        """Values by our names.
+
+        @param  names  ours by Blender's; normals and tangents are known by them, and what a version lacks is left out
+        """
+        out = {}
+        for theirs, ours in names.items():
+            socket = source.node.inputs.get(theirs)
+            if socket is None:
+                continue
+            if theirs.endswith("Normal"):
+                out[ours] = self._bent_normal(socket, source)
+            else:
+                out[ours] = self.input(socket, source)
+        return out
+
+    def _bent_normal(self, socket, source):
+        """Reference to a Normal input; None: it is the surface's own."""
+        try:
+            reference = self.graph.normal(*self._past_bump(socket, source.groups))
+        except NotUnderstood as error:
+            self._fail(source, f"{error} as normal", "the surface's own normal was used", error)
+            return None
+        # What a displacement bumps stands beside the closures.
+        return None if reference == self.graph.own_normal else reference
+
+    def anisotropy(self, source, names):
+        """Anisotropy, its turn and the tangent of a node, unless it is none.
+
+        @param  names  Blender's of the first two; our own by them
+        """
+        node, groups = source.node, source.groups
+        amount, turn = names
+        if amount not in node.inputs or self.graph.constant(node.inputs[amount], groups) == 0:
+            return {}
+        values = self.inputs(source, names)
+        tangent = nodes.linked(node.inputs["Tangent"], groups)
+        if tangent is not None:
+            values["tangent"] = self._tangent(node.inputs["Tangent"], source)
+        else:
+            self.graph.uses_generated = True
+            values["tangent"] = self.graph.op("tangent", {}, "tangent", direction="radial-z")
+        return values
+
+    def _tangent(self, socket, source):
+        try:
+            return self.graph.normal(socket, source.groups)
+        except NotUnderstood as error:
+            self._fail(source, f"{error} as tangent", "that of the mesh was used", error)
+            return None
+
+    def emit(self, source, color, strength, weight):
+        """Adds emission.
+
+        @param  color, strength  input sockets of the nodes.Source
+        """
+        groups = source.groups
+        if self.graph.constant(strength, groups) == 0 or self.graph.constant(color, groups) == [0, 0, 0]:
+            return
+        plain = None
+        if not isinstance(weight, dict):
+            plain = _unless_refused(lambda textures: scaled(_plain_emission(color, strength, groups, textures), weight))
+        self._emitters.append((plain, (source, color, strength), weight))
+
+    def _shine(self, source, weight):
+        """A value in place of a shader is emitted."""
+        node = source.node
+        if node.bl_idname in {"ShaderNodeRGB", "ShaderNodeValue"} and not isinstance(weight, dict):
+            plain = Input(tuple(weight * c for c in nodes.as_color(nodes.own_value(source.socket))))
+            self._emitters.append((plain, None, weight))
+            return
+        try:
+            self.add("emission", weight, color=self.graph.output(source))
+        except NotUnderstood as error:
+            self._fail(source, f"{error} as surface", "a black surface was used", error)
+
+    def _add_emission(self):
+        """Emission that no graph gives is the core's: all constants, or else one image."""
+        plain = [p for p, _, _ in self._emitters if p is not None]
+        kept = [p for p in plain if p.is_constant()] or plain[:1]
+        for radiance, node, weight in self._emitters:
+            if not any(radiance is k for k in kept):
+                source, color, strength = node
+                self.add("emission", weight, color=self.input(color, source), strength=self.input(strength, source))
+        if kept:
+            total = tuple(sum(channels) for channels in zip(*(k.value for k in kept)))
+            self.emission = replace(kept[0], value=total)
+
+    def with_alpha(self, source, socket, weight):
+        """What an Alpha input leaves of a weight; the rest is transparent."""
+        alpha = self._saturated(self.input(socket, source))
+        if alpha == 1:
+            return weight
+        self.add("transparent", self._times(weight, self._rest(alpha)))
+        return self._times(weight, alpha)
+
+    def unread(self, source, what, instead):
+        """Tells of a part of a node that the format cannot say."""
+        self._fail(source, f'node "{source.node.name}": {what}', instead)
 
 
-#: Inputs of the Principled BSDF that are 0 unless something is asked for that the format cannot say.
-_UNREAD = (
-    ("Subsurface", "subsurface scattering", "its colour was used as a diffuse one"),
-    ("Anisotropic", "anisotropy", "the roughness was used in all directions"),
-    ("Transmission Roughness", "transmission roughness", "the roughness of the surface was used"),
-    ("Diffuse Roughness", "roughness of the diffuse layer", "Lambert's law was used"),
-    ("Thin Film Thickness", "a thin film", "it is left out"),
-)
+_COMBINATIONS = {"ShaderNodeMixShader", "ShaderNodeAddShader"}
+
+_DISTRIBUTIONS = {
+    "GGX": "ggx",
+    "MULTI_GGX": "multiscatter-ggx",
+    "BECKMANN": "beckmann",
+    "ASHIKHMIN_SHIRLEY": "ashikhmin-shirley",
+    "SHARP": "sharp",
+}
+
+#: What closures of a version's own meaning say of it.
+_MATHS = {} if compat.MATHS == "3.4" else {"maths": compat.MATHS}
 
 
-def _principled(source, textures):
+def _distribution(node):
+    return _DISTRIBUTIONS.get(getattr(node, "distribution", None))
+
+
+def _diffuse(w, source, weight):
+    values = w.inputs(source, {"Color": "color", "Roughness": "roughness", "Normal": "normal"})
+    w.add("diffuse", weight, **values, **_MATHS)
+
+
+def _translucent(w, source, weight):
+    w.add("translucent", weight, **w.inputs(source, {"Color": "color", "Normal": "normal"}))
+
+
+def _transparent(w, source, weight):
+    w.add("transparent", weight, **w.inputs(source, {"Color": "color"}))
+
+
+def _emission(w, source, weight):
+    w.emit(source, source.node.inputs["Color"], source.node.inputs["Strength"], weight)
+
+
+def _holdout(w, source, weight):
+    w.add("holdout", weight)
+
+
+def _glossy(w, source, weight):
+    values = w.inputs(source, {"Color": "color", "Roughness": "roughness", "Normal": "normal"})
+    values.update(w.anisotropy(source, {"Anisotropy": "anisotropy", "Rotation": "rotation"}))
+    w.add("glossy", weight, **values, distribution=_distribution(source.node), **_MATHS)
+
+
+def _glass_like(kind):
+    def write(w, source, weight):
+        names = {"Color": "color", "Roughness": "roughness", "IOR": "ior", "Normal": "normal"}
+        names.update({"Thin Film Thickness": "thinFilmThickness", "Thin Film IOR": "thinFilmIor"})
+        w.transmits = True
+        w.add(kind, weight, **w.inputs(source, names), distribution=_distribution(source.node), **_MATHS)
+
+    return write
+
+
+def _metallic(w, source, weight):
+    """The Metallic BSDF, which came with 4.3."""
+    node = source.node
+    is_f82 = node.fresnel_type == "F82"
+    names = {"Roughness": "roughness", "Normal": "normal"}
+    names.update(
+        {"Base Color": "baseColor", "Edge Tint": "edgeTint"} if is_f82 else {"IOR": "ior", "Extinction": "extinction"}
+    )
+    values = w.inputs(source, names)
+    values.update(w.anisotropy(source, {"Anisotropy": "anisotropy", "Rotation": "rotation"}))
+    film = node.inputs.get("Thin Film Thickness")
+    if film is not None and w.graph.constant(film, source.groups) != 0:
+        w.unread(source, "a thin film on metal", "it is left out")
+    fresnel = "f82" if is_f82 else "physical"
+    w.add("metallic", weight, **values, fresnel=fresnel, distribution=_distribution(node), **_MATHS)
+
+
+def _velvet(w, source, weight):
+    w.add("velvet", weight, **w.inputs(source, {"Color": "color", "Sigma": "sigma", "Normal": "normal"}))
+
+
+def _sheen(w, source, weight):
+    """The Sheen BSDF of 4.0, one of whose kinds is the Velvet BSDF of before."""
+    is_velvet = source.node.distribution == "ASHIKHMIN"
+    names = {"Color": "color", "Roughness": "sigma" if is_velvet else "roughness", "Normal": "normal"}
+    w.add("velvet" if is_velvet else "sheen", weight, **w.inputs(source, names))
+
+
+def _toon(w, source, weight):
+    values = w.inputs(source, {"Color": "color", "Size": "size", "Smooth": "smooth", "Normal": "normal"})
+    w.add("toon", weight, **values, component=source.node.component.lower())
+
+
+def _subsurface(w, source, weight):
+    w.unread(source, "subsurface scattering", "a diffuse surface of its colour was used")
+    w.add("diffuse", weight, **w.inputs(source, {"Color": "color", "Normal": "normal"}))
+
+
+def _colored(what):
+    """Writer of a node of which the colour alone is taken."""
+
+    def write(w, source, weight):
+        w.unread(source, what, "a diffuse surface of its colour was used")
+        # Only the sockets that a node shows are found: hair by absorption has no colour.
+        w.add("diffuse", weight, **w.inputs(source, {"Color": "color", "Base Color": "color", "Normal": "normal"}))
+
+    return write
+
+
+def _volume(w, source, weight):
+    w.unread(source, "a volume as surface", "nothing is there, as in Cycles")
+
+
+def _portal(w, source, weight):
+    w.unread(source, "a portal for rays", "a transparent surface of its colour was used")
+    w.add("transparent", weight, **w.inputs(source, {"Color": "color"}))
+
+
+def _principled(w, source, weight):
     node, groups = source.node, source.groups
 
     def socket(name):
         return compat.principled_socket(node, name)
 
-    def constant(name, default=0.0):
-        return textures.constant_number(socket(name), groups) if socket(name) is not None else default
-
-    def warn(what, instead):
-        textures.warn(f'node "{node.name}": {what}', instead)
-
-    for name, what, instead in _UNREAD:
-        if constant(name) != 0:
-            warn(what, instead)
-    surface = Surface(
-        base_color=textures.color(socket("Base Color"), groups),
-        alpha=textures.number(socket("Alpha"), groups),
-        metallic=textures.number(socket("Metallic"), groups),
-        roughness=textures.number(socket("Roughness"), groups),
-        transmission=textures.number(socket("Transmission"), groups),
-        coat=textures.number(socket("Clearcoat"), groups),
-        coat_roughness=textures.number(socket("Clearcoat Roughness"), groups),
-        normal=_normal(socket("Normal"), groups, textures),
-    )
-    surface.base_color = _with_subsurface_color(surface, constant("Subsurface"), socket("Subsurface Color"), groups, textures)
-    surface.coat = replace(surface.coat, value=surface.coat.value * compat.COAT_SCALE)
-    if not surface.coat.is_constant(0.0):
-        if nodes.follow(socket("Clearcoat Normal"), groups) is not None:
-            warn("a normal of the coat", "that of the surface was used")
-        if compat.has_uncommon_coat(node):
-            warn("a coat with a tint or an index other than 1.5", "a clear one with 1.5 was used")
-    surface.ior, surface.specular, surface.specular_color = compat.principled_reflection(
-        constant("Specular", 0.5),
-        constant("IOR", 1.5),
-        _specular_tint(surface, socket("Specular Tint"), groups, textures, warn),
-        not surface.transmission.is_constant(0.0),
-    )
-    _set_sheen(surface, node, groups, constant, textures)
-    emission = textures.color(socket("Emission"), groups)
-    strength = constant("Emission Strength", 1.0)
-    surface.emission = _scaled(emission, strength)
-    return surface
-
-
-def _with_subsurface_color(surface, weight, socket, groups, textures):
-    """Base colour of a Principled BSDF with its Subsurface Color, which was there before 4.0.
-
-    Cycles takes the colour of all diffuse light from between both, by the weight of the subsurface scattering; what metal
-    reflects and glass lets through keeps the base colour.
-    """
-    base = surface.base_color
-    weight = min(max(weight, 0.0), 1.0)
-    if socket is None or weight == 0:
-        return base
-    if not surface.metallic.is_constant(0.0) or not surface.transmission.is_constant(0.0):
-        textures.warn("the Subsurface Color of a surface that is in part metal or glass", "its base colour was used")
-        return base
-    below = textures.color(socket, groups)
-    mixed = tuple((1 - weight) * a + weight * b for a, b in zip(base.value, below.value))
-    if (base.texture, base.color_map, base.graph) == (below.texture, below.color_map, below.graph):
-        return replace(base, value=mixed)
-    heavier = below if weight >= 0.5 else base
-    if weight < 1:
-        textures.warn("a mix of base and Subsurface Color of which one is textured", "the heavier one was used")
-    return heavier
-
-
-def _specular_tint(surface, socket, groups, textures, warn):
-    """Colour of a Principled BSDF's reflection at normal incidence."""
-    if not compat.TINTS_ARE_COLORS:
-        if textures.constant_number(socket, groups) > 0:
-            warn("specular tint", "an untinted reflection was used")
-        return _WHITE
-    tint = textures.constant_color(socket, groups)
-    if tint != _WHITE and not surface.metallic.is_constant(0.0):
-        warn("specular tint of a metal", "it reflects all light at grazing angles")
-    return tint
-
-
-def _set_sheen(surface, node, groups, constant, textures):
-    weight = constant("Sheen")
-    if weight <= 0:
+    weight = w.with_alpha(source, socket("Alpha"), weight)
+    if weight == 0:
         return
-    tint_socket = compat.principled_socket(node, "Sheen Tint")
-    reader = textures.constant_color if compat.TINTS_ARE_COLORS else textures.constant_number
-    base = surface.base_color.value
-    surface.sheen_color = compat.sheen_color(base, weight, reader(tint_socket, groups))
-    surface.sheen_roughness = constant("Sheen Roughness", surface.sheen_roughness)
-    textures.warn(f'node "{node.name}": sheen', "glTF's sheen was used, which looks a little different")
-
-
-def _scaled(color, factor):
-    return replace(color, value=tuple(c * factor for c in color.value))
-
-
-def _diffuse(source, textures):
-    color, _, constant = _inputs(source, textures)
-    if constant("Roughness") > 0:
-        textures.warn(f'node "{source.node.name}": roughness of a diffuse surface', "Lambert's law was used")
-    normal = _normal(source.node.inputs["Normal"], source.groups, textures)
-    return Surface(base_color=color("Color"), normal=normal)
-
-
-def _glossy(source, textures):
-    color, number, constant = _inputs(source, textures)
-    node = source.node
-    roughness = Input(0.0) if getattr(node, "distribution", "") == "SHARP" else number("Roughness")
-    if getattr(node, "distribution", "") in {"BECKMANN", "ASHIKHMIN_SHIRLEY"}:
-        textures.warn(f'node "{node.name}": distribution {node.distribution.lower()}', "GGX was used")
-    _warn_anisotropy(node, constant, textures)
-    normal = _normal(node.inputs["Normal"], source.groups, textures)
-    return Surface(base_color=color("Color"), metallic=Input(1.0), roughness=roughness, specular=1.0, normal=normal)
-
-
-def _warn_anisotropy(node, constant, textures):
-    if "Anisotropy" in node.inputs and constant("Anisotropy") != 0:
-        textures.warn(f'node "{node.name}": anisotropy', "the roughness was used in all directions")
-
-
-def _metallic(source, textures):
-    """The Metallic BSDF, which came with 4.3."""
-    color, number, constant = _inputs(source, textures)
-    node = source.node
-    if node.fresnel_type != "F82":
-        textures.warn(f'node "{node.name}": a metal by its indices', "its base colour was used")
-    elif textures.constant_color(node.inputs["Edge Tint"], source.groups) != _WHITE:
-        textures.warn(f'node "{node.name}": edge tint', "it reflects all light at grazing angles")
-    if node.distribution == "BECKMANN":
-        textures.warn(f'node "{node.name}": distribution beckmann', "GGX was used")
-    _warn_anisotropy(node, constant, textures)
-    return Surface(
-        base_color=color("Base Color"),
-        metallic=Input(1.0),
-        roughness=number("Roughness"),
-        specular=1.0,
-        normal=_normal(node.inputs["Normal"], source.groups, textures),
-    )
-
-
-def _glass(source, textures):
-    color, number, constant = _inputs(source, textures)
-    node = source.node
-    roughness = Input(0.0) if node.distribution == "SHARP" else number("Roughness")
-    surface = Surface(
-        base_color=color("Color"),
-        roughness=roughness,
-        transmission=Input(1.0),
-        ior=max(1.0, constant("IOR")),
-        specular=1.0,
-        normal=_normal(node.inputs["Normal"], source.groups, textures),
-    )
-    if not surface.base_color.is_constant(_WHITE):
-        textures.warn(f'node "{node.name}": coloured glass', "its reflections are white")
-    return surface
-
-
-def _refraction(source, textures):
-    textures.warn(f'node "{source.node.name}": refraction alone', "glass was used, which reflects too")
-    return _glass(source, textures)
-
-
-def _translucent(source, textures):
-    textures.warn(f'node "{source.node.name}": translucency', "a diffuse surface of its colour was used")
-    color, _, _ = _inputs(source, textures)
-    return Surface(base_color=color("Color"))
-
-
-def _transparent(source, textures):
-    color = textures.constant_color(source.node.inputs["Color"], source.groups)
-    if max(color) - min(color) > 1e-4:
-        textures.warn(f'node "{source.node.name}": coloured transparency', "its mean was used, without colour")
-    return Surface(base_color=Input(_BLACK), alpha=Input(1.0 - min(1.0, sum(color) / 3)))
-
-
-def _emission(source, textures):
-    color, _, constant = _inputs(source, textures)
-    return Surface(base_color=Input(_BLACK), emission=_scaled(color("Color"), constant("Strength")))
-
-
-def _holdout(source, textures):
-    textures.warn(f'node "{source.node.name}": holdout', "a black surface was used")
-    return Surface(base_color=Input(_BLACK))
-
-
-def _is_transparent(surface):
-    return surface.alpha.is_constant(0.0) and not surface.emits()
-
-
-def _is_black(surface):
-    return surface.base_color.is_constant(_BLACK) and surface.specular == 0 and not surface.metallic.value
-
-
-def _add(source, textures):
-    first, second = (
-        surface_from(nodes.follow(socket, source.groups), textures) for socket in source.node.inputs[:2]
-    )
-    for one, other in ((first, second), (second, first)):
-        if other.emits() and _is_black(other) and not one.emits():
-            return replace(one, emission=other.emission)
-        if _is_black(other) and not other.emits():
-            return one
-    textures.warn(f'node "{source.node.name}": a sum of shaders', "half of each was used")
-    return _blend(0.5, first, second)
-
-
-def _mix(source, textures):
-    node, groups = source.node, source.groups
-    first, second = (nodes.follow(socket, groups) for socket in node.inputs[1:3])
-    first, second = surface_from(first, textures), surface_from(second, textures)
-    by_fresnel = _fresnel_ior(nodes.follow(node.inputs[0], groups), textures)
-    if by_fresnel is not None and second.metallic.is_constant(1.0):
-        return _plastic(first, second, by_fresnel, node, textures)
-    factor = textures.number(node.inputs[0], groups)
-    if _is_transparent(first):
-        return replace(second, alpha=_times(factor, second.alpha, node, textures))
-    if _is_transparent(second):
-        if factor.texture is None:
-            rest = replace(factor, value=-factor.value, offset=1.0 - factor.offset) if factor.graph else Input(1.0 - factor.value)
-            return replace(first, alpha=_times(rest, first.alpha, node, textures))
-        textures.warn(f'node "{node.name}": a textured mix with transparency second', "swap its shaders; it is opaque")
-        return first
-    if not factor.is_constant():
-        are_pure = first.metallic.is_constant(0.0) and second.metallic.is_constant(1.0)
-        if first.base_color == second.base_color and are_pure:
-            return replace(first, metallic=factor, roughness=second.roughness)
-        textures.warn(f'node "{node.name}": a textured mix of shaders', "half of each was used")
-        return _blend(0.5, first, second)
-    weight = min(max(factor.value, 0.0), 1.0)
-    if weight in {0.0, 1.0}:
-        return second if weight else first
-    if not _blends_exactly(first, second):
-        textures.warn(f'node "{node.name}": a mix of different shaders', "one with the mean of their values was used")
-    return _blend(weight, first, second)
-
-
-def _fresnel_ior(source, textures):
-    """Index of a mix by Fresnel's equations; None for other factors."""
-    if source is None or source.node.bl_idname not in {"ShaderNodeFresnel", "ShaderNodeLayerWeight"}:
-        return None
-    if source.node.bl_idname == "ShaderNodeFresnel":
-        return max(1.0, textures.constant_number(source.node.inputs["IOR"], source.groups))
-    if source.socket.name != "Fresnel":
-        return None
-    blend = textures.constant_number(source.node.inputs["Blend"], source.groups)
-    return 1.0 / max(1.0 - blend, 1e-5)
-
-
-def _plastic(below, gloss, ior, node, textures):
-    """Gloss over something else by Fresnel: glTF's dielectric."""
-    if not gloss.base_color.is_constant(_WHITE):
-        textures.warn(f'node "{node.name}": coloured gloss', "its reflection at normal incidence has the colour")
-    tint = gloss.base_color.value if gloss.base_color.is_constant() else _WHITE
-    return replace(below, roughness=gloss.roughness, ior=ior, specular=1.0, specular_color=tint)
-
-
-def _times(factor, alpha, node, textures):
-    """Product of two opacities, of which only one may be textured."""
-    if alpha.is_constant():
-        return replace(factor, value=factor.value * alpha.value, offset=factor.offset * alpha.value)
-    if factor.is_constant():
-        return replace(alpha, value=alpha.value * factor.value, offset=alpha.offset * factor.value)
-    textures.warn(f'node "{node.name}": two textured opacities', "the one of the mix was used")
-    return factor
-
-
-def _blends_exactly(first, second):
-    """Whether the mean of the parameters is the mean of the surfaces: diffuse, emission and black ones are linear."""
-    return all(
-        s.specular == 0 and s.transmission.is_constant(0.0) and s.coat.is_constant(0.0) and s.alpha.is_constant(1.0)
-        for s in (first, second)
-    )
-
-
-def _blend(weight, first, second):
-    """A surface with mixed parameters. Where both sides are textured, the heavier one's texture stays."""
-
-    def mixed(a, b):
-        if isinstance(a, tuple):
-            return tuple((1 - weight) * x + weight * y for x, y in zip(a, b))
-        return (1 - weight) * a + weight * b
-
-    def inputs(a, b):
-        if a.is_constant() and b.is_constant():
-            return Input(mixed(a.value, b.value))
-        return a if (weight < 0.5 or b.is_constant()) and not a.is_constant() else b
-
-    out = Surface(ior=first.ior if weight < 0.5 else second.ior, normal=first.normal or second.normal)
-    for name in ("base_color", "alpha", "metallic", "roughness", "transmission", "coat", "coat_roughness", "emission"):
-        setattr(out, name, inputs(getattr(first, name), getattr(second, name)))
-    for name in ("specular", "specular_color", "sheen_color", "sheen_roughness"):
-        setattr(out, name, mixed(getattr(first, name), getattr(second, name)))
-    return out
+    w.emit(source, socket("Emission"), socket("Emission Strength"), weight)
+    if w.graph.constant(socket("Subsurface"), groups) != 0:
+        w.unread(source, "subsurface scattering", "its colour was used as a diffuse one")
+    if w.graph.constant(socket("Transmission"), groups) != 0:
+        w.transmits = True
+    values = w.inputs(source, compat.PRINCIPLED_INPUTS)
+    values.update(w.anisotropy(source, {"Anisotropic": "anisotropic", "Anisotropic Rotation": "anisotropicRotation"}))
+    w.add("principled", weight, **values, distribution=_distribution(node), maths=compat.MATHS)
 
 
 _NODES = {
@@ -415,13 +580,28 @@ _NODES = {
     "ShaderNodeBsdfGlossy": _glossy,
     "ShaderNodeBsdfAnisotropic": _glossy,
     "ShaderNodeBsdfMetallic": _metallic,
-    "ShaderNodeBsdfGlass": _glass,
-    "ShaderNodeBsdfRefraction": _refraction,
+    "ShaderNodeBsdfGlass": _glass_like("glass"),
+    "ShaderNodeBsdfRefraction": _glass_like("refraction"),
     "ShaderNodeBsdfTranslucent": _translucent,
     "ShaderNodeBsdfTransparent": _transparent,
+    "ShaderNodeBsdfVelvet": _velvet,
+    "ShaderNodeBsdfSheen": _sheen,
+    "ShaderNodeBsdfToon": _toon,
+    "ShaderNodeSubsurfaceScattering": _subsurface,
+    "ShaderNodeBsdfHair": _colored("hair"),
+    "ShaderNodeBsdfHairPrincipled": _colored("hair"),
+    "ShaderNodeEeveeSpecular": _colored("a shader of Eevee's alone"),
+    "ShaderNodeBsdfRayPortal": _portal,
     "ShaderNodeEmission": _emission,
     "ShaderNodeBackground": _emission,
     "ShaderNodeHoldout": _holdout,
-    "ShaderNodeMixShader": _mix,
-    "ShaderNodeAddShader": _add,
+    "ShaderNodeVolumeAbsorption": _volume,
+    "ShaderNodeVolumeScatter": _volume,
+    "ShaderNodeVolumePrincipled": _volume,
+    "ShaderNodeVolumeCoefficients": _volume,
 }
+
+
+def knows(node):
+    """Whether a shader node can be written."""
+    return node.bl_idname in _NODES or node.bl_idname in _COMBINATIONS

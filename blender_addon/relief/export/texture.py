@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from . import nodes
-from .graph import NotUnderstood
 
 #: glTF's wrap modes by Blender's extension.
 _WRAP = {"REPEAT": 10497, "EXTEND": 33071, "CLIP": 33071, "MIRROR": 33648}
@@ -81,18 +80,16 @@ class Input:
 
     value      linear RGB or a number
     color_map  name of a colour attribute in place of a texture, "" for the one active in renders; None: none
-    graph      reference to what a graph gives, in place of a texture; None: none
     """
 
     value: object = 1.0
     texture: object = None
     offset: float = 0.0
     color_map: object = None
-    graph: object = None
 
     def is_constant(self, value=None):
         """Whether nothing varies over the surface; with a value, whether it is that one everywhere."""
-        return self.texture is None and self.color_map is None and self.graph is None and (value is None or self.value == value)
+        return self.texture is None and self.color_map is None and (value is None or self.value == value)
 
 
 @dataclass
@@ -100,13 +97,11 @@ class TextureReader:
     """Reads inputs of one material's nodes.
 
     @param  warn        called with what is not understood, and what was used instead
-    @param  graph       GraphWriter for what no texture can say; None: there are none
     @param  takes_bump  whether a Bump node is kept, to displace by, instead of warned about
     bump                the nodes.Source of that Bump node
     """
 
     warn: object
-    graph: object = None
     takes_bump: bool = False
     bump: object = None
 
@@ -136,36 +131,23 @@ class TextureReader:
             found = self._textured(nodes.follow(socket, groups), is_color)
             if found is not None:
                 return found
-            if self.graph is not None:
-                return self._graph(socket, groups, is_color)
         reader = nodes.Reader(self.warn, groups)
         return Input(reader.color(socket) if is_color else reader.number(socket))
-
-    def _graph(self, socket, groups, is_color):
-        try:
-            return Input((1.0, 1.0, 1.0) if is_color else 1.0, graph=self.graph.value(socket, groups))
-        except NotUnderstood as error:
-            value = nodes.finite(nodes.own_value(socket), socket.name, self.warn)
-            shown = tuple(round(v, 4) for v in value) if isinstance(value, tuple) else round(value, 4)
-            self.warn(f"{error} as {socket.name}", f"the value {shown} was used")
-            return Input(nodes.as_color(value) if is_color else nodes.as_number(value))
 
     def _textured(self, source, is_color):
         """Input of a source that varies; None if it is not understood."""
         node, one = source.node, (1.0, 1.0, 1.0) if is_color else 1.0
         if node.bl_idname == "ShaderNodeTexImage":
             if node.image is None:
-                value = 1.0 if source.socket.name == "Alpha" else MISSING
+                value = 1.0 if source.socket.name == "Alpha" else (*MISSING, 1.0)
                 return Input(nodes.as_color(value) if is_color else nodes.as_number(value))
             channel = 3 if source.socket.name == "Alpha" else None
             return Input(one, Texture(node, channel, self._mapping(node, source.groups)))
         if node.bl_idname in {"ShaderNodeSeparateColor", "ShaderNodeSeparateRGB", "ShaderNodeSeparateXYZ"}:
             if getattr(node, "mode", "RGB") == "RGB":
                 return self._channel(source, one)
-        if is_color and node.bl_idname == "ShaderNodeVertexColor":
+        if is_color and node.bl_idname == "ShaderNodeVertexColor" and source.socket.name == "Color":
             return Input(one, color_map=node.layer_name)
-        if is_color and node.bl_idname == "ShaderNodeAttribute" and node.attribute_type == "GEOMETRY":
-            return Input(one, color_map=node.attribute_name)
         factors = self._factors(node)
         return self._product(source, factors, is_color) if factors is not None else None
 
@@ -218,6 +200,8 @@ class TextureReader:
         return replace(inner, offset=inner.offset + (constant if kind == "ADD" else -constant))
 
     def _mapping(self, node, groups):
+        if not nodes.has_plain_mapping(node):
+            self.warn(f'node "{node.name}": its own mapping', "it is left out")
         if node.projection != "FLAT":
             self.warn(f'node "{node.name}": projection {node.projection.lower()}', "flat was used")
         if node.extension == "CLIP":
@@ -231,9 +215,11 @@ class TextureReader:
         if source is None:
             return mapping
         node = source.node
+        if getattr(node, "from_instancer", False):
+            self.warn(f'node "{node.name}": coordinates from an instancer', "the object's own were used")
         if node.bl_idname == "ShaderNodeUVMap":
             return replace(mapping, source=("uv", node.uv_map))
-        if node.bl_idname == "ShaderNodeAttribute":
+        if node.bl_idname == "ShaderNodeAttribute" and node.attribute_type == "GEOMETRY":
             return replace(mapping, source=("uv", node.attribute_name))
         if node.bl_idname == "ShaderNodeTexCoord" and source.socket.name in {"UV", "Generated", "Object"}:
             if source.socket.name == "Object" and node.object is not None:

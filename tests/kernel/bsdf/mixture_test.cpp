@@ -227,7 +227,8 @@ TEST(Mixture, TheLayeredPrincipledReflectsNoMoreThanItReceives)
       MixtureLobes lobes;
       const Mixture m = mixture_make(one, direction(z, 0.2f), lobes);
       // Albedos of layers come from tables, as in Cycles: they miss by a hundredth or two.
-      EXPECT_LT(furnace(m), 1.03) << i << ", cosine " << z;
+      EXPECT_LT(furnace(m), 1.03) << i << ", cosine " << z << ", film " << in.thin_film_thickness << ", coat "
+                                  << in.coat_weight << ", glass " << in.transmission_weight << ", metal " << in.metallic;
     }
   }
 }
@@ -243,7 +244,8 @@ TEST(Mixture, WhitePrincipledOf43IsClosed)
                           }};
     for (const float z : {0.2f, 0.5f, 1.0f}) {
       MixtureLobes lobes;
-      EXPECT_NEAR(furnace(mixture_make(one, direction(z, 0.2f), lobes)), 1.0, 0.02) << roughness << ", cosine " << z;
+      // As in Cycles, the reflection takes from below as if it gave back all light, but it loses some by its colour.
+      EXPECT_NEAR(furnace(mixture_make(one, direction(z, 0.2f), lobes)), 1.0, 0.03) << roughness << ", cosine " << z;
     }
   }
 }

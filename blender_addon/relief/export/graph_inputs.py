@@ -1,0 +1,251 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Outputs of Blender's input nodes as RELIEF_graph: what is read of the point, its object, the ray and the camera.
+
+One function a kind of node, listed at the end. Each gives the value of one output: a reference, or numbers.
+"""
+
+import bpy
+
+from . import attributes, instance_values
+
+
+def not_understood(node, what):
+    """The exception of an output that graphs do not know."""
+    from .graph import NotUnderstood
+
+    return NotUnderstood(f'node "{node.name}" ({node.bl_label}): {what}')
+
+
+def _output(index, name):
+    return {"node": index, "output": name}
+
+
+def _constant(g, value):
+    """Numbers as a node: they may be all that a graph gives."""
+    if isinstance(value, (tuple, list)):
+        return _output(g.add("combine", dict(zip("xyz", (float(v) for v in value)))), "vector")
+    return _output(g.add("math", {"a": float(value), "b": 0.0}, operation="add"), "value")
+
+
+def mesh_attribute(g, kind, name, output):
+    """An output of an attribute of the mesh: see attributes.py."""
+    if (kind, name) not in g.attributes:
+        g.attributes.append((kind, name))
+    return _output(g.add("attribute", name=attributes.file_name((kind, name))), output)
+
+
+def instance_value(g, kind, name, output):
+    """An output of a value of the object: see instance_values.py."""
+    if (kind, name) not in g.values:
+        g.values.append((kind, name))
+    return _output(g.add("attribute", name=instance_values.file_name((kind, name))), output)
+
+
+def _texture_coordinate(g, source):
+    node, name = source.node, source.socket.identifier
+    if name == "UV":
+        return instance_value(g, "uv", "", "vector") if node.from_instancer else g.uv("")
+    if name == "Generated":
+        if node.from_instancer:
+            return instance_value(g, "generated", "", "vector")
+        g.uses_generated = True
+    if name == "Object" and node.object is not None:
+        inverse = node.object.matrix_world.inverted_safe()
+        matrix = [c for row in inverse[:3] for c in row]
+        position = _output(g.add("geometry"), "position")
+        return _output(g.add("transform", {"vector": position}, matrix=matrix), "vector")
+    return _output(g.add("texture-coordinate"), name.lower())
+
+
+def _uv_map(g, source):
+    node = source.node
+    return instance_value(g, "uv", "", "vector") if node.from_instancer else g.uv(node.uv_map)
+
+
+def _geometry(g, source):
+    name = source.socket.identifier
+    if name == "Pointiness":
+        return mesh_attribute(g, "pointiness", "", "value")
+    if name == "Random Per Island":
+        return mesh_attribute(g, "island", "", "value")
+    if name == "Tangent":
+        g.uses_generated = True
+    return _output(g.add("geometry"), "trueNormal" if name == "True Normal" else name.lower())
+
+
+def _object_info(g, source):
+    name = source.socket.identifier
+    if name == "Location":
+        return _output(g.add("object-info"), "location")
+    if name == "Material Index":
+        return _constant(g, g.material_index)
+    kind = {"Color": "color", "Alpha": "color", "Object Index": "index", "Random": "random"}[name]
+    return instance_value(g, kind, "", {"Color": "color", "Alpha": "alpha"}.get(name, "value"))
+
+
+def _particle_info(g, source):
+    name = source.socket.identifier.upper().replace(" ", "_")
+    is_vector = name in {"LOCATION", "VELOCITY", "ANGULAR_VELOCITY"}
+    return instance_value(g, "particle", name, "vector" if is_vector else "value")
+
+
+_LIGHT_PATH = {
+    "Is Camera Ray": "camera",
+    "Is Shadow Ray": "shadow",
+    "Is Diffuse Ray": "diffuse",
+    "Is Glossy Ray": "glossy",
+    "Is Singular Ray": "singular",
+    "Is Reflection Ray": "reflection",
+    "Is Transmission Ray": "transmission",
+    "Ray Length": "length",
+    "Ray Depth": "depth",
+    "Diffuse Depth": "diffuseDepth",
+    "Glossy Depth": "glossyDepth",
+    "Transparent Depth": "transparentDepth",
+    "Transmission Depth": "transmissionDepth",
+}
+
+
+def _light_path(g, source):
+    name = source.socket.identifier
+    if name == "Is Volume Scatter Ray":
+        return _constant(g, 0.0)
+    if name not in _LIGHT_PATH:
+        raise not_understood(source.node, name)
+    return _output(g.add("light-path"), _LIGHT_PATH[name])
+
+
+def _camera_data(g, source):
+    names = {"View Vector": "vector", "View Z Depth": "depth", "View Distance": "distance"}
+    return _output(g.add("camera-data"), names[source.socket.identifier])
+
+
+#: Outputs of Attribute by its sockets' names.
+_ATTRIBUTE = {"Color": "color", "Vector": "vector", "Fac": "value", "Factor": "value", "Alpha": "alpha"}
+
+#: Attributes that Cycles has by these names without the mesh having them.
+_STANDARD = {"pointiness": ("pointiness", ""), "random_per_island": ("island", ""), "uv": ("uv", "")}
+
+
+def _attribute(g, source):
+    node = source.node
+    output = _ATTRIBUTE[source.socket.name]
+    name = node.attribute_name
+    if not name:
+        return _constant(g, 1.0 if output == "alpha" else (0.0, 0.0, 0.0))
+    if node.attribute_type == "GEOMETRY":
+        if name == "generated" and output == "vector":
+            g.uses_generated = True
+            return _output(g.add("texture-coordinate"), "generated")
+        return mesh_attribute(g, *_STANDARD.get(name, ("attribute", name)), output)
+    if node.attribute_type == "VIEW_LAYER":
+        layer = g.view_layer()
+        value = instance_values.look_up(name, layer)
+        return _constant(g, {"alpha": value[3], "value": sum(value[:3]) / 3}.get(output, value[:3]))
+    return instance_value(g, node.attribute_type.lower(), name, output)
+
+
+def _color_attribute(g, source):
+    return mesh_attribute(g, "color", source.node.layer_name, _ATTRIBUTE[source.socket.name])
+
+
+def _tangent_set(g, node):
+    """Option that names the uv set of a node's tangents."""
+    number = g.coordinate_set(("uv", node.uv_map))
+    if number is None:
+        raise not_understood(node, "tangents of a third uv map")
+    return number or None
+
+
+def _tangent(g, source):
+    node = source.node
+    if node.direction_type == "UV_MAP":
+        return _output(g.add("tangent", direction="uv", uvSet=_tangent_set(g, node)), "tangent")
+    g.uses_generated = True
+    return _output(g.add("tangent", direction=f"radial-{node.axis.lower()}"), "tangent")
+
+
+def _normal_map(g, source):
+    node = source.node
+    inputs = g.inputs(node, source.groups, {"Strength": "strength", "Color": "color"})
+    space = node.space.lower().replace("_", "-")
+    uv_set = _tangent_set(g, node) if node.space == "TANGENT" else None
+    return _output(g.add("normal-map", inputs, space=space, uvSet=uv_set), "normal")
+
+
+def _vector_transform(g, source):
+    node = source.node
+    inputs = g.inputs(node, source.groups, {"Vector": "vector"})
+    options = {"transform": node.vector_type.lower(), "from": node.convert_from.lower(), "to": node.convert_to.lower()}
+    return _output(g.add("vector-transform", inputs, **options), "vector")
+
+
+def _normal(g, source):
+    node = source.node
+    inputs = g.inputs(node, source.groups, {"Normal": "normal"})
+    index = g.add("normal", inputs, direction=[float(c) for c in node.outputs["Normal"].default_value])
+    return _output(index, source.socket.identifier.lower())
+
+
+def _wireframe(g, source):
+    node = source.node
+    if node.use_pixel_size:
+        raise not_understood(node, "a size in pixels")
+    return _output(g.add("wireframe", g.inputs(node, source.groups, {"Size": "size"})), "factor")
+
+
+def _light_falloff(g, source):
+    inputs = g.inputs(source.node, source.groups, {"Strength": "strength", "Smooth": "smooth"})
+    return _output(g.add("light-falloff", inputs), source.socket.identifier.lower())
+
+
+def _hair_info(g, source):
+    """What a surface that is no hair has of it."""
+    return _constant(g, (0.0, 0.0, 0.0) if source.socket.identifier == "Tangent Normal" else 0.0)
+
+
+def _point_info(g, source):
+    """What a surface that is no point has of it."""
+    return _constant(g, (0.0, 0.0, 0.0) if source.socket.identifier == "Position" else 0.0)
+
+
+def _by_normal(kind, names):
+    """Writer of a node whose Normal may be linked.
+
+    @param  names  our names of the inputs by Blender's
+    """
+
+    def write(g, source):
+        node, groups = source.node, source.groups
+        inputs = g.inputs(node, groups, names)
+        normal = g.normal(node.inputs["Normal"], groups)
+        if normal is not None:
+            inputs["normal"] = normal
+        name = source.socket.identifier
+        return _output(g.add(kind, inputs), "factor" if name in {"Fac", "Factor"} else name.lower())
+
+    return write
+
+
+#: What gives an output of a node.
+OUTPUTS = {
+    "ShaderNodeTexCoord": _texture_coordinate,
+    "ShaderNodeUVMap": _uv_map,
+    "ShaderNodeNewGeometry": _geometry,
+    "ShaderNodeObjectInfo": _object_info,
+    "ShaderNodeParticleInfo": _particle_info,
+    "ShaderNodeLightPath": _light_path,
+    "ShaderNodeCameraData": _camera_data,
+    "ShaderNodeAttribute": _attribute,
+    "ShaderNodeVertexColor": _color_attribute,
+    "ShaderNodeTangent": _tangent,
+    "ShaderNodeNormalMap": _normal_map,
+    "ShaderNodeVectorTransform": _vector_transform,
+    "ShaderNodeNormal": _normal,
+    "ShaderNodeWireframe": _wireframe,
+    "ShaderNodeLightFalloff": _light_falloff,
+    "ShaderNodeHairInfo": _hair_info,
+    "ShaderNodePointInfo": _point_info,
+    "ShaderNodeFresnel": _by_normal("fresnel", {"IOR": "ior"}),
+    "ShaderNodeLayerWeight": _by_normal("layer-weight", {"Blend": "blend"}),
+}

@@ -1,0 +1,518 @@
+"""Input nodes give what Cycles gives, on objects that are turned, scaled unevenly, mirrored and instanced.
+
+An output is emitted by everything in the picture, plus a number that leaves nothing negative. Both engines look at the
+middle of each pixel, all but, so that they see the same points; what is left is the width of the filter, and pixels at edges.
+"""
+
+import math
+import os
+
+import bpy
+import numpy as np
+from graph_test import _assert_nodes_agree, _node
+from scenes import (
+    add_camera,
+    add_light,
+    add_plane,
+    assert_agrees,
+    assert_warns,
+    diffuse,
+    folder,
+    link,
+    make_sharp,
+    new_material,
+    new_scene,
+    render,
+    set_bounces,
+    set_world,
+)
+
+_OFFSET = 8.0
+
+
+def _scene(width=96, height=72):
+    """Objects of one material, seen by a camera that is turned and shifted; returns (scene, material, objects)."""
+    scene = new_scene(width, height)
+    scene.cycles.pixel_filter_type, scene.cycles.filter_width = "GAUSSIAN", 1 / 64
+    scene.relief.filter_width = 1 / 64
+    material = bpy.data.materials.new("inputs")
+    material.use_nodes, material.pass_index = True, 7
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=24, ring_count=12, location=(-1.6, 0.3, 0.2))
+    sphere = bpy.context.object
+    bpy.ops.object.shade_smooth()
+    sphere.rotation_euler, sphere.scale = (0.5, 0.3, 0.9), (1.2, 0.7, 0.9)
+    bpy.ops.mesh.primitive_cube_add(size=1.4, location=(1.5, 0.4, 0.1))
+    cube = bpy.context.object
+    cube.rotation_euler, cube.scale = (0.3, 0.8, 0.2), (1.1, 0.8, 1.3)
+    bpy.ops.mesh.primitive_monkey_add(size=1.8, location=(0.2, -1.3, 0.4))
+    monkey = bpy.context.object
+    monkey.rotation_euler, monkey.scale = (-0.7, 0.2, 0.4), (-1.0, 0.8, 1.0)
+    # Faces that are shaded flat but are not flat have one normal here, and as many as triangles there.
+    monkey.modifiers.new("triangles", "TRIANGULATE")
+    objects = [sphere, cube, monkey]
+    # Cones that a collection shows twice; evenly scaled, as Cycles interpolates the normals of instances before their
+    # transform, of others after it.
+    bpy.ops.mesh.primitive_cone_add(vertices=12, radius1=0.6, depth=1.2)
+    cone = bpy.context.object
+    bpy.ops.object.shade_smooth()
+    group = bpy.data.collections.new("group")
+    for owner in list(cone.users_collection):
+        owner.objects.unlink(cone)
+    group.objects.link(cone)
+    for number, place in enumerate([(-0.3, 1.6, 0.0), (2.0, 1.9, 0.3)]):
+        shown = link(None, f"shown {number}")
+        shown.instance_type, shown.instance_collection = "COLLECTION", group
+        shown.location, shown.rotation_euler, shown.scale = place, (0.4, 0.5 * number, 0.3), (0.7 + number,) * 3
+        shown.color = (0.3, 0.1, 0.5 + 0.4 * number, 0.6)
+    objects.append(cone)
+    for number, thing in enumerate(objects):
+        thing.data.materials.append(material)
+        thing.color, thing.pass_index = (0.2 * number, 0.7, 0.1, 0.3 + 0.1 * number), number + 3
+    add_camera((0.6, -5.0, 4.2), (0.85, 0.05, 0.1), lens=40, shift_x=0.05, shift_y=-0.03)
+    return scene, material, objects
+
+
+def _emit(material, build):
+    """Makes a material emit the socket that build(tree) gives, plus _OFFSET."""
+    tree = material.node_tree
+    tree.nodes.clear()
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    emission = tree.nodes.new("ShaderNodeEmission")
+    moved = tree.nodes.new("ShaderNodeVectorMath")
+    moved.inputs[1].default_value = (_OFFSET,) * 3
+    tree.links.new(build(tree), moved.inputs[0])
+    tree.links.new(moved.outputs[0], emission.inputs["Color"])
+    tree.links.new(emission.outputs[0], output.inputs["Surface"])
+
+
+def _output(kind, name, **settings):
+    """A builder of one output of a node without inputs."""
+
+    def build(tree):
+        node = tree.nodes.new(kind)
+        for key, value in settings.items():
+            setattr(node, key, value)
+        return node.outputs[name]
+
+    return build
+
+
+def _assert_agree(scene, material, builders, tolerance=3e-4, most_off=0.02, samples=8):
+    """Fails where pictures of outputs differ by more than a tolerance on more than a share of the pixels."""
+    wrong = []
+    with folder() as path:
+        for name, build in builders.items():
+            _emit(material, build)
+            ours = render(scene, "RELIEF", os.path.join(path, "relief.exr"), samples=samples).reshape(-1, 3)
+            theirs = render(scene, "CYCLES", os.path.join(path, "cycles.exr"), samples=samples).reshape(-1, 3)
+            error = np.abs(ours - theirs).max(axis=1) / np.maximum(1, np.abs(theirs - _OFFSET).max(axis=1))
+            off, seen = (error > tolerance).mean(), theirs.max(axis=1) > 0
+            values = theirs[seen] - _OFFSET
+            text = f"{name}: {off:.2%} beyond {tolerance}, median {np.median(error[seen]):.2g}"
+            print(text, "range", values.min(axis=0).round(3), values.max(axis=0).round(3))
+            if off > most_off:
+                worst = int(np.where(seen, error, 0).argmax())
+                wrong.append(f"{text}, worst {ours[worst] - _OFFSET} for {theirs[worst] - _OFFSET}")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_texture_coordinates():
+    scene, material, objects = _scene()
+    names = ("Generated", "Normal", "UV", "Object", "Camera", "Window", "Reflection")
+    builders = {name: _output("ShaderNodeTexCoord", name) for name in names}
+    other = link(None, "other")
+    other.location, other.rotation_euler, other.scale = (0.3, 0.2, 0.5), (0.5, 0.1, 0.7), (1.5, 0.6, 0.8)
+    builders["of another"] = _output("ShaderNodeTexCoord", "Object", object=other)
+    for name in ("Generated", "UV"):
+        builders[f"{name} of the instancer"] = _output("ShaderNodeTexCoord", name, from_instancer=True)
+    _assert_agree(scene, material, builders)
+
+
+def test_instances_on_faces():
+    """Generated coordinates and uv of what makes an instance are different at each."""
+    scene, material, objects = _scene()
+    for thing in objects[:3]:
+        bpy.data.objects.remove(thing)
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=3, y_subdivisions=3, size=4)
+    grid = bpy.context.object
+    grid.data.materials.append(diffuse((0, 0, 0)))
+    bpy.ops.mesh.primitive_ico_sphere_add(radius=0.4)
+    ball = bpy.context.object
+    ball.data.materials.append(material)
+    ball.parent, grid.instance_type = grid, "FACES"
+    grid["tint"], grid["size"] = (0.2, 0.4, 0.9), 3
+    builders = {
+        f"{name} of the instancer": _output("ShaderNodeTexCoord", name, from_instancer=True)
+        for name in ("Generated", "UV")
+    }
+    builders["uv map"] = _output("ShaderNodeUVMap", "UV", from_instancer=True)
+    builders["random"] = _output("ShaderNodeObjectInfo", "Random")
+    for name in ("tint", "size", "location"):
+        settings = {"attribute_type": "INSTANCER", "attribute_name": name}
+        builders[f"attribute {name}"] = _output("ShaderNodeAttribute", "Vector", **settings)
+    _assert_agree(scene, material, builders)
+
+
+def test_geometry():
+    scene, material, objects = _scene()
+    names = ("Position", "Normal", "Tangent", "True Normal", "Incoming", "Backfacing")
+    _assert_agree(scene, material, {name: _output("ShaderNodeNewGeometry", name) for name in names})
+    # From 0 to 1 over triangles of a few pixels: a 64th of one is a lot.
+    _assert_agree(scene, material, {"Parametric": _output("ShaderNodeNewGeometry", "Parametric")}, tolerance=5e-3)
+
+
+def test_pointiness_and_islands():
+    scene, material, objects = _scene()
+    names = ("Pointiness", "Random Per Island")
+    _assert_agree(scene, material, {name: _output("ShaderNodeNewGeometry", name) for name in names})
+
+
+def test_object_info():
+    scene, material, objects = _scene()
+    objects[0].name = "Kügelchen"
+    names = ("Location", "Color", "Alpha", "Object Index", "Material Index", "Random")
+    _assert_agree(scene, material, {name: _output("ShaderNodeObjectInfo", name) for name in names})
+
+
+def test_particle_info():
+    scene, material, objects = _scene()
+    bpy.ops.mesh.primitive_plane_add(size=4, location=(0, 0, -0.5))
+    emitter = bpy.context.object
+    emitter.data.materials.append(diffuse((0, 0, 0)))
+    emitter.modifiers.new("particles", "PARTICLE_SYSTEM")
+    settings = emitter.particle_systems[0].settings
+    settings.count, settings.frame_start, settings.frame_end, settings.lifetime = 40, 1, 6, 80
+    settings.physics_type, settings.normal_factor, settings.lifetime_random = "NEWTON", 1.0, 0.5
+    settings.render_type, settings.instance_object = "OBJECT", objects[1]
+    settings.particle_size, settings.size_random, settings.angular_velocity_mode = 0.25, 0.5, "VELOCITY"
+    for frame in range(1, 9):
+        scene.frame_set(frame)
+    names = ("Index", "Random", "Age", "Lifetime", "Location", "Size", "Velocity", "Angular Velocity")
+    _assert_agree(scene, material, {name: _output("ShaderNodeParticleInfo", name) for name in names})
+
+
+def test_camera_data():
+    scene, material, objects = _scene()
+    names = ("View Vector", "View Z Depth", "View Distance")
+    _assert_agree(scene, material, {name: _output("ShaderNodeCameraData", name) for name in names})
+    scene.camera.data.type, scene.camera.data.ortho_scale = "ORTHO", 7
+    builders = {name: _output("ShaderNodeCameraData", name) for name in names}
+    builders["window"] = _output("ShaderNodeTexCoord", "Window")
+    _assert_agree(scene, material, builders)
+
+
+def _attributes(objects):
+    """Attributes of all types on all objects but one."""
+    random = np.random.default_rng(3)
+    for thing in objects[:-1]:
+        mesh = thing.data
+        for kind, prop, width in (
+            ("FLOAT", "value", 1),
+            ("INT", "value", 1),
+            ("BOOLEAN", "value", 1),
+            ("FLOAT2", "vector", 2),
+            ("FLOAT_VECTOR", "vector", 3),
+            ("FLOAT_COLOR", "color", 4),
+            ("BYTE_COLOR", "color", 4),
+        ):
+            for domain in ("POINT", "CORNER", "FACE"):
+                if kind in {"FLOAT_COLOR", "BYTE_COLOR"} and domain == "FACE":
+                    continue
+                attribute = mesh.attributes.new(f"{kind} {domain}", kind, domain)
+                values = random.random((len(attribute.data), width), dtype=np.float32)
+                if kind == "INT":
+                    values = (9 * values).astype(np.int32)
+                if kind == "BOOLEAN":
+                    values = values > 0.5
+                attribute.data.foreach_set(prop, values.ravel())
+
+
+def test_attributes():
+    scene, material, objects = _scene()
+    _attributes(objects)
+    builders = {}
+    for attribute in objects[0].data.attributes:
+        kind, _, domain = attribute.name.rpartition(" ")
+        for name in ("Color", "Fac", "Alpha") if domain == "CORNER" else ("Vector",):
+            node = _output("ShaderNodeAttribute", name, attribute_name=attribute.name)
+            if domain in {"POINT", "CORNER", "FACE"} and kind:
+                builders[f"{attribute.name} {name}"] = node
+    builders["none"] = _output("ShaderNodeAttribute", "Alpha", attribute_name="nothing")
+    # Random values at the corners of triangles of a few pixels, of which a filter has a 64th.
+    _assert_agree(scene, material, builders, tolerance=5e-3, samples=4)
+
+
+def test_colors_and_uv_maps():
+    """Several of each in one graph."""
+    scene, material, objects = _scene()
+    _attributes(objects)
+    for thing in objects:
+        first = thing.data.uv_layers[0]
+        uv = np.empty(2 * len(first.data), dtype=np.float32)
+        first.data.foreach_get("uv", uv)
+        for number in range(3):
+            layer = thing.data.uv_layers.new(name=f"map {number}")
+            layer.data.foreach_set("uv", uv * (number + 0.5) + 0.1 * number)
+
+    def several(kind, prop, names, out):
+        def build(tree):
+            total = None
+            for name in names:
+                node = tree.nodes.new(kind)
+                setattr(node, prop, name)
+                if total is None:
+                    total = node.outputs[out]
+                    continue
+                added = tree.nodes.new("ShaderNodeVectorMath")
+                added.operation = "CROSS_PRODUCT" if kind == "ShaderNodeVertexColor" else "MULTIPLY_ADD"
+                tree.links.new(total, added.inputs[0])
+                tree.links.new(node.outputs[out], added.inputs[1])
+                total = added.outputs[0]
+            return total
+
+        return build
+
+    colors = ("FLOAT_COLOR POINT", "BYTE_COLOR CORNER", "FLOAT_COLOR CORNER")
+    builders = {
+        "uv maps": several("ShaderNodeUVMap", "uv_map", ("map 0", "map 1", "map 2"), "UV"),
+        "colours": several("ShaderNodeVertexColor", "layer_name", colors, "Color"),
+        "active colour": several("ShaderNodeVertexColor", "layer_name", ("",), "Color"),
+        "alpha": several("ShaderNodeVertexColor", "layer_name", colors[:1], "Alpha"),
+        "no alpha": several("ShaderNodeVertexColor", "layer_name", ("nothing",), "Alpha"),
+    }
+    _assert_agree(scene, material, builders, tolerance=5e-3, samples=4)
+
+
+def test_properties():
+    scene, material, objects = _scene()
+    scene["weight"] = 0.7
+    for number, thing in enumerate(objects[:3]):
+        thing["weight"], thing["tint"] = 0.25 * number, (0.3, 0.1 * number, 0.8)
+        thing.data["of its data"] = 3 * number
+    builders = {}
+    for kind, name in (
+        ("OBJECT", "weight"),
+        ("OBJECT", "tint"),
+        ("OBJECT", "of its data"),
+        ("OBJECT", "color"),
+        ("OBJECT", "location"),
+        ("INSTANCER", "location"),
+        ("VIEW_LAYER", "weight"),
+    ):
+        for out in ("Vector", "Fac", "Alpha"):
+            settings = {"attribute_type": kind, "attribute_name": name}
+            builders[f"{kind} {name} {out}"] = _output("ShaderNodeAttribute", out, **settings)
+    _assert_agree(scene, material, builders, samples=4)
+
+
+def test_tangents():
+    scene, material, objects = _scene()
+    builders = {
+        f"radial {axis}": _output("ShaderNodeTangent", 0, direction_type="RADIAL", axis=axis) for axis in "XYZ"
+    }
+    builders["uv"] = _output("ShaderNodeTangent", 0, direction_type="UV_MAP")
+    _assert_agree(scene, material, builders)
+
+
+def _from_position(tree):
+    """A vector that varies."""
+    return tree.nodes.new("ShaderNodeNewGeometry").outputs["Position"]
+
+
+def test_vector_transforms():
+    scene, material, objects = _scene()
+
+    def transform(kind, first, second):
+        def build(tree):
+            node = tree.nodes.new("ShaderNodeVectorTransform")
+            node.vector_type, node.convert_from, node.convert_to = kind, first, second
+            tree.links.new(_from_position(tree), node.inputs[0])
+            return node.outputs[0]
+
+        return build
+
+    spaces = ("WORLD", "OBJECT", "CAMERA")
+    builders = {
+        f"{kind} {first} {second}": transform(kind, first, second)
+        for kind in ("POINT", "VECTOR", "NORMAL")
+        for first in spaces
+        for second in spaces
+        if first != second
+    }
+    _assert_agree(scene, material, builders, samples=4)
+
+
+def test_vector_rotate():
+    builders = {}
+    for kind in ("AXIS_ANGLE", "X_AXIS", "Y_AXIS", "Z_AXIS", "EULER_XYZ"):
+        for invert in (False, True):
+            inputs = {"Vector": "xyz", "Center": (0.3, -0.2, 0.5)}
+            if kind == "AXIS_ANGLE":
+                inputs["Axis"] = (0.4, -0.7, 0.9)
+            if kind == "EULER_XYZ":
+                inputs["Rotation"] = (0.4, -0.7, 1.1)
+            else:
+                inputs["Angle"] = "w"
+            builders[f"{kind} {invert}"] = _node("ShaderNodeVectorRotate", inputs, rotation_type=kind, invert=invert)
+    builders["no axis"] = _node("ShaderNodeVectorRotate", {"Vector": "xyz", "Axis": (0, 0, 0), "Angle": "w"})
+
+    def normal(out):
+        def build(tree, xyz, w):
+            node = tree.nodes.new("ShaderNodeNormal")
+            node.outputs["Normal"].default_value = (0.3, -0.5, 0.7)
+            tree.links.new(xyz, node.inputs[0])
+            return node.outputs[out]
+
+        return build
+
+    builders["normal"], builders["dot"] = normal("Normal"), normal("Dot")
+    _assert_nodes_agree(builders, absolute=3e-6)
+
+
+def test_normal_maps():
+    scene, material, objects = _scene()
+
+    def build_of(space, strength):
+        def build(tree):
+            node = tree.nodes.new("ShaderNodeNormalMap")
+            node.space = space
+            node.inputs["Strength"].default_value = strength
+            point = tree.nodes.new("ShaderNodeTexCoord")
+            tree.links.new(point.outputs["Generated"], node.inputs["Color"])
+            return node.outputs[0]
+
+        return build
+
+    builders = {
+        f"{space} {strength}": build_of(space, strength)
+        for space in ("TANGENT", "OBJECT", "WORLD", "BLENDER_OBJECT", "BLENDER_WORLD")
+        for strength in (1.0, 0.6)
+    }
+    # Between the monkey's lips, tangents of triangles whose uv are folded are grouped in another way.
+    _assert_agree(scene, material, builders, most_off=0.03)
+
+
+def test_linked_normals():
+    scene, material, objects = _scene()
+
+    def build_of(kind, out):
+        def build(tree):
+            bent = tree.nodes.new("ShaderNodeNormalMap")
+            bent.space = "OBJECT"
+            tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"], bent.inputs["Color"])
+            node = tree.nodes.new(kind)
+            tree.links.new(bent.outputs[0], node.inputs["Normal"])
+            return node.outputs[out]
+
+        return build
+
+    builders = {
+        "fresnel": build_of("ShaderNodeFresnel", "Fac"),
+        "layer fresnel": build_of("ShaderNodeLayerWeight", "Fresnel"),
+        "facing": build_of("ShaderNodeLayerWeight", "Facing"),
+    }
+    _assert_agree(scene, material, builders, most_off=0.03)
+
+
+def test_wires():
+    scene, material, objects = _scene()
+
+    def wire(tree):
+        node = tree.nodes.new("ShaderNodeWireframe")
+        node.inputs[0].default_value = 0.1
+        return node.outputs[0]
+
+    _assert_agree(scene, material, {"wires": wire}, most_off=0.03)
+    node = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeWireframe")
+    node.use_pixel_size = True
+    assert_warns(scene, 'node "Wireframe"', "a size in pixels")
+
+
+def test_what_is_there_of_hair_and_points():
+    scene, material, objects = _scene()
+    builders = {
+        name: _output("ShaderNodeHairInfo", name)
+        for name in ("Is Strand", "Intercept", "Length", "Thickness", "Tangent Normal", "Random")
+    }
+    builders.update({f"point {n}": _output("ShaderNodePointInfo", n) for n in ("Position", "Radius", "Random")})
+    _assert_agree(scene, material, builders, samples=4)
+
+
+_LIGHT_PATH = (
+    "Is Camera Ray",
+    "Is Shadow Ray",
+    "Is Diffuse Ray",
+    "Is Glossy Ray",
+    "Is Singular Ray",
+    "Is Reflection Ray",
+    "Is Transmission Ray",
+    "Ray Length",
+    "Ray Depth",
+    "Diffuse Depth",
+    "Glossy Depth",
+    "Transparent Depth",
+    "Transmission Depth",
+)
+
+
+def _with_mirror_and_glass():
+    scene, material, objects = _scene()
+    set_bounces(scene, 4)
+    mirror, _, gloss = new_material("mirror", "ShaderNodeBsdfGlossy", Color=(1, 1, 1, 1))
+    make_sharp(gloss)
+    add_plane(3, mirror, (-1.2, 2.5, 0.5)).rotation_euler = (1.2, 0.3, 0.2)
+    pane, tree, clear = new_material("pane", "ShaderNodeBsdfTransparent")
+    add_plane(1.2, pane, (0.6, -2.6, 1.2)).rotation_euler = (0.9, 0, 0.2)
+    return scene, material
+
+
+def test_light_path_of_camera_rays_and_mirrors():
+    scene, material = _with_mirror_and_glass()
+    builders = {name: _output("ShaderNodeLightPath", name) for name in _LIGHT_PATH}
+    for name in ("Quadratic", "Linear", "Constant"):
+
+        def falloff(tree, name=name):
+            node = tree.nodes.new("ShaderNodeLightFalloff")
+            node.inputs["Strength"].default_value, node.inputs["Smooth"].default_value = 0.1, 2.0
+            return node.outputs[name]
+
+        builders[f"falloff {name}"] = falloff
+    _assert_agree(scene, material, builders, most_off=0.03)
+
+
+def _transparent_by(name, factor=1.0):
+    """A floor under a plate that is transparent by an output of Light Path times a factor."""
+    scene = new_scene(48, 36)
+    set_bounces(scene, 3)
+    plate, tree, surface = new_material("plate", Color=(0.7, 0.3, 0.2, 1))
+    path, scaled = tree.nodes.new("ShaderNodeLightPath"), tree.nodes.new("ShaderNodeMath")
+    mix, clear = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeBsdfTransparent")
+    scaled.operation, scaled.inputs[1].default_value = "MULTIPLY", factor
+    tree.links.new(path.outputs[name], scaled.inputs[0])
+    tree.links.new(scaled.outputs[0], mix.inputs[0])
+    tree.links.new(surface.outputs[0], mix.inputs[1])
+    tree.links.new(clear.outputs[0], mix.inputs[2])
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    add_plane(8, diffuse((0.6, 0.6, 0.6)))
+    add_plane(1.5, plate, (0.3, 0.2, 1.2))
+    add_plane(1.0, plate, (0.5, 0.3, 1.6))
+    add_light("AREA", (0.5, 0.4, 4), energy=300, size=0.5)
+    set_world((0.2, 0.3, 0.4))
+    add_camera((0, -5, 5), (math.radians(45), 0, 0))
+    return scene
+
+
+def test_shadow_rays():
+    """What only shadow rays do not see casts no shadow."""
+    assert_agrees(_transparent_by("Is Shadow Ray", 0.8), runs=4, samples=64)
+
+
+def test_lengths_and_depths_of_shadow_rays():
+    assert_agrees(_transparent_by("Ray Length", 0.1), runs=4, samples=64)
+    assert_agrees(_transparent_by("Ray Depth", 0.3), runs=4, samples=64)
+
+
+def test_depths_of_diffuse_rays():
+    assert_agrees(_transparent_by("Diffuse Depth", 0.5), runs=4, samples=64)
+    assert_agrees(_transparent_by("Is Diffuse Ray", 0.8), runs=4, samples=64)

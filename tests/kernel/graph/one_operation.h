@@ -1,0 +1,141 @@
+// Runs one operation of value graphs by each interpreter that this machine has.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "integrator/stages.h"
+#include "kernel/graph/graph_op.h"
+
+namespace relief::test {
+
+inline bool has_avx2() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
+
+inline const GraphOpShape& shape_of(GraphOp op) { return kGraphOpShapes[static_cast<int>(op)]; }
+
+/// Outputs of an operation over eight points: [output][lane].
+using Outputs = std::vector<std::vector<float>>;
+
+/// @param in          [input][lane]
+/// @param immediates  those that are left out, and inputs, are 0
+inline Outputs run_one(GraphRun run,
+                       GraphOp op,
+                       const std::vector<std::vector<float>>& in,
+                       const std::vector<std::uint16_t>& immediates = {},
+                       const TextureView* textures = nullptr,
+                       const std::vector<float>& table = {})
+{
+  GraphRegisters registers;
+  std::vector<std::uint16_t> code = {static_cast<std::uint16_t>(op)};
+  code.insert(code.end(), immediates.begin(), immediates.end());
+  code.resize(1 + static_cast<std::size_t>(shape_of(op).num_immediates), 0);
+  std::uint16_t next = 0;
+  for (int i = 0; i < shape_of(op).num_outputs; ++i) code.push_back(next++);
+  for (const std::vector<float>& lanes : in) {
+    registers.lanes[next] = load8(lanes.data());
+    code.push_back(next++);
+  }
+  for (auto i = static_cast<int>(in.size()); i < shape_of(op).num_inputs; ++i) {
+    registers.lanes[next] = F8{};
+    code.push_back(next++);
+  }
+  GraphProgramView program;
+  program.code = code.data();
+  program.num_words = static_cast<std::uint32_t>(code.size());
+  program.tables = table.data();
+  run(program, textures, registers);
+  Outputs out;
+  for (int i = 0; i < shape_of(op).num_outputs; ++i) {
+    out.emplace_back(8);
+    store8(out.back().data(), registers.lanes[i]);
+  }
+  return out;
+}
+
+/// Numbers of all sizes, with those among them that break things.
+class HardNumbers {
+ public:
+  explicit HardNumbers(unsigned seed) : random_(seed) {}
+
+  float any()
+  {
+    switch (random_() % 8) {
+      case 0:
+        return kHard[random_() % std::size(kHard)];
+      case 1:
+        return within(-1e6f, 1e6f);
+      case 2: {
+        const float size = std::exp2(within(-149, 127));
+        return random_() % 2 == 0 ? size : -size;
+      }
+      case 3:
+        return std::floor(within(-8, 8));
+      case 4:
+        return within(0, 1);
+      default:
+        return within(-4, 4);
+    }
+  }
+  float within(float low, float high)
+  {
+    return low + (high - low) * static_cast<float>(random_() >> 8) / static_cast<float>(1u << 24);
+  }
+  /// @return  [input][lane]
+  std::vector<std::vector<float>> lanes(std::size_t count)
+  {
+    std::vector<std::vector<float>> out(count, std::vector<float>(8));
+    for (std::vector<float>& row : out) {
+      for (float& x : row) x = any();
+    }
+    return out;
+  }
+  std::vector<float> row(float low, float high)
+  {
+    std::vector<float> out(8);
+    for (float& x : out) x = within(low, high);
+    return out;
+  }
+  unsigned word() { return static_cast<unsigned>(random_()); }
+
+ private:
+  static constexpr float kInf = std::numeric_limits<float>::infinity();
+  static constexpr float kMax = std::numeric_limits<float>::max();
+  static constexpr float kHard[] = {0.0f,
+                                    -0.0f,
+                                    1.0f,
+                                    -1.0f,
+                                    0.5f,
+                                    -0.5f,
+                                    1e-45f,
+                                    -1e-45f,
+                                    1e-38f,
+                                    3e9f,
+                                    -3e9f,
+                                    2147483648.0f,
+                                    kMax,
+                                    -kMax,
+                                    kInf,
+                                    -kInf,
+                                    std::numeric_limits<float>::quiet_NaN(),
+                                    16777216,
+                                    8388609,
+                                    1e30f,
+                                    -1e30f,
+                                    3.14159274f};
+  std::mt19937 random_;
+};
+
+/// Both are numbers and near, or neither is, or both are as large.
+inline bool is_like(double found, double expected, double tolerance)
+{
+  if (std::isnan(expected)) return std::isnan(found);
+  // Beyond the range of floats.
+  if (std::abs(expected) > 3.4028e38) return std::abs(found) > 3.40e38 && std::signbit(found) == std::signbit(expected);
+  return std::abs(found - expected) <= tolerance;
+}
+
+}  // namespace relief::test
