@@ -18,7 +18,7 @@ RELIEF_KERNEL Inputs closure_inputs(const GraphLane& at, const SurfaceClosureSpe
   if constexpr (!std::is_empty_v<Inputs>) {
     constexpr int kNumbers = sizeof(Inputs) / sizeof(float);
     float numbers[kNumbers];
-    for (int i = 0; i < kNumbers; ++i) numbers[i] = graph_result(at, spec.first_result + 1 + i);
+    for (int i = 0; i < kNumbers; ++i) numbers[i] = closure_input(graph_result(at, spec.first_result + 1 + i));
     std::memcpy(&inputs, numbers, sizeof(Inputs));
   }
   return inputs;

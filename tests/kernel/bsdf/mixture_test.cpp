@@ -266,7 +266,9 @@ TEST(Mixture, InputsThatAreNoNumbersGiveFiniteLight)
   TestRandom random(17);
   for (int i = 0; i < 3000; ++i) {
     float numbers[sizeof(Principled4Inputs) / sizeof(float)];
-    for (float& x : numbers) x = random.next() < 0.2f ? kBad[static_cast<int>(5.99f * random.next())] : random.next();
+    for (float& x : numbers) {
+      x = closure_input(random.next() < 0.2f ? kBad[static_cast<int>(5.99f * random.next())] : random.next());
+    }
     const MixtureCase one{"", [&](MixtureBuild& b) {
                             Principled4Inputs four;
                             Principled3Inputs three;

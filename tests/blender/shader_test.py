@@ -1,0 +1,188 @@
+"""Shader nodes are Cycles' shader nodes: each of them, sums and mixes by graphs, bumps, both Principled BSDFs by chance.
+
+material_test.py has what was there before closures were, with the same stage.
+"""
+
+import random
+
+import bpy
+
+from material_test import _stage
+from scenes import IS_4_0, assert_agrees, new_material
+
+
+def _agrees(material, tolerance=0.0, samples=128, **settings):
+    assert_agrees(_stage(material, **settings), samples=samples, tolerance=tolerance)
+
+
+def _single(kind, tolerance=0.0, samples=128, attributes=(), **inputs):
+    """One shader node by itself.
+
+    @param  attributes  of the node, by their names
+    """
+    material, _, node = new_material("single", kind, **inputs)
+    for name, value in dict(attributes).items():
+        setattr(node, name, value)
+    _agrees(material, tolerance, samples)
+
+
+def _noise(tree, scale=3.0, low=0.35, high=0.65):
+    """A number that varies over an object from 0 to 1."""
+    noise, ramp = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeMapRange")
+    noise.inputs["Scale"].default_value = scale
+    ramp.inputs["From Min"].default_value, ramp.inputs["From Max"].default_value = low, high
+    tree.links.new(noise.outputs[0], ramp.inputs["Value"])
+    return ramp.outputs[0]
+
+
+def _mixed(first, second):
+    """A material of two shader nodes, mixed by noise.
+
+    @param  first, second  (kind, values by the inputs' names)
+    """
+    material, tree, mix = new_material("mixed", "ShaderNodeMixShader")
+    tree.links.new(_noise(tree), mix.inputs[0])
+    for number, (kind, values) in enumerate((first, second), 1):
+        node = tree.nodes.new(kind)
+        for name, value in values.items():
+            node.inputs[name].default_value = value
+        tree.links.new(node.outputs[0], mix.inputs[number])
+    return material
+
+
+def test_rough_diffuse():
+    _single("ShaderNodeBsdfDiffuse", Color=(0.7, 0.5, 0.3, 1), Roughness=0.8)
+
+
+def test_translucent():
+    _single("ShaderNodeBsdfTranslucent", Color=(0.7, 0.5, 0.3, 1))
+
+
+def test_velvet():
+    if not IS_4_0:
+        _single("ShaderNodeBsdfVelvet", Color=(0.7, 0.5, 0.3, 1), Sigma=0.6)
+
+
+def test_toon():
+    _single("ShaderNodeBsdfToon", Color=(0.7, 0.5, 0.3, 1), Size=0.6, Smooth=0.3)
+
+
+def test_glossy_toon():
+    _single("ShaderNodeBsdfToon", attributes={"component": "GLOSSY"}, Size=0.3, Smooth=0.2)
+
+
+def test_glossy_of_each_distribution():
+    for distribution in ("GGX", "BECKMANN", "ASHIKHMIN_SHIRLEY"):
+        material, _, node = new_material("glossy", "ShaderNodeBsdfGlossy", Color=(0.9, 0.6, 0.2, 1), Roughness=0.4)
+        node.distribution = distribution
+        _agrees(material)
+        bpy.ops.object.select_all(action="SELECT")
+        bpy.ops.object.delete()
+
+
+def test_glossy_that_scatters_more_than_once():
+    """Of 3.4's random walk the energy is there, not all of the shape."""
+    attributes = {"distribution": "MULTI_GGX"}
+    _single("ShaderNodeBsdfGlossy", 0.05, attributes=attributes, Color=(0.9, 0.6, 0.2, 1), Roughness=0.7)
+
+
+def test_coloured_rough_glass():
+    _single("ShaderNodeBsdfGlass", Color=(0.9, 0.6, 0.5, 1), Roughness=0.3, IOR=1.5)
+
+
+def test_refraction():
+    _single("ShaderNodeBsdfRefraction", Color=(0.9, 0.6, 0.5, 1), Roughness=0.2, IOR=1.3)
+
+
+def test_coloured_transparency_mixed_by_fresnel():
+    material, tree, mix = new_material("mixed", "ShaderNodeMixShader")
+    clear, gloss = tree.nodes.new("ShaderNodeBsdfTransparent"), tree.nodes.new("ShaderNodeBsdfGlossy")
+    clear.inputs[0].default_value = (1.0, 0.4, 0.2, 1.0)
+    gloss.inputs["Roughness"].default_value = 0.3
+    tree.links.new(tree.nodes.new("ShaderNodeFresnel").outputs[0], mix.inputs[0])
+    tree.links.new(clear.outputs[0], mix.inputs[1])
+    tree.links.new(gloss.outputs[0], mix.inputs[2])
+    _agrees(material)
+
+
+def test_diffuse_and_gloss_mixed_by_noise():
+    diffuse = ("ShaderNodeBsdfDiffuse", {"Color": (0.8, 0.1, 0.1, 1), "Roughness": 0.0})
+    _agrees(_mixed(diffuse, ("ShaderNodeBsdfGlossy", {"Roughness": 0.3})))
+
+
+def test_emission_and_glass_mixed_by_noise():
+    emission = ("ShaderNodeEmission", {"Color": (0.2, 1, 0.3, 1), "Strength": 0.5})
+    _agrees(_mixed(emission, ("ShaderNodeBsdfGlass", {"Roughness": 0.4})))
+
+
+def test_a_sum_of_three():
+    material, tree, add = new_material("sum", "ShaderNodeAddShader")
+    inner = tree.nodes.new("ShaderNodeAddShader")
+    tree.links.new(inner.outputs[0], add.inputs[0])
+    for socket, kind in ((add.inputs[1], "ShaderNodeBsdfTranslucent"), (inner.inputs[0], "ShaderNodeBsdfDiffuse"), (inner.inputs[1], "ShaderNodeBsdfGlossy")):
+        node = tree.nodes.new(kind)
+        node.inputs["Color"].default_value = (0.3, 0.25, 0.2, 1)
+        tree.links.new(node.outputs[0], socket)
+    _agrees(material)
+
+
+def _bumped(kind="ShaderNodeBsdfPrincipled", strength=0.5, invert=False, chained=False, **inputs):
+    material, tree, node = new_material("bumped", kind, **inputs)
+    bump = tree.nodes.new("ShaderNodeBump")
+    bump.inputs["Strength"].default_value, bump.invert = strength, invert
+    # Wide, so that what lies within a pixel is even: the engines ask for slopes along different axes.
+    tree.links.new(_noise(tree, 2.0, 0.0, 1.0), bump.inputs["Height"])
+    if chained:
+        below = tree.nodes.new("ShaderNodeBump")
+        below.inputs["Strength"].default_value = 0.3
+        wave = tree.nodes.new("ShaderNodeTexWave")
+        tree.links.new(wave.outputs[0], below.inputs["Height"])
+        tree.links.new(below.outputs[0], bump.inputs["Normal"])
+    tree.links.new(bump.outputs[0], node.inputs["Normal"])
+    return material
+
+
+def test_bump():
+    _agrees(_bumped(), 0.01)
+
+
+def test_inverted_bump():
+    _agrees(_bumped(invert=True, strength=1.0), 0.01)
+
+
+def test_chained_bumps_of_gloss():
+    _agrees(_bumped("ShaderNodeBsdfGlossy", chained=True, Roughness=0.3), 0.02)
+
+
+def test_displacement_that_bumps_only():
+    material, tree, node = new_material("bumped", "ShaderNodeBsdfPrincipled")
+    displacement = tree.nodes.new("ShaderNodeDisplacement")
+    displacement.inputs["Scale"].default_value = 0.3
+    tree.links.new(_noise(tree, 2.0, 0.0, 1.0), displacement.inputs["Height"])
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    tree.links.new(displacement.outputs[0], output.inputs["Displacement"])
+    _agrees(material, 0.01)
+
+
+def _random_principled(seed):
+    """A Principled BSDF with every second value by chance. Not what docs/blender.md lists as different."""
+    chance = random.Random(seed)
+    values = {
+        "Base_Color": tuple(chance.random() for _ in range(3)) + (1.0,),
+        "Roughness": 0.2 + 0.8 * chance.random(),
+        "Metallic": chance.choice((0.0, 0.0, 1.0, chance.random())),
+        "Specular": chance.random(),
+        "Transmission": chance.choice((0.0, 0.0, chance.random())),
+        "IOR": 1.1 + chance.random(),
+        "Alpha": chance.choice((1.0, 1.0, chance.random())),
+    }
+    if not IS_4_0:
+        values.update(Sheen=chance.choice((0.0, chance.random())), Specular_Tint=chance.random())
+    return new_material("principled", "ShaderNodeBsdfPrincipled", **values)[0]
+
+
+def test_principled_by_chance():
+    for seed in range(3):
+        _agrees(_random_principled(seed), 0.02 if IS_4_0 else 0.01)
+        bpy.ops.object.select_all(action="SELECT")
+        bpy.ops.object.delete()
