@@ -128,33 +128,32 @@ std::vector<MixtureCase> cases()
 TEST(Mixture, SamplesFollowTheDensityOfAllLobes)
 {
   const auto all = cases();
-  // Two directions and two sides each; a hundredth for all of them together.
-  const double level = 0.01 / (4.0 * static_cast<double>(all.size()));
-  std::uint64_t seed = 1;
+  // A hundredth for all of them together.
+  const double level = 0.01 / static_cast<double>(all.size());
+  std::uint64_t number = 0;
   for (const MixtureCase& one : all) {
-    for (const float z : {0.25f, 0.8f}) {
-      for (const bool front : {true, false}) {
-        MixtureLobes lobes;
-        const Mixture m = mixture_make(one, direction(z, 0.7f), lobes, front);
-        Chi2Histogram histogram(16, 24);
-        TestRandom random(++seed);
-        for (int n = 0; n < 200000; ++n) {
-          const float u_lobe = random.next(), u = random.next();
-          const BsdfSample s = closure_sample<kFeatureAll>(m, tables(), u_lobe, {u, random.next()});
-          if (s.pdf > 0.0f) {
-            histogram.add(s.wi.x, s.wi.y, s.wi.z);
-          } else {
-            histogram.add_absorbed();
-          }
-        }
-        const Chi2Result result = histogram.test([&](double x, double y, double zz) {
-          const Vec3f wi{static_cast<float>(x), static_cast<float>(y), static_cast<float>(zz)};
-          return static_cast<double>(closure_eval<kFeatureAll>(m, tables(), wi).pdf);
-        });
-        EXPECT_TRUE(result.failure.empty()) << one.name << ": " << result.failure;
-        EXPECT_GT(result.p_value, level) << one.name << ", cosine " << z << (front ? "" : ", from behind");
+    ++number;
+    const float z = number % 2 == 0 ? 0.25f : 0.8f;
+    const bool front = number % 3 != 0;
+    MixtureLobes lobes;
+    const Mixture m = mixture_make(one, direction(z, 0.7f), lobes, front);
+    Chi2Histogram histogram(16, 24);
+    TestRandom random(number);
+    for (int n = 0; n < 200000; ++n) {
+      const float u_lobe = random.next(), u = random.next();
+      const BsdfSample s = closure_sample<kFeatureAll>(m, tables(), u_lobe, {u, random.next()});
+      if (s.pdf > 0.0f) {
+        histogram.add(s.wi.x, s.wi.y, s.wi.z);
+      } else {
+        histogram.add_absorbed();
       }
     }
+    const Chi2Result result = histogram.test([&](double x, double y, double zz) {
+      const Vec3f wi{static_cast<float>(x), static_cast<float>(y), static_cast<float>(zz)};
+      return static_cast<double>(closure_eval<kFeatureAll>(m, tables(), wi).pdf);
+    });
+    EXPECT_TRUE(result.failure.empty()) << one.name << ": " << result.failure;
+    EXPECT_GT(result.p_value, level) << one.name << ", cosine " << z << (front ? "" : ", from behind");
   }
 }
 
@@ -226,8 +225,10 @@ TEST(Mixture, TheLayeredPrincipledReflectsNoMoreThanItReceives)
     for (const float z : {0.1f, 0.5f, 1.0f}) {
       MixtureLobes lobes;
       const Mixture m = mixture_make(one, direction(z, 0.2f), lobes);
-      // Albedos of layers come from tables, as in Cycles: they miss by a hundredth or two.
-      EXPECT_LT(furnace(m), 1.03) << i << ", cosine " << z << ", film " << in.thin_film_thickness << ", coat "
+      // Albedos of layers come from tables, as in Cycles: they miss by a hundredth or two. What a film reflects more than
+      // its glass is given back twice where facets scatter more than once, also as there.
+      const double most = in.thin_film_thickness > 0.0f ? 1.06 : 1.03;
+      EXPECT_LT(furnace(m), most) << i << ", cosine " << z << ", film " << in.thin_film_thickness << ", coat "
                                   << in.coat_weight << ", glass " << in.transmission_weight << ", metal " << in.metallic;
     }
   }
