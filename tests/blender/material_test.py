@@ -213,8 +213,9 @@ def test_subsurface_color_is_that_of_the_diffuse_light():
     base, below = np.array((0.8, 0.1, 0.2, 1)), np.array((0.1, 0.6, 0.3, 1))
     pictures = []
     with folder() as path:
-        for weight, color in ((0.25, base), (0.0, 0.75 * base + 0.25 * below)):
-            inputs = {"Base_Color": color, "Subsurface": weight, "Subsurface_Color": below, "Specular": 0.0}
+        mixed = 0.75 * base + 0.25 * below
+        for color, subsurface in ((base, below), (mixed, mixed)):
+            inputs = {"Base_Color": color, "Subsurface": 0.25, "Subsurface_Color": subsurface, "Specular": 0.0}
             bpy.data.objects["Sphere"].data.materials[0] = new_material("m", "ShaderNodeBsdfPrincipled", **inputs)[0]
             pictures.append(render(scene, "RELIEF", f"{path}/picture.exr"))
     assert np.allclose(*pictures, rtol=1e-4), np.abs(pictures[0] - pictures[1]).max()
