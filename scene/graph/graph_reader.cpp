@@ -285,4 +285,26 @@ GraphPrograms graph_read(const GltfDocument& document,
   }
 }
 
+GraphProgram graph_read_color(const GltfDocument& document,
+                              const JsonReader& graph,
+                              TextureTable& textures,
+                              Warnings& warnings)
+{
+  // No direction has attributes: what a graph reads of one is 0.
+  std::vector<std::string> attribute_names;
+  Reader r{document, graph.file(), graph.path(), textures, attribute_names, warnings, {}, {}, {}, {}};
+  try {
+    r.read_nodes(graph);
+    if (!graph.has("outputs")) graph.fail("outputs", "an object");
+    const JsonReader outputs = graph.object("outputs");
+    if (!outputs.has("color")) outputs.fail("color", "{\"node\": …}");
+    const GraphValue color = r.input(outputs, "color", GraphType::kColor);
+    outputs.warn_unread(warnings);
+    for (const GraphScalar component : color.v) r.build.add_result(component);
+    return r.build.compile();
+  } catch (const GraphTooLarge& error) {
+    graph.fail("", error.what(), "one that needs more");
+  }
+}
+
 }  // namespace relief

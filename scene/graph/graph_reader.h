@@ -29,4 +29,12 @@ GraphPrograms graph_read(const GltfDocument& document,
                          std::vector<std::string>& attribute_names,
                          Warnings& warnings);
 
+/// Reads the graph of an environment: its output `color` becomes the program's results 0 to 2.
+/// @param graph  its object, with `nodes` and `outputs`
+/// @error        likewise
+GraphProgram graph_read_color(const GltfDocument& document,
+                              const JsonReader& graph,
+                              TextureTable& textures,
+                              Warnings& warnings);
+
 }  // namespace relief
