@@ -83,12 +83,6 @@ def test_srgb_image():
     assert_agrees(scene, samples=128, block=4, tolerance=0.01)
 
 
-def test_a_turn_about_x_is_warned_about():
-    scene = _stage()
-    _image_world(degrees(20, 0, 0))
-    assert_warns(scene, 'world "world"', "turned about X")
-
-
 def test_a_volume_is_warned_about():
     scene = _stage()
     tree = set_world((0.2, 0.5, 0.9))
@@ -180,3 +174,117 @@ def test_a_world_hidden_from_glossy_rays():
 
 def test_a_world_hidden_from_transmission_rays():
     assert_agrees(_hidden_from("transmission"), samples=128, tolerance=_FACETS)
+
+
+def _nodes(tree, *kinds):
+    return [tree.nodes.new(f"ShaderNode{kind}") for kind in kinds]
+
+
+def test_a_gradient_of_generated_coordinates():
+    """Across turned axes: Generated is the direction, Z up."""
+    scene = _stage()
+    tree = set_world((1, 1, 1), 0.8)
+    coordinate, mapping, gradient, ramp = _nodes(tree, "TexCoord", "Mapping", "TexGradient", "ValToRGB")
+    mapping.inputs["Rotation"].default_value = degrees(20, 50, 30)
+    mapping.inputs["Location"].default_value = (0.3, 0.4, 0.5)
+    ramp.color_ramp.elements[0].color = (0.9, 0.2, 0.1, 1)
+    ramp.color_ramp.elements[1].color = (0.1, 0.3, 0.9, 1)
+    tree.links.new(coordinate.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs["Vector"], gradient.inputs["Vector"])
+    tree.links.new(gradient.outputs["Fac"], ramp.inputs["Fac"])
+    tree.links.new(ramp.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+    assert_agrees(scene, samples=128, block=4)
+
+
+def test_directions():
+    """Each output that is a direction, as its colour."""
+    for kind, output in (("TexCoord", "Object"), ("TexCoord", "Normal"), ("NewGeometry", "Incoming")):
+        scene = _stage(32, 24)
+        tree = set_world((1, 1, 1))
+        source, mapping = _nodes(tree, kind, "Mapping")
+        mapping.inputs["Scale"].default_value = (0.5, 0.3, 0.4)
+        mapping.inputs["Location"].default_value = (0.6, 0.6, 0.6)
+        tree.links.new(source.outputs[output], mapping.inputs["Vector"])
+        tree.links.new(mapping.outputs["Vector"], tree.nodes["Background"].inputs["Color"])
+        assert_agrees(scene, samples=64, block=4)
+
+
+def test_clouds():
+    scene = _stage()
+    tree = set_world((1, 1, 1), 1.0)
+    noise, ramp = _nodes(tree, "TexNoise", "ValToRGB")
+    noise.inputs["Scale"].default_value = 3
+    noise.inputs["Detail"].default_value = 4
+    ramp.color_ramp.elements[0].position = 0.4
+    ramp.color_ramp.elements[0].color = (0.1, 0.3, 0.8, 1)
+    ramp.color_ramp.elements[1].position = 0.7
+    tree.links.new(noise.outputs["Fac"], ramp.inputs["Fac"])
+    tree.links.new(ramp.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+    strength = tree.nodes.new("ShaderNodeMath")
+    strength.operation = "MULTIPLY_ADD"
+    strength.inputs[1].default_value, strength.inputs[2].default_value = 2.0, 0.2
+    tree.links.new(noise.outputs["Fac"], strength.inputs[0])
+    tree.links.new(strength.outputs[0], tree.nodes["Background"].inputs["Strength"])
+    assert_agrees(scene, samples=128, block=4)
+
+
+def _mixed(factor=None):
+    """Three backgrounds: two mixed, the third added to them."""
+    tree = set_world((0.9, 0.3, 0.2), 1.5)
+    first = tree.nodes["Background"]
+    second, third, mix, add = _nodes(tree, "Background", "Background", "MixShader", "AddShader")
+    second.inputs["Color"].default_value = (0.1, 0.4, 0.9, 1)
+    second.inputs["Strength"].default_value = 0.7
+    third.inputs["Color"].default_value = (0.05, 0.1, 0.02, 1)
+    mix.inputs[0].default_value = 0.3
+    tree.links.new(first.outputs[0], mix.inputs[1])
+    tree.links.new(second.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], add.inputs[0])
+    tree.links.new(third.outputs[0], add.inputs[1])
+    tree.links.new(add.outputs[0], tree.nodes["World Output"].inputs["Surface"])
+    if factor is not None:
+        tree.links.new(factor(tree), mix.inputs[0])
+    return tree
+
+
+def test_backgrounds_mixed_and_added():
+    scene = _stage()
+    _mixed()
+    assert_agrees(scene)
+
+
+def test_backgrounds_mixed_by_height():
+    """A factor beyond 0 and 1 is cut off."""
+
+    def height(tree):
+        coordinate, separate, scale = _nodes(tree, "TexCoord", "SeparateXYZ", "Math")
+        scale.operation = "MULTIPLY_ADD"
+        scale.inputs[1].default_value, scale.inputs[2].default_value = 2.5, 0.4
+        tree.links.new(coordinate.outputs["Generated"], separate.inputs[0])
+        tree.links.new(separate.outputs["Z"], scale.inputs[0])
+        return scale.outputs[0]
+
+    scene = _stage()
+    _mixed(height)
+    assert_agrees(scene, samples=128, block=4)
+
+
+def _by_camera_ray(tree):
+    return tree.nodes.new("ShaderNodeLightPath").outputs["Is Camera Ray"]
+
+
+def test_a_world_that_the_camera_does_not_see_by_light_path():
+    """Nothing where the camera looks: that is said by visibility."""
+    scene = _stage()
+    tree = set_world((0.2, 0.5, 0.9))
+    (mix,) = _nodes(tree, "MixShader")
+    tree.links.new(_by_camera_ray(tree), mix.inputs[0])
+    tree.links.new(tree.nodes["Background"].outputs[0], mix.inputs[1])
+    tree.links.new(mix.outputs[0], tree.nodes["World Output"].inputs["Surface"])
+    assert_agrees(scene)
+
+
+def test_another_world_for_the_camera_is_warned_about():
+    scene = _stage()
+    _mixed(_by_camera_ray)
+    assert_warns(scene, 'world "world"', "surroundings of their own for the camera")
