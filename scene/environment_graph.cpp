@@ -157,18 +157,109 @@ float difference(const EnvironmentMap& coarse, const EnvironmentMap& fine)
   return sum > 0 ? static_cast<float>(std::sqrt(square / weight) / (sum / weight)) : 0.0f;
 }
 
-}  // namespace
+float luminance_of(const float* texel) { return 0.2126f * texel[0] + 0.7152f * texel[1] + 0.0722f * texel[2]; }
 
-EnvironmentMap environment_graph_bake(const EnvironmentGraph& graph, std::span<const TextureView> textures)
+/// Mean radiance over a texel.
+Vec3f mean_within(const GraphProgramView& program, const TextureView* textures, const EnvironmentMap& map, int x, int y)
+{
+  constexpr int kSide = 16;  // samples on each axis
+  Vec3f sum;
+  float weights = 0;
+  for (int row = 0; row < kSide; ++row) {
+    const float v = static_cast<float>(y) + (static_cast<float>(row) + 0.5f) / kSide;
+    const float weight = std::sin(v * kPiAngle / static_cast<float>(map.height));
+    for (int column = 0; column < kSide; column += 8) {
+      Vec3f directions[8], radiance[8];
+      for (int k = 0; k < 8; ++k) {
+        directions[k] = direction_at(map, static_cast<float>(x) + (static_cast<float>(column + k) + 0.5f) / kSide, v);
+      }
+      evaluate(program, textures, directions, radiance);
+      for (const Vec3f& r : radiance) sum += r * weight;
+      weights += 8 * weight;
+    }
+  }
+  return sum * (1 / weights);
+}
+
+/// Texels whose centres do not tell what they hold: at a sun, and at the rims of whatever is bright and small.
+std::vector<std::size_t> coarse_texels(const EnvironmentGraph& graph, const EnvironmentMap& map)
+{
+  constexpr float kBright = 8, kContrast = 2;  // times the mean, and times a neighbour
+  const auto width = static_cast<std::size_t>(map.width), height = static_cast<std::size_t>(map.height);
+  std::vector<float> bright(width * height);
+  std::vector<double> sums(height), weights(height);
+  for_each_in_parallel(height, [&](std::size_t y) {
+    for (std::size_t x = 0; x < width; ++x) {
+      bright[y * width + x] = luminance_of(&map.rgb[(y * width + x) * 3]);
+      sums[y] += bright[y * width + x];
+    }
+    weights[y] = std::sin((static_cast<double>(y) + 0.5) * 3.141592653589793 / map.height);
+    sums[y] *= weights[y];
+  });
+  double sum = 0, weight = 0;
+  for (std::size_t y = 0; y < height; ++y) {
+    sum += sums[y];
+    weight += weights[y] * map.width;
+  }
+  const float enough = kBright * static_cast<float>(sum / weight);
+  const float margin = 2 * kPiAngle / static_cast<float>(map.height);
+  std::vector<std::vector<std::size_t>> found(height);
+  for_each_in_parallel(height, [&](std::size_t y) {
+    for (std::size_t x = 0; x < width; ++x) {
+      float low = bright[y * width + x], high = low;
+      for (std::size_t line = y > 0 ? y - 1 : 0; line <= std::min(y + 1, height - 1); ++line) {
+        for (const std::size_t column : {(x + width - 1) % width, x, (x + 1) % width}) {
+          low = std::min(low, bright[line * width + column]);
+          high = std::max(high, bright[line * width + column]);
+        }
+      }
+      bool is_coarse = high > enough && high > kContrast * low;
+      for (const GraphSun& sun : graph.suns) {
+        const Vec3f d = direction_at(map, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+        is_coarse = is_coarse || length(d - sun.towards) < sun.radius + margin;
+      }
+      if (is_coarse) found[y].push_back(y * width + x);
+    }
+  });
+  std::vector<std::size_t> all;
+  for (const auto& row : found) all.insert(all.end(), row.begin(), row.end());
+  return all;
+}
+
+void refine(const EnvironmentGraph& graph, std::span<const TextureView> textures, EnvironmentMap& map)
+{
+  const std::vector<std::size_t> texels = coarse_texels(graph, map);
+  const GraphProgramView program = graph.program.view();
+  for_each_in_parallel(texels.size(), [&](std::size_t i) {
+    const int x = static_cast<int>(texels[i]) % map.width, y = static_cast<int>(texels[i]) / map.width;
+    const Vec3f mean = mean_within(program, textures.data(), map, x, y);
+    float* texel = &map.rgb[texels[i] * 3];
+    texel[0] = mean.x, texel[1] = mean.y, texel[2] = mean.z;
+  });
+}
+
+/// The map before suns are looked for.
+EnvironmentMap bake_plainly(const EnvironmentGraph& graph, std::span<const TextureView> textures)
 {
   if (graph.width > 0) return bake(graph, textures, graph.width);
   constexpr float kTolerance = 0.002f;
+  // A sun is sharp, whether or not the texels' centres meet it.
+  if (!graph.suns.empty()) return bake(graph, textures, kMostEnvironmentWidth);
   EnvironmentMap map = bake(graph, textures, kLeastEnvironmentWidth);
   while (map.width < kMostEnvironmentWidth) {
     EnvironmentMap finer = bake(graph, textures, 2 * map.width);
     if (difference(map, finer) < kTolerance) break;
     map = std::move(finer);
   }
+  return map;
+}
+
+}  // namespace
+
+EnvironmentMap environment_graph_bake(const EnvironmentGraph& graph, std::span<const TextureView> textures)
+{
+  EnvironmentMap map = bake_plainly(graph, textures);
+  refine(graph, textures, map);
   return map;
 }
 

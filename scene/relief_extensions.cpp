@@ -91,7 +91,7 @@ EnvironmentGraph read_environment_graph(const GltfDocument& document,
 {
   constexpr int kWidest = 16384;
   EnvironmentGraph graph;
-  graph.program = graph_read_color(document, r, textures, warnings);
+  graph.program = graph_read_color(document, r, textures, graph.suns, warnings);
   if (r.has("resolution")) graph.width = static_cast<int>(r.integer("resolution", 0, 2, kWidest));
   r.warn_unread(warnings);
   using Q = GraphQuantity;

@@ -1,5 +1,7 @@
 """Worlds: colours and lat-long images light and are seen as in Cycles."""
 
+import math
+
 import bpy
 
 from scenes import (
@@ -288,3 +290,82 @@ def test_another_world_for_the_camera_is_warned_about():
     scene = _stage()
     _mixed(_by_camera_ray)
     assert_warns(scene, 'world "world"', "surroundings of their own for the camera")
+
+
+def _sky_world(strength=0.1, **settings):
+    tree = set_world((1, 1, 1), strength)
+    (sky,) = _nodes(tree, "TexSky")
+    sky.sky_type = "NISHITA"
+    for name, value in settings.items():
+        setattr(sky, name, value)
+    tree.links.new(sky.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+    return tree
+
+
+def test_sky_at_dusk():
+    """The sun's disk is in it, a hand's breadth above the horizon, where the camera does not look."""
+    scene = _stage()
+    _sky_world(0.2, sun_elevation=math.radians(6), sun_rotation=math.radians(120), sun_size=math.radians(2))
+    assert_agrees(scene, samples=256, block=4)
+
+
+def test_sky_without_disk():
+    """Every setting that is not its default."""
+    scene = _stage()
+    settings = {"altitude": 2000, "air_density": 1.5, "dust_density": 3, "ozone_density": 4}
+    _sky_world(0.2, sun_disc=False, sun_elevation=math.radians(2), sun_rotation=math.radians(-20), **settings)
+    assert_agrees(scene, samples=128, block=4)
+
+
+def test_a_small_sun():
+    """Half a degree of sky gives most of the light, and casts a shadow."""
+    scene = _stage()
+    _sky_world(0.05, sun_elevation=math.radians(40), sun_rotation=math.radians(200), sun_intensity=0.5)
+    assert_agrees(scene, samples=256, block=8)
+
+
+def test_a_sun_past_the_zenith():
+    scene = _stage()
+    _sky_world(0.2, sun_disc=False, sun_elevation=math.radians(170), sun_rotation=math.radians(30))
+    assert_agrees(scene, samples=128, block=4)
+
+
+def test_another_sky_is_warned_about():
+    scene = _stage()
+    tree = _sky_world()
+    next(n for n in tree.nodes if n.bl_idname == "ShaderNodeTexSky").sky_type = "HOSEK_WILKIE"
+    assert_warns(scene, 'world "world"', "hosek_wilkie")
+
+
+def test_preetham_sky():
+    scene = _stage()
+    sky = {"sky_type": "PREETHAM", "sun_direction": (0.3, -0.5, 0.4), "turbidity": 3.5}
+    _sky_world(0.3, **sky)
+    assert_agrees(scene, samples=128, block=4)
+
+
+def test_an_image_turned_about_x():
+    scene = _stage()
+    _image_world(degrees(20, 0, 0))
+    assert_agrees(scene, samples=128, block=4)
+
+
+def test_a_mirror_ball():
+    scene = _stage()
+    _image_world(degrees(10, 30, 200), pixels=smooth_pixels())
+    texture = next(n for n in bpy.context.scene.world.node_tree.nodes if n.bl_idname == "ShaderNodeTexEnvironment")
+    texture.projection = "MIRROR_BALL"
+    assert_agrees(scene, samples=128, block=4)
+
+
+def test_an_image_and_a_colour_mixed():
+    scene = _stage()
+    tree = set_world((0.1, 0.2, 0.7), 1.5)
+    first = tree.nodes["Background"]
+    second, texture, mix = _nodes(tree, "Background", "TexEnvironment", "MixShader")
+    texture.image = new_image(asymmetric_pixels(32, 16), LINEAR, True)
+    tree.links.new(texture.outputs["Color"], second.inputs["Color"])
+    tree.links.new(first.outputs[0], mix.inputs[1])
+    tree.links.new(second.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], tree.nodes["World Output"].inputs["Surface"])
+    assert_agrees(scene, samples=128, block=4)

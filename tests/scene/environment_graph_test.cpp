@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "kernel/texture/texture.h"
 #include "scene/texture_store.h"
@@ -133,6 +135,77 @@ TEST(EnvironmentGraph, WhatDependsOnTheRayIsWarnedAbout)
     return text.find("all rays see the same surroundings") != std::string::npos;
   }));
   expect_radiance(radiance(scene, 0.3f, 0.4f), {0, 0, 0});
+}
+
+json sky(json options)
+{
+  options["type"] = "sky-texture";
+  json e = environment({options}, {{"node", 0}});
+  e["graph"]["resolution"] = 1024;
+  return e;
+}
+
+/// Integral of red over the sphere.
+double power(const Scene& scene)
+{
+  const TextureView& map = map_of(scene);
+  double sum = 0;
+  for (int y = 0; y < map.height; ++y) {
+    const double v = (y + 0.5) / map.height;
+    for (int x = 0; x < map.width; ++x) {
+      const double u = (x + 0.5) / map.width;
+      sum += std::sin(v * std::numbers::pi) *
+             static_cast<double>(radiance(scene, static_cast<float>(u), static_cast<float>(v)).x);
+    }
+  }
+  return sum * 2 * std::numbers::pi * std::numbers::pi / map.width / map.height;
+}
+
+TEST(EnvironmentGraph, SunsOfAnySizeHaveTheirPower)
+{
+  const json options = {{"sunElevation", 0.7}, {"sunRotation", 1}, {"sunIntensity", 1}};
+  json without = options;
+  without["sunDisc"] = false;
+  const double rest = power(load(sky(without)));
+  EXPECT_GT(rest, 1);
+  double first = 0;
+  for (const float size : {0.05f, 0.009512f, 0.0005f}) {
+    json with = options;
+    with["sunSize"] = size;
+    // Cycles computes the disk's solid angle in single precision.
+    const float rounded = 1 - std::cos(size / 2);
+    const double exact = 1 - std::cos(static_cast<double>(size) / 2);
+    const double sun = (power(load(sky(with))) - rest) * static_cast<double>(rounded) / exact;
+    if (first == 0) first = sun;
+    EXPECT_NEAR(sun / first, 1, 0.01) << size;
+  }
+  EXPECT_GT(first, rest);
+}
+
+TEST(EnvironmentGraph, TheSunStandsWhereItIsToldTo)
+{
+  // Clockwise from north, +Y, which is the map's middle.
+  const Scene scene = load(sky({{"sunElevation", 0.5}, {"sunRotation", 1}, {"sunSize", 0.02}}));
+  const float u = 0.5f + 1 / (2 * std::numbers::pi_v<float>), v = 0.5f - 0.5f / std::numbers::pi_v<float>;
+  const float sun = radiance(scene, u, v).x;
+  EXPECT_GT(sun, 100 * radiance(scene, u + 0.02f, v).x);
+  EXPECT_GT(sun, 100 * radiance(scene, u, v + 0.02f).x);
+  // The ground is black from asin 0.4 below the horizon on.
+  expect_radiance(radiance(scene, u, 0.65f), {0, 0, 0}, 1e-6f);
+  EXPECT_GT(radiance(scene, u, 0.52f).x, 0);
+}
+
+TEST(EnvironmentGraph, ImagesAreLookedUpByDirection)
+{
+  for (const char* projection : {"equirectangular", "mirror-ball"}) {
+    const json node = {{"type", "environment-texture"}, {"projection", projection}, {"texture", {{"index", 0}}}};
+    const Vec3f grey = radiance(load(environment({node}, {{"node", 0}, {"output", "color"}})), 0.3f, 0.4f);
+    EXPECT_GT(grey.x, 0.1f);
+    EXPECT_LT(grey.x, 0.9f);
+  }
+  EXPECT_NE(
+      error_of(environment({{{"type", "environment-texture"}}}, {{"node", 0}, {"output", "color"}})).find("texture"),
+      std::string::npos);
 }
 
 }  // namespace

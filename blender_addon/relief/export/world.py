@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's world as RELIEF_environment: a colour, a lat-long image turned about Z, or a value graph over directions."""
+"""Blender's world as RELIEF_environment: a colour, a lat-long image turned about Z, or a graph over directions."""
 
 import math
 
@@ -213,6 +213,67 @@ class WorldGraph(GraphWriter):
 
     def __init__(self, writer, images, warn):
         super().__init__(lambda name: None, lambda node: None, warn)
+        self._writer = writer
+        self._images = images
+
+    def output(self, source):
+        own = {"ShaderNodeTexEnvironment": self._image_around, "ShaderNodeTexSky": self._sky}
+        write = own.get(source.node.bl_idname, super().output)
+        return write(source)
+
+    def _image_around(self, source):
+        node = source.node
+        if node.image is None:
+            return self.op("combine-color", {"red": 1.0, "green": 0.0, "blue": 1.0}, "color")
+        uri = self._images.color_uri(node.image, node.image_user, self.warn)
+        if uri is None:
+            raise NotUnderstood(f'node "{node.name}": an image without file')
+        if node.interpolation not in {"Linear", "Closest"}:
+            self.warn(f'node "{node.name}": interpolation {node.interpolation}', "Linear was used")
+        return self.op(
+            "environment-texture",
+            {"vector": self.vector(node, source.groups, "generated")},
+            "alpha" if source.socket.identifier == "Alpha" else "color",
+            projection="mirror-ball" if node.projection == "MIRROR_BALL" else "equirectangular",
+            texture={"index": self._writer.add_texture(uri, _REPEAT, node.interpolation == "Closest")},
+            colorSpace="linear" if node.image.colorspace_settings.is_data else "srgb",
+        )
+
+    def _sky(self, source):
+        node = source.node
+        if node.sky_type == "PREETHAM":
+            vector = {"vector": self.vector(node, source.groups, "generated")}
+            sun = list(node.sun_direction)
+            return self.op("sky-texture", vector, "color", sky="preetham", sunDirection=sun, turbidity=node.turbidity)
+        if node.sky_type not in {"NISHITA", "SINGLE_SCATTERING"}:
+            raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): {node.sky_type.lower()}')
+        elevation, turn = _sun_angles(node.sun_elevation, node.sun_rotation)
+        return self.op(
+            "sky-texture",
+            {"vector": self.vector(node, source.groups, "generated")},
+            "color",
+            sunDisc=node.sun_disc,
+            sunSize=node.sun_size,
+            sunIntensity=node.sun_intensity,
+            sunElevation=elevation,
+            sunRotation=turn,
+            altitude=node.altitude,
+            air=node.air_density,
+            dust=node.aerosol_density if hasattr(node, "aerosol_density") else node.dust_density,
+            ozone=node.ozone_density,
+        )
+
+
+#: glTF's wrap mode.
+_REPEAT = 10497
+
+
+def _sun_angles(elevation, turn):
+    """A sun's elevation and rotation; one that has risen past the zenith goes down on the other side."""
+    elevation = math.remainder(elevation, 2 * math.pi)
+    if abs(elevation) <= math.pi / 2:
+        return elevation, turn
+    return math.copysign(math.pi, elevation) - elevation, turn + math.pi
 
 
 def _turn_about_z(texture, groups):
