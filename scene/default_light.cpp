@@ -196,6 +196,23 @@ void environment_set(Scene& scene, const EnvironmentChoice& choice, TextureStore
   scene.environment.visible_to_camera = choice.source == EnvironmentSource::kSky;
 }
 
+void environment_add_graph(Scene& scene, const EnvironmentGraph& graph, TextureStore& textures)
+{
+  EnvironmentMap map = environment_graph_bake(graph, textures.views());
+  const float most = *std::max_element(map.rgb.begin(), map.rgb.end());
+  // Textures are kept at half precision: a power of two in the factor keeps suns and dusks alike within its range.
+  constexpr int kMostExponent = 15;
+  int exponent = 0;
+  std::frexp(most, &exponent);
+  const float unit = most > 0 ? std::ldexp(1.0f, exponent - kMostExponent) : 1.0f;
+  if (unit > 0 && std::isfinite(1 / unit)) {
+    for (float& value : map.rgb) value /= unit;
+    scene.environment.color *= unit;
+  }
+  scene.environment.texture_index =
+      textures.add_image("environment", map.width, map.height, map.rgb, Wrap::kRepeat, Wrap::kClamp);
+}
+
 void default_light_add(Scene& scene, std::span<const Placement> placements, TextureStore& textures, Warnings& warnings)
 {
   const bool reflects = std::any_of(placements.begin(), placements.end(),

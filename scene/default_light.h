@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "scene/environment_graph.h"
 #include "scene/environment_preset.h"
 #include "scene/scene.h"
 
@@ -34,6 +35,10 @@ bool emission_lights_scene(const Scene& scene,
 /// @param textures  gets the map
 /// @pre not EnvironmentSource::kFile
 void environment_set(Scene& scene, const EnvironmentChoice& choice, TextureStore& textures);
+
+/// Makes the map of surroundings that a graph describes.
+/// @param textures  those that the graph reads; gets the map
+void environment_add_graph(Scene& scene, const EnvironmentGraph& graph, TextureStore& textures);
 
 /// Surrounds a scene in which nothing is lit by the soft studio, unseen by cameras, with a warning.
 /// @param placements  of all meshes at rest, whatever the frame: else light would come and go with what moves

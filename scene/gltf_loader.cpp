@@ -118,13 +118,14 @@ void GltfLoader::set_environment(const LoadOptions& options)
 {
   std::optional<Environment> environment;
   if (!options.environment) {
-    environment = relief_environment(*root_, textures_, warnings_);
+    environment = relief_environment(*root_, textures_, environment_graph_, warnings_);
   } else {
     environment.emplace();
     // The scene's own is not read, and may well be what is missing; but no output may take its place.
     try {
       TextureTable replaced;
-      relief_environment(*root_, replaced, warnings_);
+      std::optional<EnvironmentGraph> replaced_graph;
+      relief_environment(*root_, replaced, replaced_graph, warnings_);
       add_files(scene_, replaced.take());
     } catch (const SceneError&) {
     }
@@ -578,6 +579,7 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
     Scene scene;
     std::vector<TextureRequest> textures, height_maps;
     std::vector<Placement> unlit;
+    std::optional<EnvironmentGraph> environment_graph;
     {
       // The files go away before texels come: the two need not be in memory together.
       GltfLoader loader(warnings);
@@ -585,11 +587,13 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
       unlit = loader.take_unlit();
       textures = loader.take_textures();
       height_maps = loader.take_height_maps();
+      environment_graph = loader.take_environment_graph();
     }
     add_files(scene, textures);
     load_height_maps(scene, height_maps, warnings);
     const auto store = std::make_shared<TextureStore>(std::move(textures), options.texture_budget_bytes, warnings);
     scene.textures = store;
+    if (environment_graph) environment_add_graph(scene, *environment_graph, *store);
     if (!unlit.empty()) default_light_add(scene, unlit, *store, warnings);
     if (options.environment && options.environment->source != EnvironmentSource::kFile) {
       environment_set(scene, *options.environment, *store);

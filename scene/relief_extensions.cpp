@@ -3,8 +3,11 @@
 #include "kernel/film/film_layout.h"
 #include "kernel/state/path_event.h"
 
+#include <algorithm>
 #include <cmath>
+#include <initializer_list>
 
+#include "scene/graph/graph_reader.h"
 #include "scene/limits.h"
 
 namespace relief {
@@ -79,6 +82,32 @@ std::uint32_t read_hidden_from(const JsonReader& r)
     if (!r.boolean(name, true)) hidden |= 1u << static_cast<std::uint32_t>(event);
   }
   return hidden;
+}
+
+EnvironmentGraph read_environment_graph(const GltfDocument& document,
+                                        const JsonReader& r,
+                                        TextureTable& textures,
+                                        Warnings& warnings)
+{
+  constexpr int kWidest = 16384;
+  EnvironmentGraph graph;
+  graph.program = graph_read_color(document, r, textures, graph.suns, warnings);
+  if (r.has("resolution")) graph.width = static_cast<int>(r.integer("resolution", 0, 2, kWidest));
+  r.warn_unread(warnings);
+  using Q = GraphQuantity;
+  const auto reads = [&graph](std::initializer_list<Q> quantities) {
+    return std::any_of(graph.program.inputs.begin(), graph.program.inputs.end(), [&](const GraphInput& input) {
+      return std::find(quantities.begin(), quantities.end(), input.quantity) != quantities.end();
+    });
+  };
+  const std::string place = r.file() + ": " + r.path();
+  if (reads({Q::ray_kind, Q::ray_depth, Q::ray_length})) {
+    warnings.add(place + ": all rays see the same surroundings: those of a ray of no kind");
+  }
+  if (reads({Q::camera_from_world, Q::world_from_camera, Q::window_x, Q::window_y})) {
+    warnings.add(place + ": surroundings do not depend on the camera: its coordinates are 0");
+  }
+  return graph;
 }
 
 /// Vector of the node scaled by a length, for the half axes of an area light.
@@ -239,7 +268,10 @@ void relief_camera(const GltfDocument& document, int camera_index, Camera& camer
   });
 }
 
-std::optional<Environment> relief_environment(const GltfDocument& document, TextureTable& textures, Warnings& warnings)
+std::optional<Environment> relief_environment(const GltfDocument& document,
+                                              TextureTable& textures,
+                                              std::optional<EnvironmentGraph>& graph,
+                                              Warnings& warnings)
 {
   std::optional<Environment> out;
   document.read_extension(document.json, "", "RELIEF_environment", [&](const JsonReader& r) {
@@ -254,6 +286,10 @@ std::optional<Environment> relief_environment(const GltfDocument& document, Text
     e.hidden_from = read_hidden_from(r);
     if (r.has("image") && r.has("uri")) {
       r.fail("", "either image or uri", "both");
+    }
+    if (r.has("graph")) {
+      if (r.has("image") || r.has("uri")) r.fail("", "either a graph or a map", "both");
+      graph = read_environment_graph(document, r.object("graph"), textures, warnings);
     }
     // Round about there is no border; at the poles there is.
     const TextureSampling lat_long{Wrap::kRepeat, Wrap::kClamp, TexelFilter::kLinear};

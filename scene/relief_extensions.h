@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "scene/environment_graph.h"
 #include "scene/khronos_extensions.h"
 #include "scene/scene.h"
 
@@ -20,7 +21,11 @@ RenderSettings relief_render(const GltfDocument& document, Warnings& warnings);
 void relief_camera(const GltfDocument& document, int camera_index, Camera& camera, Warnings& warnings);
 
 /// RELIEF_environment; empty if the document has none.
-std::optional<Environment> relief_environment(const GltfDocument& document, TextureTable& textures, Warnings& warnings);
+/// @param graph  gets its graph, if it has one; a map of it is to be made when the textures are there
+std::optional<Environment> relief_environment(const GltfDocument& document,
+                                              TextureTable& textures,
+                                              std::optional<EnvironmentGraph>& graph,
+                                              Warnings& warnings);
 
 /// Reads RELIEF_light of a punctual light into it.
 /// @param value  the light's object, at `path`

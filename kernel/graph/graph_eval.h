@@ -409,6 +409,34 @@ RELIEF_KERNEL void graph_table(const GraphOperands& o)
             }));
 }
 
+/// Colours of a table of two dimensions at u, v, between the centres of its cells, 0…1 over all of them. Immediates: its first
+/// float by low and high word, its columns and rows.
+RELIEF_KERNEL void graph_grid(const GraphOperands& o)
+{
+  const float* table = o.program.tables + (o.immediates[0] | std::uint32_t{o.immediates[1]} << 16);
+  const int columns = o.immediates[2], rows = o.immediates[3];
+  const auto cell = [](float at, int size, int* second, float* rest) {
+    const float x = clamp(at * static_cast<float>(size) - 0.5f, 0.0f, static_cast<float>(size - 1));
+    const int first = static_cast<int>(x);
+    *rest = x - static_cast<float>(first);
+    *second = first + 1 < size ? first + 1 : first;
+    return first;
+  };
+  const F8 u = graph_in(o, 0), v = graph_in(o, 1);
+  F8 rgb[3];
+  for (int k = 0; k < 8; ++k) {
+    int x1, y1;
+    float s, t;
+    const int x0 = cell(u[k], columns, &x1, &s), y0 = cell(v[k], rows, &y1, &t);
+    for (int c = 0; c < 3; ++c) {
+      const auto at = [=](int x, int y) { return table[(y * columns + x) * 3 + c]; };
+      rgb[c][k] = (1.0f - t) * ((1.0f - s) * at(x0, y0) + s * at(x1, y0)) +
+                  t * ((1.0f - s) * at(x0, y1) + s * at(x1, y1));
+    }
+  }
+  for (int c = 0; c < 3; ++c) graph_set(o, c, rgb[c]);
+}
+
 /// 1 in every other cell of a lattice of unit cubes, but not in the one at the origin.
 RELIEF_KERNEL void graph_checker(const GraphOperands& o)
 {

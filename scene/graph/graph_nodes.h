@@ -31,6 +31,12 @@ struct GraphSocket {
   bool is_normal = false;      ///< that value is the shading normal instead
 };
 
+/// A light that graphs of surroundings have in so small a part of them that it is to be looked for.
+struct GraphSun {
+  Vec3f towards;  ///< unit, Z up
+  float radius;   ///< angle
+};
+
 /// One node while it is turned into operations.
 struct GraphNode {
   GraphBuilder& build;
@@ -42,6 +48,7 @@ struct GraphNode {
   const std::function<int(const JsonReader&)>& texture;
   /// Place of an attribute's name, for quantities.
   const std::function<std::uint16_t(const JsonReader&, const std::string&)>& attribute;
+  std::vector<GraphSun>& suns;  ///< gets those of directions that are looked into as they are
 
   GraphScalar number(std::string_view name) const { return inputs.at(name).v[0]; }
   const GraphVector& vector(std::string_view name) const { return inputs.at(name).v; }
@@ -61,6 +68,7 @@ std::span<const GraphNodeKind> graph_input_nodes();
 std::span<const GraphNodeKind> graph_texture_nodes();
 std::span<const GraphNodeKind> graph_color_nodes();
 std::span<const GraphNodeKind> graph_math_nodes();
+std::span<const GraphNodeKind> graph_sky_nodes();
 
 /// @return null: there is none of that name
 const GraphNodeKind* graph_node_kind(std::string_view name);

@@ -42,6 +42,7 @@ struct Reader {
   std::vector<Source> sources;
   std::vector<std::map<std::string_view, GraphValue>> values;  ///< outputs of each node
   std::set<std::uint16_t> attributes;                          ///< places of the names that are read
+  std::vector<GraphSun> suns = {};
 
   GraphValue literal(const JsonReader& parent, std::string_view name, GraphType type);
   Reference reference(const JsonReader& parent, std::string_view name, std::size_t num_nodes) const;
@@ -196,7 +197,7 @@ void Reader::lower(std::size_t index)
   };
   const std::function<std::uint16_t(const JsonReader&, const std::string&)> named =
       [this](const JsonReader& r, const std::string& name) { return attribute(r, name); };
-  GraphNode node{build, source.reader, inputs, values[index], given, texture, named};
+  GraphNode node{build, source.reader, inputs, values[index], given, texture, named, suns};
   source.kind->lower(node);
   source.reader.warn_unread(warnings);
 }
@@ -282,6 +283,30 @@ GraphPrograms graph_read(const GltfDocument& document,
     return programs;
   } catch (const GraphTooLarge& error) {
     reader.fail("", error.what(), "one that needs more");
+  }
+}
+
+GraphProgram graph_read_color(const GltfDocument& document,
+                              const JsonReader& graph,
+                              TextureTable& textures,
+                              std::vector<GraphSun>& suns,
+                              Warnings& warnings)
+{
+  // No direction has attributes: what a graph reads of one is 0.
+  std::vector<std::string> attribute_names;
+  Reader r{document, graph.file(), graph.path(), textures, attribute_names, warnings, {}, {}, {}, {}};
+  try {
+    r.read_nodes(graph);
+    if (!graph.has("outputs")) graph.fail("outputs", "an object");
+    const JsonReader outputs = graph.object("outputs");
+    if (!outputs.has("color")) outputs.fail("color", "{\"node\": …}");
+    const GraphValue color = r.input(outputs, "color", GraphType::kColor);
+    outputs.warn_unread(warnings);
+    for (const GraphScalar component : color.v) r.build.add_result(component);
+    suns = r.suns;
+    return r.build.compile();
+  } catch (const GraphTooLarge& error) {
+    graph.fail("", error.what(), "one that needs more");
   }
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "scene/gltf_document.h"
+#include "scene/graph/graph_nodes.h"
 #include "scene/graph/graph_program.h"
 #include "scene/texture_table.h"
 
@@ -28,5 +29,15 @@ GraphPrograms graph_read(const GltfDocument& document,
                          TextureTable& textures,
                          std::vector<std::string>& attribute_names,
                          Warnings& warnings);
+
+/// Reads the graph of an environment: its output `color` becomes the program's results 0 to 2.
+/// @param graph  its object, with `nodes` and `outputs`
+/// @param suns   gets the small lights that it has
+/// @error        likewise
+GraphProgram graph_read_color(const GltfDocument& document,
+                              const JsonReader& graph,
+                              TextureTable& textures,
+                              std::vector<GraphSun>& suns,
+                              Warnings& warnings);
 
 }  // namespace relief

@@ -1,5 +1,7 @@
 """Worlds: colours and lat-long images light and are seen as in Cycles."""
 
+import math
+
 import bpy
 
 from scenes import (
@@ -81,12 +83,6 @@ def test_srgb_image():
     scene = _stage()
     _image_world(is_float=False, color_space="sRGB", pixels=smooth_pixels())
     assert_agrees(scene, samples=128, block=4, tolerance=0.01)
-
-
-def test_a_turn_about_x_is_warned_about():
-    scene = _stage()
-    _image_world(degrees(20, 0, 0))
-    assert_warns(scene, 'world "world"', "turned about X")
 
 
 def test_a_volume_is_warned_about():
@@ -180,3 +176,196 @@ def test_a_world_hidden_from_glossy_rays():
 
 def test_a_world_hidden_from_transmission_rays():
     assert_agrees(_hidden_from("transmission"), samples=128, tolerance=_FACETS)
+
+
+def _nodes(tree, *kinds):
+    return [tree.nodes.new(f"ShaderNode{kind}") for kind in kinds]
+
+
+def test_a_gradient_of_generated_coordinates():
+    """Across turned axes: Generated is the direction, Z up."""
+    scene = _stage()
+    tree = set_world((1, 1, 1), 0.8)
+    coordinate, mapping, gradient, ramp = _nodes(tree, "TexCoord", "Mapping", "TexGradient", "ValToRGB")
+    mapping.inputs["Rotation"].default_value = degrees(20, 50, 30)
+    mapping.inputs["Location"].default_value = (0.3, 0.4, 0.5)
+    ramp.color_ramp.elements[0].color = (0.9, 0.2, 0.1, 1)
+    ramp.color_ramp.elements[1].color = (0.1, 0.3, 0.9, 1)
+    tree.links.new(coordinate.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs["Vector"], gradient.inputs["Vector"])
+    tree.links.new(gradient.outputs["Fac"], ramp.inputs["Fac"])
+    tree.links.new(ramp.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+    assert_agrees(scene, samples=128, block=4)
+
+
+def test_directions():
+    """Each output that is a direction, as its colour."""
+    for kind, output in (("TexCoord", "Object"), ("TexCoord", "Normal"), ("NewGeometry", "Incoming")):
+        scene = _stage(32, 24)
+        tree = set_world((1, 1, 1))
+        source, mapping = _nodes(tree, kind, "Mapping")
+        mapping.inputs["Scale"].default_value = (0.5, 0.3, 0.4)
+        mapping.inputs["Location"].default_value = (0.6, 0.6, 0.6)
+        tree.links.new(source.outputs[output], mapping.inputs["Vector"])
+        tree.links.new(mapping.outputs["Vector"], tree.nodes["Background"].inputs["Color"])
+        assert_agrees(scene, samples=64, block=4)
+
+
+def test_clouds():
+    scene = _stage()
+    tree = set_world((1, 1, 1), 1.0)
+    noise, ramp = _nodes(tree, "TexNoise", "ValToRGB")
+    noise.inputs["Scale"].default_value = 3
+    noise.inputs["Detail"].default_value = 4
+    ramp.color_ramp.elements[0].position = 0.4
+    ramp.color_ramp.elements[0].color = (0.1, 0.3, 0.8, 1)
+    ramp.color_ramp.elements[1].position = 0.7
+    tree.links.new(noise.outputs["Fac"], ramp.inputs["Fac"])
+    tree.links.new(ramp.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+    strength = tree.nodes.new("ShaderNodeMath")
+    strength.operation = "MULTIPLY_ADD"
+    strength.inputs[1].default_value, strength.inputs[2].default_value = 2.0, 0.2
+    tree.links.new(noise.outputs["Fac"], strength.inputs[0])
+    tree.links.new(strength.outputs[0], tree.nodes["Background"].inputs["Strength"])
+    assert_agrees(scene, samples=128, block=4)
+
+
+def _mixed(factor=None):
+    """Three backgrounds: two mixed, the third added to them."""
+    tree = set_world((0.9, 0.3, 0.2), 1.5)
+    first = tree.nodes["Background"]
+    second, third, mix, add = _nodes(tree, "Background", "Background", "MixShader", "AddShader")
+    second.inputs["Color"].default_value = (0.1, 0.4, 0.9, 1)
+    second.inputs["Strength"].default_value = 0.7
+    third.inputs["Color"].default_value = (0.05, 0.1, 0.02, 1)
+    mix.inputs[0].default_value = 0.3
+    tree.links.new(first.outputs[0], mix.inputs[1])
+    tree.links.new(second.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], add.inputs[0])
+    tree.links.new(third.outputs[0], add.inputs[1])
+    tree.links.new(add.outputs[0], tree.nodes["World Output"].inputs["Surface"])
+    if factor is not None:
+        tree.links.new(factor(tree), mix.inputs[0])
+    return tree
+
+
+def test_backgrounds_mixed_and_added():
+    scene = _stage()
+    _mixed()
+    assert_agrees(scene)
+
+
+def test_backgrounds_mixed_by_height():
+    """A factor beyond 0 and 1 is cut off. Where it bends there, the map rounds it between texels: by 0.4 % of a block."""
+
+    def height(tree):
+        coordinate, separate, scale = _nodes(tree, "TexCoord", "SeparateXYZ", "Math")
+        scale.operation = "MULTIPLY_ADD"
+        scale.inputs[1].default_value, scale.inputs[2].default_value = 2.5, 0.4
+        tree.links.new(coordinate.outputs["Generated"], separate.inputs[0])
+        tree.links.new(separate.outputs["Z"], scale.inputs[0])
+        return scale.outputs[0]
+
+    scene = _stage()
+    _mixed(height)
+    assert_agrees(scene, samples=128, block=4, tolerance=0.005)
+
+
+def _by_camera_ray(tree):
+    return tree.nodes.new("ShaderNodeLightPath").outputs["Is Camera Ray"]
+
+
+def test_a_world_that_the_camera_does_not_see_by_light_path():
+    """Nothing where the camera looks: that is said by visibility."""
+    scene = _stage()
+    tree = set_world((0.2, 0.5, 0.9))
+    (mix,) = _nodes(tree, "MixShader")
+    tree.links.new(_by_camera_ray(tree), mix.inputs[0])
+    tree.links.new(tree.nodes["Background"].outputs[0], mix.inputs[1])
+    tree.links.new(mix.outputs[0], tree.nodes["World Output"].inputs["Surface"])
+    assert_agrees(scene)
+
+
+def test_another_world_for_the_camera_is_warned_about():
+    scene = _stage()
+    _mixed(_by_camera_ray)
+    assert_warns(scene, 'world "world"', "surroundings of their own for the camera")
+
+
+def _sky_world(strength=0.1, **settings):
+    tree = set_world((1, 1, 1), strength)
+    (sky,) = _nodes(tree, "TexSky")
+    sky.sky_type = "NISHITA"
+    for name, value in settings.items():
+        setattr(sky, name, value)
+    tree.links.new(sky.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+    return tree
+
+
+def test_sky_at_dusk():
+    """The sun's disk is in it, a hand's breadth above the horizon, where the camera does not look."""
+    scene = _stage()
+    _sky_world(0.2, sun_elevation=math.radians(6), sun_rotation=math.radians(120), sun_size=math.radians(2))
+    assert_agrees(scene, samples=256, block=4)
+
+
+def test_sky_without_disk():
+    """Every setting that is not its default."""
+    scene = _stage()
+    settings = {"altitude": 2000, "air_density": 1.5, "dust_density": 3, "ozone_density": 4}
+    _sky_world(0.2, sun_disc=False, sun_elevation=math.radians(2), sun_rotation=math.radians(-20), **settings)
+    assert_agrees(scene, samples=128, block=4)
+
+
+def test_a_small_sun():
+    """Half a degree of sky gives most of the light, and casts a shadow."""
+    scene = _stage()
+    _sky_world(0.05, sun_elevation=math.radians(40), sun_rotation=math.radians(200), sun_intensity=0.5)
+    assert_agrees(scene, samples=256, block=8)
+
+
+def test_a_sun_past_the_zenith():
+    scene = _stage()
+    _sky_world(0.2, sun_disc=False, sun_elevation=math.radians(170), sun_rotation=math.radians(30))
+    assert_agrees(scene, samples=128, block=4)
+
+
+def test_another_sky_is_warned_about():
+    scene = _stage()
+    tree = _sky_world()
+    next(n for n in tree.nodes if n.bl_idname == "ShaderNodeTexSky").sky_type = "HOSEK_WILKIE"
+    assert_warns(scene, 'world "world"', "hosek_wilkie")
+
+
+def test_preetham_sky():
+    scene = _stage()
+    sky = {"sky_type": "PREETHAM", "sun_direction": (0.3, -0.5, 0.4), "turbidity": 3.5}
+    _sky_world(0.3, **sky)
+    assert_agrees(scene, samples=128, block=4)
+
+
+def test_an_image_turned_about_x():
+    scene = _stage()
+    _image_world(degrees(20, 0, 0))
+    assert_agrees(scene, samples=128, block=4)
+
+
+def test_a_mirror_ball():
+    scene = _stage()
+    _image_world(degrees(10, 30, 200), pixels=smooth_pixels())
+    texture = next(n for n in bpy.context.scene.world.node_tree.nodes if n.bl_idname == "ShaderNodeTexEnvironment")
+    texture.projection = "MIRROR_BALL"
+    assert_agrees(scene, samples=128, block=4)
+
+
+def test_an_image_and_a_colour_mixed():
+    scene = _stage()
+    tree = set_world((0.1, 0.2, 0.7), 1.5)
+    first = tree.nodes["Background"]
+    second, texture, mix = _nodes(tree, "Background", "TexEnvironment", "MixShader")
+    texture.image = new_image(asymmetric_pixels(32, 16), LINEAR, True)
+    tree.links.new(texture.outputs["Color"], second.inputs["Color"])
+    tree.links.new(first.outputs[0], mix.inputs[1])
+    tree.links.new(second.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], tree.nodes["World Output"].inputs["Surface"])
+    assert_agrees(scene, samples=128, block=4)

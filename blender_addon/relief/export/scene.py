@@ -204,7 +204,7 @@ class SceneExporter:
         """Gives a scene without any light one that is as good as none: the program would put up a lamp of its own."""
         environment = self.writer.json["extensions"]["RELIEF_environment"]
         has_light = any(map(_is_light, self.nodes)) or any(map(emits, self.writer.json.get("materials", ())))
-        if not has_light and "uri" not in environment and not any(environment["color"]):
+        if not has_light and not {"uri", "graph"} & environment.keys() and not any(environment["color"]):
             environment["color"] = [_DARKNESS] * 3
 
     def _warner(self, kind, name):
