@@ -13,6 +13,7 @@
 #include "scene/composition.h"
 #include "scene/default_light.h"
 #include "scene/gltf_camera.h"
+#include "scene/height_graph.h"
 #include "scene/light_units.h"
 #include "scene/load.h"
 #include "scene/memory.h"
@@ -39,6 +40,9 @@ class GltfLoader {
 
   /// Height maps that displacements refer to, in index order; empty once they are loaded.
   std::vector<TextureRequest> take_height_maps() { return height_maps_.take(); }
+
+  /// Maps of height graphs; the displacements with one index these. Empty once the others are loaded.
+  std::vector<HeightMap> take_height_graphs() { return height_graphs_.take(); }
 
  private:
   /// A primitive: a mesh of the scene, which equal primitives share, and its own material.
@@ -97,6 +101,7 @@ class GltfLoader {
   bool says_light_ = false;
   std::vector<Placement> unlit_;
   TextureTable textures_, height_maps_;
+  HeightGraphTable height_graphs_;
   Bounds world_bounds_;
   float image_aspect_ = 1;
   std::vector<Bounds> mesh_bounds_;

@@ -49,6 +49,11 @@ std::size_t GraphProgram::bytes() const
          closures.size() * sizeof(SurfaceClosureSpec) + sizeof(GraphProgram);
 }
 
+void graph_program_run(const GraphProgramView& program, GraphRegisters& registers)
+{
+  graph_run(program, nullptr, registers);
+}
+
 GraphScalar GraphBuilder::add(const Node& node, const Key& key)
 {
   const auto [it, is_new] = known_.try_emplace(key, static_cast<std::int32_t>(nodes_.size()));
@@ -138,7 +143,7 @@ std::vector<GraphScalar> GraphBuilder::fold(GraphOp op,
   GraphProgramView view = program.view();
   view.tables = tables_.data();
   GraphRegisters registers;
-  graph_run(view, nullptr, registers);
+  graph_program_run(view, registers);
   std::vector<GraphScalar> out;
   for (int i = 0; i < shape.num_outputs; ++i) out.push_back(constant(registers.lanes[i][0]));
   return out;

@@ -23,4 +23,10 @@ struct GraphProgram {
   std::size_t bytes() const;
 };
 
+struct GraphRegisters;  // kernel/graph/graph_registers.h
+
+/// Runs a program that reads no image, where scenes are made; what renders has its own for every instruction set.
+/// @param registers  the program's inputs are filled
+void graph_program_run(const GraphProgramView& program, GraphRegisters& registers);
+
 }  // namespace relief

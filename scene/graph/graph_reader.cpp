@@ -285,4 +285,26 @@ GraphPrograms graph_read(const GltfDocument& document,
   }
 }
 
+GraphProgram height_graph_read(const GltfDocument& document,
+                               const JsonReader& graph,
+                               TextureTable& textures,
+                               Warnings& warnings)
+{
+  std::vector<std::string> attribute_names;  // of what a height cannot read
+  Reader r{document, graph.file(), graph.path(), textures, attribute_names, warnings, {}, {}, {}, {}};
+  try {
+    r.read_nodes(graph);
+    if (!graph.has("outputs")) graph.fail("outputs", "an object");
+    const JsonReader outputs = graph.object("outputs");
+    const GraphValue height = r.input(outputs, "height", GraphType::kNumber);
+    if (height.v[0].index < 0) outputs.fail("height", "{\"node\": …}");
+    r.build.add_result(height.v[0]);
+    outputs.warn_unread(warnings);
+    graph.warn_unread(warnings);
+    return r.build.compile();
+  } catch (const GraphTooLarge& error) {
+    graph.fail("", error.what(), "one that needs more");
+  }
+}
+
 }  // namespace relief

@@ -29,4 +29,11 @@ GraphPrograms graph_read(const GltfDocument& document,
                          std::vector<std::string>& attribute_names,
                          Warnings& warnings);
 
+/// The graph of a displacement's height: its nodes and their output `height`, which is the program's only result.
+/// @error SceneError: as graph_read
+GraphProgram height_graph_read(const GltfDocument& document,
+                               const JsonReader& graph,
+                               TextureTable& textures,
+                               Warnings& warnings);
+
 }  // namespace relief
