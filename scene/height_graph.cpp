@@ -248,7 +248,7 @@ std::string foreign_input(const GraphProgram& program, int uv_set)
   }
   for (std::size_t word = 0; word < program.code.size();) {
     const auto op = static_cast<GraphOp>(program.code[word]);
-    if (op == GraphOp::image) return "an image";
+    if (graph_op_reads_images(op)) return "an image";
     const GraphOpShape& shape = kGraphOpShapes[static_cast<std::size_t>(op)];
     word += 1 + static_cast<std::size_t>(shape.num_immediates + shape.num_outputs + shape.num_inputs);
   }

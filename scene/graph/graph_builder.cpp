@@ -15,13 +15,12 @@ namespace {
 
 const GraphOpShape& shape_of(GraphOp op) { return kGraphOpShapes[static_cast<int>(op)]; }
 
-/// Whether an operation gives the same whatever the scene.
-bool can_fold(GraphOp op)
-{
-  return op != GraphOp::image && op != GraphOp::image_box && op != GraphOp::image_tiles;
-}
-
 }  // namespace
+
+bool graph_op_reads_images(GraphOp op)
+{
+  return op == GraphOp::image || op == GraphOp::image_box || op == GraphOp::image_tiles;
+}
 
 GraphProgramView GraphProgram::view() const
 {
@@ -154,7 +153,8 @@ std::vector<GraphScalar> GraphBuilder::apply(GraphOp op,
                                              std::span<const std::uint16_t> immediates)
 {
   const GraphOpShape& shape = shape_of(op);
-  if (can_fold(op) && std::all_of(inputs.begin(), inputs.end(), [this](GraphScalar a) { return is_constant(a); })) {
+  if (!graph_op_reads_images(op) &&
+      std::all_of(inputs.begin(), inputs.end(), [this](GraphScalar a) { return is_constant(a); })) {
     return fold(op, inputs, immediates);
   }
   if (GraphScalar simple; simplify(op, inputs, &simple)) return {simple};

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "kernel/graph/graph_op.h"
 #include "kernel/graph/graph_program.h"
 
 namespace relief {
@@ -22,6 +23,9 @@ struct GraphProgram {
   GraphProgramView view() const;
   std::size_t bytes() const;
 };
+
+/// Whether an operation depends on the scene's textures.
+bool graph_op_reads_images(GraphOp op);
 
 struct GraphRegisters;  // kernel/graph/graph_registers.h
 
