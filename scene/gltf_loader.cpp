@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <new>
 #include <set>
 #include <utility>
@@ -70,17 +71,24 @@ void add_files(Scene& scene, const std::vector<TextureRequest>& requests)
 }
 
 /// Reads the height maps, once, and points the displacements at them.
-/// @param requests  empty: done before
-void load_height_maps(Scene& scene, const std::vector<TextureRequest>& requests, Warnings& warnings)
+/// @param requests  empty, as is `baked`: done before
+/// @param baked     maps of height graphs, which come first
+void load_height_maps(Scene& scene,
+                      const std::vector<TextureRequest>& requests,
+                      std::vector<HeightMap> baked,
+                      Warnings& warnings)
 {
-  if (requests.empty()) return;
+  if (requests.empty() && baked.empty()) return;
   add_files(scene, requests);
   HeightMapSet heights = height_maps_load(requests, warnings);
   for (DisplacementSettings& displacement : scene.displacements) {
+    if (displacement.has_graph) continue;
     displacement.height.texture_index =
-        heights.map_of_request[static_cast<std::size_t>(displacement.height.texture_index)];
+        heights.map_of_request[static_cast<std::size_t>(displacement.height.texture_index)] +
+        static_cast<int>(baked.size());
   }
-  scene.height_maps = std::move(heights.maps);
+  scene.height_maps = std::move(baked);
+  std::move(heights.maps.begin(), heights.maps.end(), std::back_inserter(scene.height_maps));
 }
 
 }  // namespace
@@ -377,10 +385,22 @@ void GltfLoader::check_displacement(const PlacedNode& node, const Instance& inst
   if (index < 0 || !displaced_.emplace(instance.mesh_index, index).second) {
     return;
   }
-  const int mesh = node.document->core.nodes[static_cast<std::size_t>(node.node_index)].mesh;
-  displaced_mesh_warn(node.document->file + ": /meshes/" + std::to_string(mesh),
-                      scene_.meshes[static_cast<std::size_t>(instance.mesh_index)],
-                      scene_.displacements[static_cast<std::size_t>(index)].height, warnings_);
+  const int mesh_index = node.document->core.nodes[static_cast<std::size_t>(node.node_index)].mesh;
+  const std::string label = node.document->file + ": /meshes/" + std::to_string(mesh_index);
+  const Mesh& mesh = scene_.meshes[static_cast<std::size_t>(instance.mesh_index)];
+  const DisplacementSettings& d = scene_.displacements[static_cast<std::size_t>(index)];
+  displaced_mesh_warn(label, mesh, d.height, warnings_);
+  if (!d.has_graph) return;
+  const HeightMap& map = height_graphs_.maps()[static_cast<std::size_t>(d.height.texture_index)];
+  const UvBounds bounds = displaced_mesh_uv_bounds(mesh, d.height);
+  const auto is_outside = [](Wrap wrap, float low, float high) {
+    constexpr float kRounding = 1e-5f;
+    return wrap == Wrap::kClamp && (low < -kRounding || high > 1 + kRounding);
+  };
+  if (is_outside(map.wrap_u, bounds.low.x, bounds.high.x) || is_outside(map.wrap_v, bounds.low.y, bounds.high.y)) {
+    warnings_.add(label + ": texture coordinates beyond the uvRange of " + map.label +
+                  ": heights there are those of its border");
+  }
 }
 
 const std::vector<GltfLoader::Primitive>& GltfLoader::primitives_of(const GltfDocument& document, int mesh_index)
@@ -484,7 +504,7 @@ int GltfLoader::material_of(const GltfDocument& document, int material_index)
     name = document.core.materials[static_cast<std::size_t>(material_index)].name;
     const std::string path = "/materials/" + std::to_string(material_index);
     read_programs(document, document.element("materials", static_cast<std::size_t>(material_index)), path, material);
-    if (auto displacement = relief_displacement(document, material_index, height_maps_, warnings_)) {
+    if (auto displacement = relief_displacement(document, material_index, height_maps_, height_graphs_, warnings_)) {
       material.displacement_index = static_cast<int>(scene_.displacements.size());
       scene_.displacements.push_back(*displacement);
     }
@@ -524,7 +544,7 @@ void GltfLoader::set_camera(const LoadOptions& options)
   }
   if (!choice.look_from && !scene_.cameras.empty()) return;
   // Heights of float maps may be anything.
-  load_height_maps(scene_, height_maps_.take(), warnings_);
+  load_height_maps(scene_, height_maps_.take(), height_graphs_.take(), warnings_);
   std::vector<float> reach_of;
   for (const DisplacementSettings& d : scene_.displacements) {
     const auto map = static_cast<std::size_t>(d.height.texture_index);
@@ -578,6 +598,7 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
   try {
     Scene scene;
     std::vector<TextureRequest> textures, height_maps;
+    std::vector<HeightMap> height_graphs;
     std::vector<Placement> unlit;
     std::optional<EnvironmentGraph> environment_graph;
     {
@@ -588,9 +609,10 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
       textures = loader.take_textures();
       height_maps = loader.take_height_maps();
       environment_graph = loader.take_environment_graph();
+      height_graphs = loader.take_height_graphs();
     }
     add_files(scene, textures);
-    load_height_maps(scene, height_maps, warnings);
+    load_height_maps(scene, height_maps, std::move(height_graphs), warnings);
     const auto store = std::make_shared<TextureStore>(std::move(textures), options.texture_budget_bytes, warnings);
     scene.textures = store;
     if (environment_graph) environment_add_graph(scene, *environment_graph, *store);

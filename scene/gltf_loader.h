@@ -13,6 +13,7 @@
 #include "scene/composition.h"
 #include "scene/default_light.h"
 #include "scene/gltf_camera.h"
+#include "scene/height_graph.h"
 #include "scene/light_units.h"
 #include "scene/load.h"
 #include "scene/memory.h"
@@ -42,6 +43,9 @@ class GltfLoader {
 
   /// Height maps that displacements refer to, in index order; empty once they are loaded.
   std::vector<TextureRequest> take_height_maps() { return height_maps_.take(); }
+
+  /// Maps of height graphs; the displacements with one index these. Empty once the others are loaded.
+  std::vector<HeightMap> take_height_graphs() { return height_graphs_.take(); }
 
  private:
   /// A primitive: a mesh of the scene, which equal primitives share, and its own material.
@@ -101,6 +105,7 @@ class GltfLoader {
   std::vector<Placement> unlit_;
   TextureTable textures_, height_maps_;
   std::optional<EnvironmentGraph> environment_graph_;
+  HeightGraphTable height_graphs_;
   Bounds world_bounds_;
   float image_aspect_ = 1;
   std::vector<Bounds> mesh_bounds_;

@@ -21,9 +21,6 @@
 namespace relief {
 namespace {
 
-/// Larger heights are taken for damage: their squares would leave single precision.
-constexpr float kHighest = 1e30f;
-
 /// Rows are read in bands: few enough to stay small beside the map, enough for whole compression blocks.
 constexpr std::size_t kBandBytes = std::size_t{64} << 20;
 constexpr int kFewestBandRows = 64, kMostBandRows = 256;
@@ -70,16 +67,6 @@ std::vector<int> height_channels(const ImageHeader& header)
     }
   }
   return channels.empty() ? std::vector<int>{0} : channels;
-}
-
-std::shared_ptr<void> texels_allocate(std::size_t bytes)
-{
-  constexpr std::size_t kAlignment = 64;
-  void* block = std::aligned_alloc(kAlignment, (bytes + kAlignment - 1) / kAlignment * kAlignment);
-  if (block == nullptr) {
-    throw std::bad_alloc();
-  }
-  return {block, [](void* texels) { std::free(texels); }};
 }
 
 /// Copies the first of several interleaved channels; counts the texels whose other channels differ from it.
@@ -134,7 +121,7 @@ void texels_load(ImageReader& reader, HeightImage& image, T* texels)
 void texels_repair(std::span<float> texels, int width, HeightFindings& findings)
 {
   // NaN is no height either: it fails the comparison.
-  const auto is_height = [](float h) { return std::abs(h) <= kHighest; };
+  const auto is_height = [](float h) { return std::abs(h) <= kHighestHeight; };
   double sum = 0;
   for (std::size_t i = 0; i < texels.size(); ++i) {
     if (is_height(texels[i])) {
@@ -167,7 +154,7 @@ void image_load(HeightImage& image)
   try {
     // What is traced adds to the map a quarter of a byte a texel, and levels of detail a third of it.
     const MemoryReservation room(2 * map.bytes(), label);
-    const std::shared_ptr<void> texels = texels_allocate(map.bytes());
+    const std::shared_ptr<void> texels = height_texels_allocate(map.bytes());
     switch (map.format) {
       case HeightFormat::kU8:
         texels_load(reader, image, static_cast<std::uint8_t*>(texels.get()));
@@ -189,18 +176,16 @@ void image_load(HeightImage& image)
   }
 }
 
-void warn(const HeightImage& image, Warnings& warnings)
+void warn(const std::string& label, const HeightFindings& found, Warnings& warnings)
 {
-  const HeightFindings& found = image.findings;
   if (found.num_replaced > 0) {
-    warnings.add(image.label + ": " + std::to_string(found.num_replaced) +
+    warnings.add(label + ": " + std::to_string(found.num_replaced) +
                  " heights were not finite or beyond 1e30 and are replaced by the mean of the others, the first at "
                  "column " +
                  std::to_string(found.first_x) + ", row " + std::to_string(found.first_y));
   }
   if (found.num_coloured > 0) {
-    warnings.add(image.label +
-                 ": a colour image as height map: its first channel is used, though the others differ in " +
+    warnings.add(label + ": a colour image as height map: its first channel is used, though the others differ in " +
                  std::to_string(found.num_coloured) + " texels");
   }
 }
@@ -256,6 +241,23 @@ class Grouping {
 
 }  // namespace
 
+std::shared_ptr<void> height_texels_allocate(std::size_t bytes)
+{
+  constexpr std::size_t kAlignment = 64;
+  void* block = std::aligned_alloc(kAlignment, (bytes + kAlignment - 1) / kAlignment * kAlignment);
+  if (block == nullptr) {
+    throw std::bad_alloc();
+  }
+  return {block, [](void* texels) { std::free(texels); }};
+}
+
+void height_texels_repair(std::span<float> texels, int width, const std::string& label, Warnings& warnings)
+{
+  HeightFindings findings;
+  texels_repair(texels, width, findings);
+  warn(label, findings, warnings);
+}
+
 HeightMapView HeightMap::view() const { return {texels.get(), width, height, format, wrap_u, wrap_v}; }
 
 std::size_t HeightMap::bytes() const
@@ -289,7 +291,7 @@ HeightMapSet height_maps_load(std::span<const TextureRequest> requests, Warnings
   Grouping groups(requests);
   for_each_in_parallel(groups.images.size(), [&](std::size_t i) { image_load(groups.images[i]); });
   for (const HeightImage& image : groups.images) {
-    warn(image, warnings);
+    warn(image.label, image.findings, warnings);
   }
   for (const TextureRequest& request : requests) {
     if (request.filter == TexelFilter::kNearest) {

@@ -15,6 +15,9 @@ namespace relief {
 
 struct TextureRequest;  // scene/texture_store.h
 
+/// Larger heights are taken for damage: their squares would leave single precision.
+inline constexpr float kHighestHeight = 1e30f;
+
 /// Texels and sampler of one height map.
 struct HeightMap {
   std::string label;  ///< how messages name it, e.g. "scene.gltf: /images/3 (bark.png)"
@@ -55,5 +58,13 @@ struct HeightMapSet {
 /// @error SceneError naming the file and JSON path of an image that is missing, unreadable or absurdly large
 /// @cost  memory: the map, and 64 MiB or 64 rows of the image on top
 HeightMapSet height_maps_load(std::span<const TextureRequest> requests, Warnings& warnings);
+
+/// Room for a map's texels, aligned.
+/// @error std::bad_alloc
+std::shared_ptr<void> height_texels_allocate(std::size_t bytes);
+
+/// Replaces what is not finite or beyond ±1e30 by the mean of the others, and says so.
+/// @param label  of the map
+void height_texels_repair(std::span<float> texels, int width, const std::string& label, Warnings& warnings);
 
 }  // namespace relief

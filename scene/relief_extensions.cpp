@@ -146,16 +146,21 @@ TextureRef height_texture(const GltfDocument& document,
   return ref;
 }
 
-/// @return empty: procedural displacement alone
+/// @param material  as warnings name it
+/// @return          empty: nothing that is supported, with a warning
 std::optional<DisplacementSettings> read_displacement(const GltfDocument& document,
                                                       const JsonReader& r,
+                                                      const std::string& material,
                                                       TextureTable& height_maps,
+                                                      HeightGraphTable& height_graphs,
                                                       Warnings& warnings)
 {
   static constexpr std::string_view kSpaces[] = {"object", "world"};
   static constexpr std::string_view kSeams[] = {"keep", "weld"};
   DisplacementSettings d;
-  d.height = height_texture(document, r, "heightTexture", height_maps, warnings);
+  d.has_graph = r.has("heightGraph");
+  if (d.has_graph && r.has("heightTexture")) r.fail("", "either heightTexture or heightGraph", "both");
+  if (!d.has_graph) d.height = height_texture(document, r, "heightTexture", height_maps, warnings);
   d.scale = r.number_f("scale", 1);
   d.midlevel = r.number_f("midlevel", 0.5f);
   d.space = static_cast<DisplacementSpace>(r.choice("space", kSpaces, 0));
@@ -174,9 +179,10 @@ std::optional<DisplacementSettings> read_displacement(const GltfDocument& docume
     static_cast<void>(r.object("procedural"));
     warnings.add(r.file() + ": " + json_path_join(r.path(), "procedural") +
                  ": procedural displacement is not supported and left out");
-  } else if (d.height.texture_index < 0) {
-    r.fail("", "a heightTexture", "none");
+  } else if (!d.has_graph && d.height.texture_index < 0) {
+    r.fail("", "a heightTexture or heightGraph", "none");
   }
+  if (d.has_graph) d.height = height_graphs.add(document, r, material, warnings).value_or(TextureRef{});
   r.warn_unread(warnings);
   return d.height.texture_index >= 0 ? std::optional(d) : std::nullopt;
 }
@@ -434,6 +440,7 @@ ObjectSettings relief_object(const GltfDocument& document, int node_index, Objec
 std::optional<DisplacementSettings> relief_displacement(const GltfDocument& document,
                                                         int material_index,
                                                         TextureTable& height_maps,
+                                                        HeightGraphTable& height_graphs,
                                                         Warnings& warnings)
 {
   std::optional<DisplacementSettings> out;
@@ -441,7 +448,8 @@ std::optional<DisplacementSettings> relief_displacement(const GltfDocument& docu
   const auto& material = document.element("materials", index);
   const std::string path = "/materials/" + std::to_string(index);
   const bool own = document.read_extension(material, path, "RELIEF_displacement", [&](const JsonReader& r) {
-    out = read_displacement(document, r, height_maps, warnings);
+    const std::string name = "material \"" + document.core.materials[index].name + '"';
+    out = read_displacement(document, r, name, height_maps, height_graphs, warnings);
   });
   if (!own) {
     document.read_extension(material, path, "KHR_materials_displacement", [&](const JsonReader& r) {

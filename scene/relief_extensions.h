@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "scene/environment_graph.h"
+#include "scene/height_graph.h"
 #include "scene/khronos_extensions.h"
 #include "scene/scene.h"
 
@@ -64,11 +65,13 @@ ObjectSettings relief_object(const GltfDocument& document,
                              Warnings& warnings);
 
 /// RELIEF_displacement of a material, or the unofficial KHR_materials_displacement.
-/// @param height_maps  gets the height map: the settings' texture index is a request's in this table
-/// @return             empty: none, or one that is not supported (with a warning)
+/// @param height_maps    gets the height map: the settings' texture index is a request's in this table
+/// @param height_graphs  gets the map of a heightGraph: then the index is into this table
+/// @return               empty: none, or one that is not supported (with a warning)
 std::optional<DisplacementSettings> relief_displacement(const GltfDocument& document,
                                                         int material_index,
                                                         TextureTable& height_maps,
+                                                        HeightGraphTable& height_graphs,
                                                         Warnings& warnings);
 
 }  // namespace relief

@@ -107,6 +107,7 @@ struct DisplacementSettings {
   float lod = 0;  ///< −1: auto
   bool smoothing = false;
   bool weld_seams = false;
+  bool has_graph = false;  ///< the height is a heightGraph's, not an image's
 };
 
 enum class CausticsMode : std::uint8_t { kAuto, kOn, kOff };

@@ -15,13 +15,12 @@ namespace {
 
 const GraphOpShape& shape_of(GraphOp op) { return kGraphOpShapes[static_cast<int>(op)]; }
 
-/// Whether an operation gives the same whatever the scene.
-bool can_fold(GraphOp op)
-{
-  return op != GraphOp::image && op != GraphOp::image_box && op != GraphOp::image_tiles;
-}
-
 }  // namespace
+
+bool graph_op_reads_images(GraphOp op)
+{
+  return op == GraphOp::image || op == GraphOp::image_box || op == GraphOp::image_tiles;
+}
 
 GraphProgramView GraphProgram::view() const
 {
@@ -47,6 +46,11 @@ std::size_t GraphProgram::bytes() const
   return code.size() * sizeof(std::uint16_t) + (constants.size() + tables.size()) * sizeof(float) +
          inputs.size() * sizeof(GraphInput) + results.size() * sizeof(std::uint16_t) +
          closures.size() * sizeof(SurfaceClosureSpec) + sizeof(GraphProgram);
+}
+
+void graph_program_run(const GraphProgramView& program, GraphRegisters& registers)
+{
+  graph_run(program, nullptr, registers);
 }
 
 GraphScalar GraphBuilder::add(const Node& node, const Key& key)
@@ -138,7 +142,7 @@ std::vector<GraphScalar> GraphBuilder::fold(GraphOp op,
   GraphProgramView view = program.view();
   view.tables = tables_.data();
   GraphRegisters registers;
-  graph_run(view, nullptr, registers);
+  graph_program_run(view, registers);
   std::vector<GraphScalar> out;
   for (int i = 0; i < shape.num_outputs; ++i) out.push_back(constant(registers.lanes[i][0]));
   return out;
@@ -149,7 +153,8 @@ std::vector<GraphScalar> GraphBuilder::apply(GraphOp op,
                                              std::span<const std::uint16_t> immediates)
 {
   const GraphOpShape& shape = shape_of(op);
-  if (can_fold(op) && std::all_of(inputs.begin(), inputs.end(), [this](GraphScalar a) { return is_constant(a); })) {
+  if (!graph_op_reads_images(op) &&
+      std::all_of(inputs.begin(), inputs.end(), [this](GraphScalar a) { return is_constant(a); })) {
     return fold(op, inputs, immediates);
   }
   if (GraphScalar simple; simplify(op, inputs, &simple)) return {simple};

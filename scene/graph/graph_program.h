@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "kernel/graph/graph_op.h"
 #include "kernel/graph/graph_program.h"
 
 namespace relief {
@@ -22,5 +23,14 @@ struct GraphProgram {
   GraphProgramView view() const;
   std::size_t bytes() const;
 };
+
+/// Whether an operation depends on the scene's textures.
+bool graph_op_reads_images(GraphOp op);
+
+struct GraphRegisters;  // kernel/graph/graph_registers.h
+
+/// Runs a program that reads no image, where scenes are made; what renders has its own for every instruction set.
+/// @param registers  the program's inputs are filled
+void graph_program_run(const GraphProgramView& program, GraphRegisters& registers);
 
 }  // namespace relief

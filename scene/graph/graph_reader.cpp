@@ -237,6 +237,34 @@ void Reader::read_nodes(const JsonReader& graph)
   for (const std::size_t node : order()) lower(node);
 }
 
+/// A graph with one output, whose numbers become the program's results.
+/// @param suns  gets the small lights that it has
+GraphProgram read_output(const GltfDocument& document,
+                                const JsonReader& graph,
+                                const char* name,
+                                GraphType type,
+                                TextureTable& textures,
+                                std::vector<GraphSun>& suns,
+                                Warnings& warnings)
+{
+  // Neither directions nor texels have attributes: what a graph reads of one is 0.
+  std::vector<std::string> attribute_names;
+  Reader r{document, graph.file(), graph.path(), textures, attribute_names, warnings, {}, {}, {}, {}};
+  try {
+    r.read_nodes(graph);
+    if (!graph.has("outputs")) graph.fail("outputs", "an object");
+    const JsonReader outputs = graph.object("outputs");
+    const GraphValue value = r.input(outputs, name, type);
+    if (value.v[0].index < 0) outputs.fail(name, "{\"node\": …}");
+    outputs.warn_unread(warnings);
+    for (std::size_t c = 0; c < (type == GraphType::kNumber ? 1u : 3u); ++c) r.build.add_result(value.v[c]);
+    suns = r.suns;
+    return r.build.compile();
+  } catch (const GraphTooLarge& error) {
+    graph.fail("", error.what(), "one that needs more");
+  }
+}
+
 }  // namespace
 
 GraphPrograms graph_read(const GltfDocument& document,
@@ -292,22 +320,18 @@ GraphProgram graph_read_color(const GltfDocument& document,
                               std::vector<GraphSun>& suns,
                               Warnings& warnings)
 {
-  // No direction has attributes: what a graph reads of one is 0.
-  std::vector<std::string> attribute_names;
-  Reader r{document, graph.file(), graph.path(), textures, attribute_names, warnings, {}, {}, {}, {}};
-  try {
-    r.read_nodes(graph);
-    if (!graph.has("outputs")) graph.fail("outputs", "an object");
-    const JsonReader outputs = graph.object("outputs");
-    if (!outputs.has("color")) outputs.fail("color", "{\"node\": …}");
-    const GraphValue color = r.input(outputs, "color", GraphType::kColor);
-    outputs.warn_unread(warnings);
-    for (const GraphScalar component : color.v) r.build.add_result(component);
-    suns = r.suns;
-    return r.build.compile();
-  } catch (const GraphTooLarge& error) {
-    graph.fail("", error.what(), "one that needs more");
-  }
+  return read_output(document, graph, "color", GraphType::kColor, textures, suns, warnings);
+}
+
+GraphProgram height_graph_read(const GltfDocument& document,
+                               const JsonReader& graph,
+                               TextureTable& textures,
+                               Warnings& warnings)
+{
+  std::vector<GraphSun> suns;
+  GraphProgram program = read_output(document, graph, "height", GraphType::kNumber, textures, suns, warnings);
+  graph.warn_unread(warnings);
+  return program;
 }
 
 }  // namespace relief

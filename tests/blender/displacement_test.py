@@ -15,6 +15,7 @@ from scenes import (
     add_plane,
     add_sphere,
     assert_same_expectation,
+    assert_warns,
     degrees,
     new_image,
     new_material,
@@ -209,6 +210,65 @@ def test_constant_height():
     tree.links.remove(node.inputs["Height"].links[0])
     node.inputs["Height"].default_value = 0.7
     _assert_agrees(scene, _square(material))
+
+
+def _graph_material(kind, scale, coordinates="UV", **values):
+    """(material, texture node) of a surface that a texture without image displaces."""
+    material, tree, texture, node = _material(scale=scale)
+    tree.nodes.remove(texture)
+    texture, coordinate = tree.nodes.new(kind), tree.nodes.new("ShaderNodeTexCoord")
+    for name, value in values.items():
+        texture.inputs[name].default_value = value
+    tree.links.new(coordinate.outputs[coordinates], texture.inputs["Vector"])
+    tree.links.new(texture.outputs["Fac"], node.inputs["Height"])
+    return material, texture
+
+
+def _displacement_of(scene):
+    """RELIEF_displacement of the first material as the add-on writes it."""
+    import json
+
+    from relief.exporter import export_frames
+    from scenes import folder
+
+    with folder() as path:
+        export_frames(scene, f"{path}/scene.gltf", [1])
+        with open(f"{path}/scene.gltf", encoding="utf-8") as file:
+            return json.load(file)["materials"][0].get("extensions", {}).get("RELIEF_displacement")
+
+
+def test_noise_over_texture_coordinates():
+    scene = _stage()
+    material, _ = _graph_material("ShaderNodeTexNoise", 0.8, Scale=5.0, Detail=2.0)
+    _assert_agrees(scene, _square(material))
+
+
+def test_wave_over_texture_coordinates():
+    scene = _stage()
+    material, _ = _graph_material("ShaderNodeTexWave", 0.25, Scale=1.3, Distortion=1.5)
+    _assert_agrees(scene, _square(material))
+
+
+def test_graphs_cover_what_meshes_use_of_their_uv_map():
+    scene = _stage()
+    plane = add_plane(4, _graph_material("ShaderNodeTexNoise", 0.8)[0])
+    for corner in plane.data.uv_layers[0].data:
+        corner.uv = (3 * corner.uv[0] - 1, corner.uv[1] / 2)
+    value = _displacement_of(scene)
+    assert np.allclose(value["heightGraph"]["uvRange"], [-1, 0.5, 2, 1]), value
+    assert abs(value["scale"] - 0.8) < 1e-6
+
+
+def test_heights_over_other_coordinates_move_nothing():
+    """Not even by midlevel · scale."""
+    scene = _stage()
+    plane = add_plane(4, _graph_material("ShaderNodeTexNoise", 0.8, coordinates="Object")[0])
+    assert_warns(scene, 'material "displaced"', "a height that is no image", "object coordinates")
+    scene.relief.strict = False
+    shown = render_runs(scene, "RELIEF", 1, 16)
+    plane.data.materials.clear()
+    plane.data.materials.append(new_material("flat", Color=(0.8, 0.7, 0.6, 1), Roughness=0.0)[0])
+    assert np.array_equal(shown, render_runs(scene, "RELIEF", 1, 16))
 
 
 def test_bump_may_displace():

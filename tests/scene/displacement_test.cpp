@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "kernel/texture/texture.h"
 #include "scene/displaced_mesh.h"
 #include "scene/displacement_seams.h"
 #include "scene/texture_store.h"
@@ -186,6 +187,200 @@ TEST(Displacement, MapsInBufferViewsAreRead)
   const int view = b.view(std::vector<char>(png.begin(), png.end()));
   b.json["images"] = {{{"bufferView", view}, {"mimeType", "image/png"}}};
   EXPECT_EQ(*static_cast<const std::uint8_t*>(height_map(load(b)).texels.get()), 128);
+}
+
+// --- heights by graph ---
+
+/// Nodes of ½ + ½ sin(turns · 2π u) + rise · v, over coordinates whose v points up.
+json sine_graph(double turns, double rise = 0)
+{
+  constexpr double kTwoPi = 6.283185307179586;
+  const json uv = {{"node", 0}, {"output", "uv"}};
+  const auto math = [](const char* operation, const json& a, const json& b) {
+    return json{{"type", "math"}, {"operation", operation}, {"inputs", {{"a", a}, {"b", b}}}};
+  };
+  const auto node = [](int index) { return json{{"node", index}}; };
+  const json x = {{"node", 1}, {"output", "x"}}, y = {{"node", 1}, {"output", "y"}};
+  return {{"nodes",
+           {{{"type", "texture-coordinate"}},
+            {{"type", "separate"}, {"inputs", {{"vector", uv}}}},
+            math("multiply", x, turns * kTwoPi),
+            math("sine", node(2), 0),
+            math("multiply", node(3), 0.5),
+            math("add", node(4), 0.5),
+            math("multiply", y, rise),
+            math("add", node(5), node(6))}},
+          {"outputs", {{"height", {{"node", 7}}}}}};
+}
+
+/// Bilinear height at a mesh's texture coordinates.
+float height_of(const Scene& scene, float u, float v)
+{
+  const HeightMapView map = height_map(scene).view();
+  const Vec2f at = texture_ref_uv(settings(scene).height, {u, v});
+  const float x = at.x * static_cast<float>(map.width) - 0.5f, y = at.y * static_cast<float>(map.height) - 0.5f;
+  const auto wrap = [](Wrap mode, int i, int n) {
+    return mode == Wrap::kRepeat ? (i % n + n) % n : std::clamp(i, 0, n - 1);
+  };
+  const auto texel = [&](int i, int j) {
+    return height_at(map, std::int64_t{wrap(map.wrap_v, j, map.height)} * map.width + wrap(map.wrap_u, i, map.width));
+  };
+  const int i = static_cast<int>(std::floor(x)), j = static_cast<int>(std::floor(y));
+  const float s = x - std::floor(x), t = y - std::floor(y);
+  return (texel(i, j) * (1 - s) + texel(i + 1, j) * s) * (1 - t) +
+         (texel(i, j + 1) * (1 - s) + texel(i + 1, j + 1) * s) * t;
+}
+
+/// Largest difference to ½ + ½ sin(turns · 2π u) + rise · (1 − v) within a rectangle.
+float sine_error(const Scene& scene, float turns, float rise, Vec2f low, Vec2f high)
+{
+  float error = 0;
+  constexpr int kSteps = 97;
+  for (int i = 0; i <= kSteps; ++i) {
+    for (int j = 0; j <= kSteps; ++j) {
+      const float u = low.x + (high.x - low.x) * static_cast<float>(i) / kSteps;
+      const float v = low.y + (high.y - low.y) * static_cast<float>(j) / kSteps;
+      const float meant = 0.5f + 0.5f * std::sin(turns * 6.2831853f * u) + rise * (1 - v);
+      error = std::max(error, std::abs(height_of(scene, u, v) - meant));
+    }
+  }
+  return error;
+}
+
+json with(json graph, const json& more)
+{
+  graph.update(more);
+  return graph;
+}
+
+TEST(HeightGraph, IsEvaluatedIntoAMapThatRepeats)
+{
+  const Scene scene = load(square_displaced({{"heightGraph", sine_graph(4)}, {"scale", 0.25}}));
+  EXPECT_EQ(settings(scene).scale, 0.25f);
+  EXPECT_EQ(height_map(scene).wrap_u, Wrap::kRepeat);
+  EXPECT_EQ(height_map(scene).wrap_v, Wrap::kRepeat);
+  EXPECT_EQ(height_map(scene).width, 256);
+  EXPECT_EQ(settings(scene).height.m00, 1);
+  EXPECT_LT(sine_error(scene, 4, 0, {-1.5f, -0.5f}, {2.5f, 1.5f}), 1.0f / 512);
+  EXPECT_EQ(num_warnings(scene, "heightGraph"), 0u);
+}
+
+TEST(HeightGraph, RepeatsAlongTheDirectionThatIsPeriodic)
+{
+  const Scene scene = load(square_displaced({{"heightGraph", sine_graph(3, 2)}}));
+  EXPECT_EQ(height_map(scene).wrap_u, Wrap::kRepeat);
+  EXPECT_EQ(height_map(scene).wrap_v, Wrap::kClamp);
+  EXPECT_LT(sine_error(scene, 3, 2, {-1.5f, 0}, {2.5f, 1}), 3.0f / 512);
+}
+
+TEST(HeightGraph, CoversWhatTheFileSaysWhereItDoesNotRepeat)
+{
+  const json graph = with(sine_graph(0.3, -1), {{"uvRange", {-2, 0.25, 3, 0.5}}});
+  GltfBuilder b = square_displaced({{"heightGraph", graph}});
+  const Scene scene = load(b);
+  EXPECT_EQ(height_map(scene).wrap_u, Wrap::kClamp);
+  EXPECT_EQ(height_map(scene).wrap_v, Wrap::kClamp);
+  EXPECT_LT(sine_error(scene, 0.3f, -1, {-2, 0.25f}, {3, 0.5f}), 1.3f / 512);
+  // The square's coordinates are 0…1.
+  EXPECT_EQ(num_warnings(scene, "texture coordinates beyond the uvRange"), 1u);
+}
+
+TEST(HeightGraph, IsAsFineAsItsDetail)
+{
+  const auto size = [](const json& graph) {
+    return height_map(load(square_displaced({{"heightGraph", graph}}))).width;
+  };
+  EXPECT_EQ(size(sine_graph(1)), 256);
+  // Between texels 2π turns / size apart, a sine sags by an eighth of that squared.
+  EXPECT_EQ(size(sine_graph(20)), 1024);
+  EXPECT_EQ(size(with(sine_graph(20), {{"resolution", 128}})), 128);
+}
+
+TEST(HeightGraph, TellsOfDetailThatIsLost)
+{
+  const Scene scene = load(square_displaced({{"heightGraph", with(sine_graph(20), {{"resolution", 128}})}}));
+  EXPECT_EQ(num_warnings(scene, "the height of material \"bark\" is known to"), 1u);
+}
+
+TEST(HeightGraph, ConstantsAreATexel)
+{
+  const json graph = {{"nodes", {{{"type", "math"}, {"operation", "add"}, {"inputs", {{"a", 0.25}, {"b", 0.5}}}}}},
+                      {"outputs", {{"height", {{"node", 0}}}}}};
+  const Scene scene = load(square_displaced({{"heightGraph", graph}}));
+  EXPECT_EQ(height_map(scene).width, 1);
+  EXPECT_EQ(height_of(scene, 0.3f, 0.7f), 0.75f);
+}
+
+TEST(HeightGraph, EqualOnesShareAMapBesideImages)
+{
+  GltfBuilder b = square_displaced({{"heightGraph", sine_graph(2)}});
+  const json same = {{"heightGraph", sine_graph(2)}, {"smoothing", true}};
+  b.push("materials", {{"extensions", {{"RELIEF_displacement", same}}}});
+  b.push("materials", {{"extensions", {{"RELIEF_displacement", {{"heightTexture", {{"index", 0}}}}}}}});
+  for (int i = 1; i < 3; ++i) {
+    b.json["meshes"].push_back(b.json["meshes"][0]);
+    b.json["meshes"][static_cast<std::size_t>(i)]["primitives"][0]["material"] = i;
+    b.root_node({{"mesh", i}});
+  }
+  const Scene scene = load(b);
+  ASSERT_EQ(scene.displacements.size(), 3u);
+  ASSERT_EQ(scene.height_maps.size(), 2u);
+  EXPECT_EQ(scene.displacements[0].height.texture_index, scene.displacements[1].height.texture_index);
+  const int image = scene.displacements[2].height.texture_index;
+  EXPECT_EQ(scene.height_maps[static_cast<std::size_t>(image)].width, 1);
+}
+
+TEST(HeightGraph, OtherInputsMoveNothingAndSaySo)
+{
+  const auto with_output = [](const json& reference) {
+    json graph = sine_graph(1);
+    graph["nodes"][1]["inputs"]["vector"] = reference;
+    return graph;
+  };
+  json image = sine_graph(1);
+  image["nodes"].push_back({{"type", "image-texture"},
+                            {"texture", {{"index", 0}}},
+                            {"inputs", {{"vector", {{"node", 0}, {"output", "uv"}}}}}});
+  image["nodes"][1]["inputs"]["vector"] = {{"node", 8}, {"output", "color"}};
+  const std::pair<json, const char*> cases[] = {
+      {with_output({{"node", 0}, {"output", "object"}}), "reads \"object\""},
+      {with_output({{"node", 0}, {"output", "generated"}}), "reads \"generated\""},
+      {with_output({{"node", 0}, {"output", "uv1"}}), "reads texCoord 1"},
+      {image, "reads an image"}};
+  for (const auto& [graph, said] : cases) {
+    const Scene scene = load(square_displaced({{"heightGraph", graph}}));
+    EXPECT_TRUE(scene.displacements.empty()) << said;
+    EXPECT_EQ(scene.materials.at(0).displacement_index, -1);
+    EXPECT_FALSE(scene.features.displacement);
+    EXPECT_EQ(num_warnings(scene, said), 1u) << said;
+    EXPECT_EQ(num_warnings(scene, "the height of material \"bark\""), 1u);
+  }
+}
+
+TEST(HeightGraph, MistakesAreNamed)
+{
+  json without_output = sine_graph(1), cycle = sine_graph(1), unknown = sine_graph(1);
+  without_output["outputs"] = json::object();
+  cycle["nodes"][2]["inputs"]["a"] = {{"node", 5}};
+  unknown["nodes"][3]["type"] = "sinus";
+  const std::pair<json, const char*> cases[] = {
+      {{{"heightGraph", without_output}}, "/heightGraph/outputs/height"},
+      {{{"heightGraph", cycle}}, "/heightGraph/nodes"},
+      {{{"heightGraph", unknown}}, "/heightGraph/nodes/3/type"},
+      {{{"heightGraph", with(sine_graph(1), {{"uvRange", {0, 0, 0, 1}}})}}, "/heightGraph/uvRange"},
+      {{{"heightGraph", with(sine_graph(1), {{"texCoord", 2}})}}, "/heightGraph/texCoord"},
+      {{{"heightGraph", with(sine_graph(1), {{"resolution", 1}})}}, "/heightGraph/resolution"},
+      {{{"heightGraph", with(sine_graph(1), {{"resolution", 0}})}}, "/heightGraph/resolution"},
+      {{{"heightGraph", sine_graph(1)}, {"heightTexture", {{"index", 0}}}}, "either heightTexture or heightGraph"},
+      {json::object(), "a heightTexture or heightGraph"}};
+  for (const auto& [value, place] : cases) {
+    try {
+      load(square_displaced(value));
+      ADD_FAILURE() << place;
+    } catch (const SceneError& error) {
+      EXPECT_NE(std::string(error.what()).find(place), std::string::npos) << error.what();
+    }
+  }
 }
 
 // --- meshes ---

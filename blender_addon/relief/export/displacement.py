@@ -2,15 +2,18 @@
 """Blender's Displacement node as RELIEF_displacement.
 
 Both move a point along the interpolated normal by scale · (height − midlevel), measured in object or world space, so
-the values are taken as they are. A height of value · texture + offset is folded into scale and midlevel.
+the values are taken as they are. A height of value · texture + offset is folded into scale and midlevel; one that varies
+otherwise, but with texture coordinates alone, is a graph that the program evaluates into a map.
 """
 
 from dataclasses import dataclass
 
+import bpy
 import numpy as np
 
 from .. import compat
 from . import nodes
+from .graph import GraphWriter, NotUnderstood
 
 _SPACES = {"OBJECT": "object", "WORLD": "world"}
 
@@ -44,15 +47,16 @@ def bump_displaces(material, settings):
     return settings.bump_displaces and not has_displacement_node(material)
 
 
-def export_displacement(material, settings, textures, texture_info, images):
+def export_displacement(material, settings, textures, texture_info, images, coordinate_set):
     """Value of RELIEF_displacement.
 
-    @param  material      bpy material with nodes
-    @param  settings      scene.relief: method, level of detail and seams of all materials
-    @param  textures      TextureReader, which has read the surface
-    @param  texture_info  makes glTF's texture reference of a Texture used as numbers; None if its image is missing
-    @param  images        ImageExporter
-    @return               None if nothing moves
+    @param  material        bpy material with nodes
+    @param  settings        scene.relief: method, level of detail and seams of all materials
+    @param  textures        TextureReader, which has read the surface
+    @param  texture_info    makes glTF's texture reference of a Texture used as numbers; None if its image is missing
+    @param  images          ImageExporter
+    @param  coordinate_set  gives the number of the set that a ("uv", name) is in; None: no room for it
+    @return                 None if nothing moves
     """
     move = _move_of_bump(textures) if textures.bump else _move_of_output(material, settings, textures)
     if move is None or move.scale == 0:
@@ -60,8 +64,18 @@ def export_displacement(material, settings, textures, texture_info, images):
     height = textures.image(move.node.inputs["Height"], move.groups)
     if height is None:
         node = move.node
-        textures.warn(f'node "{node.name}" ({node.bl_label}): a height that is no image', "nothing is displaced")
-        return None
+        try:
+            graph = _height_graph(material, node.inputs["Height"], move.groups, coordinate_set)
+        except NotUnderstood as error:
+            what = f'node "{node.name}" ({node.bl_label}): a height that is no image, nor over one uv map alone'
+            textures.warn(f"{what} ({error})", "nothing is displaced")
+            return None
+        return {
+            "heightGraph": graph,
+            "scale": move.scale,
+            "midlevel": move.midlevel,
+            **_how(material, move, settings),
+        }
     # scale · (value · h + offset − midlevel) = (scale · value) · (h − (midlevel − offset) / value)
     if height.texture is None:
         return _constant(height.value, move, images)
@@ -72,6 +86,13 @@ def export_displacement(material, settings, textures, texture_info, images):
         "heightTexture": info,
         "scale": move.scale * height.value,
         "midlevel": (move.midlevel - height.offset) / height.value,
+        **_how(material, move, settings),
+    }
+
+
+def _how(material, move, settings):
+    """What of RELIEF_displacement is not the height."""
+    return {
         "space": move.space,
         "method": settings.displacement_method,
         "lod": "auto" if settings.lod < 0 else settings.lod,
@@ -79,6 +100,75 @@ def export_displacement(material, settings, textures, texture_info, images):
         "smoothing": compat.displacement_method(material) == "BOTH",
         "seams": "weld" if settings.weld_seams else "keep",
     }
+
+
+def _height_graph(material, socket, groups, coordinate_set):
+    """heightGraph of an input that varies with one set of texture coordinates.
+
+    @error  NotUnderstood
+    """
+    used = {}
+
+    def number_of(source):
+        if used and source not in used:
+            raise NotUnderstood("two uv maps")
+        used[source] = coordinate_set(source)
+        return used[source]
+
+    def no_image(node):
+        raise NotUnderstood(f'node "{node.name}": an image among what it is made of')
+
+    graph = GraphWriter(number_of, no_image)
+    height = graph.value(socket, groups)
+    if not isinstance(height, dict):
+        raise NotUnderstood("no number")
+    for node in graph.nodes:
+        if node["type"] in _VARYING:
+            raise NotUnderstood(f"it varies with {node['type'].replace('-', ' ')}")
+        for value in node.get("inputs", {}).values():
+            if not isinstance(value, dict) or graph.nodes[value["node"]]["type"] != "texture-coordinate":
+                continue
+            if value["output"] not in {"uv", "uv1"}:
+                raise NotUnderstood(f"{value['output']} coordinates")
+    json = {"nodes": graph.nodes, "outputs": {"height": height}}
+    for (_, name), number in used.items():
+        if number:
+            json["texCoord"] = number
+        covered = _uv_range(material, name)
+        if covered is not None:
+            json["uvRange"] = covered
+    return json
+
+
+#: Nodes whose outputs differ between points of equal texture coordinates.
+_VARYING = {
+    *("geometry", "vertex-color", "attribute", "object-info", "light-path", "camera-data", "tangent", "normal-map"),
+    *("fresnel", "layer-weight", "bump", "wireframe", "transform", "vector-transform"),
+}
+
+
+def _uv_range(material, name):
+    """What the meshes of a material cover of a uv map, as glTF's coordinates [u, v, u, v]; None: nothing that is known."""
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for item in bpy.data.objects:
+        mesh = item.data
+        if item.type != "MESH" or all(slot.material != material.original for slot in item.material_slots):
+            continue
+        layer = mesh.uv_layers.get(name) if name else next((la for la in mesh.uv_layers if la.active_render), None)
+        if layer is None or not len(layer.data):
+            continue
+        uv = np.empty(2 * len(layer.data), dtype=np.float32)
+        layer.data.foreach_get("uv", uv)
+        uv = uv.reshape(-1, 2).astype(float)
+        uv = uv[np.isfinite(uv).all(axis=1)]
+        if len(uv):
+            low, high = np.minimum(low, uv.min(axis=0)), np.maximum(high, uv.max(axis=0))
+    # The format wants a rectangle that is neither endless nor without area.
+    low, high = np.clip(low, -1e6, 1e6), np.clip(high, -1e6, 1e6)
+    if not (high >= low).all():
+        return None
+    high = np.maximum(high, low + 1e-5 * np.maximum(1.0, np.abs(low)))
+    return [float(low[0]), float(1.0 - high[1]), float(high[0]), float(1.0 - low[1])]
 
 
 def _move_of_output(material, settings, textures):

@@ -165,7 +165,9 @@ class MaterialJob:
             self._warn(what, instead)
 
         self._textures.warn = warn
-        value = export_displacement(material, settings, self._textures, self._data_info, self._images)
+        value = export_displacement(
+            material, settings, self._textures, self._data_info, self._images, self._coordinate_set
+        )
         if value is not None:
             self._displaced = True
             self._by_shading = not value["smoothing"]
