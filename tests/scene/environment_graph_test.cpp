@@ -140,7 +140,7 @@ TEST(EnvironmentGraph, WhatDependsOnTheRayIsWarnedAbout)
 json sky(json options)
 {
   options["type"] = "sky-texture";
-  json e = environment({options}, {{"node", 0}});
+  json e = environment(json::array({options}), {{"node", 0}});
   e["graph"]["resolution"] = 1024;
   return e;
 }
@@ -199,7 +199,7 @@ TEST(EnvironmentGraph, ImagesAreLookedUpByDirection)
 {
   for (const char* projection : {"equirectangular", "mirror-ball"}) {
     const json node = {{"type", "environment-texture"}, {"projection", projection}, {"texture", {{"index", 0}}}};
-    const Vec3f grey = radiance(load(environment({node}, {{"node", 0}, {"output", "color"}})), 0.3f, 0.4f);
+    const Vec3f grey = radiance(load(environment(json::array({node}), {{"node", 0}, {"output", "color"}})), 0.3f, 0.4f);
     EXPECT_GT(grey.x, 0.1f);
     EXPECT_LT(grey.x, 0.9f);
   }
