@@ -82,7 +82,8 @@ RELIEF_KERNEL int image_floor(float x, float* rest)
   const float bounded = clamp(x, -kFar, kFar);  // NaN: −kFar
   // Negative whole numbers count as the end of the texel before, as in Cycles.
   const int i = static_cast<int>(bounded) - (bounded < 0.0f ? 1 : 0);
-  *rest = bounded - static_cast<float>(i);
+  // Where whole numbers are further apart than 1, the end of the texel before would be 2 away.
+  *rest = min(bounded - static_cast<float>(i), 1.0f);
   return i;
 }
 

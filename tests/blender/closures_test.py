@@ -301,8 +301,10 @@ def _displaced(method="BUMP"):
 def test_bump_only_bends_every_normal():
     """(height − midlevel) · scale is the height of a bump below all closures and below bumps of their own."""
     material, tree, output, node = _displaced()
-    (closure,), graph, _ = _closures(material, _GRAPHED)
-    bump = graph[closure["normal"]["node"]]
+    (closure,), graph, found = _closures(material, _GRAPHED)
+    own = found["extensions"]["RELIEF_surface"]["normal"]
+    assert "normal" not in closure, closure
+    bump = graph[own["node"]]
     assert bump["type"] == "bump" and (bump["inputs"]["strength"], bump["inputs"]["distance"]) == (1, 1), graph
     # In object space a height is as long as the object's scale makes it.
     height = graph[bump["inputs"]["height"]["node"]]["inputs"]
@@ -312,13 +314,14 @@ def test_bump_only_bends_every_normal():
     shifted = graph[scaled["inputs"]["a"]["node"]]
     assert shifted["operation"] == "subtract" and _near(shifted["inputs"]["b"], 0.25), graph
     node.space = "WORLD"
-    (closure,), graph, _ = _closures(material, _GRAPHED)
-    assert graph[graph[closure["normal"]["node"]]["inputs"]["height"]["node"]] ["operation"] == "multiply", graph
+    _, graph, found = _closures(material, _GRAPHED)
+    own = found["extensions"]["RELIEF_surface"]["normal"]
+    assert graph[graph[own["node"]]["inputs"]["height"]["node"]]["operation"] == "multiply", graph
     shader = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeBsdfDiffuse")
-    own = _value_node(tree, shader.inputs["Normal"], "ShaderNodeBump")
-    _value_node(tree, own.inputs["Height"], "ShaderNodeTexMagic", 1)
-    (second,), graph, _ = _closures(material, _GRAPHED)
-    assert graph[second["normal"]["node"]]["inputs"]["normal"] == closure["normal"], graph
+    above = _value_node(tree, shader.inputs["Normal"], "ShaderNodeBump")
+    _value_node(tree, above.inputs["Height"], "ShaderNodeTexMagic", 1)
+    (second,), graph, found = _closures(material, _GRAPHED)
+    assert graph[second["normal"]["node"]]["inputs"]["normal"] == found["extensions"]["RELIEF_surface"]["normal"], graph
     # A height that is the same everywhere bends nothing.
     tree.links.remove(node.inputs["Height"].links[0])
     tree.links.remove(shader.inputs["Normal"].links[0])
@@ -330,8 +333,9 @@ def test_a_vector_of_the_world_bends_along_the_normal():
     node = _value_node(tree, output.inputs["Displacement"], "ShaderNodeVectorDisplacement")
     node.space = "WORLD"
     _value_node(tree, node.inputs["Vector"], output=1)
-    (closure,), graph, _ = _closures(material, _GRAPHED)
-    height = graph[graph[closure["normal"]["node"]]["inputs"]["height"]["node"]]
+    _, graph, found = _closures(material, _GRAPHED)
+    normal = found["extensions"]["RELIEF_surface"]["normal"]
+    height = graph[graph[normal["node"]]["inputs"]["height"]["node"]]
     assert (height["type"], height["operation"]) == ("vector-math", "dot"), graph
     assert graph[height["inputs"]["b"]["node"]]["type"] == "geometry", graph
 

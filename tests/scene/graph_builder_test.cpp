@@ -58,7 +58,8 @@ TEST(GraphBuilder, ComputesTexturesAtKnownPoints)
   GraphBuilder b;
   const GraphScalar p[] = {b.constant(0.3f), b.constant(-1.7f), b.constant(4.4f)};
   float value = 0;
-  ASSERT_TRUE(b.is_constant(b.apply(Op::signed_noise_3d, p)[0], &value));
+  const std::uint16_t repeats = 0;
+  ASSERT_TRUE(b.is_constant(b.apply(Op::signed_noise_3d, p, {&repeats, 1})[0], &value));
   EXPECT_GT(std::abs(value), 1e-3f);
   EXPECT_LT(std::abs(value), 1.1f);
 }
@@ -67,8 +68,8 @@ TEST(GraphBuilder, DoesNotComputeImages)
 {
   GraphBuilder b;
   const GraphScalar zero = b.constant(0), in[] = {zero, zero, zero};
-  const std::uint16_t texture = 0;
-  EXPECT_FALSE(b.is_constant(b.apply(Op::image, in, {&texture, 1})[0]));
+  const std::uint16_t texture[] = {0, 0};
+  EXPECT_FALSE(b.is_constant(b.apply(Op::image, in, texture)[0]));
 }
 
 TEST(GraphBuilder, MakesEqualPartsOnce)

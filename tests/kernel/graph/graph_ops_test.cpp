@@ -248,7 +248,7 @@ TEST_P(GraphOps, ImagesAreReadAtAnyCoordinates)
       texture.width = 3, texture.height = 2, texture.num_levels = 1, texture.num_channels = 1;
       texture.wrap_u = texture.wrap_v = wrap, texture.filter = filter;
       for (int round = 0; round < 2'000; ++round) {
-        for (const std::vector<float>& channel : run_one(GetParam(), Op::image, numbers.lanes(3), {0}, &texture)) {
+        for (const std::vector<float>& channel : run_one(GetParam(), Op::image, numbers.lanes(3), {0, 0}, &texture)) {
           for (const float x : channel) EXPECT_TRUE(x >= 0 && x <= 1) << x;
         }
       }
