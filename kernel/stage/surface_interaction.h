@@ -171,6 +171,16 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
     p.base_color += lobes.lobes[i].weight;
   }
   p.base_color = min(p.base_color, splat3(1.0f));
+  // What denoisers ask for, see surface_is_seen_through: whether nearly all of it mirrors or is clear.
+  constexpr float kSharpest = 0.27386f;  // √.075
+  float sharp = 0.0f;
+  for (int i = 0; i < lobes.size; ++i) {
+    if (lobes.lobes[i].roughness <= kSharpest) sharp += lobes.lobes[i].probability;
+  }
+  if (sharp > 0.0f && 4.0f * (scattered - sharp) < scattered) {
+    p.roughness = 0.0f;
+    p.metallic = 1.0f;
+  }
   const float passing = max_component(build.transparency);
   if (!(passing > 0.0f)) return;
   // Whichever way a path takes, it takes by its share of the light; what it then carries makes up for the chance.
