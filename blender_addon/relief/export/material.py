@@ -150,7 +150,8 @@ class MaterialJob:
         if self._graph.own_normal is not None:
             surface["normal"] = self._graph.own_normal
         self._extend("RELIEF_surface", surface)
-        self._uses_graph = any(isinstance(value, dict) for closure in closures.closures for value in closure.values())
+        refers = any(isinstance(value, dict) for closure in closures.closures for value in closure.values())
+        self._uses_graph = refers or self._graph.own_normal is not None
         if self._uses_graph:
             self._extend("RELIEF_graph", {"nodes": self._graph.nodes})
         self._write_emission(closures.emission)
