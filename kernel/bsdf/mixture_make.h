@@ -91,7 +91,7 @@ RELIEF_KERNEL MixtureLobe* mixture_add(MixtureBuild& b, Vec3f weight, const Fram
 RELIEF_KERNEL void lobe_set_microfacets(MixtureLobe& lobe, const SurfaceClosureSpec& spec, float roughness, AnisotropicAlpha alpha)
 {
   const SmithMasking masking = spec.is_4 ? SmithMasking::kCorrelated : SmithMasking::kSeparable;
-  lobe.roughness = clamp(roughness, 0.0f, 1.0f);
+  lobe.roughness = spec.distribution == ClosureDistribution::kSharp ? 0.0f : clamp(roughness, 0.0f, 1.0f);
   lobe.is_delta = spec.distribution == ClosureDistribution::kSharp || sqr(lobe.roughness) < kDeltaAlpha;
   switch (spec.distribution) {
     case ClosureDistribution::kBeckmann:
@@ -196,7 +196,7 @@ RELIEF_KERNEL void refraction_add(MixtureBuild& b,
   MixtureLobe* lobe = mixture_add(b, weight, frame_from_normal(N));
   if (lobe == nullptr) return;
   lobe->kind = MixtureLobeKind::kRefraction;
-  lobe->roughness = saturated(roughness);
+  lobe->roughness = spec.distribution == ClosureDistribution::kSharp ? 0.0f : saturated(roughness);
   const float alpha = sqr(lobe->roughness);
   lobe->is_delta = spec.distribution == ClosureDistribution::kSharp || alpha < kDeltaAlpha || dielectric_is_matched(eta);
   lobe->shape.refraction = {alpha, eta, spec.distribution == ClosureDistribution::kBeckmann,
@@ -223,7 +223,7 @@ RELIEF_KERNEL void glass_add(MixtureBuild& b,
   MixtureLobe* lobe = mixture_add(b, splat3(weight), frame_from_normal(N));
   if (lobe == nullptr) return;
   lobe->kind = MixtureLobeKind::kGlass;
-  lobe->roughness = saturated(roughness);
+  lobe->roughness = spec.distribution == ClosureDistribution::kSharp ? 0.0f : saturated(roughness);
   const float alpha = sqr(lobe->roughness);
   lobe->fresnel = fresnel;
   lobe->is_delta = spec.distribution == ClosureDistribution::kSharp || alpha < kDeltaAlpha ||
