@@ -10,16 +10,7 @@ namespace relief {
 
 enum class ClosureKind : std::uint8_t {
 #define CLOSURE(name, Type) name,
-#define COLOR(name, json, r, g, b)
-#define NUMBER(name, json, value)
-#define VECTOR(name, json)
-#define END()
 #include "kernel/bsdf/closure_inputs.inc"
-#undef CLOSURE
-#undef COLOR
-#undef NUMBER
-#undef VECTOR
-#undef END
   kCount
 };
 
@@ -32,11 +23,6 @@ enum class ClosureKind : std::uint8_t {
   }           \
   ;
 #include "kernel/bsdf/closure_inputs.inc"
-#undef CLOSURE
-#undef COLOR
-#undef NUMBER
-#undef VECTOR
-#undef END
 
 /// Microfacets of glossy, refraction, glass, metallic and Principled closures.
 enum class ClosureDistribution : std::uint8_t { kGgx, kMultiscatterGgx, kBeckmann, kAshikhminShirley, kSharp };

@@ -87,8 +87,12 @@ RELIEF_KERNEL MixtureLobe* mixture_add(MixtureBuild& b, Vec3f weight, const Fram
 }
 
 /// Makes a lobe one of reflection by microfacets.
-/// @param alpha  before it is bounded
-RELIEF_KERNEL void lobe_set_microfacets(MixtureLobe& lobe, const SurfaceClosureSpec& spec, float roughness, AnisotropicAlpha alpha)
+/// @param roughness  perceptual: whether the lobe is sharp, and how wide ray cones become
+/// @param alpha      of both directions, bounded
+RELIEF_KERNEL void lobe_set_microfacets(MixtureLobe& lobe,
+                                        const SurfaceClosureSpec& spec,
+                                        float roughness,
+                                        AnisotropicAlpha alpha)
 {
   const SmithMasking masking = spec.is_4 ? SmithMasking::kCorrelated : SmithMasking::kSeparable;
   lobe.roughness = spec.distribution == ClosureDistribution::kSharp ? 0.0f : clamp(roughness, 0.0f, 1.0f);

@@ -36,16 +36,7 @@ RELIEF_KERNEL void closures_resolve(const GraphLane& at, MixtureBuild& build)
   case ClosureKind::name:                                                   \
     closure_add(build, spec, weight, closure_inputs<Type##Inputs>(at, spec)); \
     break;
-#define COLOR(name, json, r, g, b)
-#define NUMBER(name, json, value)
-#define VECTOR(name, json)
-#define END()
 #include "kernel/bsdf/closure_inputs.inc"
-#undef CLOSURE
-#undef COLOR
-#undef NUMBER
-#undef VECTOR
-#undef END
       case ClosureKind::kCount:
         break;
     }

@@ -348,9 +348,8 @@ RELIEF_KERNEL void shade_surface_first_hit(const KernelGlobals& g,
 /// lobe α of .075, and less than a quarter of the light scattered otherwise.
 RELIEF_KERNEL bool surface_is_seen_through(const SurfaceParams& p)
 {
-  constexpr float kSharpest = 0.27386f;  // √.075
   constexpr float kLeastReflection = 0.04f;
-  if (p.unlit || p.roughness > kSharpest) return false;
+  if (p.unlit || p.roughness > kSeenThroughRoughness) return false;
   const float base = max_component(p.base_color);
   const float diffuse = (1.0f - p.metallic) * (1.0f - p.transmission) * base;
   const float sharp = p.metallic * base + (1.0f - p.metallic) * (p.specular * kLeastReflection + p.transmission * base);

@@ -59,6 +59,9 @@ RELIEF_KERNEL Vec3f shading_normal_towards(Vec3f Ns, Vec3f Ng_side, Vec3f wo)
 /// Cosine between a shading normal and what was made of it, less than which it was bent: 1 but for rounding.
 inline constexpr float kUnbent = 1.0f - 1e-6f;
 
+/// Lobes up to this perceptual roughness, a width α of .075, let denoisers see what is behind or mirrored, as in Cycles.
+inline constexpr float kSeenThroughRoughness = 0.27386f;
+
 /// The point that a path has hit; its material's parameters there are left open.
 /// @param wo  unit, back along the path's ray
 template <unsigned kFeatures>
@@ -172,10 +175,9 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   }
   p.base_color = min(p.base_color, splat3(1.0f));
   // What denoisers ask for, see surface_is_seen_through: whether nearly all of it mirrors or is clear.
-  constexpr float kSharpest = 0.27386f;  // √.075
   float sharp = 0.0f;
   for (int i = 0; i < lobes.size; ++i) {
-    if (lobes.lobes[i].roughness <= kSharpest) sharp += lobes.lobes[i].probability;
+    if (lobes.lobes[i].roughness <= kSeenThroughRoughness) sharp += lobes.lobes[i].probability;
   }
   if (sharp > 0.0f && 4.0f * (scattered - sharp) < scattered) {
     p.roughness = 0.0f;

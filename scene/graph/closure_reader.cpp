@@ -32,11 +32,6 @@ const std::vector<ClosureTable>& closure_tables()
 #define VECTOR(name, json) {json, InputKind::kVector, {0, 0, 0}},
 #define END() }},
 #include "kernel/bsdf/closure_inputs.inc"
-#undef CLOSURE
-#undef COLOR
-#undef NUMBER
-#undef VECTOR
-#undef END
   };
   return tables;
 }
