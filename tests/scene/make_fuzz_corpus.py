@@ -166,6 +166,33 @@ def graphs():
     return b
 
 
+def closures():
+    """Surfaces of closures, with and without a graph; heights by graph."""
+    b = Builder()
+    nodes = [{"type": "texture-coordinate"},
+             {"type": "noise-texture", "inputs": {"vector": {"node": 0, "output": "uv"}}},
+             {"type": "bump", "inputs": {"height": {"node": 1, "output": "factor"}, "distance": .1}, "invert": True}]
+    factor, normal = {"node": 1, "output": "factor"}, {"node": 2}
+    first = {"closures": [
+        {"type": "diffuse", "weight": factor, "roughness": .5, "normal": normal, "maths": "4.3"},
+        {"type": "glossy", "weight": .5, "anisotropy": -.5, "tangent": [1, 0, 0], "distribution": "beckmann"},
+        {"type": "transparent", "color": [1, .5, .25]}, {"type": "emission", "strength": factor},
+        {"type": "toon", "component": "glossy", "size": 1e30}, {"type": "holdout", "weight": 1e-9}],
+        "normal": normal}
+    second = {"closures": [
+        {"type": "principled", "metallic": -1, "ior": 0, "distribution": "multiscatter-ggx"},
+        {"type": "principled", "maths": "4.3", "coatWeight": 1, "coatIor": 0, "thinFilmThickness": 500},
+        {"type": "metallic", "fresnel": "physical"}, {"type": "glass", "ior": 1}, {"type": "refraction"},
+        {"type": "velvet"}, {"type": "sheen"}, {"type": "translucent"}]}
+    height = {"nodes": nodes[:2], "outputs": {"height": factor}, "resolution": 4}
+    b.json["materials"] = [
+        {"extensions": {"RELIEF_graph": {"nodes": nodes}, "RELIEF_surface": first}},
+        {"extensions": {"RELIEF_surface": second, "RELIEF_displacement": {"heightGraph": height, "scale": .1}}}]
+    for material in range(2):
+        b.node(mesh=b.square(material=material))
+    return b
+
+
 def lights():
     b = Builder()
     kinds = [{"type": "point", "intensity": 5}, {"type": "directional", "color": [1, 0, 0]},
@@ -221,7 +248,7 @@ def composition():
 def main():
     folder = pathlib.Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
-    for make in (plain, topologies, materials, graphs, lights, animation, composition):
+    for make in (plain, topologies, materials, graphs, closures, lights, animation, composition):
         (folder / f"{make.__name__}.gltf").write_bytes(make().gltf())
         (folder / f"{make.__name__}.glb").write_bytes(make().glb())
 
