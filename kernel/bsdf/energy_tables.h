@@ -38,7 +38,10 @@ struct SheenAlbedo {
   float bound = 1;   ///< 1, or less where the published model would reflect more than it receives
 };
 
-/// About 46 kB; a render needs one. Glass and sheen are filled only if asked for.
+/// Nodes along each axis of BsdfTables::reflected_share.
+inline constexpr int kShareNodes = 16;
+
+/// About 62 kB; a render needs one. Glass, sheen and what closures ask for are filled only if asked for.
 struct BsdfTables {
   GgxEntry ggx[kGgxRoughnesses][kGgxCosines];
   /// Means over the cosine-weighted hemisphere. Losses grow with alpha² and are stored divided by it, so that rows can
@@ -47,6 +50,9 @@ struct BsdfTables {
   float glass_root_lost[2][kGlassIors][kGlassRoughnesses][kGlassCosines];  ///< √(1 − albedo); [0]: from the thin side
   float glass_lost_mean[2][kGlassIors][kGlassRoughnesses];                 ///< over alpha²
   SheenAlbedo sheen[kSheenRoughnesses][kSheenCosines];
+  /// How far the reflectance of visible microfacets has risen from F0 to 1 along a dielectric's curve, on the mean, those that
+  /// lose the ray not at all: by roughness, fourth root of F0, cosine; axes from 0 to 1, linear.
+  float reflected_share[kShareNodes][kShareNodes][kShareNodes];
 };
 
 /// Position between two nodes of a table's axis.
@@ -361,14 +367,62 @@ RELIEF_KERNEL void sheen_tables_make(BsdfTables& tables)
   }
 }
 
+RELIEF_KERNEL void reflected_share_make(BsdfTables& tables)
+{
+  constexpr int kRows = 8, kColumns = 16;  // of points on the unit square
+  const auto node = [](int i) { return static_cast<float>(i) / (kShareNodes - 1); };
+  for (int r = 0; r < kShareNodes; ++r) {
+    const float alpha = max(1e-4f, sqr(node(r)));
+    for (int c = 0; c < kShareNodes; ++c) {
+      const float cos_o = max(1e-4f, node(c));
+      const Vec3f wo{__builtin_sqrtf(1.0f - sqr(cos_o)), 0.0f, cos_o};
+      float met[kRows * kColumns];  // cosines to microfacets that reflect upwards
+      int num_met = 0;
+      for (int i = 0; i < kRows * kColumns; ++i) {
+        const Vec2f u{(static_cast<float>(i % kColumns) + 0.5f) / kColumns, (static_cast<float>(i / kColumns) + 0.5f) / kRows};
+        const Vec3f wm = warp_ggx_visible_normal(wo, alpha, u);
+        const float cos_d = dot(wo, wm);
+        if (2.0f * cos_d * wm.z > wo.z) met[num_met++] = min(1.0f, cos_d);
+      }
+      for (int f = 0; f < kShareNodes; ++f) {
+        const float F0 = min(sqr(sqr(clamp(node(f), 1e-4f, 0.99f))), 0.99f);
+        const float eta = (1.0f + __builtin_sqrtf(F0)) / (1.0f - __builtin_sqrtf(F0));
+        float sum = 0.0f;
+        for (int i = 0; i < num_met; ++i) {
+          const float F = fresnel_dielectric(met[i], refracted_cosine(met[i], eta), eta);
+          sum += clamp((F - F0) / (1.0f - F0), 0.0f, 1.0f);
+        }
+        tables.reflected_share[r][f][c] = sum / (kRows * kColumns);
+      }
+    }
+  }
+}
+
+/// How far a rough dielectric's albedo lies between its F0 and 1, as the Principled BSDF of 4.x takes it.
+/// @param eta    index of the far side / index of wo's side
+/// @param cos_o  (0, 1]
+RELIEF_KERNEL float reflected_share(const BsdfTables& tables, float roughness, float eta, float cos_o)
+{
+  const float root = __builtin_sqrtf(__builtin_fabsf((eta - 1.0f) / (eta + 1.0f)));
+  const TableCoordinate r = table_coordinate(roughness, kShareNodes), f = table_coordinate(root, kShareNodes),
+                        c = table_coordinate(cos_o, kShareNodes);
+  const auto along_c = [&](int i, int j) {
+    const float* row = tables.reflected_share[r.index + i][f.index + j] + c.index;
+    return lerp(c.t, row[0], row[1]);
+  };
+  return lerp(r.t, lerp(f.t, along_c(0, 0), along_c(0, 1)), lerp(f.t, along_c(1, 0), along_c(1, 1)));
+}
+
 /// Fills the tables; the same bits on every run.
-/// @param features  FeatureBit mask of the scene: without transmission there is no glass table, without layers no sheen
+/// @param features  FeatureBit mask of the scene: without transmission there is no glass table, without layers no sheen,
+///                  without closures nothing of theirs
 /// @cost            see the test BsdfTables.AreMadeWithinTheirBudget
 RELIEF_KERNEL void bsdf_tables_make(BsdfTables& tables, unsigned features = kFeatureAll)
 {
   ggx_tables_make(tables);
   if ((features & kFeatureTransmission) != 0) glass_tables_make(tables);
   if ((features & kFeatureLayers) != 0) sheen_tables_make(tables);
+  if ((features & kFeatureMixture) != 0) reflected_share_make(tables);
 }
 
 }  // namespace relief

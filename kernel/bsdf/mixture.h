@@ -68,7 +68,7 @@ RELIEF_KERNEL Mixture mixture_part(const Mixture& m, SharpLobes sharp)
 
 /// As closure_eval of a SurfaceClosure; pdf of the chosen lobes.
 template <unsigned kFeatures, TransportMode kMode = TransportMode::kRadiance>
-RELIEF_KERNEL BsdfEval closure_eval(const Mixture& m, const BsdfTables&, Vec3f wi_local)
+RELIEF_KERNEL BsdfEval closure_eval(const Mixture& m, const BsdfTables& tables, Vec3f wi_local)
 {
   BsdfEval e;
   const float cos_i = __builtin_fabsf(wi_local.z);
@@ -78,7 +78,7 @@ RELIEF_KERNEL BsdfEval closure_eval(const Mixture& m, const BsdfTables&, Vec3f w
     const Vec3f wi_lobe = to_local(lobe.frame, wi);
     // What is above a bent normal and below the surface's would leave on the wrong side; sampling loses it, too.
     if ((wi_lobe.z < 0.0f) != (wi_local.z < 0.0f)) return;
-    const BsdfEval one = mixture_lobe_eval<kMode>(lobe, wi_lobe);
+    const BsdfEval one = mixture_lobe_eval<kMode>(lobe, tables, wi_lobe);
     e.f += lobe.weight * one.f;
     e.pdf += lobe.probability * one.pdf;
   });

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "kernel/bsdf/ashikhmin_shirley.h"
+#include "kernel/bsdf/base_interface.h"
 #include "kernel/bsdf/beckmann.h"
 #include "kernel/bsdf/clearcoat_gtr1.h"
 #include "kernel/bsdf/fresnel_models.h"
@@ -33,6 +34,7 @@ enum class MixtureLobeKind : std::uint8_t {
   kBeckmann,
   kAshikhminShirley,
   kClearcoat,
+  kMultiple,
   kRefraction,
   kGlass,
 };
@@ -63,6 +65,13 @@ struct MixtureGlass {
   Vec3f reflection_tint{1, 1, 1}, transmission_tint{1, 1, 1};
 };
 
+/// What a rough reflection scatters more than once, as MultipleLobe has it.
+struct MixtureMultiple {
+  GgxCoordinate ggx;
+  MultipleScattering scattering;
+  float over_mean = 0;  ///< 1 − E(wo), over π times its mean
+};
+
 /// Parameters of a lobe, by its kind.
 union LobeShape {
   LobeShape() : none(0) {}
@@ -77,6 +86,7 @@ union LobeShape {
   Beckmann beckmann;
   AshikhminShirley ashikhmin_shirley;
   ClearcoatGtr1 clearcoat;
+  MixtureMultiple multiple;
   MicrofacetRefraction refraction;
   MixtureGlass glass;
 };
@@ -167,7 +177,7 @@ RELIEF_KERNEL BsdfEval mixture_glass_eval(const MixtureLobe& lobe, Vec3f wi)
 /// @param wi  the lobe's frame
 /// @return    f times |cos| to the lobe's own normal, before its weight; pdf as if the lobe were chosen
 template <TransportMode kMode>
-RELIEF_KERNEL BsdfEval mixture_lobe_eval(const MixtureLobe& lobe, Vec3f wi)
+RELIEF_KERNEL BsdfEval mixture_lobe_eval(const MixtureLobe& lobe, const BsdfTables& tables, Vec3f wi)
 {
   using K = MixtureLobeKind;
   const bool transmits = lobe.kind == K::kTranslucent || lobe.kind == K::kRefraction;
@@ -219,6 +229,11 @@ RELIEF_KERNEL BsdfEval mixture_lobe_eval(const MixtureLobe& lobe, Vec3f wi)
     case K::kClearcoat:
       is_microfacet = true;
       e.f = splat3(clearcoat_gtr1_eval(lobe.shape.clearcoat, wo, wi, &e.pdf));
+      break;
+    case K::kMultiple:
+      is_diffuse = false;
+      e = {splat3(lobe.shape.multiple.over_mean * ggx_albedo(tables, lobe.shape.multiple.ggx, wi.z).lost),
+           multiple_scattering_pdf(lobe.shape.multiple.scattering, wi.z)};
       break;
     case K::kRefraction:
       is_diffuse = false;
@@ -313,6 +328,8 @@ RELIEF_KERNEL LobeSample mixture_lobe_sample(const MixtureLobe& lobe, float u_ch
       return lobe_sample_glossy(ashikhmin_shirley_sample(lobe.shape.ashikhmin_shirley, wo, u), false, sqr(lobe.roughness));
     case K::kClearcoat:
       return lobe_sample_glossy(clearcoat_gtr1_sample(lobe.shape.clearcoat, wo, u), false, sqr(lobe.roughness));
+    case K::kMultiple:
+      return lobe_sample_diffuse(multiple_scattering_sample(lobe.shape.multiple.scattering, u), false);
     case K::kRefraction:
       return lobe_sample_glossy(microfacet_refraction_sample(lobe.shape.refraction, wo, u), true, sqr(lobe.roughness));
     default:

@@ -7,6 +7,7 @@
 #include "kernel/bsdf/closure_kinds.h"
 #include "kernel/bsdf/microfacet_energy.h"
 #include "kernel/bsdf/mixture.h"
+#include "kernel/bsdf/surface_closure.h"
 #include "kernel/bsdf/surface_params.h"
 
 namespace relief {
@@ -40,13 +41,49 @@ RELIEF_KERNEL float mean_component(Vec3f v) { return (v.x + v.y + v.z) * (1.0f /
 /// A vector of a graph, which has Z up, in the scene's world.
 RELIEF_KERNEL Vec3f world_from_z_up(Vec3f v) { return {v.x, v.z, -v.y}; }
 
-/// A closure's normal.
+/// A normal turned towards the geometric one, in the plane of both, until a mirror reflects wo above the true surface: as Cycles
+/// has it, where shading_normal_consistent leaves that plane.
+///
+/// In that plane mirroring adds angles: the normal lies half way between wo's projection and the reflected direction's, and only
+/// the height of the latter is asked for.
+/// @param Ng, N, wo  unit, dot(Ng, wo) > 0
+RELIEF_KERNEL Vec3f normal_with_reflection_above(Vec3f Ng, Vec3f N, Vec3f wo)
+{
+  const float height_o = dot(Ng, wo);
+  // Rays may always leave as shallow as they come.
+  const float height = min(0.9f * height_o, 0.01f);
+  if (2.0f * dot(N, wo) * dot(N, Ng) - height_o >= height) return N;
+  const Vec3f aside = N - dot(N, Ng) * Ng;
+  const float squared = length_squared(aside);
+  if (!(squared > 1e-12f)) return Ng;
+  const Vec3f X = aside / __builtin_sqrtf(squared);
+  const float x = dot(wo, X);
+  const float inv_length = 1.0f / __builtin_sqrtf(x * x + height_o * height_o);
+  const float reflected_z = height * inv_length;
+  const Vec3f middle = (x * inv_length + safe_sqrt(1.0f - sqr(reflected_z))) * X + (height_o * inv_length + reflected_z) * Ng;
+  return normalize(middle);
+}
+
+/// A closure's normal as it is given.
 /// @param given  Z up; 0: the surface's
-RELIEF_KERNEL Vec3f closure_normal(const MixtureBuild& b, Vec3f given)
+RELIEF_KERNEL Vec3f closure_normal_as_given(const MixtureBuild& b, Vec3f given)
 {
   const float squared = length_squared(given);
   if (!(squared > 0.0f && squared < kInfinity)) return b.Ns;
-  return shading_normal_consistent(b.Ng, world_from_z_up(given) / __builtin_sqrtf(squared), b.wo);
+  return world_from_z_up(given) / __builtin_sqrtf(squared);
+}
+
+/// A closure's normal, by which wo is reflected above the true surface.
+/// @param given  Z up; 0: the surface's
+RELIEF_KERNEL Vec3f closure_normal(const MixtureBuild& b, Vec3f given)
+{
+  return normal_with_reflection_above(b.Ng, closure_normal_as_given(b, given), b.wo);
+}
+
+/// The same of a closure that does not mirror: since 4.0 Cycles leaves these as they are given.
+RELIEF_KERNEL Vec3f closure_diffuse_normal(const MixtureBuild& b, const SurfaceClosureSpec& spec, Vec3f given)
+{
+  return spec.is_4 ? closure_normal_as_given(b, given) : closure_normal(b, given);
 }
 
 /// Frame about a normal whose x is turned from a tangent.
@@ -66,12 +103,15 @@ RELIEF_KERNEL Frame closure_tangent_frame(Vec3f N, Vec3f tangent, float turns)
 }
 
 /// Adds a lobe, unless it weighs nothing: Lambert's, which the caller may make another. It is sampled by its weight.
-RELIEF_KERNEL MixtureLobe* mixture_add(MixtureBuild& b, Vec3f weight, const Frame& frame)
+/// @param is_diffuse  it may be seen from below its own horizon, as if from just above
+RELIEF_KERNEL MixtureLobe* mixture_add(MixtureBuild& b, Vec3f weight, const Frame& frame, bool is_diffuse = false)
 {
+  constexpr float kLeastCosine = 1e-3f;
   const Vec3f bounded = max(weight, Vec3f{});
   const float mean = mean_component(bounded);
   MixtureLobes& all = *b.lobes;
-  const Vec3f wo = to_local(frame, b.wo);
+  Vec3f wo = to_local(frame, b.wo);
+  if (is_diffuse) wo = normalize(Vec3f{wo.x, wo.y, max(wo.z, kLeastCosine)});
   if (!(mean > kLeastClosureWeight && mean < kInfinity && wo.z > kMinCosine && all.size < kMostMixtureLobes)) {
     return nullptr;
   }
@@ -122,15 +162,36 @@ RELIEF_KERNEL void lobe_scale(MixtureLobe& lobe, Vec3f by)
   lobe.probability *= mean_component(by);
 }
 
-/// Gives a reflection back what its microfacets would reflect more than once, if its distribution says so.
+/// Gives a reflection back what its microfacets would reflect more than once, if its distribution says so: since 4.0 in the same
+/// directions, before nearly in all. May add a lobe.
 /// @param F_mean  see ggx_energy_factor
-RELIEF_KERNEL void lobe_give_back(const MixtureBuild& b, const SurfaceClosureSpec& spec, MixtureLobe& lobe, Vec3f F_mean)
+/// @return        what the reflection is now as part of one that loses nothing to colour; 1 before 4.0
+RELIEF_KERNEL Vec3f lobe_give_back(MixtureBuild& b, const SurfaceClosureSpec& spec, MixtureLobe& lobe, Vec3f F_mean)
 {
-  if (spec.distribution != ClosureDistribution::kMultiscatterGgx || lobe.is_delta) return;
+  if (spec.distribution != ClosureDistribution::kMultiscatterGgx || lobe.is_delta) return {1, 1, 1};
   const AnisotropicAlpha alpha = lobe.shape.ggx.alpha;
   const float roughness = __builtin_sqrtf(__builtin_sqrtf(alpha.x * alpha.y));
-  const EnergyModel model = spec.is_4 ? EnergyModel::kTable : EnergyModel::kWalk;
-  lobe_scale(lobe, ggx_energy_factor(*b.tables, model, F_mean, roughness, lobe.wo.z));
+  MixtureMultiple multiple;
+  multiple.ggx = ggx_coordinate(min(roughness, 1.0f));
+  const float lost = ggx_albedo(*b.tables, multiple.ggx, lobe.wo.z).lost;
+  if (spec.is_4) {
+    const Vec3f factor = ggx_energy_factor(*b.tables, EnergyModel::kTable, F_mean, roughness, lobe.wo.z);
+    lobe_scale(lobe, factor);
+    return factor * (1.0f - lost);
+  }
+  const float lost_mean = ggx_albedo_mean(*b.tables, multiple.ggx).lost;
+  if (!(lost_mean > kLeastMeanLost && lost > 0.0f)) return {1, 1, 1};
+  // The same energy as the factor's, spread.
+  const Vec3f again = ggx_energy_factor(*b.tables, EnergyModel::kWalk, F_mean, roughness, lobe.wo.z) - splat3(1.0f);
+  const Vec3f first = lobe.fresnel.kind == MixtureFresnel::kNone ? Vec3f{1, 1, 1} : F_mean;
+  MixtureLobe* added = mixture_add(b, lobe.weight * first * again * ((1.0f - lost) / lost), lobe.frame);
+  if (added == nullptr) return {1, 1, 1};
+  multiple.scattering = multiple_scattering_make(multiple.ggx.alpha);
+  multiple.over_mean = kInvPi * lost / lost_mean;
+  added->kind = MixtureLobeKind::kMultiple;
+  added->shape.multiple = multiple;
+  added->probability *= lost;
+  return {1, 1, 1};
 }
 
 RELIEF_KERNEL float saturated(float x) { return clamp(x, 0.0f, 1.0f); }
@@ -145,7 +206,8 @@ RELIEF_KERNEL float closure_eta(const MixtureBuild& b, float ior)
 
 RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const DiffuseInputs& in)
 {
-  MixtureLobe* lobe = mixture_add(b, weight * in.color, frame_from_normal(closure_normal(b, in.normal)));
+  const Frame frame = frame_from_normal(closure_diffuse_normal(b, spec, in.normal));
+  MixtureLobe* lobe = mixture_add(b, weight * in.color, frame, true);
   if (lobe == nullptr || !(in.roughness > 0.0f)) return;
   if (spec.is_4) {
     lobe->kind = MixtureLobeKind::kOrenNayarMultiple;
@@ -296,7 +358,7 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
 
 RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec&, float weight, const VelvetInputs& in)
 {
-  MixtureLobe* lobe = mixture_add(b, weight * in.color, frame_from_normal(closure_normal(b, in.normal)));
+  MixtureLobe* lobe = mixture_add(b, weight * in.color, frame_from_normal(closure_normal(b, in.normal)), true);
   if (lobe == nullptr) return;
   lobe->kind = MixtureLobeKind::kVelvet;
   lobe->shape.velvet = velvet_make(saturated(in.sigma));
@@ -305,7 +367,7 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec&, float
 /// @return  albedo before the weight; 0: none was added
 RELIEF_KERNEL float microfibre_add(MixtureBuild& b, Vec3f weight, Vec3f N, float roughness)
 {
-  MixtureLobe* lobe = mixture_add(b, weight, frame_from_normal(N));
+  MixtureLobe* lobe = mixture_add(b, weight, frame_from_normal(N), true);
   if (lobe == nullptr) return 0.0f;
   lobe->kind = MixtureLobeKind::kMicrofibre;
   lobe->shape.microfibre = sheen_microfibre_make(lobe->wo.z, roughness);
@@ -317,14 +379,15 @@ RELIEF_KERNEL float microfibre_add(MixtureBuild& b, Vec3f weight, Vec3f N, float
 
 RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec&, float weight, const SheenInputs& in)
 {
-  microfibre_add(b, weight * in.color, closure_normal(b, in.normal), saturated(in.roughness));
+  microfibre_add(b, weight * in.color, closure_normal_as_given(b, in.normal), saturated(in.roughness));
 }
 
 RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const ToonInputs& in)
 {
   const Toon toon = toon_make(in.size, in.smooth, spec.is_other);
   if (toon_is_empty(toon)) return;
-  MixtureLobe* lobe = mixture_add(b, weight * in.color, frame_from_normal(closure_normal(b, in.normal)));
+  const Frame frame = frame_from_normal(closure_diffuse_normal(b, spec, in.normal));
+  MixtureLobe* lobe = mixture_add(b, weight * in.color, frame, true);
   if (lobe == nullptr) return;
   lobe->kind = MixtureLobeKind::kToon;
   lobe->shape.toon = toon;
@@ -438,19 +501,11 @@ RELIEF_KERNEL Vec3f layered_weight(Vec3f weight, Vec3f albedo)
   return weight * clamp(1.0f - max_component(albedo), 0.0f, 1.0f);
 }
 
-/// Albedo of a reflection that gives back what it loses, between F0 and 1 along a dielectric's curve.
-RELIEF_KERNEL Vec3f reflection_albedo(const MixtureBuild& b, Vec3f F0, float roughness, float cos_o)
-{
-  const GgxAlbedo e = ggx_albedo(*b.tables, ggx_coordinate(saturated(roughness)), cos_o);
-  const float of_F90 = ggx_albedo_with(0.0f, 1.0f, e), of_both = ggx_albedo_with(1.0f, 1.0f, e);
-  return lerp(of_both > 0.0f ? of_F90 / of_both : 0.0f, F0, Vec3f{1, 1, 1});
-}
-
 /// Layers, of which each takes from those below: sheen, coat, metal, glass, reflection, diffuse base.
 /// @source  Cycles 4.3
 RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float start, const Principled4Inputs& in)
 {
-  const Vec3f N = closure_normal(b, in.normal);
+  const Vec3f N = closure_normal(b, in.normal), N_given = closure_normal_as_given(b, in.normal);
   const Vec3f coat_N = closure_normal(b, in.coat_normal);
   const float metallic = saturated(in.metallic), roughness = saturated(in.roughness);
   const float coat = max(in.coat_weight, 0.0f), coat_ior = max(in.coat_ior, 1.0f), ior = max(in.ior, 1e-5f);
@@ -458,9 +513,10 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
   Vec3f weight = splat3(start);
   if (in.sheen_weight > kLeastClosureWeight) {
     const Vec3f own = weight * max(in.sheen_tint, Vec3f{}) * in.sheen_weight;
-    const Vec3f middle = lerp(saturated(coat), N, coat_N);
+    const Vec3f middle = lerp(saturated(coat), N_given, closure_normal_as_given(b, in.coat_normal));
     const float squared = length_squared(middle);
-    const float albedo = microfibre_add(b, own, squared > 0.0f ? middle / __builtin_sqrtf(squared) : N, saturated(in.sheen_roughness));
+    const Vec3f sheen_N = squared > 0.0f ? middle / __builtin_sqrtf(squared) : N;
+    const float albedo = microfibre_add(b, own, sheen_N, saturated(in.sheen_roughness));
     weight = layered_weight(weight, max(in.sheen_tint, Vec3f{}) * (in.sheen_weight * albedo));
   }
   if (coat > kLeastClosureWeight) {
@@ -522,14 +578,16 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
       if (lobe->fresnel.kind == MixtureFresnel::kDielectric) lobe->fresnel.kind = MixtureFresnel::kInterpolated;
       const Vec3f seen = mixture_fresnel(lobe->fresnel, lobe->wo.z);
       const bool has_film = lobe->fresnel.kind == MixtureFresnel::kThinFilm;
-      const Vec3f albedo = has_film ? seen : reflection_albedo(b, lobe->fresnel.a, roughness, lobe->wo.z);
+      const float width = __builtin_sqrtf(__builtin_sqrtf(alpha.x * alpha.y));
+      const float share = reflected_share(*b.tables, width, eta, lobe->wo.z);
+      const Vec3f albedo = has_film ? seen : lerp(share, lobe->fresnel.a, Vec3f{1, 1, 1});
       lobe->probability *= mean_component(seen);
-      lobe_give_back(b, spec, *lobe, saturated(fresnel_interpolated_mean(lobe->fresnel.a, {1, 1, 1}, eta)));
-      weight = layered_weight(weight, albedo);
+      const Vec3f F_mean = saturated(fresnel_interpolated_mean(lobe->fresnel.a, {1, 1, 1}, eta));
+      weight = layered_weight(weight, albedo * lobe_give_back(b, spec, *lobe, F_mean));
     }
   }
   const bool is_rough = in.diffuse_roughness > kLeastClosureWeight;
-  MixtureLobe* lobe = mixture_add(b, weight * base_color, frame_from_normal(N));
+  MixtureLobe* lobe = mixture_add(b, weight * base_color, frame_from_normal(N_given), true);
   if (lobe == nullptr || !is_rough) return;
   lobe->kind = MixtureLobeKind::kOrenNayarMultiple;
   lobe->shape.oren_nayar_multiple = oren_nayar_multiple_make(saturated(base_color), in.diffuse_roughness, lobe->wo);

@@ -26,7 +26,7 @@ struct GraphPoint {
   GraphRay ray;
 };
 
-/// Two vectors along the surface as long as the footprint, as Cycles has them: which way they point is left to chance.
+/// Two vectors along the surface as long as the footprint.
 struct GraphFootprint {
   Vec3f dPdx, dPdy;  ///< world
 };
@@ -34,11 +34,15 @@ struct GraphFootprint {
 RELIEF_KERNEL GraphFootprint graph_footprint(const GraphPoint& at)
 {
   const Vec3f Ng = dot(at.hit->Ng, at.wo) < 0.0f ? -at.hit->Ng : at.hit->Ng;
+  // Cycles' axes: a slope is a forward difference, so that bumps of few pixels look otherwise along others.
+  const Vec3f across = cross(Vec3f{1, 1, -1}, Ng);
   const Frame frame = frame_from_normal(Ng);
+  const bool is_parallel = !(length_squared(across) > 1e-12f);
+  const Vec3f x = is_parallel ? frame.s : normalize(across);
   // A ray without width still needs slopes: over what rounding leaves of its point.
   constexpr float kRoundings = 256.0f;
   const float width = max(at.footprint, kRoundings * max_component(at.hit->P_error));
-  return {frame.s * width, frame.t * width};
+  return {x * width, cross(Ng, x) * width};
 }
 
 /// A point a footprint away.

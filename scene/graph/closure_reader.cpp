@@ -45,10 +45,11 @@ int most_lobes(ClosureKind kind)
     case ClosureKind::holdout:
       return 0;
     case ClosureKind::glass:
+    case ClosureKind::glossy:
       return 2;
     case ClosureKind::principled3:
     case ClosureKind::principled4:
-      return 6;
+      return 7;
     default:
       return 1;
   }

@@ -104,23 +104,24 @@ def render_runs(scene, engine, runs, samples):
         return np.stack([render(scene, engine, name, seed, samples) for seed in range(runs)])
 
 
-def assert_agrees(scene, runs=5, samples=32, block=8, least_mean=0.01, tolerance=0.0):
+def assert_agrees(scene, runs=5, samples=32, block=8, least_mean=0.01, tolerance=0.0, dark=0.0):
     """Fails unless relief and Cycles have the same expected picture of a scene.
 
     @param  runs, samples  of each engine; so many that a difference of the means of 3 % would be found
     @param  block          side of the blocks of pixels that are compared
     @param  least_mean     the picture must not be darker on the mean: two black ones agree, too
     @param  tolerance      relative difference of a block that is known and allowed; the test says why
+    @param  dark           difference of a block that cannot be seen, as part of the picture's mean
     """
     relief = render_runs(scene, "RELIEF", runs, samples)
     cycles = render_runs(scene, "CYCLES", runs, samples)
-    assert_same_expectation(relief, cycles, block, least_mean, tolerance)
+    assert_same_expectation(relief, cycles, block, least_mean, tolerance, dark)
 
 
-def assert_same_expectation(relief, cycles, block=8, least_mean=0.01, tolerance=0.0):
+def assert_same_expectation(relief, cycles, block=8, least_mean=0.01, tolerance=0.0, dark=0.0):
     """The judgement of assert_agrees, for pictures at hand."""
-    if tolerance:
-        relief = relief + _allowed_shift(relief, cycles, block, tolerance)
+    if tolerance or dark:
+        relief = relief + _allowed_shift(relief, cycles, block, tolerance, dark)
     agreement = compare_runs(relief, cycles, block, SIGNIFICANCE)
     print(agreement, "means", relief.mean(axis=(0, 1, 2)), cycles.mean(axis=(0, 1, 2)))
     assert relief.mean() > least_mean, "the picture is black"
@@ -149,12 +150,12 @@ def assert_warns(scene, *texts):
     assert any(all(text in warning for text in texts) for warning in warnings), warnings
 
 
-def _allowed_shift(relief, cycles, block, tolerance):
+def _allowed_shift(relief, cycles, block, tolerance, dark):
     """What may be added to relief's blocks to bring their means nearer to those of Cycles: shape (height, width, 3)."""
     height, width = (side // block * block for side in relief.shape[1:3])
     shape = (height // block, block, width // block, block, 3)
     means = [runs[:, :height, :width].mean(axis=0).reshape(shape).mean(axis=(1, 3)) for runs in (relief, cycles)]
-    limit = tolerance * means[1]
+    limit = tolerance * means[1] + dark * means[1].mean()
     shift = np.zeros(relief.shape[1:])
     shift[:height, :width] = np.clip(means[1] - means[0], -limit, limit).repeat(block, 0).repeat(block, 1)
     return shift

@@ -124,7 +124,7 @@ struct BrokenSurface {
 TEST(ClosureReader, EveryBrokenSurfaceGivesOneClearError)
 {
   json many = json::array();
-  for (int i = 0; i < 11; ++i) many.push_back({{"type", "principled"}});
+  for (int i = 0; i < 10; ++i) many.push_back({{"type", "principled"}});
   const std::string at = "/materials/0/extensions/RELIEF_surface";
   const BrokenSurface broken[] = {
       {json::object(), at + "/closures", "an array"},
@@ -137,7 +137,7 @@ TEST(ClosureReader, EveryBrokenSurfaceGivesOneClearError)
       {{{"closures", {{{"type", "glossy"}, {"distribution", "phong"}}}}}, at + "/closures/0/distribution", "ggx"},
       {{{"closures", {{{"type", "glass"}, {"maths", "2.79"}}}}}, at + "/closures/0/maths", "3.4"},
       {{{"closures", {7}}}, at + "/closures/0", "an object"},
-      {{{"closures", many}}, at + "/closures/10", "64"},
+      {{{"closures", many}}, at + "/closures/9", "64"},
   };
   for (const BrokenSurface& one : broken) {
     try {
