@@ -11,11 +11,11 @@ from material_test import _stage
 from scenes import IS_4_0, assert_agrees, new_material
 
 
-def _agrees(material, tolerance=0.0, samples=128, **settings):
+def _agrees(material, tolerance=0.0, samples=32, **settings):
     assert_agrees(_stage(material, **settings), samples=samples, tolerance=tolerance)
 
 
-def _single(kind, tolerance=0.0, samples=128, attributes=(), **inputs):
+def _single(kind, tolerance=0.0, samples=32, attributes=(), **inputs):
     """One shader node by itself.
 
     @param  attributes  of the node, by their names

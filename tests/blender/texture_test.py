@@ -6,7 +6,6 @@ import bpy
 import numpy as np
 
 from scenes import (
-    IS_4_0,
     add_camera,
     add_light,
     add_image_node,
@@ -187,10 +186,7 @@ def test_roughness_from_a_grey_image():
     from scenes import add_light
 
     add_light("AREA", (0, 0, 9), energy=900, size=1.2)
-    # Light that bounces more than once between facets leaves in all directions, nearly. Cycles since 4.0 scales the
-    # reflection up by it instead: at the roughest end of this square, where it is 24 % of the light, by 1 / 0.76, while
-    # 1.2 would be right where the reflection is strongest. Before, both agree within 0.5 %.
-    assert_agrees(scene, samples=256, tolerance=0.08 if IS_4_0 else 0.03)
+    assert_agrees(scene, samples=64, tolerance=0.02)
 
 
 def test_normal_map():
