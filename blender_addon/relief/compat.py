@@ -88,6 +88,9 @@ PRINCIPLED_INPUTS = (
 #: Before 4.0 the octaves of a Noise Texture never grew.
 CLAMPS_NOISE_ROUGHNESS = not IS_4_0
 
+#: Before 4 Vector Transform turned normals as if they were directions, and Normal Map mixed by its Strength in the world.
+NORMALS_KEEP_UPRIGHT = TANGENT_STRENGTH = IS_4_0
+
 #: Before 4 the Hue/Saturation node cut whole turns off towards 0, so that hues below 0 stayed below.
 HUE_GOES_ROUND = IS_4_0
 
@@ -96,6 +99,11 @@ TEXTURE_MATHS = "5.2" if IS_5_0 else "4.3" if IS_4_0 else None
 
 #: Entries of the tables that stand for ramps and curves, as many as Cycles'. Checked in 3.4 and 4.3.
 TABLE_ENTRIES = 257 if IS_4_0 else 256
+
+
+def is_green_down(normal_map):
+    """Whether the green of a Normal Map node counts downwards, as DirectX has it; it came with 5.1."""
+    return getattr(normal_map, "convention", "OPENGL") == "DIRECTX"
 
 
 def principled_socket(node, name):

@@ -177,8 +177,9 @@ class GraphWriter:
 
     def vector(self, node, groups, implicit):
         """A texture's Vector, or what Blender takes where nothing is linked: generated or uv."""
-        socket = node.inputs["Vector"]
-        if nodes.linked(socket, groups) is not None:
+        # A sky with its sun's disk hides the socket; since 4.3 hidden ones are not found.
+        socket = node.inputs.get("Vector")
+        if socket is not None and socket.enabled and nodes.linked(socket, groups) is not None:
             return self.mapped(node, self.value(socket, groups))
         if implicit == "generated":
             self.uses_generated = True

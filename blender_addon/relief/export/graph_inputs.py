@@ -6,6 +6,7 @@ One function a kind of node, listed at the end. Each gives the value of one outp
 
 import bpy
 
+from .. import compat
 from . import attributes, instance_values
 
 
@@ -169,15 +170,50 @@ def _normal_map(g, source):
     node = source.node
     inputs = g.inputs(node, source.groups, {"Strength": "strength", "Color": "color"})
     space = node.space.lower().replace("_", "-")
-    uv_set = _tangent_set(g, node) if node.space == "TANGENT" else None
-    return _output(g.add("normal-map", inputs, space=space, uvSet=uv_set), "normal")
+    if node.space != "TANGENT":
+        return _output(g.add("normal-map", inputs, space=space), "normal")
+    if compat.is_green_down(node):
+        inputs["color"] = _multiply_add(g, inputs["color"], (1.0, -1.0, 1.0), (0.0, 1.0, 0.0))
+    if compat.TANGENT_STRENGTH and inputs["strength"] != 1:
+        inputs = {"color": _flattened(g, **inputs)}
+    return _output(g.add("normal-map", inputs, space=space, uvSet=_tangent_set(g, node)), "normal")
+
+
+def _multiply_add(g, vector, factors, summands):
+    inputs = {"a": vector, "b": list(factors), "c": list(summands)}
+    return g.op("vector-math", inputs, "vector", operation="multiply-add")
+
+
+def _flattened(g, color, strength):
+    """The colour of a tangent normal map nearer to even, or farther: x and y by all of the strength, z by at most 1."""
+    share = g.op("clamp", {"value": strength}, "value") if isinstance(strength, dict) else min(max(strength, 0.0), 1.0)
+    shares = g.op("combine", {"x": strength, "y": strength, "z": share}, "vector")
+    # Even is half, half, 1.
+    return g.op("mix-vector", {"factor": shares, "a": [0.5, 0.5, 1.0], "b": color}, "vector", clampFactor=False)
 
 
 def _vector_transform(g, source):
     node = source.node
-    inputs = g.inputs(node, source.groups, {"Vector": "vector"})
-    options = {"transform": node.vector_type.lower(), "from": node.convert_from.lower(), "to": node.convert_to.lower()}
-    return _output(g.add("vector-transform", inputs, **options), "vector")
+    vector = g.inputs(node, source.groups, {"Vector": "vector"})["vector"]
+    kind, spaces = node.vector_type.lower(), (node.convert_from.lower(), node.convert_to.lower())
+    if kind == "normal" and compat.NORMALS_KEEP_UPRIGHT and spaces[0] != spaces[1]:
+        return _transformed_normal(g, vector, *spaces)
+    return _transformed(g, vector, kind, *spaces)
+
+
+def _transformed(g, vector, kind, first, second):
+    options = {"transform": kind, "from": first, "to": second}
+    return g.op("vector-transform", {"vector": vector}, "vector", **options)
+
+
+def _transformed_normal(g, normal, first, second):
+    """A normal by the inverse, transposed: its dot product with what each of the new axes was."""
+    dots = {}
+    for number, axis in enumerate("xyz"):
+        unit = [float(i == number) for i in range(3)]
+        was = _transformed(g, unit, "vector", second, first)
+        dots[axis] = g.op("vector-math", {"a": normal, "b": was}, "value", operation="dot")
+    return g.op("vector-math", {"a": g.op("combine", dots, "vector")}, "vector", operation="normalize")
 
 
 def _normal(g, source):

@@ -567,6 +567,9 @@ def _principled(w, source, weight):
     w.emit(source, socket("Emission"), socket("Emission Strength"), weight)
     if w.graph.constant(socket("Subsurface"), groups) != 0:
         w.unread(source, "subsurface scattering", "its colour was used as a diffuse one")
+    wall = node.inputs.get("Thin Wall")  # since 5.2
+    if wall is not None and w.graph.constant(wall, groups) != 0:
+        w.unread(source, "a thin wall", "what bounds a solid was used")
     if w.graph.constant(socket("Transmission"), groups) != 0:
         w.transmits = True
     values = w.inputs(source, compat.PRINCIPLED_INPUTS)
