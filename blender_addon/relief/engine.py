@@ -23,8 +23,11 @@ class ReliefEngine(bpy.types.RenderEngine):
         self._viewport = None
 
     def __del__(self):
-        # Blender may drop an engine whose __init__ it has not run.
-        viewport = getattr(self, "_viewport", None)
+        # Blender may drop an engine whose __init__ it has not run, or of which it has taken down its own part.
+        try:
+            viewport = getattr(self, "_viewport", None)
+        except ReferenceError:
+            return
         if viewport is not None:
             viewport.stop()
 

@@ -350,6 +350,30 @@ def test_images():
         _assert_nodes_agree(builders, absolute=1e-5, most_off=2e-3)
 
 
+def test_images_by_direction():
+    """An Environment Texture that no world has; bytes become halves, which keep eleven bits."""
+    with folder() as path:
+        file = os.path.join(path, "around.png")
+        _write_image(file, 13, 7)
+
+        def around(projection, interpolation):
+            def build(tree, xyz, w):
+                node = tree.nodes.new("ShaderNodeTexEnvironment")
+                node.image, node.projection, node.interpolation = bpy.data.images.load(file), projection, interpolation
+                node.image.colorspace_settings.name = "Non-Color"
+                tree.links.new(xyz, node.inputs["Vector"])
+                return node.outputs["Color"]
+
+            return build
+
+        builders = {
+            f"{projection} {interpolation}": around(projection, interpolation)
+            for projection in ("EQUIRECTANGULAR", "MIRROR_BALL")
+            for interpolation in ("Closest", "Linear")
+        }
+        _assert_nodes_agree(builders, absolute=1e-3, most_off=2e-3)
+
+
 def test_images_of_encoded_colors():
     """Cycles filters what sRGB files store, multiplied by alpha in whole bytes, and decodes the sum."""
     with folder() as path:

@@ -199,6 +199,14 @@ def test_a_volume_without_surface_is_transparent():
     assert np.abs(picture - clear).mean() < 0.05 * clear.mean(), (picture.mean(), clear.mean())
 
 
+def test_a_volume_behind_an_opaque_surface_is_not_seen():
+    material, tree, node = new_material("filled", "ShaderNodeBsdfDiffuse", Color=(0.2, 0.7, 0.4, 1))
+    volume = tree.nodes.new("ShaderNodeVolumePrincipled")
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    tree.links.new(volume.outputs[0], output.inputs["Volume"])
+    assert_agrees(_stage(material), samples=64)
+
+
 def test_subsurface_color_is_that_of_the_diffuse_light():
     """Between base and Subsurface Color by the weight, as in Cycles; the input was there before 4.0."""
     import numpy as np

@@ -10,7 +10,7 @@ from .displacement import bump_displaces, export_displacement
 from .graph import GraphWriter, NotUnderstood, bump_of_displacement
 from .light import set_emission
 from .mesh import Wanted
-from .surface import TRANSPARENT, ClosureWriter, Surface, plain_surface
+from .surface import TRANSPARENT, ClosureWriter, Inside, Surface, plain_surface
 from .texture import Input, Mapping, Texture, TextureReader
 
 #: The format has two sets of texture coordinates a vertex.
@@ -120,8 +120,8 @@ class MaterialJob:
         )
         if displacement and compat.displacement_method(material) == "BUMP" and not settings.bump_displaces:
             self._bump_by(displacement)
-        transmits = self._export_surface(source, volume is not None)
-        self._write_volume(volume, transmits)
+        inside = self._export_surface(source, volume is not None)
+        self._write_volume(volume, inside)
         warned = self._displace(material, settings)
         if warned and displacement:
             self._problems.setdefault(displacement.key, warned[0])
@@ -136,16 +136,18 @@ class MaterialJob:
             self._fail(displacement, f"{error} as displacement", "nothing is displaced", error)
 
     def _export_surface(self, source, has_volume):
-        """Whether light may pass into what the surface bounds."""
+        """Returns the surface's Inside."""
         plain = plain_surface(source, self._bends) if source or not has_volume else TRANSPARENT
         if plain is not None:
             self._write_surface(plain)
-            return plain.ior is not None
+            if plain.ior is not None:
+                return Inside.BOUNDED
+            return Inside.CLOSED if plain.alpha.is_constant(1.0) else Inside.OPEN
         closures = ClosureWriter(self._graph, self._past_bump, self._fail)
         closures.write(source)
         if not closures.closures:  # black, or shining in the core's words
             self._write_surface(Surface(emission=closures.emission))
-            return False
+            return Inside.CLOSED
         surface = {"closures": closures.closures}
         if self._graph.own_normal is not None:
             surface["normal"] = self._graph.own_normal
@@ -155,7 +157,7 @@ class MaterialJob:
         if self._uses_graph:
             self._extend("RELIEF_graph", {"nodes": self._graph.nodes})
         self._write_emission(closures.emission)
-        return closures.transmits
+        return closures.inside
 
     def _displace(self, material, settings):
         """Adds the displacement; returns what was warned about."""
@@ -240,7 +242,7 @@ class MaterialJob:
         return self._coordinates.index(source)
 
     def _graph_texture(self, node):
-        """Options of image-texture that say which image an Image Texture node reads, and what of it; None without a file."""
+        """Options that say which image an Image or Environment Texture node reads, and what of it; None without a file."""
         image = node.image
         is_data = image.colorspace_settings.is_data
         texture = Texture(node, None, Mapping())
@@ -249,6 +251,9 @@ class MaterialJob:
             return {"index": self._writer.add_texture(uri, texture.wrap, texture.nearest)}
 
         options = {"colorSpace": "linear" if is_data else "srgb"}
+        if node.bl_idname == "ShaderNodeTexEnvironment":
+            uri = self._images.color_uri(image, node.image_user, self._warn)
+            return {**options, "texture": info(uri)} if uri else None
         is_multiplied = image.is_float and image.alpha_mode == "PREMUL"
         if image.source == "TILED":
             uris = self._images.tile_uris(image, not is_data, self._warn)
@@ -329,11 +334,11 @@ class MaterialJob:
         else:
             del self.json["alphaMode"]
 
-    def _write_volume(self, source, transmits):
-        if source is None:
+    def _write_volume(self, source, inside):
+        if source is None or inside == Inside.CLOSED:  # no light gets there, in Cycles neither
             return
         node, textures = source.node, self._textures
-        if node.bl_idname != "ShaderNodeVolumeAbsorption" or not transmits:
+        if node.bl_idname != "ShaderNodeVolumeAbsorption" or inside == Inside.OPEN:
             self._fail(source, f'node "{node.name}" ({node.bl_label}) as volume', "it is left out")
             return
         color = textures.constant_color(node.inputs["Color"], source.groups)

@@ -9,6 +9,7 @@ What glTF's core means exactly as Cycles does stays there: it costs less, and em
 """
 
 from dataclasses import dataclass, field, replace
+from enum import Enum
 
 from .. import compat
 from . import nodes
@@ -49,6 +50,19 @@ class Surface:
     def is_lambertian(self):
         """Whether it is diffuse and emits, or less: sums of such are such."""
         return not self.is_mirror and self.ior is None and self.alpha.is_constant(1.0)
+
+
+class Inside(Enum):
+    """What gets into what a surface bounds.
+
+    CLOSED   no light
+    OPEN     light, past or through a surface without thickness
+    BOUNDED  light, through glass
+    """
+
+    CLOSED = 0
+    OPEN = 1
+    BOUNDED = 2
 
 
 #: What is not there, such as the surface of a volume that has none of its own.
@@ -228,7 +242,7 @@ class ClosureWriter:
     @param  fail       called with a nodes.Source, what is not understood of it, and what was used instead
     closures   JSON of the closures
     emission   Input of the radiance that no graph gives, which stays in the core
-    transmits  whether light may pass into what the surface bounds
+    transmits  whether there is glass
     """
 
     def __init__(self, graph, past_bump, fail):
@@ -255,6 +269,13 @@ class ClosureWriter:
                 self._fail(part, f"{label} as surface", "a grey diffuse surface was used")
                 self.add("diffuse", weight)
         self._add_emission()
+
+    @property
+    def inside(self):
+        if self.transmits:
+            return Inside.BOUNDED
+        is_open = any(closure["type"] in {"transparent", "translucent"} for closure in self.closures)
+        return Inside.OPEN if is_open else Inside.CLOSED
 
     def _parts(self, source):
         """(nodes.Source, weight) of all shaders of a tree that are not mixes, each once, in the order that they stand in.

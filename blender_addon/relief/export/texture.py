@@ -66,8 +66,8 @@ class Texture:
     mapping: Mapping
 
     @property
-    def wrap(self):
-        return _WRAP.get(self.node.extension, _WRAP["REPEAT"])
+    def wrap(self):  # an environment has no extension, and goes round
+        return _WRAP.get(getattr(self.node, "extension", None), _WRAP["REPEAT"])
 
     @property
     def nearest(self):
