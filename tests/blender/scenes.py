@@ -120,13 +120,24 @@ def assert_agrees(scene, runs=5, samples=32, block=8, least_mean=0.01, tolerance
 
 def assert_same_expectation(relief, cycles, block=8, least_mean=0.01, tolerance=0.0, dark=0.0):
     """The judgement of assert_agrees, for pictures at hand."""
-    if tolerance or dark:
-        relief = relief + _allowed_shift(relief, cycles, block, tolerance, dark)
-    agreement = compare_runs(relief, cycles, block, SIGNIFICANCE)
+    agreement = _agreement(relief, cycles, block, tolerance, dark)
     print(agreement, "means", relief.mean(axis=(0, 1, 2)), cycles.mean(axis=(0, 1, 2)))
     assert relief.mean() > least_mean, "the picture is black"
     assert agreement.relative_standard_error < LARGEST_STANDARD_ERROR, "too noisy to tell anything"
     assert agreement.passed, "the pictures differ by more than their noise"
+
+
+def agreement(scene, runs=5, samples=32, block=8, tolerance=0.0):
+    """What assert_agrees judges, for measurements: an Agreement, and the relative difference of the means as they are."""
+    relief = render_runs(scene, "RELIEF", runs, samples)
+    cycles = render_runs(scene, "CYCLES", runs, samples)
+    return _agreement(relief, cycles, block, tolerance, 0.0), relief.mean() / cycles.mean() - 1
+
+
+def _agreement(relief, cycles, block, tolerance, dark):
+    if tolerance or dark:
+        relief = relief + _allowed_shift(relief, cycles, block, tolerance, dark)
+    return compare_runs(relief, cycles, block, SIGNIFICANCE)
 
 
 def assert_warns(scene, *texts):
