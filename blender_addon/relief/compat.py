@@ -85,6 +85,9 @@ PRINCIPLED_INPUTS = (
     }
 )
 
+#: Metal of the Principled BSDF has thin films, too; since 5.0.
+METAL_HAS_FILM = IS_5_0
+
 #: Before 4.0 the octaves of a Noise Texture never grew.
 CLAMPS_NOISE_ROUGHNESS = not IS_4_0
 

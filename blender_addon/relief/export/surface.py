@@ -591,6 +591,8 @@ def _principled(w, source, weight):
     wall = node.inputs.get("Thin Wall")  # since 5.2
     if wall is not None and w.graph.constant(wall, groups) != 0:
         w.unread(source, "a thin wall", "what bounds a solid was used")
+    if compat.METAL_HAS_FILM and all(w.graph.constant(node.inputs[n], groups) != 0 for n in ("Metallic", "Thin Film Thickness")):
+        w.unread(source, "a thin film on metal", "only what is no metal has it")
     if w.graph.constant(socket("Transmission"), groups) != 0:
         w.transmits = True
     values = w.inputs(source, compat.PRINCIPLED_INPUTS)
