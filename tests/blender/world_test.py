@@ -5,6 +5,7 @@ import math
 import bpy
 
 from scenes import (
+    IS_5_0,
     LINEAR,
     add_camera,
     add_light,
@@ -298,9 +299,10 @@ def test_another_world_for_the_camera_is_warned_about():
 def _sky_world(strength=0.1, **settings):
     tree = set_world((1, 1, 1), strength)
     (sky,) = _nodes(tree, "TexSky")
-    sky.sky_type = "NISHITA"
+    # The same by another name since 5.0.
+    sky.sky_type = "SINGLE_SCATTERING" if IS_5_0 else "NISHITA"
     for name, value in settings.items():
-        setattr(sky, name, value)
+        setattr(sky, "aerosol_density" if IS_5_0 and name == "dust_density" else name, value)
     tree.links.new(sky.outputs["Color"], tree.nodes["Background"].inputs["Color"])
     return tree
 
