@@ -12,6 +12,7 @@
 #include <numbers>
 #include <tuple>
 
+#include "integrator/emitter_graph.h"
 #include "kernel/shape/material_lookup.h"
 #include "kernel/texture/texture.h"
 #include "scene/world_displacement.h"
@@ -563,7 +564,8 @@ void rectangles_join(std::span<Light> lights, std::int32_t first)
 
 bool emits(const Material& material)
 {
-  return !is_zero(material.emission) && !material.unlit && material.displacement_index < 0;
+  return (!is_zero(material.emission) || material.emission_index >= 0) && !material.unlit &&
+         material.displacement_index < 0;
 }
 
 /// Irradiance of what the tables sample, by their own importance sampling: exact up to the variation within cells, so a
@@ -671,7 +673,10 @@ std::vector<EmissiveMesh> emissive_meshes(const Scene& scene, LightSet& set)
 
 /// Adds the lights of emissive instances to a set.
 /// @return  of each light, the mean of its emission texture
-std::vector<float> emissive_meshes_add(const Scene& scene, std::span<const TextureView> textures, LightSet& set)
+std::vector<float> emissive_meshes_add(const Scene& scene,
+                                       std::span<const TextureView> textures,
+                                       const KernelGlobals* globals,
+                                       LightSet& set)
 {
   std::vector<EmissiveMesh> meshes = emissive_meshes(scene, set);
   std::size_t num_lights = set.lights.size();
@@ -694,14 +699,21 @@ std::vector<float> emissive_meshes_add(const Scene& scene, std::span<const Textu
     const TextureRef& ref = material.emission_texture;
     const TextureView* texture =
         ref.texture_index >= 0 ? &textures[static_cast<std::size_t>(ref.texture_index)] : nullptr;
+    std::vector<Vec3f> means;
+    if (material.emission_index >= 0 && globals != nullptr) {
+      means.resize(mesh.num_triangles);
+      emitter_graph_means(*globals, i, means);
+    }
     tbb::parallel_for(std::uint32_t{0}, mesh.num_triangles, [&](std::uint32_t triangle) {
       Light light = triangle_light(placed, mesh, triangle, material.double_sided);
-      light.emission = material.emission;
+      light.emission = means.empty() ? material.emission : means[triangle];
       light.is_even = emission_is_even(material);
-      light.casts_caustics = (instance.flags & kNoCausticLight) == 0;
+      // Photons do not start where no point was seen to shine: paths find that light.
+      const bool is_dark = !means.empty() && is_zero(means[triangle]);
+      light.casts_caustics = (instance.flags & kNoCausticLight) == 0 && !is_dark;
       light.instance_index = static_cast<std::int32_t>(i);
       set.lights[emissive.first_light + triangle] = light;
-      if (texture != nullptr) {
+      if (texture != nullptr && means.empty()) {
         scales[emissive.first_light + triangle] = mean_emission_scale(*texture, ref, mesh, triangle, material.emission);
       }
     });
@@ -769,7 +781,10 @@ void light_set_build_tree(LightSet& set, std::span<const float> intensity_scales
   if (!finite.empty()) set.tree_root = branch_write(branch_make(finite, 0), 0, 0, set);
 }
 
-LightSet light_set_make(const Scene& scene, std::span<const TextureView> textures, EnvironmentDensity density)
+LightSet light_set_make(const Scene& scene,
+                        std::span<const TextureView> textures,
+                        EnvironmentDensity density,
+                        const KernelGlobals* globals)
 {
   LightSet set;
   const auto texture_view = [&](int index) {
@@ -784,7 +799,7 @@ LightSet light_set_make(const Scene& scene, std::span<const TextureView> texture
   if (scene.environment.hidden_from != 0) set.environment_irradiance = {};
 
   set.lights = scene.lights;
-  const std::vector<float> scales = emissive_meshes_add(scene, textures, set);
+  const std::vector<float> scales = emissive_meshes_add(scene, textures, globals, set);
   light_set_build_tree(set, scales);
   if (!set.environment.environment.has_map && density == EnvironmentDensity::kExcess) {
     // Where the other lights are weaker than this, leaving the environment to the BSDF costs more variance than it saves:

@@ -12,6 +12,8 @@
 
 namespace relief {
 
+struct KernelGlobals;
+
 /// Lights of an emissive mesh, and the instances that share them.
 struct SharedLights {
   std::uint32_t first_light = 0, num_lights = 0;
@@ -56,6 +58,7 @@ struct LightSet {
 /// @param textures  views of scene.textures, for the mean of emission maps
 /// @param density   of the environment: kExcess where paths that follow the BSDF find what it leaves out, which for a
 ///                  constant environment beside suns is all
+/// @param globals   what emission by graph is evaluated with, see emitter_graph_means; null: the scene has none
 /// @return          same bits for the same scene, whatever the thread count
 /// Instances of one mesh and material share their lights where there are so many lights in the scene that they are chosen in
 /// more than one step, and where they keep the mesh's shape: under another map than a similarity its triangles compare
@@ -63,7 +66,8 @@ struct LightSet {
 /// @cost            128 bytes a light, and about 80 for its place in the tree; as much for an instance that shares
 LightSet light_set_make(const Scene& scene,
                         std::span<const TextureView> textures,
-                        EnvironmentDensity density = EnvironmentDensity::kExcess);
+                        EnvironmentDensity density = EnvironmentDensity::kExcess,
+                        const KernelGlobals* globals = nullptr);
 
 /// The same from parts, without a scene: fills trails, suns, area_lights, and the tree from `lights`, `copies` and `shared`.
 /// @param intensity_scales  one a light, >= 0: mean of the texture that will multiply its emission; empty: all 1. A light

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "integrator/emitter_graph.h"
 #include "integrator/intersect_stage.h"
 #include "integrator/surface_kernels.h"
 #include "scene/texture_store.h"
@@ -72,15 +73,44 @@ SceneContext::SceneContext(const Scene& loaded,
                            const DisplacementOptions& displacement,
                            EnvironmentDensity environment_density,
                            const CausticSettings& caustics)
-    : scene(loaded),
-      lights(light_set_make(loaded, loaded.textures->views(), environment_density)),
-      bsdf_tables(std::make_unique<BsdfTables>()),
-      displacements(loaded, displacement)
+    : scene(loaded), bsdf_tables(std::make_unique<BsdfTables>()), displacements(loaded, displacement)
 {
+  make_views();
+  lights = light_set_make(scene, scene.textures->views(), environment_density, &globals);
+
   CausticsDecision decision = caustics_decide(scene, lights, caustics.mode);
   caustics_reason = std::move(decision.reason);
   globals.caustics.enabled = decision.enabled;
   globals.caustics.roughness = kSharpestGathered;
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    InstanceView& view = instances[i];
+    view.first_light_index = lights.first_light_index[i];
+    view.light_copy_index = lights.light_copy_index[i];
+    const bool caster = (view.flags & kCausticCaster) != 0;
+    const Material& material = scene.materials[static_cast<std::size_t>(view.material_index)];
+    if (decision.enabled && (view.flags & kCausticReceiver) != 0) {
+      if (has_soft_lobes(material, caster, kSharpestGathered)) view.flags |= kGathersPhotons;
+      if (has_tails(material, caster)) view.flags |= kGathersTails;
+    }
+  }
+  unsigned features = 0;
+  for (const Material& material : scene.materials) {
+    features |= feature_mask_of(material);
+    surface_kernel.push_back(static_cast<std::uint8_t>(surface_kernel_index(material, decision.enabled)));
+  }
+  bsdf_tables_make(*bsdf_tables, features);
+  accel = std::make_unique<Accel>(scene, lights.lights, lights.area_lights, displacements, shadow_filter);
+
+  globals.area_light_index = lights.area_lights.data();
+  globals.lights = lights.view();
+  globals.has_lights = lights.any();
+  globals.bsdf_tables = bsdf_tables.get();
+  globals.environment_visible_to_camera = scene.environment.visible_to_camera;
+  globals.environment_hidden_from = scene.environment.hidden_from;
+}
+
+void SceneContext::make_views()
+{
   for (const Mesh& mesh : scene.meshes) meshes.push_back(mesh.view());
   std::vector<int> uses(scene.meshes.size(), 0);
   for (const Instance& instance : scene.instances) ++uses[static_cast<std::size_t>(instance.mesh_index)];
@@ -91,27 +121,11 @@ SceneContext::SceneContext(const Scene& loaded,
     view.object_from_world = inverse(instance.world_from_object);
     view.mesh_index = instance.mesh_index;
     view.material_index = instance.material_index;
-    view.first_light_index = lights.first_light_index[i];
-    view.light_copy_index = lights.light_copy_index[i];
     view.flags = instance.flags;
     if (uses[static_cast<std::size_t>(instance.mesh_index)] > 1) view.flags |= kTracedInObjectSpace;
     if (displacements.geometry_index(i) >= 0) view.flags |= kDisplaced | kTracedInObjectSpace;
-    const bool caster = (view.flags & kCausticCaster) != 0;
-    const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
-    if (decision.enabled && (view.flags & kCausticReceiver) != 0) {
-      if (has_soft_lobes(material, caster, kSharpestGathered)) view.flags |= kGathersPhotons;
-      if (has_tails(material, caster)) view.flags |= kGathersTails;
-    }
     instances.push_back(view);
   }
-  unsigned features = 0;
-  for (const Material& material : scene.materials) {
-    features |= feature_mask_of(material);
-    surface_kernel.push_back(static_cast<std::uint8_t>(surface_kernel_index(material, decision.enabled)));
-  }
-  bsdf_tables_make(*bsdf_tables, features);
-  accel = std::make_unique<Accel>(scene, lights.lights, lights.area_lights, displacements, shadow_filter);
-
   globals.meshes = meshes.data();
   globals.instances = instances.data();
   globals.num_instances = static_cast<std::uint32_t>(instances.size());
@@ -142,13 +156,8 @@ SceneContext::SceneContext(const Scene& loaded,
   globals.materials = scene.materials.data();
   globals.graphs = graphs.data();
   globals.run_graph = stage_table_select().run_graph;
+  globals.emitter_radiance = emitter_graph_radiance;
   globals.textures = scene.textures->views().data();
-  globals.area_light_index = lights.area_lights.data();
-  globals.lights = lights.view();
-  globals.has_lights = lights.any();
-  globals.bsdf_tables = bsdf_tables.get();
-  globals.environment_visible_to_camera = scene.environment.visible_to_camera;
-  globals.environment_hidden_from = scene.environment.hidden_from;
 }
 
 void SceneContext::fill(Statistics& stats) const

@@ -43,6 +43,10 @@ struct SceneContext {
   std::unique_ptr<Accel> accel;
   std::string caustics_reason;  ///< why globals.caustics is enabled, or not
   KernelGlobals globals;
+
+ private:
+  /// Fills in what light that meshes emit by graphs is evaluated with, and all else that asks for no lights.
+  void make_views();
 };
 
 }  // namespace relief

@@ -24,6 +24,15 @@ struct BounceLimits {
 /// noise. Delta lights can only be sampled, delta lobes only be followed: each is always done by the one that can.
 enum class LightTechnique : std::uint8_t { kMis, kLightSampling, kBsdfSampling };
 
+struct KernelGlobals;
+
+/// Radiance of a point of a mesh light whose material emits by a graph.
+/// @param emitter   in world space
+/// @param wo        unit, from the emitter to where its light goes
+/// @param distance  metres that the light goes
+using EmitterRadiance =
+    Vec3f (*)(const KernelGlobals& g, const Light& emitter, Vec2f barycentric, Vec3f wo, float distance);
+
 struct KernelGlobals {
   const MeshView* meshes = nullptr;
   const InstanceView* instances = nullptr;
@@ -31,6 +40,7 @@ struct KernelGlobals {
   const Material* materials = nullptr;
   const GraphProgramView* graphs = nullptr;  ///< by Material::graph_index
   GraphRun run_graph = nullptr;
+  EmitterRadiance emitter_radiance = nullptr;
   GraphScene graph_scene;
   const TextureView* textures = nullptr;
   const std::uint32_t* area_light_index = nullptr;  ///< light of object num_instances + i

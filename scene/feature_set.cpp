@@ -59,7 +59,7 @@ FeatureSet feature_set_detect(const Scene& scene)
     f.instances |= placed[mesh];
     placed[mesh] = true;
     f.caustic_casters |= (instance.flags & kCausticCaster) != 0;
-    if (!is_zero(material.emission) && !material.unlit) {
+    if ((!is_zero(material.emission) || material.emission_index >= 0) && !material.unlit) {
       f.mesh_lights = true;
       num_emitters += scene.meshes[mesh].triangles.size();
     }

@@ -472,10 +472,13 @@ void GltfLoader::read_programs(const GltfDocument& document,
       material.metallic = known.metallic;
       material.roughness = known.roughness;
     }
-    const bool emits = std::any_of(program.closures.begin(), program.closures.end(),
-                                   [](const SurfaceClosureSpec& c) { return c.kind == ClosureKind::emission; });
     constexpr auto kEmission = static_cast<unsigned>(GraphOutput::emission);
-    says_light_ = says_light_ || emits || (material.graph_outputs >> kEmission & 1u) != 0;
+    if (programs.emission) {
+      material.emission_index = add(std::move(*programs.emission));
+    } else if (!material.has_closures && (material.graph_outputs >> kEmission & 1u) != 0) {
+      material.emission_index = material.graph_index;
+    }
+    says_light_ = says_light_ || material.emission_index >= 0;
     if (material.has_closures) material.alpha_mode = programs.transparency ? AlphaMode::kBlend : AlphaMode::kOpaque;
     if (programs.transparency) material.transparency_index = add(std::move(*programs.transparency));
   };

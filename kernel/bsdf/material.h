@@ -54,6 +54,7 @@ struct Material {
   bool has_closures = false;        ///< the graph's closures scatter, in place of everything above but the emission and
                                     ///< what absorbs; transmission, metallic, roughness sum them up
   int transparency_index = -1;      ///< into KernelGlobals::graphs: its transparent closures alone; −1: none
+  int emission_index = -1;          ///< likewise: what gives its emission, or part of it; −1: no graph does
 
   int displacement_index = -1;  ///< into Scene::displacements; −1: none
 };

@@ -56,4 +56,17 @@ RELIEF_KERNEL Vec3f closures_transparency(const GraphLane& at)
   return sum;
 }
 
+/// What emission closures alone send out.
+RELIEF_KERNEL Vec3f closures_emission(const GraphLane& at)
+{
+  MixtureBuild build{};
+  for (std::uint32_t i = 0; i < at.program->num_closures; ++i) {
+    const SurfaceClosureSpec& spec = at.program->closures[i];
+    if (spec.kind != ClosureKind::emission) continue;
+    const float weight = graph_result(at, spec.first_result);
+    if (weight > kLeastClosureWeight) closure_add(build, spec, weight, closure_inputs<EmissionInputs>(at, spec));
+  }
+  return build.emission;
+}
+
 }  // namespace relief

@@ -42,17 +42,21 @@ RELIEF_KERNEL float triangle_alpha(const Material& material,
 /// Whether emission is the same at all points of a material's triangles.
 RELIEF_KERNEL bool emission_is_even(const Material& material)
 {
-  return material.emission_texture.texture_index < 0 && material.alpha_mode == AlphaMode::kOpaque;
+  return material.emission_texture.texture_index < 0 && material.emission_index < 0 &&
+         (material.has_closures || material.alpha_mode == AlphaMode::kOpaque);
 }
 
-/// Radiance that a point of a triangle sends out, finest texture level: what is transparent emits as little as it stops.
+/// Radiance that a point of a triangle sends out besides what a graph gives, finest texture level: what is transparent emits as
+/// little as it stops, unless closures say what emits.
 RELIEF_KERNEL Vec3f triangle_emission(const Material& material,
                                       const TextureView* textures,
                                       const MeshView& mesh,
                                       std::uint32_t triangle_index,
                                       Vec2f barycentric)
 {
-  const float alpha = triangle_alpha(material, textures, mesh, triangle_index, barycentric.x, barycentric.y);
+  const float alpha = material.has_closures
+                          ? 1.0f
+                          : triangle_alpha(material, textures, mesh, triangle_index, barycentric.x, barycentric.y);
   const TextureRef& ref = material.emission_texture;
   if (ref.texture_index < 0) return material.emission * alpha;
   const Vec2f uv = triangle_texture_uv(mesh, mesh.triangles[triangle_index], barycentric.x, barycentric.y, ref);

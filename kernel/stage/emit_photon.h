@@ -4,8 +4,8 @@
 #include "kernel/globals.h"
 #include "kernel/photon/sources.h"
 #include "kernel/sample/dimensions.h"
-#include "kernel/shape/material_lookup.h"
 #include "kernel/shape/surface_hit.h"
+#include "kernel/stage/emitter.h"
 #include "kernel/stage/path_access.h"
 
 namespace relief {
@@ -43,18 +43,15 @@ RELIEF_KERNEL EmittedRay
 emit_from_area(const KernelGlobals& g, const Light& light, const Box3& box, Vec2f u_light, Vec2f u)
 {
   EmittedRay ray;
-  Vec3f radiance = light.emission;
+  Vec2f barycentric;
   if (light.kind == LightKind::kRectangle) {
     ray.O = light.P + light.edge_u * (2.0f * u_light.x - 1.0f) + light.edge_v * (2.0f * u_light.y - 1.0f);
   } else if (light.kind == LightKind::kDisk) {
     const Vec2f q = warp_disk(u_light);
     ray.O = light.P + light.edge_u * q.x + light.edge_v * q.y;
   } else {
-    const Vec2f barycentric = warp_triangle(u_light);
+    barycentric = warp_triangle(u_light);
     ray.O = light.P + light.edge_u * barycentric.x + light.edge_v * barycentric.y;
-    const InstanceView& instance = g.instances[light.instance_index];
-    radiance = triangle_emission(g.materials[instance.material_index], g.textures, g.meshes[instance.mesh_index],
-                                 static_cast<std::uint32_t>(light.triangle_index), barycentric);
   }
   float pdf = 0.0f;
   if (box_contains(box, ray.O)) {
@@ -74,6 +71,8 @@ emit_from_area(const KernelGlobals& g, const Light& light, const Box3& box, Vec2
   }
   const float cosine = dot(ray.D, light.axis);
   if (!(pdf > 0.0f) || !(light.two_sided || cosine > 0.0f)) return {};
+  const Vec3f radiance =
+      light.kind == LightKind::kTriangle ? emitter_radiance(g, light, barycentric, ray.D, 0.0f) : light.emission;
   ray.power = radiance * (__builtin_fabsf(cosine) * light.area / pdf);
   if (light.instance_index >= 0) {
     const Vec3f error = gamma_bound(8) * (abs(light.P) + abs(light.edge_u) + abs(light.edge_v));

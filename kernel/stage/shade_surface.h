@@ -9,6 +9,7 @@
 #include "kernel/sample/dimensions.h"
 #include "kernel/sample/sobol.h"
 #include "kernel/shape/material_lookup.h"
+#include "kernel/stage/emitter.h"
 #include "kernel/stage/surface_interaction.h"
 
 namespace relief {
@@ -37,9 +38,7 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   const bool is_mesh = emitter != nullptr && emitter->instance_index >= 0;
   // Any kernel may sample a textured or transparent emitter, so this is not a feature of the surface that is lit.
   if (is_mesh && !emitter->is_even) {
-    const InstanceView& emitting = g.instances[emitter->instance_index];
-    radiance = triangle_emission(g.materials[emitting.material_index], g.textures, g.meshes[emitting.mesh_index],
-                                 static_cast<std::uint32_t>(emitter->triangle_index), light.barycentric);
+    radiance = emitter_radiance(g, *emitter, light.barycentric, -light.wi, light.distance);
   }
   if (is_zero(radiance)) return;
   const Vec3f wi = to_local(at.side.frame, light.wi);

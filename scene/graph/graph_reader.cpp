@@ -301,13 +301,19 @@ GraphPrograms graph_read(const GltfDocument& document,
     programs.surface.closures = closures;
     programs.surface.surface_normal = surface_normal;
     programs.surface.attributes.assign(r.attributes.begin(), r.attributes.end());
-    std::erase_if(closures, [](const SurfaceClosureSpec& c) { return c.kind != ClosureKind::transparent; });
-    if (!closures.empty()) {
-      constexpr int kNumbers = 1 + sizeof(TransparentInputs) / sizeof(float);
-      r.build.keep_results(closures, kNumbers);
-      programs.transparency = r.build.compile();
-      programs.transparency->closures = closures;
-    }
+    const auto alone = [&](ClosureKind kind, int num_numbers) {
+      std::optional<GraphProgram> program;
+      std::vector<SurfaceClosureSpec> kept = closures;
+      std::erase_if(kept, [kind](const SurfaceClosureSpec& c) { return c.kind != kind; });
+      if (kept.empty()) return program;
+      GraphBuilder build = r.build;
+      build.keep_results(kept, 1 + num_numbers);
+      program = build.compile();
+      program->closures = kept;
+      return program;
+    };
+    programs.transparency = alone(ClosureKind::transparent, sizeof(TransparentInputs) / sizeof(float));
+    programs.emission = alone(ClosureKind::emission, sizeof(EmissionInputs) / sizeof(float));
     return programs;
   } catch (const GraphTooLarge& error) {
     reader.fail("", error.what(), "one that needs more");

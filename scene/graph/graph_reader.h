@@ -15,6 +15,7 @@ namespace relief {
 /// The programs of a material.
 struct GraphPrograms {
   GraphProgram surface;
+  std::optional<GraphProgram> emission;      ///< of its emission closures alone, for lights; none: it has none
   std::optional<GraphProgram> transparency;  ///< of its transparent closures alone, for shadow rays; none: it has none
 };
 

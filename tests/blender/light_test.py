@@ -34,6 +34,36 @@ def test_point_without_size():
     assert_agrees(_stage(lambda: add_light("POINT", (1, -1, 3), energy=300, color=(1, 0.8, 0.4), shadow_soft_size=0)))
 
 
+def _add_light_with_nodes():
+    """A point whose colour and strength nodes make of constants.
+
+    @return  the tree and its Emission node
+    """
+    light = add_light("POINT", (1, -1, 3), energy=50, shadow_soft_size=0).data
+    light.use_nodes = True
+    tree = light.node_tree
+    emission = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeEmission")
+    product, falloff, color = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("Math", "LightFalloff", "RGB"))
+    product.operation = "MULTIPLY"
+    product.inputs[0].default_value, product.inputs[1].default_value = 3, 2
+    color.outputs[0].default_value = (1, 0.5, 0.2, 1)
+    tree.links.new(product.outputs[0], falloff.inputs["Strength"])
+    tree.links.new(falloff.outputs["Quadratic"], emission.inputs["Strength"])
+    tree.links.new(color.outputs[0], emission.inputs["Color"])
+    return tree, emission
+
+
+def test_nodes_of_constants():
+    assert_agrees(_stage(_add_light_with_nodes))
+
+
+def test_nodes_that_vary_are_warned_about():
+    scene = _stage(lambda: None)
+    tree, emission = _add_light_with_nodes()
+    tree.links.new(tree.nodes.new("ShaderNodeTexIES").outputs[0], emission.inputs["Strength"])
+    assert_warns(scene, "IES Texture", "Strength")
+
+
 def test_point_with_radius():
     scene = _stage(lambda: add_light("POINT", (1, -1, 3), energy=300, shadow_soft_size=0.2))
     assert_agrees(scene, samples=128)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Callable
 
 from .. import compat
+from . import nodes
 
 #: Distance of a sun's disk in sizes of the scene: across the scene its light differs by two in so many.
 _SUN_DISTANCE = 3e4
@@ -83,17 +84,14 @@ def _emission(light, warn):
     color, strength = tuple(light.color), 1.0
     if not light.use_nodes:
         return color, strength
-    nodes = light.node_tree.nodes
-    output = next((n for n in nodes if n.bl_idname == "ShaderNodeOutputLight" and n.is_active_output), None)
-    link = output.inputs["Surface"].links[0] if output and output.inputs["Surface"].is_linked else None
-    if link is None or link.from_node.bl_idname != "ShaderNodeEmission":
+    output = nodes.active_output(light.node_tree, "ShaderNodeOutputLight")
+    source = nodes.linked(output.inputs["Surface"]) if output else None
+    if source is None or source.node.bl_idname != "ShaderNodeEmission":
         warn("light nodes other than one Emission", "its power and colour alone were used")
         return color, strength
-    emission = link.from_node
-    if any(socket.is_linked for socket in emission.inputs):
-        warn("textured light nodes", "the Emission node's unlinked values were used")
-    color = tuple(a * b for a, b in zip(color, emission.inputs["Color"].default_value))
-    return color, emission.inputs["Strength"].default_value
+    inputs, reader = source.node.inputs, nodes.Reader(warn, source.groups)
+    color = tuple(a * b for a, b in zip(color, reader.color(inputs["Color"])))
+    return color, reader.number(inputs["Strength"])
 
 
 def _add_punctual(place, light, color):

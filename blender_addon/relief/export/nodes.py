@@ -281,6 +281,12 @@ def _fold_mix(source, value):
     return (*mixed, 1.0) if kind == "RGBA" else mixed
 
 
+def _fold_light_falloff(source, value):
+    """Falloff with the square of the distance is that of light itself."""
+    strength, smooth = value(source.node.inputs["Strength"]), value(source.node.inputs["Smooth"])
+    return strength if source.socket.identifier == "Quadratic" and smooth == 0 else None
+
+
 def _fold_normal(source, value):
     if source.socket.name != "Normal":
         return None
@@ -290,6 +296,7 @@ def _fold_normal(source, value):
 
 
 _FOLDS = {
+    "ShaderNodeLightFalloff": _fold_light_falloff,
     "ShaderNodeNormal": _fold_normal,
     "ShaderNodeMath": _fold_math,
     "ShaderNodeCombineXYZ": _fold_combine,

@@ -1,0 +1,232 @@
+"""Blender's materials of many nodes in relief and in Cycles: samples a second, side by side, and how far the pictures differ.
+
+    blender -b --factory-startup --python benchmarks/cycles/graph_speed.py [-- --threads 1 --rounds 3]
+
+A ball and a floor of the same material under a sky and a lamp. The rate is that of the samples alone: the time of a picture
+of few samples is taken from that of a picture of many, so that neither program's preparation counts. The engines take
+turns; figures are medians over the rounds. `nodes` says what the nodes cost: the time for the same picture without them, every
+linked input of its shaders at a constant, is taken from that with them.
+
+Needs the add-on in Blender's scripts folder, as tests/blender/run_test.py has it.
+"""
+
+import argparse
+import os
+import statistics
+import sys
+import tempfile
+import time
+
+import bpy
+
+_ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
+sys.dont_write_bytecode = True
+sys.path[:0] = [os.path.join(_ROOT, "tests", "blender"), os.path.dirname(os.path.abspath(__file__))]
+
+import scenes  # noqa: E402
+
+_FEW, _MANY = 4, 36
+
+
+class _Tree:
+    """A node tree of a material, and a few words over it."""
+
+    def __init__(self, name):
+        self.material = bpy.data.materials.new(name)
+        self.material.use_nodes = True
+        self.tree = self.material.node_tree
+        self.tree.nodes.clear()
+
+    def node(self, kind, inputs=(), **attributes):
+        """A node; inputs by name or number are sockets to link or values."""
+        node = self.tree.nodes.new("ShaderNode" + kind)
+        for name, value in attributes.items():
+            setattr(node, name, value)
+        for key, value in dict(inputs).items():
+            if isinstance(value, bpy.types.NodeSocket):
+                self.tree.links.new(value, node.inputs[key])
+            else:
+                node.inputs[key].default_value = value
+        return node
+
+    def ramp(self, factor, *colors):
+        node = self.node("ValToRGB", {0: factor})
+        elements = node.color_ramp.elements
+        while len(elements) < len(colors):
+            elements.new(0.5)
+        for i, color in enumerate(colors):
+            elements[i].position, elements[i].color = 0.25 + 0.5 * i / (len(colors) - 1), (*color, 1)
+        return node.outputs[0]
+
+    def math(self, operation, a, b=0.5):
+        return self.node("Math", {0: a, 1: b}, operation=operation).outputs[0]
+
+    def mix(self, factor, a, b, blend="MIX"):
+        return self.node("MixRGB", {0: factor, 1: a, 2: b}, blend_type=blend).outputs[0]
+
+    def place(self, scale):
+        coordinate = self.node("TexCoord")
+        return self.node("Mapping", {0: coordinate.outputs["Object"], "Scale": scale}).outputs[0]
+
+    def end(self, shader):
+        self.node("OutputMaterial", {0: shader})
+        return self.material
+
+    def principled(self, color, roughness, height, **inputs):
+        bump = self.node("Bump", {"Height": height, "Strength": 0.4, "Distance": 0.05})
+        values = {"Base Color": color, "Roughness": roughness, "Normal": bump.outputs[0], **inputs}
+        return self.node("BsdfPrincipled", values).outputs[0]
+
+
+def wood():
+    t = _Tree("wood")
+    p = t.place((1, 1, 0.2))
+    noise = t.node("TexNoise", {0: p, "Scale": 2, "Detail": 3})
+    bent = t.node("VectorMath", {0: p, 1: noise.outputs[1]}, operation="ADD").outputs[0]
+    rings = t.node("TexWave", {0: bent, "Scale": 3, "Distortion": 4, "Detail": 2}, wave_type="RINGS").outputs[1]
+    fibre = t.node("TexNoise", {0: t.place((40, 40, 1)), "Scale": 3, "Detail": 4}).outputs[0]
+    color = t.ramp(rings, (0.25, 0.1, 0.03), (0.5, 0.25, 0.1), (0.6, 0.35, 0.15))
+    color = t.mix(t.math("MULTIPLY", fibre, 0.4), color, (0.1, 0.05, 0.02, 1))
+    color = t.node("HueSaturation", {"Color": color, "Saturation": 1.1}).outputs[0]
+    rough = t.node("MapRange", {0: fibre, 3: 0.35, 4: 0.7}).outputs[0]
+    height = t.math("ADD", t.math("MULTIPLY", rings, 0.3), fibre)
+    return t.end(t.principled(color, rough, height))
+
+
+def marble():
+    t = _Tree("marble")
+    p = t.place((1, 1, 1))
+    color = (0.9, 0.9, 0.88, 1)
+    height = 0.5
+    for i, (scale, tone) in enumerate(((1, (0.2, 0.2, 0.25)), (3, (0.5, 0.45, 0.4)), (8, (0.3, 0.33, 0.35)))):
+        noise = t.node("TexNoise", {0: p, "Scale": scale, "Detail": 6, "Distortion": 0.5})
+        vein = t.math("ABSOLUTE", t.math("SUBTRACT", noise.outputs[0], 0.5))
+        factor = t.ramp(vein, (1, 1, 1), (0.2, 0.2, 0.2), (0, 0, 0))
+        color = t.mix(factor, color, (*tone, 1))
+        height = t.math("SUBTRACT", height, t.math("MULTIPLY", factor, 0.1 / (i + 1)))
+    rough = t.node("MapRange", {0: height, 3: 0.1, 4: 0.4}).outputs[0]
+    return t.end(t.principled(color, rough, height))
+
+
+def rust():
+    t = _Tree("rust")
+    p = t.place((1, 1, 1))
+    mask = 0.0
+    for scale in (1.5, 4, 11):
+        noise = t.node("TexNoise", {0: p, "Scale": scale, "Detail": 5}).outputs[0]
+        mask = t.math("ADD", mask, t.math("MULTIPLY", noise, 0.4))
+    edge = t.ramp(mask, (0, 0, 0), (0.2, 0.2, 0.2), (1, 1, 1))
+    grain = t.node("TexMusgrave", {0: p, "Scale": 9, "Detail": 4}).outputs[0] if not scenes.IS_4_0 else mask
+    cells = t.node("TexVoronoi", {0: p, "Scale": 14}).outputs[0]
+    color = t.ramp(t.math("ADD", grain, cells), (0.15, 0.03, 0.01), (0.4, 0.12, 0.03), (0.6, 0.25, 0.08))
+    color = t.mix(0.5, color, t.ramp(cells, (0.1, 0.05, 0.03), (0.5, 0.2, 0.1)), "OVERLAY")
+    scratches = t.node("TexNoise", {0: t.place((1, 60, 1)), "Scale": 2, "Detail": 2}).outputs[0]
+    steel = t.principled(
+        t.ramp(scratches, (0.3, 0.3, 0.32), (0.6, 0.6, 0.6)),
+        t.node("MapRange", {0: scratches, 3: 0.35, 4: 0.6}).outputs[0],
+        scratches,
+        Specular=0.8,
+    )
+    rusty = t.principled(color, t.node("MapRange", {0: grain, 3: 0.7, 4: 1}).outputs[0], t.math("ADD", grain, cells))
+    return t.end(t.node("MixShader", {0: edge, 1: steel, 2: rusty}).outputs[0])
+
+
+def layers(name, count):
+    """A stack of weathered coats: each by a texture of another kind, of its own colours, roughness and height."""
+    t = _Tree(name)
+    p = t.place((1, 1, 1))
+    color, rough, height = (0.5, 0.5, 0.5, 1), 0.5, 0.0
+    for i in range(count):
+        kind = ("TexNoise", "TexVoronoi", "TexWave", "TexMagic")[i % 4]
+        texture = t.node(kind, {0: p, "Scale": 2.0 + i}).outputs[0]
+        factor = t.ramp(t.math("FRACT", t.math("MULTIPLY", texture, 1.7)), (0, 0, 0), (1, 1, 1))
+        tone = t.node("HueSaturation", {"Color": (0.6, 0.3, 0.2, 1), "Hue": 0.1 * i % 1}).outputs[0]
+        color = t.mix(factor, color, t.mix(texture, tone, (0.2, 0.2, 0.2, 1), "MULTIPLY"))
+        rough = t.math("ADD", t.math("MULTIPLY", rough, 0.8), t.math("MULTIPLY", factor, 0.1))
+        height = t.math("ADD", height, t.math("MULTIPLY", factor, 0.2))
+    return t.end(t.principled(color, rough, height))
+
+
+def scales():
+    return layers("scales", 5)
+
+
+def planet():
+    return layers("planet", 9)
+
+
+def _plain(material):
+    """The same shaders with no nodes before them."""
+    plain = material.copy()
+    tree = plain.node_tree
+    for node in tree.nodes:
+        for socket in node.inputs:
+            if socket.is_linked and socket.type != "SHADER":
+                tree.links.remove(socket.links[0])
+    return plain
+
+
+def _stage(make, plain, threads):
+    scene = scenes.new_scene(480, 360)
+    scene.relief.strict = False
+    scene.relief.caustics = "off"
+    scene.render.threads_mode, scene.render.threads = "FIXED", threads
+    scene.relief.threads = threads
+    scenes.set_bounces(scene, 4)
+    scenes.set_world((0.4, 0.5, 0.7))
+    material = make()
+    if plain:
+        material = _plain(material)
+    scenes.add_plane(8, material)
+    scenes.add_sphere(1.0, material, (0, 0, 1), segments=64)
+    scenes.add_light("AREA", (2, -2, 4), scenes.degrees(30, 25, 0), energy=150, size=1.5)
+    scenes.add_camera((0, -5, 3), scenes.degrees(67, 0, 0), lens=45)
+    return scene, len(material.node_tree.nodes)
+
+
+def _seconds_a_sample(scene, engine, path):
+    times = []
+    for samples in (_FEW, _MANY):
+        start = time.perf_counter()
+        picture = scenes.render(scene, engine, path, seed=samples, samples=samples)
+        times.append(time.perf_counter() - start)
+    return (times[1] - times[0]) / (_MANY - _FEW), picture
+
+
+def _measure(make, threads, rounds, path):
+    seconds, pictures = {}, {}
+    for _ in range(rounds):
+        for plain in (False, True):
+            scene, nodes = _stage(make, plain, threads)
+            num_nodes = nodes if not plain else num_nodes
+            for engine in ("RELIEF", "CYCLES"):
+                one, picture = _seconds_a_sample(scene, engine, path)
+                seconds.setdefault((engine, plain), []).append(one)
+                pictures[engine, plain] = picture
+    return num_nodes, {key: statistics.median(values) for key, values in seconds.items()}, pictures
+
+
+def main(arguments):
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--only", nargs="*")
+    options = parser.parse_args(arguments)
+    print("| material | nodes | relief, samples/s | Cycles | ratio | cost of nodes, µs a sample | Cycles | ratio | mean differs |")
+    print("| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |")
+    with tempfile.TemporaryDirectory() as folder:
+        for make in (wood, marble, rust, scales, planet):
+            if options.only and make.__name__ not in options.only:
+                continue
+            nodes, seconds, pictures = _measure(make, options.threads, options.rounds, os.path.join(folder, "picture.exr"))
+            ours, theirs = seconds["RELIEF", False], seconds["CYCLES", False]
+            pixels = 480 * 360
+            costs = [1e6 * (seconds[e, False] - seconds[e, True]) / pixels for e in ("RELIEF", "CYCLES")]
+            difference = pictures["RELIEF", False].mean() / pictures["CYCLES", False].mean() - 1
+            row = (f"{pixels / ours:,.0f}", f"{pixels / theirs:,.0f}", f"{theirs / ours:.2f}", f"{costs[0]:.2f}")
+            row += (f"{costs[1]:.2f}", f"{costs[1] / costs[0]:.2f}", f"{difference:+.2%}")
+            print("|", " | ".join((make.__name__, str(nodes), *row)), "|", flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[sys.argv.index("--") + 1 :] if "--" in sys.argv else [])

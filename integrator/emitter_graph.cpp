@@ -1,0 +1,95 @@
+#include "integrator/emitter_graph.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+#include "kernel/graph/graph_material.h"
+#include "kernel/shape/material_lookup.h"
+
+namespace relief {
+namespace {
+
+/// A point of an emitter and what a graph reads there.
+struct EmitterPoint {
+  EmitterPoint(const KernelGlobals& g, const InstanceView& at, std::uint32_t at_triangle, Vec2f barycentric)
+      : mesh(g.meshes[at.mesh_index]),
+        instance(at),
+        triangle(at_triangle),
+        b(barycentric),
+        hit(surface_hit_make(mesh, at, at_triangle, barycentric.x, barycentric.y))
+  {
+  }
+
+  /// @param wo  unit, from the emitter
+  GraphPoint graph_point(const KernelGlobals& g, Vec3f wo, float distance) const
+  {
+    // As in Cycles, light that is asked for comes by no kind of ray.
+    return {&mesh, &instance, triangle, b.x, b.y, &hit, wo, {0.0f, 0.0f}, 0.0f, &g.graph_scene, {0, 0, 0, distance}};
+  }
+
+  const MeshView& mesh;
+  const InstanceView& instance;
+  std::uint32_t triangle;
+  Vec2f b;
+  SurfaceHit hit;
+};
+
+/// @param lane  of the material's emission program, which has run
+Vec3f radiance_of(const KernelGlobals& g, const Material& material, const GraphLane& lane, const EmitterPoint& point)
+{
+  if (material.has_closures) {
+    return triangle_emission(material, g.textures, point.mesh, point.triangle, point.b) + closures_emission(lane);
+  }
+  constexpr float kFinest[2] = {0.0f, 0.0f};
+  const SurfaceParams p = graph_surface_params<kFeatureTextures | kFeatureTransparency>(material, graph_values(lane),
+                                                                                        g.textures, point.hit, kFinest);
+  return p.emission * p.alpha;
+}
+
+}  // namespace
+
+Vec3f emitter_graph_radiance(const KernelGlobals& g, const Light& emitter, Vec2f barycentric, Vec3f wo, float distance)
+{
+  const InstanceView& instance = g.instances[emitter.instance_index];
+  const Material& material = g.materials[instance.material_index];
+  const EmitterPoint point(g, instance, static_cast<std::uint32_t>(emitter.triangle_index), barycentric);
+  GraphRegisters registers;
+  const GraphLane lane = graph_at_point(g.run_graph, g.graphs[material.emission_index], g.textures,
+                                        point.graph_point(g, wo, distance), registers);
+  return radiance_of(g, material, lane, point);
+}
+
+void emitter_graph_means(const KernelGlobals& g, std::size_t instance_index, std::span<Vec3f> means)
+{
+  constexpr int kPoints = 8;
+  // The middles of the triangle, of its quarters and of some of theirs.
+  constexpr float kPlaces[kPoints][2] = {{1 / 3.0f, 1 / 3.0f},   {2 / 3.0f, 1 / 6.0f},   {1 / 6.0f, 2 / 3.0f},
+                                         {1 / 6.0f, 1 / 6.0f},   {1 / 12.0f, 5 / 12.0f}, {5 / 12.0f, 1 / 12.0f},
+                                         {5 / 12.0f, 5 / 12.0f}, {5 / 6.0f, 1 / 12.0f}};
+  const InstanceView& instance = g.instances[instance_index];
+  const Material& material = g.materials[instance.material_index];
+  const GraphProgramView& program = g.graphs[material.emission_index];
+  tbb::parallel_for(std::size_t{0}, means.size(), [&](std::size_t triangle) {
+    GraphRegisters registers;
+    const auto point_of = [&](int i) {
+      return EmitterPoint(g, instance, static_cast<std::uint32_t>(triangle), {kPlaces[i][0], kPlaces[i][1]});
+    };
+    for (int i = 0; i < kPoints; ++i) {
+      const EmitterPoint point = point_of(i);
+      graph_load_point(program, point.graph_point(g, point.hit.Ng, 1.0f), i, registers);
+    }
+    g.run_graph(program, g.textures, registers);
+    Vec3f sum;
+    for (int i = 0; i < kPoints; ++i)
+      sum += max(Vec3f{}, radiance_of(g, material, {&program, &registers, i}, point_of(i)));
+    means[triangle] = is_finite(sum) ? sum * (1.0f / kPoints) : Vec3f{};
+  });
+  Vec3f all;
+  for (const Vec3f& mean : means) all += mean * (1.0f / static_cast<float>(means.size()));
+  for (Vec3f& mean : means) {
+    if (is_zero(mean)) mean = all * 0.01f;
+  }
+}
+
+}  // namespace relief

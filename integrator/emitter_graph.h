@@ -1,0 +1,19 @@
+// What meshes send out whose materials emit by value graphs. Compiled once, not in every stage that samples lights.
+#pragma once
+
+#include <span>
+
+#include "kernel/globals.h"
+
+namespace relief {
+
+/// Radiance of a point of a mesh light, as KernelGlobals::emitter_radiance.
+Vec3f emitter_graph_radiance(const KernelGlobals& g, const Light& emitter, Vec2f barycentric, Vec3f wo, float distance);
+
+/// Mean radiance of triangles of an instance, by few points: what choosing among lights needs.
+/// @param g       meshes, instances, materials, graphs and textures are filled in
+/// @param means   one a triangle of the instance's mesh; those at which no point shone get a hundredth of the mesh's mean, for
+///                other points of theirs may
+void emitter_graph_means(const KernelGlobals& g, std::size_t instance, std::span<Vec3f> means);
+
+}  // namespace relief

@@ -1,0 +1,77 @@
+// Light that a value graph gives a lamp of closures: found by sampling lights as by following the BSDF.
+#include <array>
+#include <filesystem>
+#include <fstream>
+
+#include <nlohmann/json.hpp>
+
+#include "scene/load.h"
+#include "tests/image/render_runs.h"
+#include "tests/support/gltf_builder.h"
+
+namespace relief::test {
+
+namespace {
+
+using nlohmann::json;
+
+/// The Cornell box, whose lamp has patches of two colours.
+Scene patchy_cornell()
+{
+  const auto folder = std::filesystem::path(RELIEF_SOURCE_DIR) / "examples" / "cornell";
+  std::ifstream file(folder / "cornell.gltf");
+  json gltf = json::parse(file);
+  gltf["buffers"][0]["uri"] = "cornell.bin";
+  gltf["extensionsUsed"].push_back("RELIEF_surface");
+  gltf["extensionsUsed"].push_back("RELIEF_graph");
+  json& lamp = gltf["materials"][3];
+  const auto node = [](int index, const char* output) { return json{{"node", index}, {"output", output}}; };
+  const json nodes = {
+      {{"type", "geometry"}},
+      {{"type", "checker-texture"},
+       {"inputs",
+        {{"vector", node(0, "position")}, {"scale", 8}, {"color1", {60, 40, 20}}, {"color2", {20, 40, 60}}}}}};
+  lamp["emissiveFactor"] = {0, 0, 0};
+  lamp["extensions"] = {
+      {"RELIEF_graph", {{"nodes", nodes}}},
+      {"RELIEF_surface",
+       {{"closures",
+         {{{"type", "emission"}, {"color", node(1, "color")}}, {{"type", "diffuse"}, {"color", {0.5, 0.5, 0.5}}}}}}}};
+  const TemporaryFolder copy;
+  std::filesystem::copy(folder / "cornell.bin", copy / "cornell.bin");
+  return scene_load(copy.write("scene.gltf", gltf.dump()));
+}
+
+TEST(GraphEmission, LightSamplingFindsWhatPathsFind)
+{
+  const Scene scene = patchy_cornell();
+  RunOptions run;
+  run.width = run.height = 32;
+  run.samples = 256;
+  constexpr std::array kTechniques = {LightTechnique::kMis, LightTechnique::kLightSampling,
+                                      LightTechnique::kBsdfSampling};
+  std::array<Picture, 3> pictures;
+  for (std::size_t i = 0; i < kTechniques.size(); ++i) {
+    run.technique = kTechniques[i];
+    run.first_seed = 100 * (i + 1);
+    pictures[i] = render_runs(scene, run);
+  }
+  // As in estimator_agreement_test.cpp: small lamps are found by luck alone where paths look for them.
+  constexpr double kSignificance = 0.001, kAllowedOutliers = 0.05;
+  for (const std::size_t i : {1u, 2u}) {
+    const ZTestResult result =
+        z_test_pictures(pictures[0], pictures[i], run.samples * run.num_runs, kSignificance, kAllowedOutliers);
+    EXPECT_TRUE(result.passed) << i << ": " << z_text(result);
+  }
+  // Sampling the lamp has far less noise than meeting it.
+  const auto variance = [](const Picture& picture) {
+    double sum = 0;
+    for (const float v : picture.find("variance.R")->values) sum += static_cast<double>(v);
+    return sum;
+  };
+  EXPECT_LT(8 * variance(pictures[0]), variance(pictures[2]));
+}
+
+}  // namespace
+
+}  // namespace relief::test
