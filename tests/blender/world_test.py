@@ -64,26 +64,26 @@ def test_color_without_nodes():
 def test_lat_long_image():
     scene = _stage()
     _image_world()
-    assert_agrees(scene, samples=128, block=4)
+    assert_agrees(scene, samples=64, block=4)
 
 
 def test_lat_long_image_turned():
     scene = _stage()
     _image_world(degrees(0, 0, 70))
-    assert_agrees(scene, samples=128, block=4)
+    assert_agrees(scene, samples=64, block=4)
 
 
 def test_lat_long_image_turned_as_texture():
     scene = _stage()
     _image_world(degrees(0, 0, 70), kind="TEXTURE")
-    assert_agrees(scene, samples=128, block=4)
+    assert_agrees(scene, samples=64, block=4)
 
 
 def test_srgb_image():
     """Neighbouring texels differ little: between them Cycles interpolates what is stored, relief what it means."""
     scene = _stage()
     _image_world(is_float=False, color_space="sRGB", pixels=smooth_pixels())
-    assert_agrees(scene, samples=128, block=4, tolerance=0.01)
+    assert_agrees(scene, samples=64, block=4, tolerance=0.01)
 
 
 def test_a_volume_is_warned_about():
@@ -199,7 +199,7 @@ def test_a_gradient_of_generated_coordinates():
     tree.links.new(mapping.outputs["Vector"], gradient.inputs["Vector"])
     tree.links.new(gradient.outputs["Fac"], ramp.inputs["Fac"])
     tree.links.new(ramp.outputs["Color"], tree.nodes["Background"].inputs["Color"])
-    assert_agrees(scene, samples=128, block=4)
+    assert_agrees(scene, samples=64, block=4)
 
 
 def test_directions():
@@ -231,7 +231,7 @@ def test_clouds():
     strength.inputs[1].default_value, strength.inputs[2].default_value = 2.0, 0.2
     tree.links.new(noise.outputs["Fac"], strength.inputs[0])
     tree.links.new(strength.outputs[0], tree.nodes["Background"].inputs["Strength"])
-    assert_agrees(scene, samples=128, block=4)
+    assert_agrees(scene, samples=64, block=4)
 
 
 def _mixed(factor=None):
@@ -272,7 +272,7 @@ def test_backgrounds_mixed_by_height():
 
     scene = _stage()
     _mixed(height)
-    assert_agrees(scene, samples=128, block=4, tolerance=0.005)
+    assert_agrees(scene, samples=64, block=4, tolerance=0.005)
 
 
 def _by_camera_ray(tree):
@@ -319,7 +319,7 @@ def test_sky_without_disk():
     scene = _stage()
     settings = {"altitude": 2000, "air_density": 1.5, "dust_density": 3, "ozone_density": 4}
     _sky_world(0.2, sun_disc=False, sun_elevation=math.radians(2), sun_rotation=math.radians(-20), **settings)
-    assert_agrees(scene, samples=128, block=4, dark=_RIM)
+    assert_agrees(scene, samples=64, block=4, dark=_RIM)
 
 
 def test_a_small_sun():
@@ -332,7 +332,7 @@ def test_a_small_sun():
 def test_a_sun_past_the_zenith():
     scene = _stage()
     _sky_world(0.2, sun_disc=False, sun_elevation=math.radians(170), sun_rotation=math.radians(30))
-    assert_agrees(scene, samples=128, block=4, dark=_RIM)
+    assert_agrees(scene, samples=64, block=4, dark=_RIM)
 
 
 def test_another_sky_is_warned_about():
@@ -346,13 +346,13 @@ def test_preetham_sky():
     scene = _stage()
     sky = {"sky_type": "PREETHAM", "sun_direction": (0.3, -0.5, 0.4), "turbidity": 3.5}
     _sky_world(0.3, **sky)
-    assert_agrees(scene, samples=128, block=4)
+    assert_agrees(scene, samples=64, block=4)
 
 
 def test_an_image_turned_about_x():
     scene = _stage()
     _image_world(degrees(20, 0, 0))
-    assert_agrees(scene, samples=128, block=4)
+    assert_agrees(scene, samples=64, block=4)
 
 
 def test_a_mirror_ball():
@@ -360,7 +360,7 @@ def test_a_mirror_ball():
     _image_world(degrees(10, 30, 200), pixels=smooth_pixels())
     texture = next(n for n in bpy.context.scene.world.node_tree.nodes if n.bl_idname == "ShaderNodeTexEnvironment")
     texture.projection = "MIRROR_BALL"
-    assert_agrees(scene, samples=128, block=4)
+    assert_agrees(scene, samples=64, block=4)
 
 
 def test_an_image_and_a_colour_mixed():
@@ -373,4 +373,4 @@ def test_an_image_and_a_colour_mixed():
     tree.links.new(first.outputs[0], mix.inputs[1])
     tree.links.new(second.outputs[0], mix.inputs[2])
     tree.links.new(mix.outputs[0], tree.nodes["World Output"].inputs["Surface"])
-    assert_agrees(scene, samples=128, block=4)
+    assert_agrees(scene, samples=64, block=4)
