@@ -29,7 +29,11 @@ struct MixtureCase {
 constexpr Vec3f kN{0, 0, 1};
 
 /// World space is the surface's frame here.
-Mixture mixture_make(const MixtureCase& one, Vec3f wo, MixtureLobes& lobes, bool front = true, MixtureBuild* built = nullptr)
+Mixture mixture_make(const MixtureCase& one,
+                     Vec3f wo,
+                     MixtureLobes& lobes,
+                     bool front = true,
+                     MixtureBuild* built = nullptr)
 {
   lobes.size = 0;
   MixtureBuild build{wo, kN, kN, front, &tables(), &lobes};
@@ -102,7 +106,8 @@ std::vector<MixtureCase> cases()
                    closure_add(b, spec_of(false), 0.4f, VelvetInputs{});
                    closure_add(b, spec_of(false), 0.2f, ToonInputs{{0.5f, 0.5f, 0.5f}, 0.6f, 0.3f, {}});
                  }});
-  for (const auto distribution : {ClosureDistribution::kGgx, ClosureDistribution::kBeckmann, ClosureDistribution::kMultiscatterGgx}) {
+  for (const auto distribution :
+       {ClosureDistribution::kGgx, ClosureDistribution::kBeckmann, ClosureDistribution::kMultiscatterGgx}) {
     for (const bool is_4 : {false, true}) {
       const std::string which = std::to_string(static_cast<int>(distribution)) + (is_4 ? ", 4.3" : ", 3.4");
       all.push_back({"glass " + which, [=](MixtureBuild& b) {
@@ -172,7 +177,8 @@ TEST(Mixture, SamplesAndEvaluationsGiveOneAlbedo)
       sampled += a;
       sampled2 += a * a;
       const Vec3f wi = warp_sphere({u, v});
-      const double b = static_cast<double>(mean_component(closure_eval<kFeatureAll>(m, tables(), wi).f) * __builtin_fabsf(wi.z) / warp_sphere_pdf());
+      const double b = static_cast<double>(mean_component(closure_eval<kFeatureAll>(m, tables(), wi).f) *
+                                           __builtin_fabsf(wi.z) / warp_sphere_pdf());
       uniform += b;
       uniform2 += b * b;
     }
@@ -229,7 +235,8 @@ TEST(Mixture, TheLayeredPrincipledReflectsNoMoreThanItReceives)
       // its glass is given back twice where facets scatter more than once, also as there.
       const double most = in.thin_film_thickness > 0.0f ? 1.06 : 1.03;
       EXPECT_LT(furnace(m), most) << i << ", cosine " << z << ", film " << in.thin_film_thickness << ", coat "
-                                  << in.coat_weight << ", glass " << in.transmission_weight << ", metal " << in.metallic;
+                                  << in.coat_weight << ", glass " << in.transmission_weight << ", metal "
+                                  << in.metallic;
     }
   }
 }
@@ -240,14 +247,81 @@ TEST(Mixture, WhitePrincipledOf43IsClosed)
     Principled4Inputs in;
     in.base_color = {1, 1, 1};
     in.roughness = roughness;
-    const MixtureCase one{"", [&](MixtureBuild& b) {
-                            closure_add(b, spec_of(true, ClosureDistribution::kMultiscatterGgx), 1.0f, in);
-                          }};
+    const MixtureCase one{
+        "", [&](MixtureBuild& b) { closure_add(b, spec_of(true, ClosureDistribution::kMultiscatterGgx), 1.0f, in); }};
     for (const float z : {0.2f, 0.5f, 1.0f}) {
       MixtureLobes lobes;
       EXPECT_NEAR(furnace(mixture_make(one, direction(z, 0.2f), lobes)), 1.0, 0.01) << roughness << ", cosine " << z;
     }
   }
+}
+
+/// The same as reflected_share by the definition: an integral over all microfacets, in double precision.
+double reflected_share_by_quadrature(double alpha, double eta, double cos_o)
+{
+  constexpr int kSide = 1500;
+  const double pi = std::acos(-1.0), sin_o = std::sqrt(1 - cos_o * cos_o), F0 = std::pow((eta - 1) / (eta + 1), 2);
+  const double G1 = 2 / (1 + std::sqrt(1 + alpha * alpha * sin_o * sin_o / (cos_o * cos_o)));
+  double sum = 0;
+  for (int i = 0; i < kSide; ++i) {
+    // Slopes tan θ = α √(u / (1 − u)) follow the distribution times the cosine.
+    const double u = (i + 0.5) / kSide, tangent = alpha * std::sqrt(u / (1 - u));
+    const double cos_m = 1 / std::sqrt(1 + tangent * tangent), sin_m = tangent * cos_m;
+    for (int k = 0; k < kSide; ++k) {
+      const double c = sin_o * sin_m * std::cos(pi * (k + 0.5) / kSide) + cos_o * cos_m;
+      if (c <= 0 || 2 * c * cos_m <= cos_o) continue;
+      const double t = std::sqrt(1 - (1 - c * c) / (eta * eta));
+      const double parallel = (eta * c - t) / (eta * c + t), perpendicular = (c - eta * t) / (c + eta * t);
+      const double F = 0.5 * (parallel * parallel + perpendicular * perpendicular);
+      sum += G1 * c / (cos_o * cos_m) * (F - F0) / (1 - F0);
+    }
+  }
+  return sum / (double{kSide} * kSide);
+}
+
+TEST(Mixture, TheReflectedShareIsItsIntegral)
+{
+  for (const double roughness : {0.2, 0.5, 0.8, 1.0}) {
+    for (const double eta : {1.3, 1.5, 2.0}) {
+      for (const double cos_o : {0.2, 0.5, 0.9}) {
+        const float share = reflected_share(tables(), static_cast<float>(roughness), static_cast<float>(eta),
+                                            static_cast<float>(cos_o));
+        // Sixteen nodes an axis, linear between them.
+        EXPECT_NEAR(static_cast<double>(share), reflected_share_by_quadrature(roughness * roughness, eta, cos_o), 0.006)
+            << roughness << ", " << eta << ", " << cos_o;
+      }
+    }
+  }
+}
+
+TEST(Mixture, NormalsAreTurnedJustSoFarThatMirrorsReflectUpwards)
+{
+  TestRandom r(7);
+  const auto unit = [&r] { return normalize(Vec3f{r.next() - 0.5f, r.next() - 0.5f, r.next() - 0.5f}); };
+  int num_turned = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3f Ng = unit();
+    const Vec3f wo = normalize(unit() + Ng);
+    const Vec3f N = unit();
+    const float height_o = dot(wo, Ng);
+    if (!(height_o > 1e-3f && dot(N, Ng) > 0.0f)) continue;
+    const float least = std::min(0.9f * height_o, 0.01f);
+    const auto height = [&](Vec3f normal) { return 2.0f * dot(normal, wo) * dot(normal, Ng) - height_o; };
+    const Vec3f turned = normal_with_reflection_above(Ng, N, wo);
+    if (height(N) >= least) {
+      EXPECT_EQ(turned, N);
+      continue;
+    }
+    ++num_turned;
+    EXPECT_NEAR(length(turned), 1.0f, 1e-5f);
+    EXPECT_NEAR(dot(turned, cross(Ng, N)), 0.0f, 1e-5f);
+    EXPECT_NEAR(height(turned), least, 1e-4f);
+    // No nearer normal would do.
+    for (float t = 0.01f; t < 0.99f; t += 0.01f) {
+      EXPECT_LT(height(normalize(lerp(t, N, turned))), least + 1e-4f) << t;
+    }
+  }
+  EXPECT_GT(num_turned, 100);
 }
 
 TEST(Mixture, NothingWeighsNothing)
