@@ -88,7 +88,7 @@ def test_mirror():
     assert_agrees(_stage(material), samples=64)
 
 
-def test_white_mirror():
+def test_white_mirror_long():
     material, _, node = new_material("mirror", "ShaderNodeBsdfGlossy", Color=(1, 1, 1, 1))
     make_sharp(node)
     assert_agrees(_stage(material), samples=64)

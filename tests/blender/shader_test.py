@@ -70,7 +70,7 @@ def test_glossy_toon():
     _single("ShaderNodeBsdfToon", attributes={"component": "GLOSSY"}, Size=0.3, Smooth=0.0)
 
 
-def test_glossy_of_each_distribution():
+def test_glossy_of_each_distribution_long():
     for distribution in ("GGX", "BECKMANN", "ASHIKHMIN_SHIRLEY"):
         material, _, node = new_material("glossy", "ShaderNodeBsdfGlossy", Color=(0.9, 0.6, 0.2, 1), Roughness=0.4)
         node.distribution = distribution
@@ -79,13 +79,13 @@ def test_glossy_of_each_distribution():
         bpy.ops.object.delete()
 
 
-def test_glossy_that_scatters_more_than_once():
+def test_glossy_that_scatters_more_than_once_long():
     """Of 3.4's random walk the energy is there, not all of the shape."""
     attributes = {"distribution": "MULTI_GGX"}
     _single("ShaderNodeBsdfGlossy", 0.1, attributes=attributes, Color=(0.9, 0.6, 0.2, 1), Roughness=0.4)
 
 
-def test_coloured_rough_glass():
+def test_coloured_rough_glass_long():
     _single("ShaderNodeBsdfGlass", Color=(0.9, 0.6, 0.5, 1), Roughness=0.3, IOR=1.5)
 
 
@@ -93,7 +93,7 @@ def test_refraction():
     _single("ShaderNodeBsdfRefraction", Color=(0.9, 0.6, 0.5, 1), Roughness=0.2, IOR=1.3)
 
 
-def test_coloured_transparency_mixed_by_fresnel():
+def test_coloured_transparency_mixed_by_fresnel_long():
     material, tree, mix = new_material("mixed", "ShaderNodeMixShader")
     clear, gloss = tree.nodes.new("ShaderNodeBsdfTransparent"), tree.nodes.new("ShaderNodeBsdfGlossy")
     clear.inputs[0].default_value = (1.0, 0.4, 0.2, 1.0)
@@ -109,7 +109,7 @@ def test_diffuse_and_gloss_mixed_by_noise():
     _agrees(_mixed(diffuse, ("ShaderNodeBsdfGlossy", {"Roughness": 0.3})))
 
 
-def test_emission_and_glass_mixed_by_noise():
+def test_emission_and_glass_mixed_by_noise_long():
     emission = ("ShaderNodeEmission", {"Color": (0.2, 1, 0.3, 1), "Strength": 0.5})
     _agrees(_mixed(emission, ("ShaderNodeBsdfGlass", {"Roughness": 0.4})))
 
@@ -165,7 +165,7 @@ def test_displacement_that_bumps_only():
     _agrees(material, 0.01)
 
 
-def test_principled_by_chance():
+def test_principled_by_chance_long():
     """The first three of measure_random_principled.py."""
     for seed in range(3):
         found, difference = random_principled.compare(random_principled.values(seed))

@@ -173,7 +173,7 @@ def test_opacity_from_another_image():
     assert_agrees(scene, samples=128, tolerance=0.005)
 
 
-def test_roughness_from_a_grey_image():
+def test_roughness_from_a_grey_image_long():
     """A mirror whose blur varies over the square."""
     pixels = asymmetric_pixels()
     pixels[..., :3] = (0.15 + 0.5 * pixels[..., :1]) * np.ones(3)

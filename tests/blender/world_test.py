@@ -73,7 +73,7 @@ def test_lat_long_image_turned():
     assert_agrees(scene, samples=64, block=4)
 
 
-def test_lat_long_image_turned_as_texture():
+def test_lat_long_image_turned_as_texture_long():
     scene = _stage()
     _image_world(degrees(0, 0, 70), kind="TEXTURE")
     assert_agrees(scene, samples=64, block=4)
@@ -174,11 +174,11 @@ def test_a_world_hidden_from_diffuse_rays():
     assert_agrees(_hidden_from("diffuse"), samples=128, tolerance=_FACETS)
 
 
-def test_a_world_hidden_from_glossy_rays():
+def test_a_world_hidden_from_glossy_rays_long():
     assert_agrees(_hidden_from("glossy"), samples=128, tolerance=_FACETS)
 
 
-def test_a_world_hidden_from_transmission_rays():
+def test_a_world_hidden_from_transmission_rays_long():
     assert_agrees(_hidden_from("transmission"), samples=128, tolerance=_FACETS)
 
 
@@ -215,7 +215,7 @@ def test_directions():
         assert_agrees(scene, samples=64, block=4)
 
 
-def test_clouds():
+def test_clouds_long():
     scene = _stage()
     tree = set_world((1, 1, 1), 1.0)
     noise, ramp = _nodes(tree, "TexNoise", "ValToRGB")
@@ -329,7 +329,7 @@ def test_a_small_sun():
     assert_agrees(scene, samples=256, block=8)
 
 
-def test_a_sun_past_the_zenith():
+def test_a_sun_past_the_zenith_long():
     scene = _stage()
     _sky_world(0.2, sun_disc=False, sun_elevation=math.radians(170), sun_rotation=math.radians(30))
     assert_agrees(scene, samples=64, block=4, dark=_RIM)
