@@ -232,21 +232,28 @@ std::size_t EnvironmentTables::bytes() const
   return (row_cdf.size() + column_cdf.size() + row_edges.size()) * sizeof(float);
 }
 
+EnvironmentView environment_view_make(const TextureView* map, Vec3f color, float rotation)
+{
+  EnvironmentView environment;
+  environment.color = color;
+  const double turns = static_cast<double>(rotation) / (2 * std::numbers::pi);
+  environment.rotation_turns = static_cast<float>(turns - std::floor(turns));
+  if (map != nullptr) {
+    environment.has_map = true;
+    environment.map = *map;
+    environment.map.wrap_u = Wrap::kRepeat;
+  }
+  return environment;
+}
+
 EnvironmentTables environment_tables_make(const TextureView* map,
                                           Vec3f color,
                                           float rotation,
                                           EnvironmentDensity density)
 {
   EnvironmentTables tables;
-  tables.environment.color = color;
-  const double turns = static_cast<double>(rotation) / (2 * std::numbers::pi);
-  tables.environment.rotation_turns = static_cast<float>(turns - std::floor(turns));
-  if (map != nullptr) {
-    tables.environment.has_map = true;
-    tables.environment.map = *map;
-    tables.environment.map.wrap_u = Wrap::kRepeat;
-    tables_fill(tables, density);
-  }
+  tables.environment = environment_view_make(map, color, rotation);
+  if (map != nullptr) tables_fill(tables, density);
   return tables;
 }
 

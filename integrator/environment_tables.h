@@ -35,6 +35,9 @@ struct EnvironmentTables {
 /// degree wide, less than the sun's disk.
 inline constexpr int kMaxEnvironmentColumns = 1024;
 
+/// An environment without tables: for rays that look at it.
+EnvironmentView environment_view_make(const TextureView* map, Vec3f color, float rotation);
+
 /// Builds the sampling tables, in parallel.
 /// @param map       lat-long image in memory or in a tile cache; null: constant environment, no tables
 /// @param color     radiance factor, strength included

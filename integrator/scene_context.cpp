@@ -4,6 +4,8 @@
 #include <utility>
 
 #include "integrator/emitter_graph.h"
+#include "integrator/environment_tables.h"
+#include "integrator/graph_rays.h"
 #include "integrator/intersect_stage.h"
 #include "integrator/surface_kernels.h"
 #include "scene/texture_store.h"
@@ -101,12 +103,19 @@ SceneContext::SceneContext(const Scene& loaded,
   bsdf_tables_make(*bsdf_tables, features);
   accel = std::make_unique<Accel>(scene, lights.lights, lights.area_lights, displacements, shadow_filter);
 
+  globals.graph_scene.rays = graph_rays_make(*accel);
   globals.area_light_index = lights.area_lights.data();
   globals.lights = lights.view();
   globals.has_lights = lights.any();
   globals.bsdf_tables = bsdf_tables.get();
   globals.environment_visible_to_camera = scene.environment.visible_to_camera;
   globals.environment_hidden_from = scene.environment.hidden_from;
+  if (const std::optional<Surroundings>& seen = scene.environment.backdrop) {
+    const int map = seen->texture_index;
+    globals.has_backdrop = true;
+    globals.backdrop = environment_view_make(
+        map < 0 ? nullptr : &scene.textures->views()[static_cast<std::size_t>(map)], seen->color, seen->rotation);
+  }
 }
 
 void SceneContext::make_views()

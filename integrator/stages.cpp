@@ -64,6 +64,7 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
   });
   constexpr std::uint32_t kLanes = 8;
   GraphRegisters registers;
+  registers.rays = g.graph_scene.rays;
   for (std::uint32_t first = 0; first < queue.size;) {
     const Material& material = g.materials[material_of(queue.paths[first])];
     if (material.graph_index < 0) {
@@ -79,7 +80,10 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
       const SurfaceInteraction at = surface_interaction_locate<kFeatures>(g, state, path, wo);
       graph_load_point(program, surface_graph_point(g, state, path, at, wo), static_cast<int>(count), registers);
     }
+    registers.used = (1u << count) - 1;
     g.run_graph(program, g.textures, registers);
+    counters.graph_runs += 1;
+    counters.graph_points += count;
     for (std::uint32_t lane = 0; lane < count; ++lane) {
       const GraphLane values{&program, &registers, static_cast<int>(lane)};
       shade_surface<kFeatures>(g, state, queue.paths[first + lane], next, shadow, counters, &values);

@@ -196,7 +196,7 @@ void environment_set(Scene& scene, const EnvironmentChoice& choice, TextureStore
   scene.environment.visible_to_camera = choice.source == EnvironmentSource::kSky;
 }
 
-void environment_add_graph(Scene& scene, const EnvironmentGraph& graph, TextureStore& textures)
+void surroundings_add_graph(Surroundings& surroundings, const EnvironmentGraph& graph, TextureStore& textures)
 {
   EnvironmentMap map = environment_graph_bake(graph, textures.views());
   const float most = *std::max_element(map.rgb.begin(), map.rgb.end());
@@ -207,10 +207,10 @@ void environment_add_graph(Scene& scene, const EnvironmentGraph& graph, TextureS
   const float unit = most > 0 ? std::ldexp(1.0f, exponent - kMostExponent) : 1.0f;
   if (unit > 0 && std::isfinite(1 / unit)) {
     for (float& value : map.rgb) value /= unit;
-    scene.environment.color *= unit;
+    surroundings.color *= unit;
   }
-  scene.environment.texture_index =
-      textures.add_image("environment", map.width, map.height, map.rgb, Wrap::kRepeat, Wrap::kClamp);
+  surroundings.texture_index =
+      textures.add_image(graph.is_backdrop ? "backdrop" : "environment", map.width, map.height, map.rgb, Wrap::kRepeat, Wrap::kClamp);
 }
 
 void default_light_add(Scene& scene, std::span<const Placement> placements, TextureStore& textures, Warnings& warnings)

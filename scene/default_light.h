@@ -38,7 +38,7 @@ void environment_set(Scene& scene, const EnvironmentChoice& choice, TextureStore
 
 /// Makes the map of surroundings that a graph describes.
 /// @param textures  those that the graph reads; gets the map
-void environment_add_graph(Scene& scene, const EnvironmentGraph& graph, TextureStore& textures);
+void surroundings_add_graph(Surroundings& surroundings, const EnvironmentGraph& graph, TextureStore& textures);
 
 /// Surrounds a scene in which nothing is lit by the soft studio, unseen by cameras, with a warning.
 /// @param placements  of all meshes at rest, whatever the frame: else light would come and go with what moves

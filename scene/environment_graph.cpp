@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernel/graph/graph_eval.h"
+#include "kernel/graph/graph_scene.h"
 #include "scene/parallel.h"
 
 namespace relief {
@@ -22,7 +23,7 @@ Vec3f direction_at(const EnvironmentMap& map, float x, float y)
 float component(Vec3f v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
 /// What a graph reads of a direction.
-float quantity_of(const GraphInput& input, Vec3f d)
+float quantity_of(const EnvironmentGraph& graph, const GraphInput& input, Vec3f d)
 {
   using Q = GraphQuantity;
   const auto axis_of = [&input](Q first) { return static_cast<int>(input.quantity) - static_cast<int>(first); };
@@ -63,22 +64,25 @@ float quantity_of(const GraphInput& input, Vec3f d)
     case Q::object_from_world:
       // Three rows of four: there is no object, so that its space is the world's.
       return input.index % 5 == 0 ? 1.0f : 0.0f;
+    case Q::ray_kind:
+      return graph.is_backdrop && input.index == static_cast<int>(GraphRayKind::kCamera) ? 1.0f : 0.0f;
     default:
       return 0.0f;
   }
 }
 
 /// Radiance towards eight directions. What is no radiance is 0.
-void evaluate(const GraphProgramView& program,
+void evaluate(const EnvironmentGraph& graph,
               const TextureView* textures,
               const Vec3f (&directions)[8],
               Vec3f (&radiance)[8])
 {
+  const GraphProgramView program = graph.program.view();
   GraphRegisters registers;
   for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
     const GraphInput& input = program.inputs[i];
     F8& lanes = registers.lanes[input.register_index];
-    for (int k = 0; k < 8; ++k) lanes[k] = quantity_of(input, directions[k]);
+    for (int k = 0; k < 8; ++k) lanes[k] = quantity_of(graph, input, directions[k]);
   }
   graph_run(program, textures, registers);
   for (int k = 0; k < 8; ++k) {
@@ -95,7 +99,6 @@ EnvironmentMap bake(const EnvironmentGraph& graph, std::span<const TextureView> 
   EnvironmentMap map;
   map.width = width;
   map.height = std::max(1, width / 2);
-  const GraphProgramView program = graph.program.view();
   map.rgb.resize(static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height) * 3);
   for_each_in_parallel(static_cast<std::size_t>(map.height), [&](std::size_t y) {
     float* row = &map.rgb[y * static_cast<std::size_t>(map.width) * 3];
@@ -104,7 +107,7 @@ EnvironmentMap bake(const EnvironmentGraph& graph, std::span<const TextureView> 
       for (int k = 0; k < 8; ++k) {
         directions[k] = direction_at(map, static_cast<float>(x + k) + 0.5f, static_cast<float>(y) + 0.5f);
       }
-      evaluate(program, textures.data(), directions, radiance);
+      evaluate(graph, textures.data(), directions, radiance);
       for (int k = 0; k < std::min(8, map.width - x); ++k) {
         float* texel = row + (x + k) * 3;
         texel[0] = radiance[k].x, texel[1] = radiance[k].y, texel[2] = radiance[k].z;
@@ -160,7 +163,7 @@ float difference(const EnvironmentMap& coarse, const EnvironmentMap& fine)
 float luminance_of(const float* texel) { return 0.2126f * texel[0] + 0.7152f * texel[1] + 0.0722f * texel[2]; }
 
 /// Mean radiance over a texel.
-Vec3f mean_within(const GraphProgramView& program, const TextureView* textures, const EnvironmentMap& map, int x, int y)
+Vec3f mean_within(const EnvironmentGraph& graph, const TextureView* textures, const EnvironmentMap& map, int x, int y)
 {
   constexpr int kSide = 16;  // samples on each axis
   Vec3f sum;
@@ -173,7 +176,7 @@ Vec3f mean_within(const GraphProgramView& program, const TextureView* textures, 
       for (int k = 0; k < 8; ++k) {
         directions[k] = direction_at(map, static_cast<float>(x) + (static_cast<float>(column + k) + 0.5f) / kSide, v);
       }
-      evaluate(program, textures, directions, radiance);
+      evaluate(graph, textures, directions, radiance);
       for (const Vec3f& r : radiance) sum += r * weight;
       weights += 8 * weight;
     }
@@ -229,10 +232,9 @@ std::vector<std::size_t> coarse_texels(const EnvironmentGraph& graph, const Envi
 void refine(const EnvironmentGraph& graph, std::span<const TextureView> textures, EnvironmentMap& map)
 {
   const std::vector<std::size_t> texels = coarse_texels(graph, map);
-  const GraphProgramView program = graph.program.view();
   for_each_in_parallel(texels.size(), [&](std::size_t i) {
     const int x = static_cast<int>(texels[i]) % map.width, y = static_cast<int>(texels[i]) / map.width;
-    const Vec3f mean = mean_within(program, textures.data(), map, x, y);
+    const Vec3f mean = mean_within(graph, textures.data(), map, x, y);
     float* texel = &map.rgb[texels[i] * 3];
     texel[0] = mean.x, texel[1] = mean.y, texel[2] = mean.z;
   });

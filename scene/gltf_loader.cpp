@@ -126,14 +126,14 @@ void GltfLoader::set_environment(const LoadOptions& options)
 {
   std::optional<Environment> environment;
   if (!options.environment) {
-    environment = relief_environment(*root_, textures_, environment_graph_, warnings_);
+    environment = relief_environment(*root_, textures_, environment_graphs_, warnings_);
   } else {
     environment.emplace();
     // The scene's own is not read, and may well be what is missing; but no output may take its place.
     try {
       TextureTable replaced;
-      std::optional<EnvironmentGraph> replaced_graph;
-      relief_environment(*root_, replaced, replaced_graph, warnings_);
+      EnvironmentGraphs replaced_graphs;
+      relief_environment(*root_, replaced, replaced_graphs, warnings_);
       add_files(scene_, replaced.take());
     } catch (const SceneError&) {
     }
@@ -603,7 +603,7 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
     std::vector<TextureRequest> textures, height_maps;
     std::vector<HeightMap> height_graphs;
     std::vector<Placement> unlit;
-    std::optional<EnvironmentGraph> environment_graph;
+    EnvironmentGraphs environment_graphs;
     {
       // The files go away before texels come: the two need not be in memory together.
       GltfLoader loader(warnings);
@@ -611,14 +611,15 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
       unlit = loader.take_unlit();
       textures = loader.take_textures();
       height_maps = loader.take_height_maps();
-      environment_graph = loader.take_environment_graph();
+      environment_graphs = loader.take_environment_graphs();
       height_graphs = loader.take_height_graphs();
     }
     add_files(scene, textures);
     load_height_maps(scene, height_maps, std::move(height_graphs), warnings);
     const auto store = std::make_shared<TextureStore>(std::move(textures), options.texture_budget_bytes, warnings);
     scene.textures = store;
-    if (environment_graph) environment_add_graph(scene, *environment_graph, *store);
+    if (environment_graphs.environment) surroundings_add_graph(scene.environment, *environment_graphs.environment, *store);
+    if (environment_graphs.backdrop) surroundings_add_graph(*scene.environment.backdrop, *environment_graphs.backdrop, *store);
     if (!unlit.empty()) default_light_add(scene, unlit, *store, warnings);
     if (options.environment && options.environment->source != EnvironmentSource::kFile) {
       environment_set(scene, *options.environment, *store);

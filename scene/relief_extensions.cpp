@@ -1,6 +1,7 @@
 #include "scene/relief_extensions.h"
 
 #include "kernel/film/film_layout.h"
+#include "kernel/graph/graph_scene.h"
 #include "kernel/state/path_event.h"
 
 #include <algorithm>
@@ -87,6 +88,7 @@ std::uint32_t read_hidden_from(const JsonReader& r)
 EnvironmentGraph read_environment_graph(const GltfDocument& document,
                                         const JsonReader& r,
                                         TextureTable& textures,
+                                        bool has_backdrop,
                                         Warnings& warnings)
 {
   constexpr int kWidest = 16384;
@@ -101,8 +103,13 @@ EnvironmentGraph read_environment_graph(const GltfDocument& document,
     });
   };
   const std::string place = r.file() + ": " + r.path();
-  if (reads({Q::ray_kind, Q::ray_depth, Q::ray_length})) {
-    warnings.add(place + ": all rays see the same surroundings: those of a ray of no kind");
+  const auto asks = [&graph](auto&& of) { return std::any_of(graph.program.inputs.begin(), graph.program.inputs.end(), of); };
+  const bool asks_for_others = asks([has_backdrop](const GraphInput& input) {
+    return input.quantity == Q::ray_kind && (!has_backdrop || input.index != static_cast<int>(GraphRayKind::kCamera));
+  });
+  if (asks_for_others || reads({Q::ray_depth, Q::ray_length})) {
+    warnings.add(place + ": all rays" + (has_backdrop ? " but the camera's" : "") +
+                 " see the same surroundings: those of a ray of no kind");
   }
   if (reads({Q::camera_from_world, Q::world_from_camera, Q::window_x, Q::window_y})) {
     warnings.add(place + ": surroundings do not depend on the camera: its coordinates are 0");
@@ -274,36 +281,62 @@ void relief_camera(const GltfDocument& document, int camera_index, Camera& camer
   });
 }
 
+namespace {
+
+/// A colour, a map or a graph.
+/// @param has_backdrop  the camera sees others
+/// @param graph         gets the graph, if there is one
+Surroundings read_surroundings(const GltfDocument& document,
+                               const JsonReader& r,
+                               TextureTable& textures,
+                               bool has_backdrop,
+                               std::optional<EnvironmentGraph>& graph,
+                               Warnings& warnings)
+{
+  Surroundings s;
+  s.color = r.color("color", {1, 1, 1}) * r.number_f("strength", 1, 0, kNoLimit);
+  if (!is_finite(s.color)) {
+    r.fail("strength", "a finite radiance");
+  }
+  s.rotation = r.number_f("rotation", 0, -1e6, 1e6);
+  if (r.has("image") && r.has("uri")) {
+    r.fail("", "either image or uri", "both");
+  }
+  if (r.has("graph")) {
+    if (r.has("image") || r.has("uri")) r.fail("", "either a graph or a map", "both");
+    graph = read_environment_graph(document, r.object("graph"), textures, has_backdrop, warnings);
+  }
+  // Round about there is no border; at the poles there is.
+  const TextureSampling lat_long{Wrap::kRepeat, Wrap::kClamp, TexelFilter::kLinear};
+  if (const int image = r.index("image", document.count("images"), "images"); image >= 0) {
+    s.texture_index = textures.add_image(document, image, TextureColor::kSrgb, lat_long);
+  } else if (r.has("uri")) {
+    s.texture_index = textures.add_file(document, r.string("uri", ""), json_path_join(r.path(), "uri"),
+                                        TextureColor::kSrgb, lat_long);
+  }
+  return s;
+}
+
+}  // namespace
+
 std::optional<Environment> relief_environment(const GltfDocument& document,
                                               TextureTable& textures,
-                                              std::optional<EnvironmentGraph>& graph,
+                                              EnvironmentGraphs& graphs,
                                               Warnings& warnings)
 {
   std::optional<Environment> out;
   document.read_extension(document.json, "", "RELIEF_environment", [&](const JsonReader& r) {
     Environment e;
-    e.color = r.color("color", {1, 1, 1}) * r.number_f("strength", 1, 0, kNoLimit);
-    if (!is_finite(e.color)) {
-      r.fail("strength", "a finite radiance");
-    }
-    e.rotation = r.number_f("rotation", 0, -1e6, 1e6);
+    static_cast<Surroundings&>(e) =
+        read_surroundings(document, r, textures, r.has("backdrop"), graphs.environment, warnings);
     e.visible_to_camera = r.boolean("visibleToCamera", true);
     e.casts_caustics = r.boolean("causticLight", true);
     e.hidden_from = read_hidden_from(r);
-    if (r.has("image") && r.has("uri")) {
-      r.fail("", "either image or uri", "both");
-    }
-    if (r.has("graph")) {
-      if (r.has("image") || r.has("uri")) r.fail("", "either a graph or a map", "both");
-      graph = read_environment_graph(document, r.object("graph"), textures, warnings);
-    }
-    // Round about there is no border; at the poles there is.
-    const TextureSampling lat_long{Wrap::kRepeat, Wrap::kClamp, TexelFilter::kLinear};
-    if (const int image = r.index("image", document.count("images"), "images"); image >= 0) {
-      e.texture_index = textures.add_image(document, image, TextureColor::kSrgb, lat_long);
-    } else if (r.has("uri")) {
-      e.texture_index = textures.add_file(document, r.string("uri", ""), json_path_join(r.path(), "uri"),
-                                          TextureColor::kSrgb, lat_long);
+    if (r.has("backdrop")) {
+      const JsonReader backdrop = r.object("backdrop");
+      e.backdrop = read_surroundings(document, backdrop, textures, true, graphs.backdrop, warnings);
+      if (graphs.backdrop) graphs.backdrop->is_backdrop = true;
+      backdrop.warn_unread(warnings);
     }
     r.warn_unread(warnings);
     out = e;

@@ -21,11 +21,15 @@ RenderSettings relief_render(const GltfDocument& document, Warnings& warnings);
 /// RELIEF_camera: lens and window of a camera; `camera` has its glTF part already.
 void relief_camera(const GltfDocument& document, int camera_index, Camera& camera, Warnings& warnings);
 
+/// Graphs of surroundings, of which maps are to be made when the textures are there.
+struct EnvironmentGraphs {
+  std::optional<EnvironmentGraph> environment, backdrop;
+};
+
 /// RELIEF_environment; empty if the document has none.
-/// @param graph  gets its graph, if it has one; a map of it is to be made when the textures are there
 std::optional<Environment> relief_environment(const GltfDocument& document,
                                               TextureTable& textures,
-                                              std::optional<EnvironmentGraph>& graph,
+                                              EnvironmentGraphs& graphs,
                                               Warnings& warnings);
 
 /// Reads RELIEF_light of a punctual light into it.

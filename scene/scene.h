@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -68,11 +69,16 @@ struct SceneCamera {
   float aspect = 0;  ///< width / height that the file asks for; 0: follows the image
 };
 
-/// Lat-long map or constant surrounding the scene. See docs/scene_format.md for the orientation.
-struct Environment {
+/// Lat-long map or constant. See docs/scene_format.md for the orientation.
+struct Surroundings {
   Vec3f color{0, 0, 0};    ///< radiance factor, strength included
   int texture_index = -1;  ///< into TextureStore; −1: constant `color`
   float rotation = 0;      ///< radians about +Y
+};
+
+/// What surrounds the scene and lights it.
+struct Environment : Surroundings {
+  std::optional<Surroundings> backdrop;  ///< what camera rays see in its place
   bool visible_to_camera = true;
   bool casts_caustics = true;     ///< as Light::casts_caustics
   std::uint32_t hidden_from = 0;  ///< bit PathEvent: bounced rays that do not see it

@@ -28,6 +28,7 @@ struct GraphOperands {
   const std::uint16_t* immediates;
   const std::uint16_t* outputs;
   const std::uint16_t* inputs;
+  const std::uint16_t*& next;  ///< instruction
 };
 
 RELIEF_KERNEL F8 graph_in(const GraphOperands& o, int i) { return graph_operand(o.program, o.registers, o.inputs[i]); }
@@ -92,6 +93,11 @@ RELIEF_KERNEL void graph_equal(const GraphOperands& o) { graph_set(o, 0, one_whe
 RELIEF_KERNEL void graph_select(const GraphOperands& o)
 {
   graph_set(o, 0, graph_in(o, 0) != 0.0f ? graph_in(o, 1) : graph_in(o, 2));
+}
+/// The first where the second is not 0, else 0. Immediate: which guards belong together, for the compiler.
+RELIEF_KERNEL void graph_guard(const GraphOperands& o)
+{
+  graph_set(o, 0, graph_in(o, 1) != 0.0f ? graph_in(o, 0) : F8{});
 }
 RELIEF_KERNEL void graph_floor(const GraphOperands& o) { graph_set(o, 0, floor(graph_in(o, 0))); }
 RELIEF_KERNEL void graph_ceil(const GraphOperands& o) { graph_set(o, 0, -floor(-graph_in(o, 0))); }
@@ -499,6 +505,30 @@ RELIEF_KERNEL void graph_fresnel(const GraphOperands& o)
             }));
 }
 
+/// How much is open over a point by ambient occlusion: origins on both sides, normal and direction to the viewer, world; then the
+/// distance that is looked, and the instance that alone counts or −1. Immediate: rays.
+RELIEF_KERNEL void graph_open_share(const GraphOperands& o)
+{
+  const GraphRays& rays = o.registers.rays;
+  alignas(32) float in[14][8], out[8];
+  for (int i = 0; i < 14; ++i) store8(in[i], graph_in(o, i));
+  for (int k = 0; k < 8; ++k) {
+    out[k] = 1.0f;
+    if (rays.open_share == nullptr || (o.registers.used >> k & 1u) == 0) continue;
+    const auto vector = [&](int i) { return Vec3f{in[i][k], in[i + 1][k], in[i + 2][k]}; };
+    out[k] = rays.open_share(rays.scene, {{vector(0), vector(3)}, vector(6), vector(9), in[12][k], o.immediates[0],
+                                          static_cast<std::int32_t>(in[13][k])});
+  }
+  graph_set(o, 0, load8(out));
+}
+
+/// Goes on some words later where no point has a factor but 0. Immediates: how many, by low and high word.
+RELIEF_KERNEL void graph_skip(const GraphOperands& o)
+{
+  if ((mask_of(graph_in(o, 0) != 0.0f) & o.registers.used) != 0) return;
+  o.next += o.immediates[0] | std::uint32_t{o.immediates[1]} << 16;
+}
+
 /// Runs a program: see GraphRun.
 RELIEF_KERNEL void graph_run(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers)
 {
@@ -507,8 +537,11 @@ RELIEF_KERNEL void graph_run(const GraphProgramView& program, const TextureView*
   while (word < end) {
     const auto op = static_cast<GraphOp>(*word++);
     const GraphOpShape& shape = kGraphOpShapes[static_cast<int>(op)];
-    const std::uint16_t* outputs = word + shape.num_immediates;
-    const GraphOperands o{program, textures, registers, word, outputs, outputs + shape.num_outputs};
+    const std::uint16_t* immediates = word;
+    const std::uint16_t* outputs = immediates + shape.num_immediates;
+    const std::uint16_t* inputs = outputs + shape.num_outputs;
+    word = inputs + shape.num_inputs;
+    const GraphOperands o{program, textures, registers, immediates, outputs, inputs, word};
     switch (op) {
 #define X(name, num_outputs, num_inputs, num_immediates) \
   case GraphOp::name:                                    \
@@ -517,7 +550,6 @@ RELIEF_KERNEL void graph_run(const GraphProgramView& program, const TextureView*
 #include "kernel/graph/graph_ops.inc"
 #undef X
     }
-    word = o.inputs + shape.num_inputs;
   }
 }
 }  // namespace relief

@@ -264,6 +264,12 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
       return static_cast<float>(index == static_cast<int>(GraphRayDepth::kTransparent)
                                     ? at.ray.transparent
                                     : at.ray.depths >> (8 * index) & 0xffu);
+    case Q::ray_origin_x:
+    case Q::ray_origin_y:
+    case Q::ray_origin_z: {
+      const bool is_front = (to_viewer > 0.0f) == (index == 0);
+      return component(graph_z_up(surface_hit_origin(hit, hit.P, is_front)), axis_of(Q::ray_origin_x));
+    }
     case Q::ray_length:
       return at.ray.length;
     case Q::window_x:
@@ -275,6 +281,8 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
       return at.bary_u;
     case Q::edge_distance:
       return graph_edge_distance(at);
+    case Q::instance:
+      return static_cast<float>(at.instance - at.scene->instances);
     case Q::kCount:
       break;
   }
@@ -309,7 +317,13 @@ RELIEF_KERNEL GraphLane graph_at_point(GraphRun run,
                                        const GraphPoint& at,
                                        GraphRegisters& registers)
 {
-  for (int lane = 0; lane < 8; ++lane) graph_load_point(program, at, lane, registers);
+  graph_load_point(program, at, 0, registers);
+  for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
+    F8& lanes = registers.lanes[program.inputs[i].register_index];
+    lanes = splat8(lanes[0]);
+  }
+  registers.used = 1;
+  registers.rays = at.scene->rays;
   run(program, textures, registers);
   return {&program, &registers, 0};
 }

@@ -7,9 +7,27 @@
 
 namespace relief {
 
+/// A question of how much of a hemisphere is open, world with Z up.
+struct GraphOpenShare {
+  Vec3f O[2];      ///< where rays leave: on the side of the viewer, on the other
+  Vec3f N;         ///< of any length
+  Vec3f wo;        ///< with O what is told apart by
+  float distance;  ///< metres that are looked
+  int num_rays;
+  std::int32_t instance;  ///< that alone counts; −1: all do
+};
+
+/// What looks around in the scene for graphs. Null where there is none yet: all is open then.
+struct GraphRays {
+  float (*open_share)(const void* scene, const GraphOpenShare& question) = nullptr;
+  const void* scene = nullptr;
+};
+
 /// Registers of one run; its inputs are written before, its outputs read after.
 struct GraphRegisters {
   F8 lanes[kMostGraphRegisters];
+  unsigned used = 0xff;  ///< lanes that mean something, bit by bit
+  GraphRays rays = {};
 };
 
 /// Runs a program over eight points. A pointer, as the interpreter is compiled once for every instruction set, and apart from

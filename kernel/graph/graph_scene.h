@@ -2,6 +2,7 @@
 #pragma once
 
 #include "kernel/camera/camera.h"
+#include "kernel/graph/graph_registers.h"
 #include "kernel/shape/mesh_view.h"
 
 namespace relief {
@@ -39,6 +40,7 @@ struct GraphScene {
   const InstanceView* instances = nullptr;
   const GraphInstanceColumn* columns = nullptr;
   std::uint32_t num_columns = 0;
+  GraphRays rays;
   Camera camera;
   Affine3 camera_from_world;  ///< of the camera, which looks along −z there
 };

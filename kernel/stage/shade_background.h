@@ -19,7 +19,8 @@ RELIEF_KERNEL void shade_background(const KernelGlobals& g, PathState& state, st
   if (!is_shown && !is_kept) return;
   if (path_leaves_to_photons(g, state.flags[path], -1)) return;
   const Vec3f D = path_direction(state, path);
-  Vec3f radiance = environment_eval(g.lights.environment, D);
+  const bool is_backdrop = scatterings == 0 && g.has_backdrop;
+  Vec3f radiance = environment_eval(is_backdrop ? g.backdrop : g.lights.environment, D);
   if (is_zero(radiance)) return;
   radiance *= path_transmittance(path_sigma_a(state, path), kInfinity);
   if (is_kept) film_add_environment(g.film, state.pixel[path], path_throughput(state, path) * radiance);

@@ -130,8 +130,8 @@ std::vector<SurfaceClosureSpec> closures_read(const JsonReader& reader,
     }
     r.warn_unread(warnings);
     if (is_nothing) continue;
-    spec.first_result = build.add_result(results.front());
-    for (std::size_t n = 1; n < results.size(); ++n) build.add_result(results[n]);
+    spec.first_result = build.add_result(w);
+    for (const GraphScalar a : build.guarded(std::span(results).subspan(1), w)) build.add_result(a);
     closures.push_back(spec);
   }
   reader.warn_unread(warnings);

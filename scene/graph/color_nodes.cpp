@@ -169,7 +169,14 @@ void lower_mix_color(GraphNode& n)
   GraphBuilder& b = n.build;
   const std::string_view blend = kBlends[n.reader.choice("blend", kBlends, 0)];
   const GraphScalar t = n.reader.boolean("clampFactor", true) ? clamped(b, n.number("factor")) : n.number("factor");
-  GraphVector out = blend_colors(b, blend, t, n.vector("a"), n.vector("b"));
+  const auto guarded = [&b](const GraphVector& v, GraphScalar factor) {
+    const std::vector<GraphScalar> out = b.guarded(v, factor);
+    return GraphVector{out[0], out[1], out[2]};
+  };
+  // Of a factor of 0 the other colour does not matter in any way of mixing, of one of 1 the first does in most.
+  const GraphScalar rest = b(Op::subtract, {b.constant(1), t});
+  const GraphVector x = blend == "mix" ? guarded(n.vector("a"), rest) : n.vector("a");
+  GraphVector out = blend_colors(b, blend, t, x, guarded(n.vector("b"), t));
   if (n.reader.boolean("clampResult", false)) out = clamped(b, out);
   n.set("color", out, kColor);
 }
@@ -189,7 +196,9 @@ void lower_mix_number(GraphNode& n)
 {
   GraphBuilder& b = n.build;
   const GraphScalar t = n.reader.boolean("clampFactor", true) ? clamped(b, n.number("factor")) : n.number("factor");
-  n.set("value", mixed(b, t, n.number("a"), n.number("b")));
+  const auto guarded = [&b](GraphScalar a, GraphScalar factor) { return b.guarded({&a, 1}, factor)[0]; };
+  const GraphScalar rest = b(Op::subtract, {b.constant(1), t});
+  n.set("value", mixed(b, t, guarded(n.number("a"), rest), guarded(n.number("b"), t)));
 }
 
 constexpr GraphSocket kInvertInputs[] = {{"factor", kNumber, {1}}, {"color", kColor, {0, 0, 0}}};

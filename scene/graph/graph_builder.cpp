@@ -4,7 +4,6 @@
 #include <bit>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <string>
 
 #include "kernel/graph/graph_eval.h"
@@ -184,6 +183,28 @@ GraphScalar GraphBuilder::operator()(GraphOp op, std::initializer_list<GraphScal
   return apply(op, std::span(inputs.begin(), inputs.size())).front();
 }
 
+std::vector<GraphScalar> GraphBuilder::guarded(std::span<const GraphScalar> values, GraphScalar factor)
+{
+  std::vector<GraphScalar> out(values.begin(), values.end());
+  float known = 0;
+  if (is_constant(factor, &known)) {
+    if (known == 0) std::fill(out.begin(), out.end(), constant(0));
+    return out;
+  }
+  std::vector<std::int32_t> key;
+  for (const GraphScalar a : values) key.push_back(a.index);
+  key.push_back(factor.index);
+  constexpr std::size_t kMostGroups = 65536;
+  if (guard_groups_.size() == kMostGroups && !guard_groups_.contains(key)) return out;
+  const auto next = static_cast<std::uint16_t>(guard_groups_.size());
+  const std::uint16_t group = guard_groups_.try_emplace(std::move(key), next).first->second;
+  for (GraphScalar& a : out) {
+    const GraphScalar inputs[] = {a, factor};
+    if (!is_constant(a)) a = apply(GraphOp::guard, inputs, {&group, 1}).front();
+  }
+  return out;
+}
+
 std::optional<std::array<double, 2>> GraphBuilder::linear_part(GraphScalar a, GraphScalar u, GraphScalar v) const
 {
   // a = first · u + second · v + rest, gathered by following sums and known factors down to u and v.
@@ -305,6 +326,8 @@ GraphScalar GraphBuilder::shifted(GraphScalar a, GraphShift shift)
       continue;
     }
     const Operation operation = operations_[static_cast<std::size_t>(node.operation)];
+    // Guards of moved values would be others, and not stand side by side: these do without.
+    const bool is_guard = operation.op == GraphOp::guard;
     std::vector<GraphScalar> inputs;
     bool are_known = true;
     for (const GraphScalar input : operation.inputs) {
@@ -314,7 +337,8 @@ GraphScalar GraphBuilder::shifted(GraphScalar a, GraphShift shift)
       stack.push_back(input.index);
     }
     if (!are_known) continue;
-    const std::vector<GraphScalar> outputs = apply(operation.op, inputs, operation.immediates);
+    const std::vector<GraphScalar> outputs =
+        is_guard ? std::vector{inputs[0]} : apply(operation.op, inputs, operation.immediates);
     for (std::size_t i = 0; i < outputs.size(); ++i) shifted_[{operation.outputs[i].index, shift}] = outputs[i];
     stack.pop_back();
   }
@@ -331,71 +355,60 @@ std::vector<GraphScalar> GraphBuilder::wanted() const
   return all;
 }
 
-/// The operations that outputs need, each after what it needs itself; of several inputs the one that needs most registers
-/// comes first.
-std::vector<std::int32_t> GraphBuilder::order() const
+GraphSchedule GraphBuilder::schedule(bool skips) const
 {
-  // Inputs have lower numbers than what uses them, so one pass each way does.
-  std::vector<int> registers(operations_.size(), 0);
   const auto operation_of = [this](GraphScalar a) { return nodes_[static_cast<std::size_t>(a.index)].operation; };
-  const auto inputs_by_need = [&](const Operation& operation) {
-    std::vector<std::int32_t> needed;
-    for (const GraphScalar a : operation.inputs) {
-      if (operation_of(a) >= 0) needed.push_back(operation_of(a));
-    }
-    std::sort(needed.begin(), needed.end());
-    needed.erase(std::unique(needed.begin(), needed.end()), needed.end());
-    std::stable_sort(needed.begin(), needed.end(), [&](std::int32_t a, std::int32_t b) {
-      return registers[static_cast<std::size_t>(a)] > registers[static_cast<std::size_t>(b)];
-    });
-    return needed;
-  };
-  for (std::size_t i = 0; i < operations_.size(); ++i) {
-    int most = static_cast<int>(operations_[i].outputs.size()), held = 0;
-    for (const std::int32_t input : inputs_by_need(operations_[i])) {
-      const auto n = static_cast<std::size_t>(input);
-      most = std::max(most, held + registers[n]);
-      held += static_cast<int>(operations_[n].outputs.size());
-    }
-    registers[i] = most;
+  std::vector<ScheduleOperation> operations;
+  for (const Operation& operation : operations_) {
+    operations.push_back({operation.op, {}, operation.op == GraphOp::guard ? operation.immediates[0] : -1});
+    for (const GraphScalar a : operation.inputs) operations.back().needs.push_back(operation_of(a));
   }
-
-  std::vector<std::int32_t> ordered;
-  std::vector<char> is_placed(operations_.size(), 0);
-  std::vector<std::pair<std::int32_t, bool>> stack;  // operation, whether its inputs are done
-  for (const GraphScalar component : wanted()) {
-    if (operation_of(component) < 0) continue;
-    stack.emplace_back(operation_of(component), false);
-    while (!stack.empty()) {
-      const auto [operation, are_inputs_done] = stack.back();
-      stack.pop_back();
-      const auto n = static_cast<std::size_t>(operation);
-      if (is_placed[n] != 0) continue;
-      if (are_inputs_done) {
-        is_placed[n] = 1;
-        ordered.push_back(operation);
-        continue;
-      }
-      stack.emplace_back(operation, true);
-      const std::vector<std::int32_t> needed = inputs_by_need(operations_[n]);
-      for (auto it = needed.rbegin(); it != needed.rend(); ++it) stack.emplace_back(*it, false);
-    }
+  std::vector<std::int32_t> wanted_operations;
+  for (const GraphScalar a : wanted()) {
+    if (operation_of(a) >= 0) wanted_operations.push_back(operation_of(a));
   }
-  return ordered;
+  return graph_schedule(operations, wanted_operations, skips ? guard_groups_.size() : 0);
 }
 
-GraphProgram GraphBuilder::compile() const
+GraphProgram GraphBuilder::compile(bool skips) const
 {
-  const std::vector<std::int32_t> ordered = order();
-  // Last use of every value: position in the order, or beyond it for outputs.
-  constexpr auto kEver = std::numeric_limits<std::int32_t>::max();
-  std::vector<std::int32_t> last_use(nodes_.size(), -1);
-  for (std::size_t position = 0; position < ordered.size(); ++position) {
-    for (const GraphScalar a : operations_[static_cast<std::size_t>(ordered[position])].inputs) {
-      last_use[static_cast<std::size_t>(a.index)] = static_cast<std::int32_t>(position);
+  if (skips) {
+    // What is shared is held for longer, which may be too long.
+    try {
+      return compile(schedule(true));
+    } catch (const GraphTooLarge&) {
     }
   }
-  for (const GraphScalar a : wanted()) last_use[static_cast<std::size_t>(a.index)] = kEver;
+  return compile(schedule(false));
+}
+
+GraphProgram GraphBuilder::compile(const GraphSchedule& schedule) const
+{
+  using StepKind = ScheduleStep::Kind;
+  const auto operation_at = [this](std::int32_t i) -> const Operation& {
+    return operations_[static_cast<std::size_t>(i)];
+  };
+  // Guards that are not run hand on what they guard.
+  const auto source = [&](GraphScalar a) {
+    for (;;) {
+      const Node& node = nodes_[static_cast<std::size_t>(a.index)];
+      if (node.kind != Node::Kind::kOperation || operation_at(node.operation).op != GraphOp::guard) return a;
+      const std::size_t group = operation_at(node.operation).immediates[0];
+      if (group < schedule.is_guarded.size() && schedule.is_guarded[group] != 0) return a;
+      a = operation_at(node.operation).inputs[0];
+    }
+  };
+  const auto source_index = [&](GraphScalar a) { return static_cast<std::size_t>(source(a).index); };
+  // Last use of every value: position in the schedule, or beyond it for outputs.
+  constexpr auto kEver = std::numeric_limits<std::int32_t>::max();
+  std::vector<std::int32_t> last_use(nodes_.size(), -1);
+  for (std::size_t position = 0; position < schedule.steps.size(); ++position) {
+    if (schedule.steps[position].kind != StepKind::kRun) continue;
+    for (const GraphScalar a : operation_at(schedule.steps[position].index).inputs) {
+      last_use[source_index(a)] = static_cast<std::int32_t>(position);
+    }
+  }
+  for (const GraphScalar a : wanted()) last_use[source_index(a)] = kEver;
 
   GraphProgram program;
   std::map<std::uint32_t, std::uint32_t> table_places;
@@ -426,38 +439,58 @@ GraphProgram GraphBuilder::compile() const
       program.constants.push_back(nodes_[i].value);
     }
   }
-  for (std::size_t position = 0; position < ordered.size(); ++position) {
-    const Operation& operation = operations_[static_cast<std::size_t>(ordered[position])];
+  // Factor of each group, and where the words to leave out are to be written.
+  std::vector<GraphScalar> factors(guard_groups_.size());
+  for (const Operation& operation : operations_) {
+    if (operation.op == GraphOp::guard) factors[operation.immediates[0]] = operation.inputs[1];
+  }
+  std::vector<std::size_t> skips(guard_groups_.size());
+  for (std::size_t position = 0; position < schedule.steps.size(); ++position) {
+    const ScheduleStep step = schedule.steps[position];
+    const auto group = static_cast<std::size_t>(step.index);
+    if (step.kind == StepKind::kSkip) {
+      program.code.insert(program.code.end(), {static_cast<std::uint16_t>(GraphOp::skip), 0, 0,
+                                               operand_of[source_index(factors[group])]});
+      skips[group] = program.code.size();
+      continue;
+    }
+    if (step.kind == StepKind::kEnd) {
+      const std::size_t words = program.code.size() - skips[group];
+      program.code[skips[group] - 3] = static_cast<std::uint16_t>(words & 0xffffu);
+      program.code[skips[group] - 2] = static_cast<std::uint16_t>(words >> 16);
+      continue;
+    }
+    const Operation& operation = operation_at(step.index);
     // Outputs first: an operation may write one before it has read all that it reads.
     for (const GraphScalar a : operation.outputs) operand_of[static_cast<std::size_t>(a.index)] = take_register();
     program.code.push_back(static_cast<std::uint16_t>(operation.op));
     const std::vector<std::uint16_t> immediates = placed(operation, table_places, program);
     program.code.insert(program.code.end(), immediates.begin(), immediates.end());
     for (const GraphScalar a : operation.outputs) program.code.push_back(operand_of[static_cast<std::size_t>(a.index)]);
-    for (const GraphScalar a : operation.inputs) program.code.push_back(operand_of[static_cast<std::size_t>(a.index)]);
-    std::vector<std::int32_t> ended;
+    for (const GraphScalar a : operation.inputs) program.code.push_back(operand_of[source_index(a)]);
+    std::vector<std::size_t> ended;
     for (const GraphScalar a : operation.inputs) {
-      if (last_use[static_cast<std::size_t>(a.index)] == static_cast<std::int32_t>(position)) ended.push_back(a.index);
+      if (last_use[source_index(a)] == static_cast<std::int32_t>(position)) ended.push_back(source_index(a));
     }
     for (const GraphScalar a : operation.outputs) {
-      if (last_use[static_cast<std::size_t>(a.index)] < 0) ended.push_back(a.index);
+      const auto i = static_cast<std::size_t>(a.index);
+      if (last_use[i] < 0) ended.push_back(i);
     }
     std::sort(ended.begin(), ended.end());
     ended.erase(std::unique(ended.begin(), ended.end()), ended.end());
-    for (const std::int32_t i : ended) {
-      const std::uint16_t operand = operand_of[static_cast<std::size_t>(i)];
-      if (operand < kMostGraphRegisters) free_registers.push_back(operand);
+    for (const std::size_t i : ended) {
+      if (operand_of[i] < kMostGraphRegisters) free_registers.push_back(operand_of[i]);
     }
   }
   for (std::size_t i = 0; i < outputs_.size(); ++i) {
     const bool is_given = outputs_[i][0].index >= 0;
     if (is_given) program.given |= 1u << i;
     for (std::size_t c = 0; c < 3; ++c) {
-      program.outputs[i][c] = is_given ? operand_of[static_cast<std::size_t>(outputs_[i][c].index)] : kNoGraphOperand;
+      program.outputs[i][c] = is_given ? operand_of[source_index(outputs_[i][c])] : kNoGraphOperand;
     }
   }
   for (const GraphScalar a : results_) {
-    program.results.push_back(a.index < 0 ? kNoGraphOperand : operand_of[static_cast<std::size_t>(a.index)]);
+    program.results.push_back(a.index < 0 ? kNoGraphOperand : operand_of[source_index(a)]);
   }
   return program;
 }

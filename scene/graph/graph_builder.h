@@ -1,8 +1,6 @@
 // Builds a value graph of scalar operations and compiles it. Operations whose inputs are known are computed at once, equal
-// ones become one, and what no output needs is left out; what remains is put into an order that needs few registers.
-//
-// Sethi and Ullman 1970, "The Generation of Optimal Code for Arithmetic Expressions": the order. It is optimal for trees;
-// graphs share values, and for these it is a heuristic.
+// ones become one, and what no output needs is left out; what remains is put into an order that needs few registers and
+// leaves out what factors of 0 make needless (graph_schedule.h).
 #pragma once
 
 #include <array>
@@ -15,6 +13,7 @@
 
 #include "kernel/graph/graph_op.h"
 #include "scene/graph/graph_program.h"
+#include "scene/graph/graph_schedule.h"
 
 namespace relief {
 
@@ -49,6 +48,10 @@ class GraphBuilder {
   /// An operation with one output and no immediates.
   GraphScalar operator()(GraphOp op, std::initializer_list<GraphScalar> inputs);
 
+  /// Values that count only where a factor is not 0, and are 0 elsewhere. What they alone need is left out where the factor
+  /// is 0 at all points of a run.
+  std::vector<GraphScalar> guarded(std::span<const GraphScalar> values, GraphScalar factor);
+
   /// Whether a number is known, and which it is.
   bool is_constant(GraphScalar a, float* value = nullptr) const;
 
@@ -73,8 +76,9 @@ class GraphBuilder {
   /// A number as it is a footprint away: everything that leads to it is asked for there.
   GraphScalar shifted(GraphScalar a, GraphShift shift);
 
+  /// @param skips  whether what guards make needless is left out
   /// @error GraphTooLarge
-  GraphProgram compile() const;
+  GraphProgram compile(bool skips = true) const;
 
  private:
   /// One output of an operation; or a constant, or a quantity.
@@ -101,7 +105,8 @@ class GraphBuilder {
   std::vector<GraphScalar> fold(GraphOp op,
                                 std::span<const GraphScalar> inputs,
                                 std::span<const std::uint16_t> immediates);
-  std::vector<std::int32_t> order() const;
+  GraphSchedule schedule(bool skips) const;
+  GraphProgram compile(const GraphSchedule& schedule) const;
   std::vector<std::uint16_t> placed(const Operation& operation,
                                     std::map<std::uint32_t, std::uint32_t>& places,
                                     GraphProgram& program) const;
@@ -114,6 +119,7 @@ class GraphBuilder {
   std::array<GraphVector, kNumGraphOutputs> outputs_;
   std::vector<GraphScalar> results_;
   std::map<std::pair<std::int32_t, GraphShift>, GraphScalar> shifted_;
+  std::map<std::vector<std::int32_t>, std::uint16_t> guard_groups_;  ///< by their values and, at the end, their factor
 };
 
 }  // namespace relief

@@ -238,9 +238,43 @@ void lower_normal_map(GraphNode& n)
 constexpr GraphSocket kWireframeInputs[] = {{"size", kNumber, {0.01f}}};
 void lower_wireframe(GraphNode& n)
 {
+  GraphBuilder& b = n.build;
   // Half of it: the face beyond the edge shows the other half.
-  const GraphScalar half = scaled(n.build, n.number("size"), 0.5f);
-  n.set("factor", n.build(Op::less_than, {n.build.quantity(Q::edge_distance), n.build(Op::absolute, {half})}));
+  GraphScalar half = scaled(b, n.number("size"), 0.5f);
+  if (n.reader.boolean("pixels", false)) {
+    // A pixel is as wide as the footprint is across the view, in the mean of two axes.
+    const auto width = [&](const GraphVector& along) {
+      const GraphVector across = difference(b, along, product(b, incoming(b), dot(b, along, incoming(b))));
+      return b(Op::square_root, {dot(b, across, across)});
+    };
+    const GraphScalar both = b(Op::add, {width(quantities(b, Q::dpdx_x, Q::dpdx_y, Q::dpdx_z)),
+                                         width(quantities(b, Q::dpdy_x, Q::dpdy_y, Q::dpdy_z))});
+    half = b(Op::multiply, {half, scaled(b, both, 0.5f)});
+  }
+  n.set("factor", b(Op::less_than, {b.quantity(Q::edge_distance), b(Op::absolute, {half})}));
+}
+
+constexpr GraphSocket kOcclusionInputs[] = {{"color", kColor, {1, 1, 1}},
+                                            {"distance", kNumber, {1}},
+                                            {"normal", kVector, {}, true}};
+void lower_ambient_occlusion(GraphNode& n)
+{
+  GraphBuilder& b = n.build;
+  const auto rays = static_cast<std::uint16_t>(n.reader.integer("samples", 16, 1, 128));
+  const bool is_inside = n.reader.boolean("inside", false);
+  const bool is_local = n.reader.boolean("onlyLocal", false);
+  GraphVector normal = n.vector("normal");
+  if (is_inside) normal = {negative(b, normal[0]), negative(b, normal[1]), negative(b, normal[2])};
+  std::vector<GraphScalar> in;
+  for (const std::uint16_t side : {0, 1}) {
+    for (const Q q : {Q::ray_origin_x, Q::ray_origin_y, Q::ray_origin_z}) in.push_back(b.quantity(q, side));
+  }
+  for (const GraphVector& v : {normal, incoming(b)}) in.insert(in.end(), v.begin(), v.end());
+  in.push_back(n.number("distance"));
+  in.push_back(is_local ? b.quantity(Q::instance) : b.constant(-1));
+  const GraphScalar open = b.apply(Op::open_share, in, {&rays, 1}).front();
+  n.set("factor", open);
+  n.set("color", product(b, n.vector("color"), open), kColor);
 }
 
 constexpr GraphSocket kLightFalloffInputs[] = {{"strength", kNumber, {100}}, {"smooth", kNumber}};
@@ -417,6 +451,7 @@ constexpr GraphNodeKind kKinds[] = {
     {"tangent", {}, lower_tangent},
     {"normal-map", kNormalMapInputs, lower_normal_map},
     {"wireframe", kWireframeInputs, lower_wireframe},
+    {"ambient-occlusion", kOcclusionInputs, lower_ambient_occlusion},
     {"light-falloff", kLightFalloffInputs, lower_light_falloff},
     {"transform", kTransformInputs, lower_transform},
     {"vector-transform", kTransformInputs, lower_vector_transform},

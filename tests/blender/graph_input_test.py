@@ -422,10 +422,57 @@ def test_wires():
         node.inputs[0].default_value = 0.1
         return node.outputs[0]
 
-    _assert_agree(scene, material, {"wires": wire}, most_off=0.03)
-    node = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeWireframe")
-    node.use_pixel_size = True
-    assert_warns(scene, 'node "Wireframe"', "a size in pixels")
+    def wire_of_pixels(tree):
+        socket = wire(tree)
+        socket.node.use_pixel_size = True
+        socket.node.inputs[0].default_value = 3.0
+        return socket
+
+    _assert_agree(scene, material, {"wires": wire, "of pixels": wire_of_pixels}, most_off=0.03)
+
+
+def _occluded_scene(**settings):
+    """Things on a floor that emit how much is open over them."""
+    scene, material, objects = _scene(64, 48)
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=8, y_subdivisions=8, size=9, location=(0, 0, -0.5))
+    bpy.context.object.data.materials.append(material)
+    tree = material.node_tree
+    tree.nodes.clear()
+    occlusion, emission, output = (
+        tree.nodes.new(f"ShaderNode{kind}") for kind in ("AmbientOcclusion", "Emission", "OutputMaterial")
+    )
+    occlusion.inputs["Color"].default_value = (0.9, 0.6, 0.2, 1)
+    for key, value in settings.items():
+        setattr(occlusion, key, value)
+    tree.links.new(occlusion.outputs["Color"], emission.inputs["Color"])
+    tree.links.new(emission.outputs[0], output.inputs["Surface"])
+    set_bounces(scene, 0)
+    return scene, occlusion
+
+
+def test_ambient_occlusion():
+    scene, node = _occluded_scene()
+    node.inputs["Distance"].default_value = 1.2
+    assert_agrees(scene, samples=16)
+
+
+def test_ambient_occlusion_of_one_object_inside():
+    scene, node = _occluded_scene(only_local=True, inside=True, samples=5)
+    node.inputs["Distance"].default_value = 0.8
+    assert_agrees(scene, samples=16)
+
+
+def test_ambient_occlusion_through_a_ramp():
+    """The factor, of a distance that varies, sharpened: the noise of its rays is in the mean."""
+    scene, node = _occluded_scene()
+    tree = node.id_data
+    noise, power = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeMath")
+    tree.links.new(noise.outputs["Fac"], node.inputs["Distance"])
+    power.operation = "POWER"
+    power.inputs[1].default_value = 3.0
+    tree.links.new(node.outputs["AO"], power.inputs[0])
+    tree.links.new(power.outputs[0], tree.nodes["Emission"].inputs["Strength"])
+    assert_agrees(scene, samples=16)
 
 
 def test_what_is_there_of_hair_and_points():

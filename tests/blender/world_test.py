@@ -290,10 +290,37 @@ def test_a_world_that_the_camera_does_not_see_by_light_path():
     assert_agrees(scene)
 
 
-def test_another_world_for_the_camera_is_warned_about():
+def test_another_world_for_the_camera():
     scene = _stage()
     _mixed(_by_camera_ray)
-    assert_warns(scene, 'world "world"', "surroundings of their own for the camera")
+    assert_agrees(scene)
+
+
+def test_a_strength_that_the_camera_sees_otherwise():
+    """By a value, and behind what is transparent."""
+    scene = _stage()
+    tree = set_world((0.2, 0.5, 0.9))
+    add, scale = _nodes(tree, "Math", "Math")
+    add.operation, scale.operation = "ADD", "MULTIPLY"
+    tree.links.new(_by_camera_ray(tree), scale.inputs[0])
+    scale.inputs[1].default_value = 2.0
+    tree.links.new(scale.outputs[0], add.inputs[0])
+    tree.links.new(add.outputs[0], tree.nodes["Background"].inputs["Strength"])
+    bpy.ops.mesh.primitive_plane_add(size=1, location=(0.2, -2, 0.7), rotation=degrees(80, 0, 0))
+    pane = bpy.context.object
+    pane.data.materials.append(bpy.data.materials.new("pane"))
+    pane.active_material.use_nodes = True
+    (glass,) = _nodes(pane.active_material.node_tree, "BsdfTransparent")
+    glass.inputs["Color"].default_value = (0.8, 0.3, 0.6, 1)
+    output = pane.active_material.node_tree.nodes["Material Output"]
+    pane.active_material.node_tree.links.new(glass.outputs[0], output.inputs["Surface"])
+    assert_agrees(scene)
+
+
+def test_a_world_of_its_own_for_mirrors_is_warned_about():
+    scene = _stage()
+    _mixed(lambda tree: tree.nodes.new("ShaderNodeLightPath").outputs["Is Glossy Ray"])
+    assert_warns(scene, 'world "world"', "Is Glossy Ray")
 
 
 def _sky_world(strength=0.1, **settings):

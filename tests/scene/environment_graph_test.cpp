@@ -137,6 +137,22 @@ TEST(EnvironmentGraph, WhatDependsOnTheRayIsWarnedAbout)
   expect_radiance(radiance(scene, 0.3f, 0.4f), {0, 0, 0});
 }
 
+TEST(EnvironmentGraph, BackdropsAreWhatTheCameraSees)
+{
+  const json by_ray = environment({{{"type", "light-path"}}}, {{"node", 0}, {"output", "camera"}});
+  json both = by_ray;
+  both["backdrop"] = by_ray;
+  both["backdrop"]["strength"] = 3;
+  const Scene scene = load(both);
+  EXPECT_TRUE(scene.warnings.empty()) << scene.warnings.front();
+  expect_radiance(radiance(scene, 0.3f, 0.4f), {0, 0, 0});
+  const Surroundings& seen = scene.environment.backdrop.value();
+  const TextureView& map = scene.textures->views()[static_cast<std::size_t>(seen.texture_index)];
+  EXPECT_NEAR(texture_sample(map, {0.3f, 0.4f}, 0).x * seen.color.x, 3.0f, 0.01f);
+  both["backdrop"]["image"] = 0;
+  EXPECT_NE(error_of(both).find("/extensions/RELIEF_environment/backdrop"), std::string::npos);
+}
+
 json sky(json options)
 {
   options["type"] = "sky-texture";

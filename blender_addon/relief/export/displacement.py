@@ -143,7 +143,7 @@ def _height_graph(material, socket, groups, coordinate_set):
 #: Nodes whose outputs differ between points of equal texture coordinates.
 _VARYING = {
     *("geometry", "vertex-color", "attribute", "object-info", "light-path", "camera-data", "tangent", "normal-map"),
-    *("fresnel", "layer-weight", "bump", "wireframe", "transform", "vector-transform"),
+    *("fresnel", "layer-weight", "bump", "wireframe", "ambient-occlusion", "transform", "vector-transform"),
 }
 
 

@@ -224,10 +224,18 @@ def _normal(g, source):
 
 
 def _wireframe(g, source):
-    node = source.node
-    if node.use_pixel_size:
-        raise not_understood(node, "a size in pixels")
-    return _output(g.add("wireframe", g.inputs(node, source.groups, {"Size": "size"})), "factor")
+    inputs = g.inputs(source.node, source.groups, {"Size": "size"})
+    return _output(g.add("wireframe", inputs, pixels=source.node.use_pixel_size), "factor")
+
+
+def _ambient_occlusion(g, source):
+    node, groups = source.node, source.groups
+    inputs = g.inputs(node, groups, {"Color": "color", "Distance": "distance"})
+    normal = g.normal(node.inputs["Normal"], groups)
+    if normal is not None:
+        inputs["normal"] = normal
+    index = g.add("ambient-occlusion", inputs, samples=node.samples, inside=node.inside, onlyLocal=node.only_local)
+    return _output(index, "factor" if source.socket.identifier == "AO" else "color")
 
 
 def _light_falloff(g, source):
@@ -279,6 +287,7 @@ OUTPUTS = {
     "ShaderNodeVectorTransform": _vector_transform,
     "ShaderNodeNormal": _normal,
     "ShaderNodeWireframe": _wireframe,
+    "ShaderNodeAmbientOcclusion": _ambient_occlusion,
     "ShaderNodeLightFalloff": _light_falloff,
     "ShaderNodeHairInfo": _hair_info,
     "ShaderNodePointInfo": _point_info,

@@ -44,16 +44,15 @@ def _environment(world, writer, images, warn):
     if source is None:
         return {"color": [0.0, 0.0, 0.0]}
     seen = _Surroundings(writer, images, warn, is_camera=False)
-    in_picture = None
+    backdrop = None
     with nodes.reading():
         environment = seen.read(source)
         if seen.asks_for_camera:
-            in_picture = _Surroundings(writer, images, lambda *_: None, is_camera=True).read(source)
-    if in_picture is not None:
-        if in_picture == {"color": [0.0, 0.0, 0.0]}:
-            environment["visibleToCamera"] = False
-        elif in_picture != environment:
-            warn("surroundings of their own for the camera", "it sees those that other rays see")
+            backdrop = _Surroundings(writer, images, lambda *_: None, is_camera=True).read(source)
+    if backdrop == {"color": [0.0, 0.0, 0.0]}:
+        environment["visibleToCamera"] = False
+    elif backdrop is not None and (backdrop != environment or "graph" in backdrop):
+        environment["backdrop"] = backdrop
     return environment
 
 
@@ -64,7 +63,7 @@ class _Surroundings:
     """What a world's tree of shaders comes to: a sum of backgrounds, each times its weight.
 
     @param  is_camera  whether a camera ray looks: what Light Path's Is Camera Ray says
-    asks_for_camera    whether a weight depended on that
+    asks_for_camera    whether something depended on that
     """
 
     def __init__(self, writer, images, warn, is_camera):
@@ -89,7 +88,7 @@ class _Surroundings:
         if isinstance(total, list):
             return {"color": [max(0.0, c) for c in total]}
         if any(node["type"] == "light-path" for node in self._graph.nodes):
-            self._warn("surroundings that depend on the ray by more than a factor", "all rays see the same")
+            self.asks_for_camera = True
         return {"graph": {"nodes": self._graph.nodes, "outputs": {"color": total}}}
 
     def _collect(self, source, weight, above):
@@ -219,6 +218,8 @@ class WorldGraph(GraphWriter):
     def output(self, source):
         own = {"ShaderNodeTexEnvironment": self._image_around, "ShaderNodeTexSky": self._sky}
         write = own.get(source.node.bl_idname, super().output)
+        if source.node.bl_idname == "ShaderNodeLightPath" and source.socket.identifier != "Is Camera Ray":
+            self.warn(f'node "{source.node.name}": {source.socket.name}', "all rays but the camera's see the same")
         return write(source)
 
     def _image_around(self, source):
