@@ -266,7 +266,7 @@ void lower_ambient_occlusion(GraphNode& n)
   GraphVector normal = n.vector("normal");
   if (is_inside) normal = {negative(b, normal[0]), negative(b, normal[1]), negative(b, normal[2])};
   std::vector<GraphScalar> in;
-  for (const std::uint16_t side : {0, 1}) {
+  for (const std::uint16_t side : {std::uint16_t{0}, std::uint16_t{1}}) {
     for (const Q q : {Q::ray_origin_x, Q::ray_origin_y, Q::ray_origin_z}) in.push_back(b.quantity(q, side));
   }
   for (const GraphVector& v : {normal, incoming(b)}) in.insert(in.end(), v.begin(), v.end());
