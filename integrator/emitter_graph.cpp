@@ -10,9 +10,12 @@
 namespace relief {
 namespace {
 
+/// The ray that means are of: direct light from a metre away.
+constexpr GraphRay kSomeRay{0, 1, 0, 1.0f};
+
 /// A point of an emitter and what a graph reads there.
-struct EmitterPoint {
-  EmitterPoint(const KernelGlobals& g, const InstanceView& at, std::uint32_t at_triangle, Vec2f barycentric)
+struct MeshPoint {
+  MeshPoint(const KernelGlobals& g, const InstanceView& at, std::uint32_t at_triangle, Vec2f barycentric)
       : mesh(g.meshes[at.mesh_index]),
         instance(at),
         triangle(at_triangle),
@@ -22,10 +25,9 @@ struct EmitterPoint {
   }
 
   /// @param wo  unit, from the emitter
-  GraphPoint graph_point(const KernelGlobals& g, Vec3f wo, float distance) const
+  GraphPoint graph_point(const KernelGlobals& g, Vec3f wo, const GraphRay& ray) const
   {
-    // As in Cycles, light that is asked for comes by no kind of ray.
-    return {&mesh, &instance, triangle, b.x, b.y, &hit, wo, {0.0f, 0.0f}, 0.0f, &g.graph_scene, {0, 0, 0, distance}};
+    return {&mesh, &instance, triangle, b.x, b.y, &hit, wo, {0.0f, 0.0f}, 0.0f, &g.graph_scene, ray};
   }
 
   const MeshView& mesh;
@@ -36,7 +38,7 @@ struct EmitterPoint {
 };
 
 /// @param lane  of the material's emission program, which has run
-Vec3f radiance_of(const KernelGlobals& g, const Material& material, const GraphLane& lane, const EmitterPoint& point)
+Vec3f radiance_of(const KernelGlobals& g, const Material& material, const GraphLane& lane, const MeshPoint& point)
 {
   if (material.has_closures) {
     return triangle_emission(material, g.textures, point.mesh, point.triangle, point.b) + closures_emission(lane);
@@ -49,14 +51,21 @@ Vec3f radiance_of(const KernelGlobals& g, const Material& material, const GraphL
 
 }  // namespace
 
-Vec3f emitter_graph_radiance(const KernelGlobals& g, const Light& emitter, Vec2f barycentric, Vec3f wo, float distance)
+bool emitter_graph_asks_for_path(const GraphProgramView& program)
+{
+  return std::any_of(program.inputs, program.inputs + program.num_inputs, [](const GraphInput& input) {
+    return input.quantity == GraphQuantity::ray_length || input.quantity == GraphQuantity::ray_depth;
+  });
+}
+
+Vec3f emitter_graph_radiance(const KernelGlobals& g, const Light& emitter, const EmitterPoint& at)
 {
   const InstanceView& instance = g.instances[emitter.instance_index];
   const Material& material = g.materials[instance.material_index];
-  const EmitterPoint point(g, instance, static_cast<std::uint32_t>(emitter.triangle_index), barycentric);
+  const MeshPoint point(g, instance, static_cast<std::uint32_t>(emitter.triangle_index), at.barycentric);
   GraphRegisters registers;
   const GraphLane lane = graph_at_point(g.run_graph, g.graphs[material.emission_index], g.textures,
-                                        point.graph_point(g, wo, distance), registers);
+                                        point.graph_point(g, at.wo, at.ray), registers);
   return radiance_of(g, material, lane, point);
 }
 
@@ -73,11 +82,11 @@ void emitter_graph_means(const KernelGlobals& g, std::size_t instance_index, std
   tbb::parallel_for(std::size_t{0}, means.size(), [&](std::size_t triangle) {
     GraphRegisters registers;
     const auto point_of = [&](int i) {
-      return EmitterPoint(g, instance, static_cast<std::uint32_t>(triangle), {kPlaces[i][0], kPlaces[i][1]});
+      return MeshPoint(g, instance, static_cast<std::uint32_t>(triangle), {kPlaces[i][0], kPlaces[i][1]});
     };
     for (int i = 0; i < kPoints; ++i) {
-      const EmitterPoint point = point_of(i);
-      graph_load_point(program, point.graph_point(g, point.hit.Ng, 1.0f), i, registers);
+      const MeshPoint point = point_of(i);
+      graph_load_point(program, point.graph_point(g, point.hit.Ng, kSomeRay), i, registers);
     }
     g.run_graph(program, g.textures, registers);
     Vec3f sum;

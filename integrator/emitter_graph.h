@@ -8,7 +8,10 @@
 namespace relief {
 
 /// Radiance of a point of a mesh light, as KernelGlobals::emitter_radiance.
-Vec3f emitter_graph_radiance(const KernelGlobals& g, const Light& emitter, Vec2f barycentric, Vec3f wo, float distance);
+Vec3f emitter_graph_radiance(const KernelGlobals& g, const Light& emitter, const EmitterPoint& at);
+
+/// Whether what a graph gives depends on the length of a ray or on the events before it, which photons do not know of.
+bool emitter_graph_asks_for_path(const GraphProgramView& program);
 
 /// Mean radiance of triangles of an instance, by few points: what choosing among lights needs.
 /// @param g       meshes, instances, materials, graphs and textures are filled in

@@ -700,7 +700,9 @@ std::vector<float> emissive_meshes_add(const Scene& scene,
     const TextureView* texture =
         ref.texture_index >= 0 ? &textures[static_cast<std::size_t>(ref.texture_index)] : nullptr;
     std::vector<Vec3f> means;
+    bool asks_for_path = false;
     if (material.emission_index >= 0 && globals != nullptr) {
+      asks_for_path = emitter_graph_asks_for_path(globals->graphs[material.emission_index]);
       means.resize(mesh.num_triangles);
       emitter_graph_means(*globals, i, means);
     }
@@ -710,7 +712,7 @@ std::vector<float> emissive_meshes_add(const Scene& scene,
       light.is_even = emission_is_even(material);
       // Photons do not start where no point was seen to shine: paths find that light.
       const bool is_dark = !means.empty() && is_zero(means[triangle]);
-      light.casts_caustics = (instance.flags & kNoCausticLight) == 0 && !is_dark;
+      light.casts_caustics = (instance.flags & kNoCausticLight) == 0 && !is_dark && !asks_for_path;
       light.instance_index = static_cast<std::int32_t>(i);
       set.lights[emissive.first_light + triangle] = light;
       if (texture != nullptr && means.empty()) {

@@ -26,12 +26,16 @@ enum class LightTechnique : std::uint8_t { kMis, kLightSampling, kBsdfSampling }
 
 struct KernelGlobals;
 
+/// A point of a light and a ray that takes light from there.
+struct EmitterPoint {
+  Vec2f barycentric;  ///< on a triangle: weights of vertices 1 and 2
+  Vec3f wo;           ///< unit, from the light to where it goes
+  GraphRay ray;
+};
+
 /// Radiance of a point of a mesh light whose material emits by a graph.
 /// @param emitter   in world space
-/// @param wo        unit, from the emitter to where its light goes
-/// @param distance  metres that the light goes
-using EmitterRadiance =
-    Vec3f (*)(const KernelGlobals& g, const Light& emitter, Vec2f barycentric, Vec3f wo, float distance);
+using EmitterRadiance = Vec3f (*)(const KernelGlobals& g, const Light& emitter, const EmitterPoint& at);
 
 struct KernelGlobals {
   const MeshView* meshes = nullptr;

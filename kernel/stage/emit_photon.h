@@ -16,6 +16,10 @@ struct EmittedRay {
   Vec3f power{};  ///< W, over the density of the ray; 0: none
 };
 
+/// What light graphs are told of the ray that a photon comes by: as path_light_ray at the first hit of a path. Where it leads to
+/// is not known yet, and lights whose graphs ask for that start no photons.
+inline constexpr GraphRay kPhotonRay{0, 1, 0, 0.0f};
+
 /// Light from a point, or from the ball around it, towards a box.
 /// @param u_light  place on the ball
 RELIEF_KERNEL EmittedRay emit_from_point(const Light& light, const Box3& box, Vec2f u_light, Vec2f u)
@@ -71,8 +75,7 @@ emit_from_area(const KernelGlobals& g, const Light& light, const Box3& box, Vec2
   }
   const float cosine = dot(ray.D, light.axis);
   if (!(pdf > 0.0f) || !(light.two_sided || cosine > 0.0f)) return {};
-  const Vec3f radiance =
-      light.kind == LightKind::kTriangle ? emitter_radiance(g, light, barycentric, ray.D, 0.0f) : light.emission;
+  const Vec3f radiance = light.is_even ? light.emission : emitter_radiance(g, light, {barycentric, ray.D, kPhotonRay});
   ray.power = radiance * (__builtin_fabsf(cosine) * light.area / pdf);
   if (light.instance_index >= 0) {
     const Vec3f error = gamma_bound(8) * (abs(light.P) + abs(light.edge_u) + abs(light.edge_v));
