@@ -136,6 +136,14 @@ LightBounds light_bounds(const Light& light, float scale)
     bounds.two_sided = light.two_sided;
     profile = light.two_sided ? kTwoSidedProfile : kFlatProfile;
     bounds.is_flat = true;
+    if (light.spread_tan > 0.0f) {
+      // Brighter along the axis, and nothing beyond the spread.
+      bounds.falloff = std::atan(light.spread_tan);
+      bounds.intensity *= light.spread_tan * light.spread_scale;
+      profile = cone_profile(std::cos(0.5f * bounds.falloff));
+      if (light.two_sided) profile = {2.0f * profile.mean, 0.0f};
+      bounds.is_flat = false;
+    }
   }
   bounds.profile_mean = profile.mean;
   bounds.profile_slope = bounds.spread.axis * profile.slope;
@@ -741,6 +749,25 @@ std::vector<float> emissive_meshes_add(const Scene& scene,
   return scales;
 }
 
+/// Makes the emission of lights with a graph that of its mean, by which lights are compared.
+void lamps_scale(const KernelGlobals& globals, std::span<Light> lights)
+{
+  tbb::parallel_for(std::size_t{0}, lights.size(), [&](std::size_t i) {
+    Light& light = lights[i];
+    if (light.lamp_index < 0) return;
+    // What was dark wherever the graph was asked may shine elsewhere.
+    constexpr float kLeastMean = 1e-3f;
+    const float mean = max(emitter_graph_lamp_mean(globals, light), kLeastMean);
+    if (is_finite(light.emission * mean)) {
+      light.emission *= mean;
+      light.lamp_scale = 1.0f / mean;
+    }
+    if (emitter_graph_asks_for_path(globals.graphs[globals.lamps[light.lamp_index].graph_index])) {
+      light.casts_caustics = false;
+    }
+  });
+}
+
 }  // namespace
 
 void light_set_build_tree(LightSet& set, std::span<const float> intensity_scales)
@@ -801,6 +828,7 @@ LightSet light_set_make(const Scene& scene,
   if (scene.environment.hidden_from != 0) set.environment_irradiance = {};
 
   set.lights = scene.lights;
+  if (globals != nullptr) lamps_scale(*globals, set.lights);
   const std::vector<float> scales = emissive_meshes_add(scene, textures, globals, set);
   light_set_build_tree(set, scales);
   if (!set.environment.environment.has_map && density == EnvironmentDensity::kExcess) {

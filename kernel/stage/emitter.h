@@ -1,4 +1,4 @@
-// What a point of a mesh light sends out.
+// What a point of a light sends out that does not shine evenly.
 #pragma once
 
 #include "kernel/shape/material_lookup.h"
@@ -14,10 +14,12 @@ RELIEF_KERNEL GraphRay path_light_ray(const PathState& state, std::uint32_t path
   return {0, state.bounces[path] + 1u, state.flags[path] >> kPathTransparentShift, distance};
 }
 
-/// @param emitter  triangle, or rectangle of two, in world space
-/// @return         radiance; which side shines is not asked
-RELIEF_KERNEL Vec3f emitter_radiance(const KernelGlobals& g, const Light& emitter, const EmitterPoint& at)
+/// @param emitter  not even, in world space
+/// @param even     what it sends to there without its graph: counts for all but meshes
+/// @return         radiance, or what `even` is; of meshes it is not asked which side shines
+RELIEF_KERNEL Vec3f emitter_radiance(const KernelGlobals& g, const Light& emitter, Vec3f even, const EmitterPoint& at)
 {
+  if (emitter.instance_index < 0) return even * g.emitter_radiance(g, emitter, at);
   const InstanceView& instance = g.instances[emitter.instance_index];
   const Material& material = g.materials[instance.material_index];
   if (material.emission_index >= 0) return g.emitter_radiance(g, emitter, at);

@@ -37,9 +37,10 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   Vec3f radiance = light.radiance;
   const bool is_mesh = emitter != nullptr && emitter->instance_index >= 0;
   // Any kernel may sample a textured or transparent emitter, so this is not a feature of the surface that is lit.
-  if (is_mesh && !emitter->is_even) {
-    radiance =
-        emitter_radiance(g, *emitter, {light.barycentric, -light.wi, path_light_ray(state, path, light.distance)});
+  if (emitter != nullptr && !emitter->is_even) {
+    radiance = emitter_radiance(
+        g, *emitter, radiance,
+        {P + light.wi * light.distance, light.barycentric, -light.wi, path_light_ray(state, path, light.distance)});
   }
   if (is_zero(radiance)) return;
   const Vec3f wi = to_local(at.side.frame, light.wi);
