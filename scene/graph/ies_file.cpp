@@ -220,27 +220,28 @@ IesProfile ies_parse(std::string_view text, const std::string& file, const std::
   return profile;
 }
 
-std::vector<float> ies_table(const IesProfile& p, bool as_before_4)
+std::vector<float> ies_table(const IesProfile& p, IesEnds ends)
 {
-  const bool is_round = is_near(p.horizontal.front(), 0) && is_near(p.horizontal.back(), 360);
-  const bool from_below = is_near(p.vertical.front(), 0), to_above = is_near(p.vertical.back(), 180);
   std::vector<float> table;
   for (const double angle : p.horizontal) table.push_back(static_cast<float>(angle * kDegreesToRadians));
   for (const double angle : p.vertical) table.push_back(static_cast<float>(angle * kDegreesToRadians));
   const std::size_t num_h = p.horizontal.size(), num_v = p.vertical.size();
-  // The values beyond the poles are those before them, as if the luminaire were symmetrical there; beyond other ends is nothing.
+  const bool is_round = is_near(p.horizontal.front(), 0) && is_near(p.horizontal.back(), 360);
+  const bool from_below = is_near(p.vertical.front(), 0);
   const auto add_row = [&](const std::vector<float>* row) {
     if (row == nullptr) {
       table.insert(table.end(), num_v + 2, 0.0f);
       return;
     }
-    table.push_back(from_below ? (*row)[1] : 0.0f);
+    // Straight down all versions take the luminaire for symmetrical.
+    table.push_back(from_below ? (*row)[1] : ends == IesEnds::k52 ? row->front() : 0.0f);
     table.insert(table.end(), row->begin(), row->end());
-    table.push_back(as_before_4 ? row->back() : to_above ? (*row)[num_v - 2] : 0.0f);
+    table.push_back(ends == IesEnds::k43 ? 0.0f : row->back());
   };
-  add_row(is_round ? &p.rows[num_h - 2] : nullptr);
+  const bool goes_around = ends == IesEnds::k34 && is_round;
+  add_row(ends == IesEnds::k52 ? &p.rows.front() : goes_around ? &p.rows[num_h - 2] : nullptr);
   for (const std::vector<float>& row : p.rows) add_row(&row);
-  add_row(is_round ? &p.rows[1] : nullptr);
+  add_row(ends == IesEnds::k52 ? &p.rows[num_h - 2] : goes_around ? &p.rows[1] : nullptr);
   return table;
 }
 

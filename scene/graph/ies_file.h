@@ -22,8 +22,11 @@ struct IesProfile {
 /// @source ANSI/IESNA LM-63-02; LM-75-01 for the types. Type B is turned: its polar axis becomes the luminaire's, as in Blender
 IesProfile ies_parse(std::string_view text, const std::string& file, const std::string& json_path);
 
+/// What cubic interpolation takes for the values beyond the first and last angles, by versions of Blender. 3.4 goes around the
+/// axis, 4.3 takes 0, since rounding hides from it that 360° is 0°, and 5.2 repeats those at hand.
+enum class IesEnds { k34, k43, k52 };
+
 /// Floats of the table that a graph's operation reads, see ies_table_size.
-/// @param as_before_4  the last cell before straight up goes on evenly, as it did in Blender up to 3.6
-std::vector<float> ies_table(const IesProfile& profile, bool as_before_4);
+std::vector<float> ies_table(const IesProfile& profile, IesEnds ends);
 
 }  // namespace relief

@@ -540,7 +540,7 @@ void lower_ies(GraphNode& n)
   const GraphScalar vertical = b(Op::arccosine, {scaled(b, v[2], -1)});
   const GraphScalar horizontal = b(Op::add, {b(Op::arctangent2, {v[0], v[1]}), b.constant(3.14159265f)});
   const IesProfile& profile = n.ies(n.reader);
-  const std::uint32_t place = b.add_table(ies_table(profile, read_maths(n) == kMaths34));
+  const std::uint32_t place = b.add_table(ies_table(profile, static_cast<IesEnds>(read_maths(n))));
   const std::uint16_t immediates[] = {
       static_cast<std::uint16_t>(place & 0xffffu), static_cast<std::uint16_t>(place >> 16),
       static_cast<std::uint16_t>(profile.horizontal.size()), static_cast<std::uint16_t>(profile.vertical.size())};

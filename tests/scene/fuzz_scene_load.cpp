@@ -39,7 +39,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   if (text.starts_with("IESNA") || text.starts_with("TILT=")) {
     try {
-      relief::ies_table(relief::ies_parse(text, "scene.gltf", "/uri"), false);
+      relief::ies_table(relief::ies_parse(text, "scene.gltf", "/uri"), relief::IesEnds::k34);
     } catch (const relief::SceneError&) {
     }
     return 0;

@@ -117,7 +117,7 @@ double cubic(const double v[4], double x)
 TEST(IesFile, InterpolationIsThatOfCatmullAndRom)
 {
   const IesProfile p = parsed(file_of("0 20 50 110 180", "0 40 90 200 300 360"));
-  const std::vector<float> table = ies_table(p, false);
+  const std::vector<float> table = ies_table(p, IesEnds::k34);
   const int num_h = static_cast<int>(p.horizontal.size()), num_v = static_cast<int>(p.vertical.size());
   ASSERT_EQ(static_cast<int>(table.size()), ies_table_size(num_h, num_v));
   constexpr double kRadians = 3.14159265358979 / 180;
@@ -126,12 +126,12 @@ TEST(IesFile, InterpolationIsThatOfCatmullAndRom)
       for (const double x : {0.0, 0.3, 0.8}) {
         double along[4];
         for (int i = 0; i < 4; ++i) {
-          // Around the circle the last row is the first; at the poles the next value stands for the one beyond.
+          // Around the circle the last row is the first; straight down the next value stands for the one beyond, straight up the last.
           const int row = (h - 1 + i + num_h - 1) % (num_h - 1);
           double across[4];
           for (int k = 0; k < 4; ++k) {
             const int column = v - 1 + k;
-            const int inside = column < 0 ? 1 : column == num_v ? num_v - 2 : column;
+            const int inside = column < 0 ? 1 : column == num_v ? num_v - 1 : column;
             const int last = h - 1 + i == num_h - 1 ? num_h - 1 : row;
             across[k] = static_cast<double>(p.rows[static_cast<std::size_t>(last)][static_cast<std::size_t>(inside)]);
           }
@@ -149,10 +149,24 @@ TEST(IesFile, InterpolationIsThatOfCatmullAndRom)
   }
 }
 
+TEST(IesFile, EndsAreThoseOfTheVersions)
+{
+  IesProfile p = parsed(file_of("0 90 180", "0"));
+  p.rows = {{8, 8, 8}, {8, 8, 8}};
+  const auto at = [&](IesEnds ends, float h, float v) {
+    return static_cast<double>(ies_eval(ies_table(p, ends).data(), 2, 3, h, v)) / 8;
+  };
+  // Of four values of which the outer ones are 0 the middle is 9/8.
+  EXPECT_NEAR(at(IesEnds::k34, kPi, 0.8f), 1, 1e-6);
+  EXPECT_NEAR(at(IesEnds::k43, kPi, 0.8f), 1.125, 1e-6);
+  EXPECT_NEAR(at(IesEnds::k52, kPi, 0.8f), 1, 1e-6);
+  EXPECT_NEAR(at(IesEnds::k43, kPi, 0.75f * kPi), 1.125 * 1.0625, 1e-5);
+}
+
 TEST(IesFile, ThereIsNothingOutsideOfTheAngles)
 {
   const IesProfile p = parsed(file_of("0 45 90", "0"));
-  const std::vector<float> table = ies_table(p, false);
+  const std::vector<float> table = ies_table(p, IesEnds::k34);
   const auto at = [&](float h, float v) { return ies_eval(table.data(), 2, 3, h, v); };
   EXPECT_GT(at(1, 1.5f), 0);
   EXPECT_EQ(at(1, 1.6f), 0);
@@ -200,7 +214,7 @@ TEST(IesFile, WhateverIsCutOffOrChangedIsAnErrorOrAProfile)
     }
     try {
       const IesProfile p = parsed(text);
-      const std::vector<float> table = ies_table(p, run % 2 == 0);
+      const std::vector<float> table = ies_table(p, static_cast<IesEnds>(run % 3));
       const auto num_h = static_cast<int>(p.horizontal.size()), num_v = static_cast<int>(p.vertical.size());
       ASSERT_EQ(static_cast<int>(table.size()), ies_table_size(num_h, num_v));
       const float found = ies_eval(table.data(), num_h, num_v, 1.0f, 0.5f);
