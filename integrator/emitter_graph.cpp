@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "kernel/graph/graph_material.h"
 #include "kernel/shape/material_lookup.h"
@@ -10,9 +11,12 @@
 namespace relief {
 namespace {
 
+/// The ray that means are of: direct light from a metre away.
+constexpr GraphRay kSomeRay{0, 1, 0, 1.0f};
+
 /// A point of an emitter and what a graph reads there.
-struct EmitterPoint {
-  EmitterPoint(const KernelGlobals& g, const InstanceView& at, std::uint32_t at_triangle, Vec2f barycentric)
+struct MeshPoint {
+  MeshPoint(const KernelGlobals& g, const InstanceView& at, std::uint32_t at_triangle, Vec2f barycentric)
       : mesh(g.meshes[at.mesh_index]),
         instance(at),
         triangle(at_triangle),
@@ -22,10 +26,9 @@ struct EmitterPoint {
   }
 
   /// @param wo  unit, from the emitter
-  GraphPoint graph_point(const KernelGlobals& g, Vec3f wo, float distance) const
+  GraphPoint graph_point(const KernelGlobals& g, Vec3f wo, const GraphRay& ray) const
   {
-    // As in Cycles, light that is asked for comes by no kind of ray.
-    return {&mesh, &instance, triangle, b.x, b.y, &hit, wo, {0.0f, 0.0f}, 0.0f, &g.graph_scene, {0, 0, 0, distance}};
+    return {&mesh, &instance, triangle, b.x, b.y, &hit, wo, {0.0f, 0.0f}, 0.0f, &g.graph_scene, ray};
   }
 
   const MeshView& mesh;
@@ -35,8 +38,139 @@ struct EmitterPoint {
   SurfaceHit hit;
 };
 
+/// Place on a lamp: across a rectangle or disk, within the cone of a spot, around a point. 0 to 1, the second one up.
+Vec2f lamp_uv(const Light& light, const Lamp& lamp, Vec3f P, Vec3f N, Vec3f wo)
+{
+  switch (light.kind) {
+    case LightKind::kRectangle:
+    case LightKind::kDisk: {
+      const Vec3f q = P - light.P, normal = cross(light.edge_u, light.edge_v);
+      const float scale = 0.5f / length_squared(normal);
+      return {0.5f + scale * dot(cross(q, light.edge_v), normal), 0.5f + scale * dot(cross(light.edge_u, q), normal)};
+    }
+    case LightKind::kSpot: {
+      const Vec3f d = transform_vector(lamp.node.object_from_world, wo);
+      const float half_width = -d.z * safe_sqrt(1.0f - sqr(light.cos_outer)) / light.cos_outer;
+      return {0.5f + 0.5f * d.x / half_width, 0.5f + 0.5f * d.y / half_width};
+    }
+    case LightKind::kPoint: {
+      const Vec3f d = normalize(transform_vector(lamp.node.object_from_world, N));
+      return {0.5f - std::atan2(d.x, d.y) * (0.5f * kInvPi), 1.0f - std::acos(clamp(d.z, -1.0f, 1.0f)) * kInvPi};
+    }
+    default:
+      return {0.5f, 0.5f};
+  }
+}
+
+/// What a graph may read at a point of a lamp.
+struct LampPoint {
+  LampPoint(const KernelGlobals& g, const Light& light, const EmitterPoint& at)
+      : lamp(g.lamps[light.lamp_index]), scene(&g.graph_scene), wo(at.wo), ray(at.ray)
+  {
+    // The square of a sun's distance has to be a number.
+    constexpr float kFarthest = 1e18f;
+    ray.length = min(ray.length, kFarthest);
+    const bool is_sun = light.kind == LightKind::kSun;
+    const bool is_flat = light.kind == LightKind::kRectangle || light.kind == LightKind::kDisk;
+    const bool is_point = !is_flat && !is_sun && !(light.radius > 0.0f);
+    const bool is_ball = !is_flat && !is_sun && !is_point && !light.faces_viewer;
+    // Of a point the place is known without the rounding of a distance: patterns have edges at round numbers.
+    hit.P = is_sun ? light.axis : is_point ? light.P : at.P;
+    hit.Ng = is_flat ? light.axis : is_ball ? normalize(at.P - light.P) : at.wo;
+    hit.Ns = hit.Ng;
+    uv = lamp_uv(light, lamp, hit.P, hit.Ng, wo);
+    hit.uv[0] = hit.uv[1] = {uv.x, 1.0f - uv.y};
+    hit.color = {0, 0, 0, 1};
+  }
+
+  /// As graph_quantity, of a surface without triangles.
+  float quantity(const GraphInput& input) const
+  {
+    using Q = GraphQuantity;
+    switch (input.quantity) {
+      case Q::generated_x:
+      case Q::generated_y:
+      case Q::generated_z: {
+        const Vec3f p = transform_point(lamp.node.object_from_world, hit.P);
+        return input.quantity == Q::generated_x ? p.x : input.quantity == Q::generated_y ? p.y : p.z;
+      }
+      case Q::attribute_value:
+      case Q::attribute_x:
+      case Q::attribute_y:
+      case Q::attribute_z:
+        return 0.0f;
+      case Q::attribute_alpha:
+        return 1.0f;
+      case Q::edge_distance:
+        return kInfinity;
+      default: {
+        constexpr MeshView kNoMesh;
+        const GraphPoint point{&kNoMesh,     &lamp.node, 0,     uv.y, 1.0f - uv.x - uv.y, &hit, wo,
+                               {0.0f, 0.0f}, 0.0f,       scene, ray};
+        return graph_quantity(point, input.quantity, input.index);
+      }
+    }
+  }
+
+  /// Writes a lane of a program's inputs. What would be read a footprint away is read here: bumps are flat.
+  void load(const GraphProgramView& program, int lane, GraphRegisters& registers) const
+  {
+    for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
+      registers.lanes[program.inputs[i].register_index][lane] = quantity(program.inputs[i]);
+    }
+  }
+
+  const Lamp& lamp;
+  const GraphScene* scene;
+  Vec3f wo;
+  GraphRay ray;
+  SurfaceHit hit;
+  Vec2f uv;
+};
+
+/// What a lamp's program, which has run, gives; what is no light is 0.
+Vec3f lamp_factor(const GraphLane& lane)
+{
+  const auto result = [&lane](int i) {
+    const float value = graph_result(lane, i);
+    return is_finite(value) ? max(0.0f, value) : 0.0f;
+  };
+  return {result(0), result(1), result(2)};
+}
+
+/// Some point of a lamp and a direction from there, and for how much light it stands.
+struct LampSample {
+  EmitterPoint point;
+  float weight;
+};
+
+LampSample lamp_sample(const Light& light, std::uint32_t index)
+{
+  const Vec2f u = sample_2d(0, index, 0), v = sample_2d(0, index, 2);
+  switch (light.kind) {
+    case LightKind::kRectangle:
+    case LightKind::kDisk: {
+      const Vec2f q = light.kind == LightKind::kDisk ? warp_disk(u) : Vec2f{2.0f * u.x - 1.0f, 2.0f * u.y - 1.0f};
+      const Vec3f local = warp_cosine_hemisphere(v);
+      const Vec3f axis = light.two_sided && (index & 1u) != 0 ? -light.axis : light.axis;
+      const Vec3f P = light.P + light.edge_u * q.x + light.edge_v * q.y;
+      return {{P, {}, from_local(frame_from_normal(axis), local), kSomeRay}, light_spread(light, local.z)};
+    }
+    case LightKind::kPoint: {
+      const Vec3f wo = warp_sphere(u);
+      return {{light.P + wo * light.radius, {}, wo, kSomeRay}, 1.0f};
+    }
+    case LightKind::kSpot: {
+      const Vec3f wo = from_local(frame_from_normal(light.axis), warp_cone(1.0f - light.cos_outer, u));
+      return {{light.P + wo * light.radius, {}, wo, kSomeRay}, spot_light_falloff(light, dot(wo, light.axis))};
+    }
+    default:
+      return {{{}, {}, light.axis, kSomeRay}, 1.0f};
+  }
+}
+
 /// @param lane  of the material's emission program, which has run
-Vec3f radiance_of(const KernelGlobals& g, const Material& material, const GraphLane& lane, const EmitterPoint& point)
+Vec3f radiance_of(const KernelGlobals& g, const Material& material, const GraphLane& lane, const MeshPoint& point)
 {
   if (material.has_closures) {
     return triangle_emission(material, g.textures, point.mesh, point.triangle, point.b) + closures_emission(lane);
@@ -49,14 +183,29 @@ Vec3f radiance_of(const KernelGlobals& g, const Material& material, const GraphL
 
 }  // namespace
 
-Vec3f emitter_graph_radiance(const KernelGlobals& g, const Light& emitter, Vec2f barycentric, Vec3f wo, float distance)
+bool emitter_graph_asks_for_path(const GraphProgramView& program)
 {
+  return std::any_of(program.inputs, program.inputs + program.num_inputs, [](const GraphInput& input) {
+    return input.quantity == GraphQuantity::ray_length || input.quantity == GraphQuantity::ray_depth;
+  });
+}
+
+Vec3f emitter_graph_radiance(const KernelGlobals& g, const Light& emitter, const EmitterPoint& at)
+{
+  if (emitter.instance_index < 0) {
+    const GraphProgramView& program = g.graphs[g.lamps[emitter.lamp_index].graph_index];
+    GraphRegisters registers;
+    const LampPoint point(g, emitter, at);
+    for (int lane = 0; lane < 8; ++lane) point.load(program, lane, registers);
+    g.run_graph(program, g.textures, registers);
+    return lamp_factor({&program, &registers, 0}) * emitter.lamp_scale;
+  }
   const InstanceView& instance = g.instances[emitter.instance_index];
   const Material& material = g.materials[instance.material_index];
-  const EmitterPoint point(g, instance, static_cast<std::uint32_t>(emitter.triangle_index), barycentric);
+  const MeshPoint point(g, instance, static_cast<std::uint32_t>(emitter.triangle_index), at.barycentric);
   GraphRegisters registers;
   const GraphLane lane = graph_at_point(g.run_graph, g.graphs[material.emission_index], g.textures,
-                                        point.graph_point(g, wo, distance), registers);
+                                        point.graph_point(g, at.wo, at.ray), registers);
   return radiance_of(g, material, lane, point);
 }
 
@@ -73,11 +222,11 @@ void emitter_graph_means(const KernelGlobals& g, std::size_t instance_index, std
   tbb::parallel_for(std::size_t{0}, means.size(), [&](std::size_t triangle) {
     GraphRegisters registers;
     const auto point_of = [&](int i) {
-      return EmitterPoint(g, instance, static_cast<std::uint32_t>(triangle), {kPlaces[i][0], kPlaces[i][1]});
+      return MeshPoint(g, instance, static_cast<std::uint32_t>(triangle), {kPlaces[i][0], kPlaces[i][1]});
     };
     for (int i = 0; i < kPoints; ++i) {
-      const EmitterPoint point = point_of(i);
-      graph_load_point(program, point.graph_point(g, point.hit.Ng, 1.0f), i, registers);
+      const MeshPoint point = point_of(i);
+      graph_load_point(program, point.graph_point(g, point.hit.Ng, kSomeRay), i, registers);
     }
     g.run_graph(program, g.textures, registers);
     Vec3f sum;
@@ -90,6 +239,28 @@ void emitter_graph_means(const KernelGlobals& g, std::size_t instance_index, std
   for (Vec3f& mean : means) {
     if (is_zero(mean)) mean = all * 0.01f;
   }
+}
+
+float emitter_graph_lamp_mean(const KernelGlobals& g, const Light& light)
+{
+  constexpr std::uint32_t kSamples = 512;
+  const GraphProgramView& program = g.graphs[g.lamps[light.lamp_index].graph_index];
+  GraphRegisters registers;
+  double sum = 0, weights = 0;
+  for (std::uint32_t i = 0; i < kSamples; i += 8) {
+    float weight[8];
+    for (int k = 0; k < 8; ++k) {
+      const LampSample sample = lamp_sample(light, i + static_cast<std::uint32_t>(k));
+      weight[k] = sample.weight;
+      LampPoint(g, light, sample.point).load(program, k, registers);
+    }
+    g.run_graph(program, g.textures, registers);
+    for (int k = 0; k < 8; ++k) {
+      sum += static_cast<double>(weight[k] * light_scalar(lamp_factor({&program, &registers, k})));
+      weights += static_cast<double>(weight[k]);
+    }
+  }
+  return weights > 0 ? static_cast<float>(sum / weights) : 0.0f;
 }
 
 }  // namespace relief

@@ -136,6 +136,14 @@ LightBounds light_bounds(const Light& light, float scale)
     bounds.two_sided = light.two_sided;
     profile = light.two_sided ? kTwoSidedProfile : kFlatProfile;
     bounds.is_flat = true;
+    if (light.spread_tan > 0.0f) {
+      // Brighter along the axis, and nothing beyond the spread.
+      bounds.falloff = std::atan(light.spread_tan);
+      bounds.intensity *= light.spread_tan * light.spread_scale;
+      profile = cone_profile(std::cos(0.5f * bounds.falloff));
+      if (light.two_sided) profile = {2.0f * profile.mean, 0.0f};
+      bounds.is_flat = false;
+    }
   }
   bounds.profile_mean = profile.mean;
   bounds.profile_slope = bounds.spread.axis * profile.slope;
@@ -700,7 +708,9 @@ std::vector<float> emissive_meshes_add(const Scene& scene,
     const TextureView* texture =
         ref.texture_index >= 0 ? &textures[static_cast<std::size_t>(ref.texture_index)] : nullptr;
     std::vector<Vec3f> means;
+    bool asks_for_path = false;
     if (material.emission_index >= 0 && globals != nullptr) {
+      asks_for_path = emitter_graph_asks_for_path(globals->graphs[material.emission_index]);
       means.resize(mesh.num_triangles);
       emitter_graph_means(*globals, i, means);
     }
@@ -710,7 +720,7 @@ std::vector<float> emissive_meshes_add(const Scene& scene,
       light.is_even = emission_is_even(material);
       // Photons do not start where no point was seen to shine: paths find that light.
       const bool is_dark = !means.empty() && is_zero(means[triangle]);
-      light.casts_caustics = (instance.flags & kNoCausticLight) == 0 && !is_dark;
+      light.casts_caustics = (instance.flags & kNoCausticLight) == 0 && !is_dark && !asks_for_path;
       light.instance_index = static_cast<std::int32_t>(i);
       set.lights[emissive.first_light + triangle] = light;
       if (texture != nullptr && means.empty()) {
@@ -737,6 +747,25 @@ std::vector<float> emissive_meshes_add(const Scene& scene,
     }
   }
   return scales;
+}
+
+/// Makes the emission of lights with a graph that of its mean, by which lights are compared.
+void lamps_scale(const KernelGlobals& globals, std::span<Light> lights)
+{
+  tbb::parallel_for(std::size_t{0}, lights.size(), [&](std::size_t i) {
+    Light& light = lights[i];
+    if (light.lamp_index < 0) return;
+    // What was dark wherever the graph was asked may shine elsewhere.
+    constexpr float kLeastMean = 1e-3f;
+    const float mean = max(emitter_graph_lamp_mean(globals, light), kLeastMean);
+    if (is_finite(light.emission * mean)) {
+      light.emission *= mean;
+      light.lamp_scale = 1.0f / mean;
+    }
+    if (emitter_graph_asks_for_path(globals.graphs[globals.lamps[light.lamp_index].graph_index])) {
+      light.casts_caustics = false;
+    }
+  });
 }
 
 }  // namespace
@@ -799,6 +828,7 @@ LightSet light_set_make(const Scene& scene,
   if (scene.environment.hidden_from != 0) set.environment_irradiance = {};
 
   set.lights = scene.lights;
+  if (globals != nullptr) lamps_scale(*globals, set.lights);
   const std::vector<float> scales = emissive_meshes_add(scene, textures, globals, set);
   light_set_build_tree(set, scales);
   if (!set.environment.environment.has_map && density == EnvironmentDensity::kExcess) {

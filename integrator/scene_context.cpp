@@ -166,6 +166,7 @@ void SceneContext::make_views()
   globals.graphs = graphs.data();
   globals.run_graph = stage_table_select().run_graph;
   globals.emitter_radiance = emitter_graph_radiance;
+  globals.lamps = scene.lamps.data();
   globals.textures = scene.textures->views().data();
 }
 

@@ -26,21 +26,27 @@ enum class LightTechnique : std::uint8_t { kMis, kLightSampling, kBsdfSampling }
 
 struct KernelGlobals;
 
-/// Radiance of a point of a mesh light whose material emits by a graph.
+/// A point of a light and a ray that takes light from there.
+struct EmitterPoint {
+  Vec3f P;            ///< world; of suns any
+  Vec2f barycentric;  ///< on a triangle: weights of vertices 1 and 2
+  Vec3f wo;           ///< unit, from the light to where it goes
+  GraphRay ray;
+};
+
+/// Radiance of a point of a mesh light whose material emits by a graph; of other lights with a graph the factor on their emission.
 /// @param emitter   in world space
-/// @param wo        unit, from the emitter to where its light goes
-/// @param distance  metres that the light goes
-using EmitterRadiance =
-    Vec3f (*)(const KernelGlobals& g, const Light& emitter, Vec2f barycentric, Vec3f wo, float distance);
+using EmitterRadiance = Vec3f (*)(const KernelGlobals& g, const Light& emitter, const EmitterPoint& at);
 
 struct KernelGlobals {
   const MeshView* meshes = nullptr;
   const InstanceView* instances = nullptr;
   std::uint32_t num_instances = 0;
   const Material* materials = nullptr;
-  const GraphProgramView* graphs = nullptr;  ///< by Material::graph_index
+  const GraphProgramView* graphs = nullptr;  ///< by Material::graph_index and Lamp::graph_index
   GraphRun run_graph = nullptr;
   EmitterRadiance emitter_radiance = nullptr;
+  const Lamp* lamps = nullptr;  ///< by Light::lamp_index
   GraphScene graph_scene;
   const TextureView* textures = nullptr;
   const std::uint32_t* area_light_index = nullptr;  ///< light of object num_instances + i

@@ -317,6 +317,14 @@ fs::path gltf_resolve_uri(const GltfDocument& document, const std::string& uri, 
   throw SceneError(document.file, json_path, "an existing file", '"' + uri + '"');
 }
 
+ByteArray gltf_read_file(const fs::path& path,
+                         const std::string& file,
+                         const std::string& json_path,
+                         std::uint64_t most)
+{
+  return read_file(path, file, json_path, most);
+}
+
 std::span<const std::byte> gltf_buffer_view(const GltfDocument& document, int index)
 {
   const tinygltf::BufferView& view = document.core.bufferViews[static_cast<std::size_t>(index)];

@@ -74,6 +74,15 @@ std::filesystem::path gltf_resolve_uri(const GltfDocument& document,
                                        const std::string& uri,
                                        const std::string& json_path);
 
+/// Reads a regular file.
+/// @param file, json_path  who names it, for messages
+/// @param most             bytes to read; the file may be longer
+/// @error SceneError: there is none, or it cannot be read
+ByteArray gltf_read_file(const std::filesystem::path& path,
+                         const std::string& file,
+                         const std::string& json_path,
+                         std::uint64_t most);
+
 bool gltf_is_data_uri(const std::string& uri);
 
 /// Bytes of a base64 data URI.

@@ -119,6 +119,7 @@ Scene GltfLoader::load(const std::filesystem::path& path, const LoadOptions& opt
   set_camera(options);
   const std::vector<FileStamp> files = documents_.files_read();
   scene_.files.insert(scene_.files.begin(), files.begin(), files.end());
+  scene_.files.insert(scene_.files.end(), textures_.files_read().begin(), textures_.files_read().end());
   return std::move(scene_);
 }
 
@@ -335,6 +336,30 @@ void GltfLoader::place_camera(const PlacedNode& node)
   }
 }
 
+/// Makes a Lamp of the graph that a light's lamp_index names.
+void GltfLoader::place_lamp(const PlacedNode& node, Light& light)
+{
+  if (light.lamp_index < 0) return;
+  const GraphProgram& program = scene_.graphs[static_cast<std::size_t>(light.lamp_index)];
+  if (program.inputs.empty() && program.code.empty()) {
+    // The same everywhere.
+    const auto factor = [&program](std::size_t i) {
+      return std::max(0.0f, program.constants[std::size_t{program.results[i]} - kMostGraphRegisters]);
+    };
+    light.emission = light.emission * Vec3f{factor(0), factor(1), factor(2)};
+    if (!is_finite(light.emission)) light.emission = {};
+    light.lamp_index = -1;
+    light.is_even = true;
+    return;
+  }
+  Lamp lamp;
+  lamp.graph_index = light.lamp_index;
+  lamp.node.world_from_object = transform_to_affine(node.world);
+  lamp.node.object_from_world = inverse(lamp.node.world_from_object);
+  light.lamp_index = static_cast<std::int32_t>(scene_.lamps.size());
+  scene_.lamps.push_back(lamp);
+}
+
 void GltfLoader::place_lights(const PlacedNode& node)
 {
   const std::string path = "/nodes/" + std::to_string(node.node_index);
@@ -347,12 +372,19 @@ void GltfLoader::place_lights(const PlacedNode& node)
       memory_.add(sizeof(Light) * lights.size(), node.document->file + ": lights");
       scene_.lights.insert(scene_.lights.end(), lights.begin(), lights.end());
       scene_.lights.back().casts_caustics = node.object.caustic_light;
+      place_lamp(node, scene_.lights.back());
     }
+  };
+  const LampGraphReader read_graph = [&](const JsonReader& graph) {
+    const auto [it, is_new] =
+        lamp_graph_of_.try_emplace({node.document, graph.path()}, static_cast<int>(scene_.graphs.size()));
+    if (is_new) scene_.graphs.push_back(graph_read_lamp(*node.document, graph, textures_, warnings_));
+    return it->second;
   };
   const auto [units, is_new] = light_units_of_.try_emplace(node.document);
   if (is_new) units->second = light_units(*node.document, scene_.render.luminous_efficacy);
   const std::vector<Light> lights =
-      khronos_node_light(*node.document, node.node_index, node.world, units->second, warnings_);
+      khronos_node_light(*node.document, node.node_index, node.world, units->second, read_graph, warnings_);
   if (!lights.empty() && !units->second.assumed.empty()) {
     warnings_.add(node.document->file + ": " + std::exchange(units->second.assumed, {}));
   }
@@ -362,7 +394,7 @@ void GltfLoader::place_lights(const PlacedNode& node)
   node.document->read_extension(json, "", "RELIEF_area_light", [&](const JsonReader&) {
     says_light_ = true;
     if (is_usable(node, node.world, path)) {
-      add(relief_area_light(*node.document, node.node_index, node.world, warnings_));
+      add(relief_area_light(*node.document, node.node_index, node.world, read_graph, warnings_));
     }
   });
 }

@@ -80,6 +80,7 @@ class GltfLoader {
   InstanceValues node_values(const PlacedNode& node) const;
   void set_values(std::size_t instance_index, const InstanceValues& values);
   void place_camera(const PlacedNode& node);
+  void place_lamp(const PlacedNode& node, Light& light);
   void place_lights(const PlacedNode& node);
   void describe();
   void warn_missing_attributes(const std::string& label, const Mesh& mesh, const Material& material);
@@ -114,6 +115,7 @@ class GltfLoader {
   std::map<MeshSource, int> mesh_of_;  ///< −1: a primitive without a triangle
   std::map<std::pair<const GltfDocument*, int>, int> material_of_;
   std::map<const GltfDocument*, LightUnits> light_units_of_;
+  std::map<std::pair<const GltfDocument*, std::string>, int> lamp_graph_of_;  ///< by the path of the graph
   DocumentSet documents_;
   MemoryWatch memory_;
 };

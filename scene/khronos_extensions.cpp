@@ -211,6 +211,7 @@ std::vector<Light> khronos_node_light(const GltfDocument& document,
                                       int node_index,
                                       const Transform& world,
                                       const LightUnits& units,
+                                      const LampGraphReader& read_graph,
                                       Warnings& warnings)
 {
   static constexpr std::string_view kTypes[] = {"point", "spot", "directional"};
@@ -265,7 +266,7 @@ std::vector<Light> khronos_node_light(const GltfDocument& document,
     const nlohmann::json& value = (*lights)[static_cast<std::size_t>(light)];
     const std::string path = "/extensions/KHR_lights_punctual/lights/" + std::to_string(light);
     read_light(JsonReader(value, document.file, path));
-    relief_light(document, value, path, out.back(), warnings);
+    relief_light(document, value, path, read_graph, out.back(), warnings);
   });
   return out;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -39,12 +40,17 @@ void khronos_texture_transform(TextureRef& ref, const JsonReader& extension, War
 /// Material `index` of a document: core and KHR_materials_*; RELIEF_displacement is read by relief_displacement.
 Material khronos_material(const GltfDocument& document, int index, TextureTable& textures, Warnings& warnings);
 
+/// Makes a program of the graph of a light; returns its place in Scene::graphs.
+using LampGraphReader = std::function<int(const JsonReader& graph)>;
+
 /// The light that a node carries through KHR_lights_punctual, placed by the node's transform.
-/// @return 0 or 1 lights
+/// @param read_graph  see relief_light
+/// @return            0 or 1 lights
 std::vector<Light> khronos_node_light(const GltfDocument& document,
                                       int node_index,
                                       const Transform& world,
                                       const LightUnits& units,
+                                      const LampGraphReader& read_graph,
                                       Warnings& warnings);
 
 /// EXT_mesh_gpu_instancing of a node: transforms relative to the node.

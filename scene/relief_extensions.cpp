@@ -344,9 +344,34 @@ std::optional<Environment> relief_environment(const GltfDocument& document,
   return out;
 }
 
+namespace {
+
+void read_lamp_graph(const JsonReader& r, const LampGraphReader& read_graph, Light& light)
+{
+  if (!r.has("graph")) return;
+  light.lamp_index = read_graph(r.object("graph"));
+  light.is_even = false;
+}
+
+/// The full angle within which a flat light shines; its power stays the same.
+void read_spread(const JsonReader& r, Light& light)
+{
+  // Narrower ones are hardly ever seen from anywhere, which is all noise.
+  constexpr double kNarrowest = 0.0174, kHalfTurn = 3.1415926535897932;
+  const double spread = r.number("spread", kHalfTurn, kNarrowest, kHalfTurn + 1e-6);
+  constexpr double kWidest = kHalfTurn - 1e-4;
+  if (spread > kWidest) return;
+  const double tangent = std::tan(spread / 2);
+  light.spread_tan = static_cast<float>(tangent);
+  light.spread_scale = static_cast<float>(1 / (tangent - spread / 2));
+}
+
+}  // namespace
+
 void relief_light(const GltfDocument& document,
                   const nlohmann::json& value,
                   const std::string& path,
+                  const LampGraphReader& read_graph,
                   Light& light,
                   Warnings& warnings)
 {
@@ -362,6 +387,7 @@ void relief_light(const GltfDocument& document,
       light.visible_to_camera = r.boolean("visibleToCamera", false);
     }
     if (light.kind == LightKind::kSpot) light.falloff = static_cast<SpotFalloff>(r.choice("falloff", kFalloffs, 0));
+    read_lamp_graph(r, read_graph, light);
     r.warn_unread(warnings);
   });
 }
@@ -369,6 +395,7 @@ void relief_light(const GltfDocument& document,
 std::vector<Light> relief_area_light(const GltfDocument& document,
                                      int node_index,
                                      const Transform& world,
+                                     const LampGraphReader& read_graph,
                                      Warnings& warnings)
 {
   static constexpr std::string_view kShapes[] = {"rectangle", "disk"};
@@ -407,6 +434,8 @@ std::vector<Light> relief_area_light(const GltfDocument& document,
     if (!is_finite(light.emission)) {
       r.fail("", "a finite radiance", "one beyond single precision");
     }
+    read_spread(r, light);
+    read_lamp_graph(r, read_graph, light);
     r.warn_unread(warnings);
     out.push_back(light);
   });

@@ -34,17 +34,21 @@ std::optional<Environment> relief_environment(const GltfDocument& document,
 
 /// Reads RELIEF_light of a punctual light into it.
 /// @param value  the light's object, at `path`
+/// @param read_graph  what it returns becomes the light's lamp_index, for the caller to put a Lamp in place of
 void relief_light(const GltfDocument& document,
                   const nlohmann::json& value,
                   const std::string& path,
+                  const LampGraphReader& read_graph,
                   Light& light,
                   Warnings& warnings);
 
 /// RELIEF_area_light of a node, placed by its transform.
+/// @param read_graph  as for relief_light
 /// @return 0 or 1 lights
 std::vector<Light> relief_area_light(const GltfDocument& document,
                                      int node_index,
                                      const Transform& world,
+                                     const LampGraphReader& read_graph,
                                      Warnings& warnings);
 
 enum class CausticCaster : std::uint8_t { kAuto, kYes, kNo };

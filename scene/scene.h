@@ -12,6 +12,7 @@
 #include "kernel/bsdf/material.h"
 #include "kernel/camera/camera.h"
 #include "kernel/film/mist.h"
+#include "kernel/graph/graph_scene.h"
 #include "kernel/light/light.h"
 #include "kernel/shape/mesh_view.h"
 #include "scene/diagnostics.h"
@@ -171,10 +172,11 @@ struct Scene {
   std::vector<Instance> instances;
   std::vector<Material> materials;
   std::vector<std::string> material_names;
-  std::vector<GraphProgram> graphs;          ///< of materials, by Material::graph_index
+  std::vector<GraphProgram> graphs;          ///< by Material::graph_index and so on, and by Lamp::graph_index
   std::vector<std::string> attribute_names;  ///< of attributes that graphs read
   std::vector<InstanceColumn> instance_columns;
   std::vector<Light> lights;            ///< everything but mesh triangles and the environment
+  std::vector<Lamp> lamps;              ///< by Light::lamp_index
   std::vector<std::string> node_names;  ///< of all files, as far as they have names, each once, in file order
   std::vector<AnimationClip> clips;     ///< of all files
   Vec3f bounds_low, bounds_high;        ///< box of all instances, undisplaced, world; low > high without any

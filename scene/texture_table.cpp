@@ -130,6 +130,19 @@ int TextureTable::add_path(const std::filesystem::path& file,
   return add(make_key(option + ' ' + file.string(), nullptr, 0, color, sampling), std::move(request), color, sampling);
 }
 
+const IesProfile& TextureTable::add_ies(const GltfDocument& document,
+                                        const std::string& uri,
+                                        const std::string& json_path)
+{
+  constexpr std::uint64_t kMostBytes = std::uint64_t{64} << 20;
+  const std::filesystem::path file = gltf_resolve_uri(document, uri, json_path);
+  if (const auto known = ies_.find(file); known != ies_.end()) return known->second;
+  files_read_.push_back(file_stamp(file));
+  const ByteArray bytes = gltf_read_file(file, document.file, json_path, kMostBytes);
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data.get()), bytes.size);
+  return ies_.emplace(file, ies_parse(text, document.file, json_path)).first->second;
+}
+
 std::vector<TextureRequest> TextureTable::take()
 {
   index_of_.clear();

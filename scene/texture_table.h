@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "scene/gltf_document.h"
+#include "scene/graph/ies_file.h"
 #include "scene/texture_store.h"
 
 namespace relief {
@@ -43,6 +44,13 @@ class TextureTable {
                TextureColor color,
                TextureSampling sampling);
 
+  /// Intensities of a luminaire from a path beside the file. They are no texture, but read at once, each file once.
+  /// @error SceneError at `json_path`: there is no such file, or see ies_parse
+  const IesProfile& add_ies(const GltfDocument& document, const std::string& uri, const std::string& json_path);
+
+  /// The files of luminaires, as they were before they were read.
+  const std::vector<FileStamp>& files_read() const { return files_read_; }
+
   /// The requests, in index order; the table is empty afterwards.
   std::vector<TextureRequest> take();
 
@@ -58,6 +66,8 @@ class TextureTable {
 
   std::map<Key, int> index_of_;
   std::vector<TextureRequest> requests_;
+  std::map<std::filesystem::path, IesProfile> ies_;
+  std::vector<FileStamp> files_read_;
 };
 
 }  // namespace relief

@@ -188,6 +188,15 @@ SPOT_FALLOFF = "smooth" if IS_4_0 else "smooth-cosine"
 #: A spot's cone is stretched by the scale of its object.
 SPOTS_ARE_SCALED = IS_4_0
 
+#: Area lights spread by as little as nothing; before, by a degree.
+SPREADS_TO_NOTHING = IS_4_0
+
+#: Lights have coordinates of their surface.
+LIGHTS_HAVE_UV = IS_4_0
+
+#: Lights have a space of their own, and properties, as other objects.
+LIGHTS_ARE_OBJECTS = IS_5_0
+
 #: An area light of P watts and area A has the radiance P / (this · A).
 AREA_DIVISOR = math.pi if IS_4_0 else 4.0
 

@@ -12,6 +12,7 @@
 #include "kernel/graph/gabor.h"
 #include "kernel/graph/graph_op.h"
 #include "kernel/graph/graph_registers.h"
+#include "kernel/graph/ies.h"
 #include "kernel/graph/image.h"
 #include "kernel/graph/musgrave.h"
 #include "kernel/graph/noise.h"
@@ -436,11 +437,21 @@ RELIEF_KERNEL void graph_grid(const GraphOperands& o)
     const int x0 = cell(u[k], columns, &x1, &s), y0 = cell(v[k], rows, &y1, &t);
     for (int c = 0; c < 3; ++c) {
       const auto at = [=](int x, int y) { return table[(y * columns + x) * 3 + c]; };
-      rgb[c][k] = (1.0f - t) * ((1.0f - s) * at(x0, y0) + s * at(x1, y0)) +
-                  t * ((1.0f - s) * at(x0, y1) + s * at(x1, y1));
+      rgb[c][k] =
+          (1.0f - t) * ((1.0f - s) * at(x0, y0) + s * at(x1, y0)) + t * ((1.0f - s) * at(x0, y1) + s * at(x1, y1));
     }
   }
   for (int c = 0; c < 3; ++c) graph_set(o, c, rgb[c]);
+}
+
+/// Intensity by a horizontal and a vertical angle. Immediates: first float of its table by low and high word, its numbers of
+/// horizontal and of vertical angles.
+RELIEF_KERNEL void graph_ies(const GraphOperands& o)
+{
+  const float* table = o.program.tables + (o.immediates[0] | std::uint32_t{o.immediates[1]} << 16);
+  graph_set(o, 0, each_lane(graph_in(o, 0), graph_in(o, 1), [=](float horizontal, float vertical) {
+              return ies_eval(table, o.immediates[2], o.immediates[3], horizontal, vertical);
+            }));
 }
 
 /// 1 in every other cell of a lattice of unit cubes, but not in the one at the origin.

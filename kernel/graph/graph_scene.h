@@ -35,6 +35,12 @@ struct GraphInstanceColumn {
   const float* values;  ///< four an instance: three components and alpha
 };
 
+/// What a light has besides whose emission a value graph multiplies, but for meshes.
+struct Lamp {
+  std::int32_t graph_index = -1;  ///< results 0 to 2 are the factor
+  InstanceView node;              ///< of which the matrices count
+};
+
 /// What is the same for all surfaces.
 struct GraphScene {
   const InstanceView* instances = nullptr;

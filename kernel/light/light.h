@@ -22,7 +22,7 @@ struct alignas(64) Light {
   SpotFalloff falloff = SpotFalloff::kSquare;
   bool two_sided = false;         ///< rectangle, disk, triangle
   bool visible_to_camera = true;  ///< rectangle, disk, ball
-  bool is_even = true;            ///< triangle: all its points send out `emission`, see emission_is_even
+  bool is_even = true;            ///< all its points send out `emission`: see emission_is_even, and lamp_index
   bool casts_caustics = true;     ///< photons start from it, where there is a photon pass
   bool faces_viewer = false;  ///< point, spot with a radius: a disk that faces whoever looks at it instead of a ball
   Vec3f P{};                  ///< position or centre, metres (triangle: first vertex)
@@ -38,6 +38,10 @@ struct alignas(64) Light {
                                        ///< shared ones, the first of the instances)
   std::int32_t triangle_index = -1;    ///< likewise (the first of two)
   std::int32_t whole_index = -1;       ///< second triangle of such a rectangle: that light; nothing else of it counts
+  std::int32_t lamp_index = -1;        ///< of what a value graph makes uneven, but for meshes: see Lamp
+  float lamp_scale = 1;  ///< factor on what the graph gives; `emission` is divided by it, so as to be a mean
+  float spread_tan = 0;  ///< rectangle, disk: tangent of the widest angle to the axis; 0: it shines to all of its side
+  float spread_scale = 0;  ///< see light_spread
 };
 
 /// Whether a light is a ball (or a disk that faces everyone): a point or spot that has a size.

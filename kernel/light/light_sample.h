@@ -18,6 +18,16 @@ struct LightSample {
   Vec2f barycentric{};  ///< triangle: weights of vertices 1 and 2
 };
 
+/// Radiance of a rectangle or disk with a spread, as a factor on that of the same power without: falls linearly with the tangent
+/// of the angle to the axis, as light does between the slats of a grid.
+/// @param cosine  of that angle
+RELIEF_KERNEL float light_spread(const Light& light, float cosine)
+{
+  if (!(light.spread_tan > 0.0f)) return 1.0f;
+  const float tangent = safe_sqrt(1.0f - sqr(cosine)) / __builtin_fabsf(cosine);
+  return max(0.0f, (light.spread_tan - tangent) * light.spread_scale);
+}
+
 /// Radiance an area light sends against a ray that arrives at it.
 /// @param wi  unit, direction of travel of the ray, towards the light
 /// @return    0 on the back of a one-sided light and for the other kinds: see ball_light_emitted for points and spots
@@ -26,7 +36,8 @@ RELIEF_KERNEL Vec3f light_emitted(const Light& light, Vec3f wi)
   const bool area_kind =
       light.kind == LightKind::kRectangle || light.kind == LightKind::kDisk || light.kind == LightKind::kTriangle;
   if (!area_kind) return {};
-  return light.two_sided || dot(wi, light.axis) < 0.0f ? light.emission : Vec3f{};
+  const float cosine = -dot(wi, light.axis);
+  return light.two_sided || cosine > 0.0f ? light.emission * light_spread(light, cosine) : Vec3f{};
 }
 
 /// Whether a flat light's emitting side can be seen from a point; decided once for all its points.
@@ -66,7 +77,7 @@ RELIEF_KERNEL LightSample light_point_sample(const Light& light, Vec3f P, Vec3f 
   if (!(squared > 1e-30f)) return sample;
   sample.distance = __builtin_sqrtf(squared);
   sample.wi = to_light / sample.distance;
-  sample.radiance = light.emission;
+  sample.radiance = light.emission * light_spread(light, dot(sample.wi, light.axis));
   sample.pdf = pdf_solid_angle >= 0.0f ? pdf_solid_angle : light_area_pdf(light, sample.wi, sample.distance);
   return sample;
 }

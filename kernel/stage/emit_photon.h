@@ -16,9 +16,14 @@ struct EmittedRay {
   Vec3f power{};  ///< W, over the density of the ray; 0: none
 };
 
+/// What light graphs are told of the ray that a photon comes by: as path_light_ray at the first hit of a path. Where it leads to
+/// is not known yet, and lights whose graphs ask for that start no photons.
+inline constexpr GraphRay kPhotonRay{0, 1, 0, 0.0f};
+
 /// Light from a point, or from the ball around it, towards a box.
 /// @param u_light  place on the ball
-RELIEF_KERNEL EmittedRay emit_from_point(const Light& light, const Box3& box, Vec2f u_light, Vec2f u)
+RELIEF_KERNEL EmittedRay
+emit_from_point(const KernelGlobals& g, const Light& light, const Box3& box, Vec2f u_light, Vec2f u)
 {
   const Vec3f normal = warp_sphere(u_light);
   const Vec3f O = light.P + normal * light.radius;
@@ -34,7 +39,9 @@ RELIEF_KERNEL EmittedRay emit_from_point(const Light& light, const Box3& box, Ve
   float falloff = light.kind == LightKind::kSpot ? spot_light_falloff(light, dot(aim.D, light.axis)) : 1.0f;
   // Radiance I / πr², over the density 1 / 4πr² of the place, by Lambert's cosine.
   if (light.radius > 0.0f) falloff *= 4.0f * max(0.0f, dot(aim.D, normal));
-  return {O, aim.D, light.emission * (falloff / aim.pdf)};
+  Vec3f intensity = light.emission;
+  if (!light.is_even && falloff > 0.0f) intensity = emitter_radiance(g, light, intensity, {O, {}, aim.D, kPhotonRay});
+  return {O, aim.D, intensity * (falloff / aim.pdf)};
 }
 
 /// Light from a flat light towards a box.
@@ -71,8 +78,8 @@ emit_from_area(const KernelGlobals& g, const Light& light, const Box3& box, Vec2
   }
   const float cosine = dot(ray.D, light.axis);
   if (!(pdf > 0.0f) || !(light.two_sided || cosine > 0.0f)) return {};
-  const Vec3f radiance =
-      light.kind == LightKind::kTriangle ? emitter_radiance(g, light, barycentric, ray.D, 0.0f) : light.emission;
+  Vec3f radiance = light.emission * light_spread(light, cosine);
+  if (!light.is_even) radiance = emitter_radiance(g, light, radiance, {ray.O, barycentric, ray.D, kPhotonRay});
   ray.power = radiance * (__builtin_fabsf(cosine) * light.area / pdf);
   if (light.instance_index >= 0) {
     const Vec3f error = gamma_bound(8) * (abs(light.P) + abs(light.edge_u) + abs(light.edge_v));
@@ -123,9 +130,13 @@ RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
     Light storage;
     const Light& light = lights_at(g.lights, source.light, storage);
     const bool is_point = light.kind == LightKind::kPoint || light.kind == LightKind::kSpot;
-    ray = is_point                        ? emit_from_point(light, box, u_light, u)
-          : light.kind == LightKind::kSun ? emit_from_afar(sources, box, light.axis, light.emission, u)
-                                          : emit_from_area(g, light, box, u_light, u);
+    if (light.kind == LightKind::kSun) {
+      Vec3f irradiance = light.emission;
+      if (!light.is_even) irradiance = emitter_radiance(g, light, irradiance, {{}, {}, light.axis, kPhotonRay});
+      ray = emit_from_afar(sources, box, light.axis, irradiance, u);
+    } else {
+      ray = is_point ? emit_from_point(g, light, box, u_light, u) : emit_from_area(g, light, box, u_light, u);
+    }
   }
   const Vec3f power = ray.power * static_cast<float>(1.0 / (probability * sources.photons_a_pass));
   if (is_zero(power) || !is_finite(power)) return false;

@@ -1,23 +1,30 @@
-// What a point of a mesh light sends out.
+// What a point of a light sends out that does not shine evenly.
 #pragma once
 
-#include "kernel/globals.h"
 #include "kernel/shape/material_lookup.h"
+#include "kernel/stage/path_access.h"
 
 namespace relief {
 
-/// @param emitter   triangle, or rectangle of two, in world space
-/// @param wo        unit, from the emitter to where its light goes
-/// @param distance  metres that the light goes
-/// @return          radiance; which side shines is not asked
-RELIEF_KERNEL Vec3f
-emitter_radiance(const KernelGlobals& g, const Light& emitter, Vec2f barycentric, Vec3f wo, float distance)
+/// The ray of a path that asks for light at its present hit: of no kind, as in Cycles, and after one event more than the path
+/// has had, which is what a path that goes on to the light counts there.
+/// @param distance  metres to the light
+RELIEF_KERNEL GraphRay path_light_ray(const PathState& state, std::uint32_t path, float distance)
 {
+  return {0, state.bounces[path] + 1u, state.flags[path] >> kPathTransparentShift, distance};
+}
+
+/// @param emitter  not even, in world space
+/// @param even     what it sends to there without its graph: counts for all but meshes
+/// @return         radiance, or what `even` is; of meshes it is not asked which side shines
+RELIEF_KERNEL Vec3f emitter_radiance(const KernelGlobals& g, const Light& emitter, Vec3f even, const EmitterPoint& at)
+{
+  if (emitter.instance_index < 0) return even * g.emitter_radiance(g, emitter, at);
   const InstanceView& instance = g.instances[emitter.instance_index];
   const Material& material = g.materials[instance.material_index];
-  if (material.emission_index >= 0) return g.emitter_radiance(g, emitter, barycentric, wo, distance);
+  if (material.emission_index >= 0) return g.emitter_radiance(g, emitter, at);
   return triangle_emission(material, g.textures, g.meshes[instance.mesh_index],
-                           static_cast<std::uint32_t>(emitter.triangle_index), barycentric);
+                           static_cast<std::uint32_t>(emitter.triangle_index), at.barycentric);
 }
 
 }  // namespace relief

@@ -242,6 +242,14 @@ RELIEF_KERNEL bool path_leaves_to_photons(const KernelGlobals& g, std::uint32_t 
   return (flags & kPathCaustic) != 0 && light_casts_caustics(g.lights, light_index);
 }
 
+/// How far a path's ray has come to its present hit, metres; a camera's from the near clipping plane, as Cycles has it.
+RELIEF_KERNEL float path_ray_length(const KernelGlobals& g, const PathState& state, std::uint32_t path)
+{
+  const bool is_camera = static_cast<PathEvent>(path_event(state.flags[path])) == PathEvent::kCamera;
+  if (!is_camera || !(g.camera.clip_start > 0.0f)) return state.hit_t[path];
+  return state.hit_t[path] - g.camera.clip_start / dot(path_direction(state, path), g.camera_forward);
+}
+
 /// Share of light left after a stretch of the path's medium (Beer–Lambert).
 /// @param distance  metres; infinite stretches of an absorbing medium transmit nothing
 RELIEF_KERNEL Vec3f path_transmittance(Vec3f sigma_a, float distance)

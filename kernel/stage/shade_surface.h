@@ -37,8 +37,10 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   Vec3f radiance = light.radiance;
   const bool is_mesh = emitter != nullptr && emitter->instance_index >= 0;
   // Any kernel may sample a textured or transparent emitter, so this is not a feature of the surface that is lit.
-  if (is_mesh && !emitter->is_even) {
-    radiance = emitter_radiance(g, *emitter, light.barycentric, -light.wi, light.distance);
+  if (emitter != nullptr && !emitter->is_even) {
+    radiance = emitter_radiance(
+        g, *emitter, radiance,
+        {P + light.wi * light.distance, light.barycentric, -light.wi, path_light_ray(state, path, light.distance)});
   }
   if (is_zero(radiance)) return;
   const Vec3f wi = to_local(at.side.frame, light.wi);
@@ -392,7 +394,8 @@ RELIEF_KERNEL void shade_surface_emission(const KernelGlobals& g,
     if (pdf > 0.0f && at.instance->first_light_index >= 0) {
       const LightRef hit{at.instance->first_light_index + static_cast<std::int32_t>(at.triangle),
                          at.instance->light_copy_index};
-      const float pdf_light = lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), hit, wi, state.hit_t[path]);
+      const float pdf_light =
+          lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), hit, wi, state.hit_t[path]);
       radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
     }
     if (bounce == 0) film_add_emission(g.film, state.pixel[path], throughput * radiance);

@@ -30,8 +30,8 @@ struct SurfaceInteraction {
   SurfaceHit hit;
   ShadingSide side;  ///< Ng and front are known from the start, the rest is made by surface_interaction_frame
   SurfaceParams params;
-  RayCone cone;       ///< at the hit
-  float uv_width[2];  ///< texture footprint in each set's uv units
+  RayCone cone;           ///< at the hit
+  float uv_width[2];      ///< texture footprint in each set's uv units
   Vec3f passed{1, 1, 1};  ///< of closures: factor on the throughput of what passes, by a chance of 1 − alpha
   float holdout = 0;      ///< of closures: share that is a hole in the picture
 };
@@ -112,12 +112,6 @@ RELIEF_KERNEL GraphPoint surface_graph_point(const KernelGlobals& g,
                                              const SurfaceInteraction& at,
                                              Vec3f wo)
 {
-  const std::uint32_t kinds = path_ray_kinds(state, path);
-  float ray_length = state.hit_t[path];
-  // Camera rays are measured from the near clipping plane, as Cycles does.
-  if (kinds == 1u << static_cast<int>(GraphRayKind::kCamera) && g.camera.clip_start > 0.0f) {
-    ray_length -= g.camera.clip_start / -dot(wo, g.camera_forward);
-  }
   return {&g.meshes[at.instance->mesh_index],
           at.instance,
           at.triangle,
@@ -128,7 +122,8 @@ RELIEF_KERNEL GraphPoint surface_graph_point(const KernelGlobals& g,
           {at.uv_width[0], at.uv_width[1]},
           at.cone.width,
           &g.graph_scene,
-          {kinds, state.bounces[path], state.flags[path] >> kPathTransparentShift, ray_length}};
+          {path_ray_kinds(state, path), state.bounces[path], state.flags[path] >> kPathTransparentShift,
+           path_ray_length(g, state, path)}};
 }
 
 /// Resolves the closures of a located point: its lobes, its frame, and the parameters that stages ask for.
@@ -158,9 +153,8 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   const Material& m = *at.material;
   SurfaceParams& p = at.params;
   p = {};
-  p.emission = build.emission +
-               max(Vec3f{}, m.emission * xyz(material_texture_sample<kFeatures>(m.emission_texture, g.textures, at.hit.uv,
-                                                                                at.uv_width)));
+  p.emission = build.emission + max(Vec3f{}, m.emission * xyz(material_texture_sample<kFeatures>(
+                                                              m.emission_texture, g.textures, at.hit.uv, at.uv_width)));
   p.transmission = build.transmits ? 1.0f : 0.0f;
   p.thin = false;
   if (build.transmits && m.attenuation_distance < kInfinity) {
@@ -207,9 +201,10 @@ RELIEF_KERNEL SurfaceInteraction surface_interaction_make(const KernelGlobals& g
   if constexpr ((kFeatures & kFeatureGraphs) != 0) {
     if (at.material->graph_index >= 0) {
       GraphRegisters registers;
-      const GraphLane ran = lane != nullptr ? *lane
-                                            : graph_at_point(g.run_graph, g.graphs[at.material->graph_index], g.textures,
-                                                             surface_graph_point(g, state, path, at, wo), registers);
+      const GraphLane ran = lane != nullptr
+                                ? *lane
+                                : graph_at_point(g.run_graph, g.graphs[at.material->graph_index], g.textures,
+                                                 surface_graph_point(g, state, path, at, wo), registers);
       if (has_mixture<kFeatures>(at)) {
         surface_interaction_mix<kFeatures>(g, wo, ran, at, lobes);
       } else {

@@ -261,10 +261,12 @@ std::vector<std::uint16_t> GraphBuilder::placed(const Operation& operation,
   std::vector<std::uint16_t> immediates = operation.immediates;
   const bool are_tiles = operation.op == GraphOp::image_tiles;
   const bool is_grid = operation.op == GraphOp::grid;
-  if (!are_tiles && !is_grid && operation.op != GraphOp::table) return immediates;
+  const bool is_ies = operation.op == GraphOp::ies;
+  if (!are_tiles && !is_grid && !is_ies && operation.op != GraphOp::table) return immediates;
   const std::size_t low = are_tiles ? 2 : 0;  // where the place stands
   const int size = are_tiles ? immediates[1] * kImageTileColumns
                    : is_grid ? immediates[2] * immediates[3] * 3
+                   : is_ies  ? ies_table_size(immediates[2], immediates[3])
                              : immediates[2];
   const std::uint32_t from = immediates[low] | std::uint32_t{immediates[low + 1]} << 16;
   const auto [it, is_new] = places.try_emplace(from, static_cast<std::uint32_t>(program.tables.size()));

@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "scene/graph/graph_builder.h"
+#include "scene/graph/ies_file.h"
 #include "scene/json_reader.h"
 
 namespace relief {
@@ -46,6 +47,8 @@ struct GraphNode {
   const std::set<std::string_view>& given;  ///< inputs that the file gives
   /// Texture that an option names, as an index into the scene's.
   const std::function<int(const JsonReader&)>& texture;
+  /// The luminaire that an option names.
+  const std::function<const IesProfile&(const JsonReader&)>& ies;
   /// Place of an attribute's name, for quantities.
   const std::function<std::uint16_t(const JsonReader&, const std::string&)>& attribute;
   std::vector<GraphSun>& suns;  ///< gets those of directions that are looked into as they are

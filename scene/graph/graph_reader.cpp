@@ -195,9 +195,13 @@ void Reader::lower(std::size_t index)
     if (ref.texture_index > 0xffff) r.fail("texture", "one of the scene's first 65,536 textures");
     return ref.texture_index;
   };
+  const std::function<const IesProfile&(const JsonReader&)> ies = [this](const JsonReader& r) -> const IesProfile& {
+    if (!r.has("uri")) r.fail("uri", "the path of an IES file");
+    return textures.add_ies(document, r.string("uri", ""), json_path_join(r.path(), "uri"));
+  };
   const std::function<std::uint16_t(const JsonReader&, const std::string&)> named =
       [this](const JsonReader& r, const std::string& name) { return attribute(r, name); };
-  GraphNode node{build, source.reader, inputs, values[index], given, texture, named, suns};
+  GraphNode node{build, source.reader, inputs, values[index], given, texture, ies, named, suns};
   source.kind->lower(node);
   source.reader.warn_unread(warnings);
 }
@@ -240,12 +244,12 @@ void Reader::read_nodes(const JsonReader& graph)
 /// A graph with one output, whose numbers become the program's results.
 /// @param suns  gets the small lights that it has
 GraphProgram read_output(const GltfDocument& document,
-                                const JsonReader& graph,
-                                const char* name,
-                                GraphType type,
-                                TextureTable& textures,
-                                std::vector<GraphSun>& suns,
-                                Warnings& warnings)
+                         const JsonReader& graph,
+                         const char* name,
+                         GraphType type,
+                         TextureTable& textures,
+                         std::vector<GraphSun>& suns,
+                         Warnings& warnings)
 {
   // Neither directions nor texels have attributes: what a graph reads of one is 0.
   std::vector<std::string> attribute_names;
@@ -327,6 +331,17 @@ GraphProgram graph_read_color(const GltfDocument& document,
                               Warnings& warnings)
 {
   return read_output(document, graph, "color", GraphType::kColor, textures, suns, warnings);
+}
+
+GraphProgram graph_read_lamp(const GltfDocument& document,
+                             const JsonReader& graph,
+                             TextureTable& textures,
+                             Warnings& warnings)
+{
+  std::vector<GraphSun> suns;
+  GraphProgram program = read_output(document, graph, "emission", GraphType::kColor, textures, suns, warnings);
+  graph.warn_unread(warnings);
+  return program;
 }
 
 GraphProgram height_graph_read(const GltfDocument& document,

@@ -41,6 +41,13 @@ GraphProgram graph_read_color(const GltfDocument& document,
                               std::vector<GraphSun>& suns,
                               Warnings& warnings);
 
+/// The graph of a light that is no mesh: its output `emission` becomes the program's results 0 to 2.
+/// @error SceneError: as graph_read
+GraphProgram graph_read_lamp(const GltfDocument& document,
+                             const JsonReader& graph,
+                             TextureTable& textures,
+                             Warnings& warnings);
+
 /// The graph of a displacement's height: its nodes and their output `height`, which is the program's only result.
 /// @error SceneError: as graph_read
 GraphProgram height_graph_read(const GltfDocument& document,

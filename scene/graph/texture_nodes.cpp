@@ -529,7 +529,27 @@ void lower_gabor(GraphNode& n)
   n.set("intensity", b(Op::divide, {b(Op::square_root, {squared}), b.constant(range)}));
 }
 
+constexpr GraphSocket kIesInputs[] = {{"vector", kVector}, {"strength", kNumber, {1}}};
+void lower_ies(GraphNode& n)
+{
+  GraphBuilder& b = n.build;
+  GraphVector v = n.vector("vector");
+  if (!n.is_given("vector")) v = quantities(b, Q::object_normal_x, Q::object_normal_y, Q::object_normal_z);
+  v = normalized(b, v);
+  // From straight down; around from −y.
+  const GraphScalar vertical = b(Op::arccosine, {scaled(b, v[2], -1)});
+  const GraphScalar horizontal = b(Op::add, {b(Op::arctangent2, {v[0], v[1]}), b.constant(3.14159265f)});
+  const IesProfile& profile = n.ies(n.reader);
+  const std::uint32_t place = b.add_table(ies_table(profile, static_cast<IesEnds>(read_maths(n))));
+  const std::uint16_t immediates[] = {
+      static_cast<std::uint16_t>(place & 0xffffu), static_cast<std::uint16_t>(place >> 16),
+      static_cast<std::uint16_t>(profile.horizontal.size()), static_cast<std::uint16_t>(profile.vertical.size())};
+  const GraphScalar inputs[] = {horizontal, vertical};
+  n.set("factor", b(Op::multiply, {n.number("strength"), b.apply(Op::ies, inputs, immediates)[0]}));
+}
+
 constexpr GraphNodeKind kKinds[] = {
+    {"ies-texture", kIesInputs, lower_ies},
     {"noise-texture", kNoiseInputs, lower_noise},
     {"white-noise-texture", kWhiteNoiseInputs, lower_white_noise},
     {"image-texture", kImageInputs, lower_image},

@@ -57,11 +57,11 @@ def test_nodes_of_constants():
     assert_agrees(_stage(_add_light_with_nodes))
 
 
-def test_nodes_that_vary_are_warned_about():
+def test_a_light_by_nodes_of_a_surface_is_warned_about():
     scene = _stage(lambda: None)
     tree, emission = _add_light_with_nodes()
-    tree.links.new(tree.nodes.new("ShaderNodeTexIES").outputs[0], emission.inputs["Strength"])
-    assert_warns(scene, "IES Texture", "Strength")
+    tree.links.new(tree.nodes.new("ShaderNodeTangent").outputs[0], emission.inputs["Strength"])
+    assert_warns(scene, "Tangent", "of a light")
 
 
 def test_point_with_radius():

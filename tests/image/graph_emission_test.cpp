@@ -15,8 +15,11 @@ namespace {
 
 using nlohmann::json;
 
-/// The Cornell box, whose lamp has patches of two colours.
-Scene patchy_cornell()
+json node(int index, const char* output) { return {{"node", index}, {"output", output}}; }
+
+/// The Cornell box, whose lamp emits by a graph.
+/// @param color  of its emission
+Scene cornell_lit_by(const json& nodes, const json& color)
 {
   const auto folder = std::filesystem::path(RELIEF_SOURCE_DIR) / "examples" / "cornell";
   std::ifstream file(folder / "cornell.gltf");
@@ -25,26 +28,19 @@ Scene patchy_cornell()
   gltf["extensionsUsed"].push_back("RELIEF_surface");
   gltf["extensionsUsed"].push_back("RELIEF_graph");
   json& lamp = gltf["materials"][3];
-  const auto node = [](int index, const char* output) { return json{{"node", index}, {"output", output}}; };
-  const json nodes = {
-      {{"type", "geometry"}},
-      {{"type", "checker-texture"},
-       {"inputs",
-        {{"vector", node(0, "position")}, {"scale", 8}, {"color1", {60, 40, 20}}, {"color2", {20, 40, 60}}}}}};
   lamp["emissiveFactor"] = {0, 0, 0};
   lamp["extensions"] = {
       {"RELIEF_graph", {{"nodes", nodes}}},
       {"RELIEF_surface",
-       {{"closures",
-         {{{"type", "emission"}, {"color", node(1, "color")}}, {{"type", "diffuse"}, {"color", {0.5, 0.5, 0.5}}}}}}}};
+       {{"closures", {{{"type", "emission"}, {"color", color}}, {{"type", "diffuse"}, {"color", {0.5, 0.5, 0.5}}}}}}}};
   const TemporaryFolder copy;
   std::filesystem::copy(folder / "cornell.bin", copy / "cornell.bin");
   return scene_load(copy.write("scene.gltf", gltf.dump()));
 }
 
-TEST(GraphEmission, LightSamplingFindsWhatPathsFind)
+/// By MIS, by sampling lights and by following the BSDF; fails unless they agree.
+std::array<Picture, 3> pictures_by_techniques(const Scene& scene)
 {
-  const Scene scene = patchy_cornell();
   RunOptions run;
   run.width = run.height = 32;
   run.samples = 256;
@@ -63,6 +59,17 @@ TEST(GraphEmission, LightSamplingFindsWhatPathsFind)
         z_test_pictures(pictures[0], pictures[i], run.samples * run.num_runs, kSignificance, kAllowedOutliers);
     EXPECT_TRUE(result.passed) << i << ": " << z_text(result);
   }
+  return pictures;
+}
+
+TEST(GraphEmission, LightSamplingFindsWhatPathsFind)
+{
+  const json nodes = {
+      {{"type", "geometry"}},
+      {{"type", "checker-texture"},
+       {"inputs",
+        {{"vector", node(0, "position")}, {"scale", 8}, {"color1", {60, 40, 20}}, {"color2", {20, 40, 60}}}}}};
+  const std::array<Picture, 3> pictures = pictures_by_techniques(cornell_lit_by(nodes, node(1, "color")));
   // Sampling the lamp has far less noise than meeting it.
   const auto variance = [](const Picture& picture) {
     double sum = 0;
@@ -70,6 +77,20 @@ TEST(GraphEmission, LightSamplingFindsWhatPathsFind)
     return sum;
   };
   EXPECT_LT(8 * variance(pictures[0]), variance(pictures[2]));
+}
+
+/// Red grows with the depth of the ray, green falls: light that is asked for counts as light that is met.
+TEST(GraphEmission, DepthsAreTheSameForLightThatIsAskedForAndMet)
+{
+  const auto math = [](const char* operation, const json& a, const json& b) {
+    return json{{"type", "math"}, {"operation", operation}, {"inputs", {{"a", a}, {"b", b}}}};
+  };
+  const json nodes = {{{"type", "light-path"}},
+                      math("multiply", node(0, "depth"), 20),
+                      math("add", node(0, "depth"), 1),
+                      math("divide", 60, node(2, "value")),
+                      {{"type", "combine"}, {"inputs", {{"x", node(1, "value")}, {"y", node(3, "value")}, {"z", 20}}}}};
+  pictures_by_techniques(cornell_lit_by(nodes, node(4, "vector")));
 }
 
 }  // namespace

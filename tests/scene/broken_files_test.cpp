@@ -477,6 +477,29 @@ const BrokenFile kBrokenFiles[] = {
      "/nodes/3/extensions/RELIEF_area_light", "both"},
     {"area light with neither", [](auto& b) { node_extension(b, 3, "RELIEF_area_light").erase("power"); },
      "/nodes/3/extensions/RELIEF_area_light", "neither"},
+    {"area light with hardly any spread", [](auto& b) { node_extension(b, 3, "RELIEF_area_light")["spread"] = 0.001; },
+     "/nodes/3/extensions/RELIEF_area_light/spread", "0.001"},
+    {"graph of an area light without outputs",
+     [](auto& b) { node_extension(b, 3, "RELIEF_area_light")["graph"] = {{"nodes", json::array()}}; },
+     "/nodes/3/extensions/RELIEF_area_light/graph/outputs", "an object"},
+    {"graph of an area light that gives something else",
+     [](auto& b) {
+       node_extension(b, 3, "RELIEF_area_light")["graph"] = {{"nodes", {{{"type", "geometry"}}}},
+                                                             {"outputs", {{"color", {{"node", 0}}}}}};
+     },
+     "/nodes/3/extensions/RELIEF_area_light/graph/outputs/emission", "node"},
+    {"luminaire without a file",
+     [](auto& b) {
+       b.json["extensions"]["KHR_lights_punctual"]["lights"][0]["extensions"]["RELIEF_light"]["graph"] = {
+           {"nodes", {{{"type", "ies-texture"}}}}, {"outputs", {{"emission", {{"node", 0}}}}}};
+     },
+     "/extensions/KHR_lights_punctual/lights/0/extensions/RELIEF_light/graph/nodes/0/uri", "an IES file"},
+    {"luminaire's file missing",
+     [](auto& b) {
+       b.json["extensions"]["KHR_lights_punctual"]["lights"][0]["extensions"]["RELIEF_light"]["graph"] = {
+           {"nodes", {{{"type", "ies-texture"}, {"uri", "no.ies"}}}}, {"outputs", {{"emission", {{"node", 0}}}}}};
+     },
+     "/extensions/KHR_lights_punctual/lights/0/extensions/RELIEF_light/graph/nodes/0/uri", "no.ies"},
     {"area light beyond single precision", [](auto& b) { b.json["nodes"][3]["scale"] = {1e-30, 1e-30, 1}; },
      "/nodes/3/extensions/RELIEF_area_light", "1e-20"},
     {"area light of a singular node", [](auto& b) { b.json["nodes"][3]["scale"] = {0, 1, 1}; }, "/nodes/3", "singular"},

@@ -327,6 +327,30 @@ TEST(Lights, RectanglePowerIsSpreadOverItsAreaInTheWorld)
   EXPECT_TRUE(scene.features.area_lights);
 }
 
+TEST(Lights, GraphsAreLampsUnlessTheyAreConstants)
+{
+  GltfBuilder b = test::square_scene();
+  const json reads = {{"nodes", {{{"type", "light-falloff"}, {"inputs", {{"strength", 3}}}}}},
+                      {"outputs", {{"emission", {{"node", 0}, {"output", "linear"}}}}}};
+  json constant = reads;
+  constant["outputs"]["emission"]["output"] = "quadratic";
+  b.root_node(
+      {{"translation", {1, 2, 3}}, {"extensions", {{"RELIEF_area_light", {{"radiance", 2}, {"graph", reads}}}}}});
+  b.root_node({{"extensions",
+                {{"RELIEF_area_light", {{"radiance", 2}, {"graph", constant}, {"spread", 1.5707963267948966}}}}}});
+  const Scene scene = load(b);
+  ASSERT_EQ(scene.lights.size(), 2u);
+  ASSERT_EQ(scene.lamps.size(), 1u);
+  EXPECT_EQ(scene.lights[0].lamp_index, 0);
+  EXPECT_FALSE(scene.lights[0].is_even);
+  expect_near(scene.lamps[0].node.world_from_object.p, {1, 2, 3});
+  EXPECT_EQ(scene.lights[1].lamp_index, -1);
+  EXPECT_TRUE(scene.lights[1].is_even);
+  EXPECT_EQ(scene.lights[1].emission, (Vec3f{6, 6, 6}));
+  EXPECT_FLOAT_EQ(scene.lights[1].spread_tan, 1);
+  EXPECT_EQ(scene.lights[0].spread_tan, 0);
+}
+
 TEST(Lights, DiskOfAMirroredNodeStillShinesAlongMinusZ)
 {
   GltfBuilder b = test::square_scene();

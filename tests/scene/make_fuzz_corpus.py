@@ -211,7 +211,13 @@ def lights():
         b.node(name=f"light {i}", rotation=[0, .7071, 0, .7071], extensions={"KHR_lights_punctual": {"light": i}})
     b.node(camera=0, translation=[0, 0, 4])
     b.node(camera=1)
-    b.node(extensions={"RELIEF_area_light": {"shape": "disk", "radius": 2, "power": 10, "twoSided": True}})
+    profile = {"type": "ies-texture", "uri": "profile.ies", "inputs": {"strength": 2, "vector": [0, 0, 1]}}
+    falloff = {"type": "light-falloff", "inputs": {"strength": {"node": 0}, "smooth": 1}}
+    graph = {"nodes": [profile, falloff], "outputs": {"emission": {"node": 1, "output": "linear"}}}
+    kinds[2]["extensions"] = {"RELIEF_light": {"radius": .1, "falloff": "smooth", "graph": graph}}
+    area = {"shape": "disk", "radius": 2, "power": 10, "twoSided": True, "spread": 2}
+    area["graph"] = {"nodes": [{"type": "texture-coordinate"}], "outputs": {"emission": {"node": 0, "output": "uv"}}}
+    b.node(extensions={"RELIEF_area_light": area})
     b.node(mesh=b.square(), extensions={"RELIEF_object": {"castsShadow": False, "causticCaster": "auto"}})
     return b
 
@@ -251,6 +257,10 @@ def main():
     for make in (plain, topologies, materials, graphs, closures, lights, animation, composition):
         (folder / f"{make.__name__}.gltf").write_bytes(make().gltf())
         (folder / f"{make.__name__}.glb").write_bytes(make().glb())
+    numbers = "1 1000 1.5 4 3 {} 2 .1 .2 .3\n1 1 50\n{} 0 45 90\n0 45 90\n1 2 3 4\n5 6 7 8\n9 10 11 12\n"
+    (folder / "c.ies").write_text("IESNA:LM-63-1995\n[TEST] A\nTILT=NONE\n" + numbers.format(1, -45))
+    (folder / "b.ies").write_text("IESNA91\nTILT=INCLUDE\n1\n2\n0 90\n1 .5\n" + numbers.format(2, -90))
+    (folder / "a.ies").write_text("TILT=lamp.tlt\n" + numbers.format(3, -90))
 
 
 if __name__ == "__main__":

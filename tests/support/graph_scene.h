@@ -11,6 +11,9 @@
 
 namespace relief::test {
 
+/// A luminaire beside the scene.
+inline constexpr const char* kSmallProfile = "TILT=NONE\n1 1 1 3 2 1 2 0 0 0 1 1 1\n0 90 180\n0 90\n3 2 1\n6 5 4\n";
+
 /// A scene with one grey pixel as its only texture.
 /// @param graph  RELIEF_graph of its only material
 inline GltfBuilder graph_scene(const nlohmann::json& graph)
@@ -26,6 +29,7 @@ inline GltfBuilder graph_scene(const nlohmann::json& graph)
 inline Scene graph_load(const nlohmann::json& graph)
 {
   const TemporaryFolder folder;
+  folder.write("profile.ies", kSmallProfile);
   return scene_load(folder.write("scene.gltf", graph_scene(graph).gltf()));
 }
 

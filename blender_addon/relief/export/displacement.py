@@ -118,7 +118,7 @@ def _height_graph(material, socket, groups, coordinate_set):
     def no_image(node):
         raise NotUnderstood(f'node "{node.name}": an image among what it is made of')
 
-    graph = GraphWriter(number_of, no_image)
+    graph = GraphWriter(number_of, no_image, no_image)
     height = graph.value(socket, groups)
     if not isinstance(height, dict):
         raise NotUnderstood("no number")

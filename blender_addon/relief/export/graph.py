@@ -27,6 +27,7 @@ class GraphWriter:
     @param  coordinate_set  gives the number, 0 or 1, of the set that a ("uv", name) is in; None: no room for it
     @param  texture         gives the options of image-texture and environment-texture that say which image a node reads;
                             None without a file
+    @param  ies             gives the URI of what an IES Texture node reads; None: nothing
     @param  warn            called with what a value is, if it is no number, and what was used instead
     @param  material_index  Pass Index of the material
     @param  view_layer      gives the things whose properties are the view layer's attributes, the first one first
@@ -38,9 +39,10 @@ class GraphWriter:
     not_understood texts by the keys of the nodes that they are about
     """
 
-    def __init__(self, coordinate_set, texture, warn=lambda what, instead: None, material_index=0, view_layer=tuple):
+    def __init__(self, coordinate_set, texture, ies, warn=lambda what, instead: None, material_index=0, view_layer=tuple):
         self.coordinate_set = coordinate_set
         self.texture = texture
+        self.ies = ies
         self.warn = warn
         self.nodes = []
         self.uses_generated = False
@@ -182,10 +184,7 @@ class GraphWriter:
         socket = node.inputs.get("Vector")
         if socket is not None and socket.enabled and nodes.linked(socket, groups) is not None:
             return self.mapped(node, self.value(socket, groups))
-        if implicit == "generated":
-            self.uses_generated = True
-            return self.mapped(node, {"node": self.add("texture-coordinate"), "output": "generated"})
-        return self.mapped(node, self.uv(""))
+        return self.mapped(node, self.generated() if implicit == "generated" else self.uv(""))
 
     def mapped(self, node, vector):
         """A texture's vector after the mapping that the node itself has, in files from before Mapping nodes had sockets."""
@@ -203,6 +202,14 @@ class GraphWriter:
         if mapping.vector_type != "VECTOR":
             inputs["location"] = list(mapping.translation)
         return {"node": self.add("mapping", inputs, mapping=_label(mapping.vector_type)), "output": "vector"}
+
+    def generated(self):
+        self.uses_generated = True
+        return {"node": self.add("texture-coordinate"), "output": "generated"}
+
+    def coordinate_normal(self):
+        """Texture Coordinate's Normal."""
+        return {"node": self.add("texture-coordinate"), "output": "normal"}
 
     def uv(self, name):
         number = self.coordinate_set(("uv", name))

@@ -7,7 +7,7 @@ One function a kind of node, listed at the end. Each gives the value of one outp
 import bpy
 
 from .. import compat
-from . import attributes, instance_values
+from . import attributes, instance_values, nodes
 
 
 def not_understood(node, what):
@@ -243,6 +243,19 @@ def _light_falloff(g, source):
     return _output(g.add("light-falloff", inputs), source.socket.identifier.lower())
 
 
+def _ies(g, source):
+    node, groups = source.node, source.groups
+    strength = g.inputs(node, groups, {"Strength": "strength"})["strength"]
+    uri = g.ies(node)
+    if uri is None:
+        g.warn(f'node "{node.name}" ({node.bl_label}) without a file', "its strength times 100 was used, as in Cycles")
+        return _output(g.add("math", {"a": strength, "b": 100.0}, operation="multiply"), "value")
+    socket = node.inputs["Vector"]
+    vector = g.value(socket, groups) if nodes.linked(socket, groups) is not None else g.coordinate_normal()
+    inputs = {"vector": g.mapped(node, vector), "strength": strength}
+    return _output(g.add("ies-texture", inputs, uri=uri, maths=compat.TEXTURE_MATHS), "factor")
+
+
 def _hair_info(g, source):
     """What a surface that is no hair has of it."""
     return _constant(g, (0.0, 0.0, 0.0) if source.socket.identifier == "Tangent Normal" else 0.0)
@@ -289,6 +302,7 @@ OUTPUTS = {
     "ShaderNodeWireframe": _wireframe,
     "ShaderNodeAmbientOcclusion": _ambient_occlusion,
     "ShaderNodeLightFalloff": _light_falloff,
+    "ShaderNodeTexIES": _ies,
     "ShaderNodeHairInfo": _hair_info,
     "ShaderNodePointInfo": _point_info,
     "ShaderNodeFresnel": _by_normal("fresnel", {"IOR": "ior"}),

@@ -21,8 +21,9 @@ def file_name(value):
 
 
 def are_read():
-    """Whether any material of the file may read values, so that instances have to be looked at."""
-    trees = [m.node_tree for m in bpy.data.materials if m.use_nodes and m.node_tree is not None]
+    """Whether any material or light of the file may read values, so that instances have to be looked at."""
+    owners = [*bpy.data.materials, *bpy.data.lights]
+    trees = [owner.node_tree for owner in owners if owner.use_nodes and owner.node_tree is not None]
     trees += list(bpy.data.node_groups)
     return any(_reads(node) for tree in trees for node in tree.nodes)
 
@@ -94,6 +95,16 @@ def read(value, shown, data, places):
         return _of_particles(name, places)
     properties = [_property(name, shown, data, place, kind == "instancer") for place in places]
     return np.array(properties, dtype=np.float32)
+
+
+def randoms(shown, places, count):
+    """Object Info's Random at the places of an object; as if they were no instances where `places` is empty.
+
+    @return  float32 (count,)
+    """
+    if not places:
+        return np.full(count, to_unit(hash_bits(_hashed_name(shown.name), 0)[0]), dtype=np.float32)
+    return _random(shown, places)
 
 
 def _random(shown, places):

@@ -15,10 +15,13 @@ from dataclasses import dataclass
 from typing import Callable
 
 from .. import compat
-from . import nodes
+from .light_graph import read_emission
 
 #: Distance of a sun's disk in sizes of the scene: across the scene its light differs by two in so many.
 _SUN_DISTANCE = 3e4
+
+#: The least spread of an area light.
+_NARROWEST_SPREAD = math.radians(1)
 
 #: The narrowest edge of a spot, as a difference of cosines: the format wants two different cones.
 _NARROWEST_EDGE = 1e-6
@@ -32,7 +35,9 @@ class Place:
     scale              of Blender's object along X, Y and Z: areas follow the first two
     visible_to_camera  whether its surface is seen
     scene_size         metres that the scene's objects extend over
+    random             what Object Info says of the light's object
     writer             GltfWriter
+    images             ImageExporter
     warn               called with what is not understood, and what was used instead
     """
 
@@ -40,58 +45,54 @@ class Place:
     scale: tuple
     visible_to_camera: bool
     scene_size: float
+    random: float
     writer: object
+    images: object
     warn: Callable
 
 
 def export_light(light, place):
     """Adds a bpy light to the node of its place."""
-    color, strength = _emission(light, place.warn)
-    energy = compat.light_energy(light) * strength
+    color, graph = tuple(light.color), None
+    if light.use_nodes:
+        factor = read_emission(light, place.random, place.writer, place.images, place.warn)
+        if isinstance(factor, list):
+            color = tuple(a * b for a, b in zip(color, factor))
+        else:
+            graph = factor
+    energy = compat.light_energy(light)
     sizes = [getattr(light, name, 0.0) for name in ("shadow_soft_size", "size", "size_y", "angle", "spot_size")]
     if not all(math.isfinite(value) for value in (energy, *color, *sizes)):
         place.warn("a power, colour or size that is not finite", "it is left out")
         return
-    if energy < 0 or min(color) < 0:
+    if energy * max(color) < 0 or energy * min(color) < 0:
         place.warn("negative light", "it is left out")
         return
     if compat.is_portal(light):
         return
     if not compat.casts_shadow(light):
         place.warn("a light without shadows", "it casts them")
+    energy, color = abs(energy), [abs(c) for c in color]
+    own = {"graph": graph} if graph else {}
     if light.type == "POINT":
         value = {"type": "point", "intensity": energy / (4 * math.pi)}
-        if light.shadow_soft_size > 0:
-            place.writer.extend(value, "RELIEF_light", _size(light, place))
+        if light.shadow_soft_size > 0 or own:
+            place.writer.extend(value, "RELIEF_light", {**_size(light, place), **own})
         _add_punctual(place, value, color)
     elif light.type == "SPOT":
         if compat.SPOTS_ARE_SCALED and max(place.scale) > 1.001 * min(place.scale):
             place.warn("the uneven scale of a spot", "its cone is round")
-        _add_punctual(place, _spot(light, energy / (4 * math.pi), place), color)
+        _add_punctual(place, _spot(light, energy / (4 * math.pi), own, place), color)
     elif light.type == "SUN":
         if light.angle > 0:
-            _add_sun_disk(place, light.angle, color, energy)
+            _add_sun_disk(place, light.angle, color, energy, own)
         else:
-            _add_punctual(place, {"type": "directional", "intensity": energy}, color)
+            value = {"type": "directional", "intensity": energy}
+            if own:
+                place.writer.extend(value, "RELIEF_light", own)
+            _add_punctual(place, value, color)
     else:
-        _add_area(place, light, color, energy)
-        if light.spread < math.pi - 1e-4:
-            place.warn("the spread of an area light", "it shines to all sides")
-
-
-def _emission(light, warn):
-    """(colour, factor of the power) with the light's own nodes considered."""
-    color, strength = tuple(light.color), 1.0
-    if not light.use_nodes:
-        return color, strength
-    output = nodes.active_output(light.node_tree, "ShaderNodeOutputLight")
-    source = nodes.linked(output.inputs["Surface"]) if output else None
-    if source is None or source.node.bl_idname != "ShaderNodeEmission":
-        warn("light nodes other than one Emission", "its power and colour alone were used")
-        return color, strength
-    inputs, reader = source.node.inputs, nodes.Reader(warn, source.groups)
-    color = tuple(a * b for a, b in zip(color, reader.color(inputs["Color"])))
-    return color, reader.number(inputs["Strength"])
+        _add_area(place, light, color, energy, own)
 
 
 def _add_punctual(place, light, color):
@@ -108,14 +109,15 @@ def _add_child(place, child, name, value):
     place.node["children"] = [child]
 
 
-def _spot(light, intensity, place):
+def _spot(light, intensity, own, place):
+    """A spot, with what RELIEF_light has of its own."""
     outer = min(light.spot_size / 2, math.pi / 2)
     cos_outer = math.cos(outer)
     # Blender's edge takes a share of 1 − cos(outer).
     cos_inner = cos_outer + max((1 - cos_outer) * light.spot_blend, _NARROWEST_EDGE)
     out = {"type": "spot", "intensity": intensity}
     out["spot"] = {"innerConeAngle": math.acos(min(cos_inner, 1.0)), "outerConeAngle": outer}
-    place.writer.extend(out, "RELIEF_light", {"falloff": compat.SPOT_FALLOFF, **_size(light, place)})
+    place.writer.extend(out, "RELIEF_light", {"falloff": compat.SPOT_FALLOFF, **_size(light, place), **own})
     return out
 
 
@@ -128,7 +130,7 @@ def _size(light, place):
     }
 
 
-def _add_area(place, light, color, energy):
+def _add_area(place, light, color, energy, own):
     round_shape = light.shape in {"DISK", "ELLIPSE"}
     width = light.size * place.scale[0]
     height = (light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size) * place.scale[1]
@@ -136,6 +138,11 @@ def _add_area(place, light, color, energy):
     if area <= 0:
         return
     value = {"radiance": energy / (compat.AREA_DIVISOR * area), "color": list(color), "visibleToCamera": place.visible_to_camera}
+    value.update(own)
+    if light.spread < math.pi - 1e-4:
+        if light.spread < _NARROWEST_SPREAD and compat.SPREADS_TO_NOTHING:
+            place.warn("a spread of less than a degree", "it spreads by a degree")
+        value["spread"] = max(light.spread, _NARROWEST_SPREAD)
     if round_shape:
         # A disk of diameter 1, stretched by a node: ellipses have no shape of their own in the format.
         value.update(shape="disk", radius=0.5)
@@ -145,7 +152,7 @@ def _add_area(place, light, color, energy):
         place.writer.extend(place.node, "RELIEF_area_light", value)
 
 
-def _add_sun_disk(place, angle, color, energy):
+def _add_sun_disk(place, angle, color, energy, own):
     """A disk so far away that it is seen under the sun's angle from everywhere."""
     distance = _SUN_DISTANCE * place.scene_size
     half = min(angle, math.pi * 0.99) / 2
@@ -156,6 +163,7 @@ def _add_sun_disk(place, angle, color, energy):
         "radiance": energy / compat.sun_divisor(half),
         "color": list(color),
         "visibleToCamera": False,
+        **own,
     }
     _add_child(place, {"translation": [0.0, 0.0, distance]}, "RELIEF_area_light", value)
 

@@ -11,7 +11,7 @@ from .graph import GraphWriter, NotUnderstood, bump_of_displacement
 from .light import set_emission
 from .mesh import Wanted
 from .surface import TRANSPARENT, ClosureWriter, Inside, Surface, plain_surface
-from .texture import Input, Mapping, Texture, TextureReader
+from .texture import Input, TextureReader, ies_uri, image_options
 
 #: The format has two sets of texture coordinates a vertex.
 _MOST_COORDINATES = 2
@@ -97,7 +97,8 @@ class MaterialJob:
         self.coverage = None
         self._graph = GraphWriter(
             self._coordinate_set,
-            self._graph_texture,
+            lambda node: image_options(node, writer, images, self._warn),
+            lambda node: ies_uri(node, writer),
             warn=self._warn,
             material_index=material.pass_index if material else 0,
             view_layer=view_layer,
@@ -240,40 +241,6 @@ class MaterialJob:
                 return None
             self._coordinates.append(source)
         return self._coordinates.index(source)
-
-    def _graph_texture(self, node):
-        """Options that say which image an Image or Environment Texture node reads, and what of it; None without a file."""
-        image = node.image
-        is_data = image.colorspace_settings.is_data
-        texture = Texture(node, None, Mapping())
-
-        def info(uri):
-            return {"index": self._writer.add_texture(uri, texture.wrap, texture.nearest)}
-
-        options = {"colorSpace": "linear" if is_data else "srgb"}
-        if node.bl_idname == "ShaderNodeTexEnvironment":
-            uri = self._images.color_uri(image, node.image_user, self._warn)
-            return {**options, "texture": info(uri)} if uri else None
-        is_multiplied = image.is_float and image.alpha_mode == "PREMUL"
-        if image.source == "TILED":
-            uris = self._images.tile_uris(image, not is_data, self._warn)
-            tiles = [{"tile": number, "texture": info(uri), **options} for number, uri in sorted(uris.items())]
-            if not tiles:
-                return None
-            # One tile is an image like any other, as in Cycles.
-            options = {"tiles": tiles} if len(tiles) > 1 else {**options, "texture": tiles[0]["texture"]}
-        else:
-            uri, is_multiplied = self._images.stored_uri(image, node.image_user, not is_data, self._warn)
-            if uri is None:
-                return None
-            options["texture"] = info(uri)
-        if image.alpha_mode == "NONE":
-            options["alpha"] = "opaque"
-        elif not is_data and image.alpha_mode != "CHANNEL_PACKED" and image.channels in {2, 4}:
-            options["alpha"] = "associated" if is_multiplied else "straight"
-            if nodes.is_used(node.outputs["Alpha"]):
-                options["unassociate"] = True
-        return options
 
     def _color_info(self, texture):
         node = texture.node

@@ -363,17 +363,22 @@ class SceneExporter:
         original = thing.object
         light = original.evaluated_get(self._depsgraph).data
         matrices = thing.world_matrices()
-        if light.type == "POINT":  # has no direction that a scale of 0 could take from it
+        # Without nodes a point has no direction that a scale of 0 could take from it.
+        if light.type == "POINT" and not light.use_nodes:
             matrices[:, :3, :3] = np.eye(3)
-        translation, rotation, scale, _ = decompose(self._usable(thing, matrices)[0])
-        for t, r, s in zip(translation, rotation, scale):
+        usable, numbers = self._usable(thing, matrices)
+        translation, rotation, scale, _ = decompose(usable)
+        randoms = instance_values.randoms(original, thing.places, len(matrices))[numbers]
+        for t, r, s, random in zip(translation, rotation, scale, randoms):
             node = {"name": thing.name, "translation": t.tolist(), "rotation": r.tolist()}
             place = Place(
                 node=node,
                 scale=tuple(np.abs(s).tolist()),
                 visible_to_camera=original.visible_camera,
                 scene_size=scene_size,
+                random=float(random),
                 writer=self.writer,
+                images=self._images,
                 warn=self._warner("light", thing.name),
             )
             export_light(light, place)

@@ -6,8 +6,10 @@ multiplication by a constant (Math, Vector Math, Mix); for heights addition of o
 """
 
 import math
+import os
 from dataclasses import dataclass, replace
 
+import bpy
 import numpy as np
 
 from . import nodes
@@ -249,3 +251,53 @@ class TextureReader:
                 return Mapping(source, moved, -turn[2], (1 / scale[0], 1 / scale[1]))
         self.warn(f'node "{node.name}": a mapping that shears ({node.vector_type.lower()})', "the uv map was used")
         return Mapping(source)
+
+def image_options(node, writer, images, warn):
+    """Options of image-texture and environment-texture: which image an Image or Environment Texture node reads, and what of it.
+
+    @param  writer  GltfWriter
+    @param  images  ImageExporter
+    @return         None without a file
+    """
+    image = node.image
+    is_data = image.colorspace_settings.is_data
+    texture = Texture(node, None, Mapping())
+
+    def info(uri):
+        return {"index": writer.add_texture(uri, texture.wrap, texture.nearest)}
+
+    options = {"colorSpace": "linear" if is_data else "srgb"}
+    if node.bl_idname == "ShaderNodeTexEnvironment":
+        uri = images.color_uri(image, node.image_user, warn)
+        return {**options, "texture": info(uri)} if uri else None
+    is_multiplied = image.is_float and image.alpha_mode == "PREMUL"
+    if image.source == "TILED":
+        uris = images.tile_uris(image, not is_data, warn)
+        tiles = [{"tile": number, "texture": info(uri), **options} for number, uri in sorted(uris.items())]
+        if not tiles:
+            return None
+        # One tile is an image like any other, as in Cycles.
+        options = {"tiles": tiles} if len(tiles) > 1 else {**options, "texture": tiles[0]["texture"]}
+    else:
+        uri, is_multiplied = images.stored_uri(image, node.image_user, not is_data, warn)
+        if uri is None:
+            return None
+        options["texture"] = info(uri)
+    if image.alpha_mode == "NONE":
+        options["alpha"] = "opaque"
+    elif not is_data and image.alpha_mode != "CHANNEL_PACKED" and image.channels in {2, 4}:
+        options["alpha"] = "associated" if is_multiplied else "straight"
+        if nodes.is_used(node.outputs["Alpha"]):
+            options["unassociate"] = True
+    return options
+
+
+def ies_uri(node, writer):
+    """URI of the file or text that an IES Texture node reads; None: there is none.
+
+    @param  writer  GltfWriter
+    """
+    if node.mode == "INTERNAL":
+        return writer.write_file(".ies", node.ies.as_string().encode()) if node.ies is not None else None
+    path = bpy.path.abspath(node.filepath, library=node.id_data.library)
+    return writer.file_uri(path) if os.path.isfile(path) else None

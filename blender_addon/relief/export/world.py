@@ -6,8 +6,9 @@ import math
 from .. import compat
 from . import nodes
 from .axes import environment_rotation
+from .emission import EmissionTree
 from .graph import GraphWriter, NotUnderstood
-from .texture import MISSING
+from .texture import MISSING, ies_uri
 
 
 def export_world(world, visible_to_camera, writer, images, report):
@@ -56,139 +57,50 @@ def _environment(world, writer, images, warn):
     return environment
 
 
-_BLACK = [0.0, 0.0, 0.0]
-
-
-class _Surroundings:
-    """What a world's tree of shaders comes to: a sum of backgrounds, each times its weight.
+class _Surroundings(EmissionTree):
+    """What a world's tree of shaders comes to.
 
     @param  is_camera  whether a camera ray looks: what Light Path's Is Camera Ray says
     asks_for_camera    whether something depended on that
     """
 
     def __init__(self, writer, images, warn, is_camera):
-        self._writer = writer
+        super().__init__(WorldGraph(writer, images, warn), warn)
         self._images = images
-        self._warn = warn
         self._is_camera = is_camera
         self.asks_for_camera = False
-        self._graph = WorldGraph(writer, images, warn)
-        self._terms = []  # (Source of a Background, its weight)
 
     def read(self, source):
-        self._collect(source, 1.0, ())
-        if len(self._terms) == 1 and self._terms[0][1] == 1.0:
-            plain = self._plain(self._terms[0][0])
+        self.collect(source)
+        if len(self.terms) == 1 and self.terms[0][1] == 1.0:
+            plain = self._plain(self.terms[0][0])
             if plain is not None:
                 return plain
-        total = _BLACK
-        for term, weight in self._terms:
-            radiance = self._radiance(term)
-            total = self._sum(total, self._times(radiance, weight))
+        total = self.total()
         if isinstance(total, list):
             return {"color": [max(0.0, c) for c in total]}
-        if any(node["type"] == "light-path" for node in self._graph.nodes):
+        if any(node["type"] == "light-path" for node in self.graph.nodes):
             self.asks_for_camera = True
-        return {"graph": {"nodes": self._graph.nodes, "outputs": {"color": total}}}
+        return {"graph": {"nodes": self.graph.nodes, "outputs": {"color": total}}}
 
-    def _collect(self, source, weight, above):
-        """Adds the backgrounds below a shader."""
-        if source is None or source.is_value or weight == 0.0:
-            return
-        node, inputs = source.node, source.node.inputs
-        if source.key in above:
-            self._warn(f'node "{node.name}" ({node.bl_label}), which is linked in a circle', "black was used")
-            return
-        above = (*above, source.key)
-
-        def below(socket, weight):
-            self._collect(nodes.linked(socket, source.groups), weight, above)
-
-        if node.bl_idname == "ShaderNodeAddShader":
-            below(inputs[0], weight)
-            below(inputs[1], weight)
-        elif node.bl_idname == "ShaderNodeMixShader":
-            factor = self._factor(inputs[0], source.groups)
-            below(inputs[1], self._product(weight, self._inverse(factor)))
-            below(inputs[2], self._product(weight, factor))
-        elif node.bl_idname in {"ShaderNodeBackground", "ShaderNodeEmission"}:
-            self._terms.append((source, weight))
-        else:
-            self._warn(f'node "{node.name}" ({node.bl_label}) as surface', "black was used")
-
-    def _factor(self, socket, groups):
-        """A Mix Shader's factor, from 0 to 1."""
+    def factor(self, socket, groups):
         source = nodes.linked(socket, groups)
         if source is not None and source.node.bl_idname == "ShaderNodeLightPath":
             if source.socket.identifier == "Is Camera Ray":
                 self.asks_for_camera = True
                 return 1.0 if self._is_camera else 0.0
-        value = self._value(socket, groups)
-        if isinstance(value, dict):
-            return self._graph.op("clamp", {"value": value}, "value")
-        return min(max(value, 0.0), 1.0)
-
-    def _value(self, socket, groups):
-        """An input as graphs have it; what they do not know is warned about, and the socket's own value taken."""
-        try:
-            return self._graph.value(socket, groups)
-        except NotUnderstood as error:
-            value = nodes.own_value(socket)
-            if isinstance(value, tuple):
-                value = [float(c) for c in value[:3]]
-                self._warn(str(error), f"the value {tuple(round(c, 4) for c in value)} was used")
-            else:
-                self._warn(str(error), f"the value {round(value, 4)} was used")
-            return value
-
-    def _radiance(self, source):
-        inputs = source.node.inputs
-        strength = self._value(inputs["Strength"], source.groups)
-        if strength == 0.0:
-            return _BLACK
-        return self._times(self._value(inputs["Color"], source.groups), strength)
-
-    def _product(self, a, b):
-        """Of two numbers."""
-        if not isinstance(a, dict) and not isinstance(b, dict):
-            return a * b
-        if a == 1.0 or b == 1.0:
-            return b if a == 1.0 else a
-        if a == 0.0 or b == 0.0:
-            return 0.0
-        return self._graph.op("math", {"a": a, "b": b}, "value", operation="multiply")
-
-    def _inverse(self, factor):
-        if not isinstance(factor, dict):
-            return 1.0 - factor
-        return self._graph.op("math", {"a": 1.0, "b": factor}, "value", operation="subtract")
-
-    def _times(self, color, weight):
-        if weight == 0.0 or color == _BLACK:
-            return _BLACK
-        if weight == 1.0:
-            return color
-        if isinstance(color, list) and not isinstance(weight, dict):
-            return [c * weight for c in color]
-        return self._graph.op("vector-math", {"a": color, "scale": weight}, "vector", operation="scale")
-
-    def _sum(self, a, b):
-        if a == _BLACK or b == _BLACK:
-            return b if a == _BLACK else a
-        if isinstance(a, list) and isinstance(b, list):
-            return [x + y for x, y in zip(a, b)]
-        return self._graph.op("vector-math", {"a": a, "b": b}, "vector", operation="add")
+        return super().factor(socket, groups)
 
     def _plain(self, source):
         """A single background that needs no graph; None: it does."""
         inputs = source.node.inputs
-        strength = self._graph.constant(inputs["Strength"], source.groups)
+        strength = self.graph.constant(inputs["Strength"], source.groups)
         if strength is None:
             return None
         strength = max(0.0, strength)
         if strength == 0:
             return {"color": [0.0, 0.0, 0.0]}
-        value = self._graph.constant(inputs["Color"], source.groups)
+        value = self.graph.constant(inputs["Color"], source.groups)
         if value is not None:
             return {"color": [max(0.0, c) for c in value], "strength": strength}
         texture = nodes.follow(inputs["Color"], source.groups)
@@ -201,7 +113,7 @@ class _Surroundings:
             return None
         if texture.node.image is None:
             return {"color": list(MISSING), "strength": strength}
-        uri = self._images.color_uri(texture.node.image, texture.node.image_user, self._warn)
+        uri = self._images.color_uri(texture.node.image, texture.node.image_user, self.warn)
         if uri is None:
             return {"color": list(MISSING), "strength": strength}
         return {"uri": uri, "strength": strength, "rotation": environment_rotation(turn)}
@@ -211,7 +123,7 @@ class WorldGraph(GraphWriter):
     """Value graph of a world, in which textures look into a direction."""
 
     def __init__(self, writer, images, warn):
-        super().__init__(lambda name: None, lambda node: None, warn)
+        super().__init__(lambda name: None, lambda node: None, lambda node: ies_uri(node, writer), warn)
         self._writer = writer
         self._images = images
 

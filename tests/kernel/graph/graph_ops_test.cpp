@@ -270,6 +270,7 @@ std::vector<std::vector<std::uint16_t>> immediates_of(Op op)
   if (op >= Op::musgrave_1d && op <= Op::musgrave_4d) return {{0}, {1}, {2}, {3}, {4}};
   if (op == Op::table) return {{0, 0, 4, 1, 1}, {0, 0, 4, 0, 0}};
   if (op == Op::grid) return {{0, 0, 5, 7}, {0, 0, 1, 1}};
+  if (op == Op::ies) return {{0, 0, 3, 5}};
   if (op == Op::brick) return {{0, 2}, {2, 0}, {1, 1}, {2, 3}, {1000, 1000}};
   if (op >= Op::voronoi_1d && op <= Op::voronoi_4d) {
     for (std::uint16_t feature = 0; feature < 5; ++feature) {

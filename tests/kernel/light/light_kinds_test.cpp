@@ -501,6 +501,27 @@ TEST(PointLight, RaysMeetABallOnce)
   EXPECT_LT(ball_light_distance(light, {0, 0, 0.5f}, {1, 0, 0}), 0.0f);
 }
 
+TEST(DiskLight, SpreadKeepsThePower)
+{
+  for (const float half : {0.05f, 0.3f, 1.0f, 1.5f}) {
+    Light light;
+    light.kind = LightKind::kDisk;
+    light.emission = {1, 1, 1};
+    light.spread_tan = std::tan(half);
+    light.spread_scale = 1.0f / (light.spread_tan - half);
+    // ∫ L cos θ over the hemisphere, by the midpoint rule over the angle.
+    constexpr int kSteps = 100000;
+    double flux = 0;
+    for (int i = 0; i < kSteps; ++i) {
+      const double angle = (i + 0.5) * 1.5707963267948966 / kSteps;
+      const Vec3f wi{static_cast<float>(std::sin(angle)), 0, static_cast<float>(std::cos(angle))};
+      flux += static_cast<double>(light_emitted(light, wi).x) * std::cos(angle) * std::sin(angle);
+    }
+    EXPECT_NEAR(flux * 2 * 1.5707963267948966 / kSteps, 1, 2e-3) << half;
+    EXPECT_EQ(light_emitted(light, {std::sin(half + 0.01f), 0, std::cos(half + 0.01f)}).x, 0);
+  }
+}
+
 TEST(SunLight, IrradianceIsTheSameEverywhere)
 {
   Light light;
