@@ -109,6 +109,17 @@ def is_green_down(normal_map):
     return getattr(normal_map, "convention", "OPENGL") == "DIRECTX"
 
 
+def sky_kind(sky):
+    """Which sky a Sky Texture is, as RELIEF_graph calls it; None: one that is not known."""
+    return {
+        "NISHITA": "nishita",
+        "SINGLE_SCATTERING": "single-scattering",
+        "MULTIPLE_SCATTERING": "multiple-scattering",
+        "PREETHAM": "preetham",
+        "HOSEK_WILKIE": "hosek-wilkie",
+    }.get(sky.sky_type)
+
+
 def principled_socket(node, name):
     """Input of a Principled BSDF by its name in 3.4; None if this version has no such input."""
     return node.inputs.get(_PRINCIPLED_NAMES_4_0.get(name, name) if IS_4_0 else name)
