@@ -11,6 +11,7 @@
 #include <optional>
 #include <span>
 #include <stdexcept>
+#include <tuple>
 #include <vector>
 
 #include "kernel/graph/graph_op.h"
@@ -37,7 +38,11 @@ class GraphBuilder {
  public:
   GraphScalar constant(float value);
   /// @param index  of quantities that are many, see GraphInput
-  GraphScalar quantity(GraphQuantity quantity, std::uint16_t index = 0, GraphShift shift = GraphShift::kNone);
+  /// @param width  footprints that the shift is long
+  GraphScalar quantity(GraphQuantity quantity,
+                       std::uint16_t index = 0,
+                       GraphShift shift = GraphShift::kNone,
+                       float width = 1);
 
   /// @param inputs      as many as the operation has
   /// @param immediates  likewise
@@ -70,8 +75,9 @@ class GraphBuilder {
   /// @param numbers  of results that each has
   void keep_results(std::vector<SurfaceClosureSpec>& closures, int numbers);
 
-  /// A number as it is a footprint away: everything that leads to it is asked for there.
-  GraphScalar shifted(GraphScalar a, GraphShift shift);
+  /// A number as it is some footprints away: everything that leads to it is asked for there.
+  /// @param width  footprints, above 0
+  GraphScalar shifted(GraphScalar a, GraphShift shift, float width);
 
   /// @error GraphTooLarge
   GraphProgram compile() const;
@@ -86,6 +92,7 @@ class GraphBuilder {
     GraphQuantity quantity{};
     GraphShift shift{};
     std::uint16_t index = 0;  ///< of the quantity
+    float width = 1;          ///< of the shift
   };
   struct Operation {
     GraphOp op;
@@ -113,7 +120,7 @@ class GraphBuilder {
   std::map<std::vector<float>, std::uint32_t> table_places_;
   std::array<GraphVector, kNumGraphOutputs> outputs_;
   std::vector<GraphScalar> results_;
-  std::map<std::pair<std::int32_t, GraphShift>, GraphScalar> shifted_;
+  std::map<std::tuple<std::int32_t, GraphShift, float>, GraphScalar> shifted_;
 };
 
 }  // namespace relief

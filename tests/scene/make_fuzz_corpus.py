@@ -171,7 +171,8 @@ def closures():
     b = Builder()
     nodes = [{"type": "texture-coordinate"},
              {"type": "noise-texture", "inputs": {"vector": {"node": 0, "output": "uv"}}},
-             {"type": "bump", "inputs": {"height": {"node": 1, "output": "factor"}, "distance": .1}, "invert": True}]
+             {"type": "bump", "inputs": {"height": {"node": 1, "output": "factor"}, "distance": .1}, "invert": True,
+              "filterWidth": .1}]
     factor, normal = {"node": 1, "output": "factor"}, {"node": 2}
     first = {"closures": [
         {"type": "diffuse", "weight": factor, "roughness": .5, "normal": normal, "maths": "4.3"},
