@@ -33,12 +33,12 @@ _PASS_NAMES_5_0 = {
     "AO": "Ambient Occlusion",
 }
 
+#: The version whose closures Cycles has, as RELIEF_surface calls it.
+MATHS = "5.2" if IS_5_0 else "4.3" if IS_4_0 else "3.4"
+
 #: What faces of a slot without material look like, as a closure; None: diffuse grey. Since 5.0 it is the plastic of a new
 #: material.
-DEFAULT_CLOSURE = {"type": "principled", "maths": "4.3", "roughness": 0.5} if IS_5_0 else None
-
-#: The version whose closures Cycles has, as RELIEF_surface calls it.
-MATHS = "4.3" if IS_4_0 else "3.4"
+DEFAULT_CLOSURE = {"type": "principled", "maths": MATHS, "roughness": 0.5} if IS_5_0 else None
 
 #: Inputs of the principled closure by Blender's names: what there is besides anisotropy, emission and alpha.
 PRINCIPLED_INPUTS = (
@@ -84,9 +84,6 @@ PRINCIPLED_INPUTS = (
         "Clearcoat Normal": "clearcoatNormal",
     }
 )
-
-#: Metal of the Principled BSDF has thin films, too; since 5.0.
-METAL_HAS_FILM = IS_5_0
 
 #: Before 4.0 the octaves of a Noise Texture never grew.
 CLAMPS_NOISE_ROUGHNESS = not IS_4_0

@@ -183,7 +183,8 @@ def closures():
     second = {"closures": [
         {"type": "principled", "metallic": -1, "ior": 0, "distribution": "multiscatter-ggx"},
         {"type": "principled", "maths": "4.3", "coatWeight": 1, "coatIor": 0, "thinFilmThickness": 500},
-        {"type": "metallic", "fresnel": "physical"}, {"type": "glass", "ior": 1}, {"type": "refraction"},
+        {"type": "principled", "maths": "5.2", "metallic": .5, "thinFilmThickness": 500, "coatRoughness": .5},
+        {"type": "metallic", "fresnel": "physical", "maths": "5.2", "thinFilmThickness": 1e30}, {"type": "glass", "ior": 1}, {"type": "refraction"},
         {"type": "velvet"}, {"type": "sheen"}, {"type": "translucent"}]}
     height = {"nodes": nodes[:2], "outputs": {"height": factor}, "resolution": 4}
     b.json["materials"] = [
