@@ -162,19 +162,42 @@ float difference(const EnvironmentMap& coarse, const EnvironmentMap& fine)
 
 float luminance_of(const float* texel) { return 0.2126f * texel[0] + 0.7152f * texel[1] + 0.0722f * texel[2]; }
 
-/// Mean radiance over a texel.
-Vec3f mean_within(const EnvironmentGraph& graph, const TextureView* textures, const EnvironmentMap& map, int x, int y)
+/// What of a texel a sun is looked for in, besides its radius.
+float sun_margin(const EnvironmentMap& map) { return 2 * kPiAngle / static_cast<float>(map.height); }
+
+/// Samples on each axis that a texel's mean takes: a dozen along the radius of a sun, and 16 where there is none.
+int samples_within(const EnvironmentGraph& graph, const EnvironmentMap& map, int x, int y)
 {
-  constexpr int kSide = 16;  // samples on each axis
+  constexpr int kLeast = 16, kMost = 512;
+  const float texel = kPiAngle / static_cast<float>(map.height);
+  const Vec3f d = direction_at(map, static_cast<float>(x) + 0.5f, static_cast<float>(y) + 0.5f);
+  int side = kLeast;
+  for (const GraphSun& sun : graph.suns) {
+    if (!(length(d - sun.towards) < sun.radius + sun_margin(map))) continue;
+    side = std::max(side, static_cast<int>(std::fmin(12 * texel / sun.radius, static_cast<float>(kMost))));
+  }
+  return (side + 7) / 8 * 8;
+}
+
+/// Mean radiance over a texel.
+/// @param side  samples on each axis, a multiple of 8
+Vec3f mean_within(const EnvironmentGraph& graph,
+                  const TextureView* textures,
+                  const EnvironmentMap& map,
+                  int x,
+                  int y,
+                  int side)
+{
+  const auto samples = static_cast<float>(side);
   Vec3f sum;
   float weights = 0;
-  for (int row = 0; row < kSide; ++row) {
-    const float v = static_cast<float>(y) + (static_cast<float>(row) + 0.5f) / kSide;
+  for (int row = 0; row < side; ++row) {
+    const float v = static_cast<float>(y) + (static_cast<float>(row) + 0.5f) / samples;
     const float weight = std::sin(v * kPiAngle / static_cast<float>(map.height));
-    for (int column = 0; column < kSide; column += 8) {
+    for (int column = 0; column < side; column += 8) {
       Vec3f directions[8], radiance[8];
       for (int k = 0; k < 8; ++k) {
-        directions[k] = direction_at(map, static_cast<float>(x) + (static_cast<float>(column + k) + 0.5f) / kSide, v);
+        directions[k] = direction_at(map, static_cast<float>(x) + (static_cast<float>(column + k) + 0.5f) / samples, v);
       }
       evaluate(graph, textures, directions, radiance);
       for (const Vec3f& r : radiance) sum += r * weight;
@@ -205,7 +228,7 @@ std::vector<std::size_t> coarse_texels(const EnvironmentGraph& graph, const Envi
     weight += weights[y] * map.width;
   }
   const float enough = kBright * static_cast<float>(sum / weight);
-  const float margin = 2 * kPiAngle / static_cast<float>(map.height);
+  const float margin = sun_margin(map);
   std::vector<std::vector<std::size_t>> found(height);
   for_each_in_parallel(height, [&](std::size_t y) {
     for (std::size_t x = 0; x < width; ++x) {
@@ -234,7 +257,7 @@ void refine(const EnvironmentGraph& graph, std::span<const TextureView> textures
   const std::vector<std::size_t> texels = coarse_texels(graph, map);
   for_each_in_parallel(texels.size(), [&](std::size_t i) {
     const int x = static_cast<int>(texels[i]) % map.width, y = static_cast<int>(texels[i]) / map.width;
-    const Vec3f mean = mean_within(graph, textures.data(), map, x, y);
+    const Vec3f mean = mean_within(graph, textures.data(), map, x, y, samples_within(graph, map, x, y));
     float* texel = &map.rgb[texels[i] * 3];
     texel[0] = mean.x, texel[1] = mean.y, texel[2] = mean.z;
   });

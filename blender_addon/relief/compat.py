@@ -33,12 +33,12 @@ _PASS_NAMES_5_0 = {
     "AO": "Ambient Occlusion",
 }
 
+#: The version whose closures Cycles has, as RELIEF_surface calls it.
+MATHS = "5.2" if IS_5_0 else "4.3" if IS_4_0 else "3.4"
+
 #: What faces of a slot without material look like, as a closure; None: diffuse grey. Since 5.0 it is the plastic of a new
 #: material.
-DEFAULT_CLOSURE = {"type": "principled", "maths": "4.3", "roughness": 0.5} if IS_5_0 else None
-
-#: The version whose closures Cycles has, as RELIEF_surface calls it.
-MATHS = "4.3" if IS_4_0 else "3.4"
+DEFAULT_CLOSURE = {"type": "principled", "maths": MATHS, "roughness": 0.5} if IS_5_0 else None
 
 #: Inputs of the principled closure by Blender's names: what there is besides anisotropy, emission and alpha.
 PRINCIPLED_INPUTS = (
@@ -85,14 +85,17 @@ PRINCIPLED_INPUTS = (
     }
 )
 
-#: Metal of the Principled BSDF has thin films, too; since 5.0.
-METAL_HAS_FILM = IS_5_0
-
 #: Before 4.0 the octaves of a Noise Texture never grew.
 CLAMPS_NOISE_ROUGHNESS = not IS_4_0
 
 #: Before 4 Vector Transform turned normals as if they were directions, and Normal Map mixed by its Strength in the world.
 NORMALS_KEEP_UPRIGHT = TANGENT_STRENGTH = IS_4_0
+
+#: Since 5.0 tangent normal maps stand over a normal of unit length; before, over what interpolation leaves of it.
+NORMAL_MAPS_OVER_UNIT_NORMALS = IS_5_0
+
+#: Footprints away that the bump of a displacement asks for heights, and a Bump node that has no Filter Width.
+BUMP_WIDTH = 0.1 if IS_5_0 else 1.0
 
 #: Before 4 the Hue/Saturation node cut whole turns off towards 0, so that hues below 0 stayed below.
 HUE_GOES_ROUND = IS_4_0
@@ -107,6 +110,23 @@ TABLE_ENTRIES = 257 if IS_4_0 else 256
 def is_green_down(normal_map):
     """Whether the green of a Normal Map node counts downwards, as DirectX has it; it came with 5.1."""
     return getattr(normal_map, "convention", "OPENGL") == "DIRECTX"
+
+
+def bump_width(bump):
+    """How many footprints away a Bump node asks for heights; it became an input after 4.3."""
+    socket = bump.inputs.get("Filter Width")
+    return BUMP_WIDTH if socket is None else min(max(socket.default_value, 1e-3), 1e3)
+
+
+def sky_kind(sky):
+    """Which sky a Sky Texture is, as RELIEF_graph calls it; None: one that is not known."""
+    return {
+        "NISHITA": "nishita",
+        "SINGLE_SCATTERING": "single-scattering",
+        "MULTIPLE_SCATTERING": "multiple-scattering",
+        "PREETHAM": "preetham",
+        "HOSEK_WILKIE": "hosek-wilkie",
+    }.get(sky.sky_type)
 
 
 def principled_socket(node, name):

@@ -10,6 +10,7 @@
 #include "kernel/assert.h"
 #include "kernel/bsdf/dielectric.h"
 #include "kernel/bsdf/sheen.h"
+#include "kernel/bsdf/thin_film.h"
 #include "kernel/feature_mask.h"
 
 namespace relief {
@@ -41,7 +42,7 @@ struct SheenAlbedo {
 /// Nodes along each axis of BsdfTables::reflected_share.
 inline constexpr int kShareNodes = 16;
 
-/// About 62 kB; a render needs one. Glass, sheen and what closures ask for are filled only if asked for.
+/// About 74 kB; a render needs one. Glass, sheen and what closures ask for are filled only if asked for.
 struct BsdfTables {
   GgxEntry ggx[kGgxRoughnesses][kGgxCosines];
   /// Means over the cosine-weighted hemisphere. Losses grow with alpha² and are stored divided by it, so that rows can
@@ -53,6 +54,7 @@ struct BsdfTables {
   /// How far the reflectance of visible microfacets has risen from F0 to 1 along a dielectric's curve, on the mean, those that
   /// lose the ray not at all: by roughness, fourth root of F0, cosine; axes from 0 to 1, linear.
   float reflected_share[kShareNodes][kShareNodes][kShareNodes];
+  ThinFilmTable thin_film;
 };
 
 /// Position between two nodes of a table's axis.
@@ -422,7 +424,10 @@ RELIEF_KERNEL void bsdf_tables_make(BsdfTables& tables, unsigned features = kFea
   ggx_tables_make(tables);
   if ((features & kFeatureTransmission) != 0) glass_tables_make(tables);
   if ((features & kFeatureLayers) != 0) sheen_tables_make(tables);
-  if ((features & kFeatureMixture) != 0) reflected_share_make(tables);
+  if ((features & kFeatureMixture) != 0) {
+    reflected_share_make(tables);
+    thin_film_table_make(tables.thin_film);
+  }
 }
 
 }  // namespace relief

@@ -85,7 +85,7 @@ RELIEF_KERNEL Vec3f fresnel_f82_mean(const FresnelF82& f)
   return f.F0 * (20.0f / 21.0f) + splat3(1.0f / 21.0f) - f.B * (1.0f / 126.0f);
 }
 
-/// Metal by its complex index eta + ik, for absorption that is strong against the index; exact is not what Cycles does.
+/// Metal by its complex index eta + ik, for absorption that is strong against the index, as Cycles has it up to 4.x.
 /// @source  Pharr, Jakob and Humphreys, "Physically Based Rendering", 2nd edition, Eq. 8.3: of polarisations apart, with
 ///          cos_t taken as 1
 RELIEF_KERNEL Vec3f fresnel_conductor(Vec3f eta, Vec3f k, float cos_i)
@@ -99,13 +99,17 @@ RELIEF_KERNEL Vec3f fresnel_conductor(Vec3f eta, Vec3f k, float cos_i)
   return (parallel + perpendicular) * 0.5f;
 }
 
-/// The F82 curve that meets the conductor's from above and at 82°: for its mean.
-RELIEF_KERNEL FresnelF82 fresnel_f82_of_conductor(Vec3f eta, Vec3f k)
+/// The F82 curve through a reflectance from above, and one at 82°.
+RELIEF_KERNEL FresnelF82 fresnel_f82_through(Vec3f F0, Vec3f F82)
 {
-  const Vec3f F0 = fresnel_conductor(eta, k, 1.0f);
-  const Vec3f F82 = fresnel_conductor(eta, k, 1.0f / 7.0f);
   constexpr float kFifth = 0.46266436f, kInvPeak = 17.651384f;
   return {F0, (F0 * (1.0f - kFifth) + splat3(kFifth) - F82) * kInvPeak};
+}
+
+/// That which meets the conductor's: for its mean.
+RELIEF_KERNEL FresnelF82 fresnel_f82_of_conductor(Vec3f eta, Vec3f k)
+{
+  return fresnel_f82_through(fresnel_conductor(eta, k, 1.0f), fresnel_conductor(eta, k, 1.0f / 7.0f));
 }
 
 /// Both polarisations of a dielectric interface.

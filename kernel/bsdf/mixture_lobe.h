@@ -14,6 +14,7 @@
 #include "kernel/bsdf/principled_diffuse.h"
 #include "kernel/bsdf/principled_sheen.h"
 #include "kernel/bsdf/sheen_microfibre.h"
+#include "kernel/bsdf/thin_film.h"
 #include "kernel/bsdf/toon.h"
 #include "kernel/bsdf/translucent.h"
 #include "kernel/bsdf/velvet.h"
@@ -46,7 +47,11 @@ enum class MixtureFresnel : std::uint8_t {
   kDielectric,
   kF82,
   kConductor,
+  kConductorExact,
   kThinFilm,
+  kFilmOnDielectric,
+  kFilmOnConductor,
+  kFilmOnF82,
 };
 
 /// A microfacet's reflectance.
@@ -56,6 +61,7 @@ struct MicrofacetFresnel {
   Vec3f a{};          ///< F0; of conductors their index
   Vec3f b{};          ///< FresnelF82::B; of conductors the imaginary part
   float film_ior = 1.33f, film_nm = 0;
+  const ThinFilmTable* film_table = nullptr;  ///< of those kinds that have a film, but for kThinFilm
 };
 
 /// Solid glass: what microfacets reflect and refract, chosen between by their reflectance.
@@ -95,6 +101,7 @@ struct MixtureLobe {
   MixtureLobeKind kind = MixtureLobeKind::kLambert;
   bool is_delta = false;
   bool is_bent = false;   ///< its normal is not the surface's
+  bool is_5 = false;      ///< of 5.2's maths: what its normal sees and the surface does not fades as it does there
   float probability = 0;  ///< not normalised
   float roughness = kInfinity;  ///< perceptual; infinite: never sharp
   Vec3f weight{};         ///< factor on f
@@ -124,6 +131,15 @@ RELIEF_KERNEL Vec3f mixture_fresnel(const MicrofacetFresnel& f, float cos_d)
       return fresnel_f82({f.a, f.b}, cos_d);
     case MixtureFresnel::kConductor:
       return fresnel_conductor(f.a, f.b, cos_d);
+    case MixtureFresnel::kConductorExact:
+      return fresnel_conductor_exact(f.a, f.b, cos_d);
+    case MixtureFresnel::kFilmOnDielectric:
+      return fresnel_thin_film_scaled(fresnel_film_on_dielectric({f.film_table, f.film_ior, f.film_nm}, cos_d, f.eta),
+                                      f.a, f.eta);
+    case MixtureFresnel::kFilmOnConductor:
+      return fresnel_film_on_conductor({f.film_table, f.film_ior, f.film_nm}, cos_d, f.a, f.b);
+    case MixtureFresnel::kFilmOnF82:
+      return fresnel_film_on_f82({f.film_table, f.film_ior, f.film_nm}, cos_d, {f.a, f.b});
     case MixtureFresnel::kThinFilm:
       return fresnel_thin_film_scaled(fresnel_thin_film(cos_d, f.eta, f.film_ior, f.film_nm), f.a, f.eta);
   }
@@ -139,6 +155,17 @@ RELIEF_KERNEL float bump_shadowing(Vec3f N, Vec3f wi)
   const float g = below != 0.0f ? side * dot(N, wi) / (side * below) : 0.0f;
   if (g >= 1.0f) return 1.0f;
   return g > 0.0f ? g + g * g * (1.0f - g) : 0.0f;
+}
+
+/// The same as if the bumps were microfacets, as wide as the normal leans: since 5.0.
+/// @source Conty Estevez, Lecocq, Stein 2019, "A Microfacet-Based Shadowing Function to Solve the Bump Terminator Problem"
+RELIEF_KERNEL float bump_shadowing_ggx(Vec3f N, Vec3f wi)
+{
+  const float cos_N = __builtin_fabsf(N.z), cos_i = __builtin_fabsf(dot(N, wi));
+  if (!(cos_i >= 1e-6f)) return cos_N < 1.0f ? 0.0f : 1.0f;
+  const auto tan_squared = [](float cosine) { return max(1.0f / sqr(cosine) - 1.0f, 0.0f); };
+  const float alpha_squared = min(0.125f * tan_squared(cos_N), 1.0f);
+  return 2.0f / (1.0f + __builtin_sqrtf(1.0f + alpha_squared * tan_squared(cos_i)));
 }
 
 /// Cycles carries radiance through an interface as it is, where physics divides it by the square of the index. So photons
@@ -206,12 +233,14 @@ RELIEF_KERNEL BsdfEval mixture_lobe_eval(const MixtureLobe& lobe, const BsdfTabl
       e.f = splat3(principled_sheen_eval({}, wo, wi, &e.pdf));
       break;
     case K::kVelvet:
+      is_diffuse = !lobe.is_5;
       e.f = splat3(velvet_eval(lobe.shape.velvet, wo, wi, &e.pdf));
       break;
     case K::kMicrofibre:
       e.f = splat3(sheen_microfibre_eval(lobe.shape.microfibre, wo, wi, &e.pdf));
       break;
     case K::kToon:
+      is_diffuse = !(lobe.is_5 && lobe.shape.toon.is_glossy);
       e.f = splat3(toon_eval(lobe.shape.toon, wo, wi, &e.pdf));
       break;
     case K::kGgx:
@@ -248,7 +277,7 @@ RELIEF_KERNEL BsdfEval mixture_lobe_eval(const MixtureLobe& lobe, const BsdfTabl
   if (is_microfacet) {
     e.f *= mixture_fresnel(lobe.fresnel, half_angle_cosine(wo, wi));
   } else if (is_diffuse && lobe.is_bent) {
-    e.f *= bump_shadowing(lobe.surface_N, wi);
+    e.f *= lobe.is_5 ? bump_shadowing_ggx(lobe.surface_N, wi) : bump_shadowing(lobe.surface_N, wi);
   }
   e.f *= __builtin_fabsf(wi.z);
   return e;

@@ -1,5 +1,5 @@
 // Closures of a material, with their inputs at a point, as the lobes of a mixture. One function a kind of closure; each says
-// what Cycles of Blender 3.4, or with `is_4` that of 4.3, makes of it.
+// what Cycles of Blender 3.4, with `is_4` that of 4.3, with `is_5` that of 5.2, makes of it.
 //
 // Subsurface scattering is diffuse reflection of the subsurface colour here.
 #pragma once
@@ -34,6 +34,7 @@ struct MixtureBuild {
   Vec3f transparency{};
   float holdout = 0;
   bool transmits = false;  ///< some lobe sends light through the surface
+  bool is_5 = false;       ///< see MixtureLobe: of the closure that is added
 };
 
 RELIEF_KERNEL float mean_component(Vec3f v) { return (v.x + v.y + v.z) * (1.0f / 3.0f); }
@@ -121,6 +122,7 @@ RELIEF_KERNEL MixtureLobe* mixture_add(MixtureBuild& b, Vec3f weight, const Fram
   lobe.probability = mean;
   lobe.frame = frame;
   lobe.wo = wo;
+  lobe.is_5 = b.is_5;
   lobe.is_bent = !(dot(frame.n, b.Ns) > 1.0f - 1e-6f);
   if (lobe.is_bent) lobe.surface_N = to_local(frame, b.Ns);
   return &lobe;
@@ -305,16 +307,44 @@ RELIEF_KERNEL void glass_add(MixtureBuild& b,
   b.transmits = true;
 }
 
-/// A dielectric's microfacets, under a film where there is one.
-RELIEF_KERNEL MicrofacetFresnel dielectric_fresnel(float eta, float film_nm, float film_ior)
+/// Thinner films are none.
+inline constexpr float kLeastFilmNanometres = 0.1f;
+
+/// A dielectric's microfacets.
+RELIEF_KERNEL MicrofacetFresnel dielectric_fresnel(float eta)
 {
   MicrofacetFresnel f;
-  f.kind = film_nm > 0.1f ? MixtureFresnel::kThinFilm : MixtureFresnel::kDielectric;
+  f.kind = MixtureFresnel::kDielectric;
   f.eta = eta;
   f.a = splat3(fresnel_F0(eta));
+  return f;
+}
+
+/// The same under a film, where there is one.
+RELIEF_KERNEL MicrofacetFresnel
+dielectric_fresnel(const MixtureBuild& b, const SurfaceClosureSpec& spec, float eta, float film_nm, float film_ior)
+{
+  MicrofacetFresnel f = dielectric_fresnel(eta);
+  if (!(film_nm > kLeastFilmNanometres)) return f;
+  f.kind = spec.is_5 ? MixtureFresnel::kFilmOnDielectric : MixtureFresnel::kThinFilm;
   f.film_nm = film_nm;
   f.film_ior = film_ior;
+  f.film_table = &b.tables->thin_film;
   return f;
+}
+
+/// Puts a film over a metal, where there is one; up to 4.x there is none.
+RELIEF_KERNEL void metal_add_film(const MixtureBuild& b,
+                                  const SurfaceClosureSpec& spec,
+                                  float film_nm,
+                                  float film_ior,
+                                  MicrofacetFresnel& f)
+{
+  if (!spec.is_5 || !(film_nm > kLeastFilmNanometres)) return;
+  f.kind = f.kind == MixtureFresnel::kF82 ? MixtureFresnel::kFilmOnF82 : MixtureFresnel::kFilmOnConductor;
+  f.film_nm = film_nm;
+  f.film_ior = max(film_ior, 1e-5f);
+  f.film_table = &b.tables->thin_film;
 }
 
 RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const GlassInputs& in)
@@ -324,7 +354,8 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
   const Vec3f color = max(in.color, Vec3f{});
   if (spec.is_4 || spec.distribution == ClosureDistribution::kMultiscatterGgx) {
     const float film_ior = b.front ? in.thin_film_ior : in.thin_film_ior / max(in.ior, 1e-5f);
-    glass_add(b, spec, weight, N, in.roughness, dielectric_fresnel(eta, in.thin_film_thickness, film_ior), color, color);
+    glass_add(b, spec, weight, N, in.roughness, dielectric_fresnel(b, spec, eta, in.thin_film_thickness, film_ior),
+              color, color);
     return;
   }
   // Up to 3.6 the surface's own normal decides how much is reflected, whatever its microfacets are.
@@ -345,20 +376,26 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
   lobe_set_microfacets(*lobe, spec, roughness, anisotropic_alpha_of_principled(roughness, saturated(in.anisotropy)));
   Vec3f F_mean;
   if (spec.is_other) {
-    lobe->fresnel = {MixtureFresnel::kConductor, 1.0f, max(in.ior, Vec3f{}), max(in.extinction, Vec3f{}), 1.0f, 0.0f};
-    F_mean = saturated(fresnel_f82_mean(fresnel_f82_of_conductor(lobe->fresnel.a, lobe->fresnel.b)));
+    const Vec3f n = max(in.ior, Vec3f{}), k = max(in.extinction, Vec3f{});
+    lobe->fresnel = {spec.is_5 ? MixtureFresnel::kConductorExact : MixtureFresnel::kConductor, 1.0f, n, k, 1.0f, 0.0f};
+    const FresnelF82 f = spec.is_5 ? fresnel_f82_through(mixture_fresnel(lobe->fresnel, 1.0f),
+                                                         mixture_fresnel(lobe->fresnel, 1.0f / 7.0f))
+                                   : fresnel_f82_of_conductor(n, k);
+    F_mean = saturated(fresnel_f82_mean(f));
   } else {
     const FresnelF82 f = fresnel_f82_make(saturated(in.base_color), saturated(in.edge_tint));
     lobe->fresnel = {MixtureFresnel::kF82, 1.0f, f.F0, f.B, 1.0f, 0.0f};
     F_mean = fresnel_f82_mean(f);
   }
+  metal_add_film(b, spec, in.thin_film_thickness, in.thin_film_ior, lobe->fresnel);
   lobe->probability *= mean_component(mixture_fresnel(lobe->fresnel, lobe->wo.z));
   lobe_give_back(b, spec, *lobe, F_mean);
 }
 
-RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec&, float weight, const VelvetInputs& in)
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const VelvetInputs& in)
 {
-  MixtureLobe* lobe = mixture_add(b, weight * in.color, frame_from_normal(closure_normal(b, in.normal)), true);
+  const Frame frame = frame_from_normal(closure_diffuse_normal(b, spec, in.normal));
+  MixtureLobe* lobe = mixture_add(b, weight * in.color, frame, true);
   if (lobe == nullptr) return;
   lobe->kind = MixtureLobeKind::kVelvet;
   lobe->shape.velvet = velvet_make(saturated(in.sigma));
@@ -438,7 +475,7 @@ RELIEF_KERNEL void principled3_glass_add(MixtureBuild& b,
   fresnel.a = saturated(lerp(in.specular_tint, Vec3f{1, 1, 1}, base_color));
   const bool gives_back = spec.distribution == ClosureDistribution::kMultiscatterGgx && in.roughness > 0.05f;
   if (gives_back) {
-    glass_add(b, spec, weight, N, in.roughness, dielectric_fresnel(eta, 0.0f, 1.0f), {1, 1, 1}, base_color);
+    glass_add(b, spec, weight, N, in.roughness, dielectric_fresnel(eta), {1, 1, 1}, base_color);
     return;
   }
   SurfaceClosureSpec own = spec;
@@ -502,7 +539,7 @@ RELIEF_KERNEL Vec3f layered_weight(Vec3f weight, Vec3f albedo)
 }
 
 /// Layers, of which each takes from those below: sheen, coat, metal, glass, reflection, diffuse base.
-/// @source  Cycles 4.3
+/// @source  Cycles 4.3 and 5.2
 RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float start, const Principled4Inputs& in)
 {
   const Vec3f N = closure_normal(b, in.normal), N_given = closure_normal_as_given(b, in.normal);
@@ -522,14 +559,20 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
   if (coat > kLeastClosureWeight) {
     MixtureLobe* lobe = mixture_add(b, weight * coat, frame_from_normal(coat_N));
     if (lobe != nullptr) {
+      // Since 5.0 what its facets reflect more than once is given back, and it takes from below what it reflects; before it took
+      // what a smooth one reflects.
       SurfaceClosureSpec own = spec;
-      own.distribution = ClosureDistribution::kGgx;
+      own.distribution = spec.is_5 ? ClosureDistribution::kMultiscatterGgx : ClosureDistribution::kGgx;
       const float coat_roughness = saturated(in.coat_roughness);
       lobe_set_microfacets(*lobe, own, coat_roughness, anisotropic_alpha_of_glossy(coat_roughness, 0.0f));
-      lobe->fresnel = dielectric_fresnel(coat_ior, 0.0f, 1.0f);
-      const float F = fresnel_dielectric_at(lobe->wo.z, coat_ior);
+      lobe->fresnel = dielectric_fresnel(coat_ior);
+      const float F =
+          spec.is_5 && coat_ior > 1.0f
+              ? lerp(reflected_share(*b.tables, coat_roughness, coat_ior, lobe->wo.z), fresnel_F0(coat_ior), 1.0f)
+              : fresnel_dielectric_at(lobe->wo.z, coat_ior);
       lobe->probability *= F;
-      weight = layered_weight(weight, splat3(coat * F));
+      const Vec3f given_back = lobe_give_back(b, own, *lobe, splat3(fresnel_dielectric_mean(coat_ior)));
+      weight = layered_weight(weight, given_back * (coat * F));
     }
     if (in.coat_tint != Vec3f{1, 1, 1}) {
       // Beer's law along the refracted ray, a coat of thickness 1.
@@ -546,6 +589,7 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
       lobe_set_microfacets(*lobe, spec, roughness, alpha);
       const FresnelF82 f = fresnel_f82_make(saturated(base_color), min(specular_tint, splat3(1.0f)));
       lobe->fresnel = {MixtureFresnel::kF82, 1.0f, f.F0, f.B, 1.0f, 0.0f};
+      metal_add_film(b, spec, in.thin_film_thickness, in.thin_film_ior, lobe->fresnel);
       lobe->probability *= mean_component(mixture_fresnel(lobe->fresnel, lobe->wo.z));
       lobe_give_back(b, spec, *lobe, fresnel_f82_mean(f));
     }
@@ -554,7 +598,8 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
   const float transmission = saturated(in.transmission_weight);
   const float film_nm = max(in.thin_film_thickness, 0.0f), film_ior = max(in.thin_film_ior, 1e-5f);
   if (transmission > kLeastClosureWeight) {
-    MicrofacetFresnel fresnel = dielectric_fresnel(closure_eta(b, ior), film_nm, b.front ? film_ior : film_ior / ior);
+    MicrofacetFresnel fresnel =
+        dielectric_fresnel(b, spec, closure_eta(b, ior), film_nm, b.front ? film_ior : film_ior / ior);
     fresnel.a = saturated(specular_tint * fresnel_F0(ior));
     if (fresnel.kind == MixtureFresnel::kDielectric && specular_tint != Vec3f{1, 1, 1}) {
       fresnel.kind = MixtureFresnel::kInterpolated;
@@ -570,14 +615,14 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
     F0 *= 2.0f * max(in.specular_ior_level, 0.0f);
     eta = ior < 1.0f ? 1.0f / ior_of_F0(F0) : ior_of_F0(F0);
   }
-  if (eta != 1.0f || film_nm > 0.1f) {
+  if (eta != 1.0f || film_nm > kLeastFilmNanometres) {
     if (MixtureLobe* lobe = mixture_add(b, weight, base_frame)) {
       lobe_set_microfacets(*lobe, spec, roughness, alpha);
-      lobe->fresnel = dielectric_fresnel(eta, film_nm, film_ior);
+      lobe->fresnel = dielectric_fresnel(b, spec, eta, film_nm, film_ior);
       lobe->fresnel.a = saturated(specular_tint * F0);
       if (lobe->fresnel.kind == MixtureFresnel::kDielectric) lobe->fresnel.kind = MixtureFresnel::kInterpolated;
       const Vec3f seen = mixture_fresnel(lobe->fresnel, lobe->wo.z);
-      const bool has_film = lobe->fresnel.kind == MixtureFresnel::kThinFilm;
+      const bool has_film = film_nm > kLeastFilmNanometres;
       const float width = __builtin_sqrtf(__builtin_sqrtf(alpha.x * alpha.y));
       const float share = reflected_share(*b.tables, width, eta, lobe->wo.z);
       const Vec3f albedo = has_film ? seen : lerp(share, lobe->fresnel.a, Vec3f{1, 1, 1});

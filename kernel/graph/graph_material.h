@@ -45,7 +45,7 @@ RELIEF_KERNEL GraphFootprint graph_footprint(const GraphPoint& at)
   return {x * width, cross(Ng, x) * width};
 }
 
-/// A point a footprint away.
+/// A point some way along the surface.
 /// @param moved  its hit, which the result points to
 RELIEF_KERNEL GraphPoint graph_point_shifted(const GraphPoint& at, Vec3f by, SurfaceHit& moved)
 {
@@ -297,13 +297,16 @@ RELIEF_KERNEL void graph_load_point(const GraphProgramView& program,
 {
   SurfaceHit moved[2];
   GraphPoint points[3] = {at, at, at};
-  if (program.is_shifted) {
-    const GraphFootprint footprint = graph_footprint(at);
-    points[1] = graph_point_shifted(at, footprint.dPdx, moved[0]);
-    points[2] = graph_point_shifted(at, footprint.dPdy, moved[1]);
-  }
+  const GraphFootprint footprint = program.is_shifted ? graph_footprint(at) : GraphFootprint{};
+  float width = 0.0f;  // by which the points are moved
   for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
     const GraphInput input = program.inputs[i];
+    // Few programs have bumps of several widths.
+    if (input.shift != GraphShift::kNone && input.width != width) {
+      width = input.width;
+      points[1] = graph_point_shifted(at, footprint.dPdx * width, moved[0]);
+      points[2] = graph_point_shifted(at, footprint.dPdy * width, moved[1]);
+    }
     registers.lanes[input.register_index][lane] =
         graph_quantity(points[static_cast<int>(input.shift)], input.quantity, input.index);
   }

@@ -31,6 +31,7 @@ RELIEF_KERNEL void closures_resolve(const GraphLane& at, MixtureBuild& build)
     const SurfaceClosureSpec& spec = at.program->closures[i];
     const float weight = graph_result(at, spec.first_result);
     if (!(weight > kLeastClosureWeight && weight < kInfinity)) continue;
+    build.is_5 = spec.is_5;
     switch (spec.kind) {
 #define CLOSURE(name, Type)                                                 \
   case ClosureKind::name:                                                   \

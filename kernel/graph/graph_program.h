@@ -30,7 +30,7 @@ inline constexpr int kNumGraphOutputs = static_cast<int>(GraphOutput::kCount);
 inline constexpr std::uint16_t kMostGraphRegisters = 512;
 inline constexpr std::uint16_t kNoGraphOperand = 0xffff;
 
-/// Where a quantity is read: at the point, or a footprint away from it along the surface. Bumps ask for all three.
+/// Where a quantity is read: at the point, or some footprints away from it along the surface. Bumps ask for all three.
 enum class GraphShift : std::uint16_t { kNone, kAlongX, kAlongY };
 
 /// Register that is filled before a program runs.
@@ -39,6 +39,7 @@ struct GraphInput {
   GraphShift shift;
   std::uint16_t register_index;
   std::uint16_t index = 0;  ///< which, of a quantity that is many
+  float width = 1;          ///< footprints that the shift is long
 };
 
 struct GraphProgramView {

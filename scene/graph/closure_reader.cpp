@@ -59,11 +59,13 @@ SurfaceClosureSpec read_closure(const JsonReader& r)
 {
   static constexpr std::string_view kDistributions[] = {"ggx", "multiscatter-ggx", "beckmann", "ashikhmin-shirley",
                                                         "sharp"};
-  static constexpr std::string_view kMaths[] = {"3.4", "4.3"};
+  static constexpr std::string_view kMaths[] = {"3.4", "4.3", "5.2"};
   static constexpr std::string_view kComponents[] = {"diffuse", "glossy"};
   static constexpr std::string_view kFresnels[] = {"f82", "physical"};
   SurfaceClosureSpec spec;
-  spec.is_4 = r.choice("maths", kMaths, 0) == 1;
+  const int maths = r.choice("maths", kMaths, 0);
+  spec.is_4 = maths >= 1;
+  spec.is_5 = maths == 2;
   std::string type = r.string("type", "");
   const std::string given = type;
   if (type == "principled") type = spec.is_4 ? "principled4" : "principled3";

@@ -66,13 +66,15 @@ GraphScalar GraphBuilder::constant(float value)
   return add(node, {-1, std::bit_cast<std::int32_t>(value)});
 }
 
-GraphScalar GraphBuilder::quantity(GraphQuantity quantity, std::uint16_t index, GraphShift shift)
+GraphScalar GraphBuilder::quantity(GraphQuantity quantity, std::uint16_t index, GraphShift shift, float width)
 {
   Node node{Node::Kind::kQuantity};
   node.quantity = quantity;
   node.index = index;
   node.shift = shift;
-  return add(node, {-2, static_cast<std::int64_t>(quantity), static_cast<std::int64_t>(shift), index});
+  node.width = width;
+  return add(node, {-2, static_cast<std::int64_t>(quantity), static_cast<std::int64_t>(shift), index,
+                    std::bit_cast<std::int32_t>(width)});
 }
 
 bool GraphBuilder::is_constant(GraphScalar a, float* value) const
@@ -305,12 +307,12 @@ void GraphBuilder::keep_results(std::vector<SurfaceClosureSpec>& closures, int n
   results_ = std::move(kept);
 }
 
-GraphScalar GraphBuilder::shifted(GraphScalar a, GraphShift shift)
+GraphScalar GraphBuilder::shifted(GraphScalar a, GraphShift shift, float width)
 {
   // Inputs have lower numbers than what uses them, but graphs are deep: no recursion.
   std::vector<std::int32_t> stack{a.index};
   const auto known = [&](GraphScalar of) -> GraphScalar {
-    const auto it = shifted_.find({of.index, shift});
+    const auto it = shifted_.find({of.index, shift, width});
     return it == shifted_.end() ? GraphScalar{} : it->second;
   };
   while (!stack.empty()) {
@@ -323,7 +325,7 @@ GraphScalar GraphBuilder::shifted(GraphScalar a, GraphShift shift)
     if (node.kind != Node::Kind::kOperation) {
       // What a bump within a bump has moved already stays where it is.
       const bool moves = node.kind == Node::Kind::kQuantity && node.shift == GraphShift::kNone;
-      shifted_[{of.index, shift}] = moves ? quantity(node.quantity, node.index, shift) : of;
+      shifted_[{of.index, shift, width}] = moves ? quantity(node.quantity, node.index, shift, width) : of;
       stack.pop_back();
       continue;
     }
@@ -341,7 +343,7 @@ GraphScalar GraphBuilder::shifted(GraphScalar a, GraphShift shift)
     if (!are_known) continue;
     const std::vector<GraphScalar> outputs =
         is_guard ? std::vector{inputs[0]} : apply(operation.op, inputs, operation.immediates);
-    for (std::size_t i = 0; i < outputs.size(); ++i) shifted_[{operation.outputs[i].index, shift}] = outputs[i];
+    for (std::size_t i = 0; i < outputs.size(); ++i) shifted_[{operation.outputs[i].index, shift, width}] = outputs[i];
     stack.pop_back();
   }
   return known(a);
@@ -431,7 +433,7 @@ GraphProgram GraphBuilder::compile(const GraphSchedule& schedule) const
     if (last_use[i] < 0) continue;
     if (nodes_[i].kind == Node::Kind::kQuantity) {
       operand_of[i] = take_register();
-      program.inputs.push_back({nodes_[i].quantity, nodes_[i].shift, operand_of[i], nodes_[i].index});
+      program.inputs.push_back({nodes_[i].quantity, nodes_[i].shift, operand_of[i], nodes_[i].index, nodes_[i].width});
     } else if (nodes_[i].kind == Node::Kind::kConstant) {
       constexpr std::size_t kMostConstants = kNoGraphOperand - kMostGraphRegisters;
       if (program.constants.size() == kMostConstants) {

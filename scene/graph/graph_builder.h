@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 #include <stdexcept>
+#include <tuple>
 #include <vector>
 
 #include "kernel/graph/graph_op.h"
@@ -36,7 +37,11 @@ class GraphBuilder {
  public:
   GraphScalar constant(float value);
   /// @param index  of quantities that are many, see GraphInput
-  GraphScalar quantity(GraphQuantity quantity, std::uint16_t index = 0, GraphShift shift = GraphShift::kNone);
+  /// @param width  footprints that the shift is long
+  GraphScalar quantity(GraphQuantity quantity,
+                       std::uint16_t index = 0,
+                       GraphShift shift = GraphShift::kNone,
+                       float width = 1);
 
   /// @param inputs      as many as the operation has
   /// @param immediates  likewise
@@ -73,8 +78,9 @@ class GraphBuilder {
   /// @param numbers  of results that each has
   void keep_results(std::vector<SurfaceClosureSpec>& closures, int numbers);
 
-  /// A number as it is a footprint away: everything that leads to it is asked for there.
-  GraphScalar shifted(GraphScalar a, GraphShift shift);
+  /// A number as it is some footprints away: everything that leads to it is asked for there.
+  /// @param width  footprints, above 0
+  GraphScalar shifted(GraphScalar a, GraphShift shift, float width);
 
   /// @param skips  whether what guards make needless is left out
   /// @error GraphTooLarge
@@ -90,6 +96,7 @@ class GraphBuilder {
     GraphQuantity quantity{};
     GraphShift shift{};
     std::uint16_t index = 0;  ///< of the quantity
+    float width = 1;          ///< of the shift
   };
   struct Operation {
     GraphOp op;
@@ -118,7 +125,7 @@ class GraphBuilder {
   std::map<std::vector<float>, std::uint32_t> table_places_;
   std::array<GraphVector, kNumGraphOutputs> outputs_;
   std::vector<GraphScalar> results_;
-  std::map<std::pair<std::int32_t, GraphShift>, GraphScalar> shifted_;
+  std::map<std::tuple<std::int32_t, GraphShift, float>, GraphScalar> shifted_;
   std::map<std::vector<std::int32_t>, std::uint16_t> guard_groups_;  ///< by their values and, at the end, their factor
 };
 

@@ -215,7 +215,8 @@ void lower_normal_map(GraphNode& n)
   GraphScalar is_given = b.constant(1);
   if (space == 0) {
     const auto [tangent, handedness] = uv_tangent(n);
-    const GraphVector below = quantities(b, Q::vertex_normal_x, Q::vertex_normal_y, Q::vertex_normal_z);
+    GraphVector below = quantities(b, Q::vertex_normal_x, Q::vertex_normal_y, Q::vertex_normal_z);
+    if (n.reader.boolean("unitNormals", false)) below = normalized(b, below);
     const GraphVector bitangent = product(b, cross(b, below, tangent), handedness);
     normal =
         sum(b, sum(b, product(b, tangent, color[0]), product(b, bitangent, color[1])), product(b, below, color[2]));
@@ -409,13 +410,14 @@ void lower_layer_weight(GraphNode& n)
 
 constexpr GraphSocket kBumpInputs[] = {
     {"strength", kNumber, {1}}, {"distance", kNumber, {1}}, {"height", kNumber, {1}}, {"normal", kVector}};
-/// A normal turned by the slopes of a height, which is asked for at the point and a footprint away from it on two sides.
+/// A normal turned by the slopes of a height, which is asked for at the point and some footprints away from it on two sides.
 /// @source Mikkelsen 2010, "Bump Mapping Unparametrized Surfaces on the GPU": the surface gradient
 void lower_bump(GraphNode& n)
 {
   GraphBuilder& b = n.build;
   const GraphScalar height = n.number("height");
-  const auto rise = [&](GraphShift shift) { return b(Op::subtract, {b.shifted(height, shift), height}); };
+  const float width = n.reader.number_f("filterWidth", 1, 1e-3, 1e3);
+  const auto rise = [&](GraphShift shift) { return b(Op::subtract, {b.shifted(height, shift, width), height}); };
   GraphVector N = n.vector("normal");
   if (!n.is_given("normal")) N = quantities(b, Q::normal_x, Q::normal_y, Q::normal_z);
   const GraphVector dPdx = quantities(b, Q::dpdx_x, Q::dpdx_y, Q::dpdx_z);
@@ -427,7 +429,8 @@ void lower_bump(GraphNode& n)
   const GraphScalar slope = b(Op::multiply, {distance, b(Op::sign, {determinant})});
   const GraphScalar along_x = b(Op::multiply, {slope, rise(GraphShift::kAlongX)});
   const GraphScalar along_y = b(Op::multiply, {slope, rise(GraphShift::kAlongY)});
-  const GraphScalar size = b(Op::absolute, {determinant});
+  GraphScalar size = b(Op::absolute, {determinant});
+  if (width != 1) size = scaled(b, size, width);
   GraphVector bent;
   for (std::size_t c = 0; c < 3; ++c) {
     const GraphScalar gradient = b(Op::add, {b(Op::multiply, {along_x, Rx[c]}), b(Op::multiply, {along_y, Ry[c]})});

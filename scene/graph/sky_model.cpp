@@ -146,12 +146,18 @@ Vec3f radiance_from(const SkyModel& sky, Vec3f d, Vec3f towards_sun)
 
 std::vector<float> sky_table(const SkyModel& sky)
 {
-  constexpr std::size_t kColumns = kSkyColumns, kRows = kSkyRows;
-  std::vector<float> table(kColumns * kRows * 3);
+  if (sky.kind == SkyKind::kMultipleScattering) return sky_multiple_table(sky);
+  const bool is_nishita = sky.kind == SkyKind::kNishita;
+  constexpr std::size_t kColumns = kSkyColumns;
+  const std::size_t rows = is_nishita ? kSkyRows : kScatteringRows, first = is_nishita ? 0 : rows / 2;
+  const float most = is_nishita ? 0.5f + 0.25f / kSkyRows : 0.5f;
+  std::vector<float> table(kColumns * rows * 3);
   const Vec3f towards_sun = elevated(sky.sun_elevation, 0);
-  for_each_in_parallel(kRows, [&](std::size_t y) {
-    const float part = static_cast<float>(y) / kRows;
-    const float elevation = (0.5f + 0.25f / kRows) * kPiAngle * part * part;
+  for_each_in_parallel(rows - first, [&](std::size_t i) {
+    const std::size_t y = first + i;
+    const float v = static_cast<float>(y) / static_cast<float>(rows);
+    const float part = is_nishita ? v : 2 * v - 1;
+    const float elevation = most * kPiAngle * part * part;
     for (std::size_t x = 0; x < kColumns / 2; ++x) {
       const float turn = 2 * kPiAngle * static_cast<float>(x) / kColumns - kPiAngle;
       const Vec3f radiance = radiance_from(sky, elevated(elevation, turn), towards_sun);
@@ -161,14 +167,23 @@ std::vector<float> sky_table(const SkyModel& sky)
       }
     }
   });
+  // The horizon's colour fades away below it; Nishita's has a formula for that.
+  for (std::size_t y = 0; y < first; ++y) {
+    const float part = 1 - 2 * static_cast<float>(y) / static_cast<float>(rows);
+    const float left = std::max(0.0f, 1 - std::sin(most * kPiAngle * part * part) / kGroundDepth);
+    const float fade = left * left * left;
+    const float* horizon = &table[first * kColumns * 3];
+    for (std::size_t i = 0; i < kColumns * 3; ++i) table[y * kColumns * 3 + i] = horizon[i] * fade;
+  }
   return table;
 }
 
 Vec3f sky_sun_radiance(const SkyModel& sky, float elevation, float diameter)
 {
-  const Matter passed = matter_to_space({0, 0, kEarthRadius + sky.altitude}, elevated(elevation, 0));
   // Rounded as in Cycles, which costs it a few digits of a small sun.
   const float solid_angle = 2 * kPiAngle * (1 - std::cos(diameter / 2));
+  if (sky.kind == SkyKind::kMultipleScattering) return sky_multiple_sun_radiance(sky, elevation, solid_angle);
+  const Matter passed = matter_to_space({0, 0, kEarthRadius + sky.altitude}, elevated(elevation, 0));
   return color_of([&](const Wavelength& w) {
     return w.sunlight * std::exp(-(passed.air * sky.air * w.air + passed.dust * sky.dust * kDustExtinction)) /
            solid_angle;

@@ -3,6 +3,7 @@
 
 #include "scene/graph/graph_nodes.h"
 #include "scene/graph/graph_vectors.h"
+#include "scene/graph/hosek_wilkie.h"
 #include "scene/graph/sky_model.h"
 
 namespace relief {
@@ -64,28 +65,37 @@ GraphVector selected(GraphBuilder& b, GraphScalar is, const GraphVector& yes, co
 /// The sun's disk, brighter above where it is seen through less air, and dimmer towards its rim.
 struct Disk {
   Vec3f towards;
-  float elevation, diameter;
-  Vec3f bottom, top;  ///< radiance
+  float low, high;  ///< elevations
+  float diameter;
+  Vec3f bottom, top;  ///< radiance there
 };
 
 Disk disk_of(const SkyModel& sky, float turn, float diameter, float intensity)
 {
   const float radius = diameter / 2, e = sky.sun_elevation;
-  return {{std::cos(e) * std::cos(turn), std::cos(e) * std::sin(turn), std::sin(e)},
-          e,
-          diameter,
-          sky_sun_radiance(sky, std::fmax(e - radius, 0.0f), diameter) * intensity,
-          sky_sun_radiance(sky, std::fmax(e + radius, 0.0f), diameter) * intensity};
+  const auto seen_at = [&](float elevation) {
+    const bool may_be_below = sky.kind == SkyKind::kMultipleScattering;
+    return sky_sun_radiance(sky, may_be_below ? elevation : std::fmax(elevation, 0.0f), diameter) * intensity;
+  };
+  Disk disk{{std::cos(e) * std::cos(turn), std::cos(e) * std::sin(turn), std::sin(e)},
+            e - radius,
+            e + radius,
+            diameter,
+            seen_at(e - radius),
+            seen_at(e + radius)};
+  if (sky.kind == SkyKind::kNishita) {
+    // What shows of it.
+    disk.low = e > radius ? e - radius : 0.0f;
+    disk.high = std::fmax(e + radius, 1e-6f);
+  }
+  return disk;
 }
 
 /// @param angle  between the direction and the sun's middle
 GraphVector disk_radiance(GraphBuilder& b, const Disk& disk, GraphScalar elevation, GraphScalar angle)
 {
   const float radius = disk.diameter / 2;
-  const bool is_whole = disk.elevation > radius;
-  const float low = is_whole ? disk.elevation - radius : 0.0f;
-  const float high = std::fmax(disk.elevation + radius, 1e-6f);
-  const GraphScalar t = scaled(b, b(Op::subtract, {elevation, b.constant(low)}), 1 / (high - low));
+  const GraphScalar t = scaled(b, b(Op::subtract, {elevation, b.constant(disk.low)}), 1 / (disk.high - disk.low));
   const GraphScalar from_middle = scaled(b, angle, 1 / radius);
   const GraphScalar one = b.constant(1);
   const GraphScalar height = b(Op::square_root, {b(Op::subtract, {one, b(Op::multiply, {from_middle, from_middle})})});
@@ -124,16 +134,38 @@ struct PerezLobe {
 /// a t³ + b t² + c t + d.
 float cubic(float t, float a, float b, float c, float d) { return ((a * t + b) * t + c) * t + d; }
 
+/// Unit direction towards the sun.
+Vec3f read_sun_direction(const JsonReader& r)
+{
+  const std::vector<double> given = r.numbers("sunDirection", 3, 3, -1e6, 1e6);
+  if (given.empty()) return {0, 0, 1};
+  const Vec3f sun{static_cast<float>(given[0]), static_cast<float>(given[1]), static_cast<float>(given[2])};
+  if (!(length(sun) > 0)) r.fail("sunDirection", "a vector with a length");
+  return normalize(sun);
+}
+
+/// Linear Rec.709 without what is below 0.
+GraphVector color_of_xyz(GraphBuilder& b, const GraphVector& xyz)
+{
+  GraphVector color;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const Vec3f row = kRec709FromXyz[c];
+    const GraphScalar sum = sum3(b, scaled(b, xyz[0], row.x), scaled(b, xyz[1], row.y), scaled(b, xyz[2], row.z));
+    color[c] = b(Op::maximum, {sum, b.constant(0)});
+  }
+  return color;
+}
+
+/// Cosine to the zenith; below the horizon these skies are what they are on it.
+GraphScalar cosine_above_horizon(GraphBuilder& b, const GraphVector& d)
+{
+  return b(Op::maximum, {d[2], b.constant(std::sin(0.001f))});
+}
+
 void lower_preetham(GraphNode& n)
 {
   GraphBuilder& b = n.build;
-  const std::vector<double> given = n.reader.numbers("sunDirection", 3, 3, -1e6, 1e6);
-  Vec3f sun{0, 0, 1};
-  if (!given.empty()) {
-    sun = {static_cast<float>(given[0]), static_cast<float>(given[1]), static_cast<float>(given[2])};
-    if (!(length(sun) > 0)) n.reader.fail("sunDirection", "a vector with a length");
-    sun = normalize(sun);
-  }
+  const Vec3f sun = read_sun_direction(n.reader);
   const float T = n.reader.number_f("turbidity", 2.2f, 1, 1000);
   const float theta = std::acos(sun.z);
   const float chi = (4.0f / 9.0f - T / 120.0f) * (kPiAngle - 2 * theta);
@@ -160,31 +192,62 @@ void lower_preetham(GraphNode& n)
                         cubic(theta, 0.15346f, -0.26756f, 0.06670f, 0.26688f)};
   const GraphVector d = direction(n);
   const GraphScalar gamma = b(Op::arccosine, {dot(b, d, color_constant(b, sun))});
-  // Below the horizon the sky is what it is on it.
-  const GraphScalar cos_theta = b(Op::maximum, {d[2], b.constant(std::sin(0.001f))});
+  const GraphScalar cos_theta = cosine_above_horizon(b, d);
   const GraphScalar Y = luminance.lower(b, cos_theta, gamma, theta);
   const GraphScalar cx = x.lower(b, cos_theta, gamma, theta), cy = y.lower(b, cos_theta, gamma, theta);
   const GraphScalar rest = b(Op::subtract, {b(Op::subtract, {b.constant(1), cx}), cy});
   const GraphScalar by = b(Op::divide, {Y, cy});
   const GraphScalar X = b(Op::multiply, {cx, by}), Z = b(Op::multiply, {rest, by});
-  GraphVector color;
-  for (std::size_t c = 0; c < 3; ++c) {
-    const Vec3f row = kRec709FromXyz[c];
-    const GraphScalar sum = sum3(b, scaled(b, X, row.x), scaled(b, Y, row.y), scaled(b, Z, row.z));
-    color[c] = b(Op::maximum, {sum, b.constant(0)});
-  }
-  n.set("color", color, kColor);
+  n.set("color", color_of_xyz(b, {X, Y, Z}), kColor);
 }
 
-/// Clear sky of scattered light, as Cycles' "Nishita".
-void lower_nishita(GraphNode& n)
+/// @param gamma  angle to the sun
+GraphScalar lower_lobe(GraphBuilder& b, const HosekWilkieLobe& lobe, GraphScalar cos_theta, GraphScalar gamma)
+{
+  const GraphScalar one = b.constant(1), cosine = b(Op::cosine, {gamma});
+  const GraphScalar squared = b(Op::multiply, {cosine, cosine});
+  const GraphScalar from_horizon = b(Op::add, {cos_theta, b.constant(0.01f)});
+  const GraphScalar by_height =
+      b(Op::add, {one, scaled(b, b(Op::exponent, {b(Op::divide, {b.constant(lobe.b), from_horizon})}), lobe.a)});
+  const GraphScalar base = b(Op::add, {b.constant(1 + lobe.h * lobe.h), scaled(b, cosine, -2 * lobe.h)});
+  const GraphScalar around_sun = b(Op::divide, {b(Op::add, {one, squared}), b(Op::power, {base, b.constant(1.5f)})});
+  const GraphScalar scattered = sum3(b, scaled(b, b(Op::exponent, {scaled(b, gamma, lobe.e)}), lobe.d),
+                                     scaled(b, squared, lobe.f), scaled(b, around_sun, lobe.g));
+  const GraphScalar by_sun = sum3(b, b.constant(lobe.c), scattered, scaled(b, b(Op::square_root, {cos_theta}), lobe.i));
+  return scaled(b, b(Op::multiply, {by_height, by_sun}), lobe.radiance);
+}
+
+void lower_hosek_wilkie(GraphNode& n)
+{
+  GraphBuilder& b = n.build;
+  Vec3f sun = read_sun_direction(n.reader);
+  // The model's suns stand above the horizon.
+  if (sun.z < 0) sun = sun.x == 0 && sun.y == 0 ? Vec3f{0, 1, 0} : normalize(Vec3f{sun.x, sun.y, 0});
+  const float turbidity = n.reader.number_f("turbidity", 2.2f, 0, 1000);
+  const float albedo = n.reader.number_f("groundAlbedo", 0.3f, 0, 1);
+  const HosekWilkieSky sky = hosek_wilkie_make(turbidity, albedo, kPiAngle / 2 - std::acos(std::fmin(sun.z, 1.0f)));
+  const GraphVector d = direction(n);
+  const GraphScalar gamma = b(Op::arccosine, {dot(b, d, color_constant(b, sun))});
+  const GraphScalar cos_theta = cosine_above_horizon(b, d);
+  // Of Cycles, for watts.
+  constexpr float kUnit = 2 * kPiAngle / 683;
+  GraphVector xyz;
+  for (std::size_t c = 0; c < 3; ++c) xyz[c] = scaled(b, lower_lobe(b, sky.xyz[c], cos_theta, gamma), kUnit);
+  n.set("color", color_of_xyz(b, xyz), kColor);
+}
+
+/// Clear sky of scattered light, of each kind.
+void lower_scattering(GraphNode& n, SkyKind kind)
 {
   GraphBuilder& b = n.build;
   const JsonReader& r = n.reader;
+  const bool is_nishita = kind == SkyKind::kNishita;
   SkyModel sky;
+  sky.kind = kind;
   sky.sun_elevation = r.number_f("sunElevation", 0.2617994f, -kPiAngle / 2, kPiAngle / 2);
   // Below a metre, and out in space, the model breaks down.
-  sky.altitude = std::fmin(std::fmax(r.number_f("altitude", 0, -1e9, 1e9), 1.0f), 59999.0f);
+  const float altitude = r.number_f("altitude", 0, -1e9, 1e9);
+  sky.altitude = std::fmin(std::fmax(altitude, 1.0f), kind == SkyKind::kMultipleScattering ? 99999.0f : 59999.0f);
   sky.air = r.number_f("air", 1, 0, 1000);
   sky.dust = r.number_f("dust", 1, 0, 1000);
   sky.ozone = r.number_f("ozone", 1, 0, 1000);
@@ -198,8 +261,9 @@ void lower_nishita(GraphNode& n)
 
   const std::vector<float> table = sky_table(sky);
   const std::uint32_t place = b.add_table(table);
+  const auto rows = static_cast<std::uint16_t>(is_nishita ? kSkyRows : kScatteringRows);
   const std::uint16_t immediates[] = {static_cast<std::uint16_t>(place & 0xffffu),
-                                      static_cast<std::uint16_t>(place >> 16), kSkyColumns, kSkyRows};
+                                      static_cast<std::uint16_t>(place >> 16), kSkyColumns, rows};
   const auto look_up = [&](GraphScalar u, GraphScalar v) {
     const GraphScalar inputs[] = {u, v};
     const std::vector<GraphScalar> rgb = b.apply(Op::grid, inputs, immediates);
@@ -211,16 +275,16 @@ void lower_nishita(GraphNode& n)
   GraphScalar u =
       scaled(b, b(Op::add, {b(Op::arctangent2, {d[0], d[1]}), b.constant(kPiAngle + turn)}), 0.5f / kPiAngle);
   u = b(Op::select, {b(Op::greater_than, {u, one}), b(Op::subtract, {u, one}), u});
-  const GraphScalar v = b(Op::square_root, {scaled(b, elevation, 2 / kPiAngle)});
-  // The horizon's colour fades away below it.
-  constexpr float kGroundDepth = 0.4f;
-  const GraphScalar left = b(Op::maximum, {b(Op::add, {one, scaled(b, d[2], 1 / kGroundDepth)}), zero});
-  const GraphScalar fade = b(Op::multiply, {b(Op::multiply, {left, left}), left});
-  GraphVector ground = look_up(u, zero);
-  for (GraphScalar& c : ground) c = b(Op::multiply, {c, fade});
-  GraphVector above = look_up(u, v);
   const float radius = diameter / 2;
-  if (has_disk && sky.sun_elevation + radius > 0) {
+  GraphVector color;
+  if (is_nishita) {
+    color = look_up(u, b(Op::square_root, {scaled(b, elevation, 2 / kPiAngle)}));
+  } else {
+    const GraphScalar away = b(Op::square_root, {b(Op::absolute, {scaled(b, elevation, 2 / kPiAngle)})});
+    const GraphScalar signed_away = b(Op::multiply, {away, b(Op::sign, {elevation})});
+    color = look_up(u, b(Op::add, {b.constant(0.5f), scaled(b, signed_away, 0.5f)}));
+  }
+  if (has_disk && (sky.sun_elevation + radius > 0 || kind == SkyKind::kMultipleScattering)) {
     const Disk disk = disk_of(sky, turn + kPiAngle / 2, diameter, intensity);
     // By the tangent of half the angle: it is exact for small ones.
     const GraphVector to = color_constant(b, disk.towards);
@@ -232,21 +296,42 @@ void lower_nishita(GraphNode& n)
     const GraphScalar angle = scaled(
         b, b(Op::arctangent2, {b(Op::square_root, {dot(b, apart, apart)}), b(Op::square_root, {dot(b, along, along)})}),
         2);
-    above = selected(b, b(Op::less_than, {angle, b.constant(radius)}), disk_radiance(b, disk, elevation, angle), above);
+    const GraphVector sun = disk_radiance(b, disk, elevation, angle);
+    const GraphScalar is_sun = b(Op::less_than, {angle, b.constant(radius)});
+    if (is_nishita) {
+      color = selected(b, is_sun, sun, color);
+    } else {
+      // The air before it shines, too. From above the horizon is below 0.
+      constexpr float kEarthKilometres = 6371;
+      const float horizon = std::acos(kEarthKilometres / (kEarthKilometres + std::fmax(altitude, 0.0f) / 1000));
+      const GraphScalar is_seen = b(Op::multiply, {is_sun, b(Op::greater_than, {elevation, b.constant(-horizon)})});
+      color = selected(b, is_seen, each(b, Op::add, color, sun), color);
+    }
     if (is_direction(b, d)) n.suns.push_back({disk.towards, radius});
   }
-  GraphVector color = selected(b, b(Op::less_than, {d[2], zero}), ground, above);
+  if (is_nishita) {
+    // The horizon's colour fades away below it.
+    const GraphScalar left = b(Op::maximum, {b(Op::add, {one, scaled(b, d[2], 1 / kGroundDepth)}), zero});
+    const GraphScalar fade = b(Op::multiply, {b(Op::multiply, {left, left}), left});
+    GraphVector ground = look_up(u, zero);
+    for (GraphScalar& c : ground) c = b(Op::multiply, {c, fade});
+    color = selected(b, b(Op::less_than, {d[2], zero}), ground, color);
+  }
   for (GraphScalar& c : color) c = b(Op::maximum, {c, zero});
   n.set("color", color, kColor);
 }
 
 void lower_sky(GraphNode& n)
 {
-  static constexpr std::string_view kModels[] = {"nishita", "preetham"};
-  if (n.reader.choice("sky", kModels, 0) == 0) {
-    lower_nishita(n);
-  } else {
+  static constexpr std::string_view kModels[] = {"nishita", "single-scattering", "multiple-scattering", "preetham",
+                                                 "hosek-wilkie"};
+  const int model = n.reader.choice("sky", kModels, 0);
+  if (model == 3) {
     lower_preetham(n);
+  } else if (model == 4) {
+    lower_hosek_wilkie(n);
+  } else {
+    lower_scattering(n, static_cast<SkyKind>(model));
   }
 }
 

@@ -326,7 +326,7 @@ def test_a_world_of_its_own_for_mirrors_is_warned_about():
 def _sky_world(strength=0.1, **settings):
     tree = set_world((1, 1, 1), strength)
     (sky,) = _nodes(tree, "TexSky")
-    # The same by another name since 5.0.
+    # By another name since 5.0.
     sky.sky_type = "SINGLE_SCATTERING" if IS_5_0 else "NISHITA"
     for name, value in settings.items():
         setattr(sky, "aerosol_density" if IS_5_0 and name == "dust_density" else name, value)
@@ -362,11 +362,40 @@ def test_a_sun_past_the_zenith_long():
     assert_agrees(scene, samples=64, block=4, dark=_RIM)
 
 
-def test_another_sky_is_warned_about():
+def test_a_tiny_sun():
+    """Its disk is smaller than a texel of the map of the sky."""
     scene = _stage()
-    tree = _sky_world()
-    next(n for n in tree.nodes if n.bl_idname == "ShaderNodeTexSky").sky_type = "HOSEK_WILKIE"
-    assert_warns(scene, 'world "world"', "hosek_wilkie")
+    settings = {"sun_elevation": math.radians(40), "sun_rotation": math.radians(200), "sun_size": math.radians(0.05)}
+    _sky_world(0.05, sun_intensity=0.5, **settings)
+    assert_agrees(scene, samples=256, block=8, dark=_RIM)
+
+
+def test_sky_of_multiple_scattering():
+    """Each setting that is not its default; once with the sun's disk, once at dusk without."""
+    if not IS_5_0:
+        return
+    densities = {"altitude": 2000, "air_density": 1.5, "aerosol_density": 2, "ozone_density": 3}
+    for settings in (
+        {"sun_elevation": math.radians(20), "sun_rotation": math.radians(200), "sun_size": math.radians(2)},
+        {"sun_elevation": math.radians(-2), "sun_disc": False, **densities},
+    ):
+        scene = _stage()
+        _sky_world(0.1, sky_type="MULTIPLE_SCATTERING", **settings)
+        assert_agrees(scene, samples=256, block=8)
+
+
+def test_hosek_wilkie_sky():
+    """On the horizon, where it is held, the map rounds it between texels: by 0.4 % of a block."""
+    scene = _stage()
+    sky = {"sky_type": "HOSEK_WILKIE", "sun_direction": (0.3, -0.5, 0.4), "turbidity": 3.5, "ground_albedo": 0.7}
+    _sky_world(0.3, **sky)
+    assert_agrees(scene, samples=64, block=4, tolerance=0.005)
+
+
+def test_hosek_wilkie_sky_of_a_sun_below_the_horizon():
+    scene = _stage()
+    _sky_world(10.0, sky_type="HOSEK_WILKIE", sun_direction=(0.3, 0.5, -0.4), turbidity=8.5)
+    assert_agrees(scene, samples=64, block=4)
 
 
 def test_preetham_sky():

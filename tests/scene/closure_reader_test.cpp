@@ -76,10 +76,14 @@ TEST(ClosureReader, VersionsOfThePrincipledAreToldApart)
 {
   const Scene scene = closure_load({{"closures",
                                      {{{"type", "principled"}},
-                                      {{"type", "principled"}, {"maths", "4.3"}, {"coatWeight", 0.5}}}}});
+                                      {{"type", "principled"}, {"maths", "4.3"}, {"coatWeight", 0.5}},
+                                      {{"type", "principled"}, {"maths", "5.2"}}}}});
   EXPECT_EQ(scene.graphs.at(0).closures.at(0).kind, ClosureKind::principled3);
   EXPECT_EQ(scene.graphs.at(0).closures.at(1).kind, ClosureKind::principled4);
   EXPECT_EQ(inputs_of<Principled4Inputs>(scene.graphs.at(0), 1).coat_weight, 0.5f);
+  EXPECT_EQ(scene.graphs.at(0).closures.at(2).kind, ClosureKind::principled4);
+  EXPECT_TRUE(scene.graphs.at(0).closures.at(2).is_4 && scene.graphs.at(0).closures.at(2).is_5);
+  EXPECT_FALSE(scene.graphs.at(0).closures.at(1).is_5);
 }
 
 TEST(ClosureReader, WhatWeighsNothingIsLeftOut)

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "kernel/texture/texture.h"
+#include "scene/graph/hosek_wilkie.h"
 #include "scene/texture_store.h"
 #include "tests/support/graph_scene.h"
 
@@ -185,7 +186,7 @@ TEST(EnvironmentGraph, SunsOfAnySizeHaveTheirPower)
   const double rest = power(load(sky(without)));
   EXPECT_GT(rest, 1);
   double first = 0;
-  for (const float size : {0.05f, 0.009512f}) {
+  for (const float size : {0.05f, 0.009512f, 0.002f, 0.0006f}) {
     json with = options;
     with["sunSize"] = size;
     // Cycles computes the disk's solid angle in single precision.
@@ -196,6 +197,96 @@ TEST(EnvironmentGraph, SunsOfAnySizeHaveTheirPower)
     EXPECT_NEAR(sun / first, 1, 0.01) << size;
   }
   EXPECT_GT(first, rest);
+}
+
+TEST(EnvironmentGraph, SkiesOfNothingAreBlack)
+{
+  for (const char* kind : {"nishita", "single-scattering", "multiple-scattering"}) {
+    json options = {{"sky", kind}, {"sunElevation", 0.7}, {"sunDisc", false}, {"air", 0}, {"dust", 0}, {"ozone", 0}};
+    EXPECT_EQ(power(load(sky(options))), 0) << kind;
+    // Nothing dims the sun, then, whose disk has its power wherever it stands above the horizon.
+    options["sunDisc"] = true;
+    double first = 0;
+    for (const float elevation : {0.2f, 1.2f}) {
+      options["sunElevation"] = elevation;
+      options["sunSize"] = 0.05;
+      const double sun = power(load(sky(options)));
+      if (first == 0) first = sun;
+      EXPECT_NEAR(sun / first, 1, 0.01) << kind;
+    }
+    EXPECT_GT(first, 10) << kind;
+  }
+}
+
+TEST(EnvironmentGraph, ScatteringSkiesAreNishitasAboveTheHorizonAndHaveAGroundBelow)
+{
+  const json options = {{"sunElevation", 0.6}, {"sunDisc", false}};
+  const auto of_kind = [&options](const char* kind) {
+    json named = options;
+    named["sky"] = kind;
+    return load(sky(named));
+  };
+  const Scene nishita = of_kind("nishita"), single = of_kind("single-scattering"),
+              multiple = of_kind("multiple-scattering");
+  for (const float u : {0.1f, 0.4f, 0.8f}) {
+    for (const float v : {0.05f, 0.2f, 0.4f}) {
+      const Vec3f before = radiance(nishita, u, v), now = radiance(single, u, v), more = radiance(multiple, u, v);
+      expect_radiance(now / before, {1, 1, 1}, 0.01f);
+      // Another atmosphere, and more of its light.
+      expect_radiance(more / before, {1.5f, 1.5f, 1.5f}, 0.7f);
+    }
+    // Both fade away below the horizon.
+    expect_radiance(radiance(single, u, 0.53f) / radiance(nishita, u, 0.53f), {1, 1, 1}, 0.03f);
+    EXPECT_EQ(max_component(radiance(single, u, 0.65f)), 0);
+    EXPECT_GT(min_component(radiance(multiple, u, 0.8f)), 0);
+  }
+}
+
+TEST(EnvironmentGraph, CoefficientsOfHosekAndWilkieAreTheTablesAtTheirKnots)
+{
+  const float half_pi = std::numbers::pi_v<float> / 2;
+  const HosekWilkieSky low = hosek_wilkie_make(1, 0, 0), high = hosek_wilkie_make(1, 0, half_pi);
+  EXPECT_NEAR(low.xyz[0].a, -1.117001f, 1e-6f);
+  EXPECT_NEAR(low.xyz[0].h, 0.6083296f, 1e-6f);
+  EXPECT_NEAR(high.xyz[0].a, -1.070108f, 1e-5f);
+  EXPECT_NEAR(high.xyz[0].i, 2.343583f, 1e-5f);
+  EXPECT_NEAR(hosek_wilkie_make(10, 0, 0).xyz[0].a, -1.841310f, 1e-5f);
+  EXPECT_NEAR(hosek_wilkie_make(1, 1, 0).xyz[0].a, -1.116416f, 1e-6f);
+  // Linear between turbidities, and between black and white ground.
+  const float between =
+      0.5f * (hosek_wilkie_make(4, 0.25f, 0.3f).xyz[1].radiance + hosek_wilkie_make(5, 0.25f, 0.3f).xyz[1].radiance);
+  EXPECT_NEAR(hosek_wilkie_make(4.5f, 0.25f, 0.3f).xyz[1].radiance, between, 1e-5f * between);
+}
+
+TEST(EnvironmentGraph, TheSkyOfHosekAndWilkieIsItsFormula)
+{
+  const float elevation = 0.4f, turn = 1;  // from north to the east
+  const json direction = {std::cos(elevation) * std::sin(turn), std::cos(elevation) * std::cos(turn),
+                          std::sin(elevation)};
+  const Scene scene =
+      load(sky({{"sky", "hosek-wilkie"}, {"sunDirection", direction}, {"turbidity", 3.5}, {"groundAlbedo", 0.6}}));
+  const HosekWilkieSky coefficients = hosek_wilkie_make(3.5f, 0.6f, elevation);
+  for (const double u : {0.1, 0.55, 0.9}) {
+    for (const double v : {0.05, 0.25, 0.45, 0.8}) {
+      const double phi = (u - 0.5) * 2 * std::numbers::pi, theta = v * std::numbers::pi;
+      const double cos_gamma = std::sin(theta) * std::cos(phi - 1) * std::cos(0.4) + std::cos(theta) * std::sin(0.4);
+      const double cos_theta = std::max(std::cos(theta), 1e-3), gamma = std::acos(cos_gamma);
+      double xyz[3];
+      for (int c = 0; c < 3; ++c) {
+        const HosekWilkieLobe& k = coefficients.xyz[c];
+        const double around = (1 + cos_gamma * cos_gamma) / std::pow(1 + k.h * k.h - 2 * k.h * cos_gamma, 1.5);
+        xyz[c] = (1 + k.a * std::exp(k.b / (cos_theta + 0.01))) *
+                 (k.c + k.d * std::exp(k.e * gamma) + k.f * cos_gamma * cos_gamma + k.g * around +
+                  k.i * std::sqrt(cos_theta)) *
+                 k.radiance * 2 * std::numbers::pi / 683;
+      }
+      const double red = 3.2404542 * xyz[0] - 1.5371385 * xyz[1] - 0.4985314 * xyz[2];
+      const double blue = 0.0556434 * xyz[0] - 0.2040259 * xyz[1] + 1.0572252 * xyz[2];
+      const Vec3f found = radiance(scene, static_cast<float>(u), static_cast<float>(v));
+      EXPECT_NEAR(static_cast<double>(found.x), std::max(red, 0.0), 0.002 * std::abs(red) + 1e-5) << u << ", " << v;
+      EXPECT_NEAR(static_cast<double>(found.z), std::max(blue, 0.0), 0.002 * std::abs(blue) + 1e-5) << u << ", " << v;
+    }
+  }
 }
 
 TEST(EnvironmentGraph, TheSunStandsWhereItIsToldTo)

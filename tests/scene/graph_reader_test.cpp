@@ -133,6 +133,60 @@ TEST(GraphReader, ATableOfOneEntryIsAConstant)
 }
 
 // Whole turns are cut off towards 0; a quarter turn below is the end of the wheel, or goes on from its other end.
+TEST(GraphReader, BumpsAskForHeightsAsFarAwayAsTheirWidth)
+{
+  // Of x², seen along −z with footprints of half a metre.
+  const float x = 0.3f, footprint = 0.5f;
+  const json nodes = {
+      {{"type", "geometry"}},
+      {{"type", "separate"}, {"inputs", {{"vector", of(0, "position")}}}},
+      {{"type", "math"}, {"operation", "multiply"}, {"inputs", {{"a", of(1, "x")}, {"b", of(1, "x")}}}}};
+  json both = nodes;
+  for (const double width : {1.0, 0.1}) {
+    both.push_back({{"type", "bump"}, {"filterWidth", width}, {"inputs", {{"height", of(2)}}}});
+  }
+  const GraphProgram program =
+      graph_load({{"nodes", both}, {"outputs", {{"baseColor", of(3)}, {"emission", of(4)}}}}).graphs.at(0);
+  GraphRegisters registers;
+  for (const GraphInput& input : program.inputs) {
+    float value = 0;
+    if (input.quantity == Q::position_x) value = x + (input.shift == GraphShift::kAlongX ? input.width * footprint : 0);
+    if (input.quantity == Q::dpdx_x || input.quantity == Q::dpdy_y) value = footprint;
+    if (input.quantity == Q::normal_z) value = 1;
+    registers.lanes[input.register_index] = splat8(value);
+  }
+  const GraphProgramView view = program.view();
+  graph_run(view, nullptr, registers);
+  const GraphValues values = graph_values({&view, &registers, 0});
+  const auto expected = [&](float width) { return normalize(Vec3f{-(2 * x + width * footprint), 0, 1}); };
+  EXPECT_LT(length(values.of[static_cast<int>(GraphOutput::base_color)] - expected(1)), 1e-6f);
+  EXPECT_LT(length(values.of[static_cast<int>(GraphOutput::emission)] - expected(0.1f)), 1e-5f);
+}
+
+TEST(GraphReader, NormalMapsStandOverNormalsOfAnyLengthOrOfOne)
+{
+  // A tangent along x, a normal of half the length along z, a colour that leans by 45 degrees between units.
+  const auto normal_of = [](bool is_unit) {
+    const json node = {{"type", "normal-map"}, {"unitNormals", is_unit}, {"inputs", {{"color", {1, 0.5, 1}}}}};
+    const GraphProgram program =
+        graph_load({{"nodes", json::array({node})}, {"outputs", {{"baseColor", of(0)}}}}).graphs.at(0);
+    GraphRegisters registers;
+    for (const GraphInput& input : program.inputs) {
+      float value = 0;
+      if (input.quantity == Q::attribute_x || input.quantity == Q::attribute_alpha) value = 1;
+      if (input.quantity == Q::vertex_normal_z) value = 0.5f;
+      if (input.quantity == Q::normal_z) value = 1;
+      if (input.quantity == Q::object_from_world && input.index % 5 == 0) value = 1;
+      registers.lanes[input.register_index] = splat8(value);
+    }
+    const GraphProgramView view = program.view();
+    graph_run(view, nullptr, registers);
+    return graph_values({&view, &registers, 0}).of[static_cast<int>(GraphOutput::base_color)];
+  };
+  EXPECT_LT(length(normal_of(false) - normalize(Vec3f{1, 0, 0.5f})), 1e-6f);
+  EXPECT_LT(length(normal_of(true) - normalize(Vec3f{1, 0, 1})), 1e-6f);
+}
+
 TEST(GraphReader, HuesBelowNoneStayBelowOrGoRound)
 {
   json node = {{"type", "hue-saturation"}, {"inputs", {{"hue", -1.75}, {"color", {0.8, 0.2, 0.2}}}}};

@@ -171,7 +171,8 @@ def closures():
     b = Builder()
     nodes = [{"type": "texture-coordinate"},
              {"type": "noise-texture", "inputs": {"vector": {"node": 0, "output": "uv"}}},
-             {"type": "bump", "inputs": {"height": {"node": 1, "output": "factor"}, "distance": .1}, "invert": True}]
+             {"type": "bump", "inputs": {"height": {"node": 1, "output": "factor"}, "distance": .1}, "invert": True,
+              "filterWidth": .1}]
     factor, normal = {"node": 1, "output": "factor"}, {"node": 2}
     first = {"closures": [
         {"type": "diffuse", "weight": factor, "roughness": .5, "normal": normal, "maths": "4.3"},
@@ -182,7 +183,8 @@ def closures():
     second = {"closures": [
         {"type": "principled", "metallic": -1, "ior": 0, "distribution": "multiscatter-ggx"},
         {"type": "principled", "maths": "4.3", "coatWeight": 1, "coatIor": 0, "thinFilmThickness": 500},
-        {"type": "metallic", "fresnel": "physical"}, {"type": "glass", "ior": 1}, {"type": "refraction"},
+        {"type": "principled", "maths": "5.2", "metallic": .5, "thinFilmThickness": 500, "coatRoughness": .5},
+        {"type": "metallic", "fresnel": "physical", "maths": "5.2", "thinFilmThickness": 1e30}, {"type": "glass", "ior": 1}, {"type": "refraction"},
         {"type": "velvet"}, {"type": "sheen"}, {"type": "translucent"}]}
     height = {"nodes": nodes[:2], "outputs": {"height": factor}, "resolution": 4}
     b.json["materials"] = [

@@ -586,12 +586,15 @@ def _hue(g, node, groups):
 
 
 def _bump(g, node, groups):
-    # Not the Filter Width that came after 4.3: heights are asked for a footprint away, as at a width of 1.
     inputs = g.inputs(node, groups, {"Strength": "strength", "Distance": "distance", "Height": "height"})
     normal = g.normal(node.inputs["Normal"], groups)
     if normal is not None:
         inputs["normal"] = normal
-    return g.add("bump", inputs, invert=node.invert or None)
+    return g.add("bump", inputs, invert=node.invert or None, filterWidth=_unless_1(compat.bump_width(node)))
+
+
+def _unless_1(width):
+    return None if width == 1 else width
 
 
 def bump_of_displacement(g, source):
@@ -613,7 +616,8 @@ def bump_of_displacement(g, source):
             height = g.op("math", {"a": height, "b": _along_normal(g, direction)}, "value", operation="multiply")
     else:
         height = _along_normal(g, _displacement(g, source))
-    return g.op("bump", {"height": height, "strength": 1.0, "distance": 1.0}, "normal")
+    inputs = {"height": height, "strength": 1.0, "distance": 1.0}
+    return g.op("bump", inputs, "normal", filterWidth=_unless_1(compat.BUMP_WIDTH))
 
 
 def _direction(g, node, groups):

@@ -176,7 +176,8 @@ def _normal_map(g, source):
         inputs["color"] = _multiply_add(g, inputs["color"], (1.0, -1.0, 1.0), (0.0, 1.0, 0.0))
     if compat.TANGENT_STRENGTH and inputs["strength"] != 1:
         inputs = {"color": _flattened(g, **inputs)}
-    return _output(g.add("normal-map", inputs, space=space, uvSet=_tangent_set(g, node)), "normal")
+    is_unit = compat.NORMAL_MAPS_OVER_UNIT_NORMALS or None
+    return _output(g.add("normal-map", inputs, space=space, uvSet=_tangent_set(g, node), unitNormals=is_unit), "normal")
 
 
 def _multiply_add(g, vector, factors, summands):

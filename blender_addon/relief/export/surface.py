@@ -476,6 +476,9 @@ _DISTRIBUTIONS = {
 #: What closures of a version's own meaning say of it.
 _MATHS = {} if compat.MATHS == "3.4" else {"maths": compat.MATHS}
 
+#: Of closures of which only the shadows beside bent normals are of their version's own meaning.
+_SHADOW_MATHS = {"maths": compat.MATHS} if compat.MATHS == "5.2" else {}
+
 
 def _distribution(node):
     return _DISTRIBUTIONS.get(getattr(node, "distribution", None))
@@ -487,7 +490,7 @@ def _diffuse(w, source, weight):
 
 
 def _translucent(w, source, weight):
-    w.add("translucent", weight, **w.inputs(source, {"Color": "color", "Normal": "normal"}))
+    w.add("translucent", weight, **w.inputs(source, {"Color": "color", "Normal": "normal"}), **_SHADOW_MATHS)
 
 
 def _transparent(w, source, weight):
@@ -526,11 +529,9 @@ def _metallic(w, source, weight):
     names.update(
         {"Base Color": "baseColor", "Edge Tint": "edgeTint"} if is_f82 else {"IOR": "ior", "Extinction": "extinction"}
     )
+    names.update({"Thin Film Thickness": "thinFilmThickness", "Thin Film IOR": "thinFilmIor"})  # since 5.0
     values = w.inputs(source, names)
     values.update(w.anisotropy(source, {"Anisotropy": "anisotropy", "Rotation": "rotation"}))
-    film = node.inputs.get("Thin Film Thickness")
-    if film is not None and w.graph.constant(film, source.groups) != 0:
-        w.unread(source, "a thin film on metal", "it is left out")
     fresnel = "f82" if is_f82 else "physical"
     w.add("metallic", weight, **values, fresnel=fresnel, distribution=_distribution(node), **_MATHS)
 
@@ -543,17 +544,17 @@ def _sheen(w, source, weight):
     """The Sheen BSDF of 4.0, one of whose kinds is the Velvet BSDF of before."""
     is_velvet = source.node.distribution == "ASHIKHMIN"
     names = {"Color": "color", "Roughness": "sigma" if is_velvet else "roughness", "Normal": "normal"}
-    w.add("velvet" if is_velvet else "sheen", weight, **w.inputs(source, names))
+    w.add("velvet" if is_velvet else "sheen", weight, **w.inputs(source, names), **_SHADOW_MATHS)
 
 
 def _toon(w, source, weight):
     values = w.inputs(source, {"Color": "color", "Size": "size", "Smooth": "smooth", "Normal": "normal"})
-    w.add("toon", weight, **values, component=source.node.component.lower())
+    w.add("toon", weight, **values, component=source.node.component.lower(), **_SHADOW_MATHS)
 
 
 def _subsurface(w, source, weight):
     w.unread(source, "subsurface scattering", "a diffuse surface of its colour was used")
-    w.add("diffuse", weight, **w.inputs(source, {"Color": "color", "Normal": "normal"}))
+    w.add("diffuse", weight, **w.inputs(source, {"Color": "color", "Normal": "normal"}), **_SHADOW_MATHS)
 
 
 def _colored(what):
@@ -562,7 +563,8 @@ def _colored(what):
     def write(w, source, weight):
         w.unread(source, what, "a diffuse surface of its colour was used")
         # Only the sockets that a node shows are found: hair by absorption has no colour.
-        w.add("diffuse", weight, **w.inputs(source, {"Color": "color", "Base Color": "color", "Normal": "normal"}))
+        names = {"Color": "color", "Base Color": "color", "Normal": "normal"}
+        w.add("diffuse", weight, **w.inputs(source, names), **_SHADOW_MATHS)
 
     return write
 
@@ -591,8 +593,6 @@ def _principled(w, source, weight):
     wall = node.inputs.get("Thin Wall")  # since 5.2
     if wall is not None and w.graph.constant(wall, groups) != 0:
         w.unread(source, "a thin wall", "what bounds a solid was used")
-    if compat.METAL_HAS_FILM and all(w.graph.constant(node.inputs[n], groups) != 0 for n in ("Metallic", "Thin Film Thickness")):
-        w.unread(source, "a thin film on metal", "only what is no metal has it")
     if w.graph.constant(socket("Transmission"), groups) != 0:
         w.transmits = True
     values = w.inputs(source, compat.PRINCIPLED_INPUTS)

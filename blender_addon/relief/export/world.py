@@ -154,17 +154,21 @@ class WorldGraph(GraphWriter):
 
     def _sky(self, source):
         node = source.node
-        if node.sky_type == "PREETHAM":
-            vector = {"vector": self.vector(node, source.groups, "generated")}
-            sun = list(node.sun_direction)
-            return self.op("sky-texture", vector, "color", sky="preetham", sunDirection=sun, turbidity=node.turbidity)
-        if node.sky_type not in {"NISHITA", "SINGLE_SCATTERING"}:
+        kind = compat.sky_kind(node)
+        if kind is None:
             raise NotUnderstood(f'node "{node.name}" ({node.bl_label}): {node.sky_type.lower()}')
+        if kind in {"preetham", "hosek-wilkie"}:
+            vector = {"vector": self.vector(node, source.groups, "generated")}
+            settings = {"sky": kind, "sunDirection": list(node.sun_direction), "turbidity": node.turbidity}
+            if kind == "hosek-wilkie":
+                settings["groundAlbedo"] = node.ground_albedo
+            return self.op("sky-texture", vector, "color", **settings)
         elevation, turn = _sun_angles(node.sun_elevation, node.sun_rotation)
         return self.op(
             "sky-texture",
             {"vector": self.vector(node, source.groups, "generated")},
             "color",
+            sky=None if kind == "nishita" else kind,
             sunDisc=node.sun_disc,
             sunSize=node.sun_size,
             sunIntensity=node.sun_intensity,

@@ -1,6 +1,7 @@
 // Values of the lobes of Blender's shaders: against formulae in double that share no code, and against pictures of Cycles.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <complex>
 
 #include "kernel/bsdf/ashikhmin_shirley.h"
@@ -13,6 +14,7 @@
 #include "kernel/bsdf/principled_diffuse.h"
 #include "kernel/bsdf/principled_sheen.h"
 #include "kernel/bsdf/sheen_microfibre.h"
+#include "kernel/bsdf/thin_film.h"
 #include "kernel/bsdf/toon.h"
 #include "kernel/bsdf/translucent.h"
 #include "kernel/bsdf/velvet.h"
@@ -381,6 +383,26 @@ TEST(FresnelModels, ConductorIsCloseToTheExactOne)
   EXPECT_NEAR(fresnel_conductor(splat3(1.5f), splat3(0.0f), 1.0f).x, 0.04f, 1e-6f);
 }
 
+TEST(FresnelModels, ConductorsOf52AreExact)
+{
+  for (const double eta : {0.2, 1.0, 2.757}) {
+    for (const double k : {0.0, 0.5, 3.867}) {
+      for (double cosine = 0.02; cosine <= 1.0; cosine += 0.07) {
+        const Amplitudes a = amplitudes(1.4, cosine, {eta, k});
+        const Vec3f n3 = splat3(static_cast<float>(eta)), k3 = splat3(static_cast<float>(k));
+        const ConductorReflection r = fresnel_conductor_polarized(static_cast<float>(cosine), 1.4f, n3, k3);
+        EXPECT_NEAR(static_cast<double>(r.R_s.x), std::norm(a.s), 2e-5) << eta << " " << k << " " << cosine;
+        EXPECT_NEAR(static_cast<double>(r.R_p.y), std::norm(a.p), 2e-5) << eta << " " << k << " " << cosine;
+        if (k == 0.0) continue;
+        EXPECT_NEAR(static_cast<double>(r.cos_s.z), std::cos(std::arg(a.s)), 2e-4) << eta << " " << k << " " << cosine;
+        EXPECT_NEAR(static_cast<double>(r.sin_s.z), std::sin(std::arg(a.s)), 2e-4) << eta << " " << k << " " << cosine;
+        EXPECT_NEAR(static_cast<double>(r.cos_p.x), std::cos(std::arg(a.p)), 2e-4) << eta << " " << k << " " << cosine;
+        EXPECT_NEAR(static_cast<double>(r.sin_p.x), std::sin(std::arg(a.p)), 2e-4) << eta << " " << k << " " << cosine;
+      }
+    }
+  }
+}
+
 TEST(FresnelModels, F82MeetsItsColours)
 {
   const Vec3f F0 = {0.617f, 0.577f, 0.540f}, tint = {0.695f, 0.726f, 0.770f};
@@ -477,6 +499,87 @@ TEST(FresnelModels, ThinFilmIsTheSpectralIntegral)
       EXPECT_NEAR(static_cast<double>(F.x), rgb[0], 3e-3) << nm << " " << cosine;
       EXPECT_NEAR(static_cast<double>(F.y), rgb[1], 3e-3) << nm << " " << cosine;
       EXPECT_NEAR(static_cast<double>(F.z), rgb[2], 3e-3) << nm << " " << cosine;
+    }
+  }
+}
+
+const ThinFilmTable& film_table()
+{
+  static const auto made = [] {
+    auto table = std::make_unique<ThinFilmTable>();
+    thin_film_table_make(*table);
+    return table;
+  }();
+  return *made;
+}
+
+TEST(FresnelModels, FilmsOf52AreSpectralIntegrals)
+{
+  // Airy's sum in closed form at each wavelength that the table is made of, by Rec.709's matching functions.
+  const double from_xyz[3][3] = {
+      {3.2404542, -1.5371385, -0.4985314}, {-0.9692660, 1.8760108, 0.0415560}, {0.0556434, -0.2040259, 1.0572252}};
+  for (const std::complex<double> below : {std::complex<double>(1.5, 0.0), std::complex<double>(2.757, 3.867)}) {
+    for (const double nm : {50.0, 300.0, 900.0}) {
+      for (const double cosine : {0.4, 0.7, 1.0}) {
+        const double film = 1.33, cos2 = std::sqrt(1.0 - (1.0 - cosine * cosine) / (film * film));
+        const Amplitudes top = amplitudes(1.0, cosine, film), bottom = amplitudes(film, cos2, below);
+        double rgb[3] = {}, norm[3] = {};
+        for (int w = 0; w < kNumCieMatches; ++w) {
+          const std::complex<double> turn = std::polar(1.0, 4.0 * kPiD * film * nm * cos2 / (380.0 + 5.0 * w));
+          const auto sum = [&](std::complex<double> r12, std::complex<double> r23) {
+            return std::norm((r12 + r23 * turn) / (1.0 + r12 * r23 * turn));
+          };
+          const double R = 0.5 * (sum(top.s, bottom.s) + sum(top.p, bottom.p));
+          for (int c = 0; c < 3; ++c) {
+            double match = 0;
+            for (int i = 0; i < 3; ++i) match += from_xyz[c][i] * static_cast<double>(kCieMatches[i][w]);
+            rgb[c] += R * match;
+            norm[c] += match;
+          }
+        }
+        const ThinFilm thin{&film_table(), 1.33f, static_cast<float>(nm)};
+        const Vec3f n = splat3(static_cast<float>(below.real())), k = splat3(static_cast<float>(below.imag()));
+        const Vec3f F = below.imag() > 0 ? fresnel_film_on_conductor(thin, static_cast<float>(cosine), n, k)
+                                         : fresnel_film_on_dielectric(thin, static_cast<float>(cosine), n.x);
+        // The code stops at the third order, of which a metal leaves more; its table is linear between nodes.
+        const double allowed = below.imag() > 0 ? 4e-3 : 5e-4;
+        const auto exact = [&](int c) { return std::clamp(rgb[c] / norm[c], 0.0, 1.0); };
+        EXPECT_NEAR(static_cast<double>(F.x), exact(0), allowed) << below << " " << nm << " " << cosine;
+        EXPECT_NEAR(static_cast<double>(F.y), exact(1), allowed) << below << " " << nm << " " << cosine;
+        EXPECT_NEAR(static_cast<double>(F.z), exact(2), allowed) << below << " " << nm << " " << cosine;
+      }
+    }
+  }
+}
+
+TEST(FresnelModels, FilmsThatHaveFadedAreNotThere)
+{
+  const ThinFilm none{&film_table(), 1.33f, 1e-3f};
+  const Vec3f n{2.757f, 2.513f, 2.231f}, k{3.867f, 3.404f, 3.009f};
+  for (const float z : {0.1f, 0.5f, 1.0f}) {
+    EXPECT_LT(max_component(abs(fresnel_film_on_dielectric(none, z, 1.5f) - splat3(fresnel_dielectric_at(z, 1.5f)))),
+              1e-4f);
+    EXPECT_LT(max_component(abs(fresnel_film_on_conductor(none, z, n, k) - fresnel_conductor_exact(n, k, z))), 1e-4f);
+    const FresnelF82 metal = fresnel_f82_make({0.9f, 0.6f, 0.2f}, {0.7f, 0.8f, 0.9f});
+    EXPECT_LT(max_component(abs(fresnel_film_on_f82(none, z, metal) - fresnel_f82(metal, z))), 2e-3f);
+  }
+}
+
+TEST(FresnelModels, FilmsOf52NeverReflectMoreThanAll)
+{
+  for (float z = 0.0f; z <= 1.0f; z += 0.05f) {
+    for (const float nm : {0.2f, 100.0f, 5000.0f, 1e8f}) {
+      for (const float film : {1e-5f, 0.7f, 1.0f, 1.9f, 40.0f}) {
+        const ThinFilm thin{&film_table(), film, nm};
+        const FresnelF82 metal = fresnel_f82_make({1.0f, 0.5f, 0.0f}, {0.0f, 1.0f, 0.5f});
+        for (const Vec3f F :
+             {fresnel_film_on_dielectric(thin, z, 1.5f), fresnel_film_on_dielectric(thin, z, 0.6f),
+              fresnel_film_on_conductor(thin, z, {0, 1, 3}, {0, 0, 1e8f}), fresnel_film_on_f82(thin, z, metal)}) {
+          EXPECT_TRUE(is_finite(F)) << z << " " << nm << " " << film;
+          EXPECT_GE(min_component(F), 0.0f);
+          EXPECT_LE(max_component(F), 1.0f);
+        }
+      }
     }
   }
 }
