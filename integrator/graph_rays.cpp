@@ -50,7 +50,7 @@ bool is_stopped(const Accel& accel, Vec3f O, Vec3f D, float length, std::int32_t
 /// @source as Cycles' Ambient Occlusion: rays by the cosine to the normal
 float open_share(const void* scene, const GraphOpenShare& question)
 {
-  const Vec3f N = y_up(question.N), O[2] = {y_up(question.O[0]), y_up(question.O[1])};
+  const Vec3f Ng = y_up(question.Ng), N = y_up(question.N), O[2] = {y_up(question.O[0]), y_up(question.O[1])};
   if (!(question.distance > 0.0f) || question.num_rays < 1 || !(length_squared(N) > 0.0f) || !is_finite(N)) return 1.0f;
   const Accel& accel = *static_cast<const Accel*>(scene);
   const Frame frame = frame_from_normal(normalize(N));
@@ -59,7 +59,7 @@ float open_share(const void* scene, const GraphOpenShare& question)
   for (int i = 0; i < question.num_rays; ++i) {
     const Vec3f D = from_local(frame, warp_cosine_hemisphere(sample_2d(hash, static_cast<std::uint32_t>(i), 0)));
     // By the smooth normal rays leave on either side of a facet, which itself is never in their way.
-    const Vec3f& from = dot(D, O[0] - O[1]) > 0.0f ? O[0] : O[1];
+    const Vec3f& from = dot(D, Ng) > 0.0f ? O[0] : O[1];
     if (!is_stopped(accel, from, D, question.distance, question.instance)) ++num_open;
   }
   return static_cast<float>(num_open) / static_cast<float>(question.num_rays);

@@ -516,19 +516,19 @@ RELIEF_KERNEL void graph_fresnel(const GraphOperands& o)
             }));
 }
 
-/// How much is open over a point by ambient occlusion: origins on both sides, normal and direction to the viewer, world; then the
+/// How much is open over a point by ambient occlusion: origins on both sides, geometric normal, normal and direction to the viewer, world; then the
 /// distance that is looked, and the instance that alone counts or −1. Immediate: rays.
 RELIEF_KERNEL void graph_open_share(const GraphOperands& o)
 {
   const GraphRays& rays = o.registers.rays;
-  alignas(32) float in[14][8], out[8];
-  for (int i = 0; i < 14; ++i) store8(in[i], graph_in(o, i));
+  alignas(32) float in[17][8], out[8];
+  for (int i = 0; i < 17; ++i) store8(in[i], graph_in(o, i));
   for (int k = 0; k < 8; ++k) {
     out[k] = 1.0f;
     if (rays.open_share == nullptr || (o.registers.used >> k & 1u) == 0) continue;
     const auto vector = [&](int i) { return Vec3f{in[i][k], in[i + 1][k], in[i + 2][k]}; };
-    out[k] = rays.open_share(rays.scene, {{vector(0), vector(3)}, vector(6), vector(9), in[12][k], o.immediates[0],
-                                          static_cast<std::int32_t>(in[13][k])});
+    out[k] = rays.open_share(rays.scene, {{vector(0), vector(3)}, vector(6), vector(9), vector(12), in[15][k],
+                                          o.immediates[0], static_cast<std::int32_t>(in[16][k])});
   }
   graph_set(o, 0, load8(out));
 }

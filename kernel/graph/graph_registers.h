@@ -10,7 +10,8 @@ namespace relief {
 /// A question of how much of a hemisphere is open, world with Z up.
 struct GraphOpenShare {
   Vec3f O[2];      ///< where rays leave: on the side of the viewer, on the other
-  Vec3f N;         ///< of any length
+  Vec3f Ng;        ///< geometric normal on the side of the viewer
+  Vec3f N;         ///< whose hemisphere it is; of any length
   Vec3f wo;        ///< with O what is told apart by
   float distance;  ///< metres that are looked
   int num_rays;

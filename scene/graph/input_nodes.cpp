@@ -270,7 +270,8 @@ void lower_ambient_occlusion(GraphNode& n)
   for (const std::uint16_t side : {std::uint16_t{0}, std::uint16_t{1}}) {
     for (const Q q : {Q::ray_origin_x, Q::ray_origin_y, Q::ray_origin_z}) in.push_back(b.quantity(q, side));
   }
-  for (const GraphVector& v : {normal, incoming(b)}) in.insert(in.end(), v.begin(), v.end());
+  const GraphVector true_normal = quantities(b, Q::true_normal_x, Q::true_normal_y, Q::true_normal_z);
+  for (const GraphVector& v : {true_normal, normal, incoming(b)}) in.insert(in.end(), v.begin(), v.end());
   in.push_back(n.number("distance"));
   in.push_back(is_local ? b.quantity(Q::instance) : b.constant(-1));
   const GraphScalar open = b.apply(Op::open_share, in, {&rays, 1}).front();
