@@ -103,6 +103,8 @@ struct LampPoint {
         return 1.0f;
       case Q::edge_distance:
         return kInfinity;
+      case Q::instance:
+        return -1.0f;
       default: {
         constexpr MeshView kNoMesh;
         const GraphPoint point{&kNoMesh,     &lamp.node, 0,     uv.y, 1.0f - uv.x - uv.y, &hit, wo,
@@ -196,7 +198,8 @@ Vec3f emitter_graph_radiance(const KernelGlobals& g, const Light& emitter, const
     const GraphProgramView& program = g.graphs[g.lamps[emitter.lamp_index].graph_index];
     GraphRegisters registers;
     const LampPoint point(g, emitter, at);
-    for (int lane = 0; lane < 8; ++lane) point.load(program, lane, registers);
+    point.load(program, 0, registers);
+    registers.used = 1;
     g.run_graph(program, g.textures, registers);
     return lamp_factor({&program, &registers, 0}) * emitter.lamp_scale;
   }

@@ -69,9 +69,4 @@ LightSet light_set_make(const Scene& scene,
                         EnvironmentDensity density = EnvironmentDensity::kExcess,
                         const KernelGlobals* globals = nullptr);
 
-/// The same from parts, without a scene: fills trails, suns, area_lights, and the tree from `lights`, `copies` and `shared`.
-/// @param intensity_scales  one a light, >= 0: mean of the texture that will multiply its emission; empty: all 1. A light
-///                          whose emission times scale is zero is never chosen
-void light_set_build_tree(LightSet& set, std::span<const float> intensity_scales);
-
 }  // namespace relief

@@ -1,0 +1,518 @@
+#include "integrator/light_tree_build.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <numbers>
+
+namespace relief {
+namespace {
+
+constexpr float kPiAngle = std::numbers::pi_v<float>;
+
+/// Cone of directions: unit axis and half angle in radians, [0, π].
+struct Cone {
+  Vec3f axis{0, 0, 1};
+  float angle = 0;
+};
+
+/// Smallest cone around two.
+/// @source Conty Estevez and Kulla 2018, Algorithm 1
+Cone cone_union(const Cone& a, const Cone& b)
+{
+  const Cone& wide = a.angle >= b.angle ? a : b;
+  const Cone& narrow = a.angle >= b.angle ? b : a;
+  const float between = std::atan2(length(cross(wide.axis, narrow.axis)), dot(wide.axis, narrow.axis));
+  if (std::min(between + narrow.angle, kPiAngle) <= wide.angle) return wide;
+  const float angle = 0.5f * (wide.angle + between + narrow.angle);
+  if (angle >= kPiAngle) return {wide.axis, kPiAngle};
+  // Turn the wide cone's axis towards the narrow one's; opposite axes have no direction to turn in.
+  const Vec3f turn = narrow.axis - wide.axis * dot(wide.axis, narrow.axis);
+  const float turn_length = length(turn);
+  if (!(turn_length > 1e-6f)) return {wide.axis, kPiAngle};
+  const float by = angle - wide.angle;
+  return {normalize(wide.axis * std::cos(by) + turn * (std::sin(by) / turn_length)), angle};
+}
+
+/// Mean over all directions of the part of its intensity that a light has there, and the same times three and the cosine
+/// to its axis: the expansion of that part to first order is mean + slope × cosine.
+struct LightProfile {
+  float mean = 1, slope = 0;
+};
+constexpr LightProfile kFlatProfile{1.0f / 4.0f, 1.0f / 2.0f};
+constexpr LightProfile kTwoSidedProfile{1.0f / 2.0f, 0.0f};
+/// One within a cone, nothing outside.
+LightProfile cone_profile(float cosine) { return {0.5f * (1.0f - cosine), 0.75f * (1.0f - cosine * cosine)}; }
+
+/// What the build knows of a light or a group; the tree's nodes are made from these.
+struct LightBounds {
+  Vec3f low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
+  Cone spread;
+  float falloff = 0;       ///< radians
+  float profile_mean = 1;  ///< of a light: see LightProfile
+  Vec3f profile_slope;     ///< of a light: LightProfile::slope along its axis
+  bool is_flat = false;    ///< a light whose intensity is its cosine
+  float intensity = 0;     ///< 0: empty group
+  bool two_sided = false;
+};
+
+LightBounds bounds_union(const LightBounds& a, const LightBounds& b)
+{
+  if (a.intensity == 0) return b;
+  if (b.intensity == 0) return a;
+  LightBounds both;
+  both.low = min(a.low, b.low);
+  both.high = max(a.high, b.high);
+  both.spread = cone_union(a.spread, b.spread);
+  both.falloff = std::max(a.falloff, b.falloff);
+  both.intensity = std::min(a.intensity + b.intensity, 1e30f);
+  both.two_sided = a.two_sided || b.two_sided;
+  return both;
+}
+
+Vec3f bounds_centre(const LightBounds& bounds) { return bounds.low * 0.5f + bounds.high * 0.5f; }
+
+/// @param scale  mean of the emission texture
+/// @return       intensity 0: the light never needs choosing
+LightBounds light_bounds(const Light& light, float scale)
+{
+  LightBounds bounds;
+  const float emission = light_scalar(light.emission) * scale;
+  const auto include = [&bounds](Vec3f P) {
+    bounds.low = min(bounds.low, P);
+    bounds.high = max(bounds.high, P);
+  };
+  LightProfile profile;
+  switch (light.kind) {
+    case LightKind::kPoint:
+      include(light.P - Vec3f{light.radius, light.radius, light.radius});
+      include(light.P + Vec3f{light.radius, light.radius, light.radius});
+      bounds.spread = {{0, 0, 1}, kPiAngle};
+      bounds.falloff = 0.5f * kPiAngle;
+      bounds.intensity = emission;
+      break;
+    case LightKind::kSpot: {
+      include(light.P - Vec3f{light.radius, light.radius, light.radius});
+      include(light.P + Vec3f{light.radius, light.radius, light.radius});
+      const float inner = std::acos(std::clamp(light.cos_inner, -1.0f, 1.0f));
+      const float outer = std::acos(std::clamp(light.cos_outer, -1.0f, 1.0f));
+      bounds.spread = {light.axis, std::min(inner, outer)};
+      bounds.falloff = std::max(outer - inner, 0.0f);
+      profile = cone_profile(std::cos(0.5f * (inner + outer)));
+      bounds.intensity = emission;
+      break;
+    }
+    case LightKind::kRectangle:
+    case LightKind::kDisk:
+      for (const float u : {-1.0f, 1.0f}) {
+        for (const float v : {-1.0f, 1.0f}) include(light.P + light.edge_u * u + light.edge_v * v);
+      }
+      break;
+    case LightKind::kTriangle:
+      include(light.P);
+      include(light.P + light.edge_u);
+      include(light.P + light.edge_v);
+      break;
+    case LightKind::kSun:
+    case LightKind::kEnvironment:
+      return {};
+  }
+  if (light.kind == LightKind::kRectangle || light.kind == LightKind::kDisk || light.kind == LightKind::kTriangle) {
+    bounds.spread = {light.axis, 0.0f};
+    bounds.falloff = 0.5f * kPiAngle;
+    bounds.intensity = emission * light.area;
+    bounds.two_sided = light.two_sided;
+    profile = light.two_sided ? kTwoSidedProfile : kFlatProfile;
+    bounds.is_flat = true;
+    if (light.spread_tan > 0.0f) {
+      // Brighter along the axis, and nothing beyond the spread.
+      bounds.falloff = std::atan(light.spread_tan);
+      bounds.intensity *= light.spread_tan * light.spread_scale;
+      profile = cone_profile(std::cos(0.5f * bounds.falloff));
+      if (light.two_sided) profile = {2.0f * profile.mean, 0.0f};
+      bounds.is_flat = false;
+    }
+  }
+  bounds.profile_mean = profile.mean;
+  bounds.profile_slope = bounds.spread.axis * profile.slope;
+  const bool usable = bounds.intensity > 0.0f && is_finite(bounds.low) && is_finite(bounds.high);
+  if (!usable) return {};
+  bounds.intensity = std::min(bounds.intensity, 1e30f);
+  return bounds;
+}
+
+struct BuildLight {
+  LightBounds bounds;
+  Vec3f centre;
+  std::uint32_t link = 0;  ///< as LightTreeBlock::link
+};
+
+/// Sums over a group's lights, weighted by their intensities.
+struct ProfileSum {
+  double intensity = 0, mean = 0, slope[3] = {};
+};
+
+ProfileSum profile_sum(std::span<const BuildLight> lights)
+{
+  ProfileSum sum;
+  for (const BuildLight& light : lights) {
+    const double weight = static_cast<double>(light.bounds.intensity);
+    const Vec3f slope = light.bounds.profile_slope;
+    sum.intensity += weight;
+    sum.mean += weight * static_cast<double>(light.bounds.profile_mean);
+    sum.slope[0] += weight * static_cast<double>(slope.x);
+    sum.slope[1] += weight * static_cast<double>(slope.y);
+    sum.slope[2] += weight * static_cast<double>(slope.z);
+  }
+  return sum;
+}
+
+/// Intensity of a group by direction ω as a node keeps it: intensity × min(1, constant + slope · ω).
+struct GroupProfile {
+  float intensity = 0, constant = 1;
+  Vec3f slope{};
+};
+
+/// @param lights  the group's
+/// @param bounds  around all of them
+/// @return        not negative in any direction in which one of the lights emits, but for the points that a sphere around
+///                them covers
+GroupProfile group_profile(std::span<const BuildLight> lights, const LightBounds& bounds)
+{
+  if (lights.size() == 1 && bounds.is_flat) return {bounds.intensity, 0.0f, bounds.spread.axis};
+  const float reach = std::min(bounds.spread.angle + bounds.falloff, kPiAngle);
+  const float cos_reach = std::cos(reach);
+  if (cos_reach > 0.0f) {
+    // Spots: all of it within the inner cone, nothing beyond the outer one; where the two are nearly the same, the ramp is
+    // less steep and begins outside.
+    constexpr float kSteepest = 8.0f;
+    const float cos_full = std::max(std::cos(bounds.spread.angle), cos_reach + 0.5f / kSteepest);
+    const float steepness = std::min(1.0f / (cos_full - cos_reach), kSteepest);
+    return {bounds.intensity, 1.0f - steepness * cos_full, bounds.spread.axis * steepness};
+  }
+  const ProfileSum sum = profile_sum(lights);
+  const double total = sum.intensity, mean = sum.mean / total;
+  const double x = sum.slope[0], y = sum.slope[1], z = sum.slope[2];
+  const double first_order = std::sqrt(x * x + y * y + z * z) / total;
+  if (!(first_order > 1e-6)) return {bounds.intensity * static_cast<float>(mean), 1.0f, {}};
+  // The expansion is as it should be for lights that face in all directions, and too even for those that face in one,
+  // whose profile is max(0, cos) = 2 slope · ω: between the two we blend by how much the lights agree.
+  const double agreement = std::min(first_order / (2 * mean), 1.0);
+  double constant = mean * (1 - agreement);
+  const double steepness = first_order * (1 + agreement);
+  const Vec3f direction =
+      normalize(Vec3f{static_cast<float>(x / total), static_cast<float>(y / total), static_cast<float>(z / total)});
+  const double between = std::acos(std::clamp(static_cast<double>(dot(direction, bounds.spread.axis)), -1.0, 1.0));
+  constant =
+      std::max(constant, -steepness * std::cos(std::min(between + static_cast<double>(reach), std::numbers::pi)));
+  const double peak = constant + steepness;
+  // Mean over all directions of what is positive of it, which is made that of the lights.
+  const double kept = constant >= steepness ? constant : peak * peak / (4 * steepness);
+  return {static_cast<float>(total * peak * mean / kept), static_cast<float>(constant / peak),
+          direction * static_cast<float>(steepness / peak)};
+}
+
+/// Upper half of a float's bits (sign, exponent, 7 bits of mantissa), to the nearest.
+std::uint32_t upper_half(float v) { return (std::bit_cast<std::uint32_t>(v) + 0x8000u) >> 16; }
+/// The same of a number that is not negative, rounded up.
+std::uint32_t upper_half_above(float v) { return (std::bit_cast<std::uint32_t>(v) + 0xffffu) >> 16; }
+
+/// Writes one child of a node so that it holds all of a group.
+/// @param link  without the two-sided flag
+void child_write(LightTreeBlock& block,
+                 std::size_t lane,
+                 const LightBounds& bounds,
+                 const GroupProfile& profile,
+                 std::uint32_t link)
+{
+  const Vec3f centre = bounds_centre(bounds);
+  const float half_diagonal = length(bounds.high * 0.5f - bounds.low * 0.5f);
+  block.cx[lane] = centre.x;
+  block.cy[lane] = centre.y;
+  block.cz[lane] = centre.z;
+  block.intensity[lane] = std::min(profile.intensity, 1e30f);
+  // A few ulps for the roundings of centre and diagonal; a lone point light keeps radius 0.
+  const float rounding = half_diagonal > 0.0f ? 4e-7f * max_component(abs(centre)) : 0.0f;
+  const float radius = half_diagonal * (1.0f + 1e-6f) + rounding;
+  const float emission_radius = radius * (length(profile.slope) + std::abs(profile.constant));
+  block.radii[lane] = upper_half_above(emission_radius) | upper_half_above(radius) << 16;
+  block.slope_xy[lane] = upper_half(profile.slope.x) | upper_half(profile.slope.y) << 16;
+  block.slope_z_constant[lane] = upper_half(profile.slope.z) | upper_half(profile.constant) << 16;
+  block.link[lane] = link | (bounds.two_sided ? kLightTreeTwoSided : 0u);
+}
+
+/// Cost of a group by its orientation: solid angle of its emission, weighted by the cosine it falls off with.
+/// @source Conty Estevez and Kulla 2018, Eq. 1
+float orientation_cost(const LightBounds& bounds)
+{
+  const float spread = bounds.two_sided ? kPiAngle : bounds.spread.angle;
+  const float reach = std::min(spread + bounds.falloff, kPiAngle);
+  const float sin_spread = std::sin(spread), cos_spread = std::cos(spread);
+  return 2.0f * kPiAngle * (1.0f - cos_spread) +
+         0.5f * kPiAngle *
+             (2.0f * reach * sin_spread - std::cos(spread - 2.0f * reach) - 2.0f * spread * sin_spread + cos_spread);
+}
+
+/// Cost of a group in a split: intensity × orientation × surface of the box.
+float group_cost(const LightBounds& bounds)
+{
+  if (bounds.intensity == 0) return 0;
+  const Vec3f d = bounds.high - bounds.low;
+  return bounds.intensity * orientation_cost(bounds) * (d.x * d.y + d.y * d.z + d.z * d.x);
+}
+
+float component(Vec3f v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+
+struct RangeBounds {
+  LightBounds bounds;
+  Vec3f centre_low{kInfinity, kInfinity, kInfinity}, centre_high{-kInfinity, -kInfinity, -kInfinity};
+};
+
+RangeBounds range_bounds(std::span<const BuildLight> lights)
+{
+  RangeBounds range;
+  for (const BuildLight& light : lights) {
+    range.bounds = bounds_union(range.bounds, light.bounds);
+    range.centre_low = min(range.centre_low, light.centre);
+    range.centre_high = max(range.centre_high, light.centre);
+  }
+  return range;
+}
+
+/// Reorders a range so that its first `result` lights are one part: binned by centre on each axis, the least sum of the
+/// parts' costs wins.
+/// @param balanced  halves instead
+/// @pre             at least two lights
+/// @source Conty Estevez and Kulla 2018, Eq. 2
+std::size_t range_split(std::span<BuildLight> lights, const RangeBounds& range, bool balanced)
+{
+  constexpr int kBins = 16;
+  const Vec3f extent = range.centre_high - range.centre_low;
+  const float longest = max_component(extent);
+  const std::size_t half = lights.size() / 2;
+  float best_cost = kInfinity;
+  int best_axis = -1, best_bin = 0;
+  const auto bin_of = [&](const BuildLight& light, int axis) {
+    const float x = (component(light.centre, axis) - component(range.centre_low, axis)) / component(extent, axis);
+    return std::clamp(static_cast<int>(x * kBins), 0, kBins - 1);
+  };
+  for (int axis = 0; axis < 3 && !balanced; ++axis) {
+    if (!(component(extent, axis) > 0.0f)) continue;
+    std::array<LightBounds, kBins> bins;
+    for (const BuildLight& light : lights) {
+      LightBounds& bin = bins[static_cast<std::size_t>(bin_of(light, axis))];
+      bin = bounds_union(bin, light.bounds);
+    }
+    std::array<float, kBins> cost_above{};
+    LightBounds above;
+    for (int i = kBins - 1; i > 0; --i) {
+      above = bounds_union(above, bins[static_cast<std::size_t>(i)]);
+      cost_above[static_cast<std::size_t>(i)] = group_cost(above);
+    }
+    LightBounds below;
+    // Splits across the longest side are preferred: thin slabs of lights are poor groups.
+    const float regularity = longest / component(extent, axis);
+    for (int i = 1; i < kBins; ++i) {
+      below = bounds_union(below, bins[static_cast<std::size_t>(i - 1)]);
+      const float cost = regularity * (group_cost(below) + cost_above[static_cast<std::size_t>(i)]);
+      if (below.intensity > 0 && cost < best_cost) {
+        best_cost = cost;
+        best_axis = axis;
+        best_bin = i;
+      }
+    }
+  }
+  if (best_axis >= 0) {
+    const auto middle = std::stable_partition(
+        lights.begin(), lights.end(), [&](const BuildLight& light) { return bin_of(light, best_axis) < best_bin; });
+    const auto first = static_cast<std::size_t>(middle - lights.begin());
+    if (first > 0 && first < lights.size()) return first;
+  }
+  // Asked for, or coincident centres, or costs that overflow.
+  const int axis = extent.x == longest ? 0 : extent.y == longest ? 1 : 2;
+  std::stable_sort(lights.begin(), lights.end(), [axis](const BuildLight& a, const BuildLight& b) {
+    return component(a.centre, axis) < component(b.centre, axis);
+  });
+  return half;
+}
+
+/// A part of the lights that becomes one child of a node.
+struct Group {
+  std::span<BuildLight> lights;
+  RangeBounds range;
+  float cost = 0;
+};
+
+/// Splits a range into up to kLightTreeWidth groups: always the one with the greatest cost, until there are enough.
+/// @param balanced  groups of equal numbers of lights instead
+std::vector<Group> range_groups(std::span<BuildLight> lights, bool balanced)
+{
+  const auto group_make = [balanced](std::span<BuildLight> part) {
+    Group group{part, range_bounds(part), -1.0f};
+    if (part.size() > 1) group.cost = balanced ? static_cast<float>(part.size()) : group_cost(group.range.bounds);
+    return group;
+  };
+  std::vector<Group> groups{group_make(lights)};
+  while (groups.size() < static_cast<std::size_t>(kLightTreeWidth)) {
+    const auto worst =
+        std::max_element(groups.begin(), groups.end(), [](const Group& a, const Group& b) { return a.cost < b.cost; });
+    if (worst->lights.size() < 2) break;
+    const Group group = *worst;
+    const std::size_t middle = range_split(group.lights, group.range, balanced);
+    *worst = group_make(group.lights.first(middle));
+    groups.insert(worst + 1, group_make(group.lights.subspan(middle)));
+  }
+  return groups;
+}
+
+/// A node before it has a place: its children, and below each child of several lights another branch.
+struct Branch {
+  std::vector<Group> groups;
+  std::vector<Branch> below;  ///< one a group; empty for single lights
+};
+
+/// @param depth  of the node, root 0
+Branch branch_make(std::span<BuildLight> lights, int depth)
+{
+  // From this depth on groups are balanced: six more levels hold 32^6 lights, so no trail is too long.
+  constexpr int kBalancedFrom = kLightTreeMaxDepth - 6;
+  // Below this size a task costs more than it saves.
+  constexpr std::size_t kParallelLights = 2048;
+  Branch branch{range_groups(lights, depth >= kBalancedFrom), {}};
+  branch.below.resize(branch.groups.size());
+  const auto descend = [&](std::size_t i) {
+    if (branch.groups[i].lights.size() > 1) branch.below[i] = branch_make(branch.groups[i].lights, depth + 1);
+  };
+  if (lights.size() >= kParallelLights) {
+    tbb::parallel_for(std::size_t{0}, branch.groups.size(), descend);
+  } else {
+    for (std::size_t i = 0; i < branch.groups.size(); ++i) descend(i);
+  }
+  return branch;
+}
+
+/// Gives a branch and all below it their places, depth first, so that the layout does not depend on threads.
+/// @param trail  way to the branch
+/// @param depth  of the branch: the trail's length
+/// @return       link to the branch
+std::uint32_t branch_write(const Branch& branch, LightTrail trail, int depth, LightSet& set)
+{
+  const std::size_t first = set.tree_blocks.size();
+  const std::size_t num_blocks = (branch.groups.size() + kLightTreeLanes - 1) / kLightTreeLanes;
+  set.tree_blocks.resize(first + num_blocks);
+  for (std::size_t i = 0; i < branch.groups.size(); ++i) {
+    const Group& group = branch.groups[i];
+    const LightTrail child_trail = trail | static_cast<LightTrail>(i) << (kLightTreeTrailBits * depth);
+    std::uint32_t link = 0;
+    if (group.lights.size() == 1) {
+      link = group.lights[0].link;
+      const std::uint32_t index = link & kLightTreeIndexMask;
+      ((link & kLightTreeCopy) != 0 ? set.copies[index].trail : set.light_trails[index]) = child_trail;
+    } else {
+      link = branch_write(branch.below[i], child_trail, depth + 1, set);
+    }
+    child_write(set.tree_blocks[first + i / kLightTreeLanes], i % kLightTreeLanes, group.range.bounds,
+                group_profile(group.lights, group.range.bounds), link);
+  }
+  return static_cast<std::uint32_t>(first) | static_cast<std::uint32_t>(num_blocks - 1) << kLightTreeBlocksShift;
+}
+
+/// Builds the part of the tree that instances share.
+/// @return  the lights as one, in object space; intensity 0: none ever needs choosing
+LightBounds shared_build(LightSet& set, const SharedLights& shared, std::span<const float> intensity_scales)
+{
+  std::vector<BuildLight> lights;
+  for (std::uint32_t i = shared.first_light; i < shared.first_light + shared.num_lights; ++i) {
+    const LightBounds bounds = light_bounds(set.lights[i], intensity_scales.empty() ? 1.0f : intensity_scales[i]);
+    if (bounds.intensity > 0.0f) lights.push_back({bounds, bounds_centre(bounds), i | kLightTreeLeaf});
+  }
+  if (lights.empty()) return {};
+  const std::uint32_t root = lights.size() == 1 ? lights[0].link : branch_write(branch_make(lights, 0), 0, 0, set);
+  for (std::uint32_t i = 0; i < shared.num_copies; ++i) set.copies[shared.first_copy + i].root = root;
+  if (lights.size() == 1) return lights[0].bounds;
+  LightBounds bounds = range_bounds(lights).bounds;
+  const ProfileSum sum = profile_sum(lights);
+  bounds.profile_mean = static_cast<float>(sum.mean / sum.intensity);
+  bounds.profile_slope = {static_cast<float>(sum.slope[0] / sum.intensity),
+                          static_cast<float>(sum.slope[1] / sum.intensity),
+                          static_cast<float>(sum.slope[2] / sum.intensity)};
+  return bounds;
+}
+
+/// Bounds in world space of the lights that a copy shares.
+/// @param in_object  of shared_build, intensity > 0
+LightBounds copy_bounds(const LightSet& set,
+                        const SharedLights& shared,
+                        std::uint32_t copy,
+                        const LightBounds& in_object)
+{
+  const Affine3& world_from_object = set.copies[copy].world_from_object;
+  const float scale = set.copies[copy].scale;
+  LightsView view;
+  view.lights = set.lights.data();
+  view.tree.copies = set.copies.data();
+  LightBounds bounds = in_object;
+  bounds.low = splat3(kInfinity);
+  bounds.high = splat3(-kInfinity);
+  for (std::uint32_t i = shared.first_light; i < shared.first_light + shared.num_lights; ++i) {
+    Light storage;
+    const LightRef ref{static_cast<std::int32_t>(i), static_cast<std::int32_t>(copy)};
+    const LightBounds one = light_bounds(lights_at(view, ref, storage), 1.0f);
+    bounds.low = min(bounds.low, one.low);
+    bounds.high = max(bounds.high, one.high);
+  }
+  bounds.spread.axis = transform_vector(world_from_object, in_object.spread.axis) / scale;
+  bounds.profile_slope = transform_vector(world_from_object, in_object.profile_slope) / scale;
+  bounds.intensity = std::min(in_object.intensity * sqr(scale), 1e30f);
+  const bool usable = bounds.intensity > 0.0f && is_finite(bounds.low) && is_finite(bounds.high);
+  return usable ? bounds : LightBounds{};
+}
+
+}  // namespace
+
+void light_tree_build(LightSet& set, std::span<const float> intensity_scales)
+{
+  set.suns.clear();
+  set.area_lights.clear();
+  std::vector<BuildLight> finite;
+  std::size_t next_shared = 0;
+  for (std::size_t i = 0; i < set.lights.size(); ++i) {
+    const Light& light = set.lights[i];
+    const auto index = static_cast<std::uint32_t>(i);
+    if (light.kind == LightKind::kSun) set.suns.push_back(index);
+    const bool is_seen = light.instance_index < 0;
+    const bool is_flat = light.kind == LightKind::kRectangle || light.kind == LightKind::kDisk;
+    if (is_seen && (is_flat || light_is_ball(light))) {
+      set.area_lights.push_back(index);
+    }
+    if (next_shared < set.shared.size() && index == set.shared[next_shared].first_light) {
+      i += set.shared[next_shared++].num_lights - 1;
+      continue;
+    }
+    const LightBounds bounds = light_bounds(light, intensity_scales.empty() ? 1.0f : intensity_scales[i]);
+    if (bounds.intensity > 0.0f) finite.push_back({bounds, bounds_centre(bounds), index | kLightTreeLeaf});
+  }
+
+  set.light_trails.assign(set.lights.size(), 0u);
+  set.tree_blocks.clear();
+  for (const SharedLights& shared : set.shared) {
+    const LightBounds in_object = shared_build(set, shared, intensity_scales);
+    if (!(in_object.intensity > 0.0f)) continue;
+    std::vector<BuildLight> copies(shared.num_copies);
+    tbb::parallel_for(std::uint32_t{0}, shared.num_copies, [&](std::uint32_t i) {
+      const std::uint32_t copy = shared.first_copy + i;
+      const LightBounds bounds = copy_bounds(set, shared, copy, in_object);
+      copies[i] = {bounds, bounds_centre(bounds), copy | kLightTreeLeaf | kLightTreeCopy};
+    });
+    std::copy_if(copies.begin(), copies.end(), std::back_inserter(finite),
+                 [](const BuildLight& light) { return light.bounds.intensity > 0.0f; });
+  }
+  if (!finite.empty()) set.tree_root = branch_write(branch_make(finite, 0), 0, 0, set);
+}
+
+}  // namespace relief
