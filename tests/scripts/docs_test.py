@@ -2,8 +2,8 @@
 
 Commands are the lines of code blocks, and the code in running text, that start with a program or a script. Of `relief` every
 sub-command and option is held against its --help; commands that read scenes are run, small, where $RELIEF_BINARY names the
-program. Of scripts and benchmarks the file is there, can be run, and mentions the options. Sub-commands of `relief` that take
-long (bench) are not run; install_test.py runs the commands of docs/blender.md, which want Blender.
+program. Of scripts and benchmarks the file is there, can be run, and mentions the options. install_test.py runs the commands of
+docs/blender.md, which want Blender.
 """
 
 import functools
@@ -27,7 +27,8 @@ PROGRAM = re.compile(r"(?:\w+=\S+ )*(?:relief |(?:build/\w+/)?cli/relief |build/
 OPTION = re.compile(r"(?<![\w-])(-{1,2}[a-zA-Z][\w-]*)")
 PLACEHOLDERS = {"COMMAND", "…"}
 # Makes a run short: options that are added where the command does not give them, by sub-command.
-SMALL = {"render": {"--resolution": "16x9", "--spp": "2", "--threads": "2", "--progress": "none"}}
+SMALL = {"render": {"--resolution": "16x9", "--spp": "2", "--threads": "2", "--progress": "none"},
+         "bench": {"--scenes": "glass", "--quick": None}}
 # What stands for the words of a usage line.
 WORDS = {"SCENE": "examples/cornell/cornell.gltf", "X,Y": "3,3", "X,Y[,SAMPLE]": "3,3", "I": "0", "FILE": "rays.txt", "A": "A.exr", "B": "B.exr",
          "…": ""}
@@ -205,18 +206,18 @@ class Docs(unittest.TestCase):
         self.assertGreaterEqual(ran, 9)
 
     def runnable(self, command):
-        """Words after the program of a short run that stands for a command; None if its inputs are not there or it takes long."""
+        """Words after the program of a short run that stands for a command; None if its inputs are not there."""
         sub, rest = split_relief(command)
         if not sub:
             return rest if rest in (["--help"], ["--version"]) else None
         given = " ".join(rest)
-        if sub[0] == "bench" or not rest or any(option not in options_of(*sub) for option in OPTION.findall(given)):
+        if not rest or any(option not in options_of(*sub) for option in OPTION.findall(given)):
             return None
         # Brackets: what may be left out, but not those inside a word.
         given = re.sub(r"(?<!\S)\[[^\]]*\]", "", given)
         line = [w for w in (WORDS.get(word, word) for word in given.split()) if w]
         files = [w for w in line if re.search(r"\.(gltf|glb)$", w)]
-        if any(not (ROOT / f).exists() for f in files) or not (files or sub[0] in ("compare", "merge")):
+        if any(not (ROOT / f).exists() for f in files) or not (files or sub[0] in ("compare", "merge", "bench")):
             return None
         if sub[0] == "compare" and not {"A.exr", "B.exr"} <= set(line):
             return None
@@ -224,7 +225,7 @@ class Docs(unittest.TestCase):
             line += ["-o", "out.exr"]
         for option, value in SMALL.get(sub[0], {}).items():
             if option not in line:
-                line += [option, value]
+                line += [option] if value is None else [option, value]
         return [*sub, *line]
 
     def test_scripts_are_there_and_know_their_options(self):
