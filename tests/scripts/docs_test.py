@@ -182,6 +182,19 @@ class Docs(unittest.TestCase):
         self.assert_none(wrong)
 
     @unittest.skipUnless("RELIEF_BINARY" in os.environ, "$RELIEF_BINARY is not set")
+    def test_options_in_tables_exist(self):
+        text = (ROOT / "docs" / "usage.md").read_text(encoding="utf-8")
+        wrong = []
+        for section in re.split(r"^## ", text, flags=re.MULTILINE):
+            command = re.match(r"relief (\w+)\n", section)
+            if command is None:
+                continue
+            sub = (command[1], *sub_commands_of(command[1]))
+            shown = OPTION.findall(" ".join(re.findall(r"^\| (`-.*?) \|", section, re.MULTILINE)))
+            wrong += [f"docs/usage.md: relief {' '.join(sub)} has no {o}" for o in shown if o not in options_of(*sub)]
+        self.assert_none(wrong)
+
+    @unittest.skipUnless("RELIEF_BINARY" in os.environ, "$RELIEF_BINARY is not set")
     def test_commands_of_relief_run(self):
         program = str(pathlib.Path(os.environ["RELIEF_BINARY"]).resolve())
         ran, wrong = 0, []
@@ -228,10 +241,11 @@ class Docs(unittest.TestCase):
                 line += [option] if value is None else [option, value]
         return [*sub, *line]
 
-    def test_scripts_are_there_and_know_their_options(self):
+    def test_scripts_and_examples_are_there_and_options_known(self):
         wrong = []
         for place, command in all_commands():
             program, *rest = words(command)
+            wrong += [f"{place}: no file {w}" for w in rest if w.startswith("examples/") and not (ROOT / w).exists()]
             if not re.match(r"(scripts|benchmarks)/", program):
                 continue
             file = ROOT / program
