@@ -170,6 +170,7 @@ TEST(GraphBuilder, FoldsAsTheKernelRuns)
   const float hard[] = {0.0f, -0.0f, 1.0f, -2.5f, 1e-38f, -3e38f, kInf, -kInf, kNan};
   for (int op = 0; op <= static_cast<int>(Op::hsl_to_rgb); ++op) {
     const GraphOpShape& shape = kGraphOpShapes[op];
+    if (shape.num_immediates > 0) continue;  // guards and skips, which compiling makes
     for (const float x : hard) {
       for (const float y : hard) {
         const float at[] = {x, y, 0.25f};
