@@ -181,7 +181,7 @@ def test_inverted_bump():
     _agrees(_bumped(invert=True, strength=1.0), 0.01)
 
 
-def test_chained_bumps_of_gloss():
+def test_chained_bumps_of_gloss_long():
     _agrees(_bumped("ShaderNodeBsdfGlossy", chained=True, Roughness=0.3), 0.02)
 
 

@@ -170,7 +170,7 @@ def test_a_world_hidden_from_the_camera():
     assert_agrees(_hidden_from("camera"), samples=128, tolerance=_FACETS)
 
 
-def test_a_world_hidden_from_diffuse_rays():
+def test_a_world_hidden_from_diffuse_rays_long():
     assert_agrees(_hidden_from("diffuse"), samples=128, tolerance=_FACETS)
 
 
@@ -341,7 +341,7 @@ def test_sky_at_dusk():
     assert_agrees(scene, samples=256, block=4)
 
 
-def test_sky_without_disk():
+def test_sky_without_disk_long():
     """Every setting that is not its default."""
     scene = _stage()
     settings = {"altitude": 2000, "air_density": 1.5, "dust_density": 3, "ozone_density": 4}
@@ -362,7 +362,7 @@ def test_a_sun_past_the_zenith_long():
     assert_agrees(scene, samples=64, block=4, dark=_RIM)
 
 
-def test_a_tiny_sun():
+def test_a_tiny_sun_long():
     """Its disk is smaller than a texel of the map of the sky."""
     scene = _stage()
     settings = {"sun_elevation": math.radians(40), "sun_rotation": math.radians(200), "sun_size": math.radians(0.05)}
@@ -392,7 +392,7 @@ def test_hosek_wilkie_sky():
     assert_agrees(scene, samples=64, block=4, tolerance=0.005)
 
 
-def test_hosek_wilkie_sky_of_a_sun_below_the_horizon():
+def test_hosek_wilkie_sky_of_a_sun_below_the_horizon_long():
     scene = _stage()
     _sky_world(10.0, sky_type="HOSEK_WILKIE", sun_direction=(0.3, 0.5, -0.4), turbidity=8.5)
     assert_agrees(scene, samples=64, block=4)
