@@ -61,7 +61,7 @@ struct KernelGlobals {
   bool has_lights = false;  ///< something can be sampled
   bool environment_visible_to_camera = true;
   bool has_backdrop = false;
-  EnvironmentView backdrop;  ///< what camera rays see in the environment's place
+  EnvironmentView backdrop;                   ///< what camera rays see in the environment's place
   std::uint32_t environment_hidden_from = 0;  ///< bit PathEvent: rays that started so do not see it
   Mist mist;
   float occlusion_distance = 10;  ///< metres, for Aov::kAmbientOcclusion

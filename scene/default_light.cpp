@@ -209,8 +209,8 @@ void surroundings_add_graph(Surroundings& surroundings, const EnvironmentGraph& 
     for (float& value : map.rgb) value /= unit;
     surroundings.color *= unit;
   }
-  surroundings.texture_index =
-      textures.add_image(graph.is_backdrop ? "backdrop" : "environment", map.width, map.height, map.rgb, Wrap::kRepeat, Wrap::kClamp);
+  surroundings.texture_index = textures.add_image(graph.is_backdrop ? "backdrop" : "environment", map.width, map.height,
+                                                  map.rgb, Wrap::kRepeat, Wrap::kClamp);
 }
 
 void default_light_add(Scene& scene, std::span<const Placement> placements, TextureStore& textures, Warnings& warnings)

@@ -650,8 +650,10 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
     load_height_maps(scene, height_maps, std::move(height_graphs), warnings);
     const auto store = std::make_shared<TextureStore>(std::move(textures), options.texture_budget_bytes, warnings);
     scene.textures = store;
-    if (environment_graphs.environment) surroundings_add_graph(scene.environment, *environment_graphs.environment, *store);
-    if (environment_graphs.backdrop) surroundings_add_graph(*scene.environment.backdrop, *environment_graphs.backdrop, *store);
+    if (environment_graphs.environment)
+      surroundings_add_graph(scene.environment, *environment_graphs.environment, *store);
+    if (environment_graphs.backdrop)
+      surroundings_add_graph(*scene.environment.backdrop, *environment_graphs.backdrop, *store);
     if (!unlit.empty()) default_light_add(scene, unlit, *store, warnings);
     if (options.environment && options.environment->source != EnvironmentSource::kFile) {
       environment_set(scene, *options.environment, *store);

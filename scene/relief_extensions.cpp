@@ -103,7 +103,9 @@ EnvironmentGraph read_environment_graph(const GltfDocument& document,
     });
   };
   const std::string place = r.file() + ": " + r.path();
-  const auto asks = [&graph](auto&& of) { return std::any_of(graph.program.inputs.begin(), graph.program.inputs.end(), of); };
+  const auto asks = [&graph](auto&& of) {
+    return std::any_of(graph.program.inputs.begin(), graph.program.inputs.end(), of);
+  };
   const bool asks_for_others = asks([has_backdrop](const GraphInput& input) {
     return input.quantity == Q::ray_kind && (!has_backdrop || input.index != static_cast<int>(GraphRayKind::kCamera));
   });

@@ -31,9 +31,9 @@ enum class ClosureDistribution : std::uint8_t { kGgx, kMultiscatterGgx, kBeckman
 struct SurfaceClosureSpec {
   ClosureKind kind = ClosureKind::diffuse;
   ClosureDistribution distribution = ClosureDistribution::kGgx;
-  bool is_4 = false;      ///< the maths of Blender 4.3 or later, not of 3.4
-  bool is_5 = false;      ///< that of 5.2; then is_4, too
-  bool is_other = false;  ///< toon: glossy; metallic: by complex index
+  bool is_4 = false;               ///< the maths of Blender 4.3 or later, not of 3.4
+  bool is_5 = false;               ///< that of 5.2; then is_4, too
+  bool is_other = false;           ///< toon: glossy; metallic: by complex index
   std::uint16_t first_result = 0;  ///< its weight among the program's results, then its inputs, float by float
 };
 

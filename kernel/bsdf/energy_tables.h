@@ -381,7 +381,8 @@ RELIEF_KERNEL void reflected_share_make(BsdfTables& tables)
       float met[kRows * kColumns];  // cosines to microfacets that reflect upwards
       int num_met = 0;
       for (int i = 0; i < kRows * kColumns; ++i) {
-        const Vec2f u{(static_cast<float>(i % kColumns) + 0.5f) / kColumns, (static_cast<float>(i / kColumns) + 0.5f) / kRows};
+        const Vec2f u{(static_cast<float>(i % kColumns) + 0.5f) / kColumns,
+                      (static_cast<float>(i / kColumns) + 0.5f) / kRows};
         const Vec3f wm = warp_ggx_visible_normal(wo, alpha, u);
         const float cos_d = dot(wo, wm);
         if (2.0f * cos_d * wm.z > wo.z) met[num_met++] = min(1.0f, cos_d);

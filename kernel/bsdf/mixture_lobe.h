@@ -57,9 +57,9 @@ enum class MixtureFresnel : std::uint8_t {
 /// A microfacet's reflectance.
 struct MicrofacetFresnel {
   MixtureFresnel kind = MixtureFresnel::kNone;
-  float eta = 1.5f;   ///< index of the far side / index of wo's side
-  Vec3f a{};          ///< F0; of conductors their index
-  Vec3f b{};          ///< FresnelF82::B; of conductors the imaginary part
+  float eta = 1.5f;  ///< index of the far side / index of wo's side
+  Vec3f a{};         ///< F0; of conductors their index
+  Vec3f b{};         ///< FresnelF82::B; of conductors the imaginary part
   float film_ior = 1.33f, film_nm = 0;
   const ThinFilmTable* film_table = nullptr;  ///< of those kinds that have a film, but for kThinFilm
 };
@@ -104,10 +104,10 @@ struct MixtureLobe {
   bool is_5 = false;      ///< of 5.2's maths: what its normal sees and the surface does not fades as it does there
   float probability = 0;  ///< not normalised
   float roughness = kInfinity;  ///< perceptual; infinite: never sharp
-  Vec3f weight{};         ///< factor on f
-  Frame frame;            ///< world
-  Vec3f wo{};             ///< its own frame, z > 0
-  Vec3f surface_N{};      ///< the surface's shading normal, its own frame
+  Vec3f weight{};               ///< factor on f
+  Frame frame;                  ///< world
+  Vec3f wo{};                   ///< its own frame, z > 0
+  Vec3f surface_N{};            ///< the surface's shading normal, its own frame
   MicrofacetFresnel fresnel;
   LobeShape shape;
 };
@@ -354,7 +354,8 @@ RELIEF_KERNEL LobeSample mixture_lobe_sample(const MixtureLobe& lobe, float u_ch
     case K::kBeckmann:
       return lobe_sample_glossy(beckmann_sample(lobe.shape.beckmann, wo, u), false, sqr(lobe.roughness));
     case K::kAshikhminShirley:
-      return lobe_sample_glossy(ashikhmin_shirley_sample(lobe.shape.ashikhmin_shirley, wo, u), false, sqr(lobe.roughness));
+      return lobe_sample_glossy(ashikhmin_shirley_sample(lobe.shape.ashikhmin_shirley, wo, u), false,
+                                sqr(lobe.roughness));
     case K::kClearcoat:
       return lobe_sample_glossy(clearcoat_gtr1_sample(lobe.shape.clearcoat, wo, u), false, sqr(lobe.roughness));
     case K::kMultiple:

@@ -24,9 +24,9 @@ RELIEF_KERNEL float closure_input(float x)
 
 /// What closures are resolved for, and what they have come to so far.
 struct MixtureBuild {
-  Vec3f wo;   ///< unit, world
-  Vec3f Ng;   ///< geometric normal on wo's side
-  Vec3f Ns;   ///< shading normal on wo's side
+  Vec3f wo;  ///< unit, world
+  Vec3f Ng;  ///< geometric normal on wo's side
+  Vec3f Ns;  ///< shading normal on wo's side
   bool front;
   const BsdfTables* tables;
   MixtureLobes* lobes;
@@ -61,7 +61,8 @@ RELIEF_KERNEL Vec3f normal_with_reflection_above(Vec3f Ng, Vec3f N, Vec3f wo)
   const float x = dot(wo, X);
   const float inv_length = 1.0f / __builtin_sqrtf(x * x + height_o * height_o);
   const float reflected_z = height * inv_length;
-  const Vec3f middle = (x * inv_length + safe_sqrt(1.0f - sqr(reflected_z))) * X + (height_o * inv_length + reflected_z) * Ng;
+  const Vec3f middle =
+      (x * inv_length + safe_sqrt(1.0f - sqr(reflected_z))) * X + (height_o * inv_length + reflected_z) * Ng;
   return normalize(middle);
 }
 
@@ -266,13 +267,17 @@ RELIEF_KERNEL void refraction_add(MixtureBuild& b,
   lobe->kind = MixtureLobeKind::kRefraction;
   lobe->roughness = spec.distribution == ClosureDistribution::kSharp ? 0.0f : saturated(roughness);
   const float alpha = sqr(lobe->roughness);
-  lobe->is_delta = spec.distribution == ClosureDistribution::kSharp || alpha < kDeltaAlpha || dielectric_is_matched(eta);
+  lobe->is_delta =
+      spec.distribution == ClosureDistribution::kSharp || alpha < kDeltaAlpha || dielectric_is_matched(eta);
   lobe->shape.refraction = {alpha, eta, spec.distribution == ClosureDistribution::kBeckmann,
-                      spec.is_4 ? SmithMasking::kCorrelated : SmithMasking::kSeparable, false};
+                            spec.is_4 ? SmithMasking::kCorrelated : SmithMasking::kSeparable, false};
   b.transmits = true;
 }
 
-RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const RefractionInputs& in)
+RELIEF_KERNEL void closure_add(MixtureBuild& b,
+                               const SurfaceClosureSpec& spec,
+                               float weight,
+                               const RefractionInputs& in)
 {
   refraction_add(b, spec, weight * in.color, closure_normal(b, in.normal), in.roughness, closure_eta(b, in.ior));
 }
@@ -294,14 +299,15 @@ RELIEF_KERNEL void glass_add(MixtureBuild& b,
   lobe->roughness = spec.distribution == ClosureDistribution::kSharp ? 0.0f : saturated(roughness);
   const float alpha = sqr(lobe->roughness);
   lobe->fresnel = fresnel;
-  lobe->is_delta = spec.distribution == ClosureDistribution::kSharp || alpha < kDeltaAlpha ||
-                   dielectric_is_matched(fresnel.eta);
+  lobe->is_delta =
+      spec.distribution == ClosureDistribution::kSharp || alpha < kDeltaAlpha || dielectric_is_matched(fresnel.eta);
   lobe->shape.glass = {alpha, spec.distribution == ClosureDistribution::kBeckmann, reflection_tint, transmission_tint};
   if (spec.distribution == ClosureDistribution::kMultiscatterGgx && !lobe->is_delta) {
     const GlassCoordinate at = glass_coordinate(fresnel.eta, lobe->roughness);
     const float lost = glass_lost(*b.tables, at, at.side, lobe->wo.z);
     const float lost_mean = glass_lost_mean(*b.tables, at, at.side);
-    lobe_scale(*lobe, microfacet_energy_factor(saturated(transmission_tint), max(1.0f - lost, 1e-3f), 1.0f - lost_mean));
+    lobe_scale(*lobe,
+               microfacet_energy_factor(saturated(transmission_tint), max(1.0f - lost, 1e-3f), 1.0f - lost_mean));
   }
   lobe->probability = weight * mean_component(max(reflection_tint, transmission_tint));
   b.transmits = true;
@@ -495,7 +501,10 @@ RELIEF_KERNEL void principled3_glass_add(MixtureBuild& b,
 
 /// A sum of lobes, of which none takes from another.
 /// @source  Burley 2012 and 2015, as Cycles 3.4 has them
-RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const Principled3Inputs& in)
+RELIEF_KERNEL void closure_add(MixtureBuild& b,
+                               const SurfaceClosureSpec& spec,
+                               float weight,
+                               const Principled3Inputs& in)
 {
   const Vec3f N = closure_normal(b, in.normal);
   const float metallic = saturated(in.metallic), transmission = saturated(in.transmission);
@@ -540,7 +549,10 @@ RELIEF_KERNEL Vec3f layered_weight(Vec3f weight, Vec3f albedo)
 
 /// Layers, of which each takes from those below: sheen, coat, metal, glass, reflection, diffuse base.
 /// @source  Cycles 4.3 and 5.2
-RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float start, const Principled4Inputs& in)
+RELIEF_KERNEL void closure_add(MixtureBuild& b,
+                               const SurfaceClosureSpec& spec,
+                               float start,
+                               const Principled4Inputs& in)
 {
   const Vec3f N = closure_normal(b, in.normal), N_given = closure_normal_as_given(b, in.normal);
   const Vec3f coat_N = closure_normal(b, in.coat_normal);
@@ -607,7 +619,8 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
     const Vec3f through = saturated(base_color);
     const Vec3f root{__builtin_sqrtf(through.x), __builtin_sqrtf(through.y), __builtin_sqrtf(through.z)};
     const float mean = mean_component(weight);
-    glass_add(b, spec, transmission * mean, N, roughness, fresnel, weight / max(mean, 1e-20f), root * weight / max(mean, 1e-20f));
+    glass_add(b, spec, transmission * mean, N, roughness, fresnel, weight / max(mean, 1e-20f),
+              root * weight / max(mean, 1e-20f));
     weight *= 1.0f - transmission;
   }
   float F0 = fresnel_F0(ior), eta = ior;

@@ -527,8 +527,13 @@ RELIEF_KERNEL void graph_open_share(const GraphOperands& o)
     out[k] = 1.0f;
     if (rays.open_share == nullptr || (o.registers.used >> k & 1u) == 0) continue;
     const auto vector = [&](int i) { return Vec3f{in[i][k], in[i + 1][k], in[i + 2][k]}; };
-    out[k] = rays.open_share(rays.scene, {{vector(0), vector(3)}, vector(6), vector(9), vector(12), in[15][k],
-                                          o.immediates[0], static_cast<std::int32_t>(in[16][k])});
+    out[k] = rays.open_share(rays.scene, {{vector(0), vector(3)},
+                                          vector(6),
+                                          vector(9),
+                                          vector(12),
+                                          in[15][k],
+                                          o.immediates[0],
+                                          static_cast<std::int32_t>(in[16][k])});
   }
   graph_set(o, 0, load8(out));
 }

@@ -33,8 +33,8 @@ RELIEF_KERNEL void closures_resolve(const GraphLane& at, MixtureBuild& build)
     if (!(weight > kLeastClosureWeight && weight < kInfinity)) continue;
     build.is_5 = spec.is_5;
     switch (spec.kind) {
-#define CLOSURE(name, Type)                                                 \
-  case ClosureKind::name:                                                   \
+#define CLOSURE(name, Type)                                                   \
+  case ClosureKind::name:                                                     \
     closure_add(build, spec, weight, closure_inputs<Type##Inputs>(at, spec)); \
     break;
 #include "kernel/bsdf/closure_inputs.inc"

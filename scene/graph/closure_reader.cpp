@@ -30,7 +30,10 @@ const std::vector<ClosureTable>& closure_tables()
 #define COLOR(name, json, r, g, b) {json, InputKind::kColor, {r, g, b}},
 #define NUMBER(name, json, value) {json, InputKind::kNumber, {value, value, value}},
 #define VECTOR(name, json) {json, InputKind::kVector, {0, 0, 0}},
-#define END() }},
+#define END() \
+  }           \
+  }           \
+  ,
 #include "kernel/bsdf/closure_inputs.inc"
   };
   return tables;
@@ -111,7 +114,8 @@ std::vector<SurfaceClosureSpec> closures_read(const JsonReader& reader,
     SurfaceClosureSpec spec = read_closure(r);
     lobes += most_lobes(spec.kind);
     if (lobes > kMostMixtureLobes) {
-      r.fail("", "closures of at most " + std::to_string(kMostMixtureLobes) + " lobes together", "one that is too many");
+      r.fail("", "closures of at most " + std::to_string(kMostMixtureLobes) + " lobes together",
+             "one that is too many");
     }
     const GraphValue weight = input(r, "weight", GraphType::kNumber);
     float known = 0;

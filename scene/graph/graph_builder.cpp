@@ -453,8 +453,8 @@ GraphProgram GraphBuilder::compile(const GraphSchedule& schedule) const
     const ScheduleStep step = schedule.steps[position];
     const auto group = static_cast<std::size_t>(step.index);
     if (step.kind == StepKind::kSkip) {
-      program.code.insert(program.code.end(), {static_cast<std::uint16_t>(GraphOp::skip), 0, 0,
-                                               operand_of[source_index(factors[group])]});
+      program.code.insert(program.code.end(),
+                          {static_cast<std::uint16_t>(GraphOp::skip), 0, 0, operand_of[source_index(factors[group])]});
       skips[group] = program.code.size();
       continue;
     }

@@ -61,7 +61,7 @@ class Scheduler {
 
   std::span<const ScheduleOperation> operations_;
   std::span<const std::int32_t> wanted_;
-  std::vector<int> registers_;               ///< that each operation takes with all it needs
+  std::vector<int> registers_;  ///< that each operation takes with all it needs
   std::vector<Region> regions_{1};
   std::vector<std::int32_t> region_of_;      ///< innermost one of each operation
   std::vector<std::int32_t> group_regions_;  ///< kProgram: none, for it is too deep or needs nothing

@@ -409,8 +409,10 @@ void lower_layer_weight(GraphNode& n)
   n.set("facing", b(Op::subtract, {one, b(Op::power, {b(Op::absolute, {cosine}), exponent})}));
 }
 
-constexpr GraphSocket kBumpInputs[] = {
-    {"strength", kNumber, {1}}, {"distance", kNumber, {1}}, {"height", kNumber, {1}}, {"normal", kVector}};
+constexpr GraphSocket kBumpInputs[] = {{"strength", kNumber, {1}},
+                                       {"distance", kNumber, {1}},
+                                       {"height", kNumber, {1}},
+                                       {"normal", kVector}};
 /// A normal turned by the slopes of a height, which is asked for at the point and some footprints away from it on two sides.
 /// @source Mikkelsen 2010, "Bump Mapping Unparametrized Surfaces on the GPU": the surface gradient
 void lower_bump(GraphNode& n)

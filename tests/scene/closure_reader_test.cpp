@@ -98,11 +98,10 @@ TEST(ClosureReader, ShadowRaysRunTheTransparentClosuresAlone)
 {
   const json nodes = {{{"type", "texture-coordinate"}},
                       {{"type", "noise-texture"}, {"inputs", {{"vector", {{"node", 0}, {"output", "uv"}}}}}}};
-  const Scene scene = closure_load(
-      {{"closures",
-        {{{"type", "glossy"}, {"roughness", {{"node", 1}, {"output", "factor"}}}},
-         {{"type", "transparent"}, {"color", {0.5, 0.25, 0.125}}}}}},
-      nodes);
+  const Scene scene = closure_load({{"closures",
+                                     {{{"type", "glossy"}, {"roughness", {{"node", 1}, {"output", "factor"}}}},
+                                      {{"type", "transparent"}, {"color", {0.5, 0.25, 0.125}}}}}},
+                                   nodes);
   ASSERT_EQ(scene.materials.at(0).transparency_index, 1);
   const GraphProgram& program = scene.graphs.at(1);
   EXPECT_TRUE(program.code.empty());

@@ -19,7 +19,9 @@ using Op = GraphOp;
 using Q = GraphQuantity;
 
 /// The program's first output, each lane having its own inputs.
-std::array<float, 8> roughness_of(const GraphProgram& program, const std::function<float(Q, int)>& quantity, unsigned used)
+std::array<float, 8> roughness_of(const GraphProgram& program,
+                                  const std::function<float(Q, int)>& quantity,
+                                  unsigned used)
 {
   GraphRegisters registers;
   registers.used = used;
@@ -185,8 +187,8 @@ TEST(GraphSchedule, RandomGraphsSayTheSameWithoutGuards)
     }
     set_roughness(b, graph.back());
     const GraphProgram skipping = b.compile(), plain = b.compile(false);
-    num_skips += static_cast<std::size_t>(std::count(skipping.code.begin(), skipping.code.end(),
-                                                     static_cast<std::uint16_t>(Op::skip)));
+    num_skips += static_cast<std::size_t>(
+        std::count(skipping.code.begin(), skipping.code.end(), static_cast<std::uint16_t>(Op::skip)));
     std::uniform_real_distribution<float> uniform(-1, 1);
     const float spread = below(2) == 0 ? 0.0f : 1.0f;  // all lanes alike: more is skipped
     std::array<std::array<float, 8>, 6> values{};
