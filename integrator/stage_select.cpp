@@ -19,13 +19,33 @@ bool has_avx2()
   return has_f16c && __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi2");
 }
 
+/// All that graph_run_avx512 is compiled with besides.
+bool has_avx512()
+{
+  return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+         __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw");
+}
+
+/// The best there is.
+const StageTable& stage_table_best()
+{
+  if (!has_avx2()) return stage_table_baseline();
+  if (!has_avx512()) return stage_table_avx2();
+  static const StageTable table = [] {
+    StageTable with_graphs = stage_table_avx2();
+    with_graphs.run_graph = graph_run_avx512;
+    return with_graphs;
+  }();
+  return table;
+}
+
 }  // namespace
 
 const StageTable& stage_table_select()
 {
   const char* wish = std::getenv("RELIEF_ISA");
   const std::string isa = wish == nullptr ? "" : wish;
-  if (isa.empty()) return has_avx2() ? stage_table_avx2() : stage_table_baseline();
+  if (isa.empty()) return stage_table_best();
   if (isa == "baseline") return stage_table_baseline();
   if (isa == "avx2" && has_avx2()) return stage_table_avx2();
   throw std::runtime_error("$RELIEF_ISA: expected 'baseline'" + std::string(has_avx2() ? " or 'avx2'" : "") +

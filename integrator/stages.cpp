@@ -65,6 +65,7 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
   constexpr std::uint32_t kLanes = 8;
   GraphRegisters registers;
   registers.rays = g.graph_scene.rays;
+  SurfaceInteraction located[kLanes];
   for (std::uint32_t first = 0; first < queue.size;) {
     const Material& material = g.materials[material_of(queue.paths[first])];
     if (material.graph_index < 0) {
@@ -77,16 +78,17 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
       const std::uint32_t path = queue.paths[first + count];
       if (&g.materials[material_of(path)] != &material) break;
       const Vec3f wo = -path_direction(state, path);
-      const SurfaceInteraction at = surface_interaction_locate<kFeatures>(g, state, path, wo);
-      graph_load_point(program, surface_graph_point(g, state, path, at, wo), static_cast<int>(count), registers);
+      located[count] = surface_interaction_locate<kFeatures>(g, state, path, wo);
+      graph_load_point(program, surface_graph_point(g, state, path, located[count], wo), static_cast<int>(count),
+                       registers);
     }
     registers.used = (1u << count) - 1;
     g.run_graph(program, g.textures, registers);
     counters.graph_runs += 1;
     counters.graph_points += count;
     for (std::uint32_t lane = 0; lane < count; ++lane) {
-      const GraphLane values{&program, &registers, static_cast<int>(lane)};
-      shade_surface<kFeatures>(g, state, queue.paths[first + lane], next, shadow, counters, &values);
+      const GraphHit hit{&located[lane], {&program, &registers, static_cast<int>(lane)}};
+      shade_surface<kFeatures>(g, state, queue.paths[first + lane], next, shadow, counters, &hit);
     }
     first += count;
   }

@@ -61,6 +61,7 @@ struct StageTable {
 /// The interpreter of value graphs: see GraphRun.
 void graph_run_baseline(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers);
 void graph_run_avx2(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers);
+void graph_run_avx512(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers);
 
 const StageTable& stage_table_baseline();
 const StageTable& stage_table_avx2();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "kernel/bsdf/fresnel.h"
+#include "kernel/math/cie_1931.h"
 #include "kernel/math/trigonometry.h"
 
 namespace relief {
@@ -187,10 +188,7 @@ RELIEF_KERNEL Vec3f fresnel_thin_film(float cos_i, float eta, float film_ior, fl
   const Vec3f s = thin_film_airy(top.R_s, bottom.R_s, path_nm, kPi - top.phase_s + bottom.phase_s);
   const Vec3f p = thin_film_airy(top.R_p, bottom.R_p, path_nm, kPi - top.phase_p + bottom.phase_p);
   const Vec3f white = {0.95047f, 1.0f, 1.08883f};
-  const Vec3f xyz = (s + p) * 0.5f * white;
-  const Vec3f rgb = {dot(xyz, {3.2404542f, -1.5371385f, -0.4985314f}), dot(xyz, {-0.9692660f, 1.8760108f, 0.0415560f}),
-                     dot(xyz, {0.0556434f, -0.2040259f, 1.0572252f})};
-  return min(max(rgb, splat3(0.0f)), splat3(1.0f));
+  return min(max(rec709_of_xyz((s + p) * 0.5f * white), splat3(0.0f)), splat3(1.0f));
 }
 
 /// Reflectance of a film when the surface's own F0 is set by hand: scaled fully where it is at the real F0 and not at

@@ -200,11 +200,12 @@ RELIEF_KERNEL BsdfEval mixture_glass_eval(const MixtureLobe& lobe, Vec3f wi)
           (1.0f - fresnel_dielectric_at(cos_o, eta)) * pdf};
 }
 
-/// Evaluates a lobe.
+/// Evaluates a lobe. Not inlined, as are all that know every kind of lobe: kernels call them from many places, and with a copy
+/// in each were half a megabyte long and slower.
 /// @param wi  the lobe's frame
 /// @return    f times |cos| to the lobe's own normal, before its weight; pdf as if the lobe were chosen
 template <TransportMode kMode>
-RELIEF_KERNEL BsdfEval mixture_lobe_eval(const MixtureLobe& lobe, const BsdfTables& tables, Vec3f wi)
+[[gnu::noinline]] RELIEF_KERNEL BsdfEval mixture_lobe_eval(const MixtureLobe& lobe, const BsdfTables& tables, Vec3f wi)
 {
   using K = MixtureLobeKind;
   const bool transmits = lobe.kind == K::kTranslucent || lobe.kind == K::kRefraction;
@@ -332,7 +333,7 @@ RELIEF_KERNEL LobeSample mixture_delta_sample(const MixtureLobe& lobe)
 /// @param u_choice  [0, 1): between reflection and refraction
 /// @return          in the lobe's frame; radiance is not scaled by what a boundary does to solid angles, so eta is 1
 template <TransportMode kMode>
-RELIEF_KERNEL LobeSample mixture_lobe_sample(const MixtureLobe& lobe, float u_choice, Vec2f u)
+[[gnu::noinline]] RELIEF_KERNEL LobeSample mixture_lobe_sample(const MixtureLobe& lobe, float u_choice, Vec2f u)
 {
   using K = MixtureLobeKind;
   const Vec3f wo = lobe.wo;

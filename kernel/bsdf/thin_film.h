@@ -26,14 +26,9 @@ struct ThinFilmTable {
 /// @cost  512 × 81 turns by a fixed angle
 RELIEF_KERNEL void thin_film_table_make(ThinFilmTable& table)
 {
-  constexpr float kFromXyz[3][3] = {{3.2404542f, -1.5371385f, -0.4985314f},
-                                    {-0.9692660f, 1.8760108f, 0.0415560f},
-                                    {0.0556434f, -0.2040259f, 1.0572252f}};
   table = {};
   for (int w = 0; w < kNumCieMatches; ++w) {
-    const Vec3f xyz{kCieMatches[0][w], kCieMatches[1][w], kCieMatches[2][w]};
-    const auto along = [&xyz](const float* row) { return dot(xyz, {row[0], row[1], row[2]}); };
-    const Vec3f rgb{along(kFromXyz[0]), along(kFromXyz[1]), along(kFromXyz[2])};
+    const Vec3f rgb = rec709_of_xyz({kCieMatches[0][w], kCieMatches[1][w], kCieMatches[2][w]});
     const float nanometres = kFirstCieNanometres + kCieStepNanometres * static_cast<float>(w);
     const double step = 2.0 * 3.141592653589793 * kThinFilmMostNanometres / (kThinFilmNodes - 1) / nanometres;
     const double c = std::cos(step), s = std::sin(step);

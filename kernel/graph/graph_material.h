@@ -24,6 +24,7 @@ struct GraphPoint {
   float footprint;    ///< metres
   const GraphScene* scene;
   GraphRay ray;
+  Vec3f P_object{};  ///< set by graph_load_point
 };
 
 /// Two vectors along the surface as long as the footprint.
@@ -36,9 +37,8 @@ RELIEF_KERNEL GraphFootprint graph_footprint(const GraphPoint& at)
   const Vec3f Ng = dot(at.hit->Ng, at.wo) < 0.0f ? -at.hit->Ng : at.hit->Ng;
   // Cycles' axes: a slope is a forward difference, so that bumps of few pixels look otherwise along others.
   const Vec3f across = cross(Vec3f{1, 1, -1}, Ng);
-  const Frame frame = frame_from_normal(Ng);
   const bool is_parallel = !(length_squared(across) > 1e-12f);
-  const Vec3f x = is_parallel ? frame.s : normalize(across);
+  const Vec3f x = is_parallel ? frame_from_normal(Ng).s : normalize(across);
   // A ray without width still needs slopes: over what rounding leaves of its point.
   constexpr float kRoundings = 256.0f;
   const float width = max(at.footprint, kRoundings * max_component(at.hit->P_error));
@@ -62,12 +62,10 @@ RELIEF_KERNEL GraphPoint graph_point_shifted(const GraphPoint& at, Vec3f by, Sur
     out.bary_u += difference_of_products(c, p, b, q) / determinant;
     out.bary_v += difference_of_products(a, q, b, p) / determinant;
   }
-  const SurfaceHit there = surface_hit_make(*at.mesh, *at.instance, at.triangle, out.bary_u, out.bary_v);
   moved = *at.hit;
   moved.P += by;
-  moved.uv[0] = there.uv[0];
-  moved.uv[1] = there.uv[1];
-  moved.color = there.color;
+  surface_hit_interpolate(*at.mesh, tri, out.bary_u, out.bary_v, &moved);
+  out.P_object = transform_point(at.instance->object_from_world, moved.P);
   out.hit = &moved;
   return out;
 }
@@ -172,7 +170,7 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
     case Q::object_x:
     case Q::object_y:
     case Q::object_z:
-      return component(transform_point(at.instance->object_from_world, hit.P), axis_of(Q::object_x));
+      return component(at.P_object, axis_of(Q::object_x));
     case Q::generated_x:
     case Q::generated_y:
     case Q::generated_z: {
@@ -291,10 +289,11 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
 
 /// Writes a point's quantities to its lane of the registers.
 RELIEF_KERNEL void graph_load_point(const GraphProgramView& program,
-                                    const GraphPoint& at,
+                                    GraphPoint at,
                                     int lane,
                                     GraphRegisters& registers)
 {
+  at.P_object = transform_point(at.instance->object_from_world, at.hit->P);
   SurfaceHit moved[2];
   GraphPoint points[3] = {at, at, at};
   const GraphFootprint footprint = program.is_shifted ? graph_footprint(at) : GraphFootprint{};

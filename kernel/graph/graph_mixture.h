@@ -17,15 +17,16 @@ RELIEF_KERNEL Inputs closure_inputs(const GraphLane& at, const SurfaceClosureSpe
   // Structs of nothing but floats, in the order in which they were read.
   if constexpr (!std::is_empty_v<Inputs>) {
     constexpr int kNumbers = sizeof(Inputs) / sizeof(float);
-    float numbers[kNumbers];
-    for (int i = 0; i < kNumbers; ++i) numbers[i] = closure_input(graph_result(at, spec.first_result + 1 + i));
+    alignas(32) float numbers[(kNumbers + 7) / 8 * 8] = {};
+    for (int i = 0; i < kNumbers; ++i) numbers[i] = graph_result(at, spec.first_result + 1 + i);
+    for (int i = 0; i < kNumbers; i += 8) store8(numbers + i, closure_input(load8(numbers + i)));
     std::memcpy(&inputs, numbers, sizeof(Inputs));
   }
   return inputs;
 }
 
 /// Resolves all closures that have a weight at the point.
-RELIEF_KERNEL void closures_resolve(const GraphLane& at, MixtureBuild& build)
+[[gnu::noinline]] RELIEF_KERNEL void closures_resolve(const GraphLane& at, MixtureBuild& build)
 {
   for (std::uint32_t i = 0; i < at.program->num_closures; ++i) {
     const SurfaceClosureSpec& spec = at.program->closures[i];

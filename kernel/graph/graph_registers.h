@@ -55,7 +55,9 @@ struct GraphLane {
 RELIEF_KERNEL float graph_result(const GraphLane& at, int result)
 {
   const std::uint16_t operand = at.program->results[result];
-  return operand == kNoGraphOperand ? 0.0f : graph_operand(*at.program, *at.registers, operand)[at.lane];
+  if (operand == kNoGraphOperand) return 0.0f;
+  return operand < kMostGraphRegisters ? at.registers->lanes[operand][at.lane]
+                                       : at.program->constants[operand - kMostGraphRegisters];
 }
 
 /// What a program that has run gives at one lane's point.

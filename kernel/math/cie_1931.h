@@ -1,6 +1,8 @@
 // How the CIE's observer of 1931 sees light of one wavelength.
 #pragma once
 
+#include "kernel/math/vec.h"
+
 namespace relief {
 
 /// Matching functions of the CIE's 1931 observer, every 5 nm from 380 to 780.
@@ -29,6 +31,17 @@ inline constexpr float kCieMatches[3][kNumCieMatches] = {
      0.0f,    0.0f,    0.0f,    0.0f,    0.0f,    0.0f,    0.0f,    0.0f,    0.0f,    0.0f,    0.0f,    0.0f,
      0.0f,    0.0f,    0.0f,    0.0f,    0.0f,    0.0f,    0.0f,    0.0f,    0.0f},
 };
+/// Rows that give red, green and blue with Rec.709's primaries and white of a colour X, Y, Z.
+inline constexpr Vec3f kRec709FromXyz[] = {{3.2404542f, -1.5371385f, -0.4985314f},
+                                           {-0.9692660f, 1.8760108f, 0.0415560f},
+                                           {0.0556434f, -0.2040259f, 1.0572252f}};
+
+/// Linear Rec.709; of colours outside of it some channel is below 0.
+RELIEF_KERNEL Vec3f rec709_of_xyz(Vec3f xyz)
+{
+  return {dot(xyz, kRec709FromXyz[0]), dot(xyz, kRec709FromXyz[1]), dot(xyz, kRec709FromXyz[2])};
+}
+
 inline constexpr float kFirstCieNanometres = 380, kCieStepNanometres = 5;
 
 }  // namespace relief

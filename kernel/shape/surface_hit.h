@@ -21,6 +21,35 @@ struct SurfaceHit {
   Vec3f leave{};  ///< how rays' origins are moved to the front side, metres; 0: along Ng, by P_error
 };
 
+/// Writes the mesh's texture coordinates and colour at a point to a hit.
+/// @param bary_u, bary_v  barycentric weights of vertices 1 and 2
+RELIEF_KERNEL void surface_hit_interpolate(
+    const MeshView& mesh, TriangleIndices tri, float bary_u, float bary_v, SurfaceHit* hit)
+{
+  const float w0 = 1.0f - bary_u - bary_v;
+  for (int set = 0; set < 2; ++set) {
+    if (mesh.uv[set] == nullptr) continue;
+    hit->uv[set] = w0 * mesh.uv[set][tri.v0] + bary_u * mesh.uv[set][tri.v1] + bary_v * mesh.uv[set][tri.v2];
+  }
+  if (mesh.color != nullptr) {
+    const Vec4f a = mesh.color[tri.v0], b = mesh.color[tri.v1], c = mesh.color[tri.v2];
+    hit->color = {w0 * a.x + bary_u * b.x + bary_v * c.x, w0 * a.y + bary_u * b.y + bary_v * c.y,
+                  w0 * a.z + bary_u * b.z + bary_v * c.z, w0 * a.w + bary_u * b.w + bary_v * c.w};
+  }
+}
+
+/// Writes how dense texture coordinates are over a triangle, see SurfaceHit::area_ratio.
+/// @param double_area  of the triangle in the world
+RELIEF_KERNEL void surface_hit_density(const MeshView& mesh, TriangleIndices tri, float double_area, SurfaceHit* hit)
+{
+  for (int set = 0; set < 2; ++set) {
+    if (mesh.uv[set] == nullptr) continue;
+    const Vec2f t0 = mesh.uv[set][tri.v0], du = mesh.uv[set][tri.v1] - t0, dv = mesh.uv[set][tri.v2] - t0;
+    hit->area_ratio[set] =
+        __builtin_sqrtf(__builtin_fabsf(difference_of_products(du.x, dv.y, du.y, dv.x)) / double_area);
+  }
+}
+
 /// Evaluates the triangle's attributes at a hit.
 /// @param bary_u, bary_v  barycentric weights of vertices 1 and 2
 /// @source position error: pbrt-v4 §6.8.5 and Eq. 6.24; lift: Hanika 2021, "Hacking the Shadow Terminator"
@@ -79,22 +108,8 @@ RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
     hit.P_lift = w0 * d0 * n0 + bary_u * d1 * n1 + bary_v * d2 * n2;
   }
 
-  for (int set = 0; set < 2; ++set) {
-    if (mesh.uv[set] == nullptr) continue;
-    const Vec2f t0 = mesh.uv[set][tri.v0];
-    const Vec2f t1 = mesh.uv[set][tri.v1];
-    const Vec2f t2 = mesh.uv[set][tri.v2];
-    hit.uv[set] = w0 * t0 + bary_u * t1 + bary_v * t2;
-    const Vec2f du = t1 - t0;
-    const Vec2f dv = t2 - t0;
-    hit.area_ratio[set] =
-        __builtin_sqrtf(__builtin_fabsf(difference_of_products(du.x, dv.y, du.y, dv.x)) / double_area);
-  }
-  if (mesh.color != nullptr) {
-    const Vec4f a = mesh.color[tri.v0], b = mesh.color[tri.v1], c = mesh.color[tri.v2];
-    hit.color = {w0 * a.x + bary_u * b.x + bary_v * c.x, w0 * a.y + bary_u * b.y + bary_v * c.y,
-                 w0 * a.z + bary_u * b.z + bary_v * c.z, w0 * a.w + bary_u * b.w + bary_v * c.w};
-  }
+  surface_hit_interpolate(mesh, tri, bary_u, bary_v, &hit);
+  surface_hit_density(mesh, tri, double_area, &hit);
   return hit;
 }
 

@@ -404,7 +404,7 @@ RELIEF_KERNEL void shade_surface_emission(const KernelGlobals& g,
 }
 
 /// Shades one path. Reads and writes every column but the hit's.
-/// @param lane  of the material's program at the hit, which has run; null: it has none
+/// @param graph  of the material's program at the hit; null: it has none
 /// Next: intersect closest (pushed on `next`), or the path ends; it may fork. At most one ray is added to `shadow`, at a first hit two.
 template <unsigned kFeatures>
 [[gnu::flatten]] RELIEF_KERNEL void shade_surface(const KernelGlobals& g,
@@ -413,7 +413,7 @@ template <unsigned kFeatures>
                                                   QueueView& next,
                                                   ShadowQueue& shadow,
                                                   Counters& counters,
-                                                  const GraphLane* lane = nullptr)
+                                                  const GraphHit* graph = nullptr)
 {
   ++counters.surface_hits;
   const Vec3f wo = -path_direction(state, path);
@@ -427,7 +427,7 @@ template <unsigned kFeatures>
 
   constexpr bool kMixture = (kFeatures & kFeatureMixture) != 0;
   MixtureLobes lobes;
-  SurfaceInteraction at = surface_interaction_make<kFeatures>(g, state, path, wo, lobes, lane);
+  SurfaceInteraction at = surface_interaction_make<kFeatures>(g, state, path, wo, lobes, graph);
   // Whatever stands in a medium, of glass or not.
   const auto transmittance = [&] {
     const Vec3f sigma_a = path_sigma_a(state, path);

@@ -185,30 +185,36 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   at.passed = build.transparency / chance;
 }
 
+/// What a graph's program gave at a point that a path has hit.
+struct GraphHit {
+  const SurfaceInteraction* at;  ///< as surface_interaction_locate has it
+  GraphLane lane;                ///< of the program, which has run
+};
+
 /// The point that a path has hit and its material there.
-/// @param wo      unit, back along the path's ray
-/// @param lane    of the material's program, which has run; null: it is run, if there is one
-/// @param lobes   gets those of a material of closures
+/// @param wo     unit, back along the path's ray
+/// @param graph  of the material's program; null: it is run, if there is one
+/// @param lobes  gets those of a material of closures
 template <unsigned kFeatures>
 RELIEF_KERNEL SurfaceInteraction surface_interaction_make(const KernelGlobals& g,
                                                           const PathState& state,
                                                           std::uint32_t path,
                                                           Vec3f wo,
                                                           MixtureLobes& lobes,
-                                                          const GraphLane* lane = nullptr)
+                                                          const GraphHit* graph = nullptr)
 {
-  SurfaceInteraction at = surface_interaction_locate<kFeatures>(g, state, path, wo);
+  SurfaceInteraction at = graph != nullptr ? *graph->at : surface_interaction_locate<kFeatures>(g, state, path, wo);
   if constexpr ((kFeatures & kFeatureGraphs) != 0) {
     if (at.material->graph_index >= 0) {
       GraphRegisters registers;
-      const GraphLane ran = lane != nullptr
-                                ? *lane
-                                : graph_at_point(g.run_graph, g.graphs[at.material->graph_index], g.textures,
-                                                 surface_graph_point(g, state, path, at, wo), registers);
+      const GraphLane lane = graph != nullptr
+                                 ? graph->lane
+                                 : graph_at_point(g.run_graph, g.graphs[at.material->graph_index], g.textures,
+                                                  surface_graph_point(g, state, path, at, wo), registers);
       if (has_mixture<kFeatures>(at)) {
-        surface_interaction_mix<kFeatures>(g, wo, ran, at, lobes);
+        surface_interaction_mix<kFeatures>(g, wo, lane, at, lobes);
       } else {
-        at.params = graph_surface_params<kFeatures>(*at.material, graph_values(ran), g.textures, at.hit, at.uv_width);
+        at.params = graph_surface_params<kFeatures>(*at.material, graph_values(lane), g.textures, at.hit, at.uv_width);
       }
       return at;
     }

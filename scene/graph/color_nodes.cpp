@@ -314,15 +314,12 @@ void lower_wavelength(GraphNode& n)
     xyz[c] = b.apply(Op::table, {&at, 1}, immediates)[0];
   }
   // Rec. 709; divided by what keeps all wavelengths below 1.
-  constexpr float kFromXyz[3][3] = {{3.2404542f, -1.5371385f, -0.4985314f},
-                                    {-0.9692660f, 1.8760108f, 0.0415560f},
-                                    {0.0556434f, -0.2040259f, 1.0572252f}};
   const GraphScalar is_visible =
       b(Op::multiply, {b(Op::greater_than, {steps, b.constant(-1)}), b(Op::less_than, {steps, b.constant(kLast)})});
   GraphVector rgb;
   for (std::size_t c = 0; c < 3; ++c) {
-    const float* row = kFromXyz[c];
-    const GraphScalar sum = sum3(b, scaled(b, xyz[0], row[0]), scaled(b, xyz[1], row[1]), scaled(b, xyz[2], row[2]));
+    const Vec3f row = kRec709FromXyz[c];
+    const GraphScalar sum = sum3(b, scaled(b, xyz[0], row.x), scaled(b, xyz[1], row.y), scaled(b, xyz[2], row.z));
     rgb[c] = b(Op::multiply, {is_visible, b(Op::maximum, {scaled(b, sum, 1 / 2.52f), b.constant(0)})});
   }
   n.set("color", rgb, kColor);

@@ -269,6 +269,20 @@ GraphProgram read_output(const GltfDocument& document,
   }
 }
 
+/// The same where the graph's object has nothing else, and suns are of no interest.
+GraphProgram read_whole(const GltfDocument& document,
+                        const JsonReader& graph,
+                        const char* name,
+                        GraphType type,
+                        TextureTable& textures,
+                        Warnings& warnings)
+{
+  std::vector<GraphSun> suns;
+  GraphProgram program = read_output(document, graph, name, type, textures, suns, warnings);
+  graph.warn_unread(warnings);
+  return program;
+}
+
 }  // namespace
 
 GraphPrograms graph_read(const GltfDocument& document,
@@ -338,10 +352,7 @@ GraphProgram graph_read_lamp(const GltfDocument& document,
                              TextureTable& textures,
                              Warnings& warnings)
 {
-  std::vector<GraphSun> suns;
-  GraphProgram program = read_output(document, graph, "emission", GraphType::kColor, textures, suns, warnings);
-  graph.warn_unread(warnings);
-  return program;
+  return read_whole(document, graph, "emission", GraphType::kColor, textures, warnings);
 }
 
 GraphProgram height_graph_read(const GltfDocument& document,
@@ -349,10 +360,7 @@ GraphProgram height_graph_read(const GltfDocument& document,
                                TextureTable& textures,
                                Warnings& warnings)
 {
-  std::vector<GraphSun> suns;
-  GraphProgram program = read_output(document, graph, "height", GraphType::kNumber, textures, suns, warnings);
-  graph.warn_unread(warnings);
-  return program;
+  return read_whole(document, graph, "height", GraphType::kNumber, textures, warnings);
 }
 
 }  // namespace relief

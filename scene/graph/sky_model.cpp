@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernel/math/cie_1931.h"
 #include "scene/parallel.h"
 
 namespace relief {
@@ -96,15 +97,13 @@ Matter matter_to_space(Vec3f p, Vec3f d)
   return sum * distance;
 }
 
-Vec3f from_xyz(Vec3f c) { return {dot(kRec709FromXyz[0], c), dot(kRec709FromXyz[1], c), dot(kRec709FromXyz[2], c)}; }
-
 /// Sum over the spectrum of what `power` gives for a wavelength.
 template <class Power>
 Vec3f color_of(const Power& power)
 {
   Vec3f sum;
   for (const Wavelength& w : kSpectrum) sum += Vec3f{w.x, w.y, w.z} * power(w);
-  return from_xyz(sum * kWavelengthStep);
+  return rec709_of_xyz(sum * kWavelengthStep);
 }
 
 Vec3f elevated(float elevation, float turn)

@@ -22,11 +22,6 @@ struct SkyModel {
   float air = 1, dust = 1, ozone = 1;
 };
 
-/// Rows give red, green and blue, with Rec.709's primaries and white.
-inline constexpr Vec3f kRec709FromXyz[] = {{3.2404542f, -1.5371385f, -0.4985314f},
-                                           {-0.9692660f, 1.8760108f, 0.0415560f},
-                                           {0.0556434f, -0.2040259f, 1.0572252f}};
-
 inline constexpr int kSkyColumns = 512, kSkyRows = 128, kScatteringRows = 256;
 
 /// How deep below the horizon its colour has faded to black, as a sine.

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <memory>
 
+#include "kernel/math/cie_1931.h"
 #include "scene/graph/sky_model.h"
 #include "scene/parallel.h"
 
@@ -39,7 +40,7 @@ Vec3f color_of(const Spectrum& power)
 {
   Vec3f xyz;
   for (std::size_t w = 0; w < power.size(); ++w) xyz += kXyz[w] * power[w];
-  return {dot(kRec709FromXyz[0], xyz), dot(kRec709FromXyz[1], xyz), dot(kRec709FromXyz[2], xyz)};
+  return rec709_of_xyz(xyz);
 }
 
 /// What a kilometre of the atmosphere does at some height.

@@ -1,6 +1,7 @@
 // Nodes that are textures over directions: images all around, and the sky.
 #include <cmath>
 
+#include "kernel/math/cie_1931.h"
 #include "scene/graph/graph_nodes.h"
 #include "scene/graph/graph_vectors.h"
 #include "scene/graph/hosek_wilkie.h"

@@ -30,13 +30,6 @@ constexpr std::array kExamples = {
     Example{"displaced", 64, 36, 64},
 };
 
-constexpr int kNumRuns = 16;
-constexpr double kSignificance = 0.001;  // of one pair
-
-// A BSDF sample finds a small lamp by luck alone, a light sample a sharp highlight: a pixel that was never lucky in sixteen
-// runs looks certain. In the Cornell box that is one pixel in fifty; blocks and the mean carry the test.
-constexpr double kAllowedOutliers = 0.05;
-
 class EstimatorAgreement : public testing::TestWithParam<Example> {};
 
 TEST_P(EstimatorAgreement, TechniquesAgreePairwise)
@@ -44,29 +37,11 @@ TEST_P(EstimatorAgreement, TechniquesAgreePairwise)
   const Example& example = GetParam();
   const std::string name = example.name;
   const Scene scene = scene_load(std::filesystem::path(RELIEF_SOURCE_DIR) / "examples" / name / (name + ".gltf"));
-  constexpr std::array kTechniques = {LightTechnique::kMis, LightTechnique::kLightSampling,
-                                      LightTechnique::kBsdfSampling};
-  constexpr std::array kNames = {"mis", "light", "bsdf"};
-  std::array<Picture, 3> pictures;
-  for (std::size_t i = 0; i < kTechniques.size(); ++i) {
-    RunOptions run;
-    run.width = example.width;
-    run.height = example.height;
-    run.samples = example.samples;
-    run.num_runs = kNumRuns;
-    run.technique = kTechniques[i];
-    run.first_seed = 100 * (i + 1);  // independent of one another
-    pictures[i] = render_runs(scene, run);
-  }
-  for (std::size_t i = 0; i < pictures.size(); ++i) {
-    for (std::size_t k = i + 1; k < pictures.size(); ++k) {
-      const ZTestResult result =
-          z_test_pictures(pictures[i], pictures[k], example.samples * kNumRuns, kSignificance, kAllowedOutliers);
-      const std::string text = std::string(kNames[i]) + " and " + kNames[k] + ": " + z_text(result);
-      EXPECT_TRUE(result.passed) << text;
-      std::printf("%s: %s\n", example.name, text.c_str());
-    }
-  }
+  RunOptions run;
+  run.width = example.width;
+  run.height = example.height;
+  run.samples = example.samples;
+  expect_techniques_agree(scene, run, example.name);
 }
 
 INSTANTIATE_TEST_SUITE_P(Examples, EstimatorAgreement, testing::ValuesIn(kExamples), [](const auto& test) {

@@ -38,28 +38,12 @@ Scene cornell_lit_by(const json& nodes, const json& color)
   return scene_load(copy.write("scene.gltf", gltf.dump()));
 }
 
-/// By MIS, by sampling lights and by following the BSDF; fails unless they agree.
-std::array<Picture, 3> pictures_by_techniques(const Scene& scene)
+RunOptions small_runs()
 {
   RunOptions run;
   run.width = run.height = 32;
   run.samples = 256;
-  constexpr std::array kTechniques = {LightTechnique::kMis, LightTechnique::kLightSampling,
-                                      LightTechnique::kBsdfSampling};
-  std::array<Picture, 3> pictures;
-  for (std::size_t i = 0; i < kTechniques.size(); ++i) {
-    run.technique = kTechniques[i];
-    run.first_seed = 100 * (i + 1);
-    pictures[i] = render_runs(scene, run);
-  }
-  // As in estimator_agreement_test.cpp: small lamps are found by luck alone where paths look for them.
-  constexpr double kSignificance = 0.001, kAllowedOutliers = 0.05;
-  for (const std::size_t i : {1u, 2u}) {
-    const ZTestResult result =
-        z_test_pictures(pictures[0], pictures[i], run.samples * run.num_runs, kSignificance, kAllowedOutliers);
-    EXPECT_TRUE(result.passed) << i << ": " << z_text(result);
-  }
-  return pictures;
+  return run;
 }
 
 TEST(GraphEmission, LightSamplingFindsWhatPathsFind)
@@ -69,7 +53,8 @@ TEST(GraphEmission, LightSamplingFindsWhatPathsFind)
       {{"type", "checker-texture"},
        {"inputs",
         {{"vector", node(0, "position")}, {"scale", 8}, {"color1", {60, 40, 20}}, {"color2", {20, 40, 60}}}}}};
-  const std::array<Picture, 3> pictures = pictures_by_techniques(cornell_lit_by(nodes, node(1, "color")));
+  const std::array<Picture, 3> pictures =
+      expect_techniques_agree(cornell_lit_by(nodes, node(1, "color")), small_runs(), "checker");
   // Sampling the lamp has far less noise than meeting it.
   const auto variance = [](const Picture& picture) {
     double sum = 0;
@@ -90,7 +75,7 @@ TEST(GraphEmission, DepthsAreTheSameForLightThatIsAskedForAndMet)
                       math("add", node(0, "depth"), 1),
                       math("divide", 60, node(2, "value")),
                       {{"type", "combine"}, {"inputs", {{"x", node(1, "value")}, {"y", node(3, "value")}, {"z", 20}}}}};
-  pictures_by_techniques(cornell_lit_by(nodes, node(4, "vector")));
+  expect_techniques_agree(cornell_lit_by(nodes, node(4, "vector")), small_runs(), "depths");
 }
 
 }  // namespace

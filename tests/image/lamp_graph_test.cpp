@@ -57,21 +57,7 @@ void expect_agreement(const Scene& scene, int samples = 64)
   RunOptions run;
   run.width = run.height = 24;
   run.samples = samples;
-  constexpr std::array kTechniques = {LightTechnique::kMis, LightTechnique::kLightSampling,
-                                      LightTechnique::kBsdfSampling};
-  std::array<Picture, 3> pictures;
-  for (std::size_t i = 0; i < kTechniques.size(); ++i) {
-    run.technique = kTechniques[i];
-    run.first_seed = 100 * (i + 1);
-    pictures[i] = render_runs(scene, run);
-  }
-  // As in estimator_agreement_test.cpp: small lamps are found by luck alone where paths look for them.
-  constexpr double kSignificance = 0.001, kAllowedOutliers = 0.05;
-  for (const std::size_t i : {1u, 2u}) {
-    const ZTestResult result =
-        z_test_pictures(pictures[0], pictures[i], run.samples * run.num_runs, kSignificance, kAllowedOutliers);
-    EXPECT_TRUE(result.passed) << i << ": " << z_text(result);
-  }
+  expect_techniques_agree(scene, run, "lamp");
 }
 
 /// Looks down from the middle of the ceiling.
