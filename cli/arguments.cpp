@@ -4,6 +4,7 @@
 #include <cctype>
 #include <charconv>
 #include <iterator>
+#include <limits>
 #include <set>
 #include <string_view>
 #include <system_error>
@@ -18,7 +19,7 @@ namespace relief {
 
 namespace {
 
-[[noreturn]] void refuse(const char* option, const char* expected, const std::string& found)
+[[noreturn]] void refuse(const char* option, const std::string& expected, const std::string& found)
 {
   throw CLI::ValidationError(option, fmt::format("expected {}, found '{}'", expected, found));
 }
@@ -49,10 +50,11 @@ Resolution parse_resolution(const std::string& text)
 {
   Resolution size;
   const auto parts = split(text, 'x');
-  const auto fits = [](int v) { return v >= 1 && v <= 65536; };
+  const auto [low, high, labels] = setting_info("resolution").range;
+  const auto fits = [low = low, high = high](int v) { return v >= low && v <= high; };
   if (parts.size() != 2 || !to_number(parts[0], &size.width) || !to_number(parts[1], &size.height) ||
       !fits(size.width) || !fits(size.height)) {
-    refuse("--resolution", "WIDTHxHEIGHT, each from 1 to 65536", text);
+    refuse("--resolution", fmt::format("WIDTHxHEIGHT, each from {:g} to {:.0f}", low, high), text);
   }
   return size;
 }
@@ -82,7 +84,7 @@ PixelSample parse_pixel(const std::string& text)
 
 FrameList parse_frames(const std::string& text)
 {
-  constexpr const char* kExpected = "frames such as 1-10,20,30-60x2, from 0 to 1000000, or all";
+  const std::string expected = fmt::format("frames such as 1-10,20,30-60x2, from 0 to {}, or all", kLastFrame);
   if (text == "all") return {true, {}};
   std::vector<int> frames;
   std::set<int> seen;
@@ -91,15 +93,15 @@ FrameList parse_frames(const std::string& text)
     int step = 1;
     const std::size_t times = part.find('x');
     if (times != std::string_view::npos) {
-      if (!to_number(part.substr(times + 1), &step) || step < 1) refuse("--frames", kExpected, text);
+      if (!to_number(part.substr(times + 1), &step) || step < 1) refuse("--frames", expected, text);
       part = part.substr(0, times);
     }
     const std::size_t dash = part.find('-');
-    if (!to_number(part.substr(0, dash), &first)) refuse("--frames", kExpected, text);
+    if (!to_number(part.substr(0, dash), &first)) refuse("--frames", expected, text);
     int last = first;
-    if (dash != std::string_view::npos && !to_number(part.substr(dash + 1), &last)) refuse("--frames", kExpected, text);
-    if (dash == std::string_view::npos && times != std::string_view::npos) refuse("--frames", kExpected, text);
-    if (first < 0 || last < first || last > kLastFrame) refuse("--frames", kExpected, text);
+    if (dash != std::string_view::npos && !to_number(part.substr(dash + 1), &last)) refuse("--frames", expected, text);
+    if (dash == std::string_view::npos && times != std::string_view::npos) refuse("--frames", expected, text);
+    if (first < 0 || last < first || last > kLastFrame) refuse("--frames", expected, text);
     // A step beyond the last frame must not overflow.
     step = std::min(step, kLastFrame);
     for (int frame = first; frame <= last; frame += step) {
@@ -140,7 +142,7 @@ std::uint32_t parse_aovs(const std::string& text)
     if (info == kAovInfo.end()) {
       std::string names = "all";
       for (const AovInfo& i : kAovInfo) names += fmt::format(", {}", i.name);
-      refuse("--aov", ("names among " + names).c_str(), std::string(name));
+      refuse("--aov", "names among " + names, std::string(name));
     }
     mask |= 1u << static_cast<int>(info->aov);
   }
@@ -189,7 +191,7 @@ std::string parse_output(const char* option, const std::string& text, const char
     const std::string hint = suffix == std::string(".exr") && found == ".png"
                                  ? " (--png NAME.png writes a PNG beside the OpenEXR)"
                                  : std::string();
-    refuse(option, fmt::format("a name that ends in {}{}", suffix, hint).c_str(), text);
+    refuse(option, fmt::format("a name that ends in {}{}", suffix, hint), text);
   }
   return text;
 }
@@ -225,6 +227,17 @@ CLI::Validator one_of(std::vector<std::string> words)
   };
   return {check, list};
 }
+
+CLI::Validator setting_check(const SettingInfo& info)
+{
+  const auto [low, high, labels] = info.range;
+  if (info.type == SettingType::kChoice) return one_of({labels.begin(), labels.end()});
+  if (info.type == SettingType::kInteger) return whole_number(static_cast<int>(low), static_cast<int>(high));
+  constexpr double kLargest = std::numeric_limits<float>::max();
+  return number(std::max(low, -kLargest), std::min(high, kLargest));
+}
+
+std::string setting_help(const SettingInfo& info) { return fmt::format("{} (default: the scene's)", info.description); }
 
 std::filesystem::path frame_path(const std::filesystem::path& pattern, int frame)
 {

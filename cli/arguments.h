@@ -2,8 +2,10 @@
 // expected and what was found; all of it runs while the command line is parsed, before any file is touched.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,6 +15,7 @@
 #include "kernel/math/vec.h"
 #include "kernel/statistics.h"
 #include "scene/environment_preset.h"
+#include "scene/render_settings.h"
 
 namespace relief {
 
@@ -24,7 +27,7 @@ struct Resolution {
   int width = 0, height = 0;  ///< pixels; 0: none given
 };
 
-/// "WxH", each 1 … 65536.
+/// "WxH", each in the range of the setting `resolution`.
 Resolution parse_resolution(const std::string& text);
 
 /// "X0,Y0,X1,Y1" with X0 < X1, Y0 < Y1, all ≥ 0.
@@ -37,7 +40,7 @@ struct FrameList {
   bool all = false;          ///< those of the scene
   std::vector<int> numbers;  ///< each 0 … kLastFrame; empty only if `all`
 };
-inline constexpr int kLastFrame = 1'000'000;
+inline constexpr auto kLastFrame = static_cast<int>(setting_info("frameRange").range.high);
 
 /// "all", or "1-10,20,30-60x2": single frames, ranges, ranges with a step; in the order given, each frame once.
 FrameList parse_frames(const std::string& text);
@@ -71,6 +74,12 @@ CLI::Validator number(double least, double most);
 /// Likewise for a choice among words.
 CLI::Validator one_of(std::vector<std::string> words);
 
+/// For an option in place of one of the scene's settings, a number or a choice: refuses what the scene may not say either.
+CLI::Validator setting_check(const SettingInfo& info);
+
+/// What --help says of such an option.
+std::string setting_help(const SettingInfo& info);
+
 /// An argument as a shell would have to be given it again.
 std::string shell_quoted(std::string_view argument);
 
@@ -80,6 +89,17 @@ CLI::Option* add_parsed(CLI::App& command, const char* name, Value& value, Parse
 {
   return command.add_option_function<std::string>(
       name, [&value, parse](const std::string& text) { value = parse(text); }, description);
+}
+
+/// An option in place of a choice of the scene's settings. Without it `value` stays as it is.
+template <class Value>
+CLI::Option* add_choice(CLI::App& command, const char* name, std::optional<Value>& value, const SettingInfo& info)
+{
+  const auto labels = info.range.labels;
+  const auto set = [&value, labels](const std::string& text) {
+    value = static_cast<Value>(std::find(labels.begin(), labels.end(), text) - labels.begin());
+  };
+  return command.add_option_function<std::string>(name, set, setting_help(info))->check(setting_check(info));
 }
 
 /// Output path of a frame: a run of '#' in the file name becomes the number, padded to the run's length; without one,

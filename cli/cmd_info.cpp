@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
@@ -6,6 +7,7 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
 #include "cli/scene_setup.h"
@@ -14,6 +16,7 @@
 #include "scene/displaced_mesh.h"
 #include "scene/displacement_seams.h"
 #include "scene/load.h"
+#include "scene/setting_values.h"
 #include "scene/texture_store.h"
 
 namespace relief {
@@ -151,6 +154,50 @@ void print_prepared(const DisplacementSet& displacements, const Statistics& stat
   for (const std::string& reason : displacements.reasons()) line("  {}", reason);
 }
 
+/// A limit as JSON; null: there is none.
+nlohmann::ordered_json limit_json(double limit)
+{
+  if (!std::isfinite(limit)) return nullptr;
+  // Whole ones without a decimal point.
+  if (limit == std::floor(limit)) return static_cast<std::int64_t>(limit);
+  return limit;
+}
+
+/// Prints every setting that RELIEF_render may have as JSON, one a line.
+int print_declared_settings()
+{
+  const std::vector<SettingValue> all = setting_values({});
+  line("[");
+  for (const SettingValue& setting : all) {
+    const auto& [name, type, range, description] = *setting.info;
+    nlohmann::ordered_json allowed;
+    if (type == SettingType::kChoice) {
+      allowed = range.labels;
+    } else if (type != SettingType::kText) {
+      allowed = {limit_json(range.low), limit_json(range.high)};
+    }
+    const nlohmann::ordered_json entry = {{"name", name},
+                                          {"type", kSettingTypeLabels[static_cast<std::size_t>(type)]},
+                                          {"default", setting.fallback},
+                                          {"range", allowed},
+                                          {"description", description}};
+    line("  {}{}", entry.dump(), &setting == &all.back() ? "" : ",");
+  }
+  line("]");
+  return 0;
+}
+
+/// The scene's settings that are not what they are where nobody says anything.
+std::string changed_settings(const RenderSettings& settings)
+{
+  std::string text;
+  for (const SettingValue& setting : setting_values(settings)) {
+    if (setting.value == setting.fallback) continue;
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", setting.info->name, setting_text(setting.value));
+  }
+  return text.empty() ? "as by default" : text;
+}
+
 int info(const std::string& file,
          bool strict,
          const SceneSetup& setup,
@@ -176,6 +223,7 @@ int info(const std::string& file,
   const RenderSettings& r = scene.render;
   line("{}", file);
   line("image: {}x{}, {} samples, {} bounces, seed {}", r.width, r.height, r.samples, r.max_bounces, r.seed);
+  line("settings: {}", changed_settings(r));
   line("frames: {} to {} at {:g} a second", r.frame_start, r.frame_end, r.frames_per_second);
   line("meshes: {} with {} triangles; instances: {} with {} triangles in all", scene.meshes.size(), triangles,
        scene.instances.size(), placed);
@@ -230,14 +278,16 @@ void cmd_info_register(CLI::App& app, Run& run)
 {
   struct Arguments {
     std::string scene;
-    bool strict = false;
+    bool strict = false, settings = false;
     SceneSetup setup;
     DisplacementOptions displacement;
     std::optional<CausticsMode> caustics;
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("info", "Shows what is in a scene, what it will cost, and every warning");
-  command->add_option("scene", arguments->scene, "Scene file (.gltf, .glb)")->required();
+  CLI::Option* scene = command->add_option("scene", arguments->scene, "Scene file (.gltf, .glb)");
+  command->add_flag("--settings", arguments->settings, "Prints all settings that RELIEF_render may have, as JSON")
+      ->excludes(scene);
   command->add_flag("--strict", arguments->strict, "Turn warnings into errors");
   add_light_options(*command, arguments->setup);
   add_displacement_method(*command, arguments->displacement);
@@ -245,6 +295,11 @@ void cmd_info_register(CLI::App& app, Run& run)
   add_caustics_mode(*command, arguments->caustics);
   add_max_memory(*command);
   command->callback([&run, arguments] {
+    if (arguments->settings) {
+      run = print_declared_settings;
+      return;
+    }
+    if (arguments->scene.empty()) throw CLI::RequiredError("scene");
     run = [arguments] {
       return info(arguments->scene, arguments->strict, arguments->setup, arguments->displacement, arguments->caustics);
     };

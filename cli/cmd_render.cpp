@@ -342,7 +342,7 @@ bool render_frame(const RenderArguments& arguments,
     for (const std::string& file : view->files()) files_read.push_back(file_stamp(file));
     files.add_inputs("a file of the colour view", files_read);
   }
-  const std::string fingerprint = render_fingerprint(arguments.settings, frame, files_read);
+  const std::string fingerprint = render_fingerprint(arguments.settings, options.settings, frame, files_read);
   if (arguments.resume && is_whole_render(paths, fingerprint)) {
     report_skipped(progress, paths, stats.frame, "already rendered");
     return true;
@@ -447,17 +447,16 @@ void cmd_render_register(CLI::App& app, Run& run, const std::string& command_lin
   for (CLI::Option* option : add_light_options(*command, a.setup)) path_options.push_back(option);
   command->add_option("--time-limit", a.time_limit, "Stop sampling a frame after this many seconds")
       ->check(number(0.001, 1e9));
-  command
-      ->add_option("--noise-threshold", a.noise_threshold,
-                   "Stop a tile at this estimated error relative to its mean (0: off)")
-      ->check(number(0, 1e6));
+  constexpr SettingInfo kThreshold = setting_info("noiseThreshold"), kExposure = setting_info("exposure");
+  command->add_option("--noise-threshold", a.noise_threshold, setting_help(kThreshold))
+      ->check(setting_check(kThreshold));
   command->add_option("--threads", a.threads, "Threads (default: all processors)")->check(whole_number(1, 4096));
   add_parsed(*command, "--frames", a.frames, parse_frames,
              "Frames, such as 1-10,20,30-60x2, or all of the scene (default: the rest pose)");
   command->add_flag("--resume", a.resume, "Skip frames whose files are whole and of the same scene and settings");
   command->add_flag("--strict", a.strict, "Turn warnings into errors");
-  command->add_option("--view", a.view, "OpenColorIO view of the PNG");
-  command->add_option("--exposure", a.exposure, "Exposure of the PNG in stops")->check(number(-100, 100));
+  command->add_option("--view", a.view, setting_help(setting_info("view")));
+  command->add_option("--exposure", a.exposure, setting_help(kExposure))->check(setting_check(kExposure));
   add_parsed(*command, "--aov", a.aov_mask, parse_aovs, "Layers to keep: names separated by commas, or all")
       ->default_str(kDefaultAovs);
   command->add_option("--compression", a.compression, "Of the OpenEXR")

@@ -12,6 +12,7 @@
 #include "exporters/errors.h"
 #include "exporters/exr.h"
 #include "exporters/side_file.h"
+#include "scene/setting_values.h"
 
 namespace relief {
 
@@ -21,6 +22,11 @@ namespace {
 // are read and whether the run fails. The scene counts with its content.
 constexpr std::string_view kUncounted[] = {"--help",    "scene",      "--frames",    "--resume",  "--strict",
                                            "--threads", "--progress", "--reference", "--preview", "--max-memory"};
+// Options that do nothing but change one of the RenderSettings, which count as they come out. So it is one whether the scene says
+// something, the command line, or nobody.
+constexpr std::string_view kDeclared[] = {
+    "--resolution", "--spp",  "--seed",     "--max-bounces",     "--caustics",
+    "--filter",     "--view", "--exposure", "--noise-threshold", "--luminous-efficacy"};
 // Only whether they are given counts, and not where the files are.
 constexpr std::string_view kOutputs[] = {"--output", "--png", "--stats"};
 
@@ -52,7 +58,7 @@ std::vector<std::string> settings_given(const CLI::App& command)
 {
   std::vector<std::string> settings;
   for (const CLI::Option* option : command.get_options()) {
-    if (option->count() == 0 || is_among(kUncounted, *option)) continue;
+    if (option->count() == 0 || is_among(kUncounted, *option) || is_among(kDeclared, *option)) continue;
     settings.push_back(option->get_name());
     if (is_among(kOutputs, *option)) continue;
     settings.insert(settings.end(), option->results().begin(), option->results().end());
@@ -60,13 +66,15 @@ std::vector<std::string> settings_given(const CLI::App& command)
   return settings;
 }
 
-std::string render_fingerprint(const std::vector<std::string>& settings,
+std::string render_fingerprint(const std::vector<std::string>& options,
+                               const RenderSettings& settings,
                                std::optional<int> frame,
                                const std::vector<FileStamp>& files)
 {
   // Lengths keep apart what stands side by side.
   std::string text = fmt::format("{}\n{}\n", RELIEF_VERSION, frame ? std::to_string(*frame) : "rest");
-  for (const std::string& setting : settings) text += fmt::format("{} {}\n", setting.size(), setting);
+  for (const std::string& option : options) text += fmt::format("{} {}\n", option.size(), option);
+  for (const SettingValue& setting : setting_values(settings)) text += setting_text(setting.value) + '\n';
   for (const FileStamp& file : files) {
     text += fmt::format("{} {} {} {}\n", file.inode, file.bytes, file.modified_ns, file.changed_ns);
   }

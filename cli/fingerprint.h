@@ -10,6 +10,7 @@
 
 #include "exporters/picture.h"
 #include "scene/file_stamp.h"
+#include "scene/render_settings.h"
 
 namespace relief {
 
@@ -19,15 +20,18 @@ struct FramePaths {
 };
 
 /// Every option of the command line that was given, with its values, but for those of which fingerprint.cpp says that they do
-/// not change what is written. So an option that is new counts.
+/// not change what is written, or no more than RenderSettings tell. So an option that is new counts.
 /// @pre the command line has been parsed
 std::vector<std::string> settings_given(const CLI::App& command);
 
-/// Hash over what decides a frame: this version, the options, the frame, and every file that it was read from (inode, size,
-/// time of the last change of content and of anything else; not the name or the device, which differ between machines that
-/// share a folder). 16 hexadecimal digits.
-/// @param files  stamps from before the files were read
-std::string render_fingerprint(const std::vector<std::string>& settings,
+/// Hash over what decides a frame: this version, the options, the settings, the frame, and every file that it was read from
+/// (inode, size, time of the last change of content and of anything else; not the name or the device, which differ between
+/// machines that share a folder). 16 hexadecimal digits.
+/// @param options   settings_given
+/// @param settings  the scene's, with the options' changes
+/// @param files     stamps from before the files were read
+std::string render_fingerprint(const std::vector<std::string>& options,
+                               const RenderSettings& settings,
                                std::optional<int> frame,
                                const std::vector<FileStamp>& files);
 

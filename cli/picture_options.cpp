@@ -62,6 +62,7 @@ std::vector<CLI::Option*> add_ray_options(CLI::App& command, PictureOptions& opt
 
 std::vector<CLI::Option*> add_picture_options(CLI::App& command, PictureOptions& options)
 {
+  constexpr SettingInfo kSamples = setting_info("samples"), kBounces = setting_info("maxBounces");
   const auto point = [](const char* option) {
     return [option](const std::string& text) { return parse_point(option, text); };
   };
@@ -81,16 +82,13 @@ std::vector<CLI::Option*> add_picture_options(CLI::App& command, PictureOptions&
           ->check(number(0.01, 179)),
       add_parsed(command, "--resolution", options.resolution, parse_resolution,
                  "WIDTHxHEIGHT in pixels (default: the scene's)"),
-      command.add_option("--spp", options.samples, "Samples a pixel (default: the scene's)")
-          ->check(whole_number(1, 1 << 24)),
+      command.add_option("--spp", options.samples, setting_help(kSamples))->check(setting_check(kSamples)),
       add_parsed(command, "--seed", options.seed, parse_seed, "Seed of the random numbers (default: the scene's)"),
       add_parsed(command, "--crop", options.crop, parse_crop, "X0,Y0,X1,Y1: render this window of the image only"),
-      command.add_option("--max-bounces", options.max_bounces, "Scattering events after the first hit")
-          ->check(whole_number(0, 200)),
+      command.add_option("--max-bounces", options.max_bounces, setting_help(kBounces))->check(setting_check(kBounces)),
       add_displacement_memory(command, options.displacement),
       add_caustics_mode(command, options.caustics),
-      command.add_option("--filter", options.filter, "Pixel filter: box (1 px) or blackman-harris (1.5 px)")
-          ->check(one_of({"box", "blackman-harris"})),
+      add_choice(command, "--filter", options.filter, setting_info("pixelFilter.type")),
   };
 }
 
@@ -111,9 +109,9 @@ RenderOptions render_options(const Scene& scene, const PictureOptions& given)
     settings.transmission_bounces = std::min(settings.transmission_bounces, given.max_bounces);
   }
   if (given.seed) settings.seed = *given.seed;
-  if (!given.filter.empty()) {
-    settings.filter = given.filter == "box" ? PixelFilter::kBox : PixelFilter::kBlackmanHarris;
-    settings.filter_width = given.filter == "box" ? 1.0f : 1.5f;
+  if (given.filter) {
+    settings.filter = *given.filter;
+    settings.filter_width = pixel_filter_width(*given.filter);
   }
   if (given.caustics) settings.caustics.mode = *given.caustics;
   options.camera = camera_for_image(scene, given, settings.width, settings.height);

@@ -14,7 +14,7 @@
 namespace relief {
 
 struct PictureOptions {
-  std::string camera, filter;  ///< camera: name or number; empty: the first
+  std::string camera;  ///< name or number; empty: the first
   std::optional<Vec3f> look_from, look_at;
   double fov = 0;  ///< vertical, degrees; 0: the camera's
   Resolution resolution;
@@ -22,6 +22,7 @@ struct PictureOptions {
   int samples = 0, max_bounces = -1;
   std::optional<std::uint64_t> seed;
   std::optional<CausticsMode> caustics;
+  std::optional<PixelFilter> filter;
   DisplacementOptions displacement;
 };
 

@@ -35,11 +35,10 @@ std::string SceneSetup::environment_file() const
 
 std::vector<CLI::Option*> add_light_options(CLI::App& command, SceneSetup& setup)
 {
+  constexpr SettingInfo kEfficacy = setting_info("luminousEfficacy");
   return {
-      command
-          .add_option("--luminous-efficacy", setup.luminous_efficacy,
-                      "lm/W that turn the candela and lux of the scene's lights into watts (default: the scene's)")
-          ->check(number(1e-6, 1e6)),
+      command.add_option("--luminous-efficacy", setup.luminous_efficacy, setting_help(kEfficacy))
+          ->check(setting_check(kEfficacy)),
       add_parsed(command, "--environment", setup.environment, parse_environment,
                  "studio, sky, none, or a lat-long image: surroundings in place of the scene's; ,STRENGTH may follow"),
       command
@@ -93,15 +92,7 @@ CLI::Option* add_displacement_lod(CLI::App& command, DisplacementOptions& option
 
 CLI::Option* add_caustics_mode(CLI::App& command, std::optional<CausticsMode>& mode)
 {
-  const auto set = [&mode](const std::string& text) {
-    const auto* found = std::find(std::begin(kCausticsModeLabels), std::end(kCausticsModeLabels), text);
-    mode = static_cast<CausticsMode>(found - std::begin(kCausticsModeLabels));
-  };
-  return command
-      .add_option_function<std::string>(
-          "--caustics", set,
-          "Photons for caustics: auto (where something casts them), on, or off (default: the scene's)")
-      ->check(one_of({std::begin(kCausticsModeLabels), std::end(kCausticsModeLabels)}));
+  return add_choice(command, "--caustics", mode, setting_info("caustics.mode"));
 }
 
 }  // namespace relief

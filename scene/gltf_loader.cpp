@@ -45,8 +45,9 @@ int normal_map_uv_set(const Material& m)
 /// Where RELIEF_render says nothing of frames, they are those that the animations last for.
 void frame_range_from_clips(const GltfDocument& root, const std::vector<AnimationClip>& clips, RenderSettings& settings)
 {
+  constexpr SettingInfo kFrames = setting_info("frameRange");
   bool is_given = false;
-  root.read_extension(root.json, "", "RELIEF_render", [&](const JsonReader& r) { is_given = r.has("frameRange"); });
+  root.read_extension(root.json, "", "RELIEF_render", [&](const JsonReader& r) { is_given = r.has(kFrames.name); });
   if (is_given || clips.empty()) return;
   double start = clips.front().start, end = clips.front().end;
   for (const AnimationClip& clip : clips) {
@@ -54,10 +55,10 @@ void frame_range_from_clips(const GltfDocument& root, const std::vector<Animatio
     end = std::max(end, clip.end);
   }
   // A key may stand a rounding error beside its frame.
-  constexpr double kMargin = 1e-3, kLastFrame = 1e6;
+  constexpr double kMargin = 1e-3;
   const auto fps = static_cast<double>(settings.frames_per_second);
-  settings.frame_start = static_cast<int>(std::clamp(std::floor(start * fps + kMargin), 0.0, kLastFrame));
-  settings.frame_end = static_cast<int>(std::clamp(std::ceil(end * fps - kMargin), 0.0, kLastFrame));
+  settings.frame_start = static_cast<int>(std::clamp(std::floor(start * fps + kMargin), 0.0, kFrames.range.high));
+  settings.frame_end = static_cast<int>(std::clamp(std::ceil(end * fps - kMargin), 0.0, kFrames.range.high));
 }
 
 /// Before texels are read.

@@ -1,6 +1,5 @@
 #include "scene/relief_extensions.h"
 
-#include "kernel/film/film_layout.h"
 #include "kernel/graph/graph_scene.h"
 #include "kernel/state/path_event.h"
 
@@ -10,66 +9,12 @@
 
 #include "scene/graph/graph_reader.h"
 #include "scene/limits.h"
+#include "scene/setting_values.h"
 
 namespace relief {
 namespace {
 
 constexpr double kNoLimit = JsonReader::kNoLimit;
-constexpr std::int64_t kLargestInt = std::numeric_limits<std::int32_t>::max();
-
-int small_integer(const JsonReader& r, std::string_view name, int fallback, std::int64_t low, std::int64_t high)
-{
-  return static_cast<int>(r.integer(name, fallback, low, high));
-}
-
-/// Two integers of an array, or the fallback.
-void integer_pair(const JsonReader& r, std::string_view name, int& first, int& second, double low, double high)
-{
-  const std::vector<double> v = r.numbers(name, 2, 2, low, high);
-  if (v.empty()) {
-    return;
-  }
-  if (v[0] != std::floor(v[0]) || v[1] != std::floor(v[1])) {
-    r.fail(name, "two integers");
-  }
-  first = static_cast<int>(v[0]);
-  second = static_cast<int>(v[1]);
-}
-
-void read_pixel_filter(const JsonReader& r, RenderSettings& s, Warnings& warnings)
-{
-  static constexpr std::string_view kFilters[] = {"box", "blackman-harris"};
-  if (!r.has("pixelFilter")) {
-    return;
-  }
-  const JsonReader filter = r.object("pixelFilter");
-  s.filter = filter.choice("type", kFilters, 1) == 0 ? PixelFilter::kBox : PixelFilter::kBlackmanHarris;
-  s.filter_width = filter.number_f("width", s.filter == PixelFilter::kBox ? 1.0f : 1.5f, 0.01, 100);
-  filter.warn_unread(warnings);
-}
-
-CausticSettings read_caustics(const JsonReader& r, Warnings& warnings)
-{
-  CausticSettings s;
-  s.mode = static_cast<CausticsMode>(r.choice("mode", kCausticsModeLabels, 0));
-  s.photons = r.number("photons", s.photons, 0, 1e8);
-  s.alpha = r.number_f("alpha", s.alpha, 0.01, 1);
-  s.radius = r.number_f("radius", s.radius, 0, 1e6);
-  s.memory_mib = r.number("memory", s.memory_mib, 1, 1e6);
-  r.warn_unread(warnings);
-  return s;
-}
-
-Mist read_mist(const JsonReader& r, Warnings& warnings)
-{
-  static constexpr std::string_view kFalloffs[] = {"linear", "quadratic", "inverse-quadratic"};
-  Mist mist;
-  mist.start = r.number_f("start", mist.start, 0, kFarthest);
-  mist.depth = r.number_f("depth", mist.depth, 1e-6, kFarthest);
-  mist.falloff = static_cast<MistFalloff>(r.choice("falloff", kFalloffs, 1));
-  r.warn_unread(warnings);
-  return mist;
-}
 
 /// Environment::hidden_from.
 std::uint32_t read_hidden_from(const JsonReader& r)
@@ -223,33 +168,8 @@ DisplacementSettings read_khr_displacement(const GltfDocument& document,
 RenderSettings relief_render(const GltfDocument& document, Warnings& warnings)
 {
   RenderSettings s;
-  document.read_extension(document.json, "", "RELIEF_render", [&](const JsonReader& r) {
-    integer_pair(r, "resolution", s.width, s.height, 1, 65536);
-    s.samples = small_integer(r, "samples", s.samples, 1, kLargestInt);
-    s.noise_threshold = r.number_f("noiseThreshold", 0, 0, kNoLimit);
-    s.max_bounces = small_integer(r, "maxBounces", s.max_bounces, 0, kLargestInt);
-    s.diffuse_bounces = small_integer(r, "diffuseBounces", s.max_bounces, 0, kLargestInt);
-    s.glossy_bounces = small_integer(r, "glossyBounces", s.max_bounces, 0, kLargestInt);
-    s.transmission_bounces = small_integer(r, "transmissionBounces", s.max_bounces, 0, kLargestInt);
-    s.transparent_bounces = small_integer(r, "transparentBounces", s.transparent_bounces, 0, kLargestInt);
-    s.seed = static_cast<std::uint64_t>(r.integer("seed", 0, 0, std::int64_t{1} << 53));
-    s.view = r.string("view", "");
-    s.exposure = r.number_f("exposure", 0, -100, 100);
-    s.clamp_indirect = r.number_f("clampIndirect", 0, 0, kNoLimit);
-    s.film_exposure = r.number_f("filmExposure", 1, 0, 1e15);
-    integer_pair(r, "frameRange", s.frame_start, s.frame_end, -1e6, 1e6);
-    if (s.frame_end < s.frame_start) {
-      r.fail("frameRange", "a first frame that is not after the last");
-    }
-    s.frames_per_second = r.number_f("fps", s.frames_per_second, 1e-3, 1e6);
-    read_pixel_filter(r, s, warnings);
-    s.luminous_efficacy = r.number_f("luminousEfficacy", s.luminous_efficacy, 1e-6, 1e6);
-    if (r.has("caustics")) s.caustics = read_caustics(r.object("caustics"), warnings);
-    if (r.has("mist")) s.mist = read_mist(r.object("mist"), warnings);
-    s.occlusion_distance = r.number_f("occlusionDistance", s.occlusion_distance, 0, kNoLimit);
-    s.cryptomatte_levels = small_integer(r, "cryptomatteLevels", s.cryptomatte_levels, 1, kMostCryptomatteLevels);
-    r.warn_unread(warnings);
-  });
+  document.read_extension(document.json, "", "RELIEF_render",
+                          [&](const JsonReader& r) { s = render_settings_read(r, warnings); });
   return s;
 }
 

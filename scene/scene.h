@@ -11,7 +11,6 @@
 
 #include "kernel/bsdf/material.h"
 #include "kernel/camera/camera.h"
-#include "kernel/film/mist.h"
 #include "kernel/graph/graph_scene.h"
 #include "kernel/light/light.h"
 #include "kernel/shape/mesh_view.h"
@@ -19,6 +18,7 @@
 #include "scene/file_stamp.h"
 #include "scene/graph/graph_program.h"
 #include "scene/height_map.h"
+#include "scene/render_settings.h"
 
 namespace relief {
 
@@ -85,8 +85,6 @@ struct Environment : Surroundings {
   std::uint32_t hidden_from = 0;  ///< bit PathEvent: bounced rays that do not see it
 };
 
-enum class PixelFilter : std::uint8_t { kBox, kBlackmanHarris };
-
 /// How displaced meshes are traced; the scene format and the command line know them by the labels below.
 enum class DisplacementMethod : std::uint8_t {
   kAuto,
@@ -115,41 +113,6 @@ struct DisplacementSettings {
   bool smoothing = false;
   bool weld_seams = false;
   bool has_graph = false;  ///< the height is a heightGraph's, not an image's
-};
-
-enum class CausticsMode : std::uint8_t { kAuto, kOn, kOff };
-inline constexpr std::string_view kCausticsModeLabels[] = {"auto", "on", "off"};
-
-/// The photon pass, see integrator/photon_pass.h.
-struct CausticSettings {
-  CausticsMode mode = CausticsMode::kAuto;
-  double photons = 0;   ///< started in a pass (a sample a pixel); 0: one a pixel, at least 32,768
-  float alpha = 0.75f;  ///< (0, 1]: how fast the radius shrinks, see photon_radius_factor
-  float radius = 0;     ///< of the first pass, metres; 0: by how dense its photons lie
-  double memory_mib = 256;
-};
-
-/// RELIEF_render; the command line overrides single fields.
-struct RenderSettings {
-  int width = 960, height = 540;
-  int samples = 64;
-  float noise_threshold = 0;  ///< 0: off; otherwise target for the estimated error of a block relative to its mean
-  int max_bounces = 12, diffuse_bounces = 12, glossy_bounces = 12, transmission_bounces = 12;
-  int transparent_bounces = 32;
-  std::uint64_t seed = 0;
-  std::string view = "";               ///< OCIO view; empty: the display's default
-  float exposure = 0;                  ///< stops, PNG only
-  float clamp_indirect = 0;            ///< 0: off
-  float film_exposure = 1;             ///< factor on all light of the picture
-  int frame_start = 1, frame_end = 1;  ///< inclusive; what no file says follows from the clips
-  float frames_per_second = 24;
-  PixelFilter filter = PixelFilter::kBlackmanHarris;
-  float filter_width = 1.5f;  ///< pixels
-  CausticSettings caustics;
-  Mist mist;
-  float occlusion_distance = 10;  ///< metres
-  int cryptomatte_levels = 6;
-  float luminous_efficacy = 0;  ///< lm/W that divides KHR_lights_punctual's candela and lux; 0: see light_units.h
 };
 
 /// What the scene needs; passes, kernels and memory for what is absent are never run or allocated.

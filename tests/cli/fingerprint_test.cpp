@@ -36,10 +36,9 @@ TEST(Fingerprint, AnOptionThatNobodyThoughtOfCounts)
                                                             {"--new-list", "a", "b"},
                                                             {"--new-list", "ab"},
                                                             {"--new-list", "b", "a"},
-                                                            {"--spp", "1"},
                                                             {"--png", "a.png"},
                                                             {"--stats", "a.json"}};
-  for (const auto& arguments : kDifferent) all.insert(render_fingerprint(settings_of(arguments), {}, {}));
+  for (const auto& arguments : kDifferent) all.insert(render_fingerprint(settings_of(arguments), {}, {}, {}));
   EXPECT_EQ(all.size(), kDifferent.size());
 }
 
@@ -51,27 +50,51 @@ TEST(Fingerprint, WhatChangesNoPictureDoesNotCount)
             none);
 }
 
+TEST(Fingerprint, DeclaredSettingsCountByWhatTheyAre)
+{
+  EXPECT_EQ(settings_of({"--spp", "1"}), settings_of({}));
+  std::set<std::string> all = {render_fingerprint({}, {}, {}, {})};
+  std::size_t num_settings = 0;
+  for (std::size_t changed = 0; changed < std::size(kRenderSettings); ++changed) {
+    RenderSettings settings;
+    num_settings = 0;
+    const auto change = [&](auto& value) {
+      using Value = std::remove_reference_t<decltype(value)>;
+      if (num_settings++ != changed) return;
+      if constexpr (std::is_same_v<Value, std::string>) {
+        value = "\xff";  // no UTF-8
+      } else {
+        value = static_cast<Value>(static_cast<double>(value) == 0 ? 1 : 0);
+      }
+    };
+    settings.visit([&](const SettingInfo&, auto& value, const auto&...) { change(value); });
+    all.insert(render_fingerprint({}, settings, {}, {}));
+  }
+  EXPECT_EQ(num_settings, std::size(kRenderSettings));
+  EXPECT_EQ(all.size(), num_settings + 1);
+}
+
 TEST(Fingerprint, AFrameIsNotTheRestPose)
 {
-  EXPECT_NE(render_fingerprint({}, {}, {}), render_fingerprint({}, 0, {}));
-  EXPECT_NE(render_fingerprint({}, 1, {}), render_fingerprint({}, 0, {}));
+  EXPECT_NE(render_fingerprint({}, {}, {}, {}), render_fingerprint({}, {}, 0, {}));
+  EXPECT_NE(render_fingerprint({}, {}, 1, {}), render_fingerprint({}, {}, 0, {}));
 }
 
 TEST(Fingerprint, AFileCountsWithAllThatItsSystemSaysButNameAndDevice)
 {
   const FileStamp file = {"a.gltf", 1, 2, 3, 4, 5};
-  const std::string was = render_fingerprint({}, {}, {file});
+  const std::string was = render_fingerprint({}, {}, {}, {file});
   std::vector<FileStamp> changed(4, file);
   changed[0].inode = 7;
   changed[1].bytes = 7;
   changed[2].modified_ns = 7;
   changed[3].changed_ns = 7;
-  for (const FileStamp& stamp : changed) EXPECT_NE(render_fingerprint({}, {}, {stamp}), was);
+  for (const FileStamp& stamp : changed) EXPECT_NE(render_fingerprint({}, {}, {}, {stamp}), was);
   FileStamp elsewhere = file;
   elsewhere.path = "/share/a.gltf";
   elsewhere.device = 7;
-  EXPECT_EQ(render_fingerprint({}, {}, {elsewhere}), was);
-  EXPECT_NE(render_fingerprint({}, {}, {file, file}), was);
+  EXPECT_EQ(render_fingerprint({}, {}, {}, {elsewhere}), was);
+  EXPECT_NE(render_fingerprint({}, {}, {}, {file, file}), was);
 }
 
 }  // namespace

@@ -167,6 +167,28 @@ TEST_F(RenderProgram, ResumeNoticesOtherSettingsAndAnotherScene)
   EXPECT_EQ(render(scene, output, {"--resume"}).count("done"), 1);
 }
 
+TEST_F(RenderProgram, ResumeKnowsSettingsThatAreTheSame)
+{
+  GltfBuilder b = lit_square();
+  b.json["extensions"]["RELIEF_render"] = {
+      {"resolution", {16, 16}}, {"samples", 4}, {"pixelFilter", {{"type", "box"}}}};
+  const std::string scene = write_scene(b), output = file("a.exr");
+  const auto resume = [&](const Arguments& more) {
+    Arguments arguments = {"render", scene, "-o", output, "--progress", "json", "--resume"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  };
+  ASSERT_EQ(resume({}).count("done"), 1);
+  for (const Arguments& same : {Arguments{"--spp", "4"},
+                                {"--resolution", "16x16", "--filter", "box"},
+                                {"--seed", "0", "--exposure", "0.0"},
+                                {"--caustics", "auto"}}) {
+    EXPECT_EQ(resume(same).count("skipped"), 1) << same[0];
+  }
+  EXPECT_EQ(resume({"--caustics", "off"}).count("done"), 1);
+  EXPECT_EQ(resume({"--caustics", "off", "--spp", "5"}).count("done"), 1);
+}
+
 TEST_F(RenderProgram, ResumeWantsEveryFileOfAFrame)
 {
   const std::string scene = write_scene(lit_square());
