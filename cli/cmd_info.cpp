@@ -13,6 +13,7 @@
 #include "cli/scene_setup.h"
 #include "cli/standard_streams.h"
 #include "integrator/scene_context.h"
+#include "kernel/feature_mask.h"
 #include "scene/displaced_mesh.h"
 #include "scene/displacement_seams.h"
 #include "scene/load.h"
@@ -22,32 +23,6 @@
 namespace relief {
 
 namespace {
-
-struct FeatureName {
-  bool FeatureSet::*present;
-  const char* name;
-};
-
-constexpr FeatureName kFeatureNames[] = {
-    {&FeatureSet::textures, "textures"},
-    {&FeatureSet::normal_maps, "normal maps"},
-    {&FeatureSet::transparency, "transparency"},
-    {&FeatureSet::transmission, "transmission"},
-    {&FeatureSet::volume, "volume"},
-    {&FeatureSet::clearcoat, "clearcoat"},
-    {&FeatureSet::sheen, "sheen"},
-    {&FeatureSet::metal, "metal"},
-    {&FeatureSet::displacement, "displacement"},
-    {&FeatureSet::environment_map, "environment map"},
-    {&FeatureSet::environment, "environment"},
-    {&FeatureSet::mesh_lights, "mesh lights"},
-    {&FeatureSet::area_lights, "area lights"},
-    {&FeatureSet::delta_lights, "delta lights"},
-    {&FeatureSet::many_lights, "many lights"},
-    {&FeatureSet::instances, "instances"},
-    {&FeatureSet::depth_of_field, "depth of field"},
-    {&FeatureSet::caustic_casters, "caustic casters"},
-};
 
 /// Prints one line; what is in it may come from the scene.
 template <class... Values>
@@ -198,6 +173,25 @@ std::string changed_settings(const RenderSettings& settings)
   return text.empty() ? "as by default" : text;
 }
 
+/// What the materials of a scene's instances ask of the kernels, and what else costs something that no other line counts.
+std::string features(const Scene& scene)
+{
+  unsigned mask = 0;
+  std::size_t num_casters = 0;
+  for (const Instance& instance : scene.instances) {
+    mask |= feature_mask_of(scene.materials[static_cast<std::size_t>(instance.material_index)]);
+    num_casters += (instance.flags & kCausticCaster) != 0 ? 1 : 0;
+  }
+  std::string text;
+  for (std::size_t bit = 0; bit < kFeatureNames.size(); ++bit) {
+    if ((mask >> bit & 1u) != 0) text += fmt::format("{}{}", text.empty() ? "" : ", ", kFeatureNames[bit]);
+  }
+  const auto num_apertures = std::count_if(scene.cameras.begin(), scene.cameras.end(),
+                                           [](const SceneCamera& c) { return c.camera.aperture_radius > 0; });
+  return fmt::format("{}; caustic casters {}, value graphs {}, open apertures {}", text.empty() ? "none" : text,
+                     num_casters, scene.graphs.size(), num_apertures);
+}
+
 int info(const std::string& file,
          bool strict,
          const SceneSetup& setup,
@@ -256,12 +250,8 @@ int info(const std::string& file,
   }
   if (!scene.displacements.empty()) print_displacements(scene);
   if (context.displacements.size() > 0) print_prepared(context.displacements, stats);
-  std::string features;
-  for (const FeatureName& feature : kFeatureNames) {
-    if (scene.features.*feature.present) features += fmt::format("{}{}", features.empty() ? "" : ", ", feature.name);
-  }
   line("caustics: {} ({})", context.globals.caustics.enabled ? "photons" : "none", context.caustics_reason);
-  line("features: {}", features.empty() ? "none" : features);
+  line("features: {}", features(scene));
   line(
       "memory: meshes {}, textures {}, height maps {}, displacement {}, acceleration structure {}, lights "
       "{}",

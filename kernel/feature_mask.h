@@ -2,6 +2,9 @@
 // pays only for what one of its materials uses. Few bits: every one doubles the number of possible kernels.
 #pragma once
 
+#include <array>
+#include <string_view>
+
 #include "kernel/bsdf/material.h"
 #include "kernel/graph/graph_program.h"
 
@@ -18,6 +21,9 @@ enum FeatureBit : unsigned {
   kFeatureGraphs = 1u << 7,        ///< value graphs give factors
   kFeatureMixture = 1u << 8,       ///< closures scatter, in place of glTF's layered material
 };
+/// Of the bits, from the first on.
+inline constexpr std::array<std::string_view, 9> kFeatureNames = {
+    "textures", "normal maps", "transparency", "transmission", "layers", "metal", "caustics", "graphs", "closures"};
 inline constexpr unsigned kFeatureAll = (1u << 6) - 1u;  ///< of materials, but for graphs
 
 /// Bits that one material needs; a scene needs the union over its materials.

@@ -8,13 +8,13 @@
 #include <utility>
 
 #include "scene/displaced_mesh.h"
-#include "scene/feature_set.h"
 #include "scene/framing.h"
 #include "scene/gltf_mesh.h"
 #include "scene/graph/closure_reader.h"
 #include "scene/graph/graph_reader.h"
 #include "scene/khronos_extensions.h"
 #include "scene/limits.h"
+#include "scene/material_traits.h"
 #include "scene/memory.h"
 #include "scene/relief_extensions.h"
 #include "scene/texture_store.h"
@@ -661,7 +661,6 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
     }
     scene.environment.visible_to_camera = options.environment_visible.value_or(scene.environment.visible_to_camera);
     world_displacement_bake(scene);
-    scene.features = feature_set_detect(scene);
     scene.warnings = warnings.texts();
     return scene;
   } catch (const OutOfMemory&) {

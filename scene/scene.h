@@ -115,14 +115,6 @@ struct DisplacementSettings {
   bool has_graph = false;  ///< the height is a heightGraph's, not an image's
 };
 
-/// What the scene needs; passes, kernels and memory for what is absent are never run or allocated.
-struct FeatureSet {
-  bool textures = false, normal_maps = false, transparency = false, transmission = false, volume = false,
-       clearcoat = false, sheen = false, metal = false, displacement = false, environment_map = false,
-       environment = false, mesh_lights = false, area_lights = false, delta_lights = false, many_lights = false,
-       instances = false, depth_of_field = false, caustic_casters = false;
-};
-
 /// One animation of a file; all of them play at once.
 struct AnimationClip {
   std::string name;
@@ -148,7 +140,6 @@ struct Scene {
   std::vector<HeightMap> height_maps;
   Environment environment;
   RenderSettings render;
-  FeatureSet features;
   std::shared_ptr<const TextureStore> textures;
   std::vector<std::string> warnings;
   std::vector<FileStamp> files;  ///< everything that was read: the scene, buffers, images, references; as before that

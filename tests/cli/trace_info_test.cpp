@@ -1,4 +1,5 @@
 // `relief trace` and `relief info` against scenes whose answers are known.
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <sstream>
@@ -21,6 +22,13 @@ std::vector<std::vector<std::string>> csv_rows(const std::string& text)
     for (std::string field; std::getline(fields, field, ',');) rows.back().push_back(field);
   }
   return rows;
+}
+
+/// The line of a text that has a word, from there on; without one, the text.
+std::string line_of(const std::string& text, const std::string& word)
+{
+  const std::size_t at = text.find(word);
+  return at == std::string::npos ? text : text.substr(at, text.find('\n', at) - at);
 }
 
 GltfBuilder triangle_scene()
@@ -274,23 +282,72 @@ TEST_F(TraceInfoProgram, InfoCountsWhatIsThere)
                            "lights: 0 placed, 6 emissive triangles, constant environment\n", "textures: 0\n"}) {
     EXPECT_NE(outcome.output.find(line), std::string::npos) << line << outcome.output;
   }
-  const std::size_t features = outcome.output.find("features: ");
-  const std::string list = outcome.output.substr(features, outcome.output.find('\n', features) - features);
-  EXPECT_NE(list.find("instances"), std::string::npos) << list;
-  EXPECT_NE(list.find("mesh lights"), std::string::npos) << list;
-  EXPECT_EQ(list.find("displacement"), std::string::npos) << list;
-  EXPECT_EQ(list.find("textures"), std::string::npos) << list;
+}
+
+TEST_F(TraceInfoProgram, InfoNamesTheFeaturesThatAreUsed)
+{
+  const auto features = [&](const GltfBuilder& b) {
+    return line_of(run({"info", folder_.write("s.gltf", b.gltf()).string()}).output, "features: ");
+  };
+  // glTF's default material is a metal.
+  EXPECT_EQ(features(lit_square()), "features: metal; caustic casters 0, value graphs 0, open apertures 0");
+  GltfBuilder b = lit_square();
+  b.json["images"] = {{{"uri", kPixelPng}}};
+  b.json["textures"] = {{{"source", 0}}};
+  b.push("materials", {{"alphaMode", "BLEND"},
+                       {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"roughnessFactor", 0}}},
+                       {"normalTexture", {{"index", 0}}}});
+  b.push("materials",
+         {{"extensions", {{"KHR_materials_sheen", {{"sheenColorFactor", {1, 1, 1}}}}}}});  // nothing has it
+  b.json["meshes"][0]["primitives"][0]["material"] = 0;
+  EXPECT_EQ(
+      features(b),
+      "features: textures, normal maps, transparency, metal; caustic casters 1, value graphs 0, open apertures 0");
+}
+
+TEST_F(TraceInfoProgram, InfoShowsSettingsThatAreNotTheDefaults)
+{
+  GltfBuilder b = lit_square();
+  const auto settings = [&] {
+    return line_of(run({"info", folder_.write("s.gltf", b.gltf()).string()}).output, "settings: ");
+  };
+  EXPECT_EQ(settings(), "settings: as by default");
+  b.json["extensions"]["RELIEF_render"] = {
+      {"samples", 64},    {"maxBounces", 3},      {"diffuseBounces", 2},          {"noiseThreshold", 0.1},
+      {"view", "Filmic"}, {"resolution", {4, 3}}, {"caustics", {{"mode", "off"}}}};
+  EXPECT_EQ(
+      settings(),
+      "settings: resolution [4,3], noiseThreshold 0.1, maxBounces 3, diffuseBounces 2, view \"Filmic\", caustics.mode "
+      "\"off\"");
+}
+
+TEST_F(TraceInfoProgram, InfoListsAllSettingsWithoutAScene)
+{
+  const Outcome outcome = run({"info", "--settings"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+  const auto all = nlohmann::json::parse(outcome.output);
+  const auto named = [&](const char* name) {
+    return *std::find_if(all.begin(), all.end(), [&](const auto& s) { return s.at("name") == name; });
+  };
+  const auto samples = named("samples");
+  EXPECT_EQ(samples.at("type"), "integer");
+  EXPECT_EQ(samples.at("default"), 64);
+  EXPECT_EQ(samples.at("range"), (nlohmann::json{1, 2147483647}));
+  EXPECT_NE(samples.at("description"), "");
+  EXPECT_EQ(named("noiseThreshold").at("range"), (nlohmann::json{0, nullptr}));
+  EXPECT_EQ(named("caustics.mode").at("range"), (nlohmann::json{"auto", "on", "off"}));
+  EXPECT_EQ(named("resolution").at("default"), (nlohmann::json{960, 540}));
+  EXPECT_EQ(named("view").at("range"), nullptr);
+  EXPECT_EQ(named("luminousEfficacy").at("default"), nullptr);
+  EXPECT_EQ(run({"info"}).exit_code, 2);
+  EXPECT_EQ(run({"info", "--settings", file("s.gltf")}).exit_code, 2);
 }
 
 TEST_F(TraceInfoProgram, InfoSaysWhetherThereWillBePhotons)
 {
   const std::string scene = folder_.write("s.gltf", mirrored_lamp().gltf()).string();
   const std::string plain = folder_.write("p.gltf", lit_square().gltf()).string();
-  const auto caustics = [&](const Arguments& arguments) {
-    const std::string output = run(arguments).output;
-    const std::size_t line = output.find("caustics: ");
-    return line == std::string::npos ? output : output.substr(line, output.find('\n', line) - line);
-  };
+  const auto caustics = [&](const Arguments& arguments) { return line_of(run(arguments).output, "caustics: "); };
   EXPECT_EQ(caustics({"info", scene}), "caustics: photons (lights on casters)");
   EXPECT_EQ(caustics({"info", scene, "--caustics", "off"}), "caustics: none (off)");
   EXPECT_EQ(caustics({"info", plain, "--caustics", "on"}), "caustics: none (nothing casts caustics)");

@@ -91,7 +91,6 @@ TEST(Composition, AMeshUsedTwiceIsKeptOnce)
   const Scene scene = load(b);
   EXPECT_EQ(scene.meshes.size(), 1u);
   EXPECT_EQ(scene.instances.size(), 2u);
-  EXPECT_TRUE(scene.features.instances);
 }
 
 TEST(Composition, EachPrimitiveIsAnInstance)
@@ -164,7 +163,6 @@ TEST(Composition, ObjectSettingsAreInheritedAndOverruled)
   ASSERT_EQ(scene.instances.size(), 2u);
   EXPECT_EQ(scene.instances[0].flags, kVisibleToCamera | kCausticCaster | kCausticReceiver);
   EXPECT_EQ(scene.instances[1].flags, kCastsShadow);
-  EXPECT_TRUE(scene.features.caustic_casters);
 }
 
 // --- EXT_mesh_gpu_instancing ---

@@ -64,7 +64,6 @@ TEST(Displacement, IsRead)
   EXPECT_EQ(DisplacementSettings{}.lod, 0);
   EXPECT_TRUE(d.smoothing);
   EXPECT_TRUE(d.weld_seams);
-  EXPECT_TRUE(scene.features.displacement);
   EXPECT_EQ(scene.textures->views().size(), 1u);  // of the default light: heights are none
 }
 
@@ -111,7 +110,6 @@ TEST(Displacement, ProceduralAloneLeavesTheMeshAndSaysSo)
   const Scene scene = load(square_displaced({{"procedural", {{"noise", "fbm"}}}}));
   EXPECT_TRUE(scene.displacements.empty());
   EXPECT_EQ(scene.materials.at(0).displacement_index, -1);
-  EXPECT_FALSE(scene.features.displacement);
   EXPECT_EQ(num_warnings(scene, "/procedural: procedural displacement is not supported"), 1u);
 }
 
@@ -351,7 +349,6 @@ TEST(HeightGraph, OtherInputsMoveNothingAndSaySo)
     const Scene scene = load(square_displaced({{"heightGraph", graph}}));
     EXPECT_TRUE(scene.displacements.empty()) << said;
     EXPECT_EQ(scene.materials.at(0).displacement_index, -1);
-    EXPECT_FALSE(scene.features.displacement);
     EXPECT_EQ(num_warnings(scene, said), 1u) << said;
     EXPECT_EQ(num_warnings(scene, "the height of material \"bark\""), 1u);
   }

@@ -1,0 +1,28 @@
+#include "scene/material_traits.h"
+
+namespace relief {
+
+std::array<const TextureRef*, 12> material_textures(const Material& m)
+{
+  return {&m.base_color_texture,
+          &m.metallic_roughness_texture,
+          &m.normal_texture,
+          &m.emission_texture,
+          &m.transmission_texture,
+          &m.clearcoat_texture,
+          &m.clearcoat_roughness_texture,
+          &m.clearcoat_normal_texture,
+          &m.sheen_color_texture,
+          &m.sheen_roughness_texture,
+          &m.specular_texture,
+          &m.specular_color_texture};
+}
+
+bool material_casts_caustics(const Material& material)
+{
+  constexpr float kRoughest = 0.5f;
+  const bool bends = material.transmission > 0 || material.metallic >= 0.5f;
+  return bends && !material.unlit && material.roughness <= kRoughest;
+}
+
+}  // namespace relief
