@@ -29,7 +29,6 @@ class Warnings {
   void add(const std::string& text);
   /// Texts in order of first appearance, " (×N)" appended where N > 1.
   std::vector<std::string> texts() const;
-  bool empty() const { return entries_.empty(); }
 
  private:
   struct Entry {
