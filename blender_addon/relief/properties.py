@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """scene.relief and view_layer.relief: the settings, each with its unit and default in the tooltip."""
 
+import json
+import os
+
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
 
@@ -15,6 +18,32 @@ _METHODS = (
     ("tessellate", "Tessellate", "Triangles of the size of a texel: needs much memory"),
     ("tessellate-grid", "Tessellate to grids", "The same in Embree's grids"),
 )
+
+# What `relief info --settings` says, by name.
+with open(os.path.join(os.path.dirname(__file__), "declared.json"), encoding="utf-8") as _file:
+    _DECLARED = {setting["name"]: setting for setting in json.load(_file)["settings"]}
+
+# Blender's whole numbers go no further.
+_LARGEST_INT = 2**31 - 1
+
+
+def _declared(name, **own):
+    """Arguments of a property that is a setting of RELIEF_render: its default, range and tooltip.
+
+    @param  own  Blender's own: another default, the items of a choice, and soft_max, up to where a slider makes sense
+    """
+    setting = _DECLARED[name]
+    arguments = {"default": setting["default"], **own}
+    if setting["type"] == "choice":
+        shown = next(label for value, label, _ in own["items"] if value == arguments["default"])
+    else:
+        shown = f"{arguments['default']:g}"
+        low, high = setting["range"]
+        if low is not None:
+            arguments["min"] = low
+        if high is not None:
+            arguments["max"] = min(high, _LARGEST_INT) if setting["type"] == "integer" else high
+    return {**arguments, "description": f"{setting['description']} (default {shown})"}
 
 
 def _uses_cycles_settings(settings):
@@ -49,10 +78,8 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
     )
     samples: IntProperty(
         name="Samples",
-        description="Samples a pixel; with a noise threshold or a time limit, the most that are taken (default 128)",
-        default=128,
-        min=1,
-        max=16777216,
+        # Twice what a file has that says nothing: the first picture of an artist should not be noisy.
+        **_declared("samples", default=128, soft_max=16777216),
     )
     preview_samples: IntProperty(
         name="Viewport Samples",
@@ -61,12 +88,7 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
         min=1,
         max=16777216,
     )
-    seed: IntProperty(
-        name="Seed",
-        description="Of all random numbers: equal seeds give equal pictures (default 0)",
-        default=0,
-        min=0,
-    )
+    seed: IntProperty(name="Seed", **_declared("seed"))
     time_limit: FloatProperty(
         name="Time Limit",
         description="Seconds of sampling after which no further pass is started; 0 is no limit (default 0)",
@@ -74,56 +96,23 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
         min=0.0,
         unit="TIME_ABSOLUTE",
     )
-    noise_threshold: FloatProperty(
-        name="Noise Threshold",
-        description="Estimated error, relative to the mean radiance, at which a tile is finished; 0 is off (default 0)",
-        default=0.0,
-        min=0.0,
-        max=1.0,
-        precision=4,
-    )
-    max_bounces: IntProperty(
-        name="Total",
-        description="Scattering events after the first hit; 0 is direct light only (default 12)",
-        default=12,
-        min=0,
-        max=200,
-    )
-    diffuse_bounces: IntProperty(
-        name="Diffuse", description="Most of the bounces that may be diffuse (default 12)", default=12, min=0, max=200
-    )
-    glossy_bounces: IntProperty(
-        name="Glossy", description="Most of the bounces that may be glossy (default 12)", default=12, min=0, max=200
-    )
-    transmission_bounces: IntProperty(
-        name="Transmission",
-        description="Most of the bounces that may pass through a surface (default 12)",
-        default=12,
-        min=0,
-        max=200,
-    )
-    transparent_bounces: IntProperty(
-        name="Transparent",
-        description="Surfaces of an opacity below one along one path (default 32)",
-        default=32,
-        min=0,
-        max=1024,
-    )
-    clamp_indirect: FloatProperty(
-        name="Clamp Indirect",
-        description="Largest radiance of an indirect sample, in W/m²/sr; 0 is off. Clamping loses light (default 0)",
-        default=0.0,
-        min=0.0,
-    )
+    noise_threshold: FloatProperty(name="Noise Threshold", precision=4, **_declared("noiseThreshold", soft_max=1.0))
+    max_bounces: IntProperty(name="Total", **_declared("maxBounces", soft_max=200))
+    diffuse_bounces: IntProperty(name="Diffuse", **_declared("diffuseBounces", soft_max=200))
+    glossy_bounces: IntProperty(name="Glossy", **_declared("glossyBounces", soft_max=200))
+    transmission_bounces: IntProperty(name="Transmission", **_declared("transmissionBounces", soft_max=200))
+    transparent_bounces: IntProperty(name="Transparent", **_declared("transparentBounces", soft_max=1024))
+    clamp_indirect: FloatProperty(name="Clamp Indirect", **_declared("clampIndirect"))
     caustics: EnumProperty(
         name="Caustics",
-        description="Whether light through glass and from mirrors gets a photon pass of its own (default Automatic)",
-        items=(
-            ("auto", "Automatic", "Where something focuses the light of lamps, or of a world with a sun (default)"),
-            ("on", "On", "Where something focuses light, even that of an evenly bright world"),
-            ("off", "Off", "Never: it is path traced, with more noise"),
+        **_declared(
+            "caustics.mode",
+            items=(
+                ("auto", "Automatic", "Where something focuses the light of lamps, or of a world with a sun (default)"),
+                ("on", "On", "Where something focuses light, even that of an evenly bright world"),
+                ("off", "Off", "Never: it is path traced, with more noise"),
+            ),
         ),
-        default="auto",
     )
     displacement_method: EnumProperty(
         name="Method",
@@ -180,17 +169,12 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
     )
     filter_type: EnumProperty(
         name="Filter",
-        description="How samples make a pixel (default Blackman-Harris)",
-        items=(("blackman-harris", "Blackman-Harris", "Smooth"), ("box", "Box", "Equal weights")),
-        default="blackman-harris",
+        **_declared(
+            "pixelFilter.type",
+            items=(("blackman-harris", "Blackman-Harris", "Smooth"), ("box", "Box", "Equal weights")),
+        ),
     )
-    filter_width: FloatProperty(
-        name="Filter Width",
-        description="Width of the pixel filter in pixels (default 1.5)",
-        default=1.5,
-        min=0.01,
-        max=10.0,
-    )
+    filter_width: FloatProperty(name="Filter Width", **_declared("pixelFilter.width", soft_max=10.0))
 
 
 class ReliefViewLayerSettings(bpy.types.PropertyGroup):

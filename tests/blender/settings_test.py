@@ -2,6 +2,7 @@
 
 import json
 import os
+import subprocess
 
 import bpy
 import numpy as np
@@ -129,6 +130,37 @@ def test_without_cycles_relief_has_its_own():
     bpy.ops.preferences.addon_disable(module="cycles")
     assert not hasattr(scene, "cycles")
     assert _exported(scene)[0]["samples"] == 128
+
+
+def test_properties_are_as_the_program_declares_them():
+    """What relief info --settings says of those that the add-on offers: words, limits, defaults and tooltips."""
+    shown = subprocess.run([os.environ["RELIEF_BINARY"], "info", "--settings"], capture_output=True, check=True)
+    declared = {setting["name"]: setting for setting in json.loads(shown.stdout)}
+    properties = _fresh_scene().relief.bl_rna.properties
+    for name, of_the_format in {
+        "samples": "samples",
+        "seed": "seed",
+        "noise_threshold": "noiseThreshold",
+        "max_bounces": "maxBounces",
+        "diffuse_bounces": "diffuseBounces",
+        "glossy_bounces": "glossyBounces",
+        "transmission_bounces": "transmissionBounces",
+        "transparent_bounces": "transparentBounces",
+        "clamp_indirect": "clampIndirect",
+        "caustics": "caustics.mode",
+        "filter_type": "pixelFilter.type",
+        "filter_width": "pixelFilter.width",
+    }.items():
+        found, expected = properties[name], declared[of_the_format]
+        assert found.description.startswith(expected["description"] + " (default "), found.description
+        assert name == "samples" or found.default == expected["default"], name
+        if expected["type"] == "choice":
+            assert set(found.enum_items.keys()) == set(expected["range"]), name
+            continue
+        low, high = expected["range"]
+        assert abs(found.hard_min - low) <= 1e-6 * abs(low), (name, found.hard_min)
+        # Blender's properties are of 32 bits.
+        assert high is None or abs(found.hard_max - min(high, 2**31 - 1)) <= 1e-6 * high, (name, found.hard_max)
 
 
 def test_pixel_filters_are_as_wide_as_those_of_cycles():
