@@ -151,6 +151,15 @@ def is_there(path):
     return any(ROOT.glob(known.rstrip("/")))
 
 
+def range_of(text):
+    """What a cell says of a setting's range: two limits, None where there is none, or the choices; None if it says nothing."""
+    if not text or text.startswith("`"):
+        return [json.loads(choice.strip("`")) for choice in text.split(", ")] if text else None
+    if text.startswith("≥"):
+        return [float(text[1:]), None]
+    return [float(limit) for limit in text.split("…")]
+
+
 class Docs(unittest.TestCase):
     def assert_none(self, wrong):
         self.assertEqual([], sorted(set(wrong)))
@@ -311,6 +320,22 @@ class Docs(unittest.TestCase):
             if re.fullmatch(r"[\w{},*]+\.(h|cpp|inc|py)", span):
                 wrong.append(f"docs/architecture.md:{number}: {span} without its folder")
         self.assert_none(wrong)
+
+    def test_settings_are_documented_as_they_are_declared(self):
+        """The table of RELIEF_render has the declared settings in their order, with default and range, and no others."""
+        declared_file = ROOT / "blender_addon" / "relief" / "declared.json"
+        declared = {s["name"]: s for s in json.loads(declared_file.read_text(encoding="utf-8"))["settings"]}
+        text = (ROOT / "docs" / "scene_format.md").read_text(encoding="utf-8")
+        section = text.partition("### `RELIEF_render`")[2].partition("\n### ")[0]
+        rows = re.findall(r"^\| `([\w.]+)` \| (.*?) ?\| (.*?) ?\| .* \|$", section, re.MULTILINE)
+        self.assertEqual(list(declared), [name for name, _, _ in rows])
+        for name, default, allowed in rows:
+            setting = declared[name]
+            # A default may be another setting's.
+            other = declared.get(default.strip("`"))
+            shown = other["default"] if other else None if default == "–" else json.loads(default.strip("`"))
+            self.assertEqual(setting["default"], shown, f"default of {name}")
+            self.assertEqual(setting["range"], range_of(allowed), f"range of {name}")
 
     def test_links_lead_somewhere(self):
         wrong = []
