@@ -44,7 +44,7 @@ struct Settings {
   std::string mesh, map;
   float scale = 0.02f, midlevel = 0.5f, tiles = 1;
   double num_rays = 1e6;
-  std::vector<std::string> methods{"chord", "rmip", "rmip-minmax", "tfdm"};
+  std::vector<std::string> methods;  ///< empty: all that do not tessellate
   std::uint64_t part = 0;
   std::vector<double> distances{0};  ///< sizes of the mesh
   bool open_seams = false;
@@ -285,12 +285,14 @@ bool run(const Settings& settings)
   const auto num_rays = static_cast<std::uint64_t>(settings.num_rays);
   std::vector<InnerPoint> points;
   bool tight = true;
-  for (const std::string& name : settings.methods) {
-    const auto label = std::find(std::begin(kDisplacementMethodLabels), std::end(kDisplacementMethodLabels), name);
-    if (label == std::end(kDisplacementMethodLabels))
-      throw std::runtime_error("--methods: unknown method '" + name + "'");
+  for (const DisplacementMethod method : kDisplacementMethods) {
+    const std::string name(displacement_method_label(method));
+    const bool is_wanted = settings.methods.empty() ? displacement_method(method).traverse != nullptr
+                                                    : std::find(settings.methods.begin(), settings.methods.end(),
+                                                                name) != settings.methods.end();
+    if (!is_wanted) continue;
     DisplacementOptions options;
-    options.method = static_cast<DisplacementMethod>(label - std::begin(kDisplacementMethodLabels));
+    options.method = method;
     SceneContext context(scene, options);
     if (points.empty()) {
       constexpr std::size_t kNumPoints = 64;
@@ -310,8 +312,7 @@ bool run(const Settings& settings)
           name, num_rays, distance > 0 ? fmt::format("{} sizes away", distance) : "inside", leaks.num_closest,
           leaks.num_shadow, leaks.num_at_vertices, 2e-6 * settings.num_rays / leaks.seconds);
       std::fflush(stdout);
-      const bool is_tessellation =
-          options.method == DisplacementMethod::kTessellate || options.method == DisplacementMethod::kGrid;
+      const bool is_tessellation = displacement_method(*options.method).tessellation.has_value();
       tight = tight && leaks.num_closest + leaks.num_shadow + (is_tessellation ? 0 : leaks.num_at_vertices) == 0;
     }
   }
@@ -332,7 +333,10 @@ int main(int argc, char** argv)
   app.add_option("--midlevel", settings.midlevel, "Height that is not displaced");
   app.add_option("--tiles", settings.tiles, "Tiles of the map for a unit of the texture coordinates");
   app.add_option("--rays", settings.num_rays, "Rays of each kind for each method")->check(CLI::Range(1.0, 1e12));
-  app.add_option("--methods", settings.methods, "Methods, by commas")->delimiter(',');
+  app.add_option("--methods", settings.methods, "Methods, by commas; default: all that do not tessellate")
+      ->delimiter(',')
+      ->check(CLI::IsMember(std::vector<std::string>(std::begin(relief::kDisplacementMethodLabels) + 1,
+                                                     std::end(relief::kDisplacementMethodLabels))));
   app.add_option("--part", settings.part, "Rays of its own for each part of a long run");
   app.add_option("--from", settings.distances, "Sizes of the mesh that rays start away, by commas; 0: inside")
       ->delimiter(',')

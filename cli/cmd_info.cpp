@@ -12,10 +12,11 @@
 #include "cli/commands.h"
 #include "cli/scene_setup.h"
 #include "cli/standard_streams.h"
+#include "displacement/method.h"
+#include "displacement/seams.h"
 #include "integrator/scene_context.h"
 #include "kernel/feature_mask.h"
 #include "scene/displaced_mesh.h"
-#include "scene/displacement_seams.h"
 #include "scene/load.h"
 #include "scene/setting_values.h"
 #include "scene/texture_store.h"
@@ -78,42 +79,52 @@ std::string text(const SeamExtent& seams)
   return fmt::format("{} edges, {:g} m, gap up to {:g} m", seams.num_edges, seams.length, seams.largest_gap);
 }
 
-void print_displacement(const Scene& scene, int index, const std::vector<HeightRange>& ranges)
+/// The seams of all meshes that a displacement moves.
+SeamReport seams_of(const DisplacementSet& displacements, int displacement_index)
+{
+  SeamReport sum;
+  for (std::size_t i = 0; i < displacements.size(); ++i) {
+    if (displacements.displacement_index(i) != displacement_index) continue;
+    const SeamReport found = displacements.seams(i);
+    sum.all = seam_extent_sum(sum.all, found.all);
+    sum.split = seam_extent_sum(sum.split, found.split);
+  }
+  return sum;
+}
+
+void print_displacement(const Scene& scene, const DisplacementSet& displacements, int index)
 {
   const DisplacementSettings& d = scene.displacements[static_cast<std::size_t>(index)];
   const auto map_index = static_cast<std::size_t>(d.height.texture_index);
   std::size_t num_meshes = 0;
   UvBounds uv;
-  DisplacementSeams seams;
   for (const MeshDisplacement& displaced : displaced_meshes(scene)) {
     if (displaced.displacement_index != index) continue;
     const Mesh& mesh = scene.meshes[static_cast<std::size_t>(displaced.mesh_index)];
     ++num_meshes;
     uv = uv_bounds_union(uv, displaced_mesh_uv_bounds(mesh, d.height));
-    const DisplacementSeams found = displacement_seams(mesh, d, scene.height_maps[map_index].view(), ranges[map_index]);
-    seams.all = seam_extent_sum(seams.all, found.all);
-    seams.split = seam_extent_sum(seams.split, found.split);
   }
   line("  {}: {}, method {}, scale {:g} m, midlevel {:g}, {} space", material_names(scene, index),
-       scene.height_maps[map_index].label, kDisplacementMethodLabels[static_cast<std::size_t>(d.method)], d.scale,
-       d.midlevel, d.space == DisplacementSpace::kWorld ? "world" : "object");
+       scene.height_maps[map_index].label, displacement_method_label(d.method), d.scale, d.midlevel,
+       d.space == DisplacementSpace::kWorld ? "world" : "object");
   std::string covered;
   if (uv.low.x <= uv.high.x) {
     covered = fmt::format(", uv {:g} to {:g}, {:g} to {:g}", uv.low.x, uv.high.x, uv.low.y, uv.high.y);
   }
   line("    meshes: {}{}", num_meshes, covered);
+  const SeamReport seams = seams_of(displacements, index);
   line("    uv seams with different heights: {}", text(seams.all));
   if (d.weld_seams) line("      left open by welding: {}", text(seams.split));
 }
 
-void print_displacements(const Scene& scene)
+void print_displacements(const Scene& scene, const DisplacementSet& displacements)
 {
   std::vector<HeightRange> ranges;
   for (const HeightMap& map : scene.height_maps) ranges.push_back(height_map_range(map.view()));
   print_height_maps(scene, ranges);
   line("displacements: {}", scene.displacements.size());
   for (std::size_t i = 0; i < scene.displacements.size(); ++i) {
-    print_displacement(scene, static_cast<int>(i), ranges);
+    print_displacement(scene, displacements, static_cast<int>(i));
   }
 }
 
@@ -138,12 +149,21 @@ nlohmann::ordered_json limit_json(double limit)
   return limit;
 }
 
-/// Prints every setting that RELIEF_render may have as JSON, one a line.
+/// Prints a JSON array, an entry a line.
+int print_entries(const std::vector<nlohmann::ordered_json>& entries)
+{
+  line("[");
+  for (const nlohmann::ordered_json& entry : entries)
+    line("  {}{}", entry.dump(), &entry == &entries.back() ? "" : ",");
+  line("]");
+  return 0;
+}
+
+/// Prints every setting that RELIEF_render may have.
 int print_declared_settings()
 {
-  const std::vector<SettingValue> all = setting_values({});
-  line("[");
-  for (const SettingValue& setting : all) {
+  std::vector<nlohmann::ordered_json> entries;
+  for (const SettingValue& setting : setting_values({})) {
     const auto& [name, type, range, description] = *setting.info;
     nlohmann::ordered_json allowed;
     if (type == SettingType::kChoice) {
@@ -151,15 +171,28 @@ int print_declared_settings()
     } else if (type != SettingType::kText) {
       allowed = {limit_json(range.low), limit_json(range.high)};
     }
-    const nlohmann::ordered_json entry = {{"name", name},
-                                          {"type", kSettingTypeLabels[static_cast<std::size_t>(type)]},
-                                          {"default", setting.fallback},
-                                          {"range", allowed},
-                                          {"description", description}};
-    line("  {}{}", entry.dump(), &setting == &all.back() ? "" : ",");
+    entries.push_back({{"name", name},
+                       {"type", kSettingTypeLabels[static_cast<std::size_t>(type)]},
+                       {"default", setting.fallback},
+                       {"range", allowed},
+                       {"description", description}});
   }
-  line("]");
-  return 0;
+  return print_entries(entries);
+}
+
+/// Prints the methods that displaced meshes may be traced by.
+int print_declared_methods()
+{
+  std::vector<nlohmann::ordered_json> entries;
+  entries.push_back({{"name", displacement_method_label(DisplacementMethod::kAuto)},
+                     {"title", "Automatic"},
+                     {"description", "The program chooses"}});
+  for (const DisplacementMethod method : kDisplacementMethods) {
+    const DisplacementMethodEntry& entry = displacement_method(method);
+    entries.push_back(
+        {{"name", displacement_method_label(method)}, {"title", entry.title}, {"description", entry.description}});
+  }
+  return print_entries(entries);
 }
 
 /// The scene's settings that are not what they are where nobody says anything.
@@ -248,7 +281,7 @@ int info(const std::string& file,
          view.num_channels, view.num_channels == 1 ? "" : "s",
          scene.textures->is_cached(static_cast<int>(i)) ? ", through the tile cache" : "");
   }
-  if (!scene.displacements.empty()) print_displacements(scene);
+  if (!scene.displacements.empty()) print_displacements(scene, context.displacements);
   if (context.displacements.size() > 0) print_prepared(context.displacements, stats);
   line("caustics: {} ({})", context.globals.caustics.enabled ? "photons" : "none", context.caustics_reason);
   line("features: {}", features(scene));
@@ -268,7 +301,7 @@ void cmd_info_register(CLI::App& app, Run& run)
 {
   struct Arguments {
     std::string scene;
-    bool strict = false, settings = false;
+    bool strict = false, settings = false, methods = false;
     SceneSetup setup;
     DisplacementOptions displacement;
     std::optional<CausticsMode> caustics;
@@ -276,8 +309,13 @@ void cmd_info_register(CLI::App& app, Run& run)
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("info", "Shows what is in a scene, what it will cost, and every warning");
   CLI::Option* scene = command->add_option("scene", arguments->scene, "Scene file (.gltf, .glb)");
-  command->add_flag("--settings", arguments->settings, "Prints all settings that RELIEF_render may have, as JSON")
-      ->excludes(scene);
+  CLI::Option* settings =
+      command->add_flag("--settings", arguments->settings, "Prints all settings that RELIEF_render may have, as JSON")
+          ->excludes(scene);
+  command
+      ->add_flag("--methods", arguments->methods, "Prints the methods that displaced meshes can be traced by, as JSON")
+      ->excludes(scene)
+      ->excludes(settings);
   command->add_flag("--strict", arguments->strict, "Turn warnings into errors");
   add_light_options(*command, arguments->setup);
   add_displacement_method(*command, arguments->displacement);
@@ -285,8 +323,8 @@ void cmd_info_register(CLI::App& app, Run& run)
   add_caustics_mode(*command, arguments->caustics);
   add_max_memory(*command);
   command->callback([&run, arguments] {
-    if (arguments->settings) {
-      run = print_declared_settings;
+    if (arguments->settings || arguments->methods) {
+      run = arguments->settings ? print_declared_settings : print_declared_methods;
       return;
     }
     if (arguments->scene.empty()) throw CLI::RequiredError("scene");

@@ -56,7 +56,7 @@ CLI::Option* add_displacement_method(CLI::App& command, DisplacementOptions& opt
   };
   return command
       .add_option_function<std::string>("--displacement", set, "How displaced meshes are traced (default: the scene's)")
-      ->check(one_of(displacement_method_names()));
+      ->check(one_of({std::begin(kDisplacementMethodLabels), std::end(kDisplacementMethodLabels)}));
 }
 
 CLI::Option* add_displacement_memory(CLI::App& command, DisplacementOptions& options)

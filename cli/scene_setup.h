@@ -7,7 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "integrator/displacement_set.h"
+#include "displacement/displacement_set.h"
 #include "scene/load.h"
 
 namespace relief {

@@ -11,7 +11,7 @@
 
 #include "displacement/far_ray.h"
 #include "displacement/level_of_detail.h"
-#include "displacement/seam_walls_make.h"
+#include "displacement/seams.h"
 #include "kernel/math/rounding.h"
 
 namespace relief {

@@ -5,6 +5,7 @@
 
 #include "displacement/clearance.h"
 #include "displacement/seam_walls.h"
+#include "kernel/shape/surface_hit.h"
 
 namespace relief {
 
@@ -74,56 +75,32 @@ bool widen_by_neighbor(RTCPointQueryFunctionArguments* arguments)
   return false;
 }
 
-}  // namespace
-
-ReportedPoint displaced_point(const DisplacedGeometry& geometry, std::uint32_t triangle, ReportedHit hit)
+/// Half sides of the box that a point of a displaced surface is in, and the origin of a ray that leaves it along its normal.
+/// @param P, Ng  object space
+/// @return       object space
+Vec3d leaving_reach(const InstanceView& placement, Vec3f P, Vec3f Ng)
 {
-  ReportedPoint out;
-  if (hit.Ng_x >= 0.0f) {
-    out.b1 = hit.u;
-    out.b2 = hit.v;
-    out.level = static_cast<int>(hit.Ng_x);
-    const OnLevel on(geometry, triangle, out.level);
-    out.point = surface_point(on.mesh, on.tri, hit.u, hit.v);
-    return out;
-  }
-  const int code = static_cast<int>(-hit.Ng_x) - 1, edge = code % 3;
-  float b[3] = {0.0f, 0.0f, 0.0f};
-  b[edge] = 1.0f - hit.u;
-  b[edge == 2 ? 0 : edge + 1] = hit.u;
-  out.b1 = b[1];
-  out.b2 = b[2];
-  out.level = code / 3;
-  out.on_wall = true;
-  out.point = seam_wall_point(geometry.mesh, triangle, edge, hit.u, hit.v,
-                              {geometry.mesh.field, geometry.levels[out.level].field});
-  return out;
+  const DisplacedPointError error =
+      displaced_point_error(placement, P, transform_point(placement.world_from_object, P));
+  const Vec3f N = normalize(transform_normal(placement.object_from_world, as_normal(Ng)));
+  const Vec3f offset = 2.0f * dot(abs(N), error.world) * N;
+  // The origin has as large an error as the point.
+  return to_double(2.0f * error.object + abs(transform_vector(placement.object_from_world, offset)));
 }
 
-Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry,
-                              std::uint32_t triangle,
-                              int level,
-                              double b1,
-                              double b2)
+/// How far a ray's origin has to be moved to leave a point of the surface where it has a crease.
+/// @param reach  half sides of the box of errors, object space, metres
+/// @return       to the side of N, object space; zero: it can leave along the normal
+Vec3d leave_of(const DisplacedGeometry& geometry, std::uint32_t triangle, const DisplacedPlace& at, Vec3d reach)
 {
-  const OnLevel on(geometry, triangle, level);
-  return surface_smooth_normal(on.mesh, on.tri, b1, b2);
-}
-
-Vec3d displaced_leave(const DisplacedGeometry& geometry,
-                      std::uint32_t triangle,
-                      int level,
-                      double b1,
-                      double b2,
-                      Vec3d reach)
-{
-  const OnLevel on(geometry, triangle, level);
+  const double b1 = at.b1, b2 = at.b2;
+  const OnLevel on(geometry, triangle, at.level);
   const SurfaceInBox own = surface_in_box(on.mesh, on.tri, b1, b2, reach);
   double distance = own.crease ? own.clearance : 0;
   // A triangle within the box has no side that it could share.
   if (own.sides != 0 && own.sides != 7 && geometry.scene != nullptr) {
     const SurfacePoint point = surface_point(on.mesh, on.tri, b1, b2);
-    BoxOverSides box{geometry, triangle, level, {1.0 - b1 - b2, b1, b2}, point.d, reach, own.clearance};
+    BoxOverSides box{geometry, triangle, at.level, {1.0 - b1 - b2, b1, b2}, point.d, reach, own.clearance};
     double sum = 0;
     for (int k = 0; k < 3; ++k) {
       if ((own.sides >> k & 1) != 0) box.weights[k] = 0;
@@ -140,6 +117,48 @@ Vec3d displaced_leave(const DisplacedGeometry& geometry,
   if (!(distance > 0)) return {};
   const Vec3d N = base_point(on.tri, b1, b2).N;
   return N * (distance / length(N));
+}
+
+}  // namespace
+
+SurfacePoint displaced_surface_point(const DisplacedGeometry& geometry,
+                                     std::uint32_t triangle,
+                                     const DisplacedPlace& place)
+{
+  if (place.edge >= 0) {
+    return seam_wall_point(geometry.mesh, triangle, place.edge, place.fraction, place.d,
+                           {geometry.mesh.field, geometry.levels[place.level].field});
+  }
+  const OnLevel on(geometry, triangle, place.level);
+  return surface_point(on.mesh, on.tri, place.b1, place.b2);
+}
+
+Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry,
+                              std::uint32_t triangle,
+                              int level,
+                              double b1,
+                              double b2)
+{
+  const OnLevel on(geometry, triangle, level);
+  return surface_smooth_normal(on.mesh, on.tri, b1, b2);
+}
+
+DisplacedPoint displaced_resolve(const DisplacedGeometry& geometry,
+                                 const InstanceView& placement,
+                                 float texel,
+                                 std::uint32_t triangle,
+                                 EmbreeHitRecord record)
+{
+  const DisplacedPlace place = displaced_hit_decode(record);
+  const SurfacePoint point = displaced_surface_point(geometry, triangle, place);
+  DisplacedPoint out{triangle, place.b1, place.b2};
+  out.P = to_float(point.P);
+  out.Ng = out.Ns = to_float(point.Ng);
+  if (geometry.lod.by_cone) out.width = lod_width_of_level(texel, place.level);
+  if (place.edge >= 0) return out;
+  out.leave = to_float(leave_of(geometry, triangle, place, leaving_reach(placement, out.P, out.Ng)));
+  if (geometry.smooth) out.Ns = to_float(displaced_smooth_normal(geometry, triangle, place.level, place.b1, place.b2));
+  return out;
 }
 
 RTCGeometry displaced_geometry_make(RTCDevice device, const DisplacedGeometry& geometry, const TraversalTable& table)

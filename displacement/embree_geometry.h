@@ -1,49 +1,49 @@
-// Displaced meshes as Embree user geometry: bounds, and the callbacks that unpack a ray, call a traversal and pack its
-// hit. The callbacks are compiled once an instruction set, like the integrator's stages.
+// Displaced meshes as Embree user geometry: bounds, the callbacks that unpack a ray, call a method and pack its hit, and
+// what becomes of the hit that is nearest. The callbacks are compiled once an instruction set, like the integrator's
+// stages.
 #pragma once
 
 #include "displacement/displaced_mesh.h"
 #include "displacement/embree.h"
-#include "displacement/leaf.h"
 #include "displacement/level_of_detail.h"
 #include "displacement/method.h"
-#include "displacement/minmax_mipmap.h"
-#include "displacement/rmip.h"
 
 namespace relief {
 
-/// A level of a height map, and what methods need besides.
+/// A level of a height map, and what the geometry's method needs of it.
 struct DisplacementLevel {
   const HeightFieldView* field = nullptr;
-  const RmipView* rmip = nullptr;            ///< for kRmip
-  const MinmaxMipmapView* mipmap = nullptr;  ///< for kRmipOnMinmax and kTfdm
+  const void* table = nullptr;  ///< MethodTable::view
 };
 
 /// User data of a geometry: what its callbacks need. Must stay where it is while the geometry is in use.
 struct DisplacedGeometry {
   DisplacedMeshView mesh;  ///< with the finest level
-  TraversalMethod method = TraversalMethod::kChord;
+  DisplacementMethod method = kDefaultMethod;
+  bool smooth = false;  ///< shading normals come from the map's filtered gradient
   LodRule lod;
   DisplacementLevel levels[kMaxLodLevels];     ///< the finest first; lod.num_levels of them
   RmipOptions rmip_options;                    ///< for both of RMIP's
   RTCFilterFunctionN shadow_filter = nullptr;  ///< called for hits of shadow rays; null: all of them are opaque
-  RTCScene scene = nullptr;                    ///< of this geometry alone, committed; null: see displaced_leave
+  RTCScene scene = nullptr;  ///< of this geometry alone, committed; null: rays that leave it know no neighbours
+};
+
+/// A question to one triangle of a geometry: the nearest (or any) hit of a ray.
+struct DisplacedQuery {
+  Vec3d O, D;  ///< object space
+  double t_min = 0, t_max = 0;
+  bool any_hit = false;
+  LodCone cone = {};  ///< the detail that is asked for
+  float texel = 0;    ///< width of a texel of the finest level in the space that `cone` is in
 };
 
 /// Traversals compiled for one instruction set.
 struct TraversalTable {
   const char* isa;
-  /// Nearest (or any) hit of a ray with one triangle, by the geometry's method.
-  /// @param texel  width of a texel of the finest level in the space that `cone` is in
+  /// @param hit  written if the result is true
   bool (*trace)(const DisplacedGeometry& geometry,
                 std::uint32_t triangle,
-                Vec3d O,
-                Vec3d D,
-                const LodCone& cone,
-                float texel,
-                double t_min,
-                double t_max,
-                bool any_hit,
+                const DisplacedQuery& query,
                 DisplacedHit* hit,
                 TraversalCounters* counters);
   RTCIntersectFunctionN intersect;
@@ -53,13 +53,23 @@ struct TraversalTable {
 const TraversalTable& traversal_table_baseline();
 const TraversalTable& traversal_table_avx2();
 
-/// What Embree's record keeps of a hit. On the surface u and v are the weights of vertices 1 and 2 and Ng_x the level; on
-/// the wall of a seam u is the place along its edge, v the displacement and Ng_x = −(1 + 3 · level + edge).
-struct ReportedHit {
+/// What Embree's record of a hit has room for.
+struct EmbreeHitRecord {
   float u = 0, v = 0, Ng_x = 0;
 };
 
-RELIEF_KERNEL ReportedHit displaced_hit_report(const DisplacedHit& hit)
+/// Where a hit is, as far as Embree's record keeps it.
+struct DisplacedPlace {
+  float b1 = 0, b2 = 0;  ///< weights of vertices 1 and 2
+  int level = 0;
+  int edge = -1;       ///< whose wall was hit; −1: the surface
+  float fraction = 0;  ///< of a wall: along its edge
+  float d = 0;         ///< of a wall: displacement, metres
+};
+
+/// The codec of hits: on the surface u and v are the weights and Ng_x is the level; on a wall u is the fraction, v the
+/// displacement and Ng_x = −(1 + 3 · level + edge).
+RELIEF_KERNEL EmbreeHitRecord displaced_hit_encode(const DisplacedHit& hit)
 {
   if (hit.edge < 0) return {static_cast<float>(hit.b1), static_cast<float>(hit.b2), static_cast<float>(hit.level)};
   // The weight of the vertex that the edge leads to.
@@ -67,16 +77,20 @@ RELIEF_KERNEL ReportedHit displaced_hit_report(const DisplacedHit& hit)
   return {static_cast<float>(fraction), static_cast<float>(hit.d), static_cast<float>(-(1 + 3 * hit.level + hit.edge))};
 }
 
-/// The point of a hit, and where it is in its triangle.
-struct ReportedPoint {
-  float b1 = 0, b2 = 0;  ///< weights of vertices 1 and 2
-  int level = 0;
-  bool on_wall = false;
-  SurfacePoint point;
-};
+RELIEF_KERNEL DisplacedPlace displaced_hit_decode(EmbreeHitRecord record)
+{
+  if (record.Ng_x >= 0.0f) return {record.u, record.v, static_cast<int>(record.Ng_x)};
+  const int code = static_cast<int>(-record.Ng_x) - 1, edge = code % 3;
+  float b[3] = {0.0f, 0.0f, 0.0f};
+  b[edge] = 1.0f - record.u;
+  b[edge == 2 ? 0 : edge + 1] = record.u;
+  return {b[1], b[2], code / 3, edge, record.u, record.v};
+}
 
-/// @param hit  as Embree has it
-ReportedPoint displaced_point(const DisplacedGeometry& geometry, std::uint32_t triangle, ReportedHit hit);
+/// The point of the surface, or of a wall, in double precision.
+SurfacePoint displaced_surface_point(const DisplacedGeometry& geometry,
+                                     std::uint32_t triangle,
+                                     const DisplacedPlace& place);
 
 /// The shading normal of a point of the surface from the smoothed map.
 Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry,
@@ -85,19 +99,29 @@ Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry,
                               double b1,
                               double b2);
 
-/// How far a ray's origin has to be moved to leave a point of the surface where it has a crease, see clearance.h. Triangles
-/// beside the point's own are looked up in the geometry's scene; without one there are none.
-/// @param reach  half sides of the box of errors, object space, metres
-/// @return       to the side of N, object space; zero: it can leave along the normal
-Vec3d displaced_leave(const DisplacedGeometry& geometry,
-                      std::uint32_t triangle,
-                      int level,
-                      double b1,
-                      double b2,
-                      Vec3d reach);
+/// A hit on a displaced instance, as shading wants it.
+struct DisplacedPoint {
+  std::uint32_t triangle = 0;  ///< base triangle
+  float u = 0, v = 0;          ///< its barycentric weights of vertices 1 and 2
+  float width = kInfinity;     ///< widest cone that meets the surface again as it is here, see lod_width_of_level
+  Vec3f P = {}, Ng = {};       ///< on the traced surface, object space; Ng unit, on the side of the displacement normal
+  Vec3f Ns = {};               ///< unit shading normal, object space: Ng, or that of the smoothed map
+  Vec3f leave = {};            ///< see SurfaceHit::leave; object space
+};
 
-/// A new geometry, one primitive a base triangle, not committed. Hits are reported as in ReportedHit; position and normal
-/// are left to displaced_point, once the nearest is known.
+/// Completes the nearest hit, once it is known.
+///
+/// A ray that leaves a crease of the surface has to start further away than rounding asks for, see clearance.h. Triangles
+/// beside the point's own are looked up in the geometry's scene.
+/// @param placement  the instance's
+/// @param texel      width of a texel of the finest level, metres, world
+DisplacedPoint displaced_resolve(const DisplacedGeometry& geometry,
+                                 const InstanceView& placement,
+                                 float texel,
+                                 std::uint32_t triangle,
+                                 EmbreeHitRecord record);
+
+/// A new geometry, one primitive a base triangle, not committed.
 RTCGeometry displaced_geometry_make(RTCDevice device, const DisplacedGeometry& geometry, const TraversalTable& table);
 
 }  // namespace relief

@@ -168,24 +168,65 @@ RELIEF_KERNEL void weights_correct(const DisplacedMeshView& mesh,
 /// less than a texel.
 inline constexpr double kCellTolerance = 1e-9;
 
-/// First root of g in a cell.
+/// The root of g between two ends of different sign, by secant steps. An end that stays would keep the other from closing in,
+/// so its value is scaled down as Anderson and Björck 1973, "A new high order method of regula falsi type", do: half as many
+/// steps as by halving it (the Illinois method).
+/// @param noise  values no larger are zeros
+/// @param g_at   of a point of the curve
+template <class Height>
+RELIEF_KERNEL CurvePoint root_between(const DisplacedTriangle& tri,
+                                      const CurveSegment& segment,
+                                      CurvePoint a,
+                                      CurvePoint b,
+                                      double ga,
+                                      double gb,
+                                      double noise,
+                                      const Height& g_at)
+{
+  const bool starts_below = ga < 0.0;
+  int stayed = 0;
+  for (int k = 0; k < 80 && b.tau - a.tau > 0x1p-51 && ga != 0.0; ++k) {
+    double tau = a.tau + (b.tau - a.tau) * (ga / (ga - gb));
+    if (!(tau > a.tau && tau < b.tau)) tau = 0.5 * (a.tau + b.tau);
+    if (!(tau > a.tau && tau < b.tau)) break;
+    const CurvePoint p = curve_point(tri, segment, tau);
+    const double gp = g_at(p);
+    if (__builtin_fabs(gp) <= noise) return p;
+    const bool replaces_a = (gp < 0.0) == starts_below;
+    const double left = 1.0 - gp / (replaces_a ? ga : gb), factor = left > 0.0 ? left : 0.5;
+    if (replaces_a) {
+      a = p;
+      ga = gp;
+      if (stayed == 1) gb *= factor;
+      stayed = 1;
+    } else {
+      b = p;
+      gb = gp;
+      if (stayed == 2) ga *= factor;
+      stayed = 2;
+    }
+  }
+  return a;
+}
+
+/// First root of g in a cell. Not inlined: its stack is as large as that of a descent.
 /// @param i, j        the cell, lattice coordinates
 /// @param tau0, tau1  contains every τ at which the curve is in the cell; 0 <= tau0 <= tau1 <= 1
 /// @param monotone    t grows with τ; if not, all roots are looked at
 /// @param hit         t, b, cell of the nearest root whose t is within (t_min, t_max)
 /// @return            false if there is none
-RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
-                                  const DisplacedTriangle& tri,
-                                  const RayCurve& curve,
-                                  const CurveSegment& g,
-                                  std::int64_t i,
-                                  std::int64_t j,
-                                  double tau0,
-                                  double tau1,
-                                  double t_min,
-                                  double t_max,
-                                  bool monotone,
-                                  DisplacedHit* hit)
+[[gnu::noinline]] RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
+                                                    const DisplacedTriangle& tri,
+                                                    const RayCurve& curve,
+                                                    const CurveSegment& g,
+                                                    std::int64_t i,
+                                                    std::int64_t j,
+                                                    double tau0,
+                                                    double tau1,
+                                                    double t_min,
+                                                    double t_max,
+                                                    bool monotone,
+                                                    DisplacedHit* hit)
 {
   bool found = false;
   const CellHeights cell = cell_heights(*mesh.field, i, j);
@@ -266,38 +307,8 @@ RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
     const bool small = !(bound > rounding) || width <= 0x1p-50;
     // Once the bend is a small part of the difference of the ends, g is monotone and has one root.
     if (crosses && (small || 16.0 * bound < __builtin_fabs(n.gb - n.ga))) {
-      CurvePoint a = n.a, b = n.b;
-      double ga = n.ga, gb = n.gb;
-      // Secant steps between ends of different sign. An end that stays would keep the other from closing in, so its value is
-      // scaled down as Anderson and Björck 1973, "A new high order method of regula falsi type", do: half as many steps as
-      // by halving it (the Illinois method).
       const double noise = 0x1p-51 * (magnitude + slope);
-      int stayed = 0;
-      for (int k = 0; k < 80 && b.tau - a.tau > 0x1p-51 && ga != 0.0; ++k) {
-        double tau = a.tau + (b.tau - a.tau) * (ga / (ga - gb));
-        if (!(tau > a.tau && tau < b.tau)) tau = 0.5 * (a.tau + b.tau);
-        if (!(tau > a.tau && tau < b.tau)) break;
-        const CurvePoint p = curve_point(tri, g, tau);
-        const double gp = height_over(p);
-        if (__builtin_fabs(gp) <= noise) {
-          a = p;
-          break;
-        }
-        const bool replaces_a = (gp < 0.0) == (n.ga < 0.0);
-        const double left = 1.0 - gp / (replaces_a ? ga : gb), factor = left > 0.0 ? left : 0.5;
-        if (replaces_a) {
-          a = p;
-          ga = gp;
-          if (stayed == 1) gb *= factor;
-          stayed = 1;
-        } else {
-          b = p;
-          gb = gp;
-          if (stayed == 2) ga *= factor;
-          stayed = 2;
-        }
-      }
-      if (accept(a)) return true;
+      if (accept(root_between(tri, g, n.a, n.b, n.ga, n.gb, noise, height_over))) return true;
       continue;
     }
     if (small || depth + 2 > kMaxDepth) {

@@ -86,4 +86,9 @@ std::size_t MinmaxMipmap::bytes() const
   return sum;
 }
 
+MethodTable minmax_table_make(const HeightFieldView& field, const RmipOptions&)
+{
+  return method_table_of(std::make_shared<const MinmaxMipmap>(field));
+}
+
 }  // namespace relief

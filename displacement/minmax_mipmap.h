@@ -1,4 +1,4 @@
-// The min-max mipmap: a quadtree over the cells of a height field. It is the hierarchy of TFDM (traverse_tfdm.h), and it
+// The min-max mipmap: a quadtree over the cells of a height field. It is the hierarchy of TFDM (methods/tfdm.cpp), and it
 // answers range queries in RMIP's place where the two are compared.
 #pragma once
 
@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "displacement/lattice_rect.h"
+#include "displacement/method_table.h"
 
 namespace relief {
 
@@ -85,5 +86,8 @@ class MinmaxMipmap {
   std::vector<std::vector<MinmaxQuad>> levels_;
   MinmaxMipmapView view_;
 };
+
+/// A min-max mipmap as a method's table.
+MethodTable minmax_table_make(const HeightFieldView& field, const RmipOptions& options);
 
 }  // namespace relief

@@ -108,4 +108,9 @@ Rmip::Rmip(const HeightFieldView& f, int resolution)
   }
 }
 
+MethodTable rmip_table_make(const HeightFieldView& field, const RmipOptions& options)
+{
+  return method_table_of(std::make_shared<const Rmip>(field, options.resolution));
+}
+
 }  // namespace relief

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "displacement/method_table.h"
 #include "displacement/rmip_query.h"
 
 namespace relief {
@@ -28,5 +29,8 @@ class Rmip {
   std::vector<StoredRange> windows_;
   RmipView view_;
 };
+
+/// An RMIP as a method's table.
+MethodTable rmip_table_make(const HeightFieldView& field, const RmipOptions& options);
 
 }  // namespace relief

@@ -30,23 +30,36 @@ std::vector<std::uint32_t> first_equals(std::size_t count, const Key& key, const
   return first;
 }
 
+/// By its bits; −0 and 0 are one place.
+std::uint32_t place_bits(float x) { return std::bit_cast<std::uint32_t>(x + 0.0f); }
+
+template <std::size_t N>
+std::uint64_t place_hash(const std::array<std::uint32_t, N>& place)
+{
+  std::uint64_t hash = 0;
+  for (const std::uint32_t part : place) hash = hash_mix(hash ^ part);
+  return hash;
+}
+
 }  // namespace
 
 std::vector<std::uint32_t> weld_corners(std::span<const DisplacedTriangle> triangles)
 {
-  using Place = std::array<std::uint32_t, 6>;
-  const auto place_of = [&](std::uint32_t corner) -> Place {
+  const auto place_of = [&](std::uint32_t corner) -> std::array<std::uint32_t, 6> {
     const DisplacedTriangle& tri = triangles[corner / 3];
     const Vec3f P = tri.P[corner % 3], N = tri.N[corner % 3];
-    // By their bits; −0 and 0 are one place.
-    const auto bits = [](float x) { return std::bit_cast<std::uint32_t>(x + 0.0f); };
-    return {bits(P.x), bits(P.y), bits(P.z), bits(N.x), bits(N.y), bits(N.z)};
+    return {place_bits(P.x), place_bits(P.y), place_bits(P.z), place_bits(N.x), place_bits(N.y), place_bits(N.z)};
   };
-  return first_equals(3 * triangles.size(), place_of, [](const Place& place) {
-    std::uint64_t hash = 0;
-    for (const std::uint32_t part : place) hash = hash_mix(hash ^ part);
-    return hash;
-  });
+  return first_equals(3 * triangles.size(), place_of, place_hash<6>);
+}
+
+std::vector<std::uint32_t> weld_positions(std::span<const DisplacedTriangle> triangles)
+{
+  const auto place_of = [&](std::uint32_t corner) -> std::array<std::uint32_t, 3> {
+    const Vec3f P = triangles[corner / 3].P[corner % 3];
+    return {place_bits(P.x), place_bits(P.y), place_bits(P.z)};
+  };
+  return first_equals(3 * triangles.size(), place_of, place_hash<3>);
 }
 
 std::vector<std::uint32_t> weld_edges(std::span<const std::uint32_t> corners)

@@ -14,8 +14,12 @@ namespace relief {
 /// @return  for corner 3 · triangle + k the first corner that is equal to it
 std::vector<std::uint32_t> weld_corners(std::span<const DisplacedTriangle> triangles);
 
+/// Numbers the distinct P of all corners.
+/// @return  as weld_corners
+std::vector<std::uint32_t> weld_positions(std::span<const DisplacedTriangle> triangles);
+
 /// Edges between the same two places, in whichever direction. Edge 3 · triangle + k runs from vertex k to vertex k + 1.
-/// @param corners  from weld_corners
+/// @param corners  from weld_corners or weld_positions
 /// @return         for every edge the first one of those
 std::vector<std::uint32_t> weld_edges(std::span<const std::uint32_t> corners);
 

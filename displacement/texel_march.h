@@ -4,34 +4,20 @@
 
 #include "displacement/bounds3d.h"
 #include "displacement/leaf.h"
+#include "displacement/prism_query.h"
 #include "displacement/ray_projection.h"
 
 namespace relief {
 
-/// A query of one ray with one triangle.
-struct CurveSearch {
-  const DisplacedMeshView& mesh;
-  const DisplacedTriangle& tri;
-  const RayCurve& curve;
-  TraversalCounters& counters;
-  DisplacedHit& hit;
-  double t_min, t_max;  ///< t_max shrinks with every hit
-  bool unfolded, any_hit;
-  bool found = false;
+/// A search by displacements, in metres.
+struct MetricSearch : PrismSearch {
   double d_zero, d_per_texel;  ///< d = d_zero + d_per_texel · texel as stored
   double d_pad;                ///< rounding of a height, and what the curve may change within rounding of its position
-  std::uint64_t next_poll;
 };
 
-RELIEF_KERNEL CurveSearch curve_search_make(const DisplacedMeshView& mesh,
-                                            std::uint32_t triangle,
-                                            const RayCurve& curve,
-                                            double t_min,
-                                            double t_max,
-                                            bool any_hit,
-                                            DisplacedHit* hit,
-                                            TraversalCounters* counters)
+RELIEF_KERNEL MetricSearch metric_search_make(const PrismQuery& q, DisplacedHit* hit)
 {
+  const DisplacedMeshView& mesh = q.mesh;
   const HeightFieldView& f = *mesh.field;
   double d_per_texel = mesh.scale;
   if (f.map.format == HeightFormat::kU8) d_per_texel = mesh.scale / 255.0;
@@ -39,24 +25,11 @@ RELIEF_KERNEL CurveSearch curve_search_make(const DisplacedMeshView& mesh,
   const double span = f.h_step * (f.range.high - f.range.low);
   const double largest = __builtin_fabs(f.h_offset) + 65535.0 * f.h_step + __builtin_fabs(mesh.midlevel);
   const double d_pad = __builtin_fabs(mesh.scale) * (0x1p-20 * span + 0x1p-44 * largest);
-  return {mesh,
-          mesh.triangles[triangle],
-          curve,
-          *counters,
-          *hit,
-          t_min,
-          t_max,
-          mesh.unfolded[triangle] != 0,
-          any_hit,
-          false,
-          -mesh.scale * mesh.midlevel,
-          d_per_texel,
-          d_pad,
-          counters->bounds + kBoundsAPoll};
+  return {prism_search_make(q, hit), -mesh.scale * mesh.midlevel, d_per_texel, d_pad};
 }
 
 /// Displacements of stored bounds.
-RELIEF_KERNEL ScalarRange displacement_range(const CurveSearch& c, StoredRange stored)
+RELIEF_KERNEL ScalarRange displacement_range(const MetricSearch& c, StoredRange stored)
 {
   const HeightFieldView& f = *c.mesh.field;
   const double zero = c.mesh.scale * (f.h_offset - c.mesh.midlevel), step = c.mesh.scale * f.h_step;
@@ -65,7 +38,7 @@ RELIEF_KERNEL ScalarRange displacement_range(const CurveSearch& c, StoredRange s
 }
 
 /// Displacements at the corners of a cell, and so within it.
-RELIEF_KERNEL ScalarRange cell_displacement_range(const CurveSearch& c, std::int64_t i, std::int64_t j)
+RELIEF_KERNEL ScalarRange cell_displacement_range(const MetricSearch& c, std::int64_t i, std::int64_t j)
 {
   const HeightFieldView& f = *c.mesh.field;
   const int left = lattice_texel(f.x, i), right = lattice_texel(f.x, i + 1);
@@ -91,24 +64,6 @@ RELIEF_KERNEL ScalarRange cell_displacement_range(const CurveSearch& c, std::int
   return range(static_cast<const float*>(f.map.texels));
 }
 
-/// The leaf test of one cell; keeps the nearest hit.
-/// @return  true if there was one
-RELIEF_KERNEL bool cell_intersect(CurveSearch& c,
-                                  const CurveSegment& g,
-                                  std::int64_t i,
-                                  std::int64_t j,
-                                  double tau0,
-                                  double tau1)
-{
-  ++c.counters.texels;
-  tau0 = max(tau0, 0.0);
-  tau1 = min(tau1, 1.0);
-  if (!leaf_intersect(c.mesh, c.tri, c.curve, g, i, j, tau0, tau1, c.t_min, c.t_max, c.unfolded, &c.hit)) return false;
-  c.found = true;
-  c.t_max = c.hit.t;
-  return true;
-}
-
 /// Cell of a lattice coordinate; beside a clamped map, the unbounded one.
 RELIEF_KERNEL std::int64_t cell_at(const LatticeAxis& axis, double x)
 {
@@ -126,7 +81,7 @@ RELIEF_KERNEL std::int64_t cell_at(const LatticeAxis& axis, double x)
 /// @param nu  range of |N| on the stretch and a hundredth of a texel around it
 /// @return    true when the search is over
 /// @source    Thonat et al. 2023, §4.4
-RELIEF_KERNEL bool texel_march(CurveSearch& c,
+RELIEF_KERNEL bool texel_march(MetricSearch& c,
                                const CurveSegment& g,
                                const RayProjection& r,
                                const ProjectedStretch& stretch,

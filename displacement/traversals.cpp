@@ -1,42 +1,45 @@
-// Compiled once an instruction set: RELIEF_TRAVERSAL_TABLE names the function that returns the table.
+// Compiled once an instruction set, RELIEF_ISA, as the methods are: RELIEF_TRAVERSAL_TABLE names the function that returns the
+// table.
 #include "displacement/embree_geometry.h"
 #include "displacement/explain.h"
+#include "displacement/method.h"
 #include "displacement/seam_walls.h"
-#include "displacement/traverse_chord.h"
-#include "displacement/traverse_rmip.h"
-#include "displacement/traverse_tfdm.h"
 #include "kernel/math/rounding.h"
 
 namespace relief {
 
 namespace {
 
-/// Nearest (or any) hit of a ray's curve with one triangle of a mesh on one level.
-bool trace_level(const DisplacedGeometry& geometry,
+constexpr const DisplacementMethodEntry* kMethods[] = {
+    nullptr,  // kAuto: chosen before
+#define X(name, label) &RELIEF_ISA::name##_method,
+#include "kernel/shape/displacement_methods.inc"
+#undef X
+};
+
+/// A query to one triangle, with the ray's curve in it.
+struct CurveQuery {
+  const DisplacedGeometry& geometry;
+  std::uint32_t triangle;
+  const RayCurve& curve;
+  const DisplacedQuery& ray;
+  TraversalCounters& counters;
+};
+
+/// Nearest (or any) hit on one level.
+/// @param mesh      has that level
+/// @param triangle  of the mesh
+bool trace_level(const CurveQuery& q,
                  const DisplacedMeshView& mesh,
                  std::uint32_t triangle,
                  int level,
-                 const RayCurve& curve,
                  double t_min,
                  double t_max,
-                 bool any_hit,
-                 DisplacedHit* hit,
-                 TraversalCounters* counters)
+                 DisplacedHit* hit)
 {
-  const DisplacementLevel& tables = geometry.levels[level];
-  switch (geometry.method) {
-    case TraversalMethod::kRmip:
-      return traverse_rmip(mesh, triangle, curve.frame, curve, *tables.rmip, geometry.rmip_options, t_min, t_max,
-                           any_hit, hit, counters);
-    case TraversalMethod::kRmipOnMinmax:
-      return traverse_rmip(mesh, triangle, curve.frame, curve, *tables.mipmap, geometry.rmip_options, t_min, t_max,
-                           any_hit, hit, counters);
-    case TraversalMethod::kTfdm:
-      return traverse_tfdm(mesh, triangle, curve.frame, curve, *tables.mipmap, t_min, t_max, any_hit, hit, counters);
-    case TraversalMethod::kChord:
-      break;
-  }
-  return traverse_chord(mesh, triangle, curve, t_min, t_max, any_hit, hit, counters);
+  const DisplacedGeometry& g = q.geometry;
+  return kMethods[static_cast<int>(g.method)]->traverse(
+      {mesh, triangle, q.curve, t_min, t_max, q.ray.any_hit, g.rmip_options, q.counters}, g.levels[level].table, hit);
 }
 
 /// A mesh of one triangle: one of a geometry's, on one of its levels.
@@ -87,43 +90,35 @@ bool level_wall_intersect(const TriangleOnLevel& fine,
 }
 
 /// The levels that a ray sees of one triangle, one after the other.
-bool trace_levels(const DisplacedGeometry& geometry,
-                  std::uint32_t triangle,
-                  const RayCurve& curve,
-                  const LodCone& cone,
-                  float texel,
-                  double t_min,
-                  double t_max,
-                  bool any_hit,
-                  DisplacedHit* hit,
-                  TraversalCounters* counters)
+bool trace_levels(const CurveQuery& q, DisplacedHit* hit)
 {
+  const auto& [geometry, triangle, curve, ray, counters] = q;
   double begin = __builtin_huge_val(), end = -__builtin_huge_val();
   for (int k = 0; k < curve.num_segments; ++k) {
     begin = min(begin, curve.segments[k].t0);
     end = max(end, curve.segments[k].t1);
   }
-  begin = max(begin, t_min);
-  end = min(end, t_max);
+  begin = max(begin, ray.t_min);
+  end = min(end, ray.t_max);
   // Where displacement lines cross, t does not grow along the curve: such a triangle has one level.
   const bool folded = geometry.mesh.unfolded[triangle] == 0;
   const auto level_end = [&](int level) {
-    return folded ? __builtin_huge_val() : lod_level_end(geometry.lod, cone, texel, level, begin);
+    return folded ? __builtin_huge_val() : lod_level_end(q.geometry.lod, q.ray.cone, q.ray.texel, level, begin);
   };
-  int level = lod_level(geometry.lod, cone, texel, begin);
+  int level = lod_level(geometry.lod, ray.cone, ray.texel, begin);
   double change = level_end(level);
   if (level == 0 && !(change < end))  // mostly, where detail is wanted
-    return trace_level(geometry, geometry.mesh, triangle, 0, curve, t_min, t_max, any_hit, hit, counters);
-  double from = t_min;
+    return trace_level(q, geometry.mesh, triangle, 0, ray.t_min, ray.t_max, hit);
+  double from = ray.t_min;
   while (true) {
     const TriangleOnLevel fine(geometry, triangle, level);
-    if (trace_level(geometry, fine.mesh, 0, level, curve, from, min(change, t_max), any_hit, hit, counters)) {
+    if (trace_level(q, fine.mesh, 0, level, from, min(change, ray.t_max), hit)) {
       hit->level = level;
       return true;
     }
     if (!(change < end)) return false;
     const TriangleOnLevel coarse(geometry, triangle, level + 1);
-    if (change > t_min && level_wall_intersect(fine, coarse, curve, change, hit)) {
+    if (change > ray.t_min && level_wall_intersect(fine, coarse, curve, change, hit)) {
       hit->level = level + 1;
       return true;
     }
@@ -134,31 +129,27 @@ bool trace_levels(const DisplacedGeometry& geometry,
 }
 
 /// Nearest hit of a ray's curve with the walls along a triangle's seams, each at the level that is seen there.
-bool seam_walls_intersect(const DisplacedGeometry& geometry,
-                          std::uint32_t triangle,
-                          const RayCurve& curve,
-                          const LodCone& cone,
-                          float texel,
-                          double t_min,
-                          double t_max,
-                          DisplacedHit* hit)
+/// @param t_max  of the ray, or of what it has hit
+bool seam_walls_intersect(const CurveQuery& q, double t_max, DisplacedHit* hit)
 {
+  const auto& [geometry, triangle, curve, ray, counters] = q;
   const DisplacedMeshView& mesh = geometry.mesh;
   // As in trace_levels.
   const bool folded = mesh.unfolded[triangle] == 0;
-  const double begin = max(curve.segments[0].t0, t_min);
+  const double begin = max(curve.segments[0].t0, ray.t_min);
   bool found = false;
   for (int k = 0; k < curve.num_segments; ++k) {
     const CurveSegment& g = curve.segments[k];
     for (int end = 0; end < 2; ++end) {
       const double t = end == 0 ? g.t0 : g.t1;
-      const int level = geometry.lod.num_levels > 1 ? lod_level(geometry.lod, cone, texel, folded ? begin : t) : 0;
+      const int level =
+          geometry.lod.num_levels > 1 ? lod_level(geometry.lod, ray.cone, ray.texel, folded ? begin : t) : 0;
       const SeamLevel seam_level{mesh.field, geometry.levels[level].field};
       for (int edge = 0; edge < 3; ++edge) {
         if ((mesh.seam_edges[triangle] >> edge & 1) == 0) continue;
         DisplacedHit candidate;
         if (!seam_wall_intersect(mesh, triangle, curve, g, end, edge, seam_level, &candidate)) continue;
-        if (!(candidate.t > t_min && candidate.t < t_max)) continue;
+        if (!(candidate.t > ray.t_min && candidate.t < t_max)) continue;
         *hit = candidate;
         hit->level = level;
         t_max = hit->t;
@@ -171,26 +162,20 @@ bool seam_walls_intersect(const DisplacedGeometry& geometry,
 
 bool trace(const DisplacedGeometry& geometry,
            std::uint32_t triangle,
-           Vec3d O,
-           Vec3d D,
-           const LodCone& cone,
-           float texel,
-           double t_min,
-           double t_max,
-           bool any_hit,
+           const DisplacedQuery& ray,
            DisplacedHit* hit,
            TraversalCounters* counters)
 {
   if (traversal_stop(*counters)) return false;
   const DisplacedMeshView& mesh = geometry.mesh;
   RayCurve curve;
-  if (!ray_curve_make(ray_frame_make(O, D), mesh.triangles[triangle], &curve)) return false;
+  if (!ray_curve_make(ray_frame_make(ray.O, ray.D), mesh.triangles[triangle], &curve)) return false;
   ++counters->prisms;
-  const bool found = geometry.lod.num_levels > 1
-                         ? trace_levels(geometry, triangle, curve, cone, texel, t_min, t_max, any_hit, hit, counters)
-                         : trace_level(geometry, mesh, triangle, 0, curve, t_min, t_max, any_hit, hit, counters);
-  if (mesh.seam_edges == nullptr || mesh.seam_edges[triangle] == 0 || (found && any_hit)) return found;
-  return seam_walls_intersect(geometry, triangle, curve, cone, texel, t_min, found ? hit->t : t_max, hit) || found;
+  const CurveQuery q{geometry, triangle, curve, ray, *counters};
+  const bool found =
+      geometry.lod.num_levels > 1 ? trace_levels(q, hit) : trace_level(q, mesh, triangle, 0, ray.t_min, ray.t_max, hit);
+  if (mesh.seam_edges == nullptr || mesh.seam_edges[triangle] == 0 || (found && ray.any_hit)) return found;
+  return seam_walls_intersect(q, found ? hit->t : ray.t_max, hit) || found;
 }
 
 /// Where queries that bring no counters count.
@@ -225,12 +210,12 @@ bool trace_observed(const DisplacedGeometry& geometry,
 {
   TraversalCounters& counters = context.displacement != nullptr ? *context.displacement : uncounted;
   const TraversalCounters before = counters;
-  LodCone cone = context.cones != nullptr ? context.cones[ray.id] : LodCone{};
-  cone.width += cone.spread * static_cast<float>(ray.ray.t_start);
-  cone.spread *= static_cast<float>(ray.ray.t_scale);
-  const float texel = context.texels != nullptr ? context.texels[ray.instance] : geometry.lod.texel;
-  const bool found =
-      trace(geometry, ray.triangle, ray.ray.O, ray.ray.D, cone, texel, t_min, t_max, any_hit, hit, &counters);
+  DisplacedQuery query{ray.ray.O, ray.ray.D, t_min, t_max, any_hit};
+  if (context.cones != nullptr) query.cone = context.cones[ray.id];
+  query.cone.width += query.cone.spread * static_cast<float>(ray.ray.t_start);
+  query.cone.spread *= static_cast<float>(ray.ray.t_scale);
+  query.texel = context.texels != nullptr ? context.texels[ray.instance] : geometry.lod.texel;
+  const bool found = trace(geometry, ray.triangle, query, hit, &counters);
   if (context.steps == nullptr && context.visits == nullptr) return found;
   const TraversalCounters spent{counters.bounds - before.bounds,
                                 counters.texels - before.texels,
@@ -262,10 +247,10 @@ void intersect(const RTCIntersectFunctionNArguments* arguments)
       continue;
     }
     RTCRayN_tfar(rays, count, k) = static_cast<float>(hit.t);
-    const ReportedHit reported = displaced_hit_report(hit);
-    RTCHitN_u(hits, count, k) = reported.u;
-    RTCHitN_v(hits, count, k) = reported.v;
-    RTCHitN_Ng_x(hits, count, k) = reported.Ng_x;
+    const EmbreeHitRecord record = displaced_hit_encode(hit);
+    RTCHitN_u(hits, count, k) = record.u;
+    RTCHitN_v(hits, count, k) = record.v;
+    RTCHitN_Ng_x(hits, count, k) = record.Ng_x;
     RTCHitN_primID(hits, count, k) = triangle;
     RTCHitN_geomID(hits, count, k) = arguments->geomID;
     RTCHitN_instID(hits, count, k, 0) = arguments->context->instID[0];

@@ -6,7 +6,6 @@
 #pragma once
 
 #include "displacement/inversion.h"
-#include "displacement/method.h"
 #include "displacement/minmax_mipmap.h"
 #include "displacement/rmip_query.h"
 #include "displacement/texel_march.h"
@@ -122,7 +121,7 @@ RELIEF_KERNEL void reduce(const Segment& segment, ScalarRange t, RayBound& bound
 /// @param nu  of the bound's rectangle
 /// @source    Thonat et al. 2023, Alg. 1, lines 12 to 15
 template <class Bounds>
-RELIEF_KERNEL bool bound_intersect(const CurveSearch& c,
+RELIEF_KERNEL bool bound_intersect(const MetricSearch& c,
                                    const Segment& segment,
                                    const LatticeFrame& frame,
                                    const Bounds& bounds,
@@ -156,7 +155,7 @@ RELIEF_KERNEL bool bound_intersect(const CurveSearch& c,
 /// The while loop of Alg. 1 for one segment.
 /// @return  true when the search is over
 template <class Bounds>
-RELIEF_KERNEL bool segment_intersect(CurveSearch& c,
+RELIEF_KERNEL bool segment_intersect(MetricSearch& c,
                                      const Segment& segment,
                                      const LatticeFrame& frame,
                                      const Bounds& bounds,
@@ -200,23 +199,17 @@ RELIEF_KERNEL bool segment_intersect(CurveSearch& c,
 /// Nearest (or any) hit of a ray's curve in one displaced triangle.
 /// @param bounds  RmipView or MinmaxMipmapView of the mesh's height field
 /// @param hit     written if the result is true
-/// @pre           options.marching_scale >= rmip_detail::kLeastMarchingScale
+/// @pre           the marching scale >= rmip_detail::kLeastMarchingScale
 template <class Bounds>
-RELIEF_KERNEL bool traverse_rmip(const DisplacedMeshView& mesh,
-                                 std::uint32_t triangle,
-                                 const RayFrame& ray,
-                                 const RayCurve& curve,
+RELIEF_KERNEL bool traverse_rmip(const PrismQuery& q,
                                  const Bounds& bounds,
                                  const RmipOptions& options,
-                                 double t_min,
-                                 double t_max,
-                                 bool any_hit,
-                                 DisplacedHit* hit,
-                                 TraversalCounters* counters)
+                                 DisplacedHit* hit)
 {
   RELIEF_ASSERT(options.marching_scale >= rmip_detail::kLeastMarchingScale);
-  CurveSearch c = curve_search_make(mesh, triangle, curve, t_min, t_max, any_hit, hit, counters);
-  const LatticeFrame frame = lattice_frame_make(c.tri, ray);
+  const RayCurve& curve = q.curve;
+  MetricSearch c = metric_search_make(q, hit);
+  const LatticeFrame frame = lattice_frame_make(c.tri, curve.frame);
   for (int k = 0; k < curve.num_segments; ++k) {
     const CurveSegment& g = curve.segments[k];
     const CurveRange range = curve_clip(curve, g, c.unfolded, c.t_min, c.t_max);

@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "integrator/stages.h"
 #include "kernel/light/spot.h"
 #include "scene/memory.h"
 

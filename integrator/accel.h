@@ -8,9 +8,9 @@
 #include <span>
 #include <vector>
 
+#include "displacement/displacement_set.h"
 #include "displacement/embree.h"
 #include "displacement/far_ray.h"
-#include "integrator/displacement_set.h"
 #include "integrator/instance_geometry.h"
 #include "kernel/light/light.h"
 #include "kernel/math/rounding.h"

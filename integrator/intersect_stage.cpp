@@ -63,23 +63,15 @@ void classify(const KernelGlobals& g,
   }
   const InstanceView& instance = g.instances[object];
   if ((instance.flags & kDisplaced) != 0) {
-    const DisplacedPoint point = accel.displacements().point(object, instance, state.hit_triangle[path],
-                                                             state.hit_u[path], state.hit_v[path], Ng_x);
+    const DisplacedPoint point = accel.displacements().resolve(object, instance, state.hit_triangle[path],
+                                                               {state.hit_u[path], state.hit_v[path], Ng_x});
     state.hit_triangle[path] = point.triangle;
     state.hit_u[path] = point.u;
     state.hit_v[path] = point.v;
-    state.hit_P_x[path] = point.P.x;
-    state.hit_P_y[path] = point.P.y;
-    state.hit_P_z[path] = point.P.z;
-    state.hit_Ng_x[path] = point.Ng.x;
-    state.hit_Ng_y[path] = point.Ng.y;
-    state.hit_Ng_z[path] = point.Ng.z;
-    state.hit_Ns_x[path] = point.Ns.x;
-    state.hit_Ns_y[path] = point.Ns.y;
-    state.hit_Ns_z[path] = point.Ns.z;
-    state.hit_leave_x[path] = point.leave.x;
-    state.hit_leave_y[path] = point.leave.y;
-    state.hit_leave_z[path] = point.leave.z;
+    state.hit_P[path] = point.P;
+    state.hit_Ng[path] = point.Ng;
+    state.hit_Ns[path] = point.Ns;
+    state.hit_leave[path] = point.leave;
     state.hit_width[path] = point.width < kInfinity ? point.width / PathLod(state, path).factor : kInfinity;
   }
   queue_push(surfaces[surface_kernel[instance.material_index]], path);
@@ -104,12 +96,12 @@ void intersect_packet(const KernelGlobals& g,
   RTCRayHit8 packet;
   for (int i = 0; i < 8; ++i) {
     const std::uint32_t path = paths[i];
-    packet.ray.org_x[i] = state.O_x[path];
-    packet.ray.org_y[i] = state.O_y[path];
-    packet.ray.org_z[i] = state.O_z[path];
-    packet.ray.dir_x[i] = state.D_x[path];
-    packet.ray.dir_y[i] = state.D_y[path];
-    packet.ray.dir_z[i] = state.D_z[path];
+    packet.ray.org_x[i] = state.O.x[path];
+    packet.ray.org_y[i] = state.O.y[path];
+    packet.ray.org_z[i] = state.O.z[path];
+    packet.ray.dir_x[i] = state.D.x[path];
+    packet.ray.dir_y[i] = state.D.y[path];
+    packet.ray.dir_z[i] = state.D.z[path];
     packet.ray.tnear[i] = state.t_min[path];
     packet.ray.tfar[i] = state.t_max[path];
     packet.ray.time[i] = 0.0f;
@@ -208,12 +200,12 @@ void intersect_closest(const KernelGlobals& g,
   for (; i < queue.size; ++i) {
     const std::uint32_t path = queue.paths[i];
     RTCRayHit ray;
-    ray.ray.org_x = state.O_x[path];
-    ray.ray.org_y = state.O_y[path];
-    ray.ray.org_z = state.O_z[path];
-    ray.ray.dir_x = state.D_x[path];
-    ray.ray.dir_y = state.D_y[path];
-    ray.ray.dir_z = state.D_z[path];
+    ray.ray.org_x = state.O.x[path];
+    ray.ray.org_y = state.O.y[path];
+    ray.ray.org_z = state.O.z[path];
+    ray.ray.dir_x = state.D.x[path];
+    ray.ray.dir_y = state.D.y[path];
+    ray.ray.dir_z = state.D.z[path];
     ray.ray.tnear = state.t_min[path];
     ray.ray.tfar = state.t_max[path];
     ray.ray.time = 0.0f;
@@ -259,17 +251,17 @@ void intersect_shadow(const KernelGlobals& g,
   if (accel.displacements().size() > 0) context.embree.steps = &steps;
   for (std::uint32_t i = 0; i < shadow.size; ++i) {
     context.visibility = {1, 1, 1};
-    context.D = {shadow.D_x[i], shadow.D_y[i], shadow.D_z[i]};
-    context.O = {shadow.O_x[i], shadow.O_y[i], shadow.O_z[i]};
+    context.D = shadow.D[i];
+    context.O = shadow.O[i];
     context.depths = shadow_ray_depths(state, shadow, i);
     context.transparent = state.flags[shadow.path[i]] >> kPathTransparentShift;
     RTCRay ray;
-    ray.org_x = shadow.O_x[i];
-    ray.org_y = shadow.O_y[i];
-    ray.org_z = shadow.O_z[i];
-    ray.dir_x = shadow.D_x[i];
-    ray.dir_y = shadow.D_y[i];
-    ray.dir_z = shadow.D_z[i];
+    ray.org_x = context.O.x;
+    ray.org_y = context.O.y;
+    ray.org_z = context.O.z;
+    ray.dir_x = context.D.x;
+    ray.dir_y = context.D.y;
+    ray.dir_z = context.D.z;
     ray.tnear = kLeastDistance;
     ray.tfar = shadow.t_max[i];
     ray.time = 0.0f;

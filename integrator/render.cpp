@@ -185,6 +185,118 @@ Batch tile_batch(const Film& film, int tile, std::uint32_t first_sample, std::ui
   return batch;
 }
 
+namespace {
+
+std::uint64_t rays_of(const Counters& c) { return c.camera_rays + c.bounce_rays + c.shadow_rays; }
+
+/// Tells how far a render is, from whichever thread, a few times a second.
+class ProgressReporter {
+ public:
+  ProgressReporter(const RenderOptions& options,
+                   const std::function<void(const RenderProgress&)>& progress,
+                   double num_pixels)
+      : options_(options), progress_(progress), num_pixels_(num_pixels)
+  {
+  }
+  void add(std::uint64_t samples, std::uint64_t rays)
+  {
+    samples_ += samples;
+    rays_ += rays;
+  }
+  void set_photon_share(double share) { photon_share_ = share; }
+
+  /// @param now      however short ago the last report was
+  /// @param photons  null: there is no photon pass
+  void report(bool now, const PhotonPass* photons)
+  {
+    if (!progress_) return;
+    const std::unique_lock lock(mutex_, std::try_to_lock);
+    if (!lock.owns_lock() || (!now && seconds_since(last_) < 0.2)) return;
+    last_ = Clock::now();
+    const double wanted = options_.settings.samples;
+    RenderProgress p;
+    p.seconds = seconds_since(start_);
+    p.samples_per_pixel = static_cast<double>(samples_.load()) / num_pixels_;
+    p.fraction = p.samples_per_pixel / wanted;
+    if (photons != nullptr) {
+      p.photons = photons->photons();
+      p.fraction += photon_share_ * (photons->passes() - p.samples_per_pixel) / wanted;
+    }
+    if (options_.time_limit_seconds > 0) p.fraction = std::max(p.fraction, p.seconds / options_.time_limit_seconds);
+    p.fraction = std::clamp(p.fraction, last_fraction_, 1.0);
+    last_fraction_ = p.fraction;
+    p.seconds_left = p.fraction > 0 ? p.seconds / p.fraction - p.seconds : 0;
+    p.rays_per_second = p.seconds > 0 ? static_cast<double>(rays_.load()) / p.seconds : 0;
+    progress_(p);
+  }
+
+ private:
+  const RenderOptions& options_;
+  const std::function<void(const RenderProgress&)>& progress_;
+  double num_pixels_;
+  Clock::time_point start_ = Clock::now(), last_ = start_;
+  std::atomic<std::uint64_t> samples_{0}, rays_{0};
+  std::mutex mutex_;
+  double last_fraction_ = 0;
+  /// Part of the time that photons take. Until the first pass has been timed, the middle of the 0.26 to 0.73 that they take on
+  /// the scenes of benchmarks/caustics.
+  double photon_share_ = 0.5;
+};
+
+/// When previews are shown: they get a hundredth of the time, and a little more for the first ones, which change the most.
+class PreviewSchedule {
+ public:
+  bool is_due(double seconds) const
+  {
+    constexpr double kShare = 0.01, kFirstSeconds = 0.2;
+    return seconds >= next_ && spent_ <= kFirstSeconds + kShare * seconds;
+  }
+  void note(double before, double after)
+  {
+    constexpr double kInterval = 0.5;
+    spent_ += after - before;
+    next_ = after + kInterval;
+  }
+
+ private:
+  double spent_ = 0, next_ = 0;
+};
+
+void fill_film(Statistics& stats, const Film& film, const RenderSettings& settings)
+{
+  stats.seed = settings.seed;
+  stats.width = settings.width;
+  stats.height = settings.height;
+  stats.samples_per_pixel = film.mean_samples();
+  const ImageError error = film.estimate_error();
+  stats.error_rmse = error.rmse * static_cast<double>(settings.film_exposure);
+  stats.error_relmse = error.relmse;
+  stats.film_bytes = film.bytes();
+}
+
+/// What all workers have done.
+void fill_work(Statistics& stats,
+               const tbb::enumerable_thread_specific<Wavefront>& workers,
+               bool caustics,
+               const FilmWindow& window)
+{
+  stats.threads = tbb::this_task_arena::max_concurrency();
+  stats.path_state_bytes = workers.size() * Wavefront::bytes(caustics);
+  stats.stages.clear();
+  for (const char* name : kStageNames) stats.stages.push_back({name, 0.0});
+  std::uint64_t first_nonfinite = kNoSample;
+  for (const Wavefront& worker : workers) {
+    counters_add(stats.counters, worker.counters);
+    stats.displacement.most_steps =
+        std::max<std::uint64_t>(stats.displacement.most_steps, worker.most_displacement_steps);
+    for (std::size_t s = 0; s < stats.stages.size(); ++s) stats.stages[s].seconds += worker.seconds[s];
+    first_nonfinite = std::min(first_nonfinite, worker.first_nonfinite);
+  }
+  if (first_nonfinite != kNoSample) stats.first_nonfinite = pixel_sample(first_nonfinite, window);
+}
+
+}  // namespace
+
 RenderedImage render(const Scene& scene,
                      const RenderOptions& options,
                      const std::atomic<bool>& stop,
@@ -219,49 +331,17 @@ RenderedImage render(const Scene& scene,
     return worker;
   });
   const bool has_long_searches = context.displacements.size() > 0;
-  std::atomic<std::uint64_t> samples_done{0};
-  std::atomic<std::uint64_t> rays_done{0};
-  std::mutex progress_mutex;
-  Clock::time_point last_report = start;
-  double last_fraction = 0;
-  // Part of the time that photons take. Until the first pass has been timed, the middle of the 0.26 to 0.73 that they take on
-  // the scenes of benchmarks/caustics.
-  double photon_share = 0.5;
-  const double num_pixels = static_cast<double>(film.width()) * film.height();
   const auto wanted = static_cast<std::uint32_t>(settings.samples);
+  ProgressReporter reporter(options, progress, static_cast<double>(film.width()) * film.height());
+  const auto report = [&](bool now) { reporter.report(now, photons ? &*photons : nullptr); };
 
-  const auto report = [&](bool now) {
-    if (!progress) return;
-    const std::unique_lock lock(progress_mutex, std::try_to_lock);
-    if (!lock.owns_lock() || (!now && seconds_since(last_report) < 0.2)) return;
-    last_report = Clock::now();
-    RenderProgress p;
-    p.seconds = seconds_since(start);
-    p.samples_per_pixel = static_cast<double>(samples_done.load()) / num_pixels;
-    p.fraction = p.samples_per_pixel / wanted;
-    if (photons) {
-      p.photons = photons->photons();
-      p.fraction += photon_share * (photons->passes() - p.samples_per_pixel) / wanted;
-    }
-    if (options.time_limit_seconds > 0) p.fraction = std::max(p.fraction, p.seconds / options.time_limit_seconds);
-    p.fraction = std::clamp(p.fraction, last_fraction, 1.0);
-    last_fraction = p.fraction;
-    p.seconds_left = p.fraction > 0 ? p.seconds / p.fraction - p.seconds : 0;
-    p.rays_per_second = p.seconds > 0 ? static_cast<double>(rays_done.load()) / p.seconds : 0;
-    progress(p);
-  };
-
-  // Previews get a hundredth of the time, and a little more, for the first ones, which change the most.
-  double preview_seconds = 0, next_preview = 0;
+  PreviewSchedule previews;
   const auto preview = [&] {
-    constexpr double kInterval = 0.5, kShare = 0.01, kFirstSeconds = 0.2;
     const double before = seconds_since(start);
-    if (!options.preview || before < next_preview || preview_seconds > kFirstSeconds + kShare * before) return;
+    if (!options.preview || !previews.is_due(before)) return;
     options.preview(film.beauty(window.x0, window.y0, settings.width, settings.height, settings.film_exposure).view,
                     film.mean_samples());
-    const double after = seconds_since(start);
-    preview_seconds += after - before;
-    next_preview = after + kInterval;
+    previews.note(before, seconds_since(start));
   };
 
   std::vector<int> active(static_cast<std::size_t>(film.num_tiles()));
@@ -287,8 +367,7 @@ RenderedImage render(const Scene& scene,
           if (stop.load(std::memory_order_relaxed) || end.reached().load(std::memory_order_relaxed)) return;
           const FlushDenormals flush;
           Wavefront& worker = workers.local();
-          const std::uint64_t rays_before =
-              worker.counters.camera_rays + worker.counters.bounce_rays + worker.counters.shadow_rays;
+          const std::uint64_t rays_before = rays_of(worker.counters);
           const Batch batch = tile_batch(film, active[i], done, samples);
           const std::vector<float> sums = has_long_searches ? film.tile_sums(active[i]) : std::vector<float>();
           if (!worker.run(g, *context.accel, stages, context.surface_kernel, batch)) {
@@ -297,9 +376,7 @@ RenderedImage render(const Scene& scene,
           }
           end.note_progress();
           film.add_tile_samples(active[i], samples);
-          samples_done += batch.num_paths();
-          rays_done +=
-              worker.counters.camera_rays + worker.counters.bounce_rays + worker.counters.shadow_rays - rays_before;
+          reporter.add(batch.num_paths(), rays_of(worker.counters) - rays_before);
           report(false);
         },
         tbb::simple_partitioner());
@@ -309,7 +386,7 @@ RenderedImage render(const Scene& scene,
       break;
     }
     done += samples;
-    if (photons) photon_share = photons->seconds() / seconds_since(start);
+    if (photons) reporter.set_photon_share(photons->seconds() / seconds_since(start));
     // Where passes are smaller because somebody watches, tiles are judged when they would be otherwise.
     const bool is_judged = !is_watched || caustics || done % kMostSamples == 0;
     if (settings.noise_threshold > 0 && done >= kMinAdaptiveSamples && is_judged) {
@@ -328,30 +405,11 @@ RenderedImage render(const Scene& scene,
 
   stats.render_seconds = seconds_since(start);
   stats.isa = stages.isa;
-  stats.seed = settings.seed;
-  stats.width = settings.width;
-  stats.height = settings.height;
-  stats.threads = tbb::this_task_arena::max_concurrency();
-  stats.samples_per_pixel = film.mean_samples();
   stats.caustics.reason = context.caustics_reason;
   if (photons) photons->fill(stats.caustics);
-  const ImageError error = film.estimate_error();
-  stats.error_rmse = error.rmse * static_cast<double>(settings.film_exposure);
-  stats.error_relmse = error.relmse;
   context.fill(stats);
-  stats.film_bytes = film.bytes();
-  stats.path_state_bytes = workers.size() * Wavefront::bytes(caustics);
-  stats.stages.clear();
-  for (const char* name : kStageNames) stats.stages.push_back({name, 0.0});
-  std::uint64_t first_nonfinite = kNoSample;
-  for (const Wavefront& worker : workers) {
-    counters_add(stats.counters, worker.counters);
-    stats.displacement.most_steps =
-        std::max<std::uint64_t>(stats.displacement.most_steps, worker.most_displacement_steps);
-    for (std::size_t s = 0; s < stats.stages.size(); ++s) stats.stages[s].seconds += worker.seconds[s];
-    first_nonfinite = std::min(first_nonfinite, worker.first_nonfinite);
-  }
-  if (first_nonfinite != kNoSample) stats.first_nonfinite = pixel_sample(first_nonfinite, window);
+  fill_film(stats, film, settings);
+  fill_work(stats, workers, caustics, window);
   return std::move(film).resolve(window.x0, window.y0, settings.width, settings.height, settings.film_exposure);
 }
 

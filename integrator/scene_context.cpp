@@ -75,7 +75,9 @@ SceneContext::SceneContext(const Scene& loaded,
                            const DisplacementOptions& displacement,
                            EnvironmentDensity environment_density,
                            const CausticSettings& caustics)
-    : scene(loaded), bsdf_tables(std::make_unique<BsdfTables>()), displacements(loaded, displacement)
+    : scene(loaded),
+      bsdf_tables(std::make_unique<BsdfTables>()),
+      displacements(scene_displacement(loaded, displacement))
 {
   make_views();
   lights = light_set_make(scene, scene.textures->views(), environment_density, &globals);

@@ -7,6 +7,7 @@
 
 #include "integrator/accel.h"
 #include "integrator/light_set.h"
+#include "integrator/scene_displacement.h"
 #include "kernel/bsdf/energy_tables.h"
 #include "kernel/globals.h"
 #include "kernel/statistics.h"

@@ -1,9 +1,11 @@
 #include <cstdlib>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 #include <cpuid.h>
 
+#include "displacement/embree_geometry.h"
 #include "integrator/stages.h"
 
 namespace relief {
@@ -50,6 +52,11 @@ const StageTable& stage_table_select()
   if (isa == "avx2" && has_avx2()) return stage_table_avx2();
   throw std::runtime_error("$RELIEF_ISA: expected 'baseline'" + std::string(has_avx2() ? " or 'avx2'" : "") +
                            ", found '" + isa + "'");
+}
+
+const TraversalTable& traversal_table_select()
+{
+  return std::string_view(stage_table_select().isa) == "avx2" ? traversal_table_avx2() : traversal_table_baseline();
 }
 
 }  // namespace relief

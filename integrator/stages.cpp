@@ -169,12 +169,8 @@ void finish(const KernelGlobals& g,
   for (std::uint32_t i = 0; i < num_pixels * batch.num_samples; ++i) {
     const std::uint32_t sample = batch.first_sample + i / num_pixels;
     Vec3f caustic;
-    if (state.caustic.radiance_r != nullptr) {
-      caustic = {state.caustic.radiance_r[i], state.caustic.radiance_g[i], state.caustic.radiance_b[i]};
-    }
-    const bool finite =
-        film_add_sample(g.film, state.pixel[i], sample, {state.direct_r[i], state.direct_g[i], state.direct_b[i]},
-                        {state.indirect_r[i], state.indirect_g[i], state.indirect_b[i]}, caustic);
+    if (state.caustic.radiance != nullptr) caustic = (*state.caustic.radiance)[i];
+    const bool finite = film_add_sample(g.film, state.pixel[i], sample, state.direct[i], state.indirect[i], caustic);
     if (finite) continue;
     ++counters.nonfinite_samples;
     const std::uint64_t key = std::uint64_t{state.pixel[i]} << 32 | sample;

@@ -12,6 +12,8 @@
 
 namespace relief {
 
+struct TraversalTable;  // displacement/embree_geometry.h
+
 /// Surface kernels are instantiated for a few feature masks, in rising order of what they can do.
 inline constexpr int kNumSurfaceKernels = 12;
 
@@ -69,5 +71,8 @@ const StageTable& stage_table_avx2();
 /// The best table for this machine; $RELIEF_ISA (baseline, avx2) overrides.
 /// @error std::runtime_error if $RELIEF_ISA names something else or something this machine lacks
 const StageTable& stage_table_select();
+
+/// The traversals of displaced meshes that go with it.
+const TraversalTable& traversal_table_select();
 
 }  // namespace relief

@@ -55,11 +55,14 @@ TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits
     const InstanceView& instance = context.instances[object];
     DisplacedPoint point{query.hit.primID, query.hit.u, query.hit.v};
     const bool displaced = (instance.flags & kDisplaced) != 0;
-    if (displaced)
-      point = context.displacements.point(object, instance, point.triangle, point.u, point.v, query.hit.Ng_x);
-    SurfaceHit surface = surface_hit_make(context.meshes[static_cast<std::size_t>(instance.mesh_index)], instance,
-                                          point.triangle, point.u, point.v);
-    if (displaced) surface_hit_displace(&surface, instance, point.P, point.Ng, point.Ns, point.leave);
+    if (displaced) {
+      point =
+          context.displacements.resolve(object, instance, point.triangle, {query.hit.u, query.hit.v, query.hit.Ng_x});
+    }
+    const MeshView& mesh = context.meshes[static_cast<std::size_t>(instance.mesh_index)];
+    const SurfaceHit surface = displaced ? surface_hit_displaced(mesh, instance, point.triangle, point.u, point.v,
+                                                                 {point.P, point.Ng, point.Ns, point.leave})
+                                         : surface_hit_make(mesh, instance, point.triangle, point.u, point.v);
     result.hit = true;
     result.t = scaled(query.ray.tfar, -1);
     result.P = surface.P;

@@ -25,10 +25,8 @@ Wavefront::Wavefront(bool caustics)
   if (!caustics) return;
   caustic_memory_ = std::make_unique_for_overwrite<CausticMemory>();
   CausticStateView& c = state_.caustic;
-  auto column = std::begin(caustic_memory_->columns);
-  for (float** p : {&c.irradiance_r, &c.irradiance_g, &c.irradiance_b, &c.radiance_r, &c.radiance_g, &c.radiance_b}) {
-    *p = *column++;
-  }
+  c.irradiance = &caustic_memory_->irradiance;
+  c.radiance = &caustic_memory_->radiance;
   c.wi = caustic_memory_->wi;
   c.bounces = caustic_memory_->bounces;
   c.root = caustic_memory_->root;
@@ -53,38 +51,27 @@ void Wavefront::record_rays() const
 {
   for (std::uint32_t i = 0; i < active_.size; ++i) {
     const std::uint32_t p = active_.paths[i];
-    recorder->push_back({false,
-                         {state_.O_x[p], state_.O_y[p], state_.O_z[p]},
-                         {state_.D_x[p], state_.D_y[p], state_.D_z[p]},
-                         state_.t_min[p],
-                         state_.t_max[p],
-                         state_.hit_t[p],
-                         state_.pixel[p]});
+    recorder->push_back(
+        {false, state_.O[p], state_.D[p], state_.t_min[p], state_.t_max[p], state_.hit_t[p], state_.pixel[p]});
   }
 }
 
 void Wavefront::record_shadow_rays() const
 {
   for (std::uint32_t i = 0; i < shadow_.size; ++i) {
-    recorder->push_back({true,
-                         {shadow_.O_x[i], shadow_.O_y[i], shadow_.O_z[i]},
-                         {shadow_.D_x[i], shadow_.D_y[i], shadow_.D_z[i]},
-                         0.0f,
-                         shadow_.t_max[i],
-                         !is_zero(memory_->visibility[i]) ? shadow_.t_max[i] : 0.0f,
-                         state_.pixel[shadow_.path[i]]});
+    recorder->push_back({true, shadow_.O[i], shadow_.D[i], 0.0f, shadow_.t_max[i],
+                         !is_zero(memory_->visibility[i]) ? shadow_.t_max[i] : 0.0f, state_.pixel[shadow_.path[i]]});
   }
 }
 
 Vec3f Wavefront::first_radiance(std::uint32_t pixel) const
 {
-  const std::uint32_t i =
-      static_cast<std::uint32_t>(std::find(state_.pixel, state_.pixel + kBatchPaths, pixel) - state_.pixel);
+  const std::uint32_t i = static_cast<std::uint32_t>(
+      std::find(state_.pixel.entries, state_.pixel.entries + kBatchPaths, pixel) - state_.pixel.entries);
   RELIEF_ASSERT(i < kBatchPaths);
-  Vec3f radiance = Vec3f{state_.direct_r[i], state_.direct_g[i], state_.direct_b[i]} +
-                   Vec3f{state_.indirect_r[i], state_.indirect_g[i], state_.indirect_b[i]};
+  Vec3f radiance = state_.direct[i] + state_.indirect[i];
   const CausticStateView& c = state_.caustic;
-  if (c.radiance_r != nullptr) radiance += Vec3f{c.radiance_r[i], c.radiance_g[i], c.radiance_b[i]};
+  if (c.radiance != nullptr) radiance += (*c.radiance)[i];
   return radiance;
 }
 
@@ -104,9 +91,7 @@ bool Wavefront::run(const KernelGlobals& g,
 
   stages.generate(g, state_, batch);
   if (g.caustics.enabled) {
-    for (float* p : {state_.caustic.radiance_r, state_.caustic.radiance_g, state_.caustic.radiance_b}) {
-      std::fill_n(p, batch.num_paths(), 0.0f);
-    }
+    for (std::uint32_t i = 0; i < batch.num_paths(); ++i) (*state_.caustic.radiance)[i] = Vec3f{};
     std::iota(state_.caustic.root, state_.caustic.root + batch.num_paths(), 0u);
     state_.caustic.num_paths = batch.num_paths();
   }

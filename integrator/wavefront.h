@@ -88,7 +88,7 @@ class Wavefront {
     std::uint32_t queues[kNumQueues][kColumnEntries];
   };
   struct CausticMemory {
-    float columns[kNumCausticFloats][kColumnEntries];
+    PathColumn<Vec3f> irradiance, radiance;
     std::uint32_t wi[kColumnEntries], bounces[kColumnEntries], root[kColumnEntries];
   };
 

@@ -13,6 +13,7 @@
 #include "kernel/camera/camera.h"
 #include "kernel/graph/graph_scene.h"
 #include "kernel/light/light.h"
+#include "kernel/shape/displacement_settings.h"
 #include "kernel/shape/mesh_view.h"
 #include "scene/diagnostics.h"
 #include "scene/file_stamp.h"
@@ -85,36 +86,6 @@ struct Environment : Surroundings {
   std::uint32_t hidden_from = 0;  ///< bit PathEvent: bounced rays that do not see it
 };
 
-/// How displaced meshes are traced; the scene format and the command line know them by the labels below.
-enum class DisplacementMethod : std::uint8_t {
-  kAuto,
-  kRmip,
-  kTfdm,
-  kTessellate,
-  kMicrotriangle,
-  kCone,
-  kChord,
-  kMinmaxRmip,  ///< RMIP's traversal over a minmax mipmap, for comparison
-  kGrid         ///< tessellation into Embree's grids, for comparison
-};
-inline constexpr std::string_view kDisplacementMethodLabels[] = {
-    "auto", "rmip", "tfdm", "tessellate", "microtriangle", "cone", "chord", "rmip-minmax", "tessellate-grid"};
-
-enum class DisplacementSpace : std::uint8_t { kObject, kWorld };
-
-/// RELIEF_displacement of one material: parsed and validated; tracing it is displacement/'s work.
-struct DisplacementSettings {
-  TextureRef height;  ///< its texture index is into Scene::height_maps; never −1
-  float scale = 1;    ///< metres
-  float midlevel = 0.5f;
-  DisplacementSpace space = DisplacementSpace::kObject;
-  DisplacementMethod method = DisplacementMethod::kAuto;
-  float lod = 0;  ///< −1: auto
-  bool smoothing = false;
-  bool weld_seams = false;
-  bool has_graph = false;  ///< the height is a heightGraph's, not an image's
-};
-
 /// One animation of a file; all of them play at once.
 struct AnimationClip {
   std::string name;
@@ -136,7 +107,7 @@ struct Scene {
   std::vector<AnimationClip> clips;     ///< of all files
   Vec3f bounds_low, bounds_high;        ///< box of all instances, undisplaced, world; low > high without any
   std::vector<SceneCamera> cameras;     ///< never empty: the loader adds a framing camera (and a warning) if need be
-  std::vector<DisplacementSettings> displacements;
+  std::vector<DisplacementSettings> displacements;  ///< by Material::displacement_index
   std::vector<HeightMap> height_maps;
   Environment environment;
   RenderSettings render;

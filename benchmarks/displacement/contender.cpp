@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "integrator/displacement_set.h"
+#include "integrator/stages.h"
 
 namespace relief {
 
@@ -88,7 +88,7 @@ Contender::Contender(const BenchSurface& surface, const ContenderSpec& spec) : s
   const Stopwatch time;
   double map_seconds = surface_.field_seconds;
   std::atomic<std::ptrdiff_t> bytes{0};
-  if (spec_.tessellation) {
+  if (displacement_method(spec_.method).tessellation) {
     build_tessellation();
   } else {
     build_tables();
@@ -126,8 +126,9 @@ Contender::~Contender()
 void Contender::build_tessellation()
 {
   const DisplacedMeshView mesh = surface_.mesh.view();
-  rate_ = tessellation_rate_within(mesh, *spec_.tessellation, spec_.build, spec_.budget_bytes);
-  tessellation_ = std::make_unique<Tessellation>(mesh, tessellation_layout_make(mesh, *spec_.tessellation, rate_));
+  const TessellationKind kind = *displacement_method(spec_.method).tessellation;
+  rate_ = tessellation_rate_within(mesh, kind, spec_.build, spec_.budget_bytes);
+  tessellation_ = std::make_unique<Tessellation>(mesh, tessellation_layout_make(mesh, kind, rate_));
   triangle_bytes_ = tessellation_->bytes();
 }
 
@@ -135,25 +136,15 @@ void Contender::build_tables()
 {
   geometry_.mesh = surface_.mesh.view();
   geometry_.levels[0].field = &surface_.field.view();
-  geometry_.method = spec_.traversal;
+  geometry_.method = spec_.method;
   geometry_.rmip_options = spec_.rmip_options;
   triangle_bytes_ = surface_.mesh.bytes();
-  switch (spec_.traversal) {
-    case TraversalMethod::kChord:
-      table_bytes_ = surface_.field.bytes();
-      break;
-    case TraversalMethod::kRmip:
-      rmip_ = std::make_unique<Rmip>(surface_.field.view(), spec_.rmip_resolution);
-      geometry_.levels[0].rmip = &rmip_->view();
-      table_bytes_ = rmip_->bytes();
-      break;
-    case TraversalMethod::kRmipOnMinmax:
-    case TraversalMethod::kTfdm:
-      mipmap_ = std::make_unique<MinmaxMipmap>(surface_.field.view());
-      geometry_.levels[0].mipmap = &mipmap_->view();
-      table_bytes_ = mipmap_->bytes();
-      break;
-  }
+  table_bytes_ = surface_.field.bytes();
+  const DisplacementMethodEntry& method = displacement_method(spec_.method);
+  if (method.table_make == nullptr) return;
+  table_ = method.table_make(surface_.field.view(), spec_.rmip_options);
+  geometry_.levels[0].table = table_.view;
+  table_bytes_ = table_.bytes;
 }
 
 std::uint64_t Contender::num_micro_triangles() const

@@ -42,12 +42,10 @@ struct BenchHit {
 /// A method and its settings.
 struct ContenderSpec {
   std::string name;
-  TraversalMethod traversal = TraversalMethod::kChord;
-  int rmip_resolution = 0;  ///< 0: the one that takes as much memory as a mipmap
-  RmipOptions rmip_options;
-  std::optional<TessellationKind> tessellation;  ///< if set, the fields above mean nothing
-  TessellationBuild build;
-  std::uint64_t budget_bytes = 0;  ///< for building a tessellation; a rate below 1 is taken where it does not fit
+  DisplacementMethod method = kDefaultMethod;
+  RmipOptions rmip_options = {};
+  TessellationBuild build = {};    ///< of a tessellation
+  std::uint64_t budget_bytes = 0;  ///< for building it; a rate below 1 is taken where it does not fit
 };
 
 /// The largest rate, at most 1, at which building a tessellation stays within a budget.
@@ -99,8 +97,7 @@ class Contender {
   double rate_ = 1;
   std::size_t table_bytes_ = 0, triangle_bytes_ = 0, bvh_bytes_ = 0;
   double build_seconds_ = 0, rescale_seconds_ = 0;
-  std::unique_ptr<Rmip> rmip_;
-  std::unique_ptr<MinmaxMipmap> mipmap_;
+  MethodTable table_;
   std::unique_ptr<Tessellation> tessellation_;
   DisplacedGeometry geometry_;
   RTCDevice device_ = nullptr;

@@ -14,10 +14,6 @@ namespace relief {
 
 namespace {
 
-constexpr DisplacementMethod kMethods[] = {DisplacementMethod::kChord, DisplacementMethod::kRmip,
-                                           DisplacementMethod::kTfdm, DisplacementMethod::kTessellate,
-                                           DisplacementMethod::kGrid};
-
 /// The benchmark's scene as the renderer takes it. Its texels are not copied: it must not outlive the benchmark's.
 Scene render_scene(const BenchScene& bench)
 {
@@ -118,17 +114,18 @@ std::vector<FrameResult> bench_frames(const BenchScene& bench,
   const BenchSurface surface(bench);
   std::vector<FrameResult> results;
   std::vector<Vec3f> expected;
-  for (const DisplacementMethod method : kMethods) {
+  for (const DisplacementMethod method : kDisplacementMethods) {
     FrameResult result;
     result.scene = bench.spec->name;
-    result.method = kDisplacementMethodLabels[static_cast<std::size_t>(method)];
+    result.method = displacement_method_label(method);
     options.displacement.method = method;
-    if (const std::optional<TessellationKind> kind = tessellation_kind(method)) {
+    const std::optional<TessellationKind> kind = displacement_method(method).tessellation;
+    if (kind) {
       result.rate = tessellation_rate_within(surface.mesh.view(), *kind, kRenderTessellation, tessellation_bytes);
       options.displacement.tessellation_rate = result.rate;
     }
     // A tessellation takes far longer to build than a frame to render; it is not built again.
-    const int num_frames = tessellation_kind(method) ? 1 : rounds;
+    const int num_frames = kind ? 1 : rounds;
     for (int round = 0; round < num_frames; ++round) {
       Statistics stats;
       RenderedImage image;

@@ -208,20 +208,20 @@ Table frame_table(const std::vector<FrameResult>& frames)
 
 Table cost_table(const std::vector<CostSample>& samples)
 {
-  const DisplacementCosts fit = fitted_costs(samples);
-  Table table{"What auto chooses by (kDisplacementCosts)",
-              fmt::format("Fitted: {{{:.0f}, {{{:.0f}, {:.0f}, {:.0f}}}, {{{:.0f}, {:.0f}, {:.0f}}}}}", fit.exact_ray,
-                          fit.triangles.ray, fit.triangles.ray_doubling, fit.triangles.build, fit.grids.ray,
-                          fit.grids.ray_doubling, fit.grids.build),
-              {"scene", "million micro-triangles", "chord ns a ray", "triangles ns a ray", "grids ns a ray",
-               "triangles ns a build", "grids ns a build"},
+  std::string fit;
+  for (const FittedCost& fitted : fitted_costs(samples)) {
+    fit += fmt::format("{}{}: {{{:.0f}, {:.0f}, {:.0f}}}", fit.empty() ? "" : ", ",
+                       displacement_method_label(fitted.method), fitted.cost.ray, fitted.cost.ray_doubling,
+                       fitted.cost.build);
+  }
+  Table table{"What auto chooses by (MethodCost)",
+              "Fitted: " + fit,
+              {"scene", "method", "million micro-triangles", "ns a ray", "ns a build"},
               {}};
   for (const CostSample& s : samples) {
-    std::vector<std::string> row = {s.scene, fmt::format("{:.3g}", 1e-6 * static_cast<double>(s.num_micro_triangles))};
-    for (const double ns : {s.exact_ray, s.triangles_ray, s.grids_ray, s.triangles_build, s.grids_build}) {
-      row.push_back(fmt::format("{:.0f}", ns));
-    }
-    table.rows.push_back(std::move(row));
+    table.rows.push_back({s.scene, std::string(displacement_method_label(s.method)),
+                          fmt::format("{:.3g}", 1e-6 * static_cast<double>(s.num_micro_triangles)),
+                          fmt::format("{:.0f}", s.ray), fmt::format("{:.0f}", s.build)});
   }
   return table;
 }
@@ -432,12 +432,10 @@ nlohmann::ordered_json json_of(const std::vector<CostSample>& samples)
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
   for (const CostSample& s : samples) {
     json.push_back({{"scene", s.scene},
+                    {"method", displacement_method_label(s.method)},
                     {"micro_triangles", s.num_micro_triangles},
-                    {"chord_ns_a_ray", s.exact_ray},
-                    {"triangles_ns_a_ray", s.triangles_ray},
-                    {"grids_ns_a_ray", s.grids_ray},
-                    {"triangles_ns_a_build", s.triangles_build},
-                    {"grids_ns_a_build", s.grids_build}});
+                    {"ns_a_ray", s.ray},
+                    {"ns_a_build", s.build}});
   }
   return json;
 }

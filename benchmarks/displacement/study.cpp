@@ -7,8 +7,9 @@
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
+#include "displacement/rmip.h"
 #include "exporters/png_ocio.h"
-#include "integrator/displacement_set.h"
+#include "integrator/stages.h"
 
 namespace relief {
 
@@ -16,26 +17,19 @@ namespace {
 
 using Contenders = std::vector<std::unique_ptr<Contender>>;
 
-ContenderSpec traversal_spec(std::string name, TraversalMethod method, int rmip_resolution = 0)
+ContenderSpec traversal_spec(std::string name, DisplacementMethod method, int rmip_resolution = 0)
 {
-  ContenderSpec spec;
-  spec.name = std::move(name);
-  spec.traversal = method;
-  spec.rmip_resolution = rmip_resolution;
+  ContenderSpec spec{std::move(name), method};
+  spec.rmip_options.resolution = rmip_resolution;
   return spec;
 }
 
 ContenderSpec tessellation_spec(std::string name,
-                                TessellationKind kind,
+                                DisplacementMethod method,
                                 std::uint64_t budget_bytes,
                                 const TessellationBuild& build = {})
 {
-  ContenderSpec spec;
-  spec.name = std::move(name);
-  spec.tessellation = kind;
-  spec.build = build;
-  spec.budget_bytes = budget_bytes;
-  return spec;
+  return {std::move(name), method, {}, build, budget_bytes};
 }
 
 /// The paper's three sizes of an RMIP: 64, as large as a mipmap, and 1024. Smaller maps have smaller ones.
@@ -56,20 +50,28 @@ Contenders make_all(const BenchSurface& surface, const std::vector<ContenderSpec
   return contenders;
 }
 
+/// All methods, RMIP in its three sizes.
 std::vector<ContenderSpec> table_specs(const BenchScene& scene, std::uint64_t tessellation_bytes)
 {
   const RmipSizes sizes = rmip_sizes(scene);
-  // A grid takes a fifth of the memory of its triangles.
-  const std::uint64_t grid_bytes = tessellation_bytes / 4;
-  return {traversal_spec(std::string(kExactMethod), TraversalMethod::kChord),
-          traversal_spec("rmip", TraversalMethod::kRmip, sizes.equal),
-          traversal_spec("rmip-low", TraversalMethod::kRmip, sizes.low),
-          traversal_spec("rmip-high", TraversalMethod::kRmip, sizes.high),
-          traversal_spec("rmip-minmax", TraversalMethod::kRmipOnMinmax),
-          traversal_spec(std::string(kPublishedMethod), TraversalMethod::kTfdm),
-          tessellation_spec(std::string(kTessellationMethod), TessellationKind::kTriangles,
-                            tessellation_bytes - grid_bytes),
-          tessellation_spec("tessellate-grid", TessellationKind::kGrids, grid_bytes)};
+  std::vector<ContenderSpec> specs;
+  for (const DisplacementMethod method : kDisplacementMethods) {
+    const std::string name(displacement_method_label(method));
+    const std::optional<TessellationKind> kind = displacement_method(method).tessellation;
+    // A grid takes a fifth of the memory of its triangles.
+    const std::uint64_t grid_bytes = tessellation_bytes / 4;
+    if (kind) {
+      specs.push_back(tessellation_spec(
+          name, method, *kind == TessellationKind::kGrids ? grid_bytes : tessellation_bytes - grid_bytes));
+    } else {
+      specs.push_back(traversal_spec(name, method, sizes.equal));
+    }
+    if (method == DisplacementMethod::rmip) {
+      specs.push_back(traversal_spec("rmip-low", method, sizes.low));
+      specs.push_back(traversal_spec("rmip-high", method, sizes.high));
+    }
+  }
+  return specs;
 }
 
 /// Colours from dark blue over green to yellow, which brightens evenly.
@@ -200,12 +202,12 @@ void Study::add_marching(const BenchSceneSpec& spec) const
   const BenchSurface surface(scene);
   const RmipSizes sizes = rmip_sizes(scene);
   const Contenders contenders =
-      make_all(surface, {traversal_spec(std::string(kExactMethod), TraversalMethod::kChord),
-                         traversal_spec(std::string(kPublishedMethod), TraversalMethod::kTfdm),
-                         traversal_spec(fmt::format("rmip {}²", sizes.low), TraversalMethod::kRmip, sizes.low),
-                         traversal_spec(fmt::format("rmip {}²", sizes.equal), TraversalMethod::kRmip, sizes.equal),
-                         traversal_spec(fmt::format("rmip {}²", sizes.high), TraversalMethod::kRmip, sizes.high),
-                         traversal_spec("rmip on minmax mipmap", TraversalMethod::kRmipOnMinmax)});
+      make_all(surface, {traversal_spec(std::string(kExactMethod), DisplacementMethod::chord),
+                         traversal_spec(std::string(kPublishedMethod), DisplacementMethod::tfdm),
+                         traversal_spec(fmt::format("rmip {}²", sizes.low), DisplacementMethod::rmip, sizes.low),
+                         traversal_spec(fmt::format("rmip {}²", sizes.equal), DisplacementMethod::rmip, sizes.equal),
+                         traversal_spec(fmt::format("rmip {}²", sizes.high), DisplacementMethod::rmip, sizes.high),
+                         traversal_spec("rmip on minmax mipmap", DisplacementMethod::rmip_minmax)});
   const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution);
   Sweep sweep;
   sweep.title = fmt::format("{}: time of primary rays", spec.name);
@@ -242,9 +244,9 @@ void Study::add_sweeps(const BenchSceneSpec& spec) const
       const BenchScene scene = make_scene(spec, change_of(factor));
       const BenchSurface surface(scene);
       const Contenders contenders =
-          make_all(surface, {traversal_spec(std::string(kExactMethod), TraversalMethod::kChord),
-                             traversal_spec("rmip", TraversalMethod::kRmip),
-                             traversal_spec(std::string(kPublishedMethod), TraversalMethod::kTfdm)});
+          make_all(surface, {traversal_spec(std::string(kExactMethod), DisplacementMethod::chord),
+                             traversal_spec("rmip", DisplacementMethod::rmip),
+                             traversal_spec(std::string(kPublishedMethod), DisplacementMethod::tfdm)});
       const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution);
       const std::vector<Measurement> measured = bench_measure(
           contenders, BenchRayKind::kPrimary, rays.of(BenchRayKind::kPrimary), options.rounds, scene.texel_metres);
@@ -264,7 +266,7 @@ void Study::add_inversion(const BenchSceneSpec& spec) const
   say(fmt::format("{}: inversion", spec.name));
   const BenchScene scene = make_scene(spec);
   const BenchSurface surface(scene);
-  ContenderSpec with = traversal_spec("with", TraversalMethod::kRmip), without = with;
+  ContenderSpec with = traversal_spec("with", DisplacementMethod::rmip), without = with;
   without.name = "without";
   without.rmip_options.reduce_by_inversion = false;
   const Contenders contenders = make_all(surface, {with, without});
@@ -286,15 +288,15 @@ void Study::add_tessellation(const BenchSceneSpec& spec) const
   const BenchScene scene = make_scene(spec, {0.5, 1, 1});
   const BenchSurface surface(scene);
   const std::uint64_t share = options.tessellation_bytes / 5;
-  using Kind = TessellationKind;
+  constexpr DisplacementMethod kTriangles = DisplacementMethod::tessellate,
+                               kGrids = DisplacementMethod::tessellate_grid;
   const Contenders contenders = make_all(
-      surface,
-      {tessellation_spec("triangles, medium", Kind::kTriangles, share, {RTC_BUILD_QUALITY_MEDIUM, false}),
-       tessellation_spec("triangles, high", Kind::kTriangles, share, {RTC_BUILD_QUALITY_HIGH, false}),
-       tessellation_spec("triangles, medium, compact", Kind::kTriangles, share, {RTC_BUILD_QUALITY_MEDIUM, true}),
-       tessellation_spec("triangles, high, compact", Kind::kTriangles, share, {RTC_BUILD_QUALITY_HIGH, true}),
-       tessellation_spec("grids", Kind::kGrids, share),
-       traversal_spec(std::string(kExactMethod), TraversalMethod::kChord)});
+      surface, {tessellation_spec("triangles, medium", kTriangles, share, {RTC_BUILD_QUALITY_MEDIUM, false}),
+                tessellation_spec("triangles, high", kTriangles, share, {RTC_BUILD_QUALITY_HIGH, false}),
+                tessellation_spec("triangles, medium, compact", kTriangles, share, {RTC_BUILD_QUALITY_MEDIUM, true}),
+                tessellation_spec("triangles, high, compact", kTriangles, share, {RTC_BUILD_QUALITY_HIGH, true}),
+                tessellation_spec("grids", kGrids, share),
+                traversal_spec(std::string(kExactMethod), DisplacementMethod::chord)});
   const BenchRays rays = bench_rays_make(scene, *contenders.back(), options.resolution);
   const auto measured = [&](BenchRayKind kind) {
     return bench_measure(contenders, kind, rays.of(kind), options.rounds, scene.texel_metres);
@@ -313,13 +315,15 @@ void Study::add_costs(const BenchSceneSpec& spec) const
     say(fmt::format("{}: costs, map × {}", spec.name, factor));
     const BenchScene scene = make_scene(spec, {factor, 1, 1});
     const BenchSurface surface(scene);
-    const std::uint64_t share = options.tessellation_bytes / 2;
-    const Contenders contenders =
-        make_all(surface, {traversal_spec(std::string(kExactMethod), TraversalMethod::kChord),
-                           tessellation_spec("triangles", TessellationKind::kTriangles, share),
-                           tessellation_spec("grids", TessellationKind::kGrids, share)});
+    std::vector<ContenderSpec> specs;
+    for (const DisplacementMethod method : kDisplacementMethods) {
+      const DisplacementMethodEntry& entry = displacement_method(method);
+      const std::string name(displacement_method_label(method));
+      if (entry.cost) specs.push_back(tessellation_spec(name, method, options.tessellation_bytes / 2));
+    }
+    const Contenders contenders = make_all(surface, specs);
     const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution);
-    std::array<double, 3> nanoseconds{};
+    std::vector<double> nanoseconds(contenders.size());
     for (const BenchRayKind kind : {BenchRayKind::kPrimary, BenchRayKind::kBounce, BenchRayKind::kShadow}) {
       const std::vector<Measurement> measured =
           bench_measure(contenders, kind, rays.of(kind), options.rounds, scene.texel_metres);
@@ -327,11 +331,12 @@ void Study::add_costs(const BenchSceneSpec& spec) const
     }
     const auto threads =
         static_cast<double>(tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism));
-    const auto build = [&](const Contender& contender) {
-      return 1e9 * contender.build_seconds() * threads / static_cast<double>(contender.num_micro_triangles());
-    };
-    results.costs.push_back({std::string(spec.name), contenders[1]->num_micro_triangles(), nanoseconds[0],
-                             nanoseconds[1], nanoseconds[2], build(*contenders[1]), build(*contenders[2])});
+    for (std::size_t m = 0; m < contenders.size(); ++m) {
+      const std::uint64_t count = contenders[m]->num_micro_triangles();
+      const double build =
+          count > 0 ? 1e9 * contenders[m]->build_seconds() * threads / static_cast<double>(count) : 0.0;
+      results.costs.push_back({std::string(spec.name), specs[m].method, count, nanoseconds[m], build});
+    }
   }
 }
 
@@ -363,30 +368,31 @@ std::vector<const BenchSceneSpec*> chosen_scenes(const std::vector<std::string>&
 
 }  // namespace
 
-DisplacementCosts fitted_costs(const std::vector<CostSample>& samples)
+std::vector<FittedCost> fitted_costs(const std::vector<CostSample>& samples)
 {
-  DisplacementCosts costs;
-  const auto count = static_cast<double>(samples.size());
-  for (const CostSample& sample : samples) {
-    costs.exact_ray += sample.exact_ray / count;
-    costs.triangles.build += sample.triangles_build / count;
-    costs.grids.build += sample.grids_build / count;
-  }
-  const auto fit_line = [&](double CostSample::*ray, TessellationCost& cost) {
-    double x = 0, y = 0, xx = 0, xy = 0;
+  std::vector<FittedCost> fits;
+  for (const DisplacementMethod method : kDisplacementMethods) {
+    double count = 0, x = 0, y = 0, xx = 0, xy = 0, build = 0;
     for (const CostSample& sample : samples) {
-      const double doublings = std::log2(static_cast<double>(sample.num_micro_triangles) / (1 << 20));
-      x += doublings / count;
-      y += sample.*ray / count;
-      xx += doublings * doublings / count;
-      xy += doublings * sample.*ray / count;
+      if (sample.method != method) continue;
+      const double doublings =
+          sample.num_micro_triangles > 0 ? std::log2(static_cast<double>(sample.num_micro_triangles) / (1 << 20)) : 0.0;
+      count += 1;
+      x += doublings;
+      y += sample.ray;
+      xx += doublings * doublings;
+      xy += doublings * sample.ray;
+      build += sample.build;
     }
-    cost.ray_doubling = (xy - x * y) / (xx - x * x);
-    cost.ray = y - cost.ray_doubling * x;
-  };
-  fit_line(&CostSample::triangles_ray, costs.triangles);
-  fit_line(&CostSample::grids_ray, costs.grids);
-  return costs;
+    if (count == 0) continue;
+    MethodCost cost;
+    const double spread = xx - x * x / count;
+    if (spread > 0) cost.ray_doubling = (xy - x * y / count) / spread;
+    cost.ray = (y - cost.ray_doubling * x) / count;
+    cost.build = build / count;
+    fits.push_back({method, cost});
+  }
+  return fits;
 }
 
 BenchResults bench_displacement_run(const BenchOptions& options)

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "benchmarks/displacement/frames.h"
-#include "integrator/displacement_cost.h"
+#include "displacement/cost_model.h"
 
 namespace relief {
 
@@ -93,12 +93,18 @@ struct VariantResult {
   std::size_t bytes = 0;
 };
 
-/// What one scene at one map size costs by the methods that `auto` chooses among; a mean over the kinds of rays.
+/// What one scene at one map size costs by one of the methods that `auto` chooses among; a mean over the kinds of rays.
 struct CostSample {
   std::string scene;
+  DisplacementMethod method = kDefaultMethod;
   std::uint64_t num_micro_triangles = 0;
-  double exact_ray = 0, triangles_ray = 0, grids_ray = 0;  ///< nanoseconds
-  double triangles_build = 0, grids_build = 0;             ///< nanoseconds of processor time a micro-triangle
+  double ray = 0;    ///< nanoseconds
+  double build = 0;  ///< nanoseconds of processor time a micro-triangle
+};
+
+struct FittedCost {
+  DisplacementMethod method = kDefaultMethod;
+  MethodCost cost = {};
 };
 
 struct BenchResults {
@@ -114,7 +120,7 @@ struct BenchResults {
 };
 
 /// Least squares over the samples.
-DisplacementCosts fitted_costs(const std::vector<CostSample>& samples);
+std::vector<FittedCost> fitted_costs(const std::vector<CostSample>& samples);
 
 /// Names of the methods in the table; the first is what the others are compared with.
 inline constexpr std::string_view kExactMethod = "chord", kPublishedMethod = "tfdm", kTessellationMethod = "tessellate";

@@ -9,19 +9,14 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, Po
 
 from .export.settings import SHARED
 
-_METHODS = (
-    ("auto", "Automatic", "The program chooses (default)"),
-    ("chord", "Chord", "The fast method: exact, with little memory"),
-    ("rmip", "RMIP", "Ranges of oblong windows of the map (Thonat and others 2023)"),
-    ("rmip-minmax", "RMIP over min-max", "The same over a min-max mipmap, for comparisons"),
-    ("tfdm", "TFDM", "Affine arithmetic over a min-max mipmap (Thonat and others 2021)"),
-    ("tessellate", "Tessellate", "Triangles of the size of a texel: needs much memory"),
-    ("tessellate-grid", "Tessellate to grids", "The same in Embree's grids"),
-)
-
-# What `relief info --settings` says, by name.
+# What `relief info --settings` says, by name, and `relief info --methods`.
 with open(os.path.join(os.path.dirname(__file__), "declared.json"), encoding="utf-8") as _file:
-    _DECLARED = {setting["name"]: setting for setting in json.load(_file)["settings"]}
+    _program = json.load(_file)
+_DECLARED = {setting["name"]: setting for setting in _program["settings"]}
+_METHODS = tuple(
+    (method["name"], method["title"], method["description"] + (" (default)" if method["name"] == "auto" else ""))
+    for method in _program["methods"]
+)
 
 # Blender's whole numbers go no further.
 _LARGEST_INT = 2**31 - 1

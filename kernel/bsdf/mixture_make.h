@@ -9,6 +9,7 @@
 #include "kernel/bsdf/mixture.h"
 #include "kernel/bsdf/surface_closure.h"
 #include "kernel/bsdf/surface_params.h"
+#include "kernel/math/lanes.h"
 
 namespace relief {
 

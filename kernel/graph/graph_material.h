@@ -157,6 +157,28 @@ RELIEF_KERNEL float graph_edge_distance(const GraphPoint& at)
   return __builtin_sqrtf(nearest);
 }
 
+/// Element of one of the matrices between spaces, all with Z up and the camera looking along −Z.
+RELIEF_KERNEL float graph_matrix_element(const GraphPoint& at, GraphQuantity quantity, std::uint16_t index)
+{
+  using Q = GraphQuantity;
+  switch (quantity) {
+    case Q::world_from_object:
+      return graph_to_world(at.instance->world_from_object, index);
+    case Q::object_from_world:
+      return graph_from_world(at.instance->object_from_world, index);
+    case Q::camera_from_world: {
+      const float element = graph_from_world(at.scene->camera_from_world, index);
+      return index >= 8 ? -element : element;
+    }
+    case Q::world_from_camera: {
+      const float element = graph_to_world(at.scene->camera.world_from_camera, index);
+      return (index & 3) == 2 ? -element : element;
+    }
+    default:
+      return 0.0f;
+  }
+}
+
 /// @param  index  of quantities that are many
 /// @return world space turns as graph_z_up; components of vectors by `axis`
 RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity, std::uint16_t index)
@@ -245,17 +267,10 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
     case Q::attribute_alpha:
       return graph_attribute(at, index, axis_of(Q::attribute_x));
     case Q::world_from_object:
-      return graph_to_world(at.instance->world_from_object, index);
     case Q::object_from_world:
-      return graph_from_world(at.instance->object_from_world, index);
-    case Q::camera_from_world: {
-      const float element = graph_from_world(at.scene->camera_from_world, index);
-      return index >= 8 ? -element : element;
-    }
-    case Q::world_from_camera: {
-      const float element = graph_to_world(at.scene->camera.world_from_camera, index);
-      return (index & 3) == 2 ? -element : element;
-    }
+    case Q::camera_from_world:
+    case Q::world_from_camera:
+      return graph_matrix_element(at, quantity, index);
     case Q::ray_kind:
       return (at.ray.kinds >> index & 1u) != 0 ? 1.0f : 0.0f;
     case Q::ray_depth:
@@ -288,10 +303,7 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
 }
 
 /// Writes a point's quantities to its lane of the registers.
-RELIEF_KERNEL void graph_load_point(const GraphProgramView& program,
-                                    GraphPoint at,
-                                    int lane,
-                                    GraphRegisters& registers)
+RELIEF_KERNEL void graph_load_point(const GraphProgramView& program, GraphPoint at, int lane, GraphRegisters& registers)
 {
   at.P_object = transform_point(at.instance->object_from_world, at.hit->P);
   SurfaceHit moved[2];

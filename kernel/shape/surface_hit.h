@@ -23,8 +23,11 @@ struct SurfaceHit {
 
 /// Writes the mesh's texture coordinates and colour at a point to a hit.
 /// @param bary_u, bary_v  barycentric weights of vertices 1 and 2
-RELIEF_KERNEL void surface_hit_interpolate(
-    const MeshView& mesh, TriangleIndices tri, float bary_u, float bary_v, SurfaceHit* hit)
+RELIEF_KERNEL void surface_hit_interpolate(const MeshView& mesh,
+                                           TriangleIndices tri,
+                                           float bary_u,
+                                           float bary_v,
+                                           SurfaceHit* hit)
 {
   const float w0 = 1.0f - bary_u - bary_v;
   for (int set = 0; set < 2; ++set) {
@@ -134,27 +137,38 @@ RELIEF_KERNEL DisplacedPointError displaced_point_error(const InstanceView& inst
   return {forth + abs_transform(m, back), abs_transform(inverse, forth) + back};
 }
 
-/// Moves a hit from its base triangle onto the displaced surface over it. What depends on the barycentric weights alone
-/// stays; displaced surfaces are traced as they are, so there is no smoother one to lift shadow rays to.
-/// @param P_object   on the displaced surface, rounded once
-/// @param Ng_object  unit geometric normal of the displaced surface, on the side of the displacement normal
-/// @param Ns_object  unit shading normal, likewise
-/// @param leave_object  see SurfaceHit::leave
-RELIEF_KERNEL void surface_hit_displace(SurfaceHit* hit,
-                                        const InstanceView& instance,
-                                        Vec3f P_object,
-                                        Vec3f Ng_object,
-                                        Vec3f Ns_object,
-                                        Vec3f leave_object)
+/// A point of the displaced surface, as its tracer has it, object space.
+struct DisplacedSurface {
+  Vec3f P;      ///< rounded once
+  Vec3f Ng;     ///< unit geometric normal, on the side of the displacement normal
+  Vec3f Ns;     ///< unit shading normal, likewise
+  Vec3f leave;  ///< see SurfaceHit::leave
+};
+
+/// As surface_hit_make, on the displaced surface over the triangle. Texture coordinates and colours are the triangle's.
+/// Displaced surfaces are traced as they are, so there is no smoother one to lift shadow rays to.
+RELIEF_KERNEL SurfaceHit surface_hit_displaced(const MeshView& mesh,
+                                               const InstanceView& instance,
+                                               std::uint32_t triangle_index,
+                                               float bary_u,
+                                               float bary_v,
+                                               const DisplacedSurface& at)
 {
+  const TriangleIndices tri = mesh.triangles[triangle_index];
   const Affine3& m = instance.world_from_object;
   const Affine3& inverse = instance.object_from_world;
-  hit->P = transform_point(m, P_object);
-  hit->P_error = displaced_point_error(instance, P_object, hit->P).world;
-  hit->Ng = normalize(transform_normal(inverse, as_normal(Ng_object)));
-  hit->Ns = normalize(transform_normal(inverse, as_normal(Ns_object)));
-  hit->P_lift = {};
-  hit->leave = transform_vector(m, leave_object);
+  SurfaceHit hit;
+  hit.P = transform_point(m, at.P);
+  hit.P_error = displaced_point_error(instance, at.P, hit.P).world;
+  hit.Ng = normalize(transform_normal(inverse, as_normal(at.Ng)));
+  hit.Ns = normalize(transform_normal(inverse, as_normal(at.Ns)));
+  hit.P_lift = {};
+  hit.leave = transform_vector(m, at.leave);
+  surface_hit_interpolate(mesh, tri, bary_u, bary_v, &hit);
+  const Vec3f p0 = mesh.P[tri.v0];
+  const Vec3f edge1 = transform_vector(m, mesh.P[tri.v1] - p0), edge2 = transform_vector(m, mesh.P[tri.v2] - p0);
+  surface_hit_density(mesh, tri, length(cross(edge1, edge2)), &hit);
+  return hit;
 }
 
 /// Interpolated tangent frame of a normal map, world space, orthogonal to Ns.

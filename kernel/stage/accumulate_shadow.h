@@ -19,7 +19,7 @@ RELIEF_KERNEL void accumulate_shadow(const KernelGlobals& g,
     film_add_ambient(g.film, state.pixel[path], (visibility.x + visibility.y + visibility.z) / 3.0f);
     return;
   }
-  const Vec3f gain = Vec3f{shadow.gain_r[ray], shadow.gain_g[ray], shadow.gain_b[ray]} * visibility;
+  const Vec3f gain = shadow.gain[ray] * visibility;
   path_add_radiance(state, path, static_cast<int>(shadow.scatterings[ray]), gain, g.clamp_indirect);
 }
 

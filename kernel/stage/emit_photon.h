@@ -142,14 +142,14 @@ RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
   if (is_zero(power) || !is_finite(power)) return false;
 
   path_set_ray(state, path, ray.O, ray.D);
-  path_set_throughput(state, path, power);
+  state.throughput[path] = power;
   state.pixel[path] = source.target;
   state.sample_index[path] = index;
   state.pixel_hash[path] = hash;
   // One, since none means a camera ray.
   state.bounces[path] = 1;
   state.flags[path] = 0;
-  state.sigma_a_r[path] = state.sigma_a_g[path] = state.sigma_a_b[path] = 0.0f;
+  state.sigma_a[path] = Vec3f{};
   state.cone_width[path] = state.cone_spread[path] = 0.0f;
   return true;
 }

@@ -11,7 +11,7 @@ RELIEF_KERNEL Vec3f hit_geometric_normal(const KernelGlobals& g, const PathState
 {
   const InstanceView& instance = g.instances[state.hit_object[path]];
   if ((instance.flags & kDisplaced) != 0) {
-    const Vec3f Ng{state.hit_Ng_x[path], state.hit_Ng_y[path], state.hit_Ng_z[path]};
+    const Vec3f Ng = state.hit_Ng[path];
     return normalize(transform_normal(instance.object_from_world, as_normal(Ng)));
   }
   const MeshView& mesh = g.meshes[instance.mesh_index];
@@ -27,7 +27,7 @@ RELIEF_KERNEL Vec3f hit_shading_normal(const KernelGlobals& g, const PathState& 
 {
   const InstanceView& instance = g.instances[state.hit_object[path]];
   if ((instance.flags & kDisplaced) != 0) {
-    const Vec3f Ns{state.hit_Ns_x[path], state.hit_Ns_y[path], state.hit_Ns_z[path]};
+    const Vec3f Ns = state.hit_Ns[path];
     return normalize(transform_normal(instance.object_from_world, as_normal(Ns)));
   }
   return surface_hit_make(g.meshes[instance.mesh_index], instance, state.hit_triangle[path], state.hit_u[path],
@@ -57,7 +57,7 @@ hit_photon_lobe(const KernelGlobals& g, const PathState& state, std::uint32_t pa
 RELIEF_KERNEL void gather_photons(const KernelGlobals& g, PathState& state, std::uint32_t path)
 {
   const CausticStateView& caustic = state.caustic;
-  caustic.irradiance_r[path] = caustic.irradiance_g[path] = caustic.irradiance_b[path] = 0.0f;
+  (*caustic.irradiance)[path] = Vec3f{};
   const InstanceView& instance = g.instances[state.hit_object[path]];
   PhotonQuery query;
   const bool tails = path_gathers_tails(state.flags[path], instance);
@@ -77,9 +77,7 @@ RELIEF_KERNEL void gather_photons(const KernelGlobals& g, PathState& state, std:
   query.hash =
       state.pixel_hash[path] ^ (state.sample_index[path] + 1u) * 0x9e3779b1u ^ state.bounces[path] * 0x85ebca77u;
   const PhotonGather gather = photon_gather(g.caustics.map, query);
-  caustic.irradiance_r[path] = gather.irradiance.x;
-  caustic.irradiance_g[path] = gather.irradiance.y;
-  caustic.irradiance_b[path] = gather.irradiance.z;
+  (*caustic.irradiance)[path] = gather.irradiance;
   caustic.wi[path] = octahedral_encode(gather.wi);
   caustic.bounces[path] = gather.bounces;
 }

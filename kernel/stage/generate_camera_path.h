@@ -39,24 +39,20 @@ RELIEF_KERNEL void generate_camera_path(const KernelGlobals& g,
   }
   const CameraRay ray = camera_ray_make(g.camera, film_x, film_y, lens, 1.0f / static_cast<float>(g.full_height));
 
-  state.O_x[path] = ray.O.x;
-  state.O_y[path] = ray.O.y;
-  state.O_z[path] = ray.O.z;
-  state.D_x[path] = ray.D.x;
-  state.D_y[path] = ray.D.y;
-  state.D_z[path] = ray.D.z;
+  state.O[path] = ray.O;
+  state.D[path] = ray.D;
   state.t_min[path] = ray.t_min;
   state.t_max[path] = ray.t_max;
-  state.throughput_r[path] = state.throughput_g[path] = state.throughput_b[path] = 1.0f;
-  state.direct_r[path] = state.direct_g[path] = state.direct_b[path] = 0.0f;
-  state.indirect_r[path] = state.indirect_g[path] = state.indirect_b[path] = 0.0f;
+  state.throughput[path] = Vec3f{1, 1, 1};
+  state.direct[path] = Vec3f{};
+  state.indirect[path] = Vec3f{};
   state.pdf[path] = 0.0f;
   state.pixel[path] = static_cast<std::uint32_t>(pixel_y * g.film.width + pixel_x);
   state.sample_index[path] = sample_index;
   state.pixel_hash[path] = hash;
   state.bounces[path] = 0;
   state.flags[path] = 0;
-  state.sigma_a_r[path] = state.sigma_a_g[path] = state.sigma_a_b[path] = 0.0f;
+  state.sigma_a[path] = Vec3f{};
   state.eta_scale[path] = 1.0f;
   state.cone_width[path] = ray.cone_width;
   state.cone_spread[path] = ray.cone_spread;

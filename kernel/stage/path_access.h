@@ -9,40 +9,20 @@
 
 namespace relief {
 
-RELIEF_KERNEL Vec3f path_origin(const PathState& s, std::uint32_t i) { return {s.O_x[i], s.O_y[i], s.O_z[i]}; }
-RELIEF_KERNEL Vec3f path_direction(const PathState& s, std::uint32_t i) { return {s.D_x[i], s.D_y[i], s.D_z[i]}; }
-RELIEF_KERNEL Vec3f path_throughput(const PathState& s, std::uint32_t i)
-{
-  return {s.throughput_r[i], s.throughput_g[i], s.throughput_b[i]};
-}
-RELIEF_KERNEL Vec3f path_sigma_a(const PathState& s, std::uint32_t i)
-{
-  return {s.sigma_a_r[i], s.sigma_a_g[i], s.sigma_a_b[i]};
-}
-RELIEF_KERNEL Vec3f path_scatter_N(const PathState& s, std::uint32_t i)
-{
-  return {s.scatter_Nx[i], s.scatter_Ny[i], s.scatter_Nz[i]};
-}
+RELIEF_KERNEL Vec3f path_origin(const PathState& s, std::uint32_t i) { return s.O[i]; }
+RELIEF_KERNEL Vec3f path_direction(const PathState& s, std::uint32_t i) { return s.D[i]; }
+RELIEF_KERNEL Vec3f path_throughput(const PathState& s, std::uint32_t i) { return s.throughput[i]; }
+RELIEF_KERNEL Vec3f path_sigma_a(const PathState& s, std::uint32_t i) { return s.sigma_a[i]; }
+RELIEF_KERNEL Vec3f path_scatter_N(const PathState& s, std::uint32_t i) { return s.scatter_N[i]; }
 
 /// Gives a path a new ray, to be searched from its origin on.
 /// @param D  unit
 RELIEF_KERNEL void path_set_ray(PathState& s, std::uint32_t i, Vec3f O, Vec3f D)
 {
-  s.O_x[i] = O.x;
-  s.O_y[i] = O.y;
-  s.O_z[i] = O.z;
-  s.D_x[i] = D.x;
-  s.D_y[i] = D.y;
-  s.D_z[i] = D.z;
+  s.O[i] = O;
+  s.D[i] = D;
   s.t_min[i] = kLeastDistance;
   s.t_max[i] = kInfinity;
-}
-
-RELIEF_KERNEL void path_set_throughput(PathState& s, std::uint32_t i, Vec3f throughput)
-{
-  s.throughput_r[i] = throughput.x;
-  s.throughput_g[i] = throughput.y;
-  s.throughput_b[i] = throughput.z;
 }
 
 /// Queues a shadow ray.
@@ -61,18 +41,12 @@ RELIEF_KERNEL void shadow_queue_push(ShadowQueue& shadow,
                                      std::uint32_t scatterings)
 {
   const std::uint32_t ray = shadow.size++;
-  shadow.O_x[ray] = O.x;
-  shadow.O_y[ray] = O.y;
-  shadow.O_z[ray] = O.z;
-  shadow.D_x[ray] = D.x;
-  shadow.D_y[ray] = D.y;
-  shadow.D_z[ray] = D.z;
+  shadow.O[ray] = O;
+  shadow.D[ray] = D;
   shadow.t_max[ray] = t_max;
   shadow.cone_width[ray] = cone.width;
   shadow.cone_spread[ray] = cone.spread;
-  shadow.gain_r[ray] = gain.x;
-  shadow.gain_g[ray] = gain.y;
-  shadow.gain_b[ray] = gain.z;
+  shadow.gain[ray] = gain;
   shadow.path[ray] = path;
   shadow.scatterings[ray] = scatterings;
 }
@@ -110,18 +84,14 @@ RELIEF_KERNEL void path_add_radiance(PathState& s,
                                      float clamp_indirect)
 {
   if (scatterings <= 1) {
-    s.direct_r[i] += contribution.x;
-    s.direct_g[i] += contribution.y;
-    s.direct_b[i] += contribution.z;
+    s.direct[i] = s.direct[i] + contribution;
     return;
   }
   if (clamp_indirect > 0.0f) {
     const float brightest = max_component(contribution);
     if (brightest > clamp_indirect) contribution *= clamp_indirect / brightest;
   }
-  s.indirect_r[i] += contribution.x;
-  s.indirect_g[i] += contribution.y;
-  s.indirect_b[i] += contribution.z;
+  s.indirect[i] = s.indirect[i] + contribution;
 }
 
 /// Adds light to the albedo that a denoiser is told of, where it is seen by the camera or in mirrors alone.
@@ -157,26 +127,25 @@ RELIEF_KERNEL std::uint32_t path_fork(PathState& s, std::uint32_t i)
 #include "kernel/state/path_state_fields.inc"
 #undef X
   s.caustic.root[copy] = s.caustic.root[i];
-  s.direct_r[copy] = s.direct_g[copy] = s.direct_b[copy] = 0.0f;
-  s.indirect_r[copy] = s.indirect_g[copy] = s.indirect_b[copy] = 0.0f;
-  s.caustic.radiance_r[copy] = s.caustic.radiance_g[copy] = s.caustic.radiance_b[copy] = 0.0f;
+  s.direct[copy] = s.indirect[copy] = Vec3f{};
+  (*s.caustic.radiance)[copy] = Vec3f{};
   return copy;
 }
 
-/// Whether a path can become `ways` of them.
-RELIEF_KERNEL bool path_has_room(const PathState& s, std::uint32_t ways)
+/// Whether a path can become `count` of them.
+RELIEF_KERNEL bool path_has_room(const PathState& s, std::uint32_t count)
 {
-  return s.caustic.num_paths + ways - 1 <= kBatchPaths;
+  return s.caustic.num_paths + count - 1 <= kBatchPaths;
 }
 
 /// Adds what a forked path has brought to its root.
 RELIEF_KERNEL void path_add_to_root(PathState& s, std::uint32_t i)
 {
   const std::uint32_t root = s.caustic.root[i];
-  for (float* column : {s.direct_r, s.direct_g, s.direct_b, s.indirect_r, s.indirect_g, s.indirect_b,
-                        s.caustic.radiance_r, s.caustic.radiance_g, s.caustic.radiance_b}) {
-    column[root] += column[i];
-  }
+  s.direct[root] = s.direct[root] + s.direct[i];
+  s.indirect[root] = s.indirect[root] + s.indirect[i];
+  PathColumn<Vec3f>& caustic = *s.caustic.radiance;
+  caustic[root] = caustic[root] + caustic[i];
 }
 
 /// Whether light that a sharp lobe of this surface brings to the path is the photon pass's.

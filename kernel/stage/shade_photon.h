@@ -59,7 +59,7 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
   if (is_zero(power) || !is_finite(power)) return false;
 
   path_set_ray(state, path, surface_ray_origin(at, wi), wi);
-  path_set_throughput(state, path, power);
+  state.throughput[path] = power;
   const bool transmitted = (bsdf.lobe & kLobeTransmit) != 0;
   // A camera path counts the event next to the light, but no surface asks for that count any more.
   if ((state.flags[path] & kPathCaustic) != 0) {
@@ -72,9 +72,7 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
       sharp ? (state.flags[path] | kPathCaustic) & ~std::uint32_t{kPathAfterSoft} : state.flags[path] | kPathAfterSoft;
   if (transmitted && at.params.transmission > 0.0f && !at.params.thin) {
     const Vec3f inside = side.front ? at.params.sigma_a : Vec3f{};
-    state.sigma_a_r[path] = inside.x;
-    state.sigma_a_g[path] = inside.y;
-    state.sigma_a_b[path] = inside.z;
+    state.sigma_a[path] = inside;
   }
   return path_bounces(state.bounces[path], BounceKind::kAll) - 1 <= g.limits.total;
 }
@@ -118,7 +116,8 @@ RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
   if (!caster && !soft) return;
   const bool goes_on =
       has_mixture<kFeatures>(at)
-          ? shade_photon_scatter(g, state, path, at, wo, throughput, mixture_of(lobes, at.side.frame, 1.0f / at.params.alpha), soft)
+          ? shade_photon_scatter(g, state, path, at, wo, throughput,
+                                 mixture_of(lobes, at.side.frame, 1.0f / at.params.alpha), soft)
           : shade_photon_scatter(
                 g, state, path, at, wo, throughput,
                 surface_closure_make<kFeatureAll>(at.params, *g.bsdf_tables, to_local(at.side.frame, wo)), soft);

@@ -131,7 +131,7 @@ RELIEF_KERNEL void shade_surface_photons(const KernelGlobals& g,
                                          Vec3f wo)
 {
   const CausticStateView& caustic = state.caustic;
-  const Vec3f irradiance{caustic.irradiance_r[path], caustic.irradiance_g[path], caustic.irradiance_b[path]};
+  const Vec3f irradiance = (*caustic.irradiance)[path];
   if (is_zero(irradiance)) return;
   const Vec3f wi = octahedral_decode(caustic.wi[path]);
   const Vec3f wi_local = to_local(at.side.frame, wi);
@@ -148,32 +148,30 @@ RELIEF_KERNEL void shade_surface_photons(const KernelGlobals& g,
   const float by_area =
       __builtin_fabsf(dot(wi, at.side.frame.n)) / max(__builtin_fabsf(dot(wi, at.side.Ng)), kLeastCosine);
   const Vec3f radiance = path_throughput(state, path) * f * irradiance * by_area;
-  caustic.radiance_r[path] += radiance.x;
-  caustic.radiance_g[path] += radiance.y;
-  caustic.radiance_b[path] += radiance.z;
+  (*caustic.radiance)[path] = (*caustic.radiance)[path] + radiance;
 }
 
-/// Ways in which a path enters rough glass, or leaves rough metal, that the camera sees. What shines there of lamps is met by a
+/// Continuations into which a path splits where it enters rough glass, or leaves rough metal, that the camera sees. What shines there of lamps is met by a
 /// small part of the lobe: of the squared error on benchmarks/caustics' `rough`, glass on a seventh of the picture had two
-/// thirds, and of what photons then left, metal on a fourteenth half. With 2, 4 and 8 ways into glass error times processor time
+/// thirds, and of what photons then left, metal on a fourteenth half. With 2, 4 and 8 of them into glass error times processor time
 /// was 0.84, 0.75 and 0.75 of what it is with one.
-inline constexpr std::uint32_t kWaysAtRough = 4;
+inline constexpr std::uint32_t kSplitsAtRough = 4;
 
-RELIEF_KERNEL std::uint32_t path_ways_on(const PathState& state,
-                                         std::uint32_t path,
-                                         const SurfaceInteraction& at,
-                                         const SurfaceClosure& closure)
+RELIEF_KERNEL std::uint32_t path_splits_on(const PathState& state,
+                                           std::uint32_t path,
+                                           const SurfaceInteraction& at,
+                                           const SurfaceClosure& closure)
 {
   const bool seen_first = path_bounces(state.bounces[path], BounceKind::kAll) == 0;
   const GlassLobe& glass = closure.lobes;
   const bool rough_glass = glass.probability == 1.0f && !glass.delta && at.side.front;
   const bool rough_metal =
       lobe_of<SpecularLobe>(closure.lobes).probability > 0.5f && (at.instance->flags & kGathersTails) != 0;
-  return seen_first && (rough_glass || rough_metal) && path_has_room(state, kWaysAtRough) ? kWaysAtRough : 1;
+  return seen_first && (rough_glass || rough_metal) && path_has_room(state, kSplitsAtRough) ? kSplitsAtRough : 1;
 }
 
 /// Lobes of mixtures do not fork.
-RELIEF_KERNEL std::uint32_t path_ways_on(const PathState&, std::uint32_t, const SurfaceInteraction&, const Mixture&)
+RELIEF_KERNEL std::uint32_t path_splits_on(const PathState&, std::uint32_t, const SurfaceInteraction&, const Mixture&)
 {
   return 1;
 }
@@ -240,12 +238,10 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
   if (is_zero(throughput)) return;
 
   path_set_ray(state, path, surface_ray_origin(at, wi), wi);
-  path_set_throughput(state, path, throughput);
+  state.throughput[path] = throughput;
   const bool delta = (bsdf.lobe & kLobeDelta) != 0;
   state.pdf[path] = delta ? 0.0f : bsdf.pdf;
-  state.scatter_Nx[path] = light_N.x;
-  state.scatter_Ny[path] = light_N.y;
-  state.scatter_Nz[path] = light_N.z;
+  state.scatter_N[path] = light_N;
   const bool transmitted = (bsdf.lobe & kLobeTransmit) != 0;
   const BounceKind kind = transmitted ? BounceKind::kTransmission
                           : diffuse   ? BounceKind::kDiffuse
@@ -257,9 +253,7 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
   if constexpr ((kFeatures & kFeatureTransmission) != 0) {
     if (transmitted && at.params.transmission > 0.0f && !at.params.thin) {
       const Vec3f inside = side.front ? at.params.sigma_a : Vec3f{};
-      state.sigma_a_r[path] = inside.x;
-      state.sigma_a_g[path] = inside.y;
-      state.sigma_a_b[path] = inside.z;
+      state.sigma_a[path] = inside;
     }
   }
   cone = ray_cone_scatter(cone, bsdf.roughness);
@@ -442,7 +436,7 @@ template <unsigned kFeatures>
   // Closures emit, and are lit, whether or not others let the path through.
   if constexpr (kMixture) {
     const Vec3f before = path_throughput(state, path);
-    path_set_throughput(state, path, before * transmittance());
+    state.throughput[path] = before * transmittance();
     shade_surface_emission<kFeatures>(g, state, path, at, path_throughput(state, path));
     const Mixture closure = mixture_of(lobes, side.frame);
     if (g.has_lights && !last && !mixture_is_delta(closure)) {
@@ -452,7 +446,7 @@ template <unsigned kFeatures>
         shade_surface_light<kFeatures>(g, state, path, at, closure, chosen, u.light_uv, light_N, cone, shadow);
       }
     }
-    path_set_throughput(state, path, before);
+    state.throughput[path] = before;
   }
   if (!surface_is_met<kFeatures>(state, path, at.params.alpha, surface)) {
     ++counters.transparent_hits;
@@ -463,7 +457,7 @@ template <unsigned kFeatures>
   Vec3f throughput = path_throughput(state, path);
   if (!is_zero(path_sigma_a(state, path))) {
     throughput *= transmittance();
-    path_set_throughput(state, path, throughput);
+    state.throughput[path] = throughput;
   }
 
   surface_interaction_frame<kFeatures>(g, state, path, wo, at);
@@ -513,16 +507,16 @@ template <unsigned kFeatures>
   }
 
   if constexpr ((kFeatures & kFeatureCaustics) != 0 && (kFeatures & kFeatureTransmission) != 0) {
-    const std::uint32_t ways = path_ways_on(state, path, at, closure);
-    if (ways > 1) {
-      for (std::uint32_t way = ways; way-- > 0;) {
-        // The ways of all samples share one stratified set of points; ahead, each has numbers of its own.
-        const ScatterSamples v = scatter_samples(state.pixel_hash[path], sample * ways + way, surface);
-        const std::uint32_t copy = way > 0 ? path_fork(state, path) : path;
-        if (way > 0) state.pixel_hash[copy] = hash_mix_32(state.pixel_hash[path] + way);
+    const std::uint32_t splits = path_splits_on(state, path, at, closure);
+    if (splits > 1) {
+      for (std::uint32_t k = splits; k-- > 0;) {
+        // The continuations of all samples share one stratified set of points; ahead, each has numbers of its own.
+        const ScatterSamples v = scatter_samples(state.pixel_hash[path], sample * splits + k, surface);
+        const std::uint32_t copy = k > 0 ? path_fork(state, path) : path;
+        if (k > 0) state.pixel_hash[copy] = hash_mix_32(state.pixel_hash[path] + k);
         shade_surface_scatter<kFeatures>(g, state, copy, at, closure,
                                          closure_sample<kFeatures>(closure, *g.bsdf_tables, v.bsdf_lobe, v.bsdf_uv),
-                                         1.0f / static_cast<float>(ways), v, throughput, light_N, cone, next);
+                                         1.0f / static_cast<float>(splits), v, throughput, light_N, cone, next);
       }
       return;
     }

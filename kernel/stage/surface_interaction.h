@@ -72,14 +72,13 @@ surface_interaction_locate(const KernelGlobals& g, const PathState& state, std::
   at.instance = &g.instances[state.hit_object[path]];
   at.material = &g.materials[at.instance->material_index];
   at.triangle = state.hit_triangle[path];
-  at.hit = surface_hit_make(g.meshes[at.instance->mesh_index], *at.instance, at.triangle, state.hit_u[path],
-                            state.hit_v[path]);
-  if ((at.instance->flags & kDisplaced) != 0) {
-    surface_hit_displace(&at.hit, *at.instance, {state.hit_P_x[path], state.hit_P_y[path], state.hit_P_z[path]},
-                         {state.hit_Ng_x[path], state.hit_Ng_y[path], state.hit_Ng_z[path]},
-                         {state.hit_Ns_x[path], state.hit_Ns_y[path], state.hit_Ns_z[path]},
-                         {state.hit_leave_x[path], state.hit_leave_y[path], state.hit_leave_z[path]});
-  }
+  const MeshView& mesh = g.meshes[at.instance->mesh_index];
+  const float u = state.hit_u[path], v = state.hit_v[path];
+  at.hit =
+      (at.instance->flags & kDisplaced) != 0
+          ? surface_hit_displaced(mesh, *at.instance, at.triangle, u, v,
+                                  {state.hit_P[path], state.hit_Ng[path], state.hit_Ns[path], state.hit_leave[path]})
+          : surface_hit_make(mesh, *at.instance, at.triangle, u, v);
   at.side.front = dot(wo, at.hit.Ng) >= 0.0f;
   at.side.Ng = at.side.front ? at.hit.Ng : -at.hit.Ng;
 
@@ -294,7 +293,7 @@ RELIEF_KERNEL bool surface_is_met(const PathState& state, std::uint32_t path, fl
 /// @return false: it has passed as many as it may
 RELIEF_KERNEL bool path_pass_through(const KernelGlobals& g, PathState& state, std::uint32_t path, Vec3f passed)
 {
-  if (passed != Vec3f{1, 1, 1}) path_set_throughput(state, path, path_throughput(state, path) * passed);
+  if (passed != Vec3f{1, 1, 1}) state.throughput[path] = path_throughput(state, path) * passed;
   state.flags[path] += 1u << kPathTransparentShift;
   state.t_min[path] = next_float_up(state.hit_t[path]);
   return (state.flags[path] >> kPathTransparentShift) <= static_cast<std::uint32_t>(g.limits.transparent);

@@ -10,18 +10,6 @@
 
 namespace relief {
 
-/// Columns of camera paths that the caustic pass needs; null where it is off. A batch has one sample of each pixel then, and
-/// so room for paths that fork.
-struct CausticStateView {
-  float *irradiance_r = nullptr, *irradiance_g = nullptr, *irradiance_b = nullptr;  ///< at the present hit, W/m²
-  std::uint32_t* wi = nullptr;                                                      ///< octahedral: where it comes from
-  float *radiance_r = nullptr, *radiance_g = nullptr, *radiance_b = nullptr;        ///< of the sample so far
-  std::uint32_t* bounces = nullptr;  ///< of the photon that is there for all, see PhotonArrival
-  std::uint32_t* root = nullptr;     ///< camera path it forked from, or itself
-  std::uint32_t num_paths = 0;       ///< forked ones included
-};
-inline constexpr int kNumCausticFloats = 6;
-
 /// Paths of a full batch. State and queues take about 270 bytes a path, so a batch nearly stays in a second-level cache of
 /// 1 MiB.
 inline constexpr std::uint32_t kBatchPaths = 4096;
@@ -30,9 +18,53 @@ inline constexpr std::uint32_t kBatchPaths = 4096;
 /// fall into the same few sets of a cache.
 inline constexpr std::uint32_t kColumnEntries = kBatchPaths + 64 / 4;
 
+/// A column of one type.
+template <class T, std::uint32_t kEntries = kColumnEntries>
+struct PathColumn {
+  T entries[kEntries];
+
+  [[gnu::always_inline]] T& operator[](std::uint32_t i) { return entries[i]; }
+  [[gnu::always_inline]] const T& operator[](std::uint32_t i) const { return entries[i]; }
+};
+
+/// One entry of a column of vectors.
+struct Vec3fEntry {
+  float &x, &y, &z;
+
+  [[gnu::always_inline]] operator Vec3f() const { return {x, y, z}; }
+  [[gnu::always_inline]] const Vec3fEntry& operator=(Vec3f v) const
+  {
+    x = v.x;
+    y = v.y;
+    z = v.z;
+    return *this;
+  }
+  [[gnu::always_inline]] const Vec3fEntry& operator=(const Vec3fEntry& v) const { return *this = Vec3f(v); }
+};
+
+/// Vectors, component by component.
+template <std::uint32_t kEntries>
+struct PathColumn<Vec3f, kEntries> {
+  float x[kEntries], y[kEntries], z[kEntries];
+
+  [[gnu::always_inline]] Vec3fEntry operator[](std::uint32_t i) { return {x[i], y[i], z[i]}; }
+  [[gnu::always_inline]] Vec3f operator[](std::uint32_t i) const { return {x[i], y[i], z[i]}; }
+};
+
+/// Columns of camera paths that the caustic pass needs; null where it is off. A batch has one sample of each pixel then, and
+/// so room for paths that fork.
+struct CausticStateView {
+  PathColumn<Vec3f>* irradiance = nullptr;  ///< at the present hit, W/m²
+  PathColumn<Vec3f>* radiance = nullptr;    ///< of the sample so far
+  std::uint32_t* wi = nullptr;              ///< octahedral: where the irradiance comes from
+  std::uint32_t* bounces = nullptr;         ///< of the photon that is there for all, see PhotonArrival
+  std::uint32_t* root = nullptr;            ///< camera path it forked from, or itself
+  std::uint32_t num_paths = 0;              ///< forked ones included
+};
+
 /// Columns of all paths of a batch. They lie at fixed places, so that one register reaches them all.
 struct alignas(64) PathState {
-#define X(type, name) type name[kColumnEntries];
+#define X(type, name) PathColumn<type> name;
 #include "kernel/state/path_state_fields.inc"
 #undef X
   CausticStateView caustic;
@@ -57,13 +89,12 @@ inline constexpr std::uint32_t kAmbientRay = ~0u;
 
 /// Shadow rays of a batch: where to look, and what the path gains if nothing is in between.
 struct alignas(64) ShadowQueue {
-  float O_x[kShadowEntries], O_y[kShadowEntries], O_z[kShadowEntries];  ///< world
-  float D_x[kShadowEntries], D_y[kShadowEntries], D_z[kShadowEntries];  ///< world, unit
-  float t_max[kShadowEntries];                                          ///< metres
-  float cone_width[kShadowEntries], cone_spread[kShadowEntries];        ///< ray cone at O
-  float gain_r[kShadowEntries], gain_g[kShadowEntries],
-      gain_b[kShadowEntries];                 ///< radiance × throughput, MIS weight included
-  std::uint32_t path[kShadowEntries];         ///< whose
+  PathColumn<Vec3f, kShadowEntries> O;                            ///< world
+  PathColumn<Vec3f, kShadowEntries> D;                            ///< world, unit
+  float t_max[kShadowEntries];                                    ///< metres
+  float cone_width[kShadowEntries], cone_spread[kShadowEntries];  ///< ray cone at O
+  PathColumn<Vec3f, kShadowEntries> gain;                         ///< radiance × throughput, MIS weight included
+  std::uint32_t path[kShadowEntries];                             ///< whose
   std::uint32_t scatterings[kShadowEntries];  ///< events between the camera and the light, or kAmbientRay
   std::uint32_t size;                         ///< number of rays waiting
 };

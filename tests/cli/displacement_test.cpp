@@ -6,6 +6,7 @@
 #include <sstream>
 #include <thread>
 
+#include "kernel/shape/displacement_settings.h"
 #include "tests/cli/program.h"
 #include "tests/support/image_bytes.h"
 
@@ -251,10 +252,11 @@ TEST_F(DisplacementProgram, UnknownMethodsAndLevelsAreRefusedWithTheChoices)
       arguments.insert(arguments.end(), {"--displacement", method});
       const Outcome outcome = run(arguments);
       EXPECT_EQ(outcome.exit_code, 2) << command[0] << " " << method;
-      EXPECT_NE(
-          outcome.errors.find("expected one of auto, rmip, tfdm, tessellate, chord, rmip-minmax, tessellate-grid"),
-          std::string::npos)
-          << outcome.errors;
+      std::string choices;
+      for (const std::string_view label : kDisplacementMethodLabels) {
+        choices += (choices.empty() ? "" : ", ") + std::string(label);
+      }
+      EXPECT_NE(outcome.errors.find("expected one of " + choices), std::string::npos) << outcome.errors;
     }
     if (command[0] == "info") continue;
     for (const char* level : {"-1", "31", "fine", ""}) {
@@ -372,31 +374,6 @@ TEST_F(DisplacementProgram, SmoothingTurnsShadingNormalsAndNothingElse)
 
 TEST_F(DisplacementProgram, WhatIsNotFollowedIsAWarning)
 {
-  struct Case {
-    const char* key;
-    nlohmann::json value;
-    const char* warning;
-  };
-  folder_.write("rays.txt", "0.3 0.3 3 0 0 -1\n");
-  const auto expected = trace(bumpy(), {});
-  for (const Case& c :
-       {Case{"method", "cone", "material 'bark': there is no displacement method 'cone' yet; 'chord' is used"},
-        Case{"method", "microtriangle", "there is no displacement method 'microtriangle' yet"}}) {
-    GltfBuilder b = displaced_square();
-    displacement_of(b)[c.key] = c.value;
-    const std::string scene = bumpy(b);
-    EXPECT_EQ(trace(scene, {}), expected);
-    for (const Arguments& command : {Arguments{"info", scene}, Arguments{"trace", scene, "--rays", file("rays.txt")},
-                                     Arguments{"render", scene, "-o", file("o.exr"), "--resolution", "8x8"}}) {
-      const Outcome outcome = run(command);
-      EXPECT_EQ(outcome.exit_code, 0) << outcome.errors;
-      EXPECT_NE((outcome.output + outcome.errors).find(c.warning), std::string::npos)
-          << command[0] << ": " << outcome.output << outcome.errors;
-    }
-    EXPECT_EQ(run({"info", scene, "--strict"}).exit_code, 3) << c.warning;
-    EXPECT_EQ(run({"render", scene, "-o", file("strict.exr"), "--strict"}).exit_code, 3) << c.warning;
-    EXPECT_FALSE(exists("strict.exr"));
-  }
   GltfBuilder half = displaced_square();
   displacement_of(half)["lod"] = 0.5;
   const std::string scene = bumpy(half);
@@ -406,10 +383,30 @@ TEST_F(DisplacementProgram, WhatIsNotFollowedIsAWarning)
   EXPECT_NE(tessellated.errors.find("material 'bark': tessellations have whole levels of detail; level 0 is used"),
             std::string::npos)
       << tessellated.errors;
-  // The command line's choice is followed, so there is nothing to warn about.
+}
+
+TEST_F(DisplacementProgram, MethodsAreListed)
+{
+  const Outcome outcome = run({"info", "--methods"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+  const nlohmann::json methods = nlohmann::json::parse(outcome.output);
+  ASSERT_EQ(methods.size(), std::size(kDisplacementMethodLabels));
+  for (std::size_t k = 0; k < methods.size(); ++k) {
+    EXPECT_EQ(methods[k]["name"], kDisplacementMethodLabels[k]);
+    EXPECT_FALSE(methods[k]["title"].get<std::string>().empty());
+    EXPECT_FALSE(methods[k]["description"].get<std::string>().empty());
+  }
+}
+
+TEST_F(DisplacementProgram, MethodsThatSceneFilesCannotHaveAreErrors)
+{
   GltfBuilder b = displaced_square();
   displacement_of(b)["method"] = "cone";
-  EXPECT_EQ(run({"info", bumpy(b), "--displacement", "tfdm", "--strict"}).exit_code, 0);
+  const Outcome outcome = run({"info", bumpy(b)});
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(outcome.errors.find("/materials/0/extensions/RELIEF_displacement/method"), std::string::npos)
+      << outcome.errors;
+  EXPECT_NE(outcome.errors.find("\"cone\""), std::string::npos) << outcome.errors;
 }
 
 TEST_F(DisplacementProgram, InfoSaysHowItIsTraced)

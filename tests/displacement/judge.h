@@ -18,6 +18,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <map>
 #include <memory>
 #include <ostream>
 #include <sstream>
@@ -28,12 +29,10 @@
 #include "displacement/height_level.h"
 #include "tests/displacement/random_cases.h"
 #include "tests/oracle/displaced_triangle.h"
+#include "tests/support/displacement_methods.h"
 #include "tests/support/test_rays.h"
 
 namespace relief {
-
-/// How GoogleTest prints a method.
-inline void PrintTo(const TraversalMethodLabel& label, std::ostream* out) { *out << label.name; }
 
 /// How many values fall between powers of two: quantiles of very many errors in a few bytes.
 class ErrorHistogram {
@@ -150,14 +149,16 @@ class TracedCase {
   DisplacedMeshView mesh() const { return mesh_.view(); }
   const DisplacedMesh& displaced_mesh() const { return mesh_; }
   /// What a method is given to trace the triangles with.
-  DisplacedGeometry geometry(TraversalMethod method) const
+  DisplacedGeometry geometry(DisplacementMethod method) const
   {
     DisplacedGeometry result;
     result.mesh = mesh_.view();
     result.method = method;
     for (std::size_t k = 0; k < levels_.size(); ++k) {
       const Level& level = *levels_[k];
-      result.levels[k] = {&level.field.view(), &level.rmip.view(), &level.mipmap.view()};
+      result.levels[k].field = &level.field.view();
+      const auto make = displacement_method(method).table_make;
+      if (make != nullptr) result.levels[k].table = level.table(make);
     }
     const auto num_levels = static_cast<int>(levels_.size());
     result.lod = {num_levels, num_levels > 1, 0, mesh_.widest_texel()};
@@ -182,23 +183,35 @@ class TracedCase {
   std::vector<float> floats_;
   std::vector<std::uint16_t> words_;
   std::vector<std::uint8_t> bytes_;
+  using TableMake = decltype(DisplacementMethodEntry::table_make);
   /// A level of the map, and what methods need of it.
   struct Level {
     Level(const HeightMapView& map, int level)
-        : texels(level > 0 ? HeightLevel(map, level) : HeightLevel()),
-          field(level > 0 ? texels.view() : map),
-          rmip(field.view()),
-          mipmap(field.view())
+        : texels(level > 0 ? HeightLevel(map, level) : HeightLevel()), field(level > 0 ? texels.view() : map)
     {
+      for (const DisplacementMethod method : kDisplacementMethods) {
+        const auto make = displacement_method(method).table_make;
+        if (make != nullptr && !tables.contains(make)) tables[make] = make(field.view(), {});
+      }
     }
+    const void* table(TableMake make) const { return tables.at(make).view; }
+
     HeightLevel texels;
     HeightField field;
-    Rmip rmip;
-    MinmaxMipmap mipmap;
+    std::map<TableMake, MethodTable> tables;
   };
   std::vector<std::unique_ptr<Level>> levels_;
   DisplacedMesh mesh_;
 };
+
+/// A ray as a question to a geometry.
+inline DisplacedQuery displaced_query(const oracle::Ray& ray, bool any_hit)
+{
+  DisplacedQuery query{to_double(TracedCase::vector3(ray.O)), to_double(TracedCase::vector3(ray.D)), ray.t_min,
+                       ray.t_max};
+  query.any_hit = any_hit;
+  return query;
+}
 
 /// Operations in sequence, and so roundings of 2^-53 relative to the largest operand, that lead from a ray and a triangle
 /// to a hit: about a dozen from the corners to the edge functions, as many to a weight, a point, its height and t. Their
@@ -326,7 +339,7 @@ struct Judgement {
 /// Judges one method, compiled for one instruction set.
 class Judge {
  public:
-  Judge(TraversalMethod method, const TraversalTable& table) : method_(method), table_(table) {}
+  Judge(DisplacementMethod method, const TraversalTable& table) : method_(method), table_(table) {}
 
   /// @param traced      holds the triangle as number `index`
   /// @param roots       what the oracle finds for the ray
@@ -340,10 +353,7 @@ class Judge {
 
   const Judgement& judgement() const { return judgement_; }
   /// Of the method and the instruction set.
-  std::string name() const
-  {
-    return std::string(kTraversalMethods[static_cast<std::size_t>(method_)].name) + ", " + table_.isa;
-  }
+  std::string name() const { return std::string(displacement_method_label(method_)) + ", " + table_.isa; }
   const TraversalCounters& counters() const { return counters_; }
 
  private:
@@ -360,9 +370,7 @@ class Judge {
 
   bool trace(const Question& q, bool any_hit, DisplacedHit* hit)
   {
-    return table_.trace(q.traced.geometry(method_), q.index, to_double(TracedCase::vector3(q.ray.O)),
-                        to_double(TracedCase::vector3(q.ray.D)), {}, 0, q.ray.t_min, q.ray.t_max, any_hit, hit,
-                        &counters_);
+    return table_.trace(q.traced.geometry(method_), q.index, displaced_query(q.ray, any_hit), hit, &counters_);
   }
   static double t_bound(const Question& q, const oracle::Hit& root);
   static const oracle::Hit* required_root(const Question& q);
@@ -376,7 +384,7 @@ class Judge {
                     const DisplacedHit* hit,
                     const std::string& case_label);
 
-  TraversalMethod method_;
+  DisplacementMethod method_;
   const TraversalTable& table_;
   TraversalCounters counters_;
   Judgement judgement_;
@@ -578,8 +586,7 @@ inline const TraversalTable& best_table()
 inline std::vector<Judge> judges_of_all_methods(const TraversalTable& table)
 {
   std::vector<Judge> judges;
-  judges.reserve(std::size(kTraversalMethods));
-  for (const TraversalMethodLabel& label : kTraversalMethods) judges.emplace_back(label.method, table);
+  for (const DisplacementMethod method : traversing_methods()) judges.emplace_back(method, table);
   return judges;
 }
 
@@ -587,9 +594,9 @@ inline std::vector<Judge> judges_of_all_methods(const TraversalTable& table)
 inline std::vector<Judge> judges_of_all_methods()
 {
   std::vector<Judge> judges;
-  for (const TraversalMethodLabel& label : kTraversalMethods) {
-    judges.emplace_back(label.method, traversal_table_baseline());
-    if (&best_table() != &traversal_table_baseline()) judges.emplace_back(label.method, best_table());
+  for (const DisplacementMethod method : traversing_methods()) {
+    judges.emplace_back(method, traversal_table_baseline());
+    if (&best_table() != &traversal_table_baseline()) judges.emplace_back(method, best_table());
   }
   return judges;
 }

@@ -16,13 +16,13 @@ namespace {
 using oracle::Ray;
 using oracle::Vector3;
 
-class ClosedDisplacedSurface : public testing::TestWithParam<TraversalMethodLabel> {};
+class ClosedDisplacedSurface : public testing::TestWithParam<DisplacementMethod> {};
 
 TEST_P(ClosedDisplacedSurface, LetsNoRayOut)
 {
   for (const ClosedSurface& surface : {closed_sphere(), closed_torus(), seamed_box()}) {
     const TracedCase traced(surface.triangles, surface.map, HeightFormat::kFloat, 1, surface.weld_seams);
-    DisplacedScene scene(traced.geometry(GetParam().method), best_table());
+    DisplacedScene scene(traced.geometry(GetParam()), best_table());
     std::mt19937_64 random(97 + (test_part() << 32));
     std::uint64_t num_leaks = 0, num_dark_leaks = 0;
     std::string first;
@@ -43,7 +43,7 @@ TEST_P(ClosedDisplacedSurface, ShadowRaysSeeWhatRaysHit)
 {
   for (const ClosedSurface& surface : {closed_sphere(), closed_torus(), seamed_box()}) {
     const TracedCase traced(surface.triangles, surface.map, HeightFormat::kFloat, 1, surface.weld_seams);
-    DisplacedScene scene(traced.geometry(GetParam().method), best_table());
+    DisplacedScene scene(traced.geometry(GetParam()), best_table());
     std::mt19937_64 random(98);
     for (int k = 0; k < 30000; ++k) {
       // Segments between any two points, many of which end near the surface.
@@ -61,7 +61,7 @@ TEST_P(ClosedDisplacedSurface, IsFoundThroughEmbreeWhereAllTrianglesTogetherFind
 {
   for (const ClosedSurface& surface : {closed_sphere(), closed_torus(), seamed_box()}) {
     const TracedCase traced(surface.triangles, surface.map, HeightFormat::kFloat, 1, surface.weld_seams);
-    const DisplacedGeometry geometry = traced.geometry(GetParam().method);
+    const DisplacedGeometry geometry = traced.geometry(GetParam());
     DisplacedScene scene(geometry, best_table());
     std::mt19937_64 random(99);
     TraversalCounters counters;
@@ -71,9 +71,7 @@ TEST_P(ClosedDisplacedSurface, IsFoundThroughEmbreeWhereAllTrianglesTogetherFind
       float nearest = HUGE_VALF;
       for (std::uint32_t index = 0; index < geometry.mesh.num_triangles; ++index) {
         DisplacedHit hit;
-        if (best_table().trace(geometry, index, to_double(TracedCase::vector3(ray.O)),
-                               to_double(TracedCase::vector3(ray.D)), {}, 0, ray.t_min, ray.t_max, false, &hit,
-                               &counters)) {
+        if (best_table().trace(geometry, index, displaced_query(ray, false), &hit, &counters)) {
           nearest = std::min(nearest, static_cast<float>(hit.t));
         }
       }
@@ -88,7 +86,7 @@ TEST_P(ClosedDisplacedSurface, RootsOnSharedEdgesAreFoundByOneOfTheTriangles)
   for (const HardCase& hard_case : hard_cases()) {
     if (hard_case.triangles.size() < 3) continue;
     const TracedCase traced(hard_case.triangles, hard_case.map);
-    DisplacedScene scene(traced.geometry(GetParam().method), best_table());
+    DisplacedScene scene(traced.geometry(GetParam()), best_table());
     const oracle::Mesh mesh(hard_case.triangles, hard_case.map);
     for (const Ray& ray : hard_case.rays) {
       const std::vector<oracle::MeshHit> roots = mesh.intersect_all(ray);
@@ -115,12 +113,8 @@ TEST_P(ClosedDisplacedSurface, RootsOnSharedEdgesAreFoundByOneOfTheTriangles)
 
 INSTANTIATE_TEST_SUITE_P(Displacement,
                          ClosedDisplacedSurface,
-                         testing::ValuesIn(kTraversalMethods),
-                         [](const auto& each) {
-                           std::string name(each.param.name);
-                           std::replace(name.begin(), name.end(), '-', '_');
-                           return name;
-                         });
+                         testing::ValuesIn(traversing_methods()),
+                         method_test_name);
 
 }  // namespace
 }  // namespace relief

@@ -92,13 +92,13 @@ double first_stop(const Levels& levels, const LodRule& rule, const LodCone& cone
   return stop;
 }
 
-class LevelsOfDetail : public testing::TestWithParam<TraversalMethodLabel> {};
+class LevelsOfDetail : public testing::TestWithParam<DisplacementMethod> {};
 
 TEST_P(LevelsOfDetail, AreMetWhereTheConeAsksForThem)
 {
   const ClosedSurface surface = closed_torus();
   const Levels levels(surface);
-  const DisplacedGeometry geometry = levels.traced.geometry(GetParam().method);
+  const DisplacedGeometry geometry = levels.traced.geometry(GetParam());
   DisplacedScene scene(geometry, best_table());
   std::mt19937_64 random(5);
   int num_judged = 0, num_walls = 0, num_by_level[kNumLevels] = {};
@@ -119,8 +119,8 @@ TEST_P(LevelsOfDetail, AreMetWhereTheConeAsksForThem)
     ASSERT_NEAR(t, expected, 1e-6 * (1 + t)) << ray_text(ray) << " cone " << cone.width << " " << cone.spread;
     const int level = static_cast<int>(found.hit.Ng_x);
     ++num_by_level[level];
-    const SurfacePoint point =
-        displaced_point(geometry, found.hit.primID, {found.hit.u, found.hit.v, found.hit.Ng_x}).point;
+    const SurfacePoint point = displaced_surface_point(
+        geometry, found.hit.primID, displaced_hit_decode({found.hit.u, found.hit.v, found.hit.Ng_x}));
     const double away =
         length(point.P - Vec3d{ray.O[0] + t * ray.D[0], ray.O[1] + t * ray.D[1], ray.O[2] + t * ray.D[2]});
     if (away > 1e-5) ++num_walls;
@@ -135,7 +135,7 @@ TEST_P(LevelsOfDetail, LetNoRayOutOfAClosedSurface)
 {
   for (const ClosedSurface& surface : {closed_sphere(), closed_torus(), seamed_box()}) {
     const Levels levels(surface);
-    const DisplacedGeometry geometry = levels.traced.geometry(GetParam().method);
+    const DisplacedGeometry geometry = levels.traced.geometry(GetParam());
     DisplacedScene scene(geometry, best_table());
     std::mt19937_64 random(6);
     std::string first;
@@ -153,11 +153,7 @@ TEST_P(LevelsOfDetail, LetNoRayOutOfAClosedSurface)
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Displacement, LevelsOfDetail, testing::ValuesIn(kTraversalMethods), [](const auto& test) {
-  std::string name(test.param.name);
-  std::replace(name.begin(), name.end(), '-', '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(Displacement, LevelsOfDetail, testing::ValuesIn(traversing_methods()), method_test_name);
 
 TEST(LodRule, LevelsEndWhereTheNextOneBegins)
 {

@@ -107,13 +107,13 @@ Vector3 random_wall_point(std::mt19937_64& random, const std::vector<Seam>& seam
   return combination(1, combination(1 - f, seam.P[0], f, seam.P[1]), d, N);
 }
 
-class SeamWalls : public testing::TestWithParam<TraversalMethodLabel> {};
+class SeamWalls : public testing::TestWithParam<DisplacementMethod> {};
 
 TEST_P(SeamWalls, AreMetWhereTheirRuledSurfaceIs)
 {
   const ClosedSurface surface = seamed_box();
   const TracedCase traced(surface.triangles, surface.map, HeightFormat::kFloat, 1, true);
-  const DisplacedGeometry geometry = traced.geometry(GetParam().method);
+  const DisplacedGeometry geometry = traced.geometry(GetParam());
   DisplacedScene scene(geometry, best_table());
   const oracle::Mesh mesh(surface.triangles, surface.map);
   const std::vector<Seam> seams = seams_of(surface.triangles);
@@ -145,16 +145,18 @@ TEST_P(SeamWalls, AreMetWhereTheirRuledSurfaceIs)
         << ray_text(ray) << " surface " << expected << " wall " << wall;
     const auto t = static_cast<double>(found.ray.tfar);
     ASSERT_NEAR(t, std::min(wall, expected), 1e-6 * (1 + t)) << ray_text(ray);
-    const ReportedPoint at = displaced_point(geometry, found.hit.primID, {found.hit.u, found.hit.v, found.hit.Ng_x});
-    ASSERT_EQ(at.on_wall, wall < expected) << ray_text(ray);
-    num_walls += at.on_wall ? 1 : 0;
+    const DisplacedPlace at = displaced_hit_decode({found.hit.u, found.hit.v, found.hit.Ng_x});
+    const SurfacePoint point = displaced_surface_point(geometry, found.hit.primID, at);
+    const bool on_wall = at.edge >= 0;
+    ASSERT_EQ(on_wall, wall < expected) << ray_text(ray);
+    num_walls += on_wall ? 1 : 0;
     const Vec3d on_ray{ray.O[0] + t * ray.D[0], ray.O[1] + t * ray.D[1], ray.O[2] + t * ray.D[2]};
-    largest_error = std::max(largest_error, length(at.point.P - on_ray));
+    largest_error = std::max(largest_error, length(point.P - on_ray));
     // The outside is where the normal points to.
-    const double cosine = at.point.Ng.x * ray.D[0] + at.point.Ng.y * ray.D[1] + at.point.Ng.z * ray.D[2];
-    ASSERT_EQ(cosine > 0, k % 3 == 0) << ray_text(ray) << " wall " << at.on_wall;
+    const double cosine = point.Ng.x * ray.D[0] + point.Ng.y * ray.D[1] + point.Ng.z * ray.D[2];
+    ASSERT_EQ(cosine > 0, k % 3 == 0) << ray_text(ray) << " wall " << on_wall;
   }
-  std::cout << "[ figures  ] " << GetParam().name << ": " << num_judged << " rays, " << num_walls
+  std::cout << "[ figures  ] " << displacement_method_label(GetParam()) << ": " << num_judged << " rays, " << num_walls
             << " nearest hits on walls, points off the ray by " << largest_error << " at most\n";
   EXPECT_LT(largest_error, 1e-5);
   EXPECT_GE(num_judged, 4000);
@@ -173,7 +175,7 @@ TEST_P(SeamWalls, ReachOverGapsThatNeitherSideReachesInto)
       {{{{1, 1, 0}, {0, 1, 0}, {1, 0, 0}}}, {{up, up, up}}, {{uv(.3, .8), uv(.2, .8), uv(.3, .7)}}}};
   for (const bool weld : {false, true}) {
     const TracedCase traced(triangles, map, HeightFormat::kFloat, 1, weld);
-    DisplacedScene scene(traced.geometry(GetParam().method), best_table());
+    DisplacedScene scene(traced.geometry(GetParam()), best_table());
     for (const double z : {.01, .3, .5, .99}) {
       const float t = scene.intersect(ray_through({0, .2, z}, {1, 1.2, z}));
       EXPECT_EQ(t < HUGE_VALF, weld) << z;
@@ -184,17 +186,13 @@ TEST_P(SeamWalls, ReachOverGapsThatNeitherSideReachesInto)
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Displacement, SeamWalls, testing::ValuesIn(kTraversalMethods), [](const auto& test) {
-  std::string name(test.param.name);
-  std::replace(name.begin(), name.end(), '-', '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(Displacement, SeamWalls, testing::ValuesIn(traversing_methods()), method_test_name);
 
 /// Rays from inside that meet nothing.
 int num_leaks(const ClosedSurface& surface, bool weld_seams)
 {
   const TracedCase traced(surface.triangles, surface.map, HeightFormat::kFloat, 1, weld_seams);
-  DisplacedScene scene(traced.geometry(TraversalMethod::kChord), best_table());
+  DisplacedScene scene(traced.geometry(DisplacementMethod::chord), best_table());
   std::mt19937_64 random(12);
   int count = 0;
   for (int k = 0; k < 10000; ++k) count += scene.intersect(ray_from_inside(random, surface)) < HUGE_VALF ? 0 : 1;

@@ -81,13 +81,12 @@ std::vector<DisplacedHit> hits_of(const DisplacedTriangle& triangle, const Heigh
   const TracedCase traced({triangle}, map);
   std::vector<DisplacedHit> hits;
   TraversalCounters counters;
-  for (const TraversalMethodLabel& label : kTraversalMethods) {
+  for (const DisplacementMethod method : traversing_methods()) {
     for (const Ray& ray : rays) {
       DisplacedHit hit;
       hit.t = HUGE_VAL;
-      const bool found = traversal_table_baseline().trace(
-          traced.geometry(label.method), 0, to_double(TracedCase::vector3(ray.O)),
-          to_double(TracedCase::vector3(ray.D)), {}, 0, ray.t_min, ray.t_max, false, &hit, &counters);
+      const bool found =
+          traversal_table_baseline().trace(traced.geometry(method), 0, displaced_query(ray, false), &hit, &counters);
       hits.push_back(found ? hit : DisplacedHit{HUGE_VAL, 0, 0, 0, 0, 0, 0});
     }
   }

@@ -4,61 +4,66 @@
 #include <atomic>
 #include <cmath>
 #include <iostream>
+#include <map>
 #include <string>
 #include <utility>
 
 #include <gtest/gtest.h>
 
-#include "displacement/rmip.h"
-#include "displacement/traverse_chord.h"
-#include "displacement/traverse_rmip.h"
-#include "displacement/traverse_tfdm.h"
+#include "displacement/method.h"
 #include "tests/displacement/judge.h"
 #include "tests/displacement/random_cases.h"
 
 namespace relief {
 namespace {
 
-struct Query {
-  DisplacedMeshView mesh;
-  RayFrame frame;
-  RayCurve curve;
-  double t_min, t_max;
+/// A method with its table for one height field.
+struct Prepared {
+  const DisplacementMethodEntry* entry;
+  MethodTable table;
 };
 
-/// Compares a traversal with traverse_chord on random cases.
-/// @param traverse  (query, field, any_hit, hit, counters) → found
-template <class Tables, class Traverse>
-void compare_with_chord(std::uint64_t seed, int num_cases, const Tables& make_tables, const Traverse& traverse)
+Prepared prepare(DisplacementMethod method, const HeightFieldView& field, const RmipOptions& options = {})
+{
+  const DisplacementMethodEntry& entry = displacement_method(method);
+  return {&entry, entry.table_make != nullptr ? entry.table_make(field, options) : MethodTable{}};
+}
+
+/// Compares a method with chord on random cases.
+void compare_with_chord(std::uint64_t seed, int num_cases, DisplacementMethod method, const RmipOptions& options = {})
 {
   constexpr int kNumRays = 32;
   constexpr HeightFormat kFormats[] = {HeightFormat::kFloat, HeightFormat::kU16, HeightFormat::kU8};
   int num_hits = 0;
   for (int k = 0; k < num_cases; ++k) {
+    SCOPED_TRACE(testing::Message() << "case " << seed + static_cast<std::uint64_t>(k));
     std::mt19937_64 random(seed + static_cast<std::uint64_t>(k));
     RandomCase drawn = random_case(random, kNumRays);
     const HeightFormat format = kFormats[k % 3];
     drawn.map = stored_heights(drawn.map, format);
     const TracedCase traced({drawn.triangle}, drawn.map, format);
-    Query q{traced.mesh(), {}, {}, 0, 0};
-    const auto tables = make_tables(*q.mesh.field);
+    const DisplacedMeshView mesh = traced.mesh();
+    const Prepared chord = prepare(DisplacementMethod::chord, *mesh.field);
+    const Prepared other = prepare(method, *mesh.field, options);
     for (const oracle::Ray& ray : drawn.rays) {
-      q.frame = ray_frame_make(to_double(TracedCase::vector3(ray.O)), to_double(TracedCase::vector3(ray.D)));
-      if (!ray_curve_make(q.frame, q.mesh.triangles[0], &q.curve)) continue;
-      q.t_min = ray.t_min;
-      q.t_max = ray.t_max;
+      RayCurve curve;
+      if (!ray_curve_make(ray_frame_make(to_double(TracedCase::vector3(ray.O)), to_double(TracedCase::vector3(ray.D))),
+                          mesh.triangles[0], &curve)) {
+        continue;
+      }
       TraversalCounters counters;
+      PrismQuery query{mesh, 0, curve, ray.t_min, ray.t_max, false, options, counters};
       DisplacedHit expected, hit, any;
-      const bool found = traverse_chord(q.mesh, 0, q.curve, q.t_min, q.t_max, false, &expected, &counters);
-      ASSERT_EQ(traverse(q, tables, false, &hit, &counters), found) << "case " << seed + static_cast<std::uint64_t>(k);
-      ASSERT_EQ(traverse(q, tables, true, &any, &counters), found) << "case " << seed + static_cast<std::uint64_t>(k);
+      const bool found = chord.entry->traverse(query, chord.table.view, &expected);
+      ASSERT_EQ(other.entry->traverse(query, other.table.view, &hit), found);
+      query.any_hit = true;
+      ASSERT_EQ(other.entry->traverse(query, other.table.view, &any), found);
       if (!found) continue;
       ++num_hits;
       // Both refine the same root; where the ray grazes it is known to fewer digits.
-      ASSERT_NEAR(hit.t, expected.t, 1e-7 * (std::abs(expected.t) + 1e-3))
-          << "case " << seed + static_cast<std::uint64_t>(k);
+      ASSERT_NEAR(hit.t, expected.t, 1e-7 * (std::abs(expected.t) + 1e-3));
       ASSERT_GE(any.t, expected.t - 1e-7 * (std::abs(expected.t) + 1e-3));
-      ASSERT_LE(any.t, q.t_max);
+      ASSERT_LE(any.t, ray.t_max);
     }
   }
   EXPECT_GT(num_hits, num_cases * kNumRays / 4);
@@ -74,13 +79,7 @@ TEST(RmipTraversal, IsTheSameForEveryOptionAndResolution)
       for (const int resolution : {1, 3, 0, 1 << 20}) {
         SCOPED_TRACE(testing::Message() << "marching scale " << marching_scale << ", inversion " << reduce << ", R "
                                         << resolution);
-        const RmipOptions options{marching_scale, reduce};
-        compare_with_chord(
-            seed, kNumCases / 4, [&](const HeightFieldView& field) { return Rmip(field, resolution); },
-            [&](const Query& q, const Rmip& rmip, bool any_hit, DisplacedHit* hit, TraversalCounters* counters) {
-              return traverse_rmip(q.mesh, 0, q.frame, q.curve, rmip.view(), options, q.t_min, q.t_max, any_hit, hit,
-                                   counters);
-            });
+        compare_with_chord(seed, kNumCases / 4, DisplacementMethod::rmip, {marching_scale, reduce, resolution});
         if (HasFatalFailure()) return;
         seed += kNumCases;
       }
@@ -91,24 +90,14 @@ TEST(RmipTraversal, IsTheSameForEveryOptionAndResolution)
 TEST(RmipTraversal, IsTheSameOverAMinmaxMipmap)
 {
   for (const double marching_scale : {1., 16.}) {
-    compare_with_chord(
-        200000, kNumCases, [](const HeightFieldView& field) { return MinmaxMipmap(field); },
-        [&](const Query& q, const MinmaxMipmap& mipmap, bool any_hit, DisplacedHit* hit, TraversalCounters* counters) {
-          return traverse_rmip(q.mesh, 0, q.frame, q.curve, mipmap.view(), {marching_scale, true}, q.t_min, q.t_max,
-                               any_hit, hit, counters);
-        });
+    compare_with_chord(200000, kNumCases, DisplacementMethod::rmip_minmax, {marching_scale, true});
     if (HasFatalFailure()) return;
   }
 }
 
-TEST(TfdmTraversal, FindsWhatTheFastMethodFinds)
-{
-  compare_with_chord(
-      300000, 2 * kNumCases, [](const HeightFieldView& field) { return MinmaxMipmap(field); },
-      [](const Query& q, const MinmaxMipmap& mipmap, bool any_hit, DisplacedHit* hit, TraversalCounters* counters) {
-        return traverse_tfdm(q.mesh, 0, q.frame, q.curve, mipmap.view(), q.t_min, q.t_max, any_hit, hit, counters);
-      });
-}
+class EveryTraversal : public testing::TestWithParam<DisplacementMethod> {};
+
+TEST_P(EveryTraversal, FindsWhatTheFastMethodFinds) { compare_with_chord(300000, 2 * kNumCases, GetParam()); }
 
 /// A plane with heights of one texel's period, tiled so often that the ray passes thousands of texels.
 TEST(PublishedTraversals, FindTheFirstOfThousandsOfTiles)
@@ -120,24 +109,24 @@ TEST(PublishedTraversals, FindTheFirstOfThousandsOfTiles)
   for (double& h : map.h) h = float_rounded(random_unit(random));
   const TracedCase traced({triangle}, map);
   const DisplacedMeshView mesh = traced.mesh();
-  const Rmip rmip(*mesh.field);
-  const MinmaxMipmap mipmap(*mesh.field);
+  std::vector<Prepared> methods;
+  for (const DisplacementMethod method : traversing_methods()) methods.push_back(prepare(method, *mesh.field));
   for (int k = 0; k < 200; ++k) {
     const Vec3f O{-1, -1, 0.01f + 0.1f * static_cast<float>(random_unit(random))};
     const Vec3f target{0.8f * static_cast<float>(random_unit(random)), 0.2f * static_cast<float>(random_unit(random)),
                        0};
-    const RayFrame frame = ray_frame_make(to_double(O), to_double(target - O));
     RayCurve curve;
-    if (!ray_curve_make(frame, mesh.triangles[0], &curve)) continue;
-    TraversalCounters counters, tfdm_counters;
-    DisplacedHit expected, a, b;
-    ASSERT_TRUE(traverse_chord(mesh, 0, curve, 0, 1e30, false, &expected, &counters));
-    ASSERT_TRUE(traverse_rmip(mesh, 0, frame, curve, rmip.view(), {}, 0, 1e30, false, &a, &counters));
-    ASSERT_TRUE(traverse_tfdm(mesh, 0, frame, curve, mipmap.view(), 0, 1e30, false, &b, &tfdm_counters));
-    EXPECT_NEAR(a.t, expected.t, 1e-9);
-    EXPECT_NEAR(b.t, expected.t, 1e-9);
-    // Tiles are skipped as nodes are, not one by one: there are 179 200 periods.
-    EXPECT_LT(tfdm_counters.bounds, 20000u);
+    if (!ray_curve_make(ray_frame_make(to_double(O), to_double(target - O)), mesh.triangles[0], &curve)) continue;
+    double expected = -1;
+    for (const Prepared& method : methods) {
+      TraversalCounters counters;
+      DisplacedHit hit;
+      ASSERT_TRUE(method.entry->traverse({mesh, 0, curve, 0, 1e30, false, {}, counters}, method.table.view, &hit));
+      if (expected < 0) expected = hit.t;
+      EXPECT_NEAR(hit.t, expected, 1e-9) << method.entry->title;
+      // Tiles are skipped as nodes are, not one by one: there are 179 200 periods.
+      EXPECT_LT(counters.bounds, 20000u) << method.entry->title;
+    }
   }
 }
 
@@ -148,44 +137,35 @@ class WideTriangle {
       : traced_({{{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}},
                   {{{0, 0, 1}, {0, 0, 1}, {0, 0, 1}}},
                   {{{-span_u, -span_v}, {span_u, -span_v}, {-span_u, span_v}}}}},
-                std::move(map)),
-        rmip_(*traced_.mesh().field),
-        mipmap_(*traced_.mesh().field)
+                std::move(map))
   {
+    for (const DisplacementMethod method : traversing_methods()) {
+      prepared_.emplace(method, prepare(method, *traced_.mesh().field));
+    }
   }
 
   /// @param stop  as TraversalCounters has it
-  bool trace(TraversalMethod method,
+  bool trace(DisplacementMethod method,
              const oracle::Ray& ray,
              DisplacedHit* hit,
              TraversalCounters* counters,
              const std::atomic<bool>* stop = nullptr) const
   {
     const DisplacedMeshView mesh = traced_.mesh();
-    const RayFrame frame = ray_frame_make(to_double(TracedCase::vector3(ray.O)), to_double(TracedCase::vector3(ray.D)));
     counters->stop = stop;
     RayCurve curve;
-    if (!ray_curve_make(frame, mesh.triangles[0], &curve)) return false;
-    switch (method) {
-      case TraversalMethod::kChord:
-        break;
-      case TraversalMethod::kRmip:
-        return traverse_rmip(mesh, 0, frame, curve, rmip_.view(), {}, 0, 1e30, false, hit, counters);
-      case TraversalMethod::kRmipOnMinmax:
-        return traverse_rmip(mesh, 0, frame, curve, mipmap_.view(), {}, 0, 1e30, false, hit, counters);
-      case TraversalMethod::kTfdm:
-        return traverse_tfdm(mesh, 0, frame, curve, mipmap_.view(), 0, 1e30, false, hit, counters);
+    if (!ray_curve_make(ray_frame_make(to_double(TracedCase::vector3(ray.O)), to_double(TracedCase::vector3(ray.D))),
+                        mesh.triangles[0], &curve)) {
+      return false;
     }
-    return traverse_chord(mesh, 0, curve, 0, 1e30, false, hit, counters);
+    const Prepared& p = prepared_.at(method);
+    return p.entry->traverse({mesh, 0, curve, 0, 1e30, false, {}, *counters}, p.table.view, hit);
   }
 
  private:
   TracedCase traced_;
-  Rmip rmip_;
-  MinmaxMipmap mipmap_;
+  std::map<DisplacementMethod, Prepared> prepared_;
 };
-
-class EveryTraversal : public testing::TestWithParam<TraversalMethodLabel> {};
 
 TEST_P(EveryTraversal, TakesAsLongAsAClampedMapIsLarge)
 {
@@ -204,14 +184,15 @@ TEST_P(EveryTraversal, TakesAsLongAsAClampedMapIsLarge)
     const oracle::Ray ray = ray_through(combination(1, target, 1, away), target);
     DisplacedHit hit, expected;
     TraversalCounters counters, others;
-    const bool found = wide.trace(GetParam().method, ray, &hit, &counters);
-    ASSERT_EQ(found, wide.trace(TraversalMethod::kTfdm, ray, &expected, &others)) << k;
+    const bool found = wide.trace(GetParam(), ray, &hit, &counters);
+    ASSERT_EQ(found, wide.trace(DisplacementMethod::tfdm, ray, &expected, &others)) << k;
     if (found) {
       EXPECT_NEAR(hit.t, expected.t, 1e-7) << k;
     }
     most = std::max(most, counters.bounds + counters.texels);
   }
-  std::cout << "[ figures  ] " << GetParam().name << ": at most " << most << " bounds and texels a ray\n";
+  std::cout << "[ figures  ] " << displacement_method_label(GetParam()) << ": at most " << most
+            << " bounds and texels a ray\n";
   // Along an edge there are 64 cells, and as many nodes and marches; the triangle has 1.3 · 10⁹ texels a side.
   EXPECT_LT(most, 3000u);
 }
@@ -226,16 +207,12 @@ TEST_P(EveryTraversal, IsGivenUpWhenNobodyWaits)
   const oracle::Ray ray = ray_through({-1, .1, .0009995}, {1, .27, .0009993});
   DisplacedHit hit;
   TraversalCounters counters;
-  EXPECT_FALSE(wide.trace(GetParam().method, ray, &hit, &counters, &stop));
+  EXPECT_FALSE(wide.trace(GetParam(), ray, &hit, &counters, &stop));
   EXPECT_TRUE(counters.stopped);
   EXPECT_LT(counters.bounds, 10000u);
 }
 
-INSTANTIATE_TEST_SUITE_P(Displacement, EveryTraversal, testing::ValuesIn(kTraversalMethods), [](const auto& each) {
-  std::string name(each.param.name);
-  std::replace(name.begin(), name.end(), '-', '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(Displacement, EveryTraversal, testing::ValuesIn(traversing_methods()), method_test_name);
 
 TEST(ChordTraversal, SkipsARowOfAMillionTilesThatItPassesOver)
 {
@@ -249,9 +226,9 @@ TEST(ChordTraversal, SkipsARowOfAMillionTilesThatItPassesOver)
   const WideTriangle wide(5e5, .5, map);
   DisplacedHit hit;
   TraversalCounters over, into;
-  EXPECT_FALSE(wide.trace(TraversalMethod::kChord, ray_through({-1, .1, 6e-4}, {1, .1001, 6e-4}), &hit, &over));
+  EXPECT_FALSE(wide.trace(DisplacementMethod::chord, ray_through({-1, .1, 6e-4}, {1, .1001, 6e-4}), &hit, &over));
   EXPECT_LT(over.bounds, 1000u);
-  EXPECT_TRUE(wide.trace(TraversalMethod::kChord, ray_through({-1, .4, 6e-4}, {1, .4001, 6e-4}), &hit, &into));
+  EXPECT_TRUE(wide.trace(DisplacementMethod::chord, ray_through({-1, .4, 6e-4}, {1, .4001, 6e-4}), &hit, &into));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "scene/load.h"
+#include "tests/support/displacement_methods.h"
 #include "tests/image/render_runs.h"
 
 namespace relief::test {
@@ -69,12 +70,12 @@ Scene displaced_example()
 TEST(DisplacementMethods, OfOneSurfaceGiveOnePicture)
 {
   const Scene scene = displaced_example();
-  const Rendered chord = render_displaced(scene, DisplacementMethod::kChord, 0);
+  const Rendered chord = render_displaced(scene, DisplacementMethod::chord, 0);
   EXPECT_EQ(chord.stats.displacement.method, "chord");
-  for (const DisplacementMethod method :
-       {DisplacementMethod::kRmip, DisplacementMethod::kMinmaxRmip, DisplacementMethod::kTfdm}) {
+  for (const DisplacementMethod method : traversing_methods()) {
+    if (method == DisplacementMethod::chord) continue;
     const Rendered other = render_displaced(scene, method, 0);
-    const std::string name(kDisplacementMethodLabels[static_cast<std::size_t>(method)]);
+    const std::string name(displacement_method_label(method));
     EXPECT_EQ(other.stats.displacement.method, name);
     const LayerDifference depth = layer_difference(other, chord, Aov::kDepth);
     EXPECT_LT(depth.mean_error, 1e-6 * depth.mean) << name;
@@ -94,16 +95,16 @@ TEST(DisplacementMethods, ThrowTheSameCaustic)
   const auto caustic_by = [&](DisplacementMethod method) {
     return render_displaced(scene, method, 0, Aov::kCaustic, 4);
   };
-  const Rendered chord = caustic_by(DisplacementMethod::kChord);
+  const Rendered chord = caustic_by(DisplacementMethod::chord);
   EXPECT_GT(chord.stats.caustics.stored, 0u);
-  for (const DisplacementMethod method : {DisplacementMethod::kRmip, DisplacementMethod::kMinmaxRmip,
-                                          DisplacementMethod::kTfdm, DisplacementMethod::kTessellate}) {
+  for (const DisplacementMethod method : kDisplacementMethods) {
+    if (method == DisplacementMethod::chord || method == DisplacementMethod::tessellate_grid) continue;
     const LayerDifference caustic = layer_difference(caustic_by(method), chord, Aov::kCaustic);
-    const std::string name(kDisplacementMethodLabels[static_cast<std::size_t>(method)]);
+    const std::string name(displacement_method_label(method));
     std::printf("%s: caustic differs by %.2g of its mean, its mean by %.2g\n", name.c_str(),
                 caustic.mean_error / caustic.mean, caustic.bias / caustic.mean);
     ASSERT_GT(caustic.mean, 0.0);
-    const bool same_surface = method != DisplacementMethod::kTessellate;
+    const bool same_surface = method != DisplacementMethod::tessellate;
     EXPECT_LT(caustic.mean_error, (same_surface ? 1e-3 : 0.5) * caustic.mean) << name;
     EXPECT_LT(std::abs(caustic.bias), 0.05 * caustic.mean) << name;
   }
@@ -114,15 +115,15 @@ TEST(DisplacementMethods, TessellationApproachesTheSurface)
   // At level 2 a map has 64 × 64 texels: 1.4 million triangles in all. A texel is then 3 cm on the ground and 1 cm on
   // the ball, seen from 6 m and more; at the horizon a pixel is many of them.
   const Scene scene = displaced_example();
-  const Rendered chord = render_displaced(scene, DisplacementMethod::kChord, 2);
-  for (const DisplacementMethod method : {DisplacementMethod::kTessellate, DisplacementMethod::kGrid}) {
+  const Rendered chord = render_displaced(scene, DisplacementMethod::chord, 2);
+  for (const DisplacementMethod method : {DisplacementMethod::tessellate, DisplacementMethod::tessellate_grid}) {
     const Rendered triangles = render_displaced(scene, method, 2);
     const LayerDifference depth = layer_difference(triangles, chord, Aov::kDepth);
     const LayerDifference beauty = layer_difference(triangles, chord, Aov::kBeauty);
     const LayerDifference normal = layer_difference(triangles, chord, Aov::kNormal);
     std::printf("%s: depth differs by %.2g of it, normals by %.2g, radiance by %.2g of the mean, its mean by %.2g\n",
-                kDisplacementMethodLabels[static_cast<std::size_t>(method)].data(), depth.mean_error / depth.mean,
-                normal.mean_error, beauty.mean_error / beauty.mean, beauty.bias / beauty.mean);
+                displacement_method_label(method).data(), depth.mean_error / depth.mean, normal.mean_error,
+                beauty.mean_error / beauty.mean, beauty.bias / beauty.mean);
     EXPECT_LT(depth.mean_error, 3e-3 * depth.mean);
     // Two facets a texel for one bilinear patch.
     EXPECT_LT(normal.mean_error, 0.03);
@@ -137,13 +138,13 @@ TEST(DisplacementMethods, DetailThatPixelsCannotShowIsHardlyMissed)
   Scene scene = displaced_example();
   for (DisplacementSettings& displacement : scene.displacements) displacement.scale *= 0.1f;
   constexpr float kAuto = -1;
-  const Rendered finest = render_displaced(scene, DisplacementMethod::kChord, 0);
-  for (const DisplacementMethod method : {DisplacementMethod::kChord, DisplacementMethod::kRmip}) {
+  const Rendered finest = render_displaced(scene, DisplacementMethod::chord, 0);
+  for (const DisplacementMethod method : {DisplacementMethod::chord, DisplacementMethod::rmip}) {
     const Rendered seen = render_displaced(scene, method, kAuto);
     const LayerDifference depth = layer_difference(seen, finest, Aov::kDepth);
     const LayerDifference beauty = layer_difference(seen, finest, Aov::kBeauty);
     std::printf("%s: depth differs by %.2g of it, radiance by %.2g of the mean, its mean by %.2g\n",
-                kDisplacementMethodLabels[static_cast<std::size_t>(method)].data(), depth.mean_error / depth.mean,
+                displacement_method_label(method).data(), depth.mean_error / depth.mean,
                 beauty.mean_error / beauty.mean, beauty.bias / beauty.mean);
     EXPECT_GT(depth.mean_error, 0.0);
     EXPECT_LT(depth.mean_error, 3e-3 * depth.mean);
@@ -154,9 +155,9 @@ TEST(DisplacementMethods, DetailThatPixelsCannotShowIsHardlyMissed)
 TEST(DisplacementMethods, AFractionalLevelIsAMixtureOfTwo)
 {
   const Scene scene = displaced_example();
-  const Rendered fine = render_displaced(scene, DisplacementMethod::kChord, 4);
-  const Rendered coarse = render_displaced(scene, DisplacementMethod::kChord, 5);
-  const Rendered between = render_displaced(scene, DisplacementMethod::kChord, 4.25f);
+  const Rendered fine = render_displaced(scene, DisplacementMethod::chord, 4);
+  const Rendered coarse = render_displaced(scene, DisplacementMethod::chord, 5);
+  const Rendered between = render_displaced(scene, DisplacementMethod::chord, 4.25f);
   // Of 16 samples a pixel exactly a quarter takes the coarser level (the dither is stratified), so first hits are
   // those of the one or the other.
   const double to_fine = layer_difference(between, fine, Aov::kDepth).mean_error;
@@ -169,7 +170,7 @@ TEST(DisplacementMethods, AFractionalLevelIsAMixtureOfTwo)
 TEST(DisplacementMethods, StepsOfCameraRaysAreAPartOfAll)
 {
   const Scene scene = displaced_example();
-  const Rendered chord = render_displaced(scene, DisplacementMethod::kChord, 0);
+  const Rendered chord = render_displaced(scene, DisplacementMethod::chord, 0);
   const ImageView steps = film_layer(chord.image.view, Aov::kDisplacementSteps);
   double sum = 0;
   for (int y = 0; y < steps.height; ++y) {

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "integrator/trace.h"
+#include "tests/support/displacement_methods.h"
 #include "tests/support/scene_builder.h"
 
 namespace relief::test {
@@ -42,9 +43,9 @@ TEST(DisplacedInstance, SharesOneStructureWithAThousandOthers)
   transforms.reserve(1000);
   for (int k = 0; k < 1000; ++k)
     transforms.push_back({{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {3.0f * static_cast<float>(k), 0, 0}});
-  const Scene one = instances_of_a_sphere({transforms[0]}, DisplacementMethod::kChord);
-  const Scene thousand = instances_of_a_sphere(transforms, DisplacementMethod::kChord);
-  const DisplacementSet set_of_one(one, {}), set_of_thousand(thousand, {});
+  const Scene one = instances_of_a_sphere({transforms[0]}, DisplacementMethod::chord);
+  const Scene thousand = instances_of_a_sphere(transforms, DisplacementMethod::chord);
+  const DisplacementSet set_of_one = scene_displacement(one, {}), set_of_thousand = scene_displacement(thousand, {});
   EXPECT_EQ(set_of_thousand.size(), 1u);
   EXPECT_EQ(set_of_thousand.bytes(), set_of_one.bytes());
   EXPECT_EQ(set_of_thousand.num_triangles(), set_of_one.num_triangles());
@@ -97,11 +98,10 @@ TEST_P(DisplacedInstances, AreMetWhereTheirTransformsPutThem)
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Methods,
-    DisplacedInstances,
-    testing::Values(DisplacementMethod::kChord, DisplacementMethod::kRmip, DisplacementMethod::kTfdm),
-    [](const auto& method) { return std::string(kDisplacementMethodLabels[static_cast<std::size_t>(method.param)]); });
+INSTANTIATE_TEST_SUITE_P(Methods,
+                         DisplacedInstances,
+                         testing::ValuesIn(traversing_methods()),
+                         method_test_name);
 
 }  // namespace
 }  // namespace relief::test

@@ -70,30 +70,30 @@ TEST(LevelOfDetail, OfShadowRaysIsThatOfTheSurfaceTheyLeave)
 TEST(LevelOfDetail, OfAHitIsWhatLeavingRaysStartWith)
 {
   const Scene scene = noisy_plane(0.003f);
-  DisplacementSet displacements(scene, {});
+  DisplacementSet displacements = scene_displacement(scene, {});
   const int num_levels = displacements.geometry(0).lod.num_levels;
   ASSERT_GT(num_levels, 1);
   const float texel = displacements.texels()[0];
   for (int level = 0; level < num_levels; ++level) {
-    const DisplacedPoint point = displacements.point(0, {}, 0, 0.2f, 0.3f, static_cast<float>(level));
+    const DisplacedPoint point = displacements.resolve(0, {}, 0, {0.2f, 0.3f, static_cast<float>(level)});
     EXPECT_EQ(point.width, lod_width_of_level(texel, level));
   }
 }
 
 TEST(LevelOfDetail, IsTheFinestWhereSlopesAreThePicture)
 {
-  EXPECT_FALSE(DisplacementSet(noisy_plane(0.03f), {}).has_levels());
+  EXPECT_FALSE(scene_displacement(noisy_plane(0.03f), {}).has_levels());
   // Half a pixel: a few spikes have little slope on the mean.
   Scene spikes = noisy_plane(0.1f);
   auto texels = std::make_shared<std::vector<std::uint16_t>>(512 * 512);
   for (std::size_t k = 0; k < texels->size(); k += 32'000) (*texels)[k] = 65535;
   spikes.height_maps[0].texels = std::shared_ptr<const void>(texels, texels->data());
-  EXPECT_FALSE(DisplacementSet(spikes, {}).has_levels());
+  EXPECT_FALSE(scene_displacement(spikes, {}).has_levels());
 }
 
 TEST(LevelOfDetail, OfAnUnevenInstanceIsThatOfItsSteepestSlopes)
 {
-  const auto num_levels = [](const Scene& scene) { return DisplacementSet(scene, {}).geometry(0).lod.num_levels; };
+  const auto num_levels = [](const Scene& scene) { return scene_displacement(scene, {}).geometry(0).lod.num_levels; };
   Scene gentle = noisy_plane(0.001f), steep = noisy_plane(0.004f);
   ASSERT_GT(num_levels(gentle), 1);
   ASSERT_EQ(num_levels(steep), 1);
@@ -130,24 +130,24 @@ TEST(LevelOfDetail, KnowsTheLeastOfAnyStretches)
     for (const Affine3& transform : transforms) {
       Scene gentle = noisy_plane(0.001f / most), steep = noisy_plane(0.004f / most);
       gentle.instances[0].world_from_object = steep.instances[0].world_from_object = transform;
-      EXPECT_GT(DisplacementSet(gentle, {}).geometry(0).lod.num_levels, 1) << most;
-      EXPECT_EQ(DisplacementSet(steep, {}).geometry(0).lod.num_levels, 1) << most;
+      EXPECT_GT(scene_displacement(gentle, {}).geometry(0).lod.num_levels, 1) << most;
+      EXPECT_EQ(scene_displacement(steep, {}).geometry(0).lod.num_levels, 1) << most;
     }
   }
   Scene line = noisy_plane(0.001f);
   line.instances[0].world_from_object = {{1, 0, 0}, {0, 0, 0}, {0, 0, 0}, {}};
-  EXPECT_EQ(DisplacementSet(line, {}).geometry(0).lod.num_levels, 1);
+  EXPECT_EQ(scene_displacement(line, {}).geometry(0).lod.num_levels, 1);
 }
 
 TEST(LevelOfDetail, AsksForTexelsAsAnInstanceStretchesThemAtMost)
 {
   Scene scene = noisy_plane(0.001f);
-  const float texel = DisplacementSet(scene, {}).texels()[0];
+  const float texel = scene_displacement(scene, {}).texels()[0];
   scene.instances[0].world_from_object = {{0, 0, 300}, {300, 0, 0}, {0, -300, 0}, {1, 2, 3}};
-  EXPECT_FLOAT_EQ(DisplacementSet(scene, {}).texels()[0], 300 * texel);
+  EXPECT_FLOAT_EQ(scene_displacement(scene, {}).texels()[0], 300 * texel);
   // The columns' lengths are 1, 3.88 and 1.
   scene.instances[0].world_from_object = {{1, 0, 0}, {3.75f, 1, 0}, {0, 0, 1}, {}};
-  EXPECT_FLOAT_EQ(DisplacementSet(scene, {}).texels()[0], 4 * texel);
+  EXPECT_FLOAT_EQ(scene_displacement(scene, {}).texels()[0], 4 * texel);
 }
 
 TEST(LevelOfDetail, ChangesThePictureByNoMoreThanItsTolerance)

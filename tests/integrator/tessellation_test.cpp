@@ -3,6 +3,7 @@
 #include <string>
 #include <utility>
 
+#include "displacement/cost_model.h"
 #include "integrator/trace.h"
 #include "kernel/shape/surface_hit.h"
 #include "tests/support/render_scene.h"
@@ -66,15 +67,15 @@ DisplacementOptions options_of(DisplacementMethod method, double rate)
 class TessellatedBy : public testing::TestWithParam<DisplacementMethod> {};
 INSTANTIATE_TEST_SUITE_P(Methods,
                          TessellatedBy,
-                         testing::Values(DisplacementMethod::kTessellate, DisplacementMethod::kGrid),
+                         testing::Values(DisplacementMethod::tessellate, DisplacementMethod::tessellate_grid),
                          [](const auto& method) {
-                           return method.param == DisplacementMethod::kGrid ? "Grids" : "Triangles";
+                           return method.param == DisplacementMethod::tessellate_grid ? "Grids" : "Triangles";
                          });
 
 TEST_P(TessellatedBy, HitsAreThoseOfTheExactMethod)
 {
   const Scene scene = displaced_scene(AlphaMode::kOpaque);
-  const SceneContext exact(scene, options_of(DisplacementMethod::kChord, 1));
+  const SceneContext exact(scene, options_of(DisplacementMethod::chord, 1));
   const SceneContext tessellated(scene, options_of(GetParam(), 4));
   const std::vector<TraceRay> rays = random_rays(20'000);
   const std::vector<TraceHit> expected = trace_rays(exact, rays), found = trace_rays(tessellated, rays);
@@ -116,8 +117,8 @@ TEST_P(TessellatedBy, LeavingRaysDoNotComeBack)
   for (const TraceHit& h : trace_rays(context, random_rays(20'000))) {
     if (!h.hit || h.instance_index != 0) continue;
     const Affine3& inverse = context.instances[0].object_from_world;
-    SurfaceHit surface = surface_hit_make(context.meshes[0], context.instances[0], h.triangle_index, h.u, h.v);
-    surface_hit_displace(&surface, context.instances[0], transform_point(inverse, h.P), {0, 0, 1}, {0, 0, 1}, {});
+    const SurfaceHit surface = surface_hit_displaced(context.meshes[0], context.instances[0], h.triangle_index, h.u,
+                                                     h.v, {transform_point(inverse, h.P), {0, 0, 1}, {0, 0, 1}, {}});
     // A facet is a fortieth of a unit long; what lies nearer than a fiftieth of that is the facet itself.
     const Vec3f D = normalize(h.Ng + 0.7f * Vec3f{uniform(random), uniform(random), uniform(random)});
     if (dot(D, h.Ng) <= 0) continue;
@@ -134,7 +135,7 @@ TEST_P(TessellatedBy, RendersTheSameImage)
 {
   for (const AlphaMode alpha_mode : {AlphaMode::kOpaque, AlphaMode::kBlend}) {
     Scene scene = displaced_scene(alpha_mode);
-    scene.displacements[0].method = DisplacementMethod::kChord;
+    scene.displacements[0].method = DisplacementMethod::chord;
     const Estimate exact = estimate_mean(scene, render_options(scene, 64, 16), 6);
     scene.displacements[0].method = GetParam();
     const Estimate tessellated = estimate_mean(scene, render_options(scene, 64, 16), 6);
@@ -177,7 +178,7 @@ TEST(AutomaticDisplacement, TessellatesWhereThatSavesTimeWithinItsAllowance)
   EXPECT_EQ(method(1000, kAmple), "chord");
   // Without an allowance nothing is built, and one too small for triangles may do for grids.
   EXPECT_EQ(method(1e9, 0), "chord");
-  SceneContext context(scene, options_of(DisplacementMethod::kChord, 1));
+  SceneContext context(scene, options_of(DisplacementMethod::chord, 1));
   const DisplacedMeshView mesh = context.displacements.geometry(0).mesh;
   const auto peak = [&](TessellationKind kind) {
     return tessellation_peak_bytes(tessellation_layout_make(mesh, kind, 1), kRenderTessellation);
@@ -191,28 +192,24 @@ TEST(AutomaticDisplacement, TessellatesWhereThatSavesTimeWithinItsAllowance)
 
 TEST(AutomaticDisplacement, ChoosesTheLeastOfTheSumsThatItNames)
 {
-  const DisplacementCosts costs{1000, {300, 50, 500}, {400, 50, 100}};
-  TessellationLayout triangles, grids;
-  triangles.num_micro_triangles = triangles.num_primitives = 4u << 20;
-  triangles.num_vertices = 2u << 20;
-  grids = triangles;
-  grids.kind = TessellationKind::kGrids;
-  constexpr std::uint64_t kAmple = std::uint64_t{1} << 40;
+  constexpr std::uint64_t kCount = 4u << 20, kBytes = 1u << 20, kAmple = std::uint64_t{1} << 40;
+  using M = DisplacementMethod;
+  const MethodOffer offers[] = {{M::chord, {1000, 0, 0}, 0, 0},
+                                {M::tessellate, {300, 50, 500}, kCount, kBytes},
+                                {M::tessellate_grid, {400, 50, 100}, kCount, kBytes}};
   // 4 Mi micro-triangles: (300 + 2·50) ns a ray and 2.1 s, or 500 ns and 0.42 s, against 1000 ns.
-  EXPECT_NEAR(exact_seconds(costs, 1e6), 1, 1e-9);
-  EXPECT_NEAR(tessellation_seconds(costs.triangles, 4u << 20, 1e6), 0.4 + 2.097152, 1e-9);
-  EXPECT_NEAR(tessellation_seconds(costs.grids, 4u << 20, 1e6), 0.5 + 0.4194304, 1e-9);
-  const DisplacementChoice few = displacement_choose(costs, triangles, grids, 5e5, kAmple);
-  EXPECT_FALSE(few.tessellates);
-  EXPECT_EQ(few.reason.rfind("0.5 s by chord against 2.3 s by tessellate (", 0), 0u) << few.reason;
-  const DisplacementChoice some = displacement_choose(costs, triangles, grids, 1e6, kAmple);
-  EXPECT_TRUE(some.tessellates);
-  EXPECT_EQ(some.kind, TessellationKind::kGrids);
+  EXPECT_NEAR(method_seconds(offers[0].cost, 0, 1e6), 1, 1e-9);
+  EXPECT_NEAR(method_seconds(offers[1].cost, kCount, 1e6), 0.4 + 2.097152, 1e-9);
+  EXPECT_NEAR(method_seconds(offers[2].cost, kCount, 1e6), 0.5 + 0.4194304, 1e-9);
+  const DisplacementChoice few = displacement_choose(offers, 5e5, kAmple);
+  EXPECT_EQ(few.method, M::chord);
+  EXPECT_EQ(few.reason, "0.5 s by chord against 2.3 s by tessellate (1 MiB) against 0.67 s by tessellate-grid (1 MiB)");
+  EXPECT_EQ(displacement_choose(offers, 1e6, kAmple).method, M::tessellate_grid);
   // From 17 million rays on triangles repay their tree.
-  EXPECT_EQ(displacement_choose(costs, triangles, grids, 1.6e7, kAmple).kind, TessellationKind::kGrids);
-  EXPECT_EQ(displacement_choose(costs, triangles, grids, 1.8e7, kAmple).kind, TessellationKind::kTriangles);
-  EXPECT_FALSE(displacement_choose(costs, triangles, grids, 1e9, 1000).tessellates);
-  EXPECT_NE(displacement_choose(costs, triangles, grids, 1e9, 1000).reason.find("too large"), std::string::npos);
+  EXPECT_EQ(displacement_choose(offers, 1.6e7, kAmple).method, M::tessellate_grid);
+  EXPECT_EQ(displacement_choose(offers, 1.8e7, kAmple).method, M::tessellate);
+  EXPECT_EQ(displacement_choose(offers, 1e9, 1000).method, M::chord);
+  EXPECT_NE(displacement_choose(offers, 1e9, 1000).reason.find("too large"), std::string::npos);
 }
 
 }  // namespace

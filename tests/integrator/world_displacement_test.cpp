@@ -9,6 +9,7 @@
 #include "integrator/trace.h"
 #include "scene/load.h"
 #include "scene/world_displacement.h"
+#include "tests/support/displacement_methods.h"
 #include "tests/support/gltf_builder.h"
 #include "tests/support/scene_builder.h"
 
@@ -120,15 +121,14 @@ TEST_P(WorldDisplacement, MovesAlongTheWorldsNormalByItsMetres)
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Methods,
-    WorldDisplacement,
-    testing::Values(DisplacementMethod::kChord, DisplacementMethod::kRmip, DisplacementMethod::kTfdm),
-    [](const auto& method) { return std::string(kDisplacementMethodLabels[static_cast<std::size_t>(method.param)]); });
+INSTANTIATE_TEST_SUITE_P(Methods,
+                         WorldDisplacement,
+                         testing::ValuesIn(traversing_methods()),
+                         method_test_name);
 
 TEST(WorldDisplacementMeshes, AreSharedUnderOneMapAndUnderSimilarities)
 {
-  Scene scene = sphere_in_world_space({{1, 0, 0}, {0, 1, 0}, {0, 0, 3}, {}}, DisplacementMethod::kChord);
+  Scene scene = sphere_in_world_space({{1, 0, 0}, {0, 1, 0}, {0, 0, 3}, {}}, DisplacementMethod::chord);
   ASSERT_EQ(scene.meshes.size(), 2u);
   const Instance placed = scene.instances[0];
   EXPECT_EQ(placed.mesh_index, 1);
@@ -157,7 +157,7 @@ TEST(WorldDisplacementMeshes, NormalsOfTheFlattestMapsAreFinite)
                                      {{1e18f, 0, 0}, {0, 2e18f, 0}, {0, 0, 3e18f}, {}}}};
   for (const Affine3& m : maps) {
     SCOPED_TRACE(testing::Message() << m.x.x << ' ' << m.y.y << ' ' << m.z.z);
-    const Scene scene = sphere_in_world_space(m, DisplacementMethod::kChord);
+    const Scene scene = sphere_in_world_space(m, DisplacementMethod::chord);
     const Instance& instance = scene.instances[0];
     ASSERT_EQ(instance.mesh_index, 1);
     const float sign = instance.world_from_object.x.x;
@@ -177,7 +177,7 @@ TEST(WorldDisplacementOfTheSmallest, IsItsMetres)
 {
   constexpr float kScale = 1e-15f;
   const Scene scene =
-      sphere_in_world_space({{kScale, 0, 0}, {0, kScale, 0}, {0, 0, kScale}, {}}, DisplacementMethod::kChord);
+      sphere_in_world_space({{kScale, 0, 0}, {0, kScale, 0}, {0, 0, kScale}, {}}, DisplacementMethod::chord);
   const SceneContext context(scene, {});
   const TraceRay ray{{0.1f, 0.05f, 5}, {-0.1f, -0.05f, -5}, 0, kInfinity};
   const std::vector<TraceHit> hits = trace_rays(context, {&ray, 1});

@@ -7,7 +7,6 @@
 
 #include "kernel/texture/texture.h"
 #include "scene/displaced_mesh.h"
-#include "scene/displacement_seams.h"
 #include "scene/texture_store.h"
 #include "tests/support/loaded_scene.h"
 
@@ -59,7 +58,7 @@ TEST(Displacement, IsRead)
   EXPECT_EQ(d.scale, -0.25f);
   EXPECT_EQ(d.midlevel, 0.1f);
   EXPECT_EQ(d.space, DisplacementSpace::kWorld);
-  EXPECT_EQ(d.method, DisplacementMethod::kTfdm);
+  EXPECT_EQ(d.method, DisplacementMethod::tfdm);
   EXPECT_EQ(d.lod, 2);
   EXPECT_EQ(DisplacementSettings{}.lod, 0);
   EXPECT_TRUE(d.smoothing);
@@ -69,14 +68,10 @@ TEST(Displacement, IsRead)
 
 TEST(Displacement, EveryMethodHasItsName)
 {
-  using M = DisplacementMethod;
-  const std::pair<const char*, M> methods[] = {{"auto", M::kAuto},           {"rmip", M::kRmip},
-                                               {"tfdm", M::kTfdm},           {"tessellate", M::kTessellate},
-                                               {"chord", M::kChord},         {"rmip-minmax", M::kMinmaxRmip},
-                                               {"cone", M::kCone},           {"microtriangle", M::kMicrotriangle},
-                                               {"tessellate-grid", M::kGrid}};
-  for (const auto& [name, method] : methods) {
-    EXPECT_EQ(settings(load(square_displaced({{"heightTexture", {{"index", 0}}}, {"method", name}}))).method, method)
+  for (std::size_t k = 0; k < std::size(kDisplacementMethodLabels); ++k) {
+    const std::string name(kDisplacementMethodLabels[k]);
+    EXPECT_EQ(settings(load(square_displaced({{"heightTexture", {{"index", 0}}}, {"method", name}}))).method,
+              static_cast<DisplacementMethod>(k))
         << name;
   }
 }
@@ -469,176 +464,6 @@ TEST(DisplacedMesh, WeldingFindsTheFirstOfEqualPositions)
   const std::vector<Vec3f> P = {{1, 2, 3}, {0, 0, 0}, {1, 2, 3}, {-0.0f, 0, 0}, {1, 2, 4}};
   EXPECT_EQ(weld_positions(P), (std::vector<std::uint32_t>{0, 1, 0, 1, 4}));
   EXPECT_TRUE(weld_positions({}).empty());
-}
-
-// --- seams ---
-
-/// Two triangles of the unit square, split along the diagonal, over the map h = texel column / (width − 1).
-struct SeamCase {
-  static constexpr int kWidth = 64;
-
-  SeamCase()
-  {
-    mesh.P = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 0, 0}, {1, 1, 0}, {0, 1, 0}};
-    mesh.uv[0] = {{0, 0}, {1, 0}, {1, 1}, {0, 0}, {1, 1}, {0, 1}};
-    mesh.triangles = {{0, 1, 2}, {3, 4, 5}};
-    for (int x = 0; x < kWidth; ++x) {
-      texels.push_back(static_cast<float>(x) / (kWidth - 1));
-    }
-    settings.scale = -2;
-  }
-
-  void move_second_triangle(Vec2f by)
-  {
-    for (std::size_t i = 3; i < 6; ++i) {
-      mesh.uv[0][i] = mesh.uv[0][i] + by;
-    }
-  }
-
-  DisplacementSeams find(Wrap wrap) const
-  {
-    const HeightMapView map{texels.data(), kWidth, 1, HeightFormat::kFloat, wrap, wrap};
-    return displacement_seams(mesh, settings, map, height_map_range(map));
-  }
-
-  Mesh mesh;
-  std::vector<float> texels;
-  DisplacementSettings settings;
-};
-
-TEST(DisplacementSeams, EqualCoordinatesHaveNone)
-{
-  const SeamCase seam;
-  const DisplacementSeams found = seam.find(Wrap::kRepeat);
-  EXPECT_EQ(found.all.num_edges, 0u);
-  EXPECT_EQ(found.all.length, 0);
-  EXPECT_EQ(found.all.largest_gap, 0);
-}
-
-// Moved by whole tiles, also along v, where the map is constant.
-TEST(DisplacementSeams, WholeTilesApartAreTheSameUnderRepeat)
-{
-  SeamCase seam;
-  seam.move_second_triangle({1000, -3.25f});
-  EXPECT_EQ(seam.find(Wrap::kRepeat).all.num_edges, 0u);
-  // Mirrored, even tiles agree.
-  EXPECT_EQ(seam.find(Wrap::kMirror).all.num_edges, 0u);
-  seam.move_second_triangle({1, 0});
-  EXPECT_EQ(seam.find(Wrap::kRepeat).all.num_edges, 0u);
-  EXPECT_EQ(seam.find(Wrap::kMirror).all.num_edges, 1u);
-}
-
-// Under clamping the sides of the diagonal ask for h(u) and h(u + ¼). With x = 64 u − ½ clamped to 0…63 the heights are
-// x / 63: 16/63 apart where neither is clamped, and equal nowhere but at the very end.
-TEST(DisplacementSeams, AShiftedSideOpensAGapOfTheRampsRise)
-{
-  SeamCase seam;
-  seam.move_second_triangle({0.25f, 0});
-  const DisplacementSeams found = seam.find(Wrap::kClamp);
-  EXPECT_EQ(found.all.num_edges, 1u);
-  EXPECT_NEAR(found.all.largest_gap, 2 * 16.0 / 63, 1e-6);
-  // The last half texel of 64 is clamped on both sides; one of its points lies in it.
-  EXPECT_NEAR(found.all.length, std::sqrt(2.0) * (1 - 0.5 / 64), std::sqrt(2.0) / 100);
-}
-
-TEST(DisplacementSeams, TheTransformTakesPart)
-{
-  SeamCase seam;
-  seam.move_second_triangle({0.25f, 0});
-  seam.settings.height.m00 = 4;
-  EXPECT_EQ(seam.find(Wrap::kRepeat).all.num_edges, 0u);
-}
-
-// The diagonal shared by index has no seam, whatever the other edges do.
-TEST(DisplacementSeams, OpenBordersAreNoSeams)
-{
-  SeamCase seam;
-  seam.mesh.triangles = {{0, 1, 2}};
-  EXPECT_EQ(seam.find(Wrap::kClamp).all.num_edges, 0u);
-}
-
-// Three triangles on one edge: the gap is that of the two farthest apart.
-TEST(DisplacementSeams, EdgesOfManyTrianglesTakeTheWidestGap)
-{
-  SeamCase seam;
-  seam.mesh.P.insert(seam.mesh.P.end(), {{1, 1, 0}, {0, 0, 0}, {0, 0, 1}});
-  seam.mesh.uv[0].insert(seam.mesh.uv[0].end(), {{1.125f, 1}, {0.125f, 0}, {0, 0}});
-  seam.mesh.triangles.push_back({6, 7, 8});
-  EXPECT_NEAR(seam.find(Wrap::kClamp).all.largest_gap, 2 * 8.0 / 63, 1e-6);
-  seam.move_second_triangle({0.25f, 0});
-  EXPECT_NEAR(seam.find(Wrap::kClamp).all.largest_gap, 2 * 16.0 / 63, 1e-6);
-  EXPECT_EQ(seam.find(Wrap::kClamp).all.num_edges, 1u);
-}
-
-// With as many tiles as an edge has points, or a multiple, points at equal distances would all fall on one texel: here on the
-// first and the last of the map, 1 − 1/63 apart where half the points of the other side are.
-TEST(DisplacementSeams, TilesInStepWithThePointsAreSeen)
-{
-  SeamCase seam;
-  for (std::size_t i = 0; i < 6; ++i) {
-    seam.mesh.uv[0][i] = 4096.0f * seam.mesh.uv[0][i];
-  }
-  seam.move_second_triangle({0.5f, 0});
-  const DisplacementSeams found = seam.find(Wrap::kRepeat);
-  EXPECT_GT(found.all.largest_gap, 0.9);
-  EXPECT_GT(found.all.length, 0.95 * std::sqrt(2.0));
-}
-
-// 20,000 triangles of their own texture coordinates, thousands of tiles each: every edge wants its 4096 points, 120 million in
-// all, which took ten seconds. The figures of a share of them are those of all but for the largest gap.
-TEST(DisplacementSeams, ManyTilesOnManyTrianglesAreEstimatedAtOnce)
-{
-  constexpr int kSide = 100;
-  SeamCase seam;
-  seam.mesh = {};
-  for (int i = 0; i < kSide * kSide; ++i) {
-    const auto x = static_cast<float>(i % kSide), y = static_cast<float>(i / kSide);
-    for (const bool upper : {false, true}) {
-      const auto first = static_cast<std::uint32_t>(seam.mesh.P.size());
-      seam.mesh.P.insert(seam.mesh.P.end(),
-                         {{x, y, 0}, {x + 1, y + 1, 0}, upper ? Vec3f{x, y + 1, 0} : Vec3f{x + 1, y, 0}});
-      seam.mesh.uv[0].insert(seam.mesh.uv[0].end(), {{0, 0}, {3000.3f, 0}, {0, 3000.7f}});
-      seam.mesh.triangles.push_back({first, first + 1, first + 2});
-    }
-  }
-  // On the diagonals both sides have the same coordinates.
-  const DisplacementSeams found = seam.find(Wrap::kRepeat);
-  constexpr std::size_t kSeams = 2 * kSide * (kSide - 1);
-  EXPECT_EQ(found.all.num_edges, kSeams);
-  EXPECT_NEAR(found.all.length, kSeams, 0.05 * kSeams);
-  // Along v the map is constant: at u = 0 it has the mean of its ends, ½.
-  EXPECT_NEAR(found.all.largest_gap, 1, 0.05);
-  // Four million, and what rounding up adds.
-  EXPECT_LE(found.num_points, (std::size_t{1} << 22) + kSeams);
-}
-
-// What welding does not close.
-TEST(DisplacementSeams, SplitNormalsAreCountedApart)
-{
-  SeamCase seam;
-  seam.move_second_triangle({0.25f, 0});
-  EXPECT_EQ(seam.find(Wrap::kClamp).split.num_edges, 1u) << "without normals triangles move along their own";
-  seam.mesh.N.assign(6, {0, 0, 1});
-  EXPECT_EQ(seam.find(Wrap::kClamp).split.num_edges, 0u);
-  seam.mesh.N[3] = {0, 0.6f, 0.8f};
-  const DisplacementSeams found = seam.find(Wrap::kClamp);
-  EXPECT_EQ(found.split.num_edges, 1u);
-  EXPECT_EQ(found.split.length, found.all.length);
-}
-
-TEST(DisplacementSeams, ConstantMapsHaveNone)
-{
-  SeamCase seam;
-  std::fill(seam.texels.begin(), seam.texels.end(), 0.3f);
-  seam.move_second_triangle({0.3f, 0.1f});
-  EXPECT_EQ(seam.find(Wrap::kClamp).all.num_edges, 0u);
-}
-
-TEST(DisplacementSeams, WithoutCoordinatesThereIsNothingToCompare)
-{
-  SeamCase seam;
-  seam.mesh.uv[0].clear();
-  EXPECT_EQ(seam.find(Wrap::kRepeat).all.num_edges, 0u);
 }
 
 }  // namespace

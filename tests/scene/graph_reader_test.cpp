@@ -305,6 +305,15 @@ json many(std::size_t count)
   return graph;
 }
 
+json circle(std::size_t count)
+{
+  json nodes = json::array();
+  for (std::size_t i = 0; i < count; ++i) {
+    nodes.push_back({{"type", "math"}, {"inputs", {{"a", of((i + 1) % count)}}}});
+  }
+  return {{"nodes", nodes}, {"outputs", json::object()}};
+}
+
 std::vector<BrokenGraph> broken_graphs()
 {
   const json table8 = {0, 0, 0, 1, 1, 1, 1, 1};
@@ -418,15 +427,7 @@ std::vector<BrokenGraph> broken_graphs()
       {"65,537 nodes", many(65'537), "/nodes", "at most 65536, found 65537"},
       {"a million nodes", many(1'000'000), "/nodes", "at most 65536, found 1000000"},
       {"1,400 values at a time", all_alive(1400), "", "one that needs at most 512 values at a time"},
-      {"sixty thousand in a circle",
-       [] {
-         json nodes = json::array();
-         for (std::size_t i = 0; i < 60'000; ++i) {
-           nodes.push_back({{"type", "math"}, {"inputs", {{"a", of((i + 1) % 60'000)}}}});
-         }
-         return json{{"nodes", nodes}, {"outputs", json::object()}};
-       }(),
-       "/nodes/0/inputs", "nodes without a cycle"},
+      {"sixty thousand in a circle", circle(60'000), "/nodes/0/inputs", "nodes without a cycle"},
   };
 }
 

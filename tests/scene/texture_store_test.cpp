@@ -174,7 +174,7 @@ TEST_P(TextureFormats, TexelsAreTheFilesValues)
     ASSERT_EQ(view.height, 11);
     ASSERT_EQ(view.num_channels, format.num_channels);
     ASSERT_EQ(view.format, format.expected);
-    EXPECT_TRUE(loaded.warnings.empty());
+    EXPECT_TRUE(loaded.warnings.texts().empty());
     for (int y = 0; y < image.height; ++y) {
       for (int x = 0; x < image.width; ++x) {
         for (int c = 0; c < image.num_channels; ++c) {

@@ -337,6 +337,12 @@ class Docs(unittest.TestCase):
             self.assertEqual(setting["default"], shown, f"default of {name}")
             self.assertEqual(setting["range"], range_of(allowed), f"range of {name}")
 
+    def test_methods_are_documented_as_they_are_listed(self):
+        declared = json.loads((ROOT / "blender_addon" / "relief" / "declared.json").read_text(encoding="utf-8"))
+        text = (ROOT / "docs" / "scene_format.md").read_text(encoding="utf-8")
+        rows = re.search(r"\| `method` \| meaning \|\n\|[ |-]+\n((?:\|.*\n)+)", text)[1]
+        self.assertEqual([method["name"] for method in declared["methods"]], re.findall(r"^\| `([\w-]+)` \|", rows, re.MULTILINE))
+
     def test_links_lead_somewhere(self):
         wrong = []
         for path in PAGES:

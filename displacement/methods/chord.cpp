@@ -5,15 +5,13 @@
 // a chord, in both lattice coordinates and in height. Every rectangle and height interval is widened by that, so no cell
 // is passed over; the leaf test is done on the curve itself. Eight chords, and eight children, are tested side by side.
 //
-// Reading order: traverse_chord, segment_intersect, chords_intersect, chord_intersect, node_intersect.
-#pragma once
-
+// Reading order: traverse, segment_intersect, chords_intersect, chord_intersect, node_intersect.
 #include "displacement/lanes.h"
-#include "displacement/leaf.h"
+#include "displacement/method.h"
 
 namespace relief {
 
-namespace chord_detail {
+namespace {
 
 /// Rounding of a few float operations in sequence on numbers up to the one it is multiplied with.
 inline constexpr float kFloatSlack = 0x1p-20f;
@@ -49,13 +47,7 @@ struct Chord {
   double tau0, dtau;  ///< τ = tau0 + u·dtau
 };
 
-struct Search {
-  const DisplacedMeshView& mesh;
-  const DisplacedTriangle& tri;
-  const RayCurve& curve;
-  TraversalCounters& counters;
-  DisplacedHit& hit;
-  double t_min, t_max;                 ///< t_max shrinks with every hit
+struct ChordSearch : PrismSearch {
   double q_per_metre = 1, q_zero = 0;  ///< stored height = q_zero + q_per_metre · displacement
   float q_pad = 0;                     ///< and this much more or less
   const CurveSegment* segment = nullptr;
@@ -64,9 +56,6 @@ struct Search {
   float long_x = 0, long_y = 0;  ///< chords are split while they are longer
   int max_long_splits = 0;       ///< after which none is
   double tau_end = 1;            ///< nothing beyond matters: a hit is known there
-  bool unfolded = true, any_hit = false;
-  bool found = false;
-  std::uint64_t next_poll = counters.bounds + kBoundsAPoll;
 };
 
 /// Heights of five texels in a row, stored units; the other lanes are anything.
@@ -101,16 +90,18 @@ RELIEF_KERNEL F8 row_heights(const HeightFieldView& f, std::int64_t i, std::int6
 }
 
 /// @return  true when the search is over
-RELIEF_KERNEL bool cell_intersect(Search& c, const Chord& chord, std::int64_t i, std::int64_t j, float u0, float u1)
+RELIEF_KERNEL bool cell_on_chord_intersect(ChordSearch& c,
+                                           const Chord& chord,
+                                           std::int64_t i,
+                                           std::int64_t j,
+                                           float u0,
+                                           float u1)
 {
   const auto tau_at = [&](double u) { return chord.tau0 + u * chord.dtau; };
-  const double tau0 = max(0.0, tau_at(static_cast<double>(u0) - kParameterSlack));
-  const double tau1 = min(1.0, tau_at(static_cast<double>(u1) + kParameterSlack));
-  ++c.counters.texels;
-  if (!leaf_intersect(c.mesh, c.tri, c.curve, *c.segment, i, j, tau0, tau1, c.t_min, c.t_max, c.unfolded, &c.hit))
+  if (!cell_intersect(c, *c.segment, i, j, tau_at(static_cast<double>(u0) - kParameterSlack),
+                      tau_at(static_cast<double>(u1) + kParameterSlack))) {
     return false;
-  c.found = true;
-  c.t_max = c.hit.t;
+  }
   if (c.unfolded) c.tau_end = c.hit.tau;
   return c.any_hit;
 }
@@ -145,10 +136,26 @@ RELIEF_KERNEL void prefetch_cells(const HeightFieldView& f, std::int64_t i, std:
   }
 }
 
+/// Children that are met, nearest first: they are few.
+/// @param hits   bit by child
+/// @param entry  where the chord enters each
+/// @return       how many
+RELIEF_KERNEL int order_by_entry(unsigned hits, const float* entry, int* order)
+{
+  int count = 0;
+  for (; hits != 0; hits &= hits - 1) {
+    const int child = __builtin_ctz(hits);
+    int k = count++;
+    for (; k > 0 && entry[order[k - 1]] > entry[child]; --k) order[k] = order[k - 1];
+    order[k] = child;
+  }
+  return count;
+}
+
 /// Descends from one node.
 /// @param period_x, period_y  lattice coordinates of pyramid column and row 0 of this period
 /// @return true when the search is over
-RELIEF_KERNEL bool node_intersect(Search& c,
+RELIEF_KERNEL bool node_intersect(ChordSearch& c,
                                   const Chord& chord,
                                   const Node& root,
                                   std::int64_t period_x,
@@ -242,20 +249,14 @@ RELIEF_KERNEL bool node_intersect(Search& c,
       store8(entry + 8 * half, u_in);
       store8(exit + 8 * half, u_out);
     }
-    // Nearest first: the survivors are few.
-    int order[16], count = 0;
-    for (; hits != 0; hits &= hits - 1) {
-      const int child = __builtin_ctz(hits);
-      int k = count++;
-      for (; k > 0 && entry[order[k - 1]] > entry[child]; --k) order[k] = order[k - 1];
-      order[k] = child;
-    }
+    int order[16];
+    const int count = order_by_entry(hits, entry, order);
     if (child_level == 0) {
       for (int k = 0; k < count; ++k) {
         const int child = order[k];
         if (chord.tau0 + (static_cast<double>(entry[child]) - kParameterSlack) * chord.dtau > c.tau_end) break;
-        if (cell_intersect(c, chord, period_x + n.column + (child & 3), period_y + n.row + (child >> 2), entry[child],
-                           exit[child]))
+        if (cell_on_chord_intersect(c, chord, period_x + n.column + (child & 3), period_y + n.row + (child >> 2),
+                                    entry[child], exit[child]))
           return true;
       }
     } else {
@@ -331,7 +332,7 @@ RELIEF_KERNEL NodeWalk walk_over(const LatticeAxis& axis, std::int64_t origin, f
 }
 
 /// @return true when the search is over
-RELIEF_KERNEL bool chord_intersect(Search& c, const Chord& chord)
+RELIEF_KERNEL bool chord_intersect(ChordSearch& c, const Chord& chord)
 {
   const HeightFieldView& f = *c.mesh.field;
   // Nodes a quarter as large as the chord or more: it meets a few, whose bounds are looked up independently of each other,
@@ -403,34 +404,34 @@ RELIEF_KERNEL F8 quadratic_lanes(const Quadratic& p, F8 u)
   return (static_cast<float>(p.a) * u + static_cast<float>(p.b)) * u + static_cast<float>(p.c);
 }
 
-/// The curve between two parameters as one, two or four chords; those that may deviate too far are split again.
-/// @return true when the search is over
-RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int splits)
+/// A piece of the curve as eight straight stretches in single precision: the whole, its halves, its quarters, and the whole
+/// once more. Each is known with what the curve may deviate from it and what rounding may do.
+struct ChordLanes {
+  double origin_x, origin_y;  ///< integer lattice point near the piece's start
+  float extent_x, extent_y;   ///< of the triangle, about, lattice units
+  F8 u0, u1;                  ///< parameters within the piece
+  F8 x0, x1, y0, y1, q0, q1;  ///< ends: lattice units from the origin, and stored heights
+  F8 bend_x, bend_y;          ///< what a split can make less
+  F8 pad_x, pad_y, pad_q;
+};
+
+/// @param tau0, step   the piece of the segment
+/// @param W, e1, e2    over the piece, divided by W at its start
+/// @param inverse      1 / that
+[[gnu::always_inline]] RELIEF_KERNEL ChordLanes chord_lanes_make(const ChordSearch& c,
+                                                                 double tau0,
+                                                                 double step,
+                                                                 const Quadratic& W,
+                                                                 Quadratic e1,
+                                                                 Quadratic e2,
+                                                                 double inverse)
 {
   const DisplacedTriangle& tri = c.tri;
   const CurveSegment& g = *c.segment;
-  const HeightFieldView& f = *c.mesh.field;
-  const double step = tau1 - tau0;
-  Quadratic W = quadratic_shift(g.W, tau0, step);
-  Quadratic e1 = quadratic_shift(g.e[1], tau0, step), e2 = quadratic_shift(g.e[2], tau0, step);
-  const double inverse = 1.0 / W.c;
-  W = W * inverse;
-  const double end_W = W.a + W.b + W.c, least_W = quadratic_minimum(W);
-  if (least_W < kLeastFloatW * max(1.0, end_W) && splits < kMaxSplits) {
-    // At its minimum, or else where W is the geometric mean of its ends.
-    double cut = -W.b / (2.0 * W.a);
-    if (!(least_W < kLeastFloatW * min(1.0, end_W))) {
-      double roots[2] = {0.5, 0.5};
-      quadratic_roots_inside({W.a, W.b, W.c - __builtin_sqrt(end_W)}, 0.0, 1.0, roots, 0);
-      cut = roots[0];
-    }
-    const double middle = tau0 + cut * step;
-    if (chords_intersect(c, tau0, middle, splits + 1)) return true;
-    return middle <= c.tau_end && chords_intersect(c, middle, tau1, splits + 1);
-  }
   e1 = e1 * inverse;
   e2 = e2 * inverse;
   const double xu = c.x[1] - c.x[0], xv = c.x[2] - c.x[0], yu = c.y[1] - c.y[0], yv = c.y[2] - c.y[0];
+  ChordLanes out;
   const double origin_x = __builtin_floor(c.x[0] + e1.c * xu + e2.c * xv);
   const double origin_y = __builtin_floor(c.y[0] + e1.c * yu + e2.c * yv);
   const Quadratic X = W * (c.x[0] - origin_x) + e1 * xu + e2 * xv;
@@ -438,12 +439,13 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
 
   // Equal steps of τ crowd where the facet is seen edge-on; equal steps of the parameter whose weights are the same at
   // both ends do not.
-  const float bend = static_cast<float>(__builtin_sqrt(1.0 / end_W));
+  const float bend = static_cast<float>(__builtin_sqrt(1.0 / (W.a + W.b + W.c)));
   const auto spread = [&](F8 k) { return bend * k / (bend * k + (1.0f - k)); };
   // Lanes: the whole, two halves, four quarters, and the whole once more.
-  const F8 u0 = spread(F8{0, 0, 0.5f, 0, 0.25f, 0.5f, 0.75f, 0});
-  F8 u1 = spread(F8{1, 0.5f, 1, 0.25f, 0.5f, 0.75f, 1, 1});
-  u1[0] = u1[2] = u1[6] = u1[7] = 1.0f;
+  out.u0 = spread(F8{0, 0, 0.5f, 0, 0.25f, 0.5f, 0.75f, 0});
+  out.u1 = spread(F8{1, 0.5f, 1, 0.25f, 0.5f, 0.75f, 1, 1});
+  out.u1[0] = out.u1[2] = out.u1[6] = out.u1[7] = 1.0f;
+  const F8 u0 = out.u0, u1 = out.u1;
 
   struct Points {
     F8 W, b1, b2, x, y, nu, height;
@@ -513,13 +515,55 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
   const float q_slope = __builtin_fabsf(q_per_metre);
   const F8 pad_q = q_slope * (deviation_height + s_largest * (slack_b * (length(Nu) + length(Nv)) + kFloatSlack)) +
                    kFloatSlack * (__builtin_fabsf(q_zero) + max(abs(q_a), abs(q_b)) + 1.0f);
+  out.origin_x = origin_x;
+  out.origin_y = origin_y;
+  out.extent_x = extent_x;
+  out.extent_y = extent_y;
+  out.x0 = a.x;
+  out.x1 = b.x;
+  out.y0 = a.y;
+  out.y1 = b.y;
+  out.q0 = q_a;
+  out.q1 = q_b;
+  out.bend_x = bend_x;
+  out.bend_y = bend_y;
+  out.pad_x = pad_x;
+  out.pad_y = pad_y;
+  out.pad_q = pad_q;
+  return out;
+}
 
+/// The curve between two parameters as one, two or four chords; those that may deviate too far are split again.
+/// @return true when the search is over
+RELIEF_KERNEL bool chords_intersect(ChordSearch& c, double tau0, double tau1, int splits)
+{
+  const CurveSegment& g = *c.segment;
+  const HeightFieldView& f = *c.mesh.field;
+  const double step = tau1 - tau0;
+  Quadratic W = quadratic_shift(g.W, tau0, step);
+  Quadratic e1 = quadratic_shift(g.e[1], tau0, step), e2 = quadratic_shift(g.e[2], tau0, step);
+  const double inverse = 1.0 / W.c;
+  W = W * inverse;
+  const double end_W = W.a + W.b + W.c, least_W = quadratic_minimum(W);
+  if (least_W < kLeastFloatW * max(1.0, end_W) && splits < kMaxSplits) {
+    // At its minimum, or else where W is the geometric mean of its ends.
+    double cut = -W.b / (2.0 * W.a);
+    if (!(least_W < kLeastFloatW * min(1.0, end_W))) {
+      double roots[2] = {0.5, 0.5};
+      quadratic_roots_inside({W.a, W.b, W.c - __builtin_sqrt(end_W)}, 0.0, 1.0, roots, 0);
+      cut = roots[0];
+    }
+    const double middle = tau0 + cut * step;
+    if (chords_intersect(c, tau0, middle, splits + 1)) return true;
+    return middle <= c.tau_end && chords_intersect(c, middle, tau1, splits + 1);
+  }
+  const ChordLanes n = chord_lanes_make(c, tau0, step, W, e1, e2, inverse);
   // What is not a number is not known to miss.
-  unsigned alive = ~mask_of((min(q_a, q_b) - pad_q > splat8(static_cast<float>(f.range.high) + c.q_pad)) |
-                            (max(q_a, q_b) + pad_q < splat8(static_cast<float>(f.range.low) - c.q_pad)));
+  unsigned alive = ~mask_of((min(n.q0, n.q1) - n.pad_q > splat8(static_cast<float>(f.range.high) + c.q_pad)) |
+                            (max(n.q0, n.q1) + n.pad_q < splat8(static_cast<float>(f.range.low) - c.q_pad)));
   const float wanted_q = kWantedHeightDeviation * static_cast<float>(f.range.high - f.range.low) + 1.0f;
-  const unsigned straight = mask_of((bend_x <= splat8(kWantedDeviation)) & (bend_y <= splat8(kWantedDeviation)) &
-                                    (pad_q <= splat8(wanted_q)));
+  const unsigned straight = mask_of((n.bend_x <= splat8(kWantedDeviation)) & (n.bend_y <= splat8(kWantedDeviation)) &
+                                    (n.pad_q <= splat8(wanted_q)));
   c.counters.bounds += 1;
   if (traversal_poll(c.counters, c.next_poll)) return true;
   // As few chords as are straight enough; a chord that misses the map's range need not be.
@@ -528,40 +572,40 @@ RELIEF_KERNEL bool chords_intersect(Search& c, double tau0, double tau1, int spl
   alive &= (good & kWhole) == kWhole ? kWhole : ((good & kHalves) == kHalves ? kHalves : kQuarters);
   for (; alive != 0; alive &= alive - 1) {
     const int k = __builtin_ctz(alive);
-    const double from = tau0 + static_cast<double>(u0[k]) * step, to = tau0 + static_cast<double>(u1[k]) * step;
+    const double from = tau0 + static_cast<double>(n.u0[k]) * step, to = tau0 + static_cast<double>(n.u1[k]) * step;
     if (from > c.tau_end) return false;
-    const bool long_x = __builtin_fabsf(b.x[k] - a.x[k]) > c.long_x,
-               long_y = __builtin_fabsf(b.y[k] - a.y[k]) > c.long_y;
+    const bool long_x = __builtin_fabsf(n.x1[k] - n.x0[k]) > c.long_x,
+               long_y = __builtin_fabsf(n.y1[k] - n.y0[k]) > c.long_y;
     if (long_x || long_y) {
       const auto meets = [&](const LatticeAxis& axis, const StoredRange* bands, double origin, const F8& from_lanes,
                              const F8& to_lanes, float pad) {
         return band_meets(axis, bands, f.log2_band, static_cast<std::int64_t>(origin),
                           min(from_lanes[k], to_lanes[k]) - pad, max(from_lanes[k], to_lanes[k]) + pad,
-                          min(q_a[k], q_b[k]) - pad_q[k] - c.q_pad, max(q_a[k], q_b[k]) + pad_q[k] + c.q_pad);
+                          min(n.q0[k], n.q1[k]) - n.pad_q[k] - c.q_pad, max(n.q0[k], n.q1[k]) + n.pad_q[k] + c.q_pad);
       };
-      if (long_x && !meets(f.y, f.row_bands, origin_y, a.y, b.y, pad_y[k])) continue;
-      if (long_y && !meets(f.x, f.column_bands, origin_x, a.x, b.x, pad_x[k])) continue;
+      if (long_x && !meets(f.y, f.row_bands, n.origin_y, n.y0, n.y1, n.pad_y[k])) continue;
+      if (long_y && !meets(f.x, f.column_bands, n.origin_x, n.x0, n.x1, n.pad_x[k])) continue;
     }
     if (((straight >> k & 1) == 0 && splits < kMaxSplits) || ((long_x || long_y) && splits < c.max_long_splits)) {
       if (chords_intersect(c, from, to, splits + 1)) return true;
       continue;
     }
     Chord chord;
-    chord.origin_x = static_cast<std::int64_t>(origin_x);
-    chord.origin_y = static_cast<std::int64_t>(origin_y);
-    chord.x0 = a.x[k];
-    chord.y0 = a.y[k];
-    chord.q0 = q_a[k];
-    chord.dx = b.x[k] - a.x[k];
-    chord.dy = b.y[k] - a.y[k];
-    chord.dq = q_b[k] - q_a[k];
+    chord.origin_x = static_cast<std::int64_t>(n.origin_x);
+    chord.origin_y = static_cast<std::int64_t>(n.origin_y);
+    chord.x0 = n.x0[k];
+    chord.y0 = n.y0[k];
+    chord.q0 = n.q0[k];
+    chord.dx = n.x1[k] - n.x0[k];
+    chord.dy = n.y1[k] - n.y0[k];
+    chord.dq = n.q1[k] - n.q0[k];
     chord.inv_dx = 1.0f / (__builtin_fabsf(chord.dx) > 1e-15f ? chord.dx : 1e-15f);
     chord.inv_dy = 1.0f / (__builtin_fabsf(chord.dy) > 1e-15f ? chord.dy : 1e-15f);
     // No point of the curve is outside of the triangle, whatever the bounds say. A short chord near a lattice point is
     // known better than its distance from the borders of nodes, which reach up to four times as far as the chord.
-    chord.pad_x = min(pad_x[k], extent_x + 1.0f) + kFloatSlack * (4.0f + 5.0f * __builtin_fabsf(chord.dx));
-    chord.pad_y = min(pad_y[k], extent_y + 1.0f) + kFloatSlack * (4.0f + 5.0f * __builtin_fabsf(chord.dy));
-    chord.pad_q = pad_q[k] + c.q_pad;
+    chord.pad_x = min(n.pad_x[k], n.extent_x + 1.0f) + kFloatSlack * (4.0f + 5.0f * __builtin_fabsf(chord.dx));
+    chord.pad_y = min(n.pad_y[k], n.extent_y + 1.0f) + kFloatSlack * (4.0f + 5.0f * __builtin_fabsf(chord.dy));
+    chord.pad_q = n.pad_q[k] + c.q_pad;
     chord.tau0 = from;
     chord.dtau = to - from;
     if (chord_intersect(c, chord)) return true;
@@ -622,7 +666,7 @@ RELIEF_KERNEL const double* seen_coordinates(const LatticeAxis& axis,
 
 /// The part of a segment within a range.
 /// @return true when the search is over
-RELIEF_KERNEL bool segment_intersect(Search& c, const CurveSegment& g, const CurveRange& range)
+RELIEF_KERNEL bool segment_intersect(ChordSearch& c, const CurveSegment& g, const CurveRange& range)
 {
   const HeightFieldView& f = *c.mesh.field;
   ClampCuts pieces;
@@ -654,27 +698,15 @@ RELIEF_KERNEL int splits_of_long(const double* x, float wanted)
   return splits + kMaxSplits;
 }
 
-}  // namespace chord_detail
-
-/// Nearest (or any) hit of a ray's curve in one displaced triangle.
-/// @param curve  of this ray and triangle
-/// @param hit    written if the result is true
-RELIEF_KERNEL bool traverse_chord(const DisplacedMeshView& mesh,
-                                  std::uint32_t triangle,
-                                  const RayCurve& curve,
-                                  double t_min,
-                                  double t_max,
-                                  bool any_hit,
-                                  DisplacedHit* hit,
-                                  TraversalCounters* counters)
+bool traverse(const PrismQuery& q, const void*, DisplacedHit* hit)
 {
+  const DisplacedMeshView& mesh = q.mesh;
   const HeightFieldView& f = *mesh.field;
-  using chord_detail::kLeastHeightStep;
-  chord_detail::Search c{mesh, mesh.triangles[triangle], curve, *counters, *hit, t_min, t_max};
-  c.long_x = min(chord_detail::kFloatUnits, chord_detail::kPeriodsAChord * static_cast<float>(f.x.num_cells));
-  c.long_y = min(chord_detail::kFloatUnits, chord_detail::kPeriodsAChord * static_cast<float>(f.y.num_cells));
-  const int splits_x = chord_detail::splits_of_long(c.tri.x, c.long_x),
-            splits_y = chord_detail::splits_of_long(c.tri.y, c.long_y);
+  const RayCurve& curve = q.curve;
+  ChordSearch c{prism_search_make(q, hit)};
+  c.long_x = min(kFloatUnits, kPeriodsAChord * static_cast<float>(f.x.num_cells));
+  c.long_y = min(kFloatUnits, kPeriodsAChord * static_cast<float>(f.y.num_cells));
+  const int splits_x = splits_of_long(c.tri.x, c.long_x), splits_y = splits_of_long(c.tri.y, c.long_y);
   c.max_long_splits = splits_x > splits_y ? splits_x : splits_y;
   // d = scale·(h_offset + h_step·q − midlevel). A scale of zero says nothing about q: then all of the map is met.
   const double metres_per_step = mesh.scale * f.h_step;
@@ -682,21 +714,26 @@ RELIEF_KERNEL bool traverse_chord(const DisplacedMeshView& mesh,
   c.q_per_metre = flat ? 0.0 : 1.0 / metres_per_step;
   c.q_zero = flat ? 0.0 : (mesh.midlevel - f.h_offset) / f.h_step;
   c.q_pad = flat ? 65536.0f : 0.0f;
-  c.unfolded = mesh.unfolded[triangle] != 0;
-  c.any_hit = any_hit;
   for (int k = 0; k < curve.num_segments; ++k) {
     const CurveSegment& g = curve.segments[k];
-    if (g.t0 >= c.t_max) {
-      if (c.unfolded) break;
-    }
+    if (g.t0 >= c.t_max && c.unfolded) break;
     c.segment = &g;
     c.tau_end = 1.0;
     const CurveRange range = curve_clip(curve, g, c.unfolded, c.t_min, c.t_max);
     if (range.tau0 > range.tau1) continue;
     if (c.unfolded) c.tau_end = range.tau1;
-    if (chord_detail::segment_intersect(c, g, range)) break;
+    if (segment_intersect(c, g, range)) break;
   }
   return c.found;
 }
+
+}  // namespace
+
+const DisplacementMethodEntry RELIEF_ISA::chord_method{
+    .title = "Chord",
+    .description = "The fast method: exact, with little memory",
+    .traverse = traverse,
+    .cost = MethodCost{930, 0, 0},
+};
 
 }  // namespace relief

@@ -5,15 +5,14 @@
 // 40(6), 2021. Three differences, all in its favour. Nodes are bounded by the exact hull of bounds3d.h instead of affine
 // arithmetic, in a frame of the ray's own: t, and two axes across the ray, one of them level with the base triangle, so
 // that a node misses as soon as its range across the ray excludes 0. The four children of a node are tested side by side.
-// A cell is intersected by the exact leaf test, on the part of the ray's curve inside it. Reading order: traverse_tfdm,
+// A cell is intersected by the exact leaf test, on the part of the ray's curve inside it. Reading order: traverse,
 // root_intersect, children_intersect, cell_on_curve_intersect.
-#pragma once
-
+#include "displacement/method.h"
 #include "displacement/traverse_rmip.h"
 
 namespace relief {
 
-namespace tfdm_detail {
+namespace {
 
 using I4 [[gnu::vector_size(32)]] = std::int64_t;
 
@@ -53,7 +52,7 @@ struct NodeFrame {
   double d_zero, d_step;         ///< displacement of stored bounds
 };
 
-RELIEF_KERNEL NodeFrame frame_make(const CurveSearch& c, const LatticeFrame& lattice, const RayFrame& ray)
+RELIEF_KERNEL NodeFrame frame_make(const MetricSearch& c, const LatticeFrame& lattice, const RayFrame& ray)
 {
   const DisplacedTriangle& tri = c.tri;
   NodeFrame f;
@@ -108,7 +107,7 @@ struct OffsetLanes {
 };
 
 RELIEF_KERNEL OffsetLanes
-offset_lanes(const CurveSearch& c, const LatticeFrame& f, D4 x, D4 y, D4 rx, D4 ry, D4 d_low, D4 d_high)
+offset_lanes(const MetricSearch& c, const LatticeFrame& f, D4 x, D4 y, D4 rx, D4 ry, D4 d_low, D4 d_high)
 {
   const D4 along_x = f.n0x + f.nxx * x + f.nxy * y, along_y = f.n0y + f.nxy * x + f.nyy * y;
   const D4 squared = f.n00 + (f.n0x + along_x) * x + (f.n0y + along_y) * y;
@@ -142,7 +141,7 @@ RELIEF_KERNEL RangeLanes coordinate_lanes(const Coordinate& k, D4 x, D4 y, D4 rx
 /// Leaf test of a cell, on the stretch of each segment that reaches into it.
 /// @param s  of the surface in the cell
 /// @return   true if there was a hit; the search goes on: another cell may be nearer
-RELIEF_KERNEL bool cell_on_curve_intersect(CurveSearch& c,
+RELIEF_KERNEL bool cell_on_curve_intersect(MetricSearch& c,
                                            const RayProjection* projections,
                                            std::int64_t i,
                                            std::int64_t j,
@@ -258,7 +257,7 @@ struct ChildHits {
   D4 t, s_low, s_high;
 };
 
-RELIEF_KERNEL ChildHits children_intersect(CurveSearch& c,
+RELIEF_KERNEL ChildHits children_intersect(MetricSearch& c,
                                            const NodeFrame& f,
                                            const LatticeFrame& lattice,
                                            const MinmaxMipmapView& mipmap,
@@ -312,7 +311,7 @@ RELIEF_KERNEL ChildHits children_intersect(CurveSearch& c,
 
 /// Descends from one node, near children first.
 /// @return  true when the search is over
-RELIEF_KERNEL bool root_intersect(CurveSearch& c,
+RELIEF_KERNEL bool root_intersect(MetricSearch& c,
                                   const NodeFrame& f,
                                   const LatticeFrame& lattice,
                                   const MinmaxMipmapView& mipmap,
@@ -391,52 +390,49 @@ RELIEF_KERNEL int tile_levels(const ParentWalk& walk, const LatticeAxis& axis, s
   return levels;
 }
 
-}  // namespace tfdm_detail
-
-/// Nearest (or any) hit of a ray's curve in one displaced triangle.
-/// @param hit  written if the result is true
-RELIEF_KERNEL bool traverse_tfdm(const DisplacedMeshView& mesh,
-                                 std::uint32_t triangle,
-                                 const RayFrame& ray,
-                                 const RayCurve& curve,
-                                 const MinmaxMipmapView& mipmap,
-                                 double t_min,
-                                 double t_max,
-                                 bool any_hit,
-                                 DisplacedHit* hit,
-                                 TraversalCounters* counters)
+bool traverse(const PrismQuery& q, const void* table, DisplacedHit* hit)
 {
-  CurveSearch c = curve_search_make(mesh, triangle, curve, t_min, t_max, any_hit, hit, counters);
-  const LatticeFrame lattice = lattice_frame_make(c.tri, ray);
+  const auto& mipmap = *static_cast<const MinmaxMipmapView*>(table);
+  const RayCurve& curve = q.curve;
+  MetricSearch c = metric_search_make(q, hit);
+  const LatticeFrame lattice = lattice_frame_make(c.tri, curve.frame);
   // A triangle without area in the map has no quadtree: only the curve says where a ray is.
   if (!lattice.exists) {
-    return traverse_rmip(mesh, triangle, ray, curve, mipmap, RmipOptions{}, t_min, t_max, any_hit, hit, counters);
+    return traverse_rmip(q, mipmap, RmipOptions{}, hit);
   }
-  const tfdm_detail::NodeFrame f = tfdm_detail::frame_make(c, lattice, ray);
+  const NodeFrame f = frame_make(c, lattice, curve.frame);
   RayProjection projections[kMaxCurveSegments];
   for (int k = 0; k < curve.num_segments; ++k) projections[k] = ray_projection_make(c.tri, curve.segments[k]);
 
-  tfdm_detail::ParentWalk rows = tfdm_detail::parent_walk_make(mipmap.y, f.origin_y + f.y0, f.origin_y + f.y1);
-  const tfdm_detail::ParentWalk all_columns =
-      tfdm_detail::parent_walk_make(mipmap.x, f.origin_x + f.x0, f.origin_x + f.x1);
-  tfdm_detail::Node root{0, 0, 0, 0, 0, -__builtin_huge_val()};
+  ParentWalk rows = parent_walk_make(mipmap.y, f.origin_y + f.y0, f.origin_y + f.y1);
+  const ParentWalk all_columns = parent_walk_make(mipmap.x, f.origin_x + f.x0, f.origin_x + f.x1);
+  Node root{0, 0, 0, 0, 0, -__builtin_huge_val()};
   const double extent = max(f.x1 - f.x0, f.y1 - f.y0);
   if (f.x1 - f.x0 > 2.0 * mipmap.x.num_cells || f.y1 - f.y0 > 2.0 * mipmap.y.num_cells) {
-    const int levels_x = tfdm_detail::tile_levels(all_columns, mipmap.x, &root.first_x);
-    const int levels_y = tfdm_detail::tile_levels(rows, mipmap.y, &root.first_y);
+    const int levels_x = tile_levels(all_columns, mipmap.x, &root.first_x);
+    const int levels_y = tile_levels(rows, mipmap.y, &root.first_y);
     root.level = mipmap.num_levels + (levels_x > levels_y ? levels_x : levels_y);
-    tfdm_detail::root_intersect(c, f, lattice, mipmap, projections, root);
+    root_intersect(c, f, lattice, mipmap, projections, root);
     return c.found;
   }
   // The smallest nodes of which four cover the triangle, unless it spans periods.
   while (root.level + 1 < mipmap.num_levels && static_cast<double>(2 << root.level) < extent) ++root.level;
-  while (tfdm_detail::parent_walk_step(rows, mipmap.y, root.level + 1, &root.row, &root.first_y)) {
-    tfdm_detail::ParentWalk columns = all_columns;
-    while (tfdm_detail::parent_walk_step(columns, mipmap.x, root.level + 1, &root.column, &root.first_x)) {
-      if (tfdm_detail::root_intersect(c, f, lattice, mipmap, projections, root)) return c.found;
+  while (parent_walk_step(rows, mipmap.y, root.level + 1, &root.row, &root.first_y)) {
+    ParentWalk columns = all_columns;
+    while (parent_walk_step(columns, mipmap.x, root.level + 1, &root.column, &root.first_x)) {
+      if (root_intersect(c, f, lattice, mipmap, projections, root)) return c.found;
     }
   }
   return c.found;
 }
+
+}  // namespace
+
+const DisplacementMethodEntry RELIEF_ISA::tfdm_method{
+    .title = "TFDM",
+    .description = "A min-max mipmap whose nodes are bounded in space on the fly (Thonat and others 2021)",
+    .traverse = traverse,
+    .table_make = minmax_table_make,
+};
 
 }  // namespace relief

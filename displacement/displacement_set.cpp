@@ -1,0 +1,402 @@
+#include "displacement/displacement_set.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <stdexcept>
+#include <tuple>
+
+#include <unistd.h>
+
+#include "displacement/cost_model.h"
+
+namespace relief {
+
+namespace {
+
+/// By how much a similarity scales: the cube root of its determinant, which can be below single precision. The root is
+/// rounded to it, so that what turning leaves in the last digits of a double does not keep instances from sharing.
+double similarity_scale(const Affine3& m)
+{
+  const double determinant = dot(to_double(m.x), cross(to_double(m.y), to_double(m.z)));
+  return static_cast<double>(static_cast<float>(std::cbrt(std::abs(determinant))));
+}
+
+DisplacementMethod method_of(const DisplacementSettings& settings, const DisplacementOptions& options)
+{
+  return options.method.value_or(settings.method);
+}
+
+/// The most and the least that a transform stretches any direction.
+struct Stretch {
+  double most = 1, least = 1;
+};
+
+/// Largest singular value of a matrix of three columns: the root of MᵀM's largest eigenvalue.
+/// @source Smith 1961, "Eigenvalues of a symmetric 3 × 3 matrix"
+double largest_singular_value(Vec3d x, Vec3d y, Vec3d z)
+{
+  const double mean = (dot(x, x) + dot(y, y) + dot(z, z)) / 3;
+  double a = dot(x, x) - mean, b = dot(y, y) - mean, c = dot(z, z) - mean;
+  double xy = dot(x, y), yz = dot(y, z), zx = dot(z, x);
+  const double radius = std::sqrt((a * a + b * b + c * c) / 6 + (xy * xy + yz * yz + zx * zx) / 3);
+  if (!(radius > 0)) return std::sqrt(mean);
+  for (double* entry : {&a, &b, &c, &xy, &yz, &zx}) *entry /= radius;
+  const double determinant = a * (b * c - yz * yz) - xy * (xy * c - yz * zx) + zx * (xy * yz - b * zx);
+  return std::sqrt(mean + 2 * radius * std::cos(std::acos(std::clamp(determinant / 2, -1.0, 1.0)) / 3));
+}
+
+/// The least by way of the adjugate, whose largest singular value is the product of M's two largest: beside MᵀM's largest
+/// eigenvalue the others may be less than its rounding.
+Stretch stretch_of(const Affine3& m)
+{
+  const Vec3d x = to_double(m.x), y = to_double(m.y), z = to_double(m.z);
+  const double product = largest_singular_value(cross(y, z), cross(z, x), cross(x, y));
+  return {largest_singular_value(x, y, z), product > 0 ? std::abs(dot(x, cross(y, z))) / product : 0};
+}
+
+float lod_of(const DisplacementSettings& settings, const DisplacementOptions& options)
+{
+  return options.lod.value_or(settings.lod);
+}
+
+bool is_whole(float x) { return x == std::floor(x); }
+
+/// With fewer texels than this along a triangle's side a map has little left to show; levels beyond would only widen the
+/// prisms.
+constexpr double kLeastTexelsASide = 16;
+
+/// Levels that rays may choose by themselves lose no more of the surface's slopes than this, metres a metre, nor move a
+/// point further than this many of their texels: half a pixel, since texels are a quarter as wide as that. A picture's
+/// mean then changes by at most about an eighth of the slope's square (docs/displacement.md), 1.4 %.
+constexpr double kMostSlopeLost = 1.0 / 3;
+constexpr double kMostTexelsLost = 2;
+
+std::string gibibytes(std::uint64_t bytes)
+{
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1f GiB", static_cast<double>(bytes) / (1 << 30));
+  return text;
+}
+
+/// Refuses what would not fit, before anything large is allocated.
+/// @param bytes  all tessellations so far, this one included
+void check_budget(std::uint64_t bytes,
+                  const TessellationLayout& layout,
+                  const std::string& mesh,
+                  const DisplacementOptions& options)
+{
+  const std::uint64_t half_of_memory =
+      static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) / 2;
+  const std::uint64_t budget = options.tessellation_bytes > 0 ? options.tessellation_bytes : half_of_memory;
+  if (bytes <= budget) return;
+  throw std::runtime_error(
+      "tessellating mesh '" + mesh + "' into " + std::to_string(layout.num_micro_triangles / 1'000'000) +
+      " million triangles would take about " + gibibytes(bytes) + ", more than the " + gibibytes(budget) +
+      " that tessellations may have; the other displacement methods do not tessellate");
+}
+
+std::optional<TessellationKind> tessellation_kind(DisplacementMethod method)
+{
+  return method == DisplacementMethod::kAuto ? std::nullopt : displacement_method(method).tessellation;
+}
+
+}  // namespace
+
+std::vector<std::string> displacement_warnings(const DisplacementSettings& settings, const DisplacementOptions& options)
+{
+  const float lod = lod_of(settings, options);
+  if (!tessellation_kind(method_of(settings, options)) || !(lod > 0) || is_whole(lod)) return {};
+  return {"tessellations have whole levels of detail; level " + std::to_string(static_cast<int>(lod)) + " is used"};
+}
+
+DisplacementSet::Levels DisplacementSet::levels_of(const Use& use, const DisplacementOptions& options) const
+{
+  constexpr float kCoarsest = kMaxLodLevels - 1;
+  const float lod = lod_of(use.settings, options);
+  const bool tessellates = tessellation_kind(method_of(use.settings, options)).has_value();
+  Levels levels;
+  if (lod >= 0) {
+    levels.first = static_cast<int>(std::min(lod, kCoarsest));
+    if (tessellates) return levels;
+    levels.fixed = std::min(lod, kCoarsest) - static_cast<float>(levels.first);
+    levels.count = levels.fixed > 0 ? 2 : 1;
+  } else if (!tessellates) {
+    const HeightMapView& map = height_maps_[static_cast<std::size_t>(use.settings.height.texture_index)];
+    double side = mean_texels_a_side(use.mesh, use.settings.height, map.width, map.height);
+    // Levels of the map end too: with one texel it is a constant.
+    for (int texels = std::max(map.width, map.height); side >= 2 * kLeastTexelsASide && texels > 2; side /= 2) {
+      texels = (texels + 1) / 2;
+      ++levels.count;
+    }
+    levels.by_cone = levels.count > 1;
+  }
+  return levels;
+}
+
+std::vector<DisplacementSet::Use> DisplacementSet::find_uses(const DisplacementInput& input)
+{
+  std::vector<Use> uses;
+  std::map<std::tuple<int, int, double>, int> known;  // mesh, displacement, scale in object space
+  for (std::size_t i = 0; i < input.instances.size(); ++i) {
+    const DisplacedInstance& instance = input.instances[i];
+    if (instance.displacement_index < 0) continue;
+    const DisplacementSettings& settings = input.settings[static_cast<std::size_t>(instance.displacement_index)];
+    double scale = settings.scale;
+    // There are only similarities there, see scene/world_displacement.h.
+    if (settings.space == DisplacementSpace::kWorld) scale /= similarity_scale(instance.world_from_object);
+    const auto mesh = static_cast<std::size_t>(instance.mesh_index);
+    const auto [at, is_new] =
+        known.try_emplace({instance.mesh_index, instance.displacement_index, scale}, static_cast<int>(uses.size()));
+    geometry_of_instance_[i] = at->second;
+    if (is_new)
+      uses.push_back({input.meshes[mesh], input.mesh_names[mesh], instance.displacement_index, settings, scale});
+    const Stretch stretch = stretch_of(instance.world_from_object);
+    double& steepening = uses[static_cast<std::size_t>(at->second)].steepening;
+    steepening = std::max(steepening, stretch.most / stretch.least);
+  }
+  return uses;
+}
+
+DisplacementSet::DisplacementSet(const DisplacementInput& input, const DisplacementOptions& options)
+    : height_maps_(input.height_maps),
+      geometry_of_instance_(input.instances.size(), -1),
+      texel_of_instance_(input.instances.size(), 0.0f)
+{
+  const std::vector<Use> uses = find_uses(input);
+  const auto num_displaced =
+      std::count_if(geometry_of_instance_.begin(), geometry_of_instance_.end(), [](int index) { return index >= 0; });
+  const double num_rays = options.num_rays / static_cast<double>(num_displaced);
+  std::uint64_t tessellated_bytes = 0;
+  for (const Use& use : uses) {
+    geometries_.push_back(make_displaced(use, options));
+    tessellate(*geometries_.back(), options, method_of(use.settings, options) == DisplacementMethod::kAuto, num_rays,
+               &tessellated_bytes);
+  }
+  for (std::size_t i = 0; i < input.instances.size(); ++i) {
+    if (geometry_of_instance_[i] < 0) continue;
+    texel_of_instance_[i] =
+        displaced(i).geometry.lod.texel * static_cast<float>(stretch_of(input.instances[i].world_from_object).most);
+  }
+}
+
+std::unique_ptr<DisplacementSet::Displaced> DisplacementSet::make_displaced(const Use& use,
+                                                                            const DisplacementOptions& options)
+{
+  const DisplacementSettings& settings = use.settings;
+  auto displaced = std::make_unique<Displaced>();
+  displaced->name = use.mesh_name;
+  displaced->displacement_index = use.displacement_index;
+  const DisplacementMethod asked = method_of(settings, options);
+  displaced->method = asked == DisplacementMethod::kAuto ? kDefaultMethod : asked;
+  DisplacedGeometry& geometry = displaced->geometry;
+  geometry.method = displaced->method;
+  geometry.smooth = settings.smoothing;
+  Levels levels = levels_of(use, options);
+  std::vector<const HeightFieldView*> coarser;
+  if (levels.by_cone) {
+    levels.count = num_faithful_levels(use, levels.count);
+    levels.by_cone = levels.count > 1;
+  }
+  for (int k = 0; k < levels.count; ++k) {
+    geometry.levels[k] = level(settings.height.texture_index, levels.first + k, displacement_method(displaced->method));
+    if (k > 0) coarser.push_back(geometry.levels[k].field);
+  }
+  displaced->mesh = DisplacedMesh(use.mesh, *geometry.levels[0].field,
+                                  {settings.height, use.scale, settings.midlevel, settings.weld_seams}, coarser);
+  geometry.mesh = displaced->mesh.view();
+  geometry.lod = {levels.count, levels.by_cone, levels.fixed, displaced->mesh.widest_texel()};
+  has_levels_ |= levels.count > 1;
+  return displaced;
+}
+
+void DisplacementSet::tessellate(Displaced& displaced,
+                                 const DisplacementOptions& options,
+                                 bool is_auto,
+                                 double num_rays,
+                                 std::uint64_t* used_bytes)
+{
+  const DisplacedMeshView& mesh = displaced.geometry.mesh;
+  const auto layout_of = [&](DisplacementMethod method) {
+    return tessellation_layout_make(mesh, *displacement_method(method).tessellation, options.tessellation_rate);
+  };
+  if (displacement_method(displaced.method).tessellation) {
+    TessellationLayout layout = layout_of(displaced.method);
+    *used_bytes += tessellation_peak_bytes(layout, kRenderTessellation);
+    check_budget(*used_bytes, layout, displaced.name, options);
+    displaced.tessellation = std::make_unique<Tessellation>(mesh, std::move(layout));
+    return;
+  }
+  // Layouts cost time and memory of their own, so nothing is made of them without an allowance.
+  if (!is_auto || options.auto_bytes <= *used_bytes || displaced.geometry.lod.fixed > 0) return;
+  std::vector<MethodOffer> offers;
+  std::vector<TessellationLayout> layouts;
+  for (const DisplacementMethod method : kDisplacementMethods) {
+    const DisplacementMethodEntry& entry = displacement_method(method);
+    if (!entry.cost) continue;
+    offers.push_back({method, *entry.cost, 0, 0});
+    layouts.emplace_back();
+    if (!entry.tessellation) continue;
+    layouts.back() = layout_of(method);
+    offers.back().num_micro_triangles = layouts.back().num_micro_triangles;
+    offers.back().bytes = tessellation_peak_bytes(layouts.back(), kRenderTessellation);
+  }
+  const DisplacementChoice choice = displacement_choose(offers, num_rays, options.auto_bytes - *used_bytes);
+  reasons_.push_back("mesh '" + displaced.name + "': " + choice.reason);
+  if (choice.method == displaced.method) return;
+  displaced.method = choice.method;
+  const auto chosen =
+      std::find_if(offers.begin(), offers.end(), [&](const MethodOffer& o) { return o.method == choice.method; });
+  *used_bytes += chosen->bytes;
+  displaced.tessellation =
+      std::make_unique<Tessellation>(mesh, std::move(layouts[static_cast<std::size_t>(chosen - offers.begin())]));
+}
+
+int DisplacementSet::num_faithful_levels(const Use& use, int most)
+{
+  const TextureRef& mapping = use.settings.height;
+  const double scale = std::abs(use.scale);
+  const MapDensity density = map_density(use.mesh, mapping);
+  const HeightMapView& map = height_maps_[static_cast<std::size_t>(mapping.texture_index)];
+  const double texel = 1 / std::sqrt(std::max(density.u * map.width * density.v * map.height, 1e-300));
+  LevelLoss lost;
+  for (int k = 1; k < most; ++k) {
+    const bool is_new = !fields_.contains({mapping.texture_index, k});
+    const HeightMapView fine = k > 1 ? field(mapping.texture_index, k - 1).level.view() : map;
+    Field& coarse = field(mapping.texture_index, k);
+    if (!coarse.loss) coarse.loss = level_loss(fine, coarse.level.view());
+    lost = lost + *coarse.loss;
+    const double slope = use.steepening * scale * (lost.slope_u * density.u + lost.slope_v * density.v);
+    const double texels = scale * lost.height / (texel * (1 << k));
+    if (slope <= kMostSlopeLost && texels <= kMostTexelsLost) continue;
+    if (is_new) fields_.erase({mapping.texture_index, k});
+    return k;
+  }
+  return most;
+}
+
+DisplacementSet::Field& DisplacementSet::field(int map_index, int level)
+{
+  const auto [at, is_new] = fields_.try_emplace({map_index, level});
+  Field& field = at->second;
+  if (is_new) {
+    HeightMapView map = height_maps_[static_cast<std::size_t>(map_index)];
+    if (level > 0) {
+      field.level = HeightLevel(map, level);
+      map = field.level.view();
+    }
+    field.bounds = HeightField(map);
+  }
+  return field;
+}
+
+DisplacementLevel DisplacementSet::level(int map_index, int level, const DisplacementMethodEntry& method)
+{
+  Field& f = field(map_index, level);
+  if (method.table_make == nullptr) return {&f.bounds.view(), nullptr};
+  const auto [at, is_new] = f.tables.try_emplace(method.table_make);
+  if (is_new) at->second = method.table_make(f.bounds.view(), {});
+  return {&f.bounds.view(), at->second.view};
+}
+
+DisplacedPoint DisplacementSet::resolve(std::size_t instance,
+                                        const InstanceView& placement,
+                                        std::uint32_t primitive,
+                                        EmbreeHitRecord record) const
+{
+  const Displaced& d = displaced(instance);
+  if (d.tessellation == nullptr) {
+    return displaced_resolve(d.geometry, placement, texel_of_instance_[instance], primitive, record);
+  }
+  const MicroHit hit = d.tessellation->hit(primitive, record.u, record.v);
+  DisplacedPoint out{hit.triangle, static_cast<float>(hit.b1), static_cast<float>(hit.b2)};
+  out.P = to_float(hit.P);
+  out.Ng = out.Ns = to_float(hit.Ng);
+  if (d.geometry.smooth) out.Ns = to_float(displaced_smooth_normal(d.geometry, out.triangle, 0, out.u, out.v));
+  return out;
+}
+
+DisplacedPoint DisplacementSet::locate(std::size_t instance, std::uint32_t primitive, float u, float v) const
+{
+  const Displaced& d = displaced(instance);
+  if (d.tessellation == nullptr) return {primitive, u, v};
+  const MicroHit hit = d.tessellation->locate(primitive, u, v);
+  return {hit.triangle, static_cast<float>(hit.b1), static_cast<float>(hit.b2)};
+}
+
+std::size_t DisplacementSet::bytes() const
+{
+  std::size_t sum = 0;
+  for (const auto& [key, field] : fields_) {
+    sum += field.level.bytes() + field.bounds.bytes();
+    for (const auto& [make, table] : field.tables) sum += table.bytes;
+  }
+  for (const auto& displaced : geometries_) {
+    sum += displaced->mesh.bytes();
+    if (displaced->tessellation != nullptr) sum += displaced->tessellation->bytes();
+  }
+  return sum;
+}
+
+std::uint64_t DisplacementSet::num_triangles() const
+{
+  std::uint64_t sum = 0;
+  for (const auto& displaced : geometries_) sum += displaced->geometry.mesh.num_triangles;
+  return sum;
+}
+
+DisplacedMeshReport DisplacementSet::report() const
+{
+  DisplacedMeshReport sum;
+  for (const auto& displaced : geometries_) {
+    const DisplacedMeshReport& report = displaced->mesh.report();
+    sum.num_folded += report.num_folded;
+    sum.num_short_normals += report.num_short_normals;
+    sum.num_degenerate += report.num_degenerate;
+    sum.num_walls += report.num_walls;
+    sum.num_far_uv += report.num_far_uv;
+  }
+  return sum;
+}
+
+std::string DisplacementSet::method_names() const
+{
+  std::string names;
+  for (const DisplacementMethod method : kDisplacementMethods) {
+    const auto uses = [=](const auto& displaced) { return displaced->method == method; };
+    if (std::none_of(geometries_.begin(), geometries_.end(), uses)) continue;
+    names += (names.empty() ? "" : ", ") + std::string(displacement_method_label(method));
+  }
+  return names;
+}
+
+std::vector<std::string> DisplacementSet::warnings() const
+{
+  std::vector<std::string> texts;
+  for (const auto& displaced : geometries_) {
+    const DisplacedMeshReport& report = displaced->mesh.report();
+    const std::string of = " of " + std::to_string(displaced->geometry.mesh.num_triangles) + " triangles of mesh '" +
+                           displaced->name + "' ";
+    if (report.num_degenerate > 0) {
+      texts.push_back(std::to_string(report.num_degenerate) + of +
+                      "have no normal to be displaced along and are left out");
+    }
+    if (report.num_far_uv > 0) {
+      const HeightMapView& map = displaced->geometry.mesh.field->map;
+      char limit[32];
+      std::snprintf(limit, sizeof limit, "%.2g", kMostTexels / std::max(map.width, map.height));
+      texts.push_back(
+          std::to_string(report.num_far_uv) + of + "(the first is triangle " + std::to_string(report.first_far_uv) +
+          ") have texture coordinates beyond " + limit +
+          ", where the texels of their height map cannot be told apart; they are displaced as at uv (0, 0)");
+    }
+    if (report.num_short_normals > 0) {
+      texts.push_back(std::to_string(report.num_short_normals) + of +
+                      "have normals that cancel inside; around that point their displaced surface is left out");
+    }
+  }
+  return texts;
+}
+
+}  // namespace relief

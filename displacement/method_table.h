@@ -1,0 +1,32 @@
+// What a method prepares of one level of a height map, besides the bounds that all have (height_field.h).
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <utility>
+
+namespace relief {
+
+/// What RMIP's authors studied in their Figs. 10 and 12.
+struct RmipOptions {
+  double marching_scale = 16;       ///< texels; rectangles whose sides are no longer are marched through
+  bool reduce_by_inversion = true;  ///< bounds are tightened by inverting the displacement at the ends of a 3D box
+  int resolution = 0;               ///< blocks of the table along each axis; 0: rmip_linear_resolution
+};
+
+struct MethodTable {
+  std::shared_ptr<const void> owner;
+  const void* view = nullptr;  ///< as the method's traversal takes it
+  std::size_t bytes = 0;
+};
+
+/// The table of one of these classes, which own a view of themselves.
+template <class Owner>
+MethodTable method_table_of(std::shared_ptr<const Owner> owner)
+{
+  const void* view = &owner->view();
+  const std::size_t bytes = owner->bytes();
+  return {std::move(owner), view, bytes};
+}
+
+}  // namespace relief

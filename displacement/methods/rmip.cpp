@@ -1,0 +1,24 @@
+// RMIP as published: its traversal over its table.
+#include "displacement/rmip.h"
+#include "displacement/method.h"
+#include "displacement/traverse_rmip.h"
+
+namespace relief {
+
+namespace {
+
+bool traverse(const PrismQuery& query, const void* table, DisplacedHit* hit)
+{
+  return traverse_rmip(query, *static_cast<const RmipView*>(table), query.rmip_options, hit);
+}
+
+}  // namespace
+
+const DisplacementMethodEntry RELIEF_ISA::rmip_method{
+    .title = "RMIP",
+    .description = "Ranges of oblong windows of the map (Thonat and others 2023)",
+    .traverse = traverse,
+    .table_make = rmip_table_make,
+};
+
+}  // namespace relief

@@ -1,0 +1,13 @@
+// Tessellation into a mesh of triangles, see tessellation.h.
+#include "displacement/method.h"
+
+namespace relief {
+
+const DisplacementMethodEntry RELIEF_ISA::tessellate_method{
+    .title = "Tessellate",
+    .description = "Triangles of a texel's size: an approximation that needs much memory",
+    .tessellation = TessellationKind::kTriangles,
+    .cost = MethodCost{345, 63, 640},
+};
+
+}  // namespace relief

@@ -1,0 +1,67 @@
+// What methods are asked, and the state of a search that they share: a ray's curve in the prism of one displaced triangle,
+// and the nearest hit so far.
+#pragma once
+
+#include "displacement/leaf.h"
+#include "displacement/method_table.h"
+
+namespace relief {
+
+/// A ray's curve in one triangle of a mesh.
+struct PrismQuery {
+  const DisplacedMeshView& mesh;
+  std::uint32_t triangle;
+  const RayCurve& curve;  ///< of this ray and triangle
+  double t_min, t_max;    ///< hits count within
+  bool any_hit;           ///< whichever is found first will do
+  const RmipOptions& rmip_options;
+  TraversalCounters& counters;
+};
+
+/// A query under way. Methods add what is theirs.
+struct PrismSearch {
+  const DisplacedMeshView& mesh;
+  const DisplacedTriangle& tri;
+  const RayCurve& curve;
+  TraversalCounters& counters;
+  DisplacedHit& hit;
+  double t_min, t_max;     ///< t_max shrinks with every hit
+  bool unfolded, any_hit;  ///< unfolded: t grows along the curve
+  bool found = false;
+  std::uint64_t next_poll;
+};
+
+RELIEF_KERNEL PrismSearch prism_search_make(const PrismQuery& q, DisplacedHit* hit)
+{
+  return {q.mesh,
+          q.mesh.triangles[q.triangle],
+          q.curve,
+          q.counters,
+          *hit,
+          q.t_min,
+          q.t_max,
+          q.mesh.unfolded[q.triangle] != 0,
+          q.any_hit,
+          false,
+          q.counters.bounds + kBoundsAPoll};
+}
+
+/// The leaf test of one cell; keeps the nearest hit.
+/// @return  true if there was one
+RELIEF_KERNEL bool cell_intersect(PrismSearch& c,
+                                  const CurveSegment& g,
+                                  std::int64_t i,
+                                  std::int64_t j,
+                                  double tau0,
+                                  double tau1)
+{
+  ++c.counters.texels;
+  tau0 = max(tau0, 0.0);
+  tau1 = min(tau1, 1.0);
+  if (!leaf_intersect(c.mesh, c.tri, c.curve, g, i, j, tau0, tau1, c.t_min, c.t_max, c.unfolded, &c.hit)) return false;
+  c.found = true;
+  c.t_max = c.hit.t;
+  return true;
+}
+
+}  // namespace relief

@@ -1,0 +1,70 @@
+#include "integrator/scene_displacement.h"
+
+#include "scene/limits.h"
+
+namespace relief {
+
+namespace {
+
+int displacement_of(const Scene& scene, const Instance& instance)
+{
+  return scene.materials[static_cast<std::size_t>(instance.material_index)].displacement_index;
+}
+
+/// Embree leaves out what is beyond its limits without a word.
+/// @param box  of an instance's displaced mesh, object space
+void check_positions(const Scene& scene, const Instance& instance, const Box3& box)
+{
+  const Affine3& m = instance.world_from_object;
+  const Vec3f extent = max(abs(box.low), abs(box.high));
+  const Vec3f extent_world = abs(m.x) * extent.x + abs(m.y) * extent.y + abs(m.z) * extent.z + abs(m.p);
+  // A mesh without triangles has a box of infinite extent, turned over.
+  if (!(box.low.x <= box.high.x) || max_component(max(extent, extent_world)) <= kFarthestDisplaced) return;
+  throw SceneError(scene.file, "", "displaced positions within 2e15 m of the origin",
+                   "farther ones of node '" + instance.name + "'");
+}
+
+}  // namespace
+
+DisplacementSet scene_displacement(const Scene& scene, const DisplacementOptions& options)
+{
+  DisplacementInput input;
+  for (const Mesh& mesh : scene.meshes) {
+    input.meshes.push_back(mesh.view());
+    input.mesh_names.push_back(mesh.name);
+  }
+  for (const HeightMap& map : scene.height_maps) input.height_maps.push_back(map.view());
+  input.settings = scene.displacements;
+  for (const Instance& instance : scene.instances) {
+    input.instances.push_back({instance.mesh_index, displacement_of(scene, instance), instance.world_from_object});
+  }
+  DisplacementSet set(input, options);
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const int index = set.geometry_index(i);
+    if (index >= 0) check_positions(scene, scene.instances[i], set.mesh(static_cast<std::size_t>(index)).bounds());
+  }
+  return set;
+}
+
+std::vector<std::string> displacement_warnings(const Scene& scene, const DisplacementOptions& options)
+{
+  std::vector<std::string> texts;
+  for (std::size_t i = 0; i < scene.materials.size(); ++i) {
+    const int index = scene.materials[i].displacement_index;
+    if (index < 0) continue;
+    for (const std::string& text :
+         displacement_warnings(scene.displacements[static_cast<std::size_t>(index)], options)) {
+      texts.push_back("material '" + scene.material_names[i] + "': " + text);
+    }
+  }
+  return texts;
+}
+
+double expected_rays(const RenderSettings& settings)
+{
+  // Of camera, bounces and shadows: what the example scenes have.
+  constexpr double kRaysPerSample = 4;
+  return kRaysPerSample * settings.samples * static_cast<double>(settings.width) * settings.height;
+}
+
+}  // namespace relief

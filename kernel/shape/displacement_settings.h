@@ -1,0 +1,46 @@
+// How a material displaces its meshes: read by scene/, traced by displacement/.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "kernel/kernel.h"
+#include "kernel/texture/texture_view.h"
+
+namespace relief {
+
+/// How displaced meshes are traced.
+enum class DisplacementMethod : std::uint8_t {
+  kAuto,  ///< what the scene and the memory ask for
+#define X(name, label) name,
+#include "kernel/shape/displacement_methods.inc"
+#undef X
+};
+
+inline constexpr std::string_view kDisplacementMethodLabels[] = {
+    "auto",
+#define X(name, label) label,
+#include "kernel/shape/displacement_methods.inc"
+#undef X
+};
+
+RELIEF_KERNEL std::string_view displacement_method_label(DisplacementMethod method)
+{
+  return kDisplacementMethodLabels[static_cast<int>(method)];
+}
+
+enum class DisplacementSpace : std::uint8_t { kObject, kWorld };
+
+struct DisplacementSettings {
+  TextureRef height;  ///< its texture index is that of a height map; never −1
+  float scale = 1;    ///< metres
+  float midlevel = 0.5f;
+  DisplacementSpace space = DisplacementSpace::kObject;
+  DisplacementMethod method = DisplacementMethod::kAuto;
+  float lod = 0;  ///< −1: auto
+  bool smoothing = false;
+  bool weld_seams = false;
+  bool has_graph = false;  ///< the height map is made of a value graph
+};
+
+}  // namespace relief
