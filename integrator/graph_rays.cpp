@@ -2,6 +2,7 @@
 
 #include <bit>
 
+#include "kernel/math/rounding.h"
 #include "kernel/sample/sobol.h"
 #include "kernel/sample/warp.h"
 
@@ -41,9 +42,8 @@ bool is_stopped(const Accel& accel, Vec3f O, Vec3f D, float length, std::int32_t
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
     const unsigned object = ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID;
     if (instance < 0 || object == static_cast<unsigned>(instance)) return true;
-    const float next = ray.ray.tfar;
-    if (!(next > from)) return false;
-    from = next;
+    // Embree would give the same hit again: a ray that starts at one meets it.
+    from = next_float_up(ray.ray.tfar);
   }
 }
 
