@@ -26,7 +26,7 @@ Vec3f y_up(Vec3f v) { return {v.x, v.z, -v.y}; }
 bool is_stopped(const Accel& accel, Vec3f O, Vec3f D, float length, std::int32_t instance)
 {
   // The closest hit, for what lets shadow rays through in part stops these.
-  float from = 0.0f;
+  float from = kLeastDistance;
   for (;;) {
     EmbreeContext context;
     embree_context_init(context, false);
