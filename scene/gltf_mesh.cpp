@@ -366,7 +366,8 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
       t = {t.v0 - first, t.v1 - first, t.v2 - first};
     }
     const std::size_t num_vertices = *highest - first + 1;
-    constexpr std::size_t kMostVertexBytes = 2 * sizeof(Vec3f) + sizeof(Normal3f) + 2 * sizeof(Vec2f) + 2 * sizeof(Vec4f);
+    constexpr std::size_t kMostVertexBytes =
+        2 * sizeof(Vec3f) + sizeof(Normal3f) + 2 * sizeof(Vec2f) + 2 * sizeof(Vec4f);
     constexpr std::size_t kWorthALook = std::size_t{1} << 20;
     const std::size_t vertex_bytes = kMostVertexBytes + columns.size() * sizeof(Vec4f);
     if (num_vertices > kWorthALook / vertex_bytes) {

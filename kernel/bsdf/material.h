@@ -49,7 +49,7 @@ struct Material {
   TextureRef specular_texture;        ///< A
   TextureRef specular_color_texture;  ///< sRGB
 
-  int graph_index = -1;            ///< into KernelGlobals::graphs, which gives factors in place of those above; −1: none
+  int graph_index = -1;  ///< into KernelGlobals::graphs, which gives factors in place of those above; −1: none
   std::uint32_t graph_outputs = 0;  ///< bit GraphOutput: what it gives
   bool has_closures = false;        ///< the graph's closures scatter, in place of everything above but the emission and
                                     ///< what absorbs; transmission, metallic, roughness sum them up

@@ -20,8 +20,8 @@ GraphValue graph_convert(GraphBuilder& build, const GraphValue& value, GraphType
 
 const GraphNodeKind* graph_node_kind(std::string_view name)
 {
-  for (const auto kinds : {graph_input_nodes(), graph_texture_nodes(), graph_color_nodes(), graph_math_nodes(),
-                           graph_sky_nodes()}) {
+  for (const auto kinds :
+       {graph_input_nodes(), graph_texture_nodes(), graph_color_nodes(), graph_math_nodes(), graph_sky_nodes()}) {
     for (const GraphNodeKind& kind : kinds) {
       if (kind.name == name) return &kind;
     }

@@ -3,8 +3,8 @@
 #include <filesystem>
 
 #include "scene/load.h"
-#include "tests/support/displacement_methods.h"
 #include "tests/image/render_runs.h"
+#include "tests/support/displacement_methods.h"
 
 namespace relief::test {
 namespace {

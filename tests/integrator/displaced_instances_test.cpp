@@ -98,10 +98,7 @@ TEST_P(DisplacedInstances, AreMetWhereTheirTransformsPutThem)
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods,
-                         DisplacedInstances,
-                         testing::ValuesIn(traversing_methods()),
-                         method_test_name);
+INSTANTIATE_TEST_SUITE_P(Methods, DisplacedInstances, testing::ValuesIn(traversing_methods()), method_test_name);
 
 }  // namespace
 }  // namespace relief::test

@@ -121,10 +121,7 @@ TEST_P(WorldDisplacement, MovesAlongTheWorldsNormalByItsMetres)
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods,
-                         WorldDisplacement,
-                         testing::ValuesIn(traversing_methods()),
-                         method_test_name);
+INSTANTIATE_TEST_SUITE_P(Methods, WorldDisplacement, testing::ValuesIn(traversing_methods()), method_test_name);
 
 TEST(WorldDisplacementMeshes, AreSharedUnderOneMapAndUnderSimilarities)
 {

@@ -442,7 +442,8 @@ TEST(Mixture, InputsThatAreNoNumbersGiveFiniteLight)
   for (int i = 0; i < 3000; ++i) {
     float numbers[sizeof(Principled4Inputs) / sizeof(float)];
     for (float& x : numbers) {
-      x = closure_input(splat8(random.next() < 0.2f ? kBad[static_cast<int>(5.99f * random.next())] : random.next()))[0];
+      x = closure_input(
+          splat8(random.next() < 0.2f ? kBad[static_cast<int>(5.99f * random.next())] : random.next()))[0];
     }
     const MixtureCase one{"", [&](MixtureBuild& b) {
                             Principled4Inputs four;
