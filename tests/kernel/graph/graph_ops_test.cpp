@@ -65,11 +65,11 @@ const Definition kDefinitions[] = {
     {Op::tanh, [](In x) { return std::tanh(x[0]); }},
 };
 
-class GraphOps : public testing::TestWithParam<GraphRun> {
+class GraphOps : public testing::TestWithParam<test::Interpreter> {
  protected:
   void SetUp() override
   {
-    if (GetParam() == graph_run_avx2 && !test::has_avx2()) GTEST_SKIP() << "no AVX2 here";
+    if (!GetParam().is_runnable) GTEST_SKIP() << "no " << GetParam().name << " here";
   }
 };
 
@@ -80,7 +80,7 @@ TEST_P(GraphOps, AreTheirDefinitions)
     int num_wrong = 0;
     for (int round = 0; round < 20'000 && num_wrong < 3; ++round) {
       const auto in = numbers.lanes(static_cast<std::size_t>(test::shape_of(d.op).num_inputs));
-      const std::vector<float> out = run_one(GetParam(), d.op, in)[0];
+      const std::vector<float> out = run_one(GetParam().run, d.op, in)[0];
       for (std::size_t k = 0; k < 8; ++k) {
         double x[3] = {};
         for (std::size_t i = 0; i < in.size(); ++i) x[i] = static_cast<double>(in[i][k]);
@@ -147,7 +147,7 @@ TEST_P(GraphOps, ColoursAreTheirDefinitions)
       std::vector<std::vector<float>> in = {numbers.row(0, 1), numbers.row(0, 1), numbers.row(0, 1)};
       if (round % 4 == 0) in[round / 4 % 3] = in[(round / 4 + 1) % 3];  // two alike
       if (round % 50 == 0) in[0] = in[1] = in[2];
-      const test::Outputs out = run_one(GetParam(), c.op, in);
+      const test::Outputs out = run_one(GetParam().run, c.op, in);
       for (std::size_t k = 0; k < 8; ++k) {
         double x[3];
         for (std::size_t i = 0; i < 3; ++i) x[i] = static_cast<double>(in[i][k]);
@@ -178,7 +178,7 @@ TEST_P(GraphOps, TablesAreInterpolated)
     const auto in = numbers.lanes(1);
     const std::vector<std::uint16_t> immediates = {static_cast<std::uint16_t>(before), 0,
                                                    static_cast<std::uint16_t>(entries), interpolated, goes_on};
-    const std::vector<float> out = run_one(GetParam(), Op::table, in, immediates, nullptr, table)[0];
+    const std::vector<float> out = run_one(GetParam().run, Op::table, in, immediates, nullptr, table)[0];
     const float* row = table.data() + before;
     const auto at = [&](std::size_t i) { return static_cast<double>(row[i]); };
     const double last = static_cast<double>(entries - 1);
@@ -205,7 +205,7 @@ TEST_P(GraphOps, FresnelIsThatOfADielectric)
   HardNumbers numbers(4);
   for (int round = 0; round < 5'000; ++round) {
     const std::vector<std::vector<float>> in = {numbers.row(-1, 1), numbers.row(0.3f, 4)};
-    const std::vector<float> out = run_one(GetParam(), Op::fresnel, in)[0];
+    const std::vector<float> out = run_one(GetParam().run, Op::fresnel, in)[0];
     for (std::size_t k = 0; k < 8; ++k) {
       const double c = std::abs(static_cast<double>(in[0][k])), eta = static_cast<double>(in[1][k]);
       const double g_squared = eta * eta - 1 + c * c;
@@ -230,7 +230,7 @@ TEST_P(GraphOps, ImagesAreLookedUpWithVUp)
   const std::vector<std::vector<float>> in = {{0.1f, 0.3f, 0.6f, 0.9f, 0.1f, 0.3f, 0.6f, 0.9f},
                                               {0.9f, 0.9f, 0.9f, 0.9f, 0.1f, 0.1f, 0.1f, 0.1f},
                                               std::vector<float>(8, 0.0f)};
-  const test::Outputs out = run_one(GetParam(), Op::image, in, {1}, textures);
+  const test::Outputs out = run_one(GetParam().run, Op::image, in, {1}, textures);
   for (std::size_t k = 0; k < 8; ++k) {
     EXPECT_FLOAT_EQ(out[0][k], static_cast<float>(k) / 255.0f);
     EXPECT_EQ(out[3][k], 1);
@@ -248,7 +248,8 @@ TEST_P(GraphOps, ImagesAreReadAtAnyCoordinates)
       texture.width = 3, texture.height = 2, texture.num_levels = 1, texture.num_channels = 1;
       texture.wrap_u = texture.wrap_v = wrap, texture.filter = filter;
       for (int round = 0; round < 2'000; ++round) {
-        for (const std::vector<float>& channel : run_one(GetParam(), Op::image, numbers.lanes(3), {0, 0}, &texture)) {
+        for (const std::vector<float>& channel :
+             run_one(GetParam().run, Op::image, numbers.lanes(3), {0, 0}, &texture)) {
           for (const float x : channel) EXPECT_TRUE(x >= 0 && x <= 1) << x;
         }
       }
@@ -256,11 +257,9 @@ TEST_P(GraphOps, ImagesAreReadAtAnyCoordinates)
   }
 }
 
-std::string name_of_run(const testing::TestParamInfo<GraphRun>& info)
-{
-  return info.param == graph_run_baseline ? "baseline" : "avx2";
-}
-INSTANTIATE_TEST_SUITE_P(All, GraphOps, testing::Values(graph_run_baseline, graph_run_avx2), name_of_run);
+INSTANTIATE_TEST_SUITE_P(All, GraphOps, testing::ValuesIn(test::interpreters()), [](const auto& each) {
+  return std::string(each.param.name);
+});
 
 /// Choices of an operation's immediates: all for modes, some for numbers.
 std::vector<std::vector<std::uint16_t>> immediates_of(Op op)
@@ -290,6 +289,8 @@ TEST(GraphInterpreters, TakeAnyNumbers)
   texture.levels[0] = texels;
   texture.width = 3, texture.height = 2, texture.num_levels = 1, texture.num_channels = 1;
   const std::vector<float> table(4096, 0.0f);
+  std::vector<test::Interpreter> others = test::interpreters();
+  std::erase_if(others, [](const auto& other) { return !other.is_runnable || other.run == graph_run_baseline; });
   for (int i = 0; i < static_cast<int>(std::size(kGraphOpShapes)); ++i) {
     const Op op = static_cast<Op>(i);
     const bool is_slow = op >= Op::voronoi_1d && op <= Op::musgrave_4d;
@@ -298,16 +299,17 @@ TEST(GraphInterpreters, TakeAnyNumbers)
       for (int round = 0; round < (is_slow ? 100 : 1000); ++round) {
         const auto in = numbers.lanes(static_cast<std::size_t>(test::shape_of(op).num_inputs));
         const test::Outputs baseline = run_one(graph_run_baseline, op, in, immediates, &texture, table);
-        if (!test::has_avx2()) continue;
-        const test::Outputs avx2 = run_one(graph_run_avx2, op, in, immediates, &texture, table);
-        for (std::size_t o = 0; o < baseline.size(); ++o) {
-          for (std::size_t k = 0; k < 8; ++k) {
-            const double a = static_cast<double>(baseline[o][k]), b = static_cast<double>(avx2[o][k]);
-            const bool is_moderate =
-                std::all_of(in.begin(), in.end(), [k](const auto& row) { return std::abs(row[k]) <= 100; });
-            if (!is_moderate && std::isfinite(a) && std::isfinite(b)) continue;
-            ++num_all;
-            num_apart += is_like(a, b, 1e-4 * std::max(1.0, std::abs(b))) ? 0 : 1;
+        for (const test::Interpreter& other : others) {
+          const test::Outputs outputs = run_one(other.run, op, in, immediates, &texture, table);
+          for (std::size_t o = 0; o < baseline.size(); ++o) {
+            for (std::size_t k = 0; k < 8; ++k) {
+              const double a = static_cast<double>(baseline[o][k]), b = static_cast<double>(outputs[o][k]);
+              const bool is_moderate =
+                  std::all_of(in.begin(), in.end(), [k](const auto& row) { return std::abs(row[k]) <= 100; });
+              if (!is_moderate && std::isfinite(a) && std::isfinite(b)) continue;
+              ++num_all;
+              num_apart += is_like(a, b, 1e-4 * std::max(1.0, std::abs(b))) ? 0 : 1;
+            }
           }
         }
       }

@@ -20,13 +20,14 @@ std::vector<double> lane(const std::vector<std::vector<float>>& in, std::size_t 
   return p;
 }
 
-class GraphProcedural : public testing::TestWithParam<std::tuple<GraphRun, std::size_t>> {
+class GraphProcedural : public testing::TestWithParam<std::tuple<test::Interpreter, std::size_t>> {
  protected:
   void SetUp() override
   {
-    if (run() == graph_run_avx2 && !test::has_avx2()) GTEST_SKIP() << "no AVX2 here";
+    const test::Interpreter& interpreter = std::get<0>(GetParam());
+    if (!interpreter.is_runnable) GTEST_SKIP() << "no " << interpreter.name << " here";
   }
-  static GraphRun run() { return std::get<0>(GetParam()); }
+  static GraphRun run() { return std::get<0>(GetParam()).run; }
   static std::size_t dims() { return std::get<1>(GetParam()); }
   static std::vector<std::vector<float>> point(HardNumbers& numbers, float range)
   {
@@ -166,14 +167,13 @@ TEST_P(GraphProcedural, CellsAreWorleys)
   }
 }
 
-std::string name_of(const testing::TestParamInfo<std::tuple<GraphRun, std::size_t>>& info)
+std::string name_of(const testing::TestParamInfo<std::tuple<test::Interpreter, std::size_t>>& info)
 {
-  return (std::get<0>(info.param) == graph_run_baseline ? "baseline" : "avx2") +
-         std::to_string(std::get<1>(info.param)) + "d";
+  return std::get<0>(info.param).name + std::to_string(std::get<1>(info.param)) + "d";
 }
 INSTANTIATE_TEST_SUITE_P(All,
                          GraphProcedural,
-                         testing::Combine(testing::Values(graph_run_baseline, graph_run_avx2),
+                         testing::Combine(testing::ValuesIn(test::interpreters()),
                                           testing::Values<std::size_t>(1, 2, 3, 4)),
                          name_of);
 

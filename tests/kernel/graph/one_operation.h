@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <ostream>
 #include <random>
 #include <vector>
 
@@ -13,7 +14,25 @@
 
 namespace relief::test {
 
-inline bool has_avx2() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
+/// An interpreter that is compiled for some instruction set.
+struct Interpreter {
+  const char* name;
+  GraphRun run;
+  bool is_runnable;  ///< on this machine
+};
+
+inline std::vector<Interpreter> interpreters()
+{
+  const bool has_avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+  const bool has_avx512 = has_avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+                          __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw");
+  return {{"baseline", graph_run_baseline, true},
+          {"avx2", graph_run_avx2, has_avx2},
+          {"avx512", graph_run_avx512, has_avx512}};
+}
+
+/// How GoogleTest prints an interpreter.
+inline void PrintTo(const Interpreter& interpreter, std::ostream* out) { *out << interpreter.name; }
 
 inline const GraphOpShape& shape_of(GraphOp op) { return kGraphOpShapes[static_cast<int>(op)]; }
 
