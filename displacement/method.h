@@ -44,7 +44,7 @@ namespace avx2 {
 }
 #undef X
 
-/// What the exact methods are chosen from without a word from anybody.
+/// What `auto` means where it does not tessellate.
 inline constexpr DisplacementMethod kDefaultMethod = DisplacementMethod::chord;
 
 /// Entry of a method as plain x86-64 has it.

@@ -7,12 +7,12 @@
 
 namespace relief {
 
-/// A ray's curve in one triangle of a mesh.
+/// A ray's curve in one triangle of a mesh, object space.
 struct PrismQuery {
   const DisplacedMeshView& mesh;
   std::uint32_t triangle;
   const RayCurve& curve;  ///< of this ray and triangle
-  double t_min, t_max;    ///< hits count within
+  double t_min, t_max;    ///< hits count within; in units of the ray's direction
   bool any_hit;           ///< whichever is found first will do
   const RmipOptions& rmip_options;
   TraversalCounters& counters;
@@ -46,8 +46,11 @@ RELIEF_KERNEL PrismSearch prism_search_make(const PrismQuery& q, DisplacedHit* h
           q.counters.bounds + kBoundsAPoll};
 }
 
-/// The leaf test of one cell; keeps the nearest hit.
-/// @return  true if there was one
+/// The leaf test of one cell, in which all traversals end; keeps the nearest hit.
+/// @param g           segment of the curve
+/// @param i, j        the cell, lattice coordinates
+/// @param tau0, tau1  contains every τ at which the curve is in the cell; may reach beyond [0, 1]
+/// @return            true if there was one
 RELIEF_KERNEL bool cell_intersect(PrismSearch& c,
                                   const CurveSegment& g,
                                   std::int64_t i,
