@@ -10,6 +10,7 @@
 #include <tbb/parallel_reduce.h>
 
 #include "displacement/far_ray.h"
+#include "displacement/lattice_split.h"
 #include "displacement/level_of_detail.h"
 #include "displacement/seams.h"
 #include "kernel/math/rounding.h"
@@ -74,11 +75,6 @@ bool is_unfolded(const DisplacedTriangle& tri)
   }
   return positive || negative;
 }
-
-/// Bounds of heights.
-struct HeightBounds {
-  double low = static_cast<double>(kInfinity), high = -low;
-};
 
 /// Bounds of the heights between lattice positions on one level.
 /// @param x, y  of the positions
@@ -203,11 +199,50 @@ DisplacedMesh::DisplacedMesh(const MeshView& mesh,
     seam_edges_.resize(triangles_.size());
     for (const SeamWall& wall : walls_) seam_edges_[wall.edge / 3] |= static_cast<std::uint8_t>(1u << (wall.edge % 3));
   }
-  std::atomic<std::uint32_t> num_folded{0}, num_short{0}, num_degenerate{0};
-  tbb::parallel_for(std::uint32_t{0}, mesh.num_triangles, [&](std::uint32_t index) {
+  report_.num_walls = static_cast<std::uint32_t>(walls_.size());
+  report_.num_far_uv = num_far_uv;
+  report_.first_far_uv = first_far_uv;
+  bound_triangles([&](std::uint32_t index) {
+    return height_bounds(triangles_[index], walls_of(walls_, index), field, coarser);
+  });
+}
+
+DisplacedMesh::DisplacedMesh(const MeshView& mesh, const ProceduralField& field, const DisplacementMapping& mapping)
+    : triangles_(field.triangles().size()), unfolded_(triangles_.size()), mapping_(mapping)
+{
+  tbb::parallel_for(std::size_t{0}, triangles_.size(), [&](std::size_t index) {
+    const LatticeTriangle& lattice = field.triangles()[index];
+    const TriangleIndices& v = mesh.triangles[lattice.base];
+    const Vec3f P[3] = {mesh.P[v.v0], mesh.P[v.v1], mesh.P[v.v2]};
+    const Vec3d facet = cross(to_double(P[1]) - to_double(P[0]), to_double(P[2]) - to_double(P[0]));
+    const double area = length(facet);
+    const Vec3f flat = area > 0 ? to_float(facet * (1.0 / area)) : Vec3f{0, 0, 0};
+    const auto normal = [&](std::uint32_t vertex) { return mesh.N != nullptr ? as_vector(mesh.N[vertex]) : flat; };
     DisplacedTriangle& tri = triangles_[index];
-    const HeightBounds h = height_bounds(tri, walls_of(walls_, index), field, coarser);
-    double d_low = mapping.scale * (h.low - mapping.midlevel), d_high = mapping.scale * (h.high - mapping.midlevel);
+    for (int k = 0; k < 3; ++k) {
+      tri.P[k] = lattice_corner(lattice.corner[k], P[0], P[1], P[2]);
+      tri.N[k] = lattice_corner(lattice.corner[k], normal(v.v0), normal(v.v1), normal(v.v2));
+      tri.x[k] = k == 1 ? lattice.n : 0;
+      tri.y[k] = k == 2 ? lattice.n : 0;
+    }
+    tri.s_min = tri.s_max = 0;
+  });
+  bound_triangles([&](std::uint32_t index) {
+    const LatticeRange range = field.range(index);
+    return HeightBounds{range.low, range.high};
+  });
+}
+
+/// Bounds the prisms, and the mesh.
+/// @param heights  of a triangle
+void DisplacedMesh::bound_triangles(const std::function<HeightBounds(std::uint32_t)>& heights)
+{
+  const auto num_triangles = static_cast<std::uint32_t>(triangles_.size());
+  std::atomic<std::uint32_t> num_folded{0}, num_short{0}, num_degenerate{0};
+  tbb::parallel_for(std::uint32_t{0}, num_triangles, [&](std::uint32_t index) {
+    DisplacedTriangle& tri = triangles_[index];
+    const HeightBounds h = heights(index);
+    double d_low = mapping_.scale * (h.low - mapping_.midlevel), d_high = mapping_.scale * (h.high - mapping_.midlevel);
     if (d_low > d_high) std::swap(d_low, d_high);
 
     const double longest =
@@ -227,10 +262,11 @@ DisplacedMesh::DisplacedMesh(const MeshView& mesh,
     unfolded_[index] = is_unfolded(tri) ? 1 : 0;
     if (unfolded_[index] == 0) num_folded.fetch_add(1, std::memory_order_relaxed);
   });
-  report_ = {num_folded.load(), num_short.load(),   num_degenerate.load(), static_cast<std::uint32_t>(walls_.size()),
-             num_far_uv.load(), first_far_uv.load()};
+  report_.num_folded = num_folded;
+  report_.num_short_normals = num_short;
+  report_.num_degenerate = num_degenerate;
   box_ = tbb::parallel_reduce(
-      tbb::blocked_range<std::uint32_t>(0, mesh.num_triangles), box_empty(),
+      tbb::blocked_range<std::uint32_t>(0, num_triangles), box_empty(),
       [&](const tbb::blocked_range<std::uint32_t>& range, Box3 sum) {
         for (std::uint32_t index = range.begin(); index < range.end(); ++index) {
           const Box3f each = displaced_triangle_bounds(view(), index);
@@ -239,7 +275,7 @@ DisplacedMesh::DisplacedMesh(const MeshView& mesh,
         return sum;
       },
       box_union);
-  if (mesh.num_triangles > 0) pad_ = ray_target_pad(ray_target_make(box_));
+  if (num_triangles > 0) pad_ = ray_target_pad(ray_target_make(box_));
 }
 
 DisplacedMeshView DisplacedMesh::view() const

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <vector>
 
 #include "displacement/displaced_triangle.h"
+#include "displacement/procedural_field.h"
 #include "kernel/math/box.h"
 #include "kernel/shape/mesh_view.h"
 
@@ -50,6 +52,11 @@ struct Box3f {
   Vec3f low, high;
 };
 
+/// Bounds of heights.
+struct HeightBounds {
+  double low = static_cast<double>(kInfinity), high = -low;
+};
+
 class DisplacedMesh {
  public:
   DisplacedMesh() = default;
@@ -63,6 +70,11 @@ class DisplacedMesh {
                 const DisplacementMapping& mapping,
                 std::span<const HeightFieldView* const> coarser = {});
 
+  /// A mesh whose heights are computed: its triangles are the lattices', which may be parts of the mesh's.
+  /// @param field    must outlive the mesh
+  /// @param mapping  scale and midlevel
+  DisplacedMesh(const MeshView& mesh, const ProceduralField& field, const DisplacementMapping& mapping);
+
   DisplacedMeshView view() const;
   const DisplacedMeshReport& report() const { return report_; }
   /// Box around all prisms, object space.
@@ -75,6 +87,8 @@ class DisplacedMesh {
   }
 
  private:
+  void bound_triangles(const std::function<HeightBounds(std::uint32_t)>& heights);
+
   std::vector<DisplacedTriangle> triangles_;
   std::vector<std::uint8_t> unfolded_;
   std::vector<std::uint8_t> seam_edges_;  ///< empty: seams stay open

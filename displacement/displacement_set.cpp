@@ -102,6 +102,16 @@ std::optional<TessellationKind> tessellation_kind(DisplacementMethod method)
   return method == DisplacementMethod::kAuto ? std::nullopt : displacement_method(method).tessellation;
 }
 
+/// Brings a point's place from a part of a triangle to the triangle.
+void set_base_place(const ProceduralField& field, DisplacedPoint* point)
+{
+  const LatticeTriangle& part = field.triangles()[point->triangle];
+  const Vec2f place = (1.0f - point->u - point->v) * part.corner[0] + point->u * part.corner[1] + point->v * part.corner[2];
+  point->triangle = part.base;
+  point->u = place.x;
+  point->v = place.y;
+}
+
 }  // namespace
 
 std::vector<std::string> displacement_warnings(const DisplacementSettings& settings, const DisplacementOptions& options)
@@ -138,7 +148,7 @@ DisplacementSet::Levels DisplacementSet::levels_of(const Use& use, const Displac
 std::vector<DisplacementSet::Use> DisplacementSet::find_uses(const DisplacementInput& input)
 {
   std::vector<Use> uses;
-  std::map<std::tuple<int, int, double>, int> known;  // mesh, displacement, scale in object space
+  std::map<std::tuple<int, int, int, double>, int> known;  // mesh, displacement, heights, scale in object space
   for (std::size_t i = 0; i < input.instances.size(); ++i) {
     const DisplacedInstance& instance = input.instances[i];
     if (instance.displacement_index < 0) continue;
@@ -148,10 +158,14 @@ std::vector<DisplacementSet::Use> DisplacementSet::find_uses(const DisplacementI
     if (settings.space == DisplacementSpace::kWorld) scale /= similarity_scale(instance.world_from_object);
     const auto mesh = static_cast<std::size_t>(instance.mesh_index);
     const auto [at, is_new] =
-        known.try_emplace({instance.mesh_index, instance.displacement_index, scale}, static_cast<int>(uses.size()));
+        known.try_emplace({instance.mesh_index, instance.displacement_index, instance.heights_index, scale},
+                          static_cast<int>(uses.size()));
     geometry_of_instance_[i] = at->second;
-    if (is_new)
-      uses.push_back({input.meshes[mesh], input.mesh_names[mesh], instance.displacement_index, settings, scale});
+    if (is_new) {
+      const int heights = instance.heights_index;
+      uses.push_back({input.meshes[mesh], input.mesh_names[mesh], instance.displacement_index, settings,
+                      heights < 0 ? nullptr : &input.heights[static_cast<std::size_t>(heights)], scale});
+    }
     const Stretch stretch = stretch_of(instance.world_from_object);
     double& steepening = uses[static_cast<std::size_t>(at->second)].steepening;
     steepening = std::max(steepening, stretch.most / stretch.least);
@@ -161,6 +175,7 @@ std::vector<DisplacementSet::Use> DisplacementSet::find_uses(const DisplacementI
 
 DisplacementSet::DisplacementSet(const DisplacementInput& input, const DisplacementOptions& options)
     : height_maps_(input.height_maps),
+      heights_owner_(input.heights_owner),
       geometry_of_instance_(input.instances.size(), -1),
       texel_of_instance_(input.instances.size(), 0.0f)
 {
@@ -170,6 +185,10 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
   const double num_rays = options.num_rays / static_cast<double>(num_displaced);
   std::uint64_t tessellated_bytes = 0;
   for (const Use& use : uses) {
+    if (use.heights != nullptr) {
+      geometries_.push_back(make_computed(use, options));
+      continue;
+    }
     geometries_.push_back(make_displaced(use, options));
     tessellate(*geometries_.back(), options, method_of(use.settings, options) == DisplacementMethod::kAuto, num_rays,
                &tessellated_bytes);
@@ -208,6 +227,28 @@ std::unique_ptr<DisplacementSet::Displaced> DisplacementSet::make_displaced(cons
   geometry.mesh = displaced->mesh.view();
   geometry.lod = {levels.count, levels.by_cone, levels.fixed, displaced->mesh.widest_texel()};
   has_levels_ |= levels.count > 1;
+  return displaced;
+}
+
+std::unique_ptr<DisplacementSet::Displaced> DisplacementSet::make_computed(const Use& use,
+                                                                           const DisplacementOptions& options)
+{
+  const ComputedHeights& heights = *use.heights;
+  auto displaced = std::make_unique<Displaced>();
+  displaced->name = use.mesh_name;
+  displaced->displacement_index = use.displacement_index;
+  displaced->method = kDefaultMethod;
+  displaced->procedural = std::make_unique<ProceduralField>(
+      heights.source,
+      heights.num_cells > 0 ? lattices_make(use.mesh, heights.num_cells) : lattices_make(use.mesh, heights.cells),
+      use.settings.midlevel, options.computed_bytes);
+  displaced->mesh = DisplacedMesh(use.mesh, *displaced->procedural,
+                                  {.height = {}, .scale = use.scale, .midlevel = use.settings.midlevel});
+  DisplacedGeometry& geometry = displaced->geometry;
+  geometry.method = displaced->method;
+  geometry.smooth = use.settings.smoothing;
+  geometry.procedural = displaced->procedural.get();
+  geometry.mesh = displaced->mesh.view();
   return displaced;
 }
 
@@ -307,7 +348,9 @@ DisplacedPoint DisplacementSet::resolve(std::size_t instance,
 {
   const Displaced& d = displaced(instance);
   if (d.tessellation == nullptr) {
-    return displaced_resolve(d.geometry, placement, texel_of_instance_[instance], primitive, record);
+    DisplacedPoint out = displaced_resolve(d.geometry, placement, texel_of_instance_[instance], primitive, record);
+    if (d.procedural != nullptr) set_base_place(*d.procedural, &out);
+    return out;
   }
   const MicroHit hit = d.tessellation->hit(primitive, record.u, record.v);
   DisplacedPoint out{hit.triangle, static_cast<float>(hit.b1), static_cast<float>(hit.b2)};
@@ -320,9 +363,19 @@ DisplacedPoint DisplacementSet::resolve(std::size_t instance,
 DisplacedPoint DisplacementSet::locate(std::size_t instance, std::uint32_t primitive, float u, float v) const
 {
   const Displaced& d = displaced(instance);
-  if (d.tessellation == nullptr) return {primitive, u, v};
+  if (d.tessellation == nullptr) {
+    DisplacedPoint out{primitive, u, v};
+    if (d.procedural != nullptr) set_base_place(*d.procedural, &out);
+    return out;
+  }
   const MicroHit hit = d.tessellation->locate(primitive, u, v);
   return {hit.triangle, static_cast<float>(hit.b1), static_cast<float>(hit.b2)};
+}
+
+SeamReport DisplacementSet::seams(std::size_t index) const
+{
+  // Of computed heights no sides are compared.
+  return geometries_[index]->procedural == nullptr ? seam_report(geometries_[index]->mesh.view()) : SeamReport{};
 }
 
 std::size_t DisplacementSet::bytes() const
@@ -334,6 +387,7 @@ std::size_t DisplacementSet::bytes() const
   }
   for (const auto& displaced : geometries_) {
     sum += displaced->mesh.bytes();
+    if (displaced->procedural != nullptr) sum += displaced->procedural->bytes();
     if (displaced->tessellation != nullptr) sum += displaced->tessellation->bytes();
   }
   return sum;
@@ -381,6 +435,11 @@ std::vector<std::string> DisplacementSet::warnings() const
     if (report.num_degenerate > 0) {
       texts.push_back(std::to_string(report.num_degenerate) + of +
                       "have no normal to be displaced along and are left out");
+    }
+    if (displaced->procedural != nullptr && displaced->procedural->is_sampled()) {
+      texts.push_back("the heights of mesh '" + displaced->name +
+                      "' have no bounds that are known; those beyond what some points of it have, and as much again, are "
+                      "cut off");
     }
     if (report.num_far_uv > 0) {
       const HeightMapView& map = displaced->geometry.mesh.field->map;

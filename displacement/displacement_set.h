@@ -14,8 +14,10 @@
 #include "displacement/displaced_mesh.h"
 #include "displacement/embree_geometry.h"
 #include "displacement/height_level.h"
+#include "displacement/lattice_split.h"
 #include "displacement/seams.h"
 #include "displacement/tessellation.h"
+#include "kernel/camera/camera.h"
 
 namespace relief {
 
@@ -23,7 +25,15 @@ namespace relief {
 struct DisplacedInstance {
   int mesh_index = 0;
   int displacement_index = -1;  ///< −1: not displaced
+  int heights_index = -1;       ///< of heights that are computed; −1: the displacement has a map
   Affine3 world_from_object;
+};
+
+/// Heights of a mesh that are computed where they are wanted.
+struct ComputedHeights {
+  HeightSource source;
+  CellsAlong cells;      ///< that are wanted; not used with num_cells
+  std::int32_t num_cells = 0;  ///< along each side of all triangles, a power of two; 0: by `cells`
 };
 
 /// What there is to be displaced.
@@ -33,6 +43,8 @@ struct DisplacementInput {
   std::vector<HeightMapView> height_maps;  ///< their texels must outlive the set
   std::span<const DisplacementSettings> settings;
   std::vector<DisplacedInstance> instances;
+  std::vector<ComputedHeights> heights;
+  std::shared_ptr<const void> heights_owner;  ///< of what their sources read
 };
 
 /// What overrides the settings.
@@ -41,7 +53,10 @@ struct DisplacementOptions {
   std::optional<float> lod;                  ///< of all height maps, see DisplacementSettings::lod
   double tessellation_rate = 1;              ///< micro-triangle edges a texel
   std::uint64_t auto_bytes = 0;              ///< what `auto` may use while it builds tessellations; 0: it builds none
+  std::optional<Camera> camera;              ///< by which computed heights choose their cells; empty: the scene's first
+  int picture_height = 0;                    ///< pixels, with a camera
   double num_rays = 0;                   ///< that will be traced, about, for `auto` to weigh building against tracing
+  std::uint64_t computed_bytes = std::uint64_t{256} << 20;  ///< computed heights that each mesh keeps, at most
   std::uint64_t tessellation_bytes = 0;  ///< all tessellations may take while they are built; 0: half of the machine's
 };
 
@@ -80,7 +95,7 @@ class DisplacementSet {
   /// Place of a displaced geometry's settings in the input.
   int displacement_index(std::size_t index) const { return geometries_[index]->displacement_index; }
   /// The texture seams of a displaced geometry's mesh.
-  SeamReport seams(std::size_t index) const { return seam_report(geometries_[index]->mesh.view()); }
+  SeamReport seams(std::size_t index) const;
   std::size_t bytes() const;            ///< besides the maps
   std::uint64_t num_triangles() const;  ///< of all geometries
   DisplacedMeshReport report() const;   ///< sums over all geometries
@@ -95,6 +110,7 @@ class DisplacementSet {
     std::string name;           ///< of the mesh
     int displacement_index;     ///< into the input's settings
     DisplacementMethod method;  ///< by which it is traced
+    std::unique_ptr<ProceduralField> procedural;  ///< heights that are computed
     DisplacedMesh mesh;
     DisplacedGeometry geometry;  ///< where it tessellates: what is tessellated
     std::unique_ptr<Tessellation> tessellation;
@@ -115,12 +131,14 @@ class DisplacementSet {
     const std::string& mesh_name;
     int displacement_index;
     const DisplacementSettings& settings;
+    const ComputedHeights* heights;  ///< null: a map's
     double scale = 1;       ///< metres of object space
     double steepening = 1;  ///< how much steeper its instances' slopes are in the world than in object space, at most
   };
   std::vector<Use> find_uses(const DisplacementInput& input);
   Levels levels_of(const Use& use, const DisplacementOptions& options) const;
   std::unique_ptr<Displaced> make_displaced(const Use& use, const DisplacementOptions& options);
+  std::unique_ptr<Displaced> make_computed(const Use& use, const DisplacementOptions& options);
   /// How many levels of a map, the finest first, look like the map on a mesh and all its instances: what they lose of its
   /// slopes and heights is little.
   int num_faithful_levels(const Use& use, int most);
@@ -143,6 +161,7 @@ class DisplacementSet {
   DisplacementLevel level(int map_index, int level, const DisplacementMethodEntry& method);
 
   std::vector<HeightMapView> height_maps_;
+  std::shared_ptr<const void> heights_owner_;
   std::vector<int> geometry_of_instance_;
   std::vector<float> texel_of_instance_;
   bool has_levels_ = false;

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "displacement/clearance.h"
 #include "displacement/seam_walls.h"
+#include "displacement/trace_procedural.h"
 #include "kernel/shape/surface_hit.h"
 
 namespace relief {
@@ -24,17 +26,24 @@ void bounds(const RTCBoundsFunctionArguments* arguments)
   out->upper_z = box.high.z;
 }
 
-/// A geometry's mesh and one of its triangles, on one level.
-struct OnLevel {
+/// A geometry's mesh and one of its triangles, with the heights around a point of it on one level.
+struct OnSurface {
   DisplacedMeshView mesh;
   DisplacedTriangle tri;
+  std::optional<TriangleOnTile> tile;
 
-  OnLevel(const DisplacedGeometry& geometry, std::uint32_t triangle, int level)
+  OnSurface(const DisplacedGeometry& geometry, std::uint32_t triangle, int level, double b1, double b2)
       : mesh(geometry.mesh), tri(geometry.mesh.triangles[triangle])
   {
-    if (level == 0) return;
-    mesh.field = geometry.levels[level].field;
-    tri = triangle_on_level(tri, *geometry.mesh.field, *mesh.field);
+    if (geometry.procedural != nullptr) {
+      tile.emplace(geometry.mesh, *geometry.procedural, triangle,
+                   lattice_tile_at(*geometry.procedural, triangle, b1, b2));
+      mesh = tile->mesh;
+      tri = tile->tri;
+    } else if (level > 0) {
+      mesh.field = geometry.levels[level].field;
+      tri = triangle_on_level(tri, *geometry.mesh.field, *mesh.field);
+    }
   }
 };
 
@@ -57,15 +66,16 @@ bool widen_by_neighbor(RTCPointQueryFunctionArguments* arguments)
   auto& box = *static_cast<BoxOverSides*>(arguments->userPtr);
   if (arguments->primID == box.triangle) return false;
   const DisplacedTriangle& own = box.geometry.mesh.triangles[box.triangle];
-  const OnLevel other(box.geometry, arguments->primID, box.level);
+  const DisplacedTriangle& neighbor = box.geometry.mesh.triangles[arguments->primID];
   double b[3] = {0, 0, 0};
   for (int k = 0; k < 3; ++k) {
     if (box.weights[k] == 0) continue;
     int at = 0;
-    while (at < 3 && !(other.tri.P[at] == own.P[k] && other.tri.N[at] == own.N[k])) ++at;
+    while (at < 3 && !(neighbor.P[at] == own.P[k] && neighbor.N[at] == own.N[k])) ++at;
     if (at == 3) return false;
     b[at] = box.weights[k];
   }
+  const OnSurface other(box.geometry, arguments->primID, box.level, b[1], b[2]);
   // From the point to where it is on the side, and from there once more.
   const SurfaceInBox near = surface_in_box(other.mesh, other.tri, b[1], b[2], 2.0 * box.reach);
   const double d = surface_point(other.mesh, other.tri, b[1], b[2]).d;
@@ -94,7 +104,7 @@ Vec3d leaving_reach(const InstanceView& placement, Vec3f P, Vec3f Ng)
 Vec3d leave_of(const DisplacedGeometry& geometry, std::uint32_t triangle, const DisplacedPlace& at, Vec3d reach)
 {
   const double b1 = at.b1, b2 = at.b2;
-  const OnLevel on(geometry, triangle, at.level);
+  const OnSurface on(geometry, triangle, at.level, b1, b2);
   const SurfaceInBox own = surface_in_box(on.mesh, on.tri, b1, b2, reach);
   double distance = own.crease ? own.clearance : 0;
   // A triangle within the box has no side that it could share.
@@ -129,7 +139,7 @@ SurfacePoint displaced_surface_point(const DisplacedGeometry& geometry,
     return seam_wall_point(geometry.mesh, triangle, place.edge, place.fraction, place.d,
                            {geometry.mesh.field, geometry.levels[place.level].field});
   }
-  const OnLevel on(geometry, triangle, place.level);
+  const OnSurface on(geometry, triangle, place.level, place.b1, place.b2);
   return surface_point(on.mesh, on.tri, place.b1, place.b2);
 }
 
@@ -139,7 +149,7 @@ Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry,
                               double b1,
                               double b2)
 {
-  const OnLevel on(geometry, triangle, level);
+  const OnSurface on(geometry, triangle, level, b1, b2);
   return surface_smooth_normal(on.mesh, on.tri, b1, b2);
 }
 

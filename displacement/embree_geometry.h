@@ -7,6 +7,7 @@
 #include "displacement/embree.h"
 #include "displacement/level_of_detail.h"
 #include "displacement/method.h"
+#include "displacement/procedural_field.h"
 
 namespace relief {
 
@@ -25,6 +26,7 @@ struct DisplacedGeometry {
   DisplacementLevel levels[kMaxLodLevels];     ///< the finest first; lod.num_levels of them
   RmipOptions rmip_options;                    ///< for both of RMIP's
   RTCFilterFunctionN shadow_filter = nullptr;  ///< called for hits of shadow rays; null: all of them are opaque
+  const ProceduralField* procedural = nullptr;  ///< heights in place of a map's; there are no levels then
   RTCScene scene = nullptr;  ///< of this geometry alone, committed; null: rays that leave it know no neighbours
 };
 

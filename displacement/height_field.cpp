@@ -6,6 +6,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include "kernel/assert.h"
+
 namespace relief {
 
 StoredRange texel_range(const HeightFieldView& f, std::int64_t at)
@@ -83,6 +85,42 @@ StoredRange line_range(const PyramidLine& line)
 }
 
 int divide_up(int a, int b) { return (a + b - 1) / b; }
+
+/// A field without its pyramid.
+HeightFieldView field_make(const HeightMapView& map)
+{
+  HeightFieldView f;
+  f.map = map;
+  f.x = lattice_axis(map.width, map.wrap_u);
+  f.y = lattice_axis(map.height, map.wrap_v);
+  f.h_step = 1.0 / 65535.0;
+  if (map.format == HeightFormat::kFloat) {
+    const auto count = static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height);
+    const auto [low, high] = float_extremes(static_cast<const float*>(map.texels), count);
+    f.h_offset = low;
+    f.h_step = high > low ? (static_cast<double>(high) - low) / 65535.0 : 1.0;
+  }
+  return f;
+}
+
+/// Bounds of a line's 16 nodes, from the level below or from the texels.
+/// @param columns, rows  nodes of the level
+PyramidLine line_make(const HeightFieldView& f, int level, int columns, int rows, int line_column, int line_row)
+{
+  PyramidLine line;
+  for (int child = 0; child < 16; ++child) {
+    const int column = 4 * line_column + (child & 3), row = 4 * line_row + (child >> 2);
+    StoredRange range = kEmpty;
+    if (column < columns && row < rows) {
+      range = level == 0 ? block_range(f, 4 * column, 4 * row)
+                         : line_range(f.lines[level - 1][static_cast<std::ptrdiff_t>(row) * f.line_columns[level - 1] +
+                                                         column]);
+    }
+    line.low[child] = range.low;
+    line.high[child] = range.high;
+  }
+  return line;
+}
 
 /// A rectangle of cells within one period, all inclusive, in pyramid columns and rows.
 struct CellRect {
@@ -164,40 +202,17 @@ int split_by_period(const LatticeAxis& axis, std::int64_t first, std::int64_t la
 
 }  // namespace
 
-HeightField::HeightField(const HeightMapView& map)
+HeightField::HeightField(const HeightMapView& map) : view_(field_make(map))
 {
   HeightFieldView& f = view_;
-  f.map = map;
-  f.x = lattice_axis(map.width, map.wrap_u);
-  f.y = lattice_axis(map.height, map.wrap_v);
-  f.h_step = 1.0 / 65535.0;
-  if (map.format == HeightFormat::kFloat) {
-    const auto count = static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height);
-    const auto [low, high] = float_extremes(static_cast<const float*>(map.texels), count);
-    f.h_offset = low;
-    f.h_step = high > low ? (static_cast<double>(high) - low) / 65535.0 : 1.0;
-  }
-
   int columns = divide_up(f.x.num_cells, 4), rows = divide_up(f.y.num_cells, 4);  // nodes of the level below the lines
   for (int level = 0;; ++level) {
     const int line_columns = divide_up(columns, 4), line_rows = divide_up(rows, 4);
     std::vector<PyramidLine> lines(static_cast<std::size_t>(line_columns) * static_cast<std::size_t>(line_rows));
-    const PyramidLine* below = level == 0 ? nullptr : f.lines[level - 1];
-    const int below_columns = level == 0 ? 0 : f.line_columns[level - 1];
     tbb::parallel_for(0, line_rows, [&](int line_row) {
       for (int line_column = 0; line_column < line_columns; ++line_column) {
-        PyramidLine& line = lines[static_cast<std::size_t>(line_row) * static_cast<std::size_t>(line_columns) +
-                                  static_cast<std::size_t>(line_column)];
-        for (int child = 0; child < 16; ++child) {
-          const int column = 4 * line_column + (child & 3), row = 4 * line_row + (child >> 2);
-          StoredRange range = kEmpty;
-          if (column < columns && row < rows) {
-            range = level == 0 ? block_range(f, 4 * column, 4 * row)
-                               : line_range(below[static_cast<std::ptrdiff_t>(row) * below_columns + column]);
-          }
-          line.low[child] = range.low;
-          line.high[child] = range.high;
-        }
+        lines[static_cast<std::size_t>(line_row) * static_cast<std::size_t>(line_columns) +
+              static_cast<std::size_t>(line_column)] = line_make(f, level, columns, rows, line_column, line_row);
       }
     });
     levels_.push_back(std::move(lines));
@@ -210,6 +225,29 @@ HeightField::HeightField(const HeightMapView& map)
   }
   f.range = line_range(levels_.back()[0]);
   make_bands();
+}
+
+HeightFieldView small_height_field_make(const HeightMapView& map, PyramidLine* lines, int num_lines)
+{
+  HeightFieldView f = field_make(map);
+  int columns = divide_up(f.x.num_cells, 4), rows = divide_up(f.y.num_cells, 4);
+  for (int level = 0;; ++level) {
+    const int line_columns = divide_up(columns, 4), line_rows = divide_up(rows, 4);
+    RELIEF_ASSERT(line_columns * line_rows <= num_lines);
+    num_lines -= line_columns * line_rows;
+    f.lines[level] = lines;
+    f.line_columns[level] = line_columns;
+    f.num_levels = level + 1;
+    for (int row = 0; row < line_rows; ++row) {
+      for (int column = 0; column < line_columns; ++column)
+        *lines++ = line_make(f, level, columns, rows, column, row);
+    }
+    if (line_columns == 1 && line_rows == 1) break;
+    columns = line_columns;
+    rows = line_rows;
+  }
+  f.range = line_range(lines[-1]);
+  return f;
 }
 
 void HeightField::make_bands()

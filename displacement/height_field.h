@@ -126,6 +126,11 @@ class HeightField {
   HeightFieldView view_;
 };
 
+/// The field of a map small enough to be made where it is needed, without bands: for chords within eight periods.
+/// @param lines     room for the pyramid
+/// @param num_lines at least what its levels take
+HeightFieldView small_height_field_make(const HeightMapView& map, PyramidLine* lines, int num_lines);
+
 /// Bounds of one texel's height.
 /// @param at  row · width + column
 StoredRange texel_range(const HeightFieldView& field, std::int64_t at);

@@ -4,6 +4,7 @@
 #include "displacement/explain.h"
 #include "displacement/method.h"
 #include "displacement/seam_walls.h"
+#include "displacement/trace_procedural.h"
 #include "kernel/math/rounding.h"
 
 namespace relief {
@@ -172,6 +173,10 @@ bool trace(const DisplacedGeometry& geometry,
   if (!ray_curve_make(ray_frame_make(ray.O, ray.D), mesh.triangles[triangle], &curve)) return false;
   ++counters->prisms;
   const CurveQuery q{geometry, triangle, curve, ray, *counters};
+  if (geometry.procedural != nullptr) {
+    return trace_procedural({mesh, triangle, curve, ray.t_min, ray.t_max, ray.any_hit, geometry.rmip_options, *counters},
+                            *geometry.procedural, kMethods[static_cast<int>(geometry.method)]->traverse, hit);
+  }
   const bool found =
       geometry.lod.num_levels > 1 ? trace_levels(q, hit) : trace_level(q, mesh, triangle, 0, ray.t_min, ray.t_max, hit);
   if (mesh.seam_edges == nullptr || mesh.seam_edges[triangle] == 0 || (found && ray.any_hit)) return found;

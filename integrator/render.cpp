@@ -142,6 +142,8 @@ SceneContext render_context(const Scene& scene, const RenderOptions& options)
 {
   DisplacementOptions displacement = options.displacement;
   displacement.num_rays = expected_rays(options.settings);
+  displacement.camera = options.camera;
+  displacement.picture_height = options.settings.height;
   const bool light_sampling_alone = options.light_technique == LightTechnique::kLightSampling;
   return SceneContext(scene, displacement,
                       light_sampling_alone ? EnvironmentDensity::kRadiance : EnvironmentDensity::kExcess,

@@ -75,7 +75,8 @@ SceneContext::SceneContext(const Scene& loaded,
                            const DisplacementOptions& displacement,
                            EnvironmentDensity environment_density,
                            const CausticSettings& caustics)
-    : scene(loaded),
+    : SceneViews(loaded),
+      scene(loaded),
       bsdf_tables(std::make_unique<BsdfTables>()),
       displacements(scene_displacement(loaded, displacement))
 {
@@ -122,45 +123,13 @@ SceneContext::SceneContext(const Scene& loaded,
 
 void SceneContext::make_views()
 {
-  for (const Mesh& mesh : scene.meshes) meshes.push_back(mesh.view());
-  std::vector<int> uses(scene.meshes.size(), 0);
-  for (const Instance& instance : scene.instances) ++uses[static_cast<std::size_t>(instance.mesh_index)];
-  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
-    const Instance& instance = scene.instances[i];
-    InstanceView view;
-    view.world_from_object = instance.world_from_object;
-    view.object_from_world = inverse(instance.world_from_object);
-    view.mesh_index = instance.mesh_index;
-    view.material_index = instance.material_index;
-    view.flags = instance.flags;
-    if (uses[static_cast<std::size_t>(instance.mesh_index)] > 1) view.flags |= kTracedInObjectSpace;
-    if (displacements.geometry_index(i) >= 0) view.flags |= kDisplaced | kTracedInObjectSpace;
-    instances.push_back(view);
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    if (displacements.geometry_index(i) >= 0) instances[i].flags |= kDisplaced | kTracedInObjectSpace;
   }
   globals.meshes = meshes.data();
   globals.instances = instances.data();
   globals.num_instances = static_cast<std::uint32_t>(instances.size());
   for (const GraphProgram& graph : scene.graphs) graphs.push_back(graph.view());
-  std::size_t num_columns = 0;
-  for (const Mesh& mesh : scene.meshes) num_columns += mesh.columns.size();
-  mesh_columns.reserve(num_columns);  // views point into it
-  for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
-    meshes[i].columns = mesh_columns.data() + mesh_columns.size();
-    meshes[i].num_columns = static_cast<std::uint32_t>(scene.meshes[i].columns.size());
-    for (const AttributeColumn& column : scene.meshes[i].columns) {
-      mesh_columns.push_back({column.values.data(), column.name, static_cast<std::uint16_t>(column.num_components)});
-    }
-  }
-  instance_values.reserve(scene.instance_columns.size());
-  for (const InstanceColumn& column : scene.instance_columns) {
-    const float* values = column.values.data();
-    if (column.values.size() < 4 * instances.size()) {
-      instance_values.push_back(column.values);
-      instance_values.back().resize(4 * instances.size());
-      values = instance_values.back().data();
-    }
-    instance_columns.push_back({column.name, values});
-  }
   globals.graph_scene.instances = instances.data();
   globals.graph_scene.columns = instance_columns.data();
   globals.graph_scene.num_columns = static_cast<std::uint32_t>(instance_columns.size());

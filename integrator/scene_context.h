@@ -8,6 +8,7 @@
 #include "integrator/accel.h"
 #include "integrator/light_set.h"
 #include "integrator/scene_displacement.h"
+#include "integrator/scene_views.h"
 #include "kernel/bsdf/energy_tables.h"
 #include "kernel/globals.h"
 #include "kernel/statistics.h"
@@ -16,7 +17,7 @@
 namespace relief {
 
 /// Owner of what KernelGlobals points to. Camera, film, limits and seed are left for the render to fill in.
-struct SceneContext {
+struct SceneContext : SceneViews {
   /// @param loaded               must outlive the context
   /// @param environment_density  kRadiance for LightTechnique::kLightSampling, which has no other way to the light
   /// @error std::runtime_error out of memory and the like
@@ -24,19 +25,12 @@ struct SceneContext {
                         const DisplacementOptions& displacement = {},
                         EnvironmentDensity environment_density = EnvironmentDensity::kExcess,
                         const CausticSettings& caustics = {CausticsMode::kOff});
-  SceneContext(const SceneContext&) = delete;
-  SceneContext& operator=(const SceneContext&) = delete;
 
   /// Bytes by part.
   void fill(Statistics& stats) const;
 
   const Scene& scene;
-  std::vector<MeshView> meshes;
-  std::vector<InstanceView> instances;
   std::vector<GraphProgramView> graphs;
-  std::vector<MeshColumn> mesh_columns;             ///< of all meshes, one mesh's side by side
-  std::vector<std::vector<float>> instance_values;  ///< columns that do not reach all instances in the scene
-  std::vector<GraphInstanceColumn> instance_columns;
   LightSet lights;
   std::vector<std::uint8_t> surface_kernel;  ///< a material
   std::unique_ptr<BsdfTables> bsdf_tables;

@@ -1,5 +1,6 @@
 #include "integrator/scene_displacement.h"
 
+#include "integrator/computed_heights.h"
 #include "scene/limits.h"
 
 namespace relief {
@@ -36,8 +37,9 @@ DisplacementSet scene_displacement(const Scene& scene, const DisplacementOptions
   for (const HeightMap& map : scene.height_maps) input.height_maps.push_back(map.view());
   input.settings = scene.displacements;
   for (const Instance& instance : scene.instances) {
-    input.instances.push_back({instance.mesh_index, displacement_of(scene, instance), instance.world_from_object});
+    input.instances.push_back({instance.mesh_index, displacement_of(scene, instance), -1, instance.world_from_object});
   }
+  computed_heights_add(scene, options, &input);
   DisplacementSet set(input, options);
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const int index = set.geometry_index(i);

@@ -141,18 +141,19 @@ UvBounds displaced_mesh_uv_bounds(const Mesh& mesh, const TextureRef& height)
   return bounds;
 }
 
-void displaced_mesh_warn(const std::string& label, const Mesh& mesh, const TextureRef& height, Warnings& warnings)
+void displaced_mesh_warn(const std::string& label, const Mesh& mesh, const TextureRef* height, Warnings& warnings)
 {
   if (mesh.N.empty()) {
     warnings.add(label + ": displaced without normals: triangles move along their own and open cracks");
   } else {
     warn_split_normals(label, mesh, warnings);
   }
-  if (mesh.uv[height.uv_set].empty()) {
-    warnings.add(label + ": displaced without TEXCOORD_" + std::to_string(height.uv_set) +
+  if (height == nullptr) return;
+  if (mesh.uv[height->uv_set].empty()) {
+    warnings.add(label + ": displaced without TEXCOORD_" + std::to_string(height->uv_set) +
                  ", which the height map needs");
   } else {
-    warn_uv_area(label, mesh, height, warnings);
+    warn_uv_area(label, mesh, *height, warnings);
   }
 }
 

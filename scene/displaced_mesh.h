@@ -37,7 +37,7 @@ UvBounds displaced_mesh_uv_bounds(const Mesh& mesh, const TextureRef& height);
 /// Warns if a displaced mesh has no normals, normals that differ at one position, no texture coordinates, or triangles
 /// without area in texture space.
 /// @param label   how the warnings name the mesh
-/// @param height  the height map's use
-void displaced_mesh_warn(const std::string& label, const Mesh& mesh, const TextureRef& height, Warnings& warnings);
+/// @param height  the height map's use; null: there is none
+void displaced_mesh_warn(const std::string& label, const Mesh& mesh, const TextureRef* height, Warnings& warnings);
 
 }  // namespace relief

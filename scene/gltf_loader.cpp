@@ -422,8 +422,8 @@ void GltfLoader::check_displacement(const PlacedNode& node, const Instance& inst
   const std::string label = node.document->file + ": /meshes/" + std::to_string(mesh_index);
   const Mesh& mesh = scene_.meshes[static_cast<std::size_t>(instance.mesh_index)];
   const DisplacementSettings& d = scene_.displacements[static_cast<std::size_t>(index)];
-  displaced_mesh_warn(label, mesh, d.height, warnings_);
-  if (!d.has_graph) return;
+  displaced_mesh_warn(label, mesh, d.graph_index < 0 ? &d.height : nullptr, warnings_);
+  if (!d.has_graph || d.graph_index >= 0) return;
   const HeightMap& map = height_graphs_.maps()[static_cast<std::size_t>(d.height.texture_index)];
   const UvBounds bounds = displaced_mesh_uv_bounds(mesh, d.height);
   const auto is_outside = [](Wrap wrap, float low, float high) {
@@ -456,15 +456,30 @@ const std::vector<GltfLoader::Primitive>& GltfLoader::primitives_of(const GltfDo
   return it->second;
 }
 
+/// What the graphs of a material read by name, sorted.
+std::vector<std::uint16_t> GltfLoader::attributes_of(const Material& material) const
+{
+  std::vector<std::uint16_t> all;
+  const auto add = [&](int graph) {
+    if (graph < 0) return;
+    const std::vector<std::uint16_t>& attributes = scene_.graphs[static_cast<std::size_t>(graph)].attributes;
+    std::vector<std::uint16_t> both;
+    std::set_union(all.begin(), all.end(), attributes.begin(), attributes.end(), std::back_inserter(both));
+    all = std::move(both);
+  };
+  add(material.graph_index);
+  const int displacement = material.displacement_index;
+  if (displacement >= 0) add(scene_.displacements[static_cast<std::size_t>(displacement)].graph_index);
+  return all;
+}
+
 /// Index of a primitive's mesh; −1: it has no triangles.
 int GltfLoader::mesh_of(const GltfDocument& document, int mesh_index, int primitive_index, int material_index)
 {
   const tinygltf::Mesh& source = document.core.meshes[static_cast<std::size_t>(mesh_index)];
   const tinygltf::Primitive& primitive = source.primitives[static_cast<std::size_t>(primitive_index)];
   const int tangent_uv_set = normal_map_uv_set(scene_.materials[static_cast<std::size_t>(material_index)]);
-  const int graph = scene_.materials[static_cast<std::size_t>(material_index)].graph_index;
-  const std::vector<std::uint16_t> columns =
-      graph >= 0 ? scene_.graphs[static_cast<std::size_t>(graph)].attributes : std::vector<std::uint16_t>{};
+  const std::vector<std::uint16_t> columns = attributes_of(scene_.materials[static_cast<std::size_t>(material_index)]);
   const auto [it, is_new] = mesh_of_.try_emplace(
       {&document, primitive.attributes, primitive.indices, primitive.mode, tangent_uv_set, columns}, -1);
   if (!is_new) {
@@ -583,8 +598,10 @@ void GltfLoader::set_camera(const LoadOptions& options)
   load_height_maps(scene_, height_maps_.take(), height_graphs_.take(), warnings_);
   std::vector<float> reach_of;
   for (const DisplacementSettings& d : scene_.displacements) {
-    const auto map = static_cast<std::size_t>(d.height.texture_index);
-    const HeightRange range = height_map_range(scene_.height_maps[map].view());
+    HeightRange range{0, 1};  // what graphs mostly give
+    if (d.graph_index < 0) {
+      range = height_map_range(scene_.height_maps[static_cast<std::size_t>(d.height.texture_index)].view());
+    }
     reach_of.push_back(std::fabs(d.scale) * max(std::fabs(range.low - d.midlevel), std::fabs(range.high - d.midlevel)));
   }
   Framing framing(choice.fov, image_aspect_);

@@ -75,6 +75,7 @@ class GltfLoader {
                       const Primitive& primitive,
                       const Transform& world,
                       const std::string& path);
+  std::vector<std::uint16_t> attributes_of(const Material& material) const;
   /// Values by name, as graphs read them, of an instance.
   using InstanceValues = std::map<std::uint16_t, std::array<float, 4>>;
   InstanceValues node_values(const PlacedNode& node) const;
@@ -106,7 +107,7 @@ class GltfLoader {
   std::vector<Placement> unlit_;
   TextureTable textures_, height_maps_;
   EnvironmentGraphs environment_graphs_;
-  HeightGraphTable height_graphs_;
+  HeightGraphTable height_graphs_{textures_, scene_};
   Bounds world_bounds_;
   float image_aspect_ = 1;
   std::vector<Bounds> mesh_bounds_;

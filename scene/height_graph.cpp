@@ -228,31 +228,24 @@ HeightMap evaluate(const Height& height, const Layout& layout, const std::string
   return map;
 }
 
-/// What a program reads beside texture coordinates; empty: nothing.
-std::string foreign_input(const GraphProgram& program, int uv_set)
+/// Whether a program reads nothing but one set of texture coordinates.
+bool reads_coordinates_alone(const GraphProgram& program, int uv_set)
 {
-  static constexpr std::string_view kNames[] = {
-#define X(name) #name,
-#include "kernel/graph/graph_quantities.inc"
-#undef X
-  };
-  const std::string own = "uv" + std::to_string(uv_set) + '_';
+  using Q = GraphQuantity;
   for (const GraphInput& input : program.inputs) {
-    std::string name(kNames[static_cast<std::size_t>(input.quantity)]);
-    if (name.starts_with(own)) continue;
-    if (name.starts_with("uv")) return "texCoord " + std::string(1, name[2]) + ", not the given one";
-    // Components of a vector have one letter.
-    if (const std::size_t dash = name.rfind('_'); dash + 2 == name.size()) name.resize(dash);
-    std::replace(name.begin(), name.end(), '_', ' ');
-    return '"' + name + '"';
+    const Q q = input.quantity;
+    if (uv_set == 0 ? q != Q::uv0_u && q != Q::uv0_v && q != Q::uv0_width
+                    : q != Q::uv1_u && q != Q::uv1_v && q != Q::uv1_width) {
+      return false;
+    }
   }
   for (std::size_t word = 0; word < program.code.size();) {
     const auto op = static_cast<GraphOp>(program.code[word]);
-    if (graph_op_reads_images(op)) return "an image";
+    if (graph_op_reads_images(op)) return false;
     const GraphOpShape& shape = kGraphOpShapes[static_cast<std::size_t>(op)];
     word += 1 + static_cast<std::size_t>(shape.num_immediates + shape.num_outputs + shape.num_inputs);
   }
-  return {};
+  return true;
 }
 
 /// Low and high of an axis that does not repeat, from uvRange.
@@ -270,11 +263,32 @@ void set_range(const JsonReader& graph, Layout& layout)
 
 }  // namespace
 
-std::optional<TextureRef> HeightGraphTable::add(const GltfDocument& document,
-                                                const JsonReader& displacement,
-                                                const std::string& material,
-                                                Warnings& warnings)
+/// Keeps a graph that is evaluated at points.
+HeightGraph HeightGraphTable::keep(const GltfDocument& document, const JsonReader& graph, Warnings& warnings)
 {
+  for (const char* name : {"uvRange", "resolution"}) {
+    if (!graph.has(name)) continue;
+    warnings.add(graph.file() + ": " + json_path_join(graph.path(), name) + ": of maps; these heights have none");
+  }
+  HeightGraph kept;
+  if (graph.has("cells") && !(graph.raw("cells").is_string() && graph.string("cells", "") == "auto")) {
+    const bool is_number = graph.raw("cells").is_number();
+    const std::int64_t cells = is_number ? graph.integer("cells", 1, 1, kMostHeightCells) : 0;
+    if (!is_number || (cells & (cells - 1)) != 0) graph.fail("cells", "\"auto\" or a power of two up to 524288");
+    kept.num_cells = static_cast<std::int32_t>(cells);
+  }
+  kept.cell_pixels = graph.number_f("cellPixels", 1, 1e-3, 1e3);
+  kept.graph_index = static_cast<int>(scene_.graphs.size());
+  scene_.graphs.push_back(height_graph_read(document, graph, textures_, scene_.attribute_names, warnings));
+  return kept;
+}
+
+HeightGraph HeightGraphTable::add(const GltfDocument& document,
+                                  const JsonReader& displacement,
+                                  const std::string& material,
+                                  Warnings& warnings)
+{
+  static constexpr std::string_view kEvaluations[] = {"auto", "points"};
   const JsonReader graph = displacement.object("heightGraph");
   const std::string label = graph.file() + ": " + graph.path();
   TextureRef ref;
@@ -283,17 +297,20 @@ std::optional<TextureRef> HeightGraphTable::add(const GltfDocument& document,
   layout.u.wrap = layout.v.wrap = Wrap::kClamp;
   set_range(graph, layout);
   const int given_size = static_cast<int>(graph.integer("resolution", 0, 2, kLargestGivenSize));
-  // Images of a graph that is not evaluated are not to be read.
-  TextureTable images;
-  const GraphProgram program = height_graph_read(document, graph, images, warnings);
-  if (const std::string foreign = foreign_input(program, ref.uv_set); !foreign.empty()) {
-    warnings.add(label + ": the height of " + material + " reads " + foreign +
-                 "; only heights over texture coordinates alone move points: nothing is displaced");
-    return {};
-  }
+  const bool at_points = graph.choice("evaluate", kEvaluations, 0) == 1;
   const auto [known, is_new] = known_.try_emplace(
       displacement.raw("heightGraph").dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
   if (!is_new) return known->second;
+  // Images are not to be read twice.
+  TextureTable images;
+  std::vector<std::string> attribute_names;
+  Warnings unheard;
+  const GraphProgram program = height_graph_read(document, graph, images, attribute_names, unheard);
+  if (at_points || !reads_coordinates_alone(program, ref.uv_set)) return known->second = keep(document, graph, warnings);
+  for (const char* name : {"cells", "cellPixels"}) {
+    if (graph.has(name)) warnings.add(label + ": " + name + ": of heights that have no map; these have one");
+  }
+  static_cast<void>(height_graph_read(document, graph, images, attribute_names, warnings));
 
   const Height height(program, ref.uv_set);
   Findings found;
@@ -325,8 +342,7 @@ std::optional<TextureRef> HeightGraphTable::add(const GltfDocument& document,
   maps_.push_back(evaluate(height, layout, label, warnings));
   std::tie(ref.m00, ref.m02) = layout.u.mapping();
   std::tie(ref.m11, ref.m12) = layout.v.mapping();
-  known->second = ref;
-  return ref;
+  return known->second = {.map = ref};
 }
 
 }  // namespace relief

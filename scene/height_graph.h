@@ -1,9 +1,8 @@
-// Heights that materials give as value graphs over texture coordinates: each graph is evaluated once, into a height map that
-// is traced like any other.
+// Heights that materials give as value graphs. Of those over texture coordinates alone each is evaluated once, into a height
+// map that is traced like any other; others are kept, to be evaluated at the points that rays ask for.
 #pragma once
 
 #include <map>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,24 +10,36 @@
 #include "kernel/texture/texture_view.h"
 #include "scene/gltf_document.h"
 #include "scene/height_map.h"
+#include "scene/scene.h"
+#include "scene/texture_table.h"
 
 namespace relief {
+
+/// What became of a heightGraph.
+struct HeightGraph {
+  TextureRef map;              ///< where its map lies under the mesh; texture_index is into HeightGraphTable::maps
+  int graph_index = -1;        ///< into Scene::graphs; −1: it has a map
+  std::int32_t num_cells = 0;  ///< see DisplacementSettings
+  float cell_pixels = 1;
+};
 
 /// The maps of a scene's height graphs. Equal graphs share one.
 class HeightGraphTable {
  public:
-  /// Evaluates the heightGraph of a RELIEF_displacement.
+  /// @param textures  gets the images of graphs that are kept
+  /// @param scene     gets these graphs, and the names of attributes that they read
+  HeightGraphTable(TextureTable& textures, Scene& scene) : textures_(textures), scene_(scene) {}
+
+  /// Evaluates the heightGraph of a RELIEF_displacement, or keeps it.
   /// @param displacement  the extension's object, which has a heightGraph
   /// @param material      as warnings name it
-  /// @return              where the map lies under the mesh; texture_index is into maps(). Empty: the graph reads more
-  ///                      than texture coordinates, and a warning says so
-  /// @error SceneError: see graph_read; a bad texCoord, uvRange or resolution
+  /// @error SceneError: see graph_read; a bad texCoord, uvRange, resolution, evaluate, cells or cellPixels
   /// @error OutOfMemory
   /// @cost  parallel; up to 17 million evaluations
-  std::optional<TextureRef> add(const GltfDocument& document,
-                                const JsonReader& displacement,
-                                const std::string& material,
-                                Warnings& warnings);
+  HeightGraph add(const GltfDocument& document,
+                  const JsonReader& displacement,
+                  const std::string& material,
+                  Warnings& warnings);
 
   const std::vector<HeightMap>& maps() const { return maps_; }
 
@@ -36,8 +47,12 @@ class HeightGraphTable {
   std::vector<HeightMap> take() { return std::exchange(maps_, {}); }
 
  private:
+  HeightGraph keep(const GltfDocument& document, const JsonReader& graph, Warnings& warnings);
+
+  TextureTable& textures_;
+  Scene& scene_;
   std::vector<HeightMap> maps_;
-  std::map<std::string, TextureRef> known_;  ///< by the graph's JSON
+  std::map<std::string, HeightGraph> known_;  ///< by the graph's JSON
 };
 
 }  // namespace relief

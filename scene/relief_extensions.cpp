@@ -101,8 +101,7 @@ TextureRef height_texture(const GltfDocument& document,
 }
 
 /// @param material  as warnings name it
-/// @return          empty: nothing that is supported, with a warning
-std::optional<DisplacementSettings> read_displacement(const GltfDocument& document,
+DisplacementSettings read_displacement(const GltfDocument& document,
                                                       const JsonReader& r,
                                                       const std::string& material,
                                                       TextureTable& height_maps,
@@ -129,16 +128,16 @@ std::optional<DisplacementSettings> read_displacement(const GltfDocument& docume
   }
   d.smoothing = r.boolean("smoothing", false);
   d.weld_seams = r.choice("seams", kSeams, 0) == 1;
-  if (r.has("procedural")) {
-    static_cast<void>(r.object("procedural"));
-    warnings.add(r.file() + ": " + json_path_join(r.path(), "procedural") +
-                 ": procedural displacement is not supported and left out");
-  } else if (!d.has_graph && d.height.texture_index < 0) {
-    r.fail("", "a heightTexture or heightGraph", "none");
+  if (!d.has_graph && d.height.texture_index < 0) r.fail("", "a heightTexture or heightGraph", "none");
+  if (d.has_graph) {
+    const HeightGraph graph = height_graphs.add(document, r, material, warnings);
+    d.height = graph.map;
+    d.graph_index = graph.graph_index;
+    d.num_cells = graph.num_cells;
+    d.cell_pixels = graph.cell_pixels;
   }
-  if (d.has_graph) d.height = height_graphs.add(document, r, material, warnings).value_or(TextureRef{});
   r.warn_unread(warnings);
-  return d.height.texture_index >= 0 ? std::optional(d) : std::nullopt;
+  return d;
 }
 
 /// The unofficial extension stores offset + factor · h along the normal; ours is scale · (h − midlevel).

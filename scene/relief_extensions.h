@@ -74,8 +74,8 @@ ObjectSettings relief_object(const GltfDocument& document,
 
 /// RELIEF_displacement of a material, or the unofficial KHR_materials_displacement.
 /// @param height_maps    gets the height map: the settings' texture index is a request's in this table
-/// @param height_graphs  gets the map of a heightGraph: then the index is into this table
-/// @return               empty: none, or one that is not supported (with a warning)
+/// @param height_graphs  gets a heightGraph: if it has a map then the index is into this table
+/// @return               empty: none
 std::optional<DisplacementSettings> relief_displacement(const GltfDocument& document,
                                                         int material_index,
                                                         TextureTable& height_maps,

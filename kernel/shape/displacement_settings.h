@@ -31,8 +31,14 @@ RELIEF_KERNEL std::string_view displacement_method_label(DisplacementMethod meth
 
 enum class DisplacementSpace : std::uint8_t { kObject, kWorld };
 
+/// Most cells along a triangle's side.
+inline constexpr std::int32_t kMostHeightCells = 1 << 19;
+
 struct DisplacementSettings {
-  TextureRef height;  ///< its texture index is that of a height map; never −1
+  TextureRef height;  ///< its texture index is that of a height map; −1: heights are computed
+  std::int32_t graph_index = -1;  ///< of heights that are computed, into Scene::graphs; −1: they have a map
+  std::int32_t num_cells = 0;     ///< of these along each side of a triangle, a power of two; 0: by their size in the picture
+  float cell_pixels = 1;          ///< how large they are in the picture, with 0 cells
   float scale = 1;    ///< metres
   float midlevel = 0.5f;
   DisplacementSpace space = DisplacementSpace::kObject;

@@ -248,11 +248,11 @@ GraphProgram read_output(const GltfDocument& document,
                          const char* name,
                          GraphType type,
                          TextureTable& textures,
+                         std::vector<std::string>& attribute_names,
                          std::vector<GraphSun>& suns,
                          Warnings& warnings)
 {
   // Neither directions nor texels have attributes: what a graph reads of one is 0.
-  std::vector<std::string> attribute_names;
   Reader r{document, graph.file(), graph.path(), textures, attribute_names, warnings, {}, {}, {}, {}};
   try {
     r.read_nodes(graph);
@@ -263,7 +263,9 @@ GraphProgram read_output(const GltfDocument& document,
     outputs.warn_unread(warnings);
     for (std::size_t c = 0; c < (type == GraphType::kNumber ? 1u : 3u); ++c) r.build.add_result(value.v[c]);
     suns = r.suns;
-    return r.build.compile();
+    GraphProgram program = r.build.compile();
+    program.attributes.assign(r.attributes.begin(), r.attributes.end());
+    return program;
   } catch (const GraphTooLarge& error) {
     graph.fail("", error.what(), "one that needs more");
   }
@@ -275,10 +277,11 @@ GraphProgram read_whole(const GltfDocument& document,
                         const char* name,
                         GraphType type,
                         TextureTable& textures,
+                        std::vector<std::string>& attribute_names,
                         Warnings& warnings)
 {
   std::vector<GraphSun> suns;
-  GraphProgram program = read_output(document, graph, name, type, textures, suns, warnings);
+  GraphProgram program = read_output(document, graph, name, type, textures, attribute_names, suns, warnings);
   graph.warn_unread(warnings);
   return program;
 }
@@ -344,7 +347,8 @@ GraphProgram graph_read_color(const GltfDocument& document,
                               std::vector<GraphSun>& suns,
                               Warnings& warnings)
 {
-  return read_output(document, graph, "color", GraphType::kColor, textures, suns, warnings);
+  std::vector<std::string> attribute_names;  // there are none
+  return read_output(document, graph, "color", GraphType::kColor, textures, attribute_names, suns, warnings);
 }
 
 GraphProgram graph_read_lamp(const GltfDocument& document,
@@ -352,15 +356,17 @@ GraphProgram graph_read_lamp(const GltfDocument& document,
                              TextureTable& textures,
                              Warnings& warnings)
 {
-  return read_whole(document, graph, "emission", GraphType::kColor, textures, warnings);
+  std::vector<std::string> attribute_names;  // there are none
+  return read_whole(document, graph, "emission", GraphType::kColor, textures, attribute_names, warnings);
 }
 
 GraphProgram height_graph_read(const GltfDocument& document,
                                const JsonReader& graph,
                                TextureTable& textures,
+                               std::vector<std::string>& attribute_names,
                                Warnings& warnings)
 {
-  return read_whole(document, graph, "height", GraphType::kNumber, textures, warnings);
+  return read_whole(document, graph, "height", GraphType::kNumber, textures, attribute_names, warnings);
 }
 
 }  // namespace relief

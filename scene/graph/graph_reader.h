@@ -49,10 +49,12 @@ GraphProgram graph_read_lamp(const GltfDocument& document,
                              Warnings& warnings);
 
 /// The graph of a displacement's height: its nodes and their output `height`, which is the program's only result.
+/// @param attribute_names  as graph_read
 /// @error SceneError: as graph_read
 GraphProgram height_graph_read(const GltfDocument& document,
                                const JsonReader& graph,
                                TextureTable& textures,
+                               std::vector<std::string>& attribute_names,
                                Warnings& warnings);
 
 }  // namespace relief

@@ -2,8 +2,8 @@
 """Blender's Displacement node as RELIEF_displacement.
 
 Both move a point along the interpolated normal by scale · (height − midlevel), measured in object or world space, so
-the values are taken as they are. A height of value · texture + offset is folded into scale and midlevel; one that varies
-otherwise, but with texture coordinates alone, is a graph that the program evaluates into a map.
+the values are taken as they are. A height of value · texture + offset is folded into scale and midlevel; any other one is
+a graph. The program evaluates those that vary with texture coordinates alone into a map, others where rays ask for them.
 """
 
 from dataclasses import dataclass
@@ -47,7 +47,7 @@ def bump_displaces(material, settings):
     return settings.bump_displaces and not has_displacement_node(material)
 
 
-def export_displacement(material, settings, textures, texture_info, images, coordinate_set):
+def export_displacement(material, settings, textures, texture_info, images, graph, coordinates):
     """Value of RELIEF_displacement.
 
     @param  material        bpy material with nodes
@@ -55,7 +55,8 @@ def export_displacement(material, settings, textures, texture_info, images, coor
     @param  textures        TextureReader, which has read the surface
     @param  texture_info    makes glTF's texture reference of a Texture used as numbers; None if its image is missing
     @param  images          ImageExporter
-    @param  coordinate_set  gives the number of the set that a ("uv", name) is in; None: no room for it
+    @param  graph           GraphWriter, still empty, of a height that is none
+    @param  coordinates     what the sets of texture coordinates are, ("uv", name) and so on, by number
     @return                 None if nothing moves
     """
     move = _move_of_bump(textures) if textures.bump else _move_of_output(material, settings, textures)
@@ -65,13 +66,12 @@ def export_displacement(material, settings, textures, texture_info, images, coor
     if height is None:
         node = move.node
         try:
-            graph = _height_graph(material, node.inputs["Height"], move.groups, coordinate_set)
+            height_graph = _height_graph(material, node.inputs["Height"], move.groups, graph, coordinates)
         except NotUnderstood as error:
-            what = f'node "{node.name}" ({node.bl_label}): a height that is no image, nor over one uv map alone'
-            textures.warn(f"{what} ({error})", "nothing is displaced")
+            textures.warn(f'node "{node.name}" ({node.bl_label}): its height ({error})', "nothing is displaced")
             return None
         return {
-            "heightGraph": graph,
+            "heightGraph": height_graph,
             "scale": move.scale,
             "midlevel": move.midlevel,
             **_how(material, move, settings),
@@ -102,48 +102,43 @@ def _how(material, move, settings):
     }
 
 
-def _height_graph(material, socket, groups, coordinate_set):
-    """heightGraph of an input that varies with one set of texture coordinates.
+def _height_graph(material, socket, groups, graph, coordinates):
+    """heightGraph of an input.
 
     @error  NotUnderstood
     """
-    used = {}
-
-    def number_of(source):
-        if used and source not in used:
-            raise NotUnderstood("two uv maps")
-        used[source] = coordinate_set(source)
-        return used[source]
-
-    def no_image(node):
-        raise NotUnderstood(f'node "{node.name}": an image among what it is made of')
-
-    graph = GraphWriter(number_of, no_image, no_image)
     height = graph.value(socket, groups)
     if not isinstance(height, dict):
         raise NotUnderstood("no number")
-    for node in graph.nodes:
-        if node["type"] in _VARYING:
-            raise NotUnderstood(f"it varies with {node['type'].replace('-', ' ')}")
-        for value in node.get("inputs", {}).values():
-            if not isinstance(value, dict) or graph.nodes[value["node"]]["type"] != "texture-coordinate":
-                continue
-            if value["output"] not in {"uv", "uv1"}:
-                raise NotUnderstood(f"{value['output']} coordinates")
     json = {"nodes": graph.nodes, "outputs": {"height": height}}
-    for (_, name), number in used.items():
+    number = _only_set(graph)
+    if number is not None:
         if number:
             json["texCoord"] = number
-        covered = _uv_range(material, name)
+        covered = _uv_range(material, coordinates[number][1])
         if covered is not None:
             json["uvRange"] = covered
     return json
 
 
-#: Nodes whose outputs differ between points of equal texture coordinates.
+def _only_set(graph):
+    """Number of the uv map that is all a height varies with; None: it varies with something else."""
+    numbers = set()
+    for node in graph.nodes:
+        if node["type"] in _VARYING:
+            return None
+        for value in node.get("inputs", {}).values():
+            if not isinstance(value, dict) or graph.nodes[value["node"]]["type"] != "texture-coordinate":
+                continue
+            numbers.add({"uv": 0, "uv1": 1}.get(value["output"]))
+    return numbers.pop() if len(numbers) == 1 else None
+
+
+#: Nodes whose outputs differ between points of equal texture coordinates, or have images.
 _VARYING = {
     *("geometry", "vertex-color", "attribute", "object-info", "light-path", "camera-data", "tangent", "normal-map"),
     *("fresnel", "layer-weight", "bump", "wireframe", "ambient-occlusion", "transform", "vector-transform"),
+    *("image-texture", "environment-texture"),
 }
 
 

@@ -91,18 +91,22 @@ class MaterialJob:
         self._report = report
         self._coordinates = []
         self._color_map = None
-        self._displaced = self._by_shading = self._uses_graph = False
+        self._displaced = self._by_shading = self._uses_graph = self._uses_height_graph = False
         self._problems = {}
         self.json = {"name": self._name, "doubleSided": True}
         self.coverage = None
-        self._graph = GraphWriter(
-            self._coordinate_set,
-            lambda node: image_options(node, writer, images, self._warn),
-            lambda node: ies_uri(node, writer),
-            warn=self._warn,
-            material_index=material.pass_index if material else 0,
-            view_layer=view_layer,
-        )
+
+        def new_graph():
+            return GraphWriter(
+                self._coordinate_set,
+                lambda node: image_options(node, writer, images, self._warn),
+                lambda node: ies_uri(node, writer),
+                warn=self._warn,
+                material_index=material.pass_index if material else 0,
+                view_layer=view_layer,
+            )
+
+        self._graph, self._height_graph = new_graph(), new_graph()
         self._textures = TextureReader(self._warn)
         if material is not None and material.use_nodes and material.node_tree is not None:
             with nodes.reading():
@@ -126,7 +130,7 @@ class MaterialJob:
         warned = self._displace(material, settings)
         if warned and displacement:
             self._problems.setdefault(displacement.key, warned[0])
-        problems = {**self._graph.not_understood, **self._problems}
+        problems = {**self._graph.not_understood, **self._height_graph.not_understood, **self._problems}
         self.coverage = coverage_of([s for s in (source, volume, displacement) if s], problems)
 
     def _bump_by(self, displacement):
@@ -170,8 +174,9 @@ class MaterialJob:
 
         self._textures.warn = warn
         value = export_displacement(
-            material, settings, self._textures, self._data_info, self._images, self._coordinate_set
+            material, settings, self._textures, self._data_info, self._images, self._height_graph, self._coordinates
         )
+        self._uses_height_graph = value is not None and "heightGraph" in value
         if value is not None:
             self._displaced = True
             self._by_shading = not value["smoothing"]
@@ -195,15 +200,15 @@ class MaterialJob:
         return self._graph.own_normal is not None or self._graph.bends(*self._past_bump(socket, groups))
 
     def wanted(self):
-        graph, has_graph = self._graph, self._uses_graph
+        graphs = [self._graph] * self._uses_graph + [self._height_graph] * self._uses_height_graph
         return Wanted(
             tuple(self._coordinates),
             self._color_map,
             self._displaced,
             self._by_shading,
-            has_graph and graph.uses_generated,
-            tuple(sorted(graph.attributes)) if has_graph else (),
-            tuple(sorted(graph.values)) if has_graph else (),
+            any(graph.uses_generated for graph in graphs),
+            tuple(sorted({attribute for graph in graphs for attribute in graph.attributes})),
+            tuple(sorted({value for graph in graphs for value in graph.values})),
         )
 
     def _fail(self, source, what, instead, error=None):

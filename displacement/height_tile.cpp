@@ -1,0 +1,105 @@
+#include "displacement/height_tile.h"
+
+#include <algorithm>
+#include <new>
+#include <thread>
+#include <utility>
+
+#include <sys/mman.h>
+
+namespace relief {
+
+void height_tile_finish(HeightTile* tile)
+{
+  HeightMapView map;
+  map.texels = tile->texels;
+  map.width = map.height = kTileTexels;
+  map.format = HeightFormat::kFloat;
+  map.wrap_u = map.wrap_v = Wrap::kClamp;
+  tile->field = small_height_field_make(map, tile->lines, kTileLines);
+}
+
+TileCache::Pin::Pin() noexcept = default;
+TileCache::Pin::Pin(Pin&& other) noexcept : slot_(std::exchange(other.slot_, nullptr)), own_(std::move(other.own_)) {}
+TileCache::Pin& TileCache::Pin::operator=(Pin&& other) noexcept
+{
+  std::swap(slot_, other.slot_);
+  std::swap(own_, other.own_);
+  return *this;
+}
+TileCache::Pin::~Pin()
+{
+  if (slot_ != nullptr) slot_->pins.fetch_sub(1, std::memory_order_release);
+}
+const HeightFieldView& TileCache::Pin::field() const { return slot_ != nullptr ? slot_->tile.field : own_->field; }
+
+TileCache::TileCache(std::size_t bytes)
+{
+  num_sets_ = std::max<std::size_t>(bytes / (kWays * sizeof(Slot)), 1);
+  void* const pages = mmap(nullptr, num_sets_ * kWays * sizeof(Slot), PROT_READ | PROT_WRITE,
+                           MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (pages == MAP_FAILED) throw std::bad_alloc();
+  // All bits zero are empty slots.
+  slots_ = static_cast<Slot*>(pages);
+}
+
+TileCache::~TileCache() { munmap(slots_, num_sets_ * kWays * sizeof(Slot)); }
+
+std::size_t TileCache::bytes() const { return num_taken_.load(std::memory_order_relaxed) * sizeof(Slot); }
+
+TileCache::Place TileCache::find(std::uint64_t key)
+{
+  const std::uint64_t wanted = key + 1;
+  // splitmix64's finalizer: neighbours go to different sets.
+  std::uint64_t hash = wanted;
+  hash = (hash ^ (hash >> 30)) * 0xbf58476d1ce4e5b9u;
+  hash = (hash ^ (hash >> 27)) * 0x94d049bb133111ebu;
+  hash ^= hash >> 31;
+  Slot* const set = slots_ + hash % num_sets_ * kWays;
+  const auto now = static_cast<std::uint32_t>(num_made_.load(std::memory_order_relaxed));
+  for (int way = 0; way < kWays; ++way) {
+    Slot& slot = set[way];
+    if (slot.key.load(std::memory_order_acquire) != wanted) continue;
+    std::int32_t pins = slot.pins.load(std::memory_order_relaxed);
+    for (;;) {
+      if (pins == kInMaking) {  // soon done
+        std::this_thread::yield();
+        pins = slot.pins.load(std::memory_order_relaxed);
+        if (slot.key.load(std::memory_order_acquire) != wanted) break;
+        continue;
+      }
+      if (slot.pins.compare_exchange_weak(pins, pins + 1, std::memory_order_acquire)) break;
+    }
+    if (pins == kInMaking) continue;
+    // A slot that is in use is not given away, so what it holds now it keeps.
+    if (slot.key.load(std::memory_order_acquire) == wanted) {
+      if (slot.used.load(std::memory_order_relaxed) != now) slot.used.store(now, std::memory_order_relaxed);
+      return {&slot, false};
+    }
+    slot.pins.fetch_sub(1, std::memory_order_release);
+  }
+  num_made_.fetch_add(1, std::memory_order_relaxed);
+  for (int tries = 0; tries < kWays; ++tries) {
+    Slot* oldest = nullptr;
+    std::uint32_t most = 0;
+    for (int way = 0; way < kWays; ++way) {
+      Slot& slot = set[way];
+      if (slot.pins.load(std::memory_order_relaxed) != 0) continue;
+      const bool is_empty = slot.key.load(std::memory_order_relaxed) == 0;
+      const std::uint32_t age = is_empty ? ~0u : now - slot.used.load(std::memory_order_relaxed);
+      if (oldest != nullptr && age <= most) continue;
+      oldest = &slot;
+      most = age;
+    }
+    if (oldest == nullptr) break;
+    std::int32_t none = 0;
+    if (!oldest->pins.compare_exchange_strong(none, kInMaking, std::memory_order_acquire)) continue;
+    if (oldest->key.load(std::memory_order_relaxed) == 0) num_taken_.fetch_add(1, std::memory_order_relaxed);
+    oldest->key.store(wanted, std::memory_order_release);
+    oldest->used.store(now, std::memory_order_relaxed);
+    return {oldest, true};
+  }
+  return {nullptr, true};
+}
+
+}  // namespace relief

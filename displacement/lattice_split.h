@@ -1,0 +1,28 @@
+// How finely the triangles of a procedurally displaced mesh are divided: a lattice each, and where one triangle spans much
+// of the picture, parts with lattices of their own, as near ones need more cells than far ones.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "displacement/procedural_field.h"
+#include "kernel/shape/mesh_view.h"
+
+namespace relief {
+
+/// Cells that are wanted along the straight line between two points, object space. The same, to the bit, either way.
+using CellsAlong = std::function<double(Vec3f, Vec3f)>;
+
+/// The same lattice for all triangles.
+/// @param n  cells along each side, a power of two up to kMostHeightCells
+std::vector<LatticeTriangle> lattices_make(const MeshView& mesh, std::int32_t n);
+
+/// A part's side has a power of two of cells, at least as many as are wanted, by its ends alone: so both of its triangles
+/// agree. Triangles with a side of more than 256 are halved there, at most 14 times.
+/// @cost  a part takes about 250 bytes; parallel over triangles
+std::vector<LatticeTriangle> lattices_make(const MeshView& mesh, const CellsAlong& cells);
+
+/// A corner's position or normal: linear in the weights, rounded the same way for all triangles that have it.
+Vec3f lattice_corner(Vec2f weights, Vec3f v0, Vec3f v1, Vec3f v2);
+
+}  // namespace relief

@@ -1,0 +1,308 @@
+#include "integrator/computed_heights.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <map>
+#include <tuple>
+
+#include "integrator/scene_views.h"
+#include "integrator/stages.h"
+#include "kernel/graph/graph_material.h"
+#include "scene/texture_store.h"
+
+namespace relief {
+
+namespace {
+
+/// How a quantity varies over a triangle.
+enum class Variation : std::uint8_t {
+  kLinear,  ///< in the weights, as far as it is read at the mesh alone
+  kOther,
+};
+
+Variation variation_of(GraphQuantity q)
+{
+  using Q = GraphQuantity;
+  switch (q) {
+    case Q::normal_x:
+    case Q::normal_y:
+    case Q::normal_z:
+    case Q::true_normal_x:
+    case Q::true_normal_y:
+    case Q::true_normal_z:
+    case Q::incoming_x:
+    case Q::incoming_y:
+    case Q::incoming_z:
+    case Q::object_normal_x:
+    case Q::object_normal_y:
+    case Q::object_normal_z:
+    case Q::window_x:
+    case Q::window_y:
+    case Q::edge_distance:
+    case Q::parametric_x:
+    case Q::parametric_y:
+      return Variation::kOther;
+    default:
+      return Variation::kLinear;
+  }
+}
+
+/// Whether a quantity differs between instances of a mesh.
+bool is_of_instance(GraphQuantity q, const MeshView& mesh, std::uint16_t index)
+{
+  using Q = GraphQuantity;
+  switch (q) {
+    case Q::object_x:
+    case Q::object_y:
+    case Q::object_z:
+    case Q::generated_x:
+    case Q::generated_y:
+    case Q::generated_z:
+    case Q::uv0_u:
+    case Q::uv0_v:
+    case Q::uv1_u:
+    case Q::uv1_v:
+    case Q::uv0_width:
+    case Q::uv1_width:
+    case Q::color_r:
+    case Q::color_g:
+    case Q::color_b:
+    case Q::color_a:
+    case Q::backfacing:
+    case Q::object_normal_x:
+    case Q::object_normal_y:
+    case Q::object_normal_z:
+    case Q::vertex_normal_x:
+    case Q::vertex_normal_y:
+    case Q::vertex_normal_z:
+    case Q::parametric_x:
+    case Q::parametric_y:
+      return false;
+    case Q::attribute_value:
+    case Q::attribute_x:
+    case Q::attribute_y:
+    case Q::attribute_z:
+    case Q::attribute_alpha:
+      return std::none_of(mesh.columns, mesh.columns + mesh.num_columns,
+                          [=](const MeshColumn& column) { return column.name == index; });
+    default:
+      return true;
+  }
+}
+
+/// The places of a triangle's vertices by their positions, so that triangles of a side have its ends in the same order.
+std::array<int, 3> vertex_order(const MeshView& mesh, std::uint32_t triangle)
+{
+  const TriangleIndices& v = mesh.triangles[triangle];
+  const Vec3f P[3] = {mesh.P[v.v0], mesh.P[v.v1], mesh.P[v.v2]};
+  std::array<int, 3> order = {0, 1, 2};
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return std::tie(P[a].x, P[a].y, P[a].z) < std::tie(P[b].x, P[b].y, P[b].z);
+  });
+  return order;
+}
+
+/// A graph over one mesh, or over one instance of it.
+struct GraphHeights {
+  const MeshView* mesh;
+  InstanceView instance;  ///< without a place of its own where the graph reads of the mesh alone
+  GraphProgramView program;
+  const TextureView* textures;
+  GraphRun run;
+  GraphScene scene;
+  std::uint64_t id;  ///< of all that ever were
+};
+
+/// What a graph reads of one triangle.
+class OnTriangle {
+ public:
+  OnTriangle(const GraphHeights& heights, std::uint32_t triangle)
+      : heights_(heights), order_(vertex_order(*heights.mesh, triangle)), mesh_(*heights.mesh)
+  {
+    const TriangleIndices& v = mesh_.triangles[triangle];
+    const std::uint32_t vertices[3] = {v.v0, v.v1, v.v2};
+    sorted_ = {vertices[order_[0]], vertices[order_[1]], vertices[order_[2]]};
+    mesh_.triangles = &sorted_;
+    mesh_.num_triangles = 1;
+  }
+
+  const std::array<int, 3>& order() const { return order_; }
+  /// @param w  weights of the vertices in their order here
+  float quantity(const GraphInput& input, const float* w) const
+  {
+    SurfaceHit hit = surface_hit_make(mesh_, heights_.instance, 0, w[1], w[2]);
+    // Triangles of a side have normals of their own, and these point to where their vertices are in order.
+    if (mesh_.N == nullptr && is_turned()) hit.Ns = -hit.Ns;
+    hit.Ng = hit.Ns;
+    GraphPoint point{&mesh_, &heights_.instance, 0, w[1], w[2], &hit, hit.Ns, {0, 0}, 0.0f, &heights_.scene, {}};
+    point.P_object = transform_point(heights_.instance.object_from_world, hit.P);
+    if (input.quantity == GraphQuantity::parametric_x) return w[place_of(0)];
+    if (input.quantity == GraphQuantity::parametric_y) return w[place_of(1)];
+    return graph_quantity(point, input.quantity, input.index);
+  }
+
+ private:
+  bool is_turned() const { return (order_[1] - order_[0] + 3) % 3 != 1; }
+  int place_of(int vertex) const { return static_cast<int>(std::find(order_.begin(), order_.end(), vertex) - order_.begin()); }
+
+  const GraphHeights& heights_;
+  std::array<int, 3> order_;
+  MeshView mesh_;
+  TriangleIndices sorted_;
+};
+
+/// The linear quantities of the triangle that a thread asked for last.
+struct TriangleInputs {
+  std::uint64_t id = 0;
+  std::uint32_t triangle = 0;
+  std::array<int, 3> order{};
+  std::vector<std::array<float, 3>> values;  ///< of each input, at the vertices in their order
+};
+
+const TriangleInputs& triangle_inputs(const GraphHeights& heights, std::uint32_t triangle)
+{
+  thread_local TriangleInputs last;
+  if (last.id == heights.id && last.triangle == triangle) return last;
+  const OnTriangle on(heights, triangle);
+  last.id = heights.id;
+  last.triangle = triangle;
+  last.order = on.order();
+  last.values.resize(heights.program.num_inputs);
+  for (std::uint32_t i = 0; i < heights.program.num_inputs; ++i) {
+    const GraphInput& input = heights.program.inputs[i];
+    if (variation_of(input.quantity) != Variation::kLinear) continue;
+    for (std::size_t k = 0; k < 3; ++k) {
+      float w[3] = {0, 0, 0};
+      w[k] = 1;
+      last.values[i][k] = on.quantity(input, w);
+    }
+  }
+  return last;
+}
+
+void eval(const void* owner, std::uint32_t triangle, const float (*b)[8], float* h)
+{
+  const auto& heights = *static_cast<const GraphHeights*>(owner);
+  const GraphProgramView& program = heights.program;
+  const TriangleInputs& inputs = triangle_inputs(heights, triangle);
+  F8 w[3];
+  for (std::size_t k = 0; k < 3; ++k) w[k] = load8(b[inputs.order[k]]);
+  GraphRegisters registers;
+  for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
+    const GraphInput& input = program.inputs[i];
+    F8& lanes = registers.lanes[input.register_index];
+    if (variation_of(input.quantity) == Variation::kLinear) {
+      const std::array<float, 3>& v = inputs.values[i];
+      // On a side one term is zero: the others are added in the same order by both of its triangles.
+      lanes = w[0] * v[0] + w[1] * v[1] + w[2] * v[2];
+      continue;
+    }
+    const OnTriangle on(heights, triangle);
+    for (int lane = 0; lane < 8; ++lane) {
+      const float at[3] = {w[0][lane], w[1][lane], w[2][lane]};
+      lanes[lane] = on.quantity(input, at);
+    }
+  }
+  heights.run(program, heights.textures, registers);
+  const std::uint16_t result = program.results[0];
+  const F8 out = result == kNoGraphOperand ? F8{} : graph_operand(program, registers, result);
+  for (int lane = 0; lane < 8; ++lane) h[lane] = out[lane];
+}
+
+void bounds(const void*, std::uint32_t, const WeightPatches&, float* low, float* high)
+{
+  std::fill_n(low, 8, -kInfinity);
+  std::fill_n(high, 8, kInfinity);
+}
+
+/// Owner of all heights of a scene.
+struct SceneHeights {
+  explicit SceneHeights(const Scene& scene) : views(scene) {}
+
+  SceneViews views;
+  std::vector<std::unique_ptr<GraphHeights>> heights;
+};
+
+/// Where the picture is seen from.
+struct PictureView {
+  Camera camera;
+  double height = 1;  ///< pixels
+
+  /// Length of a line in the picture, pixels.
+  /// @param a, b  world
+  double pixels(Vec3f a, Vec3f b) const
+  {
+    const Vec3d along = to_double(b) - to_double(a);
+    const double scale = height / (2.0 * static_cast<double>(camera.half_height));
+    if (camera.projection == Projection::kOrthographic) return length(along) * scale;
+    const Vec3d from = to_double(camera.world_from_camera.p) - to_double(a);
+    const double squared = dot(along, along);
+    const double t = squared > 0 ? std::clamp(dot(from, along) / squared, 0.0, 1.0) : 0.0;
+    const double distance = length(from - t * along);
+    return length(along) * scale / std::max(distance, 1e-30);
+  }
+};
+
+}  // namespace
+
+void computed_heights_add(const Scene& scene, const DisplacementOptions& options, DisplacementInput* input)
+{
+  static std::atomic<std::uint64_t> next_id{1};
+  const auto settings_of = [&](const DisplacedInstance& instance) -> const DisplacementSettings* {
+    if (instance.displacement_index < 0) return nullptr;
+    const DisplacementSettings& settings = scene.displacements[static_cast<std::size_t>(instance.displacement_index)];
+    return settings.graph_index < 0 ? nullptr : &settings;
+  };
+  if (std::none_of(input->instances.begin(), input->instances.end(), settings_of)) return;
+  const auto all = std::make_shared<SceneHeights>(scene);
+  input->heights_owner = all;
+  const PictureView view{options.camera.value_or(scene.cameras.front().camera),
+                         static_cast<double>(options.camera ? options.picture_height : scene.render.height)};
+  std::map<std::tuple<int, int, int>, int> known;  // mesh, displacement, instance where that matters
+  std::map<int, std::shared_ptr<std::vector<Affine3>>> places;
+  for (std::size_t i = 0; i < input->instances.size(); ++i) {
+    DisplacedInstance& instance = input->instances[i];
+    const DisplacementSettings* settings = settings_of(instance);
+    if (settings == nullptr) continue;
+    const MeshView& mesh = all->views.meshes[static_cast<std::size_t>(instance.mesh_index)];
+    const GraphProgramView program = scene.graphs[static_cast<std::size_t>(settings->graph_index)].view();
+    const bool of_instance =
+        std::any_of(program.inputs, program.inputs + program.num_inputs,
+                    [&](const GraphInput& in) { return is_of_instance(in.quantity, mesh, in.index); });
+    const auto [at, is_new] =
+        known.try_emplace({instance.mesh_index, instance.displacement_index, of_instance ? static_cast<int>(i) : -1},
+                          static_cast<int>(input->heights.size()));
+    instance.heights_index = at->second;
+    if (is_new) {
+      const InstanceView placed = of_instance ? all->views.instances[i] : InstanceView{};
+      GraphScene graph_scene;
+      graph_scene.instances = all->views.instances.data();
+      graph_scene.columns = all->views.instance_columns.data();
+      graph_scene.num_columns = static_cast<std::uint32_t>(all->views.instance_columns.size());
+      graph_scene.camera = view.camera;
+      graph_scene.camera_from_world = inverse(view.camera.world_from_camera);
+      all->heights.push_back(std::make_unique<GraphHeights>(
+          GraphHeights{&mesh, placed, program, scene.textures->views().data(), stage_table_select().run_graph,
+                       graph_scene, next_id.fetch_add(1)}));
+      auto instances = std::make_shared<std::vector<Affine3>>();
+      places[at->second] = instances;
+      ComputedHeights heights;
+      heights.source = {all->heights.back().get(), eval, bounds};
+      heights.num_cells = settings->num_cells;
+      heights.cells = [instances, view, cell = static_cast<double>(settings->cell_pixels)](Vec3f a, Vec3f b) {
+        // The same bits either way.
+        if (std::tie(b.x, b.y, b.z) < std::tie(a.x, a.y, a.z)) std::swap(a, b);
+        double pixels = 0;
+        for (const Affine3& m : *instances)
+          pixels = std::max(pixels, view.pixels(transform_point(m, a), transform_point(m, b)));
+        return pixels / cell;
+      };
+      input->heights.push_back(std::move(heights));
+    }
+    places[at->second]->push_back(instance.world_from_object);
+  }
+}
+
+}  // namespace relief

@@ -1,0 +1,25 @@
+// A scene's meshes, instances and attributes as the kernel sees them.
+#pragma once
+
+#include <vector>
+
+#include "kernel/graph/graph_scene.h"
+#include "kernel/shape/mesh_view.h"
+#include "scene/scene.h"
+
+namespace relief {
+
+struct SceneViews {
+  /// @param scene  must outlive the views
+  explicit SceneViews(const Scene& scene);
+  SceneViews(const SceneViews&) = delete;
+  SceneViews& operator=(const SceneViews&) = delete;
+
+  std::vector<MeshView> meshes;
+  std::vector<InstanceView> instances;
+  std::vector<MeshColumn> mesh_columns;             ///< of all meshes, one mesh's side by side
+  std::vector<std::vector<float>> instance_values;  ///< columns that do not reach all instances in the scene
+  std::vector<GraphInstanceColumn> instance_columns;
+};
+
+}  // namespace relief
