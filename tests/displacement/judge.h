@@ -351,6 +351,8 @@ class Judge {
              const std::vector<oracle::Hit>& roots,
              const std::string& case_label);
 
+  /// Puts the questions to another geometry, of the same surface; null: to the case's own.
+  void ask(const DisplacedGeometry* geometry) { asked_ = geometry; }
   const Judgement& judgement() const { return judgement_; }
   /// Of the method and the instruction set.
   std::string name() const { return std::string(displacement_method_label(method_)) + ", " + table_.isa; }
@@ -370,7 +372,8 @@ class Judge {
 
   bool trace(const Question& q, bool any_hit, DisplacedHit* hit)
   {
-    return table_.trace(q.traced.geometry(method_), q.index, displaced_query(q.ray, any_hit), hit, &counters_);
+    const DisplacedGeometry geometry = asked_ != nullptr ? *asked_ : q.traced.geometry(method_);
+    return table_.trace(geometry, q.index, displaced_query(q.ray, any_hit), hit, &counters_);
   }
   static double t_bound(const Question& q, const oracle::Hit& root);
   static const oracle::Hit* required_root(const Question& q);
@@ -386,6 +389,7 @@ class Judge {
 
   DisplacementMethod method_;
   const TraversalTable& table_;
+  const DisplacedGeometry* asked_ = nullptr;
   TraversalCounters counters_;
   Judgement judgement_;
 };
