@@ -101,18 +101,19 @@ void print_displacement(const Scene& scene, const DisplacementSet& displacements
     if (displaced.displacement_index != index) continue;
     const Mesh& mesh = scene.meshes[static_cast<std::size_t>(displaced.mesh_index)];
     ++num_meshes;
-    if (d.graph_index < 0) uv = uv_bounds_union(uv, displaced_mesh_uv_bounds(mesh, d.height));
+    if (d.height.texture_index >= 0) uv = uv_bounds_union(uv, displaced_mesh_uv_bounds(mesh, d.height));
   }
-  line("  {}: {}, method {}, scale {:g} m, midlevel {:g}, {} space", material_names(scene, index),
-       d.graph_index >= 0 ? "computed heights" : scene.height_maps[static_cast<std::size_t>(d.height.texture_index)].label,
-       displacement_method_label(d.method), d.scale, d.midlevel,
+  std::string heights = d.graph_index >= 0 ? "computed heights" : "no heights";
+  if (d.height.texture_index >= 0) heights = scene.height_maps[static_cast<std::size_t>(d.height.texture_index)].label;
+  line("  {}: {}{}, method {}, scale {:g} m, midlevel {:g}, {} space", material_names(scene, index), heights,
+       d.curved ? " over a curved base" : "", displacement_method_label(d.method), d.scale, d.midlevel,
        d.space == DisplacementSpace::kWorld ? "world" : "object");
   std::string covered;
   if (uv.low.x <= uv.high.x) {
     covered = fmt::format(", uv {:g} to {:g}, {:g} to {:g}", uv.low.x, uv.high.x, uv.low.y, uv.high.y);
   }
   line("    meshes: {}{}", num_meshes, covered);
-  if (d.graph_index >= 0) return;
+  if (displacement_is_computed(d)) return;
   const SeamReport seams = seams_of(displacements, index);
   line("    uv seams with different heights: {}", text(seams.all));
   if (d.weld_seams) line("      left open by welding: {}", text(seams.split));

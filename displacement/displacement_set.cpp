@@ -163,7 +163,7 @@ std::vector<DisplacementSet::Use> DisplacementSet::find_uses(const DisplacementI
     geometry_of_instance_[i] = at->second;
     if (is_new) {
       const int heights = instance.heights_index;
-      uses.push_back({input.meshes[mesh], input.mesh_names[mesh], instance.displacement_index, settings,
+      uses.push_back({meshes_[mesh], input.mesh_names[mesh], instance.displacement_index, settings,
                       heights < 0 ? nullptr : &input.heights[static_cast<std::size_t>(heights)], scale});
     }
     const Stretch stretch = stretch_of(instance.world_from_object);
@@ -175,6 +175,7 @@ std::vector<DisplacementSet::Use> DisplacementSet::find_uses(const DisplacementI
 
 DisplacementSet::DisplacementSet(const DisplacementInput& input, const DisplacementOptions& options)
     : height_maps_(input.height_maps),
+      meshes_(input.meshes),
       heights_owner_(input.heights_owner),
       geometry_of_instance_(input.instances.size(), -1),
       texel_of_instance_(input.instances.size(), 0.0f)
@@ -238,8 +239,19 @@ std::unique_ptr<DisplacementSet::Displaced> DisplacementSet::make_computed(const
   displaced->name = use.mesh_name;
   displaced->displacement_index = use.displacement_index;
   displaced->method = kDefaultMethod;
+  HeightSource source = heights.source;
+  if (source.eval == nullptr && use.settings.height.texture_index >= 0) {
+    displaced->map_heights = std::make_unique<MapHeights>(
+        MapHeights{&use.mesh, use.settings.height, &field(use.settings.height.texture_index, 0).bounds.view()});
+    source = displaced->map_heights->source();
+  }
+  if (use.settings.curved && use.mesh.N != nullptr && use.scale != 0) {
+    displaced->curved =
+        std::make_unique<CurvedHeights>(CurvedHeights{use.mesh, source, use.scale, use.settings.midlevel});
+    source = displaced->curved->source();
+  }
   displaced->procedural = std::make_unique<ProceduralField>(
-      heights.source,
+      source,
       heights.num_cells > 0 ? lattices_make(use.mesh, heights.num_cells) : lattices_make(use.mesh, heights.cells),
       use.settings.midlevel, options.computed_bytes);
   displaced->mesh = DisplacedMesh(use.mesh, *displaced->procedural,

@@ -11,10 +11,12 @@
 #include <utility>
 #include <vector>
 
+#include "displacement/curved_heights.h"
 #include "displacement/displaced_mesh.h"
 #include "displacement/embree_geometry.h"
 #include "displacement/height_level.h"
 #include "displacement/lattice_split.h"
+#include "displacement/map_heights.h"
 #include "displacement/seams.h"
 #include "displacement/tessellation.h"
 #include "kernel/camera/camera.h"
@@ -31,7 +33,7 @@ struct DisplacedInstance {
 
 /// Heights of a mesh that are computed where they are wanted.
 struct ComputedHeights {
-  HeightSource source;
+  HeightSource source;   ///< without eval: the displacement's map is, if it has one
   CellsAlong cells;      ///< that are wanted; not used with num_cells
   std::int32_t num_cells = 0;  ///< along each side of all triangles, a power of two; 0: by `cells`
 };
@@ -110,6 +112,8 @@ class DisplacementSet {
     std::string name;           ///< of the mesh
     int displacement_index;     ///< into the input's settings
     DisplacementMethod method;  ///< by which it is traced
+    std::unique_ptr<MapHeights> map_heights;      ///< where computed heights are a map's
+    std::unique_ptr<CurvedHeights> curved;        ///< where the base is curved
     std::unique_ptr<ProceduralField> procedural;  ///< heights that are computed
     DisplacedMesh mesh;
     DisplacedGeometry geometry;  ///< where it tessellates: what is tessellated
@@ -161,6 +165,7 @@ class DisplacementSet {
   DisplacementLevel level(int map_index, int level, const DisplacementMethodEntry& method);
 
   std::vector<HeightMapView> height_maps_;
+  std::vector<MeshView> meshes_;
   std::shared_ptr<const void> heights_owner_;
   std::vector<int> geometry_of_instance_;
   std::vector<float> texel_of_instance_;

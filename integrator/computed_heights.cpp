@@ -7,6 +7,7 @@
 #include <map>
 #include <tuple>
 
+#include "integrator/graph_bounds_stage.h"
 #include "integrator/scene_views.h"
 #include "integrator/stages.h"
 #include "kernel/graph/graph_material.h"
@@ -111,6 +112,7 @@ struct GraphHeights {
   GraphProgramView program;
   const TextureView* textures;
   GraphRun run;
+  GraphBoundsRun run_bounds;
   GraphScene scene;
   std::uint64_t id;  ///< of all that ever were
 };
@@ -129,6 +131,11 @@ class OnTriangle {
   }
 
   const std::array<int, 3>& order() const { return order_; }
+  /// Place of a vertex in that order.
+  int place_of(int vertex) const
+  {
+    return static_cast<int>(std::find(order_.begin(), order_.end(), vertex) - order_.begin());
+  }
   /// @param w  weights of the vertices in their order here
   float quantity(const GraphInput& input, const float* w) const
   {
@@ -145,7 +152,6 @@ class OnTriangle {
 
  private:
   bool is_turned() const { return (order_[1] - order_[0] + 3) % 3 != 1; }
-  int place_of(int vertex) const { return static_cast<int>(std::find(order_.begin(), order_.end(), vertex) - order_.begin()); }
 
   const GraphHeights& heights_;
   std::array<int, 3> order_;
@@ -211,10 +217,85 @@ void eval(const void* owner, std::uint32_t triangle, const float (*b)[8], float*
   for (int lane = 0; lane < 8; ++lane) h[lane] = out[lane];
 }
 
-void bounds(const void*, std::uint32_t, const WeightPatches&, float* low, float* high)
+/// A number that is linear in the weights, over parallelograms.
+/// @param at  its values at the triangle's vertices
+GraphRange linear_range(const WeightPatches& patches, const float* at)
 {
-  std::fill_n(low, 8, -kInfinity);
-  std::fill_n(high, 8, kInfinity);
+  const F8 b1 = load8(patches.center[0]), b2 = load8(patches.center[1]);
+  const float e1 = at[1] - at[0], e2 = at[2] - at[0];
+  const auto along = [=](const float (*d)[8]) { return load8(d[0]) * e1 + load8(d[1]) * e2; };
+  // The sums of three products that stand for it elsewhere are off by their rounding.
+  const float size = std::max({std::abs(at[0]), std::abs(at[1]), std::abs(at[2])});
+  GraphRange out{at[0] + b1 * e1 + b2 * e2, along(patches.du), along(patches.dv), splat8(1e-6f * size),
+                 splat8(-kInfinity), splat8(kInfinity)};
+  return range_closed(out);
+}
+
+/// Bounds of what a graph reads that is not linear.
+GraphRange other_range(const OnTriangle& on, const GraphInput& input, const WeightPatches& patches)
+{
+  using Q = GraphQuantity;
+  const float first[3] = {1, 0, 0}, second[3] = {0, 1, 0};
+  switch (input.quantity) {
+    case Q::parametric_x:
+      return linear_range(patches, first);
+    case Q::parametric_y:
+      return linear_range(patches, second);
+    case Q::window_x:
+    case Q::window_y:
+    case Q::edge_distance:
+      return range_unknown();
+    default:
+      break;
+  }
+  // Unit vectors between those of the vertices, of which the quantities come by threes.
+  constexpr Q kVectors[] = {Q::normal_x, Q::true_normal_x, Q::incoming_x, Q::object_normal_x};
+  Q vector = kVectors[0];
+  for (const Q each : kVectors) {
+    if (input.quantity >= each) vector = std::max(vector, each);
+  }
+  GraphRange component[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    GraphInput part = input;
+    part.quantity = static_cast<Q>(static_cast<int>(vector) + axis);
+    float at[3];
+    for (int vertex = 0; vertex < 3; ++vertex) {
+      float w[3] = {0, 0, 0};
+      w[on.place_of(vertex)] = 1;
+      at[vertex] = on.quantity(part, w);
+    }
+    component[axis] = linear_range(patches, at);
+  }
+  GraphRange squared = range_point(F8{});
+  for (const GraphRange& c : component) squared = squared + range_within(c * c, F8{}, splat8(kInfinity));
+  const F8 low = sqrt(max(squared.low, F8{})), high = sqrt(max(squared.high, F8{}));
+  const GraphRange length = range_of_function(squared, sqrt(max(squared.c, F8{})), 0.5f / high, 0.5f / low, low, high);
+  const int axis = static_cast<int>(input.quantity) - static_cast<int>(vector);
+  return range_within(component[axis] * range_reciprocal(length), splat8(-1.00001f), splat8(1.00001f));
+}
+
+void bounds(const void* owner, std::uint32_t triangle, const WeightPatches& patches, float* low, float* high)
+{
+  const auto& heights = *static_cast<const GraphHeights*>(owner);
+  const GraphProgramView& program = heights.program;
+  const TriangleInputs& inputs = triangle_inputs(heights, triangle);
+  const auto registers = std::make_unique_for_overwrite<GraphRangeRegisters>();
+  for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
+    const GraphInput& input = program.inputs[i];
+    GraphRange& lanes = registers->lanes[input.register_index];
+    if (variation_of(input.quantity) == Variation::kLinear) {
+      float at[3];
+      for (std::size_t k = 0; k < 3; ++k) at[inputs.order[k]] = inputs.values[i][k];
+      lanes = linear_range(patches, at);
+    } else {
+      lanes = other_range(OnTriangle(heights, triangle), input, patches);
+    }
+  }
+  heights.run_bounds(program, heights.textures, *registers);
+  const std::uint16_t result = program.results[0];
+  const GraphRange out = result == kNoGraphOperand ? range_point(F8{}) : graph_range_operand(program, *registers, result);
+  store8(low, out.low);
+  store8(high, out.high);
 }
 
 /// Owner of all heights of a scene.
@@ -253,13 +334,19 @@ void computed_heights_add(const Scene& scene, const DisplacementOptions& options
   const auto settings_of = [&](const DisplacedInstance& instance) -> const DisplacementSettings* {
     if (instance.displacement_index < 0) return nullptr;
     const DisplacementSettings& settings = scene.displacements[static_cast<std::size_t>(instance.displacement_index)];
-    return settings.graph_index < 0 ? nullptr : &settings;
+    return displacement_is_computed(settings) ? &settings : nullptr;
   };
   if (std::none_of(input->instances.begin(), input->instances.end(), settings_of)) return;
   const auto all = std::make_shared<SceneHeights>(scene);
   input->heights_owner = all;
   const PictureView view{options.camera.value_or(scene.cameras.front().camera),
                          static_cast<double>(options.camera ? options.picture_height : scene.render.height)};
+  GraphScene graph_scene;
+  graph_scene.instances = all->views.instances.data();
+  graph_scene.columns = all->views.instance_columns.data();
+  graph_scene.num_columns = static_cast<std::uint32_t>(all->views.instance_columns.size());
+  graph_scene.camera = view.camera;
+  graph_scene.camera_from_world = inverse(view.camera.world_from_camera);
   std::map<std::tuple<int, int, int>, int> known;  // mesh, displacement, instance where that matters
   std::map<int, std::shared_ptr<std::vector<Affine3>>> places;
   for (std::size_t i = 0; i < input->instances.size(); ++i) {
@@ -267,7 +354,9 @@ void computed_heights_add(const Scene& scene, const DisplacementOptions& options
     const DisplacementSettings* settings = settings_of(instance);
     if (settings == nullptr) continue;
     const MeshView& mesh = all->views.meshes[static_cast<std::size_t>(instance.mesh_index)];
-    const GraphProgramView program = scene.graphs[static_cast<std::size_t>(settings->graph_index)].view();
+    const bool has_graph = settings->graph_index >= 0;
+    const GraphProgramView program =
+        has_graph ? scene.graphs[static_cast<std::size_t>(settings->graph_index)].view() : GraphProgramView{};
     const bool of_instance =
         std::any_of(program.inputs, program.inputs + program.num_inputs,
                     [&](const GraphInput& in) { return is_of_instance(in.quantity, mesh, in.index); });
@@ -276,20 +365,16 @@ void computed_heights_add(const Scene& scene, const DisplacementOptions& options
                           static_cast<int>(input->heights.size()));
     instance.heights_index = at->second;
     if (is_new) {
-      const InstanceView placed = of_instance ? all->views.instances[i] : InstanceView{};
-      GraphScene graph_scene;
-      graph_scene.instances = all->views.instances.data();
-      graph_scene.columns = all->views.instance_columns.data();
-      graph_scene.num_columns = static_cast<std::uint32_t>(all->views.instance_columns.size());
-      graph_scene.camera = view.camera;
-      graph_scene.camera_from_world = inverse(view.camera.world_from_camera);
-      all->heights.push_back(std::make_unique<GraphHeights>(
-          GraphHeights{&mesh, placed, program, scene.textures->views().data(), stage_table_select().run_graph,
-                       graph_scene, next_id.fetch_add(1)}));
+      ComputedHeights heights;
+      if (has_graph) {
+        const InstanceView placed = of_instance ? all->views.instances[i] : InstanceView{};
+        all->heights.push_back(std::make_unique<GraphHeights>(
+            GraphHeights{&mesh, placed, program, scene.textures->views().data(), stage_table_select().run_graph,
+                         graph_bounds_select(), graph_scene, next_id.fetch_add(1)}));
+        heights.source = {all->heights.back().get(), eval, bounds};
+      }
       auto instances = std::make_shared<std::vector<Affine3>>();
       places[at->second] = instances;
-      ComputedHeights heights;
-      heights.source = {all->heights.back().get(), eval, bounds};
       heights.num_cells = settings->num_cells;
       heights.cells = [instances, view, cell = static_cast<double>(settings->cell_pixels)](Vec3f a, Vec3f b) {
         // The same bits either way.

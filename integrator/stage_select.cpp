@@ -6,6 +6,7 @@
 #include <cpuid.h>
 
 #include "displacement/embree_geometry.h"
+#include "integrator/graph_bounds_stage.h"
 #include "integrator/stages.h"
 
 namespace relief {
@@ -52,6 +53,11 @@ const StageTable& stage_table_select()
   if (isa == "avx2" && has_avx2()) return stage_table_avx2();
   throw std::runtime_error("$RELIEF_ISA: expected 'baseline'" + std::string(has_avx2() ? " or 'avx2'" : "") +
                            ", found '" + isa + "'");
+}
+
+GraphBoundsRun graph_bounds_select()
+{
+  return std::string_view(stage_table_select().isa) == "avx2" ? graph_bounds_avx2 : graph_bounds_baseline;
 }
 
 const TraversalTable& traversal_table_select()

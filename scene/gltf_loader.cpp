@@ -83,7 +83,7 @@ void load_height_maps(Scene& scene,
   add_files(scene, requests);
   HeightMapSet heights = height_maps_load(requests, warnings);
   for (DisplacementSettings& displacement : scene.displacements) {
-    if (displacement.has_graph) continue;
+    if (displacement.has_graph || displacement.height.texture_index < 0) continue;
     displacement.height.texture_index =
         heights.map_of_request[static_cast<std::size_t>(displacement.height.texture_index)] +
         static_cast<int>(baked.size());
@@ -422,8 +422,9 @@ void GltfLoader::check_displacement(const PlacedNode& node, const Instance& inst
   const std::string label = node.document->file + ": /meshes/" + std::to_string(mesh_index);
   const Mesh& mesh = scene_.meshes[static_cast<std::size_t>(instance.mesh_index)];
   const DisplacementSettings& d = scene_.displacements[static_cast<std::size_t>(index)];
-  displaced_mesh_warn(label, mesh, d.graph_index < 0 ? &d.height : nullptr, warnings_);
-  if (!d.has_graph || d.graph_index >= 0) return;
+  const bool has_map = d.height.texture_index >= 0;
+  displaced_mesh_warn(label, mesh, has_map ? &d.height : nullptr, warnings_);
+  if (!d.has_graph || !has_map) return;
   const HeightMap& map = height_graphs_.maps()[static_cast<std::size_t>(d.height.texture_index)];
   const UvBounds bounds = displaced_mesh_uv_bounds(mesh, d.height);
   const auto is_outside = [](Wrap wrap, float low, float high) {
@@ -599,7 +600,7 @@ void GltfLoader::set_camera(const LoadOptions& options)
   std::vector<float> reach_of;
   for (const DisplacementSettings& d : scene_.displacements) {
     HeightRange range{0, 1};  // what graphs mostly give
-    if (d.graph_index < 0) {
+    if (d.height.texture_index >= 0) {
       range = height_map_range(scene_.height_maps[static_cast<std::size_t>(d.height.texture_index)].view());
     }
     reach_of.push_back(std::fabs(d.scale) * max(std::fabs(range.low - d.midlevel), std::fabs(range.high - d.midlevel)));

@@ -271,13 +271,6 @@ HeightGraph HeightGraphTable::keep(const GltfDocument& document, const JsonReade
     warnings.add(graph.file() + ": " + json_path_join(graph.path(), name) + ": of maps; these heights have none");
   }
   HeightGraph kept;
-  if (graph.has("cells") && !(graph.raw("cells").is_string() && graph.string("cells", "") == "auto")) {
-    const bool is_number = graph.raw("cells").is_number();
-    const std::int64_t cells = is_number ? graph.integer("cells", 1, 1, kMostHeightCells) : 0;
-    if (!is_number || (cells & (cells - 1)) != 0) graph.fail("cells", "\"auto\" or a power of two up to 524288");
-    kept.num_cells = static_cast<std::int32_t>(cells);
-  }
-  kept.cell_pixels = graph.number_f("cellPixels", 1, 1e-3, 1e3);
   kept.graph_index = static_cast<int>(scene_.graphs.size());
   scene_.graphs.push_back(height_graph_read(document, graph, textures_, scene_.attribute_names, warnings));
   return kept;
@@ -307,9 +300,6 @@ HeightGraph HeightGraphTable::add(const GltfDocument& document,
   Warnings unheard;
   const GraphProgram program = height_graph_read(document, graph, images, attribute_names, unheard);
   if (at_points || !reads_coordinates_alone(program, ref.uv_set)) return known->second = keep(document, graph, warnings);
-  for (const char* name : {"cells", "cellPixels"}) {
-    if (graph.has(name)) warnings.add(label + ": " + name + ": of heights that have no map; these have one");
-  }
   static_cast<void>(height_graph_read(document, graph, images, attribute_names, warnings));
 
   const Height height(program, ref.uv_set);

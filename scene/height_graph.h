@@ -17,10 +17,8 @@ namespace relief {
 
 /// What became of a heightGraph.
 struct HeightGraph {
-  TextureRef map;              ///< where its map lies under the mesh; texture_index is into HeightGraphTable::maps
-  int graph_index = -1;        ///< into Scene::graphs; −1: it has a map
-  std::int32_t num_cells = 0;  ///< see DisplacementSettings
-  float cell_pixels = 1;
+  TextureRef map;        ///< where its map lies under the mesh; texture_index is into HeightGraphTable::maps
+  int graph_index = -1;  ///< into Scene::graphs; −1: it has a map
 };
 
 /// The maps of a scene's height graphs. Equal graphs share one.
@@ -33,7 +31,7 @@ class HeightGraphTable {
   /// Evaluates the heightGraph of a RELIEF_displacement, or keeps it.
   /// @param displacement  the extension's object, which has a heightGraph
   /// @param material      as warnings name it
-  /// @error SceneError: see graph_read; a bad texCoord, uvRange, resolution, evaluate, cells or cellPixels
+  /// @error SceneError: see graph_read; a bad texCoord, uvRange, resolution, or evaluate
   /// @error OutOfMemory
   /// @cost  parallel; up to 17 million evaluations
   HeightGraph add(const GltfDocument& document,

@@ -100,6 +100,26 @@ TextureRef height_texture(const GltfDocument& document,
   return ref;
 }
 
+/// How fine computed heights are.
+void read_cells(const JsonReader& r, DisplacementSettings& d, Warnings& warnings)
+{
+  if (!displacement_is_computed(d)) {
+    for (const char* name : {"cells", "cellPixels"}) {
+      if (!r.has(name)) continue;
+      static_cast<void>(r.raw(name));
+      warnings.add(r.file() + ": " + json_path_join(r.path(), name) + ": of heights that are computed; these have a map");
+    }
+    return;
+  }
+  if (r.has("cells") && !(r.raw("cells").is_string() && r.string("cells", "") == "auto")) {
+    const bool is_number = r.raw("cells").is_number();
+    const std::int64_t cells = is_number ? r.integer("cells", 1, 1, kMostHeightCells) : 0;
+    if (!is_number || (cells & (cells - 1)) != 0) r.fail("cells", "\"auto\" or a power of two up to 524288");
+    d.num_cells = static_cast<std::int32_t>(cells);
+  }
+  d.cell_pixels = r.number_f("cellPixels", 1, 1e-3, 1e3);
+}
+
 /// @param material  as warnings name it
 DisplacementSettings read_displacement(const GltfDocument& document,
                                                       const JsonReader& r,
@@ -128,14 +148,16 @@ DisplacementSettings read_displacement(const GltfDocument& document,
   }
   d.smoothing = r.boolean("smoothing", false);
   d.weld_seams = r.choice("seams", kSeams, 0) == 1;
-  if (!d.has_graph && d.height.texture_index < 0) r.fail("", "a heightTexture or heightGraph", "none");
+  d.curved = r.boolean("curved", false);
+  if (!d.has_graph && d.height.texture_index < 0 && !d.curved) {
+    r.fail("", "a heightTexture or heightGraph, or curved", "none");
+  }
   if (d.has_graph) {
     const HeightGraph graph = height_graphs.add(document, r, material, warnings);
     d.height = graph.map;
     d.graph_index = graph.graph_index;
-    d.num_cells = graph.num_cells;
-    d.cell_pixels = graph.cell_pixels;
   }
+  read_cells(r, d, warnings);
   r.warn_unread(warnings);
   return d;
 }

@@ -31,13 +31,13 @@ RELIEF_KERNEL std::string_view displacement_method_label(DisplacementMethod meth
 
 enum class DisplacementSpace : std::uint8_t { kObject, kWorld };
 
-/// Most cells along a triangle's side.
+/// Most cells along a triangle's side, of heights that are computed.
 inline constexpr std::int32_t kMostHeightCells = 1 << 19;
 
 struct DisplacementSettings {
-  TextureRef height;  ///< its texture index is that of a height map; −1: heights are computed
+  TextureRef height;  ///< its texture index is that of a height map; −1: it has none
   std::int32_t graph_index = -1;  ///< of heights that are computed, into Scene::graphs; −1: they have a map
-  std::int32_t num_cells = 0;     ///< of these along each side of a triangle, a power of two; 0: by their size in the picture
+  std::int32_t num_cells = 0;     ///< of computed heights along each side of a triangle, a power of two; 0: by their size in the picture
   float cell_pixels = 1;          ///< how large they are in the picture, with 0 cells
   float scale = 1;    ///< metres
   float midlevel = 0.5f;
@@ -46,7 +46,14 @@ struct DisplacementSettings {
   float lod = 0;  ///< −1: auto
   bool smoothing = false;
   bool weld_seams = false;
-  bool has_graph = false;  ///< the height map is made of a value graph
+  bool has_graph = false;  ///< heights are those of a value graph
+  bool curved = false;     ///< the base is a smooth surface through the mesh's vertices with its normals there
 };
+
+/// Whether heights are computed where rays ask for them, rather than a map's.
+RELIEF_KERNEL bool displacement_is_computed(const DisplacementSettings& settings)
+{
+  return settings.graph_index >= 0 || settings.curved;
+}
 
 }  // namespace relief

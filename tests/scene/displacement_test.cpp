@@ -100,21 +100,6 @@ TEST(Displacement, TheUnofficialExtensionMeansTheSame)
   EXPECT_EQ(height_map(scene).width, 1);
 }
 
-TEST(Displacement, ProceduralAloneLeavesTheMeshAndSaysSo)
-{
-  const Scene scene = load(square_displaced({{"procedural", {{"noise", "fbm"}}}}));
-  EXPECT_TRUE(scene.displacements.empty());
-  EXPECT_EQ(scene.materials.at(0).displacement_index, -1);
-  EXPECT_EQ(num_warnings(scene, "/procedural: procedural displacement is not supported"), 1u);
-}
-
-TEST(Displacement, ProceduralBesideAMapLeavesTheMapAlone)
-{
-  const Scene scene = load(square_displaced({{"heightTexture", {{"index", 0}}}, {"procedural", json::object()}}));
-  EXPECT_EQ(scene.displacements.size(), 1u);
-  EXPECT_EQ(num_warnings(scene, "procedural displacement is not supported"), 1u);
-}
-
 // --- where height maps come from ---
 
 TEST(Displacement, WrapModesAreTheSamplers)
@@ -323,7 +308,7 @@ TEST(HeightGraph, EqualOnesShareAMapBesideImages)
   EXPECT_EQ(scene.height_maps[static_cast<std::size_t>(image)].width, 1);
 }
 
-TEST(HeightGraph, OtherInputsMoveNothingAndSaySo)
+TEST(HeightGraph, OfOtherInputsIsKept)
 {
   const auto with_output = [](const json& reference) {
     json graph = sine_graph(1);
@@ -335,18 +320,43 @@ TEST(HeightGraph, OtherInputsMoveNothingAndSaySo)
                             {"texture", {{"index", 0}}},
                             {"inputs", {{"vector", {{"node", 0}, {"output", "uv"}}}}}});
   image["nodes"][1]["inputs"]["vector"] = {{"node", 8}, {"output", "color"}};
-  const std::pair<json, const char*> cases[] = {
-      {with_output({{"node", 0}, {"output", "object"}}), "reads \"object\""},
-      {with_output({{"node", 0}, {"output", "generated"}}), "reads \"generated\""},
-      {with_output({{"node", 0}, {"output", "uv1"}}), "reads texCoord 1"},
-      {image, "reads an image"}};
-  for (const auto& [graph, said] : cases) {
+  for (const json& graph : {with_output({{"node", 0}, {"output", "object"}}),
+                            with_output({{"node", 0}, {"output", "generated"}}),
+                            with_output({{"node", 0}, {"output", "uv1"}}), image,
+                            with(sine_graph(1), {{"evaluate", "points"}})}) {
     const Scene scene = load(square_displaced({{"heightGraph", graph}}));
-    EXPECT_TRUE(scene.displacements.empty()) << said;
-    EXPECT_EQ(scene.materials.at(0).displacement_index, -1);
-    EXPECT_EQ(num_warnings(scene, said), 1u) << said;
-    EXPECT_EQ(num_warnings(scene, "the height of material \"bark\""), 1u);
+    ASSERT_EQ(scene.displacements.size(), 1u) << graph;
+    const DisplacementSettings& d = settings(scene);
+    ASSERT_GE(d.graph_index, 0) << graph;
+    EXPECT_EQ(d.num_cells, 0);
+    EXPECT_EQ(d.cell_pixels, 1.0f);
+    EXPECT_TRUE(scene.height_maps.empty());
+    EXPECT_EQ(scene.graphs.at(static_cast<std::size_t>(d.graph_index)).results.size(), 1u);
+    EXPECT_EQ(num_warnings(scene, "heightGraph"), 0u) << graph;
   }
+}
+
+TEST(Displacement, SaysHowFineComputedHeightsAre)
+{
+  const json graph = with(sine_graph(1), {{"evaluate", "points"}});
+  const Scene scene = load(square_displaced({{"heightGraph", graph}, {"cells", 4096}, {"cellPixels", 0.5}}));
+  EXPECT_EQ(settings(scene).num_cells, 4096);
+  EXPECT_EQ(settings(scene).cell_pixels, 0.5f);
+}
+
+TEST(Displacement, WarnsOfWhatIsOfTheOtherKind)
+{
+  EXPECT_EQ(num_warnings(load(square_displaced({{"heightGraph", sine_graph(1)}, {"cells", 4}})), "cells"), 1u);
+  const json points = with(sine_graph(1), {{"evaluate", "points"}, {"resolution", 4}});
+  EXPECT_EQ(num_warnings(load(square_displaced({{"heightGraph", points}})), "resolution"), 1u);
+}
+
+TEST(Displacement, MayCurveTheBaseAlone)
+{
+  const Scene scene = load(square_displaced({{"curved", true}}));
+  EXPECT_TRUE(settings(scene).curved);
+  EXPECT_LT(settings(scene).height.texture_index, 0);
+  EXPECT_TRUE(displacement_is_computed(settings(scene)));
 }
 
 TEST(HeightGraph, MistakesAreNamed)
@@ -363,6 +373,10 @@ TEST(HeightGraph, MistakesAreNamed)
       {{{"heightGraph", with(sine_graph(1), {{"texCoord", 2}})}}, "/heightGraph/texCoord"},
       {{{"heightGraph", with(sine_graph(1), {{"resolution", 1}})}}, "/heightGraph/resolution"},
       {{{"heightGraph", with(sine_graph(1), {{"resolution", 0}})}}, "/heightGraph/resolution"},
+      {{{"heightGraph", with(sine_graph(1), {{"evaluate", "often"}})}}, "/heightGraph/evaluate"},
+      {{{"curved", true}, {"cells", 3}}, "/cells"},
+      {{{"curved", true}, {"cells", "all"}}, "/cells"},
+      {{{"curved", true}, {"cellPixels", 0}}, "/cellPixels"},
       {{{"heightGraph", sine_graph(1)}, {"heightTexture", {{"index", 0}}}}, "either heightTexture or heightGraph"},
       {json::object(), "a heightTexture or heightGraph"}};
   for (const auto& [value, place] : cases) {

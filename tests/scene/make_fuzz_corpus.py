@@ -110,8 +110,7 @@ def materials():
                         "KHR_materials_specular": {"specularFactor": .5, "specularColorFactor": [1, 1, 1]},
                         "KHR_materials_emissive_strength": {"emissiveStrength": 4}, "KHR_materials_unlit": {},
                         "RELIEF_displacement": {"heightTexture": texture, "scale": .1, "midlevel": .5, "space": "world",
-                                                "method": "rmip", "lod": 1.5, "smoothing": True, "seams": "weld",
-                                                "procedural": {"noise": "fbm"}}}}])
+                                                "method": "rmip", "lod": 1.5, "smoothing": True, "seams": "weld"}}}])
     b.node(mesh=b.square(material=0))
     return b
 

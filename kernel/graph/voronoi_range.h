@@ -1,0 +1,99 @@
+// Bounds of Worley's cells over small parallelograms.
+//
+// A distance to points changes by no more than the way that is gone, as long as the points that count are the same: those
+// around one cell of the lattice. From one cell to the next they change, but only farther away than a cell.
+#pragma once
+
+#include "kernel/graph/graph_range.h"
+#include "kernel/graph/voronoi.h"
+
+namespace relief {
+
+/// Distance of one octave.
+/// @param settings  the same all over
+template <int kDims, bool kPcg>
+RELIEF_KERNEL GraphRange voronoi_distance_range(const GraphRange (&p)[kDims], const VoronoiSettings<kDims, kPcg>& settings)
+{
+  constexpr float kMostNear = 90000.0f;
+  // A tall sum of small ways for Minkowski's metric, whose exponents below 1 are no metric.
+  const bool is_sum = settings.metric == VoronoiMetric::kManhattan || settings.metric == VoronoiMetric::kMinkowski;
+  F8 c[kDims], way{}, squares{}, largest{}, ones[kDims], zeros[kDims]{};
+  I8 is_near = splat8(0.0f) == 0.0f, in_cell = is_near;
+  for (int i = 0; i < kDims; ++i) {
+    const F8 radius = range_radius(p[i]) + 4.0f * kRangeRounding * abs(p[i].c);
+    is_near &= abs(p[i].c) + radius <= kMostNear;
+    in_cell &= floor(p[i].c - radius) == floor(p[i].c + radius);
+    way += radius;
+    squares += radius * radius;
+    largest = max(largest, radius);
+    ones[i] = splat8(1.0f);
+  }
+  is_near &= way <= 1.0f;
+  const bool is_edge = settings.feature == VoronoiFeature::kDistanceToEdge;
+  const bool is_euclidean = settings.metric == VoronoiMetric::kEuclidean || is_edge;
+  way = is_euclidean ? sqrt(squares) : is_sum ? way : largest;
+  // Mixes of near distances are steeper by a little each: far less than four times.
+  if (settings.feature == VoronoiFeature::kSmoothF1) way *= 4.0f;
+  for (int i = 0; i < kDims; ++i) c[i] = is_near ? p[i].c : F8{};
+  const F8 at = voronoi_eval<kDims>(c, settings).distance;
+  // The cell's own point is no farther away than the cell is long, nor the second one than two.
+  const F8 cell = is_edge ? splat8(2.0f) : voronoi_distance<kDims>(zeros, ones, settings);
+  const bool is_first = settings.feature == VoronoiFeature::kF1;
+  const F8 most = (is_first ? 1.0001f : 3.0f) * cell;
+  const I8 exponent_is_metric =
+      settings.metric == VoronoiMetric::kMinkowski && !is_edge ? settings.exponent >= 1.0f : is_near;
+  I8 is_known = is_near & exponent_is_metric & (is_first ? in_cell | (at + way < 0.999f) : in_cell);
+  if (settings.feature == VoronoiFeature::kSphereRadius) is_known = I8{};
+  const GraphRange near = range_padded(max(at - way - 1e-5f, F8{}), min(at + way + 1e-5f, most));
+  const GraphRange whole = range_between(splat8(settings.feature == VoronoiFeature::kSmoothF1 ? -8.0f : 0.0f), most);
+  return range_select(is_known, near, range_select(exponent_is_metric, whole, range_unknown()));
+}
+
+/// As voronoi_fractal, with settings that are the same all over.
+/// @param out  distance, three of colour, four of position, radius
+template <int kDims, bool kPcg>
+RELIEF_KERNEL void voronoi_range(const GraphRange (&p)[kDims],
+                                 const VoronoiSettings<kDims, kPcg>& settings,
+                                 const NoiseOctaves& octaves,
+                                 GraphRange* out)
+{
+  const bool is_edge = settings.feature == VoronoiFeature::kDistanceToEdge;
+  const bool is_radius = settings.feature == VoronoiFeature::kSphereRadius;
+  const bool normalizes = (settings.flags & kVoronoiNormalize) != 0 && !is_radius;
+  const bool is_single = mask_of((octaves.detail == 0.0f) | (octaves.roughness == 0.0f)) == 0xffu || is_radius;
+  for (int i = 0; i < 9; ++i) out[i] = range_unknown();
+  F8 corner[kDims], origin[kDims]{};
+  for (F8& x : corner) x = 0.5f + 0.5f * settings.randomness;
+  F8 most = is_edge ? corner[0] : voronoi_distance<kDims>(origin, corner, settings);
+  if (settings.feature == VoronoiFeature::kF2) most *= 2.0f;
+  if (is_single) {
+    out[0] = voronoi_distance_range<kDims, kPcg>(p, settings);
+    if (normalizes) out[0] = out[0] * range_reciprocal(range_point(most));
+    out[8] = out[0];
+    const GraphRange one = range_between(F8{}, splat8(1.0f));
+    // Colours that are mixed smoothly are corrected by a little.
+    for (int i = 0; i < 3 && settings.feature != VoronoiFeature::kSmoothF1; ++i) out[1 + i] = one;
+    return;
+  }
+  if (is_edge) return;
+  const F8 detail = octaves.detail, rest = detail - floor(detail), last_octave = -floor(-detail);
+  float last = 0.0f;
+  for (int k = 0; k < 8; ++k) last = last_octave[k] > last ? last_octave[k] : last;
+  F8 amplitude = splat8(1.0f), scale = splat8(1.0f), size{};
+  GraphRange sum = range_point(F8{});
+  for (int n = 0; n <= static_cast<int>(last); ++n) {
+    GraphRange scaled[kDims];
+    for (int i = 0; i < kDims; ++i) scaled[i] = p[i] * range_point(scale);
+    const F8 number = splat8(static_cast<float>(n));
+    const I8 is_whole = number <= detail, is_there = number <= last_octave;
+    const F8 share = is_whole ? splat8(1.0f) : is_there ? rest : F8{};
+    sum = sum + voronoi_distance_range<kDims, kPcg>(scaled, settings) * range_point(share * amplitude);
+    size += share * amplitude;
+    amplitude = is_whole ? amplitude * octaves.roughness : amplitude;
+    scale = is_whole ? scale * octaves.lacunarity : scale;
+  }
+  out[0] = normalizes ? sum * range_reciprocal(range_point(size * most)) : sum;
+  out[8] = out[0];
+}
+
+}  // namespace relief
