@@ -609,8 +609,10 @@ RELIEF_KERNEL void graph_bounds_run(const GraphProgramView& program,
       case GraphOp::brick:
         b::set_all(o, 2, b::unit());
         break;
-      case GraphOp::checker:
       case GraphOp::fresnel:
+        o.set(0, range_select(in(1).low > 0.0f, range_between(zero, splat8(1.0001f)), range_unknown()));
+        break;
+      case GraphOp::checker:
       case GraphOp::open_share:
         o.set(0, b::unit());
         break;

@@ -26,7 +26,8 @@ RELIEF_KERNEL F8 range_radius(const GraphRange& a) { return abs(a.d1) + abs(a.d2
 /// Brings the two forms together; where one says nothing, neither does the affine form.
 RELIEF_KERNEL GraphRange range_closed(GraphRange a)
 {
-  const F8 pad = kRangeRounding * (abs(a.c) + range_radius(a));
+  constexpr float kDenormal = 1e-36f;
+  const F8 pad = kRangeRounding * (abs(a.c) + range_radius(a)) + kDenormal;
   a.rest += pad;
   const F8 radius = range_radius(a);
   a.low = max(a.low, a.c - radius - pad);

@@ -32,8 +32,6 @@ RELIEF_KERNEL GraphRange voronoi_distance_range(const GraphRange (&p)[kDims], co
   const bool is_edge = settings.feature == VoronoiFeature::kDistanceToEdge;
   const bool is_euclidean = settings.metric == VoronoiMetric::kEuclidean || is_edge;
   way = is_euclidean ? sqrt(squares) : is_sum ? way : largest;
-  // Mixes of near distances are steeper by a little each: far less than four times.
-  if (settings.feature == VoronoiFeature::kSmoothF1) way *= 4.0f;
   for (int i = 0; i < kDims; ++i) c[i] = is_near ? p[i].c : F8{};
   const F8 at = voronoi_eval<kDims>(c, settings).distance;
   // The cell's own point is no farther away than the cell is long, nor the second one than two.
@@ -43,10 +41,17 @@ RELIEF_KERNEL GraphRange voronoi_distance_range(const GraphRange (&p)[kDims], co
   const I8 exponent_is_metric =
       settings.metric == VoronoiMetric::kMinkowski && !is_edge ? settings.exponent >= 1.0f : is_near;
   I8 is_known = is_near & exponent_is_metric & (is_first ? in_cell | (at + way < 0.999f) : in_cell);
-  if (settings.feature == VoronoiFeature::kSphereRadius) is_known = I8{};
+  const bool is_smooth = settings.feature == VoronoiFeature::kSmoothF1;
+  if (settings.feature == VoronoiFeature::kSphereRadius || is_smooth) is_known = I8{};
   const GraphRange near = range_padded(max(at - way - 1e-5f, F8{}), min(at + way + 1e-5f, most));
-  const GraphRange whole = range_between(splat8(settings.feature == VoronoiFeature::kSmoothF1 ? -8.0f : 0.0f), most);
-  return range_select(is_known, near, range_select(exponent_is_metric, whole, range_unknown()));
+  // Each of the cells that are mixed takes a quarter of the smoothness away at most.
+  F8 least{};
+  for (int i = 0, cells = 5; is_smooth && i < kDims; ++i, cells *= 5) {
+    least = -0.25f * static_cast<float>(cells) * abs(settings.smoothness);
+  }
+  const GraphRange whole = range_between(least, most);
+  const I8 is_within = exponent_is_metric & (settings.randomness >= 0.0f) & (settings.randomness <= 1.0f);
+  return range_select(is_known & is_within, near, range_select(is_within, whole, range_unknown()));
 }
 
 /// As voronoi_fractal, with settings that are the same all over.

@@ -188,7 +188,7 @@ TEST_F(GraphBounds, AreNeverNarrowerThanSamples)
                                           static_cast<double>(e2) * p.d2 + static_cast<double>(symbol()) * p.rest);
           }
         }
-        const test::Interpreter& interpreter = test::interpreters()[sample % 2 == 1 ? 0 : 1];
+        const test::Interpreter interpreter = test::interpreters()[sample % 2 == 1 ? 0 : 1];
         if (!interpreter.is_runnable) continue;
         const test::Outputs out = test::run_one(interpreter.run, shape.op, at, immediates, &image_, kTable);
         for (std::size_t o = 0; o < out.size(); ++o) {
@@ -267,14 +267,17 @@ TEST_F(GraphBounds, OfSmoothOperationsAreTightWithTheSquareOfTheSize)
   struct Smooth {
     Op op;
     int num_varying;
-    float from, to;
+    float size, from, to;
   };
-  for (const Smooth& s : {Smooth{Op::multiply, 2, -2, 2}, Smooth{Op::sine, 1, -4, 4}, Smooth{Op::exponent, 1, -2, 2},
-                          Smooth{Op::square_root, 1, 1, 4}, Smooth{Op::divide, 2, 1, 3},
-                          Smooth{Op::signed_noise_2d, 2, -9, 9}, Smooth{Op::signed_noise_3d, 3, -9, 9}}) {
-    const double wide = mean_excess(s.op, 0.05f, s.num_varying, 2, s.from, s.to);
-    const double narrow = mean_excess(s.op, 0.0125f, s.num_varying, 2, s.from, s.to);
-    EXPECT_LT(narrow, wide / 10) << static_cast<int>(s.op) << ": " << wide << " " << narrow;
+  // Sizes at which rounding does not show.
+  for (const Smooth& s :
+       {Smooth{Op::multiply, 2, 0.4f, -2, 2}, Smooth{Op::sine, 1, 0.4f, -4, 4}, Smooth{Op::exponent, 1, 0.4f, -2, 2},
+        Smooth{Op::square_root, 1, 0.3f, 1, 4}, Smooth{Op::divide, 2, 0.2f, 1, 3},
+        Smooth{Op::signed_noise_2d, 2, 0.05f, -9, 9}, Smooth{Op::signed_noise_3d, 3, 0.05f, -9, 9}}) {
+    const double wide = mean_excess(s.op, s.size, s.num_varying, 2, s.from, s.to);
+    const double narrow = mean_excess(s.op, s.size / 4, s.num_varying, 2, s.from, s.to);
+    constexpr double kRounding = 3e-5;  // what is left of functions that grow, whose intervals are tight
+    EXPECT_LT(narrow, wide / 10 + kRounding) << static_cast<int>(s.op) << ": " << wide << " " << narrow;
   }
 }
 
@@ -313,8 +316,9 @@ TEST_F(GraphBounds, NoiseIsNoSteeperThanTheySay)
     for (int i = 0; i < dims; ++i) m[i] = std::abs(a[i]);
     if (dims == 1) return 8 * m[0];
     if (dims == 2) return std::max(m[0] + 2 * m[1], m[1] + 2 * m[0]);
-    std::sort(m, m + dims);
-    return dims == 3 ? m[1] + m[2] : m[1] + m[2] + m[3];
+    // All but the least.
+    return dims == 3 ? m[0] + m[1] + m[2] - std::min({m[0], m[1], m[2]})
+                     : m[0] + m[1] + m[2] + m[3] - std::min({m[0], m[1], m[2], m[3]});
   };
   for (int dims = 1; dims <= 4; ++dims) {
     const int n = kSteps[dims - 1];
