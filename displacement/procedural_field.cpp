@@ -44,6 +44,14 @@ void set_patch(const LatticeTriangle& t, double x0, double y0, double x1, double
   }
 }
 
+/// Of a node's line; never 0.
+std::uint64_t node_key(std::uint32_t triangle, const LatticeNode& node)
+{
+  return (std::uint64_t{triangle} << 32 | static_cast<std::uint64_t>(node.level) << 28 |
+          static_cast<std::uint64_t>(node.i) << 14 | static_cast<std::uint64_t>(node.j)) +
+         1;
+}
+
 }  // namespace
 
 /// The bounds of a node's children. Written by whoever needs them; readers take a copy and look whether it was whole.
@@ -254,6 +262,40 @@ void ProceduralField::make_tile(std::uint32_t triangle, std::int32_t tile_i, std
   }
   if (j0 < 0) std::copy_n(tile->texels + kTileTexels, kTileTexels, tile->texels);
   height_tile_finish(tile);
+  LatticeRange range{kNoBound, -kNoBound};
+  for (std::int32_t r = 1; r < kTileTexels - 1; ++r) {
+    for (std::int32_t c = 1; c < kTileTexels - 1; ++c) {
+      if (i0 + c + j0 + r > t.n) break;
+      const float h_here = tile->texels[r * kTileTexels + c];
+      range = merge(range, {h_here, h_here});
+    }
+  }
+  note_range(triangle, tile_i, tile_j, range);
+}
+
+ProceduralField::NodeLine& ProceduralField::node_line(std::uint64_t key) const
+{
+  std::uint64_t hash = key * 0x9e3779b97f4a7c15u;
+  hash = (hash ^ (hash >> 29)) * 0xbf58476d1ce4e5b9u;
+  return nodes_[(hash >> 32) % kNodeLines];
+}
+
+/// Heights that are there bound a tile better than the source does.
+void ProceduralField::note_range(std::uint32_t triangle, std::int32_t i, std::int32_t j, LatticeRange range) const
+{
+  if (nodes_ == nullptr || root(triangle).level == 0) return;
+  const std::uint64_t key = node_key(triangle, {1, i / 2, j / 2});
+  NodeLine& line = node_line(key);
+  std::uint32_t version = line.version.load(std::memory_order_acquire);
+  if ((version & 1) != 0 || line.key.load(std::memory_order_relaxed) != key ||
+      !line.version.compare_exchange_strong(version, version + 1, std::memory_order_acquire)) {
+    return;
+  }
+  std::atomic_thread_fence(std::memory_order_release);
+  const int child = 2 * (j & 1) + (i & 1);
+  line.low[child].store(range.low, std::memory_order_relaxed);
+  line.high[child].store(range.high, std::memory_order_relaxed);
+  line.version.store(version + 2, std::memory_order_release);
 }
 
 TileCache::Pin ProceduralField::tile(std::uint32_t triangle, std::int32_t i, std::int32_t j) const
@@ -301,12 +343,8 @@ void ProceduralField::find_children(std::uint32_t triangle, const LatticeNode& n
 
 void ProceduralField::children(std::uint32_t triangle, const LatticeNode& node, LatticeRange* out) const
 {
-  const std::uint64_t key = (std::uint64_t{triangle} << 32 | static_cast<std::uint64_t>(node.level) << 28 |
-                             static_cast<std::uint64_t>(node.i) << 14 | static_cast<std::uint64_t>(node.j)) +
-                            1;
-  std::uint64_t hash = key * 0x9e3779b97f4a7c15u;
-  hash = (hash ^ (hash >> 29)) * 0xbf58476d1ce4e5b9u;
-  NodeLine& line = nodes_[(hash >> 32) % kNodeLines];
+  const std::uint64_t key = node_key(triangle, node);
+  NodeLine& line = node_line(key);
   const std::uint32_t before = line.version.load(std::memory_order_acquire);
   if ((before & 1) == 0 && line.key.load(std::memory_order_relaxed) == key) {
     for (int k = 0; k < 4; ++k) {

@@ -78,6 +78,8 @@ class ProceduralField {
   Request request(const LatticeTriangle& triangle, std::int32_t i, std::int32_t j) const;
   void eval(std::uint32_t base, const Request* requests, std::size_t count, float* h) const;
   void make_tile(std::uint32_t triangle, std::int32_t i, std::int32_t j, HeightTile* tile) const;
+  NodeLine& node_line(std::uint64_t key) const;
+  void note_range(std::uint32_t triangle, std::int32_t i, std::int32_t j, LatticeRange range) const;
   void find_children(std::uint32_t triangle, const LatticeNode& node, LatticeRange* out) const;
 
   HeightSource source_;

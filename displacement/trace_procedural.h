@@ -79,10 +79,29 @@ struct LatticeSearch : PrismSearch {
   double position_error = 0;  ///< of the segment's points, lattice units
 };
 
+/// Whether the curve between two of its points may meet heights.
+/// @param low, high  of the heights of the piece's square; crossed: there are none
+RELIEF_KERNEL bool piece_meets(const LatticeSearch& c, const CurvePoint& a, const CurvePoint& b, double low, double high)
+{
+  if (!(low <= high)) return false;
+  const double ga = a.s * a.nu, gb = b.s * b.nu;
+  const double bend = curve_deviation(c.tri, *c.segment, a, b).height;
+  const double d0 = c.mesh.scale * (low - c.mesh.midlevel);
+  const double d1 = c.mesh.scale * (high - c.mesh.midlevel);
+  // Rounding, and what heights change within the error of the curve's place.
+  const double size = __builtin_fabs(c.mesh.scale * c.mesh.midlevel) + max(__builtin_fabs(d0), __builtin_fabs(d1));
+  const double pad = bend + 0x1p-46 * size + c.position_error * __builtin_fabs(d1 - d0);
+  return min(ga, gb) - pad <= max(d0, d1) && max(ga, gb) + pad >= min(d0, d1);
+}
+
 /// @return  true when the search is over
-RELIEF_KERNEL bool tile_intersect(LatticeSearch& c, const LatticeNode& tile, double tau0, double tau1)
+RELIEF_KERNEL bool tile_intersect(LatticeSearch& c, const LatticeNode& tile, const CurvePoint& a, const CurvePoint& b)
 {
   const TriangleOnTile on(c.mesh, c.field, c.triangle, tile);
+  double low, high;
+  stored_to_heights(*on.mesh.field, on.mesh.field->range, &low, &high);
+  if (!piece_meets(c, a, b, low, high)) return false;
+  const double tau0 = a.tau, tau1 = b.tau;
   RayCurve part;
   part.frame = c.curve.frame;
   for (int k = 0; k < 3; ++k) {
@@ -104,27 +123,12 @@ RELIEF_KERNEL bool tile_intersect(LatticeSearch& c, const LatticeNode& tile, dou
   return c.any_hit;
 }
 
-/// Whether the curve between two of its points may meet heights.
-/// @param square  heights of the piece's square
-RELIEF_KERNEL bool piece_meets(const LatticeSearch& c, const CurvePoint& a, const CurvePoint& b, LatticeRange square)
-{
-  if (!(square.low <= square.high)) return false;
-  const double ga = a.s * a.nu, gb = b.s * b.nu;
-  const double bend = curve_deviation(c.tri, *c.segment, a, b).height;
-  const double d0 = c.mesh.scale * (static_cast<double>(square.low) - c.mesh.midlevel);
-  const double d1 = c.mesh.scale * (static_cast<double>(square.high) - c.mesh.midlevel);
-  // Rounding, and what heights change within the error of the curve's place.
-  const double size = __builtin_fabs(c.mesh.scale * c.mesh.midlevel) + max(__builtin_fabs(d0), __builtin_fabs(d1));
-  const double pad = bend + 0x1p-46 * size + c.position_error * __builtin_fabs(d1 - d0);
-  return min(ga, gb) - pad <= max(d0, d1) && max(ga, gb) + pad >= min(d0, d1);
-}
-
 /// The curve between two parameters within a square of the lattice.
 /// @param a, b  the curve's points there
 /// @return      true when the search is over
 RELIEF_KERNEL bool square_intersect(LatticeSearch& c, const LatticeNode& node, const CurvePoint& a, const CurvePoint& b)
 {
-  if (node.level == 0) return tile_intersect(c, node, a.tau, b.tau);
+  if (node.level == 0) return tile_intersect(c, node, a, b);
   LatticeRange children[4];
   c.field.children(c.triangle, node, children);
   ++c.counters.bounds;
@@ -145,7 +149,8 @@ RELIEF_KERNEL bool square_intersect(LatticeSearch& c, const LatticeNode& node, c
     const CurvePoint to = k + 1 == num_cuts ? b : curve_point(c.tri, g, cuts[k]);
     const CurvePoint within = curve_point(c.tri, g, 0.5 * (from.tau + to.tau));
     const int right = within.x > middle_x ? 1 : 0, upper = within.y > middle_y ? 1 : 0;
-    if (piece_meets(c, from, to, children[2 * upper + right]) &&
+    const LatticeRange& child = children[2 * upper + right];
+    if (piece_meets(c, from, to, static_cast<double>(child.low), static_cast<double>(child.high)) &&
         square_intersect(c, {node.level - 1, 2 * node.i + right, 2 * node.j + upper}, from, to)) {
       return true;
     }
