@@ -1,0 +1,228 @@
+// Heights of value graphs over any coordinates, from the file to the hit.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "displacement/vec3d.h"
+#include "integrator/computed_heights.h"
+#include "integrator/scene_context.h"
+#include "integrator/trace.h"
+#include "tests/support/loaded_scene.h"
+#include "tests/support/test_rays.h"
+
+namespace relief::test {
+namespace {
+
+using nlohmann::json;
+
+json reference(int node, const char* output) { return {{"node", node}, {"output", output}}; }
+
+/// Noise over some coordinates.
+json noise(const json& coordinates, double scale, double detail)
+{
+  return {{"nodes",
+           {{{"type", "texture-coordinate"}},
+            {{"type", "noise-texture"},
+             {"inputs", {{"vector", coordinates}, {"scale", scale}, {"detail", detail}}}}}},
+          {"outputs", {{"height", reference(1, "factor")}}}};
+}
+
+/// A ball of triangles, each with vertices of its own, in Generated coordinates from 0 to 1.
+GltfBuilder ball(const json& displacement, int num_instances = 1)
+{
+  std::vector<float> P, generated;
+  constexpr int kAround = 14, kUp = 7;
+  const auto at = [](int i, int j) -> Vec3f {
+    if (j == 0 || j == kUp) return {0, j == 0 ? 1.0f : -1.0f, 0};
+    const double theta = M_PI * j / kUp, phi = 2 * M_PI * (i % kAround) / kAround;
+    return to_float(Vec3d{std::sin(theta) * std::cos(phi), std::cos(theta), -std::sin(theta) * std::sin(phi)});
+  };
+  const auto add = [&](Vec3f a, Vec3f b, Vec3f c) {
+    if (a == b || b == c || c == a) return;
+    for (const Vec3f& v : {a, b, c}) {
+      P.insert(P.end(), {v.x, v.y, v.z});
+      generated.insert(generated.end(), {0.5f + 0.5f * v.x, 0.5f + 0.5f * v.y, 0.5f + 0.5f * v.z});
+    }
+  };
+  for (int j = 0; j < kUp; ++j) {
+    for (int i = 0; i < kAround; ++i) {
+      add(at(i, j), at(i, j + 1), at(i + 1, j + 1));
+      add(at(i, j), at(i + 1, j + 1), at(i + 1, j));
+    }
+  }
+  GltfBuilder b;
+  const int position = b.accessor(P, "VEC3"), normal = b.accessor(P, "VEC3"), where = b.accessor(generated, "VEC3");
+  b.push("materials", {{"name", "ball"}, {"extensions", {{"RELIEF_displacement", displacement}}}});
+  const int mesh = b.mesh({{"attributes", {{"POSITION", position}, {"NORMAL", normal}, {"_GENERATED", where}}},
+                           {"material", 0}});
+  for (int k = 0; k < num_instances; ++k) b.root_node({{"mesh", mesh}, {"translation", {3.0 * k, 0, 0}}});
+  b.push("cameras", {{"type", "perspective"}, {"perspective", {{"yfov", 0.7}, {"znear", 0.1}}}});
+  b.root_node({{"camera", 0}, {"translation", {0, 0, 5}}});
+  return b;
+}
+
+Vec3f random_direction(std::mt19937_64& random)
+{
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const double z = unit(random), phi = M_PI * unit(random), r = std::sqrt(1 - z * z);
+  return to_float(Vec3d{r * std::cos(phi), r * std::sin(phi), z});
+}
+
+TEST(ComputedHeights, OfAnyCoordinatesLetNoRayOut)
+{
+  const json over_noise = {{"nodes",
+                            {{{"type", "texture-coordinate"}},
+                             {{"type", "noise-texture"},
+                              {"inputs", {{"vector", reference(0, "object")}, {"scale", 2}, {"detail", 1}}}},
+                             {{"type", "noise-texture"},
+                              {"inputs", {{"vector", reference(1, "color")}, {"scale", 5}, {"detail", 3}}}}}},
+                           {"outputs", {{"height", reference(2, "factor")}}}};
+  const json position = {{"nodes",
+                          {{{"type", "geometry"}},
+                           {{"type", "noise-texture"},
+                            {"inputs", {{"vector", reference(0, "position")}, {"scale", 4}, {"detail", 4}}}}}},
+                         {"outputs", {{"height", reference(1, "factor")}}}};
+  for (const json& graph : {noise(reference(0, "generated"), 6, 8), noise(reference(0, "object"), 3, 12), over_noise,
+                            position}) {
+    for (const bool curved : {false, true}) {
+      const Scene scene = load(ball({{"heightGraph", graph}, {"scale", 0.5}, {"curved", curved}}));
+      const SceneContext context(scene);
+      ASSERT_EQ(context.displacements.size(), 1u);
+      EXPECT_TRUE(context.displacements.warnings().empty()) << context.displacements.warnings().front();
+      std::mt19937_64 random(11);
+      std::vector<TraceRay> rays;
+      for (std::uint64_t k = 0; k < num_test_rays(40000) / 8; ++k) {
+        const Vec3f O = random_direction(random) * 0.3f;
+        Vec3f D = random_direction(random);
+        // Through vertices and sides of the mesh too.
+        const MeshView mesh = scene.meshes[0].view();
+        const TriangleIndices t = mesh.triangles[random() % mesh.num_triangles];
+        const float along = static_cast<float>(random() % 65) / 64;
+        if (k % 2 == 0) D = mesh.P[t.v0] * (1 - along) + mesh.P[t.v1] * along - (k % 4 == 0 ? O : Vec3f{});
+        rays.push_back({k % 4 == 2 ? Vec3f{} : O, D});
+      }
+      int num_leaks = 0;
+      for (const TraceHit& hit : trace_rays(context, rays)) num_leaks += hit.hit ? 0 : 1;
+      EXPECT_EQ(num_leaks, 0) << graph;
+    }
+  }
+}
+
+/// Steps of a graph by hand: hits lie where its height says.
+TEST(ComputedHeights, PutPointsWhereTheGraphSays)
+{
+  const json graph = {{"nodes",
+                       {{{"type", "texture-coordinate"}},
+                        {{"type", "separate"}, {"inputs", {{"vector", reference(0, "generated")}}}},
+                        {{"type", "math"}, {"operation", "multiply"}, {"inputs", {{"a", reference(1, "x")}, {"b", 2}}}}}},
+                      {"outputs", {{"height", reference(2, "value")}}}};
+  const Scene scene = load(ball({{"heightGraph", graph}, {"scale", 0.25}, {"midlevel", 0.5}, {"cells", 16}}, 2));
+  const SceneContext context(scene);
+  // One surface for both instances.
+  EXPECT_EQ(context.displacements.size(), 1u);
+  std::mt19937_64 random(12);
+  int num_hits = 0;
+  for (int k = 0; k < 2000; ++k) {
+    const Vec3f D = random_direction(random), middle{k % 2 == 0 ? 0.0f : 3.0f, 0, 0};
+    const std::vector<TraceHit> hits = trace_rays(context, std::vector<TraceRay>{{middle, D}});
+    ASSERT_TRUE(hits[0].hit);
+    const TraceHit& hit = hits[0];
+    const Mesh& mesh = scene.meshes[0];
+    const TriangleIndices t = mesh.triangles[hit.triangle_index];
+    const Vec3f base = mesh.P[t.v0] * (1 - hit.u - hit.v) + mesh.P[t.v1] * hit.u + mesh.P[t.v2] * hit.v;
+    // Heights are linear in the weights here, as the lattice's are; normals are the positions.
+    const float d = 0.25f * (2 * (0.5f + 0.5f * base.x) - 0.5f);
+    EXPECT_LT(length(base + normalize(base) * d + middle - hit.P), 2e-5f);
+    ++num_hits;
+  }
+  EXPECT_EQ(num_hits, 2000);
+}
+
+TEST(ComputedHeights, OfTheWorldDifferBetweenInstances)
+{
+  const json graph = {{"nodes",
+                       {{{"type", "geometry"}},
+                        {{"type", "noise-texture"}, {"inputs", {{"vector", reference(0, "position")}}}}}},
+                      {"outputs", {{"height", reference(1, "factor")}}}};
+  const Scene scene = load(ball({{"heightGraph", graph}, {"scale", 0.5}}, 2));
+  EXPECT_EQ(SceneContext(scene).displacements.size(), 2u);
+}
+
+/// The source's own bounds, of patches of all sizes, against what it gives there.
+TEST(ComputedHeights, AreWithinTheirBounds)
+{
+  const json by_normal = {{"nodes",
+                           {{{"type", "geometry"}},
+                            {{"type", "noise-texture"},
+                             {"inputs", {{"vector", reference(0, "normal")}, {"scale", 3}, {"detail", 3}}}}}},
+                          {"outputs", {{"height", reference(1, "factor")}}}};
+  const json musgrave = {{"nodes",
+                          {{{"type", "texture-coordinate"}},
+                           {{"type", "musgrave-texture"},
+                            {"musgraveType", "ridged-multifractal"},
+                            {"inputs", {{"vector", reference(0, "object")}, {"scale", 2}, {"detail", 6}}}}}},
+                         {"outputs", {{"height", reference(1, "factor")}}}};
+  const json voronoi = {{"nodes",
+                         {{{"type", "texture-coordinate"}},
+                          {{"type", "voronoi-texture"},
+                           {"inputs", {{"vector", reference(0, "generated")}, {"scale", 4}}}}}},
+                        {"outputs", {{"height", reference(1, "distance")}}}};
+  for (const json& graph : {noise(reference(0, "generated"), 6, 8), by_normal, musgrave, voronoi}) {
+    const Scene scene = load(ball({{"heightGraph", graph}}));
+    DisplacementInput input;
+    input.instances.push_back({0, 0, -1, scene.instances[0].world_from_object});
+    computed_heights_add(scene, {}, &input);
+    ASSERT_EQ(input.heights.size(), 1u);
+    const HeightSource source = input.heights[0].source;
+    std::mt19937_64 random(13);
+    std::uniform_real_distribution<float> unit(0, 1), symbol(-1, 1);
+    double widths[3] = {}, seen[3] = {};
+    for (int round = 0; round < 1500; ++round) {
+      const auto triangle = static_cast<std::uint32_t>(random() % scene.meshes[0].triangles.size());
+      const int size_class = round % 3;
+      const float size = std::exp2(-3.0f * static_cast<float>(size_class) - 1);
+      WeightPatches patches;
+      for (int lane = 0; lane < 8; ++lane) {
+        for (int axis = 0; axis < 2; ++axis) {
+          patches.center[axis][lane] = unit(random) * 0.5f;
+          patches.du[axis][lane] = axis == 0 ? size * 0.5f : 0.0f;
+          patches.dv[axis][lane] = axis == 1 ? size * 0.5f : 0.0f;
+        }
+      }
+      float low[8], high[8], least[8], most[8];
+      source.bounds(source.owner, triangle, patches, low, high);
+      std::fill_n(least, 8, kInfinity);
+      std::fill_n(most, 8, -kInfinity);
+      for (int sample = 0; sample < 32; ++sample) {
+        float b[3][8], h[8];
+        for (int lane = 0; lane < 8; ++lane) {
+          const float e1 = symbol(random), e2 = symbol(random);
+          for (int axis = 0; axis < 2; ++axis) {
+            b[axis + 1][lane] =
+                patches.center[axis][lane] + e1 * patches.du[axis][lane] + e2 * patches.dv[axis][lane];
+          }
+          b[0][lane] = 1 - b[1][lane] - b[2][lane];
+        }
+        source.eval(source.owner, triangle, b, h);
+        for (int lane = 0; lane < 8; ++lane) {
+          ASSERT_TRUE(h[lane] >= low[lane] && h[lane] <= high[lane])
+              << graph << " " << h[lane] << " in " << low[lane] << " " << high[lane];
+          least[lane] = std::min(least[lane], h[lane]);
+          most[lane] = std::max(most[lane], h[lane]);
+        }
+      }
+      for (int lane = 0; lane < 8; ++lane) {
+        widths[size_class] += static_cast<double>(high[lane]) - low[lane];
+        seen[size_class] += static_cast<double>(most[lane]) - least[lane];
+      }
+    }
+    std::cout << "[ figures  ] " << graph["nodes"][1]["type"] << ": bounds are as wide as what 32 samples show, times";
+    for (int k = 0; k < 3; ++k) std::cout << " " << widths[k] / seen[k];
+    std::cout << "\n";
+  }
+}
+
+}  // namespace
+}  // namespace relief::test
