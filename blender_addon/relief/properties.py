@@ -124,6 +124,15 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
         min=-1.0,
         max=16.0,
     )
+    cell_pixels: FloatProperty(
+        name="Cell Size",
+        description="How fine heights are computed that no map holds, as of noise over Generated coordinates: pixels "
+        "from one to the next, as Cycles' dicing rate (default 1)",
+        default=1.0,
+        min=0.01,
+        soft_min=0.1,
+        max=100.0,
+    )
     bump_displaces: BoolProperty(
         name="Bump Displaces",
         description="Bump nodes with an image move the surface by their distance in metres, medium grey staying where "

@@ -142,6 +142,7 @@ class RELIEF_PT_displacement(_RenderPanel, bpy.types.Panel):
         settings, rows = context.scene.relief, self.rows()
         rows.prop(settings, "displacement_method")
         rows.prop(settings, "lod")
+        rows.prop(settings, "cell_pixels")
         rows.prop(settings, "bump_displaces")
         rows.prop(settings, "weld_seams")
         row = rows.row()

@@ -259,16 +259,19 @@ def test_graphs_cover_what_meshes_use_of_their_uv_map():
     assert abs(value["scale"] - 0.8) < 1e-6
 
 
-def test_heights_over_other_coordinates_move_nothing():
-    """Not even by midlevel · scale."""
+def test_heights_over_generated_coordinates():
+    """No uv map has them."""
     scene = _stage()
-    plane = add_plane(4, _graph_material("ShaderNodeTexNoise", 0.8, coordinates="Object")[0])
-    assert_warns(scene, 'material "displaced"', "a height that is no image", "object coordinates")
-    scene.relief.strict = False
-    shown = render_runs(scene, "RELIEF", 1, 16)
-    plane.data.materials.clear()
-    plane.data.materials.append(new_material("flat", Color=(0.8, 0.7, 0.6, 1), Roughness=0.0)[0])
-    assert np.array_equal(shown, render_runs(scene, "RELIEF", 1, 16))
+    scene.relief.strict, scene.relief.cell_pixels = True, 0.1
+    material, _ = _graph_material("ShaderNodeTexNoise", 0.5, coordinates="Generated", Scale=3.0, Detail=1.0)
+    _assert_agrees(scene, _sphere(material, 1), tolerance=0.004)
+
+
+def test_heights_over_object_coordinates():
+    scene = _stage()
+    scene.relief.strict, scene.relief.cell_pixels = True, 0.1
+    material, _ = _graph_material("ShaderNodeTexWave", 0.2, coordinates="Object", Scale=1.0, Distortion=1.5)
+    _assert_agrees(scene, _square(material), tolerance=0.004)
 
 
 def test_bump_may_displace():

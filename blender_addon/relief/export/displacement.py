@@ -70,12 +70,15 @@ def export_displacement(material, settings, textures, texture_info, images, grap
         except NotUnderstood as error:
             textures.warn(f'node "{node.name}" ({node.bl_label}): its height ({error})', "nothing is displaced")
             return None
-        return {
+        value = {
             "heightGraph": height_graph,
             "scale": move.scale,
             "midlevel": move.midlevel,
             **_how(material, move, settings),
         }
+        if _only_set(graph) is None:
+            value["cellPixels"] = settings.cell_pixels
+        return value
     # scale · (value · h + offset − midlevel) = (scale · value) · (h − (midlevel − offset) / value)
     if height.texture is None:
         return _constant(height.value, move, images)
