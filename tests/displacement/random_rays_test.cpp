@@ -148,6 +148,30 @@ void judge_large_case(std::uint64_t number, RTCDevice, Findings* findings)
   }
 }
 
+/// A plane of Blender's: all normals are equal, and up is out.
+void judge_flat_case(std::uint64_t number, RTCDevice, Findings* findings)
+{
+  std::mt19937_64 random(number);
+  RandomLargeCase drawn = random_large_case(random, kTrianglesPerLargeMap, 0);
+  if (number % 2 == 0) {
+    drawn.map = random_case(random, 0).map;
+    set_random_scale(random, std::pow(10, random_between(random, -2, 0)), &drawn.map);
+  }
+  drawn.map.scale = std::abs(drawn.map.scale);
+  const HeightFormat format = kFormats[number / 2 % 4];
+  drawn.map = stored_heights(drawn.map, format);
+  for (oracle::DisplacedTriangle& triangle : drawn.triangles) triangle.N[1] = triangle.N[2] = triangle.N[0];
+  const TracedCase traced(drawn.triangles, drawn.map, format);
+  for (std::uint32_t index = 0; index < drawn.triangles.size(); ++index) {
+    const JudgedTriangle triangle(drawn.triangles[index], drawn.map);
+    for (const oracle::Ray& ray : random_rays(random, drawn.triangles[index], drawn.map, kRaysPerTriangle)) {
+      const std::vector<oracle::Hit> roots = triangle.surface.intersect_all(ray);
+      for (Judge& judge : findings->judges)
+        judge.judge(traced, index, triangle, ray, roots, "flat case " + std::to_string(number));
+    }
+  }
+}
+
 /// Judges as many cases, from number `first` on, on all processors.
 /// @param judge  judge_case or judge_large_case
 std::vector<Findings> judge_cases(std::uint64_t first,
@@ -187,6 +211,12 @@ TEST(RandomTrianglesOnLargeMaps, AreFoundByEveryMethodAsByTheOracle)
 {
   const std::uint64_t num_cases = num_test_rays(16000) / (kTrianglesPerLargeMap * kRaysPerTriangle);
   expect_no_faults(judge_cases(1 + test_part() * num_cases, num_cases, judge_large_case));
+}
+
+TEST(RandomFlatTriangles, AreFoundByEveryMethodAsByTheOracle)
+{
+  const std::uint64_t num_cases = num_test_rays(16000) / (kTrianglesPerLargeMap * kRaysPerTriangle);
+  expect_no_faults(judge_cases(1 + test_part() * num_cases, num_cases, judge_flat_case));
 }
 
 TEST(RandomDisplacedTriangles, AreFoundByEveryMethodAsByTheOracle)
