@@ -13,6 +13,7 @@
 #include <tbb/global_control.h>
 
 #include "benchmarks/displacement/report.h"
+#include "benchmarks/heightfield/study.h"
 #include "cli/arguments.h"
 #include "cli/commands.h"
 #include "cli/run_files.h"
@@ -86,6 +87,58 @@ int bench_displacement(const BenchArguments& arguments)
   return 0;
 }
 
+struct HeightfieldArguments {
+  HeightfieldOptions options;
+  std::string json, html;
+  bool quick = false;
+};
+
+int bench_heightfield(const HeightfieldArguments& arguments)
+{
+  RunFiles files;
+  files.add_output("--json", arguments.json);
+  files.add_output("--html", arguments.html);
+  for (const std::string& output : {arguments.json, arguments.html}) check_writable(output);
+  HeightfieldOptions options = arguments.options;
+  if (arguments.quick) {
+    options.size = 16;
+    options.width = 64;
+    options.height = 36;
+    options.rounds = 1;
+  }
+  if (isatty(STDERR_FILENO) != 0) {
+    options.progress = [](const std::string& line) { std::fputs((printable_text(line) + "\n").c_str(), stderr); };
+  }
+  const HeightfieldResults results = bench_heightfield_run(options);
+  fmt::print("{}", bench_heightfield_markdown(results));
+  files.check_output("--json", arguments.json);
+  files.check_output("--html", arguments.html);
+  if (!arguments.json.empty()) atomic_write(arguments.json, bench_heightfield_json(results));
+  if (!arguments.html.empty()) atomic_write(arguments.html, bench_heightfield_html(results));
+  return 0;
+}
+
+void heightfield_register(CLI::App& bench, Run& run)
+{
+  CLI::App* command =
+      bench.add_subcommand("heightfield", "Cone maps as published, over a plane: speed, and how many rays are wrong");
+  auto arguments = std::make_shared<HeightfieldArguments>();
+  HeightfieldArguments& a = *arguments;
+  command->add_option("--size", a.options.size, "Texels along a side of the height maps")
+      ->check(one_of({"16", "32", "64", "128", "256", "512"}))
+      ->capture_default_str();
+  command->add_option("--rounds", a.options.rounds, "Times that all rays are traced; the fastest counts")
+      ->check(whole_number(1, 1000))
+      ->capture_default_str();
+  command->add_option_function<std::string>(
+      "--json", [&a](const std::string& text) { a.json = parse_output("--json", text, ".json"); }, "Figures, as JSON");
+  command->add_option_function<std::string>(
+      "--html", [&a](const std::string& text) { a.html = parse_output("--html", text, ".html"); },
+      "One page with tables and pictures");
+  command->add_flag("--quick", a.quick, "Small maps, few rays, one round: whether it works, not how fast");
+  command->callback([&run, arguments] { run = [arguments] { return bench_heightfield(*arguments); }; });
+}
+
 }  // namespace
 
 void cmd_bench_register(CLI::App& app, Run& run)
@@ -122,6 +175,7 @@ void cmd_bench_register(CLI::App& app, Run& run)
       "One page with tables, plots and pictures");
   command->add_flag("--quick", a.quick, "Small maps, few rays, one round: whether it works, not how fast");
   command->callback([&run, arguments] { run = [arguments] { return bench_displacement(*arguments); }; });
+  heightfield_register(*bench, run);
 }
 
 }  // namespace relief

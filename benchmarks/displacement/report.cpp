@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "benchmarks/displacement/table.h"
 #include "exporters/report_html.h"
 
 namespace relief {
@@ -16,13 +17,6 @@ namespace {
 
 constexpr BenchRayKind kKinds[] = {BenchRayKind::kPrimary, BenchRayKind::kBounce, BenchRayKind::kShadow};
 constexpr const char* kNone = "–";
-
-/// A table before it is known how it will be written.
-struct Table {
-  std::string title, note;
-  std::vector<std::string> header;
-  std::vector<std::vector<std::string>> rows;
-};
 
 std::string mebibytes(std::size_t bytes) { return fmt::format("{:.4g}", static_cast<double>(bytes) / (1 << 20)); }
 
@@ -238,30 +232,6 @@ std::string conditions(const BenchResults& results)
       "time, chunks of rays in turns by all methods, fastest of {} rounds. A hit includes its position "
       "and normal.",
       results.isa, results.map_scale, results.resolution.width, results.resolution.height, results.rounds);
-}
-
-std::string markdown(const Table& table)
-{
-  std::string text;
-  if (!table.title.empty()) text += "### " + table.title + "\n\n";
-  if (!table.note.empty()) text += table.note + "\n\n";
-  const auto line = [&](const std::vector<std::string>& cells) {
-    text += "|";
-    for (const std::string& cell : cells) text += " " + cell + " |";
-    text += "\n";
-  };
-  line(table.header);
-  line(std::vector<std::string>(table.header.size(), "---"));
-  for (const auto& row : table.rows) line(row);
-  return text + "\n";
-}
-
-std::string html(const Table& table)
-{
-  std::string text;
-  if (!table.title.empty()) text += html_heading(table.title, 3);
-  if (!table.note.empty()) text += html_paragraph(table.note);
-  return text + html_table(table.header, table.rows);
 }
 
 std::string html(const Sweep& sweep)
