@@ -358,9 +358,11 @@ RELIEF_KERNEL void from_hues(const GraphRangeOperands& o, Vec3f (*f)(Vec3f), boo
 }
 
 /// What an image can give.
-RELIEF_KERNEL GraphRange of_texels(const TextureView& texture)
+/// @param flags  ImageFlags
+RELIEF_KERNEL GraphRange of_texels(const TextureView& texture, std::uint16_t flags)
 {
-  const bool is_unit = texture.format != TexelFormat::kHalf;
+  // Colours that are divided by opacity may be anything.
+  const bool is_unit = texture.format != TexelFormat::kHalf && (flags & kImageDivide) == 0;
   return is_unit ? range_between(splat8(-1e-4f), splat8(1.0001f)) : range_unknown();
 }
 RELIEF_KERNEL void set_all(const GraphRangeOperands& o, int count, const GraphRange& value)
@@ -598,7 +600,7 @@ RELIEF_KERNEL void graph_bounds_run(const GraphProgramView& program,
         break;
       case GraphOp::image:
       case GraphOp::image_box:
-        b::set_all(o, 4, b::of_texels(textures[immediates[0]]));
+        b::set_all(o, 4, b::of_texels(textures[immediates[0]], immediates[1]));
         break;
       case GraphOp::table:
         b::table(o);

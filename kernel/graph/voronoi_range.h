@@ -32,6 +32,8 @@ RELIEF_KERNEL GraphRange voronoi_distance_range(const GraphRange (&p)[kDims], co
   const bool is_edge = settings.feature == VoronoiFeature::kDistanceToEdge;
   const bool is_euclidean = settings.metric == VoronoiMetric::kEuclidean || is_edge;
   way = is_euclidean ? sqrt(squares) : is_sum ? way : largest;
+  // Points less than a hundredth apart count as one, whichever of them is nearer.
+  if (is_edge) way += 0.0101f;
   for (int i = 0; i < kDims; ++i) c[i] = is_near ? p[i].c : F8{};
   const F8 at = voronoi_eval<kDims>(c, settings).distance;
   // The cell's own point is no farther away than the cell is long, nor the second one than two.
