@@ -14,6 +14,7 @@
 
 #include "benchmarks/displacement/report.h"
 #include "benchmarks/heightfield/study.h"
+#include "benchmarks/procedural/study.h"
 #include "cli/arguments.h"
 #include "cli/commands.h"
 #include "cli/run_files.h"
@@ -87,56 +88,93 @@ int bench_displacement(const BenchArguments& arguments)
   return 0;
 }
 
-struct HeightfieldArguments {
-  HeightfieldOptions options;
+/// What benches of one study have in common.
+struct StudyArguments {
   std::string json, html;
+  int rounds = 3;
   bool quick = false;
 };
 
-int bench_heightfield(const HeightfieldArguments& arguments)
+/// Runs a study and writes what it found.
+template <class Options, class Results>
+int bench_study(const StudyArguments& arguments,
+                Options options,
+                Results (*study)(const Options&),
+                std::string (*markdown_of)(const Results&),
+                std::string (*json_of)(const Results&),
+                std::string (*html_of)(const Results&))
 {
   RunFiles files;
   files.add_output("--json", arguments.json);
   files.add_output("--html", arguments.html);
   for (const std::string& output : {arguments.json, arguments.html}) check_writable(output);
-  HeightfieldOptions options = arguments.options;
-  if (arguments.quick) {
-    options.size = 16;
-    options.width = 64;
-    options.height = 36;
-    options.rounds = 1;
-  }
+  options.rounds = arguments.quick ? 1 : arguments.rounds;
   if (isatty(STDERR_FILENO) != 0) {
     options.progress = [](const std::string& line) { std::fputs((printable_text(line) + "\n").c_str(), stderr); };
   }
-  const HeightfieldResults results = bench_heightfield_run(options);
-  fmt::print("{}", bench_heightfield_markdown(results));
+  const Results results = study(options);
+  fmt::print("{}", markdown_of(results));
   files.check_output("--json", arguments.json);
   files.check_output("--html", arguments.html);
-  if (!arguments.json.empty()) atomic_write(arguments.json, bench_heightfield_json(results));
-  if (!arguments.html.empty()) atomic_write(arguments.html, bench_heightfield_html(results));
+  if (!arguments.json.empty()) atomic_write(arguments.json, json_of(results));
+  if (!arguments.html.empty()) atomic_write(arguments.html, html_of(results));
   return 0;
+}
+
+void add_study_options(CLI::App& command, StudyArguments& a)
+{
+  command.add_option("--rounds", a.rounds, "Times that all rays are traced; the fastest counts")
+      ->check(whole_number(1, 1000))
+      ->capture_default_str();
+  command.add_option_function<std::string>(
+      "--json", [&a](const std::string& text) { a.json = parse_output("--json", text, ".json"); }, "Figures, as JSON");
+  command.add_option_function<std::string>(
+      "--html", [&a](const std::string& text) { a.html = parse_output("--html", text, ".html"); },
+      "One page with tables and plots or pictures");
+  command.add_flag("--quick", a.quick, "Small, one round: whether it works, not how fast");
 }
 
 void heightfield_register(CLI::App& bench, Run& run)
 {
   CLI::App* command =
       bench.add_subcommand("heightfield", "Cone maps as published, over a plane: speed, and how many rays are wrong");
-  auto arguments = std::make_shared<HeightfieldArguments>();
-  HeightfieldArguments& a = *arguments;
-  command->add_option("--size", a.options.size, "Texels along a side of the height maps")
+  struct Arguments : StudyArguments {
+    int size = 128;
+  };
+  auto arguments = std::make_shared<Arguments>();
+  command->add_option("--size", arguments->size, "Texels along a side of the height maps")
       ->check(one_of({"16", "32", "64", "128", "256", "512"}))
       ->capture_default_str();
-  command->add_option("--rounds", a.options.rounds, "Times that all rays are traced; the fastest counts")
-      ->check(whole_number(1, 1000))
-      ->capture_default_str();
-  command->add_option_function<std::string>(
-      "--json", [&a](const std::string& text) { a.json = parse_output("--json", text, ".json"); }, "Figures, as JSON");
-  command->add_option_function<std::string>(
-      "--html", [&a](const std::string& text) { a.html = parse_output("--html", text, ".html"); },
-      "One page with tables and pictures");
-  command->add_flag("--quick", a.quick, "Small maps, few rays, one round: whether it works, not how fast");
-  command->callback([&run, arguments] { run = [arguments] { return bench_heightfield(*arguments); }; });
+  add_study_options(*command, *arguments);
+  command->callback([&run, arguments] {
+    run = [arguments] {
+      HeightfieldOptions options;
+      options.size = arguments->size;
+      if (arguments->quick) {
+        options.size = 16;
+        options.width = 64;
+        options.height = 36;
+      }
+      return bench_study(*arguments, options, bench_heightfield_run, bench_heightfield_markdown, bench_heightfield_json,
+                         bench_heightfield_html);
+    };
+  });
+}
+
+void procedural_register(CLI::App& bench, Run& run)
+{
+  CLI::App* command = bench.add_subcommand(
+      "procedural", "Heights that are computed: microtriangle marching as published, and heights on demand");
+  auto arguments = std::make_shared<StudyArguments>();
+  add_study_options(*command, *arguments);
+  command->callback([&run, arguments] {
+    run = [arguments] {
+      ProceduralOptions options;
+      if (arguments->quick) options.num_rays = 500;
+      return bench_study(*arguments, options, bench_procedural_run, bench_procedural_markdown, bench_procedural_json,
+                         bench_procedural_html);
+    };
+  });
 }
 
 }  // namespace
@@ -176,6 +214,7 @@ void cmd_bench_register(CLI::App& app, Run& run)
   command->add_flag("--quick", a.quick, "Small maps, few rays, one round: whether it works, not how fast");
   command->callback([&run, arguments] { run = [arguments] { return bench_displacement(*arguments); }; });
   heightfield_register(*bench, run);
+  procedural_register(*bench, run);
 }
 
 }  // namespace relief

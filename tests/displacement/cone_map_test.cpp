@@ -67,7 +67,7 @@ TEST(ConeMaps, RelaxedOnesAreEnteredOnce)
   const ConeMap relaxed = cone_map_relaxed(t), conservative = cone_map_conservative(t);
   std::mt19937 random(4);
   int num_entered = 0, num_wider = 0;
-  for (int round = 0; round < 20000; ++round) {
+  for (int round = 0; round < 100000; ++round) {
     const int i = static_cast<int>(random() % 32), j = static_cast<int>(random() % 32);
     const int dx = static_cast<int>(random() % 3) - 1, dy = static_cast<int>(random() % 3) - 1;
     if (dx == 0 && dy == 0) continue;
