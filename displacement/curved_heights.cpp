@@ -50,10 +50,7 @@ RangeVec between(Vec3d a, Vec3d b, Range t) { return exactly(a) + exactly(b - a)
 
 /// Cubic with values 0 at both ends and slopes m0 and m1 there.
 double hermite(double m0, double m1, double t) { return t * (1 - t) * (m0 * (1 - t) - m1 * t); }
-double hermite_slope(double m0, double m1, double t)
-{
-  return m0 * (1 - t) * (1 - 3 * t) + m1 * t * (3 * t - 2);
-}
+double hermite_slope(double m0, double m1, double t) { return m0 * (1 - t) * (1 - 3 * t) + m1 * t * (3 * t - 2); }
 
 /// Slope into the triangle, towards the vertex opposite to a side, at a point of the side. The same text for numbers and for
 /// ranges, whose squares and quotients differ.
@@ -119,7 +116,8 @@ double CurvedTriangle::displacement(const double* b) const
     const int i = side, j = next(i), k = next(j);
     if (b[i] != 0) continue;
     const double length_j = b[j], length_k = b[k];
-    const Vec3d N = comes_before(P_[j], P_[k]) ? N_[j] * length_j + N_[k] * length_k : N_[k] * length_k + N_[j] * length_j;
+    const Vec3d N =
+        comes_before(P_[j], P_[k]) ? N_[j] * length_j + N_[k] * length_k : N_[k] * length_k + N_[j] * length_j;
     return side_height(j, length_k / (length_j + length_k)) * length(N);
   }
   for (int i = 0; i < 3; ++i) {
@@ -150,11 +148,11 @@ void CurvedTriangle::bounds(double* low, double* high) const
       const Range t{static_cast<double>(piece) / kPieces, static_cast<double>(piece + 1) / kPieces};
       const Range left = Range{1, 1} - t;
       const Range end = t * left * (Range{m0, m0} * left - Range{m1, m1} * t);
-      const Range slope = Range{m0, m0} * left * (Range{1, 1} - Range{3, 3} * t) +
-                          Range{m1, m1} * t * (Range{3, 3} * t - Range{2, 2});
-      const Range across = slope_across<RangeVec, Range>(between(P_[j], P_[k], t), between(N_[j], N_[k], t),
-                                                         exactly(P_[k] - P_[j]), exactly(N_[k] - N_[j]), end, slope,
-                                                         exactly(P_[i]), exactly(N_[i]));
+      const Range slope =
+          Range{m0, m0} * left * (Range{1, 1} - Range{3, 3} * t) + Range{m1, m1} * t * (Range{3, 3} * t - Range{2, 2});
+      const Range across =
+          slope_across<RangeVec, Range>(between(P_[j], P_[k], t), between(N_[j], N_[k], t), exactly(P_[k] - P_[j]),
+                                        exactly(N_[k] - N_[j]), end, slope, exactly(P_[i]), exactly(N_[i]));
       h = hull(h, hull(end, end + across * Range{1.0 / 3, 1.0 / 3}));
     }
   }

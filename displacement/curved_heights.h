@@ -43,8 +43,8 @@ class CurvedTriangle {
 
 /// Smooth heights of a mesh, with others on top.
 struct CurvedHeights {
-  MeshView mesh;           ///< with normals
-  HeightSource on_top;     ///< without eval: none, which is a height of `midlevel`
+  MeshView mesh;                   ///< with normals
+  HeightSource on_top;             ///< without eval: none, which is a height of `midlevel`
   double scale = 1, midlevel = 0;  ///< of the displacement
   HeightSource source() const;
 };

@@ -202,9 +202,8 @@ DisplacedMesh::DisplacedMesh(const MeshView& mesh,
   report_.num_walls = static_cast<std::uint32_t>(walls_.size());
   report_.num_far_uv = num_far_uv;
   report_.first_far_uv = first_far_uv;
-  bound_triangles([&](std::uint32_t index) {
-    return height_bounds(triangles_[index], walls_of(walls_, index), field, coarser);
-  });
+  bound_triangles(
+      [&](std::uint32_t index) { return height_bounds(triangles_[index], walls_of(walls_, index), field, coarser); });
 }
 
 DisplacedMesh::DisplacedMesh(const MeshView& mesh, const ProceduralField& field, const DisplacementMapping& mapping)

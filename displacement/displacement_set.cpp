@@ -106,7 +106,8 @@ std::optional<TessellationKind> tessellation_kind(DisplacementMethod method)
 void set_base_place(const ProceduralField& field, DisplacedPoint* point)
 {
   const LatticeTriangle& part = field.triangles()[point->triangle];
-  const Vec2f place = (1.0f - point->u - point->v) * part.corner[0] + point->u * part.corner[1] + point->v * part.corner[2];
+  const Vec2f place =
+      (1.0f - point->u - point->v) * part.corner[0] + point->u * part.corner[1] + point->v * part.corner[2];
   point->triangle = part.base;
   point->u = place.x;
   point->v = place.y;
@@ -449,9 +450,10 @@ std::vector<std::string> DisplacementSet::warnings() const
                       "have no normal to be displaced along and are left out");
     }
     if (displaced->procedural != nullptr && displaced->procedural->is_sampled()) {
-      texts.push_back("the heights of mesh '" + displaced->name +
-                      "' have no bounds that are known; those beyond what some points of it have, and as much again, are "
-                      "cut off");
+      texts.push_back(
+          "the heights of mesh '" + displaced->name +
+          "' have no bounds that are known; those beyond what some points of it have, and as much again, are "
+          "cut off");
     }
     if (report.num_far_uv > 0) {
       const HeightMapView& map = displaced->geometry.mesh.field->map;

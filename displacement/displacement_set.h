@@ -33,8 +33,8 @@ struct DisplacedInstance {
 
 /// Heights of a mesh that are computed where they are wanted.
 struct ComputedHeights {
-  HeightSource source;   ///< without eval: the displacement's map is, if it has one
-  CellsAlong cells;      ///< that are wanted; not used with num_cells
+  HeightSource source;         ///< without eval: the displacement's map is, if it has one
+  CellsAlong cells;            ///< that are wanted; not used with num_cells
   std::int32_t num_cells = 0;  ///< along each side of all triangles, a power of two; 0: by `cells`
 };
 
@@ -57,7 +57,7 @@ struct DisplacementOptions {
   std::uint64_t auto_bytes = 0;              ///< what `auto` may use while it builds tessellations; 0: it builds none
   std::optional<Camera> camera;              ///< by which computed heights choose their cells; empty: the scene's first
   int picture_height = 0;                    ///< pixels, with a camera
-  double num_rays = 0;                   ///< that will be traced, about, for `auto` to weigh building against tracing
+  double num_rays = 0;  ///< that will be traced, about, for `auto` to weigh building against tracing
   std::uint64_t computed_bytes = std::uint64_t{256} << 20;  ///< computed heights that each mesh keeps, at most
   std::uint64_t tessellation_bytes = 0;  ///< all tessellations may take while they are built; 0: half of the machine's
 };
@@ -109,9 +109,9 @@ class DisplacementSet {
 
  private:
   struct Displaced {
-    std::string name;           ///< of the mesh
-    int displacement_index;     ///< into the input's settings
-    DisplacementMethod method;  ///< by which it is traced
+    std::string name;                             ///< of the mesh
+    int displacement_index;                       ///< into the input's settings
+    DisplacementMethod method;                    ///< by which it is traced
     std::unique_ptr<MapHeights> map_heights;      ///< where computed heights are a map's
     std::unique_ptr<CurvedHeights> curved;        ///< where the base is curved
     std::unique_ptr<ProceduralField> procedural;  ///< heights that are computed
@@ -136,7 +136,7 @@ class DisplacementSet {
     int displacement_index;
     const DisplacementSettings& settings;
     const ComputedHeights* heights;  ///< null: a map's
-    double scale = 1;       ///< metres of object space
+    double scale = 1;                ///< metres of object space
     double steepening = 1;  ///< how much steeper its instances' slopes are in the world than in object space, at most
   };
   std::vector<Use> find_uses(const DisplacementInput& input);

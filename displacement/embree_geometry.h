@@ -23,9 +23,9 @@ struct DisplacedGeometry {
   DisplacementMethod method = kDefaultMethod;
   bool smooth = false;  ///< shading normals come from the map's filtered gradient
   LodRule lod;
-  DisplacementLevel levels[kMaxLodLevels];     ///< the finest first; lod.num_levels of them
-  RmipOptions rmip_options;                    ///< for both of RMIP's
-  RTCFilterFunctionN shadow_filter = nullptr;  ///< called for hits of shadow rays; null: all of them are opaque
+  DisplacementLevel levels[kMaxLodLevels];      ///< the finest first; lod.num_levels of them
+  RmipOptions rmip_options;                     ///< for both of RMIP's
+  RTCFilterFunctionN shadow_filter = nullptr;   ///< called for hits of shadow rays; null: all of them are opaque
   const ProceduralField* procedural = nullptr;  ///< heights in place of a map's; there are no levels then
   RTCScene scene = nullptr;  ///< of this geometry alone, committed; null: rays that leave it know no neighbours
 };

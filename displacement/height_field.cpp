@@ -112,9 +112,10 @@ PyramidLine line_make(const HeightFieldView& f, int level, int columns, int rows
     const int column = 4 * line_column + (child & 3), row = 4 * line_row + (child >> 2);
     StoredRange range = kEmpty;
     if (column < columns && row < rows) {
-      range = level == 0 ? block_range(f, 4 * column, 4 * row)
-                         : line_range(f.lines[level - 1][static_cast<std::ptrdiff_t>(row) * f.line_columns[level - 1] +
-                                                         column]);
+      range =
+          level == 0
+              ? block_range(f, 4 * column, 4 * row)
+              : line_range(f.lines[level - 1][static_cast<std::ptrdiff_t>(row) * f.line_columns[level - 1] + column]);
     }
     line.low[child] = range.low;
     line.high[child] = range.high;
@@ -239,8 +240,7 @@ HeightFieldView small_height_field_make(const HeightMapView& map, PyramidLine* l
     f.line_columns[level] = line_columns;
     f.num_levels = level + 1;
     for (int row = 0; row < line_rows; ++row) {
-      for (int column = 0; column < line_columns; ++column)
-        *lines++ = line_make(f, level, columns, rows, column, row);
+      for (int column = 0; column < line_columns; ++column) *lines++ = line_make(f, level, columns, rows, column, row);
     }
     if (line_columns == 1 && line_rows == 1) break;
     columns = line_columns;

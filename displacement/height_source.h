@@ -19,11 +19,8 @@ struct HeightSource {
   /// @param b  weights of vertices 0, 1 and 2
   void (*eval)(const void* owner, std::uint32_t triangle, const float (*b)[8], float* h) = nullptr;
   /// Bounds of all that `eval` may give over eight parallelograms of one triangle; infinite where none are known.
-  void (*bounds)(const void* owner,
-                 std::uint32_t triangle,
-                 const WeightPatches& patches,
-                 float* low,
-                 float* high) = nullptr;
+  void (*bounds)(const void* owner, std::uint32_t triangle, const WeightPatches& patches, float* low, float* high) =
+      nullptr;
 };
 
 }  // namespace relief

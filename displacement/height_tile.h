@@ -75,7 +75,7 @@ class TileCache {
     return pin;
   }
 
-  std::size_t bytes() const;           ///< taken so far
+  std::size_t bytes() const;  ///< taken so far
   std::uint64_t num_made() const { return num_made_.load(std::memory_order_relaxed); }
 
  private:
@@ -83,8 +83,8 @@ class TileCache {
   static constexpr std::int32_t kInMaking = -1;
 
   struct Slot {
-    std::atomic<std::uint64_t> key;  ///< plus one; 0: empty
-    std::atomic<std::int32_t> pins;  ///< kInMaking, or how many use it
+    std::atomic<std::uint64_t> key;   ///< plus one; 0: empty
+    std::atomic<std::int32_t> pins;   ///< kInMaking, or how many use it
     std::atomic<std::uint32_t> used;  ///< when it was last, by num_made_
     HeightTile tile;
   };

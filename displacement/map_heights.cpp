@@ -54,7 +54,8 @@ void bounds(const void* owner, std::uint32_t triangle, const WeightPatches& p, f
       const double e1 = x[1] - x[0], e2 = x[2] - x[0];
       const double middle = x[0] + p.center[0][lane] * e1 + p.center[1][lane] * e2;
       const double reach = std::abs(p.du[0][lane] * e1 + p.du[1][lane] * e2) +
-                           std::abs(p.dv[0][lane] * e1 + p.dv[1][lane] * e2) + 1e-6 * (std::abs(e1) + std::abs(e2)) + 1e-6;
+                           std::abs(p.dv[0][lane] * e1 + p.dv[1][lane] * e2) + 1e-6 * (std::abs(e1) + std::abs(e2)) +
+                           1e-6;
       cells[axis][0] = static_cast<std::int64_t>(std::floor(middle - reach));
       cells[axis][1] = static_cast<std::int64_t>(std::floor(middle + reach));
     }

@@ -209,7 +209,10 @@ LatticeNode ProceduralField::root(std::uint32_t triangle) const
   return node;
 }
 
-void ProceduralField::make_tile(std::uint32_t triangle, std::int32_t tile_i, std::int32_t tile_j, HeightTile* tile) const
+void ProceduralField::make_tile(std::uint32_t triangle,
+                                std::int32_t tile_i,
+                                std::int32_t tile_j,
+                                HeightTile* tile) const
 {
   const LatticeTriangle& t = triangles_[triangle];
   const std::int32_t i0 = tile_i * kTileCells - 1, j0 = tile_j * kTileCells - 1;
@@ -257,8 +260,7 @@ void ProceduralField::make_tile(std::uint32_t triangle, std::int32_t tile_i, std
     }
   }
   if (i0 < 0) {
-    for (std::int32_t r = 0; r < kTileTexels; ++r)
-      tile->texels[r * kTileTexels] = tile->texels[r * kTileTexels + 1];
+    for (std::int32_t r = 0; r < kTileTexels; ++r) tile->texels[r * kTileTexels] = tile->texels[r * kTileTexels + 1];
   }
   if (j0 < 0) std::copy_n(tile->texels + kTileTexels, kTileTexels, tile->texels);
   height_tile_finish(tile);

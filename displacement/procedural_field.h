@@ -21,10 +21,10 @@ namespace relief {
 
 /// A base triangle, or a part of one, and its lattice.
 struct LatticeTriangle {
-  std::uint32_t base = 0;                     ///< triangle of the mesh
-  Vec2f corner[3] = {{0, 0}, {1, 0}, {0, 1}}; ///< weights of the base triangle's vertices 1 and 2 at its corners
-  std::int32_t n = 1;                         ///< cells along each side
-  std::int32_t side_n[3] = {1, 1, 1};         ///< of the side from corner k to the next: divides n
+  std::uint32_t base = 0;                      ///< triangle of the mesh
+  Vec2f corner[3] = {{0, 0}, {1, 0}, {0, 1}};  ///< weights of the base triangle's vertices 1 and 2 at its corners
+  std::int32_t n = 1;                          ///< cells along each side
+  std::int32_t side_n[3] = {1, 1, 1};          ///< of the side from corner k to the next: divides n
 };
 
 /// Bounds of heights. Nothing where low > high.
@@ -86,8 +86,8 @@ class ProceduralField {
   std::vector<LatticeTriangle> triangles_;
   std::vector<LatticeRange> ranges_;
   float midlevel_;
-  LatticeRange all_;       ///< of all triangles
-  float side_grid_ = 0;   ///< heights on sides are multiples of this, so that what is interpolated has no rounding
+  LatticeRange all_;     ///< of all triangles
+  float side_grid_ = 0;  ///< heights on sides are multiples of this, so that what is interpolated has no rounding
   bool is_sampled_ = false;
   mutable TileCache tiles_;
   std::unique_ptr<NodeLine[]> nodes_;  ///< cached bounds of children

@@ -75,13 +75,17 @@ struct LatticeSearch : PrismSearch {
   bool (*traverse)(const PrismQuery& query, const void* table, DisplacedHit* hit);
   const RmipOptions& options;
   const CurveSegment* segment = nullptr;
-  double tau_end = 1;  ///< nothing beyond matters: a hit is known there
+  double tau_end = 1;         ///< nothing beyond matters: a hit is known there
   double position_error = 0;  ///< of the segment's points, lattice units
 };
 
 /// Whether the curve between two of its points may meet heights.
 /// @param low, high  of the heights of the piece's square; crossed: there are none
-RELIEF_KERNEL bool piece_meets(const LatticeSearch& c, const CurvePoint& a, const CurvePoint& b, double low, double high)
+RELIEF_KERNEL bool piece_meets(const LatticeSearch& c,
+                               const CurvePoint& a,
+                               const CurvePoint& b,
+                               double low,
+                               double high)
 {
   if (!(low <= high)) return false;
   const double ga = a.s * a.nu, gb = b.s * b.nu;

@@ -174,8 +174,9 @@ bool trace(const DisplacedGeometry& geometry,
   ++counters->prisms;
   const CurveQuery q{geometry, triangle, curve, ray, *counters};
   if (geometry.procedural != nullptr) {
-    return trace_procedural({mesh, triangle, curve, ray.t_min, ray.t_max, ray.any_hit, geometry.rmip_options, *counters},
-                            *geometry.procedural, kMethods[static_cast<int>(geometry.method)]->traverse, hit);
+    return trace_procedural(
+        {mesh, triangle, curve, ray.t_min, ray.t_max, ray.any_hit, geometry.rmip_options, *counters},
+        *geometry.procedural, kMethods[static_cast<int>(geometry.method)]->traverse, hit);
   }
   const bool found =
       geometry.lod.num_levels > 1 ? trace_levels(q, hit) : trace_level(q, mesh, triangle, 0, ray.t_min, ray.t_max, hit);

@@ -99,9 +99,8 @@ std::array<int, 3> vertex_order(const MeshView& mesh, std::uint32_t triangle)
   const TriangleIndices& v = mesh.triangles[triangle];
   const Vec3f P[3] = {mesh.P[v.v0], mesh.P[v.v1], mesh.P[v.v2]};
   std::array<int, 3> order = {0, 1, 2};
-  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
-    return std::tie(P[a].x, P[a].y, P[a].z) < std::tie(P[b].x, P[b].y, P[b].z);
-  });
+  std::stable_sort(order.begin(), order.end(),
+                   [&](int a, int b) { return std::tie(P[a].x, P[a].y, P[a].z) < std::tie(P[b].x, P[b].y, P[b].z); });
   return order;
 }
 
@@ -223,11 +222,11 @@ GraphRange linear_range(const WeightPatches& patches, const float* at)
 {
   const F8 b1 = load8(patches.center[0]), b2 = load8(patches.center[1]);
   const float e1 = at[1] - at[0], e2 = at[2] - at[0];
-  const auto along = [=](const float (*d)[8]) { return load8(d[0]) * e1 + load8(d[1]) * e2; };
+  const auto along = [=](const float(*d)[8]) { return load8(d[0]) * e1 + load8(d[1]) * e2; };
   // The sums of three products that stand for it elsewhere are off by their rounding.
   const float size = std::max({std::abs(at[0]), std::abs(at[1]), std::abs(at[2])});
-  GraphRange out{at[0] + b1 * e1 + b2 * e2, along(patches.du), along(patches.dv), splat8(1e-6f * size),
-                 splat8(-kInfinity), splat8(kInfinity)};
+  GraphRange out{at[0] + b1 * e1 + b2 * e2, along(patches.du),  along(patches.dv),
+                 splat8(1e-6f * size),      splat8(-kInfinity), splat8(kInfinity)};
   return range_closed(out);
 }
 
@@ -293,7 +292,8 @@ void bounds(const void* owner, std::uint32_t triangle, const WeightPatches& patc
   }
   heights.run_bounds(program, heights.textures, *registers);
   const std::uint16_t result = program.results[0];
-  const GraphRange out = result == kNoGraphOperand ? range_point(F8{}) : graph_range_operand(program, *registers, result);
+  const GraphRange out =
+      result == kNoGraphOperand ? range_point(F8{}) : graph_range_operand(program, *registers, result);
   store8(low, out.low);
   store8(high, out.high);
 }

@@ -5,7 +5,9 @@
 
 namespace relief {
 
-void graph_bounds_baseline(const GraphProgramView& program, const TextureView* textures, GraphRangeRegisters& registers);
+void graph_bounds_baseline(const GraphProgramView& program,
+                           const TextureView* textures,
+                           GraphRangeRegisters& registers);
 void graph_bounds_avx2(const GraphProgramView& program, const TextureView* textures, GraphRangeRegisters& registers);
 
 /// The one that goes with stage_table_select.

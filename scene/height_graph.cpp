@@ -299,7 +299,8 @@ HeightGraph HeightGraphTable::add(const GltfDocument& document,
   std::vector<std::string> attribute_names;
   Warnings unheard;
   const GraphProgram program = height_graph_read(document, graph, images, attribute_names, unheard);
-  if (at_points || !reads_coordinates_alone(program, ref.uv_set)) return known->second = keep(document, graph, warnings);
+  if (at_points || !reads_coordinates_alone(program, ref.uv_set))
+    return known->second = keep(document, graph, warnings);
   static_cast<void>(height_graph_read(document, graph, images, attribute_names, warnings));
 
   const Height height(program, ref.uv_set);

@@ -107,7 +107,8 @@ void read_cells(const JsonReader& r, DisplacementSettings& d, Warnings& warnings
     for (const char* name : {"cells", "cellPixels"}) {
       if (!r.has(name)) continue;
       static_cast<void>(r.raw(name));
-      warnings.add(r.file() + ": " + json_path_join(r.path(), name) + ": of heights that are computed; these have a map");
+      warnings.add(r.file() + ": " + json_path_join(r.path(), name) +
+                   ": of heights that are computed; these have a map");
     }
     return;
   }
@@ -122,11 +123,11 @@ void read_cells(const JsonReader& r, DisplacementSettings& d, Warnings& warnings
 
 /// @param material  as warnings name it
 DisplacementSettings read_displacement(const GltfDocument& document,
-                                                      const JsonReader& r,
-                                                      const std::string& material,
-                                                      TextureTable& height_maps,
-                                                      HeightGraphTable& height_graphs,
-                                                      Warnings& warnings)
+                                       const JsonReader& r,
+                                       const std::string& material,
+                                       TextureTable& height_maps,
+                                       HeightGraphTable& height_graphs,
+                                       Warnings& warnings)
 {
   static constexpr std::string_view kSpaces[] = {"object", "world"};
   static constexpr std::string_view kSeams[] = {"keep", "weld"};

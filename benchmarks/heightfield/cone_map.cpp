@@ -114,7 +114,9 @@ double HeightTexture::at(const std::vector<float>& texels, double u, double v) c
   const double x = u * size - 0.5, y = v * size - 0.5;
   const double i = std::floor(x), j = std::floor(y), fx = x - i, fy = y - j;
   const auto texel_at = [&](double a, double b) {
-    const auto wrap = [this](double k) { return static_cast<std::size_t>(((static_cast<int>(k) % size) + size) % size); };
+    const auto wrap = [this](double k) {
+      return static_cast<std::size_t>(((static_cast<int>(k) % size) + size) % size);
+    };
     return static_cast<double>(texels[wrap(b) * static_cast<std::size_t>(size) + wrap(a)]);
   };
   return (1 - fy) * ((1 - fx) * texel_at(i, j) + fx * texel_at(i + 1, j)) +
@@ -151,8 +153,7 @@ ConeMap cone_map_quick_relaxed(const HeightTexture& t)
     for (int sign_x = -1; sign_x <= 1; ++sign_x) {
       std::vector<float> finest;
       for (int j = 0; j < t.size; ++j) {
-        for (int i = 0; i < t.size; ++i)
-          finest.push_back(is_limiting(t, i, j, sign_x, sign_y) ? t.texel(i, j) : -1.0f);
+        for (int i = 0; i < t.size; ++i) finest.push_back(is_limiting(t, i, j, sign_x, sign_y) ? t.texel(i, j) : -1.0f);
       }
       limiting[static_cast<std::size_t>(3 * sign_y + sign_x + 4)] = maximum_mipmap(t, std::move(finest));
     }
@@ -166,8 +167,8 @@ ConeMap cone_map_quick_relaxed(const HeightTexture& t)
       for (int sign_y = side_y == 0 ? -1 : side_y; sign_y <= (side_y == 0 ? 1 : side_y); ++sign_y) {
         for (int sign_x = side_x == 0 ? -1 : side_x; sign_x <= (side_x == 0 ? 1 : side_x); ++sign_x) {
           if (sign_x == 0 && sign_y == 0) continue;
-          most = std::max(most, limiting[static_cast<std::size_t>(3 * sign_y + sign_x + 4)]
-                                        [static_cast<std::size_t>(level)][at]);
+          most = std::max(
+              most, limiting[static_cast<std::size_t>(3 * sign_y + sign_x + 4)][static_cast<std::size_t>(level)][at]);
         }
       }
       return most;

@@ -37,7 +37,8 @@ HeightTexture texture_of(BenchMap kind, int size)
 /// Single texels of full height, the paper's worst case.
 HeightTexture impulses(int size)
 {
-  HeightTexture texture{size, std::vector<float>(static_cast<std::size_t>(size) * static_cast<std::size_t>(size), 0.0f)};
+  HeightTexture texture{size,
+                        std::vector<float>(static_cast<std::size_t>(size) * static_cast<std::size_t>(size), 0.0f)};
   for (int j = size / 16; j < size; j += size / 8) {
     for (int i = size / 16; i < size; i += size / 8)
       texture.h[static_cast<std::size_t>(j) * static_cast<std::size_t>(size) + static_cast<std::size_t>(i)] = 1.0f;
@@ -53,7 +54,8 @@ std::vector<TextureRay> rays_of(const HeightfieldOptions& options)
   const double pitch = -0.5, aspect = static_cast<double>(options.width) / options.height;
   for (int y = 0; y < options.height; ++y) {
     for (int x = 0; x < options.width; ++x) {
-      const double px = (2 * (x + 0.5) / options.width - 1) * 0.55 * aspect, py = (1 - 2 * (y + 0.5) / options.height) * 0.55;
+      const double px = (2 * (x + 0.5) / options.width - 1) * 0.55 * aspect,
+                   py = (1 - 2 * (y + 0.5) / options.height) * 0.55;
       const double dv = std::cos(pitch) - py * std::sin(pitch), dz = std::sin(pitch) + py * std::cos(pitch);
       if (dz > -0.05) continue;
       const double t = (kDepth - eye[2]) / dz;
@@ -105,9 +107,18 @@ void measure(const HeightTexture& texture,
           ++wrong;
         }
       }
-      const auto share = [&](std::size_t count) { return static_cast<double>(count) / static_cast<double>(rays.size()); };
-      result = {v.map,       v.stepping, v.refinement, v.is_corrected, v.max_iterations,
-                nanoseconds, static_cast<double>(steps) / static_cast<double>(rays.size()), share(wrong), share(unconverged)};
+      const auto share = [&](std::size_t count) {
+        return static_cast<double>(count) / static_cast<double>(rays.size());
+      };
+      result = {v.map,
+                v.stepping,
+                v.refinement,
+                v.is_corrected,
+                v.max_iterations,
+                nanoseconds,
+                static_cast<double>(steps) / static_cast<double>(rays.size()),
+                share(wrong),
+                share(unconverged)};
     }
   }
 }
@@ -115,10 +126,12 @@ void measure(const HeightTexture& texture,
 /// Shaded hits; given up magenta, off by more than a texel red.
 HeightfieldPicture picture_of(const HeightTexture& texture, const HeightfieldOptions& options, const Variant& variant)
 {
-  HeightfieldPicture picture{fmt::format("{}{}, {}, {}, at most {} steps", variant.map,
-                                         variant.is_corrected ? " corrected" : "", variant.stepping, variant.refinement,
-                                         variant.max_iterations),
-                             options.width, options.height, {}};
+  HeightfieldPicture picture{
+      fmt::format("{}{}, {}, {}, at most {} steps", variant.map, variant.is_corrected ? " corrected" : "",
+                  variant.stepping, variant.refinement, variant.max_iterations),
+      options.width,
+      options.height,
+      {}};
   const std::vector<TextureRay> rays = rays_of(options);
   const std::size_t num_sky = static_cast<std::size_t>(options.width * options.height) - rays.size();
   for (std::size_t k = 0; k < num_sky; ++k) picture.rgb.insert(picture.rgb.end(), {150, 170, 190});
@@ -152,11 +165,12 @@ HeightfieldTexture study(const std::string& name, const HeightTexture& texture, 
     std::function<ConeMap()> make;
     ConeMap plain = {}, corrected = {};
   };
-  std::vector<Map> maps = {{"conservative", [&] { return cone_map_conservative(texture); }},
-                           {"quick", [&] { return cone_map_quick(texture); }},
-                           {"approximate relaxed", [&] { return cone_map_relaxed_approximate(texture, kRelaxedSteps); }},
-                           {"relaxed", [&] { return cone_map_relaxed(texture); }},
-                           {"quick relaxed", [&] { return cone_map_quick_relaxed(texture); }}};
+  std::vector<Map> maps = {
+      {"conservative", [&] { return cone_map_conservative(texture); }},
+      {"quick", [&] { return cone_map_quick(texture); }},
+      {"approximate relaxed", [&] { return cone_map_relaxed_approximate(texture, kRelaxedSteps); }},
+      {"relaxed", [&] { return cone_map_relaxed(texture); }},
+      {"quick relaxed", [&] { return cone_map_quick_relaxed(texture); }}};
   for (Map& map : maps) {
     double start = processor_seconds();
     map.plain = map.make();
@@ -215,12 +229,13 @@ std::string per_cent(double share) { return share > 0 ? fmt::format("{:.3g} %", 
 
 Table generation_table(const HeightfieldResults& results)
 {
-  Table table{"Making maps, milliseconds (the paper's Table 1)",
-              fmt::format("{0} × {0} texels, one thread. The paper (512 × 512, a GPU): quadtree .1, maximum mipmap .08, "
-                          "conservative 380, quick .35, approximate relaxed 592, relaxed 11.3.",
-                          results.options.size),
-              {"map"},
-              {}};
+  Table table{
+      "Making maps, milliseconds (the paper's Table 1)",
+      fmt::format("{0} × {0} texels, one thread. The paper (512 × 512, a GPU): quadtree .1, maximum mipmap .08, "
+                  "conservative 380, quick .35, approximate relaxed 592, relaxed 11.3.",
+                  results.options.size),
+      {"map"},
+      {}};
   for (const HeightfieldTexture& texture : results.textures) table.header.push_back(texture.name);
   for (std::size_t k = 0; k < results.textures[0].generation.size(); ++k) {
     std::vector<std::string> row = {results.textures[0].generation[k].first};
@@ -233,15 +248,17 @@ Table generation_table(const HeightfieldResults& results)
 
 Table trace_table(const HeightfieldTexture& texture)
 {
-  Table table{fmt::format("Tracing {} (the paper's Table 2)", texture.name),
-              "Nanoseconds of one thread a ray, steps a ray, and shares of rays that are off by more than a texel or used up "
-              "their steps.",
-              {"map", "corrected", "stepping", "refinement", "at most", "ns", "steps", "wrong", "given up"},
-              {}};
+  Table table{
+      fmt::format("Tracing {} (the paper's Table 2)", texture.name),
+      "Nanoseconds of one thread a ray, steps a ray, and shares of rays that are off by more than a texel or used up "
+      "their steps.",
+      {"map", "corrected", "stepping", "refinement", "at most", "ns", "steps", "wrong", "given up"},
+      {}};
   for (const HeightfieldResult& r : texture.results) {
     table.rows.push_back({r.map, r.is_corrected ? "yes" : "", r.stepping, r.refinement,
-                          r.max_iterations > 0 ? std::to_string(r.max_iterations) : "–", fmt::format("{:.0f}", r.nanoseconds),
-                          fmt::format("{:.3g}", r.steps), per_cent(r.wrong), per_cent(r.unconverged)});
+                          r.max_iterations > 0 ? std::to_string(r.max_iterations) : "–",
+                          fmt::format("{:.0f}", r.nanoseconds), fmt::format("{:.3g}", r.steps), per_cent(r.wrong),
+                          per_cent(r.unconverged)});
   }
   return table;
 }
@@ -249,10 +266,12 @@ Table trace_table(const HeightfieldTexture& texture)
 std::string conditions(const HeightfieldResults& results)
 {
   return fmt::format(
-      "{} rays from above over a texture of {} × {} texels that repeats, {} high in lengths of the texture; {} × {} pixels. "
-      "Processor time of one thread, all variants in turns, fastest of {} rounds. What is right is every cell's bilinear patch.",
-      results.num_rays, results.options.size, results.options.size, kDepth, results.options.width, results.options.height,
-      results.options.rounds);
+      "{} rays from above over a texture of {} × {} texels that repeats, {} high in lengths of the texture; {} × {} "
+      "pixels. "
+      "Processor time of one thread, all variants in turns, fastest of {} rounds. What is right is every cell's "
+      "bilinear patch.",
+      results.num_rays, results.options.size, results.options.size, kDepth, results.options.width,
+      results.options.height, results.options.rounds);
 }
 
 }  // namespace
@@ -271,7 +290,8 @@ HeightfieldResults bench_heightfield_run(const HeightfieldOptions& options)
 
 std::string bench_heightfield_markdown(const HeightfieldResults& results)
 {
-  std::string text = "# relief bench heightfield\n\n" + conditions(results) + "\n\n" + markdown(generation_table(results));
+  std::string text =
+      "# relief bench heightfield\n\n" + conditions(results) + "\n\n" + markdown(generation_table(results));
   for (const HeightfieldTexture& texture : results.textures) text += markdown(trace_table(texture));
   return text;
 }

@@ -23,8 +23,8 @@ struct HeightfieldResult {
   std::string map, stepping, refinement;
   bool is_corrected = false;
   int max_iterations = 0;
-  double nanoseconds = 0;      ///< of processor time a ray
-  double steps = 0;            ///< a ray
+  double nanoseconds = 0;             ///< of processor time a ray
+  double steps = 0;                   ///< a ray
   double wrong = 0, unconverged = 0;  ///< shares of rays: off by more than a texel, or given up
 };
 

@@ -159,7 +159,9 @@ TextureHit MaximumPyramid::trace(const TextureRay& r, bool exact, int max_iterat
       --level;
       continue;
     }
-    const double root = exact ? patch_root(texture_, r, t, next) : height_over(texture_, r, next) <= 0 ? secant(texture_, r, t, next) : -1;
+    const double root = exact                                 ? patch_root(texture_, r, t, next)
+                        : height_over(texture_, r, next) <= 0 ? secant(texture_, r, t, next)
+                                                              : -1;
     if (root >= 0) {
       out.hit = true;
       out.t = root;

@@ -17,8 +17,8 @@ enum class ConeRefinement { kNone, kSecant, kBisection };
 
 /// Where a ray was found to meet the heights.
 struct TextureHit {
-  bool hit = false;        ///< above height 0
-  bool converged = true;   ///< false: the iterations were used up
+  bool hit = false;       ///< above height 0
+  bool converged = true;  ///< false: the iterations were used up
   double t = 0;
   int num_steps = 0;
 };

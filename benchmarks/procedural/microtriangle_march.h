@@ -46,9 +46,9 @@ MarchVector<Real> cross(MarchVector<Real> a, MarchVector<Real> b)
 /// A base triangle with heights at the points of its grid.
 struct MarchedTriangle {
   std::array<std::array<double, 3>, 3> P, N;
-  int n = 1;                  ///< cells along a side
-  std::vector<float> h;       ///< at (i, j, k), i + j + k = n: place j · (n + 1) + k
-  double low = 0, high = 0;   ///< of the heights
+  int n = 1;                 ///< cells along a side
+  std::vector<float> h;      ///< at (i, j, k), i + j + k = n: place j · (n + 1) + k
+  double low = 0, high = 0;  ///< of the heights
 };
 
 /// Where a march ended.
@@ -67,8 +67,10 @@ class MicrotriangleMarch {
   explicit MicrotriangleMarch(const MarchedTriangle& triangle) : triangle_(triangle), n_(triangle.n)
   {
     for (std::size_t k = 0; k < 3; ++k) {
-      P_[k] = {static_cast<Real>(triangle.P[k][0]), static_cast<Real>(triangle.P[k][1]), static_cast<Real>(triangle.P[k][2])};
-      N_[k] = {static_cast<Real>(triangle.N[k][0]), static_cast<Real>(triangle.N[k][1]), static_cast<Real>(triangle.N[k][2])};
+      P_[k] = {static_cast<Real>(triangle.P[k][0]), static_cast<Real>(triangle.P[k][1]),
+               static_cast<Real>(triangle.P[k][2])};
+      N_[k] = {static_cast<Real>(triangle.N[k][0]), static_cast<Real>(triangle.N[k][1]),
+               static_cast<Real>(triangle.N[k][2])};
     }
   }
 
@@ -109,7 +111,8 @@ class MicrotriangleMarch {
   Vector base(const Place& at, const Vector* of) const
   {
     const Real d = Real{1} / static_cast<Real>(n_);
-    return of[0] * (static_cast<Real>(at[0]) * d) + of[1] * (static_cast<Real>(at[1]) * d) + of[2] * (static_cast<Real>(at[2]) * d);
+    return of[0] * (static_cast<Real>(at[0]) * d) + of[1] * (static_cast<Real>(at[1]) * d) +
+           of[2] * (static_cast<Real>(at[2]) * d);
   }
   Vector vertex(const Place& at) const
   {

@@ -60,7 +60,10 @@ void heights(const Face& face, const float (*b)[8], float* h)
   store8(h, static_cast<float>(kAmplitude) * (noise_fractal<3>(p, octaves, true, false) - 0.5f));
 }
 
-void eval(const void* owner, std::uint32_t, const float (*b)[8], float* h) { heights(*static_cast<const Face*>(owner), b, h); }
+void eval(const void* owner, std::uint32_t, const float (*b)[8], float* h)
+{
+  heights(*static_cast<const Face*>(owner), b, h);
+}
 void bounds(const void*, std::uint32_t, const WeightPatches&, float* low, float* high)
 {
   std::fill_n(low, 8, static_cast<float>(-0.5 * kAmplitude));
@@ -201,14 +204,16 @@ std::string per_cent(double share) { return share > 0 ? fmt::format("{:.3g} %", 
 
 Table march_table(const ProceduralResults& results)
 {
-  Table table{"Microtriangle marching as published",
-              "Against all micro-triangles in double precision: shares of rays that found nothing, one behind the first, or one "
-              "that is not there; cells and nanoseconds a ray. The paper: \"we have not noticed any significant errors\".",
-              {"N", "precision", "missed", "passed over", "invented", "cells", "ns"},
-              {}};
+  Table table{
+      "Microtriangle marching as published",
+      "Against all micro-triangles in double precision: shares of rays that found nothing, one behind the first, or "
+      "one "
+      "that is not there; cells and nanoseconds a ray. The paper: \"we have not noticed any significant errors\".",
+      {"N", "precision", "missed", "passed over", "invented", "cells", "ns"},
+      {}};
   for (const MarchResult& r : results.marches) {
-    table.rows.push_back({std::to_string(r.n), r.precision, per_cent(r.missed), per_cent(r.passed_over), per_cent(r.invented),
-                          fmt::format("{:.3g}", r.cells), fmt::format("{:.0f}", r.nanoseconds)});
+    table.rows.push_back({std::to_string(r.n), r.precision, per_cent(r.missed), per_cent(r.passed_over),
+                          per_cent(r.invented), fmt::format("{:.3g}", r.cells), fmt::format("{:.0f}", r.nanoseconds)});
   }
   return table;
 }
@@ -216,8 +221,10 @@ Table march_table(const ProceduralResults& results)
 Table lattice_table(const ProceduralResults& results)
 {
   Table table{"Heights on demand over the same lattice",
-              "How far the lattice's heights are from the function's (root of the mean square, in parts of the range: the paper's "
-              "Fig. 4 in figures), nanoseconds a ray the first time, heights included, and once they are there; KiB of heights.",
+              "How far the lattice's heights are from the function's (root of the mean square, in parts of the range: "
+              "the paper's "
+              "Fig. 4 in figures), nanoseconds a ray the first time, heights included, and once they are there; KiB of "
+              "heights.",
               {"N", "error", "ns first", "ns", "KiB"},
               {}};
   for (const LatticeResult& r : results.lattices) {
@@ -229,9 +236,10 @@ Table lattice_table(const ProceduralResults& results)
 
 std::string conditions(const ProceduralResults& results)
 {
-  return fmt::format("{} rays at one face of an icosahedron with the normals of its ball, eight octaves of noise, half of the "
-                     "radius high (Smits and others 2000, Figs. 1 and 4). Kernels: {}. Processor time of one thread.",
-                     results.num_rays, results.isa);
+  return fmt::format(
+      "{} rays at one face of an icosahedron with the normals of its ball, eight octaves of noise, half of the "
+      "radius high (Smits and others 2000, Figs. 1 and 4). Kernels: {}. Processor time of one thread.",
+      results.num_rays, results.isa);
 }
 
 }  // namespace
@@ -285,8 +293,8 @@ std::string bench_procedural_json(const ProceduralResults& results)
                         {"nanoseconds_a_ray", r.nanoseconds},
                         {"bytes", r.bytes}});
   }
-  const nlohmann::ordered_json json = {{"bench", "procedural"}, {"version", RELIEF_VERSION},  {"isa", results.isa},
-                                       {"rays", results.num_rays}, {"marches", marches}, {"lattices", lattices}};
+  const nlohmann::ordered_json json = {{"bench", "procedural"},    {"version", RELIEF_VERSION}, {"isa", results.isa},
+                                       {"rays", results.num_rays}, {"marches", marches},        {"lattices", lattices}};
   return json.dump(2) + "\n";
 }
 
@@ -305,8 +313,9 @@ std::string bench_procedural_html(const ProceduralResults& results)
   const std::vector<std::string> plots = {
       svg_line_plot({"error of the lattice", "N", "parts of the range", true, true}, {{"rms", x, error}}),
       svg_line_plot({"rays that marching gets wrong", "N", "%", true, false}, {{"double precision", x_march, missed}})};
-  return html_page("Procedural displacement: marching and heights on demand",
-                   {html_paragraph(conditions(results)), html_row(plots), html(march_table(results)), html(lattice_table(results))});
+  return html_page(
+      "Procedural displacement: marching and heights on demand",
+      {html_paragraph(conditions(results)), html_row(plots), html(march_table(results)), html(lattice_table(results))});
 }
 
 }  // namespace relief

@@ -18,20 +18,20 @@ struct ProceduralOptions {
 struct MarchResult {
   int n = 1;
   std::string precision;
-  double missed = 0;      ///< share of rays whose micro-triangle is there, and nothing was found
-  double passed_over = 0; ///< share that found one behind the first
+  double missed = 0;       ///< share of rays whose micro-triangle is there, and nothing was found
+  double passed_over = 0;  ///< share that found one behind the first
   double invented = 0;
-  double cells = 0;       ///< a ray
-  double nanoseconds = 0; ///< of processor time a ray
+  double cells = 0;        ///< a ray
+  double nanoseconds = 0;  ///< of processor time a ray
 };
 
 /// Our surface over the same lattice.
 struct LatticeResult {
   int n = 1;
-  double rms = 0;           ///< distance of the lattice's heights from the function's, in units of their range
-  double nanoseconds = 0;   ///< a ray, once the heights are there
+  double rms = 0;                ///< distance of the lattice's heights from the function's, in units of their range
+  double nanoseconds = 0;        ///< a ray, once the heights are there
   double first_nanoseconds = 0;  ///< a ray, the first time, heights included
-  double bytes = 0;         ///< of heights that were needed
+  double bytes = 0;              ///< of heights that were needed
 };
 
 struct ProceduralResults {

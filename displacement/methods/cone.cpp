@@ -31,7 +31,10 @@ struct FlatRay {
 
 /// Marches one segment.
 /// @return true when the search is over
-RELIEF_KERNEL bool flat_march(PrismSearch& c, const CurveSegment& g, const CurveRange& range, const CellConesView& cones)
+RELIEF_KERNEL bool flat_march(PrismSearch& c,
+                              const CurveSegment& g,
+                              const CurveRange& range,
+                              const CellConesView& cones)
 {
   const HeightFieldView& f = *c.mesh.field;
   const CurvePoint first = curve_point(c.tri, g, range.tau0), last = curve_point(c.tri, g, range.tau1);
@@ -48,11 +51,13 @@ RELIEF_KERNEL bool flat_march(PrismSearch& c, const CurveSegment& g, const Curve
   r.planar = __builtin_sqrt(r.dx * r.dx + r.dy * r.dy);
   // What the line may be off, in cells and in heights: more than rounding, far less than a cell.
   const double slack = 1e-7 + 0x1p-40 * (__builtin_fabs(r.x) + __builtin_fabs(r.y) + r.planar) +
-                       8.0 * g.relative_error * (__builtin_fabs(c.tri.x[1] - c.tri.x[0]) + __builtin_fabs(c.tri.x[2] - c.tri.x[0]) +
-                                                 __builtin_fabs(c.tri.y[1] - c.tri.y[0]) + __builtin_fabs(c.tri.y[2] - c.tri.y[0]));
+                       8.0 * g.relative_error *
+                           (__builtin_fabs(c.tri.x[1] - c.tri.x[0]) + __builtin_fabs(c.tri.x[2] - c.tri.x[0]) +
+                            __builtin_fabs(c.tri.y[1] - c.tri.y[0]) + __builtin_fabs(c.tri.y[2] - c.tri.y[0]));
   double h_low, h_high;
   stored_to_heights(f, f.range, &h_low, &h_high);
-  const double h_slack = slack * (h_high - h_low) + 0x1p-40 * (__builtin_fabs(r.h) + __builtin_fabs(r.dh) + __builtin_fabs(h_high));
+  const double h_slack =
+      slack * (h_high - h_low) + 0x1p-40 * (__builtin_fabs(r.h) + __builtin_fabs(r.dh) + __builtin_fabs(h_high));
   const double u_slack = r.planar > 0.0 ? slack / r.planar : 1.0;
   const auto cell_of = [](double at) { return static_cast<std::int64_t>(__builtin_floor(at)); };
   std::int64_t i = cell_of(r.x), j = cell_of(r.y);

@@ -168,8 +168,8 @@ RELIEF_KERNEL void tangent(const GraphRangeOperands& o)
   for (int k = 0; k < 8; ++k) {
     constexpr double kHalf = 3.141592653589793;
     const double n0 = std::floor(static_cast<double>(a.low[k]) / kHalf + 0.499999);
-    const bool known = a.high[k] < 1e6f && a.low[k] > -1e6f &&
-                       n0 == std::floor(static_cast<double>(a.high[k]) / kHalf + 0.500001);
+    const bool known =
+        a.high[k] < 1e6f && a.low[k] > -1e6f && n0 == std::floor(static_cast<double>(a.high[k]) / kHalf + 0.500001);
     low[k] = known ? std::tan(a.low[k]) : -kInfinity;
     high[k] = known ? std::tan(a.high[k]) : kInfinity;
   }
@@ -184,7 +184,8 @@ RELIEF_KERNEL void arctangent2(const GraphRangeOperands& o)
     low[k] = -3.1415930f;
     high[k] = 3.1415930f;
     const bool is_apart = x.low[k] > 0.0f || y.low[k] > 0.0f || y.high[k] < 0.0f;
-    if (!is_apart || !(x.low[k] > -kInfinity && x.high[k] < kInfinity && y.low[k] > -kInfinity && y.high[k] < kInfinity))
+    if (!is_apart ||
+        !(x.low[k] > -kInfinity && x.high[k] < kInfinity && y.low[k] > -kInfinity && y.high[k] < kInfinity))
       continue;
     // Angles of a rectangle without the origin are extreme at its corners.
     const float p[4] = {std::atan2(y.low[k], x.low[k]), std::atan2(y.low[k], x.high[k]),
@@ -468,8 +469,12 @@ RELIEF_KERNEL void graph_bounds_run(const GraphProgramView& program,
         break;
       case GraphOp::sign: {
         const GraphRange a = in(0);
-        o.set(0, range_between(a.low > 0.0f ? one : a.low == 0.0f ? zero : -one,
-                               a.high < 0.0f ? -one : a.high == 0.0f ? zero : one));
+        o.set(0, range_between(a.low > 0.0f    ? one
+                               : a.low == 0.0f ? zero
+                                               : -one,
+                               a.high < 0.0f    ? -one
+                               : a.high == 0.0f ? zero
+                                                : one));
         break;
       }
       case GraphOp::square_root: {

@@ -43,7 +43,8 @@ RELIEF_KERNEL GraphRange range_closed(GraphRange a)
   a.d1 = by_interval | ~known ? zero : a.d1;
   a.d2 = by_interval | ~known ? zero : a.d2;
   a.rest = by_interval ? half * (1.0f + kRangeRounding) + kRangeRounding * abs(middle)
-                       : known ? a.rest : splat8(kInfinity);
+           : known     ? a.rest
+                       : splat8(kInfinity);
   a.low = a.low >= -kRangeLargest ? a.low : splat8(-kInfinity);
   a.high = a.high <= kRangeLargest ? a.high : splat8(kInfinity);
   return a;
@@ -56,7 +57,11 @@ RELIEF_KERNEL GraphRange range_between(F8 low, F8 high)
   const F8 infinite = splat8(kInfinity), zero{};
   const F8 middle = 0.5f * low + 0.5f * high;
   const F8 half = (0.5f * high - 0.5f * low) * (1.0f + kRangeRounding) + kRangeRounding * abs(middle);
-  return {is_known ? middle : zero, zero, zero, is_known ? half : infinite, low >= -kRangeLargest ? low : -infinite,
+  return {is_known ? middle : zero,
+          zero,
+          zero,
+          is_known ? half : infinite,
+          low >= -kRangeLargest ? low : -infinite,
           high <= kRangeLargest ? high : infinite};
 }
 RELIEF_KERNEL GraphRange range_point(F8 a) { return range_between(a, a); }
@@ -102,10 +107,7 @@ RELIEF_KERNEL GraphRange operator+(const GraphRange& a, const GraphRange& b)
   return range_closed({a.c + b.c, a.d1 + b.d1, a.d2 + b.d2, a.rest + b.rest + size, range_low(a.low + b.low - size),
                        range_high(a.high + b.high + size)});
 }
-RELIEF_KERNEL GraphRange operator-(const GraphRange& a)
-{
-  return {-a.c, -a.d1, -a.d2, a.rest, -a.high, -a.low};
-}
+RELIEF_KERNEL GraphRange operator-(const GraphRange& a) { return {-a.c, -a.d1, -a.d2, a.rest, -a.high, -a.low}; }
 RELIEF_KERNEL GraphRange operator-(const GraphRange& a, const GraphRange& b) { return a + -b; }
 RELIEF_KERNEL GraphRange operator*(const GraphRange& a, const GraphRange& b)
 {
@@ -128,8 +130,8 @@ RELIEF_KERNEL GraphRange range_of_function(const GraphRange& a, F8 at, F8 slope_
 {
   const GraphRange bounds = range_padded(low, high);
   const F8 slope = 0.5f * slope_low + 0.5f * slope_high, radius = range_radius(a);
-  const F8 rest = abs(slope) * a.rest + (0.5f * slope_high - 0.5f * slope_low) * radius +
-                  4e-6f * (abs(at) + abs(slope) * radius);
+  const F8 rest =
+      abs(slope) * a.rest + (0.5f * slope_high - 0.5f * slope_low) * radius + 4e-6f * (abs(at) + abs(slope) * radius);
   const GraphRange affine = range_closed({at, slope * a.d1, slope * a.d2, rest, bounds.low, bounds.high});
   return range_select(rest < kRangeLargest, affine, bounds);
 }
@@ -141,8 +143,8 @@ RELIEF_KERNEL GraphRange range_abs(const GraphRange& a)
 {
   const I8 positive = a.low >= 0.0f, negative = a.high <= 0.0f;
   const F8 one = splat8(1.0f), low = min(abs(a.low), abs(a.high)), high = max(abs(a.low), abs(a.high));
-  return range_of_function(a, abs(a.c), positive ? one : -one, negative ? -one : one,
-                           positive | negative ? low : F8{}, high);
+  return range_of_function(a, abs(a.c), positive ? one : -one, negative ? -one : one, positive | negative ? low : F8{},
+                           high);
 }
 /// (a + b − |a − b|) / 2, which keeps what both have in common.
 RELIEF_KERNEL GraphRange range_min(const GraphRange& a, const GraphRange& b)

@@ -99,18 +99,16 @@ RELIEF_KERNEL GraphRange noise_signed_range(const GraphRange (&p)[kDims], bool r
     for (int j = 0; j < i; ++j) bent += kNoiseTwist[kDims - 1] * radius[i] * radius[j];
   }
   const F8 rounding = splat8(4e-6f);
-  GraphRange out = range_closed({at.value, d1, d2, rest + bent + rounding,
-                                 max(splat8(-kBound), at.value - steep - rounding),
-                                 min(splat8(kBound), at.value + steep + rounding)});
+  GraphRange out =
+      range_closed({at.value, d1, d2, rest + bent + rounding, max(splat8(-kBound), at.value - steep - rounding),
+                    min(splat8(kBound), at.value + steep + rounding)});
   return range_select(is_near, out, whole);
 }
 
 /// As noise_fractal, with settings that are the same all over.
 template <int kDims>
-RELIEF_KERNEL GraphRange noise_fractal_range(const GraphRange (&p)[kDims],
-                                             const NoiseOctaves& octaves,
-                                             bool normalize,
-                                             bool repeats)
+RELIEF_KERNEL GraphRange
+noise_fractal_range(const GraphRange (&p)[kDims], const NoiseOctaves& octaves, bool normalize, bool repeats)
 {
   const F8 whole = floor(octaves.detail), rest = octaves.detail - whole;
   float most = 0.0f;
@@ -174,8 +172,8 @@ RELIEF_KERNEL GraphRange musgrave_range(const GraphRange (&point)[kDims], Musgra
       case MusgraveType::kHybrid: {
         // Where the weight may fall below .001, octaves may be there or not.
         const I8 surely = weight.low > 0.00101f, never = weight.high <= 0.00099f;
-        const GraphRange alive = range_select(surely, share, range_select(never, range_point(F8{}),
-                                                                          range_between(F8{}, share_at)));
+        const GraphRange alive =
+            range_select(surely, share, range_select(never, range_point(F8{}), range_between(F8{}, share_at)));
         weight = range_min(weight, one);
         signal = (noise + offset) * size;
         value = value + alive * weight * signal;

@@ -12,7 +12,8 @@ namespace relief {
 /// Distance of one octave.
 /// @param settings  the same all over
 template <int kDims, bool kPcg>
-RELIEF_KERNEL GraphRange voronoi_distance_range(const GraphRange (&p)[kDims], const VoronoiSettings<kDims, kPcg>& settings)
+RELIEF_KERNEL GraphRange voronoi_distance_range(const GraphRange (&p)[kDims],
+                                                const VoronoiSettings<kDims, kPcg>& settings)
 {
   constexpr float kMostNear = 90000.0f;
   // A tall sum of small ways for Minkowski's metric, whose exponents below 1 are no metric.

@@ -35,11 +35,12 @@ enum class DisplacementSpace : std::uint8_t { kObject, kWorld };
 inline constexpr std::int32_t kMostHeightCells = 1 << 19;
 
 struct DisplacementSettings {
-  TextureRef height;  ///< its texture index is that of a height map; −1: it has none
+  TextureRef height;              ///< its texture index is that of a height map; −1: it has none
   std::int32_t graph_index = -1;  ///< of heights that are computed, into Scene::graphs; −1: they have a map
-  std::int32_t num_cells = 0;     ///< of computed heights along each side of a triangle, a power of two; 0: by their size in the picture
-  float cell_pixels = 1;          ///< how large they are in the picture, with 0 cells
-  float scale = 1;    ///< metres
+  std::int32_t num_cells =
+      0;  ///< of computed heights along each side of a triangle, a power of two; 0: by their size in the picture
+  float cell_pixels = 1;  ///< how large they are in the picture, with 0 cells
+  float scale = 1;        ///< metres
   float midlevel = 0.5f;
   DisplacementSpace space = DisplacementSpace::kObject;
   DisplacementMethod method = DisplacementMethod::kAuto;

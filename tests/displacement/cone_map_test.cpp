@@ -141,15 +141,15 @@ TEST(ConeTraces, CorrectedConservativeConesMissLessThanPlainOnes)
   for (int round = 0; round < 20000; ++round) {
     const TextureRay ray = random_ray(random);
     const double expected = exact_trace(t, ray).t;
-    const TextureHit hits[3] = {
-        cone_trace(t, plain, ray, ConeStepping::kOriginal, ConeRefinement::kSecant, 1000),
-        cone_trace(t, corrected, ray, ConeStepping::kCellMax, ConeRefinement::kSecant, 1000),
-        cone_trace(t, corrected, ray, ConeStepping::kCellMax, ConeRefinement::kNone, 0)};
+    const TextureHit hits[3] = {cone_trace(t, plain, ray, ConeStepping::kOriginal, ConeRefinement::kSecant, 1000),
+                                cone_trace(t, corrected, ray, ConeStepping::kCellMax, ConeRefinement::kSecant, 1000),
+                                cone_trace(t, corrected, ray, ConeStepping::kCellMax, ConeRefinement::kNone, 0)};
     for (int k = 0; k < 2; ++k) wrong[k] += std::abs(hits[k].t - expected) > 1.0 / 64 ? 1 : 0;
     if (round > 200) continue;
     EXPECT_FALSE(hits[2].converged);
   }
-  std::cout << "[ figures  ] off by more than a texel of 20000 rays: " << wrong[0] << " plain, " << wrong[1] << " corrected\n";
+  std::cout << "[ figures  ] off by more than a texel of 20000 rays: " << wrong[0] << " plain, " << wrong[1]
+            << " corrected\n";
   EXPECT_LT(wrong[1], wrong[0]);
 }
 

@@ -119,7 +119,8 @@ TEST(CurvedHeights, HaveOneTangentPlaneAlongASide)
     };
     widest_flat = std::max(widest_flat, std::acos(std::min(1.0, dot(facet(pair.first), facet(pair.second)))));
   }
-  std::cout << "[ figures  ] largest angle across a side: " << widest << ", of the flat triangles " << widest_flat << "\n";
+  std::cout << "[ figures  ] largest angle across a side: " << widest << ", of the flat triangles " << widest_flat
+            << "\n";
   EXPECT_GT(widest_flat, .2);
   EXPECT_LT(widest, 2e-4);  // what differences can tell
 }

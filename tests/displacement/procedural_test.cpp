@@ -109,8 +109,13 @@ oracle::HeightMap lattice_map(const ProceduralField& field, int n, double scale,
 {
   int size = 4;
   while (size < n + 2) size *= 2;
-  oracle::HeightMap map{size, size, std::vector<double>(static_cast<std::size_t>(size * size)), oracle::Wrap::kClamp,
-                        oracle::Wrap::kClamp, scale, midlevel};
+  oracle::HeightMap map{size,
+                        size,
+                        std::vector<double>(static_cast<std::size_t>(size * size)),
+                        oracle::Wrap::kClamp,
+                        oracle::Wrap::kClamp,
+                        scale,
+                        midlevel};
   const auto at = [&](int i, int j) -> double& { return map.h[static_cast<std::size_t>(j * size + i)]; };
   for (int j = 0; j < size; ++j) {
     for (int i = 0; i < size; ++i) {
@@ -154,7 +159,8 @@ TEST(ComputedHeights, AreFoundByRandomRaysAsByTheOracle)
     oracle::HeightMap map = lattice_map(field, table.n, 1, 0);
     set_random_scale(random, size * std::pow(10, random_between(random, is_large ? -3 : -2, -.5)), &map);
     const double width = map.width;
-    triangle.uv = {{{.5 / width, .5 / width}, {(table.n + .5) / width, .5 / width}, {.5 / width, (table.n + .5) / width}}};
+    triangle.uv = {
+        {{.5 / width, .5 / width}, {(table.n + .5) / width, .5 / width}, {.5 / width, (table.n + .5) / width}}};
     const TracedCase traced({triangle}, map);
     const TestMesh mesh({triangle});
     const DisplacedMesh displaced(mesh.view(), field, {.height = {}, .scale = map.scale, .midlevel = map.midlevel});
@@ -271,11 +277,12 @@ TEST(ComputedHeights, LetNoRayOut)
       if (k % 2 == 0) {
         const DisplacedMeshView traced = wavy.geometry.mesh;
         const auto index = static_cast<std::uint32_t>(random_index(random, static_cast<int>(traced.num_triangles)));
-        const double along = random_index(random, 2) == 0 ? std::floor(random_unit(random) * 65) / 64 : random_unit(random);
+        const double along =
+            random_index(random, 2) == 0 ? std::floor(random_unit(random) * 65) / 64 : random_unit(random);
         const double b[3][2] = {{along, 0}, {0, along}, {along, 1 - along}};
         const double* at = b[random_index(random, 3)];
-        const SurfacePoint point = displaced_surface_point(
-            wavy.geometry, index, {static_cast<float>(at[0]), static_cast<float>(at[1])});
+        const SurfacePoint point =
+            displaced_surface_point(wavy.geometry, index, {static_cast<float>(at[0]), static_cast<float>(at[1])});
         ray = ray_through(surface.inside(random), {point.P.x, point.P.y, point.P.z});
       }
       const bool leaks = !(scene.intersect(ray) < HUGE_VALF), dark_leaks = !scene.occluded(ray);
@@ -345,7 +352,8 @@ TEST(ComputedHeights, OfTilesAreThoseOfTheLattice)
   const WavySurface wavy(closed_torus());
   std::mt19937_64 random(6);
   for (int k = 0; k < 20000; ++k) {
-    const auto index = static_cast<std::uint32_t>(random_index(random, static_cast<int>(wavy.field.triangles().size())));
+    const auto index =
+        static_cast<std::uint32_t>(random_index(random, static_cast<int>(wavy.field.triangles().size())));
     const std::int32_t n = wavy.field.triangles()[index].n;
     std::int32_t i = random_index(random, n + 1), j = random_index(random, n + 1);
     if (i + j > n) i = n - i, j = n - j;
@@ -363,7 +371,8 @@ TEST(ComputedHeights, OfNodesAreWithinTheirBounds)
   std::mt19937_64 random(7);
   int num_nodes = 0;
   for (int k = 0; k < 20000; ++k) {
-    const auto index = static_cast<std::uint32_t>(random_index(random, static_cast<int>(wavy.field.triangles().size())));
+    const auto index =
+        static_cast<std::uint32_t>(random_index(random, static_cast<int>(wavy.field.triangles().size())));
     const std::int32_t n = wavy.field.triangles()[index].n;
     std::int32_t i = random_index(random, n + 1), j = random_index(random, n + 1);
     if (i + j > n) i = n - i, j = n - j;
@@ -379,7 +388,8 @@ TEST(ComputedHeights, OfNodesAreWithinTheirBounds)
       for (int child = 0; child < 4; ++child) {
         const std::int32_t i0 = (2 * node.i + (child & 1)) * size, j0 = (2 * node.j + (child >> 1)) * size;
         if (i < i0 || i > i0 + size || j < j0 || j > j0 + size || i0 + j0 >= n) continue;
-        ASSERT_TRUE(h >= children[child].low && h <= children[child].high) << h << " at " << i << " " << j << " of " << n;
+        ASSERT_TRUE(h >= children[child].low && h <= children[child].high)
+            << h << " at " << i << " " << j << " of " << n;
         next = {node.level - 1, 2 * node.i + (child & 1), 2 * node.j + (child >> 1)};
         ++num_nodes;
       }
@@ -413,8 +423,7 @@ TEST(ComputedHeights, WithoutKnownBoundsAreCutOff)
 TEST(ComputedHeights, ThatAreNoNumbersAreTheMidlevel)
 {
   const TestMesh mesh({hard_case_parts::flat_triangle()});
-  HeightSource source{nullptr,
-                      [](const void*, std::uint32_t, const float (*)[8], float* h) { std::fill_n(h, 8, NAN); },
+  HeightSource source{nullptr, [](const void*, std::uint32_t, const float(*)[8], float* h) { std::fill_n(h, 8, NAN); },
                       [](const void*, std::uint32_t, const WeightPatches&, float* low, float* high) {
                         std::fill_n(low, 8, 0.0f);
                         std::fill_n(high, 8, 1.0f);

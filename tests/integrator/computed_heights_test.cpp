@@ -24,8 +24,7 @@ json noise(const json& coordinates, double scale, double detail)
 {
   return {{"nodes",
            {{{"type", "texture-coordinate"}},
-            {{"type", "noise-texture"},
-             {"inputs", {{"vector", coordinates}, {"scale", scale}, {"detail", detail}}}}}},
+            {{"type", "noise-texture"}, {"inputs", {{"vector", coordinates}, {"scale", scale}, {"detail", detail}}}}}},
           {"outputs", {{"height", reference(1, "factor")}}}};
 }
 
@@ -55,8 +54,8 @@ GltfBuilder ball(const json& displacement, int num_instances = 1)
   GltfBuilder b;
   const int position = b.accessor(P, "VEC3"), normal = b.accessor(P, "VEC3"), where = b.accessor(generated, "VEC3");
   b.push("materials", {{"name", "ball"}, {"extensions", {{"RELIEF_displacement", displacement}}}});
-  const int mesh = b.mesh({{"attributes", {{"POSITION", position}, {"NORMAL", normal}, {"_GENERATED", where}}},
-                           {"material", 0}});
+  const int mesh =
+      b.mesh({{"attributes", {{"POSITION", position}, {"NORMAL", normal}, {"_GENERATED", where}}}, {"material", 0}});
   for (int k = 0; k < num_instances; ++k) b.root_node({{"mesh", mesh}, {"translation", {3.0 * k, 0, 0}}});
   b.push("cameras", {{"type", "perspective"}, {"perspective", {{"yfov", 0.7}, {"znear", 0.1}}}});
   b.root_node({{"camera", 0}, {"translation", {0, 0, 5}}});
@@ -72,20 +71,19 @@ Vec3f random_direction(std::mt19937_64& random)
 
 TEST(ComputedHeights, OfAnyCoordinatesLetNoRayOut)
 {
-  const json over_noise = {{"nodes",
-                            {{{"type", "texture-coordinate"}},
-                             {{"type", "noise-texture"},
-                              {"inputs", {{"vector", reference(0, "object")}, {"scale", 2}, {"detail", 1}}}},
-                             {{"type", "noise-texture"},
-                              {"inputs", {{"vector", reference(1, "color")}, {"scale", 5}, {"detail", 3}}}}}},
-                           {"outputs", {{"height", reference(2, "factor")}}}};
-  const json position = {{"nodes",
-                          {{{"type", "geometry"}},
-                           {{"type", "noise-texture"},
-                            {"inputs", {{"vector", reference(0, "position")}, {"scale", 4}, {"detail", 4}}}}}},
-                         {"outputs", {{"height", reference(1, "factor")}}}};
-  for (const json& graph : {noise(reference(0, "generated"), 6, 8), noise(reference(0, "object"), 3, 12), over_noise,
-                            position}) {
+  const json over_noise = {
+      {"nodes",
+       {{{"type", "texture-coordinate"}},
+        {{"type", "noise-texture"}, {"inputs", {{"vector", reference(0, "object")}, {"scale", 2}, {"detail", 1}}}},
+        {{"type", "noise-texture"}, {"inputs", {{"vector", reference(1, "color")}, {"scale", 5}, {"detail", 3}}}}}},
+      {"outputs", {{"height", reference(2, "factor")}}}};
+  const json position = {
+      {"nodes",
+       {{{"type", "geometry"}},
+        {{"type", "noise-texture"}, {"inputs", {{"vector", reference(0, "position")}, {"scale", 4}, {"detail", 4}}}}}},
+      {"outputs", {{"height", reference(1, "factor")}}}};
+  for (const json& graph :
+       {noise(reference(0, "generated"), 6, 8), noise(reference(0, "object"), 3, 12), over_noise, position}) {
     for (const bool curved : {false, true}) {
       const Scene scene = load(ball({{"heightGraph", graph}, {"scale", 0.5}, {"curved", curved}}));
       const SceneContext context(scene);
@@ -113,11 +111,12 @@ TEST(ComputedHeights, OfAnyCoordinatesLetNoRayOut)
 /// Steps of a graph by hand: hits lie where its height says.
 TEST(ComputedHeights, PutPointsWhereTheGraphSays)
 {
-  const json graph = {{"nodes",
-                       {{{"type", "texture-coordinate"}},
-                        {{"type", "separate"}, {"inputs", {{"vector", reference(0, "generated")}}}},
-                        {{"type", "math"}, {"operation", "multiply"}, {"inputs", {{"a", reference(1, "x")}, {"b", 2}}}}}},
-                      {"outputs", {{"height", reference(2, "value")}}}};
+  const json graph = {
+      {"nodes",
+       {{{"type", "texture-coordinate"}},
+        {{"type", "separate"}, {"inputs", {{"vector", reference(0, "generated")}}}},
+        {{"type", "math"}, {"operation", "multiply"}, {"inputs", {{"a", reference(1, "x")}, {"b", 2}}}}}},
+      {"outputs", {{"height", reference(2, "value")}}}};
   const Scene scene = load(ball({{"heightGraph", graph}, {"scale", 0.25}, {"midlevel", 0.5}, {"cells", 16}}, 2));
   const SceneContext context(scene);
   // One surface for both instances.
@@ -142,10 +141,10 @@ TEST(ComputedHeights, PutPointsWhereTheGraphSays)
 
 TEST(ComputedHeights, OfTheWorldDifferBetweenInstances)
 {
-  const json graph = {{"nodes",
-                       {{{"type", "geometry"}},
-                        {{"type", "noise-texture"}, {"inputs", {{"vector", reference(0, "position")}}}}}},
-                      {"outputs", {{"height", reference(1, "factor")}}}};
+  const json graph = {
+      {"nodes",
+       {{{"type", "geometry"}}, {{"type", "noise-texture"}, {"inputs", {{"vector", reference(0, "position")}}}}}},
+      {"outputs", {{"height", reference(1, "factor")}}}};
   const Scene scene = load(ball({{"heightGraph", graph}, {"scale", 0.5}}, 2));
   EXPECT_EQ(SceneContext(scene).displacements.size(), 2u);
 }
@@ -153,22 +152,22 @@ TEST(ComputedHeights, OfTheWorldDifferBetweenInstances)
 /// The source's own bounds, of patches of all sizes, against what it gives there.
 TEST(ComputedHeights, AreWithinTheirBounds)
 {
-  const json by_normal = {{"nodes",
-                           {{{"type", "geometry"}},
-                            {{"type", "noise-texture"},
-                             {"inputs", {{"vector", reference(0, "normal")}, {"scale", 3}, {"detail", 3}}}}}},
-                          {"outputs", {{"height", reference(1, "factor")}}}};
+  const json by_normal = {
+      {"nodes",
+       {{{"type", "geometry"}},
+        {{"type", "noise-texture"}, {"inputs", {{"vector", reference(0, "normal")}, {"scale", 3}, {"detail", 3}}}}}},
+      {"outputs", {{"height", reference(1, "factor")}}}};
   const json musgrave = {{"nodes",
                           {{{"type", "texture-coordinate"}},
                            {{"type", "musgrave-texture"},
                             {"musgraveType", "ridged-multifractal"},
                             {"inputs", {{"vector", reference(0, "object")}, {"scale", 2}, {"detail", 6}}}}}},
                          {"outputs", {{"height", reference(1, "factor")}}}};
-  const json voronoi = {{"nodes",
-                         {{{"type", "texture-coordinate"}},
-                          {{"type", "voronoi-texture"},
-                           {"inputs", {{"vector", reference(0, "generated")}, {"scale", 4}}}}}},
-                        {"outputs", {{"height", reference(1, "distance")}}}};
+  const json voronoi = {
+      {"nodes",
+       {{{"type", "texture-coordinate"}},
+        {{"type", "voronoi-texture"}, {"inputs", {{"vector", reference(0, "generated")}, {"scale", 4}}}}}},
+      {"outputs", {{"height", reference(1, "distance")}}}};
   for (const json& graph : {noise(reference(0, "generated"), 6, 8), by_normal, musgrave, voronoi}) {
     const Scene scene = load(ball({{"heightGraph", graph}}));
     DisplacementInput input;
@@ -200,8 +199,7 @@ TEST(ComputedHeights, AreWithinTheirBounds)
         for (int lane = 0; lane < 8; ++lane) {
           const float e1 = symbol(random), e2 = symbol(random);
           for (int axis = 0; axis < 2; ++axis) {
-            b[axis + 1][lane] =
-                patches.center[axis][lane] + e1 * patches.du[axis][lane] + e2 * patches.dv[axis][lane];
+            b[axis + 1][lane] = patches.center[axis][lane] + e1 * patches.du[axis][lane] + e2 * patches.dv[axis][lane];
           }
           b[0][lane] = 1 - b[1][lane] - b[2][lane];
         }

@@ -320,10 +320,9 @@ TEST(HeightGraph, OfOtherInputsIsKept)
                             {"texture", {{"index", 0}}},
                             {"inputs", {{"vector", {{"node", 0}, {"output", "uv"}}}}}});
   image["nodes"][1]["inputs"]["vector"] = {{"node", 8}, {"output", "color"}};
-  for (const json& graph : {with_output({{"node", 0}, {"output", "object"}}),
-                            with_output({{"node", 0}, {"output", "generated"}}),
-                            with_output({{"node", 0}, {"output", "uv1"}}), image,
-                            with(sine_graph(1), {{"evaluate", "points"}})}) {
+  for (const json& graph :
+       {with_output({{"node", 0}, {"output", "object"}}), with_output({{"node", 0}, {"output", "generated"}}),
+        with_output({{"node", 0}, {"output", "uv1"}}), image, with(sine_graph(1), {{"evaluate", "points"}})}) {
     const Scene scene = load(square_displaced({{"heightGraph", graph}}));
     ASSERT_EQ(scene.displacements.size(), 1u) << graph;
     const DisplacementSettings& d = settings(scene);

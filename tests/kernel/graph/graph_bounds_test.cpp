@@ -51,28 +51,83 @@ const std::vector<float> kTable = {0.5f, 0.7f, 0.1f, 0.1f, 2.0f, -1.0f, 0.0f, 0.
 const std::vector<Shape>& shapes()
 {
   static const std::vector<Shape> all = {
-      {Op::copy, 1}, {Op::add, 2}, {Op::subtract, 2}, {Op::multiply, 2}, {Op::divide, 2}, {Op::multiply_add, 3},
-      {Op::minimum, 2}, {Op::maximum, 2}, {Op::less_than, 2}, {Op::greater_than, 2}, {Op::equal, 2}, {Op::select, 3},
-      {Op::guard, 2}, {Op::floor, 1}, {Op::ceil, 1}, {Op::absolute, 1}, {Op::sign, 1}, {Op::square_root, 1},
-      {Op::power, 1, -2, 5}, {Op::power, 2}, {Op::logarithm, 1, 0.5f, 12}, {Op::logarithm, 2}, {Op::exponent, 1},
-      {Op::modulo, 1, -3, 3}, {Op::modulo, 2}, {Op::sine, 1}, {Op::cosine, 1}, {Op::tangent, 1}, {Op::arcsine, 1},
-      {Op::arccosine, 1}, {Op::arctangent, 1}, {Op::arctangent2, 2}, {Op::sinh, 1}, {Op::cosh, 1}, {Op::tanh, 1},
-      {Op::rgb_to_hsv, 3}, {Op::hsv_to_rgb, 3}, {Op::rgb_to_hsl, 3}, {Op::hsl_to_rgb, 3},
-      {Op::noise_1d, 1, 0, 3, pairs(2, 2)}, {Op::noise_2d, 2, 0, 3, pairs(2, 2)}, {Op::noise_3d, 3, 0, 3, pairs(2, 2)},
-      {Op::noise_4d, 4, 0, 3, pairs(2, 2)}, {Op::noise_3d, 6, 0, 3, pairs(2, 2)},
-      {Op::signed_noise_1d, 1, 0, 1, {{0}, {1}}}, {Op::signed_noise_2d, 2, 0, 1, {{0}, {1}}},
-      {Op::signed_noise_3d, 3, 0, 1, {{0}, {1}}}, {Op::signed_noise_4d, 4, 0, 1, {{0}, {1}}},
-      {Op::hash_1d, 1}, {Op::hash_2d, 2}, {Op::hash_3d, 3}, {Op::hash_4d, 4},
-      {Op::voronoi_1d, 1, 0, 1, voronoi_kinds()}, {Op::voronoi_2d, 2, 0, 1, voronoi_kinds()},
-      {Op::voronoi_3d, 3, 0, 1, voronoi_kinds()}, {Op::voronoi_4d, 4, 0, 1, voronoi_kinds()},
-      {Op::voronoi_2d, 2, 0, 3, voronoi_kinds()}, {Op::voronoi_3d, 3, 0, 3, voronoi_kinds()},
-      {Op::musgrave_1d, 1, 0, 3, pairs(5, 2)}, {Op::musgrave_2d, 2, 0, 3, pairs(5, 2)},
-      {Op::musgrave_3d, 3, 0, 3, pairs(5, 2)}, {Op::musgrave_4d, 4, 0, 3, pairs(5, 2)},
-      {Op::brick, 2, 0.01f, 1, pairs(3, 3)}, {Op::image, 2, 0, 1}, {Op::image_box, 6, 0, 1},
+      {Op::copy, 1},
+      {Op::add, 2},
+      {Op::subtract, 2},
+      {Op::multiply, 2},
+      {Op::divide, 2},
+      {Op::multiply_add, 3},
+      {Op::minimum, 2},
+      {Op::maximum, 2},
+      {Op::less_than, 2},
+      {Op::greater_than, 2},
+      {Op::equal, 2},
+      {Op::select, 3},
+      {Op::guard, 2},
+      {Op::floor, 1},
+      {Op::ceil, 1},
+      {Op::absolute, 1},
+      {Op::sign, 1},
+      {Op::square_root, 1},
+      {Op::power, 1, -2, 5},
+      {Op::power, 2},
+      {Op::logarithm, 1, 0.5f, 12},
+      {Op::logarithm, 2},
+      {Op::exponent, 1},
+      {Op::modulo, 1, -3, 3},
+      {Op::modulo, 2},
+      {Op::sine, 1},
+      {Op::cosine, 1},
+      {Op::tangent, 1},
+      {Op::arcsine, 1},
+      {Op::arccosine, 1},
+      {Op::arctangent, 1},
+      {Op::arctangent2, 2},
+      {Op::sinh, 1},
+      {Op::cosh, 1},
+      {Op::tanh, 1},
+      {Op::rgb_to_hsv, 3},
+      {Op::hsv_to_rgb, 3},
+      {Op::rgb_to_hsl, 3},
+      {Op::hsl_to_rgb, 3},
+      {Op::noise_1d, 1, 0, 3, pairs(2, 2)},
+      {Op::noise_2d, 2, 0, 3, pairs(2, 2)},
+      {Op::noise_3d, 3, 0, 3, pairs(2, 2)},
+      {Op::noise_4d, 4, 0, 3, pairs(2, 2)},
+      {Op::noise_3d, 6, 0, 3, pairs(2, 2)},
+      {Op::signed_noise_1d, 1, 0, 1, {{0}, {1}}},
+      {Op::signed_noise_2d, 2, 0, 1, {{0}, {1}}},
+      {Op::signed_noise_3d, 3, 0, 1, {{0}, {1}}},
+      {Op::signed_noise_4d, 4, 0, 1, {{0}, {1}}},
+      {Op::hash_1d, 1},
+      {Op::hash_2d, 2},
+      {Op::hash_3d, 3},
+      {Op::hash_4d, 4},
+      {Op::voronoi_1d, 1, 0, 1, voronoi_kinds()},
+      {Op::voronoi_2d, 2, 0, 1, voronoi_kinds()},
+      {Op::voronoi_3d, 3, 0, 1, voronoi_kinds()},
+      {Op::voronoi_4d, 4, 0, 1, voronoi_kinds()},
+      {Op::voronoi_2d, 2, 0, 3, voronoi_kinds()},
+      {Op::voronoi_3d, 3, 0, 3, voronoi_kinds()},
+      {Op::musgrave_1d, 1, 0, 3, pairs(5, 2)},
+      {Op::musgrave_2d, 2, 0, 3, pairs(5, 2)},
+      {Op::musgrave_3d, 3, 0, 3, pairs(5, 2)},
+      {Op::musgrave_4d, 4, 0, 3, pairs(5, 2)},
+      {Op::brick, 2, 0.01f, 1, pairs(3, 3)},
+      {Op::image, 2, 0, 1},
+      {Op::image_box, 6, 0, 1},
       {Op::table, 1, 0, 1, {{0, 0, kEntries, 0, 0}, {0, 0, kEntries, 1, 0}, {0, 0, kEntries, 1, 1}, {0, 0, 1, 1, 1}}},
-      {Op::checker, 3}, {Op::grid, 2, 0, 1, {{0, 0, 3, 1}}}, {Op::fresnel, 2}, {Op::open_share, 17},
+      {Op::checker, 3},
+      {Op::grid, 2, 0, 1, {{0, 0, 3, 1}}},
+      {Op::fresnel, 2},
+      {Op::open_share, 17},
       // Of these nothing is known, which no sample contradicts.
-      {Op::skip, 1}, {Op::image_tiles, 2}, {Op::ies, 2}, {Op::gabor_2d, 2}, {Op::gabor_3d, 3}, {Op::blackbody, 1},
+      {Op::skip, 1},
+      {Op::image_tiles, 2},
+      {Op::ies, 2},
+      {Op::gabor_2d, 2},
+      {Op::gabor_3d, 3},
+      {Op::blackbody, 1},
   };
   return all;
 }
@@ -174,13 +229,14 @@ TEST_F(GraphBounds, AreNeverNarrowerThanSamples)
         }
       }
       const std::vector<std::uint16_t>& immediates = shape.immediates[round % shape.immediates.size()];
-      const std::vector<GraphRange> ranges =
-          ranges_of(runs[round % 2], shape.op, in, immediates, &image_);
+      const std::vector<GraphRange> ranges = ranges_of(runs[round % 2], shape.op, in, immediates, &image_);
       for (int sample = 0; sample < kSamplesAParallelogram && num_wrong < 3; ++sample) {
         std::vector<std::vector<float>> at(num_inputs, std::vector<float>(8));
         for (std::size_t k = 0; k < 8; ++k) {
           const bool is_corner = numbers.word() % 4 == 0;
-          const auto symbol = [&] { return is_corner ? (numbers.word() % 2 == 0 ? 1.0f : -1.0f) : numbers.within(-1, 1); };
+          const auto symbol = [&] {
+            return is_corner ? (numbers.word() % 2 == 0 ? 1.0f : -1.0f) : numbers.within(-1, 1);
+          };
           const float e1 = symbol(), e2 = symbol();
           for (std::size_t i = 0; i < num_inputs; ++i) {
             const Parallelogram& p = in[i][k];
@@ -198,8 +254,8 @@ TEST_F(GraphBounds, AreNeverNarrowerThanSamples)
             ASSERT_FALSE(std::isnan(r.low[k]) || std::isnan(r.high[k])) << static_cast<int>(shape.op);
             const float radius = range_radius(r)[k];
             // The affine form holds as well.
-            const bool inside = value >= r.low[k] && value <= r.high[k] &&
-                                !(std::abs(value - r.c[k]) > radius * 1.0001f + 1e-30f);
+            const bool inside =
+                value >= r.low[k] && value <= r.high[k] && !(std::abs(value - r.c[k]) > radius * 1.0001f + 1e-30f);
             if (inside || (r.low[k] == -kInfinity && r.high[k] == kInfinity)) continue;
             ADD_FAILURE() << "opcode " << static_cast<int>(shape.op) << " output " << o << ": " << value
                           << " is not in [" << r.low[k] << ", " << r.high[k] << "], " << r.c[k] << " ± " << radius
