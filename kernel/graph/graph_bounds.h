@@ -4,385 +4,247 @@
 // What is not known is unknown, which is no error: whatever follows from it is, too.
 #pragma once
 
-#include "kernel/graph/graph_eval.h"
-#include "kernel/graph/graph_range_registers.h"
-#include "kernel/graph/noise_range.h"
-#include "kernel/graph/voronoi_range.h"
+#include "kernel/graph/graph_bounds_functions.h"
 
 namespace relief {
 
-/// One instruction's operands.
-struct GraphRangeOperands {
-  const GraphProgramView& program;
-  const TextureView* textures;
-  GraphRangeRegisters& registers;
-  const std::uint16_t* immediates;
-  const std::uint16_t* outputs;
-  const std::uint16_t* inputs;
-
-  GraphRange in(int i) const { return graph_range_operand(program, registers, inputs[i]); }
-  void set(int i, const GraphRange& value) const { registers.lanes[outputs[i]] = value; }
-};
-
 namespace graph_bounds {
 
-RELIEF_KERNEL F8 each(F8 a, float (*f)(float))
+RELIEF_KERNEL void copy_op(const GraphRangeOperands& o) { o.set(0, o.in(0)); }
+
+RELIEF_KERNEL void add_op(const GraphRangeOperands& o) { o.set(0, o.in(0) + o.in(1)); }
+
+RELIEF_KERNEL void subtract_op(const GraphRangeOperands& o)
 {
-  for (int k = 0; k < 8; ++k) a[k] = f(a[k]);
-  return a;
-}
-RELIEF_KERNEL GraphRange unit() { return range_between(F8{}, splat8(1.0f)); }
-/// 1 where it is sure, 0 where it is sure not.
-RELIEF_KERNEL GraphRange truth(I8 surely, I8 never)
-{
-  return range_between(surely ? splat8(1.0f) : F8{}, never ? F8{} : splat8(1.0f));
-}
-/// Whether operands from `first` on are single numbers.
-RELIEF_KERNEL bool are_points(const GraphRangeOperands& o, int first, int count)
-{
-  for (int i = first; i < first + count; ++i) {
-    if (mask_of(range_is_point(o.in(i))) != 0xffu) return false;
-  }
-  return true;
+  o.set(0, o.inputs[0] == o.inputs[1] ? range_point(F8{}) : o.in(0) - o.in(1));
 }
 
-RELIEF_KERNEL void power(const GraphRangeOperands& o)
+RELIEF_KERNEL void multiply_op(const GraphRangeOperands& o)
 {
-  const GraphRange a = o.in(0), b = o.in(1);
-  F8 low, high, at, slope_low, slope_high;
-  for (int k = 0; k < 8; ++k) {
-    const float a0 = a.low[k], a1 = a.high[k], b0 = b.low[k], b1 = b.high[k];
-    low[k] = -kInfinity;
-    high[k] = kInfinity;
-    at[k] = 0.0f;
-    slope_low[k] = -kInfinity;
-    slope_high[k] = kInfinity;
-    if (!(a0 > -kInfinity && a1 < kInfinity && b0 > -kInfinity && b1 < kInfinity)) continue;
-    if (a0 > 0.0f) {
-      const float p[4] = {graph_power(a0, b0), graph_power(a0, b1), graph_power(a1, b0), graph_power(a1, b1)};
-      low[k] = min(min(p[0], p[1]), min(p[2], p[3]));
-      high[k] = max(max(p[0], p[1]), max(p[2], p[3]));
-      if (b0 != b1) continue;
-      const float s0 = b0 * graph_power(a0, b0 - 1.0f), s1 = b0 * graph_power(a1, b0 - 1.0f);
-      at[k] = graph_power(a.c[k], b0);
-      slope_low[k] = min(s0, s1);
-      slope_high[k] = max(s0, s1);
-      // Between, powers of 1 turn; these are of 0.
-      if (!(a.c[k] > 0.0f)) slope_high[k] = kInfinity;
-    } else if (b0 == b1 && b0 > 0.0f) {
-      const float most = graph_power(max(__builtin_fabsf(a0), __builtin_fabsf(a1)), b0);
-      const bool is_even = __builtin_fmodf(b0, 2.0f) == 0.0f;
-      low[k] = a0 == 0.0f || is_even ? 0.0f : -most;
-      high[k] = most;
-    } else if (b0 == 0.0f && b1 == 0.0f) {
-      low[k] = high[k] = 1.0f;
-    }
-  }
-  o.set(0, range_of_function(a, at, slope_low, slope_high, low, high));
+  o.set(0, o.inputs[0] == o.inputs[1] ? range_within(o.in(0) * o.in(0), F8{}, splat8(kInfinity)) : o.in(0) * o.in(1));
 }
 
-RELIEF_KERNEL void logarithm(const GraphRangeOperands& o)
+RELIEF_KERNEL void divide_op(const GraphRangeOperands& o) { o.set(0, o.in(0) * range_reciprocal(o.in(1))); }
+
+RELIEF_KERNEL void multiply_add_op(const GraphRangeOperands& o) { o.set(0, o.in(0) * o.in(1) + o.in(2)); }
+
+RELIEF_KERNEL void minimum_op(const GraphRangeOperands& o) { o.set(0, range_min(o.in(0), o.in(1))); }
+
+RELIEF_KERNEL void maximum_op(const GraphRangeOperands& o) { o.set(0, range_max(o.in(0), o.in(1))); }
+
+RELIEF_KERNEL void less_than_op(const GraphRangeOperands& o)
 {
-  const GraphRange a = o.in(0), base = o.in(1);
-  F8 low, high;
-  for (int k = 0; k < 8; ++k) {
-    const float b = base.low[k];
-    const bool is_known = base.low[k] == base.high[k] && a.low[k] > 0.0f && a.high[k] < kInfinity;
-    const float p = is_known ? graph_logarithm(a.low[k], b) : -kInfinity;
-    const float q = is_known ? graph_logarithm(a.high[k], b) : kInfinity;
-    low[k] = min(p, q);
-    high[k] = max(p, q);
-    if (a.high[k] <= 0.0f || base.high[k] <= 0.0f) low[k] = high[k] = 0.0f;
-  }
-  o.set(0, range_padded(low, high));
+  o.set(0, truth(o.in(0).high < o.in(1).low, o.in(0).low >= o.in(1).high));
 }
 
-RELIEF_KERNEL void exponent(const GraphRangeOperands& o)
+RELIEF_KERNEL void greater_than_op(const GraphRangeOperands& o)
+{
+  o.set(0, truth(o.in(0).low > o.in(1).high, o.in(0).high <= o.in(1).low));
+}
+
+RELIEF_KERNEL void equal_op(const GraphRangeOperands& o)
+{
+  const GraphRange x = o.in(0), y = o.in(1);
+  const I8 apart = (x.high < y.low) | (x.low > y.high);
+  o.set(0, truth(range_is_point(x) & range_is_point(y) & (x.low == y.low), apart));
+}
+
+/// Of select and guard.
+RELIEF_KERNEL void chosen(const GraphRangeOperands& o, bool is_guard)
+{
+  const GraphRange condition = o.in(is_guard ? 1 : 0), yes = o.in(is_guard ? 0 : 1);
+  const GraphRange no = is_guard ? range_point(F8{}) : o.in(2);
+  const I8 surely = (condition.low > 0.0f) | (condition.high < 0.0f);
+  const I8 never = (condition.low == 0.0f) & (condition.high == 0.0f);
+  o.set(0, range_select(surely, yes, range_select(never, no, range_hull(yes, no))));
+}
+
+RELIEF_KERNEL void select_op(const GraphRangeOperands& o) { chosen(o, false); }
+RELIEF_KERNEL void guard_op(const GraphRangeOperands& o) { chosen(o, true); }
+
+RELIEF_KERNEL void skip_op(const GraphRangeOperands& o)
+{
+  const GraphRange factor = o.in(0);
+  if (mask_of((factor.low == 0.0f) & (factor.high == 0.0f)) == 0xffu)
+    o.next += o.immediates[0] | std::uint32_t{o.immediates[1]} << 16;
+}
+
+RELIEF_KERNEL void floor_op(const GraphRangeOperands& o)
+{
+  o.set(0, range_between(floor(o.in(0).low), floor(o.in(0).high)));
+}
+
+RELIEF_KERNEL void ceil_op(const GraphRangeOperands& o)
+{
+  o.set(0, range_between(-floor(-o.in(0).low), -floor(-o.in(0).high)));
+}
+
+RELIEF_KERNEL void absolute_op(const GraphRangeOperands& o) { o.set(0, range_abs(o.in(0))); }
+
+RELIEF_KERNEL void sign_op(const GraphRangeOperands& o)
 {
   const GraphRange a = o.in(0);
-  const auto f = [](float x) { return std::exp(x); };
-  const F8 low = each(a.low, f), high = each(a.high, f);
-  o.set(0, range_of_function(a, each(a.c, f), low, high, low, high));
+  o.set(0, range_between(a.low > 0.0f    ? splat8(1.0f)
+                         : a.low == 0.0f ? F8{}
+                                         : -splat8(1.0f),
+                         a.high < 0.0f    ? -splat8(1.0f)
+                         : a.high == 0.0f ? F8{}
+                                          : splat8(1.0f)));
 }
 
-RELIEF_KERNEL void modulo(const GraphRangeOperands& o)
-{
-  const GraphRange a = o.in(0), b = o.in(1);
-  const F8 size = max(abs(b.low), abs(b.high));
-  // Within one period: a shift.
-  F8 periods;
-  I8 is_one;
-  for (int k = 0; k < 8; ++k) {
-    const float n0 = std::trunc(a.low[k] / b.low[k]), n1 = std::trunc(a.high[k] / b.low[k]);
-    is_one[k] = b.low[k] == b.high[k] && n0 == n1 && __builtin_fabsf(n0) < 1e6f &&
-                        __builtin_fabsf(std::fmod(a.low[k], b.low[k])) > 1e-4f * size[k] &&
-                        __builtin_fabsf(std::fmod(a.high[k], b.low[k])) > 1e-4f * size[k]
-                    ? -1
-                    : 0;
-    periods[k] = is_one[k] != 0 ? n0 : 0.0f;
-  }
-  const GraphRange shifted = a - range_point(is_one ? b.low : F8{}) * range_point(periods);
-  const GraphRange whole = range_between(max(-size, min(a.low, F8{})), min(size, max(a.high, F8{})));
-  o.set(0, range_select(is_one, shifted, whole));
-}
-
-/// Sine of an angle, or of one a quarter of a turn further.
-RELIEF_KERNEL GraphRange sine_of(const GraphRange& a, double quarter)
-{
-  F8 low, high, at, slope_low, slope_high;
-  constexpr double kTurn = 6.283185307179586, kHalf = 0.5 * kTurn;
-  const auto extremes = [](double from, double to, float* least, float* most) {
-    double s0 = std::sin(from), s1 = std::sin(to);
-    *least = static_cast<float>(s0 < s1 ? s0 : s1);
-    *most = static_cast<float>(s0 > s1 ? s0 : s1);
-    // Crests at a quarter of a turn, valleys at three.
-    if (std::floor((to - 0.25 * kTurn) / kTurn) != std::floor((from - 0.25 * kTurn) / kTurn)) *most = 1.0f;
-    if (std::floor((to + 0.25 * kTurn) / kTurn) != std::floor((from + 0.25 * kTurn) / kTurn)) *least = -1.0f;
-  };
-  for (int k = 0; k < 8; ++k) {
-    const double from = static_cast<double>(a.low[k]) + quarter, to = static_cast<double>(a.high[k]) + quarter;
-    low[k] = -1.0f;
-    high[k] = 1.0f;
-    at[k] = 0.0f;
-    slope_low[k] = -1.0f;
-    slope_high[k] = 1.0f;
-    if (!(to - from < kHalf && __builtin_fabs(from) < 1e6)) continue;
-    float l, h;
-    extremes(from, to, &l, &h);
-    low[k] = l;
-    high[k] = h;
-    extremes(from + 0.25 * kTurn, to + 0.25 * kTurn, &l, &h);
-    slope_low[k] = l;
-    slope_high[k] = h;
-    at[k] = static_cast<float>(std::sin(static_cast<double>(a.c[k]) + quarter));
-  }
-  const GraphRange wide = range_between(splat8(-1.0f), splat8(1.0f));
-  const I8 known = (a.high - a.low < 3.0f) & (abs(a.low) < 1e6f);
-  return range_select(known, range_of_function(a, at, slope_low, slope_high, low, high), wide);
-}
-
-RELIEF_KERNEL void tangent(const GraphRangeOperands& o)
+RELIEF_KERNEL void square_root_op(const GraphRangeOperands& o)
 {
   const GraphRange a = o.in(0);
-  F8 low, high;
-  for (int k = 0; k < 8; ++k) {
-    constexpr double kHalf = 3.141592653589793;
-    const double n0 = std::floor(static_cast<double>(a.low[k]) / kHalf + 0.499999);
-    const bool known =
-        a.high[k] < 1e6f && a.low[k] > -1e6f && n0 == std::floor(static_cast<double>(a.high[k]) / kHalf + 0.500001);
-    low[k] = known ? std::tan(a.low[k]) : -kInfinity;
-    high[k] = known ? std::tan(a.high[k]) : kInfinity;
-  }
-  o.set(0, range_padded(low, high));
+  const F8 low = sqrt(max(a.low, F8{})), high = sqrt(max(a.high, F8{}));
+  o.set(0, range_of_function(a, sqrt(max(a.c, F8{})), 0.5f / high, 0.5f / low, low, high));
 }
 
-RELIEF_KERNEL void arctangent2(const GraphRangeOperands& o)
+RELIEF_KERNEL void power_op(const GraphRangeOperands& o) { power(o); }
+
+RELIEF_KERNEL void logarithm_op(const GraphRangeOperands& o) { logarithm(o); }
+
+RELIEF_KERNEL void exponent_op(const GraphRangeOperands& o) { exponent(o); }
+
+RELIEF_KERNEL void modulo_op(const GraphRangeOperands& o) { modulo(o); }
+
+RELIEF_KERNEL void sine_op(const GraphRangeOperands& o) { o.set(0, sine_of(o.in(0), 0.0)); }
+
+RELIEF_KERNEL void cosine_op(const GraphRangeOperands& o) { o.set(0, sine_of(o.in(0), 1.5707963267948966)); }
+
+RELIEF_KERNEL void tangent_op(const GraphRangeOperands& o) { tangent(o); }
+
+RELIEF_KERNEL void arcsine_op(const GraphRangeOperands& o)
 {
-  const GraphRange y = o.in(0), x = o.in(1);
-  F8 low, high;
-  for (int k = 0; k < 8; ++k) {
-    low[k] = -3.1415930f;
-    high[k] = 3.1415930f;
-    const bool is_apart = x.low[k] > 0.0f || y.low[k] > 0.0f || y.high[k] < 0.0f;
-    if (!is_apart ||
-        !(x.low[k] > -kInfinity && x.high[k] < kInfinity && y.low[k] > -kInfinity && y.high[k] < kInfinity))
-      continue;
-    // Angles of a rectangle without the origin are extreme at its corners.
-    const float p[4] = {std::atan2(y.low[k], x.low[k]), std::atan2(y.low[k], x.high[k]),
-                        std::atan2(y.high[k], x.low[k]), std::atan2(y.high[k], x.high[k])};
-    low[k] = min(min(p[0], p[1]), min(p[2], p[3]));
-    high[k] = max(max(p[0], p[1]), max(p[2], p[3]));
-  }
-  o.set(0, range_padded(low, high));
+  growing(o, [](float a) { return std::asin(clamp(a, -1.0f, 1.0f)); });
 }
 
-/// A growing function.
-RELIEF_KERNEL void growing(const GraphRangeOperands& o, float (*f)(float))
+RELIEF_KERNEL void arccosine_op(const GraphRangeOperands& o)
 {
   const GraphRange a = o.in(0);
-  o.set(0, range_padded(each(a.low, f), each(a.high, f)));
+  const auto f = [](float x) { return std::acos(clamp(x, -1.0f, 1.0f)); };
+  o.set(0, range_padded(each(a.high, f), each(a.low, f)));
 }
 
-RELIEF_KERNEL void table(const GraphRangeOperands& o)
+RELIEF_KERNEL void arctangent_op(const GraphRangeOperands& o)
 {
-  const float* table = o.program.tables + (o.immediates[0] | std::uint32_t{o.immediates[1]} << 16);
-  const int last = o.immediates[2] - 1;
-  const bool interpolated = o.immediates[3] != 0, goes_on = o.immediates[4] != 0 && last > 0;
-  const GraphRange a = o.in(0);
-  F8 low, high, at, slope_low, slope_high;
-  for (int k = 0; k < 8; ++k) {
-    low[k] = -kInfinity;
-    high[k] = kInfinity;
-    at[k] = slope_low[k] = 0.0f;
-    slope_high[k] = kInfinity;
-    const bool beyond = !(a.low[k] >= 0.0f && a.high[k] <= 1.0f);
-    if ((goes_on && beyond) || !(a.low[k] <= a.high[k])) continue;
-    const auto place = [&](float x) { return clamp(x, 0.0f, 1.0f) * static_cast<float>(last); };
-    const int first = static_cast<int>(place(a.low[k]) - 1e-3f), end = static_cast<int>(place(a.high[k]) + 1e-3f) + 1;
-    const int from = first > 0 ? first : 0, to = end < last ? end : last;
-    low[k] = high[k] = table[from];
-    float s0 = kInfinity, s1 = -kInfinity;
-    for (int i = from + 1; i <= to; ++i) {
-      low[k] = min(low[k], table[i]);
-      high[k] = max(high[k], table[i]);
-      const float slope = (table[i] - table[i - 1]) * static_cast<float>(last);
-      s0 = min(s0, slope);
-      s1 = max(s1, slope);
-    }
-    if (!interpolated || beyond || from == to) continue;
-    const float c = place(a.c[k]);
-    const int i = static_cast<int>(c) < last - 1 ? static_cast<int>(c) : last - 1;
-    at[k] = table[i] + (table[i + 1] - table[i]) * (c - static_cast<float>(i));
-    slope_low[k] = s0;
-    slope_high[k] = s1;
-  }
-  o.set(0, range_of_function(a, at, slope_low, slope_high, low, high));
+  growing(o, [](float a) { return std::atan(a); });
 }
 
-template <int kDims>
-RELIEF_KERNEL void noise(const GraphRangeOperands& o)
+RELIEF_KERNEL void arctangent2_op(const GraphRangeOperands& o) { arctangent2(o); }
+
+RELIEF_KERNEL void sinh_op(const GraphRangeOperands& o)
 {
-  GraphRange p[kDims];
-  for (int i = 0; i < kDims; ++i) p[i] = o.in(i);
-  if (!are_points(o, kDims, 3)) {
-    // Normalized sums keep within what one octave does.
-    const F8 most = splat8(0.5f * kNoiseLargest[kDims - 1]);
-    return o.set(0, o.immediates[0] != 0 ? range_between(0.5f - most, 0.5f + most) : range_unknown());
-  }
-  const NoiseOctaves octaves{clamp(o.in(kDims).low, 0.0f, 15.0f), max(o.in(kDims + 1).low, F8{}), o.in(kDims + 2).low};
-  o.set(0, noise_fractal_range<kDims>(p, octaves, o.immediates[0] != 0, o.immediates[1] != 0));
+  growing(o, [](float a) { return std::sinh(a); });
 }
 
-template <int kDims>
-RELIEF_KERNEL void signed_noise(const GraphRangeOperands& o)
+RELIEF_KERNEL void cosh_op(const GraphRangeOperands& o)
 {
-  GraphRange p[kDims];
-  for (int i = 0; i < kDims; ++i) p[i] = o.in(i);
-  o.set(0, noise_signed_range<kDims>(p, o.immediates[0] != 0));
+  const GraphRange a = range_abs(o.in(0));
+  const auto f = [](float x) { return std::cosh(x); };
+  o.set(0, range_padded(each(max(a.low, F8{}), f), each(a.high, f)));
 }
 
-template <int kDims>
-RELIEF_KERNEL void musgrave(const GraphRangeOperands& o)
+RELIEF_KERNEL void tanh_op(const GraphRangeOperands& o)
 {
-  if (!are_points(o, kDims, 5)) return o.set(0, range_unknown());
-  GraphRange p[kDims];
-  for (int i = 0; i < kDims; ++i) p[i] = o.in(i);
-  const MusgraveSettings settings{clamp(o.in(kDims).low, 0.0f, 16.0f),
-                                  o.in(kDims + 1).low,
-                                  o.in(kDims + 2).low,
-                                  o.in(kDims + 3).low,
-                                  o.in(kDims + 4).low,
-                                  o.immediates[1] != 0};
-  o.set(0, musgrave_range<kDims>(p, static_cast<MusgraveType>(o.immediates[0]), settings));
+  growing(o, [](float a) { return std::tanh(a); });
 }
 
-template <int kDims>
-RELIEF_KERNEL void hash(const GraphRangeOperands& o)
+RELIEF_KERNEL void rgb_to_hsv_op(const GraphRangeOperands& o) { to_hues(o, rgb_to_hsv, false); }
+
+RELIEF_KERNEL void rgb_to_hsl_op(const GraphRangeOperands& o) { to_hues(o, rgb_to_hsl, true); }
+
+RELIEF_KERNEL void hsv_to_rgb_op(const GraphRangeOperands& o) { from_hues(o, hsv_to_rgb, false); }
+
+RELIEF_KERNEL void hsl_to_rgb_op(const GraphRangeOperands& o) { from_hues(o, hsl_to_rgb, true); }
+
+RELIEF_KERNEL void noise_1d_op(const GraphRangeOperands& o) { noise<1>(o); }
+
+RELIEF_KERNEL void noise_2d_op(const GraphRangeOperands& o) { noise<2>(o); }
+
+RELIEF_KERNEL void noise_3d_op(const GraphRangeOperands& o) { noise<3>(o); }
+
+RELIEF_KERNEL void noise_4d_op(const GraphRangeOperands& o) { noise<4>(o); }
+
+RELIEF_KERNEL void signed_noise_1d_op(const GraphRangeOperands& o) { signed_noise<1>(o); }
+
+RELIEF_KERNEL void signed_noise_2d_op(const GraphRangeOperands& o) { signed_noise<2>(o); }
+
+RELIEF_KERNEL void signed_noise_3d_op(const GraphRangeOperands& o) { signed_noise<3>(o); }
+
+RELIEF_KERNEL void signed_noise_4d_op(const GraphRangeOperands& o) { signed_noise<4>(o); }
+
+RELIEF_KERNEL void hash_1d_op(const GraphRangeOperands& o) { hash<1>(o); }
+
+RELIEF_KERNEL void hash_2d_op(const GraphRangeOperands& o) { hash<2>(o); }
+
+RELIEF_KERNEL void hash_3d_op(const GraphRangeOperands& o) { hash<3>(o); }
+
+RELIEF_KERNEL void hash_4d_op(const GraphRangeOperands& o) { hash<4>(o); }
+
+RELIEF_KERNEL void voronoi_1d_op(const GraphRangeOperands& o) { voronoi<1>(o); }
+
+RELIEF_KERNEL void voronoi_2d_op(const GraphRangeOperands& o) { voronoi<2>(o); }
+
+RELIEF_KERNEL void voronoi_3d_op(const GraphRangeOperands& o) { voronoi<3>(o); }
+
+RELIEF_KERNEL void voronoi_4d_op(const GraphRangeOperands& o) { voronoi<4>(o); }
+
+RELIEF_KERNEL void musgrave_1d_op(const GraphRangeOperands& o) { musgrave<1>(o); }
+
+RELIEF_KERNEL void musgrave_2d_op(const GraphRangeOperands& o) { musgrave<2>(o); }
+
+RELIEF_KERNEL void musgrave_3d_op(const GraphRangeOperands& o) { musgrave<3>(o); }
+
+RELIEF_KERNEL void musgrave_4d_op(const GraphRangeOperands& o) { musgrave<4>(o); }
+
+RELIEF_KERNEL void image_op(const GraphRangeOperands& o)
 {
-  if (!are_points(o, 0, kDims)) return o.set(0, unit());
-  F8 key[kDims];
-  for (int i = 0; i < kDims; ++i) key[i] = o.in(i).low;
-  o.set(0, range_padded(hash_unit(key), hash_unit(key)));
+  set_all(o, 4, of_texels(o.textures[o.immediates[0]], o.immediates[1]));
 }
 
-template <int kDims>
-RELIEF_KERNEL void voronoi(const GraphRangeOperands& o)
+RELIEF_KERNEL void image_box_op(const GraphRangeOperands& o)
 {
-  GraphRange p[kDims], out[9];
-  for (int i = 0; i < kDims; ++i) p[i] = o.in(i);
-  for (GraphRange& each : out) each = range_unknown();
-  if (are_points(o, kDims, 6)) {
-    const NoiseOctaves octaves{clamp(o.in(kDims + 3).low, 0.0f, 15.0f), clamp(o.in(kDims + 4).low, 0.0f, 1.0f),
-                               o.in(kDims + 5).low};
-    const unsigned flags = o.immediates[2];
-    const auto eval = [&]<bool kPcg>() {
-      const VoronoiSettings<kDims, kPcg> settings{static_cast<VoronoiFeature>(o.immediates[0]),
-                                                  static_cast<VoronoiMetric>(o.immediates[1]),
-                                                  o.in(kDims).low,
-                                                  o.in(kDims + 1).low,
-                                                  o.in(kDims + 2).low,
-                                                  flags};
-      voronoi_range<kDims, kPcg>(p, settings, octaves, out);
-    };
-    if ((flags & kVoronoiPcg) != 0 && kDims > 1) {
-      eval.template operator()<true>();
-    } else {
-      eval.template operator()<false>();
-    }
-  }
-  for (int i = 0; i < 9; ++i) o.set(i, out[i]);
+  set_all(o, 4, of_texels(o.textures[o.immediates[0]], o.immediates[1]));
 }
 
-/// Three numbers that are known where those that they are made of are.
-RELIEF_KERNEL void color(const GraphRangeOperands& o, Vec3f (*f)(Vec3f), const GraphRange (&known)[3])
+RELIEF_KERNEL void table_op(const GraphRangeOperands& o) { table(o); }
+
+RELIEF_KERNEL void grid_op(const GraphRangeOperands& o) { grid(o); }
+
+RELIEF_KERNEL void brick_op(const GraphRangeOperands& o) { set_all(o, 2, unit()); }
+
+RELIEF_KERNEL void fresnel_op(const GraphRangeOperands& o)
 {
-  GraphRange out[3] = {known[0], known[1], known[2]};
-  if (are_points(o, 0, 3)) {
-    const F8 c[3] = {o.in(0).low, o.in(1).low, o.in(2).low};
-    F8 of[3];
-    for (int k = 0; k < 8; ++k) {
-      const Vec3f v = f({c[0][k], c[1][k], c[2][k]});
-      of[0][k] = v.x;
-      of[1][k] = v.y;
-      of[2][k] = v.z;
-    }
-    for (int i = 0; i < 3; ++i) out[i] = range_padded(of[i], of[i]);
-  }
-  for (int i = 0; i < 3; ++i) o.set(i, out[i]);
+  o.set(0, range_select(o.in(1).low > 0.0f, range_between(F8{}, splat8(1.0001f)), range_unknown()));
 }
 
-RELIEF_KERNEL void to_hues(const GraphRangeOperands& o, Vec3f (*f)(Vec3f), bool is_lightness)
+RELIEF_KERNEL void checker_op(const GraphRangeOperands& o) { o.set(0, unit()); }
+
+RELIEF_KERNEL void open_share_op(const GraphRangeOperands& o) { o.set(0, unit()); }
+
+RELIEF_KERNEL void image_tiles_op(const GraphRangeOperands& o)
 {
-  const GraphRange r = o.in(0), g = o.in(1), b = o.in(2);
-  const GraphRange most = range_max(range_max(r, g), b), least = range_min(range_min(r, g), b);
-  const I8 is_color = (least.low >= 0.0f) & (most.high <= 1.0f);
-  const GraphRange saturation = range_select(is_color, unit(), range_unknown());
-  const GraphRange hue = range_between(F8{}, splat8(1.0001f));
-  const GraphRange light = is_lightness ? range_min((most + least) * 0.5f, range_point(splat8(1.0f))) : most;
-  const GraphRange known[3] = {hue, saturation, light};
-  color(o, f, known);
+  set_all(o, kGraphOpShapes[static_cast<int>(GraphOp::image_tiles)].num_outputs, range_unknown());
 }
 
-RELIEF_KERNEL void from_hues(const GraphRangeOperands& o, Vec3f (*f)(Vec3f), bool is_lightness)
+RELIEF_KERNEL void ies_op(const GraphRangeOperands& o)
 {
-  const GraphRange saturation = o.in(1), light = o.in(2), one = range_point(splat8(1.0f));
-  GraphRange all;
-  if (is_lightness) {
-    const GraphRange chroma = (one - range_abs(light * 2.0f - one)) * saturation;
-    all = light + range_between(splat8(-0.5f), splat8(0.5f)) * chroma;
-  } else {
-    // Between the value and what is left of it without saturation.
-    all = range_hull(light, light * (one - saturation));
-  }
-  const GraphRange known[3] = {all, all, all};
-  color(o, f, known);
+  set_all(o, kGraphOpShapes[static_cast<int>(GraphOp::ies)].num_outputs, range_unknown());
 }
 
-/// What an image can give.
-/// @param flags  ImageFlags
-RELIEF_KERNEL GraphRange of_texels(const TextureView& texture, std::uint16_t flags)
+RELIEF_KERNEL void gabor_2d_op(const GraphRangeOperands& o)
 {
-  // Colours that are divided by opacity may be anything.
-  const bool is_unit = texture.format != TexelFormat::kHalf && (flags & kImageDivide) == 0;
-  return is_unit ? range_between(splat8(-1e-4f), splat8(1.0001f)) : range_unknown();
-}
-RELIEF_KERNEL void set_all(const GraphRangeOperands& o, int count, const GraphRange& value)
-{
-  for (int i = 0; i < count; ++i) o.set(i, value);
+  set_all(o, kGraphOpShapes[static_cast<int>(GraphOp::gabor_2d)].num_outputs, range_unknown());
 }
 
-RELIEF_KERNEL void grid(const GraphRangeOperands& o)
+RELIEF_KERNEL void gabor_3d_op(const GraphRangeOperands& o)
 {
-  const float* table = o.program.tables + (o.immediates[0] | std::uint32_t{o.immediates[1]} << 16);
-  const int count = o.immediates[2] * o.immediates[3];
-  for (int c = 0; c < 3; ++c) {
-    float low = table[c], high = low;
-    for (int i = 1; i < count; ++i) {
-      low = min(low, table[3 * i + c]);
-      high = max(high, table[3 * i + c]);
-    }
-    o.set(c, range_padded(splat8(low), splat8(high)));
-  }
+  set_all(o, kGraphOpShapes[static_cast<int>(GraphOp::gabor_3d)].num_outputs, range_unknown());
+}
+
+RELIEF_KERNEL void blackbody_op(const GraphRangeOperands& o)
+{
+  set_all(o, kGraphOpShapes[static_cast<int>(GraphOp::blackbody)].num_outputs, range_unknown());
 }
 
 }  // namespace graph_bounds
@@ -392,10 +254,8 @@ RELIEF_KERNEL void graph_bounds_run(const GraphProgramView& program,
                                     const TextureView* textures,
                                     GraphRangeRegisters& registers)
 {
-  namespace b = graph_bounds;
   const std::uint16_t* word = program.code;
   const std::uint16_t* const end = word + program.num_words;
-  const F8 zero{}, one = splat8(1.0f);
   while (word < end) {
     const auto op = static_cast<GraphOp>(*word++);
     const GraphOpShape& shape = kGraphOpShapes[static_cast<int>(op)];
@@ -403,233 +263,14 @@ RELIEF_KERNEL void graph_bounds_run(const GraphProgramView& program,
     const std::uint16_t* outputs = immediates + shape.num_immediates;
     const std::uint16_t* inputs = outputs + shape.num_outputs;
     word = inputs + shape.num_inputs;
-    const GraphRangeOperands o{program, textures, registers, immediates, outputs, inputs};
-    const auto in = [&o](int i) { return o.in(i); };
+    const GraphRangeOperands o{program, textures, registers, immediates, outputs, inputs, word};
     switch (op) {
-      case GraphOp::copy:
-        o.set(0, in(0));
-        break;
-      case GraphOp::add:
-        o.set(0, in(0) + in(1));
-        break;
-      case GraphOp::subtract:
-        o.set(0, inputs[0] == inputs[1] ? range_point(zero) : in(0) - in(1));
-        break;
-      case GraphOp::multiply:
-        o.set(0, inputs[0] == inputs[1] ? range_within(in(0) * in(0), zero, splat8(kInfinity)) : in(0) * in(1));
-        break;
-      case GraphOp::divide:
-        o.set(0, in(0) * range_reciprocal(in(1)));
-        break;
-      case GraphOp::multiply_add:
-        o.set(0, in(0) * in(1) + in(2));
-        break;
-      case GraphOp::minimum:
-        o.set(0, range_min(in(0), in(1)));
-        break;
-      case GraphOp::maximum:
-        o.set(0, range_max(in(0), in(1)));
-        break;
-      case GraphOp::less_than:
-        o.set(0, b::truth(in(0).high < in(1).low, in(0).low >= in(1).high));
-        break;
-      case GraphOp::greater_than:
-        o.set(0, b::truth(in(0).low > in(1).high, in(0).high <= in(1).low));
-        break;
-      case GraphOp::equal: {
-        const GraphRange x = in(0), y = in(1);
-        const I8 apart = (x.high < y.low) | (x.low > y.high);
-        o.set(0, b::truth(range_is_point(x) & range_is_point(y) & (x.low == y.low), apart));
-        break;
-      }
-      case GraphOp::select:
-      case GraphOp::guard: {
-        const bool is_guard = op == GraphOp::guard;
-        const GraphRange condition = in(is_guard ? 1 : 0), yes = in(is_guard ? 0 : 1);
-        const GraphRange no = is_guard ? range_point(zero) : in(2);
-        const I8 surely = (condition.low > 0.0f) | (condition.high < 0.0f);
-        const I8 never = (condition.low == 0.0f) & (condition.high == 0.0f);
-        o.set(0, range_select(surely, yes, range_select(never, no, range_hull(yes, no))));
-        break;
-      }
-      case GraphOp::skip: {
-        const GraphRange factor = in(0);
-        if (mask_of((factor.low == 0.0f) & (factor.high == 0.0f)) == 0xffu)
-          word += immediates[0] | std::uint32_t{immediates[1]} << 16;
-        break;
-      }
-      case GraphOp::floor:
-        o.set(0, range_between(floor(in(0).low), floor(in(0).high)));
-        break;
-      case GraphOp::ceil:
-        o.set(0, range_between(-floor(-in(0).low), -floor(-in(0).high)));
-        break;
-      case GraphOp::absolute:
-        o.set(0, range_abs(in(0)));
-        break;
-      case GraphOp::sign: {
-        const GraphRange a = in(0);
-        o.set(0, range_between(a.low > 0.0f    ? one
-                               : a.low == 0.0f ? zero
-                                               : -one,
-                               a.high < 0.0f    ? -one
-                               : a.high == 0.0f ? zero
-                                                : one));
-        break;
-      }
-      case GraphOp::square_root: {
-        const GraphRange a = in(0);
-        const F8 low = sqrt(max(a.low, zero)), high = sqrt(max(a.high, zero));
-        o.set(0, range_of_function(a, sqrt(max(a.c, zero)), 0.5f / high, 0.5f / low, low, high));
-        break;
-      }
-      case GraphOp::power:
-        b::power(o);
-        break;
-      case GraphOp::logarithm:
-        b::logarithm(o);
-        break;
-      case GraphOp::exponent:
-        b::exponent(o);
-        break;
-      case GraphOp::modulo:
-        b::modulo(o);
-        break;
-      case GraphOp::sine:
-        o.set(0, b::sine_of(in(0), 0.0));
-        break;
-      case GraphOp::cosine:
-        o.set(0, b::sine_of(in(0), 1.5707963267948966));
-        break;
-      case GraphOp::tangent:
-        b::tangent(o);
-        break;
-      case GraphOp::arcsine:
-        b::growing(o, [](float a) { return std::asin(clamp(a, -1.0f, 1.0f)); });
-        break;
-      case GraphOp::arccosine: {
-        const GraphRange a = in(0);
-        const auto f = [](float x) { return std::acos(clamp(x, -1.0f, 1.0f)); };
-        o.set(0, range_padded(b::each(a.high, f), b::each(a.low, f)));
-        break;
-      }
-      case GraphOp::arctangent:
-        b::growing(o, [](float a) { return std::atan(a); });
-        break;
-      case GraphOp::arctangent2:
-        b::arctangent2(o);
-        break;
-      case GraphOp::sinh:
-        b::growing(o, [](float a) { return std::sinh(a); });
-        break;
-      case GraphOp::cosh: {
-        const GraphRange a = range_abs(in(0));
-        const auto f = [](float x) { return std::cosh(x); };
-        o.set(0, range_padded(b::each(max(a.low, zero), f), b::each(a.high, f)));
-        break;
-      }
-      case GraphOp::tanh:
-        b::growing(o, [](float a) { return std::tanh(a); });
-        break;
-      case GraphOp::rgb_to_hsv:
-        b::to_hues(o, rgb_to_hsv, false);
-        break;
-      case GraphOp::rgb_to_hsl:
-        b::to_hues(o, rgb_to_hsl, true);
-        break;
-      case GraphOp::hsv_to_rgb:
-        b::from_hues(o, hsv_to_rgb, false);
-        break;
-      case GraphOp::hsl_to_rgb:
-        b::from_hues(o, hsl_to_rgb, true);
-        break;
-      case GraphOp::noise_1d:
-        b::noise<1>(o);
-        break;
-      case GraphOp::noise_2d:
-        b::noise<2>(o);
-        break;
-      case GraphOp::noise_3d:
-        b::noise<3>(o);
-        break;
-      case GraphOp::noise_4d:
-        b::noise<4>(o);
-        break;
-      case GraphOp::signed_noise_1d:
-        b::signed_noise<1>(o);
-        break;
-      case GraphOp::signed_noise_2d:
-        b::signed_noise<2>(o);
-        break;
-      case GraphOp::signed_noise_3d:
-        b::signed_noise<3>(o);
-        break;
-      case GraphOp::signed_noise_4d:
-        b::signed_noise<4>(o);
-        break;
-      case GraphOp::hash_1d:
-        b::hash<1>(o);
-        break;
-      case GraphOp::hash_2d:
-        b::hash<2>(o);
-        break;
-      case GraphOp::hash_3d:
-        b::hash<3>(o);
-        break;
-      case GraphOp::hash_4d:
-        b::hash<4>(o);
-        break;
-      case GraphOp::voronoi_1d:
-        b::voronoi<1>(o);
-        break;
-      case GraphOp::voronoi_2d:
-        b::voronoi<2>(o);
-        break;
-      case GraphOp::voronoi_3d:
-        b::voronoi<3>(o);
-        break;
-      case GraphOp::voronoi_4d:
-        b::voronoi<4>(o);
-        break;
-      case GraphOp::musgrave_1d:
-        b::musgrave<1>(o);
-        break;
-      case GraphOp::musgrave_2d:
-        b::musgrave<2>(o);
-        break;
-      case GraphOp::musgrave_3d:
-        b::musgrave<3>(o);
-        break;
-      case GraphOp::musgrave_4d:
-        b::musgrave<4>(o);
-        break;
-      case GraphOp::image:
-      case GraphOp::image_box:
-        b::set_all(o, 4, b::of_texels(textures[immediates[0]], immediates[1]));
-        break;
-      case GraphOp::table:
-        b::table(o);
-        break;
-      case GraphOp::grid:
-        b::grid(o);
-        break;
-      case GraphOp::brick:
-        b::set_all(o, 2, b::unit());
-        break;
-      case GraphOp::fresnel:
-        o.set(0, range_select(in(1).low > 0.0f, range_between(zero, splat8(1.0001f)), range_unknown()));
-        break;
-      case GraphOp::checker:
-      case GraphOp::open_share:
-        o.set(0, b::unit());
-        break;
-      case GraphOp::image_tiles:
-      case GraphOp::ies:
-      case GraphOp::gabor_2d:
-      case GraphOp::gabor_3d:
-      case GraphOp::blackbody:
-        b::set_all(o, shape.num_outputs, range_unknown());
-        break;
+#define X(name, num_outputs, num_inputs, num_immediates) \
+  case GraphOp::name:                                    \
+    graph_bounds::name##_op(o);                          \
+    break;
+#include "kernel/graph/graph_ops.inc"
+#undef X
     }
   }
 }

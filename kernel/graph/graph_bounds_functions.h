@@ -1,0 +1,388 @@
+// What the ranges of opcodes are made of that are more than a line: graph_bounds.h has them all.
+#pragma once
+
+#include "kernel/graph/graph_eval.h"
+#include "kernel/graph/graph_range_registers.h"
+#include "kernel/graph/noise_range.h"
+#include "kernel/graph/voronoi_range.h"
+
+namespace relief {
+
+/// One instruction's operands.
+struct GraphRangeOperands {
+  const GraphProgramView& program;
+  const TextureView* textures;
+  GraphRangeRegisters& registers;
+  const std::uint16_t* immediates;
+  const std::uint16_t* outputs;
+  const std::uint16_t* inputs;
+  const std::uint16_t*& next;  ///< instruction
+
+  GraphRange in(int i) const { return graph_range_operand(program, registers, inputs[i]); }
+  void set(int i, const GraphRange& value) const { registers.lanes[outputs[i]] = value; }
+};
+
+namespace graph_bounds {
+
+RELIEF_KERNEL F8 each(F8 a, float (*f)(float))
+{
+  for (int k = 0; k < 8; ++k) a[k] = f(a[k]);
+  return a;
+}
+RELIEF_KERNEL GraphRange unit() { return range_between(F8{}, splat8(1.0f)); }
+/// 1 where it is sure, 0 where it is sure not.
+RELIEF_KERNEL GraphRange truth(I8 surely, I8 never)
+{
+  return range_between(surely ? splat8(1.0f) : F8{}, never ? F8{} : splat8(1.0f));
+}
+/// Whether operands from `first` on are single numbers.
+RELIEF_KERNEL bool are_points(const GraphRangeOperands& o, int first, int count)
+{
+  for (int i = first; i < first + count; ++i) {
+    if (mask_of(range_is_point(o.in(i))) != 0xffu) return false;
+  }
+  return true;
+}
+
+RELIEF_KERNEL void power(const GraphRangeOperands& o)
+{
+  const GraphRange a = o.in(0), b = o.in(1);
+  F8 low, high, at, slope_low, slope_high;
+  for (int k = 0; k < 8; ++k) {
+    const float a0 = a.low[k], a1 = a.high[k], b0 = b.low[k], b1 = b.high[k];
+    low[k] = -kInfinity;
+    high[k] = kInfinity;
+    at[k] = 0.0f;
+    slope_low[k] = -kInfinity;
+    slope_high[k] = kInfinity;
+    if (!(a0 > -kInfinity && a1 < kInfinity && b0 > -kInfinity && b1 < kInfinity)) continue;
+    if (a0 > 0.0f) {
+      const float p[4] = {graph_power(a0, b0), graph_power(a0, b1), graph_power(a1, b0), graph_power(a1, b1)};
+      low[k] = min(min(p[0], p[1]), min(p[2], p[3]));
+      high[k] = max(max(p[0], p[1]), max(p[2], p[3]));
+      if (b0 != b1) continue;
+      const float s0 = b0 * graph_power(a0, b0 - 1.0f), s1 = b0 * graph_power(a1, b0 - 1.0f);
+      at[k] = graph_power(a.c[k], b0);
+      slope_low[k] = min(s0, s1);
+      slope_high[k] = max(s0, s1);
+      // Between, powers of 1 turn; these are of 0.
+      if (!(a.c[k] > 0.0f)) slope_high[k] = kInfinity;
+    } else if (b0 == b1 && b0 > 0.0f) {
+      const float most = graph_power(max(__builtin_fabsf(a0), __builtin_fabsf(a1)), b0);
+      const bool is_even = __builtin_fmodf(b0, 2.0f) == 0.0f;
+      low[k] = a0 == 0.0f || is_even ? 0.0f : -most;
+      high[k] = most;
+    } else if (b0 == 0.0f && b1 == 0.0f) {
+      low[k] = high[k] = 1.0f;
+    }
+  }
+  o.set(0, range_of_function(a, at, slope_low, slope_high, low, high));
+}
+
+RELIEF_KERNEL void logarithm(const GraphRangeOperands& o)
+{
+  const GraphRange a = o.in(0), base = o.in(1);
+  F8 low, high;
+  for (int k = 0; k < 8; ++k) {
+    const float b = base.low[k];
+    const bool is_known = base.low[k] == base.high[k] && a.low[k] > 0.0f && a.high[k] < kInfinity;
+    const float p = is_known ? graph_logarithm(a.low[k], b) : -kInfinity;
+    const float q = is_known ? graph_logarithm(a.high[k], b) : kInfinity;
+    low[k] = min(p, q);
+    high[k] = max(p, q);
+    if (a.high[k] <= 0.0f || base.high[k] <= 0.0f) low[k] = high[k] = 0.0f;
+  }
+  o.set(0, range_padded(low, high));
+}
+
+RELIEF_KERNEL void exponent(const GraphRangeOperands& o)
+{
+  const GraphRange a = o.in(0);
+  const auto f = [](float x) { return std::exp(x); };
+  const F8 low = each(a.low, f), high = each(a.high, f);
+  o.set(0, range_of_function(a, each(a.c, f), low, high, low, high));
+}
+
+RELIEF_KERNEL void modulo(const GraphRangeOperands& o)
+{
+  const GraphRange a = o.in(0), b = o.in(1);
+  const F8 size = max(abs(b.low), abs(b.high));
+  // Within one period: a shift.
+  F8 periods;
+  I8 is_one;
+  for (int k = 0; k < 8; ++k) {
+    const float n0 = std::trunc(a.low[k] / b.low[k]), n1 = std::trunc(a.high[k] / b.low[k]);
+    is_one[k] = b.low[k] == b.high[k] && n0 == n1 && __builtin_fabsf(n0) < 1e6f &&
+                        __builtin_fabsf(std::fmod(a.low[k], b.low[k])) > 1e-4f * size[k] &&
+                        __builtin_fabsf(std::fmod(a.high[k], b.low[k])) > 1e-4f * size[k]
+                    ? -1
+                    : 0;
+    periods[k] = is_one[k] != 0 ? n0 : 0.0f;
+  }
+  const GraphRange shifted = a - range_point(is_one ? b.low : F8{}) * range_point(periods);
+  const GraphRange whole = range_between(max(-size, min(a.low, F8{})), min(size, max(a.high, F8{})));
+  o.set(0, range_select(is_one, shifted, whole));
+}
+
+/// Sine of an angle, or of one a quarter of a turn further.
+RELIEF_KERNEL GraphRange sine_of(const GraphRange& a, double quarter)
+{
+  F8 low, high, at, slope_low, slope_high;
+  constexpr double kTurn = 6.283185307179586, kHalf = 0.5 * kTurn;
+  const auto extremes = [](double from, double to, float* least, float* most) {
+    double s0 = std::sin(from), s1 = std::sin(to);
+    *least = static_cast<float>(s0 < s1 ? s0 : s1);
+    *most = static_cast<float>(s0 > s1 ? s0 : s1);
+    // Crests at a quarter of a turn, valleys at three.
+    if (std::floor((to - 0.25 * kTurn) / kTurn) != std::floor((from - 0.25 * kTurn) / kTurn)) *most = 1.0f;
+    if (std::floor((to + 0.25 * kTurn) / kTurn) != std::floor((from + 0.25 * kTurn) / kTurn)) *least = -1.0f;
+  };
+  for (int k = 0; k < 8; ++k) {
+    const double from = static_cast<double>(a.low[k]) + quarter, to = static_cast<double>(a.high[k]) + quarter;
+    low[k] = -1.0f;
+    high[k] = 1.0f;
+    at[k] = 0.0f;
+    slope_low[k] = -1.0f;
+    slope_high[k] = 1.0f;
+    if (!(to - from < kHalf && __builtin_fabs(from) < 1e6)) continue;
+    float l, h;
+    extremes(from, to, &l, &h);
+    low[k] = l;
+    high[k] = h;
+    extremes(from + 0.25 * kTurn, to + 0.25 * kTurn, &l, &h);
+    slope_low[k] = l;
+    slope_high[k] = h;
+    at[k] = static_cast<float>(std::sin(static_cast<double>(a.c[k]) + quarter));
+  }
+  const GraphRange wide = range_between(splat8(-1.0f), splat8(1.0f));
+  const I8 known = (a.high - a.low < 3.0f) & (abs(a.low) < 1e6f);
+  return range_select(known, range_of_function(a, at, slope_low, slope_high, low, high), wide);
+}
+
+RELIEF_KERNEL void tangent(const GraphRangeOperands& o)
+{
+  const GraphRange a = o.in(0);
+  F8 low, high;
+  for (int k = 0; k < 8; ++k) {
+    constexpr double kHalf = 3.141592653589793;
+    const double n0 = std::floor(static_cast<double>(a.low[k]) / kHalf + 0.499999);
+    const bool known =
+        a.high[k] < 1e6f && a.low[k] > -1e6f && n0 == std::floor(static_cast<double>(a.high[k]) / kHalf + 0.500001);
+    low[k] = known ? std::tan(a.low[k]) : -kInfinity;
+    high[k] = known ? std::tan(a.high[k]) : kInfinity;
+  }
+  o.set(0, range_padded(low, high));
+}
+
+RELIEF_KERNEL void arctangent2(const GraphRangeOperands& o)
+{
+  const GraphRange y = o.in(0), x = o.in(1);
+  F8 low, high;
+  for (int k = 0; k < 8; ++k) {
+    low[k] = -3.1415930f;
+    high[k] = 3.1415930f;
+    const bool is_apart = x.low[k] > 0.0f || y.low[k] > 0.0f || y.high[k] < 0.0f;
+    if (!is_apart ||
+        !(x.low[k] > -kInfinity && x.high[k] < kInfinity && y.low[k] > -kInfinity && y.high[k] < kInfinity))
+      continue;
+    // Angles of a rectangle without the origin are extreme at its corners.
+    const float p[4] = {std::atan2(y.low[k], x.low[k]), std::atan2(y.low[k], x.high[k]),
+                        std::atan2(y.high[k], x.low[k]), std::atan2(y.high[k], x.high[k])};
+    low[k] = min(min(p[0], p[1]), min(p[2], p[3]));
+    high[k] = max(max(p[0], p[1]), max(p[2], p[3]));
+  }
+  o.set(0, range_padded(low, high));
+}
+
+/// A growing function.
+RELIEF_KERNEL void growing(const GraphRangeOperands& o, float (*f)(float))
+{
+  const GraphRange a = o.in(0);
+  o.set(0, range_padded(each(a.low, f), each(a.high, f)));
+}
+
+RELIEF_KERNEL void table(const GraphRangeOperands& o)
+{
+  const float* table = o.program.tables + (o.immediates[0] | std::uint32_t{o.immediates[1]} << 16);
+  const int last = o.immediates[2] - 1;
+  const bool interpolated = o.immediates[3] != 0, goes_on = o.immediates[4] != 0 && last > 0;
+  const GraphRange a = o.in(0);
+  F8 low, high, at, slope_low, slope_high;
+  for (int k = 0; k < 8; ++k) {
+    low[k] = -kInfinity;
+    high[k] = kInfinity;
+    at[k] = slope_low[k] = 0.0f;
+    slope_high[k] = kInfinity;
+    const bool beyond = !(a.low[k] >= 0.0f && a.high[k] <= 1.0f);
+    if ((goes_on && beyond) || !(a.low[k] <= a.high[k])) continue;
+    const auto place = [&](float x) { return clamp(x, 0.0f, 1.0f) * static_cast<float>(last); };
+    const int first = static_cast<int>(place(a.low[k]) - 1e-3f), end = static_cast<int>(place(a.high[k]) + 1e-3f) + 1;
+    const int from = first > 0 ? first : 0, to = end < last ? end : last;
+    low[k] = high[k] = table[from];
+    float s0 = kInfinity, s1 = -kInfinity;
+    for (int i = from + 1; i <= to; ++i) {
+      low[k] = min(low[k], table[i]);
+      high[k] = max(high[k], table[i]);
+      const float slope = (table[i] - table[i - 1]) * static_cast<float>(last);
+      s0 = min(s0, slope);
+      s1 = max(s1, slope);
+    }
+    if (!interpolated || beyond || from == to) continue;
+    const float c = place(a.c[k]);
+    const int i = static_cast<int>(c) < last - 1 ? static_cast<int>(c) : last - 1;
+    at[k] = table[i] + (table[i + 1] - table[i]) * (c - static_cast<float>(i));
+    slope_low[k] = s0;
+    slope_high[k] = s1;
+  }
+  o.set(0, range_of_function(a, at, slope_low, slope_high, low, high));
+}
+
+template <int kDims>
+RELIEF_KERNEL void noise(const GraphRangeOperands& o)
+{
+  GraphRange p[kDims];
+  for (int i = 0; i < kDims; ++i) p[i] = o.in(i);
+  if (!are_points(o, kDims, 3)) {
+    // Normalized sums keep within what one octave does.
+    const F8 most = splat8(0.5f * kNoiseLargest[kDims - 1]);
+    return o.set(0, o.immediates[0] != 0 ? range_between(0.5f - most, 0.5f + most) : range_unknown());
+  }
+  const NoiseOctaves octaves{clamp(o.in(kDims).low, 0.0f, 15.0f), max(o.in(kDims + 1).low, F8{}), o.in(kDims + 2).low};
+  o.set(0, noise_fractal_range<kDims>(p, octaves, o.immediates[0] != 0, o.immediates[1] != 0));
+}
+
+template <int kDims>
+RELIEF_KERNEL void signed_noise(const GraphRangeOperands& o)
+{
+  GraphRange p[kDims];
+  for (int i = 0; i < kDims; ++i) p[i] = o.in(i);
+  o.set(0, noise_signed_range<kDims>(p, o.immediates[0] != 0));
+}
+
+template <int kDims>
+RELIEF_KERNEL void musgrave(const GraphRangeOperands& o)
+{
+  if (!are_points(o, kDims, 5)) return o.set(0, range_unknown());
+  GraphRange p[kDims];
+  for (int i = 0; i < kDims; ++i) p[i] = o.in(i);
+  const MusgraveSettings settings{clamp(o.in(kDims).low, 0.0f, 16.0f),
+                                  o.in(kDims + 1).low,
+                                  o.in(kDims + 2).low,
+                                  o.in(kDims + 3).low,
+                                  o.in(kDims + 4).low,
+                                  o.immediates[1] != 0};
+  o.set(0, musgrave_range<kDims>(p, static_cast<MusgraveType>(o.immediates[0]), settings));
+}
+
+template <int kDims>
+RELIEF_KERNEL void hash(const GraphRangeOperands& o)
+{
+  if (!are_points(o, 0, kDims)) return o.set(0, unit());
+  F8 key[kDims];
+  for (int i = 0; i < kDims; ++i) key[i] = o.in(i).low;
+  o.set(0, range_padded(hash_unit(key), hash_unit(key)));
+}
+
+template <int kDims>
+RELIEF_KERNEL void voronoi(const GraphRangeOperands& o)
+{
+  GraphRange p[kDims], out[9];
+  for (int i = 0; i < kDims; ++i) p[i] = o.in(i);
+  for (GraphRange& each : out) each = range_unknown();
+  if (are_points(o, kDims, 6)) {
+    const NoiseOctaves octaves{clamp(o.in(kDims + 3).low, 0.0f, 15.0f), clamp(o.in(kDims + 4).low, 0.0f, 1.0f),
+                               o.in(kDims + 5).low};
+    const unsigned flags = o.immediates[2];
+    const auto eval = [&]<bool kPcg>() {
+      const VoronoiSettings<kDims, kPcg> settings{static_cast<VoronoiFeature>(o.immediates[0]),
+                                                  static_cast<VoronoiMetric>(o.immediates[1]),
+                                                  o.in(kDims).low,
+                                                  o.in(kDims + 1).low,
+                                                  o.in(kDims + 2).low,
+                                                  flags};
+      voronoi_range<kDims, kPcg>(p, settings, octaves, out);
+    };
+    if ((flags & kVoronoiPcg) != 0 && kDims > 1) {
+      eval.template operator()<true>();
+    } else {
+      eval.template operator()<false>();
+    }
+  }
+  for (int i = 0; i < 9; ++i) o.set(i, out[i]);
+}
+
+/// Three numbers that are known where those that they are made of are.
+RELIEF_KERNEL void color(const GraphRangeOperands& o, Vec3f (*f)(Vec3f), const GraphRange (&known)[3])
+{
+  GraphRange out[3] = {known[0], known[1], known[2]};
+  if (are_points(o, 0, 3)) {
+    const F8 c[3] = {o.in(0).low, o.in(1).low, o.in(2).low};
+    F8 of[3];
+    for (int k = 0; k < 8; ++k) {
+      const Vec3f v = f({c[0][k], c[1][k], c[2][k]});
+      of[0][k] = v.x;
+      of[1][k] = v.y;
+      of[2][k] = v.z;
+    }
+    for (int i = 0; i < 3; ++i) out[i] = range_padded(of[i], of[i]);
+  }
+  for (int i = 0; i < 3; ++i) o.set(i, out[i]);
+}
+
+RELIEF_KERNEL void to_hues(const GraphRangeOperands& o, Vec3f (*f)(Vec3f), bool is_lightness)
+{
+  const GraphRange r = o.in(0), g = o.in(1), b = o.in(2);
+  const GraphRange most = range_max(range_max(r, g), b), least = range_min(range_min(r, g), b);
+  const I8 is_color = (least.low >= 0.0f) & (most.high <= 1.0f);
+  const GraphRange saturation = range_select(is_color, unit(), range_unknown());
+  const GraphRange hue = range_between(F8{}, splat8(1.0001f));
+  const GraphRange light = is_lightness ? range_min((most + least) * 0.5f, range_point(splat8(1.0f))) : most;
+  const GraphRange known[3] = {hue, saturation, light};
+  color(o, f, known);
+}
+
+RELIEF_KERNEL void from_hues(const GraphRangeOperands& o, Vec3f (*f)(Vec3f), bool is_lightness)
+{
+  const GraphRange saturation = o.in(1), light = o.in(2), one = range_point(splat8(1.0f));
+  GraphRange all;
+  if (is_lightness) {
+    const GraphRange chroma = (one - range_abs(light * 2.0f - one)) * saturation;
+    all = light + range_between(splat8(-0.5f), splat8(0.5f)) * chroma;
+  } else {
+    // Between the value and what is left of it without saturation.
+    all = range_hull(light, light * (one - saturation));
+  }
+  const GraphRange known[3] = {all, all, all};
+  color(o, f, known);
+}
+
+/// What an image can give.
+/// @param flags  ImageFlags
+RELIEF_KERNEL GraphRange of_texels(const TextureView& texture, std::uint16_t flags)
+{
+  // Colours that are divided by opacity may be anything.
+  const bool is_unit = texture.format != TexelFormat::kHalf && (flags & kImageDivide) == 0;
+  return is_unit ? range_between(splat8(-1e-4f), splat8(1.0001f)) : range_unknown();
+}
+RELIEF_KERNEL void set_all(const GraphRangeOperands& o, int count, const GraphRange& value)
+{
+  for (int i = 0; i < count; ++i) o.set(i, value);
+}
+
+RELIEF_KERNEL void grid(const GraphRangeOperands& o)
+{
+  const float* table = o.program.tables + (o.immediates[0] | std::uint32_t{o.immediates[1]} << 16);
+  const int count = o.immediates[2] * o.immediates[3];
+  for (int c = 0; c < 3; ++c) {
+    float low = table[c], high = low;
+    for (int i = 1; i < count; ++i) {
+      low = min(low, table[3 * i + c]);
+      high = max(high, table[3 * i + c]);
+    }
+    o.set(c, range_padded(splat8(low), splat8(high)));
+  }
+}
+
+}  // namespace graph_bounds
+
+}  // namespace relief
