@@ -39,6 +39,7 @@ struct DisplacementInput {
 struct DisplacementOptions {
   std::optional<DisplacementMethod> method;  ///< of all materials
   std::optional<float> lod;                  ///< of all height maps, see DisplacementSettings::lod
+  std::optional<RmipOptions> rmip;           ///< of the methods that take them
   double tessellation_rate = 1;              ///< micro-triangle edges a texel
   std::uint64_t auto_bytes = 0;              ///< what `auto` may use while it builds tessellations; 0: it builds none
   double num_rays = 0;                   ///< that will be traced, about, for `auto` to weigh building against tracing
@@ -140,7 +141,10 @@ class DisplacementSet {
   };
   Field& field(int map_index, int level);
   /// A level with the table that a method needs, made once a field.
-  DisplacementLevel level(int map_index, int level, const DisplacementMethodEntry& method);
+  DisplacementLevel level(int map_index,
+                          int level,
+                          const DisplacementMethodEntry& method,
+                          const RmipOptions& rmip_options);
 
   std::vector<HeightMapView> height_maps_;
   std::vector<int> geometry_of_instance_;
