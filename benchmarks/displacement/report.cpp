@@ -163,8 +163,8 @@ Table paper_table(const BenchResults& results)
 Table memory_table(const BenchResults& results)
 {
   Table table{"Memory over TFDM's, beside the paper's",
-              "Tables of maps, and of tessellations all there is. In brackets: the paper's. Ours have the pyramid that "
-              "prisms are made by, of which all methods but tessellations have one. A tessellation marked * is coarser "
+              "Tables of maps, and of tessellations all there is. In brackets: the paper's. What chord searches is the "
+              "pyramid that prisms are made by, which is not counted of the others. A tessellation marked * is coarser "
               "than the map.",
               {"scene", "tfdm MiB", "tessellate", "rmip-low", "rmip", "rmip-high", "chord"},
               {}};
