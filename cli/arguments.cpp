@@ -6,6 +6,7 @@
 #include <iterator>
 #include <limits>
 #include <set>
+#include <span>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -176,6 +177,44 @@ float parse_lod(const std::string& text)
     refuse("--lod", "auto or a level from 0 to 30", text);
   }
   return level;
+}
+
+RmipOptions parse_rmip(const std::string& text)
+{
+  constexpr double kLeastScale = 1.0 / 1024, kMostScale = 1e6;
+  constexpr int kMostBlocks = 2048;  // of each axis: 2.3 GiB
+  constexpr std::string_view kSwitchLabels[] = {"off", "on"};
+  RmipOptions options;
+  std::vector<std::string_view> given;
+  const auto choice = [&](std::string_view key, std::string_view value, std::span<const std::string_view> labels) {
+    const auto found = std::find(labels.begin(), labels.end(), value);
+    if (found != labels.end()) return found - labels.begin();
+    refuse("--rmip", fmt::format("{0}={1} or {0}={2}", key, labels[0], labels[1]), text);
+  };
+  for (const std::string_view word : split(text, ',')) {
+    const std::size_t sign = std::min(word.find('='), word.size());
+    const std::string_view key = word.substr(0, sign), value = word.substr(std::min(sign + 1, word.size()));
+    if (std::find(given.begin(), given.end(), key) != given.end())
+      refuse("--rmip", fmt::format("'{}' once", key), text);
+    given.push_back(key);
+    if (key == "scale") {
+      if (!to_number(value, &options.marching_scale) ||
+          !(options.marching_scale >= kLeastScale && options.marching_scale <= kMostScale))
+        refuse("--rmip", fmt::format("scale={}…{:.0f} texels", kLeastScale, kMostScale), text);
+    } else if (key == "resolution") {
+      if (!to_number(value, &options.resolution) || options.resolution < 1 || options.resolution > kMostBlocks)
+        refuse("--rmip", fmt::format("resolution=1…{}", kMostBlocks), text);
+    } else if (key == "inversion") {
+      options.reduce_by_inversion = choice(key, value, kSwitchLabels) == 1;
+    } else if (key == "split") {
+      options.split = static_cast<RmipSplit>(choice(key, value, kRmipSplitLabels));
+    } else if (key == "leaf") {
+      options.leaf = static_cast<RmipLeaf>(choice(key, value, kRmipLeafLabels));
+    } else {
+      refuse("--rmip", "KEY=VALUE,… with the keys scale, resolution, inversion, split, leaf", text);
+    }
+  }
+  return options;
 }
 
 std::string parse_output(const char* option, const std::string& text, const char* suffix)

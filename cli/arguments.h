@@ -12,6 +12,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "displacement/method_table.h"
 #include "kernel/math/vec.h"
 #include "kernel/statistics.h"
 #include "scene/environment_preset.h"
@@ -61,6 +62,10 @@ EnvironmentChoice parse_environment(const std::string& text);
 
 /// A level of detail of height maps, or "auto": −1.
 float parse_lod(const std::string& text);
+
+/// "KEY=VALUE,…" with the keys scale, resolution, inversion, split and leaf, each at most once; what is left out stays as
+/// RMIP has it by default.
+RmipOptions parse_rmip(const std::string& text);
 
 /// Refuses an output whose name does not end in `suffix` (upper or lower case), so that no format hides under the
 /// name of another. Devices and pipes may have any name.

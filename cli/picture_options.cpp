@@ -57,7 +57,8 @@ CameraChoice camera_choice(const PictureOptions& options)
 
 std::vector<CLI::Option*> add_ray_options(CLI::App& command, PictureOptions& options)
 {
-  return {add_displacement_method(command, options.displacement), add_displacement_lod(command, options.displacement)};
+  return {add_displacement_method(command, options.displacement), add_displacement_lod(command, options.displacement),
+          add_displacement_rmip(command, options.displacement)};
 }
 
 std::vector<CLI::Option*> add_picture_options(CLI::App& command, PictureOptions& options)

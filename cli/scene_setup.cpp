@@ -90,6 +90,14 @@ CLI::Option* add_displacement_lod(CLI::App& command, DisplacementOptions& option
       "--lod", set, "Level of the height maps, 0 the finest; auto: what the pixels can show (default: the scene's)");
 }
 
+CLI::Option* add_displacement_rmip(CLI::App& command, DisplacementOptions& options)
+{
+  return add_parsed(
+      command, "--rmip", options.rmip, parse_rmip,
+      "KEY=VALUE,… of RMIP: scale (texels), resolution (of its table), inversion (on, off), split (bound, "
+      "ray), leaf (bilinear, triangles)");
+}
+
 CLI::Option* add_caustics_mode(CLI::App& command, std::optional<CausticsMode>& mode)
 {
   return add_choice(command, "--caustics", mode, setting_info("caustics.mode"));

@@ -36,6 +36,7 @@ std::vector<CLI::Option*> add_light_options(CLI::App& command, SceneSetup& setup
 CLI::Option* add_displacement_method(CLI::App& command, DisplacementOptions& options);
 CLI::Option* add_displacement_memory(CLI::App& command, DisplacementOptions& options);
 CLI::Option* add_displacement_lod(CLI::App& command, DisplacementOptions& options);
+CLI::Option* add_displacement_rmip(CLI::App& command, DisplacementOptions& options);
 /// Without it `mode` stays as it is.
 CLI::Option* add_caustics_mode(CLI::App& command, std::optional<CausticsMode>& mode);
 /// Adds --max-memory, which sets the process's limit.

@@ -117,9 +117,19 @@ void set_base_place(const ProceduralField& field, DisplacedPoint* point)
 
 std::vector<std::string> displacement_warnings(const DisplacementSettings& settings, const DisplacementOptions& options)
 {
+  std::vector<std::string> texts;
   const float lod = lod_of(settings, options);
-  if (!tessellation_kind(method_of(settings, options)) || !(lod > 0) || is_whole(lod)) return {};
-  return {"tessellations have whole levels of detail; level " + std::to_string(static_cast<int>(lod)) + " is used"};
+  const DisplacementMethod asked = method_of(settings, options);
+  if (tessellation_kind(asked) && lod > 0 && !is_whole(lod)) {
+    texts.push_back("tessellations have whole levels of detail; level " + std::to_string(static_cast<int>(lod)) +
+                    " is used");
+  }
+  const bool takes_options = asked != DisplacementMethod::kAuto && displacement_method(asked).takes_rmip_options;
+  if (options.rmip && !takes_options) {
+    texts.push_back("options of RMIP have no effect on displacement method '" +
+                    std::string(displacement_method_label(asked)) + "'");
+  }
+  return texts;
 }
 
 DisplacementSet::Levels DisplacementSet::levels_of(const Use& use, const DisplacementOptions& options) const
@@ -214,6 +224,7 @@ std::unique_ptr<DisplacementSet::Displaced> DisplacementSet::make_displaced(cons
   DisplacedGeometry& geometry = displaced->geometry;
   geometry.method = displaced->method;
   geometry.smooth = settings.smoothing;
+  geometry.rmip_options = options.rmip.value_or(RmipOptions{});
   Levels levels = levels_of(use, options);
   std::vector<const HeightFieldView*> coarser;
   if (levels.by_cone) {
@@ -221,7 +232,8 @@ std::unique_ptr<DisplacementSet::Displaced> DisplacementSet::make_displaced(cons
     levels.by_cone = levels.count > 1;
   }
   for (int k = 0; k < levels.count; ++k) {
-    geometry.levels[k] = level(settings.height.texture_index, levels.first + k, displacement_method(displaced->method));
+    geometry.levels[k] = level(settings.height.texture_index, levels.first + k, displacement_method(displaced->method),
+                               geometry.rmip_options);
     if (k > 0) coarser.push_back(geometry.levels[k].field);
   }
   displaced->mesh = DisplacedMesh(use.mesh, *geometry.levels[0].field,
@@ -345,12 +357,15 @@ DisplacementSet::Field& DisplacementSet::field(int map_index, int level)
   return field;
 }
 
-DisplacementLevel DisplacementSet::level(int map_index, int level, const DisplacementMethodEntry& method)
+DisplacementLevel DisplacementSet::level(int map_index,
+                                         int level,
+                                         const DisplacementMethodEntry& method,
+                                         const RmipOptions& rmip_options)
 {
   Field& f = field(map_index, level);
   if (method.table_make == nullptr) return {&f.bounds.view(), nullptr};
   const auto [at, is_new] = f.tables.try_emplace(method.table_make);
-  if (is_new) at->second = method.table_make(f.bounds.view(), {});
+  if (is_new) at->second = method.table_make(f.bounds.view(), rmip_options);
   return {&f.bounds.view(), at->second.view};
 }
 

@@ -53,6 +53,7 @@ struct DisplacementInput {
 struct DisplacementOptions {
   std::optional<DisplacementMethod> method;  ///< of all materials
   std::optional<float> lod;                  ///< of all height maps, see DisplacementSettings::lod
+  std::optional<RmipOptions> rmip;           ///< of the methods that take them
   double tessellation_rate = 1;              ///< micro-triangle edges a texel
   std::uint64_t auto_bytes = 0;              ///< what `auto` may use while it builds tessellations; 0: it builds none
   std::optional<Camera> camera;              ///< by which computed heights choose their cells; empty: the scene's first
@@ -162,7 +163,10 @@ class DisplacementSet {
   };
   Field& field(int map_index, int level);
   /// A level with the table that a method needs, made once a field.
-  DisplacementLevel level(int map_index, int level, const DisplacementMethodEntry& method);
+  DisplacementLevel level(int map_index,
+                          int level,
+                          const DisplacementMethodEntry& method,
+                          const RmipOptions& rmip_options);
 
   std::vector<HeightMapView> height_maps_;
   std::vector<MeshView> meshes_;

@@ -30,6 +30,7 @@ struct DisplacementMethodEntry {
   bool (*traverse)(const PrismQuery& query, const void* table, DisplacedHit* hit) = nullptr;
   /// Null: the height field is all it needs. Methods with the same function share their tables.
   MethodTable (*table_make)(const HeightFieldView& field, const RmipOptions& options) = nullptr;
+  bool takes_rmip_options = false;
   std::optional<TessellationKind> tessellation = {};
   std::optional<MethodCost> cost = {};  ///< of the methods among which `auto` chooses
 };

@@ -2,16 +2,34 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <string_view>
 #include <utility>
 
 namespace relief {
 
-/// What RMIP's authors studied in their Figs. 10 and 12.
+/// Where RMIP splits a 2D bound.
+enum class RmipSplit : std::uint8_t {
+  kBound,  ///< in the middle of its longer side: Fig. 5c of the paper
+  kRay,    ///< at the middle of the ray's interval: Fig. 5b, Patterson and others 1991
+};
+inline constexpr std::string_view kRmipSplitLabels[] = {"bound", "ray"};
+
+/// What RMIP meets in one cell.
+enum class RmipLeaf : std::uint8_t {
+  kBilinear,   ///< the surface, by the leaf test of all methods
+  kTriangles,  ///< two triangles between the displaced corners, as published: another surface, with cracks
+};
+inline constexpr std::string_view kRmipLeafLabels[] = {"bilinear", "triangles"};
+
+/// What RMIP's authors studied in their Figs. 5, 10 and 12.
 struct RmipOptions {
   double marching_scale = 16;       ///< texels; rectangles whose sides are no longer are marched through
   bool reduce_by_inversion = true;  ///< bounds are tightened by inverting the displacement at the ends of a 3D box
   int resolution = 0;               ///< blocks of the table along each axis; 0: rmip_linear_resolution
+  RmipSplit split = RmipSplit::kBound;
+  RmipLeaf leaf = RmipLeaf::kBilinear;
 };
 
 struct MethodTable {

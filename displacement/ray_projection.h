@@ -130,6 +130,25 @@ RELIEF_KERNEL VaryingSides varying_sides(const ProjectedStretch& s, const Varyin
   return {inside(s.x0, x), inside(s.x1, x), inside(s.y0, y), inside(s.y1, y)};
 }
 
+/// Splits a stretch at a point of it.
+/// @return  false if it is not inside
+RELIEF_KERNEL bool stretch_split_at(const RayProjection& r,
+                                    const ProjectedStretch& stretch,
+                                    double tau,
+                                    ProjectedStretch* front,
+                                    ProjectedStretch* back)
+{
+  // NaN is not inside.
+  if (!(tau > stretch.tau0 && tau < stretch.tau1)) return false;
+  *front = stretch;
+  *back = stretch;
+  stretch_end(r, tau, front);
+  back->tau0 = tau;
+  back->x0 = front->x1;
+  back->y0 = front->y1;
+  return true;
+}
+
 /// Splits a stretch where it crosses the line through the middle of the longer side of its rectangle.
 /// @return  false if it is too short to be split
 /// @source  Thonat et al. 2023, §4.3, Fig. 5c; where the map is clamped only what is over the map counts: beside it one
@@ -145,14 +164,7 @@ RELIEF_KERNEL bool stretch_split(const RayProjection& r,
   const BernsteinQuadratic W = bernstein_make(r.W, stretch.tau0, stretch.tau1);
   const double middle = 0.5 * (along_x ? sides.x0 + sides.x1 : sides.y0 + sides.y1);
   const double tau = stretch.tau0 + bernstein_crossing(P, W, middle) * (stretch.tau1 - stretch.tau0);
-  if (!(tau > stretch.tau0 && tau < stretch.tau1)) return false;
-  *front = stretch;
-  *back = stretch;
-  stretch_end(r, tau, front);
-  back->tau0 = tau;
-  back->x0 = front->x1;
-  back->y0 = front->y1;
-  return true;
+  return stretch_split_at(r, stretch, tau, front, back);
 }
 
 }  // namespace relief

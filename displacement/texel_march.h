@@ -4,6 +4,7 @@
 
 #include "displacement/bounds3d.h"
 #include "displacement/leaf.h"
+#include "displacement/micro_triangles.h"
 #include "displacement/prism_query.h"
 #include "displacement/ray_projection.h"
 
@@ -78,14 +79,16 @@ RELIEF_KERNEL std::int64_t cell_at(const LatticeAxis& axis, double x)
 /// The paper finds the next cell by the signs of ψ at a cell's corners; here the crossings of its lines are solved for.
 /// Where a crossing is off by rounding, so is the cell, by as much of a texel: heights are continuous there, and each
 /// cell is given a little more of the curve than its own.
-/// @param nu  range of |N| on the stretch and a hundredth of a texel around it
+/// @param nu    range of |N| on the stretch and a hundredth of a texel around it
+/// @param leaf  what is met in a cell
 /// @return    true when the search is over
 /// @source    Thonat et al. 2023, §4.4
 RELIEF_KERNEL bool texel_march(MetricSearch& c,
                                const CurveSegment& g,
                                const RayProjection& r,
                                const ProjectedStretch& stretch,
-                               ScalarRange nu)
+                               ScalarRange nu,
+                               RmipLeaf leaf)
 {
   const HeightFieldView& f = *c.mesh.field;
   std::int64_t i = cell_at(f.x, r.origin_x + stretch.x0), j = cell_at(f.y, r.origin_y + stretch.y0);
@@ -117,10 +120,11 @@ RELIEF_KERNEL bool texel_march(MetricSearch& c,
     const ScalarRange cell = cell_displacement_range(c, i, j);
     ++c.counters.bounds;
     if (traversal_poll(c.counters, c.next_poll)) return true;
-    if (height.low <= cell.high && height.high >= cell.low &&
-        cell_intersect(c, g, i, j, stretch.tau0 + from * length, stretch.tau0 + to * length) &&
-        (c.unfolded || c.any_hit)) {
-      return true;
+    if (height.low <= cell.high && height.high >= cell.low) {
+      const double tau_from = stretch.tau0 + from * length, tau_to = stretch.tau0 + to * length;
+      const bool is_hit = leaf == RmipLeaf::kTriangles ? micro_triangles_intersect(c, g, i, j, tau_from, tau_to)
+                                                       : cell_intersect(c, g, i, j, tau_from, tau_to);
+      if (is_hit && (c.unfolded || c.any_hit)) return true;
     }
     if (i == i_end && j == j_end) return false;
     u = max(u, u_next);

@@ -51,7 +51,7 @@ RELIEF_KERNEL double t_at(const Segment& segment, double tau)
 inline constexpr int kMaxPieces = 5;
 /// Stretches are split while a side is longer than the marching scale, and each split halves the longer side, so one of
 /// 2^45 texels (kMostTexels to either side) is split at most 2·(45 − log2 scale) times on the way down; each split leaves
-/// one on the stack.
+/// one on the stack. Splits of the ray have no such bound: what does not fit is marched through.
 inline constexpr double kLeastMarchingScale = 0x1p-20;
 inline constexpr int kStackSize = kMaxPieces + 2 * (45 + 20);
 
@@ -152,6 +152,28 @@ RELIEF_KERNEL bool bound_intersect(const MetricSearch& c,
   return true;
 }
 
+/// Splits a bound as the options ask for.
+/// @return  false if it is too short to be split
+/// @source  Thonat et al. 2023, §4.3, Fig. 5b and c. In a folded prism, and where the inversion does not converge, 5b's
+///          split is that of 5c
+RELIEF_KERNEL bool bound_split(MetricSearch& c,
+                               const Segment& segment,
+                               const RayBound& bound,
+                               const VaryingSides& sides,
+                               RmipSplit split,
+                               ProjectedStretch* front,
+                               ProjectedStretch* back)
+{
+  const ProjectedStretch& stretch = bound.stretch;
+  if (split == RmipSplit::kRay && c.unfolded) {
+    constexpr double kTolerance = 1.0 / 64;
+    const double tau = ray_invert(segment.T, segment.g.W, stretch.tau0, stretch.tau1, bound.t0, bound.t1,
+                                  0.5 * (bound.t0 + bound.t1), kTolerance, &c.counters.inversions);
+    if (stretch_split_at(segment.projection, stretch, tau, front, back)) return true;
+  }
+  return stretch_split(segment.projection, stretch, sides, front, back);
+}
+
 /// The while loop of Alg. 1 for one segment.
 /// @return  true when the search is over
 template <class Bounds>
@@ -183,8 +205,8 @@ RELIEF_KERNEL bool segment_intersect(MetricSearch& c,
     const double longest = max(__builtin_fabs(sides.x1 - sides.x0), __builtin_fabs(sides.y1 - sides.y0));
     ProjectedStretch front, back;
     const bool march = longest <= options.marching_scale || depth + 2 > kStackSize;
-    if (march || !stretch_split(r, stretch, sides, &front, &back)) {
-      if (texel_march(c, segment.g, r, stretch, nu)) return true;
+    if (march || !bound_split(c, segment, bound, sides, options.split, &front, &back)) {
+      if (texel_march(c, segment.g, r, stretch, nu, options.leaf)) return true;
       continue;
     }
     const double t = t_at(segment, back.tau0);

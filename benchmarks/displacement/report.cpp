@@ -153,6 +153,35 @@ Table paper_table(const BenchResults& results)
   return table;
 }
 
+/// The other half of Table 1: memory of what is searched, ours beside theirs.
+Table memory_table(const BenchResults& results)
+{
+  Table table{"Memory over TFDM's, beside the paper's",
+              "Tables of maps, and of tessellations all there is. In brackets: the paper's. What chord searches is the "
+              "pyramid that prisms are made by, which is not counted of the others. A tessellation marked * is coarser "
+              "than the map.",
+              {"scene", "tfdm MiB", "tessellate", "rmip-low", "rmip", "rmip-high", "chord"},
+              {}};
+  for (const SceneResult& scene : results.scenes) {
+    const MethodResult* tfdm = find_method(scene, kPublishedMethod);
+    if (tfdm == nullptr) continue;
+    const auto beside = [&](std::string_view name, double paper) -> std::string {
+      const MethodResult* method = find_method(scene, name);
+      if (method == nullptr) return kNone;
+      const std::size_t bytes = method->is_tessellation() ? method->bytes() : method->table_bytes;
+      return times(static_cast<double>(bytes) / static_cast<double>(tfdm->table_bytes)) +
+             (method->is_tessellation() && method->rate < 1 ? "*" : "") +
+             (paper > 0 ? fmt::format(" ({:g})", paper) : "");
+    };
+    const PaperFigures& paper = scene.paper;
+    table.rows.push_back({scene.name, mebibytes(tfdm->table_bytes),
+                          beside(kTessellationMethod, paper.tessellation_memory),
+                          beside("rmip-low", paper.rmip_low_memory), beside("rmip", paper.rmip_memory),
+                          beside("rmip-high", paper.rmip_high_memory), beside(kExactMethod, 0)});
+  }
+  return table;
+}
+
 Table sweep_table(const Sweep& sweep)
 {
   Table table{sweep.title, fmt::format("{} by {}", sweep.y_label, sweep.x_label), {sweep.x_label}, {}};
@@ -167,11 +196,16 @@ Table sweep_table(const Sweep& sweep)
 
 Table variant_table(std::string title, const std::vector<VariantResult>& variants)
 {
-  Table table{
-      std::move(title), "", {"scene", "variant", "MiB", "prepared in s", "primary Mrays/s", "bounce Mrays/s"}, {}};
+  Table table{std::move(title),
+              "",
+              {"scene", "variant", "MiB", "prepared in s", "primary Mrays/s", "bounce Mrays/s", "bounds a primary ray",
+               "texels", "inversions", "disagree"},
+              {}};
   for (const VariantResult& v : variants) {
     table.rows.push_back({v.scene, v.variant, mebibytes(v.bytes), fmt::format("{:.3g}", v.build_seconds),
-                          fmt::format("{:.3g}", v.primary_speed), fmt::format("{:.3g}", v.bounce_speed)});
+                          fmt::format("{:.3g}", v.primary_speed), fmt::format("{:.3g}", v.bounce_speed),
+                          fmt::format("{:.3g}", v.primary.bounds), fmt::format("{:.3g}", v.primary.texels),
+                          fmt::format("{:.3g}", v.primary.inversions), per_cent(v.primary.disagreement)});
   }
   return table;
 }
@@ -222,7 +256,7 @@ Table cost_table(const std::vector<CostSample>& samples)
 
 constexpr const char* kMarchingTitle = "Marching scale and resolution of RMIP (the paper's Fig. 10)";
 constexpr const char* kSweepsTitle = "More displacement, more tiles (the paper's Fig. 11)";
-constexpr const char* kInversionTitle = "RMIP with and without inversion (the paper's Fig. 12)";
+constexpr const char* kInversionTitle = "RMIP with and without inversion (the paper's Fig. 12), and its variants";
 constexpr const char* kTessellationTitle = "Ways to build a tessellation's tree (half the map's size)";
 
 std::string conditions(const BenchResults& results)
@@ -392,7 +426,11 @@ nlohmann::ordered_json json_of(const std::vector<VariantResult>& variants)
                     {"bytes", v.bytes},
                     {"build_seconds", v.build_seconds},
                     {"primary_rays_per_second", 1e6 * v.primary_speed},
-                    {"bounce_rays_per_second", 1e6 * v.bounce_speed}});
+                    {"bounce_rays_per_second", 1e6 * v.bounce_speed},
+                    {"bounds", v.primary.bounds},
+                    {"texels", v.primary.texels},
+                    {"inversions", v.primary.inversions},
+                    {"disagreement", v.primary.disagreement}});
   }
   return json;
 }
@@ -415,7 +453,7 @@ nlohmann::ordered_json json_of(const std::vector<CostSample>& samples)
 std::string bench_markdown(const BenchResults& results)
 {
   std::string text = "# relief bench displacement\n\n" + conditions(results) + "\n\n";
-  if (!results.scenes.empty()) text += markdown(paper_table(results));
+  if (!results.scenes.empty()) text += markdown(paper_table(results)) + markdown(memory_table(results));
   for (const SceneResult& scene : results.scenes) text += markdown(speed_table(scene)) + markdown(count_table(scene));
   for (const auto& [title, sweeps] :
        {std::pair(kMarchingTitle, &results.marching), std::pair(kSweepsTitle, &results.sweeps)}) {
@@ -454,6 +492,7 @@ std::string bench_html(const BenchResults& results)
   std::vector<std::string> pieces = {html_paragraph(conditions(results))};
   if (!results.scenes.empty()) {
     pieces.push_back(html(paper_table(results)));
+    pieces.push_back(html(memory_table(results)));
     std::vector<std::string> plots;
     for (const BenchRayKind kind : kKinds) plots.push_back(speed_plot(results, kind));
     plots.push_back(memory_plot(results));

@@ -19,6 +19,8 @@ struct PaperFigures {
   double tfdm_milliseconds = 0;  ///< 0: not in the table
   double tessellation = 0;       ///< speed over TFDM
   double rmip_low = 0, rmip = 0, rmip_high = 0;
+  double tessellation_memory = 0;  ///< over TFDM's, as the others
+  double rmip_low_memory = 0, rmip_memory = 0, rmip_high_memory = 0;
 };
 
 enum class BenchShape : std::uint8_t { kSphere, kTorus, kPlane, kPlate, kBlob, kGoblet };

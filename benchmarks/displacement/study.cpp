@@ -215,6 +215,9 @@ void Study::add_marching(const BenchSceneSpec& spec) const
   sweep.y_label = "ns a ray";
   sweep.log_y = true;
   for (const auto& contender : contenders) sweep.lines.push_back({contender->spec().name, {}, {}});
+  Sweep counts = sweep;
+  counts.title = fmt::format("{}: work of primary rays", spec.name);
+  counts.y_label = "bounds and texels a ray";
   for (int marching_scale = 1; marching_scale <= 256; marching_scale *= 2) {
     for (const auto& contender : contenders) {
       RmipOptions rmip_options;
@@ -226,9 +229,12 @@ void Study::add_marching(const BenchSceneSpec& spec) const
     for (std::size_t m = 0; m < measured.size(); ++m) {
       sweep.lines[m].x.push_back(marching_scale);
       sweep.lines[m].y.push_back(measured[m].nanoseconds);
+      counts.lines[m].x.push_back(marching_scale);
+      counts.lines[m].y.push_back(measured[m].bounds + measured[m].texels);
     }
   }
   results.marching.push_back(std::move(sweep));
+  results.marching.push_back(std::move(counts));
 }
 
 void Study::add_sweeps(const BenchSceneSpec& spec) const
@@ -266,10 +272,21 @@ void Study::add_inversion(const BenchSceneSpec& spec) const
   say(fmt::format("{}: inversion", spec.name));
   const BenchScene scene = make_scene(spec);
   const BenchSurface surface(scene);
-  ContenderSpec with = traversal_spec("with", DisplacementMethod::rmip), without = with;
-  without.name = "without";
-  without.rmip_options.reduce_by_inversion = false;
-  const Contenders contenders = make_all(surface, {with, without});
+  const RmipSizes sizes = rmip_sizes(scene);
+  std::vector<ContenderSpec> specs;
+  for (const int resolution : {sizes.low, sizes.equal, sizes.high}) {
+    specs.push_back(traversal_spec(fmt::format("{}², with", resolution), DisplacementMethod::rmip, resolution));
+    specs.push_back(specs.back());
+    specs.back().name = fmt::format("{}², without", resolution);
+    specs.back().rmip_options.reduce_by_inversion = false;
+  }
+  ContenderSpec variant = traversal_spec("split of the ray", DisplacementMethod::rmip, sizes.equal);
+  variant.rmip_options.split = RmipSplit::kRay;
+  specs.push_back(variant);
+  variant = traversal_spec("two triangles a cell", DisplacementMethod::rmip, sizes.equal);
+  variant.rmip_options.leaf = RmipLeaf::kTriangles;
+  specs.push_back(variant);
+  const Contenders contenders = make_all(surface, specs);
   const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution);
   const auto measured = [&](BenchRayKind kind) {
     return bench_measure(contenders, kind, rays.of(kind), options.rounds, scene.texel_metres);
@@ -277,7 +294,8 @@ void Study::add_inversion(const BenchSceneSpec& spec) const
   const std::vector<Measurement> primary = measured(BenchRayKind::kPrimary), bounce = measured(BenchRayKind::kBounce);
   for (std::size_t m = 0; m < contenders.size(); ++m) {
     results.inversion.push_back({std::string(spec.name), contenders[m]->spec().name, 1e3 / primary[m].nanoseconds,
-                                 1e3 / bounce[m].nanoseconds, contenders[m]->build_seconds(), contenders[m]->bytes()});
+                                 1e3 / bounce[m].nanoseconds, contenders[m]->build_seconds(), contenders[m]->bytes(),
+                                 primary[m]});
   }
 }
 
@@ -304,8 +322,8 @@ void Study::add_tessellation(const BenchSceneSpec& spec) const
   const std::vector<Measurement> primary = measured(BenchRayKind::kPrimary), bounce = measured(BenchRayKind::kBounce);
   for (std::size_t m = 0; m < contenders.size(); ++m) {
     results.tessellation.push_back({std::string(spec.name), contenders[m]->spec().name, 1e3 / primary[m].nanoseconds,
-                                    1e3 / bounce[m].nanoseconds, contenders[m]->build_seconds(),
-                                    contenders[m]->bytes()});
+                                    1e3 / bounce[m].nanoseconds, contenders[m]->build_seconds(), contenders[m]->bytes(),
+                                    primary[m]});
   }
 }
 
@@ -404,12 +422,13 @@ BenchResults bench_displacement_run(const BenchOptions& options)
   results.rounds = options.rounds;
   const Study study{options, results};
   for (const BenchSceneSpec* spec : chosen_scenes(options.scenes)) {
-    // The paper's plots have these scenes; plots of all ten would say the same at ten times the cost.
-    const bool for_marching = spec->name == "armor" || spec->name == "ninja-head";
+    // The paper's plots have these scenes; of others, at the same cost each, there are plots where scenes are named.
+    const bool is_named = !options.scenes.empty();
     const bool for_sweeps = spec->name == "sphere" || spec->name == "roof";
     if (options.parts.table) study.add_table(*spec);
-    if (options.parts.marching && for_marching) study.add_marching(*spec);
-    if (options.parts.sweeps && for_sweeps) study.add_sweeps(*spec);
+    if (options.parts.marching && (is_named || spec->name == "armor" || spec->name == "ninja-head"))
+      study.add_marching(*spec);
+    if (options.parts.sweeps && (is_named || for_sweeps)) study.add_sweeps(*spec);
     if (options.parts.inversion) study.add_inversion(*spec);
     if (options.parts.tessellation && spec->name == "roof") study.add_tessellation(*spec);
     if (options.parts.costs && (for_sweeps || spec->name == "glass")) study.add_costs(*spec);

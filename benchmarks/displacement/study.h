@@ -20,7 +20,7 @@ struct BenchParts {
   bool table = true;      ///< all methods on all scenes: memory, preparation, speed, counts, agreement; step pictures
   bool marching = true;   ///< Fig. 10: marching scale × RMIP resolution
   bool sweeps = true;     ///< Fig. 11: more displacement, more tiles
-  bool inversion = true;  ///< Fig. 12: bounds reduced by inversion or not
+  bool inversion = true;  ///< Fig. 12: bounds reduced by inversion or not; Fig. 5b's split, and the published leaf
   bool tessellation = true;  ///< ways to build a tessellation's tree
   bool costs = true;         ///< the constants by which `auto` chooses
   bool frames = true;        ///< whole path-traced frames
@@ -91,6 +91,7 @@ struct VariantResult {
   double primary_speed = 0, bounce_speed = 0;  ///< millions of rays a second
   double build_seconds = 0;
   std::size_t bytes = 0;
+  Measurement primary;  ///< with its counts
 };
 
 /// What one scene at one map size costs by one of the methods that `auto` chooses among; a mean over the kinds of rays.

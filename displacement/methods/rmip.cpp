@@ -19,6 +19,7 @@ const DisplacementMethodEntry RELIEF_ISA::rmip_method{
     .description = "Ranges of oblong windows of the map (Thonat and others 2023)",
     .traverse = traverse,
     .table_make = rmip_table_make,
+    .takes_rmip_options = true,
 };
 
 }  // namespace relief

@@ -71,6 +71,50 @@ class DisplacementProgram : public ProgramTest {
   }
 };
 
+TEST_F(DisplacementProgram, OptionsOfRmipChangeWhatItDoesAndNotWhatItFinds)
+{
+  const std::string scene = bumpy();
+  std::ostringstream rays;
+  for (int k = 0; k < 60; ++k)
+    rays << (k % 10) * .1 + .03 << ' ' << (k / 10) * .15 + .04 << " 1 " << (k % 7) * .1 - .3 << " .1 -1\n";
+  folder_.write("rays.txt", rays.str());
+  const auto expected = trace(scene, {"--displacement", "rmip"});
+  const auto steps_of = [](const std::vector<std::vector<std::string>>& rows) {
+    std::vector<std::string> steps;
+    for (const auto& row : rows) steps.push_back(row.back());
+    return steps;
+  };
+  const char* kAll = "scale=0.5,resolution=2,inversion=off,split=ray";
+  for (const char* options : {"scale=0.5", "inversion=off", "scale=0.5,split=ray", "resolution=1", kAll}) {
+    const auto rows = trace(scene, {"--displacement", "rmip", "--rmip", options});
+    ASSERT_EQ(rows.size(), expected.size());
+    for (std::size_t k = 0; k < rows.size(); ++k) {
+      ASSERT_EQ(rows[k][0], expected[k][0]) << options << ", ray " << k;
+      if (rows[k][0] != "1") continue;
+      EXPECT_NEAR(std::stod(rows[k][1]), std::stod(expected[k][1]), 1e-6) << options;
+    }
+  }
+  EXPECT_NE(steps_of(trace(scene, {"--displacement", "rmip", "--rmip", kAll})), steps_of(expected));
+  const auto other = trace(scene, {"--displacement", "rmip", "--rmip", "leaf=triangles"});
+  EXPECT_NE(other, expected);
+}
+
+TEST_F(DisplacementProgram, OptionsOfRmipAreChecked)
+{
+  const std::string scene = bumpy();
+  folder_.write("rays.txt", ".5 .5 1 0 0 -1\n");
+  for (const char* options : {"", "speed=1", "scale", "scale=0", "scale=nan", "resolution=0", "resolution=2.5",
+                              "inversion=yes", "split=", "leaf=quads", "scale=1,scale=2", "scale=1,"}) {
+    const Outcome outcome = run({"trace", scene, "--rays", file("rays.txt"), "--rmip", options});
+    EXPECT_EQ(outcome.exit_code, 2) << options;
+    EXPECT_NE(outcome.errors.find("--rmip: expected "), std::string::npos) << options << outcome.errors;
+  }
+  const Outcome outcome = run({"trace", scene, "--rays", file("rays.txt"), "--rmip", "scale=4"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_NE(outcome.errors.find("options of RMIP have no effect on displacement method 'auto'"), std::string::npos)
+      << outcome.errors;
+}
+
 TEST_F(DisplacementProgram, SizesBeyondTheLimitsAreErrorsOfTheScene)
 {
   struct Beyond {

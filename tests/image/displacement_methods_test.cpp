@@ -62,14 +62,17 @@ LayerDifference layer_difference(const Rendered& a, const Rendered& b, Aov aov)
   return {d.mean / count, d.mean_error / count, d.bias / count};
 }
 
-Scene displaced_example()
+Scene displaced_example(const std::string& name = "displaced")
 {
-  return scene_load(std::filesystem::path(RELIEF_SOURCE_DIR) / "examples" / "displaced" / "displaced.gltf");
+  return scene_load(std::filesystem::path(RELIEF_SOURCE_DIR) / "examples" / name / (name + ".gltf"));
 }
 
-TEST(DisplacementMethods, OfOneSurfaceGiveOnePicture)
+/// Both have two meshes, each with a map and a tiling of its own.
+class DisplacementMethodsOnScene : public testing::TestWithParam<std::string> {};
+
+TEST_P(DisplacementMethodsOnScene, OfOneSurfaceGiveOnePicture)
 {
-  const Scene scene = displaced_example();
+  const Scene scene = displaced_example(GetParam());
   const Rendered chord = render_displaced(scene, DisplacementMethod::chord, 0);
   EXPECT_EQ(chord.stats.displacement.method, "chord");
   for (const DisplacementMethod method : traversing_methods()) {
@@ -86,6 +89,11 @@ TEST(DisplacementMethods, OfOneSurfaceGiveOnePicture)
     EXPECT_LT(beauty.mean_error, 1e-3 * beauty.mean) << name;
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Displacement,
+                         DisplacementMethodsOnScene,
+                         testing::Values("displaced", "desert_tire"),
+                         [](const auto& each) { return each.param; });
 
 TEST(DisplacementMethods, ThrowTheSameCaustic)
 {
