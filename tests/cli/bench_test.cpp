@@ -95,6 +95,46 @@ TEST_F(Bench, TessellationsThatDoNotFitAreCoarserAndSaySo)
   }
 }
 
+TEST_F(Bench, ConeMapsAreTracedAndJudged)
+{
+  const std::string json_file = file("cones.json"), html_file = file("cones.html");
+  const Outcome outcome = run({"bench", "heightfield", "--quick", "--json", json_file, "--html", html_file});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+  const nlohmann::json json = nlohmann::json::parse(bytes_of_file(json_file));
+  ASSERT_EQ(json["textures"].size(), 3u);
+  for (const nlohmann::json& texture : json["textures"]) {
+    EXPECT_EQ(texture["generation_seconds"].size(), 7u);
+    EXPECT_EQ(texture["traced"].size(), 88u);
+    for (const nlohmann::json& row : texture["traced"]) {
+      EXPECT_GT(row["nanoseconds_a_ray"], 0);
+      if (row["stepping"] == "every cell") {
+        EXPECT_EQ(row["wrong"], 0);
+      }
+    }
+  }
+  EXPECT_NE(bytes_of_file(html_file).find("Table 2"), std::string::npos);
+}
+
+TEST_F(Bench, MarchingFindsTheMicroTriangles)
+{
+  const std::string json_file = file("march.json");
+  const Outcome outcome = run({"bench", "procedural", "--quick", "--json", json_file});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+  const nlohmann::json json = nlohmann::json::parse(bytes_of_file(json_file));
+  ASSERT_EQ(json["marches"].size(), 10u);
+  for (const nlohmann::json& march : json["marches"]) {
+    // As published it may lose some.
+    EXPECT_LT(march["missed"], 0.01) << march;
+    EXPECT_LT(march["passed_over"], 0.01) << march;
+    EXPECT_LT(march["invented"], 0.01) << march;
+  }
+  double last = 1;
+  for (const nlohmann::json& lattice : json["lattices"]) {
+    EXPECT_LT(lattice["error"], last) << lattice;
+    last = lattice["error"];
+  }
+}
+
 TEST_F(Bench, WrongUseIsRefused)
 {
   for (const Arguments& arguments : {Arguments{"bench"}, Arguments{"bench", "displacement", "--scenes", "teapot"},
