@@ -246,7 +246,7 @@ class Docs(unittest.TestCase):
         if sub[0] == "render" and "-o" not in line:
             line += ["-o", "out.exr"]
         for option, value in SMALL.get(sub[0], {}).items():
-            if option not in line:
+            if option not in line and option in options_of(*sub):
                 line += [option] if value is None else [option, value]
         return [*sub, *line]
 
