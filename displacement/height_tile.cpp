@@ -61,16 +61,16 @@ TileCache::Place TileCache::find(std::uint64_t key)
     Slot& slot = set[way];
     if (slot.key.load(std::memory_order_acquire) != wanted) continue;
     std::int32_t pins = slot.pins.load(std::memory_order_relaxed);
-    for (;;) {
+    bool is_pinned = false;
+    while (!is_pinned && slot.key.load(std::memory_order_acquire) == wanted) {
       if (pins == kInMaking) {  // soon done
         std::this_thread::yield();
         pins = slot.pins.load(std::memory_order_relaxed);
-        if (slot.key.load(std::memory_order_acquire) != wanted) break;
-        continue;
+      } else {
+        is_pinned = slot.pins.compare_exchange_weak(pins, pins + 1, std::memory_order_acquire);
       }
-      if (slot.pins.compare_exchange_weak(pins, pins + 1, std::memory_order_acquire)) break;
     }
-    if (pins == kInMaking) continue;
+    if (!is_pinned) continue;
     // A slot that is in use is not given away, so what it holds now it keeps.
     if (slot.key.load(std::memory_order_acquire) == wanted) {
       if (slot.used.load(std::memory_order_relaxed) != now) slot.used.store(now, std::memory_order_relaxed);
