@@ -106,4 +106,9 @@ CellCones::CellCones(const HeightFieldView& f)
   view_.cells = cells_.data();
 }
 
+MethodTable cell_cones_table_make(const HeightFieldView& field, const RmipOptions&)
+{
+  return method_table_of(std::make_shared<const CellCones>(field));
+}
+
 }  // namespace relief

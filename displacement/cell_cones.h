@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "displacement/height_field.h"
+#include "displacement/method_table.h"
 
 namespace relief {
 
@@ -36,5 +37,8 @@ class CellCones {
   std::vector<CellCone> cells_;
   CellConesView view_;
 };
+
+/// As a method's table. Not of RMIP's options.
+MethodTable cell_cones_table_make(const HeightFieldView& field, const RmipOptions& options);
 
 }  // namespace relief

@@ -9,11 +9,6 @@ namespace relief {
 
 namespace {
 
-MethodTable table_make(const HeightFieldView& field, const RmipOptions&)
-{
-  return method_table_of(std::make_shared<const CellCones>(field));
-}
-
 bool same_normal(Vec3f a, Vec3f b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
 /// Whether lattice coordinates stay over a clamped map.
@@ -136,7 +131,7 @@ const DisplacementMethodEntry RELIEF_ISA::cone_method{
     .title = "Cones",
     .description = "Cone stepping over flat bases (Dummer 2006), made exact; elsewhere as Chord",
     .traverse = traverse,
-    .table_make = table_make,
+    .table_make = cell_cones_table_make,
 };
 
 }  // namespace relief

@@ -291,7 +291,7 @@ TEST_F(DisplacementProgram, UnknownMethodsAndLevelsAreRefusedWithTheChoices)
   folder_.write("rays.txt", "0.3 0.3 3 0 0 -1\n");
   for (const Arguments& command : {Arguments{"info", scene}, Arguments{"trace", scene, "--rays", file("rays.txt")},
                                    Arguments{"render", scene, "-o", file("o.exr")}}) {
-    for (const char* method : {"cone", "microtriangle", "CHORD", "", "fast"}) {
+    for (const char* method : {"cones", "microtriangle", "CHORD", "", "fast"}) {
       Arguments arguments = command;
       arguments.insert(arguments.end(), {"--displacement", method});
       const Outcome outcome = run(arguments);
@@ -445,12 +445,12 @@ TEST_F(DisplacementProgram, MethodsAreListed)
 TEST_F(DisplacementProgram, MethodsThatSceneFilesCannotHaveAreErrors)
 {
   GltfBuilder b = displaced_square();
-  displacement_of(b)["method"] = "cone";
+  displacement_of(b)["method"] = "cones";
   const Outcome outcome = run({"info", bumpy(b)});
   EXPECT_EQ(outcome.exit_code, 3);
   EXPECT_NE(outcome.errors.find("/materials/0/extensions/RELIEF_displacement/method"), std::string::npos)
       << outcome.errors;
-  EXPECT_NE(outcome.errors.find("\"cone\""), std::string::npos) << outcome.errors;
+  EXPECT_NE(outcome.errors.find("\"cones\""), std::string::npos) << outcome.errors;
 }
 
 TEST_F(DisplacementProgram, InfoSaysHowItIsTraced)
