@@ -111,13 +111,17 @@ RELIEF_KERNEL GraphRange operator-(const GraphRange& a) { return {-a.c, -a.d1, -
 RELIEF_KERNEL GraphRange operator-(const GraphRange& a, const GraphRange& b) { return a + -b; }
 RELIEF_KERNEL GraphRange operator*(const GraphRange& a, const GraphRange& b)
 {
-  // 0 · ∞ is not a number and means 0 here: the one factor is 0 all over.
+  // 0 · ∞ is not a number. Between bounds it means 0; of a value that is 0 all over it may be any.
   const auto product = [](F8 x, F8 y) { return (x == 0.0f) | (y == 0.0f) ? F8{} : x * y; };
+  const auto is_zero = [](const GraphRange& x) { return (x.low == 0.0f) & (x.high == 0.0f); };
+  const auto is_bounded = [](const GraphRange& x) { return (x.low > -kInfinity) & (x.high < kInfinity); };
+  const I8 is_none = (is_zero(a) & ~is_bounded(b)) | (is_zero(b) & ~is_bounded(a));
   const F8 p[4] = {product(a.low, b.low), product(a.low, b.high), product(a.high, b.low), product(a.high, b.high)};
   const F8 rest = abs(a.c) * b.rest + abs(b.c) * a.rest + range_radius(a) * range_radius(b);
-  return range_closed({a.c * b.c, a.c * b.d1 + b.c * a.d1, a.c * b.d2 + b.c * a.d2, rest,
-                       range_down(min(min(p[0], p[1]), min(p[2], p[3]))),
-                       range_up(max(max(p[0], p[1]), max(p[2], p[3])))});
+  const GraphRange out = range_closed({a.c * b.c, a.c * b.d1 + b.c * a.d1, a.c * b.d2 + b.c * a.d2, rest,
+                                       range_down(min(min(p[0], p[1]), min(p[2], p[3]))),
+                                       range_up(max(max(p[0], p[1]), max(p[2], p[3])))});
+  return range_select(is_none, range_unknown(), out);
 }
 RELIEF_KERNEL GraphRange operator*(const GraphRange& a, float k) { return a * range_point(splat8(k)); }
 RELIEF_KERNEL GraphRange operator+(const GraphRange& a, float k) { return a + range_point(splat8(k)); }

@@ -243,6 +243,9 @@ RELIEF_KERNEL Voronoi<kDims> voronoi_smooth(const F8 (&cell)[kDims],
   return out;
 }
 
+/// Points whose squared distance is no more than this are one when it comes to borders.
+inline constexpr float kVoronoiTwins = 1e-4f;
+
 /// Distance to the nearest border between two cells.
 template <int kDims, bool kPcg>
 RELIEF_KERNEL F8 voronoi_edge(const F8 (&cell)[kDims],
@@ -272,13 +275,11 @@ RELIEF_KERNEL F8 voronoi_edge(const F8 (&cell)[kDims],
       across[i] = to_point - to_nearest[i];
       middle[i] = 0.5f * (to_nearest[i] + to_point);
     }
-    // Another point than the nearest.
-    constexpr float kApart = 1e-4f;
     const F8 length_squared = squared(across);
     F8 distance{};
     for (int i = 0; i < kDims; ++i) distance += middle[i] * across[i];
     distance /= sqrt(length_squared);
-    edge = length_squared > kApart ? min(edge, distance) : edge;
+    edge = length_squared > kVoronoiTwins ? min(edge, distance) : edge;
   });
   return edge;
 }

@@ -1,13 +1,54 @@
 // Bounds of Worley's cells over small parallelograms.
 //
 // A distance to points changes by no more than the way that is gone, as long as the points that count are the same: those
-// around one cell of the lattice. From one cell to the next they change, but only farther away than a cell.
+// around one cell of the lattice. From one cell to the next they change, but only farther away than a cell. So does the
+// distance to the nearest border, unless the nearest of two points that count as one changes.
 #pragma once
 
 #include "kernel/graph/graph_range.h"
 #include "kernel/graph/voronoi.h"
 
 namespace relief {
+
+/// What distances to borders are off by: differences of points a hundredth apart, each off by 2⁻²³, divide sums of size 2.
+inline constexpr float kVoronoiEdgeRounding = 2e-4f;
+
+/// Where two points that voronoi_edge takes for one may both be the nearest: the borders around them are then others on
+/// either side of the line between them.
+/// @param cell, local  as voronoi_edge's
+/// @param way          how far from there, at most
+template <int kDims, bool kPcg>
+RELIEF_KERNEL I8 voronoi_has_twins(const F8 (&cell)[kDims],
+                                   const F8 (&local)[kDims],
+                                   F8 way,
+                                   const VoronoiSettings<kDims, kPcg>& settings)
+{
+  constexpr int kPoints = kDims == 1 ? 3 : kDims == 2 ? 9 : kDims == 3 ? 27 : 81;
+  const auto squared_apart = [](const F8(&a)[kDims], const F8(&b)[kDims]) {
+    F8 sum{};
+    for (int i = 0; i < kDims; ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
+    return sum;
+  };
+  F8 points[kPoints][kDims], distances[kPoints], nearest = splat8(kInfinity);
+  int count = 0;
+  voronoi_cells<kDims>(cell, settings, 1, [&](const F8(&)[kDims], const F8(&point)[kDims]) {
+    for (int i = 0; i < kDims; ++i) points[count][i] = point[i];
+    distances[count] = sqrt(squared_apart(point, local));
+    nearest = min(nearest, distances[count++]);
+  });
+  // Rounding of differences changes their squares by less than a hundredth part.
+  constexpr float kMostApart = 1.01f * kVoronoiTwins;
+  const F8 reach = nearest + 2.0f * way + 1e-5f;
+  I8 has_twins{};
+  for (int a = 1; a < kPoints; ++a) {
+    const I8 may_be_nearest = distances[a] <= reach;
+    if (mask_of(may_be_nearest) == 0) continue;
+    for (int b = 0; b < a; ++b) {
+      has_twins |= may_be_nearest & (distances[b] <= reach) & (squared_apart(points[a], points[b]) <= kMostApart);
+    }
+  }
+  return has_twins;
+}
 
 /// Distance of one octave.
 /// @param settings  the same all over
@@ -33,9 +74,12 @@ RELIEF_KERNEL GraphRange voronoi_distance_range(const GraphRange (&p)[kDims],
   const bool is_edge = settings.feature == VoronoiFeature::kDistanceToEdge;
   const bool is_euclidean = settings.metric == VoronoiMetric::kEuclidean || is_edge;
   way = is_euclidean ? sqrt(squares) : is_sum ? way : largest;
-  // Points less than a hundredth apart count as one, whichever of them is nearer.
-  if (is_edge) way += 0.0101f;
-  for (int i = 0; i < kDims; ++i) c[i] = is_near ? p[i].c : F8{};
+  F8 corner[kDims], local[kDims];
+  for (int i = 0; i < kDims; ++i) {
+    c[i] = is_near ? p[i].c : F8{};
+    corner[i] = floor(c[i]);
+    local[i] = c[i] - corner[i];
+  }
   const F8 at = voronoi_eval<kDims>(c, settings).distance;
   // The cell's own point is no farther away than the cell is long, nor the second one than two.
   const F8 cell = is_edge ? splat8(2.0f) : voronoi_distance<kDims>(zeros, ones, settings);
@@ -46,9 +90,11 @@ RELIEF_KERNEL GraphRange voronoi_distance_range(const GraphRange (&p)[kDims],
   I8 is_known = is_near & exponent_is_metric & (is_first ? in_cell | (at + way < 0.999f) : in_cell);
   const bool is_smooth = settings.feature == VoronoiFeature::kSmoothF1;
   if (settings.feature == VoronoiFeature::kSphereRadius || is_smooth) is_known = I8{};
-  const GraphRange near = range_padded(max(at - way - 1e-5f, F8{}), min(at + way + 1e-5f, most));
+  if (is_edge) is_known &= ~voronoi_has_twins<kDims, kPcg>(corner, local, way, settings);
+  const float rounding = is_edge ? kVoronoiEdgeRounding : 1e-5f;
+  F8 least = splat8(is_edge ? -rounding : 0.0f);
+  const GraphRange near = range_padded(max(at - way - rounding, least), min(at + way + rounding, most));
   // Each of the cells that are mixed takes a quarter of the smoothness away at most.
-  F8 least{};
   for (int i = 0, cells = 5; is_smooth && i < kDims; ++i, cells *= 5) {
     least = -0.25f * static_cast<float>(cells) * abs(settings.smoothness);
   }

@@ -6,6 +6,7 @@
 
 #include "integrator/graph_bounds_stage.h"
 #include "kernel/graph/noise_range.h"
+#include "kernel/graph/voronoi_range.h"
 #include "tests/kernel/graph/one_operation.h"
 #include "tests/support/test_rays.h"
 
@@ -267,6 +268,89 @@ TEST_F(GraphBounds, AreNeverNarrowerThanSamples)
         }
       }
     }
+  }
+}
+
+/// Middles of points of neighbouring cells near the origin that are one when it comes to borders.
+template <bool kPcg>
+std::vector<std::array<float, 2>> voronoi_twins()
+{
+  constexpr int kCells = 1024;
+  const auto points_of = [](int x, int y) {
+    F8 cell[2], point[2];
+    for (int k = 0; k < 8; ++k) {
+      cell[0][k] = static_cast<float>(x + k);
+      cell[1][k] = static_cast<float>(y);
+    }
+    voronoi_point<2, kPcg>(cell, point);
+    return std::array<F8, 2>{cell[0] + point[0], cell[1] + point[1]};
+  };
+  std::vector<std::array<float, 2>> out;
+  for (int y = -kCells; y < kCells; ++y) {
+    for (int x = -kCells; x < kCells; x += 8) {
+      const std::array<F8, 2> here = points_of(x, y), others[] = {points_of(x + 1, y), points_of(x, y + 1)};
+      for (const std::array<F8, 2>& other : others) {
+        const F8 across[2] = {other[0] - here[0], other[1] - here[1]};
+        const F8 squared = across[0] * across[0] + across[1] * across[1];
+        for (int k = 0; k < 8; ++k) {
+          if (squared[k] > 0.9f * kVoronoiTwins) continue;
+          out.push_back({here[0][k] + 0.5f * across[0][k], here[1][k] + 0.5f * across[1][k]});
+        }
+      }
+    }
+  }
+  return out;
+}
+
+/// Of two points that are one when it comes to borders, each has borders of its own: distances to them jump between them.
+/// Once in some hundred thousand cells, so that random parallelograms do not meet it.
+template <bool kPcg>
+void expect_jumps_are_known()
+{
+  const VoronoiSettings<2, kPcg> settings{
+      VoronoiFeature::kDistanceToEdge, VoronoiMetric::kEuclidean, F8{}, F8{}, splat8(1.0f), kPcg ? unsigned{kVoronoiPcg} : 0u};
+  HardNumbers numbers(21);
+  int num_jumps = 0;
+  const std::vector<std::array<float, 2>> twins = voronoi_twins<kPcg>();
+  for (std::size_t round = 0; round < 20000 * twins.size(); ++round) {
+    const std::array<float, 2>& twin = twins[round % twins.size()];
+    const float size = std::exp2(numbers.within(-14, -6)), around = std::exp2(numbers.within(-8, -2));
+    F8 cell[2], a[2], b[2], way{};
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      cell[axis] = splat8(std::floor(twin[axis]));
+      for (int k = 0; k < 8; ++k) {
+        a[axis][k] = clamp(twin[axis] - cell[axis][k] + around * numbers.within(-1, 1), 0.0f, 1.0f);
+        b[axis][k] = clamp(a[axis][k] + size * numbers.within(-1, 1), 0.0f, 1.0f);
+      }
+      way += (a[axis] - b[axis]) * (a[axis] - b[axis]);
+    }
+    way = sqrt(way);
+    const F8 change = abs(voronoi_edge<2>(cell, a, settings) - voronoi_edge<2>(cell, b, settings));
+    const I8 is_known = voronoi_has_twins<2>(cell, a, way, settings);
+    for (int k = 0; k < 8; ++k) {
+      if (change[k] <= way[k] + kVoronoiEdgeRounding) continue;
+      ++num_jumps;
+      ASSERT_NE(is_known[k], 0) << change[k] << " in " << way[k] << " near " << twin[0] << " " << twin[1];
+    }
+  }
+  EXPECT_GT(num_jumps, 10);
+}
+
+TEST_F(GraphBounds, OfDistancesToBordersKnowWhereTheyJump)
+{
+  expect_jumps_are_known<false>();
+  expect_jumps_are_known<true>();
+}
+
+TEST_F(GraphBounds, OfNothingTimesTheUnknownAreUnknown)
+{
+  // 0 · ∞ is not a number, for which the midlevel stands.
+  for (const bool is_first : {false, true}) {
+    std::vector<std::array<Parallelogram, 8>> in(2);
+    for (Parallelogram& p : in[is_first ? 1 : 0]) p.rest = kInfinity;
+    const GraphRange range = ranges_of(graph_bounds_select(), Op::multiply, in, {}, nullptr)[0];
+    EXPECT_EQ(range.low[0], -kInfinity);
+    EXPECT_EQ(range.high[0], kInfinity);
   }
 }
 
