@@ -17,13 +17,8 @@ namespace relief {
 
 namespace {
 
-/// How a quantity varies over a triangle.
-enum class Variation : std::uint8_t {
-  kLinear,  ///< in the weights, as far as it is read at the mesh alone
-  kOther,
-};
-
-Variation variation_of(GraphQuantity q)
+/// Whether a quantity is linear in the weights of a triangle's vertices.
+bool is_linear(GraphQuantity q)
 {
   using Q = GraphQuantity;
   switch (q) {
@@ -44,9 +39,9 @@ Variation variation_of(GraphQuantity q)
     case Q::edge_distance:
     case Q::parametric_x:
     case Q::parametric_y:
-      return Variation::kOther;
+      return false;
     default:
-      return Variation::kLinear;
+      return true;
   }
 }
 
@@ -177,7 +172,7 @@ const TriangleInputs& triangle_inputs(const GraphHeights& heights, std::uint32_t
   last.values.resize(heights.program.num_inputs);
   for (std::uint32_t i = 0; i < heights.program.num_inputs; ++i) {
     const GraphInput& input = heights.program.inputs[i];
-    if (variation_of(input.quantity) != Variation::kLinear) continue;
+    if (!is_linear(input.quantity)) continue;
     for (std::size_t k = 0; k < 3; ++k) {
       float w[3] = {0, 0, 0};
       w[k] = 1;
@@ -198,7 +193,7 @@ void eval(const void* owner, std::uint32_t triangle, const float (*b)[8], float*
   for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
     const GraphInput& input = program.inputs[i];
     F8& lanes = registers.lanes[input.register_index];
-    if (variation_of(input.quantity) == Variation::kLinear) {
+    if (is_linear(input.quantity)) {
       const std::array<float, 3>& v = inputs.values[i];
       // On a side one term is zero: the others are added in the same order by both of its triangles.
       lanes = w[0] * v[0] + w[1] * v[1] + w[2] * v[2];
@@ -282,7 +277,7 @@ void bounds(const void* owner, std::uint32_t triangle, const WeightPatches& patc
   for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
     const GraphInput& input = program.inputs[i];
     GraphRange& lanes = registers->lanes[input.register_index];
-    if (variation_of(input.quantity) == Variation::kLinear) {
+    if (is_linear(input.quantity)) {
       float at[3];
       for (std::size_t k = 0; k < 3; ++k) at[inputs.order[k]] = inputs.values[i][k];
       lanes = linear_range(patches, at);
@@ -306,6 +301,14 @@ struct SceneHeights {
   std::vector<std::unique_ptr<GraphHeights>> heights;
 };
 
+/// Distance of a point from the line from the origin to `end`.
+double distance_to_line(const Vec3d& point, const Vec3d& end)
+{
+  const double squared = dot(end, end);
+  const double t = squared > 0 ? std::clamp(dot(point, end) / squared, 0.0, 1.0) : 0.0;
+  return length(point - t * end);
+}
+
 /// Where the picture is seen from.
 struct PictureView {
   Camera camera;
@@ -317,12 +320,16 @@ struct PictureView {
   {
     const Vec3d along = to_double(b) - to_double(a);
     const double scale = height / (2.0 * static_cast<double>(camera.half_height));
-    if (camera.projection == Projection::kOrthographic) return length(along) * scale;
-    const Vec3d from = to_double(camera.world_from_camera.p) - to_double(a);
-    const double squared = dot(along, along);
-    const double t = squared > 0 ? std::clamp(dot(from, along) / squared, 0.0, 1.0) : 0.0;
-    const double distance = length(from - t * along);
-    return length(along) * scale / std::max(distance, 1e-30);
+    const Vec3d to_eye = to_double(camera.world_from_camera.p) - to_double(a);
+    if (camera.projection == Projection::kPerspective)
+      return length(along) * scale / std::max(distance_to_line(to_eye, along), 1e-30);
+    // Cells are as long as those in the picture for as far around as it is wide, and then grow.
+    const Vec3d axis = to_double(normalize(camera.world_from_camera.z));
+    const double within =
+        (1.0 + std::abs(static_cast<double>(camera.shift_x)) + std::abs(static_cast<double>(camera.shift_y))) * 2.0 *
+        std::hypot(static_cast<double>(camera.half_width), static_cast<double>(camera.half_height));
+    const double distance = distance_to_line(to_eye - dot(to_eye, axis) * axis, along - dot(along, axis) * axis);
+    return length(along) * scale * std::min(within / distance, 1.0);
   }
 };
 

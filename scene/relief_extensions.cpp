@@ -118,7 +118,7 @@ void read_cells(const JsonReader& r, DisplacementSettings& d, Warnings& warnings
     if (!is_number || (cells & (cells - 1)) != 0) r.fail("cells", "\"auto\" or a power of two up to 524288");
     d.num_cells = static_cast<std::int32_t>(cells);
   }
-  d.cell_pixels = r.number_f("cellPixels", 1, 1e-3, 1e3);
+  d.cell_pixels = r.number_f("cellPixels", 1, 0.01, 1e3);
 }
 
 /// @param material  as warnings name it

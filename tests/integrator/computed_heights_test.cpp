@@ -5,6 +5,7 @@
 #include <random>
 #include <vector>
 
+#include "displacement/lattice_split.h"
 #include "displacement/vec3d.h"
 #include "integrator/computed_heights.h"
 #include "integrator/scene_context.h"
@@ -147,6 +148,46 @@ TEST(ComputedHeights, OfTheWorldDifferBetweenInstances)
       {"outputs", {{"height", reference(1, "factor")}}}};
   const Scene scene = load(ball({{"heightGraph", graph}, {"scale", 0.5}}, 2));
   EXPECT_EQ(SceneContext(scene).displacements.size(), 2u);
+}
+
+/// Of a plane of which an orthographic picture shows a millionth part, the rest is coarse.
+TEST(ComputedHeights, AreFineWhereThePictureIs)
+{
+  GltfBuilder b;
+  const int P = b.accessor<float>({-1e3f, -1e3f, 0, 1e3f, -1e3f, 0, -1e3f, 1e3f, 0}, "VEC3");
+  b.push("materials",
+         {{"extensions",
+           {{"RELIEF_displacement",
+             {{"heightGraph", noise(reference(0, "object"), 1, 2)}, {"scale", 0.1}, {"cellPixels", 0.5}}}}}});
+  const int mesh = b.mesh({{"attributes", {{"POSITION", P}}}, {"material", 0}});
+  b.root_node({{"mesh", mesh}});
+  b.push("cameras",
+         {{"type", "orthographic"}, {"orthographic", {{"xmag", 1}, {"ymag", 1}, {"znear", 0.1}, {"zfar", 100}}}});
+  b.root_node({{"camera", 0}, {"translation", {-500, -500, 5}}});
+  const Scene scene = load(b);
+  DisplacementInput input;
+  input.instances.push_back({0, 0, -1, scene.instances[0].world_from_object});
+  computed_heights_add(scene, {}, &input);
+  ASSERT_EQ(input.heights.size(), 1u);
+  const std::vector<LatticeTriangle> parts = lattices_make(scene.meshes[0].view(), input.heights[0].cells);
+  EXPECT_LT(parts.size(), 10'000u);
+  // Cells in the middle of the picture are half a pixel long or less.
+  const double pixel = 2.0 / scene.render.height;
+  bool is_found = false;
+  for (const LatticeTriangle& part : parts) {
+    double least = 1, longest = 0;
+    const Vec2f middle{0.25f, 0.25f};
+    for (int k = 0; k < 3; ++k) {
+      const Vec2f a = part.corner[k], c = part.corner[(k + 1) % 3];
+      const Vec2f along = c - a, to = middle - a;
+      least = std::min(least, static_cast<double>(along.x * to.y - along.y * to.x));
+      longest = std::max(longest, 2e3 * static_cast<double>(std::hypot(along.x, along.y)) / part.side_n[k]);
+    }
+    if (least < 0) continue;
+    is_found = true;
+    EXPECT_LE(longest, 0.5 * pixel * 1.001);
+  }
+  EXPECT_TRUE(is_found);
 }
 
 /// The source's own bounds, of patches of all sizes, against what it gives there.
