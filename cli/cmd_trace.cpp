@@ -149,8 +149,8 @@ std::string visit_text(const Scene& scene, const PrismVisit& visit)
 {
   const Instance& instance = scene.instances[visit.instance];
   const PrismExplanation e = prism_explain(visit);
-  std::string text = fmt::format("mesh {} triangle {} (node '{}'): ", instance.mesh_index, visit.triangle,
-                                 printable_text(instance.name));
+  std::string text =
+      fmt::format("mesh {} triangle {} (node '{}'): ", instance.mesh_index, e.triangle, printable_text(instance.name));
   if (e.num_stretches == 0) return text + "in its box, beside its prism\n";
   text += fmt::format("prism{}, searched from t {} to {}\n", e.folded ? " (folded)" : "", e.t_min, e.t_max);
   text += fmt::format("  object space: origin {} {} {}, direction {} {} {}\n", e.ray.O.x, e.ray.O.y, e.ray.O.z,
@@ -162,9 +162,9 @@ std::string visit_text(const Scene& scene, const PrismVisit& visit)
   text += fmt::format("  tested: {} bounds, {} texels, {} inversions\n", visit.counters.bounds, visit.counters.texels,
                       visit.counters.inversions);
   if (!visit.found) return text + "  no hit\n";
-  const DisplacedHit& hit = visit.hit;
-  return text + fmt::format("  hit: t {}, b {} {} {}, uv {} {}, cell {} {}, height {}, displacement {} m\n", e.t,
-                            1.0 - hit.b1 - hit.b2, hit.b1, hit.b2, e.u, e.v, e.i, e.j, e.h, e.d);
+  text += fmt::format("  hit: t {}, b {} {} {}, ", e.t, 1.0 - e.b1 - e.b2, e.b1, e.b2);
+  if (e.has_map) text += fmt::format("uv {} {}, ", e.u, e.v);
+  return text + fmt::format("cell {} {}, height {}, displacement {} m\n", e.i, e.j, e.h, e.d);
 }
 
 /// The traversal of one ray, for people to read.

@@ -1,6 +1,9 @@
 #include "displacement/explain.h"
 
 #include <cmath>
+#include <optional>
+
+#include "displacement/trace_procedural.h"
 
 namespace relief {
 
@@ -34,23 +37,38 @@ PrismExplanation prism_explain(const PrismVisit& visit)
       out.stretches[out.num_stretches++] = {t_world(g.t0), t_world(g.t1), g.s0, g.s0 + g.ds};
     }
   }
-  if (visit.found) {
-    const DisplacedHit& hit = visit.hit;
-    if (hit.level > 0) {
-      const HeightFieldView& level = *visit.geometry->levels[hit.level].field;
-      tri = triangle_on_level(tri, *mesh.field, level);
-      mesh.field = &level;
-    }
-    const double x = tri.x[0] + hit.b1 * (tri.x[1] - tri.x[0]) + hit.b2 * (tri.x[2] - tri.x[0]);
-    const double y = tri.y[0] + hit.b1 * (tri.y[1] - tri.y[0]) + hit.b2 * (tri.y[2] - tri.y[0]);
-    out.u = (x + 0.5 - whole_periods(mesh.field->x, x + 0.5)) / mesh.field->map.width;
-    out.v = (y + 0.5 - whole_periods(mesh.field->y, y + 0.5)) / mesh.field->map.height;
-    out.i = hit.i - static_cast<std::int64_t>(whole_periods(mesh.field->x, static_cast<double>(hit.i)));
-    out.j = hit.j - static_cast<std::int64_t>(whole_periods(mesh.field->y, static_cast<double>(hit.j)));
-    out.h = interpolate_height(*mesh.field, x, y);
-    out.d = displacement_at(mesh, x, y);
-    if (hit.edge >= 0) out.d = hit.d;
+  const ProceduralField* const procedural = visit.geometry->procedural;
+  out.has_map = procedural == nullptr;
+  out.triangle = out.has_map ? visit.triangle : procedural->triangles()[visit.triangle].base;
+  if (!visit.found) return out;
+  const DisplacedHit& hit = visit.hit;
+  out.b1 = hit.b1;
+  out.b2 = hit.b2;
+  std::optional<TriangleOnTile> tile;
+  if (!out.has_map) {
+    tile.emplace(mesh, *procedural, visit.triangle, lattice_tile_at(*procedural, visit.triangle, hit.b1, hit.b2));
+    mesh = tile->mesh;
+    tri = tile->tri;
+    const LatticeTriangle& part = procedural->triangles()[visit.triangle];
+    const Vec2f b = part.base_weights(static_cast<float>(hit.b1), static_cast<float>(hit.b2));
+    out.b1 = b.x;
+    out.b2 = b.y;
+  } else if (hit.level > 0) {
+    const HeightFieldView& level = *visit.geometry->levels[hit.level].field;
+    tri = triangle_on_level(tri, *mesh.field, level);
+    mesh.field = &level;
   }
+  const double x = tri.x[0] + hit.b1 * (tri.x[1] - tri.x[0]) + hit.b2 * (tri.x[2] - tri.x[0]);
+  const double y = tri.y[0] + hit.b1 * (tri.y[1] - tri.y[0]) + hit.b2 * (tri.y[2] - tri.y[0]);
+  out.h = interpolate_height(*mesh.field, x, y);
+  out.d = hit.edge >= 0 ? hit.d : displacement_at(mesh, x, y);
+  out.i = hit.i;
+  out.j = hit.j;
+  if (!out.has_map) return out;
+  out.u = (x + 0.5 - whole_periods(mesh.field->x, x + 0.5)) / mesh.field->map.width;
+  out.v = (y + 0.5 - whole_periods(mesh.field->y, y + 0.5)) / mesh.field->map.height;
+  out.i -= static_cast<std::int64_t>(whole_periods(mesh.field->x, static_cast<double>(hit.i)));
+  out.j -= static_cast<std::int64_t>(whole_periods(mesh.field->y, static_cast<double>(hit.j)));
   return out;
 }
 

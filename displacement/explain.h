@@ -50,7 +50,10 @@ struct PrismExplanation {
   PrismStretch stretches[kMaxCurveSegments];  ///< in the order of t
   int num_stretches = 0;                      ///< 0: the ray enters the box and misses the prism
   bool folded = false;                        ///< displacement lines may cross: every stretch is searched to its end
-  double u = 0, v = 0;                        ///< of the hit, in the height map, whole periods taken off
+  std::uint32_t triangle = 0;                 ///< of the mesh
+  double b1 = 0, b2 = 0;                      ///< of the hit, its weights
+  bool has_map = true;                        ///< else heights are computed, and cells the lattice's
+  double u = 0, v = 0;                        ///< in the height map, whole periods taken off
   std::int64_t i = 0, j = 0;                  ///< its cell, likewise
   double h = 0, d = 0;                        ///< its height, and the displacement in metres of object space
 };
