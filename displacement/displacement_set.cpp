@@ -106,8 +106,7 @@ std::optional<TessellationKind> tessellation_kind(DisplacementMethod method)
 void set_base_place(const ProceduralField& field, DisplacedPoint* point)
 {
   const LatticeTriangle& part = field.triangles()[point->triangle];
-  const Vec2f place =
-      (1.0f - point->u - point->v) * part.corner[0] + point->u * part.corner[1] + point->v * part.corner[2];
+  const Vec2f place = part.base_weights(point->u, point->v);
   point->triangle = part.base;
   point->u = place.x;
   point->v = place.y;
@@ -120,6 +119,13 @@ std::vector<std::string> displacement_warnings(const DisplacementSettings& setti
   std::vector<std::string> texts;
   const float lod = lod_of(settings, options);
   const DisplacementMethod asked = method_of(settings, options);
+  if (displacement_is_computed(settings)) {
+    const std::string of_maps = " has no effect on heights that are computed";
+    if (asked != DisplacementMethod::kAuto && asked != kDefaultMethod)
+      texts.push_back("displacement method '" + std::string(displacement_method_label(asked)) + "'" + of_maps);
+    if (lod > 0) texts.push_back("a level of detail" + of_maps);
+    return texts;
+  }
   if (tessellation_kind(asked) && lod > 0 && !is_whole(lod)) {
     texts.push_back("tessellations have whole levels of detail; level " + std::to_string(static_cast<int>(lod)) +
                     " is used");
@@ -252,6 +258,7 @@ std::unique_ptr<DisplacementSet::Displaced> DisplacementSet::make_computed(const
   displaced->name = use.mesh_name;
   displaced->displacement_index = use.displacement_index;
   displaced->method = kDefaultMethod;
+  if (lattice_cache_ == nullptr) lattice_cache_ = std::make_unique<LatticeCache>(options.computed_bytes);
   HeightSource source = heights.source;
   if (source.eval == nullptr && use.settings.height.texture_index >= 0) {
     displaced->map_heights = std::make_unique<MapHeights>(
@@ -266,7 +273,7 @@ std::unique_ptr<DisplacementSet::Displaced> DisplacementSet::make_computed(const
   displaced->procedural = std::make_unique<ProceduralField>(
       source,
       heights.num_cells > 0 ? lattices_make(use.mesh, heights.num_cells) : lattices_make(use.mesh, heights.cells),
-      use.settings.midlevel, options.computed_bytes);
+      use.settings.midlevel, *lattice_cache_);
   displaced->mesh = DisplacedMesh(use.mesh, *displaced->procedural,
                                   {.height = {}, .scale = use.scale, .midlevel = use.settings.midlevel});
   DisplacedGeometry& geometry = displaced->geometry;
@@ -408,7 +415,7 @@ SeamReport DisplacementSet::seams(std::size_t index) const
 
 std::size_t DisplacementSet::bytes() const
 {
-  std::size_t sum = 0;
+  std::size_t sum = lattice_cache_ != nullptr ? lattice_cache_->bytes() : 0;
   for (const auto& [key, field] : fields_) {
     sum += field.level.bytes() + field.bounds.bytes();
     for (const auto& [make, table] : field.tables) sum += table.bytes;

@@ -59,7 +59,7 @@ struct DisplacementOptions {
   std::optional<Camera> camera;              ///< by which computed heights choose their cells; empty: the scene's first
   int picture_height = 0;                    ///< pixels, with a camera
   double num_rays = 0;  ///< that will be traced, about, for `auto` to weigh building against tracing
-  std::uint64_t computed_bytes = std::uint64_t{256} << 20;  ///< computed heights that each mesh keeps, at most
+  std::uint64_t computed_bytes = std::uint64_t{256} << 20;  ///< computed heights that are kept, at most
   std::uint64_t tessellation_bytes = 0;  ///< all tessellations may take while they are built; 0: half of the machine's
 };
 
@@ -171,6 +171,7 @@ class DisplacementSet {
   std::vector<HeightMapView> height_maps_;
   std::vector<MeshView> meshes_;
   std::shared_ptr<const void> heights_owner_;
+  std::unique_ptr<LatticeCache> lattice_cache_;  ///< of computed heights; null: there are none
   std::vector<int> geometry_of_instance_;
   std::vector<float> texel_of_instance_;
   bool has_levels_ = false;

@@ -1,11 +1,8 @@
 #include "displacement/height_tile.h"
 
 #include <algorithm>
-#include <new>
 #include <thread>
 #include <utility>
-
-#include <sys/mman.h>
 
 namespace relief {
 
@@ -19,35 +16,34 @@ void height_tile_finish(HeightTile* tile)
   tile->field = small_height_field_make(map, tile->lines, kTileLines);
 }
 
-TileCache::Pin::Pin() noexcept = default;
-TileCache::Pin::Pin(Pin&& other) noexcept : slot_(std::exchange(other.slot_, nullptr)), own_(std::move(other.own_)) {}
-TileCache::Pin& TileCache::Pin::operator=(Pin&& other) noexcept
+HeightTileCache::Pin::Pin() noexcept = default;
+HeightTileCache::Pin::Pin(Pin&& other) noexcept
+    : slot_(std::exchange(other.slot_, nullptr)), own_(std::move(other.own_))
+{
+}
+HeightTileCache::Pin& HeightTileCache::Pin::operator=(Pin&& other) noexcept
 {
   std::swap(slot_, other.slot_);
   std::swap(own_, other.own_);
   return *this;
 }
-TileCache::Pin::~Pin()
+HeightTileCache::Pin::~Pin()
 {
   if (slot_ != nullptr) slot_->pins.fetch_sub(1, std::memory_order_release);
 }
-const HeightFieldView& TileCache::Pin::field() const { return slot_ != nullptr ? slot_->tile.field : own_->field; }
-
-TileCache::TileCache(std::size_t bytes)
+const HeightFieldView& HeightTileCache::Pin::field() const
 {
-  num_sets_ = std::max<std::size_t>(bytes / (kWays * sizeof(Slot)), 1);
-  void* const pages = mmap(nullptr, num_sets_ * kWays * sizeof(Slot), PROT_READ | PROT_WRITE,
-                           MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-  if (pages == MAP_FAILED) throw std::bad_alloc();
-  // All bits zero are empty slots.
-  slots_ = static_cast<Slot*>(pages);
+  return slot_ != nullptr ? slot_->tile.field : own_->field;
 }
 
-TileCache::~TileCache() { munmap(slots_, num_sets_ * kWays * sizeof(Slot)); }
+HeightTileCache::HeightTileCache(std::size_t bytes)
+    : num_sets_(std::max<std::size_t>(bytes / (kWays * sizeof(Slot)), 1)), slots_(num_sets_ * kWays * sizeof(Slot))
+{
+}
 
-std::size_t TileCache::bytes() const { return num_taken_.load(std::memory_order_relaxed) * sizeof(Slot); }
+std::size_t HeightTileCache::bytes() const { return num_taken_.load(std::memory_order_relaxed) * sizeof(Slot); }
 
-TileCache::Place TileCache::find(std::uint64_t key)
+HeightTileCache::Place HeightTileCache::find(std::uint64_t key)
 {
   const std::uint64_t wanted = key + 1;
   // splitmix64's finalizer: neighbours go to different sets.
@@ -55,7 +51,7 @@ TileCache::Place TileCache::find(std::uint64_t key)
   hash = (hash ^ (hash >> 30)) * 0xbf58476d1ce4e5b9u;
   hash = (hash ^ (hash >> 27)) * 0x94d049bb133111ebu;
   hash ^= hash >> 31;
-  Slot* const set = slots_ + hash % num_sets_ * kWays;
+  Slot* const set = slots() + hash % num_sets_ * kWays;
   const auto now = static_cast<std::uint32_t>(num_made_.load(std::memory_order_relaxed));
   for (int way = 0; way < kWays; ++way) {
     Slot& slot = set[way];

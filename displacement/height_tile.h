@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "displacement/height_field.h"
+#include "displacement/zero_pages.h"
 
 namespace relief {
 
@@ -26,7 +27,7 @@ struct HeightTile {
 void height_tile_finish(HeightTile* tile);
 
 /// Keeps tiles until their room is needed. Tiles in use stay.
-class TileCache {
+class HeightTileCache {
   struct Slot;
 
  public:
@@ -43,16 +44,13 @@ class TileCache {
     const HeightFieldView& field() const;
 
    private:
-    friend class TileCache;
+    friend class HeightTileCache;
     Slot* slot_ = nullptr;
     std::unique_ptr<HeightTile> own_;  ///< where all slots that it could be in are in use
   };
 
   /// @param bytes  at most; memory is taken as tiles are made
-  explicit TileCache(std::size_t bytes);
-  TileCache(const TileCache&) = delete;
-  TileCache& operator=(const TileCache&) = delete;
-  ~TileCache();
+  explicit HeightTileCache(std::size_t bytes);
 
   /// @param key   of the tile, below 2⁶⁴ − 1
   /// @param make  void(HeightTile*): fills in the texels
@@ -94,8 +92,10 @@ class TileCache {
   };
   Place find(std::uint64_t key);
 
-  Slot* slots_ = nullptr;  ///< pages that nobody wrote to are none
-  std::size_t num_sets_ = 0;
+  Slot* slots() const { return static_cast<Slot*>(slots_.data()); }
+
+  std::size_t num_sets_;
+  ZeroPages slots_;  ///< all bits zero are empty slots
   std::atomic<std::uint64_t> num_made_{0}, num_taken_{0};
 };
 

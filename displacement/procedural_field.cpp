@@ -15,8 +15,6 @@ namespace relief {
 
 namespace {
 
-/// Lines of bounds that are kept: 16 MiB.
-constexpr std::size_t kNodeLines = 1 << 18;
 /// Bits of heights along sides that are left for sums of three of them.
 constexpr int kBitsOfSums = 2;
 
@@ -44,22 +42,7 @@ void set_patch(const LatticeTriangle& t, double x0, double y0, double x1, double
   }
 }
 
-/// Of a node's line; never 0.
-std::uint64_t node_key(std::uint32_t triangle, const LatticeNode& node)
-{
-  return (std::uint64_t{triangle} << 32 | static_cast<std::uint64_t>(node.level) << 28 |
-          static_cast<std::uint64_t>(node.i) << 14 | static_cast<std::uint64_t>(node.j)) +
-         1;
-}
-
 }  // namespace
-
-/// The bounds of a node's children. Written by whoever needs them; readers take a copy and look whether it was whole.
-struct alignas(64) ProceduralField::NodeLine {
-  std::atomic<std::uint32_t> version{0};  ///< odd while it is written
-  std::atomic<std::uint64_t> key{0};      ///< plus one; 0: empty
-  std::atomic<float> low[4], high[4];
-};
 
 /// A point of a base triangle whose height is wanted.
 struct ProceduralField::Request {
@@ -69,23 +52,23 @@ struct ProceduralField::Request {
 ProceduralField::ProceduralField(const HeightSource& source,
                                  std::vector<LatticeTriangle> triangles,
                                  float midlevel,
-                                 std::size_t cache_bytes)
-    : source_(source), triangles_(std::move(triangles)), midlevel_(midlevel), tiles_(cache_bytes)
+                                 LatticeCache& cache)
+    : source_(source),
+      triangles_(std::move(triangles)),
+      midlevel_(midlevel),
+      cache_(cache),
+      first_triangle_(cache.num_triangles)
 {
+  cache.num_triangles += triangles_.size();
   int log2_ratio = 0;
-  bool has_nodes = false;
   for (const LatticeTriangle& t : triangles_) {
     for (const std::int32_t side : t.side_n) log2_ratio = std::max(log2_ratio, std::ilogb(t.n / side));
-    has_nodes |= t.n > kTileCells;
   }
-  if (has_nodes) nodes_ = std::make_unique<NodeLine[]>(kNodeLines);
   find_ranges();
   const float largest = std::max(std::abs(all_.low), std::abs(all_.high));
   side_grid_ = std::ldexp(1.0f, std::ilogb(std::max(largest, 1e-30f)) - 23 + kBitsOfSums + log2_ratio);
   for (LatticeRange& r : ranges_) r = {r.low - side_grid_, r.high + side_grid_};
 }
-
-ProceduralField::~ProceduralField() = default;
 
 void ProceduralField::find_ranges()
 {
@@ -272,39 +255,28 @@ void ProceduralField::make_tile(std::uint32_t triangle,
       range = merge(range, {h_here, h_here});
     }
   }
-  note_range(triangle, tile_i, tile_j, range);
-}
-
-ProceduralField::NodeLine& ProceduralField::node_line(std::uint64_t key) const
-{
-  std::uint64_t hash = key * 0x9e3779b97f4a7c15u;
-  hash = (hash ^ (hash >> 29)) * 0xbf58476d1ce4e5b9u;
-  return nodes_[(hash >> 32) % kNodeLines];
-}
-
-/// Heights that are there bound a tile better than the source does.
-void ProceduralField::note_range(std::uint32_t triangle, std::int32_t i, std::int32_t j, LatticeRange range) const
-{
-  if (nodes_ == nullptr || root(triangle).level == 0) return;
-  const std::uint64_t key = node_key(triangle, {1, i / 2, j / 2});
-  NodeLine& line = node_line(key);
-  std::uint32_t version = line.version.load(std::memory_order_acquire);
-  if ((version & 1) != 0 || line.key.load(std::memory_order_relaxed) != key ||
-      !line.version.compare_exchange_strong(version, version + 1, std::memory_order_acquire)) {
-    return;
+  // Heights that are there bound a tile better than the source does.
+  const LatticeNode parent{1, tile_i / 2, tile_j / 2};
+  if (root(triangle).level > 0) {
+    cache_.nodes.improve(node_key(triangle, parent), 2 * (tile_j & 1) + (tile_i & 1), range);
   }
-  std::atomic_thread_fence(std::memory_order_release);
-  const int child = 2 * (j & 1) + (i & 1);
-  line.low[child].store(range.low, std::memory_order_relaxed);
-  line.high[child].store(range.high, std::memory_order_relaxed);
-  line.version.store(version + 2, std::memory_order_release);
 }
 
-TileCache::Pin ProceduralField::tile(std::uint32_t triangle, std::int32_t i, std::int32_t j) const
+std::uint64_t ProceduralField::tile_key(std::uint32_t triangle, std::int32_t i, std::int32_t j) const
 {
-  const std::uint64_t key =
-      std::uint64_t{triangle} << 28 | static_cast<std::uint64_t>(i) << 14 | static_cast<std::uint64_t>(j);
-  return tiles_.get(key, [&](HeightTile* tile) { make_tile(triangle, i, j, tile); });
+  return (first_triangle_ + triangle) << 28 | static_cast<std::uint64_t>(i) << 14 | static_cast<std::uint64_t>(j);
+}
+
+std::uint64_t ProceduralField::node_key(std::uint32_t triangle, const LatticeNode& node) const
+{
+  // 2³² triangles would take half a terabyte.
+  return (first_triangle_ + triangle) << 32 | static_cast<std::uint64_t>(node.level) << 28 |
+         static_cast<std::uint64_t>(node.i) << 14 | static_cast<std::uint64_t>(node.j);
+}
+
+HeightTileCache::Pin ProceduralField::tile(std::uint32_t triangle, std::int32_t i, std::int32_t j) const
+{
+  return cache_.tiles.get(tile_key(triangle, i, j), [&](HeightTile* tile) { make_tile(triangle, i, j, tile); });
 }
 
 void ProceduralField::find_children(std::uint32_t triangle, const LatticeNode& node, LatticeRange* out) const
@@ -346,33 +318,9 @@ void ProceduralField::find_children(std::uint32_t triangle, const LatticeNode& n
 void ProceduralField::children(std::uint32_t triangle, const LatticeNode& node, LatticeRange* out) const
 {
   const std::uint64_t key = node_key(triangle, node);
-  NodeLine& line = node_line(key);
-  const std::uint32_t before = line.version.load(std::memory_order_acquire);
-  if ((before & 1) == 0 && line.key.load(std::memory_order_relaxed) == key) {
-    for (int k = 0; k < 4; ++k) {
-      out[k] = {line.low[k].load(std::memory_order_relaxed), line.high[k].load(std::memory_order_relaxed)};
-    }
-    std::atomic_thread_fence(std::memory_order_acquire);
-    if (line.version.load(std::memory_order_relaxed) == before) return;
-  }
+  if (cache_.nodes.find(key, out)) return;
   find_children(triangle, node, out);
-  std::uint32_t expected = line.version.load(std::memory_order_relaxed);
-  // Whoever comes second keeps what it found to itself.
-  if ((expected & 1) != 0 || !line.version.compare_exchange_strong(expected, expected + 1, std::memory_order_acquire))
-    return;
-  std::atomic_thread_fence(std::memory_order_release);
-  line.key.store(key, std::memory_order_relaxed);
-  for (int k = 0; k < 4; ++k) {
-    line.low[k].store(out[k].low, std::memory_order_relaxed);
-    line.high[k].store(out[k].high, std::memory_order_relaxed);
-  }
-  line.version.store(expected + 2, std::memory_order_release);
-}
-
-std::size_t ProceduralField::bytes() const
-{
-  return triangles_.size() * (sizeof(LatticeTriangle) + sizeof(LatticeRange)) + tiles_.bytes() +
-         (nodes_ != nullptr ? kNodeLines * sizeof(NodeLine) : 0);
+  cache_.nodes.keep(key, out);
 }
 
 }  // namespace relief

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "displacement/height_source.h"
-#include "displacement/height_tile.h"
+#include "displacement/lattice_cache.h"
 #include "kernel/math/vec.h"
 #include "kernel/shape/displacement_settings.h"
 
@@ -25,11 +25,12 @@ struct LatticeTriangle {
   Vec2f corner[3] = {{0, 0}, {1, 0}, {0, 1}};  ///< weights of the base triangle's vertices 1 and 2 at its corners
   std::int32_t n = 1;                          ///< cells along each side
   std::int32_t side_n[3] = {1, 1, 1};          ///< of the side from corner k to the next: divides n
-};
 
-/// Bounds of heights. Nothing where low > high.
-struct LatticeRange {
-  float low = 0, high = 0;
+  /// Weights of the base triangle's vertices 1 and 2 at a point with weights b1 and b2 of this one's.
+  Vec2f base_weights(float b1, float b2) const
+  {
+    return (1.0f - b1 - b2) * corner[0] + b1 * corner[1] + b2 * corner[2];
+  }
 };
 
 /// A square of tiles in a triangle's lattice: 2^level a side, the first at (i, j)·2^level. Level 0 is a tile.
@@ -44,13 +45,12 @@ class ProceduralField {
  public:
   /// @param source     must outlive the field
   /// @param midlevel   height that stands for those that are no numbers
-  /// @param cache_bytes of tiles, at most
+  /// @param cache      for all fields of a scene; must outlive the field
   /// @cost  bounds of all triangles; parallel over triangles
   ProceduralField(const HeightSource& source,
                   std::vector<LatticeTriangle> triangles,
                   float midlevel,
-                  std::size_t cache_bytes);
-  ~ProceduralField();
+                  LatticeCache& cache);
 
   const std::vector<LatticeTriangle>& triangles() const { return triangles_; }
   /// Bounds of a triangle's heights.
@@ -61,25 +61,26 @@ class ProceduralField {
   /// @param node  of level 1 or more
   void children(std::uint32_t triangle, const LatticeNode& node, LatticeRange* out) const;
   /// The heights of a tile.
-  TileCache::Pin tile(std::uint32_t triangle, std::int32_t i, std::int32_t j) const;
+  HeightTileCache::Pin tile(std::uint32_t triangle, std::int32_t i, std::int32_t j) const;
   /// Height at a lattice point; computed each time.
   float lattice_height(std::uint32_t triangle, std::int32_t i, std::int32_t j) const;
 
   /// Whether the source knows no bounds: heights are then held within those of some points.
   bool is_sampled() const { return is_sampled_; }
-  std::size_t bytes() const;  ///< taken so far
-  std::uint64_t num_tiles_made() const { return tiles_.num_made(); }
+  std::size_t bytes() const  ///< besides the cache
+  {
+    return triangles_.size() * (sizeof(LatticeTriangle) + sizeof(LatticeRange));
+  }
 
  private:
-  struct NodeLine;
   struct Request;
   void find_ranges();
   float rounded(float h) const;
   Request request(const LatticeTriangle& triangle, std::int32_t i, std::int32_t j) const;
   void eval(std::uint32_t base, const Request* requests, std::size_t count, float* h) const;
   void make_tile(std::uint32_t triangle, std::int32_t i, std::int32_t j, HeightTile* tile) const;
-  NodeLine& node_line(std::uint64_t key) const;
-  void note_range(std::uint32_t triangle, std::int32_t i, std::int32_t j, LatticeRange range) const;
+  std::uint64_t tile_key(std::uint32_t triangle, std::int32_t i, std::int32_t j) const;
+  std::uint64_t node_key(std::uint32_t triangle, const LatticeNode& node) const;
   void find_children(std::uint32_t triangle, const LatticeNode& node, LatticeRange* out) const;
 
   HeightSource source_;
@@ -89,8 +90,8 @@ class ProceduralField {
   LatticeRange all_;     ///< of all triangles
   float side_grid_ = 0;  ///< heights on sides are multiples of this, so that what is interpolated has no rounding
   bool is_sampled_ = false;
-  mutable TileCache tiles_;
-  std::unique_ptr<NodeLine[]> nodes_;  ///< cached bounds of children
+  LatticeCache& cache_;
+  std::uint64_t first_triangle_;  ///< of this field in the cache
 };
 
 }  // namespace relief

@@ -29,7 +29,7 @@ namespace {
 /// A tile's heights and the triangle above them, as methods see a mesh.
 struct TriangleOnTile {
   DisplacedTriangle tri;
-  TileCache::Pin pin;
+  HeightTileCache::Pin pin;
   DisplacedMeshView mesh;
   std::int64_t i0, j0;  ///< lattice coordinates of texel (0, 0)
 

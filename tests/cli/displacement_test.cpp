@@ -362,6 +362,41 @@ TEST_F(DisplacementProgram, ExplainTellsOfPrismsAndHits)
   EXPECT_EQ(run({"trace", scene, "--pixel", "1,1", "--explain", "0"}).exit_code, 2);
 }
 
+TEST_F(DisplacementProgram, ExplainTellsOfHeightsThatAreComputed)
+{
+  GltfBuilder b = displaced_square();
+  displacement_of(b)["curved"] = true;
+  displacement_of(b)["cells"] = 4;
+  const std::string scene = write(b, std::string(16, '\xff'));
+  folder_.write("rays.txt", "0.25 0.1875 3 0 0 -1\n");
+  const Outcome hit = run({"trace", scene, "--rays", file("rays.txt"), "--explain", "0"});
+  ASSERT_EQ(hit.exit_code, 0) << hit.errors;
+  for (const char* text : {"mesh 0 triangle 0 (node 'ground'): prism, searched",
+                           "  hit: t 2.5, b 0.5625 0.25 0.1875, cell 0 0, height 1, displacement 0.5 m\n",
+                           "nearest: t 2.5, mesh 0 triangle 0, P 0.25 0.1875 0.5, Ng 0 0 1\n"}) {
+    EXPECT_NE(hit.output.find(text), std::string::npos) << text << "\n" << hit.output;
+  }
+}
+
+TEST_F(DisplacementProgram, OptionsOfMapsAreSaidToHaveNoEffectOnHeightsThatAreComputed)
+{
+  GltfBuilder b = displaced_square();
+  displacement_of(b)["curved"] = true;
+  const std::string scene = write(b, std::string(16, '\xff'));
+  const auto errors = [&](const Arguments& more) {
+    Arguments arguments = {"trace", scene, "--pixel", "1,1"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.errors;
+    return outcome.errors;
+  };
+  EXPECT_EQ(errors({}), "");
+  EXPECT_EQ(errors({"--displacement", "chord"}), "");
+  const std::string of_maps = " has no effect on heights that are computed";
+  EXPECT_NE(errors({"--displacement", "rmip"}).find("displacement method 'rmip'" + of_maps), std::string::npos);
+  EXPECT_NE(errors({"--lod", "2"}).find("a level of detail" + of_maps), std::string::npos);
+}
+
 TEST_F(DisplacementProgram, StepsInPicturesAndStatisticsAgree)
 {
   const std::string scene = bumpy();

@@ -152,7 +152,8 @@ TEST(ComputedHeights, AreFoundByRandomRaysAsByTheOracle)
       side = table.n;
       if (random_index(random, 3) == 0) side >>= random_index(random, std::ilogb(table.n) + 1);
     }
-    const ProceduralField field(table.source(), {lattice}, .5f, kCacheBytes);
+    LatticeCache cache(kCacheBytes);
+    const ProceduralField field(table.source(), {lattice}, .5f, cache);
 
     const double size = std::pow(10, random_between(random, -2, 2));
     oracle::DisplacedTriangle triangle = random_base_triangle(random, size);
@@ -248,7 +249,8 @@ struct WavySurface {
       : mesh(from.triangles),
         view(mesh.view()),
         source{&view},
-        field(source.source(), lattices_make(view, cells_along), .5f, cache_bytes),
+        cache(cache_bytes),
+        field(source.source(), lattices_make(view, cells_along), .5f, cache),
         displaced(view, field, {.height = {}, .scale = .2, .midlevel = .5}),
         geometry(geometry_of(displaced, field))
   {
@@ -256,6 +258,7 @@ struct WavySurface {
   TestMesh mesh;
   MeshView view;
   WaveSource source;
+  LatticeCache cache;
   ProceduralField field;
   DisplacedMesh displaced;
   DisplacedGeometry geometry;
@@ -315,8 +318,8 @@ TEST(ComputedHeights, AreTheSameHoweverFewAreKept)
     trace(narrow, found);
     ASSERT_EQ(expected, found);
   }
-  EXPECT_GT(narrow.field.num_tiles_made(), roomy.field.num_tiles_made());
-  EXPECT_LT(narrow.field.bytes(), roomy.field.bytes());
+  EXPECT_GT(narrow.cache.tiles.num_made(), roomy.cache.tiles.num_made());
+  EXPECT_LT(narrow.cache.bytes(), roomy.cache.bytes());
 }
 
 TEST(ComputedHeights, OfTrianglesAgreeAlongTheirSides)
@@ -359,7 +362,7 @@ TEST(ComputedHeights, OfTilesAreThoseOfTheLattice)
     if (i + j > n) i = n - i, j = n - j;
     const std::int32_t last = (n - 1) / kTileCells, tile_i = std::min(i / kTileCells, last),
                        tile_j = std::min(j / kTileCells, last);
-    const TileCache::Pin tile = wavy.field.tile(index, tile_i, tile_j);
+    const HeightTileCache::Pin tile = wavy.field.tile(index, tile_i, tile_j);
     const double h = lattice_height(tile.field(), i - tile_i * kTileCells + 1, j - tile_j * kTileCells + 1);
     ASSERT_EQ(static_cast<float>(h), wavy.field.lattice_height(index, i, j)) << n << " " << i << " " << j;
   }
@@ -410,7 +413,8 @@ TEST(ComputedHeights, WithoutKnownBoundsAreCutOff)
     std::fill_n(low, 8, -HUGE_VALF);
     std::fill_n(high, 8, HUGE_VALF);
   };
-  const ProceduralField field(source, lattices_make(view, 64), .5f, kCacheBytes);
+  LatticeCache cache(kCacheBytes);
+  const ProceduralField field(source, lattices_make(view, 64), .5f, cache);
   EXPECT_TRUE(field.is_sampled());
   const LatticeRange range = field.range(0);
   EXPECT_TRUE(std::isfinite(range.low) && std::isfinite(range.high));
@@ -428,7 +432,8 @@ TEST(ComputedHeights, ThatAreNoNumbersAreTheMidlevel)
                         std::fill_n(low, 8, 0.0f);
                         std::fill_n(high, 8, 1.0f);
                       }};
-  const ProceduralField field(source, lattices_make(mesh.view(), 4), .25f, kCacheBytes);
+  LatticeCache cache(kCacheBytes);
+  const ProceduralField field(source, lattices_make(mesh.view(), 4), .25f, cache);
   EXPECT_EQ(field.lattice_height(0, 1, 2), .25f);
 }
 
