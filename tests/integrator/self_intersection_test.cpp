@@ -154,6 +154,49 @@ TEST(DisplacedSelfIntersection, NoValleyOfAStretchedHeightFieldIsMetFromWithin)
   }
 }
 
+/// A floor at height 0 whose heights are 0: its points have a coordinate that is exact, and so no error in proportion to it.
+/// What the tracer's doubles leave of the large ones is all that rays have to be moved out of.
+TEST(DisplacedSelfIntersection, LevelGroundAtZeroIsLeft)
+{
+  constexpr int kSize = 8;
+  std::mt19937 random(12345);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  for (const float size : {1e-3f, 1.0f, 1e4f}) {
+    for (const Vec3f scale : {Vec3f{1, 1, 1}, Vec3f{4, 0.5f, 64}}) {
+      std::vector<std::uint16_t> texels(kSize * kSize, 0);
+      texels[0] = 65535;
+      Scene scene = empty_scene();
+      Mesh plane = quad_mesh({-size, -size, 0}, {2 * size, 0, 0}, {0, 2 * size, 0});
+      plane.uv[0] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+      Material material = diffuse_material({1, 1, 1});
+      material.displacement_index = 0;
+      const Affine3 placement{{scale.x, 0, 0}, {0, scale.y, 0}, {0, 0, scale.z}, {}};
+      add_object(scene, plane, material, placement);
+      add_displacement(scene, kSize, texels, 0.1f * size).midlevel = 0;
+      const SceneContext context(scene);
+
+      std::vector<TraceRay> rays, leaving;
+      for (int i = 0; i < 5000; ++i) {
+        // Close to the middle and far from it; away from the peak at the corner.
+        const float reach = i % 2 == 0 ? 0.5f * size : 1e-4f * size;
+        const Vec3f target{reach * uniform(random), reach * uniform(random), 0};
+        rays.push_back({transform_point(placement, target + Vec3f{0, 0, size}), {0, 0, -1}, 0, kInfinity});
+      }
+      for (const TraceHit& h : trace_rays(context, rays)) {
+        if (!h.hit) continue;
+        for (int i = 0; i < 8; ++i) {
+          const float rise = std::exp(12 * uniform(random) - 13);
+          const Vec3f flat = normalize(Vec3f{uniform(random), uniform(random), 0});
+          leaving.push_back({h.O_front, flat + Vec3f{0, 0, rise}, kLeastDistance, 0.1f * size});
+          leaving.push_back({h.O_back, flat - Vec3f{0, 0, rise}, kLeastDistance, 0.1f * size});
+        }
+      }
+      EXPECT_EQ(leaving.size(), 80'000u);
+      EXPECT_EQ(num_hits(context, leaving), 0) << size << ", stretched by " << scale.z;
+    }
+  }
+}
+
 /// A globe of 24 × 12 quads whose map repeats around it. Where its first column is its last, vertices are equal.
 Mesh globe_mesh()
 {
