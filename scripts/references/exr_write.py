@@ -23,6 +23,20 @@ def write_reference(path, mean, variance, attributes):
     write_exr(path, layers, attributes)
 
 
+def rounded_to_noise(mean, variance):
+    """Mean and variance without the bits that say nothing, which a file cannot compress.
+
+    The mean is rounded to half of its standard error or less, the variance of few runs to a quarter of itself.
+    """
+
+    def rounded(values, unit):
+        exact = ~((unit > 0) & np.isfinite(unit))
+        step = np.exp2(np.floor(np.log2(np.where(exact, 1, unit))))
+        return np.where(exact, values, np.rint(values / step) * step)
+
+    return rounded(mean, np.sqrt(variance) / 2), rounded(variance, variance / 4)
+
+
 def write_exr(path, channels, attributes=None):
     """Any float channels of one shape (height, width), by name."""
     names = sorted(channels)

@@ -25,7 +25,7 @@ struct Reference {
 /// For GoogleTest's messages, which would print the bytes.
 void PrintTo(const Reference& reference, std::ostream* out) { *out << reference.name; }
 
-// Samples give each scene about a second on two cores; setting a scene up sixteen times is part of that.
+// Samples give each scene a second or two on two cores, photons four; setting a scene up sixteen times is part of that.
 constexpr std::array kReferences = {
     Reference{"rectangle_floor", "tests/references/rectangle_floor.gltf", 16},
     Reference{"punctual_floor", "tests/references/punctual_floor.gltf", 16},
@@ -37,6 +37,18 @@ constexpr std::array kReferences = {
     Reference{"spheres", "examples/spheres/spheres.gltf", 8},
     Reference{"product", "examples/product/product.gltf", 32},
     Reference{"glass", "examples/glass/glass.gltf", 8},
+    Reference{"displaced_bumps", "tests/references/displaced_bumps.gltf", 64},
+    Reference{"displaced_pits", "tests/references/displaced_pits.gltf", 64},
+    Reference{"displaced_sphere", "tests/references/displaced_sphere.gltf", 64},
+    Reference{"displaced_seam", "tests/references/displaced_seam.gltf", 64},
+    Reference{"displaced_cliff", "tests/references/displaced_cliff.gltf", 64},
+    Reference{"displaced_slab", "tests/references/displaced_slab.gltf", 64},
+    Reference{"displaced_graph", "tests/references/displaced_graph.gltf", 32},
+    Reference{"displaced_curved", "tests/references/displaced_curved.gltf", 16},
+    Reference{"displaced_instances", "tests/references/displaced_instances.gltf", 64},
+    Reference{"displaced_mirror", "tests/references/displaced_mirror.gltf", 64},
+    Reference{"caustic_ball", "tests/references/caustic_ball.gltf", 8},
+    Reference{"caustic_slab", "tests/references/caustic_slab.gltf", 8},
 };
 
 const std::filesystem::path kRoot = RELIEF_SOURCE_DIR;
@@ -113,6 +125,38 @@ TEST(ReferencePower, HalfAPixelOfShiftIsSeen)
     const ZTestResult result = compare_with_reference(reference_named(name), shift);
     EXPECT_FALSE(result.passed) << name << ": " << z_text(result);
   }
+}
+
+TEST(ReferencePower, DisplacementTwoPercentTallerIsSeen)
+{
+  const auto taller = [](Scene& scene) {
+    for (DisplacementSettings& displacement : scene.displacements) displacement.scale *= 1.02f;
+  };
+  for (const char* name : {"displaced_bumps", "displaced_sphere", "displaced_mirror"}) {
+    const ZTestResult result = compare_with_reference(reference_named(name), taller);
+    EXPECT_FALSE(result.passed) << name << ": " << z_text(result);
+  }
+}
+
+TEST(ReferencePower, AMapAQuarterOfATexelOffIsSeen)
+{
+  const auto shift = [](Scene& scene) {
+    for (DisplacementSettings& displacement : scene.displacements) {
+      const HeightMap& map = scene.height_maps[static_cast<std::size_t>(displacement.height.texture_index)];
+      displacement.height.m02 += 0.25f / static_cast<float>(map.width);
+    }
+  };
+  for (const char* name : {"displaced_pits", "displaced_cliff"}) {
+    const ZTestResult result = compare_with_reference(reference_named(name), shift);
+    EXPECT_FALSE(result.passed) << name << ": " << z_text(result);
+  }
+}
+
+TEST(ReferencePower, TheBiasOfWidePhotonsIsSeen)
+{
+  const auto widen = [](Scene& scene) { scene.render.caustics.radius = 0.3f; };
+  const ZTestResult result = compare_with_reference(reference_named("caustic_ball"), widen);
+  EXPECT_FALSE(result.passed) << z_text(result);
 }
 
 TEST(ReferencePower, ALightTwoPercentOffIsSeenAmongOthers)
