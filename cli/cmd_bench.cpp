@@ -91,6 +91,7 @@ int bench_displacement(const BenchArguments& arguments)
 /// What benches of one study have in common.
 struct StudyArguments {
   std::string json, html;
+  std::vector<std::string> maps;  ///< files that are read
   int rounds = 3;
   bool quick = false;
 };
@@ -107,6 +108,7 @@ int bench_study(const StudyArguments& arguments,
   RunFiles files;
   files.add_output("--json", arguments.json);
   files.add_output("--html", arguments.html);
+  for (const std::string& map : arguments.maps) files.add_input("a height map", map);
   for (const std::string& output : {arguments.json, arguments.html}) check_writable(output);
   options.rounds = arguments.quick ? 1 : arguments.rounds;
   if (isatty(STDERR_FILENO) != 0) {
@@ -145,11 +147,14 @@ void heightfield_register(CLI::App& bench, Run& run)
   command->add_option("--size", arguments->size, "Texels along a side of the height maps")
       ->check(one_of({"16", "32", "64", "128", "256", "512"}))
       ->capture_default_str();
+  command->add_option("--map", arguments->maps, "Image of heights that is studied too; may be given several times")
+      ->type_name("FILE");
   add_study_options(*command, *arguments);
   command->callback([&run, arguments] {
     run = [arguments] {
       HeightfieldOptions options;
       options.size = arguments->size;
+      options.maps = arguments->maps;
       if (arguments->quick) {
         options.size = 16;
         options.width = 64;
@@ -165,12 +170,25 @@ void procedural_register(CLI::App& bench, Run& run)
 {
   CLI::App* command = bench.add_subcommand(
       "procedural", "Heights that are computed: microtriangle marching as published, and heights on demand");
-  auto arguments = std::make_shared<StudyArguments>();
+  struct Arguments : StudyArguments {
+    std::vector<std::string> parts;
+  };
+  auto arguments = std::make_shared<Arguments>();
+  command
+      ->add_option("--parts", arguments->parts,
+                   "Parts, separated by commas: marching, lattice, pot, terrain, planet (default: all)")
+      ->delimiter(',')
+      ->check(one_of(bench_procedural_parts()));
   add_study_options(*command, *arguments);
   command->callback([&run, arguments] {
     run = [arguments] {
       ProceduralOptions options;
-      if (arguments->quick) options.num_rays = 500;
+      options.parts = arguments->parts;
+      if (arguments->quick) {
+        options.num_rays = 500;
+        options.world_shrink = 16;
+        options.world_mesh_divisor = 8;
+      }
       return bench_study(*arguments, options, bench_procedural_run, bench_procedural_markdown, bench_procedural_json,
                          bench_procedural_html);
     };

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <filesystem>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "benchmarks/displacement/maps.h"
 #include "benchmarks/displacement/table.h"
+#include "benchmarks/heightfield/map_file.h"
 #include "exporters/report_html.h"
 
 namespace relief {
@@ -269,9 +271,10 @@ std::string conditions(const HeightfieldResults& results)
       "{} rays from above over a texture of {} × {} texels that repeats, {} high in lengths of the texture; {} × {} "
       "pixels. "
       "Processor time of one thread, all variants in turns, fastest of {} rounds. What is right is every cell's "
-      "bilinear patch.",
+      "bilinear patch.{}",
       results.num_rays, results.options.size, results.options.size, kDepth, results.options.width,
-      results.options.height, results.options.rounds);
+      results.options.height, results.options.rounds,
+      results.options.maps.empty() ? "" : " Maps of files: means of their texels, over the whole range of heights.");
 }
 
 }  // namespace
@@ -281,9 +284,14 @@ HeightfieldResults bench_heightfield_run(const HeightfieldOptions& options)
   HeightfieldResults results;
   results.options = options;
   results.num_rays = rays_of(options).size();
-  const std::pair<const char*, HeightTexture> textures[] = {{"impulses", impulses(options.size)},
-                                                            {"rock", texture_of(BenchMap::kRock, options.size)},
-                                                            {"panels", texture_of(BenchMap::kPanels, options.size)}};
+  // All of them first: a file that cannot be read is known at once.
+  std::vector<std::pair<std::string, HeightTexture>> textures = {
+      {"impulses", impulses(options.size)},
+      {"rock", texture_of(BenchMap::kRock, options.size)},
+      {"panels", texture_of(BenchMap::kPanels, options.size)}};
+  for (const std::string& file : options.maps) {
+    textures.emplace_back(std::filesystem::path(file).stem().string(), height_texture_load(file, options.size));
+  }
   for (const auto& [name, texture] : textures) results.textures.push_back(study(name, texture, options));
   return results;
 }

@@ -15,6 +15,7 @@ struct HeightfieldOptions {
   int size = 128;  ///< texels a side, a power of two
   int width = 640, height = 360;
   int rounds = 3;
+  std::vector<std::string> maps;                     ///< image files that are studied too
   std::function<void(const std::string&)> progress;  ///< empty: none
 };
 
@@ -47,6 +48,7 @@ struct HeightfieldResults {
   std::vector<HeightfieldTexture> textures;
 };
 
+/// @error SceneError if a map cannot be read or is smaller than `size`
 HeightfieldResults bench_heightfield_run(const HeightfieldOptions& options);
 std::string bench_heightfield_markdown(const HeightfieldResults& results);
 std::string bench_heightfield_json(const HeightfieldResults& results);

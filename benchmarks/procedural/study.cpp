@@ -1,5 +1,6 @@
 #include "benchmarks/procedural/study.h"
 
+#include <algorithm>
 #include <ctime>
 #include <random>
 
@@ -22,6 +23,8 @@ namespace {
 constexpr int kSizes[] = {1, 4, 16, 64, 256};
 constexpr double kAmplitude = 0.5;  ///< of the radius, as in the paper's Fig. 1
 constexpr std::size_t kCacheBytes = std::size_t{64} << 20;
+constexpr const char* kMarching = "marching";
+constexpr const char* kLattice = "lattice";
 
 double processor_seconds()
 {
@@ -235,6 +238,25 @@ Table lattice_table(const ProceduralResults& results)
   return table;
 }
 
+void run_marches(const Face& face,
+                 const std::vector<Ray>& rays,
+                 const ProceduralOptions& options,
+                 ProceduralResults* results)
+{
+  for (const int n : kSizes) {
+    const MarchedTriangle triangle = marched(face, n);
+    std::vector<MarchHit> truth;
+    const MicrotriangleMarch<double> all(triangle);
+    // All of them are many.
+    const std::size_t count = n > 64 ? rays.size() / 16 : rays.size();
+    const std::vector<Ray> some(rays.begin(), rays.begin() + static_cast<std::ptrdiff_t>(count));
+    for (const Ray& ray : some) truth.push_back(all.brute_force(vector<double>(ray.O), vector<double>(ray.D)));
+    results->marches.push_back(measure_march<float>(triangle, some, truth, options.rounds, "single"));
+    results->marches.push_back(measure_march<double>(triangle, some, truth, options.rounds, "double"));
+    if (options.progress) options.progress(fmt::format("marched N = {}", n));
+  }
+}
+
 std::string conditions(const ProceduralResults& results)
 {
   return fmt::format(
@@ -245,39 +267,48 @@ std::string conditions(const ProceduralResults& results)
 
 }  // namespace
 
+std::vector<std::string> bench_procedural_parts()
+{
+  std::vector<std::string> names = {kMarching, kLattice};
+  for (const WorldSpec& spec : world_specs()) names.emplace_back(spec.name);
+  return names;
+}
+
 ProceduralResults bench_procedural_run(const ProceduralOptions& options)
 {
+  const auto is_wanted = [&](std::string_view part) {
+    return options.parts.empty() || std::find(options.parts.begin(), options.parts.end(), part) != options.parts.end();
+  };
   const Face face;
   const std::vector<Ray> rays = random_rays(face, options.num_rays);
-  ProceduralResults results{options.num_rays, traversal_table_select().isa, {}, {}};
-  for (const int n : kSizes) {
-    const MarchedTriangle triangle = marched(face, n);
-    std::vector<MarchHit> truth;
-    const MicrotriangleMarch<double> all(triangle);
-    // All of them are many.
-    const std::size_t count = n > 64 ? rays.size() / 16 : rays.size();
-    const std::vector<Ray> some(rays.begin(), rays.begin() + static_cast<std::ptrdiff_t>(count));
-    for (const Ray& ray : some) truth.push_back(all.brute_force(vector<double>(ray.O), vector<double>(ray.D)));
-    results.marches.push_back(measure_march<float>(triangle, some, truth, options.rounds, "single"));
-    results.marches.push_back(measure_march<double>(triangle, some, truth, options.rounds, "double"));
-    if (options.progress) options.progress(fmt::format("marched N = {}", n));
+  ProceduralResults results{options.num_rays, traversal_table_select().isa, {}, {}, {}};
+  if (is_wanted(kMarching)) run_marches(face, rays, options, &results);
+  if (is_wanted(kLattice)) {
+    for (const int n : {1, 4, 16, 64, 256, 4096}) {
+      results.lattices.push_back(measure_lattice(face, n, rays, options.rounds));
+      if (options.progress) options.progress(fmt::format("traced N = {}", n));
+    }
   }
-  for (const int n : {1, 4, 16, 64, 256, 4096}) {
-    results.lattices.push_back(measure_lattice(face, n, rays, options.rounds));
-    if (options.progress) options.progress(fmt::format("traced N = {}", n));
+  for (const WorldSpec& spec : world_specs()) {
+    if (!is_wanted(spec.name)) continue;
+    results.worlds.push_back(
+        world_study(spec, {options.rounds, options.world_shrink, options.world_mesh_divisor, options.progress}));
   }
   return results;
 }
 
 std::string bench_procedural_markdown(const ProceduralResults& results)
 {
-  return "# relief bench procedural\n\n" + conditions(results) + "\n\n" + markdown(march_table(results)) +
-         markdown(lattice_table(results));
+  std::string text = "# relief bench procedural\n\n" + conditions(results) + "\n\n";
+  if (!results.marches.empty()) text += markdown(march_table(results));
+  if (!results.lattices.empty()) text += markdown(lattice_table(results));
+  for (const WorldStudy& world : results.worlds) text += world_markdown(world);
+  return text;
 }
 
 std::string bench_procedural_json(const ProceduralResults& results)
 {
-  nlohmann::ordered_json marches = nlohmann::ordered_json::array(), lattices = nlohmann::ordered_json::array();
+  nlohmann::ordered_json marches = nlohmann::ordered_json::array(), lattices = marches, worlds = marches;
   for (const MarchResult& r : results.marches) {
     marches.push_back({{"n", r.n},
                        {"precision", r.precision},
@@ -294,8 +325,10 @@ std::string bench_procedural_json(const ProceduralResults& results)
                         {"nanoseconds_a_ray", r.nanoseconds},
                         {"bytes", r.bytes}});
   }
+  for (const WorldStudy& world : results.worlds) worlds.push_back(world_json(world));
   const nlohmann::ordered_json json = {{"bench", "procedural"},    {"version", RELIEF_VERSION}, {"isa", results.isa},
-                                       {"rays", results.num_rays}, {"marches", marches},        {"lattices", lattices}};
+                                       {"rays", results.num_rays}, {"marches", marches},        {"lattices", lattices},
+                                       {"worlds", worlds}};
   return json.dump(2) + "\n";
 }
 
@@ -311,12 +344,18 @@ std::string bench_procedural_html(const ProceduralResults& results)
     x_march.push_back(r.n);
     missed.push_back(100 * (r.missed + r.passed_over));
   }
-  const std::vector<std::string> plots = {
-      svg_line_plot({"error of the lattice", "N", "parts of the range", true, true}, {{"rms", x, error}}),
-      svg_line_plot({"rays that marching gets wrong", "N", "%", true, false}, {{"double precision", x_march, missed}})};
-  return html_page(
-      "Procedural displacement: marching and heights on demand",
-      {html_paragraph(conditions(results)), html_row(plots), html(march_table(results)), html(lattice_table(results))});
+  std::vector<std::string> plots, pieces = {html_paragraph(conditions(results))};
+  if (!results.lattices.empty())
+    plots.push_back(
+        svg_line_plot({"error of the lattice", "N", "parts of the range", true, true}, {{"rms", x, error}}));
+  if (!results.marches.empty())
+    plots.push_back(svg_line_plot({"rays that marching gets wrong", "N", "%", true, false},
+                                  {{"double precision", x_march, missed}}));
+  pieces.push_back(html_row(plots));
+  if (!results.marches.empty()) pieces.push_back(html(march_table(results)));
+  if (!results.lattices.empty()) pieces.push_back(html(lattice_table(results)));
+  for (const WorldStudy& world : results.worlds) pieces.push_back(world_html(world));
+  return html_page("Procedural displacement: marching and heights on demand", pieces);
 }
 
 }  // namespace relief

@@ -1,16 +1,21 @@
 // Microtriangle marching as published beside our own heights on demand: which rays they lose, what they cost, and how far a
-// lattice of N is from the heights that it stands for.
+// lattice of N is from the heights that it stands for; and what whole worlds of heights take.
 #pragma once
 
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "benchmarks/procedural/world_study.h"
+
 namespace relief {
 
 struct ProceduralOptions {
   int num_rays = 20000;
   int rounds = 3;
+  std::vector<std::string> parts;                    ///< of bench_procedural_parts; empty: all
+  double world_shrink = 1;                           ///< factor by which pictures of worlds are smaller
+  int world_mesh_divisor = 1;                        ///< see world_make
   std::function<void(const std::string&)> progress;  ///< empty: none
 };
 
@@ -39,8 +44,13 @@ struct ProceduralResults {
   std::string isa;
   std::vector<MarchResult> marches;
   std::vector<LatticeResult> lattices;
+  std::vector<WorldStudy> worlds;
 };
 
+/// Names of what can be run by itself.
+std::vector<std::string> bench_procedural_parts();
+
+/// @error std::runtime_error if Embree fails
 ProceduralResults bench_procedural_run(const ProceduralOptions& options);
 std::string bench_procedural_markdown(const ProceduralResults& results);
 std::string bench_procedural_json(const ProceduralResults& results);

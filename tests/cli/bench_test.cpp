@@ -1,9 +1,10 @@
-// `relief bench displacement`: that it runs, what it writes, and that all exact methods find the same hits. Times are not
+// `relief bench`: that it runs, what it writes, and that all exact methods find the same hits. Times are not
 // looked at: they belong to the machine.
 #include <set>
 
 #include "displacement/method.h"
 #include "tests/cli/program.h"
+#include "tests/support/image_bytes.h"
 
 namespace relief::test {
 namespace {
@@ -115,10 +116,32 @@ TEST_F(Bench, ConeMapsAreTracedAndJudged)
   EXPECT_NE(bytes_of_file(html_file).find("Table 2"), std::string::npos);
 }
 
+TEST_F(Bench, ConeMapsOfFilesAreStudiedBesideTheOthers)
+{
+  std::string texels;
+  for (int k = 0; k < 32 * 20; ++k) texels += static_cast<char>(60 + k * k * 37 % 90);
+  const std::string map = folder_.write("map.tga", tga_grey(32, 20, texels)).string();
+  const std::string small = folder_.write("small.tga", tga_grey(8, 8, texels.substr(0, 64))).string();
+  const std::string json_file = file("cones.json");
+  const Outcome outcome = run({"bench", "heightfield", "--quick", "--map", map, "--json", json_file});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+  const nlohmann::json json = nlohmann::json::parse(bytes_of_file(json_file));
+  ASSERT_EQ(json["textures"].size(), 4u);
+  EXPECT_EQ(json["textures"][3]["texture"], "map");
+  for (const nlohmann::json& row : json["textures"][3]["traced"]) {
+    if (row["stepping"] == "every cell") {
+      EXPECT_EQ(row["wrong"], 0);
+    }
+  }
+  const Outcome refused = run({"bench", "heightfield", "--quick", "--map", map, "--map", small});
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_NE(refused.errors.find("16 texels a side"), std::string::npos) << refused.errors;
+}
+
 TEST_F(Bench, MarchingFindsTheMicroTriangles)
 {
   const std::string json_file = file("march.json");
-  const Outcome outcome = run({"bench", "procedural", "--quick", "--json", json_file});
+  const Outcome outcome = run({"bench", "procedural", "--quick", "--parts", "marching,lattice", "--json", json_file});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
   const nlohmann::json json = nlohmann::json::parse(bytes_of_file(json_file));
   ASSERT_EQ(json["marches"].size(), 10u);
@@ -135,11 +158,41 @@ TEST_F(Bench, MarchingFindsTheMicroTriangles)
   }
 }
 
+TEST_F(Bench, WorldsOfMoreThanCouldBeStoredAreTraced)
+{
+  const std::string json_file = file("worlds.json"), html_file = file("worlds.html");
+  const Outcome outcome = run(
+      {"bench", "procedural", "--quick", "--parts", "pot,terrain,planet", "--json", json_file, "--html", html_file});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+  const nlohmann::json json = nlohmann::json::parse(bytes_of_file(json_file));
+  EXPECT_TRUE(json["marches"].empty());
+  ASSERT_EQ(json["worlds"].size(), 3u);
+  EXPECT_EQ(json["worlds"][0]["triangles"], 4680);
+  EXPECT_EQ(json["worlds"][2]["triangles"], 960);
+  for (const nlohmann::json& world : json["worlds"]) {
+    for (const nlohmann::json& result : world["results"]) {
+      SCOPED_TRACE(world["world"].get<std::string>() + " " + result["n"].dump());
+      const double n = result["n"], triangles = world["triangles"];
+      EXPECT_GE(result["lattices"], triangles);
+      if (n > 0) {
+        EXPECT_EQ(result["micro_triangles"], triangles * n * n);
+      }
+      EXPECT_GT(result["primary"]["hit_share"], 0.2);
+      EXPECT_GT(result["primary"]["first_tiles"], 0);
+      // Few of the heights that there are were made.
+      EXPECT_LT(result["height_bytes"], 256 << 20);
+      for (const char* kind : {"primary", "bounce", "shadow"}) EXPECT_GT(result[kind]["nanoseconds_a_ray"], 0);
+    }
+  }
+  EXPECT_NE(bytes_of_file(html_file).find("hours for the paper"), std::string::npos);
+}
+
 TEST_F(Bench, WrongUseIsRefused)
 {
-  for (const Arguments& arguments : {Arguments{"bench"}, Arguments{"bench", "displacement", "--scenes", "teapot"},
-                                     Arguments{"bench", "displacement", "--parts", "all"},
-                                     Arguments{"bench", "displacement", "--json", "bench.txt"}}) {
+  for (const Arguments& arguments :
+       {Arguments{"bench"}, Arguments{"bench", "displacement", "--scenes", "teapot"},
+        Arguments{"bench", "displacement", "--parts", "all"}, Arguments{"bench", "displacement", "--json", "bench.txt"},
+        Arguments{"bench", "procedural", "--parts", "vase"}}) {
     EXPECT_EQ(run(arguments).exit_code, 2) << arguments.back();
   }
 }
