@@ -142,6 +142,7 @@ void heightfield_register(CLI::App& bench, Run& run)
       bench.add_subcommand("heightfield", "Cone maps as published, over a plane: speed, and how many rays are wrong");
   struct Arguments : StudyArguments {
     int size = 128;
+    std::vector<std::string> cones;
   };
   auto arguments = std::make_shared<Arguments>();
   command->add_option("--size", arguments->size, "Texels along a side of the height maps")
@@ -149,12 +150,19 @@ void heightfield_register(CLI::App& bench, Run& run)
       ->capture_default_str();
   command->add_option("--map", arguments->maps, "Image of heights that is studied too; may be given several times")
       ->type_name("FILE");
+  command
+      ->add_option("--cones", arguments->cones,
+                   "Cone maps, separated by commas: conservative, quick, approximate relaxed, relaxed, quick relaxed "
+                   "(default: all)")
+      ->delimiter(',')
+      ->check(one_of(bench_heightfield_cones()));
   add_study_options(*command, *arguments);
   command->callback([&run, arguments] {
     run = [arguments] {
       HeightfieldOptions options;
       options.size = arguments->size;
       options.maps = arguments->maps;
+      options.cones = arguments->cones;
       if (arguments->quick) {
         options.size = 16;
         options.width = 64;

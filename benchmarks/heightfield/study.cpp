@@ -22,6 +22,13 @@ constexpr double kDepth = 0.12;
 /// Steps by which [P] looks for where a ray comes out.
 constexpr int kRelaxedSteps = 64;
 
+constexpr std::pair<const char*, ConeMap (*)(const HeightTexture&)> kConeMaps[] = {
+    {"conservative", cone_map_conservative},
+    {"quick", cone_map_quick},
+    {"approximate relaxed", [](const HeightTexture& t) { return cone_map_relaxed_approximate(t, kRelaxedSteps); }},
+    {"relaxed", cone_map_relaxed},
+    {"quick relaxed", cone_map_quick_relaxed}};
+
 double processor_seconds()
 {
   timespec now{};
@@ -164,18 +171,18 @@ HeightfieldTexture study(const std::string& name, const HeightTexture& texture, 
   HeightfieldTexture out{name, {}, {}, {}};
   struct Map {
     std::string name;
-    std::function<ConeMap()> make;
+    ConeMap (*make)(const HeightTexture&);
     ConeMap plain = {}, corrected = {};
   };
-  std::vector<Map> maps = {
-      {"conservative", [&] { return cone_map_conservative(texture); }},
-      {"quick", [&] { return cone_map_quick(texture); }},
-      {"approximate relaxed", [&] { return cone_map_relaxed_approximate(texture, kRelaxedSteps); }},
-      {"relaxed", [&] { return cone_map_relaxed(texture); }},
-      {"quick relaxed", [&] { return cone_map_quick_relaxed(texture); }}};
+  std::vector<Map> maps;
+  for (const auto& [cone, make] : kConeMaps) {
+    const bool is_wanted =
+        options.cones.empty() || std::find(options.cones.begin(), options.cones.end(), cone) != options.cones.end();
+    if (is_wanted) maps.push_back({cone, make});
+  }
   for (Map& map : maps) {
     double start = processor_seconds();
-    map.plain = map.make();
+    map.plain = map.make(texture);
     out.generation.emplace_back(map.name, processor_seconds() - start);
     start = processor_seconds();
     map.corrected = cone_map_corrected(texture, map.plain);
@@ -278,6 +285,13 @@ std::string conditions(const HeightfieldResults& results)
 }
 
 }  // namespace
+
+std::vector<std::string> bench_heightfield_cones()
+{
+  std::vector<std::string> names;
+  for (const auto& [cone, make] : kConeMaps) names.emplace_back(cone);
+  return names;
+}
 
 HeightfieldResults bench_heightfield_run(const HeightfieldOptions& options)
 {

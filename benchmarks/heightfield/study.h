@@ -15,7 +15,8 @@ struct HeightfieldOptions {
   int size = 128;  ///< texels a side, a power of two
   int width = 640, height = 360;
   int rounds = 3;
-  std::vector<std::string> maps;                     ///< image files that are studied too
+  std::vector<std::string> maps;   ///< image files that are studied too
+  std::vector<std::string> cones;  ///< cone maps that are made, of bench_heightfield_cones; empty: all
   std::function<void(const std::string&)> progress;  ///< empty: none
 };
 
@@ -47,6 +48,9 @@ struct HeightfieldResults {
   std::size_t num_rays = 0;
   std::vector<HeightfieldTexture> textures;
 };
+
+/// Names of all cone maps.
+std::vector<std::string> bench_heightfield_cones();
 
 /// @error SceneError if a map cannot be read or is smaller than `size`
 HeightfieldResults bench_heightfield_run(const HeightfieldOptions& options);

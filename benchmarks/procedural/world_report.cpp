@@ -5,16 +5,20 @@
 #include "benchmarks/displacement/contender.h"
 #include "benchmarks/displacement/table.h"
 #include "benchmarks/procedural/world_study.h"
+#include "displacement/displacement_set.h"
 #include "exporters/report_html.h"
 
 namespace relief {
 
 namespace {
 
-std::string cells_text(const WorldCells& cells)
+/// How a world is divided, and how much room heights have where it is not the usual.
+std::string cells_text(const WorldResult& r)
 {
-  if (cells.n > 0) return fmt::format("N = {}", cells.n);
-  return cells.least_metres > 0 ? fmt::format("a pixel, {:g} cm", 100 * cells.least_metres) : "a pixel";
+  std::string text = r.cells.n > 0 ? fmt::format("N = {}", r.cells.n) : "a pixel";
+  if (r.cells.least_metres > 0) text += fmt::format(", {:g} cm", 100 * r.cells.least_metres);
+  if (r.room_bytes > DisplacementOptions{}.computed_bytes) text += fmt::format(", {} MiB", r.room_bytes >> 20);
+  return text;
 }
 
 std::string size_text(const WorldResult& r)
@@ -49,18 +53,20 @@ Table size_table(const WorldStudy& study)
       fmt::format(
           "{} base triangles. Cells: N along all sides, or as large as a pixel (and not divided below some size). "
           "Micro-triangles: N² a lattice, in all. Preparation in seconds of wall clock on all "
-          "cores; MiB: the base mesh, what is prepared (lattices, triangles, tree), heights that were kept, and "
+          "cores; MiB: the base mesh, what is prepared (lattices, triangles, tree), the room for heights, heights that "
+          "were kept, and "
           "the most that the process had beyond what it had before, rays included.",
           study.num_triangles),
-      {"cells", "picture", "finest N", "lattices", "micro-triangles", "preparation", "mesh", "prepared", "heights",
-       "peak"},
+      {"cells", "picture", "finest N", "lattices", "micro-triangles", "preparation", "mesh", "prepared", "room",
+       "heights", "peak"},
       {}};
   if (paper.hours > 0) table.note += fmt::format(" The paper: N {}, memory {}.", paper.cells, paper.memory);
   for (const WorldResult& r : study.results) {
-    table.rows.push_back({cells_text(r.cells), size_text(r), fmt::format("{:.0f}", r.most_cells_a_side),
+    table.rows.push_back({cells_text(r), size_text(r), fmt::format("{:.0f}", r.most_cells_a_side),
                           std::to_string(r.num_lattices), fmt::format("{:.3g}", r.num_micro_triangles),
                           fmt::format("{:.2f}", r.prepare_seconds), mebibytes(r.mesh_bytes),
-                          mebibytes(r.prepared_bytes), mebibytes(r.height_bytes), mebibytes(r.peak_bytes)});
+                          mebibytes(r.prepared_bytes), mebibytes(r.room_bytes), mebibytes(r.height_bytes),
+                          mebibytes(r.peak_bytes)});
   }
   return table;
 }
@@ -85,7 +91,7 @@ Table rate_table(const WorldStudy& study)
   }
   for (const WorldResult& r : study.results) {
     const WorldRays &primary = r.rays[0], &bounce = r.rays[1], &shadow = r.rays[2];
-    table.rows.push_back({cells_text(r.cells), size_text(r), fmt::format("{:.0f} %", 100 * primary.hit_share),
+    table.rows.push_back({cells_text(r), size_text(r), fmt::format("{:.0f} %", 100 * primary.hit_share),
                           millions(primary.first_nanoseconds), millions(primary.nanoseconds),
                           millions(bounce.first_nanoseconds), millions(bounce.nanoseconds),
                           millions(shadow.nanoseconds), fmt::format("{:.3g}", per_ray(primary.first_tiles, primary)),
@@ -128,6 +134,7 @@ nlohmann::ordered_json world_json(const WorldStudy& study)
                                      {"prepare_seconds", r.prepare_seconds},
                                      {"mesh_bytes", r.mesh_bytes},
                                      {"prepared_bytes", r.prepared_bytes},
+                                     {"room_bytes", r.room_bytes},
                                      {"height_bytes", r.height_bytes},
                                      {"peak_bytes", r.peak_bytes}};
     result.update(rays);
@@ -146,12 +153,12 @@ std::string world_html(const WorldStudy& study)
   std::vector<PlotSeries> series;
   for (const char* name : {"primary, first", "primary", "bounce", "shadow"}) series.push_back({name, {}, {}});
   for (const WorldResult& r : study.results) {
-    labels.push_back(fmt::format("{}, {}", cells_text(r.cells), r.width));
+    labels.push_back(fmt::format("{}, {}", cells_text(r), r.width));
     series[0].y.push_back(1e3 / r.rays[0].first_nanoseconds);
     for (std::size_t kind = 0; kind < 3; ++kind) series[kind + 1].y.push_back(1e3 / r.rays[kind].nanoseconds);
   }
   const std::vector<std::string> pictures = {
-      html_picture(study.picture_width, study.picture_height, study.rgb, cells_text(study.results[0].cells), 1),
+      html_picture(study.picture_width, study.picture_height, study.rgb, cells_text(study.results[0]), 1),
       svg_bar_plot({"rays", "", "millions a second", false, true}, labels, series)};
   return html_heading(study.spec->title, 2) + html_row(pictures) + html(size_table(study)) + html(rate_table(study));
 }

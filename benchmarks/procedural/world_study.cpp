@@ -174,6 +174,7 @@ WorldResult measure(const World& world, const WorldSpec::Case& each, const World
   const double shrink = options.shrink * each.shrink;
   WorldResult out;
   out.cells = each.cells;
+  out.room_bytes = cache_bytes() * static_cast<std::size_t>(each.room);
   out.width = static_cast<int>(world.spec->width / shrink);
   out.height = static_cast<int>(world.spec->height / shrink);
   // Of small pictures more, so that there are rays.
@@ -184,7 +185,7 @@ WorldResult measure(const World& world, const WorldSpec::Case& each, const World
   rays.of_kind[0] = primary_rays(world.scene.cameras[0].camera, out);
   std::vector<BenchHit> hits, others;
   const PeakMemory memory;
-  const WorldTracer tracer(world, each.cells, out.height, cache_bytes());
+  const WorldTracer tracer(world, each.cells, out.height, out.room_bytes);
   trace_round(tracer, BenchRayKind::kPrimary, rays.of_kind[0], 0, &hits, out.rays.data());
   // Hits are completed for rays that leave them: what tiles that takes is not counted.
   add_secondary_rays(tracer, hits, &rays);

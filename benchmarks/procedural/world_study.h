@@ -35,6 +35,7 @@ struct WorldResult {
   WorldCells cells;
   int width = 0, height = 0;                ///< of the picture
   int traced_width = 0, traced_height = 0;  ///< of the part in its middle that is traced
+  std::uint64_t room_bytes = 0;             ///< for heights
   std::uint64_t num_lattices = 0;
   double num_micro_triangles = 0, most_cells_a_side = 0;
   double prepare_seconds = 0;    ///< wall clock

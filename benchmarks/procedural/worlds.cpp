@@ -15,7 +15,11 @@ namespace {
 
 constexpr WorldSpec::Case kPotCases[] = {{{64, 0}, 1, 1}, {{128, 0}, 1, 1}, {{0, 0}, 1, 1}};
 // With N = 4096 everywhere nearly every ray needs tiles of its own, and takes a millisecond.
-constexpr WorldSpec::Case kTerrainCases[] = {{{0, 0.01}, 1, 1}, {{0, 0}, 1, 1}, {{0, 0}, 2, 1}, {{4096, 0}, 1, 12}};
+constexpr WorldSpec::Case kTerrainCases[] = {{{0, 0.01}, 1, 1},
+                                             {{0, 0}, 1, 1},
+                                             {{0, 0}, 1, 1, 4},
+                                             {{0, 0}, 2, 1},
+                                             {{4096, 0}, 1, 12}};
 constexpr WorldSpec::Case kPlanetCases[] = {{{0, 0}, 1, 1}, {{0, 0}, 2, 1}, {{4096, 0}, 1, 12}, {{4096, 0}, 2, 12}};
 
 constexpr WorldSpec kWorlds[] = {

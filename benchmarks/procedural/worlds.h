@@ -37,6 +37,7 @@ struct WorldSpec {
     WorldCells cells;
     int shrink = 1;  ///< the picture's sides are so many times smaller
     int crop = 1;    ///< of them this part is traced, in the middle
+    int room = 1;    ///< so many times the usual memory for heights
   };
   std::span<const Case> cases;
 };

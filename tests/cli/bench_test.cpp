@@ -123,11 +123,13 @@ TEST_F(Bench, ConeMapsOfFilesAreStudiedBesideTheOthers)
   const std::string map = folder_.write("map.tga", tga_grey(32, 20, texels)).string();
   const std::string small = folder_.write("small.tga", tga_grey(8, 8, texels.substr(0, 64))).string();
   const std::string json_file = file("cones.json");
-  const Outcome outcome = run({"bench", "heightfield", "--quick", "--map", map, "--json", json_file});
+  const Outcome outcome =
+      run({"bench", "heightfield", "--quick", "--map", map, "--cones", "quick,relaxed", "--json", json_file});
   ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
   const nlohmann::json json = nlohmann::json::parse(bytes_of_file(json_file));
   ASSERT_EQ(json["textures"].size(), 4u);
   EXPECT_EQ(json["textures"][3]["texture"], "map");
+  EXPECT_EQ(json["textures"][3]["generation_seconds"].size(), 4u);
   for (const nlohmann::json& row : json["textures"][3]["traced"]) {
     if (row["stepping"] == "every cell") {
       EXPECT_EQ(row["wrong"], 0);
