@@ -152,7 +152,7 @@ void heightfield_register(CLI::App& bench, Run& run)
       ->type_name("FILE");
   command
       ->add_option("--cones", arguments->cones,
-                   "Cone maps, separated by commas: conservative, quick, approximate relaxed, relaxed, quick relaxed "
+                   "Cone maps, separated by commas: conservative, quick, approximate-relaxed, relaxed, quick-relaxed "
                    "(default: all)")
       ->delimiter(',')
       ->check(one_of(bench_heightfield_cones()));

@@ -29,6 +29,13 @@ constexpr std::pair<const char*, ConeMap (*)(const HeightTexture&)> kConeMaps[] 
     {"relaxed", cone_map_relaxed},
     {"quick relaxed", cone_map_quick_relaxed}};
 
+/// A cone map's name on the command line.
+std::string option_name(std::string cone)
+{
+  std::replace(cone.begin(), cone.end(), ' ', '-');
+  return cone;
+}
+
 double processor_seconds()
 {
   timespec now{};
@@ -176,8 +183,8 @@ HeightfieldTexture study(const std::string& name, const HeightTexture& texture, 
   };
   std::vector<Map> maps;
   for (const auto& [cone, make] : kConeMaps) {
-    const bool is_wanted =
-        options.cones.empty() || std::find(options.cones.begin(), options.cones.end(), cone) != options.cones.end();
+    const bool is_wanted = options.cones.empty() || std::find(options.cones.begin(), options.cones.end(),
+                                                              option_name(cone)) != options.cones.end();
     if (is_wanted) maps.push_back({cone, make});
   }
   for (Map& map : maps) {
@@ -289,7 +296,7 @@ std::string conditions(const HeightfieldResults& results)
 std::vector<std::string> bench_heightfield_cones()
 {
   std::vector<std::string> names;
-  for (const auto& [cone, make] : kConeMaps) names.emplace_back(cone);
+  for (const auto& [cone, make] : kConeMaps) names.push_back(option_name(cone));
   return names;
 }
 

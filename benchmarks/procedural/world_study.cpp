@@ -115,7 +115,7 @@ void shade(const WorldTracer& tracer, const PictureRays& rays, int width, int he
     const Vec3f Ng = tracer.intersect(rays.of_kind[0][rays.pixel[k]]).Ng;
     const bool is_lit = !(shadows[k].t < kInfinity);
     const float sun = is_lit ? std::max(dot(Ng, kBenchSun), 0.0f) : 0.0f, sky = bounces[k].t < kInfinity ? 0.1f : 0.35f;
-    color[rays.pixel[k]] = sun * Vec3f{0.85f, 0.78f, 0.68f} + sky * Vec3f{0.6f, 0.65f, 0.75f};
+    color[rays.pixel[k]] = sun * Vec3f{0.5f, 0.45f, 0.38f} + sky * Vec3f{0.4f, 0.44f, 0.5f};
   }
   study->picture_width = width / 2;
   study->picture_height = height / 2;

@@ -31,7 +31,7 @@ SMALL = {"render": {"--resolution": "16x9", "--spp": "2", "--threads": "2", "--p
          "bench": {"--scenes": "glass", "--quick": None}}
 # What stands for the words of a usage line.
 WORDS = {"SCENE": "examples/cornell/cornell.gltf", "X,Y": "3,3", "X,Y[,SAMPLE]": "3,3", "I": "0", "FILE": "rays.txt", "A": "A.exr", "B": "B.exr",
-         "…": ""}
+         "MAP": "examples/displaced/cobbles.png", "…": ""}
 
 
 def blocks(text):
