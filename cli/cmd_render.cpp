@@ -39,6 +39,7 @@
 #include "exporters/png_ocio.h"
 #include "exporters/stats_json.h"
 #include "integrator/render.h"
+#include "scene/kept_images.h"
 #include "scene/load.h"
 
 namespace relief {
@@ -294,13 +295,21 @@ void report_skipped(ProgressPrinter& progress, const FramePaths& paths, int fram
   progress.event({{"event", "skipped"}, {"frame", frame}, {"output", paths.exr.string()}, {"reason", reason}});
 }
 
+/// What the frames of a run share.
+struct KeptFrames {
+  KeptImages images;
+  std::shared_ptr<HeightFields> fields = std::make_shared<HeightFields>();
+};
+
 /// One frame, from loading to files.
 /// @param files  of the run; what the frame reads is added
+/// @param kept   of the frames before; null: there is one frame
 /// @return false if it was interrupted
 bool render_frame(const RenderArguments& arguments,
                   const std::string& command,
                   std::optional<int> frame,
                   RunFiles& files,
+                  KeptFrames* kept,
                   ProgressPrinter& progress)
 {
   const FramePaths paths = paths_of_frame(arguments, frame);
@@ -318,10 +327,15 @@ bool render_frame(const RenderArguments& arguments,
   LoadOptions load = arguments.setup.load_options(frame);
   load.camera = camera_choice(arguments.picture);
   load.texture_budget_bytes = static_cast<std::size_t>(arguments.texture_memory_gib * (1u << 30));
+  if (kept != nullptr) load.kept = &kept->images;
   Scene scene = scene_load(arguments.scene, load);
   files.add_inputs("a file of the scene", scene.files);
 
   Statistics stats;
+  if (kept != nullptr) {
+    const KeptTally images = kept->images.end_frame();
+    stats.kept = {images.count, 0, images.bytes, images.seconds};
+  }
   stats.load_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - load_start).count();
   stats.scene = arguments.scene;
   stats.version = RELIEF_VERSION;
@@ -332,6 +346,7 @@ bool render_frame(const RenderArguments& arguments,
   if (arguments.strict) refuse_warnings(arguments.scene, stats.warnings);
 
   RenderOptions options = options_for(scene, arguments);
+  if (kept != nullptr) options.displacement.fields = kept->fields;
   PngOptions png{options.settings.view, options.settings.exposure};
   png.alpha = arguments.setup.background == "transparent";
   std::vector<FileStamp> files_read = std::move(scene.files);
@@ -414,9 +429,12 @@ int render_all(const RenderArguments& arguments, const std::string& command)
   exr_use_threads(threads > 1 ? threads : 0);
   tbb::task_arena arena(threads);
   ProgressPrinter progress(arguments.progress);
+  KeptFrames kept;
   for (const std::optional<int> frame : frames) {
     bool is_whole = false;
-    arena.execute([&] { is_whole = render_frame(arguments, command, frame, files, progress); });
+    arena.execute([&] {
+      is_whole = render_frame(arguments, command, frame, files, frames.size() > 1 ? &kept : nullptr, progress);
+    });
     if (!is_whole || interrupt_flag()) return kInterrupted;
   }
   return 0;

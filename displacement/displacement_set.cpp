@@ -150,7 +150,7 @@ DisplacementSet::Levels DisplacementSet::levels_of(const Use& use, const Displac
     levels.fixed = std::min(lod, kCoarsest) - static_cast<float>(levels.first);
     levels.count = levels.fixed > 0 ? 2 : 1;
   } else if (!tessellates) {
-    const HeightMapView& map = height_maps_[static_cast<std::size_t>(use.settings.height.texture_index)];
+    const HeightMapView& map = map_of(use).view;
     double side = mean_texels_a_side(use.mesh, use.settings.height, map.width, map.height);
     // Levels of the map end too: with one texel it is a constant.
     for (int texels = std::max(map.width, map.height); side >= 2 * kLeastTexelsASide && texels > 2; side /= 2) {
@@ -195,7 +195,8 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
       meshes_(input.meshes),
       heights_owner_(input.heights_owner),
       geometry_of_instance_(input.instances.size(), -1),
-      texel_of_instance_(input.instances.size(), 0.0f)
+      texel_of_instance_(input.instances.size(), 0.0f),
+      fields_(options.fields != nullptr ? options.fields : std::make_shared<HeightFields>())
 {
   const std::vector<Use> uses = find_uses(input);
   const auto num_displaced =
@@ -216,6 +217,7 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
     texel_of_instance_[i] =
         displaced(i).geometry.lod.texel * static_cast<float>(stretch_of(input.instances[i].world_from_object).most);
   }
+  kept_ = fields_->end_set();
 }
 
 std::unique_ptr<DisplacementSet::Displaced> DisplacementSet::make_displaced(const Use& use,
@@ -238,8 +240,8 @@ std::unique_ptr<DisplacementSet::Displaced> DisplacementSet::make_displaced(cons
     levels.by_cone = levels.count > 1;
   }
   for (int k = 0; k < levels.count; ++k) {
-    geometry.levels[k] = level(settings.height.texture_index, levels.first + k, displacement_method(displaced->method),
-                               geometry.rmip_options);
+    geometry.levels[k] =
+        fields_->level(map_of(use), levels.first + k, displacement_method(displaced->method), geometry.rmip_options);
     if (k > 0) coarser.push_back(geometry.levels[k].field);
   }
   displaced->mesh = DisplacedMesh(use.mesh, *geometry.levels[0].field,
@@ -262,7 +264,7 @@ std::unique_ptr<DisplacementSet::Displaced> DisplacementSet::make_computed(const
   HeightSource source = heights.source;
   if (source.eval == nullptr && use.settings.height.texture_index >= 0) {
     displaced->map_heights = std::make_unique<MapHeights>(
-        MapHeights{&use.mesh, use.settings.height, &field(use.settings.height.texture_index, 0).bounds.view()});
+        MapHeights{&use.mesh, use.settings.height, &fields_->field(map_of(use), 0).bounds.view()});
     source = displaced->map_heights->source();
   }
   if (use.settings.curved && use.mesh.N != nullptr && use.scale != 0) {
@@ -331,49 +333,19 @@ int DisplacementSet::num_faithful_levels(const Use& use, int most)
   const TextureRef& mapping = use.settings.height;
   const double scale = std::abs(use.scale);
   const MapDensity density = map_density(use.mesh, mapping);
-  const HeightMapView& map = height_maps_[static_cast<std::size_t>(mapping.texture_index)];
-  const double texel = 1 / std::sqrt(std::max(density.u * map.width * density.v * map.height, 1e-300));
+  const HeightFields::Map& map = map_of(use);
+  const double texel = 1 / std::sqrt(std::max(density.u * map.view.width * density.v * map.view.height, 1e-300));
   LevelLoss lost;
   for (int k = 1; k < most; ++k) {
-    const bool is_new = !fields_.contains({mapping.texture_index, k});
-    const HeightMapView fine = k > 1 ? field(mapping.texture_index, k - 1).level.view() : map;
-    Field& coarse = field(mapping.texture_index, k);
-    if (!coarse.loss) coarse.loss = level_loss(fine, coarse.level.view());
-    lost = lost + *coarse.loss;
+    const bool is_new = !fields_->has(map, k);
+    lost = lost + fields_->loss(map, k);
     const double slope = use.steepening * scale * (lost.slope_u * density.u + lost.slope_v * density.v);
     const double texels = scale * lost.height / (texel * (1 << k));
     if (slope <= kMostSlopeLost && texels <= kMostTexelsLost) continue;
-    if (is_new) fields_.erase({mapping.texture_index, k});
+    if (is_new) fields_->drop(map, k);
     return k;
   }
   return most;
-}
-
-DisplacementSet::Field& DisplacementSet::field(int map_index, int level)
-{
-  const auto [at, is_new] = fields_.try_emplace({map_index, level});
-  Field& field = at->second;
-  if (is_new) {
-    HeightMapView map = height_maps_[static_cast<std::size_t>(map_index)];
-    if (level > 0) {
-      field.level = HeightLevel(map, level);
-      map = field.level.view();
-    }
-    field.bounds = HeightField(map);
-  }
-  return field;
-}
-
-DisplacementLevel DisplacementSet::level(int map_index,
-                                         int level,
-                                         const DisplacementMethodEntry& method,
-                                         const RmipOptions& rmip_options)
-{
-  Field& f = field(map_index, level);
-  if (method.table_make == nullptr) return {&f.bounds.view(), nullptr};
-  const auto [at, is_new] = f.tables.try_emplace(method.table_make);
-  if (is_new) at->second = method.table_make(f.bounds.view(), rmip_options);
-  return {&f.bounds.view(), at->second.view};
 }
 
 DisplacedPoint DisplacementSet::resolve(std::size_t instance,
@@ -415,11 +387,7 @@ SeamReport DisplacementSet::seams(std::size_t index) const
 
 std::size_t DisplacementSet::bytes() const
 {
-  std::size_t sum = lattice_cache_ != nullptr ? lattice_cache_->bytes() : 0;
-  for (const auto& [key, field] : fields_) {
-    sum += field.level.bytes() + field.bounds.bytes();
-    for (const auto& [make, table] : field.tables) sum += table.bytes;
-  }
+  std::size_t sum = fields_->bytes() + (lattice_cache_ != nullptr ? lattice_cache_->bytes() : 0);
   for (const auto& displaced : geometries_) {
     sum += displaced->mesh.bytes();
     if (displaced->procedural != nullptr) sum += displaced->procedural->bytes();

@@ -14,7 +14,7 @@
 #include "displacement/curved_heights.h"
 #include "displacement/displaced_mesh.h"
 #include "displacement/embree_geometry.h"
-#include "displacement/height_level.h"
+#include "displacement/height_fields.h"
 #include "displacement/lattice_split.h"
 #include "displacement/map_heights.h"
 #include "displacement/seams.h"
@@ -42,7 +42,7 @@ struct ComputedHeights {
 struct DisplacementInput {
   std::vector<MeshView> meshes;
   std::vector<std::string> mesh_names;
-  std::vector<HeightMapView> height_maps;  ///< their texels must outlive the set
+  std::vector<HeightFields::Map> height_maps;  ///< their texels must outlive the set
   std::span<const DisplacementSettings> settings;
   std::vector<DisplacedInstance> instances;
   std::vector<ComputedHeights> heights;
@@ -60,6 +60,7 @@ struct DisplacementOptions {
   int picture_height = 0;                    ///< pixels, with a camera
   double num_rays = 0;  ///< that will be traced, about, for `auto` to weigh building against tracing
   std::uint64_t computed_bytes = std::uint64_t{256} << 20;  ///< computed heights that are kept, at most
+  std::shared_ptr<HeightFields> fields;                     ///< of the sets before; null: each set has its own
   std::uint64_t tessellation_bytes = 0;  ///< all tessellations may take while they are built; 0: half of the machine's
 };
 
@@ -99,10 +100,11 @@ class DisplacementSet {
   int displacement_index(std::size_t index) const { return geometries_[index]->displacement_index; }
   /// The texture seams of a displaced geometry's mesh.
   SeamReport seams(std::size_t index) const;
-  std::size_t bytes() const;            ///< besides the maps
-  std::uint64_t num_triangles() const;  ///< of all geometries
-  DisplacedMeshReport report() const;   ///< sums over all geometries
-  std::string method_names() const;     ///< of the geometries, separated by commas
+  std::size_t bytes() const;                                 ///< besides the maps
+  std::uint64_t num_triangles() const;                       ///< of all geometries
+  DisplacedMeshReport report() const;                        ///< sums over all geometries
+  const HeightFields::Tally& kept() const { return kept_; }  ///< of the sets before
+  std::string method_names() const;                          ///< of the geometries, separated by commas
   /// What `auto` chose by, a line a geometry.
   const std::vector<std::string>& reasons() const { return reasons_; }
   /// Parts of the surfaces that are missing.
@@ -154,21 +156,12 @@ class DisplacementSet {
                   bool is_auto,
                   double num_rays,
                   std::uint64_t* used_bytes);
-  /// A level of a height map with its bounds.
-  struct Field {
-    HeightLevel level;  ///< empty at level 0, which is the map itself
-    HeightField bounds;
-    std::optional<LevelLoss> loss;  ///< against the level before; where it was asked for
-    std::map<decltype(DisplacementMethodEntry::table_make), MethodTable> tables;  ///< where methods ask for them
-  };
-  Field& field(int map_index, int level);
-  /// A level with the table that a method needs, made once a field.
-  DisplacementLevel level(int map_index,
-                          int level,
-                          const DisplacementMethodEntry& method,
-                          const RmipOptions& rmip_options);
+  const HeightFields::Map& map_of(const Use& use) const
+  {
+    return height_maps_[static_cast<std::size_t>(use.settings.height.texture_index)];
+  }
 
-  std::vector<HeightMapView> height_maps_;
+  std::vector<HeightFields::Map> height_maps_;
   std::vector<MeshView> meshes_;
   std::shared_ptr<const void> heights_owner_;
   std::unique_ptr<LatticeCache> lattice_cache_;  ///< of computed heights; null: there are none
@@ -176,7 +169,8 @@ class DisplacementSet {
   std::vector<float> texel_of_instance_;
   bool has_levels_ = false;
   std::vector<std::string> reasons_;
-  std::map<std::pair<int, int>, Field> fields_;  ///< by height map and level
+  std::shared_ptr<HeightFields> fields_;
+  HeightFields::Tally kept_;
   std::vector<std::unique_ptr<Displaced>> geometries_;
 };
 

@@ -155,6 +155,10 @@ void SceneContext::fill(Statistics& stats) const
                         height_map_bytes(scene.height_maps),
                         0,
                         displacements.reasons()};
+  const HeightFields::Tally& fields = displacements.kept();
+  stats.kept.height_fields += fields.count;
+  stats.kept.bytes += fields.bytes;
+  stats.kept.seconds += fields.seconds;
 }
 
 }  // namespace relief

@@ -34,7 +34,7 @@ DisplacementSet scene_displacement(const Scene& scene, const DisplacementOptions
     input.meshes.push_back(mesh.view());
     input.mesh_names.push_back(mesh.name);
   }
-  for (const HeightMap& map : scene.height_maps) input.height_maps.push_back(map.view());
+  for (const HeightMap& map : scene.height_maps) input.height_maps.push_back({map.view(), map.texels});
   input.settings = scene.displacements;
   for (const Instance& instance : scene.instances) {
     input.instances.push_back({instance.mesh_index, displacement_of(scene, instance), -1, instance.world_from_object});

@@ -36,6 +36,14 @@ struct CausticStatistics {
   double seconds = 0;
 };
 
+/// What frames before had made already.
+struct KeptStatistics {
+  std::uint64_t images = 0;         ///< textures and height maps
+  std::uint64_t height_fields = 0;  ///< levels of height maps with their bounds and tables
+  std::uint64_t bytes = 0;          ///< of both
+  double seconds = 0;               ///< that making them took, summed over those made side by side
+};
+
 /// One sample of a pixel; x and y in the whole image.
 struct PixelSample {
   int x = 0, y = 0;
@@ -54,6 +62,7 @@ struct Statistics {
                 film_bytes = 0, path_state_bytes = 0;
   DisplacementStatistics displacement;
   CausticStatistics caustics;
+  KeptStatistics kept;
   Counters counters;
   std::vector<StageSeconds> stages;
   /// Of the samples that were dropped because they were not finite, the first in the picture's order.

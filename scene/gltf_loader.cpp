@@ -77,11 +77,12 @@ void add_files(Scene& scene, const std::vector<TextureRequest>& requests)
 void load_height_maps(Scene& scene,
                       const std::vector<TextureRequest>& requests,
                       std::vector<HeightMap> baked,
+                      KeptImages* kept,
                       Warnings& warnings)
 {
   if (requests.empty() && baked.empty()) return;
   add_files(scene, requests);
-  HeightMapSet heights = height_maps_load(requests, warnings);
+  HeightMapSet heights = height_maps_load(requests, warnings, kept);
   for (DisplacementSettings& displacement : scene.displacements) {
     if (displacement.has_graph || displacement.height.texture_index < 0) continue;
     displacement.height.texture_index =
@@ -596,7 +597,7 @@ void GltfLoader::set_camera(const LoadOptions& options)
   }
   if (!choice.look_from && !scene_.cameras.empty()) return;
   // Heights of float maps may be anything.
-  load_height_maps(scene_, height_maps_.take(), height_graphs_.take(), warnings_);
+  load_height_maps(scene_, height_maps_.take(), height_graphs_.take(), options.kept, warnings_);
   std::vector<float> reach_of;
   for (const DisplacementSettings& d : scene_.displacements) {
     HeightRange range{0, 1};  // what graphs mostly give
@@ -666,8 +667,9 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
       height_graphs = loader.take_height_graphs();
     }
     add_files(scene, textures);
-    load_height_maps(scene, height_maps, std::move(height_graphs), warnings);
-    const auto store = std::make_shared<TextureStore>(std::move(textures), options.texture_budget_bytes, warnings);
+    load_height_maps(scene, height_maps, std::move(height_graphs), options.kept, warnings);
+    const auto store =
+        std::make_shared<TextureStore>(std::move(textures), options.texture_budget_bytes, warnings, options.kept);
     scene.textures = store;
     if (environment_graphs.environment)
       surroundings_add_graph(scene.environment, *environment_graphs.environment, *store);

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "scene/image_reader.h"
+#include "scene/kept_images.h"
 #include "scene/memory.h"
 #include "scene/parallel.h"
 #include "scene/texture_store.h"
@@ -44,12 +45,19 @@ struct HeightFindings {
   std::int64_t num_coloured = 0;  ///< texels whose channels differ
 };
 
+/// An image as it was read.
+struct HeightTexels {
+  HeightMap map;  ///< size, format and texels
+  HeightFindings findings;
+
+  std::size_t bytes() const { return map.bytes(); }
+};
+
 /// One distinct image and what became of it.
 struct HeightImage {
   ImageSource source;
   std::string label;
-  HeightMap map;
-  HeightFindings findings;
+  std::shared_ptr<const HeightTexels> read;
 };
 
 /// Channels of an image that count: the one with the heights first, then those that should equal it.
@@ -94,7 +102,7 @@ std::int64_t channel_copy(const T* from,
 
 /// Reads an image band by band into texels of type T.
 template <class T>
-void texels_load(ImageReader& reader, HeightImage& image, T* texels)
+void texels_load(ImageReader& reader, HeightTexels& image, T* texels)
 {
   const std::vector<int> channels = height_channels(reader.header());
   const auto [low, high] = std::minmax_element(channels.begin(), channels.end());
@@ -140,17 +148,18 @@ void texels_repair(std::span<float> texels, int width, HeightFindings& findings)
       texels.begin(), texels.end(), [&](float h) { return !is_height(h); }, mean);
 }
 
-void image_load(HeightImage& image)
+/// @param name  of the image, for messages
+std::shared_ptr<const HeightTexels> image_read(const ImageSource& source, const std::string& name)
 {
-  ImageReader reader(image.source);
+  const auto out = std::make_shared<HeightTexels>();
+  HeightTexels& image = *out;
+  ImageReader reader(source);
   const ImageHeader& header = reader.header();
   HeightMap& map = image.map;
   map.width = header.width;
   map.height = header.height;
   map.format = height_format(header.sample_type);
-  image.findings = {};
-  const std::string label =
-      image.label + ", " + std::to_string(map.width) + " x " + std::to_string(map.height) + " texels";
+  const std::string label = name + ", " + std::to_string(map.width) + " x " + std::to_string(map.height) + " texels";
   try {
     // What is traced adds to the map a quarter of a byte a texel, and levels of detail a third of it.
     const MemoryReservation room(2 * map.bytes(), label);
@@ -169,6 +178,7 @@ void image_load(HeightImage& image)
         break;
     }
     map.texels = texels;
+    return out;
   } catch (const OutOfMemory&) {
     throw;
   } catch (const std::bad_alloc&) {
@@ -286,12 +296,18 @@ std::size_t height_map_bytes(std::span<const HeightMap> maps)
   return bytes;
 }
 
-HeightMapSet height_maps_load(std::span<const TextureRequest> requests, Warnings& warnings)
+HeightMapSet height_maps_load(std::span<const TextureRequest> requests, Warnings& warnings, KeptImages* kept)
 {
+  KeptImages own;
+  if (kept == nullptr) kept = &own;
   Grouping groups(requests);
-  for_each_in_parallel(groups.images.size(), [&](std::size_t i) { image_load(groups.images[i]); });
+  for_each_in_parallel(groups.images.size(), [&](std::size_t i) {
+    HeightImage& image = groups.images[i];
+    image.read = kept->get<HeightTexels>(KeptImages::key("heights", image.source),
+                                         [&] { return image_read(image.source, image.label); });
+  });
   for (const HeightImage& image : groups.images) {
-    warn(image.label, image.findings, warnings);
+    warn(image.label, image.read->findings, warnings);
   }
   for (const TextureRequest& request : requests) {
     if (request.filter == TexelFilter::kNearest) {
@@ -299,7 +315,7 @@ HeightMapSet height_maps_load(std::span<const TextureRequest> requests, Warnings
     }
   }
   for (std::size_t m = 0; m < groups.maps.size(); ++m) {
-    const HeightMap& loaded = groups.images[groups.image_of_map[m]].map;
+    const HeightMap& loaded = groups.images[groups.image_of_map[m]].read->map;
     HeightMap& map = groups.maps[m];
     map.width = loaded.width;
     map.height = loaded.height;

@@ -13,6 +13,7 @@
 
 namespace relief {
 
+class KeptImages;       // scene/kept_images.h
 struct TextureRequest;  // scene/texture_store.h
 
 /// Larger heights are taken for damage: their squares would leave single precision.
@@ -55,9 +56,10 @@ struct HeightMapSet {
 /// mean of the others, 0 if there are none.
 /// @param requests  colour and filter are ignored: heights are linear data, interpolated bilinearly
 /// @param warnings  replaced texels with their number and the first place, colour channels that differ, nearest filters
+/// @param kept      of the frames before, if there are any
 /// @error SceneError naming the file and JSON path of an image that is missing, unreadable or absurdly large
 /// @cost  memory: the map, and 64 MiB or 64 rows of the image on top
-HeightMapSet height_maps_load(std::span<const TextureRequest> requests, Warnings& warnings);
+HeightMapSet height_maps_load(std::span<const TextureRequest> requests, Warnings& warnings, KeptImages* kept = nullptr);
 
 /// Room for a map's texels, aligned.
 /// @error std::bad_alloc

@@ -11,6 +11,8 @@
 
 namespace relief {
 
+class KeptImages;  // scene/kept_images.h
+
 struct LoadOptions {
   double frame = 0;        ///< animation time in frames; used only if `has_frame`
   bool has_frame = false;  ///< false: rest pose
@@ -19,6 +21,7 @@ struct LoadOptions {
   std::optional<EnvironmentChoice> environment;             ///< empty: the scene's
   std::optional<bool> environment_visible;                  ///< to cameras; empty: as the environment has it
   std::size_t texture_budget_bytes = std::size_t{4} << 30;  ///< above it textures go through a tile cache
+  KeptImages* kept = nullptr;                               ///< of the frames before; gets this frame's
 };
 
 /// Loads, composes, validates and resolves a scene.

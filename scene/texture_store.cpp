@@ -4,11 +4,11 @@
 #include <cstring>
 #include <new>
 #include <numeric>
-#include <optional>
 #include <string_view>
 #include <tuple>
 #include <unordered_map>
 
+#include "scene/kept_images.h"
 #include "scene/memory.h"
 #include "scene/mip_chain.h"
 #include "scene/parallel.h"
@@ -24,6 +24,14 @@ constexpr int kBandRows = 256;
 /// Tiles in use by the threads at one time must fit, whatever the budget.
 constexpr std::size_t kLeastCacheBytes = std::size_t{64} << 20;
 
+/// An image as it was read, to stay in memory.
+struct TextureTexels {
+  MipChain chain;
+  TexelRepairs repairs;
+
+  std::size_t bytes() const { return chain.bytes(); }
+};
+
 /// One distinct image and what became of it.
 struct Image {
   TextureSource source;
@@ -33,7 +41,7 @@ struct Image {
   TexelRepairs repairs;
   bool cached = false;
   std::size_t cache_index = 0;
-  std::optional<MipChain> chain;
+  std::shared_ptr<const TextureTexels> read;  ///< null: it is served by the cache
 };
 
 /// What messages about memory call an image.
@@ -45,7 +53,7 @@ std::string label_with_size(const Image& image)
 
 /// Reads all rows, in bands: to keep them, or only to know that they can be read.
 /// @param destination  level 0, or null
-void rows_load(Image& image, unsigned char* destination)
+TexelRepairs rows_load(const Image& image, unsigned char* destination)
 {
   TextureReader reader(image.source);
   const std::size_t row_bytes = texel_row_bytes(image.layout);
@@ -64,21 +72,29 @@ void rows_load(Image& image, unsigned char* destination)
         destination == nullptr ? scratch.data() : destination + static_cast<std::size_t>(y) * row_bytes;
     reader.read_rows(y, end, texels);
   }
-  image.repairs = reader.repairs();
+  return reader.repairs();
 }
 
-void image_load(Image& image)
+std::shared_ptr<const TextureTexels> image_read(const Image& image)
+{
+  const MemoryReservation room(mip_chain_bytes(image.layout), label_with_size(image));
+  const auto out = std::make_shared<TextureTexels>(TextureTexels{MipChain(image.layout), {}});
+  out->repairs = rows_load(image, out->chain.level(0));
+  mip_chain_build(out->chain);
+  return out;
+}
+
+void image_load(Image& image, KeptImages& kept)
 {
   try {
     if (image.cached) {
       // The cache would meet damaged data only while rendering; it is found here instead.
-      rows_load(image, nullptr);
+      image.repairs = rows_load(image, nullptr);
       return;
     }
-    const MemoryReservation room(mip_chain_bytes(image.layout), label_with_size(image));
-    image.chain.emplace(image.layout);
-    rows_load(image, image.chain->level(0));
-    mip_chain_build(*image.chain);
+    const char* const kind = image.source.color == TextureColor::kSrgb ? "texture sRGB" : "texture linear";
+    image.read = kept.get<TextureTexels>(KeptImages::key(kind, image.source), [&] { return image_read(image); });
+    image.repairs = image.read->repairs;
   } catch (const OutOfMemory&) {
     throw;
   } catch (const std::bad_alloc&) {
@@ -189,9 +205,14 @@ struct TextureStore::Impl {
   std::vector<std::string> labels;
 };
 
-TextureStore::TextureStore(std::vector<TextureRequest> requests, std::size_t budget_bytes, Warnings& warnings)
+TextureStore::TextureStore(std::vector<TextureRequest> requests,
+                           std::size_t budget_bytes,
+                           Warnings& warnings,
+                           KeptImages* kept)
     : impl_(std::make_unique<Impl>())
 {
+  KeptImages own;
+  if (kept == nullptr) kept = &own;
   ImageGroups groups;
   for (TextureRequest& request : requests) {
     impl_->image_of_texture.push_back(groups.add(request));
@@ -203,12 +224,13 @@ TextureStore::TextureStore(std::vector<TextureRequest> requests, std::size_t bud
     images[i].source.encoded = images[i].encoded;
     images[i].layout = TextureReader(images[i].source).layout();
   });
-  // Where memory is short, the tile cache is better than an end.
-  const auto budget = static_cast<std::size_t>(std::min<std::uint64_t>(budget_bytes, memory_left() / 2));
+  // Where memory is short, the tile cache is better than an end. What is there already needs none.
+  const auto budget =
+      static_cast<std::size_t>(std::min<std::uint64_t>(budget_bytes, memory_left() / 2 + kept->bytes()));
   if (const std::size_t cache_bytes = choose_cached(images, budget); cache_bytes > 0) {
     impl_->cache = std::make_unique<TextureCache>(cache_bytes);
   }
-  for_each_in_parallel(images.size(), [&](std::size_t i) { image_load(images[i]); });
+  for_each_in_parallel(images.size(), [&](std::size_t i) { image_load(images[i], *kept); });
   for (Image& image : images) {
     warn(image, warnings);
     if (image.cached) {
@@ -223,7 +245,7 @@ TextureStore::TextureStore(std::vector<TextureRequest> requests, std::size_t bud
     const Image& image = images[impl_->image_of_texture[i]];
     impl_->views.push_back(image.cached
                                ? impl_->cache->view(image.cache_index, request.wrap_u, request.wrap_v, request.filter)
-                               : resident_view(*image.chain, request));
+                               : resident_view(image.read->chain, request));
   }
 }
 
@@ -239,16 +261,17 @@ int TextureStore::add_image(std::string label,
   Image image;
   image.label = label;
   image.layout = {width, height, 3, TexelFormat::kHalf};
-  image.chain.emplace(image.layout);
-  auto* texels = reinterpret_cast<std::uint16_t*>(image.chain->level(0));
+  const auto read = std::make_shared<TextureTexels>(TextureTexels{MipChain(image.layout), {}});
+  auto* texels = reinterpret_cast<std::uint16_t*>(read->chain.level(0));
   std::transform(rgb.begin(), rgb.end(), texels,
                  [](float value) { return half_from_float(clamp(value, -kHalfMax, kHalfMax)); });
-  mip_chain_build(*image.chain);
+  mip_chain_build(read->chain);
   TextureRequest request;
   request.wrap_u = wrap_u;
   request.wrap_v = wrap_v;
   // Views look into the chain's own block, which stays where it is when the images move.
-  impl_->views.push_back(resident_view(*image.chain, request));
+  impl_->views.push_back(resident_view(read->chain, request));
+  image.read = read;
   impl_->image_of_texture.push_back(impl_->images.size());
   impl_->images.push_back(std::move(image));
   impl_->labels.push_back(std::move(label));
@@ -261,7 +284,7 @@ std::size_t TextureStore::bytes() const
 {
   std::size_t bytes = 0;
   for (const Image& image : impl_->images) {
-    bytes += image.chain ? image.chain->bytes() : 0;
+    bytes += image.read != nullptr ? image.read->bytes() : 0;
   }
   return bytes;
 }

@@ -14,6 +14,8 @@
 
 namespace relief {
 
+class KeptImages;  // scene/kept_images.h
+
 /// How a texture's numbers are to be read.
 enum class TextureColor : std::uint8_t { kSrgb, kLinear };
 
@@ -32,8 +34,12 @@ class TextureStore {
  public:
   /// Reads all textures (in parallel). Equal (image, colour) pairs share their texels.
   /// @param budget_bytes  of texels that stay in memory; half of what memory is left, if that is less
+  /// @param kept          of the frames before, if there are any
   /// @error SceneError naming the file and JSON path of an image that is missing, unreadable or absurdly large
-  TextureStore(std::vector<TextureRequest> requests, std::size_t budget_bytes, Warnings& warnings);
+  TextureStore(std::vector<TextureRequest> requests,
+               std::size_t budget_bytes,
+               Warnings& warnings,
+               KeptImages* kept = nullptr);
   ~TextureStore();
   TextureStore(const TextureStore&) = delete;
   TextureStore& operator=(const TextureStore&) = delete;

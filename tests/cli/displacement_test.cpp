@@ -397,6 +397,38 @@ TEST_F(DisplacementProgram, OptionsOfMapsAreSaidToHaveNoEffectOnHeightsThatAreCo
   EXPECT_NE(errors({"--lod", "2"}).find("a level of detail" + of_maps), std::string::npos);
 }
 
+TEST_F(DisplacementProgram, FramesKeepMapsAndTheirTables)
+{
+  GltfBuilder b = displaced_square();
+  const int times = b.accessor<float>({0, 1}, "SCALAR"), places = b.accessor<float>({0, 0, 0, .2f, 0, 0}, "VEC3");
+  b.push("animations", {{"samplers", {{{"input", times}, {"output", places}}}},
+                        {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}}}}});
+  const std::string scene = bumpy(b);
+  for (const std::string method : {"chord", "rmip"}) {
+    const Arguments options = {"--displacement", method,  "--lod", "1",     "--resolution",
+                               "24x24",          "--spp", "2",     "--aov", "beauty,depth"};
+    const auto rendered = [&](const std::string& frames, const std::string& name) {
+      Arguments all = {"--frames", frames, "--stats", file(name + ".#.json")};
+      all.insert(all.end(), options.begin(), options.end());
+      const Outcome outcome = render(scene, file(name + ".#.exr"), all);
+      EXPECT_EQ(outcome.exit_code, 0) << outcome.errors;
+    };
+    const auto kept = [&](const std::string& name) {
+      return nlohmann::json::parse(bytes_of_file(file(name + ".json")))["kept"];
+    };
+    rendered("1-3", "all");
+    rendered("3", "alone");
+    EXPECT_EQ(kept("all.1")["images"], 0);
+    EXPECT_EQ(kept("all.1")["height_fields"], 0);
+    EXPECT_EQ(kept("all.3")["images"], 1);
+    EXPECT_EQ(kept("all.3")["height_fields"], 1);
+    EXPECT_GT(kept("all.3")["bytes"], 16);
+    EXPECT_EQ(kept("alone.3")["images"], 0);
+    for (const char* channel : {"R", "depth.Z"})
+      EXPECT_EQ(values_of(file("all.3.exr"), channel), values_of(file("alone.3.exr"), channel));
+  }
+}
+
 TEST_F(DisplacementProgram, StepsInPicturesAndStatisticsAgree)
 {
   const std::string scene = bumpy();
