@@ -27,6 +27,8 @@ bool count_bytes(void* user, ssize_t bytes, bool)
   return true;
 }
 
+}  // namespace
+
 RTCRay embree_ray(const BenchRay& ray)
 {
   RTCRay out;
@@ -53,8 +55,6 @@ RTCRayHit embree_ray_hit(const BenchRay& ray)
   out.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   return out;
 }
-
-}  // namespace
 
 double tessellation_rate_within(const DisplacedMeshView& mesh,
                                 TessellationKind kind,

@@ -34,6 +34,11 @@ struct BenchRay {
   Vec3f O, D;  ///< D is unit
 };
 
+/// A ray from 0 to infinity, as Embree takes it.
+RTCRay embree_ray(const BenchRay& ray);
+/// The same, with no hit yet.
+RTCRayHit embree_ray_hit(const BenchRay& ray);
+
 /// How a ray ended.
 struct BenchHit {
   float t = kInfinity;  ///< infinite: missed; shadow rays: 0 if something is in the way

@@ -20,20 +20,6 @@ bool count_bytes(void* user, ssize_t bytes, bool)
   return true;
 }
 
-RTCRay embree_ray(const BenchRay& ray)
-{
-  return {ray.O.x, ray.O.y, ray.O.z, 0.0f, ray.D.x, ray.D.y, ray.D.z, 0.0f, kInfinity, ~0u, 0, 0};
-}
-
-RTCRayHit embree_ray_hit(const BenchRay& ray)
-{
-  RTCRayHit out;
-  out.ray = embree_ray(ray);
-  out.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  out.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  return out;
-}
-
 /// Sides that are as long as this have one cell, whatever their size in the picture. (As counts are powers of two, cells are up
 /// to half as long.)
 CellsAlong no_finer(CellsAlong cells, double least_metres)

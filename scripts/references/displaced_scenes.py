@@ -64,6 +64,12 @@ class _Scene:
         quad = meshes.quad((-half, y, half), (2 * half, 0, 0), (0, 0, -2 * half))
         self.node("floor", self.mesh("floor", quad, gltf.lambert("floor", color)))
 
+    def terrace(self):
+        """A floor under a blue sky and a sun."""
+        self.floor(SLATE)
+        self.environment(color=[0.6, 0.8, 1.0], strength=0.3)
+        self.document.add_sun((-0.7, 0.8, 0.5), (2.6, 2.4, 2.0))
+
     def checker(self, y, half, colors=((0.7, 0.2, 0.1), (0.2, 0.4, 0.7)), size=1.0):
         for i, color in enumerate(colors):
             tiles = [
@@ -141,9 +147,7 @@ def displaced_sphere(steps):
     texels[0] = texels[-1] = 0
     heights = HeightMap(_stored(texels, 8), 0.35, 0.2, (5.0, 1.0))
     scene.node("ball", scene.by_map("ball", _ball(10, 6), gltf.lambert("clay", CLAY), heights), translation=[0, 1.1, 0])
-    scene.floor(SLATE)
-    scene.environment(color=[0.6, 0.8, 1.0], strength=0.3)
-    scene.document.add_sun((-0.7, 0.8, 0.5), (2.6, 2.4, 2.0))
+    scene.terrace()
     scene.document.add_camera((0.8, 2.6, 4.6), (0, 0.95, 0), 36)
     return scene
 
@@ -258,9 +262,7 @@ def displaced_graph(steps):
         material["extensions"]["RELIEF_displacement"] = settings
         mesh = scene.mesh("waves", solid, material)
     scene.node("waves", mesh, translation=[0, 1.1, 0], rotation=list(vector.axis_angle((1, 0, 0), 20)))
-    scene.floor(SLATE)
-    scene.environment(color=[0.6, 0.8, 1.0], strength=0.3)
-    scene.document.add_sun((-0.7, 0.8, 0.5), (2.6, 2.4, 2.0))
+    scene.terrace()
     scene.document.add_camera((0.8, 2.6, 4.6), (0, 0.95, 0), 36)
     return scene
 
@@ -288,9 +290,7 @@ def displaced_curved(steps):
             material["extensions"]["RELIEF_displacement"] = settings
             mesh = scene.document.add_mesh_like(name, stored, scene.document.add_material(material))
         scene.node(name, mesh, translation=[x, 1.0, 0])
-    scene.floor(SLATE)
-    scene.environment(color=[0.6, 0.8, 1.0], strength=0.3)
-    scene.document.add_sun((-0.7, 0.8, 0.5), (2.6, 2.4, 2.0))
+    scene.terrace()
     scene.document.add_camera((0.3, 2.4, 5.6), (0, 0.75, 0), 36)
     return scene
 
@@ -341,9 +341,7 @@ def displaced_instances(steps):
         material = gltf.lambert("green", (0.4, 0.6, 0.45))
         scene.node("world", scene.by_map("world", ball, material, heights, space="world"), translation=list(place),
                    scale=list(size))
-    scene.floor(SLATE)
-    scene.environment(color=[0.6, 0.8, 1.0], strength=0.3)
-    scene.document.add_sun((-0.7, 0.8, 0.5), (2.6, 2.4, 2.0))
+    scene.terrace()
     scene.document.add_camera((0.3, 2.6, 4.6), (0, 0.45, 0), 36)
     return scene
 
