@@ -38,10 +38,12 @@ function(relief_add_library name)
 endfunction()
 
 # relief_add_tests(NAME LABELS l... LIBRARIES t... SOURCES s...): one GoogleTest executable, each TEST a CTest test.
+# Compiled with relief_test_options besides the project's own.
 function(relief_add_tests name)
   cmake_parse_arguments(arg "" "" "LABELS;LIBRARIES;SOURCES" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} GTest::gtest_main)
+  target_compile_options(${name} PRIVATE ${relief_test_options})
   include(GoogleTest)
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
   # Its PROPERTIES take no lists: of several labels only the first would remain. CTest includes this file after the one
