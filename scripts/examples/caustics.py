@@ -46,12 +46,6 @@ def ribbed(u, v):
     return 0.5 + 0.5 * inside * math.sin(2.0 * math.pi * (u + v))
 
 
-def _height_map(height, size):
-    """A square 16-bit PNG of height(u, v), both in [0, 1), heights in [0, 1]."""
-    centers = [(i + 0.5) / size for i in range(size)]
-    return images.png([[(round(65535 * height(u, v)),) for u in centers] for v in centers], bits=16)
-
-
 def _tumbler():
     """Outside wall from foot to rim, and all that closes it: rim, inside, and the foot from below."""
     steps, segments = 9, 80
@@ -82,7 +76,7 @@ def build():
     profile = [(6.0, 0.0), *((-5.0 - z, y) for z, y in bend), (-8.0, 8.0)]
     document.add_node("table", mesh=document.add_mesh("table", swept(profile, 12.0), document.add_material(table)))
 
-    bumps = document.add_texture("hammered.png", _height_map(hammered, MAP_SIZE))
+    bumps = document.add_texture("hammered.png", images.height_map(hammered, MAP_SIZE))
     wall, inside, below = _tumbler()
     # A millimetre above the table: two surfaces in one plane would be a draw.
     place = {"translation": [0.45, 0.001, 0.0]}
@@ -92,7 +86,7 @@ def build():
     document.add_node("inside", mesh=document.add_mesh("inside", inside, plain), **place)
     document.add_node("foot", mesh=document.add_mesh("foot", below, plain), **place)
 
-    ribs = document.add_texture("ribs.png", _height_map(ribbed, 64))
+    ribs = document.add_texture("ribs.png", images.height_map(ribbed, 64))
     amber = displaced(glass("amber", 1.5, 0.0, (0.95, 0.5, 0.1), 0.35), ribs, 0.10, 0.5, (12, 1), smoothing=True)
     document.add_node(
         "ball",

@@ -5,19 +5,12 @@ import math
 
 from . import images
 from .gltf import Document, dielectric, displaced, lambert
-from .meshes import Mesh
+from .meshes import Mesh, ground
 from .vector import axis_angle, smoothstep
 
 MAP_SIZE = 256
 SAND_TILES = (25, 25)
 TREAD_TILES = (6, 1)
-
-
-def _height_map(height):
-    """A 16-bit PNG of height(u, v), both in [0, 1), heights in [0, 1]."""
-    centers = [(i + 0.5) / MAP_SIZE for i in range(MAP_SIZE)]
-    rows = [[(round(65535 * min(max(height(u, v), 0.0), 1.0)),) for u in centers] for v in centers]
-    return images.png(rows, bits=16)
 
 
 def sand(u, v):
@@ -38,21 +31,6 @@ def tread(u, v):
     middle = smoothstep(0.02, 0.05, abs(across))
     rim = 1.0 - smoothstep(0.012, 0.03, abs(abs(across) - 0.6))
     return 0.1 + 0.85 * outer * gap * middle + 0.3 * rim
-
-
-def _ground():
-    """Sixty-four squares, facing up."""
-    half, squares = 9.0, 8
-    steps = [i / squares for i in range(squares + 1)]
-    positions = [(half * (2 * u - 1), 0.0, half * (2 * v - 1)) for v in steps for u in steps]
-    triangles = []
-    for row in range(squares):
-        for column in range(squares):
-            a = row * (squares + 1) + column
-            below = a + squares + 1
-            triangles += [(a, below, below + 1), (a, below + 1, a + 1)]
-    uvs = [(u, v) for v in steps for u in steps]
-    return Mesh(positions, triangles, [(0.0, 1.0, 0.0)] * len(positions), uvs)
 
 
 def _tire():
@@ -84,12 +62,12 @@ def build():
     document.add_sun((-0.75, 0.4, 0.3), (5.4, 4.5, 3.4))
 
     dune = lambert("sand", (0.46, 0.32, 0.18))
-    sand_map = document.add_texture("sand.png", _height_map(sand))
+    sand_map = document.add_texture("sand.png", images.height_map(sand, MAP_SIZE))
     dune = displaced(dune, sand_map, 0.06, 0.5, SAND_TILES, smoothing=True)
-    document.add_node("ground", mesh=document.add_mesh("ground", _ground(), document.add_material(dune)))
+    document.add_node("ground", mesh=document.add_mesh("ground", ground(9.0, 8), document.add_material(dune)))
 
     rubber = dielectric("rubber", (0.025, 0.024, 0.023), 0.55)
-    tread_map = document.add_texture("tread.png", _height_map(tread))
+    tread_map = document.add_texture("tread.png", images.height_map(tread, MAP_SIZE))
     rubber = displaced(rubber, tread_map, 0.08, 0.0, TREAD_TILES)
     document.add_node(
         "tire",

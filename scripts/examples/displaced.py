@@ -4,19 +4,12 @@ import math
 
 from . import images
 from .gltf import Document, dielectric, displaced, lambert
-from .meshes import Mesh, uv_sphere
+from .meshes import ground, uv_sphere
 from .vector import axis_angle, smoothstep
 
 MAP_SIZE = 256
 WEAVE_TILES = (12, 6)
 COBBLE_TILES = (10, 10)
-
-
-def _height_map(height):
-    """A 16-bit PNG of height(u, v), both in [0, 1), heights in [0, 1]."""
-    centers = [(i + 0.5) / MAP_SIZE for i in range(MAP_SIZE)]
-    rows = [[(round(65535 * height(u, v)),) for u in centers] for v in centers]
-    return images.png(rows, bits=16)
 
 
 def _strand(across, along):
@@ -74,21 +67,6 @@ def _sphere():
     return mesh
 
 
-def _ground():
-    """Sixty-four squares, facing up."""
-    half, squares = 20.0, 8
-    steps = [i / squares for i in range(squares + 1)]
-    positions = [(half * (2 * u - 1), 0.0, half * (2 * v - 1)) for v in steps for u in steps]
-    uvs = [(u, v) for v in steps for u in steps]
-    triangles = []
-    for row in range(squares):
-        for column in range(squares):
-            a = row * (squares + 1) + column
-            below = a + squares + 1
-            triangles += [(a, below, below + 1), (a, below + 1, a + 1)]
-    return Mesh(positions, triangles, [(0.0, 1.0, 0.0)] * len(positions), uvs)
-
-
 def build():
     document = Document("displaced", {"resolution": [768, 432], "samples": 64, "maxBounces": 4})
     sky = images.sky(horizon=(0.95, 0.86, 0.76), zenith=(0.12, 0.25, 0.55), ground=(0.2, 0.18, 0.15))
@@ -96,12 +74,12 @@ def build():
     document.add_sun((-0.75, 0.55, 0.45), (5.4, 4.5, 3.4))
 
     stone = lambert("cobbles", (0.24, 0.225, 0.21))
-    cobble_map = document.add_texture("cobbles.png", _height_map(cobbles))
+    cobble_map = document.add_texture("cobbles.png", images.height_map(cobbles, MAP_SIZE))
     stone = displaced(stone, cobble_map, 0.22, 0.5, COBBLE_TILES, smoothing=True)
-    document.add_node("ground", mesh=document.add_mesh("ground", _ground(), document.add_material(stone)))
+    document.add_node("ground", mesh=document.add_mesh("ground", ground(20.0, 8), document.add_material(stone)))
 
     wicker = dielectric("wicker", (0.42, 0.20, 0.07), 0.45)
-    weave_map = document.add_texture("weave.png", _height_map(weave))
+    weave_map = document.add_texture("weave.png", images.height_map(weave, MAP_SIZE))
     wicker = displaced(wicker, weave_map, 0.09, 0.5, WEAVE_TILES)
     # The poles, where the strands run together, are at the sides.
     document.add_node(

@@ -38,6 +38,13 @@ def png(rows, bits=8):
     )
 
 
+def height_map(height, size):
+    """A square 16-bit PNG of height(u, v), both in [0, 1)."""
+    centers = [(i + 0.5) / size for i in range(size)]
+    rows = [[(round(65535 * min(max(height(u, v), 0.0), 1.0)),) for u in centers] for v in centers]
+    return png(rows, bits=16)
+
+
 def hdr(rows):
     """A run-length encoded Radiance HDR of rows of linear RGB floats; width from 8 to 32767."""
     width = len(rows[0])

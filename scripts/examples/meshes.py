@@ -170,6 +170,25 @@ def lathe(profile, segments):
     return Mesh(positions, triangles, normals, uvs)
 
 
+def _grid(columns, rows):
+    """Triangles between (columns + 1) × (rows + 1) points in rows."""
+    triangles = []
+    for row in range(rows):
+        for column in range(columns):
+            a = row * (columns + 1) + column
+            below = a + columns + 1
+            triangles += [(a, below, below + 1), (a, below + 1, a + 1)]
+    return triangles
+
+
+def ground(half, squares):
+    """squares × squares squares about the origin, facing up, with texture coordinates."""
+    steps = [i / squares for i in range(squares + 1)]
+    positions = [(half * (2 * u - 1), 0.0, half * (2 * v - 1)) for v in steps for u in steps]
+    uvs = [(u, v) for v in steps for u in steps]
+    return Mesh(positions, _grid(squares, squares), [(0.0, 1.0, 0.0)] * len(positions), uvs)
+
+
 def height_field(height, half_width, half_depth, columns, rows):
     """A smooth surface y = height(x, z) over a rectangle about the origin, facing up."""
     positions, normals = [], []
@@ -182,13 +201,7 @@ def height_field(height, half_width, half_depth, columns, rows):
             slope_z = (height(x, z + delta) - height(x, z - delta)) / (2 * delta)
             positions.append((x, height(x, z), z))
             normals.append(vector.normalize((-slope_x, 1.0, -slope_z)))
-    triangles = []
-    for row in range(rows):
-        for column in range(columns):
-            a = row * (columns + 1) + column
-            below = a + columns + 1
-            triangles += [(a, below, below + 1), (a, below + 1, a + 1)]
-    return Mesh(positions, triangles, normals)
+    return Mesh(positions, _grid(columns, rows), normals)
 
 
 def swept(profile, half_width):
