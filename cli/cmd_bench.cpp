@@ -91,7 +91,7 @@ int bench_displacement(const BenchArguments& arguments)
 /// What benches of one study have in common.
 struct StudyArguments {
   std::string json, html;
-  std::vector<std::string> maps;  ///< files that are read
+  std::vector<std::string> inputs;  ///< files that are read
   int rounds = 3;
   bool quick = false;
 };
@@ -108,7 +108,7 @@ int bench_study(const StudyArguments& arguments,
   RunFiles files;
   files.add_output("--json", arguments.json);
   files.add_output("--html", arguments.html);
-  for (const std::string& map : arguments.maps) files.add_input("a height map", map);
+  for (const std::string& input : arguments.inputs) files.add_input("an input", input);
   for (const std::string& output : {arguments.json, arguments.html}) check_writable(output);
   options.rounds = arguments.quick ? 1 : arguments.rounds;
   if (isatty(STDERR_FILENO) != 0) {
@@ -148,7 +148,7 @@ void heightfield_register(CLI::App& bench, Run& run)
   command->add_option("--size", arguments->size, "Texels along a side of the height maps")
       ->check(one_of({"16", "32", "64", "128", "256", "512"}))
       ->capture_default_str();
-  command->add_option("--map", arguments->maps, "Image of heights that is studied too; may be given several times")
+  command->add_option("--map", arguments->inputs, "Image of heights that is studied too; may be given several times")
       ->type_name("FILE");
   command
       ->add_option("--cones", arguments->cones,
@@ -161,7 +161,7 @@ void heightfield_register(CLI::App& bench, Run& run)
     run = [arguments] {
       HeightfieldOptions options;
       options.size = arguments->size;
-      options.maps = arguments->maps;
+      options.maps = arguments->inputs;
       options.cones = arguments->cones;
       if (arguments->quick) {
         options.size = 16;
@@ -184,14 +184,19 @@ void procedural_register(CLI::App& bench, Run& run)
   auto arguments = std::make_shared<Arguments>();
   command
       ->add_option("--parts", arguments->parts,
-                   "Parts, separated by commas: marching, lattice, pot, terrain, planet (default: all)")
+                   "Parts, separated by commas: marching, lattice, smoothing, pot, terrain, planet (default: all)")
       ->delimiter(',')
       ->check(one_of(bench_procedural_parts()));
+  command
+      ->add_option("--mesh", arguments->inputs,
+                   "Scene whose meshes are smoothed beside the icosahedron; may be given several times")
+      ->type_name("FILE");
   add_study_options(*command, *arguments);
   command->callback([&run, arguments] {
     run = [arguments] {
       ProceduralOptions options;
       options.parts = arguments->parts;
+      options.meshes = arguments->inputs;
       if (arguments->quick) {
         options.num_rays = 500;
         options.world_shrink = 16;

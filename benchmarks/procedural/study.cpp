@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <ctime>
+#include <filesystem>
 #include <random>
 
 #include <fmt/format.h>
@@ -15,6 +16,7 @@
 #include "exporters/report_html.h"
 #include "integrator/stages.h"
 #include "kernel/graph/noise.h"
+#include "scene/load.h"
 
 namespace relief {
 
@@ -25,6 +27,7 @@ constexpr double kAmplitude = 0.5;  ///< of the radius, as in the paper's Fig. 1
 constexpr std::size_t kCacheBytes = std::size_t{64} << 20;
 constexpr const char* kMarching = "marching";
 constexpr const char* kLattice = "lattice";
+constexpr const char* kSmoothing = "smoothing";
 
 double processor_seconds()
 {
@@ -257,6 +260,41 @@ void run_marches(const Face& face,
   }
 }
 
+Table smoothing_table(const ProceduralResults& results)
+{
+  Table table{
+      "A smooth surface through the vertices",
+      "Angles between normals on either side of the triangles' sides, degrees, at 15 points of each: of the flat "
+      "triangles, and of the surface that is displaced with `curved` (the paper's section 4, Fig. 8). Left out: "
+      "sides where normals are so far apart that there is no such surface.",
+      {"mesh", "triangles", "sides", "left out", "flat: largest", "mean", "curved: largest", "mean", "points over .1°"},
+      {}};
+  for (const SmoothingResult& r : results.smoothings) {
+    table.rows.push_back({r.mesh, std::to_string(r.num_triangles), std::to_string(r.num_sides),
+                          std::to_string(r.num_left_out), fmt::format("{:.3g}", r.flat.largest),
+                          fmt::format("{:.3g}", r.flat.mean), fmt::format("{:.3g}", r.curved.largest),
+                          fmt::format("{:.2g}", r.curved.mean), per_cent(r.steps_share)});
+  }
+  return table;
+}
+
+void run_smoothings(const ProceduralOptions& options, ProceduralResults* results)
+{
+  results->smoothings.push_back(smoothing_study_of_icosahedron());
+  for (const std::string& file : options.meshes) {
+    const Scene scene = scene_load(file);
+    const std::size_t num_before = results->smoothings.size();
+    for (const Mesh& mesh : scene.meshes) {
+      if (mesh.N.empty()) continue;
+      results->smoothings.push_back(
+          smoothing_study(mesh.name.empty() ? std::filesystem::path(file).stem().string() : mesh.name, mesh.view()));
+    }
+    if (results->smoothings.size() == num_before) {
+      throw SceneError(file, "/meshes", "a mesh with normals", "none");
+    }
+  }
+}
+
 std::string conditions(const ProceduralResults& results)
 {
   return fmt::format(
@@ -269,7 +307,7 @@ std::string conditions(const ProceduralResults& results)
 
 std::vector<std::string> bench_procedural_parts()
 {
-  std::vector<std::string> names = {kMarching, kLattice};
+  std::vector<std::string> names = {kMarching, kLattice, kSmoothing};
   for (const WorldSpec& spec : world_specs()) names.emplace_back(spec.name);
   return names;
 }
@@ -281,7 +319,7 @@ ProceduralResults bench_procedural_run(const ProceduralOptions& options)
   };
   const Face face;
   const std::vector<Ray> rays = random_rays(face, options.num_rays);
-  ProceduralResults results{options.num_rays, traversal_table_select().isa, {}, {}, {}};
+  ProceduralResults results{options.num_rays, traversal_table_select().isa, {}, {}, {}, {}};
   if (is_wanted(kMarching)) run_marches(face, rays, options, &results);
   if (is_wanted(kLattice)) {
     for (const int n : {1, 4, 16, 64, 256, 4096}) {
@@ -289,6 +327,7 @@ ProceduralResults bench_procedural_run(const ProceduralOptions& options)
       if (options.progress) options.progress(fmt::format("traced N = {}", n));
     }
   }
+  if (is_wanted(kSmoothing)) run_smoothings(options, &results);
   for (const WorldSpec& spec : world_specs()) {
     if (!is_wanted(spec.name)) continue;
     results.worlds.push_back(
@@ -302,13 +341,15 @@ std::string bench_procedural_markdown(const ProceduralResults& results)
   std::string text = "# relief bench procedural\n\n" + conditions(results) + "\n\n";
   if (!results.marches.empty()) text += markdown(march_table(results));
   if (!results.lattices.empty()) text += markdown(lattice_table(results));
+  if (!results.smoothings.empty()) text += markdown(smoothing_table(results));
   for (const WorldStudy& world : results.worlds) text += world_markdown(world);
   return text;
 }
 
 std::string bench_procedural_json(const ProceduralResults& results)
 {
-  nlohmann::ordered_json marches = nlohmann::ordered_json::array(), lattices = marches, worlds = marches;
+  nlohmann::ordered_json marches = nlohmann::ordered_json::array(), lattices = marches, smoothings = marches,
+                         worlds = marches;
   for (const MarchResult& r : results.marches) {
     marches.push_back({{"n", r.n},
                        {"precision", r.precision},
@@ -325,10 +366,21 @@ std::string bench_procedural_json(const ProceduralResults& results)
                         {"nanoseconds_a_ray", r.nanoseconds},
                         {"bytes", r.bytes}});
   }
+  for (const SmoothingResult& r : results.smoothings) {
+    smoothings.push_back({{"mesh", r.mesh},
+                          {"triangles", r.num_triangles},
+                          {"sides", r.num_sides},
+                          {"left_out", r.num_left_out},
+                          {"flat_largest_degrees", r.flat.largest},
+                          {"flat_mean_degrees", r.flat.mean},
+                          {"curved_largest_degrees", r.curved.largest},
+                          {"curved_mean_degrees", r.curved.mean},
+                          {"over_a_tenth_of_a_degree", r.steps_share}});
+  }
   for (const WorldStudy& world : results.worlds) worlds.push_back(world_json(world));
   const nlohmann::ordered_json json = {{"bench", "procedural"},    {"version", RELIEF_VERSION}, {"isa", results.isa},
                                        {"rays", results.num_rays}, {"marches", marches},        {"lattices", lattices},
-                                       {"worlds", worlds}};
+                                       {"smoothings", smoothings}, {"worlds", worlds}};
   return json.dump(2) + "\n";
 }
 
@@ -354,6 +406,7 @@ std::string bench_procedural_html(const ProceduralResults& results)
   pieces.push_back(html_row(plots));
   if (!results.marches.empty()) pieces.push_back(html(march_table(results)));
   if (!results.lattices.empty()) pieces.push_back(html(lattice_table(results)));
+  if (!results.smoothings.empty()) pieces.push_back(html(smoothing_table(results)));
   for (const WorldStudy& world : results.worlds) pieces.push_back(world_html(world));
   return html_page("Procedural displacement: marching and heights on demand", pieces);
 }

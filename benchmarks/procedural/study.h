@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "benchmarks/procedural/smoothing_study.h"
 #include "benchmarks/procedural/world_study.h"
 
 namespace relief {
@@ -14,6 +15,7 @@ struct ProceduralOptions {
   int num_rays = 20000;
   int rounds = 3;
   std::vector<std::string> parts;                    ///< of bench_procedural_parts; empty: all
+  std::vector<std::string> meshes;                   ///< scene files whose meshes are smoothed beside the icosahedron
   double world_shrink = 1;                           ///< factor by which pictures of worlds are smaller
   int world_mesh_divisor = 1;                        ///< see world_make
   std::function<void(const std::string&)> progress;  ///< empty: none
@@ -44,13 +46,14 @@ struct ProceduralResults {
   std::string isa;
   std::vector<MarchResult> marches;
   std::vector<LatticeResult> lattices;
+  std::vector<SmoothingResult> smoothings;
   std::vector<WorldStudy> worlds;
 };
 
 /// Names of what can be run by itself.
 std::vector<std::string> bench_procedural_parts();
 
-/// @error std::runtime_error if Embree fails
+/// @error std::runtime_error if Embree fails; SceneError for scene files, or one without a mesh that has normals
 ProceduralResults bench_procedural_run(const ProceduralOptions& options);
 std::string bench_procedural_markdown(const ProceduralResults& results);
 std::string bench_procedural_json(const ProceduralResults& results);

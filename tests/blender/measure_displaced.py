@@ -1,12 +1,13 @@
 #!/usr/bin/python3
-"""Three displaced scenes from Blender, in relief and in Cycles: preparation, memory, error, time to equal error.
+"""Displaced scenes from Blender, in relief and in Cycles: preparation, memory, error, time to equal error.
 
-    RELIEF_BINARY=… BLENDER_USER_SCRIPTS=… tests/blender/measure_displaced.py [--size WxH] [--samples N] [--scenes LIST]
+    RELIEF_BINARY=… BLENDER_USER_SCRIPTS=… tests/blender/measure_displaced.py [--size WxH] [--samples N] [--scenes LIST] [--dicing R]
 
 Not a test: it takes ten minutes at 1080p on two cores and wants them for itself. Prints a Markdown table.
 
-Cycles dices to one pixel by adaptive subdivision. Errors are against the texel-exact surface: with two more pictures r, s
-of relief, of other seeds, the mean of (a − r)(a − s) is the squared error of a, the noise of r and s drops out. Cycles'
+Three scenes have height maps; `planet` has 12 octaves of noise over Generated coordinates, which relief computes at cells
+of a pixel. Cycles dices to R pixels (1) by adaptive subdivision. Errors are against the texel-exact surface (of the planet
+against cells of a quarter of a pixel): with two more pictures r, s of relief, of other seeds, the mean of (a − r)(a − s) is the squared error of a, the noise of r and s drops out. Cycles'
 error has the bias of its dicing in it; it is what an artist gets. The time to Cycles' error is relief's preparation and
 as many of its samples as bring its noise there, at least one.
 
@@ -23,7 +24,7 @@ import tempfile
 import time
 
 _HERE = os.path.dirname(os.path.abspath(__file__))
-_SCENES = ("sphere", "landscape", "torus")
+_SCENES = ("sphere", "landscape", "torus", "planet")
 
 
 # --------------------------------------------------------------------------- inside Blender
@@ -66,8 +67,6 @@ def _build(name, folder):
     import bpy
     import scenes
 
-    path = os.path.join(folder, "heights.png")
-    _height_map(path, {"landscape": 4096}.get(name, 2048), "woven" if name == "torus" else "stone")
     scene = scenes.new_scene()
     from relief import compat  # now that the add-on is on
 
@@ -75,21 +74,33 @@ def _build(name, folder):
     scenes.set_world((0.4, 0.5, 0.7))
     scenes.add_light("SUN", rotation=scenes.degrees(55, 10, 30), energy=3, angle=0)
     material, tree, _ = scenes.new_material("displaced", Color=(0.6, 0.5, 0.4, 1), Roughness=0.0)
-    image = bpy.data.images.load(path)
-    image.colorspace_settings.name = "Non-Color"
-    texture = scenes.add_image_node(tree, image)
     mapping, coordinate = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
     node = tree.nodes.new("ShaderNodeDisplacement")
-    tiles, scale = {"sphere": ((8, 6), 0.08), "landscape": ((2, 2), 1.2), "torus": ((5, 5), 0.06)}[name]
-    mapping.inputs["Scale"].default_value = (*tiles, 1)
+    tiles, scale = {
+        "sphere": ((8, 6, 1), 0.08),
+        "landscape": ((2, 2, 1), 1.2),
+        "torus": ((5, 5, 1), 0.06),
+        "planet": ((2.9, 2.9, 2.9), 0.3),
+    }[name]
+    if name == "planet":
+        texture = tree.nodes.new("ShaderNodeTexNoise")
+        for input_name, value in {"Scale": 1.0, "Detail": 11.0, "Roughness": 0.55}.items():
+            texture.inputs[input_name].default_value = value
+    else:
+        path = os.path.join(folder, "heights.png")
+        _height_map(path, {"landscape": 4096}.get(name, 2048), "woven" if name == "torus" else "stone")
+        image = bpy.data.images.load(path)
+        image.colorspace_settings.name = "Non-Color"
+        texture = scenes.add_image_node(tree, image)
+    mapping.inputs["Scale"].default_value = tiles
     node.inputs["Scale"].default_value = scale
-    tree.links.new(coordinate.outputs["UV"], mapping.inputs[0])
-    tree.links.new(mapping.outputs[0], texture.inputs[0])
+    tree.links.new(coordinate.outputs["Generated" if name == "planet" else "UV"], mapping.inputs[0])
+    tree.links.new(mapping.outputs[0], texture.inputs["Vector"])
     tree.links.new(texture.outputs[0], node.inputs["Height"])
     output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
     tree.links.new(node.outputs[0], output.inputs["Displacement"])
     compat.set_displacement_method(material, "DISPLACEMENT")
-    if name == "sphere":
+    if name in ("sphere", "planet"):
         made = scenes.add_sphere(1.0, material, segments=32)
         scenes.add_camera((0, -3.2, 0.6), scenes.degrees(80, 0, 0), lens=50)
     elif name == "landscape":
@@ -108,7 +119,7 @@ def _build(name, folder):
 
 
 def _render_inside(job):
-    """Renders the runs of a job: {"scene", "engine", "size", "runs": [{"seed", "samples", "output"}]}."""
+    """Renders the runs of a job: {"scene", "engine", "size", "dicing", "runs": [{"seed", "samples", "cells", "output"}]}."""
     import scenes
 
     with tempfile.TemporaryDirectory() as folder:
@@ -116,10 +127,11 @@ def _render_inside(job):
         scene.render.resolution_x, scene.render.resolution_y = job["size"]
         if job["engine"] == "CYCLES":
             scene.cycles.feature_set = "EXPERIMENTAL"
-            scene.cycles.dicing_rate = 1.0
+            scene.cycles.dicing_rate = job["dicing"]
             made.modifiers.new("dicing", "SUBSURF").subdivision_type = "SIMPLE"
             made.cycles.use_adaptive_subdivision = True
         for run in job["runs"]:
+            scene.relief.cell_pixels = run["cells"]
             begin = time.perf_counter()
             scenes.render(scene, job["engine"], run["output"], run["seed"], run["samples"])
             print("RUN", time.perf_counter() - begin, flush=True)
@@ -156,7 +168,7 @@ def _numbers(pattern, text):
     return [float(n) for n in re.findall(pattern, text)]
 
 
-def _measure(name, size, samples, folder):
+def _measure(name, size, samples, dicing, folder):
     """One row of the table."""
     import numpy as np
 
@@ -164,13 +176,16 @@ def _measure(name, size, samples, folder):
     from exr import read_rgb
 
     names = {n: os.path.join(folder, f"{name}.{n}.exr") for n in ("relief", "cycles", "r", "s")}
-    runs = [{"seed": i, "samples": samples, "output": names[n]} for i, n in enumerate(("relief", "r", "s"))]
-    job, program = {"scene": name, "size": size}, _wrapped_program(folder)
+    runs = [
+        {"seed": i, "samples": samples, "cells": cells, "output": names[n]}
+        for i, (n, cells) in enumerate((("relief", 1.0), ("r", 0.25), ("s", 0.25)))
+    ]
+    job, program = {"scene": name, "size": size, "dicing": dicing}, _wrapped_program(folder)
     log, _ = _render({**job, "engine": "RELIEF", "runs": runs}, program)
     total = _numbers(r"relief: ([0-9.]+) s in all", log)[0]
     sampling = _numbers(r"render ([0-9.]+);", log)[0]
     relief_bytes = _numbers(r"peak (\d+) MiB", log)[0] * 2**20
-    run = {"seed": 0, "samples": samples, "output": names["cycles"]}
+    run = {"seed": 0, "samples": samples, "cells": 1.0, "output": names["cycles"]}
     log, cycles_bytes = _render({**job, "engine": "CYCLES", "runs": [run]}, program)
     cycles_total = _numbers(r"RUN ([0-9.]+)", log)[0]
     cycles_sampling = _numbers(r"without synchronization\): ([0-9.]+)", log)
@@ -193,6 +208,7 @@ def main():
     parser.add_argument("--inside", type=json.loads, help=argparse.SUPPRESS)
     parser.add_argument("--size", default="1920x1080")
     parser.add_argument("--samples", type=int, default=16)
+    parser.add_argument("--dicing", type=float, default=1.0)
     parser.add_argument("--scenes", default=",".join(_SCENES))
     inside = "--" in sys.argv
     arguments = parser.parse_args(sys.argv[sys.argv.index("--") + 1 :] if inside else None)
@@ -205,7 +221,7 @@ def main():
     print("| --- | --- | --- | --- | --- | --- |")
     with tempfile.TemporaryDirectory() as folder:
         for name in arguments.scenes.split(","):
-            print(_measure(name, size, arguments.samples, folder), flush=True)
+            print(_measure(name, size, arguments.samples, arguments.dicing, folder), flush=True)
 
 
 if __name__ == "__main__":

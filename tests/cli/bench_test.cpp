@@ -160,6 +160,24 @@ TEST_F(Bench, MarchingFindsTheMicroTriangles)
   }
 }
 
+TEST_F(Bench, SmoothSurfacesHaveNoEdges)
+{
+  const std::string json_file = file("smoothing.json"), scene = RELIEF_SOURCE_DIR "/examples/displaced/displaced.gltf";
+  const Outcome outcome =
+      run({"bench", "procedural", "--parts", "smoothing", "--mesh", scene, "--json", json_file, "--quick"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+  const nlohmann::json json = nlohmann::json::parse(bytes_of_file(json_file));
+  ASSERT_EQ(json["smoothings"].size(), 3u);
+  const nlohmann::json& icosahedron = json["smoothings"][0];
+  EXPECT_EQ(icosahedron["sides"], 30);
+  EXPECT_NEAR(icosahedron["flat_largest_degrees"].get<double>(), 41.8103, 1e-3);  // 180° less its dihedral angle
+  EXPECT_NEAR(icosahedron["flat_mean_degrees"].get<double>(), 41.8103, 1e-3);
+  for (const nlohmann::json& result : json["smoothings"]) {
+    EXPECT_LT(result["curved_largest_degrees"].get<double>(), 0.02) << result;  // what differences can tell
+    EXPECT_EQ(result["over_a_tenth_of_a_degree"], 0) << result;
+  }
+}
+
 TEST_F(Bench, WorldsOfMoreThanCouldBeStoredAreTraced)
 {
   const std::string json_file = file("worlds.json"), html_file = file("worlds.html");
