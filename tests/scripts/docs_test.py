@@ -222,7 +222,7 @@ class Docs(unittest.TestCase):
                 if line is None:
                     continue
                 ran += 1
-                run = subprocess.run([program, *line], cwd=folder, capture_output=True, text=True, timeout=60, check=False)
+                run = subprocess.run([program, *line], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
                 if run.returncode != 0:
                     wrong.append(f"{place}: {command}\n    relief {shlex.join(line)}\n    {run.stderr.strip()}")
         self.assert_none(wrong)
