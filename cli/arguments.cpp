@@ -13,6 +13,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/value_hint.h"
 #include "kernel/film/film_layout.h"
 #include "scene/limits.h"
 
@@ -83,6 +84,35 @@ PixelSample parse_pixel(const std::string& text)
   return pixel;
 }
 
+SamplePart parse_part(const std::string& text)
+{
+  constexpr int kMost = 1'000'000;
+  SamplePart part;
+  const auto words = split(text, '/');
+  if (words.size() != 2 || !to_number(words[0], &part.number) || !to_number(words[1], &part.count) || part.number < 1 ||
+      part.number > part.count || part.count > kMost) {
+    refuse("--part", "I/N with I from 1 to N", text);
+  }
+  return part;
+}
+
+std::pair<std::uint32_t, std::uint32_t> part_samples(const SamplePart& part, int samples)
+{
+  if (part.count == 1) return {0, static_cast<std::uint32_t>(samples)};
+  constexpr std::int64_t kAligned = 4;
+  if (samples / kAligned < part.count) {
+    refuse("--part",
+           fmt::format("at most {} parts of {} samples a pixel, four samples or more in each", samples / kAligned,
+                       samples),
+           fmt::format("{}/{}", part.number, part.count));
+  }
+  const auto start_of = [&](std::int64_t index) {
+    return static_cast<std::uint32_t>(samples / kAligned * index / part.count * kAligned);
+  };
+  const auto end = part.number == part.count ? static_cast<std::uint32_t>(samples) : start_of(part.number);
+  return {start_of(part.number - 1), end};
+}
+
 FrameList parse_frames(const std::string& text)
 {
   const std::string expected = fmt::format("frames such as 1-10,20,30-60x2, from 0 to {}, or all", kLastFrame);
@@ -112,6 +142,19 @@ FrameList parse_frames(const std::string& text)
   return {false, std::move(frames)};
 }
 
+std::string frames_text(const std::vector<int>& frames)
+{
+  std::string text;
+  for (std::size_t i = 0; i < frames.size();) {
+    std::size_t end = i + 1;
+    while (end < frames.size() && frames[end] == frames[end - 1] + 1) ++end;
+    text += fmt::format("{}{}", text.empty() ? "" : ",", frames[i]);
+    if (end - i > 1) text += fmt::format("-{}", frames[end - 1]);
+    i = end;
+  }
+  return text;
+}
+
 Vec3f parse_point(const char* option, const std::string& text)
 {
   Vec3f point;
@@ -131,6 +174,13 @@ std::uint64_t parse_seed(const std::string& text)
   return seed;
 }
 
+std::vector<std::string> aov_words()
+{
+  std::vector<std::string> words = {"all"};
+  for (const AovInfo& info : kAovInfo) words.emplace_back(info.name);
+  return words;
+}
+
 std::uint32_t parse_aovs(const std::string& text)
 {
   std::uint32_t mask = 1u << static_cast<int>(Aov::kBeauty);
@@ -141,9 +191,7 @@ std::uint32_t parse_aovs(const std::string& text)
     }
     const auto* info = std::find_if(kAovInfo.begin(), kAovInfo.end(), [&](const AovInfo& i) { return i.name == name; });
     if (info == kAovInfo.end()) {
-      std::string names = "all";
-      for (const AovInfo& i : kAovInfo) names += fmt::format(", {}", i.name);
-      refuse("--aov", "names among " + names, std::string(name));
+      refuse("--aov", "names among " + words_text(aov_words()), std::string(name));
     }
     mask |= 1u << static_cast<int>(info->aov);
   }
@@ -242,7 +290,7 @@ CLI::Validator whole_number(int least, int most)
     if (to_number(text, &value) && value >= least && value <= most) return {};
     return fmt::format("expected a whole number from {} to {}, found '{}'", least, most, text);
   };
-  return {check, fmt::format("{}..{}", least, most)};
+  return {check, fmt::format("{}..{}", least, most), kRangeCheck};
 }
 
 CLI::Validator number(double least, double most)
@@ -253,18 +301,17 @@ CLI::Validator number(double least, double most)
     if (to_number(text, &value) && value >= least && value <= most) return {};
     return fmt::format("expected a number from {:g} to {:g}, found '{}'", least, most, text);
   };
-  return {check, fmt::format("{:g}..{:g}", least, most)};
+  return {check, fmt::format("{:g}..{:g}", least, most), kRangeCheck};
 }
 
 CLI::Validator one_of(std::vector<std::string> words)
 {
-  std::string list;
-  for (const std::string& word : words) list += (list.empty() ? "" : ", ") + word;
+  const std::string list = words_text(words);
   const auto check = [words = std::move(words), list](const std::string& text) -> std::string {
     if (std::find(words.begin(), words.end(), text) != words.end()) return {};
     return fmt::format("expected one of {}, found '{}'", list, text);
   };
-  return {check, list};
+  return {check, list, kOneOfCheck};
 }
 
 CLI::Validator setting_check(const SettingInfo& info)

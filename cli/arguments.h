@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
@@ -37,6 +38,18 @@ PixelRect parse_crop(const std::string& text);
 /// "X,Y" or "X,Y,SAMPLE", none negative.
 PixelSample parse_pixel(const std::string& text);
 
+/// One of several parts of the samples of a pixel; each part has other ones of the same sequence.
+struct SamplePart {
+  int number = 1, count = 1;  ///< 1 … count
+};
+
+/// "I/N".
+SamplePart parse_part(const std::string& text);
+
+/// First sample of a part, and the one after its last. Parts begin at multiples of four (RenderOptions::first_sample).
+/// @error CLI::ValidationError if there are not four samples for each part
+std::pair<std::uint32_t, std::uint32_t> part_samples(const SamplePart& part, int samples);
+
 struct FrameList {
   bool all = false;          ///< those of the scene
   std::vector<int> numbers;  ///< each 0 … kLastFrame; empty only if `all`
@@ -45,6 +58,9 @@ inline constexpr auto kLastFrame = static_cast<int>(setting_info("frameRange").r
 
 /// "all", or "1-10,20,30-60x2": single frames, ranges, ranges with a step; in the order given, each frame once.
 FrameList parse_frames(const std::string& text);
+
+/// Frames as parse_frames takes them, runs of consecutive ones short: "1-10,20".
+std::string frames_text(const std::vector<int>& frames);
 
 /// "X,Y,Z" in metres, within 1e15 of the origin.
 Vec3f parse_point(const char* option, const std::string& text);
@@ -55,6 +71,9 @@ std::uint64_t parse_seed(const std::string& text);
 /// Names of AOVs separated by commas, or "all"; beauty is always in.
 /// @return bit i: enumerator i of Aov
 std::uint32_t parse_aovs(const std::string& text);
+
+/// What parse_aovs knows.
+std::vector<std::string> aov_words();
 
 /// "studio", "sky", "none" or the name of an image, perhaps with ",STRENGTH". What follows a name's last comma is a strength
 /// if it is a number; "./a,1.hdr,1" is a file "a,1.hdr".

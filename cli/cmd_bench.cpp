@@ -18,6 +18,7 @@
 #include "cli/arguments.h"
 #include "cli/commands.h"
 #include "cli/run_files.h"
+#include "cli/value_hint.h"
 #include "exporters/atomic_file.h"
 #include "scene/diagnostics.h"
 
@@ -123,16 +124,22 @@ int bench_study(const StudyArguments& arguments,
   return 0;
 }
 
+void add_reports(CLI::App& command, std::string& json, std::string& html)
+{
+  const auto add = [&](const char* option, std::string& value, const char* suffix, const char* description) {
+    const auto parse = [=](const std::string& text) { return parse_output(option, text, suffix); };
+    names_file(add_parsed(command, option, value, parse, description), {suffix});
+  };
+  add("--json", json, ".json", "Figures, as JSON");
+  add("--html", html, ".html", "One page with tables, plots and pictures");
+}
+
 void add_study_options(CLI::App& command, StudyArguments& a)
 {
   command.add_option("--rounds", a.rounds, "Times that all rays are traced; the fastest counts")
       ->check(whole_number(1, 1000))
       ->capture_default_str();
-  command.add_option_function<std::string>(
-      "--json", [&a](const std::string& text) { a.json = parse_output("--json", text, ".json"); }, "Figures, as JSON");
-  command.add_option_function<std::string>(
-      "--html", [&a](const std::string& text) { a.html = parse_output("--html", text, ".html"); },
-      "One page with tables and plots or pictures");
+  add_reports(command, a.json, a.html);
   command.add_flag("--quick", a.quick, "Small, one round: whether it works, not how fast");
 }
 
@@ -148,8 +155,9 @@ void heightfield_register(CLI::App& bench, Run& run)
   command->add_option("--size", arguments->size, "Texels along a side of the height maps")
       ->check(one_of({"16", "32", "64", "128", "256", "512"}))
       ->capture_default_str();
-  command->add_option("--map", arguments->inputs, "Image of heights that is studied too; may be given several times")
-      ->type_name("FILE");
+  names_file(
+      command->add_option("--map", arguments->inputs, "Image of heights that is studied too; may be given several times"),
+      kImageSuffixes);
   command
       ->add_option("--cones", arguments->cones,
                    "Cone maps, separated by commas: conservative, quick, approximate-relaxed, relaxed, quick-relaxed "
@@ -187,10 +195,9 @@ void procedural_register(CLI::App& bench, Run& run)
                    "Parts, separated by commas: marching, lattice, smoothing, pot, terrain, planet (default: all)")
       ->delimiter(',')
       ->check(one_of(bench_procedural_parts()));
-  command
-      ->add_option("--mesh", arguments->inputs,
-                   "Scene whose meshes are smoothed beside the icosahedron; may be given several times")
-      ->type_name("FILE");
+  names_file(command->add_option("--mesh", arguments->inputs,
+                                 "Scene whose meshes are smoothed beside the icosahedron; may be given several times"),
+             kSceneSuffixes);
   add_study_options(*command, *arguments);
   command->callback([&run, arguments] {
     run = [arguments] {
@@ -237,11 +244,7 @@ void cmd_bench_register(CLI::App& app, Run& run)
       ->check(number(0.001, 1e6));
   command->add_option("--threads", a.threads, "Threads for preparation; rays are traced by one (default: all)")
       ->check(whole_number(1, 1024));
-  command->add_option_function<std::string>(
-      "--json", [&a](const std::string& text) { a.json = parse_output("--json", text, ".json"); }, "Figures, as JSON");
-  command->add_option_function<std::string>(
-      "--html", [&a](const std::string& text) { a.html = parse_output("--html", text, ".html"); },
-      "One page with tables, plots and pictures");
+  add_reports(*command, a.json, a.html);
   command->add_flag("--quick", a.quick, "Small maps, few rays, one round: whether it works, not how fast");
   command->callback([&run, arguments] { run = [arguments] { return bench_displacement(*arguments); }; });
   heightfield_register(*bench, run);

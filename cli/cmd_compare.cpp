@@ -9,6 +9,7 @@
 #include "cli/arguments.h"
 #include "cli/run_files.h"
 #include "cli/standard_streams.h"
+#include "cli/value_hint.h"
 #include "exporters/atomic_file.h"
 #include "exporters/difference_picture.h"
 #include "exporters/errors.h"
@@ -195,12 +196,14 @@ void cmd_compare_register(CLI::App& app, std::function<int()>& run)
 {
   CLI::App* command = app.add_subcommand("compare", "Measure how far picture A is from picture B, the reference");
   const auto arguments = std::make_shared<CompareArguments>();
-  command->add_option("A", arguments->a, "OpenEXR file to judge")->required();
-  command->add_option("B", arguments->b, "OpenEXR file that is the reference")->required();
+  names_file(command->add_option("A", arguments->a, "Picture to judge"), {".exr"})->required();
+  names_file(command->add_option("B", arguments->b, "Picture that is the reference"), {".exr"})->required();
   command->add_option("--layer", arguments->layer, "Layer to compare")->capture_default_str();
-  command->add_option_function<std::string>(
-      "--diff", [arguments](const std::string& text) { arguments->diff = parse_output("--diff", text, ".png"); },
-      "PNG to write: A, B and their signed difference with its scale");
+  names_file(
+      command->add_option_function<std::string>(
+          "--diff", [arguments](const std::string& text) { arguments->diff = parse_output("--diff", text, ".png"); },
+          "PNG to write: A, B and their signed difference with its scale"),
+      {".png"});
   command->add_option("--max-rmse", arguments->max_rmse, "Fail (exit code 1) above this RMSE");
   command->add_option("--max-relmse", arguments->max_relmse, "Fail above this mean of (a-b)^2 / (b^2 + 0.01)");
   command->add_option("--max-flip", arguments->max_flip, "Fail above this mean FLIP error");
@@ -221,8 +224,9 @@ void cmd_compare_register(CLI::App& app, std::function<int()>& run)
                    "Fraction of pixels that may fail the z-test of single pixels")
       ->check(CLI::Range(0.0, 0.5))
       ->capture_default_str();
-  command->add_option("--json", arguments->json,
-                      "Write the figures to this file as JSON; -: to standard output, instead of text");
+  names_file(command->add_option("--json", arguments->json,
+                                 "Write the figures to this file as JSON; -: to standard output, instead of text"),
+             {".json"});
   command->callback([arguments, &run] { run = [arguments] { return compare_run(*arguments); }; });
 }
 

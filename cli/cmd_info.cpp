@@ -12,6 +12,7 @@
 #include "cli/commands.h"
 #include "cli/scene_setup.h"
 #include "cli/standard_streams.h"
+#include "cli/value_hint.h"
 #include "displacement/method.h"
 #include "displacement/seams.h"
 #include "integrator/scene_context.h"
@@ -310,7 +311,7 @@ void cmd_info_register(CLI::App& app, Run& run)
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* command = app.add_subcommand("info", "Shows what is in a scene, what it will cost, and every warning");
-  CLI::Option* scene = command->add_option("scene", arguments->scene, "Scene file (.gltf, .glb)");
+  CLI::Option* scene = names_file(command->add_option("scene", arguments->scene, "Scene to show"), kSceneSuffixes);
   CLI::Option* settings =
       command->add_flag("--settings", arguments->settings, "Prints all settings that RELIEF_render may have, as JSON")
           ->excludes(scene);

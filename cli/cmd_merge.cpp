@@ -3,11 +3,13 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "cli/arguments.h"
 #include "cli/run_files.h"
 #include "cli/standard_streams.h"
+#include "cli/value_hint.h"
 #include "exporters/exr.h"
 #include "exporters/merge.h"
 
@@ -18,23 +20,48 @@ namespace {
 struct MergeArguments {
   std::vector<std::filesystem::path> inputs;
   std::filesystem::path output;
+  FrameList frames;
   MergeOptions options;
 };
 
+/// What becomes one picture.
+struct Join {
+  std::vector<std::filesystem::path> inputs;
+  std::filesystem::path output;
+};
+
+/// A join for each frame, or the one of the names as they are.
+std::vector<Join> joins_of(const MergeArguments& arguments)
+{
+  if (arguments.frames.numbers.empty()) return {{arguments.inputs, arguments.output}};
+  std::vector<Join> joins;
+  for (const int frame : arguments.frames.numbers) {
+    Join join{{}, frame_path(arguments.output, frame)};
+    for (const std::filesystem::path& input : arguments.inputs) join.inputs.push_back(frame_path(input, frame));
+    joins.push_back(std::move(join));
+  }
+  return joins;
+}
+
 int merge_run(const MergeArguments& arguments)
 {
+  const std::vector<Join> joins = joins_of(arguments);
   RunFiles files;
-  files.add_output("--output", arguments.output);
-  for (const std::filesystem::path& input : arguments.inputs) files.add_input("a picture to join", input);
-  check_writable(arguments.output);
-  const MergeResult merged = merge_pictures(arguments.inputs, arguments.options);
-  for (const std::string& warning : merged.warnings) {
-    print_warning(warning);
+  for (const Join& join : joins) files.add_output("--output", join.output);
+  for (const Join& join : joins) {
+    for (const std::filesystem::path& input : join.inputs) files.add_input("a picture to join", input);
   }
-  files.check_output("--output", arguments.output);
-  exr_write(arguments.output, merged.picture);
-  print_line(arguments.output.string() + ": " + std::to_string(arguments.inputs.size()) + " pictures, " +
-             merged.picture.attributes.at("relief:samples") + " samples a pixel");
+  check_writable(joins.front().output);
+  for (const Join& join : joins) {
+    const MergeResult merged = merge_pictures(join.inputs, arguments.options);
+    for (const std::string& warning : merged.warnings) {
+      print_warning(warning);
+    }
+    files.check_output("--output", join.output);
+    exr_write(join.output, merged.picture);
+    print_line(join.output.string() + ": " + std::to_string(join.inputs.size()) + " pictures, " +
+               merged.picture.attributes.at("relief:samples") + " samples a pixel");
+  }
   return 0;
 }
 
@@ -43,20 +70,26 @@ int merge_run(const MergeArguments& arguments)
 void cmd_merge_register(CLI::App& app, std::function<int()>& run)
 {
   CLI::App* command =
-      app.add_subcommand("merge", "Join renders of the same frame with different seeds, weighted by samples");
+      app.add_subcommand("merge", "Join renders of the same frame, of different seeds or parts, weighted by samples");
   const auto arguments = std::make_shared<MergeArguments>();
-  command->add_option("inputs", arguments->inputs, "OpenEXR files of the same scene, frame and window")
+  names_file(command->add_option("inputs", arguments->inputs, "Pictures of the same scene, frame and window"), {".exr"})
       ->required()
       ->expected(2, -1);
-  command
-      ->add_option_function<std::string>(
-          "-o,--output",
-          [arguments](const std::string& text) { arguments->output = parse_output("--output", text, ".exr"); },
-          "OpenEXR file to write")
+  names_file(command->add_option_function<std::string>(
+                 "-o,--output",
+                 [arguments](const std::string& text) { arguments->output = parse_output("--output", text, ".exr"); },
+                 "OpenEXR file to write"),
+             {".exr"})
       ->required();
-  command->add_flag("--force", arguments->options.force,
-                    "Accept files that name another scene or frame, or no seed; equal seeds are never accepted");
-  command->callback([arguments, &run] { run = [arguments] { return merge_run(*arguments); }; });
+  add_parsed(*command, "--frames", arguments->frames, parse_frames,
+             "Join these frames, such as 1-10,20,30-60x2; in all names #### stands for the number");
+  command->add_flag(
+      "--force", arguments->options.force,
+      "Accept files that name another scene or frame, or no seed; the same samples twice are never accepted");
+  command->callback([arguments, &run] {
+    if (arguments->frames.all) throw CLI::ValidationError("--frames", "expected numbers of frames, found 'all'");
+    run = [arguments] { return merge_run(*arguments); };
+  });
 }
 
 }  // namespace relief

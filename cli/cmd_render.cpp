@@ -23,6 +23,7 @@
 
 #include "cli/arguments.h"
 #include "cli/commands.h"
+#include "cli/exit_code.h"
 #include "cli/fingerprint.h"
 #include "cli/interrupt.h"
 #include "cli/picture_options.h"
@@ -30,6 +31,7 @@
 #include "cli/run_files.h"
 #include "cli/scene_setup.h"
 #include "cli/standard_streams.h"
+#include "cli/value_hint.h"
 #include "exporters/atomic_file.h"
 #include "exporters/clipping.h"
 #include "exporters/errors.h"
@@ -37,6 +39,7 @@
 #include "exporters/image_metrics.h"
 #include "exporters/output_lock.h"
 #include "exporters/png_ocio.h"
+#include "exporters/sample_range.h"
 #include "exporters/stats_json.h"
 #include "integrator/render.h"
 #include "scene/kept_images.h"
@@ -46,13 +49,11 @@ namespace relief {
 
 namespace {
 
-/// Exit code of a render that was stopped: what was rendered is saved.
-constexpr int kInterrupted = 130;
-
 struct RenderArguments {
   std::string scene, output, png, stats, reference, preview;
   PictureOptions picture;
   FrameList frames;  ///< empty: the rest pose
+  SamplePart part;
   int threads = 0;
   double time_limit = 0, noise_threshold = -1;
   std::optional<std::string> view;
@@ -121,6 +122,9 @@ RenderOptions options_for(const Scene& scene, const RenderArguments& arguments)
   if (arguments.noise_threshold >= 0) settings.noise_threshold = static_cast<float>(arguments.noise_threshold);
   if (arguments.view) settings.view = *arguments.view;
   if (arguments.exposure) settings.exposure = static_cast<float>(*arguments.exposure);
+  const auto [first, end] = part_samples(arguments.part, settings.samples);
+  options.first_sample = first;
+  options.num_samples = end - first;
   options.time_limit_seconds = arguments.time_limit;
   options.aov_mask = arguments.aov_mask;
   return options;
@@ -197,7 +201,7 @@ void write_frame(const RenderArguments& arguments,
                  const FramePaths& paths,
                  const std::string& command,
                  std::string fingerprint,
-                 const Attributes& cryptomattes,
+                 const Attributes& more_attributes,
                  const PngOptions& png,
                  const FilmView& film,
                  const Statistics& stats,
@@ -214,7 +218,7 @@ void write_frame(const RenderArguments& arguments,
     fingerprint.clear();
   }
   Attributes attributes = exr_attributes(stats, command);
-  attributes.insert(cryptomattes.begin(), cryptomattes.end());
+  attributes.insert(more_attributes.begin(), more_attributes.end());
   if (!fingerprint.empty()) attributes.merge(frame_attributes(paths, fingerprint));
   files.check_output("--output", paths.exr);
   exr_write(paths.exr, film, attributes, {compression_of(arguments), arguments.float_color});
@@ -377,7 +381,12 @@ bool render_frame(const RenderArguments& arguments,
     stats.warnings.push_back("samples that were not finite count as black; the first one's rays: " +
                              replay_command(arguments.scene, arguments.path_settings, frame, *stats.first_nonfinite));
   }
-  const Attributes cryptomattes = exr_cryptomatte_attributes(scene, options.aov_mask);
+  Attributes more_attributes = exr_cryptomatte_attributes(scene, options.aov_mask);
+  if (arguments.part.count > 1) {
+    more_attributes["relief:sample_ranges"] =
+        sample_range_text({options.first_sample, options.first_sample + options.num_samples,
+                           static_cast<std::uint32_t>(options.settings.samples)});
+  }
   scene = {};  // Pictures are written in the memory of what they were made from.
   const bool is_whole = stats.stop_reason != "interrupted";
   if (stats.samples_per_pixel <= 0) {
@@ -391,8 +400,8 @@ bool render_frame(const RenderArguments& arguments,
     stats.warnings.push_back(file + ": changed after the render had begun: the picture may show either state");
   }
   progress.warnings(stats.warnings);
-  write_frame(arguments, files, paths, command, is_whole && changed.empty() ? fingerprint : std::string(), cryptomattes,
-              png, image.view, stats, progress);
+  write_frame(arguments, files, paths, command, is_whole && changed.empty() ? fingerprint : std::string(),
+              more_attributes, png, image.view, stats, progress);
   std::optional<ImageErrors> errors;
   if (reference) errors = errors_against(*reference, image.view);
   report_frame(progress, paths, stats, errors);
@@ -452,14 +461,17 @@ void cmd_render_register(CLI::App& app, Run& run, const std::string& command_lin
   const auto output = [](const char* option, const char* suffix) {
     return [=](const std::string& text) { return parse_output(option, text, suffix); };
   };
-  command->add_option("scene", a.scene, "Scene file (.gltf, .glb)")->required();
-  add_parsed(*command, "-o,--output", a.output, output("--output", ".exr"),
-             "OpenEXR to write; with --frames, #### stands for the number")
+  names_file(command->add_option("scene", a.scene, "Scene to render"), kSceneSuffixes)->required();
+  names_file(add_parsed(*command, "-o,--output", a.output, output("--output", ".exr"),
+                        "OpenEXR to write; with --frames, #### stands for the number"),
+             {".exr"})
       ->required();
-  add_parsed(*command, "--png", a.png, output("--png", ".png"), "PNG to write, through a colour view");
-  command->add_option("--stats", a.stats, "JSON file of statistics to write");
-  add_parsed(*command, "--preview", a.preview, output("--preview", ".exr"),
-             "OpenEXR to write now and then while rendering");
+  names_file(add_parsed(*command, "--png", a.png, output("--png", ".png"), "PNG to write, through a colour view"),
+             {".png"});
+  names_file(command->add_option("--stats", a.stats, "JSON file of statistics to write"), {".json"});
+  names_file(add_parsed(*command, "--preview", a.preview, output("--preview", ".exr"),
+                        "OpenEXR to write now and then while rendering"),
+             {".exr"});
   std::vector<CLI::Option*> path_options = add_picture_options(*command, a.picture);
   for (CLI::Option* option : add_ray_options(*command, a.picture)) path_options.push_back(option);
   for (CLI::Option* option : add_light_options(*command, a.setup)) path_options.push_back(option);
@@ -471,17 +483,22 @@ void cmd_render_register(CLI::App& app, Run& run, const std::string& command_lin
   command->add_option("--threads", a.threads, "Threads (default: all processors)")->check(whole_number(1, 4096));
   add_parsed(*command, "--frames", a.frames, parse_frames,
              "Frames, such as 1-10,20,30-60x2, or all of the scene (default: the rest pose)");
+  add_parsed(*command, "--part", a.part, parse_part,
+             "I/N: only the I-th of N parts of the samples, which relief merge joins");
   command->add_flag("--resume", a.resume, "Skip frames whose files are whole and of the same scene and settings");
   command->add_flag("--strict", a.strict, "Turn warnings into errors");
   command->add_option("--view", a.view, setting_help(setting_info("view")));
   command->add_option("--exposure", a.exposure, setting_help(kExposure))->check(setting_check(kExposure));
   add_parsed(*command, "--aov", a.aov_mask, parse_aovs, "Layers to keep: names separated by commas, or all")
+      ->check(listed_words(aov_words()))
       ->default_str(kDefaultAovs);
   command->add_option("--compression", a.compression, "Of the OpenEXR")
       ->check(one_of({kExrCompressionNames.begin(), kExrCompressionNames.end()}))
       ->capture_default_str();
   command->add_flag("--float", a.float_color, "Store colours as 32-bit floats instead of halves");
-  command->add_option("--reference", a.reference, "OpenEXR to measure the error against; #### as for --output");
+  names_file(
+      command->add_option("--reference", a.reference, "OpenEXR to measure the error against; #### as for --output"),
+      {".exr"});
   command->add_option("--progress", a.progress, "bar (on a terminal), json (on standard output) or none")
       ->check(one_of({"bar", "json", "none"}))
       ->capture_default_str();

@@ -19,6 +19,7 @@
 #include "cli/run_files.h"
 #include "cli/scene_setup.h"
 #include "cli/standard_streams.h"
+#include "cli/value_hint.h"
 #include "exporters/atomic_file.h"
 #include "exporters/errors.h"
 #include "integrator/trace.h"
@@ -266,13 +267,16 @@ void cmd_trace_register(CLI::App& app, Run& run)
   auto arguments = std::make_shared<TraceArguments>();
   TraceArguments& a = *arguments;
   CLI::App* command = app.add_subcommand("trace", "Traces single rays, or shows the rays of one pixel's path");
-  command->add_option("scene", a.scene, "Scene file (.gltf, .glb)")->required();
-  CLI::Option* rays = command->add_option("--rays", a.rays, "File of rays, one 'ox oy oz dx dy dz [tmin tmax]' a line");
+  names_file(command->add_option("scene", a.scene, "Scene that is met"), kSceneSuffixes)->required();
+  CLI::Option* rays =
+      names_file(command->add_option("--rays", a.rays, "File of rays, one 'ox oy oz dx dy dz [tmin tmax]' a line"), {});
   CLI::Option* pixel = command->add_option_function<std::string>(
       "--pixel", [&a](const std::string& text) { a.pixel = parse_pixel(text); },
       "X,Y[,SAMPLE]: print the rays of that path instead");
   rays->excludes(pixel);
-  command->add_option("-o,--output", a.output, "CSV of hits, the explanation, or the path's rays; - is standard output")
+  names_file(command->add_option("-o,--output", a.output,
+                                 "CSV of hits, the explanation, or the path's rays; - is standard output"),
+             {})
       ->capture_default_str();
   command->add_option("--frame", a.frame, "Frame of the animation (default: the rest pose)")
       ->check(whole_number(0, 1'000'000));

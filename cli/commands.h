@@ -16,5 +16,8 @@ void cmd_render_register(CLI::App& app, Run& run, const std::string& command_lin
 void cmd_info_register(CLI::App& app, Run& run);
 void cmd_trace_register(CLI::App& app, Run& run);
 void cmd_bench_register(CLI::App& app, Run& run);
+void cmd_farm_register(CLI::App& app, Run& run);
+/// Manual pages and completion, of all commands.
+void cmd_help_files_register(CLI::App& app, Run& run);
 
 }  // namespace relief

@@ -12,6 +12,7 @@
 #include "cli/cmd_compare.h"
 #include "cli/cmd_merge.h"
 #include "cli/commands.h"
+#include "cli/exit_code.h"
 #include "cli/standard_streams.h"
 #include "cli/suggestion.h"
 #include "exporters/errors.h"
@@ -20,7 +21,7 @@
 
 namespace {
 
-enum ExitCode : int { kDone = 0, kFailed = 1, kUsage = 2, kInvalidScene = 3 };
+using relief::ExitCode, relief::kDone, relief::kFailed, relief::kUsage, relief::kInvalidScene;
 
 /// Prints an error and a hint (empty: none). Nothing can be done about a message that cannot be written.
 int report(ExitCode code, const std::string& what, const std::string& hint = {})
@@ -99,6 +100,8 @@ int main(int argc, char** argv)
   relief::cmd_compare_register(app, run);
   relief::cmd_merge_register(app, run);
   relief::cmd_bench_register(app, run);
+  relief::cmd_farm_register(app, run);
+  relief::cmd_help_files_register(app, run);
 
   const std::vector<std::string> arguments = arguments_of(argc, argv);
   try {
@@ -110,7 +113,7 @@ int main(int argc, char** argv)
       relief::standard_output_flush();
       return kDone;
     }
-    if (!run) throw CLI::RequiredError("a command (render, info, trace, compare, merge or bench)");
+    if (!run) throw CLI::RequiredError("a command");
     return run_command(run);
   } catch (const CLI::ParseError& error) {
     const auto commands = app.get_subcommands();

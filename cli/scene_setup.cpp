@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "cli/arguments.h"
+#include "cli/value_hint.h"
 #include "scene/diagnostics.h"
 #include "scene/memory.h"
 
@@ -39,8 +40,12 @@ std::vector<CLI::Option*> add_light_options(CLI::App& command, SceneSetup& setup
   return {
       command.add_option("--luminous-efficacy", setup.luminous_efficacy, setting_help(kEfficacy))
           ->check(setting_check(kEfficacy)),
-      add_parsed(command, "--environment", setup.environment, parse_environment,
-                 "studio, sky, none, or a lat-long image: surroundings in place of the scene's; ,STRENGTH may follow"),
+      names_file(
+          add_parsed(
+              command, "--environment", setup.environment, parse_environment,
+              "studio, sky, none, or a lat-long image: surroundings in place of the scene's; ,STRENGTH may follow"),
+          kImageSuffixes)
+          ->check(suggested_words({std::begin(kEnvironmentPresetLabels), std::end(kEnvironmentPresetLabels)})),
       command
           .add_option(
               "--background", setup.background,
@@ -86,8 +91,10 @@ void add_max_memory(CLI::App& command)
 CLI::Option* add_displacement_lod(CLI::App& command, DisplacementOptions& options)
 {
   const auto set = [&options](const std::string& text) { options.lod = parse_lod(text); };
-  return command.add_option_function<std::string>(
-      "--lod", set, "Level of the height maps, 0 the finest; auto: what the pixels can show (default: the scene's)");
+  return command
+      .add_option_function<std::string>(
+          "--lod", set, "Level of the height maps, 0 the finest; auto: what the pixels can show (default: the scene's)")
+      ->check(suggested_words({"auto"}));
 }
 
 CLI::Option* add_displacement_rmip(CLI::App& command, DisplacementOptions& options)

@@ -5,9 +5,11 @@
 #include <cstdlib>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 #include "exporters/errors.h"
 #include "exporters/exr.h"
+#include "exporters/sample_range.h"
 #include "scene/cryptomatte.h"
 
 namespace relief {
@@ -72,15 +74,64 @@ std::optional<double> number_of(const Picture& picture, const std::string& name)
   return value;
 }
 
-/// Seeds of a picture, several if it is itself a merge.
-std::vector<std::string> seeds_of(const Picture& picture)
+std::vector<std::string> list_of(const Picture& picture, const std::string& attribute)
 {
-  std::vector<std::string> seeds;
-  std::istringstream text(attribute_of(picture, "relief:seed"));
-  for (std::string seed; std::getline(text, seed, ',');) {
-    seeds.push_back(seed);
+  std::vector<std::string> words;
+  std::istringstream text(attribute_of(picture, attribute));
+  for (std::string word; std::getline(text, word, ',');) words.push_back(word);
+  return words;
+}
+
+/// Samples that a picture is made of.
+struct SampleOrigin {
+  std::string seed, file;
+  std::optional<SampleRange> range;  ///< nothing: all of the seed
+};
+
+constexpr const char* kAllSamples = "all";
+
+/// Where a picture's samples are from, several places if it is itself a merge.
+std::vector<SampleOrigin> origins_of(const Picture& picture)
+{
+  const std::vector<std::string> seeds = list_of(picture, "relief:seed");
+  const std::vector<std::string> ranges = list_of(picture, "relief:sample_ranges");
+  if (!ranges.empty() && ranges.size() != seeds.size()) {
+    throw InputError(picture.file, "has another number of relief:sample_ranges than of relief:seed");
   }
-  return seeds;
+  std::vector<SampleOrigin> origins;
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    origins.push_back({seeds[i], picture.file, std::nullopt});
+    if (ranges.empty() || ranges[i] == kAllSamples) continue;
+    origins.back().range = sample_range_parse(ranges[i]);
+    if (!origins.back().range) {
+      throw InputError(picture.file, "expected relief:sample_ranges such as 16-32/64, found '" + ranges[i] + "'");
+    }
+  }
+  return origins;
+}
+
+/// The pair of ranges of one seed of which the second continues the first; nothing if there is none.
+std::optional<std::pair<std::size_t, std::size_t>> continued_range(const std::vector<SampleOrigin>& origins)
+{
+  for (std::size_t i = 0; i < origins.size(); ++i) {
+    for (std::size_t k = 0; k < origins.size(); ++k) {
+      const SampleOrigin &a = origins[i], &b = origins[k];
+      if (a.seed == b.seed && a.range && b.range && a.range->end == b.range->first) return std::pair(i, k);
+    }
+  }
+  return std::nullopt;
+}
+
+/// Puts such ranges together. What then is all that was planned counts as any render of that seed.
+void join_ranges(std::vector<SampleOrigin>& origins)
+{
+  while (const auto pair = continued_range(origins)) {
+    origins[pair->first].range->end = origins[pair->second].range->end;
+    origins.erase(origins.begin() + static_cast<std::ptrdiff_t>(pair->second));
+  }
+  for (SampleOrigin& origin : origins) {
+    if (origin.range && origin.range->is_all()) origin.range.reset();
+  }
 }
 
 /// Sums over the pictures so far.
@@ -109,10 +160,6 @@ class Merger {
     std::vector<double> weight;  ///< only for kMeanOverHits, whose weight is its own
   };
 
-  struct SeedOrigin {
-    std::string seed, file;
-  };
-
   void check_same_image(const Picture& picture);
   void check_seeds(const Picture& picture);
   void warn_left_out(const std::string& channel, const std::string& why);
@@ -130,7 +177,7 @@ class Merger {
   Picture result_;  ///< windows and attributes; its channels are made at the end
   std::vector<Sum> sums_;
   std::vector<double> num_samples_, num_even_samples_;
-  std::vector<SeedOrigin> seeds_;
+  std::vector<SampleOrigin> origins_;
   double samples_ = 0, seconds_ = 0, weighted_square_error_ = 0;
   bool knows_error_ = true;
   std::vector<std::string> warnings_;
@@ -178,21 +225,26 @@ void Merger::check_same_image(const Picture& picture)
 
 void Merger::check_seeds(const Picture& picture)
 {
-  const std::vector<std::string> seeds = seeds_of(picture);
-  if (seeds.empty() && !options_.force) {
+  const std::vector<SampleOrigin> origins = origins_of(picture);
+  if (origins.empty() && !options_.force) {
     throw InputError(picture.file, "has no attribute relief:seed, so its samples may be those of another file");
   }
-  for (const std::string& seed : seeds) {
-    for (const SeedOrigin& known : seeds_) {
-      if (known.seed == seed) {
-        throw InputError(picture.file,
-                         "has the same seed, " + seed + ", as '" + known.file + "': the same samples twice");
+  for (const SampleOrigin& origin : origins) {
+    for (const SampleOrigin& known : origins_) {
+      if (known.seed != origin.seed) continue;
+      const std::string same = "has the same seed, " + origin.seed + ", as '" + known.file + "': ";
+      if (!origin.range || !known.range) throw InputError(picture.file, same + "the same samples twice");
+      if (origin.range->of != known.range->of) {
+        throw InputError(picture.file, same + "parts of " + std::to_string(origin.range->of) + " and of " +
+                                           std::to_string(known.range->of) + " samples, which are in different order");
+      }
+      if (origin.range->first < known.range->end && known.range->first < origin.range->end) {
+        throw InputError(picture.file, same + "some samples twice, " + sample_range_text(*origin.range) + " and " +
+                                           sample_range_text(*known.range));
       }
     }
   }
-  for (const std::string& seed : seeds) {
-    seeds_.push_back({seed, picture.file});
-  }
+  origins_.insert(origins_.end(), origins.begin(), origins.end());
 }
 
 void Merger::warn_left_out(const std::string& channel, const std::string& why)
@@ -330,9 +382,14 @@ MergeResult Merger::finish()
     sum.value = {};
     result_.channels.push_back(std::move(channel));
   }
-  std::string seeds;
-  for (const SeedOrigin& origin : seeds_) {
+  join_ranges(origins_);
+  std::string seeds, ranges;
+  bool has_ranges = false;
+  for (const SampleOrigin& origin : origins_) {
     seeds += (seeds.empty() ? "" : ",") + origin.seed;
+    ranges +=
+        (ranges.empty() ? "" : ",") + (origin.range ? sample_range_text(*origin.range) : std::string(kAllSamples));
+    has_ranges = has_ranges || origin.range;
   }
   // What remains describes the joined render; what was true of one of its parts only (threads, command, …) goes.
   const Attributes first = std::move(result_.attributes);
@@ -343,6 +400,7 @@ MergeResult Merger::finish()
       result_.attributes.insert(*found);
   }
   if (!seeds.empty()) result_.attributes["relief:seed"] = seeds;
+  if (has_ranges) result_.attributes["relief:sample_ranges"] = ranges;
   result_.attributes["relief:samples"] = attribute_number(samples_);
   result_.attributes["relief:seconds"] = attribute_number(seconds_);
   result_.attributes["relief:merged"] = std::to_string(num_pictures_);

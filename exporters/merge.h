@@ -1,4 +1,4 @@
-// Joins renders of the same frame with different seeds into the picture that one longer render would have given.
+// Joins renders of the same frame with different samples, by their seeds or as parts of one sequence, into the picture that one longer render would have given.
 #pragma once
 
 #include <filesystem>
@@ -11,8 +11,8 @@
 namespace relief {
 
 struct MergeOptions {
-  /// Accept pictures whose metadata name another scene or frame, or no seed. Equal seeds are never accepted: the same samples
-  /// twice would only look like less noise.
+  /// Accept pictures whose metadata name another scene or frame, or no seed. The same samples are never accepted twice:
+  /// that would only look like less noise.
   bool force = false;
 };
 
@@ -25,11 +25,12 @@ struct MergeResult {
 /// relief:samples):
 ///   means            Σ n·x / Σ n; depth and position, which are means over samples that hit, with n·A
 ///   half             likewise with the number of even-numbered samples, ⌈n/2⌉
-///   variance         Σ n²·v / (Σ n)²: that of the mean above, for independent renders
+///   variance         Σ n²·v / (Σ n)²: that of the mean above, for independent renders. Of parts of one sequence it is too
+///                    much, as they complete each other
 ///   samples          Σ n
 ///   ids              of the first picture that sampled the pixel
 /// Sums are in double precision.
-/// @error InputError naming the files: unreadable, different sizes or windows, equal seeds, other scene or frame, no samples
+/// @error InputError naming the files: unreadable, different sizes or windows, the same samples twice, other scene or frame, no samples
 /// @cost  8 bytes a value for the sums, and one picture more
 MergeResult merge_pictures(std::span<const std::filesystem::path> files, const MergeOptions& options = {});
 

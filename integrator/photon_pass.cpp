@@ -265,14 +265,20 @@ void PhotonPass::next(KernelGlobals& g,
   seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
+void PhotonPass::skip_to(std::uint32_t pass)
+{
+  skipped_ += pass - passes_;
+  passes_ = pass;
+}
+
 std::uint64_t PhotonPass::photons() const
 {
-  return sources_.sources.empty() ? 0 : std::uint64_t{passes_} * photons_a_pass_ + under_way_.load();
+  return sources_.sources.empty() ? 0 : std::uint64_t{passes_ - skipped_} * photons_a_pass_ + under_way_.load();
 }
 
 void PhotonPass::fill(CausticStatistics& stats) const
 {
-  stats.passes = passes_;
+  stats.passes = passes_ - skipped_;
   stats.photons = photons();
   stats.stored = stored_;
   stats.num_sources = sources_.sources.size();

@@ -48,8 +48,12 @@ class PhotonPass {
             const std::atomic<bool>& stop,
             const std::function<void()>& report);
 
-  /// Passes so far; of one under way, the part that is traced.
-  double passes() const { return passes_ + static_cast<double>(under_way_.load()) / photons_a_pass_; }
+  /// Leaves passes out: the next one is that of this number, counted from 0.
+  /// @pre one has been traced, which sets the radius of all, and none beyond that number
+  void skip_to(std::uint32_t pass);
+
+  /// Passes traced so far; of one under way, the part that is.
+  double passes() const { return passes_ - skipped_ + static_cast<double>(under_way_.load()) / photons_a_pass_; }
 
   /// Photons traced so far.
   std::uint64_t photons() const;
@@ -67,7 +71,7 @@ class PhotonPass {
   CausticSettings settings_;
   PhotonSources sources_;
   std::uint32_t photons_a_pass_;
-  std::uint32_t passes_ = 0;
+  std::uint32_t passes_ = 0, skipped_ = 0;   ///< the former with the latter
   std::atomic<std::uint32_t> under_way_{0};  ///< photons of the present pass
   float first_radius_ = 0;
   std::vector<std::vector<Photon>> chunks_;

@@ -31,6 +31,11 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
+std::uint32_t samples_wanted(const RenderOptions& options)
+{
+  return options.num_samples > 0 ? options.num_samples : static_cast<std::uint32_t>(options.settings.samples);
+}
+
 /// Samples of a pass that fills a batch.
 constexpr std::uint32_t kMostSamples = kBatchPaths / (kTileSize * kTileSize);
 
@@ -215,7 +220,7 @@ class ProgressReporter {
     const std::unique_lock lock(mutex_, std::try_to_lock);
     if (!lock.owns_lock() || (!now && seconds_since(last_) < 0.2)) return;
     last_ = Clock::now();
-    const double wanted = options_.settings.samples;
+    const double wanted = samples_wanted(options_);
     RenderProgress p;
     p.seconds = seconds_since(start_);
     p.samples_per_pixel = static_cast<double>(samples_.load()) / num_pixels_;
@@ -333,7 +338,7 @@ RenderedImage render(const Scene& scene,
     return worker;
   });
   const bool has_long_searches = context.displacements.size() > 0;
-  const auto wanted = static_cast<std::uint32_t>(settings.samples);
+  const std::uint32_t wanted = samples_wanted(options);
   ProgressReporter reporter(options, progress, static_cast<double>(film.width()) * film.height());
   const auto report = [&](bool now) { reporter.report(now, photons ? &*photons : nullptr); };
 
@@ -349,20 +354,27 @@ RenderedImage render(const Scene& scene,
   std::vector<int> active(static_cast<std::size_t>(film.num_tiles()));
   for (int tile = 0; tile < film.num_tiles(); ++tile) active[static_cast<std::size_t>(tile)] = tile;
 
+  const auto next_photons = [&] {
+    photons->next(
+        g, stages, [&]() -> Wavefront& { return workers.local(); }, end.reached(),
+        [&] {
+          end.note_progress();
+          report(false);
+        });
+  };
+  if (photons && options.first_sample > 0) {
+    // The first pass sets the radius of all.
+    next_photons();
+    photons->skip_to(options.first_sample);
+  }
+
   const bool is_watched = static_cast<bool>(options.preview);
   stats.stop_reason = "samples";
   for (std::uint32_t done = 0; done < wanted && !active.empty();) {
     // Photons are of one sample: see PhotonPass::next.
     const std::uint32_t samples =
         caustics ? 1 : pass_samples(done, wanted, seconds_since(start), options.time_limit_seconds, is_watched);
-    if (photons) {
-      photons->next(
-          g, stages, [&]() -> Wavefront& { return workers.local(); }, end.reached(),
-          [&] {
-            end.note_progress();
-            report(false);
-          });
-    }
+    if (photons) next_photons();
     tbb::parallel_for(
         std::size_t{0}, active.size(),
         [&](std::size_t i) {
@@ -370,7 +382,7 @@ RenderedImage render(const Scene& scene,
           const FlushDenormals flush;
           Wavefront& worker = workers.local();
           const std::uint64_t rays_before = rays_of(worker.counters);
-          const Batch batch = tile_batch(film, active[i], done, samples);
+          const Batch batch = tile_batch(film, active[i], options.first_sample + done, samples);
           const std::vector<float> sums = has_long_searches ? film.tile_sums(active[i]) : std::vector<float>();
           if (!worker.run(g, *context.accel, stages, context.surface_kernel, batch)) {
             film.put_back_tile_sums(active[i], sums);

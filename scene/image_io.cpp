@@ -37,8 +37,10 @@ const ImageIo& module_load()
   std::error_code no_proc;
   const fs::path program = fs::read_symlink("/proc/self/exe", no_proc);
   std::string causes;
-  // Beside the program, where a copy of both finds it, or where it was built, for the programs of tests.
-  for (const fs::path& path : {program.parent_path() / "relief_image_io.so", fs::path(RELIEF_IMAGE_IO_MODULE)}) {
+  const fs::path folder = program.parent_path(), name = "relief_image_io.so";
+  // Beside the program, where a copy of both finds it; where it is installed; or where it was built, for the programs of tests.
+  for (const fs::path& path :
+       {folder / name, folder.parent_path() / "lib/relief" / name, fs::path(RELIEF_IMAGE_IO_MODULE)}) {
     // Lazily, as at a program's start: looking up every function of 245 libraries takes another 20 ms.
     void* module = ::dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL);
     const void* entry = module == nullptr ? nullptr : ::dlsym(module, kEntryPoint);

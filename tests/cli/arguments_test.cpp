@@ -63,6 +63,43 @@ TEST(Frames, AnythingElseIsRefused)
   }
 }
 
+TEST(Frames, AreSaidShortAndReadBack)
+{
+  EXPECT_EQ(frames_text({1, 2, 3, 7, 9, 8, 10, 11}), "1-3,7,9,8,10-11");
+  for (const char* text : {"1-3", "0", "5,4,3", "1-10x3,2", "7,1000000"}) {
+    const std::vector<int> frames = parse_frames(text).numbers;
+    EXPECT_EQ(parse_frames(frames_text(frames)).numbers, frames) << text;
+  }
+}
+
+TEST(Part, PartsAreAllSamplesOnceAndBeginAtMultiplesOfFour)
+{
+  for (const int samples : {4, 16, 17, 64, 100, 1023, 2147483647}) {
+    for (const int count : {1, 2, 3, 5, 7, 25, 255}) {
+      if (count > 1 && samples < 4 * count) {
+        EXPECT_THROW(part_samples({1, count}, samples), CLI::ValidationError);
+        continue;
+      }
+      std::uint32_t next = 0;
+      for (int i = 1; i <= count; ++i) {
+        const auto [first, end] = part_samples({i, count}, samples);
+        EXPECT_EQ(first, next);
+        EXPECT_EQ(first % 4, 0u);
+        EXPECT_GT(end, first);
+        // As even as can be.
+        EXPECT_LE(static_cast<double>(end - first), static_cast<double>(samples) / count + 7);
+        next = end;
+      }
+      EXPECT_EQ(next, static_cast<std::uint32_t>(samples));
+    }
+  }
+  EXPECT_EQ(part_samples({}, 1).second, 1u);
+  EXPECT_EQ(parse_part("3/4").number, 3);
+  for (const char* text : {"0/4", "5/4", "1", "1/", "/4", "1/4/4", "-1/4", "a/b", "1/2000000", ""}) {
+    EXPECT_THROW(parse_part(text), CLI::ValidationError) << text;
+  }
+}
+
 TEST(Frames, NameAFile)
 {
   EXPECT_EQ(frame_path("out/shot.####.exr", 7), "out/shot.0007.exr");

@@ -140,6 +140,49 @@ TEST_F(Merge, OfAMergeIsTheSameAsOfAllAtOnce)
   EXPECT_NE(refusal({file("ab.exr"), b}).find("same seed"), std::string::npos);
 }
 
+TEST_F(Merge, PartsOfASeedJoinInAnyOrder)
+{
+  const auto part = [&](const std::string& name, std::uint32_t values, const std::string& range,
+                        const char* seed = "5") {
+    return write(name, film(values), seed, {{"relief:sample_ranges", range}});
+  };
+  const auto a = part("a.exr", 1, "0-16/64"), b = part("b.exr", 2, "16-48/64"), c = part("c.exr", 3, "48-64/64");
+  for (const auto& files : {std::vector{a, b, c}, {c, a, b}, {b, c, a}, {c, b, a}}) {
+    const Attributes all = merge(files).picture.attributes;
+    EXPECT_EQ(all.at("relief:seed"), "5");
+    EXPECT_FALSE(all.contains("relief:sample_ranges"));
+  }
+  const Attributes two = merge({c, a}).picture.attributes;
+  EXPECT_EQ(two.at("relief:seed"), "5,5");
+  EXPECT_EQ(two.at("relief:sample_ranges"), "48-64/64,0-16/64");
+  // Merges of parts, with another seed between.
+  exr_write(file("ca.exr"), merge({c, a}).picture);
+  const auto other = write("o.exr", film(4), "6");
+  const Attributes mixed = merge({file("ca.exr"), other}).picture.attributes;
+  EXPECT_EQ(mixed.at("relief:seed"), "5,5,6");
+  EXPECT_EQ(mixed.at("relief:sample_ranges"), "48-64/64,0-16/64,all");
+  exr_write(file("cao.exr"), merge({file("ca.exr"), other}).picture);
+  EXPECT_EQ(merge({file("cao.exr"), b}).picture.attributes.at("relief:seed"), "5,6");
+}
+
+TEST_F(Merge, RefusesTheSameSamplesOfASeedTwice)
+{
+  const auto part = [&](const std::string& name, std::uint32_t values, const std::string& range) {
+    return write(name, film(values), "5", {{"relief:sample_ranges", range}});
+  };
+  const auto a = part("a.exr", 1, "0-16/64"), b = part("b.exr", 2, "16-64/64"), whole = write("w.exr", film(3), "5");
+  for (const auto& [name, range] : {std::pair{"x.exr", "0-16/64"}, {"y.exr", "12-20/64"}, {"z.exr", "16-32/48"}}) {
+    const std::string text = refusal({a, part(name, 4, range)}, true);
+    EXPECT_NE(text.find("same seed, 5"), std::string::npos) << text;
+  }
+  EXPECT_NE(refusal({a, whole}).find("the same samples twice"), std::string::npos);
+  exr_write(file("ab.exr"), merge({a, b}).picture);
+  EXPECT_NE(refusal({file("ab.exr"), b}).find("the same samples twice"), std::string::npos);
+  for (const char* wrong : {"16-16/64", "0-65/64", "x", "1-2", "0-16/64,16-32/64"}) {
+    EXPECT_NE(refusal({a, part("wrong.exr", 4, wrong)}).find("relief:sample_ranges"), std::string::npos) << wrong;
+  }
+}
+
 TEST_F(Merge, RefusesEqualSeedsEvenByForceAndNamesBothFiles)
 {
   const auto a = write("1.exr", film(1), "7"), b = write("2.exr", film(2), "7");
