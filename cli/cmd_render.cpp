@@ -8,7 +8,10 @@
 #include <fstream>
 #include <iterator>
 #include <memory>
+#include <numeric>
 #include <optional>
+#include <span>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +19,7 @@
 #include <sys/resource.h>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/task_arena.h>
@@ -23,8 +27,10 @@
 
 #include "cli/arguments.h"
 #include "cli/commands.h"
+#include "cli/error_text.h"
 #include "cli/exit_code.h"
 #include "cli/fingerprint.h"
+#include "cli/frame_files.h"
 #include "cli/interrupt.h"
 #include "cli/picture_options.h"
 #include "cli/progress_printer.h"
@@ -36,11 +42,11 @@
 #include "exporters/clipping.h"
 #include "exporters/errors.h"
 #include "exporters/exr.h"
+#include "exporters/exr_state.h"
 #include "exporters/image_metrics.h"
 #include "exporters/output_lock.h"
 #include "exporters/png_ocio.h"
 #include "exporters/sample_range.h"
-#include "exporters/stats_json.h"
 #include "integrator/render.h"
 #include "scene/kept_images.h"
 #include "scene/load.h"
@@ -60,7 +66,9 @@ struct RenderArguments {
   std::optional<double> exposure;
   std::uint32_t aov_mask = 0;
   std::string compression = "zip", progress = "bar";
-  bool resume = false, strict = false, float_color = false;
+  bool resume = false, strict = false, keep_going = false, float_color = false;
+  std::optional<double> checkpoint;  ///< seconds; none: as --resume has it
+  double grace = 0;                  ///< seconds
   double texture_memory_gib = 4;
   SceneSetup setup;
   std::vector<std::string> settings;       ///< see settings_given
@@ -191,42 +199,6 @@ ImageErrors errors_against(const Picture& reference, const FilmView& film)
   return image_errors(rendered, expected);
 }
 
-/// Writes a frame's files, the OpenEXR last: its fingerprint says that all of them are there and whole. It is written even
-/// if another file cannot be, since it is worth the most; then without the fingerprint.
-/// @param files        of the run, to look once more before each is written
-/// @param fingerprint  empty: the render was interrupted
-/// @error OutputError of the first file that could not be written
-void write_frame(const RenderArguments& arguments,
-                 const RunFiles& files,
-                 const FramePaths& paths,
-                 const std::string& command,
-                 std::string fingerprint,
-                 const Attributes& more_attributes,
-                 const PngOptions& png,
-                 const FilmView& film,
-                 const Statistics& stats,
-                 ProgressPrinter& progress)
-{
-  std::exception_ptr failure;
-  try {
-    files.check_output("--png", paths.png);
-    if (!paths.png.empty()) png_write(paths.png, film, png);
-    files.check_output("--stats", paths.stats);
-    if (!paths.stats.empty()) atomic_write(paths.stats, stats_json(stats));
-  } catch (...) {
-    failure = std::current_exception();
-    fingerprint.clear();
-  }
-  Attributes attributes = exr_attributes(stats, command);
-  attributes.insert(more_attributes.begin(), more_attributes.end());
-  if (!fingerprint.empty()) attributes.merge(frame_attributes(paths, fingerprint));
-  files.check_output("--output", paths.exr);
-  exr_write(paths.exr, film, attributes, {compression_of(arguments), arguments.float_color});
-  if (!failure) return;
-  progress.note(fmt::format("{}: saved, but not all files of its frame could be", paths.exr.string()));
-  std::rethrow_exception(failure);
-}
-
 /// Says what to do about a PNG that is mostly white.
 void hint_at_clipping(ProgressPrinter& progress,
                       const std::filesystem::path& file,
@@ -241,26 +213,6 @@ void hint_at_clipping(ProgressPrinter& progress,
       fmt::format("{}: {:.0f} % of what is seen is white: try --exposure {:.1f}, or --luminous-efficacy 683 if the "
                   "scene's lights are in candela and lux",
                   file.string(), 100 * clipping.fraction, clipping.exposure));
-}
-
-/// Writes a frame's picture as it is while it is rendered, uncompressed, as it does not last, and tells whoever waits for it.
-/// @return false if it cannot be written: a warning says why, the render goes on
-bool write_preview(const RunFiles& files,
-                   const FramePaths& paths,
-                   int frame,
-                   const FilmView& film,
-                   double samples,
-                   ProgressPrinter& progress)
-{
-  try {
-    files.check_output("--preview", paths.preview);
-    exr_write(paths.preview, film, {{"relief:samples", fmt::format("{:g}", samples)}}, {ExrCompression::kNone, true});
-  } catch (const OutputError& error) {
-    progress.warnings({fmt::format("no more previews: {}", error.what())});
-    return false;
-  }
-  progress.event({{"event", "preview"}, {"frame", frame}, {"output", paths.preview.string()}, {"samples", samples}});
-  return true;
 }
 
 /// Tells people and programs how a frame came out.
@@ -297,6 +249,34 @@ void report_skipped(ProgressPrinter& progress, const FramePaths& paths, int fram
 {
   progress.note(fmt::format("{}: {}", paths.exr.string(), reason));
   progress.event({{"event", "skipped"}, {"frame", frame}, {"output", paths.exr.string()}, {"reason", reason}});
+}
+
+/// Seconds between the checkpoints of a frame; 0: none.
+double checkpoint_seconds(const RenderArguments& arguments, const FramePaths& paths)
+{
+  constexpr double kSeconds = 60;
+  // Whoever reads a pipe waits for one picture.
+  if (is_stream(output_destination(paths.exr))) return 0;
+  return arguments.checkpoint.value_or(arguments.resume ? kSeconds : 0.0);
+}
+
+void report_resumed(ProgressPrinter& progress, const FramePaths& paths, int frame, const RenderState& state)
+{
+  const double samples = std::accumulate(state.tile_samples.begin(), state.tile_samples.end(), 0.0) /
+                         static_cast<double>(std::max<std::size_t>(state.tile_samples.size(), 1));
+  progress.note(
+      fmt::format("{}: goes on after {:.6g} samples a pixel and {:.2f} s", paths.exr.string(), samples, state.seconds));
+  progress.event({{"event", "resumed"},
+                  {"frame", frame},
+                  {"output", paths.exr.string()},
+                  {"samples", samples},
+                  {"seconds", state.seconds}});
+}
+
+void report_failed(ProgressPrinter& progress, int frame, const std::string& name, const std::exception& error)
+{
+  progress.note(fmt::format("relief: frame {}: {}", name, error_text(error)));
+  progress.event({{"event", "failed"}, {"frame", frame}, {"reason", error_text(error)}});
 }
 
 /// What the frames of a run share.
@@ -368,11 +348,23 @@ bool render_frame(const RenderArguments& arguments,
   }
   const std::optional<Picture> reference = reference_load(paths.reference, options);
 
+  FrameFiles frame_files(files, paths, command, {compression_of(arguments), arguments.float_color}, progress);
+  std::optional<SavedRender> saved;
+  if (arguments.resume) saved = exr_state_load(paths.exr, fingerprint);
+  if (saved) {
+    options.saved = &*saved;
+    report_resumed(progress, paths, stats.frame, saved->state);
+  }
+  options.checkpoint_seconds = checkpoint_seconds(arguments, paths);
+  if (options.checkpoint_seconds > 0) {
+    options.checkpoint = [&](const RenderState& state, std::span<const float> sums, const FilmView& film) {
+      frame_files.write_checkpoint(state, sums, film, stats, fingerprint);
+    };
+  }
   const std::string title = frame ? fmt::format("frame {} ", *frame) : std::string();
-  bool shows_previews = true;
   if (!paths.preview.empty()) {
     options.preview = [&](const FilmView& film, double samples) {
-      if (shows_previews) shows_previews = write_preview(files, paths, stats.frame, film, samples, progress);
+      frame_files.write_preview(stats.frame, film, samples);
     };
   }
   const RenderedImage image = render(scene, options, interrupt_flag(), progress.callback(stats.frame, title), stats);
@@ -400,8 +392,7 @@ bool render_frame(const RenderArguments& arguments,
     stats.warnings.push_back(file + ": changed after the render had begun: the picture may show either state");
   }
   progress.warnings(stats.warnings);
-  write_frame(arguments, files, paths, command, is_whole && changed.empty() ? fingerprint : std::string(),
-              more_attributes, png, image.view, stats, progress);
+  frame_files.write(image, stats, more_attributes, png, fingerprint, is_whole && changed.empty());
   std::optional<ImageErrors> errors;
   if (reference) errors = errors_against(*reference, image.view);
   report_frame(progress, paths, stats, errors);
@@ -432,21 +423,35 @@ int render_all(const RenderArguments& arguments, const std::string& command)
   const std::vector<std::optional<int>> frames = frames_of_run(arguments);
   RunFiles files = files_of_run(arguments, frames);
 
-  interrupt_watch();
+  interrupt_watch(arguments.grace);
   const int threads = arguments.threads > 0 ? arguments.threads : tbb::info::default_concurrency();
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
   exr_use_threads(threads > 1 ? threads : 0);
   tbb::task_arena arena(threads);
   ProgressPrinter progress(arguments.progress);
   KeptFrames kept;
-  for (const std::optional<int> frame : frames) {
+  std::vector<std::string> failed;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const std::optional<int> frame = frames[i];
     bool is_whole = false;
-    arena.execute([&] {
-      is_whole = render_frame(arguments, command, frame, files, frames.size() > 1 ? &kept : nullptr, progress);
-    });
-    if (!is_whole || interrupt_flag()) return kInterrupted;
+    try {
+      arena.execute([&] {
+        is_whole = render_frame(arguments, command, frame, files, frames.size() > 1 ? &kept : nullptr, progress);
+      });
+    } catch (const CLI::Error&) {
+      throw;  // Wrong usage is wrong for every frame.
+    } catch (const std::exception& error) {
+      if (!arguments.keep_going) throw;
+      failed.push_back(frame ? std::to_string(*frame) : "rest pose");
+      report_failed(progress, frame.value_or(0), failed.back(), error);
+      is_whole = true;
+    }
+    const bool is_last = i + 1 == frames.size();
+    if (!is_whole || interrupt_flag() || (interrupt_is_announced() && !is_last)) return kInterrupted;
   }
-  return 0;
+  if (failed.empty()) return 0;
+  throw std::runtime_error(
+      fmt::format("{} of {} frames failed: {}", failed.size(), frames.size(), fmt::join(failed, ", ")));
 }
 
 }  // namespace
@@ -485,7 +490,16 @@ void cmd_render_register(CLI::App& app, Run& run, const std::string& command_lin
              "Frames, such as 1-10,20,30-60x2, or all of the scene (default: the rest pose)");
   add_parsed(*command, "--part", a.part, parse_part,
              "I/N: only the I-th of N parts of the samples, which relief merge joins");
-  command->add_flag("--resume", a.resume, "Skip frames whose files are whole and of the same scene and settings");
+  command->add_flag("--resume", a.resume,
+                    "Skip frames whose files are whole and of the same scene and settings, go on with unfinished ones");
+  command
+      ->add_option(
+          "--checkpoint", a.checkpoint,
+          "Seconds after which an unfinished picture is saved to go on from; 0: never (default: 60 with --resume)")
+      ->check(number(0, 1e9));
+  command->add_flag("--keep-going", a.keep_going, "Render the frames after one that fails; exit code 1 at the end");
+  command->add_option("--grace", a.grace, "Seconds from SIGTERM to the end of the program, whatever it is doing")
+      ->check(number(0.1, 1e9));
   command->add_flag("--strict", a.strict, "Turn warnings into errors");
   command->add_option("--view", a.view, setting_help(setting_info("view")));
   command->add_option("--exposure", a.exposure, setting_help(kExposure))->check(setting_check(kExposure));

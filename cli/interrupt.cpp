@@ -1,32 +1,65 @@
 #include "cli/interrupt.h"
 
+#include <chrono>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
+#include <thread>
+
+#include <semaphore.h>
 
 namespace relief {
 
 namespace {
 
-std::atomic<bool> g_stop{false};
+std::atomic<bool> g_announced{false}, g_stop{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may not wait for a lock");
 
-void on_signal(int)
+sem_t g_grace_begins;
+std::atomic<bool> g_has_grace{false};
+
+void on_signal(int number)
 {
-  if (g_stop.exchange(true)) std::_Exit(130);
+  const bool is_second = g_announced.exchange(true);
+  if (is_second) std::_Exit(130);
+  if (number == SIGTERM && g_has_grace) {
+    ::sem_post(&g_grace_begins);
+  } else {
+    g_stop = true;
+  }
+}
+
+/// A thread of its own: whatever the others are doing, the program ends in time.
+void keep_grace(double seconds)
+{
+  while (::sem_wait(&g_grace_begins) != 0) {
+  }
+  const auto half = std::chrono::duration<double>(seconds / 2);
+  std::this_thread::sleep_for(half);
+  g_stop = true;
+  std::this_thread::sleep_for(half);
+  std::fputs("relief: the grace time is over: what was not written by now is lost\n", stderr);
+  std::_Exit(143);
 }
 
 }  // namespace
 
-void interrupt_watch()
+void interrupt_watch(double grace_seconds)
 {
+  if (grace_seconds > 0 && ::sem_init(&g_grace_begins, 0, 0) == 0) {
+    g_has_grace = true;
+    std::thread(keep_grace, grace_seconds).detach();
+  }
   std::signal(SIGINT, on_signal);
   std::signal(SIGTERM, on_signal);
   if (std::signal(SIGHUP, on_signal) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
   std::signal(SIGPIPE, SIG_IGN);
 }
 
-void interrupt_request() { g_stop = true; }
+void interrupt_request() { g_announced = g_stop = true; }
 
 const std::atomic<bool>& interrupt_flag() { return g_stop; }
+
+bool interrupt_is_announced() { return g_announced; }
 
 }  // namespace relief

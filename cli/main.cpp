@@ -12,6 +12,7 @@
 #include "cli/cmd_compare.h"
 #include "cli/cmd_merge.h"
 #include "cli/commands.h"
+#include "cli/error_text.h"
 #include "cli/exit_code.h"
 #include "cli/standard_streams.h"
 #include "cli/suggestion.h"
@@ -35,11 +36,11 @@ int report(ExitCode code, const std::string& what, const std::string& hint = {})
 constexpr const char* kMemoryHint =
     "--max-memory, --texture-memory, --resolution and a shell's ulimit -v set what is needed and what there is";
 
-/// An error that may come of a lack of memory, told by a library's words.
-int report_of_library(ExitCode code, const std::exception& error)
+/// An error that may come of a lack of memory, perhaps told by a library's words.
+int report_error(ExitCode code, const std::exception& error)
 {
-  if (!relief::is_out_of_memory(error.what())) return report(code, error.what());
-  return report(kFailed, std::string("out of memory: ") + error.what(), kMemoryHint);
+  const bool is_of_memory = relief::is_of_memory(error);
+  return report(is_of_memory ? kFailed : code, relief::error_text(error), is_of_memory ? kMemoryHint : "");
 }
 
 /// Memory may be short where no exception can pass: a library's threads, functions that must not fail. Those end the program;
@@ -124,13 +125,9 @@ int main(int argc, char** argv)
   } catch (const relief::SceneError& error) {
     return report(kInvalidScene, error.what(),
                   error.json_path.empty() ? "" : "the scene format is described in docs/scene_format.md");
-  } catch (const relief::OutOfMemory& error) {
-    return report(kFailed, std::string("out of memory: ") + error.what(), kMemoryHint);
-  } catch (const std::bad_alloc&) {
-    return report(kFailed, "out of memory", kMemoryHint);
   } catch (const relief::InputError& error) {
-    return report_of_library(kInvalidScene, error);
+    return report_error(kInvalidScene, error);
   } catch (const std::exception& error) {
-    return report_of_library(kFailed, error);
+    return report_error(kFailed, error);
   }
 }

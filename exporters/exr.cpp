@@ -1,29 +1,18 @@
 #include "exporters/exr.h"
 
-#include <ImfChannelList.h>
-#include <ImfChromaticities.h>
-#include <ImfFrameBuffer.h>
-#include <ImfHeader.h>
-#include <ImfIO.h>
 #include <ImfInputPart.h>
 #include <ImfMultiPartInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfPartType.h>
-#include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
 #include <ImfThreading.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
-#include <cstring>
-#include <limits>
-#include <mutex>
 #include <new>
-#include <thread>
 
-#include "exporters/atomic_file.h"
 #include "exporters/errors.h"
+#include "exporters/exr_rows.h"
 #include "scene/cryptomatte.h"
 #include "scene/memory.h"
 
@@ -31,167 +20,23 @@ namespace relief {
 
 namespace {
 
-// Rows handled at once. A multiple of every compression's block (1, 16, 32, 256 rows), so that no block is compressed
-// twice or decompressed twice, and enough of them to keep a few threads busy.
-constexpr int kRowsAtOnce = 256;
-
-// A hostile header is refused before anything of its size is allocated: sides and channels of real pictures are smaller.
-constexpr int kMaxSide = 1 << 17;
+// Likewise of channels: see kMaxSide.
 constexpr std::int64_t kMaxRowValues = std::int64_t{1} << 22;  // one block of rows is then at most 4 GiB
 constexpr std::int64_t kMaxValues = std::int64_t{1} << 33;
 
-constexpr float kHalfMax = 65504.f;
-
-constexpr Imf::Compression kImfCompressions[] = {Imf::NO_COMPRESSION,  Imf::ZIPS_COMPRESSION, Imf::ZIP_COMPRESSION,
-                                                 Imf::PIZ_COMPRESSION, Imf::DWAA_COMPRESSION, Imf::DWAB_COMPRESSION};
-constexpr Imf::PixelType kImfTypes[] = {Imf::UINT, Imf::HALF, Imf::FLOAT};
-
-std::once_flag g_threads_chosen;
-
-void use_machine_threads()
-{
-  // More threads than 16 do not pay: a block of 256 rows holds no more than 16 ZIP chunks.
-  std::call_once(g_threads_chosen, [] {
-    Imf::setGlobalThreadCount(static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1u, 16u)));
-  });
-}
-
-/// OpenEXR's way of writing, onto a file that appears whole or not at all.
-class AtomicStream : public Imf::OStream {
- public:
-  explicit AtomicStream(AtomicFile& file) : Imf::OStream(file.path().string().c_str()), file_(file) {}
-  void write(const char* bytes, int num_bytes) override { file_.write(bytes, static_cast<std::size_t>(num_bytes)); }
-  std::uint64_t tellp() override { return file_.position(); }
-  void seekp(std::uint64_t position) override { file_.seek(position); }
-
- private:
-  AtomicFile& file_;
-};
-
-std::size_t bytes_of(ChannelType type) { return type == ChannelType::kHalf ? 2 : 4; }
-
-void pack_row(const ChannelView& channel, int width, int y, char* packed)
-{
-  for (int x = 0; x < width; ++x) {
-    const float value = channel.at(x, y);
-    switch (channel.type) {
-      case ChannelType::kUint: {
-        // NaN fails the comparison and becomes 0, which means "none" for ids and counts.
-        const double rounded = value > 0.f ? std::min(std::floor(double{value} + 0.5), 4294967295.0) : 0.0;
-        const std::uint32_t integer = static_cast<std::uint32_t>(rounded);
-        std::memcpy(packed + 4 * x, &integer, 4);
-        break;
-      }
-      case ChannelType::kHalf: {
-        // An infinity in a picture spreads through every filter of a compositor; a large number does not.
-        const float limited = std::isfinite(value) ? std::clamp(value, -kHalfMax, kHalfMax) : value;
-        const std::uint16_t bits = Imath::half(limited).bits();
-        std::memcpy(packed + 2 * x, &bits, 2);
-        break;
-      }
-      case ChannelType::kFloat:
-        std::memcpy(packed + 4 * x, &value, 4);
-        break;
-    }
-  }
-}
-
-struct Windows {
-  int width = 0, height = 0, crop_x = 0, crop_y = 0, full_width = 0, full_height = 0;
-};
-
-Imf::Header header_make(const Windows& windows,
-                        const std::vector<ChannelView>& channels,
-                        const Attributes& attributes,
-                        ExrCompression compression)
-{
-  const Imath::Box2i display(Imath::V2i(0, 0), Imath::V2i(windows.full_width - 1, windows.full_height - 1));
-  const Imath::Box2i data(Imath::V2i(windows.crop_x, windows.crop_y),
-                          Imath::V2i(windows.crop_x + windows.width - 1, windows.crop_y + windows.height - 1));
-  Imf::Header header(display, data);
-  header.compression() = kImfCompressions[static_cast<std::size_t>(compression)];
-  Imf::addChromaticities(header, Imf::Chromaticities());  // Rec.709 primaries and D65 are its defaults
-  for (const auto& [name, text] : attributes) {
-    header.insert(name, Imf::StringAttribute(text));
-  }
-  for (const ChannelView& channel : channels) {
-    header.channels().insert(channel.name, Imf::Channel(kImfTypes[static_cast<std::size_t>(channel.type)]));
-  }
-  return header;
-}
-
-/// Packs and writes the rows, a block at a time, so that a film is never held twice.
-void write_rows(Imf::OutputFile& output, const Windows& windows, const std::vector<ChannelView>& channels)
-{
-  const std::size_t width = static_cast<std::size_t>(windows.width);
-  std::vector<std::vector<char>> packed;
-  packed.reserve(channels.size());
-  for (const ChannelView& channel : channels) {
-    packed.emplace_back(width * kRowsAtOnce * bytes_of(channel.type));
-  }
-  for (int y0 = 0; y0 < windows.height; y0 += kRowsAtOnce) {
-    const int num_rows = std::min(kRowsAtOnce, windows.height - y0);
-    Imf::FrameBuffer buffer;
-    for (std::size_t c = 0; c < channels.size(); ++c) {
-      const std::size_t pixel_bytes = bytes_of(channels[c].type), row_bytes = pixel_bytes * width;
-      for (int row = 0; row < num_rows; ++row) {
-        pack_row(channels[c], windows.width, y0 + row, packed[c].data() + row_bytes * static_cast<std::size_t>(row));
-      }
-      buffer.insert(channels[c].name,
-                    Imf::Slice::Make(kImfTypes[static_cast<std::size_t>(channels[c].type)], packed[c].data(),
-                                     Imath::V2i(windows.crop_x, windows.crop_y + y0), windows.width, num_rows,
-                                     pixel_bytes, row_bytes));
-    }
-    output.setFrameBuffer(buffer);
-    output.writePixels(num_rows);
-  }
-}
-
 void write_channels(const std::filesystem::path& path,
-                    const Windows& windows,
+                    const ExrWindows& windows,
                     const std::vector<ChannelView>& channels,
                     const Attributes& attributes,
                     ExrCompression compression)
 {
-  use_machine_threads();
-  try {
-    if (windows.width <= 0 || windows.height <= 0 || channels.empty()) {
-      throw OutputError(path.string(), "the picture has no pixels or no channels");
-    }
-    AtomicFile file(path);
-    AtomicStream stream(file);
-    {
-      Imf::OutputFile output(stream, header_make(windows, channels, attributes, compression));
-      write_rows(output, windows, channels);
-      // The destructor writes the table of chunk offsets and swallows every error; a full disk shows in commit().
-    }
-    file.commit();
-  } catch (const OutputError&) {
-    throw;
-  } catch (const std::bad_alloc&) {
-    throw OutOfMemory("writing " + path.string());
-  } catch (const std::exception& error) {
-    throw OutputError(path.string(), error.what());
+  if (windows.width <= 0 || windows.height <= 0 || channels.empty()) {
+    throw OutputError(path.string(), "the picture has no pixels or no channels");
   }
-}
-
-ChannelType film_channel_type(const AovInfo& info, const ExrOptions& options)
-{
-  if (info.integer_like) return ChannelType::kUint;
-  switch (info.aov) {
-    case Aov::kBeauty:
-    case Aov::kDirect:
-    case Aov::kIndirect:
-    case Aov::kAlbedo:
-    case Aov::kNormal:
-    case Aov::kEmission:
-    case Aov::kEnvironment:
-    case Aov::kDenoisingAlbedo:
-    case Aov::kDenoisingNormal:
-      return options.float_color ? ChannelType::kFloat : ChannelType::kHalf;
-    default:
-      return ChannelType::kFloat;
-  }
+  exr_file_write(path, [&](Imf::OStream& stream) {
+    Imf::OutputFile output(stream, exr_header_make(windows, channels, attributes, compression));
+    exr_rows_write(output, windows, channels);
+  });
 }
 
 std::string one_line(std::string text)
@@ -299,12 +144,6 @@ void read_rows(Imf::InputPart& part, const Imath::Box2i& data, Picture& picture)
 
 }  // namespace
 
-void exr_use_threads(int num_threads)
-{
-  std::call_once(g_threads_chosen, [] {});
-  Imf::setGlobalThreadCount(std::max(num_threads, 0));
-}
-
 Attributes exr_attributes(const Statistics& statistics, std::string_view command)
 {
   std::string warnings;
@@ -367,15 +206,7 @@ void exr_write(const std::filesystem::path& path,
                const Attributes& attributes,
                const ExrOptions& options)
 {
-  std::vector<ChannelView> channels;
-  for (const AovInfo& info : kAovInfo) {
-    for (ChannelView& channel : film_layer(film, info.aov).channels) {
-      channel.type = film_channel_type(info, options);
-      channels.push_back(channel);
-    }
-  }
-  const Windows windows{film.width, film.height, film.crop_x, film.crop_y, film.full_width, film.full_height};
-  write_channels(path, windows, channels, attributes, options.compression);
+  write_channels(path, exr_windows(film), exr_film_channels(film, options), attributes, options.compression);
 }
 
 void exr_write(const std::filesystem::path& path, const Picture& picture, ExrCompression compression)
@@ -384,14 +215,14 @@ void exr_write(const std::filesystem::path& path, const Picture& picture, ExrCom
   for (const Channel& channel : picture.channels) {
     channels.push_back({channel.values.data(), 1, picture.width, channel.type, channel.name});
   }
-  const Windows windows{picture.width,  picture.height,     picture.crop_x,
-                        picture.crop_y, picture.full_width, picture.full_height};
+  const ExrWindows windows{picture.width,  picture.height,     picture.crop_x,
+                           picture.crop_y, picture.full_width, picture.full_height};
   write_channels(path, windows, channels, picture.attributes, compression);
 }
 
 Picture exr_load(const std::filesystem::path& path)
 {
-  use_machine_threads();
+  exr_threads_choose();
   const std::string file = path.string();
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored)) throw InputError(file, "no such file");

@@ -180,6 +180,12 @@ double error_extrapolate(double d1, double d2) { return std::max((5.0 * d1 - d2)
 
 FilmAccumulatorView Film::accumulator() { return {sums_.data(), width_, height_, layout_}; }
 
+void Film::restore(std::vector<float> sums, const std::vector<std::uint32_t>& samples)
+{
+  sums_ = std::move(sums);
+  samples_ = samples;
+}
+
 const float* Film::record(int x, int y) const
 {
   return sums_.data() + (static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)) *

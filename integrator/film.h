@@ -3,10 +3,13 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "kernel/film/film_accumulator.h"
 #include "kernel/film/film_layout.h"
+#include "kernel/render_state.h"
 
 namespace relief {
 
@@ -17,7 +20,8 @@ inline constexpr int kTileSize = 16;
 /// A finished picture that owns its pixels.
 struct RenderedImage {
   std::vector<float> pixels;
-  FilmView view;  ///< into `pixels`
+  FilmView view;                     ///< into `pixels`
+  std::optional<SavedRender> saved;  ///< what goes on from here; only if it was interrupted, and asked for
 };
 
 /// Root mean square errors of the whole image, estimated from its halves and quarters. NaN where a pixel has less than two
@@ -61,6 +65,10 @@ class Film {
   std::uint32_t tile_samples(int tile) const { return samples_[static_cast<std::size_t>(tile)]; }
   /// Called by the one thread that renders the tile.
   void add_tile_samples(int tile, std::uint32_t count) { samples_[static_cast<std::size_t>(tile)] += count; }
+  const std::vector<std::uint32_t>& samples() const { return samples_; }
+  std::span<const float> sums() const { return sums_; }
+  /// Puts back what the two above gave of a film of the same size and layers.
+  void restore(std::vector<float> sums, const std::vector<std::uint32_t>& samples);
   double mean_samples() const;
   /// Part of the picture that has no sample.
   double empty_part() const;

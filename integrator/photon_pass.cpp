@@ -210,6 +210,16 @@ void PhotonPass::keep_to_memory(const KernelGlobals& g, const StageTable& stages
   photons_a_pass_ = static_cast<std::uint32_t>(std::clamp(most_kept / kept_a_path, 1.0, 1.0 * photons_a_pass_));
 }
 
+void PhotonPass::restore(const PhotonPassState& state, std::uint32_t passes, std::uint32_t skipped)
+{
+  photons_a_pass_ = state.photons_a_pass;
+  first_radius_ = state.first_radius;
+  stored_ = state.stored;
+  seconds_ = state.seconds;
+  passes_ = passes;
+  skipped_ = skipped;
+}
+
 void PhotonPass::next(KernelGlobals& g,
                       const StageTable& stages,
                       const std::function<Wavefront&()>& worker,

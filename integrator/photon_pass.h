@@ -13,6 +13,7 @@
 #include "integrator/photon_map.h"
 #include "integrator/scene_context.h"
 #include "integrator/wavefront.h"
+#include "kernel/render_state.h"
 
 namespace relief {
 
@@ -52,7 +53,13 @@ class PhotonPass {
   /// @pre one has been traced, which sets the radius of all, and none beyond that number
   void skip_to(std::uint32_t pass);
 
-  /// Passes traced so far; of one under way, the part that is.
+  PhotonPassState state() const { return {photons_a_pass_, first_radius_, stored_, seconds_}; }
+  /// Goes on where another was.
+  /// @param passes   that it had finished
+  /// @param skipped  that it had left out of them
+  void restore(const PhotonPassState& state, std::uint32_t passes, std::uint32_t skipped);
+
+  /// Passes so far; of one under way, the part that is traced.
   double passes() const { return passes_ - skipped_ + static_cast<double>(under_way_.load()) / photons_a_pass_; }
 
   /// Photons traced so far.

@@ -12,10 +12,10 @@
 #include <utility>
 #include <vector>
 
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "integrator/checkpoint.h"
 #include "integrator/flush_denormals.h"
 #include "integrator/photon_pass.h"
 #include "integrator/scene_context.h"
@@ -201,8 +201,9 @@ class ProgressReporter {
  public:
   ProgressReporter(const RenderOptions& options,
                    const std::function<void(const RenderProgress&)>& progress,
-                   double num_pixels)
-      : options_(options), progress_(progress), num_pixels_(num_pixels)
+                   double num_pixels,
+                   Clock::time_point start)
+      : options_(options), progress_(progress), num_pixels_(num_pixels), start_(start)
   {
   }
   void add(std::uint64_t samples, std::uint64_t rays)
@@ -241,7 +242,7 @@ class ProgressReporter {
   const RenderOptions& options_;
   const std::function<void(const RenderProgress&)>& progress_;
   double num_pixels_;
-  Clock::time_point start_ = Clock::now(), last_ = start_;
+  Clock::time_point start_, last_ = Clock::now();
   std::atomic<std::uint64_t> samples_{0}, rays_{0};
   std::mutex mutex_;
   double last_fraction_ = 0;
@@ -282,24 +283,17 @@ void fill_film(Statistics& stats, const Film& film, const RenderSettings& settin
 }
 
 /// What all workers have done.
-void fill_work(Statistics& stats,
-               const tbb::enumerable_thread_specific<Wavefront>& workers,
-               bool caustics,
-               const FilmWindow& window)
+void fill_work(Statistics& stats, const Workers& workers, bool caustics, const FilmWindow& window)
 {
   stats.threads = tbb::this_task_arena::max_concurrency();
   stats.path_state_bytes = workers.size() * Wavefront::bytes(caustics);
+  RenderState work;
+  state_add_work(work, workers);
+  stats.counters = work.counters;
+  stats.displacement.most_steps = work.most_displacement_steps;
   stats.stages.clear();
-  for (const char* name : kStageNames) stats.stages.push_back({name, 0.0});
-  std::uint64_t first_nonfinite = kNoSample;
-  for (const Wavefront& worker : workers) {
-    counters_add(stats.counters, worker.counters);
-    stats.displacement.most_steps =
-        std::max<std::uint64_t>(stats.displacement.most_steps, worker.most_displacement_steps);
-    for (std::size_t s = 0; s < stats.stages.size(); ++s) stats.stages[s].seconds += worker.seconds[s];
-    first_nonfinite = std::min(first_nonfinite, worker.first_nonfinite);
-  }
-  if (first_nonfinite != kNoSample) stats.first_nonfinite = pixel_sample(first_nonfinite, window);
+  for (std::size_t s = 0; s < kStageNames.size(); ++s) stats.stages.push_back({kStageNames[s], work.stage_seconds[s]});
+  if (work.first_nonfinite != kNoSample) stats.first_nonfinite = pixel_sample(work.first_nonfinite, window);
 }
 
 }  // namespace
@@ -330,16 +324,19 @@ RenderedImage render(const Scene& scene,
   if (caustics) photons.emplace(context, settings.caustics, static_cast<double>(settings.width) * settings.height);
   stats.build_seconds = seconds_since(build_start);
 
-  const Clock::time_point start = Clock::now();
-  SamplingEnd end(stop, options.time_limit_seconds);
-  tbb::enumerable_thread_specific<Wavefront> workers([&] {
+  const double earlier_seconds = options.saved != nullptr ? options.saved->state.seconds : 0.0;
+  const Clock::time_point start =
+      Clock::now() - std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(earlier_seconds));
+  SamplingEnd end(stop,
+                  options.time_limit_seconds > 0 ? std::max(1e-3, options.time_limit_seconds - earlier_seconds) : 0.0);
+  Workers workers([&] {
     Wavefront worker(caustics);
     worker.stop = &end.reached();
     return worker;
   });
   const bool has_long_searches = context.displacements.size() > 0;
   const std::uint32_t wanted = samples_wanted(options);
-  ProgressReporter reporter(options, progress, static_cast<double>(film.width()) * film.height());
+  ProgressReporter reporter(options, progress, static_cast<double>(film.width()) * film.height(), start);
   const auto report = [&](bool now) { reporter.report(now, photons ? &*photons : nullptr); };
 
   PreviewSchedule previews;
@@ -362,44 +359,91 @@ RenderedImage render(const Scene& scene,
           report(false);
         });
   };
-  if (photons && options.first_sample > 0) {
-    // The first pass sets the radius of all.
-    next_photons();
-    photons->skip_to(options.first_sample);
-  }
 
   const bool is_watched = static_cast<bool>(options.preview);
   stats.stop_reason = "samples";
-  for (std::uint32_t done = 0; done < wanted && !active.empty();) {
-    // Photons are of one sample: see PhotonPass::next.
-    const std::uint32_t samples =
-        caustics ? 1 : pass_samples(done, wanted, seconds_since(start), options.time_limit_seconds, is_watched);
-    if (photons) next_photons();
-    tbb::parallel_for(
-        std::size_t{0}, active.size(),
-        [&](std::size_t i) {
-          if (stop.load(std::memory_order_relaxed) || end.reached().load(std::memory_order_relaxed)) return;
-          const FlushDenormals flush;
-          Wavefront& worker = workers.local();
-          const std::uint64_t rays_before = rays_of(worker.counters);
-          const Batch batch = tile_batch(film, active[i], options.first_sample + done, samples);
-          const std::vector<float> sums = has_long_searches ? film.tile_sums(active[i]) : std::vector<float>();
-          if (!worker.run(g, *context.accel, stages, context.surface_kernel, batch)) {
-            film.put_back_tile_sums(active[i], sums);
-            return;
-          }
-          end.note_progress();
-          film.add_tile_samples(active[i], samples);
-          reporter.add(batch.num_paths(), rays_of(worker.counters) - rays_before);
-          report(false);
-        },
-        tbb::simple_partitioner());
-    if (stop.load() || end.reached().load()) {
+  stats.isa = stages.isa;
+  std::uint32_t done = 0, samples = 0;
+  if (options.saved != nullptr && state_restore(*options.saved, film, workers.local(), wanted)) {
+    const RenderState& saved = options.saved->state;
+    g.film = film.accumulator();
+    active = saved.active;
+    done = saved.done_samples;
+    samples = saved.pass_samples;
+    if (photons) photons->restore(saved.photons, options.first_sample + done, std::max(options.first_sample, 1u) - 1);
+    reporter.add(static_cast<std::uint64_t>(film.mean_samples() * static_cast<double>(film.num_pixels())),
+                 rays_of(saved.counters));
+  } else {
+    if (options.saved != nullptr) {
+      stats.warnings.emplace_back("what was rendered before is not of this picture: begun anew");
+    }
+    if (photons && options.first_sample > 0) {
+      // The first pass sets the radius of all.
+      next_photons();
+      photons->skip_to(options.first_sample);
+    }
+  }
+  PhotonPassState photons_before;
+  const auto state = [&] {
+    RenderState now;
+    now.done_samples = done;
+    now.pass_samples = samples;
+    now.active = active;
+    now.tile_samples = film.samples();
+    now.photons = photons_before;
+    now.seconds = seconds_since(start);
+    state_add_work(now, workers);
+    return now;
+  };
+  CheckpointSchedule checkpoints(options.checkpoint ? options.checkpoint_seconds : 0.0);
+  const auto checkpoint = [&] {
+    stats.render_seconds = seconds_since(start);
+    fill_film(stats, film, settings);
+    const RenderedImage beauty =
+        film.beauty(window.x0, window.y0, settings.width, settings.height, settings.film_exposure);
+    options.checkpoint(state(), film.sums(), beauty.view);
+  };
+  while (done < wanted && !active.empty()) {
+    // Photons are of one sample: see PhotonPass::next. A pass that was under way goes on as it was begun.
+    if (samples == 0) {
+      samples = caustics ? 1 : pass_samples(done, wanted, seconds_since(start), options.time_limit_seconds, is_watched);
+    }
+    if (photons) {
+      photons_before = photons->state();
+      next_photons();
+    }
+    const auto is_ended = [&] { return stop.load() || end.reached().load(); };
+    // A checkpoint leaves tiles that wait; usually there is none, and all is done in the first turn. Each turn does one at least.
+    for (std::vector<int> waiting = active; !is_ended();) {
+      tbb::parallel_for(
+          std::size_t{0}, waiting.size(),
+          [&](std::size_t i) {
+            if (film.tile_samples(waiting[i]) != done || is_ended() || (i > 0 && checkpoints.is_due())) return;
+            const FlushDenormals flush;
+            Wavefront& worker = workers.local();
+            const std::uint64_t rays_before = rays_of(worker.counters);
+            const Batch batch = tile_batch(film, waiting[i], options.first_sample + done, samples);
+            const std::vector<float> sums = has_long_searches ? film.tile_sums(waiting[i]) : std::vector<float>();
+            if (!worker.run(g, *context.accel, stages, context.surface_kernel, batch)) {
+              film.put_back_tile_sums(waiting[i], sums);
+              return;
+            }
+            end.note_progress();
+            film.add_tile_samples(waiting[i], samples);
+            reporter.add(batch.num_paths(), rays_of(worker.counters) - rays_before);
+            report(false);
+          },
+          tbb::simple_partitioner());
+      std::erase_if(waiting, [&](int tile) { return film.tile_samples(tile) != done; });
+      if (waiting.empty()) break;
+      if (!is_ended() && checkpoints.is_due()) checkpoints.run(checkpoint);
+    }
+    if (is_ended()) {
       stats.stop_reason = stop.load() ? "interrupted" : "time_limit";
       if (!stop.load() && film.empty_part() > 0) stats.warnings.push_back(empty_part_warning(film.empty_part()));
       break;
     }
-    done += samples;
+    done += std::exchange(samples, 0);
     if (photons) reporter.set_photon_share(photons->seconds() / seconds_since(start));
     // Where passes are smaller because somebody watches, tiles are judged when they would be otherwise.
     const bool is_judged = !is_watched || caustics || done % kMostSamples == 0;
@@ -418,13 +462,19 @@ RenderedImage render(const Scene& scene,
   report(true);
 
   stats.render_seconds = seconds_since(start);
-  stats.isa = stages.isa;
   stats.caustics.reason = context.caustics_reason;
   if (photons) photons->fill(stats.caustics);
   context.fill(stats);
   fill_film(stats, film, settings);
   fill_work(stats, workers, caustics, window);
-  return std::move(film).resolve(window.x0, window.y0, settings.width, settings.height, settings.film_exposure);
+  std::optional<SavedRender> saved;
+  if (options.checkpoint && stats.stop_reason == "interrupted" && stats.samples_per_pixel > 0) {
+    saved = {state(), window.width, window.height, {film.sums().begin(), film.sums().end()}};
+  }
+  RenderedImage image =
+      std::move(film).resolve(window.x0, window.y0, settings.width, settings.height, settings.film_exposure);
+  image.saved = std::move(saved);
+  return image;
 }
 
 }  // namespace relief

@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <functional>
+#include <span>
 
 #include "integrator/film.h"
 #include "integrator/scene_context.h"
@@ -27,6 +28,12 @@ struct RenderOptions {
   /// Gets the beauty so far and its samples a pixel, soon after the start and then as often as takes a hundredth of the
   /// time, at most twice a second; may be empty. Sampling waits meanwhile. The picture is the same with it, if no time limit counts what it takes.
   std::function<void(const FilmView&, double)> preview;
+  /// Gets the state and the film's sums every so many seconds, while sampling waits, with the beauty so far. The statistics then
+  /// tell seed, size, samples, error and seconds. May be empty; if not, an interrupted render's picture has its state.
+  std::function<void(const RenderState&, std::span<const float>, const FilmView&)> checkpoint;
+  double checkpoint_seconds = 0;  ///< 0: only an interrupted picture has a state
+  /// What to go on from, to the same picture in every bit; its sums are taken. Null: begins. One of another film is a warning.
+  SavedRender* saved = nullptr;
 };
 
 struct RenderProgress {

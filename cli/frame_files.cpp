@@ -1,0 +1,84 @@
+#include "cli/frame_files.h"
+
+#include <exception>
+#include <new>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "exporters/atomic_file.h"
+#include "exporters/errors.h"
+#include "exporters/exr_state.h"
+#include "exporters/stats_json.h"
+
+namespace relief {
+
+void FrameFiles::write_preview(int frame, const FilmView& film, double samples)
+{
+  if (!shows_previews_) return;
+  try {
+    files_.check_output("--preview", paths_.preview);
+    exr_write(paths_.preview, film, {{"relief:samples", fmt::format("{:g}", samples)}}, {ExrCompression::kNone, true});
+  } catch (const OutputError& error) {
+    progress_.warnings({fmt::format("no more previews: {}", error.what())});
+    shows_previews_ = false;
+    return;
+  }
+  progress_.event({{"event", "preview"}, {"frame", frame}, {"output", paths_.preview.string()}, {"samples", samples}});
+}
+
+void FrameFiles::write_checkpoint(const RenderState& state,
+                                  std::span<const float> sums,
+                                  const FilmView& film,
+                                  Statistics stats,
+                                  const std::string& fingerprint) const
+{
+  files_.check_output("--output", paths_.exr);
+  stats.stop_reason = "interrupted";
+  try {
+    exr_write(paths_.exr, film, exr_attributes(stats, command_), {ExrCompression::kNone, exr_.float_color},
+              {state, sums, fingerprint});
+  } catch (const OutputError& error) {
+    progress_.warnings({fmt::format("a checkpoint could not be written: {}", error.what())});
+    return;
+  } catch (const std::bad_alloc&) {
+    progress_.warnings({fmt::format("a checkpoint could not be written: {}: out of memory", paths_.exr.string())});
+    return;
+  }
+  progress_.event({{"event", "checkpoint"},
+                   {"frame", stats.frame},
+                   {"output", paths_.exr.string()},
+                   {"samples", stats.samples_per_pixel}});
+}
+
+void FrameFiles::write(const RenderedImage& image,
+                       const Statistics& stats,
+                       const Attributes& cryptomattes,
+                       const PngOptions& png,
+                       const std::string& fingerprint,
+                       bool is_whole) const
+{
+  std::exception_ptr failure;
+  try {
+    files_.check_output("--png", paths_.png);
+    if (!paths_.png.empty()) png_write(paths_.png, image.view, png);
+    files_.check_output("--stats", paths_.stats);
+    if (!paths_.stats.empty()) atomic_write(paths_.stats, stats_json(stats));
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  Attributes attributes = exr_attributes(stats, command_);
+  attributes.insert(cryptomattes.begin(), cryptomattes.end());
+  if (is_whole && !failure) attributes.merge(frame_attributes(paths_, fingerprint));
+  files_.check_output("--output", paths_.exr);
+  if (image.saved) {
+    exr_write(paths_.exr, image.view, attributes, exr_, {image.saved->state, image.saved->sums, fingerprint});
+  } else {
+    exr_write(paths_.exr, image.view, attributes, exr_);
+  }
+  if (!failure) return;
+  progress_.note(fmt::format("{}: saved, but not all files of its frame could be", paths_.exr.string()));
+  std::rethrow_exception(failure);
+}
+
+}  // namespace relief

@@ -1,0 +1,62 @@
+// Writing the files of one frame: what it is as long as it is rendered, and what it has become.
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "cli/fingerprint.h"
+#include "cli/progress_printer.h"
+#include "cli/run_files.h"
+#include "exporters/exr.h"
+#include "exporters/png_ocio.h"
+#include "integrator/render.h"
+
+namespace relief {
+
+class FrameFiles {
+ public:
+  /// All but the text must outlive it.
+  /// @param files    of the run, to look once more before each is written
+  /// @param command  the command line
+  FrameFiles(const RunFiles& files,
+             const FramePaths& paths,
+             std::string command,
+             ExrOptions exr,
+             ProgressPrinter& progress)
+      : files_(files), paths_(paths), command_(std::move(command)), exr_(exr), progress_(progress)
+  {
+  }
+
+  /// Writes the picture as it is while it is rendered, uncompressed, as it does not last, and tells whoever waits for it. If it
+  /// cannot be written a warning says why, and there are no more.
+  void write_preview(int frame, const FilmView& film, double samples);
+
+  /// Writes the picture as it is with what the render goes on from. If it cannot be written a warning says why; an older one stays.
+  /// @param fingerprint  of what decides the frame
+  void write_checkpoint(const RenderState& state,
+                        std::span<const float> sums,
+                        const FilmView& film,
+                        Statistics stats,
+                        const std::string& fingerprint) const;
+
+  /// Writes the frame's files, the OpenEXR last: its fingerprint says that all of them are there and whole. It is written even
+  /// if another file cannot be, since it is worth the most; then without the fingerprint.
+  /// @param is_whole  false: it was interrupted, or may be of files that changed; nobody is to take it for the frame
+  /// @error OutputError of the first file that could not be written
+  void write(const RenderedImage& image,
+             const Statistics& stats,
+             const Attributes& cryptomattes,
+             const PngOptions& png,
+             const std::string& fingerprint,
+             bool is_whole) const;
+
+ private:
+  const RunFiles& files_;
+  const FramePaths& paths_;
+  std::string command_;
+  ExrOptions exr_;
+  ProgressPrinter& progress_;
+  bool shows_previews_ = true;
+};
+
+}  // namespace relief

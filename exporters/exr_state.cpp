@@ -1,0 +1,158 @@
+#include "exporters/exr_state.h"
+
+#include <ImfInputPart.h>
+#include <ImfMultiPartInputFile.h>
+#include <ImfMultiPartOutputFile.h>
+#include <ImfOutputPart.h>
+#include <ImfPartType.h>
+#include <ImfStringAttribute.h>
+#include <ImfThreading.h>
+
+#include <cstdio>
+#include <new>
+
+#include <nlohmann/json.hpp>
+
+#include "exporters/exr_rows.h"
+#include "scene/memory.h"
+
+namespace relief {
+
+namespace {
+
+constexpr const char* kPartName = "relief.state";
+constexpr const char* kFingerprint = "relief:state_of";
+constexpr const char* kState = "relief:state";
+/// More sums than all layers have.
+constexpr int kMostSums = 999;
+
+/// Hands each name and member of a state to `field`: the one list for writing and reading.
+template <class State, class Field>
+void visit(State& state, const Field& field)
+{
+  field("done_samples", state.done_samples);
+  field("pass_samples", state.pass_samples);
+  field("active", state.active);
+  field("tile_samples", state.tile_samples);
+  field("photons_a_pass", state.photons.photons_a_pass);
+  field("first_radius", state.photons.first_radius);
+  field("photons_stored", state.photons.stored);
+  field("photon_seconds", state.photons.seconds);
+  field("seconds", state.seconds);
+  field("stage_seconds", state.stage_seconds);
+  field("most_displacement_steps", state.most_displacement_steps);
+  field("first_nonfinite", state.first_nonfinite);
+#define X(name) field(#name, state.counters.name);
+  RELIEF_COUNTERS(X)
+#undef X
+}
+
+/// Without a dot in it, which would make it a layer.
+std::string sum_name(std::size_t index)
+{
+  char name[32];
+  std::snprintf(name, sizeof name, "sum%03zu", index);
+  return name;
+}
+
+/// The sums as OpenEXR finds them in memory.
+/// @param sums  the first pixel's, of the window
+Imf::FrameBuffer frame_buffer(const float* sums, std::size_t num_sums, const Imath::Box2i& window)
+{
+  const int width = window.max.x - window.min.x + 1, height = window.max.y - window.min.y + 1;
+  const std::size_t stride = num_sums * sizeof(float);
+  Imf::FrameBuffer buffer;
+  for (std::size_t i = 0; i < num_sums; ++i) {
+    buffer.insert(sum_name(i), Imf::Slice::Make(Imf::FLOAT, sums + i, window.min, width, height, stride,
+                                                stride * static_cast<std::size_t>(width)));
+  }
+  return buffer;
+}
+
+std::string attribute_of(const Imf::Header& header, const char* name)
+{
+  const auto* text = header.findTypedAttribute<Imf::StringAttribute>(name);
+  return text != nullptr ? text->value() : std::string();
+}
+
+/// @error std::exception of any kind if the part is not what was written
+SavedRender part_load(Imf::MultiPartInputFile& input, int index, const std::string& file)
+{
+  const Imf::Header& header = input.header(index);
+  const Imath::Box2i& window = header.dataWindow();
+  SavedRender saved;
+  const nlohmann::json json = nlohmann::json::parse(attribute_of(header, kState));
+  visit(saved.state, [&](const char* name, auto& value) { json.at(name).get_to(value); });
+  std::size_t num_sums = 0;
+  for (auto channel = header.channels().begin(); channel != header.channels().end(); ++channel) ++num_sums;
+  // The sides are within kMaxSide, or OpenEXR would not have opened the file.
+  saved.width = window.max.x - window.min.x + 1;
+  saved.height = window.max.y - window.min.y + 1;
+  if (num_sums == 0 || num_sums > kMostSums || !input.partComplete(index)) throw std::runtime_error("no state");
+  const std::size_t size = static_cast<std::size_t>(saved.width) * static_cast<std::size_t>(saved.height) * num_sums;
+  memory_require(size * sizeof(float), file);
+  saved.sums.resize(size);
+  Imf::InputPart part(input, index);
+  part.setFrameBuffer(frame_buffer(saved.sums.data(), num_sums, window));
+  part.readPixels(window.min.y, window.max.y);
+  return saved;
+}
+
+}  // namespace
+
+void exr_write(const std::filesystem::path& path,
+               const FilmView& film,
+               const Attributes& attributes,
+               const ExrOptions& options,
+               const ExrState& state)
+{
+  const ExrWindows windows = exr_windows(film);
+  const std::vector<ChannelView> channels = exr_film_channels(film, options);
+  nlohmann::json json;
+  visit(state.state, [&](const char* name, const auto& value) { json[name] = value; });
+  const std::size_t num_sums =
+      state.sums.size() / (static_cast<std::size_t>(film.width) * static_cast<std::size_t>(film.height));
+  std::vector<ChannelView> sums(num_sums);
+  for (std::size_t i = 0; i < num_sums; ++i) sums[i].name = sum_name(i);
+
+  Imf::Header headers[] = {exr_header_make(windows, channels, attributes, options.compression),
+                           exr_header_make(windows, sums, {{kFingerprint, state.fingerprint}, {kState, json.dump()}},
+                                           ExrCompression::kNone)};
+  headers[0].setName("picture");
+  headers[1].setName(kPartName);
+  for (Imf::Header& header : headers) header.setType(Imf::SCANLINEIMAGE);
+  exr_file_write(path, [&](Imf::OStream& stream) {
+    Imf::MultiPartOutputFile output(stream, headers, 2);
+    Imf::OutputPart picture(output, 0), kept(output, 1);
+    exr_rows_write(picture, windows, channels);
+    kept.setFrameBuffer(frame_buffer(state.sums.data(), num_sums, headers[1].dataWindow()));
+    kept.writePixels(windows.height);
+  });
+}
+
+std::optional<SavedRender> exr_state_load(const std::filesystem::path& path, const std::string& fingerprint)
+{
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return {};
+  exr_threads_choose();
+  Imf::Header::setMaxImageSize(kMaxSide, kMaxSide);
+  const std::string file = path.string();
+  try {
+    Imf::MultiPartInputFile input(file.c_str(), Imf::globalThreadCount(), false);
+    for (int part = 0; part < input.parts(); ++part) {
+      const Imf::Header& header = input.header(part);
+      if (!header.hasName() || header.name() != kPartName) continue;
+      if (attribute_of(header, kFingerprint) != fingerprint) return {};
+      return part_load(input, part, file);
+    }
+  } catch (const OutOfMemory&) {
+    throw;
+  } catch (const std::bad_alloc&) {
+    throw OutOfMemory(file);
+  } catch (const std::exception&) {
+    // No picture, or cut short: as if there were none.
+  }
+  return {};
+}
+
+}  // namespace relief
