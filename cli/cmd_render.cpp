@@ -27,6 +27,7 @@
 
 #include "cli/arguments.h"
 #include "cli/commands.h"
+#include "cli/denoise_picture.h"
 #include "cli/error_text.h"
 #include "cli/exit_code.h"
 #include "cli/fingerprint.h"
@@ -65,6 +66,7 @@ struct RenderArguments {
   std::optional<std::string> view;
   std::optional<double> exposure;
   std::uint32_t aov_mask = 0;
+  Denoiser denoiser = Denoiser::kNone;
   std::string compression = "zip", progress = "bar";
   bool resume = false, strict = false, keep_going = false, float_color = false;
   std::optional<double> checkpoint;  ///< seconds; none: as --resume has it
@@ -134,7 +136,7 @@ RenderOptions options_for(const Scene& scene, const RenderArguments& arguments)
   options.first_sample = first;
   options.num_samples = end - first;
   options.time_limit_seconds = arguments.time_limit;
-  options.aov_mask = arguments.aov_mask;
+  options.aov_mask = arguments.aov_mask | (arguments.denoiser == Denoiser::kNone ? 0 : denoiser_aovs());
   return options;
 }
 
@@ -184,9 +186,9 @@ std::optional<Picture> reference_load(const std::filesystem::path& file, const R
   return picture;
 }
 
-ImageErrors errors_against(const Picture& reference, const FilmView& film)
+/// @param rendered  R, G and B of the film's size
+ImageErrors errors_against(const Picture& reference, const FilmView& film, ImageView rendered)
 {
-  ImageView rendered = film_layer(film, Aov::kBeauty);
   ImageView expected = picture_layer(reference, "");
   rendered.channels.resize(3);
   expected.channels.resize(3);
@@ -219,7 +221,9 @@ void hint_at_clipping(ProgressPrinter& progress,
 void report_frame(ProgressPrinter& progress,
                   const FramePaths& paths,
                   const Statistics& stats,
-                  const std::optional<ImageErrors>& errors)
+                  const std::optional<DenoisedPicture>& denoised,
+                  const std::optional<ImageErrors>& errors,
+                  const std::optional<ImageErrors>& denoised_errors)
 {
   const std::string estimate =
       std::isfinite(stats.error_rmse) ? fmt::format("estimated RMSE {:.3g}", stats.error_rmse) : "error unknown";
@@ -227,6 +231,7 @@ void report_frame(ProgressPrinter& progress,
                             stats.height, stats.samples_per_pixel, stats.render_seconds, estimate,
                             stats.view.empty() ? "" : ", " + stats.view,
                             stats.stop_reason == "interrupted" ? " (interrupted)" : ""));
+  if (denoised) progress.note(fmt::format("{}: {}", paths.exr.string(), denoised->report()));
   nlohmann::json done = {{"event", "done"},
                          {"frame", stats.frame},
                          {"output", paths.exr.string()},
@@ -238,10 +243,22 @@ void report_frame(ProgressPrinter& progress,
     done["reference_rmse"] = errors->rmse;
     done["reference_relmse"] = errors->relmse;
   }
+  if (denoised) {
+    done["denoise_seconds"] = denoised->seconds;
+    done["denoised_rmse"] = denoised->result.rmse;
+  }
+  if (denoised_errors) {
+    done["denoised_reference_rmse"] = denoised_errors->rmse;
+    done["denoised_reference_relmse"] = denoised_errors->relmse;
+  }
   progress.event(done);
   if (errors && !progress.is_json()) {
     print_line(fmt::format("against {}: RMSE {:.6g}, relMSE {:.6g} after {:.2f} s", paths.reference.string(),
                            errors->rmse, errors->relmse, stats.render_seconds));
+    if (denoised_errors) {
+      print_line(fmt::format("denoised, against it: RMSE {:.6g}, relMSE {:.6g} after {:.2f} s", denoised_errors->rmse,
+                             denoised_errors->relmse, stats.render_seconds + denoised->seconds));
+    }
   }
 }
 
@@ -348,7 +365,8 @@ bool render_frame(const RenderArguments& arguments,
   }
   const std::optional<Picture> reference = reference_load(paths.reference, options);
 
-  FrameFiles frame_files(files, paths, command, {compression_of(arguments), arguments.float_color}, progress);
+  FrameFiles frame_files(files, paths, command, {compression_of(arguments), arguments.float_color}, arguments.aov_mask,
+                         progress);
   std::optional<SavedRender> saved;
   if (arguments.resume) saved = exr_state_load(paths.exr, fingerprint);
   if (saved) {
@@ -391,11 +409,32 @@ bool render_frame(const RenderArguments& arguments,
   for (const std::string& file : changed) {
     stats.warnings.push_back(file + ": changed after the render had begun: the picture may show either state");
   }
+  std::optional<DenoisedPicture> denoised;
+  std::exception_ptr denoise_failure;
+  if (arguments.denoiser != Denoiser::kNone) {
+    try {
+      denoised = denoise_picture(arguments.denoiser, all_channels(image.view), paths.exr.string());
+      if (std::isnan(denoised->result.rmse)) {
+        stats.warnings.emplace_back("--denoise: pixels with less than two samples stay as they are");
+      }
+    } catch (...) {
+      // What was rendered is saved all the same.
+      denoise_failure = std::current_exception();
+    }
+  }
+  const bool is_complete = is_whole && changed.empty() && !denoise_failure;
   progress.warnings(stats.warnings);
-  frame_files.write(image, stats, more_attributes, png, fingerprint, is_whole && changed.empty());
-  std::optional<ImageErrors> errors;
-  if (reference) errors = errors_against(*reference, image.view);
-  report_frame(progress, paths, stats, errors);
+  frame_files.write(image, denoised ? &*denoised : nullptr, stats, more_attributes, png, fingerprint, is_complete);
+  if (denoise_failure) {
+    progress.note(fmt::format("{}: saved, but not denoised", paths.exr.string()));
+    std::rethrow_exception(denoise_failure);
+  }
+  std::optional<ImageErrors> errors, denoised_errors;
+  if (reference) errors = errors_against(*reference, image.view, film_layer(image.view, Aov::kBeauty));
+  if (reference && denoised) {
+    denoised_errors = errors_against(*reference, image.view, denoised->beauty(image.view.height));
+  }
+  report_frame(progress, paths, stats, denoised, errors, denoised_errors);
   if (view) hint_at_clipping(progress, paths.png, image.view, *view, png.exposure);
   if (arguments.strict) refuse_warnings(arguments.scene, stats.warnings);
   return is_whole;
@@ -422,6 +461,7 @@ int render_all(const RenderArguments& arguments, const std::string& command)
 {
   const std::vector<std::optional<int>> frames = frames_of_run(arguments);
   RunFiles files = files_of_run(arguments, frames);
+  denoiser_require(arguments.denoiser);
 
   interrupt_watch(arguments.grace);
   const int threads = arguments.threads > 0 ? arguments.threads : tbb::info::default_concurrency();
@@ -506,6 +546,7 @@ void cmd_render_register(CLI::App& app, Run& run, const std::string& command_lin
   add_parsed(*command, "--aov", a.aov_mask, parse_aovs, "Layers to keep: names separated by commas, or all")
       ->check(listed_words(aov_words()))
       ->default_str(kDefaultAovs);
+  add_denoiser(*command, a.denoiser, Denoiser::kNone);
   command->add_option("--compression", a.compression, "Of the OpenEXR")
       ->check(one_of({kExrCompressionNames.begin(), kExrCompressionNames.end()}))
       ->capture_default_str();

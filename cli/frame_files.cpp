@@ -13,6 +13,29 @@
 
 namespace relief {
 
+namespace {
+
+/// The film without the layers that only a denoiser wanted.
+FilmView asked_layers(FilmView film, std::uint32_t aov_mask)
+{
+  for (std::size_t i = 0; i < film.layout.offset.size(); ++i) {
+    if ((aov_mask >> i & 1u) == 0) film.layout.offset[i] = -1;
+  }
+  return film;
+}
+
+/// What the PNG shows: the beauty, denoised if it was.
+ImageView shown(const FilmView& film, const DenoisedPicture* denoised)
+{
+  ImageView view = film_layer(film, Aov::kBeauty);
+  if (denoised == nullptr) return view;
+  ImageView color = denoised->beauty(film.height);
+  color.channels.push_back(view.channels[3]);
+  return color;
+}
+
+}  // namespace
+
 void FrameFiles::write_preview(int frame, const FilmView& film, double samples)
 {
   if (!shows_previews_) return;
@@ -52,6 +75,7 @@ void FrameFiles::write_checkpoint(const RenderState& state,
 }
 
 void FrameFiles::write(const RenderedImage& image,
+                       const DenoisedPicture* denoised,
                        const Statistics& stats,
                        const Attributes& cryptomattes,
                        const PngOptions& png,
@@ -61,7 +85,7 @@ void FrameFiles::write(const RenderedImage& image,
   std::exception_ptr failure;
   try {
     files_.check_output("--png", paths_.png);
-    if (!paths_.png.empty()) png_write(paths_.png, image.view, png);
+    if (!paths_.png.empty()) png_write(paths_.png, shown(image.view, denoised), png);
     files_.check_output("--stats", paths_.stats);
     if (!paths_.stats.empty()) atomic_write(paths_.stats, stats_json(stats));
   } catch (...) {
@@ -70,11 +94,14 @@ void FrameFiles::write(const RenderedImage& image,
   Attributes attributes = exr_attributes(stats, command_);
   attributes.insert(cryptomattes.begin(), cryptomattes.end());
   if (is_whole && !failure) attributes.merge(frame_attributes(paths_, fingerprint));
+  if (denoised != nullptr) attributes.merge(denoised->attributes());
+  const std::vector<ChannelView> more = denoised != nullptr ? denoised->channels() : std::vector<ChannelView>();
+  const FilmView film = asked_layers(image.view, aov_mask_);
   files_.check_output("--output", paths_.exr);
   if (image.saved) {
-    exr_write(paths_.exr, image.view, attributes, exr_, {image.saved->state, image.saved->sums, fingerprint});
+    exr_write(paths_.exr, film, attributes, exr_, {image.saved->state, image.saved->sums, fingerprint}, more);
   } else {
-    exr_write(paths_.exr, image.view, attributes, exr_);
+    exr_write(paths_.exr, film, attributes, exr_, more);
   }
   if (!failure) return;
   progress_.note(fmt::format("{}: saved, but not all files of its frame could be", paths_.exr.string()));

@@ -4,6 +4,7 @@
 #include <span>
 #include <string>
 
+#include "cli/denoise_picture.h"
 #include "cli/fingerprint.h"
 #include "cli/progress_printer.h"
 #include "cli/run_files.h"
@@ -18,12 +19,14 @@ class FrameFiles {
   /// All but the text must outlive it.
   /// @param files    of the run, to look once more before each is written
   /// @param command  the command line
+  /// @param aov_mask  layers that the OpenEXR has
   FrameFiles(const RunFiles& files,
              const FramePaths& paths,
              std::string command,
              ExrOptions exr,
+             std::uint32_t aov_mask,
              ProgressPrinter& progress)
-      : files_(files), paths_(paths), command_(std::move(command)), exr_(exr), progress_(progress)
+      : files_(files), paths_(paths), command_(std::move(command)), exr_(exr), aov_mask_(aov_mask), progress_(progress)
   {
   }
 
@@ -41,9 +44,11 @@ class FrameFiles {
 
   /// Writes the frame's files, the OpenEXR last: its fingerprint says that all of them are there and whole. It is written even
   /// if another file cannot be, since it is worth the most; then without the fingerprint.
+  /// @param denoised  null: nothing was
   /// @param is_whole  false: it was interrupted, or may be of files that changed; nobody is to take it for the frame
   /// @error OutputError of the first file that could not be written
   void write(const RenderedImage& image,
+             const DenoisedPicture* denoised,
              const Statistics& stats,
              const Attributes& cryptomattes,
              const PngOptions& png,
@@ -55,6 +60,7 @@ class FrameFiles {
   const FramePaths& paths_;
   std::string command_;
   ExrOptions exr_;
+  std::uint32_t aov_mask_;
   ProgressPrinter& progress_;
   bool shows_previews_ = true;
 };

@@ -10,6 +10,7 @@
 
 #include "cli/arguments.h"
 #include "cli/cmd_compare.h"
+#include "cli/cmd_denoise.h"
 #include "cli/cmd_merge.h"
 #include "cli/commands.h"
 #include "cli/error_text.h"
@@ -100,6 +101,7 @@ int main(int argc, char** argv)
   relief::cmd_trace_register(app, run);
   relief::cmd_compare_register(app, run);
   relief::cmd_merge_register(app, run);
+  relief::cmd_denoise_register(app, run);
   relief::cmd_bench_register(app, run);
   relief::cmd_farm_register(app, run);
   relief::cmd_help_files_register(app, run);

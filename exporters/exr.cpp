@@ -195,7 +195,8 @@ std::vector<std::string> exr_damaged_layers(const FilmLayout& layout, ExrCompres
   for (const AovInfo& info : kAovInfo) {
     const bool kept = layout.offset[static_cast<std::size_t>(info.aov)] >= 0;
     const bool is_data = info.aov == Aov::kNormal || info.aov == Aov::kPosition || info.aov == Aov::kVariance ||
-                         info.aov == Aov::kHalf || info.aov == Aov::kDenoisingNormal || info.channels.empty();
+                         info.aov == Aov::kHalf || info.aov == Aov::kDenoisingNormal ||
+                         info.aov == Aov::kDenoisingHalf || info.channels.empty();
     if (kept && is_data) damaged.emplace_back(info.name);
   }
   return damaged;
@@ -204,9 +205,12 @@ std::vector<std::string> exr_damaged_layers(const FilmLayout& layout, ExrCompres
 void exr_write(const std::filesystem::path& path,
                const FilmView& film,
                const Attributes& attributes,
-               const ExrOptions& options)
+               const ExrOptions& options,
+               const std::vector<ChannelView>& more)
 {
-  write_channels(path, exr_windows(film), exr_film_channels(film, options), attributes, options.compression);
+  std::vector<ChannelView> channels = more;
+  for (ChannelView& channel : exr_film_channels(film, options)) channels.push_back(std::move(channel));
+  write_channels(path, exr_windows(film), channels, attributes, options.compression);
 }
 
 void exr_write(const std::filesystem::path& path, const Picture& picture, ExrCompression compression)

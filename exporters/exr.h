@@ -42,12 +42,14 @@ std::vector<std::string> exr_damaged_layers(const FilmLayout& layout, ExrCompres
 /// Writes a film. Ids and counts are stored as 32-bit integers; depth, position, uv, variance and half as floats; colours and
 /// normals as halves unless asked otherwise. Finite values beyond a half's range become its largest value, 65504.
 /// @param attributes  text to store; a name that OpenEXR itself uses with another type is an error
+/// @param more        further channels of the film's size, stored as their types say
 /// @error OutputError; nothing is left behind
 /// @cost  memory for a block of rows only
 void exr_write(const std::filesystem::path& path,
                const FilmView& film,
                const Attributes& attributes,
-               const ExrOptions& options = {});
+               const ExrOptions& options = {},
+               const std::vector<ChannelView>& more = {});
 
 /// Writes a picture, each channel with the type it has. @error OutputError
 void exr_write(const std::filesystem::path& path,

@@ -104,10 +104,12 @@ void exr_write(const std::filesystem::path& path,
                const FilmView& film,
                const Attributes& attributes,
                const ExrOptions& options,
-               const ExrState& state)
+               const ExrState& state,
+               const std::vector<ChannelView>& more)
 {
   const ExrWindows windows = exr_windows(film);
-  const std::vector<ChannelView> channels = exr_film_channels(film, options);
+  std::vector<ChannelView> channels = more;
+  for (ChannelView& channel : exr_film_channels(film, options)) channels.push_back(std::move(channel));
   nlohmann::json json;
   visit(state.state, [&](const char* name, const auto& value) { json[name] = value; });
   const std::size_t num_sums =

@@ -19,11 +19,13 @@ struct ExrState {
 };
 
 /// Writes both. @error OutputError; an older file is then as it was
+/// @param more  as for a film alone
 void exr_write(const std::filesystem::path& path,
                const FilmView& film,
                const Attributes& attributes,
                const ExrOptions& options,
-               const ExrState& state);
+               const ExrState& state,
+               const std::vector<ChannelView>& more = {});
 
 /// Reads the second part.
 /// @return nothing if there is none, if it has another fingerprint, or if it is damaged

@@ -32,6 +32,7 @@ Rule rule_of(const std::string& channel)
       case Aov::kPosition:
         return Rule::kMeanOverHits;
       case Aov::kHalf:
+      case Aov::kDenoisingHalf:
         return Rule::kHalf;
       case Aov::kVariance:
         return Rule::kVariance;
@@ -57,6 +58,14 @@ bool is_cryptomatte(std::string_view channel)
     if (rest.size() > 2 && rest[2] == '.') return true;
   }
   return false;
+}
+
+/// Why a channel has no place among merged ones; empty: it has.
+std::string reason_to_leave_out(std::string_view channel)
+{
+  if (is_cryptomatte(channel)) return "ids have no mean";
+  const bool is_denoised = channel.starts_with("denoised.") || channel.starts_with("denoised_error.");
+  return is_denoised ? "denoise the merged picture, which has less noise" : "";
 }
 
 std::string attribute_of(const Picture& picture, const std::string& name)
@@ -199,8 +208,8 @@ void Merger::check_same_image(const Picture& picture)
     num_samples_.assign(num_pixels, 0);
     num_even_samples_.assign(num_pixels, 0);
     for (const Channel& channel : picture.channels) {
-      if (is_cryptomatte(channel.name)) {
-        warn_left_out(channel.name, "ids have no mean");
+      if (const std::string reason = reason_to_leave_out(channel.name); !reason.empty()) {
+        warn_left_out(channel.name, reason);
         continue;
       }
       const Rule rule = rule_of(channel.name);
@@ -269,7 +278,7 @@ void Merger::drop_missing_layers(const Picture& picture)
   });
   for (const Channel& channel : picture.channels) {
     const auto is_kept = [&](const Sum& sum) { return sum.name == channel.name; };
-    if (is_cryptomatte(channel.name)) continue;
+    if (!reason_to_leave_out(channel.name).empty()) continue;
     if (std::none_of(sums_.begin(), sums_.end(), is_kept)) warn(channel.name, result_.file);
   }
 }

@@ -43,7 +43,8 @@ AccumulatorLayout layout_make(std::uint32_t aov_mask, int cryptomatte_levels)
   keep(Aov::kDenoisingAlbedo, 3, layout.denoising_albedo);
   keep(Aov::kDenoisingNormal, 3, layout.denoising_normal);
   keep(Aov::kDenoisingDepth, 1, layout.denoising_depth);
-  layout.denoising = layout.denoising_albedo >= 0 || layout.denoising_normal >= 0;
+  keep(Aov::kDenoisingHalf, 7, layout.denoising_half);
+  layout.denoising = layout.denoising_albedo >= 0 || layout.denoising_normal >= 0 || layout.denoising_half >= 0;
   for (int i = 0; i < kNumCryptomattes; ++i) {
     keep(static_cast<Aov>(kFirstCryptomatte + i), 2 * cryptomatte_levels, layout.cryptomatte[i]);
   }
@@ -426,6 +427,10 @@ void Film::resolve_pixel(const float* in,
   if (float* p = plane(Aov::kDenoisingAlbedo)) put3(p, load3(in + layout_.denoising_albedo) * inverse_n);
   if (float* p = plane(Aov::kDenoisingNormal)) put3(p, load3(in + layout_.denoising_normal) * inverse_n);
   if (float* p = plane(Aov::kDenoisingDepth)) p[0] = in[layout_.denoising_depth] * inverse_n;
+  if (float* p = plane(Aov::kDenoisingHalf)) {
+    const float inverse_half = 1.0f / static_cast<float>((samples + 1) / 2);
+    for (int i = 0; i < 7; ++i) p[i] = in[layout_.denoising_half + i] * inverse_half;
+  }
   for (int i = 0; i < kNumCryptomattes; ++i) {
     float* p = plane(static_cast<Aov>(kFirstCryptomatte + i));
     if (p != nullptr) put_cryptomatte(in + layout_.cryptomatte[i], layout_.cryptomatte_levels, inverse_n, p);

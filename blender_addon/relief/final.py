@@ -52,6 +52,8 @@ def render(engine, depsgraph):
     arguments = [binary, "render", exported.path, "-o", picture_path, "--stats", stats_path]
     arguments += ["--progress", "json", "--compression", "none", "--float", "--aov", aovs]
     arguments += command_line(scene, crop)
+    if scene.relief.denoise != "none":
+        arguments += ["--denoise", scene.relief.denoise]
     preview = None
     if _is_watched():
         preview_path = os.path.join(folder, "preview.exr")

@@ -91,6 +91,17 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
         min=0.0,
         unit="TIME_ABSOLUTE",
     )
+    denoise: EnumProperty(
+        name="Denoise",
+        description="Take the noise out of the finished picture. The pass Noisy Image is the picture as it was rendered, "
+        "Denoised Error what the denoised one may be off by (default None)",
+        items=(
+            ("none", "None", "The picture as it was rendered (default)"),
+            ("builtin", "Built-in", "By what its two halves of samples, albedo, normals and depth tell"),
+            ("oidn", "Open Image Denoise", "Intel's denoiser, if it is installed on this machine"),
+        ),
+        default="none",
+    )
     noise_threshold: FloatProperty(name="Noise Threshold", precision=4, **_declared("noiseThreshold", soft_max=1.0))
     max_bounces: IntProperty(name="Total", **_declared("maxBounces", soft_max=200))
     diffuse_bounces: IntProperty(name="Diffuse", **_declared("diffuseBounces", soft_max=200))

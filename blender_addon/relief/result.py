@@ -89,6 +89,11 @@ PASSES = (
          "X", "VALUE", owner="relief"),
 )  # fmt: skip
 
+#: Passes that a picture has besides if it is denoised: the combined pass as it was rendered, under Cycles' name, and the
+#: root mean square error that is left.
+NOISY = Pass("Noisy Image", "", True, "", tuple("RGBA"), "RGBA", "COLOR")
+_DENOISED = (NOISY, Pass("Denoised Error", "", True, "", _rgb("denoised_error"), "RGB", "COLOR"))
+
 #: Cryptomattes that a view layer may ask for.
 CRYPTOMATTES = ("object", "material", "asset")
 
@@ -99,6 +104,8 @@ _NO_PASSES = {"use_pass_combined", "use_pass_cryptomatte_accurate"}
 def enabled_passes(view_layer):
     """Passes that a view layer asks for, besides the combined one."""
     passes = [p for p in PASSES if p.is_enabled(view_layer)]
+    if view_layer.id_data.relief.denoise != "none":
+        passes += _DENOISED
     for kind in CRYPTOMATTES:
         setting = f"use_pass_cryptomatte_{kind}"
         if not getattr(view_layer, setting):
@@ -132,15 +139,19 @@ def aov_list(passes, has_holdouts=False):
 
     @param  has_holdouts  the combined pass has holes that its coverage does not tell from the world
     """
-    return ",".join(["beauty", *(p.aov for p in passes), *(["holdout"] if has_holdouts else [])])
+    return ",".join(["beauty", *(p.aov for p in passes if p.aov), *(["holdout"] if has_holdouts else [])])
 
 
-def combined(picture, is_transparent):
-    """Blender's combined pass: float32 of shape (pixels, 4), bottom row first.
+def combined(picture, is_transparent, is_noisy=False):
+    """Blender's combined pass: float32 of shape (pixels, 4), bottom row first; denoised if the picture has been.
 
+    @param  is_noisy        as it was rendered
     @param  is_transparent  whether the film shows nothing where nothing was hit; elsewhere alpha is one, but in holdouts
     """
     pixels = picture.layer("R", "G", "B", "A")
+    denoised = None if is_noisy else picture.layer(*_rgb("denoised"))
+    if denoised is not None:
+        pixels[:, :3] = denoised
     if not is_transparent:
         holdout = picture.layer("holdout.A")
         pixels[:, 3] = 1.0 if holdout is None else 1.0 - holdout[:, 0]
@@ -170,7 +181,10 @@ def fill(engine, picture, layer_name, passes, is_transparent, metadata):
     compat.set_pixels(layer.passes["Combined"], combined(picture, is_transparent))
     coverage = picture.channels["A"].ravel()
     for render_pass in passes:
-        values = picture.layer(*render_pass.channels)
+        if render_pass is NOISY:
+            values = combined(picture, is_transparent, is_noisy=True)
+        else:
+            values = picture.layer(*render_pass.channels)
         target = layer.passes.get(render_pass.name)
         if values is not None and target is not None:
             converted = render_pass.convert(values, coverage)

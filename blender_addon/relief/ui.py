@@ -110,7 +110,13 @@ class RELIEF_PT_sampling(_RenderPanel, bpy.types.Panel):
         cycles = cycles_settings(context.scene)
         if cycles is not None:
             _draw_cycles_sampling(cycles, rows)
-            return
+        else:
+            self._draw_own_sampling(settings, rows)
+        rows.separator()
+        rows.prop(settings, "denoise")
+
+    @staticmethod
+    def _draw_own_sampling(settings, rows):
         rows.prop(settings, "samples")
         rows.prop(settings, "noise_threshold")
         rows.prop(settings, "time_limit")

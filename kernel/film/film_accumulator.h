@@ -19,10 +19,10 @@ struct AccumulatorLayout {
 
   int direct = -1, albedo = -1, normal = -1, depth = -1, position = -1, uv = -1, object_id = -1, material_id = -1,
       displacement_steps = -1, caustic = -1, holdout = -1, mist = -1, emission = -1, environment = -1,
-      ambient_occlusion = -1, denoising_albedo = -1, denoising_normal = -1, denoising_depth = -1;
+      ambient_occlusion = -1, denoising_albedo = -1, denoising_normal = -1, denoising_depth = -1, denoising_half = -1;
   int cryptomatte[kNumCryptomattes] = {-1, -1, -1};  ///< pairs of an id and its weight, the first of weight 0 is free
   int cryptomatte_levels = 0;
-  bool denoising = false;  ///< denoising_albedo or denoising_normal is kept
+  bool denoising = false;  ///< denoising_albedo, denoising_normal or denoising_half is kept
   int num_floats = kAlways;
 };
 
@@ -42,7 +42,7 @@ struct FirstHit {
   float ray_length = 0;
   float cryptomatte_ids[kNumCryptomattes] = {};
   std::uint32_t instance_index = 0, material_index = 0;
-  bool is_first_sample = false;
+  bool is_first_sample = false, is_even_sample = false;
 };
 
 RELIEF_KERNEL void film_add3(float* sum, Vec3f value)
@@ -85,6 +85,7 @@ RELIEF_KERNEL void film_add_first_hit(const FilmAccumulatorView& film, std::uint
   }
   if (layout.mist >= 0) record[layout.mist] += 1.0f - hit.mist;
   if (layout.denoising_depth >= 0) record[layout.denoising_depth] += hit.ray_length;
+  if (layout.denoising_half >= 0 && hit.is_even_sample) record[layout.denoising_half + 6] += hit.ray_length;
   for (int i = 0; i < kNumCryptomattes; ++i) {
     if (layout.cryptomatte[i] < 0) continue;
     film_add_cryptomatte(record + layout.cryptomatte[i], layout.cryptomatte_levels, hit.cryptomatte_ids[i]);
@@ -121,13 +122,22 @@ RELIEF_KERNEL void film_add_ambient(const FilmAccumulatorView& film, std::uint32
 }
 
 /// Adds what a denoiser is told of a sample.
-/// @param N  unit, along the camera's axes: see Aov::kDenoisingNormal; zero vector: nothing was met
-RELIEF_KERNEL void film_add_denoising(const FilmAccumulatorView& film, std::uint32_t pixel, Vec3f albedo, Vec3f N)
+/// @param is_even  whether the sample belongs to the pixel's first half
+/// @param N        unit, along the camera's axes: see Aov::kDenoisingNormal; zero vector: nothing was met
+RELIEF_KERNEL void film_add_denoising(const FilmAccumulatorView& film,
+                                      std::uint32_t pixel,
+                                      bool is_even,
+                                      Vec3f albedo,
+                                      Vec3f N)
 {
   const AccumulatorLayout& layout = film.layout;
   float* record = film_record(film, pixel);
   if (layout.denoising_albedo >= 0) film_add3(record + layout.denoising_albedo, albedo);
   if (layout.denoising_normal >= 0) film_add3(record + layout.denoising_normal, N);
+  if (layout.denoising_half >= 0 && is_even) {
+    film_add3(record + layout.denoising_half, albedo);
+    film_add3(record + layout.denoising_half + 3, N);
+  }
 }
 
 /// Adds what a camera ray cost in displaced meshes, if that is kept.

@@ -32,11 +32,12 @@ enum class Aov : std::uint8_t {
   kDenoisingAlbedo,
   kDenoisingNormal,
   kDenoisingDepth,
+  kDenoisingHalf,
   kCryptoObject,
   kCryptoMaterial,
   kCryptoAsset,
 };
-inline constexpr int kNumAovs = 26;
+inline constexpr int kNumAovs = 27;
 
 /// The three Cryptomattes, which follow one another in Aov.
 inline constexpr int kNumCryptomattes = 3;
@@ -82,6 +83,8 @@ inline constexpr std::array<AovInfo, kNumAovs> kAovInfo = {{
      "shading normal of the same hit along the camera's axes: right, up, and into the picture"},
     {Aov::kDenoisingDepth, "denoising_depth", "Z", false,
      "distance of the first hit from the camera, metres, averaged with 0 for none"},
+    {Aov::kDenoisingHalf, "denoising_half", "RGBXYZD", false,
+     "the three layers above, of the pixel's even-numbered samples"},
     {Aov::kCryptoObject, "crypto_object", "", false, "Cryptomatte of the nodes' names"},
     {Aov::kCryptoMaterial, "crypto_material", "", false, "Cryptomatte of the materials' names"},
     {Aov::kCryptoAsset, "crypto_asset", "", false, "Cryptomatte of RELIEF_object's asset names"},

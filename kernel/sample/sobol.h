@@ -134,6 +134,12 @@ RELIEF_KERNEL constexpr std::uint32_t sample_sequence_index(std::uint32_t sample
   return (sample >> 2) | ((sample >> 1 & 1u) << log2_stream) | ((sample & 1u) << (log2_stream + 1));
 }
 
+/// Whether the sample with an index in the sequence is even-numbered: of a pixel's first half.
+RELIEF_KERNEL constexpr bool sample_is_even(std::uint32_t sample_index, std::uint32_t log2_stream)
+{
+  return (sample_index >> (log2_stream + 1) & 1u) == 0;
+}
+
 /// Key that scrambles one number of a dimension.
 /// @param column  twice the dimension, plus one for the second number of a pair
 template <class Uint>

@@ -98,7 +98,7 @@ RELIEF_KERNEL void path_add_radiance(PathState& s,
 RELIEF_KERNEL void path_add_denoising(const KernelGlobals& g, const PathState& s, std::uint32_t i, Vec3f contribution)
 {
   if (!g.film.layout.denoising || (s.flags[i] & kPathSawFeature) != 0) return;
-  film_add_denoising(g.film, s.pixel[i], contribution, {});
+  film_add_denoising(g.film, s.pixel[i], sample_is_even(s.sample_index[i], g.log2_stream), contribution, {});
 }
 
 /// Weight of light found by following the BSDF against finding it by light sampling.

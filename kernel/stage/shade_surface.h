@@ -335,6 +335,7 @@ RELIEF_KERNEL void shade_surface_first_hit(const KernelGlobals& g,
       first.cryptomatte_ids[i] = g.cryptomatte_ids[i][by_material ? first.material_index : first.instance_index];
   }
   first.is_first_sample = state.sample_index[path] == 0;
+  first.is_even_sample = sample_is_even(state.sample_index[path], g.log2_stream);
   film_add_first_hit(g.film, state.pixel[path], first);
   if (layout.ambient_occlusion >= 0) shade_surface_ambient(g, state, path, at, shadow);
 }
@@ -362,7 +363,8 @@ RELIEF_KERNEL void shade_surface_denoising(const KernelGlobals& g,
   const Affine3& camera = g.camera.world_from_camera;
   const Vec3f N{dot(at.side.Ns, normalize(camera.x)), dot(at.side.Ns, normalize(camera.y)),
                 dot(at.side.Ns, g.camera_forward)};
-  film_add_denoising(g.film, state.pixel[path], path_throughput(state, path) * surface_albedo(at.params), N);
+  film_add_denoising(g.film, state.pixel[path], sample_is_even(state.sample_index[path], g.log2_stream),
+                     path_throughput(state, path) * surface_albedo(at.params), N);
 }
 
 /// Adds what a surface emits to a path that has met it.

@@ -130,6 +130,29 @@ def _assert_blocks_agree(setting, names, tolerance, owner=None, stage=_stage, sa
         assert np.abs(ours - theirs).max() < tolerance, (name, np.abs(ours - theirs).max())
 
 
+def test_denoised():
+    """Combined is denoised, Noisy Image as without; the error that it claims is the difference to a clean picture."""
+    scene = _stage()
+    name = f"{scene.view_layers[0].name}."
+    plain = passes(scene, "RELIEF", 8)
+    assert name + "Noisy Image.R" not in plain
+    scene.relief.denoise = "builtin"
+    denoised = passes(scene, "RELIEF", 8)
+    scene.relief.denoise = "none"
+    clean = passes(scene, "RELIEF", 1024)[name + "Combined.R"].astype(np.float64)
+    for channel in "RGBA":
+        assert np.array_equal(denoised[f"{name}Noisy Image.{channel}"], plain[f"{name}Combined.{channel}"]), channel
+
+    def rmse(values):
+        return np.sqrt(np.mean((values - clean) ** 2))
+
+    left = rmse(denoised[name + "Combined.R"])
+    assert left < 0.7 * rmse(plain[name + "Combined.R"]), left
+    claimed = np.sqrt(np.mean(denoised[name + "Denoised Error.R"].astype(np.float64) ** 2))
+    assert 0.6 < claimed / left < 1.6, (claimed, left)
+    assert np.array_equal(denoised[name + "Combined.A"], plain[name + "Combined.A"])
+
+
 def test_mist():
     for falloff in ("LINEAR", "QUADRATIC", "INVERSE_QUADRATIC"):
 

@@ -181,7 +181,7 @@ class Run:
             ["--caustics", self.pick("on", "off")], ["--exposure", "1"], ["--view", self.pick("Standard", "Nothing")],
             ["--noise-threshold", "0.1"], ["--time-limit", "0.001"], ["--bogus"],
             ["--environment", self.pick("studio", "env.png", "env.png,2", "missing.png")], ["--background", "world"],
-            ["--look-from", "3,2,1"]
+            ["--look-from", "3,2,1"], ["--denoise", self.pick("none", "builtin", "oidn", "all")]
         ]
         for option in self.random.sample(options, self.pick(0, 0, 1, 1, 2, 3)):
             arguments += option

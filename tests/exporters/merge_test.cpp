@@ -261,6 +261,29 @@ TEST_F(Merge, HalvesTheVarianceOfTwoEqualRenders)
   }
 }
 
+// Of merged samples there is a better one.
+TEST_F(Merge, DenoisedLayersAreLeftOutAndSaid)
+{
+  std::vector<std::filesystem::path> files;
+  for (const char* seed : {"1", "2"}) {
+    const TestFilm rendered = film(static_cast<unsigned>(*seed - '0'));
+    const ChannelView red = film_layer(rendered.view, Aov::kBeauty).channels[0];
+    ChannelView denoised = red, error = red;
+    denoised.name = "denoised.R";
+    error.name = "denoised_error.R";
+    files.push_back(file(std::string(seed) + ".exr"));
+    exr_write(files.back(), rendered.view, {{"relief:seed", seed}, {"relief:scene", "s"}, {"relief:frame", "0"}}, {},
+              {denoised, error});
+    ASSERT_NE(exr_load(files.back()).find("denoised.R"), nullptr);
+  }
+  const MergeResult result = merge(files);
+  EXPECT_EQ(result.picture.find("denoised.R"), nullptr);
+  EXPECT_EQ(result.picture.find("denoised_error.R"), nullptr);
+  EXPECT_NE(std::find(result.warnings.begin(), result.warnings.end(),
+                      "layer 'denoised' is left out: denoise the merged picture, which has less noise"),
+            result.warnings.end());
+}
+
 TEST_F(Merge, CryptomattesAreLeftOutAndSaid)
 {
   const std::uint32_t aovs =

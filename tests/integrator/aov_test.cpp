@@ -134,6 +134,10 @@ TEST(Layers, DenoisersAreToldOfWhatMirrorsShow)
   EXPECT_NEAR(N[2], 1.0f, 1e-5f) << "away from the camera, as seen in the mirror";
   EXPECT_NEAR(*r.at(Aov::kDenoisingDepth, 2, 8), 4.0f, 1e-4f) << "of the mirror itself";
   EXPECT_EQ(*r.at(Aov::kDenoisingDepth, 12, 8), 0.0f);
+  const float* half = r.at(Aov::kDenoisingHalf, 2, 8);
+  EXPECT_NEAR(half[0], 0.2f, 1e-4f);
+  EXPECT_NEAR(half[5], 1.0f, 1e-5f);
+  EXPECT_NEAR(half[6], 4.0f, 1e-4f);
   // The layers of the first hit are still the mirror's.
   EXPECT_NEAR(r.at(Aov::kNormal, 2, 8)[2], 1.0f, 1e-5f);
   EXPECT_NEAR(*r.at(Aov::kDepth, 2, 8), 4.0f, 1e-4f);
@@ -164,6 +168,31 @@ TEST(Layers, CryptomattesRankIdsByCoverage)
     EXPECT_EQ(r.at(Aov::kCryptoMaterial, 2, 8)[0], cryptomatte_id(cryptomatte_hash("material 0")));
     EXPECT_EQ(r.at(Aov::kCryptoObject, 15, 8)[1], 0.0f);
   }
+}
+
+// A wall that only some samples meet: of an even number of them, the halves' mean is the pixel's.
+TEST(Layers, DenoisersAreToldOfEvenSamplesByThemselves)
+{
+  Scene scene = half_wall(diffuse_material({0.5f, 0.5f, 0.5f}));
+  scene.cameras[0].camera.projection = Projection::kOrthographic;
+  scene.cameras[0].camera.half_width = scene.cameras[0].camera.half_height = 1;
+  scene.environment.color = {2, 2, 2};
+  const auto albedo_sums = [&](int samples) {
+    const Rendered r = render_scene(scene, render_options(scene, kSize, samples));
+    double all = 0, even = 0;
+    for (int y = 0; y < kSize; ++y) {
+      for (int x = 0; x < kSize; ++x) {
+        all += r.at(Aov::kDenoisingAlbedo, x, y)[0];
+        even += r.at(Aov::kDenoisingHalf, x, y)[0];
+      }
+    }
+    return std::pair(all, even);
+  };
+  const auto [one, one_even] = albedo_sums(1);
+  EXPECT_EQ(one, one_even) << "the first sample is even-numbered";
+  const auto [two, two_even] = albedo_sums(2);
+  EXPECT_NE(two, two_even);
+  EXPECT_NEAR(two, two_even, 0.05 * two);
 }
 
 // What shines is its own albedo: the noise before it is none of its colour.
