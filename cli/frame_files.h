@@ -3,6 +3,7 @@
 
 #include <span>
 #include <string>
+#include <utility>
 
 #include "cli/denoise_picture.h"
 #include "cli/fingerprint.h"

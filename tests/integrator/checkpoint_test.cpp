@@ -79,7 +79,10 @@ TEST(Checkpoint, WhereverItIsTakenTheRenderThatGoesOnHasTheSameBits)
   const std::pair<const char*, std::function<void(RenderOptions&)>> kCases[] = {
       {"plain", [](RenderOptions&) {}},
       {"adaptive", [](RenderOptions& o) { o.settings.noise_threshold = 0.05f; }},
-      {"caustics", [](RenderOptions& o) { o.settings.caustics.mode = CausticsMode::kOn; }},
+      {"caustics",
+       [](RenderOptions& o) {
+         o.settings.caustics.mode = CausticsMode::kOn, o.settings.caustics.photons = 1000, o.settings.samples = 20;
+       }},
       {"crop", [](RenderOptions& o) { o.crop_x0 = 5, o.crop_y0 = 7, o.crop_x1 = 50, o.crop_y1 = 40; }}};
   for (const auto& [name, change] : kCases) {
     RenderOptions options = render_options(scene, 64, 40);
@@ -111,7 +114,8 @@ TEST(Checkpoint, WhereverItIsTakenTheRenderThatGoesOnHasTheSameBits)
 TEST(Checkpoint, WhatIsOfAnotherFilmIsNotPutBack)
 {
   const Scene scene = checkpoint_scene();
-  const RenderOptions options = render_options(scene, 32, 20);
+  RenderOptions options = render_options(scene, 32, 20);
+  options.settings.caustics.mode = CausticsMode::kOff;
   const SavedRender good = render_interrupted(scene, options, 1).saved.at(0);
   const Rendered whole = render_scene(scene, options);
   const std::pair<const char*, std::function<void(SavedRender&)>> kBad[] = {
