@@ -5,13 +5,15 @@
                                   [--denoise builtin] [--keep FOLDER]
 
 Prints a line of a Markdown table for each scene and number of samples: seconds of sampling and of denoising, the errors
-against a reference of another seed without and with denoising, and the error that the denoiser claims over the true one.
+against a reference of another seed without and with denoising (less that of the reference), and the error that the denoiser claims over the true one.
 References are kept in FOLDER and used again.
 """
 
 import argparse
 import json
+import math
 import os
+import struct
 import subprocess
 import sys
 import tempfile
@@ -30,16 +32,27 @@ def render(scene, output, *options):
     return json.loads(done.stdout.splitlines()[-1])
 
 
+def attribute(path, name):
+    """A number of an OpenEXR file's header."""
+    with open(path, "rb") as file:
+        header = file.read(65536)
+    start = header.index(name.encode() + b"\0string\0") + len(name) + 8
+    (size,) = struct.unpack_from("<i", header, start)
+    return float(header[start + 4 : start + 4 + size])
+
+
 def measure(scene, arguments, folder):
     size = ["--resolution", arguments.resolution]
     reference = os.path.join(folder, scene + ".ref.exr")
     if not os.path.exists(reference):
         render(scene, reference, *size, "--spp", str(arguments.reference_spp), "--seed", "1")
+    # What a reference lacks itself is no error of the picture.
+    noise, relative_noise = (attribute(reference, f"relief:error_{name}") for name in ("rmse", "relmse"))
     for spp in arguments.spp.split(","):
         done = render(scene, os.path.join(folder, f"{scene}.{spp}.exr"), *size, "--spp", spp, "--seed", "7",
                       "--denoise", arguments.denoise, "--reference", reference)  # fmt: skip
-        rmse, denoised = done["reference_rmse"], done["denoised_reference_rmse"]
-        relmse, denoised_relmse = done["reference_relmse"], done["denoised_reference_relmse"]
+        rmse, denoised = (math.sqrt(max(done[f"{which}reference_rmse"] ** 2 - noise**2, 0)) for which in ("", "denoised_"))
+        relmse, denoised_relmse = (done[f"{which}reference_relmse"] - relative_noise for which in ("", "denoised_"))
         print(
             f"| {scene} | {spp} | {done['seconds']:.2f} | {rmse:.4f} | {relmse:.5f} | {done['denoise_seconds']:.2f} | "
             f"{denoised:.4f} | {denoised_relmse:.5f} | {relmse / denoised_relmse:.1f} | "
