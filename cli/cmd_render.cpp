@@ -47,17 +47,20 @@
 #include "exporters/image_metrics.h"
 #include "exporters/output_lock.h"
 #include "exporters/png_ocio.h"
+#include "exporters/report/frame_report.h"
 #include "exporters/sample_range.h"
+#include "exporters/stats_json.h"
 #include "integrator/render.h"
 #include "scene/kept_images.h"
 #include "scene/load.h"
+#include "scene/setting_values.h"
 
 namespace relief {
 
 namespace {
 
 struct RenderArguments {
-  std::string scene, output, png, stats, reference, preview;
+  std::string scene, output, png, stats, reference, preview, report;
   PictureOptions picture;
   FrameList frames;  ///< empty: the rest pose
   SamplePart part;
@@ -87,15 +90,22 @@ FramePaths paths_of_frame(const RenderArguments& arguments, std::optional<int> f
   // One reference may serve all frames; it has a number only where it is asked for.
   const bool has_references =
       std::filesystem::path(arguments.reference).filename().string().find('#') != std::string::npos;
-  return {numbered(arguments.output), numbered(arguments.png), numbered(arguments.stats),
+  return {numbered(arguments.output),
+          numbered(arguments.png),
+          numbered(arguments.stats),
           has_references ? numbered(arguments.reference) : std::filesystem::path(arguments.reference),
-          numbered(arguments.preview)};
+          numbered(arguments.preview),
+          numbered(arguments.report)};
 }
 
 /// Options of a frame's outputs with their files.
 std::vector<std::pair<const char*, std::filesystem::path>> outputs_of(const FramePaths& paths)
 {
-  return {{"--output", paths.exr}, {"--png", paths.png}, {"--stats", paths.stats}, {"--preview", paths.preview}};
+  return {{"--output", paths.exr},
+          {"--png", paths.png},
+          {"--stats", paths.stats},
+          {"--preview", paths.preview},
+          {"--report", paths.report}};
 }
 
 /// All that is known of a run's files before anything is read.
@@ -125,6 +135,14 @@ std::uint64_t peak_memory_bytes()
   return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024u;
 }
 
+/// Layers that a report shows.
+std::uint32_t report_aovs(const Scene& scene)
+{
+  const auto bit = [](Aov aov) { return 1u << static_cast<int>(aov); };
+  return bit(Aov::kSampleCount) | bit(Aov::kVariance) |
+         (scene.displacements.empty() ? 0u : bit(Aov::kDisplacementSteps));
+}
+
 RenderOptions options_for(const Scene& scene, const RenderArguments& arguments)
 {
   RenderOptions options = render_options(scene, arguments.picture);
@@ -137,6 +155,8 @@ RenderOptions options_for(const Scene& scene, const RenderArguments& arguments)
   options.num_samples = end - first;
   options.time_limit_seconds = arguments.time_limit;
   options.aov_mask = arguments.aov_mask | (arguments.denoiser == Denoiser::kNone ? 0 : denoiser_aovs());
+  options.keeps_errors = !arguments.stats.empty() || !arguments.report.empty();
+  if (!arguments.report.empty()) options.aov_mask |= report_aovs(scene);
   return options;
 }
 
@@ -186,19 +206,46 @@ std::optional<Picture> reference_load(const std::filesystem::path& file, const R
   return picture;
 }
 
-/// @param rendered  R, G and B of the film's size
-ImageErrors errors_against(const Picture& reference, const FilmView& film, ImageView rendered)
+/// Red, green and blue of the reference in the window of a film.
+ImageView reference_view(const Picture& reference, const FilmView& film)
 {
   ImageView expected = picture_layer(reference, "");
-  rendered.channels.resize(3);
   expected.channels.resize(3);
-  expected.width = rendered.width;
-  expected.height = rendered.height;
+  expected.width = film.width;
+  expected.height = film.height;
   for (ChannelView& channel : expected.channels) {
     channel.first +=
         (film.crop_x - reference.crop_x) * channel.pixel_stride + (film.crop_y - reference.crop_y) * channel.row_stride;
   }
-  return image_errors(rendered, expected);
+  return expected;
+}
+
+/// @param rendered  R, G and B of the film's size
+ImageErrors errors_against(const Picture& reference, const FilmView& film, ImageView rendered)
+{
+  rendered.channels.resize(3);
+  return image_errors(rendered, reference_view(reference, film));
+}
+
+/// The page about a frame.
+std::string report_html(const FramePaths& paths,
+                        const FilmView& film,
+                        const Statistics& stats,
+                        const Attributes& attributes,
+                        const std::optional<Picture>& reference)
+{
+  FrameReport report;
+  report.name = paths.exr.string();
+  report.beauty = film_layer(film, Aov::kBeauty);
+  report.variance = film_layer(film, Aov::kVariance);
+  report.samples = film_layer(film, Aov::kSampleCount);
+  report.steps = film_layer(film, Aov::kDisplacementSteps);
+  if (reference) report.reference = reference_view(*reference, film);
+  report.crop_x = film.crop_x;
+  report.crop_y = film.crop_y;
+  report.attributes = attributes;
+  report.statistics = stats_json(stats);
+  return frame_report_html(report);
 }
 
 /// Says what to do about a PNG that is mostly white.
@@ -364,6 +411,15 @@ bool render_frame(const RenderArguments& arguments,
     return true;
   }
   const std::optional<Picture> reference = reference_load(paths.reference, options);
+  if (reference) {
+    options.reference_error = [&](const FilmView& film) {
+      const ImageErrors errors = errors_against(*reference, film, film_layer(film, Aov::kBeauty));
+      return ImageError{errors.rmse, errors.relmse};
+    };
+  }
+  for (const SettingValue& setting : setting_values(options.settings)) {
+    stats.settings.emplace_back(setting.info->name, setting_text(setting.value));
+  }
 
   FrameFiles frame_files(files, paths, command, {compression_of(arguments), arguments.float_color}, arguments.aov_mask,
                          progress);
@@ -424,7 +480,11 @@ bool render_frame(const RenderArguments& arguments,
   }
   const bool is_complete = is_whole && changed.empty() && !denoise_failure;
   progress.warnings(stats.warnings);
-  frame_files.write(image, denoised ? &*denoised : nullptr, stats, more_attributes, png, fingerprint, is_complete);
+  const auto page = [&](const Attributes& attributes) {
+    return report_html(paths, image.view, stats, attributes, reference);
+  };
+  frame_files.write(image, denoised ? &*denoised : nullptr, stats, more_attributes, png, page, fingerprint,
+                    is_complete);
   if (denoise_failure) {
     progress.note(fmt::format("{}: saved, but not denoised", paths.exr.string()));
     std::rethrow_exception(denoise_failure);
@@ -517,6 +577,9 @@ void cmd_render_register(CLI::App& app, Run& run, const std::string& command_lin
   names_file(add_parsed(*command, "--preview", a.preview, output("--preview", ".exr"),
                         "OpenEXR to write now and then while rendering"),
              {".exr"});
+  names_file(
+      add_parsed(*command, "--report", a.report, output("--report", ".html"), "HTML page to write about the frame"),
+      {".html"});
   std::vector<CLI::Option*> path_options = add_picture_options(*command, a.picture);
   for (CLI::Option* option : add_ray_options(*command, a.picture)) path_options.push_back(option);
   for (CLI::Option* option : add_light_options(*command, a.setup)) path_options.push_back(option);

@@ -29,7 +29,7 @@ constexpr std::string_view kDeclared[] = {
     "--resolution", "--spp",  "--seed",     "--max-bounces",     "--caustics",
     "--filter",     "--view", "--exposure", "--noise-threshold", "--luminous-efficacy"};
 // Only whether they are given counts, and not where the files are.
-constexpr std::string_view kOutputs[] = {"--output", "--png", "--stats"};
+constexpr std::string_view kOutputs[] = {"--output", "--png", "--stats", "--report"};
 
 template <class Names>
 bool is_among(const Names& names, const CLI::Option& option)
@@ -86,7 +86,8 @@ Attributes frame_attributes(const FramePaths& paths, const std::string& fingerpr
 {
   Attributes attributes = {{"relief:fingerprint", fingerprint},
                            {"relief:png_hash", file_hash(paths.png)},
-                           {"relief:stats_hash", file_hash(paths.stats)}};
+                           {"relief:stats_hash", file_hash(paths.stats)},
+                           {"relief:report_hash", file_hash(paths.report)}};
   std::erase_if(attributes, [](const auto& entry) { return entry.second.empty(); });
   return attributes;
 }
@@ -98,7 +99,7 @@ bool is_whole_render(const FramePaths& paths, const std::string& fingerprint)
   const auto is_there = [&](const std::filesystem::path& path) {
     return path.empty() || std::filesystem::exists(path, ignored);
   };
-  if (!is_there(paths.png) || !is_there(paths.stats)) return false;
+  if (!is_there(paths.png) || !is_there(paths.stats) || !is_there(paths.report)) return false;
   try {
     // Reading all of it also finds a file that was cut short while it was copied.
     const Attributes found = exr_load(paths.exr).attributes;

@@ -16,7 +16,7 @@ namespace relief {
 
 /// Files of one frame; empty: not asked for.
 struct FramePaths {
-  std::filesystem::path exr, png, stats, reference, preview;
+  std::filesystem::path exr, png, stats, reference, preview, report;
 };
 
 /// Every option of the command line that was given, with its values, but for those of which fingerprint.cpp says that they do

@@ -79,19 +79,22 @@ void FrameFiles::write(const RenderedImage& image,
                        const Statistics& stats,
                        const Attributes& cryptomattes,
                        const PngOptions& png,
+                       const std::function<std::string(const Attributes&)>& page,
                        const std::string& fingerprint,
                        bool is_whole) const
 {
+  Attributes attributes = exr_attributes(stats, command_);
   std::exception_ptr failure;
   try {
     files_.check_output("--png", paths_.png);
     if (!paths_.png.empty()) png_write(paths_.png, shown(image.view, denoised), png);
     files_.check_output("--stats", paths_.stats);
     if (!paths_.stats.empty()) atomic_write(paths_.stats, stats_json(stats));
+    files_.check_output("--report", paths_.report);
+    if (!paths_.report.empty()) atomic_write(paths_.report, page(attributes));
   } catch (...) {
     failure = std::current_exception();
   }
-  Attributes attributes = exr_attributes(stats, command_);
   attributes.insert(cryptomattes.begin(), cryptomattes.end());
   if (is_whole && !failure) attributes.merge(frame_attributes(paths_, fingerprint));
   if (denoised != nullptr) attributes.merge(denoised->attributes());

@@ -1,6 +1,7 @@
 // Writing the files of one frame: what it is as long as it is rendered, and what it has become.
 #pragma once
 
+#include <functional>
 #include <span>
 #include <string>
 #include <utility>
@@ -46,6 +47,7 @@ class FrameFiles {
   /// Writes the frame's files, the OpenEXR last: its fingerprint says that all of them are there and whole. It is written even
   /// if another file cannot be, since it is worth the most; then without the fingerprint.
   /// @param denoised  null: nothing was
+  /// @param page      makes the HTML page about the frame, given the OpenEXR's attributes
   /// @param is_whole  false: it was interrupted, or may be of files that changed; nobody is to take it for the frame
   /// @error OutputError of the first file that could not be written
   void write(const RenderedImage& image,
@@ -53,6 +55,7 @@ class FrameFiles {
              const Statistics& stats,
              const Attributes& cryptomattes,
              const PngOptions& png,
+             const std::function<std::string(const Attributes&)>& page,
              const std::string& fingerprint,
              bool is_whole) const;
 

@@ -12,6 +12,7 @@
 #include "cli/cmd_compare.h"
 #include "cli/cmd_denoise.h"
 #include "cli/cmd_merge.h"
+#include "cli/cmd_report.h"
 #include "cli/commands.h"
 #include "cli/error_text.h"
 #include "cli/exit_code.h"
@@ -102,6 +103,7 @@ int main(int argc, char** argv)
   relief::cmd_compare_register(app, run);
   relief::cmd_merge_register(app, run);
   relief::cmd_denoise_register(app, run);
+  relief::cmd_report_register(app, run);
   relief::cmd_bench_register(app, run);
   relief::cmd_farm_register(app, run);
   relief::cmd_help_files_register(app, run);

@@ -32,6 +32,15 @@ std::string stats_json(const Statistics& statistics)
                     {"prisms_per_ray", a_ray(s.counters.displaced_prisms)},
                     {"reasons", s.displacement.reasons}};
   }
+  nlohmann::ordered_json errors = nlohmann::ordered_json::array();
+  for (const ErrorPoint& point : s.errors) {
+    errors.push_back(
+        {{"seconds", point.seconds}, {"samples", point.samples}, {"rmse", point.rmse}, {"relmse", point.relmse}});
+    if (point.reference_rmse) errors.back()["reference_rmse"] = *point.reference_rmse;
+    if (point.reference_relmse) errors.back()["reference_relmse"] = *point.reference_relmse;
+  }
+  nlohmann::ordered_json settings = nlohmann::ordered_json::object();
+  for (const auto& [name, value] : s.settings) settings[name] = nlohmann::ordered_json::parse(value);
   nlohmann::ordered_json caustics = {{"reason", s.caustics.reason},
                                      {"photons", s.caustics.photons},
                                      {"stored", s.caustics.stored},
@@ -62,6 +71,7 @@ std::string stats_json(const Statistics& statistics)
       {"samples_per_pixel", s.samples_per_pixel},
       {"error_rmse", s.error_rmse},
       {"error_relmse", s.error_relmse},
+      {"errors", errors},
       {"stop_reason", s.stop_reason},
       {"rays",
        {{"camera", s.counters.camera_rays},
@@ -80,6 +90,7 @@ std::string stats_json(const Statistics& statistics)
       {"caustics", caustics},
       {"counters", counters},
       {"stage_seconds", stages},
+      {"settings", settings},
       {"warnings", s.warnings},
   };
   // A scene's path may hold bytes that are not UTF-8; they must not cost a finished render its statistics.

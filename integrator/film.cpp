@@ -295,26 +295,38 @@ double Film::mean_luminance() const
 
 ImageError Film::estimate_error() const
 {
-  double d1 = 0, d2 = 0, relative_d1 = 0, relative_d2 = 0;
+  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  if (std::any_of(samples_.begin(), samples_.end(), [](std::uint32_t n) { return n < 2; })) return {kUnknown, kUnknown};
+  struct Sums {
+    double d1 = 0, d2 = 0, relative_d1 = 0, relative_d2 = 0;
+  };
   const auto sum = [](Vec3f v) { return static_cast<double>(v.x) + v.y + v.z; };
-  for (int tile = 0; tile < num_tiles(); ++tile) {
-    constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-    if (tile_samples(tile) < 2) return {kUnknown, kUnknown};
+  std::vector<Sums> tiles(samples_.size());
+  tbb::parallel_for(0, num_tiles(), [&](int tile) {
+    Sums& of_tile = tiles[static_cast<std::size_t>(tile)];
     int x0, y0, w, h;
     tile_rect(tile, &x0, &y0, &w, &h);
     for (int y = y0; y < y0 + h; ++y) {
       for (int x = x0; x < x0 + w; ++x) {
         const PixelEstimate pixel = pixel_estimate(record(x, y), tile_samples(tile));
         const Vec3f denominator = pixel.mean * pixel.mean + splat3(0.01f);
-        d1 += sum(pixel.d1);
-        d2 += sum(pixel.d2);
-        relative_d1 += sum(pixel.d1 / denominator);
-        relative_d2 += sum(pixel.d2 / denominator);
+        of_tile.d1 += sum(pixel.d1);
+        of_tile.d2 += sum(pixel.d2);
+        of_tile.relative_d1 += sum(pixel.d1 / denominator);
+        of_tile.relative_d2 += sum(pixel.d2 / denominator);
       }
     }
+  });
+  Sums all;
+  for (const Sums& tile : tiles) {
+    all.d1 += tile.d1;
+    all.d2 += tile.d2;
+    all.relative_d1 += tile.relative_d1;
+    all.relative_d2 += tile.relative_d2;
   }
   const double count = 3.0 * width_ * height_;
-  return {std::sqrt(error_extrapolate(d1, d2) / count), error_extrapolate(relative_d1, relative_d2) / count};
+  return {std::sqrt(error_extrapolate(all.d1, all.d2) / count),
+          error_extrapolate(all.relative_d1, all.relative_d2) / count};
 }
 
 Film::TileSpreads Film::tile_spreads(int tile) const

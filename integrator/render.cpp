@@ -16,6 +16,7 @@
 #include <tbb/task_arena.h>
 
 #include "integrator/checkpoint.h"
+#include "integrator/error_history.h"
 #include "integrator/flush_denormals.h"
 #include "integrator/photon_pass.h"
 #include "integrator/scene_context.h"
@@ -348,6 +349,8 @@ RenderedImage render(const Scene& scene,
     previews.note(before, seconds_since(start));
   };
 
+  ErrorHistory errors(film, options, window);
+
   std::vector<int> active(static_cast<std::size_t>(film.num_tiles()));
   for (int tile = 0; tile < film.num_tiles(); ++tile) active[static_cast<std::size_t>(tile)] = tile;
 
@@ -360,7 +363,7 @@ RenderedImage render(const Scene& scene,
         });
   };
 
-  const bool is_watched = static_cast<bool>(options.preview);
+  const bool is_watched = options.preview || options.keeps_errors;
   stats.stop_reason = "samples";
   stats.isa = stages.isa;
   std::uint32_t done = 0, samples = 0;
@@ -444,6 +447,7 @@ RenderedImage render(const Scene& scene,
       break;
     }
     done += std::exchange(samples, 0);
+    if (options.keeps_errors && errors.is_due()) errors.add(seconds_since(start));
     if (photons) reporter.set_photon_share(photons->seconds() / seconds_since(start));
     // Where passes are smaller because somebody watches, tiles are judged when they would be otherwise.
     const bool is_judged = !is_watched || caustics || done % kMostSamples == 0;
@@ -466,6 +470,7 @@ RenderedImage render(const Scene& scene,
   if (photons) photons->fill(stats.caustics);
   context.fill(stats);
   fill_film(stats, film, settings);
+  if (options.keeps_errors) stats.errors = std::move(errors).finish(stats);
   fill_work(stats, workers, caustics, window);
   std::optional<SavedRender> saved;
   if (options.checkpoint && stats.stop_reason == "interrupted" && stats.samples_per_pixel > 0) {

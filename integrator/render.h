@@ -34,6 +34,10 @@ struct RenderOptions {
   double checkpoint_seconds = 0;  ///< 0: only an interrupted picture has a state
   /// What to go on from, to the same picture in every bit; its sums are taken. Null: begins. One of another film is a warning.
   SavedRender* saved = nullptr;
+  /// Fill in Statistics::errors. Passes then begin with one sample, so that there is something to see from the start.
+  bool keeps_errors = false;
+  /// With keeps_errors: the beauty's error by a reference; may be empty. Sampling waits meanwhile.
+  std::function<ImageError(const FilmView&)> reference_error;
 };
 
 struct RenderProgress {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "kernel/counters.h"
@@ -44,6 +45,14 @@ struct KeptStatistics {
   double seconds = 0;               ///< that making them took, summed over those made side by side
 };
 
+/// How wrong a picture was at some time of its rendering.
+struct ErrorPoint {
+  double seconds = 0;                                      ///< of sampling
+  double samples = 0;                                      ///< a pixel, in the mean
+  double rmse = 0, relmse = 0;                             ///< estimated as Statistics::error_rmse and error_relmse
+  std::optional<double> reference_rmse, reference_relmse;  ///< against a picture that it is compared with
+};
+
 /// One sample of a pixel; x and y in the whole image.
 struct PixelSample {
   int x = 0, y = 0;
@@ -58,6 +67,7 @@ struct Statistics {
   double samples_per_pixel = 0;
   double error_rmse = 0;    ///< estimated root mean square error of the beauty image, from its halves and quarters
   double error_relmse = 0;  ///< likewise, squared error relative to (radiance² + 0.01), as `relief compare` defines it
+  std::vector<ErrorPoint> errors;  ///< each time that the samples had doubled, and at the end
   std::uint64_t peak_memory_bytes = 0, bvh_bytes = 0, mesh_bytes = 0, texture_bytes = 0, light_bytes = 0,
                 film_bytes = 0, path_state_bytes = 0;
   DisplacementStatistics displacement;
@@ -68,6 +78,7 @@ struct Statistics {
   /// Of the samples that were dropped because they were not finite, the first in the picture's order.
   std::optional<PixelSample> first_nonfinite;
   std::vector<std::string> warnings;
+  std::vector<std::pair<std::string, std::string>> settings;  ///< names, and values as JSON
   std::string stop_reason;  ///< "samples", "noise_threshold", "time_limit", "interrupted"
 };
 

@@ -10,6 +10,7 @@
 
 #include "benchmarks/displacement/table.h"
 #include "exporters/report_html.h"
+#include "exporters/svg_plot.h"
 
 namespace relief {
 

@@ -14,6 +14,7 @@
 #include "displacement/embree_geometry.h"
 #include "displacement/lattice_split.h"
 #include "exporters/report_html.h"
+#include "exporters/svg_plot.h"
 #include "integrator/stages.h"
 #include "kernel/graph/noise.h"
 #include "scene/load.h"

@@ -7,6 +7,7 @@
 #include "benchmarks/procedural/world_study.h"
 #include "displacement/displacement_set.h"
 #include "exporters/report_html.h"
+#include "exporters/svg_plot.h"
 
 namespace relief {
 

@@ -169,6 +169,8 @@ class Run:
             arguments += ["--png=" + self.output_name(".png")]
         if self.chance(0.5):
             arguments += ["--stats=" + self.output_name(".json")]
+        if self.chance(0.3):
+            arguments += ["--report=" + self.output_name(".html")]
         if self.chance(0.4):
             arguments += ["--frames", self.numbers()]
         if self.chance(0.3):

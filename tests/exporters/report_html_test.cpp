@@ -10,6 +10,7 @@
 
 #include "exporters/png_encode.h"
 #include "exporters/report_html.h"
+#include "exporters/svg_plot.h"
 
 namespace relief {
 namespace {
