@@ -170,10 +170,9 @@ class Completion(unittest.TestCase):
             self.skipTest("fish is not installed")
 
         def complete(*words):
-            script = f"{RELIEF} completion fish | source; complete -C (string join ' ' relief $argv)"
-            run = subprocess.run(["fish", "--no-config", "-c", script, *(word or "''" if i + 1 < len(words) else word
-                                                                         for i, word in enumerate(words))],
-                                 capture_output=True, text=True, check=False, cwd=self.folder, env=self.environment)
+            script = f"{RELIEF} completion fish | source; complete -C {shlex.quote(' '.join(('relief', *words)))}"
+            run = subprocess.run(["fish", "--no-config", "-c", script], capture_output=True, text=True, check=False,
+                                 cwd=self.folder, env=self.environment)
             self.assertEqual(run.stderr, "")
             return {line.split("\t")[0] for line in run.stdout.split("\n")[:-1]}
 
@@ -182,7 +181,7 @@ class Completion(unittest.TestCase):
         self.assertEqual(complete("render", "--png=c"), {"--png=c.png"})
 
     def typed(self, shell, start, keys, expected):
-        """Types `keys` in an interactive shell, and waits for `expected` on its terminal."""
+        """Types a command in an interactive shell, and echo before it, and waits for what that prints."""
         pid, terminal = pty.fork()
         if pid == 0:
             os.chdir(self.folder)
@@ -201,9 +200,9 @@ class Completion(unittest.TestCase):
         os.write(terminal, (start + "\necho rea''dy\n").encode())
         wait_for("ready\r\n")
         shown = ""
-        os.write(terminal, keys.encode())
+        os.write(terminal, keys.encode() + b"\x01echo \n")
         try:
-            wait_for(expected)
+            wait_for("\n" + expected)
         finally:
             os.kill(pid, 9)
             os.waitpid(pid, 0)
@@ -211,18 +210,17 @@ class Completion(unittest.TestCase):
     def test_bash_at_a_terminal(self):
         if shutil.which("bash") is None:
             self.skipTest("bash is not installed")
-        # The command is run: what it prints is not what was typed.
-        self.typed(["bash", "--norc", "-i"], f"source <({RELIEF} completion bash); relief_test() {{ echo \"<$*>\"; }}; PS1='$ '",
-                   "relief rend\t--comp\tdwaa my\t\x01echo \x05\n", "relief render --compression dwaa my\\ shot.GLB")
+        self.typed(["bash", "--norc", "-i"], f"source <({RELIEF} completion bash); PS1='$ '",
+                   "relief rend\t--comp\tdwaa my\t", "relief render --compression dwaa my shot.GLB")
 
     def test_zsh_at_a_terminal(self):
         if shutil.which("zsh") is None:
             self.skipTest("zsh is not installed")
         start = f"autoload -U compinit; compinit -u -D; source <({RELIEF} completion zsh); PS1='$ '"
-        for keys, expected in (("relief rend\t--compr\tdwaa my\t", "render --compression dwaa my\\ shot.GLB"),
-                               ("relief render --compression=no\t", "--compression=none"),
-                               ("relief render --aov beauty,hal\t", "beauty,half"),
-                               ("relief compare --json=c\t a.\t", "a.exr")):
+        for keys, expected in (("relief rend\t--compr\tdwaa my\t", "relief render --compression dwaa my shot.GLB"),
+                               ("relief render --compression=no\t", "relief render --compression=none"),
+                               ("relief render --aov beauty,hal\t", "relief render --aov beauty,half"),
+                               ("relief compare --diff=c\t a.\t", "relief compare --diff=c.png a.exr")):
             self.typed(["zsh", "-f", "-i"], start, keys, expected)
 
 

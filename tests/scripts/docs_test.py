@@ -24,7 +24,7 @@ FOLDERS = "benchmarks blender_addon cli displacement docs examples exporters int
 # What starts a command, after settings of environment variables.
 PROGRAM = re.compile(r"(?:\w+=\S+ )*(?:relief |(?:build/\w+/)?cli/relief |build/\w+/cli/relief |build/\w+/benchmarks/|"
                      r"scripts/\w+(?![\w/])|benchmarks/\S+\.py|relief_(?:bench_\w+|\w+_tests) |cmake --|ctest |blender -)")
-OPTION = re.compile(r"(?<![\w-])(-{1,2}[a-zA-Z][\w-]*)")
+OPTION = re.compile(r"(?<![\w=-])(-{1,2}[a-zA-Z][\w-]*)")
 PLACEHOLDERS = {"COMMAND", "…"}
 # Makes a run short: options that are added where the command does not give them, by sub-command.
 SMALL = {"render": {"--resolution": "16x9", "--spp": "2", "--threads": "2", "--progress": "none"},
@@ -112,7 +112,7 @@ def sub_commands_of(*sub_command):
 
 def split_relief(command):
     """(sub-commands, other words) of a command of `relief`."""
-    rest = words(command)[1:]
+    rest = words(command.split(" | ")[0])[1:]
     sub = []
     while rest and rest[0] in sub_commands_of(*sub):
         sub.append(rest.pop(0))
@@ -176,8 +176,11 @@ class Docs(unittest.TestCase):
             sub, rest = split_relief(command)
             if not sub and not set(rest) & (PLACEHOLDERS | {"--help", "--version"}):
                 wrong.append(f"{place}: no sub-command: {command}")
-            wrong += [f"{place}: relief {' '.join(sub)} has no {option}"
-                      for option in OPTION.findall(" ".join(rest)) if option not in options_of(*sub) and option != "--help"]
+            # What stands after "--" is for a render.
+            own, _, of_render = " ".join(rest).partition(" -- ")
+            for name, text in ((sub, own), (("render",), of_render)):
+                wrong += [f"{place}: relief {' '.join(name)} has no {option}"
+                          for option in OPTION.findall(text) if option not in options_of(*name) and option != "--help"]
         self.assert_none(wrong)
 
     @unittest.skipUnless("RELIEF_BINARY" in os.environ, "$RELIEF_BINARY is not set")
@@ -185,7 +188,8 @@ class Docs(unittest.TestCase):
         text = (ROOT / "docs" / "usage.md").read_text(encoding="utf-8")
         documented = set(OPTION.findall(text)) | {"-h", "--help"}
         wrong = []
-        for sub in [(), *((name,) for name in sub_commands_of()), *(("bench", name) for name in sub_commands_of("bench"))]:
+        names = sub_commands_of()
+        for sub in [(), *((name,) for name in names), *((name, below) for name in names for below in sub_commands_of(name))]:
             wrong += [f"docs/usage.md: nothing about {option} of relief {' '.join(sub)}"
                       for option in options_of(*sub) if option not in documented]
         self.assert_none(wrong)
