@@ -421,8 +421,10 @@ bool render_frame(const RenderArguments& arguments,
     stats.settings.emplace_back(setting.info->name, setting_text(setting.value));
   }
 
-  FrameFiles frame_files(files, paths, command, {compression_of(arguments), arguments.float_color}, arguments.aov_mask,
-                         progress);
+  // Of the page about the frame, so that `relief report` makes the same.
+  const std::uint32_t report_mask = arguments.report.empty() ? 0 : report_aovs(scene);
+  FrameFiles frame_files(files, paths, command, {compression_of(arguments), arguments.float_color},
+                         arguments.aov_mask | report_mask, progress);
   std::optional<SavedRender> saved;
   if (arguments.resume) saved = exr_state_load(paths.exr, fingerprint);
   if (saved) {
