@@ -133,7 +133,7 @@ class Completion(unittest.TestCase):
         self.assertEqual(complete("render", "--compression", ""), {"none", "zips", "zip", "piz", "dwaa", "dwab"})
         self.assertEqual(complete("render", "s.gltf", "--progress", ""), {"bar", "json", "none"})
         self.assertEqual(complete("render", "--aov", "beauty,denoising_"),
-                         {"beauty,denoising_albedo", "beauty,denoising_normal", "beauty,denoising_depth"})
+                         {f"beauty,denoising_{layer}" for layer in ("albedo", "normal", "depth", "half")})
         self.assertEqual(complete("bench", "heightfield", "--cones", "relaxed,qu"), {"relaxed,quick", "relaxed,quick-relaxed"})
         self.assertEqual(complete("info", "--displacement", "rmip"), {"rmip", "rmip-minmax"})
         self.assertEqual(complete("completion", ""), {"bash", "zsh", "fish"})
