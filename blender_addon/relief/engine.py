@@ -36,7 +36,7 @@ class ReliefEngine(bpy.types.RenderEngine):
 
     def update_render_passes(self, scene=None, renderlayer=None):
         self.register_pass(scene, renderlayer, "Combined", 4, "RGBA", "COLOR")
-        for p in result.enabled_passes(renderlayer):
+        for p in result.enabled_passes(scene, renderlayer):
             self.register_pass(scene, renderlayer, p.name, len(p.ids), p.ids, p.kind)
 
     def view_update(self, context, depsgraph):

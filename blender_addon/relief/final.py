@@ -37,7 +37,7 @@ def render(engine, depsgraph):
     view, crop = view_of(engine, depsgraph, warnings)
     folder = session.render_folder()
     layer_name = depsgraph.view_layer.name
-    passes = result.enabled_passes(depsgraph.view_layer)
+    passes = result.enabled_passes(scene, depsgraph.view_layer)
     result.warn_missing_passes(depsgraph.view_layer, warnings)
 
     engine.update_stats("", "Exporting")

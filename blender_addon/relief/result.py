@@ -101,10 +101,10 @@ CRYPTOMATTES = ("object", "material", "asset")
 _NO_PASSES = {"use_pass_combined", "use_pass_cryptomatte_accurate"}
 
 
-def enabled_passes(view_layer):
-    """Passes that a view layer asks for, besides the combined one."""
+def enabled_passes(scene, view_layer):
+    """Passes that a view layer of a scene asks for, besides the combined one."""
     passes = [p for p in PASSES if p.is_enabled(view_layer)]
-    if view_layer.id_data.relief.denoise != "none":
+    if scene.relief.denoise != "none":
         passes += _DENOISED
     for kind in CRYPTOMATTES:
         setting = f"use_pass_cryptomatte_{kind}"
