@@ -120,7 +120,7 @@ TEST_F(ExrTest, DwaIsCloseAndSaysWhichLayersItDamages)
     }
   }
   EXPECT_EQ(exr_damaged_layers(film.view.layout, ExrCompression::kDwaa),
-            (std::vector<std::string>{"normal", "position", "variance", "half", "denoising_normal"}));
+            (std::vector<std::string>{"normal", "position", "variance", "half", "denoising_normal", "denoising_half"}));
   EXPECT_TRUE(exr_damaged_layers(film.view.layout, ExrCompression::kZip).empty());
 }
 
