@@ -16,6 +16,7 @@
 #include "benchmarks/heightfield/study.h"
 #include "benchmarks/procedural/study.h"
 #include "cli/arguments.h"
+#include "cli/bench_error.h"
 #include "cli/commands.h"
 #include "cli/run_files.h"
 #include "cli/value_hint.h"
@@ -249,6 +250,7 @@ void cmd_bench_register(CLI::App& app, Run& run)
   command->callback([&run, arguments] { run = [arguments] { return bench_displacement(*arguments); }; });
   heightfield_register(*bench, run);
   procedural_register(*bench, run);
+  bench_error_register(*bench, run);
 }
 
 }  // namespace relief

@@ -106,12 +106,13 @@ def main():
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--resolution", metavar="WxH", help="instead of the scene's own")
     parser.add_argument("--threads", type=int, help="default: all")
+    parser.add_argument("--manifold", action="store_true", help="use Cycles' shadow caustics (MNEE)")
     parser.add_argument("--blend", help="also save the scene as this .blend")
     arguments = parser.parse_args()
     resolution = [int(n) for n in arguments.resolution.split("x")] if arguments.resolution else None
     runs = [{"samples": arguments.spp, "seed": arguments.seed, "output": os.path.abspath(arguments.output)}]
     try:
-        result = render_cycles(arguments.scene, runs, resolution, arguments.threads, arguments.blend)
+        result = render_cycles(arguments.scene, runs, resolution, arguments.threads, arguments.blend, manifold=arguments.manifold)
     except (CyclesError, OSError) as error:
         sys.exit(f"render_cycles: {error}")
     print(json.dumps(result, indent=2))
