@@ -124,7 +124,7 @@ class Completion(unittest.TestCase):
     def check_completion(self, complete):
         """@param complete  words to set of completions, of files their names"""
         self.assertEqual(complete("ren"), {"render"})
-        self.assertEqual(complete("bench", ""), {"displacement", "heightfield", "procedural"})
+        self.assertEqual(complete("bench", ""), {"displacement", "error", "heightfield", "procedural"})
         self.assertEqual(complete(""), set(sub_commands()))
         self.assertNotIn("complete", complete("c"))
         for command in all_commands():
