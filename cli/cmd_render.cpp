@@ -35,6 +35,7 @@
 #include "cli/interrupt.h"
 #include "cli/picture_options.h"
 #include "cli/progress_printer.h"
+#include "cli/render_session.h"
 #include "cli/run_files.h"
 #include "cli/scene_setup.h"
 #include "cli/standard_streams.h"
@@ -51,7 +52,6 @@
 #include "exporters/sample_range.h"
 #include "exporters/stats_json.h"
 #include "integrator/render.h"
-#include "scene/kept_images.h"
 #include "scene/load.h"
 #include "scene/setting_values.h"
 
@@ -114,6 +114,7 @@ RunFiles files_of_run(const RenderArguments& arguments, const std::vector<std::o
   RunFiles files;
   files.add_input("the scene", arguments.scene);
   files.add_input("the environment", arguments.setup.environment_file());
+  files.add_input("the camera's file", arguments.picture.camera_from);
   for (const std::optional<int> frame : frames) {
     const FramePaths paths = paths_of_frame(arguments, frame);
     for (const auto& [option, path] : outputs_of(paths)) files.add_output(option, path);
@@ -143,9 +144,9 @@ std::uint32_t report_aovs(const Scene& scene)
          (scene.displacements.empty() ? 0u : bit(Aov::kDisplacementSteps));
 }
 
-RenderOptions options_for(const Scene& scene, const RenderArguments& arguments)
+RenderOptions options_for(const Scene& scene, const RenderArguments& arguments, const std::vector<SceneCamera>& cameras)
 {
-  RenderOptions options = render_options(scene, arguments.picture);
+  RenderOptions options = render_options(scene, arguments.picture, cameras);
   RenderSettings& settings = options.settings;
   if (arguments.noise_threshold >= 0) settings.noise_threshold = static_cast<float>(arguments.noise_threshold);
   if (arguments.view) settings.view = *arguments.view;
@@ -343,15 +344,9 @@ void report_failed(ProgressPrinter& progress, int frame, const std::string& name
   progress.event({{"event", "failed"}, {"frame", frame}, {"reason", error_text(error)}});
 }
 
-/// What the frames of a run share.
-struct KeptFrames {
-  KeptImages images;
-  std::shared_ptr<HeightFields> fields = std::make_shared<HeightFields>();
-};
-
 /// One frame, from loading to files.
 /// @param files  of the run; what the frame reads is added
-/// @param kept   of the frames before; null: there is one frame
+/// @param kept   of the frames before; null: there are no others
 /// @return false if it was interrupted
 bool render_frame(const RenderArguments& arguments,
                   const std::string& command,
@@ -375,15 +370,12 @@ bool render_frame(const RenderArguments& arguments,
   LoadOptions load = arguments.setup.load_options(frame);
   load.camera = camera_choice(arguments.picture);
   load.texture_budget_bytes = static_cast<std::size_t>(arguments.texture_memory_gib * (1u << 30));
-  if (kept != nullptr) load.kept = &kept->images;
-  Scene scene = scene_load(arguments.scene, load);
-  files.add_inputs("a file of the scene", scene.files);
-
   Statistics stats;
-  if (kept != nullptr) {
-    const KeptTally images = kept->images.end_frame();
-    stats.kept = {images.count, 0, images.bytes, images.seconds};
-  }
+  std::shared_ptr<const Scene> owner = kept != nullptr
+                                           ? kept->load(arguments.scene, load, &stats.kept)
+                                           : std::make_shared<const Scene>(scene_load(arguments.scene, load));
+  const Scene& scene = *owner;
+  files.add_inputs("a file of the scene", scene.files);
   stats.load_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - load_start).count();
   stats.scene = arguments.scene;
   stats.version = RELIEF_VERSION;
@@ -393,11 +385,14 @@ bool render_frame(const RenderArguments& arguments,
   progress.warnings(stats.warnings);
   if (arguments.strict) refuse_warnings(arguments.scene, stats.warnings);
 
-  RenderOptions options = options_for(scene, arguments);
-  if (kept != nullptr) options.displacement.fields = kept->fields;
+  const PictureCameras cameras = picture_cameras(scene, arguments.picture, frame);
+  files.add_inputs("a file of the camera", cameras.files);
+  RenderOptions options = options_for(scene, arguments, cameras.cameras);
+  if (kept != nullptr) kept->join(&options);
   PngOptions png{options.settings.view, options.settings.exposure};
   png.alpha = arguments.setup.background == "transparent";
-  std::vector<FileStamp> files_read = std::move(scene.files);
+  std::vector<FileStamp> files_read = scene.files;
+  files_read.insert(files_read.end(), cameras.files.begin(), cameras.files.end());
   std::optional<ColorView> view;
   if (!paths.png.empty()) {
     view.emplace(png.view);
@@ -443,7 +438,10 @@ bool render_frame(const RenderArguments& arguments,
       frame_files.write_preview(stats.frame, film, samples);
     };
   }
-  const RenderedImage image = render(scene, options, interrupt_flag(), progress.callback(stats.frame, title), stats);
+  KeptContext of_frame;
+  KeptContext& context = kept != nullptr ? kept->scene.context() : of_frame;
+  const RenderedImage image =
+      render(scene, options, interrupt_flag(), progress.callback(stats.frame, title), context, stats);
   stats.peak_memory_bytes = peak_memory_bytes();
   if (stats.first_nonfinite) {
     stats.warnings.push_back("samples that were not finite count as black; the first one's rays: " +
@@ -455,7 +453,8 @@ bool render_frame(const RenderArguments& arguments,
         sample_range_text({options.first_sample, options.first_sample + options.num_samples,
                            static_cast<std::uint32_t>(options.settings.samples)});
   }
-  scene = {};  // Pictures are written in the memory of what they were made from.
+  of_frame.reset();
+  owner.reset();  // Pictures are written in the memory of what they were made from, unless that is kept.
   const bool is_whole = stats.stop_reason != "interrupted";
   if (stats.samples_per_pixel <= 0) {
     if (is_whole) throw OutputError(paths.exr, "not written: the time limit came before the first sample");
@@ -519,27 +518,32 @@ std::vector<std::optional<int>> frames_of_run(const RenderArguments& arguments)
   return {numbers.begin(), numbers.end()};
 }
 
-int render_all(const RenderArguments& arguments, const std::string& command)
+/// @param session  null: this is the process's only run
+int render_all(const RenderArguments& arguments, const std::string& command, RenderSession* session)
 {
   const std::vector<std::optional<int>> frames = frames_of_run(arguments);
   RunFiles files = files_of_run(arguments, frames);
   denoiser_require(arguments.denoiser);
 
-  interrupt_watch(arguments.grace);
+  if (session == nullptr) {
+    interrupt_watch(arguments.grace);
+  } else if (arguments.grace > 0) {
+    throw CLI::ValidationError("--grace", "expected a run of its own, found a request to relief serve");
+  }
   const int threads = arguments.threads > 0 ? arguments.threads : tbb::info::default_concurrency();
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
   exr_use_threads(threads > 1 ? threads : 0);
   tbb::task_arena arena(threads);
-  ProgressPrinter progress(arguments.progress);
-  KeptFrames kept;
+  ProgressPrinter progress(arguments.progress, session != nullptr ? session->request : nlohmann::json());
+  std::optional<KeptFrames> of_run;
+  if (session == nullptr && frames.size() > 1) of_run.emplace();
+  KeptFrames* const kept = session != nullptr ? session->kept.get() : of_run ? &*of_run : nullptr;
   std::vector<std::string> failed;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const std::optional<int> frame = frames[i];
     bool is_whole = false;
     try {
-      arena.execute([&] {
-        is_whole = render_frame(arguments, command, frame, files, frames.size() > 1 ? &kept : nullptr, progress);
-      });
+      arena.execute([&] { is_whole = render_frame(arguments, command, frame, files, kept, progress); });
     } catch (const CLI::Error&) {
       throw;  // Wrong usage is wrong for every frame.
     } catch (const std::exception& error) {
@@ -558,7 +562,7 @@ int render_all(const RenderArguments& arguments, const std::string& command)
 
 }  // namespace
 
-void cmd_render_register(CLI::App& app, Run& run, const std::string& command_line)
+void cmd_render_register(CLI::App& app, Run& run, const std::string& command_line, RenderSession* session)
 {
   constexpr const char* kDefaultAovs = "beauty,samples,variance,half";
   auto arguments = std::make_shared<RenderArguments>();
@@ -628,10 +632,10 @@ void cmd_render_register(CLI::App& app, Run& run, const std::string& command_lin
       ->check(number(0, 1e6))
       ->capture_default_str();
   add_max_memory(*command);
-  command->callback([&run, command_line, arguments, command, path_options] {
+  command->callback([&run, command_line, session, arguments, command, path_options] {
     arguments->settings = settings_given(*command);
     arguments->path_settings = words_given(path_options);
-    run = [command_line, arguments] { return render_all(*arguments, command_line); };
+    run = [command_line, session, arguments] { return render_all(*arguments, command_line, session); };
   });
 }
 

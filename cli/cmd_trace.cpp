@@ -191,9 +191,9 @@ std::string explanation_text(const Scene& scene, const SceneContext& context, co
 }
 
 /// The path of --pixel as a render follows it.
-PathReplay replay(const TraceArguments& arguments, const Scene& scene)
+PathReplay replay(const TraceArguments& arguments, const Scene& scene, const std::vector<SceneCamera>& cameras)
 {
-  const RenderOptions options = render_options(scene, arguments.picture);
+  const RenderOptions options = render_options(scene, arguments.picture, cameras);
   const PixelSample& at = *arguments.pixel;
   const FilmWindow window = render_window(options);
   const int x1 = window.x0 + window.width, y1 = window.y0 + window.height;
@@ -244,7 +244,9 @@ int trace(const TraceArguments& arguments)
   for (const std::string& text : scene.warnings) print_warning(text);
   for (const std::string& text : displacement_warnings(scene, arguments.picture.displacement)) print_warning(text);
   if (arguments.pixel) {
-    const PathReplay path = replay(arguments, scene);
+    const PictureCameras cameras = picture_cameras(scene, arguments.picture, arguments.frame);
+    files.add_inputs("a file of the camera", cameras.files);
+    const PathReplay path = replay(arguments, scene, cameras.cameras);
     for (const std::string& text : path.warnings) print_warning(text);
     files.check_output("--output", output);
     write_text(arguments.output, replay_text(path));

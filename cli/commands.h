@@ -11,8 +11,12 @@ namespace relief {
 /// Work of the chosen sub-command; returns the exit code.
 using Run = std::function<int()>;
 
+struct RenderSession;  // cli/render_session.h
+
 /// @param command_line  as given, for the metadata of pictures
-void cmd_render_register(CLI::App& app, Run& run, const std::string& command_line);
+/// @param session       of the process, must outlive the parser; null: this is its only render
+void cmd_render_register(CLI::App& app, Run& run, const std::string& command_line, RenderSession* session = nullptr);
+void cmd_serve_register(CLI::App& app, Run& run);
 void cmd_info_register(CLI::App& app, Run& run);
 void cmd_trace_register(CLI::App& app, Run& run);
 void cmd_bench_register(CLI::App& app, Run& run);

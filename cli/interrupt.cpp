@@ -12,7 +12,7 @@ namespace relief {
 
 namespace {
 
-std::atomic<bool> g_announced{false}, g_stop{false};
+std::atomic<bool> g_announced{false}, g_stop{false}, g_by_signal{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "a signal handler may not wait for a lock");
 
 sem_t g_grace_begins;
@@ -20,6 +20,7 @@ std::atomic<bool> g_has_grace{false};
 
 void on_signal(int number)
 {
+  g_by_signal = true;
   const bool is_second = g_announced.exchange(true);
   if (is_second) std::_Exit(130);
   if (number == SIGTERM && g_has_grace) {
@@ -61,5 +62,15 @@ void interrupt_request() { g_announced = g_stop = true; }
 const std::atomic<bool>& interrupt_flag() { return g_stop; }
 
 bool interrupt_is_announced() { return g_announced; }
+
+void interrupt_rest() { g_announced = true; }
+
+void interrupt_begin()
+{
+  g_announced = g_stop = false;
+  if (g_by_signal) interrupt_request();
+}
+
+bool interrupt_by_signal() { return g_by_signal; }
 
 }  // namespace relief

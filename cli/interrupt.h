@@ -22,4 +22,11 @@ const std::atomic<bool>& interrupt_flag();
 /// True once somebody wished to stop, or will when a grace time is half over: nothing more is to be begun.
 bool interrupt_is_announced();
 
+/// For a program that works now and then. It rests: there is nothing that could be saved, the first signal ends it at once.
+void interrupt_rest();
+/// It begins with a piece of work: what was wished for the one before does not count, but a signal does.
+void interrupt_begin();
+/// Whether a signal was among those who wished to stop.
+bool interrupt_by_signal();
+
 }  // namespace relief

@@ -1,4 +1,5 @@
-// The `relief` program: picks the sub-command, prints errors, chooses the exit code. Nothing else prints errors.
+// The `relief` program: picks the sub-command, prints errors, chooses the exit code. Nothing else prints errors, but `relief serve`
+// to whom it serves.
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
@@ -14,35 +15,20 @@
 #include "cli/cmd_merge.h"
 #include "cli/cmd_report.h"
 #include "cli/commands.h"
-#include "cli/error_text.h"
-#include "cli/exit_code.h"
+#include "cli/failure.h"
 #include "cli/standard_streams.h"
-#include "cli/suggestion.h"
-#include "exporters/errors.h"
 #include "scene/diagnostics.h"
 #include "scene/memory.h"
 
 namespace {
 
-using relief::ExitCode, relief::kDone, relief::kFailed, relief::kUsage, relief::kInvalidScene;
-
-/// Prints an error and a hint (empty: none). Nothing can be done about a message that cannot be written.
-int report(ExitCode code, const std::string& what, const std::string& hint = {})
+/// Prints an error and its hint. Nothing can be done about a message that cannot be written.
+int report(const relief::Failure& failure)
 {
-  std::string text = "relief: " + relief::printable_text(what) + "\n";
-  if (!hint.empty()) text += "  " + relief::printable_text(hint) + "\n";
+  std::string text = "relief: " + relief::printable_text(failure.text) + "\n";
+  if (!failure.hint.empty()) text += "  " + relief::printable_text(failure.hint) + "\n";
   std::fputs(text.c_str(), stderr);
-  return code;
-}
-
-constexpr const char* kMemoryHint =
-    "--max-memory, --texture-memory, --resolution and a shell's ulimit -v set what is needed and what there is";
-
-/// An error that may come of a lack of memory, perhaps told by a library's words.
-int report_error(ExitCode code, const std::exception& error)
-{
-  const bool is_of_memory = relief::is_of_memory(error);
-  return report(is_of_memory ? kFailed : code, relief::error_text(error), is_of_memory ? kMemoryHint : "");
+  return failure.code;
 }
 
 /// Memory may be short where no exception can pass: a library's threads, functions that must not fail. Those end the program;
@@ -53,11 +39,11 @@ int report_error(ExitCode code, const std::exception& error)
     if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
   } catch (const std::bad_alloc&) {
     std::fputs("relief: out of memory\n", stderr);
-    std::_Exit(kFailed);
+    std::_Exit(relief::kFailed);
   } catch (const std::exception& error) {
     if (relief::is_out_of_memory(error.what())) {
       std::fprintf(stderr, "relief: out of memory: %s\n", error.what());
-      std::_Exit(kFailed);
+      std::_Exit(relief::kFailed);
     }
     std::fprintf(stderr, "relief: %s\n", error.what());
   } catch (...) {
@@ -98,6 +84,7 @@ int main(int argc, char** argv)
   for (int i = 1; i < argc; ++i) command_line += " " + relief::shell_quoted(argv[i]);
   relief::Run run;
   relief::cmd_render_register(app, run, command_line);
+  relief::cmd_serve_register(app, run);
   relief::cmd_info_register(app, run);
   relief::cmd_trace_register(app, run);
   relief::cmd_compare_register(app, run);
@@ -116,22 +103,11 @@ int main(int argc, char** argv)
     } catch (const CLI::Success& help_or_version) {
       app.exit(help_or_version);
       relief::standard_output_flush();
-      return kDone;
+      return relief::kDone;
     }
     if (!run) throw CLI::RequiredError("a command");
     return run_command(run);
-  } catch (const CLI::ParseError& error) {
-    const auto commands = app.get_subcommands();
-    std::string hint = relief::suggestion(app, arguments);
-    if (!hint.empty()) hint += "; ";
-    return report(kUsage, error.what(),
-                  hint + "see relief " + (commands.empty() ? "" : commands.front()->get_name() + " ") + "--help");
-  } catch (const relief::SceneError& error) {
-    return report(kInvalidScene, error.what(),
-                  error.json_path.empty() ? "" : "the scene format is described in docs/scene_format.md");
-  } catch (const relief::InputError& error) {
-    return report_error(kInvalidScene, error);
-  } catch (const std::exception& error) {
-    return report_error(kFailed, error);
+  } catch (...) {
+    return report(relief::current_failure(app, arguments));
   }
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -15,25 +16,24 @@ namespace relief {
 namespace {
 
 /// Position of the camera of that name, or of that number if no camera is called so.
-std::size_t camera_index(const Scene& scene, const std::string& text)
+std::size_t camera_index(const std::vector<SceneCamera>& cameras, const std::string& text)
 {
-  const auto named =
-      std::find_if(scene.cameras.begin(), scene.cameras.end(), [&](const SceneCamera& c) { return c.name == text; });
-  if (named != scene.cameras.end()) return static_cast<std::size_t>(named - scene.cameras.begin());
+  const auto named = std::find_if(cameras.begin(), cameras.end(), [&](const SceneCamera& c) { return c.name == text; });
+  if (named != cameras.end()) return static_cast<std::size_t>(named - cameras.begin());
   std::size_t index = 0;
   const auto read = std::from_chars(text.data(), text.data() + text.size(), index);
-  if (read.ec == std::errc() && read.ptr == text.data() + text.size() && index < scene.cameras.size()) return index;
+  if (read.ec == std::errc() && read.ptr == text.data() + text.size() && index < cameras.size()) return index;
   std::string names;
-  for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
-    names += fmt::format("{}{} ('{}')", i == 0 ? "" : ", ", i, scene.cameras[i].name);
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    names += fmt::format("{}{} ('{}')", i == 0 ? "" : ", ", i, cameras[i].name);
   }
   throw CLI::ValidationError("--camera", fmt::format("expected one of {}, found '{}'", names, text));
 }
 
 /// The camera that was chosen, for an image of that size.
-Camera camera_for_image(const Scene& scene, const PictureOptions& options, int width, int height)
+Camera camera_for_image(const std::vector<SceneCamera>& cameras, const PictureOptions& options, int width, int height)
 {
-  Camera camera = scene.cameras[options.camera.empty() ? 0 : camera_index(scene, options.camera)].camera;
+  Camera camera = cameras[options.camera.empty() ? 0 : camera_index(cameras, options.camera)].camera;
   if (options.fov > 0) {
     if (camera.projection != Projection::kPerspective) {
       throw CLI::ValidationError("--fov", "expected a perspective camera, found an orthographic one");
@@ -48,11 +48,24 @@ Camera camera_for_image(const Scene& scene, const PictureOptions& options, int w
 
 CameraChoice camera_choice(const PictureOptions& options)
 {
+  // With another file's cameras the scene's own do not matter: it is the same whatever the picture's size.
+  if (!options.camera_from.empty()) return {{}, {}, 0, 1};
   CameraChoice choice{options.look_from, options.look_at, options.fov, 0};
   if (options.resolution.width > 0) {
     choice.image_aspect = static_cast<float>(options.resolution.width) / static_cast<float>(options.resolution.height);
   }
   return choice;
+}
+
+PictureCameras picture_cameras(const Scene& scene, const PictureOptions& options, std::optional<int> frame)
+{
+  if (options.camera_from.empty()) return {scene.cameras, {}};
+  LoadOptions load;
+  load.has_frame = frame.has_value();
+  load.frame = frame.value_or(0);
+  load.needs_camera = true;
+  Scene other = scene_load(options.camera_from, load);
+  return {std::move(other.cameras), std::move(other.files)};
 }
 
 std::vector<CLI::Option*> add_ray_options(CLI::App& command, PictureOptions& options)
@@ -69,13 +82,17 @@ std::vector<CLI::Option*> add_picture_options(CLI::App& command, PictureOptions&
   };
   CLI::Option* camera =
       command.add_option("--camera", options.camera, "Name of the camera, or its number from 0 (default: the first)");
+  CLI::Option* file =
+      command.add_option("--camera-from", options.camera_from, "Scene file whose cameras there are instead");
   CLI::Option* from =
       add_parsed(command, "--look-from", options.look_from, point("--look-from"), "X,Y,Z: a camera there instead");
   CLI::Option* at = add_parsed(command, "--look-at", options.look_at, point("--look-at"),
                                "X,Y,Z: what it looks at (default: the middle of everything)");
   from->excludes(camera);
+  from->excludes(file);
   at->needs(from);
   return {
+      file,
       camera,
       from,
       at,
@@ -93,7 +110,7 @@ std::vector<CLI::Option*> add_picture_options(CLI::App& command, PictureOptions&
   };
 }
 
-RenderOptions render_options(const Scene& scene, const PictureOptions& given)
+RenderOptions render_options(const Scene& scene, const PictureOptions& given, const std::vector<SceneCamera>& cameras)
 {
   RenderOptions options;
   RenderSettings& settings = options.settings;
@@ -115,7 +132,7 @@ RenderOptions render_options(const Scene& scene, const PictureOptions& given)
     settings.filter_width = pixel_filter_width(*given.filter);
   }
   if (given.caustics) settings.caustics.mode = *given.caustics;
-  options.camera = camera_for_image(scene, given, settings.width, settings.height);
+  options.camera = camera_for_image(cameras, given, settings.width, settings.height);
   const PixelRect& crop = given.crop;
   if (crop.x1 > settings.width || crop.y1 > settings.height) {
     throw CLI::ValidationError(

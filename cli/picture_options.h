@@ -14,7 +14,8 @@
 namespace relief {
 
 struct PictureOptions {
-  std::string camera;  ///< name or number; empty: the first
+  std::string camera_from;  ///< file whose cameras there are in place of the scene's; empty: none
+  std::string camera;       ///< name or number; empty: the first
   std::optional<Vec3f> look_from, look_at;
   double fov = 0;  ///< vertical, degrees; 0: the camera's
   Resolution resolution;
@@ -35,10 +36,22 @@ std::vector<CLI::Option*> add_picture_options(CLI::App& command, PictureOptions&
 /// What a scene has to be loaded with for the camera of the options.
 CameraChoice camera_choice(const PictureOptions& options);
 
+/// The cameras that the options choose among, and the files that they are read from if it is not the scene.
+struct PictureCameras {
+  std::vector<SceneCamera> cameras;
+  std::vector<FileStamp> files;
+};
+
+/// @param scene  was loaded with camera_choice
+/// @param frame  of an animation of the camera's file; empty: its rest pose
+/// @error SceneError if the camera's file cannot be read or has none
+PictureCameras picture_cameras(const Scene& scene, const PictureOptions& options, std::optional<int> frame);
+
 /// The scene's settings with the options' changes.
-/// @pre   the scene was loaded with camera_choice
-/// @error CLI::ValidationError for a crop or a camera that the scene does not have
-RenderOptions render_options(const Scene& scene, const PictureOptions& options);
+/// @error CLI::ValidationError for a crop or a camera that there is not
+RenderOptions render_options(const Scene& scene,
+                             const PictureOptions& options,
+                             const std::vector<SceneCamera>& cameras);
 
 /// What was given of some options, as words of a command line.
 /// @pre the command line has been parsed

@@ -6,9 +6,9 @@
 #include <unistd.h>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "cli/interrupt.h"
+#include "cli/standard_streams.h"
 #include "scene/diagnostics.h"
 
 namespace relief {
@@ -30,10 +30,10 @@ std::string duration_text(double seconds)
 
 }  // namespace
 
-ProgressPrinter::ProgressPrinter(const std::string& kind)
+ProgressPrinter::ProgressPrinter(const std::string& kind, nlohmann::json request) : request_(std::move(request))
 {
-  if (kind == "json") kind_ = Kind::kJson;
-  if (kind == "bar" && isatty(STDERR_FILENO) != 0) kind_ = Kind::kBar;
+  if (kind == "json" || !request_.is_null()) kind_ = Kind::kJson;
+  if (kind_ == Kind::kNone && kind == "bar" && isatty(STDERR_FILENO) != 0) kind_ = Kind::kBar;
 }
 
 ProgressPrinter::~ProgressPrinter() { clear_bar(); }
@@ -60,12 +60,11 @@ std::function<void(const RenderProgress&)> ProgressPrinter::callback(int frame, 
   return {};
 }
 
-void ProgressPrinter::event(const nlohmann::json& object)
+void ProgressPrinter::event(nlohmann::json object)
 {
   if (kind_ != Kind::kJson) return;
-  // Paths may hold bytes that are not UTF-8, and characters that command a terminal.
-  const std::string line = object.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace) + "\n";
-  if (write_text(stdout, line)) return;
+  if (!request_.is_null()) object["id"] = request_;
+  if (print_json(object)) return;
   kind_ = Kind::kNone;
   // Nobody needs to be told a second time, at the end.
   std::clearerr(stdout);
@@ -82,7 +81,9 @@ void ProgressPrinter::note(const std::string& line)
 void ProgressPrinter::warnings(const std::vector<std::string>& texts)
 {
   for (const std::string& text : texts) {
-    if (shown_.insert(text).second) note("relief: warning: " + text);
+    if (!shown_.insert(text).second) continue;
+    note("relief: warning: " + text);
+    event({{"event", "warning"}, {"text", text}});
   }
 }
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json_fwd.hpp>
+#include <nlohmann/json.hpp>
 
 #include "integrator/render.h"
 
@@ -15,7 +15,8 @@ namespace relief {
 class ProgressPrinter {
  public:
   /// @param kind  "bar" (drawn on standard error if that is a terminal), "json" (on standard output) or "none"
-  explicit ProgressPrinter(const std::string& kind);
+  /// @param request  of `relief serve`, its id: all events have it and are printed, whatever the kind; null: there is none
+  explicit ProgressPrinter(const std::string& kind, nlohmann::json request = {});
 
   /// Leaves no half bar behind, whatever ended the render.
   ~ProgressPrinter();
@@ -29,12 +30,12 @@ class ProgressPrinter {
   std::function<void(const RenderProgress&)> callback(int frame, std::string title);
 
   /// Prints a JSON object as a line, in JSON mode only. A reader that has gone away counts as a wish to stop.
-  void event(const nlohmann::json& object);
+  void event(nlohmann::json object);
 
   /// Prints a line on standard error, above the bar; what is not fit for a terminal is escaped.
   void note(const std::string& line);
 
-  /// Prints those warnings that this run has not shown yet.
+  /// Prints those warnings that this run has not shown yet, in JSON mode also as events.
   void warnings(const std::vector<std::string>& texts);
 
  private:
@@ -42,6 +43,7 @@ class ProgressPrinter {
   void clear_bar();
 
   enum class Kind { kNone, kBar, kJson } kind_ = Kind::kNone;
+  nlohmann::json request_;
   bool bar_is_drawn_ = false;
   std::set<std::string> shown_;
 };

@@ -7,6 +7,8 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <nlohmann/json.hpp>
+
 #include "exporters/errors.h"
 #include "scene/diagnostics.h"
 
@@ -31,6 +33,13 @@ void print_line(const std::string& line)
 void print_warning(const std::string& text)
 {
   std::fputs(("relief: warning: " + printable_text(text) + "\n").c_str(), stderr);
+}
+
+bool print_json(const nlohmann::json& object)
+{
+  // Paths may hold bytes that are not UTF-8, and characters that command a terminal.
+  const std::string line = object.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace) + "\n";
+  return std::fwrite(line.data(), 1, line.size(), stdout) == line.size() && std::fflush(stdout) == 0;
 }
 
 void standard_output_flush()

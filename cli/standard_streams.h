@@ -3,6 +3,8 @@
 
 #include <string>
 
+#include <nlohmann/json_fwd.hpp>
+
 namespace relief {
 
 /// Puts something in the place of standard streams that are closed, where writing fails. Otherwise the first file that is
@@ -15,6 +17,10 @@ void print_line(const std::string& line);
 
 /// Likewise on standard error, "relief: warning: " before it.
 void print_warning(const std::string& text);
+
+/// Prints a JSON object as a line, at once; lines of several threads do not mix.
+/// @return false if it cannot be written
+bool print_json(const nlohmann::json& object);
 
 /// Writes what standard output still holds.
 /// @error OutputError if this or any earlier write to it has failed, e.g. on a full disk

@@ -1,11 +1,13 @@
 #include "displacement/displacement_set.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
 #include <stdexcept>
 #include <tuple>
+#include <utility>
 
 #include <unistd.h>
 
@@ -102,6 +104,31 @@ std::optional<TessellationKind> tessellation_kind(DisplacementMethod method)
   return method == DisplacementMethod::kAuto ? std::nullopt : displacement_method(method).tessellation;
 }
 
+/// For a mesh that is tessellated: such are not kept.
+void forget_tree(PreparedMesh& mesh)
+{
+  mesh.content.reset();
+  mesh.tree.reset();
+  mesh.geometry.scene = nullptr;
+}
+
+/// What DisplacedMesh and its tree are made of. Fields are known by their places: what is kept goes with the first set that
+/// does not ask for it, and so no later than the fields it was made of.
+ContentHash prisms_content(const MeshView& mesh,
+                           const DisplacementMapping& mapping,
+                           const std::vector<const HeightFieldView*>& fields)
+{
+  ContentHasher hash;
+  hash.add_array(mesh.P, mesh.num_vertices);
+  hash.add_array(mesh.N, mesh.num_vertices);
+  hash.add_array(mesh.uv[mapping.height.uv_set], mesh.num_vertices);
+  hash.add_array(mesh.triangles, mesh.num_triangles);
+  const TextureRef& m = mapping.height;
+  hash.add(m.m00, m.m01, m.m02, m.m10, m.m11, m.m12, mapping.scale, mapping.midlevel, mapping.weld_seams);
+  hash.add_array(fields.data(), fields.size());
+  return hash.result();
+}
+
 /// Brings a point's place from a part of a triangle to the triangle.
 void set_base_place(const ProceduralField& field, DisplacedPoint* point)
 {
@@ -196,7 +223,8 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
       heights_owner_(input.heights_owner),
       geometry_of_instance_(input.instances.size(), -1),
       texel_of_instance_(input.instances.size(), 0.0f),
-      fields_(options.fields != nullptr ? options.fields : std::make_shared<HeightFields>())
+      fields_(options.fields != nullptr ? options.fields : std::make_shared<HeightFields>()),
+      kept_meshes_(options.meshes)
 {
   const std::vector<Use> uses = find_uses(input);
   const auto num_displaced =
@@ -218,45 +246,78 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
         displaced(i).geometry.lod.texel * static_cast<float>(stretch_of(input.instances[i].world_from_object).most);
   }
   kept_ = fields_->end_set();
+  if (kept_meshes_ != nullptr) kept_tally_ = kept_meshes_->end_set();
 }
 
-std::unique_ptr<DisplacementSet::Displaced> DisplacementSet::make_displaced(const Use& use,
-                                                                            const DisplacementOptions& options)
+DisplacementSet::~DisplacementSet()
+{
+  if (kept_meshes_ == nullptr) return;
+  for (std::unique_ptr<PreparedMesh>& geometry : geometries_) {
+    if (geometry->content && geometry->tree != nullptr) kept_meshes_->put(std::move(geometry));
+  }
+}
+
+void DisplacementSet::set_tree(std::size_t index, std::shared_ptr<RTCSceneTy> tree, std::uint64_t bytes, double seconds)
+{
+  PreparedMesh& prepared = *geometries_[index];
+  prepared.tree = std::move(tree);
+  prepared.tree_bytes = bytes;
+  prepared.seconds += seconds;
+}
+
+std::unique_ptr<PreparedMesh> DisplacementSet::make_displaced(const Use& use, const DisplacementOptions& options)
 {
   const DisplacementSettings& settings = use.settings;
-  auto displaced = std::make_unique<Displaced>();
-  displaced->name = use.mesh_name;
-  displaced->displacement_index = use.displacement_index;
   const DisplacementMethod asked = method_of(settings, options);
-  displaced->method = asked == DisplacementMethod::kAuto ? kDefaultMethod : asked;
-  DisplacedGeometry& geometry = displaced->geometry;
-  geometry.method = displaced->method;
+  DisplacedGeometry geometry;
+  geometry.method = asked == DisplacementMethod::kAuto ? kDefaultMethod : asked;
   geometry.smooth = settings.smoothing;
   geometry.rmip_options = options.rmip.value_or(RmipOptions{});
   Levels levels = levels_of(use, options);
-  std::vector<const HeightFieldView*> coarser;
   if (levels.by_cone) {
     levels.count = num_faithful_levels(use, levels.count);
     levels.by_cone = levels.count > 1;
   }
+  std::vector<const HeightFieldView*> fields;
   for (int k = 0; k < levels.count; ++k) {
     geometry.levels[k] =
-        fields_->level(map_of(use), levels.first + k, displacement_method(displaced->method), geometry.rmip_options);
-    if (k > 0) coarser.push_back(geometry.levels[k].field);
+        fields_->level(map_of(use), levels.first + k, displacement_method(geometry.method), geometry.rmip_options);
+    fields.push_back(geometry.levels[k].field);
   }
-  displaced->mesh = DisplacedMesh(use.mesh, *geometry.levels[0].field,
-                                  {settings.height, use.scale, settings.midlevel, settings.weld_seams}, coarser);
+  const DisplacementMapping mapping{settings.height, use.scale, settings.midlevel, settings.weld_seams};
+  std::unique_ptr<PreparedMesh> displaced = prisms_of(use.mesh, mapping, fields);
+  displaced->name = use.mesh_name;
+  displaced->displacement_index = use.displacement_index;
+  displaced->method = geometry.method;
   geometry.mesh = displaced->mesh.view();
   geometry.lod = {levels.count, levels.by_cone, levels.fixed, displaced->mesh.widest_texel()};
+  geometry.scene = displaced->tree.get();
+  displaced->geometry = geometry;
   has_levels_ |= levels.count > 1;
   return displaced;
 }
 
-std::unique_ptr<DisplacementSet::Displaced> DisplacementSet::make_computed(const Use& use,
-                                                                           const DisplacementOptions& options)
+std::unique_ptr<PreparedMesh> DisplacementSet::prisms_of(const MeshView& mesh,
+                                                         const DisplacementMapping& mapping,
+                                                         const std::vector<const HeightFieldView*>& fields)
+{
+  std::optional<ContentHash> content;
+  if (kept_meshes_ != nullptr) {
+    content = prisms_content(mesh, mapping, fields);
+    if (std::unique_ptr<PreparedMesh> kept = kept_meshes_->take(*content)) return kept;
+  }
+  const auto start = std::chrono::steady_clock::now();
+  auto displaced = std::make_unique<PreparedMesh>();
+  displaced->mesh = DisplacedMesh(mesh, *fields.front(), mapping, std::span(fields).subspan(1));
+  displaced->content = content;
+  displaced->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return displaced;
+}
+
+std::unique_ptr<PreparedMesh> DisplacementSet::make_computed(const Use& use, const DisplacementOptions& options)
 {
   const ComputedHeights& heights = *use.heights;
-  auto displaced = std::make_unique<Displaced>();
+  auto displaced = std::make_unique<PreparedMesh>();
   displaced->name = use.mesh_name;
   displaced->displacement_index = use.displacement_index;
   displaced->method = kDefaultMethod;
@@ -286,7 +347,7 @@ std::unique_ptr<DisplacementSet::Displaced> DisplacementSet::make_computed(const
   return displaced;
 }
 
-void DisplacementSet::tessellate(Displaced& displaced,
+void DisplacementSet::tessellate(PreparedMesh& displaced,
                                  const DisplacementOptions& options,
                                  bool is_auto,
                                  double num_rays,
@@ -301,6 +362,7 @@ void DisplacementSet::tessellate(Displaced& displaced,
     *used_bytes += tessellation_peak_bytes(layout, kRenderTessellation);
     check_budget(*used_bytes, layout, displaced.name, options);
     displaced.tessellation = std::make_unique<Tessellation>(mesh, std::move(layout));
+    forget_tree(displaced);
     return;
   }
   // Layouts cost time and memory of their own, so nothing is made of them without an allowance.
@@ -326,6 +388,7 @@ void DisplacementSet::tessellate(Displaced& displaced,
   *used_bytes += chosen->bytes;
   displaced.tessellation =
       std::make_unique<Tessellation>(mesh, std::move(layouts[static_cast<std::size_t>(chosen - offers.begin())]));
+  forget_tree(displaced);
 }
 
 int DisplacementSet::num_faithful_levels(const Use& use, int most)
@@ -353,7 +416,7 @@ DisplacedPoint DisplacementSet::resolve(std::size_t instance,
                                         std::uint32_t primitive,
                                         EmbreeHitRecord record) const
 {
-  const Displaced& d = displaced(instance);
+  const PreparedMesh& d = displaced(instance);
   if (d.tessellation == nullptr) {
     DisplacedPoint out = displaced_resolve(d.geometry, placement, texel_of_instance_[instance], primitive, record);
     if (d.procedural != nullptr) set_base_place(*d.procedural, &out);
@@ -369,7 +432,7 @@ DisplacedPoint DisplacementSet::resolve(std::size_t instance,
 
 DisplacedPoint DisplacementSet::locate(std::size_t instance, std::uint32_t primitive, float u, float v) const
 {
-  const Displaced& d = displaced(instance);
+  const PreparedMesh& d = displaced(instance);
   if (d.tessellation == nullptr) {
     DisplacedPoint out{primitive, u, v};
     if (d.procedural != nullptr) set_base_place(*d.procedural, &out);

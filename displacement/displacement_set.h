@@ -11,14 +11,10 @@
 #include <utility>
 #include <vector>
 
-#include "displacement/curved_heights.h"
-#include "displacement/displaced_mesh.h"
-#include "displacement/embree_geometry.h"
 #include "displacement/height_fields.h"
 #include "displacement/lattice_split.h"
-#include "displacement/map_heights.h"
+#include "displacement/prepared_mesh.h"
 #include "displacement/seams.h"
-#include "displacement/tessellation.h"
 #include "kernel/camera/camera.h"
 
 namespace relief {
@@ -61,6 +57,7 @@ struct DisplacementOptions {
   double num_rays = 0;  ///< that will be traced, about, for `auto` to weigh building against tracing
   std::uint64_t computed_bytes = std::uint64_t{256} << 20;  ///< computed heights that are kept, at most
   std::shared_ptr<HeightFields> fields;                     ///< of the sets before; null: each set has its own
+  std::shared_ptr<KeptMeshes> meshes;                       ///< likewise, with the same fields; null: none are kept
   std::uint64_t tessellation_bytes = 0;  ///< all tessellations may take while they are built; 0: half of the machine's
 };
 
@@ -75,6 +72,10 @@ class DisplacementSet {
  public:
   /// @error std::runtime_error with the estimate if tessellations would need more memory than they may
   DisplacementSet(const DisplacementInput& input, const DisplacementOptions& options);
+  /// Leaves to the sets after what they may use.
+  ~DisplacementSet();
+  DisplacementSet(DisplacementSet&&) = default;
+  DisplacementSet& operator=(DisplacementSet&&) = delete;
 
   /// @return  index of the displaced geometry of an instance; −1: it is not displaced
   int geometry_index(std::size_t instance) const { return geometry_of_instance_[instance]; }
@@ -84,6 +85,10 @@ class DisplacementSet {
   /// Widths of finest texels by instance, metres, world; 0 where it is not displaced.
   const float* texels() const { return texel_of_instance_.data(); }
   DisplacedGeometry& geometry(std::size_t index) { return geometries_[index]->geometry; }
+  /// A geometry's tree, committed; null: there is none yet.
+  const std::shared_ptr<RTCSceneTy>& tree(std::size_t index) const { return geometries_[index]->tree; }
+  /// @param seconds  that building it took
+  void set_tree(std::size_t index, std::shared_ptr<RTCSceneTy> tree, std::uint64_t bytes, double seconds);
   const DisplacedMesh& mesh(std::size_t index) const { return geometries_[index]->mesh; }
   /// @return null if the geometry is traversed as it is
   const Tessellation* tessellation(std::size_t index) const { return geometries_[index]->tessellation.get(); }
@@ -104,25 +109,15 @@ class DisplacementSet {
   std::uint64_t num_triangles() const;                       ///< of all geometries
   DisplacedMeshReport report() const;                        ///< sums over all geometries
   const HeightFields::Tally& kept() const { return kept_; }  ///< of the sets before
-  std::string method_names() const;                          ///< of the geometries, separated by commas
+  const KeptMeshes::Tally& kept_meshes() const { return kept_tally_; }
+  std::string method_names() const;  ///< of the geometries, separated by commas
   /// What `auto` chose by, a line a geometry.
   const std::vector<std::string>& reasons() const { return reasons_; }
   /// Parts of the surfaces that are missing.
   std::vector<std::string> warnings() const;
 
  private:
-  struct Displaced {
-    std::string name;                             ///< of the mesh
-    int displacement_index;                       ///< into the input's settings
-    DisplacementMethod method;                    ///< by which it is traced
-    std::unique_ptr<MapHeights> map_heights;      ///< where computed heights are a map's
-    std::unique_ptr<CurvedHeights> curved;        ///< where the base is curved
-    std::unique_ptr<ProceduralField> procedural;  ///< heights that are computed
-    DisplacedMesh mesh;
-    DisplacedGeometry geometry;  ///< where it tessellates: what is tessellated
-    std::unique_ptr<Tessellation> tessellation;
-  };
-  const Displaced& displaced(std::size_t instance) const
+  const PreparedMesh& displaced(std::size_t instance) const
   {
     return *geometries_[static_cast<std::size_t>(geometry_of_instance_[instance])];
   }
@@ -144,14 +139,19 @@ class DisplacementSet {
   };
   std::vector<Use> find_uses(const DisplacementInput& input);
   Levels levels_of(const Use& use, const DisplacementOptions& options) const;
-  std::unique_ptr<Displaced> make_displaced(const Use& use, const DisplacementOptions& options);
-  std::unique_ptr<Displaced> make_computed(const Use& use, const DisplacementOptions& options);
+  std::unique_ptr<PreparedMesh> make_displaced(const Use& use, const DisplacementOptions& options);
+  /// Kept or new, with nothing filled in but its prisms, tree and content.
+  /// @param fields  the finest level, then those that rays may see instead
+  std::unique_ptr<PreparedMesh> prisms_of(const MeshView& mesh,
+                                          const DisplacementMapping& mapping,
+                                          const std::vector<const HeightFieldView*>& fields);
+  std::unique_ptr<PreparedMesh> make_computed(const Use& use, const DisplacementOptions& options);
   /// How many levels of a map, the finest first, look like the map on a mesh and all its instances: what they lose of its
   /// slopes and heights is little.
   int num_faithful_levels(const Use& use, int most);
   /// Tessellates where the method, or `auto`, wants it.
   /// @param used_bytes  by all tessellations so far; grows
-  void tessellate(Displaced& displaced,
+  void tessellate(PreparedMesh& displaced,
                   const DisplacementOptions& options,
                   bool is_auto,
                   double num_rays,
@@ -171,7 +171,9 @@ class DisplacementSet {
   std::vector<std::string> reasons_;
   std::shared_ptr<HeightFields> fields_;
   HeightFields::Tally kept_;
-  std::vector<std::unique_ptr<Displaced>> geometries_;
+  std::shared_ptr<KeptMeshes> kept_meshes_;  ///< null: none are kept
+  KeptMeshes::Tally kept_tally_;
+  std::vector<std::unique_ptr<PreparedMesh>> geometries_;
 };
 
 }  // namespace relief

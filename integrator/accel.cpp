@@ -1,7 +1,12 @@
 #include "integrator/accel.h"
 
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "integrator/stages.h"
 #include "kernel/light/spot.h"
@@ -10,12 +15,6 @@
 namespace relief {
 
 namespace {
-
-bool count_bytes(void* user, ssize_t bytes, bool)
-{
-  static_cast<std::atomic<std::ptrdiff_t>*>(user)->fetch_add(bytes, std::memory_order_relaxed);
-  return true;
-}
 
 bool is_identity(const Affine3& m)
 {
@@ -170,6 +169,39 @@ Box3 points_box(std::span<const Vec3f> points, const Affine3& m)
   return box;
 }
 
+/// So that a pad stays the same where a scene changes a little, and with it the trees whose boxes it enlarges.
+float power_of_two_above(float x)
+{
+  if (!(x > 0.0f && x < kInfinity)) return x;
+  int exponent = 0;
+  const float fraction = std::frexp(x, &exponent);
+  return std::ldexp(1.0f, fraction > 0.5f ? exponent : exponent - 1);
+}
+
+/// At least instance_pad along each axis, and about the same however the instance is turned.
+float steady_pad(const InstanceGeometry& instance)
+{
+  const auto row = [&](double Vec3d::*axis) {
+    return std::hypot(instance.x.*axis, instance.y.*axis, instance.z.*axis);
+  };
+  const double longest = std::max({row(&Vec3d::x), row(&Vec3d::y), row(&Vec3d::z)});
+  // The sum of three numbers is at most so many times the root of the sum of their squares.
+  constexpr double kRootOfThree = 1.7320509;
+  return power_of_two_above(static_cast<float>(kRootOfThree * static_cast<double>(*instance.pad) * longest));
+}
+
+/// What new_mesh reads of a mesh.
+void hash_triangles(const Mesh& mesh, ContentHasher* hash)
+{
+  hash->add_array(mesh.P.data(), mesh.P.size());
+  hash->add_array(mesh.triangles.data(), mesh.triangles.size());
+}
+
+void hash_transform(const Affine3& m, ContentHasher* hash)
+{
+  for (const Vec3f column : {m.x, m.y, m.z, m.p}) hash->add(column.x, column.y, column.z);
+}
+
 Box3 scene_bounds(RTCScene scene)
 {
   RTCBounds b;
@@ -183,30 +215,14 @@ Accel::Accel(const Scene& scene,
              std::span<const Light> lights,
              std::span<const std::uint32_t> area_lights,
              DisplacementSet& displacements,
-             RTCFilterFunctionN shadow_filter)
-    : shadow_filter_(shadow_filter), displacements_(&displacements)
+             RTCFilterFunctionN shadow_filter,
+             std::shared_ptr<KeptTrees> trees)
+    : shadow_filter_(shadow_filter),
+      displacements_(&displacements),
+      trees_(trees != nullptr ? std::move(trees) : std::make_shared<KeptTrees>(false))
 {
-  device_ = rtcNewDevice(nullptr);
-  if (device_ == nullptr) {
-    if (rtcGetDeviceError(nullptr) == RTC_ERROR_OUT_OF_MEMORY) throw OutOfMemory("the start of Embree");
-    throw std::runtime_error("Embree cannot start on this machine");
-  }
-  rtcSetDeviceMemoryMonitorFunction(device_, count_bytes, &bytes_);
-  try {
-    build(scene, lights, area_lights, displacements);
-  } catch (...) {
-    release();
-    throw;
-  }
-}
-
-void Accel::build(const Scene& scene,
-                  std::span<const Light> lights,
-                  std::span<const std::uint32_t> area_lights,
-                  DisplacementSet& displacements)
-{
-  std::vector<int> uses(scene.meshes.size(), 0);
-  std::vector<char> transparent(scene.meshes.size(), 0);
+  for (std::size_t d = 0; d < displacements.size(); ++d) displacements.geometry(d).shadow_filter = nullptr;
+  meshes_.resize(scene.meshes.size());
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
     const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
@@ -216,106 +232,195 @@ void Accel::build(const Scene& scene,
         displacements.geometry(static_cast<std::size_t>(displaced)).shadow_filter = shadow_filter_;
       continue;
     }
-    const auto mesh = static_cast<std::size_t>(instance.mesh_index);
-    ++uses[mesh];
-    if (lets_light_through) transparent[mesh] = 1;
+    MeshUse& mesh = meshes_[static_cast<std::size_t>(instance.mesh_index)];
+    ++mesh.count;
+    mesh.transparent |= lets_light_through;
   }
+  build_displaced(displacements);
+  place_instances(scene, lights, area_lights);
+  build_meshes(scene);
+  build_top(scene, lights, area_lights);
+  top_ = scene_->top.get();
+  kept_ = trees_->end_scene();
+  target_ = ray_target_make(bounds());
+}
 
-  mesh_scenes_.assign(scene.meshes.size(), nullptr);
-  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
-    if (uses[m] < 2) continue;
-    // Spatial splits of HIGH quality would call the shadow filter twice for one triangle.
-    mesh_scenes_[m] = new_scene(transparent[m] != 0 ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
-    attach(mesh_scenes_[m], new_mesh(scene.meshes[m], nullptr, transparent[m] != 0), 0, ~0u);
-  }
+Accel::~Accel()
+{
+  if (trees_->keeps() && scene_ != nullptr && scene_->top != nullptr) trees_->put(std::move(scene_));
+}
 
+void Accel::build_displaced(DisplacementSet& displacements)
+{
   const TraversalTable& traversals = traversal_table_select();
-  displaced_scenes_.assign(displacements.size(), nullptr);
   for (std::size_t d = 0; d < displacements.size(); ++d) {
+    displaced_trees_.push_back(displacements.tree(d));
+    TreePointer& tree = displaced_trees_.back();
+    if (tree != nullptr) continue;
     DisplacedGeometry& displaced = displacements.geometry(d);
+    const auto start = std::chrono::steady_clock::now();
+    const std::uint64_t bytes_before = trees_->bytes();
     if (const Tessellation* tessellation = displacements.tessellation(d)) {
-      displaced_scenes_[d] = tessellation_scene_make(device_, kRenderTessellation);
-      RTCGeometry geometry = tessellation->geometry_make(device_);
+      tree = trees_->own(tessellation_scene_make(trees_->device(), kRenderTessellation));
+      RTCGeometry geometry = tessellation->geometry_make(trees_->device());
       rtcSetGeometryOccludedFilterFunction(geometry, displaced.shadow_filter);
-      attach(displaced_scenes_[d], geometry, 0, ~0u);
-    } else {
-      displaced_scenes_[d] = new_scene(RTC_BUILD_QUALITY_HIGH);
-      attach(displaced_scenes_[d], displaced_geometry_make(device_, displaced, traversals), 0, ~0u);
-      displaced.scene = displaced_scenes_[d];
+      attach(tree.get(), geometry, 0, ~0u);
+      commit(tree.get());
+      continue;
     }
-    commit(displaced_scenes_[d]);
+    tree = trees_->scene_make(RTC_BUILD_QUALITY_HIGH);
+    attach(tree.get(), displaced_geometry_make(trees_->device(), displaced, traversals), 0, ~0u);
+    commit(tree.get());
+    displaced.scene = tree.get();
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+    displacements.set_tree(d, tree, trees_->bytes() - bytes_before, seconds.count());
   }
+}
 
-  std::vector<Box3> mesh_boxes(scene.meshes.size());
-  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
-    if (mesh_scenes_[m] != nullptr) mesh_boxes[m] = points_box(scene.meshes[m].P, {});
+/// Prepares what stands in the scene as an instance, and finds how much boxes have to be enlarged.
+void Accel::place_instances(const Scene& scene,
+                            std::span<const Light> lights,
+                            std::span<const std::uint32_t> area_lights)
+{
+  for (std::size_t m = 0; m < meshes_.size(); ++m) {
+    if (meshes_[m].count >= 2) meshes_[m].box = points_box(scene.meshes[m].P, {});
   }
-
+  scene_ = std::make_unique<SceneTree>();
   Box3 box = box_empty();
-  instances_.resize(scene.instances.size());
+  scene_->instances.resize(scene.instances.size());
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
     const auto mesh = static_cast<std::size_t>(instance.mesh_index);
-    const int displaced = displacements.geometry_index(i);
+    const int displaced = displacements_->geometry_index(i);
     const auto d = static_cast<std::size_t>(displaced);
-    if (displaced < 0 && mesh_scenes_[mesh] == nullptr) {
+    if (displaced < 0 && meshes_[mesh].count < 2) {
       box = box_union(box, points_box(scene.meshes[mesh].P, instance.world_from_object));
       continue;
     }
-    instances_[i] = std::make_unique<InstanceGeometry>(instance_geometry_prepare(
-        displaced >= 0 ? displaced_scenes_[d] : mesh_scenes_[mesh],
-        displaced >= 0 ? displaced_bounds(d) : mesh_boxes[mesh], instance.world_from_object, &pad_));
-    box = box_union(box, instance_bounds(*instances_[i]));
+    // Trees of meshes come later: their boxes depend on the pad.
+    scene_->instances[i] = std::make_unique<InstanceGeometry>(instance_geometry_prepare(
+        displaced >= 0 ? displaced_trees_[d].get() : nullptr, displaced >= 0 ? displaced_bounds(d) : meshes_[mesh].box,
+        instance.world_from_object, &scene_->pad));
+    box = box_union(box, instance_bounds(*scene_->instances[i]));
   }
   for (const std::uint32_t index : area_lights) {
     const Light& light = lights[index];
     const Vec3f half = light_is_ball(light) ? splat3(light.radius) : abs(light.edge_u) + abs(light.edge_v);
     box = box_union(box, {light.P - half, light.P + half});
   }
-  if (box.low.x <= box.high.x) pad_ = ray_target_pad(ray_target_make(box));
+  if (box.low.x <= box.high.x) scene_->pad = power_of_two_above(ray_target_pad(ray_target_make(box)));
 
   // The boxes of Embree's own instances are as large as those of what they show.
-  std::vector<Vec3f> mesh_pads(scene.meshes.size());
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
-    if (instances_[i] == nullptr || displacements.geometry_index(i) >= 0 ||
-        !instance_is_accurate_in_single_precision(*instances_[i])) {
+    std::unique_ptr<InstanceGeometry>& instance = scene_->instances[i];
+    if (instance == nullptr || displacements_->geometry_index(i) >= 0 ||
+        !instance_is_accurate_in_single_precision(*instance)) {
       continue;
     }
-    Vec3f& pad = mesh_pads[static_cast<std::size_t>(scene.instances[i].mesh_index)];
-    pad = max(pad, instance_pad(*instances_[i]));
-    instances_[i].reset();
+    Vec3f& pad = meshes_[static_cast<std::size_t>(scene.instances[i].mesh_index)].pad;
+    pad = max(pad, splat3(steady_pad(*instance)));
+    instance.reset();
   }
-  for (std::size_t m = 0; m < scene.meshes.size(); ++m) {
-    if (mesh_scenes_[m] == nullptr) continue;
-    const Box3 padded{mesh_boxes[m].low - mesh_pads[m], mesh_boxes[m].high + mesh_pads[m]};
-    if (!is_zero(mesh_pads[m])) attach(mesh_scenes_[m], new_corners(padded), 1, 0);
-    commit(mesh_scenes_[m]);
-  }
+}
 
+void Accel::build_meshes(const Scene& scene)
+{
+  for (std::size_t m = 0; m < meshes_.size(); ++m) {
+    MeshUse& use = meshes_[m];
+    if (use.count < 2) continue;
+    const Mesh& mesh = scene.meshes[m];
+    ContentHash content;
+    if (trees_->keeps()) {
+      ContentHasher hash;
+      hash_triangles(mesh, &hash);
+      hash.add(use.transparent, use.pad.x, use.pad.y, use.pad.z);
+      content = hash.result();
+    }
+    use.tree = trees_->mesh_tree(content, [&] {
+      // Spatial splits of HIGH quality would call the shadow filter twice for one triangle.
+      TreePointer tree = trees_->scene_make(use.transparent ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
+      attach(tree.get(), new_mesh(mesh, nullptr, use.transparent), 0, ~0u);
+      const Box3 padded{use.box.low - use.pad, use.box.high + use.pad};
+      if (!is_zero(use.pad)) attach(tree.get(), new_corners(padded), 1, 0);
+      commit(tree.get());
+      return tree;
+    });
+  }
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    InstanceGeometry* const instance = scene_->instances[i].get();
+    if (instance == nullptr || displacements_->geometry_index(i) >= 0) continue;
+    instance->scene = meshes_[static_cast<std::size_t>(scene.instances[i].mesh_index)].tree.get();
+  }
+}
+
+/// All that build_top reads. Trees of parts are known by their places: a tree that is kept holds its parts.
+ContentHash Accel::top_content(const Scene& scene,
+                               std::span<const Light> lights,
+                               std::span<const std::uint32_t> area_lights) const
+{
+  ContentHasher hash;
+  hash.add(scene.instances.size(), area_lights.size(), scene_->pad);
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const Instance& instance = scene.instances[i];
+    const MeshUse& use = meshes_[static_cast<std::size_t>(instance.mesh_index)];
+    const int displaced = displacements_->geometry_index(i);
+    const bool is_in_place = displaced < 0 && use.tree == nullptr;
+    if (is_in_place) hash_triangles(scene.meshes[static_cast<std::size_t>(instance.mesh_index)], &hash);
+    hash.add(is_in_place, use.transparent,
+             displaced >= 0 ? displaced_trees_[static_cast<std::size_t>(displaced)].get() : use.tree.get(),
+             mask_of(instance.flags));
+    hash_transform(instance.world_from_object, &hash);
+  }
+  for (const std::uint32_t index : area_lights) {
+    const Light& light = lights[index];
+    hash.add(light.kind, light.visible_to_camera, light.radius);
+    for (const Vec3f v : {light.P, light.edge_u, light.edge_v}) hash.add(v.x, v.y, v.z);
+  }
+  return hash.result();
+}
+
+void Accel::build_top(const Scene& scene, std::span<const Light> lights, std::span<const std::uint32_t> area_lights)
+{
+  if (trees_->keeps()) {
+    scene_->content = top_content(scene, lights, area_lights);
+    if (std::unique_ptr<SceneTree> kept = trees_->take(scene_->content)) {
+      scene_ = std::move(kept);
+      return;
+    }
+  }
+  const auto start = std::chrono::steady_clock::now();
+  const std::uint64_t bytes_before = trees_->bytes();
   bool any_transparent = false;
-  for (std::size_t m = 0; m < scene.meshes.size(); ++m) any_transparent |= uses[m] == 1 && transparent[m] != 0;
-  top_ = new_scene(any_transparent ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
+  for (const MeshUse& mesh : meshes_) {
+    any_transparent |= mesh.count == 1 && mesh.transparent;
+    if (mesh.tree != nullptr) scene_->parts.push_back(mesh.tree);
+  }
+  scene_->parts.insert(scene_->parts.end(), displaced_trees_.begin(), displaced_trees_.end());
+  const TreePointer top = trees_->scene_make(any_transparent ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
     const auto mesh = static_cast<std::size_t>(instance.mesh_index);
-    attach(top_,
-           instances_[i] != nullptr ? instance_geometry_make(device_, *instances_[i])
-           : mesh_scenes_[mesh] != nullptr
-               ? new_instance(mesh_scenes_[mesh], instance.world_from_object)
-               : new_mesh(scene.meshes[mesh], &instance.world_from_object, transparent[mesh] != 0),
+    const bool is_in_place = displacements_->geometry_index(i) < 0 && meshes_[mesh].tree == nullptr;
+    scene_->num_in_place += is_in_place ? 1 : 0;
+    attach(top.get(),
+           scene_->instances[i] != nullptr ? instance_geometry_make(trees_->device(), *scene_->instances[i])
+           : !is_in_place                  ? new_instance(meshes_[mesh].tree.get(), instance.world_from_object)
+                          : new_mesh(scene.meshes[mesh], &instance.world_from_object, meshes_[mesh].transparent),
            static_cast<unsigned>(i), mask_of(instance.flags));
   }
   for (std::size_t i = 0; i < area_lights.size(); ++i) {
     const Light& light = lights[area_lights[i]];
-    attach(top_,
+    attach(top.get(),
            light.kind == LightKind::kRectangle ? new_rectangle(light)
            : light.kind == LightKind::kDisk    ? new_round(light, disk_bounds, disk_intersect)
                                                : new_round(light, ball_bounds, ball_intersect),
            static_cast<unsigned>(scene.instances.size() + i),
            kRayBounce | (light.visible_to_camera ? std::uint32_t{kRayCamera} : 0u));
   }
-  commit(top_);
-  target_ = ray_target_make(bounds());
+  commit(top.get());
+  scene_->top = top;
+  scene_->bytes = trees_->bytes() - bytes_before;
+  scene_->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 void Accel::intersect(EmbreeContext& context, RTCRayHit& ray) const
@@ -363,38 +468,16 @@ void Accel::occluded(EmbreeContext& context, RTCRay& ray) const
   if (near.tfar < 0.0f) ray.tfar = near.tfar;
 }
 
-Accel::~Accel() { release(); }
-
-void Accel::release()
-{
-  if (top_ != nullptr) rtcReleaseScene(top_);
-  for (RTCScene scene : mesh_scenes_) {
-    if (scene != nullptr) rtcReleaseScene(scene);
-  }
-  for (RTCScene scene : displaced_scenes_) {
-    if (scene != nullptr) rtcReleaseScene(scene);
-  }
-  if (device_ != nullptr) rtcReleaseDevice(device_);
-}
-
 Box3 Accel::bounds() const { return scene_bounds(top_); }
 
-Box3 Accel::displaced_bounds(std::size_t geometry) const { return scene_bounds(displaced_scenes_[geometry]); }
-
-RTCScene Accel::new_scene(RTCBuildQuality quality)
-{
-  RTCScene scene = rtcNewScene(device_);
-  rtcSetSceneBuildQuality(scene, quality);
-  rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
-  return scene;
-}
+Box3 Accel::displaced_bounds(std::size_t geometry) const { return scene_bounds(displaced_trees_[geometry].get()); }
 
 RTCGeometry Accel::new_mesh(const Mesh& mesh, const Affine3* world_from_object, bool transparent)
 {
-  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+  RTCGeometry geometry = rtcNewGeometry(trees_->device(), RTC_GEOMETRY_TYPE_TRIANGLE);
   const bool in_place = world_from_object == nullptr || is_identity(*world_from_object);
   // Embree reads 16 bytes a vertex, so a shared buffer needs room behind its last one.
-  if (in_place && mesh.P.capacity() > mesh.P.size()) {
+  if (in_place && !trees_->keeps() && mesh.P.capacity() > mesh.P.size()) {
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.P.data(), 0, sizeof(Vec3f),
                                mesh.P.size());
   } else {
@@ -405,8 +488,15 @@ RTCGeometry Accel::new_mesh(const Mesh& mesh, const Affine3* world_from_object, 
       vertices[i] = in_place ? mesh.P[i] : transform_point(*world_from_object, mesh.P[i]);
     }
   }
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
-                             sizeof(TriangleIndices), mesh.triangles.size());
+  if (!trees_->keeps()) {
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
+                               sizeof(TriangleIndices), mesh.triangles.size());
+  } else {
+    void* const indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                  sizeof(TriangleIndices), mesh.triangles.size());
+    if (indices == nullptr) throw OutOfMemory("the triangles of mesh '" + mesh.name + "'");
+    std::memcpy(indices, mesh.triangles.data(), mesh.triangles.size() * sizeof(TriangleIndices));
+  }
   if (transparent) rtcSetGeometryOccludedFilterFunction(geometry, shadow_filter_);
   return geometry;
 }
@@ -414,7 +504,7 @@ RTCGeometry Accel::new_mesh(const Mesh& mesh, const Affine3* world_from_object, 
 /// Two points that no ray hits, but that the box of a scene holds.
 RTCGeometry Accel::new_corners(const Box3& box)
 {
-  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
+  RTCGeometry geometry = rtcNewGeometry(trees_->device(), RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* vertices = static_cast<Vec3f*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), 2));
   auto* triangles = static_cast<TriangleIndices*>(
@@ -429,7 +519,7 @@ RTCGeometry Accel::new_corners(const Box3& box)
 
 RTCGeometry Accel::new_instance(RTCScene instanced, const Affine3& m)
 {
-  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_INSTANCE);
+  RTCGeometry geometry = rtcNewGeometry(trees_->device(), RTC_GEOMETRY_TYPE_INSTANCE);
   rtcSetGeometryInstancedScene(geometry, instanced);
   const float columns[12] = {m.x.x, m.x.y, m.x.z, m.y.x, m.y.y, m.y.z, m.z.x, m.z.y, m.z.z, m.p.x, m.p.y, m.p.z};
   rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
@@ -438,7 +528,7 @@ RTCGeometry Accel::new_instance(RTCScene instanced, const Affine3& m)
 
 RTCGeometry Accel::new_rectangle(const Light& light)
 {
-  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_QUAD);
+  RTCGeometry geometry = rtcNewGeometry(trees_->device(), RTC_GEOMETRY_TYPE_QUAD);
   auto* vertices = static_cast<Vec3f*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), 4));
   auto* indices = static_cast<std::uint32_t*>(
@@ -454,10 +544,10 @@ RTCGeometry Accel::new_rectangle(const Light& light)
 
 RTCGeometry Accel::new_round(const Light& light, RTCBoundsFunction bounds_of, RTCIntersectFunctionN intersect_of)
 {
-  RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_USER);
-  round_lights_.push_back(std::make_unique<Light>(light));
+  RTCGeometry geometry = rtcNewGeometry(trees_->device(), RTC_GEOMETRY_TYPE_USER);
+  scene_->round_lights.push_back(std::make_unique<Light>(light));
   rtcSetGeometryUserPrimitiveCount(geometry, 1);
-  rtcSetGeometryUserData(geometry, round_lights_.back().get());
+  rtcSetGeometryUserData(geometry, scene_->round_lights.back().get());
   rtcSetGeometryBoundsFunction(geometry, bounds_of, nullptr);
   rtcSetGeometryIntersectFunction(geometry, intersect_of);
   rtcSetGeometryOccludedFunction(geometry, light_occluded);
@@ -475,7 +565,7 @@ void Accel::attach(RTCScene target, RTCGeometry geometry, unsigned id, std::uint
 void Accel::commit(RTCScene target)
 {
   rtcCommitScene(target);
-  const RTCError error = rtcGetDeviceError(device_);
+  const RTCError error = rtcGetDeviceError(trees_->device());
   if (error == RTC_ERROR_NONE) return;
   if (error == RTC_ERROR_OUT_OF_MEMORY) throw OutOfMemory("the acceleration structure");
   throw std::runtime_error("Embree failed to build the acceleration structure (error " +

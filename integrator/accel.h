@@ -2,7 +2,6 @@
 // (or instance) number is the object index of the path state.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -11,7 +10,7 @@
 #include "displacement/displacement_set.h"
 #include "displacement/embree.h"
 #include "displacement/far_ray.h"
-#include "integrator/instance_geometry.h"
+#include "integrator/kept_trees.h"
 #include "kernel/light/light.h"
 #include "kernel/math/rounding.h"
 #include "kernel/photon/box_aim.h"
@@ -27,16 +26,19 @@ enum RayMask : std::uint32_t { kRayCamera = 1u << 0, kRayBounce = 1u << 1, kRayS
 /// those of instance_geometry.h.
 class Accel {
  public:
-  /// @param scene         must outlive the Accel: vertex and index buffers are shared where they can be
+  /// @param scene         must outlive the Accel: if no trees are kept, buffers are shared where they can be
   /// @param lights        of which `area_lights` picks those that rays can hit; object num_instances + i is area_lights[i]
   /// @param displacements of the scene; must outlive the Accel
   /// @param shadow_filter called for hits of shadow rays on surfaces that may let light through
+  /// @param trees         of the scenes before, and where those of this one stay; null: none are kept
   /// @error std::runtime_error with Embree's message when the build fails (out of memory)
   Accel(const Scene& scene,
         std::span<const Light> lights,
         std::span<const std::uint32_t> area_lights,
         DisplacementSet& displacements,
-        RTCFilterFunctionN shadow_filter);
+        RTCFilterFunctionN shadow_filter,
+        std::shared_ptr<KeptTrees> trees = nullptr);
+  /// Leaves its trees to the scenes after, if they are kept.
   ~Accel();
   Accel(const Accel&) = delete;
   Accel& operator=(const Accel&) = delete;
@@ -52,34 +54,43 @@ class Accel {
   const DisplacementSet& displacements() const { return *displacements_; }
   Box3 bounds() const;                                ///< of all that rays can hit, world
   Box3 displaced_bounds(std::size_t geometry) const;  ///< of a displaced geometry's prisms or triangles, object space
-  std::size_t bytes() const { return static_cast<std::size_t>(bytes_.load()); }  ///< allocated by Embree
+  std::size_t bytes() const { return trees_->bytes(); }   ///< allocated by Embree
+  const KeptTrees::Tally& kept() const { return kept_; }  ///< of the scenes before
 
  private:
-  RTCScene new_scene(RTCBuildQuality quality);
+  void place_instances(const Scene& scene, std::span<const Light> lights, std::span<const std::uint32_t> area_lights);
+  void build_meshes(const Scene& scene);
+  void build_displaced(DisplacementSet& displacements);
+  void build_top(const Scene& scene, std::span<const Light> lights, std::span<const std::uint32_t> area_lights);
+  ContentHash top_content(const Scene& scene,
+                          std::span<const Light> lights,
+                          std::span<const std::uint32_t> area_lights) const;
   RTCGeometry new_mesh(const Mesh& mesh, const Affine3* world_from_object, bool transparent);
   RTCGeometry new_corners(const Box3& box);
   RTCGeometry new_instance(RTCScene instanced, const Affine3& world_from_object);
   RTCGeometry new_rectangle(const Light& light);
   RTCGeometry new_round(const Light& light, RTCBoundsFunction bounds_of, RTCIntersectFunctionN intersect_of);
-  void build(const Scene& scene,
-             std::span<const Light> lights,
-             std::span<const std::uint32_t> area_lights,
-             DisplacementSet& displacements);
-  void release();
   void attach(RTCScene target, RTCGeometry geometry, unsigned id, std::uint32_t mask);
   void commit(RTCScene target);
 
-  std::atomic<std::ptrdiff_t> bytes_{0};
+  /// What a mesh needs of a tree of its own.
+  struct MeshUse {
+    int count = 0;             ///< of instances that are not displaced
+    bool transparent = false;  ///< one of them
+    Box3 box;                  ///< object space; of meshes with more than one
+    Vec3f pad;                 ///< by which it is enlarged
+    TreePointer tree;          ///< null: it occurs once and is in place
+  };
+
   RTCFilterFunctionN shadow_filter_;
   const DisplacementSet* displacements_;
-  RayTarget target_;                                          ///< all that rays can hit, world
-  float pad_ = 0;                                             ///< of its boxes, metres
-  std::vector<std::unique_ptr<InstanceGeometry>> instances_;  ///< an instance; null: in place, or Embree's own
-  RTCDevice device_ = nullptr;
-  RTCScene top_ = nullptr;
-  std::vector<RTCScene> mesh_scenes_;                 ///< null for meshes that occur once
-  std::vector<RTCScene> displaced_scenes_;            ///< a displaced geometry
-  std::vector<std::unique_ptr<Light>> round_lights_;  ///< user data of disks and balls: stable addresses
+  std::shared_ptr<KeptTrees> trees_;
+  KeptTrees::Tally kept_;
+  RayTarget target_;                          ///< all that rays can hit, world
+  std::vector<MeshUse> meshes_;               ///< a mesh of the scene
+  std::vector<TreePointer> displaced_trees_;  ///< a displaced geometry
+  std::unique_ptr<SceneTree> scene_;
+  RTCScene top_ = nullptr;  ///< of scene_
 };
 
 }  // namespace relief

@@ -144,16 +144,25 @@ FilmWindow render_window(const RenderOptions& options)
   return {options.crop_x0, options.crop_y0, options.crop_x1 - options.crop_x0, options.crop_y1 - options.crop_y0};
 }
 
-SceneContext render_context(const Scene& scene, const RenderOptions& options)
+namespace {
+
+/// How a render's context is made.
+ContextOptions context_options(const RenderOptions& options)
 {
   DisplacementOptions displacement = options.displacement;
   displacement.num_rays = expected_rays(options.settings);
   displacement.camera = options.camera;
   displacement.picture_height = options.settings.height;
   const bool light_sampling_alone = options.light_technique == LightTechnique::kLightSampling;
-  return SceneContext(scene, displacement,
-                      light_sampling_alone ? EnvironmentDensity::kRadiance : EnvironmentDensity::kExcess,
-                      options.settings.caustics);
+  return {displacement, light_sampling_alone ? EnvironmentDensity::kRadiance : EnvironmentDensity::kExcess,
+          options.settings.caustics.mode, options.trees};
+}
+
+}  // namespace
+
+SceneContext render_context(const Scene& scene, const RenderOptions& options)
+{
+  return context_make(scene, context_options(options));
 }
 
 KernelGlobals render_globals(const SceneContext& context, const RenderOptions& options, const FilterTable& filter)
@@ -297,6 +306,24 @@ void fill_work(Statistics& stats, const Workers& workers, bool caustics, const F
   if (work.first_nonfinite != kNoSample) stats.first_nonfinite = pixel_sample(work.first_nonfinite, window);
 }
 
+/// What of the context was there before.
+void fill_kept(KeptStatistics& stats, const KeptContext& kept, const SceneContext& context)
+{
+  stats.preparation = kept.is_kept();
+  if (kept.is_kept()) {
+    stats.bytes += context.accel->bytes() + context.lights.bytes() + context.displacements.bytes();
+    stats.seconds += kept.seconds();
+    return;
+  }
+  const HeightFields::Tally& fields = context.displacements.kept();
+  const KeptMeshes::Tally& displaced = context.displacements.kept_meshes();
+  const KeptTrees::Tally& trees = context.accel->kept();
+  stats.height_fields += fields.count;
+  stats.meshes += displaced.count + trees.count;
+  stats.bytes += fields.bytes + displaced.bytes + trees.bytes;
+  stats.seconds += fields.seconds + displaced.seconds + trees.seconds;
+}
+
 }  // namespace
 
 RenderedImage render(const Scene& scene,
@@ -305,9 +332,20 @@ RenderedImage render(const Scene& scene,
                      const std::function<void(const RenderProgress&)>& progress,
                      Statistics& stats)
 {
+  KeptContext nothing;
+  return render(scene, options, stop, progress, nothing, stats);
+}
+
+RenderedImage render(const Scene& scene,
+                     const RenderOptions& options,
+                     const std::atomic<bool>& stop,
+                     const std::function<void(const RenderProgress&)>& progress,
+                     KeptContext& kept,
+                     Statistics& stats)
+{
   const Clock::time_point build_start = Clock::now();
   const RenderSettings& settings = options.settings;
-  SceneContext context = render_context(scene, options);
+  const SceneContext& context = kept.get(scene, context_options(options));
   for (std::string& text : context.displacements.warnings()) stats.warnings.push_back(std::move(text));
   const StageTable& stages = stage_table_select();
 
@@ -469,6 +507,7 @@ RenderedImage render(const Scene& scene,
   stats.caustics.reason = context.caustics_reason;
   if (photons) photons->fill(stats.caustics);
   context.fill(stats);
+  fill_kept(stats.kept, kept, context);
   fill_film(stats, film, settings);
   if (options.keeps_errors) stats.errors = std::move(errors).finish(stats);
   fill_work(stats, workers, caustics, window);

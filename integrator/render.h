@@ -6,6 +6,7 @@
 #include <span>
 
 #include "integrator/film.h"
+#include "integrator/kept_context.h"
 #include "integrator/scene_context.h"
 #include "integrator/stages.h"
 #include "kernel/statistics.h"
@@ -25,6 +26,7 @@ struct RenderOptions {
   std::uint32_t aov_mask = 1;
   LightTechnique light_technique = LightTechnique::kMis;
   DisplacementOptions displacement;
+  std::shared_ptr<KeptTrees> trees;  ///< of the scenes before; null: none are kept
   /// Gets the beauty so far and its samples a pixel, soon after the start and then as often as takes a hundredth of the
   /// time, at most twice a second; may be empty. Sampling waits meanwhile. The picture is the same with it, if no time limit counts what it takes.
   std::function<void(const FilmView&, double)> preview;
@@ -65,8 +67,16 @@ Batch tile_batch(const Film& film, int tile, std::uint32_t first_sample, std::ui
 
 /// Renders; returns what was sampled when `stop` became true. Tiles that are searching displaced meshes then are dropped.
 /// @param progress  called a few times a second from any thread, one call at a time; may be empty
+/// @param kept      what was built of this scene before; what is built now stays in it
 /// @param stats     filled but for what only the caller knows (scene, version, load_seconds, warnings)
 /// @error std::runtime_error out of memory and the like
+RenderedImage render(const Scene& scene,
+                     const RenderOptions& options,
+                     const std::atomic<bool>& stop,
+                     const std::function<void(const RenderProgress&)>& progress,
+                     KeptContext& kept,
+                     Statistics& stats);
+/// The same with nothing kept.
 RenderedImage render(const Scene& scene,
                      const RenderOptions& options,
                      const std::atomic<bool>& stop,

@@ -74,7 +74,8 @@ bool has_tails(const Material& m, bool caster)
 SceneContext::SceneContext(const Scene& loaded,
                            const DisplacementOptions& displacement,
                            EnvironmentDensity environment_density,
-                           const CausticSettings& caustics)
+                           const CausticSettings& caustics,
+                           std::shared_ptr<KeptTrees> trees)
     : SceneViews(loaded),
       scene(loaded),
       bsdf_tables(std::make_unique<BsdfTables>()),
@@ -104,7 +105,8 @@ SceneContext::SceneContext(const Scene& loaded,
     surface_kernel.push_back(static_cast<std::uint8_t>(surface_kernel_index(material, decision.enabled)));
   }
   bsdf_tables_make(*bsdf_tables, features);
-  accel = std::make_unique<Accel>(scene, lights.lights, lights.area_lights, displacements, shadow_filter);
+  accel =
+      std::make_unique<Accel>(scene, lights.lights, lights.area_lights, displacements, shadow_filter, std::move(trees));
 
   globals.graph_scene.rays = graph_rays_make(*accel);
   globals.area_light_index = lights.area_lights.data();
@@ -155,10 +157,6 @@ void SceneContext::fill(Statistics& stats) const
                         height_map_bytes(scene.height_maps),
                         0,
                         displacements.reasons()};
-  const HeightFields::Tally& fields = displacements.kept();
-  stats.kept.height_fields += fields.count;
-  stats.kept.bytes += fields.bytes;
-  stats.kept.seconds += fields.seconds;
 }
 
 }  // namespace relief

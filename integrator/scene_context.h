@@ -20,11 +20,13 @@ namespace relief {
 struct SceneContext : SceneViews {
   /// @param loaded               must outlive the context
   /// @param environment_density  kRadiance for LightTechnique::kLightSampling, which has no other way to the light
+  /// @param trees                see Accel
   /// @error std::runtime_error out of memory and the like
   explicit SceneContext(const Scene& loaded,
                         const DisplacementOptions& displacement = {},
                         EnvironmentDensity environment_density = EnvironmentDensity::kExcess,
-                        const CausticSettings& caustics = {CausticsMode::kOff});
+                        const CausticSettings& caustics = {CausticsMode::kOff},
+                        std::shared_ptr<KeptTrees> trees = nullptr);
 
   /// Bytes by part.
   void fill(Statistics& stats) const;

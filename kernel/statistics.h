@@ -41,7 +41,10 @@ struct CausticStatistics {
 struct KeptStatistics {
   std::uint64_t images = 0;         ///< textures and height maps
   std::uint64_t height_fields = 0;  ///< levels of height maps with their bounds and tables
-  std::uint64_t bytes = 0;          ///< of both
+  std::uint64_t meshes = 0;         ///< that have trees or prisms of their own
+  bool scene = false;               ///< all that was loaded: the counts of the others are 0 then
+  bool preparation = false;         ///< all that was built of the scene, likewise
+  std::uint64_t bytes = 0;          ///< of all that
   double seconds = 0;               ///< that making them took, summed over those made side by side
 };
 

@@ -18,6 +18,8 @@ struct EnvironmentChoice {
   EnvironmentSource source = EnvironmentSource::kStudio;
   std::string file;    ///< kFile: a lat-long image
   float strength = 1;  ///< factor of its radiance
+
+  bool operator==(const EnvironmentChoice&) const = default;
 };
 
 /// A lat-long map as RELIEF_environment has it: its centre looks along −Z.

@@ -14,6 +14,8 @@ struct CameraChoice {
   std::optional<Vec3f> look_at;    ///< empty: the middle of everything; used only with look_from
   double fov = 0;                  ///< vertical field of view in degrees, of a camera that is made here; 0: 40
   float image_aspect = 0;          ///< width / height; 0: of the scene's resolution
+
+  bool operator==(const CameraChoice&) const = default;
 };
 
 /// Right-handed orthonormal frame that looks along −z, its y as near as possible to `up`.

@@ -596,6 +596,7 @@ void GltfLoader::set_camera(const LoadOptions& options)
     return;
   }
   if (!choice.look_from && !scene_.cameras.empty()) return;
+  if (options.needs_camera) throw SceneError(scene_.file, "/nodes", "one with a camera", "none");
   // Heights of float maps may be anything.
   load_height_maps(scene_, height_maps_.take(), height_graphs_.take(), options.kept, warnings_);
   std::vector<float> reach_of;

@@ -17,11 +17,14 @@ struct LoadOptions {
   double frame = 0;        ///< animation time in frames; used only if `has_frame`
   bool has_frame = false;  ///< false: rest pose
   CameraChoice camera;
+  bool needs_camera = false;  ///< it is an error if the file has none
   float luminous_efficacy = 0;                              ///< lm/W of the scene's lights; 0: the scene says
   std::optional<EnvironmentChoice> environment;             ///< empty: the scene's
   std::optional<bool> environment_visible;                  ///< to cameras; empty: as the environment has it
   std::size_t texture_budget_bytes = std::size_t{4} << 30;  ///< above it textures go through a tile cache
   KeptImages* kept = nullptr;                               ///< of the frames before; gets this frame's
+
+  bool operator==(const LoadOptions&) const = default;
 };
 
 /// Loads, composes, validates and resolves a scene.

@@ -132,6 +132,8 @@ MemoryLimit memory_limit()
 
 void memory_limit_set(std::uint64_t bytes) { limit_by_option = std::max<std::uint64_t>(bytes, 1); }
 
+void memory_limit_reset() { limit_by_option = 0; }
+
 std::uint64_t memory_left()
 {
   const Used used = memory_used();

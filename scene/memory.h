@@ -34,6 +34,8 @@ MemoryLimit memory_limit();
 
 /// Sets the limit in the place of the machine's and the control groups'. Before other threads ask.
 void memory_limit_set(std::uint64_t bytes);
+/// Takes that back.
+void memory_limit_reset();
 
 /// What the control groups of a process allow, the least of its own and those above it.
 /// @param root  folder in which proc/self and sys/fs/cgroup are; "/" but for tests

@@ -20,13 +20,13 @@ TEST(StatsJson, HasEveryKeyThatProgramsReadAndEveryCounter)
   statistics.counters.shadow_rays = 300;
   statistics.stages = {{"shade_surface", 1.5}};
   statistics.warnings = {"a", "b"};
-  statistics.kept = {3, 2, 400, 5};
+  statistics.kept = {3, 2, 7, true, false, 400, 5};
   const nlohmann::json json = nlohmann::json::parse(stats_json(statistics));
   EXPECT_EQ(json["load_seconds"], 1);
   EXPECT_EQ(json["build_seconds"], 2);
   EXPECT_EQ(json["render_seconds"], 4);
   EXPECT_EQ(json["samples_per_pixel"], 16);
-  EXPECT_EQ(json["kept"], (nlohmann::json{{"images", 3}, {"height_fields", 2}, {"bytes", 400}, {"seconds", 5.0}}));
+  EXPECT_EQ(json["kept"], (nlohmann::json{{"images", 3}, {"height_fields", 2}, {"meshes", 7}, {"scene", true}, {"preparation", false}, {"bytes", 400}, {"seconds", 5.0}}));
   EXPECT_EQ(json["peak_memory_bytes"], 123);
   EXPECT_EQ(json["rays"]["camera"], 100);
   EXPECT_EQ(json["rays"]["bounce"], 200);

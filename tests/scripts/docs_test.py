@@ -226,7 +226,8 @@ class Docs(unittest.TestCase):
                 if line is None or not self.has_inputs(line, folder):
                     continue
                 ran += 1
-                run = subprocess.run([program, *line], cwd=folder, capture_output=True, text=True, timeout=300, check=False)
+                run = subprocess.run([program, *line], cwd=folder, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                                     timeout=300, check=False)  # fmt: skip
                 if run.returncode != 0:
                     wrong.append(f"{place}: {command}\n    relief {shlex.join(line)}\n    {run.stderr.strip()}")
         self.assert_none(wrong)

@@ -1,0 +1,126 @@
+#include "cli/requests.h"
+
+#include <array>
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include <poll.h>
+#include <unistd.h>
+
+#include "cli/failure.h"
+#include "cli/interrupt.h"
+#include "cli/standard_streams.h"
+
+namespace relief {
+
+namespace {
+
+constexpr const char* kExpected =
+    R"(expected {"id": NUMBER OR TEXT, "render": ["SCENE", "-o", "FILE.exr", …]} or {"cancel": ID})";
+
+/// @param id  null: it is not known whose mistake it is
+void answer_mistake(const nlohmann::json& id, const std::string& text)
+{
+  print_json({{"event", "end"}, {"id", id}, {"exit_code", static_cast<int>(kUsage)}, {"error", text}});
+}
+
+bool is_id(const nlohmann::json& value) { return value.is_string() || value.is_number(); }
+
+bool is_request(const nlohmann::json& object)
+{
+  if (object.size() != 2 || !object.contains("id") || !object.contains("render") || !is_id(object["id"])) return false;
+  const nlohmann::json& words = object["render"];
+  bool are_texts = words.is_array();
+  for (const nlohmann::json& word : words) are_texts = are_texts && word.is_string();
+  return are_texts;
+}
+
+}  // namespace
+
+Requests::Requests()
+{
+  if (::pipe(wake_) != 0) throw std::system_error(errno, std::generic_category(), "a pipe");
+  thread_ = std::thread([this] { read(); });
+}
+
+Requests::~Requests()
+{
+  ::close(wake_[1]);
+  thread_.join();
+  ::close(wake_[0]);
+}
+
+std::optional<Request> Requests::next()
+{
+  std::unique_lock lock(mutex_);
+  at_work_ = nullptr;
+  interrupt_rest();
+  if (interrupt_by_signal()) return {};
+  changed_.wait(lock, [this] { return !waiting_.empty() || has_ended_; });
+  if (waiting_.empty()) return {};
+  Request request = std::move(waiting_.front());
+  waiting_.pop_front();
+  at_work_ = request.id;
+  interrupt_begin();
+  if (!waiting_.empty() || has_ended_) interrupt_request();
+  return request;
+}
+
+void Requests::read()
+{
+  std::string text;
+  std::array<char, 1 << 16> block;
+  while (true) {
+    std::array<pollfd, 2> sources = {{{STDIN_FILENO, POLLIN, 0}, {wake_[0], POLLIN, 0}}};
+    if (::poll(sources.data(), sources.size(), -1) < 0 && errno == EINTR) continue;
+    if (sources[1].revents != 0) return;
+    const ssize_t size = ::read(STDIN_FILENO, block.data(), block.size());
+    if (size < 0 && errno == EINTR) continue;
+    if (size <= 0) break;
+    text.append(block.data(), static_cast<std::size_t>(size));
+    std::size_t begin = 0;
+    for (std::size_t end = 0; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1) {
+      take(text.substr(begin, end - begin));
+    }
+    text.erase(0, begin);
+  }
+  if (!text.empty()) take(text);
+  end();
+}
+
+void Requests::take(const std::string& line)
+{
+  const nlohmann::json object = nlohmann::json::parse(line, nullptr, false);
+  const bool is_cancel = object.is_object() && object.size() == 1 && object.contains("cancel");
+  if (is_cancel && is_id(object["cancel"])) {
+    const std::lock_guard lock(mutex_);
+    // One that has ended has been answered: the two have crossed on the way.
+    if (object["cancel"] == at_work_) interrupt_request();
+    std::erase_if(waiting_, [&](const Request& request) {
+      const bool is_meant = request.id == object["cancel"];
+      if (is_meant) print_json({{"event", "end"}, {"id", request.id}, {"exit_code", static_cast<int>(kInterrupted)}});
+      return is_meant;
+    });
+    return;
+  }
+  if (!object.is_object() || !is_request(object)) {
+    const bool has_id = object.is_object() && object.contains("id") && is_id(object["id"]);
+    answer_mistake(has_id ? object["id"] : nlohmann::json(), kExpected);
+    return;
+  }
+  const std::lock_guard lock(mutex_);
+  waiting_.push_back({object["id"], object["render"].get<std::vector<std::string>>()});
+  if (!at_work_.is_null()) interrupt_request();
+  changed_.notify_one();
+}
+
+void Requests::end()
+{
+  const std::lock_guard lock(mutex_);
+  has_ended_ = true;
+  if (!at_work_.is_null()) interrupt_request();
+  changed_.notify_one();
+}
+
+}  // namespace relief

@@ -1,0 +1,63 @@
+#include "integrator/kept_context.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+
+namespace relief {
+
+namespace {
+
+bool is_same(const std::optional<RmipOptions>& a, const std::optional<RmipOptions>& b)
+{
+  if (!a || !b) return a.has_value() == b.has_value();
+  // All fields, or this does not compile.
+  const auto& [scale, inversion, resolution, split, leaf] = *a;
+  return scale == b->marching_scale && inversion == b->reduce_by_inversion && resolution == b->resolution &&
+         split == b->split && leaf == b->leaf;
+}
+
+/// May take equal cameras for different ones, by the bytes between their fields.
+bool is_same(const std::optional<Camera>& a, const std::optional<Camera>& b)
+{
+  if (!a || !b) return a.has_value() == b.has_value();
+  return std::memcmp(&*a, &*b, sizeof *a) == 0;
+}
+
+/// Whether a scene's displaced meshes are prepared alike.
+bool is_same(const Scene& scene, const DisplacementOptions& a, const DisplacementOptions& b)
+{
+  // All fields, or this does not compile.
+  const auto& [method, lod, rmip, rate, auto_bytes, camera, height, num_rays, computed_bytes, fields, meshes,
+               tessellation_bytes] = a;
+  const bool follows_camera = std::any_of(scene.displacements.begin(), scene.displacements.end(),
+                                          [](const DisplacementSettings& d) { return displacement_is_computed(d); });
+  return method == b.method && lod == b.lod && is_same(rmip, b.rmip) && rate == b.tessellation_rate &&
+         auto_bytes == b.auto_bytes && computed_bytes == b.computed_bytes && fields == b.fields && meshes == b.meshes &&
+         tessellation_bytes == b.tessellation_bytes && (auto_bytes == 0 || num_rays == b.num_rays) &&
+         (!follows_camera || (is_same(camera, b.camera) && height == b.picture_height));
+}
+
+}  // namespace
+
+SceneContext context_make(const Scene& scene, const ContextOptions& options)
+{
+  CausticSettings caustics;
+  caustics.mode = options.caustics;
+  return SceneContext(scene, options.displacement, options.environment_density, caustics, options.trees);
+}
+
+const SceneContext& KeptContext::get(const Scene& scene, const ContextOptions& options)
+{
+  is_kept_ = made_ != nullptr && is_same(scene, made_->options.displacement, options.displacement) &&
+             made_->options.environment_density == options.environment_density &&
+             made_->options.caustics == options.caustics && made_->options.trees == options.trees;
+  if (is_kept_) return made_->context;
+  made_.reset();
+  const auto start = std::chrono::steady_clock::now();
+  made_.reset(new Made{options, context_make(scene, options)});
+  seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return made_->context;
+}
+
+}  // namespace relief
