@@ -2,7 +2,7 @@
 """Blender's side of relief: a render engine that writes the scene format and runs the `relief` program.
 
 Read in this order: engine.py (what Blender calls), export/scene.py (from Blender's data to a scene file), process.py
-(the program), result.py (its picture back into Blender). What differs between versions of Blender is in compat.py.
+and server.py (the program), result.py (its picture back into Blender). What differs between versions of Blender is in compat.py.
 """
 
 import sys

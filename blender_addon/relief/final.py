@@ -10,13 +10,15 @@ import numpy as np
 
 from . import exr, report, result, session
 from .export.camera import camera_json
-from .export.scene import DATA_FOLDER, View, export_scene
+from .export.scene import DATA_FOLDER, View, export_scene, write_view
 from .export.settings import sampling_of, warn_unread_settings
 from .preferences import find_checked_binary
-from .process import Process
 from .report import ReliefError, Report, say
 
 _POLL_SECONDS = 0.05
+
+#: How long the program may take to save what it has when the artist cancels.
+_PATIENCE_SECONDS = 5.0
 
 #: Part of the time that pictures may take that are shown while rendering, and seconds more for the first ones.
 _PREVIEW_SHARE, _FIRST_PREVIEW_SECONDS = 0.02, 0.5
@@ -41,7 +43,9 @@ def render(engine, depsgraph):
     result.warn_missing_passes(depsgraph.view_layer, warnings)
 
     engine.update_stats("", "Exporting")
-    exported = export_scene(depsgraph, view, folder, "scene.gltf", warnings)
+    # The view has a file of its own: where it alone moves, the program keeps all that it has loaded and built.
+    exported = export_scene(depsgraph, any_view(view.size), folder, "scene.gltf", warnings)
+    view_path = write_view(view, folder, "view.gltf")
     session.remove_stale(os.path.join(folder, DATA_FOLDER), exported.used_files)
     known = set(warnings.warnings)
     report.last_coverage[scene.name] = warnings.coverage
@@ -49,8 +53,8 @@ def render(engine, depsgraph):
 
     aovs = result.aov_list(passes, exported.has_holdouts and not scene.render.film_transparent)
     picture_path, stats_path = os.path.join(folder, "picture.exr"), os.path.join(folder, "stats.json")
-    arguments = [binary, "render", exported.path, "-o", picture_path, "--stats", stats_path]
-    arguments += ["--progress", "json", "--compression", "none", "--float", "--aov", aovs]
+    arguments = [exported.path, "--camera-from", view_path, "-o", picture_path, "--stats", stats_path]
+    arguments += ["--compression", "none", "--float", "--aov", aovs]
     arguments += command_line(scene, crop)
     if scene.relief.denoise != "none":
         arguments += ["--denoise", scene.relief.denoise]
@@ -60,14 +64,14 @@ def render(engine, depsgraph):
         arguments += ["--preview", preview_path]
         preview = _Preview(preview_path, lambda p: result.show(engine, p, layer_name, scene.render.film_transparent))
     try:
-        _run(engine, arguments, warnings, preview)
+        _run(engine, binary, arguments, warnings, preview)
         report.publish(scene.name, warnings.warnings, known)
         if not os.path.exists(picture_path):  # cancelled before the first sample
             return
         picture = exr.read(picture_path)
         statistics = _read_statistics(stats_path)
     finally:
-        for path in (picture_path, stats_path, exported.path, preview.path if preview else ""):
+        for path in (picture_path, stats_path, preview.path if preview else ""):
             if os.path.exists(path):
                 os.remove(path)
     seconds = {"export": exported.seconds, "total": time.perf_counter() - begin}
@@ -106,19 +110,20 @@ class _Preview:
         self._spent += time.thread_time() - begin
 
 
-def _run(engine, arguments, warnings, preview=None):
-    """Runs the program to its end, or to the artist's cancelling.
+def _run(engine, binary, arguments, warnings, preview=None):
+    """Has the program render to the end, or to the artist's cancelling.
 
+    @param  arguments  after `relief render`
     @param  warnings  Report that gets the program's own
     @param  preview   _Preview, or None where nobody looks
     @error            ReliefError if it failed by itself
     """
-    with Process(arguments) as process:
-        code = _follow(engine, process, preview)
-        if code != 0 and not engine.test_break():
-            raise ReliefError(process.failure(code))
-        for text in process.warnings():
-            warnings.warn("program", text)
+    request = session.render_server().ask(binary, arguments)
+    _follow(engine, request, preview)
+    if request.code != 0 and not engine.test_break():
+        raise ReliefError(request.failure())
+    for text in request.warnings:
+        warnings.warn("program", text)
 
 
 def command_line(scene, crop=None):
@@ -149,6 +154,11 @@ def focus_distance(camera_object, matrix, depsgraph):
     target = dof.focus_object.evaluated_get(depsgraph).matrix_world.translation
     axis = matrix.to_3x3().col[2].normalized()
     return abs((target - matrix.translation).dot(axis))
+
+
+def any_view(size):
+    """A View that stands in a scene's file where the camera has one of its own: the same wherever one looks from."""
+    return View({"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.1}}, np.eye(4).tolist(), size)
 
 
 def view_of(engine, depsgraph, warnings):
@@ -188,11 +198,11 @@ def warn_unread(scene, warnings):
     warn_unread_settings(scene, lambda *text: warnings.warn(where, *text))
 
 
-def _follow(engine, process, preview):
-    """Shows progress until the program ends; ends it if the artist cancels. Returns its exit code."""
+def _follow(engine, request, preview):
+    """Shows progress until the request ends; ends it if the artist cancels."""
     engine.update_stats("", "Loading")
-    while (code := process.wait(_POLL_SECONDS)) is None:
-        for event in process.events():
+    while request.code is None:
+        for event in request.events(_POLL_SECONDS):
             if event.get("event") == "preview" and preview is not None:
                 preview.refresh()
             if event.get("event") == "progress":
@@ -202,9 +212,20 @@ def _follow(engine, process, preview):
                 rays = event.get("rays_per_second") or 0
                 photons = f" | {event['photons'] / 1e6:.1f} M photons" if event.get("photons") else ""
                 engine.update_stats("", f"Sample {event['samples']:g}{photons} | {rays / 1e6:.1f} Mrays/s{remaining}")
-        if engine.test_break():
-            return process.end()
-    return code
+        if request.code is None and engine.test_break():
+            _cancel(request)
+            return
+
+
+def _cancel(request):
+    """Waits for what the program saves of a picture; ends a program that takes too long over it."""
+    request.cancel()
+    end = time.monotonic() + _PATIENCE_SECONDS
+    while request.code is None:
+        if time.monotonic() > end:
+            session.render_server().stop()
+            return
+        request.events(_POLL_SECONDS)
 
 
 def _read_statistics(path):

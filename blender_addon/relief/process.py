@@ -67,17 +67,18 @@ def check_version(binary):
 class Process:
     """One running program. Use as a context manager: leaving the block ends it, whatever happened.
 
-    @param  arguments  command line, the program first
+    @param  arguments    command line, the program first
+    @param  takes_input  there is something to say to it
     """
 
-    def __init__(self, arguments):
+    def __init__(self, arguments, takes_input=False):
         self._events = queue.SimpleQueue()
         self._messages = []
         try:
             # A session of its own: Ctrl-C in Blender's terminal reaches Blender alone, which then ends the program.
             self._popen = subprocess.Popen(
                 arguments,
-                stdin=subprocess.DEVNULL,
+                stdin=subprocess.PIPE if takes_input else subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 text=True,
@@ -112,9 +113,22 @@ class Process:
         for line in self._popen.stderr:
             self._messages.append(line.rstrip())
 
-    def events(self):
-        """Progress objects that have arrived since the last call."""
+    def say(self, value):
+        """Sends a value as a line of JSON. One that has ended does not hear it."""
+        try:
+            self._popen.stdin.write(json.dumps(value) + "\n")
+            self._popen.stdin.flush()
+        except OSError:
+            pass
+
+    def events(self, seconds=0.0):
+        """Progress objects that have arrived since the last call; waits for the first at most so long."""
         out = []
+        if seconds > 0:
+            try:
+                out.append(self._events.get(timeout=seconds))
+            except queue.Empty:
+                pass
         while not self._events.empty():
             out.append(self._events.get())
         return out
@@ -155,6 +169,10 @@ class Process:
     def warnings(self):
         """Texts of the program's warnings so far."""
         return [m.removeprefix(_WARNING) for m in self._messages if m.startswith(_WARNING)]
+
+    def forget_messages(self):
+        """Forgets what the program has said so far: what failure() tells begins here."""
+        self._messages.clear()
 
     def failure(self, code):
         """Text for an exit code that is not success: the program's own words, or what ended it."""

@@ -2,7 +2,7 @@
 """Folders for scenes and pictures on their way between Blender and the program.
 
 They live in Blender's own temporary folder, which Blender removes when it ends. Within one render job (all frames of
-an animation) the folder stays, so that buffers of one frame serve the next; then it is removed.
+an animation) the folder stays, so that buffers of one frame serve the next, and so does the program; then both go.
 """
 
 import os
@@ -12,8 +12,11 @@ import tempfile
 import bpy
 from bpy.app.handlers import persistent
 
+from .server import Server
+
 _PREFIX = "relief_"
 _render_folder = None
+_render_server = None
 
 
 def make_folder():
@@ -34,6 +37,14 @@ def render_folder():
     return _render_folder
 
 
+def render_server():
+    """The program of the running render job."""
+    global _render_server
+    if _render_server is None:
+        _render_server = Server()
+    return _render_server
+
+
 def remove_stale(folder, keep):
     """Removes files of a folder whose names are not to be kept: buffers that the last frame did not use."""
     for name in os.listdir(folder):
@@ -43,7 +54,10 @@ def remove_stale(folder, keep):
 
 @persistent
 def _end_render_job(*_):
-    global _render_folder
+    global _render_folder, _render_server
+    if _render_server is not None:
+        _render_server.stop()
+        _render_server = None
     if _render_folder is not None:
         remove_folder(_render_folder)
         _render_folder = None

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The viewport's picture: short runs of the program, each with a seed of its own, joined as they come in.
+"""The viewport's picture: short renders by one program that stays, each with a seed of its own, joined as they come in.
 
-The first run is a coarse one, so that something is seen soon; then each takes as many samples as all before it, so that
-loading the scene again costs less and less of the time. A change ends the run and starts anew; but a coarse run is let
-come to its end, which is near, so that pictures keep coming while a view is turned or an object dragged. A change of the
-view alone writes the scene's few kilobytes again, its buffers stay.
+The first is a coarse one, so that something is seen soon; then each takes as many samples as all before it. A change ends
+the render and starts anew; but a coarse one is let come to its end, which is near, so that pictures keep coming while a
+view is turned or an object dragged. The view has a file of its own: a change of it alone leaves the scene's file as it is,
+and the program keeps all that it has loaded and built.
 """
 
 import os
@@ -19,13 +19,16 @@ from gpu_extras.presets import draw_texture_2d
 from . import exr, final, report, result, session
 from .export.camera import aperture, lens_json
 from .export.gltf import GltfWriter
-from .export.scene import DATA_FOLDER, SceneExporter, StoredMeshes, View, scene_json
+from .export.scene import DATA_FOLDER, SceneExporter, StoredMeshes, View, scene_json, write_view
 from .export.settings import sampling_of
 from .preferences import find_checked_binary
-from .process import Process
 from .report import Report, ReliefError
+from .server import Server, ServerEnded
 
 _POLL_SECONDS = 0.02
+
+#: Exit code of a render that was cancelled.
+_CANCELLED = 130
 
 #: The first run's picture is so many times smaller a side.
 _COARSE = 4
@@ -62,7 +65,10 @@ class Viewport:
         self._meshes = StoredMeshes()
         self._view = None
         self._is_changed = False
-        self._process = None
+        self._is_written = False
+        self._server = Server()
+        self._was_restarted = False
+        self._request = None
         self._run = None
         self._sum = None
         self._samples = 0
@@ -80,7 +86,7 @@ class Viewport:
         view = _view(context, depsgraph)
         self._meshes.forget_changed(depsgraph)
         exporter = SceneExporter(depsgraph, GltfWriter(self._folder, DATA_FOLDER), warnings, self._meshes)
-        exporter.add_all(view)
+        exporter.add_all(final.any_view((1, 1)))
         self._binary = find_checked_binary()
         sampling = sampling_of(scene)
         self._options = final.command_line(scene)
@@ -88,6 +94,7 @@ class Viewport:
         self._seed = sampling.seed
         self._is_transparent = scene.render.film_transparent
         self._exporter = exporter
+        self._is_written = False
         final.warn_unread(scene, warnings)
         self._scene_name, self._warnings = scene.name, warnings
         report.last_coverage[scene.name] = warnings.coverage
@@ -114,21 +121,16 @@ class Viewport:
     def stop(self):
         """Ends the program and removes the files."""
         self._is_stopped = True
-        self._end_process()
+        self._request = None
+        self._server.stop()
         session.remove_folder(self._folder)
 
     def _begin(self, view):
         """Notes what is to be rendered from now on."""
         self._view = view
-        self._exporter.set_view(view)
         self._is_changed = True
-        if self._process is not None and self._run.divisor == 1:
-            self._end_process()
-
-    def _end_process(self):
-        if self._process is not None:
-            self._process.kill()
-            self._process = None
+        if self._request is not None and self._run.divisor == 1:
+            self._request.cancel()
 
     def _poll(self):
         """Blender's timer: the seconds until the next call, None for never again."""
@@ -138,7 +140,7 @@ class Viewport:
         try:
             self._step(engine)
         except ReliefError as error:
-            self._end_process()
+            self._request = None
             self._exporter = None
             engine.error_set(str(error))
             report.say(f"error: {error}")
@@ -147,24 +149,20 @@ class Viewport:
 
     def _step(self, engine):
         """Takes over what a run has rendered, and starts the next one."""
-        if self._process is not None:
-            code = self._process.wait(0)
-            if code is None:
+        if self._request is not None:
+            try:
+                self._request.events()
+            except ServerEnded as error:
+                self._restart(error)
                 return
-            if code != 0:
-                raise ReliefError(self._process.failure(code))
-            for text in self._process.warnings():
-                self._warnings.warn("program", text)
-            self._process = None
-            self._publish()
-            self._add(exr.read(self._picture_path()))
-            engine.update_stats("", self._status())
-            engine.tag_redraw()
+            if self._request.code is None:
+                return
+            self._finish(engine)
         if self._exporter is None:
             return
         if self._is_changed:
             self._is_changed = False
-            self._write_scene()
+            self._write()
             self._sum, self._samples = None, 0
             self._run = _Run(_COARSE, 1, self._seed)
             self._start()
@@ -172,6 +170,33 @@ class Viewport:
             samples = min(max(1, self._samples), self._most_samples - self._samples)
             self._run = _Run(1, samples, self._run.seed + 1)
             self._start()
+
+    def _finish(self, engine):
+        """Takes over what a request has brought."""
+        request, self._request = self._request, None
+        if request.code == _CANCELLED:
+            return
+        if request.code != 0:
+            raise ReliefError(request.failure())
+        self._was_restarted = False
+        for text in request.warnings:
+            self._warnings.warn("program", text)
+        self._publish()
+        self._add(exr.read(self._picture_path()))
+        engine.update_stats("", self._status())
+        engine.tag_redraw()
+
+    def _restart(self, error):
+        """Starts anew where the program has ended by itself; once, as it may end again of the same cause.
+
+        @error  the ServerEnded
+        """
+        self._request = None
+        if self._was_restarted:
+            raise error
+        self._was_restarted = True
+        report.say(f"warning: {error}; it is started again")
+        self._is_changed = True
 
     def _publish(self):
         """Shows the warnings there are, if these are others than before."""
@@ -192,20 +217,25 @@ class Viewport:
         hint = f" | {number} {noun}: see Render Properties" if number else ""
         return f"relief: {self._samples} of {self._most_samples} samples{hint}"
 
-    def _write_scene(self):
-        """Writes the scene as it is now. No run may be reading it."""
+    def _write(self):
+        """Writes the scene and the view as they are now. No run may be reading them."""
+        write_view(self._view, self._folder, "view.gltf")
+        if self._is_written:
+            return
         writer = self._exporter.writer
         writer.json.update(scene_json(self._exporter.nodes))
         writer.write("scene.gltf")
         session.remove_stale(os.path.join(self._folder, DATA_FOLDER), writer.used_files)
+        self._is_written = True
 
     def _start(self):
         run = self._run
         width, height = (max(1, side // run.divisor) for side in self._view.size)
-        arguments = [self._binary, "render", os.path.join(self._folder, "scene.gltf"), "-o", self._picture_path()]
-        arguments += ["--resolution", f"{width}x{height}", "--spp", str(run.samples), "--seed", str(run.seed)]
-        arguments += ["--compression", "none", "--float", "--aov", "beauty", "--progress", "none"]
-        self._process = Process(arguments + self._options)
+        words = [os.path.join(self._folder, "scene.gltf"), "-o", self._picture_path()]
+        words += ["--camera-from", os.path.join(self._folder, "view.gltf")]
+        words += ["--resolution", f"{width}x{height}", "--spp", str(run.samples), "--seed", str(run.seed)]
+        words += ["--compression", "none", "--float", "--aov", "beauty"]
+        self._request = self._server.ask(self._binary, words + self._options)
 
     def _picture_path(self):
         return os.path.join(self._folder, "picture.exr")

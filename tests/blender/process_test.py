@@ -70,7 +70,9 @@ def test_an_error_is_reported_in_the_programs_words():
 
 def test_a_broken_picture_is_reported():
     scene = _scene()
-    with _program('while [ "$1" != -o ]; do shift; done; echo nonsense > "$2"; echo "{}" > "$4"'):
+    value = r"""value_of() { [[ $line =~ \"$1\",\ \"([^\"]*)\" ]] && echo "${BASH_REMATCH[1]}"; }; read -r line"""
+    answer = """echo '{"event": "end", "id": 1, "exit_code": 0}'; read -r line"""
+    with _program(f"{value}\necho nonsense > $(value_of -o)\necho {{}} > $(value_of --stats)\n{answer}"):
         assert "not an uncompressed" in _failure(scene)
     _assert_clean()
 
@@ -204,7 +206,7 @@ def _programs(name):
     for entry in filter(str.isdigit, os.listdir("/proc")):
         with contextlib.suppress(OSError), open(f"/proc/{entry}/cmdline", "rb") as file:
             command = file.read().decode("utf-8", "replace").split("\0")
-            if name in command and "render" in command:
+            if name in command and "serve" in command:
                 found.append(int(entry))
     return found
 

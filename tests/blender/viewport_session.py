@@ -47,12 +47,12 @@ def _is_shown():
     if shown is None:
         return True
     if shown._exporter is None:  # an error
-        return shown._process is None
+        return shown._request is None
     return shown._samples > 0 and shown._picture is None
 
 
 def _programs():
-    """Process numbers of the program's runs that are children of this Blender."""
+    """Process numbers of the programs that are children of this Blender."""
     found = []
     for entry in os.listdir("/proc"):
         if not entry.isdigit():
@@ -64,7 +64,7 @@ def _programs():
                 command = file.read().split(b"\0")
         except OSError:
             continue
-        if int(fields[1]) == os.getpid() and fields[0] != "Z" and b"render" in command:
+        if int(fields[1]) == os.getpid() and fields[0] != "Z" and b"serve" in command:
             found.append(int(entry))
     return found
 

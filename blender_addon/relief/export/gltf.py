@@ -168,17 +168,27 @@ class GltfWriter:
         return self.add_unique("textures", {"source": image, "sampler": sampler})
 
     def write(self, name):
-        """Writes the document; returns its path."""
+        """Writes the document unless it is there; returns its path."""
         try:
             text = json.dumps(self.json, separators=(",", ":"), allow_nan=False).encode()
         except ValueError as cause:
             raise ReliefError(f"{_place_of_nonfinite(self.json)}: a number that is not finite") from cause
         path = os.path.join(self.folder, name)
+        if _has_content(path, text):
+            return path
         aside = path + ".part"
         with open(aside, "wb") as file:
             self.bytes_written += file.write(text)
         os.replace(aside, path)
         return path
+
+
+def _has_content(path, content):
+    """Whether a file is there already, which then stays what it is to the program."""
+    if not os.path.exists(path) or os.path.getsize(path) != len(content):
+        return False
+    with open(path, "rb") as file:
+        return file.read() == content
 
 
 def _place_of_nonfinite(value, path=""):

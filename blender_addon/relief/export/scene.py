@@ -81,6 +81,35 @@ def export_scene(depsgraph, view, folder, name, report):
     return Exported(path, writer.used_files, seconds, writer.bytes_written, exporter.has_holdouts)
 
 
+def write_view(view, folder, name):
+    """Writes a scene file with nothing but a camera.
+
+    @param  view    View
+    @param  folder  where to write
+    @param  name    of the file
+    @return         its path
+    """
+    writer = GltfWriter(folder, DATA_FOLDER)
+    writer.json.update(scene_json([_camera_node(view, writer)]))
+    return writer.write(name)
+
+
+def _camera_node(view, writer):
+    """Node of a camera, in Blender's world."""
+    matrices, _, num_shrunk, num_bad = usable_places(np.array([view.matrix], dtype=np.float64).reshape(1, 4, 4))
+    if num_shrunk or num_bad:
+        why = "its scale is 0" if num_shrunk else "its transform is not finite"
+        raise ReliefError(f'nothing tells where the camera "{view.camera.get("name", "view")}" looks: {why}')
+    translation, rotation, _, _ = decompose(matrices)
+    writer.use_extension("RELIEF_camera")
+    return {
+        "name": view.camera.get("name", "view"),
+        "camera": writer.add_unique("cameras", view.camera),
+        "translation": translation[0].tolist(),
+        "rotation": rotation[0].tolist(),
+    }
+
+
 def scene_json(nodes, index_of=None):
     """The document's scene and nodes.
 
@@ -160,28 +189,16 @@ class SceneExporter:
 
     def add_all(self, view):
         """Adds the whole frame."""
-        self.set_view(view)
+        self._add_view(view)
         self.add_world()
         self.add_objects()
         self._keep_dark()
 
-    def set_view(self, view):
-        """Sets the camera and the settings of the picture; a later call replaces them."""
-        matrices, _, num_shrunk, num_bad = usable_places(np.array([view.matrix], dtype=np.float64).reshape(1, 4, 4))
-        if num_shrunk or num_bad:
-            why = "its scale is 0" if num_shrunk else "its transform is not finite"
-            raise ReliefError(f'nothing tells where the camera "{view.camera.get("name", "view")}" looks: {why}')
-        translation, rotation, _, _ = decompose(matrices)
-        self.writer.use_extension("RELIEF_camera")
-        if self.nodes:
-            index = self.nodes[0]["camera"]
-            self.writer.json["cameras"][index] = view.camera
-        else:
-            index = self.writer.add_unique("cameras", view.camera)
-        node = {"name": view.camera.get("name", "view"), "camera": index}
-        node.update(translation=translation[0].tolist(), rotation=rotation[0].tolist())
-        self.nodes[:1] = [node]
-        self.writer.extend(self.writer.json, "RELIEF_render", render_settings(self._scene, self._depsgraph.view_layer, view.size))
+    def _add_view(self, view):
+        """Adds the camera and the settings of the picture."""
+        self.nodes.append(_camera_node(view, self.writer))
+        settings = render_settings(self._scene, self._depsgraph.view_layer, view.size)
+        self.writer.extend(self.writer.json, "RELIEF_render", settings)
 
     def add_world(self):
         is_opaque = not self._scene.render.film_transparent
