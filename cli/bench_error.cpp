@@ -140,7 +140,7 @@ ErrorStudyOptions study_options(const ErrorArguments& arguments, int threads)
   }
   study.reference_seconds = arguments.reference_seconds > 0 ? arguments.reference_seconds : 8 * study.times.back();
   study.stop = &interrupt_flag();
-  study.render_options = [picture](const Scene& scene) { return render_options(scene, picture); };
+  study.render_options = [picture](const Scene& scene) { return render_options(scene, picture, scene.cameras); };
   if (isatty(STDERR_FILENO) != 0) {
     study.progress = [](const std::string& line) { std::fputs((printable_text(line) + "\n").c_str(), stderr); };
   }

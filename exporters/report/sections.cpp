@@ -202,18 +202,26 @@ std::string costs_html(const RenderFacts& facts)
 std::string kept_html(const RenderFacts& facts)
 {
   const auto number = [&](const char* pointer) { return facts.number(pointer).value_or(0); };
-  const double images = number("/kept/images"), fields = number("/kept/height_fields");
+  const auto flag = [&](const char* pointer) { return facts.value(pointer) == true; };
+  std::string kept;
+  const auto add = [&](const std::string& things) { kept += (kept.empty() ? "" : ", ") + things; };
+  if (flag("/kept/scene")) add("the scene with all its files");
+  if (flag("/kept/preparation")) add("all that is built for rays");
+  for (const auto& [count, things] :
+       {std::pair{number("/kept/images"), "images"},
+        {number("/kept/height_fields"), "levels of height maps with their bounds and tables"},
+        {number("/kept/meshes"), "meshes' prisms and trees"}}) {
+    if (count > 0) add(figure_text(count) + " " + things);
+  }
   std::string html = html_heading("Kept and rebuilt", 2);
-  if (!(images + fields > 0)) {
+  if (kept.empty()) {
     return html +
            html_paragraph(
                "Nothing was kept: this was the first frame of its run, or the only one. Reading the scene took " +
                seconds_text(number("/load_seconds")) + ", building for rays " + seconds_text(number("/build_seconds")) +
                ".");
   }
-  html +=
-      html_paragraph("Kept from frames before: " + figure_text(images) + " images and " + figure_text(fields) +
-                     " levels of height maps with their bounds and tables, " + bytes_text(number("/kept/bytes")) + ".");
+  html += html_paragraph("Kept from frames before: " + kept + "; " + bytes_text(number("/kept/bytes")) + ".");
   std::vector<Bar> bars;
   for (const auto& [name, pointer] : {std::pair{"kept: making it took", "/kept/seconds"},
                                       {"rebuilt: reading the scene", "/load_seconds"},

@@ -8,8 +8,8 @@
 
 #include "exporters/color_map.h"
 #include "exporters/errors.h"
-#include "exporters/report/frame_report.h"
 #include "exporters/report/figure_text.h"
+#include "exporters/report/frame_report.h"
 #include "exporters/report/value_map.h"
 #include "exporters/report/warning_groups.h"
 #include "exporters/shared_exponent.h"
@@ -161,7 +161,7 @@ Statistics some_statistics()
   stats.stages = {{"shade_surface", 2}, {"intersect", 3}};
   stats.peak_memory_bytes = 1 << 28;
   stats.bvh_bytes = 1 << 20;
-  stats.kept = {3, 2, 1000, 0.25};
+  stats.kept = {3, 2, 1, false, true, 1000, 0.25};
   stats.counters.camera_rays = 1000;
   stats.displacement.method = "chord";
   stats.settings = {{"samples", "16"}, {"exposure", "1.5"}, {"filterWidth", "1.5"}};
@@ -187,7 +187,8 @@ TEST(FrameReport, HasEverySectionAndNests)
        {"<h2>Error over time</h2>", "<h2>Maps</h2>", "<h2>Where time and memory went</h2>", "<h2>Kept and rebuilt</h2>",
         "<h2>Rays</h2>", "<h2>Settings</h2>", "<h2>Warnings</h2>", "Error against the reference", "Variance, relative",
         "<h3>Samples</h3>", "<h3>Steps</h3>", "class='wipe'", "value='1.5'", "2 × … is odd", "1 / √time",
-        "a&lt;b&gt;.gltf", "displaced meshes"}) {
+        "a&lt;b&gt;.gltf", "displaced meshes", "all that is built for rays, 3 images, 2 levels of height maps",
+        "trees;"}) {
     EXPECT_NE(html.find(text), std::string::npos) << text;
   }
   for (const char* text : {"<script>alert", "http:", "https:", "<link", "src='/", "a<b>", "<frame>"}) {
