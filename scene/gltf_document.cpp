@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstring>
 #include <limits>
+#include <new>
 #include <optional>
 #include <system_error>
 
@@ -185,6 +186,8 @@ void load_core(GltfDocument& document, const json& conforming)
   std::string error, warning;
   if (!loader.LoadASCIIFromString(&document.core, &error, &warning, text.c_str(),
                                   static_cast<unsigned int>(text.size()), "")) {
+    // It catches what its JSON parser throws.
+    if (error == std::bad_alloc().what()) throw std::bad_alloc();
     throw SceneError(document.file, "", "glTF 2.0", error.empty() ? "something else" : error);
   }
 }
