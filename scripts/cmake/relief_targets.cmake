@@ -37,13 +37,19 @@ function(relief_add_library name)
   target_link_libraries(${name} PUBLIC relief_options)
 endfunction()
 
-# relief_add_tests(NAME LABELS l... LIBRARIES t... SOURCES s...): one GoogleTest executable, each TEST a CTest test.
+# relief_add_tests(NAME [WHOLE] LABELS l... LIBRARIES t... SOURCES s...): one GoogleTest executable, each TEST a CTest test.
+# WHOLE: all of them are one, for programs that take longer to load their libraries than for most of their tests.
 # Compiled with relief_test_options besides the project's own.
 function(relief_add_tests name)
-  cmake_parse_arguments(arg "" "" "LABELS;LIBRARIES;SOURCES" ${ARGN})
+  cmake_parse_arguments(arg "WHOLE" "" "LABELS;LIBRARIES;SOURCES" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} GTest::gtest_main)
   target_compile_options(${name} PRIVATE ${relief_test_options})
+  if(arg_WHOLE)
+    add_test(NAME ${name} COMMAND ${name})
+    set_tests_properties(${name} PROPERTIES LABELS "${arg_LABELS}" TIMEOUT 600)
+    return()
+  endif()
   include(GoogleTest)
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT 600)
   # Its PROPERTIES take no lists: of several labels only the first would remain. CTest includes this file after the one
