@@ -1,28 +1,23 @@
 #include "cli/picture_options.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <numbers>
-#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "cli/scene_setup.h"
+#include "scene/framing.h"
 
 namespace relief {
 
 namespace {
 
-/// Position of the camera of that name, or of that number if no camera is called so.
+/// @error CLI::ValidationError if there is no such camera
 std::size_t camera_index(const std::vector<SceneCamera>& cameras, const std::string& text)
 {
-  const auto named = std::find_if(cameras.begin(), cameras.end(), [&](const SceneCamera& c) { return c.name == text; });
-  if (named != cameras.end()) return static_cast<std::size_t>(named - cameras.begin());
-  std::size_t index = 0;
-  const auto read = std::from_chars(text.data(), text.data() + text.size(), index);
-  if (read.ec == std::errc() && read.ptr == text.data() + text.size() && index < cameras.size()) return index;
+  if (const std::optional<std::size_t> index = camera_named(cameras, text)) return *index;
   std::string names;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     names += fmt::format("{}{} ('{}')", i == 0 ? "" : ", ", i, cameras[i].name);
@@ -31,9 +26,9 @@ std::size_t camera_index(const std::vector<SceneCamera>& cameras, const std::str
 }
 
 /// The camera that was chosen, for an image of that size.
-Camera camera_for_image(const std::vector<SceneCamera>& cameras, const PictureOptions& options, int width, int height)
+Camera camera_for_image(const SceneCamera& chosen, const PictureOptions& options, int width, int height)
 {
-  Camera camera = cameras[options.camera.empty() ? 0 : camera_index(cameras, options.camera)].camera;
+  Camera camera = chosen.camera;
   if (options.fov > 0) {
     if (camera.projection != Projection::kPerspective) {
       throw CLI::ValidationError("--fov", "expected a perspective camera, found an orthographic one");
@@ -49,8 +44,8 @@ Camera camera_for_image(const std::vector<SceneCamera>& cameras, const PictureOp
 CameraChoice camera_choice(const PictureOptions& options)
 {
   // With another file's cameras the scene's own do not matter: it is the same whatever the picture's size.
-  if (!options.camera_from.empty()) return {{}, {}, 0, 1};
-  CameraChoice choice{options.look_from, options.look_at, options.fov, 0};
+  if (!options.camera_from.empty()) return {{}, {}, 0, 1, {}, options.shutter};
+  CameraChoice choice{options.look_from, options.look_at, options.fov, 0, options.camera, options.shutter};
   if (options.resolution.width > 0) {
     choice.image_aspect = static_cast<float>(options.resolution.width) / static_cast<float>(options.resolution.height);
   }
@@ -64,6 +59,7 @@ PictureCameras picture_cameras(const Scene& scene, const PictureOptions& options
   load.has_frame = frame.has_value();
   load.frame = frame.value_or(0);
   load.needs_camera = true;
+  load.camera.shutter = 0.0f;  // Motion is of the scene: such a camera stands still.
   Scene other = scene_load(options.camera_from, load);
   return {std::move(other.cameras), std::move(other.files)};
 }
@@ -106,6 +102,10 @@ std::vector<CLI::Option*> add_picture_options(CLI::App& command, PictureOptions&
       command.add_option("--max-bounces", options.max_bounces, setting_help(kBounces))->check(setting_check(kBounces)),
       add_displacement_memory(command, options.displacement),
       add_caustics_mode(command, options.caustics),
+      command
+          .add_option("--shutter", options.shutter,
+                      "Frames that the shutter is open for motion blur; 0 is off (default: the camera's)")
+          ->check(number(0, kLongestShutter)),
       add_choice(command, "--filter", options.filter, setting_info("pixelFilter.type")),
   };
 }
@@ -132,7 +132,9 @@ RenderOptions render_options(const Scene& scene, const PictureOptions& given, co
     settings.filter_width = pixel_filter_width(*given.filter);
   }
   if (given.caustics) settings.caustics.mode = *given.caustics;
-  options.camera = camera_for_image(cameras, given, settings.width, settings.height);
+  const SceneCamera& camera = cameras[camera_index(cameras, given.camera)];
+  options.camera = camera_for_image(camera, given, settings.width, settings.height);
+  options.camera_motion_index = camera.motion_index;
   const PixelRect& crop = given.crop;
   if (crop.x1 > settings.width || crop.y1 > settings.height) {
     throw CLI::ValidationError(

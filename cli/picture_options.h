@@ -17,7 +17,8 @@ struct PictureOptions {
   std::string camera_from;  ///< file whose cameras there are in place of the scene's; empty: none
   std::string camera;       ///< name or number; empty: the first
   std::optional<Vec3f> look_from, look_at;
-  double fov = 0;  ///< vertical, degrees; 0: the camera's
+  double fov = 0;                ///< vertical, degrees; 0: the camera's
+  std::optional<float> shutter;  ///< frames; empty: the camera's
   Resolution resolution;
   PixelRect crop;
   int samples = 0, max_bounces = -1;

@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "integrator/stages.h"
-#include "kernel/light/spot.h"
 #include "scene/memory.h"
 
 namespace relief {
@@ -26,90 +25,6 @@ std::uint32_t mask_of(std::uint32_t instance_flags)
   return kRayBounce | ((instance_flags & kVisibleToCamera) != 0 ? std::uint32_t{kRayCamera} : 0u) |
          ((instance_flags & kCastsShadow) != 0 ? std::uint32_t{kRayShadow} : 0u);
 }
-
-void disk_bounds(const RTCBoundsFunctionArguments* arguments)
-{
-  const Light& light = *static_cast<const Light*>(arguments->geometryUserPtr);
-  // Extent of an ellipse c + a·cos φ + b·sin φ along an axis: √(a² + b²); a relative pad covers the rounding.
-  const auto extent = [](float a, float b) { return __builtin_sqrtf(a * a + b * b) * (1.0f + 8.0f * kUnitRoundoff); };
-  const Vec3f half{extent(light.edge_u.x, light.edge_v.x), extent(light.edge_u.y, light.edge_v.y),
-                   extent(light.edge_u.z, light.edge_v.z)};
-  const Vec3f pad = 4.0f * kUnitRoundoff * (abs(light.P) + half);
-  const Vec3f low = light.P - half - pad;
-  const Vec3f high = light.P + half + pad;
-  RTCBounds* bounds = arguments->bounds_o;
-  bounds->lower_x = low.x;
-  bounds->lower_y = low.y;
-  bounds->lower_z = low.z;
-  bounds->upper_x = high.x;
-  bounds->upper_y = high.y;
-  bounds->upper_z = high.z;
-}
-
-/// Ray against the plane of the ellipse; coordinates within it by the dual basis of its half axes.
-void disk_intersect(const RTCIntersectFunctionNArguments* arguments)
-{
-  const Light& light = *static_cast<const Light*>(arguments->geometryUserPtr);
-  RTCRayHitN* rays = arguments->rayhit;
-  const unsigned count = arguments->N;
-  RTCRayN* ray = RTCRayHitN_RayN(rays, count);
-  RTCHitN* hit = RTCRayHitN_HitN(rays, count);
-  const Vec3f normal = cross(light.edge_u, light.edge_v);
-  const float normal_squared = length_squared(normal);
-  const Vec3f dual_u = cross(light.edge_v, normal) / normal_squared;
-  const Vec3f dual_v = cross(normal, light.edge_u) / normal_squared;
-  for (unsigned i = 0; i < count; ++i) {
-    if (arguments->valid[i] != -1) continue;
-    const Vec3f O{RTCRayN_org_x(ray, count, i), RTCRayN_org_y(ray, count, i), RTCRayN_org_z(ray, count, i)};
-    const Vec3f D{RTCRayN_dir_x(ray, count, i), RTCRayN_dir_y(ray, count, i), RTCRayN_dir_z(ray, count, i)};
-    const float t = dot(light.P - O, normal) / dot(D, normal);
-    if (!(t > RTCRayN_tnear(ray, count, i) && t < RTCRayN_tfar(ray, count, i))) continue;
-    const Vec3f from_center = O + D * t - light.P;
-    if (!(sqr(dot(from_center, dual_u)) + sqr(dot(from_center, dual_v)) <= 1.0f)) continue;
-    RTCRayN_tfar(ray, count, i) = t;
-    RTCHitN_geomID(hit, count, i) = arguments->geomID;
-    RTCHitN_primID(hit, count, i) = 0;
-    RTCHitN_instID(hit, count, i, 0) = RTC_INVALID_GEOMETRY_ID;
-  }
-}
-
-void ball_bounds(const RTCBoundsFunctionArguments* arguments)
-{
-  const Light& light = *static_cast<const Light*>(arguments->geometryUserPtr);
-  const float reach = light.radius * (1.0f + 8.0f * kUnitRoundoff);
-  const Vec3f half = Vec3f{reach, reach, reach} + 4.0f * kUnitRoundoff * abs(light.P);
-  RTCBounds* bounds = arguments->bounds_o;
-  bounds->lower_x = light.P.x - half.x;
-  bounds->lower_y = light.P.y - half.y;
-  bounds->lower_z = light.P.z - half.z;
-  bounds->upper_x = light.P.x + half.x;
-  bounds->upper_y = light.P.y + half.y;
-  bounds->upper_z = light.P.z + half.z;
-}
-
-/// A ray meets a ball once: where it enters, or, started inside, where it leaves.
-void ball_intersect(const RTCIntersectFunctionNArguments* arguments)
-{
-  const Light& light = *static_cast<const Light*>(arguments->geometryUserPtr);
-  RTCRayHitN* rays = arguments->rayhit;
-  const unsigned count = arguments->N;
-  RTCRayN* ray = RTCRayHitN_RayN(rays, count);
-  RTCHitN* hit = RTCRayHitN_HitN(rays, count);
-  for (unsigned i = 0; i < count; ++i) {
-    if (arguments->valid[i] != -1) continue;
-    const Vec3f O{RTCRayN_org_x(ray, count, i), RTCRayN_org_y(ray, count, i), RTCRayN_org_z(ray, count, i)};
-    const Vec3f D{RTCRayN_dir_x(ray, count, i), RTCRayN_dir_y(ray, count, i), RTCRayN_dir_z(ray, count, i)};
-    const float t = ball_light_distance(light, light.P - O, D);
-    if (!(t > RTCRayN_tnear(ray, count, i) && t < RTCRayN_tfar(ray, count, i))) continue;
-    RTCRayN_tfar(ray, count, i) = t;
-    RTCHitN_geomID(hit, count, i) = arguments->geomID;
-    RTCHitN_primID(hit, count, i) = 0;
-    RTCHitN_instID(hit, count, i, 0) = RTC_INVALID_GEOMETRY_ID;
-  }
-}
-
-/// Area lights cast no shadows: their mask keeps shadow rays away, so this is never reached with work to do.
-void light_occluded(const RTCOccludedFunctionNArguments*) {}
 
 /// How a ray stands to the box of what it may hit.
 enum class RayStart : std::uint8_t { kNear, kFar, kInvalid };
@@ -182,7 +97,8 @@ float power_of_two_above(float x)
 float steady_pad(const InstanceGeometry& instance)
 {
   const auto row = [&](double Vec3d::*axis) {
-    return std::hypot(instance.x.*axis, instance.y.*axis, instance.z.*axis);
+    const ObjectFromWorld& m = instance.object_from_world;
+    return std::hypot(m.x.*axis, m.y.*axis, m.z.*axis);
   };
   const double longest = std::max({row(&Vec3d::x), row(&Vec3d::y), row(&Vec3d::z)});
   // The sum of three numbers is at most so many times the root of the sum of their squares.
@@ -194,6 +110,8 @@ float steady_pad(const InstanceGeometry& instance)
 void hash_triangles(const Mesh& mesh, ContentHasher* hash)
 {
   hash->add_array(mesh.P.data(), mesh.P.size());
+  hash->add(mesh.steps.size());
+  for (const MeshStep& step : mesh.steps) hash->add_array(step.P.data(), step.P.size());
   hash->add_array(mesh.triangles.data(), mesh.triangles.size());
 }
 
@@ -215,10 +133,12 @@ Accel::Accel(const Scene& scene,
              std::span<const Light> lights,
              std::span<const std::uint32_t> area_lights,
              DisplacementSet& displacements,
+             const SceneViews& views,
              RTCFilterFunctionN shadow_filter,
              std::shared_ptr<KeptTrees> trees)
     : shadow_filter_(shadow_filter),
       displacements_(&displacements),
+      views_(&views),
       trees_(trees != nullptr ? std::move(trees) : std::make_shared<KeptTrees>(false))
 {
   for (std::size_t d = 0; d < displacements.size(); ++d) displacements.geometry(d).shadow_filter = nullptr;
@@ -235,6 +155,7 @@ Accel::Accel(const Scene& scene,
     MeshUse& mesh = meshes_[static_cast<std::size_t>(instance.mesh_index)];
     ++mesh.count;
     mesh.transparent |= lets_light_through;
+    mesh.takes_time |= (views.instances[i].flags & (kMoves | kDeforms)) != 0;
   }
   build_displaced(displacements);
   place_instances(scene, lights, area_lights);
@@ -247,7 +168,7 @@ Accel::Accel(const Scene& scene,
 
 Accel::~Accel()
 {
-  if (trees_->keeps() && scene_ != nullptr && scene_->top != nullptr) trees_->put(std::move(scene_));
+  if (keeps_top() && scene_ != nullptr && scene_->top != nullptr) trees_->put(std::move(scene_));
 }
 
 void Accel::build_displaced(DisplacementSet& displacements)
@@ -283,7 +204,10 @@ void Accel::place_instances(const Scene& scene,
                             std::span<const std::uint32_t> area_lights)
 {
   for (std::size_t m = 0; m < meshes_.size(); ++m) {
-    if (meshes_[m].count >= 2) meshes_[m].box = points_box(scene.meshes[m].P, {});
+    if (!meshes_[m].has_tree()) continue;
+    Box3& mesh_box = meshes_[m].box;
+    mesh_box = points_box(scene.meshes[m].P, {});
+    for (const MeshStep& step : scene.meshes[m].steps) mesh_box = box_union(mesh_box, points_box(step.P, {}));
   }
   scene_ = std::make_unique<SceneTree>();
   Box3 box = box_empty();
@@ -293,18 +217,22 @@ void Accel::place_instances(const Scene& scene,
     const auto mesh = static_cast<std::size_t>(instance.mesh_index);
     const int displaced = displacements_->geometry_index(i);
     const auto d = static_cast<std::size_t>(displaced);
-    if (displaced < 0 && meshes_[mesh].count < 2) {
+    if (displaced < 0 && !meshes_[mesh].has_tree()) {
       box = box_union(box, points_box(scene.meshes[mesh].P, instance.world_from_object));
       continue;
     }
     // Trees of meshes come later: their boxes depend on the pad.
     scene_->instances[i] = std::make_unique<InstanceGeometry>(instance_geometry_prepare(
         displaced >= 0 ? displaced_trees_[d].get() : nullptr, displaced >= 0 ? displaced_bounds(d) : meshes_[mesh].box,
-        instance.world_from_object, &scene_->pad));
+        instance.world_from_object, views_->motion.view(instance.motion_index), &scene_->pad));
     box = box_union(box, instance_bounds(*scene_->instances[i]));
   }
   for (const std::uint32_t index : area_lights) {
     const Light& light = lights[index];
+    if (light.motion_index >= 0) {
+      box = box_union(box, light_geometry_bounds(light_geometry_prepare(light, views_->motion.views())));
+      continue;
+    }
     const Vec3f half = light_is_ball(light) ? splat3(light.radius) : abs(light.edge_u) + abs(light.edge_v);
     box = box_union(box, {light.P - half, light.P + half});
   }
@@ -313,7 +241,7 @@ void Accel::place_instances(const Scene& scene,
   // The boxes of Embree's own instances are as large as those of what they show.
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     std::unique_ptr<InstanceGeometry>& instance = scene_->instances[i];
-    if (instance == nullptr || displacements_->geometry_index(i) >= 0 ||
+    if (instance == nullptr || displacements_->geometry_index(i) >= 0 || instance->motion.num_keys > 0 ||
         !instance_is_accurate_in_single_precision(*instance)) {
       continue;
     }
@@ -327,7 +255,7 @@ void Accel::build_meshes(const Scene& scene)
 {
   for (std::size_t m = 0; m < meshes_.size(); ++m) {
     MeshUse& use = meshes_[m];
-    if (use.count < 2) continue;
+    if (!use.has_tree()) continue;
     const Mesh& mesh = scene.meshes[m];
     ContentHash content;
     if (trees_->keeps()) {
@@ -381,7 +309,7 @@ ContentHash Accel::top_content(const Scene& scene,
 
 void Accel::build_top(const Scene& scene, std::span<const Light> lights, std::span<const std::uint32_t> area_lights)
 {
-  if (trees_->keeps()) {
+  if (keeps_top()) {
     scene_->content = top_content(scene, lights, area_lights);
     if (std::unique_ptr<SceneTree> kept = trees_->take(scene_->content)) {
       scene_ = std::move(kept);
@@ -392,7 +320,7 @@ void Accel::build_top(const Scene& scene, std::span<const Light> lights, std::sp
   const std::uint64_t bytes_before = trees_->bytes();
   bool any_transparent = false;
   for (const MeshUse& mesh : meshes_) {
-    any_transparent |= mesh.count == 1 && mesh.transparent;
+    any_transparent |= !mesh.has_tree() && mesh.transparent;
     if (mesh.tree != nullptr) scene_->parts.push_back(mesh.tree);
   }
   scene_->parts.insert(scene_->parts.end(), displaced_trees_.begin(), displaced_trees_.end());
@@ -411,9 +339,7 @@ void Accel::build_top(const Scene& scene, std::span<const Light> lights, std::sp
   for (std::size_t i = 0; i < area_lights.size(); ++i) {
     const Light& light = lights[area_lights[i]];
     attach(top.get(),
-           light.kind == LightKind::kRectangle ? new_rectangle(light)
-           : light.kind == LightKind::kDisk    ? new_round(light, disk_bounds, disk_intersect)
-                                               : new_round(light, ball_bounds, ball_intersect),
+           light.kind == LightKind::kRectangle && light.motion_index < 0 ? new_rectangle(light) : new_light(light),
            static_cast<unsigned>(scene.instances.size() + i),
            kRayBounce | (light.visible_to_camera ? std::uint32_t{kRayCamera} : 0u));
   }
@@ -476,16 +402,26 @@ RTCGeometry Accel::new_mesh(const Mesh& mesh, const Affine3* world_from_object, 
 {
   RTCGeometry geometry = rtcNewGeometry(trees_->device(), RTC_GEOMETRY_TYPE_TRIANGLE);
   const bool in_place = world_from_object == nullptr || is_identity(*world_from_object);
-  // Embree reads 16 bytes a vertex, so a shared buffer needs room behind its last one.
-  if (in_place && !trees_->keeps() && mesh.P.capacity() > mesh.P.size()) {
-    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, mesh.P.data(), 0, sizeof(Vec3f),
-                               mesh.P.size());
-  } else {
+  const auto set_vertices = [&](unsigned step, const std::vector<Vec3f>& P) {
+    // Embree reads 16 bytes a vertex, so a shared buffer needs room behind its last one.
+    if (in_place && !trees_->keeps() && P.capacity() > P.size()) {
+      rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT3, P.data(), 0, sizeof(Vec3f),
+                                 P.size());
+      return;
+    }
     auto* vertices = static_cast<Vec3f*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), mesh.P.size()));
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT3, sizeof(Vec3f), P.size()));
     if (vertices == nullptr) throw OutOfMemory("the vertices of mesh '" + mesh.name + "'");
-    for (std::size_t i = 0; i < mesh.P.size(); ++i) {
-      vertices[i] = in_place ? mesh.P[i] : transform_point(*world_from_object, mesh.P[i]);
+    for (std::size_t i = 0; i < P.size(); ++i) {
+      vertices[i] = in_place ? P[i] : transform_point(*world_from_object, P[i]);
+    }
+  };
+  if (mesh.steps.empty()) {
+    set_vertices(0, mesh.P);
+  } else {
+    rtcSetGeometryTimeStepCount(geometry, static_cast<unsigned>(mesh.steps.size()));
+    for (std::size_t step = 0; step < mesh.steps.size(); ++step) {
+      set_vertices(static_cast<unsigned>(step), mesh.steps[step].P);
     }
   }
   if (!trees_->keeps()) {
@@ -542,16 +478,11 @@ RTCGeometry Accel::new_rectangle(const Light& light)
   return geometry;
 }
 
-RTCGeometry Accel::new_round(const Light& light, RTCBoundsFunction bounds_of, RTCIntersectFunctionN intersect_of)
+RTCGeometry Accel::new_light(const Light& light)
 {
-  RTCGeometry geometry = rtcNewGeometry(trees_->device(), RTC_GEOMETRY_TYPE_USER);
-  scene_->round_lights.push_back(std::make_unique<Light>(light));
-  rtcSetGeometryUserPrimitiveCount(geometry, 1);
-  rtcSetGeometryUserData(geometry, scene_->round_lights.back().get());
-  rtcSetGeometryBoundsFunction(geometry, bounds_of, nullptr);
-  rtcSetGeometryIntersectFunction(geometry, intersect_of);
-  rtcSetGeometryOccludedFunction(geometry, light_occluded);
-  return geometry;
+  const MotionView* const motions = light.motion_index >= 0 ? views_->motion.views() : nullptr;
+  scene_->lights.push_back(std::make_unique<LightGeometry>(light_geometry_prepare(light, motions)));
+  return light_geometry_make(trees_->device(), *scene_->lights.back());
 }
 
 void Accel::attach(RTCScene target, RTCGeometry geometry, unsigned id, std::uint32_t mask)

@@ -11,6 +11,7 @@
 #include "displacement/embree.h"
 #include "displacement/far_ray.h"
 #include "integrator/kept_trees.h"
+#include "integrator/scene_views.h"
 #include "kernel/light/light.h"
 #include "kernel/math/rounding.h"
 #include "kernel/photon/box_aim.h"
@@ -23,12 +24,13 @@ enum RayMask : std::uint32_t { kRayCamera = 1u << 0, kRayBounce = 1u << 1, kRayS
 
 /// Builds and owns the acceleration structure. Meshes that occur once are placed in world space; a mesh that occurs more
 /// often, or is displaced, has one scene of its own and instances of it: Embree's, or where single precision would not do,
-/// those of instance_geometry.h.
+/// those of instance_geometry.h. So has one that moves or deforms while the shutter is open, with instances of the latter.
 class Accel {
  public:
   /// @param scene         must outlive the Accel: if no trees are kept, buffers are shared where they can be
   /// @param lights        of which `area_lights` picks those that rays can hit; object num_instances + i is area_lights[i]
   /// @param displacements of the scene; must outlive the Accel
+  /// @param views         of the scene; must outlive the Accel
   /// @param shadow_filter called for hits of shadow rays on surfaces that may let light through
   /// @param trees         of the scenes before, and where those of this one stay; null: none are kept
   /// @error std::runtime_error with Embree's message when the build fails (out of memory)
@@ -36,6 +38,7 @@ class Accel {
         std::span<const Light> lights,
         std::span<const std::uint32_t> area_lights,
         DisplacementSet& displacements,
+        const SceneViews& views,
         RTCFilterFunctionN shadow_filter,
         std::shared_ptr<KeptTrees> trees = nullptr);
   /// Leaves its trees to the scenes after, if they are kept.
@@ -52,6 +55,7 @@ class Accel {
   void occluded(EmbreeContext& context, RTCRay& ray) const;
 
   const DisplacementSet& displacements() const { return *displacements_; }
+  const SceneMotion& motion() const { return views_->motion; }
   Box3 bounds() const;                                ///< of all that rays can hit, world
   Box3 displaced_bounds(std::size_t geometry) const;  ///< of a displaced geometry's prisms or triangles, object space
   std::size_t bytes() const { return trees_->bytes(); }   ///< allocated by Embree
@@ -69,7 +73,7 @@ class Accel {
   RTCGeometry new_corners(const Box3& box);
   RTCGeometry new_instance(RTCScene instanced, const Affine3& world_from_object);
   RTCGeometry new_rectangle(const Light& light);
-  RTCGeometry new_round(const Light& light, RTCBoundsFunction bounds_of, RTCIntersectFunctionN intersect_of);
+  RTCGeometry new_light(const Light& light);
   void attach(RTCScene target, RTCGeometry geometry, unsigned id, std::uint32_t mask);
   void commit(RTCScene target);
 
@@ -77,13 +81,20 @@ class Accel {
   struct MeshUse {
     int count = 0;             ///< of instances that are not displaced
     bool transparent = false;  ///< one of them
-    Box3 box;                  ///< object space; of meshes with more than one
+    bool takes_time = false;   ///< one of them moves or deforms while the shutter is open
+    Box3 box;                  ///< object space, of meshes with a tree; over all time
     Vec3f pad;                 ///< by which it is enlarged
-    TreePointer tree;          ///< null: it occurs once and is in place
+    TreePointer tree;          ///< null: it is in place
+
+    bool has_tree() const { return count > 1 || takes_time; }
   };
+
+  /// What moves is known by its place in the scene: no other has it.
+  bool keeps_top() const { return trees_->keeps() && !views_->motion.is_open(); }
 
   RTCFilterFunctionN shadow_filter_;
   const DisplacementSet* displacements_;
+  const SceneViews* views_;
   std::shared_ptr<KeptTrees> trees_;
   KeptTrees::Tally kept_;
   RayTarget target_;                          ///< all that rays can hit, world

@@ -349,7 +349,6 @@ void computed_heights_add(const Scene& scene, const DisplacementOptions& options
   const PictureView view{options.camera.value_or(scene.cameras.front().camera),
                          static_cast<double>(options.camera ? options.picture_height : scene.render.height)};
   GraphScene graph_scene;
-  graph_scene.instances = all->views.instances.data();
   graph_scene.columns = all->views.instance_columns.data();
   graph_scene.num_columns = static_cast<std::uint32_t>(all->views.instance_columns.size());
   graph_scene.camera = view.camera;

@@ -10,6 +10,7 @@
 #include "integrator/emitter_graph.h"
 #include "kernel/shape/material_lookup.h"
 #include "kernel/texture/texture.h"
+#include "scene/material_traits.h"
 #include "scene/world_displacement.h"
 
 namespace relief {
@@ -105,12 +106,6 @@ void rectangles_join(std::span<Light> lights, std::int32_t first)
   }
 }
 
-bool emits(const Material& material)
-{
-  return (!is_zero(material.emission) || material.emission_index >= 0) && !material.unlit &&
-         material.displacement_index < 0;
-}
-
 /// Instances whose emissive triangles become one piece of LightSet::lights.
 struct EmissiveMesh {
   std::vector<std::size_t> instances;
@@ -126,7 +121,11 @@ std::vector<EmissiveMesh> emissive_meshes(const Scene& scene, LightSet& set)
   std::vector<std::size_t> emissive;
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
-    if (triangles(instance) == 0 || !emits(scene.materials[static_cast<std::size_t>(instance.material_index)]))
+    if (triangles(instance) == 0 ||
+        !material_is_light(scene.materials[static_cast<std::size_t>(instance.material_index)]))
+      continue;
+    // What moves is left to paths: there is no light where it is at their time.
+    if (instance.motion_index >= 0 || !scene.meshes[static_cast<std::size_t>(instance.mesh_index)].steps.empty())
       continue;
     emissive.push_back(i);
     set.num_emissive_triangles += triangles(instance);

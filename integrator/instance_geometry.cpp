@@ -2,16 +2,68 @@
 
 #include <cmath>
 
+#include "integrator/scene_motion.h"
 #include "kernel/math/rounding.h"
 
 namespace relief {
 
 namespace {
 
+ObjectFromWorld object_from_world_make(const Affine3& world_from_object)
+{
+  const Vec3d x = to_double(world_from_object.x), y = to_double(world_from_object.y),
+              z = to_double(world_from_object.z), p = to_double(world_from_object.p);
+  const Vec3d rows[3] = {cross(y, z), cross(z, x), cross(x, y)};
+  const double d = 1.0 / dot(x, rows[0]);
+  ObjectFromWorld out;
+  out.x = d * Vec3d{rows[0].x, rows[1].x, rows[2].x};
+  out.y = d * Vec3d{rows[0].y, rows[1].y, rows[2].y};
+  out.z = d * Vec3d{rows[0].z, rows[1].z, rows[2].z};
+  out.p = -1.0 * (p.x * out.x + p.y * out.y + p.z * out.z);
+  return out;
+}
+
+/// Box of the scene's box under a transform.
+Box3 placed_bounds(const Box3& box, const Affine3& m)
+{
+  Box3 out = box_empty();
+  if (!(box.low.x <= box.high.x)) return out;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3f at{(corner & 1) != 0 ? box.high.x : box.low.x, (corner & 2) != 0 ? box.high.y : box.low.y,
+                   (corner & 4) != 0 ? box.high.z : box.low.z};
+    const Vec3f P = transform_point(m, at);
+    // The rounding of P.
+    const Vec3f size = abs(at);
+    const Vec3f error = gamma_bound(4) * (abs(m.x) * size.x + abs(m.y) * size.y + abs(m.z) * size.z + abs(m.p));
+    out = box_union(out, {P - error, P + error});
+  }
+  return out;
+}
+
+/// Box of a moving instance at one of its keys. What lies straight between this and that of the next key holds the instance
+/// meanwhile.
+Box3 key_bounds(const InstanceGeometry& instance, std::uint32_t key)
+{
+  const MotionView& motion = instance.motion;
+  const Box3& box = instance.target.box;
+  if (!(box.low.x <= box.high.x)) return box_empty();
+  const auto reach = static_cast<double>(length(max(abs(box.low), abs(box.high))));
+  double stray = 0;
+  for (std::uint32_t i = key > 0 ? key - 1 : 0; i <= key && i + 1 < motion.num_keys; ++i) {
+    stray = max(stray, motion_stray(motion.keys[i], motion.keys[i + 1], reach));
+  }
+  const Box3 out =
+      placed_bounds(box, motion_at(motion, static_cast<float>(key) / static_cast<float>(motion.num_keys - 1)));
+  // Embree's times are rounded, and so is the sum of two boxes.
+  const Vec3f margin = splat3(static_cast<float>(stray * 1.001)) +
+                       gamma_bound(8 + 2 * static_cast<int>(motion.num_keys)) * max(abs(out.low), abs(out.high));
+  return {out.low - margin, out.high + margin};
+}
+
 void bounds(const RTCBoundsFunctionArguments* arguments)
 {
   const auto& instance = *static_cast<const InstanceGeometry*>(arguments->geometryUserPtr);
-  const Box3 box = instance_bounds(instance);
+  const Box3 box = instance.motion.num_keys > 0 ? key_bounds(instance, arguments->timeStep) : instance_bounds(instance);
   const float pad = *instance.pad;
   RTCBounds* out = arguments->bounds_o;
   out->lower_x = box.low.x - pad;
@@ -32,9 +84,12 @@ struct InstanceRay {
   bool enter(const InstanceGeometry& instance, const EmbreeContext& context, RTCRay* ray)
   {
     const Vec3d O = context.far_start.is_far ? context.far_start.O : Vec3d{ray->org_x, ray->org_y, ray->org_z};
-    exact.O = O.x * instance.x + O.y * instance.y + O.z * instance.z + instance.p;
-    exact.D = static_cast<double>(ray->dir_x) * instance.x + static_cast<double>(ray->dir_y) * instance.y +
-              static_cast<double>(ray->dir_z) * instance.z;
+    ObjectFromWorld at_time;
+    if (instance.motion.num_keys > 0) at_time = object_from_world_make(motion_at(instance.motion, ray->time));
+    const ObjectFromWorld& m = instance.motion.num_keys > 0 ? at_time : instance.object_from_world;
+    exact.O = O.x * m.x + O.y * m.y + O.z * m.z + m.p;
+    exact.D = static_cast<double>(ray->dir_x) * m.x + static_cast<double>(ray->dir_y) * m.y +
+              static_cast<double>(ray->dir_z) * m.z;
     double t_min = ray->tnear, t_max = ray->tfar;
     const double size = max(std::abs(exact.D.x), max(std::abs(exact.D.y), std::abs(exact.D.z)));
     // Embree's tests are for directions that are neither tiny nor huge. A power of two rounds nothing.
@@ -157,27 +212,23 @@ void occluded(const RTCOccludedFunctionNArguments* arguments)
 InstanceGeometry instance_geometry_prepare(RTCScene scene,
                                            const Box3& box,
                                            const Affine3& world_from_object,
+                                           MotionView motion,
                                            const float* pad)
 {
   InstanceGeometry out;
   out.scene = scene;
   out.world_from_object = world_from_object;
   out.pad = pad;
-  const Vec3d x = to_double(world_from_object.x), y = to_double(world_from_object.y),
-              z = to_double(world_from_object.z), p = to_double(world_from_object.p);
-  const Vec3d rows[3] = {cross(y, z), cross(z, x), cross(x, y)};
-  const double d = 1.0 / dot(x, rows[0]);
-  out.x = d * Vec3d{rows[0].x, rows[1].x, rows[2].x};
-  out.y = d * Vec3d{rows[0].y, rows[1].y, rows[2].y};
-  out.z = d * Vec3d{rows[0].z, rows[1].z, rows[2].z};
-  out.p = -1.0 * (p.x * out.x + p.y * out.y + p.z * out.z);
+  out.object_from_world = object_from_world_make(world_from_object);
+  out.motion = motion;
   out.target = ray_target_make(box);
   return out;
 }
 
 Vec3f instance_pad(const InstanceGeometry& instance)
 {
-  return *instance.pad * (abs(to_float(instance.x)) + abs(to_float(instance.y)) + abs(to_float(instance.z)));
+  const ObjectFromWorld& m = instance.object_from_world;
+  return *instance.pad * (abs(to_float(m.x)) + abs(to_float(m.y)) + abs(to_float(m.z)));
 }
 
 bool instance_is_accurate_in_single_precision(const InstanceGeometry& instance)
@@ -189,19 +240,9 @@ bool instance_is_accurate_in_single_precision(const InstanceGeometry& instance)
 
 Box3 instance_bounds(const InstanceGeometry& instance)
 {
-  const Box3& box = instance.target.box;
+  if (instance.motion.num_keys == 0) return placed_bounds(instance.target.box, instance.world_from_object);
   Box3 out = box_empty();
-  if (!(box.low.x <= box.high.x)) return out;
-  const Affine3& m = instance.world_from_object;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vec3f at{(corner & 1) != 0 ? box.high.x : box.low.x, (corner & 2) != 0 ? box.high.y : box.low.y,
-                   (corner & 4) != 0 ? box.high.z : box.low.z};
-    const Vec3f P = transform_point(m, at);
-    // The rounding of P.
-    const Vec3f size = abs(at);
-    const Vec3f error = gamma_bound(4) * (abs(m.x) * size.x + abs(m.y) * size.y + abs(m.z) * size.z + abs(m.p));
-    out = box_union(out, {P - error, P + error});
-  }
+  for (std::uint32_t key = 0; key < instance.motion.num_keys; ++key) out = box_union(out, key_bounds(instance, key));
   return out;
 }
 
@@ -210,6 +251,7 @@ RTCGeometry instance_geometry_make(RTCDevice device, InstanceGeometry& instance)
   RTCGeometry out = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
   rtcSetGeometryUserPrimitiveCount(out, 1);
   rtcSetGeometryUserData(out, &instance);
+  if (instance.motion.num_keys > 0) rtcSetGeometryTimeStepCount(out, instance.motion.num_keys);
   rtcSetGeometryBoundsFunction(out, bounds, nullptr);
   rtcSetGeometryIntersectFunction(out, intersect);
   rtcSetGeometryOccludedFunction(out, occluded);

@@ -7,23 +7,32 @@
 #include "displacement/embree.h"
 #include "displacement/far_ray.h"
 #include "kernel/math/affine.h"
+#include "kernel/math/motion.h"
 
 namespace relief {
+
+/// A transform's inverse: images of the unit axes and of the origin.
+struct ObjectFromWorld {
+  Vec3d x, y, z, p;
+};
 
 /// User data of an instance. Must stay where it is while the geometry is in use.
 struct InstanceGeometry {
   RTCScene scene = nullptr;
   Affine3 world_from_object;
-  Vec3d x, y, z, p;            ///< object_from_world: images of the unit axes and of the origin
+  ObjectFromWorld object_from_world;
+  MotionView motion;           ///< keys: the transforms count at the rays' times instead of the two above
   RayTarget target;            ///< the scene's box, object space
   const float* pad = nullptr;  ///< by which boxes of the scene above are enlarged, metres; read while that is built
 };
 
 /// @param scene  its geometry takes EmbreeContext
 /// @param box    that the scene's geometry is in, object space
+/// @param motion without keys: it stands still
 InstanceGeometry instance_geometry_prepare(RTCScene scene,
                                            const Box3& box,
                                            const Affine3& world_from_object,
+                                           MotionView motion,
                                            const float* pad);
 
 /// By how much the scene's box is to be enlarged, object space, for that of the instance to be enlarged by its pad.
@@ -32,7 +41,7 @@ Vec3f instance_pad(const InstanceGeometry& instance);
 /// Whether single precision errs by little to the instance's size where it brings rays of the world to object space.
 bool instance_is_accurate_in_single_precision(const InstanceGeometry& instance);
 
-/// Box of an instance, not enlarged, world.
+/// Box of an instance, wherever it moves to, not enlarged, world.
 Box3 instance_bounds(const InstanceGeometry& instance);
 
 /// A new geometry of one primitive, not committed. Hits have the instance's geometry number as instID.

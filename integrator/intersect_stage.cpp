@@ -61,7 +61,15 @@ void classify(const KernelGlobals& g,
     queue_push(lights, path);
     return;
   }
-  const InstanceView& instance = g.instances[object];
+  const InstanceView& centre = g.instances[object];
+  if ((centre.flags & (kMoves | kDeforms)) != 0) {
+    const float time = path_time(state, path);
+    state.motion.instances[path] = accel.motion().instance_at(centre, time);
+    if ((centre.flags & kDeforms) != 0) {
+      state.motion.meshes[path] = accel.motion().mesh_at(centre, g.meshes[centre.mesh_index], time);
+    }
+  }
+  const InstanceView& instance = path_instance(g, state, path);
   if ((instance.flags & kDisplaced) != 0) {
     const DisplacedPoint point = accel.displacements().resolve(object, instance, state.hit_triangle[path],
                                                                {state.hit_u[path], state.hit_v[path], Ng_x});
@@ -104,7 +112,7 @@ void intersect_packet(const KernelGlobals& g,
     packet.ray.dir_z[i] = state.D.z[path];
     packet.ray.tnear[i] = state.t_min[path];
     packet.ray.tfar[i] = state.t_max[path];
-    packet.ray.time[i] = 0.0f;
+    packet.ray.time[i] = path_time(state, path);
     packet.ray.mask[i] = kRayCamera;
     packet.ray.id[i] = static_cast<unsigned>(i);
     packet.ray.flags[i] = 0;
@@ -139,6 +147,7 @@ struct ShadowContext {
   EmbreeContext embree;
   const KernelGlobals* globals = nullptr;
   const DisplacementSet* displacements = nullptr;
+  const SceneMotion* motion = nullptr;
   Vec3f visibility{1, 1, 1};
   Vec3f O, D;                                 ///< of the ray, world: filters see it in the space of the instance
   std::uint32_t depths = 0, transparent = 0;  ///< see GraphRay
@@ -208,7 +217,7 @@ void intersect_closest(const KernelGlobals& g,
     ray.ray.dir_z = state.D.z[path];
     ray.ray.tnear = state.t_min[path];
     ray.ray.tfar = state.t_max[path];
-    ray.ray.time = 0.0f;
+    ray.ray.time = path_time(state, path);
     ray.ray.mask = mask_of(state, path);
     ray.ray.id = 0;
     ray.ray.flags = 0;
@@ -243,6 +252,7 @@ void intersect_shadow(const KernelGlobals& g,
   ShadowContext context;
   context.globals = &g;
   context.displacements = &accel.displacements();
+  context.motion = &accel.motion();
   embree_context_init(context.embree, false);
   context.embree.displacement = &displacement.total;
   context.embree.texels = accel.displacements().texels();
@@ -264,7 +274,7 @@ void intersect_shadow(const KernelGlobals& g,
     ray.dir_z = context.D.z;
     ray.tnear = kLeastDistance;
     ray.tfar = shadow.t_max[i];
-    ray.time = 0.0f;
+    ray.time = path_time(state, shadow.path[i]);
     ray.mask = kRayShadow;
     ray.id = 0;
     ray.flags = 0;
@@ -288,12 +298,15 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
     const unsigned instance_id = RTCHitN_instID(arguments->hit, arguments->N, i, 0);
     const unsigned object =
         instance_id != RTC_INVALID_GEOMETRY_ID ? instance_id : RTCHitN_geomID(arguments->hit, arguments->N, i);
-    const InstanceView& instance = g.instances[object];
+    const float time = RTCRayN_time(arguments->ray, arguments->N, i);
+    const InstanceView& centre = g.instances[object];
+    const bool moves = (centre.flags & (kMoves | kDeforms)) != 0;
+    const InstanceView instance = moves ? context->motion->instance_at(centre, time) : centre;
     DisplacedPoint at{RTCHitN_primID(arguments->hit, arguments->N, i), RTCHitN_u(arguments->hit, arguments->N, i),
                       RTCHitN_v(arguments->hit, arguments->N, i)};
     if ((instance.flags & kDisplaced) != 0) at = context->displacements->locate(object, at.triangle, at.u, at.v);
     const Material& material = g.materials[instance.material_index];
-    const MeshView& mesh = g.meshes[instance.mesh_index];
+    const MeshView mesh = context->motion->mesh_at(instance, g.meshes[instance.mesh_index], time);
     Vec3f passes;
     if (material.transparency_index >= 0) {
       const SurfaceHit hit = surface_hit_make(mesh, instance, at.triangle, at.u, at.v);

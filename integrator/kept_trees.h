@@ -12,7 +12,7 @@
 #include "displacement/content_hash.h"
 #include "displacement/embree.h"
 #include "integrator/instance_geometry.h"
-#include "kernel/light/light.h"
+#include "integrator/light_geometry.h"
 
 namespace relief {
 
@@ -22,7 +22,7 @@ using TreePointer = std::shared_ptr<RTCSceneTy>;
 /// The tree of a whole scene with what its geometry refers to. Must stay where it is.
 struct SceneTree {
   std::vector<std::unique_ptr<InstanceGeometry>> instances;  ///< an instance; null: in place, or Embree's own
-  std::vector<std::unique_ptr<Light>> round_lights;          ///< user data of disks and balls
+  std::vector<std::unique_ptr<LightGeometry>> lights;        ///< those that are no rectangles, or move
   std::vector<TreePointer> parts;                            ///< that are instanced
   float pad = 0;                                             ///< of its boxes, metres
   ContentHash content;                                       ///< of all that it is made of; unused if nothing is kept

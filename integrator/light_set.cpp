@@ -49,6 +49,7 @@ LightSet light_set_make(const Scene& scene,
   if (scene.environment.hidden_from != 0) set.environment_irradiance = {};
 
   set.lights = scene.lights;
+  if (globals != nullptr) set.motions = globals->lights.motions;
   if (globals != nullptr) lamps_scale(*globals, set.lights);
   const std::vector<float> scales = emissive_meshes_add(scene, textures, globals, set);
   light_tree_build(set, scales);
@@ -82,6 +83,7 @@ LightsView LightSet::view() const
   v.environment_irradiance = environment_irradiance;
   v.environment_yields_to = environment_yields_to;
   v.environment_casts_caustics = environment_casts_caustics;
+  v.motions = motions;
   return v;
 }
 

@@ -40,6 +40,7 @@ struct LightSet {
   double environment_flux_density = 0;           ///< π × mean radiance of all of it, W/m²
   double environment_solid_angle = 0;      ///< (∫L)² / ∫L²: how wide an even light of its contrast would be, sr
   bool environment_casts_caustics = true;  ///< as Light::casts_caustics
+  const MotionView* motions = nullptr;     ///< as LightsView::motions
 
   /// @return false: nothing can be sampled
   bool any() const { return !tree_blocks.empty() || !suns.empty() || environment_irradiance.mean > 0; }
@@ -53,8 +54,8 @@ struct LightSet {
 /// Gathers the lights of a scene and builds the tree over the finite ones, in parallel.
 ///
 /// A mesh emits when its material's emission is not zero. Meshes that are displaced are left out (their surface is not
-/// where the triangles are), and so are unlit ones (they light nothing in glTF's sense): paths that hit them see their
-/// emission all the same. Triangles emit from the side glTF calls front, which a mirroring instance turns with the winding.
+/// where the triangles are), and so are unlit ones (they light nothing in glTF's sense) and those that move or deform while the
+/// shutter is open: paths that hit them see their emission all the same. Triangles emit from the side glTF calls front, which a mirroring instance turns with the winding.
 /// @param textures  views of scene.textures, for the mean of emission maps
 /// @param density   of the environment: kExcess where paths that follow the BSDF find what it leaves out, which for a
 ///                  constant environment beside suns is all

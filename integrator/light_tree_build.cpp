@@ -146,6 +146,39 @@ LightBounds light_bounds(const Light& light, float scale)
   return bounds;
 }
 
+/// Around a light wherever it is while the shutter is open.
+LightBounds moving_bounds(const LightSet& set, std::uint32_t index, float scale)
+{
+  LightsView view;
+  view.lights = set.lights.data();
+  view.motions = set.motions;
+  // What lies between two of these times is covered by what they differ by.
+  constexpr int kTimes = 64;
+  LightBounds all, before;
+  float farthest = 0, widest = 0;
+  Vec3f slope;
+  for (int i = 0; i <= kTimes; ++i) {
+    Light storage;
+    const Light& light = lights_at(view, {static_cast<std::int32_t>(index)}, storage, static_cast<float>(i) / kTimes);
+    const LightBounds one = light_bounds(light, scale);
+    if (!(one.intensity > 0.0f)) return {};
+    if (i > 0) {
+      farthest = std::max({farthest, length(one.low - before.low), length(one.high - before.high)});
+      widest = std::max(widest, std::acos(std::clamp(dot(one.spread.axis, before.spread.axis), -1.0f, 1.0f)));
+    }
+    slope += one.profile_slope * (1.0f / (kTimes + 1));
+    all = bounds_union(all, one);
+    before = one;
+  }
+  all.low = all.low - splat3(farthest);
+  all.high = all.high + splat3(farthest);
+  all.spread.angle = std::min(all.spread.angle + widest, kPiAngle);
+  all.intensity = before.intensity;
+  all.profile_mean = before.profile_mean;
+  all.profile_slope = slope;
+  return all;
+}
+
 struct BuildLight {
   LightBounds bounds;
   Vec3f centre;
@@ -494,7 +527,8 @@ void light_tree_build(LightSet& set, std::span<const float> intensity_scales)
       i += set.shared[next_shared++].num_lights - 1;
       continue;
     }
-    const LightBounds bounds = light_bounds(light, intensity_scales.empty() ? 1.0f : intensity_scales[i]);
+    const float scale = intensity_scales.empty() ? 1.0f : intensity_scales[i];
+    const LightBounds bounds = light.motion_index >= 0 ? moving_bounds(set, index, scale) : light_bounds(light, scale);
     if (bounds.intensity > 0.0f) finite.push_back({bounds, bounds_centre(bounds), index | kLightTreeLeaf});
   }
 

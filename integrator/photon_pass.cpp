@@ -8,6 +8,8 @@
 #include <tbb/parallel_for.h>
 
 #include "integrator/flush_denormals.h"
+#include "kernel/sample/dimensions.h"
+#include "kernel/sample/sobol.h"
 
 namespace relief {
 
@@ -25,9 +27,19 @@ Box3 instance_bounds(const SceneContext& context, std::size_t index)
 {
   const Instance& instance = context.scene.instances[index];
   Box3 box = box_empty();
-  const auto add = [&](Vec3f P_object) {
-    const Vec3f P = transform_point(instance.world_from_object, P_object);
+  const auto add_placed = [&](const Affine3& placed, Vec3f P_object) {
+    const Vec3f P = transform_point(placed, P_object);
     box = box_union(box, {P, P});
+  };
+  const MotionView motion = context.motion.view(instance.motion_index);
+  double stray = 0;
+  const auto add = [&](Vec3f P_object) {
+    if (motion.num_keys == 0) return add_placed(instance.world_from_object, P_object);
+    const auto reach = static_cast<double>(length(P_object));
+    for (std::uint32_t key = 0; key < motion.num_keys; ++key) {
+      add_placed(motion_at(motion, static_cast<float>(key) / static_cast<float>(motion.num_keys - 1)), P_object);
+      if (key > 0) stray = std::max(stray, motion_stray(motion.keys[key - 1], motion.keys[key], reach));
+    }
   };
   if (const int displaced = context.displacements.geometry_index(index); displaced >= 0) {
     const Box3 local = context.accel->displaced_bounds(static_cast<std::size_t>(displaced));
@@ -36,9 +48,13 @@ Box3 instance_bounds(const SceneContext& context, std::size_t index)
            (corner & 4) != 0 ? local.high.z : local.low.z});
     }
   } else {
-    for (const Vec3f& P : context.scene.meshes[static_cast<std::size_t>(instance.mesh_index)].P) add(P);
+    const Mesh& mesh = context.scene.meshes[static_cast<std::size_t>(instance.mesh_index)];
+    for (const Vec3f& P : mesh.P) add(P);
+    for (const MeshStep& step : mesh.steps) {
+      for (const Vec3f& P : step.P) add(P);
+    }
   }
-  const Vec3f margin = splat3(kBoxMargin * box_radius(box));
+  const Vec3f margin = splat3(kBoxMargin * box_radius(box) + static_cast<float>(stray));
   return {box.low - margin, box.high + margin};
 }
 
@@ -105,6 +121,19 @@ double flux_estimate(const Light& light, const Box3& box)
   return cosine > 0.0f ? emitted * static_cast<double>(light.area * std::max(cosine, 0.05f)) * omega : 0.0;
 }
 
+/// The most of it while the shutter is open, for a light that moves.
+double most_flux(const LightsView& lights, LightRef ref, const Box3& box)
+{
+  Light storage;
+  if (lights.lights[ref.light_index].motion_index < 0) return flux_estimate(lights_at(lights, ref, storage), box);
+  constexpr int kTimes = 16;
+  double most = 0;
+  for (int i = 0; i <= kTimes; ++i) {
+    most = std::max(most, flux_estimate(lights_at(lights, ref, storage, static_cast<float>(i) / kTimes), box));
+  }
+  return most;
+}
+
 }  // namespace
 
 PhotonSourcesView PhotonSources::view(double photons_a_pass) const
@@ -159,13 +188,12 @@ PhotonSources photon_sources_make(const SceneContext& context)
   out.scene_box = context.accel->bounds();
   const LightsView light_view = context.lights.view();
   for (const LightRef light : lights) {
-    Light storage;
     for (std::size_t t = 0; t < out.targets.size(); ++t) {
       const Box3& box = out.targets[t];
       const Vec3f size = box.high - box.low;
       const double surface = 2.0 * static_cast<double>(size.x * size.y + size.y * size.z + size.z * size.x);
-      const double flux = light.light_index < 0 ? context.lights.environment_flux_density * surface
-                                                : flux_estimate(lights_at(light_view, light, storage), box);
+      const double flux =
+          light.light_index < 0 ? context.lights.environment_flux_density * surface : most_flux(light_view, light, box);
       if (!(flux > 0)) continue;
       out.sources.push_back({light, static_cast<std::uint32_t>(t)});
       out.cdf.push_back(std::min(flux, 1e30));
@@ -228,6 +256,9 @@ void PhotonPass::next(KernelGlobals& g,
 {
   const auto start = std::chrono::steady_clock::now();
   g.caustics.map = {};
+  // Every pixel's sample of this pass, and all of its photons, are of one time. No pixel of an image is there.
+  g.caustics.time =
+      sample_1d(sample_pixel_hash(g.seed, -2, -1), sample_sequence_index(passes_, g.log2_stream), kTimeDimension);
   if (!sources_.sources.empty()) {
     if (passes_ == 0) keep_to_memory(g, stages, worker());
     const PhotonSourcesView view = sources_.view(photons_a_pass_);

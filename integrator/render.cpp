@@ -171,6 +171,7 @@ KernelGlobals render_globals(const SceneContext& context, const RenderOptions& o
   KernelGlobals g = context.globals;
   g.camera = options.camera;
   g.camera_forward = normalize(-options.camera.world_from_camera.z);
+  g.camera_motion = context.motion.view(options.camera_motion_index);
   g.graph_scene.camera = options.camera;
   g.graph_scene.camera_from_world = inverse(options.camera.world_from_camera);
   // A path counts in bytes; between mirrors that take nothing only this ends it.
@@ -293,10 +294,10 @@ void fill_film(Statistics& stats, const Film& film, const RenderSettings& settin
 }
 
 /// What all workers have done.
-void fill_work(Statistics& stats, const Workers& workers, bool caustics, const FilmWindow& window)
+void fill_work(Statistics& stats, const Workers& workers, std::size_t worker_bytes, const FilmWindow& window)
 {
   stats.threads = tbb::this_task_arena::max_concurrency();
-  stats.path_state_bytes = workers.size() * Wavefront::bytes(caustics);
+  stats.path_state_bytes = workers.size() * worker_bytes;
   RenderState work;
   state_add_work(work, workers);
   stats.counters = work.counters;
@@ -369,7 +370,7 @@ RenderedImage render(const Scene& scene,
   SamplingEnd end(stop,
                   options.time_limit_seconds > 0 ? std::max(1e-3, options.time_limit_seconds - earlier_seconds) : 0.0);
   Workers workers([&] {
-    Wavefront worker(caustics);
+    Wavefront worker(caustics, context.motion.is_open());
     worker.stop = &end.reached();
     return worker;
   });
@@ -510,7 +511,7 @@ RenderedImage render(const Scene& scene,
   fill_kept(stats.kept, kept, context);
   fill_film(stats, film, settings);
   if (options.keeps_errors) stats.errors = std::move(errors).finish(stats);
-  fill_work(stats, workers, caustics, window);
+  fill_work(stats, workers, Wavefront::bytes(caustics, context.motion.is_open()), window);
   std::optional<SavedRender> saved;
   if (options.checkpoint && stats.stop_reason == "interrupted" && stats.samples_per_pixel > 0) {
     saved = {state(), window.width, window.height, {film.sums().begin(), film.sums().end()}};

@@ -17,6 +17,7 @@ namespace relief {
 struct RenderOptions {
   RenderSettings settings;                                 ///< the scene's, with the command line's changes
   Camera camera;                                           ///< half_width already set for the image's aspect ratio
+  int camera_motion_index = -1;                            ///< SceneCamera::motion_index
   int crop_x0 = 0, crop_y0 = 0, crop_x1 = 0, crop_y1 = 0;  ///< pixels, half open; all 0: the whole image
   /// Of settings.samples, only these are taken; 0 of them: all. The first is a multiple of four, so that halves and quarters
   /// of the samples, which the error is estimated by, are as large as without the samples before.

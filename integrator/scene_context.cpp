@@ -105,8 +105,8 @@ SceneContext::SceneContext(const Scene& loaded,
     surface_kernel.push_back(static_cast<std::uint8_t>(surface_kernel_index(material, decision.enabled)));
   }
   bsdf_tables_make(*bsdf_tables, features);
-  accel =
-      std::make_unique<Accel>(scene, lights.lights, lights.area_lights, displacements, shadow_filter, std::move(trees));
+  accel = std::make_unique<Accel>(scene, lights.lights, lights.area_lights, displacements, *this, shadow_filter,
+                                  std::move(trees));
 
   globals.graph_scene.rays = graph_rays_make(*accel);
   globals.area_light_index = lights.area_lights.data();
@@ -126,13 +126,14 @@ SceneContext::SceneContext(const Scene& loaded,
 void SceneContext::make_views()
 {
   for (std::size_t i = 0; i < instances.size(); ++i) {
-    if (displacements.geometry_index(i) >= 0) instances[i].flags |= kDisplaced | kTracedInObjectSpace;
+    if (displacements.geometry_index(i) < 0) continue;
+    instances[i].flags |= kDisplaced | kTracedInObjectSpace;
+    instances[i].flags &= ~std::uint32_t{kDeforms};
   }
   globals.meshes = meshes.data();
   globals.instances = instances.data();
   globals.num_instances = static_cast<std::uint32_t>(instances.size());
   for (const GraphProgram& graph : scene.graphs) graphs.push_back(graph.view());
-  globals.graph_scene.instances = instances.data();
   globals.graph_scene.columns = instance_columns.data();
   globals.graph_scene.num_columns = static_cast<std::uint32_t>(instance_columns.size());
   globals.materials = scene.materials.data();
@@ -140,6 +141,7 @@ void SceneContext::make_views()
   globals.run_graph = stage_table_select().run_graph;
   globals.emitter_radiance = emitter_graph_radiance;
   globals.lamps = scene.lamps.data();
+  globals.lights.motions = motion.views();
   globals.textures = scene.textures->views().data();
 }
 
@@ -148,6 +150,7 @@ void SceneContext::fill(Statistics& stats) const
   for (const Mesh& mesh : scene.meshes) stats.mesh_bytes += mesh.bytes();
   stats.mesh_bytes += instances.size() * sizeof(InstanceView);
   stats.texture_bytes = scene.textures->bytes();
+  stats.mesh_bytes += motion.bytes();
   stats.light_bytes = lights.bytes();
   stats.bvh_bytes = accel->bytes();
   stats.displacement = {displacements.method_names(),

@@ -2,7 +2,7 @@
 
 namespace relief {
 
-SceneViews::SceneViews(const Scene& scene)
+SceneViews::SceneViews(const Scene& scene) : motion(scene)
 {
   std::vector<int> uses(scene.meshes.size(), 0);
   for (const Instance& instance : scene.instances) ++uses[static_cast<std::size_t>(instance.mesh_index)];
@@ -13,7 +13,11 @@ SceneViews::SceneViews(const Scene& scene)
     view.mesh_index = instance.mesh_index;
     view.material_index = instance.material_index;
     view.flags = instance.flags;
-    if (uses[static_cast<std::size_t>(instance.mesh_index)] > 1) view.flags |= kTracedInObjectSpace;
+    view.index = static_cast<std::uint32_t>(instances.size());
+    if (instance.motion_index >= 0) view.flags |= kMoves;
+    if (!scene.meshes[static_cast<std::size_t>(instance.mesh_index)].steps.empty()) view.flags |= kDeforms;
+    const bool takes_time = (view.flags & (kMoves | kDeforms)) != 0;
+    if (takes_time || uses[static_cast<std::size_t>(instance.mesh_index)] > 1) view.flags |= kTracedInObjectSpace;
     instances.push_back(view);
   }
   std::size_t num_columns = 0;

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "integrator/scene_motion.h"
 #include "kernel/graph/graph_scene.h"
 #include "kernel/shape/mesh_view.h"
 #include "scene/scene.h"
@@ -15,6 +16,7 @@ struct SceneViews {
   SceneViews(const SceneViews&) = delete;
   SceneViews& operator=(const SceneViews&) = delete;
 
+  SceneMotion motion;
   std::vector<MeshView> meshes;
   std::vector<InstanceView> instances;
   std::vector<MeshColumn> mesh_columns;             ///< of all meshes, one mesh's side by side

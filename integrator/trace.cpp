@@ -14,6 +14,9 @@ namespace relief {
 
 namespace {
 
+/// Single rays see what moves as it is when the shutter is half done.
+constexpr float kTraceTime = 0.5f;
+
 /// @param visits  may be null
 TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits* visits)
 {
@@ -39,7 +42,7 @@ TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits
     query.ray.dir_z = D.z;
     query.ray.tnear = t_min;
     query.ray.tfar = t_max;
-    query.ray.time = 0.0f;
+    query.ray.time = kTraceTime;
     query.ray.mask = kRayBounce;
     query.ray.id = 0;
     query.ray.flags = 0;
@@ -52,14 +55,15 @@ TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits
       t_min = next_float_up(query.ray.tfar);
       continue;
     }
-    const InstanceView& instance = context.instances[object];
+    const InstanceView instance = context.motion.instance_at(context.instances[object], kTraceTime);
     DisplacedPoint point{query.hit.primID, query.hit.u, query.hit.v};
     const bool displaced = (instance.flags & kDisplaced) != 0;
     if (displaced) {
       point =
           context.displacements.resolve(object, instance, point.triangle, {query.hit.u, query.hit.v, query.hit.Ng_x});
     }
-    const MeshView& mesh = context.meshes[static_cast<std::size_t>(instance.mesh_index)];
+    const MeshView mesh =
+        context.motion.mesh_at(instance, context.meshes[static_cast<std::size_t>(instance.mesh_index)], kTraceTime);
     const SurfaceHit surface = displaced ? surface_hit_displaced(mesh, instance, point.triangle, point.u, point.v,
                                                                  {point.P, point.Ng, point.Ns, point.leave})
                                          : surface_hit_make(mesh, instance, point.triangle, point.u, point.v);
@@ -123,7 +127,7 @@ PathReplay trace_path(const Scene& scene, const RenderOptions& options, const Pi
     const RenderSettings& settings = options.settings;
     photons.emplace(context, settings.caustics, static_cast<double>(settings.width) * settings.height);
     const std::atomic<bool> stop{false};
-    tbb::enumerable_thread_specific<Wavefront> workers([] { return Wavefront(true); });
+    tbb::enumerable_thread_specific<Wavefront> workers([&] { return Wavefront(true, context.motion.is_open()); });
     for (std::uint32_t pass = 0; pass <= at.sample_index; ++pass) {
       photons->next(
           g, stages, [&]() -> Wavefront& { return workers.local(); }, stop, [] {});
@@ -132,7 +136,7 @@ PathReplay trace_path(const Scene& scene, const RenderOptions& options, const Pi
 
   PathReplay replay;
   replay.warnings = context.displacements.warnings();
-  Wavefront wavefront(caustics);
+  Wavefront wavefront(caustics, context.motion.is_open());
   wavefront.recorder = &replay.rays;
   // The whole tile, as in the render: forks of its paths share the room of its batch.
   const int x = at.x - window.x0, y = at.y - window.y0;

@@ -14,14 +14,21 @@ using Clock = std::chrono::steady_clock;
 
 }  // namespace
 
-std::size_t Wavefront::bytes(bool caustics) { return sizeof(Memory) + (caustics ? sizeof(CausticMemory) : 0u); }
+std::size_t Wavefront::bytes(bool caustics, bool motion)
+{
+  return sizeof(Memory) + (caustics ? sizeof(CausticMemory) : 0u) + (motion ? sizeof(MotionMemory) : 0u);
+}
 
-Wavefront::Wavefront(bool caustics)
+Wavefront::Wavefront(bool caustics, bool motion)
     : memory_(std::make_unique_for_overwrite<Memory>()), state_(memory_->state), shadow_(memory_->shadow)
 {
   auto queue = std::begin(memory_->queues);
   for (QueueView* q : {&active_, &next_, &lights_, &background_}) q->paths = *queue++;
   for (QueueView& q : surfaces_) q.paths = *queue++;
+  if (motion) {
+    motion_memory_ = std::make_unique_for_overwrite<MotionMemory>();
+    state_.motion = {motion_memory_->time, motion_memory_->instances, motion_memory_->meshes};
+  }
   if (!caustics) return;
   caustic_memory_ = std::make_unique_for_overwrite<CausticMemory>();
   CausticStateView& c = state_.caustic;

@@ -35,7 +35,8 @@ struct RecordedRay {
 class Wavefront {
  public:
   /// @param caustics  camera paths will gather photons
-  explicit Wavefront(bool caustics);
+  /// @param motion    paths have a time
+  Wavefront(bool caustics, bool motion);
 
   /// Renders a batch of at most kBatchPaths paths into the film.
   /// @return  false if `stop` ended it: what the film got of it must not count
@@ -61,7 +62,7 @@ class Wavefront {
   /// @param pixel  of the film window, in the batch
   Vec3f first_radiance(std::uint32_t pixel) const;
 
-  static std::size_t bytes(bool caustics);
+  static std::size_t bytes(bool caustics, bool motion);
 
   std::vector<RecordedRay>* recorder = nullptr;  ///< receives every ray of the batch, if set
   const std::atomic<bool>* stop = nullptr;       ///< true: searches in displaced meshes are given up; null: never
@@ -92,8 +93,15 @@ class Wavefront {
     std::uint32_t wi[kColumnEntries], bounces[kColumnEntries], root[kColumnEntries];
   };
 
+  struct MotionMemory {
+    float time[kColumnEntries];
+    InstanceView instances[kColumnEntries];
+    MeshView meshes[kColumnEntries];
+  };
+
   std::unique_ptr<Memory> memory_;
   std::unique_ptr<CausticMemory> caustic_memory_;
+  std::unique_ptr<MotionMemory> motion_memory_;
   PathState& state_;
   ShadowQueue& shadow_;
   QueueView active_, next_, lights_, background_;

@@ -10,6 +10,7 @@
 #include "kernel/graph/graph_registers.h"
 #include "kernel/graph/graph_scene.h"
 #include "kernel/light/light_sampler.h"
+#include "kernel/math/motion.h"
 #include "kernel/photon/photon.h"
 #include "kernel/shape/mesh_view.h"
 #include "kernel/texture/texture_view.h"
@@ -54,7 +55,8 @@ struct KernelGlobals {
   const BsdfTables* bsdf_tables = nullptr;
   CausticsView caustics;
   Camera camera;
-  Vec3f camera_forward;  ///< unit, world: the axis that depths are measured along
+  MotionView camera_motion;  ///< of `camera`, which stands where it is when the shutter is half done
+  Vec3f camera_forward;      ///< unit, world: the axis that depths are measured along
   BounceLimits limits;
   float clamp_indirect = 0;  ///< 0: off
   LightTechnique light_technique = LightTechnique::kMis;

@@ -47,7 +47,7 @@ Value slerp(const Value& from, Value to, double t)
 /// Group `group` of key `key` as numbers.
 Value value_at(const AnimationCurve& curve, std::size_t key, std::size_t group, std::size_t num_groups)
 {
-  const std::size_t n = curve.is_rotation ? 4 : 3;
+  const auto n = static_cast<std::size_t>(curve.is_rotation ? 4 : curve.num_components);
   Value out{};
   for (std::size_t i = 0; i < n; ++i) {
     out[i] = static_cast<double>(curve.values[(key * num_groups + group) * n + i]);
@@ -55,22 +55,26 @@ Value value_at(const AnimationCurve& curve, std::size_t key, std::size_t group, 
   return out;
 }
 
+/// @param values_a_key  1, or how many weights of morph targets stand one after the other
 AnimationCurve read_curve(const GltfDocument& document,
                           const tinygltf::AnimationSampler& sampler,
                           bool is_rotation,
+                          int num_components,
+                          std::size_t values_a_key,
                           const std::string& path)
 {
   AnimationCurve curve;
   curve.is_rotation = is_rotation;
+  curve.num_components = num_components;
   curve.interpolation = sampler.interpolation == "STEP"          ? Interpolation::kStep
                         : sampler.interpolation == "CUBICSPLINE" ? Interpolation::kCubicSpline
                                                                  : Interpolation::kLinear;
   const AccessorView input =
       accessor_open(document, sampler.input, AccessorKind::kFloatOrNormalized, 1, 1, path + "/input");
-  const int n = is_rotation ? 4 : 3;
+  const int n = is_rotation ? 4 : num_components;
   const AccessorView output =
       accessor_open(document, sampler.output, AccessorKind::kFloatOrNormalized, n, n, path + "/output");
-  const std::size_t groups = curve.interpolation == Interpolation::kCubicSpline ? 3 : 1;
+  const std::size_t groups = values_a_key * (curve.interpolation == Interpolation::kCubicSpline ? 3 : 1);
   if (output.count != input.count * groups) {
     throw SceneError(document.file, path + "/output",
                      std::to_string(input.count * groups) + " elements (" + std::to_string(groups) + " a key)",
@@ -87,6 +91,26 @@ AnimationCurve read_curve(const GltfDocument& document,
   curve.values.resize(output.count * static_cast<std::size_t>(n));
   accessor_read_floats(output, 0, output.count, curve.values.data());
   return curve;
+}
+
+/// Morph targets of a mesh: of its first primitive, as all of its primitives have the same number.
+std::size_t num_targets(const GltfDocument& document, int mesh)
+{
+  return mesh < 0 ? 0 : document.core.meshes[static_cast<std::size_t>(mesh)].primitives.front().targets.size();
+}
+
+/// Weights of a mesh's targets at a time.
+/// @param curve  of one component, with `count` values a key
+std::vector<double> sample_weights(const AnimationCurve& all, std::size_t count, double time_seconds)
+{
+  std::vector<double> out;
+  const std::size_t num_values = all.values.size() / count;
+  for (std::size_t target = 0; target < count; ++target) {
+    AnimationCurve one{all.interpolation, false, all.times, std::vector<float>(num_values), 1};
+    for (std::size_t i = 0; i < num_values; ++i) one.values[i] = all.values[i * count + target];
+    out.push_back(animation_sample(one, time_seconds)[0]);
+  }
+  return out;
 }
 
 }  // namespace
@@ -133,27 +157,34 @@ std::unordered_map<int, AnimatedPose> animation_pose(const GltfDocument& documen
       const std::string channel_path = path + "/channels/" + std::to_string(c);
       const std::string& target = channel.target_path;
       const bool is_rotation = target == "rotation", is_scale = target == "scale";
-      if (channel.target_node < 0 || (!is_rotation && !is_scale && target != "translation")) {
+      const std::size_t count =
+          channel.target_node < 0 || target != "weights"
+              ? 0
+              : num_targets(document, document.core.nodes[static_cast<std::size_t>(channel.target_node)].mesh);
+      const bool is_weights = count > 0;
+      if (channel.target_node < 0 || (!is_rotation && !is_scale && !is_weights && target != "translation")) {
         warnings.add(document.file + ": animation of \"" + target + "\" is not read");
         continue;
       }
       const auto node = static_cast<std::size_t>(channel.target_node);
-      if (!document.core.nodes[node].matrix.empty()) {
+      if (!is_weights && !document.core.nodes[node].matrix.empty()) {
         throw SceneError(document.file, channel_path + "/target/node", "a node with translation, rotation and scale",
                          "node " + std::to_string(node) + " with a matrix");
       }
       const std::string sampler_path = path + "/samplers/" + std::to_string(channel.sampler);
       const AnimationCurve curve = read_curve(document, animation.samplers[static_cast<std::size_t>(channel.sampler)],
-                                              is_rotation, sampler_path);
-      const Value v = animation_sample(curve, time_seconds);
+                                              is_rotation, is_weights ? 1 : 3, is_weights ? count : 1, sampler_path);
       AnimatedPose& pose = poses[channel.target_node];
-      const bool taken = is_rotation ? pose.rotation.has_value()
-                         : is_scale  ? pose.scale.has_value()
-                                     : pose.translation.has_value();
+      const bool taken = is_rotation  ? pose.rotation.has_value()
+                         : is_scale   ? pose.scale.has_value()
+                         : is_weights ? !pose.weights.empty()
+                                      : pose.translation.has_value();
       if (taken) {
         warnings.add(document.file + ": " + channel_path + ": " + target + " of node " + std::to_string(node) +
                      " is already animated by an earlier channel, which is used");
-      } else if (is_rotation) {
+      } else if (is_weights) {
+        pose.weights = sample_weights(curve, count, time_seconds);
+      } else if (const Value v = animation_sample(curve, time_seconds); is_rotation) {
         pose.rotation = v;
       } else {
         (is_scale ? pose.scale : pose.translation) = Vec3d{v[0], v[1], v[2]};

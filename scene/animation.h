@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <unordered_map>
+#include <vector>
 
 #include "scene/gltf_document.h"
 #include "scene/scene.h"
@@ -14,6 +15,7 @@ namespace relief {
 struct AnimatedPose {
   std::optional<Vec3d> translation, scale;
   std::optional<Quaternion> rotation;
+  std::vector<double> weights;  ///< of morph targets; empty: absent
 };
 
 enum class Interpolation : std::uint8_t { kStep, kLinear, kCubicSpline };
@@ -23,8 +25,9 @@ struct AnimationCurve {
   Interpolation interpolation = Interpolation::kLinear;
   bool is_rotation = false;
   std::vector<float> times;  ///< seconds, strictly increasing, not empty
-  /// 3 components a key (4 for rotations); with kCubicSpline three such groups a key: in-tangent, value, out-tangent.
+  /// num_components a key (4 for rotations); with kCubicSpline three such groups a key: in-tangent, value, out-tangent.
   std::vector<float> values;
+  int num_components = 3;  ///< of what is no rotation
 };
 
 /// Value at a time; before the first key the first value, after the last key the last one.

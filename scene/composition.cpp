@@ -195,6 +195,11 @@ class Walk {
     placed.node_index = pending.node_index;
     placed.animated = pending.animated;
     placed.defect_path = pending.defect_path;
+    const tinygltf::Node& node = document.core.nodes[static_cast<std::size_t>(pending.node_index)];
+    placed.weights = node.weights;
+    if (placed.weights.empty() && node.mesh >= 0) {
+      placed.weights = document.core.meshes[static_cast<std::size_t>(node.mesh)].weights;
+    }
     const Transform local = local_transform(pending, placed);
     placed.world = pending.parent_world * local;
     if (placed.defect_path.empty() && transform_defect(local) != TransformDefect::kNone) {
@@ -204,7 +209,7 @@ class Walk {
     visit_(placed);
 
     const Pending child{pending.scope, 0, placed.world, placed.object, placed.animated, placed.defect_path};
-    push_all(document.core.nodes[static_cast<std::size_t>(pending.node_index)].children, child);
+    push_all(node.children, child);
     push_reference(child, pending.node_index);
   }
 
@@ -227,6 +232,7 @@ class Walk {
       trs.translation = pose->translation.value_or(trs.translation);
       trs.rotation = pose->rotation.value_or(trs.rotation);
       trs.scale = pose->scale.value_or(trs.scale);
+      if (!pose->weights.empty()) placed.weights = pose->weights;
     }
     // From the innermost reference outwards, so that the outermost file has the last word.
     for (const Scope* s = pending.scope.get(); s != nullptr; s = s->outer.get()) {

@@ -54,8 +54,9 @@ struct PlacedNode {
   ObjectSettings object;
   /// Of the references that lead here, the innermost first: the last one that says something counts.
   std::vector<std::shared_ptr<const MaterialRule>> material_rules;
-  bool animated = false;    ///< the node or one above it is animated at the time asked for
-  std::string defect_path;  ///< JSON path of the topmost node here that has a singular transform; empty: none
+  std::vector<double> weights;  ///< of its mesh's morph targets at the time asked for; empty: all 0
+  bool animated = false;        ///< the node or one above it is animated at the time asked for
+  std::string defect_path;      ///< JSON path of the topmost node here that has a singular transform; empty: none
 };
 
 /// What stands in the place of a primitive's material; nothing: that one itself.

@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <iterator>
 #include <limits>
 #include <numbers>
+#include <system_error>
 
 namespace relief {
 namespace {
@@ -34,6 +36,17 @@ SceneCamera perspective(const char* name, const Affine3& frame, double half_heig
 }
 
 }  // namespace
+
+std::optional<std::size_t> camera_named(std::span<const SceneCamera> cameras, const std::string& text)
+{
+  if (text.empty() && !cameras.empty()) return 0;
+  const auto named = std::find_if(cameras.begin(), cameras.end(), [&](const SceneCamera& c) { return c.name == text; });
+  if (named != cameras.end()) return static_cast<std::size_t>(named - cameras.begin());
+  std::size_t index = 0;
+  const auto read = std::from_chars(text.data(), text.data() + text.size(), index);
+  if (read.ec == std::errc() && read.ptr == text.data() + text.size() && index < cameras.size()) return index;
+  return {};
+}
 
 Affine3 camera_frame(Vec3f z, Vec3f up, Vec3f P)
 {

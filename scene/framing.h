@@ -2,6 +2,8 @@
 #pragma once
 
 #include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "scene/scene.h"
@@ -14,9 +16,14 @@ struct CameraChoice {
   std::optional<Vec3f> look_at;    ///< empty: the middle of everything; used only with look_from
   double fov = 0;                  ///< vertical field of view in degrees, of a camera that is made here; 0: 40
   float image_aspect = 0;          ///< width / height; 0: of the scene's resolution
+  std::string name;                ///< of a camera of the scene, or its number; empty: the first
+  std::optional<float> shutter;    ///< frames that it is open; empty: as the camera has it
 
   bool operator==(const CameraChoice&) const = default;
 };
+
+/// Position of the camera of that name, or of that number if no camera is called so; the first one's if nothing is said.
+std::optional<std::size_t> camera_named(std::span<const SceneCamera> cameras, const std::string& text);
 
 /// Right-handed orthonormal frame that looks along −z, its y as near as possible to `up`.
 Affine3 camera_frame(Vec3f z, Vec3f up, Vec3f P);

@@ -107,7 +107,7 @@ Scene GltfLoader::load(const std::filesystem::path& path, const LoadOptions& opt
                       : static_cast<float>(scene_.render.width) / static_cast<float>(scene_.render.height);
   std::optional<double> time;
   if (options.has_frame) {
-    time = options.frame / static_cast<double>(scene_.render.frames_per_second);
+    time = open_shutter(options) / static_cast<double>(scene_.render.frames_per_second);
   }
   composition_traverse(documents_, root, time, warnings_, [this](const PlacedNode& node) { place(node); });
   set_environment(options);
@@ -119,6 +119,11 @@ Scene GltfLoader::load(const std::filesystem::path& path, const LoadOptions& opt
                      std::to_string(scene_.lights.size()) + " lights");
   describe();
   set_camera(options);
+  const auto chosen = camera_named(scene_.cameras, options.camera.look_from ? "" : options.camera.name);
+  const float asked = chosen ? scene_.cameras[*chosen].shutter.frames : 0;
+  if (!options.has_frame && !scene_.clips.empty() && options.camera.shutter.value_or(asked) > 0) {
+    warnings_.add(scene_.file + ": the shutter is open, but no frame of the animation is asked for: nothing moves");
+  }
   const std::vector<FileStamp> files = documents_.files_read();
   scene_.files.insert(scene_.files.begin(), files.begin(), files.end());
   scene_.files.insert(scene_.files.end(), textures_.files_read().begin(), textures_.files_read().end());
@@ -159,7 +164,7 @@ std::vector<Placement> GltfLoader::placements(std::optional<double> time_seconds
     if (mesh < 0) return;
     std::vector<Transform> copies = khronos_instances(*node.document, node.node_index, said);
     if (copies.empty()) copies.emplace_back();
-    for (const Primitive& primitive : primitives_of(*node.document, mesh)) {
+    for (const Primitive& primitive : primitives_of(*node.document, mesh, nullptr)) {
       const int material_index = placed_material(node, primitive.material_index);
       for (const Transform& copy : copies) {
         const Transform world = node.world * copy;
@@ -188,6 +193,7 @@ void GltfLoader::describe()
 
 void GltfLoader::place(const PlacedNode& node)
 {
+  ++num_visited_;
   const tinygltf::Node& source = node.document->core.nodes[static_cast<std::size_t>(node.node_index)];
   if (source.mesh >= 0) {
     place_meshes(node);
@@ -228,7 +234,8 @@ void GltfLoader::place_meshes(const PlacedNode& node)
   const GltfDocument& document = *node.document;
   const tinygltf::Node& source = document.core.nodes[static_cast<std::size_t>(node.node_index)];
   const std::string path = "/nodes/" + std::to_string(node.node_index);
-  const std::vector<Primitive>& primitives = primitives_of(document, source.mesh);
+  const MorphWeights morph{node.weights, shutter_nodes_.weights(num_visited_ - 1)};
+  const std::vector<Primitive>& primitives = primitives_of(document, source.mesh, &morph);
   const std::vector<Transform> copies = khronos_instances(document, node.node_index, warnings_);
   const InstanceValues own = node_values(node);
   std::map<std::uint16_t, std::vector<std::array<float, 4>>> of_copies;
@@ -241,12 +248,12 @@ void GltfLoader::place_meshes(const PlacedNode& node)
   for (const Primitive& primitive : primitives) {
     if (copies.empty()) {
       const std::size_t next = scene_.instances.size();
-      place_instance(node, primitive, node.world, path);
+      place_instance(node, primitive, {}, path);
       if (scene_.instances.size() > next) set_values(next, own);
     }
     for (std::size_t copy = 0; copy < copies.size(); ++copy) {
       const std::size_t next = scene_.instances.size();
-      place_instance(node, primitive, node.world * copies[copy], path + "/extensions/EXT_mesh_gpu_instancing");
+      place_instance(node, primitive, copies[copy], path + "/extensions/EXT_mesh_gpu_instancing");
       if (scene_.instances.size() == next) continue;
       set_values(next, own);
       for (const auto& [place, values] : of_copies) set_values(next, {{place, values[copy]}});
@@ -283,9 +290,10 @@ void GltfLoader::set_values(std::size_t instance_index, const InstanceValues& va
 
 void GltfLoader::place_instance(const PlacedNode& node,
                                 const Primitive& primitive,
-                                const Transform& world,
+                                const Transform& copy,
                                 const std::string& path)
 {
+  const Transform world = node.world * copy;
   if (!is_usable(node, world, path)) {
     return;
   }
@@ -317,6 +325,25 @@ void GltfLoader::place_instance(const PlacedNode& node,
     check_positions(node, path, max(abs(each.low), abs(each.high)));
   }
   world_bounds_ = bounds_union(world_bounds_, bounds);
+  instance.motion_index = motion_of(node, path, copy);
+  const Material& material = scene_.materials[static_cast<std::size_t>(instance.material_index)];
+  const bool deforms = !scene_.meshes[static_cast<std::size_t>(instance.mesh_index)].steps.empty();
+  if ((instance.motion_index >= 0 || deforms) && material_is_light(material)) {
+    warnings_.add(node.document->file + ": " + path +
+                  ": shines and moves while the shutter is open: its light is found by chance alone, which is noisier");
+  }
+  if (deforms && material.displacement_index >= 0) {
+    warnings_.add(
+        node.document->file + ": " + path +
+        ": is displaced and deforms while the shutter is open: it keeps its shape at the middle of that time");
+  }
+  if (instance.motion_index >= 0) {
+    for (const Affine3& step : scene_.motions[static_cast<std::size_t>(instance.motion_index)]) {
+      const Bounds moved = bounds_transform(step, own_bounds);
+      check_positions(node, path, max(abs(moved.low), abs(moved.high)));
+      world_bounds_ = bounds_union(world_bounds_, moved);
+    }
+  }
   check_displacement(node, instance);
   memory_.add(sizeof(Instance), node.document->file + ": instances");
   scene_.instances.push_back(std::move(instance));
@@ -329,12 +356,82 @@ int GltfLoader::placed_material(const PlacedNode& node, int own)
   return choice ? material_of(*choice->document, choice->index) : own;
 }
 
+double GltfLoader::open_shutter(const LoadOptions& options)
+{
+  std::vector<SceneCamera> cameras;
+  if (!options.camera.look_from) {
+    Warnings unheard;  // the load has the same
+    const double time = options.frame / static_cast<double>(scene_.render.frames_per_second);
+    composition_traverse(documents_, *root_, time, unheard, [&](const PlacedNode& node) {
+      if (node.document->core.nodes[static_cast<std::size_t>(node.node_index)].camera < 0) return;
+      if (transform_defect(node.world) != TransformDefect::kNone) return;
+      cameras.push_back(gltf_camera(*node.document, node.node_index, node.world, image_aspect_, unheard));
+    });
+  }
+  Shutter shutter;
+  if (const auto chosen = camera_named(cameras, options.camera.name)) shutter = cameras[*chosen].shutter;
+  shutter.frames = options.camera.shutter.value_or(shutter.frames);
+  if (!(shutter.frames > 0)) return options.frame;
+  shutter_nodes_ =
+      ShutterNodes(documents_, *root_, shutter, options.frame, static_cast<double>(scene_.render.frames_per_second));
+  return shutter.frame_at(options.frame, 0.5);
+}
+
+int GltfLoader::motion_of(const PlacedNode& node, const std::string& path, const Transform& copy)
+{
+  std::vector<Affine3> steps = shutter_nodes_.steps(num_visited_ - 1, copy);
+  if (steps.empty()) return -1;
+  if (const std::string defect = motion_defect(steps); !defect.empty()) {
+    warnings_.add(node.document->file + ": " + path + ": " + defect +
+                  " while the shutter is open: it stands still meanwhile");
+    return -1;
+  }
+  return add_motion(std::move(steps), *node.document);
+}
+
+int GltfLoader::add_motion(std::vector<Affine3> steps, const GltfDocument& document)
+{
+  memory_.add(steps.size() * sizeof(Affine3), document.file + ": motion of instances");
+  scene_.motions.push_back(std::move(steps));
+  return static_cast<int>(scene_.motions.size()) - 1;
+}
+
+/// Gives a light that has been placed its motion.
+void GltfLoader::move_light(const PlacedNode& node, const std::string& path, Light& light)
+{
+  const std::vector<Affine3> steps = shutter_nodes_.steps(num_visited_ - 1);
+  if (steps.empty()) return;
+  const bool is_sun = light.kind == LightKind::kSun;
+  if (is_sun && std::all_of(steps.begin(), steps.end(), [&](const Affine3& step) {
+        return step.x == steps[0].x && step.y == steps[0].y && step.z == steps[0].z;
+      })) {
+    return;  // A sun is as far away as before.
+  }
+  std::vector<Affine3> motion;
+  if (!is_sun && light.lamp_index < 0) motion = light_motion(steps, transform_to_affine(node.world), light.P);
+  if (motion.empty()) {
+    const char* reason = is_sun ? "a sun" : light.lamp_index >= 0 ? "one with a graph" : "one that changes its size";
+    warnings_.add(node.document->file + ": " + path + ": a light that moves while the shutter is open, " + reason +
+                  ": it stands still meanwhile");
+    return;
+  }
+  light.motion_index = add_motion(std::move(motion), *node.document);
+}
+
 void GltfLoader::place_camera(const PlacedNode& node)
 {
   const std::string path = "/nodes/" + std::to_string(node.node_index);
   if (is_usable(node, node.world, path)) {
     check_positions(node, path, abs(transform_to_affine(node.world).p));
-    scene_.cameras.push_back(gltf_camera(*node.document, node.node_index, node.world, image_aspect_, warnings_));
+    SceneCamera camera = gltf_camera(*node.document, node.node_index, node.world, image_aspect_, warnings_);
+    camera.motion_index = motion_of(node, path);
+    if (camera.motion_index >= 0) {
+      // A camera has no scale.
+      for (Affine3& step : scene_.motions[static_cast<std::size_t>(camera.motion_index)]) {
+        step = camera_frame(normalize(step.z), normalize(step.y), step.p);
+      }
+    }
+    scene_.cameras.push_back(std::move(camera));
   }
 }
 
@@ -375,6 +472,7 @@ void GltfLoader::place_lights(const PlacedNode& node)
       scene_.lights.insert(scene_.lights.end(), lights.begin(), lights.end());
       scene_.lights.back().casts_caustics = node.object.caustic_light;
       place_lamp(node, scene_.lights.back());
+      move_light(node, path, scene_.lights.back());
     }
   };
   const LampGraphReader read_graph = [&](const JsonReader& graph) {
@@ -438,16 +536,20 @@ void GltfLoader::check_displacement(const PlacedNode& node, const Instance& inst
   }
 }
 
-const std::vector<GltfLoader::Primitive>& GltfLoader::primitives_of(const GltfDocument& document, int mesh_index)
+const std::vector<GltfLoader::Primitive>& GltfLoader::primitives_of(const GltfDocument& document,
+                                                                    int mesh_index,
+                                                                    const MorphWeights* morph)
 {
-  const auto [it, is_new] = primitives_of_.try_emplace({&document, mesh_index});
+  auto& known = primitives_of_[{&document, mesh_index}];
+  if (morph == nullptr && !known.empty()) return known.begin()->second;
+  const auto [it, is_new] = known.try_emplace(morph != nullptr ? *morph : MorphWeights{});
   if (!is_new) {
     return it->second;
   }
   const tinygltf::Mesh& source = document.core.meshes[static_cast<std::size_t>(mesh_index)];
   for (std::size_t p = 0; p < source.primitives.size(); ++p) {
     const int material = material_of(document, source.primitives[p].material);
-    const int mesh = mesh_of(document, mesh_index, static_cast<int>(p), material);
+    const int mesh = mesh_of(document, mesh_index, it->first, static_cast<int>(p), material);
     if (mesh >= 0) {
       warn_missing_attributes(document.file + ": /meshes/" + std::to_string(mesh_index),
                               scene_.meshes[static_cast<std::size_t>(mesh)],
@@ -476,25 +578,34 @@ std::vector<std::uint16_t> GltfLoader::attributes_of(const Material& material) c
 }
 
 /// Index of a primitive's mesh; −1: it has no triangles.
-int GltfLoader::mesh_of(const GltfDocument& document, int mesh_index, int primitive_index, int material_index)
+int GltfLoader::mesh_of(const GltfDocument& document,
+                        int mesh_index,
+                        const MorphWeights& morph,
+                        int primitive_index,
+                        int material_index)
 {
   const tinygltf::Mesh& source = document.core.meshes[static_cast<std::size_t>(mesh_index)];
   const tinygltf::Primitive& primitive = source.primitives[static_cast<std::size_t>(primitive_index)];
   const int tangent_uv_set = normal_map_uv_set(scene_.materials[static_cast<std::size_t>(material_index)]);
   const std::vector<std::uint16_t> columns = attributes_of(scene_.materials[static_cast<std::size_t>(material_index)]);
-  const auto [it, is_new] = mesh_of_.try_emplace(
-      {&document, primitive.attributes, primitive.indices, primitive.mode, tangent_uv_set, columns}, -1);
+  const auto [it, is_new] = mesh_of_.try_emplace({&document, primitive.attributes, primitive.indices, primitive.mode,
+                                                  tangent_uv_set, primitive.targets, morph, columns},
+                                                 -1);
   if (!is_new) {
     return it->second;
   }
   std::map<std::string, std::uint16_t> wanted;
   for (const std::uint16_t place : columns) wanted.emplace(scene_.attribute_names[place], place);
-  std::optional<Mesh> mesh = gltf_mesh_load(document, mesh_index, primitive_index, tangent_uv_set, wanted, warnings_);
+  std::optional<Mesh> mesh =
+      gltf_mesh_load(document, mesh_index, primitive_index, morph, tangent_uv_set, wanted, warnings_);
   if (mesh) {
     memory_.add(mesh->bytes(), document.file + ": /meshes/" + std::to_string(mesh_index));
     mesh->material_index = material_index;
     it->second = static_cast<int>(scene_.meshes.size());
     mesh_bounds_.push_back(bounds_of_points(mesh->P));
+    for (const MeshStep& step : mesh->steps) {
+      mesh_bounds_.back() = bounds_union(mesh_bounds_.back(), bounds_of_points(step.P));
+    }
     scene_.meshes.push_back(std::move(*mesh));
   }
   return it->second;

@@ -13,6 +13,8 @@
 #include "scene/composition.h"
 #include "scene/default_light.h"
 #include "scene/gltf_camera.h"
+#include "scene/gltf_mesh.h"
+#include "scene/gltf_motion.h"
 #include "scene/height_graph.h"
 #include "scene/light_units.h"
 #include "scene/load.h"
@@ -57,6 +59,8 @@ class GltfLoader {
     const GltfDocument* document = nullptr;
     std::map<std::string, int> attributes;  ///< accessors
     int indices = -1, mode = 0, tangent_uv_set = -1;
+    std::vector<std::map<std::string, int>> targets;  ///< accessors
+    MorphWeights morph;
     std::vector<std::uint16_t> columns;  ///< that its material's graph reads
     auto operator<=>(const MeshSource&) const = default;
   };
@@ -73,13 +77,21 @@ class GltfLoader {
   void place_meshes(const PlacedNode& node);
   void place_instance(const PlacedNode& node,
                       const Primitive& primitive,
-                      const Transform& world,
+                      const Transform& copy,
                       const std::string& path);
   std::vector<std::uint16_t> attributes_of(const Material& material) const;
   /// Values by name, as graphs read them, of an instance.
   using InstanceValues = std::map<std::uint16_t, std::array<float, 4>>;
   InstanceValues node_values(const PlacedNode& node) const;
   void set_values(std::size_t instance_index, const InstanceValues& values);
+  /// Opens the shutter of the camera that will be used.
+  /// @return  the frame that things stand at which do not move: when the shutter is half done
+  double open_shutter(const LoadOptions& options);
+  /// Motion of the node that is being placed, or of a copy in it.
+  /// @return  index into Scene::motions; −1: it stands still
+  int motion_of(const PlacedNode& node, const std::string& path, const Transform& copy = {});
+  int add_motion(std::vector<Affine3> steps, const GltfDocument& document);
+  void move_light(const PlacedNode& node, const std::string& path, Light& light);
   void place_camera(const PlacedNode& node);
   void place_lamp(const PlacedNode& node, Light& light);
   void place_lights(const PlacedNode& node);
@@ -87,8 +99,13 @@ class GltfLoader {
   void warn_missing_attributes(const std::string& label, const Mesh& mesh, const Material& material);
   void check_displacement(const PlacedNode& node, const Instance& instance);
 
-  const std::vector<Primitive>& primitives_of(const GltfDocument& document, int mesh_index);
-  int mesh_of(const GltfDocument& document, int mesh_index, int primitive_index, int material_index);
+  /// @param morph  null: any that the mesh has been placed with
+  const std::vector<Primitive>& primitives_of(const GltfDocument& document, int mesh_index, const MorphWeights* morph);
+  int mesh_of(const GltfDocument& document,
+              int mesh_index,
+              const MorphWeights& morph,
+              int primitive_index,
+              int material_index);
   int material_of(const GltfDocument& document, int material_index);
   /// Value graph and closures of a material.
   /// @param json, path  the material's object
@@ -110,9 +127,11 @@ class GltfLoader {
   HeightGraphTable height_graphs_{textures_, scene_};
   Bounds world_bounds_;
   float image_aspect_ = 1;
+  ShutterNodes shutter_nodes_;
+  std::size_t num_visited_ = 0;  ///< nodes, with the one that is being placed
   std::vector<Bounds> mesh_bounds_;
   std::set<std::pair<int, int>> displaced_;  ///< meshes and displacements that check_displacement has seen
-  std::map<std::pair<const GltfDocument*, int>, std::vector<Primitive>> primitives_of_;
+  std::map<std::pair<const GltfDocument*, int>, std::map<MorphWeights, std::vector<Primitive>>> primitives_of_;
   std::map<MeshSource, int> mesh_of_;  ///< −1: a primitive without a triangle
   std::map<std::pair<const GltfDocument*, int>, int> material_of_;
   std::map<const GltfDocument*, LightUnits> light_units_of_;

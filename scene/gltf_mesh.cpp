@@ -245,6 +245,110 @@ void read_attributes(const PrimitiveReader& reader,
   }
 }
 
+/// Name of columns that are the positions and normals of one step after the other, until the mesh has its last vertices: whatever
+/// copies or drops vertices does so with them.
+constexpr std::uint16_t kStepColumn = 0xffff;
+
+/// Sum of the targets' displacements of one attribute, by weights.
+/// @param name  POSITION or NORMAL
+std::vector<Vec3f> target_sum(const PrimitiveReader& reader,
+                              const std::string& name,
+                              std::size_t num_file_vertices,
+                              std::size_t first,
+                              std::size_t count,
+                              const std::vector<double>& weights)
+{
+  std::vector<Vec3f> sum(count);
+  for (std::size_t k = 0; k < std::min(weights.size(), reader.primitive.targets.size()); ++k) {
+    const auto found = reader.primitive.targets[k].find(name);
+    if (weights[k] == 0 || found == reader.primitive.targets[k].end()) continue;
+    const std::string path = reader.path + "/targets/" + std::to_string(k) + '/' + name;
+    const AccessorView view = accessor_open(reader.document, found->second, AccessorKind::kVertex, 3, 3, path);
+    if (view.count != num_file_vertices) {
+      throw SceneError(reader.document.file, path,
+                       "as many elements as POSITION (" + std::to_string(num_file_vertices) + ')',
+                       std::to_string(view.count));
+    }
+    const std::vector<Vec3f> values = accessor_read<Vec3f>(view, first, count);
+    const auto weight = static_cast<float>(weights[k]);
+    for (std::size_t v = 0; v < count; ++v) sum[v] += weight * values[v];
+  }
+  return sum;
+}
+
+/// Applies morph targets to positions and normals, and adds columns of those of the steps.
+/// @param num_file_vertices  that the primitive's accessors have
+void read_targets(const PrimitiveReader& reader,
+                  std::size_t num_file_vertices,
+                  std::size_t first,
+                  std::size_t count,
+                  const MorphWeights& morph,
+                  Mesh& mesh)
+{
+  const std::vector<Vec3f> P = mesh.P;
+  const std::vector<Normal3f> N = mesh.N;
+  const auto sum = [&](const char* name, const std::vector<double>& weights) {
+    return target_sum(reader, name, num_file_vertices, first, count, weights);
+  };
+  const auto add_column = [&](const std::vector<Vec3f>& values) {
+    AttributeColumn& column = mesh.columns.emplace_back();
+    column.name = kStepColumn;
+    column.num_components = 3;
+    for (const Vec3f v : values) column.values.insert(column.values.end(), {v.x, v.y, v.z});
+  };
+  const auto morphed = [&](const std::vector<double>& weights) {
+    std::vector<Vec3f> positions = sum("POSITION", weights);
+    for (std::size_t v = 0; v < count; ++v) positions[v] += P[v];
+    if (!std::all_of(positions.begin(), positions.end(), [](Vec3f p) { return is_finite(p); })) {
+      throw SceneError(reader.document.file, reader.path + "/targets", "weighted positions within single precision",
+                       "others");
+    }
+    return positions;
+  };
+  const auto morphed_normals = [&](const std::vector<double>& weights) {
+    std::vector<Vec3f> normals = sum("NORMAL", weights);
+    for (std::size_t v = 0; v < count; ++v) normals[v] += as_vector(N[v]);
+    return normals;
+  };
+  if (reader.primitive.targets.empty()) return;
+  mesh.P = morphed(morph.weights);
+  if (!N.empty()) {
+    const std::vector<Vec3f> normals = morphed_normals(morph.weights);
+    std::transform(normals.begin(), normals.end(), mesh.N.begin(), [](Vec3f n) { return as_normal(n); });
+  }
+  for (const std::vector<double>& weights : morph.steps) {
+    add_column(morphed(weights));
+    if (!N.empty()) add_column(morphed_normals(weights));
+  }
+}
+
+/// Takes the columns of steps out again, to where they belong.
+void take_steps(std::size_t num_steps, Mesh& mesh)
+{
+  std::vector<std::vector<Vec3f>> taken;
+  for (const AttributeColumn& column : mesh.columns) {
+    if (column.name != kStepColumn) continue;
+    std::vector<Vec3f>& values = taken.emplace_back(mesh.P.size());
+    for (std::size_t v = 0; v < values.size(); ++v) {
+      values[v] = {column.values[3 * v], column.values[3 * v + 1], column.values[3 * v + 2]};
+    }
+  }
+  std::erase_if(mesh.columns, [](const AttributeColumn& column) { return column.name == kStepColumn; });
+  const std::size_t a_step = mesh.N.empty() ? 1 : 2;
+  for (std::size_t i = 0; i < num_steps && a_step * i < taken.size(); ++i) {
+    MeshStep& step = mesh.steps.emplace_back();
+    step.P = std::move(taken[a_step * i]);
+    // Embree reads 16 bytes a vertex.
+    step.P.reserve(step.P.size() + 1);
+    if (mesh.N.empty()) continue;
+    step.N = mesh.N;
+    for (std::size_t v = 0; v < step.N.size(); ++v) {
+      const Vec3f n = normalize(taken[a_step * i + 1][v]);
+      if (is_finite(n)) step.N[v] = as_normal(n);
+    }
+  }
+}
+
 /// Tangents that graphs read, as columns.
 void derive_tangent_columns(const std::map<std::string, std::uint16_t>& columns, Mesh& mesh)
 {
@@ -328,6 +432,7 @@ void drop_unused_vertices(Mesh& mesh)
 std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
                                    int mesh_index,
                                    int primitive_index,
+                                   const MorphWeights& morph,
                                    int tangent_uv_set,
                                    const std::map<std::string, std::uint16_t>& columns,
                                    Warnings& warnings)
@@ -340,10 +445,6 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
   if (reader.primitive.mode < TINYGLTF_MODE_TRIANGLES) {
     reader.warn("points and lines are not rendered");
     return {};
-  }
-  const auto& json = document.element("meshes", static_cast<std::size_t>(mesh_index))["primitives"];
-  if (json[static_cast<std::size_t>(primitive_index)].contains("targets")) {
-    reader.warn("morph targets are not read");
   }
   const auto position = reader.primitive.attributes.find("POSITION");
   if (position == reader.primitive.attributes.end()) {
@@ -369,11 +470,13 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
     constexpr std::size_t kMostVertexBytes =
         2 * sizeof(Vec3f) + sizeof(Normal3f) + 2 * sizeof(Vec2f) + 2 * sizeof(Vec4f);
     constexpr std::size_t kWorthALook = std::size_t{1} << 20;
-    const std::size_t vertex_bytes = kMostVertexBytes + columns.size() * sizeof(Vec4f);
+    const std::size_t vertex_bytes =
+        kMostVertexBytes + columns.size() * sizeof(Vec4f) + morph.steps.size() * (sizeof(Vec3f) + sizeof(Normal3f));
     if (num_vertices > kWorthALook / vertex_bytes) {
       memory_require(num_vertices * vertex_bytes, document.file + ": " + reader.path);
     }
     read_attributes(reader, positions, first, num_vertices, columns, mesh);
+    read_targets(reader, positions.count, first, num_vertices, morph, mesh);
   }
   drop_unused_vertices(mesh);
   drop_empty_triangles(reader, mesh);
@@ -387,6 +490,7 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
   if (tangent_uv_set >= 0 && mesh.tangent.empty() && !mesh.uv[tangent_uv_set].empty()) {
     tangents_derive(mesh, tangent_uv_set);
   }
+  take_steps(morph.steps.size(), mesh);
   return mesh;
 }
 

@@ -1,9 +1,11 @@
 // From a glTF primitive to a triangle mesh: topology, attributes, repairs that are safe to make.
 #pragma once
 
+#include <compare>
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "scene/gltf_document.h"
 #include "scene/scene.h"
@@ -12,6 +14,13 @@ namespace relief {
 
 /// Tangents of uv set i as an attribute that graphs read: no name of a file's begins so.
 inline std::string tangent_attribute_name(int uv_set) { return "tangent:" + std::to_string(uv_set); }
+
+/// Weights of a mesh's morph targets. Those that are missing are 0.
+struct MorphWeights {
+  std::vector<double> weights;
+  std::vector<std::vector<double>> steps;  ///< while the shutter is open, see Mesh::steps; empty: they stay the same
+  auto operator<=>(const MorphWeights&) const = default;
+};
 
 /// Reads one primitive.
 /// @param tangent_uv_set  texture coordinates that a normal map needs tangents for; −1: none needed
@@ -24,6 +33,7 @@ inline std::string tangent_attribute_name(int uv_set) { return "tangent:" + std:
 std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
                                    int mesh_index,
                                    int primitive_index,
+                                   const MorphWeights& morph,
                                    int tangent_uv_set,
                                    const std::map<std::string, std::uint16_t>& columns,
                                    Warnings& warnings);

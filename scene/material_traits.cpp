@@ -18,6 +18,12 @@ std::array<const TextureRef*, 12> material_textures(const Material& m)
           &m.specular_color_texture};
 }
 
+bool material_is_light(const Material& material)
+{
+  return (!is_zero(material.emission) || material.emission_index >= 0) && !material.unlit &&
+         material.displacement_index < 0;
+}
+
 bool material_casts_caustics(const Material& material)
 {
   constexpr float kRoughest = 0.5f;

@@ -10,6 +10,9 @@ namespace relief {
 /// Every texture reference of a material, absent ones included.
 std::array<const TextureRef*, 12> material_textures(const Material& material);
 
+/// Whether a mesh of this material is among the scene's lights, see light_set_make.
+bool material_is_light(const Material& material);
+
 /// Whether light is bent or mirrored sharply enough by a material for its caustics to be worth photons: transmission or
 /// metal whose roughness factor is at most one half, beyond which light is spread and paths find it.
 bool material_casts_caustics(const Material& material);

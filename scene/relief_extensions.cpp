@@ -195,7 +195,7 @@ RenderSettings relief_render(const GltfDocument& document, Warnings& warnings)
   return s;
 }
 
-void relief_camera(const GltfDocument& document, int camera_index, Camera& camera, Warnings& warnings)
+void relief_camera(const GltfDocument& document, int camera_index, Camera& camera, Shutter& shutter, Warnings& warnings)
 {
   const auto index = static_cast<std::size_t>(camera_index);
   const std::string path = "/cameras/" + std::to_string(index);
@@ -221,6 +221,10 @@ void relief_camera(const GltfDocument& document, int camera_index, Camera& camer
         r.fail("clip", "an end beyond the start");
       }
     }
+    shutter.frames = r.number_f("shutter", 0, 0, kLongestShutter);
+    shutter.position = static_cast<ShutterPosition>(
+        r.choice("shutterPosition", kShutterPositionLabels, static_cast<int>(shutter.position)));
+    shutter.steps = static_cast<int>(r.integer("shutterSteps", shutter.steps, 1, kMostShutterSteps));
     r.warn_unread(warnings);
   });
 }

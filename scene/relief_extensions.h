@@ -18,8 +18,12 @@ namespace relief {
 /// RELIEF_render of a document; defaults where it is absent.
 RenderSettings relief_render(const GltfDocument& document, Warnings& warnings);
 
-/// RELIEF_camera: lens and window of a camera; `camera` has its glTF part already.
-void relief_camera(const GltfDocument& document, int camera_index, Camera& camera, Warnings& warnings);
+/// RELIEF_camera: lens, window and shutter of a camera; `camera` has its glTF part already.
+void relief_camera(const GltfDocument& document,
+                   int camera_index,
+                   Camera& camera,
+                   Shutter& shutter,
+                   Warnings& warnings);
 
 /// Graphs of surroundings, of which maps are to be made when the textures are there.
 struct EnvironmentGraphs {

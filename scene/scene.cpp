@@ -37,6 +37,7 @@ std::size_t Mesh::bytes() const
 {
   std::size_t of_columns = 0;
   for (const AttributeColumn& column : columns) of_columns += vector_bytes(column.values);
+  for (const MeshStep& step : steps) of_columns += vector_bytes(step.P) + vector_bytes(step.N);
   return of_columns + vector_bytes(P) + vector_bytes(N) + vector_bytes(uv[0]) + vector_bytes(uv[1]) +
          vector_bytes(tangent) + vector_bytes(color) + vector_bytes(generated) + vector_bytes(triangles);
 }

@@ -20,6 +20,7 @@
 #include "scene/graph/graph_program.h"
 #include "scene/height_map.h"
 #include "scene/render_settings.h"
+#include "scene/shutter.h"
 
 namespace relief {
 
@@ -38,6 +39,12 @@ struct InstanceColumn {
   std::vector<float> values;  ///< four an instance, see GraphInstanceColumn; those at the end may be missing
 };
 
+/// A mesh that deforms, at one time while the shutter is open.
+struct MeshStep {
+  std::vector<Vec3f> P;
+  std::vector<Normal3f> N;  ///< empty if the mesh has none
+};
+
 /// One glTF primitive: a triangle mesh with one material.
 struct Mesh {
   std::string name;
@@ -49,8 +56,9 @@ struct Mesh {
   std::vector<Vec3f> generated;          ///< _GENERATED, see MeshView; empty: absent
   std::vector<AttributeColumn> columns;  ///< what graphs read by name
   std::vector<TriangleIndices> triangles;
-  int material_index = 0;  ///< always valid: the loader adds glTF's default material where none is named
-  int copy_of = -1;        ///< mesh of the file that this is under some transform, see world_displacement.h; −1: none
+  std::vector<MeshStep> steps;  ///< at the times of Scene::motions; empty: it does not deform
+  int material_index = 0;       ///< always valid: the loader adds glTF's default material where none is named
+  int copy_of = -1;  ///< mesh of the file that this is under some transform, see world_displacement.h; −1: none
 
   MeshView view() const;
   std::size_t bytes() const;
@@ -63,12 +71,15 @@ struct Instance {
   int material_index = 0;
   Affine3 world_from_object;
   std::uint32_t flags = kVisibleToCamera | kCastsShadow;
+  int motion_index = -1;  ///< into Scene::motions: places while the shutter is open; −1: it stands still
 };
 
 struct SceneCamera {
   std::string name;
   Camera camera;     ///< half_width is for the aspect ratio `aspect`
   float aspect = 0;  ///< width / height that the file asks for; 0: follows the image
+  Shutter shutter;
+  int motion_index = -1;  ///< as Instance::motion_index
 };
 
 /// Lat-long map or constant. See docs/scene_format.md for the orientation.
@@ -101,7 +112,10 @@ struct Scene {
   std::vector<GraphProgram> graphs;          ///< by Material::graph_index and so on, and by Lamp::graph_index
   std::vector<std::string> attribute_names;  ///< of attributes that graphs read
   std::vector<InstanceColumn> instance_columns;
-  std::vector<Light> lights;            ///< everything but mesh triangles and the environment
+  std::vector<Light> lights;  ///< everything but mesh triangles and the environment
+  /// Transforms at evenly spaced times, from when the shutter opens to when it closes; of lights see LightsView::motions. What
+  /// stands where it is when the shutter is half done is everywhere else in this scene.
+  std::vector<std::vector<Affine3>> motions;
   std::vector<Lamp> lamps;              ///< by Light::lamp_index
   std::vector<std::string> node_names;  ///< of all files, as far as they have names, each once, in file order
   std::vector<AnimationClip> clips;     ///< of all files

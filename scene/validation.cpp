@@ -110,6 +110,12 @@ constexpr Field objects(std::string_view name,
   return {.name = name, .kind = Kind::kObjects, .required = required, .shortest = shortest, .fields = fields};
 }
 
+/// Weights of morph targets, as many as there are.
+constexpr Field weights()
+{
+  return {.name = "weights", .kind = Kind::kNumbers, .low = -kLargestFloat, .high = kLargestFloat, .shortest = 1};
+}
+
 constexpr Field kAsset[] = {string("version", {}, true), string("generator")};
 constexpr Field kScene[] = {string("name"), indices("nodes", "nodes")};
 constexpr Field kNode[] = {string("name"),
@@ -119,13 +125,16 @@ constexpr Field kNode[] = {string("name"),
                            numbers("matrix", 16),
                            numbers("translation", 3),
                            numbers("rotation", 4, -1.001, 1.001),
-                           numbers("scale", 3)};
+                           numbers("scale", 3),
+                           weights()};
+constexpr Field kTarget[] = {index("POSITION", "accessors"), index("NORMAL", "accessors")};
 constexpr Field kPrimitive[] = {
     {.name = "attributes", .kind = Kind::kIndexMap, .required = true, .target = "accessors"},
     index("indices", "accessors"),
     index("material", "materials"),
-    integer("mode", 0, 6)};
-constexpr Field kMesh[] = {string("name"), objects("primitives", kPrimitive, true, 1)};
+    integer("mode", 0, 6),
+    objects("targets", kTarget)};
+constexpr Field kMesh[] = {string("name"), objects("primitives", kPrimitive, true, 1), weights()};
 constexpr Field kSparseIndices[] = {index("bufferView", "bufferViews", true), integer("byteOffset", 0, kLargestInt),
                                     integer("componentType", 5121, 5125, true)};
 constexpr Field kSparseValues[] = {index("bufferView", "bufferViews", true), integer("byteOffset", 0, kLargestInt)};

@@ -15,7 +15,7 @@ namespace relief {
 nlohmann::json validation_parse(std::string_view text, const std::string& file);
 
 /// Checks glTF's core properties and copies them; integers written as 3.0 become 3, extensions, extras and what relief
-/// does not read (skins, morph targets, min and max of accessors) are left out.
+/// does not read (skins, min and max of accessors) are left out.
 /// What is wrong but has an obvious meaning gets it, with a warning: factors a little out of range, an unknown interpolation
 /// or alpha mode, nodes of a scene that are no roots.
 /// @return document for tinygltf: without `buffers` and `images`, which are checked too but loaded by gltf_document
@@ -23,7 +23,7 @@ nlohmann::json validation_parse(std::string_view text, const std::string& file);
 ///         and shared children in the node tree; accessors of primitives that do not exist
 nlohmann::json validation_conform(const nlohmann::json& document, const std::string& file, Warnings& warnings);
 
-/// Warns about extensions that are used and not read, or there and not declared, about skins, morph targets and the like.
+/// Warns about extensions that are used and not read, or there and not declared, about skins and the like.
 /// @error SceneError naming the first required extension that is not read
 void validation_check_support(const nlohmann::json& document, const std::string& file, Warnings& warnings);
 

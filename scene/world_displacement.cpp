@@ -84,6 +84,13 @@ void world_displacement_bake(Scene& scene)
       transform_mesh(copy, m);
       scene.meshes.push_back(std::move(copy));
     }
+    if (instance.motion_index >= 0) {
+      const Affine3 undone = inverse(m);
+      std::vector<Affine3> steps = scene.motions[static_cast<std::size_t>(instance.motion_index)];
+      for (Affine3& step : steps) step = step * undone;
+      instance.motion_index = static_cast<int>(scene.motions.size());
+      scene.motions.push_back(std::move(steps));
+    }
     instance.mesh_index = at->second;
     placed = {{sign, 0, 0}, {0, sign, 0}, {0, 0, sign}, placed.p};
   }

@@ -51,8 +51,8 @@ RELIEF_KERNEL GraphPoint graph_point_shifted(const GraphPoint& at, Vec3f by, Sur
 {
   const TriangleIndices tri = at.mesh->triangles[at.triangle];
   const Affine3& m = at.instance->world_from_object;
-  const Vec3f edge1 = transform_vector(m, at.mesh->P[tri.v1] - at.mesh->P[tri.v0]);
-  const Vec3f edge2 = transform_vector(m, at.mesh->P[tri.v2] - at.mesh->P[tri.v0]);
+  const Vec3f edge1 = transform_vector(m, mesh_P(*at.mesh, tri.v1) - mesh_P(*at.mesh, tri.v0));
+  const Vec3f edge2 = transform_vector(m, mesh_P(*at.mesh, tri.v2) - mesh_P(*at.mesh, tri.v0));
   // Least squares: on a displaced surface the vector does not lie in the triangle.
   const float a = dot(edge1, edge1), b = dot(edge1, edge2), c = dot(edge2, edge2);
   const float determinant = difference_of_products(a, c, b, b);
@@ -93,7 +93,7 @@ RELIEF_KERNEL float graph_attribute(const GraphPoint& at, std::uint32_t name, in
   }
   for (std::uint32_t i = 0; i < at.scene->num_columns; ++i) {
     if (at.scene->columns[i].name != name) continue;
-    const float* v = at.scene->columns[i].values + 4 * (at.instance - at.scene->instances);
+    const float* v = at.scene->columns[i].values + 4 * std::size_t{at.instance->index};
     return component == 4 ? (v[0] + v[1] + v[2]) * (1.0f / 3.0f) : v[component];
   }
   return component == 3 ? 1.0f : 0.0f;
@@ -105,8 +105,8 @@ RELIEF_KERNEL Vec3f graph_vertex_normal(const GraphPoint& at)
   if (at.mesh->N != nullptr) {
     const TriangleIndices tri = at.mesh->triangles[at.triangle];
     const float w0 = 1.0f - at.bary_u - at.bary_v;
-    const Vec3f n = w0 * as_vector(at.mesh->N[tri.v0]) + at.bary_u * as_vector(at.mesh->N[tri.v1]) +
-                    at.bary_v * as_vector(at.mesh->N[tri.v2]);
+    const Vec3f n = w0 * as_vector(mesh_N(*at.mesh, tri.v0)) + at.bary_u * as_vector(mesh_N(*at.mesh, tri.v1)) +
+                    at.bary_v * as_vector(mesh_N(*at.mesh, tri.v2));
     if (!is_zero(n)) return n;
   }
   return normalize(transform_normal(at.instance->world_from_object, as_normal(at.hit->Ng)));
@@ -148,7 +148,7 @@ RELIEF_KERNEL float graph_edge_distance(const GraphPoint& at)
   const TriangleIndices tri = at.mesh->triangles[at.triangle];
   const std::uint32_t corner[3] = {tri.v0, tri.v1, tri.v2};
   Vec3f p[3];
-  for (int i = 0; i < 3; ++i) p[i] = transform_point(at.instance->world_from_object, at.mesh->P[corner[i]]);
+  for (int i = 0; i < 3; ++i) p[i] = transform_point(at.instance->world_from_object, mesh_P(*at.mesh, corner[i]));
   float nearest = kInfinity;
   for (int i = 0; i < 3; ++i) {
     const Vec3f edge = p[(i + 1) % 3] - p[i];
@@ -295,7 +295,7 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
     case Q::edge_distance:
       return graph_edge_distance(at);
     case Q::instance:
-      return static_cast<float>(at.instance - at.scene->instances);
+      return static_cast<float>(at.instance->index);
     case Q::kCount:
       break;
   }

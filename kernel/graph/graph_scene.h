@@ -43,7 +43,6 @@ struct Lamp {
 
 /// What is the same for all surfaces.
 struct GraphScene {
-  const InstanceView* instances = nullptr;
   const GraphInstanceColumn* columns = nullptr;
   std::uint32_t num_columns = 0;
   GraphRays rays;

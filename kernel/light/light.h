@@ -39,7 +39,8 @@ struct alignas(64) Light {
   std::int32_t triangle_index = -1;    ///< likewise (the first of two)
   std::int32_t whole_index = -1;       ///< second triangle of such a rectangle: that light; nothing else of it counts
   std::int32_t lamp_index = -1;        ///< of what a value graph makes uneven, but for meshes: see Lamp
-  float lamp_scale = 1;  ///< factor on what the graph gives; `emission` is divided by it, so as to be a mean
+  std::int32_t motion_index = -1;  ///< of one that moves while the shutter is open, into LightsView::motions; −1: none
+  float lamp_scale = 1;            ///< factor on what the graph gives; `emission` is divided by it, so as to be a mean
   float spread_tan = 0;  ///< rectangle, disk: tangent of the widest angle to the axis; 0: it shines to all of its side
   float spread_scale = 0;  ///< see light_spread
 };

@@ -19,6 +19,7 @@
 #include "kernel/light/rectangle.h"
 #include "kernel/light/spot.h"
 #include "kernel/light/sun.h"
+#include "kernel/math/motion.h"
 #include "kernel/sample/sobol.h"
 #include "kernel/sample/warp.h"
 
@@ -61,6 +62,9 @@ struct LightsView {
   /// Where the other lights' estimates sum to more, the environment is left to paths that follow the BSDF.
   float environment_yields_to = kInfinity;
   bool environment_casts_caustics = true;  ///< as Light::casts_caustics
+  /// By Light::motion_index: what takes a light's vectors from when the shutter is half done to another time, and where its P
+  /// is then. They keep lengths.
+  const MotionView* motions = nullptr;
 };
 
 /// How likely each group is, and the estimates needed to go on.
@@ -78,10 +82,20 @@ RELIEF_KERNEL bool light_casts_caustics(const LightsView& view, std::int32_t lig
 
 /// A light in world space.
 /// @param ref      not the environment
-/// @param storage  where a copy's is put
-RELIEF_KERNEL const Light& lights_at(const LightsView& view, LightRef ref, Light& storage)
+/// @param storage  where a copy's is put, and one's that moves
+/// @param time     see motion.h
+RELIEF_KERNEL const Light& lights_at(const LightsView& view, LightRef ref, Light& storage, float time = 0.0f)
 {
   const Light& light = view.lights[ref.light_index];
+  if (light.motion_index >= 0) {
+    const Affine3 moved = motion_at(view.motions[light.motion_index], time);
+    storage = light;
+    storage.P = moved.p;
+    storage.edge_u = transform_vector(moved, light.edge_u);
+    storage.edge_v = transform_vector(moved, light.edge_v);
+    storage.axis = transform_vector(moved, light.axis);
+    return storage;
+  }
   if (ref.copy_index < 0) return light;
   const LightCopy& copy = view.tree.copies[ref.copy_index];
   storage = light;
@@ -259,12 +273,14 @@ lights_sample_chosen(const LightsView& view, LightsChoice chosen, const Light* l
 
 /// Chooses one light or the environment by estimated contribution at P and samples it.
 /// @param P, N, u_choice, u  as in lights_choose
-RELIEF_KERNEL LightSample lights_sample(const LightsView& view, Vec3f P, Vec3f N, float u_choice, Vec2f u)
+/// @param time               as in lights_at
+RELIEF_KERNEL LightSample
+lights_sample(const LightsView& view, Vec3f P, Vec3f N, float u_choice, Vec2f u, float time = 0.0f)
 {
   const LightsChoice chosen = lights_choose(view, P, N, u_choice, u);
   if (!(chosen.probability > 0.0f)) return {};
   Light storage;
-  const Light* light = chosen.ref.light_index >= 0 ? &lights_at(view, chosen.ref, storage) : nullptr;
+  const Light* light = chosen.ref.light_index >= 0 ? &lights_at(view, chosen.ref, storage, time) : nullptr;
   return lights_sample_chosen(view, chosen, light, P, N, u);
 }
 
@@ -273,19 +289,21 @@ RELIEF_KERNEL LightSample lights_sample(const LightsView& view, Vec3f P, Vec3f N
 /// @param ref       rectangle, disk or triangle; the second triangle of a rectangle stands for it
 /// @param wi        unit, from P to the light
 /// @param distance  metres, of the hit
+/// @param time      as in lights_at
 /// @return          solid angle × choice, as LightSample::pdf
-RELIEF_KERNEL float lights_pdf(const LightsView& view, Vec3f P, Vec3f N, LightRef ref, Vec3f wi, float distance)
+RELIEF_KERNEL float
+lights_pdf(const LightsView& view, Vec3f P, Vec3f N, LightRef ref, Vec3f wi, float distance, float time = 0.0f)
 {
+  Light storage;
   if (view.lights[ref.light_index].whole_index >= 0) ref.light_index = view.lights[ref.light_index].whole_index;
   if (view.only_light >= 0) {
-    return view.only_light == ref.light_index ? light_pdf(view.lights[ref.light_index], P, wi, distance) : 0.0f;
+    return view.only_light == ref.light_index ? light_pdf(lights_at(view, ref, storage, time), P, wi, distance) : 0.0f;
   }
   const LightGroups groups = light_groups_eval(view, P, N);
   const float choice = light_tree_pdf(view.tree, groups.finite_root, P, N, static_cast<std::uint32_t>(ref.light_index),
                                       view.light_trails[ref.light_index], ref.copy_index);
   if (!(choice > 0.0f)) return 0.0f;
-  Light storage;
-  return groups.finite * choice * light_pdf(lights_at(view, ref, storage), P, wi, distance);
+  return groups.finite * choice * light_pdf(lights_at(view, ref, storage, time), P, wi, distance);
 }
 
 /// Density with which lights_sample, called at P, would have chosen a direction of the environment.

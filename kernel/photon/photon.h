@@ -40,6 +40,7 @@ struct CausticsView {
   bool enabled = false;
   float roughness = 0;  ///< perceptual, see sharp_lobes
   PhotonMapView map;
+  float time = 0;  ///< of all photons of the pass, and of all paths that gather them
 };
 
 /// Cell of a coordinate.

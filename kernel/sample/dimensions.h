@@ -35,6 +35,9 @@ inline constexpr std::uint32_t kLodDimension = ~0u;
 /// Dimension for sample_2d of a camera path's ray for ambient occlusion; no bounce gets so far.
 inline constexpr std::uint32_t kAmbientDimension = ~0u - 1;
 
+/// Dimension for sample_1d of a path's time while the shutter is open; no bounce gets so far.
+inline constexpr std::uint32_t kTimeDimension = ~0u - 2;
+
 /// Uses at the start of a photon; its bounces use the same dimensions as a camera path's.
 enum class PhotonDimension : std::uint32_t {
   kSource,  ///< 1D: which light, towards which caster

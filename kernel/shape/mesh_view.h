@@ -29,7 +29,26 @@ struct MeshView {
   const MeshColumn* columns = nullptr;         ///< num_columns
   const TriangleIndices* triangles = nullptr;  ///< num_triangles
   std::uint32_t num_vertices = 0, num_triangles = 0, num_columns = 0;
+  /// Of a mesh that deforms while the shutter is open, at some time: what P and N will be at the next step, and the part of the
+  /// way to there. Null: the mesh does not deform, or has no normals. All else is as when the shutter is half done.
+  const Vec3f* P_next = nullptr;
+  const Normal3f* N_next = nullptr;
+  float part = 0;
 };
+
+RELIEF_KERNEL Vec3f mesh_P(const MeshView& mesh, std::uint32_t vertex)
+{
+  const Vec3f P = mesh.P[vertex];
+  return mesh.P_next == nullptr ? P : (1.0f - mesh.part) * P + mesh.part * mesh.P_next[vertex];
+}
+
+/// @pre the mesh has normals
+RELIEF_KERNEL Normal3f mesh_N(const MeshView& mesh, std::uint32_t vertex)
+{
+  const Normal3f N = mesh.N[vertex];
+  if (mesh.N_next == nullptr) return N;
+  return as_normal((1.0f - mesh.part) * as_vector(N) + mesh.part * as_vector(mesh.N_next[vertex]));
+}
 
 enum InstanceFlag : std::uint32_t {
   kVisibleToCamera = 1u << 0,
@@ -43,6 +62,8 @@ enum InstanceFlag : std::uint32_t {
   kGathersPhotons = 1u << 7,       ///< a receiver that has soft lobes, in a render with a photon pass
   kGathersTails = 1u << 9,         ///< likewise, a rough caster: see path_gathers_tails
   kHoldout = 1u << 10,             ///< a hole in the picture where the camera sees it; an object for all other rays
+  kMoves = 1u << 11,    ///< while the shutter is open: hits bring a placement of their own, see path_instance
+  kDeforms = 1u << 12,  ///< likewise, and a mesh: see path_mesh
 };
 
 /// One placement of a mesh.
@@ -53,6 +74,7 @@ struct InstanceView {
   std::int32_t first_light_index = -1;  ///< lights of an emissive mesh are consecutive, one a triangle; −1: none
   std::int32_t light_copy_index = -1;   ///< of those lights, if it shares them with other instances: see LightRef
   std::uint32_t flags = kVisibleToCamera | kCastsShadow;
+  std::uint32_t index = 0;  ///< in the scene
 };
 
 }  // namespace relief

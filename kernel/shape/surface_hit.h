@@ -65,9 +65,9 @@ RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
   const TriangleIndices tri = mesh.triangles[triangle_index];
   const float w0 = 1.0f - bary_u - bary_v;
   const Affine3& m = instance.world_from_object;
-  const Vec3f p0 = mesh.P[tri.v0];
-  const Vec3f p1 = mesh.P[tri.v1];
-  const Vec3f p2 = mesh.P[tri.v2];
+  const Vec3f p0 = mesh_P(mesh, tri.v0);
+  const Vec3f p1 = mesh_P(mesh, tri.v1);
+  const Vec3f p2 = mesh_P(mesh, tri.v2);
 
   SurfaceHit hit;
   const Vec3f P_object = w0 * p0 + bary_u * p1 + bary_v * p2;
@@ -95,9 +95,9 @@ RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
   hit.Ns = hit.Ng;
   hit.P_lift = {};
   if (mesh.N != nullptr) {
-    const Vec3f n0 = normalize(transform_normal(instance.object_from_world, mesh.N[tri.v0]));
-    const Vec3f n1 = normalize(transform_normal(instance.object_from_world, mesh.N[tri.v1]));
-    const Vec3f n2 = normalize(transform_normal(instance.object_from_world, mesh.N[tri.v2]));
+    const Vec3f n0 = normalize(transform_normal(instance.object_from_world, mesh_N(mesh, tri.v0)));
+    const Vec3f n1 = normalize(transform_normal(instance.object_from_world, mesh_N(mesh, tri.v1)));
+    const Vec3f n2 = normalize(transform_normal(instance.object_from_world, mesh_N(mesh, tri.v2)));
     const Vec3f n = w0 * n0 + bary_u * n1 + bary_v * n2;
     const float n_length = length(n);
     // Opposite vertex normals can cancel; then the flat normal is the only defensible one.
@@ -145,7 +145,7 @@ RELIEF_KERNEL DisplacedPointError displaced_point_error(const InstanceView& inst
 RELIEF_KERNEL Vec3f displaced_tracer_error(const MeshView& mesh, const InstanceView& instance, TriangleIndices tri)
 {
   constexpr float kRoundings = 0x1p-47f;  // 64 of a double; 8 were not enough for all of 10⁵ rays, 16 were
-  const Vec3f farthest = max(max(abs(mesh.P[tri.v0]), abs(mesh.P[tri.v1])), abs(mesh.P[tri.v2]));
+  const Vec3f farthest = max(max(abs(mesh_P(mesh, tri.v0)), abs(mesh_P(mesh, tri.v1))), abs(mesh_P(mesh, tri.v2)));
   const float error = kRoundings * max_component(farthest);
   const Affine3& m = instance.world_from_object;
   return (abs(m.x) + abs(m.y) + abs(m.z)) * error;
@@ -179,8 +179,9 @@ RELIEF_KERNEL SurfaceHit surface_hit_displaced(const MeshView& mesh,
   hit.P_lift = {};
   hit.leave = transform_vector(m, at.leave);
   surface_hit_interpolate(mesh, tri, bary_u, bary_v, &hit);
-  const Vec3f p0 = mesh.P[tri.v0];
-  const Vec3f edge1 = transform_vector(m, mesh.P[tri.v1] - p0), edge2 = transform_vector(m, mesh.P[tri.v2] - p0);
+  const Vec3f p0 = mesh_P(mesh, tri.v0);
+  const Vec3f edge1 = transform_vector(m, mesh_P(mesh, tri.v1) - p0),
+              edge2 = transform_vector(m, mesh_P(mesh, tri.v2) - p0);
   surface_hit_density(mesh, tri, length(cross(edge1, edge2)), &hit);
   return hit;
 }

@@ -128,7 +128,7 @@ RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
     ray = emit_from_afar(sources, box, -sample.wi, sample.radiance / sample.pdf_solid_angle, u);
   } else {
     Light storage;
-    const Light& light = lights_at(g.lights, source.light, storage);
+    const Light& light = lights_at(g.lights, source.light, storage, g.caustics.time);
     const bool is_point = light.kind == LightKind::kPoint || light.kind == LightKind::kSpot;
     if (light.kind == LightKind::kSun) {
       Vec3f irradiance = light.emission;
@@ -151,6 +151,7 @@ RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
   state.flags[path] = 0;
   state.sigma_a[path] = Vec3f{};
   state.cone_width[path] = state.cone_spread[path] = 0.0f;
+  if (state.motion.time != nullptr) state.motion.time[path] = g.caustics.time;
   return true;
 }
 

@@ -9,15 +9,15 @@ namespace relief {
 /// Unit geometric normal of a path's hit, world space, on the front side.
 RELIEF_KERNEL Vec3f hit_geometric_normal(const KernelGlobals& g, const PathState& state, std::uint32_t path)
 {
-  const InstanceView& instance = g.instances[state.hit_object[path]];
+  const InstanceView& instance = path_instance(g, state, path);
   if ((instance.flags & kDisplaced) != 0) {
     const Vec3f Ng = state.hit_Ng[path];
     return normalize(transform_normal(instance.object_from_world, as_normal(Ng)));
   }
-  const MeshView& mesh = g.meshes[instance.mesh_index];
+  const MeshView& mesh = path_mesh(g, state, path, instance);
   const TriangleIndices tri = mesh.triangles[state.hit_triangle[path]];
-  const Vec3f edge1 = transform_vector(instance.world_from_object, mesh.P[tri.v1] - mesh.P[tri.v0]);
-  const Vec3f edge2 = transform_vector(instance.world_from_object, mesh.P[tri.v2] - mesh.P[tri.v0]);
+  const Vec3f edge1 = transform_vector(instance.world_from_object, mesh_P(mesh, tri.v1) - mesh_P(mesh, tri.v0));
+  const Vec3f edge2 = transform_vector(instance.world_from_object, mesh_P(mesh, tri.v2) - mesh_P(mesh, tri.v0));
   const Vec3f Ng = normalize(cross(edge1, edge2));
   return (instance.flags & kMirrored) != 0 ? -Ng : Ng;
 }
@@ -25,12 +25,12 @@ RELIEF_KERNEL Vec3f hit_geometric_normal(const KernelGlobals& g, const PathState
 /// Unit shading normal of a path's hit, world space, on the front side, without a normal map.
 RELIEF_KERNEL Vec3f hit_shading_normal(const KernelGlobals& g, const PathState& state, std::uint32_t path)
 {
-  const InstanceView& instance = g.instances[state.hit_object[path]];
+  const InstanceView& instance = path_instance(g, state, path);
   if ((instance.flags & kDisplaced) != 0) {
     const Vec3f Ns = state.hit_Ns[path];
     return normalize(transform_normal(instance.object_from_world, as_normal(Ns)));
   }
-  return surface_hit_make(g.meshes[instance.mesh_index], instance, state.hit_triangle[path], state.hit_u[path],
+  return surface_hit_make(path_mesh(g, state, path, instance), instance, state.hit_triangle[path], state.hit_u[path],
                           state.hit_v[path])
       .Ns;
 }

@@ -11,6 +11,13 @@
 
 namespace relief {
 
+/// When a sample of a pixel is. A photon map knows of one time only, so where there is a photon pass all samples of the pass
+/// are then.
+RELIEF_KERNEL float path_time_sample(const KernelGlobals& g, std::uint32_t pixel_hash, std::uint32_t sample_index)
+{
+  return g.caustics.enabled ? g.caustics.time : sample_1d(pixel_hash, sample_index, kTimeDimension);
+}
+
 /// Starts `path` at a sample of a pixel. Writes every column but the hit's and the scatter normal.
 /// Next: intersect closest.
 /// @param pixel_x, pixel_y  in the film window
@@ -37,7 +44,17 @@ RELIEF_KERNEL void generate_camera_path(const KernelGlobals& g,
   if (g.camera.aperture_radius > 0.0f) {
     lens = warp_disk(sample_2d(hash, sample_index, dimension_camera(CameraDimension::kLens)));
   }
-  const CameraRay ray = camera_ray_make(g.camera, film_x, film_y, lens, 1.0f / static_cast<float>(g.full_height));
+  const float pixel_height = 1.0f / static_cast<float>(g.full_height);
+  CameraRay ray;
+  if (state.motion.time != nullptr) {
+    const float time = path_time_sample(g, hash, sample_index);
+    state.motion.time[path] = time;
+    Camera camera = g.camera;
+    if (g.camera_motion.num_keys > 0) camera.world_from_camera = motion_at(g.camera_motion, time);
+    ray = camera_ray_make(camera, film_x, film_y, lens, pixel_height);
+  } else {
+    ray = camera_ray_make(g.camera, film_x, film_y, lens, pixel_height);
+  }
 
   state.O[path] = ray.O;
   state.D[path] = ray.D;

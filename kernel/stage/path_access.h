@@ -15,6 +15,28 @@ RELIEF_KERNEL Vec3f path_throughput(const PathState& s, std::uint32_t i) { retur
 RELIEF_KERNEL Vec3f path_sigma_a(const PathState& s, std::uint32_t i) { return s.sigma_a[i]; }
 RELIEF_KERNEL Vec3f path_scatter_N(const PathState& s, std::uint32_t i) { return s.scatter_N[i]; }
 
+/// When the path is, see motion.h.
+RELIEF_KERNEL float path_time(const PathState& s, std::uint32_t i)
+{
+  return s.motion.time != nullptr ? s.motion.time[i] : 0.0f;
+}
+
+/// The instance that a path has hit, as it is at the path's time.
+RELIEF_KERNEL const InstanceView& path_instance(const KernelGlobals& g, const PathState& s, std::uint32_t i)
+{
+  const InstanceView& instance = g.instances[s.hit_object[i]];
+  return (instance.flags & (kMoves | kDeforms)) != 0 ? s.motion.instances[i] : instance;
+}
+
+/// Its mesh, likewise.
+RELIEF_KERNEL const MeshView& path_mesh(const KernelGlobals& g,
+                                        const PathState& s,
+                                        std::uint32_t i,
+                                        const InstanceView& instance)
+{
+  return (instance.flags & kDeforms) != 0 ? s.motion.meshes[i] : g.meshes[instance.mesh_index];
+}
+
 /// Gives a path a new ray, to be searched from its origin on.
 /// @param D  unit
 RELIEF_KERNEL void path_set_ray(PathState& s, std::uint32_t i, Vec3f O, Vec3f D)
@@ -127,6 +149,7 @@ RELIEF_KERNEL std::uint32_t path_fork(PathState& s, std::uint32_t i)
 #include "kernel/state/path_state_fields.inc"
 #undef X
   s.caustic.root[copy] = s.caustic.root[i];
+  if (s.motion.time != nullptr) s.motion.time[copy] = s.motion.time[i];
   s.direct[copy] = s.indirect[copy] = Vec3f{};
   (*s.caustic.radiance)[copy] = Vec3f{};
   return copy;

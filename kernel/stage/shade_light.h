@@ -24,7 +24,9 @@ RELIEF_KERNEL GraphRay lamp_ray(const KernelGlobals& g, const PathState& state, 
 RELIEF_KERNEL void shade_light(const KernelGlobals& g, PathState& state, std::uint32_t path)
 {
   const auto light_index = static_cast<std::int32_t>(g.area_light_index[state.hit_object[path] - g.num_instances]);
-  const Light& light = g.lights.lights[light_index];
+  Light storage;
+  const float time = path_time(state, path);
+  const Light& light = lights_at(g.lights, {light_index}, storage, time);
   const int scatterings = path_bounces(state.bounces[path], BounceKind::kAll);
   const Vec3f D = path_direction(state, path);
   const float t = state.hit_t[path];
@@ -42,7 +44,7 @@ RELIEF_KERNEL void shade_light(const KernelGlobals& g, PathState& state, std::ui
     const float pdf = state.pdf[path];
     if (pdf > 0.0f) {
       const float pdf_light =
-          lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), {light_index}, D, t);
+          lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), {light_index}, D, t, time);
       radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
     }
     path_add_radiance(state, path, scatterings, path_throughput(state, path) * radiance, g.clamp_indirect);

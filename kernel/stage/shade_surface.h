@@ -31,7 +31,8 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   const Vec3f P = at.hit.P;
   const int bounce = path_bounces(state.bounces[path], BounceKind::kAll);
   Light storage;
-  const Light* emitter = chosen.ref.light_index >= 0 ? &lights_at(g.lights, chosen.ref, storage) : nullptr;
+  const Light* emitter =
+      chosen.ref.light_index >= 0 ? &lights_at(g.lights, chosen.ref, storage, path_time(state, path)) : nullptr;
   const LightSample light = lights_sample_chosen(g.lights, chosen, emitter, P, light_N, light_u);
   if (!(light.pdf > 0.0f)) return;
   Vec3f radiance = light.radiance;
@@ -390,8 +391,8 @@ RELIEF_KERNEL void shade_surface_emission(const KernelGlobals& g,
     if (pdf > 0.0f && at.instance->first_light_index >= 0) {
       const LightRef hit{at.instance->first_light_index + static_cast<std::int32_t>(at.triangle),
                          at.instance->light_copy_index};
-      const float pdf_light =
-          lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), hit, wi, state.hit_t[path]);
+      const float pdf_light = lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), hit, wi,
+                                         state.hit_t[path], path_time(state, path));
       radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
     }
     if (bounce == 0) film_add_emission(g.film, state.pixel[path], throughput * radiance);

@@ -69,10 +69,10 @@ RELIEF_KERNEL SurfaceInteraction
 surface_interaction_locate(const KernelGlobals& g, const PathState& state, std::uint32_t path, Vec3f wo)
 {
   SurfaceInteraction at;
-  at.instance = &g.instances[state.hit_object[path]];
+  at.instance = &path_instance(g, state, path);
   at.material = &g.materials[at.instance->material_index];
   at.triangle = state.hit_triangle[path];
-  const MeshView& mesh = g.meshes[at.instance->mesh_index];
+  const MeshView& mesh = path_mesh(g, state, path, *at.instance);
   const float u = state.hit_u[path], v = state.hit_v[path];
   at.hit =
       (at.instance->flags & kDisplaced) != 0
@@ -111,7 +111,7 @@ RELIEF_KERNEL GraphPoint surface_graph_point(const KernelGlobals& g,
                                              const SurfaceInteraction& at,
                                              Vec3f wo)
 {
-  return {&g.meshes[at.instance->mesh_index],
+  return {&path_mesh(g, state, path, *at.instance),
           at.instance,
           at.triangle,
           state.hit_u[path],
@@ -240,7 +240,7 @@ RELIEF_KERNEL void surface_interaction_frame(const KernelGlobals& g,
   bool has_tangents = false;
   if constexpr ((kFeatures & kFeatureNormalMaps) != 0) {
     if (material.normal_texture.texture_index >= 0 || material.clearcoat_normal_texture.texture_index >= 0) {
-      has_tangents = surface_hit_tangent_frame(g.meshes[at.instance->mesh_index], *at.instance, at.triangle,
+      has_tangents = surface_hit_tangent_frame(path_mesh(g, state, path, *at.instance), *at.instance, at.triangle,
                                                state.hit_u[path], state.hit_v[path], at.hit.Ns, &tangent_frame);
     }
     if (has_tangents && material.normal_texture.texture_index >= 0) {

@@ -62,12 +62,24 @@ struct CausticStateView {
   std::uint32_t num_paths = 0;              ///< forked ones included
 };
 
+struct InstanceView;
+struct MeshView;
+
+/// Columns that paths need while the shutter is open; null where nothing takes time.
+struct MotionStateView {
+  float* time = nullptr;  ///< of the path, see motion.h
+  InstanceView* instances =
+      nullptr;                 ///< at the present hit, if it is on an instance that moves: as it is at the path's time
+  MeshView* meshes = nullptr;  ///< likewise, of one that deforms
+};
+
 /// Columns of all paths of a batch. They lie at fixed places, so that one register reaches them all.
 struct alignas(64) PathState {
 #define X(type, name) PathColumn<type> name;
 #include "kernel/state/path_state_fields.inc"
 #undef X
   CausticStateView caustic;
+  MotionStateView motion;
 };
 
 enum PathFlag : std::uint32_t {
