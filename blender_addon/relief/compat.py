@@ -5,6 +5,7 @@ Checked against 3.4.1, 4.3.2 and 5.2.2, as Debian 12, 13 and unstable package th
 """
 
 import math
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -269,3 +270,42 @@ def sees_world(world, ray):
         if hasattr(owner, name):
             return getattr(owner, name)
     return True
+
+
+@dataclass(frozen=True)
+class MotionBlur:
+    """What of an object takes time while the shutter is open, settings of Cycles.
+
+    moves    its transform
+    deforms  its mesh
+    steps    how finely: 2 to the power of it are looked up
+    """
+
+    moves: bool = True
+    deforms: bool = True
+    steps: int = 1
+
+
+def motion_blur_of(shown):
+    """MotionBlur of an object."""
+    cycles = getattr(shown, "cycles", None)
+    if cycles is None:
+        return MotionBlur()
+    return MotionBlur(cycles.use_motion_blur, cycles.use_deform_motion, cycles.motion_steps)
+
+
+def shutter_position(scene):
+    """"start", "center" or "end": where the frame lies while the shutter is open. Since 4.2 it is a setting of all engines."""
+    owner = shutter_position_owner(scene)
+    return "center" if owner is None else owner.motion_blur_position.lower()
+
+
+def shutter_position_owner(scene):
+    """What has motion_blur_position, for the panel; None: nothing has."""
+    owners = (scene.render, getattr(scene, "cycles", None))
+    return next((owner for owner in owners if hasattr(owner, "motion_blur_position")), None)
+
+
+def is_rolling_shutter(scene):
+    """Whether rows of the picture are to be exposed one after the other, a setting of Cycles."""
+    return getattr(getattr(scene, "cycles", None), "rolling_shutter_type", "NONE") != "NONE"

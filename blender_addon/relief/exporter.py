@@ -42,6 +42,8 @@ class Capture:
             self._shot = Shot(scene.render.fps / scene.render.fps_base)
         final.warn_unread(scene, self.report)
         view, crop = final.view_of(engine, depsgraph, self.report)
+        if scene.render.use_motion_blur:
+            self.report.warn(f'scene "{scene.name}"', "motion blur", "everything stands still")
         if crop:
             self.report.warn(f'scene "{scene.name}"', "a render region", "whole pictures; use --crop")
         exporter = SceneExporter(depsgraph, self._writer, self.report)

@@ -10,6 +10,7 @@ import numpy as np
 
 from . import exr, report, result, session
 from .export.camera import camera_json
+from .export.motion import Motion, shutter_of
 from .export.scene import DATA_FOLDER, View, export_scene, write_view
 from .export.settings import sampling_of, warn_unread_settings
 from .preferences import find_checked_binary
@@ -36,6 +37,24 @@ def render(engine, depsgraph):
     scene = depsgraph.scene
     warnings = Report(strict=scene.relief.strict)
     warn_unread(scene, warnings)
+    where = f'scene "{scene.name}"'
+    shutter = shutter_of(scene, lambda *text: warnings.warn(where, *text))
+    now = scene.frame_current, scene.frame_subframe
+    try:
+        motion = Motion(engine, depsgraph, shutter, warnings) if shutter is not None else None
+        _render(engine, depsgraph, binary, warnings, motion, begin)
+    finally:
+        if shutter is not None:
+            engine.frame_set(*now)
+
+
+def _render(engine, depsgraph, binary, warnings, motion, begin):
+    """The rest of it.
+
+    @param  motion  Motion, which has left the engine when the shutter is half done; None: nothing takes time
+    @param  begin   time.perf_counter when it all began
+    """
+    scene = depsgraph.scene
     view, crop = view_of(engine, depsgraph, warnings)
     folder = session.render_folder()
     layer_name = depsgraph.view_layer.name
@@ -43,25 +62,37 @@ def render(engine, depsgraph):
     result.warn_missing_passes(depsgraph.view_layer, warnings)
 
     engine.update_stats("", "Exporting")
-    # The view has a file of its own: where it alone moves, the program keeps all that it has loaded and built.
-    exported = export_scene(depsgraph, any_view(view.size), folder, "scene.gltf", warnings)
-    view_path = write_view(view, folder, "view.gltf")
+    # Where nothing takes time the view has a file of its own: if it alone moves, the program keeps all that it has loaded and
+    # built.
+    scene_view = view if motion is not None else any_view(view.size)
+    exported = export_scene(depsgraph, scene_view, folder, "scene.gltf", warnings, motion)
     session.remove_stale(os.path.join(folder, DATA_FOLDER), exported.used_files)
     known = set(warnings.warnings)
     report.last_coverage[scene.name] = warnings.coverage
     report.publish(scene.name, warnings.warnings)
 
     aovs = result.aov_list(passes, exported.has_holdouts and not scene.render.film_transparent)
-    picture_path, stats_path = os.path.join(folder, "picture.exr"), os.path.join(folder, "stats.json")
-    arguments = [exported.path, "--camera-from", view_path, "-o", picture_path, "--stats", stats_path]
+    number = "" if motion is None else f".{motion.frame}"
+
+    def output(name, suffix):
+        """(what the program is told, where it then writes to)."""
+        told = os.path.join(folder, f"{name}{'.#' if number else ''}{suffix}")
+        return told, os.path.join(folder, f"{name}{number}{suffix}")
+
+    (told_picture, picture_path), (told_stats, stats_path) = output("picture", ".exr"), output("stats", ".json")
+    arguments = [exported.path, "-o", told_picture, "--stats", told_stats]
+    if motion is not None:
+        arguments += ["--frames", str(motion.frame)]
+    else:
+        arguments += ["--camera-from", write_view(view, folder, "view.gltf")]
     arguments += ["--compression", "none", "--float", "--aov", aovs]
     arguments += command_line(scene, crop)
     if scene.relief.denoise != "none":
         arguments += ["--denoise", scene.relief.denoise]
     preview = None
     if _is_watched():
-        preview_path = os.path.join(folder, "preview.exr")
-        arguments += ["--preview", preview_path]
+        told_preview, preview_path = output("preview", ".exr")
+        arguments += ["--preview", told_preview]
         preview = _Preview(preview_path, lambda p: result.show(engine, p, layer_name, scene.render.film_transparent))
     try:
         _run(engine, binary, arguments, warnings, preview)
@@ -189,8 +220,6 @@ def view_of(engine, depsgraph, warnings):
 def warn_unread(scene, warnings):
     """Warns about settings of a scene that have no effect."""
     where = f'scene "{scene.name}"'
-    if scene.render.use_motion_blur:
-        warnings.warn(where, "motion blur", "everything stands still")
     if scene.render.use_freestyle:
         warnings.warn(where, "Freestyle lines", "they are left out")
     if scene.render.use_multiview:

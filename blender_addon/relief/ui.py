@@ -174,6 +174,25 @@ class RELIEF_PT_film(_RenderPanel, bpy.types.Panel):
             rows.prop(context.scene.cycles, "film_exposure")
 
 
+class RELIEF_PT_motion_blur(_RenderPanel, bpy.types.Panel):
+    bl_label = "Motion Blur"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context):
+        self.layout.prop(context.scene.render, "use_motion_blur", text="")
+
+    def draw(self, context):
+        render, rows = context.scene.render, self.rows()
+        rows.active = render.use_motion_blur
+        owner = compat.shutter_position_owner(context.scene)
+        if owner is not None:
+            rows.prop(owner, "motion_blur_position", text="Position")
+        rows.prop(render, "motion_blur_shutter")
+        cycles = getattr(context.object, "cycles", None)
+        if cycles is not None:
+            rows.prop(cycles, "motion_steps", text="Steps of the Active Object")
+
+
 class RELIEF_PT_performance(_RenderPanel, bpy.types.Panel):
     bl_label = "Performance"
     bl_options = {"DEFAULT_CLOSED"}
@@ -338,6 +357,7 @@ _classes = (
     RELIEF_PT_light_paths,
     RELIEF_PT_displacement,
     RELIEF_PT_film,
+    RELIEF_PT_motion_blur,
     RELIEF_PT_performance,
     RELIEF_PT_passes,
     RELIEF_PT_material_surface,

@@ -135,7 +135,7 @@ class GltfWriter:
                 "count": len(array),
                 "type": _SHAPES[1 if array.ndim == 1 else array.shape[1]],
             }
-            if name in ("POSITION", "input"):  # glTF asks for bounds of positions and of times
+            if name.startswith("POSITION") or name == "input":  # glTF asks for bounds of positions and of times
                 rows = array.reshape(len(array), -1)
                 accessor["min"] = rows.min(axis=0).tolist()
                 accessor["max"] = rows.max(axis=0).tolist()

@@ -159,6 +159,33 @@ def _zero_where_not_finite(values):
     return values if is_finite.all() else np.where(is_finite, values, np.float32(0))
 
 
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """Where a mesh's vertices are at one time.
+
+    positions            float32 (vertices, 3)
+    normals              of corners, float32 (loops, 3)
+    displacement_normals likewise
+    """
+
+    positions: np.ndarray
+    normals: np.ndarray
+    displacement_normals: np.ndarray
+
+    def __eq__(self, other):
+        return self.fits(other) and np.array_equal(self.positions, other.positions) and np.array_equal(self.normals, other.normals)
+
+    def fits(self, other):
+        """Whether both have the same vertices and corners."""
+        return len(self.positions) == len(other.positions) and len(self.normals) == len(other.normals)
+
+
+def shape_of(mesh):
+    """Shape of an evaluated bpy mesh."""
+    corners = _Corners(mesh, lambda *_: None)
+    return Shape(corners.positions, corners.normals, corners.displacement_normals())
+
+
 @dataclass(frozen=True)
 class StoredMesh:
     """A mesh whose arrays are in files.
@@ -180,12 +207,13 @@ class StoredMesh:
         return max((abs(x) for accessor in bounds for x in accessor["min"] + accessor["max"]), default=0.0)
 
 
-def store_mesh(mesh, wanted, writer):
+def store_mesh(mesh, wanted, writer, shapes=()):
     """Writes a mesh's arrays.
 
     @param  mesh    evaluated bpy mesh; its caches of triangles and normals are filled
     @param  wanted  tuple of the Wanted of each slot's material, at least one
     @param  writer  GltfWriter
+    @param  shapes  Shape at each step of a shutter, which become morph targets; empty: it does not deform
     @return         StoredMesh
     """
     warnings = []
@@ -201,7 +229,7 @@ def store_mesh(mesh, wanted, writer):
         parts += corners.is_smooth & np.array([w.by_shading for w in wanted])[slots]
     for part in np.unique(parts):
         (slot, smooth), own = divmod(part, 2), parts == part
-        arrays = _primitive_arrays(corners, corners.loops[own], wanted[slot], warn)
+        arrays = _primitive_arrays(corners, corners.loops[own], wanted[slot], shapes, warn)
         primitives.append((int(slot), bool(smooth), writer.store(arrays)))
     return StoredMesh(mesh.name, wanted, primitives, tuple(warnings))
 
@@ -217,13 +245,23 @@ def add_mesh(stored, materials, writer):
     primitives = []
     for slot, is_smooth, arrays in stored.primitives:
         attributes = dict(writer.add_stored(arrays))
-        primitives.append(
-            {"indices": attributes.pop("indices"), "attributes": attributes, "material": materials[slot](is_smooth)}
-        )
+        targets = []
+        while _target("POSITION", len(targets)) in attributes:
+            number = len(targets)
+            targets.append({name: attributes.pop(_target(name, number)) for name in ("POSITION", "NORMAL")})
+        primitive = {"indices": attributes.pop("indices"), "attributes": attributes, "material": materials[slot](is_smooth)}
+        if targets:
+            primitive["targets"] = targets
+        primitives.append(primitive)
     return writer.add_unique("meshes", {"name": stored.name, "primitives": primitives})
 
 
-def _primitive_arrays(corners, triangles, wanted, warn):
+def _target(name, number):
+    """Name of an array of a morph target."""
+    return f"{name} {number}"
+
+
+def _primitive_arrays(corners, triangles, wanted, shapes, warn):
     """Attributes and indices of some triangles.
 
     @param  triangles  loop numbers of shape (n, 3)
@@ -253,6 +291,11 @@ def _primitive_arrays(corners, triangles, wanted, warn):
     arrays = {"POSITION": np.ascontiguousarray(corners.positions[corners.vertex[representatives]])}
     for name, values in per_loop.items():
         arrays[name] = np.ascontiguousarray(values[representatives])
+    for number, shape in enumerate(shapes):
+        normals = shape.displacement_normals if wanted.displaced else shape.normals
+        moved = {"POSITION": shape.positions[corners.vertex[representatives]], "NORMAL": normals[representatives]}
+        for name, values in moved.items():
+            arrays[_target(name, number)] = np.ascontiguousarray(values - arrays[name])
     arrays["indices"] = indices
     return arrays
 

@@ -16,6 +16,7 @@ from .image import ImageExporter
 from .light import Place, export_light
 from .material import MaterialExporter, emits
 from .mesh import FARTHEST, add_mesh, store_mesh
+from .motion import numbered
 from .objects import collect, decompose, usable_places
 from .settings import render_settings
 from .world import export_world
@@ -61,7 +62,7 @@ class View:
     size: tuple
 
 
-def export_scene(depsgraph, view, folder, name, report):
+def export_scene(depsgraph, view, folder, name, report, motion=None):
     """Writes what a depsgraph holds as a scene file.
 
     @param  depsgraph  evaluated
@@ -69,13 +70,17 @@ def export_scene(depsgraph, view, folder, name, report):
     @param  folder     where to write; made if it is missing
     @param  name       of the scene file
     @param  report     Report
+    @param  motion     Motion while the shutter is open; None: nothing takes time
     @return            Exported
     """
     begin = time.perf_counter()
     writer = GltfWriter(folder, DATA_FOLDER)
-    exporter = SceneExporter(depsgraph, writer, report)
+    exporter = SceneExporter(depsgraph, writer, report, motion=motion)
     exporter.add_all(view)
-    writer.json.update(scene_json(exporter.nodes))
+    index_of = {}
+    writer.json.update(scene_json(exporter.nodes, index_of))
+    if motion is not None:
+        motion.write(writer, index_of)
     path = writer.write(name)
     seconds = time.perf_counter() - begin
     return Exported(path, writer.used_files, seconds, writer.bytes_written, exporter.has_holdouts)
@@ -168,19 +173,21 @@ class SceneExporter:
     """A scene file in the making.
 
     @param  stored  StoredMeshes of earlier exports, of which those that changed have been dropped; None: a single export
+    @param  motion  Motion while the shutter is open; None: nothing takes time
 
     writer        GltfWriter
     has_holdouts  something is a hole in the picture
     nodes         of the frame: glTF nodes in Blender's world, their children nodes instead of indices, the camera's first
     """
 
-    def __init__(self, depsgraph, writer, report, stored=None):
+    def __init__(self, depsgraph, writer, report, stored=None, motion=None):
         self.writer = writer
         self.nodes = []
         self.has_holdouts = False
         self._depsgraph = depsgraph
         self._scene = depsgraph.scene
         self._report = report
+        self._motion = motion
         self._stored = stored if stored is not None else StoredMeshes()
         self._by_shape = {}
         self._images = ImageExporter(self.writer, self._scene.frame_current)
@@ -196,7 +203,12 @@ class SceneExporter:
 
     def _add_view(self, view):
         """Adds the camera and the settings of the picture."""
-        self.nodes.append(_camera_node(view, self.writer))
+        if self._motion is not None:
+            view.camera["extensions"]["RELIEF_camera"].update(self._motion.shutter.json())
+        node = _camera_node(view, self.writer)
+        self.nodes.append(node)
+        if self._motion is not None:
+            self._motion.move_camera(node)
         settings = render_settings(self._scene, self._depsgraph.view_layer, view.size)
         self.writer.extend(self.writer.json, "RELIEF_render", settings)
 
@@ -208,9 +220,9 @@ class SceneExporter:
     def add_objects(self):
         """Adds meshes, instances and lights."""
         things = collect(self._depsgraph, self._report)
-        for thing in things:
+        for key, thing in numbered(things):
             if thing.kind == "geometry":
-                self._add_geometry(thing)
+                self._add_geometry(thing, key)
         self._stored.forget_unused()
         size = _extent(things)
         for thing in things:
@@ -227,14 +239,16 @@ class SceneExporter:
     def _warner(self, kind, name):
         return lambda what, instead="": self._report.warn(f'{kind} "{name}"', what, instead)
 
-    def _add_geometry(self, thing):
+    def _add_geometry(self, thing, key):
+        """@param  key  that Motion knows the thing by"""
         matrices, numbers = self._usable(thing, thing.world_matrices())
         if not len(matrices):
             return
         for system in thing.object.particle_systems:
             if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
                 self._report.warn(f'object "{thing.name}"', f'hair "{system.name}" as strands', "it is left out")
-        mesh, reach, read = self._mesh_of(thing)
+        shapes = None if self._motion is None else self._motion.shapes(key, thing.name)
+        mesh, reach, read = self._mesh_of(thing, shapes)
         if mesh is None:
             return
         is_near = np.abs(matrices[:, :3, 3]).max(axis=1) + np.abs(matrices[:, :3, :3]).sum(axis=(1, 2)) * reach < FARTHEST
@@ -246,10 +260,12 @@ class SceneExporter:
         base = {"name": thing.name, "mesh": mesh}
         settings = self._object_settings(thing)
         values = self._values_of(thing, read, numbers)
+        moves = [None] * len(numbers) if self._motion is None else self._motion.places(key, thing.name, numbers)
         if len(matrices) == 1:
-            self._add_alone(base, settings, matrices[0], values, 0)
+            self._add_alone(base, settings, matrices[0], values, 0, moves[0], shapes)
             return
         translation, rotation, scale, exact = decompose(matrices)
+        exact &= np.array([steps is None for steps in moves]) & (shapes is None)
         if exact.any():
             arrays = {"TRANSLATION": translation[exact], "ROTATION": rotation[exact], "SCALE": scale[exact]}
             arrays.update({key: v[exact] for key, v in values.items()})
@@ -261,14 +277,22 @@ class SceneExporter:
             self.writer.extend(node, "EXT_mesh_gpu_instancing", {"attributes": dict(accessors)})
             self.nodes.append(node)
         for i in np.flatnonzero(~exact):
-            self._add_alone(base, settings, matrices[i], values, i)
+            self._add_alone(base, settings, matrices[i], values, i, moves[i], shapes)
 
-    def _add_alone(self, base, settings, matrix, values, i):
+    def _add_alone(self, base, settings, matrix, values, i, steps, shapes):
         """Adds a node of one place.
 
         @param  values  of all places by name, of which it has number i
+        @param  steps   its matrices while the shutter is open; None: it stands still
+        @param  shapes  those of its mesh; None: it does not deform
         """
-        node = {**base, "matrix": matrix_property(matrix)}
+        node = dict(base)
+        if steps is None:
+            node["matrix"] = matrix_property(matrix)
+        else:
+            self._motion.move(node, steps)
+        if shapes is not None:
+            self._motion.deform(node)
         if values:
             own = {name: v[i].tolist() if v.shape[1] > 1 else float(v[i, 0]) for name, v in values.items()}
             settings = {**settings, "values": own}
@@ -329,7 +353,7 @@ class SceneExporter:
             warn("a shadow catcher", "it is an ordinary object")
         return settings
 
-    def _mesh_of(self, thing):
+    def _mesh_of(self, thing, shapes):
         """(index of the glTF mesh of a thing, largest coordinate of its vertices, values of objects that graphs read); index
         None: it has no triangles."""
         evaluated = thing.object.evaluated_get(self._depsgraph)
@@ -338,7 +362,7 @@ class SceneExporter:
         wanted = tuple(w for _, w in materials)
         stored = self._stored.get(thing.object, wanted) if thing.data is None else None
         if stored is None:
-            stored = self._store(thing, evaluated, wanted)
+            stored = self._store(thing, evaluated, wanted, shapes or ())
             if stored is None:
                 return None, 0.0, set()
             if thing.data is None:
@@ -348,7 +372,7 @@ class SceneExporter:
         read = {value for w in wanted for value in w.values}
         return add_mesh(stored, [i for i, _ in materials], self.writer), stored.reach(), read
 
-    def _store(self, thing, evaluated, wanted):
+    def _store(self, thing, evaluated, wanted, shapes):
         """StoredMesh of a thing; None if it has none. Things of one shape whose materials want the same share theirs."""
         key = (_shape(thing, evaluated), wanted)
         if key not in self._by_shape:
@@ -360,7 +384,7 @@ class SceneExporter:
             if mesh is None:
                 return None
             try:
-                self._by_shape[key] = store_mesh(mesh, wanted, self.writer)
+                self._by_shape[key] = store_mesh(mesh, wanted, self.writer, shapes)
             finally:
                 if thing.data is None:
                     evaluated.to_mesh_clear()
