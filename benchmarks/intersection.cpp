@@ -47,7 +47,7 @@ struct Bench {
   Bench(const Scene& scene, RenderOptions chosen)
       : context(scene),
         // No filter: a surface that lets light through in part stops a shadow ray here.
-        accel(scene, context.lights.lights, context.lights.area_lights, context.displacements, nullptr),
+        accel(scene, context.lights.lights, context.lights.area_lights, context.displacements, context, nullptr),
         options(std::move(chosen)),
         film(options.settings.width, options.settings.height, options.aov_mask)
   {
