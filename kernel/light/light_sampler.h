@@ -80,6 +80,17 @@ RELIEF_KERNEL bool light_casts_caustics(const LightsView& view, std::int32_t lig
   return light_index < 0 ? view.environment_casts_caustics : view.lights[light_index].casts_caustics;
 }
 
+/// A light that moves, as it is at a time.
+[[gnu::noinline]] RELIEF_KERNEL void light_move(const LightsView& view, const Light& light, float time, Light& out)
+{
+  const Affine3 moved = motion_at(view.motions[light.motion_index], time);
+  out = light;
+  out.P = moved.p;
+  out.edge_u = transform_vector(moved, light.edge_u);
+  out.edge_v = transform_vector(moved, light.edge_v);
+  out.axis = transform_vector(moved, light.axis);
+}
+
 /// A light in world space.
 /// @param ref      not the environment
 /// @param storage  where a copy's is put, and one's that moves
@@ -87,13 +98,8 @@ RELIEF_KERNEL bool light_casts_caustics(const LightsView& view, std::int32_t lig
 RELIEF_KERNEL const Light& lights_at(const LightsView& view, LightRef ref, Light& storage, float time = 0.0f)
 {
   const Light& light = view.lights[ref.light_index];
-  if (light.motion_index >= 0) {
-    const Affine3 moved = motion_at(view.motions[light.motion_index], time);
-    storage = light;
-    storage.P = moved.p;
-    storage.edge_u = transform_vector(moved, light.edge_u);
-    storage.edge_v = transform_vector(moved, light.edge_v);
-    storage.axis = transform_vector(moved, light.axis);
+  if (__builtin_expect(light.motion_index >= 0, 0)) {
+    light_move(view, light, time, storage);
     return storage;
   }
   if (ref.copy_index < 0) return light;

@@ -43,7 +43,7 @@ RELIEF_KERNEL MotionPlace motion_place(float time, std::uint32_t num_keys)
 /// @pre there are keys
 /// @source Shoemake 1985, "Animating Rotation with Quaternion Curves"; Shoemake and Duff 1992, "Matrix Animation and Polar
 ///         Decomposition"
-RELIEF_KERNEL Affine3 motion_at(MotionView motion, float time)
+[[gnu::noinline]] RELIEF_KERNEL Affine3 motion_at(MotionView motion, float time)
 {
   const MotionPlace place = motion_place(time, motion.num_keys);
   const MotionKey &a = motion.keys[place.key], &b = motion.keys[place.key + 1];

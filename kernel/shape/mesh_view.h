@@ -36,18 +36,25 @@ struct MeshView {
   float part = 0;
 };
 
+/// What most meshes do not need stays out of the way of those.
+[[gnu::noinline]] RELIEF_KERNEL Vec3f mesh_mix(Vec3f from, Vec3f to, float part)
+{
+  return (1.0f - part) * from + part * to;
+}
+
 RELIEF_KERNEL Vec3f mesh_P(const MeshView& mesh, std::uint32_t vertex)
 {
   const Vec3f P = mesh.P[vertex];
-  return mesh.P_next == nullptr ? P : (1.0f - mesh.part) * P + mesh.part * mesh.P_next[vertex];
+  if (__builtin_expect(mesh.P_next == nullptr, 1)) return P;
+  return mesh_mix(P, mesh.P_next[vertex], mesh.part);
 }
 
 /// @pre the mesh has normals
 RELIEF_KERNEL Normal3f mesh_N(const MeshView& mesh, std::uint32_t vertex)
 {
   const Normal3f N = mesh.N[vertex];
-  if (mesh.N_next == nullptr) return N;
-  return as_normal((1.0f - mesh.part) * as_vector(N) + mesh.part * as_vector(mesh.N_next[vertex]));
+  if (__builtin_expect(mesh.N_next == nullptr, 1)) return N;
+  return as_normal(mesh_mix(as_vector(N), as_vector(mesh.N_next[vertex]), mesh.part));
 }
 
 enum InstanceFlag : std::uint32_t {

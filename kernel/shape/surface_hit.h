@@ -145,7 +145,7 @@ RELIEF_KERNEL DisplacedPointError displaced_point_error(const InstanceView& inst
 RELIEF_KERNEL Vec3f displaced_tracer_error(const MeshView& mesh, const InstanceView& instance, TriangleIndices tri)
 {
   constexpr float kRoundings = 0x1p-47f;  // 64 of a double; 8 were not enough for all of 10⁵ rays, 16 were
-  const Vec3f farthest = max(max(abs(mesh_P(mesh, tri.v0)), abs(mesh_P(mesh, tri.v1))), abs(mesh_P(mesh, tri.v2)));
+  const Vec3f farthest = max(max(abs(mesh.P[tri.v0]), abs(mesh.P[tri.v1])), abs(mesh.P[tri.v2]));
   const float error = kRoundings * max_component(farthest);
   const Affine3& m = instance.world_from_object;
   return (abs(m.x) + abs(m.y) + abs(m.z)) * error;
@@ -179,9 +179,8 @@ RELIEF_KERNEL SurfaceHit surface_hit_displaced(const MeshView& mesh,
   hit.P_lift = {};
   hit.leave = transform_vector(m, at.leave);
   surface_hit_interpolate(mesh, tri, bary_u, bary_v, &hit);
-  const Vec3f p0 = mesh_P(mesh, tri.v0);
-  const Vec3f edge1 = transform_vector(m, mesh_P(mesh, tri.v1) - p0),
-              edge2 = transform_vector(m, mesh_P(mesh, tri.v2) - p0);
+  const Vec3f p0 = mesh.P[tri.v0];
+  const Vec3f edge1 = transform_vector(m, mesh.P[tri.v1] - p0), edge2 = transform_vector(m, mesh.P[tri.v2] - p0);
   surface_hit_density(mesh, tri, length(cross(edge1, edge2)), &hit);
   return hit;
 }
