@@ -156,9 +156,9 @@ void heightfield_register(CLI::App& bench, Run& run)
   command->add_option("--size", arguments->size, "Texels along a side of the height maps")
       ->check(one_of({"16", "32", "64", "128", "256", "512"}))
       ->capture_default_str();
-  names_file(
-      command->add_option("--map", arguments->inputs, "Image of heights that is studied too; may be given several times"),
-      kImageSuffixes);
+  names_file(command->add_option("--map", arguments->inputs,
+                                 "Image of heights that is studied too; may be given several times"),
+             kImageSuffixes);
   command
       ->add_option("--cones", arguments->cones,
                    "Cone maps, separated by commas: conservative, quick, approximate-relaxed, relaxed, quick-relaxed "
