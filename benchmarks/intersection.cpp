@@ -78,7 +78,7 @@ using RayLists = std::array<std::vector<RecordedRay>, 3>;
 RayLists record_rays(const Bench& bench)
 {
   RayLists lists;
-  Wavefront wavefront(false, false);
+  Wavefront wavefront({});
   std::vector<RecordedRay> rays;
   wavefront.recorder = &rays;
   for (int tile = 0; tile < bench.film.num_tiles(); ++tile) {
@@ -147,7 +147,7 @@ Measured measure(Bench& bench, const RayLists& lists, int num_rounds)
     for (std::size_t kind = 0; kind < lists.size(); ++kind) {
       result.raw[kind].seconds.push_back(trace_raw(bench.accel, lists[kind], static_cast<RayKind>(kind), &num_hits));
     }
-    Wavefront wavefront(false, false);
+    Wavefront wavefront({});
     const Clock::time_point start = Clock::now();
     for (int tile = 0; tile < bench.film.num_tiles(); ++tile) {
       wavefront.run(bench.globals, *bench.context.accel, stage_table_select(), bench.context.surface_kernel,

@@ -284,6 +284,15 @@ std::unique_ptr<PreparedMesh> DisplacementSet::make_displaced(const Use& use, co
         fields_->level(map_of(use), levels.first + k, displacement_method(geometry.method), geometry.rmip_options);
     fields.push_back(geometry.levels[k].field);
   }
+  geometry.first_level = levels.first;
+  if (levels.first + levels.count > 1) {
+    MapFacets& facets = geometry.facets.emplace(MapFacets{height_lattice_make(map_of(use).view)});
+    const bool tessellates = displacement_method(geometry.method).tessellation.has_value();
+    for (int k = levels.first == 0 ? 1 : 0; k < levels.count; ++k) {
+      facets.spread[levels.first + k] =
+          facet_spread(facets.texels, *geometry.levels[k].field, geometry.smooth, tessellates);
+    }
+  }
   const DisplacementMapping mapping{settings.height, use.scale, settings.midlevel, settings.weld_seams};
   std::unique_ptr<PreparedMesh> displaced = prisms_of(use.mesh, mapping, fields);
   displaced->name = use.mesh_name;
@@ -294,6 +303,7 @@ std::unique_ptr<PreparedMesh> DisplacementSet::make_displaced(const Use& use, co
   geometry.scene = displaced->tree.get();
   displaced->geometry = geometry;
   has_levels_ |= levels.count > 1;
+  has_facets_ |= geometry.facets.has_value();
   return displaced;
 }
 
@@ -427,6 +437,7 @@ DisplacedPoint DisplacementSet::resolve(std::size_t instance,
   out.P = to_float(hit.P);
   out.Ng = out.Ns = to_float(hit.Ng);
   if (d.geometry.smooth) out.Ns = to_float(displaced_smooth_normal(d.geometry, out.triangle, 0, out.u, out.v));
+  displaced_point_set_level(d.geometry, placement, static_cast<float>(d.geometry.first_level), &out);
   return out;
 }
 

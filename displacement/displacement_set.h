@@ -13,6 +13,7 @@
 
 #include "displacement/height_fields.h"
 #include "displacement/lattice_split.h"
+#include "displacement/level_facets.h"
 #include "displacement/prepared_mesh.h"
 #include "displacement/seams.h"
 #include "kernel/camera/camera.h"
@@ -82,6 +83,8 @@ class DisplacementSet {
   std::size_t size() const { return geometries_.size(); }
   /// Whether rays must say what detail they ask for.
   bool has_levels() const { return has_levels_; }
+  /// Whether rays may meet texels that are coarser than their map's.
+  bool has_facets() const { return has_facets_; }
   /// Widths of finest texels by instance, metres, world; 0 where it is not displaced.
   const float* texels() const { return texel_of_instance_.data(); }
   DisplacedGeometry& geometry(std::size_t index) { return geometries_[index]->geometry; }
@@ -99,6 +102,12 @@ class DisplacementSet {
                          const InstanceView& placement,
                          std::uint32_t primitive,
                          EmbreeHitRecord record) const;
+  /// The facets around a hit on a level.
+  /// @param jitter  as in level_facets_make, like the result
+  bool facets(std::size_t instance, const LevelPlace& at, Vec2f jitter, LevelFacets* out) const
+  {
+    return level_facets_make(displaced(instance).geometry, at, jitter, out);
+  }
   /// The base triangle and weights of a hit alone.
   DisplacedPoint locate(std::size_t instance, std::uint32_t primitive, float u, float v) const;
   /// Place of a displaced geometry's settings in the input.
@@ -167,7 +176,7 @@ class DisplacementSet {
   std::unique_ptr<LatticeCache> lattice_cache_;  ///< of computed heights; null: there are none
   std::vector<int> geometry_of_instance_;
   std::vector<float> texel_of_instance_;
-  bool has_levels_ = false;
+  bool has_levels_ = false, has_facets_ = false;
   std::vector<std::string> reasons_;
   std::shared_ptr<HeightFields> fields_;
   HeightFields::Tally kept_;

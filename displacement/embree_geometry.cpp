@@ -85,17 +85,21 @@ bool widen_by_neighbor(RTCPointQueryFunctionArguments* arguments)
   return false;
 }
 
-/// Half sides of the box that a point of a displaced surface is in, and the origin of a ray that leaves it along its normal.
+/// Where rays that leave a point of a displaced surface along its normal start, object space.
+struct Leaving {
+  Vec3f offset;  ///< from the point, to the side of the normal
+  Vec3d reach;   ///< half sides of the box that the point is in, and the origin
+};
+
 /// @param P, Ng  object space
-/// @return       object space
-Vec3d leaving_reach(const InstanceView& placement, Vec3f P, Vec3f Ng)
+Leaving leaving_make(const InstanceView& placement, Vec3f P, Vec3f Ng)
 {
   const DisplacedPointError error =
       displaced_point_error(placement, P, transform_point(placement.world_from_object, P));
   const Vec3f N = normalize(transform_normal(placement.object_from_world, as_normal(Ng)));
-  const Vec3f offset = 2.0f * dot(abs(N), error.world) * N;
+  const Vec3f offset = transform_vector(placement.object_from_world, 2.0f * dot(abs(N), error.world) * N);
   // The origin has as large an error as the point.
-  return to_double(2.0f * error.object + abs(transform_vector(placement.object_from_world, offset)));
+  return {offset, to_double(2.0f * error.object + abs(offset))};
 }
 
 /// How far a ray's origin has to be moved to leave a point of the surface where it has a crease.
@@ -153,6 +157,16 @@ Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry,
   return surface_smooth_normal(on.mesh, on.tri, b1, b2);
 }
 
+void displaced_point_set_level(const DisplacedGeometry& geometry,
+                               const InstanceView& placement,
+                               float level,
+                               DisplacedPoint* point)
+{
+  if (!geometry.facets || !(level > 0.0f)) return;
+  point->level = level;
+  if (is_zero(point->leave)) point->leave = leaving_make(placement, point->P, point->Ng).offset;
+}
+
 DisplacedPoint displaced_resolve(const DisplacedGeometry& geometry,
                                  const InstanceView& placement,
                                  float texel,
@@ -166,7 +180,8 @@ DisplacedPoint displaced_resolve(const DisplacedGeometry& geometry,
   out.Ng = out.Ns = to_float(point.Ng);
   if (geometry.lod.by_cone) out.width = lod_width_of_level(texel, place.level);
   if (place.edge >= 0) return out;
-  out.leave = to_float(leave_of(geometry, triangle, place, leaving_reach(placement, out.P, out.Ng)));
+  out.leave = to_float(leave_of(geometry, triangle, place, leaving_make(placement, out.P, out.Ng).reach));
+  displaced_point_set_level(geometry, placement, static_cast<float>(geometry.first_level + place.level), &out);
   if (geometry.smooth) out.Ns = to_float(displaced_smooth_normal(geometry, triangle, place.level, place.b1, place.b2));
   return out;
 }

@@ -3,6 +3,8 @@
 // stages.
 #pragma once
 
+#include <optional>
+
 #include "displacement/displaced_mesh.h"
 #include "displacement/embree.h"
 #include "displacement/level_of_detail.h"
@@ -17,6 +19,12 @@ struct DisplacementLevel {
   const void* table = nullptr;  ///< MethodTable::view
 };
 
+/// What of a map its coarser levels have lost, see level_facets.h.
+struct MapFacets {
+  HeightFieldView texels;                      ///< the map's own, without bounds
+  Vec2f spread[kMaxLodLevels + 1] = {{1, 1}};  ///< facet_spread by level of the map; only of those that rays meet
+};
+
 /// User data of a geometry: what its callbacks need. Must stay where it is while the geometry is in use.
 struct DisplacedGeometry {
   DisplacedMeshView mesh;  ///< with the finest level
@@ -24,6 +32,8 @@ struct DisplacedGeometry {
   bool smooth = false;  ///< shading normals come from the map's filtered gradient
   LodRule lod;
   DisplacementLevel levels[kMaxLodLevels];      ///< the finest first; lod.num_levels of them
+  int first_level = 0;                          ///< of the map: what levels[0] is
+  std::optional<MapFacets> facets;              ///< that coarser levels stand for; empty: there are none
   RmipOptions rmip_options;                     ///< for both of RMIP's
   RTCFilterFunctionN shadow_filter = nullptr;   ///< called for hits of shadow rays; null: all of them are opaque
   const ProceduralField* procedural = nullptr;  ///< heights in place of a map's; there are no levels then
@@ -109,6 +119,7 @@ struct DisplacedPoint {
   Vec3f P = {}, Ng = {};       ///< on the traced surface, object space; Ng unit, on the side of the displacement normal
   Vec3f Ns = {};               ///< unit shading normal, object space: Ng, or that of the smoothed map
   Vec3f leave = {};            ///< see SurfaceHit::leave; object space
+  float level = 0;             ///< of the map; above 0 it stands for facets of finer texels, see level_facets.h
 };
 
 /// Completes the nearest hit, once it is known.
@@ -122,6 +133,14 @@ DisplacedPoint displaced_resolve(const DisplacedGeometry& geometry,
                                  float texel,
                                  std::uint32_t triangle,
                                  EmbreeHitRecord record);
+
+/// Notes the level of a point, and that rays leave it along the normal that it has, whatever facet they come from.
+/// @param level  of the map
+/// @param point  complete but for that
+void displaced_point_set_level(const DisplacedGeometry& geometry,
+                               const InstanceView& placement,
+                               float level,
+                               DisplacedPoint* point);
 
 /// A new geometry, one primitive a base triangle, not committed.
 RTCGeometry displaced_geometry_make(RTCDevice device, const DisplacedGeometry& geometry, const TraversalTable& table);

@@ -86,23 +86,6 @@ StoredRange line_range(const PyramidLine& line)
 
 int divide_up(int a, int b) { return (a + b - 1) / b; }
 
-/// A field without its pyramid.
-HeightFieldView field_make(const HeightMapView& map)
-{
-  HeightFieldView f;
-  f.map = map;
-  f.x = lattice_axis(map.width, map.wrap_u);
-  f.y = lattice_axis(map.height, map.wrap_v);
-  f.h_step = 1.0 / 65535.0;
-  if (map.format == HeightFormat::kFloat) {
-    const auto count = static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height);
-    const auto [low, high] = float_extremes(static_cast<const float*>(map.texels), count);
-    f.h_offset = low;
-    f.h_step = high > low ? (static_cast<double>(high) - low) / 65535.0 : 1.0;
-  }
-  return f;
-}
-
 /// Bounds of a line's 16 nodes, from the level below or from the texels.
 /// @param columns, rows  nodes of the level
 PyramidLine line_make(const HeightFieldView& f, int level, int columns, int rows, int line_column, int line_row)
@@ -203,7 +186,7 @@ int split_by_period(const LatticeAxis& axis, std::int64_t first, std::int64_t la
 
 }  // namespace
 
-HeightField::HeightField(const HeightMapView& map) : view_(field_make(map))
+HeightField::HeightField(const HeightMapView& map) : view_(height_lattice_make(map))
 {
   HeightFieldView& f = view_;
   int columns = divide_up(f.x.num_cells, 4), rows = divide_up(f.y.num_cells, 4);  // nodes of the level below the lines
@@ -228,9 +211,25 @@ HeightField::HeightField(const HeightMapView& map) : view_(field_make(map))
   make_bands();
 }
 
+HeightFieldView height_lattice_make(const HeightMapView& map)
+{
+  HeightFieldView f;
+  f.map = map;
+  f.x = lattice_axis(map.width, map.wrap_u);
+  f.y = lattice_axis(map.height, map.wrap_v);
+  f.h_step = 1.0 / 65535.0;
+  if (map.format == HeightFormat::kFloat) {
+    const auto count = static_cast<std::size_t>(map.width) * static_cast<std::size_t>(map.height);
+    const auto [low, high] = float_extremes(static_cast<const float*>(map.texels), count);
+    f.h_offset = low;
+    f.h_step = high > low ? (static_cast<double>(high) - low) / 65535.0 : 1.0;
+  }
+  return f;
+}
+
 HeightFieldView small_height_field_make(const HeightMapView& map, PyramidLine* lines, int num_lines)
 {
-  HeightFieldView f = field_make(map);
+  HeightFieldView f = height_lattice_make(map);
   int columns = divide_up(f.x.num_cells, 4), rows = divide_up(f.y.num_cells, 4);
   for (int level = 0;; ++level) {
     const int line_columns = divide_up(columns, 4), line_rows = divide_up(rows, 4);

@@ -126,6 +126,9 @@ class HeightField {
   HeightFieldView view_;
 };
 
+/// The lattice of a map alone: without its pyramid and bounds.
+HeightFieldView height_lattice_make(const HeightMapView& map);
+
 /// The field of a map small enough to be made where it is needed, without bands: for chords within eight periods.
 /// @param lines     room for the pyramid
 /// @param num_lines at least what its levels take

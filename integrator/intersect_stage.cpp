@@ -40,6 +40,88 @@ struct PathLod {
   }
 };
 
+Vec3f normal_to_object(const InstanceView& instance, Vec3f n)
+{
+  return normalize(transform_normal(instance.world_from_object, as_normal(n)));
+}
+
+/// Lets a path meet one of the facets around its hit, as seen from where it comes.
+/// @return  false if no facet is seen from there
+bool meet_facet(PathState& state,
+                std::uint32_t path,
+                const InstanceView& instance,
+                const LevelFacets& facets,
+                float choice)
+{
+  FacetState& f = state.facets[path];
+  if (!facet_choose(facets, -f.side * path_direction(state, path), choice, &f.normal)) return false;
+  state.hit_Ng[path] = state.hit_Ns[path] = normal_to_object(instance, f.normal);
+  return true;
+}
+
+Vec2f facet_sample(const PathState& state, std::uint32_t path, FacetDimension use)
+{
+  return sample_2d(state.pixel_hash[path], state.sample_index[path], dimension_facet(path_surface(state, path), use));
+}
+
+/// Facets around the place that a path has hit.
+/// @param Ng  of the level, object space
+bool facets_at_hit(const Accel& accel,
+                   const PathState& state,
+                   std::uint32_t path,
+                   const InstanceView& instance,
+                   Vec3f Ng,
+                   LevelFacets* facets)
+{
+  return accel.displacements().facets(state.hit_object[path],
+                                      {instance, state.hit_triangle[path], state.hit_u[path], state.hit_v[path],
+                                       state.facets[path].level, state.hit_P[path], Ng},
+                                      facet_sample(state, path, FacetDimension::kJitter), facets);
+}
+
+/// A hit on a level of a height map becomes one on a facet.
+void enter_facets(const Accel& accel, PathState& state, std::uint32_t path, const InstanceView& instance, float level)
+{
+  FacetState& f = state.facets[path];
+  f.height = 0.0f;
+  if (!(level > 0.0f)) return;
+  f.level = level;
+  LevelFacets facets;
+  if (!facets_at_hit(accel, state, path, instance, state.hit_Ng[path], &facets)) return;
+  f.moments = facet_moments(facets);
+  const Vec3f wo = -path_direction(state, path);
+  f.side = dot(wo, facets.normal) < 0.0f ? -1.0f : 1.0f;
+  const Vec2f choice = facet_sample(state, path, FacetDimension::kChoice);
+  if (!meet_facet(state, path, instance, facets, choice.x)) return;
+  f.height = facet_height(facet_lambda(f.moments, f.side * wo), choice.y);
+}
+
+/// Whether a direction leads from the facet that a path is on over those around it: not through it.
+bool is_over_facets(const FacetState& f, Vec3f w) { return f.height > 0.0f && f.side * dot(w, f.normal) > 0.0f; }
+
+/// Whether a path's ray meets another facet right where it is; then that is its hit.
+bool stays_among_facets(const KernelGlobals& g, const Accel& accel, PathState& state, std::uint32_t path)
+{
+  FacetState& f = state.facets[path];
+  const Vec3f wi = path_direction(state, path);
+  // A ray that has passed through a surface goes on from there.
+  if (state.t_min[path] != kLeastDistance || !is_over_facets(f, wi)) return false;
+  const float lambda = facet_lambda(f.moments, f.side * wi);
+  const float u = sample_1d(state.pixel_hash[path], state.sample_index[path],
+                            dimension_facet(path_surface(state, path), FacetDimension::kLeave));
+  if (u < facets_leave_chance(f.height, lambda)) return false;
+  const InstanceView& instance = path_instance(g, state, path);
+  LevelFacets facets;
+  const Vec2f choice = facet_sample(state, path, FacetDimension::kChoice);
+  if (!facets_at_hit(accel, state, path, instance, normal_to_object(instance, f.moments.mean), &facets) ||
+      !meet_facet(state, path, instance, facets, choice.x)) {
+    return false;
+  }
+  f.height = facet_next_height(f.height, lambda, u);
+  state.hit_t[path] = 0.0f;
+  return true;
+}
+
 /// Puts a path into the queue of the stage that its hit asks for; displaced hits get their position and normal.
 void classify(const KernelGlobals& g,
               const Accel& accel,
@@ -57,6 +139,7 @@ void classify(const KernelGlobals& g,
     return;
   }
   state.hit_object[path] = object;
+  if (state.facets != nullptr) state.facets[path].height = 0.0f;
   if (object >= g.num_instances) {
     queue_push(lights, path);
     return;
@@ -81,6 +164,7 @@ void classify(const KernelGlobals& g,
     state.hit_Ns[path] = point.Ns;
     state.hit_leave[path] = point.leave;
     state.hit_width[path] = point.width < kInfinity ? point.width / PathLod(state, path).factor : kInfinity;
+    if (state.facets != nullptr) enter_facets(accel, state, path, instance, point.level);
   }
   queue_push(surfaces[surface_kernel[instance.material_index]], path);
 }
@@ -208,6 +292,10 @@ void intersect_closest(const KernelGlobals& g,
   }
   for (; i < queue.size; ++i) {
     const std::uint32_t path = queue.paths[i];
+    if (state.facets != nullptr && !coherent && stays_among_facets(g, accel, state, path)) {
+      queue_push(surfaces[surface_kernel[path_instance(g, state, path).material_index]], path);
+      continue;
+    }
     RTCRayHit ray;
     ray.ray.org_x = state.O.x[path];
     ray.ray.org_y = state.O.y[path];
@@ -262,6 +350,17 @@ void intersect_shadow(const KernelGlobals& g,
   for (std::uint32_t i = 0; i < shadow.size; ++i) {
     context.visibility = {1, 1, 1};
     context.D = shadow.D[i];
+    if (state.facets != nullptr) {
+      const FacetState& f = state.facets[shadow.path[i]];
+      if (is_over_facets(f, context.D)) {
+        const float chance = facets_leave_chance(f.height, facet_lambda(f.moments, f.side * context.D));
+        if (!(chance > 0.0f)) {
+          visibility[i] = {};
+          continue;
+        }
+        context.visibility = splat3(chance);
+      }
+    }
     context.O = shadow.O[i];
     context.depths = shadow_ray_depths(state, shadow, i);
     context.transparent = state.flags[shadow.path[i]] >> kPathTransparentShift;

@@ -369,8 +369,9 @@ RenderedImage render(const Scene& scene,
       Clock::now() - std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(earlier_seconds));
   SamplingEnd end(stop,
                   options.time_limit_seconds > 0 ? std::max(1e-3, options.time_limit_seconds - earlier_seconds) : 0.0);
+  const WavefrontColumns columns = context.columns();
   Workers workers([&] {
-    Wavefront worker(caustics, context.motion.is_open());
+    Wavefront worker(columns);
     worker.stop = &end.reached();
     return worker;
   });
@@ -511,7 +512,7 @@ RenderedImage render(const Scene& scene,
   fill_kept(stats.kept, kept, context);
   fill_film(stats, film, settings);
   if (options.keeps_errors) stats.errors = std::move(errors).finish(stats);
-  fill_work(stats, workers, Wavefront::bytes(caustics, context.motion.is_open()), window);
+  fill_work(stats, workers, Wavefront::bytes(columns), window);
   std::optional<SavedRender> saved;
   if (options.checkpoint && stats.stop_reason == "interrupted" && stats.samples_per_pixel > 0) {
     saved = {state(), window.width, window.height, {film.sums().begin(), film.sums().end()}};

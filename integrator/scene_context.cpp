@@ -123,6 +123,13 @@ SceneContext::SceneContext(const Scene& loaded,
   }
 }
 
+WavefrontColumns SceneContext::columns() const
+{
+  const bool caustics = globals.caustics.enabled;
+  // Photons count light by the area of the surface that they land on, which that of facets is not.
+  return {caustics, motion.is_open(), displacements.has_facets() && !caustics};
+}
+
 void SceneContext::make_views()
 {
   for (std::size_t i = 0; i < instances.size(); ++i) {

@@ -9,6 +9,7 @@
 #include "integrator/light_set.h"
 #include "integrator/scene_displacement.h"
 #include "integrator/scene_views.h"
+#include "integrator/wavefront.h"
 #include "kernel/bsdf/energy_tables.h"
 #include "kernel/globals.h"
 #include "kernel/statistics.h"
@@ -27,6 +28,8 @@ struct SceneContext : SceneViews {
                         EnvironmentDensity environment_density = EnvironmentDensity::kExcess,
                         const CausticSettings& caustics = {CausticsMode::kOff},
                         std::shared_ptr<KeptTrees> trees = nullptr);
+
+  WavefrontColumns columns() const;
 
   /// Bytes by part.
   void fill(Statistics& stats) const;

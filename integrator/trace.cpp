@@ -127,7 +127,7 @@ PathReplay trace_path(const Scene& scene, const RenderOptions& options, const Pi
     const RenderSettings& settings = options.settings;
     photons.emplace(context, settings.caustics, static_cast<double>(settings.width) * settings.height);
     const std::atomic<bool> stop{false};
-    tbb::enumerable_thread_specific<Wavefront> workers([&] { return Wavefront(true, context.motion.is_open()); });
+    tbb::enumerable_thread_specific<Wavefront> workers([&] { return Wavefront(context.columns()); });
     for (std::uint32_t pass = 0; pass <= at.sample_index; ++pass) {
       photons->next(
           g, stages, [&]() -> Wavefront& { return workers.local(); }, stop, [] {});
@@ -136,7 +136,7 @@ PathReplay trace_path(const Scene& scene, const RenderOptions& options, const Pi
 
   PathReplay replay;
   replay.warnings = context.displacements.warnings();
-  Wavefront wavefront(caustics, context.motion.is_open());
+  Wavefront wavefront(context.columns());
   wavefront.recorder = &replay.rays;
   // The whole tile, as in the render: forks of its paths share the room of its batch.
   const int x = at.x - window.x0, y = at.y - window.y0;

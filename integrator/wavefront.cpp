@@ -14,22 +14,27 @@ using Clock = std::chrono::steady_clock;
 
 }  // namespace
 
-std::size_t Wavefront::bytes(bool caustics, bool motion)
+std::size_t Wavefront::bytes(const WavefrontColumns& columns)
 {
-  return sizeof(Memory) + (caustics ? sizeof(CausticMemory) : 0u) + (motion ? sizeof(MotionMemory) : 0u);
+  return sizeof(Memory) + (columns.caustics ? sizeof(CausticMemory) : 0u) +
+         (columns.motion ? sizeof(MotionMemory) : 0u) + (columns.facets ? kColumnEntries * sizeof(FacetState) : 0u);
 }
 
-Wavefront::Wavefront(bool caustics, bool motion)
+Wavefront::Wavefront(const WavefrontColumns& columns)
     : memory_(std::make_unique_for_overwrite<Memory>()), state_(memory_->state), shadow_(memory_->shadow)
 {
   auto queue = std::begin(memory_->queues);
   for (QueueView* q : {&active_, &next_, &lights_, &background_}) q->paths = *queue++;
   for (QueueView& q : surfaces_) q.paths = *queue++;
-  if (motion) {
+  if (columns.facets) {
+    facet_memory_ = std::make_unique_for_overwrite<FacetState[]>(kColumnEntries);
+    state_.facets = facet_memory_.get();
+  }
+  if (columns.motion) {
     motion_memory_ = std::make_unique_for_overwrite<MotionMemory>();
     state_.motion = {motion_memory_->time, motion_memory_->instances, motion_memory_->meshes};
   }
-  if (!caustics) return;
+  if (!columns.caustics) return;
   caustic_memory_ = std::make_unique_for_overwrite<CausticMemory>();
   CausticStateView& c = state_.caustic;
   c.irradiance = &caustic_memory_->irradiance;

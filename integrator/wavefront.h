@@ -31,12 +31,17 @@ struct RecordedRay {
   std::uint32_t pixel = 0;  ///< of the film window
 };
 
+/// What paths need columns for.
+struct WavefrontColumns {
+  bool caustics = false;  ///< camera paths gather photons
+  bool motion = false;    ///< paths have a time
+  bool facets = false;    ///< they may meet coarser levels of height maps
+};
+
 /// Owned by one thread at a time.
 class Wavefront {
  public:
-  /// @param caustics  camera paths will gather photons
-  /// @param motion    paths have a time
-  Wavefront(bool caustics, bool motion);
+  explicit Wavefront(const WavefrontColumns& columns);
 
   /// Renders a batch of at most kBatchPaths paths into the film.
   /// @return  false if `stop` ended it: what the film got of it must not count
@@ -62,7 +67,7 @@ class Wavefront {
   /// @param pixel  of the film window, in the batch
   Vec3f first_radiance(std::uint32_t pixel) const;
 
-  static std::size_t bytes(bool caustics, bool motion);
+  static std::size_t bytes(const WavefrontColumns& columns);
 
   std::vector<RecordedRay>* recorder = nullptr;  ///< receives every ray of the batch, if set
   const std::atomic<bool>* stop = nullptr;       ///< true: searches in displaced meshes are given up; null: never
@@ -102,6 +107,7 @@ class Wavefront {
   std::unique_ptr<Memory> memory_;
   std::unique_ptr<CausticMemory> caustic_memory_;
   std::unique_ptr<MotionMemory> motion_memory_;
+  std::unique_ptr<FacetState[]> facet_memory_;
   PathState& state_;
   ShadowQueue& shadow_;
   QueueView active_, next_, lights_, background_;

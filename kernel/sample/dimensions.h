@@ -38,6 +38,22 @@ inline constexpr std::uint32_t kAmbientDimension = ~0u - 1;
 /// Dimension for sample_1d of a path's time while the shutter is open; no bounce gets so far.
 inline constexpr std::uint32_t kTimeDimension = ~0u - 2;
 
+/// Uses at every surface that is a level of a height map, see FacetState.
+enum class FacetDimension : std::uint32_t {
+  kJitter,  ///< 2D: where the facets are
+  kChoice,  ///< 2D: which one is met; at what height
+  kLeave,   ///< 1D: whether the ray that leaves the facet before gets out
+  kCount
+};
+
+/// @param bounce  as in dimension_bounce; no bounce gets as far as the first of these
+/// @return        dimension for sample_1d or sample_2d, as the use says
+RELIEF_KERNEL constexpr std::uint32_t dimension_facet(int bounce, FacetDimension use)
+{
+  return 0x20000000u + static_cast<std::uint32_t>(bounce) * static_cast<std::uint32_t>(FacetDimension::kCount) +
+         static_cast<std::uint32_t>(use);
+}
+
 /// Uses at the start of a photon; its bounces use the same dimensions as a camera path's.
 enum class PhotonDimension : std::uint32_t {
   kSource,  ///< 1D: which light, towards which caster

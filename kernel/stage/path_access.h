@@ -150,6 +150,7 @@ RELIEF_KERNEL std::uint32_t path_fork(PathState& s, std::uint32_t i)
 #undef X
   s.caustic.root[copy] = s.caustic.root[i];
   if (s.motion.time != nullptr) s.motion.time[copy] = s.motion.time[i];
+  if (s.facets != nullptr) s.facets[copy] = s.facets[i];
   s.direct[copy] = s.indirect[copy] = Vec3f{};
   (*s.caustic.radiance)[copy] = Vec3f{};
   return copy;

@@ -6,6 +6,7 @@
 
 #include "kernel/assert.h"
 #include "kernel/math/vec.h"
+#include "kernel/state/facet_state.h"
 #include "kernel/state/path_event.h"
 
 namespace relief {
@@ -80,6 +81,7 @@ struct alignas(64) PathState {
 #undef X
   CausticStateView caustic;
   MotionStateView motion;
+  FacetState* facets = nullptr;  ///< of the present hit; null where no ray meets any
 };
 
 enum PathFlag : std::uint32_t {

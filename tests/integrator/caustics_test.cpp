@@ -635,7 +635,7 @@ TEST(Caustics, WhatCastersReceiveIsStoredOrEscapes)
   KernelGlobals g = render_globals(context, options, filter);
   constexpr std::uint32_t kPhotons = 1 << 17;
   const PhotonSources sources = photon_sources_make(context);
-  Wavefront worker(true, false);
+  Wavefront worker({.caustics = true});
   std::vector<Photon> photons;
   for (std::uint32_t first = 0; first < kPhotons; first += kBatchPaths) {
     worker.trace_photons(g, *context.accel, stage_table_select(), context.surface_kernel, sources.view(kPhotons), first,

@@ -1,0 +1,94 @@
+// What a coarser level of a height map has lost: the facets of the map's own texels around a point of it.
+//
+// A ray that meets a level meets one of them, chosen by what of them it can see, and is shaded by it: so a level keeps the
+// light of the slopes that it has not. What leaves a facet gets out, or meets another one, by Smith's model of masking: the
+// facets' heights and slopes are independent of each other. Facets are taken from the map instead of a distribution, and
+// are as wide as texels; what masks them is as if their slopes were normally distributed.
+//
+// Heitz, Hanika, d'Eon, Dachsbacher 2016, "Multiple-Scattering Microfacet BSDFs with the Smith Model"; Dupuy, Heitz,
+// Iehl, Poulin, Neyret, Ostromoukhov 2013, "Linear Efficient Antialiased Displacement and Reflectance Mapping".
+#pragma once
+
+#include <cmath>
+
+#include "displacement/embree_geometry.h"
+#include "kernel/state/facet_state.h"
+
+namespace relief {
+
+/// Facets that stand for those around a point.
+inline constexpr int kLevelFacets = 16;
+
+/// Facets around a point, as area vectors: normals as long as the facets' areas are large, all of them of the same area on
+/// the level. Their mean is the level's own normal.
+struct LevelFacets {
+  Vec3f normal;                            ///< of the level, unit, world, on the side of the displacement normal
+  Vec3f per_x, per_y;                      ///< by what it changes with the map's slope along a lattice axis, world
+  float x[kLevelFacets], y[kLevelFacets];  ///< slopes less the level's
+};
+
+/// A place on a level of a displaced surface.
+struct LevelPlace {
+  const InstanceView& placement;
+  std::uint32_t triangle;
+  float b1, b2;  ///< weights of its vertices 1 and 2
+  float level;   ///< of the map, above 0
+  Vec3f P, Ng;   ///< object space, of the surface that is traced; Ng unit, on the side of the displacement normal
+};
+
+/// @param jitter  [0, 1)²: where between the facets' places
+/// @return        false where the surface has no normals
+bool level_facets_make(const DisplacedGeometry& geometry, const LevelPlace& at, Vec2f jitter, LevelFacets* out);
+
+/// How much more the facets of a level differ from it than slopes around a point of the map differ from their mean, along
+/// both axes, so that a surface has all of the slopes' second moments. (Of a smooth map they differ as much, of noise by more:
+/// what is between two texels of a level averages more than what is around it.) Measured at some places.
+/// @param smooth       slopes are those that the map is shaded with
+/// @param tessellated  the surface has a vertex a texel of the level, but not at its centre
+Vec2f facet_spread(const HeightFieldView& map, const HeightFieldView& level, bool smooth, bool tessellated);
+
+FacetMoments facet_moments(const LevelFacets& facets);
+
+/// Smith's Λ of a direction: the mean area of the facets that face away from it over that of all, as it sees them.
+/// Directions above the level have a positive one, those below it one of at most −1, as a ray on its way down meets
+/// facets.
+/// @param w  world
+inline float facet_lambda(const FacetMoments& m, Vec3f w)
+{
+  const float mean = dot(w, m.mean);
+  const float deviation = std::hypot(dot(w, m.deviation[0]), dot(w, m.deviation[1]));
+  if (!(deviation > 0.0f)) return mean >= 0.0f ? 0.0f : -1.0f;
+  const float a = mean / deviation;
+  constexpr float kInvSqrt2Pi = 0.39894228f, kInvSqrt2 = 0.70710678f;
+  const float away = deviation * (kInvSqrt2Pi * std::exp(-0.5f * a * a) - a * 0.5f * std::erfc(kInvSqrt2 * a));
+  return away / mean;
+}
+
+/// The height at which a ray that comes from outside meets a facet, as a part of all facets that are lower.
+/// @param lambda  of the direction that it comes from
+/// @param u       [0, 1)
+inline float facet_height(float lambda, float u) { return std::pow(1.0f - u, 1.0f / (1.0f + max(lambda, 0.0f))); }
+
+/// Part of the rays from a facet that get out.
+/// @param lambda  of their direction
+inline float facets_leave_chance(float height, float lambda)
+{
+  return lambda >= 0.0f ? std::pow(height, lambda) : 0.0f;
+}
+
+/// The height at which a ray that does not get out meets the next facet.
+/// @param u  [0, 1), of those numbers that are not below facets_leave_chance
+inline float facet_next_height(float height, float lambda, float u)
+{
+  constexpr float kLeast = 0x1p-20f;  // 0 stands for no facet
+  return clamp(height * std::pow(u, -1.0f / lambda), kLeast, 1.0f);
+}
+
+/// A facet that is seen from a direction, by the area that it shows.
+/// @param w       unit, world
+/// @param u       [0, 1)
+/// @param normal  unit, world, on the side of the displacement normal
+/// @return        false if all face away
+bool facet_choose(const LevelFacets& facets, Vec3f w, float u, Vec3f* normal);
+
+}  // namespace relief
