@@ -100,6 +100,7 @@ std::vector<CLI::Option*> add_picture_options(CLI::App& command, PictureOptions&
       add_parsed(command, "--seed", options.seed, parse_seed, "Seed of the random numbers (default: the scene's)"),
       add_parsed(command, "--crop", options.crop, parse_crop, "X0,Y0,X1,Y1: render this window of the image only"),
       command.add_option("--max-bounces", options.max_bounces, setting_help(kBounces))->check(setting_check(kBounces)),
+      add_displacement_error(command, options.displacement),
       add_displacement_memory(command, options.displacement),
       add_caustics_mode(command, options.caustics),
       command

@@ -75,6 +75,15 @@ CLI::Option* add_displacement_memory(CLI::App& command, DisplacementOptions& opt
       ->check(number(0, 1e6));
 }
 
+CLI::Option* add_displacement_error(CLI::App& command, DisplacementOptions& options)
+{
+  return command
+      .add_option(
+          "--displacement-error", options.error,
+          "Pixels that detail of height maps may be wide and shown by its light alone, for speed (default: 0, none)")
+      ->check(number(0, 1e3));
+}
+
 void add_max_memory(CLI::App& command)
 {
   const auto set = [](double gib) {

@@ -34,6 +34,7 @@ std::vector<CLI::Option*> add_light_options(CLI::App& command, SceneSetup& setup
 
 /// Each adds one option; `options` must outlive the parser.
 CLI::Option* add_displacement_method(CLI::App& command, DisplacementOptions& options);
+CLI::Option* add_displacement_error(CLI::App& command, DisplacementOptions& options);
 CLI::Option* add_displacement_memory(CLI::App& command, DisplacementOptions& options);
 CLI::Option* add_displacement_lod(CLI::App& command, DisplacementOptions& options);
 CLI::Option* add_displacement_rmip(CLI::App& command, DisplacementOptions& options);

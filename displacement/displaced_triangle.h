@@ -19,6 +19,14 @@ struct DisplacedTriangle {
   float s_min, s_max;  ///< bounds of d/|N| over the triangle, rounded outward
 };
 
+/// Length of an edge in the map along the axis where it is longer, texels.
+/// @param edge  from its vertex to the next
+RELIEF_KERNEL double texels_along(const DisplacedTriangle& tri, int edge)
+{
+  const int next = edge == 2 ? 0 : edge + 1;
+  return max(__builtin_fabs(tri.x[next] - tri.x[edge]), __builtin_fabs(tri.y[next] - tri.y[edge]));
+}
+
 /// Where the triangle on the other side of a texture seam reads the height map, see seam_walls.h.
 struct SeamWall {
   std::uint32_t edge;  ///< 3 · triangle + k: from the triangle's vertex k to the next

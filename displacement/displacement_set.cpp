@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <numbers>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
@@ -12,6 +11,7 @@
 #include <unistd.h>
 
 #include "displacement/cost_model.h"
+#include "displacement/stretch.h"
 
 namespace relief {
 
@@ -30,34 +30,6 @@ DisplacementMethod method_of(const DisplacementSettings& settings, const Displac
   return options.method.value_or(settings.method);
 }
 
-/// The most and the least that a transform stretches any direction.
-struct Stretch {
-  double most = 1, least = 1;
-};
-
-/// Largest singular value of a matrix of three columns: the root of MᵀM's largest eigenvalue.
-/// @source Smith 1961, "Eigenvalues of a symmetric 3 × 3 matrix"
-double largest_singular_value(Vec3d x, Vec3d y, Vec3d z)
-{
-  const double mean = (dot(x, x) + dot(y, y) + dot(z, z)) / 3;
-  double a = dot(x, x) - mean, b = dot(y, y) - mean, c = dot(z, z) - mean;
-  double xy = dot(x, y), yz = dot(y, z), zx = dot(z, x);
-  const double radius = std::sqrt((a * a + b * b + c * c) / 6 + (xy * xy + yz * yz + zx * zx) / 3);
-  if (!(radius > 0)) return std::sqrt(mean);
-  for (double* entry : {&a, &b, &c, &xy, &yz, &zx}) *entry /= radius;
-  const double determinant = a * (b * c - yz * yz) - xy * (xy * c - yz * zx) + zx * (xy * yz - b * zx);
-  return std::sqrt(mean + 2 * radius * std::cos(std::acos(std::clamp(determinant / 2, -1.0, 1.0)) / 3));
-}
-
-/// The least by way of the adjugate, whose largest singular value is the product of M's two largest: beside MᵀM's largest
-/// eigenvalue the others may be less than its rounding.
-Stretch stretch_of(const Affine3& m)
-{
-  const Vec3d x = to_double(m.x), y = to_double(m.y), z = to_double(m.z);
-  const double product = largest_singular_value(cross(y, z), cross(z, x), cross(x, y));
-  return {largest_singular_value(x, y, z), product > 0 ? std::abs(dot(x, cross(y, z))) / product : 0};
-}
-
 float lod_of(const DisplacementSettings& settings, const DisplacementOptions& options)
 {
   return options.lod.value_or(settings.lod);
@@ -68,6 +40,13 @@ bool is_whole(float x) { return x == std::floor(x); }
 /// With fewer texels than this along a triangle's side a map has little left to show; levels beyond would only widen the
 /// prisms.
 constexpr double kLeastTexelsASide = 16;
+
+/// Of meshes diced to a pixel, facets included: benchmarks/cycles' sphere and torus took .41 of what they take by chord. Of a
+/// texture's every texel, tessellations are larger than caches, and cost more (methods/tessellate.cpp).
+constexpr MethodCost kDicingCost{250, 35, 640};
+
+/// Width of the texels that rays choose by themselves, as a part of their cone's.
+constexpr float kTexelsPerCone = 0.25f;
 
 /// Levels that rays may choose by themselves lose no more of the surface's slopes than this, metres a metre, nor move a
 /// point further than this many of their texels: half a pixel, since texels are a quarter as wide as that. A picture's
@@ -82,6 +61,11 @@ std::string gibibytes(std::uint64_t bytes)
   return text;
 }
 
+std::uint64_t memory_of_machine()
+{
+  return static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
 /// Refuses what would not fit, before anything large is allocated.
 /// @param bytes  all tessellations so far, this one included
 void check_budget(std::uint64_t bytes,
@@ -89,9 +73,7 @@ void check_budget(std::uint64_t bytes,
                   const std::string& mesh,
                   const DisplacementOptions& options)
 {
-  const std::uint64_t half_of_memory =
-      static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) / 2;
-  const std::uint64_t budget = options.tessellation_bytes > 0 ? options.tessellation_bytes : half_of_memory;
+  const std::uint64_t budget = options.tessellation_bytes > 0 ? options.tessellation_bytes : memory_of_machine() / 2;
   if (bytes <= budget) return;
   throw std::runtime_error(
       "tessellating mesh '" + mesh + "' into " + std::to_string(layout.num_micro_triangles / 1'000'000) +
@@ -165,10 +147,27 @@ std::vector<std::string> displacement_warnings(const DisplacementSettings& setti
   return texts;
 }
 
+bool DisplacementSet::has_error(const Use& use, const DisplacementOptions& options) const
+{
+  return options.error > 0 && options.camera && use.heights == nullptr && !(lod_of(use.settings, options) > 0) &&
+         method_of(use.settings, options) == DisplacementMethod::kAuto;
+}
+
+void DisplacementSet::set_facets(const Use& use, bool tessellates, DisplacedGeometry* geometry) const
+{
+  const int last = geometry->first_level + geometry->lod.num_levels - 1;
+  if (last == 0) return;
+  MapFacets& facets = geometry->facets.emplace(MapFacets{height_lattice_make(map_of(use).view)});
+  for (int level = std::max(geometry->first_level, 1); level <= last; ++level) {
+    facets.spread[level] = facet_spread(facets.texels, *geometry->levels[level - geometry->first_level].field,
+                                        geometry->smooth, tessellates);
+  }
+}
+
 DisplacementSet::Levels DisplacementSet::levels_of(const Use& use, const DisplacementOptions& options) const
 {
   constexpr float kCoarsest = kMaxLodLevels - 1;
-  const float lod = lod_of(use.settings, options);
+  const float lod = has_error(use, options) ? -1.0f : lod_of(use.settings, options);
   const bool tessellates = tessellation_kind(method_of(use.settings, options)).has_value();
   Levels levels;
   if (lod >= 0) {
@@ -211,8 +210,9 @@ std::vector<DisplacementSet::Use> DisplacementSet::find_uses(const DisplacementI
                       heights < 0 ? nullptr : &input.heights[static_cast<std::size_t>(heights)], scale});
     }
     const Stretch stretch = stretch_of(instance.world_from_object);
-    double& steepening = uses[static_cast<std::size_t>(at->second)].steepening;
-    steepening = std::max(steepening, stretch.most / stretch.least);
+    Use& use = uses[static_cast<std::size_t>(at->second)];
+    use.places.push_back(instance.world_from_object);
+    use.steepening = std::max(use.steepening, stretch.most / stretch.least);
   }
   return uses;
 }
@@ -226,6 +226,7 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
       fields_(options.fields != nullptr ? options.fields : std::make_shared<HeightFields>()),
       kept_meshes_(options.meshes)
 {
+  texels_per_cone_ = options.error > 0 ? static_cast<float>(options.error) : kTexelsPerCone;
   const std::vector<Use> uses = find_uses(input);
   const auto num_displaced =
       std::count_if(geometry_of_instance_.begin(), geometry_of_instance_.end(), [](int index) { return index >= 0; });
@@ -237,8 +238,12 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
       continue;
     }
     geometries_.push_back(make_displaced(use, options));
-    tessellate(*geometries_.back(), options, method_of(use.settings, options) == DisplacementMethod::kAuto, num_rays,
-               &tessellated_bytes);
+    if (has_error(use, options)) {
+      dice(*geometries_.back(), use, options, num_rays, &tessellated_bytes);
+    } else {
+      tessellate(*geometries_.back(), options, method_of(use.settings, options) == DisplacementMethod::kAuto, num_rays,
+                 &tessellated_bytes);
+    }
   }
   for (std::size_t i = 0; i < input.instances.size(); ++i) {
     if (geometry_of_instance_[i] < 0) continue;
@@ -274,7 +279,7 @@ std::unique_ptr<PreparedMesh> DisplacementSet::make_displaced(const Use& use, co
   geometry.smooth = settings.smoothing;
   geometry.rmip_options = options.rmip.value_or(RmipOptions{});
   Levels levels = levels_of(use, options);
-  if (levels.by_cone) {
+  if (levels.by_cone && !has_error(use, options)) {
     levels.count = num_faithful_levels(use, levels.count);
     levels.by_cone = levels.count > 1;
   }
@@ -285,14 +290,8 @@ std::unique_ptr<PreparedMesh> DisplacementSet::make_displaced(const Use& use, co
     fields.push_back(geometry.levels[k].field);
   }
   geometry.first_level = levels.first;
-  if (levels.first + levels.count > 1) {
-    MapFacets& facets = geometry.facets.emplace(MapFacets{height_lattice_make(map_of(use).view)});
-    const bool tessellates = displacement_method(geometry.method).tessellation.has_value();
-    for (int k = levels.first == 0 ? 1 : 0; k < levels.count; ++k) {
-      facets.spread[levels.first + k] =
-          facet_spread(facets.texels, *geometry.levels[k].field, geometry.smooth, tessellates);
-    }
-  }
+  geometry.lod.num_levels = levels.count;
+  set_facets(use, displacement_method(geometry.method).tessellation.has_value(), &geometry);
   const DisplacementMapping mapping{settings.height, use.scale, settings.midlevel, settings.weld_seams};
   std::unique_ptr<PreparedMesh> displaced = prisms_of(use.mesh, mapping, fields);
   displaced->name = use.mesh_name;
@@ -401,6 +400,40 @@ void DisplacementSet::tessellate(PreparedMesh& displaced,
   forget_tree(displaced);
 }
 
+void DisplacementSet::dice(PreparedMesh& displaced,
+                           const Use& use,
+                           const DisplacementOptions& options,
+                           double num_rays,
+                           std::uint64_t* used_bytes)
+{
+  DisplacedGeometry& geometry = displaced.geometry;
+  std::vector<const HeightFieldView*> levels;
+  for (int k = 0; k < geometry.lod.num_levels; ++k) levels.push_back(geometry.levels[k].field);
+  const MapDensity density = map_density(use.mesh, use.settings.height);
+  const HeightMapView& map = map_of(use).view;
+  const double texel = 1 / std::sqrt(std::max(density.u * map.width * density.v * map.height, 1e-300));
+  auto dicing = std::make_unique<Dicing>(use.mesh, geometry.mesh, levels, texel,
+                                         PictureView{*options.camera, static_cast<double>(options.picture_height)},
+                                         use.places, options.error);
+  const TessellationRule rule = dicing->rule();
+  TessellationLayout layout = tessellation_layout_make(dicing->mesh(), TessellationKind::kTriangles, rule);
+  const std::uint64_t bytes = tessellation_peak_bytes(layout, kRenderTessellation) + dicing->bytes();
+  const MethodOffer offers[] = {
+      {geometry.method, *displacement_method(geometry.method).cost, 0, 0},
+      {DisplacementMethod::tessellate, kDicingCost, layout.num_micro_triangles, bytes},
+  };
+  const std::uint64_t allowance = options.auto_bytes > 0 ? options.auto_bytes : memory_of_machine() / 8;
+  const DisplacementChoice choice = displacement_choose(offers, num_rays, allowance - std::min(allowance, *used_bytes));
+  reasons_.push_back("mesh '" + displaced.name + "': " + choice.reason);
+  if (choice.method == displaced.method) return;
+  *used_bytes += bytes;
+  displaced.method = choice.method;
+  set_facets(use, true, &geometry);
+  displaced.tessellation = std::make_unique<Tessellation>(dicing->mesh(), std::move(layout), rule);
+  displaced.dicing = std::move(dicing);
+  forget_tree(displaced);
+}
+
 int DisplacementSet::num_faithful_levels(const Use& use, int most)
 {
   const TextureRef& mapping = use.settings.height;
@@ -436,8 +469,14 @@ DisplacedPoint DisplacementSet::resolve(std::size_t instance,
   DisplacedPoint out{hit.triangle, static_cast<float>(hit.b1), static_cast<float>(hit.b2)};
   out.P = to_float(hit.P);
   out.Ng = out.Ns = to_float(hit.Ng);
+  auto level = static_cast<float>(d.geometry.first_level);
+  if (d.dicing != nullptr) {
+    const Vec3d P = base_point(d.dicing->mesh().triangles[hit.triangle], hit.b1, hit.b2).P;
+    level = static_cast<float>(d.dicing->level(P));
+    d.dicing->set_base_place(&out.triangle, &out.u, &out.v);
+  }
   if (d.geometry.smooth) out.Ns = to_float(displaced_smooth_normal(d.geometry, out.triangle, 0, out.u, out.v));
-  displaced_point_set_level(d.geometry, placement, static_cast<float>(d.geometry.first_level), &out);
+  displaced_point_set_level(d.geometry, placement, level, &out);
   return out;
 }
 
@@ -450,7 +489,9 @@ DisplacedPoint DisplacementSet::locate(std::size_t instance, std::uint32_t primi
     return out;
   }
   const MicroHit hit = d.tessellation->locate(primitive, u, v);
-  return {hit.triangle, static_cast<float>(hit.b1), static_cast<float>(hit.b2)};
+  DisplacedPoint out{hit.triangle, static_cast<float>(hit.b1), static_cast<float>(hit.b2)};
+  if (d.dicing != nullptr) d.dicing->set_base_place(&out.triangle, &out.u, &out.v);
+  return out;
 }
 
 SeamReport DisplacementSet::seams(std::size_t index) const
@@ -465,6 +506,7 @@ std::size_t DisplacementSet::bytes() const
   for (const auto& displaced : geometries_) {
     sum += displaced->mesh.bytes();
     if (displaced->procedural != nullptr) sum += displaced->procedural->bytes();
+    if (displaced->dicing != nullptr) sum += displaced->dicing->bytes();
     if (displaced->tessellation != nullptr) sum += displaced->tessellation->bytes();
   }
   return sum;

@@ -52,10 +52,11 @@ struct DisplacementOptions {
   std::optional<float> lod;                  ///< of all height maps, see DisplacementSettings::lod
   std::optional<RmipOptions> rmip;           ///< of the methods that take them
   double tessellation_rate = 1;              ///< micro-triangle edges a texel
-  std::uint64_t auto_bytes = 0;              ///< what `auto` may use while it builds tessellations; 0: it builds none
-  std::optional<Camera> camera;              ///< by which computed heights choose their cells; empty: the scene's first
-  int picture_height = 0;                    ///< pixels, with a camera
-  double num_rays = 0;  ///< that will be traced, about, for `auto` to weigh building against tracing
+  double error = 0;              ///< pixels that detail of maps may be wide and missing, with a camera; 0: none
+  std::uint64_t auto_bytes = 0;  ///< what `auto` may use while it builds tessellations; 0: it builds none
+  std::optional<Camera> camera;  ///< by which computed heights choose their cells; empty: the scene's first
+  int picture_height = 0;        ///< pixels, with a camera
+  double num_rays = 0;           ///< that will be traced, about, for `auto` to weigh building against tracing
   std::uint64_t computed_bytes = std::uint64_t{256} << 20;  ///< computed heights that are kept, at most
   std::shared_ptr<HeightFields> fields;                     ///< of the sets before; null: each set has its own
   std::shared_ptr<KeptMeshes> meshes;                       ///< likewise, with the same fields; null: none are kept
@@ -95,6 +96,8 @@ class DisplacementSet {
   const DisplacedMesh& mesh(std::size_t index) const { return geometries_[index]->mesh; }
   /// @return null if the geometry is traversed as it is
   const Tessellation* tessellation(std::size_t index) const { return geometries_[index]->tessellation.get(); }
+  /// Width of the texels that a ray meets, as a part of its cone's.
+  float texels_per_cone() const { return texels_per_cone_; }
   /// Completes a hit on a displaced instance.
   /// @param placement  the instance's
   /// @param primitive  as Embree reports it, like the record
@@ -144,6 +147,7 @@ class DisplacementSet {
     const DisplacementSettings& settings;
     const ComputedHeights* heights;  ///< null: a map's
     double scale = 1;                ///< metres of object space
+    std::vector<Affine3> places{};   ///< its instances: the world from its own space
     double steepening = 1;  ///< how much steeper its instances' slopes are in the world than in object space, at most
   };
   std::vector<Use> find_uses(const DisplacementInput& input);
@@ -155,6 +159,17 @@ class DisplacementSet {
                                           const DisplacementMapping& mapping,
                                           const std::vector<const HeightFieldView*>& fields);
   std::unique_ptr<PreparedMesh> make_computed(const Use& use, const DisplacementOptions& options);
+  /// Whether a use is to be traced to an error, not exactly nor as its settings say.
+  bool has_error(const Use& use, const DisplacementOptions& options) const;
+  /// Fills in what the levels of a geometry have lost.
+  /// @param tessellates  see facet_spread
+  void set_facets(const Use& use, bool tessellates, DisplacedGeometry* geometry) const;
+  /// Tessellates a mesh as finely as the picture shows it, if that pays.
+  void dice(PreparedMesh& displaced,
+            const Use& use,
+            const DisplacementOptions& options,
+            double num_rays,
+            std::uint64_t* used_bytes);
   /// How many levels of a map, the finest first, look like the map on a mesh and all its instances: what they lose of its
   /// slopes and heights is little.
   int num_faithful_levels(const Use& use, int most);
@@ -177,6 +192,7 @@ class DisplacementSet {
   std::vector<int> geometry_of_instance_;
   std::vector<float> texel_of_instance_;
   bool has_levels_ = false, has_facets_ = false;
+  float texels_per_cone_;
   std::vector<std::string> reasons_;
   std::shared_ptr<HeightFields> fields_;
   HeightFields::Tally kept_;

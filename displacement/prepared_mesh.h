@@ -10,6 +10,7 @@
 
 #include "displacement/content_hash.h"
 #include "displacement/curved_heights.h"
+#include "displacement/dicing.h"
 #include "displacement/displaced_mesh.h"
 #include "displacement/embree_geometry.h"
 #include "displacement/map_heights.h"
@@ -25,7 +26,8 @@ struct PreparedMesh {
   std::unique_ptr<CurvedHeights> curved;        ///< where the base is curved
   std::unique_ptr<ProceduralField> procedural;  ///< heights that are computed
   DisplacedMesh mesh;
-  DisplacedGeometry geometry;  ///< where it tessellates: what is tessellated
+  DisplacedGeometry geometry;      ///< where it tessellates: what is tessellated
+  std::unique_ptr<Dicing> dicing;  ///< what is tessellated in place of the mesh; null: the mesh itself
   std::unique_ptr<Tessellation> tessellation;
   std::optional<ContentHash> content;  ///< of all that `mesh` and `tree` are made of; empty: they are not to be kept
   std::shared_ptr<RTCSceneTy> tree;    ///< of `geometry`, committed; null: none yet

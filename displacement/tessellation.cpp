@@ -79,14 +79,15 @@ struct Placed {
 };
 
 /// The surface at weights b. Written as sums of three products, which on an edge do not depend on the order of its ends.
-Placed place(const DisplacedMeshView& mesh, const DisplacedTriangle& tri, const double* b)
+Placed place(const DisplacedMeshView& mesh, const TessellationRule& rule, const DisplacedTriangle& tri, const double* b)
 {
   const Vec3d P = b[0] * to_double(tri.P[0]) + b[1] * to_double(tri.P[1]) + b[2] * to_double(tri.P[2]);
   const Vec3d N = b[0] * to_double(tri.N[0]) + b[1] * to_double(tri.N[1]) + b[2] * to_double(tri.N[2]);
   const double nu = length(N);
   if (!(nu > 0)) return {P, 0};
-  const double d = displacement_at(mesh, b[0] * tri.x[0] + b[1] * tri.x[1] + b[2] * tri.x[2],
-                                   b[0] * tri.y[0] + b[1] * tri.y[1] + b[2] * tri.y[2]);
+  const double x = b[0] * tri.x[0] + b[1] * tri.x[1] + b[2] * tri.x[2];
+  const double y = b[0] * tri.y[0] + b[1] * tri.y[1] + b[2] * tri.y[2];
+  const double d = rule.height ? mesh.scale * (rule.height(P, x, y) - mesh.midlevel) : displacement_at(mesh, x, y);
   return {P + (d / nu) * N, d};
 }
 
@@ -102,7 +103,9 @@ double seam_tolerance(const DisplacedMeshView& mesh)
 }
 
 /// The corner that computes a corner's point: the first one at the same place with the same height.
-std::vector<std::uint32_t> corner_owners(const DisplacedMeshView& mesh, const std::vector<std::uint32_t>& id)
+std::vector<std::uint32_t> corner_owners(const DisplacedMeshView& mesh,
+                                         const TessellationRule& rule,
+                                         const std::vector<std::uint32_t>& id)
 {
   const std::size_t count = id.size();
   const double tolerance = seam_tolerance(mesh);
@@ -110,7 +113,7 @@ std::vector<std::uint32_t> corner_owners(const DisplacedMeshView& mesh, const st
   for (std::uint32_t corner = 0; corner < count; ++corner) {
     double b[3] = {0, 0, 0};
     b[corner % 3] = 1;
-    d[corner] = place(mesh, mesh.triangles[corner / 3], b).d;
+    d[corner] = place(mesh, rule, mesh.triangles[corner / 3], b).d;
   }
   // Owners of one place in a chain that starts at its first corner.
   constexpr std::uint32_t kNone = ~0u;
@@ -129,14 +132,12 @@ std::vector<std::uint32_t> corner_owners(const DisplacedMeshView& mesh, const st
   return owner;
 }
 
-/// Segments that an edge asks for: its longer side in texels.
-std::uint32_t wanted_segments(const DisplacedTriangle& tri, int edge, double rate)
+/// Whole segments of an edge.
+std::uint32_t whole_segments(double wanted)
 {
-  const int next = edge == 2 ? 0 : edge + 1;
-  const double texels = std::max(std::abs(tri.x[next] - tri.x[edge]), std::abs(tri.y[next] - tri.y[edge]));
   // A little less, so that an edge of whole texels does not get one more by rounding. More than a million segments are
   // refused when the vertices are counted.
-  return static_cast<std::uint32_t>(std::clamp(std::ceil(texels * rate - 1e-3), 1.0, 1e6));
+  return static_cast<std::uint32_t>(std::clamp(std::ceil(wanted - 1e-3), 1.0, 1e6));
 }
 
 /// Vertices of a triangle with n segments a side.
@@ -152,19 +153,21 @@ std::uint64_t TessellationLayout::bytes() const
                                                           : num_primitives * sizeof(RTCGrid));
 }
 
-TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh, TessellationKind kind, double rate)
+TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh,
+                                            TessellationKind kind,
+                                            const TessellationRule& rule)
 {
   TessellationLayout layout;
   layout.kind = kind;
   layout.triangles.resize(mesh.num_triangles);
   const std::vector<std::uint32_t> id = weld_corners({mesh.triangles, mesh.num_triangles});
-  layout.corner_owner = corner_owners(mesh, id);
+  layout.corner_owner = corner_owners(mesh, rule, id);
   layout.edge_owner = weld_edges(id);
 
   std::vector<std::uint32_t> segments(layout.edge_owner.size(), 1);
   for (std::uint32_t edge = 0; edge < segments.size(); ++edge) {
     std::uint32_t& largest = segments[layout.edge_owner[edge]];
-    largest = std::max(largest, wanted_segments(mesh.triangles[edge / 3], static_cast<int>(edge % 3), rate));
+    largest = std::max(largest, whole_segments(rule.segments(mesh.triangles[edge / 3], static_cast<int>(edge % 3))));
   }
   const bool grids = kind == TessellationKind::kGrids;
   for (std::uint32_t index = 0; index < mesh.num_triangles; ++index) {
@@ -182,6 +185,13 @@ TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh, Tesse
     layout.num_micro_triangles += grids ? 6 * n * n : n * n;
   }
   return layout;
+}
+
+TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh, TessellationKind kind, double rate)
+{
+  TessellationRule rule;
+  rule.segments = [rate](const DisplacedTriangle& tri, int edge) { return rate * texels_along(tri, edge); };
+  return tessellation_layout_make(mesh, kind, rule);
 }
 
 std::uint64_t tessellation_peak_bytes(const TessellationLayout& layout, const TessellationBuild& build)
@@ -207,7 +217,7 @@ struct Tessellation::MicroTriangle {
   double weight[3] = {1, 0, 0};  ///< of the hit
 };
 
-Tessellation::Tessellation(const DisplacedMeshView& mesh, TessellationLayout layout)
+Tessellation::Tessellation(const DisplacedMeshView& mesh, TessellationLayout layout, const TessellationRule& rule)
     : mesh_(mesh), layout_(std::move(layout))
 {
   constexpr std::uint64_t kMost = ~std::uint32_t{0};
@@ -223,26 +233,33 @@ Tessellation::Tessellation(const DisplacedMeshView& mesh, TessellationLayout lay
   } else {
     grids_.resize(layout_.num_primitives);
   }
-  tbb::parallel_for(std::uint32_t{0}, mesh_.num_triangles, [&](std::uint32_t index) { fill(index); });
+  tbb::parallel_for(std::uint32_t{0}, mesh_.num_triangles, [&](std::uint32_t index) { fill(index, rule); });
   layout_.edge_owner = {};
   layout_.corner_owner = {};
+  // Of every 2^kLog2Owners-th primitive, and the last triangle once more.
+  owners_.reserve((layout_.num_primitives >> kLog2Owners) + 2);
+  for (std::uint32_t index = 0; index + 1 < mesh_.num_triangles; ++index) {
+    const std::uint32_t end = layout_.triangles[index + 1].first_primitive;
+    while ((owners_.size() << kLog2Owners) < end) owners_.push_back(index);
+  }
+  owners_.resize((layout_.num_primitives >> kLog2Owners) + 2, mesh_.num_triangles - 1);
 }
 
-void Tessellation::fill(std::uint32_t index)
+void Tessellation::fill(std::uint32_t index, const TessellationRule& rule)
 {
   const TessellatedTriangle& t = layout_.triangles[index];
   const DisplacedTriangle& tri = mesh_.triangles[index];
   const double tolerance = seam_tolerance(mesh_);
 
   const auto position = [&](const LatticeVertex& vertex) {
-    Placed own = place(mesh_, tri, vertex.b);
+    Placed own = place(mesh_, rule, tri, vertex.b);
     if (vertex.edge < 0) return own.P;
     if (vertex.step == 0 || vertex.step == vertex.steps) {
       const int corner = vertex.step == 0 ? vertex.edge : (vertex.edge == 2 ? 0 : vertex.edge + 1);
       const std::uint32_t owner = layout_.corner_owner[3 * index + static_cast<std::uint32_t>(corner)];
       double b[3] = {0, 0, 0};
       b[owner % 3] = 1;
-      return place(mesh_, mesh_.triangles[owner / 3], b).P;
+      return place(mesh_, rule, mesh_.triangles[owner / 3], b).P;
     }
     const std::uint32_t edge = 3 * index + static_cast<std::uint32_t>(vertex.edge);
     const std::uint32_t owner = layout_.edge_owner[edge];
@@ -252,7 +269,7 @@ void Tessellation::fill(std::uint32_t index)
     const int first = static_cast<int>(owner % 3);
     const bool same_way = other.P[first] == tri.P[vertex.edge];
     const LatticeVertex there = edge_vertex(first, same_way ? vertex.step : vertex.steps - vertex.step, vertex.steps);
-    const Placed shared = place(mesh_, other, there.b);
+    const Placed shared = place(mesh_, rule, other, there.b);
     return std::abs(shared.d - own.d) <= tolerance ? shared.P : own.P;
   };
   float* out = vertices_.get() + 3 * std::size_t{t.first_vertex};
@@ -309,8 +326,9 @@ RTCGeometry Tessellation::geometry_make(RTCDevice device) const
 Tessellation::MicroTriangle Tessellation::micro_triangle(std::uint32_t primitive, float u, float v) const
 {
   // The last triangle that starts at or before the primitive.
+  const auto first = layout_.triangles.begin();
   const auto after = std::upper_bound(
-      layout_.triangles.begin(), layout_.triangles.end(), primitive,
+      first + owners_[primitive >> kLog2Owners], first + owners_[(primitive >> kLog2Owners) + 1] + 1, primitive,
       [](std::uint32_t p, const TessellatedTriangle& triangle) { return p < triangle.first_primitive; });
   const TessellatedTriangle& t = *std::prev(after);
   const std::uint32_t n = t.segments, local = primitive - t.first_primitive;

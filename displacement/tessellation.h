@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -46,8 +47,19 @@ struct TessellationLayout {
   std::uint64_t bytes() const;  ///< of the vertices and indices
 };
 
-/// @param rate  micro-triangle edges a texel, larger than 0: at 1, edges are at most a texel long along both axes
+/// What decides how a mesh is tessellated.
+struct TessellationRule {
+  /// Segments that an edge asks for, from its triangle's vertex k to the next; rounded up.
+  std::function<double(const DisplacedTriangle&, int)> segments;
+  /// Height over a point of the undisplaced surface at a lattice position; empty: the map's.
+  std::function<double(Vec3d, double, double)> height;
+};
+
 /// @cost  36 bytes a base triangle; sorting of its edges
+TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh,
+                                            TessellationKind kind,
+                                            const TessellationRule& rule);
+/// @param rate  micro-triangle edges a texel, larger than 0: at 1, edges are at most a texel long along both axes
 TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh, TessellationKind kind, double rate);
 
 /// Bytes in use while Embree builds the tree: vertices, indices, the tree and what building needs besides.
@@ -67,11 +79,16 @@ class Tessellation {
   /// Evaluates the surface at all vertices.
   /// @param mesh    what it refers to must outlive the tessellation
   /// @param layout  of the same mesh
+  /// @param rule    by which it was made
   /// @error std::length_error if Embree's 32-bit indices are too short; std::bad_alloc
-  Tessellation(const DisplacedMeshView& mesh, TessellationLayout layout);
+  Tessellation(const DisplacedMeshView& mesh, TessellationLayout layout, const TessellationRule& rule = {});
 
   const TessellationLayout& layout() const { return layout_; }
-  std::size_t bytes() const { return layout_.bytes() + layout_.triangles.size() * sizeof(TessellatedTriangle); }
+  std::size_t bytes() const
+  {
+    return layout_.bytes() + layout_.triangles.size() * sizeof(TessellatedTriangle) +
+           owners_.size() * sizeof(owners_[0]);
+  }
 
   /// A new Embree geometry, not committed. The tessellation must outlive it and stay where it is.
   RTCGeometry geometry_make(RTCDevice device) const;
@@ -90,13 +107,15 @@ class Tessellation {
  private:
   struct MicroTriangle;
   MicroTriangle micro_triangle(std::uint32_t primitive, float u, float v) const;
-  void fill(std::uint32_t index);
+  void fill(std::uint32_t index, const TessellationRule& rule);
 
   DisplacedMeshView mesh_;
   TessellationLayout layout_;
   std::unique_ptr<float[]> vertices_;         ///< xyz
   std::unique_ptr<std::uint32_t[]> indices_;  ///< three a micro-triangle
   std::vector<RTCGrid> grids_;
+  static constexpr int kLog2Owners = 8;
+  std::vector<std::uint32_t> owners_;  ///< base triangle of every 2^kLog2Owners-th primitive
 };
 
 /// A scene for a tessellation, robust, not committed.

@@ -7,6 +7,7 @@
 #include <map>
 #include <tuple>
 
+#include "displacement/picture_view.h"
 #include "integrator/graph_bounds_stage.h"
 #include "integrator/scene_views.h"
 #include "integrator/stages.h"
@@ -299,38 +300,6 @@ struct SceneHeights {
 
   SceneViews views;
   std::vector<std::unique_ptr<GraphHeights>> heights;
-};
-
-/// Distance of a point from the line from the origin to `end`.
-double distance_to_line(const Vec3d& point, const Vec3d& end)
-{
-  const double squared = dot(end, end);
-  const double t = squared > 0 ? std::clamp(dot(point, end) / squared, 0.0, 1.0) : 0.0;
-  return length(point - t * end);
-}
-
-/// Where the picture is seen from.
-struct PictureView {
-  Camera camera;
-  double height = 1;  ///< pixels
-
-  /// Length of a line in the picture, pixels.
-  /// @param a, b  world
-  double pixels(Vec3f a, Vec3f b) const
-  {
-    const Vec3d along = to_double(b) - to_double(a);
-    const double scale = height / (2.0 * static_cast<double>(camera.half_height));
-    const Vec3d to_eye = to_double(camera.world_from_camera.p) - to_double(a);
-    if (camera.projection == Projection::kPerspective)
-      return length(along) * scale / std::max(distance_to_line(to_eye, along), 1e-30);
-    // Cells are as long as those in the picture for as far around as it is wide, and then grow.
-    const Vec3d axis = to_double(normalize(camera.world_from_camera.z));
-    const double within =
-        (1.0 + std::abs(static_cast<double>(camera.shift_x)) + std::abs(static_cast<double>(camera.shift_y))) * 2.0 *
-        std::hypot(static_cast<double>(camera.half_width), static_cast<double>(camera.half_height));
-    const double distance = distance_to_line(to_eye - dot(to_eye, axis) * axis, along - dot(along, axis) * axis);
-    return length(along) * scale * std::min(within / distance, 1.0);
-  }
 };
 
 }  // namespace

@@ -41,7 +41,7 @@ _REFERENCE_RUNS = 4
 
 # What relief is told besides; of layers, Cycles writes the picture alone.
 _RELIEF_OPTIONS = {
-    "relief": ["--aov", "beauty", "--float"],
+    "relief": ["--aov", "beauty", "--float", "--displacement-error", "1"],
     "relief_lod0": ["--aov", "beauty", "--float", "--lod", "0"],
 }
 

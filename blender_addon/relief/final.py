@@ -164,6 +164,8 @@ def command_line(scene, crop=None):
     """
     settings, time_limit = scene.relief, sampling_of(scene).time_limit
     arguments = ["--texture-memory", f"{settings.texture_memory:g}"]
+    if settings.displacement_error > 0:
+        arguments += ["--displacement-error", f"{settings.displacement_error:g}"]
     if settings.memory_limit > 0:
         arguments += ["--displacement-memory", f"{settings.memory_limit:g}"]
     if time_limit > 0:

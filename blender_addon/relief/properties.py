@@ -135,6 +135,15 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
         min=-1.0,
         max=16.0,
     )
+    displacement_error: FloatProperty(
+        name="Error",
+        description="Pixels that detail of height maps may be wide and shown by its light alone, as Cycles' dicing "
+        "rate, which is much faster; 0 is none (default 0)",
+        default=0.0,
+        min=0.0,
+        soft_max=8.0,
+        max=1000.0,
+    )
     cell_pixels: FloatProperty(
         name="Cell Size",
         description="How fine heights are computed that no map holds, as of noise over Generated coordinates: pixels "

@@ -147,6 +147,9 @@ class RELIEF_PT_displacement(_RenderPanel, bpy.types.Panel):
     def draw(self, context):
         settings, rows = context.scene.relief, self.rows()
         rows.prop(settings, "displacement_method")
+        row = rows.row()
+        row.active = settings.displacement_method == "auto" and settings.lod <= 0
+        row.prop(settings, "displacement_error")
         rows.prop(settings, "lod")
         rows.prop(settings, "cell_pixels")
         rows.prop(settings, "bump_displaces")

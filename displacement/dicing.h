@@ -1,0 +1,65 @@
+// Dicing: a mesh with a height map as micro-triangles as long as pixels are wide, coarser where it is farther away. Their
+// heights are those of the map's level whose texels are as wide, and facets stand for what it has lost (level_facets.h).
+//
+// The level is a function of the place on the undisplaced mesh alone, and the number of segments of a side of its ends, so
+// neighbours agree to the last bit. Triangles that span much of the picture are cut into parts first (lattice_split.h).
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "displacement/displaced_triangle.h"
+#include "displacement/lattice_split.h"
+#include "displacement/picture_view.h"
+#include "displacement/tessellation.h"
+
+namespace relief {
+
+class Dicing {
+ public:
+  /// @param mesh       without displacement
+  /// @param triangles  of the displaced mesh; parts are made of them
+  /// @param levels     of the map, the finest first
+  /// @param texel      width of one of the finest, metres of object space
+  /// @param instances  where the mesh is, the world from its own space; at least one
+  /// @param pixels     that a micro-triangle's side may be long, > 0
+  /// @cost  200 bytes a part
+  Dicing(const MeshView& mesh,
+         const DisplacedMeshView& triangles,
+         std::span<const HeightFieldView* const> levels,
+         double texel,
+         const PictureView& view,
+         std::span<const Affine3> instances,
+         double pixels);
+
+  /// The parts, in place of the mesh's triangles.
+  const DisplacedMeshView& mesh() const { return mesh_; }
+  /// What a tessellation of the parts is made by.
+  TessellationRule rule() const;
+
+  /// Level of the map at a point of the undisplaced surface.
+  /// @param P  object space
+  double level(Vec3d P) const;
+  /// Height at a lattice position on a level.
+  double height(double x, double y, double level) const;
+  /// Brings a point's place from a part to the mesh's triangle.
+  void set_base_place(std::uint32_t* triangle, float* b1, float* b2) const;
+  std::size_t bytes() const
+  {
+    return parts_.capacity() * sizeof(parts_[0]) + triangles_.capacity() * sizeof(triangles_[0]);
+  }
+
+ private:
+  double segments(Vec3f a, Vec3f b) const;
+
+  PictureView view_;
+  std::vector<Affine3> instances_;
+  std::vector<double> stretches_;  ///< of each instance: the most
+  double pixels_, texel_;
+  std::vector<const HeightFieldView*> levels_;
+  std::vector<LatticeTriangle> parts_;
+  std::vector<DisplacedTriangle> triangles_;
+  DisplacedMeshView mesh_;
+};
+
+}  // namespace relief

@@ -1,0 +1,185 @@
+// Displaced meshes diced for a picture: closed, as fine as asked for, and with the light of what is left out.
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "integrator/trace.h"
+#include "tests/support/render_scene.h"
+#include "tests/support/scene_builder.h"
+
+namespace relief::test {
+namespace {
+
+/// A closed sphere with a smooth map, tiled, seen from just above it.
+/// @param size   texels a side of the map
+/// @param tiles  around the sphere, even
+/// @param noise  of the map, part of its range
+Scene close_sphere(int size, int tiles, double noise, const Affine3& world_from_object = {})
+{
+  Scene scene = empty_scene();
+  Mesh sphere = sphere_mesh(1, 24, 12, true);
+  for (int r = 0; r <= 12; ++r) {
+    for (int c = 0; c <= 24; ++c) {
+      sphere.uv[0].push_back({static_cast<float>(c * tiles) / 24, static_cast<float>(r * tiles) / 24});
+    }
+  }
+  Material material = diffuse_material({0.8f, 0.8f, 0.8f});
+  material.displacement_index = 0;
+  add_object(scene, sphere, material, world_from_object);
+  const std::vector<std::uint16_t> random = noise_texels(size, 5);
+  std::vector<std::uint16_t> texels;
+  for (int y = 0; y < size; ++y) {
+    for (int x = 0; x < size; ++x) {
+      // At the poles, texel rows −½, all heights are one.
+      const double pole = std::sin(3.14159265 * (y + 0.5) / size);
+      const double h = 0.5 + pole * (0.2 * std::sin(2 * 3.14159265 * x / size) +
+                                     noise * (random[static_cast<std::size_t>(y * size + x)] / 65535.0 - 0.5));
+      texels.push_back(static_cast<std::uint16_t>(65535 * (y == 0 || y == size - 1 ? 0.5 : h)));
+    }
+  }
+  add_displacement(scene, size, std::move(texels), 0.1f);
+  scene.cameras[0].camera.world_from_camera.p = transform_point(world_from_object, {0.2f, 0.1f, 1.3f});
+  return scene;
+}
+
+DisplacementOptions options_of(const Scene& scene, double error, int height)
+{
+  DisplacementOptions options;
+  options.error = error;
+  options.camera = scene.cameras[0].camera;
+  options.picture_height = height;
+  options.num_rays = 1e9;
+  return options;
+}
+
+const Tessellation& tessellation_of(const SceneContext& context)
+{
+  EXPECT_EQ(context.displacements.method_names(), "tessellate");
+  return *context.displacements.tessellation(0);
+}
+
+TEST(Dicing, LetsNoRayOut)
+{
+  const Scene scene = close_sphere(512, 32, 0.1);
+  // With parts of triangles, and levels from the map's own on.
+  const SceneContext context(scene, options_of(scene, 1, 600));
+  ASSERT_GT(tessellation_of(context).layout().triangles.size(), scene.meshes[0].triangles.size());
+  std::mt19937 random(3);
+  std::normal_distribution<float> normal;
+  std::vector<TraceRay> rays;
+  for (int i = 0; i < 200'000; ++i) {
+    const Vec3f O = 0.2f * Vec3f{normal(random), normal(random), normal(random)};
+    if (length(O) > 0.8f) continue;
+    rays.push_back({O, normalize(Vec3f{normal(random), normal(random), normal(random)}), 0, kInfinity});
+  }
+  for (const TraceHit& hit : trace_rays(context, rays)) ASSERT_LT(hit.t, 3.0f);
+}
+
+/// Sides of micro-triangles in the picture, where the camera looks.
+TEST(Dicing, IsAsFineAsThePicture)
+{
+  const Affine3 placement{{0, 3, 0}, {-3, 0, 0}, {0, 0, 3}, {1, 2, 3}};
+  const Scene scene = close_sphere(512, 32, 0.1, placement);
+  double num_micro_triangles = 0;
+  for (const double error : {2.0, 1.0}) {
+    const SceneContext context(scene, options_of(scene, error, 400));
+    const Tessellation& t = tessellation_of(context);
+    double longest = 0, sum = 0;
+    int count = 0;
+    const Camera& camera = scene.cameras[0].camera;
+    const double scale = 400 / (2.0 * static_cast<double>(camera.half_height));
+    for (std::uint32_t primitive = 0; primitive < t.layout().num_primitives; primitive += 7) {
+      // On the sphere itself, since heights make sides longer.
+      Vec3f corner[2];
+      for (int k = 0; k < 2; ++k) {
+        const MicroHit hit = t.hit(primitive, static_cast<float>(k), 0.0f);
+        const Vec3f P = to_float(hit.P);
+        corner[k] = transform_point(placement, P / length(P));
+      }
+      const Vec3f middle = 0.5f * (corner[0] + corner[1]) - camera.world_from_camera.p;
+      if (std::max(std::abs(middle.x), std::abs(middle.y)) > -0.4f * middle.z) continue;
+      const double pixels = scale * static_cast<double>(length(corner[1] - corner[0]) / length(middle));
+      longest = std::max(longest, pixels);
+      sum += pixels;
+      ++count;
+    }
+    ASSERT_GT(count, 1000);
+    // Sides of sides are; where a triangle's rows meet a side that has fewer points, they are dragged by up to half a step.
+    EXPECT_LT(longest, 1.7 * error) << error;
+    EXPECT_GT(sum / count, 0.4 * error) << error;
+    EXPECT_LT(sum / count, error) << error;
+    const auto all = static_cast<double>(t.layout().num_micro_triangles);
+    if (num_micro_triangles > 0) {
+      EXPECT_NEAR(all / num_micro_triangles, 4, 1);
+    }
+    num_micro_triangles = all;
+  }
+}
+
+TEST(Dicing, FindsTheSurfaceWhereTexelsAreWiderThanPixels)
+{
+  Scene scene = close_sphere(64, 4, 0);
+  const SceneContext exact(scene);
+  const SceneContext diced(scene, options_of(scene, 1, 8000));
+  tessellation_of(diced);
+  std::vector<TraceRay> rays;
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> uniform(-0.3f, 0.3f);
+  const Vec3f O = scene.cameras[0].camera.world_from_camera.p;
+  for (int i = 0; i < 2000; ++i)
+    rays.push_back({O, normalize(Vec3f{uniform(random), uniform(random), -1}), 0, kInfinity});
+  const std::vector<TraceHit> a = trace_rays(exact, rays), b = trace_rays(diced, rays);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    ASSERT_LT(a[i].t, kInfinity);
+    // A texel is 25 mm wide. Where its bilinear patch is two triangles they differ by a quarter of the twist, .05 mm, and rays
+    // go down at angles.
+    EXPECT_NEAR(a[i].t, b[i].t, 6e-4) << i;
+    EXPECT_EQ(a[i].triangle_index, b[i].triangle_index) << i;
+  }
+}
+
+TEST(Dicing, KeepsTheMeanOfThePicture)
+{
+  Scene scene = close_sphere(64, 4, 0.2);
+  scene.cameras[0].camera.world_from_camera.p = {0, 0, 4};
+  scene.environment.color = {0.3f, 0.3f, 0.3f};
+  Light sun;
+  sun.kind = LightKind::kSun;
+  sun.axis = normalize(Vec3f{-1, 0, -0.3f});
+  sun.emission = {1, 1, 1};
+  scene.lights.push_back(sun);
+  scene.render.max_bounces = scene.render.diffuse_bounces = 4;
+  RenderOptions options = render_options(scene, 32, 1024);
+  const double exact = render_scene(scene, options).mean();
+  options.displacement.error = 1;
+  Rendered diced = render_scene(scene, options);
+  EXPECT_EQ(diced.stats.displacement.method, "tessellate");
+  EXPECT_NEAR(diced.mean() / exact, 1, 0.006);
+  // Too little memory: levels by cones instead.
+  options.displacement.auto_bytes = 1;
+  diced = render_scene(scene, options);
+  EXPECT_EQ(diced.stats.displacement.method, "chord");
+  EXPECT_NEAR(diced.mean() / exact, 1, 0.006);
+}
+
+TEST(Dicing, IsOfMapsThatSayNothingElse)
+{
+  Scene scene = close_sphere(64, 4, 0.2);
+  const auto is_diced = [&] {
+    return SceneContext(scene, options_of(scene, 1, 200)).displacements.tessellation(0) != nullptr;
+  };
+  EXPECT_TRUE(is_diced());
+  scene.displacements[0].lod = -1;
+  EXPECT_TRUE(is_diced());
+  scene.displacements[0].lod = 1;
+  EXPECT_FALSE(is_diced());
+  scene.displacements[0].lod = 0;
+  scene.displacements[0].method = DisplacementMethod::chord;
+  EXPECT_FALSE(is_diced());
+}
+
+}  // namespace
+}  // namespace relief::test
