@@ -1,6 +1,6 @@
 // A picture of a render that is not finished, with what the render goes on from: an OpenEXR file of two parts. The first is a
 // picture like any other; the second, "relief.state", has the film's sums as channels of floats, uncompressed, and the rest as
-// attributes.
+// attributes, one of which is a hash of all of it.
 #pragma once
 
 #include <optional>

@@ -1,6 +1,7 @@
 #include "integrator/checkpoint.h"
 
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 namespace relief {
@@ -15,7 +16,11 @@ bool fits(const SavedRender& saved, const Film& film, std::uint32_t wanted)
     return false;
   }
   if (state.done_samples >= wanted || state.pass_samples == 0 || state.pass_samples > wanted - state.done_samples ||
-      state.active.empty()) {
+      state.pass_samples > kMostPassSamples || state.active.empty()) {
+    return false;
+  }
+  // In rising order as it was begun: a tile that stood there twice would be rendered by two threads at once.
+  if (std::adjacent_find(state.active.begin(), state.active.end(), std::greater_equal<>()) != state.active.end()) {
     return false;
   }
   const auto is_sane = [&](std::uint32_t samples) { return samples <= wanted; };

@@ -13,6 +13,9 @@
 
 namespace relief {
 
+/// Samples of a pass that fills a batch: no pass has more.
+inline constexpr std::uint32_t kMostPassSamples = kBatchPaths / (kTileSize * kTileSize);
+
 using Workers = tbb::enumerable_thread_specific<Wavefront>;
 
 /// Adds what the workers have done.
@@ -21,7 +24,7 @@ void state_add_work(RenderState& state, const Workers& workers);
 /// Puts a saved film back, and the work that it cost onto a worker.
 /// @param saved   its sums are taken
 /// @param wanted  samples of the whole render
-/// @return false, and nothing is changed, if it is not of this film
+/// @return false, and nothing is changed, if it is not of this film or cannot have been saved
 bool state_restore(SavedRender& saved, Film& film, Wavefront& worker, std::uint32_t wanted);
 
 /// When a state is to be saved: so that no more than the interval is lost, whenever the process is killed.

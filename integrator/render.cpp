@@ -37,29 +37,27 @@ std::uint32_t samples_wanted(const RenderOptions& options)
   return options.num_samples > 0 ? options.num_samples : static_cast<std::uint32_t>(options.settings.samples);
 }
 
-/// Samples of a pass that fills a batch.
-constexpr std::uint32_t kMostSamples = kBatchPaths / (kTileSize * kTileSize);
-
 /// Samples of the next pass. Passes are as large as a batch holds, but at the start, where the first picture and the
 /// first measure of speed are wanted soon, and towards a time limit, which is kept by asking for less.
 /// @param is_watched  the picture is shown between passes: they begin with one sample, and slow ones are smaller. Some of
 ///                    them end where those do that are not watched
 std::uint32_t pass_samples(std::uint32_t done, std::uint32_t wanted, double seconds, double time_limit, bool is_watched)
 {
-  std::uint32_t samples = std::min(wanted - done, kMostSamples);
+  std::uint32_t samples = std::min(wanted - done, kMostPassSamples);
   const double per_sample = done > 0 ? seconds / done : 0.0;
   if (is_watched) {
     constexpr double kLongestSeconds = 4;
     constexpr std::uint32_t kLeastSamples = 4;  // fewer would leave batches too empty
-    samples = std::min({samples, std::max(done, 1u), kMostSamples - done % kMostSamples});
-    if (per_sample * kMostSamples > kLongestSeconds) {
+    samples = std::min({samples, std::max(done, 1u), kMostPassSamples - done % kMostPassSamples});
+    if (per_sample * kMostPassSamples > kLongestSeconds) {
       samples = std::min(samples, std::max(kLeastSamples, static_cast<std::uint32_t>(kLongestSeconds / per_sample)));
     }
   }
   if (time_limit > 0) {
     samples = std::min(samples, std::max(done, 1u));
     const double fitting = per_sample > 0 ? (time_limit - seconds) / per_sample : 1.0;
-    samples = std::min(samples, static_cast<std::uint32_t>(std::max(1.0, fitting)));
+    // In doubles: a day has room for more samples of a small picture than 32 bits can count.
+    samples = static_cast<std::uint32_t>(std::min<double>(samples, std::max(1.0, fitting)));
   }
   return samples;
 }
@@ -490,7 +488,7 @@ RenderedImage render(const Scene& scene,
     if (options.keeps_errors && errors.is_due()) errors.add(seconds_since(start));
     if (photons) reporter.set_photon_share(photons->seconds() / seconds_since(start));
     // Where passes are smaller because somebody watches, tiles are judged when they would be otherwise.
-    const bool is_judged = !is_watched || caustics || done % kMostSamples == 0;
+    const bool is_judged = !is_watched || caustics || done % kMostPassSamples == 0;
     if (settings.noise_threshold > 0 && done >= kMinAdaptiveSamples && is_judged) {
       // A tenth of the picture's mean: dark corners need not be cleaner than the eye can tell.
       const double floor = 0.1 * film.mean_luminance();

@@ -115,5 +115,32 @@ TEST_F(ExrStateTest, IsNoneIfTheFileIsCutShortOrItsTextDamaged)
   }
 }
 
+TEST_F(ExrStateTest, IsNoneIfABitOfItHasTurned)
+{
+  write("abc");
+  const std::string bytes = bytes_of_file(file("a.exr"));
+  // In digits, which stay digits; and in sums, the last of which end the file.
+  const std::size_t text = bytes.find("\"done_samples\":48"), radius = bytes.find("\"photons_a_pass\":1234567");
+  ASSERT_NE(text, std::string::npos);
+  ASSERT_NE(radius, std::string::npos);
+  const std::size_t sums_end = bytes.size(), sums_size = saved_.sums.size() * sizeof(float);
+  std::vector<std::size_t> places = {text + 15, radius + 17};
+  for (std::size_t i = 1; i < 40; ++i) places.push_back(sums_end - i * (sums_size / 40) - i % 4);
+  for (const std::size_t at : places) {
+    for (const int bit : {0, 7}) {
+      if (bit == 7 && at < sums_end - sums_size) continue;
+      std::string damaged = bytes;
+      damaged[at] = static_cast<char>(damaged[at] ^ (1 << bit));
+      write_bytes(file("damaged.exr"), damaged);
+      EXPECT_FALSE(exr_state_load(file("damaged.exr"), "abc")) << at << " bit " << bit;
+    }
+  }
+  // The highest bits of two words: products alone leave them where they are, and the one would undo the other.
+  std::string damaged = bytes;
+  for (const std::size_t at : {sums_end - 5, sums_end - 13}) damaged[at] = static_cast<char>(damaged[at] ^ 0x80);
+  write_bytes(file("damaged.exr"), damaged);
+  EXPECT_FALSE(exr_state_load(file("damaged.exr"), "abc"));
+}
+
 }  // namespace
 }  // namespace relief

@@ -1,6 +1,7 @@
 // A render that goes on from a checkpoint, wherever it was taken, is the render that was never ended.
 #include "integrator/checkpoint.h"
 
+#include <algorithm>
 #include <cstring>
 #include <functional>
 
@@ -125,10 +126,16 @@ TEST(Checkpoint, WhatIsOfAnotherFilmIsNotPutBack)
       {"tiles", [](SavedRender& s) { s.state.tile_samples.push_back(0); }},
       {"no pass", [](SavedRender& s) { s.state.pass_samples = 0; }},
       {"long pass", [](SavedRender& s) { s.state.pass_samples = 21; }},
+      {"pass beyond a batch",
+       [](SavedRender& s) {
+         s.state.pass_samples = kMostPassSamples + 1;
+         std::replace(s.state.tile_samples.begin(), s.state.tile_samples.end(), kMostPassSamples, kMostPassSamples + 1);
+       }},
       {"finished", [](SavedRender& s) { s.state.done_samples = 20; }},
       {"no tile", [](SavedRender& s) { s.state.active.clear(); }},
       {"tile beyond", [](SavedRender& s) { s.state.active[0] = 4; }},
       {"tile before", [](SavedRender& s) { s.state.active[0] = -1; }},
+      {"tile twice", [](SavedRender& s) { s.state.active[1] = s.state.active[0]; }},
       {"tile of another pass", [](SavedRender& s) { s.state.tile_samples[0] = 3; }},
       {"too many samples", [](SavedRender& s) { s.state.tile_samples[0] = 1u << 31; }}};
   for (const auto& [name, damage] : kBad) {
