@@ -150,6 +150,7 @@ class Merger {
 
   void add(const Picture& picture)
   {
+    check_finished(picture);
     check_same_image(picture);
     check_seeds(picture);
     drop_missing_layers(picture);
@@ -169,6 +170,7 @@ class Merger {
     std::vector<double> weight;  ///< only for kMeanOverHits, whose weight is its own
   };
 
+  static void check_finished(const Picture& picture);
   void check_same_image(const Picture& picture);
   void check_seeds(const Picture& picture);
   void warn_left_out(const std::string& channel, const std::string& why);
@@ -191,6 +193,13 @@ class Merger {
   bool knows_error_ = true;
   std::vector<std::string> warnings_;
 };
+
+void Merger::check_finished(const Picture& picture)
+{
+  if (attribute_of(picture, "relief:stop_reason") != "interrupted" || picture.find(kSamplesChannel) != nullptr) return;
+  // Some tiles may have had no sample yet: what is black there would count as much as the rest.
+  throw InputError(picture.file, "is of a render that is not finished, and has no layer samples.N to weight it by");
+}
 
 void Merger::check_same_image(const Picture& picture)
 {

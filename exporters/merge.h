@@ -30,7 +30,8 @@ struct MergeResult {
 ///   samples          Σ n
 ///   ids              of the first picture that sampled the pixel
 /// Sums are in double precision.
-/// @error InputError naming the files: unreadable, different sizes or windows, the same samples twice, other scene or frame, no samples
+/// @error InputError naming the files: unreadable, different sizes or windows, the same samples twice, other scene or frame, no
+///        samples; not finished, as a checkpoint, and without the layer of samples
 /// @cost  8 bytes a value for the sums, and one picture more
 MergeResult merge_pictures(std::span<const std::filesystem::path> files, const MergeOptions& options = {});
 

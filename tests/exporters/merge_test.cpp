@@ -246,6 +246,23 @@ TEST_F(Merge, WithoutCountsWeighsByTheMetadataAndWithoutThoseRefuses)
   EXPECT_NE(refusal({write("3.exr", a, "3"), write("4.exr", b, "4")}).find("relief:samples"), std::string::npos);
 }
 
+TEST_F(Merge, RefusesACheckpointWhosePixelsMayHaveNoSample)
+{
+  const TestFilm a(kWidth, kHeight, 1, 1u << static_cast<int>(Aov::kBeauty));
+  const Attributes unfinished = {{"relief:samples", "10"}, {"relief:stop_reason", "interrupted"}};
+  // With the seed of the other it is a part that is still rendered.
+  for (const char* seed : {"1", "2"}) {
+    const auto checkpoint = write("c.exr", a, seed, unfinished);
+    const auto whole = write("w.exr", a, "1", {{"relief:samples", "10"}, {"relief:sample_ranges", "0-10/20"}});
+    for (const bool force : {false, true}) {
+      EXPECT_NE(refusal({whole, checkpoint}, force).find("c.exr: is of a render that is not finished"),
+                std::string::npos);
+    }
+  }
+  // One that knows the samples of its pixels is as good as any.
+  EXPECT_EQ(refusal({write("1.exr", film(1), "1", unfinished), write("2.exr", film(2), "2")}), "no error");
+}
+
 TEST_F(Merge, HalvesTheVarianceOfTwoEqualRenders)
 {
   TestFilm a = film(1), b = film(2);
