@@ -6,11 +6,13 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
 
 #include <fmt/format.h>
 
 #include "cli/arguments.h"
 #include "cli/run_files.h"
+#include "cli/value_hint.h"
 #include "exporters/atomic_file.h"
 #include "exporters/errors.h"
 #include "exporters/exr.h"
@@ -27,6 +29,8 @@ struct ReportArguments {
 
 std::string text_of_file(const std::string& file)
 {
+  std::error_code ignored;
+  if (std::filesystem::is_directory(file, ignored)) throw InputError(file, "is a folder");
   std::ifstream stream(file, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(stream), {}};
   if (!stream) throw InputError(file, "cannot be read");
@@ -75,12 +79,13 @@ void cmd_report_register(CLI::App& app, std::function<int()>& run)
   CLI::App* command = app.add_subcommand("report", "Makes one page about a rendered frame: picture, error, cost");
   const auto arguments = std::make_shared<ReportArguments>();
   ReportArguments& a = *arguments;
-  command->add_option("picture", a.picture, "OpenEXR file that was rendered")->required();
-  command->add_option("--stats", a.statistics, "JSON file of statistics that the render wrote");
-  command->add_option("--reference", a.reference, "OpenEXR file to show and measure it against");
-  add_parsed(
-      *command, "-o,--output", a.output,
-      [](const std::string& text) { return parse_output("--output", text, ".html"); }, "HTML page to write")
+  names_file(command->add_option("picture", a.picture, "OpenEXR file that was rendered"), {".exr"})->required();
+  names_file(command->add_option("--stats", a.statistics, "JSON file of statistics that the render wrote"), {".json"});
+  names_file(command->add_option("--reference", a.reference, "OpenEXR file to show and measure it against"), {".exr"});
+  names_file(add_parsed(
+                 *command, "-o,--output", a.output,
+                 [](const std::string& text) { return parse_output("--output", text, ".html"); }, "HTML page to write"),
+             {".html"})
       ->required();
   command->callback([arguments, &run] { run = [arguments] { return report_run(*arguments); }; });
 }

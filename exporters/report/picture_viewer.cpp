@@ -4,7 +4,6 @@
 #include <cstddef>
 
 #include "exporters/png_encode.h"
-#include "exporters/report/figure_text.h"
 #include "exporters/report/value_map.h"
 #include "exporters/report_html.h"
 #include "exporters/shared_exponent.h"
@@ -131,10 +130,10 @@ std::string html_picture_viewer(const ViewedPicture& first, const ViewedPicture&
   }
   std::string html = "<div class='viewer' data-scale='" + std::to_string(factor) + "' data-x='" +
                      std::to_string(options.crop_x) + "' data-y='" + std::to_string(options.crop_y) + "'>\n";
-  html += "<div class='stage' style='--aspect:" + figure_text(static_cast<double>(width) / height, 6) +
+  html += "<div class='stage' style='--aspect:" + attribute_number(static_cast<double>(width) / height) +
           ";--width:" + std::to_string(width) + "px'>\n" + stage + "</div>\n<div class='controls'>";
   html += "<label>Exposure <input class='exposure' type='range' min='-10' max='10' step='0.1' value='" +
-          figure_text(options.exposure) + "'></label><output class='stops'></output>" +
+          attribute_number(options.exposure) + "'></label><output class='stops'></output>" +
           "<button class='reset' type='button'>0</button>";
   if (has_two) {
     html += "<label>Wipe <input class='wipe' type='range' min='0' max='100' step='0.1' value='50'></label>";

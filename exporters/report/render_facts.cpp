@@ -1,6 +1,7 @@
 #include "exporters/report/render_facts.h"
 
 #include <charconv>
+#include <cmath>
 #include <sstream>
 
 #include "exporters/errors.h"
@@ -13,8 +14,12 @@ RenderFacts::RenderFacts(Attributes attributes, std::string_view statistics, con
     : attributes_(std::move(attributes))
 {
   if (statistics.empty()) return;
-  statistics_ = Json::parse(statistics, nullptr, false);
-  if (!statistics_.is_object() || !number("/render_seconds")) {
+  // What is made of a value goes as deep as the value does.
+  constexpr int kDeepest = 100;
+  bool is_deep = false;
+  const auto keep = [&](int depth, Json::parse_event_t, Json&) { return !(is_deep |= depth > kDeepest); };
+  statistics_ = Json::parse(statistics, keep, false);
+  if (is_deep || !statistics_.is_object() || !number("/render_seconds")) {
     throw InputError(file, "expected the statistics of a render, as its option --stats writes them");
   }
 }
@@ -35,7 +40,8 @@ std::optional<double> RenderFacts::number(const std::string& pointer, const std:
   double parsed = 0;
   const char* end = at->second.data() + at->second.size();
   const auto result = std::from_chars(at->second.data(), end, parsed);
-  if (result.ec != std::errc() || result.ptr != end) return {};
+  // An error that is not known is written as nan.
+  if (result.ec != std::errc() || result.ptr != end || !std::isfinite(parsed)) return {};
   return parsed;
 }
 
@@ -43,6 +49,7 @@ std::string RenderFacts::text(const std::string& pointer, const std::string& att
 {
   const Json& found = value(pointer);
   if (found.is_string()) return found.get<std::string>();
+  if (found.is_number()) return found.dump();
   const auto at = attributes_.find(attribute);
   return at == attributes_.end() ? std::string() : at->second;
 }

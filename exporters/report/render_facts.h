@@ -27,6 +27,7 @@ class RenderFacts {
   /// @param pointer    of the number in the statistics, such as "/rays/total"
   /// @param attribute  that has it too; empty: none
   std::optional<double> number(const std::string& pointer, const std::string& attribute = {}) const;
+  /// Text, or a number with all of its digits.
   std::string text(const std::string& pointer, const std::string& attribute = {}) const;
 
   /// Members of an object of the statistics that are numbers.

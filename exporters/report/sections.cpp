@@ -287,14 +287,12 @@ std::string settings_html(const RenderFacts& facts)
                                                  {"version", "/version", "relief:version"},
                                                  {"instruction set", "/isa", "relief:isa"},
                                                  {"colour view of the PNG", "/view", "relief:view"},
-                                                 {"ended by", "/stop_reason", "relief:stop_reason"}}) {
-    const std::string text = facts.text(pointer, attribute);
-    if (!text.empty()) facts_of_run.push_back({name, printable_text(text)});
-  }
-  for (const auto& [name, pointer, attribute] : {std::tuple{"seed", "/seed", "relief:seed"},
+                                                 {"ended by", "/stop_reason", "relief:stop_reason"},
+                                                 {"seed", "/seed", "relief:seed"},
                                                  {"frame", "/frame", "relief:frame"},
                                                  {"threads", "/threads", "relief:threads"}}) {
-    if (const auto n = facts.number(pointer, attribute)) facts_of_run.push_back({name, figure_text(*n, 20)});
+    const std::string text = facts.text(pointer, attribute);
+    if (!text.empty()) facts_of_run.push_back({name, printable_text(text)});
   }
   std::vector<std::vector<std::string>> changed, usual;
   const Json& settings = facts.value("/settings");

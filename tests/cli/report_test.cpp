@@ -75,6 +75,7 @@ TEST_F(Report, RefusesWhatItCannotShow)
   const std::tuple<Arguments, int, const char*> kCases[] = {
       {{"report", file("a.exr"), "-o", file("p.html"), "--stats", text}, 3, "expected the statistics of a render"},
       {{"report", file("a.exr"), "-o", file("p.html"), "--stats", file("none.json")}, 3, "none.json: "},
+      {{"report", file("a.exr"), "-o", file("p.html"), "--stats", file(".")}, 3, "is a folder"},
       {{"report", file("a.exr"), "-o", file("p.html"), "--reference", file("small.exr")}, 3, "is 8x8 pixels at 0,0"},
       {{"report", file("none.exr"), "-o", file("p.html")}, 3, "none.exr"},
       {{"report", file("a.exr"), "-o", file("p.txt")}, 2, "a name that ends in .html"},

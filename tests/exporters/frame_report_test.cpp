@@ -203,18 +203,33 @@ TEST(FrameReport, HasEverySectionAndNests)
 TEST(FrameReport, MakesDoWithAPictureAlone)
 {
   Picture picture = constant_picture(2100, 3, 1, 1, 1);
-  picture.attributes = {
-      {"relief:seconds", "12.5"}, {"relief:warnings", "one\ntwo"}, {"relief:command", "relief render 'x'"}};
+  picture.attributes = {{"relief:seconds", "12.5"},
+                        {"relief:warnings", "one\ntwo"},
+                        {"relief:command", "relief render 'x'"},
+                        {"relief:error_rmse", "nan"}};
   const std::string html = page_of(picture, nullptr, "");
   EXPECT_EQ(test::html_nesting_error(html), "");
   for (const char* text : {"12.5 s", "<p>one</p>", "relief render &#39;x&#39;", "2100 × 3", "means of 2 × 2"}) {
     EXPECT_NE(html.find(text), std::string::npos) << text;
   }
+  EXPECT_EQ(html.find("RMSE, estimated"), std::string::npos) << "it is not known";
   EXPECT_EQ(html.find("class='wipe'"), std::string::npos);
   EXPECT_EQ(html.find("Error over time</h2>"), std::string::npos);
   const std::vector<std::string> pictures = test::html_pictures(html);
   ASSERT_EQ(pictures.size(), 2u);
   EXPECT_EQ(test::png_size(pictures[0]), (std::array<int, 2>{1050, 2}));
+}
+
+TEST(FrameReport, NumbersForProgramsHaveNoCommasAndSeedsAllOfTheirDigits)
+{
+  Picture picture = constant_picture(1200, 1, 1, 1, 1);
+  picture.attributes = {{"relief:seed", "18446744073709551615"}};
+  EXPECT_NE(page_of(picture, nullptr, "").find(">18446744073709551615</td>"), std::string::npos);
+  Statistics stats = some_statistics();
+  stats.seed = 9007199254740993;
+  const std::string html = page_of(picture, nullptr, stats_json(stats));
+  EXPECT_NE(html.find(">9007199254740993</td>"), std::string::npos);
+  EXPECT_NE(html.find("--aspect:1200;"), std::string::npos) << "1,200 is none for a style sheet";
 }
 
 TEST(FrameReport, RefusesWhatIsNoStatistics)
@@ -223,6 +238,10 @@ TEST(FrameReport, RefusesWhatIsNoStatistics)
   for (const char* text : {"{", "[]", "{}", "{\"render_seconds\": \"3\"}", "\xff"}) {
     EXPECT_THROW(page_of(picture, nullptr, text), InputError) << text;
   }
+  // As deep as a text can be, and not as a stack.
+  const std::string deep =
+      R"({"render_seconds": 1, "settings": {"a": )" + std::string(300'000, '[') + std::string(300'000, ']') + "}}";
+  EXPECT_THROW(page_of(picture, nullptr, deep), InputError);
   // What is of another type than it should be is not known.
   const std::string html = page_of(picture, nullptr,
                                    R"({"render_seconds": 1, "errors": [3, {"seconds": "x"}], "kept": 7, "settings": [],
