@@ -38,10 +38,10 @@ GroupPlanes group_load(const DenoiseInput& input, Group group)
     const PlaneView mean = input.features[group.first + i], half = input.features_half[group.first + i];
     tbb::parallel_for(0, input.height, [&](int y) {
       for (int x = 0; x < input.width; ++x) {
-        const float all = finite_or_0(mean.at(x, y)), n = input.samples.at(x, y);
-        const float even_share = n >= 2 ? std::ceil(n / 2) / n : 1.0f;
-        const float even = half.first == nullptr || !(n >= 2) ? all : finite_or_0(half.at(x, y));
-        const float odd = n >= 2 ? (all - even_share * even) / (1.0f - even_share) : all;
+        const float all = finite_or_0(mean.at(x, y)), even_share = even_share_of(input.samples.at(x, y));
+        const bool has_halves = even_share < 1;
+        const float even = half.first == nullptr || !has_halves ? all : finite_or_0(half.at(x, y));
+        const float odd = has_halves ? (all - even_share * even) / (1.0f - even_share) : all;
         planes.half[0][i].row(y)[x] = even;
         planes.half[1][i].row(y)[x] = odd;
         planes.variance[i].row(y)[x] = 0.5f * (even - odd) * (even - odd);

@@ -105,16 +105,17 @@ Halves halves_make(const DenoiseInput& input)
   Halves halves(input.width, input.height);
   tbb::parallel_for(0, input.height, [&](int y) {
     for (int x = 0; x < input.width; ++x) {
-      const float n = input.samples.at(x, y);
-      const float num_even = std::ceil(n / 2);
-      const float even_share = n >= 2 ? num_even / n : 1.0f;
-      bool is_known = n >= 2;
+      const float even_share = even_share_of(input.samples.at(x, y));
+      bool is_known = even_share < 1;
       for (std::size_t c = 0; c < 3; ++c) {
         const float mean = input.beauty[c].at(x, y), even = input.half[c].at(x, y),
                     variance = input.variance[c].at(x, y);
-        is_known = is_known && std::isfinite(mean) && std::isfinite(even) && std::isfinite(variance);
+        // Of numbers as large as there are the other half may be none.
+        const float odd = (mean - even_share * even) / (1.0f - even_share);
+        is_known =
+            is_known && std::isfinite(mean) && std::isfinite(even) && std::isfinite(odd) && std::isfinite(variance);
         halves.color[0][c].row(y)[x] = even;
-        halves.color[1][c].row(y)[x] = (mean - even_share * even) / (1.0f - even_share);
+        halves.color[1][c].row(y)[x] = odd;
         halves.variance[c].row(y)[x] = std::max(variance, 0.0f);
       }
       halves.even_share.row(y)[x] = even_share;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -28,6 +29,10 @@ struct DenoiseInput {
   std::array<PlaneView, kNumFeatures> features;
   std::array<PlaneView, kNumFeatures> features_half;  ///< as `half`; null: the features have no noise
 };
+
+/// Part of a pixel's n samples that are even-numbered: 1 if there are fewer than two, or no number that counts any, so that
+/// there is no other half.
+inline float even_share_of(float n) { return n >= 2 && std::isfinite(n) ? std::ceil(n / 2) / n : 1.0f; }
 
 /// A denoised picture: R, G, B of pixel after pixel, rows from the top.
 struct DenoiseResult {

@@ -130,6 +130,13 @@ TEST(BuiltinDenoiser, WhatIsNoNumberDoesNotSpread)
   picture.variance[3000] = std::numeric_limits<float>::quiet_NaN();
   picture.features[500] = std::numeric_limits<float>::infinity();
   picture.features_half[600] = std::numeric_limits<float>::quiet_NaN();
+  picture.samples[700] = std::numeric_limits<float>::infinity();
+  // Numbers, but the odd-numbered samples' mean is none: infinite in two channels, and no luminance.
+  for (const float sign : {1.0f, -1.0f}) {
+    const std::size_t at = 1500 + (sign < 0 ? picture.num_pixels() : 0);
+    picture.beauty[at] = sign * 3e38f;
+    picture.half[at] = sign * -3e38f;
+  }
   const DenoiseResult result = denoise_builtin(picture.input());
   EXPECT_TRUE(all_finite(result.color));
   EXPECT_TRUE(all_finite(result.error));
