@@ -78,9 +78,10 @@ void Requests::read()
     const ssize_t size = ::read(STDIN_FILENO, block.data(), block.size());
     if (size < 0 && errno == EINTR) continue;
     if (size <= 0) break;
+    // A line is looked through once, however many blocks it takes.
+    std::size_t begin = 0, from = text.size();
     text.append(block.data(), static_cast<std::size_t>(size));
-    std::size_t begin = 0;
-    for (std::size_t end = 0; (end = text.find('\n', begin)) != std::string::npos; begin = end + 1) {
+    for (std::size_t end = 0; (end = text.find('\n', from)) != std::string::npos; begin = from = end + 1) {
       take(text.substr(begin, end - begin));
     }
     text.erase(0, begin);
