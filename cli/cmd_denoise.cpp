@@ -12,6 +12,7 @@
 #include "cli/denoise_picture.h"
 #include "cli/run_files.h"
 #include "cli/standard_streams.h"
+#include "cli/value_hint.h"
 #include "exporters/exr.h"
 #include "exporters/png_ocio.h"
 
@@ -76,11 +77,16 @@ void cmd_denoise_register(CLI::App& app, std::function<int()>& run)
   const auto output = [](const char* option, const char* suffix) {
     return [=](const std::string& text) { return parse_output(option, text, suffix); };
   };
-  command->add_option("input", arguments->input, "OpenEXR file with the layers that a denoiser needs")->required();
-  add_parsed(*command, "-o,--output", arguments->output, output("--output", ".exr"),
-             "OpenEXR file to write: the input with the layers denoised and denoised_error")
+  names_file(command->add_option("input", arguments->input, "OpenEXR file with the layers that a denoiser needs"),
+             {".exr"})
       ->required();
-  add_parsed(*command, "--png", arguments->png, output("--png", ".png"), "PNG of the denoised picture to write");
+  names_file(add_parsed(*command, "-o,--output", arguments->output, output("--output", ".exr"),
+                        "OpenEXR file to write: the input with the layers denoised and denoised_error"),
+             {".exr"})
+      ->required();
+  names_file(
+      add_parsed(*command, "--png", arguments->png, output("--png", ".png"), "PNG of the denoised picture to write"),
+      {".png"});
   command->add_option("--view", arguments->view, setting_help(setting_info("view")));
   constexpr SettingInfo kExposure = setting_info("exposure");
   command->add_option("--exposure", arguments->exposure, setting_help(kExposure))->check(setting_check(kExposure));

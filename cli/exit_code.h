@@ -3,7 +3,7 @@
 
 namespace relief {
 
-enum ExitCode : int { kDone = 0, kFailed = 1, kUsage = 2, kInvalidScene = 3, kInterrupted = 130 };
+enum ExitCode : int { kDone = 0, kFailed = 1, kUsage = 2, kInvalidScene = 3, kInterrupted = 130, kGraceOver = 143 };
 
 struct ExitCodeInfo {
   ExitCode code;
@@ -16,6 +16,7 @@ inline constexpr ExitCodeInfo kExitCodes[] = {
     {kUsage, "wrong usage; also an output that is a file the run reads or another output"},
     {kInvalidScene, "the scene, or another input file, is invalid"},
     {kInterrupted, "interrupted; what was rendered is saved"},
+    {kGraceOver, "the time that --grace allows was over before all was saved"},
 };
 
 }  // namespace relief

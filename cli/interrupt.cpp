@@ -8,6 +8,8 @@
 
 #include <semaphore.h>
 
+#include "cli/exit_code.h"
+
 namespace relief {
 
 namespace {
@@ -22,7 +24,7 @@ void on_signal(int number)
 {
   g_by_signal = true;
   const bool is_second = g_announced.exchange(true);
-  if (is_second) std::_Exit(130);
+  if (is_second) std::_Exit(kInterrupted);
   if (number == SIGTERM && g_has_grace) {
     ::sem_post(&g_grace_begins);
   } else {
@@ -40,7 +42,7 @@ void keep_grace(double seconds)
   g_stop = true;
   std::this_thread::sleep_for(half);
   std::fputs("relief: the grace time is over: what was not written by now is lost\n", stderr);
-  std::_Exit(143);
+  std::_Exit(kGraceOver);
 }
 
 }  // namespace

@@ -100,7 +100,7 @@ class ManTest(unittest.TestCase):
             for name in sub_commands(*command):
                 self.assertRegex(text, rf"(?m)^\s+{name}( |$)", page)
         render = (self.folder / "relief-render.1").read_text()
-        for words in ("none, zips, zip, piz, dwaa, dwab", "Range: 1..4096", "Not together with", "Files: .gltf, .glb", "130"):
+        for words in ("none, zips, zip, piz, dwaa, dwab", "Range: 1..4096", "Not together with", "Files: .gltf, .glb", "130", "143"):
             self.assertIn(words, render.replace("\\-", "-"))
 
 
@@ -140,6 +140,8 @@ class Completion(unittest.TestCase):
         self.assertEqual(complete("render", "--frames", ""), set())
         self.assertEqual(complete("compare", "a.exr", "b"), {"b.exr"})
         self.assertEqual(complete("merge", "a.exr", "b.exr", "x"), set())
+        self.assertEqual(complete("report", "a.exr", "--reference", "b"), {"b.exr"})
+        self.assertEqual(complete("denoise", "a"), {"a.exr"})
         self.assertEqual(complete("render", "shot.gltf", "--environment", "s"), {"studio", "sky", "sky.hdr", "scenes/"})
         # A value is no option, and what was given once is not offered again.
         self.assertNotIn("--output", complete("render", "-o", "--png", "--ou"))
