@@ -18,12 +18,12 @@
 #include "cli/arguments.h"
 #include "cli/commands.h"
 #include "cli/run_files.h"
+#include "cli/scene_setup.h"
 #include "cli/slurm_script.h"
 #include "cli/standard_streams.h"
 #include "cli/value_hint.h"
 #include "exporters/atomic_file.h"
 #include "exporters/errors.h"
-#include "scene/load.h"
 
 namespace relief {
 
@@ -74,10 +74,14 @@ bool check_render_options(const FarmArguments& arguments)
   };
   refuse("--frames", "it stands before");
   refuse("--part", "--split makes parts");
+  refuse("--progress", "nobody watches a task");
   if (arguments.parts > 1) {
-    for (const char* option : {"--png", "--stats", "--preview", "--reference"}) {
+    for (const char* option : {"--png", "--stats", "--preview", "--report", "--reference"}) {
       refuse(option, "with --split, no task has the whole picture");
     }
+    // That of a scene is known to who loads it.
+    const CLI::Option& samples = *render.get_option("--spp");
+    if (samples.count() > 0) part_samples({1, arguments.parts}, samples.as<int>());
   }
   return render.get_option("--threads")->count() > 0;
 }
@@ -85,11 +89,7 @@ bool check_render_options(const FarmArguments& arguments)
 /// Frames in as many pieces as there may be, as even as can be.
 std::vector<std::vector<int>> chunks_of(const FarmArguments& arguments)
 {
-  std::vector<int> frames = arguments.frames.numbers;
-  if (arguments.frames.all) {
-    const auto [first, last] = scene_frame_range(arguments.scene);
-    for (int frame = first; frame <= last; ++frame) frames.push_back(frame);
-  }
+  const std::vector<int> frames = frames_of(arguments.frames, arguments.scene);
   if (frames.empty()) return {{}};
   const std::size_t count =
       std::clamp<std::size_t>(static_cast<std::size_t>(arguments.tasks / arguments.parts), 1, frames.size());

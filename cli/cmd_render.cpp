@@ -504,16 +504,7 @@ bool render_frame(const RenderArguments& arguments,
 /// Frames in the order in which they are rendered; nothing stands for the rest pose.
 std::vector<std::optional<int>> frames_of_run(const RenderArguments& arguments)
 {
-  std::vector<int> numbers = arguments.frames.numbers;
-  if (arguments.frames.all) {
-    const auto [first, last] = scene_frame_range(arguments.scene);
-    if (first < 0 || last > kLastFrame) {
-      throw CLI::ValidationError(
-          "--frames",
-          fmt::format("expected a scene whose frames are from 0 to {}, found {} to {}", kLastFrame, first, last));
-    }
-    for (int frame = first; frame <= last; ++frame) numbers.push_back(frame);
-  }
+  const std::vector<int> numbers = frames_of(arguments.frames, arguments.scene);
   if (numbers.empty()) return {std::nullopt};
   return {numbers.begin(), numbers.end()};
 }
@@ -553,7 +544,8 @@ int render_all(const RenderArguments& arguments, const std::string& command, Ren
       is_whole = true;
     }
     const bool is_last = i + 1 == frames.size();
-    if (!is_whole || interrupt_flag() || (interrupt_is_announced() && !is_last)) return kInterrupted;
+    // One that was finished all the same, and the last, leaves nothing to be desired.
+    if (!is_whole || (interrupt_is_announced() && !is_last)) return kInterrupted;
   }
   if (failed.empty()) return 0;
   throw std::runtime_error(

@@ -12,6 +12,7 @@
 #include "exporters/errors.h"
 #include "exporters/exr.h"
 #include "exporters/side_file.h"
+#include "scene/memory.h"
 #include "scene/setting_values.h"
 
 namespace relief {
@@ -109,6 +110,9 @@ bool is_whole_render(const FramePaths& paths, const std::string& fingerprint)
       return at != found.end() && at->second == entry.second;
     });
   } catch (const InputError&) {
+    return false;
+  } catch (const OutOfMemory&) {
+    // A damaged header may claim anything. A render of what it claims would need more than reading it, and say so.
     return false;
   }
 }

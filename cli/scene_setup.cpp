@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <iterator>
+#include <numeric>
 
 #include <fmt/format.h>
 
-#include "cli/arguments.h"
 #include "cli/value_hint.h"
 #include "scene/diagnostics.h"
 #include "scene/memory.h"
@@ -16,6 +16,19 @@ void refuse_warnings(const std::string& file, const std::vector<std::string>& wa
 {
   if (warnings.empty()) return;
   throw SceneError(file, "", "no warnings (--strict)", fmt::format("{}, first: {}", warnings.size(), warnings.front()));
+}
+
+std::vector<int> frames_of(const FrameList& list, const std::string& scene)
+{
+  if (!list.all) return list.numbers;
+  const auto [first, last] = scene_frame_range(scene);
+  if (first < 0 || last > kLastFrame) {
+    throw CLI::ValidationError("--frames", fmt::format("expected a scene whose frames are from 0 to {}, found {} to {}",
+                                                       kLastFrame, first, last));
+  }
+  std::vector<int> frames(static_cast<std::size_t>(last - first + 1));
+  std::iota(frames.begin(), frames.end(), first);
+  return frames;
 }
 
 LoadOptions SceneSetup::load_options(std::optional<int> frame) const

@@ -7,6 +7,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "cli/arguments.h"
 #include "displacement/displacement_set.h"
 #include "scene/load.h"
 
@@ -15,6 +16,10 @@ namespace relief {
 /// --strict: no warning is acceptable.
 /// @error SceneError with the first warning and the number of all
 void refuse_warnings(const std::string& file, const std::vector<std::string>& warnings);
+
+/// The frames of a list; of "all", those of the scene. Empty: the rest pose.
+/// @error CLI::ValidationError if a scene has frames that no list could name; as scene_frame_range
+std::vector<int> frames_of(const FrameList& list, const std::string& scene);
 
 /// What the command line says of a scene as a whole, whatever is then done with it.
 struct SceneSetup {

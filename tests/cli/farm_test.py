@@ -123,15 +123,25 @@ class FarmTest(unittest.TestCase):
             (("--", "--sp", "4"), 2, "--sp"),
             (("--", "--compression", "zap"), 2, "zap"),
             (("--", "--frames", "4"), 2, "no --frames"),
+            (("--", "--progress", "json"), 2, "no --progress"),
             (("--split", "2", "--", "--png", "a.png"), 2, "no --png"),
+            (("--split", "2", "--", "--report", "a.html"), 2, "no --report"),
             (("--sbatch=a\nrm -r .",), 2, "one line"),
             (("--split", "0"), 2, "--split"),
+            (("--split", "5", "--", "--spp", "16"), 2, "at most 4 parts"),
             (("--script", "a 'shot'.gltf"), 2, "--script"),
         ]
         for words, code, message in cases:
             outcome = self.farm("-o", "o.exr", *words, check=False)
             self.assertEqual(outcome.returncode, code, outcome.stderr)
             self.assertIn(message, outcome.stderr)
+        scene = json.loads((self.folder / "a 'shot'.gltf").read_text())
+        scene["extensions"]["RELIEF_render"] = {"frameRange": [-2, 1]}
+        scene["extensionsUsed"].append("RELIEF_render")
+        (self.folder / "early.gltf").write_text(json.dumps(scene))
+        outcome = self.relief("farm", "slurm", "early.gltf", "-o", "o.exr", "--frames", "all", check=False)
+        self.assertEqual(outcome.returncode, 2, outcome.stderr)
+        self.assertIn("found -2 to 1", outcome.stderr)
         outcome = self.farm("-o", "o.exr", "--submit", check=False, PATH="/nowhere")
         self.assertEqual(outcome.returncode, 1)
         self.assertIn("sbatch", outcome.stderr)

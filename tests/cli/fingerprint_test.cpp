@@ -5,6 +5,10 @@
 #include <algorithm>
 #include <set>
 
+#include "exporters/exr.h"
+#include "scene/memory.h"
+#include "tests/exporters/test_pictures.h"
+
 namespace relief {
 namespace {
 
@@ -95,6 +99,20 @@ TEST(Fingerprint, AFileCountsWithAllThatItsSystemSaysButNameAndDevice)
   elsewhere.device = 7;
   EXPECT_EQ(render_fingerprint({}, {}, {}, {elsewhere}), was);
   EXPECT_NE(render_fingerprint({}, {}, {}, {file, file}), was);
+}
+
+class WholeRender : public FolderTest {};
+
+// As one whose header is damaged: it may claim any size.
+TEST_F(WholeRender, IsNoneForWhichThereIsNoRoom)
+{
+  FramePaths paths;
+  paths.exr = file("a.exr");
+  exr_write(paths.exr, TestFilm(20, 10, 1).view, frame_attributes(paths, "abc"));
+  EXPECT_TRUE(is_whole_render(paths, "abc"));
+  memory_limit_set(1);
+  EXPECT_FALSE(is_whole_render(paths, "abc"));
+  memory_limit_reset();
 }
 
 }  // namespace
