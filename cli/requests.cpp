@@ -31,9 +31,13 @@ bool is_request(const nlohmann::json& object)
 {
   if (object.size() != 2 || !object.contains("id") || !object.contains("render") || !is_id(object["id"])) return false;
   const nlohmann::json& words = object["render"];
-  bool are_texts = words.is_array();
-  for (const nlohmann::json& word : words) are_texts = are_texts && word.is_string();
-  return are_texts;
+  bool are_words = words.is_array();
+  // No command line can have a zero in a word, and files would be called by what is before it.
+  const auto is_word = [](const nlohmann::json& word) {
+    return word.is_string() && word.get_ref<const std::string&>().find('\0') == std::string::npos;
+  };
+  for (const nlohmann::json& word : words) are_words = are_words && is_word(word);
+  return are_words;
 }
 
 }  // namespace

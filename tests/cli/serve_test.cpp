@@ -47,9 +47,10 @@ TEST_F(Serving, RendersWhatRenderDoes)
 
 TEST_F(Serving, WhatIsNoRequestIsAnsweredAndSurvived)
 {
-  for (const char* line : {"", "nonsense", "[]", "7", "{\"id\": 1}", "{\"id\": 1, \"render\": \"s.gltf\"}",
-                           "{\"id\": 1, \"render\": [1]}", "{\"id\": [1], \"render\": []}", "{\"cancel\": {}}",
-                           "{\"id\": 1, \"render\": [], \"more\": 1}", "\xff\xfe", "{\"id\": 1e999}"}) {
+  for (const char* line :
+       {"", "nonsense", "[]", "7", "{\"id\": 1}", "{\"id\": 1, \"render\": \"s.gltf\"}", "{\"id\": 1, \"render\": [1]}",
+        "{\"id\": 1, \"render\": [\"a\\u0000b\"]}", "{\"id\": [1], \"render\": []}", "{\"cancel\": {}}",
+        "{\"id\": 1, \"render\": [], \"more\": 1}", "\xff\xfe", "{\"id\": 1e999}"}) {
     server_.say(line);
     const nlohmann::json end = server_.hear();
     EXPECT_EQ(end["event"], "end") << line;
