@@ -4,6 +4,9 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
+#include <chrono>
+#include <thread>
+
 #include "tests/cli/interrupted_runs.h"
 
 namespace relief::test {
@@ -271,6 +274,18 @@ TEST_F(SurvivingRun, WhenTheGraceTimeIsOverTheProgramEndsWhateverItIsDoing)
   EXPECT_EQ(running.process->wait(), 143);
   EXPECT_NE(bytes_of_file(file("stderr")).find("relief: the grace time is over"), std::string::npos);
   EXPECT_EQ(made(), std::vector<std::string>{"pipe"});
+}
+
+TEST_F(SurvivingRun, AFrameThatWasFinishedInTimeAndWrittenAfterwardsIsNoInterrupt)
+{
+  ASSERT_EQ(::mkfifo(file("pipe").c_str(), 0600), 0);
+  const Running running = start(render_arguments(scene_, file("pipe"), {"--spp", "1", "--grace", "6"}));
+  ASSERT_TRUE(running.wait_for("progress"));
+  running.process->signal(SIGTERM);
+  // Writing waits for a reader, beyond the half of the grace time at which sampling would have ended.
+  std::this_thread::sleep_for(std::chrono::milliseconds(3500));
+  EXPECT_FALSE(bytes_of_file(file("pipe")).empty());
+  EXPECT_EQ(running.process->wait(), 0);
 }
 
 TEST_F(SurvivingRun, ALockThatAKilledProcessLeftIsNobodys)

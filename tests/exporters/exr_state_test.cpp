@@ -120,11 +120,11 @@ TEST_F(ExrStateTest, IsNoneIfABitOfItHasTurned)
   write("abc");
   const std::string bytes = bytes_of_file(file("a.exr"));
   // In digits, which stay digits; and in sums, the last of which end the file.
-  const std::size_t text = bytes.find("\"done_samples\":48"), radius = bytes.find("\"photons_a_pass\":1234567");
+  const std::size_t text = bytes.find("\"done_samples\":48"), photons = bytes.find("\"photons_a_pass\":1234567");
   ASSERT_NE(text, std::string::npos);
-  ASSERT_NE(radius, std::string::npos);
+  ASSERT_NE(photons, std::string::npos);
   const std::size_t sums_end = bytes.size(), sums_size = saved_.sums.size() * sizeof(float);
-  std::vector<std::size_t> places = {text + 15, radius + 17};
+  std::vector<std::size_t> places = {text + 15, photons + 18};
   for (std::size_t i = 1; i < 40; ++i) places.push_back(sums_end - i * (sums_size / 40) - i % 4);
   for (const std::size_t at : places) {
     for (const int bit : {0, 7}) {
