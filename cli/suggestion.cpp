@@ -15,7 +15,7 @@ constexpr std::pair<std::string_view, std::string_view> kOtherNames[] = {
     {"--height", "--resolution"}, {"--bounces", "--max-bounces"},   {"--depth", "--max-bounces"},
     {"--frame", "--frames"},      {"--jobs", "--threads"},          {"--quiet", "--progress"},
     {"--silent", "--progress"},   {"--noise", "--noise-threshold"}, {"--passes", "--aov"},
-    {"--region", "--crop"},       {"--denoise", "--aov"},           {"--time", "--time-limit"},
+    {"--region", "--crop"},       {"--time", "--time-limit"},
 };
 
 /// Letters that have to be put in, taken out, replaced, or swapped with the next one.
