@@ -45,9 +45,6 @@ constexpr double kLeastTexelsASide = 16;
 /// texture's every texel, tessellations are larger than caches, and cost more (methods/tessellate.cpp).
 constexpr MethodCost kDicingCost{250, 35, 640};
 
-/// Width of the texels that rays choose by themselves, as a part of their cone's.
-constexpr float kTexelsPerCone = 0.25f;
-
 /// Levels that rays may choose by themselves lose no more of the surface's slopes than this, metres a metre, nor move a
 /// point further than this many of their texels: half a pixel, since texels are a quarter as wide as that. A picture's
 /// mean then changes by at most about an eighth of the slope's square (docs/displacement.md), 1.4 %.
@@ -164,10 +161,23 @@ void DisplacementSet::set_facets(const Use& use, bool tessellates, DisplacedGeom
   }
 }
 
+int DisplacementSet::num_useful_levels(const Use& use) const
+{
+  const HeightMapView& map = map_of(use).view;
+  double side = mean_texels_a_side(use.mesh, use.settings.height, map.width, map.height);
+  int count = 1;
+  // Levels of the map end too: with one texel it is a constant.
+  for (int texels = std::max(map.width, map.height); side >= 2 * kLeastTexelsASide && texels > 2; side /= 2) {
+    texels = (texels + 1) / 2;
+    ++count;
+  }
+  return count;
+}
+
 DisplacementSet::Levels DisplacementSet::levels_of(const Use& use, const DisplacementOptions& options) const
 {
   constexpr float kCoarsest = kMaxLodLevels - 1;
-  const float lod = has_error(use, options) ? -1.0f : lod_of(use.settings, options);
+  const float lod = lod_of(use.settings, options);
   const bool tessellates = tessellation_kind(method_of(use.settings, options)).has_value();
   Levels levels;
   if (lod >= 0) {
@@ -176,13 +186,7 @@ DisplacementSet::Levels DisplacementSet::levels_of(const Use& use, const Displac
     levels.fixed = std::min(lod, kCoarsest) - static_cast<float>(levels.first);
     levels.count = levels.fixed > 0 ? 2 : 1;
   } else if (!tessellates) {
-    const HeightMapView& map = map_of(use).view;
-    double side = mean_texels_a_side(use.mesh, use.settings.height, map.width, map.height);
-    // Levels of the map end too: with one texel it is a constant.
-    for (int texels = std::max(map.width, map.height); side >= 2 * kLeastTexelsASide && texels > 2; side /= 2) {
-      texels = (texels + 1) / 2;
-      ++levels.count;
-    }
+    levels.count = num_useful_levels(use);
     levels.by_cone = levels.count > 1;
   }
   return levels;
@@ -226,7 +230,6 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
       fields_(options.fields != nullptr ? options.fields : std::make_shared<HeightFields>()),
       kept_meshes_(options.meshes)
 {
-  texels_per_cone_ = options.error > 0 ? static_cast<float>(options.error) : kTexelsPerCone;
   const std::vector<Use> uses = find_uses(input);
   const auto num_displaced =
       std::count_if(geometry_of_instance_.begin(), geometry_of_instance_.end(), [](int index) { return index >= 0; });
@@ -279,7 +282,7 @@ std::unique_ptr<PreparedMesh> DisplacementSet::make_displaced(const Use& use, co
   geometry.smooth = settings.smoothing;
   geometry.rmip_options = options.rmip.value_or(RmipOptions{});
   Levels levels = levels_of(use, options);
-  if (levels.by_cone && !has_error(use, options)) {
+  if (levels.by_cone) {
     levels.count = num_faithful_levels(use, levels.count);
     levels.by_cone = levels.count > 1;
   }
@@ -406,12 +409,20 @@ void DisplacementSet::dice(PreparedMesh& displaced,
                            double num_rays,
                            std::uint64_t* used_bytes)
 {
+  if (options.photons) {
+    reasons_.push_back("mesh '" + displaced.name + "': not diced, as photons may be traced");
+    return;
+  }
   DisplacedGeometry& geometry = displaced.geometry;
+  const HeightFields::Map& map = map_of(use);
   std::vector<const HeightFieldView*> levels;
-  for (int k = 0; k < geometry.lod.num_levels; ++k) levels.push_back(geometry.levels[k].field);
+  std::vector<int> new_levels;
+  for (int k = 0; k < num_useful_levels(use); ++k) {
+    if (!fields_->has(map, k)) new_levels.push_back(k);
+    levels.push_back(&fields_->field(map, k).bounds.view());
+  }
   const MapDensity density = map_density(use.mesh, use.settings.height);
-  const HeightMapView& map = map_of(use).view;
-  const double texel = 1 / std::sqrt(std::max(density.u * map.width * density.v * map.height, 1e-300));
+  const double texel = 1 / std::sqrt(std::max(density.u * map.view.width * density.v * map.view.height, 1e-300));
   auto dicing = std::make_unique<Dicing>(use.mesh, geometry.mesh, levels, texel,
                                          PictureView{*options.camera, static_cast<double>(options.picture_height)},
                                          use.places, options.error);
@@ -425,10 +436,16 @@ void DisplacementSet::dice(PreparedMesh& displaced,
   const std::uint64_t allowance = options.auto_bytes > 0 ? options.auto_bytes : memory_of_machine() / 8;
   const DisplacementChoice choice = displacement_choose(offers, num_rays, allowance - std::min(allowance, *used_bytes));
   reasons_.push_back("mesh '" + displaced.name + "': " + choice.reason);
-  if (choice.method == displaced.method) return;
+  if (choice.method == displaced.method) {
+    for (const int k : new_levels) fields_->drop(map, k);
+    return;
+  }
   *used_bytes += bytes;
   displaced.method = choice.method;
+  for (std::size_t k = 0; k < levels.size(); ++k) geometry.levels[k] = {levels[k], nullptr};
+  geometry.lod = {static_cast<int>(levels.size()), false, 0, geometry.lod.texel};
   set_facets(use, true, &geometry);
+  has_facets_ |= geometry.facets.has_value();
   displaced.tessellation = std::make_unique<Tessellation>(dicing->mesh(), std::move(layout), rule);
   displaced.dicing = std::move(dicing);
   forget_tree(displaced);

@@ -53,6 +53,7 @@ struct DisplacementOptions {
   std::optional<RmipOptions> rmip;           ///< of the methods that take them
   double tessellation_rate = 1;              ///< micro-triangle edges a texel
   double error = 0;              ///< pixels that detail of maps may be wide and missing, with a camera; 0: none
+  bool photons = false;          ///< may be traced: they know no facets, so that nothing is diced
   std::uint64_t auto_bytes = 0;  ///< what `auto` may use while it builds tessellations; 0: it builds none
   std::optional<Camera> camera;  ///< by which computed heights choose their cells; empty: the scene's first
   int picture_height = 0;        ///< pixels, with a camera
@@ -96,8 +97,6 @@ class DisplacementSet {
   const DisplacedMesh& mesh(std::size_t index) const { return geometries_[index]->mesh; }
   /// @return null if the geometry is traversed as it is
   const Tessellation* tessellation(std::size_t index) const { return geometries_[index]->tessellation.get(); }
-  /// Width of the texels that a ray meets, as a part of its cone's.
-  float texels_per_cone() const { return texels_per_cone_; }
   /// Completes a hit on a displaced instance.
   /// @param placement  the instance's
   /// @param primitive  as Embree reports it, like the record
@@ -159,6 +158,8 @@ class DisplacementSet {
                                           const DisplacementMapping& mapping,
                                           const std::vector<const HeightFieldView*>& fields);
   std::unique_ptr<PreparedMesh> make_computed(const Use& use, const DisplacementOptions& options);
+  /// Levels of a map that still show something on a mesh.
+  int num_useful_levels(const Use& use) const;
   /// Whether a use is to be traced to an error, not exactly nor as its settings say.
   bool has_error(const Use& use, const DisplacementOptions& options) const;
   /// Fills in what the levels of a geometry have lost.
@@ -192,7 +193,6 @@ class DisplacementSet {
   std::vector<int> geometry_of_instance_;
   std::vector<float> texel_of_instance_;
   bool has_levels_ = false, has_facets_ = false;
-  float texels_per_cone_;
   std::vector<std::string> reasons_;
   std::shared_ptr<HeightFields> fields_;
   HeightFields::Tally kept_;

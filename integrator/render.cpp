@@ -145,9 +145,10 @@ FilmWindow render_window(const RenderOptions& options)
 namespace {
 
 /// How a render's context is made.
-ContextOptions context_options(const RenderOptions& options)
+ContextOptions context_options(const Scene& scene, const RenderOptions& options)
 {
   DisplacementOptions displacement = options.displacement;
+  displacement.photons = may_trace_photons(scene, options.settings.caustics.mode);
   displacement.num_rays = expected_rays(options.settings);
   displacement.camera = options.camera;
   displacement.picture_height = options.settings.height;
@@ -160,7 +161,7 @@ ContextOptions context_options(const RenderOptions& options)
 
 SceneContext render_context(const Scene& scene, const RenderOptions& options)
 {
-  return context_make(scene, context_options(options));
+  return context_make(scene, context_options(scene, options));
 }
 
 KernelGlobals render_globals(const SceneContext& context, const RenderOptions& options, const FilterTable& filter)
@@ -344,7 +345,7 @@ RenderedImage render(const Scene& scene,
 {
   const Clock::time_point build_start = Clock::now();
   const RenderSettings& settings = options.settings;
-  const SceneContext& context = kept.get(scene, context_options(options));
+  const SceneContext& context = kept.get(scene, context_options(scene, options));
   for (std::string& text : context.displacements.warnings()) stats.warnings.push_back(std::move(text));
   const StageTable& stages = stage_table_select();
 

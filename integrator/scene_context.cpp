@@ -29,15 +29,17 @@ constexpr float kSharpestTails = 0.12f;
 /// A light that covers more of the sky than this, steradians, is found by paths that leave a caster often enough.
 constexpr double kWideLight = 1.0;
 
+bool any_instance(const Scene& scene, std::uint32_t flag)
+{
+  return std::any_of(scene.instances.begin(), scene.instances.end(),
+                     [=](const Instance& instance) { return (instance.flags & flag) != 0; });
+}
+
 CausticsDecision caustics_decide(const Scene& scene, LightSet& lights, CausticsMode mode)
 {
   if (mode == CausticsMode::kOff) return {false, "off"};
-  const auto any = [&](std::uint32_t flag) {
-    return std::any_of(scene.instances.begin(), scene.instances.end(),
-                       [&](const Instance& instance) { return (instance.flags & flag) != 0; });
-  };
-  if (!any(kCausticCaster)) return {false, "nothing casts caustics"};
-  if (!any(kCausticReceiver)) return {false, "nothing receives caustics"};
+  if (!any_instance(scene, kCausticCaster)) return {false, "nothing casts caustics"};
+  if (!any_instance(scene, kCausticReceiver)) return {false, "nothing receives caustics"};
   if (mode == CausticsMode::kAuto && lights.environment_solid_angle > kWideLight) {
     lights.environment_casts_caustics = false;
   }
@@ -70,6 +72,11 @@ bool has_tails(const Material& m, bool caster)
 }
 
 }  // namespace
+
+bool may_trace_photons(const Scene& scene, CausticsMode mode)
+{
+  return mode != CausticsMode::kOff && any_instance(scene, kCausticCaster) && any_instance(scene, kCausticReceiver);
+}
 
 SceneContext::SceneContext(const Scene& loaded,
                            const DisplacementOptions& displacement,

@@ -138,8 +138,8 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
     displacement_error: FloatProperty(
         name="Error",
         description="Pixels that detail of height maps may be wide and shown by its light alone, as Cycles' dicing "
-        "rate, which is much faster; 0 is none (default 0)",
-        default=0.0,
+        "rate, which is much faster; 0 is none (default 1)",
+        default=1.0,
         min=0.0,
         soft_max=8.0,
         max=1000.0,
