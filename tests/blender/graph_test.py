@@ -49,8 +49,7 @@ def _sheet(materials, low, high, seed=1, tilted=False):
     if tilted:
         slopes = random.uniform(-2, 2, (count, 1, 2))
         points[..., 2] = (slopes * (corners - 0.5)).sum(axis=-1)
-    mesh = bpy.data.meshes.new("sheet")
-    mesh.from_pydata(points.reshape(-1, 3).tolist(), [], np.arange(4 * count).reshape(-1, 4).tolist())
+    mesh = _faces(points)
     for name in ("xy", "zw"):
         steps = random.integers(low / _STEP, high / _STEP, (count, 1, 2)) + 0.5
         values = (_STEP * steps).astype(np.float32).repeat(4, axis=1)
@@ -60,6 +59,27 @@ def _sheet(materials, low, high, seed=1, tilted=False):
     for material in materials:
         mesh.materials.append(material)
     return link(mesh, "sheet")
+
+
+def _faces(points):
+    """A mesh of four-sided faces that share no vertices.
+
+    @param  points  float32 (faces, 4, 3)
+    """
+    count = len(points)
+    mesh = bpy.data.meshes.new("sheet")
+    mesh.vertices.add(4 * count)
+    mesh.loops.add(4 * count)
+    mesh.polygons.add(count)
+    mesh.vertices.foreach_set("co", points.ravel())
+    mesh.loops.foreach_set("vertex_index", np.arange(4 * count, dtype=np.int32))
+    mesh.polygons.foreach_set("loop_start", np.arange(0, 4 * count, 4, dtype=np.int32))
+    # Since 3.6 it follows from the starts.
+    if bpy.app.version < (3, 6, 0):
+        mesh.polygons.foreach_set("loop_total", np.full(count, 4, dtype=np.int32))
+    mesh.polygons.foreach_set("use_smooth", np.zeros(count, dtype=bool))
+    mesh.update(calc_edges=True)
+    return mesh
 
 
 def _emitter(name, build, sign):

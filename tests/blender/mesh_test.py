@@ -203,20 +203,27 @@ def test_indirect_light():
 
 
 def test_equal_corners_are_joined_and_no_others():
-    """Against sets of tuples, on random corners."""
+    """Against sets of tuples, on random corners of two parts; without and with many more corners that no part has."""
     import numpy as np
-    from relief.export.mesh import _join_equal
+    from relief.export.mesh import _Joiner
 
     random = np.random.default_rng(0)
-    for _ in range(200):
+    for number in range(200):
         num_loops = random.integers(3, 60)
-        vertex = random.integers(0, random.integers(1, 20), num_loops).astype(np.int32)
+        num_vertices = random.integers(1, 20)
+        vertex = random.integers(0, num_vertices, num_loops).astype(np.int32)
         attributes = [random.integers(0, 2, (num_loops, k)).astype(np.float32) for k in (3, 2)]
-        loops = random.integers(0, num_loops, 3 * random.integers(1, 30))
-        distinct, indices = _join_equal(loops, vertex, attributes)
+        if number % 2:
+            num_vertices = 5000
+            vertex = np.concatenate([vertex * 200, np.zeros(5000, dtype=np.int32)])
+            attributes = [np.concatenate([values, np.zeros((5000, values.shape[1]), np.float32)]) for values in attributes]
+        joiner = _Joiner(vertex, num_vertices)
+        for _ in range(2):
+            loops = random.integers(0, num_loops, 3 * random.integers(1, 30))
+            distinct, indices = joiner.join(loops, attributes)
 
-        def corner(loop):
-            return (vertex[loop], *(tuple(values[loop]) for values in attributes))
+            def corner(loop):
+                return (vertex[loop], *(tuple(values[loop]) for values in attributes))
 
-        assert [corner(loop) for loop in loops] == [corner(distinct[i]) for i in indices]
-        assert len(distinct) == len({corner(loop) for loop in loops}) == len({corner(loop) for loop in distinct})
+            assert [corner(loop) for loop in loops] == [corner(distinct[i]) for i in indices]
+            assert len(distinct) == len({corner(loop) for loop in loops}) == len({corner(loop) for loop in distinct})

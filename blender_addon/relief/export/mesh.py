@@ -43,11 +43,12 @@ class Wanted:
 
 
 class _Corners:
-    """A mesh's triangles and the attributes of their corners."""
+    """A mesh's triangles and the attributes of their corners, which are read once for all slots."""
 
     def __init__(self, mesh, warn):
         self.mesh = mesh
         self._warn = warn
+        self._read = {}
         mesh.calc_loop_triangles()
         num_triangles, num_loops = len(mesh.loop_triangles), len(mesh.loops)
         loops = np.empty(3 * num_triangles, dtype=np.int32)
@@ -90,14 +91,39 @@ class _Corners:
         """Leaves out triangles: those for which a boolean is not true."""
         self.loops, self.material, self.is_smooth = self.loops[keep], self.material[keep], self.is_smooth[keep]
 
+    def _once(self, read, *source):
+        """What a method reads from a source; what it gave stays for the next slot."""
+        key = (read.__name__, *source)
+        if key not in self._read:
+            self._read[key] = read(*source)
+        return self._read[key]
+
     def displacement_normals(self):
         """Normals without the edges of flat faces, which displacement would tear open; marked edges stay."""
+        return self._once(self._read_displacement_normals)
+
+    def coordinates(self, source):
+        """Texture coordinates in glTF's orientation, v = 0 at the top: float32 (loops, 2); None if there are none."""
+        return self._once(self._read_coordinates, source)
+
+    def generated(self):
+        """Generated coordinates: float32 (loops, 3)."""
+        return self._once(self._read_generated)
+
+    def attribute(self, source):
+        """An attribute that graphs read by name: float32 (loops, 1 to 4); None if there is none."""
+        return self._once(self._read_attribute, source)
+
+    def color(self, name):
+        """A colour attribute, linear: float32 (loops, 4); None if there is none on vertices or corners."""
+        return self._once(self._read_color, name)
+
+    def _read_displacement_normals(self):
         if compat.splits_normals(self.mesh):
             return self.normals
         return _zero_where_not_finite(compat.vertex_normals(self.mesh))[self.vertex]
 
-    def coordinates(self, source):
-        """Texture coordinates in glTF's orientation, v = 0 at the top: float32 (loops, 2); None if there are none."""
+    def _read_coordinates(self, source):
         kind, name = source
         if kind == "uv":
             layer = self._uv_layer(name)
@@ -115,8 +141,7 @@ class _Corners:
         out[:, 1] = 1 - uv[:, 1]
         return self._finite(out, "texture coordinates")
 
-    def generated(self):
-        """Generated coordinates: float32 (loops, 3)."""
+    def _read_generated(self):
         # Blender's texture space is the box of the mesh before modifiers.
         location = np.array(self.mesh.texspace_location, dtype=np.float32)
         size = np.array(self.mesh.texspace_size, dtype=np.float32)
@@ -134,13 +159,11 @@ class _Corners:
             return self.mesh.uv_layers.get(name)
         return next((layer for layer in self.mesh.uv_layers if layer.active_render), None)
 
-    def attribute(self, source):
-        """An attribute that graphs read by name: float32 (loops, 1 to 4); None if there is none."""
+    def _read_attribute(self, source):
         values = attributes.read(source, self.mesh, self.vertex)
         return None if values is None else self._finite(values, f"values of the attribute {source[1]}")
 
-    def color(self, name):
-        """A colour attribute, linear: float32 (loops, 4); None if there is none on vertices or corners."""
+    def _read_color(self, name):
         attributes = self.mesh.color_attributes
         attribute = attributes.get(name)
         if not name and len(attributes) > 0:
@@ -227,10 +250,13 @@ def store_mesh(mesh, wanted, writer, shapes=()):
     parts = 2 * slots
     if any(w.by_shading for w in wanted):
         parts += corners.is_smooth & np.array([w.by_shading for w in wanted])[slots]
-    for part in np.unique(parts):
-        (slot, smooth), own = divmod(part, 2), parts == part
-        arrays = _primitive_arrays(corners, corners.loops[own], wanted[slot], shapes, warn)
-        primitives.append((int(slot), bool(smooth), writer.store(arrays)))
+    order = np.argsort(parts, kind="stable")
+    numbers, begins = np.unique(parts[order], return_index=True)
+    joiner = _Joiner(corners.vertex, len(corners.positions))
+    for part, triangles in zip(numbers.tolist(), np.split(corners.loops[order], begins[1:])):
+        slot, is_smooth = divmod(part, 2)
+        arrays = _primitive_arrays(corners, triangles, joiner, wanted[slot], shapes, warn)
+        primitives.append((slot, bool(is_smooth), writer.store(arrays)))
     return StoredMesh(mesh.name, wanted, primitives, tuple(warnings))
 
 
@@ -261,10 +287,11 @@ def _target(name, number):
     return f"{name} {number}"
 
 
-def _primitive_arrays(corners, triangles, wanted, shapes, warn):
+def _primitive_arrays(corners, triangles, joiner, wanted, shapes, warn):
     """Attributes and indices of some triangles.
 
     @param  triangles  loop numbers of shape (n, 3)
+    @param  joiner     _Joiner of the mesh
     @return            arrays by glTF's names, "indices" among them
     """
     per_loop = {"NORMAL": corners.displacement_normals() if wanted.displaced else corners.normals}
@@ -286,8 +313,7 @@ def _primitive_arrays(corners, triangles, wanted, shapes, warn):
         values = corners.attribute(source)
         if values is not None:  # where it is not, it is 0 for Blender, too
             per_loop[attributes.file_name(source)] = values
-    loops = triangles.ravel()
-    representatives, indices = _join_equal(loops, corners.vertex, list(per_loop.values()))
+    representatives, indices = joiner.join(triangles.ravel(), list(per_loop.values()))
     arrays = {"POSITION": np.ascontiguousarray(corners.positions[corners.vertex[representatives]])}
     for name, values in per_loop.items():
         arrays[name] = np.ascontiguousarray(values[representatives])
@@ -300,31 +326,52 @@ def _primitive_arrays(corners, triangles, wanted, shapes, warn):
     return arrays
 
 
-def _join_equal(loops, vertex, attributes):
-    """Finds the corners that are equal in vertex and attributes.
+class _Joiner:
+    """Finds equal corners. Its tables serve all parts of a mesh: what a part costs grows with the part, not with the mesh.
 
-    @param  loops       loop numbers of triangle corners
-    @param  vertex      vertex of each loop
-    @param  attributes  float32 arrays of shape (all loops, k)
-    @return             (one loop for each distinct corner, uint32 index into these for each of `loops`)
-    @cost               linear, but for a sort of the corners that differ from the first one at their vertex
+    @param  vertex  vertex of each loop
     """
-    is_used = np.zeros(len(vertex), dtype=bool)
-    is_used[loops] = True
-    used = np.flatnonzero(is_used)
-    # The first corner at each vertex: of equal indices, the last assignment stays.
-    first_at = np.full(vertex.max() + 1, -1, dtype=np.int64)
-    first_at[vertex[used[::-1]]] = used[::-1]
-    nominal = first_at[vertex[used]]
-    differs = np.zeros(len(used), dtype=bool)
-    for values in attributes:
-        differs |= (values[used] != values[nominal]).any(axis=1)
-    others, group = _distinct(used[differs], vertex, attributes)
-    is_at = first_at >= 0
-    slot = np.empty(len(vertex), dtype=np.uint32)
-    slot[used] = (np.cumsum(is_at) - 1)[vertex[used]]
-    slot[used[differs]] = is_at.sum() + group
-    return np.concatenate([first_at[is_at], others]), slot[loops]
+
+    def __init__(self, vertex, num_vertices):
+        self._vertex = vertex
+        # Of other parts' loops and vertices they say what was written last, so they are read where this part has written.
+        self._at_loop = np.zeros(len(vertex), dtype=np.uint32)
+        self._at_vertex = np.zeros(num_vertices, dtype=np.int64)
+
+    def join(self, loops, attributes):
+        """Finds the corners that are equal in vertex and attributes.
+
+        @param  loops       loop numbers of triangle corners
+        @param  attributes  float32 arrays of shape (all loops, k)
+        @return             (one loop for each distinct corner, uint32 index into these for each of `loops`)
+        @cost               linear, but for sorts: of the corners that differ from the first one at their vertex, and of all
+                            if they are few
+        """
+        used = _in_order(loops, len(self._vertex))
+        vertex = self._vertex[used]
+        # The first corner at each vertex: of equal indices, the last assignment stays.
+        self._at_vertex[vertex[::-1]] = used[::-1]
+        nominal = self._at_vertex[vertex]
+        differs = np.zeros(len(used), dtype=bool)
+        for values in attributes:
+            differs |= (values[used] != values[nominal]).any(axis=1)
+        others, group = _distinct(used[differs], self._vertex, attributes)
+        vertices = _in_order(vertex, len(self._at_vertex))
+        first = self._at_vertex[vertices]
+        self._at_vertex[vertices] = np.arange(len(vertices))
+        self._at_loop[used] = self._at_vertex[vertex]
+        self._at_loop[used[differs]] = len(vertices) + group
+        return np.concatenate([first, others]), self._at_loop[loops]
+
+
+def _in_order(numbers, end):
+    """The distinct ones of some whole numbers from 0 to below an end, in order."""
+    # Marks cost time for each number below the end, a sort for each that is there, and about ten times as much.
+    if end > 16 * len(numbers):
+        return np.unique(numbers)
+    is_there = np.zeros(end, dtype=bool)
+    is_there[numbers] = True
+    return np.flatnonzero(is_there)
 
 
 def _distinct(loops, vertex, attributes):
