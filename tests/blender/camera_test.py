@@ -21,7 +21,7 @@ def _stage(width, height, location=(2, -5, 4), rotation=(55, 0, 22), **settings)
     add_plane(6, diffuse((0, 0, 0)))
     for x in range(-2, 3):
         for y in range(-2, 3):
-            add_sphere(0.25 + 0.04 * x, glow, (x, y, 0.3), segments=64)
+            add_sphere(0.25 + 0.04 * x, glow, (x, y, 0.3))
     camera = add_camera(location, degrees(*rotation), **settings)
     return scene, camera
 

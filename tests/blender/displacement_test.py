@@ -69,7 +69,7 @@ def _assert_agrees(scene, make, tolerance=0.002):
     pictures = {}
     for engine, detail in (("RELIEF", "coarse"), ("CYCLES", "fine")):
         made = make(detail)
-        pictures[engine] = render_runs(scene, engine, 4, 64)
+        pictures[engine] = render_runs(scene, engine, 4, 16)
         bpy.data.objects.remove(made)
     # Cycles' facets are not the surface; the tolerance is larger than what that changed of any block (.001 for squares).
     assert_same_expectation(pictures["RELIEF"], pictures["CYCLES"], 10, 0.05, tolerance)

@@ -59,14 +59,14 @@ _GLOW = ("ShaderNodeEmission", {"Color": (0.2, 1, 0.3, 1), "Strength": 1.5})
 
 
 def test_diffuse():
-    assert_agrees(_stage(diffuse((0.2, 0.7, 0.4))), samples=128)
+    assert_agrees(_stage(diffuse((0.2, 0.7, 0.4))), samples=32)
 
 
 def test_principled_without_specular():
     values = {"Base_Color": (0.2, 0.7, 0.4, 1), "Specular": 0.0}
     material, _, node = new_material("principled", "ShaderNodeBsdfPrincipled", **values)
     node.inputs["Roughness"].default_value = 0.5
-    assert_agrees(_stage(material), samples=128)
+    assert_agrees(_stage(material), samples=32)
 
 
 def test_principled_metal():
@@ -78,7 +78,7 @@ def test_principled_metal():
 
 def test_principled_plastic():
     material = new_material("plastic", "ShaderNodeBsdfPrincipled", Base_Color=(0.5, 0.1, 0.1, 1), Roughness=0.3)[0]
-    assert_agrees(_stage(material), samples=128)
+    assert_agrees(_stage(material), samples=32)
 
 
 def test_mirror():
@@ -100,7 +100,7 @@ def test_smooth_glass():
     scene = _stage(material, 8)
     # Caustics of the lamp would never settle; the sky's do.
     bpy.data.objects.remove(next(o for o in scene.objects if o.type == "LIGHT"))
-    assert_agrees(scene, samples=256)
+    assert_agrees(scene, samples=64)
 
 
 def test_absorbing_glass():
@@ -113,28 +113,28 @@ def test_absorbing_glass():
     tree.links.new(volume.outputs[0], output.inputs["Volume"])
     scene = _stage(material, 8)
     bpy.data.objects.remove(next(o for o in scene.objects if o.type == "LIGHT"))
-    assert_agrees(scene, samples=256)
+    assert_agrees(scene, samples=64)
 
 
 def test_emission():
     glow = new_material("glow", "ShaderNodeEmission", Color=(1, 0.4, 0.1, 1), Strength=2.5)[0]
-    assert_agrees(_stage(glow), samples=256)
+    assert_agrees(_stage(glow), samples=64)
 
 
 def test_transparency():
-    assert_agrees(_stage(_mixed("ShaderNodeMixShader", _CLEAR, _RED, 0.4)), samples=256)
+    assert_agrees(_stage(_mixed("ShaderNodeMixShader", _CLEAR, _RED, 0.4)), samples=64)
 
 
 def test_transparency_second():
-    assert_agrees(_stage(_mixed("ShaderNodeMixShader", _RED, _CLEAR, 0.4)), samples=256)
+    assert_agrees(_stage(_mixed("ShaderNodeMixShader", _RED, _CLEAR, 0.4)), samples=64)
 
 
 def test_mix_of_diffuse_shaders():
-    assert_agrees(_stage(_mixed("ShaderNodeMixShader", _RED, _BLUE, 0.3)), samples=128)
+    assert_agrees(_stage(_mixed("ShaderNodeMixShader", _RED, _BLUE, 0.3)), samples=32)
 
 
 def test_diffuse_plus_emission():
-    assert_agrees(_stage(_mixed("ShaderNodeAddShader", _RED, _GLOW)), samples=256)
+    assert_agrees(_stage(_mixed("ShaderNodeAddShader", _RED, _GLOW)), samples=64)
 
 
 def test_node_group():
@@ -153,14 +153,14 @@ def test_node_group():
     node.inputs["Paint"].default_value = (0.1, 0.8, 0.5, 1)
     output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
     tree.links.new(node.outputs[0], output.inputs["Surface"])
-    assert_agrees(_stage(material), samples=128)
+    assert_agrees(_stage(material), samples=32)
 
 
 def test_material_without_nodes():
     material = bpy.data.materials.new("plain")
     material.diffuse_color = (0.3, 0.6, 0.2, 1)
     # Since 5.0 it has nodes from the start, and they are plastic.
-    assert_agrees(_stage(material), samples=128, tolerance=0.02 if IS_5_0 else 0)
+    assert_agrees(_stage(material), samples=32, tolerance=0.02 if IS_5_0 else 0)
 
 
 def test_shader_that_is_not_understood_is_warned_about():

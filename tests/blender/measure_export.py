@@ -1,4 +1,4 @@
-"""What an export costs: seconds, bytes and memory for instances and for a large mesh. Prints a Markdown table.
+"""What an export costs: seconds, bytes and memory for instances and for large meshes. Prints a Markdown table.
 
     BLENDER_USER_SCRIPTS=… blender -b --factory-startup --python tests/blender/measure_export.py
 
@@ -30,6 +30,15 @@ def _duplicates(number):
         scenes.link(ball.data, "ball").location.x = x
 
 
+def _slots(number):
+    """A mesh of 160,801 vertices whose faces have materials of their own, in no order."""
+    plane = scenes.add_plane(8, subdivisions=400)
+    for _ in range(number - 1):
+        plane.data.materials.append(scenes.diffuse())
+    faces = len(plane.data.polygons)
+    plane.data.polygons.foreach_set("material_index", [7919 * face % number for face in range(faces)])
+
+
 def _peak_bytes():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
@@ -59,3 +68,5 @@ for count, side in ((9, 3), (1024, 32), (99856, 316)):
     _measure(f"{count:,} instances", lambda: _instances(side))
 _measure("2,000 linked duplicates", lambda: _duplicates(2000))
 _measure("1,002,001 vertices with uv", lambda: scenes.add_plane(8, subdivisions=1000))
+for count in (1, 20, 200):
+    _measure(f"160,801 vertices, {count} material slots", lambda: _slots(count))

@@ -199,7 +199,7 @@ def test_indirect_light():
     add_sphere(0.7, location=(0.3, 0.4, -1))
     add_light("AREA", (0, 0, 1.9), energy=100, size=1.0)
     add_camera((0, -1.9, 0), degrees(90, 0, 0), lens=20)
-    assert_agrees(scene, samples=256)
+    assert_agrees(scene, samples=64)
 
 
 def test_equal_corners_are_joined_and_no_others():

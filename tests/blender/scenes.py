@@ -203,6 +203,8 @@ def set_world(color, strength=1.0):
     """A plain background; returns its node tree."""
     world = bpy.data.worlds.new("world")
     bpy.context.scene.world = world
+    # What Cycles samples the world by: finer by itself, up to a second a render, and no picture here has need of that.
+    world.cycles.sampling_method, world.cycles.sample_map_resolution = "MANUAL", 512
     world.use_nodes = True
     background = world.node_tree.nodes["Background"]
     background.inputs["Color"].default_value = (*color, 1)

@@ -299,7 +299,7 @@ def _primitive_arrays(corners, triangles, joiner, wanted, shapes, warn):
         uv = corners.coordinates(source)
         if uv is None:
             warn(f'no uv map "{source[1]}"' if source[1] else "a textured material, but no uv map")
-            uv = np.zeros((len(corners.vertex), 2), dtype=np.float32)
+            uv = np.broadcast_to(np.float32(0), (len(corners.vertex), 2))
         per_loop[f"TEXCOORD_{number}"] = uv
     if wanted.generated:
         per_loop["_GENERATED"] = corners.generated()
