@@ -86,7 +86,9 @@ TessellationRule Dicing::rule() const
   rule.segments = [this](const DisplacedTriangle& tri, int edge) {
     return std::min(texels_along(tri, edge), segments(tri.P[edge], tri.P[edge == 2 ? 0 : edge + 1]));
   };
-  rule.height = [this](Vec3d P, double x, double y) { return height(x, y, level(P)); };
+  rule.height = [this](Vec3d P, double x, double y) {
+    return height(x, y, max(0.0, level(P) - std::log2(static_cast<double>(kTexelsASide))));
+  };
   return rule;
 }
 

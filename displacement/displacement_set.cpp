@@ -150,14 +150,20 @@ bool DisplacementSet::has_error(const Use& use, const DisplacementOptions& optio
          method_of(use.settings, options) == DisplacementMethod::kAuto;
 }
 
-void DisplacementSet::set_facets(const Use& use, bool tessellates, DisplacedGeometry* geometry) const
+void DisplacementSet::set_facets(const Use& use, DisplacedGeometry* geometry, bool diced) const
 {
   const int last = geometry->first_level + geometry->lod.num_levels - 1;
   if (last == 0) return;
   MapFacets& facets = geometry->facets.emplace(MapFacets{height_lattice_make(map_of(use).view)});
+  const bool tessellated = displacement_method(geometry->method).tessellation.has_value();
+  const double spacing = diced ? Dicing::kTexelsASide : tessellated ? 1.0 : 0.0;
+  facets.window = diced ? 1.0 / Dicing::kTexelsASide : 1.0;
   for (int level = std::max(geometry->first_level, 1); level <= last; ++level) {
-    facets.spread[level] = facet_spread(facets.texels, *geometry->levels[level - geometry->first_level].field,
-                                        geometry->smooth, tessellates);
+    // What is diced to a level has the heights of the one before.
+    static_assert(Dicing::kTexelsASide == 2);
+    const HeightFieldView& heights = *geometry->levels[level - geometry->first_level - (diced ? 1 : 0)].field;
+    facets.spread[level] =
+        facet_spread(facets.texels, heights, spacing, facets.window * (1 << level), geometry->smooth);
   }
 }
 
@@ -294,7 +300,7 @@ std::unique_ptr<PreparedMesh> DisplacementSet::make_displaced(const Use& use, co
   }
   geometry.first_level = levels.first;
   geometry.lod.num_levels = levels.count;
-  set_facets(use, displacement_method(geometry.method).tessellation.has_value(), &geometry);
+  set_facets(use, &geometry, false);
   const DisplacementMapping mapping{settings.height, use.scale, settings.midlevel, settings.weld_seams};
   std::unique_ptr<PreparedMesh> displaced = prisms_of(use.mesh, mapping, fields);
   displaced->name = use.mesh_name;
@@ -444,7 +450,7 @@ void DisplacementSet::dice(PreparedMesh& displaced,
   displaced.method = choice.method;
   for (std::size_t k = 0; k < levels.size(); ++k) geometry.levels[k] = {levels[k], nullptr};
   geometry.lod = {static_cast<int>(levels.size()), false, 0, geometry.lod.texel};
-  set_facets(use, true, &geometry);
+  set_facets(use, &geometry, true);
   has_facets_ |= geometry.facets.has_value();
   displaced.tessellation = std::make_unique<Tessellation>(dicing->mesh(), std::move(layout), rule);
   displaced.dicing = std::move(dicing);

@@ -163,8 +163,8 @@ class DisplacementSet {
   /// Whether a use is to be traced to an error, not exactly nor as its settings say.
   bool has_error(const Use& use, const DisplacementOptions& options) const;
   /// Fills in what the levels of a geometry have lost.
-  /// @param tessellates  see facet_spread
-  void set_facets(const Use& use, bool tessellates, DisplacedGeometry* geometry) const;
+  /// @param diced  it is, see dicing.h
+  void set_facets(const Use& use, DisplacedGeometry* geometry, bool diced) const;
   /// Tessellates a mesh as finely as the picture shows it, if that pays.
   void dice(PreparedMesh& displaced,
             const Use& use,

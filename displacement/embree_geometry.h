@@ -22,6 +22,7 @@ struct DisplacementLevel {
 /// What of a map its coarser levels have lost, see level_facets.h.
 struct MapFacets {
   HeightFieldView texels;                      ///< the map's own, without bounds
+  double window = 1;                           ///< width of what is around a point, texels of the level
   Vec2f spread[kMaxLodLevels + 1] = {{1, 1}};  ///< facet_spread by level of the map; only of those that rays meet
 };
 

@@ -129,7 +129,7 @@ bool level_facets_make(const DisplacedGeometry& geometry, const LevelPlace& at, 
   out->normal = size * normal;
 
   const double x = tri.x[0] + b1 * base.xu + b2 * base.xv, y = tri.y[0] + b1 * base.yu + b2 * base.yv;
-  const double width = std::exp2(at.level);
+  const double width = geometry.facets->window * std::exp2(at.level);
   const Slopes slopes = slopes_around(map, x, y, width, width, jitter, geometry.smooth);
   const float mean_x = mean_of(slopes.x), mean_y = mean_of(slopes.y);
   for (int k = 0; k < kLevelFacets; ++k) {
@@ -145,17 +145,17 @@ bool level_facets_make(const DisplacedGeometry& geometry, const LevelPlace& at, 
   return true;
 }
 
-Vec2f facet_spread(const HeightFieldView& map, const HeightFieldView& level, bool smooth, bool tessellated)
+Vec2f facet_spread(const HeightFieldView& map, const HeightFieldView& level, double spacing, double window, bool smooth)
 {
   const auto square = [](double value) { return value * value; };
   constexpr std::uint32_t kPlaces = 4096;
-  const double width = static_cast<double>(map.map.width) / level.map.width;
-  const double height = static_cast<double>(map.map.height) / level.map.height;
+  const double step = spacing > 0 ? spacing : 1.0;
+  const double width = step * map.map.width / level.map.width, height = step * map.map.height / level.map.height;
   double all_x = 0, all_y = 0, around_x = 0, around_y = 0, level_x = 0, level_y = 0;
   for (std::uint32_t i = 0; i < kPlaces; ++i) {
     const Vec2f place = sample_2d(0, i, 0), jitter = sample_2d(0, i, 1);
     const double x = static_cast<double>(place.x) * map.map.width, y = static_cast<double>(place.y) * map.map.height;
-    const Slopes slopes = slopes_around(map, x, y, width, height, jitter, smooth);
+    const Slopes slopes = slopes_around(map, x, y, window, window, jitter, smooth);
     const float mean_x = mean_of(slopes.x), mean_y = mean_of(slopes.y);
     for (int k = 0; k < kLevelFacets; ++k) {
       all_x += square(slopes.x[k]);
@@ -163,20 +163,19 @@ Vec2f facet_spread(const HeightFieldView& map, const HeightFieldView& level, boo
       around_x += square(slopes.x[k] - mean_x);
       around_y += square(slopes.y[k] - mean_y);
     }
-    const auto at = [&](double right, double down) {
-      return interpolate_height(level, lattice_on_level(x, map.map.width, level.map.width) + right,
-                                lattice_on_level(y, map.map.height, level.map.height) + down);
-    };
-    // Of a cell, or of a micro-triangle anywhere.
-    double from_x = 0, from_y = 0;
-    if (!tessellated) {
-      const double lx = lattice_on_level(x, map.map.width, level.map.width),
-                   ly = lattice_on_level(y, map.map.height, level.map.height);
-      from_x = std::floor(lx) - lx;
-      from_y = std::floor(ly) - ly;
+    double from_x = lattice_on_level(x, map.map.width, level.map.width),
+           from_y = lattice_on_level(y, map.map.height, level.map.height);
+    const double in_x = from_x, in_y = from_y;
+    if (!(spacing > 0)) {
+      from_x = std::floor(from_x);
+      from_y = std::floor(from_y);
     }
-    level_x += kLevelFacets * square((at(from_x + 1, 0) - at(from_x, 0)) / width);
-    level_y += kLevelFacets * square((at(0, from_y + 1) - at(0, from_y)) / height);
+    level_x +=
+        kLevelFacets *
+        square((interpolate_height(level, from_x + step, in_y) - interpolate_height(level, from_x, in_y)) / width);
+    level_y +=
+        kLevelFacets *
+        square((interpolate_height(level, in_x, from_y + step) - interpolate_height(level, in_x, from_y)) / height);
   }
   const auto root = [](double lost, double around) {
     return around > 0 ? static_cast<float>(std::sqrt(std::clamp(lost / around, 0.0, 4.0))) : 0.0f;

@@ -40,12 +40,18 @@ struct LevelPlace {
 /// @return        false where the surface has no normals
 bool level_facets_make(const DisplacedGeometry& geometry, const LevelPlace& at, Vec2f jitter, LevelFacets* out);
 
-/// How much more the facets of a level differ from it than slopes around a point of the map differ from their mean, along
-/// both axes, so that a surface has all of the slopes' second moments. (Of a smooth map they differ as much, of noise by more:
-/// what is between two texels of a level averages more than what is around it.) Measured at some places.
-/// @param smooth       slopes are those that the map is shaded with
-/// @param tessellated  the surface has a vertex a texel of the level, but not at its centre
-Vec2f facet_spread(const HeightFieldView& map, const HeightFieldView& level, bool smooth, bool tessellated);
+/// How much more the facets of a surface differ from it than slopes around a point of the map differ from their mean, along
+/// both axes, so that surface and facets together have the second moments of the map's slopes. (Of a smooth map they differ as much, of
+/// noise by more: what is between two texels of a level averages more than what is around it.) Measured at some places.
+/// @param level    whose heights the surface has
+/// @param spacing  texels of the level from one vertex to the next, which are anywhere; 0: the surface is the level itself
+/// @param window   width of what is around a point, texels of the map
+/// @param smooth   slopes are those that the map is shaded with
+Vec2f facet_spread(const HeightFieldView& map,
+                   const HeightFieldView& level,
+                   double spacing,
+                   double window,
+                   bool smooth);
 
 FacetMoments facet_moments(const LevelFacets& facets);
 
@@ -56,7 +62,8 @@ FacetMoments facet_moments(const LevelFacets& facets);
 inline float facet_lambda(const FacetMoments& m, Vec3f w)
 {
   const float mean = dot(w, m.mean);
-  const float deviation = std::hypot(dot(w, m.deviation[0]), dot(w, m.deviation[1]));
+  const float along[2] = {dot(w, m.deviation[0]), dot(w, m.deviation[1])};
+  const float deviation = std::sqrt(along[0] * along[0] + along[1] * along[1]);
   if (!(deviation > 0.0f)) return mean >= 0.0f ? 0.0f : -1.0f;
   const float a = mean / deviation;
   constexpr float kInvSqrt2Pi = 0.39894228f, kInvSqrt2 = 0.70710678f;

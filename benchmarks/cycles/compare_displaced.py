@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """relief against Blender's Cycles on displaced scenes: preparation, memory, and error over time.
 
-Cycles dices to triangles of one pixel (adaptive subdivision, true displacement); relief traces the map itself, at the
-level of detail that it chooses and, as `relief_lod0`, at that of the map. The reference of all is relief's picture of
+Cycles dices to triangles of one pixel (adaptive subdivision, true displacement); relief does too (`--displacement-error
+1`) and, as `relief_lod0`, traces every texel of the map. The reference of all is relief's picture of
 every texel (`--lod 0`), other seeds, of the middle of the picture; errors are measured there, what the reference's
 noise adds is taken off. Times are of whole pictures, including preparation (reading, dicing, building); processor
 seconds, of the whole process and both threads, bear other work on the machine better. The renderers take turns, all
