@@ -15,6 +15,8 @@ namespace relief {
 
 namespace {
 
+/// Bilinear patches of texels that are wider than pixels are straight enough then: they bend by a sixteenth of what they do.
+constexpr double kMostSegmentsATexel = 4;
 /// Of more instances than this only the nearest are looked at.
 constexpr std::size_t kMostInstances = 16;
 
@@ -53,10 +55,10 @@ Dicing::Dicing(const MeshView& mesh,
       mesh_(triangles)
 {
   for (const Affine3& m : instances_) stretches_.push_back(stretch_of(m).most);
-  // No finer than texels are, however near the camera is; those of some triangles are narrower than the mean.
+  // However near the camera is; texels of some triangles are narrower than the mean.
   constexpr double kNarrower = 4;
   parts_ = lattices_make(mesh, [this](Vec3f a, Vec3f b) {
-    return std::min(segments(a, b), kNarrower / texel_ * length(to_double(b) - to_double(a)));
+    return std::min(segments(a, b), kNarrower * kMostSegmentsATexel / texel_ * length(to_double(b) - to_double(a)));
   });
   triangles_.resize(parts_.size());
   tbb::parallel_for(std::size_t{0}, parts_.size(), [&](std::size_t index) {
@@ -84,7 +86,8 @@ TessellationRule Dicing::rule() const
 {
   TessellationRule rule;
   rule.segments = [this](const DisplacedTriangle& tri, int edge) {
-    return std::min(texels_along(tri, edge), segments(tri.P[edge], tri.P[edge == 2 ? 0 : edge + 1]));
+    return std::min(kMostSegmentsATexel * texels_along(tri, edge),
+                    segments(tri.P[edge], tri.P[edge == 2 ? 0 : edge + 1]));
   };
   rule.height = [this](Vec3d P, double x, double y) {
     return height(x, y, max(0.0, level(P) - std::log2(static_cast<double>(kTexelsASide))));

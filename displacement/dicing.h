@@ -36,6 +36,14 @@ class Dicing {
          std::span<const Affine3> instances,
          double pixels);
 
+  /// What dicing a mesh takes at least, with its tessellation.
+  static std::uint64_t least_bytes(const MeshView& mesh)
+  {
+    constexpr std::uint64_t kTree = 150;
+    return mesh.num_triangles *
+           (sizeof(LatticeTriangle) + sizeof(DisplacedTriangle) + sizeof(TessellatedTriangle) + kTree);
+  }
+
   /// The parts, in place of the mesh's triangles.
   const DisplacedMeshView& mesh() const { return mesh_; }
   /// What a tessellation of the parts is made by.

@@ -419,6 +419,12 @@ void DisplacementSet::dice(PreparedMesh& displaced,
     reasons_.push_back("mesh '" + displaced.name + "': not diced, as photons may be traced");
     return;
   }
+  std::uint64_t allowance = options.auto_bytes > 0 ? options.auto_bytes : memory_of_machine() / 8;
+  allowance -= std::min(allowance, *used_bytes);
+  if (Dicing::least_bytes(use.mesh) > allowance) {
+    reasons_.push_back("mesh '" + displaced.name + "': not diced, as its triangles alone are too many for that");
+    return;
+  }
   DisplacedGeometry& geometry = displaced.geometry;
   const HeightFields::Map& map = map_of(use);
   std::vector<const HeightFieldView*> levels;
@@ -439,8 +445,7 @@ void DisplacementSet::dice(PreparedMesh& displaced,
       {geometry.method, *displacement_method(geometry.method).cost, 0, 0},
       {DisplacementMethod::tessellate, kDicingCost, layout.num_micro_triangles, bytes},
   };
-  const std::uint64_t allowance = options.auto_bytes > 0 ? options.auto_bytes : memory_of_machine() / 8;
-  const DisplacementChoice choice = displacement_choose(offers, num_rays, allowance - std::min(allowance, *used_bytes));
+  const DisplacementChoice choice = displacement_choose(offers, num_rays, allowance);
   reasons_.push_back("mesh '" + displaced.name + "': " + choice.reason);
   if (choice.method == displaced.method) {
     for (const int k : new_levels) fields_->drop(map, k);

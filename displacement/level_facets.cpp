@@ -126,6 +126,7 @@ bool level_facets_make(const DisplacedGeometry& geometry, const LevelPlace& at, 
   };
   const Vec3f normal = transform_normal(at.placement.object_from_world, as_normal(at.Ng));
   const float size = 1.0f / length(normal);
+  if (!(size < kInfinity)) return false;
   out->normal = size * normal;
 
   const double x = tri.x[0] + b1 * base.xu + b2 * base.xv, y = tri.y[0] + b1 * base.yu + b2 * base.yv;

@@ -87,6 +87,9 @@ def _render(engine, depsgraph, binary, warnings, motion, begin):
         arguments += ["--camera-from", write_view(view, folder, "view.gltf")]
     arguments += ["--compression", "none", "--float", "--aov", aovs]
     arguments += command_line(scene, crop)
+    # Not in the viewport: there a moved camera would have everything diced again.
+    if scene.relief.displacement_error > 0:
+        arguments += ["--displacement-error", f"{scene.relief.displacement_error:g}"]
     if scene.relief.denoise != "none":
         arguments += ["--denoise", scene.relief.denoise]
     preview = None
@@ -164,8 +167,6 @@ def command_line(scene, crop=None):
     """
     settings, time_limit = scene.relief, sampling_of(scene).time_limit
     arguments = ["--texture-memory", f"{settings.texture_memory:g}"]
-    if settings.displacement_error > 0:
-        arguments += ["--displacement-error", f"{settings.displacement_error:g}"]
     if settings.memory_limit > 0:
         arguments += ["--displacement-memory", f"{settings.memory_limit:g}"]
     if time_limit > 0:

@@ -55,6 +55,7 @@ def _material(scale=0.4, midlevel=0.5, space="OBJECT", method="DISPLACEMENT", is
 
 def _stage():
     scene = new_scene(80, 60)
+    scene.relief.displacement_error = 0.0
     set_world((0.05, 0.05, 0.1))
     add_light("SUN", rotation=degrees(50, 20, 0), energy=3, angle=0)
     add_camera((0, -5, 3.2), degrees(57, 0, 0), lens=45)
@@ -104,6 +105,15 @@ def test_height_and_midlevel():
     scene = _stage()
     material, _, _, _ = _material(scale=0.4, midlevel=0.3)
     _assert_agrees(scene, _square(material))
+
+
+def test_error_of_a_pixel():
+    """As it is by default: diced, and the same but for what is finer than pixels."""
+    scene = _stage()
+    scene.relief.property_unset("displacement_error")
+    assert scene.relief.displacement_error == 1.0
+    material, _, _, _ = _material(scale=0.4)
+    _assert_agrees(scene, _square(material), 0.01)
 
 
 def test_negative_scale():
