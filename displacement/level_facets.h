@@ -41,8 +41,9 @@ struct LevelPlace {
 bool level_facets_make(const DisplacedGeometry& geometry, const LevelPlace& at, Vec2f jitter, LevelFacets* out);
 
 /// How much more the facets of a surface differ from it than slopes around a point of the map differ from their mean, along
-/// both axes, so that surface and facets together have the second moments of the map's slopes. (Of a smooth map they differ as much, of
-/// noise by more: what is between two texels of a level averages more than what is around it.) Measured at some places.
+/// both axes, so that surface and facets together have the second moments of the map's slopes. (Of a smooth map they differ
+/// as much, of noise by more: what is between two texels of a level averages more than what is around it.) Measured at some
+/// places.
 /// @param level    whose heights the surface has
 /// @param spacing  texels of the level from one vertex to the next, which are anywhere; 0: the surface is the level itself
 /// @param window   width of what is around a point, texels of the map
@@ -68,7 +69,7 @@ inline float facet_lambda(const FacetMoments& m, Vec3f w)
   const float a = mean / deviation;
   constexpr float kInvSqrt2Pi = 0.39894228f, kInvSqrt2 = 0.70710678f;
   const float away = deviation * (kInvSqrt2Pi * std::exp(-0.5f * a * a) - a * 0.5f * std::erfc(kInvSqrt2 * a));
-  return away / mean;
+  return max(away, 0.0f) / mean;
 }
 
 /// The height at which a ray that comes from outside meets a facet, as a part of all facets that are lower.
