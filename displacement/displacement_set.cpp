@@ -419,7 +419,9 @@ void DisplacementSet::dice(PreparedMesh& displaced,
     reasons_.push_back("mesh '" + displaced.name + "': not diced, as photons may be traced");
     return;
   }
-  std::uint64_t allowance = options.auto_bytes > 0 ? options.auto_bytes : memory_of_machine() / 8;
+  std::uint64_t allowance = options.auto_bytes > 0     ? options.auto_bytes
+                            : options.dicing_bytes > 0 ? options.dicing_bytes
+                                                       : memory_of_machine() / 8;
   allowance -= std::min(allowance, *used_bytes);
   if (Dicing::least_bytes(use.mesh) > allowance) {
     reasons_.push_back("mesh '" + displaced.name + "': not diced, as its triangles alone are too many for that");

@@ -61,6 +61,7 @@ struct DisplacementOptions {
   std::uint64_t computed_bytes = std::uint64_t{256} << 20;  ///< computed heights that are kept, at most
   std::shared_ptr<HeightFields> fields;                     ///< of the sets before; null: each set has its own
   std::shared_ptr<KeptMeshes> meshes;                       ///< likewise, with the same fields; null: none are kept
+  std::uint64_t dicing_bytes = 0;  ///< what dicing may use if auto_bytes says nothing; 0: an eighth of the machine's
   std::uint64_t tessellation_bytes = 0;  ///< all tessellations may take while they are built; 0: half of the machine's
 };
 

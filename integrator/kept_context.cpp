@@ -29,15 +29,15 @@ bool is_same(const Scene& scene, const DisplacementOptions& a, const Displacemen
 {
   // All fields, or this does not compile.
   const auto& [method, lod, rmip, rate, error, photons, auto_bytes, camera, height, num_rays, computed_bytes, fields,
-               meshes, tessellation_bytes] = a;
+               meshes, dicing_bytes, tessellation_bytes] = a;
   const bool dices = error > 0 && !scene.displacements.empty();
   const bool follows_camera =
       dices || std::any_of(scene.displacements.begin(), scene.displacements.end(),
                            [](const DisplacementSettings& d) { return displacement_is_computed(d); });
   return method == b.method && lod == b.lod && is_same(rmip, b.rmip) && rate == b.tessellation_rate &&
          error == b.error && photons == b.photons && auto_bytes == b.auto_bytes && computed_bytes == b.computed_bytes &&
-         fields == b.fields && meshes == b.meshes && tessellation_bytes == b.tessellation_bytes &&
-         ((auto_bytes == 0 && !dices) || num_rays == b.num_rays) &&
+         fields == b.fields && meshes == b.meshes && dicing_bytes == b.dicing_bytes &&
+         tessellation_bytes == b.tessellation_bytes && ((auto_bytes == 0 && !dices) || num_rays == b.num_rays) &&
          (!follows_camera || (is_same(camera, b.camera) && height == b.picture_height));
 }
 

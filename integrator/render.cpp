@@ -23,6 +23,7 @@
 #include "integrator/stages.h"
 #include "integrator/wavefront.h"
 #include "scene/cryptomatte.h"
+#include "scene/memory.h"
 
 namespace relief {
 
@@ -148,6 +149,7 @@ namespace {
 ContextOptions context_options(const Scene& scene, const RenderOptions& options)
 {
   DisplacementOptions displacement = options.displacement;
+  displacement.dicing_bytes = memory_limit().bytes / 8;
   displacement.photons = may_trace_photons(scene, options.settings.caustics.mode);
   displacement.num_rays = expected_rays(options.settings);
   displacement.camera = options.camera;
