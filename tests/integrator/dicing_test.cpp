@@ -1,6 +1,8 @@
 // Displaced meshes diced for a picture: closed, as fine as asked for, and with the light of what is left out.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <random>
 #include <string>
 #include <utility>
@@ -26,6 +28,13 @@ Scene close_sphere(int size, int tiles, double noise, const Affine3& world_from_
       sphere.uv[0].push_back({static_cast<float>(c * tiles) / 24, static_cast<float>(r * tiles) / 24});
     }
   }
+  // Closed to the last bit: at the seam and the poles.
+  for (std::size_t i = 0; i < sphere.P.size(); ++i) {
+    const std::size_t r = i / 25, first = r * 25;
+    if (i % 25 == 24) sphere.P[i] = sphere.P[first];
+    if (r == 0 || r == 12) sphere.P[i] = {0, r == 0 ? 1.0f : -1.0f, 0};
+    sphere.N[i] = as_normal(sphere.P[i]);
+  }
   Material material = diffuse_material({0.8f, 0.8f, 0.8f});
   material.displacement_index = 0;
   add_object(scene, sphere, material, world_from_object);
@@ -33,11 +42,12 @@ Scene close_sphere(int size, int tiles, double noise, const Affine3& world_from_
   std::vector<std::uint16_t> texels;
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
-      // At the poles, texel rows −½, all heights are one.
+      // Around the poles, texel rows −½, all heights are one on all levels.
       const double pole = std::sin(3.14159265 * (y + 0.5) / size);
       const double h = 0.5 + pole * (0.2 * std::sin(2 * 3.14159265 * x / size) +
                                      noise * (random[static_cast<std::size_t>(y * size + x)] / 65535.0 - 0.5));
-      texels.push_back(static_cast<std::uint16_t>(65535 * (y == 0 || y == size - 1 ? 0.5 : h)));
+      texels.push_back(
+          static_cast<std::uint16_t>(65535 * (std::min(y, size - 1 - y) < (size > 64 ? size / 16 : 1) ? 0.5 : h)));
     }
   }
   add_displacement(scene, size, std::move(texels), 0.1f);
@@ -76,6 +86,36 @@ TEST(Dicing, LetsNoRayOut)
     rays.push_back({O, normalize(Vec3f{normal(random), normal(random), normal(random)}), 0, kInfinity});
   }
   for (const TraceHit& hit : trace_rays(context, rays)) ASSERT_LT(hit.t, 3.0f);
+}
+
+/// Every side of a micro-triangle is one of another, the other way, with the same ends to the last bit.
+TEST(Dicing, OfAClosedMeshIsClosed)
+{
+  Scene scene = close_sphere(512, 32, 0.1);
+  // Texture coordinates are cut around the poles.
+  scene.displacements[0].weld_seams = true;
+  const SceneContext context(scene, options_of(scene, 1, 400));
+  const Tessellation& t = tessellation_of(context);
+  ASSERT_GT(t.layout().triangles.size(), scene.meshes[0].triangles.size());
+  std::vector<std::array<float, 6>> sides[2];  // from a lower to a higher end, and those from a higher one
+  for (std::uint32_t primitive = 0; primitive < t.layout().num_primitives; ++primitive) {
+    Vec3f corner[3];
+    for (int k = 0; k < 3; ++k) corner[k] = to_float(t.hit(primitive, k == 1 ? 1.0f : 0.0f, k == 2 ? 1.0f : 0.0f).P);
+    for (int k = 0; k < 3; ++k) {
+      std::array<float, 3> a{corner[k].x, corner[k].y, corner[k].z};
+      const Vec3f& to = corner[(k + 1) % 3];
+      std::array<float, 3> b{to.x, to.y, to.z};
+      if (a == b) continue;
+      const bool turned = b < a;
+      if (turned) std::swap(a, b);
+      sides[turned].push_back({a[0], a[1], a[2], b[0], b[1], b[2]});
+    }
+  }
+  for (auto& each : sides) std::sort(each.begin(), each.end());
+  std::vector<std::array<float, 6>> open;
+  std::set_symmetric_difference(sides[0].begin(), sides[0].end(), sides[1].begin(), sides[1].end(),
+                                std::back_inserter(open));
+  EXPECT_EQ(open.size(), 0u) << "of " << 2 * sides[0].size();
 }
 
 /// Sides of micro-triangles in the picture, where the camera looks.
