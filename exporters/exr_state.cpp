@@ -53,7 +53,7 @@ void visit(State& state, const Field& field)
 
 /// Of all that stands in the part: it is stored as it is, so nothing else would tell a bit that has turned, in a sum or in a
 /// number of the text, from the truth.
-/// @cost  0.1 s a GB
+/// @cost  0.2 s a GB
 std::string state_hash(const std::string& text, std::span<const float> sums)
 {
   std::uint64_t hash = hash_of(text);
