@@ -505,7 +505,12 @@ DisplacedPoint DisplacementSet::resolve(std::size_t instance,
     level = static_cast<float>(d.dicing->level(P));
     d.dicing->set_base_place(&out.triangle, &out.u, &out.v);
   }
-  if (d.geometry.smooth) out.Ns = to_float(displaced_smooth_normal(d.geometry, out.triangle, 0, out.u, out.v));
+  if (d.geometry.smooth) {
+    out.Ns = to_float(displaced_smooth_normal(d.geometry, out.triangle, 0, out.u, out.v));
+  } else if (d.dicing != nullptr && !(level > 0.0f)) {
+    // Micro-triangles across the line between two texels would show as teeth where texels are wider than pixels.
+    out.Ns = to_float(displaced_surface_point(d.geometry, out.triangle, {out.u, out.v}).Ng);
+  }
   displaced_point_set_level(d.geometry, placement, level, &out);
   return out;
 }
