@@ -181,6 +181,23 @@ TEST(Dicing, FindsTheSurfaceWhereTexelsAreWiderThanPixels)
   }
 }
 
+/// Micro-triangles that cross the line between two texels would show.
+TEST(Dicing, ShadesTexelsThatAreWiderThanPixelsAsTheMapHasThem)
+{
+  const Scene scene = close_sphere(64, 4, 0);
+  const SceneContext exact(scene), diced(scene, options_of(scene, 1, 8000));
+  const std::uint32_t count = static_cast<std::uint32_t>(tessellation_of(diced).layout().num_primitives);
+  int num_shaded = 0;
+  for (std::uint32_t primitive = 0; primitive < count; primitive += 97) {
+    const DisplacedPoint point = diced.displacements.resolve(0, {}, primitive, {0.3f, 0.4f, 0});
+    if (point.level > 0) continue;
+    const DisplacedPoint expected = exact.displacements.resolve(0, {}, point.triangle, {point.u, point.v, 0});
+    ASSERT_EQ(point.Ns, expected.Ng) << primitive;
+    ++num_shaded;
+  }
+  EXPECT_GT(num_shaded, 1000);
+}
+
 TEST(Dicing, KeepsTheMeanOfThePicture)
 {
   Scene scene = close_sphere(64, 4, 0.2);
