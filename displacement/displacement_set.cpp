@@ -227,6 +227,26 @@ std::vector<DisplacementSet::Use> DisplacementSet::find_uses(const DisplacementI
   return uses;
 }
 
+/// About which part of a picture's rays meet a use: how much of the picture the boxes of its instances fill, together at
+/// most all of it; 1 without a camera.
+double DisplacementSet::picture_share(const Use& use, const DisplacementOptions& options)
+{
+  if (!options.camera || options.picture_height <= 0) return 1;
+  const PictureView view{*options.camera, static_cast<double>(options.picture_height)};
+  const double height = view.height;
+  const double width =
+      height * static_cast<double>(options.camera->half_width) / static_cast<double>(options.camera->half_height);
+  Box3 box = box_empty();
+  for (std::uint32_t i = 0; i < use.mesh.num_vertices; ++i) box = box_union(box, {use.mesh.P[i], use.mesh.P[i]});
+  double share = 0;
+  for (const Affine3& place : use.places) {
+    const Vec3f low = transform_point(place, box.low), high = transform_point(place, box.high);
+    const double pixels = view.pixels(low, high) / view.coarsening(0.5 * (to_double(low) + to_double(high)));
+    share += std::min(pixels * pixels / (width * height), 1.0);
+  }
+  return std::min(share, 1.0);
+}
+
 DisplacementSet::DisplacementSet(const DisplacementInput& input, const DisplacementOptions& options)
     : height_maps_(input.height_maps),
       meshes_(input.meshes),
@@ -237,9 +257,6 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
       kept_meshes_(options.meshes)
 {
   const std::vector<Use> uses = find_uses(input);
-  const auto num_displaced =
-      std::count_if(geometry_of_instance_.begin(), geometry_of_instance_.end(), [](int index) { return index >= 0; });
-  const double num_rays = options.num_rays / static_cast<double>(num_displaced);
   std::uint64_t tessellated_bytes = 0;
   for (const Use& use : uses) {
     if (use.heights != nullptr) {
@@ -247,6 +264,7 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
       continue;
     }
     geometries_.push_back(make_displaced(use, options));
+    const double num_rays = options.num_rays * picture_share(use, options);
     if (has_error(use, options)) {
       dice(*geometries_.back(), use, options, num_rays, &tessellated_bytes);
     } else {

@@ -150,6 +150,7 @@ class DisplacementSet {
     std::vector<Affine3> places{};   ///< its instances: the world from its own space
     double steepening = 1;  ///< how much steeper its instances' slopes are in the world than in object space, at most
   };
+  static double picture_share(const Use& use, const DisplacementOptions& options);
   std::vector<Use> find_uses(const DisplacementInput& input);
   Levels levels_of(const Use& use, const DisplacementOptions& options) const;
   std::unique_ptr<PreparedMesh> make_displaced(const Use& use, const DisplacementOptions& options);

@@ -1,6 +1,7 @@
 #include "displacement/level_facets.h"
 
 #include <algorithm>
+#include <type_traits>
 
 #include "kernel/sample/sobol.h"
 
@@ -10,6 +11,8 @@ namespace {
 
 constexpr int kSide = 4;
 static_assert(kSide * kSide == kLevelFacets);
+
+using F4 [[gnu::vector_size(16)]] = float;
 
 /// Cells at equal distances along a lattice axis, and the texels that their slopes are made of.
 struct CellsAlongAxis {
@@ -24,43 +27,71 @@ CellsAlongAxis cells_along(const LatticeAxis& axis, double x, double width, floa
 {
   CellsAlongAxis cells;
   for (int k = 0; k < kSide; ++k) {
-    const double at = x + width * ((k + static_cast<double>(jitter)) / kSide - 0.5), floor = std::floor(at);
-    for (int j = 0; j < 4; ++j) {
-      cells.texel[k][j] = lattice_texel(axis, static_cast<std::int64_t>(floor) - 1 + j) * stride;
-    }
-    cells.place[k] = static_cast<float>(at - floor);
+    const double at = x + width * ((k + static_cast<double>(jitter)) / kSide - 0.5);
+    auto cell = static_cast<std::int64_t>(at);
+    cell -= at < static_cast<double>(cell) ? 1 : 0;
+    for (int j = 0; j < 4; ++j) cells.texel[k][j] = lattice_texel(axis, cell - 1 + j) * stride;
+    cells.place[k] = static_cast<float>(at - static_cast<double>(cell));
   }
   return cells;
 }
 
-float mix(float a, float b, float t) { return a + (b - a) * t; }
+/// Four texels of a row.
+template <class Texel>
+F4 load4(const Texel* row, const std::int64_t* columns)
+{
+  if (columns[1] == columns[0] + 1 && columns[2] == columns[0] + 2 && columns[3] == columns[0] + 3) {
+    using Texels [[gnu::vector_size(4 * sizeof(Texel))]] = Texel;
+    using I4 [[gnu::vector_size(16)]] = std::int32_t;
+    Texels texels;
+    __builtin_memcpy(&texels, row + columns[0], sizeof texels);
+    if constexpr (std::is_same_v<Texel, float>) return texels;
+    return __builtin_convertvector(__builtin_convertvector(texels, I4), F4);
+  }
+  return F4{static_cast<float>(row[columns[0]]), static_cast<float>(row[columns[1]]),
+            static_cast<float>(row[columns[2]]), static_cast<float>(row[columns[3]])};
+}
+
+F4 mix(F4 a, F4 b, float t) { return a + (b - a) * t; }
+
+float sum_of(F4 a) { return (a[0] + a[2]) + (a[1] + a[3]); }
+
+/// Lane k of the result is the sum of the k-th of the four.
+F4 sums_of(const F4* a)
+{
+  const F4 first = __builtin_shufflevector(a[0], a[1], 0, 4, 1, 5) + __builtin_shufflevector(a[0], a[1], 2, 6, 3, 7);
+  const F4 last = __builtin_shufflevector(a[2], a[3], 0, 4, 1, 5) + __builtin_shufflevector(a[2], a[3], 2, 6, 3, 7);
+  return __builtin_shufflevector(first, last, 0, 1, 4, 5) + __builtin_shufflevector(first, last, 2, 3, 6, 7);
+}
 
 /// Slopes of a map around a point of it, heights a texel.
 struct Slopes {
-  float x[kLevelFacets], y[kLevelFacets];
+  F4 x[kSide], y[kSide];
 };
 
 /// Slopes of texels, in units of theirs.
 template <class Texel>
 void slopes_of(const Texel* texels, const CellsAlongAxis& columns, const CellsAlongAxis& rows, bool smooth, Slopes* out)
 {
-  for (int k = 0; k < kLevelFacets; ++k) {
-    const int c = k % kSide, r = k / kSide;
-    const float fx = columns.place[c], fy = rows.place[r];
-    const auto height = [&](int i, int j) {
-      return static_cast<float>(texels[rows.texel[r][j] + columns.texel[c][i]]);
-    };
-    const float h00 = height(1, 1), h10 = height(2, 1), h01 = height(1, 2), h11 = height(2, 2);
-    if (!smooth) {
-      out->x[k] = mix(h10 - h00, h11 - h01, fy);
-      out->y[k] = mix(h01 - h00, h11 - h10, fx);
-      continue;
+  // What a slope is of the four texels of a row. Smooth ones are half the difference of what is interpolated one texel to
+  // either side.
+  F4 along[kSide], across[kSide];
+  for (int c = 0; c < kSide; ++c) {
+    const float f = columns.place[c];
+    along[c] = smooth ? 0.5f * F4{f - 1.0f, -f, 1.0f - f, f} : F4{0, -1, 1, 0};
+    across[c] = (smooth ? 0.5f : 1.0f) * F4{0, 1.0f - f, f, 0};
+  }
+  for (int r = 0; r < kSide; ++r) {
+    const float f = rows.place[r];
+    F4 x[kSide], y[kSide];
+    for (int c = 0; c < kSide; ++c) {
+      const auto row = [&](int j) { return load4(texels + rows.texel[r][j], columns.texel[c]); };
+      const F4 low = row(1), high = row(2);
+      x[c] = along[c] * mix(low, high, f);
+      y[c] = across[c] * (smooth ? mix(high - row(0), row(3) - low, f) : high - low);
     }
-    // Half the difference of what is interpolated one texel to either side.
-    out->x[k] = 0.5f * mix(mix(h10 - height(0, 1), height(3, 1) - h00, fx),
-                           mix(h11 - height(0, 2), height(3, 2) - h01, fx), fy);
-    out->y[k] = 0.5f * mix(mix(h01 - height(1, 0), height(1, 3) - h00, fy),
-                           mix(h11 - height(2, 0), height(2, 3) - h10, fy), fx);
+    out->x[r] = sums_of(x);
+    out->y[r] = sums_of(y);
   }
 }
 
@@ -88,18 +119,26 @@ slopes_around(const HeightFieldView& f, double x, double y, double width, double
       slopes_of(static_cast<const float*>(f.map.texels), columns, rows, smooth, &slopes);
       break;
   }
-  for (int k = 0; k < kLevelFacets; ++k) {
-    slopes.x[k] *= step;
-    slopes.y[k] *= step;
+  for (int r = 0; r < kSide; ++r) {
+    slopes.x[r] *= step;
+    slopes.y[r] *= step;
   }
   return slopes;
 }
 
-float mean_of(const float* values)
+/// Of all facets.
+float sum_of(const F4* values) { return sum_of((values[0] + values[1]) + (values[2] + values[3])); }
+float sum_of_products(const F4* a, const F4* b)
 {
-  float sum = 0;
-  for (int k = 0; k < kLevelFacets; ++k) sum += values[k];
-  return sum / kLevelFacets;
+  return sum_of((a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]));
+}
+
+Slopes slopes_of(const LevelFacets& facets)
+{
+  Slopes slopes;
+  __builtin_memcpy(slopes.x, facets.x, sizeof slopes.x);
+  __builtin_memcpy(slopes.y, facets.y, sizeof slopes.y);
+  return slopes;
 }
 
 }  // namespace
@@ -132,10 +171,11 @@ bool level_facets_make(const DisplacedGeometry& geometry, const LevelPlace& at, 
   const double x = tri.x[0] + b1 * base.xu + b2 * base.xv, y = tri.y[0] + b1 * base.yu + b2 * base.yv;
   const double width = geometry.facets->window * std::exp2(at.level);
   const Slopes slopes = slopes_around(map, x, y, width, width, jitter, geometry.smooth);
-  const float mean_x = mean_of(slopes.x), mean_y = mean_of(slopes.y);
-  for (int k = 0; k < kLevelFacets; ++k) {
-    out->x[k] = slopes.x[k] - mean_x;
-    out->y[k] = slopes.y[k] - mean_y;
+  const float mean_x = sum_of(slopes.x) / kLevelFacets, mean_y = sum_of(slopes.y) / kLevelFacets;
+  for (int r = 0; r < kSide; ++r) {
+    const F4 less_x = slopes.x[r] - mean_x, less_y = slopes.y[r] - mean_y;
+    __builtin_memcpy(out->x + kSide * r, &less_x, sizeof less_x);
+    __builtin_memcpy(out->y + kSide * r, &less_y, sizeof less_y);
   }
   const auto level = static_cast<int>(at.level);
   const float part = at.level - static_cast<float>(level);
@@ -157,12 +197,13 @@ Vec2f facet_spread(const HeightFieldView& map, const HeightFieldView& level, dou
     const Vec2f place = sample_2d(0, i, 0), jitter = sample_2d(0, i, 1);
     const double x = static_cast<double>(place.x) * map.map.width, y = static_cast<double>(place.y) * map.map.height;
     const Slopes slopes = slopes_around(map, x, y, window, window, jitter, smooth);
-    const float mean_x = mean_of(slopes.x), mean_y = mean_of(slopes.y);
+    const float mean_x = sum_of(slopes.x) / kLevelFacets, mean_y = sum_of(slopes.y) / kLevelFacets;
     for (int k = 0; k < kLevelFacets; ++k) {
-      all_x += square(slopes.x[k]);
-      all_y += square(slopes.y[k]);
-      around_x += square(slopes.x[k] - mean_x);
-      around_y += square(slopes.y[k] - mean_y);
+      const float slope_x = slopes.x[k / kSide][k % kSide], slope_y = slopes.y[k / kSide][k % kSide];
+      all_x += square(slope_x);
+      all_y += square(slope_y);
+      around_x += square(slope_x - mean_x);
+      around_y += square(slope_y - mean_y);
     }
     double from_x = lattice_on_level(x, map.map.width, level.map.width),
            from_y = lattice_on_level(y, map.map.height, level.map.height);
@@ -186,12 +227,9 @@ Vec2f facet_spread(const HeightFieldView& map, const HeightFieldView& level, dou
 
 FacetMoments facet_moments(const LevelFacets& facets)
 {
-  float xx = 0, xy = 0, yy = 0;
-  for (int k = 0; k < kLevelFacets; ++k) {
-    xx += facets.x[k] * facets.x[k];
-    xy += facets.x[k] * facets.y[k];
-    yy += facets.y[k] * facets.y[k];
-  }
+  const Slopes slopes = slopes_of(facets);
+  const float xx = sum_of_products(slopes.x, slopes.x), xy = sum_of_products(slopes.x, slopes.y),
+              yy = sum_of_products(slopes.y, slopes.y);
   constexpr float kEach = 1.0f / kLevelFacets;
   // The root of the covariance by Cholesky.
   const float x = std::sqrt(xx * kEach);
@@ -203,9 +241,16 @@ FacetMoments facet_moments(const LevelFacets& facets)
 bool facet_choose(const LevelFacets& facets, Vec3f w, float u, Vec3f* normal)
 {
   const float mean = dot(w, facets.normal), x = dot(w, facets.per_x), y = dot(w, facets.per_y);
-  float shown[kLevelFacets], sum = 0;
-  for (int k = 0; k < kLevelFacets; ++k) sum += shown[k] = max(0.0f, mean + facets.x[k] * x + facets.y[k] * y);
+  const Slopes slopes = slopes_of(facets);
+  F4 lanes[kSide];
+  for (int r = 0; r < kSide; ++r) {
+    lanes[r] = mean + slopes.x[r] * x + slopes.y[r] * y;
+    lanes[r] = lanes[r] > 0.0f ? lanes[r] : F4{};
+  }
+  const float sum = sum_of(lanes);
   if (!(sum > 0.0f)) return false;
+  float shown[kLevelFacets];
+  __builtin_memcpy(shown, lanes, sizeof shown);
   float left = u * sum;
   int chosen = 0;
   for (int k = 0; k < kLevelFacets; ++k) {

@@ -56,6 +56,18 @@ Vec2f facet_spread(const HeightFieldView& map,
 
 FacetMoments facet_moments(const LevelFacets& facets);
 
+/// φ(a) − a·Q(a) of the normal distribution: the mean of what a normal number exceeds a by.
+/// @source Abramowitz and Stegun 1964, 7.1.26, off by 1e-7
+inline float mean_excess(float a)
+{
+  const float size = std::abs(a);
+  const float t = 1.0f / (1.0f + 0.23164189f * size);
+  const float tail =
+      t * (0.254829592f + t * (-0.284496736f + t * (1.421413741f + t * (-1.453152027f + t * 1.061405429f))));
+  const float excess = std::exp(-0.5f * a * a) * (0.39894228f - 0.5f * size * tail);
+  return max(a < 0.0f ? excess - a : excess, 0.0f);
+}
+
 /// Smith's Λ of a direction: the mean area of the facets that face away from it over that of all, as it sees them.
 /// Directions above the level have a positive one, those below it one of at most −1, as a ray on its way down meets
 /// facets.
@@ -66,10 +78,7 @@ inline float facet_lambda(const FacetMoments& m, Vec3f w)
   const float along[2] = {dot(w, m.deviation[0]), dot(w, m.deviation[1])};
   const float deviation = std::sqrt(along[0] * along[0] + along[1] * along[1]);
   if (!(deviation > 0.0f)) return mean >= 0.0f ? 0.0f : -1.0f;
-  const float a = mean / deviation;
-  constexpr float kInvSqrt2Pi = 0.39894228f, kInvSqrt2 = 0.70710678f;
-  const float away = deviation * (kInvSqrt2Pi * std::exp(-0.5f * a * a) - a * 0.5f * std::erfc(kInvSqrt2 * a));
-  return max(away, 0.0f) / mean;
+  return deviation * mean_excess(mean / deviation) / mean;
 }
 
 /// The height at which a ray that comes from outside meets a facet, as a part of all facets that are lower.

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include "displacement/shared_edges.h"
 
@@ -307,6 +308,17 @@ void Tessellation::fill(std::uint32_t index, const TessellationRule& rule)
   }
 }
 
+Box3 Tessellation::bounds() const
+{
+  return tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, layout_.num_vertices), box_empty(),
+      [&](const tbb::blocked_range<std::size_t>& range, Box3 box) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) box = box_union(box, {vertex(i), vertex(i)});
+        return box;
+      },
+      box_union);
+}
+
 RTCGeometry Tessellation::geometry_make(RTCDevice device) const
 {
   const bool grids = layout_.kind == TessellationKind::kGrids;
@@ -368,7 +380,8 @@ Tessellation::MicroTriangle Tessellation::micro_triangle(std::uint32_t primitive
   micro.weight[1] = static_cast<double>(u);
   micro.weight[2] = static_cast<double>(v);
   for (int k = 0; k < 3; ++k) {
-    micro.vertex[k] = indices_[3 * std::size_t{primitive} + static_cast<std::size_t>(k)];
+    const std::uint64_t row = at[k][1];
+    micro.vertex[k] = t.first_vertex + row * (n + 1) - row * (row - 1) / 2 + at[k][0];
     micro.lattice[k] = triangle_vertex(t, at[k][0], at[k][1]);
   }
   return micro;

@@ -14,6 +14,7 @@
 
 #include "displacement/displaced_triangle.h"
 #include "displacement/embree.h"
+#include "kernel/math/box.h"
 
 namespace relief {
 
@@ -84,6 +85,7 @@ class Tessellation {
   Tessellation(const DisplacedMeshView& mesh, TessellationLayout layout, const TessellationRule& rule = {});
 
   const TessellationLayout& layout() const { return layout_; }
+  Box3 bounds() const;  ///< of its vertices, object space
   std::size_t bytes() const
   {
     return layout_.bytes() + layout_.triangles.size() * sizeof(TessellatedTriangle) +

@@ -159,7 +159,11 @@ Accel::Accel(const Scene& scene,
   }
   build_displaced(displacements);
   place_instances(scene, lights, area_lights);
+  build_tessellated(displacements);
   build_meshes(scene);
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    if (scene_->instances[i] != nullptr) scene_->instances[i]->scene = tree_of(scene, i).get();
+  }
   build_top(scene, lights, area_lights);
   top_ = scene_->top.get();
   kept_ = trees_->end_scene();
@@ -175,26 +179,39 @@ void Accel::build_displaced(DisplacementSet& displacements)
 {
   const TraversalTable& traversals = traversal_table_select();
   for (std::size_t d = 0; d < displacements.size(); ++d) {
-    displaced_trees_.push_back(displacements.tree(d));
-    TreePointer& tree = displaced_trees_.back();
-    if (tree != nullptr) continue;
-    DisplacedGeometry& displaced = displacements.geometry(d);
-    const auto start = std::chrono::steady_clock::now();
-    const std::uint64_t bytes_before = trees_->bytes();
+    DisplacedUse& use = displaced_.emplace_back();
     if (const Tessellation* tessellation = displacements.tessellation(d)) {
-      tree = trees_->own(tessellation_scene_make(trees_->device(), kRenderTessellation));
-      RTCGeometry geometry = tessellation->geometry_make(trees_->device());
-      rtcSetGeometryOccludedFilterFunction(geometry, displaced.shadow_filter);
-      attach(tree.get(), geometry, 0, ~0u);
-      commit(tree.get());
+      use.box = tessellation->bounds();
       continue;
     }
-    tree = trees_->scene_make(RTC_BUILD_QUALITY_HIGH);
-    attach(tree.get(), displaced_geometry_make(trees_->device(), displaced, traversals), 0, ~0u);
-    commit(tree.get());
-    displaced.scene = tree.get();
-    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-    displacements.set_tree(d, tree, trees_->bytes() - bytes_before, seconds.count());
+    use.tree = displacements.tree(d);
+    if (use.tree == nullptr) {
+      DisplacedGeometry& displaced = displacements.geometry(d);
+      const auto start = std::chrono::steady_clock::now();
+      const std::uint64_t bytes_before = trees_->bytes();
+      use.tree = trees_->scene_make(RTC_BUILD_QUALITY_HIGH);
+      attach(use.tree.get(), displaced_geometry_make(trees_->device(), displaced, traversals), 0, ~0u);
+      commit(use.tree.get());
+      displaced.scene = use.tree.get();
+      const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+      displacements.set_tree(d, use.tree, trees_->bytes() - bytes_before, seconds.count());
+    }
+    use.box = scene_bounds(use.tree.get());
+  }
+}
+
+void Accel::build_tessellated(DisplacementSet& displacements)
+{
+  for (std::size_t d = 0; d < displacements.size(); ++d) {
+    const Tessellation* const tessellation = displacements.tessellation(d);
+    if (tessellation == nullptr) continue;
+    DisplacedUse& use = displaced_[d];
+    use.tree = trees_->own(tessellation_scene_make(trees_->device(), kRenderTessellation));
+    RTCGeometry geometry = tessellation->geometry_make(trees_->device());
+    rtcSetGeometryOccludedFilterFunction(geometry, displacements.geometry(d).shadow_filter);
+    attach(use.tree.get(), geometry, 0, ~0u);
+    attach_corners(use.tree.get(), use.box, use.pad);
+    commit(use.tree.get());
   }
 }
 
@@ -221,9 +238,9 @@ void Accel::place_instances(const Scene& scene,
       box = box_union(box, points_box(scene.meshes[mesh].P, instance.world_from_object));
       continue;
     }
-    // Trees of meshes come later: their boxes depend on the pad.
+    // Trees of meshes and tessellations come later: their boxes depend on the pad.
     scene_->instances[i] = std::make_unique<InstanceGeometry>(instance_geometry_prepare(
-        displaced >= 0 ? displaced_trees_[d].get() : nullptr, displaced >= 0 ? displaced_bounds(d) : meshes_[mesh].box,
+        displaced >= 0 ? displaced_[d].tree.get() : nullptr, displaced >= 0 ? displaced_[d].box : meshes_[mesh].box,
         instance.world_from_object, views_->motion.view(instance.motion_index), &scene_->pad));
     box = box_union(box, instance_bounds(*scene_->instances[i]));
   }
@@ -241,11 +258,13 @@ void Accel::place_instances(const Scene& scene,
   // The boxes of Embree's own instances are as large as those of what they show.
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     std::unique_ptr<InstanceGeometry>& instance = scene_->instances[i];
-    if (instance == nullptr || displacements_->geometry_index(i) >= 0 || instance->motion.num_keys > 0 ||
+    if (instance == nullptr || instance->scene != nullptr || instance->motion.num_keys > 0 ||
         !instance_is_accurate_in_single_precision(*instance)) {
       continue;
     }
-    Vec3f& pad = meshes_[static_cast<std::size_t>(scene.instances[i].mesh_index)].pad;
+    const int displaced = displacements_->geometry_index(i);
+    Vec3f& pad = displaced >= 0 ? displaced_[static_cast<std::size_t>(displaced)].pad
+                                : meshes_[static_cast<std::size_t>(scene.instances[i].mesh_index)].pad;
     pad = max(pad, splat3(steady_pad(*instance)));
     instance.reset();
   }
@@ -268,17 +287,18 @@ void Accel::build_meshes(const Scene& scene)
       // Spatial splits of HIGH quality would call the shadow filter twice for one triangle.
       TreePointer tree = trees_->scene_make(use.transparent ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
       attach(tree.get(), new_mesh(mesh, nullptr, use.transparent), 0, ~0u);
-      const Box3 padded{use.box.low - use.pad, use.box.high + use.pad};
-      if (!is_zero(use.pad)) attach(tree.get(), new_corners(padded), 1, 0);
+      attach_corners(tree.get(), use.box, use.pad);
       commit(tree.get());
       return tree;
     });
   }
-  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
-    InstanceGeometry* const instance = scene_->instances[i].get();
-    if (instance == nullptr || displacements_->geometry_index(i) >= 0) continue;
-    instance->scene = meshes_[static_cast<std::size_t>(scene.instances[i].mesh_index)].tree.get();
-  }
+}
+
+const TreePointer& Accel::tree_of(const Scene& scene, std::size_t instance) const
+{
+  const int displaced = displacements_->geometry_index(instance);
+  if (displaced >= 0) return displaced_[static_cast<std::size_t>(displaced)].tree;
+  return meshes_[static_cast<std::size_t>(scene.instances[instance].mesh_index)].tree;
 }
 
 /// All that build_top reads. Trees of parts are known by their places: a tree that is kept holds its parts.
@@ -290,13 +310,10 @@ ContentHash Accel::top_content(const Scene& scene,
   hash.add(scene.instances.size(), area_lights.size(), scene_->pad);
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
-    const MeshUse& use = meshes_[static_cast<std::size_t>(instance.mesh_index)];
-    const int displaced = displacements_->geometry_index(i);
-    const bool is_in_place = displaced < 0 && use.tree == nullptr;
-    if (is_in_place) hash_triangles(scene.meshes[static_cast<std::size_t>(instance.mesh_index)], &hash);
-    hash.add(is_in_place, use.transparent,
-             displaced >= 0 ? displaced_trees_[static_cast<std::size_t>(displaced)].get() : use.tree.get(),
-             mask_of(instance.flags));
+    const auto mesh = static_cast<std::size_t>(instance.mesh_index);
+    const TreePointer& tree = tree_of(scene, i);
+    if (tree == nullptr) hash_triangles(scene.meshes[mesh], &hash);
+    hash.add(tree == nullptr, meshes_[mesh].transparent, tree.get(), mask_of(instance.flags));
     hash_transform(instance.world_from_object, &hash);
   }
   for (const std::uint32_t index : area_lights) {
@@ -323,17 +340,17 @@ void Accel::build_top(const Scene& scene, std::span<const Light> lights, std::sp
     any_transparent |= !mesh.has_tree() && mesh.transparent;
     if (mesh.tree != nullptr) scene_->parts.push_back(mesh.tree);
   }
-  scene_->parts.insert(scene_->parts.end(), displaced_trees_.begin(), displaced_trees_.end());
+  for (const DisplacedUse& use : displaced_) scene_->parts.push_back(use.tree);
   const TreePointer top = trees_->scene_make(any_transparent ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
     const auto mesh = static_cast<std::size_t>(instance.mesh_index);
-    const bool is_in_place = displacements_->geometry_index(i) < 0 && meshes_[mesh].tree == nullptr;
-    scene_->num_in_place += is_in_place ? 1 : 0;
+    const TreePointer& tree = tree_of(scene, i);
+    scene_->num_in_place += tree == nullptr ? 1 : 0;
     attach(top.get(),
            scene_->instances[i] != nullptr ? instance_geometry_make(trees_->device(), *scene_->instances[i])
-           : !is_in_place                  ? new_instance(meshes_[mesh].tree.get(), instance.world_from_object)
-                          : new_mesh(scene.meshes[mesh], &instance.world_from_object, meshes_[mesh].transparent),
+           : tree != nullptr               ? new_instance(tree.get(), instance.world_from_object)
+                             : new_mesh(scene.meshes[mesh], &instance.world_from_object, meshes_[mesh].transparent),
            static_cast<unsigned>(i), mask_of(instance.flags));
   }
   for (std::size_t i = 0; i < area_lights.size(); ++i) {
@@ -396,8 +413,6 @@ void Accel::occluded(EmbreeContext& context, RTCRay& ray) const
 
 Box3 Accel::bounds() const { return scene_bounds(top_); }
 
-Box3 Accel::displaced_bounds(std::size_t geometry) const { return scene_bounds(displaced_trees_[geometry].get()); }
-
 RTCGeometry Accel::new_mesh(const Mesh& mesh, const Affine3* world_from_object, bool transparent)
 {
   RTCGeometry geometry = rtcNewGeometry(trees_->device(), RTC_GEOMETRY_TYPE_TRIANGLE);
@@ -437,20 +452,21 @@ RTCGeometry Accel::new_mesh(const Mesh& mesh, const Affine3* world_from_object, 
   return geometry;
 }
 
-/// Two points that no ray hits, but that the box of a scene holds.
-RTCGeometry Accel::new_corners(const Box3& box)
+/// Enlarges a scene's box, by two points that no ray hits.
+void Accel::attach_corners(RTCScene target, const Box3& box, Vec3f pad)
 {
+  if (is_zero(pad)) return;
   RTCGeometry geometry = rtcNewGeometry(trees_->device(), RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* vertices = static_cast<Vec3f*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), 2));
   auto* triangles = static_cast<TriangleIndices*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(TriangleIndices), 2));
   if (vertices == nullptr || triangles == nullptr) throw OutOfMemory("the box of a mesh");
-  vertices[0] = box.low;
-  vertices[1] = box.high;
+  vertices[0] = box.low - pad;
+  vertices[1] = box.high + pad;
   triangles[0] = {0, 0, 0};
   triangles[1] = {1, 1, 1};
-  return geometry;
+  attach(target, geometry, 1, 0);
 }
 
 RTCGeometry Accel::new_instance(RTCScene instanced, const Affine3& m)

@@ -24,7 +24,8 @@ enum RayMask : std::uint32_t { kRayCamera = 1u << 0, kRayBounce = 1u << 1, kRayS
 
 /// Builds and owns the acceleration structure. Meshes that occur once are placed in world space; a mesh that occurs more
 /// often, or is displaced, has one scene of its own and instances of it: Embree's, or where single precision would not do,
-/// those of instance_geometry.h. So has one that moves or deforms while the shutter is open, with instances of the latter.
+/// those of instance_geometry.h. So has one that moves or deforms while the shutter is open, with instances of the latter,
+/// as have displaced meshes that are not tessellated.
 class Accel {
  public:
   /// @param scene         must outlive the Accel: if no trees are kept, buffers are shared where they can be
@@ -56,8 +57,11 @@ class Accel {
 
   const DisplacementSet& displacements() const { return *displacements_; }
   const SceneMotion& motion() const { return views_->motion; }
-  Box3 bounds() const;                                ///< of all that rays can hit, world
-  Box3 displaced_bounds(std::size_t geometry) const;  ///< of a displaced geometry's prisms or triangles, object space
+  Box3 bounds() const;  ///< of all that rays can hit, world
+  Box3 displaced_bounds(std::size_t geometry) const
+  {
+    return displaced_[geometry].box;
+  }  ///< of a displaced geometry's prisms or triangles, object space
   std::size_t bytes() const { return trees_->bytes(); }   ///< allocated by Embree
   const KeptTrees::Tally& kept() const { return kept_; }  ///< of the scenes before
 
@@ -65,12 +69,14 @@ class Accel {
   void place_instances(const Scene& scene, std::span<const Light> lights, std::span<const std::uint32_t> area_lights);
   void build_meshes(const Scene& scene);
   void build_displaced(DisplacementSet& displacements);
+  void build_tessellated(DisplacementSet& displacements);
   void build_top(const Scene& scene, std::span<const Light> lights, std::span<const std::uint32_t> area_lights);
+  const TreePointer& tree_of(const Scene& scene, std::size_t instance) const;  ///< null: it is in place
   ContentHash top_content(const Scene& scene,
                           std::span<const Light> lights,
                           std::span<const std::uint32_t> area_lights) const;
   RTCGeometry new_mesh(const Mesh& mesh, const Affine3* world_from_object, bool transparent);
-  RTCGeometry new_corners(const Box3& box);
+  void attach_corners(RTCScene target, const Box3& box, Vec3f pad);
   RTCGeometry new_instance(RTCScene instanced, const Affine3& world_from_object);
   RTCGeometry new_rectangle(const Light& light);
   RTCGeometry new_light(const Light& light);
@@ -89,6 +95,13 @@ class Accel {
     bool has_tree() const { return count > 1 || takes_time; }
   };
 
+  /// A displaced geometry.
+  struct DisplacedUse {
+    Box3 box;          ///< object space
+    Vec3f pad;         ///< by which it is enlarged, of a tessellation
+    TreePointer tree;  ///< of a tessellation it comes later: it depends on the pad
+  };
+
   /// What moves is known by its place in the scene: no other has it.
   bool keeps_top() const { return trees_->keeps() && !views_->motion.is_open(); }
 
@@ -97,9 +110,9 @@ class Accel {
   const SceneViews* views_;
   std::shared_ptr<KeptTrees> trees_;
   KeptTrees::Tally kept_;
-  RayTarget target_;                          ///< all that rays can hit, world
-  std::vector<MeshUse> meshes_;               ///< a mesh of the scene
-  std::vector<TreePointer> displaced_trees_;  ///< a displaced geometry
+  RayTarget target_;                     ///< all that rays can hit, world
+  std::vector<MeshUse> meshes_;          ///< a mesh of the scene
+  std::vector<DisplacedUse> displaced_;  ///< a geometry of displacements_
   std::unique_ptr<SceneTree> scene_;
   RTCScene top_ = nullptr;  ///< of scene_
 };

@@ -1,16 +1,22 @@
-"""The displaced scenes: three that Cycles can dice, and two that no tessellation fits into memory.
+"""The displaced scenes: those that Cycles can dice, and two that no tessellation fits into memory.
 
 `sphere`      960 triangles, a 2k map tiled 8×6
 `landscape`   128 triangles, a 4k map tiled 2×2, seen from just above the ground
 `torus`       5,120 triangles, a woven 2k map tiled 5×5
+`pebbles`     300 instances of 480 triangles, a 1k map tiled 3×2
+`glazed`      the torus and its map again, glossy
+`scan`        17,684 triangles with the 4k map that was made for them; from the folder RELIEF_BENCH_DATA, which has
+              meshes/lee_perry_smith.glb and maps/lee_perry_smith_disp_4k.jpg
 `huge_torus`  8,192 triangles, a 4k map tiled 25×25: ten billion texels as seen
 `huge_plane`  two triangles, one map of 16k × 16k
 
 Base meshes have the normals that Blender computes, since Cycles' subdivision knows no others.
 """
 
+import json
 import math
 import os
+import struct
 import sys
 
 import numpy as np
@@ -45,14 +51,38 @@ def _grid(point, columns, rows, closed):
     triangles = np.concatenate(
         [np.stack([corner, below, corner + 1], 1), np.stack([corner + 1, below, below + 1], 1)]
     )
+    return _smooth_mesh(positions, triangles, np.stack([a.ravel(), b.ravel()], 1))
+
+
+def _smooth_mesh(positions, triangles, uvs):
+    """A mesh with smooth normals, closed where positions are equal; triangles between two copies of a place are left out."""
     vertices, merged = np.unique(positions, axis=0, return_inverse=True)
     merged = merged.ravel()
-    corners = merged[triangles]
-    # Triangles between two copies of a pole.
-    triangles = triangles[[len(set(triangle)) == 3 for triangle in corners.tolist()]]
+    triangles = triangles[[len(set(triangle)) == 3 for triangle in merged[triangles].tolist()]]
     normals = _angle_weighted_normals(vertices.astype(np.float64), merged[triangles])[merged]
-    uvs = np.stack([a.ravel(), b.ravel()], 1)
     return meshes.Mesh(positions.tolist(), triangles.tolist(), normals.tolist(), uvs.tolist())
+
+
+def _read_glb(path):
+    """Positions, triangles and texture coordinates of a GLB file's one primitive."""
+    with open(path, "rb") as file:
+        data = file.read()
+    (length,) = struct.unpack_from("<I", data, 12)
+    gltf, start = json.loads(data[20 : 20 + length]), 28 + length
+
+    def accessor(index, dtype, width):
+        accessor = gltf["accessors"][index]
+        view = gltf["bufferViews"][accessor["bufferView"]]
+        offset = start + view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        return np.frombuffer(data, dtype, accessor["count"] * width, offset).reshape(-1, width)
+
+    primitive = gltf["meshes"][0]["primitives"][0]
+    indices = np.uint32 if gltf["accessors"][primitive["indices"]]["componentType"] == 5125 else np.uint16
+    return (
+        accessor(primitive["attributes"]["POSITION"], np.float32, 3),
+        accessor(primitive["indices"], indices, 1).reshape(-1, 3).astype(np.int64),
+        accessor(primitive["attributes"]["TEXCOORD_0"], np.float32, 2),
+    )
 
 
 def _angle_weighted_normals(vertices, triangles):
@@ -119,6 +149,45 @@ def torus():
     return document
 
 
+def pebbles():
+    document = _document("pebbles")
+    document.add_node("ground", mesh=document.add_mesh(
+        "ground", _grid(_plane, 1, 1, (False, False)), document.add_material(gltf.lambert("ground", (0.4, 0.36, 0.3)))))  # fmt: skip
+    texture = document.add_texture("heights.png", maps.encode_png(maps.rock, 1024))
+    material = document.add_material(gltf.displaced(gltf.lambert("pebble", (0.5, 0.47, 0.42)), texture, 0.5, 0.5, (3, 2)))
+    mesh = document.add_mesh("pebble", _grid(_sphere, 24, 12, (True, False)), material)
+    random = np.random.default_rng(3)
+    places, sizes = random.uniform((-4, 0, -4), (4, 0, 4), (300, 3)), random.uniform(0.08, 0.3, 300)
+    places[:, 1] = 0.7 * sizes
+    turns = random.normal(size=(300, 4))
+    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+    document.add_instances("pebbles", mesh, places.tolist(), turns.tolist(), np.repeat(sizes[:, None], 3, 1).tolist())
+    document.add_camera((0.6, 1.9, 5.2), (0, 0, 0.6), 34)
+    return document
+
+
+def glazed():
+    document = _document("glazed")
+    texture = document.add_texture("heights.png", maps.encode_png(maps.weave, 2048))
+    material = gltf.displaced(gltf.dielectric("glaze", (0.06, 0.2, 0.25), 0.2), texture, 0.09, 0.5, (5, 5))
+    mesh = document.add_mesh("base", _grid(_torus, 64, 40, (True, True)), document.add_material(material))
+    document.add_node("displaced", mesh=mesh)
+    document.add_camera((0.4, 2.2, 2.6), (0, -0.05, 0.05), 36)
+    return document
+
+
+def scan():
+    data = os.environ["RELIEF_BENCH_DATA"]
+    document = _document("scan")
+    with open(os.path.join(data, "maps", "lee_perry_smith_disp_4k.jpg"), "rb") as file:
+        texture = document.add_texture("heights.jpg", file.read())
+    mesh = _smooth_mesh(*_read_glb(os.path.join(data, "meshes", "lee_perry_smith.glb")))
+    material = gltf.displaced(gltf.dielectric("skin", (0.5, 0.33, 0.26), 0.45), texture, 0.5, 0.5)
+    document.add_node("scan", mesh=document.add_mesh("head", mesh, document.add_material(material)))
+    document.add_camera((1.5, 0.6, 11.0), (0, -0.1, 0), 34)
+    return document
+
+
 def huge_torus():
     document = _document("huge_torus")
     mesh = _grid(_torus, 64, 64, (True, True))
@@ -135,5 +204,12 @@ def huge_plane():
     return document
 
 
-COMPARED = {"sphere": sphere, "landscape": landscape, "torus": torus}
+COMPARED = {
+    "sphere": sphere,
+    "landscape": landscape,
+    "torus": torus,
+    "pebbles": pebbles,
+    "glazed": glazed,
+    "scan": scan,
+}
 HUGE = {"huge_torus": huge_torus, "huge_plane": huge_plane}

@@ -222,6 +222,23 @@ TEST(Dicing, KeepsTheMeanOfThePicture)
   EXPECT_EQ(diced.mean(), exact);
 }
 
+TEST(Dicing, PaysForManyInstancesAsForOne)
+{
+  Scene scene = close_sphere(512, 32, 0.1);
+  DisplacementOptions options = options_of(scene, 1, 600);
+  options.num_rays = 1e8;
+  EXPECT_EQ(SceneContext(scene, options).displacements.method_names(), "tessellate");
+  for (int i = 1; i < 100; ++i) {
+    scene.instances.push_back(scene.instances[0]);
+    scene.instances.back().world_from_object.p = {0.02f * static_cast<float>(i), 0, 0};
+  }
+  EXPECT_EQ(SceneContext(scene, options).displacements.method_names(), "tessellate");
+  // What the picture hardly shows is not worth its building.
+  options.camera->world_from_camera.p = {0, 0, 1000};
+  options.num_rays = 1e5;
+  EXPECT_EQ(SceneContext(scene, options).displacements.method_names(), "chord");
+}
+
 TEST(Dicing, IsOfMapsThatSayNothingElse)
 {
   Scene scene = close_sphere(64, 4, 0.2);
