@@ -225,8 +225,8 @@ TEST(Dicing, KeepsTheMeanOfThePicture)
 TEST(Dicing, PaysForManyInstancesAsForOne)
 {
   Scene scene = close_sphere(512, 32, 0.1);
-  DisplacementOptions options = options_of(scene, 1, 600);
-  options.num_rays = 1e8;
+  DisplacementOptions options = options_of(scene, 1, 60);
+  options.num_rays = 1e7;
   EXPECT_EQ(SceneContext(scene, options).displacements.method_names(), "tessellate");
   for (int i = 1; i < 100; ++i) {
     scene.instances.push_back(scene.instances[0]);
@@ -235,7 +235,7 @@ TEST(Dicing, PaysForManyInstancesAsForOne)
   EXPECT_EQ(SceneContext(scene, options).displacements.method_names(), "tessellate");
   // What the picture hardly shows is not worth its building.
   options.camera->world_from_camera.p = {0, 0, 1000};
-  options.num_rays = 1e5;
+  options.num_rays = 1e4;
   EXPECT_EQ(SceneContext(scene, options).displacements.method_names(), "chord");
 }
 
