@@ -86,7 +86,8 @@ def _check_normals(mesh, normals):
     """Cycles' subdivision displaces along the normals that Blender computes; others would be another surface."""
     computed = np.empty(3 * len(mesh.vertices), np.float32)
     mesh.vertices.foreach_get("normal", computed)
-    if normals is None or np.abs(computed.reshape(-1, 3) - normals).max() > 1e-4:
+    # Around thin triangles Blender's single precision errs by a few ten-thousandths.
+    if normals is None or np.abs(computed.reshape(-1, 3) - normals).max() > 1e-3:
         raise Unsupported("a displaced mesh whose normals are not those that Blender computes")
 
 
