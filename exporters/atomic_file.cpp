@@ -228,13 +228,35 @@ void AtomicFile::commit_stream()
 void AtomicFile::commit_temporary()
 {
   std::FILE* file = std::exchange(file_, nullptr);
-  // Buffered bytes reach the disk here, so this is where a full disk may show first.
+  // Buffered bytes leave the process here, so this is where a full disk may show first.
   if (std::fclose(file) != 0) fail(errno);
   // What OpenEXR writes in a destructor fails without a word, and then nothing is left in the buffer to fail above.
   if (first_error_ != 0) fail(first_error_);
+  // A name may reach the disk before the bytes that it names: after a power cut it would stand for an empty file.
+  synchronize(descriptor_);
   if (::rename(temporary_.c_str(), destination_.c_str()) != 0) fail(errno);
   temporary_.clear();
+  synchronize_folder();
   close_descriptor();
+}
+
+void AtomicFile::synchronize(int descriptor)
+{
+  while (::fsync(descriptor) != 0) {
+    // Where a file system cannot do it there is nothing more to be done.
+    if (errno == EINVAL || errno == ENOTSUP) return;
+    if (errno != EINTR) fail(errno);
+  }
+}
+
+void AtomicFile::synchronize_folder()
+{
+  const fs::path folder = destination_.has_parent_path() ? destination_.parent_path() : fs::path(".");
+  // A folder may be written to and not be read. The file has its name all the same.
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
 }
 
 void atomic_write(const fs::path& target, std::string_view bytes)

@@ -20,7 +20,8 @@ bool is_stream(const std::filesystem::path& destination);
 /// A file being written. Nobody sees it under its own name before `commit`; without a commit it leaves nothing behind.
 /// A symbolic link is followed, also to a file that is not there yet; an older file's owner and permissions are kept. What
 /// is_stream says is written directly and in one go, so that a pipe takes formats that are not written from front to end.
-/// Not synchronized to the disk: it protects against errors, interrupts and parallel writers, not against power cuts.
+/// The bytes are on the disk before the name is, and the name before `commit` returns: a power cut leaves the old file or the
+/// new one.
 class AtomicFile {
  public:
   /// Opens the temporary file; its name is unique across processes and machines that share the folder. What killed runs have
@@ -58,6 +59,8 @@ class AtomicFile {
   void open_temporary();
   void commit_stream();
   void commit_temporary();
+  void synchronize(int descriptor);
+  void synchronize_folder();
   void close_descriptor();
 
   std::filesystem::path path_, destination_, temporary_;

@@ -17,9 +17,61 @@
 #include "exporters/side_file.h"
 #include "tests/exporters/test_pictures.h"
 
+namespace {
+
+/// What the process asked of the disk, in order, while that is recorded.
+std::vector<std::string> disk_calls;
+std::atomic<bool> is_recorded = false;
+/// What fsync fails with; 0: nothing.
+std::atomic<int> fsync_error = 0;
+
+void record(const std::string& call)
+{
+  if (is_recorded) disk_calls.push_back(call);
+}
+
+}  // namespace
+
+// In the place of the C library's: no test can cut the power.
+extern "C" int fsync(int descriptor)
+{
+  struct stat status {};
+  ::fstat(descriptor, &status);
+  record(S_ISDIR(status.st_mode) ? "fsync folder" : "fsync " + std::to_string(status.st_size) + " bytes");
+  errno = fsync_error;
+  return fsync_error == 0 ? 0 : -1;
+}
+
+extern "C" int rename(const char* from, const char* to) noexcept
+{
+  record("rename");
+  return ::renameat(AT_FDCWD, from, AT_FDCWD, to);
+}
+
 namespace relief {
 
 using AtomicFileTest = FolderTest;
+
+TEST_F(AtomicFileTest, ItsBytesAreOnTheDiskBeforeItsName)
+{
+  is_recorded = true;
+  atomic_write(file("a.txt"), "12345");
+  is_recorded = false;
+  EXPECT_EQ(disk_calls, (std::vector<std::string>{"fsync 5 bytes", "rename", "fsync folder"}));
+}
+
+TEST_F(AtomicFileTest, BytesThatDoNotReachTheDiskLeaveTheOldFile)
+{
+  write_bytes(file("a.txt"), "old");
+  fsync_error = EIO;
+  EXPECT_THROW(atomic_write(file("a.txt"), "new"), OutputError);
+  fsync_error = EINVAL;  // of a file system that knows no such thing
+  EXPECT_EQ(bytes_of_file(file("a.txt")), "old");
+  EXPECT_EQ(files_in_folder(), std::vector<std::string>{"a.txt"});
+  atomic_write(file("a.txt"), "new");
+  fsync_error = 0;
+  EXPECT_EQ(bytes_of_file(file("a.txt")), "new");
+}
 
 TEST_F(AtomicFileTest, IsInvisibleUntilCommitted)
 {
