@@ -11,6 +11,7 @@
 #include "exporters/exr.h"
 #include "exporters/sample_range.h"
 #include "scene/cryptomatte.h"
+#include "scene/memory.h"
 
 namespace relief {
 
@@ -171,6 +172,7 @@ class Merger {
   };
 
   static void check_finished(const Picture& picture);
+  static void require_memory(const Picture& picture, std::size_t num_pixels);
   void check_same_image(const Picture& picture);
   void check_seeds(const Picture& picture);
   void warn_left_out(const std::string& channel, const std::string& why);
@@ -201,6 +203,18 @@ void Merger::check_finished(const Picture& picture)
   throw InputError(picture.file, "is of a render that is not finished, and has no layer samples.N to weight it by");
 }
 
+/// Of all sums, which are twice as large as the pictures.
+void Merger::require_memory(const Picture& picture, std::size_t num_pixels)
+{
+  // The pixels' samples: all, the even-numbered ones, and those of one picture.
+  std::size_t num_values = 3;
+  for (const Channel& channel : picture.channels) {
+    if (!reason_to_leave_out(channel.name).empty()) continue;
+    num_values += rule_of(channel.name) == Rule::kMeanOverHits ? 2 : 1;
+  }
+  memory_require(std::uint64_t{num_values} * num_pixels * sizeof(double), picture.file + ": the sums of its layers");
+}
+
 void Merger::check_same_image(const Picture& picture)
 {
   if (num_pictures_ == 0) {
@@ -214,6 +228,7 @@ void Merger::check_same_image(const Picture& picture)
     result_.attributes = picture.attributes;
     std::erase_if(result_.attributes, [](const auto& entry) { return entry.first.starts_with("cryptomatte/"); });
     const std::size_t num_pixels = static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height);
+    require_memory(picture, num_pixels);
     num_samples_.assign(num_pixels, 0);
     num_even_samples_.assign(num_pixels, 0);
     for (const Channel& channel : picture.channels) {

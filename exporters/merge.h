@@ -31,7 +31,7 @@ struct MergeResult {
 ///   ids              of the first picture that sampled the pixel
 /// Sums are in double precision.
 /// @error InputError naming the files: unreadable, different sizes or windows, the same samples twice, other scene or frame, no
-///        samples; not finished, as a checkpoint, and without the layer of samples
+///        samples; not finished, as a checkpoint, and without the layer of samples. OutOfMemory, before the sums are made
 /// @cost  8 bytes a value for the sums, and one picture more
 MergeResult merge_pictures(std::span<const std::filesystem::path> files, const MergeOptions& options = {});
 

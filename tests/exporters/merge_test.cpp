@@ -7,6 +7,7 @@
 
 #include "exporters/errors.h"
 #include "exporters/exr.h"
+#include "scene/memory.h"
 #include "tests/exporters/test_pictures.h"
 
 namespace relief {
@@ -244,6 +245,21 @@ TEST_F(Merge, WithoutCountsWeighsByTheMetadataAndWithoutThoseRefuses)
           .picture;
   EXPECT_FLOAT_EQ(merged.find("R")->values[5], .25f * a.pixels[20] + .75f * b.pixels[20]);
   EXPECT_NE(refusal({write("3.exr", a, "3"), write("4.exr", b, "4")}).find("relief:samples"), std::string::npos);
+}
+
+TEST_F(Merge, AsksForTheMemoryOfItsSums)
+{
+  const std::filesystem::path a = write("a.exr", film(1), "1"), b = write("b.exr", film(2), "2");
+  const std::vector<std::filesystem::path> files = {a, b};
+  memory_limit_set(1);
+  try {
+    merge_pictures(files);
+    ADD_FAILURE() << "no error";
+  } catch (const OutOfMemory& error) {
+    EXPECT_EQ(std::string(error.what()).find(a.string() + ": the sums of its layers"), 0u) << error.what();
+  }
+  memory_limit_reset();
+  EXPECT_EQ(merge_pictures(files).picture.width, kWidth);
 }
 
 TEST_F(Merge, RefusesACheckpointWhosePixelsMayHaveNoSample)
