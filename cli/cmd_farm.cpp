@@ -53,7 +53,8 @@ bool is_in_path(const std::string& program)
 
 /// Reads the options after "--" as `render` will, so that mistakes are found here and not on the farm.
 /// @return whether the number of threads is among them
-/// @error CLI::ParseError; also for options that every part of a frame would use for the same file
+/// @error CLI::ParseError; also for options that every part of a frame would use for the same file, and for more parts than
+///        there are samples for; SceneError if that has to be read and cannot
 bool check_render_options(const FarmArguments& arguments)
 {
   CLI::App app;
@@ -79,9 +80,9 @@ bool check_render_options(const FarmArguments& arguments)
     for (const char* option : {"--png", "--stats", "--preview", "--report", "--reference"}) {
       refuse(option, "with --split, no task has the whole picture");
     }
-    // That of a scene is known to who loads it.
     const CLI::Option& samples = *render.get_option("--spp");
-    if (samples.count() > 0) part_samples({1, arguments.parts}, samples.as<int>());
+    part_samples({1, arguments.parts},
+                 samples.count() > 0 ? samples.as<int>() : scene_settings(arguments.scene).samples);
   }
   return render.get_option("--threads")->count() > 0;
 }

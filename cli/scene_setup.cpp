@@ -21,7 +21,8 @@ void refuse_warnings(const std::string& file, const std::vector<std::string>& wa
 std::vector<int> frames_of(const FrameList& list, const std::string& scene)
 {
   if (!list.all) return list.numbers;
-  const auto [first, last] = scene_frame_range(scene);
+  const RenderSettings settings = scene_settings(scene);
+  const int first = settings.frame_start, last = settings.frame_end;
   if (first < 0 || last > kLastFrame) {
     throw CLI::ValidationError("--frames", fmt::format("expected a scene whose frames are from 0 to {}, found {} to {}",
                                                        kLastFrame, first, last));

@@ -18,7 +18,7 @@ namespace relief {
 void refuse_warnings(const std::string& file, const std::vector<std::string>& warnings);
 
 /// The frames of a list; of "all", those of the scene. Empty: the rest pose.
-/// @error CLI::ValidationError if a scene has frames that no list could name; as scene_frame_range
+/// @error CLI::ValidationError if a scene has frames that no list could name; as scene_settings
 std::vector<int> frames_of(const FrameList& list, const std::string& scene);
 
 /// What the command line says of a scene as a whole, whatever is then done with it.

@@ -743,7 +743,7 @@ void GltfLoader::set_camera(const LoadOptions& options)
   scene_.cameras.push_back(framing.camera());
 }
 
-std::pair<int, int> scene_frame_range(const std::filesystem::path& path)
+RenderSettings scene_settings(const std::filesystem::path& path)
 {
   Warnings unheard;  // the load has the same
   DocumentSet documents;
@@ -756,7 +756,7 @@ std::pair<int, int> scene_frame_range(const std::filesystem::path& path)
     all.insert(all.end(), clips.begin(), clips.end());
   }
   frame_range_from_clips(root, all, settings);
-  return {settings.frame_start, settings.frame_end};
+  return settings;
 }
 
 Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)

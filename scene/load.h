@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <optional>
-#include <utility>
 
 #include "scene/environment_preset.h"
 #include "scene/framing.h"
@@ -17,7 +16,7 @@ struct LoadOptions {
   double frame = 0;        ///< animation time in frames; used only if `has_frame`
   bool has_frame = false;  ///< false: rest pose
   CameraChoice camera;
-  bool needs_camera = false;  ///< it is an error if the file has none
+  bool needs_camera = false;                                ///< it is an error if the file has none
   float luminous_efficacy = 0;                              ///< lm/W of the scene's lights; 0: the scene says
   std::optional<EnvironmentChoice> environment;             ///< empty: the scene's
   std::optional<bool> environment_visible;                  ///< to cameras; empty: as the environment has it
@@ -32,8 +31,8 @@ struct LoadOptions {
 /// @error SceneError for anything wrong with the file or what it refers to; never crashes on any input
 Scene scene_load(const std::filesystem::path& path, const LoadOptions& options = {});
 
-/// First and last frame of a scene, as its RenderSettings would have them, without loading what it shows.
+/// A scene's RenderSettings as scene_load gives them, without loading what it shows.
 /// @error SceneError
-std::pair<int, int> scene_frame_range(const std::filesystem::path& path);
+RenderSettings scene_settings(const std::filesystem::path& path);
 
 }  // namespace relief

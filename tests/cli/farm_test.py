@@ -135,6 +135,17 @@ class FarmTest(unittest.TestCase):
             outcome = self.farm("-o", "o.exr", *words, check=False)
             self.assertEqual(outcome.returncode, code, outcome.stderr)
             self.assertIn(message, outcome.stderr)
+        # The scene's own number, where none is given.
+        scene = json.loads((self.folder / "a 'shot'.gltf").read_text())
+        scene["extensions"]["RELIEF_render"] = {"samples": 16}
+        scene["extensionsUsed"].append("RELIEF_render")
+        (self.folder / "sixteen.gltf").write_text(json.dumps(scene))
+        outcome = self.relief("farm", "slurm", "sixteen.gltf", "-o", "o.exr", "--split", "5", check=False)
+        self.assertEqual(outcome.returncode, 2, outcome.stderr)
+        self.assertIn("at most 4 parts of 16 samples", outcome.stderr)
+        self.assertFalse((self.folder / "farm.slurm.sh").exists())
+        self.relief("farm", "slurm", "sixteen.gltf", "-o", "o.exr", "--split", "5", "--", "--spp", "20")
+        (self.folder / "farm.slurm.sh").unlink()
         scene = json.loads((self.folder / "a 'shot'.gltf").read_text())
         scene["extensions"]["RELIEF_render"] = {"frameRange": [-2, 1]}
         scene["extensionsUsed"].append("RELIEF_render")
