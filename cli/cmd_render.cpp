@@ -338,6 +338,21 @@ void report_resumed(ProgressPrinter& progress, const FramePaths& paths, int fram
                   {"seconds", state.seconds}});
 }
 
+/// What an unfinished frame goes on from, if there is anything; a damaged state is warned about, and the frame begins anew.
+std::optional<SavedRender> state_of(const FramePaths& paths,
+                                    const std::string& fingerprint,
+                                    Statistics& stats,
+                                    ProgressPrinter& progress)
+{
+  try {
+    return exr_state_load(paths.exr, fingerprint);
+  } catch (const InputError& error) {
+    stats.warnings.push_back(fmt::format("{}: the frame begins anew", error.what()));
+    progress.warnings({stats.warnings.back()});
+    return {};
+  }
+}
+
 void report_failed(ProgressPrinter& progress, int frame, const std::string& name, const std::exception& error)
 {
   progress.note(fmt::format("relief: frame {}: {}", name, error_text(error)));
@@ -421,7 +436,7 @@ bool render_frame(const RenderArguments& arguments,
   FrameFiles frame_files(files, paths, command, {compression_of(arguments), arguments.float_color},
                          arguments.aov_mask | report_mask, progress);
   std::optional<SavedRender> saved;
-  if (arguments.resume) saved = exr_state_load(paths.exr, fingerprint);
+  if (arguments.resume) saved = state_of(paths, fingerprint, stats, progress);
   if (saved) {
     options.saved = &*saved;
     report_resumed(progress, paths, stats.frame, saved->state);
@@ -509,6 +524,17 @@ std::vector<std::optional<int>> frames_of_run(const RenderArguments& arguments)
   return {numbers.begin(), numbers.end()};
 }
 
+/// Refuses files that would stand among the events.
+/// @param frame  any of the run: streams have the same name for all
+void refuse_standard_output(const RenderArguments& arguments, std::optional<int> frame)
+{
+  for (const auto& [option, path] : outputs_of(paths_of_frame(arguments, frame))) {
+    if (path.empty() || !is_standard_output(path)) continue;
+    throw CLI::ValidationError(
+        option, fmt::format("expected a file, found '{}': events are printed to standard output", path.string()));
+  }
+}
+
 /// @param session  null: this is the process's only run
 int render_all(const RenderArguments& arguments, const std::string& command, RenderSession* session)
 {
@@ -526,6 +552,7 @@ int render_all(const RenderArguments& arguments, const std::string& command, Ren
   exr_use_threads(threads > 1 ? threads : 0);
   tbb::task_arena arena(threads);
   ProgressPrinter progress(arguments.progress, session != nullptr ? session->request : nlohmann::json());
+  if (progress.is_json()) refuse_standard_output(arguments, frames.front());
   std::optional<KeptFrames> of_run;
   if (session == nullptr && frames.size() > 1) of_run.emplace();
   KeptFrames* const kept = session != nullptr ? session->kept.get() : of_run ? &*of_run : nullptr;

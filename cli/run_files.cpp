@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
@@ -118,6 +119,17 @@ void RunFiles::check_output(const std::string& option, const std::filesystem::pa
   refuse(option, "a file that nothing else is written to",
          fmt::format("'{}', which is '{}' of {}", file.string(), outputs_[found->second].name,
                      outputs_[found->second].what));
+}
+
+bool is_standard_output(const std::filesystem::path& path)
+{
+  struct stat file {
+  }, output{};
+  if (::stat(path.c_str(), &file) != 0 || ::fstat(STDOUT_FILENO, &output) != 0) return false;
+  if (file.st_dev != output.st_dev || file.st_ino != output.st_ino) return false;
+  // Nobody reads what both throw away.
+  std::error_code ignored;
+  return !std::filesystem::equivalent(path, "/dev/null", ignored);
 }
 
 void check_writable(const std::filesystem::path& path)

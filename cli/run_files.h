@@ -57,6 +57,9 @@ class RunFiles {
   mutable std::unordered_map<std::string, std::string> canonical_;  ///< of folders that were met
 };
 
+/// Whether what is written to a file stands among what is printed: it is standard output, whatever its name.
+bool is_standard_output(const std::filesystem::path& path);
+
 /// Fails now if a file could not be written after hours of work. Pipes are left alone: their reader would see an end.
 /// @error OutputError
 void check_writable(const std::filesystem::path& path);

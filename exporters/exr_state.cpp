@@ -15,6 +15,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "exporters/errors.h"
 #include "exporters/exr_rows.h"
 #include "exporters/side_file.h"
 #include "scene/memory.h"
@@ -97,6 +98,11 @@ std::string attribute_of(const Imf::Header& header, const char* name)
   return text != nullptr ? text->value() : std::string();
 }
 
+[[noreturn]] void refuse(const char* expected, const std::string& found)
+{
+  throw std::runtime_error(std::string("expected ") + expected + ", found " + found);
+}
+
 /// @error std::exception of any kind if the part is not what was written
 SavedRender part_load(Imf::MultiPartInputFile& input, int index, const std::string& file)
 {
@@ -108,17 +114,23 @@ SavedRender part_load(Imf::MultiPartInputFile& input, int index, const std::stri
   // The sides are within kMaxSide, or OpenEXR would not have opened the file.
   saved.width = window.max.x - window.min.x + 1;
   saved.height = window.max.y - window.min.y + 1;
-  if (num_sums == 0 || num_sums > kMostSums || !input.partComplete(index)) throw std::runtime_error("no state");
+  if (num_sums == 0 || num_sums > kMostSums)
+    refuse("a state's sums in channels", std::to_string(num_sums) + " channels");
+  if (!input.partComplete(index)) refuse("all rows of the state", "a file that was cut short");
   const std::size_t size = static_cast<std::size_t>(saved.width) * static_cast<std::size_t>(saved.height) * num_sums;
   // It is stored uncompressed: whoever claims more sums than the file has room for asks for no memory.
-  if (size > std::filesystem::file_size(file) / sizeof(float)) throw std::runtime_error("no state");
+  const std::uintmax_t file_size = std::filesystem::file_size(file);
+  if (size > file_size / sizeof(float)) {
+    refuse("a state within the file", std::to_string(size) + " sums in " + std::to_string(file_size) + " bytes");
+  }
   memory_require(size * sizeof(float), file);
   saved.sums.resize(size);
   Imf::InputPart part(input, index);
   part.setFrameBuffer(frame_buffer(saved.sums.data(), num_sums, window));
   part.readPixels(window.min.y, window.max.y);
   const std::string text = attribute_of(header, kState);
-  if (attribute_of(header, kHash) != state_hash(text, saved.sums)) throw std::runtime_error("no state");
+  const std::string expected = attribute_of(header, kHash), found = state_hash(text, saved.sums);
+  if (expected != found) refuse(("a state whose hash is '" + expected + "'").c_str(), "one of '" + found + "'");
   const nlohmann::json json = nlohmann::json::parse(text);
   visit(saved.state, [&](const char* name, auto& value) { json.at(name).get_to(value); });
   return saved;
@@ -180,8 +192,11 @@ std::optional<SavedRender> exr_state_load(const std::filesystem::path& path, con
     throw;
   } catch (const std::bad_alloc&) {
     throw OutOfMemory(file);
-  } catch (const std::exception&) {
-    // No picture, or cut short: as if there were none.
+  } catch (const std::exception& error) {
+    // What the libraries say may be several lines, and name the file.
+    std::string cause = error.what();
+    if (!cause.starts_with("expected ")) cause = "expected a saved state, found a file that cannot be read: " + cause;
+    throw InputError(file, cause);
   }
   return {};
 }

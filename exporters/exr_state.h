@@ -28,8 +28,8 @@ void exr_write(const std::filesystem::path& path,
                const std::vector<ChannelView>& more = {});
 
 /// Reads the second part.
-/// @return nothing if there is none, if it has another fingerprint, or if it is damaged
-/// @error OutOfMemory
+/// @return nothing if there is no file, no such part, or one of another fingerprint
+/// @error OutOfMemory; InputError, with what was expected and found, if the file is no OpenEXR file or the part is damaged
 std::optional<SavedRender> exr_state_load(const std::filesystem::path& path, const std::string& fingerprint);
 
 }  // namespace relief

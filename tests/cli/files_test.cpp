@@ -493,6 +493,22 @@ TEST_F(FilesOfARun, WhatAKilledRunLeftIsRemovedByTheNext)
   for (const std::string& name : files()) EXPECT_FALSE(name.starts_with(".")) << name;
 }
 
+TEST_F(FilesOfARun, EventsAndPicturesAreNotMixed)
+{
+  // What /dev/stdout is, a file that standard output goes to, and one that takes both and keeps neither.
+  const std::tuple<std::string, std::string, int> kCases[] = {
+      {"/proc/self/fd/1", file("a.exr"), 2}, {file("a.exr"), file("a.exr"), 2}, {"/dev/null", "/dev/null", 0}};
+  for (const auto& [output, standard_output, exit_code] : kCases) {
+    const std::string command = std::string(RELIEF_PROGRAM) + " render " + scene_ + " -o " + output +
+                                " --resolution 8x8 --spp 1 --progress json 2>" + file("stderr") + " >" +
+                                standard_output;
+    EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), exit_code) << command;
+    EXPECT_EQ(bytes_of_file(file("stderr")).find("--output: expected a file, found '") != std::string::npos,
+              exit_code != 0)
+        << bytes_of_file(file("stderr"));
+  }
+}
+
 TEST_F(FilesOfARun, APipeTakesAPicture)
 {
   // OpenEXR goes back to its table of offsets, which a pipe cannot. What /dev/stdout is, but ours to lose.

@@ -78,6 +78,18 @@ TEST_F(Serving, MistakesHaveTheTextAndCodeOfRender)
   expect(words("o.exr"), 0, "");
 }
 
+TEST_F(Serving, APictureOnStandardOutputIsRefused)
+{
+  for (const char* name : {"/dev/stdout", "/proc/self/fd/1"}) {
+    const nlohmann::json end = server_.render(1, {scene_, "-o", name, "--spp", "1"});
+    EXPECT_EQ(end["exit_code"], 2) << end;
+    EXPECT_NE(end.value("error", "").find("expected a file, found '" + std::string(name) + "'"), std::string::npos)
+        << end;
+  }
+  EXPECT_EQ(server_.render(2, words("o.exr", {"--stats", "/dev/stdout"}))["exit_code"], 2);
+  EXPECT_EQ(server_.render(3, words("o.exr", {"--stats", "/dev/null"}))["exit_code"], 0);
+}
+
 TEST_F(Serving, ACancelSavesWhatIsRendered)
 {
   server_.ask(1, words("o.exr", {"--spp", kEndless}));

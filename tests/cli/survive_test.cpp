@@ -129,15 +129,24 @@ TEST_F(SurvivingRun, AStateIsOfItsSettingsAndIsNotAskedForWithoutResume)
   EXPECT_EQ(run(patient(file("a.exr"))).count("resumed"), 0);
 }
 
-TEST_F(SurvivingRun, AFileThatIsCutShortHasNoState)
+TEST_F(SurvivingRun, AStateThatIsDamagedIsWarnedAboutAndBegunAnew)
 {
   leave_state(file("a.exr"), SIGKILL);
   const std::string bytes = bytes_of_file(file("a.exr"));
-  for (const double part : {0.001, 0.3, 0.99}) {
-    folder_.write("a.exr", bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
+  std::string turned = bytes;
+  turned[turned.size() - 3] = static_cast<char>(turned[turned.size() - 3] ^ 1);
+  std::vector<std::string> bad = {turned};
+  for (const double part : {0.0, 0.001, 0.3, 0.99}) {
+    bad.push_back(bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
+  }
+  for (const std::string& damaged : bad) {
+    folder_.write("a.exr", damaged);
     const Outcome outcome = run(patient(file("a.exr"), {"--time-limit", "0.05"}));
-    EXPECT_EQ(outcome.exit_code, 0) << part << outcome.errors;
-    EXPECT_EQ(outcome.count("resumed"), 0) << part;
+    EXPECT_EQ(outcome.exit_code, 0) << damaged.size() << outcome.errors;
+    EXPECT_EQ(outcome.count("resumed"), 0) << damaged.size();
+    EXPECT_NE(outcome.errors.find("relief: warning: " + file("a.exr") + ": expected "), std::string::npos)
+        << damaged.size() << outcome.errors;
+    EXPECT_NE(outcome.errors.find(": the frame begins anew\n"), std::string::npos) << outcome.errors;
   }
 }
 

@@ -43,6 +43,21 @@ class ExrStateTest : public FolderTest {
     exr_write(file("a.exr"), film_.view, {{"relief:seed", "7"}}, {}, {saved_.state, saved_.sums, fingerprint});
   }
 
+  /// Whether a file's state is refused with its name, what was expected and what was found, one of which is given.
+  testing::AssertionResult is_refused(const std::string& name, const std::string& text)
+  {
+    try {
+      exr_state_load(file(name), "abc");
+    } catch (const InputError& error) {
+      const bool says_all = error.file == file(name) && error.cause.starts_with("expected ") &&
+                            error.cause.find(", found ") != std::string::npos &&
+                            error.cause.find('\n') == std::string::npos;
+      if (says_all && error.cause.find(text) != std::string::npos) return testing::AssertionSuccess();
+      return testing::AssertionFailure() << error.what();
+    }
+    return testing::AssertionFailure() << "no error";
+  }
+
   TestFilm film_;
   SavedRender saved_;
 };
@@ -97,13 +112,13 @@ TEST_F(ExrStateTest, IsOfItsFingerprintAlone)
   EXPECT_FALSE(exr_state_load(file("a.exr"), "")) << "a whole picture has no state";
 }
 
-TEST_F(ExrStateTest, IsNoneIfTheFileIsCutShortOrItsTextDamaged)
+TEST_F(ExrStateTest, IsRefusedIfTheFileIsCutShortOrItsTextDamaged)
 {
   write("abc");
   const std::string bytes = bytes_of_file(file("a.exr"));
   for (const double part : {0.0, 0.001, 0.1, 0.5, 0.9, 0.9999}) {
     write_bytes(file("cut.exr"), bytes.substr(0, static_cast<std::size_t>(part * static_cast<double>(bytes.size()))));
-    EXPECT_FALSE(exr_state_load(file("cut.exr"), "abc")) << part;
+    EXPECT_TRUE(is_refused("cut.exr", part < 0.01 ? "found a file that cannot be read: " : "")) << part;
   }
   for (const std::string word : {"done_samples", "\"active\":[", "camera_rays"}) {
     std::string damaged = bytes;
@@ -111,11 +126,11 @@ TEST_F(ExrStateTest, IsNoneIfTheFileIsCutShortOrItsTextDamaged)
     ASSERT_NE(at, std::string::npos) << word;
     damaged[at + 1] = '#';
     write_bytes(file("damaged.exr"), damaged);
-    EXPECT_FALSE(exr_state_load(file("damaged.exr"), "abc")) << word;
+    EXPECT_TRUE(is_refused("damaged.exr", "expected a state whose hash is '")) << word;
   }
 }
 
-TEST_F(ExrStateTest, IsNoneIfABitOfItHasTurned)
+TEST_F(ExrStateTest, IsRefusedIfABitOfItHasTurned)
 {
   write("abc");
   const std::string bytes = bytes_of_file(file("a.exr"));
@@ -132,7 +147,7 @@ TEST_F(ExrStateTest, IsNoneIfABitOfItHasTurned)
       std::string damaged = bytes;
       damaged[at] = static_cast<char>(damaged[at] ^ (1 << bit));
       write_bytes(file("damaged.exr"), damaged);
-      EXPECT_FALSE(exr_state_load(file("damaged.exr"), "abc")) << at << " bit " << bit;
+      EXPECT_TRUE(is_refused("damaged.exr", "expected a state whose hash is '")) << at << " bit " << bit;
     }
   }
   // The highest bits of two words: products alone leave them where they are, and the one would undo the other.
