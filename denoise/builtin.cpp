@@ -14,8 +14,8 @@ DenoiseResult denoise_builtin(const DenoiseInput& input)
   const int width = input.width, height = input.height;
   Halves halves = halves_make(input);
   replace_fireflies(halves);
-  // The widths' pictures, and last the one that is not filtered.
-  std::vector<Candidate> candidates(kNumFits + 1, Candidate(width, height));
+  find_independent_parts(halves);
+  std::vector<Candidate> candidates(kNumFits, Candidate(width, height));
   {
     const std::array<FeatureColumns, 2> features = features_filter(input);
     ColorPlanes variance = halves.variance;
@@ -27,14 +27,7 @@ DenoiseResult denoise_builtin(const DenoiseInput& input)
     }
     for (std::size_t half = 0; half < 2; ++half) half_filter(halves, half, variance, features[half], candidates);
   }
-  Candidate& unfiltered = candidates.back();
-  for_pixels(halves.is_known, [&](int x, int y) {
-    for (std::size_t c = 0; c < 3; ++c) {
-      unfiltered.color[c].row(y)[x] = halves.mean(c, x, y);
-      unfiltered.difference[c].row(y)[x] = halves.color[0][c].row(y)[x] - halves.color[1][c].row(y)[x];
-    }
-  });
-  const Candidate picture = candidates_choose(halves, candidates);
+  const Candidate picture = candidates_combine(halves, candidates);
 
   DenoiseResult result;
   result.color.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 3);

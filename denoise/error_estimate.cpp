@@ -27,7 +27,7 @@ Residual residual_of(const Halves& halves, const Candidate& picture, std::size_t
   return to;
 }
 
-/// The direction in which a picture changes least at a pixel: of its neighbours one that lies there.
+/// The direction in which a picture changes least at a pixel, as the offset of a pixel that lies there.
 struct Direction {
   int x, y;
 };
@@ -38,17 +38,16 @@ Direction direction_along(const ColorPlanes& color, int x, int y)
     const int at_x = std::clamp(x + dx, 0, color[0].width() - 1), at_y = std::clamp(y + dy, 0, color[0].height() - 1);
     return color[0].row(at_y)[at_x] + color[1].row(at_y)[at_x] + color[2].row(at_y)[at_x];
   };
-  const auto change = [&](int dx, int dy) { return std::abs(at(dx, dy) - at(-dx, -dy)); };
-  // Sobel's derivatives in all four directions; diagonal neighbours are further away.
-  constexpr float kDiagonal = 0.70710678f;
-  const float across = 2 * change(1, 0) + change(1, 1) + change(1, -1),
-              down = 2 * change(0, 1) + change(1, 1) + change(-1, 1);
-  const float falling = kDiagonal * (2 * change(1, 1)) + change(1, 0) + change(0, 1),
-              rising = kDiagonal * (2 * change(1, -1)) + change(1, 0) + change(0, 1);
-  const float least = std::min({across, down, falling, rising});
-  if (across == least) return {1, 0};
-  if (down == least) return {0, 1};
-  return falling == least ? Direction{1, 1} : Direction{1, -1};
+  // Sobel's derivatives; along an edge is across them.
+  const float across = 2 * (at(1, 0) - at(-1, 0)) + at(1, 1) - at(-1, 1) + at(1, -1) - at(-1, -1);
+  const float down = 2 * (at(0, 1) - at(0, -1)) + at(1, 1) - at(1, -1) + at(-1, 1) - at(-1, -1);
+  const float along_x = std::abs(down), along_y = std::abs(across);
+  // Between 0, 26.6 and 45 degrees.
+  constexpr float kFlat = 0.236f, kSteep = 0.721f;
+  const float least = std::min(along_x, along_y), most = std::max(along_x, along_y);
+  const int longer = least > kFlat * most && least <= kSteep * most ? 2 : 1, shorter = least > kFlat * most ? 1 : 0;
+  const int sign = (down > 0) == (across > 0) ? -1 : 1;
+  return along_x >= along_y ? Direction{longer, sign * shorter} : Direction{shorter, sign * longer};
 }
 
 /// Product of the systematic errors of a pixel and of those beside it, by chance far from the truth. An edge that is blurred
@@ -70,22 +69,6 @@ float bias_product(const Residual& residual, Direction along, int x, int y)
   return count > 0 ? sum / count : 0.0f;
 }
 
-/// Part of the difference of halves that is the picture's noise; the rest is what each lacks of the other, as parts of one
-/// point set complete each other.
-float independent_part(const Halves& halves, std::size_t c)
-{
-  double variance = 0, of_halves = 0;
-  for (int y = 0; y < halves.is_known.height(); ++y) {
-    for (int x = 0; x < halves.is_known.width(); ++x) {
-      const float even = halves.even_share.row(y)[x];
-      const float noise = halves.color[0][c].row(y)[x] - halves.color[1][c].row(y)[x];
-      variance += static_cast<double>(halves.variance[c].row(y)[x]);
-      of_halves += static_cast<double>(even * (1.0f - even) * noise * noise);
-    }
-  }
-  return of_halves > 0 ? static_cast<float>(std::clamp(variance / of_halves, 0.5, 1.0)) : 1.0f;
-}
-
 double sum_of(const Plane& plane)
 {
   double sum = 0;
@@ -96,10 +79,9 @@ double sum_of(const Plane& plane)
 }
 
 /// A mean that is known with a variance, less what chance makes of nothing: what is no more than that is none.
-double significant(double mean, double variance)
+double significant(double mean, double variance, double num_variances = 2)
 {
-  constexpr double kVariances = 2;
-  return mean > 0 ? std::max(mean - kVariances * variance / mean, 0.0) : 0.0;
+  return mean > 0 ? std::max(mean - num_variances * variance / mean, 0.0) : 0.0;
 }
 
 }  // namespace
@@ -116,16 +98,22 @@ void error_estimate(Halves& halves, const Candidate& picture, DenoiseResult& res
   for (std::size_t c = 0; c < 3; ++c) {
     box_filter(halves.lost[c], kLostReach);
     const Residual residual = residual_of(halves, picture, c);
-    const float part = independent_part(halves, c);
     Plane noise(width, height), bias(width, height), bias_square(width, height), scale(width, height);
+    Plane excess(width, height), excess_square(width, height);
     for_pixels(noise, [&](int x, int y) {
       const float left = residual.noise_left.row(y)[x], lost = halves.lost[c].row(y)[x];
-      noise.row(y)[x] = part * left * left + lost * lost;
+      const float independent = halves.independent[c].row(y)[x] * left * left;
+      noise.row(y)[x] = independent + lost * lost;
+      excess.row(y)[x] = gain_of(halves, picture, c, x, y).error(1) - independent;
+      excess_square.row(y)[x] = excess.row(y)[x] * excess.row(y)[x];
       bias.row(y)[x] = bias_product(residual, direction_along(picture.color, x, y), x, y);
       bias_square.row(y)[x] = bias.row(y)[x] * bias.row(y)[x];
       scale.row(y)[x] = halves.variance[c].row(y)[x];
     });
-    const double sum = sum_of(noise) + significant(sum_of(bias), sum_of(bias_square) / kNumPairs);
+    // What the filter does wrong, known in two ways. The second knows of detail of one pixel's size, but rests on variances,
+    // so it has to be twice as sure.
+    const double blurred = significant(sum_of(bias), sum_of(bias_square) / kNumPairs);
+    const double sum = sum_of(noise) + std::max(blurred, significant(sum_of(excess), sum_of(excess_square), 4));
     total += sum;
     // Errors stay where noise is: parts of it are averaged.
     box_filter(scale, 1);

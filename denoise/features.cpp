@@ -23,10 +23,15 @@ constexpr Group kGroups[] = {{0, 3}, {3, 3}, {6, 1}};
 struct GroupPlanes {
   GroupPlanes(std::size_t count, int width, int height)
   {
-    for (std::vector<Plane>* planes : {&half[0], &half[1], &variance}) planes->assign(count, Plane(width, height));
+    for (std::vector<Plane>* planes : {&half[0], &half[1], &variance, &emission[0], &emission[1]}) {
+      planes->assign(count, Plane(width, height));
+    }
   }
   std::array<std::vector<Plane>, 2> half;
   std::vector<Plane> variance;  ///< of a half
+  /// What is not filtered: the part of an albedo above 1, which is an emitter's light. It is in the colour as it is in the
+  /// feature, noise and all, so that it tells the colour exactly; filtered, small lamps became blobs.
+  std::array<std::vector<Plane>, 2> emission;
 };
 
 float finite_or_0(float x) { return std::isfinite(x) ? x : 0.0f; }
@@ -42,9 +47,14 @@ GroupPlanes group_load(const DenoiseInput& input, Group group)
         const bool has_halves = even_share < 1;
         const float even = half.first == nullptr || !has_halves ? all : finite_or_0(half.at(x, y));
         const float odd = has_halves ? (all - even_share * even) / (1.0f - even_share) : all;
-        planes.half[0][i].row(y)[x] = even;
-        planes.half[1][i].row(y)[x] = odd;
-        planes.variance[i].row(y)[x] = 0.5f * (even - odd) * (even - odd);
+        const std::array<float, 2> values = {even, odd};
+        for (std::size_t of = 0; of < 2; ++of) {
+          const float emission = group.first == 0 ? std::max(values[of] - 1.0f, 0.0f) : 0.0f;
+          planes.emission[of][i].row(y)[x] = emission;
+          planes.half[of][i].row(y)[x] = values[of] - emission;
+        }
+        const float difference = planes.half[0][i].row(y)[x] - planes.half[1][i].row(y)[x];
+        planes.variance[i].row(y)[x] = 0.5f * difference * difference;
       }
     });
     box_filter(planes.variance[i], 1);
@@ -135,8 +145,11 @@ void group_filter(const DenoiseInput& input, Group group, std::array<FeatureColu
             static_cast<std::size_t>(y) * static_cast<std::size_t>(input.width) + static_cast<std::size_t>(x);
         for (std::size_t i = 0; i < group.count; ++i) {
           const auto at = (i * kTile + static_cast<std::size_t>(y - y0)) * kTile + static_cast<std::size_t>(x - x0);
-          const float even = is_filtered ? filtered[0][at] : planes.half[0][i].row(y)[x];
-          const float odd = is_filtered ? filtered[1][at] : planes.half[1][i].row(y)[x];
+          const auto value = [&](std::size_t half) {
+            return planes.emission[half][i].row(y)[x] +
+                   (is_filtered ? filtered[half][at] : planes.half[half][i].row(y)[x]);
+          };
+          const float even = value(0), odd = value(1);
           const std::size_t to = pixel * 8 + 1 + group.first + i;
           columns[0].value[to] = even;
           columns[1].value[to] = odd;

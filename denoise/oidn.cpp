@@ -174,6 +174,7 @@ DenoiseResult denoise_oidn(const DenoiseInput& input)
 {
   const Session session(input);
   Halves halves = halves_make(input);
+  find_independent_parts(halves);
   ColorPlanes mean = color_planes(input.width, input.height);
   for (std::size_t c = 0; c < 3; ++c) {
     for_pixels(mean[c], [&](int x, int y) { mean[c].row(y)[x] = halves.mean(c, x, y); });

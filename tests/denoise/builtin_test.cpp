@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <random>
 
 #include "tests/denoise/test_picture.h"
 
@@ -182,6 +183,94 @@ TEST(BuiltinDenoiser, InstructionSetsAgree)
   const DenoiseResult baseline = denoise_builtin(picture.input());
   unsetenv("RELIEF_ISA");
   for (std::size_t i = 0; i < best.color.size(); ++i) ASSERT_NEAR(best.color[i], baseline.color[i], 1e-3f) << i;
+}
+
+/// Detail that no feature knows and no neighbour shares: one of two values, by chance.
+double speckle(int x, int y)
+{
+  // A few rounds of a hash of the pixel.
+  unsigned h = static_cast<unsigned>(x) * 0x9e3779b9u ^ static_cast<unsigned>(y) * 0x85ebca6bu;
+  for (int i = 0; i < 3; ++i) h = (h ^ h >> 15) * 0x2c1b3c6du;
+  return (h >> 16 & 1u) == 0 ? 0.85 : 1.15;
+}
+
+// Halves of one point set differ by more than the picture is off, here twice as much. Taken for its noise, that would be more
+// than the detail, and worth blurring.
+TEST(BuiltinDenoiser, DetailIsNotTakenForWhatHalvesLackOfEachOther)
+{
+  const TestPicture picture = test_picture(128, 96, {0.1, -0.6, 0, 8}, speckle);
+  const DenoiseResult result = denoise_builtin(picture.input());
+  EXPECT_LT(picture.rmse(result.color), picture.rmse(picture.noisy()));
+  EXPECT_NEAR(result.rmse / picture.rmse(result.color), 1, 0.1);
+}
+
+// As large as the noise: a little may be gained, and it is known how much is not.
+TEST(BuiltinDenoiser, DetailThatNothingTellsFromNoiseIsHalfDenoised)
+{
+  const TestPicture picture = test_picture(128, 96, {0.15, 0, 0, 9}, speckle);
+  const DenoiseResult result = denoise_builtin(picture.input());
+  // The best linear estimate halves the squared error.
+  EXPECT_NEAR(picture.rmse(result.color) / picture.rmse(picture.noisy()), std::sqrt(0.5), 0.06);
+  EXPECT_NEAR(result.rmse / picture.rmse(result.color), 1, 0.1);
+}
+
+/// Four samples a pixel before a grey wall, of which some hit a lamp of less than a pixel's size.
+/// @param is_emitter  whether features tell, as a render's albedo does
+TestPicture lamps(bool is_emitter, unsigned seed)
+{
+  constexpr float kRadiance = 20;
+  TestPicture picture = test_picture(128, 96, {0.05, 0, 0, seed}, one);
+  std::mt19937 engine(seed + 100);
+  std::uniform_real_distribution<double> uniform;
+  const std::size_t n = picture.num_pixels();
+  for (std::size_t pixel = 0; pixel < n; ++pixel) {
+    // In the upper third.
+    const double coverage = pixel < n / 3 && uniform(engine) < 0.1 ? uniform(engine) : 0.0;
+    float even = 0, odd = 0;
+    for (int sample = 0; sample < 4; ++sample) (sample % 2 == 0 ? even : odd) += uniform(engine) < coverage ? 0.5f : 0;
+    const float mean = 0.5f * (even + odd);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::size_t at = c * n + pixel;
+      picture.truth[at] += static_cast<double>(kRadiance) * coverage;
+      picture.beauty[at] += kRadiance * mean;
+      picture.half[at] += kRadiance * even;
+      picture.variance[at] += kRadiance * kRadiance * mean * (1 - mean) / 3;
+      picture.features[at] = 0.5f + (is_emitter ? kRadiance * mean : 0);
+      picture.features_half[at] = 0.5f + (is_emitter ? kRadiance * even : 0);
+    }
+    picture.samples[pixel] = 4;
+  }
+  return picture;
+}
+
+/// Of pixels that are wall alone.
+double rmse_of_wall(const TestPicture& picture, const std::vector<float>& color)
+{
+  double sum = 0, count = 0;
+  for (std::size_t pixel = 0; pixel < picture.num_pixels(); ++pixel) {
+    if (picture.truth[pixel] > 1) continue;
+    sum += std::pow(static_cast<double>(color[3 * pixel]) - 1, 2.0);
+    ++count;
+  }
+  return std::sqrt(sum / count);
+}
+
+TEST(BuiltinDenoiser, SmallLampsStayAndTheWallsBesideThemAreDenoised)
+{
+  const TestPicture picture = lamps(true, 10);
+  const DenoiseResult result = denoise_builtin(picture.input());
+  EXPECT_LT(rmse_of_wall(picture, result.color), 0.7 * rmse_of_wall(picture, picture.noisy()));
+  EXPECT_LT(picture.rmse(result.color), 1.01 * picture.rmse(picture.noisy()));
+  EXPECT_NEAR(result.rmse / picture.rmse(result.color), 1, 0.2);
+}
+
+// Lamps that only the colours know are like noise of rare samples; blurred they would be half as far off again.
+TEST(BuiltinDenoiser, SpotsThatNoFeatureKnowsDoNotBecomeBlobs)
+{
+  const TestPicture picture = lamps(false, 11);
+  const DenoiseResult result = denoise_builtin(picture.input());
+  EXPECT_LT(picture.rmse(result.color), 1.05 * picture.rmse(picture.noisy()));
+  EXPECT_NEAR(result.rmse / picture.rmse(result.color), 1, 0.2);
 }
 
 struct ErrorCase {
