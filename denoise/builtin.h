@@ -1,11 +1,11 @@
 // The built-in denoiser: first-order regression of the colours on features, each half of the samples filtered by weights
-// from the other, in two widths between which, and the picture as it is, every pixel has the one whose error is estimated
-// to be least. The halves also tell the error that is left.
+// from the other, in two widths. Every pixel moves towards the better one by as much as the halves say that it pays
+// (candidate.h). The halves also tell the error that is left (error_estimate.h).
 //
 // Source: Bitterli et al. 2016, "Nonlinearly Weighted First-order Regression for Denoising Monte Carlo Renderings"; the weights
 // are those of Rousselle et al. 2012, "Adaptive Rendering with Non-Local Means Filtering". We differ in this: fireflies are
-// taken out first; regressions are centred at every second pixel; features of a half are its own; and how errors are
-// estimated (candidate.h, error_estimate.h).
+// taken out first; regressions are centred at every second pixel; features of a half are its own, emitters' light in them is not
+// filtered; and how errors are estimated.
 #pragma once
 
 #include "denoise/image.h"

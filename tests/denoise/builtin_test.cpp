@@ -243,11 +243,11 @@ TestPicture lamps(bool is_emitter, unsigned seed)
   return picture;
 }
 
-/// Of pixels that are wall alone.
-double rmse_of_wall(const TestPicture& picture, const std::vector<float>& color)
+/// Of pixels of some rows that are wall alone.
+double rmse_of_wall(const TestPicture& picture, const std::vector<float>& color, int first_row, int end_row)
 {
   double sum = 0, count = 0;
-  for (std::size_t pixel = 0; pixel < picture.num_pixels(); ++pixel) {
+  for (std::size_t pixel = picture.pixel(0, first_row); pixel < picture.pixel(0, end_row); ++pixel) {
     if (picture.truth[pixel] > 1) continue;
     sum += std::pow(static_cast<double>(color[3 * pixel]) - 1, 2.0);
     ++count;
@@ -255,12 +255,14 @@ double rmse_of_wall(const TestPicture& picture, const std::vector<float>& color)
   return std::sqrt(sum / count);
 }
 
-TEST(BuiltinDenoiser, SmallLampsStayAndTheWallsBesideThemAreDenoised)
+// Filtered like other features, emission makes blobs: .35 on the wall between the lamps.
+TEST(BuiltinDenoiser, SmallLampsStayAndTheWallBesideThemIsDenoised)
 {
   const TestPicture picture = lamps(true, 10);
   const DenoiseResult result = denoise_builtin(picture.input());
-  EXPECT_LT(rmse_of_wall(picture, result.color), 0.7 * rmse_of_wall(picture, picture.noisy()));
-  EXPECT_LT(picture.rmse(result.color), 1.01 * picture.rmse(picture.noisy()));
+  EXPECT_LT(rmse_of_wall(picture, result.color, 0, 32), 0.1) << "between the lamps";
+  EXPECT_LT(rmse_of_wall(picture, result.color, 45, 96), 0.01) << "away from them";
+  EXPECT_LT(picture.rmse(result.color), picture.rmse(picture.noisy()));
   EXPECT_NEAR(result.rmse / picture.rmse(result.color), 1, 0.2);
 }
 
