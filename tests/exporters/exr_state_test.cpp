@@ -147,14 +147,14 @@ TEST_F(ExrStateTest, IsRefusedIfABitOfItHasTurned)
       std::string damaged = bytes;
       damaged[at] = static_cast<char>(damaged[at] ^ (1 << bit));
       write_bytes(file("damaged.exr"), damaged);
-      EXPECT_TRUE(is_refused("damaged.exr", "expected a state whose hash is '")) << at << " bit " << bit;
+      EXPECT_TRUE(is_refused("damaged.exr", "")) << at << " bit " << bit;
     }
   }
   // The highest bits of two words: products alone leave them where they are, and the one would undo the other.
   std::string damaged = bytes;
   for (const std::size_t at : {sums_end - 5, sums_end - 13}) damaged[at] = static_cast<char>(damaged[at] ^ 0x80);
   write_bytes(file("damaged.exr"), damaged);
-  EXPECT_FALSE(exr_state_load(file("damaged.exr"), "abc"));
+  EXPECT_TRUE(is_refused("damaged.exr", "expected a state whose hash is '"));
 }
 
 }  // namespace

@@ -249,9 +249,15 @@ TEST_F(Merge, WithoutCountsWeighsByTheMetadataAndWithoutThoseRefuses)
 
 TEST_F(Merge, AsksForTheMemoryOfItsSums)
 {
-  const std::filesystem::path a = write("a.exr", film(1), "1"), b = write("b.exr", film(2), "2");
+  constexpr int kSide = 300;
+  const std::filesystem::path a = write("a.exr", TestFilm(kSide, kSide, 1), "1"),
+                              b = write("b.exr", TestFilm(kSide, kSide, 2), "2");
   const std::vector<std::filesystem::path> files = {a, b};
-  memory_limit_set(1);
+  // Room for the picture and half of its sums, which are twice as large.
+  const std::uint64_t picture = exr_load(a).channels.size() * kSide * kSide * sizeof(float);
+  constexpr std::uint64_t kMuch = std::uint64_t{1} << 50;
+  memory_limit_set(kMuch);
+  memory_limit_set(kMuch - memory_left() + 2 * picture);
   try {
     merge_pictures(files);
     ADD_FAILURE() << "no error";
@@ -259,7 +265,7 @@ TEST_F(Merge, AsksForTheMemoryOfItsSums)
     EXPECT_EQ(std::string(error.what()).find(a.string() + ": the sums of its layers"), 0u) << error.what();
   }
   memory_limit_reset();
-  EXPECT_EQ(merge_pictures(files).picture.width, kWidth);
+  EXPECT_EQ(merge_pictures(files).picture.width, kSide);
 }
 
 TEST_F(Merge, RefusesACheckpointWhosePixelsMayHaveNoSample)
