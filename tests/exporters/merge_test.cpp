@@ -7,7 +7,6 @@
 
 #include "exporters/errors.h"
 #include "exporters/exr.h"
-#include "scene/memory.h"
 #include "tests/exporters/test_pictures.h"
 
 namespace relief {
@@ -245,27 +244,6 @@ TEST_F(Merge, WithoutCountsWeighsByTheMetadataAndWithoutThoseRefuses)
           .picture;
   EXPECT_FLOAT_EQ(merged.find("R")->values[5], .25f * a.pixels[20] + .75f * b.pixels[20]);
   EXPECT_NE(refusal({write("3.exr", a, "3"), write("4.exr", b, "4")}).find("relief:samples"), std::string::npos);
-}
-
-TEST_F(Merge, AsksForTheMemoryOfItsSums)
-{
-  constexpr int kSide = 300;
-  const std::filesystem::path a = write("a.exr", TestFilm(kSide, kSide, 1), "1"),
-                              b = write("b.exr", TestFilm(kSide, kSide, 2), "2");
-  const std::vector<std::filesystem::path> files = {a, b};
-  // Room for the picture and half of its sums, which are twice as large.
-  const std::uint64_t picture = exr_load(a).channels.size() * kSide * kSide * sizeof(float);
-  constexpr std::uint64_t kMuch = std::uint64_t{1} << 50;
-  memory_limit_set(kMuch);
-  memory_limit_set(kMuch - memory_left() + 2 * picture);
-  try {
-    merge_pictures(files);
-    ADD_FAILURE() << "no error";
-  } catch (const OutOfMemory& error) {
-    EXPECT_EQ(std::string(error.what()).find(a.string() + ": the sums of its layers"), 0u) << error.what();
-  }
-  memory_limit_reset();
-  EXPECT_EQ(merge_pictures(files).picture.width, kSide);
 }
 
 TEST_F(Merge, RefusesACheckpointWhosePixelsMayHaveNoSample)
