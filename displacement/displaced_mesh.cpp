@@ -12,69 +12,13 @@
 #include "displacement/far_ray.h"
 #include "displacement/lattice_split.h"
 #include "displacement/level_of_detail.h"
+#include "displacement/prism.h"
 #include "displacement/seams.h"
 #include "kernel/math/rounding.h"
 
 namespace relief {
 
 namespace {
-
-/// |N| this many times smaller than at a vertex is taken no smaller: around a point where N vanishes there is no surface.
-constexpr double kLeastNormal = 1e-3;
-
-/// Least distance of the triangle abc from the origin.
-/// @source Ericson 2005, "Real-Time Collision Detection", §5.1.5, for the origin
-double distance_to_origin(Vec3d a, Vec3d b, Vec3d c)
-{
-  const auto segment = [](Vec3d p, Vec3d q) {
-    const Vec3d pq = q - p;
-    const double squared = dot(pq, pq);
-    const double u = squared > 0 ? std::clamp(-dot(p, pq) / squared, 0.0, 1.0) : 0.0;
-    return length(p + u * pq);
-  };
-  const double edges = std::min({segment(a, b), segment(b, c), segment(c, a)});
-  const Vec3d n = cross(b - a, c - a);
-  const double squared = dot(n, n);
-  if (!(squared > 0)) return edges;
-  // Is the origin's projection inside?
-  const Vec3d foot = n * (dot(a, n) / squared);
-  const bool inside =
-      dot(cross(b - a, foot - a), n) >= 0 && dot(cross(c - b, foot - b), n) >= 0 && dot(cross(a - c, foot - c), n) >= 0;
-  return inside ? std::min(edges, length(foot)) : edges;
-}
-
-float round_down(double x)
-{
-  const auto f = static_cast<float>(x);
-  return std::nextafter(f, -kInfinity);
-}
-float round_up(double x)
-{
-  const auto f = static_cast<float>(x);
-  return std::nextafter(f, kInfinity);
-}
-
-/// Whether det(∂/∂b1, ∂/∂b2, ∂/∂s) of P + sN keeps its sign over the prism: it is linear in b and quadratic in s, so its
-/// Bernstein coefficients at the three vertices bound it.
-bool is_unfolded(const DisplacedTriangle& tri)
-{
-  const Vec3d Pu = to_double(tri.P[1]) - to_double(tri.P[0]), Pv = to_double(tri.P[2]) - to_double(tri.P[0]);
-  const Vec3d Nu = to_double(tri.N[1]) - to_double(tri.N[0]), Nv = to_double(tri.N[2]) - to_double(tri.N[0]);
-  const double s0 = tri.s_min, s1 = tri.s_max;
-  // At s0, at both (blossom) and at s1.
-  const Vec3d c0 = cross(Pu + s0 * Nu, Pv + s0 * Nv), c2 = cross(Pu + s1 * Nu, Pv + s1 * Nv);
-  const Vec3d c1 = 0.5 * (cross(Pu + s0 * Nu, Pv + s1 * Nv) + cross(Pu + s1 * Nu, Pv + s0 * Nv));
-  bool positive = true, negative = true;
-  for (const Vec3f& n : tri.N) {
-    for (const Vec3d& c : {c0, c1, c2}) {
-      const double det = dot(c, to_double(n));
-      const double margin = 1e-9 * length(c) * length(to_double(n));
-      positive &= det > margin;
-      negative &= det < -margin;
-    }
-  }
-  return positive || negative;
-}
 
 /// Bounds of the heights between lattice positions on one level.
 /// @param x, y  of the positions
@@ -136,6 +80,19 @@ HeightBounds height_bounds(const DisplacedTriangle& tri,
   return bounds;
 }
 
+/// Sets P and N of a triangle, or of a part of it.
+void place_corners(const MeshView& mesh, const TriangleIndices& v, const LatticeTriangle* part, DisplacedTriangle* tri)
+{
+  const Vec3f P[3] = {mesh.P[v.v0], mesh.P[v.v1], mesh.P[v.v2]};
+  Vec3f N[3];
+  if (mesh.N != nullptr) {
+    N[0] = as_vector(mesh.N[v.v0]);
+    N[1] = as_vector(mesh.N[v.v1]);
+    N[2] = as_vector(mesh.N[v.v2]);
+  }
+  corners_place(P, mesh.N != nullptr ? N : nullptr, part, tri);
+}
+
 /// A triangle without the bounds of its displacement.
 /// @param is_far  becomes true if its texture coordinates are of no use
 DisplacedTriangle place_triangle(const MeshView& mesh,
@@ -149,15 +106,8 @@ DisplacedTriangle place_triangle(const MeshView& mesh,
   const Vec2f* uv = mesh.uv[m.uv_set];
   const TriangleIndices& v = mesh.triangles[index];
   const std::uint32_t vertices[3] = {v.v0, v.v1, v.v2};
-  for (int k = 0; k < 3; ++k) tri.P[k] = mesh.P[vertices[k]];
-  const Vec3d facet = cross(to_double(tri.P[1]) - to_double(tri.P[0]), to_double(tri.P[2]) - to_double(tri.P[0]));
-  const double area = length(facet);
+  place_corners(mesh, v, nullptr, &tri);
   for (int k = 0; k < 3; ++k) {
-    if (mesh.N != nullptr) {
-      tri.N[k] = as_vector(mesh.N[vertices[k]]);
-    } else {
-      tri.N[k] = area > 0 ? to_float(facet * (1.0 / area)) : Vec3f{0, 0, 0};
-    }
     const Vec2f t = uv != nullptr ? uv[vertices[k]] : Vec2f{};
     const double u = static_cast<double>(m.m00) * t.x + static_cast<double>(m.m01) * t.y + m.m02;
     const double w = static_cast<double>(m.m10) * t.x + static_cast<double>(m.m11) * t.y + m.m12;
@@ -181,9 +131,11 @@ DisplacedTriangle place_triangle(const MeshView& mesh,
 DisplacedMesh::DisplacedMesh(const MeshView& mesh,
                              const HeightFieldView& field,
                              const DisplacementMapping& mapping,
-                             std::span<const HeightFieldView* const> coarser)
+                             std::span<const HeightFieldView* const> coarser,
+                             std::span<const MeshShape> steps)
     : triangles_(mesh.num_triangles), unfolded_(mesh.num_triangles), field_(&field), mapping_(mapping)
 {
+  set_steps(mesh, nullptr, steps);
   std::atomic<std::uint32_t> num_far_uv{0}, first_far_uv{mesh.num_triangles};
   tbb::parallel_for(std::uint32_t{0}, mesh.num_triangles, [&](std::uint32_t index) {
     bool is_far = false;
@@ -206,21 +158,18 @@ DisplacedMesh::DisplacedMesh(const MeshView& mesh,
       [&](std::uint32_t index) { return height_bounds(triangles_[index], walls_of(walls_, index), field, coarser); });
 }
 
-DisplacedMesh::DisplacedMesh(const MeshView& mesh, const ProceduralField& field, const DisplacementMapping& mapping)
+DisplacedMesh::DisplacedMesh(const MeshView& mesh,
+                             const ProceduralField& field,
+                             const DisplacementMapping& mapping,
+                             std::span<const MeshShape> steps)
     : triangles_(field.triangles().size()), unfolded_(triangles_.size()), mapping_(mapping)
 {
+  set_steps(mesh, field.triangles().data(), steps);
   tbb::parallel_for(std::size_t{0}, triangles_.size(), [&](std::size_t index) {
     const LatticeTriangle& lattice = field.triangles()[index];
-    const TriangleIndices& v = mesh.triangles[lattice.base];
-    const Vec3f P[3] = {mesh.P[v.v0], mesh.P[v.v1], mesh.P[v.v2]};
-    const Vec3d facet = cross(to_double(P[1]) - to_double(P[0]), to_double(P[2]) - to_double(P[0]));
-    const double area = length(facet);
-    const Vec3f flat = area > 0 ? to_float(facet * (1.0 / area)) : Vec3f{0, 0, 0};
-    const auto normal = [&](std::uint32_t vertex) { return mesh.N != nullptr ? as_vector(mesh.N[vertex]) : flat; };
     DisplacedTriangle& tri = triangles_[index];
+    place_corners(mesh, mesh.triangles[lattice.base], &lattice, &tri);
     for (int k = 0; k < 3; ++k) {
-      tri.P[k] = lattice_corner(lattice.corner[k], P[0], P[1], P[2]);
-      tri.N[k] = lattice_corner(lattice.corner[k], normal(v.v0), normal(v.v1), normal(v.v2));
       tri.x[k] = k == 1 ? lattice.n : 0;
       tri.y[k] = k == 2 ? lattice.n : 0;
     }
@@ -230,6 +179,19 @@ DisplacedMesh::DisplacedMesh(const MeshView& mesh, const ProceduralField& field,
     const LatticeRange range = field.range(index);
     return HeightBounds{range.low, range.high};
   });
+}
+
+/// Makes room for what is known of a mesh that deforms.
+/// @param parts  of the mesh's triangles, which are displaced; null: the triangles are
+/// @param steps  none: it does not deform
+void DisplacedMesh::set_steps(const MeshView& mesh, const LatticeTriangle* parts, std::span<const MeshShape> steps)
+{
+  if (steps.empty()) return;
+  deformation_ = std::make_unique<Deformation>();
+  deformation_->triangles = mesh.triangles;
+  deformation_->parts = parts;
+  deformation_->steps.assign(steps.begin(), steps.end());
+  deformation_->bounds.resize(triangles_.size());
 }
 
 /// Bounds the prisms, and the mesh.
@@ -244,22 +206,16 @@ void DisplacedMesh::bound_triangles(const std::function<HeightBounds(std::uint32
     double d_low = mapping_.scale * (h.low - mapping_.midlevel), d_high = mapping_.scale * (h.high - mapping_.midlevel);
     if (d_low > d_high) std::swap(d_low, d_high);
 
-    const double longest =
-        std::max({length(to_double(tri.N[0])), length(to_double(tri.N[1])), length(to_double(tri.N[2]))});
-    const double shortest =
-        distance_to_origin(to_double(tri.N[0]), to_double(tri.N[1]), to_double(tri.N[2])) * (1 - 1e-9);
-    if (!(longest > 0)) {
+    const PrismReport report = prism_bound(d_low, d_high, &tri);
+    unfolded_[index] = report.unfolded ? 1 : 0;
+    if (deformation_ != nullptr)
+      deformation_->bounds[index] = deforming_bounds_make(*deformation_, index, d_low, d_high);
+    if (report.degenerate) {
       num_degenerate.fetch_add(1, std::memory_order_relaxed);
-      tri.s_min = 1;
-      tri.s_max = 0;
       return;
     }
-    if (shortest < kLeastNormal * longest) num_short.fetch_add(1, std::memory_order_relaxed);
-    const double least = std::max(shortest, kLeastNormal * longest);
-    tri.s_min = round_down(std::min(d_low / least, d_low / longest));
-    tri.s_max = round_up(std::max(d_high / least, d_high / longest));
-    unfolded_[index] = is_unfolded(tri) ? 1 : 0;
-    if (unfolded_[index] == 0) num_folded.fetch_add(1, std::memory_order_relaxed);
+    if (report.short_normals) num_short.fetch_add(1, std::memory_order_relaxed);
+    if (!report.unfolded) num_folded.fetch_add(1, std::memory_order_relaxed);
   });
   report_.num_folded = num_folded;
   report_.num_short_normals = num_short;
@@ -268,8 +224,12 @@ void DisplacedMesh::bound_triangles(const std::function<HeightBounds(std::uint32
       tbb::blocked_range<std::uint32_t>(0, num_triangles), box_empty(),
       [&](const tbb::blocked_range<std::uint32_t>& range, Box3 sum) {
         for (std::uint32_t index = range.begin(); index < range.end(); ++index) {
-          const Box3f each = displaced_triangle_bounds(view(), index);
-          sum = box_union(sum, {each.low, each.high});
+          if (deformation_ == nullptr) {
+            sum = box_union(sum, displaced_triangle_bounds(view(), index));
+            continue;
+          }
+          for (std::uint32_t step = 0; step < deformation_->steps.size(); ++step)
+            sum = box_union(sum, deforming_triangle_bounds(view(), index, step));
         }
         return sum;
       },
@@ -288,16 +248,26 @@ DisplacedMeshView DisplacedMesh::view() const
           mapping_.weld_seams ? seam_edges_.data() : nullptr,
           walls_.data(),
           static_cast<std::uint32_t>(walls_.size()),
-          pad_};
+          pad_,
+          0,
+          deformation_.get()};
 }
 
 float DisplacedMesh::widest_texel() const
 {
   double widest = 0;
-  for (const DisplacedTriangle& tri : triangles_) {
+  const auto widen = [&](const DisplacedTriangle& tri, double texels) {
     const Vec3d a = to_double(tri.P[1]) - to_double(tri.P[0]), b = to_double(tri.P[2]) - to_double(tri.P[0]);
-    const double area = 0.5 * length(cross(a, b)), texels = lattice_area(tri);
-    if (texels > 0) widest = std::max(widest, area / texels);
+    if (texels > 0) widest = std::max(widest, 0.5 * length(cross(a, b)) / texels);
+  };
+  for (std::uint32_t index = 0; index < triangles_.size(); ++index) {
+    const double texels = lattice_area(triangles_[index]);
+    widen(triangles_[index], texels);
+    for (std::uint32_t step = 0; deformation_ != nullptr && step < deformation_->steps.size(); ++step) {
+      DisplacedTriangle then;
+      deforming_triangle_at_step(*deformation_, index, step, &then);
+      widen(then, texels);
+    }
   }
   return static_cast<float>(std::sqrt(widest));
 }
@@ -343,7 +313,7 @@ MapDensity map_density(const MeshView& mesh, const TextureRef& mapping)
   return {std::sqrt(u_squares / area), std::sqrt(v_squares / area)};
 }
 
-Box3f displaced_triangle_bounds(const DisplacedMeshView& mesh, std::uint32_t triangle)
+Box3 displaced_triangle_bounds(const DisplacedMeshView& mesh, std::uint32_t triangle)
 {
   const DisplacedTriangle& tri = mesh.triangles[triangle];
   if (tri.s_min > tri.s_max) {
@@ -372,7 +342,7 @@ Box3f displaced_triangle_bounds(const DisplacedMeshView& mesh, std::uint32_t tri
     *low = round_down(std::max(prism_low, base_low - reach) - pad);
     *high = round_up(std::min(prism_high, base_high + reach) + pad);
   };
-  Box3f box;
+  Box3 box;
   bounds(&Vec3f::x, &box.low.x, &box.high.x);
   bounds(&Vec3f::y, &box.low.y, &box.high.y);
   bounds(&Vec3f::z, &box.low.z, &box.high.z);

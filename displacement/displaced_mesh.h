@@ -3,9 +3,11 @@
 
 #include <cstddef>
 #include <functional>
+#include <memory>
 #include <span>
 #include <vector>
 
+#include "displacement/deformation.h"
 #include "displacement/displaced_triangle.h"
 #include "displacement/procedural_field.h"
 #include "kernel/math/box.h"
@@ -47,11 +49,6 @@ struct MapDensity {
 /// @return  zero for a mesh without the uv set or without area
 MapDensity map_density(const MeshView& mesh, const TextureRef& mapping);
 
-/// Box of a displaced triangle, object space, rounded outward.
-struct Box3f {
-  Vec3f low, high;
-};
-
 /// Bounds of heights.
 struct HeightBounds {
   double low = static_cast<double>(kInfinity), high = -low;
@@ -64,35 +61,44 @@ class DisplacedMesh {
   ///               are triangles whose uv are beyond kMostTexels
   /// @param field   must outlive the mesh
   /// @param coarser levels of the same map that rays may see instead: prisms hold all of their surfaces
-  /// @cost  129 bytes a triangle, and 40 a side of a welded seam; parallel over triangles
+  /// @param steps   of the mesh while the shutter is open, which itself is as when that is half done; what they point to must
+  ///                outlive this. None: it does not deform
+  /// @cost  129 bytes a triangle, 24 more if it deforms, and 40 a side of a welded seam; parallel over triangles
   DisplacedMesh(const MeshView& mesh,
                 const HeightFieldView& field,
                 const DisplacementMapping& mapping,
-                std::span<const HeightFieldView* const> coarser = {});
+                std::span<const HeightFieldView* const> coarser = {},
+                std::span<const MeshShape> steps = {});
 
   /// A mesh whose heights are computed: its triangles are the lattices', which may be parts of the mesh's.
   /// @param field    must outlive the mesh
   /// @param mapping  scale and midlevel
-  DisplacedMesh(const MeshView& mesh, const ProceduralField& field, const DisplacementMapping& mapping);
+  DisplacedMesh(const MeshView& mesh,
+                const ProceduralField& field,
+                const DisplacementMapping& mapping,
+                std::span<const MeshShape> steps = {});
 
   DisplacedMeshView view() const;
   const DisplacedMeshReport& report() const { return report_; }
-  /// Box around all prisms, object space.
+  /// Box around all prisms at all times, object space.
   const Box3& bounds() const { return box_; }
   /// Width of the widest texel on the base mesh, metres of object space: the root of its area. 0 without any.
   float widest_texel() const;
   std::size_t bytes() const
   {
-    return triangles_.size() * (sizeof(DisplacedTriangle) + 1) + seam_edges_.size() + walls_.size() * sizeof(SeamWall);
+    return triangles_.size() * (sizeof(DisplacedTriangle) + 1) + seam_edges_.size() + walls_.size() * sizeof(SeamWall) +
+           (deformation_ != nullptr ? deformation_->bytes() : 0);
   }
 
  private:
+  void set_steps(const MeshView& mesh, const LatticeTriangle* parts, std::span<const MeshShape> steps);
   void bound_triangles(const std::function<HeightBounds(std::uint32_t)>& heights);
 
   std::vector<DisplacedTriangle> triangles_;
   std::vector<std::uint8_t> unfolded_;
   std::vector<std::uint8_t> seam_edges_;  ///< empty: seams stay open
   std::vector<SeamWall> walls_;
+  std::unique_ptr<Deformation> deformation_;  ///< null: there is none
   const HeightFieldView* field_ = nullptr;
   Box3 box_ = box_empty();
   float pad_ = 0;
@@ -101,7 +107,7 @@ class DisplacedMesh {
 };
 
 /// Box around P + s·N for all of a triangle's prism, and at most as far from the base triangle as its displacement;
-/// enlarged by the mesh's pad.
-Box3f displaced_triangle_bounds(const DisplacedMeshView& mesh, std::uint32_t triangle);
+/// enlarged by the mesh's pad. Of meshes that do not deform; rounded outward.
+Box3 displaced_triangle_bounds(const DisplacedMeshView& mesh, std::uint32_t triangle);
 
 }  // namespace relief

@@ -11,6 +11,8 @@
 
 namespace relief {
 
+struct Deformation;  // deformation.h
+
 /// 128 bytes: everything a ray needs of a base triangle.
 struct DisplacedTriangle {
   Vec3f P[3];          ///< object space, metres
@@ -44,6 +46,10 @@ struct DisplacedMeshView {
   const SeamWall* walls = nullptr;           ///< in the order of their edges
   std::uint32_t num_walls = 0;
   float pad = 0;  ///< by which the triangles' boxes are enlarged, metres
+  /// Of a view of one triangle that deforms: its number, by which walls and computed heights know it.
+  std::uint32_t first_triangle = 0;
+  const Deformation* deformation =
+      nullptr;  ///< while the shutter is open: triangles are as when it is half done; null: none
 };
 
 /// Displacement along the unit normal at a lattice position, metres.

@@ -25,7 +25,7 @@ double similarity_scale(const Affine3& m)
   return static_cast<double>(static_cast<float>(std::cbrt(std::abs(determinant))));
 }
 
-DisplacementMethod method_of(const DisplacementSettings& settings, const DisplacementOptions& options)
+DisplacementMethod asked_method(const DisplacementSettings& settings, const DisplacementOptions& options)
 {
   return options.method.value_or(settings.method);
 }
@@ -124,7 +124,7 @@ std::vector<std::string> displacement_warnings(const DisplacementSettings& setti
 {
   std::vector<std::string> texts;
   const float lod = lod_of(settings, options);
-  const DisplacementMethod asked = method_of(settings, options);
+  const DisplacementMethod asked = asked_method(settings, options);
   if (displacement_is_computed(settings)) {
     const std::string of_maps = " has no effect on heights that are computed";
     if (asked != DisplacementMethod::kAuto && asked != kDefaultMethod)
@@ -144,10 +144,29 @@ std::vector<std::string> displacement_warnings(const DisplacementSettings& setti
   return texts;
 }
 
+DisplacementMethod DisplacementSet::method_of(const Use& use, const DisplacementOptions& options) const
+{
+  const DisplacementMethod asked = asked_method(use.settings, options);
+  return !use.steps.empty() && tessellation_kind(asked) ? kDefaultMethod : asked;
+}
+
+/// Says what is not done with a mesh that deforms.
+void DisplacementSet::leave_untessellated(const Use& use, const DisplacementOptions& options)
+{
+  const DisplacementMethod asked = asked_method(use.settings, options);
+  if (has_error(use, options)) {
+    reasons_.push_back("mesh '" + use.mesh_name + "': not diced, as it deforms while the shutter is open");
+  } else if (tessellation_kind(asked)) {
+    untessellated_.push_back(
+        "mesh '" + use.mesh_name + "' deforms while the shutter is open, and is traced by method '" +
+        std::string(displacement_method_label(kDefaultMethod)) + "': tessellations are of one time");
+  }
+}
+
 bool DisplacementSet::has_error(const Use& use, const DisplacementOptions& options) const
 {
   return options.error > 0 && options.camera && use.heights == nullptr && !(lod_of(use.settings, options) > 0) &&
-         method_of(use.settings, options) == DisplacementMethod::kAuto;
+         method_of(use, options) == DisplacementMethod::kAuto;
 }
 
 void DisplacementSet::set_facets(const Use& use, DisplacedGeometry* geometry, bool diced) const
@@ -184,7 +203,7 @@ DisplacementSet::Levels DisplacementSet::levels_of(const Use& use, const Displac
 {
   constexpr float kCoarsest = kMaxLodLevels - 1;
   const float lod = lod_of(use.settings, options);
-  const bool tessellates = tessellation_kind(method_of(use.settings, options)).has_value();
+  const bool tessellates = tessellation_kind(method_of(use, options)).has_value();
   Levels levels;
   if (lod >= 0) {
     levels.first = static_cast<int>(std::min(lod, kCoarsest));
@@ -217,7 +236,10 @@ std::vector<DisplacementSet::Use> DisplacementSet::find_uses(const DisplacementI
     if (is_new) {
       const int heights = instance.heights_index;
       uses.push_back({meshes_[mesh], input.mesh_names[mesh], instance.displacement_index, settings,
-                      heights < 0 ? nullptr : &input.heights[static_cast<std::size_t>(heights)], scale});
+                      heights < 0 ? nullptr : &input.heights[static_cast<std::size_t>(heights)],
+                      mesh < input.mesh_steps.size() ? std::span<const MeshShape>(input.mesh_steps[mesh])
+                                                     : std::span<const MeshShape>{},
+                      scale});
     }
     const Stretch stretch = stretch_of(instance.world_from_object);
     Use& use = uses[static_cast<std::size_t>(at->second)];
@@ -265,10 +287,12 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
     }
     geometries_.push_back(make_displaced(use, options));
     const double num_rays = options.num_rays * picture_share(use, options);
-    if (has_error(use, options)) {
+    if (!use.steps.empty()) {
+      leave_untessellated(use, options);
+    } else if (has_error(use, options)) {
       dice(*geometries_.back(), use, options, num_rays, &tessellated_bytes);
     } else {
-      tessellate(*geometries_.back(), options, method_of(use.settings, options) == DisplacementMethod::kAuto, num_rays,
+      tessellate(*geometries_.back(), options, method_of(use, options) == DisplacementMethod::kAuto, num_rays,
                  &tessellated_bytes);
     }
   }
@@ -300,7 +324,7 @@ void DisplacementSet::set_tree(std::size_t index, std::shared_ptr<RTCSceneTy> tr
 std::unique_ptr<PreparedMesh> DisplacementSet::make_displaced(const Use& use, const DisplacementOptions& options)
 {
   const DisplacementSettings& settings = use.settings;
-  const DisplacementMethod asked = method_of(settings, options);
+  const DisplacementMethod asked = method_of(use, options);
   DisplacedGeometry geometry;
   geometry.method = asked == DisplacementMethod::kAuto ? kDefaultMethod : asked;
   geometry.smooth = settings.smoothing;
@@ -320,7 +344,7 @@ std::unique_ptr<PreparedMesh> DisplacementSet::make_displaced(const Use& use, co
   geometry.lod.num_levels = levels.count;
   set_facets(use, &geometry, false);
   const DisplacementMapping mapping{settings.height, use.scale, settings.midlevel, settings.weld_seams};
-  std::unique_ptr<PreparedMesh> displaced = prisms_of(use.mesh, mapping, fields);
+  std::unique_ptr<PreparedMesh> displaced = prisms_of(use, mapping, fields);
   displaced->name = use.mesh_name;
   displaced->displacement_index = use.displacement_index;
   displaced->method = geometry.method;
@@ -333,18 +357,19 @@ std::unique_ptr<PreparedMesh> DisplacementSet::make_displaced(const Use& use, co
   return displaced;
 }
 
-std::unique_ptr<PreparedMesh> DisplacementSet::prisms_of(const MeshView& mesh,
+std::unique_ptr<PreparedMesh> DisplacementSet::prisms_of(const Use& use,
                                                          const DisplacementMapping& mapping,
                                                          const std::vector<const HeightFieldView*>& fields)
 {
   std::optional<ContentHash> content;
-  if (kept_meshes_ != nullptr) {
-    content = prisms_content(mesh, mapping, fields);
+  // What deforms is another in the next frame.
+  if (kept_meshes_ != nullptr && use.steps.empty()) {
+    content = prisms_content(use.mesh, mapping, fields);
     if (std::unique_ptr<PreparedMesh> kept = kept_meshes_->take(*content)) return kept;
   }
   const auto start = std::chrono::steady_clock::now();
   auto displaced = std::make_unique<PreparedMesh>();
-  displaced->mesh = DisplacedMesh(mesh, *fields.front(), mapping, std::span(fields).subspan(1));
+  displaced->mesh = DisplacedMesh(use.mesh, *fields.front(), mapping, std::span(fields).subspan(1), use.steps);
   displaced->content = content;
   displaced->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return displaced;
@@ -374,7 +399,7 @@ std::unique_ptr<PreparedMesh> DisplacementSet::make_computed(const Use& use, con
       heights.num_cells > 0 ? lattices_make(use.mesh, heights.num_cells) : lattices_make(use.mesh, heights.cells),
       use.settings.midlevel, *lattice_cache_);
   displaced->mesh = DisplacedMesh(use.mesh, *displaced->procedural,
-                                  {.height = {}, .scale = use.scale, .midlevel = use.settings.midlevel});
+                                  {.height = {}, .scale = use.scale, .midlevel = use.settings.midlevel}, use.steps);
   DisplacedGeometry& geometry = displaced->geometry;
   geometry.method = displaced->method;
   geometry.smooth = use.settings.smoothing;
@@ -524,7 +549,7 @@ DisplacedPoint DisplacementSet::resolve(std::size_t instance,
     d.dicing->set_base_place(&out.triangle, &out.u, &out.v);
   }
   if (d.geometry.smooth) {
-    out.Ns = to_float(displaced_smooth_normal(d.geometry, out.triangle, 0, out.u, out.v));
+    out.Ns = to_float(displaced_smooth_normal(d.geometry, out.triangle, {out.u, out.v}));
   } else if (d.dicing != nullptr && !(level > 0.0f)) {
     // Micro-triangles across the line between two texels would show as teeth where texels are wider than pixels.
     out.Ns = to_float(displaced_surface_point(d.geometry, out.triangle, {out.u, out.v}).Ng);
@@ -599,7 +624,7 @@ std::string DisplacementSet::method_names() const
 
 std::vector<std::string> DisplacementSet::warnings() const
 {
-  std::vector<std::string> texts;
+  std::vector<std::string> texts = untessellated_;
   for (const auto& displaced : geometries_) {
     const DisplacedMeshReport& report = displaced->mesh.report();
     const std::string of = " of " + std::to_string(displaced->geometry.mesh.num_triangles) + " triangles of mesh '" +

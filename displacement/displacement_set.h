@@ -39,6 +39,9 @@ struct ComputedHeights {
 struct DisplacementInput {
   std::vector<MeshView> meshes;
   std::vector<std::string> mesh_names;
+  /// By mesh, at evenly spaced times while the shutter is open; the meshes are as when that is half done. What they point to must
+  /// outlive the set. Empty, or none of a mesh: it does not deform.
+  std::vector<std::vector<MeshShape>> mesh_steps;
   std::vector<HeightFields::Map> height_maps;  ///< their texels must outlive the set
   std::span<const DisplacementSettings> settings;
   std::vector<DisplacedInstance> instances;
@@ -125,7 +128,7 @@ class DisplacementSet {
   std::string method_names() const;  ///< of the geometries, separated by commas
   /// What `auto` chose by, a line a geometry.
   const std::vector<std::string>& reasons() const { return reasons_; }
-  /// Parts of the surfaces that are missing.
+  /// Parts of the surfaces that are missing, and methods that are not followed.
   std::vector<std::string> warnings() const;
 
  private:
@@ -145,9 +148,10 @@ class DisplacementSet {
     const std::string& mesh_name;
     int displacement_index;
     const DisplacementSettings& settings;
-    const ComputedHeights* heights;  ///< null: a map's
-    double scale = 1;                ///< metres of object space
-    std::vector<Affine3> places{};   ///< its instances: the world from its own space
+    const ComputedHeights* heights;    ///< null: a map's
+    std::span<const MeshShape> steps;  ///< none: it does not deform
+    double scale = 1;                  ///< metres of object space
+    std::vector<Affine3> places{};     ///< its instances: the world from its own space
     double steepening = 1;  ///< how much steeper its instances' slopes are in the world than in object space, at most
   };
   static double picture_share(const Use& use, const DisplacementOptions& options);
@@ -156,12 +160,15 @@ class DisplacementSet {
   std::unique_ptr<PreparedMesh> make_displaced(const Use& use, const DisplacementOptions& options);
   /// Kept or new, with nothing filled in but its prisms, tree and content.
   /// @param fields  the finest level, then those that rays may see instead
-  std::unique_ptr<PreparedMesh> prisms_of(const MeshView& mesh,
+  std::unique_ptr<PreparedMesh> prisms_of(const Use& use,
                                           const DisplacementMapping& mapping,
                                           const std::vector<const HeightFieldView*>& fields);
   std::unique_ptr<PreparedMesh> make_computed(const Use& use, const DisplacementOptions& options);
   /// Levels of a map that still show something on a mesh.
   int num_useful_levels(const Use& use) const;
+  /// The method that a use is to be traced by; `auto` may still tessellate.
+  DisplacementMethod method_of(const Use& use, const DisplacementOptions& options) const;
+  void leave_untessellated(const Use& use, const DisplacementOptions& options);
   /// Whether a use is to be traced to an error, not exactly nor as its settings say.
   bool has_error(const Use& use, const DisplacementOptions& options) const;
   /// Fills in what the levels of a geometry have lost.
@@ -195,7 +202,7 @@ class DisplacementSet {
   std::vector<int> geometry_of_instance_;
   std::vector<float> texel_of_instance_;
   bool has_levels_ = false, has_facets_ = false;
-  std::vector<std::string> reasons_;
+  std::vector<std::string> reasons_, untessellated_;
   std::shared_ptr<HeightFields> fields_;
   HeightFields::Tally kept_;
   std::shared_ptr<KeptMeshes> kept_meshes_;  ///< null: none are kept

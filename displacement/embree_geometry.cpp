@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "displacement/clearance.h"
+#include "displacement/deformation.h"
 #include "displacement/seam_walls.h"
 #include "displacement/trace_procedural.h"
 #include "kernel/shape/surface_hit.h"
@@ -15,8 +16,9 @@ namespace {
 
 void bounds(const RTCBoundsFunctionArguments* arguments)
 {
-  const auto& geometry = *static_cast<const DisplacedGeometry*>(arguments->geometryUserPtr);
-  const Box3f box = displaced_triangle_bounds(geometry.mesh, arguments->primID);
+  const DisplacedMeshView& mesh = static_cast<const DisplacedGeometry*>(arguments->geometryUserPtr)->mesh;
+  const Box3 box = mesh.deformation != nullptr ? deforming_triangle_bounds(mesh, arguments->primID, arguments->timeStep)
+                                               : displaced_triangle_bounds(mesh, arguments->primID);
   RTCBounds* out = arguments->bounds_o;
   out->lower_x = box.low.x;
   out->lower_y = box.low.y;
@@ -28,15 +30,16 @@ void bounds(const RTCBoundsFunctionArguments* arguments)
 
 /// A geometry's mesh and one of its triangles, with the heights around a point of it on one level.
 struct OnSurface {
+  MeshAtTime then;
   DisplacedMeshView mesh;
   DisplacedTriangle tri;
   std::optional<TriangleOnTile> tile;
 
-  OnSurface(const DisplacedGeometry& geometry, std::uint32_t triangle, int level, double b1, double b2)
-      : mesh(geometry.mesh), tri(geometry.mesh.triangles[triangle])
+  OnSurface(const DisplacedGeometry& geometry, std::uint32_t triangle, int level, double b1, double b2, float time)
+      : then(geometry.mesh, triangle, time), mesh(then.mesh), tri(then.tri())
   {
     if (geometry.procedural != nullptr) {
-      tile.emplace(geometry.mesh, *geometry.procedural, triangle,
+      tile.emplace(then.mesh, *geometry.procedural, then.triangle,
                    lattice_tile_at(*geometry.procedural, triangle, b1, b2));
       mesh = tile->mesh;
       tri = tile->tri;
@@ -51,7 +54,9 @@ struct OnSurface {
 struct BoxOverSides {
   const DisplacedGeometry& geometry;
   std::uint32_t triangle;
+  const DisplacedTriangle& tri;
   int level;
+  float time;         ///< of the ray
   double weights[3];  ///< of the triangle's vertices; 0 where the box reaches over the side opposite to them
   double d;           ///< the point's displacement, metres
   Vec3d reach;
@@ -65,8 +70,8 @@ bool widen_by_neighbor(RTCPointQueryFunctionArguments* arguments)
 {
   auto& box = *static_cast<BoxOverSides*>(arguments->userPtr);
   if (arguments->primID == box.triangle) return false;
-  const DisplacedTriangle& own = box.geometry.mesh.triangles[box.triangle];
-  const DisplacedTriangle& neighbor = box.geometry.mesh.triangles[arguments->primID];
+  const MeshAtTime then(box.geometry.mesh, arguments->primID, box.time);
+  const DisplacedTriangle &own = box.tri, &neighbor = then.tri();
   double b[3] = {0, 0, 0};
   for (int k = 0; k < 3; ++k) {
     if (box.weights[k] == 0) continue;
@@ -75,7 +80,7 @@ bool widen_by_neighbor(RTCPointQueryFunctionArguments* arguments)
     if (at == 3) return false;
     b[at] = box.weights[k];
   }
-  const OnSurface other(box.geometry, arguments->primID, box.level, b[1], b[2]);
+  const OnSurface other(box.geometry, arguments->primID, box.level, b[1], b[2], box.time);
   // From the point to where it is on the side, and from there once more.
   const SurfaceInBox near = surface_in_box(other.mesh, other.tri, b[1], b[2], 2.0 * box.reach);
   const double d = surface_point(other.mesh, other.tri, b[1], b[2]).d;
@@ -108,13 +113,14 @@ Leaving leaving_make(const InstanceView& placement, Vec3f P, Vec3f Ng)
 Vec3d leave_of(const DisplacedGeometry& geometry, std::uint32_t triangle, const DisplacedPlace& at, Vec3d reach)
 {
   const double b1 = at.b1, b2 = at.b2;
-  const OnSurface on(geometry, triangle, at.level, b1, b2);
+  const OnSurface on(geometry, triangle, at.level, b1, b2, at.time);
   const SurfaceInBox own = surface_in_box(on.mesh, on.tri, b1, b2, reach);
   double distance = own.crease ? own.clearance : 0;
   // A triangle within the box has no side that it could share.
   if (own.sides != 0 && own.sides != 7 && geometry.scene != nullptr) {
     const SurfacePoint point = surface_point(on.mesh, on.tri, b1, b2);
-    BoxOverSides box{geometry, triangle, at.level, {1.0 - b1 - b2, b1, b2}, point.d, reach, own.clearance};
+    BoxOverSides box{geometry, triangle, on.then.tri(), at.level, at.time, {1.0 - b1 - b2, b1, b2},
+                     point.d,  reach,    own.clearance};
     double sum = 0;
     for (int k = 0; k < 3; ++k) {
       if ((own.sides >> k & 1) != 0) box.weights[k] = 0;
@@ -122,7 +128,7 @@ Vec3d leave_of(const DisplacedGeometry& geometry, std::uint32_t triangle, const 
     }
     for (double& weight : box.weights) weight /= sum;
     const Vec3f P = to_float(point.P);
-    RTCPointQuery query{P.x, P.y, P.z, 0.0f, static_cast<float>(2.0 * length(reach))};
+    RTCPointQuery query{P.x, P.y, P.z, at.time, static_cast<float>(2.0 * length(reach))};
     RTCPointQueryContext context;
     rtcInitPointQueryContext(&context);
     rtcPointQuery(geometry.scene, &query, &context, widen_by_neighbor, &box);
@@ -140,21 +146,18 @@ SurfacePoint displaced_surface_point(const DisplacedGeometry& geometry,
                                      const DisplacedPlace& place)
 {
   if (place.edge >= 0) {
-    return seam_wall_point(geometry.mesh, triangle, place.edge, place.fraction, place.d,
+    const MeshAtTime then(geometry.mesh, triangle, place.time);
+    return seam_wall_point(then.mesh, then.triangle, place.edge, place.fraction, place.d,
                            {geometry.mesh.field, geometry.levels[place.level].field});
   }
-  const OnSurface on(geometry, triangle, place.level, place.b1, place.b2);
+  const OnSurface on(geometry, triangle, place.level, place.b1, place.b2, place.time);
   return surface_point(on.mesh, on.tri, place.b1, place.b2);
 }
 
-Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry,
-                              std::uint32_t triangle,
-                              int level,
-                              double b1,
-                              double b2)
+Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry, std::uint32_t triangle, const DisplacedPlace& place)
 {
-  const OnSurface on(geometry, triangle, level, b1, b2);
-  return surface_smooth_normal(on.mesh, on.tri, b1, b2);
+  const OnSurface on(geometry, triangle, place.level, place.b1, place.b2, place.time);
+  return surface_smooth_normal(on.mesh, on.tri, place.b1, place.b2);
 }
 
 void displaced_point_set_level(const DisplacedGeometry& geometry,
@@ -182,7 +185,7 @@ DisplacedPoint displaced_resolve(const DisplacedGeometry& geometry,
   if (place.edge >= 0) return out;
   out.leave = to_float(leave_of(geometry, triangle, place, leaving_make(placement, out.P, out.Ng).reach));
   displaced_point_set_level(geometry, placement, static_cast<float>(geometry.first_level + place.level), &out);
-  if (geometry.smooth) out.Ns = to_float(displaced_smooth_normal(geometry, triangle, place.level, place.b1, place.b2));
+  if (geometry.smooth) out.Ns = to_float(displaced_smooth_normal(geometry, triangle, place));
   return out;
 }
 
@@ -192,6 +195,8 @@ RTCGeometry displaced_geometry_make(RTCDevice device, const DisplacedGeometry& g
   rtcSetGeometryUserPrimitiveCount(out, geometry.mesh.num_triangles);
   // Embree hands the pointer back as it was given; no callback writes through it.
   rtcSetGeometryUserData(out, const_cast<DisplacedGeometry*>(&geometry));
+  if (const Deformation* const deformation = geometry.mesh.deformation)
+    rtcSetGeometryTimeStepCount(out, static_cast<unsigned>(deformation->steps.size()));
   rtcSetGeometryBoundsFunction(out, bounds, nullptr);
   rtcSetGeometryIntersectFunction(out, table.intersect);
   rtcSetGeometryOccludedFunction(out, table.occluded);

@@ -48,6 +48,7 @@ struct DisplacedQuery {
   bool any_hit = false;
   LodCone cone = {};  ///< the detail that is asked for
   float texel = 0;    ///< width of a texel of the finest level in the space that `cone` is in
+  float time = 0;     ///< 0…1; of no matter to meshes that do not deform
 };
 
 /// Traversals compiled for one instruction set.
@@ -66,9 +67,10 @@ struct TraversalTable {
 const TraversalTable& traversal_table_baseline();
 const TraversalTable& traversal_table_avx2();
 
-/// What Embree's record of a hit has room for.
+/// What Embree's record of a hit has room for, and the time of its ray.
 struct EmbreeHitRecord {
   float u = 0, v = 0, Ng_x = 0;
+  float time = 0;
 };
 
 /// Where a hit is, as far as Embree's record keeps it.
@@ -78,6 +80,7 @@ struct DisplacedPlace {
   int edge = -1;       ///< whose wall was hit; −1: the surface
   float fraction = 0;  ///< of a wall: along its edge
   float d = 0;         ///< of a wall: displacement, metres
+  float time = 0;      ///< of the ray
 };
 
 /// The codec of hits: on the surface u and v are the weights and Ng_x is the level; on a wall u is the fraction, v the
@@ -92,12 +95,14 @@ RELIEF_KERNEL EmbreeHitRecord displaced_hit_encode(const DisplacedHit& hit)
 
 RELIEF_KERNEL DisplacedPlace displaced_hit_decode(EmbreeHitRecord record)
 {
-  if (record.Ng_x >= 0.0f) return {record.u, record.v, static_cast<int>(record.Ng_x)};
+  if (record.Ng_x >= 0.0f) {
+    return {record.u, record.v, static_cast<int>(record.Ng_x), -1, 0.0f, 0.0f, record.time};
+  }
   const int code = static_cast<int>(-record.Ng_x) - 1, edge = code % 3;
   float b[3] = {0.0f, 0.0f, 0.0f};
   b[edge] = 1.0f - record.u;
   b[edge == 2 ? 0 : edge + 1] = record.u;
-  return {b[1], b[2], code / 3, edge, record.u, record.v};
+  return {b[1], b[2], code / 3, edge, record.u, record.v, record.time};
 }
 
 /// The point of the surface, or of a wall, in double precision.
@@ -106,11 +111,7 @@ SurfacePoint displaced_surface_point(const DisplacedGeometry& geometry,
                                      const DisplacedPlace& place);
 
 /// The shading normal of a point of the surface from the smoothed map.
-Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry,
-                              std::uint32_t triangle,
-                              int level,
-                              double b1,
-                              double b2);
+Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry, std::uint32_t triangle, const DisplacedPlace& place);
 
 /// A hit on a displaced instance, as shading wants it.
 struct DisplacedPoint {

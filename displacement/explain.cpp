@@ -3,6 +3,7 @@
 #include <cmath>
 #include <optional>
 
+#include "displacement/deformation.h"
 #include "displacement/trace_procedural.h"
 
 namespace relief {
@@ -19,8 +20,9 @@ double whole_periods(const LatticeAxis& axis, double x)
 
 PrismExplanation prism_explain(const PrismVisit& visit)
 {
-  DisplacedMeshView mesh = visit.geometry->mesh;
-  DisplacedTriangle tri = mesh.triangles[visit.triangle];
+  const MeshAtTime then(visit.geometry->mesh, visit.triangle, visit.time);
+  DisplacedMeshView mesh = then.mesh;
+  DisplacedTriangle tri = then.tri();
   PrismExplanation out;
   const ObjectRay& ray = visit.ray;
   const auto t_world = [&](double t) { return ray.t_start + ray.t_scale * t; };
@@ -29,7 +31,7 @@ PrismExplanation prism_explain(const PrismVisit& visit)
   out.t_min = t_world(visit.t_min);
   out.t_max = t_world(visit.t_max);
   out.t = t_world(visit.hit.t);
-  out.folded = mesh.unfolded[visit.triangle] == 0;
+  out.folded = mesh.unfolded[then.triangle] == 0;
   RayCurve curve;
   if (ray_curve_make(ray_frame_make(ray.O, ray.D), tri, &curve)) {
     for (int k = 0; k < curve.num_segments; ++k) {
@@ -46,7 +48,7 @@ PrismExplanation prism_explain(const PrismVisit& visit)
   out.b2 = hit.b2;
   std::optional<TriangleOnTile> tile;
   if (!out.has_map) {
-    tile.emplace(mesh, *procedural, visit.triangle, lattice_tile_at(*procedural, visit.triangle, hit.b1, hit.b2));
+    tile.emplace(mesh, *procedural, then.triangle, lattice_tile_at(*procedural, visit.triangle, hit.b1, hit.b2));
     mesh = tile->mesh;
     tri = tile->tri;
     const LatticeTriangle& part = procedural->triangles()[visit.triangle];

@@ -12,6 +12,7 @@ namespace relief {
 struct PrismVisit {
   const DisplacedGeometry* geometry = nullptr;
   std::uint32_t instance = 0, triangle = 0;
+  float time = 0;
   ObjectRay ray;                ///< all t of the visit are its own
   double t_min = 0, t_max = 0;  ///< what was searched; t_max falls with every hit
   TraversalCounters counters;   ///< of this call

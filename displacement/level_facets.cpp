@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <type_traits>
 
+#include "displacement/deformation.h"
 #include "kernel/sample/sobol.h"
 
 namespace relief {
@@ -146,7 +147,8 @@ Slopes slopes_of(const LevelFacets& facets)
 bool level_facets_make(const DisplacedGeometry& geometry, const LevelPlace& at, Vec2f jitter, LevelFacets* out)
 {
   const HeightFieldView& map = geometry.facets->texels;
-  const DisplacedTriangle tri = triangle_on_level(geometry.mesh.triangles[at.triangle], *geometry.mesh.field, map);
+  const MeshAtTime then(geometry.mesh, at.triangle, at.time);
+  const DisplacedTriangle tri = triangle_on_level(then.tri(), *geometry.mesh.field, map);
   const double b1 = at.b1, b2 = at.b2;
   const BasePoint base = base_point(tri, b1, b2);
   const double inverse_length = 1.0 / length(base.N);

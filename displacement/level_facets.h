@@ -31,9 +31,10 @@ struct LevelFacets {
 struct LevelPlace {
   const InstanceView& placement;
   std::uint32_t triangle;
-  float b1, b2;  ///< weights of its vertices 1 and 2
-  float level;   ///< of the map, above 0
-  Vec3f P, Ng;   ///< object space, of the surface that is traced; Ng unit, on the side of the displacement normal
+  float b1, b2;    ///< weights of its vertices 1 and 2
+  float level;     ///< of the map, above 0
+  Vec3f P, Ng;     ///< object space, of the surface that is traced; Ng unit, on the side of the displacement normal
+  float time = 0;  ///< of the ray
 };
 
 /// @param jitter  [0, 1)²: where between the facets' places

@@ -44,7 +44,7 @@ seam_heights(const DisplacedMeshView& mesh, std::uint32_t triangle, int edge, do
   heights.own = displacement_on_level(mesh, level, tri.x[edge] + fraction * (tri.x[next] - tri.x[edge]),
                                       tri.y[edge] + fraction * (tri.y[next] - tri.y[edge]));
   heights.low = heights.high = heights.own;
-  const std::uint32_t index = 3 * triangle + static_cast<std::uint32_t>(edge);
+  const std::uint32_t index = 3 * (mesh.first_triangle + triangle) + static_cast<std::uint32_t>(edge);
   std::uint32_t first = 0, end = mesh.num_walls;
   while (first < end) {
     const std::uint32_t middle = first + (end - first) / 2;

@@ -35,7 +35,7 @@ struct TriangleOnTile {
 
   TriangleOnTile(const DisplacedMeshView& on, const ProceduralField& field, std::uint32_t triangle, LatticeNode tile)
       : tri(on.triangles[triangle]),
-        pin(field.tile(triangle, tile.i, tile.j)),
+        pin(field.tile(on.first_triangle + triangle, tile.i, tile.j)),
         mesh{&tri, on.unfolded + triangle, 1, &pin.field(), on.scale, on.midlevel},
         i0(std::int64_t{tile.i} * kTileCells - 1),
         j0(std::int64_t{tile.j} * kTileCells - 1)
@@ -134,7 +134,7 @@ RELIEF_KERNEL bool square_intersect(LatticeSearch& c, const LatticeNode& node, c
 {
   if (node.level == 0) return tile_intersect(c, node, a, b);
   LatticeRange children[4];
-  c.field.children(c.triangle, node, children);
+  c.field.children(c.mesh.first_triangle + c.triangle, node, children);
   ++c.counters.bounds;
   if (traversal_poll(c.counters, c.next_poll)) return true;
   // Where it passes from one child to another.
@@ -172,7 +172,7 @@ RELIEF_KERNEL bool trace_procedural(const PrismQuery& q,
                                     DisplacedHit* hit)
 {
   LatticeSearch c{prism_search_make(q, hit), field, q.triangle, traverse, q.rmip_options};
-  const LatticeNode root = field.root(q.triangle);
+  const LatticeNode root = field.root(q.mesh.first_triangle + q.triangle);
   for (int k = 0; k < q.curve.num_segments; ++k) {
     const CurveSegment& g = q.curve.segments[k];
     if (g.t0 >= c.t_max && c.unfolded) break;

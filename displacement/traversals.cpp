@@ -1,5 +1,6 @@
 // Compiled once an instruction set, RELIEF_ISA, as the methods are: RELIEF_TRAVERSAL_TABLE names the function that returns the
 // table.
+#include "displacement/deformation.h"
 #include "displacement/embree_geometry.h"
 #include "displacement/explain.h"
 #include "displacement/method.h"
@@ -21,7 +22,8 @@ constexpr const DisplacementMethodEntry* kMethods[] = {
 /// A query to one triangle, with the ray's curve in it.
 struct CurveQuery {
   const DisplacedGeometry& geometry;
-  std::uint32_t triangle;
+  const DisplacedMeshView& mesh;  ///< the geometry's, at the ray's time
+  std::uint32_t triangle;         ///< of that
   const RayCurve& curve;
   const DisplacedQuery& ray;
   TraversalCounters& counters;
@@ -43,19 +45,14 @@ bool trace_level(const CurveQuery& q,
       {mesh, triangle, q.curve, t_min, t_max, q.ray.any_hit, g.rmip_options, q.counters}, g.levels[level].table, hit);
 }
 
-/// A mesh of one triangle: one of a geometry's, on one of its levels.
+/// A mesh of one triangle: a query's, on one of its geometry's levels.
 struct TriangleOnLevel {
   DisplacedTriangle tri;
   DisplacedMeshView mesh;
 
-  TriangleOnLevel(const DisplacedGeometry& geometry, std::uint32_t triangle, int level)
-      : tri(triangle_on_level(geometry.mesh.triangles[triangle], *geometry.mesh.field, *geometry.levels[level].field)),
-        mesh{&tri,
-             geometry.mesh.unfolded + triangle,
-             1,
-             geometry.levels[level].field,
-             geometry.mesh.scale,
-             geometry.mesh.midlevel}
+  TriangleOnLevel(const CurveQuery& q, int level)
+      : tri(triangle_on_level(q.mesh.triangles[q.triangle], *q.mesh.field, *q.geometry.levels[level].field)),
+        mesh{&tri, q.mesh.unfolded + q.triangle, 1, q.geometry.levels[level].field, q.mesh.scale, q.mesh.midlevel}
   {
   }
   // The mesh points to the triangle.
@@ -93,7 +90,7 @@ bool level_wall_intersect(const TriangleOnLevel& fine,
 /// The levels that a ray sees of one triangle, one after the other.
 bool trace_levels(const CurveQuery& q, DisplacedHit* hit)
 {
-  const auto& [geometry, triangle, curve, ray, counters] = q;
+  const auto& [geometry, mesh, triangle, curve, ray, counters] = q;
   double begin = __builtin_huge_val(), end = -__builtin_huge_val();
   for (int k = 0; k < curve.num_segments; ++k) {
     begin = min(begin, curve.segments[k].t0);
@@ -102,23 +99,23 @@ bool trace_levels(const CurveQuery& q, DisplacedHit* hit)
   begin = max(begin, ray.t_min);
   end = min(end, ray.t_max);
   // Where displacement lines cross, t does not grow along the curve: such a triangle has one level.
-  const bool folded = geometry.mesh.unfolded[triangle] == 0;
+  const bool folded = mesh.unfolded[triangle] == 0;
   const auto level_end = [&](int level) {
     return folded ? __builtin_huge_val() : lod_level_end(q.geometry.lod, q.ray.cone, q.ray.texel, level, begin);
   };
   int level = lod_level(geometry.lod, ray.cone, ray.texel, begin);
   double change = level_end(level);
   if (level == 0 && !(change < end))  // mostly, where detail is wanted
-    return trace_level(q, geometry.mesh, triangle, 0, ray.t_min, ray.t_max, hit);
+    return trace_level(q, mesh, triangle, 0, ray.t_min, ray.t_max, hit);
   double from = ray.t_min;
   while (true) {
-    const TriangleOnLevel fine(geometry, triangle, level);
+    const TriangleOnLevel fine(q, level);
     if (trace_level(q, fine.mesh, 0, level, from, min(change, ray.t_max), hit)) {
       hit->level = level;
       return true;
     }
     if (!(change < end)) return false;
-    const TriangleOnLevel coarse(geometry, triangle, level + 1);
+    const TriangleOnLevel coarse(q, level + 1);
     if (change > ray.t_min && level_wall_intersect(fine, coarse, curve, change, hit)) {
       hit->level = level + 1;
       return true;
@@ -133,8 +130,7 @@ bool trace_levels(const CurveQuery& q, DisplacedHit* hit)
 /// @param t_max  of the ray, or of what it has hit
 bool seam_walls_intersect(const CurveQuery& q, double t_max, DisplacedHit* hit)
 {
-  const auto& [geometry, triangle, curve, ray, counters] = q;
-  const DisplacedMeshView& mesh = geometry.mesh;
+  const auto& [geometry, mesh, triangle, curve, ray, counters] = q;
   // As in trace_levels.
   const bool folded = mesh.unfolded[triangle] == 0;
   const double begin = max(curve.segments[0].t0, ray.t_min);
@@ -161,18 +157,20 @@ bool seam_walls_intersect(const CurveQuery& q, double t_max, DisplacedHit* hit)
   return found;
 }
 
-bool trace(const DisplacedGeometry& geometry,
-           std::uint32_t triangle,
-           const DisplacedQuery& ray,
-           DisplacedHit* hit,
-           TraversalCounters* counters)
+/// @param mesh      the geometry's, at the ray's time
+/// @param triangle  of that
+bool trace_triangle(const DisplacedGeometry& geometry,
+                    const DisplacedMeshView& mesh,
+                    std::uint32_t triangle,
+                    const DisplacedQuery& ray,
+                    DisplacedHit* hit,
+                    TraversalCounters* counters)
 {
   if (traversal_stop(*counters)) return false;
-  const DisplacedMeshView& mesh = geometry.mesh;
   RayCurve curve;
   if (!ray_curve_make(ray_frame_make(ray.O, ray.D), mesh.triangles[triangle], &curve)) return false;
   ++counters->prisms;
-  const CurveQuery q{geometry, triangle, curve, ray, *counters};
+  const CurveQuery q{geometry, mesh, triangle, curve, ray, *counters};
   if (geometry.procedural != nullptr) {
     return trace_procedural(
         {mesh, triangle, curve, ray.t_min, ray.t_max, ray.any_hit, geometry.rmip_options, *counters},
@@ -184,18 +182,40 @@ bool trace(const DisplacedGeometry& geometry,
   return seam_walls_intersect(q, found ? hit->t : ray.t_max, hit) || found;
 }
 
+[[gnu::noinline]] bool trace_deforming(const DisplacedGeometry& geometry,
+                                       std::uint32_t triangle,
+                                       const DisplacedQuery& ray,
+                                       DisplacedHit* hit,
+                                       TraversalCounters* counters)
+{
+  const TriangleAtTime at(geometry.mesh, triangle, ray.time);
+  return trace_triangle(geometry, at.mesh, 0, ray, hit, counters);
+}
+
+bool trace(const DisplacedGeometry& geometry,
+           std::uint32_t triangle,
+           const DisplacedQuery& ray,
+           DisplacedHit* hit,
+           TraversalCounters* counters)
+{
+  if (geometry.mesh.deformation != nullptr) [[unlikely]]
+    return trace_deforming(geometry, triangle, ray, hit, counters);
+  return trace_triangle(geometry, geometry.mesh, triangle, ray, hit, counters);
+}
+
 /// Where queries that bring no counters count.
 thread_local TraversalCounters uncounted;
 
 /// One ray of a callback, in the geometry's space.
 struct CallbackRay {
   unsigned id, instance, triangle;
+  float time;
   ObjectRay ray;
 };
 
 CallbackRay callback_ray(RTCRayN* rays, unsigned count, unsigned lane, unsigned triangle, const EmbreeContext& context)
 {
-  CallbackRay out{RTCRayN_id(rays, count, lane), context.rtc.instID[0], triangle, {}};
+  CallbackRay out{RTCRayN_id(rays, count, lane), context.rtc.instID[0], triangle, RTCRayN_time(rays, count, lane), {}};
   if (context.object_ray != nullptr) {
     out.ray = *context.object_ray;
   } else {
@@ -217,6 +237,7 @@ bool trace_observed(const DisplacedGeometry& geometry,
   TraversalCounters& counters = context.displacement != nullptr ? *context.displacement : uncounted;
   const TraversalCounters before = counters;
   DisplacedQuery query{ray.ray.O, ray.ray.D, t_min, t_max, any_hit};
+  query.time = ray.time;
   if (context.cones != nullptr) query.cone = context.cones[ray.id];
   query.cone.width += query.cone.spread * static_cast<float>(ray.ray.t_start);
   query.cone.spread *= static_cast<float>(ray.ray.t_scale);
@@ -231,8 +252,8 @@ bool trace_observed(const DisplacedGeometry& geometry,
                                 false};
   if (context.steps != nullptr) context.steps[ray.id] += static_cast<std::uint32_t>(spent.bounds + spent.texels);
   if (context.visits != nullptr) {
-    prism_visits_add(*context.visits, {&geometry, ray.instance, ray.triangle, ray.ray, t_min, t_max, spent, found,
-                                       found ? *hit : DisplacedHit{}});
+    prism_visits_add(*context.visits, {&geometry, ray.instance, ray.triangle, ray.time, ray.ray, t_min, t_max, spent,
+                                       found, found ? *hit : DisplacedHit{}});
   }
   return found;
 }

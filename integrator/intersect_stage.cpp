@@ -75,7 +75,7 @@ bool facets_at_hit(const Accel& accel,
 {
   return accel.displacements().facets(state.hit_object[path],
                                       {instance, state.hit_triangle[path], state.hit_u[path], state.hit_v[path],
-                                       state.facets[path].level, state.hit_P[path], Ng},
+                                       state.facets[path].level, state.hit_P[path], Ng, path_time(state, path)},
                                       facet_sample(state, path, FacetDimension::kJitter), facets);
 }
 
@@ -154,8 +154,9 @@ void classify(const KernelGlobals& g,
   }
   const InstanceView& instance = path_instance(g, state, path);
   if ((instance.flags & kDisplaced) != 0) {
-    const DisplacedPoint point = accel.displacements().resolve(object, instance, state.hit_triangle[path],
-                                                               {state.hit_u[path], state.hit_v[path], Ng_x});
+    const DisplacedPoint point =
+        accel.displacements().resolve(object, instance, state.hit_triangle[path],
+                                      {state.hit_u[path], state.hit_v[path], Ng_x, path_time(state, path)});
     state.hit_triangle[path] = point.triangle;
     state.hit_u[path] = point.u;
     state.hit_v[path] = point.v;

@@ -142,7 +142,6 @@ void SceneContext::make_views()
   for (std::size_t i = 0; i < instances.size(); ++i) {
     if (displacements.geometry_index(i) < 0) continue;
     instances[i].flags |= kDisplaced | kTracedInObjectSpace;
-    instances[i].flags &= ~std::uint32_t{kDeforms};
   }
   globals.meshes = meshes.data();
   globals.instances = instances.data();

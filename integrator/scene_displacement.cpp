@@ -33,6 +33,8 @@ DisplacementSet scene_displacement(const Scene& scene, const DisplacementOptions
   for (const Mesh& mesh : scene.meshes) {
     input.meshes.push_back(mesh.view());
     input.mesh_names.push_back(mesh.name);
+    std::vector<MeshShape>& steps = input.mesh_steps.emplace_back();
+    for (const MeshStep& step : mesh.steps) steps.push_back({step.P.data(), step.N.empty() ? nullptr : step.N.data()});
   }
   for (const HeightMap& map : scene.height_maps) input.height_maps.push_back({map.view(), map.texels});
   input.settings = scene.displacements;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernel/math/step_place.h"
+
 namespace relief {
 
 namespace {
@@ -164,15 +166,14 @@ MeshView SceneMotion::mesh_at(const InstanceView& instance, const MeshView& cent
   MeshView out = centre;
   if ((instance.flags & kDeforms) == 0) return out;
   const std::vector<MeshStep>& steps = scene_.meshes[static_cast<std::size_t>(instance.mesh_index)].steps;
-  // As Embree has it, in single precision.
-  const float along = time * static_cast<float>(steps.size() - 1);
-  const std::size_t before = std::min(static_cast<std::size_t>(along), steps.size() - 2);
-  out.part = along - static_cast<float>(before);
-  out.P = steps[before].P.data();
-  out.P_next = steps[before + 1].P.data();
+  const StepPlace place = step_place(time, static_cast<std::uint32_t>(steps.size()));
+  const MeshStep &before = steps[place.step], &next = steps[place.step + 1];
+  out.part = place.part;
+  out.P = before.P.data();
+  out.P_next = next.P.data();
   if (centre.N != nullptr) {
-    out.N = steps[before].N.data();
-    out.N_next = steps[before + 1].N.data();
+    out.N = before.N.data();
+    out.N_next = next.N.data();
   }
   return out;
 }

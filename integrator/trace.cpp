@@ -59,8 +59,8 @@ TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits
     DisplacedPoint point{query.hit.primID, query.hit.u, query.hit.v};
     const bool displaced = (instance.flags & kDisplaced) != 0;
     if (displaced) {
-      point =
-          context.displacements.resolve(object, instance, point.triangle, {query.hit.u, query.hit.v, query.hit.Ng_x});
+      point = context.displacements.resolve(object, instance, point.triangle,
+                                            {query.hit.u, query.hit.v, query.hit.Ng_x, kTraceTime});
     }
     const MeshView mesh =
         context.motion.mesh_at(instance, context.meshes[static_cast<std::size_t>(instance.mesh_index)], kTraceTime);

@@ -332,11 +332,6 @@ void GltfLoader::place_instance(const PlacedNode& node,
     warnings_.add(node.document->file + ": " + path +
                   ": shines and moves while the shutter is open: its light is found by chance alone, which is noisier");
   }
-  if (deforms && material.displacement_index >= 0) {
-    warnings_.add(
-        node.document->file + ": " + path +
-        ": is displaced and deforms while the shutter is open: it keeps its shape at the middle of that time");
-  }
   if (instance.motion_index >= 0) {
     for (const Affine3& step : scene_.motions[static_cast<std::size_t>(instance.motion_index)]) {
       const Bounds moved = bounds_transform(step, own_bounds);

@@ -28,13 +28,23 @@ bool mirrors(const Affine3& m)
 /// @param m  its determinant is positive
 void transform_mesh(Mesh& mesh, const Affine3& m)
 {
-  for (Vec3f& P : mesh.P) P = transform_vector(m, P);
+  const auto transform_positions = [&](std::vector<Vec3f>& positions) {
+    for (Vec3f& P : positions) P = transform_vector(m, P);
+  };
+  transform_positions(mesh.P);
   // The inverse transpose is the matrix of cofactors up to a factor. Each axis gives up its own size first: products of
   // what a scale of 1e-24 leaves of one are zero (test WorldDisplacementMeshes.NormalsOfTheFlattestMapsAreFinite).
   const float of_x = extent(m.x), of_y = extent(m.y), of_z = extent(m.z), least = std::min({of_x, of_y, of_z});
   const Vec3f x = m.x / of_x, y = m.y / of_y, z = m.z / of_z;
   const Affine3 cofactors{cross(y, z) * (least / of_x), cross(z, x) * (least / of_y), cross(x, y) * (least / of_z), {}};
-  for (Normal3f& N : mesh.N) N = as_normal(transform_vector(cofactors, as_vector(N)));
+  const auto transform_normals = [&](std::vector<Normal3f>& normals) {
+    for (Normal3f& N : normals) N = as_normal(transform_vector(cofactors, as_vector(N)));
+  };
+  transform_normals(mesh.N);
+  for (MeshStep& step : mesh.steps) {
+    transform_positions(step.P);
+    transform_normals(step.N);
+  }
   for (Vec4f& tangent : mesh.tangent) {
     const Vec3f t = normalize(transform_vector(m, xyz(tangent)));
     tangent = {t.x, t.y, t.z, tangent.w};

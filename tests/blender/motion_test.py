@@ -97,10 +97,9 @@ def test_meshes_that_deform():
     assert_agrees(scene, block=8)
 
 
-def test_displaced_meshes():
-    """Cycles dices them once, at the middle of the shutter; so does what goes here keep its shape."""
-    scene = _stage()
-    scene.cycles.feature_set = "EXPERIMENTAL"
+def _waves():
+    """A grid that is displaced by waves."""
+    bpy.context.scene.cycles.feature_set = "EXPERIMENTAL"
     waves = np.full((64, 64, 4), 1.0)
     x = np.linspace(0, 8 * np.pi, 64, endpoint=False)
     waves[:, :, :3] = (0.5 + 0.5 * np.sin(x)[None, :] * np.sin(x)[:, None])[:, :, None]
@@ -117,7 +116,26 @@ def test_displaced_meshes():
     shown = bpy.context.object
     shown.data.materials.append(material)
     shown.rotation_euler = degrees(60, 0, 0)
-    _animate(shown, "location", (-0.6, 0, 0.2), (0.6, 0, 0.2))
+    return shown
+
+
+def test_displaced_meshes():
+    """Cycles dices them once, at the middle of the shutter; so does what goes here keep its shape."""
+    scene = _stage()
+    _animate(_waves(), "location", (-0.6, 0, 0.2), (0.6, 0, 0.2))
+    assert_agrees(scene, block=8, tolerance=0.01)
+
+
+def test_displaced_meshes_that_deform():
+    """In their plane: Cycles adds the displacement of the middle to all steps, which here is that of each."""
+    scene = _stage()
+    shown = _waves()
+    shown.shape_key_add(name="Basis")
+    wide = shown.shape_key_add(name="wide")
+    for vertex in wide.data:
+        x, y, z = vertex.co
+        vertex.co = (1.8 * x + 0.3 * y + 0.3, 0.7 * y, z)
+    _animate(wide, "value", 0.0, 1.0)
     assert_agrees(scene, block=8, tolerance=0.01)
 
 

@@ -140,7 +140,7 @@ inline oracle::Ray ray_from_inside(std::mt19937_64& random, const ClosedSurface&
 }
 
 /// A ray as Embree takes it.
-inline RTCRay embree_ray(const oracle::Ray& ray)
+inline RTCRay embree_ray(const oracle::Ray& ray, float time = 0)
 {
   RTCRay result{};
   const Vec3f O = TracedCase::vector3(ray.O), D = TracedCase::vector3(ray.D);
@@ -152,6 +152,7 @@ inline RTCRay embree_ray(const oracle::Ray& ray)
   result.dir_z = D.z;
   result.tnear = static_cast<float>(ray.t_min);
   result.tfar = static_cast<float>(ray.t_max);
+  result.time = time;
   result.mask = ~0u;
   return result;
 }
@@ -170,6 +171,7 @@ class DisplacedScene {
     rtcAttachGeometry(scene_, made);
     rtcReleaseGeometry(made);
     rtcCommitScene(scene_);
+    geometry_.scene = scene_;
     embree_context_init(context_, false);
   }
   ~DisplacedScene()
@@ -181,24 +183,30 @@ class DisplacedScene {
   DisplacedScene& operator=(const DisplacedScene&) = delete;
 
   /// @return  t of the nearest hit; infinite: none
-  float intersect(const oracle::Ray& ray, const LodCone& cone = {})
+  float intersect(const oracle::Ray& ray, const LodCone& cone = {}, float time = 0)
   {
-    const RTCRayHit query = hit(ray, cone);
+    const RTCRayHit query = hit(ray, cone, time);
     return query.hit.geomID != RTC_INVALID_GEOMETRY_ID ? query.ray.tfar : HUGE_VALF;
   }
   /// The nearest hit as Embree reports it.
-  RTCRayHit hit(const oracle::Ray& ray, const LodCone& cone)
+  RTCRayHit hit(const oracle::Ray& ray, const LodCone& cone, float time = 0)
   {
     RTCRayHit query{};
-    query.ray = embree_ray(ray);
+    query.ray = embree_ray(ray, time);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     context_.cones = &cone;
     embree_intersect1(scene_, context_, query);
     return query;
   }
-  bool occluded(const oracle::Ray& ray, const LodCone& cone = {})
+  /// A hit, completed.
+  DisplacedPoint resolve(const RTCRayHit& query) const
   {
-    RTCRay query = embree_ray(ray);
+    return displaced_resolve(geometry_, {}, 0.0f, query.hit.primID,
+                             {query.hit.u, query.hit.v, query.hit.Ng_x, query.ray.time});
+  }
+  bool occluded(const oracle::Ray& ray, const LodCone& cone = {}, float time = 0)
+  {
+    RTCRay query = embree_ray(ray, time);
     context_.cones = &cone;
     embree_occluded1(scene_, context_, query);
     return query.tfar < 0;

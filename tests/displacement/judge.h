@@ -94,18 +94,32 @@ class TracedCase {
  public:
   /// @param map         what `stored_heights` makes of the format; float heights must be floats
   /// @param num_levels  of detail, by the rays' cones if there are several
+  /// @param steps       the same triangles at times while the shutter is open; none: they do not deform
   TracedCase(const std::vector<oracle::DisplacedTriangle>& triangles,
              const oracle::HeightMap& map,
              HeightFormat format = HeightFormat::kFloat,
              int num_levels = 1,
-             bool weld_seams = false)
+             bool weld_seams = false,
+             const std::vector<std::vector<oracle::DisplacedTriangle>>& steps = {})
   {
+    const auto add_shape = [](const oracle::DisplacedTriangle& triangle, std::vector<Vec3f>* P,
+                              std::vector<Normal3f>* N) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        P->push_back(vector3(triangle.P[k]));
+        N->push_back(as_normal(vector3(triangle.N[k])));
+      }
+    };
+    steps_.resize(steps.size());
+    std::vector<MeshShape> shapes;
+    for (std::size_t step = 0; step < steps.size(); ++step) {
+      for (const oracle::DisplacedTriangle& triangle : steps[step])
+        add_shape(triangle, &steps_[step].first, &steps_[step].second);
+      shapes.push_back({steps_[step].first.data(), steps_[step].second.data()});
+    }
     for (const oracle::DisplacedTriangle& triangle : triangles) {
       const auto first = static_cast<std::uint32_t>(P_.size());
+      add_shape(triangle, &P_, &N_);
       for (std::size_t k = 0; k < 3; ++k) {
-        P_.push_back(vector3(triangle.P[k]));
-        const Vec3f N = vector3(triangle.N[k]);
-        N_.push_back({N.x, N.y, N.z});
         uv_.push_back({static_cast<float>(triangle.uv[k][0]), static_cast<float>(triangle.uv[k][1])});
       }
       indices_.push_back({first, first + 1, first + 2});
@@ -141,7 +155,7 @@ class TracedCase {
       levels_.push_back(std::make_unique<Level>(view, k));
       if (k > 0) coarser.push_back(&levels_.back()->field.view());
     }
-    mesh_ = DisplacedMesh(mesh, levels_[0]->field.view(), mapping, coarser);
+    mesh_ = DisplacedMesh(mesh, levels_[0]->field.view(), mapping, coarser, shapes);
   }
   TracedCase(const TracedCase&) = delete;
   TracedCase& operator=(const TracedCase&) = delete;
@@ -178,6 +192,7 @@ class TracedCase {
  private:
   std::vector<Vec3f> P_;
   std::vector<Normal3f> N_;
+  std::vector<std::pair<std::vector<Vec3f>, std::vector<Normal3f>>> steps_;
   std::vector<Vec2f> uv_;
   std::vector<TriangleIndices> indices_;
   std::vector<float> floats_;
@@ -205,11 +220,12 @@ class TracedCase {
 };
 
 /// A ray as a question to a geometry.
-inline DisplacedQuery displaced_query(const oracle::Ray& ray, bool any_hit)
+inline DisplacedQuery displaced_query(const oracle::Ray& ray, bool any_hit, float time = 0)
 {
   DisplacedQuery query{to_double(TracedCase::vector3(ray.O)), to_double(TracedCase::vector3(ray.D)), ray.t_min,
                        ray.t_max};
   query.any_hit = any_hit;
+  query.time = time;
   return query;
 }
 

@@ -204,7 +204,7 @@ TEST(DisplacedTriangleBounds, HoldTheSurface)
     const RandomCase drawn = random_case(random, 0);
     const TracedCase traced({drawn.triangle}, drawn.map);
     const relief::DisplacedTriangle& tri = traced.mesh().triangles[0];
-    const Box3f box = displaced_triangle_bounds(traced.mesh(), 0);
+    const Box3 box = displaced_triangle_bounds(traced.mesh(), 0);
     const JudgedTriangle triangle(drawn.triangle, drawn.map);
     for (int k = 0; k < 200; ++k) {
       Vector2 b = random_barycentric(random);

@@ -9,6 +9,7 @@
 #include <tbb/global_control.h>
 
 #include "tests/support/caustic_scene.h"
+#include "tests/support/loaded_scene.h"
 #include "tests/support/render_scene.h"
 #include "tests/support/scene_builder.h"
 
@@ -351,29 +352,58 @@ TEST(MotionBlur, OfAGlowingMeshIsTheMeanOfStills)
   expect_mean_of_stills([&](float t) { return scene_at(place_at(t)); }, moving);
 }
 
+constexpr int kColumns = 16, kRows = 8;  // of spheres that are displaced
+
+/// A displaced sphere, its texture seam at the back, and a floor.
+Scene displaced_sphere_scene(Mesh sphere, const Affine3& placed = {}, bool curved = false)
+{
+  Scene scene = empty_scene();
+  scene.render.max_bounces = 1;
+  constexpr int kTexels = 16;
+  for (int r = 0; r <= kRows; ++r) {
+    for (int c = 0; c <= kColumns; ++c)
+      sphere.uv[0].push_back({static_cast<float>(c) / kColumns, static_cast<float>(r) / kRows});
+  }
+  Material material = diffuse_material({0.8f, 0.5f, 0.3f});
+  material.displacement_index = 0;
+  add_object(scene, std::move(sphere), material, placed);
+  add_displacement(scene, kTexels, noise_texels(kTexels, 5), 0.2f).curved = curved;
+  add_object(scene, quad_mesh({-2, -0.7f, 2}, {4, 0, 0}, {0, 0, -4}), diffuse_material(splat3(0.5f)));
+  scene.lights.push_back(square_light({1, 2.5f, 1}, {0, -1, 0}, 0.3f, 20));
+  return scene;
+}
+
 TEST(MotionBlur, OfADisplacedMeshIsTheMeanOfStills)
 {
   const auto scene_at = [](const Affine3& placed) {
-    Scene scene = empty_scene();
-    scene.render.max_bounces = 1;
-    constexpr int kColumns = 16, kRows = 8, kTexels = 16;
-    Mesh sphere = sphere_mesh(0.5f, kColumns, kRows, true);
-    for (int r = 0; r <= kRows; ++r) {
-      for (int c = 0; c <= kColumns; ++c)
-        sphere.uv[0].push_back({static_cast<float>(c) / kColumns, static_cast<float>(r) / kRows});
-    }
-    Material material = diffuse_material({0.8f, 0.5f, 0.3f});
-    material.displacement_index = 0;
-    add_object(scene, sphere, material, placed);
-    add_displacement(scene, kTexels, noise_texels(kTexels, 5), 0.2f);
-    add_object(scene, quad_mesh({-2, -0.7f, 2}, {4, 0, 0}, {0, 0, -4}), diffuse_material(splat3(0.5f)));
-    scene.lights.push_back(square_light({1, 2.5f, 1}, {0, -1, 0}, 0.3f, 20));
-    return scene;
+    return displaced_sphere_scene(sphere_mesh(0.5f, kColumns, kRows, true), placed);
   };
   Scene moving = scene_at(place_at(0.5f));
   moving.instances[0].motion_index = add_motion(moving, steps_of(place_at, 2));
   expect_mean_of_stills([&](float t) { return scene_at(place_at(t)); }, moving);
 }
+
+/// Shapes of a mesh at three times, and what is straight between them.
+struct Shapes {
+  Mesh shapes[3];
+
+  Mesh at(float t) const
+  {
+    const int before = std::min(static_cast<int>(2 * t), 1);
+    const float part = 2 * t - static_cast<float>(before);
+    const Mesh &from = shapes[before], &to = shapes[before + 1];
+    Mesh mesh = shapes[0];
+    for (std::size_t v = 0; v < mesh.P.size(); ++v) {
+      mesh.P[v] = from.P[v] * (1 - part) + to.P[v] * part;
+      mesh.N[v] = as_normal(as_vector(from.N[v]) * (1 - part) + as_vector(to.N[v]) * part);
+    }
+    return mesh;
+  }
+  void add_steps(Scene& scene) const
+  {
+    for (const Mesh& mesh : shapes) scene.meshes[0].steps.push_back({mesh.P, mesh.N});
+  }
+};
 
 TEST(MotionBlur, OfAMeshThatDeformsIsTheMeanOfStills)
 {
@@ -387,29 +417,93 @@ TEST(MotionBlur, OfAMeshThatDeformsIsTheMeanOfStills)
     }
     return mesh;
   };
-  const Mesh shapes[3] = {shape(0), shape(1), shape(2)};
-  const auto mesh_at = [&](float t) {
-    const int before = std::min(static_cast<int>(2 * t), 1);
-    const float part = 2 * t - static_cast<float>(before);
-    Mesh mesh = shapes[0];
-    for (std::size_t v = 0; v < mesh.P.size(); ++v) {
-      mesh.P[v] = shapes[before].P[v] * (1 - part) + shapes[before + 1].P[v] * part;
-      mesh.N[v] = as_normal(as_vector(shapes[before].N[v]) * (1 - part) + as_vector(shapes[before + 1].N[v]) * part);
-    }
-    return mesh;
-  };
+  const Shapes shapes{shape(0), shape(1), shape(2)};
   const auto scene_at = [&](float t, const Affine3& placed) {
     Scene scene = box_scene(placed);
-    scene.meshes[0] = mesh_at(t);
+    scene.meshes[0] = shapes.at(t);
     return scene;
   };
   for (const bool moves : {false, true}) {
     SCOPED_TRACE(moves);
     Scene moving = scene_at(0.5f, place_at(0.5f));
-    for (const Mesh& mesh : shapes) moving.meshes[0].steps.push_back({mesh.P, mesh.N});
+    shapes.add_steps(moving);
     if (moves) moving.instances[0].motion_index = add_motion(moving, steps_of(place_at, 2));
     expect_mean_of_stills([&](float t) { return scene_at(t, place_at(moves ? t : 0.5f)); }, moving);
   }
+}
+
+TEST(MotionBlur, OfADisplacedMeshThatDeformsIsTheMeanOfStills)
+{
+  const auto shape = [](float step) {
+    Mesh mesh = sphere_mesh(0.4f, kColumns, kRows, true);
+    for (std::size_t v = 0; v < mesh.P.size(); ++v) {
+      Vec3f& P = mesh.P[v];
+      P = {P.x * (1 + 0.5f * step), P.y + 0.4f * P.x * step * step, P.z};
+      const Vec3f N = as_vector(mesh.N[v]);
+      mesh.N[v] = as_normal({N.x, N.y + 0.4f * N.x * step, N.z});
+    }
+    return mesh;
+  };
+  const Shapes shapes{shape(0), shape(1), shape(2)};
+  for (const bool moves : {false, true}) {
+    SCOPED_TRACE(moves);
+    Scene moving = displaced_sphere_scene(shapes.at(0.5f), place_at(0.5f));
+    shapes.add_steps(moving);
+    if (moves) moving.instances[0].motion_index = add_motion(moving, steps_of(place_at, 2));
+    expect_mean_of_stills([&](float t) { return displaced_sphere_scene(shapes.at(t), place_at(moves ? t : 0.5f)); },
+                          moving);
+  }
+}
+
+/// Computed heights are those of the middle: of a mesh that only shifts, the same at all times.
+TEST(MotionBlur, OfACurvedMeshThatShiftsIsTheMeanOfStills)
+{
+  const auto shape = [](float step) {
+    Mesh mesh = sphere_mesh(0.4f, kColumns, kRows, true);
+    for (Vec3f& P : mesh.P) P += Vec3f{0.5f * (step - 1), 0.2f * step * step, 0};
+    return mesh;
+  };
+  const Shapes shapes{shape(0), shape(1), shape(2)};
+  const auto scene_at = [&](float t) { return displaced_sphere_scene(shapes.at(t), {}, true); };
+  Scene moving = scene_at(0.5f);
+  shapes.add_steps(moving);
+  expect_mean_of_stills(scene_at, moving);
+}
+
+/// A grey PNG of 8 × 8 texels, two waves by one.
+constexpr const char* kWavesPng =
+    "data:image/png;base64,"
+    "iVBORw0KGgoAAAANSUhEUgAAAAgAAAAICAAAAADhZOFXAAAAJUlEQVR42mNYtCgmBoQZLl3S0QFhBAMuBaEWLWKASF"
+    "y6hGDApAB3hB/BGNGTdQAAAABJRU5ErkJggg==";
+
+TEST(MotionBlur, OfADisplacedMorphOfAFileIsTheMeanOfItsFrames)
+{
+  GltfBuilder b = square_scene();
+  const int corner = b.accessor<float>({-1, 0.5f, 0, 0, 0, 0, 0.5f, 0, 0, 0, 0, 1}, "VEC3");
+  const int tilt = b.accessor<float>({-0.5f, 0, 0, 0, 0, 0, 0, 0.5f, 0, 0, 0, 0}, "VEC3");
+  b.json["meshes"][0]["primitives"][0]["targets"] = {{{"POSITION", corner}, {"NORMAL", tilt}}};
+  b.json["extensions"]["RELIEF_render"] = {{"fps", 1}};
+  const int times = b.accessor<float>({0, 10}, "SCALAR"), weights = b.accessor<float>({0, 1}, "SCALAR");
+  b.json["animations"] = {{{"samplers", {{{"input", times}, {"output", weights}}}},
+                           {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "weights"}}}}}}}};
+  b.push("images", {{"uri", kWavesPng}});
+  b.push("textures", {{"source", 0}});
+  b.push("materials",
+         {{"extensions", {{"RELIEF_displacement", {{"heightTexture", {{"index", 0}}}, {"scale", 0.3f}}}}}});
+  b.json["meshes"][0]["primitives"][0]["material"] = 0;
+  const auto frame = [&](float number, float shutter) {
+    LoadOptions options;
+    options.has_frame = true;
+    options.frame = static_cast<double>(number);
+    options.camera.look_from = Vec3f{0.5f, -1.5f, 3};
+    options.camera.shutter = shutter;
+    return load(b, options);
+  };
+  constexpr float kShutter = 8;
+  const Scene moving = frame(5, kShutter);
+  ASSERT_FALSE(moving.meshes.at(0).steps.empty());
+  for (const std::string& warning : moving.warnings) EXPECT_EQ(warning.find("deform"), std::string::npos) << warning;
+  expect_mean_of_stills([&](float t) { return frame(5 + kShutter * (t - 0.5f), 0); }, moving, {}, 512, 2e-3);
 }
 
 TEST(MotionBlur, OfCausticsIsTheMeanOfStills)
