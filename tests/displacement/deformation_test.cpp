@@ -41,7 +41,7 @@ std::vector<Bending> bendings()
              return {N[0] + .2 * N[1] * step, N[1] * (1 + .3 * step), N[2]};
            }},
           {"twisted", [](const Vector3& P, int step) { return turned(P, .3 * step * (1 + P[2])); },
-           [](const Vector3& N, int step) { return turned(N, .7 * step); }},
+           [](const Vector3& N, int step) { return turned(N, .35 * step); }},
           // Boxes have to do without bounds of d/|N|.
           {"with normals that nearly turn over", stretched,
            [](const Vector3& N, int step) { return turned(N, 2.6 * step); }}};
