@@ -9,7 +9,6 @@
 #include <tbb/global_control.h>
 
 #include "tests/support/caustic_scene.h"
-#include "tests/support/loaded_scene.h"
 #include "tests/support/render_scene.h"
 #include "tests/support/scene_builder.h"
 
@@ -468,42 +467,6 @@ TEST(MotionBlur, OfACurvedMeshThatShiftsIsTheMeanOfStills)
   Scene moving = scene_at(0.5f);
   shapes.add_steps(moving);
   expect_mean_of_stills(scene_at, moving);
-}
-
-/// A grey PNG of 8 × 8 texels, two waves by one.
-constexpr const char* kWavesPng =
-    "data:image/png;base64,"
-    "iVBORw0KGgoAAAANSUhEUgAAAAgAAAAICAAAAADhZOFXAAAAJUlEQVR42mNYtCgmBoQZLl3S0QFhBAMuBaEWLWKASF"
-    "y6hGDApAB3hB/BGNGTdQAAAABJRU5ErkJggg==";
-
-TEST(MotionBlur, OfADisplacedMorphOfAFileIsTheMeanOfItsFrames)
-{
-  GltfBuilder b = square_scene();
-  const int corner = b.accessor<float>({-1, 0.5f, 0, 0, 0, 0, 0.5f, 0, 0, 0, 0, 1}, "VEC3");
-  const int tilt = b.accessor<float>({-0.5f, 0, 0, 0, 0, 0, 0, 0.5f, 0, 0, 0, 0}, "VEC3");
-  b.json["meshes"][0]["primitives"][0]["targets"] = {{{"POSITION", corner}, {"NORMAL", tilt}}};
-  b.json["extensions"]["RELIEF_render"] = {{"fps", 1}};
-  const int times = b.accessor<float>({0, 10}, "SCALAR"), weights = b.accessor<float>({0, 1}, "SCALAR");
-  b.json["animations"] = {{{"samplers", {{{"input", times}, {"output", weights}}}},
-                           {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "weights"}}}}}}}};
-  b.push("images", {{"uri", kWavesPng}});
-  b.push("textures", {{"source", 0}});
-  b.push("materials",
-         {{"extensions", {{"RELIEF_displacement", {{"heightTexture", {{"index", 0}}}, {"scale", 0.3f}}}}}});
-  b.json["meshes"][0]["primitives"][0]["material"] = 0;
-  const auto frame = [&](float number, float shutter) {
-    LoadOptions options;
-    options.has_frame = true;
-    options.frame = static_cast<double>(number);
-    options.camera.look_from = Vec3f{0.5f, -1.5f, 3};
-    options.camera.shutter = shutter;
-    return load(b, options);
-  };
-  constexpr float kShutter = 8;
-  const Scene moving = frame(5, kShutter);
-  ASSERT_FALSE(moving.meshes.at(0).steps.empty());
-  for (const std::string& warning : moving.warnings) EXPECT_EQ(warning.find("deform"), std::string::npos) << warning;
-  expect_mean_of_stills([&](float t) { return frame(5 + kShutter * (t - 0.5f), 0); }, moving, {}, 512, 2e-3);
 }
 
 TEST(MotionBlur, OfCausticsIsTheMeanOfStills)
