@@ -25,10 +25,11 @@ Vector3 turned(const Vector3& v, double angle)
   return {c * v[0] - s * v[1], s * v[0] + c * v[1], v[2]};
 }
 
-/// A way to deform: a point's or normal's place at a step.
+/// A way to deform.
 struct Bending {
   std::string name;
-  std::function<Vector3(const Vector3&, int)> P, N;
+  std::function<Vector3(const Vector3& P, int step)> P;
+  std::function<Vector3(const Vector3& N, const Vector3& P, int step)> N;
 };
 
 std::vector<Bending> bendings()
@@ -37,14 +38,14 @@ std::vector<Bending> bendings()
     return {P[0] * (1 + .4 * step), P[1] + .1 * P[2] * step * step, P[2] * (1 + .1 * step)};
   };
   return {{"stretched", stretched,
-           [](const Vector3& N, int step) -> Vector3 {
+           [](const Vector3& N, const Vector3&, int step) -> Vector3 {
              return {N[0] + .2 * N[1] * step, N[1] * (1 + .3 * step), N[2]};
            }},
           {"twisted", [](const Vector3& P, int step) { return turned(P, .3 * step * (1 + P[2])); },
-           [](const Vector3& N, int step) { return turned(N, .35 * step); }},
+           [](const Vector3& N, const Vector3& P, int step) { return turned(N, .3 * step * (1 + P[2])); }},
           // Boxes have to do without bounds of d/|N|.
           {"with normals that nearly turn over", stretched,
-           [](const Vector3& N, int step) { return turned(N, 2.6 * step); }}};
+           [](const Vector3& N, const Vector3&, int step) { return turned(N, 2.6 * step); }}};
 }
 
 constexpr int kSteps = 3;
@@ -61,8 +62,8 @@ struct Deforming {
       Triangles& bent = steps.emplace_back(surface.triangles);
       for (oracle::DisplacedTriangle& triangle : bent) {
         for (std::size_t k = 0; k < 3; ++k) {
+          triangle.N[k] = float_rounded(bending.N(triangle.N[k], triangle.P[k], step));
           triangle.P[k] = float_rounded(bending.P(triangle.P[k], step));
-          triangle.N[k] = float_rounded(bending.N(triangle.N[k], step));
         }
       }
     }

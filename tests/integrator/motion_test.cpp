@@ -9,6 +9,7 @@
 #include <tbb/global_control.h>
 
 #include "tests/support/caustic_scene.h"
+#include "tests/support/loaded_scene.h"
 #include "tests/support/render_scene.h"
 #include "tests/support/scene_builder.h"
 
@@ -452,6 +453,46 @@ TEST(MotionBlur, OfADisplacedMeshThatDeformsIsTheMeanOfStills)
     expect_mean_of_stills([&](float t) { return displaced_sphere_scene(shapes.at(t), place_at(moves ? t : 0.5f)); },
                           moving);
   }
+}
+
+/// A grey PNG of 8 × 8 texels, two waves by one.
+constexpr const char* kWavesPng =
+    "data:image/png;base64,"
+    "iVBORw0KGgoAAAANSUhEUgAAAAgAAAAICAAAAADhZOFXAAAAJUlEQVR42mNYtCgmBoQZLl3S0QFhBAMuBaEWLWKASF"
+    "y6hGDApAB3hB/BGNGTdQAAAABJRU5ErkJggg==";
+
+TEST(MotionBlur, OfADisplacedMorphOfAFileIsTheMeanOfItsFrames)
+{
+  GltfBuilder b = square_scene();
+  const int corner = b.accessor<float>({-1, 0.5f, 0, 0, 0, 0, 0.5f, 0, 0, 0, 0, 1}, "VEC3");
+  const int tilt = b.accessor<float>({-0.5f, 0, 0, 0, 0, 0, 0, 0.5f, 0, 0, 0, 0}, "VEC3");
+  b.json["meshes"][0]["primitives"][0]["targets"] = {{{"POSITION", corner}, {"NORMAL", tilt}}};
+  b.json["extensions"]["RELIEF_render"] = {{"fps", 1}};
+  const int times = b.accessor<float>({0, 10}, "SCALAR"), weights = b.accessor<float>({0, 1}, "SCALAR");
+  b.json["animations"] = {{{"samplers", {{{"input", times}, {"output", weights}}}},
+                           {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "weights"}}}}}}}};
+  b.push("images", {{"uri", kWavesPng}});
+  b.push("textures", {{"source", 0}});
+  b.push("materials",
+         {{"extensions", {{"RELIEF_displacement", {{"heightTexture", {{"index", 0}}}, {"scale", 0.3f}}}}}});
+  b.json["meshes"][0]["primitives"][0]["material"] = 0;
+  // Those that a file without any gets follow what there is in a frame.
+  b.push("cameras", {{"type", "perspective"}, {"perspective", {{"yfov", 0.6f}, {"znear", 0.01f}}}});
+  b.root_node({{"camera", 0}, {"translation", {0.3f, 0.5f, 3}}});
+  b.json["extensions"]["KHR_lights_punctual"] = {{"lights", {{{"type", "directional"}, {"intensity", 3}}}}};
+  b.root_node({{"rotation", {0, 0.383f, 0, 0.924f}}, {"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+  const auto frame = [&](float number, float shutter) {
+    LoadOptions options;
+    options.has_frame = true;
+    options.frame = static_cast<double>(number);
+    options.camera.shutter = shutter;
+    return load(b, options);
+  };
+  constexpr float kShutter = 8;
+  const Scene moving = frame(5, kShutter);
+  ASSERT_FALSE(moving.meshes.at(0).steps.empty());
+  for (const std::string& warning : moving.warnings) EXPECT_EQ(warning.find("deform"), std::string::npos) << warning;
+  expect_mean_of_stills([&](float t) { return frame(5 + kShutter * (t - 0.5f), 0); }, moving, {}, 512, 2e-3);
 }
 
 /// Computed heights are those of the middle: of a mesh that only shifts, the same at all times.
