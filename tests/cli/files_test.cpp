@@ -495,9 +495,9 @@ TEST_F(FilesOfARun, WhatAKilledRunLeftIsRemovedByTheNext)
 
 TEST_F(FilesOfARun, EventsAndPicturesAreNotMixed)
 {
-  // What /dev/stdout is, a file that standard output goes to, and one that takes both and keeps neither.
+  // By its name, a file that standard output goes to, and one that takes both and keeps neither.
   const std::tuple<std::string, std::string, int> kCases[] = {
-      {"/proc/self/fd/1", file("a.exr"), 2}, {file("a.exr"), file("a.exr"), 2}, {"/dev/null", "/dev/null", 0}};
+      {"/dev/stdout", "/dev/full", 2}, {file("a.exr"), file("a.exr"), 2}, {"/dev/null", "/dev/null", 0}};
   for (const auto& [output, standard_output, exit_code] : kCases) {
     const std::string command = std::string(RELIEF_PROGRAM) + " render " + scene_ + " -o " + output +
                                 " --resolution 8x8 --spp 1 --progress json 2>" + file("stderr") + " >" +
