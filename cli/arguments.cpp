@@ -258,10 +258,14 @@ RmipOptions parse_rmip(const std::string& text)
       options.split = static_cast<RmipSplit>(choice(key, value, kRmipSplitLabels));
     } else if (key == "leaf") {
       options.leaf = static_cast<RmipLeaf>(choice(key, value, kRmipLeafLabels));
+    } else if (key == "levels") {
+      options.levels = static_cast<RmipLevels>(choice(key, value, kRmipLevelsLabels));
     } else {
-      refuse("--rmip", "KEY=VALUE,… with the keys scale, resolution, inversion, split, leaf", text);
+      refuse("--rmip", "KEY=VALUE,… with the keys scale, resolution, inversion, split, leaf, levels", text);
     }
   }
+  if (options.levels == RmipLevels::kInterpolated && options.leaf == RmipLeaf::kTriangles)
+    refuse("--rmip", "levels=interpolated with leaf=bilinear", text);
   return options;
 }
 

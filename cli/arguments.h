@@ -82,7 +82,7 @@ EnvironmentChoice parse_environment(const std::string& text);
 /// A level of detail of height maps, or "auto": −1.
 float parse_lod(const std::string& text);
 
-/// "KEY=VALUE,…" with the keys scale, resolution, inversion, split and leaf, each at most once; what is left out stays as
+/// "KEY=VALUE,…" with the keys scale, resolution, inversion, split, leaf and levels, each at most once; what is left out stays as
 /// RMIP has it by default.
 RmipOptions parse_rmip(const std::string& text);
 

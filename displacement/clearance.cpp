@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "displacement/level_blend.h"
+
 namespace relief {
 
 namespace {
@@ -14,6 +16,17 @@ double change_within(Vec3d a, Vec3d reach)
 {
   return std::abs(a.x) * reach.x + std::abs(a.y) * reach.y + std::abs(a.z) * reach.z;
 }
+
+/// A rectangle around a point, in lattice coordinates.
+struct Around {
+  double x, y, dx, dy;
+
+  bool has_crease() const { return cell_of(x - dx) != cell_of(x + dx) || cell_of(y - dy) != cell_of(y + dy); }
+  HeightsBetween heights(const HeightFieldView& field) const
+  {
+    return heights_between(field, x - dx, y - dy, x + dx, y + dy);
+  }
+};
 
 }  // namespace
 
@@ -47,7 +60,7 @@ SurfaceInBox surface_in_box(const DisplacedMeshView& mesh,
 {
   const BasePoint base = base_point(tri, b1, b2);
   const double x = tri.x[0] + b1 * base.xu + b2 * base.xv, y = tri.y[0] + b1 * base.yu + b2 * base.yv;
-  const double h = interpolate_height(*mesh.field, x, y);
+  const double h = mesh.blend == nullptr ? interpolate_height(*mesh.field, x, y) : blended_height(mesh, x, y);
   const double nu = length(base.N), s = mesh.scale * (h - mesh.midlevel) / nu;
   // Gradients of b1, b2 and s, as functions of a point P(b) + s·N(b): the dual basis of its derivatives.
   const Vec3d u = base.Pu + s * base.Nu, v = base.Pv + s * base.Nv;
@@ -59,14 +72,27 @@ SurfaceInBox surface_in_box(const DisplacedMeshView& mesh,
   constexpr double kMostTexels = 1 << 20;
   if (!(dx + dy < kMostTexels)) return {};
   SurfaceInBox out;
-  out.crease = cell_of(x - dx) != cell_of(x + dx) || cell_of(y - dy) != cell_of(y + dy);
+  const Around around{x, y, dx, dy};
+  out.crease = around.has_crease();
+  Around around_coarse{};
+  if (mesh.blend != nullptr) {
+    const HeightMapView &fine = mesh.field->map, &coarse = mesh.blend->coarse->map;
+    around_coarse = {lattice_on_level(x, fine.width, coarse.width), lattice_on_level(y, fine.height, coarse.height),
+                     dx * coarse.width / fine.width, dy * coarse.height / fine.height};
+    out.crease |= around_coarse.has_crease();
+  }
   const double weights[3] = {1.0 - b1 - b2, b1, b2};
   const Vec3d gradients[3] = {-1.0 * (b1_gradient + b2_gradient), b1_gradient, b2_gradient};
   for (int k = 0; k < 3; ++k) {
     if (weights[k] < change_within(gradients[k], reach)) out.sides |= static_cast<std::uint8_t>(1u << k);
   }
   if (!out.crease && out.sides == 0) return out;
-  const HeightsBetween near = heights_between(*mesh.field, x - dx, y - dy, x + dx, y + dy);
+  HeightsBetween near = around.heights(*mesh.field);
+  if (mesh.blend != nullptr) {
+    const HeightsBetween coarse = around_coarse.heights(*mesh.blend->coarse);
+    const double w = mesh.blend->weight;
+    near = {(1.0 - w) * near.low + w * coarse.low, (1.0 - w) * near.high + w * coarse.high};
+  }
   // Of the displacement s·|N|.
   const Vec3d n = base.N * (1.0 / nu);
   const Vec3d gradient =

@@ -35,6 +35,13 @@ struct SeamWall {
   double x[2], y[2];   ///< lattice coordinates at the edge's start and end
 };
 
+/// A surface between two levels of its height map, see level_blend.h.
+struct LevelBlend {
+  const HeightFieldView* coarse = nullptr;  ///< the level after the mesh's field
+  const void* table = nullptr;              ///< what the method needs of it: MethodTable::view
+  double weight = 0;                        ///< of the coarser level, 0…1; the rest is the field's
+};
+
 /// A displaced mesh without ownership.
 struct DisplacedMeshView {
   const DisplacedTriangle* triangles = nullptr;
@@ -49,7 +56,8 @@ struct DisplacedMeshView {
   /// Of a view of one triangle that deforms: its number, by which walls and computed heights know it.
   std::uint32_t first_triangle = 0;
   const Deformation* deformation =
-      nullptr;  ///< while the shutter is open: triangles are as when it is half done; null: none
+      nullptr;                        ///< while the shutter is open: triangles are as when it is half done; null: none
+  const LevelBlend* blend = nullptr;  ///< null: the surface has the heights of the field alone
 };
 
 /// Displacement along the unit normal at a lattice position, metres.
@@ -109,6 +117,21 @@ RELIEF_KERNEL Vec3d surface_normal(const BasePoint& base, double d, double scale
   return normal * ((dot(normal, n) < 0.0 ? -1.0 : 1.0) / __builtin_sqrt(squared));
 }
 
+/// S and its geometric normal where it is displaced by a bilinear patch.
+/// @param fx, fy  from the corner that the patch is given from
+RELIEF_KERNEL SurfacePoint
+patch_point(const DisplacedMeshView& mesh, const BasePoint& base, const CellHeights& c, double fx, double fy)
+{
+  const double h = c.h00 + c.hx * fx + (c.hy + c.hxy * fx) * fy;
+  SurfacePoint point;
+  point.N = base.N;
+  point.d = mesh.scale * (h - mesh.midlevel);
+  const double inverse_length = 1.0 / length(point.N);
+  point.P = base.P + point.d * (point.N * inverse_length);
+  point.Ng = surface_normal(base, point.d, mesh.scale, c.hx + c.hxy * fy, c.hy + c.hxy * fx);
+  return point;
+}
+
 /// Evaluates S and its geometric normal.
 /// @param b1, b2  barycentric weights of vertices 1 and 2
 /// @param i, j    the cell whose bilinear patch is meant: at a texel line the two sides have different normals
@@ -122,15 +145,7 @@ RELIEF_KERNEL SurfacePoint surface_point(const DisplacedMeshView& mesh,
   const BasePoint base = base_point(tri, b1, b2);
   const double fx = tri.x[0] + b1 * base.xu + b2 * base.xv - static_cast<double>(i);
   const double fy = tri.y[0] + b1 * base.yu + b2 * base.yv - static_cast<double>(j);
-  const CellHeights c = cell_heights(*mesh.field, i, j);
-  const double h = c.h00 + c.hx * fx + (c.hy + c.hxy * fx) * fy;
-  SurfacePoint point;
-  point.N = base.N;
-  point.d = mesh.scale * (h - mesh.midlevel);
-  const double inverse_length = 1.0 / length(point.N);
-  point.P = base.P + point.d * (point.N * inverse_length);
-  point.Ng = surface_normal(base, point.d, mesh.scale, c.hx + c.hxy * fy, c.hy + c.hxy * fx);
-  return point;
+  return patch_point(mesh, base, cell_heights(*mesh.field, i, j), fx, fy);
 }
 
 /// The same, in the cell that the weights fall into.
@@ -145,8 +160,19 @@ RELIEF_KERNEL SurfacePoint surface_point(const DisplacedMeshView& mesh,
                        static_cast<std::int64_t>(__builtin_floor(y)));
 }
 
-/// Normal for shading a surface whose facets should not show: that of S with the map's slopes taken over one texel to
-/// either side, which makes them continuous where the bilinear patches of two cells meet.
+/// Slopes of a map, a lattice unit.
+struct LatticeSlopes {
+  double x = 0, y = 0;
+};
+
+/// Taken over one texel to either side, which makes them continuous where the bilinear patches of two cells meet.
+RELIEF_KERNEL LatticeSlopes smooth_slopes(const HeightFieldView& f, double x, double y)
+{
+  return {0.5 * (interpolate_height(f, x + 1.0, y) - interpolate_height(f, x - 1.0, y)),
+          0.5 * (interpolate_height(f, x, y + 1.0) - interpolate_height(f, x, y - 1.0))};
+}
+
+/// Normal for shading a surface whose facets should not show: that of S with the map's smooth slopes.
 /// @return unit, on the side of N
 RELIEF_KERNEL Vec3d surface_smooth_normal(const DisplacedMeshView& mesh,
                                           const DisplacedTriangle& tri,
@@ -156,10 +182,8 @@ RELIEF_KERNEL Vec3d surface_smooth_normal(const DisplacedMeshView& mesh,
   const BasePoint base = base_point(tri, b1, b2);
   const double x = tri.x[0] + b1 * base.xu + b2 * base.xv;
   const double y = tri.y[0] + b1 * base.yu + b2 * base.yv;
-  const HeightFieldView& f = *mesh.field;
-  const double hx = 0.5 * (interpolate_height(f, x + 1.0, y) - interpolate_height(f, x - 1.0, y));
-  const double hy = 0.5 * (interpolate_height(f, x, y + 1.0) - interpolate_height(f, x, y - 1.0));
-  return surface_normal(base, displacement_at(mesh, x, y), mesh.scale, hx, hy);
+  const LatticeSlopes slopes = smooth_slopes(*mesh.field, x, y);
+  return surface_normal(base, displacement_at(mesh, x, y), mesh.scale, slopes.x, slopes.y);
 }
 
 }  // namespace relief

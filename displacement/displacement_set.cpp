@@ -83,6 +83,20 @@ std::optional<TessellationKind> tessellation_kind(DisplacementMethod method)
   return method == DisplacementMethod::kAuto ? std::nullopt : displacement_method(method).tessellation;
 }
 
+bool takes_rmip_options(DisplacementMethod method)
+{
+  return method != DisplacementMethod::kAuto && displacement_method(method).takes_rmip_options;
+}
+
+/// Whether a surface between two levels is traced instead of either by chance. A level that rays choose by their cones would
+/// change along them: a surface that is bilinear nowhere.
+bool blends_levels(const DisplacementSettings& settings, const DisplacementOptions& options)
+{
+  const float lod = lod_of(settings, options);
+  return takes_rmip_options(asked_method(settings, options)) && options.rmip &&
+         options.rmip->levels == RmipLevels::kInterpolated && lod > 0 && !is_whole(lod);
+}
+
 /// For a mesh that is tessellated: such are not kept.
 void forget_tree(PreparedMesh& mesh)
 {
@@ -136,10 +150,12 @@ std::vector<std::string> displacement_warnings(const DisplacementSettings& setti
     texts.push_back("tessellations have whole levels of detail; level " + std::to_string(static_cast<int>(lod)) +
                     " is used");
   }
-  const bool takes_options = asked != DisplacementMethod::kAuto && displacement_method(asked).takes_rmip_options;
-  if (options.rmip && !takes_options) {
+  if (options.rmip && !takes_rmip_options(asked)) {
     texts.push_back("options of RMIP have no effect on displacement method '" +
                     std::string(displacement_method_label(asked)) + "'");
+  } else if (options.rmip && options.rmip->levels == RmipLevels::kInterpolated && !blends_levels(settings, options)) {
+    texts.push_back(std::string("RMIP interpolates only between levels of detail that are fixed, such as 1.5; ") +
+                    (lod < 0 ? "those that rays choose by their cones are mixed" : "a whole level is traced as it is"));
   }
   return texts;
 }
@@ -351,8 +367,14 @@ std::unique_ptr<PreparedMesh> DisplacementSet::make_displaced(const Use& use, co
   geometry.mesh = displaced->mesh.view();
   geometry.lod = {levels.count, levels.by_cone, levels.fixed, displaced->mesh.widest_texel()};
   geometry.scene = displaced->tree.get();
+  if (levels.count > 1 && blends_levels(settings, options)) {
+    displaced->blend = {geometry.levels[1].field, geometry.levels[1].table, static_cast<double>(levels.fixed)};
+    geometry.mesh.blend = &displaced->blend;
+    geometry.lod.num_levels = 1;
+    geometry.lod.fixed = 0;
+  }
   displaced->geometry = geometry;
-  has_levels_ |= levels.count > 1;
+  has_levels_ |= geometry.lod.num_levels > 1;
   has_facets_ |= geometry.facets.has_value();
   return displaced;
 }

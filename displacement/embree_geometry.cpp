@@ -6,6 +6,7 @@
 
 #include "displacement/clearance.h"
 #include "displacement/deformation.h"
+#include "displacement/level_blend.h"
 #include "displacement/seam_walls.h"
 #include "displacement/trace_procedural.h"
 #include "kernel/shape/surface_hit.h"
@@ -83,7 +84,7 @@ bool widen_by_neighbor(RTCPointQueryFunctionArguments* arguments)
   const OnSurface other(box.geometry, arguments->primID, box.level, b[1], b[2], box.time);
   // From the point to where it is on the side, and from there once more.
   const SurfaceInBox near = surface_in_box(other.mesh, other.tri, b[1], b[2], 2.0 * box.reach);
-  const double d = surface_point(other.mesh, other.tri, b[1], b[2]).d;
+  const double d = traced_surface_point(other.mesh, other.tri, b[1], b[2]).d;
   if (!(std::abs(d - box.d) <= near.clearance)) return false;
   box.clearance = std::max(box.clearance, near.clearance);
   box.has_neighbors = true;
@@ -118,7 +119,7 @@ Vec3d leave_of(const DisplacedGeometry& geometry, std::uint32_t triangle, const 
   double distance = own.crease ? own.clearance : 0;
   // A triangle within the box has no side that it could share.
   if (own.sides != 0 && own.sides != 7 && geometry.scene != nullptr) {
-    const SurfacePoint point = surface_point(on.mesh, on.tri, b1, b2);
+    const SurfacePoint point = traced_surface_point(on.mesh, on.tri, b1, b2);
     BoxOverSides box{geometry, triangle, on.then.tri(), at.level, at.time, {1.0 - b1 - b2, b1, b2},
                      point.d,  reach,    own.clearance};
     double sum = 0;
@@ -151,13 +152,13 @@ SurfacePoint displaced_surface_point(const DisplacedGeometry& geometry,
                            {geometry.mesh.field, geometry.levels[place.level].field});
   }
   const OnSurface on(geometry, triangle, place.level, place.b1, place.b2, place.time);
-  return surface_point(on.mesh, on.tri, place.b1, place.b2);
+  return traced_surface_point(on.mesh, on.tri, place.b1, place.b2);
 }
 
 Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry, std::uint32_t triangle, const DisplacedPlace& place)
 {
   const OnSurface on(geometry, triangle, place.level, place.b1, place.b2, place.time);
-  return surface_smooth_normal(on.mesh, on.tri, place.b1, place.b2);
+  return traced_smooth_normal(on.mesh, on.tri, place.b1, place.b2);
 }
 
 void displaced_point_set_level(const DisplacedGeometry& geometry,
@@ -184,7 +185,9 @@ DisplacedPoint displaced_resolve(const DisplacedGeometry& geometry,
   if (geometry.lod.by_cone) out.width = lod_width_of_level(texel, place.level);
   if (place.edge >= 0) return out;
   out.leave = to_float(leave_of(geometry, triangle, place, leaving_make(placement, out.P, out.Ng).reach));
-  displaced_point_set_level(geometry, placement, static_cast<float>(geometry.first_level + place.level), &out);
+  const float between = geometry.mesh.blend != nullptr ? static_cast<float>(geometry.mesh.blend->weight) : 0.0f;
+  displaced_point_set_level(geometry, placement, static_cast<float>(geometry.first_level + place.level) + between,
+                            &out);
   if (geometry.smooth) out.Ns = to_float(displaced_smooth_normal(geometry, triangle, place));
   return out;
 }

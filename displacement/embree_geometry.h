@@ -32,7 +32,7 @@ struct DisplacedGeometry {
   DisplacementMethod method = kDefaultMethod;
   bool smooth = false;  ///< shading normals come from the map's filtered gradient
   LodRule lod;
-  DisplacementLevel levels[kMaxLodLevels];      ///< the finest first; lod.num_levels of them
+  DisplacementLevel levels[kMaxLodLevels];      ///< the finest first; lod.num_levels of them, and one more of a blend
   int first_level = 0;                          ///< of the map: what levels[0] is
   std::optional<MapFacets> facets;              ///< that coarser levels stand for; empty: there are none
   RmipOptions rmip_options;                     ///< for both of RMIP's

@@ -209,18 +209,64 @@ RELIEF_KERNEL CurvePoint root_between(const DisplacedTriangle& tri,
   return a;
 }
 
+/// The bilinear patch that the leaf test is for.
+struct LeafPatch {
+  CellHeights heights;                  ///< from the corner of its cell
+  double magnitude;                     ///< of the terms of a height, beside the midlevel
+  double x_low, x_high, y_low, y_high;  ///< where it is the surface, lattice coordinates
+};
+
+/// Sum of the terms of a height in a cell, beside the midlevel.
+RELIEF_KERNEL double height_magnitude(const CellHeights& cell, double midlevel)
+{
+  return __builtin_fabs(cell.h00 - midlevel) + __builtin_fabs(cell.hx) + __builtin_fabs(cell.hy) +
+         __builtin_fabs(cell.hxy);
+}
+
+/// A cell of a lattice, by its lower corner.
+struct LatticeCell {
+  std::int64_t i, j;
+};
+
+/// Where the patch of a cell is the surface: unbounded cells beside a clamped map have one height along the unbounded axis,
+/// so their corner may be anywhere.
+RELIEF_KERNEL void set_patch_bounds(const HeightFieldView& f, std::int64_t i, std::int64_t j, LeafPatch* patch)
+{
+  const double corner_x = static_cast<double>(i), corner_y = static_cast<double>(j);
+  const bool clamp_x = f.x.wrap == Wrap::kClamp, clamp_y = f.y.wrap == Wrap::kClamp;
+  patch->x_low = clamp_x && i < 0 ? -__builtin_huge_val() : corner_x;
+  patch->x_high = clamp_x && i >= f.x.num_texels - 1 ? __builtin_huge_val() : corner_x + 1.0;
+  patch->y_low = clamp_y && j < 0 ? -__builtin_huge_val() : corner_y;
+  patch->y_high = clamp_y && j >= f.y.num_texels - 1 ? __builtin_huge_val() : corner_y + 1.0;
+}
+
+RELIEF_KERNEL LeafPatch leaf_patch(const DisplacedMeshView& mesh, LatticeCell cell)
+{
+  LeafPatch patch;
+  patch.heights = cell_heights(*mesh.field, cell.i, cell.j);
+  patch.magnitude = height_magnitude(patch.heights, mesh.midlevel);
+  set_patch_bounds(*mesh.field, cell.i, cell.j, &patch);
+  return patch;
+}
+
+/// Displacement at any lattice position of the surface that a cell is of, metres.
+RELIEF_KERNEL double leaf_displacement(const DisplacedMeshView& mesh, LatticeCell, double x, double y)
+{
+  return displacement_at(mesh, x, y);
+}
+
 /// First root of g in a cell. Not inlined: its stack is as large as that of a descent.
-/// @param i, j        the cell, lattice coordinates
+/// @param place       the cell, or what of it has one patch: LatticeCell, or BlendedCell (level_blend.h)
 /// @param tau0, tau1  contains every τ at which the curve is in the cell; 0 <= tau0 <= tau1 <= 1
 /// @param monotone    t grows with τ; if not, all roots are looked at
 /// @param hit         t, b, cell of the nearest root whose t is within (t_min, t_max)
 /// @return            false if there is none
+template <class Cell>
 [[gnu::noinline]] RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
                                                     const DisplacedTriangle& tri,
                                                     const RayCurve& curve,
                                                     const CurveSegment& g,
-                                                    std::int64_t i,
-                                                    std::int64_t j,
+                                                    const Cell place,
                                                     double tau0,
                                                     double tau1,
                                                     double t_min,
@@ -229,15 +275,9 @@ RELIEF_KERNEL CurvePoint root_between(const DisplacedTriangle& tri,
                                                     DisplacedHit* hit)
 {
   bool found = false;
-  const CellHeights cell = cell_heights(*mesh.field, i, j);
-  // Unbounded cells beside a clamped map have one height along the unbounded axis, so their corner may be anywhere.
-  const double corner_x = static_cast<double>(i), corner_y = static_cast<double>(j);
-  const LatticeAxis &axis_x = mesh.field->x, &axis_y = mesh.field->y;
-  const bool clamp_x = axis_x.wrap == Wrap::kClamp, clamp_y = axis_y.wrap == Wrap::kClamp;
-  const double x_low = clamp_x && i < 0 ? -__builtin_huge_val() : corner_x;
-  const double x_high = clamp_x && i >= axis_x.num_texels - 1 ? __builtin_huge_val() : corner_x + 1.0;
-  const double y_low = clamp_y && j < 0 ? -__builtin_huge_val() : corner_y;
-  const double y_high = clamp_y && j >= axis_y.num_texels - 1 ? __builtin_huge_val() : corner_y + 1.0;
+  const LeafPatch patch = leaf_patch(mesh, place);
+  const CellHeights& cell = patch.heights;
+  const double corner_x = static_cast<double>(place.i), corner_y = static_cast<double>(place.j);
 
   const auto height_over = [&](const CurvePoint& p) {
     const double fx = p.x - corner_x, fy = p.y - corner_y;
@@ -260,18 +300,17 @@ RELIEF_KERNEL CurvePoint root_between(const DisplacedTriangle& tri,
                                         (__builtin_fabs(tri.x[1] - tri.x[0]) + __builtin_fabs(tri.x[2] - tri.x[0])) +
                                     (__builtin_fabs(cell.hy) + __builtin_fabs(cell.hxy)) *
                                         (__builtin_fabs(tri.y[1] - tri.y[0]) + __builtin_fabs(tri.y[2] - tri.y[0])));
-  const double magnitude =
-      __builtin_fabs(mesh.scale) * (__builtin_fabs(cell.h00 - mesh.midlevel) + __builtin_fabs(cell.hx) +
-                                    __builtin_fabs(cell.hy) + __builtin_fabs(cell.hxy));
+  const double magnitude = __builtin_fabs(mesh.scale) * patch.magnitude;
   const double rounding = 0x1p-49 * (magnitude + slope);
 
   // Takes a root; true when no other can be nearer.
   const auto accept = [&](const CurvePoint& p) {
-    const double beside = max(max(x_low - p.x, p.x - x_high), max(y_low - p.y, p.y - y_high));
+    const double beside = max(max(patch.x_low - p.x, p.x - patch.x_high), max(patch.y_low - p.y, p.y - patch.y_high));
     if (!(beside <= kCellTolerance)) return false;
     // There the surface is the neighbour's, which has a root of its own unless rounding took it.
-    if (beside > 0.0 && !(__builtin_fabs(p.s * p.nu - displacement_at(mesh, p.x, p.y)) <= rounding)) return false;
-    DisplacedHit candidate{curve_t(curve, g, p.tau), p.b1, p.b2, i, j, p.tau};
+    if (beside > 0.0 && !(__builtin_fabs(p.s * p.nu - leaf_displacement(mesh, place, p.x, p.y)) <= rounding))
+      return false;
+    DisplacedHit candidate{curve_t(curve, g, p.tau), p.b1, p.b2, place.i, place.j, p.tau};
     if (g.relative_error > kExactWeights) weights_correct(mesh, tri, curve.frame, cell, g.relative_error, &candidate);
     if (!(candidate.t > t_min && candidate.t < t_max)) return false;
     *hit = candidate;

@@ -3,8 +3,7 @@
 // A level is a function of the distance along the ray alone, for all triangles of a geometry, so neighbours never
 // disagree. Levels are whole; what lies between two of them is a mixture: each path draws one number, `dither`, and its
 // rays take the coarser level as often as the fraction asks. The mean image is the interpolation of the two images, and
-// every ray meets a surface that exists. (Thonat et al. 2023 interpolate the bounds and heights of two levels instead,
-// which searches both maps for every ray.)
+// every ray meets a surface that exists. (RMIP can interpolate fixed levels instead, see level_blend.h.)
 #pragma once
 
 #include "displacement/displaced_triangle.h"

@@ -23,13 +23,21 @@ enum class RmipLeaf : std::uint8_t {
 };
 inline constexpr std::string_view kRmipLeafLabels[] = {"bilinear", "triangles"};
 
-/// What RMIP's authors studied in their Figs. 5, 10 and 12.
+/// What RMIP meets at a fractional level of detail.
+enum class RmipLevels : std::uint8_t {
+  kMixed,         ///< one of two levels, by chance: level_of_detail.h
+  kInterpolated,  ///< one surface between them, if the level is fixed: level_blend.h
+};
+inline constexpr std::string_view kRmipLevelsLabels[] = {"mixed", "interpolated"};
+
+/// What RMIP's authors studied in their Figs. 5, 10 and 12, and their fractional levels of detail.
 struct RmipOptions {
   double marching_scale = 16;       ///< texels; rectangles whose sides are no longer are marched through
   bool reduce_by_inversion = true;  ///< bounds are tightened by inverting the displacement at the ends of a 3D box
   int resolution = 0;               ///< blocks of the table along each axis; 0: rmip_linear_resolution
   RmipSplit split = RmipSplit::kBound;
   RmipLeaf leaf = RmipLeaf::kBilinear;
+  RmipLevels levels = RmipLevels::kMixed;
 };
 
 struct MethodTable {

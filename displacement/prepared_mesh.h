@@ -27,6 +27,7 @@ struct PreparedMesh {
   std::unique_ptr<ProceduralField> procedural;  ///< heights that are computed
   DisplacedMesh mesh;
   DisplacedGeometry geometry;      ///< where it tessellates: what is tessellated
+  LevelBlend blend;                ///< of its mesh, if it has one
   std::unique_ptr<Dicing> dicing;  ///< what is tessellated in place of the mesh; null: the mesh itself
   std::unique_ptr<Tessellation> tessellation;
   std::optional<ContentHash> content;  ///< of all that `mesh` and `tree` are made of; empty: they are not to be kept

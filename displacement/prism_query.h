@@ -48,9 +48,23 @@ RELIEF_KERNEL PrismSearch prism_search_make(const PrismQuery& q, DisplacedHit* h
 
 /// The leaf test of one cell, in which all traversals end; keeps the nearest hit.
 /// @param g           segment of the curve
-/// @param i, j        the cell, lattice coordinates
+/// @param place       the cell, see leaf_intersect
 /// @param tau0, tau1  contains every τ at which the curve is in the cell; may reach beyond [0, 1]
 /// @return            true if there was one
+template <class Cell>
+RELIEF_KERNEL bool cell_intersect(PrismSearch& c, const CurveSegment& g, const Cell& place, double tau0, double tau1)
+{
+  ++c.counters.texels;
+  tau0 = max(tau0, 0.0);
+  tau1 = min(tau1, 1.0);
+  if (!leaf_intersect(c.mesh, c.tri, c.curve, g, place, tau0, tau1, c.t_min, c.t_max, c.unfolded, &c.hit)) return false;
+  c.found = true;
+  c.t_max = c.hit.t;
+  return true;
+}
+
+/// The same where the mesh has the heights of its field.
+/// @param i, j  the cell, lattice coordinates
 RELIEF_KERNEL bool cell_intersect(PrismSearch& c,
                                   const CurveSegment& g,
                                   std::int64_t i,
@@ -58,13 +72,7 @@ RELIEF_KERNEL bool cell_intersect(PrismSearch& c,
                                   double tau0,
                                   double tau1)
 {
-  ++c.counters.texels;
-  tau0 = max(tau0, 0.0);
-  tau1 = min(tau1, 1.0);
-  if (!leaf_intersect(c.mesh, c.tri, c.curve, g, i, j, tau0, tau1, c.t_min, c.t_max, c.unfolded, &c.hit)) return false;
-  c.found = true;
-  c.t_max = c.hit.t;
-  return true;
+  return cell_intersect(c, g, LatticeCell{i, j}, tau0, tau1);
 }
 
 }  // namespace relief

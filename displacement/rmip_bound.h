@@ -112,6 +112,13 @@ RELIEF_KERNEL void reduce(const Segment& segment, ScalarRange t, RayBound& bound
   }
 }
 
+/// Displacements over a rectangle, by a table of the mesh's field.
+template <class Bounds>
+RELIEF_KERNEL ScalarRange displacements_over(const MetricSearch& c, const Bounds& bounds, const LatticeRect& rect)
+{
+  return displacement_range(c, range_query(bounds, rect));
+}
+
 /// Whether the surface may meet the ray on a bound; shrinks the bound.
 ///
 /// Two tests: of s, which is known along the curve, at no cost; and of the box in space, whose ends are inverted.
@@ -128,9 +135,9 @@ RELIEF_KERNEL bool bound_intersect(const MetricSearch& c,
                                    RayBound& bound)
 {
   const RayProjection& r = segment.projection;
-  const ScalarRange d =
-      displacement_range(c, range_query(bounds, {r.origin_x + (rect.x - rect.rx), r.origin_x + (rect.x + rect.rx),
-                                                 r.origin_y + (rect.y - rect.ry), r.origin_y + (rect.y + rect.ry)}));
+  const ScalarRange d = displacements_over(c, bounds,
+                                           {r.origin_x + (rect.x - rect.rx), r.origin_x + (rect.x + rect.rx),
+                                            r.origin_y + (rect.y - rect.ry), r.origin_y + (rect.y + rect.ry)});
   const ScalarRange s = offset_range(c.tri, d, nu);
   const CurveSegment& g = segment.g;
   const double s0 = g.s0 + bound.stretch.tau0 * g.ds, s1 = g.s0 + bound.stretch.tau1 * g.ds;

@@ -9,7 +9,7 @@
 #pragma once
 
 #include "displacement/leaf.h"
-#include "displacement/level_of_detail.h"
+#include "displacement/level_blend.h"
 
 namespace relief {
 
@@ -19,9 +19,11 @@ struct SeamLevel {
   const HeightFieldView* field = nullptr;   ///< where heights are read
 };
 
-/// Displacement at the lattice coordinates of the finest level, as a level has it.
+/// Displacement at the lattice coordinates of the finest level, as a level has it, or the mesh's blend of two.
 RELIEF_KERNEL double displacement_on_level(const DisplacedMeshView& mesh, const SeamLevel& level, double x, double y)
 {
+  if (mesh.blend != nullptr) [[unlikely]]
+    return blended_displacement(mesh, x, y);
   x = lattice_on_level(x, level.finest->map.width, level.field->map.width);
   y = lattice_on_level(y, level.finest->map.height, level.field->map.height);
   return mesh.scale * (interpolate_height(*level.field, x, y) - mesh.midlevel);

@@ -13,6 +13,19 @@ namespace relief {
 
 namespace rmip_detail {
 
+/// The march of a stretch through the surface that the bounds are of.
+template <class Bounds>
+RELIEF_KERNEL bool surface_march(MetricSearch& c,
+                                 const Bounds&,
+                                 const CurveSegment& g,
+                                 const RayProjection& r,
+                                 const ProjectedStretch& stretch,
+                                 ScalarRange nu,
+                                 const RmipOptions& options)
+{
+  return texel_march(c, g, r, stretch, nu, options.leaf);
+}
+
 /// The while loop of Alg. 1 for one segment.
 /// @return  true when the search is over
 template <class Bounds>
@@ -45,7 +58,7 @@ RELIEF_KERNEL bool segment_intersect(MetricSearch& c,
     ProjectedStretch front, back;
     const bool march = longest <= options.marching_scale || depth + 2 > kStackSize;
     if (march || !bound_split(c, segment, bound, sides, options.split, &front, &back)) {
-      if (texel_march(c, segment.g, r, stretch, nu, options.leaf)) return true;
+      if (surface_march(c, bounds, segment.g, r, stretch, nu, options)) return true;
       continue;
     }
     const double t = t_at(segment, back.tau0);
@@ -58,7 +71,7 @@ RELIEF_KERNEL bool segment_intersect(MetricSearch& c,
 }  // namespace rmip_detail
 
 /// Nearest (or any) hit of a ray's curve in one displaced triangle.
-/// @param bounds  RmipView or MinmaxMipmapView of the mesh's height field
+/// @param bounds  RmipView or MinmaxMipmapView of the mesh's height field, or BlendedBounds of its blend (blended_bounds.h)
 /// @param hit     written if the result is true
 /// @pre           the marching scale >= rmip_detail::kLeastMarchingScale
 template <class Bounds>

@@ -12,9 +12,9 @@ bool is_same(const std::optional<RmipOptions>& a, const std::optional<RmipOption
 {
   if (!a || !b) return a.has_value() == b.has_value();
   // All fields, or this does not compile.
-  const auto& [scale, inversion, resolution, split, leaf] = *a;
+  const auto& [scale, inversion, resolution, split, leaf, levels] = *a;
   return scale == b->marching_scale && inversion == b->reduce_by_inversion && resolution == b->resolution &&
-         split == b->split && leaf == b->leaf;
+         split == b->split && leaf == b->leaf && levels == b->levels;
 }
 
 /// May take equal cameras for different ones, by the bytes between their fields.

@@ -1,6 +1,7 @@
 // RMIP as published: its traversal over its table.
 #include "displacement/rmip.h"
 #include "displacement/method.h"
+#include "displacement/traverse_blended.h"
 #include "displacement/traverse_rmip.h"
 
 namespace relief {
@@ -9,7 +10,9 @@ namespace {
 
 bool traverse(const PrismQuery& query, const void* table, DisplacedHit* hit)
 {
-  return traverse_rmip(query, *static_cast<const RmipView*>(table), query.rmip_options, hit);
+  const auto& bounds = *static_cast<const RmipView*>(table);
+  if (query.mesh.blend != nullptr) return RELIEF_ISA::traverse_blended(query, bounds, hit);
+  return traverse_rmip(query, bounds, query.rmip_options, hit);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 // RMIP's traversal over a min-max mipmap in place of its table: Fig. 10 of its paper.
 #include "displacement/method.h"
+#include "displacement/traverse_blended.h"
 #include "displacement/traverse_rmip.h"
 
 namespace relief {
@@ -8,7 +9,9 @@ namespace {
 
 bool traverse(const PrismQuery& query, const void* table, DisplacedHit* hit)
 {
-  return traverse_rmip(query, *static_cast<const MinmaxMipmapView*>(table), query.rmip_options, hit);
+  const auto& bounds = *static_cast<const MinmaxMipmapView*>(table);
+  if (query.mesh.blend != nullptr) return RELIEF_ISA::traverse_blended(query, bounds, hit);
+  return traverse_rmip(query, bounds, query.rmip_options, hit);
 }
 
 }  // namespace

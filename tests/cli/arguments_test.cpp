@@ -218,6 +218,16 @@ TEST(OutputName, HasTheSuffixOfItsFormatOrIsADevice)
   }
 }
 
+TEST(RmipOptions, LevelsAreInterpolatedBetweenBilinearCells)
+{
+  EXPECT_EQ(parse_rmip("scale=4").levels, RmipLevels::kMixed);
+  EXPECT_EQ(parse_rmip("levels=mixed,leaf=triangles").levels, RmipLevels::kMixed);
+  EXPECT_EQ(parse_rmip("levels=interpolated,scale=4").levels, RmipLevels::kInterpolated);
+  for (const char* text : {"levels", "levels=1", "levels=mixed,levels=mixed", "levels=interpolated,leaf=triangles",
+                           "leaf=triangles,levels=interpolated"})
+    EXPECT_ANY_THROW(parse_rmip(text)) << text;
+}
+
 /// Empty if the check accepts the text.
 std::string verdict(const CLI::Validator& check, std::string text) { return check(text); }
 

@@ -104,7 +104,8 @@ TEST_F(DisplacementProgram, OptionsOfRmipAreChecked)
   const std::string scene = bumpy();
   folder_.write("rays.txt", ".5 .5 1 0 0 -1\n");
   for (const char* options : {"", "speed=1", "scale", "scale=0", "scale=nan", "resolution=0", "resolution=2.5",
-                              "inversion=yes", "split=", "leaf=quads", "scale=1,scale=2", "scale=1,"}) {
+                              "inversion=yes", "split=", "leaf=quads", "scale=1,scale=2", "scale=1,",
+                              "levels=", "levels=1", "levels=interpolated,leaf=triangles"}) {
     const Outcome outcome = run({"trace", scene, "--rays", file("rays.txt"), "--rmip", options});
     EXPECT_EQ(outcome.exit_code, 2) << options;
     EXPECT_NE(outcome.errors.find("--rmip: expected "), std::string::npos) << options << outcome.errors;
@@ -113,6 +114,49 @@ TEST_F(DisplacementProgram, OptionsOfRmipAreChecked)
   EXPECT_EQ(outcome.exit_code, 0);
   EXPECT_NE(outcome.errors.find("options of RMIP have no effect on displacement method 'auto'"), std::string::npos)
       << outcome.errors;
+}
+
+TEST_F(DisplacementProgram, RmipInterpolatesBetweenTwoLevels)
+{
+  const std::string scene = bumpy();
+  std::string rays;
+  for (int i = 0; i < 12; ++i) {
+    for (int k = 0; k < 12; ++k)
+      rays += std::to_string(0.03 + 0.077 * i) + " " + std::to_string(0.02 + 0.078 * k) + " 3 0 0 -1\n";
+  }
+  folder_.write("rays.txt", rays);
+  const auto at = [&](const std::string& method, const std::string& lod) {
+    return trace(scene, {"--displacement", method, "--lod", lod, "--rmip", "levels=interpolated"});
+  };
+  for (const std::string method : {"rmip", "rmip-minmax"}) {
+    // Straight down, a ray's way is blended as the heights are.
+    const auto fine = at(method, "0"), coarse = at(method, "1"), between = at(method, "0.25");
+    ASSERT_EQ(between.size(), 144u);
+    int num_apart = 0;
+    for (std::size_t k = 0; k < between.size(); ++k) {
+      ASSERT_EQ(between[k][0], "1") << k;
+      const double t[2] = {std::stod(fine[k][1]), std::stod(coarse[k][1])};
+      EXPECT_NEAR(std::stod(between[k][1]), .75 * t[0] + .25 * t[1], 2e-6) << method << " ray " << k;
+      num_apart += std::abs(t[0] - t[1]) > .02 ? 1 : 0;
+    }
+    EXPECT_GT(num_apart, 72);
+    EXPECT_NE(at(method, "0.25"), trace(scene, {"--displacement", method, "--lod", "0.25"}));
+  }
+}
+
+TEST_F(DisplacementProgram, RmipSaysWhereItDoesNotInterpolate)
+{
+  const std::string scene = bumpy();
+  folder_.write("rays.txt", ".5 .5 1 0 0 -1\n");
+  const auto warnings = [&](const std::string& lod) {
+    return run({"trace", scene, "--rays", file("rays.txt"), "--displacement", "rmip", "--lod", lod, "--rmip",
+                "levels=interpolated"})
+        .errors;
+  };
+  const std::string of_rmip = "RMIP interpolates only between levels of detail that are fixed, such as 1.5; ";
+  EXPECT_NE(warnings("auto").find(of_rmip + "those that rays choose by their cones are mixed"), std::string::npos);
+  EXPECT_NE(warnings("1").find(of_rmip + "a whole level is traced as it is"), std::string::npos);
+  EXPECT_EQ(warnings("0.5").find(of_rmip), std::string::npos);
 }
 
 TEST_F(DisplacementProgram, SizesBeyondTheLimitsAreErrorsOfTheScene)

@@ -198,6 +198,8 @@ class DisplacedScene {
     embree_intersect1(scene_, context_, query);
     return query;
   }
+  /// Counts what rays do from now on.
+  void count(TraversalCounters* counters) { context_.displacement = counters; }
   /// A hit, completed.
   DisplacedPoint resolve(const RTCRayHit& query) const
   {

@@ -27,6 +27,7 @@
 
 #include "displacement/embree_geometry.h"
 #include "displacement/height_level.h"
+#include "displacement/level_blend.h"
 #include "tests/displacement/random_cases.h"
 #include "tests/oracle/displaced_triangle.h"
 #include "tests/support/displacement_methods.h"
@@ -367,9 +368,10 @@ class Judge {
              const std::vector<oracle::Hit>& roots,
              const std::string& case_label);
 
-  /// Puts the questions to another geometry, of the same surface; null: to the case's own.
+  /// Puts the questions to another geometry, of the surface that the oracle is given; null: to the case's own.
   void ask(const DisplacedGeometry* geometry) { asked_ = geometry; }
   const Judgement& judgement() const { return judgement_; }
+  DisplacementMethod method() const { return method_; }
   /// Of the method and the instruction set.
   std::string name() const { return std::string(displacement_method_label(method_)) + ", " + table_.isa; }
   const TraversalCounters& counters() const { return counters_; }
@@ -395,7 +397,7 @@ class Judge {
   static const oracle::Hit* required_root(const Question& q);
   static Match match(const Question& q, const DisplacedHit& hit, const oracle::Hit** root);
   static double distance_from_ray(const Question& q, const DisplacedHit& hit);
-  static double normal_angle(const Question& q, const DisplacedHit& hit);
+  double normal_angle(const Question& q, const DisplacedHit& hit) const;
   void record_errors(const Question& q, const DisplacedHit& hit, const oracle::Hit& root);
   void record_fault(std::uint64_t& count,
                     const char* what,
@@ -473,11 +475,12 @@ inline Judge::Match Judge::match(const Question& q, const DisplacedHit& hit, con
 /// Angle between the hit's normal and the oracle's for the same weights; on a line between texels the nearest one of
 /// those on its sides. Normals are on the side of N; the oracle's are on that of the undisplaced triangle, which differs
 /// where all of it is displaced through the points in which displacement lines meet.
-inline double Judge::normal_angle(const Question& q, const DisplacedHit& hit)
+inline double Judge::normal_angle(const Question& q, const DisplacedHit& hit) const
 {
-  const DisplacedMeshView mesh = q.traced.mesh();
+  const DisplacedMeshView mesh = asked_ != nullptr ? asked_->mesh : q.traced.mesh();
   const DisplacedTriangle& tri = mesh.triangles[q.index];
-  const SurfacePoint point = surface_point(mesh, tri, hit.b1, hit.b2, hit.i, hit.j);
+  const SurfacePoint point = mesh.blend != nullptr ? blended_surface_point(mesh, tri, hit.b1, hit.b2, hit.i, hit.j)
+                                                   : surface_point(mesh, tri, hit.b1, hit.b2, hit.i, hit.j);
   if (dot(point.Ng, point.N) < -1e-12 * length(point.N)) return 4;
   const double xu = tri.x[1] - tri.x[0], xv = tri.x[2] - tri.x[0];
   const double yu = tri.y[1] - tri.y[0], yv = tri.y[2] - tri.y[0];
