@@ -477,7 +477,8 @@ inline Judge::Match Judge::match(const Question& q, const DisplacedHit& hit, con
 /// where all of it is displaced through the points in which displacement lines meet.
 inline double Judge::normal_angle(const Question& q, const DisplacedHit& hit) const
 {
-  const DisplacedMeshView mesh = asked_ != nullptr ? asked_->mesh : q.traced.mesh();
+  // Computed heights are known as a map's to the case alone, a blend of levels to the geometry alone.
+  const DisplacedMeshView mesh = asked_ != nullptr && asked_->mesh.blend != nullptr ? asked_->mesh : q.traced.mesh();
   const DisplacedTriangle& tri = mesh.triangles[q.index];
   const SurfacePoint point = mesh.blend != nullptr ? blended_surface_point(mesh, tri, hit.b1, hit.b2, hit.i, hit.j)
                                                    : surface_point(mesh, tri, hit.b1, hit.b2, hit.i, hit.j);
