@@ -27,12 +27,12 @@ struct Gain {
 /// noise of the other; Var(y) from what the halves differ by, of which only a part is noise of both (independent_part).
 Gain gain_of(const Halves& halves, const Candidate& candidate, std::size_t channel, int x, int y);
 
-/// Puts together the best parts of the candidates, of which each pixel gets as much as pays: the picture as it is moves
-/// towards the best candidate by
+/// Puts together the best parts of the candidates. Of those each pixel gets as much as pays: the picture as it is moves towards
+/// the best candidate by
 ///   Σ (Var(y) − Cov(D, y)) / Σ (D − y)²,  at least 0 and at most 1,
 /// which makes the estimated error least, and by less where a few pixels make all of that. So what nobody denoised well stays
-/// as it was, and the error does not grow but by chance. Sums are over the neighbourhood without the pixel itself: what is chosen by a pixel's own noise is better than it
-/// should be, and the error that is left would be estimated too low.
+/// as it was, and the error does not grow but by chance. Sums are over the neighbourhood without the pixel itself: what is
+/// chosen by a pixel's own noise is better than it should be, and the error that is left would be estimated too low.
 /// @return the picture as it is where it is not known, or certain all around
 /// @source James & Stein 1961, with the error of a linear estimate in place of that of none
 Candidate candidates_combine(const Halves& halves, const std::vector<Candidate>& candidates);

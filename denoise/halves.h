@@ -40,8 +40,7 @@ void replace_fireflies(Halves& halves);
 
 /// Fills in the part of the halves' squared difference, times their shares, that is the variance of the picture. It is all of
 /// it if halves are independent. But they are of one point set, in which each has what the other lacks: they differ by more
-/// than the picture is off. Taken for noise, that would be denoised away at the
-/// cost of detail.
+/// than the picture is off. Taken for noise, that would be denoised away at the cost of detail.
 void find_independent_parts(Halves& halves);
 
 }  // namespace relief

@@ -79,7 +79,59 @@ RELIEF_KERNEL ScalarRange blended_cell_range(const MetricSearch& c, const Blende
   return {min(min(a, b), min(p, q)) - c.d_pad, max(max(a, b), max(p, q)) + c.d_pad};
 }
 
-/// texel_march through a blend: along each axis the lines of both lattices are crossed in turn.
+/// One axis of a walk through the parts of cells: along it the lines of both lattices are crossed in turn.
+struct BlendedWalkAxis {
+  const LatticeAxis &fine, &coarse;
+  bool ascends;
+  std::int64_t last_i;
+  bool last_upper;
+
+  bool is_at_end(std::int64_t i, bool upper) const { return i == last_i && upper == last_upper; }
+  /// Where a part ends in the direction of the march.
+  double end_of(std::int64_t i, const BlendedCellAxis& axis, bool upper) const
+  {
+    const double within = ascends ? (upper ? 1.0 : min(axis.cut, 1.0)) : (upper ? axis.cut : 0.0);
+    return static_cast<double>(i) + within;
+  }
+  void step(std::int64_t& i, BlendedCellAxis& axis, bool& upper) const
+  {
+    if (ascends != upper && axis.cut < 1.0) {
+      upper = ascends;
+      return;
+    }
+    i += ascends ? 1 : -1;
+    axis = blended_cell_axis(fine, coarse, i);
+    upper = !ascends && axis.cut < 1.0;
+  }
+};
+
+/// A walk through the parts of cells, see march.
+struct BlendedWalk {
+  LineCrossings crossing;
+  BlendedCell cell;
+  BlendedWalkAxis x, y;
+
+  double crossing_x() const
+  {
+    return x.is_at_end(cell.i, cell.upper_x) ? LineCrossings::kNever
+                                             : crossing.with_column(x.end_of(cell.i, cell.x, cell.upper_x));
+  }
+  double crossing_y() const
+  {
+    return y.is_at_end(cell.j, cell.upper_y) ? LineCrossings::kNever
+                                             : crossing.with_row(y.end_of(cell.j, cell.y, cell.upper_y));
+  }
+  void step_x() { x.step(cell.i, cell.x, cell.upper_x); }
+  void step_y() { y.step(cell.j, cell.y, cell.upper_y); }
+  bool is_at_end() const { return x.is_at_end(cell.i, cell.upper_x) && y.is_at_end(cell.j, cell.upper_y); }
+  ScalarRange range(const MetricSearch& c) const { return blended_cell_range(c, cell); }
+  bool intersect(MetricSearch& c, const CurveSegment& g, double tau0, double tau1) const
+  {
+    return cell_intersect(c, g, cell, tau0, tau1);
+  }
+};
+
+/// march through a blend.
 /// @return  true when the search is over
 template <class Bounds>
 RELIEF_KERNEL bool surface_march(MetricSearch& c,
@@ -91,71 +143,17 @@ RELIEF_KERNEL bool surface_march(MetricSearch& c,
                                  const RmipOptions&)
 {
   const HeightFieldView &f = *c.mesh.field, &coarse = *c.mesh.blend->coarse;
+  const auto cell_of = [&](double x, double y) {
+    return blended_cell_at(c.mesh, cell_at(f.x, x), cell_at(f.y, y), x, y);
+  };
   const double x_start = r.origin_x + stretch.x0, y_start = r.origin_y + stretch.y0;
   const double x_end = r.origin_x + stretch.x1, y_end = r.origin_y + stretch.y1;
-  BlendedCell cell = blended_cell_at(c.mesh, cell_at(f.x, x_start), cell_at(f.y, y_start), x_start, y_start);
-  const BlendedCell last = blended_cell_at(c.mesh, cell_at(f.x, x_end), cell_at(f.y, y_end), x_end, y_end);
-  const bool ascends_x = x_start <= x_end, ascends_y = y_start <= y_end;
-  const BernsteinQuadratic X = bernstein_make(r.X, stretch.tau0, stretch.tau1);
-  const BernsteinQuadratic Y = bernstein_make(r.Y, stretch.tau0, stretch.tau1);
-  const BernsteinQuadratic W = bernstein_make(r.W, stretch.tau0, stretch.tau1);
-  const double length = stretch.tau1 - stretch.tau0;
-  constexpr double kNever = 2.0;
-  const auto is_last = [](std::int64_t i, bool upper, std::int64_t last_i, bool last_upper) {
-    return i == last_i && upper == last_upper;
-  };
-  // Where a part of a cell ends in the direction of the march.
-  const auto end_of = [](std::int64_t i, const BlendedCellAxis& axis, bool upper, bool ascends) {
-    const double within = ascends ? (upper ? 1.0 : min(axis.cut, 1.0)) : (upper ? axis.cut : 0.0);
-    return static_cast<double>(i) + within;
-  };
-  const auto crossing_x = [&] {
-    if (is_last(cell.i, cell.upper_x, last.i, last.upper_x)) return kNever;
-    return bernstein_crossing(X, W, end_of(cell.i, cell.x, cell.upper_x, ascends_x) - r.origin_x);
-  };
-  const auto crossing_y = [&] {
-    if (is_last(cell.j, cell.upper_y, last.j, last.upper_y)) return kNever;
-    return bernstein_crossing(Y, W, end_of(cell.j, cell.y, cell.upper_y, ascends_y) - r.origin_y);
-  };
-  const auto step = [](std::int64_t& i, BlendedCellAxis& axis, bool& upper, bool ascends, const LatticeAxis& of_fine,
-                       const LatticeAxis& of_coarse) {
-    if (ascends != upper && axis.cut < 1.0) {
-      upper = ascends;
-      return;
-    }
-    i += ascends ? 1 : -1;
-    axis = blended_cell_axis(of_fine, of_coarse, i);
-    upper = !ascends && axis.cut < 1.0;
-  };
-  // As in texel_march.
-  constexpr double kSlack = 0x1p-20;
-  const double s_start = g.s0 + stretch.tau0 * g.ds, s_length = length * g.ds;
-  double u = 0.0, u_x = crossing_x(), u_y = crossing_y();
-  for (;;) {
-    const double nearer = u_x < u_y ? u_x : u_y, u_next = nearer < 1.0 ? nearer : 1.0;
-    const double from = u - kSlack, to = u_next + kSlack;
-    const double s_from = s_start + from * s_length, s_to = s_start + to * s_length;
-    const double s_low = min(s_from, s_to), s_high = max(s_from, s_to);
-    const ScalarRange height{s_low * (s_low < 0.0 ? nu.high : nu.low), s_high * (s_high > 0.0 ? nu.high : nu.low)};
-    const ScalarRange range = blended_cell_range(c, cell);
-    ++c.counters.bounds;
-    if (traversal_poll(c.counters, c.next_poll)) return true;
-    if (height.low <= range.high && height.high >= range.low &&
-        cell_intersect(c, g, cell, stretch.tau0 + from * length, stretch.tau0 + to * length) &&
-        (c.unfolded || c.any_hit)) {
-      return true;
-    }
-    if (is_last(cell.i, cell.upper_x, last.i, last.upper_x) && is_last(cell.j, cell.upper_y, last.j, last.upper_y))
-      return false;
-    u = max(u, u_next);
-    if (u_x < u_y) {
-      step(cell.i, cell.x, cell.upper_x, ascends_x, f.x, coarse.x);
-      u_x = crossing_x();
-    } else {
-      step(cell.j, cell.y, cell.upper_y, ascends_y, f.y, coarse.y);
-      u_y = crossing_y();
-    }
-  }
+  const BlendedCell last = cell_of(x_end, y_end);
+  BlendedWalk walk{{r, stretch},
+                   cell_of(x_start, y_start),
+                   {f.x, coarse.x, x_start <= x_end, last.i, last.upper_x},
+                   {f.y, coarse.y, y_start <= y_end, last.j, last.upper_y}};
+  return march(c, g, stretch, nu, walk);
 }
 
 }  // namespace relief

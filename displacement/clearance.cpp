@@ -59,7 +59,7 @@ SurfaceInBox surface_in_box(const DisplacedMeshView& mesh,
                             Vec3d reach)
 {
   const BasePoint base = base_point(tri, b1, b2);
-  const double x = tri.x[0] + b1 * base.xu + b2 * base.xv, y = tri.y[0] + b1 * base.yu + b2 * base.yv;
+  const auto [x, y] = lattice_point(tri, b1, b2);
   const double h = mesh.blend == nullptr ? interpolate_height(*mesh.field, x, y) : blended_height(mesh, x, y);
   const double nu = length(base.N), s = mesh.scale * (h - mesh.midlevel) / nu;
   // Gradients of b1, b2 and s, as functions of a point P(b) + s·N(b): the dual basis of its derivatives.

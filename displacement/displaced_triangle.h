@@ -98,6 +98,18 @@ RELIEF_KERNEL BasePoint base_point(const DisplacedTriangle& tri, double b1, doub
   return p;
 }
 
+/// A place in the height map, lattice coordinates.
+struct LatticePoint {
+  double x = 0, y = 0;
+};
+
+/// @param b1, b2  barycentric weights of vertices 1 and 2
+RELIEF_KERNEL LatticePoint lattice_point(const DisplacedTriangle& tri, double b1, double b2)
+{
+  return {tri.x[0] + b1 * (tri.x[1] - tri.x[0]) + b2 * (tri.x[2] - tri.x[0]),
+          tri.y[0] + b1 * (tri.y[1] - tri.y[0]) + b2 * (tri.y[2] - tri.y[0])};
+}
+
 /// Normal of a surface P + d·N/|N| at a point where d has the slopes scale·hx and scale·hy a lattice unit.
 /// @param scale   metres
 /// @return        unit, on the side of N; where the surface has no tangent plane: N/|N|
@@ -143,9 +155,9 @@ RELIEF_KERNEL SurfacePoint surface_point(const DisplacedMeshView& mesh,
                                          std::int64_t j)
 {
   const BasePoint base = base_point(tri, b1, b2);
-  const double fx = tri.x[0] + b1 * base.xu + b2 * base.xv - static_cast<double>(i);
-  const double fy = tri.y[0] + b1 * base.yu + b2 * base.yv - static_cast<double>(j);
-  return patch_point(mesh, base, cell_heights(*mesh.field, i, j), fx, fy);
+  const LatticePoint at = lattice_point(tri, b1, b2);
+  return patch_point(mesh, base, cell_heights(*mesh.field, i, j), at.x - static_cast<double>(i),
+                     at.y - static_cast<double>(j));
 }
 
 /// The same, in the cell that the weights fall into.
@@ -154,10 +166,9 @@ RELIEF_KERNEL SurfacePoint surface_point(const DisplacedMeshView& mesh,
                                          double b1,
                                          double b2)
 {
-  const double x = tri.x[0] + b1 * (tri.x[1] - tri.x[0]) + b2 * (tri.x[2] - tri.x[0]);
-  const double y = tri.y[0] + b1 * (tri.y[1] - tri.y[0]) + b2 * (tri.y[2] - tri.y[0]);
-  return surface_point(mesh, tri, b1, b2, static_cast<std::int64_t>(__builtin_floor(x)),
-                       static_cast<std::int64_t>(__builtin_floor(y)));
+  const LatticePoint at = lattice_point(tri, b1, b2);
+  return surface_point(mesh, tri, b1, b2, static_cast<std::int64_t>(__builtin_floor(at.x)),
+                       static_cast<std::int64_t>(__builtin_floor(at.y)));
 }
 
 /// Slopes of a map, a lattice unit.
@@ -180,8 +191,7 @@ RELIEF_KERNEL Vec3d surface_smooth_normal(const DisplacedMeshView& mesh,
                                           double b2)
 {
   const BasePoint base = base_point(tri, b1, b2);
-  const double x = tri.x[0] + b1 * base.xu + b2 * base.xv;
-  const double y = tri.y[0] + b1 * base.yu + b2 * base.yv;
+  const auto [x, y] = lattice_point(tri, b1, b2);
   const LatticeSlopes slopes = smooth_slopes(*mesh.field, x, y);
   return surface_normal(base, displacement_at(mesh, x, y), mesh.scale, slopes.x, slopes.y);
 }

@@ -109,7 +109,7 @@ RELIEF_KERNEL SurfacePoint blended_surface_point(const DisplacedMeshView& mesh,
                                                  std::int64_t j)
 {
   const BasePoint base = base_point(tri, b1, b2);
-  const double x = tri.x[0] + b1 * base.xu + b2 * base.xv, y = tri.y[0] + b1 * base.yu + b2 * base.yv;
+  const auto [x, y] = lattice_point(tri, b1, b2);
   const BlendedCell cell = blended_cell_at(mesh, i, j, x, y);
   const CellHeights heights = blended_heights(cell, blended_patches(mesh, cell), mesh.blend->weight);
   return patch_point(mesh, base, heights, x - static_cast<double>(i), y - static_cast<double>(j));
@@ -122,8 +122,7 @@ RELIEF_KERNEL SurfacePoint traced_surface_point(const DisplacedMeshView& mesh,
                                                 double b2)
 {
   if (mesh.blend == nullptr) return surface_point(mesh, tri, b1, b2);
-  const double x = tri.x[0] + b1 * (tri.x[1] - tri.x[0]) + b2 * (tri.x[2] - tri.x[0]);
-  const double y = tri.y[0] + b1 * (tri.y[1] - tri.y[0]) + b2 * (tri.y[2] - tri.y[0]);
+  const auto [x, y] = lattice_point(tri, b1, b2);
   return blended_surface_point(mesh, tri, b1, b2, static_cast<std::int64_t>(__builtin_floor(x)),
                                static_cast<std::int64_t>(__builtin_floor(y)));
 }
@@ -137,7 +136,7 @@ RELIEF_KERNEL Vec3d traced_smooth_normal(const DisplacedMeshView& mesh,
   if (mesh.blend == nullptr) return surface_smooth_normal(mesh, tri, b1, b2);
   const HeightFieldView &fine = *mesh.field, &coarse = *mesh.blend->coarse;
   const BasePoint base = base_point(tri, b1, b2);
-  const double x = tri.x[0] + b1 * base.xu + b2 * base.xv, y = tri.y[0] + b1 * base.yu + b2 * base.yv;
+  const auto [x, y] = lattice_point(tri, b1, b2);
   const double x_coarse = lattice_on_level(x, fine.map.width, coarse.map.width),
                y_coarse = lattice_on_level(y, fine.map.height, coarse.map.height);
   const LatticeSlopes f = smooth_slopes(fine, x, y), c = smooth_slopes(coarse, x_coarse, y_coarse);

@@ -170,7 +170,7 @@ bool level_facets_make(const DisplacedGeometry& geometry, const LevelPlace& at, 
   if (!(size < kInfinity)) return false;
   out->normal = size * normal;
 
-  const double x = tri.x[0] + b1 * base.xu + b2 * base.xv, y = tri.y[0] + b1 * base.yu + b2 * base.yv;
+  const auto [x, y] = lattice_point(tri, b1, b2);
   const double width = geometry.facets->window * std::exp2(at.level);
   const Slopes slopes = slopes_around(map, x, y, width, width, jitter, geometry.smooth);
   const float mean_x = sum_of(slopes.x) / kLevelFacets, mean_y = sum_of(slopes.y) / kLevelFacets;

@@ -74,15 +74,99 @@ RELIEF_KERNEL std::int64_t cell_at(const LatticeAxis& axis, double x)
   return i < -1 ? -1 : (i > last ? last : i);
 }
 
+/// Where a stretch crosses the lines of a lattice, in parts of it.
+struct LineCrossings {
+  static constexpr double kNever = 2.0;
+  BernsteinQuadratic X, Y, W;
+  double origin_x, origin_y;
+
+  LineCrossings(const RayProjection& r, const ProjectedStretch& stretch)
+      : X(bernstein_make(r.X, stretch.tau0, stretch.tau1)),
+        Y(bernstein_make(r.Y, stretch.tau0, stretch.tau1)),
+        W(bernstein_make(r.W, stretch.tau0, stretch.tau1)),
+        origin_x(r.origin_x),
+        origin_y(r.origin_y)
+  {
+  }
+  double with_column(double x) const { return bernstein_crossing(X, W, x - origin_x); }
+  double with_row(double y) const { return bernstein_crossing(Y, W, y - origin_y); }
+};
+
 /// The cells that a monotone stretch crosses, front to back, and the leaf test in those whose heights the ray reaches.
 ///
 /// The paper finds the next cell by the signs of ψ at a cell's corners; here the crossings of its lines are solved for.
 /// Where a crossing is off by rounding, so is the cell, by as much of a texel: heights are continuous there, and each
 /// cell is given a little more of the curve than its own.
+/// @param walk  from cell to cell: crossing_x and crossing_y tell where the stretch leaves the one that it is in, or kNever
+///              after the last; step_x and step_y go on to the next; is_at_end; range of its displacements; intersect, the test
 /// @param nu    range of |N| on the stretch and a hundredth of a texel around it
-/// @param leaf  what is met in a cell
 /// @return    true when the search is over
 /// @source    Thonat et al. 2023, §4.4
+template <class Walk>
+RELIEF_KERNEL bool march(MetricSearch& c,
+                         const CurveSegment& g,
+                         const ProjectedStretch& stretch,
+                         ScalarRange nu,
+                         Walk& walk)
+{
+  const double length = stretch.tau1 - stretch.tau0;
+  // Of the stretch, so some 1e-5 of a texel: more than rounding, too little to cost anything.
+  constexpr double kSlack = 0x1p-20;
+  const double s_start = g.s0 + stretch.tau0 * g.ds, s_length = length * g.ds;
+  double u = 0.0, u_x = walk.crossing_x(), u_y = walk.crossing_y();
+  for (;;) {
+    const double nearer = u_x < u_y ? u_x : u_y, u_next = nearer < 1.0 ? nearer : 1.0;
+    const double from = u - kSlack, to = u_next + kSlack;
+    const double s_from = s_start + from * s_length, s_to = s_start + to * s_length;
+    const double s_low = min(s_from, s_to), s_high = max(s_from, s_to);
+    const ScalarRange height{s_low * (s_low < 0.0 ? nu.high : nu.low), s_high * (s_high > 0.0 ? nu.high : nu.low)};
+    const ScalarRange cell = walk.range(c);
+    ++c.counters.bounds;
+    if (traversal_poll(c.counters, c.next_poll)) return true;
+    if (height.low <= cell.high && height.high >= cell.low) {
+      const bool is_hit = walk.intersect(c, g, stretch.tau0 + from * length, stretch.tau0 + to * length);
+      if (is_hit && (c.unfolded || c.any_hit)) return true;
+    }
+    if (walk.is_at_end()) return false;
+    u = max(u, u_next);
+    if (u_x < u_y) {
+      walk.step_x();
+      u_x = walk.crossing_x();
+    } else {
+      walk.step_y();
+      u_y = walk.crossing_y();
+    }
+  }
+}
+
+/// A walk through the cells of a map.
+struct TexelWalk {
+  LineCrossings crossing;
+  std::int64_t i, j, i_end, j_end;
+  int step_i, step_j;
+  RmipLeaf leaf;
+
+  double crossing_x() const
+  {
+    return i == i_end ? LineCrossings::kNever : crossing.with_column(static_cast<double>(step_i > 0 ? i + 1 : i));
+  }
+  double crossing_y() const
+  {
+    return j == j_end ? LineCrossings::kNever : crossing.with_row(static_cast<double>(step_j > 0 ? j + 1 : j));
+  }
+  void step_x() { i += step_i; }
+  void step_y() { j += step_j; }
+  bool is_at_end() const { return i == i_end && j == j_end; }
+  ScalarRange range(const MetricSearch& c) const { return cell_displacement_range(c, i, j); }
+  bool intersect(MetricSearch& c, const CurveSegment& g, double tau0, double tau1) const
+  {
+    return leaf == RmipLeaf::kTriangles ? micro_triangles_intersect(c, g, i, j, tau0, tau1)
+                                        : cell_intersect(c, g, i, j, tau0, tau1);
+  }
+};
+
+/// march through the cells of a mesh's field.
+/// @param leaf  what is met in a cell
 RELIEF_KERNEL bool texel_march(MetricSearch& c,
                                const CurveSegment& g,
                                const RayProjection& r,
@@ -91,51 +175,10 @@ RELIEF_KERNEL bool texel_march(MetricSearch& c,
                                RmipLeaf leaf)
 {
   const HeightFieldView& f = *c.mesh.field;
-  std::int64_t i = cell_at(f.x, r.origin_x + stretch.x0), j = cell_at(f.y, r.origin_y + stretch.y0);
+  const std::int64_t i = cell_at(f.x, r.origin_x + stretch.x0), j = cell_at(f.y, r.origin_y + stretch.y0);
   const std::int64_t i_end = cell_at(f.x, r.origin_x + stretch.x1), j_end = cell_at(f.y, r.origin_y + stretch.y1);
-  const int step_i = i <= i_end ? 1 : -1, step_j = j <= j_end ? 1 : -1;
-  const BernsteinQuadratic X = bernstein_make(r.X, stretch.tau0, stretch.tau1);
-  const BernsteinQuadratic Y = bernstein_make(r.Y, stretch.tau0, stretch.tau1);
-  const BernsteinQuadratic W = bernstein_make(r.W, stretch.tau0, stretch.tau1);
-  const double length = stretch.tau1 - stretch.tau0;
-  constexpr double kNever = 2.0;
-  const auto crossing_x = [&] {
-    if (i == i_end) return kNever;
-    return bernstein_crossing(X, W, static_cast<double>(step_i > 0 ? i + 1 : i) - r.origin_x);
-  };
-  const auto crossing_y = [&] {
-    if (j == j_end) return kNever;
-    return bernstein_crossing(Y, W, static_cast<double>(step_j > 0 ? j + 1 : j) - r.origin_y);
-  };
-  // Of the stretch, so some 1e-5 of a texel: more than rounding, too little to cost anything.
-  constexpr double kSlack = 0x1p-20;
-  const double s_start = g.s0 + stretch.tau0 * g.ds, s_length = length * g.ds;
-  double u = 0.0, u_x = crossing_x(), u_y = crossing_y();
-  for (;;) {
-    const double nearer = u_x < u_y ? u_x : u_y, u_next = nearer < 1.0 ? nearer : 1.0;
-    const double from = u - kSlack, to = u_next + kSlack;
-    const double s_from = s_start + from * s_length, s_to = s_start + to * s_length;
-    const double s_low = min(s_from, s_to), s_high = max(s_from, s_to);
-    const ScalarRange height{s_low * (s_low < 0.0 ? nu.high : nu.low), s_high * (s_high > 0.0 ? nu.high : nu.low)};
-    const ScalarRange cell = cell_displacement_range(c, i, j);
-    ++c.counters.bounds;
-    if (traversal_poll(c.counters, c.next_poll)) return true;
-    if (height.low <= cell.high && height.high >= cell.low) {
-      const double tau_from = stretch.tau0 + from * length, tau_to = stretch.tau0 + to * length;
-      const bool is_hit = leaf == RmipLeaf::kTriangles ? micro_triangles_intersect(c, g, i, j, tau_from, tau_to)
-                                                       : cell_intersect(c, g, i, j, tau_from, tau_to);
-      if (is_hit && (c.unfolded || c.any_hit)) return true;
-    }
-    if (i == i_end && j == j_end) return false;
-    u = max(u, u_next);
-    if (u_x < u_y) {
-      i += step_i;
-      u_x = crossing_x();
-    } else {
-      j += step_j;
-      u_y = crossing_y();
-    }
-  }
+  TexelWalk walk{{r, stretch}, i, j, i_end, j_end, i <= i_end ? 1 : -1, j <= j_end ? 1 : -1, leaf};
+  return march(c, g, stretch, nu, walk);
 }
 
 }  // namespace relief

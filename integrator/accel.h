@@ -58,10 +58,8 @@ class Accel {
   const DisplacementSet& displacements() const { return *displacements_; }
   const SceneMotion& motion() const { return views_->motion; }
   Box3 bounds() const;  ///< of all that rays can hit, world
-  Box3 displaced_bounds(std::size_t geometry) const
-  {
-    return displaced_[geometry].box;
-  }  ///< of a displaced geometry's prisms or triangles, object space
+  /// Of a displaced geometry's prisms or micro-triangles, object space.
+  Box3 displaced_bounds(std::size_t geometry) const { return displaced_[geometry].box; }
   std::size_t bytes() const { return trees_->bytes(); }   ///< allocated by Embree
   const KeptTrees::Tally& kept() const { return kept_; }  ///< of the scenes before
 

@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include <gtest/gtest.h>
+
 #include "displacement/embree.h"
 #include "tests/displacement/hard_cases.h"
 #include "tests/displacement/judge.h"
@@ -229,5 +231,24 @@ inline std::string ray_text(const oracle::Ray& ray)
       << ray.D[2] << " t in " << ray.t_min << " " << ray.t_max;
   return out.str();
 }
+
+/// Rays that got out of a closed surface.
+struct Leaks {
+  std::uint64_t num_closest = 0, num_shadow = 0;
+  std::string first;  ///< one of them
+
+  void trace(DisplacedScene& scene, const oracle::Ray& ray, float time = 0)
+  {
+    const bool closest = !(scene.intersect(ray, {}, time) < HUGE_VALF), shadow = !scene.occluded(ray, {}, time);
+    if ((closest || shadow) && first.empty()) first = ray_text(ray) + " at " + std::to_string(time);
+    num_closest += closest ? 1 : 0;
+    num_shadow += shadow ? 1 : 0;
+  }
+  void expect_none(const std::string& surface) const
+  {
+    EXPECT_EQ(num_closest, 0u) << surface << " " << first;
+    EXPECT_EQ(num_shadow, 0u) << surface << " " << first;
+  }
+};
 
 }  // namespace relief

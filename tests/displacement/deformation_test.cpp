@@ -166,8 +166,7 @@ TEST_P(DisplacedMeshThatDeforms, LetsNoRayOutAtAnyTime)
                               deforming.steps);
       DisplacedScene scene(traced.geometry(GetParam()), best_table());
       std::mt19937_64 random(7);
-      std::uint64_t num_leaks = 0;
-      std::string first;
+      Leaks leaks;
       const std::uint64_t num_rays = num_test_rays(60000) / 6;
       float time = 0;
       for (std::uint64_t k = 0; k < num_rays; ++k) {
@@ -175,12 +174,9 @@ TEST_P(DisplacedMeshThatDeforms, LetsNoRayOutAtAnyTime)
           time = random_time(random);
           deforming.set_time(time);
         }
-        const Ray ray = ray_from_inside(random, deforming.surface);
-        const bool leaks = !(scene.intersect(ray, {}, time) < HUGE_VALF) || !scene.occluded(ray, {}, time);
-        if (leaks && first.empty()) first = ray_text(ray) + " at " + std::to_string(time);
-        num_leaks += leaks ? 1 : 0;
+        leaks.trace(scene, ray_from_inside(random, deforming.surface), time);
       }
-      EXPECT_EQ(num_leaks, 0u) << closed.name << " " << bending->name << " " << first;
+      leaks.expect_none(closed.name + " " + bending->name);
     }
   }
 }

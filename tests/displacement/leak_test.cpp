@@ -24,18 +24,12 @@ TEST_P(ClosedDisplacedSurface, LetsNoRayOut)
     const TracedCase traced(surface.triangles, surface.map, HeightFormat::kFloat, 1, surface.weld_seams);
     DisplacedScene scene(traced.geometry(GetParam()), best_table());
     std::mt19937_64 random(97 + (test_part() << 32));
-    std::uint64_t num_leaks = 0, num_dark_leaks = 0;
-    std::string first;
+    Leaks leaks;
     const std::uint64_t num_rays = num_test_rays(150000) / 3;
     for (std::uint64_t k = 0; k < num_rays; ++k) {
-      const Ray ray = ray_from_inside(random, surface);
-      const bool leaks = !(scene.intersect(ray) < HUGE_VALF), dark_leaks = !scene.occluded(ray);
-      if ((leaks || dark_leaks) && first.empty()) first = ray_text(ray);
-      num_leaks += leaks ? 1 : 0;
-      num_dark_leaks += dark_leaks ? 1 : 0;
+      leaks.trace(scene, ray_from_inside(random, surface));
     }
-    EXPECT_EQ(num_leaks, 0u) << surface.name << " " << first;
-    EXPECT_EQ(num_dark_leaks, 0u) << surface.name << " " << first;
+    leaks.expect_none(surface.name);
   }
 }
 

@@ -218,17 +218,11 @@ TEST_P(BlendedSurface, LetsNoRayOut)
       BlendedCase blended(surface.triangles, surface.map, weight, HeightFormat::kFloat, surface.weld_seams);
       DisplacedScene scene(blended.geometry(GetParam()), best_table());
       std::mt19937_64 random(297 + (test_part() << 32));
-      std::uint64_t num_leaks = 0, num_dark_leaks = 0;
-      std::string first;
+      Leaks leaks;
       for (std::uint64_t k = 0; k < num_test_rays(120000) / 6; ++k) {
-        const oracle::Ray ray = ray_from_inside(random, surface);
-        const bool leaks = !(scene.intersect(ray) < HUGE_VALF), dark_leaks = !scene.occluded(ray);
-        if ((leaks || dark_leaks) && first.empty()) first = ray_text(ray);
-        num_leaks += leaks ? 1 : 0;
-        num_dark_leaks += dark_leaks ? 1 : 0;
+        leaks.trace(scene, ray_from_inside(random, surface));
       }
-      EXPECT_EQ(num_leaks, 0u) << surface.name << " " << first;
-      EXPECT_EQ(num_dark_leaks, 0u) << surface.name << " " << first;
+      leaks.expect_none(surface.name);
     }
   }
 }

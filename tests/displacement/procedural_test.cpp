@@ -271,8 +271,7 @@ TEST(ComputedHeights, LetNoRayOut)
     EXPECT_GT(wavy.field.triangles().size(), surface.triangles.size());
     DisplacedScene scene(wavy.geometry, best_table());
     std::mt19937_64 random(97 + (test_part() << 32));
-    std::uint64_t num_leaks = 0, num_dark_leaks = 0;
-    std::string first;
+    Leaks leaks;
     const std::uint64_t num_rays = num_test_rays(60000) / 2;
     for (std::uint64_t k = 0; k < num_rays; ++k) {
       // Half of them through corners and sides of parts.
@@ -288,13 +287,9 @@ TEST(ComputedHeights, LetNoRayOut)
             displaced_surface_point(wavy.geometry, index, {static_cast<float>(at[0]), static_cast<float>(at[1])});
         ray = ray_through(surface.inside(random), {point.P.x, point.P.y, point.P.z});
       }
-      const bool leaks = !(scene.intersect(ray) < HUGE_VALF), dark_leaks = !scene.occluded(ray);
-      if ((leaks || dark_leaks) && first.empty()) first = ray_text(ray);
-      num_leaks += leaks ? 1 : 0;
-      num_dark_leaks += dark_leaks ? 1 : 0;
+      leaks.trace(scene, ray);
     }
-    EXPECT_EQ(num_leaks, 0u) << surface.name << " " << first;
-    EXPECT_EQ(num_dark_leaks, 0u) << surface.name << " " << first;
+    leaks.expect_none(surface.name);
   }
 }
 
