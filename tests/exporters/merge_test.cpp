@@ -7,6 +7,7 @@
 
 #include "exporters/errors.h"
 #include "exporters/exr.h"
+#include "scene/memory.h"
 #include "tests/exporters/test_pictures.h"
 
 namespace relief {
@@ -313,6 +314,32 @@ TEST_F(Merge, CryptomattesAreLeftOutAndSaid)
   EXPECT_EQ(result.picture.attributes.count("cryptomatte/3ae39a5/name"), 0u);
   ASSERT_EQ(result.warnings.size(), 3u);
   EXPECT_EQ(result.warnings[0], "layer 'CryptoObject00' is left out: ids have no mean");
+}
+
+TEST_F(Merge, AsksForTheMemoryOfItsSums)
+{
+  Picture large;
+  large.width = large.full_width = 2048;
+  large.height = large.full_height = 1024;
+  const std::size_t num_pixels = std::size_t{2048} * 1024;
+  for (const char* name : {"R", "G", "B", "A", "samples.N"}) {
+    large.channels.push_back({name, ChannelType::kFloat, std::vector<float>(num_pixels, 1.0f)});
+  }
+  large.attributes = {{"relief:seed", "1"}, {"relief:scene", "s"}, {"relief:frame", "0"}};
+  exr_write(file("1.exr"), large);
+  large = {};
+  // Enough for the picture, 40 MiB, and not for eight sums of 16.
+  constexpr std::uint64_t kAll = std::uint64_t{1} << 40;
+  memory_limit_set(kAll);
+  memory_limit_set(kAll - memory_left() + (std::uint64_t{64} << 20));
+  std::string refused = "no error";
+  try {
+    merge({file("1.exr")});
+  } catch (const OutOfMemory& error) {
+    refused = error.what();
+  }
+  memory_limit_reset();
+  EXPECT_NE(refused.find("the sums of its layers"), std::string::npos) << refused;
 }
 
 }  // namespace relief
