@@ -39,8 +39,39 @@ RELIEF_KERNEL D4 max(D4 a, D4 b) { return a > b ? a : b; }
 RELIEF_KERNEL D4 min(D4 a, D4 b) { return a < b ? a : b; }
 RELIEF_KERNEL D4 sqrt(D4 a)
 {
+#ifdef __AVX__
+  return __builtin_bit_cast(D4, _mm256_sqrt_pd(__builtin_bit_cast(__m256d, a)));
+#else
   for (int k = 0; k < 4; ++k) a[k] = __builtin_sqrt(a[k]);
   return a;
+#endif
+}
+/// a·b + c, rounded once where the machine can.
+RELIEF_KERNEL F8 fused(F8 a, F8 b, F8 c)
+{
+#ifdef __FMA__
+  return __builtin_bit_cast(
+      F8, _mm256_fmadd_ps(__builtin_bit_cast(__m256, a), __builtin_bit_cast(__m256, b), __builtin_bit_cast(__m256, c)));
+#else
+  return a * b + c;
+#endif
+}
+RELIEF_KERNEL double fused(double a, double b, double c)
+{
+#ifdef __FMA__
+  return __builtin_fma(a, b, c);
+#else
+  return a * b + c;
+#endif
+}
+RELIEF_KERNEL D4 fused(D4 a, D4 b, D4 c)
+{
+#ifdef __FMA__
+  return __builtin_bit_cast(D4, _mm256_fmadd_pd(__builtin_bit_cast(__m256d, a), __builtin_bit_cast(__m256d, b),
+                                                __builtin_bit_cast(__m256d, c)));
+#else
+  return a * b + c;
+#endif
 }
 /// Lanes 1, 2, 0: the next vertex of a triangle. Lane 3 stays.
 RELIEF_KERNEL D4 next_vertex(D4 a) { return __builtin_shufflevector(a, a, 1, 2, 0, 3); }

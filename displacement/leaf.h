@@ -65,6 +65,12 @@ struct CurvePoint {
 
 RELIEF_KERNEL Vec3d curve_normal(const CurvePoint& p) { return {p.Nx, p.Ny, p.Nz}; }
 
+/// Σ b_k·v_k
+RELIEF_KERNEL double weighted_sum(double b0, double b1, double b2, double v0, double v1, double v2)
+{
+  return fused(b2, v2, fused(b1, v1, b0 * v0));
+}
+
 RELIEF_KERNEL CurvePoint curve_point(const DisplacedTriangle& tri, const CurveSegment& g, double tau)
 {
   CurvePoint p;
@@ -75,14 +81,17 @@ RELIEF_KERNEL CurvePoint curve_point(const DisplacedTriangle& tri, const CurveSe
   const double b0 = e0 * inverse;
   p.b1 = e1 * inverse;
   p.b2 = e2 * inverse;
-  p.x = b0 * tri.x[0] + p.b1 * tri.x[1] + p.b2 * tri.x[2];
-  p.y = b0 * tri.y[0] + p.b1 * tri.y[1] + p.b2 * tri.y[2];
-  const Vec3d N = b0 * to_double(tri.N[0]) + p.b1 * to_double(tri.N[1]) + p.b2 * to_double(tri.N[2]);
-  p.Nx = N.x;
-  p.Ny = N.y;
-  p.Nz = N.z;
-  p.s = g.s0 + tau * g.ds;
-  p.nu = length(N);
+  const Vec3f* N = tri.N;
+  p.x = weighted_sum(b0, p.b1, p.b2, tri.x[0], tri.x[1], tri.x[2]);
+  p.y = weighted_sum(b0, p.b1, p.b2, tri.y[0], tri.y[1], tri.y[2]);
+  p.Nx = weighted_sum(b0, p.b1, p.b2, static_cast<double>(N[0].x), static_cast<double>(N[1].x),
+                      static_cast<double>(N[2].x));
+  p.Ny = weighted_sum(b0, p.b1, p.b2, static_cast<double>(N[0].y), static_cast<double>(N[1].y),
+                      static_cast<double>(N[2].y));
+  p.Nz = weighted_sum(b0, p.b1, p.b2, static_cast<double>(N[0].z), static_cast<double>(N[1].z),
+                      static_cast<double>(N[2].z));
+  p.s = fused(tau, g.ds, g.s0);
+  p.nu = __builtin_sqrt(fused(p.Nz, p.Nz, fused(p.Ny, p.Ny, p.Nx * p.Nx)));
   return p;
 }
 
@@ -168,45 +177,81 @@ RELIEF_KERNEL void weights_correct(const DisplacedMeshView& mesh,
 /// less than a texel.
 inline constexpr double kCellTolerance = 1e-9;
 
-/// The root of g between two ends of different sign, by secant steps. An end that stays would keep the other from closing in,
-/// so its value is scaled down as Anderson and Björck 1973, "A new high order method of regula falsi type", do: half as many
-/// steps as by halving it (the Illinois method).
+/// A bracket of a root: τ at its ends, where g has different signs.
+struct RootBracket {
+  double a, b, ga, gb;
+};
+
+/// The root of g in a bracket: a step of Newton from a guess, then secant steps. An end that stays would keep the other from
+/// closing in, so its value is scaled down as Anderson and Björck 1973, "A new high order method of regula falsi type", do:
+/// half as many steps as by halving it (the Illinois method).
+/// @param guess  τ; anything outside of the bracket stands for the secant
+/// @param slope  of g there, about
 /// @param noise  values no larger are zeros
 /// @param g_at   of a point of the curve
 template <class Height>
 RELIEF_KERNEL CurvePoint root_between(const DisplacedTriangle& tri,
                                       const CurveSegment& segment,
-                                      CurvePoint a,
-                                      CurvePoint b,
-                                      double ga,
-                                      double gb,
+                                      RootBracket n,
+                                      double guess,
+                                      double slope,
                                       double noise,
                                       const Height& g_at)
 {
-  const bool starts_below = ga < 0.0;
+  const bool starts_below = n.ga < 0.0;
   int stayed = 0;
-  for (int k = 0; k < 80 && b.tau - a.tau > 0x1p-51 && ga != 0.0; ++k) {
-    double tau = a.tau + (b.tau - a.tau) * (ga / (ga - gb));
-    if (!(tau > a.tau && tau < b.tau)) tau = 0.5 * (a.tau + b.tau);
-    if (!(tau > a.tau && tau < b.tau)) break;
+  double tau = guess;
+  for (int k = 0; k < 80 && n.b - n.a > 0x1p-51 && n.ga != 0.0; ++k) {
+    if (!(tau > n.a && tau < n.b)) tau = n.a + (n.b - n.a) * (n.ga / (n.ga - n.gb));
+    if (!(tau > n.a && tau < n.b)) tau = 0.5 * (n.a + n.b);
+    if (!(tau > n.a && tau < n.b)) break;
     const CurvePoint p = curve_point(tri, segment, tau);
     const double gp = g_at(p);
     if (__builtin_fabs(gp) <= noise) return p;
     const bool replaces_a = (gp < 0.0) == starts_below;
-    const double left = 1.0 - gp / (replaces_a ? ga : gb), factor = left > 0.0 ? left : 0.5;
+    const double left = 1.0 - gp / (replaces_a ? n.ga : n.gb), factor = left > 0.0 ? left : 0.5;
     if (replaces_a) {
-      a = p;
-      ga = gp;
-      if (stayed == 1) gb *= factor;
+      n.a = tau;
+      n.ga = gp;
+      if (stayed == 1) n.gb *= factor;
       stayed = 1;
     } else {
-      b = p;
-      gb = gp;
-      if (stayed == 2) ga *= factor;
+      n.b = tau;
+      n.gb = gp;
+      if (stayed == 2) n.ga *= factor;
       stayed = 2;
     }
+    tau = k == 0 ? tau - gp / slope : n.a;
   }
-  return a;
+  return curve_point(tri, segment, n.a);
+}
+
+/// Values of g at τ0, τ0 + w/3, τ0 + 2w/3 and τ0 + w; τ0 + k·w/3 at sample k.
+struct CurveSamples {
+  double tau0, width;
+  D4 g;
+};
+
+/// The root of the cubic through four samples between the two of them that differ in sign.
+/// @param slope  of the cubic there
+/// @return       τ, about
+RELIEF_KERNEL double cubic_root(const CurveSamples& n, double* slope)
+{
+  const double f0 = n.g[0], f1 = n.g[1], f2 = n.g[2], f3 = n.g[3];
+  const bool below = f0 < 0.0;
+  const int k = (f1 < 0.0) != below ? 0 : ((f2 < 0.0) != below ? 1 : 2);
+  const double from = n.g[k], to = n.g[k + 1];
+  double v = static_cast<double>(k) + from / (from - to);
+  // Newton's form of the polynomial, in powers of v.
+  const double d1 = f1 - f0, d2 = 0.5 * (f2 - 2.0 * f1 + f0), d3 = (f3 - f0 - 3.0 * (f2 - f1)) * (1.0 / 6.0);
+  const double c2 = d2 - 3.0 * d3, c1 = d1 - d2 + 2.0 * d3;
+  double derivative = 0;
+  for (int step = 0; step < 2; ++step) {
+    derivative = fused(fused(3.0 * d3, v, 2.0 * c2), v, c1);
+    v -= fused(fused(fused(d3, v, c2), v, c1), v, f0) / derivative;
+  }
+  *slope = derivative * 3.0 / n.width;
+  return fused(v, n.width * (1.0 / 3.0), n.tau0);
 }
 
 /// The bilinear patch that the leaf test is for.
@@ -255,6 +300,44 @@ RELIEF_KERNEL double leaf_displacement(const DisplacedMeshView& mesh, LatticeCel
   return displacement_at(mesh, x, y);
 }
 
+/// g at four points of the curve side by side; a and b become the first and the last.
+RELIEF_KERNEL CurveSamples curve_samples(const DisplacedTriangle& tri,
+                                         const CurveSegment& g,
+                                         const CellHeights& cell,
+                                         double corner_x,
+                                         double corner_y,
+                                         const DisplacedMeshView& mesh,
+                                         double tau0,
+                                         double tau1,
+                                         CurvePoint* a,
+                                         CurvePoint* b)
+{
+  const auto splat = [](double x) { return D4{x, x, x, x}; };
+  const double width = tau1 - tau0;
+  const D4 tau{tau0, fused(width, 1.0 / 3.0, tau0), fused(width, 2.0 / 3.0, tau0), tau1};
+  const auto at = [&](const Quadratic& p) { return fused(fused(splat(p.a), tau, splat(p.b)), tau, splat(p.c)); };
+  const D4 e0 = at(g.e[0]), e1 = at(g.e[1]), e2 = at(g.e[2]);
+  const D4 W = e0 + e1 + e2, inverse = 1.0 / W;
+  const D4 b0 = e0 * inverse, b1 = e1 * inverse, b2 = e2 * inverse;
+  const auto sum = [&](double v0, double v1, double v2) { return fused(b2, splat(v2), fused(b1, splat(v1), b0 * v0)); };
+  const auto of = [&](float v0, float v1, float v2) {
+    return sum(static_cast<double>(v0), static_cast<double>(v1), static_cast<double>(v2));
+  };
+  const Vec3f* N = tri.N;
+  const D4 x = sum(tri.x[0], tri.x[1], tri.x[2]), y = sum(tri.y[0], tri.y[1], tri.y[2]);
+  const D4 Nx = of(N[0].x, N[1].x, N[2].x), Ny = of(N[0].y, N[1].y, N[2].y), Nz = of(N[0].z, N[1].z, N[2].z);
+  const D4 s = fused(tau, splat(g.ds), splat(g.s0));
+  const D4 nu = sqrt(fused(Nz, Nz, fused(Ny, Ny, Nx * Nx)));
+  const D4 fx = x - corner_x, fy = y - corner_y;
+  const D4 h = fused(fused(splat(cell.hxy), fx, splat(cell.hy)), fy, fused(splat(cell.hx), fx, splat(cell.h00)));
+  const auto point = [&](int k) {
+    return CurvePoint{tau[k], b1[k], b2[k], W[k], x[k], y[k], Nx[k], Ny[k], Nz[k], s[k], nu[k]};
+  };
+  *a = point(0);
+  *b = point(3);
+  return {tau0, width, fused(s, nu, -mesh.scale * (h - mesh.midlevel))};
+}
+
 /// First root of g in a cell. Not inlined: its stack is as large as that of a descent.
 /// @param place       the cell, or what of it has one patch: LatticeCell, or BlendedCell (level_blend.h)
 /// @param tau0, tau1  contains every τ at which the curve is in the cell; 0 <= tau0 <= tau1 <= 1
@@ -281,8 +364,8 @@ template <class Cell>
 
   const auto height_over = [&](const CurvePoint& p) {
     const double fx = p.x - corner_x, fy = p.y - corner_y;
-    const double h = cell.h00 + cell.hx * fx + (cell.hy + cell.hxy * fx) * fy;
-    return p.s * p.nu - mesh.scale * (h - mesh.midlevel);
+    const double h = fused(fused(cell.hxy, fx, cell.hy), fy, fused(cell.hx, fx, cell.h00));
+    return fused(p.s, p.nu, -mesh.scale * (h - mesh.midlevel));
   };
   const auto deviation = [&](const CurvePoint& a, const CurvePoint& b) {
     const CurveDeviation d = curve_deviation(tri, g, a, b);
@@ -328,10 +411,10 @@ template <class Cell>
   constexpr int kMaxDepth = 64;
   Interval stack[kMaxDepth];
   int depth = 0;
-  stack[0].a = curve_point(tri, g, tau0);
-  stack[0].b = curve_point(tri, g, tau1);
-  stack[0].ga = height_over(stack[0].a);
-  stack[0].gb = height_over(stack[0].b);
+  const CurveSamples samples =
+      curve_samples(tri, g, cell, corner_x, corner_y, mesh, tau0, tau1, &stack[0].a, &stack[0].b);
+  stack[0].ga = samples.g[0];
+  stack[0].gb = samples.g[3];
   // A root at a wall may be lost between two triangles that round it differently: both take it.
   if (tau0 <= 0.0 && __builtin_fabs(stack[0].ga) <= rounding && accept(stack[0].a)) return true;
   const CurvePoint last = stack[0].b;
@@ -339,6 +422,7 @@ template <class Cell>
   depth = 1;
   while (depth > 0) {
     const Interval n = stack[--depth];
+    const bool is_whole = n.a.tau == tau0 && n.b.tau == tau1;
     const bool crosses = (n.ga < 0.0) != (n.gb < 0.0);
     const double bound = deviation(n.a, n.b);
     const double width = n.b.tau - n.a.tau;
@@ -347,7 +431,10 @@ template <class Cell>
     // Once the bend is a small part of the difference of the ends, g is monotone and has one root.
     if (crosses && (small || 16.0 * bound < __builtin_fabs(n.gb - n.ga))) {
       const double noise = 0x1p-51 * (magnitude + slope);
-      if (accept(root_between(tri, g, n.a, n.b, n.ga, n.gb, noise, height_over))) return true;
+      const RootBracket bracket{n.a.tau, n.b.tau, n.ga, n.gb};
+      double slope_at_guess = (n.gb - n.ga) / width;
+      const double guess = is_whole ? cubic_root(samples, &slope_at_guess) : n.a.tau;
+      if (accept(root_between(tri, g, bracket, guess, slope_at_guess, noise, height_over))) return true;
       continue;
     }
     if (small || depth + 2 > kMaxDepth) {

@@ -58,7 +58,7 @@ struct Quadratic {
   double a, b, c;
 };
 
-RELIEF_KERNEL double quadratic_at(Quadratic p, double tau) { return (p.a * tau + p.b) * tau + p.c; }
+RELIEF_KERNEL double quadratic_at(Quadratic p, double tau) { return fused(fused(p.a, tau, p.b), tau, p.c); }
 
 RELIEF_KERNEL Quadratic operator+(Quadratic p, Quadratic q) { return {p.a + q.a, p.b + q.b, p.c + q.c}; }
 RELIEF_KERNEL Quadratic operator*(Quadratic p, double k) { return {p.a * k, p.b * k, p.c * k}; }
@@ -66,6 +66,11 @@ RELIEF_KERNEL Quadratic operator*(Quadratic p, double k) { return {p.a * k, p.b 
 RELIEF_KERNEL Quadratic quadratic_shift(Quadratic p, double origin, double step)
 {
   return {p.a * step * step, (p.b + 2.0 * p.a * origin) * step, quadratic_at(p, origin)};
+}
+/// The middle Bernstein coefficient over a stretch: between its ends p is within what they and this span.
+RELIEF_KERNEL double quadratic_blossom(Quadratic p, double from, double to)
+{
+  return p.a * from * to + 0.5 * p.b * (from + to) + p.c;
 }
 /// Least value over [0, 1].
 RELIEF_KERNEL double quadratic_minimum(Quadratic p)
@@ -315,7 +320,9 @@ RELIEF_KERNEL void add_interval(RayCurve& curve,
   Quadratic W = e[0] + e[1] + e[2];
   W.c -= edge_on;
   double pieces[4];
-  int num_pieces = quadratic_roots_inside(W, begin, end, pieces, 0);
+  // Mostly all three Bernstein coefficients are positive, and so is W in between.
+  const bool faces = min(min(quadratic_at(W, begin), quadratic_at(W, end)), quadratic_blossom(W, begin, end)) > 0.0;
+  int num_pieces = faces ? 0 : quadratic_roots_inside(W, begin, end, pieces, 0);
   pieces[num_pieces++] = end;
   sort_ascending(pieces, num_pieces);
   for (int k = 0; k < num_pieces; ++k) {
@@ -358,9 +365,10 @@ RELIEF_KERNEL bool ray_curve_make(const RayFrame& frame, const DisplacedTriangle
 
   // Lane i is vertex i (lane 3 repeats vertex 2), then edge i, which is opposite to it.
   const auto lanes_of = [](const Vec3f* v, int axis) {
+    // Of each array eight floats are read from the axis on: after the last of them there are more of the triangle.
     static_assert(sizeof(Vec3f) == 3 * sizeof(float));
-    const float* f = reinterpret_cast<const float*>(v) + axis;
-    return D4{f[0], f[3], f[6], f[6]};
+    const F8 f = load8(reinterpret_cast<const float*>(v) + axis);
+    return __builtin_convertvector(__builtin_shufflevector(f, f, 0, 3, 6, 6), D4);
   };
   const D4 pz = lanes_of(tri.P, frame.kz) - frame.O[frame.kz], nz = lanes_of(tri.N, frame.kz);
   const D4 x = lanes_of(tri.P, frame.kx) - frame.O[frame.kx] - frame.Sx * pz;

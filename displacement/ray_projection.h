@@ -18,7 +18,7 @@ struct BernsteinQuadratic {
 
 RELIEF_KERNEL BernsteinQuadratic bernstein_make(const Quadratic& p, double tau0, double tau1)
 {
-  return {quadratic_at(p, tau0), p.a * tau0 * tau1 + 0.5 * p.b * (tau0 + tau1) + p.c, quadratic_at(p, tau1)};
+  return {quadratic_at(p, tau0), quadratic_blossom(p, tau0, tau1), quadratic_at(p, tau1)};
 }
 
 /// The u in [0, 1] where p − c·W vanishes, u = 0 at the start of the stretch and 1 at its end.

@@ -293,6 +293,21 @@ inline void add_texture_coordinates(std::vector<HardCase>& cases)
     const Vector3 target = oracle::surface_eval(triangle, island, b).P;
     cases.back().rays[i] = ray_through(combination(1, target, 1, random_direction(random)), target);
   }
+  // Long rays close to borders of the bounds' nodes, which they cross at a small angle.
+  HardCase along{"long rays along borders of nodes", {flat_triangle()}, noise_map(1024, 1024, .004), {}};
+  for (int i = 0; i < kNumRays; ++i) {
+    const double border = 64 * (1 + random_index(random, 8)), off = std::pow(10, -3 - 4 * random_unit(random));
+    const double at = random_unit(random) * 400 + 50, side = random_unit(random) < .5 ? -1 : 1;
+    Vector2 uv{(border + side * off + .5) / 1024, (at + .5) / 1024};
+    Vector3 direction{side * off * std::pow(10, -2 * random_unit(random)), 1, -.004 * (.2 + random_unit(random))};
+    if (random_index(random, 2) == 0) {
+      std::swap(uv[0], uv[1]);
+      std::swap(direction[0], direction[1]);
+    }
+    const Vector3 target = oracle::surface_eval(along.triangles[0], along.map, weights_at_uv(along.triangles[0], uv)).P;
+    along.rays.push_back(ray_through(combination(1, target, -1, direction), target));
+  }
+  cases.push_back(along);
   cases.push_back(random_rays_case("uv far below a texel", scaled_uv(domed, 1. / 512, .25, .25), map));
   HardCase tiled = random_rays_case("tiled 1000 times", scaled_uv(domed, 1000, 0, 0), noise_map(8, 8, .002));
   cases.push_back(tiled);
