@@ -154,6 +154,22 @@ inline void add_directions(std::vector<HardCase>& cases)
     const Vector3 D{std::cos(phi), std::sin(phi), 0};
     return ray_through(combination(1, target, -2, D), target);
   }));
+  // Seen edge-on at one s: weights are 0/0 there.
+  cases.push_back(special_rays_case("in the plane of a facet", domed, map, [&](std::mt19937_64& random) {
+    const double s = random_between(random, -.05, .05), tilt = std::pow(10, random_between(random, -16, -8));
+    const auto facet_point = [&](const Vector2& b) {
+      Vector3 at{};
+      const double weights[3] = {1 - b[0] - b[1], b[0], b[1]};
+      for (std::size_t k = 0; k < 3; ++k) {
+        at = combination(1, at, weights[k], domed.P[k]);
+        at = combination(1, at, weights[k] * s, domed.N[k]);
+      }
+      return at;
+    };
+    const Vector3 from = facet_point(random_barycentric(random)), to = facet_point(random_barycentric(random));
+    const Vector3 D = combination(1, combination(1, to, -1, from), tilt, random_direction(random));
+    return ray_through(combination(1, from, -3, D), from);
+  }));
   for (const auto& [name, triangle] :
        {std::pair{"along a displacement line", domed}, std::pair{"along a displacement line of parallel ones", flat}}) {
     cases.push_back(special_rays_case(name, triangle, map, [&, t = triangle](std::mt19937_64& random) {
