@@ -14,6 +14,10 @@ import numpy as np
 from gltf_reader import Unsupported
 
 
+# What a smooth lobe's distribution is called; since Blender 4 roughness 0 says it.
+_SHARP = "SHARP" if bpy.app.version < (4, 0, 0) else "GGX"
+
+
 class _Tree:
     """A few words over bpy's node trees: `add` makes a node, wires or sets its inputs, and returns it."""
 
@@ -62,7 +66,7 @@ def _glossy(tree, color, roughness, normal):
     return tree.add(
         "ShaderNodeBsdfGlossy",
         {"Color": color, "Roughness": roughness, "Normal": normal},
-        distribution="SHARP" if is_mirror else "MULTI_GGX",
+        distribution=_SHARP if is_mirror else "MULTI_GGX",
     ).outputs[0]
 
 
@@ -91,7 +95,8 @@ def build_material(gltf, index):
     material = bpy.data.materials.new(source.get("name", f"material {index}"))
     material.use_nodes = True
     # Cycles leaves small emitters out of light sampling only when told so; nothing is left out here.
-    material.cycles.sample_as_light = True
+    if bpy.app.version < (3, 5, 0):
+        material.cycles.sample_as_light = True
     tree = _Tree(material.node_tree)
     approximate = []
     surface, volume = _surface(tree, gltf, source, approximate)
@@ -99,10 +104,12 @@ def build_material(gltf, index):
     output = tree.add("ShaderNodeOutputMaterial", {"Surface": surface})
     if volume is not None:
         tree.connect(output.inputs["Volume"], volume)
-        material.cycles.homogeneous_volume = True
+        if bpy.app.version < (5, 0, 0):
+            material.cycles.homogeneous_volume = True
     if is_displaced(source):
         tree.connect(output.inputs["Displacement"], _displacement(tree, gltf, source))
-        material.cycles.displacement_method = "DISPLACEMENT"
+        owner = material.cycles if bpy.app.version < (4, 1, 0) else material
+        owner.displacement_method = "DISPLACEMENT"
         approximate.append("displacement: diced")
     return material, approximate
 
@@ -230,7 +237,7 @@ def _glass(tree, extensions, transmission, color, roughness, ior, normal, approx
     surface = tree.add(
         "ShaderNodeBsdfGlass",
         {"Color": (1, 1, 1), "Roughness": roughness, "IOR": ior, "Normal": normal},
-        distribution="MULTI_GGX" if roughness > 0 else "SHARP",
+        distribution="MULTI_GGX" if roughness > 0 else _SHARP,
     ).outputs[0]
     attenuation = np.array(volume.get("attenuationColor", (1, 1, 1)), dtype=np.float64)
     distance = volume.get("attenuationDistance", math.inf)

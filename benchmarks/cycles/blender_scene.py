@@ -1,4 +1,4 @@
-"""Builds a relief scene in Blender and renders it with Cycles; runs inside Blender 3.4.
+"""Builds a relief scene in Blender and renders it with Cycles; runs inside Blender 3.4 or 5.2.
 
     blender -b --factory-startup --debug-cycles --python blender_scene.py -- SCENE JOB.json
 
@@ -75,8 +75,9 @@ def build_mesh(gltf, primitive, name, material):
     if displaced:
         _check_normals(mesh, gltf.accessor(attributes["NORMAL"])[first] if is_smooth else None)
     elif is_smooth:
-        mesh.use_auto_smooth = True
-        mesh.auto_smooth_angle = math.pi
+        if bpy.app.version < (4, 1, 0):
+            mesh.use_auto_smooth = True
+            mesh.auto_smooth_angle = math.pi
         # Blender keeps custom normals as two 16-bit angles, an error of some 1e-4 radians.
         mesh.normals_split_custom_set_from_vertices(gltf.accessor(attributes["NORMAL"]).tolist())
     return mesh
@@ -95,8 +96,12 @@ def _dice(displaced_object):
     """Adaptive subdivision of flat triangles: the last modifier, which Cycles then does itself."""
     subdivision = displaced_object.modifiers.new("dicing", "SUBSURF")
     subdivision.subdivision_type = "SIMPLE"
-    displaced_object.cycles.use_adaptive_subdivision = True
-    displaced_object.cycles.dicing_rate = 1.0
+    if bpy.app.version < (5, 0, 0):
+        displaced_object.cycles.use_adaptive_subdivision = True
+        displaced_object.cycles.dicing_rate = 1.0
+    else:
+        subdivision.use_adaptive_subdivision = True
+        subdivision.adaptive_pixel_size = 1.0
 
 
 def build_camera(gltf, node, matrix):
@@ -180,7 +185,7 @@ def build_environment(gltf):
         uri = settings.get("uri") or gltf.json["images"][settings["image"]]["uri"]
         texture = nodes.new("ShaderNodeTexEnvironment")
         texture.image = bpy.data.images.load(os.path.join(gltf.folder, uri))
-        texture.image.colorspace_settings.name = "Linear"
+        texture.image.colorspace_settings.name = "Linear" if bpy.app.version < (4, 0, 0) else "Linear Rec.709"
         coordinates = nodes.new("ShaderNodeTexCoord")
         # The centre of Cycles' map looks along Blender's +X, that of ours along glTF's −Z, which is Blender's +Y.
         mapping = nodes.new("ShaderNodeMapping")
@@ -204,17 +209,17 @@ def build_scene(path):
     for node, matrix in gltf.node_matrices():
         extensions = node.get("extensions", {})
         if "mesh" in node:
+            source = gltf.json["meshes"][node["mesh"]]
             if node["mesh"] not in meshes:
-                source = gltf.json["meshes"][node["mesh"]]
                 name = source.get("name", f"mesh {node['mesh']}")
                 meshes[node["mesh"]] = [
                     build_mesh(gltf, primitive, name, built[primitive["material"]][0])
                     for primitive in source["primitives"]
                 ]
             for world in gltf.instance_matrices(node, matrix):
-                for mesh in meshes[node["mesh"]]:
+                for mesh, primitive in zip(meshes[node["mesh"]], source["primitives"]):
                     new = _add_object(node.get("name", "node"), mesh, world)
-                    if mesh.materials[0].cycles.displacement_method == "DISPLACEMENT":
+                    if is_displaced(gltf.json["materials"][primitive["material"]]):
                         _dice(new)
         if "camera" in node and bpy.context.scene.camera is None:
             build_camera(gltf, node, matrix)
@@ -243,8 +248,9 @@ def set_up_render(settings):
     scene.render.image_settings.exr_codec = "NONE"
     cycles = scene.cycles
     cycles.device = "CPU"
-    # Adaptive subdivision is experimental; triangles of one pixel, and of Blender's own four outside the picture.
-    cycles.feature_set = "EXPERIMENTAL"
+    # Triangles of one pixel, and of Blender's own four outside the picture.
+    if bpy.app.version < (5, 0, 0):
+        cycles.feature_set = "EXPERIMENTAL"  # adaptive subdivision was
     cycles.dicing_rate = 1.0
     cycles.samples = settings.get("samples", 64)
     cycles.use_adaptive_sampling = False

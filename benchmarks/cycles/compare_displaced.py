@@ -13,8 +13,8 @@ reference, all independent, mean (a − r)(b − s) is the squared bias, without
 
 `huge_torus` and `huge_plane` are rendered by relief alone: memory, preparation, and a PNG to look at.
 
-Writes markdown to standard output and all numbers to a JSON file. Needs Blender 3.4 and numpy (Debian: blender
-python3-numpy).
+Writes markdown to standard output and all numbers to a JSON file. Needs Blender 3.4 or 5.2 and numpy (Debian: blender
+python3-numpy). With several Blenders each has its turn.
 """
 
 import argparse
@@ -34,7 +34,7 @@ sys.path.insert(0, _FOLDER)
 from compare import Job, render_relief  # noqa: E402
 from displaced_scenes import COMPARED, HUGE  # noqa: E402
 from exr import read_rgb  # noqa: E402
-from render_cycles import render_cycles  # noqa: E402
+from render_cycles import blender_version, render_cycles  # noqa: E402
 
 _MIB = 2**20
 _REFERENCE_RUNS = 4
@@ -62,13 +62,13 @@ def _save(name, arguments, folder):
     return Job(scene, folder, resolution, arguments.threads, os.path.abspath(arguments.relief))
 
 
-def _timed(job, renderer, samples):
+def _timed(job, renderer, samples, blenders):
     """One whole picture by a process of its own: (run with the process's costs added, the picture's window)."""
     # Every picture has its own seed, so that no two share their noise.
     output = os.path.join(job.folder, f"{renderer}_{samples}.exr")
     runs = [{"samples": samples, "seed": samples, "output": output}]
-    if renderer == "cycles":
-        report = render_cycles(job.scene, runs, job.resolution, job.threads)
+    if renderer in blenders:
+        report = render_cycles(job.scene, runs, job.resolution, job.threads, blender=blenders[renderer])
     else:
         report = render_relief(job, runs, _RELIEF_OPTIONS[renderer])
     x0, y0, x1, y1 = _window(job.resolution)
@@ -87,17 +87,18 @@ def _reference(job, samples):
     return np.stack([read_rgb(run["output"]) for run in runs])
 
 
-def render_pictures(job, samples):
+def render_pictures(job, samples, blenders):
     """All timed pictures of a scene, the renderers in turns.
 
-    @param  samples  samples a pixel of the pictures of each renderer, two or more, by name
-    @return          lists of what `_timed` returns, by name
+    @param  samples   samples a pixel of the pictures of each renderer, two or more, by name
+    @param  blenders  programs of those that are Cycles, by name
+    @return           lists of what `_timed` returns, by name
     """
     pictures = {renderer: [] for renderer in samples}
     for turn in range(max(map(len, samples.values()))):
         for renderer, counts in samples.items():
             if turn < len(counts):
-                pictures[renderer].append(_timed(job, renderer, counts[turn]))
+                pictures[renderer].append(_timed(job, renderer, counts[turn], blenders))
     return pictures
 
 
@@ -129,15 +130,21 @@ def compare_scene(job, pictures, reference_samples):
         a, b = rendered[-2][1], rendered[-1][1]
         pairings = (a - halves[0]) * (b - halves[1]), (a - halves[1]) * (b - halves[0])
         bias = float(np.mean(pairings))
+        first, last = points[0], points[-1]
         result["renderers"][renderer] = {
             "pictures": points,
+            "processor_seconds_a_sample": (last["processor_seconds"] - first["processor_seconds"])
+            / (last["samples"] - first["samples"]),
             "bias_rmse": math.sqrt(max(bias, 0)),
             "relative_bias_of_mean": float(b.mean() / reference.mean()) - 1,
         }
     for renderer in _RELIEF_OPTIONS:
         points = result["renderers"][renderer]["pictures"]
         result["renderers"][renderer]["equal_error"] = [
-            _equal_error(points, target) for target in result["renderers"]["cycles"]["pictures"]
+            {"cycles": cycles, **_equal_error(points, target)}
+            for cycles in pictures
+            if cycles not in _RELIEF_OPTIONS
+            for target in result["renderers"][cycles]["pictures"]
         ]
     return result
 
@@ -192,8 +199,8 @@ def render_huge(job, samples):
 
 def _markdown(results):
     lines = [
-        "| scene | renderer | preparation s | peak MiB | spp | s, all included | processor s | RMSE | bias RMSE | bias of mean |",
-        "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
+        "| scene | renderer | preparation s | peak MiB | spp | s, all included | processor s | a sample | RMSE | bias RMSE | bias of mean |",
+        "| --- | --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
     ]
     for name, result in results.items():
         for renderer, values in result["renderers"].items():
@@ -201,12 +208,12 @@ def _markdown(results):
                 lines.append(
                     f"| {name} | {renderer} | {point['preparation_seconds']:.2f} "
                     f"| {point['peak_memory_bytes'] / _MIB:.0f} | {point['samples']} | {_seconds(point):.1f} "
-                    f"| {point['processor_seconds']:.1f} | {point['rmse']:.4f} | {values['bias_rmse']:.4f} | {100 * values['relative_bias_of_mean']:+.2f} % |"
+                    f"| {point['processor_seconds']:.1f} | {values['processor_seconds_a_sample']:.2f} | {point['rmse']:.4f} | {values['bias_rmse']:.4f} | {100 * values['relative_bias_of_mean']:+.2f} % |"
                 )
     lines += [
         "",
-        "| scene | RMSE | Cycles spp | Cycles s | renderer | spp | s | speed-up | memory, Cycles / relief |",
-        "| --- | ---: | ---: | ---: | --- | ---: | ---: | ---: | ---: |",
+        "| scene | Cycles | RMSE | Cycles spp | Cycles s | renderer | spp | s | speed-up | memory, Cycles / relief |",
+        "| --- | --- | ---: | ---: | ---: | --- | ---: | ---: | ---: | ---: |",
     ]
     for name, result in results.items():
         peaks = {
@@ -216,10 +223,10 @@ def _markdown(results):
         for renderer in _RELIEF_OPTIONS:
             for equal in result["renderers"][renderer]["equal_error"]:
                 lines.append(
-                    f"| {name} | {equal['rmse']:.4f} | {equal['cycles_samples']} | {equal['seconds']['cycles']:.1f} "
+                    f"| {name} | {equal['cycles']} | {equal['rmse']:.4f} | {equal['cycles_samples']} | {equal['seconds']['cycles']:.1f} "
                     f"| {renderer} | {equal['samples']:.1f}{' (extrapolated)' if equal['extrapolated'] else ''} "
                     f"| {equal['seconds']['relief']:.1f} | {equal['speedup']:.2f} "
-                    f"| {peaks['cycles'] / peaks[renderer]:.1f} |"
+                    f"| {peaks[equal['cycles']] / peaks[renderer]:.1f} |"
                 )
     return "\n".join(lines)
 
@@ -260,6 +267,9 @@ def main():
     parser.add_argument("--huge-spp", type=int, default=8, help="of the huge scenes (default: 8)")
     parser.add_argument("--scale", type=float, default=1.0, help="factor on 1920x1080 (default: 1)")
     parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument(
+        "--blender", action="append", help="program whose Cycles is compared; may be repeated (default: blender)"
+    )
     parser.add_argument("--relief", default=os.path.join(root, "build", "release", "cli", "relief"))
     parser.add_argument("--keep", metavar="FOLDER", help="keep scenes and pictures here")
     parser.add_argument("--json", default="cycles_displaced.json", help="where the numbers go")
@@ -268,7 +278,10 @@ def main():
     if unknown:
         parser.error(f"no scene is called {unknown[0]}; there are {', '.join(names)}")
 
-    samples = {**{renderer: arguments.relief_spp for renderer in _RELIEF_OPTIONS}, "cycles": arguments.cycles_spp}
+    arguments.blender = arguments.blender or ["blender"]
+    blenders = {"cycles " + ".".join(map(str, blender_version(path))): path for path in arguments.blender}
+    samples = {renderer: arguments.relief_spp for renderer in _RELIEF_OPTIONS}
+    samples |= {cycles: arguments.cycles_spp for cycles in blenders}
     jobs, pictures, results, huge = {}, {}, {}, {}
     with tempfile.TemporaryDirectory() as scratch:
         for name in arguments.scenes or COMPARED:
@@ -277,7 +290,7 @@ def main():
             if name in HUGE:
                 huge[name] = render_huge(jobs[name], arguments.huge_spp)
             else:
-                pictures[name] = render_pictures(jobs[name], samples)
+                pictures[name] = render_pictures(jobs[name], samples, blenders)
         print("references", file=sys.stderr, flush=True)
         for name, rendered in pictures.items():
             results[name] = compare_scene(jobs[name], rendered, arguments.reference_spp)

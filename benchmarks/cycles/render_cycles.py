@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Renders a relief scene with Blender's Cycles and prints what it cost, as JSON.
 
-Needs Blender 3.4 and, for the python that runs inside it, numpy (Debian: blender python3-numpy). The picture is a
+Needs Blender 3.4 or 5.2 and, for the python that runs inside it, numpy (Debian: blender python3-numpy). The picture is a
 linear float EXR. `render_seconds` is Cycles' own "render time (without synchronization)"; `synchronize_seconds` is
 what it spends on taking the scene over, `preparation_seconds` that and dicing, displacing and building its BVH;
 `peak_memory_bytes` is that of the whole process, an empty Blender being about 270 MiB.
@@ -26,6 +26,15 @@ class CyclesError(Exception):
     """Blender failed, or said nothing that could be understood; the message ends with its last lines."""
 
 
+def blender_version(blender="blender"):
+    """The version of a Blender, as a tuple of integers. @error CyclesError"""
+    said = subprocess.run([blender, "--version"], capture_output=True, text=True, check=False).stdout
+    match = re.search(r"Blender (\d+)\.(\d+)\.(\d+)", said)
+    if match is None:
+        raise CyclesError(f"{blender} does not say its version:\n{said}")
+    return tuple(map(int, match.groups()))
+
+
 def render_cycles(scene, runs, resolution=None, threads=None, blend=None, blender="blender", manifold=False):
     """Renders a scene once a run, in one Blender process.
 
@@ -47,7 +56,8 @@ def render_cycles(scene, runs, resolution=None, threads=None, blend=None, blende
         with open(job_path, "w", encoding="utf-8") as file:
             json.dump(job, file)
         log_path = os.path.join(folder, "log.txt")
-        command = [blender, "-b", "--factory-startup", "--debug-cycles", "--python-exit-code", "9"]
+        verbose = ["--log", "cycles", "--log-level", "debug"] if blender_version(blender) >= (5, 0, 0) else ["--debug-cycles"]
+        command = [blender, "-b", "--factory-startup", *verbose, "--python-exit-code", "9"]
         command += ["--python", os.path.join(_FOLDER, "blender_scene.py"), "--", os.path.abspath(scene), job_path]
         with open(log_path, "w", encoding="utf-8") as log:
             # Debian's Blender borrows modules from the first python3 on PATH: let that be Debian's, which has numpy.
