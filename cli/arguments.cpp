@@ -260,8 +260,10 @@ RmipOptions parse_rmip(const std::string& text)
       options.leaf = static_cast<RmipLeaf>(choice(key, value, kRmipLeafLabels));
     } else if (key == "levels") {
       options.levels = static_cast<RmipLevels>(choice(key, value, kRmipLevelsLabels));
+    } else if (key == "bounds") {
+      options.bounds = static_cast<SpaceBounds>(choice(key, value, kSpaceBoundsLabels));
     } else {
-      refuse("--rmip", "KEY=VALUE,… with the keys scale, resolution, inversion, split, leaf, levels", text);
+      refuse("--rmip", "KEY=VALUE,… with the keys scale, resolution, inversion, split, leaf, levels, bounds", text);
     }
   }
   if (options.levels == RmipLevels::kInterpolated && options.leaf == RmipLeaf::kTriangles)

@@ -27,6 +27,7 @@ struct LatticeFrame {
   D4 pad;                               ///< bound on rounding of a coordinate
   D4 inverse_D;                         ///< of the ray's direction
   double n00, n0x, n0y, nxx, nxy, nyy;  ///< |N|² as a quadratic form
+  double nxy_abs;                       ///< nxy of the components' sizes
   double length_Nx, length_Ny;
   double nu_squared_pad;
   double longest;       ///< of the vertex normals
@@ -74,6 +75,7 @@ RELIEF_KERNEL LatticeFrame lattice_frame_make(const DisplacedTriangle& tri, cons
   f.n0y = dot(N[0], Ny);
   f.nxx = dot(Nx, Nx);
   f.nxy = dot(Nx, Ny);
+  f.nxy_abs = dot(abs(Nx), abs(Ny));
   f.nyy = dot(Ny, Ny);
   f.length_Nx = __builtin_sqrt(f.nxx);
   f.length_Ny = __builtin_sqrt(f.nyy);
@@ -142,6 +144,92 @@ RELIEF_KERNEL ScalarRange surface_bounds_intersect(const LatticeFrame& f, const 
   const D4 near_t = min(a, b), far_t = max(a, b);
   return {max(max(near_t[0], near_t[1]), max(near_t[2], near_t[3])),
           min(min(far_t[0], far_t[1]), min(far_t[2], far_t[3]))};
+}
+
+/// A quantity over a rectangle and a range of displacements, by affine arithmetic: centre + x·ε + y·ε + d·ε ± rest, each ε
+/// anywhere in [−1, 1].
+template <class Lanes>
+struct AffineForm {
+  Lanes centre, x, y, d, rest;
+};
+
+template <class Lanes>
+RELIEF_KERNEL AffineForm<Lanes> operator*(const AffineForm<Lanes>& a, const AffineForm<Lanes>& b)
+{
+  const auto radius = [](const AffineForm<Lanes>& f) { return abs(f.x) + abs(f.y) + abs(f.d) + f.rest; };
+  return {a.centre * b.centre, a.centre * b.x + b.centre * a.x, a.centre * b.y + b.centre * a.y,
+          a.centre * b.d + b.centre * a.d, abs(a.centre) * b.rest + abs(b.centre) * a.rest + radius(a) * radius(b)};
+}
+
+/// 1/|N| over rectangles, one a lane.
+/// @param exists  gets false in lanes where |N| may vanish; these have no form
+/// @source        de Figueiredo and Stolfi 2004, "Affine Arithmetic: Concepts and Applications", §4: products, and the
+///                min-range approximation of a convex function
+RELIEF_KERNEL AffineForm<D4> inverse_length_affine(const LatticeFrame& f, D4 x, D4 y, D4 rx, D4 ry, I4* exists)
+{
+  const D4 along_x = f.n0x + f.nxx * x + f.nxy * y, along_y = f.n0y + f.nxy * x + f.nyy * y;
+  const D4 squared = f.n00 + (f.n0x + along_x) * x + (f.n0y + along_y) * y;
+  const D4 by_x = 2.0 * rx * along_x, by_y = 2.0 * ry * along_y;
+  const D4 rest = rx * rx * f.nxx + ry * ry * f.nyy + 2.0 * rx * ry * f.nxy_abs + f.nu_squared_pad;
+  const D4 radius = abs(by_x) + abs(by_y) + rest;
+  *exists = squared - radius > 4.0 * f.nu_squared_pad;
+  const D4 low = *exists ? squared - radius : D4{1, 1, 1, 1}, high = *exists ? squared + radius : D4{1, 1, 1, 1};
+  const D4 at_low = 1.0 / sqrt(low), at_high = 1.0 / sqrt(high);
+  const D4 slope = -0.5 * at_high / high;  // the least in size: what is left over falls all the way
+  const D4 left_low = at_low - slope * low, left_high = at_high - slope * high;
+  const D4 zero{};
+  return {slope * squared + 0.5 * (left_low + left_high), slope * by_x, slope * by_y, zero,
+          0.5 * (left_low - left_high) - slope * rest};
+}
+
+/// One coordinate of P and N over rectangles: at their centres, and along the lattice.
+template <class Along>
+struct CoordinateOver {
+  D4 P, N;
+  Along Px, Py, Nx, Ny;
+};
+
+/// Ranges of coordinates of the displaced surface over rectangles, by affine arithmetic; lanes are rectangles or axes.
+/// @param inverse      see inverse_length_affine
+/// @param d, d_radius  displacements
+template <class Along>
+RELIEF_KERNEL void displaced_range_affine(const CoordinateOver<Along>& over,
+                                          D4 rx,
+                                          D4 ry,
+                                          const AffineForm<D4>& inverse,
+                                          D4 d,
+                                          D4 d_radius,
+                                          D4* low,
+                                          D4* high)
+{
+  const D4 zero{};
+  const AffineForm<D4> n = AffineForm<D4>{over.N, rx * over.Nx, ry * over.Ny, zero, zero} * inverse;
+  const AffineForm<D4> moved = n * AffineForm<D4>{d, zero, zero, d_radius, zero};
+  const D4 radius = abs(rx * over.Px + moved.x) + abs(ry * over.Py + moved.y) + abs(moved.d) + moved.rest;
+  const D4 centre = over.P + moved.centre;
+  *low = centre - radius;
+  *high = centre + radius;
+}
+
+/// As surface_bounds_intersect, by the box of object space that affine arithmetic finds.
+/// @param d  displacements over the rectangle
+/// @param s  of the surface there: for where |N| may vanish
+RELIEF_KERNEL ScalarRange affine_bounds_intersect(const LatticeFrame& f,
+                                                  const CentredRect& c,
+                                                  ScalarRange d,
+                                                  ScalarRange s)
+{
+  const auto all = [](double x) { return D4{x, x, x, x}; };
+  const D4 rx = all(c.rx), ry = all(c.ry);
+  I4 exists;
+  const AffineForm<D4> inverse = inverse_length_affine(f, all(c.x), all(c.y), rx, ry, &exists);
+  if (exists[0] == 0) return surface_bounds_intersect(f, c, s);
+  D4 low, high;
+  const CoordinateOver<D4> over{f.P0 + c.x * f.Px + c.y * f.Py, f.N0 + c.x * f.Nx + c.y * f.Ny, f.Px, f.Py, f.Nx, f.Ny};
+  displaced_range_affine(over, rx, ry, inverse, all(0.5 * (d.low + d.high)), all(0.5 * (d.high - d.low)), &low, &high);
+  const D4 a = (low - f.pad) * f.inverse_D, b = (high + f.pad) * f.inverse_D;
+  const D4 near_t = min(a, b), far_t = max(a, b);
+  return {max(max(near_t[0], near_t[1]), near_t[2]), min(min(far_t[0], far_t[1]), far_t[2])};
 }
 
 }  // namespace relief

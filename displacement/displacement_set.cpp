@@ -83,9 +83,9 @@ std::optional<TessellationKind> tessellation_kind(DisplacementMethod method)
   return method == DisplacementMethod::kAuto ? std::nullopt : displacement_method(method).tessellation;
 }
 
-bool takes_rmip_options(DisplacementMethod method)
+RmipOptionsUse rmip_options_use(DisplacementMethod method)
 {
-  return method != DisplacementMethod::kAuto && displacement_method(method).takes_rmip_options;
+  return method != DisplacementMethod::kAuto ? displacement_method(method).rmip_options : RmipOptionsUse::kNone;
 }
 
 /// Whether a surface between two levels is traced instead of either by chance. A level that rays choose by their cones would
@@ -93,7 +93,7 @@ bool takes_rmip_options(DisplacementMethod method)
 bool blends_levels(const DisplacementSettings& settings, const DisplacementOptions& options)
 {
   const float lod = lod_of(settings, options);
-  return takes_rmip_options(asked_method(settings, options)) && options.rmip &&
+  return rmip_options_use(asked_method(settings, options)) == RmipOptionsUse::kAll && options.rmip &&
          options.rmip->levels == RmipLevels::kInterpolated && lod > 0 && !is_whole(lod);
 }
 
@@ -150,8 +150,12 @@ std::vector<std::string> displacement_warnings(const DisplacementSettings& setti
     texts.push_back("tessellations have whole levels of detail; level " + std::to_string(static_cast<int>(lod)) +
                     " is used");
   }
-  if (options.rmip && !takes_rmip_options(asked)) {
-    texts.push_back("options of RMIP have no effect on displacement method '" +
+  const RmipOptionsUse use = rmip_options_use(asked);
+  const std::string_view without_effect = use == RmipOptionsUse::kNone ? "options" : "options but 'bounds'";
+  const bool is_obeyed = use == RmipOptionsUse::kAll || (use == RmipOptionsUse::kBounds && options.rmip &&
+                                                         *options.rmip == RmipOptions{.bounds = options.rmip->bounds});
+  if (options.rmip && !is_obeyed) {
+    texts.push_back(std::string(without_effect) + " of RMIP have no effect on displacement method '" +
                     std::string(displacement_method_label(asked)) + "'");
   } else if (options.rmip && options.rmip->levels == RmipLevels::kInterpolated && !blends_levels(settings, options)) {
     texts.push_back(std::string("RMIP interpolates only between levels of detail that are fixed, such as 1.5; ") +
@@ -480,10 +484,6 @@ void DisplacementSet::dice(PreparedMesh& displaced,
                            double num_rays,
                            std::uint64_t* used_bytes)
 {
-  if (options.photons) {
-    reasons_.push_back("mesh '" + displaced.name + "': not diced, as photons may be traced");
-    return;
-  }
   std::uint64_t allowance = options.auto_bytes > 0     ? options.auto_bytes
                             : options.dicing_bytes > 0 ? options.dicing_bytes
                                                        : memory_of_machine() / 8;

@@ -56,7 +56,6 @@ struct DisplacementOptions {
   std::optional<RmipOptions> rmip;           ///< of the methods that take them
   double tessellation_rate = 1;              ///< micro-triangle edges a texel
   double error = 0;              ///< pixels that detail of maps may be wide and missing, with a camera; 0: none
-  bool photons = false;          ///< may be traced: they know no facets, so that nothing is diced
   std::uint64_t auto_bytes = 0;  ///< what `auto` may use while it builds tessellations; 0: it builds none
   std::optional<Camera> camera;  ///< by which computed heights choose their cells; empty: the scene's first
   int picture_height = 0;        ///< pixels, with a camera

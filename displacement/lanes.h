@@ -7,6 +7,7 @@
 namespace relief {
 
 using D4 [[gnu::vector_size(32)]] = double;
+using I4 [[gnu::vector_size(32)]] = std::int64_t;
 
 /// Small integers as floats; by way of 32 bits, which is one instruction less than GCC makes of it by itself.
 template <typename Small>

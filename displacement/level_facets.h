@@ -9,10 +9,8 @@
 // Iehl, Poulin, Neyret, Ostromoukhov 2013, "Linear Efficient Antialiased Displacement and Reflectance Mapping".
 #pragma once
 
-#include <cmath>
-
 #include "displacement/embree_geometry.h"
-#include "kernel/state/facet_state.h"
+#include "kernel/shape/facet_masking.h"
 
 namespace relief {
 
@@ -56,51 +54,6 @@ Vec2f facet_spread(const HeightFieldView& map,
                    bool smooth);
 
 FacetMoments facet_moments(const LevelFacets& facets);
-
-/// φ(a) − a·Q(a) of the normal distribution: the mean of what a normal number exceeds a by.
-/// @source Abramowitz and Stegun 1964, 7.1.26, off by 1e-7
-inline float mean_excess(float a)
-{
-  const float size = std::abs(a);
-  const float t = 1.0f / (1.0f + 0.23164189f * size);
-  const float tail =
-      t * (0.254829592f + t * (-0.284496736f + t * (1.421413741f + t * (-1.453152027f + t * 1.061405429f))));
-  const float excess = std::exp(-0.5f * a * a) * (0.39894228f - 0.5f * size * tail);
-  return max(a < 0.0f ? excess - a : excess, 0.0f);
-}
-
-/// Smith's Λ of a direction: the mean area of the facets that face away from it over that of all, as it sees them.
-/// Directions above the level have a positive one, those below it one of at most −1, as a ray on its way down meets
-/// facets.
-/// @param w  world
-inline float facet_lambda(const FacetMoments& m, Vec3f w)
-{
-  const float mean = dot(w, m.mean);
-  const float along[2] = {dot(w, m.deviation[0]), dot(w, m.deviation[1])};
-  const float deviation = std::sqrt(along[0] * along[0] + along[1] * along[1]);
-  if (!(deviation > 0.0f)) return mean >= 0.0f ? 0.0f : -1.0f;
-  return deviation * mean_excess(mean / deviation) / mean;
-}
-
-/// The height at which a ray that comes from outside meets a facet, as a part of all facets that are lower.
-/// @param lambda  of the direction that it comes from
-/// @param u       [0, 1)
-inline float facet_height(float lambda, float u) { return std::pow(1.0f - u, 1.0f / (1.0f + max(lambda, 0.0f))); }
-
-/// Part of the rays from a facet that get out.
-/// @param lambda  of their direction
-inline float facets_leave_chance(float height, float lambda)
-{
-  return lambda >= 0.0f ? std::pow(height, lambda) : 0.0f;
-}
-
-/// The height at which a ray that does not get out meets the next facet.
-/// @param u  [0, 1), of those numbers that are not below facets_leave_chance
-inline float facet_next_height(float height, float lambda, float u)
-{
-  constexpr float kLeast = 0x1p-20f;  // 0 stands for no facet
-  return clamp(height * std::pow(u, -1.0f / lambda), kLeast, 1.0f);
-}
 
 /// A facet that is seen from a direction, by the area that it shows.
 /// @param w       unit, world

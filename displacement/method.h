@@ -21,6 +21,9 @@ struct MethodCost {
   double build = 0;         ///< a micro-triangle
 };
 
+/// Which of RmipOptions a method obeys.
+enum class RmipOptionsUse : std::uint8_t { kNone, kBounds, kAll };
+
 struct DisplacementMethodEntry {
   std::string_view title;        ///< in menus
   std::string_view description;  ///< one sentence without a full stop
@@ -30,7 +33,7 @@ struct DisplacementMethodEntry {
   bool (*traverse)(const PrismQuery& query, const void* table, DisplacedHit* hit) = nullptr;
   /// Null: the height field is all it needs. Methods with the same function share their tables.
   MethodTable (*table_make)(const HeightFieldView& field, const RmipOptions& options) = nullptr;
-  bool takes_rmip_options = false;
+  RmipOptionsUse rmip_options = RmipOptionsUse::kNone;
   std::optional<TessellationKind> tessellation = {};
   std::optional<MethodCost> cost = {};  ///< of the methods among which `auto` chooses
 };

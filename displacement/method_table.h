@@ -23,6 +23,13 @@ enum class RmipLeaf : std::uint8_t {
 };
 inline constexpr std::string_view kRmipLeafLabels[] = {"bilinear", "triangles"};
 
+/// How the surface over a rectangle of the map is bounded in space.
+enum class SpaceBounds : std::uint8_t {
+  kHull,    ///< its exact ranges (bounds3d.h)
+  kAffine,  ///< boxes of object space by affine arithmetic, as published
+};
+inline constexpr std::string_view kSpaceBoundsLabels[] = {"hull", "affine"};
+
 /// What RMIP meets at a fractional level of detail.
 enum class RmipLevels : std::uint8_t {
   kMixed,         ///< one of two levels, by chance: level_of_detail.h
@@ -30,7 +37,7 @@ enum class RmipLevels : std::uint8_t {
 };
 inline constexpr std::string_view kRmipLevelsLabels[] = {"mixed", "interpolated"};
 
-/// What RMIP's authors studied in their Figs. 5, 10 and 12, and their fractional levels of detail.
+/// What RMIP's authors studied in their Figs. 5, 10 and 12, and their fractional levels of detail. TFDM takes the bounds.
 struct RmipOptions {
   double marching_scale = 16;       ///< texels; rectangles whose sides are no longer are marched through
   bool reduce_by_inversion = true;  ///< bounds are tightened by inverting the displacement at the ends of a 3D box
@@ -38,6 +45,9 @@ struct RmipOptions {
   RmipSplit split = RmipSplit::kBound;
   RmipLeaf leaf = RmipLeaf::kBilinear;
   RmipLevels levels = RmipLevels::kMixed;
+  SpaceBounds bounds = SpaceBounds::kHull;
+
+  bool operator==(const RmipOptions&) const = default;
 };
 
 struct MethodTable {

@@ -121,7 +121,8 @@ RELIEF_KERNEL ScalarRange displacements_over(const MetricSearch& c, const Bounds
 
 /// Whether the surface may meet the ray on a bound; shrinks the bound.
 ///
-/// Two tests: of s, which is known along the curve, at no cost; and of the box in space, whose ends are inverted.
+/// Two tests: of s, which is known along the curve, at no cost; and of the box in space, whose ends are inverted. With the
+/// published bounds the box alone.
 /// @param nu  of the bound's rectangle
 /// @source    Thonat et al. 2023, Alg. 1, lines 12 to 15
 template <class Bounds>
@@ -129,7 +130,7 @@ RELIEF_KERNEL bool bound_intersect(const MetricSearch& c,
                                    const Segment& segment,
                                    const LatticeFrame& frame,
                                    const Bounds& bounds,
-                                   bool reduce_by_inversion,
+                                   const RmipOptions& options,
                                    const CentredRect& rect,
                                    ScalarRange nu,
                                    RayBound& bound)
@@ -139,20 +140,21 @@ RELIEF_KERNEL bool bound_intersect(const MetricSearch& c,
                                            {r.origin_x + (rect.x - rect.rx), r.origin_x + (rect.x + rect.rx),
                                             r.origin_y + (rect.y - rect.ry), r.origin_y + (rect.y + rect.ry)});
   const ScalarRange s = offset_range(c.tri, d, nu);
+  const bool affine = options.bounds == SpaceBounds::kAffine;
   const CurveSegment& g = segment.g;
   const double s0 = g.s0 + bound.stretch.tau0 * g.ds, s1 = g.s0 + bound.stretch.tau1 * g.ds;
   const double s_pad = 0x1p-40 * (__builtin_fabs(s0) + __builtin_fabs(s1));
-  if (!(s.low <= max(s0, s1) + s_pad && s.high >= min(s0, s1) - s_pad)) return false;
+  if (!affine && !(s.low <= max(s0, s1) + s_pad && s.high >= min(s0, s1) - s_pad)) return false;
   if (!frame.exists) return true;
 
-  ScalarRange t = surface_bounds_intersect(frame, rect, s);
+  ScalarRange t = affine ? affine_bounds_intersect(frame, rect, d, s) : surface_bounds_intersect(frame, rect, s);
   t.low -= segment.t_pad;
   t.high += segment.t_pad;
   if (!(t.low <= t.high && t.low <= c.t_max && t.high >= c.t_min)) return false;
   // In a folded prism t does not grow along the curve, and its inversion is not unique.
   if (!c.unfolded) return true;
   if (!(t.low <= bound.t1 && t.high >= bound.t0)) return false;
-  if (reduce_by_inversion) reduce(segment, t, bound, c.counters);
+  if (options.reduce_by_inversion) reduce(segment, t, bound, c.counters);
   return true;
 }
 

@@ -51,7 +51,7 @@ RELIEF_KERNEL bool segment_intersect(MetricSearch& c,
     const ScalarRange nu = normal_range(frame, {rect.x, rect.y, rect.rx + kMargin, rect.ry + kMargin});
     // The paper marches through small bounds at once. To test them as a whole first takes a quarter fewer steps, in no
     // more time, and allows a larger marching scale.
-    if (!bound_intersect(c, segment, frame, bounds, options.reduce_by_inversion, rect, nu, bound)) continue;
+    if (!bound_intersect(c, segment, frame, bounds, options, rect, nu, bound)) continue;
     const ProjectedStretch& stretch = bound.stretch;
     const VaryingSides sides = varying_sides(stretch, varying_x, varying_y);
     const double longest = max(__builtin_fabs(sides.x1 - sides.x0), __builtin_fabs(sides.y1 - sides.y0));

@@ -22,6 +22,7 @@ RELIEF_KERNEL constexpr Vec3d cross(Vec3d a, Vec3d b)
 {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
+RELIEF_KERNEL Vec3d abs(Vec3d a) { return {__builtin_fabs(a.x), __builtin_fabs(a.y), __builtin_fabs(a.z)}; }
 RELIEF_KERNEL double length(Vec3d a) { return __builtin_sqrt(dot(a, a)); }
 RELIEF_KERNEL constexpr Vec3d to_double(Vec3f v) { return {v.x, v.y, v.z}; }
 RELIEF_KERNEL constexpr Vec3f to_float(Vec3d v)

@@ -96,9 +96,6 @@ void enter_facets(const Accel& accel, PathState& state, std::uint32_t path, cons
   f.height = facet_height(facet_lambda(f.moments, f.side * wo), choice.y);
 }
 
-/// Whether a direction leads from the facet that a path is on over those around it: not through it.
-bool is_over_facets(const FacetState& f, Vec3f w) { return f.height > 0.0f && f.side * dot(w, f.normal) > 0.0f; }
-
 /// Whether a path's ray meets another facet right where it is; then that is its hit.
 bool stays_among_facets(const KernelGlobals& g, const Accel& accel, PathState& state, std::uint32_t path)
 {
@@ -119,6 +116,9 @@ bool stays_among_facets(const KernelGlobals& g, const Accel& accel, PathState& s
   }
   f.height = facet_next_height(f.height, lambda, u);
   state.hit_t[path] = 0.0f;
+  // No photon is kept that came from a facet beside.
+  std::uint32_t& flags = state.flags[path];
+  if ((flags & (kPathPhoton | kPathAfterSoft)) == kPathAfterSoft) flags = path_flags_left_to_paths(flags);
   return true;
 }
 

@@ -8,15 +8,6 @@ namespace relief {
 
 namespace {
 
-bool is_same(const std::optional<RmipOptions>& a, const std::optional<RmipOptions>& b)
-{
-  if (!a || !b) return a.has_value() == b.has_value();
-  // All fields, or this does not compile.
-  const auto& [scale, inversion, resolution, split, leaf, levels] = *a;
-  return scale == b->marching_scale && inversion == b->reduce_by_inversion && resolution == b->resolution &&
-         split == b->split && leaf == b->leaf && levels == b->levels;
-}
-
 /// May take equal cameras for different ones, by the bytes between their fields.
 bool is_same(const std::optional<Camera>& a, const std::optional<Camera>& b)
 {
@@ -28,16 +19,16 @@ bool is_same(const std::optional<Camera>& a, const std::optional<Camera>& b)
 bool is_same(const Scene& scene, const DisplacementOptions& a, const DisplacementOptions& b)
 {
   // All fields, or this does not compile.
-  const auto& [method, lod, rmip, rate, error, photons, auto_bytes, camera, height, num_rays, computed_bytes, fields,
-               meshes, dicing_bytes, tessellation_bytes] = a;
+  const auto& [method, lod, rmip, rate, error, auto_bytes, camera, height, num_rays, computed_bytes, fields, meshes,
+               dicing_bytes, tessellation_bytes] = a;
   const bool dices = error > 0 && !scene.displacements.empty();
   const bool follows_camera =
       dices || std::any_of(scene.displacements.begin(), scene.displacements.end(),
                            [](const DisplacementSettings& d) { return displacement_is_computed(d); });
-  return method == b.method && lod == b.lod && is_same(rmip, b.rmip) && rate == b.tessellation_rate &&
-         error == b.error && photons == b.photons && auto_bytes == b.auto_bytes && computed_bytes == b.computed_bytes &&
-         fields == b.fields && meshes == b.meshes && dicing_bytes == b.dicing_bytes &&
-         tessellation_bytes == b.tessellation_bytes && ((auto_bytes == 0 && !dices) || num_rays == b.num_rays) &&
+  return method == b.method && lod == b.lod && rmip == b.rmip && rate == b.tessellation_rate && error == b.error &&
+         auto_bytes == b.auto_bytes && computed_bytes == b.computed_bytes && fields == b.fields && meshes == b.meshes &&
+         dicing_bytes == b.dicing_bytes && tessellation_bytes == b.tessellation_bytes &&
+         ((auto_bytes == 0 && !dices) || num_rays == b.num_rays) &&
          (!follows_camera || (is_same(camera, b.camera) && height == b.picture_height));
 }
 

@@ -146,11 +146,10 @@ FilmWindow render_window(const RenderOptions& options)
 namespace {
 
 /// How a render's context is made.
-ContextOptions context_options(const Scene& scene, const RenderOptions& options)
+ContextOptions context_options(const RenderOptions& options)
 {
   DisplacementOptions displacement = options.displacement;
   displacement.dicing_bytes = memory_limit().bytes / 8;
-  displacement.photons = may_trace_photons(scene, options.settings.caustics.mode);
   displacement.num_rays = expected_rays(options.settings);
   displacement.camera = options.camera;
   displacement.picture_height = options.settings.height;
@@ -163,7 +162,7 @@ ContextOptions context_options(const Scene& scene, const RenderOptions& options)
 
 SceneContext render_context(const Scene& scene, const RenderOptions& options)
 {
-  return context_make(scene, context_options(scene, options));
+  return context_make(scene, context_options(options));
 }
 
 KernelGlobals render_globals(const SceneContext& context, const RenderOptions& options, const FilterTable& filter)
@@ -347,7 +346,7 @@ RenderedImage render(const Scene& scene,
 {
   const Clock::time_point build_start = Clock::now();
   const RenderSettings& settings = options.settings;
-  const SceneContext& context = kept.get(scene, context_options(scene, options));
+  const SceneContext& context = kept.get(scene, context_options(options));
   for (std::string& text : context.displacements.warnings()) stats.warnings.push_back(std::move(text));
   const StageTable& stages = stage_table_select();
 

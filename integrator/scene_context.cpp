@@ -29,17 +29,47 @@ constexpr float kSharpestTails = 0.12f;
 /// A light that covers more of the sky than this, steradians, is found by paths that leave a caster often enough.
 constexpr double kWideLight = 1.0;
 
-bool any_instance(const Scene& scene, std::uint32_t flag)
+/// Whether a material has soft lobes besides what its microfacets scatter more than once.
+bool has_wide_lobes(const Material& m, bool caster, float roughness)
 {
-  return std::any_of(scene.instances.begin(), scene.instances.end(),
-                     [=](const Instance& instance) { return (instance.flags & flag) != 0; });
+  if (m.has_closures) return true;
+  const bool textured = m.metallic_roughness_texture.texture_index >= 0 || m.transmission_texture.texture_index >= 0 ||
+                        m.graph_index >= 0;
+  const bool diffuse = m.metallic < 1.0f && m.transmission < 1.0f;
+  const bool rough = !caster && (m.roughness > roughness || (m.clearcoat > 0.0f && m.clearcoat_roughness > roughness));
+  return !m.unlit && (textured || diffuse || rough || !is_zero(m.sheen_color));
+}
+
+/// Whether photons can show on a material at all, rather than be sent on by sharp lobes alone.
+bool has_soft_lobes(const Material& m, bool caster, float roughness)
+{
+  // Microfacets scatter light more than once on all but smooth metal and thin walls.
+  const bool multiple = m.roughness > 0.0f && (m.metallic > 0.0f || m.thickness == 0.0f);
+  return has_wide_lobes(m, caster, roughness) || (multiple && !m.unlit);
+}
+
+/// Whether photons show on a material by the tails of its sharp lobes, see path_gathers_tails. Not among bumps, which are
+/// narrower than the radius that photons are spread over.
+bool has_tails(const Material& m, bool caster)
+{
+  return caster && m.displacement_index < 0 && !m.unlit && !m.has_closures && m.roughness >= kSharpestTails;
 }
 
 CausticsDecision caustics_decide(const Scene& scene, LightSet& lights, CausticsMode mode)
 {
   if (mode == CausticsMode::kOff) return {false, "off"};
-  if (!any_instance(scene, kCausticCaster)) return {false, "nothing casts caustics"};
-  if (!any_instance(scene, kCausticReceiver)) return {false, "nothing receives caustics"};
+  bool any_caster = false, any_receiver = false;
+  for (const Instance& instance : scene.instances) {
+    const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
+    const bool caster = (instance.flags & kCausticCaster) != 0;
+    any_caster |= caster;
+    if ((instance.flags & kCausticReceiver) == 0) continue;
+    // Alone, what metal's microfacets scatter more than once is not worth a photon. With glass paths fork, which is.
+    any_receiver |= mode == CausticsMode::kOn || material.transmission > 0.0f ||
+                    has_wide_lobes(material, caster, kSharpestGathered) || has_tails(material, caster);
+  }
+  if (!any_caster) return {false, "nothing casts caustics"};
+  if (!any_receiver) return {false, "nothing receives caustics"};
   if (mode == CausticsMode::kAuto && lights.environment_solid_angle > kWideLight) {
     lights.environment_casts_caustics = false;
   }
@@ -52,31 +82,7 @@ CausticsDecision caustics_decide(const Scene& scene, LightSet& lights, CausticsM
                     (environment ? "the environment" : "") + " on casters"};
 }
 
-/// Whether photons can show on a material at all, rather than be sent on by sharp lobes alone.
-bool has_soft_lobes(const Material& m, bool caster, float roughness)
-{
-  if (m.has_closures) return true;
-  const bool textured = m.metallic_roughness_texture.texture_index >= 0 || m.transmission_texture.texture_index >= 0 ||
-                        m.graph_index >= 0;
-  const bool diffuse = m.metallic < 1.0f && m.transmission < 1.0f;
-  const bool rough = !caster && (m.roughness > roughness || (m.clearcoat > 0.0f && m.clearcoat_roughness > roughness));
-  // Microfacets scatter light more than once on all but smooth metal and thin walls.
-  const bool multiple = m.roughness > 0.0f && (m.metallic > 0.0f || m.thickness == 0.0f);
-  return !m.unlit && (textured || diffuse || rough || multiple || !is_zero(m.sheen_color));
-}
-
-/// Whether photons show on a material by the tails of its sharp lobes, see path_gathers_tails.
-bool has_tails(const Material& m, bool caster)
-{
-  return caster && !m.unlit && !m.has_closures && m.roughness >= kSharpestTails;
-}
-
 }  // namespace
-
-bool may_trace_photons(const Scene& scene, CausticsMode mode)
-{
-  return mode != CausticsMode::kOff && any_instance(scene, kCausticCaster) && any_instance(scene, kCausticReceiver);
-}
 
 SceneContext::SceneContext(const Scene& loaded,
                            const DisplacementOptions& displacement,
@@ -132,9 +138,7 @@ SceneContext::SceneContext(const Scene& loaded,
 
 WavefrontColumns SceneContext::columns() const
 {
-  const bool caustics = globals.caustics.enabled;
-  // Photons count light by the area of the surface that they land on, which that of facets is not.
-  return {caustics, motion.is_open(), displacements.has_facets() && !caustics};
+  return {globals.caustics.enabled, motion.is_open(), displacements.has_facets()};
 }
 
 void SceneContext::make_views()

@@ -17,9 +17,6 @@
 
 namespace relief {
 
-/// Whether a scene has what photons are traced for, whatever its lights are.
-bool may_trace_photons(const Scene& scene, CausticsMode mode);
-
 /// Owner of what KernelGlobals points to. Camera, film, limits and seed are left for the render to fill in.
 struct SceneContext : SceneViews {
   /// @param loaded               must outlive the context

@@ -27,8 +27,12 @@ bool material_is_light(const Material& material)
 bool material_casts_caustics(const Material& material)
 {
   constexpr float kRoughest = 0.5f;
+  // Photons are spread over a radius, which bumps are narrower than: on a woven torus of copper, rough by 0.3, a third of their
+  // light was lost, in six times the time. Paths find what goes in so many directions.
+  constexpr float kRoughestDisplaced = 0.25f;
   const bool bends = material.transmission > 0 || material.metallic >= 0.5f;
-  return bends && !material.unlit && material.roughness <= kRoughest;
+  const float roughest = material.displacement_index >= 0 ? kRoughestDisplaced : kRoughest;
+  return bends && !material.unlit && material.roughness <= roughest;
 }
 
 }  // namespace relief

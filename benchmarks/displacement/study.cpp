@@ -66,7 +66,13 @@ std::vector<ContenderSpec> table_specs(const BenchScene& scene, std::uint64_t te
     } else {
       specs.push_back(traversal_spec(name, method, sizes.equal));
     }
+    if (method == DisplacementMethod::tfdm) {
+      specs.push_back(traversal_spec("tfdm-affine", method));
+      specs.back().rmip_options.bounds = SpaceBounds::kAffine;
+    }
     if (method == DisplacementMethod::rmip) {
+      specs.push_back(traversal_spec("rmip-affine", method, sizes.equal));
+      specs.back().rmip_options.bounds = SpaceBounds::kAffine;
       specs.push_back(traversal_spec("rmip-low", method, sizes.low));
       specs.push_back(traversal_spec("rmip-high", method, sizes.high));
     }

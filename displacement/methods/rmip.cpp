@@ -22,7 +22,7 @@ const DisplacementMethodEntry RELIEF_ISA::rmip_method{
     .description = "Ranges of oblong windows of the map (Thonat and others 2023)",
     .traverse = traverse,
     .table_make = rmip_table_make,
-    .takes_rmip_options = true,
+    .rmip_options = RmipOptionsUse::kAll,
 };
 
 }  // namespace relief

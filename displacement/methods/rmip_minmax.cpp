@@ -21,7 +21,7 @@ const DisplacementMethodEntry RELIEF_ISA::rmip_minmax_method{
     .description = "RMIP's traversal over a min-max mipmap, for comparisons",
     .traverse = traverse,
     .table_make = minmax_table_make,
-    .takes_rmip_options = true,
+    .rmip_options = RmipOptionsUse::kAll,
 };
 
 }  // namespace relief

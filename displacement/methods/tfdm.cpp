@@ -3,8 +3,9 @@
 //
 // T. Thonat, F. Beaune, X. Sun, N. Carr, T. Boubekeur, "Tessellation-Free Displacement Mapping for Ray Tracing", ACM TOG
 // 40(6), 2021. Three differences, all in its favour. Nodes are bounded by the exact hull of bounds3d.h instead of affine
-// arithmetic, in a frame of the ray's own: t, and two axes across the ray, one of them level with the base triangle, so
-// that a node misses as soon as its range across the ray excludes 0. The four children of a node are tested side by side.
+// arithmetic (which SpaceBounds::kAffine asks for), in a frame of the ray's own: t, and two axes across the ray, one of them
+// level with the base triangle, so that a node misses as soon as its range across the ray excludes 0. The four children of a
+// node are tested side by side.
 // A cell is intersected by the exact leaf test, on the part of the ray's curve inside it. Reading order: traverse,
 // root_intersect, children_intersect, cell_on_curve_intersect.
 #include "displacement/method.h"
@@ -13,8 +14,6 @@
 namespace relief {
 
 namespace {
-
-using I4 [[gnu::vector_size(32)]] = std::int64_t;
 
 RELIEF_KERNEL unsigned mask_of(I4 m)
 {
@@ -50,9 +49,13 @@ struct NodeFrame {
   double x0, x1, y0, y1;         ///< the triangle's rectangle
   double origin_x, origin_y;     ///< lattice coordinates of vertex 0
   double d_zero, d_step;         ///< displacement of stored bounds
+  bool affine;                   ///< nodes are bounded as published
 };
 
-RELIEF_KERNEL NodeFrame frame_make(const MetricSearch& c, const LatticeFrame& lattice, const RayFrame& ray)
+RELIEF_KERNEL NodeFrame frame_make(const MetricSearch& c,
+                                   const LatticeFrame& lattice,
+                                   const RayFrame& ray,
+                                   SpaceBounds bounds)
 {
   const DisplacedTriangle& tri = c.tri;
   NodeFrame f;
@@ -98,6 +101,7 @@ RELIEF_KERNEL NodeFrame frame_make(const MetricSearch& c, const LatticeFrame& la
   f.origin_y = tri.y[0];
   f.d_zero = c.mesh.scale * (c.mesh.field->h_offset - c.mesh.midlevel);
   f.d_step = c.mesh.scale * c.mesh.field->h_step;
+  f.affine = bounds == SpaceBounds::kAffine;
   return f;
 }
 
@@ -136,6 +140,28 @@ RELIEF_KERNEL RangeLanes coordinate_lanes(const Coordinate& k, D4 x, D4 y, D4 rx
   const D4 radius_a = rx * abs(k.Px + s.low * k.Nx) + ry * abs(k.Py + s.low * k.Ny);
   const D4 radius_b = rx * abs(k.Px + s.high * k.Nx) + ry * abs(k.Py + s.high * k.Ny);
   return {min(a - radius_a, b - radius_b) - k.pad, max(a + radius_a, b + radius_b) + k.pad};
+}
+
+/// Ranges of t in the boxes of four nodes, by affine arithmetic; empty for a miss.
+/// @param d_low, d_high  displacements
+/// @param regular        gets false for nodes over which |N| may vanish
+RELIEF_KERNEL RangeLanes affine_lanes(const LatticeFrame& f, D4 x, D4 y, D4 rx, D4 ry, D4 d_low, D4 d_high, I4* regular)
+{
+  const AffineForm<D4> inverse = inverse_length_affine(f, x, y, rx, ry, regular);
+  RangeLanes t{splat4(-__builtin_huge_val()), splat4(__builtin_huge_val())};
+  for (int axis = 0; axis < 3; ++axis) {
+    const CoordinateOver<double> over{f.P0[axis] + f.Px[axis] * x + f.Py[axis] * y,
+                                      f.N0[axis] + f.Nx[axis] * x + f.Ny[axis] * y,
+                                      f.Px[axis],
+                                      f.Py[axis],
+                                      f.Nx[axis],
+                                      f.Ny[axis]};
+    D4 low, high;
+    displaced_range_affine(over, rx, ry, inverse, 0.5 * (d_low + d_high), 0.5 * (d_high - d_low), &low, &high);
+    const D4 a = (low - f.pad[axis]) * f.inverse_D[axis], b = (high + f.pad[axis]) * f.inverse_D[axis];
+    t = {max(t.low, min(a, b)), min(t.high, max(a, b))};
+  }
+  return t;
 }
 
 /// Leaf test of a cell, on the stretch of each segment that reaches into it.
@@ -288,11 +314,22 @@ RELIEF_KERNEL ChildHits children_intersect(MetricSearch& c,
     overlaps &= b.P0 + b.Px * x + b.Py * y + rx * __builtin_fabs(b.Px) + ry * __builtin_fabs(b.Py) >= -b.pad;
   }
   const D4 da = f.d_zero + f.d_step * low, db = f.d_zero + f.d_step * high;
-  const OffsetLanes s = offset_lanes(c, lattice, x, y, rx, ry, min(da, db) - c.d_pad, max(da, db) + c.d_pad);
-  const RangeLanes upright = coordinate_lanes(f.upright, x, y, rx, ry, s);
-  const RangeLanes level = coordinate_lanes(f.level, x, y, rx, ry, s);
-  const RangeLanes t = coordinate_lanes(f.t, x, y, rx, ry, s);
-  overlaps &= (upright.low <= 0.0) & (upright.high >= 0.0) & (level.low <= 0.0) & (level.high >= 0.0);
+  const D4 d_low = min(da, db) - c.d_pad, d_high = max(da, db) + c.d_pad;
+  const OffsetLanes s = offset_lanes(c, lattice, x, y, rx, ry, d_low, d_high);
+  RangeLanes t;
+  I4 regular{};
+  if (f.affine) {
+    t = affine_lanes(lattice, x, y, rx, ry, d_low, d_high, &regular);
+    overlaps &= ~regular | (t.low <= t.high);
+  }
+  if (mask_of(regular) != 0xfu) {
+    const RangeLanes upright = coordinate_lanes(f.upright, x, y, rx, ry, s);
+    const RangeLanes level = coordinate_lanes(f.level, x, y, rx, ry, s);
+    const RangeLanes exact = coordinate_lanes(f.t, x, y, rx, ry, s);
+    overlaps &= regular | ((upright.low <= 0.0) & (upright.high >= 0.0) & (level.low <= 0.0) & (level.high >= 0.0));
+    t.low = regular ? t.low : exact.low;
+    t.high = regular ? t.high : exact.high;
+  }
   overlaps &= (t.low <= c.t_max) & (t.high >= c.t_min);
   c.counters.bounds += 4;
 
@@ -398,9 +435,9 @@ bool traverse(const PrismQuery& q, const void* table, DisplacedHit* hit)
   const LatticeFrame lattice = lattice_frame_make(c.tri, curve.frame);
   // A triangle without area in the map has no quadtree: only the curve says where a ray is.
   if (!lattice.exists) {
-    return traverse_rmip(q, mipmap, RmipOptions{}, hit);
+    return traverse_rmip(q, mipmap, q.rmip_options, hit);
   }
-  const NodeFrame f = frame_make(c, lattice, curve.frame);
+  const NodeFrame f = frame_make(c, lattice, curve.frame, q.rmip_options.bounds);
   RayProjection projections[kMaxCurveSegments];
   for (int k = 0; k < curve.num_segments; ++k) projections[k] = ray_projection_make(c.tri, curve.segments[k]);
 
@@ -433,6 +470,7 @@ const DisplacementMethodEntry RELIEF_ISA::tfdm_method{
     .description = "A min-max mipmap whose nodes are bounded in space on the fly (Thonat and others 2021)",
     .traverse = traverse,
     .table_make = minmax_table_make,
+    .rmip_options = RmipOptionsUse::kBounds,
 };
 
 }  // namespace relief

@@ -148,10 +148,11 @@ RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
   state.pixel_hash[path] = hash;
   // One, since none means a camera ray.
   state.bounces[path] = 1;
-  state.flags[path] = 0;
+  state.flags[path] = kPathPhoton;
   state.sigma_a[path] = Vec3f{};
   state.cone_width[path] = state.cone_spread[path] = 0.0f;
   if (state.motion.time != nullptr) state.motion.time[path] = g.caustics.time;
+  if (state.facets != nullptr) state.facets[path].height = 0.0f;
   return true;
 }
 

@@ -74,10 +74,13 @@ RELIEF_KERNEL void gather_photons(const KernelGlobals& g, PathState& state, std:
   if (!front) query.Ng = -query.Ng;
   query.both_sides = g.materials[instance.material_index].transmission > 0.0f;
   if (tails) query.lobe = hit_photon_lobe(g, state, path, -D, query.Ng, front);
+  query.Ng = path_level_normal(state, path, query.Ng);
   query.hash =
       state.pixel_hash[path] ^ (state.sample_index[path] + 1u) * 0x9e3779b1u ^ state.bounces[path] * 0x85ebca77u;
   const PhotonGather gather = photon_gather(g.caustics.map, query);
-  (*caustic.irradiance)[path] = gather.irradiance;
+  const bool on_facet = state.facets != nullptr && state.facets[path].height > 0.0f;
+  (*caustic.irradiance)[path] =
+      on_facet ? gather.irradiance * facet_irradiance_factor(state.facets[path], gather.wi) : gather.irradiance;
   caustic.wi[path] = octahedral_encode(gather.wi);
   caustic.bounces[path] = gather.bounces;
 }

@@ -89,10 +89,18 @@ RELIEF_KERNEL std::uint32_t path_flags_after(std::uint32_t flags, PathEvent even
 }
 
 /// Surfaces the path has met before, transparent ones included: what dimension_bounce counts by, so that no two
-/// surfaces share random numbers.
+/// surfaces share random numbers. A photon's first scattering is not among its bounces.
 RELIEF_KERNEL int path_surface(const PathState& s, std::uint32_t i)
 {
-  return path_bounces(s.bounces[i], BounceKind::kAll) + static_cast<int>(s.flags[i] >> kPathTransparentShift);
+  constexpr std::uint32_t kScatteredPhoton = kPathPhoton | kPathCaustic;
+  const int first = (s.flags[i] & kScatteredPhoton) == kScatteredPhoton ? 1 : 0;
+  return first + path_bounces(s.bounces[i], BounceKind::kAll) + static_cast<int>(s.flags[i] >> kPathTransparentShift);
+}
+
+/// Whether the facet that a path has hit is next to the one that it left (displacement/level_facets.h).
+RELIEF_KERNEL bool path_is_among_facets(const PathState& s, std::uint32_t i)
+{
+  return s.facets != nullptr && s.hit_t[i] == 0.0f;
 }
 
 /// Adds radiance that arrives along the path's present ray, which left its last scattering event: direct light after

@@ -12,12 +12,6 @@
 
 namespace relief {
 
-/// As path_surface for camera paths: tells the surfaces that a photon meets apart. Its bounces leave out the first.
-RELIEF_KERNEL int photon_surface(const PathState& state, std::uint32_t path)
-{
-  return path_surface(state, path) + ((state.flags[path] & kPathCaustic) != 0 ? 1 : 0);
-}
-
 /// Scatters a photon.
 /// @param closure  of the surface for wo
 /// @param soft     the map has it, for soft lobes to show: they scatter as well
@@ -36,7 +30,7 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
   const Vec3f wo_local = to_local(side.frame, wo);
   const bool caster = (at.instance->flags & kCausticCaster) != 0;
   if (!soft) closure = closure_sharp(closure, kAllSharp);
-  const int surface = photon_surface(state, path);
+  const int surface = path_surface(state, path);
   const ScatterSamples u = scatter_samples(state.pixel_hash[path], state.sample_index[path], surface);
   BsdfSample bsdf =
       closure_sample<kFeatureAll, TransportMode::kImportance>(closure, *g.bsdf_tables, u.bsdf_lobe, u.bsdf_uv);
@@ -45,7 +39,7 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
       closure, *g.bsdf_tables, sharp_lobes(at.params, caster, g.caustics.roughness), u.sharpness, bsdf);
   if (sharp && !caster) return false;
   const Vec3f wi = from_local(side.frame, bsdf.wi);
-  if (!shading_is_reversible(side, wi)) return false;
+  if (!shading_is_reversible(side, wi) || path_crosses_facets(state, path, wi)) return false;
   // The adjoint of a BSDF with shading normals is not symmetric (Veach 1997, Eq. 5.19).
   const float cos_o = __builtin_fabsf(dot(wo, side.Ng));
   if (!(cos_o > 0.0f)) return false;
@@ -89,7 +83,7 @@ RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
   constexpr unsigned kFeatures = kFeatureAll | kFeatureGraphs | kFeatureMixture;
   MixtureLobes lobes;
   SurfaceInteraction at = surface_interaction_make<kFeatures>(g, state, path, wo, lobes);
-  if (!surface_is_met<kFeatures>(state, path, at.params.alpha, photon_surface(state, path))) {
+  if (!surface_is_met<kFeatures>(state, path, at.params.alpha, path_surface(state, path))) {
     if (path_pass_through(g, state, path, at.passed)) queue_push(next, path);
     return;
   }
@@ -105,13 +99,16 @@ RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
   if (is_zero(throughput)) return;
   surface_interaction_frame<kFeatures>(g, state, path, wo, at);
   const bool caster = (flags & kCausticCaster) != 0;
-  const bool arrived = has_scattered && (state.flags[path] & kPathAfterSoft) == 0;
+  // From one facet to the next light is the paths' to bring: a search would have to know the heights of both.
+  const bool arrived = has_scattered && (state.flags[path] & kPathAfterSoft) == 0 && !path_is_among_facets(state, path);
   const bool soft = arrived && (flags & kGathersPhotons) != 0;
   if (soft || (arrived && (flags & kGathersTails) != 0)) {
     // Along the ray, as gather_photons: on a triangle that is large against the caustic, at.hit is less exact.
     const Vec3f P = path_origin(state, path) - wo * state.hit_t[path];
     photons.photons[photons.size++] = {
-        P, {throughput, octahedral_encode(wo), octahedral_encode(at.side.Ng), state.bounces[path] - 1u}};
+        P,
+        {throughput, octahedral_encode(wo), octahedral_encode(path_level_normal(state, path, at.side.Ng)),
+         state.bounces[path] - 1u}};
   }
   if (!caster && !soft) return;
   const bool goes_on =

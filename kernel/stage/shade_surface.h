@@ -48,7 +48,7 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   BsdfEval bsdf = closure_eval<kFeatures>(closure, *g.bsdf_tables, wi);
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
     if (light_casts_caustics(g.lights, light.ref.light_index) && path_caustic_after(state.flags[path], *at.instance) &&
-        shading_is_reversible(at.side, light.wi)) {
+        shading_is_reversible(at.side, light.wi) && !path_crosses_facets(state, path, light.wi)) {
       bsdf.f = closure_eval<kFeatures>(closure_soft(closure, kAllSharp), *g.bsdf_tables, wi).f;
     }
   }
@@ -212,7 +212,7 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
     const SharpLobes sharp = path_sharp_lobes(g, state.flags[path], at, wi, bsdf.pdf);
     const bool is_sharp = closure_split<kFeatures>(closure, *g.bsdf_tables, sharp, u.sharpness, bsdf);
-    const bool is_paths = is_sharp && !shading_is_reversible(side, wi);
+    const bool is_paths = (is_sharp && !shading_is_reversible(side, wi)) || path_crosses_facets(state, path, wi);
     state.flags[path] = is_paths ? path_flags_left_to_paths(state.flags[path])
                                  : path_caustic_flags(state.flags[path], *at.instance, is_sharp);
   }

@@ -8,6 +8,7 @@
 #include "kernel/graph/graph_material.h"
 #include "kernel/sample/dimensions.h"
 #include "kernel/sample/sobol.h"
+#include "kernel/shape/facet_masking.h"
 #include "kernel/shape/surface_hit.h"
 #include "kernel/stage/path_access.h"
 #include "kernel/texture/ray_cone.h"
@@ -272,6 +273,20 @@ RELIEF_KERNEL void surface_interaction_frame(const KernelGlobals& g,
 RELIEF_KERNEL bool shading_is_reversible(const ShadingSide& side, Vec3f wi)
 {
   return !side.bent && (dot(wi, side.Ns) > 0.0f) == (dot(wi, side.Ng) > 0.0f);
+}
+
+/// Whether a direction from a path's hit is_across_facets.
+RELIEF_KERNEL bool path_crosses_facets(const PathState& state, std::uint32_t path, Vec3f wi)
+{
+  return state.facets != nullptr && is_across_facets(state.facets[path], wi);
+}
+
+/// Unit normal of the level on whose facet a path's hit is, world space, on the path's side.
+/// @param Ng  of the hit; the result where it is on no facet
+RELIEF_KERNEL Vec3f path_level_normal(const PathState& state, std::uint32_t path, Vec3f Ng)
+{
+  if (state.facets == nullptr || !(state.facets[path].height > 0.0f)) return Ng;
+  return state.facets[path].side * state.facets[path].moments.mean;
 }
 
 /// Whether the surface is there for this path, or lets it through.

@@ -92,6 +92,7 @@ enum PathFlag : std::uint32_t {
   kPathCaustic = 1u << 4,      ///< after such an event, only sharp ones at casters: lights ahead are brought by photons
   kPathSawFeature = 1u << 5,   ///< what a denoiser is told is written, see Aov::kDenoisingAlbedo
   kPathEventShift = 6,         ///< position of the two bits of PathEvent
+  kPathPhoton = 1u << 8,       ///< it started at a light
   kPathTransparentShift = 16,  ///< position of the count of transparent surfaces
 };
 

@@ -228,6 +228,14 @@ TEST(RmipOptions, LevelsAreInterpolatedBetweenBilinearCells)
     EXPECT_ANY_THROW(parse_rmip(text)) << text;
 }
 
+TEST(RmipOptions, BoundsAreHullsOrAffine)
+{
+  EXPECT_EQ(parse_rmip("scale=4").bounds, SpaceBounds::kHull);
+  EXPECT_EQ(parse_rmip("bounds=affine,scale=4").bounds, SpaceBounds::kAffine);
+  for (const char* text : {"bounds", "bounds=box", "bounds=hull,bounds=affine"})
+    EXPECT_ANY_THROW(parse_rmip(text)) << text;
+}
+
 /// Empty if the check accepts the text.
 std::string verdict(const CLI::Validator& check, std::string text) { return check(text); }
 

@@ -18,7 +18,7 @@ TEST_F(Bench, QuickRunMeasuresEveryMethodOnEveryScene)
   ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
   const nlohmann::json json = nlohmann::json::parse(bytes_of_file(json_file));
   ASSERT_EQ(json["scenes"].size(), 10u);
-  std::set<std::string> expected = {"rmip-low", "rmip-high"};
+  std::set<std::string> expected = {"rmip-low", "rmip-high", "rmip-affine", "tfdm-affine"};
   for (const DisplacementMethod method : kDisplacementMethods) expected.emplace(displacement_method_label(method));
   for (const nlohmann::json& scene : json["scenes"]) {
     std::set<std::string> methods;

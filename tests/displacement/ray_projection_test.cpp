@@ -282,5 +282,43 @@ TEST(SurfaceBounds, AreMetByRaysThroughPointsInside)
   EXPECT_GT(num_rays, 500);
 }
 
+TEST(AffineBounds, HoldTheSurface)
+{
+  int num_points = 0;
+  for_random_bounds(8, [&](const DisplacedTriangle& tri, const LatticeFrame&, const CentredRect& rect, auto& random) {
+    const LatticeFrame f = lattice_frame_make(tri, ray_frame_make({0, 0, 0}, {0.3, 0.5, 0.8}));
+    if (!f.exists) return;
+    const double length_N = length(to_double(tri.N[0]));
+    const double d0 = tri.s_min * length_N, d1 = tri.s_max * length_N;
+    const auto all = [](double x) { return D4{x, x, x, x}; };
+    I4 exists;
+    const AffineForm<D4> inverse =
+        inverse_length_affine(f, all(rect.x), all(rect.y), all(rect.rx), all(rect.ry), &exists);
+    if (exists[0] == 0) return;
+    D4 low, high;
+    displaced_range_affine(CoordinateOver<D4>{f.P0 + rect.x * f.Px + rect.y * f.Py,
+                                              f.N0 + rect.x * f.Nx + rect.y * f.Ny, f.Px, f.Py, f.Nx, f.Ny},
+                           all(rect.rx), all(rect.ry), inverse, all(0.5 * (d0 + d1)), all(0.5 * (d1 - d0)), &low,
+                           &high);
+    for (int k = 0; k < 20; ++k) {
+      // Corners as well: there the ranges are as wide as they get.
+      const auto place = [&] { return k < 8 ? (random() % 2 == 0 ? -1.0 : 1.0) : random_between(random, -1, 1); };
+      const oracle::Vector2 b = weights_at(tri, rect.x + rect.rx * place(), rect.y + rect.ry * place());
+      const double d = 0.5 * (d0 + d1) + 0.5 * (d1 - d0) * place();
+      const auto at = [&](const Vec3f* v) {
+        return (1 - b[0] - b[1]) * to_double(v[0]) + b[0] * to_double(v[1]) + b[1] * to_double(v[2]);
+      };
+      const Vec3d N = at(tri.N), S = at(tri.P) + d / length(N) * N;
+      const double S_lanes[3] = {S.x, S.y, S.z};
+      for (int axis = 0; axis < 3; ++axis) {
+        ++num_points;
+        EXPECT_GE(S_lanes[axis], low[axis] - f.pad[axis]);
+        EXPECT_LE(S_lanes[axis], high[axis] + f.pad[axis]);
+      }
+    }
+  });
+  EXPECT_GT(num_points, 10000);
+}
+
 }  // namespace
 }  // namespace relief

@@ -100,6 +100,18 @@ TEST(RmipTraversal, IsTheSameWhereTheRayIsSplitInTheMiddle)
   }
 }
 
+TEST(PublishedTraversals, AreTheSameByAffineArithmetic)
+{
+  std::uint64_t seed = 170000;
+  for (const DisplacementMethod method :
+       {DisplacementMethod::rmip, DisplacementMethod::rmip_minmax, DisplacementMethod::tfdm}) {
+    SCOPED_TRACE(displacement_method_label(method));
+    compare_with_chord(seed, kNumCases, method, {.marching_scale = 1, .bounds = SpaceBounds::kAffine});
+    if (HasFatalFailure()) return;
+    seed += kNumCases;
+  }
+}
+
 /// Two triangles a cell are another surface: how often they miss what is there, and hit what is not.
 struct LeafRates {
   int num_rays = 0, num_hits = 0, num_missed = 0, num_invented = 0, num_elsewhere = 0;

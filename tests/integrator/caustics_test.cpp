@@ -11,6 +11,7 @@
 
 #include "integrator/photon_pass.h"
 #include "kernel/photon/gather.h"
+#include "scene/material_traits.h"
 #include "tests/support/caustic_scene.h"
 
 namespace relief::test {
@@ -707,6 +708,33 @@ TEST(Caustics, NothingIsDoneWhereNoneCanBe)
   EXPECT_GT(pixels(CausticsMode::kAuto).stats.caustics.photons, 0u);
   scene.lights.front().casts_caustics = false;
   EXPECT_EQ(pixels(CausticsMode::kAuto).stats.caustics.reason, "no light casts caustics");
+
+  // Metal alone: what it scatters more than once shows next to nothing. Rough metal shows tails, but not where it is displaced.
+  for (const float roughness : {0.05f, 0.2f}) {
+    Scene metal = empty_scene();
+    Material material;
+    material.roughness = roughness;
+    add_caster(metal, sphere_mesh(0.3f, 32, 16, true), material);
+    metal.lights.push_back(point_light({0, 1, 0}, 5));
+    look_down(metal, {}, 1, 1.5f);
+    const RenderOptions options = caustic_options(metal, CausticsMode::kAuto, 24, 8);
+    EXPECT_EQ(render_scene(metal, options).stats.caustics.reason,
+              roughness < 0.1f ? "nothing receives caustics" : "lights on casters");
+    add_displacement(metal, 16, noise_texels(16, 1), 0.01f);
+    metal.materials[0].displacement_index = 0;
+    EXPECT_EQ(render_scene(metal, options).stats.caustics.reason, "nothing receives caustics");
+  }
+}
+
+TEST(Caustics, RoughCastersThatAreDisplacedAreOnesOnlyWhereTheySaySo)
+{
+  Material metal;
+  metal.roughness = 0.3f;
+  EXPECT_TRUE(material_casts_caustics(metal));
+  metal.displacement_index = 0;
+  EXPECT_FALSE(material_casts_caustics(metal));
+  metal.roughness = 0.25f;
+  EXPECT_TRUE(material_casts_caustics(metal));
 }
 
 TEST(Caustics, PhotonsKeepToTheirMemory)
