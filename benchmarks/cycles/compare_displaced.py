@@ -284,8 +284,10 @@ def main():
     samples |= {cycles: arguments.cycles_spp for cycles in blenders}
     jobs, pictures, results, huge = {}, {}, {}, {}
     with tempfile.TemporaryDirectory() as scratch:
+        # All scenes first: one of them may lack what it is made of.
         for name in arguments.scenes or COMPARED:
             jobs[name] = _save(name, arguments, os.path.join(arguments.keep or scratch, name))
+        for name in jobs:
             print(f"{name}, {jobs[name].resolution[0]}x{jobs[name].resolution[1]}", file=sys.stderr, flush=True)
             if name in HUGE:
                 huge[name] = render_huge(jobs[name], arguments.huge_spp)

@@ -177,7 +177,9 @@ def glazed():
 
 
 def scan():
-    data = os.environ["RELIEF_BENCH_DATA"]
+    data = os.environ.get("RELIEF_BENCH_DATA")
+    if data is None:
+        sys.exit("scan: RELIEF_BENCH_DATA names no folder of meshes and maps")
     document = _document("scan")
     with open(os.path.join(data, "maps", "lee_perry_smith_disp_4k.jpg"), "rb") as file:
         texture = document.add_texture("heights.jpg", file.read())

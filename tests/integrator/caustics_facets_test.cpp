@@ -1,5 +1,8 @@
 // Levels of height maps and photons: the facets that stand for a level send photons on, show them, and share the light with
 // paths as whole surfaces do. Each rule has a scene where leaving it out shows.
+#include <memory>
+
+#include "kernel/stage/path_access.h"
 #include "tests/support/caustic_scene.h"
 
 namespace relief::test {
@@ -93,6 +96,19 @@ TEST(CausticFacets, OfGlassThatIsSeenRefractPhotons)
   scene.lights.push_back(square_light({0.3f, 1.5f, 0}, {0, -1, 0}, 0.4f, 10));
   look_down(scene, {0, 0, 0}, 0.5f, 1.2f);
   expect_same(scene, 256, 16, 0.005, "glass above a floor");
+}
+
+TEST(CausticFacets, OfEachSurfaceHaveRandomNumbersOfTheirOwn)
+{
+  const auto state = std::make_unique<PathState>();
+  state->bounces[0] = 1;
+  state->flags[0] = kPathPhoton;
+  EXPECT_EQ(path_surface(*state, 0), 1);
+  // The first scattering of a photon is not among its bounces; of a camera path every one is.
+  state->flags[0] = kPathPhoton | kPathCaustic;
+  EXPECT_EQ(path_surface(*state, 0), 2);
+  state->flags[0] = kPathCaustic;
+  EXPECT_EQ(path_surface(*state, 0), 1);
 }
 
 }  // namespace

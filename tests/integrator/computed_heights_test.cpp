@@ -140,6 +140,76 @@ TEST(ComputedHeights, PutPointsWhereTheGraphSays)
   EXPECT_EQ(num_hits, 2000);
 }
 
+/// Heights that are linear over each triangle of a ball: its lattice has no error, and normals are those of the derivatives
+/// of P + d(P)·P/|P|, by hand.
+TEST(ComputedHeights, HaveTheNormalsOfLinearOnes)
+{
+  const json graph = {
+      {"nodes",
+       {{{"type", "texture-coordinate"}}, {{"type", "separate"}, {"inputs", {{"vector", reference(0, "generated")}}}}}},
+      {"outputs", {{"height", reference(1, "x")}}}};
+  constexpr double kScale = 0.5, kMidlevel = 0.3;
+  const Scene scene = load(ball({{"heightGraph", graph}, {"scale", kScale}, {"midlevel", kMidlevel}, {"cells", 16}}));
+  const SceneContext context(scene);
+  std::mt19937_64 random(14);
+  for (int k = 0; k < 2000; ++k) {
+    const TraceHit hit = trace_rays(context, std::vector<TraceRay>{{{}, random_direction(random)}})[0];
+    ASSERT_TRUE(hit.hit);
+    const Mesh& mesh = scene.meshes[0];
+    const TriangleIndices t = mesh.triangles[hit.triangle_index];
+    const Vec3d P0 = to_double(mesh.P[t.v0]), u = to_double(mesh.P[t.v1]) - P0, v = to_double(mesh.P[t.v2]) - P0;
+    const Vec3d P = P0 + static_cast<double>(hit.u) * u + static_cast<double>(hit.v) * v, n = P * (1 / length(P));
+    const double d = kScale * (0.5 + 0.5 * P.x - kMidlevel);
+    const auto along = [&](Vec3d w) { return w + n * (kScale * 0.5 * w.x) + (w - n * dot(n, w)) * (d / length(P)); };
+    const Vec3d expected = cross(along(u), along(v)), Ng = to_double(hit.Ng);
+    // Heights are floats, of a few roundings of 6e-8, and the least cells are 0.012 wide.
+    EXPECT_LT(length(cross(expected, Ng)) / length(expected), 5e-5);
+    EXPECT_GT(dot(expected, Ng), 0);
+  }
+}
+
+/// Of waves of one direction the slope is known; that of a cell is off by half its width times the curvature at most.
+TEST(ComputedHeights, HaveTheGradientsOfTheGraphAsCellsShrink)
+{
+  constexpr double kWaves = 6, kScale = 0.25;
+  const json graph = {
+      {"nodes",
+       {{{"type", "texture-coordinate"}},
+        {{"type", "separate"}, {"inputs", {{"vector", reference(0, "object")}}}},
+        {{"type", "math"}, {"operation", "multiply"}, {"inputs", {{"a", reference(1, "x")}, {"b", kWaves}}}},
+        {{"type", "math"}, {"operation", "sine"}, {"inputs", {{"a", reference(2, "value")}}}}}},
+      {"outputs", {{"height", reference(3, "value")}}}};
+  for (const int cells : {16, 64, 256}) {
+    GltfBuilder b;
+    const int P = b.accessor<float>({-1, -1, 0, 1, -1, 0, -1, 1, 0}, "VEC3");
+    b.push(
+        "materials",
+        {{"extensions",
+          {{"RELIEF_displacement", {{"heightGraph", graph}, {"scale", kScale}, {"midlevel", 0}, {"cells", cells}}}}}});
+    b.root_node({{"mesh", b.mesh({{"attributes", {{"POSITION", P}}}, {"material", 0}})}});
+    b.push("cameras", {{"type", "perspective"}, {"perspective", {{"yfov", 0.7}, {"znear", 0.1}}}});
+    b.root_node({{"camera", 0}, {"translation", {0, 0, 5}}});
+    const Scene scene = load(b);
+    const SceneContext context(scene);
+    std::mt19937_64 random(15);
+    std::uniform_real_distribution<float> unit(0, 1);
+    double most = 0;
+    const double bound = 0.5 * (2.0 / cells) * kScale * kWaves * kWaves;
+    for (int k = 0; k < 4000; ++k) {
+      const float x = unit(random), y = (1 - x) * unit(random);
+      const TraceHit hit = trace_rays(context, std::vector<TraceRay>{{{2 * x - 1, 2 * y - 1, 3}, {0, 0, -1}}})[0];
+      ASSERT_TRUE(hit.hit);
+      const double slope = -static_cast<double>(hit.Ng.x / hit.Ng.z);
+      const double error = slope - kScale * kWaves * std::cos(kWaves * static_cast<double>(hit.P.x));
+      EXPECT_LE(std::abs(error), bound * 1.01 + 1e-4);
+      EXPECT_NEAR(hit.Ng.y, 0, 1e-3);
+      most = std::max(most, std::abs(error));
+    }
+    // The bound is no wider than it has to be.
+    EXPECT_GT(most, bound / 2) << cells;
+  }
+}
+
 TEST(ComputedHeights, OfTheWorldDifferBetweenInstances)
 {
   const json graph = {
