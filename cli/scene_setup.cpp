@@ -125,7 +125,7 @@ CLI::Option* add_displacement_rmip(CLI::App& command, DisplacementOptions& optio
   return add_parsed(
       command, "--rmip", options.rmip, parse_rmip,
       "KEY=VALUE,… of RMIP: scale (texels), resolution (of its table), inversion (on, off), split (bound, "
-      "ray), leaf (bilinear, triangles), levels (mixed, interpolated)");
+      "ray), leaf (bilinear, triangles), levels (mixed, interpolated), bounds (hull, affine)");
 }
 
 CLI::Option* add_caustics_mode(CLI::App& command, std::optional<CausticsMode>& mode)

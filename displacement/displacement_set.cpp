@@ -47,7 +47,7 @@ constexpr MethodCost kDicingCost{250, 35, 640};
 
 /// Levels that rays may choose by themselves lose no more of the surface's slopes than this, metres a metre, nor move a
 /// point further than this many of their texels: half a pixel, since texels are a quarter as wide as that. A picture's
-/// mean then changes by at most about an eighth of the slope's square (docs/displacement.md), 1.4 %.
+/// mean then changes by a fortieth of the slope's square at most (docs/displacement.md), .3 %.
 constexpr double kMostSlopeLost = 1.0 / 3;
 constexpr double kMostTexelsLost = 2;
 

@@ -122,7 +122,7 @@ RELIEF_KERNEL ScalarRange displacements_over(const MetricSearch& c, const Bounds
 /// Whether the surface may meet the ray on a bound; shrinks the bound.
 ///
 /// Two tests: of s, which is known along the curve, at no cost; and of the box in space, whose ends are inverted. With the
-/// published bounds the box alone.
+/// published bounds the box alone, if there is one.
 /// @param nu  of the bound's rectangle
 /// @source    Thonat et al. 2023, Alg. 1, lines 12 to 15
 template <class Bounds>
@@ -144,7 +144,7 @@ RELIEF_KERNEL bool bound_intersect(const MetricSearch& c,
   const CurveSegment& g = segment.g;
   const double s0 = g.s0 + bound.stretch.tau0 * g.ds, s1 = g.s0 + bound.stretch.tau1 * g.ds;
   const double s_pad = 0x1p-40 * (__builtin_fabs(s0) + __builtin_fabs(s1));
-  if (!affine && !(s.low <= max(s0, s1) + s_pad && s.high >= min(s0, s1) - s_pad)) return false;
+  if (!(affine && frame.exists) && !(s.low <= max(s0, s1) + s_pad && s.high >= min(s0, s1) - s_pad)) return false;
   if (!frame.exists) return true;
 
   ScalarRange t = affine ? affine_bounds_intersect(frame, rect, d, s) : surface_bounds_intersect(frame, rect, s);

@@ -49,7 +49,7 @@ struct NodeFrame {
   double x0, x1, y0, y1;         ///< the triangle's rectangle
   double origin_x, origin_y;     ///< lattice coordinates of vertex 0
   double d_zero, d_step;         ///< displacement of stored bounds
-  bool affine;                   ///< nodes are bounded as published
+  bool affine;                   ///< nodes are bounded by boxes of object space, as published
 };
 
 RELIEF_KERNEL NodeFrame frame_make(const MetricSearch& c,
@@ -315,20 +315,23 @@ RELIEF_KERNEL ChildHits children_intersect(MetricSearch& c,
   }
   const D4 da = f.d_zero + f.d_step * low, db = f.d_zero + f.d_step * high;
   const D4 d_low = min(da, db) - c.d_pad, d_high = max(da, db) + c.d_pad;
-  const OffsetLanes s = offset_lanes(c, lattice, x, y, rx, ry, d_low, d_high);
-  RangeLanes t;
+  OffsetLanes s{};
+  RangeLanes t{};
   I4 regular{};
   if (f.affine) {
     t = affine_lanes(lattice, x, y, rx, ry, d_low, d_high, &regular);
     overlaps &= ~regular | (t.low <= t.high);
   }
-  if (mask_of(regular) != 0xfu) {
+  const bool exact = mask_of(overlaps & ~regular) != 0;
+  // Cells are searched by them.
+  if (exact || node.level == 0) s = offset_lanes(c, lattice, x, y, rx, ry, d_low, d_high);
+  if (exact) {
     const RangeLanes upright = coordinate_lanes(f.upright, x, y, rx, ry, s);
     const RangeLanes level = coordinate_lanes(f.level, x, y, rx, ry, s);
-    const RangeLanes exact = coordinate_lanes(f.t, x, y, rx, ry, s);
+    const RangeLanes along = coordinate_lanes(f.t, x, y, rx, ry, s);
     overlaps &= regular | ((upright.low <= 0.0) & (upright.high >= 0.0) & (level.low <= 0.0) & (level.high >= 0.0));
-    t.low = regular ? t.low : exact.low;
-    t.high = regular ? t.high : exact.high;
+    t.low = regular ? t.low : along.low;
+    t.high = regular ? t.high : along.high;
   }
   overlaps &= (t.low <= c.t_max) & (t.high >= c.t_min);
   c.counters.bounds += 4;
@@ -435,7 +438,7 @@ bool traverse(const PrismQuery& q, const void* table, DisplacedHit* hit)
   const LatticeFrame lattice = lattice_frame_make(c.tri, curve.frame);
   // A triangle without area in the map has no quadtree: only the curve says where a ray is.
   if (!lattice.exists) {
-    return traverse_rmip(q, mipmap, q.rmip_options, hit);
+    return traverse_rmip(q, mipmap, RmipOptions{.bounds = q.rmip_options.bounds}, hit);
   }
   const NodeFrame f = frame_make(c, lattice, curve.frame, q.rmip_options.bounds);
   RayProjection projections[kMaxCurveSegments];
