@@ -146,26 +146,25 @@ RELIEF_KERNEL ScalarRange surface_bounds_intersect(const LatticeFrame& f, const 
           min(min(far_t[0], far_t[1]), min(far_t[2], far_t[3]))};
 }
 
-/// A quantity over a rectangle and a range of displacements, by affine arithmetic: centre + x·ε + y·ε + d·ε ± rest, each ε
+/// A quantity over a rectangle and a range of displacements, by affine arithmetic: centre + x·ε₁ + y·ε₂ + d·ε₃ ± rest, each ε
 /// anywhere in [−1, 1].
-template <class Lanes>
 struct AffineForm {
-  Lanes centre, x, y, d, rest;
+  D4 centre, x, y, d, rest;
 };
 
-template <class Lanes>
-RELIEF_KERNEL AffineForm<Lanes> operator*(const AffineForm<Lanes>& a, const AffineForm<Lanes>& b)
+RELIEF_KERNEL AffineForm operator*(const AffineForm& a, const AffineForm& b)
 {
-  const auto radius = [](const AffineForm<Lanes>& f) { return abs(f.x) + abs(f.y) + abs(f.d) + f.rest; };
+  const auto radius = [](const AffineForm& f) { return abs(f.x) + abs(f.y) + abs(f.d) + f.rest; };
   return {a.centre * b.centre, a.centre * b.x + b.centre * a.x, a.centre * b.y + b.centre * a.y,
           a.centre * b.d + b.centre * a.d, abs(a.centre) * b.rest + abs(b.centre) * a.rest + radius(a) * radius(b)};
 }
 
 /// 1/|N| over rectangles, one a lane.
+/// @param x, y, rx, ry  as in CentredRect
 /// @param exists  gets false in lanes where |N| may vanish; these have no form
 /// @source        de Figueiredo and Stolfi 2004, "Affine Arithmetic: Concepts and Applications", §4: products, and the
 ///                min-range approximation of a convex function
-RELIEF_KERNEL AffineForm<D4> inverse_length_affine(const LatticeFrame& f, D4 x, D4 y, D4 rx, D4 ry, I4* exists)
+RELIEF_KERNEL AffineForm inverse_length_affine(const LatticeFrame& f, D4 x, D4 y, D4 rx, D4 ry, I4* exists)
 {
   const D4 along_x = f.n0x + f.nxx * x + f.nxy * y, along_y = f.n0y + f.nxy * x + f.nyy * y;
   const D4 squared = f.n00 + (f.n0x + along_x) * x + (f.n0y + along_y) * y;
@@ -191,20 +190,21 @@ struct CoordinateOver {
 
 /// Ranges of coordinates of the displaced surface over rectangles, by affine arithmetic; lanes are rectangles or axes.
 /// @param inverse      see inverse_length_affine
-/// @param d, d_radius  displacements
+/// @param d, d_radius  displacements, metres: their middle, and how far they reach from it
+/// @param low, high    get the ranges, without what rounding may add: LatticeFrame::pad
 template <class Along>
 RELIEF_KERNEL void displaced_range_affine(const CoordinateOver<Along>& over,
                                           D4 rx,
                                           D4 ry,
-                                          const AffineForm<D4>& inverse,
+                                          const AffineForm& inverse,
                                           D4 d,
                                           D4 d_radius,
                                           D4* low,
                                           D4* high)
 {
   const D4 zero{};
-  const AffineForm<D4> n = AffineForm<D4>{over.N, rx * over.Nx, ry * over.Ny, zero, zero} * inverse;
-  const AffineForm<D4> moved = n * AffineForm<D4>{d, zero, zero, d_radius, zero};
+  const AffineForm n = AffineForm{over.N, rx * over.Nx, ry * over.Ny, zero, zero} * inverse;
+  const AffineForm moved = n * AffineForm{d, zero, zero, d_radius, zero};
   const D4 radius = abs(rx * over.Px + moved.x) + abs(ry * over.Py + moved.y) + abs(moved.d) + moved.rest;
   const D4 centre = over.P + moved.centre;
   *low = centre - radius;
@@ -222,7 +222,7 @@ RELIEF_KERNEL ScalarRange affine_bounds_intersect(const LatticeFrame& f,
   const auto all = [](double x) { return D4{x, x, x, x}; };
   const D4 rx = all(c.rx), ry = all(c.ry);
   I4 exists;
-  const AffineForm<D4> inverse = inverse_length_affine(f, all(c.x), all(c.y), rx, ry, &exists);
+  const AffineForm inverse = inverse_length_affine(f, all(c.x), all(c.y), rx, ry, &exists);
   if (exists[0] == 0) return surface_bounds_intersect(f, c, s);
   D4 low, high;
   const CoordinateOver<D4> over{f.P0 + c.x * f.Px + c.y * f.Py, f.N0 + c.x * f.Nx + c.y * f.Ny, f.Px, f.Py, f.Nx, f.Ny};

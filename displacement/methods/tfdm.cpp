@@ -147,7 +147,7 @@ RELIEF_KERNEL RangeLanes coordinate_lanes(const Coordinate& k, D4 x, D4 y, D4 rx
 /// @param regular        gets false for nodes over which |N| may vanish
 RELIEF_KERNEL RangeLanes affine_lanes(const LatticeFrame& f, D4 x, D4 y, D4 rx, D4 ry, D4 d_low, D4 d_high, I4* regular)
 {
-  const AffineForm<D4> inverse = inverse_length_affine(f, x, y, rx, ry, regular);
+  const AffineForm inverse = inverse_length_affine(f, x, y, rx, ry, regular);
   RangeLanes t{splat4(-__builtin_huge_val()), splat4(__builtin_huge_val())};
   for (int axis = 0; axis < 3; ++axis) {
     const CoordinateOver<double> over{f.P0[axis] + f.Px[axis] * x + f.Py[axis] * y,

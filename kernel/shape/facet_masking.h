@@ -71,7 +71,7 @@ RELIEF_KERNEL bool is_across_facets(const FacetState& f, Vec3f w)
   return f.height > 0.0f && f.side * dot(w, f.normal) <= 0.0f && f.side * dot(w, f.moments.mean) > 0.0f;
 }
 
-/// What a facet gets, by its own area, of light that is counted by the area of the level.
+/// Irradiance of a facet over that of the level, whose area photons are counted by: 0 where the facets around hide the light.
 /// @param f   of a hit on a facet
 /// @param wi  unit, world, towards the light
 RELIEF_KERNEL float facet_irradiance_factor(const FacetState& f, Vec3f wi)

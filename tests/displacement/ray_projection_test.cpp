@@ -292,8 +292,7 @@ TEST(AffineBounds, HoldTheSurface)
     const double d0 = tri.s_min * length_N, d1 = tri.s_max * length_N;
     const auto all = [](double x) { return D4{x, x, x, x}; };
     I4 exists;
-    const AffineForm<D4> inverse =
-        inverse_length_affine(f, all(rect.x), all(rect.y), all(rect.rx), all(rect.ry), &exists);
+    const AffineForm inverse = inverse_length_affine(f, all(rect.x), all(rect.y), all(rect.rx), all(rect.ry), &exists);
     if (exists[0] == 0) return;
     D4 low, high;
     displaced_range_affine(CoordinateOver<D4>{f.P0 + rect.x * f.Px + rect.y * f.Py,
