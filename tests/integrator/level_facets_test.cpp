@@ -1,4 +1,5 @@
 // What levels of height maps have lost: facets of the map, and pictures that keep its light.
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <utility>
@@ -80,6 +81,45 @@ TEST(LevelFacets, LambdaOfFlatOnesIsThatOfASmoothSurface)
   EXPECT_EQ(facet_lambda(flat, {0.6f, 0, -0.8f}), -1.0f);
   EXPECT_EQ(facets_leave_chance(0.3f, 0.0f), 1.0f);
   EXPECT_EQ(facets_leave_chance(0.3f, -1.0f), 0.0f);
+}
+
+/// What facets get together is what the level gets; where light comes from below the level or through a facet, none of those
+/// that face it from above get any.
+TEST(LevelFacets, ShareTheLightOfTheLevel)
+{
+  std::mt19937_64 random(3);
+  std::normal_distribution<float> normal;
+  std::uniform_real_distribution<float> uniform;
+  FacetState f{};
+  f.moments = {{0, 0, 1}, {{0.7f, 0.1f, 0}, {0, 0.4f, 0}}};
+  for (const float side : {1.0f, -1.0f}) {
+    f.side = side;
+    for (const Vec3f above : {Vec3f{0, 0, 1}, normalize(Vec3f{1, 0.5f, 1}), normalize(Vec3f{-1, 0, 0.3f})}) {
+      const Vec3f wi = side * above;
+      double sum = 0, squares = 0;
+      constexpr int kCount = 400'000;
+      for (int i = 0; i < kCount; ++i) {
+        const Vec3f facet =
+            f.moments.mean + normal(random) * f.moments.deviation[0] + normal(random) * f.moments.deviation[1];
+        f.height = 1.0f - uniform(random);
+        f.normal = normalize(facet);
+        const double light = static_cast<double>(length(facet) * facet_irradiance_factor(f, wi));
+        if (dot(f.normal, above) <= 0.0f) {
+          ASSERT_EQ(light, 0.0);
+        }
+        sum += light;
+        squares += light * light;
+      }
+      const double mean = sum / kCount;
+      // Six such: one in 300,000 is beyond 5 standard errors by chance.
+      EXPECT_NEAR(mean, 1, 5 * std::sqrt(std::max(squares / kCount - mean * mean, 0.0) / kCount) + 1e-6);
+    }
+    // Over the facet, but from below the level; through the facet, from below it.
+    f.height = 0.5f;
+    f.normal = normalize(Vec3f{1, 0, 1});
+    EXPECT_EQ(facet_irradiance_factor(f, side * normalize(Vec3f{1, 0, -0.2f})), 0.0f);
+    EXPECT_NEAR(facet_irradiance_factor(f, side * Vec3f{0, 0, -1}), std::sqrt(0.5f), 1e-6f);
+  }
 }
 
 /// Facets and level together have the slopes of the map, in all directions.
