@@ -506,7 +506,7 @@ void DisplacementSet::dice(PreparedMesh& displaced,
                                          PictureView{*options.camera, static_cast<double>(options.picture_height)},
                                          use.places, options.error);
   const TessellationRule rule = dicing->rule();
-  TessellationLayout layout = tessellation_layout_make(dicing->mesh(), TessellationKind::kTriangles, rule);
+  TessellationLayout layout = tessellation_layout_make(dicing->mesh(), TessellationKind::kQuads, rule);
   const std::uint64_t bytes = tessellation_peak_bytes(layout, kRenderTessellation) + dicing->bytes();
   const MethodOffer offers[] = {
       {geometry.method, *displacement_method(geometry.method).cost, 0, 0},

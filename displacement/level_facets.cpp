@@ -18,7 +18,8 @@ using F4 [[gnu::vector_size(16)]] = float;
 /// Cells at equal distances along a lattice axis, and the texels that their slopes are made of.
 struct CellsAlongAxis {
   std::int64_t texel[kSide][4];  ///< before the cell, at its ends, and behind it; times the stride
-  float place[kSide];            ///< within the cell
+  F4 place;                      ///< within the cell
+  bool in_a_row;                 ///< each cell's texels are neighbours in the map
 };
 
 /// @param x       lattice coordinate in the middle
@@ -27,21 +28,31 @@ struct CellsAlongAxis {
 CellsAlongAxis cells_along(const LatticeAxis& axis, double x, double width, float jitter, std::int64_t stride)
 {
   CellsAlongAxis cells;
+  std::int64_t before[kSide];
   for (int k = 0; k < kSide; ++k) {
     const double at = x + width * ((k + static_cast<double>(jitter)) / kSide - 0.5);
     auto cell = static_cast<std::int64_t>(at);
     cell -= at < static_cast<double>(cell) ? 1 : 0;
-    for (int j = 0; j < 4; ++j) cells.texel[k][j] = lattice_texel(axis, cell - 1 + j) * stride;
+    before[k] = cell - 1;
     cells.place[k] = static_cast<float>(at - static_cast<double>(cell));
+  }
+  // Mostly none of them is beyond the end of a tile: then two divisions do.
+  const std::int64_t length = before[kSide - 1] + 3 - before[0], first = lattice_texel(axis, before[0]);
+  cells.in_a_row = lattice_texel(axis, before[0] + length) - first == length;
+  for (int k = 0; k < kSide; ++k) {
+    for (int j = 0; j < 4; ++j) {
+      cells.texel[k][j] =
+          stride * (cells.in_a_row ? first + (before[k] - before[0]) + j : lattice_texel(axis, before[k] + j));
+    }
   }
   return cells;
 }
 
 /// Four texels of a row.
 template <class Texel>
-F4 load4(const Texel* row, const std::int64_t* columns)
+F4 load4(const Texel* row, const std::int64_t* columns, bool in_a_row)
 {
-  if (columns[1] == columns[0] + 1 && columns[2] == columns[0] + 2 && columns[3] == columns[0] + 3) {
+  if (in_a_row) {
     using Texels [[gnu::vector_size(4 * sizeof(Texel))]] = Texel;
     using I4 [[gnu::vector_size(16)]] = std::int32_t;
     Texels texels;
@@ -53,17 +64,29 @@ F4 load4(const Texel* row, const std::int64_t* columns)
             static_cast<float>(row[columns[2]]), static_cast<float>(row[columns[3]])};
 }
 
-F4 mix(F4 a, F4 b, float t) { return a + (b - a) * t; }
+/// Texels of a row, by their place beside a cell; a lane is a column of cells.
+struct RowOfCells {
+  F4 texel[4];
+};
+
+template <class Texel>
+RowOfCells row_of_cells(const Texel* row, const CellsAlongAxis& columns)
+{
+  F4 c[kSide];
+  for (int k = 0; k < kSide; ++k) c[k] = load4(row, columns.texel[k], columns.in_a_row);
+  const F4 low01 = __builtin_shufflevector(c[0], c[1], 0, 4, 1, 5),
+           high01 = __builtin_shufflevector(c[0], c[1], 2, 6, 3, 7);
+  const F4 low23 = __builtin_shufflevector(c[2], c[3], 0, 4, 1, 5),
+           high23 = __builtin_shufflevector(c[2], c[3], 2, 6, 3, 7);
+  return {{__builtin_shufflevector(low01, low23, 0, 1, 4, 5), __builtin_shufflevector(low01, low23, 2, 3, 6, 7),
+           __builtin_shufflevector(high01, high23, 0, 1, 4, 5), __builtin_shufflevector(high01, high23, 2, 3, 6, 7)}};
+}
+
+F4 mix(F4 a, F4 b, F4 t) { return a + (b - a) * t; }
+
+F4 splat(float x) { return F4{x, x, x, x}; }
 
 float sum_of(F4 a) { return (a[0] + a[2]) + (a[1] + a[3]); }
-
-/// Lane k of the result is the sum of the k-th of the four.
-F4 sums_of(const F4* a)
-{
-  const F4 first = __builtin_shufflevector(a[0], a[1], 0, 4, 1, 5) + __builtin_shufflevector(a[0], a[1], 2, 6, 3, 7);
-  const F4 last = __builtin_shufflevector(a[2], a[3], 0, 4, 1, 5) + __builtin_shufflevector(a[2], a[3], 2, 6, 3, 7);
-  return __builtin_shufflevector(first, last, 0, 1, 4, 5) + __builtin_shufflevector(first, last, 2, 3, 6, 7);
-}
 
 /// Slopes of a map around a point of it, heights a texel.
 struct Slopes {
@@ -74,50 +97,69 @@ struct Slopes {
 template <class Texel>
 void slopes_of(const Texel* texels, const CellsAlongAxis& columns, const CellsAlongAxis& rows, bool smooth, Slopes* out)
 {
-  // What a slope is of the four texels of a row. Smooth ones are half the difference of what is interpolated one texel to
-  // either side.
-  F4 along[kSide], across[kSide];
-  for (int c = 0; c < kSide; ++c) {
-    const float f = columns.place[c];
-    along[c] = smooth ? 0.5f * F4{f - 1.0f, -f, 1.0f - f, f} : F4{0, -1, 1, 0};
-    across[c] = (smooth ? 0.5f : 1.0f) * F4{0, 1.0f - f, f, 0};
-  }
+  const F4 fx = columns.place;
   for (int r = 0; r < kSide; ++r) {
-    const float f = rows.place[r];
-    F4 x[kSide], y[kSide];
-    for (int c = 0; c < kSide; ++c) {
-      const auto row = [&](int j) { return load4(texels + rows.texel[r][j], columns.texel[c]); };
-      const F4 low = row(1), high = row(2);
-      x[c] = along[c] * mix(low, high, f);
-      y[c] = across[c] * (smooth ? mix(high - row(0), row(3) - low, f) : high - low);
+    const auto row = [&](int j) { return row_of_cells(texels + rows.texel[r][j], columns); };
+    const F4 fy = splat(rows.place[r]);
+    const RowOfCells low = row(1), high = row(2);
+    if (!smooth) {
+      out->x[r] = mix(low.texel[2] - low.texel[1], high.texel[2] - high.texel[1], fy);
+      out->y[r] = mix(high.texel[1] - low.texel[1], high.texel[2] - low.texel[2], fx);
+      continue;
     }
-    out->x[r] = sums_of(x);
-    out->y[r] = sums_of(y);
+    // Half the difference of what is interpolated one texel to either side.
+    const RowOfCells below = row(0), above = row(3);
+    F4 across[4], up[4];
+    for (int k = 0; k < 4; ++k) {
+      across[k] = mix(low.texel[k], high.texel[k], fy);
+      up[k] = mix(high.texel[k] - below.texel[k], above.texel[k] - low.texel[k], fy);
+    }
+    out->x[r] = 0.5f * mix(across[2] - across[0], across[3] - across[1], fx);
+    out->y[r] = 0.5f * mix(up[1], up[2], fx);
   }
 }
+
+/// Cells of a map around a point.
+struct CellsAround {
+  CellsAlongAxis columns, rows;
+};
 
 /// @param x, y           lattice coordinates
 /// @param width, height  of the rectangle around them that is looked at
 /// @param jitter         [0, 1)²
-/// @param smooth         slopes are those that the map is shaded with, see surface_smooth_normal
-Slopes
-slopes_around(const HeightFieldView& f, double x, double y, double width, double height, Vec2f jitter, bool smooth)
+CellsAround cells_around(const HeightFieldView& f, double x, double y, double width, double height, Vec2f jitter)
 {
-  const CellsAlongAxis columns = cells_along(f.x, x, width, jitter.x, 1);
-  const CellsAlongAxis rows = cells_along(f.y, y, height, jitter.y, f.map.width);
+  return {cells_along(f.x, x, width, jitter.x, 1), cells_along(f.y, y, height, jitter.y, f.map.width)};
+}
+
+/// Starts to fetch the texels that slopes in cells are made of.
+void prefetch_cells(const HeightFieldView& f, const CellsAround& cells)
+{
+  static_assert(static_cast<int>(HeightFormat::kU8) == 0 && static_cast<int>(HeightFormat::kU16) == 1 &&
+                static_cast<int>(HeightFormat::kFloat) == 2);
+  const int log2_bytes = static_cast<int>(f.map.format);
+  for (const auto& rows : cells.rows.texel) {
+    for (const std::int64_t row : {rows[1], rows[2]})
+      __builtin_prefetch(static_cast<const char*>(f.map.texels) + ((row + cells.columns.texel[0][1]) << log2_bytes));
+  }
+}
+
+/// @param smooth  slopes are those that the map is shaded with, see surface_smooth_normal
+Slopes slopes_in(const HeightFieldView& f, const CellsAround& cells, bool smooth)
+{
   Slopes slopes;
   float step = 1.0f;
   switch (f.map.format) {
     case HeightFormat::kU8:
       step = 1.0f / 255.0f;
-      slopes_of(static_cast<const std::uint8_t*>(f.map.texels), columns, rows, smooth, &slopes);
+      slopes_of(static_cast<const std::uint8_t*>(f.map.texels), cells.columns, cells.rows, smooth, &slopes);
       break;
     case HeightFormat::kU16:
       step = 1.0f / 65535.0f;
-      slopes_of(static_cast<const std::uint16_t*>(f.map.texels), columns, rows, smooth, &slopes);
+      slopes_of(static_cast<const std::uint16_t*>(f.map.texels), cells.columns, cells.rows, smooth, &slopes);
       break;
     case HeightFormat::kFloat:
-      slopes_of(static_cast<const float*>(f.map.texels), columns, rows, smooth, &slopes);
+      slopes_of(static_cast<const float*>(f.map.texels), cells.columns, cells.rows, smooth, &slopes);
       break;
   }
   for (int r = 0; r < kSide; ++r) {
@@ -150,6 +192,11 @@ bool level_facets_make(const DisplacedGeometry& geometry, const LevelPlace& at, 
   const MeshAtTime then(geometry.mesh, at.triangle, at.time);
   const DisplacedTriangle tri = triangle_on_level(then.tri(), *geometry.mesh.field, map);
   const double b1 = at.b1, b2 = at.b2;
+  const auto [x, y] = lattice_point(tri, b1, b2);
+  const double width = geometry.facets->window * static_cast<double>(std::exp2(at.level));
+  const CellsAround cells = cells_around(map, x, y, width, width, jitter);
+  prefetch_cells(map, cells);
+
   const BasePoint base = base_point(tri, b1, b2);
   const double inverse_length = 1.0 / length(base.N);
   const Vec3d n = base.N * inverse_length;
@@ -170,9 +217,7 @@ bool level_facets_make(const DisplacedGeometry& geometry, const LevelPlace& at, 
   if (!(size < kInfinity)) return false;
   out->normal = size * normal;
 
-  const auto [x, y] = lattice_point(tri, b1, b2);
-  const double width = geometry.facets->window * std::exp2(at.level);
-  const Slopes slopes = slopes_around(map, x, y, width, width, jitter, geometry.smooth);
+  const Slopes slopes = slopes_in(map, cells, geometry.smooth);
   const float mean_x = sum_of(slopes.x) / kLevelFacets, mean_y = sum_of(slopes.y) / kLevelFacets;
   for (int r = 0; r < kSide; ++r) {
     const F4 less_x = slopes.x[r] - mean_x, less_y = slopes.y[r] - mean_y;
@@ -198,7 +243,7 @@ Vec2f facet_spread(const HeightFieldView& map, const HeightFieldView& level, dou
   for (std::uint32_t i = 0; i < kPlaces; ++i) {
     const Vec2f place = sample_2d(0, i, 0), jitter = sample_2d(0, i, 1);
     const double x = static_cast<double>(place.x) * map.map.width, y = static_cast<double>(place.y) * map.map.height;
-    const Slopes slopes = slopes_around(map, x, y, window, window, jitter, smooth);
+    const Slopes slopes = slopes_in(map, cells_around(map, x, y, window, window, jitter), smooth);
     const float mean_x = sum_of(slopes.x) / kLevelFacets, mean_y = sum_of(slopes.y) / kLevelFacets;
     for (int k = 0; k < kLevelFacets; ++k) {
       const float slope_x = slopes.x[k / kSide][k % kSide], slope_y = slopes.y[k / kSide][k % kSide];
@@ -251,16 +296,20 @@ bool facet_choose(const LevelFacets& facets, Vec3f w, float u, Vec3f* normal)
   }
   const float sum = sum_of(lanes);
   if (!(sum > 0.0f)) return false;
+  // First the row, then the facet.
+  float left = u * sum;
+  const auto choose = [&](F4 size) {
+    const float first = size[0], second = first + size[1], third = second + size[2];
+    const int k = (left >= first ? 1 : 0) + (left >= second ? 1 : 0) + (left >= third ? 1 : 0);
+    left -= k == 0 ? 0.0f : (k == 1 ? first : (k == 2 ? second : third));
+    return k;
+  };
+  const int r = choose(F4{sum_of(lanes[0]), sum_of(lanes[1]), sum_of(lanes[2]), sum_of(lanes[3])});
+  int chosen = kSide * r + choose(lanes[r]);
+  // Roundings may end at a facet that is not seen.
   float shown[kLevelFacets];
   __builtin_memcpy(shown, lanes, sizeof shown);
-  float left = u * sum;
-  int chosen = 0;
-  for (int k = 0; k < kLevelFacets; ++k) {
-    if (!(shown[k] > 0.0f)) continue;
-    chosen = k;
-    left -= shown[k];
-    if (left < 0.0f) break;
-  }
+  while (!(shown[chosen] > 0.0f)) chosen = (chosen + kLevelFacets - 1) % kLevelFacets;
   *normal = normalize(facets.normal + facets.x[chosen] * facets.per_x + facets.y[chosen] * facets.per_y);
   return true;
 }

@@ -9,9 +9,21 @@
 
 namespace relief {
 
-struct PictureView {
+class PictureView {
+ public:
+  /// @param height  pixels
+  PictureView(const Camera& of, double picture_height)
+      : camera(of),
+        height(picture_height),
+        eye_(to_double(of.world_from_camera.p)),
+        right_(unit(of.world_from_camera.x)),
+        up_(unit(of.world_from_camera.y)),
+        back_(unit(of.world_from_camera.z))
+  {
+  }
+
   Camera camera;
-  double height = 1;  ///< pixels
+  double height;  ///< pixels
 
   /// Length of a line in the picture, pixels: as if all of it were as near as its nearest point.
   /// @param a, b  world
@@ -29,19 +41,19 @@ struct PictureView {
   double coarsening(Vec3d P) const
   {
     constexpr double kAround = 1.5, kMost = 4.0;
-    const Vec3d from_eye = P - to_double(camera.world_from_camera.p);
-    const auto along = [&](Vec3f axis) { return dot(from_eye, to_double(normalize(axis))); };
-    const double depth = -along(camera.world_from_camera.z);
+    const Vec3d from_eye = P - eye_;
+    const double depth = -dot(from_eye, back_);
     const double size = camera.projection == Projection::kPerspective ? depth : 1.0;
     if (!(size > 0.0)) return kMost;
-    const double x = along(camera.world_from_camera.x) / (size * static_cast<double>(camera.half_width));
-    const double y = along(camera.world_from_camera.y) / (size * static_cast<double>(camera.half_height));
+    const double x = dot(from_eye, right_) / (size * static_cast<double>(camera.half_width));
+    const double y = dot(from_eye, up_) / (size * static_cast<double>(camera.half_height));
     const double out = std::max(std::abs(x - 2.0 * static_cast<double>(camera.shift_x)),
                                 std::abs(y - 2.0 * static_cast<double>(camera.shift_y)));
     return std::clamp(out / kAround, 1.0, kMost);
   }
 
  private:
+  static Vec3d unit(Vec3f axis) { return to_double(normalize(axis)); }
   /// Distance of a point from the line from the origin to `end`.
   static double distance_to_line(const Vec3d& point, const Vec3d& end)
   {
@@ -53,16 +65,17 @@ struct PictureView {
   double pixels_a_metre(const Vec3d& P, const Vec3d& along) const
   {
     const double scale = height / (2.0 * static_cast<double>(camera.half_height));
-    const Vec3d to_eye = to_double(camera.world_from_camera.p) - P;
+    const Vec3d to_eye = eye_ - P;
     if (camera.projection == Projection::kPerspective) return scale / std::max(distance_to_line(to_eye, along), 1e-30);
     // As in the picture for as far around as it is wide, and then less.
-    const Vec3d axis = to_double(normalize(camera.world_from_camera.z));
     const double within =
         (1.0 + std::abs(static_cast<double>(camera.shift_x)) + std::abs(static_cast<double>(camera.shift_y))) * 2.0 *
         std::hypot(static_cast<double>(camera.half_width), static_cast<double>(camera.half_height));
-    const double distance = distance_to_line(to_eye - dot(to_eye, axis) * axis, along - dot(along, axis) * axis);
+    const double distance = distance_to_line(to_eye - dot(to_eye, back_) * back_, along - dot(along, back_) * back_);
     return scale * std::min(within / distance, 1.0);
   }
+
+  Vec3d eye_, right_, up_, back_;  ///< world; the last three unit
 };
 
 }  // namespace relief

@@ -150,8 +150,8 @@ std::uint64_t TessellationLayout::bytes() const
 {
   // Embree reads 16 bytes at the last vertex.
   const std::uint64_t vertices = (3 * num_vertices + 1) * sizeof(float);
-  return vertices + (kind == TessellationKind::kTriangles ? num_primitives * 3 * sizeof(std::uint32_t)
-                                                          : num_primitives * sizeof(RTCGrid));
+  return vertices + (kind == TessellationKind::kQuads ? num_primitives * 4 * sizeof(std::uint32_t)
+                                                      : num_primitives * sizeof(RTCGrid));
 }
 
 TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh,
@@ -182,7 +182,7 @@ TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh,
     t.first_primitive = static_cast<std::uint32_t>(layout.num_primitives);
     const std::uint64_t n = t.segments;
     layout.num_vertices += grids ? 3 * (n + 1) * (n + 1) : triangle_vertices(n);
-    layout.num_primitives += grids ? 3 : n * n;
+    layout.num_primitives += grids ? 3 : n * (n + 1) / 2;
     layout.num_micro_triangles += grids ? 6 * n * n : n * n;
   }
   return layout;
@@ -197,11 +197,11 @@ TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh, Tesse
 
 std::uint64_t tessellation_peak_bytes(const TessellationLayout& layout, const TessellationBuild& build)
 {
-  // Peaks of Embree 3.13.5 beside its inputs, on flat and wavy meshes of 0.1 to 8.4 million triangles: 89 to 99 bytes a
-  // triangle (57 to 67 stay), 62 to 64 if compact (30 to 35 stay), and 82 to 116 for each 2 × 2 cells of a grid.
-  constexpr std::uint64_t kTriangle = 99, kCompactTriangle = 65, kGridBlock = 116;
-  if (layout.kind == TessellationKind::kTriangles) {
-    return layout.bytes() + layout.num_micro_triangles * (build.compact ? kCompactTriangle : kTriangle);
+  // Peaks of Embree 3.13.5 beside its inputs, on flat and wavy meshes of .05 to 9 million micro-triangles: 62 to 74 bytes for
+  // each (39 to 42 stay), 33 to 51 if compact (19 to 36 stay), and 82 to 116 for each 2 × 2 cells of a grid.
+  constexpr std::uint64_t kMicroTriangle = 76, kCompactMicroTriangle = 53, kGridBlock = 116;
+  if (layout.kind == TessellationKind::kQuads) {
+    return layout.bytes() + layout.num_micro_triangles * (build.compact ? kCompactMicroTriangle : kMicroTriangle);
   }
   std::uint64_t num_blocks = 0;
   for (const TessellatedTriangle& t : layout.triangles) {
@@ -214,8 +214,14 @@ std::uint64_t tessellation_peak_bytes(const TessellationLayout& layout, const Te
 struct Tessellation::MicroTriangle {
   std::uint32_t triangle = 0;
   std::uint64_t vertex[3] = {0, 0, 0};
-  LatticeVertex lattice[3];
   double weight[3] = {1, 0, 0};  ///< of the hit
+  double b1 = 0, b2 = 0;         ///< of the hit, of the base triangle's vertices 1 and 2
+
+  void add_weights(int k, const LatticeVertex& of)
+  {
+    b1 += weight[k] * of.b[1];
+    b2 += weight[k] * of.b[2];
+  }
 };
 
 Tessellation::Tessellation(const DisplacedMeshView& mesh, TessellationLayout layout, const TessellationRule& rule)
@@ -229,8 +235,8 @@ Tessellation::Tessellation(const DisplacedMeshView& mesh, TessellationLayout lay
   }
   if (!fits) throw std::length_error("a tessellation is finer than Embree can count: a lower rate is needed");
   vertices_ = std::make_unique_for_overwrite<float[]>(3 * layout_.num_vertices + 1);
-  if (layout_.kind == TessellationKind::kTriangles) {
-    indices_ = std::make_unique_for_overwrite<std::uint32_t[]>(3 * layout_.num_primitives);
+  if (layout_.kind == TessellationKind::kQuads) {
+    indices_ = std::make_unique_for_overwrite<std::uint32_t[]>(4 * layout_.num_primitives);
   } else {
     grids_.resize(layout_.num_primitives);
   }
@@ -293,16 +299,15 @@ void Tessellation::fill(std::uint32_t index, const TessellationRule& rule)
     }
     return;
   }
-  std::uint32_t* index_out = indices_.get() + 3 * std::size_t{t.first_primitive};
+  std::uint32_t* index_out = indices_.get() + 4 * std::size_t{t.first_primitive};
   std::uint32_t row = t.first_vertex;
   for (std::uint32_t j = 0; j <= n; ++j) {
     const std::uint32_t next_row = row + (n - j + 1);
     for (std::uint32_t i = 0; i + j <= n; ++i) put(triangle_vertex(t, i, j));
     for (std::uint32_t i = 0; i + j < n; ++i) {
       const std::uint32_t a = row + i, c = next_row + i;
-      for (const std::uint32_t v : {a, a + 1, c}) *index_out++ = v;
-      if (i + j + 1 == n) continue;
-      for (const std::uint32_t v : {a + 1, c + 1, c}) *index_out++ = v;
+      // Embree takes a quadrilateral whose last two vertices are one for a triangle.
+      for (const std::uint32_t v : {a, a + 1, i + j + 1 == n ? c : c + 1, c}) *index_out++ = v;
     }
     row = next_row;
   }
@@ -322,15 +327,15 @@ Box3 Tessellation::bounds() const
 RTCGeometry Tessellation::geometry_make(RTCDevice device) const
 {
   const bool grids = layout_.kind == TessellationKind::kGrids;
-  RTCGeometry geometry = rtcNewGeometry(device, grids ? RTC_GEOMETRY_TYPE_GRID : RTC_GEOMETRY_TYPE_TRIANGLE);
+  RTCGeometry geometry = rtcNewGeometry(device, grids ? RTC_GEOMETRY_TYPE_GRID : RTC_GEOMETRY_TYPE_QUAD);
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices_.get(), 0,
                              3 * sizeof(float), layout_.num_vertices);
   if (grids) {
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_GRID, 0, RTC_FORMAT_GRID, grids_.data(), 0, sizeof(RTCGrid),
                                layout_.num_primitives);
   } else {
-    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, indices_.get(), 0,
-                               3 * sizeof(std::uint32_t), layout_.num_primitives);
+    rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, indices_.get(), 0,
+                               4 * sizeof(std::uint32_t), layout_.num_primitives);
   }
   return geometry;
 }
@@ -362,53 +367,53 @@ Tessellation::MicroTriangle Tessellation::micro_triangle(std::uint32_t primitive
     for (int k = 0; k < 3; ++k) {
       micro.vertex[k] =
           t.first_vertex + std::uint64_t{local} * (n + 1) * (n + 1) + std::uint64_t{at[k][1]} * (n + 1) + at[k][0];
-      micro.lattice[k] = grid_vertex(t, static_cast<int>(local), at[k][0], at[k][1]);
+      micro.add_weights(k, grid_vertex(t, static_cast<int>(local), at[k][0], at[k][1]));
     }
     return micro;
   }
-  // Row j starts at n² − (n − j)².
-  const std::uint64_t left = std::uint64_t{n} * n - local;
-  auto rows = static_cast<std::uint64_t>(std::ceil(std::sqrt(static_cast<double>(left))));
-  while (rows * rows < left) ++rows;
-  while ((rows - 1) * (rows - 1) >= left) --rows;
+  // Rows from j on have r(r + 1)/2 quadrilaterals, r = n − j.
+  const std::uint64_t left = std::uint64_t{n} * (n + 1) / 2 - local;
+  auto rows = static_cast<std::uint64_t>(0.5 * std::sqrt(8.0 * static_cast<double>(left) + 1.0));
+  while (rows * (rows + 1) / 2 < left) ++rows;
+  while (rows * (rows - 1) / 2 >= left) --rows;
   const auto j = static_cast<std::uint32_t>(n - rows);
-  const auto in_row = static_cast<std::uint32_t>(rows * rows - left);
-  const std::uint32_t i = in_row / 2;
-  const bool upright = in_row % 2 == 0;
-  const std::uint32_t at[3][2] = {{upright ? i : i + 1, j}, {i + 1, upright ? j : j + 1}, {i, j + 1}};
-  micro.weight[0] = 1.0 - static_cast<double>(u) - static_cast<double>(v);
-  micro.weight[1] = static_cast<double>(u);
-  micro.weight[2] = static_cast<double>(v);
-  for (int k = 0; k < 3; ++k) {
-    const std::uint64_t row = at[k][1];
-    micro.vertex[k] = t.first_vertex + row * (n + 1) - row * (row - 1) / 2 + at[k][0];
-    micro.lattice[k] = triangle_vertex(t, at[k][0], at[k][1]);
+  const auto i = static_cast<std::uint32_t>(rows * (rows + 1) / 2 - left);
+  // The last one of a row is a triangle.
+  const bool lower = u + v <= 1.0f || i + j + 1 == n;
+  const double x = static_cast<double>(u), y = static_cast<double>(v);
+  const std::uint64_t corner = t.first_vertex + std::uint64_t{j} * (n + 1) - std::uint64_t{j} * (j - 1) / 2 + i;
+  const std::uint64_t above = corner + (n - j + 1);
+  micro.vertex[0] = lower ? corner : above + 1;
+  micro.vertex[1] = corner + 1;
+  micro.vertex[2] = above;
+  micro.weight[0] = lower ? 1 - x - y : x + y - 1;
+  micro.weight[1] = lower ? x : 1 - y;
+  micro.weight[2] = lower ? y : 1 - x;
+  const bool is_snapped = (j == 0 && t.edge_segments[0] != n) || (i + j + 2 >= n && t.edge_segments[1] != n) ||
+                          (i == 0 && t.edge_segments[2] != n);
+  if (!is_snapped) [[likely]] {
+    micro.b1 = (i + x) / n;
+    micro.b2 = (j + y) / n;
+    return micro;
   }
+  const std::uint32_t at[3][2] = {{lower ? i : i + 1, lower ? j : j + 1}, {i + 1, j}, {i, j + 1}};
+  for (int k = 0; k < 3; ++k) micro.add_weights(k, triangle_vertex(t, at[k][0], at[k][1]));
   return micro;
 }
 
 MicroHit Tessellation::locate(std::uint32_t primitive, float u, float v) const
 {
   const MicroTriangle micro = micro_triangle(primitive, u, v);
-  MicroHit hit;
-  hit.triangle = micro.triangle;
-  for (int k = 0; k < 3; ++k) {
-    hit.b1 += micro.weight[k] * micro.lattice[k].b[1];
-    hit.b2 += micro.weight[k] * micro.lattice[k].b[2];
-  }
-  return hit;
+  return {micro.triangle, micro.b1, micro.b2};
 }
 
 MicroHit Tessellation::hit(std::uint32_t primitive, float u, float v) const
 {
   const MicroTriangle micro = micro_triangle(primitive, u, v);
-  MicroHit hit;
-  hit.triangle = micro.triangle;
+  MicroHit hit{micro.triangle, micro.b1, micro.b2};
   Vec3d P[3];
   for (int k = 0; k < 3; ++k) {
     P[k] = to_double(vertex(micro.vertex[k]));
-    hit.b1 += micro.weight[k] * micro.lattice[k].b[1];
-    hit.b2 += micro.weight[k] * micro.lattice[k].b[2];
     hit.P = hit.P + micro.weight[k] * P[k];
   }
   const DisplacedTriangle& tri = mesh_.triangles[micro.triangle];

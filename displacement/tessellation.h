@@ -1,5 +1,5 @@
-// Pre-tessellation: displaced triangles as micro-triangles with vertices on the surface, traced by Embree as any mesh or
-// grid. Fast and large, and the one method that is an approximation: the surface is left between the vertices.
+// Pre-tessellation: displaced triangles as micro-triangles with vertices on the surface, traced by Embree as quadrilaterals of
+// two or as grids. Fast and large, and the one method that is an approximation: the surface is left between the vertices.
 //
 // Every base triangle is divided evenly, as finely as its share of the height map asks for. Neighbours use the same
 // points along a shared edge: an edge has a number of segments of its own, the largest that one of its triangles wants,
@@ -19,8 +19,10 @@
 namespace relief {
 
 enum class TessellationKind : std::uint8_t {
-  kTriangles,  ///< an indexed mesh: n² micro-triangles a base triangle
-  kGrids       ///< three grids a base triangle, one at each vertex, that meet at its centre; less memory, slower
+  /// An indexed mesh of pairs that share a side, and single ones at the ends of rows: n² micro-triangles a base triangle. Beside
+  /// single triangles it takes half of the time to build, .7 of the memory, and rays are as fast.
+  kQuads,
+  kGrids  ///< three grids a base triangle, one at each vertex, that meet at its centre; less memory, slower
 };
 
 /// How a tessellation's tree is built.
@@ -38,7 +40,7 @@ struct TessellatedTriangle {
 
 /// What will be built, before anything large is allocated.
 struct TessellationLayout {
-  TessellationKind kind = TessellationKind::kTriangles;
+  TessellationKind kind = TessellationKind::kQuads;
   std::vector<TessellatedTriangle> triangles;
   /// For every edge (3 · triangle + edge): the one of its group that computes the points; for every corner likewise.
   /// Empty once the points are computed.
@@ -71,8 +73,8 @@ std::uint64_t tessellation_peak_bytes(const TessellationLayout& layout, const Te
 struct MicroHit {
   std::uint32_t triangle = 0;  ///< base triangle
   double b1 = 0, b2 = 0;       ///< its barycentric weights of vertices 1 and 2
-  Vec3d P;                     ///< on the micro-triangle, object space
-  Vec3d Ng;                    ///< unit normal of the micro-triangle, on the side of the displacement normal
+  Vec3d P{};                   ///< on the micro-triangle, object space
+  Vec3d Ng{};                  ///< unit normal of the micro-triangle, on the side of the displacement normal
 };
 
 class Tessellation {
@@ -114,7 +116,7 @@ class Tessellation {
   DisplacedMeshView mesh_;
   TessellationLayout layout_;
   std::unique_ptr<float[]> vertices_;         ///< xyz
-  std::unique_ptr<std::uint32_t[]> indices_;  ///< three a micro-triangle
+  std::unique_ptr<std::uint32_t[]> indices_;  ///< four a quadrilateral
   std::vector<RTCGrid> grids_;
   static constexpr int kLog2Owners = 8;
   std::vector<std::uint32_t> owners_;  ///< base triangle of every 2^kLog2Owners-th primitive

@@ -210,7 +210,7 @@ void Accel::build_tessellated(DisplacementSet& displacements)
     RTCGeometry geometry = tessellation->geometry_make(trees_->device());
     rtcSetGeometryOccludedFilterFunction(geometry, displacements.geometry(d).shadow_filter);
     attach(use.tree.get(), geometry, 0, ~0u);
-    attach_corners(use.tree.get(), use.box, use.pad);
+    attach_corners(use.tree.get(), use.box, use.pad, tessellation->layout().kind == TessellationKind::kQuads);
     commit(use.tree.get());
   }
 }
@@ -453,19 +453,21 @@ RTCGeometry Accel::new_mesh(const Mesh& mesh, const Affine3* world_from_object, 
 }
 
 /// Enlarges a scene's box, by two points that no ray hits.
-void Accel::attach_corners(RTCScene target, const Box3& box, Vec3f pad)
+/// @param quads  what else is in the scene is quadrilaterals: Embree has a tree for each type, and rays pass all
+void Accel::attach_corners(RTCScene target, const Box3& box, Vec3f pad, bool quads)
 {
   if (is_zero(pad)) return;
-  RTCGeometry geometry = rtcNewGeometry(trees_->device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+  const std::uint32_t sides = quads ? 4 : 3;
+  RTCGeometry geometry = rtcNewGeometry(trees_->device(), quads ? RTC_GEOMETRY_TYPE_QUAD : RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* vertices = static_cast<Vec3f*>(
       rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), 2));
-  auto* triangles = static_cast<TriangleIndices*>(
-      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(TriangleIndices), 2));
-  if (vertices == nullptr || triangles == nullptr) throw OutOfMemory("the box of a mesh");
+  auto* indices = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0,
+                                                                      quads ? RTC_FORMAT_UINT4 : RTC_FORMAT_UINT3,
+                                                                      sides * sizeof(std::uint32_t), 2));
+  if (vertices == nullptr || indices == nullptr) throw OutOfMemory("the box of a mesh");
   vertices[0] = box.low - pad;
   vertices[1] = box.high + pad;
-  triangles[0] = {0, 0, 0};
-  triangles[1] = {1, 1, 1};
+  for (std::uint32_t i = 0; i < 2 * sides; ++i) indices[i] = i / sides;
   attach(target, geometry, 1, 0);
 }
 

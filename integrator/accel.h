@@ -74,7 +74,7 @@ class Accel {
                           std::span<const Light> lights,
                           std::span<const std::uint32_t> area_lights) const;
   RTCGeometry new_mesh(const Mesh& mesh, const Affine3* world_from_object, bool transparent);
-  void attach_corners(RTCScene target, const Box3& box, Vec3f pad);
+  void attach_corners(RTCScene target, const Box3& box, Vec3f pad, bool quads = false);
   RTCGeometry new_instance(RTCScene instanced, const Affine3& world_from_object);
   RTCGeometry new_rectangle(const Light& light);
   RTCGeometry new_light(const Light& light);

@@ -18,7 +18,8 @@ namespace relief {
 
 namespace {
 
-/// Pixels of a batch in blocks of 4×2, so that eight neighbouring camera rays form a packet.
+/// Pixels of a batch in blocks of 4×2, so that eight camera rays that follow each other are neighbours, however few samples
+/// there are.
 /// Widths and heights that are no multiples (image borders) go row by row.
 void batch_pixel(const Batch& batch, std::uint32_t index, int* x, int* y)
 {
@@ -38,13 +39,12 @@ void generate(const KernelGlobals& g, PathState& state, const Batch& batch)
 {
   const auto num_pixels = static_cast<std::uint32_t>(batch.width * batch.height);
   std::uint32_t path = 0;
-  for (std::uint32_t s = 0; s < batch.num_samples; ++s) {
-    for (std::uint32_t p = 0; p < num_pixels; ++p, ++path) {
-      int x = 0;
-      int y = 0;
-      batch_pixel(batch, p, &x, &y);
+  for (std::uint32_t p = 0; p < num_pixels; ++p) {
+    int x = 0;
+    int y = 0;
+    batch_pixel(batch, p, &x, &y);
+    for (std::uint32_t s = 0; s < batch.num_samples; ++s, ++path)
       generate_camera_path(g, state, path, x, y, batch.first_sample + s);
-    }
   }
 }
 
@@ -165,9 +165,8 @@ void finish(const KernelGlobals& g,
             std::uint64_t& first_nonfinite)
 {
   for (std::uint32_t i = batch.num_paths(); i < state.caustic.num_paths; ++i) path_add_to_root(state, i);
-  const auto num_pixels = static_cast<std::uint32_t>(batch.width * batch.height);
-  for (std::uint32_t i = 0; i < num_pixels * batch.num_samples; ++i) {
-    const std::uint32_t sample = batch.first_sample + i / num_pixels;
+  for (std::uint32_t i = 0; i < batch.num_paths(); ++i) {
+    const std::uint32_t sample = batch.first_sample + i % batch.num_samples;
     Vec3f caustic;
     if (state.caustic.radiance != nullptr) caustic = (*state.caustic.radiance)[i];
     const bool finite = film_add_sample(g.film, state.pixel[i], sample, state.direct[i], state.indirect[i], caustic);

@@ -17,8 +17,9 @@ struct TraversalTable;  // displacement/embree_geometry.h
 /// Surface kernels are instantiated for a few feature masks, in rising order of what they can do.
 inline constexpr int kNumSurfaceKernels = 12;
 
-/// A rectangle of pixels and a run of their samples; path i of a batch is pixel i % (width·height) in the order of
-/// batch_pixel, sample first_sample + i / (width·height).
+/// A rectangle of pixels and a run of their samples; path i of a batch is pixel i / num_samples in the order of
+/// batch_pixel, sample first_sample + i % num_samples. So neighbouring paths are of one pixel, and meet the same triangles and
+/// texels.
 struct Batch {
   int x0 = 0, y0 = 0, width = 0, height = 0;  ///< in the film window
   std::uint32_t first_sample = 0, num_samples = 0;

@@ -1,4 +1,4 @@
-// Tessellation into a mesh of triangles, see tessellation.h.
+// Tessellation into Embree's quadrilaterals, see tessellation.h.
 #include "displacement/method.h"
 
 namespace relief {
@@ -6,7 +6,7 @@ namespace relief {
 const DisplacementMethodEntry RELIEF_ISA::tessellate_method{
     .title = "Tessellate",
     .description = "Triangles of a texel's size: an approximation that needs much memory",
-    .tessellation = TessellationKind::kTriangles,
+    .tessellation = TessellationKind::kQuads,
     .cost = MethodCost{345, 63, 640},
 };
 

@@ -217,9 +217,9 @@ TEST(SeamWalls, AreOneASideWhereTexturesDiffer)
 class TessellationOfSeams : public testing::TestWithParam<TessellationKind> {};
 INSTANTIATE_TEST_SUITE_P(Kinds,
                          TessellationOfSeams,
-                         testing::Values(TessellationKind::kTriangles, TessellationKind::kGrids),
+                         testing::Values(TessellationKind::kQuads, TessellationKind::kGrids),
                          [](const auto& kind) {
-                           return kind.param == TessellationKind::kTriangles ? "Triangles" : "Grids";
+                           return kind.param == TessellationKind::kQuads ? "Triangles" : "Grids";
                          });
 
 TEST_P(TessellationOfSeams, LetsNoRayOut)

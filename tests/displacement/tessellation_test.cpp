@@ -17,7 +17,7 @@ namespace relief {
 namespace {
 
 constexpr double kPi2 = 6.283185307179586;
-constexpr TessellationKind kKinds[] = {TessellationKind::kTriangles, TessellationKind::kGrids};
+constexpr TessellationKind kKinds[] = {TessellationKind::kQuads, TessellationKind::kGrids};
 
 /// A displaced mesh with everything that it refers to.
 struct Displaced {
@@ -163,13 +163,13 @@ bool is_hit(const RTCRayHit& ray) { return ray.hit.geomID != RTC_INVALID_GEOMETR
 
 class TessellationOf : public testing::TestWithParam<TessellationKind> {};
 INSTANTIATE_TEST_SUITE_P(Kinds, TessellationOf, testing::ValuesIn(kKinds), [](const auto& kind) {
-  return kind.param == TessellationKind::kTriangles ? "Triangles" : "Grids";
+  return kind.param == TessellationKind::kQuads ? "Triangles" : "Grids";
 });
 
 /// Corners of a primitive as Embree counts them: of a micro-triangle, or all of a grid's vertices.
 std::vector<std::array<float, 2>> corners_of(const Tessellation& t, std::uint32_t triangle)
 {
-  if (t.layout().kind == TessellationKind::kTriangles) return {{0, 0}, {1, 0}, {0, 1}};
+  if (t.layout().kind == TessellationKind::kQuads) return {{0, 0}, {1, 0}, {0, 1}};
   std::vector<std::array<float, 2>> corners;
   const auto n = static_cast<int>(t.layout().triangles[triangle].segments);
   for (int y = 0; y <= n; ++y) {
@@ -229,7 +229,7 @@ TEST_P(TessellationOf, ClosedMeshesStayClosedToTheLastBit)
   };
   for (const TessellatedTriangle& tri : layout.triangles) {
     const std::uint64_t n = tri.segments;
-    if (layout.kind == TessellationKind::kTriangles) {
+    if (layout.kind == TessellationKind::kQuads) {
       std::uint64_t row = tri.first_vertex;
       for (std::uint64_t j = 0; j < n; ++j) {
         const std::uint64_t next = row + n - j + 1;
@@ -320,7 +320,7 @@ double largest_distance(const Displaced& d, TessellationKind kind, double rate)
   double largest = 0;
   for (int k = 0; k < 200'000; ++k) {
     float u = uniform(random), v = uniform(random);
-    if (kind == TessellationKind::kTriangles && u + v > 1) {
+    if (kind == TessellationKind::kQuads && u + v > 1) {
       u = 1 - u;
       v = 1 - v;
     }
@@ -338,7 +338,7 @@ TEST_P(TessellationOf, ConvergesToTheSurface)
   make_patch(d, 2, 32);
   // Where edges follow the texel lines the error falls with the square of the rate; across them, where the surface has
   // creases, with the rate.
-  const double factor = GetParam() == TessellationKind::kTriangles ? 3.5 : 1.7;
+  const double factor = GetParam() == TessellationKind::kQuads ? 3.5 : 1.7;
   double previous = largest_distance(d, GetParam(), 1);
   EXPECT_LT(previous, 0.1 * 2 / 32.0);
   for (const double rate : {2.0, 4.0, 8.0}) {
@@ -360,7 +360,7 @@ TEST(Tessellation, SeamsWithDifferentHeightsStayOpen)
   for (int k = 0; k < 16 * 16; ++k) d.texels.push_back(static_cast<std::uint16_t>(random()));
   d.displace(16, 16, 0.1);
   const DisplacedMeshView mesh = d.mesh.view();
-  const Tessellation t(mesh, tessellation_layout_make(mesh, TessellationKind::kTriangles, 1));
+  const Tessellation t(mesh, tessellation_layout_make(mesh, TessellationKind::kQuads, 1));
   for (std::uint32_t primitive = 0; primitive < t.layout().num_primitives; ++primitive) {
     const MicroHit hit = t.hit(primitive, 0, 0);
     EXPECT_LT(length(surface_point(mesh, mesh.triangles[hit.triangle], hit.b1, hit.b2).P - hit.P), 1e-5);
@@ -371,10 +371,10 @@ TEST(Tessellation, FollowsTheTexelsOfEachTriangle)
 {
   Displaced d;
   make_patch(d, 2, 32);
-  const TessellationLayout layout = tessellation_layout_make(d.mesh.view(), TessellationKind::kTriangles, 1);
+  const TessellationLayout layout = tessellation_layout_make(d.mesh.view(), TessellationKind::kQuads, 1);
   EXPECT_EQ(layout.triangles[0].segments, 16u);
   EXPECT_EQ(layout.num_micro_triangles, 8u * 256u);
-  EXPECT_EQ(tessellation_layout_make(d.mesh.view(), TessellationKind::kTriangles, 0.5).triangles[0].segments, 8u);
+  EXPECT_EQ(tessellation_layout_make(d.mesh.view(), TessellationKind::kQuads, 0.5).triangles[0].segments, 8u);
   EXPECT_EQ(tessellation_layout_make(d.mesh.view(), TessellationKind::kGrids, 1).triangles[0].segments, 8u);
 }
 

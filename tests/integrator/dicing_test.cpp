@@ -98,9 +98,14 @@ TEST(Dicing, OfAClosedMeshIsClosed)
   const Tessellation& t = tessellation_of(context);
   ASSERT_GT(t.layout().triangles.size(), scene.meshes[0].triangles.size());
   std::vector<std::array<float, 6>> sides[2];  // from a lower to a higher end, and those from a higher one
-  for (std::uint32_t primitive = 0; primitive < t.layout().num_primitives; ++primitive) {
+  std::uint64_t num_triangles = 0;
+  const auto add_triangle = [&](std::uint32_t primitive, bool upper) {
+    ++num_triangles;
     Vec3f corner[3];
-    for (int k = 0; k < 3; ++k) corner[k] = to_float(t.hit(primitive, k == 1 ? 1.0f : 0.0f, k == 2 ? 1.0f : 0.0f).P);
+    for (int k = 0; k < 3; ++k) {
+      const float u = k == 1 ? 1.0f : 0.0f, v = k == 2 ? 1.0f : 0.0f;
+      corner[k] = to_float((upper ? t.hit(primitive, 1.0f - u, 1.0f - v) : t.hit(primitive, u, v)).P);
+    }
     for (int k = 0; k < 3; ++k) {
       std::array<float, 3> a{corner[k].x, corner[k].y, corner[k].z};
       const Vec3f& to = corner[(k + 1) % 3];
@@ -110,7 +115,17 @@ TEST(Dicing, OfAClosedMeshIsClosed)
       if (turned) std::swap(a, b);
       sides[turned].push_back({a[0], a[1], a[2], b[0], b[1], b[2]});
     }
+  };
+  for (const TessellatedTriangle& triangle : t.layout().triangles) {
+    std::uint32_t primitive = triangle.first_primitive;
+    for (std::uint32_t row = triangle.segments; row > 0; --row) {
+      for (std::uint32_t i = 1; i <= row; ++i, ++primitive) {
+        add_triangle(primitive, false);
+        if (i < row) add_triangle(primitive, true);
+      }
+    }
   }
+  EXPECT_EQ(num_triangles, t.layout().num_micro_triangles);
   for (auto& each : sides) std::sort(each.begin(), each.end());
   std::vector<std::array<float, 6>> open;
   std::set_symmetric_difference(sides[0].begin(), sides[0].end(), sides[1].begin(), sides[1].end(),

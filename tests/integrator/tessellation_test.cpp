@@ -183,7 +183,7 @@ TEST(AutomaticDisplacement, TessellatesWhereThatSavesTimeWithinItsAllowance)
   const auto peak = [&](TessellationKind kind) {
     return tessellation_peak_bytes(tessellation_layout_make(mesh, kind, 1), kRenderTessellation);
   };
-  const std::uint64_t grids = peak(TessellationKind::kGrids), triangles = peak(TessellationKind::kTriangles);
+  const std::uint64_t grids = peak(TessellationKind::kGrids), triangles = peak(TessellationKind::kQuads);
   ASSERT_LT(grids, triangles);
   EXPECT_EQ(method(1e9, triangles), "tessellate");
   EXPECT_EQ(method(1e9, triangles - 1), "tessellate-grid");
