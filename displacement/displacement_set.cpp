@@ -41,9 +41,9 @@ bool is_whole(float x) { return x == std::floor(x); }
 /// prisms.
 constexpr double kLeastTexelsASide = 16;
 
-/// Of meshes diced to a pixel, facets included: benchmarks/cycles' sphere and torus took .41 of what they take by chord. Of a
+/// Of meshes diced to a pixel, facets included: benchmarks/cycles' sphere and torus took .34 of what they take by chord. Of a
 /// texture's every texel, tessellations are larger than caches, and cost more (methods/tessellate.cpp).
-constexpr MethodCost kDicingCost{250, 35, 640};
+constexpr MethodCost kDicingCost{208, 29, 350};
 
 /// Levels that rays may choose by themselves lose no more of the surface's slopes than this, metres a metre, nor move a
 /// point further than this many of their texels: half a pixel, since texels are a quarter as wide as that. A picture's

@@ -7,7 +7,7 @@ const DisplacementMethodEntry RELIEF_ISA::tessellate_method{
     .title = "Tessellate",
     .description = "Triangles of a texel's size: an approximation that needs much memory",
     .tessellation = TessellationKind::kQuads,
-    .cost = MethodCost{345, 63, 640},
+    .cost = MethodCost{283, 39, 285},
 };
 
 }  // namespace relief

@@ -7,7 +7,7 @@ const DisplacementMethodEntry RELIEF_ISA::tessellate_grid_method{
     .title = "Tessellate to grids",
     .description = "The same in Embree's grids: less memory, slower",
     .tessellation = TessellationKind::kGrids,
-    .cost = MethodCost{430, 77, 130},
+    .cost = MethodCost{366, 58, 95},
 };
 
 }  // namespace relief
