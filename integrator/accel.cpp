@@ -67,7 +67,7 @@ class FarRay {
 
   bool meets() const { return meets_; }  ///< the box of what it may hit
   /// t from where the ray started.
-  float t(float near_t) const { return static_cast<float>(static_cast<double>(near_t) + start_.t); }
+  double t(float near_t) const { return static_cast<double>(near_t) + start_.t; }
 
  private:
   FarStart& start_;
@@ -82,6 +82,18 @@ Box3 points_box(std::span<const Vec3f> points, const Affine3& m)
     box = box_union(box, {P_there, P_there});
   }
   return box;
+}
+
+/// Whether a light is so far away that boxes as wide as its distance asks for would be much larger than the things in them:
+/// soft suns are. Rays that start beyond the things are moved near, and look for such lights before.
+/// @param things  box of all that is not far away
+bool is_far_away(const Box3& light, const Box3& things)
+{
+  constexpr float kFar = 16;
+  if (!(things.low.x <= things.high.x)) return false;
+  const Vec3f reach = splat3(kFar * length(things.high - things.low));
+  const Vec3f beyond = max(max(light.high - (things.high + reach), (things.low - reach) - light.low), splat3(0.0f));
+  return !is_zero(beyond);
 }
 
 /// So that a pad stays the same where a scene changes a little, and with it the trees whose boxes it enlarges.
@@ -167,7 +179,12 @@ Accel::Accel(const Scene& scene,
   build_top(scene, lights, area_lights);
   top_ = scene_->top.get();
   kept_ = trees_->end_scene();
-  target_ = ray_target_make(bounds());
+  if (scene_->far_lights != nullptr) {
+    target_ = ray_target_make(scene_->target);
+    far_lights_target_ = ray_target_make(scene_bounds(scene_->far_lights.get()));
+  } else {
+    target_ = ray_target_make(bounds());
+  }
 }
 
 Accel::~Accel()
@@ -244,15 +261,12 @@ void Accel::place_instances(const Scene& scene,
         instance.world_from_object, views_->motion.view(instance.motion_index), &scene_->pad));
     box = box_union(box, instance_bounds(*scene_->instances[i]));
   }
+  const Box3 things = box;
   for (const std::uint32_t index : area_lights) {
-    const Light& light = lights[index];
-    if (light.motion_index >= 0) {
-      box = box_union(box, light_geometry_bounds(light_geometry_prepare(light, views_->motion.views())));
-      continue;
-    }
-    const Vec3f half = light_is_ball(light) ? splat3(light.radius) : abs(light.edge_u) + abs(light.edge_v);
-    box = box_union(box, {light.P - half, light.P + half});
+    const Box3 light = light_box(lights[index]);
+    if (!is_far_away(light, things)) box = box_union(box, light);
   }
+  scene_->target = box;
   if (box.low.x <= box.high.x) scene_->pad = power_of_two_above(ray_target_pad(ray_target_make(box)));
 
   // The boxes of Embree's own instances are as large as those of what they show.
@@ -355,15 +369,42 @@ void Accel::build_top(const Scene& scene, std::span<const Light> lights, std::sp
   }
   for (std::size_t i = 0; i < area_lights.size(); ++i) {
     const Light& light = lights[area_lights[i]];
-    attach(top.get(),
-           light.kind == LightKind::kRectangle && light.motion_index < 0 ? new_rectangle(light) : new_light(light),
-           static_cast<unsigned>(scene.instances.size() + i),
-           kRayBounce | (light.visible_to_camera ? std::uint32_t{kRayCamera} : 0u));
+    RTCGeometry geometry =
+        light.kind == LightKind::kRectangle && light.motion_index < 0 ? new_rectangle(light) : new_light(light);
+    const auto id = static_cast<unsigned>(scene.instances.size() + i);
+    const std::uint32_t mask = kRayBounce | (light.visible_to_camera ? std::uint32_t{kRayCamera} : 0u);
+    const Box3 with_light = box_union(scene_->target, light_box(light));
+    if (with_light.low != scene_->target.low || with_light.high != scene_->target.high) {
+      if (scene_->far_lights == nullptr) scene_->far_lights = trees_->scene_make(RTC_BUILD_QUALITY_MEDIUM);
+      rtcRetainGeometry(geometry);
+      attach(scene_->far_lights.get(), geometry, id, mask);
+    }
+    attach(top.get(), geometry, id, mask);
   }
+  if (scene_->far_lights != nullptr) commit(scene_->far_lights.get());
   commit(top.get());
   scene_->top = top;
   scene_->bytes = trees_->bytes() - bytes_before;
   scene_->seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Nearest hit of a ray that is moved near to a target.
+/// @param nearest  ray's t of what is known; from afar single precision does not tell it from what is behind. Lowered where
+///                 something nearer is hit
+void Accel::intersect_far(const RayTarget& target,
+                          RTCScene scene,
+                          EmbreeContext& context,
+                          RTCRayHit& ray,
+                          double* nearest)
+{
+  RTCRayHit near = ray;
+  near.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  const FarRay far(target, context, &near.ray);
+  if (!far.meets()) return;
+  embree_intersect1(scene, context, near);
+  if (near.hit.geomID == RTC_INVALID_GEOMETRY_ID || far.t(near.ray.tfar) >= *nearest) return;
+  *nearest = far.t(near.ray.tfar);
+  ray.hit = near.hit;
 }
 
 void Accel::intersect(EmbreeContext& context, RTCRayHit& ray) const
@@ -371,13 +412,18 @@ void Accel::intersect(EmbreeContext& context, RTCRayHit& ray) const
   const RayStart start = ray_start(target_, ray.ray);
   if (start == RayStart::kNear) return embree_intersect1(top_, context, ray);
   if (start == RayStart::kInvalid) return;
-  RTCRayHit near = ray;
-  const FarRay far(target_, context, &near.ray);
-  if (!far.meets()) return;
-  embree_intersect1(top_, context, near);
-  if (near.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
-  ray.hit = near.hit;
-  ray.ray.tfar = min(ray.ray.tfar, far.t(near.ray.tfar));
+  double nearest = HUGE_VAL;
+  // On its way to where it is moved to there may be lights.
+  if (RTCScene lights = scene_->far_lights.get()) {
+    if (ray_start(far_lights_target_, ray.ray) == RayStart::kNear) {
+      embree_intersect1(lights, context, ray);
+      if (ray.hit.geomID != RTC_INVALID_GEOMETRY_ID) nearest = static_cast<double>(ray.ray.tfar);
+    } else {
+      intersect_far(far_lights_target_, lights, context, ray, &nearest);
+    }
+  }
+  intersect_far(target_, top_, context, ray, &nearest);
+  ray.ray.tfar = static_cast<float>(min(static_cast<double>(ray.ray.tfar), nearest));
 }
 
 void Accel::intersect8(EmbreeContext& context, RTCRayHit8& rays) const
@@ -478,6 +524,13 @@ RTCGeometry Accel::new_instance(RTCScene instanced, const Affine3& m)
   const float columns[12] = {m.x.x, m.x.y, m.x.z, m.y.x, m.y.y, m.y.z, m.z.x, m.z.y, m.z.z, m.p.x, m.p.y, m.p.z};
   rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
   return geometry;
+}
+
+Box3 Accel::light_box(const Light& light) const
+{
+  if (light.motion_index >= 0) return light_geometry_bounds(light_geometry_prepare(light, views_->motion.views()));
+  const Vec3f half = light_is_ball(light) ? splat3(light.radius) : abs(light.edge_u) + abs(light.edge_v);
+  return {light.P - half, light.P + half};
 }
 
 RTCGeometry Accel::new_rectangle(const Light& light)

@@ -64,6 +64,11 @@ class Accel {
   const KeptTrees::Tally& kept() const { return kept_; }  ///< of the scenes before
 
  private:
+  static void intersect_far(const RayTarget& target,
+                            RTCScene scene,
+                            EmbreeContext& context,
+                            RTCRayHit& ray,
+                            double* nearest);
   void place_instances(const Scene& scene, std::span<const Light> lights, std::span<const std::uint32_t> area_lights);
   void build_meshes(const Scene& scene);
   void build_displaced(DisplacementSet& displacements);
@@ -76,6 +81,7 @@ class Accel {
   RTCGeometry new_mesh(const Mesh& mesh, const Affine3* world_from_object, bool transparent);
   void attach_corners(RTCScene target, const Box3& box, Vec3f pad, bool quads = false);
   RTCGeometry new_instance(RTCScene instanced, const Affine3& world_from_object);
+  Box3 light_box(const Light& light) const;
   RTCGeometry new_rectangle(const Light& light);
   RTCGeometry new_light(const Light& light);
   void attach(RTCScene target, RTCGeometry geometry, unsigned id, std::uint32_t mask);
@@ -108,7 +114,8 @@ class Accel {
   const SceneViews* views_;
   std::shared_ptr<KeptTrees> trees_;
   KeptTrees::Tally kept_;
-  RayTarget target_;                     ///< all that rays can hit, world
+  RayTarget target_;                     ///< all that rays can hit, but for lights that are far away; world
+  RayTarget far_lights_target_;          ///< these lights
   std::vector<MeshUse> meshes_;          ///< a mesh of the scene
   std::vector<DisplacedUse> displaced_;  ///< a geometry of displacements_
   std::unique_ptr<SceneTree> scene_;

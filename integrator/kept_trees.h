@@ -25,11 +25,13 @@ struct SceneTree {
   std::vector<std::unique_ptr<LightGeometry>> lights;        ///< those that are no rectangles, or move
   std::vector<TreePointer> parts;                            ///< that are instanced
   float pad = 0;                                             ///< of its boxes, metres
+  Box3 target = box_empty();                                 ///< of all but lights that are far away, world
   ContentHash content;                                       ///< of all that it is made of; unused if nothing is kept
   std::uint64_t num_in_place = 0;                            ///< meshes that are part of this tree itself
   std::uint64_t bytes = 0;
-  double seconds = 0;  ///< that building it took
-  TreePointer top;     ///< the last member: the others outlive it
+  double seconds = 0;      ///< that building it took
+  TreePointer far_lights;  ///< lights that are far away, which are in the top tree too; null: none is
+  TreePointer top;         ///< the last member: the others outlive it
 };
 
 class KeptTrees {

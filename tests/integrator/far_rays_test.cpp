@@ -253,6 +253,71 @@ TEST(FarRaysOnPlainMeshes, HitThemWhetherInPlaceOrInstances)
   }
 }
 
+/// A lamp so far away that rays from behind it are moved past it, to the things: they meet it before.
+TEST(FarRaysOnLamps, MeetThemAndTheThingsBehindThem)
+{
+  constexpr float kHeight = 3e5f, kRadius = 1e3f;
+  constexpr unsigned kThing = 0, kLamp = 1, kNothing = RTC_INVALID_GEOMETRY_ID;
+  Scene scene = empty_scene();
+  add_object(scene, quad_mesh({-1, -1, 0}, {2, 0, 0}, {0, 2, 0}), diffuse_material({0.5f, 0.5f, 0.5f}));
+  Light lamp;
+  lamp.P = {0, 0, kHeight};
+  lamp.radius = kRadius;
+  lamp.emission = {1, 1, 1};
+  scene.lights.push_back(lamp);
+  const SceneContext context(scene, {});
+  struct Case {
+    Vec3f O, to;
+    unsigned object;
+    float t;  ///< metres
+  };
+  const float slanted = length(Vec3f{1e5f, 0, 1e6f});
+  const Case cases[8] = {
+      {{0, 0, 2}, {0, 0, kHeight}, kLamp, kHeight - kRadius - 2},
+      {{0, 0, 1e15f}, {0, 0, 0}, kLamp, 1e15f},
+      {{0, 0, 1e5f}, {0, 0, 0}, kThing, 1e5f},
+      {{0, 0, 1e5f}, {0, 0, kHeight}, kLamp, kHeight - kRadius - 1e5f},
+      {{0, 0, 1e6f}, {0, 0, 0}, kLamp, 1e6f - kHeight - kRadius},
+      {{1e5f, 0, 1e6f}, {0, 0, 0}, kThing, slanted},                 // beside the lamp
+      {{1e5f, 0, 1e6f}, {5e4f, 0, 0}, kNothing, 0},                  // beside both
+      {{0, 5e4f, kHeight}, {0, 0, kHeight}, kLamp, 5e4f - kRadius},  // away from the thing
+  };
+  const auto expect = [&](unsigned i, unsigned object, float t) {
+    EXPECT_EQ(object, cases[i].object) << i;
+    if (object != kNothing) {
+      EXPECT_NEAR(t, cases[i].t, 1e-5f * cases[i].t) << i;
+    }
+  };
+  EmbreeContext embree;
+  embree_context_init(embree, false);
+  RTCRayHit8 packet;
+  auto* const rays = reinterpret_cast<RTCRayHitN*>(&packet);
+  for (unsigned i = 0; i < 8; ++i) {
+    const Vec3f O = cases[i].O, D = normalize(cases[i].to - O);
+    RTCRayHit ray{};
+    ray.ray = {O.x, O.y, O.z, 0, D.x, D.y, D.z, 0, kInfinity, kRayBounce, i, 0};
+    ray.hit.geomID = ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    RTCRayN* const lanes = RTCRayHitN_RayN(rays, 8);
+    RTCRayN_org_x(lanes, 8, i) = O.x;
+    RTCRayN_org_y(lanes, 8, i) = O.y;
+    RTCRayN_org_z(lanes, 8, i) = O.z;
+    RTCRayN_tnear(lanes, 8, i) = 0;
+    RTCRayN_dir_x(lanes, 8, i) = D.x;
+    RTCRayN_dir_y(lanes, 8, i) = D.y;
+    RTCRayN_dir_z(lanes, 8, i) = D.z;
+    RTCRayN_time(lanes, 8, i) = 0;
+    RTCRayN_tfar(lanes, 8, i) = kInfinity;
+    RTCRayN_mask(lanes, 8, i) = kRayBounce;
+    RTCRayN_id(lanes, 8, i) = i;
+    RTCRayN_flags(lanes, 8, i) = 0;
+    rtcCopyHitToHitN(RTCRayHitN_HitN(rays, 8), &ray.hit, 8, i);
+    context.accel->intersect(embree, ray);
+    expect(i, ray.hit.geomID, ray.ray.tfar);
+  }
+  context.accel->intersect8(embree, packet);
+  for (unsigned i = 0; i < 8; ++i) expect(i, packet.hit.geomID[i], packet.ray.tfar[i]);
+}
+
 /// All but Embree's grids, which let single rays from afar through.
 std::vector<DisplacementMethod> methods_from_afar()
 {
