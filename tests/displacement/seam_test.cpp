@@ -219,7 +219,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds,
                          TessellationOfSeams,
                          testing::Values(TessellationKind::kQuads, TessellationKind::kGrids),
                          [](const auto& kind) {
-                           return kind.param == TessellationKind::kQuads ? "Triangles" : "Grids";
+                           return kind.param == TessellationKind::kQuads ? "Quads" : "Grids";
                          });
 
 TEST_P(TessellationOfSeams, LetsNoRayOut)

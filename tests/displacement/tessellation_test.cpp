@@ -163,7 +163,7 @@ bool is_hit(const RTCRayHit& ray) { return ray.hit.geomID != RTC_INVALID_GEOMETR
 
 class TessellationOf : public testing::TestWithParam<TessellationKind> {};
 INSTANTIATE_TEST_SUITE_P(Kinds, TessellationOf, testing::ValuesIn(kKinds), [](const auto& kind) {
-  return kind.param == TessellationKind::kQuads ? "Triangles" : "Grids";
+  return kind.param == TessellationKind::kQuads ? "Quads" : "Grids";
 });
 
 /// Corners of a primitive as Embree counts them: of a micro-triangle, or all of a grid's vertices.
