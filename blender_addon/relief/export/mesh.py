@@ -142,10 +142,14 @@ class _Corners:
         return self._finite(out, "texture coordinates")
 
     def _read_generated(self):
-        # Blender's texture space is the box of the mesh before modifiers.
+        # Of the mesh at rest, carried along by modifiers that make or remove vertices; Blender's texture space is its box.
+        rest = np.empty(3 * len(self.mesh.vertices), dtype=np.float32)
+        self.mesh.vertices.foreach_get("undeformed_co", rest)
         location = np.array(self.mesh.texspace_location, dtype=np.float32)
         size = np.array(self.mesh.texspace_size, dtype=np.float32)
-        return (self.positions[self.vertex] - location) / np.where(size == 0, 1, 2 * size) + np.float32(0.5)
+        per_metre = np.divide(np.float32(0.5), size, out=np.zeros_like(size), where=size != 0)
+        generated = (rest.reshape(-1, 3) - location) * per_metre + np.float32(0.5)
+        return self._finite(generated, "generated coordinates")[self.vertex]
 
     def _finite(self, values, what):
         """Values with 0 where they are not finite."""
