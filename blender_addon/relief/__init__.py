@@ -22,6 +22,10 @@ for _name in [name for name in sys.modules if name.startswith(f"{__name__}.")]:
     del sys.modules[_name]
     globals().pop(_name.removeprefix(f"{__name__}."), None)
 
+from .find_numpy import find_numpy  # noqa: E402
+
+find_numpy(__name__)
+
 from . import engine, exporter, operators, preferences, properties, session, ui  # noqa: E402
 
 _modules = (session, preferences, properties, engine, operators, exporter, ui)

@@ -3,6 +3,7 @@
 import os
 import re
 import subprocess
+import sys
 
 import bpy
 
@@ -96,6 +97,49 @@ def test_install_use_and_remove_as_an_extension():
         blender("--command", "extension", "remove", "relief")
         left = [n for _, folders, _ in os.walk(f"{path}/config") for n in folders if n == "relief"]
         assert not left, left
+
+
+def _enabled_beside_another_python(path, script):
+    """What Blender prints that enables the add-on where the first Python on the PATH is one as pyenv's: with no packages."""
+    os.makedirs(f"{path}/bin")
+    os.makedirs(f"{path}/lib")
+    version = f"{sys.version_info.major}.{sys.version_info.minor}"
+    os.symlink(os.path.dirname(os.__file__), f"{path}/lib/python{version}")
+    for name in ("python3", f"python{version}"):
+        with open(f"{path}/bin/{name}", "w", encoding="utf-8") as file:
+            file.write("#!/bin/sh\nexit 1\n")
+        os.chmod(f"{path}/bin/{name}", 0o755)
+    environment = {**os.environ, "PATH": f"{path}/bin:{os.environ['PATH']}"}
+    script += 'import bpy\nbpy.ops.preferences.addon_enable(module="relief")\nprint("ENABLED", "relief" in bpy.context.preferences.addons)'
+    command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-expr", script]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=100)
+    return done.stdout + done.stderr
+
+
+def test_numpy_is_found_beside_another_python():
+    with folder() as path:
+        output = _enabled_beside_another_python(path, "")
+        assert "ENABLED True" in output and "Traceback" not in output, output
+
+
+#: Python code that takes numpy away.
+_WITHOUT_NUMPY = """
+import sys
+for name in [name for name in sys.modules if name.split(".")[0] == "numpy"]:
+    del sys.modules[name]
+class NoNumpy:
+    def find_spec(self, name, *_):
+        if name.split(".")[0] == "numpy":
+            raise ModuleNotFoundError("No module named 'numpy'", name="numpy")
+sys.meta_path.insert(0, NoNumpy())
+"""
+
+
+def test_missing_numpy_is_one_message():
+    with folder() as path:
+        output = _enabled_beside_another_python(path, _WITHOUT_NUMPY)
+        assert "ENABLED False" in output and "Traceback" not in output, output
+        assert output.count("relief needs numpy") == 1 and "python3-numpy" in output, output
 
 
 def test_versions_agree():
