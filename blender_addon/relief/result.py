@@ -23,7 +23,8 @@ class Pass:
     is_own    our own passes, and those that Cycles adds, have to be registered and added; Blender makes the others itself
     aov       layer of the program's picture
     channels  names of channels there
-    ids       Blender's channel names
+    ids       Blender's channel names; small ones where they are no colours: of those Blender keeps 32 bits in files of 16,
+              and DWA loses nothing
     kind      'COLOR', 'VECTOR' or 'VALUE'
     convert   from float32 (pixels, channels) and coverage (pixels,) to what Blender wants
     """
@@ -84,7 +85,7 @@ PASSES = (
     Pass("Indirect", "use_pass_indirect", True, "indirect", _rgb("indirect"), "RGB", "COLOR", owner="relief"),
     Pass("Caustics", "use_pass_caustic", True, "caustic", _rgb("caustic"), "RGB", "COLOR", owner="relief"),
     Pass("Samples", "use_pass_samples", True, "samples", ("samples.N",), "X", "VALUE", owner="relief"),
-    Pass("Variance", "use_pass_variance", True, "variance", _rgb("variance"), "RGB", "COLOR", owner="relief"),
+    Pass("Variance", "use_pass_variance", True, "variance", _rgb("variance"), "rgb", "COLOR", owner="relief"),
     Pass("Displacement Steps", "use_pass_displacement_steps", True, "displacement_steps", ("displacement_steps.N",),
          "X", "VALUE", owner="relief"),
 )  # fmt: skip
@@ -92,7 +93,7 @@ PASSES = (
 #: Passes that a picture has besides if it is denoised: the combined pass as it was rendered, under Cycles' name, and the
 #: root mean square error that is left.
 NOISY = Pass("Noisy Image", "", True, "", tuple("RGBA"), "RGBA", "COLOR")
-_DENOISED = (NOISY, Pass("Denoised Error", "", True, "", _rgb("denoised_error"), "RGB", "COLOR"))
+_DENOISED = (NOISY, Pass("Denoised Error", "", True, "", _rgb("denoised_error"), "rgb", "COLOR"))
 
 #: Cryptomattes that a view layer may ask for.
 CRYPTOMATTES = ("object", "material", "asset")
@@ -113,7 +114,7 @@ def enabled_passes(scene, view_layer):
         for i in range((view_layer.pass_cryptomatte_depth + 1) // 2):
             name = f"Crypto{kind.capitalize()}{i:02d}"
             channels = tuple(f"{name}.{c}" for c in "rgba")
-            passes.append(Pass(name, setting, True, f"crypto_{kind}", channels, "RGBA", "COLOR"))
+            passes.append(Pass(name, setting, True, f"crypto_{kind}", channels, "rgba", "COLOR"))
     return passes
 
 

@@ -84,6 +84,31 @@ def test_ids_and_coverages_are_those_of_cycles():
                 assert np.abs(ours - theirs).max() < largest and abs(ours.mean() - theirs.mean()) < 0.005, (kind, name)
 
 
+def test_files_of_16_bits_keep_ids():
+    """As numbers of 32 bits, like Cycles': by the names of channels, by which DWA decides what it may damage, too."""
+    from relief import exr
+
+    scene = _stage()
+    scene.view_layers[0].relief.use_pass_variance = True
+    scene.relief.denoise = "builtin"
+    found = {}
+    for engine in ("RELIEF", "CYCLES"):
+        scene.render.engine, scene.relief.samples, scene.cycles.samples = engine, 16, 16
+        set_file_format("OPEN_EXR_MULTILAYER", "16")
+        with folder() as path:
+            scene.render.filepath = os.path.join(path, "picture.exr")
+            bpy.ops.render.render(write_still=True)
+            found[engine] = exr.read(scene.render.filepath).channels
+    layer = scene.view_layers[0].name
+    for name in ("floor", "ball", "small ball"):
+        ours, theirs = (_coverage(found[engine], layer, "object", name, 6) for engine in ("RELIEF", "CYCLES"))
+        assert theirs.mean() > 0.01 and abs(ours.mean() - theirs.mean()) < 0.01, name
+    names = {engine: {n for n in channels if "Crypto" in n} for engine, channels in found.items()}
+    assert names["RELIEF"] == names["CYCLES"] and names["RELIEF"], names
+    own = {f"{layer}.{kind}.{c}" for kind in ("Variance", "Denoised Error") for c in "rgb"}
+    assert own <= found["RELIEF"].keys(), found["RELIEF"].keys()
+
+
 def test_metadata_is_that_of_cycles():
     from relief import exr
 

@@ -148,7 +148,7 @@ def test_denoised():
 
     left = rmse(denoised[name + "Combined.R"])
     assert left < 0.7 * rmse(plain[name + "Combined.R"]), left
-    claimed = np.sqrt(np.mean(denoised[name + "Denoised Error.R"].astype(np.float64) ** 2))
+    claimed = np.sqrt(np.mean(denoised[name + "Denoised Error.r"].astype(np.float64) ** 2))
     assert 0.6 < claimed / left < 1.6, (claimed, left)
     assert np.array_equal(denoised[name + "Combined.A"], plain[name + "Combined.A"])
 
