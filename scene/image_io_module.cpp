@@ -30,6 +30,14 @@ SampleType sample_type(const OIIO::TypeDesc& type)
 /// The library's words, if it has any.
 std::string error_or(const std::string& error, const char* otherwise) { return error.empty() ? otherwise : error; }
 
+/// Held while OpenImageIO reads a header, of whatever format. Its readers share tables that grow as they are asked: those of
+/// decode_icc_profile (2.4) gain an entry for each word that they do not know, so that no first call fills them for good.
+std::mutex& header_mutex()
+{
+  static std::mutex mutex;
+  return mutex;
+}
+
 class OiioFile final : public ImageFile {
  public:
   explicit OiioFile(std::unique_ptr<OIIO::ImageInput> input) : input_(std::move(input)) {}
@@ -40,6 +48,7 @@ class OiioFile final : public ImageFile {
   {
     OIIO::ImageSpec config;
     config.attribute("oiio:UnassociatedAlpha", 1);
+    const std::lock_guard guard(header_mutex());
     try {
       if (!encoded.empty()) {
         memory_ = std::make_unique<OIIO::Filesystem::IOMemReader>(encoded.data(), encoded.size());
@@ -79,6 +88,10 @@ class OiioFile final : public ImageFile {
   {
     const bool tiled = spec_.tile_width > 0 && spec_.tile_height > 0;
     const int y0 = spec_.y + row_begin, y1 = spec_.y + row_end;
+    // Decoders that only go forward open the file anew for a row that they have passed.
+    std::unique_lock guard(header_mutex(), std::defer_lock);
+    if (row_begin < next_row_) guard.lock();
+    next_row_ = row_end;
     try {
       const bool ok =
           tiled ? input_->read_tiles(0, 0, spec_.x, spec_.x + spec_.width, y0, y1, spec_.z, spec_.z + 1, channel_begin,
@@ -96,6 +109,7 @@ class OiioFile final : public ImageFile {
   std::unique_ptr<OIIO::Filesystem::IOMemReader> memory_;
   std::unique_ptr<OIIO::ImageInput> input_;
   OIIO::ImageSpec spec_;
+  int next_row_ = 0;  ///< after those that were read last
 };
 
 std::unique_ptr<ImageFile> file_make(const std::string& format)
