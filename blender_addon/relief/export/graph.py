@@ -8,7 +8,7 @@ One function a kind of node, listed at the end with the names of its outputs. Th
 from json import dumps
 
 from .. import compat
-from . import nodes
+from . import color_space, nodes
 from .graph_inputs import OUTPUTS, mesh_attribute
 
 
@@ -72,7 +72,26 @@ class GraphWriter:
         @error  NotUnderstood
         """
         constant = self.constant(socket, groups)
-        return constant if constant is not None else self.output(nodes.follow(socket, groups))
+        if constant is not None:
+            return constant
+        source = nodes.follow(socket, groups)
+        found = self.output(source)
+        return self.grey(found) if socket.type == "VALUE" and source.socket.type == "RGBA" else found
+
+    def grey(self, color):
+        """The luminance of a reference to a colour, which where it is that of Rec. 709 is what numbers take of colours."""
+        weights = color_space.luminance_weights()
+        if weights == color_space.REC709_WEIGHTS or not isinstance(color, dict):
+            return color
+        return self.op("vector-math", {"a": color, "b": list(weights)}, "value", operation="dot")
+
+    def made_color(self, color):
+        """A reference to a colour that the program makes itself, in Blender's working space."""
+        matrix = color_space.scene_linear_from_rec709()
+        if matrix is None:
+            return color
+        rows = [self.op("vector-math", {"a": color, "b": row}, "value", operation="dot") for row in matrix.tolist()]
+        return self.op("combine", dict(zip("xyz", rows)), "vector")
 
     def normal(self, socket, groups=()):
         """Reference to a Normal input, in the world; None: nothing is linked, and the surface has the mesh's own.
@@ -685,8 +704,6 @@ _NODES = {
     ),
     "ShaderNodeTexMusgrave": (_musgrave, _FACTOR),
     "ShaderNodeTexGabor": (_gabor, {"Value": "value", "Phase": "phase", "Intensity": "intensity"}),
-    "ShaderNodeBlackbody": (_simple("blackbody", {"Temperature": "temperature"}), {"Color": "color"}),
-    "ShaderNodeWavelength": (_simple("wavelength", {"Wavelength": "wavelength"}), {"Color": "color"}),
     "ShaderNodeSeparateHSV": (_separate_hsv, {"H": "red", "S": "green", "V": "blue"}),
     "ShaderNodeCombineHSV": (_combine_hsv, {"Color": "color"}),
     "ShaderNodeVectorRotate": (_vector_rotate, {"Vector": "vector"}),
@@ -707,7 +724,6 @@ _NODES = {
     "ShaderNodeSeparateRGB": (_separate_rgb, _RGB),
     "ShaderNodeCombineColor": (_combine_rgb, {"Color": "color"}),
     "ShaderNodeCombineRGB": (_combine_rgb, {"Image": "color"}),
-    "ShaderNodeRGBToBW": (_simple("rgb-to-bw", {"Color": "color"}), {"Val": "value"}),
     "ShaderNodeSeparateXYZ": (_simple("separate", {"Vector": "vector"}), _XYZ),
     "ShaderNodeCombineXYZ": (_simple("combine", {"X": "x", "Y": "y", "Z": "z"}), {"Vector": "vector"}),
     "ShaderNodeClamp": (_clamp, {"Result": "value"}),

@@ -267,6 +267,26 @@ def _point_info(g, source):
     return _constant(g, (0.0, 0.0, 0.0) if source.socket.identifier == "Position" else 0.0)
 
 
+def _made_color(kind, name):
+    """Writer of a node that makes a colour of a number, by its name."""
+
+    def write(g, source):
+        node = source.node
+        color = _output(g.add(kind, g.inputs(node, source.groups, {name: name.lower()})), "color")
+        converted = g.made_color(color)
+        if kind == "wavelength" and converted is not color:
+            g.warn(f'node "{node.name}" ({node.bl_label}) in a working space of other primaries', "colours end at Rec. 709")
+        return converted
+
+    return write
+
+
+def _rgb_to_bw(g, source):
+    color = g.inputs(source.node, source.groups, {"Color": "color"})
+    weighted = g.grey(color["color"])
+    return _output(g.add("rgb-to-bw", color), "value") if weighted is color["color"] else weighted
+
+
 def _by_normal(kind, names):
     """Writer of a node whose Normal may be linked.
 
@@ -306,6 +326,9 @@ OUTPUTS = {
     "ShaderNodeTexIES": _ies,
     "ShaderNodeHairInfo": _hair_info,
     "ShaderNodePointInfo": _point_info,
+    "ShaderNodeBlackbody": _made_color("blackbody", "Temperature"),
+    "ShaderNodeWavelength": _made_color("wavelength", "Wavelength"),
+    "ShaderNodeRGBToBW": _rgb_to_bw,
     "ShaderNodeFresnel": _by_normal("fresnel", {"IOR": "ior"}),
     "ShaderNodeLayerWeight": _by_normal("layer-weight", {"Blend": "blend"}),
 }

@@ -14,9 +14,8 @@ import bpy
 import numpy as np
 
 from .. import exr
+from . import color_space
 
-_LINEAR_SPACES = {"Non-Color", "Raw", "Linear", "Linear Rec.709", "Generic Data", "Utility - Raw"}
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], dtype=np.float32)
 _FLOAT_SUFFIXES = {".exr", ".hdr"}
 _TIFF_SAMPLE_FORMAT, _TIFF_IEEE_FLOAT = 339, 3
 
@@ -70,11 +69,22 @@ class ImageExporter:
                 warn(f'image "{image.name}": no file {tile!r}', "the tile is left out")
                 continue
             with open(tile, "rb") as file:
-                if not self._means_the_same(image, file.read(4096), tile, is_color):
-                    space = image.colorspace_settings.name
-                    warn(f'image "{image.name}": tiles in colour space {space}', "they are read as their files say")
-            found[number] = self._writer.file_uri(tile)
+                is_same = self._means_the_same(image, file.read(4096), tile, is_color)
+            found[number] = self._writer.file_uri(tile) if is_same else self._tile_from_pixels(image, tile, warn)
         return found
+
+    def _tile_from_pixels(self, image, path, warn):
+        """URI of a tile in the colour space of its image."""
+        key = (image.name_full, path)
+        if key not in self._uris:
+            tile = bpy.data.images.load(path)
+            try:
+                tile.colorspace_settings.name = image.colorspace_settings.name
+                tile.alpha_mode = image.alpha_mode
+                self._uris[key] = self._make_from_pixels(tile, warn)
+            finally:
+                bpy.data.images.remove(tile)
+        return self._uris[key]
 
     def data_uri(self, image, user, warn):
         """URI of an image used as numbers: roughness, normals, heights."""
@@ -105,7 +115,8 @@ class ImageExporter:
             return None
         if channel is not None:
             return pixels[..., min(channel, pixels.shape[-1] - 1)]
-        return pixels[..., :3] @ _LUMINANCE if pixels.shape[-1] >= 3 else pixels[..., 0]
+        weights = np.array(color_space.luminance_weights(), dtype=np.float32)
+        return pixels[..., :3] @ weights if pixels.shape[-1] >= 3 else pixels[..., 0]
 
     def write_pixels(self, channels):
         """Writes float32 planes, bottom row first, as an image of linear floats; returns its URI."""
@@ -155,10 +166,8 @@ class ImageExporter:
         """Whether the program reads the file and makes of it what Blender makes of it."""
         if _suffix(first_bytes, path) is None:
             return False
-        space = image.colorspace_settings.name
-        if _is_float_file(first_bytes, path) or not is_color:
-            return space in _LINEAR_SPACES
-        return space == "sRGB"
+        expected = "linear" if _is_float_file(first_bytes, path) or not is_color else "srgb"
+        return color_space.meaning(image.colorspace_settings) == expected
 
     def _make_from_pixels(self, image, warn):
         pixels = self._linear_pixels(image, warn)
@@ -184,12 +193,9 @@ class ImageExporter:
             # Cycles does it in bytes, rounding down; the little more is for products that are whole numbers.
             pixels[..., :3] = np.floor(pixels[..., :3] * pixels[..., 3:] * 255 + 1e-3) / 255
         # Blender keeps floats scene-linear, bytes as they were stored.
-        space = image.colorspace_settings.name
-        if not image.is_float and space not in _LINEAR_SPACES:
-            if space != "sRGB":
-                warn(f'image "{image.name}": colour space {space}', "it is read as sRGB")
-            color = pixels[..., :3]
-            pixels[..., :3] = np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
+        if not image.is_float:
+            color = np.repeat(pixels[..., :1], 3, axis=2) if image.channels < 3 else pixels[..., :3]
+            pixels[..., :3] = color_space.to_scene_linear(color, image.colorspace_settings)[..., : pixels.shape[-1]]
         return pixels
 
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import bpy
 
+from . import color_space
+
 
 @dataclass(frozen=True)
 class Source:
@@ -322,4 +324,4 @@ def as_number(value):
         return value
     if len(value) < 4:
         return sum(value) / len(value)
-    return 0.2126 * value[0] + 0.7152 * value[1] + 0.0722 * value[2]
+    return sum(w * v for w, v in zip(color_space.luminance_weights(), value))

@@ -162,9 +162,9 @@ class WorldGraph(GraphWriter):
             settings = {"sky": kind, "sunDirection": list(node.sun_direction), "turbidity": node.turbidity}
             if kind == "hosek-wilkie":
                 settings["groundAlbedo"] = node.ground_albedo
-            return self.op("sky-texture", vector, "color", **settings)
+            return self.made_color(self.op("sky-texture", vector, "color", **settings))
         elevation, turn = _sun_angles(node.sun_elevation, node.sun_rotation)
-        return self.op(
+        color = self.op(
             "sky-texture",
             {"vector": self.vector(node, source.groups, "generated")},
             "color",
@@ -179,6 +179,7 @@ class WorldGraph(GraphWriter):
             dust=node.aerosol_density if hasattr(node, "aerosol_density") else node.dust_density,
             ozone=node.ozone_density,
         )
+        return self.made_color(color)
 
 
 #: glTF's wrap mode.
