@@ -113,6 +113,26 @@ def test_the_operator_exports_a_range():
         _run("info", f"{path}/shot.gltf")
 
 
+def test_no_file_is_written_through_a_link_that_somebody_has_planted():
+    from relief.exporter import export_frames
+
+    scene = _shot()
+    with folder() as path:
+        export_frames(scene, f"{path}/first.gltf", [1])
+        names = [f"shot_data/{name}" for name in os.listdir(f"{path}/first_data")] + ["shot.gltf"]
+        os.mkdir(f"{path}/shot_data")
+        for i, name in enumerate(names):
+            with open(f"{path}/precious{i}", "w", encoding="utf-8") as file:
+                file.write("mine")
+            os.symlink(f"{path}/precious{i}", f"{path}/{name}.part")
+        export_frames(scene, f"{path}/shot.gltf", [1])
+        for i in range(len(names)):
+            with open(f"{path}/precious{i}", encoding="utf-8") as file:
+                assert file.read() == "mine", names[i]
+        assert sorted(n for n in os.listdir(path) if n.startswith(".relief")) == []
+        _run("info", f"{path}/shot.gltf")
+
+
 def test_animation_renders_every_frame():
     """blender -a: three frames, each its own."""
     scene = _shot()

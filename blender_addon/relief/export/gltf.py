@@ -5,10 +5,12 @@ Buffers and images are named after their content: what is there already is not w
 which only the camera moved costs a few kilobytes.
 """
 
+import contextlib
 import hashlib
 import json
 import math
 import os
+import secrets
 from dataclasses import dataclass
 from urllib.parse import quote
 
@@ -96,12 +98,8 @@ class GltfWriter:
         name = content_name(*parts) + suffix
         path = os.path.join(self.folder, self.data_folder, name)
         if name not in self.used_files and not os.path.exists(path):
-            # Whole or not at all: a name promises its content.
-            aside = path + ".part"
-            with open(aside, "wb") as file:
-                for part in parts:
-                    self.bytes_written += file.write(part)
-            os.replace(aside, path)
+            # A name promises its content.
+            self.bytes_written += _write_whole(path, parts)
         self.used_files.add(name)
         return f"{self.data_folder}/{name}"
 
@@ -176,11 +174,25 @@ class GltfWriter:
         path = os.path.join(self.folder, name)
         if _has_content(path, text):
             return path
-        aside = path + ".part"
-        with open(aside, "wb") as file:
-            self.bytes_written += file.write(text)
-        os.replace(aside, path)
+        self.bytes_written += _write_whole(path, [text])
         return path
+
+
+def _write_whole(path, parts):
+    """Writes a file, which appears whole or not at all; returns the number of bytes.
+
+    It is made under a name that nothing has: what stands there already may lead to any other file.
+    """
+    aside = os.path.join(os.path.dirname(path), f".relief-{secrets.token_hex(8)}.part")
+    try:
+        with open(aside, "xb") as file:
+            count = sum(file.write(part) for part in parts)
+        os.replace(aside, path)
+    except BaseException:
+        with contextlib.suppress(FileNotFoundError):
+            os.remove(aside)
+        raise
+    return count
 
 
 def _has_content(path, content):
