@@ -145,6 +145,14 @@ def displacement_owner(material):
     return material if IS_4_1 else getattr(material, "cycles", None)
 
 
+def has_transparent_shadow(material):
+    """Whether light passes where a material is transparent. Before 4.2 it was Cycles' property."""
+    for owner in (material, getattr(material, "cycles", None)):
+        if hasattr(owner, "use_transparent_shadow"):
+            return owner.use_transparent_shadow
+    return True
+
+
 def displacement_method(material):
     """'BUMP', 'DISPLACEMENT' or 'BOTH': the material's own setting."""
     return getattr(displacement_owner(material), "displacement_method", "BUMP")
@@ -264,12 +272,21 @@ def world_of(scene, view_layer):
     return getattr(view_layer, "world_override", None) or scene.world
 
 
-def sees_world(world, ray):
-    """Whether rays of a kind ('camera', 'diffuse', 'glossy', 'transmission') see the world."""
+def world_visibility(world, ray):
+    """(what has it, its name) of the property by which rays of a kind see the world; None: there is none.
+
+    @param  ray  'camera', 'diffuse', 'glossy' or 'transmission'
+    """
     for owner, name in ((world, f"visible_{ray}"), (getattr(world, "cycles_visibility", None), ray)):
         if hasattr(owner, name):
-            return getattr(owner, name)
-    return True
+            return owner, name
+    return None
+
+
+def sees_world(world, ray):
+    """Whether rays of a kind see the world; see world_visibility."""
+    found = world_visibility(world, ray)
+    return found is None or getattr(*found)
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The render engine as Blender sees it: forwards to final.py and viewport.py, and tells every failure."""
+"""The render engine as Blender sees it: forwards to final.py, viewport.py and preview.py, and tells every failure."""
 
 import traceback
 
 import bpy
 
-from . import compat, exporter, final, result
+from . import compat, exporter, final, preview, result
 from .report import ReliefError, say
 from .viewport import Viewport, stop_all
 
@@ -13,7 +13,7 @@ from .viewport import Viewport, stop_all
 class ReliefEngine(bpy.types.RenderEngine):
     bl_idname = "RELIEF"
     bl_label = "relief"
-    bl_use_preview = False
+    bl_use_preview = True
     bl_use_postprocess = True
     bl_use_shading_nodes_custom = False
     bl_use_eevee_viewport = True  # material preview is Eevee's
@@ -32,6 +32,9 @@ class ReliefEngine(bpy.types.RenderEngine):
             viewport.stop()
 
     def render(self, depsgraph):
+        if self.is_preview:
+            self._preview(depsgraph)
+            return
         self._guard(lambda: exporter.capture(self, depsgraph) or final.render(self, depsgraph))
 
     def update_render_passes(self, scene=None, renderlayer=None):
@@ -47,6 +50,15 @@ class ReliefEngine(bpy.types.RenderEngine):
     def view_draw(self, context, depsgraph):
         if self._viewport is not None:
             self._guard(lambda: self._viewport.draw(context, depsgraph))
+
+    def _preview(self, depsgraph):
+        """A preview that fails is black; only the console says why, as Blender asks for one with each glance at a list."""
+        try:
+            preview.render(self, depsgraph)
+        except ReliefError as error:
+            say(f"warning: no preview: {error}")
+        except Exception as error:
+            say(f"warning: no preview: {''.join(traceback.format_exception(error))}")
 
     def _guard(self, action):
         """Runs an action and reports its failure. An exception that left here would leave a black picture and no word."""

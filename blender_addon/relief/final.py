@@ -38,7 +38,7 @@ def render(engine, depsgraph):
     warnings = Report(strict=scene.relief.strict)
     warn_unread(scene, warnings)
     where = f'scene "{scene.name}"'
-    shutter = shutter_of(scene, lambda *text: warnings.warn(where, *text))
+    shutter = shutter_of(scene, depsgraph.view_layer, lambda *text: warnings.warn(where, *text))
     now = scene.frame_current, scene.frame_subframe
     try:
         motion = Motion(engine, depsgraph, shutter, warnings) if shutter is not None else None
@@ -61,7 +61,7 @@ def _render(engine, depsgraph, binary, warnings, motion, begin):
     passes = result.enabled_passes(scene, depsgraph.view_layer)
     result.warn_missing_passes(depsgraph.view_layer, warnings)
 
-    engine.update_stats("", "Exporting")
+    engine.update_stats("", f"{scene.name}, {layer_name} | Exporting")
     # Where nothing takes time the view has a file of its own: if it alone moves, the program keeps all that it has loaded and
     # built.
     scene_view = view if motion is not None else any_view(view.size)
@@ -86,7 +86,7 @@ def _render(engine, depsgraph, binary, warnings, motion, begin):
     else:
         arguments += ["--camera-from", write_view(view, folder, "view.gltf")]
     arguments += ["--compression", "none", "--float", "--aov", aovs]
-    arguments += command_line(scene, crop)
+    arguments += command_line(scene, depsgraph.view_layer, crop)
     # Not in the viewport: there a moved camera would have everything diced again.
     if scene.relief.displacement_error > 0:
         arguments += ["--displacement-error", f"{scene.relief.displacement_error:g}"]
@@ -98,7 +98,7 @@ def _render(engine, depsgraph, binary, warnings, motion, begin):
         arguments += ["--preview", told_preview]
         preview = _Preview(preview_path, lambda p: result.show(engine, p, layer_name, scene.render.film_transparent))
     try:
-        _run(engine, binary, arguments, warnings, preview)
+        _run(engine, binary, arguments, depsgraph, warnings, preview)
         report.publish(scene.name, warnings.warnings, known)
         if not os.path.exists(picture_path):  # cancelled before the first sample
             return
@@ -144,35 +144,40 @@ class _Preview:
         self._spent += time.thread_time() - begin
 
 
-def _run(engine, binary, arguments, warnings, preview=None):
+def _run(engine, binary, arguments, depsgraph, warnings, preview=None):
     """Has the program render to the end, or to the artist's cancelling.
 
     @param  arguments  after `relief render`
+    @param  depsgraph  what is rendered
     @param  warnings  Report that gets the program's own
     @param  preview   _Preview, or None where nobody looks
     @error            ReliefError if it failed by itself
     """
     request = session.render_server().ask(binary, arguments)
-    _follow(engine, request, preview)
+    scene, layer = depsgraph.scene, depsgraph.view_layer
+    _follow(engine, request, f"{scene.name}, {layer.name}", sampling_of(scene, layer).samples, preview)
     if request.code != 0 and not engine.test_break():
         raise ReliefError(request.failure())
     for text in request.warnings:
         warnings.warn("program", text)
 
 
-def command_line(scene, crop=None):
+def command_line(scene, view_layer, crop=None):
     """Options of the program that the scene format has no place for.
 
     @param  crop  (x0, y0, x1, y1) from the top left, or None
     """
-    settings, time_limit = scene.relief, sampling_of(scene).time_limit
+    settings, time_limit = scene.relief, sampling_of(scene, view_layer).time_limit
     arguments = ["--texture-memory", f"{settings.texture_memory:g}"]
     if settings.memory_limit > 0:
         arguments += ["--displacement-memory", f"{settings.memory_limit:g}"]
     if time_limit > 0:
         arguments += ["--time-limit", f"{time_limit:g}"]
-    if settings.threads > 0:
-        arguments += ["--threads", str(settings.threads)]
+    threads = settings.threads
+    if threads == 0 and scene.render.threads_mode == "FIXED":  # or by blender's -t
+        threads = scene.render.threads
+    if threads > 0:
+        arguments += ["--threads", str(threads)]
     if settings.strict:
         arguments.append("--strict")
     if crop:
@@ -185,9 +190,13 @@ def focus_distance(camera_object, matrix, depsgraph):
     dof = camera_object.data.dof
     if dof.focus_object is None:
         return dof.focus_distance
-    target = dof.focus_object.evaluated_get(depsgraph).matrix_world.translation
+    target = dof.focus_object.evaluated_get(depsgraph)
+    place = target.matrix_world
+    bone = target.pose.bones.get(dof.focus_subtarget) if target.pose is not None else None
+    if bone is not None:
+        place = place @ bone.matrix
     axis = matrix.to_3x3().col[2].normalized()
-    return abs((target - matrix.translation).dot(axis))
+    return abs((place.translation - matrix.translation).dot(axis))
 
 
 def any_view(size):
@@ -230,20 +239,35 @@ def warn_unread(scene, warnings):
     warn_unread_settings(scene, lambda *text: warnings.warn(where, *text))
 
 
-def _follow(engine, request, preview):
-    """Shows progress until the request ends; ends it if the artist cancels."""
-    engine.update_stats("", "Loading")
+def status(progress, layer, samples):
+    """The line that says how far a render is, in the order that Cycles has.
+
+    @param  progress  the program's event
+    @param  layer     "scene, view layer"
+    @param  samples   a pixel, when it is done
+    """
+    parts = []
+    if 0 < progress["fraction"] < 1:
+        minutes, seconds = divmod(round(progress["seconds_left"]), 60)
+        hours, minutes = divmod(minutes, 60)
+        parts.append(f"Remaining:{f'{hours}:' if hours else ''}{minutes:02d}:{seconds:02d}")
+    parts += [layer, f"Sample {progress['samples']:.0f}/{samples}"]
+    if progress["photons"]:
+        parts.append(f"{progress['photons'] / 1e6:.1f} M photons")
+    parts.append(f"{progress['rays_per_second'] / 1e6:.1f} Mrays/s")
+    return " | ".join(parts)
+
+
+def _follow(engine, request, layer, samples, preview):
+    """Shows progress until the request ends; ends it if the artist cancels. Arguments as for status."""
+    engine.update_stats("", f"{layer} | Loading")
     while request.code is None:
         for event in request.events(_POLL_SECONDS):
             if event.get("event") == "preview" and preview is not None:
                 preview.refresh()
             if event.get("event") == "progress":
                 engine.update_progress(event["fraction"])
-                left = event.get("seconds_left")
-                remaining = f" | {left:.0f} s left" if left is not None else ""
-                rays = event.get("rays_per_second") or 0
-                photons = f" | {event['photons'] / 1e6:.1f} M photons" if event.get("photons") else ""
-                engine.update_stats("", f"Sample {event['samples']:g}{photons} | {rays / 1e6:.1f} Mrays/s{remaining}")
+                engine.update_stats("", status(event, layer, samples))
         if request.code is None and engine.test_break():
             _cancel(request)
             return

@@ -181,7 +181,7 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
     )
     threads: IntProperty(
         name="Threads",
-        description="Threads to use; 0 is one for each processor (default 0)",
+        description="Threads to use; 0 is what Blender's own setting says, one for each processor at first (default 0)",
         default=0,
         min=0,
         max=1024,

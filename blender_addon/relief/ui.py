@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Panels, where a Cycles user looks for them. Those of Blender that make sense for any engine are shared."""
+"""Panels, where a Cycles user looks for them. Those of Blender that make sense for any engine are shared.
 
+tests/blender/ui_test.py compares them with those of Cycles, setting by setting, and has the reason of each that is missing.
+"""
+
+import sys
 import textwrap
 
 import bpy
 
 from . import compat
-from .export.displacement import has_displacement_node, needs_switch
+from .export.displacement import needs_switch
+from .export.nodes import active_output
+from .export.objects import GEOMETRY_TYPES
 from .export.settings import cycles_settings
 from .preferences import find_checked_binary
 from .report import ReliefError, group, last_coverage, last_warnings, total
@@ -14,7 +20,7 @@ from .result import CRYPTOMATTES, PASSES
 
 _ENGINE = "RELIEF"
 
-#: Panels made for Blender's own engines of which relief knows nothing.
+#: Panels made for Blender's own engines in whose place relief has others, or of which it knows nothing.
 _FOREIGN_PANELS = {
     "DATA_PT_area",
     "DATA_PT_camera_dof",
@@ -24,11 +30,17 @@ _FOREIGN_PANELS = {
     "DATA_PT_spot",
     "NODE_DATA_PT_light",
     "OBJECT_PT_shading",
-    "RENDER_PT_freestyle",
     "RENDER_PT_simplify",
     "VIEWLAYER_PT_filter",
     "VIEWLAYER_PT_layer_passes",
 }
+
+#: Panels that Blender keeps for its own engines, but that are of use to every one: Cycles has a copy of each.
+_BORROWED_PANELS = {"EEVEE_MATERIAL_PT_context_material", "MATERIAL_PT_preview"}
+
+#: Modules whose cycles_shader_nodes_poll(context) tells which nodes the Add menu of the shader editor offers: before 4.0, and
+#: since.
+_NODE_MENUS = ("nodeitems_builtins", "bl_ui.node_add_menu_shader")
 
 
 class _Panel:
@@ -46,6 +58,42 @@ class _Panel:
         self.layout.use_property_split = True
         self.layout.use_property_decorate = False
         return self.layout.column()
+
+
+def _panel_of(member):
+    """Base of panels that are there while the properties editor shows something.
+
+    @param  member  of the context, such as "world"
+    """
+
+    class Panel(_Panel):
+        @classmethod
+        def poll(cls, context):
+            shown = getattr(context, member)
+            # The materials of grease pencils are drawn by no engine.
+            return super().poll(context) and shown is not None and not getattr(shown, "grease_pencil", None)
+
+    return Panel
+
+
+_MaterialPanel, _WorldPanel, _LightPanel, _CameraPanel, _ObjectPanel = map(
+    _panel_of, ("material", "world", "light", "camera", "object")
+)
+
+
+def _like(panel, name, **own):
+    """The class of a panel that shows the same as another elsewhere.
+
+    @param  own  what differs
+    """
+    members = {key: value for key, value in vars(panel).items() if key not in {"bl_rna", "__dict__", "__weakref__"}}
+    return type(name, panel.__bases__, {**members, **own})
+
+
+def _in_node_editor(panel):
+    """The same beside the nodes."""
+    own = {"bl_space_type": "NODE_EDITOR", "bl_region_type": "UI", "bl_category": "Options"}
+    return _like(panel, f"NODE_{panel.__name__}", **own)
 
 
 class _RenderPanel(_Panel):
@@ -173,8 +221,34 @@ class RELIEF_PT_film(_RenderPanel, bpy.types.Panel):
         if cycles is None or cycles.pixel_filter_type != "BOX":
             rows.prop(settings if cycles is None else cycles, "filter_width")
         rows.prop(context.scene.render, "film_transparent")
-        if hasattr(context.scene, "cycles"):
-            rows.prop(context.scene.cycles, "film_exposure")
+        own = getattr(context.scene, "cycles", None)
+        if own is not None:
+            row = rows.row()
+            row.active = context.scene.render.film_transparent
+            row.prop(own, "film_transparent_glass")
+            row = rows.row()
+            row.active = context.scene.render.film_transparent and own.film_transparent_glass
+            row.prop(own, "film_transparent_roughness", text="Roughness Threshold")
+            rows.prop(own, "film_exposure")
+
+
+class RELIEF_PT_simplify(_RenderPanel, bpy.types.Panel):
+    bl_label = "Simplify"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context):
+        self.layout.prop(context.scene.render, "use_simplify", text="")
+
+    def draw(self, context):
+        pass
+
+
+def _simplify_panels():
+    """What Blender has below its own panel Simplify, which would stand above all of relief's."""
+    for panel in bpy.types.Panel.__subclasses__():
+        if getattr(panel, "bl_parent_id", "") == "RENDER_PT_simplify" and "BLENDER_RENDER" in panel.COMPAT_ENGINES:
+            name = panel.__name__.replace("RENDER_PT", "RELIEF_PT")
+            yield _like(panel, name, bl_parent_id="RELIEF_PT_simplify", COMPAT_ENGINES={_ENGINE})
 
 
 class RELIEF_PT_motion_blur(_RenderPanel, bpy.types.Panel):
@@ -191,9 +265,6 @@ class RELIEF_PT_motion_blur(_RenderPanel, bpy.types.Panel):
         if owner is not None:
             rows.prop(owner, "motion_blur_position", text="Position")
         rows.prop(render, "motion_blur_shutter")
-        cycles = getattr(context.object, "cycles", None)
-        if cycles is not None:
-            rows.prop(cycles, "motion_steps", text="Steps of the Active Object")
 
 
 class RELIEF_PT_performance(_RenderPanel, bpy.types.Panel):
@@ -201,15 +272,49 @@ class RELIEF_PT_performance(_RenderPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        settings, rows = context.scene.relief, self.rows()
-        rows.prop(settings, "threads")
+        settings, render, rows = context.scene.relief, context.scene.render, self.rows()
+        if settings.threads > 0:  # files from before Blender's own setting was used
+            rows.prop(settings, "threads")
+        else:
+            rows.prop(render, "threads_mode")
+            row = rows.row()
+            row.active = render.threads_mode == "FIXED"
+            row.prop(render, "threads")
         rows.prop(settings, "texture_memory")
         rows.prop(settings, "strict")
 
 
-class RELIEF_PT_passes(_Panel, bpy.types.Panel):
-    bl_label = "Passes"
+class _LayerPanel(_Panel):
     bl_context = "view_layer"
+
+
+class RELIEF_PT_filter(_LayerPanel, bpy.types.Panel):
+    bl_label = "Filter"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layer, rows = context.view_layer, self.rows()
+        rows.prop(layer, "use_sky", text="Environment")
+        rows.prop(layer, "use_solid", text="Surfaces")
+        row = rows.row()
+        row.active = context.scene.render.use_motion_blur
+        row.prop(layer, "use_motion_blur", text="Motion Blur")
+
+
+class RELIEF_PT_override(_LayerPanel, bpy.types.Panel):
+    bl_label = "Override"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layer, rows = context.view_layer, self.rows()
+        rows.prop(layer, "material_override")
+        if hasattr(layer, "world_override"):
+            rows.prop(layer, "world_override")
+        rows.prop(layer, "samples")
+
+
+class RELIEF_PT_passes(_LayerPanel, bpy.types.Panel):
+    bl_label = "Passes"
 
     def draw(self, context):
         layer, rows = context.view_layer, self.rows()
@@ -227,17 +332,14 @@ class RELIEF_PT_passes(_Panel, bpy.types.Panel):
                 rows.prop(layer.relief, name)
 
 
-class RELIEF_PT_material_surface(_Panel, bpy.types.Panel):
+class RELIEF_PT_material_surface(_MaterialPanel, bpy.types.Panel):
     bl_label = "Surface"
     bl_context = "material"
 
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and context.material is not None
-
     def draw(self, context):
         material, layout = context.material, self.layout
-        layout.prop(material, "use_nodes", icon="NODETREE")
+        if not compat.IS_5_0:  # since then materials have nodes always
+            layout.prop(material, "use_nodes", icon="NODETREE")
         if material.use_nodes:
             _draw_coverage(layout, last_coverage.get(context.scene.name, {}).get(material.name))
             _draw_output(layout, material.node_tree, "ShaderNodeOutputMaterial", "Surface")
@@ -245,34 +347,62 @@ class RELIEF_PT_material_surface(_Panel, bpy.types.Panel):
             layout.prop(material, "diffuse_color", text="Base Color")
 
 
-class RELIEF_PT_material_displacement(_Panel, bpy.types.Panel):
-    bl_label = "relief Displacement"
+class _MaterialNodesPanel(_MaterialPanel):
     bl_context = "material"
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and context.material is not None and has_displacement_node(context.material)
+        return super().poll(context) and context.material.use_nodes
+
+
+class RELIEF_PT_material_volume(_MaterialNodesPanel, bpy.types.Panel):
+    bl_label = "Volume"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        _draw_output(self.layout, context.material.node_tree, "ShaderNodeOutputMaterial", "Volume")
+
+
+class RELIEF_PT_material_displacement(_MaterialNodesPanel, bpy.types.Panel):
+    bl_label = "Displacement"
 
     def draw(self, context):
         material, rows = context.material, self.rows()
-        rows.prop(compat.displacement_owner(material), "displacement_method", text="Displacement")
+        owner = compat.displacement_owner(material)
+        if owner is not None:
+            rows.prop(owner, "displacement_method", text="Displacement")
         if needs_switch(material):
             rows.label(text="Bump Only: it bends normals, but moves nothing", icon="INFO")
             rows.operator("relief.displace")
         _draw_output(self.layout, material.node_tree, "ShaderNodeOutputMaterial", "Displacement")
 
 
-class RELIEF_PT_world(_Panel, bpy.types.Panel):
+class RELIEF_PT_material_settings(_MaterialPanel, bpy.types.Panel):
+    bl_label = "Settings"
+    bl_context = "material"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        self.rows().prop(context.material, "pass_index")
+
+
+class RELIEF_PT_world_preview(_WorldPanel, bpy.types.Panel):
+    bl_label = "Preview"
+    bl_context = "world"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        self.layout.template_preview(context.world)
+
+
+class RELIEF_PT_world(_WorldPanel, bpy.types.Panel):
     bl_label = "Surface"
     bl_context = "world"
 
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and context.world is not None
-
     def draw(self, context):
         world, layout = context.world, self.layout
-        layout.prop(world, "use_nodes", icon="NODETREE")
+        if not compat.IS_5_0:
+            layout.prop(world, "use_nodes", icon="NODETREE")
         if world.use_nodes:
             _draw_output(layout, world.node_tree, "ShaderNodeOutputWorld", "Surface")
         else:
@@ -280,48 +410,129 @@ class RELIEF_PT_world(_Panel, bpy.types.Panel):
         self.rows().prop(world.relief, "caustic_light")
 
 
-class RELIEF_PT_light(_Panel, bpy.types.Panel):
-    bl_label = "Light"
-    bl_context = "data"
+class RELIEF_PT_world_ray_visibility(_WorldPanel, bpy.types.Panel):
+    bl_label = "Ray Visibility"
+    bl_context = "world"
+    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and context.light is not None
+        return super().poll(context) and compat.world_visibility(context.world, "camera") is not None
 
     def draw(self, context):
-        light, rows = context.light, self.rows()
-        rows.prop(light, "type", expand=False)
-        rows.prop(light, "color")
-        rows.prop(light, "energy", text="Strength" if light.type == "SUN" else "Power")
-        if light.type == "SUN":
-            rows.prop(light, "angle")
-        elif light.type == "AREA":
-            rows.prop(light, "shape")
-            rows.prop(light, "size")
-            if light.shape in {"RECTANGLE", "ELLIPSE"}:
-                rows.prop(light, "size_y")
-        else:
-            rows.prop(light, "shadow_soft_size", text="Radius")
-        if light.type == "SPOT":
-            rows.prop(light, "spot_size")
-            rows.prop(light, "spot_blend")
+        rows = self.rows()
+        for ray in ("camera", "diffuse", "glossy", "transmission"):
+            rows.prop(*compat.world_visibility(context.world, ray))
 
 
-class RELIEF_PT_object_visibility(_Panel, bpy.types.Panel):
-    bl_label = "Visibility"
-    bl_context = "object"
+class RELIEF_PT_world_mist(_WorldPanel, bpy.types.Panel):
+    bl_label = "Mist Pass"
+    bl_context = "world"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        shown, rows = context.object, self.rows()
-        rows.prop(shown, "hide_render", text="Renders", invert_checkbox=True)
-        rows.prop(shown, "visible_camera", text="Camera")
-        rows.prop(shown, "visible_shadow", text="Shadow")
+        mist, rows = context.world.mist_settings, self.rows()
+        rows.prop(mist, "start")
+        rows.prop(mist, "depth")
+        rows.prop(mist, "falloff")
 
 
-class RELIEF_PT_object_caustics(_Panel, bpy.types.Panel):
-    bl_label = "Caustics"
+class RELIEF_PT_light(_LightPanel, bpy.types.Panel):
+    bl_label = "Light"
+    bl_context = "data"
+
+    def draw(self, context):
+        light = context.light
+        is_beside_nodes = self.bl_space_type != "PROPERTIES"
+        self.layout.row().prop(light, "type", expand=not is_beside_nodes)
+        rows = self.rows()
+        rows.prop(light, "color")
+        for name in ("use_temperature", "temperature"):
+            if hasattr(light, name):
+                rows.prop(light, name)
+        rows.prop(light, "energy", text="Strength" if light.type == "SUN" else "Power")
+        for name in ("exposure", "normalize"):
+            if hasattr(light, name):
+                rows.prop(light, name)
+        if light.type == "SUN":
+            rows.prop(light, "angle")
+        elif light.type == "AREA":
+            self._draw_area(light, rows)
+        else:
+            if hasattr(light, "use_soft_falloff"):
+                rows.prop(light, "use_soft_falloff")
+            rows.prop(light, "shadow_soft_size", text="Radius")
+        if light.type == "SPOT":
+            rows.prop(light, "spot_size")
+            rows.prop(light, "spot_blend", slider=True)
+            rows.prop(light, "show_cone")
+
+    @staticmethod
+    def _draw_area(light, rows):
+        rows.prop(light, "shape")
+        is_uneven = light.shape in {"RECTANGLE", "ELLIPSE"}
+        rows.prop(light, "size", text="Size X" if is_uneven else "Size")
+        if is_uneven:
+            rows.prop(light, "size_y", text="Y")
+        rows.prop(light, "spread")
+        if hasattr(light, "cycles"):
+            rows.prop(light.cycles, "is_portal")
+
+
+class RELIEF_PT_light_nodes(_LightPanel, bpy.types.Panel):
+    bl_label = "Nodes"
+    bl_context = "data"
+
+    def draw(self, context):
+        light, layout = context.light, self.layout
+        layout.prop(light, "use_nodes", icon="NODETREE")
+        if light.use_nodes:
+            _draw_output(layout, light.node_tree, "ShaderNodeOutputLight", "Surface")
+
+
+class RELIEF_PT_object_motion_blur(_ObjectPanel, bpy.types.Panel):
+    bl_label = "Motion Blur"
     bl_context = "object"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and hasattr(context.object, "cycles") and context.object.type != "LIGHT"
+
+    def draw_header(self, context):
+        self.layout.active = context.scene.render.use_motion_blur
+        self.layout.prop(context.object.cycles, "use_motion_blur", text="")
+
+    def draw(self, context):
+        cycles, rows = context.object.cycles, self.rows()
+        rows.active = context.scene.render.use_motion_blur and cycles.use_motion_blur
+        rows.prop(cycles, "motion_steps", text="Steps")
+        if context.object.type != "CAMERA":
+            rows.prop(cycles, "use_deform_motion", text="Deformation")
+
+
+class _SeenObjectPanel(_ObjectPanel):
+    bl_context = "object"
+
+    @classmethod
+    def poll(cls, context):
+        shown = context.object
+        return super().poll(context) and (shown.type in {"LIGHT", *GEOMETRY_TYPES} or shown.is_instancer)
+
+
+class RELIEF_PT_object_ray_visibility(_SeenObjectPanel, bpy.types.Panel):
+    bl_label = "Ray Visibility"
+    bl_parent_id = "OBJECT_PT_visibility"
+
+    def draw(self, context):
+        shown, rows = context.object, self.rows()
+        for ray in ("camera", "diffuse", "glossy", "transmission", "shadow"):
+            if ray != "shadow" or shown.type != "LIGHT":
+                rows.prop(shown, f"visible_{ray}", text=ray.capitalize())
+
+
+class RELIEF_PT_object_caustics(_SeenObjectPanel, bpy.types.Panel):
+    bl_label = "Caustics"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
@@ -332,13 +543,9 @@ class RELIEF_PT_object_caustics(_Panel, bpy.types.Panel):
         rows.prop(settings, "caustic_light")
 
 
-class RELIEF_PT_camera_dof(_Panel, bpy.types.Panel):
+class RELIEF_PT_camera_dof(_CameraPanel, bpy.types.Panel):
     bl_label = "Depth of Field"
     bl_context = "data"
-
-    @classmethod
-    def poll(cls, context):
-        return super().poll(context) and context.camera is not None
 
     def draw_header(self, context):
         self.layout.prop(context.camera.dof, "use_dof", text="")
@@ -347,8 +554,11 @@ class RELIEF_PT_camera_dof(_Panel, bpy.types.Panel):
         dof, rows = context.camera.dof, self.rows()
         rows.active = dof.use_dof
         rows.prop(dof, "focus_object")
+        target = dof.focus_object
+        if target is not None and target.type == "ARMATURE":
+            rows.prop_search(dof, "focus_subtarget", target.data, "bones", text="Focus Bone")
         row = rows.row()
-        row.active = dof.focus_object is None
+        row.active = target is None
         row.prop(dof, "focus_distance")
         rows.prop(dof, "aperture_fstop")
 
@@ -360,16 +570,28 @@ _classes = (
     RELIEF_PT_light_paths,
     RELIEF_PT_displacement,
     RELIEF_PT_film,
+    RELIEF_PT_simplify,
+    *_simplify_panels(),
     RELIEF_PT_motion_blur,
     RELIEF_PT_performance,
+    RELIEF_PT_filter,
+    RELIEF_PT_override,
     RELIEF_PT_passes,
     RELIEF_PT_material_surface,
+    RELIEF_PT_material_volume,
     RELIEF_PT_material_displacement,
+    RELIEF_PT_material_settings,
+    RELIEF_PT_world_preview,
     RELIEF_PT_world,
+    RELIEF_PT_world_mist,
+    RELIEF_PT_world_ray_visibility,
     RELIEF_PT_light,
-    RELIEF_PT_object_visibility,
+    RELIEF_PT_light_nodes,
+    RELIEF_PT_object_motion_blur,
+    RELIEF_PT_object_ray_visibility,
     RELIEF_PT_object_caustics,
     RELIEF_PT_camera_dof,
+    *map(_in_node_editor, (RELIEF_PT_light, RELIEF_PT_material_settings, RELIEF_PT_world_ray_visibility)),
 )
 
 
@@ -414,7 +636,7 @@ def _draw_coverage(layout, coverage):
 
 def _draw_output(layout, tree, idname, socket_name):
     """The nodes behind one socket of a tree's output, as Blender draws them."""
-    node = next((n for n in tree.nodes if n.bl_idname == idname and n.is_active_output), None)
+    node = active_output(tree, idname)
     if node is None:
         layout.label(text="No output node")
         return
@@ -425,8 +647,36 @@ def _shared_panels():
     """Blender's panels that any engine of nodes and render results can use."""
     for panel in bpy.types.Panel.__subclasses__():
         engines = getattr(panel, "COMPAT_ENGINES", ())
-        if "BLENDER_RENDER" in engines and panel.__name__ not in _FOREIGN_PANELS:
+        if "BLENDER_RENDER" in engines and panel.__name__ not in _FOREIGN_PANELS or panel.__name__ in _BORROWED_PANELS:
             yield panel
+
+
+def _offer_nodes():
+    """Has the shader editor's Add menu offer what it offers for Cycles: Blender asks for the engine by its name there."""
+    for module in filter(None, map(sys.modules.get, _NODE_MENUS)):
+        ask = getattr(module, "cycles_shader_nodes_poll", None)
+        if ask is not None:
+
+            def offers(context, ask=ask):
+                return context.engine == _ENGINE or ask(context)
+
+            offers.before = ask
+            module.cycles_shader_nodes_poll = offers
+
+
+def _withdraw_nodes():
+    """Undoes what _offer_nodes does."""
+    for module in filter(None, map(sys.modules.get, _NODE_MENUS)):
+        before = getattr(getattr(module, "cycles_shader_nodes_poll", None), "before", None)
+        if before is not None:
+            module.cycles_shader_nodes_poll = before
+
+
+def _draw_indirect_only(menu, context):
+    """What Blender's menu of collections in the outliner has for Cycles alone."""
+    if context.engine == _ENGINE:
+        menu.layout.operator("outliner.collection_indirect_only_set")
+        menu.layout.operator("outliner.collection_indirect_only_clear")
 
 
 def register():
@@ -434,9 +684,13 @@ def register():
         bpy.utils.register_class(cls)
     for panel in _shared_panels():
         panel.COMPAT_ENGINES.add(_ENGINE)
+    bpy.types.OUTLINER_MT_collection_view_layer.append(_draw_indirect_only)
+    _offer_nodes()
 
 
 def unregister():
+    _withdraw_nodes()
+    bpy.types.OUTLINER_MT_collection_view_layer.remove(_draw_indirect_only)
     for panel in _shared_panels():
         panel.COMPAT_ENGINES.discard(_ENGINE)
     for cls in reversed(_classes):

@@ -88,8 +88,8 @@ class Viewport:
         exporter = SceneExporter(depsgraph, GltfWriter(self._folder, DATA_FOLDER), warnings, self._meshes)
         exporter.add_all(final.any_view((1, 1)))
         self._binary = find_checked_binary()
-        sampling = sampling_of(scene)
-        self._options = final.command_line(scene)
+        sampling = sampling_of(scene, depsgraph.view_layer)
+        self._options = final.command_line(scene, depsgraph.view_layer)
         self._most_samples = sampling.preview_samples
         self._seed = sampling.seed
         self._is_transparent = scene.render.film_transparent

@@ -1,5 +1,7 @@
 """Lenses: framing, shift, sensor fit, depth of field and clipping are Cycles' own."""
 
+import bpy
+
 from scenes import (
     add_camera,
     add_plane,
@@ -100,6 +102,19 @@ def test_depth_of_field_on_an_object():
     scene, camera = _stage(64, 40, lens=50)
     _focus(camera, 0.08)
     camera.data.dof.focus_object = next(o for o in scene.objects if o.location.y == 1 and o.location.x == 1)
+    assert_agrees(scene, block=4, samples=128)
+
+
+def test_depth_of_field_on_a_bone():
+    scene, camera = _stage(64, 40, lens=50)
+    _focus(camera, 0.08)
+    bpy.ops.object.armature_add(location=(0, 6, 0))
+    armature = bpy.context.object
+    bpy.ops.object.mode_set(mode="EDIT")
+    bone = armature.data.edit_bones.new("far")
+    bone.head, bone.tail = (0, -4, 0), (0, -4, 1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    camera.data.dof.focus_object, camera.data.dof.focus_subtarget = armature, "far"
     assert_agrees(scene, block=4, samples=128)
 
 

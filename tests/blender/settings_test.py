@@ -70,8 +70,8 @@ def test_cycles_settings_are_taken_over():
         "pixelFilter": {"type": "blackman-harris", "width": 3.0},
     }
     assert {key: found[key] for key in expected} == expected and not warnings, (found, warnings)
-    assert "--time-limit 33" in " ".join(final.command_line(scene))
-    assert sampling_of(scene).preview_samples == 16777216  # Cycles' 0 is no end
+    assert "--time-limit 33" in " ".join(final.command_line(scene, scene.view_layers[0]))
+    assert sampling_of(scene, scene.view_layers[0]).preview_samples == 16777216  # Cycles' 0 is no end
     cycles.adaptive_threshold = 0  # Cycles chooses
     assert _exported(scene)[0]["noiseThreshold"] == 1 / 77
     cycles.use_adaptive_sampling = False
@@ -96,6 +96,61 @@ def test_what_cycles_alone_can_do_is_warned_about():
     assert abs(found["pixelFilter"]["width"] - 2.7075) < 1e-3, found
     for text in ("Clamp Direct", "Gaussian"):
         assert any(text in warning for warning in warnings), warnings
+
+
+def test_what_changes_cycles_picture_alone_is_warned_about():
+    from relief.export.settings import warn_unread_settings
+
+    def said():
+        texts = []
+        warn_unread_settings(scene, lambda *text: texts.append("; ".join(text)))
+        return texts
+
+    scene = _fresh_scene()
+    scene.relief.use_cycles_settings = True
+    cycles, lamp, ball = scene.cycles, add_light("POINT"), add_sphere()
+    set_world((1, 1, 1))
+    for owner, name, value, text in (
+        (cycles, "use_fast_gi", True, "Fast GI"),
+        (cycles, "caustics_reflective", False, "reflective caustics"),
+        (cycles, "caustics_refractive", False, "refractive caustics"),
+        (lamp.data.cycles, "max_bounces", 1, f'light "{lamp.data.name}"'),
+        (scene.world.cycles, "max_bounces", 1, "the world"),
+    ):
+        assert not said(), said()
+        before = getattr(owner, name)
+        setattr(owner, name, value)
+        assert len(said()) == 1 and text in said()[0], (name, said())
+        setattr(owner, name, before)
+    ball.cycles.use_camera_cull = cycles.use_camera_cull = True
+    cycles.texture_limit_render = "256"
+    assert not said(), said()  # Simplify is off
+    scene.render.use_simplify = True
+    assert len(said()) == 2 and "Camera Culling" in said()[0] and "Texture Limit" in said()[1], said()
+
+
+def test_threads_are_blenders_own():
+    from relief import final
+
+    scene = _fresh_scene()
+    layer = scene.view_layers[0]
+    assert "--threads" not in final.command_line(scene, layer)
+    scene.render.threads_mode, scene.render.threads = "FIXED", 3
+    assert "--threads 3" in " ".join(final.command_line(scene, layer))
+    scene.relief.threads = 2
+    assert "--threads 2" in " ".join(final.command_line(scene, layer))
+
+
+def test_the_status_line_has_what_cycles_has():
+    from relief.final import status
+
+    progress = {"fraction": 0.25, "samples": 16, "photons": 0, "seconds": 40.0, "seconds_left": 125.4}
+    progress |= {"rays_per_second": 2.5e6, "memory_bytes": 3 << 20, "peak_memory_bytes": 5 << 20}
+    text = status(progress, "Scene, ViewLayer", 64)
+    assert text.split(" | ")[:2] == ["Remaining:02:05", "Scene, ViewLayer"], text
+    assert "Sample 16/64" in text, text
+    assert status({**progress, "seconds_left": 3725}, "", 64).startswith("Remaining:1:02:05")
+    assert "Remaining" not in status({**progress, "fraction": 0}, "", 64)  # nothing tells yet
 
 
 def test_own_settings_are_kept():

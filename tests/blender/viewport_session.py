@@ -155,6 +155,21 @@ def _panels():
             area.type = "PROPERTIES"
 
 
+def _watch_previews():
+    """Notes the colour in the middle of the first icon that Blender has the engine render: the Material tab's."""
+    from relief import preview
+
+    show = preview.result.show
+
+    def note(engine, picture, *arguments):
+        height, width = picture.height, picture.width
+        middle = picture.layer("R", "G", "B").reshape(height, width, 3)[height // 3 : -height // 3, width // 3 : -width // 3]
+        _seen.setdefault("preview", middle.mean(axis=(0, 1)).tolist())
+        show(engine, picture, *arguments)
+
+    preview.result.show = note
+
+
 def _warn():
     """Materials of several balls have what relief does not know; the Render tab is shown."""
     bpy.context.scene.relief.use_cycles_settings = True
@@ -215,7 +230,10 @@ def _steps():
     """What is done, one a timer's turn."""
     if _SESSION == "panels":
         yield _panels
+        yield _watch_previews
         for active, tab in (
+            ("light", "DATA"),
+            ("camera", "DATA"),
             ("ball", "RENDER"),
             ("ball", "OUTPUT"),
             ("ball", "VIEW_LAYER"),
@@ -224,10 +242,10 @@ def _steps():
             ("ball", "OBJECT"),
             ("ball", "DATA"),
             ("ball", "MATERIAL"),
-            ("light", "DATA"),
-            ("camera", "DATA"),
         ):
             yield _show_panels(active, tab)
+        while "preview" not in _seen:  # the test has a limit
+            yield lambda: None
         yield _finish
     if _SESSION == "warnings":
         yield _panels

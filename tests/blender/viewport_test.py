@@ -140,9 +140,12 @@ def test_f12_shows_the_picture_as_it_refines():
 
 
 def test_panels_draw():
-    """Every tab of the properties editor, for a mesh, a light and a camera: no panel fails."""
+    """Every tab of the properties editor, for a mesh, a light and a camera: no panel fails, and a red ball's icon is red."""
     with folder() as path:
         output = _run_session("panels", path)
         with open(f"{path}/seen.json", encoding="utf-8") as file:
-            assert len(json.load(file)) == 10
+            seen = json.load(file)
+    assert len(seen) == 11
+    red, green, blue = seen["preview"]
+    assert red > 1.8 * max(green, blue), seen["preview"]
     assert "rna_uiItemR" not in output and "Error" not in output, output

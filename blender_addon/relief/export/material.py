@@ -126,6 +126,8 @@ class MaterialJob:
         if displacement and compat.displacement_method(material) == "BUMP" and not settings.bump_displaces:
             self._bump_by(displacement)
         inside = self._export_surface(source, volume is not None)
+        if inside is Inside.OPEN and not compat.has_transparent_shadow(material):
+            self._warn("shadows without transparency", "they are as transparent as the material")
         self._write_volume(volume, inside)
         warned = self._displace(material, settings)
         if warned and displacement:

@@ -40,13 +40,13 @@ class Shutter:
         return {"shutter": self.frames, "shutterPosition": self.position, "shutterSteps": self.steps}
 
 
-def shutter_of(scene, warn):
-    """Shutter of a scene; None if it is closed.
+def shutter_of(scene, view_layer, warn):
+    """Shutter of a scene's view layer; None if it is closed.
 
     @param  warn  called with what is not understood, and what was used instead
     """
     render = scene.render
-    if not render.use_motion_blur or render.motion_blur_shutter <= 0:
+    if not (render.use_motion_blur and view_layer.use_motion_blur) or render.motion_blur_shutter <= 0:
         return None
     if compat.is_rolling_shutter(scene):
         warn("a rolling shutter", "all of the picture is exposed at once")

@@ -4,6 +4,7 @@
 import contextlib
 import math
 import sys
+import threading
 from dataclasses import dataclass
 
 import bpy
@@ -44,21 +45,25 @@ _DEEPEST = 30000
 
 _tables = None
 
+#: Held while trees are read: a preview or the viewport may be exported while a picture is.
+_one_reader = threading.RLock()
+
 
 @contextlib.contextmanager
 def reading():
     """While no tree changes: links are looked up in tables, where Blender goes through all of a tree, and long chains are
     followed to their end."""
     global _tables
-    before, deepest = _tables, sys.getrecursionlimit()
-    _tables = {}
-    if sys.version_info >= (3, 11):  # before, each frame takes of the thread's stack
-        sys.setrecursionlimit(max(deepest, _DEEPEST))
-    try:
-        yield
-    finally:
-        _tables = before
-        sys.setrecursionlimit(deepest)
+    with _one_reader:
+        before, deepest = _tables, sys.getrecursionlimit()
+        _tables = {}
+        if sys.version_info >= (3, 11):  # before, each frame takes of the thread's stack
+            sys.setrecursionlimit(max(deepest, _DEEPEST))
+        try:
+            yield
+        finally:
+            _tables = before
+            sys.setrecursionlimit(deepest)
 
 
 def _link(socket):

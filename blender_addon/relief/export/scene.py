@@ -213,13 +213,15 @@ class SceneExporter:
         self.writer.extend(self.writer.json, "RELIEF_render", settings)
 
     def add_world(self):
-        is_opaque = not self._scene.render.film_transparent
-        world = compat.world_of(self._scene, self._depsgraph.view_layer)
+        is_opaque, layer = not self._scene.render.film_transparent, self._depsgraph.view_layer
+        world = compat.world_of(self._scene, layer) if layer.use_sky else None
         export_world(world, is_opaque, self.writer, self._images, self._report)
 
     def add_objects(self):
         """Adds meshes, instances and lights."""
         things = collect(self._depsgraph, self._report)
+        if not self._depsgraph.view_layer.use_solid:
+            things = [thing for thing in things if thing.kind != "geometry"]
         for key, thing in numbered(things):
             if thing.kind == "geometry":
                 self._add_geometry(thing, key)

@@ -48,17 +48,18 @@ def cycles_settings(scene):
     return getattr(scene, "cycles", None) if scene.relief.use_cycles_settings else None
 
 
-def sampling_of(scene):
-    """Sampling of a scene in its current frame."""
+def sampling_of(scene, view_layer):
+    """Sampling of a scene's view layer in its current frame."""
     cycles = cycles_settings(scene)
     if cycles is None:
-        return Sampling(**{name: getattr(scene.relief, name) for name in SHARED})
+        own = {name: getattr(scene.relief, name) for name in SHARED}
+        return Sampling(**{**own, "samples": view_layer.samples or own["samples"]})
     threshold = 0.0
     if cycles.use_adaptive_sampling:
         threshold = cycles.adaptive_threshold or max(_LEAST_THRESHOLD, 1 / cycles.samples)
     is_box = cycles.pixel_filter_type == "BOX"
     return Sampling(
-        samples=cycles.samples,
+        samples=_layer_samples(cycles, view_layer),
         preview_samples=cycles.preview_samples or _ENDLESS,
         noise_threshold=threshold,
         time_limit=cycles.time_limit,
@@ -74,6 +75,15 @@ def sampling_of(scene):
     )
 
 
+def _layer_samples(cycles, view_layer):
+    """Samples of a view layer: it may have a number of its own, and the scene may want that ignored or as a bound."""
+    if view_layer.samples <= 0 or cycles.use_layer_samples == "IGNORE":
+        return cycles.samples
+    if cycles.use_layer_samples == "BOUNDED":
+        return min(cycles.samples, view_layer.samples)
+    return view_layer.samples
+
+
 def _seed_of_frame(seed, frame):
     """A seed that tells nothing of those of other frames."""
     return zlib.crc32(f"{seed} {frame}".encode()) >> 1
@@ -87,6 +97,23 @@ def warn_unread_settings(scene, warn):
     cycles = cycles_settings(scene)
     if cycles is None:
         return
+    if cycles.use_fast_gi:
+        warn("Fast GI Approximation", "all bounces were traced")
+    for name in ("reflective", "refractive"):
+        if not getattr(cycles, f"caustics_{name}"):
+            warn(f"{name} caustics switched off for Cycles", "they are rendered: see Light Paths > Caustics")
+    if scene.render.use_simplify:
+        for name, label in (("use_camera_cull", "Camera Culling"), ("use_distance_cull", "Distance Culling")):
+            if getattr(cycles, name) and any(getattr(getattr(o, "cycles", None), name, False) for o in scene.objects):
+                warn(f"Simplify's {label}", "nothing was left out")
+        if cycles.texture_limit_render != "OFF":
+            warn("Simplify's Texture Limit", "textures have their full size")
+    lit = {o.data.name: o.data for o in scene.objects if o.type == "LIGHT"}
+    for name, light in lit.items():
+        if light.cycles.max_bounces < cycles.max_bounces:
+            warn(f'Max Bounces of light "{name}"', "it lights all bounces")
+    if scene.world is not None and scene.world.cycles.max_bounces < cycles.max_bounces:
+        warn("Max Bounces of the world", "it lights all bounces")
     if cycles.sample_clamp_direct > 0:
         warn("Clamp Direct", "direct light was not clamped")
     if cycles.pixel_filter_type == "GAUSSIAN":
@@ -100,7 +127,7 @@ def render_settings(scene, view_layer, size):
     @param  view_layer  of the picture
     @param  size        (width, height) of the whole picture in pixels
     """
-    sampling = sampling_of(scene)
+    sampling = sampling_of(scene, view_layer)
     return {
         **_pass_settings(compat.world_of(scene, view_layer), view_layer),
         "filmExposure": compat.film_exposure(scene),
