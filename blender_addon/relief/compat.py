@@ -252,6 +252,18 @@ def is_portal(light):
     return light.type == "AREA" and getattr(getattr(light, "cycles", None), "is_portal", False)
 
 
+def dicing_modifier(shown, scene):
+    """The Subdivision modifier of an object that Cycles dices to the picture; None: there is none. Experimental before 5.0."""
+    last = shown.modifiers[-1] if shown.modifiers else None
+    if last is None or last.type != "SUBSURF" or not last.show_render:
+        return None
+    if IS_5_0:
+        return last if last.use_adaptive_subdivision else None
+    cycles = getattr(scene, "cycles", None)
+    is_on = cycles is not None and cycles.feature_set == "EXPERIMENTAL" and shown.cycles.use_adaptive_subdivision
+    return last if is_on else None
+
+
 def light_energy(light):
     """Blender's power of a light: watts, for a sun W/m². Since 4.5 lights have an exposure besides."""
     return light.energy * 2.0 ** getattr(light, "exposure", 0.0)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from . import unread
 from .instance_values import Place, are_read
 
 #: Objects that Blender can turn into a mesh.
@@ -20,7 +21,10 @@ _FLAT = 1e-6
 _THICKNESS = 1e-4
 
 #: Evaluated objects that have nothing to render.
-_SILENT_TYPES = {"CAMERA", "EMPTY", "ARMATURE", "LATTICE", "SPEAKER"}
+_SILENT_TYPES = {"CAMERA", "EMPTY", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE"}
+
+#: Those that Blender draws over the picture of any engine.
+_DRAWN_TYPES = {"GPENCIL", "GREASEPENCIL"}
 
 
 @dataclass(frozen=True)
@@ -76,8 +80,9 @@ def collect(depsgraph, report):
         shown = instance.object
         kind = "geometry" if shown.type in GEOMETRY_TYPES else "light" if shown.type == "LIGHT" else None
         if kind is None:
-            if shown.type not in _SILENT_TYPES:
-                report.warn(f'object "{shown.name}"', f"objects of type {shown.type.lower()}", "it is left out")
+            if shown.type not in _SILENT_TYPES | _DRAWN_TYPES:
+                what = unread.KINDS.get(shown.type, f"objects of type {shown.type.lower()}")
+                report.warn(f'object "{shown.name}"', what, "it is left out")
             continue
         if not (instance.show_self if not instance.is_instance else True):
             continue

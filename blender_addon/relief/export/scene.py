@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import compat
 from ..report import ReliefError
-from . import instance_values
+from . import instance_values, unread
 from .axes import GLTF_FROM_BLENDER
 from .gltf import GltfWriter, matrix_property
 from .image import ImageExporter
@@ -343,6 +343,7 @@ class SceneExporter:
         if not original.visible_shadow:
             settings["castsShadow"] = False
         warn = self._warner("object", original.name)
+        unread.warn_unread_of_object(original, self._scene, warn)
         _warn_visibility(original, warn)
         caustics = original.relief
         if caustics.caustic_caster != "auto":
@@ -425,6 +426,7 @@ class SceneExporter:
                 warn=self._warner("light", thing.name),
             )
             export_light(light, place)
+            unread.warn_unread_of_light(light, place.warn)
             _warn_visibility(original, place.warn)
             if not original.relief.caustic_light:
                 settings = node.setdefault("extensions", {}).get("RELIEF_object", {})

@@ -40,7 +40,7 @@ def _environment(world, writer, images, warn):
         return {"color": [max(0.0, c) for c in nodes.finite(tuple(world.color), "its colour", warn)]}
     output = nodes.active_output(world.node_tree, "ShaderNodeOutputWorld")
     if output and nodes.linked(output.inputs["Volume"]) is not None:
-        warn("a volume", "it is left out")
+        warn("a volume that fills the world", "it is left out, and with it that it dims what is far: all but near lamps")
     source = nodes.linked(output.inputs["Surface"]) if output else None
     if source is None:
         return {"color": [0.0, 0.0, 0.0]}

@@ -1,0 +1,131 @@
+"""Nothing of a file is lost without a word: what relief does not read is warned about, once, and what it reads is as in Cycles."""
+
+import bpy
+
+from scenes import (
+    IS_5_0,
+    add_camera,
+    add_group_socket,
+    add_light,
+    add_plane,
+    add_sphere,
+    degrees,
+    diffuse,
+    folder,
+    link,
+    new_material,
+    new_scene,
+    render,
+    set_world,
+)
+
+
+def _stage():
+    scene = new_scene(48, 36)
+    set_world((0.3, 0.3, 0.3))
+    add_plane(8, diffuse((0.6, 0.5, 0.4)))
+    add_sphere(0.8, diffuse(), (0, 0, 0.8))
+    add_light("SUN", rotation=degrees(40, 20, 0), energy=2, angle=0.05)
+    add_camera((0, -6, 3.5), degrees(62, 0, 0), lens=35)
+    return scene
+
+
+def _warnings(scene):
+    from relief import report
+
+    scene.relief.strict, scene.relief.use_cycles_settings = False, True
+    with folder() as path:
+        render(scene, "RELIEF", f"{path}/picture.exr", samples=1)
+    return report.last_warnings[scene.name]
+
+
+def _assert_warned_once(change, *texts):
+    """Fails unless a change to the stage's scene adds one warning, which has some texts."""
+    scene = _stage()
+    assert not _warnings(scene), _warnings(scene)
+    change(scene)
+    found = _warnings(scene)
+    assert len(found) == 1 and all(text in found[0] for text in texts), found
+
+
+def _sphere():
+    return next(o for o in bpy.data.objects if o.name.startswith("Sphere"))
+
+
+def _owner(name, *owners):
+    return next(owner for owner in owners if hasattr(owner, name))
+
+
+def test_settings_of_things_that_change_cycles_picture_alone():
+    def dice(scene):
+        modifier = _sphere().modifiers.new("subdivision", "SUBSURF")
+        if IS_5_0:
+            modifier.use_adaptive_subdivision = True
+            return
+        scene.cycles.feature_set = "EXPERIMENTAL"
+        _sphere().cycles.use_adaptive_subdivision = True
+
+    def offset(_):
+        name = "shadow_terminator_geometry_offset"
+        setattr(_owner(name, _sphere().cycles, _sphere()), name, 0.5)
+
+    for change, *texts in (
+        (dice, "adaptive subdivision", "2"),
+        (offset, "shadow terminator"),
+        (lambda _: setattr(bpy.data.lights[0].cycles, "use_multiple_importance_sampling", False), "Multiple Importance"),
+    ):
+        _assert_warned_once(change, *texts)
+
+
+def test_fog_of_the_world_is_told():
+    def fill(scene):
+        tree = scene.world.node_tree
+        volume = tree.nodes.new("ShaderNodeVolumeScatter")
+        tree.links.new(volume.outputs[0], tree.nodes["World Output"].inputs["Volume"])
+
+    _assert_warned_once(fill, "world", "volume that fills the world", "dims what is far")
+
+
+def test_fog_of_objects_is_told_once_a_material():
+    def fill(_):
+        fog, tree, volume = new_material("fog", "ShaderNodeVolumePrincipled")
+        output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+        tree.links.remove(output.inputs["Surface"].links[0])
+        tree.links.new(volume.outputs[0], output.inputs["Volume"])
+        for x in (-2, 2):
+            add_sphere(0.5, fog, (x, 0, 0.5))
+
+    _assert_warned_once(fill, 'material "fog"', "as volume", "left out")
+
+
+def _made_by_nodes(kind):
+    """A sphere of which geometry nodes make something else."""
+    tree = bpy.data.node_groups.new("geometry", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        add_group_socket(tree, "Geometry", direction, "NodeSocketGeometry")
+    node = tree.nodes.new(kind)
+    tree.links.new(tree.nodes.new("NodeGroupInput").outputs[0], node.inputs[0])
+    tree.links.new(node.outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0])
+    add_sphere(0.5, location=(2, 0, 0.5)).modifiers.new("geometry", "NODES").node_group = tree
+
+
+def test_what_is_no_mesh_is_told():
+    _assert_warned_once(lambda _: _made_by_nodes("GeometryNodeMeshToPoints"), "object", "a point cloud", "left out")
+    _assert_warned_once(lambda _: _made_by_nodes("GeometryNodeMeshToVolume"), "object", "a volume object", "left out")
+    _assert_warned_once(lambda _: link(bpy.data.volumes.new("cloud"), "cloud"), "cloud", "a volume object", "left out")
+    _assert_warned_once(lambda _: link(bpy.data.hair_curves.new("fur"), "fur"), "fur", "hair curves", "left out")
+
+
+def test_subsurface_scattering_is_told_once_a_material():
+    def scatter(_):
+        skin = new_material("skin", "ShaderNodeSubsurfaceScattering")[0]
+        for x in (-2, 2):
+            add_sphere(0.5, skin, (x, 0, 0.5))
+
+    _assert_warned_once(scatter, 'material "skin"', "subsurface scattering", "diffuse")
+
+
+def test_light_probes_are_nothing():
+    scene = _stage()
+    bpy.ops.object.lightprobe_add(location=(0, 0, 3))
+    assert not _warnings(scene), _warnings(scene)
