@@ -264,9 +264,32 @@ def dicing_modifier(shown, scene):
     return last if is_on else None
 
 
-def light_energy(light):
-    """Blender's power of a light: watts, for a sun W/m². Since 4.5 lights have an exposure besides."""
-    return light.energy * 2.0 ** getattr(light, "exposure", 0.0)
+def light_energy(light, scale=(1.0, 1.0)):
+    """Blender's power of a light: watts, for a sun W/m². Since 4.5 lights have an exposure besides, and may mean what they are
+    given for a unit of what shines: the larger, the more.
+
+    @param  scale  of the light's object along X and Y, which area lights follow
+    """
+    energy = light.energy * 2.0 ** getattr(light, "exposure", 0.0)
+    return energy if getattr(light, "normalize", True) else energy * _shining_area(light, scale)
+
+
+def _shining_area(light, scale):
+    """What Cycles divides by where a light's power is for all of it; a sun has that of a disk a metre away."""
+    if light.type == "AREA":
+        area = light.size * scale[0] * (light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size) * scale[1]
+        return area * math.pi / 4 if light.shape in {"DISK", "ELLIPSE"} else area
+    if light.type == "SUN":
+        return math.pi * math.sin(light.angle / 2) ** 2 if light.angle > 0 else 1.0
+    return 4 * math.pi * light.shadow_soft_size**2 if light.shadow_soft_size > 0 else 4.0
+
+
+def light_color(light):
+    """A light's colour; since 4.5 it may be that of a black body, tinted."""
+    color = tuple(light.color)
+    if not getattr(light, "use_temperature", False):
+        return color
+    return tuple(a * b for a, b in zip(color, light.temperature_color))
 
 
 def faces_viewer(light):

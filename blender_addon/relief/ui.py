@@ -281,6 +281,9 @@ class RELIEF_PT_performance(_RenderPanel, bpy.types.Panel):
             row.active = render.threads_mode == "FIXED"
             row.prop(render, "threads")
         rows.prop(settings, "texture_memory")
+        for name in ("compositor_device", "compositor_precision"):
+            if hasattr(render, name):
+                rows.prop(render, name)
         rows.prop(settings, "strict")
 
 
@@ -296,6 +299,8 @@ class RELIEF_PT_filter(_LayerPanel, bpy.types.Panel):
         layer, rows = context.view_layer, self.rows()
         rows.prop(layer, "use_sky", text="Environment")
         rows.prop(layer, "use_solid", text="Surfaces")
+        if hasattr(layer, "use_grease_pencil"):
+            rows.prop(layer, "use_grease_pencil", text="Grease Pencil")
         row = rows.row()
         row.active = context.scene.render.use_motion_blur
         row.prop(layer, "use_motion_blur", text="Motion Blur")
@@ -560,6 +565,9 @@ class RELIEF_PT_camera_dof(_CameraPanel, bpy.types.Panel):
         row = rows.row()
         row.active = target is None
         row.prop(dof, "focus_distance")
+        if compat.IS_5_0:  # before, it picks what the pointer is over without being told what for
+            pick = row.operator("ui.eyedropper_depth", icon="EYEDROPPER", text="")
+            pick.prop_data_path = "scene.camera.data.dof.focus_distance"
         rows.prop(dof, "aperture_fstop")
 
 

@@ -179,6 +179,37 @@ def test_elliptic_area_with_scaled_object():
     assert_agrees(_stage(light), samples=128)
 
 
+def test_temperature_and_exposure():
+    """Which lights have since 4.5."""
+    if "temperature" not in bpy.types.Light.bl_rna.properties:
+        return
+
+    def add():
+        light = add_light("POINT", (1, -1, 3), energy=200, color=(1, 0.9, 0.8), shadow_soft_size=0.2).data
+        light.use_temperature, light.temperature, light.exposure = True, 3000, 0.5
+
+    assert_agrees(_stage(add))
+
+
+def test_powers_of_a_unit_of_area():
+    """What lights mean since 4.5 if they are not normalized."""
+    if "normalize" not in bpy.types.Light.bl_rna.properties:
+        return
+    for kind, settings in (
+        ("POINT", {"energy": 300, "shadow_soft_size": 0.3}),
+        ("POINT", {"energy": 50, "shadow_soft_size": 0.0}),
+        ("SPOT", {"energy": 300, "shadow_soft_size": 0.3, "spot_size": 1.0}),
+        ("SUN", {"energy": 100, "angle": 0.2}),
+        ("SUN", {"energy": 2, "angle": 0.0}),
+        ("AREA", {"energy": 30, "shape": "ELLIPSE", "size": 1.5, "size_y": 0.7}),
+    ):
+        def add(kind=kind, settings=settings):
+            light = add_light(kind, (0.3, -0.2, 3), normalize=False, **settings)
+            light.scale = (1.5, 1.2, 1.0) if kind == "AREA" else (1, 1, 1)
+
+        assert_agrees(_stage(add))
+
+
 def test_a_light_that_some_rays_do_not_see_is_warned_about():
     scene = _stage(lambda: setattr(add_light("POINT", energy=300), "visible_glossy", False))
     assert_warns(scene, 'light "light"', "hidden from glossy rays")

@@ -123,10 +123,14 @@ def test_what_changes_cycles_picture_alone_is_warned_about():
         assert len(said()) == 1 and text in said()[0], (name, said())
         setattr(owner, name, before)
     ball.cycles.use_camera_cull = cycles.use_camera_cull = True
-    cycles.texture_limit_render = "256"
     assert not said(), said()  # Simplify is off
     scene.render.use_simplify = True
-    assert len(said()) == 2 and "Camera Culling" in said()[0] and "Texture Limit" in said()[1], said()
+    assert len(said()) == 1, said()
+    if hasattr(cycles, "texture_resolution_render"):
+        cycles.texture_resolution_render = 0.25
+    else:
+        cycles.texture_limit_render = "256"
+    assert len(said()) == 2 and "Camera Culling" in said()[0] and "limit of textures" in said()[1], said()
 
 
 def test_threads_are_blenders_own():

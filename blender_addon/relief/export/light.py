@@ -53,14 +53,14 @@ class Place:
 
 def export_light(light, place):
     """Adds a bpy light to the node of its place."""
-    color, graph = tuple(light.color), None
+    color, graph = compat.light_color(light), None
     if light.use_nodes:
         factor = read_emission(light, place.random, place.writer, place.images, place.warn)
         if isinstance(factor, list):
             color = tuple(a * b for a, b in zip(color, factor))
         else:
             graph = factor
-    energy = compat.light_energy(light)
+    energy = compat.light_energy(light, place.scale)
     sizes = [getattr(light, name, 0.0) for name in ("shadow_soft_size", "size", "size_y", "angle", "spot_size")]
     if not all(math.isfinite(value) for value in (energy, *color, *sizes)):
         place.warn("a power, colour or size that is not finite", "it is left out")

@@ -128,6 +128,8 @@ class MaterialJob:
         inside = self._export_surface(source, volume is not None)
         if inside is Inside.OPEN and not compat.has_transparent_shadow(material):
             self._warn("shadows without transparency", "they are as transparent as the material")
+        if not getattr(getattr(material, "cycles", None), "use_bump_map_correction", True):
+            self._warn("Bump Map Correction switched off", "bump is corrected")
         self._write_volume(volume, inside)
         warned = self._displace(material, settings)
         if warned and displacement:

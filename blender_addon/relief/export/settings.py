@@ -106,14 +106,18 @@ def warn_unread_settings(scene, warn):
         for name, label in (("use_camera_cull", "Camera Culling"), ("use_distance_cull", "Distance Culling")):
             if getattr(cycles, name) and any(getattr(getattr(o, "cycles", None), name, False) for o in scene.objects):
                 warn(f"Simplify's {label}", "nothing was left out")
-        if cycles.texture_limit_render != "OFF":
-            warn("Simplify's Texture Limit", "textures have their full size")
+        limit, resolution = (getattr(cycles, f"texture_{name}_render", None) for name in ("limit", "resolution"))
+        if limit not in (None, "OFF") or resolution not in (None, 1.0):
+            warn("Simplify's limit of textures", "they have their full size")
     lit = {o.data.name: o.data for o in scene.objects if o.type == "LIGHT"}
     for name, light in lit.items():
         if light.cycles.max_bounces < cycles.max_bounces:
             warn(f'Max Bounces of light "{name}"', "it lights all bounces")
-    if scene.world is not None and scene.world.cycles.max_bounces < cycles.max_bounces:
+    world = scene.world.cycles if scene.world is not None else None
+    if world is not None and world.max_bounces < cycles.max_bounces:
         warn("Max Bounces of the world", "it lights all bounces")
+    if not getattr(world, "use_shadows", True):
+        warn("a world without shadows", "it casts them")
     if cycles.sample_clamp_direct > 0:
         warn("Clamp Direct", "direct light was not clamped")
     if cycles.pixel_filter_type == "GAUSSIAN":
