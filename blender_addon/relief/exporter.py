@@ -42,6 +42,12 @@ class Capture:
             self._shot = Shot(scene.render.fps / scene.render.fps_base)
         final.warn_unread(scene, self.report)
         view, crop = final.view_of(engine, depsgraph, self.report)
+        for is_on, what, instead in (
+            (scene.render.use_freestyle, "Freestyle lines", "they are left out"),
+            (scene.render.use_multiview, "stereoscopy", "the scene's camera alone was used"),
+        ):
+            if is_on:
+                self.report.warn(f'scene "{scene.name}"', what, instead)
         if scene.render.use_motion_blur:
             self.report.warn(f'scene "{scene.name}"', "motion blur", "everything stands still")
         if crop:

@@ -40,24 +40,39 @@ def render(engine, depsgraph):
     where = f'scene "{scene.name}"'
     shutter = shutter_of(scene, depsgraph.view_layer, lambda *text: warnings.warn(where, *text))
     now = scene.frame_current, scene.frame_subframe
-    try:
-        motion = Motion(engine, depsgraph, shutter, warnings) if shutter is not None else None
-        _render(engine, depsgraph, binary, warnings, motion, begin)
-    finally:
-        if shutter is not None:
-            engine.frame_set(*now)
+    for eye in _eyes(scene):
+        engine.active_view_set(eye)
+        try:
+            motion = Motion(engine, depsgraph, shutter, warnings) if shutter is not None else None
+            _render(engine, depsgraph, binary, warnings, motion, eye, begin)
+        finally:
+            if shutter is not None:
+                engine.frame_set(*now)
+        if engine.test_break():
+            return
 
 
-def _render(engine, depsgraph, binary, warnings, motion, begin):
+def _eyes(scene):
+    """Names of the stereoscopic views that are to be rendered; one without name where there is but one."""
+    render = scene.render
+    if not render.use_multiview:
+        return [""]
+    is_stereo = render.views_format == "STEREO_3D"
+    return [view.name for view in render.views if view.use and (not is_stereo or view.name in {"left", "right"})]
+
+
+def _render(engine, depsgraph, binary, warnings, motion, eye, begin):
     """The rest of it.
 
     @param  motion  Motion, which has left the engine when the shutter is half done; None: nothing takes time
+    @param  eye     the stereoscopic view, which the engine has as its active one
     @param  begin   time.perf_counter when it all began
     """
     scene = depsgraph.scene
     view, crop = view_of(engine, depsgraph, warnings)
     folder = session.render_folder()
     layer_name = depsgraph.view_layer.name
+    place = {"layer": layer_name, "view": eye}
     passes = result.enabled_passes(scene, depsgraph.view_layer)
     result.warn_missing_passes(depsgraph.view_layer, warnings)
 
@@ -96,7 +111,7 @@ def _render(engine, depsgraph, binary, warnings, motion, begin):
     if _is_watched():
         told_preview, preview_path = output("preview", ".exr")
         arguments += ["--preview", told_preview]
-        preview = _Preview(preview_path, lambda p: result.show(engine, p, layer_name, scene.render.film_transparent))
+        preview = _Preview(preview_path, lambda p: result.show(engine, p, place, scene.render.film_transparent))
     try:
         _run(engine, binary, arguments, depsgraph, warnings, preview)
         report.publish(scene.name, warnings.warnings, known)
@@ -110,7 +125,7 @@ def _render(engine, depsgraph, binary, warnings, motion, begin):
                 os.remove(path)
     seconds = {"export": exported.seconds, "total": time.perf_counter() - begin}
     metadata = _metadata(statistics, warnings.warnings, seconds, exported.bytes_written)
-    result.fill(engine, picture, layer_name, passes, scene.render.film_transparent, metadata)
+    result.fill(engine, picture, place, passes, scene.render.film_transparent, metadata)
     _log(statistics, seconds, exported.bytes_written)
 
 
@@ -207,9 +222,10 @@ def any_view(size):
 def view_of(engine, depsgraph, warnings):
     """(View of the scene's camera, render region as (x0, y0, x1, y1) from the top left or None)."""
     scene = depsgraph.scene
-    if scene.camera is None:
+    shown = engine.camera_override or scene.camera
+    if shown is None:
         raise ReliefError("the scene has no camera")
-    camera = scene.camera.evaluated_get(depsgraph)
+    camera = shown.evaluated_get(depsgraph)
     if camera.type != "CAMERA":
         raise ReliefError(f'the scene looks through "{camera.name}", which is not a camera')
     matrix = engine.camera_model_matrix(camera)
@@ -219,7 +235,8 @@ def view_of(engine, depsgraph, warnings):
     width = int(render.resolution_x * render.resolution_percentage / 100)
     height = int(render.resolution_y * render.resolution_percentage / 100)
     distance = focus_distance(camera, camera.matrix_world, depsgraph)
-    lens = camera_json(camera.data, (width, height), distance, lambda *t: warnings.warn(f'camera "{camera.name}"', *t))
+    shift = (engine.camera_shift_x(camera), camera.data.shift_y)
+    lens = camera_json(camera.data, shift, (width, height), distance, lambda *t: warnings.warn(f'camera "{camera.name}"', *t))
     view = View(lens, [list(row) for row in matrix], (width, height))
     if not render.use_border:
         return view, None
@@ -232,10 +249,6 @@ def view_of(engine, depsgraph, warnings):
 def warn_unread(scene, warnings):
     """Warns about settings of a scene that have no effect."""
     where = f'scene "{scene.name}"'
-    if scene.render.use_freestyle:
-        warnings.warn(where, "Freestyle lines", "they are left out")
-    if scene.render.use_multiview:
-        warnings.warn(where, "stereoscopy", "the scene's camera alone was used")
     warn_unread_settings(scene, lambda *text: warnings.warn(where, *text))
 
 

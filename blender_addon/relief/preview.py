@@ -35,6 +35,6 @@ def render(engine, depsgraph):
                     return
             if code != 0:
                 raise ReliefError(program.failure(code))
-        result.show(engine, exr.read(path), depsgraph.view_layer.name, scene.render.film_transparent)
+        result.show(engine, exr.read(path), {"layer": depsgraph.view_layer.name}, scene.render.film_transparent)
     finally:
         session.remove_folder(folder)

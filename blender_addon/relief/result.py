@@ -159,25 +159,26 @@ def combined(picture, is_transparent, is_noisy=False):
     return pixels
 
 
-def show(engine, picture, layer_name, is_transparent):
+def show(engine, picture, place, is_transparent):
     """Shows a picture that is not finished: its combined pass alone. Arguments as for fill."""
-    result = engine.begin_result(0, 0, picture.width, picture.height, layer=layer_name)
+    result = engine.begin_result(0, 0, picture.width, picture.height, **place)
     compat.set_pixels(result.layers[0].passes["Combined"], combined(picture, is_transparent))
     engine.end_result(result)
 
 
-def fill(engine, picture, layer_name, passes, is_transparent, metadata):
+def fill(engine, picture, place, passes, is_transparent, metadata):
     """Hands a picture to Blender.
 
     @param  engine      bpy.types.RenderEngine inside render()
     @param  picture     exr.Picture of the size that Blender expects
-    @param  layer_name  view layer
+    @param  place       {"layer": name of the view layer, "view": name of the stereoscopic view}
     @param  metadata    texts by name, for the image's file
     """
+    layer_name = place["layer"]
     for render_pass in passes:
         if render_pass.is_own:
             engine.add_pass(render_pass.name, len(render_pass.ids), render_pass.ids, layer=layer_name)
-    result = engine.begin_result(0, 0, picture.width, picture.height, layer=layer_name)
+    result = engine.begin_result(0, 0, picture.width, picture.height, **place)
     layer = result.layers[0]
     compat.set_pixels(layer.passes["Combined"], combined(picture, is_transparent))
     coverage = picture.channels["A"].ravel()

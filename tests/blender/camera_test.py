@@ -1,6 +1,7 @@
 """Lenses: framing, shift, sensor fit, depth of field and clipping are Cycles' own."""
 
 import bpy
+import numpy as np
 
 from scenes import (
     add_camera,
@@ -9,8 +10,10 @@ from scenes import (
     assert_agrees,
     degrees,
     diffuse,
+    folder,
     new_material,
     new_scene,
+    read_rgb,
     set_world,
 )
 
@@ -122,6 +125,45 @@ def test_depth_of_field_orthographic():
     scene, camera = _stage(64, 40, type="ORTHO", ortho_scale=5)
     _focus(camera, 2.0)
     assert_agrees(scene, block=4, samples=128)
+
+
+def _eyes(scene, engine):
+    """Pictures of both eyes: {"L" or "R": (height, width, 3)}."""
+    scene.render.image_settings.views_format = "INDIVIDUAL"
+    scene.render.engine = engine
+    scene.relief.samples = scene.cycles.samples = 64
+    with folder() as path:
+        scene.render.filepath = f"{path}/picture.exr"
+        bpy.ops.render.render(write_still=True)
+        return {eye: read_rgb(f"{path}/picture_{eye}.exr") for eye in "LR"}
+
+
+def _assert_eyes_agree(scene):
+    relief, cycles = _eyes(scene, "RELIEF"), _eyes(scene, "CYCLES")
+    noise = 0.03
+    for eye in "LR":
+        assert np.sqrt(np.mean((relief[eye] - cycles[eye]) ** 2)) < noise, eye
+    assert np.sqrt(np.mean((cycles["L"] - cycles["R"]) ** 2)) > 3 * noise, "both eyes see the same"
+
+
+def test_stereoscopy():
+    scene, camera = _stage(64, 40, lens=35)
+    scene.render.use_multiview = True
+    camera.data.stereo.interocular_distance, camera.data.stereo.convergence_distance = 1.0, 5.0
+    for convergence in ("OFFAXIS", "PARALLEL", "TOE"):
+        camera.data.stereo.convergence_mode = convergence
+        _assert_eyes_agree(scene)
+
+
+def test_views_by_several_cameras():
+    scene, camera = _stage(64, 40, lens=35)
+    scene.render.use_multiview, scene.render.views_format = True, "MULTIVIEW"
+    camera.name = "camera_L"
+    other = add_camera((1, -5, 5), degrees(50, 0, 12), lens=30)
+    other.name = "camera_R"
+    scene.camera = camera
+    scene.render.views["left"].camera_suffix, scene.render.views["right"].camera_suffix = "_L", "_R"
+    _assert_eyes_agree(scene)
 
 
 def test_render_region():

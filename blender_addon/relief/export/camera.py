@@ -7,10 +7,11 @@ import math
 _METRES_PER_MILLIMETRE = 1e-3
 
 
-def camera_json(camera, frame, focus_distance, warn):
+def camera_json(camera, own_shift, frame, focus_distance, warn):
     """glTF camera of a bpy camera.
 
     @param  camera          bpy camera
+    @param  own_shift       its shift along both axes, that of its eye
     @param  frame           (width, height) of the whole picture in pixels
     @param  focus_distance  metres along the camera's axis
     @param  warn            called with what is not understood, and what was used instead
@@ -27,7 +28,7 @@ def camera_json(camera, frame, focus_distance, warn):
         # AUTO always measures with the sensor's width.
         sensor = camera.sensor_height if camera.sensor_fit == "VERTICAL" else camera.sensor_width
         half_height = 0.5 * sensor / camera.lens / by_height
-    shift = (camera.shift_x * by_width, camera.shift_y * by_height)
+    shift = (own_shift[0] * by_width, own_shift[1] * by_height)
     clip = (camera.clip_start, camera.clip_end)
     out = lens_json(camera.type == "ORTHO", half_height, aspect, shift, clip)
     out["name"] = camera.name
