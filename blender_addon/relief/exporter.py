@@ -12,6 +12,7 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from . import final, report
+from .export import color_space
 from .export.animation import Shot
 from .export.gltf import GltfWriter
 from .export.scene import SceneExporter
@@ -50,6 +51,9 @@ class Capture:
                 self.report.warn(f'scene "{scene.name}"', what, instead)
         if scene.render.use_motion_blur:
             self.report.warn(f'scene "{scene.name}"', "motion blur", "everything stands still")
+        if color_space.scene_linear_from_rec709() is not None:
+            what = "a working space with other primaries than Rec. 709, by $OCIO"
+            self.report.warn(f'scene "{scene.name}"', what, "its colours are in it, which the program does not know")
         if crop:
             self.report.warn(f'scene "{scene.name}"', "a render region", "whole pictures; use --crop")
         exporter = SceneExporter(depsgraph, self._writer, self.report)

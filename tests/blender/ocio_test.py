@@ -170,6 +170,22 @@ def a_sky_is_that_of_cycles():
     assert_agrees(scene, samples=32, tolerance=0.02)
 
 
+def an_exported_scene_says_so():
+    from relief.exporter import export_frames
+
+    scene = new_scene()
+    add_camera()
+    add_plane()
+    scene.relief.strict = False
+    with folder() as path:
+        warnings, _ = export_frames(scene, f"{path}/scene.gltf", [1])
+    assert any("working space" in warning for warning in warnings), warnings
+
+
+def test_exported_scenes():
+    _run("an_exported_scene_says_so")
+
+
 def test_colours():
     _run("colours_are_those_of_cycles")
 
