@@ -5,15 +5,17 @@
 // Kulla and Conty 2017, "Revisiting Physically Based Shading at Imageworks" [KC].
 //
 // eta is index transmitted / index incident, seen from wo, which is always at z > 0: the caller mirrors. Refraction
-// compresses solid angles, so radiance that crosses into wo's side is scaled by 1/eta² (radiance over index² is what
-// stays constant along a ray); flux, and so photons, is not.
+// compresses solid angles. What stays constant along a ray is radiance over the square of the index, and that is what all
+// paths carry, as in Cycles: what shines within glass is given so, and glass is white in an even glow from either side of
+// it, closed or not. Photons, which bring flux, are scaled by 1/eta² for both to agree.
 #pragma once
 
 #include "kernel/bsdf/ggx.h"
 
 namespace relief {
 
-/// What a path carries: radiance from lights to the camera (traced backwards), or flux of photons.
+/// What a path carries: radiance over the square of the index, from lights to the camera (traced backwards), or what
+/// photons bring.
 enum class TransportMode { kRadiance, kImportance };
 
 /// Indices closer than this to each other do not bend light, and the half vector of refraction has no digits left. Such
@@ -25,7 +27,7 @@ RELIEF_KERNEL bool dielectric_is_matched(float eta) { return __builtin_fabsf(eta
 template <TransportMode kMode>
 RELIEF_KERNEL float transmission_scale(float eta)
 {
-  return kMode == TransportMode::kRadiance ? 1.0f / (eta * eta) : 1.0f;
+  return kMode == TransportMode::kImportance ? 1.0f / (eta * eta) : 1.0f;
 }
 
 /// Refracted direction.
@@ -39,7 +41,7 @@ RELIEF_KERNEL Vec3f refract(Vec3f wo, Vec3f m, float cos_o, float cos_t, float e
 
 /// One scattering by the microfacets.
 struct DielectricEval {
-  float f = 0;    ///< flux convention: multiply by transmission_scale where wi.z < 0
+  float f = 0;    ///< multiply by transmission_scale where wi.z < 0
   float pdf = 0;  ///< solid angle of wi under dielectric_sample
 };
 

@@ -12,7 +12,7 @@
 //
 // Conventions. Directions are in the local shading frame, normal +z, unit. Opaque surfaces and thin walls look alike
 // from both sides; a solid's inside is z < 0. f excludes |cos|; the pdf is the whole mixture's. f of light that
-// crosses a solid's boundary is for radiance, scaled by (eta_i / eta_t)², unless kMode says importance. Everything is
+// crosses a solid's boundary is for radiance over the square of the index, unless kMode says importance. Everything is
 // reciprocal but the coat's attenuation of what lies below, which depends on wo alone as in KHR_materials_clearcoat.
 #pragma once
 

@@ -20,7 +20,7 @@ struct MicrofacetRefraction {
   bool lights_unconnected = false;
 };
 
-/// f in the flux convention, in which a furnace is closed. Cycles leaves it at that; transmission_scale makes it radiance.
+/// f of radiance over the square of the index, in which a furnace is closed; times transmission_scale for photons.
 /// @param wo, wi  unit; wo.z > 0
 /// @param pdf     solid angle of wi under microfacet_refraction_sample; 0 where it is not connected
 /// @source        [W] Eq. 16, 17 and 21 without (1 − F)

@@ -168,14 +168,6 @@ RELIEF_KERNEL float bump_shadowing_ggx(Vec3f N, Vec3f wi)
   return 2.0f / (1.0f + __builtin_sqrtf(1.0f + alpha_squared * tan_squared(cos_i)));
 }
 
-/// Cycles carries radiance through an interface as it is, where physics divides it by the square of the index. So photons
-/// have to be scaled, for both to agree.
-template <TransportMode kMode>
-RELIEF_KERNEL float mixture_transmission_scale(float eta)
-{
-  return kMode == TransportMode::kImportance ? 1.0f / (eta * eta) : 1.0f;
-}
-
 /// @return  f, and pdf as if the lobe were chosen
 template <TransportMode kMode>
 RELIEF_KERNEL BsdfEval mixture_glass_eval(const MixtureLobe& lobe, Vec3f wi)
@@ -196,7 +188,7 @@ RELIEF_KERNEL BsdfEval mixture_glass_eval(const MixtureLobe& lobe, Vec3f wi)
   const Vec3f h = lobe.wo + eta * wi;
   const float cos_o = min(1.0f, __builtin_fabsf(dot(lobe.wo, h)) / length(h));
   const Vec3f through = splat3(1.0f) - mixture_fresnel(lobe.fresnel, cos_o);
-  return {glass.transmission_tint * max(through, Vec3f{}) * (f * mixture_transmission_scale<kMode>(eta)),
+  return {glass.transmission_tint * max(through, Vec3f{}) * (f * transmission_scale<kMode>(eta)),
           (1.0f - fresnel_dielectric_at(cos_o, eta)) * pdf};
 }
 
@@ -268,7 +260,7 @@ template <TransportMode kMode>
     case K::kRefraction:
       is_diffuse = false;
       e.f = splat3(microfacet_refraction_eval(lobe.shape.refraction, wo, wi, &e.pdf) *
-                   mixture_transmission_scale<kMode>(lobe.shape.refraction.eta));
+                   transmission_scale<kMode>(lobe.shape.refraction.eta));
       break;
     case K::kGlass:
       is_diffuse = false;
@@ -307,11 +299,18 @@ RELIEF_KERNEL LobeSample mixture_glass_sample(const MixtureLobe& lobe, float u_c
   } else {
     wi = normalize(refract(wo, wm, cos_o, refracted_cosine(cos_o, eta), eta));
   }
-  if (!lobe.is_delta) return lobe_sample_glossy(wi, !reflects, glass.alpha);
+  LobeSample s;
   const Vec3f F = mixture_fresnel(lobe.fresnel, cos_o);
-  if (reflects) return lobe_sample_delta(wi, glass.reflection_tint * F, chance);
-  const Vec3f through = max(splat3(1.0f) - F, Vec3f{}) * mixture_transmission_scale<kMode>(eta);
-  return lobe_sample_delta(wi, glass.transmission_tint * through, 1.0f - chance);
+  if (!lobe.is_delta) {
+    s = lobe_sample_glossy(wi, !reflects, glass.alpha);
+  } else if (reflects) {
+    s = lobe_sample_delta(wi, glass.reflection_tint * F, chance);
+  } else {
+    const Vec3f through = max(splat3(1.0f) - F, Vec3f{}) * transmission_scale<kMode>(eta);
+    s = lobe_sample_delta(wi, glass.transmission_tint * through, 1.0f - chance);
+  }
+  if (!reflects) s.eta = eta;
+  return s;
 }
 
 /// What a lobe of microfacets sends on as a mirror, or as a clear pane.
@@ -326,12 +325,14 @@ RELIEF_KERNEL LobeSample mixture_delta_sample(const MixtureLobe& lobe)
   const float cos_t = refracted_cosine(wo.z, eta);
   if (!(cos_t > 0.0f)) return {};
   const Vec3f wi = dielectric_is_matched(eta) ? -wo : normalize(Vec3f{-wo.x / eta, -wo.y / eta, -cos_t});
-  return lobe_sample_delta(wi, splat3(mixture_transmission_scale<kMode>(eta)));
+  LobeSample s = lobe_sample_delta(wi, splat3(transmission_scale<kMode>(eta)));
+  s.eta = eta;
+  return s;
 }
 
 /// Samples a lobe.
 /// @param u_choice  [0, 1): between reflection and refraction
-/// @return          in the lobe's frame; radiance is not scaled by what a boundary does to solid angles, so eta is 1
+/// @return          in the lobe's frame
 template <TransportMode kMode>
 [[gnu::noinline]] RELIEF_KERNEL LobeSample mixture_lobe_sample(const MixtureLobe& lobe, float u_choice, Vec2f u)
 {
@@ -361,8 +362,12 @@ template <TransportMode kMode>
       return lobe_sample_glossy(clearcoat_gtr1_sample(lobe.shape.clearcoat, wo, u), false, sqr(lobe.roughness));
     case K::kMultiple:
       return lobe_sample_diffuse(multiple_scattering_sample(lobe.shape.multiple.scattering, u), false);
-    case K::kRefraction:
-      return lobe_sample_glossy(microfacet_refraction_sample(lobe.shape.refraction, wo, u), true, sqr(lobe.roughness));
+    case K::kRefraction: {
+      const Vec3f wi = microfacet_refraction_sample(lobe.shape.refraction, wo, u);
+      LobeSample s = lobe_sample_glossy(wi, true, sqr(lobe.roughness));
+      s.eta = lobe.shape.refraction.eta;
+      return s;
+    }
     default:
       return lobe_sample_diffuse(diffuse_sample(u), false);
   }

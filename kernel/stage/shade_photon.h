@@ -46,8 +46,9 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
   const float adjoint = __builtin_fabsf(wo_local.z) * __builtin_fabsf(dot(wi, side.Ng)) / cos_o;
   const Vec3f scattered = throughput * bsdf.f * (adjoint / bsdf.pdf);
 
-  // Roulette by what the surface takes: photons keep their power.
-  const float survival = min(1.0f, max_component(scattered) / max_component(throughput));
+  // Roulette by what the surface takes: photons keep their power. What transmission_scale takes on the way into glass comes
+  // back on the way out.
+  const float survival = min(1.0f, max_component(scattered) * sqr(bsdf.eta) / max_component(throughput));
   if (!(u.roulette < survival)) return false;
   const Vec3f power = scattered / survival;
   if (is_zero(power) || !is_finite(power)) return false;

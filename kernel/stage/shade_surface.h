@@ -218,21 +218,20 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
   }
   throughput *= bsdf.f * (share * __builtin_fabsf(bsdf.wi.z) / bsdf.pdf);
 
-  float eta_scale = 1.0f;
+  float forked = 1.0f;
   if constexpr ((kFeatures & kFeatureTransmission) != 0) {
-    eta_scale = state.eta_scale[path] * sqr(bsdf.eta) / share;
-    state.eta_scale[path] = eta_scale;
+    forked = state.fork_share[path] * share;
+    state.fork_share[path] = forked;
   }
 
   // Russian roulette with the square root of the throughput: a gentler rate than the throughput itself, which measured
-  // less noise at equal time (as Cycles and others found). What refraction takes on entering glass is not a loss: it
-  // comes back on leaving (pbrt-v4 §14.5.4), and what a fork takes goes the other way. The first indirect ray is spared, and
+  // less noise at equal time (as Cycles and others found). What a fork takes is no loss: it goes the other way. The first indirect ray is spared, and
   // the second if it is no diffuse one: what such a ray finds, a lamp in a mirror say, is most of the noise of many pictures.
   // (Rolling for the second of every kind costs 7 % of efficiency under an environment, sparing the second of every kind up
   // to 12 % in crowded scenes.)
   const bool diffuse = (bsdf.lobe & kLobeDiffuse) != 0;
   if (path_bounces(bounces, BounceKind::kAll) > (diffuse ? 0 : 1)) {
-    const float survival = min(1.0f, __builtin_sqrtf(max_component(throughput) * eta_scale));
+    const float survival = min(1.0f, __builtin_sqrtf(max_component(throughput) / forked));
     if (!(u.roulette < survival)) return;
     throughput *= 1.0f / survival;
   }

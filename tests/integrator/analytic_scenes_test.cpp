@@ -243,6 +243,41 @@ TEST_P(AnalyticScene, SmoothGlassSphereVanishesInAWhiteFurnace)
   expect_mean(estimate_mean(scene, options(scene, 16, 64), kRuns), 1.0, 1e-3);
 }
 
+Material clear_glass()
+{
+  Material glass;
+  glass.metallic = 0;
+  glass.roughness = 0;
+  glass.transmission = 1;
+  glass.thickness = 1;
+  return glass;
+}
+
+// Light is carried through one interface alone, and is what it was: by physics' own measure it would be 2.25 times as
+// bright within. All paths carry radiance over the square of the index, as Cycles' do.
+TEST_P(AnalyticScene, AWorldIsAsBrightFromWithinGlass)
+{
+  Scene scene = empty_scene();
+  scene.cameras[0].camera.world_from_camera.p = {0, 0, 0};
+  add(scene, sphere_mesh(2, 128, 64, true), clear_glass());
+  scene.environment.color = {0.5f, 0.5f, 0.5f};
+  scene.render.max_bounces = scene.render.transmission_bounces = scene.render.glossy_bounces = 120;
+  expect_mean(estimate_mean(scene, options(scene, 16, 16), kRuns), 0.5, 1e-3);
+}
+
+TEST_P(AnalyticScene, AFloorBehindOneSheetOfGlassIsAsBright)
+{
+  // Through the sheet the floor emits .5, and the sheet mirrors a black world: 1 − F, straight down.
+  Scene scene = floor_scene();
+  Material floor = diffuse_material({0, 0, 0});
+  floor.emission = {0.5f, 0.5f, 0.5f};
+  add(scene, big_quad(0), floor);
+  add(scene, big_quad(0.2f), clear_glass());
+  scene.render.max_bounces = scene.render.transmission_bounces = 4;
+  const double F = 0.04;
+  expect_mean(estimate_mean(scene, options(scene, 8, 16), kRuns), 0.5 * (1 - F), 1e-4);
+}
+
 INSTANTIATE_TEST_SUITE_P(, AnalyticScene, testing::ValuesIn(kConfigurations), [](const auto& parameter) {
   return std::string(parameter.param.name);
 });

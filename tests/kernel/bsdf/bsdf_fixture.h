@@ -123,14 +123,13 @@ struct SampledAlbedo {
   double largest_weight = 0;
 };
 
-template <TransportMode kMode = TransportMode::kRadiance>
-SampledAlbedo sampled_albedo(const SurfaceParams& p, Vec3f wo, std::uint32_t num_samples)
+inline SampledAlbedo sampled_albedo(const SurfaceParams& p, Vec3f wo, std::uint32_t num_samples)
 {
   SampledAlbedo a;
   const SurfaceClosure closure = surface_closure_make<kFeatureAll>(p, full_tables(), wo);
   for (std::uint32_t i = 0; i < num_samples; ++i) {
     const Point3 point = sequence_point(i);
-    const BsdfSample s = closure_sample<kFeatureAll, kMode>(closure, full_tables(), point.lobe, point.u);
+    const BsdfSample s = closure_sample<kFeatureAll>(closure, full_tables(), point.lobe, point.u);
     if (!(s.pdf > 0.0f)) continue;
     const Vec3f weight = s.f * (std::fabs(s.wi.z) / s.pdf);
     a.r += static_cast<double>(weight.x);

@@ -1,6 +1,5 @@
 // White furnace: a white surface in uniform light is invisible. Albedos are averages of 2^17 low-discrepancy samples of
-// surface_sample, whose own error is a few 1e-4; sampling_test.cpp ties samples to evaluations and densities. Glass is
-// followed as flux (kImportance), so that refraction's compression of radiance does not count as a loss.
+// surface_sample, whose own error is a few 1e-4; sampling_test.cpp ties samples to evaluations and densities.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -26,7 +25,7 @@ Furnace furnace(Make&& surface, double side = 1.0)
   for (const float roughness : kRoughnesses) {
     for (const float height : kHeights) {
       const Vec3f wo = direction(static_cast<float>(side) * height);
-      const SampledAlbedo a = sampled_albedo<TransportMode::kImportance>(surface(roughness), wo, kSamples);
+      const SampledAlbedo a = sampled_albedo(surface(roughness), wo, kSamples);
       result.smallest = std::fmin(result.smallest, a.r);
       result.largest = std::fmax(result.largest, a.r);
       result.largest_weight = std::fmax(result.largest_weight, a.largest_weight);

@@ -1,5 +1,5 @@
 // f(wo, wi) = f(wi, wo) for everything that reflects; across a solid's boundary radiance over index squared is what is
-// reciprocal: f(wo, wi)·eta² of one side equals f(wi, wo) of the other. Rates allowed: 0.
+// reciprocal: f(wo, wi) / eta² of one side equals f(wi, wo) of the other. Rates allowed: 0.
 #include <gtest/gtest.h>
 
 #include "tests/kernel/bsdf/bsdf_fixture.h"
@@ -62,14 +62,14 @@ TEST(Reciprocity, OfRefraction)
       for (int n = 0; n < 4000; ++n) {
         const Vec3f outside = direction(0.02f + 0.98f * random.next(), 6.0f * random.next());
         const Vec3f inside = direction(-0.02f - 0.98f * random.next(), 6.0f * random.next());
-        // Traced from outside, f carries 1/ior²; from inside, ior².
-        const float in = surface_eval<kFeatureAll>(p, full_tables(), outside, inside).f.x * ior * ior;
+        const float in = surface_eval<kFeatureAll>(p, full_tables(), outside, inside).f.x / (ior * ior);
         const float out = surface_eval<kFeatureAll>(p, full_tables(), inside, outside).f.x;
         ASSERT_NEAR(in, out, 1e-3f * max(in, out) + 1e-6f) << ior << " " << r << " " << n;
         num_compared += in > 1e-4f ? 1 : 0;
-        // As flux, photons going in see what cameras looking out see.
-        const float flux = surface_eval<kFeatureAll, TransportMode::kImportance>(p, full_tables(), outside, inside).f.x;
-        ASSERT_NEAR(flux, in, 1e-5f * in) << ior << " " << r << " " << n;
+        // Photons going in see what cameras looking out see.
+        const float photons =
+            surface_eval<kFeatureAll, TransportMode::kImportance>(p, full_tables(), outside, inside).f.x;
+        ASSERT_NEAR(photons, in, 1e-5f * in) << ior << " " << r << " " << n;
       }
     }
   }

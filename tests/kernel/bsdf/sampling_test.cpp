@@ -207,7 +207,7 @@ TEST(SurfaceAlbedo, IsAtMostOneForRandomParameters)
   for (int n = 0; n < 1500; ++n) {
     const SurfaceParams p = random_params(random);
     const float wo_z = 2.0f * random.next() - 1.0f;
-    const SampledAlbedo a = sampled_albedo<TransportMode::kImportance>(p, direction(wo_z), 4096);
+    const SampledAlbedo a = sampled_albedo(p, direction(wo_z), 4096);
     largest = std::max({largest, a.r, a.g, a.b});
     largest_weight = std::max(largest_weight, a.largest_weight);
     ASSERT_LT(std::max({a.r, a.g, a.b}), 1.03) << "surface " << n << " of seed 7, wo.z " << wo_z;
