@@ -45,7 +45,8 @@ RELIEF_KERNEL GraphFootprint graph_footprint(const GraphPoint& at)
   return {x * width, cross(Ng, x) * width};
 }
 
-/// A point some way along the surface.
+/// A point some way along the surface, whose slopes bumps are made of. On the back of a face what the vertices carry is read
+/// as far on the other side, as Cycles does: so that a bump seen from behind is a hollow.
 /// @param moved  its hit, which the result points to
 RELIEF_KERNEL GraphPoint graph_point_shifted(const GraphPoint& at, Vec3f by, SurfaceHit& moved)
 {
@@ -58,7 +59,8 @@ RELIEF_KERNEL GraphPoint graph_point_shifted(const GraphPoint& at, Vec3f by, Sur
   const float determinant = difference_of_products(a, c, b, b);
   GraphPoint out = at;
   if (determinant > 0.0f) {
-    const float p = dot(edge1, by), q = dot(edge2, by);
+    const float carried = dot(at.hit->Ng, at.wo) < 0.0f ? -1.0f : 1.0f;
+    const float p = carried * dot(edge1, by), q = carried * dot(edge2, by);
     out.bary_u += difference_of_products(c, p, b, q) / determinant;
     out.bary_v += difference_of_products(a, q, b, p) / determinant;
   }
