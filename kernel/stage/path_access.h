@@ -103,6 +103,15 @@ RELIEF_KERNEL bool path_is_among_facets(const PathState& s, std::uint32_t i)
   return s.facets != nullptr && s.hit_t[i] == 0.0f;
 }
 
+/// An indirect sample's radiance, scaled until the mean of its channels is within a limit, as Cycles clamps it.
+/// @param limit  0: none
+RELIEF_KERNEL Vec3f indirect_clamped(Vec3f contribution, float limit)
+{
+  const Vec3f size = abs(contribution);
+  const float mean = (size.x + size.y + size.z) * (1.0f / 3.0f);
+  return limit > 0.0f && mean > limit ? contribution * (limit / mean) : contribution;
+}
+
 /// Adds radiance that arrives along the path's present ray, which left its last scattering event: direct light after
 /// at most one event, indirect after more.
 /// @param radiance      as emitted, W/m²/sr
@@ -117,11 +126,7 @@ RELIEF_KERNEL void path_add_radiance(PathState& s,
     s.direct[i] = s.direct[i] + contribution;
     return;
   }
-  if (clamp_indirect > 0.0f) {
-    const float brightest = max_component(contribution);
-    if (brightest > clamp_indirect) contribution *= clamp_indirect / brightest;
-  }
-  s.indirect[i] = s.indirect[i] + contribution;
+  s.indirect[i] = s.indirect[i] + indirect_clamped(contribution, clamp_indirect);
 }
 
 /// Adds light to the albedo that a denoiser is told of, where it is seen by the camera or in mirrors alone.

@@ -149,7 +149,7 @@ RELIEF_KERNEL void shade_surface_photons(const KernelGlobals& g,
   const float by_area =
       __builtin_fabsf(dot(wi, at.side.frame.n)) / max(__builtin_fabsf(dot(wi, at.side.Ng)), kLeastCosine);
   const Vec3f radiance = path_throughput(state, path) * f * irradiance * by_area;
-  (*caustic.radiance)[path] = (*caustic.radiance)[path] + radiance;
+  (*caustic.radiance)[path] = (*caustic.radiance)[path] + indirect_clamped(radiance, g.clamp_indirect);
 }
 
 /// Continuations into which a path splits where it enters rough glass, or leaves rough metal, that the camera sees. What shines there of lamps is met by a
