@@ -12,9 +12,11 @@ namespace relief {
 inline constexpr float kGtr1Ior = 1.5f;
 /// What Cycles multiplies the clearcoat's strength by.
 inline constexpr float kGtr1Strength = 0.25f;
+/// Up to this alpha Cycles mirrors. The default roughness of .03 is wider, and its long tail is most of what a lamp gives.
+inline constexpr float kGtr1DeltaAlpha = 3.1622776e-4f;
 
 struct ClearcoatGtr1 {
-  float alpha = 1e-3f;  ///< roughness², >= kDeltaAlpha; 1 and more is uniform
+  float alpha = 1e-3f;  ///< roughness², >= kGtr1DeltaAlpha; 1 and more is uniform
 };
 
 /// Density of microfacet normals per unit of projected area.
@@ -31,33 +33,28 @@ RELIEF_KERNEL float gtr1_D(float alpha, float sine2)
 /// f with reflectance 1: times Fresnel, kGtr1Strength and the clearcoat's strength it is the lobe. The masking does not
 /// belong to the distribution, so that the albedo before those factors reaches 3.2 at grazing angles.
 ///
-/// Cycles samples it as if it were GGX of the same roughness and divides by the density that its formula would have, so
-/// that with light found by sampling the lobe alone (the background without importance, other surfaces) it shows GGX's
-/// shape instead.
+/// As Cycles does, the lobe is sampled as if it were GGX of the same roughness, and weighed by the density that visible
+/// normals of GTR1 would have. So it is not the same light that lamps give when they are sampled and when they are met: where
+/// the lobe alone finds it (a world, other surfaces) it has GGX's shape, and between the two what multiple importance
+/// sampling makes of both.
 /// @param wo, wi  unit; wo.z > 0
-/// @param pdf     solid angle of wi under clearcoat_gtr1_sample
+/// @param pdf     what counts as the density of wi
 RELIEF_KERNEL float clearcoat_gtr1_eval(const ClearcoatGtr1& lobe, Vec3f wo, Vec3f wi, float* pdf)
 {
   *pdf = 0.0f;
   if (!(wi.z > 0.0f)) return 0.0f;
   const Vec3f h = wo + wi;
-  const float h_squared = length_squared(h);
-  const float D = gtr1_D(lobe.alpha, (h.x * h.x + h.y * h.y) / h_squared);
-  const float inv_length = 1.0f / __builtin_sqrtf(h_squared);
-  *pdf = 0.5f * D * h.z * inv_length * inv_length;  // D cos / (4 cos_d), cos_d half of the length
+  const float D = gtr1_D(lobe.alpha, (h.x * h.x + h.y * h.y) / length_squared(h));
   constexpr float kMaskingAlpha = 0.25f;
-  return D / ((wo.z + ggx_stretched_length(wo.z, kMaskingAlpha)) * (wi.z + ggx_stretched_length(wi.z, kMaskingAlpha)));
+  const float masked_o = wo.z + ggx_stretched_length(wo.z, kMaskingAlpha);
+  *pdf = 0.5f * D / masked_o;
+  return D / (masked_o * (wi.z + ggx_stretched_length(wi.z, kMaskingAlpha)));
 }
 
 /// @return unit; zero vector or z <= 0 is lost
-/// @source [B] Eq. 5
 RELIEF_KERNEL Vec3f clearcoat_gtr1_sample(const ClearcoatGtr1& lobe, Vec3f wo, Vec2f u)
 {
-  const float a2 = sqr(lobe.alpha);
-  const float sine2 = lobe.alpha >= 0.999f ? u.y : (std::exp(std::log(a2) * (1.0f - u.y)) - a2) / (1.0f - a2);
-  const SinCos phi = sin_cos_turn(u.x);
-  const float sine = safe_sqrt(sine2);
-  const Vec3f h = {sine * phi.cos, sine * phi.sin, safe_sqrt(1.0f - sine2)};
+  const Vec3f h = warp_ggx_visible_normal(wo, lobe.alpha, u);
   const float cos_d = dot(wo, h);
   if (!(cos_d > 0.0f)) return {};
   return 2.0f * cos_d * h - wo;

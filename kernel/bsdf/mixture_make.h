@@ -534,9 +534,10 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b,
     MixtureLobe* coat = mixture_add(b, splat3(weight * kGtr1Strength * in.clearcoat), frame_from_normal(coat_N));
     if (coat == nullptr) return;
     coat->kind = MixtureLobeKind::kClearcoat;
-    coat->roughness = saturated(in.clearcoat_roughness);
-    coat->shape.clearcoat = {max(sqr(coat->roughness), kDeltaAlpha)};
-    coat->is_delta = sqr(coat->roughness) < kDeltaAlpha;
+    coat->roughness = closure_roughness(spec, in.clearcoat_roughness);
+    const float alpha = sqr(coat->roughness);
+    coat->shape.clearcoat = {max(alpha, kGtr1DeltaAlpha)};
+    coat->is_delta = alpha <= kGtr1DeltaAlpha;
     coat->fresnel = {MixtureFresnel::kInterpolated, kGtr1Ior, splat3(0.04f), {}, 1.0f, 0.0f};
     coat->probability *= mean_component(mixture_fresnel(coat->fresnel, coat->wo.z));
   }
