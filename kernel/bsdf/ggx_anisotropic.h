@@ -36,7 +36,7 @@ RELIEF_KERNEL AnisotropicAlpha anisotropic_alpha_of_glossy(float roughness, floa
 }
 
 /// Of the Principled node: wider along the tangent.
-/// @param anisotropic  [0, 1]
+/// @param anisotropic  [0, 1]; as it is given up to 3.6: negative is wider across the tangent
 RELIEF_KERNEL AnisotropicAlpha anisotropic_alpha_of_principled(float roughness, float anisotropic)
 {
   const float alpha = sqr(roughness);

@@ -201,6 +201,12 @@ RELIEF_KERNEL Vec3f lobe_give_back(MixtureBuild& b, const SurfaceClosureSpec& sp
 RELIEF_KERNEL float saturated(float x) { return clamp(x, 0.0f, 1.0f); }
 RELIEF_KERNEL Vec3f saturated(Vec3f c) { return {saturated(c.x), saturated(c.y), saturated(c.z)}; }
 
+/// Roughness of microfacets. Up to 3.6 it is squared as it is given, so that negative ones count as positive ones.
+RELIEF_KERNEL float closure_roughness(const SurfaceClosureSpec& spec, float given)
+{
+  return saturated(spec.is_4 ? given : __builtin_fabsf(given));
+}
+
 /// Index of refraction as wo meets it.
 RELIEF_KERNEL float closure_eta(const MixtureBuild& b, float ior)
 {
@@ -250,12 +256,13 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
   const Vec3f N = closure_normal(b, in.normal);
   MixtureLobe* lobe = mixture_add(b, weight * in.color, closure_tangent_frame(N, in.tangent, in.rotation));
   if (lobe == nullptr) return;
-  const float roughness = saturated(in.roughness);
+  const float roughness = closure_roughness(spec, in.roughness);
   lobe_set_microfacets(*lobe, spec, roughness, anisotropic_alpha_of_glossy(roughness, in.anisotropy));
   lobe_give_back(b, spec, *lobe, saturated(in.color));
 }
 
 /// Refraction by microfacets, without what they reflect.
+/// @param roughness  as it is given: all versions square it so
 RELIEF_KERNEL void refraction_add(MixtureBuild& b,
                                   const SurfaceClosureSpec& spec,
                                   Vec3f weight,
@@ -266,7 +273,7 @@ RELIEF_KERNEL void refraction_add(MixtureBuild& b,
   MixtureLobe* lobe = mixture_add(b, weight, frame_from_normal(N));
   if (lobe == nullptr) return;
   lobe->kind = MixtureLobeKind::kRefraction;
-  lobe->roughness = spec.distribution == ClosureDistribution::kSharp ? 0.0f : saturated(roughness);
+  lobe->roughness = spec.distribution == ClosureDistribution::kSharp ? 0.0f : saturated(__builtin_fabsf(roughness));
   const float alpha = sqr(lobe->roughness);
   lobe->is_delta =
       spec.distribution == ClosureDistribution::kSharp || alpha < kDeltaAlpha || dielectric_is_matched(eta);
@@ -297,7 +304,7 @@ RELIEF_KERNEL void glass_add(MixtureBuild& b,
   MixtureLobe* lobe = mixture_add(b, splat3(weight), frame_from_normal(N));
   if (lobe == nullptr) return;
   lobe->kind = MixtureLobeKind::kGlass;
-  lobe->roughness = spec.distribution == ClosureDistribution::kSharp ? 0.0f : saturated(roughness);
+  lobe->roughness = spec.distribution == ClosureDistribution::kSharp ? 0.0f : closure_roughness(spec, roughness);
   const float alpha = sqr(lobe->roughness);
   lobe->fresnel = fresnel;
   lobe->is_delta =
@@ -368,7 +375,7 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
   // Up to 3.6 the surface's own normal decides how much is reflected, whatever its microfacets are.
   const float F = fresnel_dielectric_at(saturated(dot(N, b.wo)), eta);
   if (MixtureLobe* lobe = mixture_add(b, color * (weight * F), frame_from_normal(N))) {
-    const float roughness = saturated(in.roughness);
+    const float roughness = closure_roughness(spec, in.roughness);
     lobe_set_microfacets(*lobe, spec, roughness, anisotropic_alpha_of_glossy(roughness, 0.0f));
   }
   refraction_add(b, spec, color * (weight * (1.0f - F)), N, in.roughness, eta);
@@ -456,8 +463,8 @@ RELIEF_KERNEL void principled3_specular_add(MixtureBuild& b,
   SurfaceClosureSpec own = spec;
   // As Cycles does: smooth surfaces lose nothing worth giving back.
   if (in.roughness <= 0.075f) own.distribution = ClosureDistribution::kGgx;
-  lobe_set_microfacets(*lobe, own, in.roughness,
-                       anisotropic_alpha_of_principled(saturated(in.roughness), saturated(in.anisotropic)));
+  const float roughness = closure_roughness(spec, in.roughness);
+  lobe_set_microfacets(*lobe, own, roughness, anisotropic_alpha_of_principled(roughness, in.anisotropic));
   const float luminance = 0.3f * in.base_color.x + 0.6f * in.base_color.y + 0.1f * in.base_color.z;
   const Vec3f tint = lerp(in.specular_tint, Vec3f{1, 1, 1}, tint_of(in.base_color, luminance));
   const Vec3f F0 = saturated(lerp(in.metallic, tint * (0.08f * in.specular), in.base_color));
@@ -489,7 +496,7 @@ RELIEF_KERNEL void principled3_glass_add(MixtureBuild& b,
   own.distribution = ClosureDistribution::kGgx;
   const float F = fresnel_dielectric_at(saturated(dot(N, b.wo)), eta);
   if (MixtureLobe* lobe = mixture_add(b, splat3(weight * F), frame_from_normal(N))) {
-    const float roughness = saturated(in.roughness);
+    const float roughness = closure_roughness(spec, in.roughness);
     lobe_set_microfacets(*lobe, own, roughness, anisotropic_alpha_of_glossy(roughness, 0.0f));
     lobe->fresnel = fresnel;
     lobe->probability *= mean_component(mixture_fresnel(fresnel, lobe->wo.z));

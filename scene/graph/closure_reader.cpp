@@ -1,6 +1,7 @@
 #include "scene/graph/closure_reader.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -183,7 +184,7 @@ ClosureSummary closures_summarize(const GraphProgram& program)
     if (refracts) summary.transmission = 1;
     if (reflects) summary.metallic = 1;
     const bool is_sharp = closure.distribution == ClosureDistribution::kSharp;
-    summary.roughness = std::min(summary.roughness, is_sharp ? 0.0f : known("roughness", 0));
+    summary.roughness = std::min(summary.roughness, is_sharp ? 0.0f : std::abs(known("roughness", 0)));
   }
   return summary;
 }
