@@ -116,18 +116,19 @@ RELIEF_KERNEL SurfaceParams surface_params_eval(const Material& m,
   return p;
 }
 
-/// Normal from a tangent-space normal map.
+/// Normal from a tangent-space normal map, of its finest level: the mean of normals that spread is a mirror where there was
+/// none, and metal seen from afar was a fifth as bright. Samples of a pixel see the spread themselves.
 /// @param scale  factor on x and y (normalTexture.scale)
 /// @return       unit, tangent space (x along the tangent, z along the surface's normal); +z without a map, or where
 ///               the map holds no direction
 RELIEF_KERNEL Vec3f normal_map_eval(const TextureRef& ref,
                                     float scale,
                                     const TextureView* textures,
-                                    const Vec2f uv[2],
-                                    const float uv_width[2])
+                                    const Vec2f uv[2])
 {
   if (ref.texture_index < 0) return {0, 0, 1};
-  const Vec4f texel = material_texture_sample<kFeatureNormalMaps>(ref, textures, uv, uv_width);
+  constexpr float kFinest[2] = {0, 0};
+  const Vec4f texel = material_texture_sample<kFeatureNormalMaps>(ref, textures, uv, kFinest);
   const Vec3f n{scale * (2.0f * texel.x - 1.0f), scale * (2.0f * texel.y - 1.0f), 2.0f * texel.z - 1.0f};
   // A tangent-space normal never points into the surface; the bound keeps it from lying in it.
   const Vec3f outward{n.x, n.y, max(n.z, 1e-3f)};
@@ -136,21 +137,15 @@ RELIEF_KERNEL Vec3f normal_map_eval(const TextureRef& ref,
 }
 
 /// The material's normal map (normalTexture).
-RELIEF_KERNEL Vec3f normal_map_eval(const Material& m,
-                                    const TextureView* textures,
-                                    const Vec2f uv[2],
-                                    const float uv_width[2])
+RELIEF_KERNEL Vec3f normal_map_eval(const Material& m, const TextureView* textures, const Vec2f uv[2])
 {
-  return normal_map_eval(m.normal_texture, m.normal_scale, textures, uv, uv_width);
+  return normal_map_eval(m.normal_texture, m.normal_scale, textures, uv);
 }
 
 /// The coat's normal map (clearcoatNormalTexture).
-RELIEF_KERNEL Vec3f clearcoat_normal_map_eval(const Material& m,
-                                              const TextureView* textures,
-                                              const Vec2f uv[2],
-                                              const float uv_width[2])
+RELIEF_KERNEL Vec3f clearcoat_normal_map_eval(const Material& m, const TextureView* textures, const Vec2f uv[2])
 {
-  return normal_map_eval(m.clearcoat_normal_texture, m.clearcoat_normal_scale, textures, uv, uv_width);
+  return normal_map_eval(m.clearcoat_normal_texture, m.clearcoat_normal_scale, textures, uv);
 }
 
 /// Shading normal bent no further than needed for a mirror to reflect wo above the true surface.

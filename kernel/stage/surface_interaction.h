@@ -245,8 +245,7 @@ RELIEF_KERNEL void surface_interaction_frame(const KernelGlobals& g,
                                                state.hit_u[path], state.hit_v[path], at.hit.Ns, &tangent_frame);
     }
     if (has_tangents && material.normal_texture.texture_index >= 0) {
-      const Vec3f N =
-          normalize(from_local(tangent_frame, normal_map_eval(material, g.textures, at.hit.uv, at.uv_width)));
+      const Vec3f N = normalize(from_local(tangent_frame, normal_map_eval(material, g.textures, at.hit.uv)));
       side.Ns = shading_normal_consistent(side.Ng, side.front ? N : -N, wo);
       side.bent = !(dot(side.Ns, side.front ? N : -N) > kUnbent);
     }
@@ -258,8 +257,7 @@ RELIEF_KERNEL void surface_interaction_frame(const KernelGlobals& g,
       // The coat lies smoothly over the base's normal map unless it has one of its own (KHR_materials_clearcoat).
       Vec3f N = at.hit.Ns;
       if (material.clearcoat_normal_texture.texture_index >= 0) {
-        N = normalize(
-            from_local(tangent_frame, clearcoat_normal_map_eval(material, g.textures, at.hit.uv, at.uv_width)));
+        N = normalize(from_local(tangent_frame, clearcoat_normal_map_eval(material, g.textures, at.hit.uv)));
       }
       at.params.clearcoat_N = to_local(side.frame, shading_normal_consistent(side.Ng, side.front ? N : -N, wo));
     }

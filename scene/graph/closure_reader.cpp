@@ -132,7 +132,8 @@ std::vector<SurfaceClosureSpec> closures_read(const JsonReader& reader,
       const GraphValue value = input(r, socket.name, type);
       for (std::size_t c = 0; c < (is_number ? 1u : 3u); ++c) {
         const bool is_given = value.v[c].index >= 0;
-        results.push_back(is_given ? value.v[c] : build.constant(socket.value[c]));
+        const GraphScalar given = is_given ? value.v[c] : build.constant(socket.value[c]);
+        results.push_back(socket.kind == InputKind::kVector ? build.unfiltered(given) : given);
       }
     }
     r.warn_unread(warnings);

@@ -307,13 +307,17 @@ void GraphBuilder::keep_results(std::vector<SurfaceClosureSpec>& closures, int n
   results_ = std::move(kept);
 }
 
-GraphScalar GraphBuilder::shifted(GraphScalar a, GraphShift shift, float width)
+/// A number with other constants and quantities in their places.
+/// @param done  what has been rewritten so already
+/// @param leaf  of a constant or quantity and its node: what stands in its place
+template <typename Leaf>
+GraphScalar GraphBuilder::rewritten(GraphScalar a, Rewritten& done, Leaf&& leaf)
 {
   // Inputs have lower numbers than what uses them, but graphs are deep: no recursion.
   std::vector<std::int32_t> stack{a.index};
   const auto known = [&](GraphScalar of) -> GraphScalar {
-    const auto it = shifted_.find({of.index, shift, width});
-    return it == shifted_.end() ? GraphScalar{} : it->second;
+    const auto it = done.find(of.index);
+    return it == done.end() ? GraphScalar{} : it->second;
   };
   while (!stack.empty()) {
     const GraphScalar of{stack.back()};
@@ -323,14 +327,12 @@ GraphScalar GraphBuilder::shifted(GraphScalar a, GraphShift shift, float width)
     }
     const Node node = nodes_[static_cast<std::size_t>(of.index)];
     if (node.kind != Node::Kind::kOperation) {
-      // What a bump within a bump has moved already stays where it is.
-      const bool moves = node.kind == Node::Kind::kQuantity && node.shift == GraphShift::kNone;
-      shifted_[{of.index, shift, width}] = moves ? quantity(node.quantity, node.index, shift, width) : of;
+      done[of.index] = leaf(of, node);
       stack.pop_back();
       continue;
     }
     const Operation operation = operations_[static_cast<std::size_t>(node.operation)];
-    // Guards of moved values would be others, and not stand side by side: these do without.
+    // Guards of rewritten values would be others, and not stand side by side: these do without.
     const bool is_guard = operation.op == GraphOp::guard;
     std::vector<GraphScalar> inputs;
     bool are_known = true;
@@ -343,10 +345,28 @@ GraphScalar GraphBuilder::shifted(GraphScalar a, GraphShift shift, float width)
     if (!are_known) continue;
     const std::vector<GraphScalar> outputs =
         is_guard ? std::vector{inputs[0]} : apply(operation.op, inputs, operation.immediates);
-    for (std::size_t i = 0; i < outputs.size(); ++i) shifted_[{operation.outputs[i].index, shift, width}] = outputs[i];
+    for (std::size_t i = 0; i < outputs.size(); ++i) done[operation.outputs[i].index] = outputs[i];
     stack.pop_back();
   }
   return known(a);
+}
+
+GraphScalar GraphBuilder::shifted(GraphScalar a, GraphShift shift, float width)
+{
+  return rewritten(a, shifted_[{shift, width}], [&](GraphScalar of, const Node& node) {
+    // What a bump within a bump has moved already stays where it is.
+    const bool moves = node.kind == Node::Kind::kQuantity && node.shift == GraphShift::kNone;
+    return moves ? quantity(node.quantity, node.index, shift, width) : of;
+  });
+}
+
+GraphScalar GraphBuilder::unfiltered(GraphScalar a)
+{
+  return rewritten(a, unfiltered_, [&](GraphScalar of, const Node& node) {
+    const bool is_width = node.kind == Node::Kind::kQuantity &&
+                          (node.quantity == GraphQuantity::uv0_width || node.quantity == GraphQuantity::uv1_width);
+    return is_width ? constant(0) : of;
+  });
 }
 
 /// All numbers that the program has to give.

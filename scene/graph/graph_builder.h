@@ -82,6 +82,10 @@ class GraphBuilder {
   /// @param width  footprints, above 0
   GraphScalar shifted(GraphScalar a, GraphShift shift, float width);
 
+  /// A number as the finest levels of all images give it. Normals and heights are read so: what a pixel makes of many of them
+  /// is not what it makes of their mean.
+  GraphScalar unfiltered(GraphScalar a);
+
   /// @param skips  whether what guards make needless is left out
   /// @error GraphTooLarge
   GraphProgram compile(bool skips = true) const;
@@ -105,7 +109,10 @@ class GraphBuilder {
     std::vector<GraphScalar> outputs;
   };
   using Key = std::vector<std::int64_t>;
+  using Rewritten = std::map<std::int32_t, GraphScalar>;  ///< by what they were
 
+  template <typename Leaf>
+  GraphScalar rewritten(GraphScalar a, Rewritten& known, Leaf&& leaf);
   GraphScalar add(const Node& node, const Key& key);
   std::vector<GraphScalar> wanted() const;
   bool simplify(GraphOp op, std::span<const GraphScalar> in, GraphScalar* out) const;
@@ -125,7 +132,8 @@ class GraphBuilder {
   std::map<std::vector<float>, std::uint32_t> table_places_;
   std::array<GraphVector, kNumGraphOutputs> outputs_;
   std::vector<GraphScalar> results_;
-  std::map<std::tuple<std::int32_t, GraphShift, float>, GraphScalar> shifted_;
+  std::map<std::pair<GraphShift, float>, Rewritten> shifted_;
+  Rewritten unfiltered_;
   std::map<std::vector<std::int32_t>, std::uint16_t> guard_groups_;  ///< by their values and, at the end, their factor
 };
 

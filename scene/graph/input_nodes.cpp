@@ -210,7 +210,7 @@ void lower_normal_map(GraphNode& n)
   const int space = n.reader.choice("space", kSpaces, 0);
   const GraphVector own = shading_normal(b);
   GraphVector color = n.vector("color");
-  for (GraphScalar& c : color) c = scaled(b, b(Op::subtract, {c, b.constant(0.5f)}), 2);
+  for (GraphScalar& c : color) c = scaled(b, b(Op::subtract, {b.unfiltered(c), b.constant(0.5f)}), 2);
   GraphVector normal;
   GraphScalar is_given = b.constant(1);
   if (space == 0) {
@@ -418,7 +418,7 @@ constexpr GraphSocket kBumpInputs[] = {{"strength", kNumber, {1}},
 void lower_bump(GraphNode& n)
 {
   GraphBuilder& b = n.build;
-  const GraphScalar height = n.number("height");
+  const GraphScalar height = b.unfiltered(n.number("height"));
   const float width = n.reader.number_f("filterWidth", 1, 1e-3, 1e3);
   const auto rise = [&](GraphShift shift) { return b(Op::subtract, {b.shifted(height, shift, width), height}); };
   GraphVector N = n.vector("normal");

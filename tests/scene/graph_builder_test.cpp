@@ -53,6 +53,19 @@ TEST(GraphBuilder, ComputesWhatIsKnown)
   EXPECT_EQ(value_of(program, [](Q) { return 0.0f; }), 17);
 }
 
+TEST(GraphBuilder, WhatIsUnfilteredHasNoFootprint)
+{
+  GraphBuilder b;
+  const GraphScalar width = b(Op::multiply, {b.quantity(Q::uv0_width), b.constant(4)});
+  const GraphScalar sum = b(Op::add, {b(Op::sine, {width}), b.quantity(Q::uv0_u)});
+  const auto at = [](Q q) { return q == Q::uv0_width ? 0.5f : 0.25f; };
+  EXPECT_FLOAT_EQ(value_of(program_of(b, sum), at), std::sin(2.0f) + 0.25f);
+  const GraphScalar fine = b.unfiltered(sum);
+  EXPECT_FLOAT_EQ(value_of(program_of(b, fine), at), 0.25f);
+  EXPECT_EQ(b.unfiltered(sum).index, fine.index);
+  EXPECT_EQ(b.unfiltered(fine).index, fine.index);
+}
+
 TEST(GraphBuilder, ComputesTexturesAtKnownPoints)
 {
   GraphBuilder b;

@@ -163,6 +163,33 @@ TEST(GraphReader, BumpsAskForHeightsAsFarAwayAsTheirWidth)
   EXPECT_LT(length(values.of[static_cast<int>(GraphOutput::emission)] - expected(0.1f)), 1e-5f);
 }
 
+// The mean of normals or heights is flat where they are not.
+TEST(GraphReader, NormalsAndHeightsAreOfTheFinestLevelAndColoursAreNot)
+{
+  const auto has_width = [](const json& nodes, const char* socket, const json& value) {
+    const json surface = {{"closures", {{{"type", "diffuse"}, {socket, value}}}}};
+    test::GltfBuilder b = test::graph_scene({{"nodes", nodes}});
+    b.json["materials"][0]["extensions"]["RELIEF_surface"] = surface;
+    const test::TemporaryFolder folder;
+    const Scene scene = scene_load(folder.write("scene.gltf", b.gltf()));
+    for (const GraphInput& input : scene.graphs.at(0).inputs) {
+      if (input.quantity == Q::uv0_width) return true;
+    }
+    return false;
+  };
+  const json image = {{"type", "image-texture"},
+                      {"texture", {{"index", 0}}},
+                      {"inputs", {{"vector", of(0, "uv")}}}};
+  const json coordinate = {{"type", "texture-coordinate"}};
+  EXPECT_TRUE(has_width({coordinate, image}, "color", of(1, "color")));
+  EXPECT_FALSE(has_width({coordinate, image}, "normal", of(1, "color")));
+  const json bump = {{"type", "bump"}, {"inputs", {{"height", of(1, "color")}}}};
+  EXPECT_FALSE(has_width({coordinate, image, bump}, "normal", of(2, "normal")));
+  const json map = {{"type", "normal-map"}, {"space", "world"}, {"inputs", {{"color", of(1, "color")}}}};
+  EXPECT_FALSE(has_width({coordinate, image, map}, "normal", of(2, "normal")));
+  EXPECT_FALSE(has_width({coordinate, image, map}, "color", of(2, "normal")));
+}
+
 TEST(GraphReader, NormalMapsStandOverNormalsOfAnyLengthOrOfOne)
 {
   // A tangent along x, a normal of half the length along z, a colour that leans by 45 degrees between units.

@@ -126,17 +126,17 @@ TEST(NormalMap, DecodesAndScales)
 {
   const ConstantTexture texture(255, 0, 255, 255);  // (1, −1, 1)
   const TextureRef ref{0, 0};
-  const Vec3f n = normal_map_eval(ref, 0.5f, &texture.view, kUv, kNoWidth);
+  const Vec3f n = normal_map_eval(ref, 0.5f, &texture.view, kUv);
   const Vec3f expected = normalize({0.5f, -0.5f, 1.0f});
   EXPECT_LT(length(n - expected), 1e-6f);
-  EXPECT_EQ(normal_map_eval(TextureRef{}, 1.0f, nullptr, kUv, kNoWidth), (Vec3f{0, 0, 1}));
+  EXPECT_EQ(normal_map_eval(TextureRef{}, 1.0f, nullptr, kUv), (Vec3f{0, 0, 1}));
 }
 
 TEST(NormalMap, NeverPointsIntoTheSurface)
 {
   const ConstantTexture inward(127, 127, 0, 255), nothing(128, 128, 128, 255);
   for (const ConstantTexture* texture : {&inward, &nothing}) {
-    const Vec3f n = normal_map_eval(TextureRef{0, 0}, 1.0f, &texture->view, kUv, kNoWidth);
+    const Vec3f n = normal_map_eval(TextureRef{0, 0}, 1.0f, &texture->view, kUv);
     EXPECT_GT(n.z, 0.0f);
     EXPECT_NEAR(length(n), 1.0f, 1e-6f);
   }
