@@ -28,6 +28,7 @@ struct MixtureLobes {
 struct Mixture {
   const MixtureLobes* all;
   Frame frame;           ///< of the surface: directions are given in it
+  Vec3f Ng;              ///< its geometric normal, on the frame's side
   std::uint64_t chosen;  ///< bit by lobe
   float scale;           ///< of the chosen lobes' probabilities, which then sum to one
   float gain;            ///< factor on f: what makes up for the chance of a path to meet the lobes at all
@@ -41,9 +42,10 @@ RELIEF_KERNEL void mixture_visit(const Mixture& m, F&& f)
 }
 
 /// All lobes of a hit.
-RELIEF_KERNEL Mixture mixture_of(const MixtureLobes& lobes, const Frame& frame, float gain = 1.0f)
+RELIEF_KERNEL Mixture mixture_of(const MixtureLobes& lobes, const Frame& frame, Vec3f Ng, float gain = 1.0f)
 {
-  Mixture m{&lobes, frame, lobes.size < 64 ? (std::uint64_t{1} << lobes.size) - 1 : ~std::uint64_t{0}, 0.0f, gain};
+  const std::uint64_t chosen = lobes.size < 64 ? (std::uint64_t{1} << lobes.size) - 1 : ~std::uint64_t{0};
+  Mixture m{&lobes, frame, Ng, chosen, 0.0f, gain};
   float sum = 0.0f;
   mixture_visit(m, [&](const MixtureLobe& lobe) { sum += lobe.probability; });
   m.scale = sum > 0.0f ? 1.0f / sum : 0.0f;
@@ -54,7 +56,7 @@ RELIEF_KERNEL Mixture mixture_of(const MixtureLobes& lobes, const Frame& frame, 
 template <bool kSharp>
 RELIEF_KERNEL Mixture mixture_part(const Mixture& m, SharpLobes sharp)
 {
-  Mixture part{m.all, m.frame, 0, 0.0f, m.gain};
+  Mixture part{m.all, m.frame, m.Ng, 0, 0.0f, m.gain};
   float sum = 0.0f;
   for (std::uint64_t left = m.chosen; left != 0; left &= left - 1) {
     const MixtureLobe& lobe = m.all->lobes[__builtin_ctzll(left)];
@@ -67,20 +69,28 @@ RELIEF_KERNEL Mixture mixture_part(const Mixture& m, SharpLobes sharp)
 }
 
 /// As closure_eval of a SurfaceClosure; pdf of the chosen lobes.
+/// @param sampled  the lobe that wi was sampled from; null: it was not
 template <unsigned kFeatures, TransportMode kMode = TransportMode::kRadiance>
-RELIEF_KERNEL BsdfEval closure_eval(const Mixture& m, const BsdfTables& tables, Vec3f wi_local)
+RELIEF_KERNEL BsdfEval
+closure_eval(const Mixture& m, const BsdfTables& tables, Vec3f wi_local, const MixtureLobe* sampled = nullptr)
 {
   BsdfEval e;
   const float cos_i = __builtin_fabsf(wi_local.z);
   if (!(cos_i > kMinCosine)) return e;
   const Vec3f wi = from_local(m.frame, wi_local);
+  const bool below_Ns = wi_local.z < 0.0f, below_Ng = dot(wi, m.Ng) < 0.0f;
   mixture_visit(m, [&](const MixtureLobe& lobe) {
     const Vec3f wi_lobe = to_local(lobe.frame, wi);
-    // What is above a bent normal and below the surface's would leave on the wrong side; sampling loses it, too.
-    if ((wi_lobe.z < 0.0f) != (wi_local.z < 0.0f)) return;
+    const bool below = wi_lobe.z < 0.0f;
+    const bool shines = mixture_lobe_reaches(lobe, below, below_Ns, below_Ng, &lobe == sampled);
+    // Of microfacets Cycles counts the density of what it would not sample, too: a lamp that they see so is not the brighter
+    // for it, nor noisier.
+    const bool is_found = mixture_lobe_reaches(lobe, below, below_Ns, below_Ng, true) ||
+                          (shines && mixture_lobe_is_microfacet(lobe.kind));
+    if (!shines && !is_found) return;
     const BsdfEval one = mixture_lobe_eval<kMode>(lobe, tables, wi_lobe);
-    e.f += lobe.weight * one.f;
-    e.pdf += lobe.probability * one.pdf;
+    if (shines) e.f += lobe.weight * one.f;
+    if (is_found) e.pdf += lobe.probability * one.pdf;
   });
   e.f *= m.gain / cos_i;
   e.pdf *= m.scale;
@@ -109,9 +119,12 @@ RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tabl
   const LobeSample d = mixture_lobe_sample<kMode>(*chosen, u_lobe, u);
   if (d.bits == 0 || (d.wi.z < 0.0f) != ((d.bits & kLobeTransmit) != 0)) return {};
   BsdfSample s;
-  s.wi = to_local(m.frame, from_local(chosen->frame, d.wi));
-  // A lobe about a bent normal may send light to where its side of the surface is not.
-  if ((s.wi.z < 0.0f) != (d.wi.z < 0.0f) || !(__builtin_fabsf(s.wi.z) > kMinCosine)) return {};
+  const Vec3f wi = from_local(chosen->frame, d.wi);
+  s.wi = to_local(m.frame, wi);
+  if (!mixture_lobe_reaches(*chosen, d.wi.z < 0.0f, s.wi.z < 0.0f, dot(wi, m.Ng) < 0.0f, true) ||
+      !(__builtin_fabsf(s.wi.z) > kMinCosine)) {
+    return {};
+  }
   s.roughness = d.roughness;
   s.eta = d.eta;
   s.lobe = d.bits;
@@ -120,7 +133,7 @@ RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tabl
     s.pdf = chosen->probability * m.scale * d.probability;
     return s;
   }
-  const BsdfEval e = closure_eval<kFeatures, kMode>(m, tables, s.wi);
+  const BsdfEval e = closure_eval<kFeatures, kMode>(m, tables, s.wi, chosen);
   s.f = e.f;
   s.pdf = e.pdf;
   return s;

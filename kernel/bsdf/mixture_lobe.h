@@ -101,6 +101,7 @@ struct MixtureLobe {
   MixtureLobeKind kind = MixtureLobeKind::kLambert;
   bool is_delta = false;
   bool is_bent = false;   ///< its normal is not the surface's
+  bool is_4 = false;      ///< of 4.3's maths or later ones: which sides it reaches, see mixture_lobe_reaches
   bool is_5 = false;      ///< of 5.2's maths: what its normal sees and the surface does not fades as it does there
   float probability = 0;  ///< not normalised
   float roughness = kInfinity;  ///< perceptual; infinite: never sharp
@@ -115,6 +116,32 @@ struct MixtureLobe {
 RELIEF_KERNEL bool mixture_lobe_is_sharp(const MixtureLobe& lobe, float most_roughness)
 {
   return lobe.roughness < kInfinity && lobe.roughness <= most_roughness;
+}
+
+RELIEF_KERNEL bool mixture_lobe_is_microfacet(MixtureLobeKind kind)
+{
+  using K = MixtureLobeKind;
+  return kind == K::kGgx || kind == K::kBeckmann || kind == K::kAshikhminShirley || kind == K::kRefraction ||
+         kind == K::kGlass;
+}
+
+/// Whether a lobe sends light to a direction that its own normal has on one side and the surface on another: as the version
+/// of Cycles has it whose maths it is. What is sampled leaves by the true surface, so that no mirror sends it inside.
+/// @param below     wi is below the lobe's normal, so that it is meant to go through the surface
+/// @param below_Ns  the same of the surface's shading normal
+/// @param below_Ng  of its geometric normal
+/// @param sampled   wi was sampled from this lobe; or else it is asked for, as the direction of a lamp is
+RELIEF_KERNEL bool
+mixture_lobe_reaches(const MixtureLobe& lobe, bool below, bool below_Ns, bool below_Ng, bool sampled)
+{
+  const bool is_microfacet = mixture_lobe_is_microfacet(lobe.kind);
+  if (!lobe.is_4 && !lobe.is_5) {
+    const bool refracts = lobe.kind == MixtureLobeKind::kRefraction || lobe.kind == MixtureLobeKind::kGlass;
+    return !sampled || (refracts && below) || below == below_Ng;
+  }
+  if (sampled) return below == below_Ng && (is_microfacet || !lobe.is_5 || below == below_Ns);
+  if (lobe.is_5) return below == below_Ns;
+  return !is_microfacet || below == below_Ng;
 }
 
 /// @param cos_d  between either direction and the microfacet, >= 0

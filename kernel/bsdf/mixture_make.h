@@ -27,7 +27,7 @@ RELIEF_KERNEL F8 closure_input(F8 x)
 struct MixtureBuild {
   Vec3f wo;  ///< unit, world
   Vec3f Ng;  ///< geometric normal on wo's side
-  Vec3f Ns;  ///< shading normal on wo's side
+  Vec3f Ns;  ///< shading normal on the side of Ng; wo may be below its horizon
   bool front;
   const BsdfTables* tables;
   MixtureLobes* lobes;
@@ -35,37 +35,13 @@ struct MixtureBuild {
   Vec3f transparency{};
   float holdout = 0;
   bool transmits = false;  ///< some lobe sends light through the surface
-  bool is_5 = false;       ///< see MixtureLobe: of the closure that is added
+  bool is_4 = false, is_5 = false;  ///< see MixtureLobe: of the closure that is added
 };
 
 RELIEF_KERNEL float mean_component(Vec3f v) { return (v.x + v.y + v.z) * (1.0f / 3.0f); }
 
 /// A vector of a graph, which has Z up, in the scene's world.
 RELIEF_KERNEL Vec3f world_from_z_up(Vec3f v) { return {v.x, v.z, -v.y}; }
-
-/// A normal turned towards the geometric one, in the plane of both, until a mirror reflects wo above the true surface: as Cycles
-/// has it, where shading_normal_consistent leaves that plane.
-///
-/// In that plane mirroring adds angles: the normal lies half way between wo's projection and the reflected direction's, and only
-/// the height of the latter is asked for.
-/// @param Ng, N, wo  unit, dot(Ng, wo) > 0
-RELIEF_KERNEL Vec3f normal_with_reflection_above(Vec3f Ng, Vec3f N, Vec3f wo)
-{
-  const float height_o = dot(Ng, wo);
-  // Rays may always leave as shallow as they come.
-  const float height = min(0.9f * height_o, 0.01f);
-  if (2.0f * dot(N, wo) * dot(N, Ng) - height_o >= height) return N;
-  const Vec3f aside = N - dot(N, Ng) * Ng;
-  const float squared = length_squared(aside);
-  if (!(squared > 1e-12f)) return Ng;
-  const Vec3f X = aside / __builtin_sqrtf(squared);
-  const float x = dot(wo, X);
-  const float inv_length = 1.0f / __builtin_sqrtf(x * x + height_o * height_o);
-  const float reflected_z = height * inv_length;
-  const Vec3f middle =
-      (x * inv_length + safe_sqrt(1.0f - sqr(reflected_z))) * X + (height_o * inv_length + reflected_z) * Ng;
-  return normalize(middle);
-}
 
 /// A closure's normal as it is given.
 /// @param given  Z up; 0: the surface's
@@ -124,6 +100,7 @@ RELIEF_KERNEL MixtureLobe* mixture_add(MixtureBuild& b, Vec3f weight, const Fram
   lobe.probability = mean;
   lobe.frame = frame;
   lobe.wo = wo;
+  lobe.is_4 = b.is_4;
   lobe.is_5 = b.is_5;
   lobe.is_bent = !(dot(frame.n, b.Ns) > 1.0f - 1e-6f);
   if (lobe.is_bent) lobe.surface_N = to_local(frame, b.Ns);

@@ -178,6 +178,30 @@ RELIEF_KERNEL Vec3f shading_normal_consistent(Vec3f Ng, Vec3f Ns, Vec3f wo)
   return 2.0f * dot(N, wo) * dot(N, Ng) > dot(wo, Ng) ? N : Ng;
 }
 
+/// A normal turned towards the geometric one, in the plane of both, until a mirror reflects wo above the true surface: as Cycles
+/// has it, where shading_normal_consistent leaves that plane.
+///
+/// In that plane mirroring adds angles: the normal lies half way between wo's projection and the reflected direction's, and only
+/// the height of the latter is asked for.
+/// @param Ng, N, wo  unit, dot(Ng, wo) > 0
+RELIEF_KERNEL Vec3f normal_with_reflection_above(Vec3f Ng, Vec3f N, Vec3f wo)
+{
+  const float height_o = dot(Ng, wo);
+  // Rays may always leave as shallow as they come.
+  const float height = min(0.9f * height_o, 0.01f);
+  if (2.0f * dot(N, wo) * dot(N, Ng) - height_o >= height) return N;
+  const Vec3f aside = N - dot(N, Ng) * Ng;
+  const float squared = length_squared(aside);
+  if (!(squared > 1e-12f)) return Ng;
+  const Vec3f X = aside / __builtin_sqrtf(squared);
+  const float x = dot(wo, X);
+  const float inv_length = 1.0f / __builtin_sqrtf(x * x + height_o * height_o);
+  const float reflected_z = height * inv_length;
+  const Vec3f middle =
+      (x * inv_length + safe_sqrt(1.0f - sqr(reflected_z))) * X + (height_o * inv_length + reflected_z) * Ng;
+  return normalize(middle);
+}
+
 /// What a denoiser or compositor calls the surface's colour.
 /// @return base colour, linear; for unlit surfaces what they emit
 RELIEF_KERNEL Vec3f surface_albedo(const SurfaceParams& p) { return p.base_color; }

@@ -115,7 +115,7 @@ RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
   const bool goes_on =
       has_mixture<kFeatures>(at)
           ? shade_photon_scatter(g, state, path, at, wo, throughput,
-                                 mixture_of(lobes, at.side.frame, 1.0f / at.params.alpha), soft)
+                                 mixture_of(lobes, at.side.frame, at.side.Ng, 1.0f / at.params.alpha), soft)
           : shade_photon_scatter(
                 g, state, path, at, wo, throughput,
                 surface_closure_make<kFeatureAll>(at.params, *g.bsdf_tables, to_local(at.side.frame, wo)), soft);

@@ -440,7 +440,7 @@ template <unsigned kFeatures>
     const Vec3f before = path_throughput(state, path);
     state.throughput[path] = before * transmittance();
     shade_surface_emission<kFeatures>(g, state, path, at, path_throughput(state, path));
-    const Mixture closure = mixture_of(lobes, side.frame);
+    const Mixture closure = mixture_of(lobes, side.frame, side.Ng);
     if (g.has_lights && !last && !mixture_is_delta(closure)) {
       const Vec3f light_N = at.params.transmission > 0.0f ? Vec3f{} : side.Ns;
       const LightsChoice chosen = lights_choose(g.lights, at.hit.P, light_N, u.light_choice, u.light_uv);
@@ -493,7 +493,7 @@ template <unsigned kFeatures>
   // While the chosen light is on its way from memory, the BSDF is sampled.
   const auto closure = [&] {
     if constexpr (kMixture) {
-      return mixture_of(lobes, side.frame, 1.0f / params.alpha);
+      return mixture_of(lobes, side.frame, side.Ng, 1.0f / params.alpha);
     } else {
       return surface_closure_make<kFeatures>(params, *g.bsdf_tables, wo_local);
     }

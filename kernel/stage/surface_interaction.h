@@ -45,11 +45,13 @@ RELIEF_KERNEL bool has_mixture(const SurfaceInteraction& at)
   return false;
 }
 
-/// Turns the shading normal to wo's side and bends it until wo is above its horizon.
+/// A shading normal on the side of the geometric one.
+RELIEF_KERNEL Vec3f shading_normal_turned(Vec3f Ns, Vec3f Ng_side) { return dot(Ns, Ng_side) < 0.0f ? -Ns : Ns; }
+
+/// Bends a shading normal until wo is above its horizon.
 /// Interpolated normals can face away from a viewer who sees the facet; leaving them so makes dark rims.
-RELIEF_KERNEL Vec3f shading_normal_towards(Vec3f Ns, Vec3f Ng_side, Vec3f wo)
+RELIEF_KERNEL Vec3f shading_normal_towards(Vec3f Ns, Vec3f wo)
 {
-  if (dot(Ns, Ng_side) < 0.0f) Ns = -Ns;
   const float cos_o = dot(Ns, wo);
   // The least cosine keeps the local frame's arithmetic away from zero; 1e-3 is 0.06° and cannot be seen.
   constexpr float kLeastCosine = 1e-3f;
@@ -137,17 +139,19 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
                                            MixtureLobes& lobes)
 {
   ShadingSide& side = at.side;
-  side.Ns = shading_normal_towards(at.hit.Ns, side.Ng, wo);
-  side.bent = !(__builtin_fabsf(dot(side.Ns, at.hit.Ns)) > kUnbent);
+  const Vec3f Ns = shading_normal_turned(at.hit.Ns, side.Ng);
+  lobes.size = 0;
+  MixtureBuild build{wo, side.Ng, Ns, side.front, g.bsdf_tables, &lobes};
   if (const std::uint16_t first = lane.program->surface_normal; first != kNoGraphOperand) {
     const Vec3f given{graph_result(lane, first), graph_result(lane, first + 1), graph_result(lane, first + 2)};
-    const Vec3f N = closure_normal({wo, side.Ng, side.Ns, side.front, nullptr, nullptr}, given);
-    side.bent = side.bent || !(dot(N, side.Ns) > kUnbent);
-    side.Ns = N;
+    // Since 4.0 what displaces nothing bends freely.
+    bool is_4 = false;
+    for (std::uint32_t i = 0; i < lane.program->num_closures; ++i) is_4 = is_4 || lane.program->closures[i].is_4;
+    build.Ns = is_4 ? closure_normal_as_given(build, given) : closure_normal(build, given);
   }
+  side.Ns = shading_normal_towards(build.Ns, wo);
+  side.bent = !(dot(side.Ns, Ns) > kUnbent);
   side.frame = frame_from_normal(side.Ns);
-  lobes.size = 0;
-  MixtureBuild build{wo, side.Ng, side.Ns, side.front, g.bsdf_tables, &lobes};
   closures_resolve(lane, build);
 
   const Material& m = *at.material;
@@ -235,7 +239,12 @@ RELIEF_KERNEL void surface_interaction_frame(const KernelGlobals& g,
   if (has_mixture<kFeatures>(at)) return;
   const Material& material = *at.material;
   ShadingSide& side = at.side;
-  side.Ns = shading_normal_towards(at.hit.Ns, side.Ng, wo);
+  Vec3f Ns = shading_normal_turned(at.hit.Ns, side.Ng);
+  // On coarse meshes mirrors and glass would reflect into their own facets, whose places were dark. Diffuse light is not lost so.
+  if (at.params.metallic > 0.0f || at.params.transmission > 0.0f) {
+    Ns = normal_with_reflection_above(side.Ng, Ns, wo);
+  }
+  side.Ns = shading_normal_towards(Ns, wo);
   side.bent = !(__builtin_fabsf(dot(side.Ns, at.hit.Ns)) > kUnbent);
   Frame tangent_frame;
   bool has_tangents = false;
@@ -316,8 +325,12 @@ RELIEF_KERNEL bool path_pass_through(const KernelGlobals& g, PathState& state, s
 /// @param wi  unit, its direction
 RELIEF_KERNEL Vec3f surface_ray_origin(const SurfaceInteraction& at, Vec3f wi)
 {
-  // Above the surface the ray starts on the lifted side, below it on the other.
-  const bool above = dot(wi, at.side.Ns) > 0.0f;
+  // Above the surface the ray starts on the lifted side, below it on the other. Closures send light by the true surface; what
+  // only the shading normal sees of lamps is lifted above a facet, unless it may have come through.
+  const bool above_Ns = dot(wi, at.side.Ns) > 0.0f;
+  const bool above = at.material->has_closures
+                         ? dot(wi, at.side.Ng) > 0.0f || (above_Ns && !(at.params.transmission > 0.0f))
+                         : above_Ns;
   Vec3f P = at.hit.P;
   if (above && at.side.front) P += at.hit.P_lift * terminator_lift_weight(dot(wi, at.side.Ng));
   return surface_hit_origin(at.hit, P, above == at.side.front);

@@ -135,8 +135,6 @@ def test_many_ways_to_one_shader_are_one_closure():
 def test_every_shader_node():
     """One closure a node, with its inputs by our names, its choices by ours, and no weight."""
     maths = {"maths": "5.2" if IS_5_0 else "4.3"} if IS_4_0 else {}
-    # Of some closures only the shadows beside bent normals have changed, in 5.
-    shadows = maths if IS_5_0 else {}
 
     def check(kind, expected, settings=(), **inputs):
         material, tree, output = _material(kind)
@@ -170,16 +168,16 @@ def test_every_shader_node():
         Roughness=0.4,
         IOR=1.3,
     )
-    check("ShaderNodeBsdfTranslucent", {"type": "translucent", **values, **shadows}, Color=color)
+    check("ShaderNodeBsdfTranslucent", {"type": "translucent", **values, **maths}, Color=color)
     check("ShaderNodeBsdfTransparent", {"type": "transparent", **values}, Color=color)
     check("ShaderNodeHoldout", {"type": "holdout"})
     for component in ("diffuse", "glossy"):
-        expected = {"type": "toon", **values, "size": 0.6, "smooth": 0.2, "component": component, **shadows}
+        expected = {"type": "toon", **values, "size": 0.6, "smooth": 0.2, "component": component, **maths}
         check("ShaderNodeBsdfToon", expected, [("component", component.upper())], Color=color, Size=0.6, Smooth=0.2)
     if IS_4_0:
-        expected = {"type": "sheen", **values, "roughness": 0.4, **shadows}
+        expected = {"type": "sheen", **values, "roughness": 0.4, **maths}
         check("ShaderNodeBsdfSheen", expected, [("distribution", "MICROFIBER")], Color=color, Roughness=0.4)
-        expected = {"type": "velvet", **values, "sigma": 0.4, **shadows}
+        expected = {"type": "velvet", **values, "sigma": 0.4, **maths}
         check("ShaderNodeBsdfSheen", expected, [("distribution", "ASHIKHMIN")], Color=color, Roughness=0.4)
         metal = {"type": "metallic", "roughness": 0.4, "distribution": "ggx", **film, **maths}
         expected = {**metal, "baseColor": color[:3], "edgeTint": (1, 0.5, 1), "fresnel": "f82"}

@@ -473,11 +473,8 @@ _DISTRIBUTIONS = {
     "SHARP": "sharp",
 }
 
-#: What closures of a version's own meaning say of it.
+#: What closures say of their version: many mean something of its own, and all take bent normals as it does.
 _MATHS = {} if compat.MATHS == "3.4" else {"maths": compat.MATHS}
-
-#: Of closures of which only the shadows beside bent normals are of their version's own meaning.
-_SHADOW_MATHS = {"maths": compat.MATHS} if compat.MATHS == "5.2" else {}
 
 
 def _distribution(node):
@@ -490,7 +487,7 @@ def _diffuse(w, source, weight):
 
 
 def _translucent(w, source, weight):
-    w.add("translucent", weight, **w.inputs(source, {"Color": "color", "Normal": "normal"}), **_SHADOW_MATHS)
+    w.add("translucent", weight, **w.inputs(source, {"Color": "color", "Normal": "normal"}), **_MATHS)
 
 
 def _transparent(w, source, weight):
@@ -544,17 +541,17 @@ def _sheen(w, source, weight):
     """The Sheen BSDF of 4.0, one of whose kinds is the Velvet BSDF of before."""
     is_velvet = source.node.distribution == "ASHIKHMIN"
     names = {"Color": "color", "Roughness": "sigma" if is_velvet else "roughness", "Normal": "normal"}
-    w.add("velvet" if is_velvet else "sheen", weight, **w.inputs(source, names), **_SHADOW_MATHS)
+    w.add("velvet" if is_velvet else "sheen", weight, **w.inputs(source, names), **_MATHS)
 
 
 def _toon(w, source, weight):
     values = w.inputs(source, {"Color": "color", "Size": "size", "Smooth": "smooth", "Normal": "normal"})
-    w.add("toon", weight, **values, component=source.node.component.lower(), **_SHADOW_MATHS)
+    w.add("toon", weight, **values, component=source.node.component.lower(), **_MATHS)
 
 
 def _subsurface(w, source, weight):
     w.unread(source, "subsurface scattering", "a diffuse surface of its colour was used")
-    w.add("diffuse", weight, **w.inputs(source, {"Color": "color", "Normal": "normal"}), **_SHADOW_MATHS)
+    w.add("diffuse", weight, **w.inputs(source, {"Color": "color", "Normal": "normal"}), **_MATHS)
 
 
 def _colored(what):
@@ -564,7 +561,7 @@ def _colored(what):
         w.unread(source, what, "a diffuse surface of its colour was used")
         # Only the sockets that a node shows are found: hair by absorption has no colour.
         names = {"Color": "color", "Base Color": "color", "Normal": "normal"}
-        w.add("diffuse", weight, **w.inputs(source, names), **_SHADOW_MATHS)
+        w.add("diffuse", weight, **w.inputs(source, names), **_MATHS)
 
     return write
 

@@ -39,7 +39,7 @@ Mixture mixture_make(const MixtureCase& one,
   MixtureBuild build{wo, kN, kN, front, &tables(), &lobes};
   one.add(build);
   if (built != nullptr) *built = build;
-  return mixture_of(lobes, frame_from_normal(kN));
+  return mixture_of(lobes, frame_from_normal(kN), kN);
 }
 
 /// A normal that leans by some degrees, Z up as graphs have it.
@@ -65,7 +65,7 @@ template <typename Inputs>
 MixtureCase case_of_52(const std::string& name, const SurfaceClosureSpec& spec, const Inputs& in)
 {
   return {name, [=](MixtureBuild& b) {
-            b.is_5 = true;
+            b.is_4 = b.is_5 = true;
             closure_add(b, spec, 1.0f, in);
           }};
 }
@@ -424,6 +424,96 @@ TEST(Mixture, NormalsAreTurnedJustSoFarThatMirrorsReflectUpwards)
   EXPECT_GT(num_turned, 100);
 }
 
+/// A mirror whose normal leans, on a facet under a smooth normal that leans as well.
+struct BentMirror {
+  const char* name;
+  bool is_4, is_5;
+};
+
+// Black patches were on the coarse balls of every version: what the lobe reflected above the facet, and below the smooth
+// normal's horizon, was lost.
+TEST(Mixture, BentMirrorsLoseNothingAboveTheFacet)
+{
+  for (const BentMirror version : {BentMirror{"3.4", false, false}, {"4.3", true, false}, {"5.2", true, true}}) {
+    TestRandom r(23);
+    int num_apart = 0;
+    for (int i = 0; i < 2000; ++i) {
+      const auto lean = [&r](float by) { return normalize(Vec3f{by * (r.next() - 0.5f), by * (r.next() - 0.5f), 1.0f}); };
+      const Vec3f Ns = lean(1.0f), bent = lean(2.0f);
+      const Vec3f wo = direction(0.05f + 0.9f * r.next(), 6.0f * r.next());
+      MixtureLobes lobes;
+      MixtureBuild b{wo, kN, Ns, true, &tables(), &lobes};
+      b.is_4 = version.is_4;
+      b.is_5 = version.is_5;
+      SurfaceClosureSpec spec = spec_of(version.is_4, ClosureDistribution::kSharp);
+      spec.is_5 = version.is_5;
+      GlossyInputs in;
+      in.color = {1, 1, 1};
+      in.normal = {bent.x, -bent.z, bent.y};  // Z up
+      closure_add(b, spec, 1.0f, in);
+      const Mixture m = mixture_of(lobes, frame_from_normal(Ns), kN);
+      const BsdfSample s = closure_sample<kFeatureAll>(m, tables(), 0.5f, {r.next(), r.next()});
+      ASSERT_GT(s.pdf, 0.0f) << version.name << " " << i;
+      EXPECT_GT(from_local(m.frame, s.wi).z, 0.0f) << version.name;
+      EXPECT_NEAR(s.f.x * __builtin_fabsf(s.wi.z) / s.pdf, 1.0f, 1e-5f) << version.name;
+      num_apart += s.wi.z < 0.0f ? 1 : 0;
+    }
+    EXPECT_GT(num_apart, 20) << version.name;
+  }
+}
+
+// What Cycles asks of a lamp below the facet or below the smooth normal's horizon, that a rough mirror's own normal sees.
+TEST(Mixture, LampsAreSeenByTheNormalsOfEachVersion)
+{
+  const auto shines = [](bool is_4, bool is_5, Vec3f Ns, Vec3f N, Vec3f wi) {
+    const Vec3f wo = normalize(Vec3f{0.1f, 0, 1});
+    MixtureLobes lobes;
+    MixtureBuild b{wo, kN, Ns, true, &tables(), &lobes};
+    b.is_4 = is_4;
+    b.is_5 = is_5;
+    SurfaceClosureSpec spec = spec_of(is_4);
+    spec.is_5 = is_5;
+    GlossyInputs in;
+    in.roughness = 1.0f;
+    in.normal = {N.x, -N.z, N.y};
+    closure_add(b, spec, 1.0f, in);
+    const Mixture m = mixture_of(lobes, frame_from_normal(Ns), kN);
+    return !is_zero(closure_eval<kFeatureAll>(m, tables(), to_local(m.frame, wi)).f);
+  };
+  const Vec3f leans = normalize(Vec3f{0.5f, 0, 1}), leans_more = normalize(Vec3f{0.6f, 0, 1});
+  const Vec3f below_facet = normalize(Vec3f{1, 0, -0.1f}), below_smooth = normalize(Vec3f{-1, 0, 0.1f});
+  // A facet and a bump: 4.3 asks the facet, 5.2 the smooth normal, 3.4 neither.
+  EXPECT_TRUE(shines(false, false, kN, leans, below_facet));
+  EXPECT_FALSE(shines(true, false, kN, leans, below_facet));
+  EXPECT_FALSE(shines(true, true, kN, leans, below_facet));
+  EXPECT_TRUE(shines(true, true, leans, leans_more, below_facet));
+  EXPECT_FALSE(shines(true, false, leans, leans_more, below_facet));
+  // Above the facet and below the smooth normal's horizon, where the bump leans back.
+  EXPECT_TRUE(shines(false, false, leans, kN, below_smooth));
+  EXPECT_TRUE(shines(true, false, leans, kN, below_smooth));
+  EXPECT_FALSE(shines(true, true, leans, kN, below_smooth));
+}
+
+TEST(Mixture, NegativeRoughnessIsWhatItsSquareIsUpTo36)
+{
+  const auto roughness_of = [](bool is_4, auto in) {
+    in.roughness = -0.5f;
+    MixtureLobes lobes;
+    MixtureBuild b{direction(0.7f), kN, kN, true, &tables(), &lobes};
+    closure_add(b, spec_of(is_4), 1.0f, in);
+    return lobes.lobes[lobes.size - 1].roughness;
+  };
+  EXPECT_EQ(roughness_of(false, GlossyInputs{}), 0.5f);
+  EXPECT_EQ(roughness_of(true, GlossyInputs{}), 0.0f);
+  EXPECT_EQ(roughness_of(false, GlassInputs{}), 0.5f);
+  EXPECT_EQ(roughness_of(true, GlassInputs{}), 0.0f);
+  EXPECT_EQ(roughness_of(false, RefractionInputs{}), 0.5f);
+  EXPECT_EQ(roughness_of(true, RefractionInputs{}), 0.5f);
+  Principled3Inputs metal;
+  metal.metallic = 1.0f;
+  EXPECT_EQ(roughness_of(false, metal), 0.5f);
+}
+
 TEST(Mixture, NothingWeighsNothing)
 {
   MixtureLobes lobes;
@@ -450,7 +540,7 @@ TEST(Mixture, InputsThatAreNoNumbersGiveFiniteLight)
                             std::memcpy(&four, numbers, sizeof four);
                             std::memcpy(&three, numbers, sizeof three);
                             if (i % 4 == 0) {
-                              b.is_5 = true;
+                              b.is_4 = b.is_5 = true;
                               closure_add(b, spec_of_52(static_cast<ClosureDistribution>(i % 5)), 1.0f, four);
                             } else if (i % 2 == 0) {
                               closure_add(b, spec_of(true, static_cast<ClosureDistribution>(i % 5)), 1.0f, four);
