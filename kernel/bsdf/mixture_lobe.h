@@ -131,8 +131,7 @@ RELIEF_KERNEL bool mixture_lobe_is_microfacet(MixtureLobeKind kind)
 /// @param below_Ns  the same of the surface's shading normal
 /// @param below_Ng  of its geometric normal
 /// @param sampled   wi was sampled from this lobe; or else it is asked for, as the direction of a lamp is
-RELIEF_KERNEL bool
-mixture_lobe_reaches(const MixtureLobe& lobe, bool below, bool below_Ns, bool below_Ng, bool sampled)
+RELIEF_KERNEL bool mixture_lobe_reaches(const MixtureLobe& lobe, bool below, bool below_Ns, bool below_Ng, bool sampled)
 {
   const bool is_microfacet = mixture_lobe_is_microfacet(lobe.kind);
   if (!lobe.is_4 && !lobe.is_5) {

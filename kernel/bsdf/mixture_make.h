@@ -34,7 +34,7 @@ struct MixtureBuild {
   Vec3f emission{};
   Vec3f transparency{};
   float holdout = 0;
-  bool transmits = false;  ///< some lobe sends light through the surface
+  bool transmits = false;           ///< some lobe sends light through the surface
   bool is_4 = false, is_5 = false;  ///< see MixtureLobe: of the closure that is added
 };
 

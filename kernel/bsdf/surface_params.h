@@ -121,10 +121,7 @@ RELIEF_KERNEL SurfaceParams surface_params_eval(const Material& m,
 /// @param scale  factor on x and y (normalTexture.scale)
 /// @return       unit, tangent space (x along the tangent, z along the surface's normal); +z without a map, or where
 ///               the map holds no direction
-RELIEF_KERNEL Vec3f normal_map_eval(const TextureRef& ref,
-                                    float scale,
-                                    const TextureView* textures,
-                                    const Vec2f uv[2])
+RELIEF_KERNEL Vec3f normal_map_eval(const TextureRef& ref, float scale, const TextureView* textures, const Vec2f uv[2])
 {
   if (ref.texture_index < 0) return {0, 0, 1};
   constexpr float kFinest[2] = {0, 0};

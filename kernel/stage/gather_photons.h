@@ -44,7 +44,8 @@ hit_photon_lobe(const KernelGlobals& g, const PathState& state, std::uint32_t pa
   const Material& material = g.materials[g.instances[state.hit_object[path]].material_index];
   PhotonLobe lobe;
   lobe.alpha = sqr(material.roughness);
-  lobe.frame = frame_from_normal(shading_normal_towards(shading_normal_turned(hit_shading_normal(g, state, path), Ng), wo));
+  lobe.frame =
+      frame_from_normal(shading_normal_towards(shading_normal_turned(hit_shading_normal(g, state, path), Ng), wo));
   lobe.wo = to_local(lobe.frame, wo);
   const float eta = front ? material.ior : 1.0f / material.ior;
   const bool glass = material.transmission > 0.0f && material.thickness > 0.0f && material.metallic == 0.0f;

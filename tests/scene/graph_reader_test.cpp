@@ -177,9 +177,7 @@ TEST(GraphReader, NormalsAndHeightsAreOfTheFinestLevelAndColoursAreNot)
     }
     return false;
   };
-  const json image = {{"type", "image-texture"},
-                      {"texture", {{"index", 0}}},
-                      {"inputs", {{"vector", of(0, "uv")}}}};
+  const json image = {{"type", "image-texture"}, {"texture", {{"index", 0}}}, {"inputs", {{"vector", of(0, "uv")}}}};
   const json coordinate = {{"type", "texture-coordinate"}};
   EXPECT_TRUE(has_width({coordinate, image}, "color", of(1, "color")));
   EXPECT_FALSE(has_width({coordinate, image}, "normal", of(1, "color")));

@@ -159,7 +159,7 @@ class _Plain:
         self._require(not self._bends(node.inputs["Normal"], groups))
         self._require(self._color(node.inputs["Color"], groups).is_constant(_WHITE))
         if node.distribution != "SHARP":
-            self._require(self._constant(node.inputs["Roughness"], groups) <= _SHARP)
+            self._require(abs(self._constant(node.inputs["Roughness"], groups)) <= _SHARP)
 
     def _mirror(self, node, groups):
         self._require_sharp_white(node, groups)

@@ -207,13 +207,14 @@ TEST(BlenderLobe, ClearcoatFindsLightAsGgxOfItsRoughness)
         const double z = (i + 0.5) / kZ, r = std::sqrt(1.0 - z * z);
         for (int j = 0; j < kPhi; ++j) {
           const double phi = M_PI * ((j + 0.5) / kPhi - 0.5);
-          const double h[3] = {static_cast<double>(wo.x) + r * std::cos(phi), static_cast<double>(wo.y) + r * std::sin(phi),
-                               static_cast<double>(wo.z) + z};
+          const double h[3] = {static_cast<double>(wo.x) + r * std::cos(phi),
+                               static_cast<double>(wo.y) + r * std::sin(phi), static_cast<double>(wo.z) + z};
           const double a2 = static_cast<double>(alpha) * static_cast<double>(alpha);
           const double cos2 = h[2] * h[2] / (h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
           const double t = 1.0 - cos2 + a2 * cos2;
           const double D = a2 / (M_PI * t * t);
-          const double pdf = G1(static_cast<double>(wo_z), static_cast<double>(alpha)) * D / (4.0 * static_cast<double>(wo_z));
+          const double pdf =
+              G1(static_cast<double>(wo_z), static_cast<double>(alpha)) * D / (4.0 * static_cast<double>(wo_z));
           expected += pdf * G1(z, 0.25) * M_PI / kPhi / kZ;
         }
       }

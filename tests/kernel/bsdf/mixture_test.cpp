@@ -438,7 +438,9 @@ TEST(Mixture, BentMirrorsLoseNothingAboveTheFacet)
     TestRandom r(23);
     int num_apart = 0;
     for (int i = 0; i < 2000; ++i) {
-      const auto lean = [&r](float by) { return normalize(Vec3f{by * (r.next() - 0.5f), by * (r.next() - 0.5f), 1.0f}); };
+      const auto lean = [&r](float by) {
+        return normalize(Vec3f{by * (r.next() - 0.5f), by * (r.next() - 0.5f), 1.0f});
+      };
       const Vec3f Ns = lean(1.0f), bent = lean(2.0f);
       const Vec3f wo = direction(0.05f + 0.9f * r.next(), 6.0f * r.next());
       MixtureLobes lobes;
