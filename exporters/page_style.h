@@ -9,18 +9,20 @@ inline constexpr const char* kPageStyle = R"(
 :root{--ink:#e6e9ed;--dim:#9aa4af;--page:#14171b;--panel:#1d2126;--line:#3a414a;--bar:#56b4e9}}
 *{box-sizing:border-box}
 body{font:15px/1.45 system-ui,sans-serif;max-width:1320px;margin:2em auto;padding:0 1em;color:var(--ink);background:var(--page)}
-h1{font-size:26px;margin:0 0 .3em;overflow-wrap:anywhere}
+h1{font-size:26px;margin:0 0 .3em;overflow-wrap:break-word}
 h2{font-size:20px;margin:2em 0 .6em;padding-bottom:.2em;border-bottom:1px solid var(--line)}
 h3{font-size:15px;margin:1.2em 0 .4em}
 table{border-collapse:collapse;margin:1em 0;font-size:13px}
-th,td{border:1px solid var(--line);padding:2px 8px;text-align:left;overflow-wrap:anywhere}
+th,td{border:1px solid var(--line);padding:2px 8px;text-align:left}
+td{overflow-wrap:anywhere}
 th{background:var(--panel)}
 td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 td:first-child{min-width:10em}
+.scroll{overflow-x:auto}
 .row{display:flex;flex-wrap:wrap;gap:12px;align-items:flex-start}
 figure{margin:0;width:min-content}
 figcaption{font-size:12px;color:var(--dim)}
-svg.plot{background:var(--panel);color:var(--ink);font-family:system-ui,sans-serif;border-radius:6px}
+svg.plot{max-width:100%;height:auto;background:var(--panel);color:var(--ink);font-family:system-ui,sans-serif;border-radius:6px}
 svg.plot text{fill:var(--ink)}
 svg.plot .grid{stroke:var(--line)}
 svg.plot .axis{stroke:var(--ink)}

@@ -54,7 +54,8 @@ std::string html_paragraph(std::string_view text) { return "<p>" + html_escape(t
 
 std::string html_table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows)
 {
-  std::string html = "<table><tr>";
+  // Words of headings are whole: a table may be wider than the page.
+  std::string html = "<div class='scroll'><table><tr>";
   for (const std::string& cell : header) html += "<th>" + html_escape(cell) + "</th>";
   html += "</tr>\n";
   for (const std::vector<std::string>& row : rows) {
@@ -65,7 +66,7 @@ std::string html_table(const std::vector<std::string>& header, const std::vector
     }
     html += "</tr>\n";
   }
-  return html + "</table>\n";
+  return html + "</table></div>\n";
 }
 
 std::string html_picture(int width, int height, std::span<const std::uint8_t> rgb, std::string_view caption, int scale)

@@ -15,13 +15,18 @@ namespace relief {
 
 namespace {
 
-/// Colours that can be told apart with any kind of colour vision.
-/// @source Okabe, Ito 2008, "Color Universal Design"; yellow left out: too light for lines on white
-constexpr std::array kColors = {"#0072b2", "#d55e00",      "#009e73", "#cc79a7", "#56b4e9",
-                                "#e69f00", "currentColor", "#999999", "#7a4fa3", "#6b8e23"};
+/// The first seven can be told apart with any kind of colour vision; marks help with the others.
+/// @source Okabe, Ito 2008, "Color Universal Design"; yellow left out: too light for lines on white; the light blue, too: there is a
+///         blue already
+constexpr std::array kColors = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "currentColor", "#8c8c8c",
+                                "#7a4fa3", "#e31a1c", "#6b8e23", "#8c510a", "#35c4c4", "#b8a000", "#ff9da7", "#5c0a3a",
+                                "#a6d854"};
+constexpr int kNumMarks = 4;
 
-constexpr int kWidth = 620, kHeight = 360;
-constexpr int kLeft = 62, kRight = 170, kTop = 30, kBottom = 48;
+/// Sizes at which words can be read when the page is shown at half its size.
+constexpr int kWidth = 820, kHeight = 500, kFont = 18, kTitleFont = 20;
+constexpr int kLeft = 96, kRight = 240, kTop = 40, kBottom = 76;
+constexpr double kLegendLine = 25;
 
 std::string number_text(double value)
 {
@@ -117,34 +122,61 @@ std::string svg_line(double x0, double y0, double x1, double y1, std::string_vie
          "' y2='" + coordinate_text(y1) + "' " + std::string(attributes) + "/>";
 }
 
-std::string color_of(std::size_t series) { return kColors[series % kColors.size()]; }
+/// The mark of a style around a point.
+std::string svg_mark(double x, double y, double radius, const PlotStyles::Style& style)
+{
+  const auto at = [&](double dx, double dy) {
+    return coordinate_text(x + dx * radius) + "," + coordinate_text(y + dy * radius) + " ";
+  };
+  const std::string fill = "fill='" + style.color + "'";
+  switch (style.mark) {
+    case 0:
+      return "<circle cx='" + coordinate_text(x) + "' cy='" + coordinate_text(y) + "' r='" + coordinate_text(radius) +
+             "' " + fill + "/>";
+    case 1:
+      return "<polygon points='" + at(-.9, -.9) + at(.9, -.9) + at(.9, .9) + at(-.9, .9) + "' " + fill + "/>";
+    case 2:
+      return "<polygon points='" + at(0, -1.3) + at(1.2, .9) + at(-1.2, .9) + "' " + fill + "/>";
+    default:
+      return "<polygon points='" + at(0, -1.4) + at(1.4, 0) + at(0, 1.4) + at(-1.4, 0) + "' " + fill + "/>";
+  }
+}
 
 /// Frame, title, labels, the y axis with its grid, and the legend.
-std::string svg_begin(const PlotAxes& axes, const Scale& y, const std::vector<PlotSeries>& series)
+/// @param styles      of the series
+/// @param has_marks   the legend shows those of lines, and else squares
+std::string svg_begin(const PlotAxes& axes,
+                      const Scale& y,
+                      const std::vector<PlotSeries>& series,
+                      const std::vector<PlotStyles::Style>& styles,
+                      bool has_marks)
 {
-  std::string svg = "<svg width='" + std::to_string(kWidth) + "' height='" + std::to_string(kHeight) +
-                    "' class='plot' font-size='11'>";
-  svg += svg_text(kLeft, 18, axes.title, "font-size='13' font-weight='bold'");
-  svg += svg_text((kLeft + kWidth - kRight) / 2.0, kHeight - 8, axes.x_label, "text-anchor='middle'");
+  const std::string size = std::to_string(kWidth) + " " + std::to_string(kHeight);
+  std::string svg = "<svg width='" + std::to_string(kWidth) + "' viewBox='0 0 " + size + "' class='plot' font-size='" +
+                    std::to_string(kFont) + "'>";
+  svg += svg_text(kLeft, kTitleFont + 6, axes.title,
+                  "font-weight='bold' font-size='" + std::to_string(kTitleFont) + "'");
+  svg += svg_text((kLeft + kWidth - kRight) / 2.0, kHeight - 12, axes.x_label, "text-anchor='middle'");
   const double middle = (kTop + kHeight - kBottom) / 2.0;
-  svg += svg_text(14, middle, axes.y_label,
-                  "text-anchor='middle' transform='rotate(-90 14 " + coordinate_text(middle) + ")'");
+  const std::string y_label_x = std::to_string(kFont + 2);
+  svg += svg_text(kFont + 2, middle, axes.y_label,
+                  "text-anchor='middle' transform='rotate(-90 " + y_label_x + " " + coordinate_text(middle) + ")'");
   for (const double tick : ticks_of(y)) {
     svg += svg_line(kLeft, y.at(tick), kWidth - kRight, y.at(tick), "class='grid'");
-    svg += svg_text(kLeft - 5, y.at(tick) + 4, number_text(tick), "text-anchor='end'");
+    svg += svg_text(kLeft - 7, y.at(tick) + 6, number_text(tick), "text-anchor='end'");
   }
   svg += svg_line(kLeft, kTop, kLeft, kHeight - kBottom, "class='axis'");
   svg += svg_line(kLeft, kHeight - kBottom, kWidth - kRight, kHeight - kBottom, "class='axis'");
   for (std::size_t s = 0; s < series.size(); ++s) {
-    const double line_y = kTop + 8 + 16 * static_cast<double>(s);
+    const double line_y = kTop + 14 + kLegendLine * static_cast<double>(s);
+    constexpr double kSign = kWidth - kRight + 24, kName = kWidth - kRight + 42;
     if (series[s].is_guide) {
-      svg += svg_line(kWidth - kRight + 10, line_y - 3, kWidth - kRight + 24, line_y - 3, "class='guide'");
-      svg += svg_text(kWidth - kRight + 27, line_y + 1, series[s].name, "");
-      continue;
+      svg += svg_line(kSign - 12, line_y - 6, kSign + 12, line_y - 6, "class='guide'");
+    } else {
+      svg += svg_mark(kSign, line_y - 6, has_marks ? 6 : 8,
+                      has_marks ? styles[s] : PlotStyles::Style{styles[s].color, 1});
     }
-    svg += "<rect x='" + std::to_string(kWidth - kRight + 12) + "' y='" + coordinate_text(line_y - 8) +
-           "' width='10' height='10' fill='" + color_of(s) + "'/>";
-    svg += svg_text(kWidth - kRight + 27, line_y + 1, series[s].name, "");
+    svg += svg_text(kName, line_y, series[s].name, "");
   }
   return svg;
 }
@@ -156,16 +188,31 @@ std::vector<double> all_values(const std::vector<PlotSeries>& series, std::vecto
   return values;
 }
 
+/// Guides have none of their own.
+std::vector<PlotStyles::Style> styles_of(const std::vector<PlotSeries>& series, PlotStyles& styles)
+{
+  std::vector<PlotStyles::Style> all;
+  for (const PlotSeries& s : series) all.push_back(s.is_guide ? PlotStyles::Style{} : styles.of(s.name));
+  return all;
+}
+
 }  // namespace
 
-std::string svg_line_plot(const PlotAxes& axes, const std::vector<PlotSeries>& series)
+PlotStyles::Style PlotStyles::of(const std::string& name)
 {
+  const std::size_t index = index_of_.try_emplace(name.substr(0, name.find(" (")), index_of_.size()).first->second;
+  return {kColors[index % kColors.size()], static_cast<int>((index + index / kColors.size()) % kNumMarks)};
+}
+
+std::string svg_line_plot(const PlotAxes& axes, const std::vector<PlotSeries>& series, PlotStyles& page_styles)
+{
+  const std::vector<PlotStyles::Style> styles = styles_of(series, page_styles);
   const Scale x = scale_of(all_values(series, &PlotSeries::x), axes.log_x, false, kLeft + 8, kWidth - kRight - 8);
   const Scale y = scale_of(all_values(series, &PlotSeries::y), axes.log_y, false, kHeight - kBottom - 6, kTop + 6);
-  std::string svg = svg_begin(axes, y, series);
+  std::string svg = svg_begin(axes, y, series, styles, true);
   for (const double tick : ticks_of(x)) {
-    svg += svg_line(x.at(tick), kHeight - kBottom, x.at(tick), kHeight - kBottom + 4, "class='axis'");
-    svg += svg_text(x.at(tick), kHeight - kBottom + 16, number_text(tick), "text-anchor='middle'");
+    svg += svg_line(x.at(tick), kHeight - kBottom, x.at(tick), kHeight - kBottom + 6, "class='axis'");
+    svg += svg_text(x.at(tick), kHeight - kBottom + kFont + 8, number_text(tick), "text-anchor='middle'");
   }
   for (std::size_t s = 0; s < series.size(); ++s) {
     std::string path, marks;
@@ -175,15 +222,15 @@ std::string svg_line_plot(const PlotAxes& axes, const std::vector<PlotSeries>& s
         pen_down = false;
         continue;
       }
-      const std::string px = coordinate_text(x.at(series[s].x[k])), py = coordinate_text(y.at(series[s].y[k]));
-      path += (pen_down ? "L" : "M") + px + " " + py;
-      marks += "<circle cx='" + px + "' cy='" + py + "' r='3' fill='" + color_of(s) + "'/>";
+      const double px = x.at(series[s].x[k]), py = y.at(series[s].y[k]);
+      path += (pen_down ? "L" : "M") + coordinate_text(px) + " " + coordinate_text(py);
+      marks += svg_mark(px, py, 4.5, styles[s]);
       pen_down = true;
     }
     if (series[s].is_guide) {
       svg += "<path d='" + path + "' class='guide'/>";
     } else {
-      svg += "<path d='" + path + "' fill='none' stroke='" + color_of(s) + "' stroke-width='1.6'/>" + marks;
+      svg += "<path d='" + path + "' fill='none' stroke='" + styles[s].color + "' stroke-width='2.2'/>" + marks;
     }
   }
   return svg + "</svg>\n";
@@ -191,26 +238,27 @@ std::string svg_line_plot(const PlotAxes& axes, const std::vector<PlotSeries>& s
 
 std::string svg_bar_plot(const PlotAxes& axes,
                          const std::vector<std::string>& labels,
-                         const std::vector<PlotSeries>& series)
+                         const std::vector<PlotSeries>& series,
+                         PlotStyles& page_styles)
 {
+  const std::vector<PlotStyles::Style> styles = styles_of(series, page_styles);
   const Scale y = scale_of(all_values(series, &PlotSeries::y), axes.log_y, true, kHeight - kBottom, kTop + 6);
-  std::string svg = svg_begin(axes, y, series);
+  std::string svg = svg_begin(axes, y, series, styles, false);
   const double group =
       static_cast<double>(kWidth - kRight - kLeft) / static_cast<double>(std::max<std::size_t>(labels.size(), 1));
   const double bar = 0.8 * group / static_cast<double>(std::max<std::size_t>(series.size(), 1));
   for (std::size_t g = 0; g < labels.size(); ++g) {
     const double left = kLeft + group * static_cast<double>(g);
-    svg += svg_text(left + group / 2, kHeight - kBottom + 14, labels[g],
-                    labels.size() > 5
-                        ? "text-anchor='end' font-size='9' transform='rotate(-20 " + coordinate_text(left + group / 2) +
-                              " " + std::to_string(kHeight - kBottom + 14) + ")'"
-                        : "text-anchor='middle'");
+    constexpr int kLabel = kHeight - kBottom + kFont + 2;
+    const std::string turned = "text-anchor='end' font-size='16' transform='rotate(-28 " +
+                               coordinate_text(left + group / 2) + " " + std::to_string(kLabel) + ")'";
+    svg += svg_text(left + group / 2, kLabel, labels[g], labels.size() > 3 ? turned : "text-anchor='middle'");
     for (std::size_t s = 0; s < series.size(); ++s) {
       if (g >= series[s].y.size() || !y.shows(series[s].y[g])) continue;
       const double top = y.at(series[s].y[g]);
       svg += "<rect x='" + coordinate_text(left + 0.1 * group + bar * static_cast<double>(s)) + "' y='" +
              coordinate_text(top) + "' width='" + coordinate_text(std::max(bar - 0.5, 0.5)) + "' height='" +
-             coordinate_text(kHeight - kBottom - top) + "' fill='" + color_of(s) + "'/>";
+             coordinate_text(kHeight - kBottom - top) + "' fill='" + styles[s].color + "'/>";
     }
   }
   return svg + "</svg>\n";

@@ -269,15 +269,15 @@ std::string conditions(const BenchResults& results)
       results.isa, results.map_scale, results.resolution.width, results.resolution.height, results.rounds);
 }
 
-std::string html(const Sweep& sweep)
+std::string html(const Sweep& sweep, PlotStyles& styles)
 {
   std::vector<PlotSeries> series;
   for (const Sweep::Line& line : sweep.lines) series.push_back({line.name, line.x, line.y});
-  return svg_line_plot({sweep.title, sweep.x_label, sweep.y_label, true, sweep.log_y}, series);
+  return svg_line_plot({sweep.title, sweep.x_label, sweep.y_label, true, sweep.log_y}, series, styles);
 }
 
 /// Bars of all methods' speeds on all scenes.
-std::string speed_plot(const BenchResults& results, BenchRayKind kind)
+std::string speed_plot(const BenchResults& results, BenchRayKind kind, PlotStyles& styles)
 {
   std::vector<std::string> labels;
   std::vector<PlotSeries> series;
@@ -290,10 +290,10 @@ std::string speed_plot(const BenchResults& results, BenchRayKind kind)
   }
   return svg_bar_plot(
       {fmt::format("{} rays", kBenchRayKindNames[static_cast<std::size_t>(kind)]), "", "Mrays/s", false, true}, labels,
-      series);
+      series, styles);
 }
 
-std::string memory_plot(const BenchResults& results)
+std::string memory_plot(const BenchResults& results, PlotStyles& styles)
 {
   std::vector<std::string> labels;
   std::vector<PlotSeries> series;
@@ -304,7 +304,7 @@ std::string memory_plot(const BenchResults& results)
       series[m].y.push_back(static_cast<double>(scene.methods[m].bytes()) / (1 << 20));
     }
   }
-  return svg_bar_plot({"memory besides the map", "", "MiB", false, true}, labels, series);
+  return svg_bar_plot({"memory besides the map", "", "MiB", false, true}, labels, series, styles);
 }
 
 /// Half as wide and high, each pixel the mean of four.
@@ -490,13 +490,14 @@ std::string bench_json(const BenchResults& results)
 
 std::string bench_html(const BenchResults& results)
 {
+  PlotStyles styles;
   std::vector<std::string> pieces = {html_paragraph(conditions(results))};
   if (!results.scenes.empty()) {
     pieces.push_back(html(paper_table(results)));
     pieces.push_back(html(memory_table(results)));
     std::vector<std::string> plots;
-    for (const BenchRayKind kind : kKinds) plots.push_back(speed_plot(results, kind));
-    plots.push_back(memory_plot(results));
+    for (const BenchRayKind kind : kKinds) plots.push_back(speed_plot(results, kind, styles));
+    plots.push_back(memory_plot(results, styles));
     pieces.push_back(html_row(plots));
   }
   for (const SceneResult& scene : results.scenes) {
@@ -507,7 +508,7 @@ std::string bench_html(const BenchResults& results)
     if (sweeps->empty()) continue;
     pieces.push_back(html_heading(title, 2));
     std::vector<std::string> plots;
-    for (const Sweep& sweep : *sweeps) plots.push_back(html(sweep));
+    for (const Sweep& sweep : *sweeps) plots.push_back(html(sweep, styles));
     pieces.push_back(html_row(plots));
   }
   if (!results.inversion.empty()) pieces.push_back(html(variant_table(kInversionTitle, results.inversion)));

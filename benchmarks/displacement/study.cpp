@@ -213,7 +213,7 @@ void Study::add_marching(const BenchSceneSpec& spec) const
                          traversal_spec(fmt::format("rmip {}²", sizes.low), DisplacementMethod::rmip, sizes.low),
                          traversal_spec(fmt::format("rmip {}²", sizes.equal), DisplacementMethod::rmip, sizes.equal),
                          traversal_spec(fmt::format("rmip {}²", sizes.high), DisplacementMethod::rmip, sizes.high),
-                         traversal_spec("rmip on minmax mipmap", DisplacementMethod::rmip_minmax)});
+                         traversal_spec("rmip-minmax", DisplacementMethod::rmip_minmax)});
   const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution);
   Sweep sweep;
   sweep.title = fmt::format("{}: time of primary rays", spec.name);

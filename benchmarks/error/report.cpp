@@ -63,7 +63,10 @@ Table measurements(const ErrorSceneResult& scene)
   return table;
 }
 
-std::string plot(const ErrorSceneResult& scene, const char* label, double ErrorMeasurement::*value)
+std::string plot(const ErrorSceneResult& scene,
+                 const char* label,
+                 double ErrorMeasurement::*value,
+                 PlotStyles& styles)
 {
   std::vector<PlotSeries> lines;
   for (const ErrorSeries& series : scene.series) {
@@ -74,7 +77,7 @@ std::string plot(const ErrorSceneResult& scene, const char* label, double ErrorM
     }
     lines.push_back(std::move(line));
   }
-  return svg_line_plot({scene.scene, "seconds of sampling", label, true, true}, lines);
+  return svg_line_plot({scene.scene, "seconds of sampling", label, true, true}, lines, styles);
 }
 
 }  // namespace
@@ -124,10 +127,11 @@ std::string error_study_html(const ErrorStudyResults& results)
       "Each way to render a scene, with four times the samples from point to point, against one reference. "
       "Errors at equal times, and times to equal error, lie on straight lines between the points of these "
       "logarithmic plots.")};
+  PlotStyles styles;
   for (const ErrorSceneResult& scene : results.scenes) {
     pieces.push_back(html(summary(results, scene)));
     pieces.push_back(
-        html_row({plot(scene, "RMSE", &ErrorMeasurement::rmse), plot(scene, "relMSE", &ErrorMeasurement::relmse)}));
+        html_row({plot(scene, "RMSE", &ErrorMeasurement::rmse, styles), plot(scene, "relMSE", &ErrorMeasurement::relmse, styles)}));
     pieces.push_back("<details><summary>All renders</summary>" + html(measurements(scene)) + "</details>\n");
   }
   return html_page("Speed against error", pieces);

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <ctime>
 #include <filesystem>
+#include <iterator>
+#include <tuple>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -270,11 +272,33 @@ Table trace_table(const HeightfieldTexture& texture)
       "their steps.",
       {"map", "corrected", "stepping", "refinement", "at most", "ns", "steps", "wrong", "given up"},
       {}};
-  for (const HeightfieldResult& r : texture.results) {
-    table.rows.push_back({r.map, r.is_corrected ? "yes" : "", r.stepping, r.refinement,
-                          r.max_iterations > 0 ? std::to_string(r.max_iterations) : "–",
-                          fmt::format("{:.0f}", r.nanoseconds), fmt::format("{:.3g}", r.steps), per_cent(r.wrong),
-                          per_cent(r.unconverged)});
+  // Grouped as the paper's: by map, then by what is done with it. What a row shares with the one above is said once.
+  std::vector<const HeightfieldResult*> rows;
+  for (const HeightfieldResult& r : texture.results) rows.push_back(&r);
+  const auto place = [&](const HeightfieldResult* r) {
+    return std::find_if(rows.begin(), rows.end(), [&](const HeightfieldResult* other) { return other->map == r->map; });
+  };
+  std::vector<std::vector<const HeightfieldResult*>> groups;
+  for (auto row = rows.begin(); row != rows.end(); ++row) {
+    if (place(*row) != row) continue;
+    std::vector<const HeightfieldResult*>& group = groups.emplace_back();
+    std::copy_if(rows.begin(), rows.end(), std::back_inserter(group),
+                 [&](const HeightfieldResult* r) { return r->map == (*row)->map; });
+    std::stable_sort(group.begin(), group.end(), [](const HeightfieldResult* a, const HeightfieldResult* b) {
+      return std::tie(a->is_corrected, a->stepping) < std::tie(b->is_corrected, b->stepping);
+    });
+  }
+  for (const auto& group : groups) {
+    const HeightfieldResult* above = nullptr;
+    for (const HeightfieldResult* r : group) {
+      const bool same_map = above != nullptr;
+      const bool same_way = same_map && r->is_corrected == above->is_corrected && r->stepping == above->stepping;
+      table.rows.push_back({same_map ? "" : r->map, same_way || !r->is_corrected ? "" : "yes", same_way ? "" : r->stepping,
+                            r->refinement, r->max_iterations > 0 ? std::to_string(r->max_iterations) : "–",
+                            fmt::format("{:.0f}", r->nanoseconds), fmt::format("{:.3g}", r->steps), per_cent(r->wrong),
+                            per_cent(r->unconverged)});
+      above = r;
+    }
   }
   return table;
 }

@@ -397,13 +397,14 @@ std::string bench_procedural_html(const ProceduralResults& results)
     x_march.push_back(r.n);
     missed.push_back(100 * (r.missed + r.passed_over));
   }
+  PlotStyles styles;
   std::vector<std::string> plots, pieces = {html_paragraph(conditions(results))};
   if (!results.lattices.empty())
     plots.push_back(
-        svg_line_plot({"error of the lattice", "N", "parts of the range", true, true}, {{"rms", x, error}}));
+        svg_line_plot({"error of the lattice", "N", "parts of the range", true, true}, {{"rms", x, error}}, styles));
   if (!results.marches.empty())
     plots.push_back(svg_line_plot({"rays that marching gets wrong", "N", "%", true, false},
-                                  {{"double precision", x_march, missed}}));
+                                  {{"double precision", x_march, missed}}, styles));
   pieces.push_back(html_row(plots));
   if (!results.marches.empty()) pieces.push_back(html(march_table(results)));
   if (!results.lattices.empty()) pieces.push_back(html(lattice_table(results)));

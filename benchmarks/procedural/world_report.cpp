@@ -150,6 +150,7 @@ nlohmann::ordered_json world_json(const WorldStudy& study)
 
 std::string world_html(const WorldStudy& study)
 {
+  PlotStyles styles;
   std::vector<std::string> labels;
   std::vector<PlotSeries> series;
   for (const char* name : {"primary, first", "primary", "bounce", "shadow"}) series.push_back({name, {}, {}});
@@ -160,7 +161,7 @@ std::string world_html(const WorldStudy& study)
   }
   const std::vector<std::string> pictures = {
       html_picture(study.picture_width, study.picture_height, study.rgb, cells_text(study.results[0]), 1),
-      svg_bar_plot({"rays", "", "millions a second", false, true}, labels, series)};
+      svg_bar_plot({"rays", "", "millions a second", false, true}, labels, series, styles)};
   return html_heading(study.spec->title, 2) + html_row(pictures) + html(size_table(study)) + html(rate_table(study));
 }
 

@@ -101,7 +101,8 @@ std::string error_plot(const Json& errors,
   }
   if (series.empty()) return {};
   series.push_back(slope_of(series.back(), slope, power));
-  return svg_line_plot(axes, series);
+  PlotStyles styles;
+  return svg_line_plot(axes, series, styles);
 }
 
 std::string cell_of(const Json& point, const char* key)

@@ -5,7 +5,9 @@
 
 #include <cmath>
 #include <memory>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "exporters/png_encode.h"
@@ -53,8 +55,9 @@ TEST(ReportHtml, TextCannotBecomeMarkup)
 TEST(ReportHtml, NothingIsLoadedFromElsewhere)
 {
   const std::vector<std::uint8_t> rgb(12, 0);
+  PlotStyles styles;
   const std::string page = html_page(
-      "t", {html_picture(2, 2, rgb, "c", 1), svg_line_plot({"p", "x", "y", true, true}, {{"s", {1, 10}, {2, 3}}})});
+      "t", {html_picture(2, 2, rgb, "c", 1), svg_line_plot({"p", "x", "y", true, true}, {{"s", {1, 10}, {2, 3}}}, styles)});
   for (const char* reference : {"http:", "https:", "<script", "url(", "<link"}) {
     EXPECT_EQ(page.find(reference), std::string::npos) << reference;
   }
@@ -70,17 +73,41 @@ int count(const std::string& text, const std::string& what)
 TEST(ReportHtml, PlotsShowWhatCanBeShown)
 {
   const double nan = std::nan("");
-  const std::string lines = svg_line_plot({"p", "x", "y", true, true},
-                                          {{"a", {1, 2, 4}, {1, nan, 3}}, {"b", {0, 2}, {1, -1}}, {"none", {}, {}}});
-  EXPECT_EQ(count(lines, "<circle"), 2);
+  PlotStyles styles;
+  const std::string lines =
+      svg_line_plot({"p", "x", "y", true, true},
+                    {{"a", {1, 2, 4}, {1, nan, 3}}, {"b", {0, 2}, {1, -1}}, {"none", {}, {}}}, styles);
+  // One of the legend, two points.
+  EXPECT_EQ(count(lines, "<circle"), 3);
   EXPECT_EQ(count(lines, "nan"), 0);
   EXPECT_EQ(count(lines, "inf"), 0);
   const std::string bars =
-      svg_bar_plot({"p", "", "y", false, true}, {"one", "two"}, {{"a", {}, {5, nan}}, {"b", {}, {7}}});
-  // Two of the legend, two bars.
-  EXPECT_EQ(count(bars, "<rect"), 4);
-  EXPECT_EQ(count(svg_bar_plot({}, {}, {}), "nan"), 0);
-  EXPECT_EQ(count(svg_line_plot({}, {}), "nan"), 0);
+      svg_bar_plot({"p", "", "y", false, true}, {"one", "two"}, {{"a", {}, {5, nan}}, {"b", {}, {7}}}, styles);
+  EXPECT_EQ(count(bars, "<rect"), 2);
+  EXPECT_EQ(count(svg_bar_plot({}, {}, {}, styles), "nan"), 0);
+  EXPECT_EQ(count(svg_line_plot({}, {}, styles), "nan"), 0);
+}
+
+TEST(ReportHtml, ASeriesLooksTheSameInAllPlotsAndLikeNoOther)
+{
+  PlotStyles styles;
+  std::set<std::pair<std::string, int>> all;
+  std::set<std::string> colors;
+  for (int i = 0; i < 64; ++i) {
+    const PlotStyles::Style style = styles.of("method " + std::to_string(i));
+    all.emplace(style.color, style.mark);
+    if (i < 16) colors.insert(style.color);
+  }
+  EXPECT_EQ(all.size(), 64u);
+  EXPECT_EQ(colors.size(), 16u);
+  EXPECT_EQ(styles.of("method 7 (0.3 M)").color, styles.of("method 7").color);
+  // Whatever stands before it in a plot.
+  const std::string color = "stroke='" + styles.of("method 9").color + "'";
+  for (const std::vector<PlotSeries>& series :
+       {std::vector<PlotSeries>{{"method 9", {1, 2}, {1, 2}}},
+        std::vector<PlotSeries>{{"method 3", {1, 2}, {1, 2}}, {"method 9", {1, 2}, {1, 2}}}}) {
+    EXPECT_EQ(count(svg_line_plot({"p", "x", "y"}, series, styles), color), 1);
+  }
 }
 
 TEST(ReportHtml, NumbersAreAlignedAndShortRowsFilled)
