@@ -146,10 +146,11 @@ std::string hits_csv(const std::vector<TraceHit>& hits)
 }
 
 /// What one prism did to a ray, several lines.
-std::string visit_text(const Scene& scene, const PrismVisit& visit)
+/// @param t_unit  as for prism_explain
+std::string visit_text(const Scene& scene, const PrismVisit& visit, double t_unit)
 {
   const Instance& instance = scene.instances[visit.instance];
-  const PrismExplanation e = prism_explain(visit);
+  const PrismExplanation e = prism_explain(visit, t_unit);
   std::string text =
       fmt::format("mesh {} triangle {} (node '{}'): ", instance.mesh_index, e.triangle, printable_text(instance.name));
   if (e.num_stretches == 0) return text + "in its box, beside its prism\n";
@@ -176,7 +177,7 @@ std::string explanation_text(const Scene& scene, const SceneContext& context, co
                                  ray.D.x, ray.D.y, ray.D.z, ray.t_min, ray.t_max);
   TraversalCounters total;
   for (const PrismVisit& visit : explained.visits) {
-    text += visit_text(scene, visit);
+    text += visit_text(scene, visit, explained.t_unit);
     total.prisms += visit.counters.prisms;
     total.bounds += visit.counters.bounds;
     total.texels += visit.counters.texels;

@@ -18,25 +18,25 @@ double whole_periods(const LatticeAxis& axis, double x)
 
 }  // namespace
 
-PrismExplanation prism_explain(const PrismVisit& visit)
+PrismExplanation prism_explain(const PrismVisit& visit, double t_unit)
 {
   const MeshAtTime then(visit.geometry->mesh, visit.triangle, visit.time);
   DisplacedMeshView mesh = then.mesh;
   DisplacedTriangle tri = then.tri();
   PrismExplanation out;
   const ObjectRay& ray = visit.ray;
-  const auto t_world = [&](double t) { return ray.t_start + ray.t_scale * t; };
-  out.ray.D = to_float(ray.D * (1.0 / ray.t_scale));
+  const auto t_asked = [&](double t) { return (ray.t_start + ray.t_scale * t) * t_unit; };
+  out.ray.D = to_float(ray.D * (1.0 / (ray.t_scale * t_unit)));
   out.ray.O = to_float(ray.O - ray.D * (ray.t_start / ray.t_scale));
-  out.t_min = t_world(visit.t_min);
-  out.t_max = t_world(visit.t_max);
-  out.t = t_world(visit.hit.t);
+  out.t_min = t_asked(visit.t_min);
+  out.t_max = t_asked(visit.t_max);
+  out.t = t_asked(visit.hit.t);
   out.folded = mesh.unfolded[then.triangle] == 0;
   RayCurve curve;
   if (ray_curve_make(ray_frame_make(ray.O, ray.D), tri, &curve)) {
     for (int k = 0; k < curve.num_segments; ++k) {
       const CurveSegment& g = curve.segments[k];
-      out.stretches[out.num_stretches++] = {t_world(g.t0), t_world(g.t1), g.s0, g.s0 + g.ds};
+      out.stretches[out.num_stretches++] = {t_asked(g.t0), t_asked(g.t1), g.s0, g.s0 + g.ds};
     }
   }
   const ProceduralField* const procedural = visit.geometry->procedural;

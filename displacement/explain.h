@@ -40,14 +40,14 @@ RELIEF_KERNEL void prism_visits_add(PrismVisits& visits, const PrismVisit& visit
 
 /// A stretch of a ray inside a prism.
 struct PrismStretch {
-  double t0 = 0, t1 = 0;  ///< world
+  double t0 = 0, t1 = 0;  ///< of the ray that was asked about
   double s0 = 0, s1 = 0;  ///< d/|N| where it begins and ends
 };
 
 /// The geometry behind a visit.
 struct PrismExplanation {
   ExplainedRay ray;
-  double t_min = 0, t_max = 0, t = 0;         ///< of the visit and its hit, world
+  double t_min = 0, t_max = 0, t = 0;         ///< of the visit and its hit, of the ray that was asked about
   PrismStretch stretches[kMaxCurveSegments];  ///< in the order of t
   int num_stretches = 0;                      ///< 0: the ray enters the box and misses the prism
   bool folded = false;                        ///< displacement lines may cross: every stretch is searched to its end
@@ -59,6 +59,8 @@ struct PrismExplanation {
   double h = 0, d = 0;                        ///< its height, and the displacement in metres of object space
 };
 
-PrismExplanation prism_explain(const PrismVisit& visit);
+/// @param t_unit  what one unit of t of the ray that was traced is in that of the ray that was asked about, a power of two: the
+///                two differ in the lengths of their directions
+PrismExplanation prism_explain(const PrismVisit& visit, double t_unit = 1);
 
 }  // namespace relief

@@ -17,6 +17,9 @@ namespace {
 /// Single rays see what moves as it is when the shutter is half done.
 constexpr float kTraceTime = 0.5f;
 
+/// Directions of any length are traced as long as Embree takes them: divided by two to this power.
+int direction_exponent(const TraceRay& ray) { return std::ilogb(max_component(abs(ray.D))); }
+
 /// @param visits  may be null
 TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits* visits)
 {
@@ -26,8 +29,7 @@ TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits
   embree.displacement = &counters;
   embree.visits = visits;
   TraceHit result;
-  // Directions of any length, to a power of two: as long as Embree takes them.
-  const int exponent = std::ilogb(max_component(abs(ray.D)));
+  const int exponent = direction_exponent(ray);
   const auto scaled = [exponent](float v, int by) { return std::ldexp(v, by * exponent); };
   const Vec3f D{scaled(ray.D.x, -1), scaled(ray.D.y, -1), scaled(ray.D.z, -1)};
   const float t_max = scaled(ray.t_max, 1);
@@ -104,6 +106,7 @@ TraceExplanation trace_explain(const SceneContext& context, const TraceRay& ray)
   out.visits.resize(visits.size);
   visits = {out.visits.data(), out.visits.size(), 0};
   trace_ray(context, ray, &visits);
+  out.t_unit = std::ldexp(1.0, -direction_exponent(ray));
   return out;
 }
 

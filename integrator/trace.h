@@ -38,6 +38,7 @@ std::vector<TraceHit> trace_rays(const SceneContext& context, std::span<const Tr
 struct TraceExplanation {
   TraceHit hit;
   std::vector<PrismVisit> visits;  ///< their geometries are the context's
+  double t_unit = 1;               ///< of the visits, for prism_explain
 };
 TraceExplanation trace_explain(const SceneContext& context, const TraceRay& ray);
 

@@ -398,6 +398,12 @@ TEST_F(DisplacementProgram, ExplainTellsOfPrismsAndHits)
         "in all: ", "nearest: t 2.5, mesh 0 triangle 0, P 0.25 0.1875 0.5, Ng 0 0 1\n"}) {
     EXPECT_NE(hit.output.find(text), std::string::npos) << text << "\n" << hit.output;
   }
+  // All t are in the length of the direction that was given, and the ray in object space is the one that was.
+  folder_.write("long.txt", "0.25 0.1875 3 0 0 -100\n");
+  const Outcome long_ray = run({"trace", scene, "--rays", file("long.txt"), "--explain", "0"});
+  for (const char* text : {"  inside: t 0.025 to 0.03, ", "direction 0 0 -100\n", "  hit: t 0.025, ", "nearest: t 0.025, "}) {
+    EXPECT_NE(long_ray.output.find(text), std::string::npos) << text << "\n" << long_ray.output;
+  }
   const Outcome miss = run({"trace", scene, "--rays", file("rays.txt"), "--explain", "0"});
   EXPECT_NE(miss.output.find("in all: 0 boxes, 0 prisms, 0 bounds, 0 texels, 0 inversions\nnearest: nothing\n"),
             std::string::npos)
