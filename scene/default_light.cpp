@@ -138,17 +138,20 @@ std::vector<SurfacePoint> emitter_points(const Scene& scene,
   return points;
 }
 
-/// Irradiance of a surface at a point that faces the light, by π: the radiance that white has there.
-double white_radiance(Vec3f P, const std::vector<SurfacePoint>& emitters)
+/// Irradiance of a point of a surface, by π: the radiance that it has if it is white.
+double white_radiance(const SurfacePoint& point, const std::vector<SurfacePoint>& emitters)
 {
   double irradiance = 0;
   for (const SurfacePoint& e : emitters) {
-    const Vec3f to_P = P - e.P;
-    const double squared = static_cast<double>(dot(to_P, to_P));
-    const double cosine = static_cast<double>(dot(to_P, e.Ng)) / std::sqrt(squared);
-    const double emitted = e.double_sided ? std::fabs(cosine) : std::max(cosine, 0.0);
+    const Vec3f to_point = point.P - e.P;
+    const double squared = static_cast<double>(dot(to_point, to_point));
     // A point of the emitter itself: 0 / 0.
-    if (squared > 0) irradiance += e.radiance * static_cast<double>(e.area) * emitted / squared;
+    if (!(squared > 0)) continue;
+    const auto facing = [&](const SurfacePoint& of, Vec3f towards) {
+      const double cosine = static_cast<double>(dot(towards, of.Ng)) / std::sqrt(squared);
+      return of.double_sided ? std::fabs(cosine) : std::max(cosine, 0.0);
+    };
+    irradiance += e.radiance * static_cast<double>(e.area) * facing(e, to_point) * facing(point, -to_point) / squared;
   }
   return irradiance * std::numbers::inv_pi;
 }
@@ -172,17 +175,37 @@ bool emission_lights_scene(const Scene& scene,
     const SurfacePoint point = sampler.sample(p);
     if (!(point.area > 0) || material_of(scene, p).unlit) continue;
     area += static_cast<double>(point.area);
-    if (point.radiance >= kLitRadiance) {
+    if (point.radiance >= kGlowingRadiance) {
       glowing_area += static_cast<double>(point.area);
     } else {
       ++num_dull;
-      if (white_radiance(point.P, emitters) >= kLitRadiance) ++num_lit;
+      if (white_radiance(point, emitters) >= kLitRadiance) ++num_lit;
     }
   }
-  return num_lit >= kLitFraction * num_dull || glowing_area >= kLitFraction * area;
+  return num_lit >= kLitFraction * num_dull || glowing_area >= kGlowingFraction * area;
 }
 
-void environment_set(Scene& scene, const EnvironmentChoice& choice, TextureStore& textures)
+namespace {
+
+/// What cameras see in the studio's place.
+EnvironmentMap backdrop_make()
+{
+  // Interpolation makes the rest of it, all around the same.
+  constexpr float kBelow = 0.09f, kAbove = 0.3f, kPiAngle = 3.14159265f;
+  EnvironmentMap map;
+  map.width = 1;
+  map.height = 128;
+  for (int y = 0; y < map.height; ++y) {
+    const float up = std::cos((static_cast<float>(y) + 0.5f) * kPiAngle / static_cast<float>(map.height));
+    const float t = clamp(0.5f + 0.7f * up, 0.0f, 1.0f);
+    map.rgb.insert(map.rgb.end(), 3, kBelow + (kAbove - kBelow) * t * t * (3 - 2 * t));
+  }
+  return map;
+}
+
+}  // namespace
+
+void environment_set(Scene& scene, const EnvironmentChoice& choice, bool has_backdrop, TextureStore& textures)
 {
   scene.environment = Environment{};
   if (choice.source == EnvironmentSource::kNone) return;
@@ -192,8 +215,15 @@ void environment_set(Scene& scene, const EnvironmentChoice& choice, TextureStore
   scene.environment.texture_index =
       textures.add_image(std::string(label), map.width, map.height, map.rgb, Wrap::kRepeat, Wrap::kClamp);
   scene.environment.color = splat3(choice.strength);
-  // Before a studio's walls nothing stands out.
-  scene.environment.visible_to_camera = choice.source == EnvironmentSource::kSky;
+  const bool is_studio = choice.source == EnvironmentSource::kStudio;
+  // Before a studio's walls and lamps nothing stands out.
+  scene.environment.visible_to_camera = !is_studio || has_backdrop;
+  if (!is_studio || !has_backdrop) return;
+  const EnvironmentMap seen = backdrop_make();
+  Surroundings& backdrop = scene.environment.backdrop.emplace();
+  backdrop.color = splat3(1);
+  backdrop.texture_index =
+      textures.add_image("backdrop", seen.width, seen.height, seen.rgb, Wrap::kRepeat, Wrap::kClamp);
 }
 
 void surroundings_add_graph(Surroundings& surroundings, const EnvironmentGraph& graph, TextureStore& textures)
@@ -213,7 +243,11 @@ void surroundings_add_graph(Surroundings& surroundings, const EnvironmentGraph& 
                                                   map.rgb, Wrap::kRepeat, Wrap::kClamp);
 }
 
-void default_light_add(Scene& scene, std::span<const Placement> placements, TextureStore& textures, Warnings& warnings)
+void default_light_add(Scene& scene,
+                       std::span<const Placement> placements,
+                       bool has_backdrop,
+                       TextureStore& textures,
+                       Warnings& warnings)
 {
   const bool reflects = std::any_of(placements.begin(), placements.end(),
                                     [&](const Placement& p) { return !material_of(scene, p).unlit; });
@@ -224,8 +258,9 @@ void default_light_add(Scene& scene, std::span<const Placement> placements, Text
   warnings.add(
       scene.file +
       (emits ? ": no light, and emission that leaves most of the scene dark" : ": no light or environment") +
-      ": a soft studio lights it, which cameras do not see; --environment or RELIEF_environment says otherwise");
-  environment_set(scene, {}, textures);
+      ": a soft studio lights it, before a grey backdrop; --environment, --background or RELIEF_environment says "
+      "otherwise");
+  environment_set(scene, {}, has_backdrop, textures);
 }
 
 }  // namespace relief

@@ -18,13 +18,14 @@ struct Placement {
 };
 
 /// See emission_lights_scene.
-inline constexpr double kLitRadiance = 0.1, kLitFraction = 0.5;
+inline constexpr double kLitRadiance = 0.1, kGlowingRadiance = 0.25, kLitFraction = 0.25, kGlowingFraction = 0.5;
 
 /// Whether emissive surfaces are the scene's lamps, or decoration. They are lamps if half of the surface glows by itself, with
-/// a radiance of .1 or more; or if at least half of those points are lit that do not, among 256, the same number on each mesh
-/// instance: a white surface there, turned to where the light comes from, would reflect as much. Nothing shadows, and 2048
-/// points of the emissive surfaces, chosen by what they may emit, stand for all of them. So a lamp lights what is near,
-/// however large the floor it stands on, and lights on a model do not count for the model, whose surface turns away from them.
+/// a radiance of .25 or more; or if at least a quarter of those points are lit that do not, among 256, the same number on each mesh
+/// instance: if they were white, they would have a radiance of .1. One lamp lights half of what is round. Nothing shadows but the surfaces themselves, which turn away
+/// from each other, and 2048 points of the emissive surfaces, chosen by what they may emit, stand for all of them. So a lamp
+/// lights what is near, however large the floor it stands on, and lights on a model do not count for the model, whose surface
+/// turns away from them.
 /// @param textures  of the scene, loaded
 /// @cost  some milliseconds
 bool emission_lights_scene(const Scene& scene,
@@ -32,17 +33,24 @@ bool emission_lights_scene(const Scene& scene,
                            std::span<const TextureView> textures);
 
 /// Surrounds a scene by what was chosen.
-/// @param textures  gets the map
+/// @param textures      gets the map
+/// @param has_backdrop  cameras see a grey gradient in the studio's place, from dark below to light above, before which dark
+///                      things stand out as bright ones do
 /// @pre not EnvironmentSource::kFile
-void environment_set(Scene& scene, const EnvironmentChoice& choice, TextureStore& textures);
+void environment_set(Scene& scene, const EnvironmentChoice& choice, bool has_backdrop, TextureStore& textures);
 
 /// Makes the map of surroundings that a graph describes.
 /// @param textures  those that the graph reads; gets the map
 void surroundings_add_graph(Surroundings& surroundings, const EnvironmentGraph& graph, TextureStore& textures);
 
-/// Surrounds a scene in which nothing is lit by the soft studio, unseen by cameras, with a warning.
+/// Surrounds a scene in which nothing is lit by the soft studio, with a warning.
+/// @param has_backdrop  as for environment_set
 /// @param placements  of all meshes at rest, whatever the frame: else light would come and go with what moves
 /// @pre the scene has neither lights nor an environment, be it a black one
-void default_light_add(Scene& scene, std::span<const Placement> placements, TextureStore& textures, Warnings& warnings);
+void default_light_add(Scene& scene,
+                       std::span<const Placement> placements,
+                       bool has_backdrop,
+                       TextureStore& textures,
+                       Warnings& warnings);
 
 }  // namespace relief

@@ -10,13 +10,16 @@
 
 namespace relief {
 
+/// For the camera that shows everything, whatever cameras there are; but one that is called so comes first.
+inline constexpr const char* kAutoCamera = "auto";
+
 /// What the user says of the camera.
 struct CameraChoice {
   std::optional<Vec3f> look_from;  ///< empty: a camera of the scene, or one that shows everything
   std::optional<Vec3f> look_at;    ///< empty: the middle of everything; used only with look_from
   double fov = 0;                  ///< vertical field of view in degrees, of a camera that is made here; 0: 40
   float image_aspect = 0;          ///< width / height; 0: of the scene's resolution
-  std::string name;                ///< of a camera of the scene, or its number; empty: the first
+  std::string name;                ///< of a camera of the scene, or its number, or kAutoCamera; empty: the first
   std::optional<float> shutter;    ///< frames that it is open; empty: as the camera has it
 
   bool operator==(const CameraChoice&) const = default;

@@ -124,6 +124,7 @@ std::span<const std::byte> load_buffer(GltfDocument& document,
   const std::string path = "/buffers/" + std::to_string(i);
   const auto length = static_cast<std::uint64_t>(buffer["byteLength"].get<double>());
   std::span<const std::byte> bytes;
+  if (length == 0) return bytes;
   const auto uri = buffer.find("uri");
   if (uri == buffer.end()) {
     if (i != 0 || !glb_binary) {
@@ -350,6 +351,7 @@ std::unique_ptr<GltfDocument> gltf_document_load(const fs::path& path, Warnings&
   document->storage.push_back(read_file(path, document->file, "", std::numeric_limits<std::uint64_t>::max()));
   const Container container = split_container(document->storage.back().span(), document->file);
   document->json = validation_parse(container.json, document->file);
+  validation_drop_nulls(document->json, document->file, warnings);
   validation_check_support(document->json, document->file, warnings);
   const json conforming = validation_conform(document->json, document->file, warnings);
   load_core(*document, conforming);

@@ -204,8 +204,7 @@ void GltfLoader::place(const PlacedNode& node)
   place_lights(node);
 }
 
-/// Whether something may stand here. What an animation has shrunk to nothing is left out; anything else that is flat,
-/// or beyond the numbers, is a mistake.
+/// Whether something may stand here. What is flat, shrunk to nothing, or beyond the numbers, is left out with a warning.
 bool GltfLoader::is_usable(const PlacedNode& node, const Transform& world, const std::string& path)
 {
   const TransformDefect defect = transform_defect(world);
@@ -213,12 +212,10 @@ bool GltfLoader::is_usable(const PlacedNode& node, const Transform& world, const
     return true;
   }
   const std::string where = node.defect_path.empty() ? path : node.defect_path;
-  if (defect == TransformDefect::kSingular && node.animated) {
-    warnings_.add(node.document->file + ": " + where + ": singular transform at this frame, left out");
-    return false;
-  }
-  throw SceneError(node.document->file, where, "a transform that can be inverted",
-                   defect == TransformDefect::kSingular ? "a singular one" : "one beyond single precision");
+  warnings_.add(node.document->file + ": " + where + ": " +
+                (defect == TransformDefect::kSingular ? "singular transform" : "transform beyond single precision") +
+                (node.animated ? " at this frame" : "") + ", left out");
+  return false;
 }
 
 /// @param extent  largest coordinates, metres
@@ -313,11 +310,9 @@ void GltfLoader::place_instance(const PlacedNode& node,
       instance_flags(node.object, scene_.materials[static_cast<std::size_t>(instance.material_index)], world);
   const Affine3 inverse_of_it = inverse(instance.world_from_object);
   if (!(max_component(max(abs(inverse_of_it.x), max(abs(inverse_of_it.y), abs(inverse_of_it.z)))) <= kFarthest)) {
-    if (node.animated) {
-      warnings_.add(node.document->file + ": " + path + ": scaled to less than 1e-15 at this frame, left out");
-      return;
-    }
-    throw SceneError(node.document->file, path, "a transform that shrinks to no less than 1e-15", "a smaller scale");
+    warnings_.add(node.document->file + ": " + path + ": scaled to less than 1e-15" +
+                  (node.animated ? " at this frame" : "") + ", left out");
+    return;
   }
   const Bounds& own_bounds = mesh_bounds_[static_cast<std::size_t>(primitive.mesh_index)];
   const Bounds bounds = bounds_transform(instance.world_from_object, own_bounds);
@@ -701,7 +696,8 @@ void GltfLoader::set_camera(const LoadOptions& options)
     scene_.cameras = {look_camera(*choice.look_from, *choice.look_at, choice.fov, image_aspect_)};
     return;
   }
-  if (!choice.look_from && !scene_.cameras.empty()) return;
+  const bool is_auto = choice.name == kAutoCamera && !camera_named(scene_.cameras, choice.name);
+  if (!choice.look_from && !is_auto && !scene_.cameras.empty()) return;
   if (options.needs_camera) throw SceneError(scene_.file, "/nodes", "one with a camera", "none");
   // Heights of float maps may be anything.
   load_height_maps(scene_, height_maps_.take(), height_graphs_.take(), options.kept, warnings_);
@@ -734,8 +730,9 @@ void GltfLoader::set_camera(const LoadOptions& options)
     scene_.cameras = {look_camera(*choice.look_from, framing.middle(), choice.fov, image_aspect_)};
     return;
   }
-  warnings_.add(scene_.file + ": no camera: one that frames everything is used");
-  scene_.cameras.push_back(framing.camera());
+  if (!is_auto) warnings_.add(scene_.file + ": no camera: one that frames everything is used");
+  scene_.cameras = {framing.camera()};
+  if (is_auto) scene_.cameras.front().name = kAutoCamera;
 }
 
 RenderSettings scene_settings(const std::filesystem::path& path)
@@ -752,6 +749,19 @@ RenderSettings scene_settings(const std::filesystem::path& path)
   }
   frame_range_from_clips(root, all, settings);
   return settings;
+}
+
+std::vector<FileStamp> scene_files(const std::filesystem::path& path)
+{
+  Warnings unheard;  // the load has the same
+  GltfLoader loader(unheard);
+  // A camera that is given: one that frames everything would have to know the height maps.
+  LoadOptions options;
+  options.camera.look_from = options.camera.look_at = Vec3f{};
+  Scene scene = loader.load(path, options);
+  add_files(scene, loader.take_textures());
+  add_files(scene, loader.take_height_maps());
+  return std::move(scene.files);
 }
 
 Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
@@ -782,9 +792,10 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
       surroundings_add_graph(scene.environment, *environment_graphs.environment, *store);
     if (environment_graphs.backdrop)
       surroundings_add_graph(*scene.environment.backdrop, *environment_graphs.backdrop, *store);
-    if (!unlit.empty()) default_light_add(scene, unlit, *store, warnings);
+    const bool has_backdrop = !options.environment_visible.has_value();
+    if (!unlit.empty()) default_light_add(scene, unlit, has_backdrop, *store, warnings);
     if (options.environment && options.environment->source != EnvironmentSource::kFile) {
-      environment_set(scene, *options.environment, *store);
+      environment_set(scene, *options.environment, has_backdrop, *store);
     }
     scene.environment.visible_to_camera = options.environment_visible.value_or(scene.environment.visible_to_camera);
     world_displacement_bake(scene);

@@ -429,6 +429,31 @@ void drop_unused_vertices(Mesh& mesh)
 
 }  // namespace
 
+namespace {
+
+/// The accessor of a primitive that has nothing to read; empty: there is none.
+std::string empty_accessor(const GltfDocument& document, const tinygltf::Primitive& primitive)
+{
+  const auto is_empty = [&](int index) {
+    if (index < 0) return false;
+    const int view = document.core.accessors[static_cast<std::size_t>(index)].bufferView;
+    return view >= 0 && document.core.bufferViews[static_cast<std::size_t>(view)].byteLength == 0;
+  };
+  const auto name = [](int index) { return "/accessors/" + std::to_string(index); };
+  if (is_empty(primitive.indices)) return name(primitive.indices);
+  for (const auto& [attribute, index] : primitive.attributes) {
+    if (is_empty(index)) return name(index);
+  }
+  for (const std::map<std::string, int>& target : primitive.targets) {
+    for (const auto& [attribute, index] : target) {
+      if (is_empty(index)) return name(index);
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
 std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
                                    int mesh_index,
                                    int primitive_index,
@@ -444,6 +469,10 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
   reader.label = reader.path + (source.name.empty() ? "" : " (" + source.name + ')');
   if (reader.primitive.mode < TINYGLTF_MODE_TRIANGLES) {
     reader.warn("points and lines are not rendered");
+    return {};
+  }
+  if (const std::string empty = empty_accessor(document, reader.primitive); !empty.empty()) {
+    reader.warn(empty + " reads from a buffer view without a byte: left out");
     return {};
   }
   const auto position = reader.primitive.attributes.find("POSITION");

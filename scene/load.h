@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "scene/environment_preset.h"
 #include "scene/framing.h"
@@ -30,6 +31,11 @@ struct LoadOptions {
 /// @param path  .gltf or .glb
 /// @error SceneError for anything wrong with the file or what it refers to; never crashes on any input
 Scene scene_load(const std::filesystem::path& path, const LoadOptions& options = {});
+
+/// Every file that scene_load reads, and those that an environment of the command line replaces: what no output may be.
+/// No image is read.
+/// @error SceneError
+std::vector<FileStamp> scene_files(const std::filesystem::path& path);
 
 /// A scene's RenderSettings as scene_load gives them, without loading what it shows.
 /// @error SceneError

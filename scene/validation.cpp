@@ -148,8 +148,8 @@ constexpr Field kAccessor[] = {index("bufferView", "bufferViews"),
                                string("type", "SCALAR|VEC2|VEC3|VEC4|MAT2|MAT3|MAT4", true),
                                object("sparse", kSparse)};
 constexpr Field kBufferView[] = {index("buffer", "buffers", true), integer("byteOffset", 0, kLargestSize),
-                                 integer("byteLength", 1, kLargestSize, true), integer("byteStride", 4, 252)};
-constexpr Field kBuffer[] = {string("uri"), integer("byteLength", 1, kLargestSize, true)};
+                                 integer("byteLength", 0, kLargestSize, true), integer("byteStride", 4, 252)};
+constexpr Field kBuffer[] = {string("uri"), integer("byteLength", 0, kLargestSize, true)};
 constexpr Field kImage[] = {string("name"), string("uri"), string("mimeType"), index("bufferView", "bufferViews")};
 constexpr Field kTexture[] = {index("sampler", "samplers"), index("source", "images")};
 constexpr Field kSampler[] = {integer("magFilter", 9728, 9729), integer("minFilter", 9728, 9987),
@@ -394,7 +394,7 @@ class Conformer {
   Warnings& warnings_;
 };
 
-/// Nodes must form trees. What a scene lists must be their roots: of other nodes, those that stand in the scene anyhow are
+/// Nodes must form trees. A node with two parents stays with the first. What a scene lists must be their roots: of other nodes, those that stand in the scene anyhow are
 /// taken off the list, the others are roots there.
 void conform_node_tree(json& document, const std::string& file, Warnings& warnings)
 {
@@ -406,15 +406,20 @@ void conform_node_tree(json& document, const std::string& file, Warnings& warnin
   std::vector<std::size_t> parent(nodes->size(), kNone);
   for (std::size_t i = 0; i < nodes->size(); ++i) {
     const auto children = (*nodes)[i].find("children");
-    for (std::size_t j = 0; children != (*nodes)[i].end() && j < children->size(); ++j) {
+    if (children == (*nodes)[i].end()) continue;
+    json kept = json::array();
+    for (std::size_t j = 0; j < children->size(); ++j) {
       const auto child = (*children)[j].get<std::size_t>();
-      if (parent[child] != kNone) {
-        throw SceneError(file, "/nodes/" + std::to_string(i) + "/children/" + std::to_string(j),
-                         "a node without another parent",
-                         "node " + std::to_string(child) + ", a child of node " + std::to_string(parent[child]));
+      if (parent[child] == kNone) {
+        parent[child] = i;
+        kept.push_back(child);
+        continue;
       }
-      parent[child] = i;
+      warnings.add(file + ": /nodes/" + std::to_string(i) + "/children/" + std::to_string(j) +
+                   ": expected a node without another parent, found node " + std::to_string(child) +
+                   ", a child of node " + std::to_string(parent[child]) + ", where alone it counts");
     }
+    *children = std::move(kept);
   }
   // With at most one parent each, a walk upwards either ends at a root or goes round. `mark` tells this walk from
   // earlier ones, so every node is visited once.
@@ -595,6 +600,34 @@ void collect_extensions(const json& value, std::set<std::string>& names)
   }
 }
 
+/// What another program can do about an extension that is not read; with a comma before it, or empty.
+std::string conversion_of(const std::string& extension)
+{
+  struct Conversion {
+    std::string_view extension, text;
+  };
+  constexpr Conversion kConversions[] = {
+      {"KHR_draco_mesh_compression", "compressed meshes: `gltf-transform copy IN OUT` (glTF-Transform), or an import into "
+                                     "Blender and an export without compression, writes them plain"},
+      {"EXT_meshopt_compression", "compressed buffers: `gltf-transform copy IN OUT` (glTF-Transform) or `gltfpack` without "
+                                  "-c writes them plain"},
+      {"KHR_meshopt_compression", "compressed buffers: `gltf-transform copy IN OUT` (glTF-Transform) writes them plain"},
+      {"KHR_texture_basisu", "KTX2 textures: `ktx extract` (KTX-Software) makes PNG of each, which the images' uri then "
+                             "names"},
+      {"EXT_texture_webp", "WebP textures: `gltf-transform png IN OUT` (glTF-Transform) makes PNG of them"},
+      {"EXT_texture_avif", "AVIF textures: `gltf-transform png IN OUT` (glTF-Transform) makes PNG of them"},
+      {"MSFT_texture_dds", "DDS textures: their images' own source, PNG or JPEG, is read once the file does not require "
+                           "the extension"},
+      {"KHR_materials_pbrSpecularGlossiness", "materials of specular colour and glossiness: `gltf-transform metalrough IN "
+                                              "OUT` (glTF-Transform) makes metal and roughness of them"},
+      {"KHR_techniques_webgl", "materials of WebGL shaders, which no program converts: export the scene again"},
+  };
+  const auto* found = std::find_if(std::begin(kConversions), std::end(kConversions),
+                                   [&](const Conversion& known) { return known.extension == extension; });
+  return found != std::end(kConversions) ? ", " + std::string(found->text)
+                                         : ", which another program would have to take out";
+}
+
 bool is_supported(const std::string& extension)
 {
   return std::find(std::begin(kSupportedExtensions), std::end(kSupportedExtensions), extension) !=
@@ -643,6 +676,51 @@ json validation_parse(std::string_view text, const std::string& file)
   return document;
 }
 
+namespace {
+
+/// Removes members that are null, but what is in `extras`.
+/// @param path   of the value
+/// @param first  gets the path of the first
+/// @return how many there were
+std::size_t drop_nulls(json& value, const std::string& path, std::string& first)
+{
+  std::size_t count = 0;
+  if (value.is_object()) {
+    for (auto member = value.begin(); member != value.end();) {
+      if (member.key() == "extras") {
+        ++member;
+        continue;
+      }
+      const bool is_null = member->is_null();
+      // Paths cost time, and few files have any.
+      if (is_null && count == 0 && first.empty()) first = json_path_join(path, member.key());
+      if (is_null) {
+        member = value.erase(member);
+        ++count;
+        continue;
+      }
+      if (member->is_structured()) count += drop_nulls(*member, json_path_join(path, member.key()), first);
+      ++member;
+    }
+  } else if (value.is_array()) {
+    for (std::size_t i = 0; i < value.size(); ++i) {
+      if (value[i].is_structured()) count += drop_nulls(value[i], json_path_join(path, i), first);
+    }
+  }
+  return count;
+}
+
+}  // namespace
+
+void validation_drop_nulls(json& document, const std::string& file, Warnings& warnings)
+{
+  std::string first;
+  const std::size_t count = drop_nulls(document, "", first);
+  if (count == 0) return;
+  warnings.add(file + ": " + first + ": expected a value, found null, which counts as nothing" +
+               (count > 1 ? " (" + std::to_string(count) + " in all)" : ""));
+}
+
 json validation_conform(const json& document, const std::string& file, Warnings& warnings)
 {
   check_version(document, file);
@@ -683,7 +761,7 @@ void validation_check_support(const json& document, const std::string& file, War
     }
   };
   for_each_unknown("extensionsRequired", [&](const std::string& name, const std::string& path) {
-    throw SceneError(file, path, "an extension that relief reads", '"' + name + '"');
+    throw SceneError(file, path, "an extension that relief reads", '"' + name + '"' + conversion_of(name));
   });
   for_each_unknown("extensionsUsed", [&](const std::string& name, const std::string&) {
     warnings.add(file + ": extension " + name + " is not read");

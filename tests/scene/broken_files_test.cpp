@@ -91,11 +91,11 @@ const BrokenFile kBrokenFiles[] = {
      [](auto& b) {
        b.json["extensionsRequired"] = {"KHR_texture_transform", "KHR_draco_mesh_compression"};
      },
-     "/extensionsRequired/1", "KHR_draco_mesh_compression"},
+     "/extensionsRequired/1", "\"KHR_draco_mesh_compression\", compressed meshes: `gltf-transform copy"},
     {"meshopt required", [](auto& b) { b.json["extensionsRequired"] = {"EXT_meshopt_compression"}; },
-     "/extensionsRequired/0", "EXT_meshopt_compression"},
+     "/extensionsRequired/0", "\"EXT_meshopt_compression\", compressed buffers: `gltf-transform copy"},
     {"KTX2 required", [](auto& b) { b.json["extensionsRequired"] = {"KHR_texture_basisu"}; }, "/extensionsRequired/0",
-     "KHR_texture_basisu"},
+     "\"KHR_texture_basisu\", KTX2 textures: `ktx extract`"},
     {"extensionsRequired is a string", [](auto& b) { b.json["extensionsRequired"] = "x"; }, "/extensionsRequired",
      "an array"},
     {"extensionsUsed holds a number", [](auto& b) { b.json["extensionsUsed"] = {7}; }, "/extensionsUsed/0", "a string"},
@@ -282,12 +282,6 @@ const BrokenFile kBrokenFiles[] = {
        b.json["nodes"][0]["children"] = {0};
      },
      "/nodes/0/children", "cycle"},
-    {"node with two parents",
-     [](auto& b) {
-       b.json["nodes"][0]["children"] = {2};
-       b.json["nodes"][1]["children"] = {2};
-     },
-     "/nodes/1/children/0", "another parent"},
     {"child out of range", [](auto& b) { b.json["nodes"][0]["children"] = {99}; }, "/nodes/0/children/0", "/nodes"},
     {"matrix of 15", [](auto& b) { b.json["nodes"][0]["matrix"] = std::vector<double>(15, 1.0); }, "/nodes/0/matrix",
      "16"},
@@ -304,24 +298,11 @@ const BrokenFile kBrokenFiles[] = {
        b.json["nodes"][0]["scale"] = {1e300, 1, 1};
      },
      "/nodes/0/scale/0", "finite number"},
-    {"singular scale",
-     [](auto& b) {
-       b.json["nodes"][4]["scale"] = {1, 0, 1};
-     },
-     "/nodes/4", "singular"},
-    {"singular matrix",
-     [](auto& b) { b.json["nodes"][4]["matrix"] = {1, 1, 0, 0, 2, 2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}; }, "/nodes/4",
-     "singular"},
     {"positions beyond a tenth of a light-year",
      [](auto& b) {
        b.json["nodes"][0]["scale"] = {1e20, 1e20, 1e20};
      },
      "/nodes/0", "1e15"},
-    {"a scale whose inverse is beyond a tenth of a light-year",
-     [](auto& b) {
-       b.json["nodes"][4]["scale"] = {1e-18, 1e-18, 1e-18};
-     },
-     "/nodes/4/extensions/EXT_mesh_gpu_instancing", "1e-15"},
     // Cameras, lights
     {"camera beyond a tenth of a light-year",
      [](auto& b) {
@@ -419,11 +400,6 @@ const BrokenFile kBrokenFiles[] = {
     {"instancing of wrong type",
      [](auto& b) { node_extension(b, 4, "EXT_mesh_gpu_instancing")["attributes"]["ROTATION"] = 4; },
      "/nodes/4/extensions/EXT_mesh_gpu_instancing/attributes/ROTATION", "VEC4"},
-    {"instancing scaled to nothing",
-     [](auto& b) {
-       node_extension(b, 4, "EXT_mesh_gpu_instancing")["attributes"] = {{"SCALE", 4}};
-     },
-     "/nodes/4/extensions/EXT_mesh_gpu_instancing", "singular"},
     // Animations (at frame 10)
     {"animation sampler out of range", [](auto& b) { b.json["animations"][0]["channels"][0]["sampler"] = 1; },
      "/animations/0/channels/0/sampler", "below 1"},
@@ -502,7 +478,6 @@ const BrokenFile kBrokenFiles[] = {
      "/extensions/KHR_lights_punctual/lights/0/extensions/RELIEF_light/graph/nodes/0/uri", "no.ies"},
     {"area light beyond single precision", [](auto& b) { b.json["nodes"][3]["scale"] = {1e-30, 1e-30, 1}; },
      "/nodes/3/extensions/RELIEF_area_light", "1e-20"},
-    {"area light of a singular node", [](auto& b) { b.json["nodes"][3]["scale"] = {0, 1, 1}; }, "/nodes/3", "singular"},
     {"object setting is a number", [](auto& b) { node_extension(b, 4, "RELIEF_object")["castsShadow"] = 1; },
      "/nodes/4/extensions/RELIEF_object/castsShadow", "true or false"},
     {"caustic caster maybe", [](auto& b) { node_extension(b, 4, "RELIEF_object")["causticCaster"] = "maybe"; },

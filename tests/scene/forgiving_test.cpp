@@ -94,6 +94,81 @@ TEST(Forgiving, NodesOfASceneThatAreNoRootsCountOnce)
   EXPECT_TRUE(has_warning(scene, "which is not in the scene"));
 }
 
+TEST(Forgiving, ANodeWithTwoParentsStaysWithTheFirst)
+{
+  GltfBuilder b = test::square_scene();
+  b.push("nodes", {{"children", {0}}, {"translation", {3, 0, 0}}});
+  b.push("nodes", {{"children", {0}}, {"translation", {7, 0, 0}}});
+  b.json["scenes"][0]["nodes"] = {1, 2};
+  const Scene scene = load(b);
+  ASSERT_EQ(scene.instances.size(), 1u);
+  EXPECT_EQ(scene.instances[0].world_from_object.p.x, 3.0f);
+  EXPECT_TRUE(has_warning(scene, "/nodes/2/children/0: expected a node without another parent, found node 0, a child of node 1"));
+}
+
+TEST(Forgiving, WhatIsSingularOrBeyondTheNumbersIsLeftOut)
+{
+  for (const auto& [transform, what] :
+       {std::pair{json{{"scale", {1, 0, 1}}}, "singular transform, left out"},
+        {json{{"matrix", {1, 1, 0, 0, 2, 2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}}}, "singular transform, left out"},
+        {json{{"scale", {1e-18, 1e-18, 1e-18}}}, "scaled to less than 1e-15, left out"}}) {
+    GltfBuilder b = test::square_scene();
+    for (const char* kind : {"mesh", "camera"}) {
+      json node = transform;
+      node[kind] = 0;
+      b.root_node(node);
+    }
+    b.push("cameras", {{"type", "perspective"}, {"perspective", {{"yfov", 1}, {"znear", 0.1}}}});
+    json light = transform;
+    light["extensions"]["KHR_lights_punctual"] = {{"light", 0}};
+    b.root_node(light);
+    b.json["extensions"]["KHR_lights_punctual"] = {{"lights", {{{"type", "point"}}}}};
+    const Scene scene = load(b);
+    EXPECT_EQ(scene.instances.size(), 1u) << transform;
+    EXPECT_TRUE(has_warning(scene, std::string("/nodes/1: ") + what)) << transform;
+  }
+}
+
+TEST(Forgiving, WhatIsNullIsNotThere)
+{
+  GltfBuilder b = square_with({{"pbrMetallicRoughness", {{"metallicFactor", nullptr}, {"roughnessFactor", 0.25}}},
+                               {"normalTexture", nullptr},
+                               {"extras", {{"note", nullptr}}}});
+  b.json["extensions"]["KHR_lights_punctual"] = {{"lights", {{{"type", "directional"}, {"spot", nullptr}}}}};
+  b.root_node({{"extensions", {{"KHR_lights_punctual", {{"light", 0}}}}}});
+  const Scene scene = load(b);
+  EXPECT_EQ(scene.lights.size(), 1u);
+  EXPECT_EQ(scene.materials[0].metallic, 1.0f);
+  EXPECT_EQ(scene.materials[0].roughness, 0.25f);
+  EXPECT_TRUE(has_warning(scene, "/extensions/KHR_lights_punctual/lights/0/spot: expected a value, found null, which counts "
+                                 "as nothing (3 in all)"));
+}
+
+TEST(Forgiving, AMeshOfABufferViewWithoutAByteIsLeftOut)
+{
+  for (const char* user : {"POSITION", "indices"}) {
+    GltfBuilder b = test::square_scene();
+    json mesh = b.json["meshes"][0];
+    const int view = static_cast<int>(b.json["bufferViews"].size());
+    b.push("bufferViews", {{"buffer", 0}, {"byteLength", 0}});
+    json accessor = b.json["accessors"][mesh["primitives"][0]["attributes"]["POSITION"].get<std::size_t>()];
+    if (user == std::string("indices")) accessor = {{"componentType", 5125}, {"count", 3}, {"type", "SCALAR"}};
+    accessor["bufferView"] = view;
+    const std::size_t index = b.json["accessors"].size();
+    b.push("accessors", accessor);
+    (user == std::string("indices") ? mesh["primitives"][0] : mesh["primitives"][0]["attributes"])[user] = index;
+    b.push("meshes", mesh);
+    b.root_node({{"mesh", 1}});
+    const Scene scene = load(b);
+    EXPECT_EQ(scene.instances.size(), 1u) << user;
+    EXPECT_TRUE(has_warning(scene, "/accessors/" + std::to_string(index) + " reads from a buffer view without a byte: left out"));
+  }
+  // One that nobody reads is nobody's trouble, nor is such a buffer.
+  GltfBuilder b = test::square_scene();
+  b.push("bufferViews", {{"buffer", 0}, {"byteLength", 0}});
+  EXPECT_EQ(load(b).instances.size(), 1u);
+}
+
 TEST(Forgiving, ExtensionsThatAreNotDeclaredAreReadOrNamed)
 {
   GltfBuilder b = square_with({{"extensions", {{"KHR_materials_ior", {{"ior", 2}}}}}});
