@@ -15,6 +15,7 @@ DenoiseResult denoise_builtin(const DenoiseInput& input)
   Halves halves = halves_make(input);
   replace_fireflies(halves);
   find_independent_parts(halves);
+  denoise_check_stop(input);
   std::vector<Candidate> candidates(kNumFits, Candidate(width, height));
   {
     const std::array<FeatureColumns, 2> features = features_filter(input);
@@ -25,9 +26,10 @@ DenoiseResult denoise_builtin(const DenoiseInput& input)
       variance[c].extend();
       for (ColorPlanes& half : halves.color) half[c].extend();
     }
-    for (std::size_t half = 0; half < 2; ++half) half_filter(halves, half, variance, features[half], candidates);
+    for (std::size_t half = 0; half < 2; ++half) half_filter(input, halves, half, variance, features[half], candidates);
   }
   const Candidate picture = candidates_combine(halves, candidates);
+  denoise_check_stop(input);
 
   DenoiseResult result;
   result.color.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 3);

@@ -13,6 +13,7 @@
 namespace relief {
 
 /// Denoises a picture. Where nothing varies, and where a pixel has less than two samples, it stays as it is.
+/// @error DenoiseStopped
 /// @cost  about 350 bytes a pixel; 1920 × 1080 pixels take 20 seconds of one processor with AVX2, 30 without
 DenoiseResult denoise_builtin(const DenoiseInput& input);
 

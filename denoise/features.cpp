@@ -133,6 +133,7 @@ void group_filter(const DenoiseInput& input, Group group, std::array<FeatureColu
   const GroupPlanes planes = group_load(input, group);
   const int tiles_x = (input.width + kTile - 1) / kTile, tiles_y = (input.height + kTile - 1) / kTile;
   tbb::parallel_for(0, tiles_x * tiles_y, [&](int tile) {
+    denoise_check_stop(input);
     const int x0 = tile % tiles_x * kTile, y0 = tile / tiles_x * kTile;
     std::array<std::array<float, 3 * kTile * kTile>, 2> filtered;
     const bool is_filtered = !is_certain(planes, x0, y0);

@@ -11,7 +11,8 @@
 
 namespace relief {
 
-void half_filter(const Halves& halves,
+void half_filter(const DenoiseInput& input,
+                 const Halves& halves,
                  std::size_t half,
                  const ColorPlanes& variance,
                  const FeatureColumns& features,
@@ -52,6 +53,7 @@ void half_filter(const Halves& halves,
     const int first_x = phase & 1, first_y = phase >> 1;
     const int num_x = (tiles_x - first_x + 1) / 2, num_y = (tiles_y - first_y + 1) / 2;
     tbb::parallel_for(0, num_x * num_y, [&](int i) {
+      denoise_check_stop(input);
       const int x0 = (first_x + 2 * (i % num_x)) * kFitTile, y0 = (first_y + 2 * (i / num_x)) * kFitTile;
       FitScratch& scratch = *scratches.local();
       fit_tile(planes, x0, y0, scratch);

@@ -11,8 +11,11 @@ namespace relief {
 /// Filters one half in all widths (kFitWidths) and adds it, by its share of the samples, to the widths' candidates.
 /// @param half      0 or 1
 /// @param variance  of a half's colours, smoothed; its border filled, as that of the colours
+/// @param input     may tell it to give up
+/// @error DenoiseStopped
 /// @cost  about 80 bytes a pixel while it runs
-void half_filter(const Halves& halves,
+void half_filter(const DenoiseInput& input,
+                 const Halves& halves,
                  std::size_t half,
                  const ColorPlanes& variance,
                  const FeatureColumns& features,

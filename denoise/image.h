@@ -2,8 +2,10 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
+#include <stdexcept>
 #include <vector>
 
 namespace relief {
@@ -28,7 +30,21 @@ struct DenoiseInput {
   PlaneView samples;
   std::array<PlaneView, kNumFeatures> features;
   std::array<PlaneView, kNumFeatures> features_half;  ///< as `half`; null: the features have no noise
+  const std::atomic<bool>* stop = nullptr;            ///< gives up when it becomes true; null: never
+
+  bool is_stopped() const { return stop != nullptr && *stop; }
 };
+
+/// Thrown by a denoiser that was told to give up.
+struct DenoiseStopped : std::runtime_error {
+  DenoiseStopped() : std::runtime_error("interrupted") {}
+};
+
+/// @error DenoiseStopped, if it was told to give up
+inline void denoise_check_stop(const DenoiseInput& input)
+{
+  if (input.is_stopped()) throw DenoiseStopped();
+}
 
 /// Part of a pixel's n samples that are even-numbered: 1 if there are fewer than two, or no number that counts any, so that
 /// there is no other half.

@@ -34,6 +34,7 @@ struct Oidn {
                     std::size_t pixel_stride,
                     std::size_t row_stride) = nullptr;
   void (*set_bool)(Filter, const char* name, bool value) = nullptr;
+  void (*set_progress_monitor)(Filter, bool (*goes_on)(void* user, double share), void* user) = nullptr;
   void (*commit_filter)(Filter) = nullptr;
   void (*execute_filter)(Filter) = nullptr;
   void (*release_filter)(Filter) = nullptr;
@@ -70,6 +71,7 @@ Oidn oidn_load()
     find(library, name, "oidnNewFilter", oidn.new_filter);
     find(library, name, "oidnSetSharedFilterImage", oidn.set_image);
     find(library, name, known_symbol(library, "oidnSetFilterBool", "oidnSetFilter1b"), oidn.set_bool);
+    find(library, name, "oidnSetFilterProgressMonitorFunction", oidn.set_progress_monitor);
     find(library, name, "oidnCommitFilter", oidn.commit_filter);
     find(library, name, "oidnExecuteFilter", oidn.execute_filter);
     find(library, name, "oidnReleaseFilter", oidn.release_filter);
@@ -106,6 +108,7 @@ class Session {
  public:
   explicit Session(const DenoiseInput& input)
       : oidn_(oidn_load()),
+        input_(input),
         width_(input.width),
         height_(input.height),
         albedo_(interleaved(features_of(input, 0))),
@@ -133,8 +136,10 @@ class Session {
     set("normal", normal_);
     set("output", output);
     oidn_.set_bool(filter.get(), "hdr", true);
+    oidn_.set_progress_monitor(filter.get(), goes_on, const_cast<DenoiseInput*>(&input_));
     oidn_.commit_filter(filter.get());
     oidn_.execute_filter(filter.get());
+    denoise_check_stop(input_);
     check();
     ColorPlanes planes = color_planes(width_, height_);
     for (std::size_t c = 0; c < 3; ++c) {
@@ -148,6 +153,9 @@ class Session {
   }
 
  private:
+  /// Asked by the library now and then. @param input  DenoiseInput
+  static bool goes_on(void* input, double) { return !static_cast<const DenoiseInput*>(input)->is_stopped(); }
+
   void check() const
   {
     const char* message = nullptr;
@@ -156,6 +164,7 @@ class Session {
   }
 
   Oidn oidn_;
+  const DenoiseInput& input_;
   int width_, height_;
   std::vector<float> albedo_, normal_;
   std::unique_ptr<void, void (*)(void*)> device_;

@@ -143,6 +143,17 @@ TEST(BuiltinDenoiser, WhatIsNoNumberDoesNotSpread)
   EXPECT_TRUE(all_finite(result.error));
 }
 
+TEST(BuiltinDenoiser, GivesUpWhenToldTo)
+{
+  const TestPicture picture = test_picture(40, 30, {}, one);
+  std::atomic<bool> stop{true};
+  DenoiseInput input = picture.input();
+  input.stop = &stop;
+  EXPECT_THROW(denoise_builtin(input), DenoiseStopped);
+  stop = false;
+  EXPECT_EQ(denoise_builtin(input).color, denoise_builtin(picture.input()).color);
+}
+
 TEST(BuiltinDenoiser, AnySize)
 {
   for (const auto& [width, height] : {std::pair(1, 1), {1, 40}, {40, 1}, {3, 2}, {33, 31}}) {

@@ -10,6 +10,8 @@ struct Filter {
   const float *color = nullptr, *albedo = nullptr, *normal = nullptr;
   float* output = nullptr;
   std::size_t num_pixels = 0;
+  bool (*goes_on)(void*, double) = nullptr;
+  void* user = nullptr;
   bool is_hdr = false, is_committed = false;
 };
 
@@ -59,12 +61,21 @@ void oidnSetFilterBool(void* filter, const char* name, bool value)
 {
   if (std::strcmp(name, "hdr") == 0) static_cast<Filter*>(filter)->is_hdr = value;
 }
+void oidnSetFilterProgressMonitorFunction(void* filter, bool (*goes_on)(void*, double), void* user)
+{
+  static_cast<Filter*>(filter)->goes_on = goes_on;
+  static_cast<Filter*>(filter)->user = user;
+}
 void oidnCommitFilter(void* filter) { static_cast<Filter*>(filter)->is_committed = true; }
 void oidnExecuteFilter(void* filter)
 {
   const auto& of = *static_cast<Filter*>(filter);
   if (!of.color || !of.albedo || !of.normal || !of.output || !of.is_hdr || !of.is_committed) {
     g_error = "not all was set";
+    return;
+  }
+  if (of.goes_on != nullptr && !of.goes_on(of.user, 0.5)) {
+    g_error = "cancelled";
     return;
   }
   for (std::size_t i = 0; i < of.num_pixels; ++i) {

@@ -28,6 +28,15 @@ TEST(Oidn, ItsErrorIsEstimatedToo)
   EXPECT_NEAR(result.rmse / picture.rmse(result.color), 1, 0.1);
 }
 
+TEST(Oidn, GivesUpWhenToldTo)
+{
+  const std::atomic<bool> stop{true};
+  const TestPicture picture = test_picture(16, 16, {}, [](int, int) { return 1; });
+  DenoiseInput input = picture.input();
+  input.stop = &stop;
+  EXPECT_THROW(denoise_oidn(input), DenoiseStopped);
+}
+
 TEST(Oidn, ItsOwnErrorsAreTold)
 {
   TestPicture picture = test_picture(8, 8, {}, [](int, int) { return 1; });
