@@ -2,16 +2,23 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
+#include <fcntl.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <fmt/format.h>
@@ -29,6 +36,7 @@
 #include "exporters/atomic_file.h"
 #include "exporters/exr.h"
 #include "scene/diagnostics.h"
+#include "scene/load.h"
 
 namespace relief {
 
@@ -66,16 +74,40 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
-/// Runs a command of a shell. @return what it printed; @error std::runtime_error if it failed
+/// The command that is running, and its process group; 0: none is.
+std::atomic<pid_t> g_command{0};
+
+/// Runs a command of a shell, in a process group of its own. @return what it printed; @error std::runtime_error if it failed
 std::string output_of(const std::string& command)
 {
-  std::FILE* pipe = ::popen(command.c_str(), "r");
-  if (pipe == nullptr) throw std::runtime_error(command + ": cannot be started");
+  int ends[2];
+  if (::pipe2(ends, O_CLOEXEC) != 0) throw std::system_error(errno, std::generic_category(), command);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::setpgid(0, 0);
+    std::signal(SIGPIPE, SIG_DFL);
+    ::dup2(ends[1], STDOUT_FILENO);
+    ::execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
+    std::_Exit(127);
+  }
+  ::close(ends[1]);
+  if (child > 0) {
+    // Here, too: whichever of the two processes comes first.
+    ::setpgid(child, child);
+    g_command = child;
+  }
   std::string text;
   std::array<char, 4096> block;
-  for (std::size_t size = 0; (size = std::fread(block.data(), 1, block.size(), pipe)) > 0;)
-    text.append(block.data(), size);
-  if (::pclose(pipe) != 0) throw std::runtime_error(command + ": failed");
+  for (ssize_t size = 0; child > 0 && (size = ::read(ends[0], block.data(), block.size())) != 0;) {
+    if (size < 0 && errno == EINTR) continue;
+    if (size < 0) break;
+    text.append(block.data(), static_cast<std::size_t>(size));
+  }
+  ::close(ends[0]);
+  int status = 0;
+  if (child < 0 || ::waitpid(child, &status, 0) < 0 || status != 0) status = -1;
+  g_command = 0;
+  if (status != 0) throw std::runtime_error(command + ": failed");
   return text;
 }
 
@@ -139,7 +171,6 @@ ErrorStudyOptions study_options(const ErrorArguments& arguments, int threads)
     if (picture.resolution.width == 0) picture.resolution = {48, 32};
   }
   study.reference_seconds = arguments.reference_seconds > 0 ? arguments.reference_seconds : 8 * study.times.back();
-  study.stop = &interrupt_flag();
   study.render_options = [picture](const Scene& scene) { return render_options(scene, picture, scene.cameras); };
   if (isatty(STDERR_FILENO) != 0) {
     study.progress = [](const std::string& line) { std::fputs((printable_text(line) + "\n").c_str(), stderr); };
@@ -147,26 +178,9 @@ ErrorStudyOptions study_options(const ErrorArguments& arguments, int threads)
   return study;
 }
 
-int bench_error(const ErrorArguments& arguments)
+/// Prints the tables and writes the files. @return whether all that was asked for is there
+bool write_results(const ErrorArguments& arguments, const RunFiles& files, const ErrorStudyResults& results)
 {
-  if (!arguments.reference.empty() && arguments.scenes.size() > 1) {
-    throw CLI::ValidationError("--reference", fmt::format("expected one scene, found {}", arguments.scenes.size()));
-  }
-  RunFiles files;
-  files.add_output("--json", arguments.json);
-  files.add_output("--html", arguments.html);
-  for (const std::string& scene : arguments.scenes) files.add_input("a scene", scene);
-  files.add_input("the reference", arguments.reference);
-  for (const std::string& output : {arguments.json, arguments.html}) check_writable(output);
-  interrupt_watch();
-  const int threads = arguments.threads > 0 ? arguments.threads : tbb::info::default_concurrency();
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
-  ErrorStudyOptions study = study_options(arguments, threads);
-  if (!arguments.reference.empty()) study.reference = exr_load(arguments.reference);
-  std::optional<ScratchFolder> scratch;
-  if (!study.others.empty()) study.scratch = scratch.emplace().path();
-  ErrorStudyResults results;
-  tbb::task_arena(threads).execute([&] { results = error_study_run(study); });
   fmt::print("{}", error_study_markdown(results));
   files.check_output("--json", arguments.json);
   files.check_output("--html", arguments.html);
@@ -177,8 +191,50 @@ int bench_error(const ErrorArguments& arguments)
     for (const std::string& failure : scene.failures) print_warning(scene.scene + ": " + failure);
     is_whole = is_whole && scene.failures.empty();
   }
-  if (interrupt_flag()) return 130;
-  return is_whole ? 0 : 1;
+  return is_whole;
+}
+
+int bench_error(const ErrorArguments& arguments)
+{
+  if (!arguments.reference.empty() && arguments.scenes.size() > 1) {
+    throw CLI::ValidationError("--reference", fmt::format("expected one scene, found {}", arguments.scenes.size()));
+  }
+  RunFiles files;
+  files.add_output("--json", arguments.json);
+  files.add_output("--html", arguments.html);
+  for (const std::string& scene : arguments.scenes) {
+    files.add_input("a scene", scene);
+    files.add_inputs("a file of the scene", scene_files(scene));
+  }
+  files.add_input("the reference", arguments.reference);
+  for (const std::string& output : {arguments.json, arguments.html}) check_writable(output);
+  broken_pipes_ignore();
+  const int threads = arguments.threads > 0 ? arguments.threads : tbb::info::default_concurrency();
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+  ErrorStudyOptions study = study_options(arguments, threads);
+  if (!arguments.reference.empty()) study.reference = exr_load(arguments.reference);
+  std::optional<ScratchFolder> scratch;
+  if (!study.others.empty()) study.scratch = scratch.emplace().path();
+  std::mutex mutex;
+  ErrorStudyResults so_far;
+  study.measured = [&](const ErrorStudyResults& results) {
+    const std::lock_guard lock(mutex);
+    so_far = results;
+  };
+  ErrorStudyResults results;
+  {
+    const Farewell farewell([&] {
+      if (const pid_t command = g_command; command > 0) ::kill(-command, SIGKILL);
+      scratch.reset();
+      const std::lock_guard lock(mutex);
+      if (so_far.scenes.empty()) return;
+      write_results(arguments, files, so_far);
+      standard_output_flush();
+    });
+    tbb::task_arena(threads).execute([&] { results = error_study_run(study); });
+  }
+  const KeepsForSaving writing;
+  return write_results(arguments, files, results) ? kDone : kFailed;
 }
 
 std::vector<std::string> words(std::span<const std::string_view> labels) { return {labels.begin(), labels.end()}; }

@@ -22,6 +22,7 @@
 #include "cli/value_hint.h"
 #include "exporters/atomic_file.h"
 #include "scene/diagnostics.h"
+#include "scene/load.h"
 
 namespace relief {
 
@@ -94,6 +95,7 @@ int bench_displacement(const BenchArguments& arguments)
 struct StudyArguments {
   std::string json, html;
   std::vector<std::string> inputs;  ///< files that are read
+  bool are_scenes = false;          ///< they name files that are read, too
   int rounds = 3;
   bool quick = false;
 };
@@ -110,7 +112,10 @@ int bench_study(const StudyArguments& arguments,
   RunFiles files;
   files.add_output("--json", arguments.json);
   files.add_output("--html", arguments.html);
-  for (const std::string& input : arguments.inputs) files.add_input("an input", input);
+  for (const std::string& input : arguments.inputs) {
+    files.add_input("an input", input);
+    if (arguments.are_scenes) files.add_inputs("a file of the scene", scene_files(input));
+  }
   for (const std::string& output : {arguments.json, arguments.html}) check_writable(output);
   options.rounds = arguments.quick ? 1 : arguments.rounds;
   if (isatty(STDERR_FILENO) != 0) {
@@ -191,6 +196,7 @@ void procedural_register(CLI::App& bench, Run& run)
     std::vector<std::string> parts;
   };
   auto arguments = std::make_shared<Arguments>();
+  arguments->are_scenes = true;
   command
       ->add_option("--parts", arguments->parts,
                    "Parts, separated by commas: marching, lattice, smoothing, pot, terrain, planet (default: all)")

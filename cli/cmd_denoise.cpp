@@ -49,6 +49,10 @@ int denoise_run(const DenoiseArguments& arguments)
   files.add_output("--output", arguments.output);
   files.add_output("--png", arguments.png);
   files.add_input("the picture to denoise", arguments.input);
+  if (!arguments.png.empty()) {
+    const ColorView view(arguments.view);
+    for (const std::string& file : view.files()) files.add_input("a file of the colour view", file);
+  }
   denoiser_require(arguments.denoiser);
   check_writable(arguments.output);
   check_writable(arguments.png);

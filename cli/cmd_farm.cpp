@@ -104,6 +104,23 @@ std::vector<std::vector<int>> chunks_of(const FarmArguments& arguments)
   return chunks;
 }
 
+/// What the tasks of a job read and write.
+RunFiles files_of(const SlurmJob& job)
+{
+  std::vector<int> frames;
+  for (const std::vector<int>& chunk : job.chunks) frames.insert(frames.end(), chunk.begin(), chunk.end());
+  std::vector<std::string> words = {"render", job.scene, "--output", job.output};
+  words.insert(words.end(), job.render_options.begin(), job.render_options.end());
+  RunFiles files = render_files(words, frames);
+  if (job.parts == 1) return files;
+  const std::vector<int> numbers = frames.empty() ? std::vector<int>{0} : frames;
+  for (int part = 1; part <= job.parts; ++part) {
+    const std::filesystem::path pattern = slurm_part_output(job, part);
+    for (const int frame : numbers) files.add_output("--split", frames.empty() ? pattern : frame_path(pattern, frame));
+  }
+  return files;
+}
+
 /// Runs the script, which submits itself and prints the numbers of its jobs.
 /// @error std::runtime_error: it failed, and has said why
 void submit(const std::filesystem::path& script)
@@ -125,12 +142,7 @@ int farm(const FarmArguments& arguments)
   if (arguments.submit && !is_in_path("sbatch")) {
     throw std::runtime_error("--submit: expected Slurm's sbatch in one of the folders of PATH, found none");
   }
-  RunFiles files;
-  files.add_output("--script", arguments.script);
-  files.add_input("the scene", arguments.scene);
   if (!std::filesystem::exists(arguments.scene)) throw InputError(arguments.scene, "expected a scene, found no file");
-  check_writable(arguments.script);
-
   SlurmJob job;
   job.sets_threads = !check_render_options(arguments);
   job.program = std::filesystem::read_symlink("/proc/self/exe").string();
@@ -146,6 +158,9 @@ int farm(const FarmArguments& arguments)
   job.output = job.chunks.front().empty() || has_number
                    ? arguments.output
                    : (output.parent_path() / output.stem()).string() + ".####" + output.extension().string();
+  RunFiles files = files_of(job);
+  files.add_output("--script", arguments.script);
+  check_writable(arguments.script);
   atomic_write(arguments.script, slurm_script(job));
   std::error_code no_matter;
   using std::filesystem::perms;

@@ -249,6 +249,34 @@ std::string report_html(const FramePaths& paths,
   return frame_report_html(report);
 }
 
+/// Says what to do about a picture that shows nothing, or nothing but darkness; empty: it shows something.
+std::string emptiness_warning(const Scene& scene, const FilmView& film)
+{
+  const bool has_something = std::any_of(scene.instances.begin(), scene.instances.end(), [](const Instance& instance) {
+    return (instance.flags & (kVisibleToCamera | kHoldout)) == kVisibleToCamera;
+  });
+  const bool is_window = film.width != film.full_width || film.height != film.full_height;
+  if (!has_something || is_window) return {};
+  const ImageView beauty = film_layer(film, Aov::kBeauty);
+  if (beauty.channels.empty()) return {};
+  double covered = 0, brightest = 0;
+  for (int y = 0; y < film.height; ++y) {
+    for (int x = 0; x < film.width; ++x) {
+      const double coverage = static_cast<double>(beauty.channels[3].at(x, y));
+      covered += coverage;
+      if (coverage <= 0) continue;
+      for (std::size_t c = 0; c < 3; ++c) {
+        brightest = std::max(brightest, static_cast<double>(beauty.channels[c].at(x, y)));
+      }
+    }
+  }
+  // Half of the first code of a PNG that is not black.
+  constexpr double kDark = 1.5e-4;
+  if (covered == 0) return "the camera sees nothing of the scene; --camera auto looks at all of it";
+  if (brightest < kDark) return "no light reaches what the camera sees; --environment studio or sky lights it";
+  return {};
+}
+
 /// Says what to do about a PNG that is mostly white.
 void hint_at_clipping(ProgressPrinter& progress,
                       const std::filesystem::path& file,
@@ -372,15 +400,29 @@ bool render_frame(const RenderArguments& arguments,
 {
   const FramePaths paths = paths_of_frame(arguments, frame);
   std::vector<std::unique_ptr<OutputLock>> locks;
+  std::exception_ptr unwritable;
   for (const auto& [option, path] : outputs_of(paths)) {
-    check_writable(path);
-    locks.push_back(std::make_unique<OutputLock>(path));
+    try {
+      check_writable(path);
+      locks.push_back(std::make_unique<OutputLock>(path));
+    } catch (const OutputError&) {
+      // Where the frame is there already, nothing is to be written.
+      if (!arguments.resume) throw;
+      if (!unwritable) unwritable = std::current_exception();
+      continue;
+    }
     const std::string& holder = locks.back()->holder();
     if (holder.empty()) continue;
     if (!arguments.resume) throw OutputError(path.string(), "is being made by " + holder);
     report_skipped(progress, paths, frame.value_or(0), fmt::format("is being made by {}, left out", holder));
     return true;
   }
+  const auto note_unwritten = [&] {
+    progress.note(fmt::format("{}: interrupted before the first sample, not written", paths.exr.string()));
+  };
+  // Until sampling begins there is nothing to save.
+  std::optional<KeepsForSaving> saving;
+  const Farewell farewell(note_unwritten);
   const auto load_start = std::chrono::steady_clock::now();
   LoadOptions load = arguments.setup.load_options(frame);
   load.camera = camera_choice(arguments.picture);
@@ -397,6 +439,7 @@ bool render_frame(const RenderArguments& arguments,
   stats.frame = frame.value_or(0);
   stats.warnings = scene.warnings;
   for (std::string& text : warnings_about(arguments, scene)) stats.warnings.push_back(std::move(text));
+  progress.phase(paths.exr.string(), "loaded", stats.load_seconds);
   progress.warnings(stats.warnings);
   if (arguments.strict) refuse_warnings(arguments.scene, stats.warnings);
 
@@ -420,6 +463,7 @@ bool render_frame(const RenderArguments& arguments,
     report_skipped(progress, paths, stats.frame, "already rendered");
     return true;
   }
+  if (unwritable) std::rethrow_exception(unwritable);
   const std::optional<Picture> reference = reference_load(paths.reference, options);
   if (reference) {
     options.reference_error = [&](const FilmView& film) {
@@ -434,7 +478,7 @@ bool render_frame(const RenderArguments& arguments,
   // Of the page about the frame, so that `relief report` makes the same.
   const std::uint32_t report_mask = arguments.report.empty() ? 0 : report_aovs(scene);
   FrameFiles frame_files(files, paths, command, {compression_of(arguments), arguments.float_color},
-                         arguments.aov_mask | report_mask, progress);
+                         arguments.aov_mask | report_mask, exr_camera_attributes(options.camera), progress);
   std::optional<SavedRender> saved;
   if (arguments.resume) saved = state_of(paths, fingerprint, stats, progress);
   if (saved) {
@@ -453,10 +497,17 @@ bool render_frame(const RenderArguments& arguments,
       frame_files.write_preview(stats.frame, film, samples);
     };
   }
+  options.prepared = [&] {
+    saving.emplace();
+    progress.phase(paths.exr.string(), "built", stats.build_seconds);
+  };
+  options.traced_photons = [&](double seconds) {
+    progress.phase(paths.exr.string(), "photons of the first sample traced", seconds);
+  };
   KeptContext of_frame;
   KeptContext& context = kept != nullptr ? kept->scene.context() : of_frame;
   const RenderedImage image =
-      render(scene, options, interrupt_flag(), progress.callback(stats.frame, title), context, stats);
+      render(scene, options, interrupt_flag(), progress.callback(stats.frame, paths.exr.string(), title), context, stats);
   stats.peak_memory_bytes = peak_memory_bytes();
   if (stats.first_nonfinite) {
     stats.warnings.push_back("samples that were not finite count as black; the first one's rays: " +
@@ -468,12 +519,18 @@ bool render_frame(const RenderArguments& arguments,
         sample_range_text({options.first_sample, options.first_sample + options.num_samples,
                            static_cast<std::uint32_t>(options.settings.samples)});
   }
+  // Whoever sends requests shows the picture to somebody who works on the scene, and may be in the dark on purpose.
+  if (stats.samples_per_pixel > 0 && !progress.is_of_request()) {
+    if (std::string text = emptiness_warning(scene, image.view); !text.empty()) {
+      stats.warnings.push_back(arguments.scene + ": " + text);
+    }
+  }
   of_frame.reset();
   owner.reset();  // Pictures are written in the memory of what they were made from, unless that is kept.
-  const bool is_whole = stats.stop_reason != "interrupted";
+  bool is_whole = stats.stop_reason != "interrupted";
   if (stats.samples_per_pixel <= 0) {
     if (is_whole) throw OutputError(paths.exr, "not written: the time limit came before the first sample");
-    progress.note(fmt::format("{}: interrupted before the first sample, not written", paths.exr.string()));
+    note_unwritten();
     return false;
   }
   // Textures may be read until here.
@@ -485,10 +542,15 @@ bool render_frame(const RenderArguments& arguments,
   std::exception_ptr denoise_failure;
   if (arguments.denoiser != Denoiser::kNone) {
     try {
-      denoised = denoise_picture(arguments.denoiser, all_channels(image.view), paths.exr.string());
+      denoised =
+          denoise_picture(arguments.denoiser, all_channels(image.view), paths.exr.string(), &interrupt_flag());
       if (std::isnan(denoised->result.rmse)) {
         stats.warnings.emplace_back("--denoise: pixels with less than two samples stay as they are");
       }
+    } catch (const DenoiseStopped&) {
+      is_whole = false;
+      stats.stop_reason = "interrupted";
+      progress.note(fmt::format("{}: interrupted, not denoised", paths.exr.string()));
     } catch (...) {
       // What was rendered is saved all the same.
       denoise_failure = std::current_exception();
@@ -517,9 +579,8 @@ bool render_frame(const RenderArguments& arguments,
 }
 
 /// Frames in the order in which they are rendered; nothing stands for the rest pose.
-std::vector<std::optional<int>> frames_of_run(const RenderArguments& arguments)
+std::vector<std::optional<int>> frames_of_run(const std::vector<int>& numbers)
 {
-  const std::vector<int> numbers = frames_of(arguments.frames, arguments.scene);
   if (numbers.empty()) return {std::nullopt};
   return {numbers.begin(), numbers.end()};
 }
@@ -538,12 +599,13 @@ void refuse_standard_output(const RenderArguments& arguments, std::optional<int>
 /// @param session  null: this is the process's only run
 int render_all(const RenderArguments& arguments, const std::string& command, RenderSession* session)
 {
-  const std::vector<std::optional<int>> frames = frames_of_run(arguments);
+  const std::vector<std::optional<int>> frames = frames_of_run(frames_of(arguments.frames, arguments.scene));
   RunFiles files = files_of_run(arguments, frames);
   denoiser_require(arguments.denoiser);
 
   if (session == nullptr) {
-    interrupt_watch(arguments.grace);
+    broken_pipes_ignore();
+    if (arguments.grace > 0) interrupt_grace(arguments.grace);
   } else if (arguments.grace > 0) {
     throw CLI::ValidationError("--grace", "expected a run of its own, found a request to relief serve");
   }
@@ -581,11 +643,13 @@ int render_all(const RenderArguments& arguments, const std::string& command, Ren
 
 }  // namespace
 
-void cmd_render_register(CLI::App& app, Run& run, const std::string& command_line, RenderSession* session)
+namespace {
+
+/// Adds the command with its options, which go to `a`.
+/// @return  the command, and those of its options that decide a path
+std::pair<CLI::App*, std::vector<CLI::Option*>> add_render(CLI::App& app, RenderArguments& a)
 {
   constexpr const char* kDefaultAovs = "beauty,samples,variance,half";
-  auto arguments = std::make_shared<RenderArguments>();
-  RenderArguments& a = *arguments;
   a.aov_mask = parse_aovs(kDefaultAovs);
   CLI::App* command = app.add_subcommand("render", "Renders a scene to OpenEXR and PNG");
   const auto output = [](const char* option, const char* suffix) {
@@ -651,7 +715,36 @@ void cmd_render_register(CLI::App& app, Run& run, const std::string& command_lin
       ->check(number(0, 1e6))
       ->capture_default_str();
   add_max_memory(*command);
-  command->callback([&run, command_line, session, arguments, command, path_options] {
+  return {command, std::move(path_options)};
+}
+
+}  // namespace
+
+RunFiles render_files(const std::vector<std::string>& words, const std::vector<int>& frames)
+{
+  CLI::App app;
+  RenderArguments arguments;
+  add_render(app, arguments);
+  app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
+  RunFiles files = files_of_run(arguments, frames_of_run(frames));
+  files.add_inputs("a file of the scene", scene_files(arguments.scene));
+  const std::string& camera_from = arguments.picture.camera_from;
+  if (!camera_from.empty()) files.add_inputs("a file of the camera", scene_files(camera_from));
+  if (arguments.png.empty()) return files;
+  try {
+    const ColorView view(arguments.view.value_or(scene_settings(arguments.scene).view));
+    for (const std::string& file : view.files()) files.add_input("a file of the colour view", file);
+  } catch (const InputError&) {
+    // Those who render may have another configuration.
+  }
+  return files;
+}
+
+void cmd_render_register(CLI::App& app, Run& run, const std::string& command_line, RenderSession* session)
+{
+  auto arguments = std::make_shared<RenderArguments>();
+  const auto [command, path_options] = add_render(app, *arguments);
+  command->callback([&run, command_line, session, arguments, command = command, path_options = path_options] {
     arguments->settings = settings_given(*command);
     arguments->path_settings = words_given(path_options);
     run = [command_line, session, arguments] { return render_all(*arguments, command_line, session); };

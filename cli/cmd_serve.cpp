@@ -51,8 +51,9 @@ bool answer(const Request& request, const Failure& outcome)
 
 int serve()
 {
-  interrupt_watch();
+  broken_pipes_ignore();
   Requests requests;
+  const Farewell farewell([&] { requests.tell_interrupted(); });
   RenderSession session;
   while (const std::optional<Request> request = requests.next()) {
     Failure outcome{kInterrupted, {}, {}};
@@ -62,7 +63,9 @@ int serve()
       session.kept = std::make_unique<KeptFrames>();
       outcome = render_request(*request, session);
     }
+    const KeepsForSaving answering;
     if (!answer(*request, outcome)) return kFailed;
+    requests.finish();
   }
   return interrupt_by_signal() ? kInterrupted : kDone;
 }

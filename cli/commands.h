@@ -3,8 +3,11 @@
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
+
+#include "cli/run_files.h"
 
 namespace relief {
 
@@ -16,6 +19,11 @@ struct RenderSession;  // cli/render_session.h
 /// @param command_line  as given, for the metadata of pictures
 /// @param session       of the process, must outlive the parser; null: this is its only render
 void cmd_render_register(CLI::App& app, Run& run, const std::string& command_line, RenderSession* session = nullptr);
+/// All files of the run that words of a command line of `render` ask for, those that its scenes name too.
+/// @param words   with the command's name, without --frames
+/// @param frames  that it is for; empty: the rest pose
+/// @error CLI::ParseError, also if an output is an input; SceneError
+RunFiles render_files(const std::vector<std::string>& words, const std::vector<int>& frames);
 void cmd_serve_register(CLI::App& app, Run& run);
 void cmd_info_register(CLI::App& app, Run& run);
 void cmd_trace_register(CLI::App& app, Run& run);

@@ -161,9 +161,13 @@ ImageView all_channels(const Picture& picture)
   return view;
 }
 
-DenoisedPicture denoise_picture(Denoiser denoiser, const ImageView& layers, const std::string& file)
+DenoisedPicture denoise_picture(Denoiser denoiser,
+                                const ImageView& layers,
+                                const std::string& file,
+                                const std::atomic<bool>* stop)
 {
-  const DenoiseInput input = input_of(layers, file);
+  DenoiseInput input = input_of(layers, file);
+  input.stop = stop;
   // Measured with 1920 x 1080 pixels.
   constexpr std::uint64_t kPixelBytes = 350;
   memory_require(kPixelBytes * static_cast<std::uint64_t>(input.width) * static_cast<std::uint64_t>(input.height),

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -52,7 +53,11 @@ ImageView all_channels(const Picture& picture);
 /// Denoises.
 /// @param layers  with all channels of denoiser_aovs; those of denoising_half may be missing: features then have no noise
 /// @param file    for messages
-/// @error InputError that names the layers that are missing; as for denoise_oidn
-DenoisedPicture denoise_picture(Denoiser denoiser, const ImageView& layers, const std::string& file);
+/// @param stop    gives up when it becomes true; null: never
+/// @error InputError that names the layers that are missing; as for denoise_oidn; DenoiseStopped
+DenoisedPicture denoise_picture(Denoiser denoiser,
+                                const ImageView& layers,
+                                const std::string& file,
+                                const std::atomic<bool>* stop = nullptr);
 
 }  // namespace relief

@@ -36,6 +36,13 @@ ImageView shown(const FilmView& film, const DenoisedPicture* denoised)
 
 }  // namespace
 
+Attributes FrameFiles::attributes_of(const Statistics& stats) const
+{
+  Attributes attributes = exr_attributes(stats, command_);
+  attributes.insert(camera_.begin(), camera_.end());
+  return attributes;
+}
+
 void FrameFiles::write_preview(int frame, const FilmView& film, double samples)
 {
   if (!shows_previews_) return;
@@ -59,7 +66,7 @@ void FrameFiles::write_checkpoint(const RenderState& state,
   files_.check_output("--output", paths_.exr);
   stats.stop_reason = "interrupted";
   try {
-    exr_write(paths_.exr, film, exr_attributes(stats, command_), {ExrCompression::kNone, exr_.float_color},
+    exr_write(paths_.exr, film, attributes_of(stats), {ExrCompression::kNone, exr_.float_color},
               {state, sums, fingerprint});
   } catch (const OutputError& error) {
     progress_.warnings({fmt::format("a checkpoint could not be written: {}", error.what())});
@@ -83,7 +90,7 @@ void FrameFiles::write(const RenderedImage& image,
                        const std::string& fingerprint,
                        bool is_whole) const
 {
-  Attributes attributes = exr_attributes(stats, command_);
+  Attributes attributes = attributes_of(stats);
   std::exception_ptr failure;
   try {
     files_.check_output("--png", paths_.png);

@@ -22,13 +22,21 @@ class FrameFiles {
   /// @param files    of the run, to look once more before each is written
   /// @param command  the command line
   /// @param aov_mask  layers that the OpenEXR has
+  /// @param camera    attributes of the OpenEXR that tell it
   FrameFiles(const RunFiles& files,
              const FramePaths& paths,
              std::string command,
              ExrOptions exr,
              std::uint32_t aov_mask,
+             Attributes camera,
              ProgressPrinter& progress)
-      : files_(files), paths_(paths), command_(std::move(command)), exr_(exr), aov_mask_(aov_mask), progress_(progress)
+      : files_(files),
+        paths_(paths),
+        command_(std::move(command)),
+        exr_(exr),
+        aov_mask_(aov_mask),
+        camera_(std::move(camera)),
+        progress_(progress)
   {
   }
 
@@ -60,11 +68,14 @@ class FrameFiles {
              bool is_whole) const;
 
  private:
+  Attributes attributes_of(const Statistics& stats) const;
+
   const RunFiles& files_;
   const FramePaths& paths_;
   std::string command_;
   ExrOptions exr_;
   std::uint32_t aov_mask_;
+  Attributes camera_;
   ProgressPrinter& progress_;
   bool shows_previews_ = true;
 };

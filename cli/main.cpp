@@ -16,6 +16,7 @@
 #include "cli/cmd_report.h"
 #include "cli/commands.h"
 #include "cli/failure.h"
+#include "cli/interrupt.h"
 #include "cli/standard_streams.h"
 #include "scene/diagnostics.h"
 #include "scene/memory.h"
@@ -64,6 +65,7 @@ std::vector<std::string> arguments_of(int argc, char** argv)
 
 int run_command(const relief::Run& run)
 {
+  relief::interrupt_watch();
   const int code = run();
   relief::standard_output_flush();
   return code;

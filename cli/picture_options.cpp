@@ -77,7 +77,7 @@ std::vector<CLI::Option*> add_picture_options(CLI::App& command, PictureOptions&
     return [option](const std::string& text) { return parse_point(option, text); };
   };
   CLI::Option* camera =
-      command.add_option("--camera", options.camera, "Name of the camera, or its number from 0 (default: the first)");
+      command.add_option("--camera", options.camera, "Name of the camera, its number from 0, or auto: one that shows everything (default: the first)");
   CLI::Option* file =
       command.add_option("--camera-from", options.camera_from, "Scene file whose cameras there are instead");
   CLI::Option* from =

@@ -33,18 +33,21 @@ std::string duration_text(double seconds)
 ProgressPrinter::ProgressPrinter(const std::string& kind, nlohmann::json request) : request_(std::move(request))
 {
   if (kind == "json" || !request_.is_null()) kind_ = Kind::kJson;
-  if (kind_ == Kind::kNone && kind == "bar" && isatty(STDERR_FILENO) != 0) kind_ = Kind::kBar;
+  if (kind_ == Kind::kNone && kind == "bar") kind_ = isatty(STDERR_FILENO) != 0 ? Kind::kBar : Kind::kLog;
 }
 
 ProgressPrinter::~ProgressPrinter() { clear_bar(); }
 
-std::function<void(const RenderProgress&)> ProgressPrinter::callback(int frame, std::string title)
+std::function<void(const RenderProgress&)> ProgressPrinter::callback(int frame, std::string name, std::string title)
 {
+  logged_seconds_ = logged_fraction_ = 0;
   switch (kind_) {
     case Kind::kNone:
       return {};
     case Kind::kBar:
       return [this, title = std::move(title)](const RenderProgress& p) { draw_bar(title, p); };
+    case Kind::kLog:
+      return [this, name = std::move(name)](const RenderProgress& p) { log(name, p); };
     case Kind::kJson:
       return [this, frame](const RenderProgress& p) {
         event({{"event", "progress"},
@@ -58,6 +61,23 @@ std::function<void(const RenderProgress&)> ProgressPrinter::callback(int frame, 
       };
   }
   return {};
+}
+
+void ProgressPrinter::log(const std::string& name, const RenderProgress& p)
+{
+  // A log is read later: what is new, seldom enough to be looked through.
+  constexpr double kMostSeconds = 10, kLeastSeconds = 1, kShare = 0.05;
+  const double waited = p.seconds - logged_seconds_;
+  if (waited < kLeastSeconds || (waited < kMostSeconds && p.fraction < logged_fraction_ + kShare)) return;
+  logged_seconds_ = p.seconds;
+  logged_fraction_ = p.fraction;
+  note(fmt::format("{}: {:.0f} % after {}, {} left, {:.4g} samples a pixel", name, 100 * p.fraction,
+                   duration_text(p.seconds), duration_text(p.seconds_left), p.samples_per_pixel));
+}
+
+void ProgressPrinter::phase(const std::string& name, const char* what, double seconds)
+{
+  if (kind_ == Kind::kLog) note(fmt::format("{}: {} in {:.2f} s", name, what, seconds));
 }
 
 void ProgressPrinter::event(nlohmann::json object)

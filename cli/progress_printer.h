@@ -14,7 +14,8 @@ namespace relief {
 
 class ProgressPrinter {
  public:
-  /// @param kind  "bar" (drawn on standard error if that is a terminal), "json" (on standard output) or "none"
+  /// @param kind  "bar" (drawn on standard error if that is a terminal, and otherwise lines now and then), "json" (on standard
+  ///              output) or "none"
   /// @param request  of `relief serve`, its id: all events have it and are printed, whatever the kind; null: there is none
   explicit ProgressPrinter(const std::string& kind, nlohmann::json request = {});
 
@@ -24,10 +25,15 @@ class ProgressPrinter {
   ProgressPrinter& operator=(const ProgressPrinter&) = delete;
 
   bool is_json() const { return kind_ == Kind::kJson; }
+  bool is_of_request() const { return !request_.is_null(); }
 
   /// Prints the progress of a frame; empty if nobody is to see it.
+  /// @param name   of the picture, before lines
   /// @param title  what stands before the bar, such as "frame 7 "
-  std::function<void(const RenderProgress&)> callback(int frame, std::string title);
+  std::function<void(const RenderProgress&)> callback(int frame, std::string name, std::string title);
+
+  /// Says where nobody sees a bar that a part of the work before sampling is done.
+  void phase(const std::string& name, const char* what, double seconds);
 
   /// Prints a JSON object as a line, in JSON mode only. A reader that has gone away counts as a wish to stop.
   void event(nlohmann::json object);
@@ -40,12 +46,14 @@ class ProgressPrinter {
 
  private:
   void draw_bar(const std::string& title, const RenderProgress& progress);
+  void log(const std::string& name, const RenderProgress& progress);
   void clear_bar();
 
-  enum class Kind { kNone, kBar, kJson } kind_ = Kind::kNone;
+  enum class Kind { kNone, kBar, kLog, kJson } kind_ = Kind::kNone;
   nlohmann::json request_;
   bool bar_is_drawn_ = false;
   std::set<std::string> shown_;
+  double logged_seconds_ = 0, logged_fraction_ = 0;  ///< of the last line about a frame
 };
 
 }  // namespace relief

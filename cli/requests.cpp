@@ -1,7 +1,9 @@
 #include "cli/requests.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -19,10 +21,18 @@ namespace {
 constexpr const char* kExpected =
     R"(expected {"id": NUMBER OR TEXT, "render": ["SCENE", "-o", "FILE.exr", …]} or {"cancel": ID})";
 
+/// More than any command line has: what follows is no request, and must not take memory without end.
+constexpr std::size_t kLongestLine = std::size_t{1} << 22;
+
 /// @param id  null: it is not known whose mistake it is
 void answer_mistake(const nlohmann::json& id, const std::string& text)
 {
   print_json({{"event", "end"}, {"id", id}, {"exit_code", static_cast<int>(kUsage)}, {"error", text}});
+}
+
+void answer_interrupted(const nlohmann::json& id)
+{
+  print_json({{"event", "end"}, {"id", id}, {"exit_code", static_cast<int>(kInterrupted)}});
 }
 
 bool is_id(const nlohmann::json& value) { return value.is_string() || value.is_number(); }
@@ -58,7 +68,6 @@ Requests::~Requests()
 std::optional<Request> Requests::next()
 {
   std::unique_lock lock(mutex_);
-  at_work_ = nullptr;
   interrupt_rest();
   if (interrupt_by_signal()) return {};
   changed_.wait(lock, [this] { return !waiting_.empty() || has_ended_; });
@@ -69,6 +78,19 @@ std::optional<Request> Requests::next()
   interrupt_begin();
   if (!waiting_.empty() || has_ended_) interrupt_request();
   return request;
+}
+
+void Requests::finish()
+{
+  const std::lock_guard lock(mutex_);
+  at_work_ = nullptr;
+}
+
+void Requests::tell_interrupted()
+{
+  const std::lock_guard lock(mutex_);
+  if (!at_work_.is_null()) answer_interrupted(at_work_);
+  for (const Request& request : waiting_) answer_interrupted(request.id);
 }
 
 void Requests::read()
@@ -82,13 +104,17 @@ void Requests::read()
     const ssize_t size = ::read(STDIN_FILENO, block.data(), block.size());
     if (size < 0 && errno == EINTR) continue;
     if (size <= 0) break;
-    // A line is looked through once, however many blocks it takes.
-    std::size_t begin = 0, from = text.size();
-    text.append(block.data(), static_cast<std::size_t>(size));
-    for (std::size_t end = 0; (end = text.find('\n', from)) != std::string::npos; begin = from = end + 1) {
-      take(text.substr(begin, end - begin));
+    std::string_view rest(block.data(), static_cast<std::size_t>(size));
+    while (!rest.empty()) {
+      const std::size_t end = std::min(rest.find('\n'), rest.size());
+      // Of one that is too long the beginning is kept, for nobody; a character more says that it is.
+      text += rest.substr(0, std::min(end, kLongestLine + 1 - text.size()));
+      rest.remove_prefix(end);
+      if (rest.empty()) break;
+      rest.remove_prefix(1);
+      take(text);
+      text.clear();
     }
-    text.erase(0, begin);
   }
   if (!text.empty()) take(text);
   end();
@@ -96,6 +122,10 @@ void Requests::read()
 
 void Requests::take(const std::string& line)
 {
+  if (line.size() > kLongestLine) {
+    answer_mistake({}, "expected a line of at most " + std::to_string(kLongestLine) + " characters, found a longer one");
+    return;
+  }
   const nlohmann::json object = nlohmann::json::parse(line, nullptr, false);
   const bool is_cancel = object.is_object() && object.size() == 1 && object.contains("cancel");
   if (is_cancel && is_id(object["cancel"])) {
@@ -104,7 +134,7 @@ void Requests::take(const std::string& line)
     if (object["cancel"] == at_work_) interrupt_request();
     std::erase_if(waiting_, [&](const Request& request) {
       const bool is_meant = request.id == object["cancel"];
-      if (is_meant) print_json({{"event", "end"}, {"id", request.id}, {"exit_code", static_cast<int>(kInterrupted)}});
+      if (is_meant) answer_interrupted(request.id);
       return is_meant;
     });
     return;
@@ -124,7 +154,7 @@ void Requests::end()
 {
   const std::lock_guard lock(mutex_);
   has_ended_ = true;
-  if (!at_work_.is_null()) interrupt_request();
+  if (!at_work_.is_null()) interrupt_end(kDone);
   changed_.notify_one();
 }
 

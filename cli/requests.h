@@ -33,6 +33,12 @@ class Requests {
   /// @return empty: there will be no other
   std::optional<Request> next();
 
+  /// Says that the request at work has been answered.
+  void finish();
+
+  /// Answers all that have not been answered that they were interrupted, from any thread, before the program ends.
+  void tell_interrupted();
+
  private:
   void read();
   void take(const std::string& line);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -23,13 +24,19 @@ std::string job_name(const SlurmJob& job)
   return name;
 }
 
-/// The output of a part, for a shell: the number is a parameter of its own or a figure.
-std::string part_file(const SlurmJob& job, const std::string& part)
+/// What the output of a part is called, before and after its number.
+std::pair<std::string, std::string> part_names(const SlurmJob& job)
 {
   const std::filesystem::path output(job.output);
   const std::string stem = (output.parent_path() / output.stem()).string();
-  return shell_quoted(stem + ".part-") + part +
-         shell_quoted(fmt::format("-of-{}{}", job.parts, output.extension().string()));
+  return {stem + ".part-", fmt::format("-of-{}{}", job.parts, output.extension().string())};
+}
+
+/// The output of a part, for a shell: the number is a parameter of its own or a figure.
+std::string part_file(const SlurmJob& job, const std::string& part)
+{
+  const auto [start, end] = part_names(job);
+  return shell_quoted(start) + part + shell_quoted(end);
 }
 
 /// A function that says which frames a chunk has.
@@ -54,7 +61,7 @@ render()
   text += "  \"$relief\" render " + shell_quoted(job.scene) + " -o " +
           (job.parts > 1 ? part_file(job, "\"$part\"") : shell_quoted(job.output));
   if (has_frames(job)) text += " --frames \"$(frames_of \"$chunk\")\"";
-  text += " --resume --progress none";
+  text += " --resume";
   // Halves would be rounded before they are added.
   if (job.parts > 1) text += fmt::format(" --part \"$part/{}\" --float", job.parts);
   if (job.sets_threads) text += " ${SLURM_CPUS_ON_NODE:+--threads \"$SLURM_CPUS_ON_NODE\"}";
@@ -117,6 +124,12 @@ submit()
 }
 
 }  // namespace
+
+std::string slurm_part_output(const SlurmJob& job, int part)
+{
+  const auto [start, end] = part_names(job);
+  return start + std::to_string(part) + end;
+}
 
 std::string slurm_script(const SlurmJob& job)
 {

@@ -22,4 +22,7 @@ struct SlurmJob {
 /// @pre output has a run of # if there are frames
 std::string slurm_script(const SlurmJob& job);
 
+/// Where a part of a frame goes, counted from 1; with the output's run of #.
+std::string slurm_part_output(const SlurmJob& job, int part);
+
 }  // namespace relief

@@ -14,7 +14,6 @@
 #include <unistd.h>
 
 #include "exporters/errors.h"
-#include "exporters/side_file.h"
 
 namespace relief {
 
@@ -63,6 +62,17 @@ void copy_access(int descriptor, const struct stat& old)
   }
   // Afterwards: a change of owner may take permissions away.
   ::fchmod(descriptor, old.st_mode & 0777u);
+}
+
+/// Whether this user may give a file's name to another file: in a folder with the sticky bit, as /tmp, that is for the owners
+/// alone.
+bool may_be_replaced(const fs::path& file, const struct stat& status)
+{
+  struct stat folder {};
+  const fs::path parent = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  if (::stat(parent.c_str(), &folder) != 0 || (folder.st_mode & S_ISVTX) == 0) return true;
+  const uid_t user = ::geteuid();
+  return user == 0 || user == status.st_uid || user == folder.st_uid;
 }
 
 }  // namespace
@@ -136,6 +146,7 @@ void AtomicFile::open_temporary()
   const bool replaces = ::stat(destination_.c_str(), &old) == 0;
   // Renaming would ask the folder alone; who writes to a file needs the file's permission.
   if (replaces && ::faccessat(AT_FDCWD, destination_.c_str(), W_OK, AT_EACCESS) != 0) fail(errno);
+  if (replaces && !may_be_replaced(destination_, old)) fail(EPERM);
   // The folder of an empty path is no folder.
   if (destination_.filename().empty()) fail(ENOENT);
   const long name_limit =
@@ -158,6 +169,7 @@ void AtomicFile::open_temporary()
       continue;
     }
     temporary_ = temporary;
+    note_.emplace(temporary_);
     if (replaces) copy_access(opened, old);
     descriptor_ = ::fcntl(opened, F_DUPFD_CLOEXEC, 0);
     file_ = ::fdopen(opened, "wb");
@@ -234,10 +246,30 @@ void AtomicFile::commit_temporary()
   if (first_error_ != 0) fail(first_error_);
   // A name may reach the disk before the bytes that it names: after a power cut it would stand for an empty file.
   synchronize(descriptor_);
-  if (::rename(temporary_.c_str(), destination_.c_str()) != 0) fail(errno);
+  if (::rename(temporary_.c_str(), destination_.c_str()) != 0) keep_aside(errno);
   temporary_.clear();
+  note_.reset();
   synchronize_folder();
   close_descriptor();
+}
+
+void AtomicFile::keep_aside(int error_number)
+{
+  // The folder, or what stands in it, has changed since the file was opened. What was made may have taken hours.
+  constexpr int kMostNames = 1000;
+  for (int i = 1; i <= kMostNames; ++i) {
+    fs::path aside = destination_;
+    aside.replace_filename(destination_.stem().string() + ".kept-" + std::to_string(i) +
+                           destination_.extension().string());
+    if (::link(temporary_.c_str(), aside.c_str()) != 0) {
+      if (errno == EEXIST) continue;
+      break;
+    }
+    first_error_ = error_number;
+    throw OutputError(path_.string(), std::generic_category().message(error_number) + "; it is kept as '" +
+                                          aside.string() + "'");
+  }
+  fail(error_number);
 }
 
 void AtomicFile::synchronize(int descriptor)

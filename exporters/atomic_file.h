@@ -4,8 +4,11 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
+
+#include "exporters/side_file.h"
 
 namespace relief {
 
@@ -45,8 +48,9 @@ class AtomicFile {
   /// Position in bytes from the start. @error OutputError
   std::uint64_t position();
 
-  /// Closes the file and gives it its name, replacing an older file in one step.
-  /// @error OutputError; the older file is then untouched. An earlier failure is reported again: a library in between may
+  /// Closes the file and gives it its name, replacing an older file in one step. If that alone is not possible any more, it gets
+  /// another name beside it, NAME.kept-N.SUFFIX.
+  /// @error OutputError, which tells that name; the older file is then untouched. An earlier failure is reported again: a library in between may
   ///        have swallowed it
   void commit();
 
@@ -59,11 +63,13 @@ class AtomicFile {
   void open_temporary();
   void commit_stream();
   void commit_temporary();
+  [[noreturn]] void keep_aside(int error_number);
   void synchronize(int descriptor);
   void synchronize_folder();
   void close_descriptor();
 
   std::filesystem::path path_, destination_, temporary_;
+  std::optional<SideFileNote> note_;  ///< of the temporary file
   std::FILE* file_ = nullptr;  ///< the temporary file; null for a stream
   int descriptor_ = -1;        ///< of the stream; or holds the temporary file's lock until it has its name
   std::string stream_bytes_;   ///< written to the stream by commit

@@ -4,14 +4,16 @@
 #include <ImfMultiPartInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfPartType.h>
-#include <ImfStringAttribute.h>
 #include <ImfThreading.h>
 
 #include <algorithm>
 #include <cstdio>
+#include <ctime>
 #include <new>
+#include <utility>
 
 #include "exporters/errors.h"
+#include "exporters/exr_attribute.h"
 #include "exporters/exr_rows.h"
 #include "scene/cryptomatte.h"
 #include "scene/memory.h"
@@ -46,15 +48,14 @@ std::string one_line(std::string text)
   return text;
 }
 
-/// The attributes that are text, except those by which OpenEXR itself describes a part.
+/// The attributes that can be written again, except those by which OpenEXR itself describes a part.
 Attributes attributes_of(const Imf::Header& header)
 {
   Attributes attributes;
   for (auto entry = header.begin(); entry != header.end(); ++entry) {
     const std::string name = entry.name();
     if (name == "name" || name == "type" || name == "view") continue;
-    const auto* text = dynamic_cast<const Imf::StringAttribute*>(&entry.attribute());
-    if (text != nullptr) attributes[name] = text->value();
+    if (auto text = exr_attribute_text(name, entry.attribute())) attributes[name] = std::move(*text);
   }
   return attributes;
 }
@@ -167,8 +168,45 @@ Attributes exr_attributes(const Statistics& statistics, std::string_view command
       {"relief:warnings", warnings},
       {"relief:command", std::string(command)},
   };
+  const std::time_t now = std::time(nullptr);
+  std::tm local{};
+  std::array<char, 32> date{};
+  if (::localtime_r(&now, &local) != nullptr &&
+      std::strftime(date.data(), date.size(), "%Y:%m:%d %H:%M:%S", &local) > 0) {
+    attributes["capDate"] = date.data();
+    // Seconds to be added to local time.
+    attributes["utcOffset"] = std::to_string(-local.tm_gmtoff);
+  }
   std::erase_if(attributes, [](const auto& entry) { return entry.second.empty(); });
   return attributes;
+}
+
+Attributes exr_camera_attributes(const Camera& camera)
+{
+  // Rows of a matrix that a row of coordinates stands before, as OpenEXR has it.
+  const auto text = [](const std::array<std::array<double, 4>, 4>& m) {
+    std::string numbers;
+    for (const auto& row : m) {
+      for (const double value : row) numbers += (numbers.empty() ? "" : " ") + attribute_number(value);
+    }
+    return numbers;
+  };
+  const Affine3 to = inverse(camera.world_from_camera);
+  const std::array<Vec3f, 4> images = {to.x, to.y, to.z, to.p};
+  const double x_scale = 1.0 / static_cast<double>(camera.half_width), y_scale = 1.0 / static_cast<double>(camera.half_height);
+  // A shift is a fraction of the whole window, which is 2 wide in these coordinates.
+  const double x_shift = 2.0 * static_cast<double>(camera.shift_x), y_shift = 2.0 * static_cast<double>(camera.shift_y);
+  const bool is_perspective = camera.projection == Projection::kPerspective;
+  std::array<std::array<double, 4>, 4> camera_matrix{}, screen_matrix{};
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double x = static_cast<double>(images[i].x), y = static_cast<double>(images[i].y),
+                 z = static_cast<double>(images[i].z), one = i == 3 ? 1.0 : 0.0;
+    camera_matrix[i] = {x, y, z, one};
+    const double w = is_perspective ? -z : one;
+    // There need not be planes that the third coordinate could lie between: it rises with the distance, and tells it.
+    screen_matrix[i] = {x * x_scale - w * x_shift, y * y_scale - w * y_shift, is_perspective ? w - one : -z, w};
+  }
+  return {{"worldToCamera", text(camera_matrix)}, {"worldToNDC", text(screen_matrix)}};
 }
 
 Attributes exr_cryptomatte_attributes(const Scene& scene, std::uint32_t aov_mask)

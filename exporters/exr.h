@@ -32,6 +32,11 @@ void exr_use_threads(int num_threads);
 /// @param command  the command line that made it, or empty
 Attributes exr_attributes(const Statistics& statistics, std::string_view command);
 
+/// A picture's camera: worldToCamera and worldToNDC, for rows of coordinates that stand before them. The camera looks along its −Z,
+/// with +Y up. NDC are −1…1 from left to right and from the bottom up, of the whole picture; the third is 1 − 1/d in a perspective view
+/// and d in an orthographic one, where d is the distance along the axis in metres.
+Attributes exr_camera_attributes(const Camera& camera);
+
 /// What compositors need to know of the Cryptomattes among a film's layers: their names, and whose ids they hold.
 Attributes exr_cryptomatte_attributes(const Scene& scene, std::uint32_t aov_mask);
 
@@ -41,7 +46,7 @@ std::vector<std::string> exr_damaged_layers(const FilmLayout& layout, ExrCompres
 
 /// Writes a film. Ids and counts are stored as 32-bit integers; depth, position, uv, variance and half as floats; colours and
 /// normals as halves unless asked otherwise. Finite values beyond a half's range become its largest value, 65504.
-/// @param attributes  text to store; a name that OpenEXR itself uses with another type is an error
+/// @param attributes  to store, see exr_attribute.h; a name that OpenEXR itself uses with another type is an error
 /// @param more        further channels of the film's size, stored as their types say
 /// @error OutputError; nothing is left behind
 /// @cost  memory for a block of rows only
@@ -56,7 +61,7 @@ void exr_write(const std::filesystem::path& path,
                const Picture& picture,
                ExrCompression compression = ExrCompression::kZip);
 
-/// Reads the first part of any flat OpenEXR file, scanline or tiled, with the attributes that are text.
+/// Reads the first part of any flat OpenEXR file, scanline or tiled, with the attributes that are text or of our own.
 /// @error InputError for anything else: unreadable, truncated, corrupt, deep, subsampled, or absurdly large
 /// @cost  4 bytes a value; memory grows with what was really read, whatever the header claims
 Picture exr_load(const std::filesystem::path& path);

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "exporters/atomic_file.h"
+#include "exporters/exr_attribute.h"
 #include "exporters/errors.h"
 #include "scene/memory.h"
 
@@ -106,9 +107,7 @@ Imf::Header exr_header_make(const ExrWindows& windows,
   Imf::Header header(display, data);
   header.compression() = kImfCompressions[static_cast<std::size_t>(compression)];
   Imf::addChromaticities(header, Imf::Chromaticities());  // Rec.709 primaries and D65 are its defaults
-  for (const auto& [name, text] : attributes) {
-    header.insert(name, Imf::StringAttribute(text));
-  }
+  for (const auto& [name, text] : attributes) exr_attribute_insert(header, name, text);
   for (const ChannelView& channel : channels) {
     header.channels().insert(channel.name, Imf::Channel(exr_pixel_type(channel.type)));
   }

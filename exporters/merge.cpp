@@ -428,7 +428,8 @@ MergeResult Merger::finish()
   const Attributes first = std::move(result_.attributes);
   result_.attributes.clear();
   for (const char* kept :
-       {"software", "relief:version", "relief:scene", "relief:frame", "relief:view", "relief:warnings"}) {
+       {"software", "capDate", "utcOffset", "worldToCamera", "worldToNDC", "relief:version", "relief:scene", "relief:frame",
+        "relief:view", "relief:warnings"}) {
     if (const auto found = first.find(kept); found != first.end() && !found->second.empty())
       result_.attributes.insert(*found);
   }

@@ -13,7 +13,6 @@
 
 #include "exporters/atomic_file.h"
 #include "exporters/errors.h"
-#include "exporters/side_file.h"
 
 namespace relief {
 
@@ -31,6 +30,9 @@ std::string holder_of(int descriptor)
   // Between making and locking the file and writing into it there is a moment.
   return holder.empty() ? "another process" : holder;
 }
+
+/// How a lock that stands there already is opened: whatever it is, nothing happens to it, and nobody waits.
+constexpr int kOldFlags = O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
 
 /// Says in the lock who has it. That is for people and for side_files_clean: a full disk does not matter.
 void sign(int descriptor)
@@ -51,28 +53,38 @@ OutputLock::OutputLock(const std::filesystem::path& output)
   // side_files_clean holds a lock for a moment to see whether anybody else does.
   constexpr int kMostTries = 20;
   for (int try_number = 1;; ++try_number) {
-    descriptor_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+    // Only what was made here is written into: a file that stands there already may be another name of any file.
+    descriptor_ = ::open(path_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    const bool is_new = descriptor_ >= 0;
+    if (!is_new && errno == EEXIST) descriptor_ = ::open(path_.c_str(), O_RDWR | kOldFlags);
     // Another user's lock cannot be written to, but it can be asked.
-    if (descriptor_ < 0 && errno == EACCES) descriptor_ = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
+    if (descriptor_ < 0 && errno == EACCES) descriptor_ = ::open(path_.c_str(), O_RDONLY | kOldFlags);
+    if (descriptor_ < 0 && errno == ENOENT && try_number < kMostTries) continue;
     if (descriptor_ < 0) throw OutputError(output.string(), std::generic_category().message(errno));
     const int error = file_lock(descriptor_, false);
+    if (error == EWOULDBLOCK && try_number >= kMostTries) {
+      holder_ = holder_of(descriptor_);
+      ::close(descriptor_);
+      descriptor_ = -1;
+      return;
+    }
+    if (error == EWOULDBLOCK) {
+      ::close(descriptor_);
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      continue;
+    }
     if (error == 0 && !is_file_at(descriptor_, path_)) {
       // Its last holder removed it between our opening and locking it.
       ::close(descriptor_);
       continue;
     }
-    if (error == EWOULDBLOCK && try_number < kMostTries) {
+    if (is_new) sign(descriptor_);
+    // One that a killed run has left makes room for one that says who has it now. Where that is not allowed, it serves as it is.
+    if (!is_new && error == 0 && ::unlink(path_.c_str()) == 0) {
       ::close(descriptor_);
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
       continue;
     }
-    if (error == EWOULDBLOCK) {
-      holder_ = holder_of(descriptor_);
-      ::close(descriptor_);
-      descriptor_ = -1;
-    } else if (error == 0) {
-      sign(descriptor_);
-    }
+    note_.emplace(path_);
     return;
   }
 }

@@ -2,7 +2,10 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
+
+#include "exporters/side_file.h"
 
 namespace relief {
 
@@ -23,6 +26,7 @@ class OutputLock {
 
  private:
   std::filesystem::path path_;
+  std::optional<SideFileNote> note_;
   int descriptor_ = -1;
   std::string holder_;
 };

@@ -4,8 +4,11 @@
 #include <array>
 #include <cerrno>
 #include <cstdio>
+#include <mutex>
 #include <random>
+#include <set>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include <fcntl.h>
@@ -16,6 +19,9 @@
 namespace relief {
 
 namespace {
+
+std::mutex g_noted_mutex;
+std::multiset<std::filesystem::path> g_noted;
 
 constexpr std::string_view kPrefix = ".relief-", kTemporarySuffix = ".tmp", kLockSuffix = ".lock";
 constexpr std::size_t kHostDigits = 8, kNumberDigits = 16;
@@ -114,6 +120,24 @@ bool is_file_at(int descriptor, const std::filesystem::path& path)
   }, named{};
   return ::fstat(descriptor, &open_file) == 0 && ::lstat(path.c_str(), &named) == 0 &&
          open_file.st_dev == named.st_dev && open_file.st_ino == named.st_ino;
+}
+
+SideFileNote::SideFileNote(std::filesystem::path path) : path_(std::move(path))
+{
+  const std::lock_guard guard(g_noted_mutex);
+  g_noted.insert(path_);
+}
+
+SideFileNote::~SideFileNote()
+{
+  const std::lock_guard guard(g_noted_mutex);
+  g_noted.extract(path_);
+}
+
+void side_files_remove()
+{
+  const std::lock_guard guard(g_noted_mutex);
+  for (const std::filesystem::path& path : g_noted) ::unlink(path.c_str());
 }
 
 void side_files_clean(const std::filesystem::path& folder)

@@ -31,6 +31,21 @@ int file_lock(int descriptor, bool waits);
 /// Whether a path still leads to the open file: another run may have removed it before it was locked.
 bool is_file_at(int descriptor, const std::filesystem::path& path);
 
+/// Says that a side file is this process's, for as long as the object lives.
+class SideFileNote {
+ public:
+  explicit SideFileNote(std::filesystem::path path);
+  ~SideFileNote();
+  SideFileNote(const SideFileNote&) = delete;
+  SideFileNote& operator=(const SideFileNote&) = delete;
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// Removes this process's side files, before it ends without its destructors.
+void side_files_remove();
+
 /// Removes what runs of this machine and user that were killed left in a folder. Files that somebody holds stay, and so does
 /// whatever is not certainly ours.
 /// @param folder  empty: the current one; one that cannot be read is left alone

@@ -34,8 +34,10 @@ class CheckpointSchedule {
   /// @param interval  seconds; 0: never
   explicit CheckpointSchedule(double interval) : interval_(interval), next_(Clock::now() + duration(interval)) {}
 
+  bool is_on() const { return interval_ > 0; }
+
   /// Asked by any thread.
-  bool is_due() const { return interval_ > 0 && Clock::now() >= next_; }
+  bool is_due() const { return is_on() && Clock::now() >= next_; }
 
   /// Saves, while nobody asks.
   void run(const std::function<void()>& save);

@@ -42,9 +42,12 @@ std::uint32_t samples_wanted(const RenderOptions& options)
 /// first measure of speed are wanted soon, and towards a time limit, which is kept by asking for less.
 /// @param is_watched  the picture is shown between passes: they begin with one sample, and slow ones are smaller. Some of
 ///                    them end where those do that are not watched
-std::uint32_t pass_samples(std::uint32_t done, std::uint32_t wanted, double seconds, double time_limit, bool is_watched)
+/// @param most        samples after which a checkpoint may be due: as those that are watched
+std::uint32_t pass_samples(
+    std::uint32_t done, std::uint32_t wanted, double seconds, double time_limit, bool is_watched, std::uint32_t most)
 {
   std::uint32_t samples = std::min(wanted - done, kMostPassSamples);
+  if (most < kMostPassSamples) samples = std::min({samples, most, kMostPassSamples - done % kMostPassSamples});
   const double per_sample = done > 0 ? seconds / done : 0.0;
   if (is_watched) {
     constexpr double kLongestSeconds = 4;
@@ -363,6 +366,7 @@ RenderedImage render(const Scene& scene,
   std::optional<PhotonPass> photons;
   if (caustics) photons.emplace(context, settings.caustics, static_cast<double>(settings.width) * settings.height);
   stats.build_seconds = seconds_since(build_start);
+  if (options.prepared) options.prepared();
 
   const double earlier_seconds = options.saved != nullptr ? options.saved->state.seconds : 0.0;
   const Clock::time_point start =
@@ -446,18 +450,37 @@ RenderedImage render(const Scene& scene,
         film.beauty(window.x0, window.y0, settings.width, settings.height, settings.film_exposure);
     options.checkpoint(state(), film.sums(), beauty.view);
   };
+  // A checkpoint has to wait for tiles that are under way, so they must not take longer than what may be lost. Before anything is
+  // measured pictures of few tiles, which wait for all of them, begin as small as can be.
+  const auto most_samples = [&]() -> std::uint32_t {
+    if (!checkpoints.is_on()) return kMostPassSamples;
+    constexpr double kFewTiles = 4;
+    const double tiles_a_thread =
+        static_cast<double>(active.size()) / static_cast<double>(tbb::this_task_arena::max_concurrency());
+    if (done == 0) return tiles_a_thread <= kFewTiles ? 1 : kMostPassSamples;
+    const double tile_seconds = seconds_since(start) / done / std::max(tiles_a_thread, 1.0);
+    return static_cast<std::uint32_t>(
+        std::clamp(options.checkpoint_seconds / tile_seconds, 1.0, static_cast<double>(kMostPassSamples)));
+  };
+  bool has_small_passes = is_watched;
+  std::function<void(double)> tell_photons = options.traced_photons;
   while (done < wanted && !active.empty()) {
     // Photons are of one sample: see PhotonPass::next. A pass that was under way goes on as it was begun.
     if (samples == 0) {
-      samples = caustics ? 1 : pass_samples(done, wanted, seconds_since(start), options.time_limit_seconds, is_watched);
+      const std::uint32_t most = most_samples();
+      has_small_passes = has_small_passes || most < kMostPassSamples;
+      samples = caustics ? 1
+                         : pass_samples(done, wanted, seconds_since(start), options.time_limit_seconds, is_watched, most);
     }
     if (photons) {
       photons_before = photons->state();
       next_photons();
+      if (tell_photons && !end.reached()) std::exchange(tell_photons, {})(seconds_since(start));
     }
     const auto is_ended = [&] { return stop.load() || end.reached().load(); };
     // A checkpoint leaves tiles that wait; usually there is none, and all is done in the first turn. Each turn does one at least.
     for (std::vector<int> waiting = active; !is_ended();) {
+      if (checkpoints.is_due() && film.mean_samples() > 0) checkpoints.run(checkpoint);
       tbb::parallel_for(
           std::size_t{0}, waiting.size(),
           [&](std::size_t i) {
@@ -479,7 +502,6 @@ RenderedImage render(const Scene& scene,
           tbb::simple_partitioner());
       std::erase_if(waiting, [&](int tile) { return film.tile_samples(tile) != done; });
       if (waiting.empty()) break;
-      if (!is_ended() && checkpoints.is_due()) checkpoints.run(checkpoint);
     }
     if (is_ended()) {
       stats.stop_reason = stop.load() ? "interrupted" : "time_limit";
@@ -489,8 +511,8 @@ RenderedImage render(const Scene& scene,
     done += std::exchange(samples, 0);
     if (options.keeps_errors && errors.is_due()) errors.add(seconds_since(start));
     if (photons) reporter.set_photon_share(photons->seconds() / seconds_since(start));
-    // Where passes are smaller because somebody watches, tiles are judged when they would be otherwise.
-    const bool is_judged = !is_watched || caustics || done % kMostPassSamples == 0;
+    // Where passes are smaller because somebody watches or saves, tiles are judged when they would be otherwise.
+    const bool is_judged = !has_small_passes || caustics || done % kMostPassSamples == 0;
     if (settings.noise_threshold > 0 && done >= kMinAdaptiveSamples && is_judged) {
       // A tenth of the picture's mean: dark corners need not be cleaner than the eye can tell.
       const double floor = 0.1 * film.mean_luminance();

@@ -28,6 +28,10 @@ struct RenderOptions {
   LightTechnique light_technique = LightTechnique::kMis;
   DisplacementOptions displacement;
   std::shared_ptr<KeptTrees> trees;  ///< of the scenes before; null: none are kept
+  /// Called once what rays need is built, before the first of them; may be empty.
+  std::function<void()> prepared;
+  /// Called once the first photons are traced, with the seconds that it took; may be empty.
+  std::function<void(double)> traced_photons;
   /// Gets the beauty so far and its samples a pixel, soon after the start and then as often as takes a hundredth of the
   /// time, at most twice a second; may be empty. Sampling waits meanwhile. The picture is the same with it, if no time limit counts what it takes.
   std::function<void(const FilmView&, double)> preview;

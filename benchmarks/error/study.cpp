@@ -1,5 +1,6 @@
 #include "benchmarks/error/study.h"
 
+#include <atomic>
 #include <exception>
 #include <filesystem>
 #include <limits>
@@ -83,11 +84,8 @@ struct Reference {
   }
 };
 
-const std::atomic<bool>& stop_of(const ErrorStudyOptions& study)
-{
-  static const std::atomic<bool> never{false};
-  return study.stop != nullptr ? *study.stop : never;
-}
+/// Nobody ends a render: what was measured before is told meanwhile.
+const std::atomic<bool> kNeverStop{false};
 
 Reference reference_make(const ErrorStudyOptions& study, const Scene& scene, RenderOptions options)
 {
@@ -111,7 +109,7 @@ Reference reference_make(const ErrorStudyOptions& study, const Scene& scene, Ren
   options.displacement.lod = 0;
   options.settings.caustics.mode = CausticsMode::kAuto;
   Statistics stats;
-  reference.rendered = render(scene, options, stop_of(study), {}, stats);
+  reference.rendered = render(scene, options, kNeverStop, {}, stats);
   reference.samples = stats.samples_per_pixel;
   reference.rmse = stats.error_rmse;
   return reference;
@@ -125,43 +123,43 @@ ErrorMeasurement measured(const ImageView& picture, const ImageView& reference, 
   return {samples, seconds, errors.rmse, errors.relmse};
 }
 
+/// Results that grow, and who is told.
+struct Log {
+  const ErrorStudyOptions& study;
+  ErrorStudyResults results;
+};
+
 /// Renders with four times the samples each, until one has taken as long as the last time. A line needs a few points anyway.
 template <class Render>
-ErrorSeries series_make(const ErrorStudyOptions& study, std::string name, Render render_with)
+void series_measure(Log& log, std::string name, Render render_with)
 {
-  ErrorSeries series;
+  const ErrorStudyOptions& study = log.study;
+  ErrorSeries& series = log.results.scenes.back().series.emplace_back();
   series.name = std::move(name);
   for (int samples = 1; samples <= kMostSamples; samples *= 4) {
-    if (stop_of(study)) break;
     series.points.push_back(render_with(samples, series.preparation_seconds));
+    if (study.measured) study.measured(log.results);
     constexpr std::size_t kFewestPoints = 3;
     if (series.points.size() >= kFewestPoints && series.points.back().seconds >= study.times.back()) break;
   }
-  return series;
 }
 
-ErrorSeries choice_series(const ErrorStudyOptions& study,
-                          const Scene& scene,
-                          const Choice& choice,
-                          const ImageView& reference)
+void choice_measure(Log& log, const Scene& scene, const Choice& choice, const ImageView& reference)
 {
-  return series_make(study, choice.name, [&](int samples, double& preparation) {
+  series_measure(log, choice.name, [&](int samples, double& preparation) {
     RenderOptions options = choice.options;
     options.settings.samples = samples;
     Statistics stats;
-    const RenderedImage image = render(scene, options, stop_of(study), {}, stats);
+    const RenderedImage image = render(scene, options, kNeverStop, {}, stats);
     preparation = stats.build_seconds;
     return measured(film_layer(image.view, Aov::kBeauty), reference, samples, stats.render_seconds);
   });
 }
 
-ErrorSeries other_series(const ErrorStudyOptions& study,
-                         const OtherRenderer& other,
-                         const std::string& scene,
-                         const ImageView& reference)
+void other_measure(Log& log, const OtherRenderer& other, const std::string& scene, const ImageView& reference)
 {
-  const std::string output = (std::filesystem::path(study.scratch) / "picture.exr").string();
-  return series_make(study, other.name, [&](int samples, double& preparation) {
+  const std::string output = (std::filesystem::path(log.study.scratch) / "picture.exr").string();
+  series_measure(log, other.name, [&](int samples, double& preparation) {
     const OtherRenderer::Seconds seconds = other.render(scene, reference.width, reference.height, samples, output);
     preparation = seconds.preparation;
     const Picture picture = exr_load(output);
@@ -178,17 +176,16 @@ ErrorSeries other_series(const ErrorStudyOptions& study,
 
 ErrorStudyResults error_study_run(const ErrorStudyOptions& study)
 {
-  ErrorStudyResults results{study.times, {}};
+  Log log{study, {study.times, {}}};
   const auto say = [&](const std::string& line) {
     if (study.progress) study.progress(line);
   };
   for (const std::string& file : study.scenes) {
-    if (stop_of(study)) break;
     const Scene scene = scene_load(file);
     const RenderOptions base = study.render_options(scene);
     say(file + ": reference");
     const Reference reference = reference_make(study, scene, base);
-    ErrorSceneResult result;
+    ErrorSceneResult& result = log.results.scenes.emplace_back();
     result.scene = std::filesystem::path(file).stem().string();
     result.width = base.settings.width;
     result.height = base.settings.height;
@@ -196,20 +193,20 @@ ErrorStudyResults error_study_run(const ErrorStudyOptions& study)
     result.reference_rmse = reference.rmse;
     for (const Choice& choice : choices_of(study, scene, base)) {
       say(file + ": " + choice.name);
-      result.series.push_back(choice_series(study, scene, choice, reference.view()));
+      choice_measure(log, scene, choice, reference.view());
     }
     for (const OtherRenderer& other : study.others) {
       say(file + ": " + other.name);
       // Another renderer need not know what a scene has; that must not cost what was measured so far.
       try {
-        result.series.push_back(other_series(study, other, file, reference.view()));
+        other_measure(log, other, file, reference.view());
       } catch (const std::exception& error) {
+        result.series.pop_back();
         result.failures.push_back(other.name + ": " + error.what());
       }
     }
-    results.scenes.push_back(std::move(result));
   }
-  return results;
+  return std::move(log.results);
 }
 
 }  // namespace relief

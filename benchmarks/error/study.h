@@ -1,7 +1,6 @@
 // Speed against error: every scene rendered in every way, with more and more samples, and judged by one reference.
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <optional>
 #include <string>
@@ -24,23 +23,6 @@ struct OtherRenderer {
       render;
 };
 
-struct ErrorStudyOptions {
-  std::vector<std::string> scenes;  ///< files
-  /// Ways to render are all combinations of these. What makes no difference to a scene is left out.
-  std::vector<DisplacementMethod> methods;  ///< empty: the scene's
-  std::vector<float> levels;                ///< as DisplacementOptions::lod
-  std::vector<CausticsMode> caustics;
-  std::vector<LightTechnique> lights;
-  std::vector<OtherRenderer> others;
-  std::vector<double> times;         ///< seconds, rising: errors are told at these; none is sampled for much longer
-  std::optional<Picture> reference;  ///< of the only scene; empty: rendered
-  double reference_seconds = 0;      ///< of sampling
-  const std::atomic<bool>* stop = nullptr;                    ///< ends it after the render under way
-  std::function<RenderOptions(const Scene&)> render_options;  ///< of a scene, whatever the way
-  std::string scratch;                                        ///< folder for pictures of others
-  std::function<void(const std::string&)> progress;           ///< empty: none
-};
-
 struct ErrorSceneResult {
   std::string scene;
   int width = 0, height = 0;
@@ -53,6 +35,23 @@ struct ErrorSceneResult {
 struct ErrorStudyResults {
   std::vector<double> times;
   std::vector<ErrorSceneResult> scenes;
+};
+
+struct ErrorStudyOptions {
+  std::vector<std::string> scenes;  ///< files
+  /// Ways to render are all combinations of these. What makes no difference to a scene is left out.
+  std::vector<DisplacementMethod> methods;  ///< empty: the scene's
+  std::vector<float> levels;                ///< as DisplacementOptions::lod
+  std::vector<CausticsMode> caustics;
+  std::vector<LightTechnique> lights;
+  std::vector<OtherRenderer> others;
+  std::vector<double> times;         ///< seconds, rising: errors are told at these; none is sampled for much longer
+  std::optional<Picture> reference;  ///< of the only scene; empty: rendered
+  double reference_seconds = 0;      ///< of sampling
+  std::function<RenderOptions(const Scene&)> render_options;  ///< of a scene, whatever the way
+  std::string scratch;                                        ///< folder for pictures of others
+  std::function<void(const std::string&)> progress;           ///< empty: none
+  std::function<void(const ErrorStudyResults&)> measured;     ///< gets all that there is, after each render; empty: none
 };
 
 /// Names of ways to sample lights in the order of LightTechnique.

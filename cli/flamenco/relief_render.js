@@ -56,7 +56,7 @@ function renderTask(settings, frames, name, file, options) {
     const task = author.Task(name, "misc");
     task.addCommand(author.Command("exec", {
         exe: settings.program,
-        args: ["render", settings.scene, "-o", file, "--frames", frames, "--resume", "--progress", "none"].concat(options),
+        args: ["render", settings.scene, "-o", file, "--frames", frames, "--resume"].concat(options),
     }));
     return task;
 }

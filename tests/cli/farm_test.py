@@ -160,6 +160,41 @@ class FarmTest(unittest.TestCase):
         self.assertEqual(outcome.returncode, 3, outcome.stderr)
         self.assertFalse((self.folder / "farm.slurm.sh").exists())
 
+    def test_no_script_takes_the_place_of_what_its_tasks_read_or_write(self):
+        write_shot(self.folder / "other.gltf")
+        self.relief("render", "other.gltf", "-o", "ref.0002.exr", *TINY)
+        self.relief("render", "other.gltf", "-o", "sky.exr", *TINY)
+        (self.folder / "link.sh").symlink_to("a 'shot'.bin")
+        os.link(self.folder / "a 'shot'.bin", self.folder / "twin.sh")
+        os.link(self.folder / "other.bin", self.folder / "other.sh")
+        before = {path.name: path.read_bytes() for path in self.folder.iterdir()}
+        common = "-o", "o.exr", "--frames", "1-2"
+        for script, words in (("a 'shot'.bin", ()), ("link.sh", ()), ("twin.sh", ()), ("o.0002.exr", ()),
+                              ("o.0002.part-2-of-2.exr", ("--split", "2")), ("sky.exr", ("--", "--environment", "sky.exr")),
+                              ("ref.0002.exr", ("--", "--reference", "ref.####.exr")), ("p.0001.png", ("--", "--png", "p.png")),
+                              ("other.bin", ("--", "--camera-from", "other.gltf")), ("other.sh", ("--", "--camera-from", "other.gltf"))):
+            outcome = self.farm(*common, "--script", script, *words, check=False)
+            self.assertEqual(outcome.returncode, 2, (script, outcome.stderr))
+            self.assertIn("--script: expected a file that", outcome.stderr)
+            self.assertEqual({path.name: path.read_bytes() for path in self.folder.iterdir()}, before)
+        # Nor an output that of an input, which every task would find out.
+        self.assertEqual(self.farm("-o", "ref.exr", "--frames", "2", "--", "--reference", "ref.####.exr", check=False).returncode, 2)
+        self.farm(*common, "--script", "own.sh")
+        self.farm(*common, "--script", "own.sh")
+
+    def test_no_bench_takes_the_place_of_what_it_reads(self):
+        scene = self.folder / "s.gltf"
+        write_shot(scene)
+        os.link(scene.with_suffix(".bin"), self.folder / "twin.json")
+        (self.folder / "link.html").symlink_to("s.bin")
+        before = {path.name: path.read_bytes() for path in self.folder.iterdir()}
+        for words in (("error", "s.gltf", "--quick", "--json", "twin.json"), ("error", "s.gltf", "--quick", "--html", "link.html"),
+                      ("procedural", "--quick", "--parts", "smoothing", "--mesh", "s.gltf", "--json", "twin.json")):
+            outcome = self.relief("bench", *words, check=False)
+            self.assertEqual(outcome.returncode, 2, outcome.stderr)
+            self.assertIn("read as a file of the scene", outcome.stderr)
+            self.assertEqual({path.name: path.read_bytes() for path in self.folder.iterdir()}, before)
+
     def test_the_tasks_are_as_many_as_there_may_be(self):
         for words, tasks in ((("--frames", "1-240"), 240), (("--frames", "1-240", "--split", "4"), 960),
                              (("--frames", "1-2400"), 1000), (("--frames", "1-240", "--tasks", "7"), 7),

@@ -124,6 +124,21 @@ double mean_seen(const std::string& exr, const char* channel)
   return sum / covered;
 }
 
+/// Columns of a picture with geometry.
+std::vector<int> columns_seen(const std::string& exr, int width)
+{
+  const std::vector<float> coverage = values_of(exr, "A");
+  std::vector<int> columns;
+  for (int x = 0; x < width; ++x) {
+    for (std::size_t i = static_cast<std::size_t>(x); i < coverage.size(); i += static_cast<std::size_t>(width)) {
+      if (coverage[i] < 0.5f) continue;
+      columns.push_back(x);
+      break;
+    }
+  }
+  return columns;
+}
+
 TEST_F(FirstPictures, AModelWithLightsOnItIsLit)
 {
   const std::string scene = folder_.write("s.gltf", ball_with_lights().gltf()).string();
@@ -153,7 +168,11 @@ TEST_F(FirstPictures, AnySceneIsLitByAnImage)
   EXPECT_GT(green, 0);
   EXPECT_NEAR(background({"--environment", file("white.png") + ",3"}).first, 3 * green, 0.01 * green);
   EXPECT_GT(background({"--environment", "sky"}).first, 0.1f);
-  EXPECT_EQ(background({"--environment", "studio"}), std::pair(0.0f, 0.0f));
+  // Grey in the studio's place, which is not part of the picture.
+  EXPECT_GT(background({"--environment", "studio"}).first, 0.05f);
+  EXPECT_LT(background({"--environment", "studio"}).first, 0.35f);
+  EXPECT_EQ(background({"--environment", "studio"}).second, 0.0f);
+  EXPECT_EQ(background({"--environment", "studio", "--background", "black"}), std::pair(0.0f, 0.0f));
   EXPECT_EQ(background({"--environment", "sky", "--background", "black"}), std::pair(0.0f, 0.0f));
   EXPECT_GT(background({"--environment", "studio", "--background", "world"}).first, 0.1f);
   // Without another environment, the scene's.
@@ -161,6 +180,60 @@ TEST_F(FirstPictures, AnySceneIsLitByAnImage)
   EXPECT_EQ(background({"--background", "transparent"}), std::pair(0.0f, 0.0f));
   EXPECT_EQ(run({"info", scene, "--environment", "sky"}).exit_code, 0);
   EXPECT_EQ(run({"trace", scene, "--pixel", "3,3", "--environment", file("white.png")}).exit_code, 0);
+}
+
+TEST_F(FirstPictures, TheBackdropIsDarkBelowAndLightAboveAndLightsNothing)
+{
+  GltfBuilder b = lit_square();
+  b.json["extensions"].erase("RELIEF_environment");
+  b.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 1}, {"znear", 0.1}}}}};
+  const std::string scene = folder_.write("s.gltf", b.gltf()).string();
+  ASSERT_EQ(render(scene, file("a.exr")).exit_code, 0);
+  const std::vector<float> grey = values_of(file("a.exr"), "G"), alpha = values_of(file("a.exr"), "A");
+  ASSERT_EQ(alpha.front() + alpha.back(), 0.0f);
+  EXPECT_GT(grey.front(), grey.back() + 0.02f);
+  for (const float value : {grey.front(), grey.back()}) {
+    EXPECT_GT(value, 0.05f);
+    EXPECT_LT(value, 0.35f);
+  }
+  ASSERT_EQ(render(scene, file("b.exr"), {"--background", "black"}).exit_code, 0);
+  const std::vector<float> black = values_of(file("b.exr"), "G");
+  for (std::size_t i = 0; i < grey.size(); ++i) {
+    if (alpha[i] == 1.0f) {
+      EXPECT_EQ(grey[i], black[i]) << i;
+    } else if (alpha[i] == 0.0f) {
+      EXPECT_EQ(black[i], 0.0f) << i;
+    }
+  }
+}
+
+TEST_F(FirstPictures, APictureOfNothingComesWithAWarningThatHelps)
+{
+  GltfBuilder b = lit_square();
+  b.json["nodes"].back()["rotation"] = {0, 1, 0, 0};
+  const std::string blind = folder_.write("blind.gltf", b.gltf()).string();
+  Outcome outcome = render(blind, file("a.exr"));
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_NE(outcome.errors.find("the camera sees nothing of the scene; --camera auto"), std::string::npos) << outcome.errors;
+  outcome = render(blind, file("a.exr"), {"--camera", "auto"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.errors.find("warning"), std::string::npos) << outcome.errors;
+  EXPECT_GT(columns_seen(file("a.exr"), 16).size(), 8u);
+  EXPECT_EQ(run({"trace", blind, "--pixel", "8,8", "--camera", "auto", "--resolution", "16x16"}).exit_code, 0);
+
+  GltfBuilder dark = mirrored_lamp();
+  dark.json["extensions"]["KHR_lights_punctual"] = {
+      {"lights", {{{"type", "spot"}, {"intensity", 1}, {"spot", nlohmann::json::object()}}}}};
+  // It shines away from everything.
+  dark.json["nodes"].back()["translation"] = {0.5, 0.5, -20};
+  const std::string missed = folder_.write("missed.gltf", dark.gltf()).string();
+  outcome = render(missed, file("a.exr"));
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_NE(outcome.errors.find("no light reaches what the camera sees; --environment studio"), std::string::npos)
+      << outcome.errors;
+  EXPECT_EQ(render(missed, file("a.exr"), {"--strict"}).exit_code, 3);
+  outcome = render(missed, file("a.exr"), {"--environment", "studio"});
+  EXPECT_EQ(outcome.errors.find("no light reaches"), std::string::npos) << outcome.errors;
 }
 
 TEST_F(FirstPictures, TransparentPngsHaveCoverage)
@@ -205,21 +278,6 @@ TEST_F(FirstPictures, ResumingSeesAnotherEnvironment)
   folder_.write("e.png", from_base64(std::string_view(kGreyPixelPng).substr(22)));
   EXPECT_EQ(render(scene, file("a.exr"), options).count("done"), 1);
   EXPECT_EQ(render(scene, file("a.exr"), {"--environment", "sky", "--resume"}).count("done"), 1);
-}
-
-/// Columns of a picture with geometry.
-std::vector<int> columns_seen(const std::string& exr, int width)
-{
-  const std::vector<float> coverage = values_of(exr, "A");
-  std::vector<int> columns;
-  for (int x = 0; x < width; ++x) {
-    for (std::size_t i = static_cast<std::size_t>(x); i < coverage.size(); i += static_cast<std::size_t>(width)) {
-      if (coverage[i] < 0.5f) continue;
-      columns.push_back(x);
-      break;
-    }
-  }
-  return columns;
 }
 
 TEST_F(FirstPictures, WhatMovesIsSeenToMove)

@@ -88,6 +88,14 @@ def scene_files(map_suffix, exr):
             colour: png([200, 100]), height: grey, sky: grey}
 
 
+def lock_name(name):
+    """What the lock of an output is called: exporters/side_file.h."""
+    value = 0xCBF29CE484222325
+    for byte in name.encode():
+        value = (value ^ byte) * 0x100000001B3 % 2**64
+    return f".relief-{value:016x}.lock"
+
+
 class Run:
     """One run of the program in a folder of its own."""
 
@@ -133,6 +141,12 @@ class Run:
         os.symlink("loop.exr", self.folder / "loop.exr")
         os.symlink("old.exr", self.folder / "again.exr")
         # Devices of our own, and the way to standard output: whatever goes wrong, the machine's stay as they are.
+        # Other names of inputs where the program's own locks would be.
+        self.planted = set()
+        for name in self.random.sample(["out.exr", "out.png", "out.json", "old.exr", "sub/out.exr", "out.0001.exr"], 2):
+            planted = self.folder / pathlib.PurePath(name).parent / lock_name(pathlib.PurePath(name).name)
+            self.pick(os.link, os.symlink)(self.folder / self.pick(*self.victims), planted)
+            self.planted.add(str(planted.relative_to(self.folder)))
         for name, minor in (("null", 3), ("full", 7)):
             try:
                 os.mknod(self.folder / name, stat.S_IFCHR | 0o666, os.makedev(1, minor))
@@ -196,9 +210,26 @@ class Run:
             tiny[1] = self.pick("1x1", "7x3", "16x16")
         return arguments + tiny
 
+    def farm_arguments(self):
+        arguments = ["farm", "slurm", "scene.gltf", "-o", self.pick("out.exr", "sub/out.##.exr", self.output_name(".exr"))]
+        arguments.append("--script=" + self.output_name(self.pick(".sh", ".exr", ".png", ".json")))
+        if self.chance(0.4):
+            arguments += ["--frames", self.numbers()]
+        if self.chance(0.3):
+            arguments += ["--split", "2"]
+        arguments.append("--")
+        if self.chance(0.3):
+            self.write("env.png", png([9, 99]))
+            self.inputs["env.png"] = png([9, 99])
+            arguments += ["--environment", "env.png"]
+        if self.chance(0.3):
+            arguments += ["--stats", self.output_name(".json")]
+        return arguments
+
     def arguments(self):
-        command = self.pick(*["render"] * 6, *["trace"] * 2, "compare", "compare", "merge", "merge", "info", "help")
-        if command in ("render", "trace", "info"):
+        command = self.pick(*["render"] * 12, *["trace"] * 4, *["compare", "merge", "info"] * 4, *["farm", "report", "denoise"] * 3,
+                            "bench", "help")
+        if command in ("render", "trace", "info", "farm", "bench"):
             self.make_inputs(scene_files(".exr" if self.chance(0.03) else ".png", self.pictures[0]))
         if command == "render":
             # Not inputs of every run; but a reference that is not asked for is an older output like any other.
@@ -208,6 +239,10 @@ class Run:
             self.make_inputs({"rays.txt": b"0.5 0.5 3 0 0 -1\n0 0 3 0 0 1\n"})
         elif command in ("compare", "merge"):
             self.make_inputs({"A.exr": self.pictures[0], "B.exr": self.pictures[1]})
+        elif command == "report":
+            self.make_inputs({"A.exr": self.pictures[0], "B.exr": self.pictures[1], "stats.json": b"{}"})
+        elif command == "denoise":
+            self.make_inputs({"A.exr": self.pictures[2]})
         elif command == "help":
             self.make_inputs({"scene.gltf": b"{}"})
         if command == "render":
@@ -248,6 +283,16 @@ class Run:
             return arguments
         if command == "merge":
             return ["merge", "A.exr", "B.exr", "--output=" + self.output_name(".exr")]
+        if command == "farm":
+            return self.farm_arguments()
+        if command == "bench":
+            return ["bench", "error", "scene.gltf", "--quick", "--resolution", "4x4", "--caustics", "off", "--levels", "0",
+                    "--json=" + self.output_name(".json"), "--html=" + self.output_name(".html")]
+        if command == "report":
+            return ["report", "A.exr", "--stats", "stats.json", "--reference", "B.exr", "--output=" + self.output_name(".html")]
+        if command == "denoise":
+            picture = ["--png=" + self.output_name(".png")] if self.chance(0.6) else []
+            return ["denoise", "A.exr", "--output=" + self.output_name(".exr"), *picture, "--threads", "1"]
         if command == "info":
             return ["info", "scene.gltf"]
         return self.pick(["--help"], ["--version"], ["render", "--help"], [], ["merge"])
@@ -262,6 +307,8 @@ class Run:
         found = {}
         for path in self.folder.rglob("*"):
             name = str(path.relative_to(self.folder))
+            if name in self.planted:
+                continue
             status = path.lstat()
             if name in self.inputs:
                 found[name] = (path.read_bytes(), status.st_mode, status.st_ino, status.st_mtime_ns, status.st_uid)
@@ -330,8 +377,9 @@ class Run:
 
     def check(self, before, code, arguments):
         after = self.state()
+        to_run = stat.S_IXUSR if arguments[:1] == ["farm"] else 0  # a script is its owner's
         for name, was in before.items():
-            if after.get(name) == was:
+            if after.get(name) == was or isinstance(was, int) and after.get(name) == was | to_run:
                 continue
             if name in self.inputs:
                 raise Failure(f"input {name!r} has changed")
@@ -339,8 +387,9 @@ class Run:
         for name, now in after.items():
             if os.path.basename(name).startswith(".relief-"):
                 raise Failure(f"{name!r} is left behind")
+            modes = {0o666 & ~UMASK, 0o666 & ~UMASK | to_run}
             is_new = name not in before and not name.startswith("clean") and name != "stdout.txt"
-            if is_new and isinstance(now, int) and stat.S_IMODE(now) != 0o666 & ~UMASK:
+            if is_new and isinstance(now, int) and stat.S_IMODE(now) not in modes:
                 raise Failure(f"{name!r} has the permissions {stat.S_IMODE(now):o}")
         if code == 0 and arguments[:2] == ["render", "scene.gltf"] and "--frames" not in arguments:
             path = self.folder / self.outputs[0]
@@ -349,14 +398,15 @@ class Run:
 
 
 def pictures_make(program):
-    """Two small pictures of the same scene with different seeds."""
+    """Two small pictures of the same scene with different seeds, and one with the layers that a denoiser needs."""
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         for file_name, data in scene_files(".png", b"").items():
             (folder / file_name).write_bytes(data)
         pictures = []
-        for seed in ("1", "2"):
-            subprocess.run([program, "render", "scene.gltf", "-o", "a.exr", "--seed", seed, *TINY], cwd=folder,
+        layers = "beauty,samples,variance,half,denoising_albedo,denoising_normal,denoising_depth,denoising_half"
+        for more in (["--seed", "1"], ["--seed", "2"], ["--aov", layers]):
+            subprocess.run([program, "render", "scene.gltf", "-o", "a.exr", *more, *TINY], cwd=folder,
                            stderr=subprocess.DEVNULL, check=True)
             pictures.append((folder / "a.exr").read_bytes())
         return pictures

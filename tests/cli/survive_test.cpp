@@ -110,6 +110,32 @@ TEST_F(SurvivingRun, ASignalLeavesAllLayersAndAStateToGoOnFrom)
   EXPECT_TRUE(same_bits(file("a.exr"), file("whole.exr")));
 }
 
+TEST_F(SurvivingRun, APictureOfOneTileIsSavedBetweenItsPasses)
+{
+  const std::pair<const char*, Arguments> kCases[] = {{"plain", {}},
+                                                      {"adaptive", {"--noise-threshold", "1e-4"}},
+                                                      {"caustics", {"--caustics", "on"}}};
+  for (const auto& [name, more] : kCases) {
+    const auto arguments = [&](const std::string& output, const char* seconds) {
+      Arguments all = {"--resume", "--checkpoint", seconds, "--spp", "1000"};
+      all.insert(all.end(), more.begin(), more.end());
+      return render_arguments(scene_, output, all);
+    };
+    const std::string whole = file(std::string(name) + "_whole.exr"), killed = file(std::string(name) + ".exr");
+    ASSERT_EQ(run(arguments(whole, "0")).exit_code, 0);
+    {
+      const Running running = start(arguments(killed, "0.001"));
+      ASSERT_TRUE(running.wait_for("checkpoint")) << name;
+      running.process->signal(SIGKILL);
+      running.process->wait();
+    }
+    const Outcome last = run(arguments(killed, "0.001"));
+    EXPECT_EQ(last.exit_code, 0) << last.errors;
+    EXPECT_EQ(last.count("resumed"), 1) << name;
+    EXPECT_TRUE(same_bits(killed, whole)) << name;
+  }
+}
+
 TEST_F(SurvivingRun, AStateIsOfItsSettingsAndIsNotAskedForWithoutResume)
 {
   leave_state(file("a.exr"), SIGKILL);

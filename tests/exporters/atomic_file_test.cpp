@@ -328,6 +328,44 @@ TEST_F(AtomicFileTest, ALockHasOneHolderAndSaysWho)
   EXPECT_THROW(OutputLock(file("nowhere/a.txt")), OutputError);
 }
 
+TEST_F(AtomicFileTest, ALockThatIsAnotherNameOfAFileLeavesItAlone)
+{
+  write_bytes(file("precious"), "mine");
+  const std::string lock = lock_name_of("a.txt");
+  std::filesystem::create_hard_link(file("precious"), file(lock));
+  {
+    const OutputLock first(file("a.txt"));
+    EXPECT_EQ(first.holder(), "");
+    EXPECT_EQ(bytes_of_file(file("precious")), "mine");
+    EXPECT_EQ(OutputLock(file("a.txt")).holder(), "process " + std::to_string(::getpid()) + " on " + host_name());
+  }
+  EXPECT_EQ(bytes_of_file(file("precious")), "mine");
+  std::filesystem::create_symlink("precious", file(lock));
+  EXPECT_THROW(OutputLock(file("a.txt")), OutputError);
+  std::filesystem::remove(file(lock));
+  ASSERT_EQ(::mkfifo(file(lock).c_str(), 0600), 0);
+  EXPECT_EQ(OutputLock(file("a.txt")).holder(), "") << "nobody waits for a pipe";
+  EXPECT_EQ(bytes_of_file(file("precious")), "mine");
+  EXPECT_EQ(files_in_folder(), std::vector<std::string>{"precious"});
+}
+
+TEST_F(AtomicFileTest, WhatCannotHaveItsNameAnyMoreIsKeptUnderAnother)
+{
+  write_bytes(file("a.kept-1.txt"), "of before");
+  AtomicFile made(file("a.txt"));
+  made.write("hours of work", 13);
+  std::filesystem::create_directory(file("a.txt"));
+  try {
+    made.commit();
+    ADD_FAILURE() << "a folder cannot be replaced";
+  } catch (const OutputError& error) {
+    EXPECT_NE(std::string(error.what()).find("it is kept as '" + file("a.kept-2.txt").string() + "'"), std::string::npos)
+        << error.what();
+  }
+  EXPECT_EQ(bytes_of_file(file("a.kept-2.txt")), "hours of work");
+  EXPECT_EQ(bytes_of_file(file("a.kept-1.txt")), "of before");
+}
+
 TEST_F(AtomicFileTest, ALockIsNeverHeldTwice)
 {
   std::atomic<int> num_holders = 0, most = 0, num_times = 0;

@@ -2,8 +2,10 @@
 
 #include <ImfChannelList.h>
 #include <ImfChromaticitiesAttribute.h>
+#include <ImfDoubleAttribute.h>
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
+#include <ImfIntAttribute.h>
 #include <ImfStandardAttributes.h>
 #include <gtest/gtest.h>
 
@@ -168,6 +170,55 @@ TEST_F(ExrTest, AttributesComeBackAsText)
   EXPECT_EQ(picture.attributes.at("relief:samples"), "64");
   EXPECT_EQ(picture.attributes.at("relief:warnings"), "one\ntwo");
   EXPECT_FALSE(picture.attributes.contains("relief:view"));  // empty ones are left out
+}
+
+TEST_F(ExrTest, NumbersAndMatricesAreSuchToEveryReader)
+{
+  Statistics statistics;
+  statistics.seed = 4'000'000'001;
+  statistics.samples_per_pixel = 64;
+  statistics.render_seconds = 12.5;
+  statistics.frame = 7;
+  Attributes attributes = exr_attributes(statistics, "");
+  Camera camera;
+  camera.world_from_camera = {{0, 0, -1}, {0, 1, 0}, {1, 0, 0}, {5, 2, 3}};
+  camera.half_width = 0.5f;
+  camera.half_height = 0.25f;
+  camera.shift_x = 0.1f;
+  for (const auto& [name, text] : exr_camera_attributes(camera)) attributes[name] = text;
+  exr_write(file("a.exr"), TestFilm(3, 2, 6).view, attributes);
+  {
+    const Imf::InputFile input(file("a.exr").c_str());
+    const Imf::Header& header = input.header();
+    EXPECT_EQ(header.typedAttribute<Imf::DoubleAttribute>("relief:seed").value(), 4'000'000'001.0);
+    EXPECT_EQ(header.typedAttribute<Imf::DoubleAttribute>("relief:samples").value(), 64.0);
+    EXPECT_EQ(header.typedAttribute<Imf::DoubleAttribute>("relief:seconds").value(), 12.5);
+    EXPECT_EQ(header.typedAttribute<Imf::IntAttribute>("relief:frame").value(), 7);
+    const std::string date = Imf::capDate(header);
+    EXPECT_EQ(date.size(), 19u) << date;
+    EXPECT_EQ(date[4], ':');
+    EXPECT_TRUE(Imf::hasUtcOffset(header));
+    // Two metres before the camera, which looks along −x, .5 m to its right and .25 m above.
+    const Imath::V3f P(3, 2.25f, 2.5f);
+    Imath::V3f in_camera, on_screen;
+    Imf::worldToCamera(header).multVecMatrix(P, in_camera);
+    EXPECT_NEAR((in_camera - Imath::V3f(0.5f, 0.25f, -2)).length(), 0, 1e-6);
+    Imf::worldToNDC(header).multVecMatrix(P, on_screen);
+    // Half of half the width, less the shift of a tenth of the whole; half of half the height.
+    EXPECT_NEAR((on_screen - Imath::V3f(0.5f - 0.2f, 0.5f, 0.5f)).length(), 0, 1e-6);
+    camera.projection = Projection::kOrthographic;
+  }
+  for (const auto& [name, text] : exr_camera_attributes(camera)) attributes[name] = text;
+  exr_write(file("b.exr"), TestFilm(3, 2, 6).view, attributes);
+  const Imf::InputFile input(file("b.exr").c_str());
+  Imath::V3f on_screen;
+  Imf::worldToNDC(input.header()).multVecMatrix(Imath::V3f(3, 2.25f, 2.5f), on_screen);
+  EXPECT_NEAR((on_screen - Imath::V3f(1 - 0.2f, 1, 2)).length(), 0, 1e-6);
+  const Picture picture = exr_load(file("b.exr"));
+  EXPECT_EQ(picture.attributes.at("relief:seed"), "4000000001");
+  EXPECT_EQ(picture.attributes.at("worldToNDC"), attributes.at("worldToNDC"));
+  exr_write(file("c.exr"), picture);
+  EXPECT_EQ(exr_load(file("c.exr")).attributes, picture.attributes);
 }
 
 TEST_F(ExrTest, SaysItsPrimariesAreRec709)
