@@ -80,6 +80,7 @@ class MicrotriangleMarch {
     const std::vector<Crossing> crossings = volume(O, D);
     MarchHit out;
     for (std::size_t k = 0; k + 1 < crossings.size(); k += 2) {
+      if (crossings[k + 1].t < Real{0}) continue;
       if (interval(O, D, crossings[k], crossings[k + 1], &out)) return out;
     }
     return out;
@@ -120,7 +121,7 @@ class MicrotriangleMarch {
     return base(at, P_) + base(at, N_) * h;
   }
 
-  /// Möller and Trumbore 1997.
+  /// The triangle and a whole line. Möller and Trumbore 1997.
   static bool meets(Vector O, Vector D, Vector a, Vector b, Vector c, Real* t, Real* u, Real* v)
   {
     const Vector e1 = b - a, e2 = c - a, p = cross(D, e2);
@@ -133,13 +134,13 @@ class MicrotriangleMarch {
     *v = dot(D, q) / determinant;
     if (!(*v >= Real{0} && *u + *v <= Real{1})) return false;
     *t = dot(e2, q) / determinant;
-    return *t >= Real{0};
+    return true;
   }
 
   bool test(Vector O, Vector D, const Place& a, const Place& b, const Place& c, MarchHit* out) const
   {
     Real t, u, v;
-    if (!meets(O, D, vertex(a), vertex(b), vertex(c), &t, &u, &v)) return false;
+    if (!meets(O, D, vertex(a), vertex(b), vertex(c), &t, &u, &v) || !(t >= Real{0})) return false;
     if (out->hit && out->t <= static_cast<double>(t)) return true;
     out->hit = true;
     out->t = static_cast<double>(t);
@@ -173,15 +174,14 @@ class MicrotriangleMarch {
       const Real u = -dot(from, other) / dot(along, other);
       if (!(u >= Real{0} && u <= Real{1})) continue;
       const Vector at = from + along * u;
-      const Real t = dot(at, D) / dot(D, D);
-      if (t < Real{0}) continue;
-      Crossing crossing{t, {}, k};
+      Crossing crossing{dot(at, D) / dot(D, D), {}, k};
       crossing.b[static_cast<std::size_t>(i)] = Real{1} - u;
       crossing.b[static_cast<std::size_t>(j)] = u;
       out->push_back(crossing);
     }
   }
 
+  /// Of the whole line: a ray that starts within the volume has entered it before.
   std::vector<Crossing> volume(Vector O, Vector D) const
   {
     std::vector<Crossing> all;
