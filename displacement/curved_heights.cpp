@@ -133,6 +133,30 @@ double CurvedTriangle::displacement(const double* b) const
   return sum > 0 ? h / sum * length(N) : 0.0;
 }
 
+WeightSlopes CurvedTriangle::slopes(double b1, double b2) const
+{
+  // By points towards the two vertices that are farthest, which are within the triangle wherever this one is.
+  constexpr double kStep = 1e-4;
+  const double b[3] = {1 - b1 - b2, b1, b2};
+  const int nearest = static_cast<int>(std::max_element(b, b + 3) - b);
+  const int ends[2] = {next(nearest), next(next(nearest))};
+  double change[2];
+  for (int k = 0; k < 2; ++k) {
+    const auto at = [&](double part) {
+      double w[3];
+      for (int i = 0; i < 3; ++i) w[i] = b[i] + part * ((i == ends[k] ? 1.0 : 0.0) - b[i]);
+      return displacement(w);
+    };
+    change[k] = (4 * at(kStep) - 3 * at(0) - at(2 * kStep)) / (2 * kStep);
+  }
+  const auto towards = [&](int k) {
+    return WeightSlopes{(ends[k] == 1 ? 1.0 : 0.0) - b1, (ends[k] == 2 ? 1.0 : 0.0) - b2};
+  };
+  const WeightSlopes s = towards(0), t = towards(1);
+  const double inverse = 1 / (s.b1 * t.b2 - s.b2 * t.b1);
+  return {(change[0] * t.b2 - change[1] * s.b2) * inverse, (change[1] * s.b1 - change[0] * t.b1) * inverse};
+}
+
 void CurvedTriangle::bounds(double* low, double* high) const
 {
   // Blends are convex, and so are the Bernstein forms of the cubics: what these are made of bounds h.
@@ -210,8 +234,32 @@ void bounds(const void* owner, std::uint32_t triangle, const WeightPatches& patc
   }
 }
 
+/// Of the smooth surface itself as they are: it goes on beyond its sides as its neighbours do.
+void slopes(const void* owner,
+            std::uint32_t triangle,
+            const Vec2f* at,
+            int count,
+            Vec2f du,
+            Vec2f dv,
+            HeightSlopes* out)
+{
+  const auto& heights = *static_cast<const CurvedHeights*>(owner);
+  std::fill_n(out, count, HeightSlopes{});
+  if (heights.on_top.eval != nullptr) height_slopes(heights.on_top, triangle, at, count, du, dv, out);
+  const CurvedTriangle curved = curved_triangle(heights.mesh, triangle);
+  for (int k = 0; k < count; ++k) {
+    const WeightSlopes change = curved.slopes(static_cast<double>(at[k].x), static_cast<double>(at[k].y));
+    const auto along = [&](Vec2f d) {
+      const double h = (change.b1 * d.x + change.b2 * d.y) / heights.scale;
+      return std::isfinite(h) ? static_cast<float>(h) : 0.0f;
+    };
+    out[k].u += along(du);
+    out[k].v += along(dv);
+  }
+}
+
 }  // namespace
 
-HeightSource CurvedHeights::source() const { return {this, eval, bounds}; }
+HeightSource CurvedHeights::source() const { return {this, eval, bounds, slopes}; }
 
 }  // namespace relief

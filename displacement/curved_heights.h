@@ -20,6 +20,11 @@
 
 namespace relief {
 
+/// How something changes with the weights of a triangle's vertices 1 and 2.
+struct WeightSlopes {
+  double b1, b2;
+};
+
 /// One triangle's smooth surface.
 class CurvedTriangle {
  public:
@@ -29,6 +34,8 @@ class CurvedTriangle {
   /// Displacement along the interpolated normal, metres. On a side the same to the bit from both of its triangles.
   /// @param b  weights
   double displacement(const double* b) const;
+  /// How the displacement changes with the weights of vertices 1 and 2, metres; on a side that of the surface within.
+  WeightSlopes slopes(double b1, double b2) const;
   /// Bounds over the triangle, metres; infinite where the normals are so far apart that no surface is known.
   void bounds(double* low, double* high) const;
 

@@ -157,8 +157,13 @@ SurfacePoint displaced_surface_point(const DisplacedGeometry& geometry,
 
 Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry, std::uint32_t triangle, const DisplacedPlace& place)
 {
-  const OnSurface on(geometry, triangle, place.level, place.b1, place.b2, place.time);
-  return traced_smooth_normal(on.mesh, on.tri, place.b1, place.b2);
+  const double b1 = place.b1, b2 = place.b2;
+  const OnSurface on(geometry, triangle, place.level, b1, b2, place.time);
+  if (!on.tile) return traced_smooth_normal(on.mesh, on.tri, b1, b2);
+  const auto [x, y] = lattice_point(on.tri, b1, b2);
+  const LatticeNode tile = lattice_tile_at(*geometry.procedural, triangle, b1, b2);
+  const LatticeSlopes slopes = geometry.procedural->smooth_slopes(triangle, b1, b2, *on.mesh.field, tile.i, tile.j);
+  return surface_normal(base_point(on.tri, b1, b2), displacement_at(on.mesh, x, y), on.mesh.scale, slopes.x, slopes.y);
 }
 
 void displaced_point_set_level(const DisplacedGeometry& geometry,

@@ -184,6 +184,55 @@ float ProceduralField::lattice_height(std::uint32_t triangle, std::int32_t i, st
   return on[0] || on[2] || k <= 1 ? rounded(h) : h;
 }
 
+LatticeSlopes ProceduralField::smooth_slopes(std::uint32_t triangle,
+                                             double b1,
+                                             double b2,
+                                             const HeightFieldView& tile,
+                                             std::int32_t tile_i,
+                                             std::int32_t tile_j) const
+{
+  const LatticeTriangle& t = triangles_[triangle];
+  const double x = b1 * t.n, y = b2 * t.n;
+  const std::int32_t i = std::clamp(static_cast<std::int32_t>(std::floor(x)), 0, t.n - 1),
+                     j = std::clamp(static_cast<std::int32_t>(std::floor(y)), 0, t.n - 1 - i);
+  const double fx = std::clamp(x - i, 0.0, 1.0), fy = std::clamp(y - j, 0.0, 1.0);
+  // The third side cuts the last cells.
+  const bool is_cut = i + j == t.n - 1;
+  const double weights[4] = {is_cut ? std::max(1 - fx - fy, 0.0) : (1 - fx) * (1 - fy), is_cut ? fx : fx * (1 - fy),
+                             is_cut ? fy : (1 - fx) * fy, is_cut ? 0.0 : fx * fy};
+  LatticeSlopes sum;
+  Vec2f beyond[4];
+  double beyond_weight[4];
+  int num_beyond = 0;
+  for (int k = 0; k < 4; ++k) {
+    if (!(weights[k] > 0)) continue;
+    const std::int32_t at_i = i + (k & 1), at_j = j + (k >> 1);
+    // Texels of the tile.
+    const std::int32_t c = at_i - tile_i * kTileCells + 1, r = at_j - tile_j * kTileCells + 1;
+    const bool is_within =
+        at_i > 0 && at_j > 0 && at_i + at_j < t.n && c > 0 && r > 0 && c < kTileTexels - 1 && r < kTileTexels - 1;
+    if (is_within) {
+      const auto h = [&](int at_c, int at_r) { return relief::lattice_height(tile, at_c, at_r); };
+      sum.x += weights[k] * 0.5 * (h(c + 1, r) - h(c - 1, r));
+      sum.y += weights[k] * 0.5 * (h(c, r + 1) - h(c, r - 1));
+      continue;
+    }
+    const Request at = request(t, at_i, at_j);
+    beyond[num_beyond] = {at.b[1], at.b[2]};
+    beyond_weight[num_beyond++] = weights[k];
+  }
+  if (num_beyond == 0) return sum;
+  const float unit = 1.0f / static_cast<float>(t.n);
+  HeightSlopes slopes[4];
+  height_slopes(source_, t.base, beyond, num_beyond, (t.corner[1] - t.corner[0]) * unit,
+                (t.corner[2] - t.corner[0]) * unit, slopes);
+  for (int k = 0; k < num_beyond; ++k) {
+    sum.x += beyond_weight[k] * static_cast<double>(slopes[k].u);
+    sum.y += beyond_weight[k] * static_cast<double>(slopes[k].v);
+  }
+  return sum;
+}
+
 LatticeNode ProceduralField::root(std::uint32_t triangle) const
 {
   const std::int32_t tiles = divide_up(triangles_[triangle].n, kTileCells);

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "displacement/displaced_triangle.h"
 #include "displacement/height_source.h"
 #include "displacement/lattice_cache.h"
 #include "kernel/math/vec.h"
@@ -64,6 +65,17 @@ class ProceduralField {
   HeightTileCache::Pin tile(std::uint32_t triangle, std::int32_t i, std::int32_t j) const;
   /// Height at a lattice point; computed each time.
   float lattice_height(std::uint32_t triangle, std::int32_t i, std::int32_t j) const;
+
+  /// Slopes at a point, a lattice unit: linear between lattice points, and at these over one unit to either side, as if the
+  /// lattice went on beyond the triangle. So they are continuous where cells meet.
+  /// @param b1, b2  weights of the triangle's vertices 1 and 2
+  /// @param tile    the field of its tile (i, j), from which the heights of other lattice points are taken
+  LatticeSlopes smooth_slopes(std::uint32_t triangle,
+                              double b1,
+                              double b2,
+                              const HeightFieldView& tile,
+                              std::int32_t tile_i,
+                              std::int32_t tile_j) const;
 
   /// Whether the source knows no bounds: heights are then held within those of some points.
   bool is_sampled() const { return is_sampled_; }

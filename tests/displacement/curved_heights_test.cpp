@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "displacement/curved_heights.h"
+#include "displacement/embree_geometry.h"
+#include "displacement/lattice_split.h"
 #include "tests/displacement/random_cases.h"
 
 namespace relief {
@@ -158,6 +160,49 @@ TEST(CurvedHeights, OfFlatMeshesAreNone)
   const CurvedTriangle curved(flat.P, flat.N);
   const double b[3] = {.25, .25, .5};
   EXPECT_EQ(curved.displacement(b), 0);
+}
+
+/// Smooth normals are those of the curved surface, of triangles of one cell too.
+TEST(CurvedHeights, AreShadedWithOneNormalAlongASide)
+{
+  std::mt19937_64 random(6);
+  double across_side = 0, at_corner = 0;
+  for (int round = 0; round < 100; ++round) {
+    const Pair pair(random);
+    const Vec3f P[4] = {pair.first.P[0], pair.first.P[1], pair.first.P[2], pair.second.P[2]};
+    Normal3f N[4];
+    for (int k = 0; k < 4; ++k) N[k] = as_normal(k < 3 ? pair.first.N[k] : pair.second.N[2]);
+    const TriangleIndices triangles[2] = {{0, 1, 2}, {1, 0, 3}};
+    MeshView view;
+    view.P = P;
+    view.N = N;
+    view.triangles = triangles;
+    view.num_vertices = 4;
+    view.num_triangles = 2;
+    const CurvedHeights heights{view, {}, 1, 0};
+    for (const int num_cells : {1, 2, 32}) {
+      LatticeCache cache(1 << 20);
+      const ProceduralField field(heights.source(), lattices_make(view, num_cells), 0, cache);
+      const DisplacedMesh displaced(view, field, {.height = {}, .scale = 1, .midlevel = 0});
+      DisplacedGeometry geometry;
+      geometry.mesh = displaced.view();
+      geometry.procedural = &field;
+      for (int k = 0; k < 3; ++k) {
+        const Vec3d found = displaced_smooth_normal(geometry, 0, {k == 1 ? 1.0f : 0.0f, k == 2 ? 1.0f : 0.0f});
+        const Vec3d expected = to_double(pair.first.N[k]);
+        at_corner = std::max(at_corner, length(found - expected * (1 / length(expected))));
+      }
+      for (int at = 0; at <= num_cells; ++at) {
+        const float along = static_cast<float>(at) / static_cast<float>(num_cells);
+        const Vec3d a = displaced_smooth_normal(geometry, 0, {along, 0}),
+                    b = displaced_smooth_normal(geometry, 1, {1 - along, 0});
+        across_side = std::max(across_side, length(a - b));
+      }
+    }
+  }
+  // Heights are floats.
+  EXPECT_LT(at_corner, 1e-5);
+  EXPECT_LT(across_side, 1e-4);
 }
 
 /// Of a sphere's corners the surface is much nearer to the sphere than the triangle is.

@@ -398,6 +398,63 @@ TEST(ComputedHeights, OfNodesAreWithinTheirBounds)
   EXPECT_GT(num_nodes, 1000);
 }
 
+/// A square of so many quads a side, whose normals are along z.
+std::vector<oracle::DisplacedTriangle> square_of_quads(int num_quads)
+{
+  const auto vertex = [&](int i, int j) {
+    return oracle::Vector3{static_cast<double>(i) / num_quads, static_cast<double>(j) / num_quads, 0};
+  };
+  std::vector<oracle::DisplacedTriangle> triangles;
+  for (int j = 0; j < num_quads; ++j) {
+    for (int i = 0; i < num_quads; ++i) {
+      for (const bool upper : {false, true}) {
+        oracle::DisplacedTriangle triangle;
+        triangle.P = {vertex(upper ? i + 1 : i, upper ? j + 1 : j), upper ? vertex(i, j + 1) : vertex(i + 1, j),
+                      upper ? vertex(i + 1, j) : vertex(i, j + 1)};
+        triangle.N = {{{0, 0, 1}, {0, 0, 1}, {0, 0, 1}}};
+        triangles.push_back(triangle);
+      }
+    }
+  }
+  return triangles;
+}
+
+/// Smooth normals are those of the height function, whether a square is many triangles of one cell or few of many.
+TEST(ComputedHeights, AreShadedAlikeHoweverFewTheirCells)
+{
+  for (const int num_cells : {1, 2, 4, 8, 64}) {
+    const TestMesh mesh(square_of_quads(64 / num_cells));
+    const MeshView view = mesh.view();
+    const WaveSource waves{&view};
+    LatticeCache cache(kCacheBytes);
+    const ProceduralField field(waves.source(), lattices_make(view, num_cells), .5f, cache);
+    const double scale = .2;
+    const DisplacedMesh displaced(view, field, {.height = {}, .scale = scale, .midlevel = .5});
+    const DisplacedGeometry geometry = geometry_of(displaced, field);
+    std::mt19937_64 random(31);
+    double largest = 0;
+    Vec3d mean{}, expected_mean{};
+    for (int k = 0; k < 20000; ++k) {
+      const auto index = static_cast<std::uint32_t>(random_index(random, static_cast<int>(view.num_triangles)));
+      const oracle::Vector2 b = random_barycentric(random);
+      const float b1 = static_cast<float>(b[0]), b2 = static_cast<float>(b[1]);
+      const Vec3d found = displaced_smooth_normal(geometry, index, {b1, b2});
+      const float w[3] = {1 - b1 - b2, b1, b2};
+      const Vec3d P = to_double(waves.position(index, w));
+      const double f = 9, sine_z = .5 * std::sin(2.0);
+      Vec3d expected{-scale * f * std::cos(f * P.x) * std::cos(f * P.y + 1) * sine_z,
+                     scale * f * std::sin(f * P.x) * std::sin(f * P.y + 1) * sine_z, 1};
+      expected = expected * (1 / length(expected));
+      largest = std::max(largest, length(found - expected));
+      mean = mean + found;
+      expected_mean = expected_mean + expected;
+    }
+    // Slopes over a 64th to either side, and linear between: of waves of this length off by a 160th.
+    EXPECT_LT(largest, .01) << num_cells << " cells a side";
+    EXPECT_LT(length(mean - expected_mean) / 20000, 2e-3) << num_cells << " cells a side";
+  }
+}
+
 TEST(ComputedHeights, WithoutKnownBoundsAreCutOff)
 {
   const TestMesh mesh({hard_case_parts::flat_triangle()});
