@@ -15,6 +15,7 @@
 #include "cli/value_hint.h"
 #include "displacement/method.h"
 #include "displacement/seams.h"
+#include "integrator/border_seams.h"
 #include "integrator/scene_context.h"
 #include "kernel/feature_mask.h"
 #include "scene/displaced_mesh.h"
@@ -93,7 +94,8 @@ SeamReport seams_of(const DisplacementSet& displacements, int displacement_index
   return sum;
 }
 
-void print_displacement(const Scene& scene, const DisplacementSet& displacements, int index)
+/// @param borders  of its meshes with those of other materials
+void print_displacement(const Scene& scene, const DisplacementSet& displacements, const SeamExtent& borders, int index)
 {
   const DisplacementSettings& d = scene.displacements[static_cast<std::size_t>(index)];
   std::size_t num_meshes = 0;
@@ -118,6 +120,7 @@ void print_displacement(const Scene& scene, const DisplacementSet& displacements
   const SeamReport seams = seams_of(displacements, index);
   line("    uv seams with different heights: {}", text(seams.all));
   if (d.weld_seams) line("      left open by welding: {}", text(seams.split));
+  if (borders.num_edges > 0) line("    open borders with other materials: {}", text(borders));
 }
 
 void print_displacements(const Scene& scene, const DisplacementSet& displacements)
@@ -126,8 +129,9 @@ void print_displacements(const Scene& scene, const DisplacementSet& displacement
   for (const HeightMap& map : scene.height_maps) ranges.push_back(height_map_range(map.view()));
   print_height_maps(scene, ranges);
   line("displacements: {}", scene.displacements.size());
+  const std::vector<SeamExtent> borders = border_seams(scene, displacements);
   for (std::size_t i = 0; i < scene.displacements.size(); ++i) {
-    print_displacement(scene, displacements, static_cast<int>(i));
+    print_displacement(scene, displacements, borders[i], static_cast<int>(i));
   }
 }
 

@@ -354,6 +354,41 @@ TEST_F(TraceInfoProgram, InfoSaysWhetherThereWillBePhotons)
   EXPECT_EQ(run({"info", scene, "--caustics", "sometimes"}).exit_code, 2);
 }
 
+// A square of two triangles with a material each: one is raised by half a metre, the other by a tenth or not at all.
+TEST_F(TraceInfoProgram, InfoShowsOpenBordersBetweenMaterials)
+{
+  for (const bool both : {false, true}) {
+    GltfBuilder b;
+    const int first = b.accessor<float>({0, 0, 0, 1, 0, 0, 1, 1, 0}, "VEC3"),
+              second = b.accessor<float>({0, 0, 0, 1, 1, 0, 0, 1, 0}, "VEC3"),
+              N = b.accessor<float>({0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3"),
+              uv = b.accessor<float>({0, 0, 1, 0, 0, 1}, "VEC2");
+    const auto primitive = [&](int P, int material) {
+      return nlohmann::json{{"attributes", {{"POSITION", P}, {"NORMAL", N}, {"TEXCOORD_0", uv}}},
+                            {"material", material}};
+    };
+    b.mesh(primitive(first, 0));
+    b.json["meshes"][0]["primitives"].push_back(primitive(second, 1));
+    b.root_node({{"mesh", 0}});
+    folder_.write("white.tga", tga_grey(1, 1, "\xff"));
+    const auto raised = [](double scale) {
+      return nlohmann::json{
+          {"RELIEF_displacement",
+           {{"heightTexture", {{"uri", "white.tga"}}}, {"scale", scale}, {"midlevel", 0}, {"seams", "weld"}}}};
+    };
+    b.push("materials", {{"name", "bark"}, {"extensions", raised(0.5)}});
+    b.push("materials", {{"name", "moss"}, {"extensions", both ? raised(0.1) : nlohmann::json::object()}});
+    b.json["extensionsUsed"].push_back("RELIEF_displacement");
+    const Outcome outcome = run({"info", folder_.write("s.gltf", b.gltf()).string()});
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+    const std::string expected = std::string("open borders with other materials: 1 edges, 1.41421 m, gap up to ") +
+                                 (both ? "0.4" : "0.5") + " m\n";
+    const std::size_t at = outcome.output.find(expected);
+    EXPECT_NE(at, std::string::npos) << outcome.output;
+    EXPECT_EQ(outcome.output.find(expected, at + 1) != std::string::npos, both) << outcome.output;
+  }
+}
+
 // A square of two triangles with vertices of their own. Along the diagonal one side reads u = ¼, the centre of the first
 // texel, the other u = ¾, that of the second.
 TEST_F(TraceInfoProgram, InfoShowsHeightMapsAndTheirSeams)
