@@ -101,4 +101,53 @@ SurfaceInBox surface_in_box(const DisplacedMeshView& mesh,
   return out;
 }
 
+void add_planes_in_box(const DisplacedMeshView& mesh,
+                       const DisplacedTriangle& tri,
+                       double b1,
+                       double b2,
+                       Vec3d error,
+                       Vec3d reach,
+                       std::vector<NearPlane>* planes)
+{
+  if (mesh.blend != nullptr) return;
+  const BasePoint base = base_point(tri, b1, b2);
+  const auto [x, y] = lattice_point(tri, b1, b2);
+  const double inverse_length = 1.0 / length(base.N);
+  const Vec3d n = base.N * inverse_length;
+  const double d = displacement_at(mesh, x, y);
+  // Around the base triangle's vertices as they are numbered, wherever the surface is turned over.
+  const double winding = dot(cross(base.Pu, base.Pv), base.N) < 0 ? -1.0 : 1.0;
+  struct Tangents {
+    Vec3d u, v, normal;
+  };
+  const auto tangents = [&](std::int64_t i, std::int64_t j) {
+    const CellHeights c = cell_heights(*mesh.field, i, j);
+    const double fx = std::clamp(x - static_cast<double>(i), 0.0, 1.0),
+                 fy = std::clamp(y - static_cast<double>(j), 0.0, 1.0);
+    const double hx = mesh.scale * (c.hx + c.hxy * fy), hy = mesh.scale * (c.hy + c.hxy * fx);
+    const auto derivative = [&](Vec3d dP, Vec3d dN, double dx, double dy) {
+      return dP + (hx * dx + hy * dy) * n + (d * inverse_length) * (dN - dot(n, dN) * n);
+    };
+    const Vec3d u = derivative(base.Pu, base.Nu, base.xu, base.yu), v = derivative(base.Pv, base.Nv, base.xv, base.yv);
+    return Tangents{u, v, cross(u, v)};
+  };
+  const Tangents own = tangents(cell_of(x), cell_of(y));
+  const double squared = dot(own.normal, own.normal);
+  if (!(squared > 0)) return;
+  // Gradients along the surface, which are short wherever it is not degenerate itself.
+  const Vec3d b1_gradient = cross(own.v, own.normal) * (1 / squared),
+              b2_gradient = cross(own.normal, own.u) * (1 / squared);
+  const double dx = std::min(change_within(base.xu * b1_gradient + base.xv * b2_gradient, reach), 0.5);
+  const double dy = std::min(change_within(base.yu * b1_gradient + base.yv * b2_gradient, reach), 0.5);
+  for (std::int64_t j = cell_of(y - dy); j <= cell_of(y + dy); ++j) {
+    for (std::int64_t i = cell_of(x - dx); i <= cell_of(x + dx); ++i) {
+      const Vec3d normal = tangents(i, j).normal;
+      const double size = length(normal);
+      if (!(size > 0)) continue;
+      const Vec3d N = normal * (winding / size);
+      planes->push_back({N, change_within(N, 2.0 * error + reach)});
+    }
+  }
+}
+
 }  // namespace relief

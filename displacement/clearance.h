@@ -6,9 +6,16 @@
 // a point meets the surface only once, so there the origin is moved along that line instead, past all heights that the
 // surface has within the box. The same holds along the sides that base triangles share, where the normals of two surfaces
 // meet: there the heights are those of all triangles that the box reaches into (displaced_leave finds them).
+//
+// Where the surface is nearly parallel to its displacement lines, a move along one is long for what it clears: at a fold, where
+// they cross, without end (it was .033 m). There the planes of the cells and triangles in the box say what is the shortest
+// way out of it (plane_clearance.h).
 #pragma once
 
+#include <vector>
+
 #include "displacement/displaced_triangle.h"
+#include "displacement/plane_clearance.h"
 
 namespace relief {
 
@@ -35,5 +42,17 @@ SurfaceInBox surface_in_box(const DisplacedMeshView& mesh,
                             double b1,
                             double b2,
                             Vec3d reach);
+
+/// Adds the planes of a triangle's surface in the cells that a box around a point of it reaches into. Not of a surface between
+/// two levels.
+/// @param error  per axis, of a point and of an origin, as in offset_ray_origin
+/// @param reach  half sides of the box that they are in
+void add_planes_in_box(const DisplacedMeshView& mesh,
+                       const DisplacedTriangle& tri,
+                       double b1,
+                       double b2,
+                       Vec3d error,
+                       Vec3d reach,
+                       std::vector<NearPlane>* planes);
 
 }  // namespace relief

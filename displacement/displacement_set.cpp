@@ -564,6 +564,11 @@ DisplacedPoint DisplacementSet::resolve(std::size_t instance,
   DisplacedPoint out{hit.triangle, static_cast<float>(hit.b1), static_cast<float>(hit.b2)};
   out.P = to_float(hit.P);
   out.Ng = out.Ns = to_float(hit.Ng);
+  if (d.geometry.scene != nullptr) {
+    const LeavingErrors errors = leaving_errors(placement, out.P, out.Ng);
+    out.leave = to_float(d.tessellation->leave(d.geometry.scene, primitive, record.u, record.v, hit, errors.error,
+                                               2 * length(errors.reach)));
+  }
   auto level = static_cast<float>(d.geometry.first_level);
   if (d.dicing != nullptr) {
     const Vec3d P = base_point(d.dicing->mesh().triangles[hit.triangle], hit.b1, hit.b2).P;

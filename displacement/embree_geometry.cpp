@@ -63,6 +63,8 @@ struct BoxOverSides {
   Vec3d reach;
   double clearance;  ///< of the triangle itself, then of its neighbours too
   bool has_neighbors = false;
+  Vec3d error = {};                          ///< as in add_planes_in_box
+  std::vector<NearPlane>* planes = nullptr;  ///< to which those of neighbours are added; null: they are not
 };
 
 /// Widens the clearance by that of a triangle that has all vertices between which the point is, if it has the surface in
@@ -88,59 +90,78 @@ bool widen_by_neighbor(RTCPointQueryFunctionArguments* arguments)
   if (!(std::abs(d - box.d) <= near.clearance)) return false;
   box.clearance = std::max(box.clearance, near.clearance);
   box.has_neighbors = true;
+  if (box.planes != nullptr)
+    add_planes_in_box(other.mesh, other.tri, b[1], b[2], box.error, 2.0 * box.reach, box.planes);
   return false;
 }
 
-/// Where rays that leave a point of a displaced surface along its normal start, object space.
-struct Leaving {
-  Vec3f offset;  ///< from the point, to the side of the normal
-  Vec3d reach;   ///< half sides of the box that the point is in, and the origin
-};
+void find_neighbors(BoxOverSides& box, Vec3d point)
+{
+  const Vec3f P = to_float(point);
+  RTCPointQuery query{P.x, P.y, P.z, box.time, static_cast<float>(2.0 * length(box.reach))};
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  rtcPointQuery(box.geometry.scene, &query, &context, widen_by_neighbor, &box);
+}
 
-/// @param P, Ng  object space
-Leaving leaving_make(const InstanceView& placement, Vec3f P, Vec3f Ng)
+/// How far a ray's origin has to be moved to leave a point of the surface where it has a crease.
+/// @param errors  of the point, object space
+/// @return        to the side of N, object space; zero: it can leave along the normal
+Vec3d leave_of(const DisplacedGeometry& geometry,
+               std::uint32_t triangle,
+               const DisplacedPlace& at,
+               Vec3f Ng,
+               const LeavingErrors& errors)
+{
+  const double b1 = at.b1, b2 = at.b2;
+  const Vec3d reach = errors.reach;
+  const OnSurface on(geometry, triangle, at.level, b1, b2, at.time);
+  const SurfaceInBox own = surface_in_box(on.mesh, on.tri, b1, b2, reach);
+  double distance = own.crease ? own.clearance : 0;
+  std::optional<BoxOverSides> box;
+  SurfacePoint point;
+  // A triangle within the box has no side that it could share.
+  if (own.sides != 0 && own.sides != 7 && geometry.scene != nullptr) {
+    point = traced_surface_point(on.mesh, on.tri, b1, b2);
+    box.emplace(BoxOverSides{
+        geometry, triangle, on.then.tri(), at.level, at.time, {1.0 - b1 - b2, b1, b2}, point.d, reach, own.clearance});
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) {
+      if ((own.sides >> k & 1) != 0) box->weights[k] = 0;
+      sum += box->weights[k];
+    }
+    for (double& weight : box->weights) weight /= sum;
+    find_neighbors(*box, point.P);
+    if (box->has_neighbors) distance = box->clearance;
+  }
+  if (!(distance > 0)) return {};
+  // Steeper surfaces than of so many metres a metre are as good as parallel to their displacement lines.
+  constexpr double kSteepest = 64;
+  if (distance <= kSteepest * length(reach)) {
+    const Vec3d N = base_point(on.tri, b1, b2).N;
+    return N * (distance / length(N));
+  }
+  std::vector<NearPlane> planes;
+  add_planes_in_box(on.mesh, on.tri, b1, b2, errors.error, reach, &planes);
+  if (box) {
+    box->error = errors.error;
+    box->planes = &planes;
+    find_neighbors(*box, point.P);
+  }
+  return planes_leave(planes, to_double(Ng));
+}
+
+}  // namespace
+
+LeavingErrors leaving_errors(const InstanceView& placement, Vec3f P, Vec3f Ng)
 {
   const DisplacedPointError error =
       displaced_point_error(placement, P, transform_point(placement.world_from_object, P));
   const Vec3f N = normalize(transform_normal(placement.object_from_world, as_normal(Ng)));
   const Vec3f offset = transform_vector(placement.object_from_world, 2.0f * dot(abs(N), error.world) * N);
   // The origin has as large an error as the point.
-  return {offset, to_double(2.0f * error.object + abs(offset))};
+  return {offset, to_double(error.object), to_double(2.0f * error.object + abs(offset))};
 }
-
-/// How far a ray's origin has to be moved to leave a point of the surface where it has a crease.
-/// @param reach  half sides of the box of errors, object space, metres
-/// @return       to the side of N, object space; zero: it can leave along the normal
-Vec3d leave_of(const DisplacedGeometry& geometry, std::uint32_t triangle, const DisplacedPlace& at, Vec3d reach)
-{
-  const double b1 = at.b1, b2 = at.b2;
-  const OnSurface on(geometry, triangle, at.level, b1, b2, at.time);
-  const SurfaceInBox own = surface_in_box(on.mesh, on.tri, b1, b2, reach);
-  double distance = own.crease ? own.clearance : 0;
-  // A triangle within the box has no side that it could share.
-  if (own.sides != 0 && own.sides != 7 && geometry.scene != nullptr) {
-    const SurfacePoint point = traced_surface_point(on.mesh, on.tri, b1, b2);
-    BoxOverSides box{geometry, triangle, on.then.tri(), at.level, at.time, {1.0 - b1 - b2, b1, b2},
-                     point.d,  reach,    own.clearance};
-    double sum = 0;
-    for (int k = 0; k < 3; ++k) {
-      if ((own.sides >> k & 1) != 0) box.weights[k] = 0;
-      sum += box.weights[k];
-    }
-    for (double& weight : box.weights) weight /= sum;
-    const Vec3f P = to_float(point.P);
-    RTCPointQuery query{P.x, P.y, P.z, at.time, static_cast<float>(2.0 * length(reach))};
-    RTCPointQueryContext context;
-    rtcInitPointQueryContext(&context);
-    rtcPointQuery(geometry.scene, &query, &context, widen_by_neighbor, &box);
-    if (box.has_neighbors) distance = box.clearance;
-  }
-  if (!(distance > 0)) return {};
-  const Vec3d N = base_point(on.tri, b1, b2).N;
-  return N * (distance / length(N));
-}
-
-}  // namespace
 
 SurfacePoint displaced_surface_point(const DisplacedGeometry& geometry,
                                      std::uint32_t triangle,
@@ -173,7 +194,7 @@ void displaced_point_set_level(const DisplacedGeometry& geometry,
 {
   if (!geometry.facets || !(level > 0.0f)) return;
   point->level = level;
-  if (is_zero(point->leave)) point->leave = leaving_make(placement, point->P, point->Ng).offset;
+  if (is_zero(point->leave)) point->leave = leaving_errors(placement, point->P, point->Ng).offset;
 }
 
 DisplacedPoint displaced_resolve(const DisplacedGeometry& geometry,
@@ -189,7 +210,7 @@ DisplacedPoint displaced_resolve(const DisplacedGeometry& geometry,
   out.Ng = out.Ns = to_float(point.Ng);
   if (geometry.lod.by_cone) out.width = lod_width_of_level(texel, place.level);
   if (place.edge >= 0) return out;
-  out.leave = to_float(leave_of(geometry, triangle, place, leaving_make(placement, out.P, out.Ng).reach));
+  out.leave = to_float(leave_of(geometry, triangle, place, out.Ng, leaving_errors(placement, out.P, out.Ng)));
   const float between = geometry.mesh.blend != nullptr ? static_cast<float>(geometry.mesh.blend->weight) : 0.0f;
   displaced_point_set_level(geometry, placement, static_cast<float>(geometry.first_level + place.level) + between,
                             &out);

@@ -38,7 +38,8 @@ struct DisplacedGeometry {
   RmipOptions rmip_options;                     ///< for both of RMIP's
   RTCFilterFunctionN shadow_filter = nullptr;   ///< called for hits of shadow rays; null: all of them are opaque
   const ProceduralField* procedural = nullptr;  ///< heights in place of a map's; there are no levels then
-  RTCScene scene = nullptr;  ///< of this geometry alone, committed; null: rays that leave it know no neighbours
+  RTCScene scene =
+      nullptr;  ///< of this geometry, or of what it is tessellated to, committed; null: no neighbours are known
 };
 
 /// A question to one triangle of a geometry: the nearest (or any) hit of a ray.
@@ -135,6 +136,16 @@ DisplacedPoint displaced_resolve(const DisplacedGeometry& geometry,
                                  float texel,
                                  std::uint32_t triangle,
                                  EmbreeHitRecord record);
+
+/// The errors of a point and of a ray's origin there, as its tracer sees them.
+struct LeavingErrors {
+  Vec3f offset;  ///< of an origin from the point, to the side of the normal; object space
+  Vec3d error;   ///< of either, per axis; object space
+  Vec3d reach;   ///< half sides of the box that both are in
+};
+
+/// @param P, Ng  object space
+LeavingErrors leaving_errors(const InstanceView& placement, Vec3f P, Vec3f Ng);
 
 /// Notes the level of a point, and that rays leave it along the normal that it has, whatever facet they come from.
 /// @param level  of the map

@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
+#include "displacement/plane_clearance.h"
 #include "displacement/shared_edges.h"
 
 namespace relief {
@@ -340,17 +341,23 @@ RTCGeometry Tessellation::geometry_make(RTCDevice device) const
   return geometry;
 }
 
-Tessellation::MicroTriangle Tessellation::micro_triangle(std::uint32_t primitive, float u, float v) const
+/// The base triangle of a primitive.
+std::uint32_t Tessellation::triangle_of(std::uint32_t primitive) const
 {
   // The last triangle that starts at or before the primitive.
   const auto first = layout_.triangles.begin();
   const auto after = std::upper_bound(
       first + owners_[primitive >> kLog2Owners], first + owners_[(primitive >> kLog2Owners) + 1] + 1, primitive,
       [](std::uint32_t p, const TessellatedTriangle& triangle) { return p < triangle.first_primitive; });
-  const TessellatedTriangle& t = *std::prev(after);
-  const std::uint32_t n = t.segments, local = primitive - t.first_primitive;
+  return static_cast<std::uint32_t>(std::prev(after) - first);
+}
+
+Tessellation::MicroTriangle Tessellation::micro_triangle(std::uint32_t primitive, float u, float v) const
+{
   MicroTriangle micro;
-  micro.triangle = static_cast<std::uint32_t>(std::prev(after) - layout_.triangles.begin());
+  micro.triangle = triangle_of(primitive);
+  const TessellatedTriangle& t = layout_.triangles[micro.triangle];
+  const std::uint32_t n = t.segments, local = primitive - t.first_primitive;
 
   if (layout_.kind == TessellationKind::kGrids) {
     // Embree's u and v span the whole grid.
@@ -422,7 +429,144 @@ MicroHit Tessellation::hit(std::uint32_t primitive, float u, float v) const
   const Vec3d normal = cross(P[1] - P[0], P[2] - P[0]);
   const double squared = dot(normal, normal);
   hit.Ng = squared > 0 ? normal * ((dot(normal, N) < 0 ? -1.0 : 1.0) / std::sqrt(squared)) : N * (1.0 / length(N));
+  // Twice the area, as a part of it, over the side's length.
+  double least = static_cast<double>(kInfinity);
+  for (int k = 0; k < 3; ++k) {
+    const Vec3d side = P[(k + 2) % 3] - P[(k + 1) % 3];
+    least = std::min(least, micro.weight[k] * micro.weight[k] * squared / std::max(dot(side, side), 1e-300));
+  }
+  hit.side_distance = std::sqrt(least);
   return hit;
+}
+
+namespace {
+
+/// Squared distance of the origin from a triangle. @source Ericson 2005, Real-Time Collision Detection, §5.1.5
+double squared_distance(Vec3d a, Vec3d b, Vec3d c)
+{
+  const auto to_line = [](Vec3d from, Vec3d to) {
+    const Vec3d along = to - from;
+    const double squared = dot(along, along);
+    const double t = squared > 0 ? std::clamp(-dot(from, along) / squared, 0.0, 1.0) : 0.0;
+    const Vec3d nearest = from + t * along;
+    return dot(nearest, nearest);
+  };
+  const Vec3d n = cross(b - a, c - a);
+  const bool inside = dot(cross(a, b), n) >= 0 && dot(cross(b, c), n) >= 0 && dot(cross(c, a), n) >= 0 && dot(n, n) > 0;
+  if (inside) return dot(a, n) * dot(a, n) / dot(n, n);
+  return std::min({to_line(a, b), to_line(b, c), to_line(c, a)});
+}
+
+}  // namespace
+
+/// Micro-triangles around a point.
+struct Tessellation::Around {
+  const Tessellation& tessellation;
+  Vec3d P;
+  std::uint32_t primitive;  ///< that it is on
+  std::uint32_t x, y;       ///< of a grid: its cell
+  Vec3d error;
+  double reach;
+  std::vector<NearPlane> planes;
+
+  /// @param winding  of the base triangle
+  void add(double winding, Vec3d a, Vec3d b, Vec3d c)
+  {
+    const Vec3d normal = cross(b - a, c - a);
+    const double squared = dot(normal, normal);
+    if (!(squared > 0) || !(squared_distance(a - P, b - P, c - P) <= reach * reach)) return;
+    const Vec3d N = normal * (winding / std::sqrt(squared));
+    // On either side of it: rays leave a ridge below and a valley above alike.
+    const double distance = 2 * dot(abs(N), error) + std::abs(dot(P - a, N));
+    for (NearPlane& plane : planes) {
+      if (dot(plane.N, N) < 1 - 1e-9) continue;
+      plane.distance = std::max(plane.distance, distance);
+      return;
+    }
+    planes.push_back({N, distance});
+  }
+};
+
+/// Whether a base triangle's vertices run counter-clockwise around its normals, 1, or clockwise, −1.
+double Tessellation::winding(std::uint32_t triangle) const
+{
+  const DisplacedTriangle& tri = mesh_.triangles[triangle];
+  const Vec3d normal = cross(to_double(tri.P[1]) - to_double(tri.P[0]), to_double(tri.P[2]) - to_double(tri.P[0]));
+  return dot(normal, to_double(tri.N[0]) + to_double(tri.N[1]) + to_double(tri.N[2])) < 0 ? -1.0 : 1.0;
+}
+
+bool Tessellation::add_planes_of(RTCPointQueryFunctionArguments* arguments)
+{
+  auto& around = *static_cast<Around*>(arguments->userPtr);
+  const Tessellation& t = around.tessellation;
+  if (arguments->geomID != 0) return false;
+  const std::uint32_t triangle = t.triangle_of(arguments->primID);
+  const double winding = t.winding(triangle);
+  const auto at = [&](std::uint64_t vertex) { return to_double(t.vertex(vertex)); };
+  if (t.layout_.kind == TessellationKind::kQuads) {
+    const std::uint32_t* v = t.indices_.get() + 4 * std::size_t{arguments->primID};
+    around.add(winding, at(v[0]), at(v[1]), at(v[3]));
+    if (v[2] != v[3]) around.add(winding, at(v[1]), at(v[2]), at(v[3]));
+    return false;
+  }
+  const std::uint32_t n = t.layout_.triangles[triangle].segments;
+  const std::uint64_t first = t.grids_[arguments->primID].startVertexID;
+  const auto add_cell = [&](std::uint32_t x, std::uint32_t y) {
+    const std::uint64_t a = first + std::uint64_t{y} * (n + 1) + x, b = a + n + 1;
+    around.add(winding, at(a), at(a + 1), at(b));
+    around.add(winding, at(a + 1), at(b + 1), at(b));
+  };
+  if (arguments->primID == around.primitive) {
+    for (std::uint32_t y = around.y - std::min(around.y, 1u); y <= std::min(around.y + 1, n - 1); ++y) {
+      for (std::uint32_t x = around.x - std::min(around.x, 1u); x <= std::min(around.x + 1, n - 1); ++x) add_cell(x, y);
+    }
+    return false;
+  }
+  // Of another grid only what is along its border can be near.
+  for (std::uint32_t y = 0; y < n; ++y) {
+    const bool is_row = y == 0 || y == n - 1;
+    for (std::uint32_t x = 0; x < n; x += is_row || n == 1 ? 1 : n - 1) add_cell(x, y);
+  }
+  return false;
+}
+
+Vec3d Tessellation::leave(RTCScene scene,
+                          std::uint32_t primitive,
+                          float u,
+                          float v,
+                          const MicroHit& hit,
+                          Vec3d error,
+                          double reach) const
+{
+  if (!(hit.side_distance <= reach)) return {};
+  const auto cell = [&](float along) {
+    const std::uint32_t n = layout_.triangles[hit.triangle].segments;
+    return std::min(static_cast<std::uint32_t>(std::max(along, 0.0f) * static_cast<float>(n)), n - 1);
+  };
+  Around around{*this, hit.P, primitive, cell(u), cell(v), error, reach, {}};
+  // Where errors are larger than micro-triangles are, as far from the origin as that is, no surface is left to be clear of, and
+  // all that are near would take too long.
+  constexpr double kMostSides = 2;
+  std::uint64_t ends[3];
+  if (layout_.kind == TessellationKind::kQuads) {
+    const std::uint32_t* const corners = indices_.get() + 4 * std::size_t{primitive};
+    ends[0] = corners[0];
+    ends[1] = corners[1];
+    ends[2] = corners[3];
+  } else {
+    const std::uint64_t row = layout_.triangles[hit.triangle].segments + 1;
+    ends[0] = grids_[primitive].startVertexID + around.y * row + around.x;
+    ends[1] = ends[0] + 1;
+    ends[2] = ends[0] + row;
+  }
+  const Vec3f P0 = vertex(ends[0]), P1 = vertex(ends[1]), P2 = vertex(ends[2]);
+  if (!(reach < kMostSides * static_cast<double>(max(length(P1 - P0), length(P2 - P0))))) return {};
+  const Vec3f P = to_float(hit.P);
+  RTCPointQuery query{P.x, P.y, P.z, 0, static_cast<float>(reach)};
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  rtcPointQuery(scene, &query, &context, add_planes_of, &around);
+  return planes_leave(around.planes, hit.Ng);
 }
 
 RTCScene tessellation_scene_make(RTCDevice device, const TessellationBuild& build)

@@ -75,6 +75,7 @@ struct MicroHit {
   double b1 = 0, b2 = 0;       ///< its barycentric weights of vertices 1 and 2
   Vec3d P{};                   ///< on the micro-triangle, object space
   Vec3d Ng{};                  ///< unit normal of the micro-triangle, on the side of the displacement normal
+  double side_distance = 0;    ///< from the point to the nearest side of the micro-triangle
 };
 
 class Tessellation {
@@ -103,6 +104,16 @@ class Tessellation {
   /// The whole point of a hit.
   MicroHit hit(std::uint32_t primitive, float u, float v) const;
 
+  /// Where rays start that leave a hit near a side of its micro-triangle: clear of all micro-triangles around it. In a valley
+  /// narrower than a right angle a move along the normal ends behind the other slope (test Dicing.LetsNoPathOut).
+  /// @param scene      of this geometry as number 0
+  /// @param primitive, u, v  of the hit
+  /// @param error      per axis, of a point and of an origin, as in offset_ray_origin; object space
+  /// @param reach      micro-triangles within this distance count, metres
+  /// @return           to the side of the hit's normal; zero: no more is to be done than for any other hit
+  Vec3d leave(RTCScene scene, std::uint32_t primitive, float u, float v, const MicroHit& hit, Vec3d error, double reach)
+      const;
+
   Vec3f vertex(std::size_t index) const
   {
     return {vertices_[3 * index], vertices_[3 * index + 1], vertices_[3 * index + 2]};
@@ -110,6 +121,10 @@ class Tessellation {
 
  private:
   struct MicroTriangle;
+  struct Around;
+  static bool add_planes_of(RTCPointQueryFunctionArguments* arguments);
+  double winding(std::uint32_t triangle) const;
+  std::uint32_t triangle_of(std::uint32_t primitive) const;
   MicroTriangle micro_triangle(std::uint32_t primitive, float u, float v) const;
   void fill(std::uint32_t index, const TessellationRule& rule);
 

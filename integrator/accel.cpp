@@ -229,6 +229,7 @@ void Accel::build_tessellated(DisplacementSet& displacements)
     attach(use.tree.get(), geometry, 0, ~0u);
     attach_corners(use.tree.get(), use.box, use.pad, tessellation->layout().kind == TessellationKind::kQuads);
     commit(use.tree.get());
+    displacements.geometry(d).scene = use.tree.get();
   }
 }
 

@@ -154,6 +154,70 @@ TEST(DisplacedSelfIntersection, NoValleyOfAStretchedHeightFieldIsMetFromWithin)
   }
 }
 
+/// The same of micro-triangles, from points on their sides and very near to them.
+TEST(DisplacedSelfIntersection, NoValleyOfATessellationIsMetFromWithin)
+{
+  constexpr int kSize = 64;
+  const std::vector<std::uint16_t> texels = noise_texels(kSize, 3);
+  std::mt19937 random(12345);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  for (const DisplacementMethod method :
+       {DisplacementMethod::tessellate, DisplacementMethod::tessellate_grid, DisplacementMethod::kAuto}) {
+    for (const Vec3f scale : kStretches) {
+      for (int place = 0; place < kNumPlaces; ++place) {
+        const Affine3 placement = stretched_placement(scale, place, random);
+        Scene scene = empty_scene();
+        Mesh plane = quad_mesh({-2, -2, 0}, {4, 0, 0}, {0, 4, 0});
+        plane.uv[0] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+        Material material = diffuse_material({1, 1, 1});
+        material.displacement_index = 0;
+        add_object(scene, plane, material, placement);
+        add_displacement(scene, kSize, texels, 0.1f);
+        DisplacementOptions options;
+        options.method = method;
+        if (method == DisplacementMethod::kAuto) {
+          options.error = 2;
+          options.camera = scene.cameras[0].camera;
+          options.camera->world_from_camera = placement * options.camera->world_from_camera;
+          options.picture_height = 200;
+          options.num_rays = 1e9;
+        }
+        const SceneContext context(scene, options);
+        const Tessellation* tessellation = context.displacements.tessellation(0);
+        ASSERT_NE(tessellation, nullptr);
+
+        std::vector<TraceRay> rays, leaving;
+        for (int i = 0; i < 3'000; ++i) {
+          const auto primitive = static_cast<std::uint32_t>(random() % tessellation->layout().num_primitives);
+          const float along = std::fabs(uniform(random)), beside = i % 2 == 0 ? 0.0f : 1e-6f * uniform(random);
+          float u = along, v = std::fabs(beside);
+          if (tessellation->layout().kind == TessellationKind::kGrids) {
+            // Between two columns of the grid.
+            const auto n = static_cast<float>(tessellation->layout().triangles[primitive / 3].segments);
+            v = (std::floor(n * std::fabs(uniform(random))) + v) / n;
+          }
+          if (i % 3 == 0) std::swap(u, v);
+          const Vec3f target = to_float(tessellation->hit(primitive, u, v).P);
+          if (std::max(std::fabs(target.x), std::fabs(target.y)) > 1.95f) continue;
+          const Vec3f from{3 * uniform(random), 3 * uniform(random), i % 4 < 2 ? 2.0f : -2.0f};
+          const Vec3f O = transform_point(placement, from);
+          rays.push_back({O, transform_point(placement, target) - O, 0, kInfinity});
+        }
+        const Vec3f up = normalize(placement.z);
+        for (const TraceHit& h : trace_rays(context, rays)) {
+          if (!h.hit) continue;
+          const bool upward = dot(h.Ng, up) > 0;
+          leaving.push_back({h.O_front, upward ? up : -up, kLeastDistance, kInfinity});
+          leaving.push_back({h.O_back, upward ? -up : up, kLeastDistance, kInfinity});
+        }
+        EXPECT_GT(leaving.size(), 4'000u);
+        EXPECT_EQ(num_hits(context, leaving), 0) << displacement_method_label(method) << ", " << scale.x << " "
+                                                 << scale.y << " " << scale.z << ", placement " << place;
+      }
+    }
+  }
+}
+
 /// A floor at height 0 whose heights are 0: its points have a coordinate that is exact, and so no error in proportion to it.
 /// What the tracer's doubles leave of the large ones is all that rays have to be moved out of.
 TEST(DisplacedSelfIntersection, LevelGroundAtZeroIsLeft)

@@ -1,0 +1,96 @@
+// The way out of where planes meet: a short move after which a point is clear of all surfaces near it.
+#pragma once
+
+#include <algorithm>
+#include <optional>
+#include <vector>
+
+#include "displacement/vec3d.h"
+
+namespace relief {
+
+/// A surface near a point, as flat as it is there.
+struct NearPlane {
+  Vec3d N;          ///< unit
+  double distance;  ///< that a point has to be moved along N, > 0
+};
+
+/// The shortest v with N·v ≥ distance for all planes.
+/// @return  empty if there is none: their normals are not all on one side of anything
+/// @cost    the fourth power of their number
+inline std::optional<Vec3d> few_planes_leave(const std::vector<NearPlane>& planes)
+{
+  std::optional<Vec3d> best;
+  double least = static_cast<double>(kInfinity);
+  const auto offer = [&](Vec3d v) {
+    const double squared = dot(v, v);
+    if (!(squared < least)) return;
+    const bool is_clear = std::all_of(planes.begin(), planes.end(), [&](const NearPlane& plane) {
+      return dot(plane.N, v) >= plane.distance * (1 - 1e-9);
+    });
+    if (!is_clear) return;
+    best = v;
+    least = squared;
+  };
+  // It lies on one, two or three of the planes' borders.
+  const std::size_t count = planes.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const NearPlane& a = planes[i];
+    offer(a.distance * a.N);
+    for (std::size_t j = i + 1; j < count; ++j) {
+      const NearPlane& b = planes[j];
+      const Vec3d along = cross(a.N, b.N);
+      const double squared = dot(along, along);
+      if (!(squared > 1e-20)) continue;
+      offer((a.distance * cross(b.N, along) + b.distance * cross(along, a.N)) * (1 / squared));
+      for (std::size_t k = j + 1; k < count; ++k) {
+        const NearPlane& c = planes[k];
+        const double volume = dot(along, c.N);
+        if (!(volume * volume > 1e-20)) continue;
+        offer((a.distance * cross(b.N, c.N) + b.distance * cross(c.N, a.N) + c.distance * along) * (1 / volume));
+      }
+    }
+  }
+  return best;
+}
+
+/// Some v with N·v ≥ distance for all planes, not much longer than the shortest.
+/// @return  empty if none is found
+/// @cost    in proportion to their number
+/// @source  Hildreth 1957, "A quadratic programming procedure"
+inline std::optional<Vec3d> many_planes_leave(const std::vector<NearPlane>& planes)
+{
+  constexpr int kSweeps = 64;
+  Vec3d v{};
+  std::vector<double> pushed(planes.size(), 0.0);  // along each of the normals
+  for (int sweep = 0; sweep < kSweeps; ++sweep) {
+    for (std::size_t k = 0; k < planes.size(); ++k) {
+      const double more = max(planes[k].distance - dot(planes[k].N, v), -pushed[k]);
+      pushed[k] += more;
+      v = v + more * planes[k].N;
+    }
+  }
+  double longer = 1;
+  for (const NearPlane& plane : planes) {
+    const double along = dot(plane.N, v);
+    if (!(along > 1e-6 * plane.distance)) return std::nullopt;
+    longer = max(longer, plane.distance / along);
+  }
+  return v * longer;
+}
+
+/// @param Ng  unit, of the point's own surface. Planes know only the order of their vertices
+/// @return    a move to the side of Ng that leaves all planes behind; zero if there is none
+inline Vec3d planes_leave(const std::vector<NearPlane>& planes, Vec3d Ng)
+{
+  constexpr std::size_t kFew = 12;
+  const std::optional<Vec3d> offset = planes.size() <= kFew ? few_planes_leave(planes) : many_planes_leave(planes);
+  double own = 0;
+  for (const NearPlane& plane : planes) {
+    const double cosine = dot(plane.N, Ng);
+    if (__builtin_fabs(cosine) > __builtin_fabs(own)) own = cosine;
+  }
+  return offset.value_or(Vec3d{}) * (own < 0 ? -1.0 : 1.0);
+}
+
+}  // namespace relief
