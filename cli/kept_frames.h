@@ -15,6 +15,7 @@ struct KeptFrames {
   KeptImages images;
   std::shared_ptr<HeightFields> fields = std::make_shared<HeightFields>();
   std::shared_ptr<KeptMeshes> meshes = std::make_shared<KeptMeshes>();
+  std::shared_ptr<DicingChoices> choices = std::make_shared<DicingChoices>();
   std::shared_ptr<KeptTrees> trees = std::make_shared<KeptTrees>(true);
   KeptScene scene;
 
@@ -23,6 +24,7 @@ struct KeptFrames {
   {
     options->displacement.fields = fields;
     options->displacement.meshes = meshes;
+    options->displacement.choices = choices;
     options->trees = trees;
   }
 

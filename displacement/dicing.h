@@ -11,7 +11,7 @@
 
 #include "displacement/displaced_triangle.h"
 #include "displacement/lattice_split.h"
-#include "displacement/picture_view.h"
+#include "displacement/seen_instances.h"
 #include "displacement/tessellation.h"
 
 namespace relief {
@@ -27,6 +27,7 @@ class Dicing {
   /// @param texel      width of one of the finest, metres of object space
   /// @param instances  where the mesh is, the world from its own space; at least one
   /// @param pixels     that a micro-triangle's side may be long, > 0
+  /// @param require    see lattices_make
   /// @cost  200 bytes a part
   Dicing(const MeshView& mesh,
          const DisplacedMeshView& triangles,
@@ -34,7 +35,8 @@ class Dicing {
          double texel,
          const PictureView& view,
          std::span<const Affine3> instances,
-         double pixels);
+         double pixels,
+         const RequireBytes& require = {});
 
   /// What dicing a mesh takes at least, with its tessellation.
   static std::uint64_t least_bytes(const MeshView& mesh)
@@ -58,15 +60,11 @@ class Dicing {
   void set_base_place(std::uint32_t* triangle, float* b1, float* b2) const;
   std::size_t bytes() const
   {
-    return parts_.capacity() * sizeof(parts_[0]) + triangles_.capacity() * sizeof(triangles_[0]);
+    return parts_.capacity() * sizeof(parts_[0]) + triangles_.capacity() * sizeof(triangles_[0]) + seen_.bytes();
   }
 
  private:
-  double segments(Vec3f a, Vec3f b) const;
-
-  PictureView view_;
-  std::vector<Affine3> instances_;
-  std::vector<double> stretches_;  ///< of each instance: the most
+  SeenInstances seen_;
   double pixels_, texel_;
   std::vector<const HeightFieldView*> levels_;
   std::vector<LatticeTriangle> parts_;

@@ -420,10 +420,11 @@ std::unique_ptr<PreparedMesh> DisplacementSet::make_computed(const Use& use, con
         std::make_unique<CurvedHeights>(CurvedHeights{use.mesh, source, use.scale, use.settings.midlevel});
     source = displaced->curved->source();
   }
-  displaced->procedural = std::make_unique<ProceduralField>(
-      source,
-      heights.num_cells > 0 ? lattices_make(use.mesh, heights.num_cells) : lattices_make(use.mesh, heights.cells),
-      use.settings.midlevel, *lattice_cache_);
+  displaced->procedural =
+      std::make_unique<ProceduralField>(source,
+                                        heights.num_cells > 0 ? lattices_make(use.mesh, heights.num_cells)
+                                                              : lattices_make(use.mesh, heights.cells, options.require),
+                                        use.settings.midlevel, *lattice_cache_);
   displaced->mesh = DisplacedMesh(use.mesh, *displaced->procedural,
                                   {.height = {}, .scale = use.scale, .midlevel = use.settings.midlevel}, use.steps);
   DisplacedGeometry& geometry = displaced->geometry;
@@ -487,8 +488,24 @@ void DisplacementSet::dice(PreparedMesh& displaced,
   std::uint64_t allowance = options.auto_bytes > 0     ? options.auto_bytes
                             : options.dicing_bytes > 0 ? options.dicing_bytes
                                                        : memory_of_machine() / 8;
+  bool* is_diced = nullptr;  // of the pictures before and after
+  if (options.choices != nullptr) {
+    const auto [known, is_new] =
+        options.choices->is_diced.try_emplace({use.mesh_name, use.displacement_index, use.mesh.num_triangles, use.scale,
+                                               options.error, options.num_rays, options.picture_height, allowance},
+                                              false);
+    if (!is_new && !known->second) {
+      reasons_.push_back("mesh '" + displaced.name + "': not diced, as it was not in a picture before");
+      return;
+    }
+    is_diced = &known->second;
+    // In the first picture with room for what the others may take more.
+    if (is_new) allowance /= 2;
+  }
+  const bool was_diced = is_diced != nullptr && *is_diced;
   allowance -= std::min(allowance, *used_bytes);
   if (Dicing::least_bytes(use.mesh) > allowance) {
+    if (is_diced != nullptr) *is_diced = false;
     reasons_.push_back("mesh '" + displaced.name + "': not diced, as its triangles alone are too many for that");
     return;
   }
@@ -504,7 +521,7 @@ void DisplacementSet::dice(PreparedMesh& displaced,
   const double texel = 1 / std::sqrt(std::max(density.u * map.view.width * density.v * map.view.height, 1e-300));
   auto dicing = std::make_unique<Dicing>(use.mesh, geometry.mesh, levels, texel,
                                          PictureView{*options.camera, static_cast<double>(options.picture_height)},
-                                         use.places, options.error);
+                                         use.places, options.error, options.require);
   const TessellationRule rule = dicing->rule();
   TessellationLayout layout = tessellation_layout_make(dicing->mesh(), TessellationKind::kQuads, rule);
   const std::uint64_t bytes = tessellation_peak_bytes(layout, kRenderTessellation) + dicing->bytes();
@@ -512,7 +529,10 @@ void DisplacementSet::dice(PreparedMesh& displaced,
       {geometry.method, *displacement_method(geometry.method).cost, 0, 0},
       {DisplacementMethod::tessellate, kDicingCost, layout.num_micro_triangles, bytes},
   };
-  const DisplacementChoice choice = displacement_choose(offers, num_rays, allowance);
+  DisplacementChoice choice = displacement_choose(offers, num_rays, allowance);
+  if (was_diced && bytes <= allowance)
+    choice = {DisplacementMethod::tessellate, choice.reason + "; diced as in a picture before"};
+  if (is_diced != nullptr) *is_diced = choice.method != displaced.method;
   reasons_.push_back("mesh '" + displaced.name + "': " + choice.reason);
   if (choice.method == displaced.method) {
     for (const int k : new_levels) fields_->drop(map, k);

@@ -49,6 +49,22 @@ struct DisplacementInput {
   std::shared_ptr<const void> heights_owner;  ///< of what their sources read
 };
 
+/// Which meshes of a sequence of pictures are diced, decided where they are met first. What dicing takes and spares changes
+/// with the camera: decided anew, a mesh would be exact in one picture and diced in the next, and its mean would jump.
+struct DicingChoices {
+  /// A mesh by its name, displacement and triangles, and what dicing is asked for.
+  struct Key {
+    std::string mesh;
+    int displacement_index;
+    std::uint32_t num_triangles;
+    double scale, error, num_rays;
+    int picture_height;
+    std::uint64_t allowance_bytes;
+    auto operator<=>(const Key&) const = default;
+  };
+  std::map<Key, bool> is_diced;
+};
+
 /// What overrides the settings.
 struct DisplacementOptions {
   std::optional<DisplacementMethod> method;  ///< of all materials
@@ -63,6 +79,8 @@ struct DisplacementOptions {
   std::uint64_t computed_bytes = std::uint64_t{256} << 20;  ///< computed heights that are kept, at most
   std::shared_ptr<HeightFields> fields;                     ///< of the sets before; null: each set has its own
   std::shared_ptr<KeptMeshes> meshes;                       ///< likewise, with the same fields; null: none are kept
+  std::shared_ptr<DicingChoices> choices;                   ///< of the sets before; null: this is the only one
+  RequireBytes require;            ///< asked before and while much is allocated; null: nobody is
   std::uint64_t dicing_bytes = 0;  ///< what dicing may use if auto_bytes says nothing; 0: an eighth of the machine's
   std::uint64_t tessellation_bytes = 0;  ///< all tessellations may take while they are built; 0: half of the machine's
 };

@@ -1,6 +1,7 @@
 #include "displacement/lattice_split.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include <tbb/blocked_range.h>
@@ -17,11 +18,31 @@ constexpr double kMostCells = 256;
 /// Weights then have at most 14 + 8 bits, and are exact in single precision.
 constexpr int kMostHalvings = 14;
 
+/// Counts parts, and asks for room from time to time.
+class PartCount {
+ public:
+  explicit PartCount(const RequireBytes& require) : require_(require) {}
+  void add()
+  {
+    // Itself, once more where all are put together, its triangle, and what Embree's tree has of it.
+    constexpr std::uint64_t kPartBytes = 350, kStep = 1 << 14;
+    if ((num_.fetch_add(1, std::memory_order_relaxed) + 1) % kStep == 0 && require_) require_(kPartBytes * num_);
+  }
+
+ private:
+  const RequireBytes& require_;
+  std::atomic<std::uint64_t> num_{0};
+};
+
 /// Triangles whose sides are long are cut into two, three or four.
 class Splitter {
  public:
-  Splitter(const MeshView& mesh, std::uint32_t base, const CellsAlong& cells, std::vector<LatticeTriangle>* out)
-      : base_(base), cells_(cells), out_(out)
+  Splitter(const MeshView& mesh,
+           std::uint32_t base,
+           const CellsAlong& cells,
+           PartCount& count,
+           std::vector<LatticeTriangle>* out)
+      : base_(base), cells_(cells), count_(count), out_(out)
   {
     const TriangleIndices& v = mesh.triangles[base];
     P_[0] = mesh.P[v.v0];
@@ -81,11 +102,13 @@ class Splitter {
       while (t.side_n[k] < cells[k] && t.side_n[k] < kMostCells) t.side_n[k] *= 2;
       t.n = std::max(t.n, t.side_n[k]);
     }
+    count_.add();
     out_->push_back(t);
   }
 
   std::uint32_t base_;
   const CellsAlong& cells_;
+  PartCount& count_;
   std::vector<LatticeTriangle>* out_;
   Vec3f P_[3];
 };
@@ -104,15 +127,16 @@ std::vector<LatticeTriangle> lattices_make(const MeshView& mesh, std::int32_t n)
   return out;
 }
 
-std::vector<LatticeTriangle> lattices_make(const MeshView& mesh, const CellsAlong& cells)
+std::vector<LatticeTriangle> lattices_make(const MeshView& mesh, const CellsAlong& cells, const RequireBytes& require)
 {
+  PartCount count(require);
   // In pieces, so that the order does not depend on the threads.
   constexpr std::size_t kPiece = 1024;
   std::vector<std::vector<LatticeTriangle>> pieces((mesh.num_triangles + kPiece - 1) / kPiece);
   tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t piece) {
     const std::size_t end = std::min<std::size_t>((piece + 1) * kPiece, mesh.num_triangles);
     for (std::size_t base = piece * kPiece; base < end; ++base) {
-      Splitter(mesh, static_cast<std::uint32_t>(base), cells, &pieces[piece]).split({0, 0}, {1, 0}, {0, 1}, 0);
+      Splitter(mesh, static_cast<std::uint32_t>(base), cells, count, &pieces[piece]).split({0, 0}, {1, 0}, {0, 1}, 0);
     }
   });
   std::vector<LatticeTriangle> out;

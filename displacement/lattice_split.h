@@ -13,14 +13,20 @@ namespace relief {
 /// Cells that are wanted along the straight line between two points, object space. The same, to the bit, either way.
 using CellsAlong = std::function<double(Vec3f, Vec3f)>;
 
+/// Fails, by throwing, unless there is room for so many bytes.
+using RequireBytes = std::function<void(std::uint64_t)>;
+
 /// The same lattice for all triangles.
 /// @param n  cells along each side, a power of two up to kMostHeightCells
 std::vector<LatticeTriangle> lattices_make(const MeshView& mesh, std::int32_t n);
 
 /// A part's side has a power of two of cells, at least as many as are wanted, by its ends alone: so both of its triangles
 /// agree. Triangles with a side of more than 256 are halved there, at most 14 times.
-/// @cost  a part takes about 250 bytes; parallel over triangles
-std::vector<LatticeTriangle> lattices_make(const MeshView& mesh, const CellsAlong& cells);
+/// @param require  called as parts come to be, with what those so far will take; null: nobody asks
+/// @cost  a part takes about 350 bytes until it can be traced; parallel over triangles
+std::vector<LatticeTriangle> lattices_make(const MeshView& mesh,
+                                           const CellsAlong& cells,
+                                           const RequireBytes& require = {});
 
 /// A corner's position or normal: linear in the weights, rounded the same way for all triangles that have it.
 Vec3f lattice_corner(Vec2f weights, Vec3f v0, Vec3f v1, Vec3f v2);

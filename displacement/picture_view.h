@@ -20,6 +20,11 @@ class PictureView {
         up_(unit(of.world_from_camera.y)),
         back_(unit(of.world_from_camera.z))
   {
+    const auto half_width = static_cast<double>(of.half_width), half_height = static_cast<double>(of.half_height);
+    const Vec3d ahead = (2.0 * half_width * static_cast<double>(of.shift_x)) * right_ +
+                        (2.0 * half_height * static_cast<double>(of.shift_y)) * up_ - back_;
+    ahead_ = ahead * (1.0 / length(ahead));
+    half_angle_ = std::atan(std::hypot(half_width, half_height));
   }
 
   Camera camera;
@@ -35,24 +40,60 @@ class PictureView {
   /// Length of a metre at a point, pixels.
   /// @param P  world
   double pixels_a_metre(Vec3d P) const { return pixels_a_metre(P, {}); }
+  /// The most of pixels_a_metre within a ball, divided by the least of coarsening() there if things may be coarser outside.
+  /// @param middle  world
+  double most_pixels_a_metre(Vec3d middle, double radius, bool coarser_outside) const
+  {
+    const Vec3d from_eye = middle - eye_;
+    const double depth = -dot(from_eye, back_);
+    double most;
+    if (camera.projection == Projection::kPerspective) {
+      most = pixels_a_radian() / std::max(length(from_eye) - radius, 1e-30);
+    } else {
+      most = pixels_in_plane(std::max(length(from_eye + depth * back_) - radius, 0.0));
+    }
+    if (!coarser_outside || camera.projection != Projection::kPerspective) return most;
+    if (depth + radius <= 0) return most / kMostCoarsening;
+    if (depth - radius <= 0) return most;
+    const auto out = [&](const Vec3d& axis, float half, float shift) {
+      return (std::abs(dot(from_eye, axis)) - radius) / ((depth + radius) * static_cast<double>(half)) -
+             2.0 * std::abs(static_cast<double>(shift));
+    };
+    const double least =
+        std::max(out(right_, camera.half_width, camera.shift_x), out(up_, camera.half_height, camera.shift_y));
+    return most / std::clamp(least / kAround, 1.0, kMostCoarsening);
+  }
   /// How much coarser a point may be for being outside of the picture: 1 in it and for half of it around, then growing up to 4
-  /// with the distance from its middle. (Cycles takes 4 at once; growing keeps neighbours alike.)
+  /// with the distance from its middle. (Cycles takes 4 at once; growing keeps neighbours alike.) And see coarsening_afar.
   /// @param P  world
   double coarsening(Vec3d P) const
   {
-    constexpr double kAround = 1.5, kMost = 4.0;
     const Vec3d from_eye = P - eye_;
     const double depth = -dot(from_eye, back_);
     const double size = camera.projection == Projection::kPerspective ? depth : 1.0;
-    if (!(size > 0.0)) return kMost;
+    if (!(size > 0.0)) return kMostCoarsening * coarsening_afar(P);
     const double x = dot(from_eye, right_) / (size * static_cast<double>(camera.half_width));
     const double y = dot(from_eye, up_) / (size * static_cast<double>(camera.half_height));
     const double out = std::max(std::abs(x - 2.0 * static_cast<double>(camera.shift_x)),
                                 std::abs(y - 2.0 * static_cast<double>(camera.shift_y)));
-    return std::clamp(out / kAround, 1.0, kMost);
+    return std::clamp(out / kAround, 1.0, kMostCoarsening) * coarsening_afar(P);
+  }
+  /// How much coarser a point may be for being far beside a picture that shows little of what is around: 1 within sixteen
+  /// times the picture's angle, and then growing with the angle. What a telescope does not see would else be as fine as what
+  /// it sees, and more than any memory holds. Angles of ordinary pictures are too wide for that.
+  /// @param P  world
+  double coarsening_afar(Vec3d P) const
+  {
+    constexpr double kAfar = 16, kHalfTurn = 3.14159265358979;
+    if (camera.projection != Projection::kPerspective || kAfar * half_angle_ >= kHalfTurn) return 1;
+    const Vec3d from_eye = P - eye_;
+    const double angle = std::atan2(length(cross(from_eye, ahead_)), dot(from_eye, ahead_));
+    return std::max(angle / (kAfar * half_angle_), 1.0);
   }
 
  private:
+  static constexpr double kAround = 1.5, kMostCoarsening = 4.0;  ///< of coarsening()
+
   static Vec3d unit(Vec3f axis) { return to_double(normalize(axis)); }
   /// Distance of a point from the line from the origin to `end`.
   static double distance_to_line(const Vec3d& point, const Vec3d& end)
@@ -64,18 +105,25 @@ class PictureView {
   /// Where a line from P along `along` is nearest.
   double pixels_a_metre(const Vec3d& P, const Vec3d& along) const
   {
-    const double scale = height / (2.0 * static_cast<double>(camera.half_height));
     const Vec3d to_eye = eye_ - P;
-    if (camera.projection == Projection::kPerspective) return scale / std::max(distance_to_line(to_eye, along), 1e-30);
-    // As in the picture for as far around as it is wide, and then less.
+    if (camera.projection == Projection::kPerspective)
+      return pixels_a_radian() / std::max(distance_to_line(to_eye, along), 1e-30);
+    return pixels_in_plane(distance_to_line(to_eye - dot(to_eye, back_) * back_, along - dot(along, back_) * back_));
+  }
+  /// Of a perspective camera, in the middle of its picture; of an orthographic one pixels a metre.
+  double pixels_a_radian() const { return height / (2.0 * static_cast<double>(camera.half_height)); }
+  /// Of an orthographic camera, at a distance from its axis: as in the picture for as far around as it is wide, and then less.
+  double pixels_in_plane(double distance) const
+  {
     const double within =
         (1.0 + std::abs(static_cast<double>(camera.shift_x)) + std::abs(static_cast<double>(camera.shift_y))) * 2.0 *
         std::hypot(static_cast<double>(camera.half_width), static_cast<double>(camera.half_height));
-    const double distance = distance_to_line(to_eye - dot(to_eye, back_) * back_, along - dot(along, back_) * back_);
-    return scale * std::min(within / distance, 1.0);
+    return pixels_a_radian() * std::min(within / distance, 1.0);
   }
 
   Vec3d eye_, right_, up_, back_;  ///< world; the last three unit
+  Vec3d ahead_;                    ///< unit, to the middle of the picture
+  double half_angle_ = 1;          ///< from there to its corners, about; of a perspective camera
 };
 
 }  // namespace relief

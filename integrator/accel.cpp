@@ -569,6 +569,7 @@ void Accel::commit(RTCScene target)
 {
   rtcCommitScene(target);
   const RTCError error = rtcGetDeviceError(trees_->device());
+  if (const std::optional<OutOfMemory> refusal = trees_->refusal()) throw *refusal;
   if (error == RTC_ERROR_NONE) return;
   if (error == RTC_ERROR_OUT_OF_MEMORY) throw OutOfMemory("the acceleration structure");
   throw std::runtime_error("Embree failed to build the acceleration structure (error " +

@@ -7,7 +7,7 @@
 #include <map>
 #include <tuple>
 
-#include "displacement/picture_view.h"
+#include "displacement/seen_instances.h"
 #include "integrator/graph_bounds_stage.h"
 #include "integrator/scene_views.h"
 #include "integrator/stages.h"
@@ -323,7 +323,12 @@ void computed_heights_add(const Scene& scene, const DisplacementOptions& options
   graph_scene.camera = view.camera;
   graph_scene.camera_from_world = inverse(view.camera.world_from_camera);
   std::map<std::tuple<int, int, int>, int> known;  // mesh, displacement, instance where that matters
-  std::map<int, std::shared_ptr<std::vector<Affine3>>> places;
+  struct Place {
+    const MeshView* mesh;
+    std::vector<Affine3> instances;
+    double cell_pixels;
+  };
+  std::vector<Place> places;  // of each of the heights
   for (std::size_t i = 0; i < input->instances.size(); ++i) {
     DisplacedInstance& instance = input->instances[i];
     const DisplacementSettings* settings = settings_of(instance);
@@ -348,20 +353,17 @@ void computed_heights_add(const Scene& scene, const DisplacementOptions& options
                          graph_bounds_select(), graph_scene, next_id.fetch_add(1)}));
         heights.source = {all->heights.back().get(), eval, bounds};
       }
-      auto instances = std::make_shared<std::vector<Affine3>>();
-      places[at->second] = instances;
       heights.num_cells = settings->num_cells;
-      heights.cells = [instances, view, cell = static_cast<double>(settings->cell_pixels)](Vec3f a, Vec3f b) {
-        // The same bits either way.
-        if (std::tie(b.x, b.y, b.z) < std::tie(a.x, a.y, a.z)) std::swap(a, b);
-        double pixels = 0;
-        for (const Affine3& m : *instances)
-          pixels = std::max(pixels, view.pixels(transform_point(m, a), transform_point(m, b)));
-        return pixels / cell;
-      };
+      places.push_back({&mesh, {}, static_cast<double>(settings->cell_pixels)});
       input->heights.push_back(std::move(heights));
     }
-    places[at->second]->push_back(instance.world_from_object);
+    places[static_cast<std::size_t>(at->second)].instances.push_back(instance.world_from_object);
+  }
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const Place& place = places[k];
+    const auto seen =
+        std::make_shared<const SeenInstances>(*place.mesh, view, place.instances, SeenInstances::Coarser::kAfar);
+    input->heights[k].cells = [seen, cell = place.cell_pixels](Vec3f a, Vec3f b) { return seen->pixels(a, b) / cell; };
   }
 }
 

@@ -20,14 +20,14 @@ bool is_same(const Scene& scene, const DisplacementOptions& a, const Displacemen
 {
   // All fields, or this does not compile.
   const auto& [method, lod, rmip, rate, error, auto_bytes, camera, height, num_rays, computed_bytes, fields, meshes,
-               dicing_bytes, tessellation_bytes] = a;
+               choices, require, dicing_bytes, tessellation_bytes] = a;
   const bool dices = error > 0 && !scene.displacements.empty();
   const bool follows_camera =
       dices || std::any_of(scene.displacements.begin(), scene.displacements.end(),
                            [](const DisplacementSettings& d) { return displacement_is_computed(d); });
   return method == b.method && lod == b.lod && rmip == b.rmip && rate == b.tessellation_rate && error == b.error &&
          auto_bytes == b.auto_bytes && computed_bytes == b.computed_bytes && fields == b.fields && meshes == b.meshes &&
-         dicing_bytes == b.dicing_bytes && tessellation_bytes == b.tessellation_bytes &&
+         choices == b.choices && dicing_bytes == b.dicing_bytes && tessellation_bytes == b.tessellation_bytes &&
          ((auto_bytes == 0 && !dices) || num_rays == b.num_rays) &&
          (!follows_camera || (is_same(camera, b.camera) && height == b.picture_height));
 }

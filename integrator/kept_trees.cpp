@@ -1,5 +1,6 @@
 #include "integrator/kept_trees.h"
 
+#include <algorithm>
 #include <chrono>
 #include <stdexcept>
 #include <utility>
@@ -10,13 +11,35 @@ namespace relief {
 
 namespace {
 
-bool count_bytes(void* user, ssize_t bytes, bool)
+}  // namespace
+
+/// Embree asks before each block that it takes, and gives up the build where the answer is no. How large a tree gets is not
+/// known before, so that is where its memory is bounded.
+bool KeptTrees::Device::count(void* user, ssize_t more, bool)
 {
-  static_cast<std::atomic<std::ptrdiff_t>*>(user)->fetch_add(bytes, std::memory_order_relaxed);
-  return true;
+  Device& device = *static_cast<Device*>(user);
+  device.bytes.fetch_add(more, std::memory_order_relaxed);
+  if (more <= 0) return true;
+  constexpr std::ptrdiff_t kStep = std::ptrdiff_t{16} << 20;
+  const std::ptrdiff_t unchecked = device.unchecked.fetch_add(more, std::memory_order_relaxed) + more;
+  if (unchecked < kStep) return true;
+  device.unchecked.store(0, std::memory_order_relaxed);
+  try {
+    memory_require(static_cast<std::uint64_t>(std::max<std::ptrdiff_t>(more, kStep)), "the acceleration structure");
+    return true;
+  } catch (const OutOfMemory& error) {
+    device.bytes.fetch_sub(more, std::memory_order_relaxed);
+    const std::lock_guard lock(device.mutex);
+    device.refusal = error;
+    return false;
+  }
 }
 
-}  // namespace
+std::optional<OutOfMemory> KeptTrees::refusal() const
+{
+  const std::lock_guard lock(device_->mutex);
+  return std::exchange(device_->refusal, std::nullopt);
+}
 
 KeptTrees::Device::~Device()
 {
@@ -30,7 +53,7 @@ KeptTrees::KeptTrees(bool keeps) : keeps_(keeps), device_(std::make_shared<Devic
     if (rtcGetDeviceError(nullptr) == RTC_ERROR_OUT_OF_MEMORY) throw OutOfMemory("the start of Embree");
     throw std::runtime_error("Embree cannot start on this machine");
   }
-  rtcSetDeviceMemoryMonitorFunction(device_->device, count_bytes, &device_->bytes);
+  rtcSetDeviceMemoryMonitorFunction(device_->device, Device::count, device_.get());
 }
 
 TreePointer KeptTrees::scene_make(RTCBuildQuality quality) const

@@ -7,12 +7,15 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <vector>
 
 #include "displacement/content_hash.h"
 #include "displacement/embree.h"
 #include "integrator/instance_geometry.h"
 #include "integrator/light_geometry.h"
+#include "scene/memory.h"
 
 namespace relief {
 
@@ -43,6 +46,8 @@ class KeptTrees {
   bool keeps() const { return keeps_; }
   RTCDevice device() const { return device_->device; }
   std::uint64_t bytes() const { return static_cast<std::uint64_t>(device_->bytes.load()); }  ///< allocated by Embree
+  /// Why Embree was refused memory since this was asked last; empty: it was not.
+  std::optional<OutOfMemory> refusal() const;
   /// An empty scene of Embree's.
   TreePointer scene_make(RTCBuildQuality quality) const;
   /// A scene of Embree's that somebody else has made with the device.
@@ -67,8 +72,11 @@ class KeptTrees {
  private:
   struct Device {
     RTCDevice device = nullptr;
-    std::atomic<std::ptrdiff_t> bytes{0};
+    std::atomic<std::ptrdiff_t> bytes{0}, unchecked{0};
+    std::mutex mutex;
+    std::optional<OutOfMemory> refusal;  ///< of memory that Embree asked for
     ~Device();
+    static bool count(void* user, ssize_t more, bool after);
   };
   struct MeshTree {
     TreePointer tree;

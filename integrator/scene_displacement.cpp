@@ -2,6 +2,7 @@
 
 #include "integrator/computed_heights.h"
 #include "scene/limits.h"
+#include "scene/memory.h"
 
 namespace relief {
 
@@ -27,8 +28,10 @@ void check_positions(const Scene& scene, const Instance& instance, const Box3& b
 
 }  // namespace
 
-DisplacementSet scene_displacement(const Scene& scene, const DisplacementOptions& options)
+DisplacementSet scene_displacement(const Scene& scene, const DisplacementOptions& asked)
 {
+  DisplacementOptions options = asked;
+  options.require = [](std::uint64_t bytes) { memory_require(bytes, "displaced meshes"); };
   DisplacementInput input;
   for (const Mesh& mesh : scene.meshes) {
     input.meshes.push_back(mesh.view());

@@ -88,6 +88,101 @@ TEST(Dicing, LetsNoRayOut)
   for (const TraceHit& hit : trace_rays(context, rays)) ASSERT_LT(hit.t, 3.0f);
 }
 
+/// Paths within a closed surface that is dark, in a bright world: whatever light they find has leaked.
+TEST(Dicing, LetsNoPathOut)
+{
+  Scene scene = close_sphere(64, 4, 0.9);
+  scene.displacements[0].weld_seams = true;
+  scene.cameras[0].camera.world_from_camera.p = {};
+  scene.cameras[0].camera.half_width = scene.cameras[0].camera.half_height = 1;
+  scene.environment.color = {1e6f, 1e6f, 1e6f};
+  scene.render.max_bounces = scene.render.diffuse_bounces = 8;
+  for (const DisplacementMethod method :
+       {DisplacementMethod::kAuto, DisplacementMethod::tessellate, DisplacementMethod::tessellate_grid}) {
+    RenderOptions options = render_options(scene, 128, 64);
+    options.displacement.method = method;
+    if (method == DisplacementMethod::kAuto) options.displacement.error = 1;
+    const Rendered rendered = render_scene(scene, options);
+    EXPECT_EQ(rendered.stats.displacement.method,
+              method == DisplacementMethod::tessellate_grid ? "tessellate-grid" : "tessellate");
+    int num_bright = 0;
+    for (int y = 0; y < 128; ++y) {
+      for (int x = 0; x < 128; ++x) num_bright += rendered.radiance(x, y).x > 0 ? 1 : 0;
+    }
+    // Of 10⁶ paths over larger micro-triangles one remains, of five: where its ray passes exactly through the bottom of a valley,
+    // Embree names the slope behind as the nearest.
+    EXPECT_LE(num_bright, method == DisplacementMethod::tessellate ? 1 : 0) << displacement_method_label(method);
+  }
+}
+
+/// A strip that reaches beneath the camera is as fine there as it would be by itself, however many instances are nearer by
+/// their middles.
+TEST(Dicing, IsAsFineAsAnyOfItsInstancesAsks)
+{
+  Scene scene = empty_scene();
+  Mesh strip = quad_mesh({-60, -0.5f, 0}, {120, 0, 0}, {0, 1, 0});
+  strip.uv[0] = {{0, 0}, {120, 0}, {120, 1}, {0, 1}};
+  Material material = diffuse_material({0.8f, 0.8f, 0.8f});
+  material.displacement_index = 0;
+  const Affine3 under{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-58, 0, 0}};
+  add_object(scene, strip, material, under);
+  add_displacement(scene, 64, noise_texels(64, 2), 0.02f);
+  scene.cameras[0].camera.world_from_camera.p = {0, 0, 1};
+  const DisplacementOptions options = options_of(scene, 1, 200);
+  const std::uint64_t alone = tessellation_of(SceneContext(scene, options)).layout().num_micro_triangles;
+  for (int i = 0; i < 40; ++i) {
+    scene.instances.push_back(scene.instances[0]);
+    scene.instances.back().world_from_object.p = {0, 20, 10 + 0.1f * static_cast<float>(i)};
+  }
+  const std::uint64_t among_others = tessellation_of(SceneContext(scene, options)).layout().num_micro_triangles;
+  EXPECT_GE(among_others, alone);
+}
+
+/// What of many instances is seen largest, beside all of them looked at.
+TEST(Dicing, LooksAtEveryInstance)
+{
+  std::mt19937 random(8);
+  std::uniform_real_distribution<float> uniform(-1, 1);
+  const auto vector = [&] { return Vec3f{uniform(random), uniform(random), uniform(random)}; };
+  for (const Projection projection : {Projection::kPerspective, Projection::kOrthographic}) {
+    for (const float half : {0.001f, 0.4f}) {
+      Camera camera;
+      camera.projection = projection;
+      camera.half_width = camera.half_height = half;
+      const PictureView view(camera, 500);
+      const Mesh mesh = quad_mesh({-1, -1, 0}, {2, 0, 0}, {0, 2, 0});
+      std::vector<Affine3> instances;
+      for (int i = 0; i < 300; ++i) {
+        const float size = std::exp(2 * uniform(random));
+        instances.push_back({size * vector(), size * vector(), size * vector(), 30 * vector()});
+      }
+      for (const auto coarser : {SeenInstances::Coarser::kOutside, SeenInstances::Coarser::kAfar}) {
+        const SeenInstances seen(mesh.view(), view, instances, coarser);
+        const auto coarsening = [&](Vec3d P) {
+          return coarser == SeenInstances::Coarser::kOutside ? view.coarsening(P) : view.coarsening_afar(P);
+        };
+        for (int k = 0; k < 300; ++k) {
+          const Vec3f a{uniform(random), uniform(random), 0}, b{uniform(random), uniform(random), 0};
+          double metre = 0, line = 0;
+          for (const Affine3& m : instances) {
+            const Vec3f from = transform_point(m, a), to = transform_point(m, b);
+            const double stretch = std::max({length(m.x), length(m.y), length(m.z)});
+            // The largest singular value is at least that.
+            metre = std::max(metre, stretch * view.pixels_a_metre(to_double(from)) / coarsening(to_double(from)));
+            const double ends = std::min(coarsening(to_double(from)), coarsening(to_double(to)));
+            line = std::max(
+                line, view.pixels(from, to) / std::min(ends, coarsening(0.5 * (to_double(from) + to_double(to)))));
+          }
+          EXPECT_GE(seen.pixels_a_metre(to_double(a)) * (1 + 1.0 / 16), metre);
+          const double found = seen.pixels(a, b);
+          EXPECT_LE(found, line * (1 + 1e-9));
+          EXPECT_GE(found * (1 + 1.0 / 16), line);
+        }
+      }
+    }
+  }
+}
+
 /// Every side of a micro-triangle is one of another, the other way, with the same ends to the last bit.
 TEST(Dicing, OfAClosedMeshIsClosed)
 {
