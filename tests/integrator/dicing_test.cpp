@@ -3,12 +3,14 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <memory>
 #include <random>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "integrator/trace.h"
+#include "scene/memory.h"
 #include "tests/support/render_scene.h"
 #include "tests/support/scene_builder.h"
 
@@ -347,6 +349,37 @@ TEST(Dicing, PaysForManyInstancesAsForOne)
   options.camera->world_from_camera.p = {0, 0, 1000};
   options.num_rays = 1e4;
   EXPECT_EQ(SceneContext(scene, options).displacements.method_names(), "chord");
+}
+
+/// What takes more than half of the allowance is not diced in the first picture of a sequence; in later ones it stays what it
+/// was, with all of the allowance.
+TEST(Dicing, IsDecidedOnceForASequence)
+{
+  const Scene scene = close_sphere(64, 4, 0.2);
+  DisplacementOptions far = options_of(scene, 1, 200), near = far;
+  far.camera->world_from_camera.p = {0, 0, 3};
+  const SceneContext alone(scene, near);
+  near.auto_bytes = tessellation_peak_bytes(tessellation_of(alone).layout(), kRenderTessellation) * 13 / 10;
+  far.auto_bytes = near.auto_bytes;
+  EXPECT_EQ(SceneContext(scene, near).displacements.method_names(), "tessellate");
+  near.choices = far.choices = std::make_shared<DicingChoices>();
+  for (const DisplacementOptions& options : {far, near, far})
+    EXPECT_EQ(SceneContext(scene, options).displacements.method_names(), "tessellate");
+  near.choices = far.choices = std::make_shared<DicingChoices>();
+  for (const DisplacementOptions& options : {near, far, near})
+    EXPECT_EQ(SceneContext(scene, options).displacements.method_names(), "chord");
+}
+
+/// Trees are refused memory while they are built.
+TEST(SceneMemory, BoundsTrees)
+{
+  Scene scene = empty_scene();
+  add_object(scene, sphere_mesh(1, 1000, 500, false), diffuse_material({1, 1, 1}));
+  memory_limit_set(memory_limit().bytes - memory_left() + (std::uint64_t{40} << 20));
+  EXPECT_THROW(SceneContext{scene}, OutOfMemory);
+  memory_limit_reset();
+  const SceneContext context(scene);
+  EXPECT_TRUE(trace_rays(context, std::vector<TraceRay>{{{0, 0, 4}, {0, 0, -1}, 0, kInfinity}})[0].hit);
 }
 
 TEST(Dicing, IsOfMapsThatSayNothingElse)
