@@ -7,8 +7,10 @@
 #include <ImfThreading.h>
 
 #include <algorithm>
+#include <bit>
 #include <cstdio>
 #include <ctime>
+#include <iterator>
 #include <new>
 #include <utility>
 
@@ -23,7 +25,7 @@ namespace relief {
 namespace {
 
 // Likewise of channels: see kMaxSide.
-constexpr std::int64_t kMaxRowValues = std::int64_t{1} << 22;  // one block of rows is then at most 4 GiB
+constexpr std::int64_t kMaxRowValues = std::int64_t{1} << 22;
 constexpr std::int64_t kMaxValues = std::int64_t{1} << 33;
 
 void write_channels(const std::filesystem::path& path,
@@ -110,35 +112,35 @@ Picture picture_from_header(const Imf::Header& header, const std::string& file)
 
 void read_rows(Imf::InputPart& part, const Imath::Box2i& data, Picture& picture)
 {
-  const std::size_t width = static_cast<std::size_t>(picture.width);
-  std::vector<float> values(width * kRowsAtOnce * picture.channels.size());
-  std::vector<std::uint32_t> integers;
-  const bool has_integers = std::any_of(picture.channels.begin(), picture.channels.end(),
-                                        [](const Channel& channel) { return channel.type == ChannelType::kUint; });
-  if (has_integers) integers.resize(values.size());
-  for (int y0 = 0; y0 < picture.height; y0 += kRowsAtOnce) {
-    const int num_rows = std::min(kRowsAtOnce, picture.height - y0);
+  constexpr std::size_t kBlockBytes = std::size_t{64} << 20;
+  const std::size_t width = static_cast<std::size_t>(picture.width), num_channels = picture.channels.size();
+  const std::size_t row_values = width * num_channels;
+  const int most_rows = std::min(kRowsAtOnce, picture.height);
+  const int rows_at_once =
+      std::clamp(static_cast<int>(kBlockBytes / std::max<std::size_t>(row_values * sizeof(float), 1)), 1, most_rows);
+  // Integers and floats are of one size.
+  const MemoryReservation room(row_values * sizeof(float) * static_cast<std::size_t>(rows_at_once), picture.file);
+  std::vector<std::uint32_t> words(row_values * static_cast<std::size_t>(rows_at_once));
+  // Not committed before it is written: a header may claim more than the file has.
+  for (Channel& channel : picture.channels) channel.values.reserve(width * static_cast<std::size_t>(picture.height));
+  for (int y0 = 0; y0 < picture.height; y0 += rows_at_once) {
+    const int num_rows = std::min(rows_at_once, picture.height - y0);
     const Imath::V2i origin(data.min.x, data.min.y + y0);
     const std::size_t block = width * static_cast<std::size_t>(num_rows);
     Imf::FrameBuffer buffer;
-    for (std::size_t c = 0; c < picture.channels.size(); ++c) {
-      const bool is_integer = picture.channels[c].type == ChannelType::kUint;
-      void* target = is_integer ? static_cast<void*>(integers.data() + c * block) : values.data() + c * block;
+    for (std::size_t c = 0; c < num_channels; ++c) {
       // Halves come as floats: OpenEXR converts between the two, but it turns integers above a half's range into garbage.
-      buffer.insert(picture.channels[c].name, Imf::Slice::Make(is_integer ? Imf::UINT : Imf::FLOAT, target, origin,
-                                                               picture.width, num_rows, std::size_t{4}, 4 * width));
+      const Imf::PixelType type = picture.channels[c].type == ChannelType::kUint ? Imf::UINT : Imf::FLOAT;
+      buffer.insert(picture.channels[c].name, Imf::Slice::Make(type, words.data() + c * block, origin, picture.width,
+                                                               num_rows, std::size_t{4}, 4 * width));
     }
     part.setFrameBuffer(buffer);
     part.readPixels(origin.y, origin.y + num_rows - 1);
-    for (std::size_t c = 0; c < picture.channels.size(); ++c) {
-      std::vector<float>& kept = picture.channels[c].values;
-      if (picture.channels[c].type == ChannelType::kUint) {
-        const std::uint32_t* first = integers.data() + c * block;
-        std::transform(first, first + block, std::back_inserter(kept),
-                       [](std::uint32_t i) { return static_cast<float>(i); });
-      } else {
-        kept.insert(kept.end(), values.data() + c * block, values.data() + (c + 1) * block);
-      }
+    for (std::size_t c = 0; c < num_channels; ++c) {
+      const auto first = words.begin() + static_cast<std::ptrdiff_t>(c * block);
+      const bool is_integer = picture.channels[c].type == ChannelType::kUint;
+      std::transform(first, first + static_cast<std::ptrdiff_t>(block), std::back_inserter(picture.channels[c].values),
+                     [=](std::uint32_t w) { return is_integer ? static_cast<float>(w) : std::bit_cast<float>(w); });
     }
   }
 }
@@ -272,11 +274,13 @@ Picture exr_load(const std::filesystem::path& path)
   // OpenEXR allocates its table of chunks from the header's claim when it opens a file, so its own limit is needed too.
   Imf::Header::setMaxImageSize(kMaxSide, kMaxSide);
   Imf::Header::setMaxTileSize(4096, 4096);
+  const std::uint64_t decoder_bytes = exr_decoder_bytes(file);
   try {
     Imf::MultiPartInputFile input(file.c_str(), Imf::globalThreadCount(), false);
     if (input.parts() < 1) throw InputError(file, "holds no picture");
     const Imf::Header& header = input.header(0);
     Picture picture = picture_from_header(header, file);
+    const MemoryReservation room(decoder_bytes, file);
     if (!input.partComplete(0)) throw InputError(file, "is incomplete: its writer was interrupted");
     Imf::InputPart part(input, 0);
     read_rows(part, header.dataWindow(), picture);

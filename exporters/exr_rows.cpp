@@ -14,13 +14,14 @@
 #include "exporters/atomic_file.h"
 #include "exporters/exr_attribute.h"
 #include "exporters/errors.h"
+#include "kernel/texture/half.h"
+#include "scene/image_memory.h"
 #include "scene/memory.h"
 
 namespace relief {
 
 namespace {
 
-constexpr float kHalfMax = 65504.f;
 
 constexpr Imf::Compression kImfCompressions[] = {Imf::NO_COMPRESSION,  Imf::ZIPS_COMPRESSION, Imf::ZIP_COMPRESSION,
                                                  Imf::PIZ_COMPRESSION, Imf::DWAA_COMPRESSION, Imf::DWAB_COMPRESSION};
@@ -60,6 +61,14 @@ ChannelType film_channel_type(const AovInfo& info, const ExrOptions& options)
 }
 
 }  // namespace
+
+std::uint64_t exr_decoder_bytes(const std::string& file)
+{
+  BytesOfFile bytes(file);
+  const std::optional<std::uint64_t> num_bytes = decoder_bytes("openexr", bytes);
+  if (!num_bytes) throw InputError(file, "not a readable OpenEXR file: it ends before its header does");
+  return *num_bytes;
+}
 
 void exr_threads_choose()
 {

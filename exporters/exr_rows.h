@@ -41,6 +41,10 @@ Imf::Header exr_header_make(const ExrWindows& windows,
                             const Attributes& attributes,
                             ExrCompression compression);
 
+/// What OpenEXR allocates to read a file: tables of all parts, and what it decodes of the first.
+/// @error InputError: the file ends before its header does
+std::uint64_t exr_decoder_bytes(const std::string& file);
+
 /// Chooses the machine's number of threads unless exr_use_threads has.
 void exr_threads_choose();
 

@@ -181,7 +181,9 @@ std::optional<SavedRender> exr_state_load(const std::filesystem::path& path, con
   Imf::Header::setMaxImageSize(kMaxSide, kMaxSide);
   const std::string file = path.string();
   try {
+    const std::uint64_t decoder_bytes = exr_decoder_bytes(file);
     Imf::MultiPartInputFile input(file.c_str(), Imf::globalThreadCount(), false);
+    const MemoryReservation room(decoder_bytes, file);
     for (int part = 0; part < input.parts(); ++part) {
       const Imf::Header& header = input.header(part);
       if (!header.hasName() || header.name() != kPartName) continue;

@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "kernel/assert.h"
+#include "scene/memory.h"
 
 namespace relief {
 
@@ -298,6 +299,8 @@ std::vector<float> flip_map(const ImageView& a, const ImageView& b, const FlipOp
 {
   RELIEF_ASSERT(a.width == b.width && a.height == b.height);
   RELIEF_ASSERT(a.channels.size() >= 3 && b.channels.size() >= 3);
+  constexpr std::uint64_t kPixelBytes = 40 * sizeof(float);
+  memory_require(static_cast<std::uint64_t>(a.width) * static_cast<std::uint64_t>(a.height) * kPixelBytes, "FLIP");
   const Perceived seen_a = perceive(a, options), seen_b = perceive(b, options);
   std::vector<float> map(seen_a.edges.size());
   for (std::size_t i = 0; i < map.size(); ++i) {

@@ -148,23 +148,39 @@ double webp_bytes(Numbers& file)
   return kTexelBytes * width * height + file.little(4, 4);
 }
 
-/// What a header of OpenEXR says of its first part.
+/// What a header of OpenEXR says of a part.
 struct ExrHeader {
   double width = 0, height = 0, texel_bytes = 0, tile_width = 0, tile_height = 0;
   std::uint32_t compression = 0;
+  std::uint64_t end = 0;  ///< of the header
+
+  bool is_tiled() const { return tile_width > 0 && tile_height > 0; }
+
+  /// Rows that are compressed together: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
+  double chunk_rows() const
+  {
+    constexpr std::array<double, 10> kRows = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
+    return std::min(kRows[std::min<std::size_t>(compression, kRows.size() - 1)], height);
+  }
+
+  double num_chunks() const
+  {
+    return is_tiled() ? std::ceil(width / tile_width) * std::ceil(height / tile_height)
+                      : std::ceil(height / std::max(chunk_rows(), 1.0));
+  }
 };
 
-std::optional<ExrHeader> exr_header(Numbers& file)
+ExrHeader exr_header(Numbers& file, std::uint64_t at)
 {
   ExrHeader header;
-  for (std::uint64_t at = 8; file.is_valid();) {
+  while (file.is_valid()) {
     const std::string name = file.text(at);
-    if (name.empty()) {
-      return file.is_valid() ? std::optional(header) : std::nullopt;
-    }
     at += name.size() + 1;
+    if (name.empty()) break;
     at += file.text(at).size() + 1;
     const std::uint64_t value = at + 4, end = value + file.little(at, 4);
+    // Whoever claims more than the file has is no header: this makes the answer void.
+    file.little(end, 1);
     if (name == "compression") {
       header.compression = file.little(value, 1);
     } else if (name == "dataWindow") {
@@ -172,8 +188,8 @@ std::optional<ExrHeader> exr_header(Numbers& file)
         return static_cast<double>(static_cast<std::int32_t>(file.little(first + 8, 4))) -
                static_cast<std::int32_t>(file.little(first, 4)) + 1;
       };
-      header.width = side(value);
-      header.height = side(value + 4);
+      header.width = std::max(side(value), 0.0);
+      header.height = std::max(side(value + 4), 0.0);
     } else if (name == "tiles") {
       header.tile_width = file.little(value, 4);
       header.tile_height = file.little(value + 4, 4);
@@ -188,34 +204,54 @@ std::optional<ExrHeader> exr_header(Numbers& file)
     }
     at = end;
   }
-  return {};
+  header.end = at;
+  return header;
 }
 
+/// For the first part, which is the one that is read, and the tables of all.
 double openexr_bytes(Numbers& file)
 {
-  const std::optional<ExrHeader> header = exr_header(file);
-  if (!header) {
+  constexpr std::uint32_t kMagic = 20000630, kSeveralParts = 0x1000;
+  if (file.little(0, 4) != kMagic) {
     return 0;
   }
-  // Rows of a chunk: none, RLE, ZIPS, ZIP, PIZ, PXR24, B44, B44A, DWAA, DWAB.
-  constexpr std::array<double, 10> kChunkRows = {1, 1, 1, 16, 32, 16, 32, 32, 32, 256};
-  // Each thread decodes two chunks, each of which is there packed and unpacked.
-  const double num_chunks = 4 * std::max(1u, std::thread::hardware_concurrency());
-  const double width = std::max(header->width, 0.0), height = std::max(header->height, 0.0);
-  if (header->tile_width > 0 && header->tile_height > 0) {
-    const double across = std::ceil(width / header->tile_width), down = std::ceil(height / header->tile_height);
-    const double tile = header->tile_width * header->tile_height * header->texel_bytes;
-    constexpr double kOffsetBytes = 8 * 4.0 / 3;  // with those of smaller levels
-    return kOffsetBytes * across * down + tile * (num_chunks + 2 * across);
+  const bool has_several = (file.little(4, 4) & kSeveralParts) != 0;
+  const ExrHeader header = exr_header(file, 8);
+  constexpr double kOffsetBytes = 8 * 4.0 / 3;  // with those of smaller levels
+  double bytes = kOffsetBytes * header.num_chunks();
+  // An empty header ends the list.
+  for (ExrHeader part = header; has_several && file.is_valid() && file.little(part.end, 1) != 0;) {
+    part = exr_header(file, part.end);
+    bytes += kOffsetBytes * part.num_chunks();
   }
-  const double rows = kChunkRows[std::min<std::size_t>(header->compression, kChunkRows.size() - 1)];
+  // Each thread decodes two chunks, each of which is there packed and unpacked; there are no more than the image has.
+  const double most = 2 * std::max(1u, std::thread::hardware_concurrency());
+  const double num_decoded = 2 * std::min(most, header.num_chunks());
+  if (header.is_tiled()) {
+    const double tile = header.tile_width * header.tile_height * header.texel_bytes;
+    return bytes + tile * (num_decoded + 2 * std::ceil(header.width / header.tile_width));
+  }
   constexpr double kTableBytes = 32;  // a row
-  return kTableBytes * height + num_chunks * width * header->texel_bytes * std::min(rows, height);
+  return bytes + kTableBytes * header.height + num_decoded * header.width * header.texel_bytes * header.chunk_rows();
 }
 
 }  // namespace
 
-std::uint64_t decoder_bytes(std::string_view reader, ImageBytes& bytes)
+bool BytesOfFile::read(std::uint64_t offset, std::span<unsigned char> bytes)
+{
+  constexpr std::uint64_t kStep = 4096;
+  // Steps within what is buffered stay there; seeking would read anew.
+  if (offset < position_ || offset > position_ + kStep) {
+    stream_.seekg(static_cast<std::streamoff>(offset));
+  } else {
+    stream_.ignore(static_cast<std::streamsize>(offset - position_));
+  }
+  stream_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  position_ = offset + bytes.size();
+  return static_cast<bool>(stream_);
+}
+
+std::optional<std::uint64_t> decoder_bytes(std::string_view reader, ImageBytes& bytes)
 {
   struct Format {
     std::string_view name;
@@ -230,7 +266,10 @@ std::uint64_t decoder_bytes(std::string_view reader, ImageBytes& bytes)
   }
   Numbers numbers(bytes);
   const double size = format->bytes(numbers);
-  return numbers.is_valid() ? whole_bytes(size) : 0;
+  if (!numbers.is_valid()) {
+    return reader == "openexr" ? std::nullopt : std::optional<std::uint64_t>(0);
+  }
+  return whole_bytes(size);
 }
 
 std::uint64_t decoder_block_bytes(const ImageHeader& header)

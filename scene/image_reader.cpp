@@ -85,29 +85,6 @@ class BytesOfMemory final : public ImageBytes {
   std::span<const unsigned char> bytes_;
 };
 
-class BytesOfFile final : public ImageBytes {
- public:
-  explicit BytesOfFile(const std::string& file) : stream_(file, std::ios::binary) {}
-
-  bool read(std::uint64_t offset, std::span<unsigned char> bytes) override
-  {
-    // Steps within what is buffered stay there; seeking would read anew.
-    if (offset < position_ || offset > position_ + kStep) {
-      stream_.seekg(static_cast<std::streamoff>(offset));
-    } else {
-      stream_.ignore(static_cast<std::streamsize>(offset - position_));
-    }
-    stream_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    position_ = offset + bytes.size();
-    return static_cast<bool>(stream_);
-  }
-
- private:
-  static constexpr std::uint64_t kStep = 4096;
-  std::ifstream stream_;
-  std::uint64_t position_ = 0;
-};
-
 /// Whether a JPEG stream reaches its end marker. The decoder itself fills what is missing with grey and says nothing.
 bool jpeg_is_complete(std::span<const unsigned char> bytes)
 {
@@ -182,10 +159,10 @@ void ImageReader::open()
   const std::string format = found.reader;
   if (source_.file.empty()) {
     BytesOfMemory bytes(source_.encoded);
-    decoder_room_ = MemoryReservation(decoder_bytes(format, bytes), label_of(source_));
+    reserve_decoder(format, bytes);
   } else {
     BytesOfFile bytes(source_.file);
-    decoder_room_ = MemoryReservation(decoder_bytes(format, bytes), label_of(source_));
+    reserve_decoder(format, bytes);
   }
   if (format == "jpeg") {
     if (!source_.file.empty()) {
@@ -209,6 +186,15 @@ void ImageReader::open()
   if (!error.empty()) {
     fail_to_read(source_, "a readable image", error);
   }
+}
+
+void ImageReader::reserve_decoder(const std::string& format, ImageBytes& bytes)
+{
+  const std::optional<std::uint64_t> num_bytes = decoder_bytes(format, bytes);
+  if (!num_bytes) {
+    fail(source_, "a whole OpenEXR header", "a file that ends before it does");
+  }
+  decoder_room_ = MemoryReservation(*num_bytes, label_of(source_));
 }
 
 void ImageReader::check_header()
@@ -246,6 +232,16 @@ std::size_t ImageReader::row_bytes() const
   const std::size_t sample_bytes = type_ == SampleType::kU8 ? 1 : type_ == SampleType::kU16 ? 2 : 4;
   return static_cast<std::size_t>(header_.width) * static_cast<std::size_t>(channel_end_ - channel_begin_) *
          sample_bytes;
+}
+
+int ImageReader::rows_at_once() const
+{
+  // Of all channels: some decoders bring rows of them along for the few that are selected.
+  constexpr std::size_t kBandBytes = std::size_t{64} << 20, kSampleBytes = sizeof(float);
+  constexpr std::size_t kMostRows = 256;  // a multiple of the usual tile sides and compression blocks
+  const std::size_t row =
+      static_cast<std::size_t>(header_.width) * static_cast<std::size_t>(header_.num_channels) * kSampleBytes;
+  return static_cast<int>(std::clamp<std::size_t>(kBandBytes / row, 1, kMostRows));
 }
 
 const unsigned char* ImageReader::load_rows(int begin, int end)

@@ -13,6 +13,8 @@
 
 namespace relief {
 
+class ImageBytes;  // scene/image_memory.h
+
 /// An image to be read. Does not own the bytes.
 struct ImageSource {
   std::string file;                        ///< empty when `encoded` is used
@@ -42,6 +44,9 @@ class ImageReader {
   /// Bytes of one row of the selected channels.
   std::size_t row_bytes() const;
 
+  /// How many rows to ask for at a time: few enough to stay small, enough for whole compression blocks where rows are short.
+  int rows_at_once() const;
+
   /// Reads rows; going from top to bottom is fastest, and cheap in steps of any size.
   /// @param begin, end  0 <= begin < end <= height
   /// @return            rows `begin` to `end`, tightly packed, until the next call
@@ -50,6 +55,7 @@ class ImageReader {
 
  private:
   void open();
+  void reserve_decoder(const std::string& format, ImageBytes& bytes);
   void check_header();
   void read(int begin, int end);
 

@@ -2,6 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <fstream>
+#include <string>
+#include <vector>
 
 #include "exporters/errors.h"
 #include "exporters/exr.h"
@@ -37,6 +40,28 @@ class ExrFault : public FolderTest {
   }
 
   static void put_int(std::string& bytes, std::size_t at, std::int32_t value) { std::memcpy(&bytes[at], &value, 4); }
+
+  /// Most memory that this process has held since it was last told to forget, or holds.
+  /// @param name  VmHWM or VmRSS
+  static double held_mib(const std::string& name)
+  {
+    std::ifstream status("/proc/self/status");
+    for (std::string word; status >> word;) {
+      double kib = 0;
+      if (word == name + ":" && status >> kib) return kib / 1024;
+    }
+    return -1;
+  }
+
+  /// What a call takes at its peak.
+  template <class Call>
+  static double peak_mib(const Call& call)
+  {
+    std::ofstream("/proc/self/clear_refs") << 5;
+    const double before = held_mib("VmRSS");
+    call();
+    return held_mib("VmHWM") - before;
+  }
 
   /// Start of an attribute's value.
   static std::size_t value_of(const std::string& bytes, const std::string& name, const std::string& type)
@@ -98,6 +123,36 @@ TEST_F(ExrFault, AHeaderThatClaimsAHugePictureIsRefusedBeforeAllocation)
     put_int(hostile, display_window + 12, last);
     EXPECT_FALSE(loads(hostile)) << last;
   }
+}
+
+// Of 65536 x 1 pixels in 64 channels, 18 kB that hold 16 MiB of values: reading 256 rows at once took 8.2 GB.
+TEST_F(ExrFault, AWidePictureOfOneRowTakesWhatItsValuesTake)
+{
+  for (const ChannelType type : {ChannelType::kUint, ChannelType::kFloat, ChannelType::kHalf}) {
+    for (const ExrCompression compression : {ExrCompression::kZip, ExrCompression::kNone}) {
+      Picture picture;
+      picture.width = picture.full_width = 65536;
+      picture.height = picture.full_height = 1;
+      for (int c = 0; c < 64; ++c) {
+        picture.channels.push_back({"c" + std::to_string(c), type, std::vector<float>(65536, static_cast<float>(c))});
+      }
+      exr_write(file("wide.exr"), picture, compression);
+      Picture loaded;
+      const double taken = peak_mib([&] { loaded = exr_load(file("wide.exr")); });
+      EXPECT_LT(taken, 200) << static_cast<int>(type) << " " << static_cast<int>(compression);
+      ASSERT_EQ(loaded.channels.size(), 64u);
+      for (int c = 0; c < 64; c += 21) {
+        EXPECT_EQ(loaded.find("c" + std::to_string(c))->values, std::vector<float>(65536, static_cast<float>(c)));
+      }
+    }
+  }
+}
+
+TEST_F(ExrFault, TextThatClaimsMoreThanTheFileHasIsRefusedBeforeAllocation)
+{
+  std::string bytes = valid_bytes(ExrCompression::kZip);
+  put_int(bytes, value_of(bytes, "relief:seed", "string") - 4, 0x7fffff00);
+  EXPECT_LT(peak_mib([&] { EXPECT_FALSE(loads(bytes)); }), 100);
 }
 
 TEST_F(ExrFault, WhatIsNoExrIsSaidToBeNone)

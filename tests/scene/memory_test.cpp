@@ -104,7 +104,7 @@ struct TextBytes final : ImageBytes {
 double decoder_gib(const char* reader, const std::string& bytes)
 {
   TextBytes source(bytes);
-  return static_cast<double>(decoder_bytes(reader, source)) / (1024.0 * kMiB);
+  return static_cast<double>(decoder_bytes(reader, source).value_or(0)) / (1024.0 * kMiB);
 }
 
 // What was measured of such files: 8.4 GB, 25 GB, 4.2 GB.
@@ -114,6 +114,31 @@ TEST(DecoderBytes, AreThoseThatDecodersTake)
   EXPECT_NEAR(decoder_gib("jpeg", test::jpeg_progressive(65500, 65500, 3)), 24.1, 0.3);
   EXPECT_NEAR(decoder_gib("png", test::png_header(65536, 65536, true)), 8.0, 0.1) << "with a channel for transparency";
   EXPECT_LT(decoder_gib("png", test::png_header(65536, 65536, false)), 0.001);
+}
+
+/// A header of OpenEXR: one channel of floats.
+std::string exr_part(std::uint32_t side, std::uint32_t tile)
+{
+  const auto attribute = [](const std::string& name, const std::string& type, const std::string& value) {
+    return name + '\0' + type + '\0' + test::little_endian(static_cast<std::uint32_t>(value.size()), 4) + value;
+  };
+  const std::string channel = std::string("Y\0\2\0\0\0", 6) + std::string(4, '\0') + test::little_endian(1, 4) +
+                              test::little_endian(1, 4) + '\0';
+  const std::string window = std::string(8, '\0') + test::little_endian(side - 1, 4) + test::little_endian(side - 1, 4);
+  const std::string tiles = test::little_endian(tile, 4) + test::little_endian(tile, 4) + '\0';
+  return attribute("channels", "chlist", channel) + attribute("compression", "compression", std::string(1, '\0')) +
+         attribute("dataWindow", "box2i", window) + (tile > 0 ? attribute("tiles", "tiledesc", tiles) : "") + '\0';
+}
+
+TEST(DecoderBytes, OfOpenExrCountTheTablesOfAllParts)
+{
+  const std::string one = std::string("\x76\x2f\x31\x01\x02\0\0\0", 8), several("\x76\x2f\x31\x01\x02\x10\0\0", 8);
+  EXPECT_LT(decoder_gib("openexr", one + exr_part(64, 0) + std::string(8, '\0')), 0.001);
+  // 2^32 tiles of one texel, and their smaller levels.
+  EXPECT_NEAR(decoder_gib("openexr", several + exr_part(64, 0) + exr_part(65536, 1) + std::string(8, '\0')), 42.7, 0.1);
+  EXPECT_LT(decoder_gib("openexr", several + exr_part(64, 0) + exr_part(64, 16) + std::string(8, '\0')), 0.001);
+  TextBytes cut(one + exr_part(64, 0).substr(0, 60) + std::string("text\0string\0\0\0\0\x7f", 16));
+  EXPECT_FALSE(decoder_bytes("openexr", cut)) << "text of two gigabytes";
 }
 
 TEST(DecoderBytes, OfHeadersThatEndAreNone)
