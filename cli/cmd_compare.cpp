@@ -7,6 +7,7 @@
 #include <string>
 
 #include "cli/arguments.h"
+#include "cli/memory_option.h"
 #include "cli/run_files.h"
 #include "cli/standard_streams.h"
 #include "cli/value_hint.h"
@@ -227,6 +228,7 @@ void cmd_compare_register(CLI::App& app, std::function<int()>& run)
   names_file(command->add_option("--json", arguments->json,
                                  "Write the figures to this file as JSON; -: to standard output, instead of text"),
              {".json"});
+  add_max_memory(*command);
   command->callback([arguments, &run] { run = [arguments] { return compare_run(*arguments); }; });
 }
 

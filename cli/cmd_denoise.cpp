@@ -10,6 +10,7 @@
 
 #include "cli/arguments.h"
 #include "cli/denoise_picture.h"
+#include "cli/memory_option.h"
 #include "cli/run_files.h"
 #include "cli/standard_streams.h"
 #include "cli/value_hint.h"
@@ -97,6 +98,7 @@ void cmd_denoise_register(CLI::App& app, std::function<int()>& run)
   command->add_option("--threads", arguments->threads, "Threads (default: all processors)")
       ->check(whole_number(1, 4096));
   add_denoiser(*command, arguments->denoiser, Denoiser::kBuiltin);
+  add_max_memory(*command);
   command->callback([arguments, &run] { run = [arguments] { return denoise_run(*arguments); }; });
 }
 

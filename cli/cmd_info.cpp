@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
+#include "cli/memory_option.h"
 #include "cli/scene_setup.h"
 #include "cli/standard_streams.h"
 #include "cli/value_hint.h"
@@ -328,6 +329,7 @@ void cmd_info_register(CLI::App& app, Run& run)
   add_displacement_method(*command, arguments->displacement);
   add_displacement_memory(*command, arguments->displacement);
   add_caustics_mode(*command, arguments->caustics);
+  add_continue_without_textures(*command, arguments->setup);
   add_max_memory(*command);
   command->callback([&run, arguments] {
     if (arguments->settings || arguments->methods) {

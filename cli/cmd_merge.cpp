@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "cli/arguments.h"
+#include "cli/memory_option.h"
 #include "cli/run_files.h"
 #include "cli/standard_streams.h"
 #include "cli/value_hint.h"
@@ -86,6 +87,7 @@ void cmd_merge_register(CLI::App& app, std::function<int()>& run)
   command->add_flag(
       "--force", arguments->options.force,
       "Accept files that name another scene or frame, or no seed; the same samples twice are never accepted");
+  add_max_memory(*command);
   command->callback([arguments, &run] {
     if (arguments->frames.all) throw CLI::ValidationError("--frames", "expected numbers of frames, found 'all'");
     run = [arguments] { return merge_run(*arguments); };

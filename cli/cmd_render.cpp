@@ -33,6 +33,7 @@
 #include "cli/fingerprint.h"
 #include "cli/frame_files.h"
 #include "cli/interrupt.h"
+#include "cli/memory_option.h"
 #include "cli/picture_options.h"
 #include "cli/progress_printer.h"
 #include "cli/render_session.h"
@@ -714,6 +715,7 @@ std::pair<CLI::App*, std::vector<CLI::Option*>> add_render(CLI::App& app, Render
                    "GiB of textures to keep in memory; more are read through a tile cache")
       ->check(number(0, 1e6))
       ->capture_default_str();
+  add_continue_without_textures(*command, a.setup);
   add_max_memory(*command);
   return {command, std::move(path_options)};
 }

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "cli/arguments.h"
+#include "cli/memory_option.h"
 #include "cli/run_files.h"
 #include "cli/value_hint.h"
 #include "exporters/atomic_file.h"
@@ -87,6 +88,7 @@ void cmd_report_register(CLI::App& app, std::function<int()>& run)
                  [](const std::string& text) { return parse_output("--output", text, ".html"); }, "HTML page to write"),
              {".html"})
       ->required();
+  add_max_memory(*command);
   command->callback([arguments, &run] { run = [arguments] { return report_run(*arguments); }; });
 }
 

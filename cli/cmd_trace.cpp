@@ -15,6 +15,7 @@
 
 #include "cli/arguments.h"
 #include "cli/commands.h"
+#include "cli/memory_option.h"
 #include "cli/picture_options.h"
 #include "cli/run_files.h"
 #include "cli/scene_setup.h"
@@ -286,6 +287,7 @@ void cmd_trace_register(CLI::App& app, Run& run)
   add_light_options(*command, a.setup);
   add_ray_options(*command, a.picture);
   for (CLI::Option* option : add_picture_options(*command, a.picture)) option->needs(pixel);
+  add_continue_without_textures(*command, a.setup);
   add_max_memory(*command);
   command->add_option("--explain", a.explain, "Tell what this ray did in displaced meshes instead, counted from 0")
       ->check(whole_number(0, std::numeric_limits<int>::max()))

@@ -8,7 +8,6 @@
 
 #include "cli/value_hint.h"
 #include "scene/diagnostics.h"
-#include "scene/memory.h"
 
 namespace relief {
 
@@ -39,6 +38,7 @@ LoadOptions SceneSetup::load_options(std::optional<int> frame) const
   options.frame = frame.value_or(0);
   options.luminous_efficacy = static_cast<float>(luminous_efficacy);
   options.environment = environment;
+  options.continue_without_textures = continue_without_textures;
   if (!background.empty()) options.environment_visible = background == "world";
   return options;
 }
@@ -46,6 +46,12 @@ LoadOptions SceneSetup::load_options(std::optional<int> frame) const
 std::string SceneSetup::environment_file() const
 {
   return environment && environment->source == EnvironmentSource::kFile ? environment->file : "";
+}
+
+void add_continue_without_textures(CLI::App& command, SceneSetup& setup)
+{
+  command.add_flag("--continue-without-textures", setup.continue_without_textures,
+                   "Show images that are missing or broken as magenta, with a warning for each, in place of an error");
 }
 
 std::vector<CLI::Option*> add_light_options(CLI::App& command, SceneSetup& setup)
@@ -96,19 +102,6 @@ CLI::Option* add_displacement_error(CLI::App& command, DisplacementOptions& opti
           "--displacement-error", options.error,
           "Pixels that detail of height maps may be wide and shown by its light alone, for speed (default: 0, none)")
       ->check(number(0, 1e3));
-}
-
-void add_max_memory(CLI::App& command)
-{
-  const auto set = [](double gib) {
-    memory_limit_set(static_cast<std::uint64_t>(gib * static_cast<double>(std::uint64_t{1} << 30)));
-  };
-  command
-      .add_option_function<double>(
-          "--max-memory", set,
-          "GiB that the run may take; what would take more is an error (default: what the machine "
-          "and its control groups have)")
-      ->check(number(1e-6, 1e9));
 }
 
 CLI::Option* add_displacement_lod(CLI::App& command, DisplacementOptions& options)

@@ -25,6 +25,7 @@ std::vector<int> frames_of(const FrameList& list, const std::string& scene);
 struct SceneSetup {
   double luminous_efficacy = 0;  ///< lm/W; 0: the scene says
   std::optional<EnvironmentChoice> environment;
+  bool continue_without_textures = false;
   std::string background;  ///< "world", "black" or "transparent"; empty: the scene says
 
   /// @param frame  empty: the rest pose
@@ -37,6 +38,9 @@ struct SceneSetup {
 /// Adds the options about light; `setup` must outlive the parser.
 std::vector<CLI::Option*> add_light_options(CLI::App& command, SceneSetup& setup);
 
+/// Adds --continue-without-textures.
+void add_continue_without_textures(CLI::App& command, SceneSetup& setup);
+
 /// Each adds one option; `options` must outlive the parser.
 CLI::Option* add_displacement_method(CLI::App& command, DisplacementOptions& options);
 CLI::Option* add_displacement_error(CLI::App& command, DisplacementOptions& options);
@@ -45,7 +49,5 @@ CLI::Option* add_displacement_lod(CLI::App& command, DisplacementOptions& option
 CLI::Option* add_displacement_rmip(CLI::App& command, DisplacementOptions& options);
 /// Without it `mode` stays as it is.
 CLI::Option* add_caustics_mode(CLI::App& command, std::optional<CausticsMode>& mode);
-/// Adds --max-memory, which sets the process's limit.
-void add_max_memory(CLI::App& command);
 
 }  // namespace relief

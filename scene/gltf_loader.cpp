@@ -17,6 +17,7 @@
 #include "scene/material_traits.h"
 #include "scene/memory.h"
 #include "scene/relief_extensions.h"
+#include "scene/texture_faults.h"
 #include "scene/texture_store.h"
 #include "scene/world_displacement.h"
 
@@ -754,7 +755,8 @@ RenderSettings scene_settings(const std::filesystem::path& path)
 std::vector<FileStamp> scene_files(const std::filesystem::path& path)
 {
   Warnings unheard;  // the load has the same
-  GltfLoader loader(unheard);
+  TextureFaults unheard_faults;
+  GltfLoader loader(unheard, unheard_faults);
   // A camera that is given: one that frames everything would have to know the height maps.
   LoadOptions options;
   options.camera.look_from = options.camera.look_at = Vec3f{};
@@ -767,6 +769,7 @@ std::vector<FileStamp> scene_files(const std::filesystem::path& path)
 Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
 {
   Warnings warnings;
+  TextureFaults faults;
   try {
     Scene scene;
     std::vector<TextureRequest> textures, height_maps;
@@ -775,7 +778,7 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
     EnvironmentGraphs environment_graphs;
     {
       // The files go away before texels come: the two need not be in memory together.
-      GltfLoader loader(warnings);
+      GltfLoader loader(warnings, faults);
       scene = loader.load(path, options);
       unlit = loader.take_unlit();
       textures = loader.take_textures();
@@ -788,6 +791,7 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
     const auto store =
         std::make_shared<TextureStore>(std::move(textures), options.texture_budget_bytes, warnings, options.kept);
     scene.textures = store;
+    faults.settle(options.continue_without_textures, warnings);
     if (environment_graphs.environment)
       surroundings_add_graph(scene.environment, *environment_graphs.environment, *store);
     if (environment_graphs.backdrop)

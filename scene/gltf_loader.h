@@ -25,7 +25,10 @@ namespace relief {
 
 class GltfLoader {
  public:
-  explicit GltfLoader(Warnings& warnings) : warnings_(warnings) {}
+  /// @param faults  outlives the requests for textures, too
+  GltfLoader(Warnings& warnings, TextureFaults& faults) : warnings_(warnings), textures_(&faults), height_maps_(&faults)
+  {
+  }
 
   /// @return everything but the texture store, features and warnings; without the height maps, unless the camera had to know
   ///         them: the displacements' texture indices are those of take_height_maps then

@@ -295,7 +295,7 @@ HeightGraph HeightGraphTable::add(const GltfDocument& document,
       displacement.raw("heightGraph").dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
   if (!is_new) return known->second;
   // Images are not to be read twice.
-  TextureTable images;
+  TextureTable images(textures_.faults());
   std::vector<std::string> attribute_names;
   Warnings unheard;
   const GraphProgram program = height_graph_read(document, graph, images, attribute_names, unheard);

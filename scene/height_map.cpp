@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <new>
+#include <optional>
 #include <set>
 #include <string_view>
 #include <tuple>
@@ -17,14 +18,11 @@
 #include "scene/kept_images.h"
 #include "scene/memory.h"
 #include "scene/parallel.h"
+#include "scene/texture_faults.h"
 #include "scene/texture_store.h"
 
 namespace relief {
 namespace {
-
-/// Rows are read in bands: few enough to stay small beside the map, enough for whole compression blocks.
-constexpr std::size_t kBandBytes = std::size_t{64} << 20;
-constexpr int kFewestBandRows = 64, kMostBandRows = 256;
 
 std::size_t format_bytes(HeightFormat format)
 {
@@ -58,6 +56,9 @@ struct HeightImage {
   ImageSource source;
   std::string label;
   std::shared_ptr<const HeightTexels> read;
+  bool is_missing = false;  ///< someone knows already
+  TextureFaults* faults = nullptr;
+  std::optional<SceneError> fault;  ///< it cannot be read
 };
 
 /// Channels of an image that count: the one with the heights first, then those that should equal it.
@@ -115,7 +116,7 @@ void texels_load(ImageReader& reader, HeightTexels& image, T* texels)
   }
   const auto width = static_cast<std::size_t>(image.map.width);
   const std::size_t stride = reader.row_bytes() / (width * sizeof(T));
-  const int band = std::clamp(static_cast<int>(kBandBytes / reader.row_bytes()), kFewestBandRows, kMostBandRows);
+  const int band = reader.rows_at_once();
   for (int y = 0; y < image.map.height; y += band) {
     const int end = std::min(y + band, image.map.height);
     const auto num_texels = static_cast<std::size_t>(end - y) * width;
@@ -186,6 +187,18 @@ std::shared_ptr<const HeightTexels> image_read(const ImageSource& source, const 
   }
 }
 
+/// One height everywhere, in the place of an image that cannot be read.
+std::shared_ptr<const HeightTexels> missing_make()
+{
+  const auto out = std::make_shared<HeightTexels>();
+  out->map.width = out->map.height = 1;
+  out->map.format = HeightFormat::kFloat;
+  const std::shared_ptr<void> texel = height_texels_allocate(sizeof(float));
+  std::memcpy(texel.get(), &kMissingHeight, sizeof kMissingHeight);
+  out->map.texels = texel;
+  return out;
+}
+
 void warn(const std::string& label, const HeightFindings& found, Warnings& warnings)
 {
   if (found.num_replaced > 0) {
@@ -218,14 +231,18 @@ class Grouping {
  private:
   std::size_t add_image(const TextureRequest& request)
   {
-    const std::string file =
-        request.file.empty() ? std::string() : std::filesystem::absolute(request.file).lexically_normal().string();
+    const std::string file = request.is_missing ? "missing"  // no path that is absolute
+                             : request.file.empty()
+                                 ? std::string()
+                                 : std::filesystem::absolute(request.file).lexically_normal().string();
     const std::string_view bytes(reinterpret_cast<const char*>(request.encoded.data()), request.encoded.size());
     const auto [known, is_new] = image_of_.try_emplace({file, bytes}, images.size());
     if (is_new) {
       HeightImage& image = images.emplace_back();
       image.source = {file, request.encoded, request.scene_file, request.json_path};
       image.label = request.label;
+      image.is_missing = request.is_missing;
+      image.faults = request.faults;
     }
     return known->second;
   }
@@ -303,9 +320,19 @@ HeightMapSet height_maps_load(std::span<const TextureRequest> requests, Warnings
   Grouping groups(requests);
   for_each_in_parallel(groups.images.size(), [&](std::size_t i) {
     HeightImage& image = groups.images[i];
-    image.read = kept->get<HeightTexels>(KeptImages::key("heights", image.source),
-                                         [&] { return image_read(image.source, image.label); });
+    if (image.is_missing) return;
+    try {
+      image.read = kept->get<HeightTexels>(KeptImages::key("heights", image.source),
+                                           [&] { return image_read(image.source, image.label); });
+    } catch (const SceneError& fault) {
+      if (image.faults == nullptr) throw;
+      image.fault = fault;
+    }
   });
+  for (HeightImage& image : groups.images) {
+    if (image.fault) image.faults->add(*image.fault);
+    if (image.read == nullptr) image.read = missing_make();
+  }
   for (const HeightImage& image : groups.images) {
     warn(image.label, image.read->findings, warnings);
   }

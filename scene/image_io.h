@@ -29,8 +29,9 @@ struct ImageHeader {
   int sample_bits = 0;
   bool is_integer = false, is_deep = false;
   std::vector<std::string> channel_names;
-  int alpha_channel = -1;   ///< -1: none
-  std::string format_name;  ///< OpenImageIO's
+  int alpha_channel = -1;          ///< -1: none
+  bool alpha_is_straight = false;  ///< colours are not multiplied by it
+  std::string format_name;         ///< OpenImageIO's
 
   /// Index of the channel of this name; -1: none.
   int channel_index(std::string_view name) const;
@@ -64,7 +65,7 @@ class ImageFile {
 class TileRows {
  public:
   virtual ~TileRows() = default;
-  /// Format kU8 or kHalf.
+  /// Format kU8 or kHalf; wide, too.
   virtual TexelLayout layout() const = 0;
   /// Gives rows [begin, end), tightly packed. @error std::exception
   virtual void read_rows(int begin, int end, unsigned char* texels) = 0;

@@ -75,6 +75,7 @@ class OiioFile final : public ImageFile {
               spec_.deep,
               spec_.channelnames,
               spec_.alpha_channel,
+              alpha_is_straight(),
               input_->format_name()};
     return {};
   }
@@ -106,6 +107,17 @@ class OiioFile final : public ImageFile {
   }
 
  private:
+  bool alpha_is_straight() const
+  {
+    if (spec_.alpha_channel < 0) return false;
+    // A TGA of old says nothing: it is straight, as in Blender, unless marked otherwise.
+    constexpr int kAssociated = 4;
+    if (input_->format_name() == std::string_view("targa")) {
+      return spec_.get_int_attribute("targa:alpha_type", -1) != kAssociated;
+    }
+    return spec_.get_int_attribute("oiio:UnassociatedAlpha") != 0;
+  }
+
   std::unique_ptr<OIIO::Filesystem::IOMemReader> memory_;
   std::unique_ptr<OIIO::ImageInput> input_;
   OIIO::ImageSpec spec_;
@@ -147,7 +159,9 @@ class SourceInput final : public OIIO::ImageInput {
     }
     const TexelLayout layout = rows_->layout();
     m_spec = OIIO::ImageSpec(layout.width, layout.height, layout.num_channels,
-                             layout.format == TexelFormat::kU8 ? OIIO::TypeDesc::UINT8 : OIIO::TypeDesc::HALF);
+                             layout.format == TexelFormat::kU8 ? OIIO::TypeDesc::UINT8
+                             : layout.is_wide                  ? OIIO::TypeDesc::FLOAT
+                                                               : OIIO::TypeDesc::HALF);
     spec = m_spec;
     return true;
   }
@@ -232,7 +246,8 @@ class OiioTileCache final : public TileCache {
       image.levels.push_back({spec.width, spec.height, spec.tile_width, spec.tile_height});
       if (level == 0) {
         const bool is_u8 = spec.format == OIIO::TypeDesc::UINT8;
-        image.layout = {spec.width, spec.height, spec.nchannels, is_u8 ? TexelFormat::kU8 : TexelFormat::kHalf};
+        image.layout = {spec.width, spec.height, spec.nchannels, is_u8 ? TexelFormat::kU8 : TexelFormat::kHalf,
+                        spec.format == OIIO::TypeDesc::FLOAT};
       }
     }
     return {};
@@ -260,4 +275,4 @@ std::unique_ptr<TileCache> tile_cache_make(std::size_t budget_bytes, int tile_si
 }  // namespace
 }  // namespace relief
 
-extern "C" const relief::ImageIo relief_image_io_2 = {relief::file_make, relief::tile_cache_make};
+extern "C" const relief::ImageIo relief_image_io_3 = {relief::file_make, relief::tile_cache_make};

@@ -21,6 +21,7 @@ struct LoadOptions {
   float luminous_efficacy = 0;                              ///< lm/W of the scene's lights; 0: the scene says
   std::optional<EnvironmentChoice> environment;             ///< empty: the scene's
   std::optional<bool> environment_visible;                  ///< to cameras; empty: as the environment has it
+  bool continue_without_textures = false;                   ///< warnings for what cannot be read, which is magenta
   std::size_t texture_budget_bytes = std::size_t{4} << 30;  ///< above it textures go through a tile cache
   KeptImages* kept = nullptr;                               ///< of the frames before; gets this frame's
 

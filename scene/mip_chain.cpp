@@ -100,14 +100,34 @@ void texel_write(unsigned char* texel, TexelValue value, const SrgbEncoder& enco
   }
 }
 
+/// How a texel is read and written whose channels are of one of the kernel's formats.
 template <TexelFormat kFormat, int kChannels>
-void level_build(MipChain& chain, int level, const SrgbEncoder& encoder)
+struct FormatTexel {
+  const SrgbEncoder& encoder;
+  static TexelValue load(const unsigned char* texel) { return texel_load<kFormat, kChannels>(texel); }
+  void write(unsigned char* texel, TexelValue value) const { texel_write<kFormat, kChannels>(texel, value, encoder); }
+};
+
+/// Likewise of floats.
+struct WideTexel {
+  std::size_t num_channels;
+  TexelValue load(const unsigned char* texel) const
+  {
+    TexelValue value{};
+    std::memcpy(&value, texel, num_channels * sizeof(float));
+    return value;
+  }
+  void write(unsigned char* texel, TexelValue value) const { std::memcpy(texel, &value, num_channels * sizeof(float)); }
+};
+
+template <class Texel>
+void level_build(MipChain& chain, int level, const Texel& texel)
 {
   const TexelLayout& layout = chain.layout();
   const int fine_width = mip_size(layout.width, level - 1);
   const std::vector<Coverage> columns = coverage_make(fine_width, mip_size(layout.width, level));
   const std::vector<Coverage> rows = coverage_make(mip_size(layout.height, level - 1), mip_size(layout.height, level));
-  const auto bytes = static_cast<std::size_t>(texel_bytes(kFormat, kChannels));
+  const std::size_t bytes = texel_layout_bytes(layout);
   const unsigned char* fine = chain.level(level - 1);
   unsigned char* coarse = chain.level(level);
   const std::size_t fine_pitch = static_cast<std::size_t>(fine_width) * bytes;
@@ -119,12 +139,12 @@ void level_build(MipChain& chain, int level, const SrgbEncoder& encoder)
           const unsigned char* fine_row = fine + static_cast<std::size_t>(rows[y].first + j) * fine_pitch;
           TexelValue row_sum{};
           for (int i = 0; i < columns[x].count; ++i) {
-            row_sum += columns[x].weights[i] * texel_load<kFormat, kChannels>(
-                                                   fine_row + static_cast<std::size_t>(columns[x].first + i) * bytes);
+            row_sum +=
+                columns[x].weights[i] * texel.load(fine_row + static_cast<std::size_t>(columns[x].first + i) * bytes);
           }
           sum += rows[y].weights[j] * row_sum;
         }
-        texel_write<kFormat, kChannels>(coarse + (y * columns.size() + x) * bytes, sum, encoder);
+        texel.write(coarse + (y * columns.size() + x) * bytes, sum);
       }
     }
   });
@@ -135,13 +155,13 @@ void level_build(MipChain& chain, int level, const SrgbEncoder& encoder)
 {
   switch (chain.layout().num_channels) {
     case 1:
-      return level_build<kFormat, 1>(chain, level, encoder);
+      return level_build(chain, level, FormatTexel<kFormat, 1>{encoder});
     case 2:
-      return level_build<kFormat, 2>(chain, level, encoder);
+      return level_build(chain, level, FormatTexel<kFormat, 2>{encoder});
     case 3:
-      return level_build<kFormat, 3>(chain, level, encoder);
+      return level_build(chain, level, FormatTexel<kFormat, 3>{encoder});
     default:
-      return level_build<kFormat, 4>(chain, level, encoder);
+      return level_build(chain, level, FormatTexel<kFormat, 4>{encoder});
   }
 }
 
@@ -163,16 +183,20 @@ void advise_large_pages(unsigned char* block, std::size_t bytes)
 std::size_t level_bytes(const TexelLayout& layout, int level)
 {
   return static_cast<std::size_t>(mip_size(layout.width, level)) *
-         static_cast<std::size_t>(mip_size(layout.height, level)) *
-         static_cast<std::size_t>(texel_bytes(layout.format, layout.num_channels));
+         static_cast<std::size_t>(mip_size(layout.height, level)) * texel_layout_bytes(layout);
 }
 
 }  // namespace
 
+std::size_t texel_layout_bytes(const TexelLayout& layout)
+{
+  return layout.is_wide ? static_cast<std::size_t>(layout.num_channels) * sizeof(float)
+                        : static_cast<std::size_t>(texel_bytes(layout.format, layout.num_channels));
+}
+
 std::size_t texel_row_bytes(const TexelLayout& layout)
 {
-  return static_cast<std::size_t>(layout.width) *
-         static_cast<std::size_t>(texel_bytes(layout.format, layout.num_channels));
+  return static_cast<std::size_t>(layout.width) * texel_layout_bytes(layout);
 }
 
 int mip_num_levels(int width, int height)
@@ -211,6 +235,10 @@ void mip_chain_build(MipChain& chain)
 {
   static const SrgbEncoder encoder;
   for (int level = 1; level < chain.num_levels(); ++level) {
+    if (chain.layout().is_wide) {
+      level_build(chain, level, WideTexel{static_cast<std::size_t>(chain.layout().num_channels)});
+      continue;
+    }
     switch (chain.layout().format) {
       case TexelFormat::kU8:
         level_build<TexelFormat::kU8>(chain, level, encoder);

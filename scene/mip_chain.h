@@ -14,7 +14,13 @@ struct TexelLayout {
   int width = 0, height = 0;
   int num_channels = 0;  ///< 1 to 4, meant as in TextureView
   TexelFormat format = TexelFormat::kU8;
+  /// Channels are 32-bit floats in place of halves, since some value is beyond those: the kernel looks such texels up by a
+  /// function (wide_texture.h). The format is kHalf: light, not codes.
+  bool is_wide = false;
 };
+
+/// Bytes of a texel.
+std::size_t texel_layout_bytes(const TexelLayout& layout);
 
 /// Bytes of one row of level 0.
 std::size_t texel_row_bytes(const TexelLayout& layout);

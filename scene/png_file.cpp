@@ -93,6 +93,7 @@ class PngFile final : public ImageFile {
     header.is_integer = true;
     header.channel_names = names[num_channels - 1];
     header.alpha_channel = num_channels % 2 == 0 ? num_channels - 1 : -1;
+    header.alpha_is_straight = header.alpha_channel >= 0;
     header.format_name = "png";
     width_ = static_cast<std::size_t>(header.width);
     height_ = header.height;

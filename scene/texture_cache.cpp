@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "scene/image_io.h"
+#include "scene/wide_texture.h"
 
 namespace relief {
 namespace {
@@ -83,13 +84,12 @@ class TileCursor {
       tile_x_ = tile_x;
       tile_y_ = tile_y;
     }
-    static constexpr unsigned char kBlack[8] = {};
+    static constexpr unsigned char kBlack[4 * sizeof(float)] = {};
     if (tile_.texels == nullptr) {
       return kBlack;
     }
     const int index = (y - tile_y) * size_.tile_width + (x - tile_x);
-    const TexelLayout& layout = image_.tiles.layout;
-    return tile_.texels + index * texel_bytes(layout.format, layout.num_channels);
+    return tile_.texels + static_cast<std::size_t>(index) * texel_layout_bytes(image_.tiles.layout);
   }
 
  private:
@@ -108,14 +108,26 @@ class TileCursor {
   int tile_x_ = -1, tile_y_ = -1;
 };
 
-/// As texture_sample_level, from tiles.
+/// How the texels of tiles are read.
 template <TexelFormat kFormat, int kChannels>
+struct FormatTexel {
+  static TexelValue load(const unsigned char* texel) { return texel_load<kFormat, kChannels>(texel); }
+  static TexelValue scale() { return texel_scale<kFormat>(); }
+};
+template <int kChannels>
+struct WideTexel {
+  static TexelValue load(const unsigned char* texel) { return texel_load_wide<kChannels>(texel); }
+  static TexelValue scale() { return texel_scale<TexelFormat::kHalf>(); }
+};
+
+/// As texture_sample_level, from tiles.
+template <class Texel>
 TexelValue cached_sample_level(const CachedTexture& texture, int level, Vec2f uv)
 {
   const TextureView& view = texture.view;
   const TileLevel& size = texture.image->tiles.levels[static_cast<std::size_t>(level)];
   TileCursor cursor(*texture.image, level);
-  const auto load = [&](int x, int y) { return texel_load<kFormat, kChannels>(cursor.texel(x, y)); };
+  const auto load = [&](int x, int y) { return Texel::load(cursor.texel(x, y)); };
   if (view.filter == TexelFilter::kNearest) {
     return load(axis_nearest(uv.x, size.width, view.wrap_u), axis_nearest(uv.y, size.height, view.wrap_v));
   }
@@ -127,27 +139,31 @@ TexelValue cached_sample_level(const CachedTexture& texture, int level, Vec2f uv
   return texel_bilinear(v00, v10, v01, v11, x.t, y.t);
 }
 
-template <TexelFormat kFormat, int kChannels>
+template <class Texel>
 Vec4f cached_sample(const void* handle, Vec2f uv, float width)
 {
   const CachedTexture& texture = *static_cast<const CachedTexture*>(handle);
   const MipSelection mip = mip_select(texture.view, width);
-  TexelValue value = cached_sample_level<kFormat, kChannels>(texture, mip.level, uv);
+  TexelValue value = cached_sample_level<Texel>(texture, mip.level, uv);
   if (mip.blend > 0.0f) {
-    value += mip.blend * (cached_sample_level<kFormat, kChannels>(texture, mip.level + 1, uv) - value);
+    value += mip.blend * (cached_sample_level<Texel>(texture, mip.level + 1, uv) - value);
   }
-  value *= texel_scale<kFormat>();
+  value *= Texel::scale();
   return {value[0], value[1], value[2], value[3]};
 }
 
 TextureView::Lookup lookup_for(const TexelLayout& layout)
 {
-  constexpr TextureView::Lookup kU8[] = {cached_sample<TexelFormat::kU8, 1>, cached_sample<TexelFormat::kU8, 2>,
-                                         cached_sample<TexelFormat::kU8, 3>, cached_sample<TexelFormat::kU8, 4>};
-  constexpr TextureView::Lookup kHalf[] = {cached_sample<TexelFormat::kHalf, 1>, cached_sample<TexelFormat::kHalf, 2>,
-                                           cached_sample<TexelFormat::kHalf, 3>, cached_sample<TexelFormat::kHalf, 4>};
+  constexpr auto kU8 = TexelFormat::kU8, kHalf = TexelFormat::kHalf;
+  constexpr TextureView::Lookup kOfU8[] = {cached_sample<FormatTexel<kU8, 1>>, cached_sample<FormatTexel<kU8, 2>>,
+                                           cached_sample<FormatTexel<kU8, 3>>, cached_sample<FormatTexel<kU8, 4>>};
+  constexpr TextureView::Lookup kOfHalf[] = {cached_sample<FormatTexel<kHalf, 1>>, cached_sample<FormatTexel<kHalf, 2>>,
+                                             cached_sample<FormatTexel<kHalf, 3>>,
+                                             cached_sample<FormatTexel<kHalf, 4>>};
+  constexpr TextureView::Lookup kWide[] = {cached_sample<WideTexel<1>>, cached_sample<WideTexel<2>>,
+                                           cached_sample<WideTexel<3>>, cached_sample<WideTexel<4>>};
   const auto i = static_cast<std::size_t>(layout.num_channels - 1);
-  return layout.format == TexelFormat::kU8 ? kU8[i] : kHalf[i];
+  return layout.format == kU8 ? kOfU8[i] : layout.is_wide ? kWide[i] : kOfHalf[i];
 }
 
 }  // namespace

@@ -43,12 +43,13 @@ struct TextureReader::Impl {
   explicit Impl(const TextureSource& source);
 
   void convert_row(const unsigned char* source_row, unsigned char* texels);
-  std::uint16_t convert_value(float value, bool is_alpha);
+  float repaired(float value, bool is_alpha);
+  void associate(unsigned char* source_rows, std::size_t num_texels) const;
 
   ImageReader image;
   std::vector<int> channels;               ///< of the file, one a texel channel; −1: zero
   int channel_begin = 0, channel_end = 0;  ///< range that is read from the file
-  bool is_8_bit = false, decode_srgb = false;
+  bool is_8_bit = false, decode_srgb = false, associates = false, divides = false, is_16_bit = false;
   TexelLayout layout;
   TexelRepairs repairs;
 };
@@ -65,16 +66,24 @@ TextureReader::Impl::Impl(const TextureSource& source) : image(source)
     }
   }
   is_8_bit = header.sample_type == SampleType::kU8;
-  const bool is_srgb = source.color == TextureColor::kSrgb && header.is_integer;
+  const bool is_srgb =
+      texture_color_is_encoded(source.color) || (!texture_color_is_linear(source.color) && header.is_integer);
+  // Of four channels alone, and of each value by its own code: as Cycles does it.
+  associates = texture_color_is_associated(source.color) && header.alpha_is_straight && header.num_channels == 4;
   decode_srgb = is_srgb && !is_8_bit;
+  divides = decode_srgb && texture_color_is_divided(source.color) && !header.alpha_is_straight &&
+            header.num_channels == 4 && header.alpha_channel == 3;
   layout.width = header.width;
   layout.height = header.height;
   layout.num_channels = static_cast<int>(channels.size());
   layout.format = !is_8_bit ? TexelFormat::kHalf : is_srgb ? TexelFormat::kU8Srgb : TexelFormat::kU8;
+  layout.is_wide = source.is_wide && !is_8_bit;
+  is_16_bit = header.sample_type == SampleType::kU16;
   image.select(channel_begin, channel_end, is_8_bit ? SampleType::kU8 : SampleType::kFloat);
 }
 
-std::uint16_t TextureReader::Impl::convert_value(float value, bool is_alpha)
+/// A value as light, finite and in range.
+float TextureReader::Impl::repaired(float value, bool is_alpha)
 {
   if (!is_finite(value)) {
     ++repairs.num_non_finite;
@@ -83,11 +92,32 @@ std::uint16_t TextureReader::Impl::convert_value(float value, bool is_alpha)
   if (decode_srgb && !is_alpha) {
     value = linear_from_srgb(value);
   }
-  if (std::abs(value) > kHalfMax) {
+  if (std::abs(value) > kHalfMax && !layout.is_wide) {
     ++repairs.num_clamped;
     value = std::copysign(kHalfMax, value);
   }
-  return half_from_float(value);
+  return value;
+}
+
+/// Multiplies colours of four channels by their alpha. Integers are rounded down.
+void TextureReader::Impl::associate(unsigned char* source_rows, std::size_t num_texels) const
+{
+  constexpr std::size_t kColors = 3, kChannels = 4;
+  for (std::size_t i = 0; i < num_texels; ++i) {
+    if (is_8_bit) {
+      unsigned char* texel = source_rows + i * kChannels;
+      for (std::size_t c = 0; c < kColors; ++c) texel[c] = static_cast<unsigned char>(texel[c] * texel[kColors] / 255);
+      continue;
+    }
+    float texel[kChannels];
+    std::memcpy(texel, source_rows + i * sizeof texel, sizeof texel);
+    for (std::size_t c = 0; c < kColors; ++c) {
+      texel[c] *= texel[kColors];
+      // The little more is for products that are whole numbers.
+      if (is_16_bit) texel[c] = std::floor(texel[c] * 65535.0f + 0.01f) / 65535.0f;
+    }
+    std::memcpy(source_rows + i * sizeof texel, texel, sizeof texel);
+  }
 }
 
 void TextureReader::Impl::convert_row(const unsigned char* source_row, unsigned char* texels)
@@ -107,7 +137,18 @@ void TextureReader::Impl::convert_row(const unsigned char* source_row, unsigned 
       } else {
         float value;
         std::memcpy(&value, source_row + from * sizeof value, sizeof value);
-        const std::uint16_t half = convert_value(value, is_alpha);
+        // Light that is divided by alpha later has to be decode(code / alpha) then.
+        float alpha = 1;
+        if (divides && !is_alpha) {
+          std::memcpy(&alpha, source_row + (x * num_read + 3) * sizeof alpha, sizeof alpha);
+          if (!(alpha > 0.0f)) alpha = 1;
+        }
+        value = repaired(value / alpha, is_alpha) * alpha;
+        if (layout.is_wide) {
+          std::memcpy(texels + to * sizeof value, &value, sizeof value);
+          continue;
+        }
+        const std::uint16_t half = half_from_float(value);
         std::memcpy(texels + to * sizeof half, &half, sizeof half);
       }
     }
@@ -118,11 +159,20 @@ TextureReader::TextureReader(const TextureSource& source) : impl_(std::make_uniq
 TextureReader::~TextureReader() = default;
 
 const TexelLayout& TextureReader::layout() const { return impl_->layout; }
+int TextureReader::rows_at_once() const { return impl_->image.rows_at_once(); }
 const TexelRepairs& TextureReader::repairs() const { return impl_->repairs; }
 
 void TextureReader::read_rows(int begin, int end, unsigned char* texels)
 {
   const unsigned char* rows = impl_->image.load_rows(begin, end);
+  std::vector<unsigned char> associated;
+  if (impl_->associates) {
+    // Rows of the reader may be asked for again.
+    associated.assign(rows, rows + static_cast<std::size_t>(end - begin) * impl_->image.row_bytes());
+    impl_->associate(associated.data(),
+                     static_cast<std::size_t>(end - begin) * static_cast<std::size_t>(impl_->layout.width));
+    rows = associated.data();
+  }
   const std::size_t row_bytes = texel_row_bytes(impl_->layout);
   std::memset(texels, 0, static_cast<std::size_t>(end - begin) * row_bytes);
   for (std::size_t y = 0; y < static_cast<std::size_t>(end - begin); ++y) {

@@ -14,12 +14,13 @@ namespace relief {
 /// An image to be read as a texture. Does not own the bytes.
 struct TextureSource : ImageSource {
   TextureColor color = TextureColor::kLinear;
+  bool is_wide = false;  ///< what would become half stays a 32-bit float
 };
 
 /// What was changed to make an image's values usable.
 struct TexelRepairs {
   std::int64_t num_non_finite = 0;  ///< NaN and infinities, became 0
-  std::int64_t num_clamped = 0;     ///< beyond the range of half, became ±kHalfMax
+  std::int64_t num_clamped = 0;     ///< beyond the range of half, became ±kHalfMax; none if it is wide
 };
 
 /// An open image. The texels' meaning:
@@ -27,7 +28,7 @@ struct TexelRepairs {
 ///   are decoded on the way;
 /// - 1 channel: grey; 2: grey and alpha, or R and G of RGB if the second is no alpha; 3: RGB; 4: RGBA; of more
 ///   channels those named R, G, B, A, or else the first three;
-/// - colours stay unassociated with alpha where the file has them so, as glTF says.
+/// - colours stay unassociated with alpha where the file has them so, as glTF says, unless the source asks for others.
 /// Not for use by several threads at once.
 class TextureReader {
  public:
@@ -38,6 +39,8 @@ class TextureReader {
   TextureReader& operator=(const TextureReader&) = delete;
 
   const TexelLayout& layout() const;
+  /// As of ImageReader.
+  int rows_at_once() const;
 
   /// Reads rows; going from top to bottom is fastest.
   /// @param begin, end  0 <= begin < end <= height

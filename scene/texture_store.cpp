@@ -1,9 +1,12 @@
 #include "scene/texture_store.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <deque>
 #include <new>
 #include <numeric>
+#include <optional>
 #include <string_view>
 #include <tuple>
 #include <unordered_map>
@@ -13,33 +16,35 @@
 #include "scene/mip_chain.h"
 #include "scene/parallel.h"
 #include "scene/texture_cache.h"
+#include "scene/texture_faults.h"
 #include "scene/texture_source.h"
+#include "scene/wide_texture.h"
 
 namespace relief {
 namespace {
-
-/// Rows read at a time: a multiple of the usual tile sides and compression blocks.
-constexpr int kBandRows = 256;
 
 /// Tiles in use by the threads at one time must fit, whatever the budget.
 constexpr std::size_t kLeastCacheBytes = std::size_t{64} << 20;
 
 /// An image as it was read, to stay in memory.
 struct TextureTexels {
-  MipChain chain;
+  std::optional<MipChain> chain;  ///< none: halves do not hold its values, and it has to be read again
   TexelRepairs repairs;
 
-  std::size_t bytes() const { return chain.bytes(); }
+  std::size_t bytes() const { return chain ? chain->bytes() : 0; }
 };
 
 /// One distinct image and what became of it.
 struct Image {
   TextureSource source;
+  bool is_missing = false;  ///< someone knows already
+  TextureFaults* faults = nullptr;
+  std::optional<SceneError> fault;  ///< it cannot be read
   std::string label;
   std::vector<unsigned char> encoded;  ///< what source.encoded looks at
   TexelLayout layout;
   TexelRepairs repairs;
-  bool cached = false;
+  bool cached = false, needs_load = true;
   std::size_t cache_index = 0;
   std::shared_ptr<const TextureTexels> read;  ///< null: it is served by the cache
 };
@@ -51,7 +56,7 @@ std::string label_with_size(const Image& image)
          " texels";
 }
 
-/// Reads all rows, in bands: to keep them, or only to know that they can be read.
+/// Reads all rows, in bands: to keep them, or only to know that they can be read. Ends where a value is beyond halves.
 /// @param destination  level 0, or null
 TexelRepairs rows_load(const Image& image, unsigned char* destination)
 {
@@ -63,14 +68,16 @@ TexelRepairs rows_load(const Image& image, unsigned char* destination)
                      "a file that changed");
   }
   std::vector<unsigned char> scratch;
-  for (int y = 0; y < image.layout.height; y += kBandRows) {
-    const int end = std::min(y + kBandRows, image.layout.height);
+  const int band = reader.rows_at_once();
+  for (int y = 0; y < image.layout.height; y += band) {
+    const int end = std::min(y + band, image.layout.height);
     if (destination == nullptr) {
       scratch.resize(static_cast<std::size_t>(end - y) * row_bytes);
     }
     unsigned char* texels =
         destination == nullptr ? scratch.data() : destination + static_cast<std::size_t>(y) * row_bytes;
     reader.read_rows(y, end, texels);
+    if (reader.repairs().num_clamped > 0) break;
   }
   return reader.repairs();
 }
@@ -79,9 +86,40 @@ std::shared_ptr<const TextureTexels> image_read(const Image& image)
 {
   const MemoryReservation room(mip_chain_bytes(image.layout), label_with_size(image));
   const auto out = std::make_shared<TextureTexels>(TextureTexels{MipChain(image.layout), {}});
-  out->repairs = rows_load(image, out->chain.level(0));
-  mip_chain_build(out->chain);
+  out->repairs = rows_load(image, out->chain->level(0));
+  if (out->repairs.num_clamped > 0) {
+    out->chain.reset();
+  } else {
+    mip_chain_build(*out->chain);
+  }
   return out;
+}
+
+/// What stands in the place of an image that cannot be read.
+std::shared_ptr<const TextureTexels> missing_make(TexelLayout& layout)
+{
+  layout = {1, 1, 4, TexelFormat::kU8};
+  const auto out = std::make_shared<TextureTexels>(TextureTexels{MipChain(layout), {}});
+  std::memcpy(out->chain->level(0), kMissingTexel, sizeof kMissingTexel);
+  return out;
+}
+
+/// Runs a step of an image's way, unless there is none to go. Where someone hears of faults they are kept instead of thrown.
+template <class Step>
+void image_step(Image& image, const Step& step)
+{
+  if (image.is_missing || image.fault) return;
+  if (image.faults == nullptr) return step();
+  try {
+    step();
+  } catch (const SceneError& fault) {
+    image.fault = fault;
+  }
+}
+
+std::string kind_of(const TextureSource& source)
+{
+  return "texture " + std::to_string(static_cast<int>(source.color)) + (source.is_wide ? " wide" : "");
 }
 
 void image_load(Image& image, KeptImages& kept)
@@ -92,8 +130,8 @@ void image_load(Image& image, KeptImages& kept)
       image.repairs = rows_load(image, nullptr);
       return;
     }
-    const char* const kind = image.source.color == TextureColor::kSrgb ? "texture sRGB" : "texture linear";
-    image.read = kept.get<TextureTexels>(KeptImages::key(kind, image.source), [&] { return image_read(image); });
+    image.read = kept.get<TextureTexels>(KeptImages::key(kind_of(image.source), image.source),
+                                         [&] { return image_read(image); });
     image.repairs = image.read->repairs;
   } catch (const OutOfMemory&) {
     throw;
@@ -102,15 +140,17 @@ void image_load(Image& image, KeptImages& kept)
   }
 }
 
-/// Marks images as cached, largest first, until the others fit; ties go by order.
+/// Marks images as cached, largest first, until the others fit; ties go by order. Those that are, stay.
 /// @return  bytes left to the cache
 std::size_t choose_cached(std::vector<Image>& images, std::size_t budget_bytes)
 {
   std::size_t resident = 0;
+  bool any_cached = false;
   for (const Image& image : images) {
-    resident += mip_chain_bytes(image.layout);
+    any_cached = any_cached || image.cached;
+    resident += image.cached ? 0 : mip_chain_bytes(image.layout);
   }
-  if (resident <= budget_bytes) {
+  if (resident <= budget_bytes && !any_cached) {
     return 0;
   }
   // A quarter of the budget is the cache's own.
@@ -125,6 +165,7 @@ std::size_t choose_cached(std::vector<Image>& images, std::size_t budget_bytes)
     if (resident <= resident_budget) {
       break;
     }
+    if (images[i].cached) continue;
     images[i].cached = true;
     resident -= mip_chain_bytes(images[i].layout);
   }
@@ -138,13 +179,9 @@ void warn(const Image& image, Warnings& warnings)
     warnings.add(image.label + ": " + std::to_string(repairs.num_non_finite) +
                  " values were not finite and are read as 0");
   }
-  if (repairs.num_clamped > 0) {
-    warnings.add(image.label + ": " + std::to_string(repairs.num_clamped) +
-                 " values were beyond the range of half precision and are clamped to 65504");
-  }
 }
 
-TextureView resident_view(const MipChain& chain, const TextureRequest& request)
+TextureView texels_view(const MipChain& chain, const TextureRequest& request)
 {
   const TexelLayout& layout = chain.layout();
   TextureView view;
@@ -176,7 +213,8 @@ class ImageGroups {
     const auto [begin, end] = by_key_.equal_range(key);
     for (auto entry = begin; entry != end; ++entry) {
       const Image& image = images[entry->second];
-      if (image.source.color == request.color && image.source.file == file && image.encoded == request.encoded) {
+      if (image.source.color == request.color && image.source.file == file && image.encoded == request.encoded &&
+          image.is_missing == request.is_missing) {
         return entry->second;
       }
     }
@@ -184,6 +222,8 @@ class ImageGroups {
     image.encoded = std::move(request.encoded);
     image.source = {{file, {}, request.scene_file, request.json_path}, request.color};
     image.label = request.label;
+    image.is_missing = request.is_missing;
+    image.faults = request.faults;
     by_key_.emplace(key, images.size() - 1);
     return images.size() - 1;
   }
@@ -201,7 +241,17 @@ struct TextureStore::Impl {
   std::vector<Image> images;
   std::unique_ptr<TextureCache> cache;
   std::vector<TextureView> views;
+  std::deque<WideTexture> wide;  ///< views point at them
   std::vector<std::size_t> image_of_texture;
+
+  /// View of an image in memory.
+  TextureView resident_view(const Image& image, const TextureRequest& request)
+  {
+    const TextureView view = texels_view(*image.read->chain, request);
+    return image.read->chain->layout().is_wide
+               ? wide_texture_view(wide.emplace_back(WideTexture{&*image.read->chain, view}))
+               : view;
+  }
   std::vector<std::string> labels;
 };
 
@@ -222,15 +272,42 @@ TextureStore::TextureStore(std::vector<TextureRequest> requests,
   std::vector<Image>& images = impl_->images;
   for_each_in_parallel(images.size(), [&](std::size_t i) {
     images[i].source.encoded = images[i].encoded;
-    images[i].layout = TextureReader(images[i].source).layout();
+    image_step(images[i], [&] { images[i].layout = TextureReader(images[i].source).layout(); });
   });
   // Where memory is short, the tile cache is better than an end. What is there already needs none.
   const auto budget =
       static_cast<std::size_t>(std::min<std::uint64_t>(budget_bytes, memory_left() / 2 + kept->bytes()));
-  if (const std::size_t cache_bytes = choose_cached(images, budget); cache_bytes > 0) {
-    impl_->cache = std::make_unique<TextureCache>(cache_bytes);
+  std::size_t cache_bytes = choose_cached(images, budget);
+  const auto load_all = [&] {
+    for_each_in_parallel(images.size(), [&](std::size_t i) {
+      image_step(images[i], [&] {
+        if (images[i].needs_load) image_load(images[i], *kept);
+        images[i].needs_load = false;
+      });
+    });
+  };
+  load_all();
+  // Which images halves do not hold is known when they have been read so far. Then they are as large again.
+  bool any_wide = false;
+  for (Image& image : images) {
+    if (image.repairs.num_clamped == 0) continue;
+    image.source.is_wide = image.layout.is_wide = image.needs_load = any_wide = true;
   }
-  for_each_in_parallel(images.size(), [&](std::size_t i) { image_load(images[i], *kept); });
+  if (any_wide) {
+    cache_bytes = choose_cached(images, budget);
+    for (Image& image : images) {
+      if (image.cached) image.read.reset();
+    }
+    load_all();
+  }
+  for (Image& image : images) {
+    if (image.fault) image.faults->add(*image.fault);
+    if (image.is_missing || image.fault) {
+      image.cached = false;
+      image.read = missing_make(image.layout);
+    }
+  }
+  if (cache_bytes > 0) impl_->cache = std::make_unique<TextureCache>(cache_bytes);
   for (Image& image : images) {
     warn(image, warnings);
     if (image.cached) {
@@ -245,7 +322,7 @@ TextureStore::TextureStore(std::vector<TextureRequest> requests,
     const Image& image = images[impl_->image_of_texture[i]];
     impl_->views.push_back(image.cached
                                ? impl_->cache->view(image.cache_index, request.wrap_u, request.wrap_v, request.filter)
-                               : resident_view(image.read->chain, request));
+                               : impl_->resident_view(image, request));
   }
 }
 
@@ -261,17 +338,21 @@ int TextureStore::add_image(std::string label,
   Image image;
   image.label = label;
   image.layout = {width, height, 3, TexelFormat::kHalf};
+  image.layout.is_wide = std::any_of(rgb.begin(), rgb.end(), [](float v) { return std::abs(v) > kHalfMax; });
   const auto read = std::make_shared<TextureTexels>(TextureTexels{MipChain(image.layout), {}});
-  auto* texels = reinterpret_cast<std::uint16_t*>(read->chain.level(0));
-  std::transform(rgb.begin(), rgb.end(), texels,
-                 [](float value) { return half_from_float(clamp(value, -kHalfMax, kHalfMax)); });
-  mip_chain_build(read->chain);
+  unsigned char* const texels = read->chain->level(0);
+  if (image.layout.is_wide) {
+    std::memcpy(texels, rgb.data(), rgb.size_bytes());
+  } else {
+    std::transform(rgb.begin(), rgb.end(), reinterpret_cast<std::uint16_t*>(texels), half_from_float);
+  }
+  mip_chain_build(*read->chain);
   TextureRequest request;
   request.wrap_u = wrap_u;
   request.wrap_v = wrap_v;
   // Views look into the chain's own block, which stays where it is when the images move.
-  impl_->views.push_back(resident_view(read->chain, request));
   image.read = read;
+  impl_->views.push_back(impl_->resident_view(image, request));
   impl_->image_of_texture.push_back(impl_->images.size());
   impl_->images.push_back(std::move(image));
   impl_->labels.push_back(std::move(label));

@@ -14,10 +14,42 @@
 
 namespace relief {
 
-class KeptImages;  // scene/kept_images.h
+class KeptImages;     // scene/kept_images.h
+class TextureFaults;  // scene/texture_faults.h
 
-/// How a texture's numbers are to be read.
-enum class TextureColor : std::uint8_t { kSrgb, kLinear };
+/// How a texture's numbers are to be read. Of floats sRGB means light all the same, encoded sRGB does not.
+enum class TextureColor : std::uint8_t {
+  kSrgb,
+  kLinear,
+  kEncodedSrgb,
+  /// Associated: colours are multiplied by alpha, as codes, where the file has them apart from it. So Blender reads images whose
+  /// alpha is not used.
+  kSrgbAssociated,
+  kLinearAssociated,
+  kEncodedSrgbAssociated,
+  /// Divided: look-ups are divided by alpha. It has to make no difference that codes of more than 8 bits are decoded before.
+  kSrgbDivided,
+  kEncodedSrgbDivided
+};
+
+inline constexpr bool texture_color_is_linear(TextureColor color)
+{
+  return color == TextureColor::kLinear || color == TextureColor::kLinearAssociated;
+}
+inline constexpr bool texture_color_is_encoded(TextureColor color)
+{
+  return color == TextureColor::kEncodedSrgb || color == TextureColor::kEncodedSrgbAssociated ||
+         color == TextureColor::kEncodedSrgbDivided;
+}
+inline constexpr bool texture_color_is_associated(TextureColor color)
+{
+  return color == TextureColor::kSrgbAssociated || color == TextureColor::kLinearAssociated ||
+         color == TextureColor::kEncodedSrgbAssociated;
+}
+inline constexpr bool texture_color_is_divided(TextureColor color)
+{
+  return color == TextureColor::kSrgbDivided || color == TextureColor::kEncodedSrgbDivided;
+}
 
 /// One texture to be loaded: an image (file, or encoded bytes in memory) with its sampler and its reading.
 struct TextureRequest {
@@ -28,6 +60,8 @@ struct TextureRequest {
   TextureColor color = TextureColor::kLinear;
   Wrap wrap_u = Wrap::kRepeat, wrap_v = Wrap::kRepeat;
   TexelFilter filter = TexelFilter::kLinear;
+  bool is_missing = false;          ///< magenta, which `faults` knows of
+  TextureFaults* faults = nullptr;  ///< hears of what cannot be read, which is magenta then; null: it is an error
 };
 
 class TextureStore {
@@ -35,7 +69,8 @@ class TextureStore {
   /// Reads all textures (in parallel). Equal (image, colour) pairs share their texels.
   /// @param budget_bytes  of texels that stay in memory; half of what memory is left, if that is less
   /// @param kept          of the frames before, if there are any
-  /// @error SceneError naming the file and JSON path of an image that is missing, unreadable or absurdly large
+  /// @error SceneError naming the file and JSON path of an image that is missing, unreadable or absurdly large, unless its
+  ///        request has someone to hear of it
   TextureStore(std::vector<TextureRequest> requests,
                std::size_t budget_bytes,
                Warnings& warnings,
@@ -45,7 +80,7 @@ class TextureStore {
   TextureStore& operator=(const TextureStore&) = delete;
 
   /// Adds an image that was computed; it is never served by the tile cache.
-  /// @param rgb  linear, rows from the top, 3 × width × height; kept at half precision
+  /// @param rgb  linear, rows from the top, 3 × width × height; kept at half precision, unless a value is beyond it
   /// @return     its index
   int add_image(std::string label, int width, int height, std::span<const float> rgb, Wrap wrap_u, Wrap wrap_v);
 

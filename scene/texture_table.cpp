@@ -3,6 +3,8 @@
 #include <cstring>
 #include <utility>
 
+#include "scene/texture_faults.h"
+
 namespace relief {
 namespace {
 
@@ -39,6 +41,19 @@ TextureTable::Key TextureTable::make_key(std::string file,
           static_cast<int>(sampling.filter)};
 }
 
+template <class Step>
+bool TextureTable::succeeds(const Step& step)
+{
+  try {
+    step();
+    return true;
+  } catch (const SceneError& fault) {
+    if (faults_ == nullptr) throw;
+    faults_->add(fault);
+    return false;
+  }
+}
+
 int TextureTable::add(Key key, TextureRequest request, TextureColor color, TextureSampling sampling)
 {
   const auto index = static_cast<int>(requests_.size());
@@ -46,6 +61,7 @@ int TextureTable::add(Key key, TextureRequest request, TextureColor color, Textu
   request.wrap_u = sampling.wrap_u;
   request.wrap_v = sampling.wrap_v;
   request.filter = sampling.filter;
+  request.faults = faults_;
   requests_.push_back(std::move(request));
   index_of_.emplace(std::move(key), index);
   return index;
@@ -54,8 +70,17 @@ int TextureTable::add(Key key, TextureRequest request, TextureColor color, Textu
 int TextureTable::add_texture(const GltfDocument& document, int texture_index, TextureColor color)
 {
   const tinygltf::Texture& texture = document.core.textures[static_cast<std::size_t>(texture_index)];
-  if (texture.source < 0) {
-    throw SceneError(document.file, "/textures/" + std::to_string(texture_index) + "/source", "an image", "nothing");
+  const std::string path = "/textures/" + std::to_string(texture_index) + "/source";
+  const bool has_source = succeeds([&] {
+    if (texture.source < 0) throw SceneError(document.file, path, "an image", "nothing");
+  });
+  if (!has_source) {
+    TextureRequest request;
+    request.scene_file = document.file;
+    request.json_path = path;
+    request.label = document.file + ": " + path;
+    request.is_missing = true;
+    return add(make_key(request.label, nullptr, 0, color, {}), std::move(request), color, {});
   }
   TextureSampling sampling;
   if (texture.sampler >= 0) {
@@ -75,18 +100,21 @@ int TextureTable::add_image(const GltfDocument& document, int image_index, Textu
     return known->second;
   }
   const std::string path = "/images/" + std::to_string(image_index);
-  const JsonReader image(document.element("images", static_cast<std::size_t>(image_index)), document.file, path);
-  if (image.has("uri") == image.has("bufferView")) {
-    image.fail("", "either uri or bufferView", image.has("uri") ? "both" : "neither");
-  }
   TextureRequest request;
   request.scene_file = document.file;
   request.json_path = path;
-  std::string name = image.string("name", "");
-  if (image.has("bufferView")) {
-    const int view = image.index("bufferView", document.core.bufferViews.size(), "buffer views");
-    request.encoded = to_bytes(gltf_buffer_view(document, view));
-  } else {
+  std::string name;
+  request.is_missing = !succeeds([&] {
+    const JsonReader image(document.element("images", static_cast<std::size_t>(image_index)), document.file, path);
+    if (image.has("uri") == image.has("bufferView")) {
+      image.fail("", "either uri or bufferView", image.has("uri") ? "both" : "neither");
+    }
+    name = image.string("name", "");
+    if (image.has("bufferView")) {
+      const int view = image.index("bufferView", document.core.bufferViews.size(), "buffer views");
+      request.encoded = to_bytes(gltf_buffer_view(document, view));
+      return;
+    }
     const std::string uri = image.string("uri", "");
     if (gltf_is_data_uri(uri)) {
       request.encoded = to_bytes(gltf_decode_data_uri(uri, document.file, path + "/uri").span());
@@ -94,7 +122,7 @@ int TextureTable::add_image(const GltfDocument& document, int image_index, Textu
       request.file = gltf_resolve_uri(document, uri, path + "/uri");
       name = request.file.filename().string();
     }
-  }
+  });
   request.label = document.file + ": " + path + (name.empty() ? "" : " (" + name + ')');
   return add(std::move(key), std::move(request), color, sampling);
 }
@@ -106,8 +134,8 @@ int TextureTable::add_file(const GltfDocument& document,
                            TextureSampling sampling)
 {
   TextureRequest request;
-  request.file = gltf_resolve_uri(document, uri, json_path);
-  Key key = make_key(request.file.string(), nullptr, 0, color, sampling);
+  request.is_missing = !succeeds([&] { request.file = gltf_resolve_uri(document, uri, json_path); });
+  Key key = make_key(request.is_missing ? json_path : request.file.string(), nullptr, 0, color, sampling);
   if (const auto known = index_of_.find(key); known != index_of_.end()) {
     return known->second;
   }
@@ -135,12 +163,17 @@ const IesProfile& TextureTable::add_ies(const GltfDocument& document,
                                         const std::string& json_path)
 {
   constexpr std::uint64_t kMostBytes = std::uint64_t{64} << 20;
-  const std::filesystem::path file = gltf_resolve_uri(document, uri, json_path);
-  if (const auto known = ies_.find(file); known != ies_.end()) return known->second;
-  files_read_.push_back(file_stamp(file));
-  const ByteArray bytes = gltf_read_file(file, document.file, json_path, kMostBytes);
-  const std::string_view text(reinterpret_cast<const char*>(bytes.data.get()), bytes.size);
-  return ies_.emplace(file, ies_parse(text, document.file, json_path)).first->second;
+  std::filesystem::path file;
+  IesProfile profile;
+  succeeds([&] {
+    file = gltf_resolve_uri(document, uri, json_path);
+    if (ies_.contains(file)) return;
+    files_read_.push_back(file_stamp(file));
+    const ByteArray bytes = gltf_read_file(file, document.file, json_path, kMostBytes);
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data.get()), bytes.size);
+    profile = ies_parse(text, document.file, json_path);
+  });
+  return ies_.try_emplace(file, std::move(profile)).first->second;
 }
 
 std::vector<TextureRequest> TextureTable::take()

@@ -17,9 +17,16 @@ struct TextureSampling {
   TexelFilter filter = TexelFilter::kLinear;
 };
 
-/// Each function returns the index that the texture will have in the TextureStore made of `take()`.
+/// Each function returns the index that the texture will have in the TextureStore made of `take()`. Where someone hears of
+/// faults, they are none of the errors below: what cannot be had is missing.
 class TextureTable {
  public:
+  /// @param faults  hears of what cannot be had, from here and from those who read the requests; outlives them. Null: errors
+  explicit TextureTable(TextureFaults* faults = nullptr) : faults_(faults) {}
+
+  /// Who hears of what cannot be had; null: nobody.
+  TextureFaults* faults() const { return faults_; }
+
   /// A glTF texture: image and sampler.
   /// @param texture_index  valid (validated core)
   /// @error SceneError: the texture has no source; see add_image
@@ -45,6 +52,7 @@ class TextureTable {
                TextureSampling sampling);
 
   /// Intensities of a luminaire from a path beside the file. They are no texture, but read at once, each file once.
+  /// @return  without rows: it is missing
   /// @error SceneError at `json_path`: there is no such file, or see ies_parse
   const IesProfile& add_ies(const GltfDocument& document, const std::string& uri, const std::string& json_path);
 
@@ -63,6 +71,12 @@ class TextureTable {
                       TextureColor color,
                       TextureSampling sampling);
   int add(Key key, TextureRequest request, TextureColor color, TextureSampling sampling);
+
+  /// Runs what may fail. @return whether it did not
+  template <class Step>
+  bool succeeds(const Step& step);
+
+  TextureFaults* faults_ = nullptr;
 
   std::map<Key, int> index_of_;
   std::vector<TextureRequest> requests_;

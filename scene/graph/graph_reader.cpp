@@ -185,11 +185,18 @@ void Reader::lower(std::size_t index)
     given.insert(name);
     inputs[name] = graph_convert(build, look_up(source.reader.object("inputs"), name, from), inputs[name].type);
   }
-  const std::function<int(const JsonReader&)> texture = [this](const JsonReader& r) {
-    static constexpr std::string_view kSpaces[] = {"srgb", "linear"};
-    const bool is_linear = r.choice("colorSpace", kSpaces, 0) == 1;
-    const TextureRef ref = khronos_texture_ref(
-        document, r, "texture", is_linear ? TextureColor::kLinear : TextureColor::kSrgb, textures, warnings);
+  const bool is_straight = source.reader.has("alpha") && source.reader.string("alpha", "") == "straight";
+  const bool is_divided = source.reader.has("unassociate") && source.reader.boolean("unassociate", false);
+  const std::function<int(const JsonReader&)> texture = [=, this](const JsonReader& r) {
+    static constexpr std::string_view kSpaces[] = {"srgb", "linear", "encoded-srgb"};
+    static constexpr TextureColor kStored[] = {TextureColor::kSrgb, TextureColor::kLinear, TextureColor::kEncodedSrgb};
+    static constexpr TextureColor kAssociated[] = {TextureColor::kSrgbAssociated, TextureColor::kLinearAssociated,
+                                                   TextureColor::kEncodedSrgbAssociated};
+    static constexpr TextureColor kDivided[] = {TextureColor::kSrgbDivided, TextureColor::kLinear,
+                                                TextureColor::kEncodedSrgbDivided};
+    const auto space = static_cast<std::size_t>(r.choice("colorSpace", kSpaces, 0));
+    const TextureColor color = is_divided ? kDivided[space] : is_straight ? kAssociated[space] : kStored[space];
+    const TextureRef ref = khronos_texture_ref(document, r, "texture", color, textures, warnings);
     if (ref.texture_index < 0) r.fail("texture", "{\"index\": …}");
     // Programs have 16 bits for it.
     if (ref.texture_index > 0xffff) r.fail("texture", "one of the scene's first 65,536 textures");

@@ -201,9 +201,11 @@ void lower_image(GraphNode& n)
   unsigned flags = 0;
   if (n.reader.boolean("clip", false)) flags |= kImageClip;
   if (n.reader.choice("filter", kFilters, 0) == 1) flags |= kImageCubic;
-  if (alpha == 1) flags |= kImageMultiply;
+  const bool is_divided = n.reader.boolean("unassociate", false);
+  // Colours that are not divided afterwards are multiplied when they are read (graph_reader.cpp).
+  if (alpha == 1 && is_divided) flags |= kImageMultiply;
   if (alpha == 3) flags |= kImageOpaque;
-  if (n.reader.boolean("unassociate", false)) flags |= kImageDivide;
+  if (is_divided) flags |= kImageDivide;
   const auto flag_word = static_cast<std::uint16_t>(flags);
   const GraphVector& at = n.vector("vector");
   const bool is_tiled = n.reader.has("tiles");
@@ -540,6 +542,11 @@ void lower_ies(GraphNode& n)
   const GraphScalar vertical = b(Op::arccosine, {scaled(b, v[2], -1)});
   const GraphScalar horizontal = b(Op::add, {b(Op::arctangent2, {v[0], v[1]}), b.constant(3.14159265f)});
   const IesProfile& profile = n.ies(n.reader);
+  if (profile.rows.empty()) {
+    constexpr float kOfMissing = 100;  // as in Blender
+    n.set("factor", scaled(b, n.number("strength"), kOfMissing));
+    return;
+  }
   const std::uint32_t place = b.add_table(ies_table(profile, static_cast<IesEnds>(read_maths(n))));
   const std::uint16_t immediates[] = {
       static_cast<std::uint16_t>(place & 0xffffu), static_cast<std::uint16_t>(place >> 16),

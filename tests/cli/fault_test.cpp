@@ -1,6 +1,8 @@
 // What goes wrong: exit codes, one-line messages, files that are whole or absent, interrupts.
+#include <algorithm>
 #include <fstream>
 #include <sstream>
+#include <vector>
 
 #include "tests/cli/program.h"
 
@@ -122,6 +124,38 @@ TEST_F(FaultyUse, AnInvalidSceneIsExitCodeThree)
   expect_failure({"render", scene_, "-o", out}, 3, "scene.gltf: ");
   folder_.write("scene.gltf", "not JSON at all");
   expect_failure({"render", scene_, "-o", out}, 3, "scene.gltf: ");
+}
+
+// One run tells of all that is wrong with a scene's images, height maps and luminaires.
+TEST_F(FaultyUse, TexturesThatCannotBeReadAreOneErrorOrMagenta)
+{
+  GltfBuilder b = lit_square();
+  for (const char* uri : {"gone.png", "data:image/png;base64,iVBORw0KGgo=", "also_gone.jpg"}) {
+    b.push("textures", {{"source", b.push("images", {{"uri", uri}})}});
+  }
+  b.push("materials",
+         {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 0}}},
+          {"emissiveTexture", {{"index", 1}}},
+          {"emissiveFactor", {1, 1, 1}},
+          {"normalTexture", {{"index", 2}}},
+          {"extensions", {{"RELIEF_displacement", {{"heightTexture", {{"uri", "heights.png"}}}, {"scale", 0.1}}}}}});
+  b.json["meshes"][0]["primitives"][0]["material"] = 0;
+  folder_.write("scene.gltf", b.gltf());
+  const std::string out = file("a.exr");
+  for (const char* name : {"gone.png", "/images/1", "also_gone.jpg", "heights.png"}) {
+    expect_failure({"render", scene_, "-o", out}, 3, name);
+    expect_failure({"info", scene_}, 3, name);
+  }
+  expect_failure({"render", scene_, "-o", out}, 3, "found 4 that cannot");
+  const Outcome outcome = render(scene_, out, {"--continue-without-textures"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.errors;
+  for (const char* name : {"gone.png", "/images/1", "also_gone.jpg", "heights.png"}) {
+    EXPECT_NE(outcome.errors.find(name), std::string::npos) << outcome.errors;
+  }
+  const std::vector<float> red = values_of(out, "R"), green = values_of(out, "G");
+  EXPECT_GT(*std::max_element(red.begin(), red.end()), 1) << "emission is 1, besides what is reflected";
+  const auto brightest = static_cast<std::size_t>(std::max_element(red.begin(), red.end()) - red.begin());
+  EXPECT_LT(green[brightest], 0.2) << "magenta";
 }
 
 TEST_F(FaultyUse, AReferenceOfAnotherSizeIsFoundBeforeTheRender)

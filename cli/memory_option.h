@@ -1,0 +1,11 @@
+// The option --max-memory, which all commands have that read large files.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace relief {
+
+/// Adds --max-memory, which sets the process's limit.
+void add_max_memory(CLI::App& command);
+
+}  // namespace relief
