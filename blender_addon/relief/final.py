@@ -183,7 +183,7 @@ def command_line(scene, view_layer, crop=None):
     @param  crop  (x0, y0, x1, y1) from the top left, or None
     """
     settings, time_limit = scene.relief, sampling_of(scene, view_layer).time_limit
-    arguments = ["--texture-memory", f"{settings.texture_memory:g}"]
+    arguments = ["--texture-memory", f"{settings.texture_memory:g}", "--continue-without-textures"]
     if settings.memory_limit > 0:
         arguments += ["--displacement-memory", f"{settings.memory_limit:g}"]
     if time_limit > 0:

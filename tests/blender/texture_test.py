@@ -321,7 +321,56 @@ def test_missing_file_is_warned_about():
         name = _save(f"{path}/image.png")
         scene, _, _, _ = _stage(lambda: bpy.data.images.load(name))
         os.remove(name)
-        assert_warns(scene, 'image "image.png"', "no file")
+        assert_warns(scene, 'image "image.png"', "no file", "magenta")
+
+
+def _missing_node(tree, **settings):
+    """An Image Texture node of a file that is gone."""
+    image = bpy.data.images.new("gone", 4, 4)
+    image.source = "FILE"
+    image.filepath = "/nowhere/gone.png"
+    return add_image_node(tree, image, **settings)
+
+
+def test_missing_files_are_magenta_in_every_use():
+    """As a colour, an opacity, a number, a mask, a normal, a bump, a height and a lamp's colour."""
+    scene = new_scene(96, 48)
+    set_world((0.5, 0.6, 0.7))
+    kinds = ("color", "opacity", "roughness", "mask", "normal", "bump", "height", "clipped")
+    for i, use in enumerate(kinds):
+        is_glossy = use == "roughness"
+        material, tree, node = new_material(use, "ShaderNodeBsdfGlossy" if is_glossy else "ShaderNodeBsdfDiffuse")
+        texture = _missing_node(tree, extension="CLIP" if use == "clipped" else "REPEAT")
+        output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+        color = texture.outputs["Color"]
+        if use in {"color", "clipped"}:
+            tree.links.new(color, node.inputs["Color"])
+        elif use == "roughness":
+            tree.links.new(color, node.inputs["Roughness"])
+        elif use in {"opacity", "mask"}:
+            mix, clear = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeBsdfTransparent")
+            tree.links.new(texture.outputs["Alpha"] if use == "opacity" else color, mix.inputs[0])
+            tree.links.new(clear.outputs[0], mix.inputs[1])
+            tree.links.new(node.outputs[0], mix.inputs[2])
+            tree.links.new(mix.outputs[0], output.inputs["Surface"])
+        elif use == "height":
+            move = tree.nodes.new("ShaderNodeDisplacement")
+            tree.links.new(color, move.inputs["Height"])
+            tree.links.new(move.outputs[0], output.inputs["Displacement"])
+            material.cycles.displacement_method = "DISPLACEMENT"
+        else:
+            bend = tree.nodes.new("ShaderNodeNormalMap" if use == "normal" else "ShaderNodeBump")
+            tree.links.new(color, bend.inputs["Color" if use == "normal" else "Height"])
+            tree.links.new(bend.outputs["Normal"], node.inputs["Normal"])
+        add_plane(1.8, material, (2 * (i % 4) - 3, 2 * (i // 4) - 1, 0))
+    light = add_light("SPOT", (2, -1, 4), energy=300, spot_size=2)
+    light.data.use_nodes = True
+    tree = light.data.node_tree
+    tree.links.new(_missing_node(tree).outputs["Color"], tree.nodes["Emission"].inputs["Color"])
+    add_light("SUN", rotation=degrees(20, 30, 0), energy=1, angle=0)
+    add_camera((0, 0, 9), lens=40)
+    scene.relief.strict = False
+    assert_agrees(scene, samples=64, block=4, tolerance=0.02)
 
 
 def test_an_image_node_without_image_is_magenta():

@@ -8,6 +8,7 @@ from scenes import (
     IS_5_0,
     LINEAR,
     add_camera,
+    add_image_node,
     add_light,
     add_sphere,
     asymmetric_pixels,
@@ -430,3 +431,35 @@ def test_an_image_and_a_colour_mixed():
     tree.links.new(second.outputs[0], mix.inputs[2])
     tree.links.new(mix.outputs[0], tree.nodes["World Output"].inputs["Surface"])
     assert_agrees(scene, samples=64, block=4)
+
+
+def _image_in_world(**settings):
+    """The world by an Image Texture node."""
+    scene = _stage()
+    tree = set_world((1, 1, 1))
+    texture = add_image_node(tree, new_image(smooth_pixels(64, 32)), **settings)
+    tree.links.new(texture.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+    return scene, tree, texture
+
+
+def test_image_textures_of_every_projection():
+    for projection in ("FLAT", "SPHERE", "TUBE", "BOX"):
+        scene, tree, texture = _image_in_world(projection=projection, projection_blend=0.3)
+        coordinate = tree.nodes.new("ShaderNodeTexCoord")
+        tree.links.new(coordinate.outputs["Generated"], texture.inputs["Vector"])
+        print(projection)
+        assert_agrees(scene, samples=64, tolerance=0.01)
+
+
+def test_an_image_texture_without_coordinates():
+    """A world has no uv map: it is the texel at the origin everywhere."""
+    scene, tree, texture = _image_in_world()
+    assert_agrees(scene, tolerance=0.01)
+
+
+def test_missing_images_are_magenta():
+    scene, tree, texture = _image_in_world(projection="SPHERE")
+    texture.image.source = "FILE"
+    texture.image.filepath = "/nowhere/gone.png"
+    assert_warns(scene, 'image "image"', "no file", "magenta")
+    assert_agrees(scene, tolerance=0.001)

@@ -5,10 +5,15 @@ The program decides by the use of a texture: colours stored as integers are sRGB
 Blender's colour space says the same, the file itself is named, and packed files are written out as they are: no value
 passes through Blender's pixels, heights keep their 16 bits. Otherwise the pixels are taken, made linear and written as
 32-bit floats, which no use changes.
+
+What Cycles does with alpha goes by the file, not by whether Blender calls it straight or premultiplied: colours that a
+file has apart from alpha are multiplied by it, as they are stored; and divided again, after filtering, where the node's
+Alpha is used.
 """
 
 import os
 import struct
+import zlib
 
 import bpy
 import numpy as np
@@ -18,6 +23,10 @@ from . import color_space
 
 _FLOAT_SUFFIXES = {".exr", ".hdr"}
 _TIFF_SAMPLE_FORMAT, _TIFF_IEEE_FLOAT = 339, 3
+_TIFF_EXTRA_SAMPLES, _TIFF_ASSOCIATED = 338, 1
+
+#: Colour of an image that is missing.
+MISSING = (1.0, 0.0, 1.0)
 
 
 class ImageExporter:
@@ -31,29 +40,21 @@ class ImageExporter:
         self._writer = writer
         self._frame = frame
         self._uris = {}
+        self._associated = {}
         self._of_pixels = set()
 
-    def color_uri(self, image, user, warn, alpha_is_linked=True):
-        """URI of an image used as a colour; None if there is none to use, which is warned about.
-
-        @param  alpha_is_linked  whether the node's Alpha is used: if not, Blender darkens what is transparent
-        """
-        if not alpha_is_linked and _is_transparent(image):
-            key = (image.name_full, "darkened")
-            if key not in self._uris:
-                pixels = self._linear_pixels(image, warn, darkened=True)
-                self._uris[key] = self.write_pixels({name: pixels[..., c] for c, name in enumerate("RGB")})
-            return self._uris[key]
+    def color_uri(self, image, user, warn):
+        """URI of an image used as a colour, with its colours as they are stored."""
         return self._uri(image, user, True, warn)
 
-    def stored_uri(self, image, user, is_color, warn):
+    def stored_uri(self, image, user, is_color, warn, associates=False):
         """URI of an image with its colours as they are stored, whatever its alpha.
 
-        @return  (URI, or None without a file; whether the colours are multiplied by alpha already)
+        @param  associates  whether they are to be multiplied by alpha; what the program can do itself it is left to
+        @return  (URI, whether the colours are multiplied by alpha already)
         """
-        uri = self._uri(image, user, is_color, warn)
-        # Blender's own floats always are.
-        return uri, image.is_float and (image.alpha_mode == "PREMUL" or image.name_full in self._of_pixels)
+        uri = self._uri(image, user, is_color, warn, associates, is_encoded(image))
+        return uri, self._associated.get(uri, False)
 
     def tile_uris(self, image, is_color, warn):
         """URIs of a tiled image's files by the number of the tile; empty without any, which is warned about."""
@@ -66,7 +67,8 @@ class ImageExporter:
             column, row = (number - 1001) % 10, (number - 1001) // 10
             tile = path.replace("<UDIM>", str(number)).replace("<UVTILE>", f"u{column + 1}_v{row + 1}")
             if not os.path.isfile(tile):
-                warn(f'image "{image.name}": no file {tile!r}', "the tile is left out")
+                warn(f'image "{image.name}": no file {tile!r}', "the tile is magenta")
+                found[number] = self._missing()
                 continue
             with open(tile, "rb") as file:
                 is_same = self._means_the_same(image, file.read(4096), tile, is_color)
@@ -81,14 +83,16 @@ class ImageExporter:
             try:
                 tile.colorspace_settings.name = image.colorspace_settings.name
                 tile.alpha_mode = image.alpha_mode
-                self._uris[key] = self._make_from_pixels(tile, warn)
+                self._uris[key] = self._make_from_pixels(tile, warn, False)
             finally:
                 bpy.data.images.remove(tile)
         return self._uris[key]
 
     def data_uri(self, image, user, warn):
-        """URI of an image used as numbers: roughness, normals, heights."""
-        return self._uri(image, user, False, warn)
+        """URI of an image used as one number, which of colours is their luminance."""
+        uri = self._uri(image, user, False, warn)
+        is_plain = uri != self._uris.get("missing") and uri not in self._of_pixels and _is_grey(image)
+        return uri if is_plain else self.channel_uri(image, None, warn)
 
     def channel_uri(self, image, channel, warn):
         """URI of a grey image with one channel (0…3) of another, as numbers."""
@@ -109,10 +113,10 @@ class ImageExporter:
         return self._uris[key]
 
     def _plane(self, image, channel, warn):
-        """One channel, or the grey value: float32 (height, width); None without pixels."""
+        """One channel, or the grey value: float32 (height, width)."""
         pixels = self._linear_pixels(image, warn)
         if pixels is None:
-            return None
+            pixels = np.full((1, 1, 4), (*MISSING, 1.0), dtype=np.float32)
         if channel is not None:
             return pixels[..., min(channel, pixels.shape[-1] - 1)]
         weights = np.array(color_space.luminance_weights(), dtype=np.float32)
@@ -123,32 +127,46 @@ class ImageExporter:
         planes = {name: np.ascontiguousarray(plane[::-1], dtype=np.float32) for name, plane in channels.items()}
         return self._writer.write_file(".exr", exr.encode(planes))
 
-    def _uri(self, image, user, is_color, warn):
-        key = (image.name_full, is_color, self._frame if image.source == "SEQUENCE" else 0)
+    def _uri(self, image, user, is_color, warn, associates=False, encoded=False):
+        key = (image.name_full, is_color, self._frame if image.source == "SEQUENCE" else 0, associates, encoded)
         if key not in self._uris:
-            self._uris[key] = self._make(image, user, is_color, warn)
+            self._uris[key] = self._make(image, user, is_color, warn, associates, encoded)
         return self._uris[key]
 
-    def _make(self, image, user, is_color, warn):
+    def _make(self, image, user, is_color, warn, associates, encoded):
         if image.source in {"MOVIE", "TILED", "VIEWER"}:
-            warn(f'image "{image.name}": {image.source.lower()} images', "it is left out")
-            return None
+            warn(f'image "{image.name}": {image.source.lower()} images', "magenta was used")
+            return self._missing()
         packed = _packed_bytes(image)
         if image.source == "GENERATED" or image.is_dirty:
-            return self._make_from_pixels(image, warn)
+            return self._make_from_pixels(image, warn, associates)
         if packed is not None:
-            if self._means_the_same(image, packed[:4096], image.filepath, is_color):
-                return self._writer.write_file(_suffix(packed, image.filepath), packed)
-            return self._make_from_pixels(image, warn)
+            # Cycles takes Blender's pixels, which of 16 bits are floats multiplied by alpha.
+            is_changed = image.is_float and not _is_float_file(packed[:4096], image.filepath) and has_transparency(image)
+            if not is_changed and self._means_the_same(image, packed[:4096], image.filepath, is_color):
+                uri = self._writer.write_file(_suffix(packed, image.filepath), packed)
+                return self._note_alpha(uri, packed[:4096], image.filepath)
+            return self._make_from_pixels(image, warn, associates)
         path = self._path(image, user)
         if not os.path.isfile(path):
-            warn(f'image "{image.name}": no file {path!r}', "it is left out")
-            return None
+            warn(f'image "{image.name}": no file {path!r}', "magenta was used")
+            return self._missing()
         with open(path, "rb") as file:
             first = file.read(4096)
-        if self._means_the_same(image, first, path, is_color):
-            return self._writer.file_uri(path)
-        return self._make_from_pixels(image, warn)
+        if self._means_the_same(image, first, path, is_color, encoded):
+            return self._note_alpha(self._writer.file_uri(path), first, path)
+        return self._make_from_pixels(image, warn, associates)
+
+    def _note_alpha(self, uri, first_bytes, path):
+        if _is_associated_file(first_bytes, path):
+            self._associated[uri] = True
+        return uri
+
+    def _missing(self):
+        """URI of what stands for an image that is missing: one texel, magenta and opaque."""
+        if "missing" not in self._uris:
+            self._uris["missing"] = self._writer.write_file(".png", _one_texel_png((255, 0, 255)))
+        return self._uris["missing"]
 
     def _path(self, image, user):
         path = bpy.path.abspath(image.filepath, library=image.library)
@@ -162,20 +180,28 @@ class ImageExporter:
         digits = len(stem) - len(stem.rstrip("0123456789"))
         return os.path.join(folder, f"{stem[: len(stem) - digits]}{frame:0{digits}d}{suffix}") if digits else path
 
-    def _means_the_same(self, image, first_bytes, path, is_color):
-        """Whether the program reads the file and makes of it what Blender makes of it."""
+    def _means_the_same(self, image, first_bytes, path, is_color, encoded=False):
+        """Whether the program reads the file and makes of it what Blender makes of it.
+
+        @param  encoded  whether it is told of floats that are sRGB
+        """
         if _suffix(first_bytes, path) is None:
             return False
-        expected = "linear" if _is_float_file(first_bytes, path) or not is_color else "srgb"
-        return color_space.meaning(image.colorspace_settings) == expected
+        meaning = color_space.meaning(image.colorspace_settings)
+        if _is_float_file(first_bytes, path) or not is_color:
+            return meaning == "linear" or encoded and meaning == "srgb"
+        return meaning == "srgb"
 
-    def _make_from_pixels(self, image, warn):
-        pixels = self._linear_pixels(image, warn)
+    def _make_from_pixels(self, image, warn, associates):
+        """As Blender has the pixels: bytes apart from alpha, floats multiplied by it."""
+        pixels = self._linear_pixels(image, warn, associates and not image.is_float)
         if pixels is None:
-            return None
-        self._of_pixels.add(image.name_full)
+            return self._missing()
         names = "RGBA"[: pixels.shape[-1]] if pixels.shape[-1] != 1 else "Y"
-        return self.write_pixels({name: pixels[..., c] for c, name in enumerate(names)})
+        uri = self.write_pixels({name: pixels[..., c] for c, name in enumerate(names)})
+        self._associated[uri] = image.is_float or associates
+        self._of_pixels.add(uri)
+        return uri
 
     def _linear_pixels(self, image, warn, darkened=False):
         """An image's scene-linear values: float32 of shape (height, width, channels), bottom row first.
@@ -184,12 +210,12 @@ class ImageExporter:
         """
         width, height = image.size
         if width * height == 0:
-            warn(f'image "{image.name}" has no pixels', "it is left out")
+            warn(f'image "{image.name}" has no pixels', "magenta was used")
             return None
         pixels = np.empty(width * height * image.channels, dtype=np.float32)
         image.pixels.foreach_get(pixels)
         pixels = pixels.reshape(height, width, image.channels)
-        if darkened:
+        if darkened and image.channels == 4:
             # Cycles does it in bytes, rounding down; the little more is for products that are whole numbers.
             pixels[..., :3] = np.floor(pixels[..., :3] * pixels[..., 3:] * 255 + 1e-3) / 255
         # Blender keeps floats scene-linear, bytes as they were stored.
@@ -199,22 +225,115 @@ class ImageExporter:
         return pixels
 
 
+def is_linear(image):
+    """Whether an image's colours are stored as light, or are data."""
+    return color_space.meaning(image.colorspace_settings) == "linear"
+
+
+def is_encoded(image):
+    """Whether an image's file has floats that are sRGB, of all things."""
+    if image.source not in {"FILE", "SEQUENCE"} or image.is_dirty or image.packed_file is not None:
+        return False
+    return color_space.meaning(image.colorspace_settings) == "srgb" and _is_float_file(_first_bytes(image), image.filepath)
+
+
+def has_pixels_of_all_frames(image, is_color):
+    """Whether no pixels are needed of an image for a use in glTF's core: of a sequence Blender has those of one frame alone.
+
+    @param  is_color  whether it is used as a colour
+    """
+    if image.source != "SEQUENCE":
+        return True
+    if is_color and not _is_float_file(_first_bytes(image), image.filepath):
+        return color_space.meaning(image.colorspace_settings) == "srgb"
+    return is_linear(image) and (is_color or _is_grey_file(_first_bytes(image)))
+
+
+def reads_as_stored(image, is_color, uses_alpha):
+    """Whether Cycles shows an image's colours as its file has them, and its alpha too if that is used.
+
+    @param  is_color    whether it is used as a colour
+    @param  uses_alpha  whether the node's Alpha is linked to anything
+    """
+    if not has_transparency(image):
+        return True
+    if image.is_float or _is_associated_file(_first_bytes(image), image.filepath):
+        return False
+    if image.alpha_mode == "NONE":
+        return not uses_alpha
+    # Blender's pixels, which other spaces need, are not always what the file has.
+    if color_space.meaning(image.colorspace_settings) != ("srgb" if is_color else "linear"):
+        return False
+    if image.colorspace_settings.is_data or image.alpha_mode == "CHANNEL_PACKED":
+        return True
+    return uses_alpha and (is_color or image.alpha_mode == "STRAIGHT")
+
+
 #: Whether images have transparent pixels, by what tells an image and its state: looking costs a second at 8k.
 _transparency = {}
 
 
-def _is_transparent(image):
-    """Whether an image has colours that are stored apart from an alpha below one."""
-    if image.is_float or image.channels != 4 or image.alpha_mode != "STRAIGHT" or image.source not in {"FILE", "GENERATED"}:
+def has_transparency(image):
+    """Whether an image has an alpha below one somewhere. Of images with several files nothing is known: perhaps."""
+    # Blender's pixels are opaque where it is told to ignore alpha, of which the file may have made something.
+    if image.source not in {"FILE", "GENERATED"} or image.alpha_mode == "NONE":
+        return _may_have_alpha(_first_bytes(image))
+    if image.channels != 4:
         return False
     path = bpy.path.abspath(image.filepath, library=image.library)
     stamp = os.stat(path).st_mtime_ns if image.source == "FILE" and os.path.isfile(path) else None
     key = (image.name_full, path, stamp, tuple(image.size))
     if image.is_dirty or stamp is None or key not in _transparency:
+        if stamp is not None and not image.is_dirty and not _may_have_alpha(_first_bytes(image)):
+            _transparency[key] = False
+            return False
         pixels = np.empty(image.size[0] * image.size[1] * 4, dtype=np.float32)
         image.pixels.foreach_get(pixels)
         _transparency[key] = bool((pixels[3::4] < 1).any())
     return _transparency[key]
+
+
+def _first_bytes(image):
+    """Of an image's file, or of the first of several; empty without one."""
+    path = bpy.path.abspath(image.filepath, library=image.library)
+    if not os.path.isfile(path):
+        return b""
+    with open(path, "rb") as file:
+        return file.read(4096)
+
+
+def _may_have_alpha(first_bytes):
+    """Whether a file can have transparent pixels, by its first bytes."""
+    if first_bytes.startswith(b"\x89PNG"):
+        return first_bytes[25] & 4 != 0 or b"tRNS" in first_bytes or first_bytes[25] == 3
+    return not first_bytes.startswith((b"\xff\xd8", b"#?"))
+
+
+def _is_grey(image):
+    """Whether all colours of an image are equal: its pixels are looked at, unless its file cannot have others."""
+    first = b"" if image.is_dirty or image.packed_file is not None else _first_bytes(image)
+    if _is_grey_file(first) or image.source == "SEQUENCE" or image.channels < 3:
+        return True
+    pixels = np.empty(image.size[0] * image.size[1] * image.channels, dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(-1, image.channels)
+    return bool((pixels[:, 0] == pixels[:, 1]).all() and (pixels[:, 0] == pixels[:, 2]).all())
+
+
+def _is_grey_file(first_bytes):
+    """Whether a file has no colours, by its first bytes; of other formats than PNG nothing is known."""
+    return first_bytes.startswith(b"\x89PNG") and first_bytes[25] in {0, 4}
+
+
+def _one_texel_png(color):
+    """A PNG of one opaque texel."""
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = struct.pack(">IIBBBBB", 1, 1, 8, 2, 0, 0, 0)
+    texel = zlib.compress(b"\0" + bytes(color))
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", texel) + chunk(b"IEND", b"")
 
 
 def _packed_bytes(image):
@@ -248,18 +367,31 @@ def _is_float_file(first_bytes, path):
     return suffix in _FLOAT_SUFFIXES
 
 
-def _tiff_is_float(data):
-    """Whether a TIFF holds floats. A directory beyond the bytes at hand is taken to be one of integers.
+def _is_associated_file(first_bytes, path):
+    """Whether a file's colours are multiplied by its alpha."""
+    suffix = _suffix(first_bytes, path)
+    if suffix == ".tif":
+        return _tiff_value(first_bytes, _TIFF_EXTRA_SAMPLES) == _TIFF_ASSOCIATED
+    # OpenImageIO, and so Cycles, takes WebP's colours for multiplied, which they are not.
+    return suffix in _FLOAT_SUFFIXES or suffix == ".webp"
 
-    @source  TIFF 6.0, sections 2 and 19 (SampleFormat)
+
+def _tiff_is_float(data):
+    return _tiff_value(data, _TIFF_SAMPLE_FORMAT) == _TIFF_IEEE_FLOAT
+
+
+def _tiff_value(data, wanted):
+    """The first number of a TIFF's tag; None: it has none, or its directory is beyond the bytes at hand.
+
+    @source  TIFF 6.0, sections 2, 18 (ExtraSamples) and 19 (SampleFormat)
     """
     order = "<" if data.startswith(b"II") else ">"
     (directory,) = struct.unpack_from(order + "I", data, 4)
     if directory + 2 > len(data):
-        return False
+        return None
     (count,) = struct.unpack_from(order + "H", data, directory)
     for entry in range(directory + 2, min(directory + 2 + 12 * count, len(data) - 11), 12):
         tag, _, number, value = struct.unpack_from(order + "HHIH", data, entry)
-        if tag == _TIFF_SAMPLE_FORMAT and number <= 2:
-            return value == _TIFF_IEEE_FLOAT
-    return False
+        if tag == wanted and number <= 2:
+            return value
+    return None

@@ -253,7 +253,7 @@ class MaterialJob:
 
     def _color_info(self, texture):
         node = texture.node
-        uri = self._images.color_uri(node.image, node.image_user, self._warn, node.outputs["Alpha"].is_linked)
+        uri = self._images.color_uri(node.image, node.image_user, self._warn)
         return self._info(texture, uri)
 
     def _data_info(self, texture):
@@ -307,8 +307,6 @@ class MaterialJob:
         info = self._info(texture, self._images.alpha_uri(texture.node.image, texture.channel, self._warn))
         if info:
             pbr["baseColorTexture"] = info
-        else:
-            del self.json["alphaMode"]
 
     def _write_volume(self, source, inside):
         if source is None or inside == Inside.CLOSED:  # no light gets there, in Cycles neither

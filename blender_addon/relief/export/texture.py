@@ -13,15 +13,12 @@ import bpy
 import numpy as np
 
 from . import nodes
+from .image import MISSING, has_pixels_of_all_frames, is_linear, is_encoded, reads_as_stored
 
 #: glTF's wrap modes by Blender's extension.
 _WRAP = {"REPEAT": 10497, "EXTEND": 33071, "CLIP": 33071, "MIRROR": 33648}
 
 _CHANNELS = {"Red": 0, "Green": 1, "Blue": 2, "R": 0, "G": 1, "B": 2, "X": 0, "Y": 1, "Z": 2, "Alpha": 3}
-
-
-#: Colour of an image node without image.
-MISSING = (1.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -137,7 +134,19 @@ class TextureReader:
         return Input(reader.color(socket) if is_color else reader.number(socket))
 
     def _textured(self, source, is_color):
-        """Input of a source that varies; None if it is not understood."""
+        """Input of a source that varies; None if it is not understood, or if glTF's textures do not mean it."""
+        found = self._read(source, is_color)
+        if found is not None and found.texture is not None:
+            node = found.texture.node
+            if not reads_as_stored(node.image, is_color, nodes.is_used(node.outputs["Alpha"])):
+                return None
+            if is_encoded(node.image) or not has_pixels_of_all_frames(node.image, is_color) or (
+                node.image.source == "SEQUENCE" and found.texture.channel is not None
+            ):
+                return None
+        return found
+
+    def _read(self, source, is_color):
         node, one = source.node, (1.0, 1.0, 1.0) if is_color else 1.0
         if node.bl_idname == "ShaderNodeTexImage":
             if node.image is None:
@@ -185,7 +194,7 @@ class TextureReader:
         if not np.isfinite(constant).all():
             return None
         varying = nodes.follow(first if left is None else second, source.groups)
-        inner = self._textured(varying, is_color)
+        inner = self._read(varying, is_color)
         if inner is None:
             return None
         if is_color:
@@ -257,37 +266,41 @@ def image_options(node, writer, images, warn):
 
     @param  writer  GltfWriter
     @param  images  ImageExporter
-    @return         None without a file
+    @return         None without tiles
     """
     image = node.image
     is_data = image.colorspace_settings.is_data
+    is_opaque = image.alpha_mode == "NONE"
+    is_separate = is_data or image.alpha_mode == "CHANNEL_PACKED" or image.source == "FILE" and image.channels not in {2, 4}
+    uses_alpha = nodes.is_used(node.outputs["Alpha"])
+    associates = not (is_opaque or is_separate or uses_alpha)
     texture = Texture(node, None, Mapping())
 
     def info(uri):
         return {"index": writer.add_texture(uri, texture.wrap, texture.nearest)}
 
-    options = {"colorSpace": "linear" if is_data else "srgb"}
+    options = {"colorSpace": "linear" if is_linear(image) else "encoded-srgb" if is_encoded(image) else "srgb"}
     if node.bl_idname == "ShaderNodeTexEnvironment":
-        uri = images.color_uri(image, node.image_user, warn)
-        return {**options, "texture": info(uri)} if uri else None
+        uri, is_multiplied = images.stored_uri(image, node.image_user, not is_linear(image), warn, associates)
+        if associates and not is_multiplied:
+            options["alpha"] = "straight"
+        return {**options, "texture": info(uri)}
     is_multiplied = image.is_float and image.alpha_mode == "PREMUL"
     if image.source == "TILED":
-        uris = images.tile_uris(image, not is_data, warn)
+        uris = images.tile_uris(image, not is_linear(image), warn)
         tiles = [{"tile": number, "texture": info(uri), **options} for number, uri in sorted(uris.items())]
         if not tiles:
             return None
         # One tile is an image like any other, as in Cycles.
         options = {"tiles": tiles} if len(tiles) > 1 else {**options, "texture": tiles[0]["texture"]}
     else:
-        uri, is_multiplied = images.stored_uri(image, node.image_user, not is_data, warn)
-        if uri is None:
-            return None
+        uri, is_multiplied = images.stored_uri(image, node.image_user, not is_linear(image), warn, associates)
         options["texture"] = info(uri)
-    if image.alpha_mode == "NONE":
+    if is_opaque:
         options["alpha"] = "opaque"
-    elif not is_data and image.alpha_mode != "CHANNEL_PACKED" and image.channels in {2, 4}:
+    elif not is_separate:
         options["alpha"] = "associated" if is_multiplied else "straight"
-        if nodes.is_used(node.outputs["Alpha"]):
+        if uses_alpha:
             options["unassociate"] = True
     return options
 

@@ -8,7 +8,8 @@ from . import nodes
 from .axes import environment_rotation
 from .emission import EmissionTree
 from .graph import GraphWriter, NotUnderstood
-from .texture import MISSING, ies_uri
+from .image import MISSING, is_encoded, reads_as_stored
+from .texture import ies_uri, image_options
 
 
 def export_world(world, visible_to_camera, writer, images, report):
@@ -113,9 +114,9 @@ class _Surroundings(EmissionTree):
             return None
         if texture.node.image is None:
             return {"color": list(MISSING), "strength": strength}
+        if is_encoded(texture.node.image) or not reads_as_stored(texture.node.image, True, False):
+            return None
         uri = self._images.color_uri(texture.node.image, texture.node.image_user, self.warn)
-        if uri is None:
-            return {"color": list(MISSING), "strength": strength}
         return {"uri": uri, "strength": strength, "rotation": environment_rotation(turn)}
 
 
@@ -123,9 +124,12 @@ class WorldGraph(GraphWriter):
     """Value graph of a world, in which textures look into a direction."""
 
     def __init__(self, writer, images, warn):
-        super().__init__(lambda name: None, lambda node: None, lambda node: ies_uri(node, writer), warn)
-        self._writer = writer
-        self._images = images
+        super().__init__(
+            lambda name: None,
+            lambda node: image_options(node, writer, images, warn),
+            lambda node: ies_uri(node, writer),
+            warn,
+        )
 
     def output(self, source):
         own = {"ShaderNodeTexEnvironment": self._image_around, "ShaderNodeTexSky": self._sky}
@@ -138,9 +142,6 @@ class WorldGraph(GraphWriter):
         node = source.node
         if node.image is None:
             return self.op("combine-color", {"red": 1.0, "green": 0.0, "blue": 1.0}, "color")
-        uri = self._images.color_uri(node.image, node.image_user, self.warn)
-        if uri is None:
-            raise NotUnderstood(f'node "{node.name}": an image without file')
         if node.interpolation not in {"Linear", "Closest"}:
             self.warn(f'node "{node.name}": interpolation {node.interpolation}', "Linear was used")
         return self.op(
@@ -148,8 +149,7 @@ class WorldGraph(GraphWriter):
             {"vector": self.vector(node, source.groups, "generated")},
             "alpha" if source.socket.identifier == "Alpha" else "color",
             projection="mirror-ball" if node.projection == "MIRROR_BALL" else "equirectangular",
-            texture={"index": self._writer.add_texture(uri, _REPEAT, node.interpolation == "Closest")},
-            colorSpace="linear" if node.image.colorspace_settings.is_data else "srgb",
+            **self.texture(node),
         )
 
     def _sky(self, source):
@@ -180,10 +180,6 @@ class WorldGraph(GraphWriter):
             ozone=node.ozone_density,
         )
         return self.made_color(color)
-
-
-#: glTF's wrap mode.
-_REPEAT = 10497
 
 
 def _sun_angles(elevation, turn):
