@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <iostream>
 #include <random>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "integrator/computed_heights.h"
 #include "integrator/scene_context.h"
 #include "integrator/trace.h"
+#include "scene/memory.h"
 #include "tests/support/loaded_scene.h"
 #include "tests/support/test_rays.h"
 
@@ -107,6 +109,25 @@ TEST(ComputedHeights, OfAnyCoordinatesLetNoRayOut)
       EXPECT_EQ(num_leaks, 0) << graph;
     }
   }
+}
+
+/// A telescope sees a thousandth of a ball. As fine all over, it would be millions of parts.
+TEST(ComputedHeights, AreFewWhereATelescopeDoesNotLook)
+{
+  const Scene scene = load(ball({{"heightGraph", noise(reference(0, "object"), 3, 2)}, {"scale", 0.1}}));
+  DisplacementOptions options;
+  options.camera = scene.cameras[0].camera;
+  options.camera->half_width *= 1e-3f;
+  options.camera->half_height *= 1e-3f;
+  options.picture_height = 270;
+  const SceneContext narrow(scene, options);
+  EXPECT_LT(narrow.displacements.num_triangles(), 200'000u);
+  std::cout << "[ figures  ] " << narrow.displacements.num_triangles() << " parts\n";
+  // Where there is no room for them either.
+  options.picture_height = 27000;
+  memory_limit_set(memory_limit().bytes - memory_left() + (std::uint64_t{64} << 20));
+  EXPECT_THROW(SceneContext(scene, options), OutOfMemory);
+  memory_limit_reset();
 }
 
 /// Steps of a graph by hand: hits lie where its height says.
