@@ -1,12 +1,14 @@
 // Runs a compiled value graph over eight points at a time. One function an opcode of graph_ops.inc, then graph_run, which
 // decodes each instruction once for all lanes.
 //
-// Numbers are Blender's: a division by zero gives 0, roots and logarithms of what has none give 0.
+// Numbers are Blender's: a division by zero gives 0, roots and logarithms of what has none give 0, a negative power of 0 is
+// infinite.
 #pragma once
 
+#include <atomic>
 #include <cmath>
+#include <limits>
 
-#include "kernel/bsdf/fresnel.h"
 #include "kernel/graph/blackbody.h"
 #include "kernel/graph/color_spaces.h"
 #include "kernel/graph/gabor.h"
@@ -51,17 +53,22 @@ RELIEF_KERNEL F8 each_lane(F8 a, F8 b, F&& f)
 
 RELIEF_KERNEL F8 one_where(I8 is) { return is ? splat8(1.0f) : F8{}; }
 
-/// Power of a number that may be negative where the exponent is whole.
+/// A whole number of 32 bits as processors convert it: what does not fit is the lowest one.
+RELIEF_KERNEL int graph_int(float a)
+{
+  return a >= -2147483648.0f && a < 2147483648.0f ? static_cast<int>(a) : std::numeric_limits<int>::min();
+}
+
+/// Power of a number that may be negative where the exponent is whole and has 32 bits; elsewhere 0. Of 0 it is the library's, so
+/// that negative powers are infinite.
 RELIEF_KERNEL float graph_power(float a, float b)
 {
-  if (a < 0.0f && b != std::trunc(b)) return 0.0f;
-  if (b == 0.0f) return 1.0f;
-  return a == 0.0f ? 0.0f : std::pow(a, b);
+  return a < 0.0f && b != static_cast<float>(graph_int(b)) ? 0.0f : std::pow(a, b);
 }
 
 RELIEF_KERNEL float graph_logarithm(float a, float base)
 {
-  if (!(a > 0.0f && base > 0.0f)) return 0.0f;
+  if (a <= 0.0f || base <= 0.0f) return 0.0f;
   const float scale = std::log(base);
   return scale != 0.0f ? std::log(a) / scale : 0.0f;
 }
@@ -315,15 +322,21 @@ RELIEF_KERNEL float brick_tint(std::uint32_t row, std::uint32_t column)
   return 0.5f * static_cast<float>(n) / 1073741824.0f;
 }
 
+/// A number that is rounded before anything is added to it, where a compiler would fuse the two: Cycles does not, and far from the
+/// origin the difference is as large as a brick's mortar.
+RELIEF_KERNEL float graph_rounded(float a)
+{
+  asm("" : "+x"(a));
+  return a;
+}
+
 /// Bricks at x, y; then mortar size and smoothness, bias, width, height, offset, squash. Immediates: every how many rows are
 /// shifted, and squashed; 0: none. Outputs: tint, share of mortar.
 RELIEF_KERNEL void graph_brick(const GraphOperands& o)
 {
   alignas(32) float in[9][8], tint[8], mortar[8];
   for (int i = 0; i < 9; ++i) store8(in[i], graph_in(o, i));
-  const auto row_of = [](float a) {
-    return static_cast<int>(clamp(__builtin_floorf(a), -2147483648.0f, 2147483520.0f));
-  };
+  const auto row_of = [](float a) { return graph_int(__builtin_floorf(a)); };
   for (int k = 0; k < 8; ++k) {
     const float x_all = in[0][k], y_all = in[1][k], size = in[2][k], smooth = in[3][k], height = in[6][k];
     float width = in[5][k], shift = 0.0f;
@@ -331,11 +344,11 @@ RELIEF_KERNEL void graph_brick(const GraphOperands& o)
     const int shifted_rows = o.immediates[0], squashed_rows = o.immediates[1];
     if (shifted_rows != 0 && squashed_rows != 0) {
       width *= row % squashed_rows != 0 ? 1.0f : in[8][k];
-      shift = row % shifted_rows != 0 ? 0.0f : width * in[7][k];
+      shift = row % shifted_rows != 0 ? 0.0f : graph_rounded(width * in[7][k]);
     }
     const int column = row_of((x_all + shift) / width);
-    const float x = x_all + shift - width * static_cast<float>(column);
-    const float y = y_all - height * static_cast<float>(row);
+    const float x = x_all + shift - graph_rounded(width * static_cast<float>(column));
+    const float y = y_all - graph_rounded(height * static_cast<float>(row));
     tint[k] =
         clamp(brick_tint(static_cast<std::uint32_t>(row), static_cast<std::uint32_t>(column)) + in[4][k], 0.0f, 1.0f);
     const float inside = min(min(x, y), min(width - x, height - y));
@@ -457,13 +470,14 @@ RELIEF_KERNEL void graph_ies(const GraphOperands& o)
 /// 1 in every other cell of a lattice of unit cubes, but not in the one at the origin.
 RELIEF_KERNEL void graph_checker(const GraphOperands& o)
 {
-  F8 sum{};
+  // Of each axis by itself: far away a sum of three has lost the bit that says whether it is odd.
+  I8 is_odd{};
   for (int i = 0; i < 3; ++i) {
     // Keeps what lies on the border of two cells from flickering between them.
-    const F8 p = (graph_in(o, i) + 1e-6f) * 0.999999f;
-    sum += abs(floor(p));
+    const F8 cell = floor((graph_in(o, i) + 1e-6f) * 0.999999f);
+    is_odd ^= cell - 2.0f * floor(0.5f * cell) == 1.0f;  // NaN and infinity: even
   }
-  graph_set(o, 0, sum - 2.0f * floor(0.5f * sum));
+  graph_set(o, 0, one_where(is_odd));
 }
 
 /// Waves at x, y; then frequency, isotropy and the direction's angle as a fraction of a turn. Outputs: sums of cosines and sines.
@@ -507,12 +521,25 @@ RELIEF_KERNEL void graph_blackbody(const GraphOperands& o)
   for (int i = 0; i < 3; ++i) graph_set(o, i, load8(c[i]));
 }
 
+/// Reflectance of a dielectric. Normals that are linked may be longer than 1, and the cosine with them: the formula goes on there.
+/// @param c    >= 0
+/// @param eta  > 0
+/// @source     Cook and Torrance 1982, "A Reflectance Model for Computer Graphics"
+RELIEF_KERNEL float graph_reflectance(float c, float eta)
+{
+  const float squared = eta * eta - 1.0f + c * c;
+  if (!(squared > 0.0f)) return 1.0f;
+  const float g = __builtin_sqrtf(squared);
+  const float across = (g - c) / (g + c);
+  const float along = (c * (g + c) - 1.0f) / (c * (g - c) + 1.0f);
+  return 0.5f * across * across * (1.0f + along * along);
+}
+
 /// Reflectance of a dielectric for a cosine and an index of refraction.
 RELIEF_KERNEL void graph_fresnel(const GraphOperands& o)
 {
   graph_set(o, 0, each_lane(graph_in(o, 0), graph_in(o, 1), [](float cos_i, float eta) {
-              const float c = min(1.0f, __builtin_fabsf(cos_i));
-              return fresnel_dielectric(c, refracted_cosine(c, eta), eta);
+              return graph_reflectance(__builtin_fabsf(cos_i), eta);
             }));
 }
 
@@ -545,12 +572,23 @@ RELIEF_KERNEL void graph_skip(const GraphOperands& o)
   o.next += o.immediates[0] | std::uint32_t{o.immediates[1]} << 16;
 }
 
+/// Operations after which a run asks whether it is to be given up. The dearest take a millisecond each.
+inline constexpr unsigned kGraphOpsAPoll = 16;
+
 /// Runs a program: see GraphRun.
-RELIEF_KERNEL void graph_run(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers)
+/// @param stop  true: the run is given up, and all that it gives is 0; null: never
+RELIEF_KERNEL void graph_run(const GraphProgramView& program,
+                             const TextureView* textures,
+                             GraphRegisters& registers,
+                             const std::atomic<bool>* stop = nullptr)
 {
   const std::uint16_t* word = program.code;
   const std::uint16_t* const end = word + program.num_words;
-  while (word < end) {
+  for (unsigned count = 0; word < end; ++count) {
+    if (count % kGraphOpsAPoll == 0 && stop != nullptr && stop->load(std::memory_order_relaxed)) [[unlikely]] {
+      for (F8& lanes : registers.lanes) lanes = F8{};
+      return;
+    }
     const auto op = static_cast<GraphOp>(*word++);
     const GraphOpShape& shape = kGraphOpShapes[static_cast<int>(op)];
     const std::uint16_t* immediates = word;

@@ -1,4 +1,5 @@
 // Nodes of colours: ramps, curves, mixes, spaces.
+#include <algorithm>
 #include <array>
 
 #include "kernel/math/cie_1931.h"
@@ -177,7 +178,12 @@ void lower_mix_color(GraphNode& n)
   // Of a factor of 0 the other colour does not matter in any way of mixing, of one of 1 the first does in most.
   const GraphScalar rest = b(Op::subtract, {b.constant(1), t});
   const GraphVector x = blend == "mix" ? guarded(n.vector("a"), rest) : n.vector("a");
-  GraphVector out = blend_colors(b, blend, t, x, guarded(n.vector("b"), t));
+  // A known factor of 0 leaves colours alone, also those that a way of mixing would cut off or send through hues; but for three,
+  // as Cycles does it.
+  constexpr std::string_view kAlways[] = {"lighten", "dodge", "burn"};
+  float known = 1;
+  const bool is_off = b.is_constant(t, &known) && known == 0 && std::ranges::find(kAlways, blend) == std::end(kAlways);
+  GraphVector out = is_off ? x : blend_colors(b, blend, t, x, guarded(n.vector("b"), t));
   if (n.reader.boolean("clampResult", false)) out = clamped(b, out);
   n.set("color", out, kColor);
 }
@@ -217,7 +223,10 @@ void lower_gamma(GraphNode& n)
   GraphVector out;
   for (std::size_t i = 0; i < 3; ++i) {
     const GraphScalar c = n.vector("color")[i];
-    out[i] = b(Op::select, {b(Op::greater_than, {c, b.constant(0)}), b(Op::power, {c, n.number("gamma")}), c});
+    const GraphScalar bent =
+        b(Op::select, {b(Op::greater_than, {c, b.constant(0)}), b(Op::power, {c, n.number("gamma")}), c});
+    // What is not above 0 stays as it is, but of a gamma of 0 all is 1.
+    out[i] = b(Op::select, {n.number("gamma"), bent, b.constant(1)});
   }
   n.set("color", out, kColor);
 }

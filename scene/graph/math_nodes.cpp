@@ -1,5 +1,6 @@
 // Nodes of numbers and vectors.
 #include <array>
+#include <limits>
 #include <tuple>
 
 #include "scene/graph/graph_nodes.h"
@@ -50,12 +51,14 @@ GraphScalar smoother_step(GraphBuilder& b, GraphScalar t)
 }
 
 /// A number from one range as one of another.
+/// @param of_nothing  what a range without width gives
 GraphScalar mapped(GraphBuilder& b,
                    int kind,
                    GraphScalar value,
                    const std::array<GraphScalar, 4>& range,
                    GraphScalar steps,
-                   bool clamp)
+                   bool clamp,
+                   GraphScalar of_nothing)
 {
   const auto [from_low, from_high, to_low, to_high] = range;
   GraphScalar t = b(Op::divide, {b(Op::subtract, {value, from_low}), b(Op::subtract, {from_high, from_low})});
@@ -68,8 +71,8 @@ GraphScalar mapped(GraphBuilder& b,
   }
   GraphScalar out = b(Op::add, {to_low, b(Op::multiply, {t, b(Op::subtract, {to_high, to_low})})});
   const GraphScalar width = b(Op::subtract, {from_high, from_low});
-  out = b(Op::select, {width, out, b.constant(0)});
-  if (!clamp || kind > 1) return out;
+  out = b(Op::select, {width, out, of_nothing});
+  if (!clamp) return out;
   return b(Op::minimum, {b(Op::maximum, {out, b(Op::minimum, {to_low, to_high})}), b(Op::maximum, {to_low, to_high})});
 }
 
@@ -82,7 +85,7 @@ void lower_map_range(GraphNode& n)
   const int kind = n.reader.choice("interpolation", kMapKinds, 0);
   n.set("value", mapped(n.build, kind, n.number("value"),
                         {n.number("fromMin"), n.number("fromMax"), n.number("toMin"), n.number("toMax")},
-                        n.number("steps"), n.reader.boolean("clamp", true)));
+                        n.number("steps"), n.reader.boolean("clamp", true), n.build.constant(0)));
 }
 
 constexpr GraphSocket kMapVectorInputs[] = {
@@ -91,12 +94,13 @@ constexpr GraphSocket kMapVectorInputs[] = {
 void lower_map_vector(GraphNode& n)
 {
   const int kind = n.reader.choice("interpolation", kMapKinds, 0);
-  const bool clamp = n.reader.boolean("clamp", true);
+  // What is smoothed stays within anyway.
+  const bool clamp = n.reader.boolean("clamp", true) && kind < 2;
   GraphVector out;
   for (std::size_t i = 0; i < 3; ++i) {
     out[i] = mapped(n.build, kind, n.vector("vector")[i],
                     {n.vector("fromMin")[i], n.vector("fromMax")[i], n.vector("toMin")[i], n.vector("toMax")[i]},
-                    n.vector("steps")[i], clamp);
+                    n.vector("steps")[i], clamp, n.vector("toMin")[i]);
   }
   n.set("vector", out, kVector);
 }
@@ -236,8 +240,9 @@ GraphScalar math(GraphBuilder& b, std::string_view op, GraphScalar x, GraphScala
   if (op == "inverse-square-root") return b(Op::divide, {one, b(Op::square_root, {x})});
   if (op == "compare") {
     const GraphScalar distance = b(Op::absolute, {b(Op::subtract, {x, y})});
-    const GraphScalar tolerance = b(Op::maximum, {z, b.constant(1e-5f)});
-    return b(Op::subtract, {one, b(Op::greater_than, {distance, tolerance})});
+    const GraphScalar tolerance = b(Op::maximum, {z, b.constant(std::numeric_limits<float>::epsilon())});
+    // Equal infinities have no distance.
+    return b(Op::select, {b(Op::greater_than, {distance, tolerance}), b(Op::equal, {x, y}), one});
   }
   if (op == "smooth-minimum") return b(Op::select, {z, smooth_minimum(b, x, y, z), b(Op::minimum, {x, y})});
   if (op == "smooth-maximum") {

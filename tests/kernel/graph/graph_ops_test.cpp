@@ -15,8 +15,6 @@ using test::run_one;
 using Op = GraphOp;
 using In = const double*;
 
-double fraction_free(double a, double b) { return b == std::trunc(b) || a >= 0 ? 1 : 0; }
-
 struct Definition {
   Op op;
   std::function<double(In)> value;
@@ -47,10 +45,10 @@ const Definition kDefinitions[] = {
     {Op::square_root, [](In x) { return x[0] > 0 ? std::sqrt(x[0]) : 0; }},
     {Op::power,
      [](In x) {
-       if (x[0] < 0 && fraction_free(x[0], x[1]) == 0) return 0.0;
-       return x[1] == 0 ? 1.0 : x[0] == 0 ? 0.0 : std::pow(x[0], x[1]);
+       const bool is_whole = x[1] == std::trunc(x[1]) && x[1] >= -0x1p31 && x[1] < 0x1p31;
+       return x[0] < 0 && !is_whole ? 0.0 : std::pow(x[0], x[1]);
      }},
-    {Op::logarithm, [](In x) { return x[0] > 0 && x[1] > 0 && x[1] != 1 ? std::log(x[0]) / std::log(x[1]) : 0; }},
+    {Op::logarithm, [](In x) { return x[0] <= 0 || x[1] <= 0 || x[1] == 1 ? 0 : std::log(x[0]) / std::log(x[1]); }},
     {Op::exponent, [](In x) { return std::exp(x[0]); }},
     {Op::modulo, [](In x) { return x[1] == 0 ? 0 : std::fmod(x[0], x[1]); }},
     {Op::sine, [](In x) { return std::sin(x[0]); }},
@@ -354,7 +352,10 @@ TEST(GraphInterpreters, StayWithinWhatTheyPromise)
     check(of(Op::voronoi_1d), {4, 0}, 1, 0, 4, of_cells);
   }
   check(Op::brick, {2, 2}, 2, 0, 1, unchanged);
-  check(Op::fresnel, {}, 1, 0, 1.0001, [&](auto& in) { in[1] = numbers.row(0.01f, 100); });
+  check(Op::fresnel, {}, 1, 0, 1.0001, [&](auto& in) {
+    in[0] = numbers.row(-1, 1);
+    in[1] = numbers.row(0.01f, 100);
+  });
 }
 
 }  // namespace
