@@ -98,6 +98,9 @@ NORMAL_MAPS_OVER_UNIT_NORMALS = IS_5_0
 #: Footprints away that the bump of a displacement asks for heights, and a Bump node that has no Filter Width.
 BUMP_WIDTH = 0.1 if IS_5_0 else 1.0
 
+#: Up to 3.5 Bump nodes themselves bend normals back until the viewer is reflected above the surface; then closures alone do.
+BUMP_REFLECTS_ABOVE = bpy.app.version < (3, 6, 0)
+
 #: Before 4 the Hue/Saturation node cut whole turns off towards 0, so that hues below 0 stayed below.
 HUE_GOES_ROUND = IS_4_0
 
@@ -106,6 +109,9 @@ TEXTURE_MATHS = "5.2" if IS_5_0 else "4.3" if IS_4_0 else None
 
 #: Entries of the tables that stand for ramps and curves, as many as Cycles'. Checked in 3.4 and 4.3.
 TABLE_ENTRIES = 257 if IS_4_0 else 256
+
+#: Since 4.1 Cycles reads IES files of type A.
+IES_HAS_TYPE_A = IS_4_1
 
 
 def is_green_down(normal_map):

@@ -77,6 +77,11 @@ GraphScalar GraphBuilder::quantity(GraphQuantity quantity, std::uint16_t index, 
                     std::bit_cast<std::int32_t>(width)});
 }
 
+GraphScalar GraphBuilder::quantity_here(GraphQuantity quantity, std::uint16_t index)
+{
+  return this->quantity(quantity, index, GraphShift::kNone, 0);
+}
+
 bool GraphBuilder::is_constant(GraphScalar a, float* value) const
 {
   const Node& node = nodes_[static_cast<std::size_t>(a.index)];
@@ -355,7 +360,7 @@ GraphScalar GraphBuilder::shifted(GraphScalar a, GraphShift shift, float width)
 {
   return rewritten(a, shifted_[{shift, width}], [&](GraphScalar of, const Node& node) {
     // What a bump within a bump has moved already stays where it is.
-    const bool moves = node.kind == Node::Kind::kQuantity && node.shift == GraphShift::kNone;
+    const bool moves = node.kind == Node::Kind::kQuantity && node.shift == GraphShift::kNone && node.width != 0;
     return moves ? quantity(node.quantity, node.index, shift, width) : of;
   });
 }

@@ -43,6 +43,9 @@ class GraphBuilder {
                        GraphShift shift = GraphShift::kNone,
                        float width = 1);
 
+  /// A quantity that no bump moves: it is asked for at the point, wherever a height that depends on it is.
+  GraphScalar quantity_here(GraphQuantity quantity, std::uint16_t index = 0);
+
   /// @param inputs      as many as the operation has
   /// @param immediates  likewise
   /// @return            its outputs
@@ -100,7 +103,7 @@ class GraphBuilder {
     GraphQuantity quantity{};
     GraphShift shift{};
     std::uint16_t index = 0;  ///< of the quantity
-    float width = 1;          ///< of the shift
+    float width = 1;          ///< of the shift; 0: there is to be none
   };
   struct Operation {
     GraphOp op;

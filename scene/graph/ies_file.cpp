@@ -175,10 +175,13 @@ void fill_type_b(IesProfile& p)
 IesProfile ies_parse(std::string_view text, const std::string& file, const std::string& json_path)
 {
   constexpr std::string_view kTilt = "TILT=";
-  std::size_t tilt = text.starts_with(kTilt) ? 0 : text.find("\nTILT=");
+  // Lines end with CR LF, and in files of some makers with either of them.
+  std::size_t tilt = text.find(kTilt);
+  while (tilt != std::string_view::npos && tilt > 0 && text[tilt - 1] != '\n' && text[tilt - 1] != '\r') {
+    tilt = text.find(kTilt, tilt + 1);
+  }
   const Numbers whole(text, file, json_path);
   if (tilt == std::string_view::npos) whole.fail("a line TILT=…", "none");
-  if (tilt > 0) ++tilt;
   const std::string_view kind = text.substr(tilt + kTilt.size(), 7);
   const std::size_t line_end = std::min(text.find_first_of("\r\n", tilt), text.size());
   Numbers numbers(text.substr(line_end), file, json_path);
@@ -190,7 +193,7 @@ IesProfile ies_parse(std::string_view text, const std::string& file, const std::
   numbers.next("a number of lamps");
   numbers.next("lumens");
   double factor = numbers.next("a candela multiplier");
-  const std::size_t num_vertical = numbers.count("a number of vertical angles", 2, kMostAngles);
+  const std::size_t num_vertical = numbers.count("a number of vertical angles", 1, kMostAngles);
   const std::size_t num_horizontal = numbers.count("a number of horizontal angles", 1, kMostAngles);
   if (num_vertical * num_horizontal > kMostValues) {
     numbers.fail("at most 1,048,576 values", std::to_string(num_vertical * num_horizontal));
@@ -210,6 +213,11 @@ IesProfile ies_parse(std::string_view text, const std::string& file, const std::
       row.push_back(static_cast<float>(numbers.next("candelas") * factor * IesProfile::kWattsPerCandela));
       if (!std::isfinite(row.back())) numbers.fail("finite candelas", number_text(static_cast<double>(row.back())));
     }
+  }
+  if (type == 1 && num_vertical == 1) {
+    // Within a single angle there is nothing, so that the luminaire is dark, in Blender too.
+    profile.vertical = {0, 180};
+    for (std::vector<float>& row : profile.rows) row = {0.0f, 0.0f};
   }
   if (type == 1) fill_type_c(profile);
   if (type == 2) fill_type_b(profile);

@@ -185,7 +185,10 @@ void lower_light_path(GraphNode& n)
 void lower_camera_data(GraphNode& n)
 {
   GraphBuilder& b = n.build;
-  const GraphVector seen = transformed(b, Q::camera_from_world, position(b), true);
+  // As in Cycles, heights of a bump see the depth of the point itself.
+  const GraphVector here = {b.quantity_here(Q::position_x), b.quantity_here(Q::position_y),
+                            b.quantity_here(Q::position_z)};
+  const GraphVector seen = transformed(b, Q::camera_from_world, here, true);
   n.set("vector", normalized(b, seen), kVector);
   n.set("depth", seen[2]);
   n.set("distance", b(Op::square_root, {dot(b, seen, seen)}));
@@ -268,7 +271,8 @@ void lower_ambient_occlusion(GraphNode& n)
   if (is_inside) normal = {negative(b, normal[0]), negative(b, normal[1]), negative(b, normal[2])};
   std::vector<GraphScalar> in;
   for (const std::uint16_t side : {std::uint16_t{0}, std::uint16_t{1}}) {
-    for (const Q q : {Q::ray_origin_x, Q::ray_origin_y, Q::ray_origin_z}) in.push_back(b.quantity(q, side));
+    // As in Cycles, heights of a bump see what is open over the point itself.
+    for (const Q q : {Q::ray_origin_x, Q::ray_origin_y, Q::ray_origin_z}) in.push_back(b.quantity_here(q, side));
   }
   const GraphVector true_normal = quantities(b, Q::true_normal_x, Q::true_normal_y, Q::true_normal_z);
   for (const GraphVector& v : {true_normal, normal, incoming(b)}) in.insert(in.end(), v.begin(), v.end());
@@ -409,6 +413,28 @@ void lower_layer_weight(GraphNode& n)
   n.set("facing", b(Op::subtract, {one, b(Op::power, {b(Op::absolute, {cosine}), exponent})}));
 }
 
+/// A normal turned towards the true one, in the plane of both, until a mirror reflects the viewer's direction above the surface.
+///
+/// In that plane mirroring adds angles: the normal lies half way between the viewer's projection and the reflected direction's.
+GraphVector reflecting_above(GraphBuilder& b, const GraphVector& normal)
+{
+  const GraphVector Ng = quantities(b, Q::true_normal_x, Q::true_normal_y, Q::true_normal_z), wo = incoming(b);
+  const GraphScalar height_o = dot(b, Ng, wo), along = dot(b, normal, Ng), one = b.constant(1);
+  // Rays may always leave as shallow as they come.
+  const GraphScalar least = b(Op::minimum, {scaled(b, height_o, 0.9f), b.constant(0.01f)});
+  const GraphScalar height = b(Op::subtract, {scaled(b, b(Op::multiply, {dot(b, normal, wo), along}), 2), height_o});
+  const GraphVector X = normalized(b, difference(b, normal, product(b, Ng, along)));
+  const GraphScalar x = dot(b, wo, X);
+  const GraphScalar squared = b(Op::add, {b(Op::multiply, {x, x}), b(Op::multiply, {height_o, height_o})});
+  const GraphScalar length = b(Op::square_root, {squared});
+  const GraphScalar reflected_z = b(Op::divide, {least, length});
+  const GraphScalar rest = b(Op::subtract, {one, b(Op::multiply, {reflected_z, reflected_z})});
+  const GraphScalar reflected_x = b(Op::square_root, {rest});
+  const GraphVector middle = sum(b, product(b, X, b(Op::add, {b(Op::divide, {x, length}), reflected_x})),
+                                 product(b, Ng, b(Op::add, {b(Op::divide, {height_o, length}), reflected_z})));
+  return selected(b, b(Op::less_than, {height, least}), normalized(b, middle), normal);
+}
+
 constexpr GraphSocket kBumpInputs[] = {{"strength", kNumber, {1}},
                                        {"distance", kNumber, {1}},
                                        {"height", kNumber, {1}},
@@ -440,7 +466,8 @@ void lower_bump(GraphNode& n)
     bent[c] = b(Op::subtract, {b(Op::multiply, {size, N[c]}), gradient});
   }
   const GraphScalar strength = b(Op::maximum, {n.number("strength"), b.constant(0)});
-  n.set("normal", normalized(b, mixed(b, strength, N, normalized(b, bent))), kVector);
+  const GraphVector normal = normalized(b, mixed(b, strength, N, normalized(b, bent)));
+  n.set("normal", n.reader.boolean("reflectsAbove", false) ? reflecting_above(b, normal) : normal, kVector);
 }
 
 constexpr GraphNodeKind kKinds[] = {

@@ -433,6 +433,23 @@ def test_missing_ies_file():
     assert_warns(_ies_scene(make), "IES Texture", "without a file")
 
 
+def test_ies_files_that_cycles_does_not_read():
+    """It takes 100 for them; the program reads them, and the difference is told."""
+    texts = {"CR alone": _ies().replace("\n", "\r"), "begins with TILT": _ies().partition("none\n")[2]}
+    if not IS_4_0:
+        texts["of type A"] = _ies(vertical=[-90, 0, 90], horizontal=[0, 90], kind=3)
+    for what, text in texts.items():
+        with folder() as path:
+            name = os.path.join(path, "profile.ies")
+            with open(name, "w", newline="") as file:
+                file.write(text)
+
+            def make(node):
+                node.mode, node.filepath = "EXTERNAL", name
+
+            assert_warns(_ies_scene(make), "IES Texture", what)
+
+
 def test_spread_of_areas():
     for shape, spread in (("RECTANGLE", 100), ("DISK", 60)):
         scene = _stage(lambda: _add_area(shape=shape, spread=math.radians(spread)))

@@ -33,6 +33,7 @@ class GraphWriter:
     @param  view_layer      gives the things whose properties are the view layer's attributes, the first one first
     nodes          JSON of the nodes so far
     uses_generated whether meshes need _GENERATED
+    uses_tangents  whether tangents along the uv map that is active in renders are read
     attributes     attributes of meshes that are read: see attributes.py
     values         values of objects that are read: see instance_values.py
     own_normal     reference to the surface's normal as a displacement bumps it; None: it is the mesh's
@@ -45,7 +46,7 @@ class GraphWriter:
         self.ies = ies
         self.warn = warn
         self.nodes = []
-        self.uses_generated = False
+        self.uses_generated = self.uses_tangents = False
         self.material_index = material_index
         self.view_layer = view_layer
         self.attributes = []
@@ -609,7 +610,13 @@ def _bump(g, node, groups):
     normal = g.normal(node.inputs["Normal"], groups)
     if normal is not None:
         inputs["normal"] = normal
-    return g.add("bump", inputs, invert=node.invert or None, filterWidth=_unless_1(compat.bump_width(node)))
+    return g.add(
+        "bump",
+        inputs,
+        invert=node.invert or None,
+        filterWidth=_unless_1(compat.bump_width(node)),
+        reflectsAbove=compat.BUMP_REFLECTS_ABOVE or None,
+    )
 
 
 def _unless_1(width):
@@ -636,7 +643,8 @@ def bump_of_displacement(g, source):
     else:
         height = _along_normal(g, _displacement(g, source))
     inputs = {"height": height, "strength": 1.0, "distance": 1.0}
-    return g.op("bump", inputs, "normal", filterWidth=_unless_1(compat.BUMP_WIDTH))
+    options = {"filterWidth": _unless_1(compat.BUMP_WIDTH), "reflectsAbove": compat.BUMP_REFLECTS_ABOVE or None}
+    return g.op("bump", inputs, "normal", **options)
 
 
 def _direction(g, node, groups):

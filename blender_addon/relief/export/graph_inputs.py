@@ -155,6 +155,7 @@ def _tangent_set(g, node):
     number = g.coordinate_set(("uv", node.uv_map))
     if number is None:
         raise not_understood(node, "tangents of a third uv map")
+    g.uses_tangents = g.uses_tangents or not node.uv_map
     return number or None
 
 
@@ -244,6 +245,24 @@ def _light_falloff(g, source):
     return _output(g.add("light-falloff", inputs), source.socket.identifier.lower())
 
 
+def _unread_by_cycles(node):
+    """What keeps Cycles from reading a node's IES file that the program reads; None: nothing."""
+    if node.mode == "INTERNAL":
+        return None
+    try:
+        with open(bpy.path.abspath(node.filepath, library=node.id_data.library), "rb") as file:
+            # Where lines end, and the type of photometry, are seen in the beginning.
+            data = file.read(1 << 16)
+    except OSError:
+        return None
+    if b"\nTILT=" not in data and (b"\rTILT=" in data or data.startswith(b"TILT=")):
+        return "whose lines end with CR alone" if b"\n" not in data else "that begins with TILT"
+    words = data.partition(b"\nTILT=")[2].replace(b",", b" ").split()
+    if not compat.IES_HAS_TYPE_A and words[:1] == [b"NONE"] and words[6:7] == [b"3"]:
+        return "of type A"
+    return None
+
+
 def _ies(g, source):
     node, groups = source.node, source.groups
     strength = g.inputs(node, groups, {"Strength": "strength"})["strength"]
@@ -251,6 +270,9 @@ def _ies(g, source):
     if uri is None:
         g.warn(f'node "{node.name}" ({node.bl_label}) without a file', "its strength times 100 was used, as in Cycles")
         return _output(g.add("math", {"a": strength, "b": 100.0}, operation="multiply"), "value")
+    what = _unread_by_cycles(node)
+    if what is not None:
+        g.warn(f'node "{node.name}" ({node.bl_label}): an IES file {what}', "it was read; Cycles takes 100 times the strength")
     socket = node.inputs["Vector"]
     vector = g.value(socket, groups) if nodes.linked(socket, groups) is not None else g.coordinate_normal()
     inputs = {"vector": g.mapped(node, vector), "strength": strength}

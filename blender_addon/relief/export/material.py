@@ -211,6 +211,7 @@ class MaterialJob:
             self._displaced,
             self._by_shading,
             any(graph.uses_generated for graph in graphs),
+            any(graph.uses_tangents for graph in graphs),
             tuple(sorted({attribute for graph in graphs for attribute in graph.attributes})),
             tuple(sorted({value for graph in graphs for value in graph.values})),
         )

@@ -29,6 +29,7 @@ class Wanted:
     displaced    normals say where surfaces go to, so they must not open flat-shaded edges
     by_shading   smooth and flat faces have materials of their own
     generated    value graphs read the coordinates that Blender generates
+    tangents     value graphs read tangents along the uv map that is active in renders
     attributes   that value graphs read by name: see attributes.py
     values       of objects that value graphs read: see instance_values.py; the mesh does not depend on them
     """
@@ -38,6 +39,7 @@ class Wanted:
     displaced: bool = False
     by_shading: bool = False
     generated: bool = False
+    tangents: bool = False
     attributes: tuple = ()
     values: tuple = field(default=(), compare=False)
 
@@ -132,6 +134,8 @@ class _Corners:
             uv = np.empty(2 * len(self.mesh.loops), dtype=np.float32)
             layer.data.foreach_get("uv", uv)
             uv = uv.reshape(-1, 2)
+        elif kind == "around":
+            uv = self._around()
         else:
             uv = self.positions[self.vertex, :2]
             if kind == "generated":
@@ -141,14 +145,28 @@ class _Corners:
         out[:, 1] = 1 - uv[:, 1]
         return self._finite(out, "texture coordinates")
 
-    def _read_generated(self):
-        # Of the mesh at rest, carried along by modifiers that make or remove vertices; Blender's texture space is its box.
+    def _rest(self):
+        """Where vertices are at rest: float32 (vertices, 3)."""
         rest = np.empty(3 * len(self.mesh.vertices), dtype=np.float32)
         self.mesh.vertices.foreach_get("undeformed_co", rest)
+        return rest.reshape(-1, 3)
+
+    def _around(self):
+        """Longitude and latitude around the object's origin, 0 … 1: what Cycles takes for a uv map that tangents lack."""
+        x, y, z = self._rest().astype(np.float64).T
+        length = np.sqrt(x * x + y * y + z * z)
+        longitude = np.where((x == 0) & (y == 0), 0, 0.5 - np.arctan2(x, y) / (2 * np.pi))
+        cosine = np.divide(z, length, out=np.ones_like(z), where=length > 0)
+        uv = np.stack([longitude, 1 - np.arccos(np.clip(cosine, -1, 1)) / np.pi], axis=-1)
+        uv[length == 0] = 0
+        return uv.astype(np.float32)[self.vertex]
+
+    def _read_generated(self):
+        # Of the mesh at rest, carried along by modifiers that make or remove vertices; Blender's texture space is its box.
         location = np.array(self.mesh.texspace_location, dtype=np.float32)
         size = np.array(self.mesh.texspace_size, dtype=np.float32)
         per_metre = np.divide(np.float32(0.5), size, out=np.zeros_like(size), where=size != 0)
-        generated = (rest.reshape(-1, 3) - location) * per_metre + np.float32(0.5)
+        generated = (self._rest() - location) * per_metre + np.float32(0.5)
         return self._finite(generated, "generated coordinates")[self.vertex]
 
     def _finite(self, values, what):
@@ -301,7 +319,9 @@ def _primitive_arrays(corners, triangles, joiner, wanted, shapes, warn):
     per_loop = {"NORMAL": corners.displacement_normals() if wanted.displaced else corners.normals}
     for number, source in enumerate(wanted.coordinates):
         uv = corners.coordinates(source)
-        if uv is None:
+        if uv is None and wanted.tangents and not source[1] and len(corners.mesh.uv_layers) == 0:
+            uv = corners.coordinates(("around", ""))
+        elif uv is None:
             warn(f'no uv map "{source[1]}"' if source[1] else "a textured material, but no uv map")
             uv = np.broadcast_to(np.float32(0), (len(corners.vertex), 2))
         per_loop[f"TEXCOORD_{number}"] = uv
