@@ -215,7 +215,14 @@ RELIEF_KERNEL void brick_op(const GraphRangeOperands& o) { set_all(o, 2, unit())
 
 RELIEF_KERNEL void fresnel_op(const GraphRangeOperands& o)
 {
-  o.set(0, range_select(o.in(1).low > 0.0f, range_between(F8{}, splat8(1.0001f)), range_unknown()));
+  const GraphRange cosine = o.in(0), eta = o.in(1);
+  // The cosines of unit vectors, rounded; those of longer ones have bounds where the index is 1 at least: Cook and Torrance's
+  // second factor is c (g − c) at most, which is less than (η² − 1) / 2.
+  const I8 is_unit = (cosine.low >= -1.00001f) & (cosine.high <= 1.00001f) & (eta.low > 0.0f);
+  const F8 half = max(splat8(1.0f), 0.5f * eta.high * eta.high);
+  const GraphRange longer = range_between(F8{}, (0.5f + 0.5f * half * half) * 1.0001f);
+  o.set(0, range_select(is_unit, range_between(F8{}, splat8(1.01f)),
+                        range_select(eta.low >= 1.0f, longer, range_unknown())));
 }
 
 RELIEF_KERNEL void checker_op(const GraphRangeOperands& o) { o.set(0, unit()); }
