@@ -332,7 +332,7 @@ void occluded(const RTCOccludedFunctionNArguments* arguments)
         break;
       }
       // As far as a path moves on past a surface: the next search rounds the same hit to another last bit.
-      t_min = next_float_up(static_cast<float>(hit.t));
+      t_min = t_min_behind(static_cast<float>(hit.t));
     }
   }
 }

@@ -57,7 +57,10 @@ class FarRay {
     ray->org_x = static_cast<float>(start_.O.x);
     ray->org_y = static_cast<float>(start_.O.y);
     ray->org_z = static_cast<float>(start_.O.z);
-    ray->tnear = static_cast<float>(max(static_cast<double>(ray->tnear) - start_.t, 0.0));
+    // Rounded up: rounded down to where a hit was, a ray that goes on behind it would find it again.
+    const double from = max(static_cast<double>(ray->tnear) - start_.t, 0.0);
+    const auto rounded = static_cast<float>(from);
+    ray->tnear = static_cast<double>(rounded) < from ? t_min_behind(rounded) : rounded;
     ray->tfar = static_cast<float>(static_cast<double>(ray->tfar) - start_.t);
     meets_ = start_.t >= 0 && ray->tnear <= ray->tfar;
   }

@@ -75,7 +75,7 @@ struct LampPoint {
     const bool is_point = !is_flat && !is_sun && !(light.radius > 0.0f);
     const bool is_ball = !is_flat && !is_sun && !is_point && !light.faces_viewer;
     // Of a point the place is known without the rounding of a distance: patterns have edges at round numbers.
-    hit.P = is_sun ? light.axis : is_point ? light.P : at.P;
+    hit.P = is_sun ? at.wo : is_point ? light.P : at.P;
     hit.Ng = is_flat ? light.axis : is_ball ? normalize(at.P - light.P) : at.wo;
     hit.Ns = hit.Ng;
     uv = lamp_uv(light, lamp, hit.P, hit.Ng, wo);
@@ -165,6 +165,11 @@ LampSample lamp_sample(const Light& light, std::uint32_t index)
     case LightKind::kSpot: {
       const Vec3f wo = from_local(frame_from_normal(light.axis), warp_cone(1.0f - light.cos_outer, u));
       return {{light.P + wo * light.radius, {}, wo, kSomeRay}, spot_light_falloff(light, dot(wo, light.axis))};
+    }
+    case LightKind::kSun: {
+      const Vec3f wo =
+          light_is_sun_disk(light) ? from_local(frame_from_normal(light.axis), warp_cone(light.cone, u)) : light.axis;
+      return {{{}, {}, wo, kSomeRay}, 1.0f};
     }
     default:
       return {{{}, {}, light.axis, kSomeRay}, 1.0f};

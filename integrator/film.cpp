@@ -15,7 +15,7 @@ namespace relief {
 
 namespace {
 
-AccumulatorLayout layout_make(std::uint32_t aov_mask, int cryptomatte_levels)
+AccumulatorLayout layout_make(std::uint32_t aov_mask, int cryptomatte_levels, bool keeps_clear)
 {
   AccumulatorLayout layout;
   layout.cryptomatte_levels = cryptomatte_levels;
@@ -44,6 +44,7 @@ AccumulatorLayout layout_make(std::uint32_t aov_mask, int cryptomatte_levels)
   keep(Aov::kDenoisingNormal, 3, layout.denoising_normal);
   keep(Aov::kDenoisingDepth, 1, layout.denoising_depth);
   keep(Aov::kDenoisingHalf, 7, layout.denoising_half);
+  if (keeps_clear) layout.clear = layout.num_floats++;
   layout.denoising = layout.denoising_albedo >= 0 || layout.denoising_normal >= 0 || layout.denoising_half >= 0;
   for (int i = 0; i < kNumCryptomattes; ++i) {
     keep(static_cast<Aov>(kFirstCryptomatte + i), 2 * cryptomatte_levels, layout.cryptomatte[i]);
@@ -165,13 +166,13 @@ static std::size_t sums_size(int width, int height, const AccumulatorLayout& lay
   return size;
 }
 
-Film::Film(int width, int height, std::uint32_t aov_mask, int cryptomatte_levels)
+Film::Film(int width, int height, std::uint32_t aov_mask, int cryptomatte_levels, bool keeps_clear)
     : width_(width),
       height_(height),
       tiles_x_((width + kTileSize - 1) / kTileSize),
       tiles_y_((height + kTileSize - 1) / kTileSize),
       aov_mask_(aov_mask | 1u << static_cast<int>(Aov::kBeauty)),
-      layout_(layout_make(aov_mask_, cryptomatte_levels)),
+      layout_(layout_make(aov_mask_, cryptomatte_levels, keeps_clear)),
       sums_(sums_size(width, height, layout_)),
       samples_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_))
 {
@@ -408,7 +409,7 @@ void Film::resolve_pixel(const float* in,
   const float inverse_hits = hits > 0.0f ? 1.0f / hits : 0.0f;
   if (float* p = plane(Aov::kBeauty)) {
     put3(p, pixel.mean * exposure);
-    p[3] = hits * inverse_n;
+    p[3] = alpha(in, samples);
   }
   if (float* p = plane(Aov::kDirect)) put3(p, load3(in + layout_.direct) * light);
   if (float* p = plane(Aov::kIndirect)) put3(p, pixel.mean * exposure - load3(in + layout_.direct) * light);
@@ -449,6 +450,12 @@ void Film::resolve_pixel(const float* in,
   }
 }
 
+float Film::alpha(const float* record, std::uint32_t samples) const
+{
+  const float clear = layout_.clear >= 0 ? record[layout_.clear] : 0.0f;
+  return std::clamp((record[AccumulatorLayout::kCoverage] - clear) / static_cast<float>(samples), 0.0f, 1.0f);
+}
+
 FilmView Film::window(std::uint32_t aov_mask, int crop_x, int crop_y, int full_width, int full_height) const
 {
   FilmView view;
@@ -476,7 +483,7 @@ RenderedImage Film::beauty(int crop_x, int crop_y, int full_width, int full_heig
       const float* sums = record(x, y);
       const float inverse_n = 1.0f / static_cast<float>(samples);
       for (int i = 0; i < 3; ++i) to[i] = sums[AccumulatorLayout::kBeauty + i] * (exposure * inverse_n);
-      to[3] = sums[AccumulatorLayout::kCoverage] * inverse_n;
+      to[3] = alpha(sums, samples);
     }
   });
   return picture;

@@ -50,7 +50,8 @@ class Film {
  public:
   /// @param aov_mask            bit i keeps enumerator i of Aov; beauty is always kept
   /// @param cryptomatte_levels  ids that a Cryptomatte keeps of a pixel
-  Film(int width, int height, std::uint32_t aov_mask, int cryptomatte_levels = 6);
+  /// @param keeps_clear         where the environment is not seen, alpha is not coverage alone, see film_add_clear
+  Film(int width, int height, std::uint32_t aov_mask, int cryptomatte_levels = 6, bool keeps_clear = false);
 
   FilmAccumulatorView accumulator();
   int width() const { return width_; }
@@ -97,6 +98,7 @@ class Film {
 
  private:
   const float* record(int x, int y) const;
+  float alpha(const float* record, std::uint32_t samples) const;
   /// View of a finished picture, without its pixels.
   FilmView window(std::uint32_t aov_mask, int crop_x, int crop_y, int full_width, int full_height) const;
   /// Sums over a tile's pixels: variance of the mean as extrapolated, and by the spread of single samples.

@@ -43,7 +43,7 @@ bool is_stopped(const Accel& accel, Vec3f O, Vec3f D, float length, std::int32_t
     const unsigned object = ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID;
     if (instance < 0 || object == static_cast<unsigned>(instance)) return true;
     // Embree would give the same hit again: a ray that starts at one meets it.
-    from = next_float_up(ray.ray.tfar);
+    from = t_min_behind(ray.ray.tfar);
   }
 }
 

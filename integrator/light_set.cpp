@@ -2,6 +2,8 @@
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
+
 #include "integrator/emissive_meshes.h"
 #include "integrator/emitter_graph.h"
 #include "integrator/environment_light.h"
@@ -79,6 +81,8 @@ LightsView LightSet::view() const
   }
   v.suns = suns.data();
   v.num_suns = static_cast<std::uint32_t>(suns.size());
+  v.has_sun_disks =
+      std::any_of(suns.begin(), suns.end(), [this](std::uint32_t i) { return light_is_sun_disk(lights[i]); });
   v.environment = environment.view();
   v.environment_irradiance = environment_irradiance;
   v.environment_yields_to = environment_yields_to;

@@ -8,6 +8,7 @@
 #include <tbb/parallel_for.h>
 
 #include "integrator/flush_denormals.h"
+#include "integrator/instance_box.h"
 #include "kernel/sample/dimensions.h"
 #include "kernel/sample/sobol.h"
 
@@ -15,48 +16,9 @@ namespace relief {
 
 namespace {
 
-/// Grows boxes by a little, so that flat ones have an inside and hits on their faces are within.
-constexpr float kBoxMargin = 1e-4f;
-
 Vec3f box_centre(const Box3& box) { return 0.5f * (box.low + box.high); }
 
 float box_radius(const Box3& box) { return 0.5f * length(box.high - box.low); }
-
-/// World bounds of an instance.
-Box3 instance_bounds(const SceneContext& context, std::size_t index)
-{
-  const Instance& instance = context.scene.instances[index];
-  Box3 box = box_empty();
-  const auto add_placed = [&](const Affine3& placed, Vec3f P_object) {
-    const Vec3f P = transform_point(placed, P_object);
-    box = box_union(box, {P, P});
-  };
-  const MotionView motion = context.motion.view(instance.motion_index);
-  double stray = 0;
-  const auto add = [&](Vec3f P_object) {
-    if (motion.num_keys == 0) return add_placed(instance.world_from_object, P_object);
-    const auto reach = static_cast<double>(length(P_object));
-    for (std::uint32_t key = 0; key < motion.num_keys; ++key) {
-      add_placed(motion_at(motion, static_cast<float>(key) / static_cast<float>(motion.num_keys - 1)), P_object);
-      if (key > 0) stray = std::max(stray, motion_stray(motion.keys[key - 1], motion.keys[key], reach));
-    }
-  };
-  if (const int displaced = context.displacements.geometry_index(index); displaced >= 0) {
-    const Box3 local = context.accel->displaced_bounds(static_cast<std::size_t>(displaced));
-    for (int corner = 0; corner < 8; ++corner) {
-      add({(corner & 1) != 0 ? local.high.x : local.low.x, (corner & 2) != 0 ? local.high.y : local.low.y,
-           (corner & 4) != 0 ? local.high.z : local.low.z});
-    }
-  } else {
-    const Mesh& mesh = context.scene.meshes[static_cast<std::size_t>(instance.mesh_index)];
-    for (const Vec3f& P : mesh.P) add(P);
-    for (const MeshStep& step : mesh.steps) {
-      for (const Vec3f& P : step.P) add(P);
-    }
-  }
-  const Vec3f margin = splat3(kBoxMargin * box_radius(box) + static_cast<float>(stray));
-  return {box.low - margin, box.high + margin};
-}
 
 struct Caster {
   std::size_t instance;
@@ -178,7 +140,7 @@ PhotonSources photon_sources_make(const SceneContext& context)
   if (casters.empty() || lights.empty()) return out;
 
   tbb::parallel_for(std::size_t{0}, casters.size(),
-                    [&](std::size_t i) { casters[i].box = instance_bounds(context, casters[i].instance); });
+                    [&](std::size_t i) { casters[i].box = instance_box(context, casters[i].instance); });
   // A choice has 24 random bits: pairs beyond this many would be chosen unevenly.
   constexpr std::size_t kMostPairs = 1u << 16;
   const std::size_t most_groups = std::max<std::size_t>(1, kMostPairs / lights.size());

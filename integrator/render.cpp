@@ -15,6 +15,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "integrator/camera_medium.h"
 #include "integrator/checkpoint.h"
 #include "integrator/error_history.h"
 #include "integrator/flush_denormals.h"
@@ -22,6 +23,7 @@
 #include "integrator/scene_context.h"
 #include "integrator/stages.h"
 #include "integrator/wavefront.h"
+#include "kernel/bsdf/closure_kinds.h"
 #include "scene/cryptomatte.h"
 #include "scene/memory.h"
 
@@ -43,8 +45,12 @@ std::uint32_t samples_wanted(const RenderOptions& options)
 /// @param is_watched  the picture is shown between passes: they begin with one sample, and slow ones are smaller. Some of
 ///                    them end where those do that are not watched
 /// @param most        samples after which a checkpoint may be due: as those that are watched
-std::uint32_t pass_samples(
-    std::uint32_t done, std::uint32_t wanted, double seconds, double time_limit, bool is_watched, std::uint32_t most)
+std::uint32_t pass_samples(std::uint32_t done,
+                           std::uint32_t wanted,
+                           double seconds,
+                           double time_limit,
+                           bool is_watched,
+                           std::uint32_t most)
 {
   std::uint32_t samples = std::min(wanted - done, kMostPassSamples);
   if (most < kMostPassSamples) samples = std::min({samples, most, kMostPassSamples - done % kMostPassSamples});
@@ -210,6 +216,17 @@ namespace {
 
 std::uint64_t rays_of(const Counters& c) { return c.camera_rays + c.bounce_rays + c.shadow_rays; }
 
+/// Whether something may be a hole in the picture.
+bool has_holdouts(const Scene& scene)
+{
+  const auto is_holdout = [](const SurfaceClosureSpec& closure) { return closure.kind == ClosureKind::holdout; };
+  return std::any_of(scene.instances.begin(), scene.instances.end(),
+                     [](const Instance& instance) { return (instance.flags & kHoldout) != 0; }) ||
+         std::any_of(scene.graphs.begin(), scene.graphs.end(), [&](const GraphProgram& graph) {
+           return std::any_of(graph.closures.begin(), graph.closures.end(), is_holdout);
+         });
+}
+
 /// Tells how far a render is, from whichever thread, a few times a second.
 class ProgressReporter {
  public:
@@ -354,7 +371,8 @@ RenderedImage render(const Scene& scene,
   const StageTable& stages = stage_table_select();
 
   const FilmWindow window = render_window(options);
-  Film film(window.width, window.height, options.aov_mask, settings.cryptomatte_levels);
+  Film film(window.width, window.height, options.aov_mask, settings.cryptomatte_levels,
+            !scene.environment.visible_to_camera || has_holdouts(scene));
 
   FilterTable filter;
   blackman_harris_table_make(filter);
@@ -374,9 +392,12 @@ RenderedImage render(const Scene& scene,
   SamplingEnd end(stop,
                   options.time_limit_seconds > 0 ? std::max(1e-3, options.time_limit_seconds - earlier_seconds) : 0.0);
   const WavefrontColumns columns = context.columns();
+  const CameraMedium camera_medium(context);
+  for (std::string& text : camera_medium.overlaps()) stats.warnings.push_back(std::move(text));
   Workers workers([&] {
     Wavefront worker(columns);
     worker.stop = &end.reached();
+    if (camera_medium.exists()) worker.camera_medium = &camera_medium;
     return worker;
   });
   const bool has_long_searches = context.displacements.size() > 0;
@@ -469,8 +490,8 @@ RenderedImage render(const Scene& scene,
     if (samples == 0) {
       const std::uint32_t most = most_samples();
       has_small_passes = has_small_passes || most < kMostPassSamples;
-      samples = caustics ? 1
-                         : pass_samples(done, wanted, seconds_since(start), options.time_limit_seconds, is_watched, most);
+      samples =
+          caustics ? 1 : pass_samples(done, wanted, seconds_since(start), options.time_limit_seconds, is_watched, most);
     }
     if (photons) {
       photons_before = photons->state();

@@ -123,10 +123,13 @@ SceneContext::SceneContext(const Scene& loaded,
 
   globals.graph_scene.rays = graph_rays_make(*accel);
   globals.area_light_index = lights.area_lights.data();
+  globals.num_area_lights = static_cast<std::uint32_t>(lights.area_lights.size());
   globals.lights = lights.view();
   globals.has_lights = lights.any();
   globals.bsdf_tables = bsdf_tables.get();
   globals.environment_visible_to_camera = scene.environment.visible_to_camera;
+  const std::optional<float>& clear = scene.environment.clear_roughness;
+  globals.clear_alpha = clear && !scene.environment.visible_to_camera ? *clear * *clear : -1.0f;
   globals.environment_hidden_from = scene.environment.hidden_from;
   if (const std::optional<Surroundings>& seen = scene.environment.backdrop) {
     const int map = seen->texture_index;

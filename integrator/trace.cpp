@@ -5,6 +5,7 @@
 
 #include <tbb/enumerable_thread_specific.h>
 
+#include "integrator/camera_medium.h"
 #include "integrator/flush_denormals.h"
 #include "integrator/photon_pass.h"
 #include "integrator/stages.h"
@@ -54,7 +55,7 @@ TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) break;
     const unsigned object = query.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? query.hit.instID[0] : query.hit.geomID;
     if (object >= context.globals.num_instances) {
-      t_min = next_float_up(query.ray.tfar);
+      t_min = t_min_behind(query.ray.tfar);
       continue;
     }
     const InstanceView instance = context.motion.instance_at(context.instances[object], kTraceTime);
@@ -141,6 +142,8 @@ PathReplay trace_path(const Scene& scene, const RenderOptions& options, const Pi
   replay.warnings = context.displacements.warnings();
   Wavefront wavefront(context.columns());
   wavefront.recorder = &replay.rays;
+  const CameraMedium camera_medium(context);
+  if (camera_medium.exists()) wavefront.camera_medium = &camera_medium;
   // The whole tile, as in the render: forks of its paths share the room of its batch.
   const int x = at.x - window.x0, y = at.y - window.y0;
   const Batch batch = tile_batch(film, film.tile_at(x, y), at.sample_index, 1);

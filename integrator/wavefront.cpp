@@ -6,11 +6,22 @@
 #include <numeric>
 #include <utility>
 
+#include "integrator/camera_medium.h"
+
 namespace relief {
 
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+/// Searches after which every path of a batch has ended: it scatters, passes transparent surfaces, and passes each lamp twice
+/// between two such events at most. A search that does not get on from a hit would otherwise last for ever.
+std::uint64_t most_searches(const KernelGlobals& g)
+{
+  const auto scatterings = static_cast<std::uint64_t>(g.limits.total) + 2;
+  return scatterings * (2 * std::uint64_t{g.num_area_lights} + 1) + static_cast<std::uint64_t>(g.limits.transparent) +
+         1;
+}
 
 }  // namespace
 
@@ -102,6 +113,7 @@ bool Wavefront::run(const KernelGlobals& g,
   };
 
   stages.generate(g, state_, batch);
+  if (camera_medium != nullptr) camera_medium->apply(state_, batch.num_paths());
   if (g.caustics.enabled) {
     for (std::uint32_t i = 0; i < batch.num_paths(); ++i) (*state_.caustic.radiance)[i] = Vec3f{};
     std::iota(state_.caustic.root, state_.caustic.root + batch.num_paths(), 0u);
@@ -114,7 +126,12 @@ bool Wavefront::run(const KernelGlobals& g,
 
   DisplacementWork displacement;
   displacement.total.stop = stop;
+  std::uint64_t searches_left = most_searches(g);
   for (bool camera = true; active_.size > 0 && !displacement.total.stopped; camera = false) {
+    if (searches_left-- == 0) {
+      counters.endless_paths += active_.size;
+      break;
+    }
     if (!camera) counters.bounce_rays += active_.size;
     clear_queues();
     intersect_closest(g, accel, state_, active_, camera, surface_kernel.data(), surfaces_.data(), lights_, background_,
@@ -165,7 +182,11 @@ void Wavefront::trace_photons(const KernelGlobals& g,
   stages.emit_photons(g, sources, state_, first, count, active_);
   DisplacementWork displacement;
   displacement.total.stop = stop;
-  while (active_.size > 0 && !displacement.total.stopped) {
+  for (std::uint64_t searches_left = most_searches(g); active_.size > 0 && !displacement.total.stopped;) {
+    if (searches_left-- == 0) {
+      counters.endless_paths += active_.size;
+      break;
+    }
     clear_queues();
     counters.photon_rays += active_.size;
     intersect_closest(g, accel, state_, active_, false, surface_kernel.data(), surfaces_.data(), lights_, background_,
@@ -180,7 +201,7 @@ void Wavefront::trace_photons(const KernelGlobals& g,
     // Area lights let rays pass.
     for (std::uint32_t i = 0; i < lights_.size; ++i) {
       const std::uint32_t path = lights_.paths[i];
-      state_.t_min[path] = next_float_up(state_.hit_t[path]);
+      state_.t_min[path] = t_min_behind(state_.hit_t[path]);
       queue_push(next_, path);
     }
     std::swap(active_, next_);

@@ -38,6 +38,8 @@ struct WavefrontColumns {
   bool facets = false;    ///< they may meet coarser levels of height maps
 };
 
+class CameraMedium;
+
 /// Owned by one thread at a time.
 class Wavefront {
  public:
@@ -69,6 +71,7 @@ class Wavefront {
 
   static std::size_t bytes(const WavefrontColumns& columns);
 
+  const CameraMedium* camera_medium = nullptr;   ///< null: camera rays start in none
   std::vector<RecordedRay>* recorder = nullptr;  ///< receives every ray of the batch, if set
   const std::atomic<bool>* stop = nullptr;       ///< true: searches in displaced meshes are given up; null: never
   Counters counters;

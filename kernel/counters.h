@@ -8,7 +8,7 @@ namespace relief {
 // clang-format off
 #define RELIEF_COUNTERS(X) \
   X(camera_rays) X(bounce_rays) X(shadow_rays) X(surface_hits) X(background_hits) \
-  X(transparent_hits) X(graph_runs) X(graph_points) X(nonfinite_samples) X(photon_paths) X(photon_rays) \
+  X(transparent_hits) X(graph_runs) X(graph_points) X(nonfinite_samples) X(photon_paths) X(photon_rays) X(endless_paths) \
   X(displaced_prisms) X(displaced_bounds) X(displaced_texels) X(displaced_inversions)
 // clang-format on
 

@@ -51,6 +51,7 @@ struct KernelGlobals {
   GraphScene graph_scene;
   const TextureView* textures = nullptr;
   const std::uint32_t* area_light_index = nullptr;  ///< light of object num_instances + i
+  std::uint32_t num_area_lights = 0;
   LightsView lights;
   const BsdfTables* bsdf_tables = nullptr;
   CausticsView caustics;
@@ -62,6 +63,8 @@ struct KernelGlobals {
   LightTechnique light_technique = LightTechnique::kMis;
   bool has_lights = false;  ///< something can be sampled
   bool environment_visible_to_camera = true;
+  float clear_alpha =
+      -1;  ///< where it is not: of lobes up to this width α what is refracted leaves the film clear; −1: none
   bool has_backdrop = false;
   EnvironmentView backdrop;                   ///< what camera rays see in the environment's place
   std::uint32_t environment_hidden_from = 0;  ///< bit PathEvent: rays that started so do not see it

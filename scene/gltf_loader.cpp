@@ -26,8 +26,10 @@ namespace {
 
 std::uint32_t instance_flags(const ObjectSettings& object, const Material& material, const Transform& world)
 {
-  const bool caster = object.caustic_caster == CausticCaster::kYes ||
-                      (object.caustic_caster == CausticCaster::kAuto && material_casts_caustics(material));
+  // What rays for light pass, or may pass, must not send that light on as photons as well.
+  const bool caster =
+      (object.caustic_caster == CausticCaster::kYes && !material.depends_on_ray) ||
+      (object.caustic_caster == CausticCaster::kAuto && object.casts_shadow && material_casts_caustics(material));
   return (object.visible_to_camera ? kVisibleToCamera : 0u) | (object.casts_shadow ? kCastsShadow : 0u) |
          (transform_mirrors(world) ? kMirrored : 0u) | (caster ? kCausticCaster : 0u) |
          (object.caustic_receiver ? kCausticReceiver : 0u) | (object.caustic_light ? 0u : kNoCausticLight) |
@@ -309,6 +311,11 @@ void GltfLoader::place_instance(const PlacedNode& node,
   instance.world_from_object = transform_to_affine(world);
   instance.flags =
       instance_flags(node.object, scene_.materials[static_cast<std::size_t>(instance.material_index)], world);
+  if (node.object.caustic_caster == CausticCaster::kYes &&
+      scene_.materials[static_cast<std::size_t>(instance.material_index)].depends_on_ray) {
+    warnings_.add(node.document->file + ": " + path +
+                  ": its material depends on the kind of ray, so that it casts no caustics of photons");
+  }
   const Affine3 inverse_of_it = inverse(instance.world_from_object);
   if (!(max_component(max(abs(inverse_of_it.x), max(abs(inverse_of_it.y), abs(inverse_of_it.z)))) <= kFarthest)) {
     warnings_.add(node.document->file + ": " + path + ": scaled to less than 1e-15" +
@@ -462,6 +469,7 @@ void GltfLoader::place_lights(const PlacedNode& node)
       memory_.add(sizeof(Light) * lights.size(), node.document->file + ": lights");
       scene_.lights.insert(scene_.lights.end(), lights.begin(), lights.end());
       scene_.lights.back().casts_caustics = node.object.caustic_light;
+      scene_.lights.back().hidden_from = static_cast<std::uint8_t>(node.object.hidden_from);
       place_lamp(node, scene_.lights.back());
       move_light(node, path, scene_.lights.back());
     }
@@ -617,6 +625,10 @@ void GltfLoader::read_programs(const GltfDocument& document,
     material.graph_index = add(std::move(programs.surface));
     const GraphProgram& program = scene_.graphs.back();
     material.graph_outputs = program.given;
+    material.depends_on_ray = std::any_of(program.inputs.begin(), program.inputs.end(), [](const GraphInput& input) {
+      using Q = GraphQuantity;
+      return input.quantity == Q::ray_kind || input.quantity == Q::ray_depth || input.quantity == Q::ray_length;
+    });
     material.has_closures = surface != nullptr;
     if (material.has_closures) {
       const ClosureSummary known = closures_summarize(program);

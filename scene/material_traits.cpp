@@ -32,7 +32,7 @@ bool material_casts_caustics(const Material& material)
   constexpr float kRoughestDisplaced = 0.25f;
   const bool bends = material.transmission > 0 || material.metallic >= 0.5f;
   const float roughest = material.displacement_index >= 0 ? kRoughestDisplaced : kRoughest;
-  return bends && !material.unlit && material.roughness <= roughest;
+  return bends && !material.unlit && !material.depends_on_ray && material.roughness <= roughest;
 }
 
 }  // namespace relief

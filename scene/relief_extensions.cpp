@@ -16,8 +16,9 @@ namespace {
 
 constexpr double kNoLimit = JsonReader::kNoLimit;
 
-/// Environment::hidden_from.
-std::uint32_t read_hidden_from(const JsonReader& r)
+/// Environment::hidden_from, or Light's.
+/// @param inherited  what it is where nothing is said
+std::uint32_t read_hidden_from(const JsonReader& r, std::uint32_t inherited = 0)
 {
   static constexpr std::pair<std::string_view, PathEvent> kRays[] = {
       {"visibleToDiffuse", PathEvent::kDiffuse},
@@ -25,7 +26,8 @@ std::uint32_t read_hidden_from(const JsonReader& r)
       {"visibleToTransmission", PathEvent::kTransmission}};
   std::uint32_t hidden = 0;
   for (const auto& [name, event] : kRays) {
-    if (!r.boolean(name, true)) hidden |= 1u << static_cast<std::uint32_t>(event);
+    const std::uint32_t bit = 1u << static_cast<std::uint32_t>(event);
+    if (!r.boolean(name, (inherited & bit) == 0)) hidden |= bit;
   }
   return hidden;
 }
@@ -280,6 +282,7 @@ std::optional<Environment> relief_environment(const GltfDocument& document,
     e.visible_to_camera = r.boolean("visibleToCamera", true);
     e.casts_caustics = r.boolean("causticLight", true);
     e.hidden_from = read_hidden_from(r);
+    if (r.has("clearGlass")) e.clear_roughness = r.number_f("clearGlass", 0, 0, 1);
     if (r.has("backdrop")) {
       const JsonReader backdrop = r.object("backdrop");
       e.backdrop = read_surroundings(document, backdrop, textures, true, graphs.backdrop, warnings);
@@ -326,7 +329,16 @@ void relief_light(const GltfDocument& document,
   static constexpr std::string_view kFalloffs[] = {"square", "smooth", "smooth-cosine"};
   static constexpr std::string_view kShapes[] = {"ball", "disk"};
   document.read_extension(value, path, "RELIEF_light", [&](const JsonReader& r) {
-    if (light.kind != LightKind::kSun) {
+    if (light.kind == LightKind::kSun) {
+      // The widest that has a side to shine from; as one minus the cosine of half of it, without that one's digits.
+      constexpr double kWidest = 3.1415;
+      const double half_sine = std::sin(r.number("angle", 0, 0, kWidest) / 4);
+      light.cone = static_cast<float>(2 * half_sine * half_sine);
+      // So narrow a sun is a point; its radiance leaves single precision.
+      constexpr float kNarrowest = 1e-14f;
+      if (light.cone < kNarrowest) light.cone = 0;
+      light.visible_to_camera = r.boolean("visibleToCamera", false);
+    } else {
       light.radius = r.number_f("radius", 0, 0, kFarthest);
       // Its square would leave single precision; so small a ball is a point.
       constexpr float kSmallestRadius = 1e-9f;
@@ -429,6 +441,7 @@ ObjectSettings relief_object(const GltfDocument& document, int node_index, Objec
     s.caustic_receiver = r.boolean("causticReceiver", s.caustic_receiver);
     s.caustic_light = r.boolean("causticLight", s.caustic_light);
     s.holdout = r.boolean("holdout", s.holdout);
+    s.hidden_from = read_hidden_from(r, s.hidden_from);
     s.asset = r.string("asset", s.asset);
     if (r.has("values")) s.values = read_object_values(r, s.values.get());
     if (r.has("causticCaster")) {

@@ -95,6 +95,8 @@ struct Environment : Surroundings {
   bool visible_to_camera = true;
   bool casts_caustics = true;     ///< as Light::casts_caustics
   std::uint32_t hidden_from = 0;  ///< bit PathEvent: bounced rays that do not see it
+  /// Perceptual: where the camera does not see it, glass up to this roughness is as clear as air. Empty: glass is opaque.
+  std::optional<float> clear_roughness;
 };
 
 /// One animation of a file; all of them play at once.

@@ -59,6 +59,9 @@ RELIEF_KERNEL SurfaceClosure closure_soft(const SurfaceClosure& c, SharpLobes sh
   return closure_without<true>(c, sharp);
 }
 
+/// The closure's diffuse lobes alone, to be evaluated: its pdf means nothing.
+RELIEF_KERNEL SurfaceClosure closure_diffuse(const SurfaceClosure& c) { return closure_soft(c, kAllSharp); }
+
 /// Whether a closure has lobes that are sharp, or that are soft.
 template <bool kSharp>
 RELIEF_KERNEL bool closure_has(const SurfaceClosure& c, SharpLobes sharp)

@@ -52,20 +52,28 @@ RELIEF_KERNEL Mixture mixture_of(const MixtureLobes& lobes, const Frame& frame, 
   return m;
 }
 
-/// The lobes that are sharp, or those that are soft; the same for both.
-template <bool kSharp>
-RELIEF_KERNEL Mixture mixture_part(const Mixture& m, SharpLobes sharp)
+/// The lobes for which wanted(lobe) is true.
+template <typename F>
+RELIEF_KERNEL Mixture mixture_choose(const Mixture& m, F&& wanted)
 {
   Mixture part{m.all, m.frame, m.Ng, 0, 0.0f, m.gain};
   float sum = 0.0f;
   for (std::uint64_t left = m.chosen; left != 0; left &= left - 1) {
     const MixtureLobe& lobe = m.all->lobes[__builtin_ctzll(left)];
-    if (mixture_lobe_is_sharp(lobe, sharp.most_roughness) != kSharp) continue;
+    if (!wanted(lobe)) continue;
     part.chosen |= left & -left;
     sum += lobe.probability;
   }
   part.scale = sum > 0.0f ? 1.0f / sum : 0.0f;
   return part;
+}
+
+/// The lobes that are sharp, or those that are soft; the same for both.
+template <bool kSharp>
+RELIEF_KERNEL Mixture mixture_part(const Mixture& m, SharpLobes sharp)
+{
+  return mixture_choose(
+      m, [sharp](const MixtureLobe& lobe) { return mixture_lobe_is_sharp(lobe, sharp.most_roughness) == kSharp; });
 }
 
 /// As closure_eval of a SurfaceClosure; pdf of the chosen lobes.
@@ -141,6 +149,7 @@ RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tabl
 
 RELIEF_KERNEL Mixture closure_sharp(const Mixture& m, SharpLobes sharp) { return mixture_part<true>(m, sharp); }
 RELIEF_KERNEL Mixture closure_soft(const Mixture& m, SharpLobes sharp) { return mixture_part<false>(m, sharp); }
+RELIEF_KERNEL Mixture closure_diffuse(const Mixture& m) { return mixture_choose(m, mixture_lobe_is_diffuse); }
 
 template <bool kSharp>
 RELIEF_KERNEL bool closure_has(const Mixture& m, SharpLobes sharp)

@@ -113,6 +113,24 @@ struct MixtureLobe {
   LobeShape shape;
 };
 
+/// Whether what the lobe scatters counts as diffuse, as mixture_lobe_sample says of it.
+RELIEF_KERNEL bool mixture_lobe_is_diffuse(const MixtureLobe& lobe)
+{
+  switch (lobe.kind) {
+    case MixtureLobeKind::kToon:
+      return !lobe.shape.toon.is_glossy;
+    case MixtureLobeKind::kGgx:
+    case MixtureLobeKind::kBeckmann:
+    case MixtureLobeKind::kAshikhminShirley:
+    case MixtureLobeKind::kClearcoat:
+    case MixtureLobeKind::kRefraction:
+    case MixtureLobeKind::kGlass:
+      return false;
+    default:
+      return true;
+  }
+}
+
 RELIEF_KERNEL bool mixture_lobe_is_sharp(const MixtureLobe& lobe, float most_roughness)
 {
   return lobe.roughness < kInfinity && lobe.roughness <= most_roughness;

@@ -19,7 +19,8 @@ struct AccumulatorLayout {
 
   int direct = -1, albedo = -1, normal = -1, depth = -1, position = -1, uv = -1, object_id = -1, material_id = -1,
       displacement_steps = -1, caustic = -1, holdout = -1, mist = -1, emission = -1, environment = -1,
-      ambient_occlusion = -1, denoising_albedo = -1, denoising_normal = -1, denoising_depth = -1, denoising_half = -1;
+      ambient_occlusion = -1, clear = -1, denoising_albedo = -1, denoising_normal = -1, denoising_depth = -1,
+      denoising_half = -1;
   int cryptomatte[kNumCryptomattes] = {-1, -1, -1};  ///< pairs of an id and its weight, the first of weight 0 is free
   int cryptomatte_levels = 0;
   bool denoising = false;  ///< denoising_albedo, denoising_normal or denoising_half is kept
@@ -96,10 +97,17 @@ RELIEF_KERNEL void film_add_first_hit(const FilmAccumulatorView& film, std::uint
   }
 }
 
-/// Counts a sample that met a holdout, if that is kept.
-RELIEF_KERNEL void film_add_holdout(const FilmAccumulatorView& film, std::uint32_t pixel)
+/// Counts a sample that met a holdout, or a share of one, if that is kept.
+RELIEF_KERNEL void film_add_holdout(const FilmAccumulatorView& film, std::uint32_t pixel, float share = 1.0f)
 {
-  if (film.layout.holdout >= 0) film_record(film, pixel)[film.layout.holdout] += 1.0f;
+  if (film.layout.holdout >= 0) film_record(film, pixel)[film.layout.holdout] += share;
+}
+
+/// Takes a share of a sample from what the picture's alpha says of it, if that is kept.
+/// @param share  negative: gives one
+RELIEF_KERNEL void film_add_clear(const FilmAccumulatorView& film, std::uint32_t pixel, float share)
+{
+  if (film.layout.clear >= 0) film_record(film, pixel)[film.layout.clear] += share;
 }
 
 /// Adds what something that the camera sees sends out, if that is kept.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "kernel/math/affine.h"
+#include "kernel/state/path_event.h"
 
 namespace relief {
 
@@ -21,16 +22,17 @@ struct alignas(64) Light {
   LightKind kind = LightKind::kPoint;
   SpotFalloff falloff = SpotFalloff::kSquare;
   bool two_sided = false;         ///< rectangle, disk, triangle
-  bool visible_to_camera = true;  ///< rectangle, disk, ball
+  bool visible_to_camera = true;  ///< rectangle, disk, ball, sun of an angle
   bool is_even = true;            ///< all its points send out `emission`: see emission_is_even, and lamp_index
   bool casts_caustics = true;     ///< photons start from it, where there is a photon pass
-  bool faces_viewer = false;  ///< point, spot with a radius: a disk that faces whoever looks at it instead of a ball
-  Vec3f P{};                  ///< position or centre, metres (triangle: first vertex)
-  Vec3f axis{0, 0, -1};       ///< unit: spot and sun: direction of travel; rectangle, disk, triangle: emitting side
-  Vec3f edge_u{}, edge_v{};   ///< rectangle, disk: *half* axes, any two independent vectors (disk: an ellipse);
-                              ///< triangle: P1−P0 and P2−P0
-  Vec3f emission{};           ///< point, spot: radiant intensity (W/sr, on the spot's axis); sun: irradiance on a
-                              ///< plane across the axis (W/m²); area kinds: radiance (W/m²/sr)
+  bool faces_viewer = false;     ///< point, spot with a radius: a disk that faces whoever looks at it instead of a ball
+  std::uint8_t hidden_from = 0;  ///< bit PathEvent, but for the camera's: what scatters so is not lit, see light_hides
+  Vec3f P{};                     ///< position or centre, metres (triangle: first vertex)
+  Vec3f axis{0, 0, -1};          ///< unit: spot and sun: direction of travel; rectangle, disk, triangle: emitting side
+  Vec3f edge_u{}, edge_v{};      ///< rectangle, disk: *half* axes, any two independent vectors (disk: an ellipse);
+                                 ///< triangle: P1−P0 and P2−P0
+  Vec3f emission{};              ///< point, spot: radiant intensity (W/sr, on the spot's axis); sun: irradiance on a
+                                 ///< plane across the axis (W/m²); area kinds: radiance (W/m²/sr)
   float cos_inner = 1, cos_outer = 0;  ///< spot cone
   float radius = 0;                    ///< point, spot: of the ball or disk that shines in the point's place, metres
   float area = 0;                      ///< m², area kinds
@@ -43,12 +45,32 @@ struct alignas(64) Light {
   float lamp_scale = 1;            ///< factor on what the graph gives; `emission` is divided by it, so as to be a mean
   float spread_tan = 0;  ///< rectangle, disk: tangent of the widest angle to the axis; 0: it shines to all of its side
   float spread_scale = 0;  ///< see light_spread
+  float cone = 0;          ///< sun: one minus the cosine of half the angle that it is seen under; 0: it is a point
 };
 
 /// Whether a light is a ball (or a disk that faces everyone): a point or spot that has a size.
 RELIEF_KERNEL bool light_is_ball(const Light& light)
 {
   return light.radius > 0.0f && (light.kind == LightKind::kPoint || light.kind == LightKind::kSpot);
+}
+
+/// Whether a light is a sun that is more than a point.
+RELIEF_KERNEL bool light_is_sun_disk(const Light& light) { return light.kind == LightKind::kSun && light.cone > 0.0f; }
+
+/// What on one side of a surface does not see a light: what scatters diffusely, and what microfacets make.
+struct LightHides {
+  bool diffuse = false, sharp = false;
+
+  bool any() const { return diffuse || sharp; }
+  /// One of the two alone: paths cannot tell which of them they follow, so that lights are asked alone.
+  bool differs() const { return diffuse != sharp; }
+};
+
+/// @param transmits  the side is that behind the surface
+RELIEF_KERNEL LightHides light_hides(const Light& light, bool transmits)
+{
+  const auto hides = [&light](PathEvent event) { return (light.hidden_from >> static_cast<int>(event) & 1u) != 0; };
+  return {hides(PathEvent::kDiffuse), hides(transmits ? PathEvent::kTransmission : PathEvent::kGlossy)};
 }
 
 /// Names a light: the environment, a light of the scene, or one that an instance shares with others.

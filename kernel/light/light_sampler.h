@@ -57,6 +57,7 @@ struct LightsView {
   std::int32_t only_light = -1;              ///< the one finite light, where nothing else can be chosen
   const std::uint32_t* suns = nullptr;       ///< indices into `lights`
   std::uint32_t num_suns = 0;
+  bool has_sun_disks = false;  ///< one of them is_sun_disk: rays that meet nothing may see it
   EnvironmentView environment;
   EnvironmentIrradiance environment_irradiance;
   /// Where the other lights' estimates sum to more, the environment is left to paths that follow the BSDF.
@@ -117,10 +118,15 @@ RELIEF_KERNEL const Light& lights_at(const LightsView& view, LightRef ref, Light
 /// Mean of the three channels: the scalar by which lights are compared.
 RELIEF_KERNEL float light_scalar(Vec3f rgb) { return (rgb.x + rgb.y + rgb.z) * (1.0f / 3.0f); }
 
-/// Estimate of one sun's irradiance; 0 below the horizon of N.
+/// Estimate of one sun's irradiance; 0 where all of it is below the horizon of N. Its cosine near the horizon is estimated as
+/// light_tree_estimate does.
 RELIEF_KERNEL float light_sun_importance(const Light& sun, Vec3f N)
 {
-  const float cosine = is_zero(N) ? 1.0f : -dot(N, sun.axis);
+  float cosine = is_zero(N) ? 1.0f : -dot(N, sun.axis);
+  if (sun.cone > 0.0f) {
+    const float highest = cosine + __builtin_sqrtf(sun.cone * (2.0f - sun.cone));
+    cosine = max(cosine, highest > 0.0f ? 0.3f * highest + 0.01f : 0.0f);
+  }
   return cosine > 0.0f ? min(light_scalar(sun.emission) * cosine, 1e30f) : 0.0f;
 }
 
@@ -159,7 +165,7 @@ RELIEF_KERNEL LightSample light_sample(const Light& light, Vec3f P, Vec2f u)
     case LightKind::kSpot:
       return spot_light_sample(light, P, u);
     case LightKind::kSun:
-      return sun_light_sample(light);
+      return sun_light_sample(light, u);
     case LightKind::kRectangle:
       return rectangle_light_sample(light, P, u);
     case LightKind::kDisk:
@@ -310,6 +316,17 @@ lights_pdf(const LightsView& view, Vec3f P, Vec3f N, LightRef ref, Vec3f wi, flo
                                       view.light_trails[ref.light_index], ref.copy_index);
   if (!(choice > 0.0f)) return 0.0f;
   return groups.finite * choice * light_pdf(lights_at(view, ref, storage, time), P, wi, distance);
+}
+
+/// Density with which lights_sample, called at P, would have chosen a direction of a sun that it meets.
+/// @param sun_index  in `lights`
+RELIEF_KERNEL float lights_sun_pdf(const LightsView& view, Vec3f P, Vec3f N, std::uint32_t sun_index)
+{
+  const Light& sun = view.lights[sun_index];
+  const float importance = light_sun_importance(sun, N);
+  if (!(importance > 0.0f)) return 0.0f;
+  const LightGroups groups = light_groups_eval(view, P, N);
+  return groups.suns * (importance / groups.sun_sum) * sun_light_pdf(sun);
 }
 
 /// Density with which lights_sample, called at P, would have chosen a direction of the environment.

@@ -25,4 +25,9 @@ RELIEF_KERNEL constexpr float next_float_up(float x)
   return __builtin_bit_cast(float, __builtin_bit_cast(std::uint32_t, x) + 1u);
 }
 
+/// Least t_min of a ray that goes on behind a hit at t. Next to 0 a denormal would do, were they not flushed to 0 while rays are
+/// traced: the hit would be found for ever.
+/// @param t  not infinite, not NaN
+RELIEF_KERNEL constexpr float t_min_behind(float t) { return t < kLeastDistance ? kLeastDistance : next_float_up(t); }
+
 }  // namespace relief

@@ -123,17 +123,20 @@ RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
   const Vec2f u = sample_2d(hash, index, dimension_photon(PhotonDimension::kAim));
 
   EmittedRay ray;
+  std::uint32_t hidden_from = 0;
   if (source.light.light_index < 0) {
     const EnvironmentSample sample = environment_sample_all(g.lights.environment, u_light);
     ray = emit_from_afar(sources, box, -sample.wi, sample.radiance / sample.pdf_solid_angle, u);
   } else {
     Light storage;
     const Light& light = lights_at(g.lights, source.light, storage, g.caustics.time);
+    hidden_from = light.hidden_from;
     const bool is_point = light.kind == LightKind::kPoint || light.kind == LightKind::kSpot;
     if (light.kind == LightKind::kSun) {
-      Vec3f irradiance = light.emission;
-      if (!light.is_even) irradiance = emitter_radiance(g, light, irradiance, {{}, {}, light.axis, kPhotonRay});
-      ray = emit_from_afar(sources, box, light.axis, irradiance, u);
+      const LightSample sun = sun_light_sample(light, u_light);
+      Vec3f irradiance = sun.radiance / sun.pdf;
+      if (!light.is_even) irradiance = emitter_radiance(g, light, irradiance, {{}, {}, -sun.wi, kPhotonRay});
+      ray = emit_from_afar(sources, box, -sun.wi, irradiance, u);
     } else {
       ray = is_point ? emit_from_point(g, light, box, u_light, u) : emit_from_area(g, light, box, u_light, u);
     }
@@ -148,7 +151,7 @@ RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
   state.pixel_hash[path] = hash;
   // One, since none means a camera ray.
   state.bounces[path] = 1;
-  state.flags[path] = kPathPhoton;
+  state.flags[path] = kPathPhoton | hidden_from << kPathHiddenShift;
   state.sigma_a[path] = Vec3f{};
   state.cone_width[path] = state.cone_spread[path] = 0.0f;
   if (state.motion.time != nullptr) state.motion.time[path] = g.caustics.time;

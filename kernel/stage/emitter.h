@@ -14,6 +14,15 @@ RELIEF_KERNEL GraphRay path_light_ray(const PathState& state, std::uint32_t path
   return {0, state.bounces[path] + 1u, state.flags[path] >> kPathTransparentShift, distance};
 }
 
+/// What the graph of a lamp is told of a path's ray that met it. As in Cycles, the ray is of no kind, and counts as one event more
+/// than the path has had; but where light is asked for as well it counts as there, for the sum of both must not depend on how
+/// light is found.
+RELIEF_KERNEL GraphRay lamp_ray(const KernelGlobals& g, const PathState& state, std::uint32_t path)
+{
+  const std::uint32_t depths = state.bounces[path] + (state.pdf[path] > 0.0f ? 0u : 1u);
+  return {0, depths, state.flags[path] >> kPathTransparentShift, path_ray_length(g, state, path)};
+}
+
 /// @param emitter  not even, in world space
 /// @param even     what it sends to there without its graph: counts for all but meshes
 /// @return         radiance, or what `even` is; of meshes it is not asked which side shines

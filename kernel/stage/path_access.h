@@ -153,6 +153,17 @@ RELIEF_KERNEL float path_light_weight(LightTechnique technique, float pdf_light,
   return technique == LightTechnique::kMis ? mis_power(pdf_light, pdf_bsdf) : 0.0f;
 }
 
+/// Whether a path that meets a light adds it, or none of it comes this way, or all of it is for next-event estimation to find.
+RELIEF_KERNEL bool path_sees_light(const PathState& s, std::uint32_t i, const Light& light)
+{
+  const auto event = static_cast<PathEvent>(path_event(s.flags[i]));
+  if (event == PathEvent::kCamera) return light.visible_to_camera;
+  if (light.hidden_from == 0) return true;
+  // Of single directions the event is known.
+  if (!(s.pdf[i] > 0.0f)) return (light.hidden_from >> static_cast<int>(event) & 1u) == 0;
+  return !light_hides(light, event == PathEvent::kTransmission).any();
+}
+
 /// Copies a path that can go on in two ways; the copy has brought nothing yet.
 /// @pre there is room, see path_has_room
 RELIEF_KERNEL std::uint32_t path_fork(PathState& s, std::uint32_t i)

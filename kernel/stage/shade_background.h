@@ -3,19 +3,54 @@
 
 #include "kernel/counters.h"
 #include "kernel/globals.h"
-#include "kernel/stage/path_access.h"
+#include "kernel/stage/emitter.h"
 
 namespace relief {
 
-/// Adds the environment's radiance, weighted against next-event estimation.
+/// Adds the radiance of suns that a ray meets which has met nothing else.
+RELIEF_KERNEL void shade_sun_disks(const KernelGlobals& g, PathState& state, std::uint32_t path)
+{
+  const int scatterings = path_bounces(state.bounces[path], BounceKind::kAll);
+  const Vec3f D = path_direction(state, path);
+  for (std::uint32_t i = 0; i < g.lights.num_suns; ++i) {
+    const std::uint32_t index = g.lights.suns[i];
+    const Light& sun = g.lights.lights[index];
+    if (!light_is_sun_disk(sun) || !sun_light_is_met(sun, D) || !path_sees_light(state, path, sun)) continue;
+    if (path_leaves_to_photons(g, state.flags[path], static_cast<std::int32_t>(index))) continue;
+    Vec3f radiance = sun_light_radiance(sun);
+    if (!sun.is_even) radiance = emitter_radiance(g, sun, radiance, {{}, {}, -D, lamp_ray(g, state, path)});
+    radiance *= path_transmittance(path_sigma_a(state, path), kInfinity);
+    const Vec3f seen = path_throughput(state, path) * radiance;
+    if (is_zero(seen)) continue;
+    if (scatterings == 0) film_add_emission(g.film, state.pixel[path], seen);
+    path_add_denoising(g, state, path, seen);
+    const float pdf = state.pdf[path];
+    const float weight =
+        pdf > 0.0f
+            ? path_bsdf_weight(g.light_technique, pdf,
+                               lights_sun_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), index))
+            : 1.0f;
+    path_add_radiance(state, path, scatterings, seen * weight, g.clamp_indirect);
+  }
+}
+
+/// Adds the radiance of the environment and of suns, weighted against next-event estimation.
 /// Reads the ray, throughput, pdf, scatter normal and medium; writes the radiance. The path ends.
 RELIEF_KERNEL void shade_background(const KernelGlobals& g, PathState& state, std::uint32_t path, Counters& counters)
 {
   ++counters.background_hits;
+  if (g.lights.has_sun_disks) shade_sun_disks(g, state, path);
   const int scatterings = path_bounces(state.bounces[path], BounceKind::kAll);
   const bool is_kept = scatterings == 0 && g.film.layout.environment >= 0;
   const bool is_shown = scatterings > 0 ? (g.environment_hidden_from >> path_event(state.flags[path]) & 1u) == 0
                                         : g.environment_visible_to_camera;
+  // What has passed through clear glass, or a filter, leaves as much of the film clear as it has kept of its light.
+  if (!g.environment_visible_to_camera && (state.flags[path] & kPathCovers) == 0) {
+    const float share =
+        light_scalar(path_throughput(state, path) * path_transmittance(path_sigma_a(state, path), kInfinity));
+    film_add_clear(g.film, state.pixel[path], (state.flags[path] & kPathSawSurface) != 0 ? share : share - 1.0f);
+    if (scatterings > 0) return;
+  }
   if (!is_shown && !is_kept) return;
   if (path_leaves_to_photons(g, state.flags[path], -1)) return;
   const Vec3f D = path_direction(state, path);

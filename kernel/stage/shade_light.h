@@ -9,15 +9,6 @@
 
 namespace relief {
 
-/// What the graph of a lamp is told of a path's ray that met it. As in Cycles, the ray is of no kind, and counts as one event more
-/// than the path has had; but where light is asked for as well it counts as there, for the sum of both must not depend on how
-/// light is found.
-RELIEF_KERNEL GraphRay lamp_ray(const KernelGlobals& g, const PathState& state, std::uint32_t path)
-{
-  const std::uint32_t depths = state.bounces[path] + (state.pdf[path] > 0.0f ? 0u : 1u);
-  return {0, depths, state.flags[path] >> kPathTransparentShift, path_ray_length(g, state, path)};
-}
-
 /// Adds the light's radiance, weighted against next-event estimation, and sends the ray on behind the light.
 /// Reads the ray, hit, throughput, pdf, scatter normal and medium; writes the radiance and t_min.
 /// Next: intersect closest.
@@ -32,12 +23,13 @@ RELIEF_KERNEL void shade_light(const KernelGlobals& g, PathState& state, std::ui
   const float t = state.hit_t[path];
   Vec3f radiance = light_is_ball(light) ? ball_light_emitted(light, D) : light_emitted(light, D);
   const bool by_photons = path_leaves_to_photons(g, state.flags[path], light_index);
+  if (!path_sees_light(state, path, light)) radiance = {};
   if (!light.is_even && !is_zero(radiance) && !by_photons) {
     radiance =
         emitter_radiance(g, light, radiance, {path_origin(state, path) + D * t, {}, -D, lamp_ray(g, state, path)});
   }
   if (!is_zero(radiance) && !by_photons) {
-    radiance *= path_transmittance(path_sigma_a(state, path), t);
+    radiance *= path_transmittance(path_sigma_a(state, path), path_ray_length(g, state, path));
     const Vec3f seen = path_throughput(state, path) * radiance;
     if (scatterings == 0) film_add_emission(g.film, state.pixel[path], seen);
     path_add_denoising(g, state, path, seen);
@@ -49,7 +41,7 @@ RELIEF_KERNEL void shade_light(const KernelGlobals& g, PathState& state, std::ui
     }
     path_add_radiance(state, path, scatterings, path_throughput(state, path) * radiance, g.clamp_indirect);
   }
-  state.t_min[path] = next_float_up(t);
+  state.t_min[path] = t_min_behind(t);
 }
 
 }  // namespace relief

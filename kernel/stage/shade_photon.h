@@ -38,6 +38,10 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
   const bool sharp = closure_split<kFeatureAll, TransportMode::kImportance>(
       closure, *g.bsdf_tables, sharp_lobes(at.params, caster, g.caustics.roughness), u.sharpness, bsdf);
   if (sharp && !caster) return false;
+  const bool transmitted = (bsdf.lobe & kLobeTransmit) != 0;
+  const PathEvent event = transmitted ? PathEvent::kTransmission : PathEvent::kGlossy;
+  const bool is_first = (state.flags[path] & kPathCaustic) == 0;
+  if (is_first && (state.flags[path] >> kPathHiddenShift >> static_cast<int>(event) & 1u) != 0) return false;
   const Vec3f wi = from_local(side.frame, bsdf.wi);
   if (!shading_is_reversible(side, wi) || path_crosses_facets(state, path, wi)) return false;
   // The adjoint of a BSDF with shading normals is not symmetric (Veach 1997, Eq. 5.19).
@@ -55,7 +59,6 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
 
   path_set_ray(state, path, surface_ray_origin(at, wi), wi);
   state.throughput[path] = power;
-  const bool transmitted = (bsdf.lobe & kLobeTransmit) != 0;
   // A camera path counts the event next to the light, but no surface asks for that count any more.
   if ((state.flags[path] & kPathCaustic) != 0) {
     const BounceKind kind = transmitted                       ? BounceKind::kTransmission

@@ -14,6 +14,18 @@
 
 namespace relief {
 
+/// The part of a surface's f that a light is not hidden from.
+/// @param wi  in the closure's frame
+/// @param f   of all
+template <unsigned kFeatures, typename Closure>
+[[gnu::noinline]] RELIEF_KERNEL Vec3f
+shade_surface_seen_by(const KernelGlobals& g, const Closure& closure, Vec3f wi, Vec3f f, LightHides hides)
+{
+  if (!hides.differs()) return hides.diffuse ? Vec3f{} : f;
+  const Vec3f diffuse = closure_eval<kFeatures>(closure_diffuse(closure), *g.bsdf_tables, wi).f;
+  return hides.diffuse ? max(f - diffuse, Vec3f{}) : diffuse;
+}
+
 /// Queues a shadow ray towards a light sample taken at the hit.
 /// @param chosen, light_u, light_N  from and given to lights_choose
 template <unsigned kFeatures, typename Closure>
@@ -52,10 +64,22 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
       bsdf.f = closure_eval<kFeatures>(closure_soft(closure, kAllSharp), *g.bsdf_tables, wi).f;
     }
   }
+  bool is_found_here_alone = light.delta;
+  if (emitter != nullptr && __builtin_expect(emitter->hidden_from != 0, 0)) {
+    const bool transmits = (wi.z < 0.0f) != (dot(at.side.frame.n, path_direction(state, path)) > 0.0f);
+    const LightHides hides = light_hides(*emitter, transmits);
+    is_found_here_alone = light.delta || hides.differs();
+    bsdf.f = shade_surface_seen_by<kFeatures>(g, closure, wi, bsdf.f, hides);
+  }
   if (is_zero(bsdf.f)) return;
   const float cos_i = __builtin_fabsf(wi.z);
-  const float weight = path_light_weight(g.light_technique, light.pdf, bsdf.pdf, light.delta);
-  const Vec3f gain = path_throughput(state, path) * bsdf.f * radiance * (cos_i * weight / light.pdf);
+  const float weight = path_light_weight(g.light_technique, light.pdf, bsdf.pdf, is_found_here_alone);
+  Vec3f gain = path_throughput(state, path) * bsdf.f * radiance * (cos_i * weight / light.pdf);
+  // A lamp that stands in the path's medium; on the other side of a surface there is another.
+  if (const Vec3f sigma_a = path_sigma_a(state, path); __builtin_expect(!is_zero(sigma_a), 0)) {
+    const bool is_here = light.distance < kInfinity && (dot(light.wi, at.side.Ng) > 0.0f);
+    if (is_here) gain *= path_transmittance(sigma_a, light.distance);
+  }
   if (is_zero(gain)) return;
 
   const Vec3f O = surface_ray_origin(at, light.wi);
@@ -250,6 +274,8 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
   state.flags[path] = path_flags_after(state.flags[path], transmitted ? PathEvent::kTransmission
                                                           : diffuse   ? PathEvent::kDiffuse
                                                                       : PathEvent::kGlossy);
+  const bool is_clear = transmitted && !diffuse && bsdf.roughness <= g.clear_alpha;
+  if (!is_clear) state.flags[path] |= kPathCovers;
   if constexpr ((kFeatures & kFeatureTransmission) != 0) {
     if (transmitted && at.params.transmission > 0.0f && !at.params.thin) {
       const Vec3f inside = side.front ? at.params.sigma_a : Vec3f{};
@@ -399,6 +425,29 @@ RELIEF_KERNEL void shade_surface_emission(const KernelGlobals& g,
   }
 }
 
+/// Tells the film of what is a hole in it: closures that are, and all of an object but what lets rays through. Whatever else there
+/// is of the surface, the film gets as well.
+/// @param transmittance  of the path's ray
+/// @return               whether the path ends here unless it is let through
+template <unsigned kFeatures>
+RELIEF_KERNEL bool shade_surface_holdout(const KernelGlobals& g,
+                                         const PathState& state,
+                                         std::uint32_t path,
+                                         const SurfaceInteraction& at,
+                                         Vec3f transmittance)
+{
+  if ((state.flags[path] & kPathCovers) != 0) return false;
+  const bool is_object = (at.instance->flags & kHoldout) != 0;
+  const float opacity = 1.0f - (1.0f - at.params.alpha) * light_scalar(at.passed);
+  const float hole = is_object ? opacity : at.holdout;
+  if (hole > 0.0f) {
+    const float share = hole * light_scalar(path_throughput(state, path) * transmittance);
+    film_add_holdout(g.film, state.pixel[path], share);
+    film_add_clear(g.film, state.pixel[path], share);
+  }
+  return is_object || hole == 1.0f;
+}
+
 /// Shades one path. Reads and writes every column but the hit's.
 /// @param graph  of the material's program at the hit; null: it has none
 /// Next: intersect closest (pushed on `next`), or the path ends; it may fork. At most one ray is added to `shadow`, at a first hit two.
@@ -417,7 +466,6 @@ template <unsigned kFeatures>
   const std::uint32_t bounces = state.bounces[path];
   const int bounce = path_bounces(bounces, BounceKind::kAll);
   const int surface = path_surface(state, path);
-  const float t = state.hit_t[path];
   // Early: nothing waits for them yet.
   const ScatterSamples u = scatter_samples(state.pixel_hash[path], sample, surface);
 
@@ -427,7 +475,7 @@ template <unsigned kFeatures>
   // Whatever stands in a medium, of glass or not.
   const auto transmittance = [&] {
     const Vec3f sigma_a = path_sigma_a(state, path);
-    return is_zero(sigma_a) ? Vec3f{1, 1, 1} : path_transmittance(sigma_a, t);
+    return is_zero(sigma_a) ? Vec3f{1, 1, 1} : path_transmittance(sigma_a, path_ray_length(g, state, path));
   };
   const ShadingSide& side = at.side;
   RayCone cone = at.cone;
@@ -435,8 +483,9 @@ template <unsigned kFeatures>
   const bool last = bounce > g.limits.total || path_bounces(bounces, BounceKind::kDiffuse) > g.limits.diffuse ||
                     path_bounces(bounces, BounceKind::kGlossy) > g.limits.glossy ||
                     path_bounces(bounces, BounceKind::kTransmission) > g.limits.transmission;
+  const bool is_held = shade_surface_holdout<kFeatures>(g, state, path, at, transmittance());
   // Closures emit, and are lit, whether or not others let the path through.
-  if constexpr (kMixture) {
+  if (kMixture && !is_held) {
     const Vec3f before = path_throughput(state, path);
     state.throughput[path] = before * transmittance();
     shade_surface_emission<kFeatures>(g, state, path, at, path_throughput(state, path));
@@ -455,6 +504,10 @@ template <unsigned kFeatures>
     if (path_pass_through(g, state, path, at.passed)) queue_push(next, path);
     return;
   }
+  if (is_held) {
+    if ((state.flags[path] & kPathSawSurface) == 0) film_add_clear(g.film, state.pixel[path], -1.0f);
+    return;
+  }
 
   Vec3f throughput = path_throughput(state, path);
   if (!is_zero(path_sigma_a(state, path))) {
@@ -463,15 +516,10 @@ template <unsigned kFeatures>
   }
 
   surface_interaction_frame<kFeatures>(g, state, path, wo, at);
-  const InstanceView& instance = *at.instance;
   const SurfaceParams& params = at.params;
   const Vec3f wo_local = to_local(side.frame, wo);
 
   if ((state.flags[path] & kPathSawSurface) == 0) {
-    if ((instance.flags & kHoldout) != 0 || u.sharpness < at.holdout) {
-      film_add_holdout(g.film, state.pixel[path]);
-      return;
-    }
     state.flags[path] |= kPathSawSurface;
     shade_surface_first_hit(g, state, path, at, shadow);
   }

@@ -95,10 +95,15 @@ surface_interaction_locate(const KernelGlobals& g, const PathState& state, std::
   return at;
 }
 
-/// What kinds of ray a path's present one is: bits GraphRayKind.
+/// What kinds of ray a path's present one is: bits GraphRayKind. A photon's is what the camera's path is told that goes the other
+/// way: from what shows the photon it is a diffuse one, and before, as far as anyone knows yet, one through glass.
 RELIEF_KERNEL std::uint32_t path_ray_kinds(const PathState& state, std::uint32_t path)
 {
   const auto bit = [](GraphRayKind kind) { return 1u << static_cast<int>(kind); };
+  if ((state.flags[path] & kPathPhoton) != 0) {
+    if ((state.flags[path] & kPathCaustic) != 0) return bit(GraphRayKind::kReflection) | bit(GraphRayKind::kDiffuse);
+    return bit(GraphRayKind::kTransmission) | bit(GraphRayKind::kGlossy) | bit(GraphRayKind::kSingular);
+  }
   const auto event = static_cast<PathEvent>(path_event(state.flags[path]));
   if (event == PathEvent::kCamera) return bit(GraphRayKind::kCamera);
   const std::uint32_t side =
@@ -317,7 +322,7 @@ RELIEF_KERNEL bool path_pass_through(const KernelGlobals& g, PathState& state, s
 {
   if (passed != Vec3f{1, 1, 1}) state.throughput[path] = path_throughput(state, path) * passed;
   state.flags[path] += 1u << kPathTransparentShift;
-  state.t_min[path] = next_float_up(state.hit_t[path]);
+  state.t_min[path] = t_min_behind(state.hit_t[path]);
   return (state.flags[path] >> kPathTransparentShift) <= static_cast<std::uint32_t>(g.limits.transparent);
 }
 

@@ -93,6 +93,8 @@ enum PathFlag : std::uint32_t {
   kPathSawFeature = 1u << 5,   ///< what a denoiser is told is written, see Aov::kDenoisingAlbedo
   kPathEventShift = 6,         ///< position of the two bits of PathEvent
   kPathPhoton = 1u << 8,       ///< it started at a light
+  kPathHiddenShift = 9,        ///< position of four bits, of a photon: Light::hidden_from
+  kPathCovers = 1u << 13,      ///< an event after which the film is not clear, whatever is seen behind it
   kPathTransparentShift = 16,  ///< position of the count of transparent surfaces
 };
 

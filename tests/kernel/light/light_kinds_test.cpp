@@ -536,5 +536,35 @@ TEST(SunLight, IrradianceIsTheSameEverywhere)
   EXPECT_TRUE(sample.delta);
 }
 
+/// The sampler, its density and what rays meet are of the same cone, which causes the irradiance that was asked for.
+TEST(SunLight, OfAnAngleFillsItsCone)
+{
+  for (const double half : {1e-4, 4.65e-3, 0.1, 1.0, 1.55}) {
+    Light light;
+    light.kind = LightKind::kSun;
+    light.axis = normalize(Vec3f{0.3f, -0.8f, 0.5f});
+    light.emission = {3, 2, 1};
+    light.cone = static_cast<float>(2 * std::sin(half / 2) * std::sin(half / 2));
+    constexpr int kSteps = 128;
+    double irradiance = 0;
+    for (int i = 0; i < kSteps * kSteps; ++i) {
+      const Vec2f u{(static_cast<float>(i % kSteps) + 0.5f) / kSteps, (static_cast<float>(i / kSteps) + 0.5f) / kSteps};
+      const LightSample sample = light_sample(light, {1e6f, 5, 0}, u);
+      ASSERT_TRUE(sun_light_is_met(light, sample.wi)) << half;
+      ASSERT_EQ(sample.pdf, sun_light_pdf(light));
+      ASSERT_FALSE(sample.delta);
+      irradiance += static_cast<double>(sample.radiance.x) * -static_cast<double>(dot(sample.wi, light.axis)) /
+                    static_cast<double>(sample.pdf);
+    }
+    EXPECT_NEAR(irradiance / (kSteps * kSteps), 3.0, 3e-4) << half;
+    const Vec3f across = normalize(cross(light.axis, {1, 0, 0}));
+    const auto at_angle = [&](double angle) {
+      return across * static_cast<float>(std::sin(angle)) - light.axis * static_cast<float>(std::cos(angle));
+    };
+    EXPECT_TRUE(sun_light_is_met(light, at_angle(half * 0.99)));
+    EXPECT_FALSE(sun_light_is_met(light, at_angle(half * 1.01)));
+  }
+}
+
 }  // namespace
 }  // namespace relief
