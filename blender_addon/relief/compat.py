@@ -308,6 +308,14 @@ def film_exposure(scene):
     return getattr(getattr(scene, "cycles", None), "film_exposure", 1.0)
 
 
+def clear_roughness(scene):
+    """Roughness up to which glass before a transparent background is transparent, a setting of Cycles; None: none is."""
+    cycles = getattr(scene, "cycles", None)
+    if not getattr(cycles, "film_transparent_glass", False):
+        return None
+    return min(max(cycles.film_transparent_roughness, 0.0), 1.0)
+
+
 def world_of(scene, view_layer):
     """The world of a picture; later versions let a view layer have its own."""
     return getattr(view_layer, "world_override", None) or scene.world

@@ -56,6 +56,42 @@ def _caustic(scene):
     return float(np.mean([channels[f"{scene.view_layers[0].name}.Caustics.{c}"] for c in "RGB"]))
 
 
+def _architects_pane(bits):
+    """The slab's stage, whose glass lets rays of some kinds pass as if it were not there."""
+    scene, slab, sun = _slab()
+    material = slab.data.materials[0]
+    tree = material.node_tree
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    glass = output.inputs["Surface"].links[0].from_socket
+    light_path, transparent, mix = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("LightPath", "BsdfTransparent", "MixShader"))
+    factor = None
+    for bit in bits:
+        socket = light_path.outputs[bit]
+        if factor is not None:
+            most = tree.nodes.new("ShaderNodeMath")
+            most.operation = "MAXIMUM"
+            tree.links.new(factor, most.inputs[0])
+            tree.links.new(socket, most.inputs[1])
+            socket = most.outputs[0]
+        factor = socket
+    tree.links.new(factor, mix.inputs[0])
+    tree.links.new(glass, mix.inputs[1])
+    tree.links.new(transparent.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], output.inputs["Surface"])
+    return scene, sun
+
+
+def test_glass_that_shadow_rays_pass_casts_no_photons():
+    """Light came twice: past the pane, and as photons through it."""
+    from scenes import assert_agrees
+
+    for bits in (("Is Shadow Ray",), ("Is Shadow Ray", "Is Diffuse Ray"), ("Is Shadow Ray", "Is Reflection Ray")):
+        scene, _ = _architects_pane(bits)
+        assert _caustic(scene) == 0.0
+        set_file_format("OPEN_EXR", "32")
+        assert_agrees(scene, samples=32, least_mean=0.001)
+
+
 def test_slab_transmits_what_its_two_sides_leave():
     scene, _, _ = _slab()
     reflectance = 0.2**2

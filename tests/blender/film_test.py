@@ -104,6 +104,60 @@ def test_material_override():
     assert_agrees(scene, samples=64)
 
 
+def _glass_stage(roughness, threshold):
+    """Balls of smooth and of rougher glass, a coloured filter and a ball behind, before nothing."""
+    scene = new_scene()
+    scene.render.film_transparent = True
+    scene.cycles.film_transparent_glass = True
+    scene.cycles.film_transparent_roughness = threshold
+    for x, rough in ((-1.0, 0.0), (1.0, roughness)):
+        glass = new_material("glass", "ShaderNodeBsdfGlass", IOR=1.3, Roughness=rough, Color=(0.9, 0.8, 0.7, 1))[0]
+        add_sphere(0.7, glass, (x, 0, 0.8))
+    add_sphere(0.4, diffuse((0.8, 0.5, 0.3)), (0.6, 2.0, 0.8))
+    held = add_sphere(0.4, diffuse((0.8, 0.5, 0.3)), (-0.6, 2.0, 0.8))
+    held.is_holdout = True
+    add_plane(1.0, new_material("filter", "ShaderNodeBsdfTransparent", Color=(0.5, 0.3, 0.2, 1))[0], (0, -1, 1.7)).rotation_euler = degrees(80, 0, 0)
+    set_world((0.3, 0.4, 0.5))
+    add_light("POINT", (2, -3, 3), energy=200)
+    add_camera((0, -6, 1), degrees(90, 0, 0), lens=50)
+    set_bounces(scene, 6)
+    return scene
+
+
+def test_transparent_glass():
+    """Glass up to a roughness is as clear as the film behind it, rougher glass is not, and filters are by their colour."""
+    for roughness, threshold in ((0.2, 0.3), (0.3, 0.1)):
+        scene = _glass_stage(roughness, threshold)
+        assert_agrees(scene, samples=256, tolerance=0.03)
+        relief, cycles = _alpha(scene, "RELIEF"), _alpha(scene, "CYCLES")
+        assert abs(relief.mean() - cycles.mean()) < 0.004, (relief.mean(), cycles.mean())
+        blocks = [a[:48, :64].reshape(6, 8, 8, 8).mean(axis=(1, 3)) for a in (relief, cycles)]
+        assert np.abs(blocks[0] - blocks[1]).max() < 0.05
+        scene.cycles.film_transparent_glass = False
+        assert _alpha(scene, "RELIEF").mean() > relief.mean() + 0.02
+
+
+def test_holdouts_are_black():
+    """Closures of an object that is held out left their light where alpha is 0."""
+    from relief import exr
+
+    scene, _ = _stage()
+    scene.render.film_transparent = True
+    ball = next(o for o in scene.objects if o.name.startswith("Sphere"))
+    material, tree, node = new_material("shiny", "ShaderNodeBsdfGlossy", Roughness=0.4)
+    ball.data.materials[0] = material
+    ball.is_holdout = True
+    scene.render.image_settings.color_mode, scene.render.image_settings.exr_codec = "RGBA", "NONE"
+    with folder() as path:
+        name = os.path.join(path, "picture.exr")
+        render(scene, "RELIEF", name, samples=16)
+        channels = exr.read(name).channels
+    hole = channels["A"] == 0
+    assert hole.any()
+    assert max(channels[c][hole].max() for c in "RGB") == 0
+    assert_agrees(scene, samples=64)
+
+
 def test_film_exposure():
     scene, _ = _stage()
     scene.cycles.film_exposure = 2.5

@@ -210,9 +210,68 @@ def test_powers_of_a_unit_of_area():
         assert_agrees(_stage(add))
 
 
-def test_a_light_that_some_rays_do_not_see_is_warned_about():
-    scene = _stage(lambda: setattr(add_light("POINT", energy=300), "visible_glossy", False))
-    assert_warns(scene, 'light "light"', "hidden from glossy rays")
+def test_sun_with_angle_far_from_the_origin():
+    """A disk in its place was 3 % darker at 10 km, 38 % at 100 km."""
+    for metres in (1e4, 1e5):
+        scene = _stage(lambda: add_light("SUN", rotation=degrees(40, 20, 0), energy=3, angle=math.radians(4)))
+        for shown in scene.objects:
+            if shown.type != "LIGHT":
+                shown.location = (shown.location[0] + metres, shown.location[1] + metres, shown.location[2])
+        scene.camera.data.clip_end = 1e3
+        assert_agrees(scene, samples=64, tolerance=0.02)
+
+
+def _hidden_stage(kind, ray, **settings):
+    """A plastic floor, a matt wall, a mirror and a pane before a lamp that some rays do not see."""
+    scene = new_scene()
+    plastic, tree, node = new_material("plastic", "ShaderNodeBsdfPrincipled", Roughness=0.3)
+    add_plane(material=plastic)
+    add_sphere(0.6, diffuse((0.7, 0.3, 0.2)), (-1.1, 0.4, 0.6))
+    mirror, _, node = new_material("mirror", "ShaderNodeBsdfGlossy", Color=(0.9, 0.9, 0.9, 1))
+    make_sharp(node)
+    add_sphere(0.6, mirror, (1.1, 0.4, 0.6))
+    translucent = new_material("translucent", "ShaderNodeBsdfTranslucent")[0]
+    pane = add_plane(1.0, translucent, (0, -0.6, 0.5))
+    pane.rotation_euler = degrees(75, 0, 0)
+    lamp = add_light(kind, (0, 0.5, 3), degrees(10, 5, 0), **settings)
+    setattr(lamp, f"visible_{ray}", False)
+    set_world((0.05, 0.05, 0.05))
+    add_camera((0, -6, 5), degrees(50, 0, 0), lens=40)
+    set_bounces(scene, 1)
+    return scene
+
+
+def test_lamps_that_some_rays_do_not_see():
+    """What is behind glass, or mirrored, or lit diffusely may be without a lamp that lights everything else."""
+    for ray in ("diffuse", "glossy", "transmission"):
+        assert_agrees(_hidden_stage("AREA", ray, energy=100, size=1.0), samples=128)
+        assert_agrees(_hidden_stage("POINT", ray, energy=100, shadow_soft_size=0.3), samples=128)
+        assert_agrees(_hidden_stage("SUN", ray, energy=3, angle=0.2), samples=128)
+
+
+def test_a_lamp_behind_glass_that_transmission_rays_do_not_see():
+    scene = new_scene()
+    add_plane(8, diffuse())
+    glass, _, node = new_material("glass", "ShaderNodeBsdfGlass", IOR=1.45)
+    make_sharp(node)
+    add_plane(3.0, glass, (0, 0, 1))
+    add_light("AREA", (0, 0, 2.5), energy=200, size=1.0).visible_transmission = False
+    set_world((0.1, 0.1, 0.1))
+    add_camera((0, -4, 0.8), degrees(83, 0, 0), lens=40)
+    set_bounces(scene, 4)
+    assert_agrees(scene, samples=128, tolerance=0.02)
+
+
+def test_area_lights_scaled_to_a_line_are_dark():
+    for shape in ("SQUARE", "DISK"):
+        for scale in ((0, 1, 1), (1, 0, 1), (0, 0, 1)):
+
+            def light():
+                add_light("AREA", (1, 0, 3), shape=shape, energy=200, size=1.5).scale = scale
+
+            scene = _stage(light)
+            set_world((0.2, 0.2, 0.2))
+            assert_agrees(scene, samples=16)
 
 
 def test_a_strength_three_percent_off_is_noticed():

@@ -15,6 +15,7 @@ from scenes import (
     diffuse,
     make_sharp,
     new_material,
+    new_scene,
     set_bounces,
     set_world,
 )
@@ -114,6 +115,58 @@ def test_absorbing_glass():
     scene = _stage(material, 8)
     bpy.data.objects.remove(next(o for o in scene.objects if o.type == "LIGHT"))
     assert_agrees(scene, samples=64)
+
+
+def _absorbing_ball(radius, location=(0, 0, 0), color=(0.2, 0.6, 0.9, 1)):
+    """A ball of the index of air, which absorbs."""
+    material, tree, node = new_material("absorbing", "ShaderNodeBsdfGlass", Color=(1, 1, 1, 1), IOR=1.0001)
+    make_sharp(node)
+    volume = tree.nodes.new("ShaderNodeVolumeAbsorption")
+    volume.inputs["Color"].default_value = color
+    volume.inputs["Density"].default_value = 0.8
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    tree.links.new(volume.outputs[0], output.inputs["Volume"])
+    return add_sphere(radius, material, location)
+
+
+def test_a_camera_in_what_absorbs():
+    """Light was absorbed only where the path had come in through the surface."""
+    for is_orthographic in (False, True):
+        scene = new_scene()
+        _absorbing_ball(1)
+        add_sphere(0.2, None, (0.2, 0.5, 0.1))
+        set_world((1, 1, 1))
+        add_camera((0, -0.2, 0), (1.4, 0, -0.3), lens=20).data.type = "ORTHO" if is_orthographic else "PERSP"
+        scene.camera.data.ortho_scale = 3
+        set_bounces(scene, 4)
+        assert_agrees(scene, samples=64)
+
+
+def test_a_lamp_in_what_absorbs():
+    scene = new_scene()
+    _absorbing_ball(2)
+    add_plane(1.5, None, (0, 0, -0.5))
+    add_light("AREA", (0.2, 0.1, 0.6), energy=20, size=0.5)
+    add_camera((0, -1.2, 0.3), degrees(65, 0, 0), lens=30)
+    set_bounces(scene, 4)
+    assert_agrees(scene, samples=128)
+
+
+def test_absorbing_things_in_each_other_are_warned_about():
+    scene = new_scene()
+    _absorbing_ball(1)
+    _absorbing_ball(0.5, (0.8, 0, 0))
+    add_camera()
+    set_world((1, 1, 1))
+    assert_warns(scene, "stand in each other")
+
+
+def test_negative_emission_is_warned_about():
+    scene = new_scene()
+    add_plane(2, new_material("dark", "ShaderNodeEmission", Color=(1, 0.4, 0.1, 1), Strength=-2.0)[0])
+    add_camera()
+    set_world((1, 1, 1))
+    assert_warns(scene, 'material "dark"', "negative emission")
 
 
 def test_emission():

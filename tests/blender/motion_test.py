@@ -189,3 +189,16 @@ def test_what_is_not_understood_is_said():
     scene.cycles.rolling_shutter_type = "NONE"
     scene.render.motion_blur_shutter_curve.curves[0].points[0].location = (0, 0)
     assert_warns(scene, "a shutter curve", "the shutter is fully open all the time")
+
+
+def test_a_lens_that_changes_is_warned_about():
+    for name, values in (("lens", (30, 90)), ("sensor_width", (18, 54))):
+        scene = _stage()
+        scene.render.use_motion_blur = True
+        scene.render.motion_blur_shutter = 1.0
+        camera = scene.camera.data
+        for frame, value in zip((9, 11), values):
+            setattr(camera, name, value)
+            camera.keyframe_insert(name, frame=frame)
+        scene.frame_set(10)
+        assert_warns(scene, 'camera "', "a lens that changes", "stays as it is half way")

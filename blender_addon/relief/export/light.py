@@ -7,7 +7,7 @@ What Blender means by power, and what the scene format wants (checked against Cy
     sun           E W/m²     irradiance E
     area          P watts    radiance P / πA            before 4.0 P / 4A: a factor older than Blender's watts
 
-Sizes: points and spots shine from a ball or from a disk that faces each point, a sun is a disk far away.
+Sizes: points and spots shine from a ball or from a disk that faces each point, a sun is seen under an angle from everywhere.
 """
 
 import math
@@ -17,8 +17,8 @@ from typing import Callable
 from .. import compat
 from .light_graph import read_emission
 
-#: Distance of a sun's disk in sizes of the scene: across the scene its light differs by two in so many.
-_SUN_DISTANCE = 3e4
+#: The widest sun that is understood.
+_WIDEST_SUN = math.pi * 0.99
 
 #: The least spread of an area light.
 _NARROWEST_SPREAD = math.radians(1)
@@ -34,7 +34,6 @@ class Place:
     node               glTF node without scale: its −Z is the light's direction; its children are nodes, not indices yet
     scale              of Blender's object along X, Y and Z: areas follow the first two
     visible_to_camera  whether its surface is seen
-    scene_size         metres that the scene's objects extend over
     random             what Object Info says of the light's object
     writer             GltfWriter
     images             ImageExporter
@@ -44,7 +43,6 @@ class Place:
     node: dict
     scale: tuple
     visible_to_camera: bool
-    scene_size: float
     random: float
     writer: object
     images: object
@@ -84,13 +82,15 @@ def export_light(light, place):
             place.warn("the uneven scale of a spot", "its cone is round")
         _add_punctual(place, _spot(light, energy / (4 * math.pi), own, place), color)
     elif light.type == "SUN":
+        value = {"type": "directional", "intensity": energy}
         if light.angle > 0:
-            _add_sun_disk(place, light.angle, color, energy, own)
-        else:
-            value = {"type": "directional", "intensity": energy}
-            if own:
-                place.writer.extend(value, "RELIEF_light", own)
-            _add_punctual(place, value, color)
+            angle = min(light.angle, _WIDEST_SUN)
+            # Cycles' radiance; the format has the irradiance that it causes on a plane across.
+            value["intensity"] *= math.pi * math.sin(angle / 2) ** 2 / compat.sun_divisor(angle / 2)
+            own = {"angle": angle, **own}
+        if own:
+            place.writer.extend(value, "RELIEF_light", own)
+        _add_punctual(place, value, color)
     else:
         _add_area(place, light, color, energy, own)
 
@@ -150,22 +150,6 @@ def _add_area(place, light, color, energy, own):
     else:
         value.update(shape="rectangle", width=width, height=height)
         place.writer.extend(place.node, "RELIEF_area_light", value)
-
-
-def _add_sun_disk(place, angle, color, energy, own):
-    """A disk so far away that it is seen under the sun's angle from everywhere."""
-    distance = _SUN_DISTANCE * place.scene_size
-    half = min(angle, math.pi * 0.99) / 2
-    value = {
-        "shape": "disk",
-        "radius": distance * math.tan(half),
-        # Seen from the scene it fills the cone of the half angle.
-        "radiance": energy / compat.sun_divisor(half),
-        "color": list(color),
-        "visibleToCamera": False,
-        **own,
-    }
-    _add_child(place, {"translation": [0.0, 0.0, distance]}, "RELIEF_area_light", value)
 
 
 def set_emission(material, radiance, writer):

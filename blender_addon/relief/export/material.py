@@ -288,6 +288,8 @@ class MaterialJob:
     def _write_emission(self, emission):
         if emission.is_constant((0.0, 0.0, 0.0)):
             return
+        if min(emission.value) < 0:
+            self._warn("negative emission", "there is none")
         set_emission(self.json, [max(0.0, c) for c in emission.value], self._writer)
         if emission.texture:
             info = self._color_info(emission.texture)

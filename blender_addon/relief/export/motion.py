@@ -74,18 +74,23 @@ class Motion:
         self.moves = []
         self._fps = scene.render.fps / scene.render.fps_base
         self._report = report
-        self._camera = []
+        self._camera, self._lenses = [], set()
         self._places, self._shapes = {}, {}
         now = scene.frame_current_final
         for step in range(shutter.steps + 1):
             _set_frame(engine, shutter.frame_at(now, step / shutter.steps))
             self._look(engine, depsgraph)
         _set_frame(engine, shutter.frame_at(now, 0.5))
+        if len(self._lenses) > 1:
+            report.warn(
+                f'camera "{scene.camera.name}"', "a lens that changes while the shutter is open", "it stays as it is half way"
+            )
 
     def _look(self, engine, depsgraph):
         """Adds what things are now to what they were at the steps before."""
         camera = depsgraph.scene.camera
         if camera is not None:
+            self._lenses.add(_lens(camera.evaluated_get(depsgraph).data))
             self._camera.append(np.array(engine.camera_model_matrix(camera.evaluated_get(depsgraph)), dtype=np.float64))
         for key, thing in numbered(collect(depsgraph, _Silent())):
             settings = compat.motion_blur_of(thing.object)
@@ -188,6 +193,13 @@ class _Silent:
 
     def warn(self, *_):
         pass
+
+
+def _lens(camera):
+    """What of a bpy camera makes its picture smaller or larger."""
+    if camera.type == "ORTHO":
+        return (camera.type, camera.ortho_scale)
+    return (camera.type, camera.sensor_fit, camera.sensor_width, camera.sensor_height, camera.lens)
 
 
 def _set_frame(engine, frame):

@@ -215,7 +215,7 @@ class SceneExporter:
     def add_world(self):
         is_opaque, layer = not self._scene.render.film_transparent, self._depsgraph.view_layer
         world = compat.world_of(self._scene, layer) if layer.use_sky else None
-        export_world(world, is_opaque, self.writer, self._images, self._report)
+        export_world(world, is_opaque, compat.clear_roughness(self._scene), self.writer, self._images, self._report)
 
     def add_objects(self):
         """Adds meshes, instances and lights."""
@@ -226,10 +226,9 @@ class SceneExporter:
             if thing.kind == "geometry":
                 self._add_geometry(thing, key)
         self._stored.forget_unused()
-        size = _extent(things)
         for thing in things:
             if thing.kind == "light":
-                self._add_lights(thing, size)
+                self._add_lights(thing)
 
     def _keep_dark(self):
         """Gives a scene without any light one that is as good as none: the program would put up a lamp of its own."""
@@ -403,34 +402,37 @@ class SceneExporter:
             exported = [(i, w if w.coordinates else replace(w, coordinates=_ACTIVE_UV)) for i, w in exported]
         return exported
 
-    def _add_lights(self, thing, scene_size):
+    def _add_lights(self, thing):
         original = thing.object
         light = original.evaluated_get(self._depsgraph).data
         matrices = thing.world_matrices()
         # Without nodes a point has no direction that a scale of 0 could take from it.
         if light.type == "POINT" and not light.use_nodes:
             matrices[:, :3, :3] = np.eye(3)
-        usable, numbers = self._usable(thing, matrices)
+        lit = np.flatnonzero(~_has_no_area(light, matrices))
+        usable, numbers = self._usable(thing, matrices[lit])
         translation, rotation, scale, _ = decompose(usable)
-        randoms = instance_values.randoms(original, thing.places, len(matrices))[numbers]
+        randoms = instance_values.randoms(original, thing.places, len(matrices))[lit[numbers]]
         for t, r, s, random in zip(translation, rotation, scale, randoms):
             node = {"name": thing.name, "translation": t.tolist(), "rotation": r.tolist()}
             place = Place(
                 node=node,
                 scale=tuple(np.abs(s).tolist()),
                 visible_to_camera=original.visible_camera,
-                scene_size=scene_size,
                 random=float(random),
                 writer=self.writer,
                 images=self._images,
                 warn=self._warner("light", thing.name),
             )
             export_light(light, place)
+            if compat.links_light(original):
+                place.warn(*_LINKED)
             unread.warn_unread_of_light(light, place.warn)
-            _warn_visibility(original, place.warn)
+            settings = {f"visibleTo{ray.capitalize()}": False for ray in _hidden_from(original)}
             if not original.relief.caustic_light:
-                settings = node.setdefault("extensions", {}).get("RELIEF_object", {})
-                self.writer.extend(node, "RELIEF_object", {**settings, "causticLight": False})
+                settings["causticLight"] = False
+            if settings:
+                self.writer.extend(node, "RELIEF_object", settings)
             self.nodes.append(node)
 
 
@@ -474,27 +476,25 @@ def _is_light(node):
     return any(_is_light(child) for child in node.get("children", ()))
 
 
+def _hidden_from(original):
+    """The kinds of bounced rays that do not see an object."""
+    return [ray for ray in ("diffuse", "glossy", "transmission") if not getattr(original, f"visible_{ray}")]
+
+
+def _has_no_area(light, matrices):
+    """At which places an area light has shrunk to a line, or a round one to nothing along its axis: then it is dark in Cycles,
+    too.
+    """
+    if light.type != "AREA":
+        return np.zeros(len(matrices), dtype=bool)
+    needed = 3 if light.shape in {"DISK", "ELLIPSE"} else 2
+    return (np.linalg.norm(matrices[:, :3, :needed], axis=1) == 0).any(axis=1)
+
+
 def _warn_visibility(original, warn):
     """Warns where an object shines on, or is seen by, some things alone."""
-    hidden = [k for k in ("diffuse", "glossy", "transmission") if not getattr(original, f"visible_{k}")]
+    hidden = _hidden_from(original)
     if hidden:
         warn(f"hidden from {' and '.join(hidden)} rays", "these see it")
     if compat.links_light(original):
-        warn("light linking", "it shines on everything")
-
-
-def _extent(things):
-    """Metres that the centres of all things and their own sizes reach over: at least 1."""
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for thing in things:
-        if thing.kind != "geometry":
-            continue
-        matrices = thing.world_matrices()
-        corners = np.array(thing.object.bound_box, dtype=np.float64)
-        reach = np.abs(corners).max() * np.abs(matrices[:, :3, :3]).sum(axis=2).max(axis=1)
-        first, last = matrices[:, :3, 3] - reach[:, None], matrices[:, :3, 3] + reach[:, None]
-        # What is not finite or out of bounds is left out of the picture, too.
-        is_seen = np.isfinite(first + last).all(axis=1) & (np.maximum(np.abs(first), np.abs(last)) < FARTHEST).all(axis=1)
-        low = np.minimum(low, first[is_seen].min(axis=0, initial=np.inf))
-        high = np.maximum(high, last[is_seen].max(axis=0, initial=-np.inf))
-    return max(1.0, float((high - low).max())) if np.isfinite(low).all() else 1.0
+        warn(*_LINKED)

@@ -12,11 +12,12 @@ from .image import MISSING, is_encoded, reads_as_stored
 from .texture import ies_uri, image_options
 
 
-def export_world(world, visible_to_camera, writer, images, report):
+def export_world(world, visible_to_camera, clear_roughness, writer, images, report):
     """Adds the surroundings. Without a world, or with a black one, there is none.
 
     @param  world              bpy world or None
     @param  visible_to_camera  False: films with a transparent background
+    @param  clear_roughness    up to which glass is as clear as air then; None: it is opaque
     @param  writer             GltfWriter
     @param  images             ImageExporter
     @param  report             Report
@@ -27,6 +28,8 @@ def export_world(world, visible_to_camera, writer, images, report):
         environment = _environment(world, writer, images, lambda *text: report.warn(f'world "{world.name}"', *text))
     seen = environment.get("visibleToCamera", True) and (world is None or compat.sees_world(world, "camera"))
     environment["visibleToCamera"] = visible_to_camera and seen
+    if not visible_to_camera and clear_roughness is not None:
+        environment["clearGlass"] = clear_roughness
     for ray in ("diffuse", "glossy", "transmission"):
         if world is not None and not compat.sees_world(world, ray):
             environment[f"visibleTo{ray.capitalize()}"] = False
@@ -38,7 +41,7 @@ def export_world(world, visible_to_camera, writer, images, report):
 def _environment(world, writer, images, warn):
     """RELIEF_environment of a world, but for what says who sees it."""
     if not world.use_nodes:
-        return {"color": [max(0.0, c) for c in nodes.finite(tuple(world.color), "its colour", warn)]}
+        return {"color": _not_negative(nodes.finite(tuple(world.color), "its colour", warn), warn)}
     output = nodes.active_output(world.node_tree, "ShaderNodeOutputWorld")
     if output and nodes.linked(output.inputs["Volume"]) is not None:
         warn("a volume that fills the world", "it is left out, and with it that it dims what is far: all but near lamps")
@@ -56,6 +59,17 @@ def _environment(world, writer, images, warn):
     elif backdrop is not None and (backdrop != environment or "graph" in backdrop):
         environment["backdrop"] = backdrop
     return environment
+
+
+#: What is said of light that takes light away.
+_NEGATIVE = ("negative light", "there is none there")
+
+
+def _not_negative(color, warn):
+    """A colour without what is below 0."""
+    if min(color) < 0:
+        warn(*_NEGATIVE)
+    return [max(0.0, c) for c in color]
 
 
 class _Surroundings(EmissionTree):
@@ -79,7 +93,7 @@ class _Surroundings(EmissionTree):
                 return plain
         total = self.total()
         if isinstance(total, list):
-            return {"color": [max(0.0, c) for c in total]}
+            return {"color": _not_negative(total, self.warn)}
         if any(node["type"] == "light-path" for node in self.graph.nodes):
             self.asks_for_camera = True
         return {"graph": {"nodes": self.graph.nodes, "outputs": {"color": total}}}
@@ -98,12 +112,16 @@ class _Surroundings(EmissionTree):
         strength = self.graph.constant(inputs["Strength"], source.groups)
         if strength is None:
             return None
-        strength = max(0.0, strength)
+        value = self.graph.constant(inputs["Color"], source.groups)
+        if strength < 0:
+            if value is not None and min(value) < 0:
+                return {"color": _not_negative([c * strength for c in value], self.warn)}
+            self.warn(*_NEGATIVE)
+            strength = 0.0
         if strength == 0:
             return {"color": [0.0, 0.0, 0.0]}
-        value = self.graph.constant(inputs["Color"], source.groups)
         if value is not None:
-            return {"color": [max(0.0, c) for c in value], "strength": strength}
+            return {"color": _not_negative(value, self.warn), "strength": strength}
         texture = nodes.follow(inputs["Color"], source.groups)
         if texture.node.bl_idname != "ShaderNodeTexEnvironment" or texture.node.projection != "EQUIRECTANGULAR":
             return None
