@@ -106,6 +106,7 @@ struct GraphHeights {
   InstanceView instance;  ///< without a place of its own where the graph reads of the mesh alone
   GraphProgramView program;
   const TextureView* textures;
+  const ImageBounds* image_bounds;
   GraphRun run;
   GraphBoundsRun run_bounds;
   GraphScene scene;
@@ -286,6 +287,7 @@ void bounds(const void* owner, std::uint32_t triangle, const WeightPatches& patc
       lanes = other_range(OnTriangle(heights, triangle), input, patches);
     }
   }
+  registers->images = heights.image_bounds;
   heights.run_bounds(program, heights.textures, *registers);
   const std::uint16_t result = program.results[0];
   const GraphRange out =
@@ -348,9 +350,9 @@ void computed_heights_add(const Scene& scene, const DisplacementOptions& options
       ComputedHeights heights;
       if (has_graph) {
         const InstanceView placed = of_instance ? all->views.instances[i] : InstanceView{};
-        all->heights.push_back(std::make_unique<GraphHeights>(
-            GraphHeights{&mesh, placed, program, scene.textures->views().data(), stage_table_select().run_graph,
-                         graph_bounds_select(), graph_scene, next_id.fetch_add(1)}));
+        all->heights.push_back(std::make_unique<GraphHeights>(GraphHeights{
+            &mesh, placed, program, scene.textures->height_views().data(), scene.textures->height_bounds().data(),
+            stage_table_select().run_graph, graph_bounds_select(), graph_scene, next_id.fetch_add(1)}));
         heights.source = {all->heights.back().get(), eval, bounds};
       }
       heights.num_cells = settings->num_cells;

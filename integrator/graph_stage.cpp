@@ -1,5 +1,6 @@
 // The interpreter of value graphs, compiled once an instruction set like stages.cpp, with RELIEF_GRAPH_RUN naming its one
 // function. Apart from the stages, for opcodes are many and change often.
+#include "integrator/graph_stop.h"
 #include "integrator/stages.h"
 #include "kernel/graph/graph_eval.h"
 
@@ -7,7 +8,7 @@ namespace relief {
 
 void RELIEF_GRAPH_RUN(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers)
 {
-  graph_run(program, textures, registers);
+  graph_run(program, textures, registers, graph_stop);
 }
 
 }  // namespace relief

@@ -400,7 +400,8 @@ RenderedImage render(const Scene& scene,
     if (camera_medium.exists()) worker.camera_medium = &camera_medium;
     return worker;
   });
-  const bool has_long_searches = context.displacements.size() > 0;
+  // What a tile may be given up in the middle of.
+  const bool has_long_searches = context.displacements.size() > 0 || !scene.graphs.empty();
   const std::uint32_t wanted = samples_wanted(options);
   ProgressReporter reporter(options, progress, static_cast<double>(film.width()) * film.height(), start);
   const auto report = [&](bool now) { reporter.report(now, photons ? &*photons : nullptr); };

@@ -70,7 +70,8 @@ KernelGlobals render_globals(const SceneContext& context, const RenderOptions& o
 /// Samples of a tile's pixels.
 Batch tile_batch(const Film& film, int tile, std::uint32_t first_sample, std::uint32_t num_samples);
 
-/// Renders; returns what was sampled when `stop` became true. Tiles that are searching displaced meshes then are dropped.
+/// Renders; returns what was sampled when `stop` became true. Tiles that are searching displaced meshes
+/// or running value graphs then are dropped.
 /// @param progress  called a few times a second from any thread, one call at a time; may be empty
 /// @param kept      what was built of this scene before; what is built now stays in it
 /// @param stats     filled but for what only the caller knows (scene, version, load_seconds, warnings)

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "integrator/camera_medium.h"
+#include "integrator/graph_stop.h"
 
 namespace relief {
 
@@ -126,8 +127,14 @@ bool Wavefront::run(const KernelGlobals& g,
 
   DisplacementWork displacement;
   displacement.total.stop = stop;
+  const GraphStop graphs(stop);
+  // Graphs that were given up gave nothing that may count.
+  const auto is_stopped = [&] {
+    return displacement.total.stopped ||
+           (g.graphs != nullptr && stop != nullptr && stop->load(std::memory_order_relaxed));
+  };
   std::uint64_t searches_left = most_searches(g);
-  for (bool camera = true; active_.size > 0 && !displacement.total.stopped; camera = false) {
+  for (bool camera = true; active_.size > 0 && !is_stopped(); camera = false) {
     if (searches_left-- == 0) {
       counters.endless_paths += active_.size;
       break;
@@ -160,7 +167,7 @@ bool Wavefront::run(const KernelGlobals& g,
   }
 
   note_displacement(displacement);
-  if (displacement.total.stopped) return false;
+  if (is_stopped()) return false;
   stages.finish(g, state_, batch, counters, first_nonfinite);
   charge(Stage::kFilm);
   return true;
@@ -182,7 +189,12 @@ void Wavefront::trace_photons(const KernelGlobals& g,
   stages.emit_photons(g, sources, state_, first, count, active_);
   DisplacementWork displacement;
   displacement.total.stop = stop;
-  for (std::uint64_t searches_left = most_searches(g); active_.size > 0 && !displacement.total.stopped;) {
+  const GraphStop graphs(stop);
+  const auto is_stopped = [&] {
+    return displacement.total.stopped ||
+           (g.graphs != nullptr && stop != nullptr && stop->load(std::memory_order_relaxed));
+  };
+  for (std::uint64_t searches_left = most_searches(g); active_.size > 0 && !is_stopped();) {
     if (searches_left-- == 0) {
       counters.endless_paths += active_.size;
       break;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <deque>
+#include <map>
 #include <new>
 #include <numeric>
 #include <optional>
@@ -11,6 +12,7 @@
 #include <tuple>
 #include <unordered_map>
 
+#include "scene/height_image.h"
 #include "scene/kept_images.h"
 #include "scene/memory.h"
 #include "scene/mip_chain.h"
@@ -253,6 +255,9 @@ struct TextureStore::Impl {
                : view;
   }
   std::vector<std::string> labels;
+  std::map<std::size_t, std::unique_ptr<HeightImage>> height_images;  ///< by their images
+  std::vector<TextureView> height_views;
+  std::vector<ImageBounds> height_bounds;
 };
 
 TextureStore::TextureStore(std::vector<TextureRequest> requests,
@@ -308,6 +313,13 @@ TextureStore::TextureStore(std::vector<TextureRequest> requests,
     }
   }
   if (cache_bytes > 0) impl_->cache = std::make_unique<TextureCache>(cache_bytes);
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    const std::size_t of = impl_->image_of_texture[i];
+    if (!requests[i].of_heights || impl_->height_images.contains(of)) continue;
+    const Image& image = images[of];
+    const bool is_there = !image.is_missing && !image.fault;
+    impl_->height_images[of] = std::make_unique<HeightImage>(is_there ? &image.source : nullptr, image.layout, image.label);
+  }
   for (Image& image : images) {
     warn(image, warnings);
     if (image.cached) {
@@ -323,6 +335,14 @@ TextureStore::TextureStore(std::vector<TextureRequest> requests,
     impl_->views.push_back(image.cached
                                ? impl_->cache->view(image.cache_index, request.wrap_u, request.wrap_v, request.filter)
                                : impl_->resident_view(image, request));
+  }
+  impl_->height_views = impl_->views;
+  impl_->height_bounds.resize(requests.size());
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    if (!requests[i].of_heights) continue;
+    HeightImage& image = *impl_->height_images[impl_->image_of_texture[i]];
+    impl_->height_views[i] = image.view(impl_->views[i]);
+    impl_->height_bounds[i] = image.bounds(impl_->height_views[i]);
   }
 }
 
@@ -360,6 +380,8 @@ int TextureStore::add_image(std::string label,
 }
 
 std::span<const TextureView> TextureStore::views() const { return impl_->views; }
+std::span<const TextureView> TextureStore::height_views() const { return impl_->height_views; }
+std::span<const ImageBounds> TextureStore::height_bounds() const { return impl_->height_bounds; }
 
 std::size_t TextureStore::bytes() const
 {
@@ -367,6 +389,7 @@ std::size_t TextureStore::bytes() const
   for (const Image& image : impl_->images) {
     bytes += image.read != nullptr ? image.read->bytes() : 0;
   }
+  for (const auto& [index, image] : impl_->height_images) bytes += image->bytes();
   return bytes;
 }
 

@@ -16,6 +16,7 @@ namespace relief {
 
 class KeptImages;     // scene/kept_images.h
 class TextureFaults;  // scene/texture_faults.h
+struct ImageBounds;   // kernel/graph/image_bounds.h
 
 /// How a texture's numbers are to be read. Of floats sRGB means light all the same, encoded sRGB does not.
 enum class TextureColor : std::uint8_t {
@@ -62,6 +63,7 @@ struct TextureRequest {
   TexelFilter filter = TexelFilter::kLinear;
   bool is_missing = false;          ///< magenta, which `faults` knows of
   TextureFaults* faults = nullptr;  ///< hears of what cannot be read, which is magenta then; null: it is an error
+  bool of_heights = false;  ///< a value graph of heights reads it: in its own precision, and with bounds
 };
 
 class TextureStore {
@@ -85,6 +87,10 @@ class TextureStore {
   int add_image(std::string label, int width, int height, std::span<const float> rgb, Wrap wrap_u, Wrap wrap_v);
 
   std::span<const TextureView> views() const;
+  /// What value graphs of heights read in the place of these; others are as there.
+  std::span<const TextureView> height_views() const;
+  /// Of each texture; those that no heights read have none.
+  std::span<const ImageBounds> height_bounds() const;
   std::size_t bytes() const;        ///< resident texels
   bool is_cached(int index) const;  ///< served by the tile cache
   const std::string& label(int index) const;

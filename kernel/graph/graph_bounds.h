@@ -197,15 +197,11 @@ RELIEF_KERNEL void musgrave_3d_op(const GraphRangeOperands& o) { musgrave<3>(o);
 
 RELIEF_KERNEL void musgrave_4d_op(const GraphRangeOperands& o) { musgrave<4>(o); }
 
-RELIEF_KERNEL void image_op(const GraphRangeOperands& o)
-{
-  set_all(o, 4, of_texels(o.textures[o.immediates[0]], o.immediates[1]));
-}
+RELIEF_KERNEL void image_op(const GraphRangeOperands& o) { image(o); }
 
-RELIEF_KERNEL void image_box_op(const GraphRangeOperands& o)
-{
-  set_all(o, 4, of_texels(o.textures[o.immediates[0]], o.immediates[1]));
-}
+RELIEF_KERNEL void image_box_op(const GraphRangeOperands& o) { image_box(o); }
+
+RELIEF_KERNEL void image_tiles_op(const GraphRangeOperands& o) { image_tiles(o); }
 
 RELIEF_KERNEL void table_op(const GraphRangeOperands& o) { table(o); }
 
@@ -229,41 +225,48 @@ RELIEF_KERNEL void checker_op(const GraphRangeOperands& o) { o.set(0, unit()); }
 
 RELIEF_KERNEL void open_share_op(const GraphRangeOperands& o) { o.set(0, unit()); }
 
-RELIEF_KERNEL void image_tiles_op(const GraphRangeOperands& o)
-{
-  set_all(o, kGraphOpShapes[static_cast<int>(GraphOp::image_tiles)].num_outputs, range_unknown());
-}
-
 RELIEF_KERNEL void ies_op(const GraphRangeOperands& o)
 {
-  set_all(o, kGraphOpShapes[static_cast<int>(GraphOp::ies)].num_outputs, range_unknown());
+  const float* table = o.program.tables + (o.immediates[0] | std::uint32_t{o.immediates[1]} << 16);
+  const int angles = o.immediates[2] + o.immediates[3], size = ies_table_size(o.immediates[2], o.immediates[3]);
+  float most = 0.0f;
+  for (int i = angles; i < size; ++i) most = max(most, __builtin_fabsf(table[i]));
+  // The weights of four values between two add up to 5/4 in size.
+  o.set(0, range_between(F8{}, splat8(25.0f / 16.0f * 1.0001f * most)));
 }
 
-RELIEF_KERNEL void gabor_2d_op(const GraphRangeOperands& o)
+/// No spot is larger than 1, and eight in each of the cells around are looked at.
+RELIEF_KERNEL void gabor_op(const GraphRangeOperands& o, float num_cells)
 {
-  set_all(o, kGraphOpShapes[static_cast<int>(GraphOp::gabor_2d)].num_outputs, range_unknown());
+  const F8 most = splat8(num_cells * kGaborSpots);
+  set_all(o, 2, range_between(-most, most));
 }
 
-RELIEF_KERNEL void gabor_3d_op(const GraphRangeOperands& o)
-{
-  set_all(o, kGraphOpShapes[static_cast<int>(GraphOp::gabor_3d)].num_outputs, range_unknown());
-}
+RELIEF_KERNEL void gabor_2d_op(const GraphRangeOperands& o) { gabor_op(o, 9.0f); }
+RELIEF_KERNEL void gabor_3d_op(const GraphRangeOperands& o) { gabor_op(o, 27.0f); }
 
+/// Of any temperature: red of 800 K is the most, green of it the least.
 RELIEF_KERNEL void blackbody_op(const GraphRangeOperands& o)
 {
-  set_all(o, kGraphOpShapes[static_cast<int>(GraphOp::blackbody)].num_outputs, range_unknown());
+  set_all(o, 3, range_between(splat8(-0.25f), splat8(5.5f)));
 }
 
 }  // namespace graph_bounds
 
 /// Runs a program: see GraphBoundsRun.
+/// @param stop  true: the run is given up, and nothing is known; null: never
 RELIEF_KERNEL void graph_bounds_run(const GraphProgramView& program,
                                     const TextureView* textures,
-                                    GraphRangeRegisters& registers)
+                                    GraphRangeRegisters& registers,
+                                    const std::atomic<bool>* stop = nullptr)
 {
   const std::uint16_t* word = program.code;
   const std::uint16_t* const end = word + program.num_words;
-  while (word < end) {
+  for (unsigned count = 0; word < end; ++count) {
+    if (count % kGraphOpsAPoll == 0 && stop != nullptr && stop->load(std::memory_order_relaxed)) [[unlikely]] {
+      for (GraphRange& range : registers.lanes) range = range_unknown();
+      return;
+    }
     const auto op = static_cast<GraphOp>(*word++);
     const GraphOpShape& shape = kGraphOpShapes[static_cast<int>(op)];
     const std::uint16_t* immediates = word;

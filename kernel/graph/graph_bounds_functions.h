@@ -74,6 +74,11 @@ RELIEF_KERNEL void power(const GraphRangeOperands& o)
       high[k] = most;
     } else if (b0 == 0.0f && b1 == 0.0f) {
       low[k] = high[k] = 1.0f;
+    } else if (b0 >= 0.0f) {
+      // Whole exponents among others that give 0 of what is negative.
+      const float largest = max(__builtin_fabsf(a0), __builtin_fabsf(a1));
+      high[k] = max(1.0f, max(graph_power(largest, b0), graph_power(largest, b1)));
+      low[k] = a0 == 0.0f ? 0.0f : -high[k];
     }
   }
   o.set(0, range_of_function(a, at, slope_low, slope_high, low, high));
@@ -84,12 +89,18 @@ RELIEF_KERNEL void logarithm(const GraphRangeOperands& o)
   const GraphRange a = o.in(0), base = o.in(1);
   F8 low, high;
   for (int k = 0; k < 8; ++k) {
-    const float b = base.low[k];
-    const bool is_known = base.low[k] == base.high[k] && a.low[k] > 0.0f && a.high[k] < kInfinity;
-    const float p = is_known ? graph_logarithm(a.low[k], b) : -kInfinity;
-    const float q = is_known ? graph_logarithm(a.high[k], b) : kInfinity;
-    low[k] = min(p, q);
-    high[k] = max(p, q);
+    // Between bases on one side of 1 both logarithms and their quotient are extreme at ends.
+    const bool is_apart =
+        base.low[k] > 1.0f || (base.low[k] > 0.0f && base.high[k] < 1.0f) || base.low[k] == base.high[k];
+    const bool is_known = is_apart && base.high[k] < kInfinity && a.low[k] > 0.0f && a.high[k] < kInfinity;
+    low[k] = is_known ? kInfinity : -kInfinity;
+    high[k] = -low[k];
+    for (int end = 0; is_known && end < 4; ++end) {
+      const float value =
+          graph_logarithm(end % 2 == 0 ? a.low[k] : a.high[k], end / 2 == 0 ? base.low[k] : base.high[k]);
+      low[k] = min(low[k], value);
+      high[k] = max(high[k], value);
+    }
     if (a.high[k] <= 0.0f || base.high[k] <= 0.0f) low[k] = high[k] = 0.0f;
   }
   o.set(0, range_padded(low, high));
@@ -214,7 +225,8 @@ RELIEF_KERNEL void table(const GraphRangeOperands& o)
     at[k] = slope_low[k] = 0.0f;
     slope_high[k] = kInfinity;
     const bool beyond = !(a.low[k] >= 0.0f && a.high[k] <= 1.0f);
-    if ((goes_on && beyond) || !(a.low[k] <= a.high[k])) continue;
+    if (!(a.low[k] <= a.high[k])) continue;
+    if (goes_on && !(a.low[k] > -kInfinity && a.high[k] < kInfinity)) continue;
     const auto place = [&](float x) { return clamp(x, 0.0f, 1.0f) * static_cast<float>(last); };
     const int first = static_cast<int>(place(a.low[k]) - 1e-3f), end = static_cast<int>(place(a.high[k]) + 1e-3f) + 1;
     const int from = first > 0 ? first : 0, to = end < last ? end : last;
@@ -227,6 +239,17 @@ RELIEF_KERNEL void table(const GraphRangeOperands& o)
       s0 = min(s0, slope);
       s1 = max(s1, slope);
     }
+    if (goes_on && beyond) {
+      // Straight on from either end.
+      const float before = min(a.low[k], 0.0f) * static_cast<float>(last);
+      const float after = (max(a.high[k], 1.0f) - 1.0f) * static_cast<float>(last);
+      const float ends[2] = {table[0] + (table[1] - table[0]) * before,
+                             table[last] + (table[last] - table[last - 1]) * after};
+      for (const float value : ends) {
+        low[k] = min(low[k], value);
+        high[k] = max(high[k], value);
+      }
+    }
     if (!interpolated || beyond || from == to) continue;
     const float c = place(a.c[k]);
     const int i = static_cast<int>(c) < last - 1 ? static_cast<int>(c) : last - 1;
@@ -237,6 +260,18 @@ RELIEF_KERNEL void table(const GraphRangeOperands& o)
   o.set(0, range_of_function(a, at, slope_low, slope_high, low, high));
 }
 
+/// How large octaves are together, each smaller by a factor than the one before.
+/// @param last  number of the last one, rounded up; < 32
+RELIEF_KERNEL F8 sum_of_octaves(F8 last, F8 factor)
+{
+  F8 sum = splat8(1.0f), amplitude = sum;
+  for (int n = 1; n < 32; ++n) {
+    amplitude *= factor;
+    sum += last > static_cast<float>(n - 1) ? amplitude : F8{};
+  }
+  return sum;
+}
+
 template <int kDims>
 RELIEF_KERNEL void noise(const GraphRangeOperands& o)
 {
@@ -245,7 +280,9 @@ RELIEF_KERNEL void noise(const GraphRangeOperands& o)
   if (!are_points(o, kDims, 3)) {
     // Normalized sums keep within what one octave does.
     const F8 most = splat8(0.5f * kNoiseLargest[kDims - 1]);
-    return o.set(0, o.immediates[0] != 0 ? range_between(0.5f - most, 0.5f + most) : range_unknown());
+    if (o.immediates[0] != 0) return o.set(0, range_between(0.5f - most, 0.5f + most));
+    const F8 all = 2.0f * most * sum_of_octaves(clamp(o.in(kDims).high, 0.0f, 15.0f), max(o.in(kDims + 1).high, F8{}));
+    return o.set(0, range_between(-all, all));
   }
   const NoiseOctaves octaves{clamp(o.in(kDims).low, 0.0f, 15.0f), max(o.in(kDims + 1).low, F8{}), o.in(kDims + 2).low};
   o.set(0, noise_fractal_range<kDims>(p, octaves, o.immediates[0] != 0, o.immediates[1] != 0));
@@ -259,10 +296,33 @@ RELIEF_KERNEL void signed_noise(const GraphRangeOperands& o)
   o.set(0, noise_signed_range<kDims>(p, o.immediates[0] != 0));
 }
 
+/// Bounds of Musgrave's noises by how large an octave is, which hold however their settings vary.
+RELIEF_KERNEL GraphRange musgrave_whole(const GraphRangeOperands& o, int num_dims)
+{
+  const auto size_of = [](const GraphRange& a) { return max(abs(a.low), abs(a.high)); };
+  const F8 noise = splat8(kNoiseLargest[num_dims - 1]), last = clamp(o.in(num_dims).high, 0.0f, 16.0f);
+  const F8 falloff = size_of(o.in(num_dims + 1)), lifted = noise + size_of(o.in(num_dims + 3));
+  const auto type = static_cast<MusgraveType>(o.immediates[0]);
+  const bool multiplies = type == MusgraveType::kMultifractal || type == MusgraveType::kHeteroTerrain;
+  if (!multiplies) {
+    // Weights of octaves are at most 1.
+    const F8 one = type == MusgraveType::kFbm ? noise : type == MusgraveType::kHybrid ? lifted : lifted * lifted;
+    const F8 all = one * sum_of_octaves(last + 1.0f, falloff);
+    return range_between(-all, all);
+  }
+  const F8 step = type == MusgraveType::kMultifractal ? noise : lifted;
+  F8 product = type == MusgraveType::kMultifractal ? splat8(1.0f) : lifted, size = splat8(1.0f);
+  for (int n = 0; n <= 17; ++n) {
+    product *= last + 1.0f >= static_cast<float>(n) ? 1.0f + step * size : splat8(1.0f);
+    size *= falloff;
+  }
+  return range_between(-product, product);
+}
+
 template <int kDims>
 RELIEF_KERNEL void musgrave(const GraphRangeOperands& o)
 {
-  if (!are_points(o, kDims, 5)) return o.set(0, range_unknown());
+  if (!are_points(o, kDims, 5)) return o.set(0, musgrave_whole(o, kDims));
   GraphRange p[kDims];
   for (int i = 0; i < kDims; ++i) p[i] = o.in(i);
   const MusgraveSettings settings{clamp(o.in(kDims).low, 0.0f, 16.0f),
@@ -286,27 +346,25 @@ RELIEF_KERNEL void hash(const GraphRangeOperands& o)
 template <int kDims>
 RELIEF_KERNEL void voronoi(const GraphRangeOperands& o)
 {
-  GraphRange p[kDims], out[9];
+  GraphRange p[kDims], settings_of[6], out[9];
   for (int i = 0; i < kDims; ++i) p[i] = o.in(i);
-  for (GraphRange& each : out) each = range_unknown();
+  for (int i = 0; i < 6; ++i) settings_of[i] = o.in(kDims + i);
+  const auto feature = static_cast<VoronoiFeature>(o.immediates[0]);
+  const auto metric = static_cast<VoronoiMetric>(o.immediates[1]);
+  const unsigned flags = o.immediates[2];
+  voronoi_whole<kDims>(p, feature, metric, (flags & kVoronoiNormalize) != 0, settings_of, out);
   if (are_points(o, kDims, 6)) {
     const NoiseOctaves octaves{clamp(o.in(kDims + 3).low, 0.0f, 15.0f), clamp(o.in(kDims + 4).low, 0.0f, 1.0f),
                                o.in(kDims + 5).low};
-    const unsigned flags = o.immediates[2];
     const auto eval = [&]<bool kPcg>() {
-      const VoronoiSettings<kDims, kPcg> settings{static_cast<VoronoiFeature>(o.immediates[0]),
-                                                  static_cast<VoronoiMetric>(o.immediates[1]),
-                                                  o.in(kDims).low,
-                                                  o.in(kDims + 1).low,
-                                                  o.in(kDims + 2).low,
-                                                  flags};
-      voronoi_range<kDims, kPcg>(p, settings, octaves, out);
+      const VoronoiSettings<kDims, kPcg> settings{
+          feature, metric, o.in(kDims).low, o.in(kDims + 1).low, o.in(kDims + 2).low, flags};
+      return voronoi_range<kDims, kPcg>(p, settings, octaves);
     };
-    if ((flags & kVoronoiPcg) != 0 && kDims > 1) {
-      eval.template operator()<true>();
-    } else {
-      eval.template operator()<false>();
-    }
+    const bool is_pcg = (flags & kVoronoiPcg) != 0 && kDims > 1;
+    const GraphRange distance = is_pcg ? eval.template operator()<true>() : eval.template operator()<false>();
+    const I8 is_known = (distance.low > -kInfinity) & (distance.high < kInfinity);
+    out[0] = out[8] = range_select(is_known, distance, out[0]);
   }
   for (int i = 0; i < 9; ++i) o.set(i, out[i]);
 }
@@ -333,7 +391,7 @@ RELIEF_KERNEL void to_hues(const GraphRangeOperands& o, Vec3f (*f)(Vec3f), bool 
 {
   const GraphRange r = o.in(0), g = o.in(1), b = o.in(2);
   const GraphRange most = range_max(range_max(r, g), b), least = range_min(range_min(r, g), b);
-  const I8 is_color = (least.low >= 0.0f) & (most.high <= 1.0f);
+  const I8 is_color = is_lightness ? (least.low >= 0.0f) & (most.high <= 1.0f) : least.low >= 0.0f;
   const GraphRange saturation = range_select(is_color, unit(), range_unknown());
   const GraphRange hue = range_between(F8{}, splat8(1.0001f));
   const GraphRange light = is_lightness ? range_min((most + least) * 0.5f, range_point(splat8(1.0f))) : most;
@@ -364,6 +422,96 @@ RELIEF_KERNEL GraphRange of_texels(const TextureView& texture, std::uint16_t fla
   const bool is_unit = texture.format != TexelFormat::kHalf && (flags & kImageDivide) == 0;
   return is_unit ? range_between(splat8(-1e-4f), splat8(1.0001f)) : range_unknown();
 }
+/// What an image gives over rectangles of coordinates, one a lane.
+/// @param u, v  v up
+RELIEF_KERNEL void image_ranges(const GraphRangeOperands& o,
+                                int texture_index,
+                                const GraphRange& u,
+                                const GraphRange& v,
+                                bool is_finest,
+                                unsigned flags,
+                                GraphRange (&rgba)[4])
+{
+  const TextureView& texture = o.textures[texture_index];
+  const ImageBounds bounds = o.registers.images != nullptr ? o.registers.images[texture_index] : ImageBounds{};
+  if (bounds.num_levels == 0) {
+    for (GraphRange& channel : rgba) channel = of_texels(texture, static_cast<std::uint16_t>(flags));
+    return;
+  }
+  F8 low[4], high[4];
+  for (int k = 0; k < 8; ++k) {
+    const float us[2] = {u.low[k], u.high[k]}, vs[2] = {v.low[k], v.high[k]};
+    const TexelRange range = image_range(texture, bounds, us, vs, is_finest, flags);
+    for (int c = 0; c < 4; ++c) {
+      // Rounding of the sixteen products of a filter, which is relative to the largest.
+      const float pad = 4e-6f * max(__builtin_fabsf(range.low[c]), __builtin_fabsf(range.high[c]));
+      low[c][k] = range.low[c] - pad;
+      high[c][k] = range.high[c] + pad;
+    }
+  }
+  for (int c = 0; c < 4; ++c) rgba[c] = range_padded(low[c], high[c]);
+}
+
+RELIEF_KERNEL void image(const GraphRangeOperands& o)
+{
+  GraphRange rgba[4];
+  const I8 is_point = (o.in(2).low == 0.0f) & (o.in(2).high == 0.0f);
+  image_ranges(o, o.immediates[0], o.in(0), o.in(1), mask_of(is_point) == 0xffu, o.immediates[1], rgba);
+  for (int c = 0; c < 4; ++c) o.set(c, rgba[c]);
+}
+
+/// Of the sides of a box, whose shares add up to 1; each may be mirrored.
+RELIEF_KERNEL void image_box(const GraphRangeOperands& o)
+{
+  const GraphRange one = range_point(splat8(1.0f)), p[3] = {o.in(0), o.in(1), o.in(2)};
+  constexpr int kSides[3][2] = {{1, 2}, {0, 2}, {1, 0}};
+  GraphRange sides[3][4];
+  for (int side = 0; side < 3; ++side) {
+    const GraphRange& u = p[kSides[side][0]];
+    image_ranges(o, o.immediates[0], range_hull(u, one - u), p[kSides[side][1]], true, o.immediates[1], sides[side]);
+  }
+  for (int c = 0; c < 4; ++c) o.set(c, range_hull(range_hull(sides[0][c], sides[1][c]), sides[2][c]));
+}
+
+/// Of all tiles that a rectangle may reach, and of what is missing.
+RELIEF_KERNEL void image_tiles(const GraphRangeOperands& o)
+{
+  const float* tiles = o.program.tables + (o.immediates[2] | std::uint32_t{o.immediates[3]} << 16);
+  const I8 is_point = (o.in(2).low == 0.0f) & (o.in(2).high == 0.0f);
+  const bool is_finest = mask_of(is_point) == 0xffu;
+  const GraphRange u = o.in(0), v = o.in(1);
+  GraphRange all[4];
+  const float missing[4] = {kMissingImage.x, kMissingImage.y, kMissingImage.z, kMissingImage.w};
+  for (int c = 0; c < 4; ++c) all[c] = range_point(splat8(missing[c]));
+  for (int row = 0; row < o.immediates[1]; ++row) {
+    for (int column = 0; column < kImageTileColumns; ++column) {
+      const float tile = tiles[row * kImageTileColumns + column];
+      if (tile < 0.0f) continue;
+      const auto within = [](const GraphRange& at, int number, F8& low, F8& high) {
+        const auto first = static_cast<float>(number);
+        const F8 least = splat8(number == 0 ? -1.0f : 0.0f), most = splat8(1.0f);
+        low = max(at.low - first, least);
+        high = min(at.high - first, most);
+        return low <= high;
+      };
+      F8 u0, u1, v0, v1;
+      const I8 is_met = within(u, column, u0, u1) & within(v, row, v0, v1);
+      if (mask_of(is_met) == 0) continue;
+      const I8 is_single = (u.low >= static_cast<float>(column)) & (u.high < static_cast<float>(column + 1)) &
+                           (v.low >= static_cast<float>(row)) & (v.high < static_cast<float>(row + 1));
+      GraphRange of_tile[4];
+      const F8 zero{};
+      image_ranges(o, static_cast<int>(tile), range_between(is_met ? u0 : zero, is_met ? u1 : zero),
+                   range_between(is_met ? v0 : zero, is_met ? v1 : zero), is_finest, o.immediates[0], of_tile);
+      for (int c = 0; c < 4; ++c) {
+        const GraphRange met = range_select(is_single, of_tile[c], range_hull(all[c], of_tile[c]));
+        all[c] = range_select(is_met, met, all[c]);
+      }
+    }
+  }
+  for (int c = 0; c < 4; ++c) o.set(c, all[c]);
+}
+
 RELIEF_KERNEL void set_all(const GraphRangeOperands& o, int count, const GraphRange& value)
 {
   for (int i = 0; i < count; ++i) o.set(i, value);

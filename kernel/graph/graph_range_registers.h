@@ -3,6 +3,7 @@
 
 #include "kernel/graph/graph_program.h"
 #include "kernel/graph/graph_range.h"
+#include "kernel/graph/image_bounds.h"
 #include "kernel/texture/texture_view.h"
 
 namespace relief {
@@ -10,6 +11,7 @@ namespace relief {
 /// Registers of one run; its inputs are written before, its outputs read after.
 struct GraphRangeRegisters {
   GraphRange lanes[kMostGraphRegisters];
+  const ImageBounds* images;  ///< of the textures, one by one; null: there are none
 };
 
 /// Runs a program over eight parallelograms.

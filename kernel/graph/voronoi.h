@@ -304,17 +304,21 @@ RELIEF_KERNEL F8 voronoi_radius(const F8 (&cell)[kDims],
     assign_where(is_nearer, own_offset, offset);
     assign_where(is_nearer, own_point, point);
   });
-  F8 own_cell[kDims], from_own[kDims];
-  for (int i = 0; i < kDims; ++i) {
-    own_cell[i] = cell[i] + own_offset[i];
-    from_own[i] = own_point[i] - own_offset[i];
-  }
+  // Offsets of cells are whole numbers, which are exact; sums with a cell far away are not, so there is one alone.
   F8 radius = settings.far();
-  voronoi_cells<kDims>(own_cell, settings, 1, [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
-    bool is_own = true;
-    for (int i = 0; i < kDims; ++i) is_own = is_own && offset[i][0] == 0.0f;
-    if (!is_own) radius = min(radius, distance_of(point, from_own));
-  });
+  int count = 1;
+  for (int i = 0; i < kDims; ++i) count *= 3;
+  for (int n = 0; n < count; ++n) {
+    F8 offset[kDims], corner[kDims], point[kDims];
+    for (int i = 0, rest = n; i < kDims; ++i, rest /= 3) {
+      offset[i] = own_offset[i] + static_cast<float>(rest % 3 - 1);
+      corner[i] = cell[i] + offset[i];
+    }
+    if (n == count / 2) continue;  // its own
+    voronoi_point<kDims, kPcg>(corner, point);
+    for (int i = 0; i < kDims; ++i) point[i] = offset[i] + point[i] * settings.randomness;
+    radius = min(radius, distance_of(point, own_point));
+  }
   return 0.5f * radius;
 }
 
@@ -325,7 +329,8 @@ RELIEF_KERNEL Voronoi<kDims> voronoi_eval(const F8 (&p)[kDims], const VoronoiSet
   F8 cell[kDims], local[kDims];
   for (int i = 0; i < kDims; ++i) {
     cell[i] = floor(p[i]);
-    local[i] = p[i] - cell[i];
+    const F8 rest = p[i] - cell[i];
+    local[i] = rest == rest ? rest : F8{};  // of infinity there is none
   }
   Voronoi<kDims> out;
   switch (settings.feature) {
@@ -378,14 +383,15 @@ RELIEF_KERNEL Voronoi<kDims> voronoi_fractal(const F8 (&p)[kDims],
       const F8 distance = mixed(sum.distance, min(sum.distance, octave.distance / scale), amplitude);
       const F8 mixed_distance = is_whole ? distance : mixed(sum.distance, min(sum.distance, distance), share);
       const F8 mixed_size = mixed(size, mixed(size, most / scale, amplitude), share);
-      sum.distance = is_single ? (n == 0 ? octave.distance : sum.distance) : mixed_distance;
-      size = is_single ? size : mixed_size;
+      sum.distance = is_single ? (n == 0 ? octave.distance : sum.distance) : is_there ? mixed_distance : sum.distance;
+      size = is_single | ~is_there ? size : mixed_size;
     } else {
       sum.distance += share * octave.distance * amplitude;
       for (int c = 0; c < 3; ++c) sum.color[c] += share * octave.color[c] * amplitude;
       for (int i = 0; i < kDims; ++i) {
         const F8 position = mixed(sum.position[i], octave.position[i] / scale, amplitude);
-        sum.position[i] = is_whole ? position : mixed(sum.position[i], position, share);
+        // Of octaves that other points have, scales may be 0.
+        sum.position[i] = is_whole ? position : is_there ? mixed(sum.position[i], position, share) : sum.position[i];
       }
       size += share * amplitude;
     }

@@ -50,12 +50,15 @@ RELIEF_KERNEL I8 voronoi_has_twins(const F8 (&cell)[kDims],
   return has_twins;
 }
 
-/// Distance of one octave.
+/// Distance of one octave; unknown where the points that count may change.
 /// @param settings  the same all over
 template <int kDims, bool kPcg>
 RELIEF_KERNEL GraphRange voronoi_distance_range(const GraphRange (&p)[kDims],
                                                 const VoronoiSettings<kDims, kPcg>& settings)
 {
+  // Radii jump from cell to cell; what is mixed smoothly has no slope that is known.
+  if (settings.feature == VoronoiFeature::kSphereRadius || settings.feature == VoronoiFeature::kSmoothF1)
+    return range_unknown();
   constexpr float kMostNear = 90000.0f;
   // A tall sum of small ways for Minkowski's metric, whose exponents below 1 are no metric.
   const bool is_sum = settings.metric == VoronoiMetric::kManhattan || settings.metric == VoronoiMetric::kMinkowski;
@@ -85,51 +88,102 @@ RELIEF_KERNEL GraphRange voronoi_distance_range(const GraphRange (&p)[kDims],
   const F8 cell = is_edge ? splat8(2.0f) : voronoi_distance<kDims>(zeros, ones, settings);
   const bool is_first = settings.feature == VoronoiFeature::kF1;
   const F8 most = (is_first ? 1.0001f : 3.0f) * cell;
-  const I8 exponent_is_metric =
-      settings.metric == VoronoiMetric::kMinkowski && !is_edge ? settings.exponent >= 1.0f : is_near;
-  I8 is_known = is_near & exponent_is_metric & (is_first ? in_cell | (at + way < 0.999f) : in_cell);
-  const bool is_smooth = settings.feature == VoronoiFeature::kSmoothF1;
-  if (settings.feature == VoronoiFeature::kSphereRadius || is_smooth) is_known = I8{};
+  const I8 is_metric = settings.metric == VoronoiMetric::kMinkowski && !is_edge ? settings.exponent >= 1.0f : is_near;
+  I8 is_known = is_near & is_metric & (is_first ? in_cell | (at + way < 0.999f) : in_cell);
   if (is_edge) is_known &= ~voronoi_has_twins<kDims, kPcg>(corner, local, way, settings);
   const float rounding = is_edge ? kVoronoiEdgeRounding : 1e-5f;
-  F8 least = splat8(is_edge ? -rounding : 0.0f);
+  const F8 least = splat8(is_edge ? -rounding : 0.0f);
   const GraphRange near = range_padded(max(at - way - rounding, least), min(at + way + rounding, most));
-  // Each of the cells that are mixed takes a quarter of the smoothness away at most.
-  for (int i = 0, cells = 5; is_smooth && i < kDims; ++i, cells *= 5) {
-    least = -0.25f * static_cast<float>(cells) * abs(settings.smoothness);
-  }
-  const GraphRange whole = range_between(least, most);
-  const I8 is_within = exponent_is_metric & (settings.randomness >= 0.0f) & (settings.randomness <= 1.0f);
-  return range_select(is_known & is_within, near, range_select(is_within, whole, range_unknown()));
+  const I8 is_within = (settings.randomness >= 0.0f) & (settings.randomness <= 1.0f);
+  return range_select(is_known & is_within, near, range_unknown());
 }
 
-/// As voronoi_fractal, with settings that are the same all over.
+/// Bounds by the size of cells alone, of any octaves, which hold wherever a point is and however its settings vary: the cell's
+/// own point is no farther away than the cell is long.
+/// @param s    smoothness, exponent, randomness, detail, roughness, lacunarity
 /// @param out  distance, three of colour, four of position, radius
-template <int kDims, bool kPcg>
-RELIEF_KERNEL void voronoi_range(const GraphRange (&p)[kDims],
-                                 const VoronoiSettings<kDims, kPcg>& settings,
-                                 const NoiseOctaves& octaves,
+template <int kDims>
+RELIEF_KERNEL void voronoi_whole(const GraphRange (&p)[kDims],
+                                 VoronoiFeature feature,
+                                 VoronoiMetric metric,
+                                 bool normalizes,
+                                 const GraphRange (&s)[6],
                                  GraphRange* out)
+{
+  const GraphRange &smoothness = s[0], &exponent = s[1], &randomness = s[2], &lacunarity = s[5];
+  const bool is_edge = feature == VoronoiFeature::kDistanceToEdge, is_radius = feature == VoronoiFeature::kSphereRadius;
+  const bool is_smooth = feature == VoronoiFeature::kSmoothF1;
+  const bool has_exponent = metric == VoronoiMetric::kMinkowski && kDims > 1 && !is_edge && !is_radius;
+  F8 ones[kDims], zeros[kDims]{};
+  for (F8& x : ones) x = splat8(1.0f);
+  // The smaller an exponent, the longer a cell; below 0 it has no length.
+  const VoronoiSettings<kDims, false> settings{feature, metric, F8{}, exponent.low, F8{}};
+  const F8 length = is_edge ? splat8(2.0f) : is_radius ? splat8(1.0f) : voronoi_distance<kDims>(zeros, ones, settings);
+  const F8 most = (feature == VoronoiFeature::kF1 ? 1.0001f : 3.0f) * length;
+  float num_cells = 1.0f;
+  for (int i = 0; i < kDims; ++i) num_cells *= 5.0f;
+  // Each of the cells that are mixed takes a quarter of the smoothness away at most.
+  const F8 mixed_away = is_smooth ? 0.25f * num_cells * max(abs(smoothness.low), abs(smoothness.high)) : F8{};
+  const GraphRange distance = range_between(is_edge ? splat8(-kVoronoiEdgeRounding) : -mixed_away, most);
+  const GraphRange color = range_between(-mixed_away, splat8(1.0f));
+  const F8 detail = is_radius ? F8{} : clamp(s[3].high, 0.0f, 15.0f), roughness = clamp(s[4].high, 0.0f, 1.0f);
+  F8 sum = splat8(1.0f), amplitude = sum, finest = sum;
+  for (int n = 1; n < 16; ++n) {
+    const I8 is_there = detail > static_cast<float>(n - 1);
+    amplitude *= roughness;
+    sum += is_there ? amplitude : F8{};
+    finest *= is_there ? max(lacunarity.high, splat8(1.0f)) : splat8(1.0f);
+  }
+  const GraphRange octaves = range_between(splat8(1.0f), sum);
+  I8 is_known = (randomness.low >= 0.0f) & (randomness.high <= 1.0f);
+  if (has_exponent) is_known &= exponent.low > 0.0f;
+  if (is_smooth) is_known &= smoothness.low > 0.0f;
+  // Coarser octaves than the first are divided by less than 1.
+  const I8 gets_finer = (detail == 0.0f) | (lacunarity.low >= 1.0f);
+  out[0] = is_edge ? distance : distance * octaves;
+  if (normalizes && !is_radius) {
+    // Divided by how far a corner is from the middle of the points there may be, which is as far as along an axis at least.
+    const F8 corner = (0.5f + 0.5f * randomness.low) * (feature == VoronoiFeature::kF2 ? 2.0f : 1.0f);
+    out[0] =
+        (is_edge ? distance * range_between(splat8(1.0f), finest) : distance) * range_reciprocal(range_point(corner));
+  }
+  out[0] = range_select(is_edge ? is_known & gets_finer : is_known, out[0], range_unknown());
+  // Borders have no colour; it is divided by a size that may be 0 where octaves get coarser.
+  const I8 has_color = is_edge ? is_known & gets_finer : is_known;
+  for (int c = 0; c < 3; ++c) {
+    out[1 + c] = range_select(has_color, normalizes ? color : color * octaves, range_unknown());
+  }
+  for (int i = 0; i < 4; ++i) {
+    const int axis = kDims == 1 ? i - 3 : i;
+    out[4 + i] = range_point(F8{});
+    if (axis < 0 || axis >= kDims || is_edge || is_radius) continue;
+    const GraphRange& x = p[axis];
+    // The farthest of the cells that are looked at ends three away.
+    const F8 away = 3.0f + mixed_away + 8.0f * kRangeRounding * max(abs(x.low), abs(x.high));
+    out[4 + i] = range_select(is_known & gets_finer, range_between(x.low - away, x.high + away), range_unknown());
+  }
+  out[8] = out[0];
+}
+
+/// Distance of voronoi_fractal, with settings that are the same all over; unknown where one octave's is.
+template <int kDims, bool kPcg>
+RELIEF_KERNEL GraphRange voronoi_range(const GraphRange (&p)[kDims],
+                                       const VoronoiSettings<kDims, kPcg>& settings,
+                                       const NoiseOctaves& octaves)
 {
   const bool is_edge = settings.feature == VoronoiFeature::kDistanceToEdge;
   const bool is_radius = settings.feature == VoronoiFeature::kSphereRadius;
   const bool normalizes = (settings.flags & kVoronoiNormalize) != 0 && !is_radius;
   const bool is_single = mask_of((octaves.detail == 0.0f) | (octaves.roughness == 0.0f)) == 0xffu || is_radius;
-  for (int i = 0; i < 9; ++i) out[i] = range_unknown();
   F8 corner[kDims], origin[kDims]{};
   for (F8& x : corner) x = 0.5f + 0.5f * settings.randomness;
   F8 most = is_edge ? corner[0] : voronoi_distance<kDims>(origin, corner, settings);
   if (settings.feature == VoronoiFeature::kF2) most *= 2.0f;
   if (is_single) {
-    out[0] = voronoi_distance_range<kDims, kPcg>(p, settings);
-    if (normalizes) out[0] = out[0] * range_reciprocal(range_point(most));
-    out[8] = out[0];
-    const GraphRange one = range_between(F8{}, splat8(1.0f));
-    // Colours that are mixed smoothly are corrected by a little.
-    for (int i = 0; i < 3 && settings.feature != VoronoiFeature::kSmoothF1; ++i) out[1 + i] = one;
-    return;
+    const GraphRange distance = voronoi_distance_range<kDims, kPcg>(p, settings);
+    return normalizes ? distance * range_reciprocal(range_point(most)) : distance;
   }
-  if (is_edge) return;
+  if (is_edge) return range_unknown();
   const F8 detail = octaves.detail, rest = detail - floor(detail), last_octave = -floor(-detail);
   float last = 0.0f;
   for (int k = 0; k < 8; ++k) last = last_octave[k] > last ? last_octave[k] : last;
@@ -146,8 +200,7 @@ RELIEF_KERNEL void voronoi_range(const GraphRange (&p)[kDims],
     amplitude = is_whole ? amplitude * octaves.roughness : amplitude;
     scale = is_whole ? scale * octaves.lacunarity : scale;
   }
-  out[0] = normalizes ? sum * range_reciprocal(range_point(size * most)) : sum;
-  out[8] = out[0];
+  return normalizes ? sum * range_reciprocal(range_point(size * most)) : sum;
 }
 
 }  // namespace relief

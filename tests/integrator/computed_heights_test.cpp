@@ -12,6 +12,7 @@
 #include "integrator/scene_context.h"
 #include "integrator/trace.h"
 #include "scene/memory.h"
+#include "tests/support/image_bytes.h"
 #include "tests/support/loaded_scene.h"
 #include "tests/support/test_rays.h"
 
@@ -228,6 +229,75 @@ TEST(ComputedHeights, HaveTheGradientsOfTheGraphAsCellsShrink)
     }
     // The bound is no wider than it has to be.
     EXPECT_GT(most, bound / 2) << cells;
+  }
+}
+
+/// A square of 2 × 2 m around the origin whose height is an image of 16 bits, read by a graph.
+Scene square_of_image(int width, int height, const std::vector<std::uint16_t>& texels, double scale)
+{
+  const json graph = {
+      {"nodes",
+       {{{"type", "texture-coordinate"}},
+        {{"type", "image-texture"},
+         {"texture", {{"index", 0}}},
+         {"colorSpace", "linear"},
+         {"inputs", {{"vector", reference(0, "uv")}}}},
+        {{"type", "math"}, {"operation", "add"}, {"inputs", {{"a", reference(1, "color")}, {"b", 0}}}}}},
+      {"outputs", {{"height", reference(2, "value")}}}};
+  GltfBuilder b;
+  const int P = b.accessor<float>({-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, -1, 0, 1, 1, 0, -1, 1, 0}, "VEC3");
+  const int uv = b.accessor<float>({0, 1, 1, 1, 1, 0, 0, 1, 1, 0, 0, 0}, "VEC2");
+  b.push("images", {{"uri", "height.tif"}});
+  b.push("textures", {{"source", 0}});
+  b.push("materials",
+         {{"extensions",
+           {{"RELIEF_displacement", {{"heightGraph", graph}, {"scale", scale}, {"midlevel", 0}, {"cells", 512}}}}}});
+  b.root_node({{"mesh", b.mesh({{"attributes", {{"POSITION", P}, {"TEXCOORD_0", uv}}}, {"material", 0}})}});
+  b.push("cameras", {{"type", "perspective"}, {"perspective", {{"yfov", 0.7}, {"znear", 0.1}}}});
+  b.root_node({{"camera", 0}, {"translation", {0, 0, 5}}});
+  const TemporaryFolder folder;
+  folder.write("height.tif", tiff_grey_16(width, height, texels));
+  return scene_load(folder.write("scene.gltf", b.gltf()), {});
+}
+
+/// Height of the surface over a place.
+float height_at(const SceneContext& context, float x, float y)
+{
+  const TraceHit hit = trace_rays(context, std::vector<TraceRay>{{{x, y, 3}, {0, 0, -1}}})[0];
+  return hit.hit ? hit.P.z : kInfinity;
+}
+
+/// What a coarse look at the heights would miss: the bounds of an image's texels do not.
+TEST(ComputedHeights, OfAnImageHaveItsSmallestBump)
+{
+  constexpr int kSize = 512, kFirst = 333, kBump = 16;
+  std::vector<std::uint16_t> texels(std::size_t{kSize} * kSize, 0);
+  for (int y = kFirst; y < kFirst + kBump; ++y) {
+    for (int x = kFirst; x < kFirst + kBump; ++x)
+      texels[static_cast<std::size_t>(y) * kSize + static_cast<std::size_t>(x)] = 65535;
+  }
+  const Scene scene = square_of_image(kSize, kSize, texels, 0.2);
+  const SceneContext context(scene);
+  const auto place = [](int texel) { return 2 * (static_cast<float>(texel) + 0.5f) / kSize - 1; };
+  for (int texel = kFirst + 1; texel < kFirst + kBump - 1; ++texel) {
+    EXPECT_NEAR(height_at(context, place(texel), -place(texel)), 0.2f, 1e-5f) << texel;
+  }
+  EXPECT_NEAR(height_at(context, 0, 0), 0.0f, 1e-6f);
+}
+
+/// A ramp of all 16 bits: halves have steps of 32 of these near 1.
+TEST(ComputedHeights, OfAnImageKeepItsBits)
+{
+  constexpr int kWidth = 2048;
+  std::vector<std::uint16_t> texels;
+  for (int row = 0; row < 2; ++row) {
+    for (int x = 0; x < kWidth; ++x) texels.push_back(static_cast<std::uint16_t>(60000 + x));
+  }
+  const Scene scene = square_of_image(kWidth, 2, texels, 1);
+  const SceneContext context(scene);
+  for (int x = 8; x < kWidth - 8; x += 37) {
+    const float at = 2 * (static_cast<float>(x) + 0.5f) / kWidth - 1;
+    EXPECT_NEAR(height_at(context, at, 0.3f), static_cast<float>(60000 + x) / 65535.0f, 2e-6f) << x;
   }
 }
 

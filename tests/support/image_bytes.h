@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace relief::test {
 
@@ -80,6 +81,27 @@ inline std::string tiff_tile(std::uint32_t side)
     bytes += little_endian(t.number, 2) + little_endian(t.type, 2) + little_endian(1, 4) + little_endian(t.value, 4);
   }
   bytes.resize(kDataOffset + kDataBytes, '\0');
+  return bytes;
+}
+
+/// A grey TIFF of 16 bits, not compressed.
+/// @param texels  rows from the top
+inline std::string tiff_grey_16(int width, int height, const std::vector<std::uint16_t>& texels)
+{
+  struct Tag {
+    std::uint32_t number, type, value;
+  };
+  constexpr std::uint32_t kShort = 3, kLong = 4, kDataOffset = 200;
+  const auto w = static_cast<std::uint32_t>(width), h = static_cast<std::uint32_t>(height);
+  const Tag tags[] = {{256, kLong, w},  {257, kLong, h},  {258, kShort, 16},
+                      {259, kShort, 1}, {262, kShort, 1}, {273, kLong, kDataOffset},
+                      {277, kShort, 1}, {278, kLong, h},  {279, kLong, 2 * w * h}};
+  std::string bytes = std::string("II*\0", 4) + little_endian(8, 4) + little_endian(std::size(tags), 2);
+  for (const Tag& t : tags) {
+    bytes += little_endian(t.number, 2) + little_endian(t.type, 2) + little_endian(1, 4) + little_endian(t.value, 4);
+  }
+  bytes.resize(kDataOffset, '\0');
+  for (const std::uint16_t texel : texels) bytes += little_endian(texel, 2);
   return bytes;
 }
 

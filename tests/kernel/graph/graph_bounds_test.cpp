@@ -7,6 +7,7 @@
 #include "integrator/graph_bounds_stage.h"
 #include "kernel/graph/noise_range.h"
 #include "kernel/graph/voronoi_range.h"
+#include "scene/height_image.h"
 #include "tests/kernel/graph/one_operation.h"
 #include "tests/support/test_rays.h"
 
@@ -46,7 +47,14 @@ std::vector<std::vector<std::uint16_t>> voronoi_kinds()
 }
 
 constexpr std::uint16_t kEntries = 9;
-const std::vector<float> kTable = {0.5f, 0.7f, 0.1f, 0.1f, 2.0f, -1.0f, 0.0f, 0.25f, 0.5f};
+/// And a luminaire's after it: two angles on each axis, and the values around and between them.
+const std::vector<float> kTable = {0.5f,  0.7f,  0.1f,  0.1f,  2.0f,  -1.0f, 0.0f,  0.25f, 0.5f,  0.0f,
+                                   6.28f, 0.0f,  3.14f, 0.3f,  -2.0f, -1.5f, 0.25f, 0.0f,  1.25f, -0.5f,
+                                   0.1f,  0.75f, 2.0f,  3.0f,  4.0f,  0.0f,  0.5f,  0.25f, 1.0f,  0.0f,
+                                   -1.0f, -1.0f, -1.0f, -1.0f, -1.0f, -1.0f, -1.0f, -1.0f, -1.0f};
+
+/// Where the table has a row of tiles, of which the first alone is there.
+constexpr std::uint16_t kFirstTile = 29;
 
 /// One row an opcode; a new one has to be given a row.
 const std::vector<Shape>& shapes()
@@ -96,6 +104,7 @@ const std::vector<Shape>& shapes()
       {Op::noise_3d, 3, 0, 3, pairs(2, 2)},
       {Op::noise_4d, 4, 0, 3, pairs(2, 2)},
       {Op::noise_3d, 6, 0, 3, pairs(2, 2)},
+      {Op::noise_1d, 4, 0, 3, pairs(2, 2)},
       {Op::signed_noise_1d, 1, 0, 1, {{0}, {1}}},
       {Op::signed_noise_2d, 2, 0, 1, {{0}, {1}}},
       {Op::signed_noise_3d, 3, 0, 1, {{0}, {1}}},
@@ -108,12 +117,17 @@ const std::vector<Shape>& shapes()
       {Op::voronoi_2d, 2, 0, 1, voronoi_kinds()},
       {Op::voronoi_3d, 3, 0, 1, voronoi_kinds()},
       {Op::voronoi_4d, 4, 0, 1, voronoi_kinds()},
+      {Op::voronoi_1d, 7, 0, 1, voronoi_kinds()},
+      {Op::voronoi_2d, 8, 0, 1, voronoi_kinds()},
+      {Op::voronoi_3d, 9, 0, 1, voronoi_kinds()},
       {Op::voronoi_2d, 2, 0, 3, voronoi_kinds()},
       {Op::voronoi_3d, 3, 0, 3, voronoi_kinds()},
       {Op::musgrave_1d, 1, 0, 3, pairs(5, 2)},
       {Op::musgrave_2d, 2, 0, 3, pairs(5, 2)},
       {Op::musgrave_3d, 3, 0, 3, pairs(5, 2)},
       {Op::musgrave_4d, 4, 0, 3, pairs(5, 2)},
+      {Op::musgrave_1d, 6, 0, 3, pairs(5, 2)},
+      {Op::musgrave_3d, 8, 0, 3, pairs(5, 2)},
       {Op::brick, 2, 0.01f, 1, pairs(3, 3)},
       {Op::image, 2, 0, 1},
       {Op::image_box, 6, 0, 1},
@@ -121,23 +135,20 @@ const std::vector<Shape>& shapes()
       {Op::checker, 3},
       {Op::grid, 2, 0, 1, {{0, 0, 3, 1}}},
       {Op::fresnel, 2},
+      {Op::fresnel, 1, 1, 3},
       {Op::open_share, 17},
-      // Of these nothing is known, which no sample contradicts.
-      {Op::skip, 1},
-      {Op::image_tiles, 2},
-      {Op::ies, 2},
+      {Op::ies, 2, 0, 1, {{kEntries, 0, 2, 2}}},
       {Op::gabor_2d, 2},
       {Op::gabor_3d, 3},
       {Op::blackbody, 1},
+      {Op::image_tiles, 2, 0, 1, {{0, 1, kFirstTile, 0}}},
+      // Of this nothing is known, which no sample contradicts.
+      {Op::skip, 1},
   };
   return all;
 }
 
-bool is_unknown_to_ranges(Op op)
-{
-  return op == Op::skip || op == Op::image_tiles || op == Op::ies || op == Op::gabor_2d || op == Op::gabor_3d ||
-         op == Op::blackbody;
-}
+bool is_unknown_to_ranges(Op op) { return op == Op::skip; }
 
 /// A parallelogram in the space of an operation's inputs.
 struct Parallelogram {
@@ -266,6 +277,103 @@ TEST_F(GraphBounds, AreNeverNarrowerThanSamples)
             ++num_wrong;
           }
         }
+      }
+    }
+  }
+}
+
+/// Of images of bytes and of floats, with all wraps, filters and readings of opacity, over windows of any size.
+TEST(ImageBounds, HoldAllThatIsReadFromAWindow)
+{
+  HardNumbers numbers(41);
+  constexpr int kWidth = 53, kHeight = 37;
+  std::vector<std::uint8_t> texels(kWidth * kHeight * 4);
+  for (std::size_t i = 0; i < texels.size(); ++i) texels[i] = static_cast<std::uint8_t>(numbers.word() >> 7);
+  for (int round = 0; round < 4000; ++round) {
+    TextureView texture;
+    texture.width = kWidth;
+    texture.height = kHeight;
+    texture.num_levels = 1;
+    texture.num_channels = 1 + round % 4;
+    texture.format = round / 4 % 2 == 0 ? TexelFormat::kU8 : TexelFormat::kU8Srgb;
+    texture.filter = round / 8 % 2 == 0 ? TexelFilter::kLinear : TexelFilter::kNearest;
+    texture.wrap_u = static_cast<Wrap>(numbers.word() % 3);
+    texture.wrap_v = static_cast<Wrap>(numbers.word() % 3);
+    texture.levels[0] = texels.data();
+    HeightImage image(nullptr, {kWidth, kHeight, texture.num_channels, texture.format}, "");
+    const ImageBounds bounds = image.bounds(texture);
+    const unsigned flags = numbers.word() % 32;
+    const float size = std::exp2(numbers.within(-8, 1));
+    const float u[2] = {numbers.within(-3, 3), 0}, v[2] = {numbers.within(-3, 3), 0};
+    const float us[2] = {u[0], u[0] + size * numbers.within(0, 1)}, vs[2] = {v[0], v[0] + size * numbers.within(0, 1)};
+    const TexelRange range = image_range(texture, bounds, us, vs, true, flags);
+    for (int sample = 0; sample < 60; ++sample) {
+      const Vec4f value = image_sample(texture, numbers.within(us[0], us[1]), numbers.within(vs[0], vs[1]), 0, flags);
+      const float channels[4] = {value.x, value.y, value.z, value.w};
+      for (int c = 0; c < 4; ++c) {
+        // Sums of sixteen products, and quotients, are rounded.
+        const float rounding = 1e-5f * std::max(1.0f, std::abs(channels[c]));
+        ASSERT_TRUE(channels[c] >= range.low[c] - rounding && channels[c] <= range.high[c] + rounding)
+            << channels[c] << " in [" << range.low[c] << ", " << range.high[c] << "] channel " << c << " flags "
+            << flags << " round " << round;
+      }
+    }
+  }
+}
+
+/// Of a ramp they are no wider than the window and the texels around it, up to the blocks' size.
+TEST(ImageBounds, AreTightWhereWindowsAreSmall)
+{
+  constexpr int kSize = 256;
+  std::vector<std::uint8_t> texels(kSize * kSize);
+  for (int i = 0; i < kSize * kSize; ++i) texels[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(i % kSize);
+  TextureView texture;
+  texture.width = texture.height = kSize;
+  texture.num_levels = texture.num_channels = 1;
+  texture.wrap_u = texture.wrap_v = Wrap::kClamp;
+  texture.levels[0] = texels.data();
+  HeightImage image(nullptr, {kSize, kSize, 1, TexelFormat::kU8}, "");
+  const ImageBounds bounds = image.bounds(texture);
+  for (const float size : {0.004f, 0.02f, 0.1f, 0.3f}) {
+    const float u[2] = {0.4f, 0.4f + size}, v[2] = {0.2f, 0.2f + size};
+    const TexelRange range = image_range(texture, bounds, u, v, true, 0);
+    EXPECT_LE(range.high[0] - range.low[0], 2 * size + 10.0f / kSize) << size;
+    EXPECT_LE(range.low[0], 0.4f);
+    EXPECT_GE(range.high[0], 0.4f + size - 1.0f / kSize);
+  }
+}
+
+/// Heights that depend on bounds are cut off where there are none: so what is bounded everywhere is known to be, also over what is
+/// much wider than a cell, of coordinates of which nothing is known, and of settings that vary.
+TEST_F(GraphBounds, OfWhatIsBoundedEverywhereAreFinite)
+{
+  HardNumbers numbers(31);
+  for (const Shape& shape : shapes()) {
+    const bool is_pattern = (shape.op >= Op::noise_1d && shape.op <= Op::brick) || shape.op == Op::checker ||
+                            shape.op == Op::grid || (shape.op >= Op::ies && shape.op <= Op::blackbody) ||
+                            shape.op == Op::image || shape.op == Op::image_box || shape.op == Op::image_tiles;
+    if (!is_pattern) continue;
+    const auto num_inputs = static_cast<std::size_t>(test::shape_of(shape.op).num_inputs);
+    // Ops of one to four dimensions come by fours.
+    int num_coordinates = shape.num_varying;
+    for (const Op first : {Op::noise_1d, Op::signed_noise_1d, Op::hash_1d, Op::voronoi_1d, Op::musgrave_1d}) {
+      const int dimensions = static_cast<int>(shape.op) - static_cast<int>(first) + 1;
+      if (dimensions >= 1 && dimensions <= 4) num_coordinates = dimensions;
+    }
+    for (const std::vector<std::uint16_t>& immediates : shape.immediates) {
+      std::vector<std::array<Parallelogram, 8>> in(num_inputs);
+      for (std::size_t i = 0; i < num_inputs; ++i) {
+        // Octaves get finer; other settings are between 0 and 1.
+        const bool is_lacunarity = shape.op >= Op::voronoi_1d && shape.op <= Op::voronoi_4d && i + 1 == num_inputs;
+        for (Parallelogram& p : in[i]) {
+          p = static_cast<int>(i) < num_coordinates      ? Parallelogram{numbers.within(-1e3f, 1e3f), 40, 30, 1e4f}
+              : static_cast<int>(i) >= shape.num_varying ? Parallelogram{is_lacunarity ? 2.0f : 0.8f, 0, 0, 0}
+                                                         : Parallelogram{is_lacunarity ? 2.0f : 0.8f, 0.05f, 0, 0.1f};
+        }
+      }
+      for (const GraphRange& r : ranges_of(graph_bounds_select(), shape.op, in, immediates, &image_)) {
+        const bool is_whole = r.low[0] > -kInfinity && r.high[0] < kInfinity;
+        EXPECT_TRUE(is_whole) << "opcode " << static_cast<int>(shape.op) << " " << testing::PrintToString(immediates);
       }
     }
   }
