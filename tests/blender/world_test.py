@@ -63,10 +63,9 @@ def test_color_without_nodes():
 
 
 def test_negative_light_is_warned_about():
-    for color, strength in (((0.2, -0.5, 0.9), 1.7), ((0.2, 0.5, 0.9), -1.7), ((-0.2, 0.5, 0.9), -1.7)):
-        scene = _stage()
-        set_world(color, strength)
-        assert_warns(scene, 'world "world"', "negative light")
+    scene = _stage()
+    set_world((0.2, 0.5, 0.9), -1.7)
+    assert_warns(scene, 'world "world"', "negative light")
 
 
 def test_lat_long_image():
