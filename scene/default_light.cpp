@@ -138,7 +138,7 @@ std::vector<SurfacePoint> emitter_points(const Scene& scene,
   return points;
 }
 
-/// Irradiance of a point of a surface, by π: the radiance that it has if it is white.
+/// Irradiance of a surface at a point, turned to the light, by π: the radiance that white has there.
 double white_radiance(const SurfacePoint& point, const std::vector<SurfacePoint>& emitters)
 {
   double irradiance = 0;
@@ -151,7 +151,7 @@ double white_radiance(const SurfacePoint& point, const std::vector<SurfacePoint>
       const double cosine = static_cast<double>(dot(towards, of.Ng)) / std::sqrt(squared);
       return of.double_sided ? std::fabs(cosine) : std::max(cosine, 0.0);
     };
-    irradiance += e.radiance * static_cast<double>(e.area) * facing(e, to_point) * facing(point, -to_point) / squared;
+    irradiance += e.radiance * static_cast<double>(e.area) * facing(e, to_point) / squared;
   }
   return irradiance * std::numbers::inv_pi;
 }

@@ -18,12 +18,11 @@ struct Placement {
 };
 
 /// See emission_lights_scene.
-inline constexpr double kLitRadiance = 0.1, kGlowingRadiance = 0.25, kLitFraction = 0.25, kGlowingFraction = 0.5;
+inline constexpr double kLitRadiance = 0.1, kGlowingRadiance = 0.25, kLitFraction = 0.5, kGlowingFraction = 0.5;
 
 /// Whether emissive surfaces are the scene's lamps, or decoration. They are lamps if half of the surface glows by itself, with
-/// a radiance of .25 or more; or if at least a quarter of those points are lit that do not, among 256, the same number on each mesh
-/// instance: if they were white, they would have a radiance of .1. One lamp lights half of what is round. Nothing shadows but the surfaces themselves, which turn away
-/// from each other, and 2048 points of the emissive surfaces, chosen by what they may emit, stand for all of them. So a lamp
+/// a radiance of .25 or more; or if at least half of those points are lit that do not, among 256, the same number on each mesh
+/// instance: if they were white and turned to the light, they would have a radiance of .1. Nothing shadows, and 2048 points of the emissive surfaces, chosen by what they may emit, stand for all of them. So a lamp
 /// lights what is near, however large the floor it stands on, and lights on a model do not count for the model, whose surface
 /// turns away from them.
 /// @param textures  of the scene, loaded
