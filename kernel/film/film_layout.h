@@ -59,7 +59,7 @@ inline constexpr std::array<AovInfo, kNumAovs> kAovInfo = {{
     {Aov::kDirect, "direct", "RGB", false, "light after at most one scattering event, emission seen directly included"},
     {Aov::kIndirect, "indirect", "RGB", false, "light after two or more scattering events"},
     {Aov::kAlbedo, "albedo", "RGB", false, "base colour of the first non-transparent hit"},
-    {Aov::kNormal, "normal", "XYZ", false, "unit shading normal of the first hit, world space, averaged"},
+    {Aov::kNormal, "normal", "XYZ", false, "unit shading normal of the first hit with its bumps, world space, averaged"},
     {Aov::kDepth, "depth", "Z", false, "distance along the camera's axis, metres, averaged over samples that hit"},
     {Aov::kPosition, "position", "XYZ", false, "first hit, world space, metres, averaged over samples that hit"},
     {Aov::kUv, "uv", "UV", false, "texture coordinates (set 0) of the first hit, averaged"},

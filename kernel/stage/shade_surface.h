@@ -321,6 +321,24 @@ RELIEF_KERNEL void shade_surface_scatter(const KernelGlobals& g,
   shade_surface_continue<kFeatures>(g, state, path, at, closure, bsdf, share, u, throughput, light_N, cone, next);
 }
 
+/// Shading normal of all that scatters at a surface: of a mixture the mean of its lobes', each of which may be bumped, by
+/// what they weigh, as in Cycles.
+/// @return  at most unit length; shorter where lobes disagree
+template <unsigned kFeatures>
+RELIEF_KERNEL Vec3f surface_mean_normal(const SurfaceInteraction& at, const MixtureLobes& lobes)
+{
+  if (!has_mixture<kFeatures>(at)) return at.side.Ns;
+  Vec3f sum;
+  float total = 0;
+  for (int i = 0; i < lobes.size; ++i) {
+    const Vec3f weight = lobes.lobes[i].weight;
+    const float share = __builtin_fabsf(weight.x + weight.y + weight.z);
+    sum += share * lobes.lobes[i].frame.n;
+    total += share;
+  }
+  return is_zero(sum) ? at.side.Ns : sum / total;
+}
+
 /// Queues a ray that sees whether the surroundings of a first hit are open.
 RELIEF_KERNEL void shade_surface_ambient(const KernelGlobals& g,
                                          const PathState& state,
@@ -336,16 +354,18 @@ RELIEF_KERNEL void shade_surface_ambient(const KernelGlobals& g,
 }
 
 /// Writes what the film keeps of a path's first hit.
+/// @param N  see surface_mean_normal
 RELIEF_KERNEL void shade_surface_first_hit(const KernelGlobals& g,
                                            const PathState& state,
                                            std::uint32_t path,
                                            const SurfaceInteraction& at,
+                                           Vec3f N,
                                            ShadowQueue& shadow)
 {
   const AccumulatorLayout& layout = g.film.layout;
   FirstHit first;
   first.P = at.hit.P;
-  first.N = at.side.Ns;
+  first.N = normalize(N);
   first.albedo = surface_albedo(at.params);
   first.uv = at.hit.uv[0];
   const Vec3f from_camera = at.hit.P - g.camera.world_from_camera.p;
@@ -379,18 +399,19 @@ RELIEF_KERNEL bool surface_is_seen_through(const SurfaceParams& p)
 }
 
 /// Writes what a denoiser is told of a path, unless that is to be found further on.
+/// @param N  see surface_mean_normal
 RELIEF_KERNEL void shade_surface_denoising(const KernelGlobals& g,
                                            PathState& state,
                                            std::uint32_t path,
-                                           const SurfaceInteraction& at)
+                                           const SurfaceInteraction& at,
+                                           Vec3f N)
 {
   if (surface_is_seen_through(at.params)) return;
   state.flags[path] |= kPathSawFeature;
   const Affine3& camera = g.camera.world_from_camera;
-  const Vec3f N{dot(at.side.Ns, normalize(camera.x)), dot(at.side.Ns, normalize(camera.y)),
-                dot(at.side.Ns, g.camera_forward)};
+  const Vec3f N_camera{dot(N, normalize(camera.x)), dot(N, normalize(camera.y)), dot(N, g.camera_forward)};
   film_add_denoising(g.film, state.pixel[path], sample_is_even(state.sample_index[path], g.log2_stream),
-                     path_throughput(state, path) * surface_albedo(at.params), N);
+                     path_throughput(state, path) * surface_albedo(at.params), N_camera);
 }
 
 /// Adds what a surface emits to a path that has met it.
@@ -521,12 +542,13 @@ template <unsigned kFeatures>
 
   if ((state.flags[path] & kPathSawSurface) == 0) {
     state.flags[path] |= kPathSawSurface;
-    shade_surface_first_hit(g, state, path, at, shadow);
+    const Vec3f N = g.film.layout.normal >= 0 ? surface_mean_normal<kFeatures>(at, lobes) : side.Ns;
+    shade_surface_first_hit(g, state, path, at, N, shadow);
   }
 
   if constexpr (!kMixture) shade_surface_emission<kFeatures>(g, state, path, at, throughput);
   if (g.film.layout.denoising && (state.flags[path] & kPathSawFeature) == 0) {
-    shade_surface_denoising(g, state, path, at);
+    shade_surface_denoising(g, state, path, at, surface_mean_normal<kFeatures>(at, lobes));
   }
   if (params.unlit || last) return;
 

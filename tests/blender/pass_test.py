@@ -86,6 +86,35 @@ def test_normal():
     assert np.abs(relief - cycles)[:, inside].max() < 0.05
 
 
+def _bumped_stage():
+    """Bumps as wide as several blocks: of all closures, of one of two that are mixed, and of one beside the smooth rest."""
+    scene = new_scene()
+    set_world((0.3, 0.4, 0.5))
+    for x, kind in ((-2.2, "ShaderNodeBsdfPrincipled"), (0, "ShaderNodeMixShader"), (2.2, "ShaderNodeBsdfDiffuse")):
+        material, tree, node = new_material("bumped", kind)
+        noise, bump = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeBump")
+        noise.inputs["Scale"].default_value, bump.inputs["Distance"].default_value = 1.0, 3.0
+        tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Object"], noise.inputs["Vector"])
+        tree.links.new(noise.outputs[0], bump.inputs["Height"])
+        if kind == "ShaderNodeMixShader":
+            node.inputs["Fac"].default_value = 0.3
+            smooth, node_of_bump = (tree.nodes.new(f"ShaderNodeBsdf{name}") for name in ("Diffuse", "Glossy"))
+            for index, part in enumerate((smooth, node_of_bump)):
+                tree.links.new(part.outputs[0], node.inputs[1 + index])
+            node = node_of_bump
+        tree.links.new(bump.outputs[0], node.inputs["Normal"])
+        add_plane(2, material, (x, 0, 0))
+    add_camera((0, 0, 6), lens=40)
+    return scene
+
+
+def test_normals_are_bumped():
+    axes = [f"Normal.{axis}" for axis in "XYZ"]
+    _assert_blocks_agree("use_pass_normal", axes, 0.01, stage=_bumped_stage)
+    axes = [f"Denoising Normal.{axis}" for axis in "XYZ"]
+    _assert_blocks_agree("denoising_store_passes", axes, 0.02, owner="cycles", stage=_bumped_stage)
+
+
 def test_position():
     relief, cycles, spread = _compared("use_pass_position", ["Position.X", "Position.Y", "Position.Z"])
     inside = spread < 0.2
