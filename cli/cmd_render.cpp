@@ -5,7 +5,6 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
-#include <fstream>
 #include <iterator>
 #include <memory>
 #include <numeric>
@@ -15,8 +14,6 @@
 #include <string>
 #include <utility>
 #include <vector>
-
-#include <sys/resource.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -34,6 +31,7 @@
 #include "cli/frame_files.h"
 #include "cli/interrupt.h"
 #include "cli/memory_option.h"
+#include "cli/memory_use.h"
 #include "cli/picture_options.h"
 #include "cli/progress_printer.h"
 #include "cli/render_session.h"
@@ -122,19 +120,6 @@ RunFiles files_of_run(const RenderArguments& arguments, const std::vector<std::o
     files.add_input("the reference", paths.reference);
   }
   return files;
-}
-
-std::uint64_t peak_memory_bytes()
-{
-  // Not what getrusage says, where Linux has it: there the size of the program that started this one counts too.
-  std::ifstream status("/proc/self/status");
-  for (std::string word; status >> word;) {
-    std::uint64_t kibibytes = 0;
-    if (word == "VmHWM:" && status >> kibibytes) return kibibytes * 1024u;
-  }
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024u;
 }
 
 /// Layers that a report shows.

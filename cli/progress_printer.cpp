@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "cli/interrupt.h"
+#include "cli/memory_use.h"
 #include "cli/standard_streams.h"
 #include "scene/diagnostics.h"
 
@@ -57,7 +58,9 @@ std::function<void(const RenderProgress&)> ProgressPrinter::callback(int frame, 
                {"photons", p.photons},
                {"seconds", p.seconds},
                {"seconds_left", p.seconds_left},
-               {"rays_per_second", p.rays_per_second}});
+               {"rays_per_second", p.rays_per_second},
+               {"memory_bytes", memory_bytes()},
+               {"peak_memory_bytes", peak_memory_bytes()}});
       };
   }
   return {};

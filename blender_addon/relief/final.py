@@ -264,11 +264,20 @@ def status(progress, layer, samples):
         minutes, seconds = divmod(round(progress["seconds_left"]), 60)
         hours, minutes = divmod(minutes, 60)
         parts.append(f"Remaining:{f'{hours}:' if hours else ''}{minutes:02d}:{seconds:02d}")
+    if memory := _memory(progress):
+        parts.append("Mem:{:.0f}M, Peak:{:.0f}M".format(*memory))
     parts += [layer, f"Sample {progress['samples']:.0f}/{samples}"]
     if progress["photons"]:
         parts.append(f"{progress['photons'] / 1e6:.1f} M photons")
     parts.append(f"{progress['rays_per_second'] / 1e6:.1f} Mrays/s")
     return " | ".join(parts)
+
+
+def _memory(progress):
+    """(now, at most) of the program, in MiB; None: one of the first does not tell."""
+    if "memory_bytes" not in progress:
+        return None
+    return progress["memory_bytes"] / 2**20, progress["peak_memory_bytes"] / 2**20
 
 
 def _follow(engine, request, layer, samples, preview):
@@ -280,6 +289,8 @@ def _follow(engine, request, layer, samples, preview):
                 preview.refresh()
             if event.get("event") == "progress":
                 engine.update_progress(event["fraction"])
+                if memory := _memory(event):
+                    engine.update_memory_stats(memory_used=memory[0], memory_peak=memory[1])
                 engine.update_stats("", status(event, layer, samples))
         if request.code is None and engine.test_break():
             _cancel(request)

@@ -151,8 +151,8 @@ def test_the_status_line_has_what_cycles_has():
     progress = {"fraction": 0.25, "samples": 16, "photons": 0, "seconds": 40.0, "seconds_left": 125.4}
     progress |= {"rays_per_second": 2.5e6, "memory_bytes": 3 << 20, "peak_memory_bytes": 5 << 20}
     text = status(progress, "Scene, ViewLayer", 64)
-    assert text.split(" | ")[:2] == ["Remaining:02:05", "Scene, ViewLayer"], text
-    assert "Sample 16/64" in text, text
+    assert text.split(" | ")[:2] == ["Remaining:02:05", "Mem:3M, Peak:5M"], text
+    assert "Scene, ViewLayer | Sample 16/64" in text, text
     assert status({**progress, "seconds_left": 3725}, "", 64).startswith("Remaining:1:02:05")
     assert "Remaining" not in status({**progress, "fraction": 0}, "", 64)  # nothing tells yet
 

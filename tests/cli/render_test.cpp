@@ -287,6 +287,8 @@ TEST_F(RenderProgram, ProgressIsOneJsonObjectALine)
     for (const char* key : {"frame", "samples", "photons", "seconds", "seconds_left", "rays_per_second"}) {
       EXPECT_TRUE(events[i][key].is_number()) << key;
     }
+    EXPECT_GT(events[i]["memory_bytes"], 0);
+    EXPECT_GE(events[i]["peak_memory_bytes"], events[i]["memory_bytes"]);
     EXPECT_GE(events[i]["fraction"], fraction);
     fraction = events[i]["fraction"];
   }
