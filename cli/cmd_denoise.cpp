@@ -23,7 +23,7 @@ namespace {
 
 struct DenoiseArguments {
   std::filesystem::path input;
-  std::string output, png, view;
+  std::string output, png, view, display;
   double exposure = 0;
   int threads = 0;
   Denoiser denoiser = Denoiser::kBuiltin;
@@ -64,7 +64,9 @@ int denoise_run(const DenoiseArguments& arguments)
   const DenoisedPicture denoised = denoise_picture(arguments.denoiser, all_channels(picture), arguments.input.string());
   files.check_output("--png", arguments.png);
   if (!arguments.png.empty()) {
-    png_write(arguments.png, denoised.beauty(picture.height), {arguments.view, arguments.exposure});
+    PngOptions png{arguments.view, arguments.exposure};
+    png.display = arguments.display;
+    png_write(arguments.png, denoised.beauty(picture.height), png);
   }
   add_layers(picture, denoised);
   files.check_output("--output", arguments.output);
@@ -93,6 +95,8 @@ void cmd_denoise_register(CLI::App& app, std::function<int()>& run)
       add_parsed(*command, "--png", arguments->png, output("--png", ".png"), "PNG of the denoised picture to write"),
       {".png"});
   command->add_option("--view", arguments->view, setting_help(setting_info("view")));
+  command->add_option("--display", arguments->display,
+                      "OpenColorIO display of the PNG's view (default: the configuration's)");
   constexpr SettingInfo kExposure = setting_info("exposure");
   command->add_option("--exposure", arguments->exposure, setting_help(kExposure))->check(setting_check(kExposure));
   command->add_option("--threads", arguments->threads, "Threads (default: all processors)")

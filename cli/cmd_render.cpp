@@ -65,7 +65,7 @@ struct RenderArguments {
   SamplePart part;
   int threads = 0;
   double time_limit = 0, noise_threshold = -1;
-  std::optional<std::string> view;
+  std::optional<std::string> view, display;
   std::optional<double> exposure;
   std::uint32_t aov_mask = 0;
   Denoiser denoiser = Denoiser::kNone;
@@ -157,9 +157,12 @@ ExrCompression compression_of(const RenderArguments& arguments)
 std::vector<std::string> warnings_about(const RenderArguments& arguments, const Scene& scene)
 {
   // Looked up although nothing shows it: what is misspelt is to be heard of before the frames are rendered.
-  if (arguments.png.empty() && arguments.view) ColorView unused(*arguments.view);
+  if (arguments.png.empty() && (arguments.view || arguments.display)) {
+    ColorView unused(arguments.view.value_or(""), arguments.display.value_or(""));
+  }
   std::vector<std::string> texts = displacement_warnings(scene, arguments.picture.displacement);
   if (arguments.png.empty() && arguments.view) texts.emplace_back("--view has no effect without --png");
+  if (arguments.png.empty() && arguments.display) texts.emplace_back("--display has no effect without --png");
   if (arguments.png.empty() && arguments.exposure) texts.emplace_back("--exposure has no effect without --png");
   for (const std::string& layer : exr_damaged_layers(film_layout_make(arguments.aov_mask), compression_of(arguments))) {
     texts.push_back(fmt::format("--compression {}: it takes the data in the layer '{}' for colours and rounds them",
@@ -434,12 +437,13 @@ bool render_frame(const RenderArguments& arguments,
   RenderOptions options = options_for(scene, arguments, cameras.cameras);
   if (kept != nullptr) kept->join(&options);
   PngOptions png{options.settings.view, options.settings.exposure};
+  png.display = arguments.display.value_or("");
   png.alpha = arguments.setup.background == "transparent";
   std::vector<FileStamp> files_read = scene.files;
   files_read.insert(files_read.end(), cameras.files.begin(), cameras.files.end());
   std::optional<ColorView> view;
   if (!paths.png.empty()) {
-    view.emplace(png.view);
+    view.emplace(png.view, png.display);
     stats.view = view->description();
     for (const std::string& file : view->files()) files_read.push_back(file_stamp(file));
     files.add_inputs("a file of the colour view", files_read);
@@ -506,7 +510,7 @@ bool render_frame(const RenderArguments& arguments,
                            static_cast<std::uint32_t>(options.settings.samples)});
   }
   // Whoever sends requests shows the picture to somebody who works on the scene, and may be in the dark on purpose.
-  if (stats.samples_per_pixel > 0 && !progress.is_of_request()) {
+  if (stats.samples_per_pixel >= 1 && !progress.is_of_request()) {
     if (std::string text = emptiness_warning(scene, image.view); !text.empty()) {
       stats.warnings.push_back(arguments.scene + ": " + text);
     }
@@ -680,6 +684,7 @@ std::pair<CLI::App*, std::vector<CLI::Option*>> add_render(CLI::App& app, Render
       ->check(number(0.1, 1e9));
   command->add_flag("--strict", a.strict, "Turn warnings into errors");
   command->add_option("--view", a.view, setting_help(setting_info("view")));
+  command->add_option("--display", a.display, "OpenColorIO display of the PNG's view (default: the configuration's)");
   command->add_option("--exposure", a.exposure, setting_help(kExposure))->check(setting_check(kExposure));
   add_parsed(*command, "--aov", a.aov_mask, parse_aovs, "Layers to keep: names separated by commas, or all")
       ->check(listed_words(aov_words()))

@@ -62,6 +62,23 @@ std::string joined_views(const OCIO::ConstConfigRcPtr& config, const char* displ
   return text;
 }
 
+bool has_display(const OCIO::ConstConfigRcPtr& config, const std::string& display)
+{
+  for (int i = 0; i < config->getNumDisplays(); ++i) {
+    if (display == config->getDisplay(i)) return true;
+  }
+  return false;
+}
+
+std::string joined_displays(const OCIO::ConstConfigRcPtr& config)
+{
+  std::string text;
+  for (int i = 0; i < config->getNumDisplays(); ++i) {
+    text += (i > 0 ? ", " : "") + std::string("'") + config->getDisplay(i) + "'";
+  }
+  return text;
+}
+
 bool has_view(const OCIO::ConstConfigRcPtr& config, const char* display, const std::string& view)
 {
   for (int i = 0; i < config->getNumViews(display); ++i) {
@@ -84,12 +101,15 @@ struct FoundView {
   std::vector<std::string> files;
 };
 
-/// @error InputError if the view is not there; OCIO::Exception if the configuration is broken
-FoundView view_from_config(const std::string& file, const std::string& requested)
+/// @error InputError if the display or the view is not there; OCIO::Exception if the configuration is broken
+FoundView view_from_config(const std::string& file, const std::string& requested, const std::string& requested_display)
 {
   const OCIO::ConstConfigRcPtr config = OCIO::Config::CreateFromFile(file.c_str());
   config->validate();
-  const char* display = config->getDefaultDisplay();
+  if (!requested_display.empty() && !has_display(config, requested_display)) {
+    throw InputError(file, "has no display '" + requested_display + "'; there are " + joined_displays(config));
+  }
+  const char* display = requested_display.empty() ? config->getDefaultDisplay() : requested_display.c_str();
   std::string view = requested;
   if (view.empty()) {
     view = has_view(config, display, kStandardView) ? kStandardView : config->getDefaultView(display);
@@ -173,7 +193,7 @@ void write_encoded(const std::filesystem::path& path,
 
 }  // namespace
 
-ColorView::ColorView(const std::string& view)
+ColorView::ColorView(const std::string& view, const std::string& display)
 {
   const auto use = [&](FoundView found) {
     processor_ = std::make_unique<Processor>(Processor{std::move(found.cpu)});
@@ -182,7 +202,7 @@ ColorView::ColorView(const std::string& view)
   };
   if (const char* configured = std::getenv("OCIO"); configured != nullptr && *configured != '\0') {
     try {
-      use(view_from_config(configured, view));
+      use(view_from_config(configured, view, display));
       return;
     } catch (const OCIO::Exception& error) {
       throw InputError(configured, std::string("is named by $OCIO but cannot be used: ") + error.what());
@@ -190,7 +210,7 @@ ColorView::ColorView(const std::string& view)
   }
   for (const std::filesystem::path& config : installed_configs()) {
     try {
-      use(view_from_config(config.string(), view));
+      use(view_from_config(config.string(), view, display));
       return;
     } catch (const OCIO::Exception&) {
       // A newer Blender's configuration may be beyond this OpenColorIO; nobody asked for it, so the next one is tried.
@@ -199,6 +219,10 @@ ColorView::ColorView(const std::string& view)
   if (!view.empty() && view != kStandardView) {
     throw InputError("view '" + view + "'",
                      "no OpenColorIO configuration was found, and without one there is only 'Standard'; set $OCIO");
+  }
+  if (!display.empty()) {
+    throw InputError("display '" + display + "'",
+                     "no OpenColorIO configuration was found, and without one there is only sRGB; set $OCIO");
   }
   description_ = "view 'Standard', built-in sRGB curve";
 }
@@ -233,7 +257,7 @@ std::string png_write(const std::filesystem::path& path, const ImageView& image,
     throw OutputError(path.string(),
                       "a PNG is made of red, green, blue and perhaps coverage, which this picture lacks");
   }
-  const ColorView view(options.view);
+  const ColorView view(options.view, options.display);
   if (options.bits == 16) {
     write_encoded<std::uint16_t>(path, image, view, options);
   } else {

@@ -16,21 +16,23 @@
 namespace relief {
 
 struct PngOptions {
-  /// View of the configuration's default display. Empty: "Standard", the plain sRGB look, even where the configuration's own
+  /// View of the display. Empty: "Standard", the plain sRGB look, even where the configuration's own
   /// default is another (Blender's is Filmic); a configuration without a "Standard" view uses its own default.
   std::string view;
   double exposure = 0;  ///< stops; pixels are multiplied by 2^exposure before the view
   int bits = 8;         ///< 8 or 16
   bool alpha = false;   ///< keep coverage, unassociated as PNG wants it; otherwise the picture stands over black
+  std::string display = {};  ///< whose view it is; empty: the configuration's default
 };
 
 /// Where pixels go after exposure. Made once, used for any number of pictures.
 /// Looked for in this order: the configuration that $OCIO names; the one that Blender installs; the built-in sRGB view.
 class ColorView {
  public:
-  /// @param view  as PngOptions::view
-  /// @error InputError if $OCIO is set but its configuration cannot be used, or if there is no such view (lists those that are)
-  explicit ColorView(const std::string& view);
+  /// @param view, display  as in PngOptions
+  /// @error InputError if $OCIO is set but its configuration cannot be used, or if there is no such display or view (lists those
+  ///        that are)
+  explicit ColorView(const std::string& view, const std::string& display = {});
   ~ColorView();
   ColorView(ColorView&&) noexcept;
   ColorView& operator=(ColorView&&) noexcept;

@@ -574,7 +574,8 @@ void Accel::commit(RTCScene target)
   const RTCError error = rtcGetDeviceError(trees_->device());
   if (const std::optional<OutOfMemory> refusal = trees_->refusal()) throw *refusal;
   if (error == RTC_ERROR_NONE) return;
-  if (error == RTC_ERROR_OUT_OF_MEMORY) throw OutOfMemory("the acceleration structure");
+  // What the standard library throws is unknown to Embree: that no thread can be started, where there is little memory.
+  if (error == RTC_ERROR_OUT_OF_MEMORY || error == RTC_ERROR_UNKNOWN) throw OutOfMemory("the acceleration structure");
   throw std::runtime_error("Embree failed to build the acceleration structure (error " +
                            std::to_string(static_cast<int>(error)) + ")");
 }

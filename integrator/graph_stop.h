@@ -6,8 +6,8 @@
 
 namespace relief {
 
-/// What ends runs of graphs on this thread; null: nothing does.
-inline thread_local const std::atomic<bool>* graph_stop = nullptr;
+/// What ends runs of graphs on this thread; null: nothing does. Not inline: objects of several instruction sets read it.
+extern constinit thread_local const std::atomic<bool>* graph_stop;
 
 /// While one lives, graphs that this thread runs are given up once a flag is true. What they give then is not to be used.
 class GraphStop {

@@ -473,9 +473,13 @@ RenderedImage render(const Scene& scene,
     options.checkpoint(state(), film.sums(), beauty.view);
   };
   // A checkpoint has to wait for tiles that are under way, so they must not take longer than what may be lost. Before anything is
-  // measured pictures of few tiles, which wait for all of them, begin as small as can be.
+  // measured pictures of few tiles, which wait for all of them, begin as small as can be. Further layers are added to where a
+  // path meets what they tell: the last bits of their sums depend on which samples are under way together.
+  constexpr auto bit = [](Aov aov) { return 1u << static_cast<int>(aov); };
+  constexpr std::uint32_t kSumsByPath = bit(Aov::kBeauty) | bit(Aov::kSampleCount) | bit(Aov::kVariance) | bit(Aov::kHalf);
+  const bool cuts_passes = checkpoints.is_on() && (options.aov_mask & ~kSumsByPath) == 0;
   const auto most_samples = [&]() -> std::uint32_t {
-    if (!checkpoints.is_on()) return kMostPassSamples;
+    if (!cuts_passes) return kMostPassSamples;
     constexpr double kFewTiles = 4;
     const double tiles_a_thread =
         static_cast<double>(active.size()) / static_cast<double>(tbb::this_task_arena::max_concurrency());

@@ -136,7 +136,8 @@ RELIEF_KERNEL void voronoi_whole(const GraphRange (&p)[kDims],
   }
   const GraphRange octaves = range_between(splat8(1.0f), sum);
   I8 is_known = (randomness.low >= 0.0f) & (randomness.high <= 1.0f);
-  if (has_exponent) is_known &= exponent.low > 0.0f;
+  // Of exponents near 0 lengths are infinite, and what is made of them is no number.
+  if (has_exponent) is_known &= (exponent.low > 0.0f) & (most < kInfinity);
   if (is_smooth) is_known &= smoothness.low > 0.0f;
   // Coarser octaves than the first are divided by less than 1.
   const I8 gets_finer = (detail == 0.0f) | (lacunarity.low >= 1.0f);

@@ -3,8 +3,10 @@
 #include <OpenImageIO/imageio.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstdlib>
+#include <tuple>
 
 #include "exporters/errors.h"
 #include "tests/exporters/test_pictures.h"
@@ -121,6 +123,29 @@ class PngOcio : public FolderTest {
 }  // namespace
 
 TEST_F(PngOcio, StandardViewIsTheDefaultAndWithinOneCodeOfExactSrgb) { EXPECT_LE(worst_code(8), 1); }
+
+TEST_F(PngOcio, DisplaysHaveViewsOfTheirOwn)
+{
+  std::string config = kConfig;
+  config.replace(config.find("colorspaces:"), 0, "  Projector:\n    - !<View> {name: Plain, colorspace: lin}\n");
+  write_bytes(file("config.ocio"), config);
+  const std::array<float, 3> linear = {0.25f, 0.5f, 0.75f};
+  std::array<float, 3> shown = linear;
+  ColorView("", "Projector").apply(shown);
+  for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(shown[c], linear[c], 1e-6f);
+  shown = linear;
+  ColorView("Double", "Screen").apply(shown);
+  for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(shown[c], 2 * linear[c], 1e-6f);
+  for (const auto& [view, display, listed] :
+       {std::tuple("", "Wall", "'Projector'"), std::tuple("Double", "Projector", "'Plain'")}) {
+    try {
+      ColorView unused(view, display);
+      FAIL() << display;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(listed), std::string::npos) << error.what();
+    }
+  }
+}
 
 TEST_F(PngOcio, SixteenBitsKeepSixteenBits) { EXPECT_LE(worst_code(16), 8); }
 

@@ -63,7 +63,7 @@ TEST(Displacement, IsRead)
   EXPECT_EQ(DisplacementSettings{}.lod, 0);
   EXPECT_TRUE(d.smoothing);
   EXPECT_TRUE(d.weld_seams);
-  EXPECT_EQ(scene.textures->views().size(), 1u);  // of the default light: heights are none
+  EXPECT_EQ(scene.textures->views().size(), 2u);  // of the default light and what stands behind it: heights are none
 }
 
 TEST(Displacement, EveryMethodHasItsName)
