@@ -7,7 +7,7 @@ import sys
 
 import bpy
 
-from scenes import _ROOT, add_camera, add_plane, folder
+from scenes import _ROOT, add_camera, add_plane, folder, set_world
 
 _STEPS = """
 import addon_utils, bpy, os, sys
@@ -194,6 +194,7 @@ def test_the_documented_commands_run_without_complaint():
         commands = re.findall(r"^    (\S.*)$", file.read(), re.MULTILINE)
     scene = bpy.context.scene
     scene.render.engine, scene.relief.samples = "RELIEF", 1
+    set_world((0.5, 0.5, 0.5))
     add_plane()
     add_camera()
     with folder() as path:
