@@ -138,7 +138,7 @@ class TextureReader:
         found = self._read(source, is_color)
         if found is not None and found.texture is not None:
             node = found.texture.node
-            if not reads_as_stored(node.image, is_color, nodes.is_used(node.outputs["Alpha"])):
+            if not reads_as_stored(node.image, is_color, uses_alpha(node)):
                 return None
             if is_encoded(node.image) or not has_pixels_of_all_frames(node.image, is_color) or (
                 node.image.source == "SEQUENCE" and found.texture.channel is not None
@@ -261,6 +261,13 @@ class TextureReader:
         self.warn(f'node "{node.name}": a mapping that shears ({node.vector_type.lower()})', "the uv map was used")
         return Mapping(source)
 
+
+def uses_alpha(node):
+    """Whether the alpha that an Image Texture node gives leads anywhere. Environment Texture nodes give none."""
+    alpha = node.outputs.get("Alpha")
+    return alpha is not None and nodes.is_used(alpha)
+
+
 def image_options(node, writer, images, warn):
     """Options of image-texture and environment-texture: which image an Image or Environment Texture node reads, and what of it.
 
@@ -272,8 +279,7 @@ def image_options(node, writer, images, warn):
     is_data = image.colorspace_settings.is_data
     is_opaque = image.alpha_mode == "NONE"
     is_separate = is_data or image.alpha_mode == "CHANNEL_PACKED" or image.source == "FILE" and image.channels not in {2, 4}
-    uses_alpha = nodes.is_used(node.outputs["Alpha"])
-    associates = not (is_opaque or is_separate or uses_alpha)
+    associates = not (is_opaque or is_separate or uses_alpha(node))
     texture = Texture(node, None, Mapping())
 
     def info(uri):
@@ -300,7 +306,7 @@ def image_options(node, writer, images, warn):
         options["alpha"] = "opaque"
     elif not is_separate:
         options["alpha"] = "associated" if is_multiplied else "straight"
-        if uses_alpha:
+        if uses_alpha(node):
             options["unassociate"] = True
     return options
 
