@@ -51,6 +51,8 @@ LightSet light_set_make(const Scene& scene,
   if (scene.environment.hidden_from != 0) set.environment_irradiance = {};
 
   set.lights = scene.lights;
+  // Likewise of lamps: photons come to a surface as no kind of ray.
+  for (Light& light : set.lights) light.casts_caustics = light.casts_caustics && light.hidden_from == 0;
   if (globals != nullptr) set.motions = globals->lights.motions;
   if (globals != nullptr) lamps_scale(*globals, set.lights);
   const std::vector<float> scales = emissive_meshes_add(scene, textures, globals, set);

@@ -24,7 +24,7 @@ class Picture:
 
     width, height  pixels of the data window
     channels       float32 arrays of shape (height, width) by full channel name; row 0 is the bottom, as in Blender
-    attributes     texts of the header by name
+    attributes     texts and numbers of the header by name
     """
 
     def __init__(self, width, height, channels, attributes):
@@ -38,6 +38,15 @@ class Picture:
         if any(name not in self.channels for name in names):
             return None
         return np.stack([self.channels[name].ravel() for name in names], axis=-1)
+
+
+#: What attributes of a kind are, from their bytes.
+_ATTRIBUTES = {
+    "string": lambda value: value.decode("utf-8", "replace"),
+    "int": lambda value: struct.unpack("<i", value)[0],
+    "float": lambda value: struct.unpack("<f", value)[0],
+    "double": lambda value: struct.unpack("<d", value)[0],
+}
 
 
 def read(path):
@@ -72,8 +81,8 @@ def _parse(data):
     if not np.array_equal(rows["y"], np.arange(y0, y1 + 1)):
         raise ValueError("scanlines out of order")
     channels = {name: rows[name][::-1].astype(np.float32) for name in row.names[2:]}
-    texts = {name: value.decode("utf-8", "replace") for name, (kind, value) in header.items() if kind == "string"}
-    return Picture(width, height, channels, texts)
+    attributes = {name: _ATTRIBUTES[kind](value) for name, (kind, value) in header.items() if kind in _ATTRIBUTES}
+    return Picture(width, height, channels, attributes)
 
 
 def _parse_header(data):

@@ -246,7 +246,7 @@ def test_the_picture_is_shown_while_it_is_rendered():
             assert bool(shown) == is_watched, shown
             pictures.append(exr.read(scene.render.filepath).channels)
         final._is_watched, result.show = kept
-    assert shown[0] == "1", shown
+    assert shown[0] == 1, shown
     assert pictures[0].keys() == pictures[1].keys() and len(pictures[0]) > 4, (pictures[0].keys(), pictures[1].keys())
     for name, values in pictures[0].items():
         assert np.array_equal(values, pictures[1][name]), name
