@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings of objects and lights that change Cycles' picture and not relief's: one warning for each that is not as usual.
 
-Which do was found by setting each of Blender's and rendering in Cycles. Those of scenes are in settings.py.
+Which do was found by setting them one by one and rendering in Cycles: of most kinds of objects, not of all. Those of scenes are in settings.py.
 """
 
 from .. import compat
