@@ -24,62 +24,13 @@ sys.dont_write_bytecode = True
 sys.path[:0] = [os.path.join(_ROOT, "tests", "blender"), os.path.dirname(os.path.abspath(__file__))]
 
 import scenes  # noqa: E402
+from node_tree import NodeTree  # noqa: E402
 
 _FEW, _MANY = 4, 36
 
 
-class _Tree:
-    """A node tree of a material, and a few words over it."""
-
-    def __init__(self, name):
-        self.material = bpy.data.materials.new(name)
-        self.material.use_nodes = True
-        self.tree = self.material.node_tree
-        self.tree.nodes.clear()
-
-    def node(self, kind, inputs=(), **attributes):
-        """A node; inputs by name or number are sockets to link or values."""
-        node = self.tree.nodes.new("ShaderNode" + kind)
-        for name, value in attributes.items():
-            setattr(node, name, value)
-        for key, value in dict(inputs).items():
-            if isinstance(value, bpy.types.NodeSocket):
-                self.tree.links.new(value, node.inputs[key])
-            else:
-                node.inputs[key].default_value = value
-        return node
-
-    def ramp(self, factor, *colors):
-        node = self.node("ValToRGB", {0: factor})
-        elements = node.color_ramp.elements
-        while len(elements) < len(colors):
-            elements.new(0.5)
-        for i, color in enumerate(colors):
-            elements[i].position, elements[i].color = 0.25 + 0.5 * i / (len(colors) - 1), (*color, 1)
-        return node.outputs[0]
-
-    def math(self, operation, a, b=0.5):
-        return self.node("Math", {0: a, 1: b}, operation=operation).outputs[0]
-
-    def mix(self, factor, a, b, blend="MIX"):
-        return self.node("MixRGB", {0: factor, 1: a, 2: b}, blend_type=blend).outputs[0]
-
-    def place(self, scale):
-        coordinate = self.node("TexCoord")
-        return self.node("Mapping", {0: coordinate.outputs["Object"], "Scale": scale}).outputs[0]
-
-    def end(self, shader):
-        self.node("OutputMaterial", {0: shader})
-        return self.material
-
-    def principled(self, color, roughness, height, **inputs):
-        bump = self.node("Bump", {"Height": height, "Strength": 0.4, "Distance": 0.05})
-        values = {"Base Color": color, "Roughness": roughness, "Normal": bump.outputs[0], **inputs}
-        return self.node("BsdfPrincipled", values).outputs[0]
-
-
 def wood():
-    t = _Tree("wood")
+    t = NodeTree("wood")
     p = t.place((1, 1, 0.2))
     noise = t.node("TexNoise", {0: p, "Scale": 2, "Detail": 3})
     bent = t.node("VectorMath", {0: p, 1: noise.outputs[1]}, operation="ADD").outputs[0]
@@ -94,7 +45,7 @@ def wood():
 
 
 def marble():
-    t = _Tree("marble")
+    t = NodeTree("marble")
     p = t.place((1, 1, 1))
     color = (0.9, 0.9, 0.88, 1)
     height = 0.5
@@ -109,7 +60,7 @@ def marble():
 
 
 def rust():
-    t = _Tree("rust")
+    t = NodeTree("rust")
     p = t.place((1, 1, 1))
     mask = 0.0
     for scale in (1.5, 4, 11):
@@ -133,7 +84,7 @@ def rust():
 
 def layers(name, count):
     """A stack of weathered coats: each by a texture of another kind, of its own colours, roughness and height."""
-    t = _Tree(name)
+    t = NodeTree(name)
     p = t.place((1, 1, 1))
     color, rough, height = (0.5, 0.5, 0.5, 1), 0.5, 0.0
     for i in range(count):
