@@ -69,7 +69,7 @@ struct RenderArguments {
   std::optional<double> exposure;
   std::uint32_t aov_mask = 0;
   Denoiser denoiser = Denoiser::kNone;
-  std::string compression = "zip", progress = "bar";
+  std::string compression = "zip", color_space = "rec709", progress = "bar";
   bool resume = false, strict = false, keep_going = false, float_color = false;
   std::optional<double> checkpoint;  ///< seconds; none: as --resume has it
   double grace = 0;                  ///< seconds
@@ -151,6 +151,12 @@ ExrCompression compression_of(const RenderArguments& arguments)
 {
   const auto* found = std::find(kExrCompressionNames.begin(), kExrCompressionNames.end(), arguments.compression);
   return static_cast<ExrCompression>(found - kExrCompressionNames.begin());
+}
+
+ColorSpace color_space_of(const RenderArguments& arguments)
+{
+  const auto* found = std::find(kColorSpaceNames.begin(), kColorSpaceNames.end(), arguments.color_space);
+  return static_cast<ColorSpace>(found - kColorSpaceNames.begin());
 }
 
 /// Settings that do nothing, more than meets the eye, or something else than they say.
@@ -467,7 +473,7 @@ bool render_frame(const RenderArguments& arguments,
 
   // Of the page about the frame, so that `relief report` makes the same.
   const std::uint32_t report_mask = arguments.report.empty() ? 0 : report_aovs(scene);
-  FrameFiles frame_files(files, paths, command, {compression_of(arguments), arguments.float_color},
+  FrameFiles frame_files(files, paths, command, {compression_of(arguments), arguments.float_color, color_space_of(arguments)},
                          arguments.aov_mask | report_mask, exr_camera_attributes(options.camera), progress);
   std::optional<SavedRender> saved;
   if (arguments.resume) saved = state_of(paths, fingerprint, stats, progress);
@@ -692,6 +698,9 @@ std::pair<CLI::App*, std::vector<CLI::Option*>> add_render(CLI::App& app, Render
   add_denoiser(*command, a.denoiser, Denoiser::kNone);
   command->add_option("--compression", a.compression, "Of the OpenEXR")
       ->check(one_of({kExrCompressionNames.begin(), kExrCompressionNames.end()}))
+      ->capture_default_str();
+  command->add_option("--color-space", a.color_space, "Primaries of the OpenEXR's colours")
+      ->check(one_of({kColorSpaceNames.begin(), kColorSpaceNames.end()}))
       ->capture_default_str();
   command->add_flag("--float", a.float_color, "Store colours as 32-bit floats instead of halves");
   names_file(

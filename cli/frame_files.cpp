@@ -48,7 +48,7 @@ void FrameFiles::write_preview(int frame, const FilmView& film, double samples)
   if (!shows_previews_) return;
   try {
     files_.check_output("--preview", paths_.preview);
-    exr_write(paths_.preview, film, {{"relief:samples", fmt::format("{:g}", samples)}}, {ExrCompression::kNone, true});
+    exr_write(paths_.preview, film, {{"relief:samples", fmt::format("{:g}", samples)}}, {ExrCompression::kNone, true, exr_.color_space});
   } catch (const OutputError& error) {
     progress_.warnings({fmt::format("no more previews: {}", error.what())});
     shows_previews_ = false;
@@ -66,7 +66,7 @@ void FrameFiles::write_checkpoint(const RenderState& state,
   files_.check_output("--output", paths_.exr);
   stats.stop_reason = "interrupted";
   try {
-    exr_write(paths_.exr, film, attributes_of(stats), {ExrCompression::kNone, exr_.float_color},
+    exr_write(paths_.exr, film, attributes_of(stats), {ExrCompression::kNone, exr_.float_color, exr_.color_space},
               {state, sums, fingerprint});
   } catch (const OutputError& error) {
     progress_.warnings({fmt::format("a checkpoint could not be written: {}", error.what())});

@@ -1,13 +1,16 @@
 #include "exporters/exr.h"
 
+#include <ImfChromaticities.h>
 #include <ImfInputPart.h>
 #include <ImfMultiPartInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfPartType.h>
+#include <ImfStandardAttributes.h>
 #include <ImfThreading.h>
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <iterator>
@@ -32,14 +35,15 @@ void write_channels(const std::filesystem::path& path,
                     const ExrWindows& windows,
                     const std::vector<ChannelView>& channels,
                     const Attributes& attributes,
-                    ExrCompression compression)
+                    ExrCompression compression,
+                    ColorSpace space = ColorSpace::kRec709)
 {
   if (windows.width <= 0 || windows.height <= 0 || channels.empty()) {
     throw OutputError(path.string(), "the picture has no pixels or no channels");
   }
   exr_file_write(path, [&](Imf::OStream& stream) {
-    Imf::OutputFile output(stream, exr_header_make(windows, channels, attributes, compression));
-    exr_rows_write(output, windows, channels);
+    Imf::OutputFile output(stream, exr_header_make(windows, channels, attributes, compression, space));
+    exr_rows_write(output, windows, channels, space);
   });
 }
 
@@ -141,6 +145,44 @@ void read_rows(Imf::InputPart& part, const Imath::Box2i& data, Picture& picture)
       const bool is_integer = picture.channels[c].type == ChannelType::kUint;
       std::transform(first, first + static_cast<std::ptrdiff_t>(block), std::back_inserter(picture.channels[c].values),
                      [=](std::uint32_t w) { return is_integer ? static_cast<float>(w) : std::bit_cast<float>(w); });
+    }
+  }
+}
+
+/// Whether a file's colours are those of ACEScg, as far as floats tell.
+bool is_acescg(const Imf::Header& header)
+{
+  if (!Imf::hasChromaticities(header)) return false;
+  const Imf::Chromaticities& found = Imf::chromaticities(header);
+  const Chromaticities& expected = kChromaticities[static_cast<std::size_t>(ColorSpace::kAcescg)];
+  const auto is_near = [](const Imath::V2f& a, const std::array<double, 2>& b) {
+    return std::abs(a.x - b[0]) < 1e-4 && std::abs(a.y - b[1]) < 1e-4;
+  };
+  return is_near(found.red, expected.red) && is_near(found.green, expected.green) &&
+         is_near(found.blue, expected.blue) && is_near(found.white, expected.white);
+}
+
+/// Converts the colours of a picture from ACEScg to Rec.709.
+void convert_colors(Picture& picture)
+{
+  const ColorMatrix matrix = color_matrix(ColorSpace::kAcescg, ColorSpace::kRec709);
+  for (Channel& red : picture.channels) {
+    if (color_component(red.name) != std::size_t{0}) continue;
+    const auto other = [&](char letter) {
+      const std::string name = red.name.substr(0, red.name.size() - 1) + letter;
+      return std::find_if(picture.channels.begin(), picture.channels.end(),
+                          [&](const Channel& channel) { return channel.name == name; });
+    };
+    const auto green = other('G'), blue = other('B');
+    if (green == picture.channels.end() || blue == picture.channels.end()) continue;
+    for (std::size_t i = 0; i < red.values.size(); ++i) {
+      const double r = red.values[i], g = green->values[i], b = blue->values[i];
+      const auto row = [&](std::size_t c) {
+        return static_cast<float>(matrix[c][0] * r + matrix[c][1] * g + matrix[c][2] * b);
+      };
+      red.values[i] = row(0);
+      green->values[i] = row(1);
+      blue->values[i] = row(2);
     }
   }
 }
@@ -250,7 +292,7 @@ void exr_write(const std::filesystem::path& path,
 {
   std::vector<ChannelView> channels = more;
   for (ChannelView& channel : exr_film_channels(film, options)) channels.push_back(std::move(channel));
-  write_channels(path, exr_windows(film), channels, attributes, options.compression);
+  write_channels(path, exr_windows(film), channels, attributes, options.compression, options.color_space);
 }
 
 void exr_write(const std::filesystem::path& path, const Picture& picture, ExrCompression compression)
@@ -284,6 +326,7 @@ Picture exr_load(const std::filesystem::path& path)
     if (!input.partComplete(0)) throw InputError(file, "is incomplete: its writer was interrupted");
     Imf::InputPart part(input, 0);
     read_rows(part, header.dataWindow(), picture);
+    if (is_acescg(header)) convert_colors(picture);
     return picture;
   } catch (const InputError&) {
     throw;

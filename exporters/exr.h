@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "exporters/color_space.h"
 #include "exporters/picture.h"
 #include "kernel/statistics.h"
 #include "scene/scene.h"
@@ -22,6 +23,7 @@ inline constexpr std::array<std::string_view, 6> kExrCompressionNames = {"none",
 struct ExrOptions {
   ExrCompression compression = ExrCompression::kZip;
   bool float_color = false;  ///< radiance, albedo and normals as 32-bit floats instead of halves
+  ColorSpace color_space = ColorSpace::kRec709;  ///< of the layers that are colours (color_component)
 };
 
 /// Number of threads that compress and decompress, for the whole process. Without a call it is the machine's.
@@ -61,7 +63,8 @@ void exr_write(const std::filesystem::path& path,
                const Picture& picture,
                ExrCompression compression = ExrCompression::kZip);
 
-/// Reads the first part of any flat OpenEXR file, scanline or tiled, with the attributes that are text or of our own.
+/// Reads the first part of any flat OpenEXR file, scanline or tiled, with the attributes that are text or of our own. Colours of a
+/// file whose chromaticities are those of ACEScg become Rec.709; others are taken as they are.
 /// @error InputError for anything else: unreadable, truncated, corrupt, deep, subsampled, or absurdly large
 /// @cost  4 bytes a value; memory grows with what was really read, whatever the header claims
 Picture exr_load(const std::filesystem::path& path);

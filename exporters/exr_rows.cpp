@@ -108,14 +108,20 @@ std::vector<ChannelView> exr_film_channels(const FilmView& film, const ExrOption
 Imf::Header exr_header_make(const ExrWindows& windows,
                             const std::vector<ChannelView>& channels,
                             const Attributes& attributes,
-                            ExrCompression compression)
+                            ExrCompression compression,
+                            ColorSpace space)
 {
   const Imath::Box2i display(Imath::V2i(0, 0), Imath::V2i(windows.full_width - 1, windows.full_height - 1));
   const Imath::Box2i data(Imath::V2i(windows.crop_x, windows.crop_y),
                           Imath::V2i(windows.crop_x + windows.width - 1, windows.crop_y + windows.height - 1));
   Imf::Header header(display, data);
   header.compression() = kImfCompressions[static_cast<std::size_t>(compression)];
-  Imf::addChromaticities(header, Imf::Chromaticities());  // Rec.709 primaries and D65 are its defaults
+  const Chromaticities& primaries = kChromaticities[static_cast<std::size_t>(space)];
+  const auto xy = [](const std::array<double, 2>& at) {
+    return Imath::V2f(static_cast<float>(at[0]), static_cast<float>(at[1]));
+  };
+  Imf::addChromaticities(header, Imf::Chromaticities(xy(primaries.red), xy(primaries.green), xy(primaries.blue),
+                                                     xy(primaries.white)));
   for (const auto& [name, text] : attributes) exr_attribute_insert(header, name, text);
   for (const ChannelView& channel : channels) {
     header.channels().insert(channel.name, Imf::Channel(exr_pixel_type(channel.type)));
@@ -165,6 +171,36 @@ void exr_row_pack(const ChannelView& channel, int width, int y, char* packed)
         break;
     }
   }
+}
+
+void exr_row_pack(const ChannelView& channel,
+                  const std::array<const ChannelView*, 3>& rgb,
+                  const std::array<double, 3>& weights,
+                  int width,
+                  int y,
+                  char* packed)
+{
+  std::vector<float> row(static_cast<std::size_t>(width));
+  for (int x = 0; x < width; ++x) {
+    double sum = 0;
+    for (std::size_t i = 0; i < 3; ++i) sum += weights[i] * double{rgb[i]->at(x, y)};
+    row[static_cast<std::size_t>(x)] = static_cast<float>(sum);
+  }
+  exr_row_pack({row.data(), 1, 0, channel.type, {}}, width, 0, packed);
+}
+
+std::array<const ChannelView*, 3> exr_colors_of(const ChannelView& channel, const std::vector<ChannelView>& channels)
+{
+  if (!color_component(channel.name)) return {};
+  std::array<const ChannelView*, 3> rgb{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::string name = channel.name;
+    name.back() = "RGB"[i];
+    const auto found = std::find_if(channels.begin(), channels.end(), [&](const ChannelView& c) { return c.name == name; });
+    if (found == channels.end()) return {};
+    rgb[i] = &*found;
+  }
+  return rgb;
 }
 
 }  // namespace relief

@@ -8,6 +8,7 @@
 #include <ImfIO.h>
 
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <vector>
@@ -39,7 +40,8 @@ std::size_t exr_value_bytes(ChannelType type);
 Imf::Header exr_header_make(const ExrWindows& windows,
                             const std::vector<ChannelView>& channels,
                             const Attributes& attributes,
-                            ExrCompression compression);
+                            ExrCompression compression,
+                            ColorSpace space = ColorSpace::kRec709);
 
 /// What OpenEXR allocates to read a file: tables of all parts, and what it decodes of the first.
 /// @error InputError: the file ends before its header does
@@ -56,11 +58,34 @@ void exr_file_write(const std::filesystem::path& path, const std::function<void(
 /// Packs a row of a channel as the file has it.
 void exr_row_pack(const ChannelView& channel, int width, int y, char* packed);
 
+/// Likewise of a component of colours that are converted.
+/// @param rgb      red, green and blue of its layer
+/// @param weights  what each adds to it
+void exr_row_pack(const ChannelView& channel,
+                  const std::array<const ChannelView*, 3>& rgb,
+                  const std::array<double, 3>& weights,
+                  int width,
+                  int y,
+                  char* packed);
+
+/// Red, green and blue of the layer that a channel is a component of. @return nulls if it is not the component of a colour
+std::array<const ChannelView*, 3> exr_colors_of(const ChannelView& channel, const std::vector<ChannelView>& channels);
+
 /// Packs and writes the rows, a block at a time, so that a film is never held twice.
 /// @param output  Imf::OutputFile, or Imf::OutputPart
+/// @param space   that colours are converted to
 template <class Output>
-void exr_rows_write(Output& output, const ExrWindows& windows, const std::vector<ChannelView>& channels)
+void exr_rows_write(Output& output,
+                    const ExrWindows& windows,
+                    const std::vector<ChannelView>& channels,
+                    ColorSpace space = ColorSpace::kRec709)
 {
+  const ColorMatrix matrix = color_matrix(ColorSpace::kRec709, space);
+  std::vector<std::array<const ChannelView*, 3>> colors(channels.size());
+  if (space != ColorSpace::kRec709) {
+    std::transform(channels.begin(), channels.end(), colors.begin(),
+                   [&](const ChannelView& channel) { return exr_colors_of(channel, channels); });
+  }
   const std::size_t width = static_cast<std::size_t>(windows.width);
   std::vector<std::vector<char>> packed;
   packed.reserve(channels.size());
@@ -73,8 +98,13 @@ void exr_rows_write(Output& output, const ExrWindows& windows, const std::vector
     for (std::size_t c = 0; c < channels.size(); ++c) {
       const std::size_t pixel_bytes = exr_value_bytes(channels[c].type), row_bytes = pixel_bytes * width;
       for (int row = 0; row < num_rows; ++row) {
-        exr_row_pack(channels[c], windows.width, y0 + row,
-                     packed[c].data() + row_bytes * static_cast<std::size_t>(row));
+        char* const target = packed[c].data() + row_bytes * static_cast<std::size_t>(row);
+        if (colors[c][0] != nullptr) {
+          const std::size_t component = *color_component(channels[c].name);
+          exr_row_pack(channels[c], colors[c], matrix[component], windows.width, y0 + row, target);
+        } else {
+          exr_row_pack(channels[c], windows.width, y0 + row, target);
+        }
       }
       buffer.insert(channels[c].name, Imf::Slice::Make(exr_pixel_type(channels[c].type), packed[c].data(),
                                                        Imath::V2i(windows.crop_x, windows.crop_y + y0), windows.width,

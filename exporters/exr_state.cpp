@@ -157,7 +157,7 @@ void exr_write(const std::filesystem::path& path,
 
   const std::string text = json.dump();
   Imf::Header headers[] = {
-      exr_header_make(windows, channels, attributes, options.compression),
+      exr_header_make(windows, channels, attributes, options.compression, options.color_space),
       exr_header_make(windows, sums,
                       {{kFingerprint, state.fingerprint}, {kState, text}, {kHash, state_hash(text, state.sums)}},
                       ExrCompression::kNone)};
@@ -167,7 +167,7 @@ void exr_write(const std::filesystem::path& path,
   exr_file_write(path, [&](Imf::OStream& stream) {
     Imf::MultiPartOutputFile output(stream, headers, 2);
     Imf::OutputPart picture(output, 0), kept(output, 1);
-    exr_rows_write(picture, windows, channels);
+    exr_rows_write(picture, windows, channels, options.color_space);
     kept.setFrameBuffer(frame_buffer(state.sums.data(), num_sums, headers[1].dataWindow()));
     kept.writePixels(windows.height);
   });

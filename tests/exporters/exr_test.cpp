@@ -3,6 +3,7 @@
 #include <ImfChannelList.h>
 #include <ImfChromaticitiesAttribute.h>
 #include <ImfDoubleAttribute.h>
+#include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
 #include <ImfIntAttribute.h>
@@ -92,6 +93,73 @@ TEST_F(ExrTest, ValuesBeyondAHalfBecomeItsLargestAndNanStays)
   EXPECT_EQ(red[1], -65504.f);
   EXPECT_TRUE(std::isnan(red[2]));
   EXPECT_TRUE(std::isinf(red[3]));
+}
+
+TEST_F(ExrTest, ColoursOfAcescgHaveItsPrimariesInTheFileAndRec709InMemory)
+{
+  // From Rec.709 to ACEScg with Bradford's adaptation, as the Academy publishes it.
+  constexpr double kMatrix[3][3] = {
+      {0.613097, 0.339523, 0.047379}, {0.070194, 0.916354, 0.013452}, {0.020616, 0.109570, 0.869815}};
+  const TestFilm film(21, 300, 5);
+  exr_write(file("a.exr"), film.view, {}, {ExrCompression::kZip, true, ColorSpace::kAcescg});
+  Imf::InputFile input(file("a.exr").string().c_str());
+  const Imf::Chromaticities& found = Imf::chromaticities(input.header());
+  EXPECT_NEAR(found.green.y, 0.830f, 1e-6f);
+  EXPECT_NEAR(found.white.x, 0.32168f, 1e-6f);
+  for (const auto& [layer, aov] : {std::pair("", Aov::kBeauty), {"albedo.", Aov::kAlbedo}}) {
+    std::vector<float> stored[3];
+    Imf::FrameBuffer buffer;
+    for (std::size_t c = 0; c < 3; ++c) {
+      stored[c].resize(21 * 300);
+      buffer.insert(std::string(layer) + "RGB"[c],
+                    Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(stored[c].data()), 4, 4 * 21));
+    }
+    input.setFrameBuffer(buffer);
+    input.readPixels(0, 299);
+    for (int y = 0; y < 300; ++y) {
+      for (int x = 0; x < 21; ++x) {
+        double sum = 0;
+        for (std::size_t c = 0; c < 3; ++c) sum += double{std::abs(film_value(film, aov, c, x, y))};
+        for (std::size_t c = 0; c < 3; ++c) {
+          double expected = 0;
+          for (std::size_t i = 0; i < 3; ++i) expected += kMatrix[c][i] * double{film_value(film, aov, i, x, y)};
+          // The published white of D65 is rounded otherwise than ours.
+          ASSERT_NEAR(stored[c][static_cast<std::size_t>(y * 21 + x)], expected, 2e-4 * sum) << layer << x << "," << y;
+        }
+      }
+    }
+  }
+  const Picture picture = exr_load(file("a.exr"));
+  for (const AovInfo& info : kAovInfo) {
+    for (std::size_t c = 0; c < info.channels.size(); ++c) {
+      const std::string name = channel_name(info, c);
+      const bool is_color = color_component(name).has_value();
+      for (int y = 0; y < 300; ++y) {
+        for (int x = 0; x < 21; ++x) {
+          double size = 0;
+          for (std::size_t i = 0; i < info.channels.size(); ++i) {
+            size = std::max(size, double{std::abs(film_value(film, info.aov, i, x, y))});
+          }
+          ASSERT_NEAR(picture.find(name)->values[static_cast<std::size_t>(y * 21 + x)],
+                      film_value(film, info.aov, c, x, y), is_color ? 2e-6 * size : 0)
+              << name;
+        }
+      }
+    }
+  }
+}
+
+TEST(ColorSpace, OnlyColoursAreConverted)
+{
+  for (const char* name : {"R", "G", "B", "albedo.R", "denoised.G", "caustic.B", "direct.R"}) {
+    EXPECT_TRUE(color_component(name)) << name;
+  }
+  for (const char* name : {"A", "variance.R", "half.G", "denoised_error.B", "denoising_half.R", "normal.X", "depth.Z",
+                           "CryptoObject00.R", "x.albedo.R", "RG", ""}) {
+    EXPECT_FALSE(color_component(name)) << name;
+  }
+  const ColorMatrix matrix = color_matrix(ColorSpace::kRec709, ColorSpace::kAcescg);
+  for (const auto& row : matrix) EXPECT_NEAR(row[0] + row[1] + row[2], 1, 1e-12);  // white stays white
 }
 
 TEST_F(ExrTest, DwaIsCloseAndSaysWhichLayersItDamages)
