@@ -236,6 +236,26 @@ TEST_F(FirstPictures, APictureOfNothingComesWithAWarningThatHelps)
   EXPECT_EQ(outcome.errors.find("no light reaches"), std::string::npos) << outcome.errors;
 }
 
+TEST_F(FirstPictures, SaysThatWhatGlowsLeavesTheRestDark)
+{
+  // What is near is lit, yet on the side that the camera does not see: a lamp behind a wall, that looks out a little.
+  GltfBuilder b = sunlit_square(1);
+  b.json["extensions"].erase("KHR_lights_punctual");
+  b.json["nodes"].back().erase("extensions");
+  b.json["cameras"][0]["orthographic"].update({{"xmag", 1}, {"ymag", 1}});
+  b.push("materials", {{"emissiveFactor", {1, 1, 1}}});
+  nlohmann::json lamp = b.json["meshes"][0];
+  lamp["primitives"][0]["material"] = 1;
+  b.push("meshes", lamp);
+  b.root_node({{"mesh", 1}, {"translation", {0.15, 0, -0.2}}});
+  const std::string scene = folder_.write("s.gltf", b.gltf()).string();
+  Outcome outcome = render(scene, file("a.exr"));
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_NE(outcome.errors.find("what glows is all its light"), std::string::npos) << outcome.errors;
+  outcome = render(scene, file("a.exr"), {"--environment", "studio"});
+  EXPECT_EQ(outcome.errors.find("what glows"), std::string::npos) << outcome.errors;
+}
+
 TEST_F(FirstPictures, TransparentPngsHaveCoverage)
 {
   const std::string scene = folder_.write("s.gltf", lit_square().gltf()).string();
