@@ -20,10 +20,16 @@ import numpy as np
 
 from .. import exr
 from . import color_space
-
-_FLOAT_SUFFIXES = {".exr", ".hdr"}
-_TIFF_SAMPLE_FORMAT, _TIFF_IEEE_FLOAT = 339, 3
-_TIFF_EXTRA_SAMPLES, _TIFF_ASSOCIATED = 338, 1
+from .image_header import (
+    file_head,
+    image_header,
+    is_associated_file,
+    is_float_file,
+    is_grey_file,
+    may_have_alpha,
+    png_is_opaque,
+    suffix,
+)
 
 #: Colour of an image that is missing.
 MISSING = (1.0, 0.0, 1.0)
@@ -142,9 +148,9 @@ class ImageExporter:
             return self._make_from_pixels(image, warn, associates)
         if packed is not None:
             # Cycles takes Blender's pixels, which of 16 bits are floats multiplied by alpha.
-            is_changed = image.is_float and not _is_float_file(packed[:4096], image.filepath) and has_transparency(image)
+            is_changed = image_header(image).is_float and not is_float_file(packed[:4096], image.filepath) and has_transparency(image)
             if not is_changed and self._means_the_same(image, packed[:4096], image.filepath, is_color):
-                uri = self._writer.write_file(_suffix(packed, image.filepath), packed)
+                uri = self._writer.write_file(suffix(packed, image.filepath), packed)
                 return self._note_alpha(uri, packed[:4096], image.filepath)
             return self._make_from_pixels(image, warn, associates)
         path = self._path(image, user)
@@ -158,7 +164,7 @@ class ImageExporter:
         return self._make_from_pixels(image, warn, associates)
 
     def _note_alpha(self, uri, first_bytes, path):
-        if _is_associated_file(first_bytes, path):
+        if is_associated_file(first_bytes, path):
             self._associated[uri] = True
         return uri
 
@@ -185,10 +191,10 @@ class ImageExporter:
 
         @param  encoded  whether it is told of floats that are sRGB
         """
-        if _suffix(first_bytes, path) is None:
+        if suffix(first_bytes, path) is None:
             return False
         meaning = color_space.meaning(image.colorspace_settings)
-        if _is_float_file(first_bytes, path) or not is_color:
+        if is_float_file(first_bytes, path) or not is_color:
             return meaning == "linear" or encoded and meaning == "srgb"
         return meaning == "srgb"
 
@@ -234,7 +240,7 @@ def is_encoded(image):
     """Whether an image's file has floats that are sRGB, of all things."""
     if image.source not in {"FILE", "SEQUENCE"} or image.is_dirty or image.packed_file is not None:
         return False
-    return color_space.meaning(image.colorspace_settings) == "srgb" and _is_float_file(_first_bytes(image), image.filepath)
+    return color_space.meaning(image.colorspace_settings) == "srgb" and is_float_file(file_head(image), image.filepath)
 
 
 def has_pixels_of_all_frames(image, is_color):
@@ -244,9 +250,9 @@ def has_pixels_of_all_frames(image, is_color):
     """
     if image.source != "SEQUENCE":
         return True
-    if is_color and not _is_float_file(_first_bytes(image), image.filepath):
+    if is_color and not is_float_file(file_head(image), image.filepath):
         return color_space.meaning(image.colorspace_settings) == "srgb"
-    return is_linear(image) and (is_color or _is_grey_file(_first_bytes(image)))
+    return is_linear(image) and (is_color or is_grey_file(file_head(image)))
 
 
 def reads_as_stored(image, is_color, uses_alpha):
@@ -257,7 +263,7 @@ def reads_as_stored(image, is_color, uses_alpha):
     """
     if not has_transparency(image):
         return True
-    if image.is_float or _is_associated_file(_first_bytes(image), image.filepath):
+    if image_header(image).is_float or is_associated_file(file_head(image), image.filepath):
         return False
     if image.alpha_mode == "NONE":
         return not uses_alpha
@@ -277,52 +283,59 @@ def has_transparency(image):
     """Whether an image has an alpha below one somewhere. Of images with several files nothing is known: perhaps."""
     # Blender's pixels are opaque where it is told to ignore alpha, of which the file may have made something.
     if image.source not in {"FILE", "GENERATED"} or image.alpha_mode == "NONE":
-        return _may_have_alpha(_first_bytes(image))
-    if image.channels != 4:
-        return False
-    path = bpy.path.abspath(image.filepath, library=image.library)
-    stamp = os.stat(path).st_mtime_ns if image.source == "FILE" and os.path.isfile(path) else None
-    key = (image.name_full, path, stamp, tuple(image.size))
-    if image.is_dirty or stamp is None or key not in _transparency:
-        if stamp is not None and not image.is_dirty and not _may_have_alpha(_first_bytes(image)):
-            _transparency[key] = False
+        return may_have_alpha(file_head(image))
+    if image.source == "FILE" and not image.is_dirty:
+        head = file_head(image)
+        if head and not may_have_alpha(head):
             return False
-        pixels = np.empty(image.size[0] * image.size[1] * 4, dtype=np.float32)
-        image.pixels.foreach_get(pixels)
-        _transparency[key] = bool((pixels[3::4] < 1).any())
+    key = None if image.is_dirty else _state_of(image)
+    if key is None or key not in _transparency:
+        _transparency[key] = _looks_transparent(image)
     return _transparency[key]
 
 
-def _first_bytes(image):
-    """Of an image's file, or of the first of several; empty without one."""
+def _state_of(image):
+    """What tells an image and its file; None: nothing does."""
+    if image.source != "FILE":
+        return None
+    if image.packed_file is not None:
+        return image.name_full, zlib.crc32(image.packed_file.data), image.packed_file.size
     path = bpy.path.abspath(image.filepath, library=image.library)
-    if not os.path.isfile(path):
+    return (image.name_full, path, os.stat(path).st_mtime_ns) if os.path.isfile(path) else None
+
+
+def _looks_transparent(image):
+    """Whether a pixel of an image has an alpha below one."""
+    if image.source == "FILE" and not image.is_dirty:
+        is_opaque = png_is_opaque(_file_bytes(image))
+        if is_opaque is not None:
+            return not is_opaque
+    if image.channels != 4:
+        return False
+    pixels = np.empty(image.size[0] * image.size[1] * 4, dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    return bool((pixels[3::4] < 1).any())
+
+
+def _file_bytes(image):
+    """Bytes of an image's PNG, packed or not; empty of other files."""
+    if not file_head(image).startswith(b"\x89PNG"):
         return b""
-    with open(path, "rb") as file:
-        return file.read(4096)
-
-
-def _may_have_alpha(first_bytes):
-    """Whether a file can have transparent pixels, by its first bytes."""
-    if first_bytes.startswith(b"\x89PNG"):
-        return first_bytes[25] & 4 != 0 or b"tRNS" in first_bytes or first_bytes[25] == 3
-    return not first_bytes.startswith((b"\xff\xd8", b"#?"))
+    if image.packed_file is not None:
+        return image.packed_file.data
+    with open(bpy.path.abspath(image.filepath, library=image.library), "rb") as file:
+        return file.read()
 
 
 def _is_grey(image):
     """Whether all colours of an image are equal: its pixels are looked at, unless its file cannot have others."""
-    first = b"" if image.is_dirty or image.packed_file is not None else _first_bytes(image)
-    if _is_grey_file(first) or image.source == "SEQUENCE" or image.channels < 3:
+    first = b"" if image.is_dirty else file_head(image)
+    if is_grey_file(first) or image.source == "SEQUENCE" or image.channels < 3:
         return True
     pixels = np.empty(image.size[0] * image.size[1] * image.channels, dtype=np.float32)
     image.pixels.foreach_get(pixels)
     pixels = pixels.reshape(-1, image.channels)
     return bool((pixels[:, 0] == pixels[:, 1]).all() and (pixels[:, 0] == pixels[:, 2]).all())
-
-
-def _is_grey_file(first_bytes):
-    """Whether a file has no colours, by its first bytes; of other formats than PNG nothing is known."""
-    return first_bytes.startswith(b"\x89PNG") and first_bytes[25] in {0, 4}
 
 
 def _one_texel_png(color):
@@ -339,59 +352,4 @@ def _one_texel_png(color):
 def _packed_bytes(image):
     if image.packed_file is not None:
         return image.packed_file.data
-    return None
-
-
-def _suffix(data, name):
-    """Suffix of a file, by its first bytes, as the program sees them; None for what it does not read."""
-    for start, suffix in (
-        (b"\x89PNG", ".png"),
-        (b"\xff\xd8", ".jpg"),
-        (b"v/1\x01", ".exr"),
-        (b"#?", ".hdr"),
-        (b"II*\0", ".tif"),
-        (b"MM\0*", ".tif"),
-        (b"BM", ".bmp"),
-    ):
-        if data.startswith(start):
-            return suffix
-    if data.startswith(b"RIFF") and data[8:12] == b"WEBP":
-        return ".webp"
-    return ".tga" if os.path.splitext(name)[1].lower() == ".tga" else None
-
-
-def _is_float_file(first_bytes, path):
-    suffix = _suffix(first_bytes, path)
-    if suffix == ".tif":
-        return _tiff_is_float(first_bytes)
-    return suffix in _FLOAT_SUFFIXES
-
-
-def _is_associated_file(first_bytes, path):
-    """Whether a file's colours are multiplied by its alpha."""
-    suffix = _suffix(first_bytes, path)
-    if suffix == ".tif":
-        return _tiff_value(first_bytes, _TIFF_EXTRA_SAMPLES) == _TIFF_ASSOCIATED
-    # OpenImageIO, and so Cycles, takes WebP's colours for multiplied, which they are not.
-    return suffix in _FLOAT_SUFFIXES or suffix == ".webp"
-
-
-def _tiff_is_float(data):
-    return _tiff_value(data, _TIFF_SAMPLE_FORMAT) == _TIFF_IEEE_FLOAT
-
-
-def _tiff_value(data, wanted):
-    """The first number of a TIFF's tag; None: it has none, or its directory is beyond the bytes at hand.
-
-    @source  TIFF 6.0, sections 2, 18 (ExtraSamples) and 19 (SampleFormat)
-    """
-    order = "<" if data.startswith(b"II") else ">"
-    (directory,) = struct.unpack_from(order + "I", data, 4)
-    if directory + 2 > len(data):
-        return None
-    (count,) = struct.unpack_from(order + "H", data, directory)
-    for entry in range(directory + 2, min(directory + 2 + 12 * count, len(data) - 11), 12):
-        tag, _, number, value = struct.unpack_from(order + "HHIH", data, entry)
-        if tag == wanted and number <= 2:
-            return value
     return None

@@ -14,6 +14,7 @@ import numpy as np
 
 from . import nodes
 from .image import MISSING, has_pixels_of_all_frames, is_linear, is_encoded, reads_as_stored
+from .image_header import image_header
 
 #: glTF's wrap modes by Blender's extension.
 _WRAP = {"REPEAT": 10497, "EXTEND": 33071, "CLIP": 33071, "MIRROR": 33648}
@@ -278,7 +279,7 @@ def image_options(node, writer, images, warn):
     image = node.image
     is_data = image.colorspace_settings.is_data
     is_opaque = image.alpha_mode == "NONE"
-    is_separate = is_data or image.alpha_mode == "CHANNEL_PACKED" or image.source == "FILE" and image.channels not in {2, 4}
+    is_separate = is_data or image.alpha_mode == "CHANNEL_PACKED" or image.source == "FILE" and image_header(image).channels not in {2, 4}
     associates = not (is_opaque or is_separate or uses_alpha(node))
     texture = Texture(node, None, Mapping())
 
@@ -291,7 +292,7 @@ def image_options(node, writer, images, warn):
         if associates and not is_multiplied:
             options["alpha"] = "straight"
         return {**options, "texture": info(uri)}
-    is_multiplied = image.is_float and image.alpha_mode == "PREMUL"
+    is_multiplied = image_header(image).is_float and image.alpha_mode == "PREMUL"
     if image.source == "TILED":
         uris = images.tile_uris(image, not is_linear(image), warn)
         tiles = [{"tile": number, "texture": info(uri), **options} for number, uri in sorted(uris.items())]
