@@ -47,6 +47,7 @@ class Contender:
     engine: str  # as bpy calls it
     binary: str  # of relief; "" for Cycles
     scripts: str  # folder with addons/relief
+    forced: tuple  # pairs of scene.relief's properties and values
     identity: str  # hash of all that its pictures depend on
 
 
@@ -64,7 +65,7 @@ class Setting:
 def scene_functions():
     """Source text of each scene of scenes.py and more_scenes.py by name, in their order; of all else there, by ""."""
     functions, others = {}, ""
-    for name in ("scenes.py", "stage.py", os.path.join("..", "cycles", "node_tree.py")):
+    for name in ("scenes.py", "more_scenes.py", "stage.py", os.path.join("..", "cycles", "node_tree.py")):
         with open(os.path.join(_FOLDER, name), encoding="utf-8") as file:
             source = file.read()
         for node in ast.parse(source).body:
@@ -101,7 +102,7 @@ class Bench:
         self.options = options
         self.version = ".".join(map(str, blender_version(options.blender)))
         addon = os.path.join(_ROOT, "blender_addon", "relief")
-        cycles = Contender("Cycles", "CYCLES", "", self._scripts(scratch, "cycles", addon), _hash(self.version))
+        cycles = Contender("Cycles", "CYCLES", "", self._scripts(scratch, "cycles", addon), (), _hash(self.version))
         self.contenders = [] if options.no_cycles else [cycles]
         self._builder = cycles
         for i, word in enumerate(options.relief):
@@ -113,9 +114,12 @@ class Bench:
             own = os.path.join(binary, "..", "..", "..", "..", "blender_addon", "relief")
             folder = os.path.normpath(own) if os.path.isdir(os.path.normpath(own)) else addon
             scripts = self._scripts(scratch, f"relief{i}", folder)
-            identity = _hash(self.version, _hash_files(binary), _hash_files(folder), options.caustics)
             label = label or ("relief" if len(options.relief) == 1 else f"relief {i + 1}")
-            self.contenders.append(Contender(label, "RELIEF", binary, scripts, identity))
+            for caustics in options.caustics:
+                forced = (("caustics", caustics),) if caustics else ()
+                identity = _hash(self.version, _hash_files(binary), _hash_files(folder), forced)
+                named = f"{label}, caustics {caustics}" if caustics else label
+                self.contenders.append(Contender(named, "RELIEF", binary, scripts, forced, identity))
         self._scratch = scratch
 
     @staticmethod
@@ -152,9 +156,8 @@ class Bench:
     def press(self, contender, blend, setting, seed, output):
         """One F12; {"processor_seconds", "wall_seconds", "peak_memory_bytes"}, and output.exr and output.png."""
         options = self.options
-        forced = {"caustics": options.caustics} if options.caustics else {}
         job = {"blend": blend, "engine": contender.engine, "seed": seed, "resolution": options.resolution, "output": output}
-        job |= {"threads": options.threads, "relief": forced, **dataclasses.asdict(setting)}
+        job |= {"threads": options.threads, "relief": dict(contender.forced), **dataclasses.asdict(setting)}
         path = os.path.join(self._scratch, "job.json")
         with open(path, "w", encoding="utf-8") as file:
             json.dump(job, file)
@@ -188,7 +191,7 @@ class Bench:
                 # In turns, the first one too: whatever else the machine does hits all alike.
                 for contender in self.contenders if seed % 2 else self.contenders[::-1]:
                     key = (setting, contender)
-                    part = f"{stem}_{setting}_{contender.label}_{seed}".replace(" ", "_")
+                    part = f"{stem}_{setting}_{contender.label}_{seed}".replace(", ", "_").replace(" ", "_")
                     output = os.path.join(options.output, part)
                     costs.setdefault(key, []).append(self.press(contender, blend, setting, seed, output))
                     files.setdefault(key, []).append(part)
@@ -275,7 +278,8 @@ def _parse(arguments, names):
                         help="samples of an engine's own reference; 0: none, noise by the seeds' spread (default: 1024)")
     parser.add_argument("--relief", action="append", metavar="[LABEL=]BINARY",
                         help="one or more to compare, each with the add-on of its tree (default: this tree's build/release)")
-    parser.add_argument("--caustics", choices=("auto", "on", "off"), help="relief's setting in all scenes")
+    parser.add_argument("--caustics", type=lambda text: text.split(","), default=[None], metavar="LIST",
+                        help="relief's setting in all scenes, of auto, on and off; several: relief with each")
     parser.add_argument("--no-cycles", action="store_true", help="the first relief is what the others are set beside")
     parser.add_argument("--threads", type=int, default=os.cpu_count(), help="default: all")
     parser.add_argument("--blender", default="blender")

@@ -17,20 +17,10 @@ import bpy
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
+import more_scenes  # noqa: E402
 import stage  # noqa: E402
 from stage import NodeTree  # noqa: E402
 
-WHITE, BLACK = (0.8, 0.8, 0.8), (0.02, 0.02, 0.02)
-
-
-def _wood(name="wood"):
-    return stage.mottled(
-        name, (0.16, 0.07, 0.03), (0.38, 0.2, 0.09), scale=2.0, roughness=(0.25, 0.5), stretch=(1, 12, 1)
-    )
-
-
-def _plaster(name="wall", color=(0.75, 0.72, 0.66)):
-    return stage.plastic(name, color, 0.8)
 
 
 def monkeys():
@@ -54,7 +44,7 @@ _GOBLET += [(0.39, 1.1), (0.28, 0.78), (0.001, 0.62)]
 
 def still_life():
     stage.begin((0.2, 0.22, 0.25), 0.5)
-    stage.add("plane", _wood("table"), size=8)
+    stage.add("plane", stage.wood("table"), size=8)
     stage.turned(stage.glass(), _GOBLET, (-0.9, 0.2, 0.0))
     stage.add("uv_sphere", stage.glass("ball", (0.9, 1, 0.95)), (0.1, -0.7, 0.35), radius=0.35, segments=48, ring_count=24)
     kettle = [(0.001, 0), (0.5, 0.0), (0.62, 0.2), (0.6, 0.5), (0.4, 0.8), (0.15, 0.9), (0.08, 1.0), (0.001, 1.03)]
@@ -64,51 +54,18 @@ def still_life():
     apple = stage.mottled("apple", (0.5, 0.03, 0.02), (0.6, 0.3, 0.05), roughness=(0.2, 0.35), bump=False)
     stage.add("uv_sphere", apple, (1.1, -0.6, 0.3), (1, 1, 0.9), radius=0.33)
     stage.add("uv_sphere", apple, (0.7, -1.0, 0.27), (1, 1, 0.9), radius=0.3)
-    stage.box(_plaster("book", (0.1, 0.15, 0.3)), (-2, 0.6, 0), (-1.1, 1.6, 0.2))
+    stage.box(stage.plaster("book", (0.1, 0.15, 0.3)), (-2, 0.6, 0), (-1.1, 1.6, 0.2))
     stage.lamp("AREA", (-2.5, -1.5, 3.5), (0, 0, 0.3), 160.0, size=1.2)
     stage.lamp("AREA", (3.0, 1.0, 2.0), (0, 0, 0.4), 40.0, size=0.8, color=(1, 0.8, 0.6))
     stage.camera((0, -5.2, 2.0), (0, 0, 0.5), 60)
 
 
-def _room_shell(wall, floor, width=5.0, depth=6.0, height=2.7, window=(1.2, 3.6, 0.9, 2.2)):
-    """A room about (0, 0) with a window in its left wall: from and to along y (from the front), and in height."""
-    x, near, far = width / 2, -depth / 2, depth / 2
-    stage.box(floor, (-x, near, -0.1), (x, far, 0), 0)
-    stage.box(wall, (-x - 0.2, near, height), (x + 0.2, far, height + 0.2), 0)
-    stage.box(wall, (-x - 0.2, far, 0), (x + 0.2, far + 0.2, height), 0)
-    stage.box(wall, (-x - 0.2, near - 0.2, 0), (x + 0.2, near, height), 0)
-    stage.box(wall, (x, near, 0), (x + 0.2, far, height), 0)
-    y0, y1, z0, z1 = near + window[0], near + window[1], window[2], window[3]
-    for low, high in (((near, 0), (y0, height)), ((y1, 0), (far, height)), ((y0, 0), (y1, z0)), ((y0, z1), (y1, height))):
-        stage.box(wall, (-x - 0.2, *low), (-x, *high), 0)
-
-
-def _furniture(cloth, wood):
-    """A sofa, a table and a shelf with books, for rooms of _room_shell."""
-    stage.box(cloth, (0.9, 0.2, 0.12), (2.3, 2.4, 0.45), 0.06)
-    stage.box(cloth, (1.9, 0.2, 0.4), (2.35, 2.4, 0.9), 0.08)
-    for y in (0.1, 2.25):
-        stage.box(cloth, (0.9, y, 0.12), (2.3, y + 0.25, 0.65), 0.06)
-    stage.box(wood, (-0.6, 0.5, 0.38), (0.5, 1.7, 0.43))
-    for x in (-0.55, 0.4):
-        for y in (0.55, 1.6):
-            stage.box(wood, (x, y, 0), (x + 0.06, y + 0.06, 0.38), 0.005)
-    chance = random.Random(3)
-    for level in range(3):
-        stage.box(wood, (-1.8, 2.65, 0.6 + 0.5 * level), (0.2, 2.98, 0.64 + 0.5 * level), 0.005)
-        x = -1.75
-        while x < 0.0:
-            thick, high = chance.uniform(0.03, 0.08), chance.uniform(0.22, 0.36)
-            book = stage.plastic("book", [chance.uniform(0.03, 0.6) for _ in range(3)], 0.6)
-            stage.box(book, (x, 2.7, 0.64 + 0.5 * level), (x + thick, 2.95, 0.64 + 0.5 * level + high), 0)
-            x += thick + chance.uniform(0.002, 0.03)
-
-
 def room():
     stage.begin((0.55, 0.7, 1.0), 4.0)
-    _room_shell(_plaster("wall", (0.8, 0.79, 0.76)), _wood("floor"), window=(1.0, 4.4, 0.7, 2.3))
-    _furniture(stage.plastic("sofa", (0.25, 0.3, 0.35), 0.9, Sheen=0.5), _wood())
-    stage.turned(_plaster("vase", (0.8, 0.8, 0.85)), [(0.001, 0), (0.08, 0), (0.13, 0.15), (0.05, 0.3), (0.07, 0.34)], (0, 1, 0.43))
+    stage.room_shell(stage.plaster("wall", (0.8, 0.79, 0.76)), stage.wood("floor"), window=(1.0, 4.4, 0.7, 2.3))
+    stage.furniture(stage.plastic("sofa", (0.25, 0.3, 0.35), 0.9, Sheen=0.5), stage.wood())
+    vase = [(0.001, 0), (0.08, 0), (0.13, 0.15), (0.05, 0.3), (0.07, 0.34)]
+    stage.turned(stage.plaster("vase", (0.8, 0.8, 0.85)), vase, (0, 1, 0.43))
     frame = stage.metal("frame", (0.8, 0.7, 0.5), 0.3)
     stage.box(frame, (2.44, 0.6, 1.3), (2.49, 1.9, 2.2), 0.01)
     stage.box(stage.mottled("picture", (0.1, 0.2, 0.5), (0.7, 0.5, 0.2), bump=False), (2.43, 0.65, 1.35), (2.45, 1.85, 2.15), 0)
@@ -120,9 +77,9 @@ def room():
 
 def lamps():
     stage.begin((0.02, 0.03, 0.05), 1.0)
-    wood, dark = _wood("desk"), stage.plastic("black", BLACK, 0.3)
+    wood, dark = stage.wood("desk"), stage.plastic("black", stage.BLACK, 0.3)
     stage.box(wood, (-1.6, -0.6, -0.06), (1.6, 0.8, 0))
-    stage.box(_plaster(), (-4, 1.2, -2), (4, 1.3, 3), 0)
+    stage.box(stage.plaster(), (-4, 1.2, -2), (4, 1.3, 3), 0)
     stage.box(dark, (-0.55, 0.25, 0.1), (0.55, 0.29, 0.75), 0.01)
     stage.box(stage.glowing("screen", (0.3, 0.5, 1.0), 2.0), (-0.5, 0.24, 0.14), (0.5, 0.252, 0.71), 0)
     stage.box(dark, (-0.4, -0.3, 0), (0.4, -0.1, 0.02), 0.005)
@@ -146,7 +103,7 @@ def doughnuts():
     chance = random.Random(5)
     stage.add("plane", stage.checked("cloth", (0.7, 0.7, 0.7), (0.6, 0.15, 0.15), 4.0, 0.8), size=8)
     plate = [(0.001, 0.02), (0.9, 0.02), (1.5, 0.2), (1.52, 0.18), (0.9, 0.0), (0.001, 0)]
-    stage.turned(stage.plastic("plate", WHITE, 0.1), plate, steps=64)
+    stage.turned(stage.plastic("plate", stage.WHITE, 0.1), plate, steps=64)
     dough = stage.mottled("dough", (0.45, 0.2, 0.06), (0.7, 0.4, 0.15), scale=8.0, roughness=(0.6, 0.9))
     colors = ((0.75, 0.25, 0.35), (0.15, 0.05, 0.02), (0.8, 0.75, 0.6))
     crumbs = [stage.plastic("crumb", c, 0.4) for c in ((0.9, 0.8, 0.1), (0.1, 0.5, 0.8), (0.9, 0.9, 0.9))]
@@ -200,7 +157,7 @@ def pavilion():
             stage.box(pane, (x + 0.09, y - 0.01, 0.3), (x + 3.55, y + 0.01, 3.3), 0)
     for x in (-5.5, 5.5):
         stage.box(pane, (x - 0.01, -3.4, 0.3), (x + 0.01, 3.4, 3.3), 0)
-    leather, wood = stage.plastic("leather", (0.15, 0.06, 0.03), 0.4), _wood()
+    leather, wood = stage.plastic("leather", (0.15, 0.06, 0.03), 0.4), stage.wood()
     for x in (-3, 2.2):
         stage.box(leather, (x, -0.5, 0.5), (x + 1.2, 0.6, 0.75), 0.05)
         stage.box(leather, (x, 0.45, 0.7), (x + 1.2, 0.7, 1.2), 0.05)
@@ -258,7 +215,8 @@ def _car(paint, dark, tint, rim):
     """A car along x: a body under a Subdivision modifier, a cabin of tinted glass, four wheels."""
     sections = ((-2.1, 0.45, 0.55, 0.7), (-1.9, 0.35, 0.85, 0.85), (-0.9, 0.3, 0.95, 0.9), (0.9, 0.3, 0.9, 0.9))
     sections += ((1.9, 0.35, 0.75, 0.85), (2.15, 0.45, 0.6, 0.7))
-    for material, rings in ((paint, sections), (tint, ((-1.5, 0.85, 0.95, 0.75), (-0.7, 0.8, 1.4, 0.68), (0.3, 0.8, 1.42, 0.68), (1.1, 0.8, 0.92, 0.75)))):
+    cabin = ((-1.5, 0.85, 0.95, 0.75), (-0.7, 0.8, 1.4, 0.68), (0.3, 0.8, 1.42, 0.68), (1.1, 0.8, 0.92, 0.75))
+    for material, rings in ((paint, sections), (tint, cabin)):
         points, faces = [], []
         for x, low, high, half in rings:
             points += [(x, -half, low), (x, half, low), (x, half, high), (x, -half, high)]
@@ -287,7 +245,7 @@ def car():
     stage.backdrop(stage.plastic("backdrop", (0.5, 0.5, 0.5), 0.6), 14, 6, 6, 2.0)
     paint = stage.plastic("paint", (0.6, 0.02, 0.02), 0.35, Metallic=0.6, Clearcoat=1.0)
     tint = stage.plastic("tint", (0.3, 0.35, 0.35), 0.0, Transmission=0.9)
-    _car(paint, stage.plastic("rubber", BLACK, 0.8), tint, stage.metal("rim", (0.9, 0.9, 0.9), 0.2))
+    _car(paint, stage.plastic("rubber", stage.BLACK, 0.8), tint, stage.metal("rim", (0.9, 0.9, 0.9), 0.2))
     stage.lamp("AREA", (0, 0, 5), (0, 0, 0), 400.0, shape="RECTANGLE", size=5, size_y=2)
     stage.lamp("AREA", (5, -4, 3), (0, 0, 0.5), 150.0, size=2)
     stage.lamp("AREA", (-6, -2, 2), (0, 0, 0.5), 100.0, size=2, color=(0.7, 0.8, 1))
@@ -296,6 +254,7 @@ def car():
 
 #: By name, in the order of the tables.
 SCENES = {f.__name__: f for f in (monkeys, still_life, room, lamps, doughnuts, landscape, pavilion, pebbles, neon, car)}
+SCENES |= more_scenes.SCENES
 
 
 def main(folder, names):

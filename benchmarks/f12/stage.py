@@ -5,6 +5,7 @@ All of Blender's settings stay as a new file has them. Lengths are metres; colou
 
 import math
 import os
+import random
 import sys
 
 import bpy
@@ -17,6 +18,8 @@ sys.path[:0] = [os.path.join(_ROOT, "tests", "blender"), os.path.join(_ROOT, "be
 
 from node_tree import NodeTree  # noqa: E402
 from scenes import LINEAR, link, new_image  # noqa: E402
+
+WHITE, BLACK = (0.8, 0.8, 0.8), (0.02, 0.02, 0.02)
 
 
 def begin(color=(0.05, 0.05, 0.05), strength=1.0):
@@ -226,3 +229,47 @@ def backdrop(material, width=12.0, depth=6.0, height=5.0, radius=1.5):
     mesh.polygons.foreach_set("use_smooth", [True] * len(faces))
     mesh.materials.append(material)
     return link(mesh, "backdrop")
+
+
+def wood(name="wood"):
+    return mottled(
+        name, (0.16, 0.07, 0.03), (0.38, 0.2, 0.09), scale=2.0, roughness=(0.25, 0.5), stretch=(1, 12, 1)
+    )
+
+
+def plaster(name="wall", color=(0.75, 0.72, 0.66)):
+    return plastic(name, color, 0.8)
+
+
+def room_shell(wall, floor, width=5.0, depth=6.0, height=2.7, window=(1.2, 3.6, 0.9, 2.2)):
+    """A room about (0, 0) with a window in its left wall: from and to along y (from the front), and in height."""
+    x, near, far = width / 2, -depth / 2, depth / 2
+    box(floor, (-x, near, -0.1), (x, far, 0), 0)
+    box(wall, (-x - 0.2, near, height), (x + 0.2, far, height + 0.2), 0)
+    box(wall, (-x - 0.2, far, 0), (x + 0.2, far + 0.2, height), 0)
+    box(wall, (-x - 0.2, near - 0.2, 0), (x + 0.2, near, height), 0)
+    box(wall, (x, near, 0), (x + 0.2, far, height), 0)
+    y0, y1, z0, z1 = near + window[0], near + window[1], window[2], window[3]
+    for low, high in (((near, 0), (y0, height)), ((y1, 0), (far, height)), ((y0, 0), (y1, z0)), ((y0, z1), (y1, height))):
+        box(wall, (-x - 0.2, *low), (-x, *high), 0)
+
+
+def furniture(cloth, wood):
+    """A sofa, a table and a shelf with books, for rooms of room_shell."""
+    box(cloth, (0.9, 0.2, 0.12), (2.3, 2.4, 0.45), 0.06)
+    box(cloth, (1.9, 0.2, 0.4), (2.35, 2.4, 0.9), 0.08)
+    for y in (0.1, 2.25):
+        box(cloth, (0.9, y, 0.12), (2.3, y + 0.25, 0.65), 0.06)
+    box(wood, (-0.6, 0.5, 0.38), (0.5, 1.7, 0.43))
+    for x in (-0.55, 0.4):
+        for y in (0.55, 1.6):
+            box(wood, (x, y, 0), (x + 0.06, y + 0.06, 0.38), 0.005)
+    chance = random.Random(3)
+    for level in range(3):
+        box(wood, (-1.8, 2.65, 0.6 + 0.5 * level), (0.2, 2.98, 0.64 + 0.5 * level), 0.005)
+        x = -1.75
+        while x < 0.0:
+            thick, high = chance.uniform(0.03, 0.08), chance.uniform(0.22, 0.36)
+            book = plastic("book", [chance.uniform(0.03, 0.6) for _ in range(3)], 0.6)
+            box(book, (x, 2.7, 0.64 + 0.5 * level), (x + thick, 2.95, 0.64 + 0.5 * level + high), 0)
+            x += thick + chance.uniform(0.002, 0.03)

@@ -69,6 +69,13 @@ class Runs(unittest.TestCase):
             again = {path: path.stat().st_mtime_ns for path in pathlib.Path(folder).rglob("references/*.exr")}
             self.assertEqual(again, references)
 
+    def test_every_scene_can_be_made(self):
+        names = {name for name in run.scene_functions() if name}
+        with tempfile.TemporaryDirectory() as folder:
+            command = [BLENDER, "-b", "--factory-startup", "--addons", "relief", "--python-exit-code", "9"]
+            subprocess.run([*command, "--python", str(_RUN.parent / "scenes.py"), "--", folder], check=True, stdout=subprocess.DEVNULL)
+            self.assertEqual({path.stem for path in pathlib.Path(folder).glob("*.blend")}, names)
+
     def test_what_is_no_scene_is_said(self):
         done = subprocess.run([str(_RUN), "nothing"], capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, 2)
