@@ -51,7 +51,7 @@ struct Bench {
         options(std::move(chosen)),
         film(options.settings.width, options.settings.height, options.aov_mask)
   {
-    blackman_harris_table_make(filter);
+    pixel_filter_table_make(options.settings.filter, filter);
     globals = render_globals(context, options, filter);
     globals.film = film.accumulator();
   }
@@ -86,9 +86,8 @@ RayLists record_rays(const Bench& bench)
     const Batch batch = bench.batch(tile, 1);
     wavefront.run(bench.globals, *bench.context.accel, stage_table_select(), bench.context.surface_kernel, batch);
     for (std::size_t i = 0; i < rays.size(); ++i) {
-      const RayKind kind = rays[i].shadow          ? RayKind::kShadow
-                           : i < batch.num_paths() ? RayKind::kCamera
-                                                   : RayKind::kBounce;
+      const bool is_camera = i < static_cast<std::size_t>(batch.width * batch.height);
+      const RayKind kind = rays[i].shadow ? RayKind::kShadow : is_camera ? RayKind::kCamera : RayKind::kBounce;
       lists[static_cast<std::size_t>(kind)].push_back(rays[i]);
     }
   }

@@ -27,8 +27,9 @@ constexpr std::string_view kUncounted[] = {"--help",       "scene",        "--fr
 // Options that do nothing but change one of the RenderSettings, which count as they come out. So it is one whether the scene says
 // something, the command line, or nobody.
 constexpr std::string_view kDeclared[] = {
-    "--resolution", "--spp",  "--seed",     "--max-bounces",     "--caustics",
-    "--filter",     "--view", "--exposure", "--noise-threshold", "--luminous-efficacy"};
+    "--resolution",   "--spp",  "--seed",     "--max-bounces",     "--caustics",
+    "--filter",       "--view", "--exposure", "--noise-threshold", "--luminous-efficacy",
+    "--filter-glossy"};
 // Only whether they are given counts, and not where the files are.
 constexpr std::string_view kOutputs[] = {"--output", "--png", "--stats", "--report"};
 

@@ -72,12 +72,14 @@ std::vector<CLI::Option*> add_ray_options(CLI::App& command, PictureOptions& opt
 
 std::vector<CLI::Option*> add_picture_options(CLI::App& command, PictureOptions& options)
 {
-  constexpr SettingInfo kSamples = setting_info("samples"), kBounces = setting_info("maxBounces");
+  constexpr SettingInfo kSamples = setting_info("samples"), kBounces = setting_info("maxBounces"),
+                        kFilterGlossy = setting_info("filterGlossy");
   const auto point = [](const char* option) {
     return [option](const std::string& text) { return parse_point(option, text); };
   };
-  CLI::Option* camera =
-      command.add_option("--camera", options.camera, "Name of the camera, its number from 0, or auto: one that shows everything (default: the first)");
+  CLI::Option* camera = command.add_option(
+      "--camera", options.camera,
+      "Name of the camera, its number from 0, or auto: one that shows everything (default: the first)");
   CLI::Option* file =
       command.add_option("--camera-from", options.camera_from, "Scene file whose cameras there are instead");
   CLI::Option* from =
@@ -108,6 +110,8 @@ std::vector<CLI::Option*> add_picture_options(CLI::App& command, PictureOptions&
                       "Frames that the shutter is open for motion blur; 0 is off (default: the camera's)")
           ->check(number(0, kLongestShutter)),
       add_choice(command, "--filter", options.filter, setting_info("pixelFilter.type")),
+      command.add_option("--filter-glossy", options.filter_glossy, setting_help(kFilterGlossy))
+          ->check(setting_check(kFilterGlossy)),
   };
 }
 
@@ -132,6 +136,7 @@ RenderOptions render_options(const Scene& scene, const PictureOptions& given, co
     settings.filter = *given.filter;
     settings.filter_width = pixel_filter_width(*given.filter);
   }
+  if (given.filter_glossy >= 0) settings.filter_glossy = static_cast<float>(given.filter_glossy);
   if (given.caustics) settings.caustics.mode = *given.caustics;
   const SceneCamera& camera = cameras[camera_index(cameras, given.camera)];
   options.camera = camera_for_image(camera, given, settings.width, settings.height);

@@ -25,6 +25,7 @@ struct PictureOptions {
   std::optional<std::uint64_t> seed;
   std::optional<CausticsMode> caustics;
   std::optional<PixelFilter> filter;
+  double filter_glossy = -1;  ///< negative: the scene's
   DisplacementOptions displacement;
 };
 

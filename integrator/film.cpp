@@ -9,13 +9,14 @@
 #include <string>
 #include <utility>
 
+#include "kernel/assert.h"
 #include "scene/memory.h"
 
 namespace relief {
 
 namespace {
 
-AccumulatorLayout layout_make(std::uint32_t aov_mask, int cryptomatte_levels, bool keeps_clear)
+AccumulatorLayout layout_make(std::uint32_t aov_mask, int cryptomatte_levels, bool keeps_clear, bool counts_samples)
 {
   AccumulatorLayout layout;
   layout.cryptomatte_levels = cryptomatte_levels;
@@ -45,6 +46,10 @@ AccumulatorLayout layout_make(std::uint32_t aov_mask, int cryptomatte_levels, bo
   keep(Aov::kDenoisingDepth, 1, layout.denoising_depth);
   keep(Aov::kDenoisingHalf, 7, layout.denoising_half);
   if (keeps_clear) layout.clear = layout.num_floats++;
+  if (counts_samples) {
+    layout.samples = layout.num_floats;
+    layout.num_floats += 2;
+  }
   layout.denoising = layout.denoising_albedo >= 0 || layout.denoising_normal >= 0 || layout.denoising_half >= 0;
   for (int i = 0; i < kNumCryptomattes; ++i) {
     keep(static_cast<Aov>(kFirstCryptomatte + i), 2 * cryptomatte_levels, layout.cryptomatte[i]);
@@ -166,13 +171,13 @@ static std::size_t sums_size(int width, int height, const AccumulatorLayout& lay
   return size;
 }
 
-Film::Film(int width, int height, std::uint32_t aov_mask, int cryptomatte_levels, bool keeps_clear)
+Film::Film(int width, int height, std::uint32_t aov_mask, int cryptomatte_levels, bool keeps_clear, bool counts_samples)
     : width_(width),
       height_(height),
       tiles_x_((width + kTileSize - 1) / kTileSize),
       tiles_y_((height + kTileSize - 1) / kTileSize),
       aov_mask_(aov_mask | 1u << static_cast<int>(Aov::kBeauty)),
-      layout_(layout_make(aov_mask_, cryptomatte_levels, keeps_clear)),
+      layout_(layout_make(aov_mask_, cryptomatte_levels, keeps_clear, counts_samples)),
       sums_(sums_size(width, height, layout_)),
       samples_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_))
 {
@@ -208,7 +213,13 @@ double Film::mean_samples() const
   for (int tile = 0; tile < num_tiles(); ++tile) {
     int x0, y0, w, h;
     tile_rect(tile, &x0, &y0, &w, &h);
-    sum += static_cast<double>(tile_samples(tile)) * w * h;
+    if (layout_.samples < 0) {
+      sum += static_cast<double>(tile_samples(tile)) * w * h;
+      continue;
+    }
+    for (int y = y0; y < y0 + h; ++y) {
+      for (int x = x0; x < x0 + w; ++x) sum += pixel_samples(record(x, y), tile);
+    }
   }
   return sum / (static_cast<double>(width_) * height_);
 }
@@ -244,54 +255,64 @@ void Film::put_back_tile_sums(int tile, const std::vector<float>& sums)
     std::copy_n(sums.begin() + y * row, row, sums_.begin() + (record(x0, y0 + y) - sums_.data()));
 }
 
-void Film::tile_variances(int tile, Vec3f* extrapolated, Vec3f* by_samples) const
+std::uint32_t Film::pixel_samples(const float* record, int tile) const
 {
-  int x0, y0, w, h;
-  tile_rect(tile, &x0, &y0, &w, &h);
-  Vec3f d1, d2;
-  *by_samples = {};
-  for (int y = y0; y < y0 + h; ++y) {
-    for (int x = x0; x < x0 + w; ++x) {
-      const PixelEstimate pixel = pixel_estimate(record(x, y), tile_samples(tile));
-      d1 += pixel.d1;
-      d2 += pixel.d2;
-      *by_samples += pixel.sample_variance;
-    }
-  }
-  const auto channel = [](float a, float b) { return static_cast<float>(error_extrapolate(a, b)); };
-  *extrapolated = {channel(d1.x, d2.x), channel(d1.y, d2.y), channel(d1.z, d2.z)};
+  return layout_.samples >= 0 ? static_cast<std::uint32_t>(record[layout_.samples]) : tile_samples(tile);
 }
 
-double Film::tile_error(int tile, double floor) const
+bool Film::is_noisy(const float* record, int tile, const NoiseRule& rule) const
 {
-  int x0, y0, w, h;
-  tile_rect(tile, &x0, &y0, &w, &h);
-  Vec3f extrapolated, by_samples;
-  tile_variances(tile, &extrapolated, &by_samples);
-  double mean = 0;
-  for (int y = y0; y < y0 + h; ++y) {
-    for (int x = x0; x < x0 + w; ++x) {
-      mean += luminance(pixel_estimate(record(x, y), tile_samples(tile)).mean);
-    }
-  }
-  const double num_pixels = static_cast<double>(w) * h;
-  // Parts can agree by luck; the samples' variance ignores stratification, so it errs on the high side. A quarter of it
-  // keeps a lucky tile from stopping early.
-  const double variance = std::max(luminance(extrapolated), 0.25f * luminance(by_samples)) / num_pixels;
-  return std::sqrt(variance) / std::max(mean / num_pixels, floor);
+  // Beside the root of the light, or the light itself, so that black is not divided by.
+  constexpr float kLeast = 1e-4f;
+  // What the halves differ by is that much more than the error that a threshold of that number was found to mean.
+  constexpr float kScale = 5.0f;
+  const auto sum = [](Vec3f v) { return v.x + v.y + v.z; };
+  const PixelEstimate pixel = pixel_estimate(record, pixel_samples(record, tile));
+  const bool is_linear = rule.maths == NoiseMaths::k43;
+  const float exposure = is_linear ? rule.exposure : 1.0f;
+  const float light = std::max(sum(pixel.mean) * exposure, 0.0f);
+  const float normal = is_linear && light >= 1.0f ? light : std::sqrt(light);
+  return !(sum(abs(pixel.mean - pixel.even)) * exposure / (kLeast + normal) < kScale * rule.threshold);
 }
 
-double Film::mean_luminance() const
+std::vector<int> Film::judge(const NoiseRule& rule, std::uint32_t passed)
 {
-  double sum = 0;
+  RELIEF_ASSERT(layout_.samples >= 0);
+  const auto width = static_cast<std::size_t>(width_), num_floats = static_cast<std::size_t>(layout_.num_floats);
+  const auto rests = [&](std::size_t pixel) -> float& {
+    return sums_[pixel * num_floats + static_cast<std::size_t>(layout_.samples) + 1];
+  };
+  std::vector<std::uint8_t> noisy(num_pixels());
+  tbb::parallel_for(0, height_, [&](int y) {
+    for (int x = 0; x < width_; ++x) {
+      const std::size_t pixel = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
+      noisy[pixel] = rests(pixel) == 0.0f && is_noisy(record(x, y), tile_at(x, y), rule);
+    }
+  });
+  std::vector<std::uint8_t> goes_on(static_cast<std::size_t>(num_tiles()));
+  tbb::parallel_for(0, tiles_y_, [&](int tile_y) {
+    for (int y = tile_y * kTileSize; y < std::min((tile_y + 1) * kTileSize, height_); ++y) {
+      for (int x = 0; x < width_; ++x) {
+        bool is_near_noise = false;
+        for (int v = std::max(y - 1, 0); v <= std::min(y + 1, height_ - 1); ++v) {
+          for (int u = std::max(x - 1, 0); u <= std::min(x + 1, width_ - 1); ++u) {
+            is_near_noise =
+                is_near_noise || noisy[static_cast<std::size_t>(v) * width + static_cast<std::size_t>(u)] != 0;
+          }
+        }
+        rests(static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)) = is_near_noise ? 0.0f : 1.0f;
+        if (is_near_noise) goes_on[static_cast<std::size_t>(tile_at(x, y))] = 1;
+      }
+    }
+  });
+  std::vector<int> tiles;
   for (int tile = 0; tile < num_tiles(); ++tile) {
-    int x0, y0, w, h;
-    tile_rect(tile, &x0, &y0, &w, &h);
-    for (int y = y0; y < y0 + h; ++y) {
-      for (int x = x0; x < x0 + w; ++x) sum += luminance(pixel_estimate(record(x, y), tile_samples(tile)).mean);
-    }
+    if (goes_on[static_cast<std::size_t>(tile)] == 0) continue;
+    tiles.push_back(tile);
+    // Tiles that had come to rest may go on for their neighbours' sake.
+    samples_[static_cast<std::size_t>(tile)] = passed;
   }
-  return sum / (static_cast<double>(width_) * height_);
+  return tiles;
 }
 
 ImageError Film::estimate_error() const
@@ -309,7 +330,7 @@ ImageError Film::estimate_error() const
     tile_rect(tile, &x0, &y0, &w, &h);
     for (int y = y0; y < y0 + h; ++y) {
       for (int x = x0; x < x0 + w; ++x) {
-        const PixelEstimate pixel = pixel_estimate(record(x, y), tile_samples(tile));
+        const PixelEstimate pixel = pixel_estimate(record(x, y), pixel_samples(record(x, y), tile));
         const Vec3f denominator = pixel.mean * pixel.mean + splat3(0.01f);
         of_tile.d1 += sum(pixel.d1);
         of_tile.d2 += sum(pixel.d2);
@@ -337,7 +358,7 @@ Film::TileSpreads Film::tile_spreads(int tile) const
   TileSpreads spreads;
   for (int y = y0; y < y0 + h; ++y) {
     for (int x = x0; x < x0 + w; ++x) {
-      const PixelEstimate pixel = pixel_estimate(record(x, y), tile_samples(tile));
+      const PixelEstimate pixel = pixel_estimate(record(x, y), pixel_samples(record(x, y), tile));
       const auto add = [&](std::size_t channel, float sample_variance, float d1, float d2) {
         if (!(sample_variance > 0.0f)) return;
         spreads.channels[channel][spread_class(sample_variance)].add({1.0f, sample_variance, d1, d2});
@@ -478,9 +499,9 @@ RenderedImage Film::beauty(int crop_x, int crop_y, int full_width, int full_heig
   tbb::parallel_for(0, height_, [&](int y) {
     float* to = picture.pixels.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) * 4;
     for (int x = 0; x < width_; ++x, to += 4) {
-      const std::uint32_t samples = tile_samples(y / kTileSize * tiles_x_ + x / kTileSize);
-      if (samples == 0) continue;
       const float* sums = record(x, y);
+      const std::uint32_t samples = pixel_samples(sums, tile_at(x, y));
+      if (samples == 0) continue;
       const float inverse_n = 1.0f / static_cast<float>(samples);
       for (int i = 0; i < 3; ++i) to[i] = sums[AccumulatorLayout::kBeauty + i] * (exposure * inverse_n);
       to[3] = alpha(sums, samples);
@@ -518,9 +539,9 @@ RenderedImage Film::resolve(int crop_x, int crop_y, int full_width, int full_hei
         const std::size_t pixel =
             static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
         const int tile_x = x / kTileSize;
-        const std::uint32_t samples = tile_samples(tile_y * tiles_x_ + tile_x);
         const auto from = sums_.begin() + static_cast<std::ptrdiff_t>(pixel * num_in);
         std::copy(from, from + layout_.num_floats, sums.begin());
+        const std::uint32_t samples = pixel_samples(sums.data(), tile_y * tiles_x_ + tile_x);
         float* to = sums_.data() + pixel * num_out;
         std::fill(to, to + num_out, 0.0f);
         if (samples == 0) continue;

@@ -10,12 +10,23 @@
 #include "kernel/film/film_accumulator.h"
 #include "kernel/film/film_layout.h"
 #include "kernel/render_state.h"
+#include "scene/render_settings.h"
 
 namespace relief {
 
 /// Side of the square tiles that are sampled, judged by adaptive sampling and handed to threads as one, pixels.
 /// 16 × 16 pixels × 16 samples fill a batch of 4,096 paths.
 inline constexpr int kTileSize = 16;
+
+/// When a pixel's noise is low enough: what the two halves of its samples differ by is at most the threshold, times five, of the
+/// root of its light, summed over channels.
+/// @source  the halves: Dammertz et al. 2010, "A hierarchical automatic stopping condition for Monte Carlo global illumination";
+///          the numbers are those of Cycles
+struct NoiseRule {
+  float threshold = 0;
+  NoiseMaths maths = NoiseMaths::k43;
+  float exposure = 1;  ///< factor on all light
+};
 
 /// A finished picture that owns its pixels.
 struct RenderedImage {
@@ -51,7 +62,13 @@ class Film {
   /// @param aov_mask            bit i keeps enumerator i of Aov; beauty is always kept
   /// @param cryptomatte_levels  ids that a Cryptomatte keeps of a pixel
   /// @param keeps_clear         where the environment is not seen, alpha is not coverage alone, see film_add_clear
-  Film(int width, int height, std::uint32_t aov_mask, int cryptomatte_levels = 6, bool keeps_clear = false);
+  /// @param counts_samples      each pixel has a number of its own, see judge
+  Film(int width,
+       int height,
+       std::uint32_t aov_mask,
+       int cryptomatte_levels = 6,
+       bool keeps_clear = false,
+       bool counts_samples = false);
 
   FilmAccumulatorView accumulator();
   int width() const { return width_; }
@@ -63,6 +80,7 @@ class Film {
   /// The tile of a pixel of the window.
   int tile_at(int x, int y) const { return y / kTileSize * tiles_x_ + x / kTileSize; }
 
+  /// Samples that the tile has been given; those of its pixels that rest have had fewer.
   std::uint32_t tile_samples(int tile) const { return samples_[static_cast<std::size_t>(tile)]; }
   /// Called by the one thread that renders the tile.
   void add_tile_samples(int tile, std::uint32_t count) { samples_[static_cast<std::size_t>(tile)] += count; }
@@ -79,10 +97,12 @@ class Film {
   /// @param sums  of the same tile, from tile_sums
   void put_back_tile_sums(int tile, const std::vector<float>& sums);
 
-  /// Estimated root mean square error of a tile's pixels relative to its mean radiance (Rec.709 luminance); tiles darker
-  /// than `floor` are judged relative to that.
-  double tile_error(int tile, double floor) const;
-  double mean_luminance() const;
+  /// Lets pixels rest whose noise is below a threshold, and which have no neighbour of which that is not true: Cycles' rule.
+  /// One that rests is not judged again; it goes on when a neighbour turns out to be noisy.
+  /// @param passed  samples that tiles which go on count as given
+  /// @return        tiles with pixels that go on, in rising order
+  /// @pre           the film counts_samples, and nobody is adding any
+  std::vector<int> judge(const NoiseRule& rule, std::uint32_t passed);
 
   /// Errors of the image's mean, estimated by error_extrapolate from sums over all pixels.
   ImageError estimate_error() const;
@@ -101,8 +121,9 @@ class Film {
   float alpha(const float* record, std::uint32_t samples) const;
   /// View of a finished picture, without its pixels.
   FilmView window(std::uint32_t aov_mask, int crop_x, int crop_y, int full_width, int full_height) const;
-  /// Sums over a tile's pixels: variance of the mean as extrapolated, and by the spread of single samples.
-  void tile_variances(int tile, Vec3f* extrapolated, Vec3f* by_samples) const;
+  /// Samples of a pixel of a tile.
+  std::uint32_t pixel_samples(const float* record, int tile) const;
+  bool is_noisy(const float* record, int tile, const NoiseRule& rule) const;
   struct TileSpreads;
   struct TileLevels;
   TileSpreads tile_spreads(int tile) const;

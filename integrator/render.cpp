@@ -41,10 +41,10 @@ std::uint32_t samples_wanted(const RenderOptions& options)
 }
 
 /// Samples of the next pass. Passes are as large as a batch holds, but at the start, where the first picture and the
-/// first measure of speed are wanted soon, and towards a time limit, which is kept by asking for less.
-/// @param is_watched  the picture is shown between passes: they begin with one sample, and slow ones are smaller. Some of
-///                    them end where those do that are not watched
-/// @param most        samples after which a checkpoint may be due: as those that are watched
+/// first measure of speed are wanted soon, and towards a time limit, which is kept by asking for less. Whatever was asked for
+/// before, they come to multiples of kMostPassSamples, after which noise is judged.
+/// @param is_watched  the picture is shown between passes: they begin with one sample, and slow ones are smaller
+/// @param most        samples after which a checkpoint may be due
 std::uint32_t pass_samples(std::uint32_t done,
                            std::uint32_t wanted,
                            double seconds,
@@ -52,13 +52,12 @@ std::uint32_t pass_samples(std::uint32_t done,
                            bool is_watched,
                            std::uint32_t most)
 {
-  std::uint32_t samples = std::min(wanted - done, kMostPassSamples);
-  if (most < kMostPassSamples) samples = std::min({samples, most, kMostPassSamples - done % kMostPassSamples});
+  std::uint32_t samples = std::min({wanted - done, kMostPassSamples - done % kMostPassSamples, most});
   const double per_sample = done > 0 ? seconds / done : 0.0;
   if (is_watched) {
     constexpr double kLongestSeconds = 4;
     constexpr std::uint32_t kLeastSamples = 4;  // fewer would leave batches too empty
-    samples = std::min({samples, std::max(done, 1u), kMostPassSamples - done % kMostPassSamples});
+    samples = std::min(samples, std::max(done, 1u));
     if (per_sample * kMostPassSamples > kLongestSeconds) {
       samples = std::min(samples, std::max(kLeastSamples, static_cast<std::uint32_t>(kLongestSeconds / per_sample)));
     }
@@ -72,8 +71,21 @@ std::uint32_t pass_samples(std::uint32_t done,
   return samples;
 }
 
-/// A noise threshold is first looked at after this many samples: below, the estimate of the error is itself noise.
-constexpr std::uint32_t kMinAdaptiveSamples = 16;
+/// Samples after which pixels are judged for the first time: Cycles' numbers.
+std::uint32_t least_samples(const RenderSettings& settings)
+{
+  constexpr int kLeast = 4;
+  if (settings.min_samples > 0) return static_cast<std::uint32_t>(std::max(settings.min_samples, kLeast));
+  const double automatic = std::ceil(16.0 / std::pow(static_cast<double>(settings.noise_threshold), 0.3));
+  return static_cast<std::uint32_t>(std::clamp(automatic, double{kLeast}, double{kLargestSettingInt}));
+}
+
+/// Whether pixels are judged after a number of samples.
+bool is_judged_after(const RenderSettings& settings, std::uint32_t samples)
+{
+  constexpr std::uint32_t kStep = 16;
+  return settings.noise_threshold > 0 && samples % kStep == 0 && samples > least_samples(settings) + 1;
+}
 
 /// @param sample  pixel of the window << 32 | sample
 PixelSample pixel_sample(std::uint64_t sample, const FilmWindow& window)
@@ -169,6 +181,11 @@ ContextOptions context_options(const RenderOptions& options)
 
 }  // namespace
 
+void pixel_filter_table_make(PixelFilter filter, FilterTable& table)
+{
+  filter_table_make(filter == PixelFilter::kGaussian ? gaussian : blackman_harris, table);
+}
+
 SceneContext render_context(const Scene& scene, const RenderOptions& options)
 {
   return context_make(scene, context_options(options));
@@ -187,7 +204,9 @@ KernelGlobals render_globals(const SceneContext& context, const RenderOptions& o
   constexpr int kMostBounces = 200;
   g.limits = {std::min(settings.max_bounces, kMostBounces), settings.diffuse_bounces, settings.glossy_bounces,
               settings.transmission_bounces, settings.transparent_bounces};
+  g.clamp_direct = settings.clamp_direct;
   g.clamp_indirect = settings.clamp_indirect;
+  g.filter_glossy = settings.filter_glossy;
   g.light_technique = options.light_technique;
   g.filter = settings.filter == PixelFilter::kBox ? nullptr : &filter;
   g.filter_width = settings.filter_width;
@@ -372,14 +391,15 @@ RenderedImage render(const Scene& scene,
 
   const FilmWindow window = render_window(options);
   Film film(window.width, window.height, options.aov_mask, settings.cryptomatte_levels,
-            !scene.environment.visible_to_camera || has_holdouts(scene));
+            !scene.environment.visible_to_camera || has_holdouts(scene), settings.noise_threshold > 0);
 
   FilterTable filter;
-  blackman_harris_table_make(filter);
+  pixel_filter_table_make(settings.filter, filter);
   KernelGlobals g = render_globals(context, options, filter);
   g.film = film.accumulator();
   const CryptomatteIds ids = cryptomatte_ids(scene, options.aov_mask);
   for (std::size_t i = 0; i < kNumCryptomattes; ++i) g.cryptomatte_ids[i] = ids[i].data();
+  const bool counts_samples = g.film.layout.samples >= 0;
   const bool caustics = g.caustics.enabled;
   std::optional<PhotonPass> photons;
   if (caustics) photons.emplace(context, settings.caustics, static_cast<double>(settings.width) * settings.height);
@@ -476,7 +496,8 @@ RenderedImage render(const Scene& scene,
   // measured pictures of few tiles, which wait for all of them, begin as small as can be. Further layers are added to where a
   // path meets what they tell: the last bits of their sums depend on which samples are under way together.
   constexpr auto bit = [](Aov aov) { return 1u << static_cast<int>(aov); };
-  constexpr std::uint32_t kSumsByPath = bit(Aov::kBeauty) | bit(Aov::kSampleCount) | bit(Aov::kVariance) | bit(Aov::kHalf);
+  constexpr std::uint32_t kSumsByPath =
+      bit(Aov::kBeauty) | bit(Aov::kSampleCount) | bit(Aov::kVariance) | bit(Aov::kHalf);
   const bool cuts_passes = checkpoints.is_on() && (options.aov_mask & ~kSumsByPath) == 0;
   const auto most_samples = [&]() -> std::uint32_t {
     if (!cuts_passes) return kMostPassSamples;
@@ -488,15 +509,13 @@ RenderedImage render(const Scene& scene,
     return static_cast<std::uint32_t>(
         std::clamp(options.checkpoint_seconds / tile_seconds, 1.0, static_cast<double>(kMostPassSamples)));
   };
-  bool has_small_passes = is_watched;
   std::function<void(double)> tell_photons = options.traced_photons;
   while (done < wanted && !active.empty()) {
     // Photons are of one sample: see PhotonPass::next. A pass that was under way goes on as it was begun.
     if (samples == 0) {
-      const std::uint32_t most = most_samples();
-      has_small_passes = has_small_passes || most < kMostPassSamples;
-      samples =
-          caustics ? 1 : pass_samples(done, wanted, seconds_since(start), options.time_limit_seconds, is_watched, most);
+      samples = caustics ? 1
+                         : pass_samples(done, wanted, seconds_since(start), options.time_limit_seconds, is_watched,
+                                        most_samples());
     }
     if (photons) {
       photons_before = photons->state();
@@ -514,7 +533,9 @@ RenderedImage render(const Scene& scene,
             const FlushDenormals flush;
             Wavefront& worker = workers.local();
             const std::uint64_t rays_before = rays_of(worker.counters);
-            const Batch batch = tile_batch(film, waiting[i], options.first_sample + done, samples);
+            const Batch batch =
+                tile_batch(film, waiting[i], options.first_sample + (counts_samples ? 0 : done), samples);
+            const std::uint64_t paths_before = worker.counters.camera_rays;
             const std::vector<float> sums = has_long_searches ? film.tile_sums(waiting[i]) : std::vector<float>();
             if (!worker.run(g, *context.accel, stages, context.surface_kernel, batch)) {
               film.put_back_tile_sums(waiting[i], sums);
@@ -522,7 +543,7 @@ RenderedImage render(const Scene& scene,
             }
             end.note_progress();
             film.add_tile_samples(waiting[i], samples);
-            reporter.add(batch.num_paths(), rays_of(worker.counters) - rays_before);
+            reporter.add(worker.counters.camera_rays - paths_before, rays_of(worker.counters) - rays_before);
             report(false);
           },
           tbb::simple_partitioner());
@@ -537,13 +558,9 @@ RenderedImage render(const Scene& scene,
     done += std::exchange(samples, 0);
     if (options.keeps_errors && errors.is_due()) errors.add(seconds_since(start));
     if (photons) reporter.set_photon_share(photons->seconds() / seconds_since(start));
-    // Where passes are smaller because somebody watches or saves, tiles are judged when they would be otherwise.
-    const bool is_judged = !has_small_passes || caustics || done % kMostPassSamples == 0;
-    if (settings.noise_threshold > 0 && done >= kMinAdaptiveSamples && is_judged) {
-      // A tenth of the picture's mean: dark corners need not be cleaner than the eye can tell.
-      const double floor = 0.1 * film.mean_luminance();
-      std::erase_if(active, [&](int tile) { return film.tile_error(tile, floor) <= settings.noise_threshold; });
-      if (active.empty() && done < wanted) stats.stop_reason = "noise_threshold";
+    if (done < wanted && is_judged_after(settings, done)) {
+      active = film.judge({settings.noise_threshold, settings.noise_maths, settings.film_exposure}, done);
+      if (active.empty()) stats.stop_reason = "noise_threshold";
     }
     if (options.time_limit_seconds > 0 && seconds_since(start) >= options.time_limit_seconds && done < wanted) {
       stats.stop_reason = "time_limit";

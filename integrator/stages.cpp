@@ -35,7 +35,13 @@ void batch_pixel(const Batch& batch, std::uint32_t index, int* x, int* y)
   *y = batch.y0 + static_cast<int>(block / blocks_a_row * 2 + index / 4 % 2);
 }
 
-void generate(const KernelGlobals& g, PathState& state, const Batch& batch)
+/// Sample of a pixel that is its next in a batch.
+std::uint32_t next_sample(const KernelGlobals& g, const Batch& batch, std::uint32_t pixel)
+{
+  return batch.first_sample + (g.film.layout.samples >= 0 ? film_pixel_samples(g.film, pixel) : 0u);
+}
+
+std::uint32_t generate(const KernelGlobals& g, PathState& state, const Batch& batch)
 {
   const auto num_pixels = static_cast<std::uint32_t>(batch.width * batch.height);
   std::uint32_t path = 0;
@@ -43,9 +49,12 @@ void generate(const KernelGlobals& g, PathState& state, const Batch& batch)
     int x = 0;
     int y = 0;
     batch_pixel(batch, p, &x, &y);
-    for (std::uint32_t s = 0; s < batch.num_samples; ++s, ++path)
-      generate_camera_path(g, state, path, x, y, batch.first_sample + s);
+    const auto pixel = static_cast<std::uint32_t>(y * g.film.width + x);
+    if (film_pixel_rests(g.film, pixel)) continue;
+    const std::uint32_t first = next_sample(g, batch, pixel);
+    for (std::uint32_t s = 0; s < batch.num_samples; ++s, ++path) generate_camera_path(g, state, path, x, y, first + s);
   }
+  return path;
 }
 
 /// Runs the graphs of up to eight paths that have hit one material, then shades each.
@@ -161,12 +170,15 @@ void shade_photons(const KernelGlobals& g,
 void finish(const KernelGlobals& g,
             PathState& state,
             const Batch& batch,
+            std::uint32_t num_paths,
             Counters& counters,
             std::uint64_t& first_nonfinite)
 {
-  for (std::uint32_t i = batch.num_paths(); i < state.caustic.num_paths; ++i) path_add_to_root(state, i);
-  for (std::uint32_t i = 0; i < batch.num_paths(); ++i) {
-    const std::uint32_t sample = batch.first_sample + i % batch.num_samples;
+  for (std::uint32_t i = num_paths; i < state.caustic.num_paths; ++i) path_add_to_root(state, i);
+  const bool counts = g.film.layout.samples >= 0;
+  for (std::uint32_t i = 0; i < num_paths; ++i) {
+    const std::uint32_t sample =
+        counts ? next_sample(g, batch, state.pixel[i]) : batch.first_sample + i % batch.num_samples;
     Vec3f caustic;
     if (state.caustic.radiance != nullptr) caustic = (*state.caustic.radiance)[i];
     const bool finite = film_add_sample(g.film, state.pixel[i], sample, state.direct[i], state.indirect[i], caustic);

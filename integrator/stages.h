@@ -19,17 +19,17 @@ inline constexpr int kNumSurfaceKernels = 12;
 
 /// A rectangle of pixels and a run of their samples; path i of a batch is pixel i / num_samples in the order of
 /// batch_pixel, sample first_sample + i % num_samples. So neighbouring paths are of one pixel, and meet the same triangles and
-/// texels.
+/// texels. Of a film that counts the samples of each pixel, those that rest are left out, and first_sample is the first of
+/// pixels that have had none: each goes on from its own.
 struct Batch {
   int x0 = 0, y0 = 0, width = 0, height = 0;  ///< in the film window
   std::uint32_t first_sample = 0, num_samples = 0;
-
-  std::uint32_t num_paths() const { return static_cast<std::uint32_t>(width * height) * num_samples; }
 };
 
 struct StageTable {
   const char* isa;
-  void (*generate)(const KernelGlobals&, PathState&, const Batch&);
+  /// Starts the batch's paths, from 0 on. @return  their number
+  std::uint32_t (*generate)(const KernelGlobals&, PathState&, const Batch&);
   void (*shade_surface[kNumSurfaceKernels])(const KernelGlobals&,
                                             PathState&,
                                             const QueueView& queue,
@@ -56,8 +56,14 @@ struct StageTable {
                         QueueView& next,
                         PhotonQueueView& photons);
   /// Adds the batch's finished samples to the film, in path order; what paths that forked have found goes to their root's.
+  /// @param num_paths        from generate
   /// @param first_nonfinite  pixel << 32 | sample, lowered to the least of the samples that were dropped
-  void (*finish)(const KernelGlobals&, PathState&, const Batch&, Counters&, std::uint64_t& first_nonfinite);
+  void (*finish)(const KernelGlobals&,
+                 PathState&,
+                 const Batch&,
+                 std::uint32_t num_paths,
+                 Counters&,
+                 std::uint64_t& first_nonfinite);
   GraphRun run_graph;
 };
 

@@ -121,7 +121,7 @@ PathReplay trace_path(const Scene& scene, const RenderOptions& options, const Pi
   // Layers beside the beauty do not change a path.
   Film film(window.width, window.height, 1u << static_cast<int>(Aov::kBeauty));
   FilterTable filter;
-  blackman_harris_table_make(filter);
+  pixel_filter_table_make(options.settings.filter, filter);
   KernelGlobals g = render_globals(context, options, filter);
   g.film = film.accumulator();
 

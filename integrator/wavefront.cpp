@@ -105,7 +105,7 @@ bool Wavefront::run(const KernelGlobals& g,
                     const std::vector<std::uint8_t>& surface_kernel,
                     const Batch& batch)
 {
-  RELIEF_ASSERT(batch.num_paths() <= kBatchPaths);
+  RELIEF_ASSERT(static_cast<std::uint32_t>(batch.width * batch.height) * batch.num_samples <= kBatchPaths);
   Clock::time_point last = Clock::now();
   const auto charge = [&](Stage stage) {
     const Clock::time_point now = Clock::now();
@@ -113,14 +113,14 @@ bool Wavefront::run(const KernelGlobals& g,
     last = now;
   };
 
-  stages.generate(g, state_, batch);
-  if (camera_medium != nullptr) camera_medium->apply(state_, batch.num_paths());
+  const std::uint32_t num_paths = stages.generate(g, state_, batch);
+  if (camera_medium != nullptr) camera_medium->apply(state_, num_paths);
   if (g.caustics.enabled) {
-    for (std::uint32_t i = 0; i < batch.num_paths(); ++i) (*state_.caustic.radiance)[i] = Vec3f{};
-    std::iota(state_.caustic.root, state_.caustic.root + batch.num_paths(), 0u);
-    state_.caustic.num_paths = batch.num_paths();
+    for (std::uint32_t i = 0; i < num_paths; ++i) (*state_.caustic.radiance)[i] = Vec3f{};
+    std::iota(state_.caustic.root, state_.caustic.root + num_paths, 0u);
+    state_.caustic.num_paths = num_paths;
   }
-  active_.size = batch.num_paths();
+  active_.size = num_paths;
   for (std::uint32_t i = 0; i < active_.size; ++i) active_.paths[i] = i;
   counters.camera_rays += active_.size;
   charge(Stage::kGenerate);
@@ -168,7 +168,7 @@ bool Wavefront::run(const KernelGlobals& g,
 
   note_displacement(displacement);
   if (is_stopped()) return false;
-  stages.finish(g, state_, batch, counters, first_nonfinite);
+  stages.finish(g, state_, batch, num_paths, counters, first_nonfinite);
   charge(Stage::kFilm);
   return true;
 }

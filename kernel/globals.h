@@ -59,7 +59,8 @@ struct KernelGlobals {
   MotionView camera_motion;  ///< of `camera`, which stands where it is when the shutter is half done
   Vec3f camera_forward;      ///< unit, world: the axis that depths are measured along
   BounceLimits limits;
-  float clamp_indirect = 0;  ///< 0: off
+  float clamp_direct = 0, clamp_indirect = 0;  ///< 0: off
+  float filter_glossy = 0;                     ///< see path_blur; 0: off
   LightTechnique light_technique = LightTechnique::kMis;
   bool has_lights = false;  ///< something can be sampled
   bool environment_visible_to_camera = true;

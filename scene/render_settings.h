@@ -14,11 +14,20 @@
 
 namespace relief {
 
-enum class PixelFilter : std::uint8_t { kBox, kBlackmanHarris };
-inline constexpr std::string_view kPixelFilterLabels[] = {"box", "blackman-harris"};
+enum class PixelFilter : std::uint8_t { kBox, kBlackmanHarris, kGaussian };
+inline constexpr std::string_view kPixelFilterLabels[] = {"box", "blackman-harris", "gaussian"};
 
 /// Width of a pixel filter that nobody gave one, pixels.
-constexpr float pixel_filter_width(PixelFilter filter) { return filter == PixelFilter::kBox ? 1.0f : 1.5f; }
+constexpr float pixel_filter_width(PixelFilter filter)
+{
+  constexpr float kWidths[] = {1.0f, 1.5f, 4.5f};
+  return kWidths[static_cast<int>(filter)];
+}
+
+/// Versions of Blender that judge noise differently: up to 3.4 against the root of the light, since 3.5 bright light against
+/// itself.
+enum class NoiseMaths : std::uint8_t { k34, k43 };
+inline constexpr std::string_view kNoiseMathsLabels[] = {"3.4", "4.3"};
 
 enum class CausticsMode : std::uint8_t { kAuto, kOn, kOff };
 inline constexpr std::string_view kCausticsModeLabels[] = {"auto", "on", "off"};

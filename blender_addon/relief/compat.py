@@ -104,6 +104,9 @@ BUMP_REFLECTS_ABOVE = bpy.app.version < (3, 6, 0)
 #: Before 4 the Hue/Saturation node cut whole turns off towards 0, so that hues below 0 stayed below.
 HUE_GOES_ROUND = IS_4_0
 
+#: The version whose Cycles judges noise as this one's does, as RELIEF_render calls it.
+NOISE_MATHS = "4.3" if bpy.app.version >= (3, 5, 0) else "3.4"
+
 #: Whose numbers the textures of this version have, as RELIEF_graph calls them; None: those of 3.4.
 TEXTURE_MATHS = "5.2" if IS_5_0 else "4.3" if IS_4_0 else None
 

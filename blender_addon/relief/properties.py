@@ -103,11 +103,14 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
         default="none",
     )
     noise_threshold: FloatProperty(name="Noise Threshold", precision=4, **_declared("noiseThreshold", soft_max=1.0))
+    min_samples: IntProperty(name="Min Samples", **_declared("minSamples", soft_max=4096))
     max_bounces: IntProperty(name="Total", **_declared("maxBounces", soft_max=200))
     diffuse_bounces: IntProperty(name="Diffuse", **_declared("diffuseBounces", soft_max=200))
     glossy_bounces: IntProperty(name="Glossy", **_declared("glossyBounces", soft_max=200))
     transmission_bounces: IntProperty(name="Transmission", **_declared("transmissionBounces", soft_max=200))
     transparent_bounces: IntProperty(name="Transparent", **_declared("transparentBounces", soft_max=1024))
+    filter_glossy: FloatProperty(name="Filter Glossy", **_declared("filterGlossy", soft_max=10.0))
+    clamp_direct: FloatProperty(name="Clamp Direct", **_declared("clampDirect"))
     clamp_indirect: FloatProperty(name="Clamp Indirect", **_declared("clampIndirect"))
     caustics: EnumProperty(
         name="Caustics",
@@ -195,7 +198,11 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
         name="Filter",
         **_declared(
             "pixelFilter.type",
-            items=(("blackman-harris", "Blackman-Harris", "Smooth"), ("box", "Box", "Equal weights")),
+            items=(
+                ("blackman-harris", "Blackman-Harris", "Smooth"),
+                ("gaussian", "Gaussian", "Smooth, six standard deviations to either side"),
+                ("box", "Box", "Equal weights"),
+            ),
         ),
     )
     filter_width: FloatProperty(name="Filter Width", **_declared("pixelFilter.width", soft_max=10.0))

@@ -167,6 +167,7 @@ class RELIEF_PT_sampling(_RenderPanel, bpy.types.Panel):
     def _draw_own_sampling(settings, rows):
         rows.prop(settings, "samples")
         rows.prop(settings, "noise_threshold")
+        rows.prop(settings, "min_samples")
         rows.prop(settings, "time_limit")
         rows.separator()
         rows.prop(settings, "preview_samples")
@@ -185,7 +186,9 @@ class RELIEF_PT_light_paths(_RenderPanel, bpy.types.Panel):
             rows.prop(owner, name)
         rows.prop(owner, "transparent_bounces" if cycles is None else "transparent_max_bounces")
         rows.separator()
-        rows.prop(owner, "clamp_indirect" if cycles is None else "sample_clamp_indirect", text="Clamp Indirect")
+        for kind in ("direct", "indirect"):
+            rows.prop(owner, f"clamp_{kind}" if cycles is None else f"sample_clamp_{kind}", text=f"Clamp {kind.title()}")
+        rows.prop(owner, "filter_glossy" if cycles is None else "blur_glossy", text="Filter Glossy")
         rows.prop(settings, "caustics")
 
 
@@ -614,6 +617,9 @@ def _draw_cycles_sampling(cycles, rows):
     row = rows.row()
     row.active = cycles.use_adaptive_sampling
     row.prop(cycles, "adaptive_threshold", text="Threshold")
+    row = rows.row()
+    row.active = cycles.use_adaptive_sampling
+    row.prop(cycles, "adaptive_min_samples", text="Min Samples")
     rows.prop(cycles, "samples", text="Max Samples" if cycles.use_adaptive_sampling else "Samples")
     rows.prop(cycles, "time_limit")
     rows.separator()

@@ -18,6 +18,12 @@ RELIEF_KERNEL AshikhminShirley ashikhmin_shirley_make(AnisotropicAlpha alpha)
   return {2.0f / sqr(alpha.x) - 2.0f, 2.0f / sqr(alpha.y) - 2.0f};
 }
 
+/// The roughness that ashikhmin_shirley_make was given.
+RELIEF_KERNEL AnisotropicAlpha ashikhmin_shirley_alpha(const AshikhminShirley& lobe)
+{
+  return {__builtin_sqrtf(2.0f / (lobe.n_x + 2.0f)), __builtin_sqrtf(2.0f / (lobe.n_y + 2.0f))};
+}
+
 /// f with reflectance 1. It is reciprocal. Its albedo is 1 for sharp lobes seen from above, and falls with roughness.
 /// @param wo, wi  unit; wo.z > 0
 /// @param pdf     solid angle of wi under ashikhmin_shirley_sample

@@ -100,10 +100,11 @@ union LobeShape {
 struct MixtureLobe {
   MixtureLobeKind kind = MixtureLobeKind::kLambert;
   bool is_delta = false;
-  bool is_bent = false;   ///< its normal is not the surface's
-  bool is_4 = false;      ///< of 4.3's maths or later ones: which sides it reaches, see mixture_lobe_reaches
-  bool is_5 = false;      ///< of 5.2's maths: what its normal sees and the surface does not fades as it does there
-  float probability = 0;  ///< not normalised
+  bool stays_sharp = false;  ///< a distribution without width: nothing blurs it
+  bool is_bent = false;      ///< its normal is not the surface's
+  bool is_4 = false;         ///< of 4.3's maths or later ones: which sides it reaches, see mixture_lobe_reaches
+  bool is_5 = false;         ///< of 5.2's maths: what its normal sees and the surface does not fades as it does there
+  float probability = 0;     ///< not normalised
   float roughness = kInfinity;  ///< perceptual; infinite: never sharp
   Vec3f weight{};               ///< factor on f
   Frame frame;                  ///< world

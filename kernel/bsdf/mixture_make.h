@@ -36,6 +36,8 @@ struct MixtureBuild {
   float holdout = 0;
   bool transmits = false;           ///< some lobe sends light through the surface
   bool is_4 = false, is_5 = false;  ///< see MixtureLobe: of the closure that is added
+  float blur = 0;                   ///< see path_blur; 0: none
+  float most_sharp = -1;            ///< perceptual roughness up to which lobes are not blurred
 };
 
 RELIEF_KERNEL float mean_component(Vec3f v) { return (v.x + v.y + v.z) * (1.0f / 3.0f); }
@@ -107,6 +109,46 @@ RELIEF_KERNEL MixtureLobe* mixture_add(MixtureBuild& b, Vec3f weight, const Fram
   return &lobe;
 }
 
+/// Widens a lobe of microfacets to a least width. The energy that it has been given back stays that of before.
+RELIEF_KERNEL void lobe_blur(MixtureLobe& lobe, float blur, float most_sharp)
+{
+  using K = MixtureLobeKind;
+  if (lobe.stays_sharp || !(lobe.roughness < kInfinity) || lobe.roughness <= most_sharp) return;
+  const auto widen = [blur](AnisotropicAlpha& alpha) {
+    alpha.x = max(alpha.x, blur);
+    alpha.y = max(alpha.y, blur);
+  };
+  switch (lobe.kind) {
+    case K::kGgx:
+      widen(lobe.shape.ggx.alpha);
+      break;
+    case K::kBeckmann:
+      widen(lobe.shape.beckmann.alpha);
+      break;
+    case K::kAshikhminShirley: {
+      AnisotropicAlpha alpha = ashikhmin_shirley_alpha(lobe.shape.ashikhmin_shirley);
+      widen(alpha);
+      lobe.shape.ashikhmin_shirley = ashikhmin_shirley_make(alpha);
+      break;
+    }
+    case K::kClearcoat:
+      lobe.shape.clearcoat.alpha = max(lobe.shape.clearcoat.alpha, blur);
+      break;
+    case K::kRefraction:
+      if (dielectric_is_matched(lobe.shape.refraction.eta)) return;
+      lobe.shape.refraction.alpha = max(lobe.shape.refraction.alpha, blur);
+      break;
+    case K::kGlass:
+      if (dielectric_is_matched(lobe.fresnel.eta)) return;
+      lobe.shape.glass.alpha = max(lobe.shape.glass.alpha, blur);
+      break;
+    default:
+      return;
+  }
+  lobe.roughness = max(lobe.roughness, __builtin_sqrtf(blur));
+  lobe.is_delta = lobe.is_delta && blur < kDeltaAlpha;
+}
+
 /// Makes a lobe one of reflection by microfacets.
 /// @param roughness  perceptual: whether the lobe is sharp, and how wide ray cones become
 /// @param alpha      of both directions, bounded
@@ -117,7 +159,8 @@ RELIEF_KERNEL void lobe_set_microfacets(MixtureLobe& lobe,
 {
   const SmithMasking masking = spec.is_4 ? SmithMasking::kCorrelated : SmithMasking::kSeparable;
   lobe.roughness = spec.distribution == ClosureDistribution::kSharp ? 0.0f : clamp(roughness, 0.0f, 1.0f);
-  lobe.is_delta = spec.distribution == ClosureDistribution::kSharp || sqr(lobe.roughness) < kDeltaAlpha;
+  lobe.stays_sharp = spec.distribution == ClosureDistribution::kSharp;
+  lobe.is_delta = lobe.stays_sharp || sqr(lobe.roughness) < kDeltaAlpha;
   switch (spec.distribution) {
     case ClosureDistribution::kBeckmann:
       lobe.kind = MixtureLobeKind::kBeckmann;
@@ -149,6 +192,8 @@ RELIEF_KERNEL void lobe_scale(MixtureLobe& lobe, Vec3f by)
 /// @return        what the reflection is now as part of one that loses nothing to colour; 1 before 4.0
 RELIEF_KERNEL Vec3f lobe_give_back(MixtureBuild& b, const SurfaceClosureSpec& spec, MixtureLobe& lobe, Vec3f F_mean)
 {
+  // Before 4.0 facets send light on as blurred ones.
+  if (!spec.is_4) lobe_blur(lobe, b.blur, b.most_sharp);
   if (spec.distribution != ClosureDistribution::kMultiscatterGgx || lobe.is_delta) return {1, 1, 1};
   const AnisotropicAlpha alpha = lobe.shape.ggx.alpha;
   const float roughness = __builtin_sqrtf(__builtin_sqrtf(alpha.x * alpha.y));
@@ -252,8 +297,8 @@ RELIEF_KERNEL void refraction_add(MixtureBuild& b,
   lobe->kind = MixtureLobeKind::kRefraction;
   lobe->roughness = spec.distribution == ClosureDistribution::kSharp ? 0.0f : saturated(__builtin_fabsf(roughness));
   const float alpha = sqr(lobe->roughness);
-  lobe->is_delta =
-      spec.distribution == ClosureDistribution::kSharp || alpha < kDeltaAlpha || dielectric_is_matched(eta);
+  lobe->stays_sharp = spec.distribution == ClosureDistribution::kSharp;
+  lobe->is_delta = lobe->stays_sharp || alpha < kDeltaAlpha || dielectric_is_matched(eta);
   lobe->shape.refraction = {alpha, eta, spec.distribution == ClosureDistribution::kBeckmann,
                             spec.is_4 ? SmithMasking::kCorrelated : SmithMasking::kSeparable, false};
   b.transmits = true;
@@ -284,9 +329,10 @@ RELIEF_KERNEL void glass_add(MixtureBuild& b,
   lobe->roughness = spec.distribution == ClosureDistribution::kSharp ? 0.0f : closure_roughness(spec, roughness);
   const float alpha = sqr(lobe->roughness);
   lobe->fresnel = fresnel;
-  lobe->is_delta =
-      spec.distribution == ClosureDistribution::kSharp || alpha < kDeltaAlpha || dielectric_is_matched(fresnel.eta);
+  lobe->stays_sharp = spec.distribution == ClosureDistribution::kSharp;
+  lobe->is_delta = lobe->stays_sharp || alpha < kDeltaAlpha || dielectric_is_matched(fresnel.eta);
   lobe->shape.glass = {alpha, spec.distribution == ClosureDistribution::kBeckmann, reflection_tint, transmission_tint};
+  if (!spec.is_4) lobe_blur(*lobe, b.blur, b.most_sharp);
   if (spec.distribution == ClosureDistribution::kMultiscatterGgx && !lobe->is_delta) {
     const GlassCoordinate at = glass_coordinate(fresnel.eta, lobe->roughness);
     const float lost = glass_lost(*b.tables, at, at.side, lobe->wo.z);

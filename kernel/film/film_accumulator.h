@@ -21,6 +21,8 @@ struct AccumulatorLayout {
       displacement_steps = -1, caustic = -1, holdout = -1, mist = -1, emission = -1, environment = -1,
       ambient_occlusion = -1, clear = -1, denoising_albedo = -1, denoising_normal = -1, denoising_depth = -1,
       denoising_half = -1;
+  int samples =
+      -1;  ///< that the pixel has had, and whether it rests: where noise decides how many it gets, pixel by pixel
   int cryptomatte[kNumCryptomattes] = {-1, -1, -1};  ///< pairs of an id and its weight, the first of weight 0 is free
   int cryptomatte_levels = 0;
   bool denoising = false;  ///< denoising_albedo, denoising_normal or denoising_half is kept
@@ -159,6 +161,18 @@ RELIEF_KERNEL void film_add_displacement_steps(const FilmAccumulatorView& film,
   record[layout.displacement_steps] += static_cast<float>(steps);
 }
 
+/// Samples that a pixel has had so far, of a film that counts them.
+RELIEF_KERNEL std::uint32_t film_pixel_samples(const FilmAccumulatorView& film, std::uint32_t pixel)
+{
+  return static_cast<std::uint32_t>(film_record(film, pixel)[film.layout.samples]);
+}
+
+/// Whether a pixel gets no sample of a batch: its noise is below the threshold.
+RELIEF_KERNEL bool film_pixel_rests(const FilmAccumulatorView& film, std::uint32_t pixel)
+{
+  return film.layout.samples >= 0 && film_record(film, pixel)[film.layout.samples + 1] != 0.0f;
+}
+
 /// Adds a finished sample.
 /// @param sample  of the pixel, counted from 0
 /// @return false when the sample is not finite; it then counts as black
@@ -171,6 +185,7 @@ RELIEF_KERNEL bool film_add_sample(const FilmAccumulatorView& film,
 {
   const AccumulatorLayout& layout = film.layout;
   float* record = film_record(film, pixel);
+  if (layout.samples >= 0) record[layout.samples] += 1.0f;
   const Vec3f radiance = direct + indirect + caustic;
   if (!is_finite(radiance)) return false;
   film_add3(record + AccumulatorLayout::kBeauty, radiance);

@@ -5,7 +5,8 @@
 
 namespace relief {
 
-inline constexpr int kFilterTableSize = 256;
+/// As long as Cycles': what is between two entries is spread evenly, and the outermost of a Gaussian are far apart.
+inline constexpr int kFilterTableSize = 1024;
 
 /// Inverse of the filter's cumulative distribution on [−½, ½], at i / kFilterTableSize.
 struct FilterTable {
@@ -20,15 +21,20 @@ RELIEF_KERNEL double blackman_harris(double x)
   return 0.35875 - 0.48829 * std::cos(a) + 0.14128 * std::cos(2 * a) - 0.01168 * std::cos(3 * a);
 }
 
-RELIEF_KERNEL void blackman_harris_table_make(FilterTable& table)
+/// Gaussian over [−½, ½], which ends at six standard deviations.
+RELIEF_KERNEL double gaussian(double x) { return std::exp(-72 * x * x); }
+
+/// @param filter  positive inside of (−½, ½)
+template <typename Filter>
+RELIEF_KERNEL void filter_table_make(Filter filter, FilterTable& table)
 {
   constexpr int kSteps = 1 << 14;
   double total = 0;
-  for (int i = 0; i < kSteps; ++i) total += blackman_harris((i + 0.5) / kSteps - 0.5);
+  for (int i = 0; i < kSteps; ++i) total += filter((i + 0.5) / kSteps - 0.5);
   double sum = 0;
   int entry = 0;
   for (int i = 0; i < kSteps; ++i) {
-    const double next = sum + blackman_harris((i + 0.5) / kSteps - 0.5) / total;
+    const double next = sum + filter((i + 0.5) / kSteps - 0.5) / total;
     while (entry <= kFilterTableSize && static_cast<double>(entry) / kFilterTableSize <= next) {
       const double within = (static_cast<double>(entry) / kFilterTableSize - sum) / (next - sum);
       table.inverse_cdf[entry++] = static_cast<float>((i + within) / kSteps - 0.5);

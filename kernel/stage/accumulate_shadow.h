@@ -20,7 +20,7 @@ RELIEF_KERNEL void accumulate_shadow(const KernelGlobals& g,
     return;
   }
   const Vec3f gain = shadow.gain[ray] * visibility;
-  path_add_radiance(state, path, static_cast<int>(shadow.scatterings[ray]), gain, g.clamp_indirect);
+  path_add_radiance(g, state, path, static_cast<int>(shadow.scatterings[ray]), gain);
 }
 
 }  // namespace relief

@@ -154,6 +154,7 @@ RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
   state.flags[path] = kPathPhoton | hidden_from << kPathHiddenShift;
   state.sigma_a[path] = Vec3f{};
   state.cone_width[path] = state.cone_spread[path] = 0.0f;
+  state.least_pdf[path] = kInfinity;
   if (state.motion.time != nullptr) state.motion.time[path] = g.caustics.time;
   if (state.facets != nullptr) state.facets[path].height = 0.0f;
   return true;

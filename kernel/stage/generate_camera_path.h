@@ -63,6 +63,7 @@ RELIEF_KERNEL void generate_camera_path(const KernelGlobals& g,
   state.throughput[path] = Vec3f{1, 1, 1};
   state.direct[path] = Vec3f{};
   state.indirect[path] = Vec3f{};
+  state.least_pdf[path] = kInfinity;
   state.pdf[path] = 0.0f;
   state.pixel[path] = static_cast<std::uint32_t>(pixel_y * g.film.width + pixel_x);
   state.sample_index[path] = sample_index;

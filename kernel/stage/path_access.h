@@ -103,9 +103,9 @@ RELIEF_KERNEL bool path_is_among_facets(const PathState& s, std::uint32_t i)
   return s.facets != nullptr && s.hit_t[i] == 0.0f;
 }
 
-/// An indirect sample's radiance, scaled until the mean of its channels is within a limit, as Cycles clamps it.
+/// A sample's radiance, scaled until the mean of its channels is within a limit, as Cycles clamps it.
 /// @param limit  0: none
-RELIEF_KERNEL Vec3f indirect_clamped(Vec3f contribution, float limit)
+RELIEF_KERNEL Vec3f radiance_clamped(Vec3f contribution, float limit)
 {
   const Vec3f size = abs(contribution);
   const float mean = (size.x + size.y + size.z) * (1.0f / 3.0f);
@@ -116,17 +116,17 @@ RELIEF_KERNEL Vec3f indirect_clamped(Vec3f contribution, float limit)
 /// at most one event, indirect after more.
 /// @param radiance      as emitted, W/m²/sr
 /// @param scatterings   events between the camera and the emitter
-RELIEF_KERNEL void path_add_radiance(PathState& s,
+RELIEF_KERNEL void path_add_radiance(const KernelGlobals& g,
+                                     PathState& s,
                                      std::uint32_t i,
                                      int scatterings,
-                                     Vec3f contribution,
-                                     float clamp_indirect)
+                                     Vec3f contribution)
 {
   if (scatterings <= 1) {
-    s.direct[i] = s.direct[i] + contribution;
+    s.direct[i] = s.direct[i] + radiance_clamped(contribution, g.clamp_direct);
     return;
   }
-  s.indirect[i] = s.indirect[i] + indirect_clamped(contribution, clamp_indirect);
+  s.indirect[i] = s.indirect[i] + radiance_clamped(contribution, g.clamp_indirect);
 }
 
 /// Adds light to the albedo that a denoiser is told of, where it is seen by the camera or in mirrors alone.
@@ -134,6 +134,15 @@ RELIEF_KERNEL void path_add_denoising(const KernelGlobals& g, const PathState& s
 {
   if (!g.film.layout.denoising || (s.flags[i] & kPathSawFeature) != 0) return;
   film_add_denoising(g.film, s.pixel[i], sample_is_even(s.sample_index[i], g.log2_stream), contribution, {});
+}
+
+/// Least width α of microfacets that a path meets: where it has come by unlikely directions, what it sees is blurred, in place
+/// of noise. As in Cycles ("Filter Glossy").
+/// @return  0: they are as they are
+RELIEF_KERNEL float path_blur(const KernelGlobals& g, const PathState& s, std::uint32_t i)
+{
+  constexpr float kWidest = 0.5f;
+  return s.least_pdf[i] < g.filter_glossy ? kWidest * __builtin_sqrtf(1.0f - s.least_pdf[i] / g.filter_glossy) : 0.0f;
 }
 
 /// Weight of light found by following the BSDF against finding it by light sampling.

@@ -30,7 +30,7 @@ RELIEF_KERNEL void shade_sun_disks(const KernelGlobals& g, PathState& state, std
             ? path_bsdf_weight(g.light_technique, pdf,
                                lights_sun_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), index))
             : 1.0f;
-    path_add_radiance(state, path, scatterings, seen * weight, g.clamp_indirect);
+    path_add_radiance(g, state, path, scatterings, seen * weight);
   }
 }
 
@@ -66,7 +66,7 @@ RELIEF_KERNEL void shade_background(const KernelGlobals& g, PathState& state, st
     const float pdf_light = lights_environment_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), D);
     radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
   }
-  path_add_radiance(state, path, scatterings, path_throughput(state, path) * radiance, g.clamp_indirect);
+  path_add_radiance(g, state, path, scatterings, path_throughput(state, path) * radiance);
 }
 
 }  // namespace relief

@@ -173,7 +173,7 @@ RELIEF_KERNEL void shade_surface_photons(const KernelGlobals& g,
   const float by_area =
       __builtin_fabsf(dot(wi, at.side.frame.n)) / max(__builtin_fabsf(dot(wi, at.side.Ng)), kLeastCosine);
   const Vec3f radiance = path_throughput(state, path) * f * irradiance * by_area;
-  (*caustic.radiance)[path] = (*caustic.radiance)[path] + indirect_clamped(radiance, g.clamp_indirect);
+  (*caustic.radiance)[path] = (*caustic.radiance)[path] + radiance_clamped(radiance, g.clamp_indirect);
 }
 
 /// Continuations into which a path splits where it enters rough glass, or leaves rough metal, that the camera sees. What shines there of lamps is met by a
@@ -265,6 +265,7 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
   state.throughput[path] = throughput;
   const bool delta = (bsdf.lobe & kLobeDelta) != 0;
   state.pdf[path] = delta ? 0.0f : bsdf.pdf;
+  if (!delta) state.least_pdf[path] = min(state.least_pdf[path], bsdf.pdf);
   state.scatter_N[path] = light_N;
   const bool transmitted = (bsdf.lobe & kLobeTransmit) != 0;
   const BounceKind kind = transmitted ? BounceKind::kTransmission
@@ -442,7 +443,7 @@ RELIEF_KERNEL void shade_surface_emission(const KernelGlobals& g,
       radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
     }
     if (bounce == 0) film_add_emission(g.film, state.pixel[path], throughput * radiance);
-    path_add_radiance(state, path, bounce, throughput * radiance, g.clamp_indirect);
+    path_add_radiance(g, state, path, bounce, throughput * radiance);
   }
 }
 

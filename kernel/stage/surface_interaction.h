@@ -133,13 +133,57 @@ RELIEF_KERNEL GraphPoint surface_graph_point(const KernelGlobals& g,
            path_ray_length(g, state, path)}};
 }
 
+/// How a path blurs the microfacets that it meets.
+struct SurfaceBlur {
+  float alpha = 0;        ///< see path_blur
+  float most_sharp = -1;  ///< perceptual roughness up to which lobes are left: photons see those as they are
+};
+
+template <unsigned kFeatures>
+RELIEF_KERNEL SurfaceBlur
+surface_blur(const KernelGlobals& g, const PathState& state, std::uint32_t path, const InstanceView& instance)
+{
+  SurfaceBlur blur{path_blur(g, state, path)};
+  if constexpr ((kFeatures & kFeatureCaustics) != 0) {
+    blur.most_sharp = (instance.flags & kCausticCaster) != 0 ? kInfinity : g.caustics.roughness;
+  }
+  return blur;
+}
+
+/// The same of glTF's layered material.
+RELIEF_KERNEL void surface_params_blur(SurfaceParams& p, SurfaceBlur blur)
+{
+  const float least = __builtin_sqrtf(blur.alpha);
+  for (float* roughness : {&p.roughness, &p.clearcoat_roughness}) {
+    if (*roughness > blur.most_sharp) *roughness = max(*roughness, least);
+  }
+}
+
+/// Makes the least chance of a lobe an eighth of all: where the camera looks, a faint reflection of something bright is seen.
+/// The chances are Cycles'. They decide what counts as diffuse where limits of bounces end some kinds of path, and so the mean.
+/// @param passing  chance of what passes through
+RELIEF_KERNEL void mixture_lobes_defend(MixtureLobes& lobes, float passing)
+{
+  constexpr float kLeastShare = 0.125f;
+  float sum = passing;
+  for (int i = 0; i < lobes.size; ++i) sum += lobes.lobes[i].probability;
+  for (int i = 0; i < lobes.size; ++i) {
+    MixtureLobe& lobe = lobes.lobes[i];
+    // What facets scatter more than once is part of their lobe.
+    if (lobe.kind != MixtureLobeKind::kMultiple) lobe.probability = max(lobe.probability, kLeastShare * sum);
+  }
+}
+
 /// Resolves the closures of a located point: its lobes, its frame, and the parameters that stages ask for.
-/// @param lane   of the material's program
-/// @param lobes  gets the lobes
+/// @param lane         of the material's program
+/// @param is_first     of a path from the camera
+/// @param lobes        gets the lobes
 template <unsigned kFeatures>
 RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
                                            Vec3f wo,
                                            const GraphLane& lane,
+                                           SurfaceBlur blur,
+                                           bool is_first,
                                            SurfaceInteraction& at,
                                            MixtureLobes& lobes)
 {
@@ -147,6 +191,8 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   const Vec3f Ns = shading_normal_turned(at.hit.Ns, side.Ng);
   lobes.size = 0;
   MixtureBuild build{wo, side.Ng, Ns, side.front, g.bsdf_tables, &lobes};
+  build.blur = blur.alpha;
+  build.most_sharp = blur.most_sharp;
   if (const std::uint16_t first = lane.program->surface_normal; first != kNoGraphOperand) {
     const Vec3f given{graph_result(lane, first), graph_result(lane, first + 1), graph_result(lane, first + 2)};
     // Since 4.0 what displaces nothing bends freely.
@@ -158,6 +204,9 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   side.bent = !(dot(side.Ns, Ns) > kUnbent);
   side.frame = frame_from_normal(side.Ns);
   closures_resolve(lane, build);
+  if (blur.alpha > 0.0f) {
+    for (int i = 0; i < lobes.size; ++i) lobe_blur(lobes.lobes[i], blur.alpha, blur.most_sharp);
+  }
 
   const Material& m = *at.material;
   SurfaceParams& p = at.params;
@@ -186,6 +235,7 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
     p.roughness = 0.0f;
     p.metallic = 1.0f;
   }
+  if (is_first) mixture_lobes_defend(lobes, mean_component(build.transparency));
   const float passing = max_component(build.transparency);
   if (!(passing > 0.0f)) return;
   // Whichever way a path takes, it takes by its share of the light; what it then carries makes up for the chance.
@@ -213,6 +263,7 @@ RELIEF_KERNEL SurfaceInteraction surface_interaction_make(const KernelGlobals& g
                                                           const GraphHit* graph = nullptr)
 {
   SurfaceInteraction at = graph != nullptr ? *graph->at : surface_interaction_locate<kFeatures>(g, state, path, wo);
+  const SurfaceBlur blur = surface_blur<kFeatures>(g, state, path, *at.instance);
   if constexpr ((kFeatures & kFeatureGraphs) != 0) {
     if (at.material->graph_index >= 0) {
       GraphRegisters registers;
@@ -221,14 +272,16 @@ RELIEF_KERNEL SurfaceInteraction surface_interaction_make(const KernelGlobals& g
                                  : graph_at_point(g.run_graph, g.graphs[at.material->graph_index], g.textures,
                                                   surface_graph_point(g, state, path, at, wo), registers);
       if (has_mixture<kFeatures>(at)) {
-        surface_interaction_mix<kFeatures>(g, wo, lane, at, lobes);
+        surface_interaction_mix<kFeatures>(g, wo, lane, blur, path_surface(state, path) == 0, at, lobes);
       } else {
         at.params = graph_surface_params<kFeatures>(*at.material, graph_values(lane), g.textures, at.hit, at.uv_width);
+        if (blur.alpha > 0.0f) surface_params_blur(at.params, blur);
       }
       return at;
     }
   }
   at.params = surface_params_eval<kFeatures>(*at.material, g.textures, at.hit.uv, at.hit.color, at.uv_width);
+  if (blur.alpha > 0.0f) surface_params_blur(at.params, blur);
   return at;
 }
 

@@ -195,7 +195,7 @@ class Run:
             ["--compression", self.pick("none", "zips", "piz", "dwaa")], ["--camera", self.pick("front", "nobody")],
             ["--displacement", self.pick("rmip", "tfdm", "chord", "tessellate")], ["--lod", self.pick("0", "auto", "-1")],
             ["--caustics", self.pick("on", "off")], ["--exposure", "1"], ["--color-space", "acescg"], ["--display", "Nothing"], ["--view", self.pick("Standard", "Nothing")],
-            ["--noise-threshold", "0.1"], ["--time-limit", "0.001"], ["--bogus"],
+            ["--noise-threshold", "0.1"], ["--filter-glossy", "1"], ["--time-limit", "0.001"], ["--bogus"],
             ["--environment", self.pick("studio", "env.png", "env.png,2", "missing.png")], ["--background", "world"],
             ["--look-from", "3,2,1"], ["--denoise", self.pick("none", "builtin", "oidn", "all")]
         ]

@@ -98,7 +98,8 @@ TEST(RenderSettingsList, EveryLabelIsReadAsItself)
 TEST(RenderSettingsList, WhatIsReadIsShown)
 {
   const json said = json::parse(R"({
-    "resolution": [640, 480], "samples": 9, "noiseThreshold": 0.01, "maxBounces": 5, "diffuseBounces": 4,
+    "resolution": [640, 480], "samples": 9, "noiseThreshold": 0.01, "noiseMaths": "3.4", "minSamples": 8,
+    "filterGlossy": 0.5, "clampDirect": 4, "maxBounces": 5, "diffuseBounces": 4,
     "glossyBounces": 3, "transmissionBounces": 2, "transparentBounces": 7, "seed": 9007199254740991, "view": "Filmic",
     "exposure": -1, "clampIndirect": 3, "filmExposure": 2, "frameRange": [-2, 8], "fps": 29.97,
     "pixelFilter": {"type": "box", "width": 2}, "luminousEfficacy": 683, "caustics": {"mode": "on", "photons": 1000,

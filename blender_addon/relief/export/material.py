@@ -10,6 +10,7 @@ from .displacement import bump_displaces, export_displacement
 from .graph import GraphWriter, NotUnderstood, bump_of_displacement
 from .light import set_emission
 from .mesh import Wanted
+from .settings import filters_glossy
 from .surface import TRANSPARENT, ClosureWriter, Inside, Surface, plain_surface
 from .texture import Input, TextureReader, ies_uri, image_options
 
@@ -89,6 +90,7 @@ class MaterialJob:
         self._images = images
         self._name = material.name if material else "default"
         self._report = report
+        self._filters_glossy = filters_glossy(settings.id_data)
         self._coordinates = []
         self._color_map = None
         self._displaced = self._by_shading = self._uses_graph = self._uses_height_graph = False
@@ -146,13 +148,14 @@ class MaterialJob:
 
     def _export_surface(self, source, has_volume):
         """Returns the surface's Inside."""
-        plain = plain_surface(source, self._bends) if source or not has_volume else TRANSPARENT
+        filters = self._filters_glossy
+        plain = plain_surface(source, self._bends, filters) if source or not has_volume else TRANSPARENT
         if plain is not None:
             self._write_surface(plain)
             if plain.ior is not None:
                 return Inside.BOUNDED
             return Inside.CLOSED if plain.alpha.is_constant(1.0) else Inside.OPEN
-        closures = ClosureWriter(self._graph, self._past_bump, self._fail)
+        closures = ClosureWriter(self._graph, self._past_bump, self._fail, filters)
         closures.write(source)
         if not closures.closures:  # black, or shining in the core's words
             self._write_surface(Surface(emission=closures.emission))

@@ -6,9 +6,8 @@ from dataclasses import dataclass, fields
 
 from .. import compat
 
-#: Widths of Cycles are of its own functions. Relief's is where Blackman-Harris ends; that has the spread of a Gaussian
-#: whose standard deviation is a quarter of Cycles' width.
-_WIDTHS = {"BLACKMAN_HARRIS": 2.0, "GAUSSIAN": 0.25 / 0.138507}
+#: Cycles' pixel filters: relief's name, and what a width of Cycles' is multiplied by. Relief's widths are where filters end.
+_FILTERS = {"BOX": ("box", 0.0), "BLACKMAN_HARRIS": ("blackman-harris", 2.0), "GAUSSIAN": ("gaussian", 3.0)}
 
 #: Cycles' 0, where it means no end.
 _ENDLESS = 16777216
@@ -27,6 +26,7 @@ class Sampling:
     samples: int
     preview_samples: int
     noise_threshold: float
+    min_samples: int
     time_limit: float
     seed: int
     max_bounces: int
@@ -34,6 +34,8 @@ class Sampling:
     glossy_bounces: int
     transmission_bounces: int
     transparent_bounces: int
+    filter_glossy: float
+    clamp_direct: float
     clamp_indirect: float
     filter_type: str
     filter_width: float
@@ -54,24 +56,28 @@ def sampling_of(scene, view_layer):
     if cycles is None:
         own = {name: getattr(scene.relief, name) for name in SHARED}
         return Sampling(**{**own, "samples": view_layer.samples or own["samples"]})
+    samples, share = _subset(cycles, _layer_samples(cycles, view_layer))
     threshold = 0.0
     if cycles.use_adaptive_sampling:
-        threshold = cycles.adaptive_threshold or max(_LEAST_THRESHOLD, 1 / cycles.samples)
-    is_box = cycles.pixel_filter_type == "BOX"
+        threshold = share**0.5 * (cycles.adaptive_threshold or max(_LEAST_THRESHOLD, 1 / cycles.samples))
+    filter_type, width_factor = _FILTERS[cycles.pixel_filter_type]
     return Sampling(
-        samples=_layer_samples(cycles, view_layer),
+        samples=samples,
         preview_samples=cycles.preview_samples or _ENDLESS,
         noise_threshold=threshold,
+        min_samples=cycles.adaptive_min_samples,
         time_limit=cycles.time_limit,
-        seed=_seed_of_frame(cycles.seed, scene.frame_current) if cycles.use_animated_seed else cycles.seed,
+        seed=_seed(cycles, scene.frame_current),
         max_bounces=cycles.max_bounces,
         diffuse_bounces=cycles.diffuse_bounces,
         glossy_bounces=cycles.glossy_bounces,
         transmission_bounces=cycles.transmission_bounces,
         transparent_bounces=cycles.transparent_max_bounces,
+        filter_glossy=cycles.blur_glossy,
+        clamp_direct=cycles.sample_clamp_direct,
         clamp_indirect=cycles.sample_clamp_indirect,
-        filter_type="box" if is_box else "blackman-harris",
-        filter_width=1.0 if is_box else cycles.filter_width * _WIDTHS[cycles.pixel_filter_type],
+        filter_type=filter_type,
+        filter_width=cycles.filter_width * width_factor or 1.0,
     )
 
 
@@ -84,9 +90,25 @@ def _layer_samples(cycles, view_layer):
     return view_layer.samples
 
 
-def _seed_of_frame(seed, frame):
-    """A seed that tells nothing of those of other frames."""
-    return zlib.crc32(f"{seed} {frame}".encode()) >> 1
+def _subset(cycles, samples):
+    """(samples that are taken of as many, their share). Since 4.5 a part of them can be asked for, for several machines."""
+    if not getattr(cycles, "use_sample_subset", False):
+        return samples, 1.0
+    taken = min(cycles.sample_subset_length, samples - cycles.sample_offset)
+    return max(taken, 1), max(taken, 1) / samples
+
+
+def _seed(cycles, frame):
+    """A seed that tells nothing of those of other frames and of other offsets, whose samples Cycles takes in its stead."""
+    offset = cycles.sample_offset if getattr(cycles, "use_sample_subset", True) else 0
+    words = [cycles.seed, *([frame] if cycles.use_animated_seed else []), *(["offset", offset] if offset else [])]
+    return cycles.seed if len(words) == 1 else zlib.crc32(" ".join(map(str, words)).encode()) >> 1
+
+
+def filters_glossy(scene):
+    """Whether what unlikely paths see in mirrors and through glass is blurred."""
+    cycles = cycles_settings(scene)
+    return (scene.relief.filter_glossy if cycles is None else cycles.blur_glossy) > 0
 
 
 def warn_unread_settings(scene, warn):
@@ -118,10 +140,6 @@ def warn_unread_settings(scene, warn):
         warn("Max Bounces of the world", "it lights all bounces")
     if not getattr(world, "use_shadows", True):
         warn("a world without shadows", "it casts them")
-    if cycles.sample_clamp_direct > 0:
-        warn("Clamp Direct", "direct light was not clamped")
-    if cycles.pixel_filter_type == "GAUSSIAN":
-        warn("the Gaussian pixel filter", "a Blackman-Harris one that spreads as far was used")
 
 
 def render_settings(scene, view_layer, size):
@@ -138,6 +156,8 @@ def render_settings(scene, view_layer, size):
         "resolution": list(size),
         "samples": sampling.samples,
         "noiseThreshold": sampling.noise_threshold,
+        "noiseMaths": compat.NOISE_MATHS,
+        "minSamples": sampling.min_samples,
         "maxBounces": sampling.max_bounces,
         "diffuseBounces": min(sampling.diffuse_bounces, sampling.max_bounces),
         "glossyBounces": min(sampling.glossy_bounces, sampling.max_bounces),
@@ -145,6 +165,8 @@ def render_settings(scene, view_layer, size):
         "transparentBounces": sampling.transparent_bounces,
         "seed": sampling.seed,
         "exposure": scene.view_settings.exposure,
+        "filterGlossy": sampling.filter_glossy,
+        "clampDirect": sampling.clamp_direct,
         "clampIndirect": sampling.clamp_indirect,
         "pixelFilter": {"type": sampling.filter_type, "width": sampling.filter_width},
         "caustics": {"mode": scene.relief.caustics},

@@ -73,14 +73,15 @@ class _NotPlain(Exception):
     """Something that glTF's core cannot say, or does not mean as Cycles does."""
 
 
-def plain_surface(source, bends):
+def plain_surface(source, bends, filters_glossy):
     """A shader output in glTF's core.
 
-    @param  source  nodes.Source of a shader, None: nothing linked, which is black
-    @param  bends   tells of a Normal input and its groups whether it gives another normal than the mesh's
-    @return         Surface; None if the core cannot say it
+    @param  source          nodes.Source of a shader, None: nothing linked, which is black
+    @param  bends           tells of a Normal input and its groups whether it gives another normal than the mesh's
+    @param  filters_glossy  mirrors and glass may be blurred, which Cycles does by microfacets of its own
+    @return                 Surface; None if the core cannot say it
     """
-    return _unless_refused(lambda textures: _Plain(textures, bends).surface(source))
+    return _unless_refused(lambda textures: _Plain(textures, bends, filters_glossy).surface(source))
 
 
 def _unless_refused(read):
@@ -115,9 +116,10 @@ def _plain_emission(color, strength, groups, textures):
 
 
 class _Plain:
-    def __init__(self, textures, bends):
+    def __init__(self, textures, bends, filters_glossy):
         self._textures = textures
         self._bends = bends
+        self._filters_glossy = filters_glossy
 
     def surface(self, source):
         if source is None or source.is_value:
@@ -156,10 +158,11 @@ class _Plain:
         return replace(TRANSPARENT)
 
     def _require_sharp_white(self, node, groups):
+        self._require(not self._filters_glossy)
         self._require(not self._bends(node.inputs["Normal"], groups))
         self._require(self._color(node.inputs["Color"], groups).is_constant(_WHITE))
         if node.distribution != "SHARP":
-            self._require(abs(self._constant(node.inputs["Roughness"], groups)) <= _SHARP)
+            self._require(self._constant(node.inputs["Roughness"], groups) <= _SHARP)
 
     def _mirror(self, node, groups):
         self._require_sharp_white(node, groups)
@@ -240,13 +243,15 @@ class ClosureWriter:
     @param  graph      GraphWriter, which gets what varies
     @param  past_bump  gives the Normal input and its groups that count in place of others: behind a Bump that displaces
     @param  fail       called with a nodes.Source, what is not understood of it, and what was used instead
+    @param  filters_glossy  as of plain_surface
     closures   JSON of the closures
     emission   Input of the radiance that no graph gives, which stays in the core
     transmits  whether there is glass
     """
 
-    def __init__(self, graph, past_bump, fail):
+    def __init__(self, graph, past_bump, fail, filters_glossy):
         self.graph = graph
+        self.filters_glossy = filters_glossy
         self.closures = []
         self.emission = Input(_BLACK)
         self.transmits = False
@@ -481,6 +486,18 @@ def _distribution(node):
     return _DISTRIBUTIONS.get(getattr(node, "distribution", None))
 
 
+def _microfacets(w, node, values):
+    """The roughness and distribution of gloss and glass. Up to 3.6 Cycles has others for constant roughnesses: where it
+    filters, sharp ones are microfacets, which can be blurred, else those without roughness are sharp."""
+    roughness, distribution = values["roughness"], _distribution(node)
+    if compat.MATHS == "3.4" and not isinstance(roughness, dict):
+        if w.filters_glossy and distribution == "sharp":
+            roughness, distribution = 0.0, "ggx"
+        elif not w.filters_glossy and roughness <= _SHARP:
+            distribution = "sharp"
+    return {"roughness": roughness, "distribution": distribution}
+
+
 def _diffuse(w, source, weight):
     values = w.inputs(source, {"Color": "color", "Roughness": "roughness", "Normal": "normal"})
     w.add("diffuse", weight, **values, **_MATHS)
@@ -505,7 +522,7 @@ def _holdout(w, source, weight):
 def _glossy(w, source, weight):
     values = w.inputs(source, {"Color": "color", "Roughness": "roughness", "Normal": "normal"})
     values.update(w.anisotropy(source, {"Anisotropy": "anisotropy", "Rotation": "rotation"}))
-    w.add("glossy", weight, **values, distribution=_distribution(source.node), **_MATHS)
+    w.add("glossy", weight, **{**values, **_microfacets(w, source.node, values)}, **_MATHS)
 
 
 def _glass_like(kind):
@@ -513,7 +530,8 @@ def _glass_like(kind):
         names = {"Color": "color", "Roughness": "roughness", "IOR": "ior", "Normal": "normal"}
         names.update({"Thin Film Thickness": "thinFilmThickness", "Thin Film IOR": "thinFilmIor"})
         w.transmits = True
-        w.add(kind, weight, **w.inputs(source, names), distribution=_distribution(source.node), **_MATHS)
+        values = w.inputs(source, names)
+        w.add(kind, weight, **{**values, **_microfacets(w, source.node, values)}, **_MATHS)
 
     return write
 

@@ -175,6 +175,91 @@ double sampled_pdf(const Mixture& m, Vec3f wi)
   return sum;
 }
 
+/// Blurs a closure's lobes as a path does that meets them.
+template <typename Inputs>
+void add_blurred(MixtureLobes& lobes, const SurfaceClosureSpec& spec, const Inputs& in, float blur, float most_sharp)
+{
+  lobes.size = 0;
+  MixtureBuild build{normalize(Vec3f{0.5f, 0.2f, 0.8f}), kN, kN, true, &tables(), &lobes};
+  build.is_4 = spec.is_4;
+  build.blur = blur;
+  build.most_sharp = most_sharp;
+  closure_add(build, spec, 1.0f, in);
+  for (int i = 0; i < lobes.size; ++i) lobe_blur(lobes.lobes[i], blur, most_sharp);
+}
+
+/// Light of the same directions by both; their quotient where it is the same everywhere.
+void expect_proportional(const MixtureLobes& a, const MixtureLobes& b, float* quotient)
+{
+  TestRandom random(3);
+  *quotient = 0;
+  for (int i = 0; i < 200; ++i) {
+    const Vec3f wi = normalize(Vec3f{random.next() - 0.5f, random.next() - 0.5f, 2.0f * random.next() - 1.0f});
+    const auto eval = [&](const MixtureLobes& lobes) {
+      return closure_eval<kFeatureAll>(mixture_of(lobes, frame_from_normal(kN), kN), tables(), wi).f.x;
+    };
+    const float f_a = eval(a), f_b = eval(b);
+    if (f_b < 1e-3f) continue;
+    if (*quotient == 0) *quotient = f_a / f_b;
+    EXPECT_NEAR(f_a / f_b, *quotient, 1e-3f * *quotient) << i;
+  }
+  EXPECT_GT(*quotient, 0);
+}
+
+TEST(Mixture, BlurredLobesAreThoseOfTheirWidth)
+{
+  using D = ClosureDistribution;
+  constexpr float kBlur = 0.25f, kRoughness = 0.5f;
+  const auto check = [&](const SurfaceClosureSpec& spec, auto in, bool keeps_energy) {
+    SCOPED_TRACE(std::to_string(static_cast<int>(spec.distribution)) + (spec.is_4 ? ", 4.3" : ", 3.4"));
+    for (const float before : {0.0f, 0.2f}) {
+      MixtureLobes blurred, rough;
+      in.roughness = before;
+      add_blurred(blurred, spec, in, kBlur, -1.0f);
+      in.roughness = kRoughness;
+      add_blurred(rough, spec, in, 0.0f, -1.0f);
+      float quotient;
+      expect_proportional(blurred, rough, &quotient);
+      // What is given back is that of the width before, from 4.0 on.
+      if (keeps_energy) {
+        EXPECT_NEAR(quotient, 1.0f, 1e-3f);
+      }
+    }
+  };
+  for (const D distribution : {D::kGgx, D::kBeckmann, D::kAshikhminShirley}) {
+    check(spec_of(false, distribution), GlossyInputs{}, true);
+    check(spec_of(true, distribution), GlossyInputs{}, true);
+  }
+  check(spec_of(false, D::kMultiscatterGgx), GlossyInputs{}, true);
+  check(spec_of(true, D::kMultiscatterGgx), GlossyInputs{}, false);
+  for (const D distribution : {D::kGgx, D::kBeckmann}) {
+    for (const bool is_4 : {false, true}) {
+      check(spec_of(is_4, distribution), GlassInputs{}, true);
+      check(spec_of(is_4, distribution), RefractionInputs{}, true);
+    }
+  }
+  check(spec_of(false, D::kMultiscatterGgx), GlassInputs{}, true);
+}
+
+TEST(Mixture, WhatIsSharpByKindOrForPhotonsIsNotBlurred)
+{
+  MixtureLobes lobes;
+  add_blurred(lobes, spec_of(false, ClosureDistribution::kSharp), GlossyInputs{}, 0.4f, -1.0f);
+  ASSERT_EQ(lobes.size, 1);
+  EXPECT_TRUE(lobes.lobes[0].is_delta);
+  GlossyInputs in;
+  in.roughness = 0.25f;
+  for (const float most_sharp : {0.3f, kInfinity}) {
+    add_blurred(lobes, spec_of(false), in, 0.4f, most_sharp);
+    EXPECT_EQ(lobes.lobes[0].roughness, 0.25f);
+    EXPECT_EQ(lobes.lobes[0].shape.ggx.alpha.x, 0.0625f);
+  }
+  // A wider lobe stays as it is.
+  in.roughness = 0.9f;
+  add_blurred(lobes, spec_of(false), in, 0.4f, -1.0f);
+  EXPECT_EQ(lobes.lobes[0].shape.ggx.alpha.x, 0.9f * 0.9f);
+}
+
 TEST(Mixture, SamplesFollowTheDensityOfAllLobes)
 {
   const auto all = cases();
