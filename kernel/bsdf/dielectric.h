@@ -82,14 +82,14 @@ struct DielectricSample {
   bool transmitted = false;
 };
 
-/// @param u_choice  [0, 1): reflect or refract
+/// @param u_branch  [0, 1): reflect or refract
 /// @return          wi.z has the wrong sign where the microfacets lose the ray
-RELIEF_KERNEL DielectricSample dielectric_sample(Vec3f wo, float alpha, float eta, float u_choice, Vec2f u)
+RELIEF_KERNEL DielectricSample dielectric_sample(Vec3f wo, float alpha, float eta, float u_branch, Vec2f u)
 {
   const Vec3f wm = warp_ggx_visible_normal(wo, alpha, u);
   const float cos_o = min(1.0f, dot(wo, wm));
   const float cos_t = refracted_cosine(cos_o, eta);
-  if (u_choice < fresnel_dielectric(cos_o, cos_t, eta)) return {2.0f * cos_o * wm - wo, false};
+  if (u_branch < fresnel_dielectric(cos_o, cos_t, eta)) return {2.0f * cos_o * wm - wo, false};
   return {normalize(refract(wo, wm, cos_o, cos_t, eta)), true};
 }
 

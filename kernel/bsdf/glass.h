@@ -5,6 +5,7 @@
 #include "kernel/bsdf/base_interface.h"
 #include "kernel/bsdf/diffuse.h"
 #include "kernel/bsdf/lobe.h"
+#include "kernel/sample/choice.h"
 
 namespace relief {
 
@@ -44,14 +45,14 @@ RELIEF_KERNEL BsdfEval lobe_eval(const GlassLobe& glass, const BaseInterface& ba
 
 /// Smooth or index-matched glass.
 template <TransportMode kMode>
-RELIEF_KERNEL LobeSample glass_sample_delta(const GlassLobe& glass, const BaseInterface& base, float u_choice)
+RELIEF_KERNEL LobeSample glass_sample_delta(const GlassLobe& glass, const BaseInterface& base, float u_branch)
 {
   const Vec3f wo = base.wo;
   const float eta = glass.eta;
   if (dielectric_is_matched(eta)) return lobe_sample_delta(-wo, base.transmission_color * glass.weight);
   const float cos_t = refracted_cosine(wo.z, eta);
   const float F = fresnel_dielectric(wo.z, cos_t, eta);
-  if (u_choice < F) return lobe_sample_delta({-wo.x, -wo.y, wo.z}, splat3(glass.weight * F), F);
+  if (u_branch < F) return lobe_sample_delta({-wo.x, -wo.y, wo.z}, splat3(glass.weight * F), F);
   const float scale = (1.0f - F) * glass.weight * transmission_scale<kMode>(eta);
   LobeSample s =
       lobe_sample_delta(normalize({-wo.x / eta, -wo.y / eta, -cos_t}), base.transmission_color * scale, 1.0f - F);
@@ -61,17 +62,17 @@ RELIEF_KERNEL LobeSample glass_sample_delta(const GlassLobe& glass, const BaseIn
 
 template <TransportMode kMode>
 RELIEF_KERNEL LobeSample
-lobe_sample(const GlassLobe& glass, const BaseInterface& base, const BsdfTables&, float u_choice, Vec2f u)
+lobe_sample(const GlassLobe& glass, const BaseInterface& base, const BsdfTables&, float u_branch, Vec2f u)
 {
-  if (glass.delta) return glass_sample_delta<kMode>(glass, base, u_choice);
+  if (glass.delta) return glass_sample_delta<kMode>(glass, base, u_branch);
   LobeSample s;
-  if (u_choice < glass.lost) {
-    const bool crosses = u_choice / glass.lost >= glass.reflect_share;
-    const Vec3f wi = multiple_scattering_sample(base.scattering, u);
+  if (u.x < glass.lost) {
+    const bool crosses = u_branch >= glass.reflect_share;
+    const Vec3f wi = multiple_scattering_sample(base.scattering, {choice_rest(u.x, glass.lost), u.y});
     s = lobe_sample_diffuse(crosses ? -wi : wi, crosses);
   } else {
-    const float u_fresnel = (u_choice - glass.lost) / (1.0f - glass.lost);
-    const DielectricSample d = dielectric_sample(base.wo, base.ggx.alpha, glass.eta, u_fresnel, u);
+    const Vec2f rest{choice_rest(u.x - glass.lost, 1.0f - glass.lost), u.y};
+    const DielectricSample d = dielectric_sample(base.wo, base.ggx.alpha, glass.eta, u_branch, rest);
     s = lobe_sample_glossy(d.wi, d.transmitted, base.ggx.alpha);
   }
   if ((s.bits & kLobeTransmit) != 0) s.eta = glass.eta;

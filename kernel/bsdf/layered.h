@@ -17,6 +17,7 @@
 #pragma once
 
 #include "kernel/bsdf/surface_closure.h"
+#include "kernel/sample/choice.h"
 
 namespace relief {
 
@@ -57,20 +58,20 @@ RELIEF_KERNEL BsdfEval closure_eval(const SurfaceClosure& c, const BsdfTables& t
 
 /// Samples a closure with the features it was made with: one lobe is chosen, and the direction weighed against all of
 /// them.
-/// @param u_lobe  [0, 1): chooses the lobe, and what is left of it between reflection and refraction
-/// @param u       [0, 1)²: direction
+/// @param u_branch  [0, 1): between reflection and refraction at the microfacet that u gives
+/// @param u         [0, 1)²: u.x chooses the lobe, and what is left of it is half of the direction, see ChoicePoint
 template <unsigned kFeatures, TransportMode kMode = TransportMode::kRadiance>
-RELIEF_KERNEL BsdfSample closure_sample(const SurfaceClosure& c, const BsdfTables& tables, float u_lobe, Vec2f u)
+RELIEF_KERNEL BsdfSample closure_sample(const SurfaceClosure& c, const BsdfTables& tables, float u_branch, Vec2f u)
 {
   LobeSample d;
   float probability = 0.0f;
   bool is_layer = false;
   lobes_visit_until<kFeatures>(c.lobes, [&]<typename L>(const L& lobe) {
-    if (!(u_lobe < lobe.probability)) {
-      u_lobe -= lobe.probability;
+    if (!(u.x < lobe.probability)) {
+      u.x -= lobe.probability;
       return false;
     }
-    d = lobe_sample<kMode>(lobe, c.base, tables, u_lobe / lobe.probability, u);
+    d = lobe_sample<kMode>(lobe, c.base, tables, u_branch, {choice_rest(u.x, lobe.probability), u.y});
     probability = lobe.probability;
     is_layer = L::kIsLayer;
     return true;
@@ -123,15 +124,14 @@ surface_eval(const SurfaceParams& p, const BsdfTables& tables, Vec3f wo, Vec3f w
 }
 
 /// Samples the surface.
-/// @param wo      unit, local shading frame
-/// @param u_lobe  [0, 1): see closure_sample
-/// @param u       [0, 1)²
+/// @param wo           unit, local shading frame
+/// @param u_branch, u  see closure_sample
 template <unsigned kFeatures, TransportMode kMode = TransportMode::kRadiance>
 [[gnu::flatten]] RELIEF_KERNEL BsdfSample
-surface_sample(const SurfaceParams& p, const BsdfTables& tables, Vec3f wo, float u_lobe, Vec2f u)
+surface_sample(const SurfaceParams& p, const BsdfTables& tables, Vec3f wo, float u_branch, Vec2f u)
 {
   return with_needed_features<kFeatures>(p, [&]<unsigned kNeeded>() {
-    return closure_sample<kNeeded, kMode>(surface_closure_make<kNeeded>(p, tables, wo), tables, u_lobe, u);
+    return closure_sample<kNeeded, kMode>(surface_closure_make<kNeeded>(p, tables, wo), tables, u_branch, u);
   });
 }
 

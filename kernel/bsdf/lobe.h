@@ -10,7 +10,7 @@
 // and two functions, which are given the interface that the lobes of the base share (base_interface.h):
 //
 //   lobe_eval<kMode>(lobe, base, tables, wi)             BsdfEval; pdf as if the lobe were chosen; delta lobes: 0
-//   lobe_sample<kMode>(lobe, base, tables, u_choice, u)  LobeSample
+//   lobe_sample<kMode>(lobe, base, tables, u_branch, u)  LobeSample
 //
 // They are called for lobes with a probability alone, and lobe_eval for directions on the lobe's side. Directions are in
 // the shading frame turned so that wo.z > 0. surface_closure.h has the one list and fills it; layered.h evaluates and

@@ -107,7 +107,7 @@ closure_eval(const Mixture& m, const BsdfTables& tables, Vec3f wi_local, const M
 
 /// As closure_sample of a SurfaceClosure.
 template <unsigned kFeatures, TransportMode kMode = TransportMode::kRadiance>
-RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tables, float u_lobe, Vec2f u)
+RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tables, float u_branch, Vec2f u)
 {
   const MixtureLobe* chosen = nullptr;
   for (std::uint64_t left = m.chosen; left != 0; left &= left - 1) {
@@ -115,16 +115,16 @@ RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tabl
     const float probability = lobe.probability * m.scale;
     if (!(probability > 0.0f)) continue;
     chosen = &lobe;
-    if (u_lobe < probability) {
-      u_lobe /= probability;
+    if (u.x < probability) {
+      u.x /= probability;
       break;
     }
-    u_lobe -= probability;
+    u.x -= probability;
   }
   if (chosen == nullptr) return {};
   // Rounding may leave a little over behind the last lobe.
-  u_lobe = min(u_lobe, 1.0f - kUnitRoundoff);
-  const LobeSample d = mixture_lobe_sample<kMode>(*chosen, u_lobe, u);
+  u.x = min(u.x, 1.0f - kUnitRoundoff);
+  const LobeSample d = mixture_lobe_sample<kMode>(*chosen, u_branch, u);
   if (d.bits == 0 || (d.wi.z < 0.0f) != ((d.bits & kLobeTransmit) != 0)) return {};
   BsdfSample s;
   const Vec3f wi = from_local(chosen->frame, d.wi);

@@ -323,7 +323,7 @@ template <TransportMode kMode>
 
 /// Samples glass, rough or smooth.
 template <TransportMode kMode>
-RELIEF_KERNEL LobeSample mixture_glass_sample(const MixtureLobe& lobe, float u_choice, Vec2f u)
+RELIEF_KERNEL LobeSample mixture_glass_sample(const MixtureLobe& lobe, float u_branch, Vec2f u)
 {
   const MixtureGlass& glass = lobe.shape.glass;
   const float eta = lobe.fresnel.eta;
@@ -335,7 +335,7 @@ RELIEF_KERNEL LobeSample mixture_glass_sample(const MixtureLobe& lobe, float u_c
   const float cos_o = min(1.0f, dot(wo, wm));
   if (!(cos_o > 0.0f)) return {};
   const float chance = fresnel_dielectric_at(cos_o, eta);
-  const bool reflects = u_choice < chance;
+  const bool reflects = u_branch < chance;
   Vec3f wi;
   if (reflects) {
     wi = 2.0f * cos_o * wm - wo;
@@ -376,14 +376,14 @@ RELIEF_KERNEL LobeSample mixture_delta_sample(const MixtureLobe& lobe)
 }
 
 /// Samples a lobe.
-/// @param u_choice  [0, 1): between reflection and refraction
+/// @param u_branch  [0, 1): between reflection and refraction
 /// @return          in the lobe's frame
 template <TransportMode kMode>
-[[gnu::noinline]] RELIEF_KERNEL LobeSample mixture_lobe_sample(const MixtureLobe& lobe, float u_choice, Vec2f u)
+[[gnu::noinline]] RELIEF_KERNEL LobeSample mixture_lobe_sample(const MixtureLobe& lobe, float u_branch, Vec2f u)
 {
   using K = MixtureLobeKind;
   const Vec3f wo = lobe.wo;
-  if (lobe.kind == K::kGlass) return mixture_glass_sample<kMode>(lobe, u_choice, u);
+  if (lobe.kind == K::kGlass) return mixture_glass_sample<kMode>(lobe, u_branch, u);
   if (lobe.is_delta) return mixture_delta_sample<kMode>(lobe);
   switch (lobe.kind) {
     case K::kTranslucent:

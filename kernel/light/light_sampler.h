@@ -20,7 +20,7 @@
 #include "kernel/light/spot.h"
 #include "kernel/light/sun.h"
 #include "kernel/math/motion.h"
-#include "kernel/sample/sobol.h"
+#include "kernel/sample/choice.h"
 #include "kernel/sample/warp.h"
 
 namespace relief {
@@ -227,73 +227,73 @@ RELIEF_KERNEL float light_environment_pdf(const EnvironmentView& environment, Ve
 struct LightsChoice {
   LightRef ref;
   float probability = 0;  ///< 0: none
+  Vec2f u;                ///< [0, 1)²: place on it
 };
 
 /// Chooses one light or the environment by estimated contribution at P, and starts to fetch it.
 /// @param P         world
 /// @param N         unit shading normal when only light from its side matters; zero vector: light from all sides does
-/// @param u_choice  [0, 1)
-/// @param u         what lights_sample_chosen will be given
-RELIEF_KERNEL LightsChoice lights_choose(const LightsView& view, Vec3f P, Vec3f N, float u_choice, Vec2f u)
+/// @param u         both chooses and is the place on what is chosen
+RELIEF_KERNEL LightsChoice lights_choose(const LightsView& view, Vec3f P, Vec3f N, ChoicePoint u)
 {
-  if (view.only_light >= 0) return {{view.only_light}, 1.0f};
+  if (view.only_light >= 0) return {{view.only_light}, 1.0f, choice_place(u)};
   const LightGroups groups = light_groups_eval(view, P, N);
-  // A deep tree wants more bits than a float has; the ones of the point on the light serve as the missing low ones.
-  const std::uint64_t low_bits = hash_mix((static_cast<std::uint64_t>(__builtin_bit_cast(std::uint32_t, u.x)) << 32) |
-                                          __builtin_bit_cast(std::uint32_t, u.y));
-  double choice = static_cast<double>(u_choice) + static_cast<double>(low_bits >> 32) * 0x1p-56;
-
   const double p_environment = static_cast<double>(groups.environment);
   const double p_suns = static_cast<double>(groups.suns);
-  if (choice < p_environment) return {{}, groups.environment};
-  choice -= p_environment;
+  if (u.x < p_environment) return {{}, groups.environment, choice_place({choice_rest(u.x, p_environment), u.y})};
+  const double choice = u.x - p_environment;
   if (choice < p_suns) {
-    float target = static_cast<float>(choice / p_suns) * groups.sun_sum;
+    const double scale = static_cast<double>(groups.sun_sum) / p_suns;
+    double target = choice * scale;
     LightsChoice chosen;
     for (std::uint32_t i = 0; i < view.num_suns; ++i) {
       const float importance = light_sun_importance(view.lights[view.suns[i]], N);
       if (!(importance > 0.0f)) continue;
-      chosen = {{static_cast<std::int32_t>(view.suns[i])}, groups.suns * importance / groups.sun_sum};
-      if (target < importance) break;
-      target -= importance;
+      const double width = static_cast<double>(importance);
+      chosen = {{static_cast<std::int32_t>(view.suns[i])},
+                groups.suns * importance / groups.sun_sum,
+                choice_place({choice_rest(target, width), u.y})};
+      if (target < width) break;
+      target -= width;
     }
     return chosen;
   }
   if (!(groups.finite > 0.0f)) return {};
-  const double in_group = (choice - p_suns) / static_cast<double>(groups.finite);
+  const double in_group = choice_rest(choice - p_suns, static_cast<double>(groups.finite));
   const LightChoice chosen = light_tree_sample(view.tree, groups.finite_root, P, N, in_group);
   // Among thousands of lights this one is in no near cache; what the caller does meanwhile hides half of the wait.
   const Light* light = &view.lights[chosen.light_index];
   __builtin_prefetch(light);
   __builtin_prefetch(reinterpret_cast<const char*>(light) + 64);
-  return {{static_cast<std::int32_t>(chosen.light_index), chosen.copy_index}, groups.finite * chosen.probability};
+  return {{static_cast<std::int32_t>(chosen.light_index), chosen.copy_index},
+          groups.finite * chosen.probability,
+          choice_place({chosen.rest, u.y})};
 }
 
 /// Samples a light that lights_choose has chosen.
 /// @param light  in world space; null: the environment
 /// @param N      as handed to it
-/// @param u      [0, 1)²
 /// @return       pdf includes the choice; see LightSample
 RELIEF_KERNEL LightSample
-lights_sample_chosen(const LightsView& view, LightsChoice chosen, const Light* light, Vec3f P, Vec3f N, Vec2f u)
+lights_sample_chosen(const LightsView& view, LightsChoice chosen, const Light* light, Vec3f P, Vec3f N)
 {
-  LightSample sample = light == nullptr ? light_environment_sample(view.environment, N, u) : light_sample(*light, P, u);
+  LightSample sample = light == nullptr ? light_environment_sample(view.environment, N, chosen.u)
+                                        : light_sample(*light, P, chosen.u);
   sample.pdf *= chosen.probability;
   sample.ref = chosen.ref;
   return sample;
 }
 
 /// Chooses one light or the environment by estimated contribution at P and samples it.
-/// @param P, N, u_choice, u  as in lights_choose
-/// @param time               as in lights_at
-RELIEF_KERNEL LightSample
-lights_sample(const LightsView& view, Vec3f P, Vec3f N, float u_choice, Vec2f u, float time = 0.0f)
+/// @param P, N, u  as in lights_choose
+/// @param time     as in lights_at
+RELIEF_KERNEL LightSample lights_sample(const LightsView& view, Vec3f P, Vec3f N, ChoicePoint u, float time = 0.0f)
 {
-  const LightsChoice chosen = lights_choose(view, P, N, u_choice, u);
+  const LightsChoice chosen = lights_choose(view, P, N, u);
   if (!(chosen.probability > 0.0f)) return {};
   Light storage;
   const Light* light = chosen.ref.light_index >= 0 ? &lights_at(view, chosen.ref, storage, time) : nullptr;
-  return lights_sample_chosen(view, chosen, light, P, N, u);
+  return lights_sample_chosen(view, chosen, light, P, N);
 }
 
 /// Density with which lights_sample, called at P, would have made a ray that hit an area light.

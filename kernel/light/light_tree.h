@@ -20,6 +20,7 @@
 #pragma once
 
 #include "kernel/math/affine.h"
+#include "kernel/sample/choice.h"
 
 #ifdef __AVX__
 #include <immintrin.h>
@@ -199,6 +200,7 @@ struct LightChoice {
   std::uint32_t light_index = 0;
   std::int32_t copy_index = -1;  ///< −1: the light is no instance's
   float probability = 0;         ///< 0: none; the walk can end in a group none of whose members turns out to contribute
+  double rest = 0;               ///< [0, 1): what the choice has left of its number, uniform again
 };
 
 /// Chooses one of the finite lights.
@@ -230,17 +232,17 @@ RELIEF_KERNEL LightChoice light_tree_sample(LightTreeView tree, const LightEstim
       passed = pass ? block_running : passed;
     }
     const float value = at->value[block][lane];
-    // In double, for what is left of u has to choose at the levels below.
-    const double rest =
-        u * static_cast<double>(at->sum) - static_cast<double>(at->before[lane]) - static_cast<double>(passed);
-    u = rest > 0.0 ? rest / static_cast<double>(value) : 0.0;
+    // In double, for what is left of u has to choose at the levels below, and a place on the light.
+    u = choice_rest(
+        u * static_cast<double>(at->sum) - static_cast<double>(at->before[lane]) - static_cast<double>(passed),
+        static_cast<double>(value));
     probability *= value / at->sum;
     link = tree.blocks[(link & kLightTreeIndexMask) + static_cast<std::uint32_t>(block)].link[lane];
     if ((link & (kLightTreeLeaf | kLightTreeCopy)) == (kLightTreeLeaf | kLightTreeCopy)) {
       copy_index = static_cast<std::int32_t>(link & kLightTreeIndexMask);
       link = light_copy_enter(tree.copies[copy_index], P, N);
     }
-    if ((link & kLightTreeLeaf) != 0) return {link & kLightTreeIndexMask, copy_index, probability};
+    if ((link & kLightTreeLeaf) != 0) return {link & kLightTreeIndexMask, copy_index, probability, u};
     light_tree_estimate(tree, link, P, N, below);
     at = &below;
   }

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "kernel/sample/sobol.h"
+#include "kernel/sample/choice.h"
 
 namespace relief {
 
@@ -16,9 +16,9 @@ enum class CameraDimension : std::uint32_t {
 
 /// Uses at every surface that a path meets. The first four are drawn together, see scatter_samples.
 enum class BounceDimension : std::uint32_t {
-  kChoices,       ///< 2D: which light; which lobe scatters
-  kLightUv,       ///< 2D: place on the light
-  kBsdfUv,        ///< 2D: direction within the lobe
+  kLight,         ///< 2D: which light, and the place on it
+  kBsdf,          ///< 2D: which lobe scatters, and the direction within it
+  kBranch,        ///< 2D: whether what the direction is known of reflects or transmits; the second is left
   kFate,          ///< 2D: whether the path goes on; whether sharp or soft lobes have scattered it
   kTransparency,  ///< 1D: whether a partly transparent surface is there
   kCount
@@ -77,16 +77,16 @@ RELIEF_KERNEL constexpr std::uint32_t dimension_bounce(int bounce, BounceDimensi
 
 /// The numbers that one scattering event may ask for, each in [0, 1).
 struct ScatterSamples {
-  float light_choice, bsdf_lobe;
-  Vec2f light_uv, bsdf_uv;
-  float roulette, sharpness;
+  ChoicePoint light;
+  Vec2f bsdf;
+  float branch, roulette, sharpness;
 };
 
 /// @param bounce  as in dimension_bounce; the rest as in sample_2d
 RELIEF_KERNEL ScatterSamples scatter_samples(std::uint32_t pixel_hash, std::uint32_t sample_index, int bounce)
 {
-  const Sample2dX4 u = sample_2d_x4(pixel_hash, sample_index, dimension_bounce(bounce, BounceDimension::kChoices));
-  return {u.at[0].x, u.at[0].y, u.at[1], u.at[2], u.at[3].x, u.at[3].y};
+  const Sample2dX4 u = sample_2d_x4(pixel_hash, sample_index, dimension_bounce(bounce, BounceDimension::kLight));
+  return {choice_point(u.first_bits[0], u.first_bits[1]), u.at[1], u.at[2].x, u.at[3].x, u.at[3].y};
 }
 
 }  // namespace relief

@@ -182,6 +182,7 @@ RELIEF_KERNEL constexpr Vec2f sample_2d(std::uint32_t pixel_hash, std::uint32_t 
 /// Points of four dimensions at once.
 struct Sample2dX4 {
   Vec2f at[4];
+  std::uint32_t first_bits[2];  ///< all bits of the first dimension's numbers, which floats hold 24 of
 };
 
 /// The points that sample_2d has for four dimensions in a row, for little more than what one of them costs: what a
@@ -200,7 +201,7 @@ RELIEF_KERNEL Sample2dX4 sample_2d_x4(std::uint32_t pixel_hash, std::uint32_t sa
   using FloatX8 = float __attribute__((vector_size(32)));
   // 24 bits, as unit_float; signed, because that is what machines convert.
   const FloatX8 u = __builtin_convertvector(__builtin_bit_cast(IntX8, bits >> 8), FloatX8) * 0x1p-24f;
-  return {{{u[0], u[1]}, {u[2], u[3]}, {u[4], u[5]}, {u[6], u[7]}}};
+  return {{{u[0], u[1]}, {u[2], u[3]}, {u[4], u[5]}, {u[6], u[7]}}, {bits[0], bits[1]}};
 }
 
 }  // namespace relief

@@ -27,7 +27,7 @@ shade_surface_seen_by(const KernelGlobals& g, const Closure& closure, Vec3f wi, 
 }
 
 /// Queues a shadow ray towards a light sample taken at the hit.
-/// @param chosen, light_u, light_N  from and given to lights_choose
+/// @param chosen, light_N  from and given to lights_choose
 template <unsigned kFeatures, typename Closure>
 RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
                                        const PathState& state,
@@ -35,7 +35,6 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
                                        const SurfaceInteraction& at,
                                        const Closure& closure,
                                        LightsChoice chosen,
-                                       Vec2f light_u,
                                        Vec3f light_N,
                                        RayCone cone,
                                        ShadowQueue& shadow)
@@ -45,7 +44,7 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   Light storage;
   const Light* emitter =
       chosen.ref.light_index >= 0 ? &lights_at(g.lights, chosen.ref, storage, path_time(state, path)) : nullptr;
-  const LightSample light = lights_sample_chosen(g.lights, chosen, emitter, P, light_N, light_u);
+  const LightSample light = lights_sample_chosen(g.lights, chosen, emitter, P, light_N);
   if (!(light.pdf > 0.0f)) return;
   Vec3f radiance = light.radiance;
   const bool is_mesh = emitter != nullptr && emitter->instance_index >= 0;
@@ -308,7 +307,7 @@ RELIEF_KERNEL void shade_surface_scatter(const KernelGlobals& g,
   if constexpr ((kFeatures & kFeatureCaustics) != 0 && (kFeatures & kFeatureTransmission) != 0 &&
                 (kFeatures & kFeatureMixture) == 0) {
     if (path_forks_at_glass(state, path, closure)) {
-      const GlassBranches branches = glass_branches_sample<kFeatures>(closure, *g.bsdf_tables, u.bsdf_lobe, u.bsdf_uv);
+      const GlassBranches branches = glass_branches_sample<kFeatures>(closure, *g.bsdf_tables, u.bsdf);
       const bool by_photons =
           path_gathers_tails(state.flags[path], *at.instance) && branches.reflected.pdf < kTailDensity;
       if (branches.reflectance < 1.0f && !by_photons) {
@@ -514,9 +513,9 @@ template <unsigned kFeatures>
     const Mixture closure = mixture_of(lobes, side.frame, side.Ng);
     if (g.has_lights && !last && !mixture_is_delta(closure)) {
       const Vec3f light_N = at.params.transmission > 0.0f ? Vec3f{} : side.Ns;
-      const LightsChoice chosen = lights_choose(g.lights, at.hit.P, light_N, u.light_choice, u.light_uv);
+      const LightsChoice chosen = lights_choose(g.lights, at.hit.P, light_N, u.light);
       if (chosen.probability > 0.0f) {
-        shade_surface_light<kFeatures>(g, state, path, at, closure, chosen, u.light_uv, light_N, cone, shadow);
+        shade_surface_light<kFeatures>(g, state, path, at, closure, chosen, light_N, cone, shadow);
       }
     }
     state.throughput[path] = before;
@@ -557,7 +556,7 @@ template <unsigned kFeatures>
   LightsChoice chosen;
   if constexpr (!kMixture) {
     if (g.has_lights && !surface_is_delta(params)) {
-      chosen = lights_choose(g.lights, at.hit.P, light_N, u.light_choice, u.light_uv);
+      chosen = lights_choose(g.lights, at.hit.P, light_N, u.light);
     }
   }
 
@@ -569,10 +568,10 @@ template <unsigned kFeatures>
       return surface_closure_make<kFeatures>(params, *g.bsdf_tables, wo_local);
     }
   }();
-  const BsdfSample bsdf = closure_sample<kFeatures>(closure, *g.bsdf_tables, u.bsdf_lobe, u.bsdf_uv);
+  const BsdfSample bsdf = closure_sample<kFeatures>(closure, *g.bsdf_tables, u.branch, u.bsdf);
 
   if (chosen.probability > 0.0f) {
-    shade_surface_light<kFeatures>(g, state, path, at, closure, chosen, u.light_uv, light_N, cone, shadow);
+    shade_surface_light<kFeatures>(g, state, path, at, closure, chosen, light_N, cone, shadow);
   }
 
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
@@ -588,7 +587,7 @@ template <unsigned kFeatures>
         const std::uint32_t copy = k > 0 ? path_fork(state, path) : path;
         if (k > 0) state.pixel_hash[copy] = hash_mix_32(state.pixel_hash[path] + k);
         shade_surface_scatter<kFeatures>(g, state, copy, at, closure,
-                                         closure_sample<kFeatures>(closure, *g.bsdf_tables, v.bsdf_lobe, v.bsdf_uv),
+                                         closure_sample<kFeatures>(closure, *g.bsdf_tables, v.branch, v.bsdf),
                                          1.0f / static_cast<float>(splits), v, throughput, light_N, cone, next);
       }
       return;

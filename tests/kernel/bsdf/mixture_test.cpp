@@ -275,8 +275,8 @@ TEST(Mixture, SamplesFollowTheDensityOfAllLobes)
     Chi2Histogram histogram(16, 24);
     TestRandom random(number);
     for (int n = 0; n < 200000; ++n) {
-      const float u_lobe = random.next(), u = random.next();
-      const BsdfSample s = closure_sample<kFeatureAll>(m, tables(), u_lobe, {u, random.next()});
+      const float u_branch = random.next(), u = random.next();
+      const BsdfSample s = closure_sample<kFeatureAll>(m, tables(), u_branch, {u, random.next()});
       if (s.pdf > 0.0f) {
         histogram.add(s.wi.x, s.wi.y, s.wi.z);
       } else {
@@ -300,8 +300,8 @@ TEST(Mixture, SamplesAndEvaluationsGiveOneAlbedo)
     double sampled = 0, sampled2 = 0, uniform = 0, uniform2 = 0;
     TestRandom random(5);
     for (int n = 0; n < kSamples; ++n) {
-      const float u_lobe = random.next(), u = random.next(), v = random.next();
-      const BsdfSample s = closure_sample<kFeatureAll>(m, tables(), u_lobe, {u, v});
+      const float u_branch = random.next(), u = random.next(), v = random.next();
+      const BsdfSample s = closure_sample<kFeatureAll>(m, tables(), u_branch, {u, v});
       const double a = s.pdf > 0.0f ? static_cast<double>(mean_component(s.f) * __builtin_fabsf(s.wi.z) / s.pdf) : 0.0;
       sampled += a;
       sampled2 += a * a;
@@ -343,8 +343,8 @@ double furnace(const Mixture& m)
   double sum = 0;
   TestRandom random(11);
   for (int n = 0; n < kSamples; ++n) {
-    const float u_lobe = random.next(), u = random.next();
-    const BsdfSample s = closure_sample<kFeatureAll>(m, tables(), u_lobe, {u, random.next()});
+    const float u_branch = random.next(), u = random.next();
+    const BsdfSample s = closure_sample<kFeatureAll>(m, tables(), u_branch, {u, random.next()});
     if (s.pdf > 0.0f) sum += static_cast<double>(max_component(s.f) * __builtin_fabsf(s.wi.z) / s.pdf);
   }
   return sum / kSamples;

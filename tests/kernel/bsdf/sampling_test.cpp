@@ -59,9 +59,9 @@ TEST(SurfaceSample, FollowsItsDensity)
     Chi2Histogram histogram(16, 24);
     TestRandom random(i);
     for (int n = 0; n < 1000000; ++n) {
-      const float u_lobe = random.next();
+      const float u_branch = random.next();
       const float u = random.next();
-      const BsdfSample s = closure_sample<kFeatureAll>(closure, full_tables(), u_lobe, {u, random.next()});
+      const BsdfSample s = closure_sample<kFeatureAll>(closure, full_tables(), u_branch, {u, random.next()});
       if (s.pdf > 0.0f) {
         histogram.add(s.wi.x, s.wi.y, s.wi.z);
       } else {
@@ -331,17 +331,16 @@ TEST(GlassBranches, AreWhatChanceWouldChooseBetween)
     for (int n = 0; n < 1000; ++n) {
       const float u_x = random.next();
       const Vec2f u{u_x, random.next()};
-      const GlassBranches both = glass_branches_sample<kFeatureAll>(closure, full_tables(), 0.999f, u);
+      const GlassBranches both = glass_branches_sample<kFeatureAll>(closure, full_tables(), u);
       const float F = both.reflectance;
       EXPECT_EQ(
-          glass_branches_sample<kFeatureAll>(closure, full_tables(), 0.99f * glass_lobe.lost - 1e-9f, u).reflectance,
+          glass_branches_sample<kFeatureAll>(closure, full_tables(), {0.99f * glass_lobe.lost - 1e-9f, u.y}).reflectance,
           1.0f);
       if (!(F < 0.999f)) continue;
       ++pairs;
-      const float turn = glass_lobe.lost + (1 - glass_lobe.lost) * F;
       constexpr float kClose = 1e-5f;
-      const BsdfSample below = closure_sample<kFeatureAll>(closure, full_tables(), turn - kClose, u);
-      const BsdfSample above = closure_sample<kFeatureAll>(closure, full_tables(), turn + kClose, u);
+      const BsdfSample below = closure_sample<kFeatureAll>(closure, full_tables(), F - kClose, u);
+      const BsdfSample above = closure_sample<kFeatureAll>(closure, full_tables(), F + kClose, u);
       for (const auto& [one, other] : {std::pair{below, both.reflected}, std::pair{above, both.refracted}}) {
         EXPECT_EQ(one.lobe, other.lobe);
         EXPECT_EQ(one.pdf, other.pdf);
@@ -354,7 +353,7 @@ TEST(GlassBranches, AreWhatChanceWouldChooseBetween)
   }
   EXPECT_EQ(glass_branches_sample<kFeatureAll>(
                 surface_closure_make<kFeatureAll>(glass(1.0f, 0.2f), full_tables(), direction(0.5f)), full_tables(),
-                0.5f, {0.5f, 0.5f})
+                {0.5f, 0.5f})
                 .reflectance,
             1.0f);
 }

@@ -52,7 +52,8 @@ inline Moments sampler_moments(const LightsView& view, Vec3f P, Vec3f N, int sam
   double sum = 0, squares = 0;
   for (int k = 0; k < samples; ++k) {
     const std::uint32_t hash = sample_pixel_hash(11, k, 0);
-    const LightSample sample = lights_sample(view, P, N, sample_1d(hash, 0, 1), sample_2d(hash, 0, 2));
+    const Sample2dX4 u = sample_2d_x4(hash, 0, 1);
+    const LightSample sample = lights_sample(view, P, N, choice_point(u.first_bits[0], u.first_bits[1]));
     if (!(sample.pdf > 0.0f)) continue;
     const double value = static_cast<double>(light_scalar(sample.radiance) * max(0.0f, dot(N, sample.wi)) / sample.pdf);
     sum += value / samples;

@@ -110,7 +110,7 @@ TEST(LightSet, TwoTrianglesOfARectangleAreOneLight)
     const float pdf = lights_pdf(view, P, {}, {0}, wi, 2.1f);
     EXPECT_GT(pdf, 0.0f);
     EXPECT_EQ(lights_pdf(view, P, {}, {1}, wi, 2.1f), pdf);
-    EXPECT_EQ(lights_sample(view, P, {}, 0.4f, {0.3f, 0.9f}).ref.light_index, 0);
+    EXPECT_EQ(lights_sample(view, P, {}, {0.4, 0.9f}).ref.light_index, 0);
   }
 }
 
@@ -179,7 +179,7 @@ TEST(LightSet, DoubleSidedMaterialsEmitFromBothSides)
   const LightSet set = light_set_make(squares({emissive({1, 1, 1}), both}), {});
   EXPECT_FALSE(set.lights[0].two_sided);
   EXPECT_TRUE(set.lights[2].two_sided);
-  EXPECT_EQ(lights_sample(set.view(), {0.5f, 0.2f, -1}, {}, 0.0f, {0.5f, 0.5f}).ref.light_index / 2, 1);
+  EXPECT_EQ(lights_sample(set.view(), {0.5f, 0.2f, -1}, {}, {0.0, 0.5f}).ref.light_index / 2, 1);
 }
 
 TEST(LightSet, TexturesWeighTheChoiceButNotTheEmission)

@@ -201,7 +201,7 @@ TEST(SharedLights, DensityOfAHitEqualsTheSamples)
   int compared = 0, squares = 0;
   for (int i = 0; i < 20000; ++i) {
     const Vec3f P = random.in_cube(8), N = random.next() < 0.25 ? Vec3f{} : random.direction();
-    const LightSample sample = lights_sample(view, P, N, random.unit(), {random.unit(), random.unit()});
+    const LightSample sample = lights_sample(view, P, N, {random.next(), random.unit()});
     if (sample.pdf == 0.0f) continue;
     ++compared;
     LightRef hit = sample.ref;
