@@ -140,7 +140,7 @@ void print_displacements(const Scene& scene, const DisplacementSet& displacement
 void print_prepared(const DisplacementSet& displacements, const Statistics& stats)
 {
   const DisplacedMeshReport report = displacements.report();
-  line("displaced geometries: {}, traced by {}, {}", displacements.size(), stats.displacement.method,
+  line("displaced geometries: {}, traced by {}, {}", stats.displacement.num_geometries, stats.displacement.method,
        megabytes(stats.displacement.bytes));
   line("  prisms: {}; folded (slower to trace) {}, with normals that cancel {}, without a normal {}",
        stats.displacement.num_prisms, report.num_folded, report.num_short_normals, report.num_degenerate);
@@ -290,7 +290,7 @@ int info(const std::string& file,
          scene.textures->is_cached(static_cast<int>(i)) ? ", through the tile cache" : "");
   }
   if (!scene.displacements.empty()) print_displacements(scene, context.displacements);
-  if (context.displacements.size() > 0) print_prepared(context.displacements, stats);
+  if (stats.displacement.num_geometries > 0) print_prepared(context.displacements, stats);
   line("caustics: {} ({})", context.globals.caustics.enabled ? "photons" : "none", context.caustics_reason);
   line("features: {}", features(scene));
   line(

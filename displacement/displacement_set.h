@@ -14,6 +14,7 @@
 #include "displacement/height_fields.h"
 #include "displacement/lattice_split.h"
 #include "displacement/level_facets.h"
+#include "displacement/moved_mesh.h"
 #include "displacement/prepared_mesh.h"
 #include "displacement/seams.h"
 #include "kernel/camera/camera.h"
@@ -31,8 +32,11 @@ struct DisplacedInstance {
 /// Heights of a mesh that are computed where they are wanted.
 struct ComputedHeights {
   HeightSource source;         ///< without eval: the displacement's map is, if it has one
+  CornerHeights corners = {};  ///< by `source`
   CellsAlong cells;            ///< that are wanted; not used with num_cells
+  CellsAlong cells_seen = {};  ///< likewise, fewer where the camera does not look
   std::int32_t num_cells = 0;  ///< along each side of all triangles, a power of two; 0: by `cells`
+  bool is_constant = false;    ///< the same all over the mesh
 };
 
 /// What there is to be displaced.
@@ -49,7 +53,14 @@ struct DisplacementInput {
   std::shared_ptr<const void> heights_owner;  ///< of what their sources read
 };
 
-/// Which meshes of a sequence of pictures are diced, decided where they are met first. What dicing takes and spares changes
+/// Whose vertices displacement moves.
+enum class VertexMove : std::uint8_t {
+  kNone,    ///< rays are traced over the heights
+  kOwn,     ///< the mesh's
+  kDivided  ///< those of triangles that its own are divided to
+};
+
+/// Which meshes of a sequence of pictures are diced or moved, decided where they are met first. What dicing takes and spares changes
 /// with the camera: decided anew, a mesh would be exact in one picture and diced in the next, and its mean would jump.
 struct DicingChoices {
   /// A mesh by its name, displacement and triangles, and what dicing is asked for.
@@ -63,6 +74,7 @@ struct DicingChoices {
     auto operator<=>(const Key&) const = default;
   };
   std::map<Key, bool> is_diced;
+  std::map<Key, VertexMove> moved;  ///< likewise, which ones have their vertices moved
 };
 
 /// What overrides the settings.
@@ -101,8 +113,11 @@ class DisplacementSet {
   DisplacementSet(DisplacementSet&&) = default;
   DisplacementSet& operator=(DisplacementSet&&) = delete;
 
-  /// @return  index of the displaced geometry of an instance; −1: it is not displaced
+  /// @return  index of the displaced geometry of an instance; −1: it is not displaced, or its mesh is moved
   int geometry_index(std::size_t instance) const { return geometry_of_instance_[instance]; }
+  /// @return  index of the moved mesh that an instance has in place of its own; −1: it has its own
+  int moved_index(std::size_t instance) const { return moved_of_instance_[instance]; }
+  std::span<const MovedMesh> moved() const { return moved_; }
   std::size_t size() const { return geometries_.size(); }
   /// Whether rays must say what detail they ask for.
   bool has_levels() const { return has_levels_; }
@@ -142,7 +157,7 @@ class DisplacementSet {
   DisplacedMeshReport report() const;                        ///< sums over all geometries
   const HeightFields::Tally& kept() const { return kept_; }  ///< of the sets before
   const KeptMeshes::Tally& kept_meshes() const { return kept_tally_; }
-  std::string method_names() const;  ///< of the geometries, separated by commas
+  std::string method_names() const;  ///< of the geometries, separated by commas, and "vertices" for moved meshes
   /// What `auto` chose by, a line a geometry.
   const std::vector<std::string>& reasons() const { return reasons_; }
   /// Parts of the surfaces that are missing, and methods that are not followed.
@@ -162,6 +177,7 @@ class DisplacementSet {
   /// A mesh and a displacement that occur together, on one or more instances.
   struct Use {
     const MeshView& mesh;
+    int mesh_index;
     const std::string& mesh_name;
     int displacement_index;
     const DisplacementSettings& settings;
@@ -181,6 +197,15 @@ class DisplacementSet {
                                           const DisplacementMapping& mapping,
                                           const std::vector<const HeightFieldView*>& fields);
   std::unique_ptr<PreparedMesh> make_computed(const Use& use, const DisplacementOptions& options);
+  /// Whose vertices a use is to move: the mesh's where heights are the same everywhere or triangles a few cells wide, those of
+  /// divided ones where they have room.
+  /// @param parts       receives those of divided triangles
+  /// @param used_bytes  by all meshes so far; grows by what dividing takes
+  VertexMove vertex_move_of(const Use& use,
+                            const DisplacementOptions& options,
+                            std::vector<LatticeTriangle>* parts,
+                            std::uint64_t* used_bytes);
+  MovedMesh make_moved(const Use& use, VertexMove move, std::span<const LatticeTriangle> parts);
   /// Levels of a map that still show something on a mesh.
   int num_useful_levels(const Use& use) const;
   /// The method that a use is to be traced by; `auto` may still tessellate.
@@ -216,7 +241,7 @@ class DisplacementSet {
   std::vector<MeshView> meshes_;
   std::shared_ptr<const void> heights_owner_;
   std::unique_ptr<LatticeCache> lattice_cache_;  ///< of computed heights; null: there are none
-  std::vector<int> geometry_of_instance_;
+  std::vector<int> geometry_of_instance_, moved_of_instance_;
   std::vector<float> texel_of_instance_;
   bool has_levels_ = false, has_facets_ = false;
   std::vector<std::string> reasons_, untessellated_;
@@ -225,6 +250,7 @@ class DisplacementSet {
   std::shared_ptr<KeptMeshes> kept_meshes_;  ///< null: none are kept
   KeptMeshes::Tally kept_tally_;
   std::vector<std::unique_ptr<PreparedMesh>> geometries_;
+  std::vector<MovedMesh> moved_;
 };
 
 }  // namespace relief

@@ -33,6 +33,12 @@ std::vector<std::uint32_t> first_equals(std::size_t count, const Key& key, const
 /// By its bits; −0 and 0 are one place.
 std::uint32_t place_bits(float x) { return std::bit_cast<std::uint32_t>(x + 0.0f); }
 
+/// Of a displacement line.
+std::array<std::uint32_t, 6> line_bits(Vec3f P, Vec3f N)
+{
+  return {place_bits(P.x), place_bits(P.y), place_bits(P.z), place_bits(N.x), place_bits(N.y), place_bits(N.z)};
+}
+
 template <std::size_t N>
 std::uint64_t place_hash(const std::array<std::uint32_t, N>& place)
 {
@@ -45,12 +51,17 @@ std::uint64_t place_hash(const std::array<std::uint32_t, N>& place)
 
 std::vector<std::uint32_t> weld_corners(std::span<const DisplacedTriangle> triangles)
 {
-  const auto place_of = [&](std::uint32_t corner) -> std::array<std::uint32_t, 6> {
+  const auto key = [&](std::uint32_t corner) {
     const DisplacedTriangle& tri = triangles[corner / 3];
-    const Vec3f P = tri.P[corner % 3], N = tri.N[corner % 3];
-    return {place_bits(P.x), place_bits(P.y), place_bits(P.z), place_bits(N.x), place_bits(N.y), place_bits(N.z)};
+    return line_bits(tri.P[corner % 3], tri.N[corner % 3]);
   };
-  return first_equals(3 * triangles.size(), place_of, place_hash<6>);
+  return first_equals(3 * triangles.size(), key, place_hash<6>);
+}
+
+std::vector<std::uint32_t> weld_vertices(std::span<const Vec3f> P, std::span<const Normal3f> N)
+{
+  const auto key = [&](std::uint32_t vertex) { return line_bits(P[vertex], as_vector(N[vertex])); };
+  return first_equals(P.size(), key, place_hash<6>);
 }
 
 std::vector<std::uint32_t> weld_positions(std::span<const DisplacedTriangle> triangles)

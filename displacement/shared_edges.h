@@ -14,6 +14,10 @@ namespace relief {
 /// @return  for corner 3 · triangle + k the first corner that is equal to it
 std::vector<std::uint32_t> weld_corners(std::span<const DisplacedTriangle> triangles);
 
+/// Numbers the distinct (P, N) of a mesh's vertices.
+/// @return  for each the first one that is equal to it
+std::vector<std::uint32_t> weld_vertices(std::span<const Vec3f> P, std::span<const Normal3f> N);
+
 /// Numbers the distinct P of all corners.
 /// @return  as weld_corners
 std::vector<std::uint32_t> weld_positions(std::span<const DisplacedTriangle> triangles);

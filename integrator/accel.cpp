@@ -122,9 +122,9 @@ float steady_pad(const InstanceGeometry& instance)
 }
 
 /// What new_mesh reads of a mesh.
-void hash_triangles(const Mesh& mesh, ContentHasher* hash)
+void hash_triangles(const TreeMesh& mesh, ContentHasher* hash)
 {
-  hash->add_array(mesh.P.data(), mesh.P.size());
+  hash->add_array(mesh.P->data(), mesh.P->size());
   hash->add(mesh.steps.size());
   for (const MeshStep& step : mesh.steps) hash->add_array(step.P.data(), step.P.size());
   hash->add_array(mesh.triangles.data(), mesh.triangles.size());
@@ -157,7 +157,13 @@ Accel::Accel(const Scene& scene,
       trees_(trees != nullptr ? std::move(trees) : std::make_shared<KeptTrees>(false))
 {
   for (std::size_t d = 0; d < displacements.size(); ++d) displacements.geometry(d).shadow_filter = nullptr;
-  meshes_.resize(scene.meshes.size());
+  for (const Mesh& mesh : scene.meshes) {
+    meshes_.emplace_back().mesh = {mesh.name, &mesh.P, mesh.steps, mesh.triangles};
+  }
+  for (const MovedMesh& moved : displacements.moved()) {
+    const MeshView& mesh = views_->meshes[meshes_.size()];
+    meshes_.emplace_back().mesh = {moved.name, &moved.P, {}, {mesh.triangles, mesh.num_triangles}};
+  }
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
     const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
@@ -167,7 +173,7 @@ Accel::Accel(const Scene& scene,
         displacements.geometry(static_cast<std::size_t>(displaced)).shadow_filter = shadow_filter_;
       continue;
     }
-    MeshUse& mesh = meshes_[static_cast<std::size_t>(instance.mesh_index)];
+    MeshUse& mesh = use_of(i);
     ++mesh.count;
     mesh.transparent |= lets_light_through;
     mesh.takes_time |= (views.instances[i].flags & (kMoves | kDeforms)) != 0;
@@ -175,9 +181,9 @@ Accel::Accel(const Scene& scene,
   build_displaced(displacements);
   place_instances(scene, lights, area_lights);
   build_tessellated(displacements);
-  build_meshes(scene);
+  build_meshes();
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
-    if (scene_->instances[i] != nullptr) scene_->instances[i]->scene = tree_of(scene, i).get();
+    if (scene_->instances[i] != nullptr) scene_->instances[i]->scene = tree_of(i).get();
   }
   build_top(scene, lights, area_lights);
   top_ = scene_->top.get();
@@ -241,27 +247,26 @@ void Accel::place_instances(const Scene& scene,
                             std::span<const Light> lights,
                             std::span<const std::uint32_t> area_lights)
 {
-  for (std::size_t m = 0; m < meshes_.size(); ++m) {
-    if (!meshes_[m].has_tree()) continue;
-    Box3& mesh_box = meshes_[m].box;
-    mesh_box = points_box(scene.meshes[m].P, {});
-    for (const MeshStep& step : scene.meshes[m].steps) mesh_box = box_union(mesh_box, points_box(step.P, {}));
+  for (MeshUse& use : meshes_) {
+    if (!use.has_tree()) continue;
+    use.box = points_box(*use.mesh.P, {});
+    for (const MeshStep& step : use.mesh.steps) use.box = box_union(use.box, points_box(step.P, {}));
   }
   scene_ = std::make_unique<SceneTree>();
   Box3 box = box_empty();
   scene_->instances.resize(scene.instances.size());
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
-    const auto mesh = static_cast<std::size_t>(instance.mesh_index);
+    const MeshUse& use = use_of(i);
     const int displaced = displacements_->geometry_index(i);
     const auto d = static_cast<std::size_t>(displaced);
-    if (displaced < 0 && !meshes_[mesh].has_tree()) {
-      box = box_union(box, points_box(scene.meshes[mesh].P, instance.world_from_object));
+    if (displaced < 0 && !use.has_tree()) {
+      box = box_union(box, points_box(*use.mesh.P, instance.world_from_object));
       continue;
     }
     // Trees of meshes and tessellations come later: their boxes depend on the pad.
     scene_->instances[i] = std::make_unique<InstanceGeometry>(instance_geometry_prepare(
-        displaced >= 0 ? displaced_[d].tree.get() : nullptr, displaced >= 0 ? displaced_[d].box : meshes_[mesh].box,
+        displaced >= 0 ? displaced_[d].tree.get() : nullptr, displaced >= 0 ? displaced_[d].box : use.box,
         instance.world_from_object, views_->motion.view(instance.motion_index), &scene_->pad));
     box = box_union(box, instance_bounds(*scene_->instances[i]));
   }
@@ -281,30 +286,27 @@ void Accel::place_instances(const Scene& scene,
       continue;
     }
     const int displaced = displacements_->geometry_index(i);
-    Vec3f& pad = displaced >= 0 ? displaced_[static_cast<std::size_t>(displaced)].pad
-                                : meshes_[static_cast<std::size_t>(scene.instances[i].mesh_index)].pad;
+    Vec3f& pad = displaced >= 0 ? displaced_[static_cast<std::size_t>(displaced)].pad : use_of(i).pad;
     pad = max(pad, splat3(steady_pad(*instance)));
     instance.reset();
   }
 }
 
-void Accel::build_meshes(const Scene& scene)
+void Accel::build_meshes()
 {
-  for (std::size_t m = 0; m < meshes_.size(); ++m) {
-    MeshUse& use = meshes_[m];
+  for (MeshUse& use : meshes_) {
     if (!use.has_tree()) continue;
-    const Mesh& mesh = scene.meshes[m];
     ContentHash content;
     if (trees_->keeps()) {
       ContentHasher hash;
-      hash_triangles(mesh, &hash);
+      hash_triangles(use.mesh, &hash);
       hash.add(use.transparent, use.pad.x, use.pad.y, use.pad.z);
       content = hash.result();
     }
     use.tree = trees_->mesh_tree(content, [&] {
       // Spatial splits of HIGH quality would call the shadow filter twice for one triangle.
       TreePointer tree = trees_->scene_make(use.transparent ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
-      attach(tree.get(), new_mesh(mesh, nullptr, use.transparent), 0, ~0u);
+      attach(tree.get(), new_mesh(use.mesh, nullptr, use.transparent), 0, ~0u);
       attach_corners(tree.get(), use.box, use.pad);
       commit(tree.get());
       return tree;
@@ -312,11 +314,10 @@ void Accel::build_meshes(const Scene& scene)
   }
 }
 
-const TreePointer& Accel::tree_of(const Scene& scene, std::size_t instance) const
+const TreePointer& Accel::tree_of(std::size_t instance) const
 {
   const int displaced = displacements_->geometry_index(instance);
-  if (displaced >= 0) return displaced_[static_cast<std::size_t>(displaced)].tree;
-  return meshes_[static_cast<std::size_t>(scene.instances[instance].mesh_index)].tree;
+  return displaced >= 0 ? displaced_[static_cast<std::size_t>(displaced)].tree : use_of(instance).tree;
 }
 
 /// All that build_top reads. Trees of parts are known by their places: a tree that is kept holds its parts.
@@ -328,10 +329,10 @@ ContentHash Accel::top_content(const Scene& scene,
   hash.add(scene.instances.size(), area_lights.size(), scene_->pad);
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
-    const auto mesh = static_cast<std::size_t>(instance.mesh_index);
-    const TreePointer& tree = tree_of(scene, i);
-    if (tree == nullptr) hash_triangles(scene.meshes[mesh], &hash);
-    hash.add(tree == nullptr, meshes_[mesh].transparent, tree.get(), mask_of(instance.flags));
+    const MeshUse& use = use_of(i);
+    const TreePointer& tree = tree_of(i);
+    if (tree == nullptr) hash_triangles(use.mesh, &hash);
+    hash.add(tree == nullptr, use.transparent, tree.get(), mask_of(instance.flags));
     hash_transform(instance.world_from_object, &hash);
   }
   for (const std::uint32_t index : area_lights) {
@@ -362,13 +363,13 @@ void Accel::build_top(const Scene& scene, std::span<const Light> lights, std::sp
   const TreePointer top = trees_->scene_make(any_transparent ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
-    const auto mesh = static_cast<std::size_t>(instance.mesh_index);
-    const TreePointer& tree = tree_of(scene, i);
+    const MeshUse& use = use_of(i);
+    const TreePointer& tree = tree_of(i);
     scene_->num_in_place += tree == nullptr ? 1 : 0;
     attach(top.get(),
            scene_->instances[i] != nullptr ? instance_geometry_make(trees_->device(), *scene_->instances[i])
            : tree != nullptr               ? new_instance(tree.get(), instance.world_from_object)
-                             : new_mesh(scene.meshes[mesh], &instance.world_from_object, meshes_[mesh].transparent),
+                                           : new_mesh(use.mesh, &instance.world_from_object, use.transparent),
            static_cast<unsigned>(i), mask_of(instance.flags));
   }
   for (std::size_t i = 0; i < area_lights.size(); ++i) {
@@ -463,7 +464,7 @@ void Accel::occluded(EmbreeContext& context, RTCRay& ray) const
 
 Box3 Accel::bounds() const { return scene_bounds(top_); }
 
-RTCGeometry Accel::new_mesh(const Mesh& mesh, const Affine3* world_from_object, bool transparent)
+RTCGeometry Accel::new_mesh(const TreeMesh& mesh, const Affine3* world_from_object, bool transparent)
 {
   RTCGeometry geometry = rtcNewGeometry(trees_->device(), RTC_GEOMETRY_TYPE_TRIANGLE);
   const bool in_place = world_from_object == nullptr || is_identity(*world_from_object);
@@ -476,13 +477,13 @@ RTCGeometry Accel::new_mesh(const Mesh& mesh, const Affine3* world_from_object, 
     }
     auto* vertices = static_cast<Vec3f*>(
         rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT3, sizeof(Vec3f), P.size()));
-    if (vertices == nullptr) throw OutOfMemory("the vertices of mesh '" + mesh.name + "'");
+    if (vertices == nullptr) throw OutOfMemory("the vertices of mesh '" + std::string(mesh.name) + "'");
     for (std::size_t i = 0; i < P.size(); ++i) {
       vertices[i] = in_place ? P[i] : transform_point(*world_from_object, P[i]);
     }
   };
   if (mesh.steps.empty()) {
-    set_vertices(0, mesh.P);
+    set_vertices(0, *mesh.P);
   } else {
     rtcSetGeometryTimeStepCount(geometry, static_cast<unsigned>(mesh.steps.size()));
     for (std::size_t step = 0; step < mesh.steps.size(); ++step) {
@@ -495,7 +496,7 @@ RTCGeometry Accel::new_mesh(const Mesh& mesh, const Affine3* world_from_object, 
   } else {
     void* const indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                                   sizeof(TriangleIndices), mesh.triangles.size());
-    if (indices == nullptr) throw OutOfMemory("the triangles of mesh '" + mesh.name + "'");
+    if (indices == nullptr) throw OutOfMemory("the triangles of mesh '" + std::string(mesh.name) + "'");
     std::memcpy(indices, mesh.triangles.data(), mesh.triangles.size() * sizeof(TriangleIndices));
   }
   if (transparent) rtcSetGeometryOccludedFilterFunction(geometry, shadow_filter_);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "displacement/displacement_set.h"
@@ -21,6 +22,14 @@ namespace relief {
 
 /// Ray kinds as Embree mask bits.
 enum RayMask : std::uint32_t { kRayCamera = 1u << 0, kRayBounce = 1u << 1, kRayShadow = 1u << 2 };
+
+/// What a tree holds of a mesh, without ownership.
+struct TreeMesh {
+  std::string_view name;
+  const std::vector<Vec3f>* P = nullptr;  ///< object space
+  std::span<const MeshStep> steps;        ///< none: it does not deform
+  std::span<const TriangleIndices> triangles;
+};
 
 /// Builds and owns the acceleration structure. Meshes that occur once are placed in world space; a mesh that occurs more
 /// often, or is displaced, has one scene of its own and instances of it: Embree's, or where single precision would not do,
@@ -70,15 +79,15 @@ class Accel {
                             RTCRayHit& ray,
                             double* nearest);
   void place_instances(const Scene& scene, std::span<const Light> lights, std::span<const std::uint32_t> area_lights);
-  void build_meshes(const Scene& scene);
+  void build_meshes();
   void build_displaced(DisplacementSet& displacements);
   void build_tessellated(DisplacementSet& displacements);
   void build_top(const Scene& scene, std::span<const Light> lights, std::span<const std::uint32_t> area_lights);
-  const TreePointer& tree_of(const Scene& scene, std::size_t instance) const;  ///< null: it is in place
+  const TreePointer& tree_of(std::size_t instance) const;  ///< null: it is in place
   ContentHash top_content(const Scene& scene,
                           std::span<const Light> lights,
                           std::span<const std::uint32_t> area_lights) const;
-  RTCGeometry new_mesh(const Mesh& mesh, const Affine3* world_from_object, bool transparent);
+  RTCGeometry new_mesh(const TreeMesh& mesh, const Affine3* world_from_object, bool transparent);
   void attach_corners(RTCScene target, const Box3& box, Vec3f pad, bool quads = false);
   RTCGeometry new_instance(RTCScene instanced, const Affine3& world_from_object);
   Box3 light_box(const Light& light) const;
@@ -89,6 +98,7 @@ class Accel {
 
   /// What a mesh needs of a tree of its own.
   struct MeshUse {
+    TreeMesh mesh;
     int count = 0;             ///< of instances that are not displaced
     bool transparent = false;  ///< one of them
     bool takes_time = false;   ///< one of them moves or deforms while the shutter is open
@@ -98,6 +108,15 @@ class Accel {
 
     bool has_tree() const { return count > 1 || takes_time; }
   };
+
+  const MeshUse& use_of(std::size_t instance) const
+  {
+    return meshes_[static_cast<std::size_t>(views_->instances[instance].mesh_index)];
+  }
+  MeshUse& use_of(std::size_t instance)
+  {
+    return meshes_[static_cast<std::size_t>(views_->instances[instance].mesh_index)];
+  }
 
   /// A displaced geometry.
   struct DisplacedUse {
@@ -116,7 +135,7 @@ class Accel {
   KeptTrees::Tally kept_;
   RayTarget target_;                     ///< all that rays can hit, but for lights that are far away; world
   RayTarget far_lights_target_;          ///< these lights
-  std::vector<MeshUse> meshes_;          ///< a mesh of the scene
+  std::vector<MeshUse> meshes_;          ///< a mesh of views_
   std::vector<DisplacedUse> displaced_;  ///< a geometry of displacements_
   std::unique_ptr<SceneTree> scene_;
   RTCScene top_ = nullptr;  ///< of scene_

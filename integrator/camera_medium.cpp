@@ -98,8 +98,9 @@ std::int32_t CameraMedium::innermost_at(Vec3f P, float time, std::int32_t wanted
 bool CameraMedium::stands_in(const Solid& solid, std::int32_t other) const
 {
   constexpr std::size_t kCorners = 16;
-  const Instance& instance = context_.scene.instances[solid.instance];
-  const std::vector<Vec3f>& corners = context_.scene.meshes[static_cast<std::size_t>(instance.mesh_index)].P;
+  const InstanceView& instance = context_.instances[solid.instance];
+  const MeshView& mesh = context_.meshes[static_cast<std::size_t>(instance.mesh_index)];
+  const std::span<const Vec3f> corners(mesh.P, mesh.num_vertices);
   const std::size_t step = std::max<std::size_t>(1, corners.size() / kCorners);
   const Box3& box = solids_[static_cast<std::size_t>(other)].box;
   for (std::size_t i = 0; i < corners.size(); i += step) {

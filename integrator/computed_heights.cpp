@@ -89,6 +89,28 @@ bool is_of_instance(GraphQuantity q, const MeshView& mesh, std::uint16_t index)
   }
 }
 
+/// Whether a quantity is the same at all points of an instance.
+bool is_of_all(GraphQuantity q, const MeshView& mesh, std::uint16_t index)
+{
+  using Q = GraphQuantity;
+  switch (q) {
+    case Q::attribute_value:
+    case Q::attribute_x:
+    case Q::attribute_y:
+    case Q::attribute_z:
+    case Q::attribute_alpha:
+      return is_of_instance(q, mesh, index);
+    case Q::world_from_object:
+    case Q::object_from_world:
+    case Q::camera_from_world:
+    case Q::world_from_camera:
+    case Q::instance:
+      return true;
+    default:
+      return false;
+  }
+}
+
 /// The places of a triangle's vertices by their positions, so that triangles of a side have its ends in the same order.
 std::array<int, 3> vertex_order(const MeshView& mesh, std::uint32_t triangle)
 {
@@ -132,18 +154,28 @@ class OnTriangle {
   {
     return static_cast<int>(std::find(order_.begin(), order_.end(), vertex) - order_.begin());
   }
+  /// A point's hit, which the result points to.
   /// @param w  weights of the vertices in their order here
-  float quantity(const GraphInput& input, const float* w) const
+  GraphPoint point(const float* w, SurfaceHit& hit) const
   {
-    SurfaceHit hit = surface_hit_make(mesh_, heights_.instance, 0, w[1], w[2]);
+    hit = surface_hit_make(mesh_, heights_.instance, 0, w[1], w[2]);
     // Triangles of a side have normals of their own, and these point to where their vertices are in order.
     if (mesh_.N == nullptr && is_turned()) hit.Ns = -hit.Ns;
     hit.Ng = hit.Ns;
-    GraphPoint point{&mesh_, &heights_.instance, 0, w[1], w[2], &hit, hit.Ns, {0, 0}, 0.0f, &heights_.scene, {}};
-    point.P_object = transform_point(heights_.instance.object_from_world, hit.P);
+    GraphPoint out{&mesh_, &heights_.instance, 0, w[1], w[2], &hit, hit.Ns, {0, 0}, 0.0f, &heights_.scene, {}};
+    out.P_object = transform_point(heights_.instance.object_from_world, hit.P);
+    return out;
+  }
+  float quantity(const GraphInput& input, const GraphPoint& at, const float* w) const
+  {
     if (input.quantity == GraphQuantity::parametric_x) return w[place_of(0)];
     if (input.quantity == GraphQuantity::parametric_y) return w[place_of(1)];
-    return graph_quantity(point, input.quantity, input.index);
+    return graph_quantity(at, input.quantity, input.index);
+  }
+  float quantity(const GraphInput& input, const float* w) const
+  {
+    SurfaceHit hit;
+    return quantity(input, point(w, hit), w);
   }
 
  private:
@@ -184,6 +216,15 @@ const TriangleInputs& triangle_inputs(const GraphHeights& heights, std::uint32_t
   return last;
 }
 
+/// Heights by a graph whose inputs are set.
+void run(const GraphHeights& heights, GraphRegisters& registers, float* h)
+{
+  heights.run(heights.program, heights.textures, registers);
+  const std::uint16_t result = heights.program.results[0];
+  const F8 out = result == kNoGraphOperand ? F8{} : graph_operand(heights.program, registers, result);
+  for (int lane = 0; lane < 8; ++lane) h[lane] = out[lane];
+}
+
 void eval(const void* owner, std::uint32_t triangle, const float (*b)[8], float* h)
 {
   const auto& heights = *static_cast<const GraphHeights*>(owner);
@@ -207,10 +248,25 @@ void eval(const void* owner, std::uint32_t triangle, const float (*b)[8], float*
       lanes[lane] = on.quantity(input, at);
     }
   }
-  heights.run(program, heights.textures, registers);
-  const std::uint16_t result = program.results[0];
-  const F8 out = result == kNoGraphOperand ? F8{} : graph_operand(program, registers, result);
-  for (int lane = 0; lane < 8; ++lane) h[lane] = out[lane];
+  run(heights, registers, h);
+}
+
+/// As CornerHeights.
+void eval_corners(const GraphHeights& heights, const std::uint32_t* corners, float* h)
+{
+  const GraphProgramView& program = heights.program;
+  GraphRegisters registers;
+  for (int lane = 0; lane < 8; ++lane) {
+    const OnTriangle on(heights, corners[lane] / 3);
+    float w[3] = {0, 0, 0};
+    w[on.place_of(static_cast<int>(corners[lane] % 3))] = 1;
+    SurfaceHit hit;
+    const GraphPoint at = on.point(w, hit);
+    for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
+      registers.lanes[program.inputs[i].register_index][lane] = on.quantity(program.inputs[i], at, w);
+    }
+  }
+  run(heights, registers, h);
 }
 
 /// A number that is linear in the weights, over parallelograms.
@@ -317,6 +373,7 @@ void computed_heights_add(const Scene& scene, const DisplacementOptions& options
   if (std::none_of(input->instances.begin(), input->instances.end(), settings_of)) return;
   const auto all = std::make_shared<SceneHeights>(scene);
   input->heights_owner = all;
+  input->meshes = all->views.meshes;  // with the attributes that graphs read
   const PictureView view{options.camera.value_or(scene.cameras.front().camera),
                          static_cast<double>(options.camera ? options.picture_height : scene.render.height)};
   GraphScene graph_scene;
@@ -354,6 +411,12 @@ void computed_heights_add(const Scene& scene, const DisplacementOptions& options
             &mesh, placed, program, scene.textures->height_views().data(), scene.textures->height_bounds().data(),
             stage_table_select().run_graph, graph_bounds_select(), graph_scene, next_id.fetch_add(1)}));
         heights.source = {all->heights.back().get(), eval, bounds};
+        heights.corners = [graph = all->heights.back().get()](const std::uint32_t* corners, float* h) {
+          eval_corners(*graph, corners, h);
+        };
+        heights.is_constant =
+            std::none_of(program.inputs, program.inputs + program.num_inputs,
+                         [&](const GraphInput& in) { return !is_of_all(in.quantity, mesh, in.index); });
       }
       heights.num_cells = settings->num_cells;
       places.push_back({&mesh, {}, static_cast<double>(settings->cell_pixels)});
@@ -363,9 +426,12 @@ void computed_heights_add(const Scene& scene, const DisplacementOptions& options
   }
   for (std::size_t k = 0; k < places.size(); ++k) {
     const Place& place = places[k];
-    const auto seen =
-        std::make_shared<const SeenInstances>(*place.mesh, view, place.instances, SeenInstances::Coarser::kAfar);
-    input->heights[k].cells = [seen, cell = place.cell_pixels](Vec3f a, Vec3f b) { return seen->pixels(a, b) / cell; };
+    const auto cells = [&](SeenInstances::Coarser coarser) {
+      const auto seen = std::make_shared<const SeenInstances>(*place.mesh, view, place.instances, coarser);
+      return [seen, cell = place.cell_pixels](Vec3f a, Vec3f b) { return seen->pixels(a, b) / cell; };
+    };
+    input->heights[k].cells = cells(SeenInstances::Coarser::kAfar);
+    input->heights[k].cells_seen = cells(SeenInstances::Coarser::kOutside);
   }
 }
 

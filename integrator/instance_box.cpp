@@ -36,9 +36,9 @@ Box3 instance_box(const SceneContext& context, std::size_t index)
            (corner & 4) != 0 ? local.high.z : local.low.z});
     }
   } else {
-    const Mesh& mesh = context.scene.meshes[static_cast<std::size_t>(instance.mesh_index)];
-    for (const Vec3f& P : mesh.P) add(P);
-    for (const MeshStep& step : mesh.steps) {
+    const MeshView& mesh = context.meshes[static_cast<std::size_t>(context.instances[index].mesh_index)];
+    for (std::uint32_t i = 0; i < mesh.num_vertices; ++i) add(mesh.P[i]);
+    for (const MeshStep& step : context.scene.meshes[static_cast<std::size_t>(instance.mesh_index)].steps) {
       for (const Vec3f& P : step.P) add(P);
     }
   }

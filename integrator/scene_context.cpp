@@ -146,6 +146,14 @@ WavefrontColumns SceneContext::columns() const
 
 void SceneContext::make_views()
 {
+  for (const MovedMesh& moved : displacements.moved()) {
+    const MeshView mesh = meshes[static_cast<std::size_t>(moved.mesh_index)];
+    meshes.push_back(moved.view(mesh));
+  }
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    const int moved = displacements.moved_index(i);
+    if (moved >= 0) instances[i].mesh_index = static_cast<std::int32_t>(scene.meshes.size()) + moved;
+  }
   for (std::size_t i = 0; i < instances.size(); ++i) {
     if (displacements.geometry_index(i) < 0) continue;
     instances[i].flags |= kDisplaced | kTracedInObjectSpace;
@@ -174,7 +182,7 @@ void SceneContext::fill(Statistics& stats) const
   stats.light_bytes = lights.bytes();
   stats.bvh_bytes = accel->bytes();
   stats.displacement = {displacements.method_names(),
-                        displacements.size(),
+                        displacements.size() + displacements.moved().size(),
                         displacements.num_triangles(),
                         displacements.bytes(),
                         height_map_bytes(scene.height_maps),

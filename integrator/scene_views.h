@@ -17,7 +17,8 @@ struct SceneViews {
   SceneViews& operator=(const SceneViews&) = delete;
 
   SceneMotion motion;
-  std::vector<MeshView> meshes;
+  std::vector<MeshView>
+      meshes;  ///< those of the scene; a context has moved ones (displacement/moved_mesh.h) behind them
   std::vector<InstanceView> instances;
   std::vector<MeshColumn> mesh_columns;             ///< of all meshes, one mesh's side by side
   std::vector<std::vector<float>> instance_values;  ///< columns that do not reach all instances in the scene

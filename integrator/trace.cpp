@@ -79,8 +79,9 @@ TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits
     result.u = point.u;
     result.v = point.v;
     result.instance_index = static_cast<std::int32_t>(object);
-    const int copy_of = context.scene.meshes[static_cast<std::size_t>(instance.mesh_index)].copy_of;
-    result.mesh_index = copy_of >= 0 ? copy_of : instance.mesh_index;
+    const int mesh_index = context.scene.instances[object].mesh_index;
+    const int copy_of = context.scene.meshes[static_cast<std::size_t>(mesh_index)].copy_of;
+    result.mesh_index = copy_of >= 0 ? copy_of : mesh_index;
     result.triangle_index = point.triangle;
     break;
   }

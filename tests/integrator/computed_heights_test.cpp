@@ -89,7 +89,7 @@ TEST(ComputedHeights, OfAnyCoordinatesLetNoRayOut)
   for (const json& graph :
        {noise(reference(0, "generated"), 6, 8), noise(reference(0, "object"), 3, 12), over_noise, position}) {
     for (const bool curved : {false, true}) {
-      const Scene scene = load(ball({{"heightGraph", graph}, {"scale", 0.5}, {"curved", curved}}));
+      const Scene scene = load(ball({{"heightGraph", graph}, {"scale", 0.5}, {"curved", curved}, {"method", "chord"}}));
       const SceneContext context(scene);
       ASSERT_EQ(context.displacements.size(), 1u);
       EXPECT_TRUE(context.displacements.warnings().empty()) << context.displacements.warnings().front();
@@ -115,7 +115,8 @@ TEST(ComputedHeights, OfAnyCoordinatesLetNoRayOut)
 /// A telescope sees a thousandth of a ball. As fine all over, it would be millions of parts.
 TEST(ComputedHeights, AreFewWhereATelescopeDoesNotLook)
 {
-  const Scene scene = load(ball({{"heightGraph", noise(reference(0, "object"), 3, 2)}, {"scale", 0.1}}));
+  const Scene scene =
+      load(ball({{"heightGraph", noise(reference(0, "object"), 3, 2)}, {"scale", 0.1}, {"method", "chord"}}));
   DisplacementOptions options;
   options.camera = scene.cameras[0].camera;
   options.camera->half_width *= 1e-3f;
@@ -307,8 +308,11 @@ TEST(ComputedHeights, OfTheWorldDifferBetweenInstances)
       {"nodes",
        {{{"type", "geometry"}}, {{"type", "noise-texture"}, {"inputs", {{"vector", reference(0, "position")}}}}}},
       {"outputs", {{"height", reference(1, "factor")}}}};
-  const Scene scene = load(ball({{"heightGraph", graph}, {"scale", 0.5}}, 2));
-  EXPECT_EQ(SceneContext(scene).displacements.size(), 2u);
+  for (const char* method : {"auto", "chord"}) {
+    const Scene scene = load(ball({{"heightGraph", graph}, {"scale", 0.5}, {"method", method}}, 2));
+    const SceneContext context(scene);
+    EXPECT_EQ(context.displacements.size() + context.displacements.moved().size(), 2u) << method;
+  }
 }
 
 /// Of a plane of which an orthographic picture shows a millionth part, the rest is coarse.

@@ -1,0 +1,173 @@
+// Displacement by moving vertices: where they go, how they are shaded, and that nothing opens.
+#include "displacement/moved_mesh.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "displacement/vec3d.h"
+
+namespace relief::test {
+namespace {
+
+/// An octahedron of half a size along x, y and z, whose normals are as long as its vertices are far from the middle.
+struct Octahedron {
+  std::vector<Vec3f> P{{1, 0, 0}, {0, 2, 0}, {0, 0, 1.5f}, {-1, 0, 0}, {0, -2, 0}, {0, 0, -1.5f}};
+  std::vector<Normal3f> N;
+  std::vector<Vec2f> uv;
+  std::vector<TriangleIndices> triangles{{0, 1, 2}, {1, 3, 2}, {3, 4, 2}, {4, 0, 2},
+                                         {1, 0, 5}, {3, 1, 5}, {4, 3, 5}, {0, 4, 5}};
+
+  Octahedron()
+  {
+    for (const Vec3f& v : P) {
+      N.push_back(as_normal(v));
+      uv.push_back({v.x + 2 * v.y, v.z});
+    }
+  }
+  MeshView view() const
+  {
+    MeshView out;
+    out.P = P.data();
+    out.N = N.data();
+    out.uv[0] = uv.data();
+    out.triangles = triangles.data();
+    out.num_vertices = static_cast<std::uint32_t>(P.size());
+    out.num_triangles = static_cast<std::uint32_t>(triangles.size());
+    return out;
+  }
+};
+
+double waves(const Vec3d& P) { return 0.5 + 0.2 * std::sin(3 * P.x + 1) * std::cos(2 * P.y) + 0.1 * P.z; }
+
+/// Waves over the base. In double precision sums along a side have one rounding, whichever triangle asks.
+void eval_waves(const void* owner, std::uint32_t triangle, const float (*b)[8], float* h)
+{
+  const auto& mesh = *static_cast<const MeshView*>(owner);
+  const TriangleIndices& t = mesh.triangles[triangle];
+  for (int lane = 0; lane < 8; ++lane) {
+    const Vec3d P = static_cast<double>(b[0][lane]) * to_double(mesh.P[t.v0]) +
+                    static_cast<double>(b[1][lane]) * to_double(mesh.P[t.v1]) +
+                    static_cast<double>(b[2][lane]) * to_double(mesh.P[t.v2]);
+    h[lane] = static_cast<float>(waves(P));
+  }
+}
+
+constexpr VertexDisplacement kBy{0.3, 0.25f, true};
+
+Vec3d moved(const Vec3d& P, const Vec3d& N)
+{
+  return P + N * (kBy.scale * (waves(P) - static_cast<double>(kBy.midlevel)) / length(N));
+}
+
+TEST(MovedMesh, HasItsVerticesWhereHeightsSay)
+{
+  const Octahedron octahedron;
+  const MeshView mesh = octahedron.view();
+  const MovedMesh out = moved_mesh_make(mesh, corner_heights({&mesh, eval_waves}), kBy);
+  const MeshView view = out.view(mesh);
+  EXPECT_EQ(view.triangles, mesh.triangles);
+  for (std::size_t k = 0; k < octahedron.P.size(); ++k) {
+    const Vec3d P = to_double(octahedron.P[k]);
+    EXPECT_LT(length(to_double(view.P[k]) - moved(P, P)), 1e-6);
+    Vec3d sum{};
+    for (const TriangleIndices& t : octahedron.triangles) {
+      if (t.v0 != k && t.v1 != k && t.v2 != k) continue;
+      const Vec3d a = to_double(view.P[t.v0]), n = cross(to_double(view.P[t.v1]) - a, to_double(view.P[t.v2]) - a);
+      sum = sum + n * (1 / length(n));
+    }
+    EXPECT_LT(length(to_double(as_vector(view.N[k])) - sum * (1 / length(sum))), 1e-6);
+  }
+}
+
+/// A vertex that a seam has two of moves as one: heights are those of the first, as in Cycles, where it is one.
+TEST(MovedMesh, StaysClosedAlongTextureSeams)
+{
+  Octahedron octahedron;
+  octahedron.P.push_back(octahedron.P[2]);
+  octahedron.N.push_back(octahedron.N[2]);
+  octahedron.uv.push_back({7, 7});
+  for (std::size_t t = 1; t < 3; ++t) octahedron.triangles[t].v2 = 6;
+  const MeshView mesh = octahedron.view();
+  const CornerHeights by_triangle = [](const std::uint32_t* corners, float* h) {
+    for (int lane = 0; lane < 8; ++lane) h[lane] = static_cast<float>(corners[lane] / 3);
+  };
+  const MovedMesh out = moved_mesh_make(mesh, by_triangle, kBy);
+  EXPECT_EQ(out.P[2], out.P[6]);
+  EXPECT_EQ(as_vector(out.N[2]), as_vector(out.N[6]));
+  EXPECT_NEAR(out.P[2].z, 1.5 + kBy.scale * -static_cast<double>(kBy.midlevel), 1e-6);
+}
+
+TEST(MovedMesh, LeavesVerticesWhoseHeightIsNoNumber)
+{
+  const Octahedron octahedron;
+  const MeshView mesh = octahedron.view();
+  const CornerHeights none = [](const std::uint32_t*, float* h) { std::fill_n(h, 8, std::nanf("")); };
+  EXPECT_EQ(moved_mesh_make(mesh, none, kBy).P, octahedron.P);
+}
+
+/// Sides that are divided differently: each edge has its like, the other way round, and all points are where heights say.
+TEST(MovedMesh, IsClosedWhereTrianglesAreDividedDifferently)
+{
+  const Octahedron octahedron;
+  const MeshView mesh = octahedron.view();
+  const HeightSource source{&mesh, eval_waves};
+  // More where x and y are positive; triangles of 300 cells are cut into parts.
+  for (const double most : {1.0, 5.0, 40.0, 300.0}) {
+    const auto cells = [&](Vec3f a, Vec3f b) {
+      const double x = 0.5 * static_cast<double>(a.x + b.x), y = 0.5 * static_cast<double>(a.y + b.y);
+      return most * std::clamp(0.5 + x * 0.5 + y * 0.25, 0.05, 1.0) * static_cast<double>(length(b - a)) / 2.5;
+    };
+    const std::vector<LatticeTriangle> parts = lattices_make(mesh, cells);
+    const MovedMesh out = divided_mesh_make(mesh, source, parts, kBy);
+    const MeshView view = out.view(mesh);
+    using Place = std::array<float, 3>;
+    const auto place = [&](std::uint32_t vertex) {
+      const Vec3f& P = view.P[vertex];
+      return Place{P.x, P.y, P.z};
+    };
+    std::map<std::pair<Place, Place>, int> edges;
+    std::map<Place, Vec3f> normals;
+    double volume = 0;
+    for (std::uint32_t k = 0; k < view.num_triangles; ++k) {
+      const TriangleIndices& t = view.triangles[k];
+      const std::array<std::uint32_t, 3> v{t.v0, t.v1, t.v2};
+      if (place(v[0]) == place(v[1]) || place(v[1]) == place(v[2]) || place(v[2]) == place(v[0])) continue;
+      for (std::size_t side = 0; side < 3; ++side) {
+        const Place a = place(v[side]), b = place(v[(side + 1) % 3]);
+        ++edges[{a, b}];
+        --edges[{b, a}];
+        // Shaded alike on both sides.
+        const Vec3f N = as_vector(view.N[v[side]]);
+        EXPECT_EQ(normals.try_emplace(a, N).first->second, N);
+      }
+      volume += dot(to_double(view.P[t.v0]), cross(to_double(view.P[t.v1]), to_double(view.P[t.v2]))) / 6;
+    }
+    EXPECT_TRUE(std::all_of(edges.begin(), edges.end(), [](const auto& edge) { return edge.second == 0; })) << most;
+    EXPECT_GT(volume, 1);
+    // The uv are linear in the places here, so these tell where a vertex was: x + 2y and z, on |x| + |y|/2 + |z|/1.5 = 1.
+    for (std::uint32_t k = 0; k < view.num_vertices; ++k) {
+      const auto sum = static_cast<double>(view.uv[0][k].x), z = static_cast<double>(view.uv[0][k].y);
+      const Vec3d at = to_double(view.P[k]);
+      // The vertex moved along N = (x, y, z) of its base, so base and moved point are on one line through the middle.
+      const double x = at.x / at.z * z, y = at.y / at.z * z;
+      if (std::abs(z) < 0.05) continue;
+      EXPECT_NEAR(x + 2 * y, sum, 2e-4);
+      EXPECT_LT(length(at - moved({x, y, z}, {x, y, z})), 2e-5);
+    }
+  }
+}
+
+TEST(MovedMesh, CountsTheCellsOfItsTriangles)
+{
+  const Octahedron octahedron;
+  const MeshView mesh = octahedron.view();
+  EXPECT_DOUBLE_EQ(mean_cells_a_side(mesh, [](Vec3f, Vec3f) { return 3.0; }), 3.0);
+}
+
+}  // namespace
+}  // namespace relief::test
