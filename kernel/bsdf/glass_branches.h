@@ -17,8 +17,7 @@ struct GlassBranches {
 /// @param u  as closure_sample's
 /// @return   reflectance 1 as well where microfacets scatter more than once
 template <unsigned kFeatures>
-RELIEF_KERNEL GlassBranches
-glass_branches_sample(const SurfaceClosure& c, const BsdfTables& tables, Vec2f u)
+RELIEF_KERNEL GlassBranches glass_branches_sample(const SurfaceClosure& c, const BsdfTables& tables, Vec2f u)
 {
   GlassBranches branches;
   const GlassLobe& glass = c.lobes;

@@ -277,8 +277,8 @@ RELIEF_KERNEL LightsChoice lights_choose(const LightsView& view, Vec3f P, Vec3f 
 RELIEF_KERNEL LightSample
 lights_sample_chosen(const LightsView& view, LightsChoice chosen, const Light* light, Vec3f P, Vec3f N)
 {
-  LightSample sample = light == nullptr ? light_environment_sample(view.environment, N, chosen.u)
-                                        : light_sample(*light, P, chosen.u);
+  LightSample sample =
+      light == nullptr ? light_environment_sample(view.environment, N, chosen.u) : light_sample(*light, P, chosen.u);
   sample.pdf *= chosen.probability;
   sample.ref = chosen.ref;
   return sample;

@@ -32,8 +32,7 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
   if (!soft) closure = closure_sharp(closure, kAllSharp);
   const int surface = path_surface(state, path);
   const ScatterSamples u = scatter_samples(state.pixel_hash[path], state.sample_index[path], surface);
-  BsdfSample bsdf =
-      closure_sample<kFeatureAll, TransportMode::kImportance>(closure, *g.bsdf_tables, u.branch, u.bsdf);
+  BsdfSample bsdf = closure_sample<kFeatureAll, TransportMode::kImportance>(closure, *g.bsdf_tables, u.branch, u.bsdf);
   if (!(bsdf.pdf > 0.0f)) return false;
   const bool sharp = closure_split<kFeatureAll, TransportMode::kImportance>(
       closure, *g.bsdf_tables, sharp_lobes(at.params, caster, g.caustics.roughness), u.sharpness, bsdf);

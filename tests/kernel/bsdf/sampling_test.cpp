@@ -333,9 +333,9 @@ TEST(GlassBranches, AreWhatChanceWouldChooseBetween)
       const Vec2f u{u_x, random.next()};
       const GlassBranches both = glass_branches_sample<kFeatureAll>(closure, full_tables(), u);
       const float F = both.reflectance;
-      EXPECT_EQ(
-          glass_branches_sample<kFeatureAll>(closure, full_tables(), {0.99f * glass_lobe.lost - 1e-9f, u.y}).reflectance,
-          1.0f);
+      EXPECT_EQ(glass_branches_sample<kFeatureAll>(closure, full_tables(), {0.99f * glass_lobe.lost - 1e-9f, u.y})
+                    .reflectance,
+                1.0f);
       if (!(F < 0.999f)) continue;
       ++pairs;
       constexpr float kClose = 1e-5f;

@@ -438,7 +438,8 @@ TEST(LightSampler, PlaceIsEvenOnWhateverIsChosen)
     const LightsChoice chosen = lights_choose(view, {1, 2, 3}, {}, {random.next(), random.unit()});
     if (!(chosen.probability > 0.0f)) continue;
     const bool often = static_cast<double>(chosen.probability) * kPoints > kOften;
-    const auto cell = static_cast<std::size_t>(chosen.u.x * kSide) * kSide + static_cast<std::size_t>(chosen.u.y * kSide);
+    const auto cell =
+        static_cast<std::size_t>(chosen.u.x * kSide) * kSide + static_cast<std::size_t>(chosen.u.y * kSide);
     ASSERT_LT(cell, static_cast<std::size_t>(kSide * kSide));
     ++counts[often ? chosen.ref.light_index : -2][cell];
   }
@@ -562,8 +563,7 @@ TEST(LightSampler, CoincidentAndDegenerateLightsBuildAWorkingTree)
   const LightsView view = set.view();
   for (const Vec3f P : {Vec3f{1, 2, 3}, Vec3f{0, 0, 0}, Vec3f{1e18f, 0, 0}, Vec3f{3, 3, 3}}) {
     for (int i = 0; i < 1000; ++i) {
-      const LightSample sample =
-          lights_sample(view, P, random_normal(random), {random.next(), random.unit()});
+      const LightSample sample = lights_sample(view, P, random_normal(random), {random.next(), random.unit()});
       ASSERT_TRUE(is_finite(sample.pdf) && sample.pdf >= 0.0f);
       if (sample.pdf == 0.0f) continue;
       ASSERT_TRUE(is_finite(sample.radiance) && is_finite(sample.wi));
@@ -588,7 +588,8 @@ TEST(LightSampler, AHundredThousandLights)
   for (int i = 0; i < n; ++i) {
     const Vec3f P{static_cast<float>(i % 100), 3, 4};
     sum += static_cast<double>(
-        lights_sample(view, P, {0, 1, 0}, {static_cast<double>(sample_1d(1, static_cast<std::uint32_t>(i), 0)), 0.4f}).pdf);
+        lights_sample(view, P, {0, 1, 0}, {static_cast<double>(sample_1d(1, static_cast<std::uint32_t>(i), 0)), 0.4f})
+            .pdf);
   }
   const double sample_seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC / n;
   std::printf("build %.3f s, %.0f bytes a light, %.0f ns a sample (%g)\n", build_seconds,

@@ -92,7 +92,8 @@ TEST(Choice, RestStaysInsideWhateverTheRounding)
   for (const double width : {1.0, 0.3, 1e-7, 1e-300}) {
     EXPECT_EQ(choice_rest(-1e-20, width), 0.0);
     EXPECT_LT(choice_rest(width * 1.0000001, width), 1.0);
-    EXPECT_LT(choice_rest(static_cast<float>(std::max(width, 1e-30)), static_cast<float>(std::max(width, 1e-30))), 1.0f);
+    EXPECT_LT(choice_rest(static_cast<float>(std::max(width, 1e-30)), static_cast<float>(std::max(width, 1e-30))),
+              1.0f);
   }
   EXPECT_LT(choice_place({1 - 0x1p-53, 0.0f}).x, 1.0f);
 }
