@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <iterator>
 #include <memory>
-#include <numeric>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -354,10 +353,12 @@ double checkpoint_seconds(const RenderArguments& arguments, const FramePaths& pa
   return arguments.checkpoint.value_or(arguments.resume ? kSeconds : 0.0);
 }
 
-void report_resumed(ProgressPrinter& progress, const FramePaths& paths, int frame, const RenderState& state)
+void report_resumed(ProgressPrinter& progress, const FramePaths& paths, int frame, const SavedRender& saved)
 {
-  const double samples = std::accumulate(state.tile_samples.begin(), state.tile_samples.end(), 0.0) /
-                         static_cast<double>(std::max<std::size_t>(state.tile_samples.size(), 1));
+  const RenderState& state = saved.state;
+  // Tiles do not tell: some of their pixels may have come to rest.
+  const double samples = static_cast<double>(state.counters.camera_rays) /
+                         (static_cast<double>(saved.width) * static_cast<double>(saved.height));
   progress.note(
       fmt::format("{}: goes on after {:.6g} samples a pixel and {:.2f} s", paths.exr.string(), samples, state.seconds));
   progress.event({{"event", "resumed"},
@@ -485,7 +486,7 @@ bool render_frame(const RenderArguments& arguments,
   if (arguments.resume) saved = state_of(paths, fingerprint, stats, progress);
   if (saved) {
     options.saved = &*saved;
-    report_resumed(progress, paths, stats.frame, saved->state);
+    report_resumed(progress, paths, stats.frame, *saved);
   }
   options.checkpoint_seconds = checkpoint_seconds(arguments, paths);
   if (options.checkpoint_seconds > 0) {
