@@ -126,15 +126,15 @@ def bottle():
     stage.backdrop(stage.plastic("backdrop", (0.6, 0.6, 0.58), 0.5), 8, 3, 5, 1.5)
     outer = [(0.001, 0.0), (0.36, 0.0), (0.38, 0.04), (0.38, 1.1), (0.3, 1.3), (0.12, 1.5), (0.11, 1.85), (0.13, 1.86)]
     inner = [(0.13, 1.92), (0.085, 1.92), (0.085, 1.5), (0.27, 1.27), (0.35, 1.08), (0.35, 0.06), (0.001, 0.05)]
-    stage.turned(stage.glass("bottle", (0.9, 1.0, 0.93), ior=1.5), outer + inner, (0, 0, 0), 64)
+    stage.turned(stage.glass("bottle", (0.9, 1.0, 0.93), ior=1.5), outer + inner, (0, 0, stage.CLEAR), 64)
     # A little into the glass, as it is done so that no air is in between.
     liquid = [(0.001, 0.045), (0.353, 0.055), (0.353, 0.95), (0.001, 0.95)]
-    stage.turned(stage.plastic("liquid", (0.9, 0.35, 0.1), 0.0, Transmission=1.0, IOR=1.33), liquid, (0, 0, 0), 64)
+    stage.turned(stage.plastic("liquid", (0.9, 0.35, 0.1), 0.0, Transmission=1.0, IOR=1.33), liquid, (0, 0, stage.CLEAR), 64)
     stage.turned(stage.plastic("cork", (0.4, 0.25, 0.12), 0.9), [(0.001, 1.75), (0.083, 1.75), (0.1, 2.05), (0.001, 2.05)])
     tumbler = [(0.001, 0), (0.2, 0), (0.24, 0.5), (0.22, 0.5), (0.185, 0.05), (0.001, 0.05)]
-    stage.turned(stage.glass("tumbler"), tumbler, (0.75, -0.35, 0))
+    stage.turned(stage.glass("tumbler"), tumbler, (0.75, -0.35, stage.CLEAR))
     water = [(0.001, 0.048), (0.186, 0.048), (0.2105, 0.3), (0.001, 0.3)]
-    stage.turned(stage.plastic("water", stage.WHITE, 0.0, Transmission=1.0, IOR=1.33), water, (0.75, -0.35, 0))
+    stage.turned(stage.plastic("water", stage.WHITE, 0.0, Transmission=1.0, IOR=1.33), water, (0.75, -0.35, stage.CLEAR))
     lemon = stage.mottled("lemon", (0.8, 0.6, 0.05), (0.9, 0.7, 0.1), scale=25.0, roughness=(0.3, 0.5))
     stage.add("uv_sphere", lemon, (-0.7, -0.3, 0.2), (1.25, 1, 1), radius=0.2)
     stage.lamp("AREA", (-3, -1.5, 3), (0, 0, 0.7), 200.0, size=1.2)

@@ -45,7 +45,7 @@ _GOBLET += [(0.39, 1.1), (0.28, 0.78), (0.001, 0.62)]
 def still_life():
     stage.begin((0.2, 0.22, 0.25), 0.5)
     stage.add("plane", stage.wood("table"), size=8)
-    stage.turned(stage.glass(), _GOBLET, (-0.9, 0.2, 0.0))
+    stage.turned(stage.glass(), _GOBLET, (-0.9, 0.2, stage.CLEAR))
     stage.add("uv_sphere", stage.glass("ball", (0.9, 1, 0.95)), (0.1, -0.7, 0.35), radius=0.35, segments=48, ring_count=24)
     kettle = [(0.001, 0), (0.5, 0.0), (0.62, 0.2), (0.6, 0.5), (0.4, 0.8), (0.15, 0.9), (0.08, 1.0), (0.001, 1.03)]
     stage.turned(stage.metal("steel", (0.8, 0.8, 0.82), 0.08), kettle, (0.75, 0.6, 0))
@@ -92,7 +92,7 @@ def lamps():
     stage.lamp("AREA", (-1.5, -1.0, 1.8), (0, 0.2, 0.1), 12.0, size=0.5, color=(0.6, 0.75, 1))
     mug = [(0.001, 0), (0.09, 0), (0.1, 0.02), (0.1, 0.22), (0.09, 0.22), (0.09, 0.03), (0.001, 0.02)]
     stage.turned(stage.plastic("mug", (0.6, 0.08, 0.05), 0.2), mug, (0.75, -0.2, 0))
-    stage.turned(stage.glass("tumbler"), mug, (-0.75, -0.25, 0))
+    stage.turned(stage.glass("tumbler"), mug, (-0.75, -0.25, stage.CLEAR))
     for i, color in enumerate(((0.1, 0.2, 0.4), (0.5, 0.4, 0.1), (0.3, 0.05, 0.1))):
         stage.box(stage.plastic("book", color), (0.95 - 0.03 * i, 0.25, 0.05 * i), (1.4 - 0.05 * i, 0.6, 0.05 * i + 0.05), 0.005)
     stage.camera((0.2, -2.6, 1.35), (0, 0.2, 0.25), 40)

@@ -21,6 +21,9 @@ from scenes import LINEAR, link, new_image  # noqa: E402
 
 WHITE, BLACK = (0.8, 0.8, 0.8), (0.02, 0.02, 0.02)
 
+#: Height that glass stands at: in the plane of a table, which of the two a ray meets first would be the engine's chance.
+CLEAR = 0.002
+
 
 def begin(color=(0.05, 0.05, 0.05), strength=1.0):
     """An empty file with the add-on and a plain world; returns the world's node tree."""
