@@ -277,7 +277,7 @@ def test_pixel_filters_are_as_wide_as_those_of_cycles():
         relief, cycles = pictures
         difference = np.abs(relief - cycles).max()
         print(kind, width, difference)
-        # A width that is wrong by a fifth shows as 0.04; a Blackman-Harris filter that spreads as far as a Gaussian, as 0.025.
+        # A width that is wrong by a fifth shows as 0.04.
         assert difference < 0.015, (kind, width, difference)
         assert relief.max() > 0.99
 
