@@ -56,8 +56,8 @@ constexpr double kMostTexelsLost = 2;
 /// 320 × 180 pixels 294 processor seconds instead of 7, cracks on 200 × 200 at 1280 × 720, of six cells, 78 instead of 12).
 constexpr double kMostMovedCells = 16;
 
-/// Sides of divided triangles, cells at most: as lattices have powers of two, they are 1.4 cells long in the mean. With one there
-/// were ten million in an ordinary picture, and evaluating them took as long as all else.
+/// Sides of divided triangles, cells at most: lattices have powers of two, so they are one to two cells long. Of one cell and less
+/// there would be four times as many.
 constexpr double kDividedCells = 2;
 
 /// A mesh of fewer triangles was not divided to be displaced: however small it is now, the camera may come near.
