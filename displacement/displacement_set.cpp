@@ -52,8 +52,8 @@ constexpr double kMostSlopeLost = 1.0 / 3;
 constexpr double kMostTexelsLost = 2;
 
 /// Computed heights over triangles of so many cells along a side, in the mean, are those of their vertices, as in Cycles: whoever
-/// divided a mesh so finely did it for these, and tracing what is between takes 6 to 40 times as long (noise on 640 × 640 quads at
-/// 320 × 180 pixels 294 processor seconds instead of 7, cracks on 200 × 200 at 1280 × 720, of six cells, 78 instead of 12).
+/// divided a mesh so finely did it for these, and tracing what is between takes 4 to 40 times as long (noise on 640 × 640 quads at
+/// 320 × 180 pixels 294 processor seconds instead of 7, cracks on 200 × 200 at 1280 × 720, of six cells, 78 instead of 9).
 constexpr double kMostMovedCells = 16;
 
 /// Sides of divided triangles, cells at most: lattices have powers of two, so they are one to two cells long. Of one cell and less
