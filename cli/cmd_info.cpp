@@ -279,6 +279,7 @@ int info(const std::string& file,
   print_names("materials", scene.material_names);
   line("lights: {} placed, {} emissive triangles, {}", scene.lights.size(), context.lights.num_emissive_triangles,
        scene.environment.texture_index >= 0 ? "environment map"
+       : scene.environment.graph            ? "environment by graph"
        : is_zero(scene.environment.color)   ? "no environment"
                                             : "constant environment");
   const std::size_t num_textures = scene.textures->views().size();

@@ -164,14 +164,25 @@ std::vector<double> cells_integrate(const LuminanceImage& image, int num_columns
   return cells;
 }
 
-void tables_fill(EnvironmentTables& tables, EnvironmentDensity density)
+float turns_of(float rotation)
+{
+  const double turns = static_cast<double>(rotation) / (2 * std::numbers::pi);
+  return static_cast<float>(turns - std::floor(turns));
+}
+
+/// Cells and the mean luminance that a unit of them stands for.
+struct Cells {
+  int num_columns = 0, num_rows = 0;
+  std::vector<double> values;  ///< row after row
+  double unit = 1;
+};
+
+/// Writes the cumulative distributions.
+/// @return  flux of what they are in proportion to, luminance × solid angle
+double tables_fill(EnvironmentTables& tables, Cells cells, EnvironmentDensity density)
 {
   EnvironmentView& environment = tables.environment;
-  const int num_columns = std::clamp(environment.map.width, 1, kMaxEnvironmentColumns);
-  // Even, so that no row lies in both hemispheres.
-  const int num_rows = std::clamp(environment.map.height + environment.map.height % 2, 2, kMaxEnvironmentColumns / 2);
-  const LuminanceImage image = luminance_load(environment, level_for_cells(environment.map, num_columns, num_rows));
-  std::vector<double> cells = cells_integrate(image, num_columns, num_rows);
+  const int num_columns = cells.num_columns, num_rows = cells.num_rows;
   tables.row_edges = row_edges_make(num_rows);
   const auto height = [&tables](std::size_t row) {
     return static_cast<double>(std::abs(tables.row_edges[row + 1] - tables.row_edges[row]));
@@ -181,31 +192,34 @@ void tables_fill(EnvironmentTables& tables, EnvironmentDensity density)
   const std::size_t pitch = width + 1;
   tables.column_cdf.resize(static_cast<std::size_t>(num_rows) * pitch);
 
+  double sum = 0, area = 0;
+  for (std::size_t i = 0; i < cells.values.size(); ++i) {
+    sum += cells.values[i] * height(i / width);
+    area += height(i / width);
+  }
+  const double mean = sum / area;
   if (density == EnvironmentDensity::kExcess) {
-    double sum = 0, area = 0;
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      sum += cells[i] * height(i / width);
-      area += height(i / width);
-    }
-    const double mean = sum / area;
-    for (double& cell : cells) cell = std::max(cell - mean, 0.0);
-    const double texels_per_cell = static_cast<double>(image.width) * image.height / static_cast<double>(cells.size());
-    tables.base_luminance = static_cast<float>(mean / texels_per_cell);
+    for (double& cell : cells.values) cell = std::max(cell - mean, 0.0);
+    tables.base_luminance = static_cast<float>(mean * cells.unit);
+  } else if (tables.computed) {
+    constexpr double kLeast = 0.05;
+    for (double& cell : cells.values) cell = std::max(cell, kLeast * mean);
   }
   std::vector<double> row_weights(static_cast<std::size_t>(num_rows));
   tbb::parallel_for(0, num_rows, [&](int row) {
     const auto r = static_cast<std::size_t>(row);
-    const double* weights = cells.data() + r * width;
-    const double sum = std::accumulate(weights, weights + width, 0.0);
-    row_weights[r] = sum * height(r);
+    const double* weights = cells.values.data() + r * width;
+    const double row_sum = std::accumulate(weights, weights + width, 0.0);
+    row_weights[r] = row_sum * height(r);
     float* cdf = tables.column_cdf.data() + r * pitch;
-    if (sum > 0) {
+    if (row_sum > 0) {
       cdf_write(weights, num_columns, cdf);
     } else {
       cdf_write_uniform(num_columns, cdf);
     }
   });
-  if (*std::max_element(row_weights.begin(), row_weights.end()) > 0) {
+  const double flux = std::accumulate(row_weights.begin(), row_weights.end(), 0.0);
+  if (flux > 0) {
     cdf_write(row_weights.data(), num_rows, tables.row_cdf.data());
     environment.num_columns = num_columns;
     environment.num_rows = num_rows;
@@ -214,6 +228,65 @@ void tables_fill(EnvironmentTables& tables, EnvironmentDensity density)
     tables.column_cdf.clear();
     tables.row_edges.clear();
   }
+  return flux * cells.unit * 4 * std::numbers::pi / num_columns;
+}
+
+Cells cells_of_map(const EnvironmentView& environment)
+{
+  Cells cells;
+  cells.num_columns = std::clamp(environment.map.width, 1, kMaxEnvironmentColumns);
+  // Even, so that no row lies in both hemispheres.
+  cells.num_rows = std::clamp(environment.map.height + environment.map.height % 2, 2, kMaxEnvironmentColumns / 2);
+  const LuminanceImage image =
+      luminance_load(environment, level_for_cells(environment.map, cells.num_columns, cells.num_rows));
+  cells.values = cells_integrate(image, cells.num_columns, cells.num_rows);
+  cells.unit = static_cast<double>(cells.values.size()) / (static_cast<double>(image.width) * image.height);
+  return cells;
+}
+
+/// The disks in world space, a little wider: rounding must not take a place within a disk out of it.
+std::vector<EnvironmentSun> suns_of(const ComputedEnvironment& computed, std::span<const GraphSun> suns)
+{
+  constexpr float kWider = 1.002f;
+  std::vector<EnvironmentSun> out;
+  for (const GraphSun& sun : suns) {
+    const float half = std::sin(0.5f * std::min(kWider * sun.radius, std::numbers::pi_v<float>));
+    const Vec3f map{sun.towards.x, sun.towards.z, -sun.towards.y};
+    out.push_back({normalize(computed_environment_world(computed, map)), 2.0f * half * half, 0.0f});
+  }
+  return out;
+}
+
+/// Shares the choice between suns and cells in proportion to their light, with a part that is even: none of it knows of shadows,
+/// so that nothing may starve.
+/// @param flux  of the cells; 0: there are none
+void suns_share(EnvironmentTables& tables, std::span<const float> luminances, double flux)
+{
+  double total = flux;
+  int num_lit = flux > 0 ? 1 : 0;
+  const auto flux_of = [&](std::size_t i) {
+    return static_cast<double>(luminances[i]) * 2 * std::numbers::pi * static_cast<double>(tables.suns[i].cone);
+  };
+  for (std::size_t i = 0; i < tables.suns.size(); ++i) {
+    total += flux_of(i);
+    num_lit += luminances[i] > 0 ? 1 : 0;
+  }
+  if (num_lit == 0) {
+    tables.suns.clear();
+    return;
+  }
+  constexpr double kDefensive = 0.25;
+  double rest = 1;
+  std::vector<EnvironmentSun> lit;
+  for (std::size_t i = 0; i < tables.suns.size(); ++i) {
+    if (!(luminances[i] > 0)) continue;
+    EnvironmentSun sun = tables.suns[i];
+    sun.probability = static_cast<float>((1 - kDefensive) * flux_of(i) / total + kDefensive / num_lit);
+    rest -= static_cast<double>(sun.probability);
+    lit.push_back(sun);
+  }
+  tables.suns = std::move(lit);
+  tables.environment.cells_probability = flux > 0 ? static_cast<float>(rest) : 0.0f;
 }
 
 }  // namespace
@@ -224,6 +297,8 @@ EnvironmentView EnvironmentTables::view() const
   view.row_cdf = row_cdf.data();
   view.column_cdf = column_cdf.data();
   view.row_edges = row_edges.data();
+  view.suns = suns.data();
+  view.num_suns = static_cast<int>(suns.size());
   return view;
 }
 
@@ -236,13 +311,23 @@ EnvironmentView environment_view_make(const TextureView* map, Vec3f color, float
 {
   EnvironmentView environment;
   environment.color = color;
-  const double turns = static_cast<double>(rotation) / (2 * std::numbers::pi);
-  environment.rotation_turns = static_cast<float>(turns - std::floor(turns));
+  environment.rotation_turns = turns_of(rotation);
   if (map != nullptr) {
     environment.has_map = true;
     environment.map = *map;
     environment.map.wrap_u = Wrap::kRepeat;
   }
+  return environment;
+}
+
+EnvironmentView environment_view_make(const ComputedEnvironment& computed, Vec3f color, float rotation)
+{
+  EnvironmentView environment;
+  environment.color = color;
+  environment.rotation_turns = turns_of(rotation);
+  environment.has_map = true;
+  environment.radiance_of = computed_environment_radiance;
+  environment.computed = &computed;
   return environment;
 }
 
@@ -253,7 +338,24 @@ EnvironmentTables environment_tables_make(const TextureView* map,
 {
   EnvironmentTables tables;
   tables.environment = environment_view_make(map, color, rotation);
-  if (map != nullptr) tables_fill(tables, density);
+  if (map != nullptr) tables_fill(tables, cells_of_map(tables.environment), density);
+  return tables;
+}
+
+EnvironmentTables environment_tables_make(std::shared_ptr<const ComputedEnvironment> computed,
+                                          Vec3f color,
+                                          float rotation,
+                                          std::span<const GraphSun> suns,
+                                          int image_side,
+                                          EnvironmentDensity density)
+{
+  EnvironmentTables tables;
+  tables.environment = environment_view_make(*computed, color, rotation);
+  tables.suns = suns_of(*computed, suns);
+  const ComputedCells found = computed_environment_cells(*computed, tables.suns, color, image_side);
+  tables.computed = std::move(computed);
+  Cells cells{ComputedCells::kColumns, ComputedCells::kRows, {found.luminance.begin(), found.luminance.end()}, 1};
+  suns_share(tables, found.suns, tables_fill(tables, std::move(cells), density));
   return tables;
 }
 

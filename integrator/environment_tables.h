@@ -5,8 +5,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
 
+#include "integrator/computed_environment.h"
 #include "kernel/light/environment.h"
 
 namespace relief {
@@ -25,6 +28,8 @@ struct EnvironmentTables {
   EnvironmentView environment;  ///< everything but the pointers into the vectors
   float base_luminance = 0;     ///< of the map times its factor: what kExcess takes off; 0 for kRadiance
   std::vector<float> row_cdf, column_cdf, row_edges;
+  std::shared_ptr<const ComputedEnvironment> computed;  ///< null: there is a map, or nothing
+  std::vector<EnvironmentSun> suns;
 
   /// The environment with its pointers set; valid while this object is neither changed nor moved.
   EnvironmentView view() const;
@@ -37,17 +42,29 @@ inline constexpr int kMaxEnvironmentColumns = 1024;
 
 /// An environment without tables: for rays that look at it.
 EnvironmentView environment_view_make(const TextureView* map, Vec3f color, float rotation);
+/// @param computed  made with the same rotation
+EnvironmentView environment_view_make(const ComputedEnvironment& computed, Vec3f color, float rotation);
 
 /// Builds the sampling tables, in parallel.
 /// @param map       lat-long image in memory or in a tile cache; null: constant environment, no tables
 /// @param color     radiance factor, strength included
 /// @param rotation  radians about +Y
-/// @return          a map without any light yields tables without cells, with kExcess an even one too
-/// @pre             the map's texture repeats in u (the loader's default)
-/// @cost            2 MiB at most; reads the mip level with about twice the cells' resolution once
+/// @return  a map without any light yields tables without cells, with kExcess an even one too
+/// @pre     the map's texture repeats in u (the loader's default)
+/// @cost    2 MiB at most; reads the mip level with about twice the cells' resolution once
 EnvironmentTables environment_tables_make(const TextureView* map,
                                           Vec3f color,
                                           float rotation,
                                           EnvironmentDensity density = EnvironmentDensity::kRadiance);
+
+/// Likewise of computed surroundings, see computed_environment_cells. With kRadiance no cell has less than a twentieth of the
+/// mean: middles of cells do not see all that is in them.
+/// @param image_side  of images that they are computed from, texels; 0: none
+EnvironmentTables environment_tables_make(std::shared_ptr<const ComputedEnvironment> computed,
+                                          Vec3f color,
+                                          float rotation,
+                                          std::span<const GraphSun> suns,
+                                          int image_side,
+                                          EnvironmentDensity density);
 
 }  // namespace relief

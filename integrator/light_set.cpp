@@ -42,8 +42,16 @@ LightSet light_set_make(const Scene& scene,
   const auto texture_view = [&](int index) {
     return index >= 0 ? &textures[static_cast<std::size_t>(index)] : nullptr;
   };
-  set.environment = environment_tables_make(texture_view(scene.environment.texture_index), scene.environment.color,
-                                            scene.environment.rotation, density);
+  const Environment& environment = scene.environment;
+  if (environment.graph) {
+    const auto computed = std::make_shared<const ComputedEnvironment>(
+        computed_environment_make(*environment.graph, environment.rotation, globals->run_graph, textures.data()));
+    set.environment = environment_tables_make(computed, environment.color, environment.rotation, environment.graph->suns,
+                                              environment_graph_image_side(*environment.graph, textures), density);
+  } else {
+    set.environment = environment_tables_make(texture_view(environment.texture_index), environment.color,
+                                              environment.rotation, density);
+  }
   set.environment_irradiance = environment_irradiance(set.environment);
   environment_integrate(set);
   set.environment_casts_caustics = scene.environment.casts_caustics && scene.environment.hidden_from == 0;

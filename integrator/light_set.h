@@ -59,7 +59,8 @@ struct LightSet {
 /// @param textures  views of scene.textures, for the mean of emission maps
 /// @param density   of the environment: kExcess where paths that follow the BSDF find what it leaves out, which for a
 ///                  constant environment beside suns is all
-/// @param globals   what emission by graph is evaluated with, see emitter_graph_means; null: the scene has none
+/// @param globals   what emission by graph is evaluated with, see emitter_graph_means, and surroundings by graph; null: the
+///                  scene has none
 /// @return          same bits for the same scene, whatever the thread count
 /// Instances of one mesh and material share their lights where there are so many lights in the scene that they are chosen in
 /// more than one step, and where they keep the mesh's shape: under another map than a similarity its triangles compare

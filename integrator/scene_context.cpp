@@ -132,10 +132,16 @@ SceneContext::SceneContext(const Scene& loaded,
   globals.clear_alpha = clear && !scene.environment.visible_to_camera ? *clear * *clear : -1.0f;
   globals.environment_hidden_from = scene.environment.hidden_from;
   if (const std::optional<Surroundings>& seen = scene.environment.backdrop) {
-    const int map = seen->texture_index;
     globals.has_backdrop = true;
-    globals.backdrop = environment_view_make(
-        map < 0 ? nullptr : &scene.textures->views()[static_cast<std::size_t>(map)], seen->color, seen->rotation);
+    if (seen->graph) {
+      backdrop =
+          computed_environment_make(*seen->graph, seen->rotation, globals.run_graph, scene.textures->views().data());
+      globals.backdrop = environment_view_make(backdrop, seen->color, seen->rotation);
+    } else {
+      const int map = seen->texture_index;
+      globals.backdrop = environment_view_make(
+          map < 0 ? nullptr : &scene.textures->views()[static_cast<std::size_t>(map)], seen->color, seen->rotation);
+    }
   }
 }
 

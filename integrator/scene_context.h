@@ -41,6 +41,7 @@ struct SceneContext : SceneViews {
   std::unique_ptr<BsdfTables> bsdf_tables;
   DisplacementSet displacements;
   std::unique_ptr<Accel> accel;
+  ComputedEnvironment backdrop;              ///< if the scene has such a one
   std::string caustics_reason;  ///< why globals.caustics is enabled, or not
   KernelGlobals globals;
 

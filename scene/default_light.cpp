@@ -226,23 +226,6 @@ void environment_set(Scene& scene, const EnvironmentChoice& choice, bool has_bac
       textures.add_image("backdrop", seen.width, seen.height, seen.rgb, Wrap::kRepeat, Wrap::kClamp);
 }
 
-void surroundings_add_graph(Surroundings& surroundings, const EnvironmentGraph& graph, TextureStore& textures)
-{
-  EnvironmentMap map = environment_graph_bake(graph, textures.views());
-  const float most = *std::max_element(map.rgb.begin(), map.rgb.end());
-  // Textures are kept at half precision: a power of two in the factor keeps suns and dusks alike within its range.
-  constexpr int kMostExponent = 15;
-  int exponent = 0;
-  std::frexp(most, &exponent);
-  const float unit = most > 0 ? std::ldexp(1.0f, exponent - kMostExponent) : 1.0f;
-  if (unit > 0 && std::isfinite(1 / unit)) {
-    for (float& value : map.rgb) value /= unit;
-    surroundings.color *= unit;
-  }
-  surroundings.texture_index = textures.add_image(graph.is_backdrop ? "backdrop" : "environment", map.width, map.height,
-                                                  map.rgb, Wrap::kRepeat, Wrap::kClamp);
-}
-
 void default_light_add(Scene& scene,
                        std::span<const Placement> placements,
                        bool has_backdrop,

@@ -5,7 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "scene/environment_graph.h"
 #include "scene/environment_preset.h"
 #include "scene/scene.h"
 
@@ -37,10 +36,6 @@ bool emission_lights_scene(const Scene& scene,
 ///                      things stand out as bright ones do
 /// @pre not EnvironmentSource::kFile
 void environment_set(Scene& scene, const EnvironmentChoice& choice, bool has_backdrop, TextureStore& textures);
-
-/// Makes the map of surroundings that a graph describes.
-/// @param textures  those that the graph reads; gets the map
-void surroundings_add_graph(Surroundings& surroundings, const EnvironmentGraph& graph, TextureStore& textures);
 
 /// Surrounds a scene in which nothing is lit by the soft studio, with a warning.
 /// @param has_backdrop  as for environment_set

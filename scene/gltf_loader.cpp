@@ -137,14 +137,13 @@ void GltfLoader::set_environment(const LoadOptions& options)
 {
   std::optional<Environment> environment;
   if (!options.environment) {
-    environment = relief_environment(*root_, textures_, environment_graphs_, warnings_);
+    environment = relief_environment(*root_, textures_, warnings_);
   } else {
     environment.emplace();
     // The scene's own is not read, and may well be what is missing; but no output may take its place.
     try {
       TextureTable replaced;
-      EnvironmentGraphs replaced_graphs;
-      relief_environment(*root_, replaced, replaced_graphs, warnings_);
+      relief_environment(*root_, replaced, warnings_);
       add_files(scene_, replaced.take());
     } catch (const SceneError&) {
     }
@@ -787,7 +786,6 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
     std::vector<TextureRequest> textures, height_maps;
     std::vector<HeightMap> height_graphs;
     std::vector<Placement> unlit;
-    EnvironmentGraphs environment_graphs;
     {
       // The files go away before texels come: the two need not be in memory together.
       GltfLoader loader(warnings, faults);
@@ -795,7 +793,6 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
       unlit = loader.take_unlit();
       textures = loader.take_textures();
       height_maps = loader.take_height_maps();
-      environment_graphs = loader.take_environment_graphs();
       height_graphs = loader.take_height_graphs();
     }
     add_files(scene, textures);
@@ -804,10 +801,6 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
         std::make_shared<TextureStore>(std::move(textures), options.texture_budget_bytes, warnings, options.kept);
     scene.textures = store;
     faults.settle(options.continue_without_textures, warnings);
-    if (environment_graphs.environment)
-      surroundings_add_graph(scene.environment, *environment_graphs.environment, *store);
-    if (environment_graphs.backdrop)
-      surroundings_add_graph(*scene.environment.backdrop, *environment_graphs.backdrop, *store);
     const bool has_backdrop = !options.environment_visible.has_value();
     if (!unlit.empty()) default_light_add(scene, unlit, has_backdrop, *store, warnings);
     if (options.environment && options.environment->source != EnvironmentSource::kFile) {

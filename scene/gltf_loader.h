@@ -44,7 +44,6 @@ class GltfLoader {
   std::vector<TextureRequest> take_textures() { return textures_.take(); }
 
   /// Graph that a map of the surroundings is to be made of.
-  EnvironmentGraphs take_environment_graphs() { return std::exchange(environment_graphs_, {}); }
 
   /// Height maps that displacements refer to, in index order; empty once they are loaded.
   std::vector<TextureRequest> take_height_maps() { return height_maps_.take(); }
@@ -126,7 +125,6 @@ class GltfLoader {
   bool says_light_ = false;
   std::vector<Placement> unlit_;
   TextureTable textures_, height_maps_;
-  EnvironmentGraphs environment_graphs_;
   HeightGraphTable height_graphs_{textures_, scene_};
   Bounds world_bounds_;
   float image_aspect_ = 1;

@@ -249,26 +249,6 @@ bool reads_coordinates_alone(const GraphProgram& program, int uv_set)
   return true;
 }
 
-/// The textures that a program reads.
-std::vector<int> textures_of(const GraphProgram& program)
-{
-  std::vector<int> out;
-  for (std::size_t word = 0; word < program.code.size();) {
-    const auto op = static_cast<GraphOp>(program.code[word]);
-    const std::uint16_t* const immediates = &program.code[word] + 1;
-    if (op == GraphOp::image || op == GraphOp::image_box) out.push_back(immediates[0]);
-    if (op == GraphOp::image_tiles) {
-      const float* const tiles = &program.tables[immediates[2] | std::uint32_t{immediates[3]} << 16];
-      for (int i = 0; i < immediates[1] * kImageTileColumns; ++i) {
-        if (tiles[i] >= 0) out.push_back(static_cast<int>(tiles[i]));
-      }
-    }
-    const GraphOpShape& shape = kGraphOpShapes[static_cast<std::size_t>(op)];
-    word += 1 + static_cast<std::size_t>(shape.num_immediates + shape.num_outputs + shape.num_inputs);
-  }
-  return out;
-}
-
 /// Low and high of an axis that does not repeat, from uvRange.
 void set_range(const JsonReader& graph, Layout& layout)
 {
@@ -294,7 +274,7 @@ HeightGraph HeightGraphTable::keep(const GltfDocument& document, const JsonReade
   HeightGraph kept;
   kept.graph_index = static_cast<int>(scene_.graphs.size());
   scene_.graphs.push_back(height_graph_read(document, graph, textures_, scene_.attribute_names, warnings));
-  for (const int texture : textures_of(scene_.graphs.back())) textures_.use_for_heights(texture);
+  for (const int texture : graph_textures(scene_.graphs.back())) textures_.use_for_heights(texture);
   return kept;
 }
 

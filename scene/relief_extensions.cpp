@@ -38,10 +38,8 @@ EnvironmentGraph read_environment_graph(const GltfDocument& document,
                                         bool has_backdrop,
                                         Warnings& warnings)
 {
-  constexpr int kWidest = 16384;
   EnvironmentGraph graph;
   graph.program = graph_read_color(document, r, textures, graph.suns, warnings);
-  if (r.has("resolution")) graph.width = static_cast<int>(r.integer("resolution", 0, 2, kWidest));
   r.warn_unread(warnings);
   using Q = GraphQuantity;
   const auto reads = [&graph](std::initializer_list<Q> quantities) {
@@ -235,12 +233,10 @@ namespace {
 
 /// A colour, a map or a graph.
 /// @param has_backdrop  the camera sees others
-/// @param graph         gets the graph, if there is one
 Surroundings read_surroundings(const GltfDocument& document,
                                const JsonReader& r,
                                TextureTable& textures,
                                bool has_backdrop,
-                               std::optional<EnvironmentGraph>& graph,
                                Warnings& warnings)
 {
   Surroundings s;
@@ -254,7 +250,7 @@ Surroundings read_surroundings(const GltfDocument& document,
   }
   if (r.has("graph")) {
     if (r.has("image") || r.has("uri")) r.fail("", "either a graph or a map", "both");
-    graph = read_environment_graph(document, r.object("graph"), textures, has_backdrop, warnings);
+    s.graph = read_environment_graph(document, r.object("graph"), textures, has_backdrop, warnings);
   }
   // Round about there is no border; at the poles there is.
   const TextureSampling lat_long{Wrap::kRepeat, Wrap::kClamp, TexelFilter::kLinear};
@@ -271,22 +267,21 @@ Surroundings read_surroundings(const GltfDocument& document,
 
 std::optional<Environment> relief_environment(const GltfDocument& document,
                                               TextureTable& textures,
-                                              EnvironmentGraphs& graphs,
                                               Warnings& warnings)
 {
   std::optional<Environment> out;
   document.read_extension(document.json, "", "RELIEF_environment", [&](const JsonReader& r) {
     Environment e;
     static_cast<Surroundings&>(e) =
-        read_surroundings(document, r, textures, r.has("backdrop"), graphs.environment, warnings);
+        read_surroundings(document, r, textures, r.has("backdrop"), warnings);
     e.visible_to_camera = r.boolean("visibleToCamera", true);
     e.casts_caustics = r.boolean("causticLight", true);
     e.hidden_from = read_hidden_from(r);
     if (r.has("clearGlass")) e.clear_roughness = r.number_f("clearGlass", 0, 0, 1);
     if (r.has("backdrop")) {
       const JsonReader backdrop = r.object("backdrop");
-      e.backdrop = read_surroundings(document, backdrop, textures, true, graphs.backdrop, warnings);
-      if (graphs.backdrop) graphs.backdrop->is_backdrop = true;
+      e.backdrop = read_surroundings(document, backdrop, textures, true, warnings);
+      if (e.backdrop->graph) e.backdrop->graph->is_backdrop = true;
       backdrop.warn_unread(warnings);
     }
     r.warn_unread(warnings);

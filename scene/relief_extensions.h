@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "scene/environment_graph.h"
 #include "scene/height_graph.h"
 #include "scene/khronos_extensions.h"
 #include "scene/scene.h"
@@ -25,15 +24,9 @@ void relief_camera(const GltfDocument& document,
                    Shutter& shutter,
                    Warnings& warnings);
 
-/// Graphs of surroundings, of which maps are to be made when the textures are there.
-struct EnvironmentGraphs {
-  std::optional<EnvironmentGraph> environment, backdrop;
-};
-
 /// RELIEF_environment; empty if the document has none.
 std::optional<Environment> relief_environment(const GltfDocument& document,
                                               TextureTable& textures,
-                                              EnvironmentGraphs& graphs,
                                               Warnings& warnings);
 
 /// Reads RELIEF_light of a punctual light into it.

@@ -16,6 +16,7 @@
 #include "kernel/shape/displacement_settings.h"
 #include "kernel/shape/mesh_view.h"
 #include "scene/diagnostics.h"
+#include "scene/environment_graph.h"
 #include "scene/file_stamp.h"
 #include "scene/graph/graph_program.h"
 #include "scene/height_map.h"
@@ -82,10 +83,11 @@ struct SceneCamera {
   int motion_index = -1;  ///< as Instance::motion_index
 };
 
-/// Lat-long map or constant. See docs/scene_format.md for the orientation.
+/// Lat-long map, graph or constant. See docs/scene_format.md for the orientation.
 struct Surroundings {
-  Vec3f color{0, 0, 0};    ///< radiance factor, strength included
-  int texture_index = -1;  ///< into TextureStore; −1: constant `color`
+  Vec3f color{0, 0, 0};                   ///< radiance factor, strength included
+  int texture_index = -1;                 ///< into TextureStore; −1: no map
+  std::optional<EnvironmentGraph> graph;  ///< in a map's place
   float rotation = 0;      ///< radians about +Y
 };
 

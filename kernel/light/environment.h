@@ -1,25 +1,43 @@
-// The light that surrounds the scene: a lat-long map or one constant radiance. environment_eval is the light,
-// environment_sample and environment_pdf choose directions in proportion to it; the tables they read are made by
-// integrator/environment_tables.h.
+// The light that surrounds the scene: a lat-long map, one constant radiance, or what a value graph gives for a direction.
+// environment_eval is the light, environment_sample and environment_pdf choose directions about in proportion to it; the tables
+// they read are made by integrator/environment_tables.h.
 //
 // Directions: the map's centre looks along −Z, its right half is +X, its top +Y. Direction d of the unrotated map has
 // u = ½ + atan2(d.x, −d.z) / 2π, v = θ / π with θ the angle to +Y; the rotation adds to u.
 #pragma once
 
 #include "kernel/math/trigonometry.h"
+#include "kernel/sample/warp.h"
 #include "kernel/texture/texture.h"
 
 namespace relief {
+
+/// Radiance from a direction of surroundings that are computed, W/m²/sr, >= 0. A pointer, as graphs are run apart from the stages.
+/// @param wi  unit, towards the environment, world space
+using EnvironmentRadiance = Vec3f (*)(const void* computed, Vec3f wi);
+
+/// The disk of a sun among computed surroundings, which is smaller than a cell: it is sampled by itself.
+struct EnvironmentSun {
+  Vec3f towards;          ///< its middle; unit, world space
+  float cone = 0;         ///< 1 − cosine of its radius
+  float probability = 0;  ///< with which it is chosen
+};
 
 /// An environment and its sampling tables. Cells are those of a grid over the map, uniform in u and v; within a cell
 /// directions are uniform in solid angle, so that the density is constant over it and bounded at the poles.
 struct EnvironmentView {
   Vec3f color{};  ///< radiance factor, strength included; the radiance itself without a map
-  bool has_map = false;
+  bool has_map = false;      ///< it is not constant
   float rotation_turns = 0;  ///< rotation about +Y in turns, [0, 1)
   TextureView map;           ///< repeats in u; copied, so that a look-up needs no further pointer
+  /// Gives the radiance in the map's place, as `color` times what it returns. Null: it is not computed.
+  EnvironmentRadiance radiance_of = nullptr;
+  const void* computed = nullptr;  ///< handed to it
 
-  int num_columns = 0, num_rows = 0;  ///< of cells; rows even. 0: the map is black, nothing is sampled
+  const EnvironmentSun* suns = nullptr;  ///< of computed surroundings
+  int num_suns = 0;
+  float cells_probability = 1;        ///< with which a cell is chosen, and no sun
+  int num_columns = 0, num_rows = 0;  ///< of cells; rows even. 0: no cell is sampled
   const float* row_cdf = nullptr;     ///< num_rows + 1, from 0 to 1
   const float* column_cdf = nullptr;  ///< num_rows × (num_columns + 1), each row from 0 to 1
   /// num_rows + 1; upper hemisphere: sin²(θ/2) at the row's upper edge, lower hemisphere: cos²(θ/2). Solid angle is
@@ -46,9 +64,9 @@ RELIEF_KERNEL Vec2f environment_uv(const EnvironmentView& environment, Vec3f wi)
 }
 
 /// Radiance at a position of the map, from environment_uv.
+/// @pre there is a map
 RELIEF_KERNEL Vec3f environment_eval_uv(const EnvironmentView& environment, Vec2f uv)
 {
-  if (!environment.has_map) return environment.color;
   // Half a texel from the poles the first and last rows are repeated, whatever the texture's own wrap mode.
   const float half_texel = 0.5f / static_cast<float>(environment.map.height);
   const Vec2f inside{uv.x, clamp(uv.y, half_texel, 1.0f - half_texel)};
@@ -63,6 +81,7 @@ RELIEF_KERNEL Vec3f environment_eval_uv(const EnvironmentView& environment, Vec2
 RELIEF_KERNEL Vec3f environment_eval(const EnvironmentView& environment, Vec3f wi)
 {
   if (!environment.has_map) return environment.color;
+  if (environment.radiance_of != nullptr) return environment.color * environment.radiance_of(environment.computed, wi);
   return environment_eval_uv(environment, environment_uv(environment, wi));
 }
 
@@ -108,41 +127,10 @@ RELIEF_KERNEL Vec3f environment_direction(const EnvironmentView& environment, in
   return {sin_theta * phi.sin, cos_theta, -sin_theta * phi.cos};
 }
 
-/// A direction towards the environment, in proportion to its luminance, or what the tables take of it, averaged over
-/// cells.
-/// @param u  uniform in [0, 1)²; u.x chooses the column, u.y the row
-/// @return   uniform over the sphere without a map; pdf 0 for a black map
-RELIEF_KERNEL EnvironmentSample environment_sample(const EnvironmentView& environment, Vec2f u)
+/// Density of a place on the map among the cells.
+RELIEF_KERNEL float environment_cells_pdf(const EnvironmentView& environment, Vec2f uv)
 {
-  if (!environment.has_map) {
-    const float z = 1.0f - 2.0f * u.y;
-    const float r = 2.0f * safe_sqrt(u.y * (1.0f - u.y));
-    const SinCos phi = sin_cos_turn(u.x);
-    return {{r * phi.cos, z, r * phi.sin}, environment.color, 0.25f * kInvPi};
-  }
-  if (environment.num_rows == 0) {
-    return {};
-  }
-  const CdfCell row = cdf_cell(environment.row_cdf, environment.num_rows, u.y);
-  const float* column_cdf =
-      environment.column_cdf + static_cast<std::ptrdiff_t>(row.index) * (environment.num_columns + 1);
-  const CdfCell column = cdf_cell(column_cdf, environment.num_columns, u.x);
-  EnvironmentSample sample;
-  sample.wi = environment_direction(environment, column.index, row.index, column.fraction, row.fraction);
-  sample.radiance = environment_eval(environment, sample.wi);
-  sample.pdf_solid_angle = row.probability * column.probability / environment_cell_solid_angle(environment, row.index);
-  return sample;
-}
-
-/// Density of environment_sample at a position of the map.
-RELIEF_KERNEL float environment_pdf_uv(const EnvironmentView& environment, Vec2f uv)
-{
-  if (!environment.has_map) {
-    return 0.25f * kInvPi;
-  }
-  if (environment.num_rows == 0) {
-    return 0.0f;
-  }
+  if (environment.num_rows == 0) return 0.0f;
   const int column = axis_nearest(uv.x, environment.num_columns, Wrap::kClamp);
   const int row = axis_nearest(uv.y, environment.num_rows, Wrap::kClamp);
   const float* column_cdf = environment.column_cdf + static_cast<std::ptrdiff_t>(row) * (environment.num_columns + 1);
@@ -151,12 +139,87 @@ RELIEF_KERNEL float environment_pdf_uv(const EnvironmentView& environment, Vec2f
   return probability / environment_cell_solid_angle(environment, row);
 }
 
+/// Density of the suns at a direction, with the choice among them and the cells.
+RELIEF_KERNEL float environment_suns_pdf(const EnvironmentView& environment, Vec3f wi)
+{
+  float pdf = 0.0f;
+  for (int i = 0; i < environment.num_suns; ++i) {
+    const EnvironmentSun& sun = environment.suns[i];
+    // By the difference, as sun_light_is_met.
+    if (length_squared(wi - sun.towards) <= 2.0f * sun.cone) pdf += sun.probability * warp_cone_pdf(sun.cone);
+  }
+  return pdf;
+}
+
 /// Density of environment_sample at a direction.
 /// @param wi  unit, world space
 /// @return    1/sr; positive wherever the light that the tables were made for is
 RELIEF_KERNEL float environment_pdf(const EnvironmentView& environment, Vec3f wi)
 {
-  return environment_pdf_uv(environment, environment_uv(environment, wi));
+  if (!environment.has_map) return 0.25f * kInvPi;
+  const float in_cells = environment_cells_pdf(environment, environment_uv(environment, wi));
+  return environment.cells_probability * in_cells + environment_suns_pdf(environment, wi);
+}
+
+/// A direction in a cell chosen by the tables, with the density of that.
+/// @param u  uniform in [0, 1)²; u.x chooses the column, u.y the row
+/// @pre      there are cells
+RELIEF_KERNEL EnvironmentSample environment_cells_sample(const EnvironmentView& environment, Vec2f u)
+{
+  const CdfCell row = cdf_cell(environment.row_cdf, environment.num_rows, u.y);
+  const float* column_cdf =
+      environment.column_cdf + static_cast<std::ptrdiff_t>(row.index) * (environment.num_columns + 1);
+  const CdfCell column = cdf_cell(column_cdf, environment.num_columns, u.x);
+  EnvironmentSample sample;
+  sample.wi = environment_direction(environment, column.index, row.index, column.fraction, row.fraction);
+  sample.pdf_solid_angle = row.probability * column.probability / environment_cell_solid_angle(environment, row.index);
+  return sample;
+}
+
+/// A direction by suns and cells together; u.x chooses among them, and what is left of it serves on.
+/// @return  without radiance; pdf 0: neither was found
+RELIEF_KERNEL EnvironmentSample environment_choose(const EnvironmentView& environment, Vec2f u)
+{
+  constexpr float kBelowOne = 1.0f - 0x1p-24f;
+  for (int i = 0; i < environment.num_suns; ++i) {
+    const EnvironmentSun& sun = environment.suns[i];
+    if (u.x < sun.probability) {
+      const Vec2f within{min(u.x / sun.probability, kBelowOne), u.y};
+      EnvironmentSample sample;
+      sample.wi = from_local(frame_from_normal(sun.towards), warp_cone(sun.cone, within));
+      sample.pdf_solid_angle = environment_pdf(environment, sample.wi);
+      return sample;
+    }
+    u.x -= sun.probability;
+  }
+  if (environment.num_rows == 0) return {};
+  u.x = min(u.x / environment.cells_probability, kBelowOne);
+  EnvironmentSample sample = environment_cells_sample(environment, u);
+  sample.pdf_solid_angle = environment.cells_probability * sample.pdf_solid_angle +
+                           environment_suns_pdf(environment, sample.wi);
+  return sample;
+}
+
+/// A direction towards the environment, in proportion to its luminance, or what the tables take of it, averaged over
+/// cells.
+/// @param u  uniform in [0, 1)²
+/// @return   uniform over the sphere without a map; pdf 0: nothing was sampled
+RELIEF_KERNEL EnvironmentSample environment_sample(const EnvironmentView& environment, Vec2f u)
+{
+  if (!environment.has_map) {
+    const float z = 1.0f - 2.0f * u.y;
+    const float r = 2.0f * safe_sqrt(u.y * (1.0f - u.y));
+    const SinCos phi = sin_cos_turn(u.x);
+    return {{r * phi.cos, z, r * phi.sin}, environment.color, 0.25f * kInvPi};
+  }
+  EnvironmentSample sample;
+  if (environment.num_suns > 0) {
+    sample = environment_choose(environment, u);
+  } else if (environment.num_rows > 0) {
+    sample = environment_cells_sample(environment, u);
+  }
+  if (sample.pdf_solid_angle > 0.0f) sample.radiance = environment_eval(environment, sample.wi);
+  return sample;
 }
 
 /// A direction of all of the environment's light, for photons: half of them by environment_sample, whose density may leave
@@ -165,7 +228,7 @@ RELIEF_KERNEL float environment_pdf(const EnvironmentView& environment, Vec3f wi
 RELIEF_KERNEL EnvironmentSample environment_sample_all(const EnvironmentView& environment, Vec2f u)
 {
   const float even = 0.25f * kInvPi;
-  const bool has_cells = environment.has_map && environment.num_rows > 0;
+  const bool has_cells = environment.has_map && (environment.num_rows > 0 || environment.num_suns > 0);
   EnvironmentSample sample;
   if (has_cells && u.x < 0.5f) {
     sample = environment_sample(environment, {2.0f * u.x, u.y});
@@ -184,8 +247,7 @@ RELIEF_KERNEL EnvironmentSample environment_sample_all(const EnvironmentView& en
 /// Radiance and density at once, for paths that leave the scene.
 RELIEF_KERNEL EnvironmentSample environment_eval_pdf(const EnvironmentView& environment, Vec3f wi)
 {
-  const Vec2f uv = environment_uv(environment, wi);
-  return {wi, environment_eval_uv(environment, uv), environment_pdf_uv(environment, uv)};
+  return {wi, environment_eval(environment, wi), environment_pdf(environment, wi)};
 }
 
 }  // namespace relief

@@ -21,6 +21,25 @@ bool graph_op_reads_images(GraphOp op)
   return op == GraphOp::image || op == GraphOp::image_box || op == GraphOp::image_tiles;
 }
 
+std::vector<int> graph_textures(const GraphProgram& program)
+{
+  std::vector<int> out;
+  for (std::size_t word = 0; word < program.code.size();) {
+    const auto op = static_cast<GraphOp>(program.code[word]);
+    const std::uint16_t* const immediates = &program.code[word] + 1;
+    if (op == GraphOp::image || op == GraphOp::image_box) out.push_back(immediates[0]);
+    if (op == GraphOp::image_tiles) {
+      const float* const tiles = &program.tables[immediates[2] | std::uint32_t{immediates[3]} << 16];
+      for (int i = 0; i < immediates[1] * kImageTileColumns; ++i) {
+        if (tiles[i] >= 0) out.push_back(static_cast<int>(tiles[i]));
+      }
+    }
+    const GraphOpShape& shape = kGraphOpShapes[static_cast<std::size_t>(op)];
+    word += 1 + static_cast<std::size_t>(shape.num_immediates + shape.num_outputs + shape.num_inputs);
+  }
+  return out;
+}
+
 GraphProgramView GraphProgram::view() const
 {
   GraphProgramView v;

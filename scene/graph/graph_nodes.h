@@ -32,12 +32,6 @@ struct GraphSocket {
   bool is_normal = false;      ///< that value is the shading normal instead
 };
 
-/// A light that graphs of surroundings have in so small a part of them that it is to be looked for.
-struct GraphSun {
-  Vec3f towards;  ///< unit, Z up
-  float radius;   ///< angle
-};
-
 /// One node while it is turned into operations.
 struct GraphNode {
   GraphBuilder& build;

@@ -24,8 +24,17 @@ struct GraphProgram {
   std::size_t bytes() const;
 };
 
+/// The textures that a program reads, each as often as it does.
+std::vector<int> graph_textures(const GraphProgram& program);
+
 /// Whether an operation depends on the scene's textures.
 bool graph_op_reads_images(GraphOp op);
+
+/// A light that graphs of surroundings have in so small a part of them that it is to be looked for.
+struct GraphSun {
+  Vec3f towards;  ///< unit, Z up
+  float radius;   ///< angle
+};
 
 struct GraphRegisters;  // kernel/graph/graph_registers.h
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kernel/math/cie_1931.h"
+#include "scene/graph/sky_columns.h"
 #include "scene/parallel.h"
 
 namespace relief {
@@ -111,19 +112,14 @@ Vec3f elevated(float elevation, float turn)
   return {std::cos(elevation) * std::cos(turn), std::cos(elevation) * std::sin(turn), std::sin(elevation)};
 }
 
-/// Light scattered once towards the eye from a direction.
-Vec3f radiance_from(const SkyModel& sky, Vec3f d, Vec3f towards_sun)
+/// Light scattered once towards the eye from a direction, but for the phase functions.
+SkySums sums_from(const SkyModel& sky, Vec3f d, Vec3f towards_sun)
 {
   constexpr int kWavelengths = sizeof(kSpectrum) / sizeof(kSpectrum[0]);
-  constexpr float kG = kDustAnisotropy;
   const Matter amounts{sky.air, sky.dust, sky.ozone};
-  const float cosine = dot(d, towards_sun), lobes = 1 + cosine * cosine;
-  const float air_phase = 3 / (16 * kPiAngle) * lobes;
-  const float dust_phase =
-      3 / (8 * kPiAngle) * (1 - kG * kG) * lobes / ((2 + kG * kG) * std::pow(1 + kG * kG - 2 * kG * cosine, 1.5f));
   const Vec3f eye{0, 0, kEarthRadius + sky.altitude};
   const float segment = way_out(eye, d) / kSegments;
-  float power[kWavelengths] = {};
+  float air[kWavelengths] = {}, dust[kWavelengths] = {};
   Matter passed;
   for (int i = 0; i < kSegments; ++i) {
     const Vec3f p = eye + d * ((static_cast<float>(i) + 0.5f) * segment);
@@ -134,11 +130,24 @@ Vec3f radiance_from(const SkyModel& sky, Vec3f d, Vec3f towards_sun)
     for (int k = 0; k < kWavelengths; ++k) {
       const Wavelength& w = kSpectrum[k];
       const float left = std::exp(-(all.air * w.air + all.dust * kDustExtinction + all.ozone * w.ozone));
-      const float scattered = air_phase * here.air * w.air + dust_phase * here.dust * kDustScattering;
-      power[k] += left * scattered * w.sunlight * segment;
+      air[k] += left * here.air * w.air * w.sunlight * segment;
+      dust[k] += left * here.dust * kDustScattering * w.sunlight * segment;
     }
   }
-  return color_of([&power](const Wavelength& w) { return power[&w - kSpectrum]; });
+  return {color_of([&air](const Wavelength& w) { return air[&w - kSpectrum]; }),
+          color_of([&dust](const Wavelength& w) { return dust[&w - kSpectrum]; }),
+          {}};
+}
+
+/// @param cosine  of the angle between the direction and the sun
+Vec3f radiance_of(const SkySums& sums, float cosine)
+{
+  constexpr float kG = kDustAnisotropy;
+  const float lobes = 1 + cosine * cosine;
+  const float air_phase = 3 / (16 * kPiAngle) * lobes;
+  const float dust_phase =
+      3 / (8 * kPiAngle) * (1 - kG * kG) * lobes / ((2 + kG * kG) * std::pow(1 + kG * kG - 2 * kG * cosine, 1.5f));
+  return sums.air * air_phase + sums.dust * dust_phase;
 }
 
 }  // namespace
@@ -152,14 +161,26 @@ std::vector<float> sky_table(const SkyModel& sky)
   const float most = is_nishita ? 0.5f + 0.25f / kSkyRows : 0.5f;
   std::vector<float> table(kColumns * rows * 3);
   const Vec3f towards_sun = elevated(sky.sun_elevation, 0);
+  // The earth's shadow has a rim, across which nothing can be interpolated.
+  const bool is_dusk = towards_sun.z < 0;
   for_each_in_parallel(rows - first, [&](std::size_t i) {
     const std::size_t y = first + i;
     const float v = static_cast<float>(y) / static_cast<float>(rows);
     const float part = is_nishita ? v : 2 * v - 1;
     const float elevation = most * kPiAngle * part * part;
+    const auto direction_at = [&](std::size_t x) {
+      return elevated(elevation, 2 * kPiAngle * static_cast<float>(x) / kColumns - kPiAngle);
+    };
+    std::vector<SkySums> knots;
+    if (!is_dusk) {
+      for (std::size_t k = 0; k < kSkyKnots; ++k) {
+        knots.push_back(sums_from(sky, direction_at(k * kSkyStride), towards_sun));
+      }
+    }
     for (std::size_t x = 0; x < kColumns / 2; ++x) {
-      const float turn = 2 * kPiAngle * static_cast<float>(x) / kColumns - kPiAngle;
-      const Vec3f radiance = radiance_from(sky, elevated(elevation, turn), towards_sun);
+      const Vec3f d = direction_at(x);
+      const SkySums sums = is_dusk ? sums_from(sky, d, towards_sun) : sky_sums_at(knots, static_cast<float>(x));
+      const Vec3f radiance = radiance_of(sums, dot(d, towards_sun));
       for (const std::size_t column : {x, kColumns - 1 - x}) {
         float* texel = &table[(y * kColumns + column) * 3];
         texel[0] = radiance.x, texel[1] = radiance.y, texel[2] = radiance.z;

@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "kernel/math/cie_1931.h"
+#include "scene/graph/sky_columns.h"
 #include "scene/graph/sky_model.h"
 #include "scene/parallel.h"
 
@@ -152,29 +153,35 @@ Spectrum scattered_before(const SunlightTable& sunlight, float cosine, float hei
   return out;
 }
 
-Spectrum radiance_from(const SkyModel& sky, const SunlightTable& sunlight, Vec3f eye, Vec3f d, Vec3f towards_sun)
+SkySums sums_from(const SkyModel& sky, const SunlightTable& sunlight, Vec3f eye, Vec3f d, Vec3f towards_sun)
 {
-  constexpr float kG = kDustAnisotropy;
-  const float cosine = dot(d, towards_sun);
-  const float air_phase = 3 / (16 * kPiAngle) * (1 + cosine * cosine);
-  const float dust_phase = (1 - kG * kG) / (4 * kPiAngle * std::pow(1 + kG * kG - 2 * kG * cosine, 1.5f));
   const float to_ground = distance_to(eye, d, kEarthRadius);
   const float step = (to_ground < 0 ? distance_to(eye, d, kAtmosphereRadius) : to_ground) / kSteps;
-  Spectrum sum{}, left{1, 1, 1, 1};
+  Spectrum air{}, dust{}, even{}, left{1, 1, 1, 1};
   for (int i = 0; i < kSteps; ++i) {
     const Vec3f p = eye + d * ((static_cast<float>(i) + 0.5f) * step);
     const float sun_cosine = dot(p, towards_sun) / length(p), height = height_of(p);
     const Matter m = matter_at(sky, height);
     const Spectrum direct = sunlight.at(sun_cosine, height), before = scattered_before(sunlight, sun_cosine, height);
-    for (std::size_t w = 0; w < sum.size(); ++w) {
-      const float source = kSunlight[w] * (m.air[w] * (air_phase * direct[w] + before[w]) +
-                                           m.dust[w] * (dust_phase * direct[w] + before[w]));
+    for (std::size_t w = 0; w < left.size(); ++w) {
       const float passed = std::exp(-step * m.extinction[w]);
-      sum[w] += left[w] * source * (1 - passed) / std::max(m.extinction[w], 1e-7f);
+      const float seen = kSunlight[w] * left[w] * (1 - passed) / std::max(m.extinction[w], 1e-7f);
+      air[w] += seen * m.air[w] * direct[w];
+      dust[w] += seen * m.dust[w] * direct[w];
+      even[w] += seen * (m.air[w] + m.dust[w]) * before[w];
       left[w] *= passed;
     }
   }
-  return sum;
+  return {color_of(air), color_of(dust), color_of(even)};
+}
+
+/// @param cosine  of the angle between the direction and the sun
+Vec3f radiance_of(const SkySums& sums, float cosine)
+{
+  constexpr float kG = kDustAnisotropy;
+  const float air_phase = 3 / (16 * kPiAngle) * (1 + cosine * cosine);
+  const float dust_phase = (1 - kG * kG) / (4 * kPiAngle * std::pow(1 + kG * kG - 2 * kG * cosine, 1.5f));
+  return sums.air * air_phase + sums.dust * dust_phase + sums.even;
 }
 
 /// Kilometres at which the model still works.
@@ -192,10 +199,17 @@ std::vector<float> sky_multiple_table(const SkyModel& sky)
   for_each_in_parallel(kRows, [&](std::size_t y) {
     const float v = 2 * (static_cast<float>(y) + 0.5f) / kRows - 1;
     const float elevation = std::copysign(v * v, v) * kPiAngle / 2;
+    const auto direction_at = [&](float place) {
+      const float turn = 2 * kPiAngle * place / kColumns;
+      return Vec3f{std::cos(elevation) * std::cos(turn), std::cos(elevation) * std::sin(turn), std::sin(elevation)};
+    };
+    std::vector<SkySums> knots;
+    for (std::size_t k = 0; k < kSkyKnots; ++k) {
+      knots.push_back(sums_from(sky, *sunlight, eye, direction_at(static_cast<float>(k * kSkyStride)), towards_sun));
+    }
     for (std::size_t x = 0; x < kColumns / 2; ++x) {
-      const float turn = 2 * kPiAngle * (static_cast<float>(x) + 0.5f) / kColumns;
-      const Vec3f d{std::cos(elevation) * std::cos(turn), std::cos(elevation) * std::sin(turn), std::sin(elevation)};
-      const Vec3f radiance = color_of(radiance_from(sky, *sunlight, eye, d, towards_sun));
+      const float place = static_cast<float>(x) + 0.5f;
+      const Vec3f radiance = radiance_of(sky_sums_at(knots, place), dot(direction_at(place), towards_sun));
       for (const std::size_t column : {x, kColumns - 1 - x}) {
         float* texel = &table[(y * kColumns + column) * 3];
         texel[0] = radiance.x, texel[1] = radiance.y, texel[2] = radiance.z;

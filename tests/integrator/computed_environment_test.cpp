@@ -1,5 +1,5 @@
-// Surroundings by a value graph: what a direction is for it, how fine the map gets, and what is wrong with one.
-#include "scene/environment_graph.h"
+// Surroundings by a value graph: what a direction is for it, how directions are chosen, and what is wrong with one.
+#include "integrator/computed_environment.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,11 @@
 #include <cmath>
 #include <numbers>
 
-#include "kernel/texture/texture.h"
+#include "integrator/environment_tables.h"
+#include "integrator/light_set.h"
+#include "integrator/stages.h"
+#include "kernel/globals.h"
+#include "kernel/sample/sobol.h"
 #include "scene/graph/hosek_wilkie.h"
 #include "scene/texture_store.h"
 #include "tests/support/graph_scene.h"
@@ -31,19 +35,37 @@ Scene load(const json& environment)
   return scene_load(folder.write("scene.gltf", b.gltf()));
 }
 
-const TextureView& map_of(const Scene& scene)
+/// Direction of a place of a lat-long map, v down, whose middle looks along −Z.
+Vec3f direction_of(double u, double v)
 {
-  return scene.textures->views()[static_cast<std::size_t>(scene.environment.texture_index)];
+  const double phi = (u - 0.5) * 2 * std::numbers::pi, theta = v * std::numbers::pi;
+  return {static_cast<float>(std::sin(theta) * std::sin(phi)), static_cast<float>(std::cos(theta)),
+          static_cast<float>(-std::sin(theta) * std::cos(phi))};
 }
 
-/// Radiance at a place of the map, v down.
-Vec3f radiance(const Scene& scene, float u, float v)
+ComputedEnvironment computed_of(const Scene& scene, const Surroundings& surroundings)
 {
-  const Vec4f texel = texture_sample(map_of(scene), {u, v}, 0);
-  return scene.environment.color * Vec3f{texel.x, texel.y, texel.z};
+  return computed_environment_make(surroundings.graph.value(), surroundings.rotation, stage_table_select().run_graph,
+                                   scene.textures->views().data());
 }
 
-void expect_radiance(Vec3f found, Vec3f expected, float tolerance = 0.01f)
+Vec3f radiance(const Scene& scene, const Surroundings& surroundings, float u, float v)
+{
+  const ComputedEnvironment computed = computed_of(scene, surroundings);
+  return environment_eval(environment_view_make(computed, surroundings.color, surroundings.rotation),
+                          direction_of(static_cast<double>(u), static_cast<double>(v)));
+}
+
+Vec3f radiance(const Scene& scene, float u, float v) { return radiance(scene, scene.environment, u, v); }
+
+EnvironmentTables tables_of(const Scene& scene, EnvironmentDensity density)
+{
+  const Environment& e = scene.environment;
+  return environment_tables_make(std::make_shared<const ComputedEnvironment>(computed_of(scene, e)), e.color, e.rotation,
+                                 e.graph->suns, environment_graph_image_side(*e.graph, scene.textures->views()), density);
+}
+
+void expect_radiance(Vec3f found, Vec3f expected, float tolerance = 2e-6f)
 {
   EXPECT_NEAR(found.x, expected.x, tolerance);
   EXPECT_NEAR(found.y, expected.y, tolerance);
@@ -64,7 +86,6 @@ TEST(EnvironmentGraph, PositionsAreDirectionsWithZUp)
 {
   const json geometry = json::array({{{"type", "geometry"}}});
   const Scene scene = load(environment(geometry, {{"node", 0}, {"output", "position"}}));
-  EXPECT_EQ(map_of(scene).width, 512);
   expect_radiance(radiance(scene, 0.5f, 0.5f), {0, 1, 0});
   expect_radiance(radiance(scene, 0.75f, 0.5f), {1, 0, 0});
   expect_radiance(radiance(scene, 0.5f, 0.0f), {0, 0, 1});
@@ -80,27 +101,15 @@ TEST(EnvironmentGraph, GeneratedAndObjectAreDirectionsToo)
 {
   for (const char* output : {"generated", "object"}) {
     const Scene scene = load(environment({{{"type", "texture-coordinate"}}}, {{"node", 0}, {"output", output}}));
-    expect_radiance(radiance(scene, 0.625f, 0.25f), {0.5f, 0.5f, 0.7071f});
+    expect_radiance(radiance(scene, 0.625f, 0.25f), {0.5f, 0.5f, std::sqrt(0.5f)});
   }
-}
-
-TEST(EnvironmentGraph, FineGraphsGetFineMaps)
-{
-  const json noise = {{{"type", "texture-coordinate"}},
-                      {{"type", "noise-texture"},
-                       {"inputs", {{"vector", {{"node", 0}, {"output", "generated"}}}, {"scale", 30}, {"detail", 0}}}}};
-  json e = environment(noise, {{"node", 1}, {"output", "factor"}});
-  EXPECT_GT(map_of(load(e)).width, 512);
-  e["graph"]["resolution"] = 64;
-  EXPECT_EQ(map_of(load(e)).width, 64);
-  EXPECT_EQ(map_of(load(e)).height, 32);
 }
 
 TEST(EnvironmentGraph, RadiancesBeyondHalfPrecisionStay)
 {
   for (const float value : {1e8f, 1e-8f}) {
     expect_radiance(radiance(load(environment(json::array(), {value, value / 2, 0})), 0.3f, 0.4f) * (1 / value),
-                    {1, 0.5f, 0}, 0.001f);
+                    {1, 0.5f, 0});
   }
   // What is no radiance is none.
   expect_radiance(radiance(load(environment(json::array(), {-1, 2, 0})), 0.3f, 0.4f), {0, 2, 0});
@@ -124,9 +133,6 @@ TEST(EnvironmentGraph, ErrorsSayWhere)
   EXPECT_NE(error_of(without).find("/extensions/RELIEF_environment/graph/outputs/color"), std::string::npos);
   EXPECT_NE(error_of({{"graph", {{"nodes", json::array()}}}}).find("graph/outputs"), std::string::npos);
   EXPECT_NE(error_of(environment({{{"type", "nonsense"}}}, {1, 1, 1})).find("graph/nodes/0/type"), std::string::npos);
-  json narrow = environment(json::array(), {1, 1, 1});
-  narrow["graph"]["resolution"] = 1;
-  EXPECT_NE(error_of(narrow).find("graph/resolution"), std::string::npos);
 }
 
 TEST(EnvironmentGraph, WhatDependsOnTheRayIsWarnedAbout)
@@ -150,8 +156,7 @@ TEST(EnvironmentGraph, BackdropsAreWhatTheCameraSees)
   }));
   expect_radiance(radiance(scene, 0.3f, 0.4f), {0, 0, 0});
   const Surroundings& seen = scene.environment.backdrop.value();
-  const TextureView& map = scene.textures->views()[static_cast<std::size_t>(seen.texture_index)];
-  EXPECT_NEAR(texture_sample(map, {0.3f, 0.4f}, 0).x * seen.color.x, 3.0f, 0.01f);
+  EXPECT_EQ(radiance(scene, seen, 0.3f, 0.4f).x, 3.0f);
   both["backdrop"]["image"] = 0;
   EXPECT_NE(error_of(both).find("/extensions/RELIEF_environment/backdrop"), std::string::npos);
 }
@@ -159,25 +164,37 @@ TEST(EnvironmentGraph, BackdropsAreWhatTheCameraSees)
 json sky(json options)
 {
   options["type"] = "sky-texture";
-  json e = environment(json::array({options}), {{"node", 0}});
-  e["graph"]["resolution"] = 1024;
-  return e;
+  return environment(json::array({options}), {{"node", 0}});
 }
 
-/// Integral of red over the sphere.
+/// Integral of red over the sphere, by the directions that are chosen.
 double power(const Scene& scene)
 {
-  const TextureView& map = map_of(scene);
+  constexpr std::uint32_t kSamples = 1u << 16;
+  const EnvironmentTables tables = tables_of(scene, EnvironmentDensity::kRadiance);
+  const EnvironmentView view = tables.view();
   double sum = 0;
-  for (int y = 0; y < map.height; ++y) {
-    const double v = (y + 0.5) / map.height;
-    for (int x = 0; x < map.width; ++x) {
-      const double u = (x + 0.5) / map.width;
+  for (std::uint32_t i = 0; i < kSamples; ++i) {
+    const EnvironmentSample sample = environment_sample(view, sample_2d(0, i, 0));
+    if (sample.pdf_solid_angle > 0) sum += static_cast<double>(sample.radiance.x / sample.pdf_solid_angle);
+  }
+  return sum / kSamples;
+}
+
+/// The same by a grid of directions.
+double power_by_grid(const Scene& scene, int rows)
+{
+  const ComputedEnvironment computed = computed_of(scene, scene.environment);
+  const EnvironmentView view = environment_view_make(computed, scene.environment.color, scene.environment.rotation);
+  double sum = 0;
+  for (int y = 0; y < rows; ++y) {
+    const double v = (y + 0.5) / rows;
+    for (int x = 0; x < 2 * rows; ++x) {
       sum += std::sin(v * std::numbers::pi) *
-             static_cast<double>(radiance(scene, static_cast<float>(u), static_cast<float>(v)).x);
+             static_cast<double>(environment_eval(view, direction_of((x + 0.5) / (2 * rows), v)).x);
     }
   }
-  return sum * 2 * std::numbers::pi * std::numbers::pi / map.width / map.height;
+  return sum * std::numbers::pi * std::numbers::pi / rows / rows;
 }
 
 TEST(EnvironmentGraph, SunsOfAnySizeHaveTheirPower)
@@ -315,6 +332,139 @@ TEST(EnvironmentGraph, ImagesAreLookedUpByDirection)
   EXPECT_NE(
       error_of(environment({{{"type", "environment-texture"}}}, {{"node", 0}, {"output", "color"}})).find("texture"),
       std::string::npos);
+}
+
+json noise(double scale)
+{
+  return environment({{{"type", "texture-coordinate"}},
+                      {{"type", "noise-texture"},
+                       {"inputs", {{"vector", {{"node", 0}, {"output", "generated"}}}, {"scale", scale}, {"detail", 2}}}}},
+                     {{"node", 1}, {"output", "factor"}});
+}
+
+/// What makes a sun, cells and noise of two scales; each with and without a turn.
+std::vector<Scene> varied_scenes()
+{
+  std::vector<Scene> scenes;
+  for (const double rotation : {0.0, 1.0}) {
+    for (json e : {noise(3), noise(90), sky({{"sunElevation", 0.5}, {"sunRotation", 1}, {"sunSize", 0.1}})}) {
+      e["rotation"] = rotation;
+      scenes.push_back(load(e));
+    }
+  }
+  return scenes;
+}
+
+TEST(ComputedEnvironment, IsNotBlurred)
+{
+  // 2,000 cells a radian: a map of 4,096 texels has a third of that.
+  const Scene scene = load(environment({{{"type", "texture-coordinate"}},
+                                        {{"type", "checker-texture"},
+                                         {"inputs", {{"vector", {{"node", 0}, {"output", "generated"}}}, {"scale", 2000}}}}},
+                                       {{"node", 1}, {"output", "factor"}}));
+  int num_grey = 0, num_white = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const float value = radiance(scene, 0.001f * static_cast<float>(i % 997), 0.3f + 0.0001f * static_cast<float>(i)).x;
+    num_grey += value != 0 && value != 1;
+    num_white += value == 1;
+  }
+  EXPECT_EQ(num_grey, 0);
+  EXPECT_NEAR(num_white, 1000, 150);
+}
+
+TEST(ComputedEnvironment, TurnsAsAMapWould)
+{
+  json e = noise(3);
+  const Scene still = load(e);
+  e["rotation"] = 2 * std::numbers::pi * 0.125;
+  const Scene turned = load(e);
+  for (const float u : {0.1f, 0.45f, 0.8f}) {
+    expect_radiance(radiance(turned, u, 0.4f), radiance(still, u + 0.125f, 0.4f), 1e-5f);
+  }
+}
+
+TEST(ComputedEnvironment, SamplesHaveTheRadianceAndTheDensityOfTheirDirections)
+{
+  for (const Scene& scene : varied_scenes()) {
+    for (const EnvironmentDensity density : {EnvironmentDensity::kRadiance, EnvironmentDensity::kExcess}) {
+      const EnvironmentTables tables = tables_of(scene, density);
+      const EnvironmentView view = tables.view();
+      constexpr std::uint32_t kSamples = 20000;
+      int num_others = 0;
+      for (std::uint32_t i = 0; i < kSamples; ++i) {
+        const EnvironmentSample s = environment_sample(view, sample_2d(1, i, 0));
+        ASSERT_GT(s.pdf_solid_angle, 0.0f);
+        ASSERT_NEAR(length(s.wi), 1.0f, 1e-6f);
+        ASSERT_EQ(s.radiance, environment_eval(view, s.wi));
+        num_others += std::abs(environment_pdf(view, s.wi) - s.pdf_solid_angle) > 1e-5f * s.pdf_solid_angle;
+      }
+      // As in EnvironmentSampling: directions within rounding of a cell's border.
+      EXPECT_LE(num_others, static_cast<int>(kSamples / 500));
+    }
+  }
+}
+
+TEST(ComputedEnvironment, DensityIntegratesToOneAndFollowsWhatIsSampled)
+{
+  constexpr int kRows = 1024, kBlocks = 8, kSamples = 1 << 17;
+  for (const Scene& scene : varied_scenes()) {
+    for (const EnvironmentDensity density : {EnvironmentDensity::kRadiance, EnvironmentDensity::kExcess}) {
+      const EnvironmentTables tables = tables_of(scene, density);
+      const EnvironmentView view = tables.view();
+      std::vector<double> expected(2 * kBlocks * kBlocks), found(expected.size());
+      const auto block_of = [](double u, double v) {
+        const int x = std::min(static_cast<int>(u * 2 * kBlocks), 2 * kBlocks - 1);
+        return static_cast<std::size_t>(std::min(static_cast<int>(v * kBlocks), kBlocks - 1) * 2 * kBlocks + x);
+      };
+      double total = 0;
+      for (int y = 0; y < kRows; ++y) {
+        const double v = (y + 0.5) / kRows;
+        const double weight = std::sin(v * std::numbers::pi) * std::numbers::pi * std::numbers::pi / kRows / kRows;
+        for (int x = 0; x < 2 * kRows; ++x) {
+          const double u = (x + 0.5) / (2 * kRows);
+          const double part = weight * static_cast<double>(environment_pdf(view, direction_of(u, v)));
+          expected[block_of(u, v)] += part;
+          total += part;
+        }
+      }
+      EXPECT_NEAR(total, 1, 0.005);
+      for (std::uint32_t i = 0; i < kSamples; ++i) {
+        const Vec3f wi = environment_sample(view, sample_2d(2, i, 0)).wi;
+        const double u = 0.5 + std::atan2(static_cast<double>(wi.x), static_cast<double>(-wi.z)) / (2 * std::numbers::pi);
+        found[block_of(u, std::acos(std::clamp(static_cast<double>(wi.y), -1.0, 1.0)) / std::numbers::pi)] += 1.0 / kSamples;
+      }
+      // Five standard deviations of independent samples, besides what the grid errs by.
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        EXPECT_NEAR(found[i], expected[i], 5 * std::sqrt(expected[i] / kSamples) + 0.01 * expected[i] + 1e-4) << i;
+      }
+    }
+  }
+}
+
+TEST(ComputedEnvironment, SamplingFindsAllOfTheLight)
+{
+  for (const Scene& scene : varied_scenes()) {
+    const double expected = power_by_grid(scene, 1024);
+    EXPECT_NEAR(power(scene), expected, 0.01 * expected);
+  }
+}
+
+TEST(ComputedEnvironment, DiskOfASunIsSampledByItself)
+{
+  const Scene scene = load(sky({{"sunElevation", 0.5}, {"sunRotation", 1}}));
+  const EnvironmentTables tables = tables_of(scene, EnvironmentDensity::kExcess);
+  const EnvironmentView view = tables.view();
+  ASSERT_EQ(view.num_suns, 1);
+  constexpr int kSamples = 4096;
+  int num_in_sun = 0;
+  for (std::uint32_t i = 0; i < kSamples; ++i) {
+    const EnvironmentSample s = environment_sample(view, sample_2d(3, i, 0));
+    num_in_sun += s.radiance.x > 1000;
+  }
+  // Half of a clear day's light and more is the sun's; of a cell it fills a third.
+  EXPECT_GT(num_in_sun, kSamples / 2);
+  EXPECT_LT(num_in_sun, kSamples * 9 / 10);
+  EXPECT_LT(tables.bytes(), std::size_t{1} << 20);
 }
 
 }  // namespace

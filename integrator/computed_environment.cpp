@@ -1,0 +1,284 @@
+#include "integrator/computed_environment.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "kernel/graph/graph_scene.h"
+
+namespace relief {
+namespace {
+
+constexpr int kLanes = 8;
+
+float component(Vec3f v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+
+/// What a graph reads of a direction, Z up.
+float quantity_of(const ComputedEnvironment& environment, const GraphInput& input, Vec3f d)
+{
+  using Q = GraphQuantity;
+  const auto axis_of = [&input](Q first) { return static_cast<int>(input.quantity) - static_cast<int>(first); };
+  switch (input.quantity) {
+    case Q::object_x:
+    case Q::object_y:
+    case Q::object_z:
+      return component(d, axis_of(Q::object_x));
+    case Q::generated_x:
+    case Q::generated_y:
+    case Q::generated_z:
+      return component(d, axis_of(Q::generated_x));
+    case Q::position_x:
+    case Q::position_y:
+    case Q::position_z:
+      return component(d, axis_of(Q::position_x));
+    case Q::normal_x:
+    case Q::normal_y:
+    case Q::normal_z:
+      return -component(d, axis_of(Q::normal_x));
+    case Q::true_normal_x:
+    case Q::true_normal_y:
+    case Q::true_normal_z:
+      return -component(d, axis_of(Q::true_normal_x));
+    case Q::object_normal_x:
+    case Q::object_normal_y:
+    case Q::object_normal_z:
+      return -component(d, axis_of(Q::object_normal_x));
+    case Q::vertex_normal_x:
+    case Q::vertex_normal_y:
+    case Q::vertex_normal_z:
+      return -component(d, axis_of(Q::vertex_normal_x));
+    case Q::incoming_x:
+    case Q::incoming_y:
+    case Q::incoming_z:
+      return -component(d, axis_of(Q::incoming_x));
+    case Q::world_from_object:
+    case Q::object_from_world:
+      // Three rows of four: there is no object, so that its space is the world's.
+      return input.index % 5 == 0 ? 1.0f : 0.0f;
+    case Q::ray_kind:
+      return environment.is_backdrop && input.index == static_cast<int>(GraphRayKind::kCamera) ? 1.0f : 0.0f;
+    default:
+      return 0.0f;
+  }
+}
+
+/// Radiance towards the first `count` of eight directions in world space.
+void evaluate(const ComputedEnvironment& environment, const Vec3f* directions, int count, Vec3f* radiance)
+{
+  GraphRegisters registers;
+  registers.used = (1u << count) - 1;
+  Vec3f turned[kLanes];
+  for (int k = 0; k < count; ++k) {
+    // Turned as the map would be; and Y up as in glTF is Z up for graphs.
+    const Vec3f wi = directions[k];
+    turned[k] = {wi.x * environment.cos_rotation - wi.z * environment.sin_rotation,
+                 -wi.z * environment.cos_rotation - wi.x * environment.sin_rotation, wi.y};
+  }
+  for (std::uint32_t i = 0; i < environment.program.num_inputs; ++i) {
+    const GraphInput& input = environment.program.inputs[i];
+    F8& lanes = registers.lanes[input.register_index];
+    for (int k = 0; k < count; ++k) lanes[k] = quantity_of(environment, input, turned[k]);
+  }
+  environment.run(environment.program, environment.textures, registers);
+  for (int k = 0; k < count; ++k) {
+    const auto result = [&](int c) {
+      const float value = graph_result({&environment.program, &registers, k}, c);
+      return std::isfinite(value) && value > 0.0f ? value : 0.0f;
+    };
+    radiance[k] = {result(0), result(1), result(2)};
+  }
+}
+
+/// Makes the map: cells as EnvironmentView has them before it is rotated, whose directions are turned back here.
+class CellMap {
+ public:
+  CellMap(const ComputedEnvironment& environment, std::span<const EnvironmentSun> suns, Vec3f color)
+      : environment_(environment), suns_(suns), color_(color)
+  {
+  }
+
+  /// Mean luminance of a cell, by side² places.
+  float mean_at(int column, int row, int side) const
+  {
+    Vec3f directions[kLanes];
+    float sum = 0;
+    int waiting = 0;
+    const auto add = [&] {
+      Vec3f radiance[kLanes];
+      evaluate(environment_, directions, waiting, radiance);
+      for (int k = 0; k < waiting; ++k) sum += luminance(color_ * radiance[k]);
+      waiting = 0;
+    };
+    for (int i = 0; i < side * side; ++i) {
+      directions[waiting++] = direction_at(column, row, side, i);
+      if (waiting == kLanes) add();
+    }
+    if (waiting > 0) add();
+    return sum / static_cast<float>(side * side);
+  }
+
+  /// Luminance of a row of cells by their middles.
+  void row_by_middles(int row, float* out) const
+  {
+    for (int column = 0; column < ComputedCells::kColumns; column += kLanes) {
+      Vec3f directions[kLanes], radiance[kLanes];
+      for (int k = 0; k < kLanes; ++k) directions[k] = direction_at(column + k, row, 1, 0);
+      evaluate(environment_, directions, kLanes, radiance);
+      for (int k = 0; k < kLanes; ++k) out[column + k] = luminance(color_ * radiance[k]);
+    }
+  }
+
+  /// Mean luminance of a sun's disk.
+  float sun_mean(const EnvironmentSun& sun) const
+  {
+    constexpr int kSide = 8;
+    const Frame frame = frame_from_normal(sun.towards);
+    float sum = 0;
+    for (int i = 0; i < kSide; ++i) {
+      Vec3f directions[kLanes], radiance[kLanes];
+      for (int k = 0; k < kLanes; ++k) {
+        const Vec2f u{(static_cast<float>(i) + 0.5f) / kSide, (static_cast<float>(k) + 0.5f) / kLanes};
+        directions[k] = from_local(frame, warp_cone(sun.cone, u));
+      }
+      evaluate(environment_, directions, kLanes, radiance);
+      for (const Vec3f& r : radiance) sum += luminance(color_ * r);
+    }
+    return sum / (kSide * kLanes);
+  }
+
+ private:
+  /// A place of a cell, in world space; beside the suns, not in them.
+  Vec3f direction_at(int column, int row, int side, int place) const
+  {
+    const float x = static_cast<float>(column) + (static_cast<float>(place % side) + 0.5f) / static_cast<float>(side);
+    const float y = static_cast<float>(row) + (static_cast<float>(place / side) + 0.5f) / static_cast<float>(side);
+    const float theta = y * (kPi / ComputedCells::kRows);
+    const SinCos phi = sin_cos_turn(x / ComputedCells::kColumns - 0.5f);
+    const float sine = std::sin(theta);
+    const Vec3f map{sine * phi.sin, std::cos(theta), -sine * phi.cos};
+    Vec3f d = computed_environment_world(environment_, map);
+    for (const EnvironmentSun& sun : suns_) {
+      if (!(length_squared(d - sun.towards) <= 2.0f * sun.cone)) continue;
+      const Frame frame = frame_from_normal(sun.towards);
+      const float t = 1.05f * std::sqrt(2.0f * sun.cone);
+      const Vec3f away = d - sun.towards * dot(d, sun.towards);
+      d = normalize(sun.towards + (is_zero(away) ? frame.s : normalize(away)) * t);
+    }
+    return d;
+  }
+
+  const ComputedEnvironment& environment_;
+  std::span<const EnvironmentSun> suns_;
+  Vec3f color_;
+};
+
+/// Cells whose middles do not tell what they hold, where something bright is small: the brightest neighbourhoods first.
+std::vector<std::size_t> cells_to_refine(const std::vector<float>& cells)
+{
+  constexpr float kBright = 8, kContrast = 2;  // times the mean, and times a neighbour
+  constexpr std::size_t kMost = 4096;
+  constexpr int kColumns = ComputedCells::kColumns, kRows = ComputedCells::kRows;
+  double sum = 0, weights = 0;
+  for (int y = 0; y < kRows; ++y) {
+    const double weight = std::sin((y + 0.5) * std::numbers::pi / kRows);
+    double row = 0;
+    for (int x = 0; x < kColumns; ++x) row += static_cast<double>(cells[static_cast<std::size_t>(y * kColumns + x)]);
+    sum += weight * row;
+    weights += weight * kColumns;
+  }
+  const float enough = kBright * static_cast<float>(sum / weights);
+  std::vector<std::pair<float, std::size_t>> found;
+  for (int y = 0; y < kRows; ++y) {
+    for (int x = 0; x < kColumns; ++x) {
+      float low = kInfinity, high = 0;
+      for (int line = std::max(y - 1, 0); line <= std::min(y + 1, kRows - 1); ++line) {
+        for (int step = -1; step <= 1; ++step) {
+          const int column = (x + step + kColumns) % kColumns;
+          const float value = cells[static_cast<std::size_t>(line * kColumns + column)];
+          low = std::min(low, value);
+          high = std::max(high, value);
+        }
+      }
+      if (high > enough && high > kContrast * low) found.push_back({-high, static_cast<std::size_t>(y * kColumns + x)});
+    }
+  }
+  std::sort(found.begin(), found.end());
+  found.resize(std::min(found.size(), kMost));
+  std::vector<std::size_t> out;
+  for (const auto& [bright, cell] : found) out.push_back(cell);
+  return out;
+}
+
+}  // namespace
+
+ComputedEnvironment computed_environment_make(const EnvironmentGraph& graph,
+                                              float rotation,
+                                              GraphRun run,
+                                              const TextureView* textures)
+{
+  ComputedEnvironment environment;
+  environment.program = graph.program.view();
+  environment.run = run;
+  environment.textures = textures;
+  environment.is_backdrop = graph.is_backdrop;
+  environment.cos_rotation = std::cos(rotation);
+  environment.sin_rotation = std::sin(rotation);
+  return environment;
+}
+
+Vec3f computed_environment_world(const ComputedEnvironment& environment, Vec3f map)
+{
+  return {map.x * environment.cos_rotation + map.z * environment.sin_rotation, map.y,
+          map.z * environment.cos_rotation - map.x * environment.sin_rotation};
+}
+
+Vec3f computed_environment_radiance(const void* computed, Vec3f wi)
+{
+  Vec3f radiance;
+  evaluate(*static_cast<const ComputedEnvironment*>(computed), &wi, 1, &radiance);
+  return radiance;
+}
+
+ComputedCells computed_environment_cells(const ComputedEnvironment& computed,
+                                         std::span<const EnvironmentSun> suns,
+                                         Vec3f color,
+                                         int most_side)
+{
+  constexpr int kMostSide = 8, kFineSide = 8;
+  constexpr auto kColumns = static_cast<std::size_t>(ComputedCells::kColumns);
+  const CellMap map(computed, suns, color);
+  const int side = std::clamp((most_side + ComputedCells::kColumns - 1) / ComputedCells::kColumns, 1, kMostSide);
+  ComputedCells cells;
+  cells.luminance.resize(kColumns * ComputedCells::kRows);
+  tbb::parallel_for(0, ComputedCells::kRows, [&](int row) {
+    float* const out = &cells.luminance[static_cast<std::size_t>(row) * kColumns];
+    if (side == 1) {
+      map.row_by_middles(row, out);
+    } else {
+      for (int column = 0; column < ComputedCells::kColumns; ++column) out[column] = map.mean_at(column, row, side);
+    }
+  });
+  if (side < kFineSide) {
+    const std::vector<std::size_t> fine = cells_to_refine(cells.luminance);
+    tbb::parallel_for(std::size_t{0}, fine.size(), [&](std::size_t i) {
+      const auto column = static_cast<int>(fine[i] % kColumns), row = static_cast<int>(fine[i] / kColumns);
+      cells.luminance[fine[i]] = map.mean_at(column, row, kFineSide);
+    });
+  }
+  for (const EnvironmentSun& sun : suns) cells.suns.push_back(map.sun_mean(sun));
+  return cells;
+}
+
+int environment_graph_image_side(const EnvironmentGraph& graph, std::span<const TextureView> textures)
+{
+  int most = 0;
+  for (const int texture : graph_textures(graph.program)) {
+    const TextureView& view = textures[static_cast<std::size_t>(texture)];
+    most = std::max({most, view.width, view.height});
+  }
+  return most;
+}
+
+}  // namespace relief
