@@ -6,12 +6,16 @@
 #include <cmath>
 #include <numbers>
 
+#include "kernel/graph/graph_op.h"
 #include "kernel/graph/graph_scene.h"
+#include "kernel/math/trigonometry.h"
 
 namespace relief {
 namespace {
 
 constexpr int kLanes = 8;
+constexpr int kColumns = ComputedCells::kColumns, kRows = ComputedCells::kRows;
+constexpr std::size_t kNumCells = std::size_t{kColumns} * kRows;
 
 float component(Vec3f v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
 
@@ -91,6 +95,48 @@ void evaluate(const ComputedEnvironment& environment, const Vec3f* directions, i
   }
 }
 
+/// Whether a program has operations whose values vary without end: patterns and images.
+bool graph_has_textures(const GraphProgramView& program)
+{
+  for (std::uint32_t word = 0; word < program.num_words;) {
+    const auto op = static_cast<GraphOp>(program.code[word]);
+    const bool is_plain = op < GraphOp::noise_1d || op == GraphOp::table || op == GraphOp::grid || op == GraphOp::blackbody;
+    if (!is_plain) return true;
+    const GraphOpShape& shape = kGraphOpShapes[static_cast<std::size_t>(op)];
+    word += 1 + static_cast<std::uint32_t>(shape.num_immediates + shape.num_outputs + shape.num_inputs);
+  }
+  return false;
+}
+
+/// A place between four middles.
+struct Lattice {
+  int column = 0, row = -1;  ///< of the upper left one; −1: nearer to a pole
+  float x = 0, y = 0;        ///< to the right one, and down: 0 to 1
+
+  std::size_t index() const { return static_cast<std::size_t>(row * kColumns + column); }
+};
+
+Lattice lattice_of(const ComputedEnvironment& environment, Vec3f wi)
+{
+  const float x = wi.x * environment.cos_rotation - wi.z * environment.sin_rotation;
+  const float z = wi.x * environment.sin_rotation + wi.z * environment.cos_rotation;
+  const float v = angle_of(std::sqrt(x * x + z * z), wi.y) * kInvPi;
+  const float turn = std::copysign(angle_of(std::fabs(x), -z) * (0.5f * kInvPi), x);
+  const float column = (turn + 0.5f) * kColumns + (kColumns - 0.5f), row = v * kRows - 0.5f;
+  if (!(row >= 0 && row < kRows - 1)) return {};
+  const int left = static_cast<int>(column), up = static_cast<int>(row);
+  return {left % kColumns, up, column - static_cast<float>(left), row - static_cast<float>(up)};
+}
+
+Vec3f interpolated(const ComputedEnvironment& environment, const Lattice& at)
+{
+  const Vec3f* const up = &environment.middles[static_cast<std::size_t>(at.row * kColumns)];
+  const Vec3f* const down = up + kColumns;
+  const int right = (at.column + 1) % kColumns;
+  return (up[at.column] * (1 - at.x) + up[right] * at.x) * (1 - at.y) +
+         (down[at.column] * (1 - at.x) + down[right] * at.x) * at.y;
+}
+
 /// Makes the map: cells as EnvironmentView has them before it is rotated, whose directions are turned back here.
 class CellMap {
  public:
@@ -117,6 +163,28 @@ class CellMap {
     }
     if (waiting > 0) add();
     return sum / static_cast<float>(side * side);
+  }
+
+  /// Radiance along a row, a place a cell.
+  /// @param place  in the cells, to the right and down: 0 to 1
+  void row(int row, float place, Vec3f* out) const
+  {
+    for (int column = 0; column < kColumns; column += kLanes) {
+      Vec3f directions[kLanes];
+      for (int k = 0; k < kLanes; ++k) {
+        directions[k] = direction(static_cast<float>(column + k) + place, static_cast<float>(row) + place);
+      }
+      evaluate(environment_, directions, kLanes, out + column);
+    }
+  }
+
+  /// World direction of a place of the map, in cells.
+  Vec3f direction(float x, float y) const
+  {
+    const float theta = y * (kPi / kRows);
+    const SinCos phi = sin_cos_turn(x / kColumns - 0.5f);
+    const float sine = std::sin(theta);
+    return computed_environment_world(environment_, {sine * phi.sin, std::cos(theta), -sine * phi.cos});
   }
 
   /// Luminance of a row of cells by their middles.
@@ -154,11 +222,7 @@ class CellMap {
   {
     const float x = static_cast<float>(column) + (static_cast<float>(place % side) + 0.5f) / static_cast<float>(side);
     const float y = static_cast<float>(row) + (static_cast<float>(place / side) + 0.5f) / static_cast<float>(side);
-    const float theta = y * (kPi / ComputedCells::kRows);
-    const SinCos phi = sin_cos_turn(x / ComputedCells::kColumns - 0.5f);
-    const float sine = std::sin(theta);
-    const Vec3f map{sine * phi.sin, std::cos(theta), -sine * phi.cos};
-    Vec3f d = computed_environment_world(environment_, map);
+    Vec3f d = direction(x, y);
     for (const EnvironmentSun& sun : suns_) {
       if (!(length_squared(d - sun.towards) <= 2.0f * sun.cone)) continue;
       const Frame frame = frame_from_normal(sun.towards);
@@ -179,7 +243,6 @@ std::vector<std::size_t> cells_to_refine(const std::vector<float>& cells)
 {
   constexpr float kBright = 8, kContrast = 2;  // times the mean, and times a neighbour
   constexpr std::size_t kMost = 4096;
-  constexpr int kColumns = ComputedCells::kColumns, kRows = ComputedCells::kRows;
   double sum = 0, weights = 0;
   for (int y = 0; y < kRows; ++y) {
     const double weight = std::sin((y + 0.5) * std::numbers::pi / kRows);
@@ -236,9 +299,58 @@ Vec3f computed_environment_world(const ComputedEnvironment& environment, Vec3f m
 
 Vec3f computed_environment_radiance(const void* computed, Vec3f wi)
 {
+  const auto& environment = *static_cast<const ComputedEnvironment*>(computed);
+  if (!environment.is_smooth.empty()) {
+    const Lattice at = lattice_of(environment, wi);
+    if (at.row >= 0 && environment.is_smooth[at.index()] != 0) return interpolated(environment, at);
+  }
   Vec3f radiance;
-  evaluate(*static_cast<const ComputedEnvironment*>(computed), &wi, 1, &radiance);
+  evaluate(environment, &wi, 1, &radiance);
   return radiance;
+}
+
+void computed_environment_smooth(ComputedEnvironment& environment, std::span<const EnvironmentSun> suns)
+{
+  if (graph_has_textures(environment.program)) return;
+  const CellMap map(environment, {}, {1, 1, 1});
+  std::vector<Vec3f> middles(kNumCells), between(kNumCells);
+  tbb::parallel_for(0, kRows, [&](int row) {
+    map.row(row, 0.5f, &middles[static_cast<std::size_t>(row * kColumns)]);
+    if (row + 1 < kRows) map.row(row, 1.0f, &between[static_cast<std::size_t>(row * kColumns)]);
+  });
+  double sum = 0;
+  for (const Vec3f& value : middles) sum += static_cast<double>(max_component(value));
+  // A quarter of what pictures are to agree by.
+  constexpr float kTolerance = 1e-3f;
+  const float least = 0.1f * kTolerance * static_cast<float>(sum / static_cast<double>(kNumCells));
+  environment.middles = std::move(middles);
+  std::vector<std::uint8_t> agrees(kNumCells);
+  tbb::parallel_for(0, kRows - 1, [&](int row) {
+    for (int column = 0; column < kColumns; ++column) {
+      const Lattice at{column, row, 0.5f, 0.5f};
+      const Vec3f value = between[at.index()], error = interpolated(environment, at) - value;
+      const float greatest = std::max({std::fabs(error.x), std::fabs(error.y), std::fabs(error.z)});
+      agrees[at.index()] = greatest <= kTolerance * max_component(value) + least;
+    }
+  });
+  // Those beside one that fails may hold the rest of what it failed for; a sun's disk may lie between all places.
+  constexpr float kReach = 3 * std::numbers::pi_v<float> / kRows;
+  environment.is_smooth.assign(kNumCells, 0);
+  tbb::parallel_for(1, kRows - 2, [&](int row) {
+    for (int column = 0; column < kColumns; ++column) {
+      bool is_smooth = true;
+      for (int y = row - 1; y <= row + 1; ++y) {
+        for (int x = column + kColumns - 1; x <= column + kColumns + 1; ++x) {
+          is_smooth = is_smooth && agrees[static_cast<std::size_t>(y * kColumns + x % kColumns)] != 0;
+        }
+      }
+      const Vec3f d = map.direction(static_cast<float>(column + 1), static_cast<float>(row + 1));
+      for (const EnvironmentSun& sun : suns) {
+        is_smooth = is_smooth && length(d - sun.towards) > std::sqrt(2.0f * sun.cone) + kReach;
+      }
+      environment.is_smooth[static_cast<std::size_t>(row * kColumns + column)] = is_smooth;
+    }
+  });
 }
 
 ComputedCells computed_environment_cells(const ComputedEnvironment& computed,
@@ -247,23 +359,23 @@ ComputedCells computed_environment_cells(const ComputedEnvironment& computed,
                                          int most_side)
 {
   constexpr int kMostSide = 8, kFineSide = 8;
-  constexpr auto kColumns = static_cast<std::size_t>(ComputedCells::kColumns);
+  constexpr auto kWidth = static_cast<std::size_t>(kColumns);
   const CellMap map(computed, suns, color);
-  const int side = std::clamp((most_side + ComputedCells::kColumns - 1) / ComputedCells::kColumns, 1, kMostSide);
+  const int side = std::clamp((most_side + kColumns - 1) / kColumns, 1, kMostSide);
   ComputedCells cells;
-  cells.luminance.resize(kColumns * ComputedCells::kRows);
-  tbb::parallel_for(0, ComputedCells::kRows, [&](int row) {
-    float* const out = &cells.luminance[static_cast<std::size_t>(row) * kColumns];
+  cells.luminance.resize(kNumCells);
+  tbb::parallel_for(0, kRows, [&](int row) {
+    float* const out = &cells.luminance[static_cast<std::size_t>(row) * kWidth];
     if (side == 1) {
       map.row_by_middles(row, out);
     } else {
-      for (int column = 0; column < ComputedCells::kColumns; ++column) out[column] = map.mean_at(column, row, side);
+      for (int column = 0; column < kColumns; ++column) out[column] = map.mean_at(column, row, side);
     }
   });
   if (side < kFineSide) {
     const std::vector<std::size_t> fine = cells_to_refine(cells.luminance);
     tbb::parallel_for(std::size_t{0}, fine.size(), [&](std::size_t i) {
-      const auto column = static_cast<int>(fine[i] % kColumns), row = static_cast<int>(fine[i] / kColumns);
+      const auto column = static_cast<int>(fine[i] % kWidth), row = static_cast<int>(fine[i] / kWidth);
       cells.luminance[fine[i]] = map.mean_at(column, row, kFineSide);
     });
   }

@@ -2,6 +2,7 @@
 // by which directions are chosen.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -18,7 +19,17 @@ struct ComputedEnvironment {
   const TextureView* textures = nullptr;
   bool is_backdrop = false;
   float cos_rotation = 1, sin_rotation = 0;  ///< of the surroundings about +Y
+  /// Radiance at the middles of ComputedCells' cells, row after row. Empty: the graph has textures, between whose values nothing
+  /// can be told.
+  std::vector<Vec3f> middles;
+  /// Of each four middles, by the upper left one, whether between them interpolation is as good as the graph.
+  std::vector<std::uint8_t> is_smooth;
 };
+
+/// Looks where a graph of arithmetic alone is smooth: there, bilinear interpolation takes the place of running it, which takes
+/// several times as long.
+/// @param suns  in world space; nothing is interpolated near them
+void computed_environment_smooth(ComputedEnvironment& computed, std::span<const EnvironmentSun> suns);
 
 /// @param rotation  radians about +Y
 ComputedEnvironment computed_environment_make(const EnvironmentGraph& graph,

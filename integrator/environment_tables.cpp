@@ -304,7 +304,8 @@ EnvironmentView EnvironmentTables::view() const
 
 std::size_t EnvironmentTables::bytes() const
 {
-  return (row_cdf.size() + column_cdf.size() + row_edges.size()) * sizeof(float);
+  return (row_cdf.size() + column_cdf.size() + row_edges.size()) * sizeof(float) +
+         (computed ? computed->middles.size() * sizeof(Vec3f) + computed->is_smooth.size() : 0);
 }
 
 EnvironmentView environment_view_make(const TextureView* map, Vec3f color, float rotation)
@@ -342,7 +343,7 @@ EnvironmentTables environment_tables_make(const TextureView* map,
   return tables;
 }
 
-EnvironmentTables environment_tables_make(std::shared_ptr<const ComputedEnvironment> computed,
+EnvironmentTables environment_tables_make(std::shared_ptr<ComputedEnvironment> computed,
                                           Vec3f color,
                                           float rotation,
                                           std::span<const GraphSun> suns,
@@ -352,6 +353,7 @@ EnvironmentTables environment_tables_make(std::shared_ptr<const ComputedEnvironm
   EnvironmentTables tables;
   tables.environment = environment_view_make(*computed, color, rotation);
   tables.suns = suns_of(*computed, suns);
+  computed_environment_smooth(*computed, tables.suns);
   const ComputedCells found = computed_environment_cells(*computed, tables.suns, color, image_side);
   tables.computed = std::move(computed);
   Cells cells{ComputedCells::kColumns, ComputedCells::kRows, {found.luminance.begin(), found.luminance.end()}, 1};

@@ -57,10 +57,10 @@ EnvironmentTables environment_tables_make(const TextureView* map,
                                           float rotation,
                                           EnvironmentDensity density = EnvironmentDensity::kRadiance);
 
-/// Likewise of computed surroundings, see computed_environment_cells. With kRadiance no cell has less than a twentieth of the
+/// Likewise of computed surroundings, see computed_environment_cells and computed_environment_smooth. With kRadiance no cell has less than a twentieth of the
 /// mean: middles of cells do not see all that is in them.
 /// @param image_side  of images that they are computed from, texels; 0: none
-EnvironmentTables environment_tables_make(std::shared_ptr<const ComputedEnvironment> computed,
+EnvironmentTables environment_tables_make(std::shared_ptr<ComputedEnvironment> computed,
                                           Vec3f color,
                                           float rotation,
                                           std::span<const GraphSun> suns,

@@ -44,7 +44,7 @@ LightSet light_set_make(const Scene& scene,
   };
   const Environment& environment = scene.environment;
   if (environment.graph) {
-    const auto computed = std::make_shared<const ComputedEnvironment>(
+    const auto computed = std::make_shared<ComputedEnvironment>(
         computed_environment_make(*environment.graph, environment.rotation, globals->run_graph, textures.data()));
     set.environment = environment_tables_make(computed, environment.color, environment.rotation, environment.graph->suns,
                                               environment_graph_image_side(*environment.graph, textures), density);

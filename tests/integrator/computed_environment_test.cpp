@@ -61,7 +61,7 @@ Vec3f radiance(const Scene& scene, float u, float v) { return radiance(scene, sc
 EnvironmentTables tables_of(const Scene& scene, EnvironmentDensity density)
 {
   const Environment& e = scene.environment;
-  return environment_tables_make(std::make_shared<const ComputedEnvironment>(computed_of(scene, e)), e.color, e.rotation,
+  return environment_tables_make(std::make_shared<ComputedEnvironment>(computed_of(scene, e)), e.color, e.rotation,
                                  e.graph->suns, environment_graph_image_side(*e.graph, scene.textures->views()), density);
 }
 
@@ -464,7 +464,28 @@ TEST(ComputedEnvironment, DiskOfASunIsSampledByItself)
   // Half of a clear day's light and more is the sun's; of a cell it fills a third.
   EXPECT_GT(num_in_sun, kSamples / 2);
   EXPECT_LT(num_in_sun, kSamples * 9 / 10);
-  EXPECT_LT(tables.bytes(), std::size_t{1} << 20);
+  EXPECT_LT(tables.bytes(), std::size_t{5} << 19);
+}
+
+TEST(ComputedEnvironment, InterpolatesWhereItIsSmoothAlone)
+{
+  // Of a clear sky the horizon is sharp, and the sun.
+  const Scene scene = load(sky({{"sunElevation", 0.5}, {"sunRotation", 1}}));
+  const EnvironmentTables tables = tables_of(scene, EnvironmentDensity::kExcess);
+  const EnvironmentView view = tables.view();
+  double num_smooth = 0;
+  for (const std::uint8_t is_smooth : tables.computed->is_smooth) num_smooth += is_smooth;
+  EXPECT_GT(num_smooth, 0.8 * ComputedCells::kColumns * ComputedCells::kRows);
+  for (std::uint32_t i = 0; i < 50000; ++i) {
+    const Vec2f at = sample_2d(4, i, 0);
+    const Vec3f found = environment_eval(view, direction_of(static_cast<double>(at.x), static_cast<double>(at.y)));
+    const Vec3f exact = radiance(scene, at.x, at.y);
+    // Where it fades to black, a ten-thousandth of the mean, which is about 5.
+    ASSERT_LT(max_component(found - exact), 0.004f * max_component(exact) + 1e-3f) << at.x << ", " << at.y;
+    ASSERT_LT(max_component(exact - found), 0.004f * max_component(exact) + 1e-3f) << at.x << ", " << at.y;
+  }
+  const Scene textured = load(noise(3));
+  EXPECT_TRUE(tables_of(textured, EnvironmentDensity::kExcess).computed->is_smooth.empty());
 }
 
 }  // namespace
