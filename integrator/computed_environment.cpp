@@ -319,7 +319,13 @@ void computed_environment_smooth(ComputedEnvironment& environment, std::span<con
     if (row + 1 < kRows) map.row(row, 1.0f, &between[static_cast<std::size_t>(row * kColumns)]);
   });
   double sum = 0;
-  for (const Vec3f& value : middles) sum += static_cast<double>(max_component(value));
+  for (std::size_t i = 0; i < kNumCells; ++i) {
+    const auto column = static_cast<float>(i % kColumns) + 0.5f, row = static_cast<float>(i / kColumns) + 0.5f;
+    const bool is_sun = std::any_of(suns.begin(), suns.end(), [&](const EnvironmentSun& sun) {
+      return length_squared(map.direction(column, row) - sun.towards) <= 2.0f * sun.cone;
+    });
+    if (!is_sun) sum += static_cast<double>(max_component(middles[i]));
+  }
   // A quarter of what pictures are to agree by.
   constexpr float kTolerance = 1e-3f;
   const float least = 0.1f * kTolerance * static_cast<float>(sum / static_cast<double>(kNumCells));
