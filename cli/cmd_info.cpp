@@ -292,7 +292,8 @@ int info(const std::string& file,
   }
   if (!scene.displacements.empty()) print_displacements(scene, context.displacements);
   if (stats.displacement.num_geometries > 0) print_prepared(context.displacements, stats);
-  line("caustics: {} ({})", context.globals.caustics.enabled ? "photons" : "none", context.caustics_reason);
+  const char* photons = r.caustics.mode == CausticsMode::kAuto ? "photons where they pay" : "photons";
+  line("caustics: {} ({})", context.globals.caustics.enabled ? photons : "none", context.caustics_reason);
   line("features: {}", features(scene));
   line(
       "memory: meshes {}, textures {}, height maps {}, displacement {}, acceleration structure {}, lights "

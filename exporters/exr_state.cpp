@@ -43,6 +43,9 @@ void visit(State& state, const Field& field)
   field("first_radius", state.photons.first_radius);
   field("photons_stored", state.photons.stored);
   field("photon_seconds", state.photons.seconds);
+  field("photon_passes", state.photons.passes);
+  field("photon_maps", state.photons.maps);
+  field("photons_served", state.photons.served);
   field("seconds", state.seconds);
   field("stage_seconds", state.stage_seconds);
   field("most_displacement_steps", state.most_displacement_steps);

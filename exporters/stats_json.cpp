@@ -49,7 +49,9 @@ std::string stats_json(const Statistics& statistics)
                                      {"radius", s.caustics.radius},
                                      {"seconds", s.caustics.seconds},
                                      {"bytes", s.caustics.bytes},
-                                     {"sources", s.caustics.num_sources}};
+                                     {"sources", s.caustics.num_sources},
+                                     {"error_ratio", s.caustics.error_ratio},
+                                     {"cost_ratio", s.caustics.cost_ratio}};
   const nlohmann::ordered_json json = {
       {"scene", s.scene},
       {"version", s.version},

@@ -7,6 +7,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "integrator/checkpoint.h"
 #include "integrator/flush_denormals.h"
 #include "integrator/instance_box.h"
 #include "kernel/sample/dimensions.h"
@@ -108,6 +109,7 @@ PhotonSourcesView PhotonSources::view(double photons_a_pass) const
   v.target_of = target_of.data();
   v.scene_box = scene_box;
   v.photons_a_pass = photons_a_pass;
+  if (!factors.empty()) v.factors = factors.data();
   return v;
 }
 
@@ -175,12 +177,27 @@ PhotonSources photon_sources_make(const SceneContext& context)
   return out;
 }
 
-PhotonPass::PhotonPass(const SceneContext& context, const CausticSettings& settings, double num_pixels)
-    : context_(context), settings_(settings), sources_(photon_sources_make(context))
+double photons_wanted(const RenderSettings& settings)
 {
   constexpr double kFewest = 1 << 15;
-  const double wanted = settings.photons > 0 ? std::max(settings.photons, 1.0) : std::max(num_pixels, kFewest);
-  photons_a_pass_ = static_cast<std::uint32_t>(std::min(wanted, 1e8));
+  const double num_pixels = static_cast<double>(settings.width) * settings.height;
+  const double asked = settings.caustics.photons;
+  return std::min(asked > 0 ? std::max(asked, 1.0) : std::max(num_pixels, kFewest), 1e8);
+}
+
+std::uint32_t photon_turn_samples(double active)
+{
+  // Batches hold no more, and more would be beyond what the threshold asks for.
+  constexpr double kMostOfMap = kMostPassSamples / 2;
+  if (active >= 1) return 1;
+  return 2 * static_cast<std::uint32_t>(std::min(std::ceil(1 / active), kMostOfMap));
+}
+
+PhotonPass::PhotonPass(const SceneContext& context, const RenderSettings& settings, PhotonSources sources)
+    : context_(context), settings_(settings.caustics), sources_(std::move(sources))
+{
+  photons_a_pass_ = static_cast<std::uint32_t>(photons_wanted(settings));
+  if (settings.noise_threshold > 0) settings_.memory_mib /= kMaps;
 }
 
 void PhotonPass::keep_to_memory(const KernelGlobals& g, const StageTable& stages, Wavefront& worker)
@@ -192,7 +209,7 @@ void PhotonPass::keep_to_memory(const KernelGlobals& g, const StageTable& stages
   // A path is kept at each surface that it meets, if they are all casters that show caustics: rough glass for one.
   if (photons_a_pass_ * (g.limits.total + 1.0) <= most_kept) return;
   std::vector<Photon> kept;
-  worker.trace_photons(g, *context_.accel, stages, context_.surface_kernel, sources_.view(photons_a_pass_), 0,
+  worker.trace_photons(g, *context_.accel, stages, context_.surface_kernels(true), sources_.view(photons_a_pass_), 0,
                        kBatchPaths, kept);
   // What these paths leave out of account: four standard errors of as many that each keep nothing or one.
   constexpr double kMargin = 1 + 4.0 / 64;
@@ -200,17 +217,47 @@ void PhotonPass::keep_to_memory(const KernelGlobals& g, const StageTable& stages
   photons_a_pass_ = static_cast<std::uint32_t>(std::clamp(most_kept / kept_a_path, 1.0, 1.0 * photons_a_pass_));
 }
 
-void PhotonPass::restore(const PhotonPassState& state, std::uint32_t passes, std::uint32_t skipped)
+void PhotonPass::restore(const PhotonPassState& state, std::uint32_t skipped)
 {
   photons_a_pass_ = state.photons_a_pass;
   first_radius_ = state.first_radius;
   stored_ = state.stored;
   seconds_ = state.seconds;
-  passes_ = passes;
+  passes_ = state.passes;
+  num_maps_ = state.maps;
+  served_ = state.served;
   skipped_ = skipped;
+  are_lost_ = true;
+}
+
+void PhotonPass::next_turn(std::array<KernelGlobals, kMaps>& g,
+                           std::uint32_t samples,
+                           double active,
+                           const StageTable& stages,
+                           const std::function<Wavefront&()>& worker,
+                           const std::atomic<bool>& stop,
+                           const std::function<void()>& report)
+{
+  const std::uint32_t wanted = samples > 1 ? kMaps : 1;
+  // A turn of one sample has photons of its own.
+  const bool are_used_up = wanted == 1 || num_maps_ < wanted || served_ >= num_maps_;
+  if (are_used_up) {
+    num_maps_ = wanted;
+    served_ = 0;
+  } else if (are_lost_) {
+    passes_ -= num_maps_;
+  }
+  if (are_used_up || are_lost_) {
+    const std::uint64_t stored = stored_;
+    for (std::uint32_t slot = 0; slot < num_maps_; ++slot) next(g[slot], slot, stages, worker, stop, report);
+    if (!are_used_up) stored_ = stored;
+  }
+  are_lost_ = false;
+  served_ += samples * active;
 }
 
 void PhotonPass::next(KernelGlobals& g,
+                      std::size_t slot,
                       const StageTable& stages,
                       const std::function<Wavefront&()>& worker,
                       const std::atomic<bool>& stop,
@@ -236,7 +283,8 @@ void PhotonPass::next(KernelGlobals& g,
           const std::uint32_t count = std::min(kBatchPaths, photons_a_pass_ - begin);
           // Tracing wants room for all paths of a batch, of which few may be kept.
           std::vector<Photon> kept;
-          worker().trace_photons(g, *context_.accel, stages, context_.surface_kernel, view, first + begin, count, kept);
+          worker().trace_photons(g, *context_.accel, stages, context_.surface_kernels(true), view, first + begin, count,
+                                 kept);
           chunks_[c].assign(kept.begin(), kept.end());
           under_way_ += count;
           report();
@@ -259,8 +307,8 @@ void PhotonPass::next(KernelGlobals& g,
                                                       : photon_radii(chunks_, kWithin, first_radius_, passes_);
       const auto factor = static_cast<float>(photon_radius_factor(passes_, settings_.alpha));
       for (float& radius : radii) radius *= factor;
-      map_.build(chunks_, radii);
-      g.caustics.map = map_.view();
+      maps_[slot].build(chunks_, radii);
+      g.caustics.map = maps_[slot].view();
     }
   }
   ++passes_;
@@ -288,7 +336,8 @@ void PhotonPass::fill(CausticStatistics& stats) const
   stats.first_radius = first_radius_;
   stats.radius = passes_ > 0 ? first_radius_ * photon_radius_factor(passes_ - 1, settings_.alpha) : 0;
   stats.seconds = seconds_;
-  stats.bytes = map_.bytes();
+  stats.bytes = 0;
+  for (const PhotonMap& map : maps_) stats.bytes += map.bytes();
   for (const std::vector<Photon>& chunk : chunks_) stats.bytes += chunk.capacity() * sizeof(Photon);
 }
 

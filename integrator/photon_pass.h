@@ -5,6 +5,7 @@
 // path tracer's; see path_caustic_flags and closure_split for how it leaves these out.
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <functional>
@@ -24,6 +25,7 @@ struct PhotonSources {
   std::vector<Box3> targets;
   std::vector<std::int32_t> target_of;
   Box3 scene_box;
+  std::vector<float> factors;  ///< on the power of each; none: 1
 
   PhotonSourcesView view(double photons_a_pass) const;
 };
@@ -32,18 +34,45 @@ struct PhotonSources {
 /// @return no sources where no light can reach a caster
 PhotonSources photon_sources_make(const SceneContext& context);
 
+/// Photons that a pass is to start.
+double photons_wanted(const RenderSettings& settings);
+
+/// Samples of every active pixel in the next turn, where there are photons. While all of a picture is sampled, one, with photons
+/// of its own. Where few tiles still wait, as many as pay for the two passes that even and odd samples get then: no sample has
+/// more photons traced for it than it would have in a picture without a noise threshold.
+/// @param active  part of the picture that is sampled, (0, 1]
+std::uint32_t photon_turn_samples(double active);
+
 class PhotonPass {
  public:
-  /// @param num_pixels  of the whole picture, so that a crop has the same photons
-  PhotonPass(const SceneContext& context, const CausticSettings& settings, double num_pixels);
+  /// Maps in use at once. Even and odd samples of a pixel never share photons, so that halves of its samples know nothing of
+  /// each other's, and the error estimate holds for caustics as for the rest.
+  static constexpr std::size_t kMaps = 2;
 
-  /// Traces the next pass's photons and sorts them. Every sample of a pixel has a pass of its own, so that halves of the
-  /// samples know nothing of each other's photons, and the error estimate holds for caustics as for the rest.
-  /// @param g       gets the map
-  /// @param worker  the calling thread's
-  /// @param stop    true: photons not begun are left out
-  /// @param report  called by any thread when photons have been traced
+  /// @param settings  of the whole picture, so that a crop has the same photons
+  PhotonPass(const SceneContext& context, const RenderSettings& settings, PhotonSources sources);
+
+  /// Sees to the photons of a turn. Usually they are traced; those of the turn before are kept as long as the samples that they
+  /// have served are fewer than one of each pixel.
+  /// @param g        get the maps: of samples by their parity if there are several, else only the first
+  /// @param samples  of each active pixel
+  /// @param active   part of the picture that is sampled
+  /// @param worker   the calling thread's
+  /// @param stop     true: photons not begun are left out
+  /// @param report   called by any thread when photons have been traced
+  void next_turn(std::array<KernelGlobals, kMaps>& g,
+                 std::uint32_t samples,
+                 double active,
+                 const StageTable& stages,
+                 const std::function<Wavefront&()>& worker,
+                 const std::atomic<bool>& stop,
+                 const std::function<void()>& report);
+
+  /// Traces the next pass's photons and sorts them.
+  /// @param g     gets the map
+  /// @param slot  the map's place: what was there is gone
   void next(KernelGlobals& g,
+            std::size_t slot,
             const StageTable& stages,
             const std::function<Wavefront&()>& worker,
             const std::atomic<bool>& stop,
@@ -53,11 +82,13 @@ class PhotonPass {
   /// @pre one has been traced, which sets the radius of all, and none beyond that number
   void skip_to(std::uint32_t pass);
 
-  PhotonPassState state() const { return {photons_a_pass_, first_radius_, stored_, seconds_}; }
+  PhotonPassState state() const
+  {
+    return {photons_a_pass_, first_radius_, stored_, seconds_, passes_, num_maps_, served_};
+  }
   /// Goes on where another was.
-  /// @param passes   that it had finished
-  /// @param skipped  that it had left out of them
-  void restore(const PhotonPassState& state, std::uint32_t passes, std::uint32_t skipped);
+  /// @param skipped  passes that it had left out
+  void restore(const PhotonPassState& state, std::uint32_t skipped);
 
   /// Passes so far; of one under way, the part that is traced.
   double passes() const { return passes_ - skipped_ + static_cast<double>(under_way_.load()) / photons_a_pass_; }
@@ -82,7 +113,10 @@ class PhotonPass {
   std::atomic<std::uint32_t> under_way_{0};  ///< photons of the present pass
   float first_radius_ = 0;
   std::vector<std::vector<Photon>> chunks_;
-  PhotonMap map_;
+  std::array<PhotonMap, kMaps> maps_;
+  std::uint32_t num_maps_ = 0;  ///< in use
+  double served_ = 0;           ///< samples of the whole window, by these
+  bool are_lost_ = false;       ///< they were another's, and have to be traced again
   std::uint64_t stored_ = 0;
   double seconds_ = 0;
 };

@@ -19,6 +19,7 @@
 #include "integrator/checkpoint.h"
 #include "integrator/error_history.h"
 #include "integrator/flush_denormals.h"
+#include "integrator/photon_benefit.h"
 #include "integrator/photon_pass.h"
 #include "integrator/scene_context.h"
 #include "integrator/stages.h"
@@ -400,9 +401,6 @@ RenderedImage render(const Scene& scene,
   const CryptomatteIds ids = cryptomatte_ids(scene, options.aov_mask);
   for (std::size_t i = 0; i < kNumCryptomattes; ++i) g.cryptomatte_ids[i] = ids[i].data();
   const bool counts_samples = g.film.layout.samples >= 0;
-  const bool caustics = g.caustics.enabled;
-  std::optional<PhotonPass> photons;
-  if (caustics) photons.emplace(context, settings.caustics, static_cast<double>(settings.width) * settings.height);
   stats.build_seconds = seconds_since(build_start);
   if (options.prepared) options.prepared();
 
@@ -411,7 +409,14 @@ RenderedImage render(const Scene& scene,
       Clock::now() - std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(earlier_seconds));
   SamplingEnd end(stop,
                   options.time_limit_seconds > 0 ? std::max(1e-3, options.time_limit_seconds - earlier_seconds) : 0.0);
-  const WavefrontColumns columns = context.columns();
+  PhotonChoice choice = photon_choice_make(context, options, g, end.reached());
+  const bool caustics = choice.photons;
+  std::optional<PhotonPass> photons;
+  if (caustics) {
+    photons.emplace(context, settings, std::move(choice.sources));
+  }
+  const std::vector<std::uint8_t>& surface_kernels = context.surface_kernels(caustics);
+  const WavefrontColumns columns = context.columns(caustics);
   const CameraMedium camera_medium(context);
   for (std::string& text : camera_medium.overlaps()) stats.warnings.push_back(std::move(text));
   Workers workers([&] {
@@ -440,13 +445,17 @@ RenderedImage render(const Scene& scene,
   std::vector<int> active(static_cast<std::size_t>(film.num_tiles()));
   for (int tile = 0; tile < film.num_tiles(); ++tile) active[static_cast<std::size_t>(tile)] = tile;
 
-  const auto next_photons = [&] {
-    photons->next(
-        g, stages, [&]() -> Wavefront& { return workers.local(); }, end.reached(),
-        [&] {
-          end.note_progress();
-          report(false);
-        });
+  // What has photons has as many of these as there are maps.
+  std::array<KernelGlobals, PhotonPass::kMaps> by_map{g, g};
+  const auto my_worker = [&]() -> Wavefront& { return workers.local(); };
+  const auto note_photons = [&] {
+    end.note_progress();
+    report(false);
+  };
+  const auto active_part = [&] {
+    double pixels = 0;
+    for (std::uint32_t p = 0; p < film.num_pixels(); ++p) pixels += film_pixel_rests(by_map.front().film, p) ? 0 : 1;
+    return pixels / static_cast<double>(film.num_pixels());
   };
 
   const bool is_watched = options.preview || options.keeps_errors;
@@ -455,11 +464,11 @@ RenderedImage render(const Scene& scene,
   std::uint32_t done = 0, samples = 0;
   if (options.saved != nullptr && state_restore(*options.saved, film, workers.local(), wanted)) {
     const RenderState& saved = options.saved->state;
-    g.film = film.accumulator();
+    for (KernelGlobals& globals : by_map) globals.film = film.accumulator();
     active = saved.active;
     done = saved.done_samples;
     samples = saved.pass_samples;
-    if (photons) photons->restore(saved.photons, options.first_sample + done, std::max(options.first_sample, 1u) - 1);
+    if (photons) photons->restore(saved.photons, std::max(options.first_sample, 1u) - 1);
     reporter.add(static_cast<std::uint64_t>(film.mean_samples() * static_cast<double>(film.num_pixels())),
                  rays_of(saved.counters));
   } else {
@@ -468,7 +477,7 @@ RenderedImage render(const Scene& scene,
     }
     if (photons && options.first_sample > 0) {
       // The first pass sets the radius of all.
-      next_photons();
+      photons->next(by_map.front(), 0, stages, my_worker, end.reached(), note_photons);
       photons->skip_to(options.first_sample);
     }
   }
@@ -511,15 +520,17 @@ RenderedImage render(const Scene& scene,
   };
   std::function<void(double)> tell_photons = options.traced_photons;
   while (done < wanted && !active.empty()) {
-    // Photons are of one sample: see PhotonPass::next. A pass that was under way goes on as it was begun.
+    // A pass that was under way goes on as it was begun.
     if (samples == 0) {
-      samples = caustics ? 1
+      // Noise is judged after multiples of kMostPassSamples.
+      samples = caustics ? std::min({photon_turn_samples(active_part()), wanted - done,
+                                     kMostPassSamples - done % kMostPassSamples})
                          : pass_samples(done, wanted, seconds_since(start), options.time_limit_seconds, is_watched,
                                         most_samples());
     }
     if (photons) {
       photons_before = photons->state();
-      next_photons();
+      photons->next_turn(by_map, samples, active_part(), stages, my_worker, end.reached(), note_photons);
       if (tell_photons && !end.reached()) std::exchange(tell_photons, {})(seconds_since(start));
     }
     const auto is_ended = [&] { return stop.load() || end.reached().load(); };
@@ -533,13 +544,18 @@ RenderedImage render(const Scene& scene,
             const FlushDenormals flush;
             Wavefront& worker = workers.local();
             const std::uint64_t rays_before = rays_of(worker.counters);
-            const Batch batch =
-                tile_batch(film, waiting[i], options.first_sample + (counts_samples ? 0 : done), samples);
             const std::uint64_t paths_before = worker.counters.camera_rays;
             const std::vector<float> sums = has_long_searches ? film.tile_sums(waiting[i]) : std::vector<float>();
-            if (!worker.run(g, *context.accel, stages, context.surface_kernel, batch)) {
-              film.put_back_tile_sums(waiting[i], sums);
-              return;
+            // Photons are of one sample or of every other, and forks need room: then a batch has one sample of each pixel.
+            const std::uint32_t batch_samples = caustics ? 1 : samples;
+            for (std::uint32_t s = 0; s < samples; s += batch_samples) {
+              const std::uint32_t first = options.first_sample + (counts_samples ? 0 : done + s);
+              const KernelGlobals& globals = by_map[caustics && samples > 1 ? (done + s) % PhotonPass::kMaps : 0];
+              const Batch batch = tile_batch(film, waiting[i], first, batch_samples);
+              if (!worker.run(globals, *context.accel, stages, surface_kernels, batch)) {
+                film.put_back_tile_sums(waiting[i], sums);
+                return;
+              }
             }
             end.note_progress();
             film.add_tile_samples(waiting[i], samples);
@@ -571,7 +587,9 @@ RenderedImage render(const Scene& scene,
   report(true);
 
   stats.render_seconds = seconds_since(start);
-  stats.caustics.reason = context.caustics_reason;
+  stats.caustics.reason = choice.reason;
+  stats.caustics.error_ratio = choice.error_ratio;
+  stats.caustics.cost_ratio = choice.cost_ratio;
   if (photons) photons->fill(stats.caustics);
   context.fill(stats);
   fill_kept(stats.kept, kept, context);

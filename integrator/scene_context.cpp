@@ -116,6 +116,7 @@ SceneContext::SceneContext(const Scene& loaded,
   for (const Material& material : scene.materials) {
     features |= feature_mask_of(material);
     surface_kernel.push_back(static_cast<std::uint8_t>(surface_kernel_index(material, decision.enabled)));
+    surface_kernel_of_paths.push_back(static_cast<std::uint8_t>(surface_kernel_index(material, false)));
   }
   bsdf_tables_make(*bsdf_tables, features);
   accel = std::make_unique<Accel>(scene, lights.lights, lights.area_lights, displacements, *this, shadow_filter,
@@ -145,9 +146,9 @@ SceneContext::SceneContext(const Scene& loaded,
   }
 }
 
-WavefrontColumns SceneContext::columns() const
+WavefrontColumns SceneContext::columns(bool photons) const
 {
-  return {globals.caustics.enabled, motion.is_open(), displacements.has_facets()};
+  return {photons, motion.is_open(), displacements.has_facets()};
 }
 
 void SceneContext::make_views()

@@ -29,7 +29,12 @@ struct SceneContext : SceneViews {
                         const CausticSettings& caustics = {CausticsMode::kOff},
                         std::shared_ptr<KeptTrees> trees = nullptr);
 
-  WavefrontColumns columns() const;
+  /// @param photons  the render has a photon pass
+  WavefrontColumns columns(bool photons) const;
+  const std::vector<std::uint8_t>& surface_kernels(bool photons) const
+  {
+    return photons ? surface_kernel : surface_kernel_of_paths;
+  }
 
   /// Bytes by part.
   void fill(Statistics& stats) const;
@@ -37,7 +42,7 @@ struct SceneContext : SceneViews {
   const Scene& scene;
   std::vector<GraphProgramView> graphs;
   LightSet lights;
-  std::vector<std::uint8_t> surface_kernel;  ///< a material
+  std::vector<std::uint8_t> surface_kernel, surface_kernel_of_paths;  ///< a material; the latter's know no photons
   std::unique_ptr<BsdfTables> bsdf_tables;
   DisplacementSet displacements;
   std::unique_ptr<Accel> accel;

@@ -7,6 +7,7 @@
 
 #include "integrator/camera_medium.h"
 #include "integrator/flush_denormals.h"
+#include "integrator/photon_benefit.h"
 #include "integrator/photon_pass.h"
 #include "integrator/stages.h"
 #include "kernel/shape/surface_hit.h"
@@ -126,22 +127,22 @@ PathReplay trace_path(const Scene& scene, const RenderOptions& options, const Pi
   KernelGlobals g = render_globals(context, options, filter);
   g.film = film.accumulator();
 
-  const bool caustics = g.caustics.enabled;
+  const std::atomic<bool> stop{false};
+  PhotonChoice choice = photon_choice_make(context, options, g, stop);
+  const bool caustics = choice.photons;
   std::optional<PhotonPass> photons;
   if (caustics) {
-    const RenderSettings& settings = options.settings;
-    photons.emplace(context, settings.caustics, static_cast<double>(settings.width) * settings.height);
-    const std::atomic<bool> stop{false};
-    tbb::enumerable_thread_specific<Wavefront> workers([&] { return Wavefront(context.columns()); });
+    photons.emplace(context, options.settings, std::move(choice.sources));
+    tbb::enumerable_thread_specific<Wavefront> workers([&] { return Wavefront(context.columns(caustics)); });
     for (std::uint32_t pass = 0; pass <= at.sample_index; ++pass) {
       photons->next(
-          g, stages, [&]() -> Wavefront& { return workers.local(); }, stop, [] {});
+          g, 0, stages, [&]() -> Wavefront& { return workers.local(); }, stop, [] {});
     }
   }
 
   PathReplay replay;
   replay.warnings = context.displacements.warnings();
-  Wavefront wavefront(context.columns());
+  Wavefront wavefront(context.columns(caustics));
   wavefront.recorder = &replay.rays;
   const CameraMedium camera_medium(context);
   if (camera_medium.exists()) wavefront.camera_medium = &camera_medium;
@@ -149,7 +150,7 @@ PathReplay trace_path(const Scene& scene, const RenderOptions& options, const Pi
   const int x = at.x - window.x0, y = at.y - window.y0;
   const Batch batch = tile_batch(film, film.tile_at(x, y), at.sample_index, 1);
   const FlushDenormals flush;
-  wavefront.run(g, *context.accel, stages, context.surface_kernel, batch);
+  wavefront.run(g, *context.accel, stages, context.surface_kernels(caustics), batch);
   const auto pixel = static_cast<std::uint32_t>(y * window.width + x);
   std::erase_if(replay.rays, [&](const RecordedRay& ray) { return ray.pixel != pixel; });
   replay.radiance = wavefront.first_radiance(pixel);

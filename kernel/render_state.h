@@ -8,12 +8,15 @@
 
 namespace relief {
 
-/// Of the photon pass, before the pass that is under way; its photons are traced again.
+/// Of the photon pass, before the turn that is under way; its photons are traced again.
 struct PhotonPassState {
   std::uint32_t photons_a_pass = 0;
   float first_radius = 0;  ///< metres; 0: not known yet
   std::uint64_t stored = 0;
   double seconds = 0;
+  std::uint32_t passes = 0;  ///< with those left out
+  std::uint32_t maps = 0;    ///< of the last of them, that are in use
+  double served = 0;         ///< samples of the whole window that these have brought light to
 };
 
 /// All but the film's sums. A pass over the picture may be under way: it goes on with those of its tiles that have not had it,

@@ -35,6 +35,9 @@ struct CausticStatistics {
   std::uint64_t passes = 0, num_sources = 0, bytes = 0;
   double first_radius = 0, radius = 0;  ///< typical, in the first and the last pass, metres
   double seconds = 0;
+  /// What decided by benefit: squared error of paths alone over that with photons, and cost of a sample with photons over that of
+  /// one without; 0 where nothing was measured.
+  double error_ratio = 0, cost_ratio = 0;
 };
 
 /// What frames before had made already.

@@ -20,6 +20,7 @@ struct PhotonSourcesView {
   const std::int32_t* target_of = nullptr;  ///< of each instance; −1: no caster
   Box3 scene_box;                           ///< around everything that light can hit
   double photons_a_pass = 1;
+  const float* factors = nullptr;  ///< on the power that each source sends; null: 1
 };
 
 }  // namespace relief

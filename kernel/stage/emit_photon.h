@@ -141,7 +141,8 @@ RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
       ray = is_point ? emit_from_point(g, light, box, u_light, u) : emit_from_area(g, light, box, u_light, u);
     }
   }
-  const Vec3f power = ray.power * static_cast<float>(1.0 / (probability * sources.photons_a_pass));
+  const float factor = sources.factors != nullptr ? sources.factors[low] : 1.0f;
+  const Vec3f power = ray.power * (factor * static_cast<float>(1.0 / (probability * sources.photons_a_pass)));
   if (is_zero(power) || !is_finite(power)) return false;
 
   path_set_ray(state, path, ray.O, ray.D);

@@ -62,7 +62,7 @@ TEST_F(RenderProgram, CausticsStandStillFromFrameToFrame)
 {
   // The noise of a still scene is that of its seed, and not another one in each frame: a caustic does not flicker.
   const std::string scene = write_scene(mirrored_lamp());
-  const Arguments frames = {"--frames", "3,4", "--resolution", "16x16", "--spp", "2", "--aov", "beauty,caustic"};
+  const Arguments frames = {"--frames", "3,4", "--resolution", "16x16", "--spp", "2", "--aov", "beauty,caustic", "--caustics", "on"};
   const Outcome outcome = render(scene, file("f.#.exr"), frames);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
   const std::vector<float> caustic = values_of(file("f.3.exr"), "caustic.R");

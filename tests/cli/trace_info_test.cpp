@@ -348,7 +348,7 @@ TEST_F(TraceInfoProgram, InfoSaysWhetherThereWillBePhotons)
   const std::string scene = folder_.write("s.gltf", mirrored_lamp().gltf()).string();
   const std::string plain = folder_.write("p.gltf", lit_square().gltf()).string();
   const auto caustics = [&](const Arguments& arguments) { return line_of(run(arguments).output, "caustics: "); };
-  EXPECT_EQ(caustics({"info", scene}), "caustics: photons (lights on casters)");
+  EXPECT_EQ(caustics({"info", scene}), "caustics: photons where they pay (lights on casters)");
   EXPECT_EQ(caustics({"info", scene, "--caustics", "off"}), "caustics: none (off)");
   EXPECT_EQ(caustics({"info", plain, "--caustics", "on"}), "caustics: none (nothing casts caustics)");
   EXPECT_EQ(run({"info", scene, "--caustics", "sometimes"}).exit_code, 2);

@@ -30,7 +30,7 @@ class ExrStateTest : public FolderTest {
     state.pass_samples = 16;
     state.active = {0, 2, 5};
     state.tile_samples = {48, 16, 64, 32, 32, 48};
-    state.photons = {1234567, 0.1f, std::uint64_t{1} << 40, 1.0 / 3};
+    state.photons = {1234567, 0.1f, std::uint64_t{1} << 40, 1.0 / 3, 77, 2, 0.6};
     state.seconds = 1e9 / 7;
     state.counters.camera_rays = std::numeric_limits<std::uint64_t>::max();
     state.stage_seconds = {0.1, 0.2};
@@ -80,6 +80,9 @@ TEST_F(ExrStateTest, ComesBackInEveryBit)
   EXPECT_EQ(a.photons.first_radius, b.photons.first_radius);
   EXPECT_EQ(a.photons.stored, b.photons.stored);
   EXPECT_EQ(a.photons.seconds, b.photons.seconds);
+  EXPECT_EQ(a.photons.passes, b.photons.passes);
+  EXPECT_EQ(a.photons.maps, b.photons.maps);
+  EXPECT_EQ(a.photons.served, b.photons.served);
   EXPECT_EQ(a.seconds, b.seconds);
   EXPECT_EQ(a.counters.camera_rays, b.counters.camera_rays);
   EXPECT_EQ(a.stage_seconds, b.stage_seconds);

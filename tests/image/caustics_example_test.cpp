@@ -67,7 +67,7 @@ Regions render_regions(const Scene& scene, int samples, std::uint64_t first_seed
 
 TEST(CausticsExample, PhotonsThroughDisplacedGlassBringWhatPathsBring)
 {
-  const Regions photons = render_regions(wide_lamp_scene(CausticsMode::kAuto), 8, 1);
+  const Regions photons = render_regions(wide_lamp_scene(CausticsMode::kOn), 8, 1);
   const Regions paths = render_regions(wide_lamp_scene(CausticsMode::kOff), 96, 100);
   constexpr double kBlur = 0.01;
   for (std::size_t r = 0; r < photons.mean.size(); ++r) {

@@ -87,7 +87,7 @@ double mirrored_over_closed_form(Scene scene, Vec3f N)
   add_caster(scene, wall(), mirror_material());
   scene.lights.push_back(point_light({0, 1, 0}, 5));
   look_down(scene, {0.3f, 0, 0.2f}, 0.4f, 2);
-  RenderOptions options = caustic_options(scene, CausticsMode::kAuto, 32, 16);
+  RenderOptions options = caustic_options(scene, CausticsMode::kOn, 32, 16);
   options.settings.diffuse_bounces = 1;
   options.settings.caustics.photons = 1 << 17;
   const Rendered picture = render_scene(scene, options);

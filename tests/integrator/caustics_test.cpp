@@ -358,7 +358,7 @@ double mirrored_lamp_over_closed_form(float lamp_radius)
   scene.lights.push_back(point_light({0, 1, 0}, 5));
   scene.lights.back().radius = lamp_radius;
   look_down(scene, {0.3f, 0, 0.2f}, 0.4f, 2);
-  RenderOptions options = caustic_options(scene, CausticsMode::kAuto, 32, 16);
+  RenderOptions options = caustic_options(scene, CausticsMode::kOn, 32, 16);
   options.settings.caustics.photons = 1 << 17;
   const Rendered picture = render_scene(scene, options);
   EXPECT_EQ(picture.stats.caustics.passes, 16u);
@@ -406,7 +406,7 @@ double slab_over_closed_form(float size, float floor)
   sun.emission = splat3(4);
   scene.lights.push_back(sun);
   look_down(scene, {}, 0.5f * h, 0.7f * h);
-  RenderOptions options = caustic_options(scene, CausticsMode::kAuto, 24, 16);
+  RenderOptions options = caustic_options(scene, CausticsMode::kOn, 24, 16);
   options.settings.caustics.photons = 1 << 16;
   const double F = 0.04;
   const Rendered picture = render_scene(scene, options);
@@ -524,7 +524,7 @@ TEST(Caustics, FewPhotonsKeepTheLight)
   scene.lights.push_back(point_light({0, 1, 0}, 5));
   look_down(scene, {}, 15, 20);
   constexpr int kPasses = 64;
-  RenderOptions options = caustic_options(scene, CausticsMode::kAuto, 32, kPasses);
+  RenderOptions options = caustic_options(scene, CausticsMode::kOn, 32, kPasses);
   const auto light = [&](double photons) {
     options.settings.caustics.photons = photons;
     return mean_of(render_scene(scene, options), Aov::kCaustic);
@@ -548,7 +548,7 @@ TEST(Caustics, CropsShowTheWholePicturesPixels)
   scene.lights.push_back(square_light({0, 2, 0}, {0, -1, 0}, 0.1f, 50));
   look_down(scene, {}, 1, 3);
   // More pixels than the fewest photons there are.
-  RenderOptions options = caustic_options(scene, CausticsMode::kAuto, 200, 2);
+  RenderOptions options = caustic_options(scene, CausticsMode::kOn, 200, 2);
   const Rendered whole = render_scene(scene, options);
   options.crop_x0 = 60;
   options.crop_y0 = 80;
@@ -578,7 +578,7 @@ TEST(Caustics, OfACentimetreAndAKilometreAreTheSame)
     scene.lights.push_back(square_light({0, 2 * scale, 0}, {0, -1, 0}, 0.125f * scale, 50));
     scene.lights.push_back(point_light({scale, 2 * scale, 0}, 2 * scale * scale));
     look_down(scene, {}, scale, 3 * scale);
-    return render_scene(scene, caustic_options(scene, CausticsMode::kAuto, 64, 4));
+    return render_scene(scene, caustic_options(scene, CausticsMode::kOn, 64, 4));
   };
   const Rendered metre = picture(1);
   EXPECT_GT(mean_of(metre, Aov::kCaustic), 0.01);
@@ -610,7 +610,7 @@ TEST(Caustics, ProgressIsThatOfBothPasses)
     EXPECT_GE(p.photons, last.photons);
     last = p;
   };
-  render(scene, caustic_options(scene, CausticsMode::kAuto, 200, 5), stop, progress, stats);
+  render(scene, caustic_options(scene, CausticsMode::kOn, 200, 5), stop, progress, stats);
   EXPECT_EQ(last.fraction, 1);
   EXPECT_EQ(last.samples_per_pixel, 5);
   EXPECT_EQ(last.photons, stats.caustics.photons);
@@ -705,7 +705,7 @@ TEST(Caustics, NothingIsDoneWhereNoneCanBe)
 
   add_caster(scene, sphere_mesh(0.3f, 32, 16, true), glass_material());
   EXPECT_EQ(pixels(CausticsMode::kOff).stats.caustics.photons, 0u);
-  EXPECT_GT(pixels(CausticsMode::kAuto).stats.caustics.photons, 0u);
+  EXPECT_GT(pixels(CausticsMode::kOn).stats.caustics.photons, 0u);
   scene.lights.front().casts_caustics = false;
   EXPECT_EQ(pixels(CausticsMode::kAuto).stats.caustics.reason, "no light casts caustics");
 
@@ -719,7 +719,7 @@ TEST(Caustics, NothingIsDoneWhereNoneCanBe)
     look_down(metal, {}, 1, 1.5f);
     const RenderOptions options = caustic_options(metal, CausticsMode::kAuto, 24, 8);
     EXPECT_EQ(render_scene(metal, options).stats.caustics.reason,
-              roughness < 0.1f ? "nothing receives caustics" : "lights on casters");
+              roughness < 0.1f ? "nothing receives caustics" : "no caustic shows in the picture");
     add_displacement(metal, 16, noise_texels(16, 1), 0.01f);
     metal.materials[0].displacement_index = 0;
     EXPECT_EQ(render_scene(metal, options).stats.caustics.reason, "nothing receives caustics");

@@ -84,6 +84,11 @@ TEST(Checkpoint, WhereverItIsTakenTheRenderThatGoesOnHasTheSameBits)
        [](RenderOptions& o) {
          o.settings.caustics.mode = CausticsMode::kOn, o.settings.caustics.photons = 1000, o.settings.samples = 20;
        }},
+      {"few tiles with photons",
+       [](RenderOptions& o) {
+         o.settings.caustics.mode = CausticsMode::kOn, o.settings.caustics.photons = 1000;
+         o.settings.noise_threshold = 0.05f;
+       }},
       {"crop", [](RenderOptions& o) { o.crop_x0 = 5, o.crop_y0 = 7, o.crop_x1 = 50, o.crop_y1 = 40; }}};
   for (const auto& [name, change] : kCases) {
     RenderOptions options = render_options(scene, 64, 40);
