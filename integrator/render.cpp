@@ -214,7 +214,8 @@ KernelGlobals render_globals(const SceneContext& context, const RenderOptions& o
   g.seed = settings.seed;
   g.mist = settings.mist;
   g.occlusion_distance = settings.occlusion_distance;
-  g.log2_stream = sample_log2_stream(static_cast<std::uint32_t>(settings.samples));
+  const auto planned = static_cast<std::uint32_t>(settings.samples);
+  g.log2_stream = sample_log2_stream(settings.noise_threshold > 0 ? std::min(least_samples(settings), planned) : planned);
   g.full_width = settings.width;
   g.full_height = settings.height;
   const FilmWindow window = render_window(options);

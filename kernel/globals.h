@@ -76,7 +76,7 @@ struct KernelGlobals {
   const FilterTable* filter = nullptr;  ///< null: box
   float filter_width = 1;               ///< pixels
   std::uint64_t seed = 0;
-  std::uint32_t log2_stream = 0;        ///< of the planned samples a pixel, see sample_sequence_index
+  std::uint32_t log2_stream = 0;        ///< of the samples that a pixel gets for sure, see sample_sequence_index
   int full_width = 0, full_height = 0;  ///< of the whole image, pixels
   int crop_x = 0, crop_y = 0;           ///< the film window's corner in it
   FilmAccumulatorView film;

@@ -114,7 +114,7 @@ RELIEF_KERNEL constexpr std::uint32_t sample_pixel_hash(std::uint64_t seed, int 
   return static_cast<std::uint32_t>(hash_mix(hash_mix(seed + 0x9e3779b97f4a7c15u) ^ pixel) >> 32);
 }
 
-/// log₂ of the length of a stream for a planned number of samples a pixel, see sample_sequence_index.
+/// log₂ of the length of a stream for a number of samples a pixel that is to be even, see sample_sequence_index.
 RELIEF_KERNEL constexpr std::uint32_t sample_log2_stream(std::uint32_t num_samples)
 {
   std::uint32_t log2 = 0;
@@ -126,17 +126,27 @@ RELIEF_KERNEL constexpr std::uint32_t sample_log2_stream(std::uint32_t num_sampl
 ///
 /// Four aligned blocks of the sequence ("streams") are visited in turn: sample i belongs to half i & 1 and, in it, to
 /// quarter (i >> 1) & 1. Whenever 4·2^k samples are done, each stream is a net of 2^k points; when all planned samples
-/// are, and their number is a power of two, halves and whole are nets too.
-/// @param sample       i, below 4·2^log2_stream
+/// are, and their number is a power of two, halves and whole are nets too. Samples past the four streams double them, again
+/// and again: the next 2^k of the sequence have four streams of their own. So the whole is a net whenever 2^k samples are
+/// done, and halves are made of nets, where nobody knows how many samples there will be. (With streams for the most that
+/// there may be, the variance at 64 of 4,096 samples was twice what it is, in smooth light twelve times.)
 /// @param log2_stream  from sample_log2_stream
 RELIEF_KERNEL constexpr std::uint32_t sample_sequence_index(std::uint32_t sample, std::uint32_t log2_stream)
 {
-  return (sample >> 2) | ((sample >> 1 & 1u) << log2_stream) | ((sample & 1u) << (log2_stream + 1));
+  std::uint32_t done = 0;
+  if (sample >> log2_stream >= 4) {
+    const std::uint32_t log2 = 31u - static_cast<std::uint32_t>(__builtin_clz(sample));
+    done = 1u << log2;
+    log2_stream = log2 - 2;
+    sample -= done;
+  }
+  return done | (sample >> 2) | ((sample >> 1 & 1u) << log2_stream) | ((sample & 1u) << (log2_stream + 1));
 }
 
 /// Whether the sample with an index in the sequence is even-numbered: of a pixel's first half.
 RELIEF_KERNEL constexpr bool sample_is_even(std::uint32_t sample_index, std::uint32_t log2_stream)
 {
+  if (sample_index >> log2_stream >= 4) log2_stream = 29u - static_cast<std::uint32_t>(__builtin_clz(sample_index));
   return (sample_index >> (log2_stream + 1) & 1u) == 0;
 }
 

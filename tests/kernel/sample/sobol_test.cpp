@@ -223,6 +223,32 @@ TEST(Sobol, SequenceIndexIsAPermutationForAnyPlannedNumber)
   }
 }
 
+TEST(Sobol, SamplesPastTheStreamsDoubleThem)
+{
+  for (const std::uint32_t planned : {1u, 4u, 16u, 50u, 64u}) {
+    const std::uint32_t log2_stream = sample_log2_stream(planned);
+    for (std::uint32_t n = 4u << log2_stream; n <= 4096; n *= 2) {
+      std::vector<int> count(n, 0);
+      for (std::uint32_t i = 0; i < n; ++i) {
+        const std::uint32_t index = sample_sequence_index(i, log2_stream);
+        ASSERT_LT(index, n) << planned << " " << i;
+        ++count[index];
+        ASSERT_EQ(sample_is_even(index, log2_stream), i % 2 == 0) << planned << " " << i;
+      }
+      EXPECT_EQ(std::count(count.begin(), count.end(), 1), static_cast<std::ptrdiff_t>(n)) << planned;
+      if (n == 4u << log2_stream) continue;
+      // Of what the last doubling added, a half is an aligned block of the sequence, and so a net.
+      std::uint32_t least = ~0u, most = 0;
+      for (std::uint32_t i = n / 2; i < n; i += 2) {
+        least = std::min(least, sample_sequence_index(i, log2_stream));
+        most = std::max(most, sample_sequence_index(i, log2_stream));
+      }
+      EXPECT_EQ(least, n / 2) << planned;
+      EXPECT_EQ(most, n / 2 + n / 4 - 1) << planned;
+    }
+  }
+}
+
 TEST(Sobol, DimensionsAndNeighbouringPixelsAreUncorrelated)
 {
   const int n = 200000;  // pixels
