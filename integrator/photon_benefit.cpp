@@ -244,11 +244,8 @@ PhotonChoice photon_choice_make(const SceneContext& context,
   // With photons a path that comes by chance to a bright caustic has noise of its own.
   const Pilot shown =
       pilot_run(context, options, g, choice.sources, static_cast<std::uint32_t>(paths), paths / kPilotSamples, stop);
-  // The rarest of other paths are not among so few samples. Against references the squared error of whole pictures of metal and
-  // glass under suns and lamps was 2 to 20 times what a pilot tells.
-  constexpr double kUnseen = 5;
-  const double without = kUnseen * pilot.seen_error + pilot.caustic_error;
-  const double with = kUnseen * std::max(shown.seen_error, pilot.seen_error) + pilot.photon_error;
+  const double without = pilot.seen_error + pilot.caustic_error;
+  const double with = std::max(shown.seen_error, pilot.seen_error) + pilot.photon_error;
   choice.error_ratio = without / std::max(with, 1e-30);
   const bool pays = choice.error_ratio > choice.cost_ratio;
   char figures[160];

@@ -76,7 +76,7 @@ TEST(Layers, BackdropsAreSeenInTheEnvironmentsPlaceByTheCameraAlone)
   Scene scene = half_wall(diffuse_material({0.5f, 0.5f, 0.5f}));
   scene.environment.color = {0.25f, 0.5f, 0.75f};
   const Rendered lit = render_scene(scene, render_options(scene, kSize, 4));
-  scene.environment.backdrop = Surroundings{{2, 3, 4}};
+  scene.environment.backdrop.emplace().color = {2, 3, 4};
   const Rendered r = render_scene(scene, render_options(scene, kSize, 4));
   EXPECT_EQ(r.radiance(12, 8).y, 3.0f);
   EXPECT_EQ(r.at(Aov::kEnvironment, 12, 8)[1], 3.0f);
