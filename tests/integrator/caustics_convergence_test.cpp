@@ -70,6 +70,7 @@ TEST(CausticConvergence, BiasIsThatOfTheShrinkingKernel)
   constexpr double kRadius = 0.3;
   constexpr double kAlpha = 2.0 / 3.0;
   RenderOptions options = render_options(scene, 2, 1);
+  options.settings.caustics.mode = CausticsMode::kOn;
   // Of the light seen directly: what the mirror shows of the floor is left out.
   options.settings.diffuse_bounces = 1;
   options.settings.caustics.photons = 1 << 11;
@@ -104,10 +105,12 @@ TEST(CausticConvergence, PhotonsDoNotKnowTheCamera)
 {
   // A camera that moves through an animation sees a caustic that stands still, with the same pattern.
   Scene scene = mirror_scene();
-  const RenderOptions options = render_options(scene, 8, 2);
+  RenderOptions options = render_options(scene, 8, 2);
+  options.settings.caustics.mode = CausticsMode::kOn;
   const Rendered here = render_scene(scene, options);
   scene.cameras.front().camera.world_from_camera.p += Vec3f{0.03f, 0.05f, -0.02f};
-  const RenderOptions moved = render_options(scene, 8, 2);
+  RenderOptions moved = render_options(scene, 8, 2);
+  moved.settings.caustics.mode = CausticsMode::kOn;
   const Rendered there = render_scene(scene, moved);
   EXPECT_NE(here.image.pixels, there.image.pixels);
   EXPECT_GT(here.stats.caustics.stored, 0u);

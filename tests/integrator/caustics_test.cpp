@@ -496,14 +496,15 @@ TEST(PathsThatFork, WaysIntoRoughGlassShareOneSetOfPoints)
 
 TEST(PathsThatFork, WaysFromRoughMetalShareOneSetOfPoints)
 {
-  // Likewise with a lamp above. A single way leads there or not, with a deviation of the mean itself.
+  // Likewise with a lamp above. A single way leads there or not, with a deviation of the mean itself. The number that turns the
+  // lobe has chosen it among others, so that its halves are not quite halves of the four points.
   Scene scene = empty_scene();
   Material metal;
   metal.roughness = 0.4f;
   add_caster(scene, quad_mesh({-2, 0.2f, 2}, {4, 0, 0}, {0, 0, -4}), metal);
   scene.lights.push_back(square_light({10, 3, 0}, {0, -1, 0}, 10, 1));
   look_down(scene, {0, 0.2f, 0}, 0.0005f, 1);
-  expect_four_ways(scene, 0.25);
+  expect_four_ways(scene, 0.3);
 }
 
 TEST(Caustics, SunThroughASlabLosesWhatTwoInterfacesReflect)
