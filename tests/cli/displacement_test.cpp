@@ -385,9 +385,10 @@ TEST_F(DisplacementProgram, LevelsAverageTheMap)
 
 TEST_F(DisplacementProgram, ExplainTellsOfPrismsAndHits)
 {
+  // A method that is named: what one height raises everywhere is moved, and rays meet no prism.
   const std::string scene = write(displaced_square(), std::string(16, '\xff'));
   folder_.write("rays.txt", "9 9 3 0 0 -1\n0.25 0.1875 3 0 0 -1\n");
-  const Outcome hit = run({"trace", scene, "--rays", file("rays.txt"), "--explain", "1"});
+  const Outcome hit = run({"trace", scene, "--rays", file("rays.txt"), "--displacement", "chord", "--explain", "1"});
   ASSERT_EQ(hit.exit_code, 0) << hit.errors;
   for (const char* text :
        {"ray: origin 0.25 0.1875 3, direction 0 0 -1, t 0 to inf\n",
@@ -398,11 +399,11 @@ TEST_F(DisplacementProgram, ExplainTellsOfPrismsAndHits)
   }
   // All t are in the length of the direction that was given, and the ray in object space is the one that was.
   folder_.write("long.txt", "0.25 0.1875 3 0 0 -100\n");
-  const Outcome long_ray = run({"trace", scene, "--rays", file("long.txt"), "--explain", "0"});
+  const Outcome long_ray = run({"trace", scene, "--rays", file("long.txt"), "--displacement", "chord", "--explain", "0"});
   for (const char* text : {"  inside: t 0.02499", "direction 0 0 -100\n", "  hit: t 0.025, ", "nearest: t 0.025, "}) {
     EXPECT_NE(long_ray.output.find(text), std::string::npos) << text << "\n" << long_ray.output;
   }
-  const Outcome miss = run({"trace", scene, "--rays", file("rays.txt"), "--explain", "0"});
+  const Outcome miss = run({"trace", scene, "--rays", file("rays.txt"), "--displacement", "chord", "--explain", "0"});
   EXPECT_NE(miss.output.find("in all: 0 boxes, 0 prisms, 0 bounds, 0 texels, 0 inversions\nnearest: nothing\n"),
             std::string::npos)
       << miss.output;
