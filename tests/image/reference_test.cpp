@@ -47,7 +47,7 @@ constexpr std::array kReferences = {
     Reference{"displaced_curved", "tests/references/displaced_curved.gltf", 16},
     Reference{"displaced_instances", "tests/references/displaced_instances.gltf", 32},
     Reference{"displaced_mirror", "tests/references/displaced_mirror.gltf", 32},
-    Reference{"caustic_ball", "tests/references/caustic_ball.gltf", 8},
+    Reference{"caustic_ball", "tests/references/caustic_ball.gltf", 32},
     Reference{"caustic_slab", "tests/references/caustic_slab.gltf", 8},
 };
 
