@@ -87,13 +87,11 @@ def test_filter_glossy_blurs_as_cycles_does():
 def test_a_noise_threshold_leaves_as_much_noise_as_in_cycles():
     """The error that is left and the samples that it takes, by thresholds, beside Cycles'."""
     scene = _scene(None)
-    # By the lamp alone: beside a world relief had 1.31 times Cycles' error at every threshold, where both took the least samples.
-    set_world((0, 0, 0))
     scene.cycles.samples = 2048
     (reference,) = _pictures(scene, "RELIEF", [77])
     scene.cycles.use_adaptive_sampling, scene.cycles.samples = True, 1024
     ratios = []
-    for threshold in (0.05, 0.02, 0.01):
+    for threshold in (0.1, 0.05, 0.02, 0.01):
         scene.cycles.adaptive_threshold = threshold
         errors = []
         for engine in ("RELIEF", "CYCLES"):
