@@ -21,8 +21,7 @@ struct AccumulatorLayout {
       displacement_steps = -1, caustic = -1, holdout = -1, mist = -1, emission = -1, environment = -1,
       ambient_occlusion = -1, clear = -1, denoising_albedo = -1, denoising_normal = -1, denoising_depth = -1,
       denoising_half = -1;
-  int samples =
-      -1;  ///< that the pixel has had, and whether it rests: where noise decides how many it gets, pixel by pixel
+  int samples = -1;  ///< that the pixel has had, and whether it rests: where noise ends pixels one by one
   int cryptomatte[kNumCryptomattes] = {-1, -1, -1};  ///< pairs of an id and its weight, the first of weight 0 is free
   int cryptomatte_levels = 0;
   bool denoising = false;  ///< denoising_albedo, denoising_normal or denoising_half is kept

@@ -90,15 +90,20 @@ TEST(SamplingLimits, PixelsRestByTheRuleOfCycles)
       options.settings.film_exposure = exposure;
       const Rendered r = render_scene(scene, options);
       int resting = 0;
+      double most = 0;
       for (int y = 0; y < 64; ++y) {
         for (int x = 0; x < 64; ++x) {
           // A pixel and all around it were found good when it came to rest, and have had no sample since unless they go on for others.
           if (*r.at(Aov::kSampleCount, x, y) == 1024) continue;
           ++resting;
-          EXPECT_LT(cycles_error(r, x, y, is_linear, exposure), 0.05 * 1.001) << x << ' ' << y;
+          const double error = cycles_error(r, x, y, is_linear, exposure);
+          EXPECT_LT(error, 0.05 * 1.001) << x << ' ' << y;
+          most = std::max(most, error);
         }
       }
       EXPECT_GT(resting, 64 * 32);
+      // A stricter rule would leave none so near the bound.
+      EXPECT_GT(most, 0.9 * 0.05);
     }
   }
 }
