@@ -33,8 +33,8 @@ struct MovedMesh {
   int mesh_index = 0;       ///< of the mesh that was
   std::vector<Vec3f> P;     ///< of all vertices
   std::vector<Normal3f> N;  ///< likewise; empty: it is flat
-  std::shared_ptr<const DividedMesh>
-      divided;  ///< triangles, and all else that vertices have; null: those of the mesh that was
+  /// Triangles, and all else that vertices have; null: those of the mesh that was.
+  std::shared_ptr<const DividedMesh> divided;
 
   /// @param mesh  that was
   MeshView view(const MeshView& mesh) const;
@@ -45,8 +45,8 @@ struct MovedMesh {
 struct VertexDisplacement {
   double scale = 1;      ///< metres of object space
   float midlevel = 0.5;  ///< stands for heights that are no numbers as well
-  bool smooth =
-      false;  ///< it is shaded smooth: a vertex has the mean of the unit normals of the triangles around it, as in Cycles
+  /// It is shaded smooth: a vertex has the mean of the unit normals of the triangles around it, as in Cycles.
+  bool smooth = false;
 };
 
 /// Moves the vertices of a mesh along their normals. Vertices of one place and normal move together, by the height at the

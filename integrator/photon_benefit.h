@@ -35,7 +35,7 @@ PhotonChoice photon_choice_make(const SceneContext& context,
 /// A light as paths see it by a caster.
 struct CausticLight {
   double irradiance = 0;   ///< on the caster, W/m²
-  double solid_angle = 0;  ///< that paths spread their noise over: of the light or of the caster's lobe, whichever is larger
+  double solid_angle = 0;  ///< of the light or of the caster's lobe, the larger one: paths spread noise over it
 };
 
 /// @param box    around the casters
