@@ -12,7 +12,7 @@ from . import exr, report, result, session
 from .export.camera import camera_json
 from .export.motion import Motion, shutter_of
 from .export.scene import DATA_FOLDER, View, export_scene, write_view
-from .export.settings import sampling_of, warn_unread_settings
+from .export.settings import denoiser_of, sampling_of, warn_unread_settings
 from .preferences import find_checked_binary
 from .report import ReliefError, Report, say
 
@@ -73,6 +73,7 @@ def _render(engine, depsgraph, binary, warnings, motion, eye, begin):
     folder = session.render_folder()
     layer_name = depsgraph.view_layer.name
     place = {"layer": layer_name, "view": eye}
+    denoiser = denoiser_of(scene, depsgraph.view_layer)
     passes = result.enabled_passes(scene, depsgraph.view_layer)
     result.warn_missing_passes(depsgraph.view_layer, warnings)
 
@@ -105,8 +106,8 @@ def _render(engine, depsgraph, binary, warnings, motion, eye, begin):
     # Not in the viewport: there a moved camera would have everything diced again.
     if scene.relief.displacement_error > 0:
         arguments += ["--displacement-error", f"{scene.relief.displacement_error:g}"]
-    if scene.relief.denoise != "none":
-        arguments += ["--denoise", scene.relief.denoise]
+    if denoiser != "none":
+        arguments += ["--denoise", denoiser]
     preview = None
     if _is_watched():
         told_preview, preview_path = output("preview", ".exr")

@@ -7,7 +7,7 @@ import os
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty
 
-from .export.settings import SHARED
+from .export.settings import SHARED, cycles_settings
 
 # What `relief info --settings` says, by name, and `relief info --methods`.
 with open(os.path.join(os.path.dirname(__file__), "declared.json"), encoding="utf-8") as _file:
@@ -16,6 +16,11 @@ _DECLARED = {setting["name"]: setting for setting in _program["settings"]}
 _METHODS = tuple(
     (method["name"], method["title"], method["description"] + (" (default)" if method["name"] == "auto" else ""))
     for method in _program["methods"]
+)
+
+_DENOISERS = (
+    ("builtin", "Built-in", "By what its two halves of samples, albedo, normals and depth tell (default)"),
+    ("oidn", "Open Image Denoise", "Intel's denoiser, if it is installed on this machine"),
 )
 
 # Blender's whole numbers go no further.
@@ -47,6 +52,18 @@ def _uses_cycles_settings(settings):
     return settings.settings_source == "cycles"
 
 
+def _denoise(settings):
+    owner = cycles_settings(settings.id_data) or settings
+    return 1 + settings.bl_rna.properties["denoiser"].enum_items.find(settings.denoiser) if owner.use_denoising else 0
+
+
+def _set_denoise(settings, value):
+    owner = cycles_settings(settings.id_data) or settings
+    owner.use_denoising = value > 0
+    if value > 0:
+        settings.denoiser = _DENOISERS[value - 1][0]
+
+
 def _use_cycles_settings(settings, value):
     settings.settings_source = "cycles" if value else "relief"
 
@@ -66,8 +83,8 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
     )
     use_cycles_settings: BoolProperty(
         name="Use Cycles Settings",
-        description="Take samples, noise threshold, time limit, seed, bounces, clamping and pixel filter from the "
-        "scene's settings for Cycles (default on, unless one of relief's own has been set)",
+        description="Take samples, noise threshold, time limit, denoising, seed, bounces, clamping and pixel filter from "
+        "the scene's settings for Cycles (default on, unless one of relief's own has been set)",
         get=_uses_cycles_settings,
         set=_use_cycles_settings,
     )
@@ -91,16 +108,25 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
         min=0.0,
         unit="TIME_ABSOLUTE",
     )
-    denoise: EnumProperty(
+    use_denoising: BoolProperty(
         name="Denoise",
         description="Take the noise out of the finished picture. The pass Noisy Image is the picture as it was rendered, "
-        "Denoised Error what the denoised one may be off by (default None)",
-        items=(
-            ("none", "None", "The picture as it was rendered (default)"),
-            ("builtin", "Built-in", "By what its two halves of samples, albedo, normals and depth tell"),
-            ("oidn", "Open Image Denoise", "Intel's denoiser, if it is installed on this machine"),
-        ),
-        default="none",
+        "Denoised Error what the denoised one may be off by (default off)",
+        default=False,
+    )
+    denoiser: EnumProperty(
+        name="Denoiser",
+        description="What takes the noise out (default Built-in)",
+        items=_DENOISERS,
+        default="builtin",
+    )
+    denoise: EnumProperty(
+        name="Denoise",
+        description="Denoise and Denoiser in one, for scripts",
+        items=(("none", "None", "The picture as it was rendered"), *_DENOISERS),
+        get=_denoise,
+        set=_set_denoise,
+        options={"HIDDEN"},
     )
     noise_threshold: FloatProperty(name="Noise Threshold", precision=4, **_declared("noiseThreshold", soft_max=1.0))
     min_samples: IntProperty(name="Min Samples", **_declared("minSamples", soft_max=4096))

@@ -8,6 +8,7 @@ import numpy as np
 
 from . import compat, cryptomatte
 from .export.axes import blender_from_gltf
+from .export.settings import denoiser_of
 
 #: What Blender's depth pass holds where nothing was hit.
 _FAR = 1e10
@@ -105,7 +106,7 @@ _NO_PASSES = {"use_pass_combined", "use_pass_cryptomatte_accurate"}
 def enabled_passes(scene, view_layer):
     """Passes that a view layer of a scene asks for, besides the combined one."""
     passes = [p for p in PASSES if p.is_enabled(view_layer)]
-    if scene.relief.denoise != "none":
+    if denoiser_of(scene, view_layer) != "none":
         passes += _DENOISED
     for kind in CRYPTOMATTES:
         setting = f"use_pass_cryptomatte_{kind}"

@@ -160,8 +160,6 @@ class RELIEF_PT_sampling(_RenderPanel, bpy.types.Panel):
             _draw_cycles_sampling(cycles, rows)
         else:
             self._draw_own_sampling(settings, rows)
-        rows.separator()
-        rows.prop(settings, "denoise")
 
     @staticmethod
     def _draw_own_sampling(settings, rows):
@@ -172,6 +170,24 @@ class RELIEF_PT_sampling(_RenderPanel, bpy.types.Panel):
         rows.separator()
         rows.prop(settings, "preview_samples")
         rows.prop(settings, "seed")
+
+
+class RELIEF_PT_sampling_denoise(_RenderPanel, bpy.types.Panel):
+    bl_label = "Denoise"
+    bl_parent_id = "RELIEF_PT_sampling"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context):
+        self.layout.prop(self._owner(context), "use_denoising", text="")
+
+    def draw(self, context):
+        rows = self.rows()
+        rows.active = self._owner(context).use_denoising
+        rows.prop(context.scene.relief, "denoiser")
+
+    @staticmethod
+    def _owner(context):
+        return cycles_settings(context.scene) or context.scene.relief
 
 
 class RELIEF_PT_light_paths(_RenderPanel, bpy.types.Panel):
@@ -307,6 +323,11 @@ class RELIEF_PT_filter(_LayerPanel, bpy.types.Panel):
         row = rows.row()
         row.active = context.scene.render.use_motion_blur
         row.prop(layer, "use_motion_blur", text="Motion Blur")
+        cycles = cycles_settings(context.scene)
+        if cycles is not None:
+            row = rows.row()
+            row.active = cycles.use_denoising
+            row.prop(layer.cycles, "use_denoising", text="Denoising")
 
 
 class RELIEF_PT_override(_LayerPanel, bpy.types.Panel):
@@ -578,6 +599,7 @@ _classes = (
     RELIEF_PT_warnings,
     RELIEF_PT_materials,
     RELIEF_PT_sampling,
+    RELIEF_PT_sampling_denoise,
     RELIEF_PT_light_paths,
     RELIEF_PT_displacement,
     RELIEF_PT_film,

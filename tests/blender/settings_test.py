@@ -84,6 +84,34 @@ def test_cycles_settings_are_taken_over():
     assert _exported(scene)[0]["noiseThreshold"] == 0
 
 
+def test_cycles_checkbox_denoises():
+    """Denoise of the scene and of the view layer are Cycles' own, until relief's settings are chosen; scripts have both in one."""
+    from relief.export.settings import denoiser_of
+    from relief.result import enabled_passes
+
+    scene = _fresh_scene()
+    layer, settings = scene.view_layers[0], scene.relief
+    assert scene.cycles.use_denoising  # Blender's default
+
+    def found():
+        names = {p.name for p in enabled_passes(scene, layer)}
+        assert ("Noisy Image" in names) == ("Denoised Error" in names) == (denoiser_of(scene, layer) != "none"), names
+        return denoiser_of(scene, layer)
+
+    assert found() == settings.denoise == "builtin"
+    layer.cycles.use_denoising = False
+    assert found() == "none"
+    layer.cycles.use_denoising = True
+    settings.denoise = "none"
+    assert not scene.cycles.use_denoising and found() == "none" and settings.use_cycles_settings
+    settings.denoise = "oidn"
+    assert scene.cycles.use_denoising and found() == "oidn" and settings.use_cycles_settings
+    settings.use_cycles_settings = False
+    assert found() == settings.denoise == "none"
+    settings.denoise = "builtin"
+    assert settings.use_denoising and found() == "builtin"
+
+
 def test_animated_seeds_differ_from_frame_to_frame():
     scene = _fresh_scene()
     scene.cycles.use_animated_seed = True

@@ -61,8 +61,9 @@ _MISSING = {
     "material: *.use_transparent_shadow": "shadows are as transparent as the material; a warning tells",
     # what relief does by itself, or otherwise
     "*: *caustics*": "caustics are photons, with settings of their own",
-    "render: *denois*": "denoising is relief's own: Denoise",
-    "view_layer: *.use_denoising": "denoising is relief's own: Denoise",
+    "render: *.denois*": "the denoisers are relief's own",
+    "render: *.use_preview_denoising": "the viewport is not denoised",
+    "render: *.preview_denois*": "the viewport is not denoised",
     "object: *.shadow_terminator_*": "done without",
     "render: *.preview_adaptive_*": "the viewport takes all its samples",
     "render: *.use_preview_adaptive_*": "the viewport takes all its samples",

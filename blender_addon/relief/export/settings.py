@@ -28,6 +28,7 @@ class Sampling:
     noise_threshold: float
     min_samples: int
     time_limit: float
+    use_denoising: bool
     seed: int
     max_bounces: int
     diffuse_bounces: int
@@ -67,6 +68,7 @@ def sampling_of(scene, view_layer):
         noise_threshold=threshold,
         min_samples=cycles.adaptive_min_samples,
         time_limit=cycles.time_limit,
+        use_denoising=cycles.use_denoising and view_layer.cycles.use_denoising,
         seed=_seed(cycles, scene.frame_current),
         max_bounces=cycles.max_bounces,
         diffuse_bounces=cycles.diffuse_bounces,
@@ -103,6 +105,11 @@ def _seed(cycles, frame):
     offset = cycles.sample_offset if getattr(cycles, "use_sample_subset", True) else 0
     words = [cycles.seed, *([frame] if cycles.use_animated_seed else []), *(["offset", offset] if offset else [])]
     return cycles.seed if len(words) == 1 else zlib.crc32(" ".join(map(str, words)).encode()) >> 1
+
+
+def denoiser_of(scene, view_layer):
+    """Value of --denoise for the final render of a view layer."""
+    return scene.relief.denoiser if sampling_of(scene, view_layer).use_denoising else "none"
 
 
 def filters_glossy(scene):
