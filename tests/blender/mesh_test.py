@@ -227,3 +227,40 @@ def test_equal_corners_are_joined_and_no_others():
 
             assert [corner(loop) for loop in loops] == [corner(distinct[i]) for i in indices]
             assert len(distinct) == len({corner(loop) for loop in loops}) == len({corner(loop) for loop in distinct})
+
+
+def test_triangles_without_area_are_left_out_and_no_others():
+    """Against exact arithmetic: needles, points and lines of all sizes, some further off than single precision squares."""
+    from fractions import Fraction
+
+    import numpy as np
+    from relief.export.mesh import _Corners
+
+    random = np.random.default_rng(0)
+    corners = []
+    for number in range(400):
+        a, along = random.normal(size=(2, 3))
+        across = np.cross(along, random.normal(size=3)) * 10.0 ** -random.uniform(0, 9)
+        second = 2.0 ** random.integers(-3, 3) * along
+        if number % 4 == 0:
+            across[:] = 0  # a line but for what is rounded
+        if number % 8 == 1:
+            second = across = np.zeros(3)
+        if number % 8 == 2:  # a line, exactly
+            a, along = np.zeros(3), np.round(4 * along)
+            second, across = 2 * along, np.zeros(3)
+        corners += [scale * (a + offset) for scale in [10.0 ** random.choice([-25, -18, -3, 0, 3, 12])]
+                    for offset in (np.zeros(3), along, second + across)]
+    positions = np.array(corners, dtype=np.float32)
+    mesh = bpy.data.meshes.new("needles")
+    mesh.from_pydata(positions.tolist(), [], np.arange(len(positions)).reshape(-1, 3).tolist())
+    kept = {int(v) // 3 for v in _Corners(mesh, print).loops.ravel()}
+
+    def has_area(number):
+        a, b, c = ([Fraction(float(x)) for x in row] for row in positions[3 * number : 3 * number + 3])
+        u, v = ([x - y for x, y in zip(p, a)] for p in (b, c))
+        return any(u[i - 1] * v[i] != u[i] * v[i - 1] for i in range(3))
+
+    wrong = [n for n in range(400) if has_area(n) != (n in kept)]
+    assert not wrong, [positions[3 * n : 3 * n + 3] for n in wrong[:3]]
+    assert 200 < len(kept) < 390, len(kept)

@@ -67,11 +67,18 @@ class _Indices:
         self._writer = writer
         self._json = json
         self._by_shading = by_shading
+        self._indices = {}
 
     def __call__(self, is_smooth):
         """Index of the glTF material of smooth or of flat faces."""
+        key = self._by_shading and is_smooth
+        if key not in self._indices:
+            self._indices[key] = self._add(key)
+        return self._indices[key]
+
+    def _add(self, is_smooth):
         json = self._json
-        if self._by_shading and is_smooth:
+        if is_smooth:
             extensions = json["extensions"]
             displacement = {**extensions["RELIEF_displacement"], "smoothing": True}
             json = {**json, "extensions": {**extensions, "RELIEF_displacement": displacement}}

@@ -84,8 +84,12 @@ class _Corners:
 
     def _drop_empty(self):
         """Leaves out triangles without area, which text and bevels are full of: nothing can be seen of them."""
-        a, b, c = (self.positions[self.vertex[self.loops[:, i]]].astype(np.float64) for i in range(3))
-        keep = np.cross(b - a, c - a).any(axis=1)
+        vertex = self.vertex[self.loops]
+        keep = _is_wide(*(self.positions.take(vertex[:, i], axis=0) for i in range(3)))
+        if keep.all():
+            return
+        a, b, c = (self.positions[vertex[~keep, i]].astype(np.float64) for i in range(3))
+        keep[~keep] = np.cross(b - a, c - a).any(axis=1)
         if not keep.all():
             self._keep(keep)
 
@@ -196,6 +200,20 @@ class _Corners:
         attribute.data.foreach_get("color", values)
         values = self._finite(values.reshape(-1, 4), "colours")
         return values[self.vertex] if attribute.domain == "POINT" else values
+
+
+def _is_wide(a, b, c):
+    """Whether triangles have an area for sure, as nearly all have: float32 tells it in a fifth of the time of float64.
+
+    @param  a, b, c  corners, float32 (n, 3)
+    @return          of (n,); false says nothing
+    """
+    b, c = b - a, c - a
+    with np.errstate(over="ignore", invalid="ignore"):
+        squares = np.einsum("ij,ij->i", b, b) * np.einsum("ij,ij->i", c, c)
+        cosine = np.einsum("ij,ij->i", b, c)
+        # A sine of .01: what is rounded is a thousandth of its square. Squares that overflow, or are all lost, say no.
+        return squares - cosine * cosine > np.float32(1e-4) * squares
 
 
 def _zero_where_not_finite(values):

@@ -151,6 +151,8 @@ def usable_places(matrices):
     with np.errstate(divide="ignore", invalid="ignore"):
         volume = np.abs(np.linalg.det(linear / np.where(lengths == 0, 1, lengths)[:, None, :]))
     is_solid = (lengths > _NOTHING).all(axis=1) & (volume > _FLAT)
+    if is_solid.all():
+        return finite, numbers, 0, len(matrices) - len(finite)
     places, stay = list(finite[is_solid]), list(numbers[is_solid])
     num_shrunk = 0
     for number, matrix in zip(numbers[~is_solid], finite[~is_solid]):
