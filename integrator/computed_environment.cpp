@@ -108,33 +108,123 @@ bool graph_has_textures(const GraphProgramView& program)
   return false;
 }
 
-/// A place between four middles.
-struct Lattice {
-  int column = 0, row = -1;  ///< of the upper left one; −1: nearer to a pole
-  float x = 0, y = 0;        ///< to the right one, and down: 0 to 1
-
-  std::size_t index() const { return static_cast<std::size_t>(row * kColumns + column); }
+/// A place between four of a grid's.
+struct GridPlace {
+  int column = 0, row = 0;  ///< of the upper left one
+  float x = 0, y = 0;       ///< to the right one, and down: 0 to 1
 };
 
-Lattice lattice_of(const ComputedEnvironment& environment, Vec3f wi)
+/// Of a world direction, in the map; near the poles a place that is not smooth.
+GridPlace map_place(const ComputedEnvironment& environment, Vec3f wi)
 {
   const float x = wi.x * environment.cos_rotation - wi.z * environment.sin_rotation;
   const float z = wi.x * environment.sin_rotation + wi.z * environment.cos_rotation;
   const float v = angle_of(std::sqrt(x * x + z * z), wi.y) * kInvPi;
   const float turn = std::copysign(angle_of(std::fabs(x), -z) * (0.5f * kInvPi), x);
   const float column = (turn + 0.5f) * kColumns + (kColumns - 0.5f), row = v * kRows - 0.5f;
-  if (!(row >= 0 && row < kRows - 1)) return {};
+  if (!(row >= 0)) return {};
   const int left = static_cast<int>(column), up = static_cast<int>(row);
   return {left % kColumns, up, column - static_cast<float>(left), row - static_cast<float>(up)};
 }
 
-Vec3f interpolated(const ComputedEnvironment& environment, const Lattice& at)
+/// Places to a side of a sun's square. More than half of the disk is to lie where limb darkening is told well enough.
+constexpr int kSunSide = 64;
+
+/// Of a world direction, in a sun's square; outside of it a place that is not smooth.
+GridPlace sun_place(const SmoothSun& sun, Vec3f wi)
 {
-  const Vec3f* const up = &environment.middles[static_cast<std::size_t>(at.row * kColumns)];
-  const Vec3f* const down = up + kColumns;
-  const int right = (at.column + 1) % kColumns;
-  return (up[at.column] * (1 - at.x) + up[right] * at.x) * (1 - at.y) +
-         (down[at.column] * (1 - at.x) + down[right] * at.x) * at.y;
+  const Vec3f d = to_local(sun.frame, wi);
+  constexpr float kMiddle = 0.5f * (kSunSide - 1);
+  const float x = kMiddle + d.x / d.z * sun.scale, y = kMiddle + d.y / d.z * sun.scale;
+  if (!(d.z > 0.0f && x >= 0.0f && x < kSunSide - 1 && y >= 0.0f && y < kSunSide - 1)) return {};
+  const int left = static_cast<int>(x), up = static_cast<int>(y);
+  return {left, up, x - static_cast<float>(left), y - static_cast<float>(up)};
+}
+
+bool is_smooth_at(const SmoothGrid& grid, const GridPlace& at)
+{
+  return grid.is_smooth[static_cast<std::size_t>(at.row * grid.columns + at.column)] != 0;
+}
+
+/// Linear along rows and, as skies change most by height, cubic across them (Bessel's formula): of a sky by day six tenths of all
+/// directions below the horizon would else be left to the graph.
+/// @param at  its row neither one of the first nor of the last two
+Vec3f interpolated(const SmoothGrid& grid, const GridPlace& at)
+{
+  const int right = (at.column + 1) % grid.columns;
+  const auto on_row = [&](int row) {
+    const Vec3f* const values = &grid.values[static_cast<std::size_t>(row * grid.columns)];
+    return values[at.column] * (1 - at.x) + values[right] * at.x;
+  };
+  const Vec3f up = on_row(at.row), down = on_row(at.row + 1);
+  const Vec3f bend = on_row(at.row - 1) - up - down + on_row(at.row + 2);
+  return up * (1 - at.y) + down * at.y - bend * (0.25f * at.y * (1 - at.y));
+}
+
+/// Finds where a grid is smooth: between four places, and all that surround these, interpolation gives what is there. What a
+/// place in the middle does not see of an edge, one beside it does.
+/// @param between  radiance in the middle of each four places, by the upper left one
+/// @param least    error that may be everywhere
+void grid_find_smooth(SmoothGrid& grid, const std::vector<Vec3f>& between, float least)
+{
+  // A quarter of what pictures are to agree by.
+  constexpr float kTolerance = 1e-3f;
+  const int columns = grid.columns, rows = grid.rows;
+  std::vector<std::uint8_t> agrees(grid.values.size());
+  tbb::parallel_for(1, rows - 2, [&](int row) {
+    for (int column = 0; column < columns; ++column) {
+      const auto at = static_cast<std::size_t>(row * columns + column);
+      const Vec3f value = between[at], error = abs(interpolated(grid, {column, row, 0.5f, 0.5f}) - value);
+      agrees[at] = max_component(error) <= kTolerance * max_component(value) + least;
+    }
+  });
+  grid.is_smooth.assign(grid.values.size(), 0);
+  tbb::parallel_for(1, rows - 2, [&](int row) {
+    for (int column = 0; column < columns; ++column) {
+      bool is_smooth = true;
+      for (int y = row - 1; y <= row + 1; ++y) {
+        for (int x = column + columns - 1; x <= column + columns + 1; ++x) {
+          is_smooth = is_smooth && agrees[static_cast<std::size_t>(y * columns + x % columns)] != 0;
+        }
+      }
+      grid.is_smooth[static_cast<std::size_t>(row * columns + column)] = is_smooth;
+    }
+  });
+}
+
+SmoothSun sun_smooth(const ComputedEnvironment& environment, const EnvironmentSun& sun)
+{
+  constexpr float kMargin = 1.1f;
+  const float tangent = std::sqrt(sun.cone * (2.0f - sun.cone)) / (1.0f - sun.cone);
+  SmoothSun out;
+  out.frame = frame_from_normal(sun.towards);
+  out.scale = 0.5f * (kSunSide - 1) / (kMargin * tangent);
+  out.grid.columns = out.grid.rows = kSunSide;
+  std::vector<Vec3f> between(std::size_t{kSunSide} * kSunSide);
+  out.grid.values.resize(between.size());
+  const auto fill = [&](int row, float place, Vec3f* values) {
+    for (int column = 0; column < kSunSide; column += kLanes) {
+      Vec3f directions[kLanes];
+      for (int k = 0; k < kLanes; ++k) {
+        const float x = static_cast<float>(column + k) + place - 0.5f * (kSunSide - 1);
+        const float y = static_cast<float>(row) + place - 0.5f * (kSunSide - 1);
+        directions[k] = from_local(out.frame, normalize(Vec3f{x / out.scale, y / out.scale, 1.0f}));
+      }
+      evaluate(environment, directions, kLanes, values + column);
+    }
+  };
+  tbb::parallel_for(0, kSunSide, [&](int row) {
+    fill(row, 0.0f, &out.grid.values[static_cast<std::size_t>(row * kSunSide)]);
+    fill(row, 0.5f, &between[static_cast<std::size_t>(row * kSunSide)]);
+  });
+  grid_find_smooth(out.grid, between, 0.0f);
+  // Nothing follows on the last column.
+  for (int row = 0; row < kSunSide; ++row) {
+    for (const int column : {0, kSunSide - 2, kSunSide - 1}) {
+      out.grid.is_smooth[static_cast<std::size_t>(row * kSunSide + column)] = 0;
+    }
+  }
+  return out;
 }
 
 /// Makes the map: cells as EnvironmentView has them before it is rotated, whose directions are turned back here.
@@ -300,9 +390,13 @@ Vec3f computed_environment_world(const ComputedEnvironment& environment, Vec3f m
 Vec3f computed_environment_radiance(const void* computed, Vec3f wi)
 {
   const auto& environment = *static_cast<const ComputedEnvironment*>(computed);
-  if (!environment.is_smooth.empty()) {
-    const Lattice at = lattice_of(environment, wi);
-    if (at.row >= 0 && environment.is_smooth[at.index()] != 0) return interpolated(environment, at);
+  if (!environment.map.is_smooth.empty()) {
+    const GridPlace at = map_place(environment, wi);
+    if (is_smooth_at(environment.map, at)) return interpolated(environment.map, at);
+    for (const SmoothSun& sun : environment.suns) {
+      const GridPlace in_square = sun_place(sun, wi);
+      if (is_smooth_at(sun.grid, in_square)) return interpolated(sun.grid, in_square);
+    }
   }
   Vec3f radiance;
   evaluate(environment, &wi, 1, &radiance);
@@ -312,51 +406,35 @@ Vec3f computed_environment_radiance(const void* computed, Vec3f wi)
 void computed_environment_smooth(ComputedEnvironment& environment, std::span<const EnvironmentSun> suns)
 {
   if (graph_has_textures(environment.program)) return;
-  const CellMap map(environment, {}, {1, 1, 1});
-  std::vector<Vec3f> middles(kNumCells), between(kNumCells);
+  const CellMap cells(environment, {}, {1, 1, 1});
+  SmoothGrid map{kColumns, kRows, std::vector<Vec3f>(kNumCells), {}};
+  std::vector<Vec3f> between(kNumCells);
   tbb::parallel_for(0, kRows, [&](int row) {
-    map.row(row, 0.5f, &middles[static_cast<std::size_t>(row * kColumns)]);
-    if (row + 1 < kRows) map.row(row, 1.0f, &between[static_cast<std::size_t>(row * kColumns)]);
+    cells.row(row, 0.5f, &map.values[static_cast<std::size_t>(row * kColumns)]);
+    if (row + 1 < kRows) cells.row(row, 1.0f, &between[static_cast<std::size_t>(row * kColumns)]);
   });
   double sum = 0;
   for (std::size_t i = 0; i < kNumCells; ++i) {
     const auto column = static_cast<float>(i % kColumns) + 0.5f, row = static_cast<float>(i / kColumns) + 0.5f;
     const bool is_sun = std::any_of(suns.begin(), suns.end(), [&](const EnvironmentSun& sun) {
-      return length_squared(map.direction(column, row) - sun.towards) <= 2.0f * sun.cone;
+      return length_squared(cells.direction(column, row) - sun.towards) <= 2.0f * sun.cone;
     });
-    if (!is_sun) sum += static_cast<double>(max_component(middles[i]));
+    if (!is_sun) sum += static_cast<double>(max_component(map.values[i]));
   }
-  // A quarter of what pictures are to agree by.
-  constexpr float kTolerance = 1e-3f;
-  const float least = 0.1f * kTolerance * static_cast<float>(sum / static_cast<double>(kNumCells));
-  environment.middles = std::move(middles);
-  std::vector<std::uint8_t> agrees(kNumCells);
-  tbb::parallel_for(0, kRows - 1, [&](int row) {
-    for (int column = 0; column < kColumns; ++column) {
-      const Lattice at{column, row, 0.5f, 0.5f};
-      const Vec3f value = between[at.index()], error = interpolated(environment, at) - value;
-      const float greatest = std::max({std::fabs(error.x), std::fabs(error.y), std::fabs(error.z)});
-      agrees[at.index()] = greatest <= kTolerance * max_component(value) + least;
-    }
-  });
-  // Those beside one that fails may hold the rest of what it failed for; a sun's disk may lie between all places.
+  grid_find_smooth(map, between, 1e-4f * static_cast<float>(sum / static_cast<double>(kNumCells)));
+  // A sun's disk may lie between all places.
   constexpr float kReach = 3 * std::numbers::pi_v<float> / kRows;
-  environment.is_smooth.assign(kNumCells, 0);
-  tbb::parallel_for(1, kRows - 2, [&](int row) {
+  tbb::parallel_for(0, kRows, [&](int row) {
     for (int column = 0; column < kColumns; ++column) {
-      bool is_smooth = true;
-      for (int y = row - 1; y <= row + 1; ++y) {
-        for (int x = column + kColumns - 1; x <= column + kColumns + 1; ++x) {
-          is_smooth = is_smooth && agrees[static_cast<std::size_t>(y * kColumns + x % kColumns)] != 0;
-        }
-      }
-      const Vec3f d = map.direction(static_cast<float>(column + 1), static_cast<float>(row + 1));
+      const Vec3f d = cells.direction(static_cast<float>(column + 1), static_cast<float>(row + 1));
       for (const EnvironmentSun& sun : suns) {
-        is_smooth = is_smooth && length(d - sun.towards) > std::sqrt(2.0f * sun.cone) + kReach;
+        if (length(d - sun.towards) > std::sqrt(2.0f * sun.cone) + kReach) continue;
+        map.is_smooth[static_cast<std::size_t>(row * kColumns + column)] = 0;
       }
-      environment.is_smooth[static_cast<std::size_t>(row * kColumns + column)] = is_smooth;
     }
   });
+  for (const EnvironmentSun& sun : suns) environment.suns.push_back(sun_smooth(environment, sun));
+  environment.map = std::move(map);
 }
 
 ComputedCells computed_environment_cells(const ComputedEnvironment& computed,

@@ -12,6 +12,21 @@
 
 namespace relief {
 
+/// Radiance at places of a grid, and where between them it may be interpolated.
+struct SmoothGrid {
+  int columns = 0, rows = 0;       ///< of places; the first column follows on the last
+  std::vector<Vec3f> values;       ///< row after row
+  /// Of each four places, by the upper left one, whether between them interpolation is as good as the graph.
+  std::vector<std::uint8_t> is_smooth;
+};
+
+/// A square about a sun's disk, as the grid has it: evenly spaced on a plane across the direction to its middle.
+struct SmoothSun {
+  Frame frame;      ///< its n towards the middle; world space
+  float scale = 0;  ///< of places to the tangent of the angle from the middle
+  SmoothGrid grid;
+};
+
 /// What a graph is evaluated with; what it points to must outlive it.
 struct ComputedEnvironment {
   GraphProgramView program;
@@ -19,16 +34,13 @@ struct ComputedEnvironment {
   const TextureView* textures = nullptr;
   bool is_backdrop = false;
   float cos_rotation = 1, sin_rotation = 0;  ///< of the surroundings about +Y
-  /// Radiance at the middles of ComputedCells' cells, row after row. Empty: the graph has textures, between whose values nothing
-  /// can be told.
-  std::vector<Vec3f> middles;
-  /// Of each four middles, by the upper left one, whether between them interpolation is as good as the graph.
-  std::vector<std::uint8_t> is_smooth;
+  SmoothGrid map;  ///< of the middles of ComputedCells' cells; empty: the graph has textures, between whose values nothing can be told
+  std::vector<SmoothSun> suns;  ///< likewise
 };
 
-/// Looks where a graph of arithmetic alone is smooth: there, bilinear interpolation takes the place of running it, which takes
-/// several times as long.
-/// @param suns  in world space; nothing is interpolated near them
+/// Looks where a graph of arithmetic alone is smooth: there, interpolation takes the place of running it, which takes several
+/// times as long.
+/// @param suns  in world space: looked at by themselves
 void computed_environment_smooth(ComputedEnvironment& computed, std::span<const EnvironmentSun> suns);
 
 /// @param rotation  radians about +Y

@@ -304,8 +304,15 @@ EnvironmentView EnvironmentTables::view() const
 
 std::size_t EnvironmentTables::bytes() const
 {
-  return (row_cdf.size() + column_cdf.size() + row_edges.size()) * sizeof(float) +
-         (computed ? computed->middles.size() * sizeof(Vec3f) + computed->is_smooth.size() : 0);
+  std::size_t bytes = (row_cdf.size() + column_cdf.size() + row_edges.size()) * sizeof(float);
+  const auto add = [&bytes](const SmoothGrid& grid) {
+    bytes += grid.values.size() * sizeof(Vec3f) + grid.is_smooth.size();
+  };
+  if (computed) {
+    add(computed->map);
+    for (const SmoothSun& sun : computed->suns) add(sun.grid);
+  }
+  return bytes;
 }
 
 EnvironmentView environment_view_make(const TextureView* map, Vec3f color, float rotation)

@@ -12,6 +12,7 @@
 #include "integrator/stages.h"
 #include "kernel/globals.h"
 #include "kernel/sample/sobol.h"
+#include "kernel/sample/warp.h"
 #include "scene/graph/hosek_wilkie.h"
 #include "scene/texture_store.h"
 #include "tests/support/graph_scene.h"
@@ -469,13 +470,13 @@ TEST(ComputedEnvironment, DiskOfASunIsSampledByItself)
 
 TEST(ComputedEnvironment, InterpolatesWhereItIsSmoothAlone)
 {
-  // Of a clear sky the horizon is sharp, and the sun.
+  // Of a clear sky the horizon is sharp, and the sun's rim.
   const Scene scene = load(sky({{"sunElevation", 0.5}, {"sunRotation", 1}}));
   const EnvironmentTables tables = tables_of(scene, EnvironmentDensity::kExcess);
   const EnvironmentView view = tables.view();
   double num_smooth = 0;
-  for (const std::uint8_t is_smooth : tables.computed->is_smooth) num_smooth += is_smooth;
-  EXPECT_GT(num_smooth, 0.8 * ComputedCells::kColumns * ComputedCells::kRows);
+  for (const std::uint8_t is_smooth : tables.computed->map.is_smooth) num_smooth += is_smooth;
+  EXPECT_GT(num_smooth, 0.95 * ComputedCells::kColumns * ComputedCells::kRows);
   constexpr std::uint32_t kPlaces = 50000;
   std::vector<Vec2f> places(kPlaces);
   double sum = 0;
@@ -494,7 +495,31 @@ TEST(ComputedEnvironment, InterpolatesWhereItIsSmoothAlone)
     ASSERT_LT(max_component(exact - found), 0.004f * max_component(exact) + least) << at.x << ", " << at.y;
   }
   const Scene textured = load(noise(3));
-  EXPECT_TRUE(tables_of(textured, EnvironmentDensity::kExcess).computed->is_smooth.empty());
+  EXPECT_TRUE(tables_of(textured, EnvironmentDensity::kExcess).computed->map.is_smooth.empty());
+}
+
+TEST(ComputedEnvironment, InterpolatesWithinSuns)
+{
+  for (const double elevation : {0.02, 0.5, 1.4}) {
+    const Scene scene = load(sky({{"sunElevation", elevation}, {"sunRotation", 1}}));
+    const EnvironmentTables tables = tables_of(scene, EnvironmentDensity::kExcess);
+    const EnvironmentView view = tables.view();
+    const ComputedEnvironment graph = computed_of(scene, scene.environment);
+    ASSERT_EQ(tables.computed->suns.size(), 1u);
+    const SmoothGrid& grid = tables.computed->suns[0].grid;
+    double num_smooth = 0;
+    for (const std::uint8_t is_smooth : grid.is_smooth) num_smooth += is_smooth;
+    // The disk has two thirds of its square.
+    EXPECT_GT(num_smooth, 0.4 * static_cast<double>(grid.values.size())) << elevation;
+    const Frame frame = frame_from_normal(view.suns[0].towards);
+    for (std::uint32_t i = 0; i < 20000; ++i) {
+      // Beyond the rim, too.
+      const Vec3f d = from_local(frame, warp_cone(1.3f * view.suns[0].cone, sample_2d(5, i, 0)));
+      const Vec3f exact = environment_eval(environment_view_make(graph, scene.environment.color, scene.environment.rotation), d);
+      const Vec3f found = environment_eval(view, d);
+      ASSERT_LT(max_component(abs(found - exact)), 0.004f * max_component(exact)) << elevation << ": " << i;
+    }
+  }
 }
 
 }  // namespace
