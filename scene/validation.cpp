@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <set>
@@ -11,6 +12,7 @@
 
 #include "scene/file_kind.h"
 #include "scene/json_reader.h"
+#include "scene/memory.h"
 
 namespace relief {
 
@@ -559,11 +561,16 @@ void check_version(const json& document, const std::string& file)
   }
 }
 
-/// Deepest nesting of brackets outside strings; the parser and the destructor of a document are iterative, but printing a
-/// value is not.
-int nesting_depth(std::string_view text)
+/// What a text of JSON will be, by its brackets, colons and commas outside strings.
+struct JsonExtent {
+  int deepest = 0;  ///< nesting; the parser and the destructor of a document are iterative, but printing a value is not
+  std::uint64_t values = 1, members = 0;  ///< at most
+};
+
+JsonExtent json_extent(std::string_view text)
 {
-  int depth = 0, deepest = 0;
+  JsonExtent extent;
+  int depth = 0;
   bool in_string = false;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
@@ -576,12 +583,17 @@ int nesting_depth(std::string_view text)
     } else if (c == '"') {
       in_string = true;
     } else if (c == '[' || c == '{') {
-      deepest = std::max(deepest, ++depth);
+      extent.deepest = std::max(extent.deepest, ++depth);
+      ++extent.values;
     } else if (c == ']' || c == '}') {
       --depth;
+    } else if (c == ',') {
+      ++extent.values;
+    } else if (c == ':') {
+      ++extent.members;
     }
   }
-  return deepest;
+  return extent;
 }
 
 /// Names of all extensions that a value and what is in it have; `extras` are nobody's business.
@@ -656,11 +668,15 @@ json validation_parse(std::string_view text, const std::string& file)
     throw SceneError(file, "", "glTF 2.0 (.gltf, .glb)", std::string(kind));
   }
   constexpr int kDeepest = 100;
-  const int depth = nesting_depth(text);
-  if (depth > kDeepest) {
+  const JsonExtent extent = json_extent(text);
+  if (extent.deepest > kDeepest) {
     throw SceneError(file, "", "JSON nested at most " + std::to_string(kDeepest) + " levels deep",
-                     std::to_string(depth) + " levels");
+                     std::to_string(extent.deepest) + " levels");
   }
+  // The text, its conforming copy and tinygltf's are in memory together: a file of 2^20 references takes 240 bytes a value and
+  // member, one of plain numbers 60.
+  constexpr std::uint64_t kValueBytes = 48, kMemberBytes = 128;
+  memory_require(extent.values * kValueBytes + extent.members * kMemberBytes, file + ": JSON");
   json document;
   try {
     document = json::parse(text);

@@ -7,6 +7,7 @@
 
 #include "scene/diagnostics.h"
 #include "scene/image_memory.h"
+#include "scene/validation.h"
 #include "tests/support/gltf_builder.h"
 #include "tests/support/image_bytes.h"
 
@@ -87,6 +88,22 @@ TEST(MemoryReservation, CountsWhatOthersHold)
   }
   const MemoryReservation again(100 * kMiB, "what was given back");
   EXPECT_THROW(memory_require(std::numeric_limits<std::uint64_t>::max(), "everything"), OutOfMemory);
+}
+
+// Likewise.
+TEST(MemoryOfJson, IsAskedForBeforeItIsParsed)
+{
+  std::string text = R"({"nodes":[)";
+  for (int i = 0; i < 1 << 18; ++i) text += R"({"a":{"b":[1,2,3]}},)";
+  text += "{}]}";
+  EXPECT_EQ(validation_parse(text, "a.gltf")["nodes"].size(), (1u << 18) + 1u);
+  memory_limit_set(memory_limit().bytes - memory_left() + 96 * kMiB);
+  try {
+    validation_parse(text, "a.gltf");
+    FAIL() << "there is no room for it";
+  } catch (const OutOfMemory& error) {
+    EXPECT_NE(std::string(error.what()).find("a.gltf: JSON: needs up to"), std::string::npos) << error.what();
+  }
 }
 
 /// Bytes of an image as decoder_bytes reads them.
