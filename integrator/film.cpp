@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <string>
 #include <utility>
 
@@ -260,7 +261,7 @@ std::uint32_t Film::pixel_samples(const float* record, int tile) const
   return layout_.samples >= 0 ? static_cast<std::uint32_t>(record[layout_.samples]) : tile_samples(tile);
 }
 
-bool Film::is_noisy(const float* record, int tile, const NoiseRule& rule) const
+float Film::noise(const float* record, int tile, const NoiseRule& rule) const
 {
   // Beside the root of the light, or the light itself, so that black is not divided by.
   constexpr float kLeast = 1e-4f;
@@ -272,7 +273,7 @@ bool Film::is_noisy(const float* record, int tile, const NoiseRule& rule) const
   const float exposure = is_linear ? rule.exposure : 1.0f;
   const float light = std::max(sum(pixel.mean) * exposure, 0.0f);
   const float normal = is_linear && light >= 1.0f ? light : std::sqrt(light);
-  return !(sum(abs(pixel.mean - pixel.even)) * exposure / (kLeast + normal) < kScale * rule.threshold);
+  return sum(abs(pixel.mean - pixel.even)) * exposure / ((kLeast + normal) * kScale * rule.threshold);
 }
 
 std::vector<int> Film::judge(const NoiseRule& rule, std::uint32_t passed)
@@ -286,7 +287,7 @@ std::vector<int> Film::judge(const NoiseRule& rule, std::uint32_t passed)
   tbb::parallel_for(0, height_, [&](int y) {
     for (int x = 0; x < width_; ++x) {
       const std::size_t pixel = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
-      noisy[pixel] = rests(pixel) == 0.0f && is_noisy(record(x, y), tile_at(x, y), rule);
+      noisy[pixel] = rests(pixel) == 0.0f && !(noise(record(x, y), tile_at(x, y), rule) < 1.0f);
     }
   });
   std::vector<std::uint8_t> goes_on(static_cast<std::size_t>(num_tiles()));
@@ -313,6 +314,44 @@ std::vector<int> Film::judge(const NoiseRule& rule, std::uint32_t passed)
     samples_[static_cast<std::size_t>(tile)] = passed;
   }
   return tiles;
+}
+
+double Film::samples_to_come(const NoiseRule& rule, const NoiseJudging& judging, std::uint32_t done) const
+{
+  // A pixel rests once its noise and that of its eight neighbours are below the threshold together. The square of the largest of
+  // nine differences of equal spread is below 3.2 times their variance with even chances. Of nine scenes with thresholds of .05
+  // and .01, 2.8 told what was to come after a tenth as .71 to 1.32 of it, in the mean .97; twice as much or half of it is off by
+  // a third.
+  constexpr double kLargestOfNine = 2.8;
+  // What two halves of one pixel differ by says little; of the pixels around there are enough, and they are alike.
+  constexpr int kBlock = 4;
+  const auto goes_on = [&](int x, int y) { return record(x, y)[layout_.samples + 1] == 0.0f; };
+  const auto blocks_of = [](int side) { return (side + kBlock - 1) / kBlock; };
+  std::vector<double> rows(static_cast<std::size_t>(blocks_of(height_)));
+  tbb::parallel_for(0, blocks_of(height_), [&](int row) {
+    const int y0 = row * kBlock, y1 = std::min(y0 + kBlock, height_);
+    for (int x0 = 0; x0 < width_; x0 += kBlock) {
+      const int x1 = std::min(x0 + kBlock, width_);
+      double squares = 0;
+      int count = 0;
+      for (int y = y0; y < y1; ++y) {
+        for (int x = x0; x < x1; ++x) {
+          if (!goes_on(x, y)) continue;
+          const double beside = noise(record(x, y), tile_at(x, y), rule);
+          squares += beside * beside;
+          ++count;
+        }
+      }
+      if (count == 0) continue;
+      // The mean is over all: those that rest make the others' chances better.
+      const double needed = done * kLargestOfNine * squares / ((x1 - x0) * (y1 - y0));
+      const double judged = std::ceil(needed / judging.step) * judging.step;
+      const double most = judging.most;
+      const double total = judged < most ? std::clamp<double>(judged, std::min<double>(judging.next, most), most) : most;
+      rows[static_cast<std::size_t>(row)] += count * (total - done);
+    }
+  });
+  return std::accumulate(rows.begin(), rows.end(), 0.0) / static_cast<double>(num_pixels());
 }
 
 ImageError Film::estimate_error() const

@@ -28,6 +28,13 @@ struct NoiseRule {
   float exposure = 1;  ///< factor on all light
 };
 
+/// When noise is judged.
+struct NoiseJudging {
+  std::uint32_t next = 0;  ///< samples after which it will be for the next time
+  std::uint32_t step = 0;  ///< samples between that time and each further one
+  std::uint32_t most = 0;  ///< samples with which all ends
+};
+
 /// A finished picture that owns its pixels.
 struct RenderedImage {
   std::vector<float> pixels;
@@ -104,6 +111,12 @@ class Film {
   /// @pre           the film counts_samples, and nobody is adding any
   std::vector<int> judge(const NoiseRule& rule, std::uint32_t passed);
 
+  /// Samples that are still to be taken until all pixels rest, as far as noise tells that falls with the root of their number.
+  /// @param done  samples that pixels which go on have had, at least two
+  /// @return      of the mean pixel
+  /// @pre         the film counts_samples, and nobody is adding any
+  double samples_to_come(const NoiseRule& rule, const NoiseJudging& judging, std::uint32_t done) const;
+
   /// Errors of the image's mean, estimated by error_extrapolate from sums over all pixels.
   ImageError estimate_error() const;
 
@@ -123,7 +136,8 @@ class Film {
   FilmView window(std::uint32_t aov_mask, int crop_x, int crop_y, int full_width, int full_height) const;
   /// Samples of a pixel of a tile.
   std::uint32_t pixel_samples(const float* record, int tile) const;
-  bool is_noisy(const float* record, int tile, const NoiseRule& rule) const;
+  /// Noise of a pixel beside what the rule allows: not below 1, and it is noisy.
+  float noise(const float* record, int tile, const NoiseRule& rule) const;
   struct TileSpreads;
   struct TileLevels;
   TileSpreads tile_spreads(int tile) const;

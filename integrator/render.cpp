@@ -81,11 +81,20 @@ std::uint32_t least_samples(const RenderSettings& settings)
   return static_cast<std::uint32_t>(std::clamp(automatic, double{kLeast}, double{kLargestSettingInt}));
 }
 
+/// Samples between two times at which noise is judged.
+constexpr std::uint32_t kJudgingStep = 16;
+
 /// Whether pixels are judged after a number of samples.
 bool is_judged_after(const RenderSettings& settings, std::uint32_t samples)
 {
-  constexpr std::uint32_t kStep = 16;
-  return settings.noise_threshold > 0 && samples % kStep == 0 && samples > least_samples(settings) + 1;
+  return settings.noise_threshold > 0 && samples % kJudgingStep == 0 && samples > least_samples(settings) + 1;
+}
+
+/// When pixels are judged once some samples are done.
+NoiseJudging judging_after(const RenderSettings& settings, std::uint32_t done, std::uint32_t wanted)
+{
+  const std::uint32_t before = std::max(done, least_samples(settings) + 1);
+  return {before - before % kJudgingStep + kJudgingStep, kJudgingStep, wanted};
 }
 
 /// @param sample  pixel of the window << 32 | sample
@@ -248,6 +257,29 @@ bool has_holdouts(const Scene& scene)
          });
 }
 
+/// How fast work was done lately: what a render begins with is slower or faster than what follows.
+class RecentSpeed {
+ public:
+  void note(double seconds, double work)
+  {
+    if (seconds < 2 * later_.seconds) return;
+    earlier_ = later_;
+    later_ = {seconds, work};
+  }
+  /// Work a second since a time between a quarter and half of all ago; 0: there was none.
+  double get(double seconds, double work) const
+  {
+    const double passed = seconds - earlier_.seconds;
+    return passed > 0 ? std::max(work - earlier_.work, 0.0) / passed : 0;
+  }
+
+ private:
+  struct Moment {
+    double seconds = 0, work = 0;
+  };
+  Moment earlier_, later_;
+};
+
 /// Tells how far a render is, from whichever thread, a few times a second.
 class ProgressReporter {
  public:
@@ -255,15 +287,23 @@ class ProgressReporter {
                    const std::function<void(const RenderProgress&)>& progress,
                    double num_pixels,
                    Clock::time_point start)
-      : options_(options), progress_(progress), num_pixels_(num_pixels), start_(start)
+      : options_(options), progress_(progress), num_pixels_(num_pixels), start_(start), wanted_(samples_wanted(options))
   {
+    // Most pictures with a noise threshold end long before the most samples that there may be: a guess, until noise has been seen.
+    const std::uint32_t most = samples_wanted(options);
+    if (options.settings.noise_threshold > 0) {
+      wanted_ = std::min<double>(most, 2.0 * judging_after(options.settings, 0, most).next);
+    }
   }
+  bool is_watched() const { return static_cast<bool>(progress_); }
   void add(std::uint64_t samples, std::uint64_t rays)
   {
     samples_ += samples;
     rays_ += rays;
   }
   void set_photon_share(double share) { photon_share_ = share; }
+  /// @param wanted  samples that the mean pixel will have had at the end
+  void set_wanted(double wanted) { wanted_ = wanted; }
 
   /// @param now      however short ago the last report was
   /// @param photons  null: there is no photon pass
@@ -273,19 +313,25 @@ class ProgressReporter {
     const std::unique_lock lock(mutex_, std::try_to_lock);
     if (!lock.owns_lock() || (!now && seconds_since(last_) < 0.2)) return;
     last_ = Clock::now();
-    const double wanted = samples_wanted(options_);
     RenderProgress p;
     p.seconds = seconds_since(start_);
     p.samples_per_pixel = static_cast<double>(samples_.load()) / num_pixels_;
-    p.fraction = p.samples_per_pixel / wanted;
+    double work = p.samples_per_pixel;
     if (photons != nullptr) {
       p.photons = photons->photons();
-      p.fraction += photon_share_ * (photons->passes() - p.samples_per_pixel) / wanted;
+      work += photon_share_ * (photons->passes() - p.samples_per_pixel);
     }
-    if (options_.time_limit_seconds > 0) p.fraction = std::max(p.fraction, p.seconds / options_.time_limit_seconds);
+    p.fraction = work / wanted_;
+    const double speed = speed_.get(p.seconds, work);
+    speed_.note(p.seconds, work);
+    p.seconds_left = speed > 0 ? std::max(wanted_ - work, 0.0) / speed : 0;
+    if (options_.time_limit_seconds > 0) {
+      p.fraction = std::max(p.fraction, p.seconds / options_.time_limit_seconds);
+      const double most_left = std::max(options_.time_limit_seconds - p.seconds, 0.0);
+      p.seconds_left = speed > 0 ? std::min(p.seconds_left, most_left) : most_left;
+    }
     p.fraction = std::clamp(p.fraction, last_fraction_, 1.0);
     last_fraction_ = p.fraction;
-    p.seconds_left = p.fraction > 0 ? p.seconds / p.fraction - p.seconds : 0;
     p.rays_per_second = p.seconds > 0 ? static_cast<double>(rays_.load()) / p.seconds : 0;
     progress_(p);
   }
@@ -297,7 +343,8 @@ class ProgressReporter {
   Clock::time_point start_, last_ = Clock::now();
   std::atomic<std::uint64_t> samples_{0}, rays_{0};
   std::mutex mutex_;
-  double last_fraction_ = 0;
+  double wanted_, last_fraction_ = 0;
+  RecentSpeed speed_;
   /// Part of the time that photons take. Until the first pass has been timed, the middle of the 0.26 to 0.73 that they take on
   /// the scenes of benchmarks/caustics.
   double photon_share_ = 0.5;
@@ -519,6 +566,15 @@ RenderedImage render(const Scene& scene,
     return static_cast<std::uint32_t>(
         std::clamp(options.checkpoint_seconds / tile_seconds, 1.0, static_cast<double>(kMostPassSamples)));
   };
+  std::uint32_t looked_at = 0;
+  const auto look_ahead = [&] {
+    // Often enough for the time left, seldom enough to cost nothing. Of fewer samples than four nothing is known.
+    constexpr std::uint32_t kLeastSamples = 4;
+    if (settings.noise_threshold <= 0 || !reporter.is_watched() || done < std::max(kLeastSamples, looked_at + looked_at / 2)) return;
+    looked_at = done;
+    const NoiseRule rule{settings.noise_threshold, settings.noise_maths, settings.film_exposure};
+    reporter.set_wanted(film.mean_samples() + film.samples_to_come(rule, judging_after(settings, done, wanted), done));
+  };
   std::function<void(double)> tell_photons = options.traced_photons;
   while (done < wanted && !active.empty()) {
     // A pass that was under way goes on as it was begun.
@@ -579,12 +635,14 @@ RenderedImage render(const Scene& scene,
       active = film.judge({settings.noise_threshold, settings.noise_maths, settings.film_exposure}, done);
       if (active.empty()) stats.stop_reason = "noise_threshold";
     }
+    look_ahead();
     if (options.time_limit_seconds > 0 && seconds_since(start) >= options.time_limit_seconds && done < wanted) {
       stats.stop_reason = "time_limit";
       break;
     }
     if (done < wanted && !active.empty()) preview();
   }
+  if (active.empty()) reporter.set_wanted(film.mean_samples());
   report(true);
 
   stats.render_seconds = seconds_since(start);

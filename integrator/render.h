@@ -48,7 +48,9 @@ struct RenderOptions {
 };
 
 struct RenderProgress {
-  double fraction = 0;  ///< of the samples and their photons (or of the time limit, whichever ends sooner)
+  /// Of the samples and their photons (or of the time limit, whichever ends sooner); with a noise threshold, of the samples that
+  /// it is expected to take.
+  double fraction = 0;
   double samples_per_pixel = 0, seconds = 0, seconds_left = 0, rays_per_second = 0;
   std::uint64_t photons = 0;  ///< traced so far
 };
