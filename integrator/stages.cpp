@@ -2,7 +2,7 @@
 // set's table. Nothing here may have external linkage but that function: see scripts/check_isa.
 #include "integrator/stages.h"
 
-#include <algorithm>
+#include <utility>
 
 #include "integrator/surface_kernels.h"
 #include "kernel/stage/accumulate_shadow.h"
@@ -57,6 +57,35 @@ std::uint32_t generate(const KernelGlobals& g, PathState& state, const Batch& ba
   return path;
 }
 
+/// Puts paths in the order of the materials that they have hit; those of one material stay in the order they had. By bytes of the
+/// material's index, of which few are needed: comparing paths took 3 % of all time.
+void sort_by_material(const KernelGlobals& g, const PathState& state, const QueueView& queue)
+{
+  struct Entry {
+    std::uint32_t material, path;
+  };
+  Entry entries[2][kBatchPaths];
+  std::uint32_t differ = 0;  // bits in which they do
+  for (std::uint32_t i = 0; i < queue.size; ++i) {
+    const std::uint32_t path = queue.paths[i];
+    const auto material = static_cast<std::uint32_t>(g.instances[state.hit_object[path]].material_index);
+    entries[0][i] = {material, path};
+    differ |= material ^ entries[0][0].material;
+  }
+  int from = 0;
+  for (int shift = 0; shift < 32 && differ >> shift != 0; shift += 8, from ^= 1) {
+    std::uint32_t ends[256] = {};
+    for (std::uint32_t i = 0; i < queue.size; ++i) ++ends[entries[from][i].material >> shift & 0xffu];
+    std::uint32_t begin = 0;
+    for (std::uint32_t& end : ends) begin += std::exchange(end, begin);
+    for (std::uint32_t i = 0; i < queue.size; ++i) {
+      const Entry entry = entries[from][i];
+      entries[from ^ 1][ends[entry.material >> shift & 0xffu]++] = entry;
+    }
+  }
+  for (std::uint32_t i = 0; i < queue.size; ++i) queue.paths[i] = entries[from][i].path;
+}
+
 /// Runs the graphs of up to eight paths that have hit one material, then shades each.
 template <unsigned kFeatures>
 void shade_surfaces_by_graph(const KernelGlobals& g,
@@ -67,10 +96,7 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
                              Counters& counters)
 {
   const auto material_of = [&](std::uint32_t path) { return g.instances[state.hit_object[path]].material_index; };
-  std::sort(queue.paths, queue.paths + queue.size, [&](std::uint32_t a, std::uint32_t b) {
-    const std::int32_t of_a = material_of(a), of_b = material_of(b);
-    return of_a != of_b ? of_a < of_b : a < b;
-  });
+  sort_by_material(g, state, queue);
   constexpr std::uint32_t kLanes = 8;
   GraphRegisters registers;
   registers.rays = g.graph_scene.rays;

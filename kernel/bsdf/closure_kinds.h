@@ -24,6 +24,13 @@ enum class ClosureKind : std::uint8_t {
   ;
 #include "kernel/bsdf/closure_inputs.inc"
 
+/// Inputs of closures: what is not finite counts as 0, and no product of a few of them overflows.
+RELIEF_KERNEL float closure_input(float x)
+{
+  constexpr float kLargest = 1e8f;
+  return x - x == 0.0f ? clamp(x, -kLargest, kLargest) : 0.0f;
+}
+
 /// Microfacets of glossy, refraction, glass, metallic and Principled closures.
 enum class ClosureDistribution : std::uint8_t { kGgx, kMultiscatterGgx, kBeckmann, kAshikhminShirley, kSharp };
 

@@ -16,13 +16,6 @@ namespace relief {
 /// Closures and lobes that weigh less are left out, as Cycles leaves them.
 inline constexpr float kLeastClosureWeight = 1e-5f;
 
-/// Inputs of closures: what is not finite counts as 0, and no product of a few of them overflows.
-RELIEF_KERNEL F8 closure_input(F8 x)
-{
-  constexpr float kLargest = 1e8f;
-  return x - x == 0.0f ? min(max(x, splat8(-kLargest)), splat8(kLargest)) : splat8(0.0f);
-}
-
 /// What closures are resolved for, and what they have come to so far.
 struct MixtureBuild {
   Vec3f wo;  ///< unit, world

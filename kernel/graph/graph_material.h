@@ -307,21 +307,23 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
 /// Writes a point's quantities to its lane of the registers.
 RELIEF_KERNEL void graph_load_point(const GraphProgramView& program, GraphPoint at, int lane, GraphRegisters& registers)
 {
+  if (program.num_inputs == 0) return;
   at.P_object = transform_point(at.instance->object_from_world, at.hit->P);
   SurfaceHit moved[2];
-  GraphPoint points[3] = {at, at, at};
+  GraphPoint shifted[2];
+  const GraphPoint* const points[3] = {&at, &shifted[0], &shifted[1]};
   const GraphFootprint footprint = program.is_shifted ? graph_footprint(at) : GraphFootprint{};
-  float width = 0.0f;  // by which the points are moved
+  float width = -1.0f;  // by which the points are moved
   for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
     const GraphInput input = program.inputs[i];
     // Few programs have bumps of several widths.
     if (input.shift != GraphShift::kNone && input.width != width) {
       width = input.width;
-      points[1] = graph_point_shifted(at, footprint.dPdx * width, moved[0]);
-      points[2] = graph_point_shifted(at, footprint.dPdy * width, moved[1]);
+      shifted[0] = graph_point_shifted(at, footprint.dPdx * width, moved[0]);
+      shifted[1] = graph_point_shifted(at, footprint.dPdy * width, moved[1]);
     }
     registers.lanes[input.register_index][lane] =
-        graph_quantity(points[static_cast<int>(input.shift)], input.quantity, input.index);
+        graph_quantity(*points[static_cast<int>(input.shift)], input.quantity, input.index);
   }
 }
 

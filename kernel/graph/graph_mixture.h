@@ -17,9 +17,14 @@ RELIEF_KERNEL Inputs closure_inputs(const GraphLane& at, const SurfaceClosureSpe
   // Structs of nothing but floats, in the order in which they were read.
   if constexpr (!std::is_empty_v<Inputs>) {
     constexpr int kNumbers = sizeof(Inputs) / sizeof(float);
-    alignas(32) float numbers[(kNumbers + 7) / 8 * 8] = {};
-    for (int i = 0; i < kNumbers; ++i) numbers[i] = graph_result(at, spec.first_result + 1 + i);
-    for (int i = 0; i < kNumbers; i += 8) store8(numbers + i, closure_input(load8(numbers + i)));
+    const GraphProgramView& program = *at.program;
+    const int first = spec.first_result + 1;
+    alignas(32) float numbers[(kNumbers + 7) / 8 * 8];
+    for (int i = 0; i < kNumbers; i += 8) store8(numbers + i, load8(program.result_values + first + i));
+    for (int i = program.varying_before[first]; i < program.varying_before[first + kNumbers]; ++i) {
+      const int result = program.varying[i];
+      numbers[result - first] = closure_input(at.registers->lanes[program.results[result]][at.lane]);
+    }
     std::memcpy(&inputs, numbers, sizeof(Inputs));
   }
   return inputs;

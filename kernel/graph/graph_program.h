@@ -53,6 +53,10 @@ struct GraphProgramView {
   /// Operands of each output's components; kNoGraphOperand: the graph does not give it.
   std::uint16_t outputs[kNumGraphOutputs][3] = {};
   const std::uint16_t* results = nullptr;  ///< operands, see SurfaceClosureSpec; kNoGraphOperand: 0
+  /// By result: its value as a closure's input where that is constant, and how many results before it vary. Eight more values follow.
+  const float* result_values = nullptr;
+  const std::uint16_t* varying_before = nullptr;
+  const std::uint16_t* varying = nullptr;  ///< results that are registers, in order
   const SurfaceClosureSpec* closures = nullptr;
   std::uint32_t num_closures = 0;
   /// First of three results: the shading normal, Z up, in place of the surface's; kNoGraphOperand: that stays.

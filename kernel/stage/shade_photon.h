@@ -85,7 +85,8 @@ RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
   const Vec3f wo = -path_direction(state, path);
   constexpr unsigned kFeatures = kFeatureAll | kFeatureGraphs | kFeatureMixture;
   MixtureLobes lobes;
-  SurfaceInteraction at = surface_interaction_make<kFeatures>(g, state, path, wo, lobes);
+  SurfaceInteraction at = surface_interaction_locate<kFeatures>(g, state, path, wo);
+  surface_interaction_resolve<kFeatures>(g, state, path, wo, at, lobes);
   if (!surface_is_met<kFeatures>(state, path, at.params.alpha, path_surface(state, path))) {
     if (path_pass_through(g, state, path, at.passed)) queue_push(next, path);
     return;

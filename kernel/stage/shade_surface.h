@@ -493,7 +493,10 @@ template <unsigned kFeatures>
 
   constexpr bool kMixture = (kFeatures & kFeatureMixture) != 0;
   MixtureLobes lobes;
-  SurfaceInteraction at = surface_interaction_make<kFeatures>(g, state, path, wo, lobes, graph);
+  SurfaceInteraction own;
+  if (graph == nullptr) own = surface_interaction_locate<kFeatures>(g, state, path, wo);
+  SurfaceInteraction& at = graph != nullptr ? *graph->at : own;
+  surface_interaction_resolve<kFeatures>(g, state, path, wo, at, lobes, graph);
   // Whatever stands in a medium, of glass or not.
   const auto transmittance = [&] {
     const Vec3f sigma_a = path_sigma_a(state, path);

@@ -246,23 +246,23 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
 
 /// What a graph's program gave at a point that a path has hit.
 struct GraphHit {
-  const SurfaceInteraction* at;  ///< as surface_interaction_locate has it
+  SurfaceInteraction* at;  ///< as surface_interaction_locate has it
   GraphLane lane;                ///< of the program, which has run
 };
 
-/// The point that a path has hit and its material there.
+/// Completes a located point with its material there.
 /// @param wo     unit, back along the path's ray
 /// @param graph  of the material's program; null: it is run, if there is one
 /// @param lobes  gets those of a material of closures
 template <unsigned kFeatures>
-RELIEF_KERNEL SurfaceInteraction surface_interaction_make(const KernelGlobals& g,
-                                                          const PathState& state,
-                                                          std::uint32_t path,
-                                                          Vec3f wo,
-                                                          MixtureLobes& lobes,
-                                                          const GraphHit* graph = nullptr)
+RELIEF_KERNEL void surface_interaction_resolve(const KernelGlobals& g,
+                                               const PathState& state,
+                                               std::uint32_t path,
+                                               Vec3f wo,
+                                               SurfaceInteraction& at,
+                                               MixtureLobes& lobes,
+                                               const GraphHit* graph = nullptr)
 {
-  SurfaceInteraction at = graph != nullptr ? *graph->at : surface_interaction_locate<kFeatures>(g, state, path, wo);
   const SurfaceBlur blur = surface_blur<kFeatures>(g, state, path, *at.instance);
   if constexpr ((kFeatures & kFeatureGraphs) != 0) {
     if (at.material->graph_index >= 0) {
@@ -277,16 +277,15 @@ RELIEF_KERNEL SurfaceInteraction surface_interaction_make(const KernelGlobals& g
         at.params = graph_surface_params<kFeatures>(*at.material, graph_values(lane), g.textures, at.hit, at.uv_width);
         if (blur.alpha > 0.0f) surface_params_blur(at.params, blur);
       }
-      return at;
+      return;
     }
   }
   at.params = surface_params_eval<kFeatures>(*at.material, g.textures, at.hit.uv, at.hit.color, at.uv_width);
   if (blur.alpha > 0.0f) surface_params_blur(at.params, blur);
-  return at;
 }
 
 /// Completes an interaction with its shading frame and, where it has one, the coat's.
-/// @param wo  as given to surface_interaction_make
+/// @param wo  as given to surface_interaction_resolve
 template <unsigned kFeatures>
 RELIEF_KERNEL void surface_interaction_frame(const KernelGlobals& g,
                                              const PathState& state,

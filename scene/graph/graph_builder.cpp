@@ -6,6 +6,7 @@
 #include <limits>
 #include <string>
 
+#include "kernel/bsdf/closure_kinds.h"
 #include "kernel/graph/graph_eval.h"
 #include "kernel/graph/image.h"
 
@@ -13,6 +14,21 @@ namespace relief {
 namespace {
 
 const GraphOpShape& shape_of(GraphOp op) { return kGraphOpShapes[static_cast<int>(op)]; }
+
+/// Tells a program's results that are constant from those that vary.
+void results_split(GraphProgram& program)
+{
+  for (std::size_t i = 0; i < program.results.size(); ++i) {
+    const std::uint16_t operand = program.results[i];
+    const bool is_constant = operand >= kMostGraphRegisters && operand != kNoGraphOperand;
+    program.varying_before.push_back(static_cast<std::uint16_t>(program.varying.size()));
+    if (operand < kMostGraphRegisters) program.varying.push_back(static_cast<std::uint16_t>(i));
+    program.result_values.push_back(
+        is_constant ? closure_input(program.constants[std::size_t{operand} - kMostGraphRegisters]) : 0.0f);
+  }
+  program.varying_before.push_back(static_cast<std::uint16_t>(program.varying.size()));
+  program.result_values.resize(program.results.size() + 8);
+}
 
 }  // namespace
 
@@ -52,6 +68,9 @@ GraphProgramView GraphProgram::view() const
   v.is_shifted = std::any_of(inputs.begin(), inputs.end(),
                              [](const GraphInput& input) { return input.shift != GraphShift::kNone; });
   v.results = results.data();
+  v.result_values = result_values.data();
+  v.varying_before = varying_before.data();
+  v.varying = varying.data();
   v.closures = closures.data();
   v.num_closures = static_cast<std::uint32_t>(closures.size());
   v.surface_normal = surface_normal;
@@ -62,7 +81,8 @@ GraphProgramView GraphProgram::view() const
 std::size_t GraphProgram::bytes() const
 {
   return code.size() * sizeof(std::uint16_t) + (constants.size() + tables.size()) * sizeof(float) +
-         inputs.size() * sizeof(GraphInput) + results.size() * sizeof(std::uint16_t) +
+         inputs.size() * sizeof(GraphInput) + result_values.size() * sizeof(float) +
+         (results.size() + varying_before.size() + varying.size()) * sizeof(std::uint16_t) +
          closures.size() * sizeof(SurfaceClosureSpec) + sizeof(GraphProgram);
 }
 
@@ -540,6 +560,7 @@ GraphProgram GraphBuilder::compile(const GraphSchedule& schedule) const
   for (const GraphScalar a : results_) {
     program.results.push_back(a.index < 0 ? kNoGraphOperand : operand_of[source_index(a)]);
   }
+  results_split(program);
   return program;
 }
 

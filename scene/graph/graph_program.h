@@ -15,6 +15,8 @@ struct GraphProgram {
   std::uint16_t outputs[kNumGraphOutputs][3] = {};
   std::uint32_t given = 0;  ///< bit GraphOutput
   std::vector<std::uint16_t> results;
+  std::vector<float> result_values;  ///< this and the next two: see GraphProgramView
+  std::vector<std::uint16_t> varying_before, varying;
   std::vector<SurfaceClosureSpec> closures;
   std::uint16_t surface_normal = kNoGraphOperand;  ///< see GraphProgramView
   int num_registers = 0;
