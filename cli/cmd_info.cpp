@@ -11,6 +11,7 @@
 
 #include "cli/commands.h"
 #include "cli/memory_option.h"
+#include "cli/picture_info.h"
 #include "cli/scene_setup.h"
 #include "cli/standard_streams.h"
 #include "cli/value_hint.h"
@@ -317,8 +318,8 @@ void cmd_info_register(CLI::App& app, Run& run)
     std::optional<CausticsMode> caustics;
   };
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = app.add_subcommand("info", "Shows what is in a scene, what it will cost, and every warning");
-  CLI::Option* scene = names_file(command->add_option("scene", arguments->scene, "Scene to show"), kSceneSuffixes);
+  CLI::App* command = app.add_subcommand("info", "Shows what is in a scene, what it will cost, and every warning; or what a picture says of itself");
+  CLI::Option* scene = names_file(command->add_option("scene", arguments->scene, "Scene or OpenEXR picture to show"), {".gltf", ".glb", ".exr"});
   CLI::Option* settings =
       command->add_flag("--settings", arguments->settings, "Prints all settings that RELIEF_render may have, as JSON")
           ->excludes(scene);
@@ -340,6 +341,7 @@ void cmd_info_register(CLI::App& app, Run& run)
     }
     if (arguments->scene.empty()) throw CLI::RequiredError("scene");
     run = [arguments] {
+      if (is_exr_file(arguments->scene)) return picture_info(arguments->scene);
       return info(arguments->scene, arguments->strict, arguments->setup, arguments->displacement, arguments->caustics);
     };
   });

@@ -18,8 +18,10 @@
 #include "cli/failure.h"
 #include "cli/interrupt.h"
 #include "cli/standard_streams.h"
+#include "cli/version.h"
 #include "scene/diagnostics.h"
 #include "scene/memory.h"
+#include "scene/reading_root.h"
 
 namespace {
 
@@ -80,7 +82,14 @@ int main(int argc, char** argv)
   // Beyond the limit of a file's size a write then fails, like any other, instead of ending the program.
   std::signal(SIGXFSZ, SIG_IGN);
   CLI::App app("relief " RELIEF_VERSION ": renders displacement-mapped glTF scenes", "relief");
-  app.set_version_flag("--version", "relief " RELIEF_VERSION);
+  app.set_version_flag("--version", relief::version_text);
+  app.add_option_function<std::string>(
+         "--root",
+         [](const std::string& folder) {
+           if (!relief::reading_root_set(folder)) throw CLI::ValidationError("--root", "expected a folder, found '" + folder + "'");
+         },
+         "Folder below which files must be that scenes name, for scenes of strangers; given before the command")
+      ->type_name("FOLDER");
   app.require_subcommand(0, 1);
   std::string command_line = "relief";
   for (int i = 1; i < argc; ++i) command_line += " " + relief::shell_quoted(argv[i]);

@@ -5,7 +5,7 @@ namespace relief {
 const DisplacementMethodEntry& displacement_method(DisplacementMethod method)
 {
   static constexpr const DisplacementMethodEntry* kEntries[] = {
-#define X(name, label) &baseline::name##_method,
+#define X(name, label) &RELIEF_ENTRIES_ISA::name##_method,
 #include "kernel/shape/displacement_methods.inc"
 #undef X
   };

@@ -51,7 +51,7 @@ namespace avx2 {
 /// What `auto` means where it does not tessellate.
 inline constexpr DisplacementMethod kDefaultMethod = DisplacementMethod::chord;
 
-/// Entry of a method as plain x86-64 has it.
+/// Entry of a method, of the first instruction set that was built: plain x86-64, but for programs that are built without it.
 /// @pre  not kAuto
 const DisplacementMethodEntry& displacement_method(DisplacementMethod method);
 

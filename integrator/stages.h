@@ -75,8 +75,8 @@ void graph_run_avx512(const GraphProgramView& program, const TextureView* textur
 const StageTable& stage_table_baseline();
 const StageTable& stage_table_avx2();
 
-/// The best table for this machine; $RELIEF_ISA (baseline, avx2) overrides.
-/// @error std::runtime_error if $RELIEF_ISA names something else or something this machine lacks
+/// The best table for this machine of those that were built; $RELIEF_ISA (baseline, avx2) overrides.
+/// @error std::runtime_error if $RELIEF_ISA names something else or something this machine lacks; if nothing that was built runs
 const StageTable& stage_table_select();
 
 /// The traversals of displaced meshes that go with it.

@@ -13,6 +13,7 @@
 
 #include "scene/file_kind.h"
 #include "scene/memory.h"
+#include "scene/reading_root.h"
 #include "scene/validation.h"
 
 namespace relief {
@@ -316,6 +317,9 @@ fs::path gltf_resolve_uri(const GltfDocument& document, const std::string& uri, 
     throw SceneError(document.file, json_path, "a path relative to the file", '"' + uri + '"');
   }
   if (auto file = file_of_uri(document, uri)) {
+    if (!reading_is_allowed(*file)) {
+      throw SceneError(document.file, json_path, "a file below " + reading_root().string() + " (--root)", '"' + uri + '"');
+    }
     return *std::move(file);
   }
   throw SceneError(document.file, json_path, "an existing file", '"' + uri + '"');

@@ -36,7 +36,8 @@ const ImageIo& module_load()
   address_space_require();
   std::error_code no_proc;
   const fs::path program = fs::read_symlink("/proc/self/exe", no_proc);
-  std::string causes;
+  std::string cause;
+  bool is_of_a_file = false;  // that is there
   const fs::path folder = program.parent_path(), name = "relief_image_io.so";
   // Beside the program, where a copy of both finds it; where it is installed; or where it was built, for the programs of tests.
   for (const fs::path& path :
@@ -47,13 +48,15 @@ const ImageIo& module_load()
     if (entry != nullptr) {
       return *static_cast<const ImageIo*>(entry);
     }
-    // The same for both, if they are one or a library is missing.
-    const std::string cause = ::dlerror();
-    if (causes.find(cause) == std::string::npos) {
-      causes += (causes.empty() ? "" : "; ") + cause;
+    // What is wrong with one that is there, mostly a library that it needs, says more than that others are not.
+    const std::string text = ::dlerror();
+    if (!is_of_a_file) {
+      cause = text;
+      std::error_code error;
+      is_of_a_file = fs::exists(path, error);
     }
   }
-  throw std::runtime_error("the module that reads images cannot be loaded: " + causes);
+  throw std::runtime_error("the module that reads images cannot be loaded: " + cause);
 }
 
 }  // namespace

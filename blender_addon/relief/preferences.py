@@ -13,7 +13,7 @@ class ReliefPreferences(bpy.types.AddonPreferences):
 
     binary: StringProperty(
         name="Program",
-        description="Path of the relief program; empty: $RELIEF_BINARY, then the PATH (default empty)",
+        description="Path of the relief program; empty: $RELIEF_BINARY, then the one that came with the add-on, then the PATH (default empty)",
         subtype="FILE_PATH",
     )
 

@@ -3,6 +3,7 @@
 
 import json
 import os
+import platform
 import queue
 import shutil
 import subprocess
@@ -22,8 +23,34 @@ _WARNING = "relief: warning: "
 _checked_binaries = {}
 
 
+#: Where an add-on that holds the program has it, and for which machines that is.
+_OWN_PROGRAM = os.path.join(os.path.dirname(os.path.abspath(__file__)), "program", "bin", "relief")
+_OWN_PLATFORM = ("Linux", "x86_64")
+
+
+def _own_program():
+    """Path of the program that came with the add-on, ready to be run; None: it came without.
+
+    @error  ReliefError if it is not for this machine, or cannot be made executable
+    """
+    if not os.path.isfile(_OWN_PROGRAM):
+        return None
+    if (platform.system(), platform.machine()) != _OWN_PLATFORM:
+        raise ReliefError(
+            f"this add-on holds a relief program for {' on '.join(_OWN_PLATFORM)}, and this is {platform.system()} on {platform.machine()}: "
+            "build relief here and set its path in Edit > Preferences > Add-ons > relief"
+        )
+    if not os.access(_OWN_PROGRAM, os.X_OK):
+        # Blender does not keep the permissions of what it unpacks.
+        try:
+            os.chmod(_OWN_PROGRAM, 0o755)
+        except OSError as cause:
+            raise ReliefError(f"{_OWN_PROGRAM} cannot be made executable: {cause.strerror}") from cause
+    return _OWN_PROGRAM
+
+
 def find_binary(preference):
-    """Path of the program: the preference, then $RELIEF_BINARY, then the PATH.
+    """Path of the program: the preference, then $RELIEF_BINARY, then the one that came with the add-on, then the PATH.
 
     @error  ReliefError that names the places looked at
     """
@@ -32,7 +59,7 @@ def find_binary(preference):
             if not (os.path.isfile(path) and os.access(path, os.X_OK)):
                 raise ReliefError(f"{origin} name {path!r} as the relief program, which is not an executable file")
             return path
-    found = shutil.which("relief")
+    found = _own_program() or shutil.which("relief")
     if not found:
         raise ReliefError(
             "the relief program was not found. Set its path in Edit > Preferences > Add-ons > relief, "
@@ -53,7 +80,7 @@ def check_version(binary):
             run = subprocess.run([binary, "--version"], capture_output=True, text=True, timeout=20)
         except (OSError, subprocess.TimeoutExpired) as cause:
             raise ReliefError(f"{binary} cannot be run: {cause}") from cause
-        words = run.stdout.split()
+        words = run.stdout.partition("\n")[0].split()
         numbers = words[1].split(".") if len(words) == 2 and words[0] == "relief" else []
         if run.returncode != 0 or len(numbers) < 2 or not all(n.isdigit() for n in numbers[:2]):
             raise ReliefError(f"{binary} is not the relief program: `--version` says {run.stdout.strip()!r}")

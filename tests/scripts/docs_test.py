@@ -18,7 +18,7 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "benchmarks" / "RESULTS.md"]
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md")), ROOT / "benchmarks" / "RESULTS.md"]
 FOLDERS = "benchmarks blender_addon cli displacement docs examples exporters integrator kernel scene scripts tests".split()
 
 # What starts a command, after settings of environment variables.
@@ -163,6 +163,15 @@ def range_of(text):
 class Docs(unittest.TestCase):
     def assert_none(self, wrong):
         self.assertEqual([], sorted(set(wrong)))
+
+    def test_versions_are_the_projects(self):
+        version = re.search(r"^project\(relief VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"), re.MULTILINE)[1]
+        for name, pattern in {"CITATION.cff": r"^version: (\S+)$", "README.md": r"version = \{([\d.]+)\}",
+                              "blender_addon/relief/blender_manifest.toml": r'^version = "(\S+)"$'}.items():
+            found = re.findall(pattern, (ROOT / name).read_text(encoding="utf-8"), re.MULTILINE)
+            self.assertEqual([version], found, name)
+        packages = re.findall(r"relief(?:-blender)?[-_](\d+\.\d+\.\d+)", (ROOT / "README.md").read_text(encoding="utf-8"))
+        self.assertEqual({version}, set(packages))
 
     def test_there_are_commands(self):
         self.assertGreater(len(list(all_commands())), 40)
