@@ -1,4 +1,4 @@
-"""Five scenes with caustics, each hard for a path tracer in its own way. `python3 -m benchmarks.caustics.scenes FOLDER`
+"""Six scenes with caustics, each hard for a path tracer in its own way. `python3 -m benchmarks.caustics.scenes FOLDER`
 writes them from the repository's root.
 
 sphere    a glass sphere over a floor under a small area light
@@ -6,6 +6,7 @@ ring      a gold ring under a sun, which a path tracer never finds by chance
 water     a glass bowl of light: a displaced, rippled slab over a basin under a small lamp
 mirror    a glass prism whose caustic is seen in a mirror, and falls on a wall
 rough     spheres of glass and metal of rising roughness, across the threshold between photons and paths
+hall      200 glass spheres under one lamp, of which the camera sees one
 """
 
 import math
@@ -137,7 +138,21 @@ def rough():
     return document
 
 
-SCENES = {build.__name__: build for build in (sphere, ring, water, mirror, rough)}
+def hall():
+    # What bright caustics throw on to other surfaces is noise of its own, which no photon helps.
+    document = Document("hall", {**RENDER, "diffuseBounces": 1})
+    floor(document, 12.0)
+    columns, rows = 20, 10
+    ball = document.add_mesh("ball", uv_sphere(0.3, 64, 32), document.add_material(glass("glass")))
+    for i in range(columns * rows):
+        column, row = i % columns, i // columns
+        document.add_node(f"ball {i}", mesh=ball, translation=[column - columns / 2, 0.35, row - rows / 2])
+    document.add_area_light("lamp", (9, 8, -3), (0, 0, 0), 0.2, 0.2, (5000, 5000, 5000))
+    document.add_camera((0.0, 1.6, 1.3), (-0.4, 0, 0.15), 14)
+    return document
+
+
+SCENES = {build.__name__: build for build in (sphere, ring, water, mirror, rough, hall)}
 
 
 def main(folder):
