@@ -347,7 +347,8 @@ double Film::samples_to_come(const NoiseRule& rule, const NoiseJudging& judging,
       const double needed = done * kLargestOfNine * squares / ((x1 - x0) * (y1 - y0));
       const double judged = std::ceil(needed / judging.step) * judging.step;
       const double most = judging.most;
-      const double total = judged < most ? std::clamp<double>(judged, std::min<double>(judging.next, most), most) : most;
+      const double total =
+          judged < most ? std::clamp<double>(judged, std::min<double>(judging.next, most), most) : most;
       rows[static_cast<std::size_t>(row)] += count * (total - done);
     }
   });

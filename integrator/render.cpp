@@ -224,7 +224,8 @@ KernelGlobals render_globals(const SceneContext& context, const RenderOptions& o
   g.mist = settings.mist;
   g.occlusion_distance = settings.occlusion_distance;
   const auto planned = static_cast<std::uint32_t>(settings.samples);
-  g.log2_stream = sample_log2_stream(settings.noise_threshold > 0 ? std::min(least_samples(settings), planned) : planned);
+  g.log2_stream =
+      sample_log2_stream(settings.noise_threshold > 0 ? std::min(least_samples(settings), planned) : planned);
   g.full_width = settings.width;
   g.full_height = settings.height;
   const FilmWindow window = render_window(options);
@@ -570,7 +571,9 @@ RenderedImage render(const Scene& scene,
   const auto look_ahead = [&] {
     // Often enough for the time left, seldom enough to cost nothing. Of fewer samples than four nothing is known.
     constexpr std::uint32_t kLeastSamples = 4;
-    if (settings.noise_threshold <= 0 || !reporter.is_watched() || done < std::max(kLeastSamples, looked_at + looked_at / 2)) return;
+    if (settings.noise_threshold <= 0 || !reporter.is_watched() ||
+        done < std::max(kLeastSamples, looked_at + looked_at / 2))
+      return;
     looked_at = done;
     const NoiseRule rule{settings.noise_threshold, settings.noise_maths, settings.film_exposure};
     reporter.set_wanted(film.mean_samples() + film.samples_to_come(rule, judging_after(settings, done, wanted), done));

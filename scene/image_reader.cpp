@@ -9,6 +9,7 @@
 #include "scene/diagnostics.h"
 #include "scene/image_format.h"
 #include "scene/image_memory.h"
+#include "scene/jpeg_file.h"
 #include "scene/memory.h"
 #include "scene/png_file.h"
 
@@ -172,11 +173,12 @@ void ImageReader::open()
       fail(source_, "a complete JPEG image", "truncated data");
     }
   }
-  image_ = format == "png" ? png_file_make() : image_io().make_file(format);
+  const std::span<const unsigned char> bytes = owned_.empty() ? source_.encoded : owned_;
+  image_ = format == "png" ? png_file_make() : format == "jpeg" ? jpeg_file_make(bytes) : nullptr;
+  if (image_ == nullptr) image_ = image_io().make_file(format);
   if (image_ == nullptr) {
     fail(source_, "an image that OpenImageIO reads", "format \"" + format + "\", which it was built without");
   }
-  const std::span<const unsigned char> bytes = owned_.empty() ? source_.encoded : owned_;
   const bool is_embedded = source_.file.empty() || !owned_.empty();
   if (is_embedded && !image_->can_be_embedded()) {
     fail(source_, "an image format that can be embedded", "format \"" + format + "\"");

@@ -1,4 +1,4 @@
-// PNG, the format of most height maps, by libpng alone: a scene whose images are all PNG never loads OpenImageIO, which
+// PNG, the format of most height maps, by libpng alone: a scene whose images are all PNG or JPEG never loads OpenImageIO, which
 // costs a process a quarter of a second and 100 MiB (image_io.h).
 #pragma once
 

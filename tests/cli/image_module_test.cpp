@@ -1,4 +1,4 @@
-// OpenImageIO is loaded when the first image that is not PNG is opened and not before: it takes longer than many a command.
+// OpenImageIO is loaded when the first image is opened that is neither PNG nor JPEG, and not before: it takes longer than many a command.
 // Here it cannot be loaded at all, since a file of its name that is no library comes first in the search path.
 #include "tests/cli/program.h"
 

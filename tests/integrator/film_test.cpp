@@ -80,7 +80,8 @@ TEST(Film, SamplesToComeAreTold)
     picture.sample(kMost);
     ASSERT_TRUE(picture.rests());
     const double all = picture.mean_samples();
-    for (const auto& [done, sum] : told) EXPECT_NEAR(sum / all, 1.0, error) << done << " of " << all << ", " << least << '-' << most;
+    for (const auto& [done, sum] : told)
+      EXPECT_NEAR(sum / all, 1.0, error) << done << " of " << all << ", " << least << '-' << most;
     EXPECT_EQ(picture.samples_to_come(), 0);
   }
 }
