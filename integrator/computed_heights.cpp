@@ -105,6 +105,7 @@ bool is_of_all(GraphQuantity q, const MeshView& mesh, std::uint16_t index)
     case Q::camera_from_world:
     case Q::world_from_camera:
     case Q::instance:
+    case Q::shutter_time:
       return true;
     default:
       return false;

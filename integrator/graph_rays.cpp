@@ -1,10 +1,15 @@
 #include "integrator/graph_rays.h"
 
+#include <algorithm>
 #include <bit>
+#include <cmath>
 
+#include "integrator/scene_context.h"
 #include "kernel/math/rounding.h"
+#include "kernel/math/trigonometry.h"
 #include "kernel/sample/sobol.h"
 #include "kernel/sample/warp.h"
+#include "kernel/shape/surface_hit.h"
 
 namespace relief {
 namespace {
@@ -21,30 +26,49 @@ std::uint32_t hash_of(Vec3f O, Vec3f wo)
 }
 
 Vec3f y_up(Vec3f v) { return {v.x, v.z, -v.y}; }
+Vec3f z_up(Vec3f v) { return {v.x, -v.z, v.y}; }
 
-/// Whether a ray of the given length is stopped by something that casts shadows, or by one instance of it.
-bool is_stopped(const Accel& accel, Vec3f O, Vec3f D, float length, std::int32_t instance)
+struct LookingRay {
+  Vec3f O, D;
+  float length;
+  float time;
+  unsigned mask;
+};
+
+/// Goes through what a ray meets, nearest first.
+/// @param visit  called with the object and the hit; true: no further
+/// @return       whether a visit was the last
+template <typename Visit>
+bool meets(const Accel& accel, const LookingRay& looking, Visit&& visit)
 {
-  // The closest hit, for what lets shadow rays through in part stops these.
   float from = kLeastDistance;
   for (;;) {
     EmbreeContext context;
     embree_context_init(context, false);
     RTCRayHit ray{};
-    ray.ray.org_x = O.x, ray.ray.org_y = O.y, ray.ray.org_z = O.z;
-    ray.ray.dir_x = D.x, ray.ray.dir_y = D.y, ray.ray.dir_z = D.z;
+    ray.ray.org_x = looking.O.x, ray.ray.org_y = looking.O.y, ray.ray.org_z = looking.O.z;
+    ray.ray.dir_x = looking.D.x, ray.ray.dir_y = looking.D.y, ray.ray.dir_z = looking.D.z;
     ray.ray.tnear = from;
-    ray.ray.tfar = length;
-    ray.ray.mask = kRayShadow;
+    ray.ray.tfar = looking.length;
+    ray.ray.time = looking.time;
+    ray.ray.mask = looking.mask;
     ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     accel.intersect(context, ray);
     if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
-    const unsigned object = ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID;
-    if (instance < 0 || object == static_cast<unsigned>(instance)) return true;
+    if (visit(ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID, ray)) return true;
     // Embree would give the same hit again: a ray that starts at one meets it.
     from = t_min_behind(ray.ray.tfar);
   }
+}
+
+/// Whether what a ray met belongs to an instance's object, which has one instance a material.
+bool is_of_object(const SceneContext& context, unsigned met, std::int32_t instance)
+{
+  const auto& instances = context.scene.instances;
+  if (met >= instances.size()) return false;
+  const auto own = static_cast<std::size_t>(instance);
+  return met == own || (instances[met].object_index >= 0 && instances[met].object_index == instances[own].object_index);
 }
 
 /// @source as Cycles' Ambient Occlusion: rays by the cosine to the normal
@@ -52,7 +76,10 @@ float open_share(const void* scene, const GraphOpenShare& question)
 {
   const Vec3f Ng = y_up(question.Ng), N = y_up(question.N), O[2] = {y_up(question.O[0]), y_up(question.O[1])};
   if (!(question.distance > 0.0f) || question.num_rays < 1 || !(length_squared(N) > 0.0f) || !is_finite(N)) return 1.0f;
-  const Accel& accel = *static_cast<const Accel*>(scene);
+  const SceneContext& context = *static_cast<const SceneContext*>(scene);
+  // What casts no shadow is in the way of its own object alone.
+  const bool is_local = question.instance >= 0;
+  const unsigned mask = is_local ? ~0u : unsigned{kRayShadow};
   const Frame frame = frame_from_normal(normalize(N));
   const std::uint32_t hash = hash_of(O[0], question.wo);
   int num_open = 0;
@@ -60,13 +87,103 @@ float open_share(const void* scene, const GraphOpenShare& question)
     const Vec3f D = from_local(frame, warp_cosine_hemisphere(sample_2d(hash, static_cast<std::uint32_t>(i), 0)));
     // By the smooth normal rays leave on either side of a facet, which itself is never in their way.
     const Vec3f& from = dot(D, Ng) > 0.0f ? O[0] : O[1];
-    if (!is_stopped(accel, from, D, question.distance, question.instance)) ++num_open;
+    // The closest hits, for what lets shadow rays through in part stops these.
+    const auto stops = [&](unsigned met, const RTCRayHit&) {
+      return !is_local || is_of_object(context, met, question.instance);
+    };
+    if (!meets(*context.accel, {from, D, question.distance, question.time, mask}, stops)) ++num_open;
   }
   return static_cast<float>(num_open) / static_cast<float>(question.num_rays);
 }
 
+/// A place where a ray met a surface.
+struct MetSurface {
+  Vec3f P, Ng, Ns;  ///< world; normals unit, on the front side
+};
+
+MetSurface met_surface(const SceneContext& context, unsigned object, const RTCRayHit& ray)
+{
+  const SceneMotion& motion = context.motion;
+  InstanceView instance = context.instances[object];
+  MeshView mesh = context.meshes[static_cast<std::size_t>(instance.mesh_index)];
+  if ((instance.flags & (kMoves | kDeforms)) != 0) {
+    const bool deforms = (instance.flags & kDeforms) != 0;
+    instance = motion.instance_at(instance, ray.ray.time);
+    if (deforms) mesh = motion.mesh_at(instance, mesh, ray.ray.time);
+  }
+  if ((instance.flags & kDisplaced) == 0) {
+    const SurfaceHit hit = surface_hit_make(mesh, instance, ray.hit.primID, ray.hit.u, ray.hit.v);
+    return {hit.P, hit.Ng, hit.Ns};
+  }
+  const DisplacedPoint at = context.displacements.resolve(object, instance, ray.hit.primID,
+                                                          {ray.hit.u, ray.hit.v, ray.hit.Ng_x, ray.ray.time});
+  const auto normal = [&](Vec3f n) { return normalize(transform_normal(instance.object_from_world, as_normal(n))); };
+  return {transform_point(instance.world_from_object, at.P), normal(at.Ng), normal(at.Ns)};
+}
+
+/// Where a share of what rounds an edge comes from: by (1 − r)³ over a disk of radius 1.
+/// @param u  in [0, 1]: the share that is further away
+/// @return   distance from the middle
+float bevel_distance(float u)
+{
+  // With s = 1 − r the share is s⁴ (5 − 4 s), which grows: Newton's steps, within bounds.
+  float low = 0, high = 1, s = 0.5f;
+  for (int i = 0; i < 24; ++i) {
+    const float cubed = s * s * s, error = cubed * s * (5.0f - 4.0f * s) - u;
+    (error < 0 ? low : high) = s;
+    const float step = error / (20.0f * cubed * (1.0f - s));
+    const float next = s - step;
+    const float last = s;
+    s = next > low && next < high ? next : 0.5f * (low + high);
+    if (std::fabs(s - last) < 1e-6f) break;
+  }
+  return 1.0f - s;
+}
+
+/// @source as Cycles' Bevel: the mean of the object's smooth normals around the point, each by (radius − distance)³, which rays
+///         along three axes meet at places of a disk; the axes are weighted by the power heuristic. King et al. 2013, "BSSRDF
+///         Importance Sampling". Sums of few rays are normalized, so that pictures depend on how they are spread.
+Vec3f bevel(const void* scene, const GraphBevel& question)
+{
+  const SceneContext& context = *static_cast<const SceneContext*>(scene);
+  const Vec3f P = y_up(question.P), Ng = y_up(question.Ng);
+  const float radius = question.radius;
+  if (!(radius > 0.0f && radius < kInfinity) || !is_finite(P)) return {};
+  constexpr float kChances[3] = {0.5f, 0.25f, 0.25f};
+  const Frame frame = frame_from_normal(Ng);
+  const Vec3f axes[3] = {frame.n, frame.s, frame.t};
+  const std::uint32_t hash = hash_of(P, question.wo);
+  Vec3f sum;
+  for (int i = 0; i < question.num_rays; ++i) {
+    const Vec2f u = sample_2d(hash, static_cast<std::uint32_t>(i), 0);
+    const int axis = u.x < 0.5f ? 0 : u.x < 0.75f ? 1 : 2;
+    const float before = axis == 0 ? 0.0f : axis == 1 ? 0.5f : 0.75f;
+    const SinCos turn = sin_cos_turn((u.x - before) / kChances[axis]);
+    const float r = bevel_distance(u.y), half = std::sqrt(std::max(0.0f, 1.0f - r * r));
+    if (!(r < 1.0f)) continue;
+    const Vec3f along = axes[axis], across = axes[(axis + 1) % 3] * turn.cos + axes[(axis + 2) % 3] * turn.sin;
+    const LookingRay ray{P + (along * half + across * r) * radius, -along, 2.0f * half * radius, question.time, ~0u};
+    meets(*context.accel, ray, [&](unsigned met, const RTCRayHit& hit) {
+      if (!is_of_object(context, met, question.instance)) return false;
+      const MetSurface at = met_surface(context, met, hit);
+      const float near = 1.0f - length(at.P - P) / radius;
+      if (!(near > 0.0f)) return false;
+      float squares = 0;
+      for (int k = 0; k < 3; ++k) {
+        const float pdf = kChances[k] * dot(axes[k], at.Ng);
+        squares += pdf * pdf;
+      }
+      const float ratio = near / (1.0f - r);
+      sum += at.Ns * (ratio * ratio * ratio * kChances[axis] * std::fabs(dot(along, at.Ng)) / squares);
+      return false;
+    });
+  }
+  const float size = length(sum);
+  return size > 0.0f && is_finite(sum) ? z_up(sum / size) : Vec3f{};
+}
+
 }  // namespace
 
-GraphRays graph_rays_make(const Accel& accel) { return {open_share, &accel}; }
+GraphRays graph_rays_make(const SceneContext& context) { return {open_share, bevel, &context}; }
 
 }  // namespace relief

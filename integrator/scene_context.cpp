@@ -122,7 +122,7 @@ SceneContext::SceneContext(const Scene& loaded,
   accel = std::make_unique<Accel>(scene, lights.lights, lights.area_lights, displacements, *this, shadow_filter,
                                   std::move(trees));
 
-  globals.graph_scene.rays = graph_rays_make(*accel);
+  globals.graph_scene.rays = graph_rays_make(*this);
   globals.area_light_index = lights.area_lights.data();
   globals.num_area_lights = static_cast<std::uint32_t>(lights.area_lights.size());
   globals.lights = lights.view();

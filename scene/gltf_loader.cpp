@@ -248,16 +248,20 @@ void GltfLoader::place_meshes(const PlacedNode& node)
     if (copies.empty()) {
       const std::size_t next = scene_.instances.size();
       place_instance(node, primitive, {}, path);
-      if (scene_.instances.size() > next) set_values(next, own);
+      if (scene_.instances.size() == next) continue;
+      scene_.instances[next].object_index = num_objects_;
+      set_values(next, own);
     }
     for (std::size_t copy = 0; copy < copies.size(); ++copy) {
       const std::size_t next = scene_.instances.size();
       place_instance(node, primitive, copies[copy], path + "/extensions/EXT_mesh_gpu_instancing");
       if (scene_.instances.size() == next) continue;
+      scene_.instances[next].object_index = num_objects_ + static_cast<int>(copy);
       set_values(next, own);
       for (const auto& [place, values] : of_copies) set_values(next, {{place, values[copy]}});
     }
   }
+  num_objects_ += copies.empty() ? 1 : static_cast<int>(copies.size());
 }
 
 /// Values of a node's RELIEF_object that graphs read.
@@ -626,7 +630,10 @@ void GltfLoader::read_programs(const GltfDocument& document,
     material.graph_outputs = program.given;
     material.depends_on_ray = std::any_of(program.inputs.begin(), program.inputs.end(), [](const GraphInput& input) {
       using Q = GraphQuantity;
-      return input.quantity == Q::ray_kind || input.quantity == Q::ray_depth || input.quantity == Q::ray_length;
+      // Photons show sharply what they show at all.
+      const bool is_blurred = input.index == static_cast<int>(GraphRayKind::kBlurred);
+      return (input.quantity == Q::ray_kind && !is_blurred) || input.quantity == Q::ray_depth ||
+             input.quantity == Q::ray_length;
     });
     material.has_closures = surface != nullptr;
     if (material.has_closures) {

@@ -130,6 +130,7 @@ class GltfLoader {
   float image_aspect_ = 1;
   ShutterNodes shutter_nodes_;
   std::size_t num_visited_ = 0;  ///< nodes, with the one that is being placed
+  int num_objects_ = 0;          ///< see Instance::object_index
   std::vector<Bounds> mesh_bounds_;
   std::set<std::pair<int, int>> displaced_;  ///< meshes and displacements that check_displacement has seen
   std::map<std::pair<const GltfDocument*, int>, std::map<MorphWeights, std::vector<Primitive>>> primitives_of_;

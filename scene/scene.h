@@ -73,6 +73,7 @@ struct Instance {
   Affine3 world_from_object;
   std::uint32_t flags = kVisibleToCamera | kCastsShadow;
   int motion_index = -1;  ///< into Scene::motions: places while the shutter is open; −1: it stands still
+  int object_index = -1;  ///< the same for all primitives of one node, or of one copy in it; −1: it is alone
 };
 
 struct SceneCamera {

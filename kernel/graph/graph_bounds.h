@@ -225,6 +225,11 @@ RELIEF_KERNEL void checker_op(const GraphRangeOperands& o) { o.set(0, unit()); }
 
 RELIEF_KERNEL void open_share_op(const GraphRangeOperands& o) { o.set(0, unit()); }
 
+RELIEF_KERNEL void bevel_op(const GraphRangeOperands& o)
+{
+  for (int i = 0; i < 3; ++i) o.set(i, range_between(splat8(-1.0f), splat8(1.0f)));
+}
+
 RELIEF_KERNEL void ies_op(const GraphRangeOperands& o)
 {
   const float* table = o.program.tables + (o.immediates[0] | std::uint32_t{o.immediates[1]} << 16);

@@ -544,12 +544,12 @@ RELIEF_KERNEL void graph_fresnel(const GraphOperands& o)
 }
 
 /// How much is open over a point by ambient occlusion: origins on both sides, geometric normal, normal and direction to the viewer, world; then the
-/// distance that is looked, and the instance that alone counts or −1. Immediate: rays.
+/// distance that is looked, the instance that alone counts or −1, and the time. Immediate: rays.
 RELIEF_KERNEL void graph_open_share(const GraphOperands& o)
 {
   const GraphRays& rays = o.registers.rays;
-  alignas(32) float in[17][8], out[8];
-  for (int i = 0; i < 17; ++i) store8(in[i], graph_in(o, i));
+  alignas(32) float in[18][8], out[8];
+  for (int i = 0; i < 18; ++i) store8(in[i], graph_in(o, i));
   for (int k = 0; k < 8; ++k) {
     out[k] = 1.0f;
     if (rays.open_share == nullptr || (o.registers.used >> k & 1u) == 0) continue;
@@ -560,9 +560,29 @@ RELIEF_KERNEL void graph_open_share(const GraphOperands& o)
                                           vector(12),
                                           in[15][k],
                                           o.immediates[0],
-                                          static_cast<std::int32_t>(in[16][k])});
+                                          static_cast<std::int32_t>(in[16][k]),
+                                          in[17][k]});
   }
   graph_set(o, 0, load8(out));
+}
+
+/// The normal of rounded edges: position, geometric normal and direction to the viewer, world; then the radius, the instance
+/// and the time. Immediate: rays. (0, 0, 0) where there is none.
+RELIEF_KERNEL void graph_bevel(const GraphOperands& o)
+{
+  const GraphRays& rays = o.registers.rays;
+  alignas(32) float in[12][8], out[3][8] = {};
+  for (int i = 0; i < 12; ++i) store8(in[i], graph_in(o, i));
+  for (int k = 0; k < 8; ++k) {
+    if (rays.bevel == nullptr || (o.registers.used >> k & 1u) == 0 || !(in[9][k] > 0.0f)) continue;
+    const auto vector = [&](int i) { return Vec3f{in[i][k], in[i + 1][k], in[i + 2][k]}; };
+    const Vec3f N = rays.bevel(rays.scene, {vector(0), vector(3), vector(6), in[9][k], o.immediates[0],
+                                            static_cast<std::int32_t>(in[10][k]), in[11][k]});
+    out[0][k] = N.x;
+    out[1][k] = N.y;
+    out[2][k] = N.z;
+  }
+  for (int i = 0; i < 3; ++i) graph_set(o, i, load8(out[i]));
 }
 
 /// Goes on some words later where no point has a factor but 0. Immediates: how many, by low and high word.

@@ -298,6 +298,8 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
       return graph_edge_distance(at);
     case Q::instance:
       return static_cast<float>(at.instance->index);
+    case Q::shutter_time:
+      return at.ray.time;
     case Q::kCount:
       break;
   }
@@ -341,7 +343,9 @@ RELIEF_KERNEL GraphLane graph_at_point(GraphRun run,
     lanes = splat8(lanes[0]);
   }
   registers.used = 1;
-  registers.rays = at.scene->rays;
+  // As in Cycles, what shadow rays meet does not look around.
+  const bool is_shadow = (at.ray.kinds >> static_cast<int>(GraphRayKind::kShadow) & 1u) != 0;
+  registers.rays = is_shadow ? GraphRays{} : at.scene->rays;
   run(program, textures, registers);
   return {&program, &registers, 0};
 }

@@ -15,12 +15,26 @@ struct GraphOpenShare {
   Vec3f wo;        ///< with O what is told apart by
   float distance;  ///< metres that are looked
   int num_rays;
-  std::int32_t instance;  ///< that alone counts; −1: all do
+  std::int32_t instance;  ///< whose object alone counts; −1: all do
+  float time;             ///< of the ray, see motion.h
 };
 
-/// What looks around in the scene for graphs. Null where there is none yet: all is open then.
+/// A question of what the normal would be if edges were rounded, world with Z up.
+struct GraphBevel {
+  Vec3f P;
+  Vec3f Ng;      ///< unit geometric normal, on either side
+  Vec3f wo;      ///< with P what is told apart by
+  float radius;  ///< metres that are looked
+  int num_rays;
+  std::int32_t instance;  ///< whose object it is
+  float time;             ///< of the ray, see motion.h
+};
+
+/// What looks around in the scene for graphs. Null where there is none yet: all is open then, and edges are as they are.
 struct GraphRays {
   float (*open_share)(const void* scene, const GraphOpenShare& question) = nullptr;
+  /// @return  unit, on the front side; (0, 0, 0): nothing was met
+  Vec3f (*bevel)(const void* scene, const GraphBevel& question) = nullptr;
   const void* scene = nullptr;
 };
 

@@ -16,6 +16,7 @@ enum class GraphRayKind : std::uint8_t {
   kSingular,  ///< it left a sharp one
   kReflection,
   kTransmission,
+  kBlurred,  ///< what it shows is not sharp: it, or one before, has left a wide lobe
 };
 
 /// What GraphRay counts, bytes of `depths` but the last.
@@ -27,6 +28,7 @@ struct GraphRay {
   std::uint32_t depths = 0;       ///< four 8-bit counts, as PathState::bounces
   std::uint32_t transparent = 0;  ///< surfaces that it has passed
   float length = 0;               ///< metres
+  float time = 0;                 ///< see motion.h
 };
 
 /// Values of all instances by one name.

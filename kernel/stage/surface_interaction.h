@@ -106,8 +106,11 @@ RELIEF_KERNEL std::uint32_t path_ray_kinds(const PathState& state, std::uint32_t
   }
   const auto event = static_cast<PathEvent>(path_event(state.flags[path]));
   if (event == PathEvent::kCamera) return bit(GraphRayKind::kCamera);
+  // Cycles' bound on the least density of a path that still rounds edges.
+  constexpr float kSharpPdf = 8.0f;
   const std::uint32_t side =
-      bit(event == PathEvent::kTransmission ? GraphRayKind::kTransmission : GraphRayKind::kReflection);
+      bit(event == PathEvent::kTransmission ? GraphRayKind::kTransmission : GraphRayKind::kReflection) |
+      (state.least_pdf[path] < kSharpPdf ? bit(GraphRayKind::kBlurred) : 0u);
   if (event == PathEvent::kDiffuse) return side | bit(GraphRayKind::kDiffuse);
   return side | bit(GraphRayKind::kGlossy) | (state.pdf[path] > 0.0f ? 0u : bit(GraphRayKind::kSingular));
 }
@@ -130,7 +133,7 @@ RELIEF_KERNEL GraphPoint surface_graph_point(const KernelGlobals& g,
           at.cone.width,
           &g.graph_scene,
           {path_ray_kinds(state, path), state.bounces[path], state.flags[path] >> kPathTransparentShift,
-           path_ray_length(g, state, path)}};
+           path_ray_length(g, state, path), path_time(state, path)}};
 }
 
 /// How a path blurs the microfacets that it meets.

@@ -278,9 +278,33 @@ void lower_ambient_occlusion(GraphNode& n)
   for (const GraphVector& v : {true_normal, normal, incoming(b)}) in.insert(in.end(), v.begin(), v.end());
   in.push_back(n.number("distance"));
   in.push_back(is_local ? b.quantity(Q::instance) : b.constant(-1));
+  in.push_back(b.quantity(Q::shutter_time));
   const GraphScalar open = b.apply(Op::open_share, in, {&rays, 1}).front();
   n.set("factor", open);
   n.set("color", product(b, n.vector("color"), open), kColor);
+}
+
+constexpr GraphSocket kBevelInputs[] = {{"radius", kNumber, {0.05f}}, {"normal", kVector, {}, true}};
+void lower_bevel(GraphNode& n)
+{
+  GraphBuilder& b = n.build;
+  const auto rays = static_cast<std::uint16_t>(n.reader.integer("samples", 4, 1, 128));
+  // As in Cycles, what is seen blurred has its edges as they are.
+  const GraphScalar is_blurred = b.quantity(Q::ray_kind, static_cast<std::uint16_t>(GraphRayKind::kBlurred));
+  const GraphScalar radius = b(Op::select, {is_blurred, b.constant(0), n.number("radius")});
+  std::vector<GraphScalar> in;
+  for (const Q q : {Q::position_x, Q::position_y, Q::position_z}) in.push_back(b.quantity_here(q));
+  const GraphVector true_normal = quantities(b, Q::true_normal_x, Q::true_normal_y, Q::true_normal_z);
+  for (const GraphVector& v : {true_normal, incoming(b)}) in.insert(in.end(), v.begin(), v.end());
+  in.insert(in.end(), {radius, b.quantity(Q::instance), b.quantity(Q::shutter_time)});
+  const std::vector<GraphScalar> met = b.apply(Op::bevel, in, {&rays, 1});
+  const GraphVector front = {met[0], met[1], met[2]}, own = shading_normal(b);
+  const GraphVector back = {negative(b, front[0]), negative(b, front[1]), negative(b, front[2])};
+  const GraphScalar is_round = b(Op::less_than, {b.constant(0), dot(b, front, front)});
+  GraphVector normal = selected(b, is_round, selected(b, b.quantity(Q::backfacing), back, front), own);
+  // A normal that is given is turned as the surface's own one is.
+  if (n.is_given("normal")) normal = normalized(b, sum(b, n.vector("normal"), difference(b, normal, own)));
+  n.set("normal", normal, kVector);
 }
 
 constexpr GraphSocket kLightFalloffInputs[] = {{"strength", kNumber, {100}}, {"smooth", kNumber}};
@@ -485,6 +509,7 @@ constexpr GraphNodeKind kKinds[] = {
     {"normal-map", kNormalMapInputs, lower_normal_map},
     {"wireframe", kWireframeInputs, lower_wireframe},
     {"ambient-occlusion", kOcclusionInputs, lower_ambient_occlusion},
+    {"bevel", kBevelInputs, lower_bevel},
     {"light-falloff", kLightFalloffInputs, lower_light_falloff},
     {"transform", kTransformInputs, lower_transform},
     {"vector-transform", kTransformInputs, lower_vector_transform},

@@ -541,6 +541,65 @@ def test_ambient_occlusion_through_a_ramp():
     assert_agrees(scene, samples=16)
 
 
+def _beveled_scene(samples, radius=0.3):
+    """Things that emit their normal with rounded edges; two of them are one object of two materials."""
+    scene, material, objects = _scene(64, 48)
+    tree = material.node_tree
+    tree.nodes.clear()
+    bevel, shifted, emission, output = (
+        tree.nodes.new(f"ShaderNode{kind}") for kind in ("Bevel", "VectorMath", "Emission", "OutputMaterial")
+    )
+    bevel.samples, bevel.inputs["Radius"].default_value = samples, radius
+    shifted.operation = "ADD"
+    shifted.inputs[1].default_value = (1.5, 1.5, 1.5)
+    tree.links.new(bevel.outputs["Normal"], shifted.inputs[0])
+    tree.links.new(shifted.outputs[0], emission.inputs["Color"])
+    tree.links.new(emission.outputs[0], output.inputs["Surface"])
+    bpy.ops.mesh.primitive_cube_add(size=1.4, location=(0.3, -1.2, 0.4), rotation=(0.3, 0.2, 0.5))
+    cube = bpy.context.object
+    cube.scale = (-1, 0.7, 1.2)
+    for each in (material, material.copy()):
+        cube.data.materials.append(each)
+    for number, polygon in enumerate(cube.data.polygons):
+        polygon.material_index = number % 2
+    set_bounces(scene, 0)
+    return scene, bevel
+
+
+def test_bevel():
+    scene, _ = _beveled_scene(8)
+    assert_agrees(scene, samples=32)
+
+
+def test_bevel_of_few_rays_over_a_bump():
+    """A normal that is given is turned as the surface's own is; sums of few rays are normalized."""
+    scene, bevel = _beveled_scene(2)
+    tree = bevel.id_data
+    bump, noise = tree.nodes.new("ShaderNodeBump"), tree.nodes.new("ShaderNodeTexNoise")
+    noise.inputs["Scale"].default_value = 2
+    tree.links.new(noise.outputs["Fac"], bump.inputs["Height"])
+    tree.links.new(bump.outputs[0], bevel.inputs["Normal"])
+    assert_agrees(scene, samples=32)
+
+
+def test_bevel_of_metal():
+    """Mirror-like things that mirror each other: paths that have left a wide lobe see edges as they are."""
+    scene, _ = _beveled_scene(8)
+    for each in {slot.material for thing in bpy.data.objects for slot in thing.material_slots}:
+        nodes = each.node_tree.nodes
+        if "Bevel" not in nodes:
+            continue
+        glossy = nodes.get("Glossy BSDF") or nodes.new("ShaderNodeBsdfGlossy")
+        glossy.inputs["Roughness"].default_value = 0.3
+        each.node_tree.links.new(nodes["Bevel"].outputs[0], glossy.inputs["Normal"])
+        each.node_tree.links.new(glossy.outputs[0], nodes["Material Output"].inputs["Surface"])
+    bpy.ops.mesh.primitive_plane_add(size=9, location=(0, 0, -0.5))
+    bpy.context.object.data.materials.append(diffuse())
+    set_world((0.6, 0.7, 1.0))
+    set_bounces(scene, 3)
+    assert_agrees(scene, samples=64)
+
+
 def test_what_is_there_of_hair_and_points():
     scene, material, objects = _scene()
     builders = {

@@ -140,7 +140,7 @@ def _only_set(graph):
 #: Nodes whose outputs differ between points of equal texture coordinates, or have images.
 _VARYING = {
     *("geometry", "vertex-color", "attribute", "object-info", "light-path", "camera-data", "tangent", "normal-map"),
-    *("fresnel", "layer-weight", "bump", "wireframe", "ambient-occlusion", "transform", "vector-transform"),
+    *("fresnel", "layer-weight", "bump", "wireframe", "ambient-occlusion", "bevel", "transform", "vector-transform"),
     *("image-texture", "environment-texture"),
 }
 

@@ -240,6 +240,15 @@ def _ambient_occlusion(g, source):
     return _output(index, "factor" if source.socket.identifier == "AO" else "color")
 
 
+def _bevel(g, source):
+    node, groups = source.node, source.groups
+    inputs = g.inputs(node, groups, {"Radius": "radius"})
+    normal = g.normal(node.inputs["Normal"], groups)
+    if normal is not None:
+        inputs["normal"] = normal
+    return _output(g.add("bevel", inputs, samples=node.samples), "normal")
+
+
 def _light_falloff(g, source):
     inputs = g.inputs(source.node, source.groups, {"Strength": "strength", "Smooth": "smooth"})
     return _output(g.add("light-falloff", inputs), source.socket.identifier.lower())
@@ -344,6 +353,7 @@ OUTPUTS = {
     "ShaderNodeNormal": _normal,
     "ShaderNodeWireframe": _wireframe,
     "ShaderNodeAmbientOcclusion": _ambient_occlusion,
+    "ShaderNodeBevel": _bevel,
     "ShaderNodeLightFalloff": _light_falloff,
     "ShaderNodeTexIES": _ies,
     "ShaderNodeHairInfo": _hair_info,
