@@ -1,8 +1,10 @@
 #include "integrator/photon_map.h"
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
@@ -60,6 +62,7 @@ void PhotonMap::build(const std::vector<std::vector<Photon>>& chunks, const std:
     }
   }
   tbb::parallel_sort(order_.begin(), order_.end());
+  mark_near(photons, radii);
 
   x_.resize(count);
   y_.resize(count);
@@ -85,6 +88,35 @@ void PhotonMap::build(const std::vector<std::vector<Photon>>& chunks, const std:
   }
 }
 
+void PhotonMap::mark_near(const std::vector<const Photon*>& photons, const std::vector<float>& radii)
+{
+  // A photon's ball reaches into three cells an axis at most. Some hundred photons share a cell where they lie dense.
+  constexpr std::uint32_t kFewest = 64;
+  near_.assign(std::max(kFewest, std::bit_ceil(static_cast<std::uint32_t>(photons.size() / 4 + 1))), 0);
+  const auto mask = static_cast<std::uint32_t>(near_.size()) - 1;
+  const float least_inverse = 1.0f / sqr(largest_radius_), inverse_cell = 1.0f / largest_radius_;
+  tbb::parallel_for(std::size_t{0}, photons.size(), [&](std::size_t i) {
+    const auto bit = static_cast<std::uint8_t>(1u << photon_octave(1.0f / sqr(radii[i]), least_inverse));
+    // A little more, for the rounding of distances and cells.
+    const Vec3f P = photons[i]->P;
+    const Vec3f reach = splat3(1.001f * radii[i]) + 1e-6f * abs(P);
+    const auto cells = [&](float x, float r) {
+      return std::pair{photon_cell(x - r, inverse_cell), photon_cell(x + r, inverse_cell)};
+    };
+    const auto [x0, x1] = cells(P.x, reach.x);
+    const auto [y0, y1] = cells(P.y, reach.y);
+    const auto [z0, z1] = cells(P.z, reach.z);
+    for (std::int32_t z = z0; z <= z1; ++z) {
+      for (std::int32_t y = y0; y <= y1; ++y) {
+        for (std::int32_t x = x0; x <= x1; ++x) {
+          const std::atomic_ref<std::uint8_t> entry(near_[photon_near(x, y, z, mask)]);
+          if ((entry.load(std::memory_order_relaxed) & bit) == 0) entry.fetch_or(bit, std::memory_order_relaxed);
+        }
+      }
+    }
+  });
+}
+
 PhotonMapView PhotonMap::view() const
 {
   PhotonMapView v;
@@ -99,13 +131,16 @@ PhotonMapView PhotonMap::view() const
   v.largest_radius = largest_radius_;
   v.bounds = bounds_.data();
   v.octaves = octaves_;
+  v.near = near_.data();
+  v.near_mask = static_cast<std::uint32_t>(near_.size()) - 1;
   return v;
 }
 
 std::size_t PhotonMap::bytes() const
 {
   return arrivals_.capacity() * (sizeof(PhotonArrival) + 4 * sizeof(float)) +
-         bucket_begin_.capacity() * sizeof(std::uint32_t) + order_.capacity() * sizeof(std::uint64_t);
+         bucket_begin_.capacity() * sizeof(std::uint32_t) + order_.capacity() * sizeof(std::uint64_t) +
+         near_.capacity();
 }
 
 float photon_radius_for(const std::vector<std::vector<Photon>>& chunks, double wanted)

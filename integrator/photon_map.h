@@ -24,9 +24,13 @@ class PhotonMap {
   std::size_t bytes() const;
 
  private:
+  /// Marks the cells that photons reach into, see PhotonMapView::near.
+  void mark_near(const std::vector<const Photon*>& photons, const std::vector<float>& radii);
+
   std::vector<float> x_, y_, z_, inverse_radius_squared_;
   std::vector<PhotonArrival> arrivals_;
   std::vector<std::uint32_t> bucket_begin_;
+  std::vector<std::uint8_t> near_;
   std::vector<std::uint64_t> order_;  ///< bucket << 32 | number of a photon
   std::array<Box3, kPhotonOctaves> bounds_{};
   std::uint32_t octaves_ = 0;

@@ -55,9 +55,20 @@ bool has_tails(const Material& m, bool caster)
   return caster && m.displacement_index < 0 && !m.unlit && !m.has_closures && m.roughness >= kSharpestTails;
 }
 
-CausticsDecision caustics_decide(const Scene& scene, LightSet& lights, CausticsMode mode)
+/// See CausticsView.
+std::uint32_t events_switched_off(CausticKinds kinds)
 {
+  constexpr std::uint32_t kReflection = 1u << static_cast<int>(PathEvent::kGlossy);
+  constexpr std::uint32_t kRefraction = 1u << static_cast<int>(PathEvent::kTransmission);
+  constexpr std::uint32_t kOff[] = {0, kRefraction, kReflection, kReflection | kRefraction};
+  return kOff[static_cast<int>(kinds)];
+}
+
+CausticsDecision caustics_decide(const Scene& scene, LightSet& lights, const CausticSettings& settings)
+{
+  const CausticsMode mode = settings.mode;
   if (mode == CausticsMode::kOff) return {false, "off"};
+  if (settings.kinds == CausticKinds::kNone) return {false, "there are to be none"};
   bool any_caster = false, any_receiver = false;
   for (const Instance& instance : scene.instances) {
     const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
@@ -97,10 +108,11 @@ SceneContext::SceneContext(const Scene& loaded,
   make_views();
   lights = light_set_make(scene, scene.textures->views(), environment_density, &globals);
 
-  CausticsDecision decision = caustics_decide(scene, lights, caustics.mode);
+  CausticsDecision decision = caustics_decide(scene, lights, caustics);
   caustics_reason = std::move(decision.reason);
   globals.caustics.enabled = decision.enabled;
   globals.caustics.roughness = kSharpestGathered;
+  globals.caustics.switched_off = events_switched_off(caustics.kinds);
   for (std::size_t i = 0; i < instances.size(); ++i) {
     InstanceView& view = instances[i];
     view.first_light_index = lights.first_light_index[i];

@@ -32,6 +32,10 @@ inline constexpr std::string_view kNoiseMathsLabels[] = {"3.4", "4.3"};
 enum class CausticsMode : std::uint8_t { kAuto, kOn, kOff };
 inline constexpr std::string_view kCausticsModeLabels[] = {"auto", "on", "off"};
 
+/// Which light reaches diffuse surfaces by way of microfacets: what was reflected last, or refracted.
+enum class CausticKinds : std::uint8_t { kBoth, kReflective, kRefractive, kNone };
+inline constexpr std::string_view kCausticKindsLabels[] = {"both", "reflective", "refractive", "none"};
+
 inline constexpr std::string_view kMistFalloffLabels[] = {"linear", "quadratic",
                                                           "inverse-quadratic"};  ///< of MistFalloff
 

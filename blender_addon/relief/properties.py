@@ -149,6 +149,18 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
             ),
         ),
     )
+    caustic_kinds: EnumProperty(
+        name="Kinds of Caustics",
+        **_declared(
+            "caustics.kinds",
+            items=(
+                ("both", "Both", "Reflections and refractions (default)"),
+                ("reflective", "Reflective", "Reflections alone"),
+                ("refractive", "Refractive", "Refractions alone"),
+                ("none", "None", "Neither"),
+            ),
+        ),
+    )
     displacement_method: EnumProperty(
         name="Method",
         description="How displaced meshes are traced. All but the tessellating ones show the same surface (default "

@@ -206,6 +206,11 @@ class RELIEF_PT_light_paths(_RenderPanel, bpy.types.Panel):
             rows.prop(owner, f"clamp_{kind}" if cycles is None else f"sample_clamp_{kind}", text=f"Clamp {kind.title()}")
         rows.prop(owner, "filter_glossy" if cycles is None else "blur_glossy", text="Filter Glossy")
         rows.prop(settings, "caustics")
+        if cycles is None:
+            rows.prop(settings, "caustic_kinds")
+        else:
+            rows.prop(cycles, "caustics_reflective")
+            rows.prop(cycles, "caustics_refractive")
 
 
 class RELIEF_PT_displacement(_RenderPanel, bpy.types.Panel):

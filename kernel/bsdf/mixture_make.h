@@ -27,10 +27,11 @@ struct MixtureBuild {
   Vec3f emission{};
   Vec3f transparency{};
   float holdout = 0;
-  bool transmits = false;           ///< some lobe sends light through the surface
-  bool is_4 = false, is_5 = false;  ///< see MixtureLobe: of the closure that is added
-  float blur = 0;                   ///< see path_blur; 0: none
-  float most_sharp = -1;            ///< perceptual roughness up to which lobes are not blurred
+  bool transmits = false;                 ///< some lobe sends light through the surface
+  bool is_4 = false, is_5 = false;        ///< see MixtureLobe: of the closure that is added
+  float blur = 0;                         ///< see path_blur; 0: none
+  float most_sharp = -1;                  ///< perceptual roughness up to which lobes are not blurred
+  bool reflects = true, refracts = true;  ///< there are microfacets that do so; see path_does_without
 };
 
 RELIEF_KERNEL float mean_component(Vec3f v) { return (v.x + v.y + v.z) * (1.0f / 3.0f); }
@@ -100,6 +101,12 @@ RELIEF_KERNEL MixtureLobe* mixture_add(MixtureBuild& b, Vec3f weight, const Fram
   lobe.is_bent = !(dot(frame.n, b.Ns) > 1.0f - 1e-6f);
   if (lobe.is_bent) lobe.surface_N = to_local(frame, b.Ns);
   return &lobe;
+}
+
+/// The same of microfacets that reflect.
+RELIEF_KERNEL MixtureLobe* reflection_add(MixtureBuild& b, Vec3f weight, const Frame& frame)
+{
+  return b.reflects ? mixture_add(b, weight, frame) : nullptr;
 }
 
 /// Widens a lobe of microfacets to a least width. The energy that it has been given back stays that of before.
@@ -269,7 +276,7 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec&, float
 RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const GlossyInputs& in)
 {
   const Vec3f N = closure_normal(b, in.normal);
-  MixtureLobe* lobe = mixture_add(b, weight * in.color, closure_tangent_frame(N, in.tangent, in.rotation));
+  MixtureLobe* lobe = reflection_add(b, weight * in.color, closure_tangent_frame(N, in.tangent, in.rotation));
   if (lobe == nullptr) return;
   const float roughness = closure_roughness(spec, in.roughness);
   lobe_set_microfacets(*lobe, spec, roughness, anisotropic_alpha_of_glossy(roughness, in.anisotropy));
@@ -285,7 +292,7 @@ RELIEF_KERNEL void refraction_add(MixtureBuild& b,
                                   float roughness,
                                   float eta)
 {
-  MixtureLobe* lobe = mixture_add(b, weight, frame_from_normal(N));
+  MixtureLobe* lobe = b.refracts ? mixture_add(b, weight, frame_from_normal(N)) : nullptr;
   if (lobe == nullptr) return;
   lobe->kind = MixtureLobeKind::kRefraction;
   lobe->roughness = spec.distribution == ClosureDistribution::kSharp ? 0.0f : saturated(__builtin_fabsf(roughness));
@@ -316,6 +323,10 @@ RELIEF_KERNEL void glass_add(MixtureBuild& b,
                              Vec3f reflection_tint,
                              Vec3f transmission_tint)
 {
+  if (!b.reflects && !b.refracts) return;
+  // Up to 3.6 such glass has both or nothing.
+  if (spec.is_4 && !b.reflects) reflection_tint = {};
+  if (spec.is_4 && !b.refracts) transmission_tint = {};
   MixtureLobe* lobe = mixture_add(b, splat3(weight), frame_from_normal(N));
   if (lobe == nullptr) return;
   lobe->kind = MixtureLobeKind::kGlass;
@@ -330,8 +341,10 @@ RELIEF_KERNEL void glass_add(MixtureBuild& b,
     const GlassCoordinate at = glass_coordinate(fresnel.eta, lobe->roughness);
     const float lost = glass_lost(*b.tables, at, at.side, lobe->wo.z);
     const float lost_mean = glass_lost_mean(*b.tables, at, at.side);
-    lobe_scale(*lobe,
-               microfacet_energy_factor(saturated(transmission_tint), max(1.0f - lost, 1e-3f), 1.0f - lost_mean));
+    const bool mirrors = spec.is_4 && is_zero(transmission_tint);
+    const Vec3f F_mean =
+        mirrors ? reflection_tint * fresnel_interpolated_mean(fresnel.a, {1, 1, 1}, fresnel.eta) : transmission_tint;
+    lobe_scale(*lobe, microfacet_energy_factor(saturated(F_mean), max(1.0f - lost, 1e-3f), 1.0f - lost_mean));
   }
   lobe->probability = weight * mean_component(max(reflection_tint, transmission_tint));
   b.transmits = true;
@@ -390,7 +403,7 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
   }
   // Up to 3.6 the surface's own normal decides how much is reflected, whatever its microfacets are.
   const float F = fresnel_dielectric_at(saturated(dot(N, b.wo)), eta);
-  if (MixtureLobe* lobe = mixture_add(b, color * (weight * F), frame_from_normal(N))) {
+  if (MixtureLobe* lobe = reflection_add(b, color * (weight * F), frame_from_normal(N))) {
     const float roughness = closure_roughness(spec, in.roughness);
     lobe_set_microfacets(*lobe, spec, roughness, anisotropic_alpha_of_glossy(roughness, 0.0f));
   }
@@ -400,7 +413,7 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
 RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const MetallicInputs& in)
 {
   const Vec3f N = closure_normal(b, in.normal);
-  MixtureLobe* lobe = mixture_add(b, splat3(weight), closure_tangent_frame(N, in.tangent, in.rotation));
+  MixtureLobe* lobe = reflection_add(b, splat3(weight), closure_tangent_frame(N, in.tangent, in.rotation));
   if (lobe == nullptr) return;
   const float roughness = saturated(in.roughness);
   lobe_set_microfacets(*lobe, spec, roughness, anisotropic_alpha_of_principled(roughness, saturated(in.anisotropy)));
@@ -452,7 +465,7 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec&, float
 RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const ToonInputs& in)
 {
   const Toon toon = toon_make(in.size, in.smooth, spec.is_other);
-  if (toon_is_empty(toon)) return;
+  if (toon_is_empty(toon) || (toon.is_glossy && !b.reflects)) return;
   const Frame frame = frame_from_normal(closure_diffuse_normal(b, spec, in.normal));
   MixtureLobe* lobe = mixture_add(b, weight * in.color, frame, true);
   if (lobe == nullptr) return;
@@ -474,7 +487,7 @@ RELIEF_KERNEL void principled3_specular_add(MixtureBuild& b,
                                             const Principled3Inputs& in)
 {
   if (!(in.specular > kLeastClosureWeight || in.metallic > kLeastClosureWeight)) return;
-  MixtureLobe* lobe = mixture_add(b, splat3(weight), closure_tangent_frame(N, in.tangent, in.anisotropic_rotation));
+  MixtureLobe* lobe = reflection_add(b, splat3(weight), closure_tangent_frame(N, in.tangent, in.anisotropic_rotation));
   if (lobe == nullptr) return;
   SurfaceClosureSpec own = spec;
   // As Cycles does: smooth surfaces lose nothing worth giving back.
@@ -511,7 +524,7 @@ RELIEF_KERNEL void principled3_glass_add(MixtureBuild& b,
   SurfaceClosureSpec own = spec;
   own.distribution = ClosureDistribution::kGgx;
   const float F = fresnel_dielectric_at(saturated(dot(N, b.wo)), eta);
-  if (MixtureLobe* lobe = mixture_add(b, splat3(weight * F), frame_from_normal(N))) {
+  if (MixtureLobe* lobe = reflection_add(b, splat3(weight * F), frame_from_normal(N))) {
     const float roughness = closure_roughness(spec, in.roughness);
     lobe_set_microfacets(*lobe, own, roughness, anisotropic_alpha_of_glossy(roughness, 0.0f));
     lobe->fresnel = fresnel;
@@ -554,7 +567,7 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b,
   if (glass_weight > kLeastClosureWeight) principled3_glass_add(b, spec, weight * glass_weight, N, in);
   if (in.clearcoat > kLeastClosureWeight) {
     const Vec3f coat_N = closure_normal(b, in.clearcoat_normal);
-    MixtureLobe* coat = mixture_add(b, splat3(weight * kGtr1Strength * in.clearcoat), frame_from_normal(coat_N));
+    MixtureLobe* coat = reflection_add(b, splat3(weight * kGtr1Strength * in.clearcoat), frame_from_normal(coat_N));
     if (coat == nullptr) return;
     coat->kind = MixtureLobeKind::kClearcoat;
     coat->roughness = closure_roughness(spec, in.clearcoat_roughness);
@@ -594,7 +607,7 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b,
     weight = layered_weight(weight, max(in.sheen_tint, Vec3f{}) * (in.sheen_weight * albedo));
   }
   if (coat > kLeastClosureWeight) {
-    MixtureLobe* lobe = mixture_add(b, weight * coat, frame_from_normal(coat_N));
+    MixtureLobe* lobe = reflection_add(b, weight * coat, frame_from_normal(coat_N));
     if (lobe != nullptr) {
       // Since 5.0 what its facets reflect more than once is given back, and it takes from below what it reflects; before it took
       // what a smooth one reflects.
@@ -622,7 +635,7 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b,
   const Frame base_frame = closure_tangent_frame(N, in.tangent, in.anisotropic_rotation);
   const AnisotropicAlpha alpha = anisotropic_alpha_of_principled(roughness, saturated(in.anisotropic));
   if (metallic > kLeastClosureWeight) {
-    if (MixtureLobe* lobe = mixture_add(b, weight * metallic, base_frame)) {
+    if (MixtureLobe* lobe = reflection_add(b, weight * metallic, base_frame)) {
       lobe_set_microfacets(*lobe, spec, roughness, alpha);
       const FresnelF82 f = fresnel_f82_make(saturated(base_color), min(specular_tint, splat3(1.0f)));
       lobe->fresnel = {MixtureFresnel::kF82, 1.0f, f.F0, f.B, 1.0f, 0.0f};
@@ -654,7 +667,7 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b,
     eta = ior < 1.0f ? 1.0f / ior_of_F0(F0) : ior_of_F0(F0);
   }
   if (eta != 1.0f || film_nm > kLeastFilmNanometres) {
-    if (MixtureLobe* lobe = mixture_add(b, weight, base_frame)) {
+    if (MixtureLobe* lobe = reflection_add(b, weight, base_frame)) {
       lobe_set_microfacets(*lobe, spec, roughness, alpha);
       lobe->fresnel = dielectric_fresnel(b, spec, eta, film_nm, film_ior);
       lobe->fresnel.a = saturated(specular_tint * F0);

@@ -33,12 +33,16 @@ struct PhotonMapView {
   const Box3* bounds = nullptr;                 ///< of photons, for each octave
   std::uint32_t octaves = 0;  ///< bit i: there are photons of radii in largest_radius · (2^−i−1, 2^−i]
   float largest_radius = 0;   ///< metres; 0: no photons. Cells are twice as wide as an octave's largest
+  const std::uint8_t* near =
+      nullptr;                  ///< near_mask + 1 entries, by photon_near; bit i: a photon of octave i reaches there
+  std::uint32_t near_mask = 0;  ///< a power of two − 1
 };
 
 /// What the stages need of the caustic pass.
 struct CausticsView {
   bool enabled = false;
-  float roughness = 0;  ///< perceptual, see sharp_lobes
+  std::uint32_t switched_off = 0;  ///< bit PathEvent: light that was scattered so last lights nothing diffuse
+  float roughness = 0;             ///< perceptual, see sharp_lobes
   PhotonMapView map;
   float time = 0;  ///< of all photons of the pass, and of all paths that gather them
 };
@@ -54,6 +58,12 @@ RELIEF_KERNEL std::uint32_t photon_row(std::int32_t y, std::int32_t z, int octav
 {
   return (static_cast<std::uint32_t>(y) * 0x9e3779b1u ^ static_cast<std::uint32_t>(z) * 0x85ebca77u) +
          static_cast<std::uint32_t>(octave) * 0xc2b2ae35u;
+}
+
+/// Entry of PhotonMapView::near for a cell as wide as the largest radius. Cells may share one.
+RELIEF_KERNEL std::uint32_t photon_near(std::int32_t x, std::int32_t y, std::int32_t z, std::uint32_t mask)
+{
+  return (photon_row(y, z, kPhotonOctaves) + static_cast<std::uint32_t>(x)) & mask;
 }
 
 /// Octave of a photon's radius.

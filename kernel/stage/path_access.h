@@ -88,6 +88,19 @@ RELIEF_KERNEL std::uint32_t path_flags_after(std::uint32_t flags, PathEvent even
   return (flags & ~(3u << kPathEventShift)) | static_cast<std::uint32_t>(event) << kPathEventShift;
 }
 
+/// Microfacets that a path does not see: after a diffuse event those by which there are to be no caustics.
+/// @return  bits PathEvent
+RELIEF_KERNEL std::uint32_t path_does_without(const KernelGlobals& g, std::uint32_t flags)
+{
+  return path_event(flags) == static_cast<std::uint32_t>(PathEvent::kDiffuse) ? g.caustics.switched_off : 0;
+}
+
+/// Whether bits PathEvent have that of light that microfacets send on.
+RELIEF_KERNEL bool events_have(std::uint32_t events, bool transmitted)
+{
+  return (events >> static_cast<int>(transmitted ? PathEvent::kTransmission : PathEvent::kGlossy) & 1u) != 0;
+}
+
 /// Surfaces the path has met before, transparent ones included: what dimension_bounce counts by, so that no two
 /// surfaces share random numbers. A photon's first scattering is not among its bounces.
 RELIEF_KERNEL int path_surface(const PathState& s, std::uint32_t i)
@@ -250,6 +263,13 @@ RELIEF_KERNEL bool photon_bounces_left(const BounceLimits& limits,
 RELIEF_KERNEL std::uint32_t path_flags_left_to_paths(std::uint32_t flags)
 {
   return flags & ~std::uint32_t{kPathAfterSoft | kPathCaustic};
+}
+
+/// Whether light that a sharp event takes to where a path comes from is no photon's: such caustics are switched off, and what sees
+/// them nevertheless, after an event that is no diffuse one, is the path alone.
+RELIEF_KERNEL bool path_is_alone(const KernelGlobals& g, std::uint32_t flags, bool transmitted)
+{
+  return (flags & kPathAfterSoft) != 0 && events_have(g.caustics.switched_off, transmitted);
 }
 
 /// The flags of a path after a scattering event.

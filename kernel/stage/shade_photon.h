@@ -65,8 +65,8 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
                                                               : BounceKind::kGlossy;
     state.bounces[path] += 1u + (1u << static_cast<int>(kind));
   }
-  state.flags[path] =
-      sharp ? (state.flags[path] | kPathCaustic) & ~std::uint32_t{kPathAfterSoft} : state.flags[path] | kPathAfterSoft;
+  const std::uint32_t flags = path_flags_after(state.flags[path], event);
+  state.flags[path] = sharp ? (flags | kPathCaustic) & ~std::uint32_t{kPathAfterSoft} : flags | kPathAfterSoft;
   if (transmitted && at.params.transmission > 0.0f && !at.params.thin) {
     const Vec3f inside = side.front ? at.params.sigma_a : Vec3f{};
     state.sigma_a[path] = inside;
@@ -104,7 +104,9 @@ RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
   surface_interaction_frame<kFeatures>(g, state, path, wo, at);
   const bool caster = (flags & kCausticCaster) != 0;
   // From one facet to the next light is the paths' to bring: a search would have to know the heights of both.
-  const bool arrived = has_scattered && (state.flags[path] & kPathAfterSoft) == 0 && !path_is_among_facets(state, path);
+  const bool arrived = has_scattered && (state.flags[path] & kPathAfterSoft) == 0 &&
+                       (g.caustics.switched_off >> path_event(state.flags[path]) & 1u) == 0 &&
+                       !path_is_among_facets(state, path);
   const bool soft = arrived && (flags & kGathersPhotons) != 0;
   if (soft || (arrived && (flags & kGathersTails) != 0)) {
     // Along the ray, as gather_photons: on a triangle that is large against the caustic, at.hit is less exact.

@@ -14,6 +14,14 @@
 
 namespace relief {
 
+/// The part of a surface's f that is diffuse.
+/// @param wi  in the closure's frame
+template <unsigned kFeatures, typename Closure>
+[[gnu::noinline]] RELIEF_KERNEL Vec3f shade_surface_diffuse(const KernelGlobals& g, const Closure& closure, Vec3f wi)
+{
+  return closure_eval<kFeatures>(closure_diffuse(closure), *g.bsdf_tables, wi).f;
+}
+
 /// The part of a surface's f that a light is not hidden from.
 /// @param wi  in the closure's frame
 /// @param f   of all
@@ -22,7 +30,7 @@ template <unsigned kFeatures, typename Closure>
 shade_surface_seen_by(const KernelGlobals& g, const Closure& closure, Vec3f wi, Vec3f f, LightHides hides)
 {
   if (!hides.differs()) return hides.diffuse ? Vec3f{} : f;
-  const Vec3f diffuse = closure_eval<kFeatures>(closure_diffuse(closure), *g.bsdf_tables, wi).f;
+  const Vec3f diffuse = shade_surface_diffuse<kFeatures>(g, closure, wi);
   return hides.diffuse ? max(f - diffuse, Vec3f{}) : diffuse;
 }
 
@@ -57,16 +65,23 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   if (is_zero(radiance)) return;
   const Vec3f wi = to_local(at.side.frame, light.wi);
   BsdfEval bsdf = closure_eval<kFeatures>(closure, *g.bsdf_tables, wi);
+  const auto transmits = [&] { return (wi.z < 0.0f) != (dot(at.side.frame.n, path_direction(state, path)) > 0.0f); };
+  if constexpr ((kFeatures & kFeatureMixture) == 0) {
+    const std::uint32_t without = path_does_without(g, state.flags[path]);
+    if (__builtin_expect(without != 0, 0) && events_have(without, transmits())) {
+      bsdf.f = shade_surface_diffuse<kFeatures>(g, closure, wi);
+    }
+  }
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
     if (light_casts_caustics(g.lights, light.ref.light_index) && path_caustic_after(state.flags[path], *at.instance) &&
-        shading_is_reversible(at.side, light.wi) && !path_crosses_facets(state, path, light.wi)) {
+        shading_is_reversible(at.side, light.wi) && !path_crosses_facets(state, path, light.wi) &&
+        !path_is_alone(g, state.flags[path], transmits())) {
       bsdf.f = closure_eval<kFeatures>(closure_soft(closure, kAllSharp), *g.bsdf_tables, wi).f;
     }
   }
   bool is_found_here_alone = light.delta;
   if (emitter != nullptr && __builtin_expect(emitter->hidden_from != 0, 0)) {
-    const bool transmits = (wi.z < 0.0f) != (dot(at.side.frame.n, path_direction(state, path)) > 0.0f);
-    const LightHides hides = light_hides(*emitter, transmits);
+    const LightHides hides = light_hides(*emitter, transmits());
     is_found_here_alone = light.delta || hides.differs();
     bsdf.f = shade_surface_seen_by<kFeatures>(g, closure, wi, bsdf.f, hides);
   }
@@ -240,10 +255,22 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
   const std::uint32_t bounces = state.bounces[path];
   if (!(bsdf.pdf > 0.0f)) return;
   const Vec3f wi = from_local(side.frame, bsdf.wi);
+  const bool transmitted = (bsdf.lobe & kLobeTransmit) != 0;
+  bool is_diffuse_alone = false;
+  if constexpr ((kFeatures & kFeatureMixture) == 0) {
+    const std::uint32_t without = path_does_without(g, state.flags[path]);
+    is_diffuse_alone = __builtin_expect(without != 0, 0) && events_have(without, transmitted);
+    if (is_diffuse_alone) {
+      if ((bsdf.lobe & kLobeDelta) != 0) return;
+      bsdf.f = shade_surface_diffuse<kFeatures>(g, closure, bsdf.wi);
+    }
+  }
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
     const SharpLobes sharp = path_sharp_lobes(g, state.flags[path], at, wi, bsdf.pdf);
-    const bool is_sharp = closure_split<kFeatures>(closure, *g.bsdf_tables, sharp, u.sharpness, bsdf);
-    const bool is_paths = (is_sharp && !shading_is_reversible(side, wi)) || path_crosses_facets(state, path, wi);
+    const bool is_sharp =
+        !is_diffuse_alone && closure_split<kFeatures>(closure, *g.bsdf_tables, sharp, u.sharpness, bsdf);
+    const bool is_alone = !shading_is_reversible(side, wi) || path_is_alone(g, state.flags[path], transmitted);
+    const bool is_paths = (is_sharp && is_alone) || path_crosses_facets(state, path, wi);
     state.flags[path] = is_paths ? path_flags_left_to_paths(state.flags[path])
                                  : path_caustic_flags(state.flags[path], *at.instance, is_sharp);
   }
@@ -266,7 +293,6 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
   state.pdf[path] = delta ? 0.0f : bsdf.pdf;
   if (!delta) state.least_pdf[path] = min(state.least_pdf[path], bsdf.pdf);
   state.scatter_N[path] = light_N;
-  const bool transmitted = (bsdf.lobe & kLobeTransmit) != 0;
   const bool diffuse = (bsdf.lobe & kLobeDiffuse) != 0;
   const BounceKind kind = transmitted ? BounceKind::kTransmission
                           : diffuse   ? BounceKind::kDiffuse

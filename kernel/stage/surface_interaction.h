@@ -179,6 +179,7 @@ RELIEF_KERNEL void mixture_lobes_defend(MixtureLobes& lobes, float passing)
 
 /// Resolves the closures of a located point: its lobes, its frame, and the parameters that stages ask for.
 /// @param lane         of the material's program
+/// @param without      see path_does_without
 /// @param is_first     of a path from the camera
 /// @param lobes        gets the lobes
 template <unsigned kFeatures>
@@ -186,6 +187,7 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
                                            Vec3f wo,
                                            const GraphLane& lane,
                                            SurfaceBlur blur,
+                                           std::uint32_t without,
                                            bool is_first,
                                            SurfaceInteraction& at,
                                            MixtureLobes& lobes)
@@ -196,6 +198,8 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   MixtureBuild build{wo, side.Ng, Ns, side.front, g.bsdf_tables, &lobes};
   build.blur = blur.alpha;
   build.most_sharp = blur.most_sharp;
+  build.reflects = !events_have(without, false);
+  build.refracts = !events_have(without, true);
   if (const std::uint16_t first = lane.program->surface_normal; first != kNoGraphOperand) {
     const Vec3f given{graph_result(lane, first), graph_result(lane, first + 1), graph_result(lane, first + 2)};
     // Since 4.0 what displaces nothing bends freely.
@@ -275,7 +279,8 @@ RELIEF_KERNEL void surface_interaction_resolve(const KernelGlobals& g,
                                  : graph_at_point(g.run_graph, g.graphs[at.material->graph_index], g.textures,
                                                   surface_graph_point(g, state, path, at, wo), registers);
       if (has_mixture<kFeatures>(at)) {
-        surface_interaction_mix<kFeatures>(g, wo, lane, blur, path_surface(state, path) == 0, at, lobes);
+        surface_interaction_mix<kFeatures>(g, wo, lane, blur, path_does_without(g, state.flags[path]),
+                                           path_surface(state, path) == 0, at, lobes);
       } else {
         at.params = graph_surface_params<kFeatures>(*at.material, graph_values(lane), g.textures, at.hit, at.uv_width);
         if (blur.alpha > 0.0f) surface_params_blur(at.params, blur);

@@ -10,6 +10,8 @@ from scenes import (
     add_camera,
     add_light,
     add_plane,
+    add_sphere,
+    degrees,
     diffuse,
     folder,
     link,
@@ -112,6 +114,42 @@ def test_objects_and_lights_may_stay_out():
     scene.relief.caustics = "off"
     assert _caustic(scene) == 0
     scene.relief.caustics = "on"
+    scene.cycles.caustics_refractive = False
+    assert _caustic(scene) == 0
+    scene.cycles.caustics_refractive = True
     for thing in scene.objects:
         thing.relief.caustic_receiver = False
     assert _caustic(scene) == 0
+
+
+def _balls():
+    """Glass and metal of all kinds on plastic, under a lamp that paths find by them."""
+    scene = new_scene(48, 32)
+    set_bounces(scene, 8)
+    set_world((0.3, 0.35, 0.4))
+    scene.cycles.blur_glossy = 0.0
+    add_plane(8, new_material("plastic", "ShaderNodeBsdfPrincipled", Roughness=0.3, Base_Color=(0.7, 0.7, 0.7, 1))[0])
+    materials = (
+        new_material("rough glass", "ShaderNodeBsdfGlass", Roughness=0.1)[0],
+        new_material("glass", "ShaderNodeBsdfGlass", Roughness=0.0)[0],
+        new_material("metal", "ShaderNodeBsdfPrincipled", Metallic=1.0, Roughness=0.1)[0],
+        new_material("mirror", "ShaderNodeBsdfAnisotropic", Roughness=0.0)[0],
+        new_material("principled glass", "ShaderNodeBsdfPrincipled", Transmission=1.0, Roughness=0.2)[0],
+    )
+    for i, material in enumerate(materials):
+        add_sphere(0.5, material, (1.1 * (i - 2), 0.6 * (i % 2), 0.51))
+    add_light("AREA", (1, -1, 3), degrees(15, 18, 0), energy=200).data.size = 2
+    add_camera((0, -4, 2.6), degrees(58, 0, 0), lens=35)
+    return scene
+
+
+def test_switches_of_caustics_are_those_of_cycles():
+    from scenes import assert_agrees
+
+    for reflective, refractive in ((False, False), (True, False), (False, True)):
+        scene = _balls()
+        scene.cycles.caustics_reflective, scene.cycles.caustics_refractive = reflective, refractive
+        for mode in ("on", "off"):
+            scene.relief.caustics = mode
+            # Photons blur what is as narrow as their radius, and pixels of few of them stand out.
+            assert_agrees(scene, runs=5, samples=64, block=8, tolerance=0.02 if mode == "on" else 0.0)

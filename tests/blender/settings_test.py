@@ -136,8 +136,6 @@ def test_what_changes_cycles_picture_alone_is_warned_about():
     set_world((1, 1, 1))
     for owner, name, value, text in (
         (cycles, "use_fast_gi", True, "Fast GI"),
-        (cycles, "caustics_reflective", False, "reflective caustics"),
-        (cycles, "caustics_refractive", False, "refractive caustics"),
         (lamp.data.cycles, "max_bounces", 1, f'light "{lamp.data.name}"'),
         (scene.world.cycles, "max_bounces", 1, "the world"),
     ):
@@ -264,6 +262,7 @@ def test_properties_are_as_the_program_declares_them():
         "clamp_direct": "clampDirect",
         "clamp_indirect": "clampIndirect",
         "caustics": "caustics.mode",
+        "caustic_kinds": "caustics.kinds",
         "filter_type": "pixelFilter.type",
         "filter_width": "pixelFilter.width",
     }.items():

@@ -9,6 +9,9 @@ from .. import compat
 #: Cycles' pixel filters: relief's name, and what a width of Cycles' is multiplied by. Relief's widths are where filters end.
 _FILTERS = {"BOX": ("box", 0.0), "BLACKMAN_HARRIS": ("blackman-harris", 2.0), "GAUSSIAN": ("gaussian", 3.0)}
 
+#: The format's names of which caustics there are, by whether there are reflective and refractive ones.
+_CAUSTIC_KINDS = {(True, True): "both", (True, False): "reflective", (False, True): "refractive", (False, False): "none"}
+
 #: Cycles' 0, where it means no end.
 _ENDLESS = 16777216
 
@@ -40,6 +43,7 @@ class Sampling:
     clamp_indirect: float
     filter_type: str
     filter_width: float
+    caustic_kinds: str
 
 
 #: Names of scene.relief's settings that Cycles has, too.
@@ -80,6 +84,7 @@ def sampling_of(scene, view_layer):
         clamp_indirect=cycles.sample_clamp_indirect,
         filter_type=filter_type,
         filter_width=cycles.filter_width * width_factor or 1.0,
+        caustic_kinds=_CAUSTIC_KINDS[cycles.caustics_reflective, cycles.caustics_refractive],
     )
 
 
@@ -128,9 +133,6 @@ def warn_unread_settings(scene, warn):
         return
     if cycles.use_fast_gi:
         warn("Fast GI Approximation", "all bounces were traced")
-    for name in ("reflective", "refractive"):
-        if not getattr(cycles, f"caustics_{name}"):
-            warn(f"{name} caustics switched off for Cycles", "they are rendered: see Light Paths > Caustics")
     if scene.render.use_simplify:
         for name, label in (("use_camera_cull", "Camera Culling"), ("use_distance_cull", "Distance Culling")):
             if getattr(cycles, name) and any(getattr(getattr(o, "cycles", None), name, False) for o in scene.objects):
@@ -176,7 +178,7 @@ def render_settings(scene, view_layer, size):
         "clampDirect": sampling.clamp_direct,
         "clampIndirect": sampling.clamp_indirect,
         "pixelFilter": {"type": sampling.filter_type, "width": sampling.filter_width},
-        "caustics": {"mode": scene.relief.caustics},
+        "caustics": {"mode": scene.relief.caustics, "kinds": sampling.caustic_kinds},
         "frameRange": [scene.frame_start, scene.frame_end],
         "fps": scene.render.fps / scene.render.fps_base,
     }
