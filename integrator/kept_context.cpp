@@ -38,6 +38,7 @@ SceneContext context_make(const Scene& scene, const ContextOptions& options)
 {
   CausticSettings caustics;
   caustics.mode = options.caustics;
+  caustics.kinds = options.caustic_kinds;
   return SceneContext(scene, options.displacement, options.environment_density, caustics, options.trees);
 }
 
@@ -45,7 +46,8 @@ const SceneContext& KeptContext::get(const Scene& scene, const ContextOptions& o
 {
   is_kept_ = made_ != nullptr && is_same(scene, made_->options.displacement, options.displacement) &&
              made_->options.environment_density == options.environment_density &&
-             made_->options.caustics == options.caustics && made_->options.trees == options.trees;
+             made_->options.caustics == options.caustics && made_->options.trees == options.trees &&
+             made_->options.caustic_kinds == options.caustic_kinds;
   if (is_kept_) return made_->context;
   made_.reset();
   const auto start = std::chrono::steady_clock::now();

@@ -14,6 +14,7 @@ struct ContextOptions {
   EnvironmentDensity environment_density = EnvironmentDensity::kExcess;
   CausticsMode caustics = CausticsMode::kOff;
   std::shared_ptr<KeptTrees> trees;  ///< of the scenes before; null: none
+  CausticKinds caustic_kinds = CausticKinds::kBoth;
 };
 
 /// @error as SceneContext

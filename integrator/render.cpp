@@ -186,7 +186,7 @@ ContextOptions context_options(const RenderOptions& options)
   displacement.picture_height = options.settings.height;
   const bool light_sampling_alone = options.light_technique == LightTechnique::kLightSampling;
   return {displacement, light_sampling_alone ? EnvironmentDensity::kRadiance : EnvironmentDensity::kExcess,
-          options.settings.caustics.mode, options.trees};
+          options.settings.caustics.mode, options.trees, options.settings.caustics.kinds};
 }
 
 }  // namespace

@@ -632,7 +632,7 @@ TEST(Mixture, InputsThatAreNoNumbersGiveFiniteLight)
     float numbers[sizeof(Principled4Inputs) / sizeof(float)];
     for (float& x : numbers) {
       x = closure_input(
-          splat8(random.next() < 0.2f ? kBad[static_cast<int>(5.99f * random.next())] : random.next()))[0];
+          random.next() < 0.2f ? kBad[static_cast<int>(5.99f * random.next())] : random.next());
     }
     const MixtureCase one{"", [&](MixtureBuild& b) {
                             Principled4Inputs four;
