@@ -148,6 +148,7 @@ def test_switches_of_caustics_are_those_of_cycles():
 
     for reflective, refractive in ((False, False), (True, False), (False, True)):
         scene = _balls()
+        scene.relief.use_cycles_settings = True
         scene.cycles.caustics_reflective, scene.cycles.caustics_refractive = reflective, refractive
         for mode in ("on", "off"):
             scene.relief.caustics = mode
