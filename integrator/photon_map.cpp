@@ -90,9 +90,10 @@ void PhotonMap::build(const std::vector<std::vector<Photon>>& chunks, const std:
 
 void PhotonMap::mark_near(const std::vector<const Photon*>& photons, const std::vector<float>& radii)
 {
-  // A photon's ball reaches into three cells an axis at most. Some hundred photons share a cell where they lie dense.
+  // A photon's ball reaches into three cells an axis at most. A table of a byte a photon: where they lie dense many share a cell, so
+  // that few entries are taken, and few cells share one.
   constexpr std::uint32_t kFewest = 64;
-  near_.assign(std::max(kFewest, std::bit_ceil(static_cast<std::uint32_t>(photons.size() / 4 + 1))), 0);
+  near_.assign(std::max(kFewest, std::bit_ceil(static_cast<std::uint32_t>(photons.size()))), 0);
   const auto mask = static_cast<std::uint32_t>(near_.size()) - 1;
   const float least_inverse = 1.0f / sqr(largest_radius_), inverse_cell = 1.0f / largest_radius_;
   tbb::parallel_for(std::size_t{0}, photons.size(), [&](std::size_t i) {
