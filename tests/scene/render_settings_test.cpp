@@ -102,7 +102,7 @@ TEST(RenderSettingsList, WhatIsReadIsShown)
     "filterGlossy": 0.5, "clampDirect": 4, "maxBounces": 5, "diffuseBounces": 4,
     "glossyBounces": 3, "transmissionBounces": 2, "transparentBounces": 7, "seed": 9007199254740991, "view": "Filmic",
     "exposure": -1, "clampIndirect": 3, "filmExposure": 2, "frameRange": [-2, 8], "fps": 29.97,
-    "pixelFilter": {"type": "box", "width": 2}, "luminousEfficacy": 683, "caustics": {"mode": "on", "photons": 1000,
+    "pixelFilter": {"type": "box", "width": 2}, "luminousEfficacy": 683, "caustics": {"mode": "on", "kinds": "none", "photons": 1000,
     "alpha": 0.7, "radius": 0.1, "memory": 64}, "mist": {"start": 1, "depth": 2, "falloff": "linear"},
     "occlusionDistance": 0.3, "cryptomatteLevels": 8})");
   for (const SettingValue& setting : setting_values(read(said))) {
