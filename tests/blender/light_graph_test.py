@@ -114,7 +114,6 @@ def test_light_that_is_negative_in_parts_is_warned_about():
 
     for by, is_negative in ((-0.3, True), (4.0, False)):
         scene = _stage(lambda: None)
-        scene.relief.strict = False
         world = set_world((1, 1, 1))
         shine, tree, emission = new_material("shine", "ShaderNodeEmission")
         lamp = _Nodes(add_light("AREA", (1, -1, 3), energy=20, size=1))
