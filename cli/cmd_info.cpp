@@ -247,7 +247,6 @@ int info(const std::string& file,
   std::vector<std::string> warnings = scene.warnings;
   for (std::string& text : displacement_warnings(scene, displacement)) warnings.push_back(std::move(text));
   for (std::string& text : context.displacements.warnings()) warnings.push_back(std::move(text));
-  warnings.insert(warnings.end(), context.lights.warnings.begin(), context.lights.warnings.end());
   Statistics stats;
   context.fill(stats);
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <numeric>
 
 #include "kernel/graph/graph_op.h"
 #include "kernel/graph/graph_scene.h"
@@ -70,12 +69,7 @@ float quantity_of(const ComputedEnvironment& environment, const GraphInput& inpu
 }
 
 /// Radiance towards the first `count` of eight directions in world space.
-/// @param lost  gets what is negative; null: nobody asks
-void evaluate(const ComputedEnvironment& environment,
-              const Vec3f* directions,
-              int count,
-              Vec3f* radiance,
-              Vec3f* lost = nullptr)
+void evaluate(const ComputedEnvironment& environment, const Vec3f* directions, int count, Vec3f* radiance)
 {
   GraphRegisters registers;
   registers.used = (1u << count) - 1;
@@ -98,12 +92,6 @@ void evaluate(const ComputedEnvironment& environment,
       return std::isfinite(value) && value > 0.0f ? value : 0.0f;
     };
     radiance[k] = {result(0), result(1), result(2)};
-    if (lost == nullptr) continue;
-    const auto below = [&](int c) {
-      const float value = graph_result({&environment.program, &registers, k}, c);
-      return std::isfinite(value) && value < 0.0f ? -value : 0.0f;
-    };
-    lost[k] = {below(0), below(1), below(2)};
   }
 }
 
@@ -248,19 +236,15 @@ class CellMap {
   }
 
   /// Mean luminance of a cell, by side² places.
-  /// @param negative  gets the mean of what is negative added
-  float mean_at(int column, int row, int side, float& negative) const
+  float mean_at(int column, int row, int side) const
   {
     Vec3f directions[kLanes];
-    float sum = 0, below = 0;
+    float sum = 0;
     int waiting = 0;
     const auto add = [&] {
-      Vec3f radiance[kLanes], lost[kLanes];
-      evaluate(environment_, directions, waiting, radiance, lost);
-      for (int k = 0; k < waiting; ++k) {
-        sum += luminance(color_ * radiance[k]);
-        below += luminance(color_ * lost[k]);
-      }
+      Vec3f radiance[kLanes];
+      evaluate(environment_, directions, waiting, radiance);
+      for (int k = 0; k < waiting; ++k) sum += luminance(color_ * radiance[k]);
       waiting = 0;
     };
     for (int i = 0; i < side * side; ++i) {
@@ -268,7 +252,6 @@ class CellMap {
       if (waiting == kLanes) add();
     }
     if (waiting > 0) add();
-    negative += below / static_cast<float>(side * side);
     return sum / static_cast<float>(side * side);
   }
 
@@ -295,17 +278,13 @@ class CellMap {
   }
 
   /// Luminance of a row of cells by their middles.
-  /// @param negative  gets the sum of what is negative added
-  void row_by_middles(int row, float* out, float& negative) const
+  void row_by_middles(int row, float* out) const
   {
     for (int column = 0; column < ComputedCells::kColumns; column += kLanes) {
-      Vec3f directions[kLanes], radiance[kLanes], lost[kLanes];
+      Vec3f directions[kLanes], radiance[kLanes];
       for (int k = 0; k < kLanes; ++k) directions[k] = direction_at(column + k, row, 1, 0);
-      evaluate(environment_, directions, kLanes, radiance, lost);
-      for (int k = 0; k < kLanes; ++k) {
-        out[column + k] = luminance(color_ * radiance[k]);
-        negative += luminance(color_ * lost[k]);
-      }
+      evaluate(environment_, directions, kLanes, radiance);
+      for (int k = 0; k < kLanes; ++k) out[column + k] = luminance(color_ * radiance[k]);
     }
   }
 
@@ -469,28 +448,19 @@ ComputedCells computed_environment_cells(const ComputedEnvironment& computed,
   const int side = std::clamp((most_side + kColumns - 1) / kColumns, 1, kMostSide);
   ComputedCells cells;
   cells.luminance.resize(kNumCells);
-  std::vector<float> positive(kRows), negative(kRows);
   tbb::parallel_for(0, kRows, [&](int row) {
     float* const out = &cells.luminance[static_cast<std::size_t>(row) * kWidth];
-    float& below = negative[static_cast<std::size_t>(row)];
     if (side == 1) {
-      map.row_by_middles(row, out, below);
+      map.row_by_middles(row, out);
     } else {
-      for (int column = 0; column < kColumns; ++column) out[column] = map.mean_at(column, row, side, below);
+      for (int column = 0; column < kColumns; ++column) out[column] = map.mean_at(column, row, side);
     }
-    const float height = std::sin((static_cast<float>(row) + 0.5f) * std::numbers::pi_v<float> / kRows);
-    positive[static_cast<std::size_t>(row)] = height * std::accumulate(out, out + kWidth, 0.0f);
-    below *= height;
   });
-  const float above = std::accumulate(positive.begin(), positive.end(), 0.0f);
-  const float below = std::accumulate(negative.begin(), negative.end(), 0.0f);
-  cells.negative = below > 0 ? below / (above + below) : 0.0f;
   if (side < kFineSide) {
     const std::vector<std::size_t> fine = cells_to_refine(cells.luminance);
     tbb::parallel_for(std::size_t{0}, fine.size(), [&](std::size_t i) {
       const auto column = static_cast<int>(fine[i] % kWidth), row = static_cast<int>(fine[i] / kWidth);
-      float known = 0;
-      cells.luminance[fine[i]] = map.mean_at(column, row, kFineSide, known);
+      cells.luminance[fine[i]] = map.mean_at(column, row, kFineSide);
     });
   }
   for (const EnvironmentSun& sun : suns) cells.suns.push_back(map.sun_mean(sun));

@@ -62,7 +62,6 @@ struct ComputedCells {
   static constexpr int kColumns = 512, kRows = 256;
   std::vector<float> luminance;  ///< means, row after row, without suns
   std::vector<float> suns;       ///< mean luminance of each
-  float negative = 0;            ///< share of what is negative and counts as 0, of all light there and missing
 };
 
 /// Evaluates a graph at the middles of the cells; where it reads images, as often as their texels ask for; and where something

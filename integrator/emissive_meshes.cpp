@@ -183,8 +183,7 @@ std::vector<float> emissive_meshes_add(const Scene& scene,
     if (material.emission_index >= 0 && globals != nullptr) {
       asks_for_path = emitter_graph_asks_for_path(globals->graphs[material.emission_index]);
       means.resize(mesh.num_triangles);
-      const std::string& name = scene.material_names[static_cast<std::size_t>(instance.material_index)];
-      warn_of_negative(set, "emission of material \"" + name + "\"", emitter_graph_means(*globals, i, means));
+      emitter_graph_means(*globals, i, means);
     }
     tbb::parallel_for(std::uint32_t{0}, mesh.num_triangles, [&](std::uint32_t triangle) {
       Light light = triangle_light(placed, mesh, triangle, material.double_sided);

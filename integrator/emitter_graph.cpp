@@ -4,11 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <vector>
 
 #include "kernel/graph/graph_material.h"
-#include "kernel/graph/graph_mixture.h"
 #include "kernel/shape/material_lookup.h"
 
 namespace relief {
@@ -143,16 +140,6 @@ Vec3f lamp_factor(const GraphLane& lane)
   return {result(0), result(1), result(2)};
 }
 
-/// What of that is negative.
-Vec3f lamp_lost(const GraphLane& lane)
-{
-  const auto result = [&lane](int i) {
-    const float value = graph_result(lane, i);
-    return is_finite(value) ? max(0.0f, -value) : 0.0f;
-  };
-  return {result(0), result(1), result(2)};
-}
-
 /// Some point of a lamp and a direction from there, and for how much light it stands.
 struct LampSample {
   EmitterPoint point;
@@ -201,27 +188,6 @@ Vec3f radiance_of(const KernelGlobals& g, const Material& material, const GraphL
   return p.emission * p.alpha;
 }
 
-/// What of a material's emission, whose program has run, is negative.
-Vec3f lost_of(const Material& material, const GraphLane& lane)
-{
-  if (!material.has_closures) {
-    const GraphValues values = graph_values(lane);
-    const int emission = static_cast<int>(GraphOutput::emission);
-    return (values.given >> emission & 1u) != 0 ? max(Vec3f{}, -values.of[emission]) : Vec3f{};
-  }
-  Vec3f sum;
-  for (std::uint32_t i = 0; i < lane.program->num_closures; ++i) {
-    const SurfaceClosureSpec& spec = lane.program->closures[i];
-    const float weight = graph_result(lane, spec.first_result);
-    if (spec.kind != ClosureKind::emission || !(weight > 0.0f)) continue;
-    const auto in = closure_inputs<EmissionInputs>(lane, spec);
-    sum += max(Vec3f{}, in.color * (-weight * in.strength));
-  }
-  return sum;
-}
-
-float negative_share(double lost, double kept) { return lost > 0 ? static_cast<float>(lost / (lost + kept)) : 0.0f; }
-
 }  // namespace
 
 bool emitter_graph_asks_for_path(const GraphProgramView& program)
@@ -251,7 +217,7 @@ Vec3f emitter_graph_radiance(const KernelGlobals& g, const Light& emitter, const
   return radiance_of(g, material, lane, point);
 }
 
-float emitter_graph_means(const KernelGlobals& g, std::size_t instance_index, std::span<Vec3f> means)
+void emitter_graph_means(const KernelGlobals& g, std::size_t instance_index, std::span<Vec3f> means)
 {
   constexpr int kPoints = 8;
   // The middles of the triangle, of its quarters and of some of theirs.
@@ -261,7 +227,6 @@ float emitter_graph_means(const KernelGlobals& g, std::size_t instance_index, st
   const InstanceView& instance = g.instances[instance_index];
   const Material& material = g.materials[instance.material_index];
   const GraphProgramView& program = g.graphs[material.emission_index];
-  std::vector<float> lost(means.size());
   tbb::parallel_for(std::size_t{0}, means.size(), [&](std::size_t triangle) {
     GraphRegisters registers;
     const auto point_of = [&](int i) {
@@ -272,30 +237,24 @@ float emitter_graph_means(const KernelGlobals& g, std::size_t instance_index, st
       graph_load_point(program, point.graph_point(g, point.hit.Ng, kSomeRay), i, registers);
     }
     g.run_graph(program, g.textures, registers);
-    Vec3f sum, below;
-    for (int i = 0; i < kPoints; ++i) {
+    Vec3f sum;
+    for (int i = 0; i < kPoints; ++i)
       sum += max(Vec3f{}, radiance_of(g, material, {&program, &registers, i}, point_of(i)));
-      below += lost_of(material, {&program, &registers, i});
-    }
-    lost[triangle] = is_finite(below) ? light_scalar(below) * (1.0f / kPoints) : 0.0f;
     means[triangle] = is_finite(sum) ? sum * (1.0f / kPoints) : Vec3f{};
   });
-  double kept = 0;
-  for (const Vec3f& mean : means) kept += static_cast<double>(light_scalar(mean));
   Vec3f all;
   for (const Vec3f& mean : means) all += mean * (1.0f / static_cast<float>(means.size()));
   for (Vec3f& mean : means) {
     if (is_zero(mean)) mean = all * 0.01f;
   }
-  return negative_share(std::accumulate(lost.begin(), lost.end(), 0.0), kept);
 }
 
-LampGraphMean emitter_graph_lamp_mean(const KernelGlobals& g, const Light& light)
+float emitter_graph_lamp_mean(const KernelGlobals& g, const Light& light)
 {
   constexpr std::uint32_t kSamples = 512;
   const GraphProgramView& program = g.graphs[g.lamps[light.lamp_index].graph_index];
   GraphRegisters registers;
-  double sum = 0, lost = 0, weights = 0;
+  double sum = 0, weights = 0;
   for (std::uint32_t i = 0; i < kSamples; i += 8) {
     float weight[8];
     for (int k = 0; k < 8; ++k) {
@@ -306,11 +265,10 @@ LampGraphMean emitter_graph_lamp_mean(const KernelGlobals& g, const Light& light
     g.run_graph(program, g.textures, registers);
     for (int k = 0; k < 8; ++k) {
       sum += static_cast<double>(weight[k] * light_scalar(lamp_factor({&program, &registers, k})));
-      lost += static_cast<double>(weight[k] * light_scalar(lamp_lost({&program, &registers, k})));
       weights += static_cast<double>(weight[k]);
     }
   }
-  return {weights > 0 ? static_cast<float>(sum / weights) : 0.0f, negative_share(lost, sum)};
+  return weights > 0 ? static_cast<float>(sum / weights) : 0.0f;
 }
 
 }  // namespace relief

@@ -17,17 +17,11 @@ bool emitter_graph_asks_for_path(const GraphProgramView& program);
 /// @param g       meshes, instances, materials, graphs and textures are filled in
 /// @param means   one a triangle of the instance's mesh; those at which no point shone get a hundredth of the mesh's mean, for
 ///                other points of theirs may
-/// @return        share of what is negative and counts as 0, of all light there and missing
-float emitter_graph_means(const KernelGlobals& g, std::size_t instance, std::span<Vec3f> means);
+void emitter_graph_means(const KernelGlobals& g, std::size_t instance, std::span<Vec3f> means);
 
-/// What the graph of a lamp gives, over its points and the directions in which it shines.
-struct LampGraphMean {
-  float mean = 0;      ///< of the three channels
-  float negative = 0;  ///< as of emitter_graph_means
-};
-
-/// The length of rays is a metre there.
+/// Mean of what the graph of a lamp gives, over its points and the directions in which it shines, of the three channels. The
+/// length of rays is a metre there.
 /// @param light  with a lamp_index
-LampGraphMean emitter_graph_lamp_mean(const KernelGlobals& g, const Light& light);
+float emitter_graph_lamp_mean(const KernelGlobals& g, const Light& light);
 
 }  // namespace relief

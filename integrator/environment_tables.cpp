@@ -362,7 +362,6 @@ EnvironmentTables environment_tables_make(std::shared_ptr<ComputedEnvironment> c
   tables.suns = suns_of(*computed, suns);
   computed_environment_smooth(*computed, tables.suns);
   const ComputedCells found = computed_environment_cells(*computed, tables.suns, color, image_side);
-  tables.negative = found.negative;
   tables.computed = std::move(computed);
   Cells cells{ComputedCells::kColumns, ComputedCells::kRows, {found.luminance.begin(), found.luminance.end()}, 1};
   suns_share(tables, found.suns, tables_fill(tables, std::move(cells), density));

@@ -30,7 +30,6 @@ struct EnvironmentTables {
   std::vector<float> row_cdf, column_cdf, row_edges;
   std::shared_ptr<const ComputedEnvironment> computed;  ///< null: there is a map, or nothing
   std::vector<EnvironmentSun> suns;
-  float negative = 0;  ///< see ComputedCells
 
   /// The environment with its pointers set; valid while this object is neither changed nor moved.
   EnvironmentView view() const;

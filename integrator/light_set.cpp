@@ -13,18 +13,14 @@ namespace relief {
 namespace {
 
 /// Makes the emission of lights with a graph that of its mean, by which lights are compared.
-void lamps_scale(const KernelGlobals& globals, LightSet& set)
+void lamps_scale(const KernelGlobals& globals, std::span<Light> lights)
 {
-  std::vector<Light>& lights = set.lights;
-  std::vector<float> negative(lights.size());
   tbb::parallel_for(std::size_t{0}, lights.size(), [&](std::size_t i) {
     Light& light = lights[i];
     if (light.lamp_index < 0) return;
     // What was dark wherever the graph was asked may shine elsewhere.
     constexpr float kLeastMean = 1e-3f;
-    const LampGraphMean found = emitter_graph_lamp_mean(globals, light);
-    const float mean = max(found.mean, kLeastMean);
-    negative[i] = found.negative;
+    const float mean = max(emitter_graph_lamp_mean(globals, light), kLeastMean);
     if (is_finite(light.emission * mean)) {
       light.emission *= mean;
       light.lamp_scale = 1.0f / mean;
@@ -33,17 +29,9 @@ void lamps_scale(const KernelGlobals& globals, LightSet& set)
       light.casts_caustics = false;
     }
   });
-  for (const float share : negative) warn_of_negative(set, "light of a lamp with a graph", share);
 }
 
 }  // namespace
-
-void warn_of_negative(LightSet& set, const std::string& what, float share)
-{
-  // Images have negative texels beside bright ones, and skies are sums that are not quite 0 at night.
-  constexpr float kNone = 1e-3f;
-  if (share > kNone) set.warnings.insert(what + " is negative in parts: there is none there");
-}
 
 LightSet light_set_make(const Scene& scene,
                         std::span<const TextureView> textures,
@@ -64,7 +52,6 @@ LightSet light_set_make(const Scene& scene,
     set.environment = environment_tables_make(texture_view(environment.texture_index), environment.color,
                                               environment.rotation, density);
   }
-  warn_of_negative(set, "light of the surroundings", set.environment.negative);
   set.environment_irradiance = environment_irradiance(set.environment);
   environment_integrate(set);
   set.environment_casts_caustics = scene.environment.casts_caustics && scene.environment.hidden_from == 0;
@@ -75,7 +62,7 @@ LightSet light_set_make(const Scene& scene,
   // Likewise of lamps: photons come to a surface as no kind of ray.
   for (Light& light : set.lights) light.casts_caustics = light.casts_caustics && light.hidden_from == 0;
   if (globals != nullptr) set.motions = globals->lights.motions;
-  if (globals != nullptr) lamps_scale(*globals, set);
+  if (globals != nullptr) lamps_scale(*globals, set.lights);
   const std::vector<float> scales = emissive_meshes_add(scene, textures, globals, set);
   light_tree_build(set, scales);
   if (!set.environment.environment.has_map && density == EnvironmentDensity::kExcess) {

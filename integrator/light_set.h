@@ -3,9 +3,7 @@
 #pragma once
 
 #include <cstdint>
-#include <set>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "integrator/environment_tables.h"
@@ -43,7 +41,6 @@ struct LightSet {
   double environment_solid_angle = 0;      ///< (∫L)² / ∫L²: how wide an even light of its contrast would be, sr
   bool environment_casts_caustics = true;  ///< as Light::casts_caustics
   const MotionView* motions = nullptr;     ///< as LightsView::motions
-  std::set<std::string> warnings;
 
   /// @return false: nothing can be sampled
   bool any() const { return !tree_blocks.empty() || !suns.empty() || environment_irradiance.mean > 0; }
@@ -53,11 +50,6 @@ struct LightSet {
   LightsView view() const;
   std::size_t bytes() const;
 };
-
-/// Warns of light by a graph that is negative in parts, which is none here; where it is hardly any nothing is said.
-/// @param what   whose it is
-/// @param share  of all light there and missing
-void warn_of_negative(LightSet& set, const std::string& what, float share);
 
 /// Gathers the lights of a scene and builds the tree over the finite ones, in parallel.
 ///

@@ -437,7 +437,6 @@ RenderedImage render(const Scene& scene,
   const RenderSettings& settings = options.settings;
   const SceneContext& context = kept.get(scene, context_options(options));
   for (std::string& text : context.displacements.warnings()) stats.warnings.push_back(std::move(text));
-  for (const std::string& text : context.lights.warnings) stats.warnings.push_back(text);
   const StageTable& stages = stage_table_select();
 
   const FilmWindow window = render_window(options);

@@ -19,9 +19,7 @@ from scenes import (
     make_sharp,
     new_material,
     new_scene,
-    render,
     set_bounces,
-    set_world,
 )
 
 
@@ -96,41 +94,6 @@ def _image():
     image.pixels = pixels.ravel()
     image.pack()
     return image
-
-
-def _shifted(tree, output, by):
-    """The sum of a vector's components and a number, for a strength."""
-    dot, add = tree.nodes.new("ShaderNodeVectorMath"), tree.nodes.new("ShaderNodeMath")
-    dot.operation, dot.inputs[1].default_value = "DOT_PRODUCT", (1, 1, 1)
-    add.inputs[1].default_value = by
-    tree.links.new(output, dot.inputs[0])
-    tree.links.new(dot.outputs["Value"], add.inputs[0])
-    return add.outputs[0]
-
-
-def test_light_that_is_negative_in_parts_is_warned_about():
-    """Cycles takes light away there, seen and lit by; here there is none, which is said once for each source."""
-    from relief import report
-
-    for by, is_negative in ((-0.3, True), (4.0, False)):
-        scene = _stage(lambda: None)
-        world = set_world((1, 1, 1))
-        shine, tree, emission = new_material("shine", "ShaderNodeEmission")
-        lamp = _Nodes(add_light("AREA", (1, -1, 3), energy=20, size=1))
-        add_sphere(0.3, shine, location=(-1, 0, 0.3))
-        for its, strength in (
-            (world, world.nodes["Background"].inputs["Strength"]),
-            (tree, emission.inputs["Strength"]),
-            (lamp.tree, lamp.emission.inputs["Strength"]),
-        ):
-            geometry = its.nodes.new("ShaderNodeNewGeometry")
-            its.links.new(_shifted(its, geometry.outputs["Incoming"], by), strength)
-        with folder() as path:
-            render(scene, "RELIEF", os.path.join(path, "picture.exr"), samples=1)
-        warnings = [text for text in report.last_warnings[scene.name] if "negative in parts" in text]
-        for what in ("the surroundings", 'material "shine"', "a lamp"):
-            assert any(what in text for text in warnings) == is_negative, (what, warnings)
-        assert len(warnings) == 3 * is_negative, warnings
 
 
 def test_point_by_black_body():
