@@ -55,16 +55,12 @@ RELIEF_KERNEL void surface_hit_density(const MeshView& mesh, TriangleIndices tri
 
 /// Evaluates the triangle's attributes at a hit.
 /// @param bary_u, bary_v  barycentric weights of vertices 1 and 2
-/// @param leaves          whether rays leave from it: next to an edge the triangle beyond it may be nearer than their origins are
-///                        moved, which would put them behind it, so that the point is taken a little away from there. Else the
-///                        point is the same for all triangles that share it
 /// @source position error: pbrt-v4 §6.8.5 and Eq. 6.24; lift: Hanika 2021, "Hacking the Shadow Terminator"
 RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
                                           const InstanceView& instance,
                                           std::uint32_t triangle_index,
                                           float bary_u,
-                                          float bary_v,
-                                          bool leaves = false)
+                                          float bary_v)
 {
   const TriangleIndices tri = mesh.triangles[triangle_index];
   const float w0 = 1.0f - bary_u - bary_v;
@@ -95,20 +91,6 @@ RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
   if ((instance.flags & kMirrored) != 0) normal_area = -normal_area;
   const float double_area = length(normal_area);
   hit.Ng = normal_area / double_area;
-
-  if (leaves) {
-    // With 2 in place of 8, 12 of 8 million paths got out of wedges of 2 and 6 degrees that stand 100 m from the origin; with 0,
-    // 110 (test ClosedMesh.NoPathGetsOutPastAnEdge).
-    constexpr float kEdgeClearance = 8.0f;
-    const float clearance = kEdgeClearance * (hit.P_error.x + hit.P_error.y + hit.P_error.z);
-    const Vec3f across = abs(edge1) + abs(edge2);
-    const float margin = clearance * (across.x + across.y + across.z);  // barycentric, by the double area
-    if (min(w0, min(bary_u, bary_v)) * double_area < margin) [[unlikely]] {
-      const float least = min(margin / double_area, 1.0f / 3.0f), rest = 1.0f - 3.0f * least;
-      hit.P =
-          transform_point(m, (least + rest * w0) * p0 + (least + rest * bary_u) * p1 + (least + rest * bary_v) * p2);
-    }
-  }
 
   hit.Ns = hit.Ng;
   hit.P_lift = {};

@@ -81,7 +81,7 @@ surface_interaction_locate(const KernelGlobals& g, const PathState& state, std::
       (at.instance->flags & kDisplaced) != 0
           ? surface_hit_displaced(mesh, *at.instance, at.triangle, u, v,
                                   {state.hit_P[path], state.hit_Ng[path], state.hit_Ns[path], state.hit_leave[path]})
-          : surface_hit_make(mesh, *at.instance, at.triangle, u, v, true);
+          : surface_hit_make(mesh, *at.instance, at.triangle, u, v);
   at.side.front = dot(wo, at.hit.Ng) >= 0.0f;
   at.side.Ng = at.side.front ? at.hit.Ng : -at.hit.Ng;
 
