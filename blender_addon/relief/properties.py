@@ -122,7 +122,7 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
     )
     denoise: EnumProperty(
         name="Denoise",
-        description="Denoise and Denoiser in one, for scripts",
+        description="Denoise and Denoiser in one, for scripts (default none)",
         items=(("none", "None", "The picture as it was rendered"), *_DENOISERS),
         get=_denoise,
         set=_set_denoise,

@@ -114,9 +114,9 @@ def test_objects_and_lights_may_stay_out():
     scene.relief.caustics = "off"
     assert _caustic(scene) == 0
     scene.relief.caustics = "on"
-    scene.cycles.caustics_refractive = False
+    scene.relief.caustic_kinds = "reflective"
     assert _caustic(scene) == 0
-    scene.cycles.caustics_refractive = True
+    scene.relief.caustic_kinds = "both"
     for thing in scene.objects:
         thing.relief.caustic_receiver = False
     assert _caustic(scene) == 0

@@ -240,6 +240,8 @@ def test_the_documented_commands_run_without_complaint():
         bpy.ops.export_scene.relief(filepath=f"{path}/shot.gltf", use_range=True, frame_start=1, frame_end=48)
         program = os.environ["RELIEF_BINARY"]
         places = (
+            # It would build the program: tests/scripts/package_test.py has it.
+            (r"^scripts/package addon", f"test -x {_ROOT}/scripts/package"),
             (r"^scripts/package_addon", f"{_ROOT}/scripts/package_addon {path}/relief.zip"),
             (r"build/release/cli/relief", program),
             (r"\bblender -b", f"{bpy.app.binary_path} --factory-startup -b"),
@@ -253,4 +255,4 @@ def test_the_documented_commands_run_without_complaint():
             assert done.returncode == 0, (command, output)
             assert not re.search("(?i)not available|not found|warning:|error:|traceback", output), (command, output)
         made = {"relief.zip", "out0001.exr", "shot.0001.exr", "shot.0048.exr"}
-        assert len(commands) == 3 and made <= set(os.listdir(path)), (commands, os.listdir(path))
+        assert len(commands) == 4 and made <= set(os.listdir(path)), (commands, os.listdir(path))
