@@ -433,7 +433,11 @@ void computed_environment_smooth(ComputedEnvironment& environment, std::span<con
       }
     }
   });
-  for (const EnvironmentSun& sun : suns) environment.suns.push_back(sun_smooth(environment, sun));
+  // The square is on a plane, which disks near a half circle have no place on.
+  constexpr float kWidest = 0.3f;
+  for (const EnvironmentSun& sun : suns) {
+    if (sun.cone < kWidest) environment.suns.push_back(sun_smooth(environment, sun));
+  }
   environment.map = std::move(map);
 }
 

@@ -20,6 +20,12 @@ namespace relief {
 /// How values of an image are handed over: integers scaled to the type, or to 0…1 for floats.
 enum class SampleType { kU8, kU16, kFloat };
 
+/// Bytes of a sample.
+constexpr std::size_t sample_bytes(SampleType type)
+{
+  return type == SampleType::kU8 ? 1 : type == SampleType::kU16 ? 2 : 4;
+}
+
 /// What an image says of itself; nothing is checked.
 struct ImageHeader {
   int width = 0, height = 0, depth = 0, num_channels = 0;

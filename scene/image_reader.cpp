@@ -231,9 +231,8 @@ void ImageReader::select(int channel_begin, int channel_end, SampleType type)
 
 std::size_t ImageReader::row_bytes() const
 {
-  const std::size_t sample_bytes = type_ == SampleType::kU8 ? 1 : type_ == SampleType::kU16 ? 2 : 4;
   return static_cast<std::size_t>(header_.width) * static_cast<std::size_t>(channel_end_ - channel_begin_) *
-         sample_bytes;
+         sample_bytes(type_);
 }
 
 int ImageReader::rows_at_once() const

@@ -56,7 +56,7 @@ class JpegFile final : public ImageFile {
                         unsigned char* rows) override
   {
     RELIEF_ASSERT(0 <= row_begin && row_begin < row_end && row_end <= height_);
-    const std::size_t type_bytes = type == SampleType::kU8 ? 1 : type == SampleType::kU16 ? 2 : 4;
+    const std::size_t type_bytes = sample_bytes(type);
     const int num_copied = channel_end - channel_begin;
     row_.resize(width_ * static_cast<std::size_t>(num_channels_));
     for (int row = row_begin; row < row_end; ++row) {

@@ -60,7 +60,7 @@ class PngFile final : public ImageFile {
                         unsigned char* rows) override
   {
     RELIEF_ASSERT(0 <= row_begin && row_begin < row_end && row_end <= height_);
-    const std::size_t type_bytes = type == SampleType::kU8 ? 1 : type == SampleType::kU16 ? 2 : 4;
+    const std::size_t type_bytes = sample_bytes(type);
     const int num_copied = channel_end - channel_begin;
     // The passes of an interlaced image go over all of it.
     rows_.resize(row_bytes_ * static_cast<std::size_t>(num_passes_ > 1 ? height_ : 1));

@@ -74,8 +74,6 @@ std::vector<unsigned char> jpeg_write(const JpegCase& c)
   return out;
 }
 
-std::size_t bytes_of(SampleType type) { return type == SampleType::kU8 ? 1 : type == SampleType::kU16 ? 2 : 4; }
-
 /// Integers are the same. Floats are quotients here; the library multiplies by a rounded inverse.
 void expect_same(ImageFile& file,
                  ImageFile& other,
@@ -85,12 +83,12 @@ void expect_same(ImageFile& file,
                  int channel_end,
                  SampleType type)
 {
-  const auto size = static_cast<std::size_t>((end - begin) * kWidth * (channel_end - channel_begin)) * bytes_of(type);
+  const auto size = static_cast<std::size_t>((end - begin) * kWidth * (channel_end - channel_begin)) * sample_bytes(type);
   std::vector<unsigned char> found(size), expected(size);
   ASSERT_EQ(file.read_rows(begin, end, channel_begin, channel_end, type, found.data()), "");
   ASSERT_EQ(other.read_rows(begin, end, channel_begin, channel_end, type, expected.data()), "");
   if (type != SampleType::kFloat) {
-    EXPECT_TRUE(found == expected) << "rows from " << begin << ", " << bytes_of(type) << " bytes";
+    EXPECT_TRUE(found == expected) << "rows from " << begin << ", " << sample_bytes(type) << " bytes";
     return;
   }
   for (std::size_t i = 0; i < size; i += sizeof(float)) {

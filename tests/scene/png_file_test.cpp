@@ -89,8 +89,6 @@ std::vector<unsigned char> file_bytes(const fs::path& path)
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-std::size_t bytes_of(SampleType type) { return type == SampleType::kU8 ? 1 : type == SampleType::kU16 ? 2 : 4; }
-
 /// Some rows and channels of an open image.
 std::vector<unsigned char> read(ImageFile& file,
                                 int begin,
@@ -100,7 +98,7 @@ std::vector<unsigned char> read(ImageFile& file,
                                 SampleType type)
 {
   std::vector<unsigned char> rows(static_cast<std::size_t>((end - begin) * kWidth * (channel_end - channel_begin)) *
-                                  bytes_of(type));
+                                  sample_bytes(type));
   EXPECT_EQ(file.read_rows(begin, end, channel_begin, channel_end, type, rows.data()), "");
   return rows;
 }
@@ -116,7 +114,7 @@ void expect_same(ImageFile& file,
 {
   const std::vector<unsigned char> found = read(file, begin, end, channel_begin, channel_end, type);
   const std::vector<unsigned char> expected = read(other, begin, end, channel_begin, channel_end, type);
-  const std::string label = "rows from " + std::to_string(begin) + ", " + std::to_string(bytes_of(type)) + " bytes";
+  const std::string label = "rows from " + std::to_string(begin) + ", " + std::to_string(sample_bytes(type)) + " bytes";
   if (type != SampleType::kFloat) {
     EXPECT_TRUE(found == expected) << label;
     return;
