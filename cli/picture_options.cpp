@@ -130,6 +130,7 @@ RenderOptions render_options(const Scene& scene, const PictureOptions& given, co
     settings.diffuse_bounces = std::min(settings.diffuse_bounces, given.max_bounces);
     settings.glossy_bounces = std::min(settings.glossy_bounces, given.max_bounces);
     settings.transmission_bounces = std::min(settings.transmission_bounces, given.max_bounces);
+    settings.volume_bounces = std::min(settings.volume_bounces, given.max_bounces);
   }
   if (given.seed) settings.seed = *given.seed;
   if (given.filter) {

@@ -4,8 +4,8 @@
 #include <numeric>
 
 #include "integrator/instance_box.h"
+#include "integrator/instance_hit.h"
 #include "kernel/bsdf/surface_params.h"
-#include "kernel/shape/surface_hit.h"
 #include "kernel/stage/path_access.h"
 
 namespace relief {
@@ -19,20 +19,6 @@ bool absorbs(const Material& m) { return is_solid(m) && m.attenuation_distance <
 
 /// When the shutter is half done.
 constexpr float kShutterCentre = 0.5f;
-
-/// A hit's geometric normal on the front side, world space.
-Vec3f hit_normal(const SceneContext& context, const RTCRayHit& ray, unsigned object)
-{
-  const InstanceView instance = context.motion.instance_at(context.instances[object], ray.ray.time);
-  if ((instance.flags & kDisplaced) != 0) {
-    const DisplacedPoint point = context.displacements.resolve(object, instance, ray.hit.primID,
-                                                               {ray.hit.u, ray.hit.v, ray.hit.Ng_x, ray.ray.time});
-    return transform_normal(instance.object_from_world, as_normal(point.Ng));
-  }
-  const MeshView mesh =
-      context.motion.mesh_at(instance, context.meshes[static_cast<std::size_t>(instance.mesh_index)], ray.ray.time);
-  return surface_hit_make(mesh, instance, ray.hit.primID, ray.hit.u, ray.hit.v).Ng;
-}
 
 }  // namespace
 
@@ -67,25 +53,13 @@ std::int32_t CameraMedium::innermost_at(Vec3f P, float time, std::int32_t wanted
   float from = kLeastDistance;
   constexpr int kMostHits = 1 << 16;
   for (int i = 0; i < kMostHits; ++i) {
-    EmbreeContext embree;
-    embree_context_init(embree, false);
-    RTCRayHit ray{};
-    ray.ray.org_x = P.x, ray.ray.org_y = P.y, ray.ray.org_z = P.z;
-    ray.ray.dir_x = kDirection.x, ray.ray.dir_y = kDirection.y, ray.ray.dir_z = kDirection.z;
-    ray.ray.tnear = from;
-    ray.ray.tfar = kInfinity;
-    ray.ray.time = time;
-    ray.ray.mask = kRayBounce;
-    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    context_.accel->intersect(embree, ray);
-    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) break;
-    from = t_min_behind(ray.ray.tfar);
-    const unsigned object = ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID;
-    const std::int32_t solid = object < solid_of_.size() ? solid_of_[object] : -1;
+    const std::optional<InstanceHit> hit = instance_hit_next(context_, P, kDirection, time, from, kRayBounce);
+    if (!hit) break;
+    from = t_min_behind(hit->t);
+    const std::int32_t solid = hit->instance < solid_of_.size() ? solid_of_[hit->instance] : -1;
     if (solid < 0 || (wanted >= 0 && solid != wanted)) continue;
     int& count = entered[static_cast<std::size_t>(solid)];
-    if (dot(kDirection, hit_normal(context_, ray, object)) < 0.0f) {
+    if (dot(kDirection, hit->Ng) < 0.0f) {
       ++count;
     } else if (count-- == 0) {
       return solid;

@@ -1,5 +1,6 @@
 #include "integrator/intersect_stage.h"
 
+#include "integrator/media.h"
 #include "kernel/graph/graph_material.h"
 #include "kernel/math/rounding.h"
 #include "kernel/sample/dimensions.h"
@@ -236,13 +237,17 @@ struct ShadowContext {
   Vec3f visibility{1, 1, 1};
   Vec3f O, D;                                 ///< of the ray, world: filters see it in the space of the instance
   std::uint32_t depths = 0, transparent = 0;  ///< see GraphRay
+  std::vector<ShadowBoundary>* boundaries = nullptr;  ///< gets those that it passes; null where there are no media
 };
 
 /// Events before a shadow ray, as GraphRay::depths: it counts as one more, of no kind. Its path may have gone on since.
 std::uint32_t shadow_ray_depths(const PathState& state, const ShadowQueue& shadow, std::uint32_t ray)
 {
   const std::uint32_t path = shadow.path[ray], depths = state.bounces[path];
-  if (static_cast<std::uint32_t>(path_bounces(depths, BounceKind::kAll)) != shadow.scatterings[ray]) return depths + 1u;
+  const bool has_gone_on =
+      static_cast<std::uint32_t>(path_bounces(depths, BounceKind::kAll)) == shadow.scatterings[ray];
+  if (!has_gone_on) return depths + 1u;
+  if ((state.flags[path] & kPathScattered) != 0) return depths;
   const auto event = static_cast<PathEvent>(path_event(state.flags[path]));
   const BounceKind kind = event == PathEvent::kDiffuse  ? BounceKind::kDiffuse
                           : event == PathEvent::kGlossy ? BounceKind::kGlossy
@@ -335,6 +340,7 @@ void intersect_shadow(const KernelGlobals& g,
                       const Accel& accel,
                       const PathState& state,
                       const ShadowQueue& shadow,
+                      ShadowStart start,
                       Vec3f* visibility,
                       DisplacementWork& displacement)
 {
@@ -345,6 +351,8 @@ void intersect_shadow(const KernelGlobals& g,
   embree_context_init(context.embree, false);
   context.embree.displacement = &displacement.total;
   context.embree.texels = accel.displacements().texels();
+  std::vector<ShadowBoundary> boundaries;
+  if (state.media != nullptr) context.boundaries = &boundaries;
   const bool has_levels = accel.displacements().has_levels();
   std::uint32_t steps = 0;
   if (accel.displacements().size() > 0) context.embree.steps = &steps;
@@ -386,6 +394,16 @@ void intersect_shadow(const KernelGlobals& g,
     accel.occluded(context.embree, ray);
     if (context.embree.steps != nullptr) note_steps(steps, displacement);
     visibility[i] = ray.tfar < 0.0f ? Vec3f{} : context.visibility;
+    if (state.media != nullptr) {
+      if (!is_zero(visibility[i]) && shadow.scatterings[i] != kAmbientRay) {
+        MediumState inside = state.media[shadow.path[i]];
+        if (start == ShadowStart::kAtHit && inside.hit_inside != kWholeWorld && medium_is_behind(inside, context.O)) {
+          medium_cross(inside, inside.hit_inside, inside.hit_front);
+        }
+        visibility[i] *= shadow_transmittance(g, inside, boundaries, shadow.t_max[i]);
+      }
+      boundaries.clear();
+    }
   }
 }
 
@@ -407,6 +425,13 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
     if ((instance.flags & kDisplaced) != 0) at = context->displacements->locate(object, at.triangle, at.u, at.v);
     const Material& material = g.materials[instance.material_index];
     const MeshView mesh = context->motion->mesh_at(instance, g.meshes[instance.mesh_index], time);
+    if (material.medium_index >= 0) {
+      const SurfaceHit hit = surface_hit_make(mesh, instance, at.triangle, at.u, at.v);
+      // A far ray starts elsewhere.
+      const double t = static_cast<double>(RTCRayN_tfar(arguments->ray, arguments->N, i)) + context->embree.far_start.t;
+      context->boundaries->push_back(
+          {static_cast<float>(t), static_cast<std::int32_t>(object), at.triangle, dot(context->D, hit.Ng) < 0.0f});
+    }
     Vec3f passes;
     if (material.transparency_index >= 0) {
       const SurfaceHit hit = surface_hit_make(mesh, instance, at.triangle, at.u, at.v);

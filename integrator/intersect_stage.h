@@ -32,13 +32,18 @@ void intersect_closest(const KernelGlobals& g,
                        QueueView& background,
                        DisplacementWork& displacement);
 
+/// Where shadow rays start.
+enum class ShadowStart : std::uint8_t { kAtHit, kInMedium };
+
 /// Traces every waiting shadow ray.
+/// @param start         at the hits of their paths, or before these
 /// @param visibility    one entry a ray: share of light that passes
 /// @param displacement  what these rays did is added to it
 void intersect_shadow(const KernelGlobals& g,
                       const Accel& accel,
                       const PathState& state,
                       const ShadowQueue& shadow,
+                      ShadowStart start,
                       Vec3f* visibility,
                       DisplacementWork& displacement);
 

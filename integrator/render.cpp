@@ -19,6 +19,7 @@
 #include "integrator/checkpoint.h"
 #include "integrator/error_history.h"
 #include "integrator/flush_denormals.h"
+#include "integrator/media.h"
 #include "integrator/photon_benefit.h"
 #include "integrator/photon_pass.h"
 #include "integrator/scene_context.h"
@@ -212,8 +213,12 @@ KernelGlobals render_globals(const SceneContext& context, const RenderOptions& o
   g.graph_scene.camera_from_world = inverse(options.camera.world_from_camera);
   // A path counts in bytes; between mirrors that take nothing only this ends it.
   constexpr int kMostBounces = 200;
-  g.limits = {std::min(settings.max_bounces, kMostBounces), settings.diffuse_bounces, settings.glossy_bounces,
-              settings.transmission_bounces, settings.transparent_bounces};
+  g.limits = {std::min(settings.max_bounces, kMostBounces),
+              settings.diffuse_bounces,
+              settings.glossy_bounces,
+              settings.transmission_bounces,
+              settings.transparent_bounces,
+              settings.volume_bounces};
   g.clamp_direct = settings.clamp_direct;
   g.clamp_indirect = settings.clamp_indirect;
   g.filter_glossy = settings.filter_glossy;
@@ -467,11 +472,14 @@ RenderedImage render(const Scene& scene,
   const std::vector<std::uint8_t>& surface_kernels = context.surface_kernels(caustics);
   const WavefrontColumns columns = context.columns(caustics);
   const CameraMedium camera_medium(context);
+  const Media media(context);
+  for (std::string& text : media.problems()) stats.warnings.push_back(std::move(text));
   for (std::string& text : camera_medium.overlaps()) stats.warnings.push_back(std::move(text));
   Workers workers([&] {
     Wavefront worker(columns);
     worker.stop = &end.reached();
     if (camera_medium.exists()) worker.camera_medium = &camera_medium;
+    if (media.exist()) worker.media = &media;
     return worker;
   });
   // What a tile may be given up in the middle of.

@@ -69,6 +69,8 @@ CausticsDecision caustics_decide(const Scene& scene, LightSet& lights, const Cau
   const CausticsMode mode = settings.mode;
   if (mode == CausticsMode::kOff) return {false, "off"};
   if (settings.kinds == CausticKinds::kNone) return {false, "there are to be none"};
+  if (!scene.media.empty() || scene.environment.medium)
+    return {false, "there are media, of which photons know nothing"};
   bool any_caster = false, any_receiver = false;
   for (const Instance& instance : scene.instances) {
     const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
@@ -91,6 +93,16 @@ CausticsDecision caustics_decide(const Scene& scene, LightSet& lights, const Cau
   if (!any_light && !environment) return {false, "no light casts caustics"};
   return {true, std::string(any_light ? "lights" : "") + (any_light && environment ? " and " : "") +
                     (environment ? "the environment" : "") + " on casters"};
+}
+
+/// Nothing gets through what fills all space from infinitely far away: asking for it would be in vain.
+void leave_out_what_is_far(const Medium& world, KernelGlobals& g)
+{
+  if (!(world.sigma_t.x > 0.0f && world.sigma_t.y > 0.0f && world.sigma_t.z > 0.0f)) return;
+  g.lights.environment_irradiance.mean = 0.0f;
+  g.lights.num_suns = 0;
+  g.lights.has_sun_disks = false;
+  g.has_lights = g.lights.tree.blocks != nullptr || g.lights.only_light >= 0;
 }
 
 }  // namespace
@@ -139,6 +151,7 @@ SceneContext::SceneContext(const Scene& loaded,
   globals.num_area_lights = static_cast<std::uint32_t>(lights.area_lights.size());
   globals.lights = lights.view();
   globals.has_lights = lights.any();
+  if (globals.world_medium >= 0) leave_out_what_is_far(media.back(), globals);
   globals.bsdf_tables = bsdf_tables.get();
   globals.environment_visible_to_camera = scene.environment.visible_to_camera;
   const std::optional<float>& clear = scene.environment.clear_roughness;
@@ -160,7 +173,7 @@ SceneContext::SceneContext(const Scene& loaded,
 
 WavefrontColumns SceneContext::columns(bool photons) const
 {
-  return {photons, motion.is_open(), displacements.has_facets()};
+  return {photons, motion.is_open(), displacements.has_facets(), !media.empty()};
 }
 
 void SceneContext::make_views()
@@ -184,6 +197,12 @@ void SceneContext::make_views()
   globals.graph_scene.columns = instance_columns.data();
   globals.graph_scene.num_columns = static_cast<std::uint32_t>(instance_columns.size());
   globals.materials = scene.materials.data();
+  media = scene.media;
+  if (scene.environment.medium) {
+    globals.world_medium = static_cast<std::int32_t>(media.size());
+    media.push_back(*scene.environment.medium);
+  }
+  globals.media = media.data();
   globals.graphs = graphs.data();
   globals.run_graph = stage_table_select().run_graph;
   globals.emitter_radiance = emitter_graph_radiance;

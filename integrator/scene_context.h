@@ -41,6 +41,7 @@ struct SceneContext : SceneViews {
 
   const Scene& scene;
   std::vector<GraphProgramView> graphs;
+  std::vector<Medium> media;  ///< the scene's, then what fills all space
   LightSet lights;
   std::vector<std::uint8_t> surface_kernel, surface_kernel_of_paths;  ///< a material; the latter's know no photons
   std::unique_ptr<BsdfTables> bsdf_tables;

@@ -224,6 +224,7 @@ const StageTable kTable = {
      shade_surfaces<kSurfaceKernelFeatures[6]>, shade_surfaces<kSurfaceKernelFeatures[7]>,
      shade_surfaces<kSurfaceKernelFeatures[8]>, shade_surfaces<kSurfaceKernelFeatures[9]>,
      shade_surfaces<kSurfaceKernelFeatures[10]>, shade_surfaces<kSurfaceKernelFeatures[11]>},
+    RELIEF_SHADE_MEDIA,
     shade_backgrounds,
     shade_lights,
     accumulate_shadows,

@@ -36,6 +36,15 @@ struct StageTable {
                                             QueueView& next,
                                             ShadowQueue& shadow,
                                             Counters&);
+  /// Takes paths through the media that they are in, before what they have met is shaded; those that do not get there, and those that
+  /// have met a boundary alone, leave their queues.
+  /// @param queues  of surfaces, then of lights and of the background
+  void (*shade_media)(const KernelGlobals&,
+                      PathState&,
+                      QueueView* queues,
+                      int num_surfaces,
+                      QueueView& next,
+                      ShadowQueue& shadow);
   void (*shade_background)(const KernelGlobals&, PathState&, const QueueView& queue, Counters&);
   void (*shade_light)(const KernelGlobals&, PathState&, const QueueView& queue, QueueView& next);
   /// @param visibility  one entry a shadow ray
@@ -71,6 +80,20 @@ struct StageTable {
 void graph_run_baseline(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers);
 void graph_run_avx2(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers);
 void graph_run_avx512(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers);
+
+/// See StageTable::shade_media.
+void shade_media_baseline(const KernelGlobals& g,
+                          PathState& state,
+                          QueueView* queues,
+                          int num_surfaces,
+                          QueueView& next,
+                          ShadowQueue& shadow);
+void shade_media_avx2(const KernelGlobals& g,
+                      PathState& state,
+                      QueueView* queues,
+                      int num_surfaces,
+                      QueueView& next,
+                      ShadowQueue& shadow);
 
 const StageTable& stage_table_baseline();
 const StageTable& stage_table_avx2();

@@ -7,6 +7,7 @@
 
 #include "integrator/camera_medium.h"
 #include "integrator/flush_denormals.h"
+#include "integrator/media.h"
 #include "integrator/photon_benefit.h"
 #include "integrator/photon_pass.h"
 #include "integrator/stages.h"
@@ -146,6 +147,8 @@ PathReplay trace_path(const Scene& scene, const RenderOptions& options, const Pi
   wavefront.recorder = &replay.rays;
   const CameraMedium camera_medium(context);
   if (camera_medium.exists()) wavefront.camera_medium = &camera_medium;
+  const Media media(context);
+  if (media.exist()) wavefront.media = &media;
   // The whole tile, as in the render: forks of its paths share the room of its batch.
   const int x = at.x - window.x0, y = at.y - window.y0;
   const Batch batch = tile_batch(film, film.tile_at(x, y), at.sample_index, 1);

@@ -8,6 +8,8 @@
 
 #include "integrator/camera_medium.h"
 #include "integrator/graph_stop.h"
+#include "integrator/media.h"
+#include "kernel/stage/path_access.h"
 
 namespace relief {
 
@@ -20,8 +22,9 @@ using Clock = std::chrono::steady_clock;
 std::uint64_t most_searches(const KernelGlobals& g)
 {
   const auto scatterings = static_cast<std::uint64_t>(g.limits.total) + 2;
+  const std::uint64_t boundaries = g.media != nullptr ? kMostBoundaries : 0;
   return scatterings * (2 * std::uint64_t{g.num_area_lights} + 1) + static_cast<std::uint64_t>(g.limits.transparent) +
-         1;
+         boundaries + 1;
 }
 
 }  // namespace
@@ -29,15 +32,20 @@ std::uint64_t most_searches(const KernelGlobals& g)
 std::size_t Wavefront::bytes(const WavefrontColumns& columns)
 {
   return sizeof(Memory) + (columns.caustics ? sizeof(CausticMemory) : 0u) +
-         (columns.motion ? sizeof(MotionMemory) : 0u) + (columns.facets ? kColumnEntries * sizeof(FacetState) : 0u);
+         (columns.motion ? sizeof(MotionMemory) : 0u) + (columns.facets ? kColumnEntries * sizeof(FacetState) : 0u) +
+         (columns.media ? kColumnEntries * sizeof(MediumState) : 0u);
 }
 
 Wavefront::Wavefront(const WavefrontColumns& columns)
     : memory_(std::make_unique_for_overwrite<Memory>()), state_(memory_->state), shadow_(memory_->shadow)
 {
   auto queue = std::begin(memory_->queues);
-  for (QueueView* q : {&active_, &next_, &lights_, &background_}) q->paths = *queue++;
-  for (QueueView& q : surfaces_) q.paths = *queue++;
+  for (QueueView* q : {&active_, &next_}) q->paths = *queue++;
+  for (QueueView& q : met_) q.paths = *queue++;
+  if (columns.media) {
+    medium_memory_ = std::make_unique_for_overwrite<MediumState[]>(kColumnEntries);
+    state_.media = medium_memory_.get();
+  }
   if (columns.facets) {
     facet_memory_ = std::make_unique_for_overwrite<FacetState[]>(kColumnEntries);
     state_.facets = facet_memory_.get();
@@ -67,8 +75,18 @@ void Wavefront::note_displacement(const DisplacementWork& work)
 
 void Wavefront::clear_queues()
 {
-  lights_.size = background_.size = next_.size = shadow_.size = 0;
-  for (QueueView& queue : surfaces_) queue.size = 0;
+  next_.size = shadow_.size = 0;
+  for (QueueView& queue : met_) queue.size = 0;
+}
+
+void Wavefront::trace_shadows(const KernelGlobals& g,
+                              const Accel& accel,
+                              ShadowStart start,
+                              DisplacementWork& displacement)
+{
+  counters.shadow_rays += shadow_.size;
+  intersect_shadow(g, accel, state_, shadow_, start, memory_->visibility, displacement);
+  if (recorder != nullptr) record_shadow_rays();
 }
 
 void Wavefront::record_rays() const
@@ -115,6 +133,7 @@ bool Wavefront::run(const KernelGlobals& g,
 
   const std::uint32_t num_paths = stages.generate(g, state_, batch);
   if (camera_medium != nullptr) camera_medium->apply(state_, num_paths);
+  if (media != nullptr) media->start(state_, num_paths);
   if (g.caustics.enabled) {
     for (std::uint32_t i = 0; i < num_paths; ++i) (*state_.caustic.radiance)[i] = Vec3f{};
     std::iota(state_.caustic.root, state_.caustic.root + num_paths, 0u);
@@ -141,27 +160,36 @@ bool Wavefront::run(const KernelGlobals& g,
     }
     if (!camera) counters.bounce_rays += active_.size;
     clear_queues();
-    intersect_closest(g, accel, state_, active_, camera, surface_kernel.data(), surfaces_.data(), lights_, background_,
+    intersect_closest(g, accel, state_, active_, camera, surface_kernel.data(), met_.data(), lights(), background(),
                       displacement);
     if (recorder != nullptr) record_rays();
     charge(Stage::kIntersectClosest);
 
+    if (media != nullptr) {
+      stages.shade_media(g, state_, met_.data(), kNumSurfaceKernels, next_, shadow_);
+      charge(Stage::kShade);
+      trace_shadows(g, accel, ShadowStart::kInMedium, displacement);
+      charge(Stage::kIntersectShadow);
+      stages.accumulate_shadow(g, state_, shadow_, memory_->visibility);
+      shadow_.size = 0;
+    }
     if (g.caustics.enabled) {
-      for (const QueueView& queue : surfaces_) stages.gather_photons(g, state_, queue);
+      for (const QueueView& queue : surfaces()) stages.gather_photons(g, state_, queue);
       charge(Stage::kGatherPhotons);
     }
-    stages.shade_background(g, state_, background_, counters);
-    stages.shade_light(g, state_, lights_, next_);
-    for (std::size_t k = 0; k < surfaces_.size(); ++k) {
-      if (surfaces_[k].size > 0) stages.shade_surface[k](g, state_, surfaces_[k], next_, shadow_, counters);
+    stages.shade_background(g, state_, background(), counters);
+    stages.shade_light(g, state_, lights(), next_);
+    for (std::size_t k = 0; k < kNumSurfaceKernels; ++k) {
+      if (met_[k].size > 0) stages.shade_surface[k](g, state_, met_[k], next_, shadow_, counters);
     }
     charge(Stage::kShade);
 
-    counters.shadow_rays += shadow_.size;
-    intersect_shadow(g, accel, state_, shadow_, memory_->visibility, displacement);
-    if (recorder != nullptr) record_shadow_rays();
+    trace_shadows(g, accel, ShadowStart::kAtHit, displacement);
     charge(Stage::kIntersectShadow);
     stages.accumulate_shadow(g, state_, shadow_, memory_->visibility);
+    if (media != nullptr) {
+      for (std::uint32_t i = 0; i < next_.size; ++i) medium_follow(state_, next_.paths[i]);
+    }
     std::swap(active_, next_);
     charge(Stage::kShade);
   }
@@ -201,18 +229,18 @@ void Wavefront::trace_photons(const KernelGlobals& g,
     }
     clear_queues();
     counters.photon_rays += active_.size;
-    intersect_closest(g, accel, state_, active_, false, surface_kernel.data(), surfaces_.data(), lights_, background_,
+    intersect_closest(g, accel, state_, active_, false, surface_kernel.data(), met_.data(), lights(), background(),
                       displacement);
     const std::size_t before = out.size();
     out.resize(before + active_.size);
     PhotonQueueView photons{out.data() + before, 0};
-    for (const QueueView& queue : surfaces_) {
+    for (const QueueView& queue : surfaces()) {
       stages.shade_photons(g, sources, state_, queue, next_, photons);
     }
     out.resize(before + photons.size);
     // Area lights let rays pass.
-    for (std::uint32_t i = 0; i < lights_.size; ++i) {
-      const std::uint32_t path = lights_.paths[i];
+    for (std::uint32_t i = 0; i < lights().size; ++i) {
+      const std::uint32_t path = lights().paths[i];
       state_.t_min[path] = t_min_behind(state_.hit_t[path]);
       queue_push(next_, path);
     }

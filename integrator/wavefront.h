@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "integrator/accel.h"
@@ -36,9 +37,11 @@ struct WavefrontColumns {
   bool caustics = false;  ///< camera paths gather photons
   bool motion = false;    ///< paths have a time
   bool facets = false;    ///< they may meet coarser levels of height maps
+  bool media = false;     ///< something fills space
 };
 
 class CameraMedium;
+class Media;
 
 /// Owned by one thread at a time.
 class Wavefront {
@@ -72,6 +75,7 @@ class Wavefront {
   static std::size_t bytes(const WavefrontColumns& columns);
 
   const CameraMedium* camera_medium = nullptr;   ///< null: camera rays start in none
+  const Media* media = nullptr;                  ///< null: there are none
   std::vector<RecordedRay>* recorder = nullptr;  ///< receives every ray of the batch, if set
   const std::atomic<bool>* stop = nullptr;       ///< true: searches in displaced meshes are given up; null: never
   Counters counters;
@@ -82,7 +86,11 @@ class Wavefront {
   std::uint64_t first_nonfinite = kNoSample;
 
  private:
+  std::span<QueueView> surfaces() { return {met_.data(), kNumSurfaceKernels}; }
+  QueueView& lights() { return met_[kNumSurfaceKernels]; }
+  QueueView& background() { return met_[kNumSurfaceKernels + 1]; }
   void clear_queues();
+  void trace_shadows(const KernelGlobals& g, const Accel& accel, ShadowStart start, DisplacementWork& displacement);
   void note_displacement(const DisplacementWork& work);
   void record_rays() const;
   void record_shadow_rays() const;
@@ -111,10 +119,11 @@ class Wavefront {
   std::unique_ptr<CausticMemory> caustic_memory_;
   std::unique_ptr<MotionMemory> motion_memory_;
   std::unique_ptr<FacetState[]> facet_memory_;
+  std::unique_ptr<MediumState[]> medium_memory_;
   PathState& state_;
   ShadowQueue& shadow_;
-  QueueView active_, next_, lights_, background_;
-  std::array<QueueView, kNumSurfaceKernels> surfaces_;
+  QueueView active_, next_;
+  std::array<QueueView, kNumSurfaceKernels + 2> met_;  ///< by what they have met: see surfaces, lights, background
 };
 
 }  // namespace relief

@@ -14,11 +14,12 @@
 #include "kernel/photon/photon.h"
 #include "kernel/shape/mesh_view.h"
 #include "kernel/texture/texture_view.h"
+#include "kernel/volume/medium.h"
 
 namespace relief {
 
 struct BounceLimits {
-  int total = 12, diffuse = 12, glossy = 12, transmission = 12, transparent = 32;
+  int total = 12, diffuse = 12, glossy = 12, transmission = 12, transparent = 32, volume = 12;
 };
 
 /// How direct light is estimated. All three converge to the same picture, which tests rely on; the default has the least
@@ -44,6 +45,8 @@ struct KernelGlobals {
   const InstanceView* instances = nullptr;
   std::uint32_t num_instances = 0;
   const Material* materials = nullptr;
+  const Medium* media = nullptr;             ///< by Material::medium_index
+  std::int32_t world_medium = -1;            ///< into media: what fills all space; −1: nothing
   const GraphProgramView* graphs = nullptr;  ///< by Material::graph_index and Lamp::graph_index
   GraphRun run_graph = nullptr;
   EmitterRadiance emitter_radiance = nullptr;

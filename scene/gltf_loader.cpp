@@ -619,13 +619,21 @@ void GltfLoader::read_programs(const GltfDocument& document,
                                Material& material)
 {
   // The closures' reader stands within the graph's, for they refer to its nodes.
-  const auto read = [&](const JsonReader* graph, const JsonReader* surface) {
-    GraphPrograms programs = graph_read(document, graph, surface, textures_, scene_.attribute_names, warnings_);
+  const auto read = [&](const JsonReader* graph, const JsonReader* surface, const JsonReader* volume) {
+    GraphPrograms programs = graph_read(document, graph, surface, volume, textures_, scene_.attribute_names, warnings_);
+    if (programs.volume) {
+      if (!programs.volume->program.inputs.empty()) {
+        volume->fail("closures", "numbers, or nodes that do not depend on where they are", "nodes that do");
+      }
+      material.medium_index = static_cast<int>(scene_.media.size());
+      scene_.media.push_back(medium_of(programs.volume->program, programs.volume->closures));
+    }
+    if (!programs.surface) return;
     const auto add = [this](GraphProgram&& program) {
       scene_.graphs.push_back(std::move(program));
       return static_cast<int>(scene_.graphs.size()) - 1;
     };
-    material.graph_index = add(std::move(programs.surface));
+    material.graph_index = add(std::move(*programs.surface));
     const GraphProgram& program = scene_.graphs.back();
     material.graph_outputs = program.given;
     material.depends_on_ray = std::any_of(program.inputs.begin(), program.inputs.end(), [](const GraphInput& input) {
@@ -652,13 +660,20 @@ void GltfLoader::read_programs(const GltfDocument& document,
     if (material.has_closures) material.alpha_mode = programs.transparency ? AlphaMode::kBlend : AlphaMode::kOpaque;
     if (programs.transparency) material.transparency_index = add(std::move(*programs.transparency));
   };
-  const auto read_with = [&](const JsonReader* surface) {
-    return document.read_extension(json, path, "RELIEF_graph", [&](const JsonReader& graph) { read(&graph, surface); });
+  const auto read_with = [&](const JsonReader* surface, const JsonReader* volume) {
+    const bool has_graph = document.read_extension(json, path, "RELIEF_graph",
+                                                   [&](const JsonReader& graph) { read(&graph, surface, volume); });
+    if (!has_graph && (surface != nullptr || volume != nullptr)) read(nullptr, surface, volume);
   };
-  const bool has_surface = document.read_extension(json, path, "RELIEF_surface", [&](const JsonReader& surface) {
-    if (!read_with(&surface)) read(nullptr, &surface);
-  });
-  if (!has_surface) read_with(nullptr);
+  const auto read_around = [&](const JsonReader* volume) {
+    const bool has_surface = document.read_extension(json, path, "RELIEF_surface",
+                                                     [&](const JsonReader& surface) { read_with(&surface, volume); });
+    if (!has_surface) read_with(nullptr, volume);
+  };
+  const bool has_volume =
+      document.read_extension(json, path, "RELIEF_volume", [&](const JsonReader& volume) { read_around(&volume); });
+  if (!has_volume) read_around(nullptr);
+  material.is_boundary = material.medium_index >= 0 && material_has_no_surface(material);
 }
 
 int GltfLoader::material_of(const GltfDocument& document, int material_index)

@@ -35,4 +35,10 @@ bool material_casts_caustics(const Material& material)
   return bends && !material.unlit && !material.depends_on_ray && material.roughness <= roughest;
 }
 
+bool material_has_no_surface(const Material& m)
+{
+  return m.alpha_mode == AlphaMode::kBlend && m.base_alpha == 0.0f && !m.has_closures && m.graph_index < 0 &&
+         is_zero(m.emission);
+}
+
 }  // namespace relief

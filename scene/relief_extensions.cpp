@@ -277,6 +277,11 @@ std::optional<Environment> relief_environment(const GltfDocument& document,
     e.visible_to_camera = r.boolean("visibleToCamera", true);
     e.casts_caustics = r.boolean("causticLight", true);
     e.hidden_from = read_hidden_from(r);
+    if (r.has("volume")) {
+      const JsonReader volume = r.object("volume");
+      const VolumeProgram medium = volume_read(document, volume, textures, warnings);
+      e.medium = medium_of(medium.program, medium.closures);
+    }
     if (r.has("clearGlass")) e.clear_roughness = r.number_f("clearGlass", 0, 0, 1);
     if (r.has("backdrop")) {
       const JsonReader backdrop = r.object("backdrop");

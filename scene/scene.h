@@ -15,6 +15,7 @@
 #include "kernel/light/light.h"
 #include "kernel/shape/displacement_settings.h"
 #include "kernel/shape/mesh_view.h"
+#include "kernel/volume/medium.h"
 #include "scene/diagnostics.h"
 #include "scene/environment_graph.h"
 #include "scene/file_stamp.h"
@@ -98,6 +99,7 @@ struct Environment : Surroundings {
   bool visible_to_camera = true;
   bool casts_caustics = true;     ///< as Light::casts_caustics
   std::uint32_t hidden_from = 0;  ///< bit PathEvent: bounced rays that do not see it
+  std::optional<Medium> medium;   ///< that fills all space
   /// Perceptual: where the camera does not see it, glass up to this roughness is as clear as air. Empty: glass is opaque.
   std::optional<float> clear_roughness;
 };
@@ -114,6 +116,7 @@ struct Scene {
   std::vector<Instance> instances;
   std::vector<Material> materials;
   std::vector<std::string> material_names;
+  std::vector<Medium> media;                 ///< by Material::medium_index
   std::vector<GraphProgram> graphs;          ///< by Material::graph_index and so on, and by Lamp::graph_index
   std::vector<std::string> attribute_names;  ///< of attributes that graphs read
   std::vector<InstanceColumn> instance_columns;

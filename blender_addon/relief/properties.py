@@ -134,6 +134,7 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
     diffuse_bounces: IntProperty(name="Diffuse", **_declared("diffuseBounces", soft_max=200))
     glossy_bounces: IntProperty(name="Glossy", **_declared("glossyBounces", soft_max=200))
     transmission_bounces: IntProperty(name="Transmission", **_declared("transmissionBounces", soft_max=200))
+    volume_bounces: IntProperty(name="Volume", **_declared("volumeBounces", soft_max=200))
     transparent_bounces: IntProperty(name="Transparent", **_declared("transparentBounces", soft_max=1024))
     filter_glossy: FloatProperty(name="Filter Glossy", **_declared("filterGlossy", soft_max=10.0))
     clamp_direct: FloatProperty(name="Clamp Direct", **_declared("clampDirect"))

@@ -198,7 +198,7 @@ class RELIEF_PT_light_paths(_RenderPanel, bpy.types.Panel):
         settings, rows = context.scene.relief, self.rows()
         cycles = cycles_settings(context.scene)
         owner = settings if cycles is None else cycles
-        for name in ("max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces"):
+        for name in ("max_bounces", "diffuse_bounces", "glossy_bounces", "transmission_bounces", "volume_bounces"):
             rows.prop(owner, name)
         rows.prop(owner, "transparent_bounces" if cycles is None else "transparent_max_bounces")
         rows.separator()
@@ -444,6 +444,19 @@ class RELIEF_PT_world(_WorldPanel, bpy.types.Panel):
         self.rows().prop(world.relief, "caustic_light")
 
 
+class RELIEF_PT_world_volume(_WorldPanel, bpy.types.Panel):
+    bl_label = "Volume"
+    bl_context = "world"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and context.world.use_nodes
+
+    def draw(self, context):
+        _draw_output(self.layout, context.world.node_tree, "ShaderNodeOutputWorld", "Volume")
+
+
 class RELIEF_PT_world_ray_visibility(_WorldPanel, bpy.types.Panel):
     bl_label = "Ray Visibility"
     bl_context = "world"
@@ -621,6 +634,7 @@ _classes = (
     RELIEF_PT_material_settings,
     RELIEF_PT_world_preview,
     RELIEF_PT_world,
+    RELIEF_PT_world_volume,
     RELIEF_PT_world_mist,
     RELIEF_PT_world_ray_visibility,
     RELIEF_PT_light,

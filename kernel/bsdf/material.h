@@ -57,6 +57,8 @@ struct Material {
   int transparency_index = -1;      ///< into KernelGlobals::graphs: its transparent closures alone; −1: none
   int emission_index = -1;          ///< likewise: what gives its emission, or part of it; −1: no graph does
 
+  int medium_index = -1;        ///< into Scene::media: what fills what its meshes bound; −1: nothing
+  bool is_boundary = false;     ///< there is no surface, but for what begins or ends there
   int displacement_index = -1;  ///< into Scene::displacements; −1: none
 };
 

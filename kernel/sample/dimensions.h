@@ -54,6 +54,24 @@ RELIEF_KERNEL constexpr std::uint32_t dimension_facet(int bounce, FacetDimension
          static_cast<std::uint32_t>(use);
 }
 
+/// Uses in every stretch of a path's ray that is in media. The first four are drawn together.
+enum class MediumDimension : std::uint32_t {
+  kLight,     ///< 2D: which light, and the place on it
+  kPhase,     ///< 2D: which phase function, and the direction
+  kDistance,  ///< 2D: how far the path gets; which channel that is asked of
+  kDirect,    ///< 2D: where light is asked for; how that is chosen
+  kPivot,     ///< 2D: the light around which it is
+  kFate,      ///< 1D: whether the path goes on
+  kCount
+};
+
+/// @param stretch  of the path's rays, from 0 on; few get as far as the first of those that photons use
+/// @return         dimension for sample_1d or sample_2d, as the use says
+RELIEF_KERNEL constexpr std::uint32_t dimension_medium(std::uint32_t stretch, MediumDimension use)
+{
+  return 0x30000000u + stretch * static_cast<std::uint32_t>(MediumDimension::kCount) + static_cast<std::uint32_t>(use);
+}
+
 /// Uses at the start of a photon; its bounces use the same dimensions as a camera path's.
 enum class PhotonDimension : std::uint32_t {
   kSource,  ///< 1D: which light, towards which caster

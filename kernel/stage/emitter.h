@@ -2,6 +2,7 @@
 #pragma once
 
 #include "kernel/shape/material_lookup.h"
+#include "kernel/shape/surface_hit.h"
 #include "kernel/stage/path_access.h"
 
 namespace relief {
@@ -34,6 +35,32 @@ RELIEF_KERNEL Vec3f emitter_radiance(const KernelGlobals& g, const Light& emitte
   if (material.emission_index >= 0) return g.emitter_radiance(g, emitter, at);
   return triangle_emission(material, g.textures, g.meshes[instance.mesh_index],
                            static_cast<std::uint32_t>(emitter.triangle_index), at.barycentric);
+}
+
+/// Aims a shadow ray at a light's sample.
+/// @param light    sampled at P
+/// @param emitter  the light, world; null: the environment
+/// @param O        where the ray starts, at P or a little beside
+/// @param D, t_max get its direction and length
+RELIEF_KERNEL void shadow_ray_aim(const LightSample& light,
+                                  const Light* emitter,
+                                  Vec3f P,
+                                  Vec3f O,
+                                  Vec3f& D,
+                                  float& t_max)
+{
+  D = light.wi;
+  t_max = light.distance;
+  if (!(t_max < kInfinity)) return;
+  Vec3f target = P + light.wi * light.distance;
+  if (emitter != nullptr && emitter->instance_index >= 0) {
+    // Stop short of the emitter itself by the error bound of a point on it.
+    const Vec3f error = gamma_bound(8) * (abs(emitter->P) + abs(emitter->edge_u) + abs(emitter->edge_v) + abs(P));
+    target = offset_ray_origin(target, error, dot(emitter->axis, light.wi) < 0.0f ? emitter->axis : -emitter->axis);
+  }
+  const Vec3f to_target = target - O;
+  t_max = length(to_target);
+  D = to_target / t_max;
 }
 
 }  // namespace relief

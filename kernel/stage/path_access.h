@@ -85,7 +85,7 @@ RELIEF_KERNEL std::uint32_t path_event(std::uint32_t flags) { return flags >> kP
 
 RELIEF_KERNEL std::uint32_t path_flags_after(std::uint32_t flags, PathEvent event)
 {
-  return (flags & ~(3u << kPathEventShift)) | static_cast<std::uint32_t>(event) << kPathEventShift;
+  return (flags & ~(3u << kPathEventShift | kPathScattered)) | static_cast<std::uint32_t>(event) << kPathEventShift;
 }
 
 /// Microfacets that a path does not see: after a diffuse event those by which there are to be no caustics.
@@ -180,10 +180,20 @@ RELIEF_KERNEL bool path_sees_light(const PathState& s, std::uint32_t i, const Li
 {
   const auto event = static_cast<PathEvent>(path_event(s.flags[i]));
   if (event == PathEvent::kCamera) return light.visible_to_camera;
-  if (light.hidden_from == 0) return true;
+  if (light.hidden_from == 0 || (s.flags[i] & kPathScattered) != 0) return true;
   // Of single directions the event is known.
   if (!(s.pdf[i] > 0.0f)) return (light.hidden_from >> static_cast<int>(event) & 1u) == 0;
   return !light_hides(light, event == PathEvent::kTransmission).any();
+}
+
+/// Lets a path that goes on from its hit enter or leave what the surface there bounds, if it has passed that.
+RELIEF_KERNEL void medium_follow(PathState& state, std::uint32_t path)
+{
+  MediumState& m = state.media[path];
+  if (m.hit_inside == kWholeWorld) return;
+  // A new ray is searched from its start on.
+  const bool has_passed = state.t_min[path] != kLeastDistance || medium_is_behind(m, path_origin(state, path));
+  if (has_passed) medium_cross(m, m.hit_inside, m.hit_front);
 }
 
 /// Copies a path that can go on in two ways; the copy has brought nothing yet.

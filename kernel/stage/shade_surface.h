@@ -55,7 +55,6 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   const LightSample light = lights_sample_chosen(g.lights, chosen, emitter, P, light_N);
   if (!(light.pdf > 0.0f)) return;
   Vec3f radiance = light.radiance;
-  const bool is_mesh = emitter != nullptr && emitter->instance_index >= 0;
   // Any kernel may sample a textured or transparent emitter, so this is not a feature of the surface that is lit.
   if (emitter != nullptr && !emitter->is_even) {
     radiance = emitter_radiance(
@@ -97,19 +96,9 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   if (is_zero(gain)) return;
 
   const Vec3f O = surface_ray_origin(at, light.wi);
-  Vec3f D = light.wi;
-  float t_max = light.distance;
-  if (t_max < kInfinity) {
-    Vec3f target = P + light.wi * light.distance;
-    if (is_mesh) {
-      // Stop short of the emitter itself by the error bound of a point on it.
-      const Vec3f error = gamma_bound(8) * (abs(emitter->P) + abs(emitter->edge_u) + abs(emitter->edge_v) + abs(P));
-      target = offset_ray_origin(target, error, dot(emitter->axis, light.wi) < 0.0f ? emitter->axis : -emitter->axis);
-    }
-    const Vec3f to_target = target - O;
-    t_max = length(to_target);
-    D = to_target / t_max;
-  }
+  Vec3f D;
+  float t_max = 0;
+  shadow_ray_aim(light, emitter, P, O, D, t_max);
   shadow_queue_push(shadow, path, O, D, t_max, cone, gain, static_cast<std::uint32_t>(bounce + 1));
 }
 
@@ -533,7 +522,8 @@ template <unsigned kFeatures>
   if ((at.instance->flags & kDisplaced) != 0) cone.width = min(cone.width, state.hit_width[path]);
   const bool last = bounce > g.limits.total || path_bounces(bounces, BounceKind::kDiffuse) > g.limits.diffuse ||
                     path_bounces(bounces, BounceKind::kGlossy) > g.limits.glossy ||
-                    path_bounces(bounces, BounceKind::kTransmission) > g.limits.transmission;
+                    path_bounces(bounces, BounceKind::kTransmission) > g.limits.transmission ||
+                    (state.flags[path] & kPathLast) != 0;
   const bool is_held = shade_surface_holdout<kFeatures>(g, state, path, at, transmittance());
   // Closures emit, and are lit, whether or not others let the path through.
   if (kMixture && !is_held) {

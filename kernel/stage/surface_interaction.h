@@ -108,9 +108,10 @@ RELIEF_KERNEL std::uint32_t path_ray_kinds(const PathState& state, std::uint32_t
   if (event == PathEvent::kCamera) return bit(GraphRayKind::kCamera);
   // Cycles' bound on the least density of a path that still rounds edges.
   constexpr float kSharpPdf = 8.0f;
+  const std::uint32_t blurred = state.least_pdf[path] < kSharpPdf ? bit(GraphRayKind::kBlurred) : 0u;
+  if ((state.flags[path] & kPathScattered) != 0) return blurred;
   const std::uint32_t side =
-      bit(event == PathEvent::kTransmission ? GraphRayKind::kTransmission : GraphRayKind::kReflection) |
-      (state.least_pdf[path] < kSharpPdf ? bit(GraphRayKind::kBlurred) : 0u);
+      bit(event == PathEvent::kTransmission ? GraphRayKind::kTransmission : GraphRayKind::kReflection) | blurred;
   if (event == PathEvent::kDiffuse) return side | bit(GraphRayKind::kDiffuse);
   return side | bit(GraphRayKind::kGlossy) | (state.pdf[path] > 0.0f ? 0u : bit(GraphRayKind::kSingular));
 }

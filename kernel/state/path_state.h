@@ -7,6 +7,7 @@
 #include "kernel/assert.h"
 #include "kernel/math/vec.h"
 #include "kernel/state/facet_state.h"
+#include "kernel/state/medium_state.h"
 #include "kernel/state/path_event.h"
 
 namespace relief {
@@ -82,6 +83,7 @@ struct alignas(64) PathState {
   CausticStateView caustic;
   MotionStateView motion;
   FacetState* facets = nullptr;  ///< of the present hit; null where no ray meets any
+  MediumState* media = nullptr;  ///< null where nothing has a medium
 };
 
 enum PathFlag : std::uint32_t {
@@ -95,6 +97,8 @@ enum PathFlag : std::uint32_t {
   kPathPhoton = 1u << 8,       ///< it started at a light
   kPathHiddenShift = 9,        ///< position of four bits, of a photon: Light::hidden_from
   kPathCovers = 1u << 13,      ///< an event after which the film is not clear, whatever is seen behind it
+  kPathScattered = 1u << 14,   ///< the last scattering event was in a medium: the two bits of PathEvent mean nothing
+  kPathLast = 1u << 15,        ///< it has scattered in media as often as it may: what it meets is seen, but not lit
   kPathTransparentShift = 16,  ///< position of the count of transparent surfaces
 };
 

@@ -298,25 +298,37 @@ GraphProgram read_whole(const GltfDocument& document,
 GraphPrograms graph_read(const GltfDocument& document,
                          const JsonReader* graph,
                          const JsonReader* surface,
+                         const JsonReader* volume,
                          TextureTable& textures,
                          std::vector<std::string>& attribute_names,
                          Warnings& warnings)
 {
-  const JsonReader& reader = graph != nullptr ? *graph : *surface;
+  const JsonReader& reader = graph != nullptr ? *graph : surface != nullptr ? *surface : *volume;
   Reader r{document, reader.file(), reader.path(), textures, attribute_names, warnings, {}, {}, {}, {}};
   GraphPrograms programs;
   try {
+    const auto input = [&r](const JsonReader& parent, std::string_view name, GraphType type) {
+      return r.input(parent, name, type);
+    };
+    if (graph != nullptr) r.read_nodes(*graph);
+    if (volume != nullptr) {
+      const GraphBuilder nodes = r.build;
+      programs.volume.emplace();
+      programs.volume->closures = volume_closures_read(*volume, input, r.build, warnings);
+      programs.volume->program = r.build.compile();
+      programs.volume->program.attributes.assign(r.attributes.begin(), r.attributes.end());
+      r.build = nodes;
+    }
+    bool has_outputs = false;
     if (graph != nullptr) {
-      r.read_nodes(*graph);
-      if (surface == nullptr || graph->has("outputs")) r.read_outputs(*graph);
+      has_outputs = (surface == nullptr && volume == nullptr) || graph->has("outputs");
+      if (has_outputs) r.read_outputs(*graph);
       graph->warn_unread(warnings);
     }
+    if (surface == nullptr && !has_outputs) return programs;
     std::vector<SurfaceClosureSpec> closures;
     std::uint16_t surface_normal = kNoGraphOperand;
     if (surface != nullptr) {
-      const auto input = [&r](const JsonReader& parent, std::string_view name, GraphType type) {
-        return r.input(parent, name, type);
-      };
       const GraphValue normal = input(*surface, "normal", GraphType::kVector);
       closures = closures_read(*surface, input, r.build, warnings);
       if (normal.v[0].index >= 0) {
@@ -326,9 +338,9 @@ GraphPrograms graph_read(const GltfDocument& document,
       }
     }
     programs.surface = r.build.compile();
-    programs.surface.closures = closures;
-    programs.surface.surface_normal = surface_normal;
-    programs.surface.attributes.assign(r.attributes.begin(), r.attributes.end());
+    programs.surface->closures = closures;
+    programs.surface->surface_normal = surface_normal;
+    programs.surface->attributes.assign(r.attributes.begin(), r.attributes.end());
     const auto alone = [&](ClosureKind kind, int num_numbers) {
       std::optional<GraphProgram> program;
       std::vector<SurfaceClosureSpec> kept = closures;
@@ -346,6 +358,15 @@ GraphPrograms graph_read(const GltfDocument& document,
   } catch (const GraphTooLarge& error) {
     reader.fail("", error.what(), "one that needs more");
   }
+}
+
+VolumeProgram volume_read(const GltfDocument& document,
+                          const JsonReader& volume,
+                          TextureTable& textures,
+                          Warnings& warnings)
+{
+  std::vector<std::string> attribute_names;  // there are none
+  return *graph_read(document, nullptr, nullptr, &volume, textures, attribute_names, warnings).volume;
 }
 
 GraphProgram graph_read_color(const GltfDocument& document,

@@ -8,28 +8,46 @@
 #include "scene/gltf_document.h"
 #include "scene/graph/graph_nodes.h"
 #include "scene/graph/graph_program.h"
+#include "scene/graph/volume_reader.h"
 #include "scene/texture_table.h"
 
 namespace relief {
 
+/// What gives a medium.
+struct VolumeProgram {
+  GraphProgram program;
+  std::vector<VolumeClosureSpec> closures;
+};
+
 /// The programs of a material.
 struct GraphPrograms {
-  GraphProgram surface;
+  std::optional<GraphProgram> surface;       ///< none: there is neither RELIEF_surface nor an output of the graph
   std::optional<GraphProgram> emission;      ///< of its emission closures alone, for lights; none: it has none
   std::optional<GraphProgram> transparency;  ///< of its transparent closures alone, for shadow rays; none: it has none
+  std::optional<VolumeProgram> volume;       ///< none: there is no RELIEF_volume
 };
 
 /// @param graph     RELIEF_graph's object; null: no nodes
-/// @param surface   RELIEF_surface's object; null: the graph gives factors of glTF's material alone
+/// @param surface   RELIEF_surface's object; null: the graph gives factors of glTF's material alone, if any
+/// @param volume    RELIEF_volume's object; null: there is none
 /// @param textures  gets the images that the graph reads; their indices stand in the program
 /// @param attribute_names  likewise, the names of attributes
 /// @error SceneError: a node of unknown type, a reference to none, a cycle, a value of another type; a graph too large
 GraphPrograms graph_read(const GltfDocument& document,
                          const JsonReader* graph,
                          const JsonReader* surface,
+                         const JsonReader* volume,
                          TextureTable& textures,
                          std::vector<std::string>& attribute_names,
                          Warnings& warnings);
+
+/// Reads a medium without a graph.
+/// @param volume  its object, with `closures`
+/// @error         likewise
+VolumeProgram volume_read(const GltfDocument& document,
+                          const JsonReader& volume,
+                          TextureTable& textures,
+                          Warnings& warnings);
 
 /// Reads the graph of an environment: its output `color` becomes the program's results 0 to 2.
 /// @param graph  its object, with `nodes` and `outputs`

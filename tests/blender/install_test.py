@@ -206,7 +206,7 @@ def test_every_setting_says_unit_and_default():
         if name not in {"rna_type", "name"}:
             assert "default" in setting.description, name
     for name in (
-        "samples seed time_limit noise_threshold max_bounces diffuse_bounces glossy_bounces transmission_bounces "
+        "samples seed time_limit noise_threshold max_bounces diffuse_bounces glossy_bounces transmission_bounces volume_bounces "
         "displacement_method displacement_error lod memory_limit caustics"
     ).split():
         assert hasattr(scene.relief, name), name

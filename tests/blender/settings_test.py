@@ -57,6 +57,7 @@ def test_cycles_settings_are_taken_over():
     cycles.sample_clamp_direct, cycles.blur_glossy = 8.5, 0.25
     cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = 9, 2, 3
     cycles.transmission_bounces, cycles.transparent_max_bounces, cycles.sample_clamp_indirect = 5, 6, 7.5
+    cycles.volume_bounces = 4
     assert scene.relief.use_cycles_settings
     found, warnings = _exported(scene)
     expected = {
@@ -70,6 +71,7 @@ def test_cycles_settings_are_taken_over():
         "diffuseBounces": 2,
         "glossyBounces": 3,
         "transmissionBounces": 5,
+        "volumeBounces": 4,
         "transparentBounces": 6,
         "seed": 5,
         "clampIndirect": 7.5,
@@ -256,6 +258,7 @@ def test_properties_are_as_the_program_declares_them():
         "diffuse_bounces": "diffuseBounces",
         "glossy_bounces": "glossyBounces",
         "transmission_bounces": "transmissionBounces",
+        "volume_bounces": "volumeBounces",
         "transparent_bounces": "transparentBounces",
         "min_samples": "minSamples",
         "filter_glossy": "filterGlossy",

@@ -93,14 +93,6 @@ def test_srgb_image():
     assert_agrees(scene, samples=64, block=4, tolerance=0.01)
 
 
-def test_a_volume_is_warned_about():
-    scene = _stage()
-    tree = set_world((0.2, 0.5, 0.9))
-    volume = tree.nodes.new("ShaderNodeVolumeScatter")
-    tree.links.new(volume.outputs[0], tree.nodes["World Output"].inputs["Volume"])
-    assert_warns(scene, 'world "world"', "a volume")
-
-
 def test_transparent_film():
     """Where nothing is, alpha is 0; elsewhere the picture stays."""
     import numpy as np

@@ -13,6 +13,7 @@ from .mesh import Wanted
 from .settings import filters_glossy
 from .surface import TRANSPARENT, ClosureWriter, Inside, Surface, plain_surface
 from .texture import Input, TextureReader, ies_uri, image_options
+from .volume import VolumeWriter
 
 #: The format has two sets of texture coordinates a vertex.
 _MOST_COORDINATES = 2
@@ -326,7 +327,7 @@ class MaterialJob:
             return
         node, textures = source.node, self._textures
         if node.bl_idname != "ShaderNodeVolumeAbsorption" or inside == Inside.OPEN:
-            self._fail(source, f'node "{node.name}" ({node.bl_label}) as volume', "it is left out")
+            self._write_medium(source)
             return
         color = textures.constant_color(node.inputs["Color"], source.groups)
         density = max(0.0, textures.constant_number(node.inputs["Density"], source.groups))
@@ -341,3 +342,12 @@ class MaterialJob:
             "attenuationColor": [math.exp(-c * distance) for c in coefficients],
         }
         self._extend("KHR_materials_volume", value)
+
+    def _write_medium(self, source):
+        medium = VolumeWriter(self._graph, self._fail)
+        medium.write(source)
+        if medium.varies:
+            node = source.node
+            self._fail(source, f'node "{node.name}" ({node.bl_label}): what varies in a volume', "it is left out")
+        elif medium.closures:
+            self._extend("RELIEF_volume", {"closures": medium.closures})

@@ -37,6 +37,7 @@ class Sampling:
     diffuse_bounces: int
     glossy_bounces: int
     transmission_bounces: int
+    volume_bounces: int
     transparent_bounces: int
     filter_glossy: float
     clamp_direct: float
@@ -78,6 +79,7 @@ def sampling_of(scene, view_layer):
         diffuse_bounces=cycles.diffuse_bounces,
         glossy_bounces=cycles.glossy_bounces,
         transmission_bounces=cycles.transmission_bounces,
+        volume_bounces=cycles.volume_bounces,
         transparent_bounces=cycles.transparent_max_bounces,
         filter_glossy=cycles.blur_glossy,
         clamp_direct=cycles.sample_clamp_direct,
@@ -171,6 +173,7 @@ def render_settings(scene, view_layer, size):
         "diffuseBounces": min(sampling.diffuse_bounces, sampling.max_bounces),
         "glossyBounces": min(sampling.glossy_bounces, sampling.max_bounces),
         "transmissionBounces": min(sampling.transmission_bounces, sampling.max_bounces),
+        "volumeBounces": min(sampling.volume_bounces, sampling.max_bounces),
         "transparentBounces": sampling.transparent_bounces,
         "seed": sampling.seed,
         "exposure": scene.view_settings.exposure,

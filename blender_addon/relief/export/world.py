@@ -10,6 +10,7 @@ from .emission import EmissionTree
 from .graph import GraphWriter, NotUnderstood
 from .image import MISSING, is_encoded, reads_as_stored
 from .texture import ies_uri, image_options
+from .volume import VolumeWriter
 
 
 def export_world(world, visible_to_camera, clear_roughness, writer, images, report):
@@ -43,9 +44,26 @@ def _environment(world, writer, images, warn):
     if not world.use_nodes:
         return {"color": _not_negative(nodes.finite(tuple(world.color), "its colour", warn), warn)}
     output = nodes.active_output(world.node_tree, "ShaderNodeOutputWorld")
-    if output and nodes.linked(output.inputs["Volume"]) is not None:
-        warn("a volume that fills the world", "it is left out, and with it that it dims what is far: all but near lamps")
-    source = nodes.linked(output.inputs["Surface"]) if output else None
+    source, volume = (nodes.linked(output.inputs[name]) if output else None for name in ("Surface", "Volume"))
+    environment = _surroundings(source, writer, images, warn)
+    if volume is not None:
+        with nodes.reading():
+            _add_medium(environment, volume, writer, images, warn)
+    return environment
+
+
+def _add_medium(environment, source, writer, images, warn):
+    """What fills the world."""
+    medium = VolumeWriter(WorldGraph(writer, images, warn), lambda _source, what, instead, _error=None: warn(what, instead))
+    medium.write(source)
+    if medium.varies:
+        warn("a volume that fills the world and varies", "it is left out, and with it that it dims what is far")
+    elif medium.closures:
+        environment["volume"] = {"closures": medium.closures}
+
+
+def _surroundings(source, writer, images, warn):
+    """RELIEF_environment of a shader, None: it is black."""
     if source is None:
         return {"color": [0.0, 0.0, 0.0]}
     seen = _Surroundings(writer, images, warn, is_camera=False)

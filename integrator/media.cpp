@@ -1,0 +1,145 @@
+#include "integrator/media.h"
+
+#include <algorithm>
+#include <map>
+#include <tuple>
+#include <utility>
+
+#include "integrator/instance_box.h"
+#include "integrator/instance_hit.h"
+#include "kernel/stage/path_access.h"
+#include "kernel/volume/distance.h"
+
+namespace relief {
+
+namespace {
+
+Vec3f sigma_t_of(const KernelGlobals& g, const MediumState& m)
+{
+  Vec3f sum;
+  for (int i = 0; i < m.size; ++i) {
+    const std::int32_t instance = m.inside[i];
+    const std::int32_t medium =
+        instance == kWholeWorld ? g.world_medium : g.materials[g.instances[instance].material_index].medium_index;
+    sum += g.media[medium].sigma_t;
+  }
+  return sum;
+}
+
+}  // namespace
+
+Media::Media(const SceneContext& context) : context_(context), exist_(!context.media.empty())
+{
+  for (std::size_t i = 0; i < context.scene.instances.size(); ++i) {
+    const auto material = static_cast<std::size_t>(context.scene.instances[i].material_index);
+    if (context.scene.materials[material].medium_index < 0) continue;
+    filled_.push_back({instance_box(context, i), static_cast<std::int32_t>(i)});
+  }
+}
+
+std::vector<std::string> Media::problems() const
+{
+  std::vector<std::string> out;
+  std::map<int, std::string> told;  // by mesh
+  constexpr std::size_t kMostNamed = 10;
+  for (const Filled& filled : filled_) {
+    const Instance& instance = context_.scene.instances[static_cast<std::size_t>(filled.instance)];
+    if (!told.try_emplace(instance.mesh_index).second || out.size() >= kMostNamed) continue;
+    const Mesh& mesh = context_.scene.meshes[static_cast<std::size_t>(instance.mesh_index)];
+    // By places, not by numbers: what is sharp or unwrapped has vertices twice.
+    std::vector<std::tuple<float, float, float>> places;
+    for (const Vec3f P : mesh.P) places.emplace_back(P.x, P.y, P.z);
+    std::sort(places.begin(), places.end());
+    const auto number = [&](std::uint32_t v) {
+      const Vec3f P = mesh.P[v];
+      return std::lower_bound(places.begin(), places.end(), std::tuple(P.x, P.y, P.z)) - places.begin();
+    };
+    std::vector<std::pair<std::ptrdiff_t, std::ptrdiff_t>> edges;
+    double volume = 0;
+    for (const TriangleIndices& tri : mesh.triangles) {
+      const std::ptrdiff_t a = number(tri.v0), b = number(tri.v1), c = number(tri.v2);
+      for (const auto& edge : {std::pair(a, b), std::pair(b, c), std::pair(c, a)}) edges.push_back(edge);
+      volume += static_cast<double>(dot(mesh.P[tri.v0], cross(mesh.P[tri.v1], mesh.P[tri.v2])));
+    }
+    std::sort(edges.begin(), edges.end());
+    const bool is_open = std::any_of(edges.begin(), edges.end(), [&](const auto& edge) {
+      return edge.first != edge.second &&
+             !std::binary_search(edges.begin(), edges.end(), std::pair(edge.second, edge.first));
+    });
+    const std::string who = '"' + instance.name + "\" bounds a medium and is ";
+    if (is_open) {
+      out.push_back(who + "not closed: where a ray gets in or out beside it the medium begins or ends elsewhere");
+    } else if (volume < 0) {
+      out.push_back(who + "inside out: rays do not get into it");
+    }
+  }
+  return out;
+}
+
+/// The media around a point.
+void Media::find(Vec3f P, float time, MediumState& out) const
+{
+  out.size = 0;
+  if (context_.globals.world_medium >= 0) out.inside[out.size++] = kWholeWorld;
+  const bool may_be_within = std::any_of(filled_.begin(), filled_.end(), [P](const Filled& filled) {
+    return boxes_overlap(filled.box, {P, P});
+  });
+  if (!may_be_within) return;
+  // Along no axis, on which things are built: there edges are met.
+  constexpr Vec3f kDirection{0.36851f, 0.81479f, 0.44771f};
+  // Of what is entered on the way as much has to be left; a surface that is left besides is one around P.
+  std::map<unsigned, int> entered;
+  float from = kLeastDistance;
+  constexpr int kMostHits = 1 << 16;
+  for (int i = 0; i < kMostHits; ++i) {
+    const std::optional<InstanceHit> hit = instance_hit_next(context_, P, kDirection, time, from, kRayCamera);
+    if (!hit) break;
+    from = t_min_behind(hit->t);
+    if (hit->instance >= context_.scene.instances.size()) continue;
+    const auto material = static_cast<std::size_t>(context_.scene.instances[hit->instance].material_index);
+    if (context_.scene.materials[material].medium_index < 0) continue;
+    int& count = entered[hit->instance];
+    if (dot(kDirection, hit->Ng) < 0.0f) {
+      ++count;
+    } else if (count-- == 0) {
+      medium_cross(out, static_cast<std::int32_t>(hit->instance), true);
+    }
+  }
+}
+
+void Media::start(PathState& state, std::uint32_t count) const
+{
+  Vec3f before_O;
+  MediumState inside{};
+  float before_time = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Vec3f O = path_origin(state, i) + path_direction(state, i) * state.t_min[i];
+    const float time = path_time(state, i);
+    if (i == 0 || O != before_O || time != before_time) find(O, time, inside);
+    before_O = O;
+    before_time = time;
+    inside.hit_inside = kWholeWorld;
+    state.media[i] = inside;
+  }
+}
+
+Vec3f shadow_transmittance(const KernelGlobals& g,
+                           MediumState inside,
+                           std::vector<ShadowBoundary>& boundaries,
+                           float t_max)
+{
+  std::sort(boundaries.begin(), boundaries.end(), [](const ShadowBoundary& a, const ShadowBoundary& b) {
+    return std::tuple(a.t, a.instance, a.triangle) < std::tuple(b.t, b.instance, b.triangle);
+  });
+  Vec3f passes{1, 1, 1};
+  float from = 0;
+  for (const ShadowBoundary& boundary : boundaries) {
+    passes *= medium_transmittance(sigma_t_of(g, inside), boundary.t - from);
+    from = boundary.t;
+    medium_cross(inside, boundary.instance, boundary.is_front);
+  }
+  if (!(t_max < kInfinity)) medium_leave_all(inside);
+  return passes * medium_transmittance(sigma_t_of(g, inside), t_max - from);
+}
+
+}  // namespace relief

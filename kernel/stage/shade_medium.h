@@ -1,0 +1,271 @@
+// Stage: a path's ray has been searched, and is in media. It is weakened or scattered on its way to what it has met; and where its
+// hit is no surface but a boundary, it goes on behind it.
+//
+// Light is asked for at a point of its own on every stretch, not where the path scatters: in thin fog few paths do. The point is by
+// how light is weakened or, near a small light, as often by how near that is, and weighed as the sum of both (Kulla and Fajardo
+// 2012). Against lights that paths meet, what is found is weighed by direction, as at surfaces.
+#pragma once
+
+#include "kernel/counters.h"
+#include "kernel/sample/dimensions.h"
+#include "kernel/sample/sobol.h"
+#include "kernel/stage/shade_surface.h"
+#include "kernel/volume/distance.h"
+
+namespace relief {
+
+/// What a stretch of a ray through media is.
+struct MediumStretch {
+  Vec3f O, D;                          ///< where it begins, world
+  float length;                        ///< metres; may be infinite
+  std::uint32_t hash, sample, number;  ///< for random numbers
+  Vec3f chances;                       ///< of channels
+};
+
+RELIEF_KERNEL MediaSum path_media(const KernelGlobals& g, const MediumState& m)
+{
+  MediaSum sum;
+  for (int i = 0; i < m.size; ++i) {
+    const std::int32_t instance = m.inside[i];
+    const std::int32_t medium =
+        instance == kWholeWorld ? g.world_medium : g.materials[g.instances[instance].material_index].medium_index;
+    media_add(sum, g.media[medium]);
+  }
+  return sum;
+}
+
+/// Where on a stretch light is asked for.
+struct MediumPlace {
+  float distance = 0;  ///< metres from its start
+  float pdf = 0;       ///< a metre; 0: nowhere
+};
+
+/// Small lights that are farther from the ray than light gets on average, so many times, are not looked for along it: what they
+/// light there is as even as the medium.
+inline constexpr float kNearLight = 4.0f;
+
+/// Chooses where light is asked for.
+RELIEF_KERNEL MediumPlace medium_place(const KernelGlobals& g, const MediumStretch& at, Vec3f sigma_t, float time)
+{
+  const Vec2f u = sample_2d(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kDirect));
+  const float sigma = channel_choose(sigma_t, at.chances, u.y);
+  const float densest = max_component(sigma_t);
+  Equiangular near;
+  {
+    const Vec2f v = sample_2d(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kPivot));
+    const auto bits = [](float x) { return static_cast<std::uint32_t>(x * 0x1p24f) << 8; };
+    const float middle = min(0.5f * at.length, densest > 0.0f ? 1.0f / densest : at.length);
+    const Vec3f P = at.O + at.D * middle;
+    const LightsChoice chosen = lights_choose(g.lights, P, {}, choice_point(bits(v.x), bits(v.y)));
+    if (chosen.probability > 0.0f && chosen.ref.light_index >= 0) {
+      Light storage;
+      const Light& emitter = lights_at(g.lights, chosen.ref, storage, time);
+      const LightSample light = lights_sample_chosen(g.lights, chosen, &emitter, P, {});
+      if (light.pdf > 0.0f && light.distance < kInfinity) {
+        near = equiangular_make(at.O, at.D, at.length, P + light.wi * light.distance);
+        if (near.distance * densest > kNearLight) near.distance = 0.0f;
+      }
+    }
+  }
+  MediumPlace place;
+  float x = u.x;
+  const bool is_near = near.distance > 0.0f;
+  if (is_near && x < 0.5f) {
+    place.distance = min(equiangular_sample(near, 2.0f * x), at.length);
+  } else {
+    if (is_near) x = 2.0f * x - 1.0f;
+    place.distance = free_distance_sample_within(sigma, at.length, x);
+  }
+  place.pdf = free_distance_pdf_within(sigma_t, at.chances, at.length, place.distance);
+  if (is_near) place.pdf = 0.5f * (place.pdf + equiangular_pdf(near, place.distance));
+  return place;
+}
+
+/// Queues a shadow ray from a place on a stretch.
+RELIEF_KERNEL void shade_medium_light(const KernelGlobals& g,
+                                      const PathState& state,
+                                      std::uint32_t path,
+                                      const MediumStretch& at,
+                                      const MediaSum& media,
+                                      ChoicePoint u,
+                                      ShadowQueue& shadow)
+{
+  const float time = path_time(state, path);
+  const MediumPlace place = medium_place(g, at, media.sigma_t, time);
+  if (!(place.pdf > 0.0f) || !(place.distance < kInfinity)) return;
+  const Vec3f P = at.O + at.D * place.distance;
+  const LightsChoice chosen = lights_choose(g.lights, P, {}, u);
+  if (!(chosen.probability > 0.0f)) return;
+  Light storage;
+  const Light* emitter = chosen.ref.light_index >= 0 ? &lights_at(g.lights, chosen.ref, storage, time) : nullptr;
+  const LightSample light = lights_sample_chosen(g.lights, chosen, emitter, P, {});
+  if (!(light.pdf > 0.0f)) return;
+  Vec3f radiance = light.radiance;
+  if (emitter != nullptr && !emitter->is_even) {
+    radiance = emitter_radiance(
+        g, *emitter, radiance,
+        {P + light.wi * light.distance, light.barycentric, -light.wi, path_light_ray(state, path, light.distance)});
+  }
+  if (is_zero(radiance)) return;
+  const PhaseEval phase = media_eval(media, at.D, light.wi);
+  const float weight = path_light_weight(g.light_technique, light.pdf, phase.pdf, light.delta);
+  const Vec3f gain = path_throughput(state, path) * medium_transmittance(media.sigma_t, place.distance) * phase.f *
+                     radiance * (weight / (light.pdf * place.pdf));
+  if (is_zero(gain)) return;
+  Vec3f D;
+  float t_max = 0;
+  shadow_ray_aim(light, emitter, P, P, D, t_max);
+  const RayCone cone =
+      ray_cone_propagate({state.cone_width[path], state.cone_spread[path]}, state.t_min[path] + place.distance);
+  shadow_queue_push(shadow, path, P, D, t_max, cone, gain,
+                    static_cast<std::uint32_t>(path_bounces(state.bounces[path], BounceKind::kAll) + 1));
+}
+
+/// Sends a path on from where it is scattered, or ends it.
+/// @param throughput  up to there, by the density of the place
+/// @param distance    from the start of the stretch, metres
+RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
+                                        PathState& state,
+                                        std::uint32_t path,
+                                        const MediumStretch& at,
+                                        const MediaSum& media,
+                                        Vec3f throughput,
+                                        float distance,
+                                        Vec2f u,
+                                        QueueView& next)
+{
+  const Vec3f wi = media_sample(media, at.D, u);
+  const PhaseEval phase = media_eval(media, at.D, wi);
+  if (!(phase.pdf > 0.0f)) return;
+  throughput *= phase.f / phase.pdf;
+  const bool first = path_bounces(state.bounces[path], BounceKind::kAll) == 0;
+  const float carried = max_component(throughput);
+  if (first) {
+    state.first_throughput[path] = min(1.0f, carried);
+  } else {
+    const float roulette = sample_1d(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kFate));
+    const float survival = min(1.0f, kSurvivalRate * carried / state.first_throughput[path]);
+    if (!(roulette < survival)) return;
+    throughput *= 1.0f / survival;
+  }
+  if (is_zero(throughput)) return;
+  RayCone cone = ray_cone_propagate({state.cone_width[path], state.cone_spread[path]}, state.t_min[path] + distance);
+  cone = ray_cone_scatter(cone, 1.0f);
+  path_set_ray(state, path, at.O + at.D * distance, wi);
+  state.throughput[path] = throughput;
+  state.pdf[path] = phase.pdf;
+  state.least_pdf[path] = min(state.least_pdf[path], phase.pdf);
+  state.scatter_N[path] = Vec3f{};
+  state.bounces[path] += 1u;
+  state.flags[path] |= kPathScattered | kPathCovers;
+  state.cone_width[path] = cone.width;
+  state.cone_spread[path] = cone.spread;
+  if (static_cast<int>(++state.media[path].bounces) > g.limits.volume) state.flags[path] |= kPathLast;
+  queue_push(next, path);
+}
+
+/// Takes a path through the media between where its ray starts and what it has met.
+/// @return  whether it gets there; else it has gone on elsewhere, or ended
+RELIEF_KERNEL bool shade_medium_stretch(const KernelGlobals& g,
+                                        PathState& state,
+                                        std::uint32_t path,
+                                        QueueView& next,
+                                        ShadowQueue& shadow)
+{
+  MediumState& m = state.media[path];
+  const MediaSum media = path_media(g, m);
+  const Vec3f sigma_t = media.sigma_t;
+  const Vec3f D = path_direction(state, path);
+  const float start = state.t_min[path];
+  MediumStretch at{path_origin(state, path) + D * start,
+                   D,
+                   max(0.0f, state.hit_t[path] - start),
+                   state.pixel_hash[path],
+                   state.sample_index[path],
+                   m.stretches++,
+                   {}};
+  const std::uint32_t bounces = state.bounces[path];
+  const int bounce = path_bounces(bounces, BounceKind::kAll);
+  const Vec3f throughput = path_throughput(state, path);
+  if (!is_zero(media.emission)) {
+    const Vec3f emitted = throughput * media.emission * medium_transmittance_integral(sigma_t, at.length);
+    // What shines on an infinite way, and takes nothing away, has no radiance.
+    if (is_finite(emitted)) {
+      if (bounce == 0) film_add_emission(g.film, state.pixel[path], emitted);
+      path_add_denoising(g, state, path, emitted);
+      path_add_radiance(g, state, path, bounce, emitted);
+    }
+  }
+  const bool last = bounce > g.limits.total || (state.flags[path] & kPathLast) != 0 ||
+                    path_bounces(bounces, BounceKind::kDiffuse) > g.limits.diffuse ||
+                    path_bounces(bounces, BounceKind::kGlossy) > g.limits.glossy ||
+                    path_bounces(bounces, BounceKind::kTransmission) > g.limits.transmission;
+  const auto albedo = [](float scattered, float all) { return all > 0.0f ? scattered / all : 0.0f; };
+  const Vec3f carried = throughput * Vec3f{albedo(media.sigma_s.x, sigma_t.x), albedo(media.sigma_s.y, sigma_t.y),
+                                           albedo(media.sigma_s.z, sigma_t.z)};
+  if (last || !(at.length > 0.0f) || !(max_component(carried) > 0.0f)) {
+    state.throughput[path] = throughput * medium_transmittance(sigma_t, at.length);
+    return !is_zero(path_throughput(state, path)) || bounce == 0;
+  }
+  at.chances = channel_chances(carried);
+  const Sample2dX4 u = sample_2d_x4(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kLight));
+  if (g.has_lights) {
+    shade_medium_light(g, state, path, at, media, choice_point(u.first_bits[0], u.first_bits[1]), shadow);
+  }
+  const float distance = free_distance_sample(channel_choose(sigma_t, at.chances, u.at[2].y), u.at[2].x);
+  if (distance < at.length) {
+    const Vec3f left = medium_transmittance(sigma_t, distance);
+    const float pdf = dot(at.chances, sigma_t * left);
+    if (!(pdf > 0.0f)) return false;
+    if (g.film.layout.denoising && (state.flags[path] & kPathSawFeature) == 0) {
+      state.flags[path] |= kPathSawFeature;
+      film_add_denoising(g.film, state.pixel[path], sample_is_even(at.sample, g.log2_stream), carried, {});
+    }
+    shade_medium_scatter(g, state, path, at, media, throughput * left / pdf, distance, u.at[1], next);
+    return false;
+  }
+  const Vec3f left = medium_transmittance(sigma_t, at.length);
+  const float chance = dot(at.chances, left);
+  state.throughput[path] = chance > 0.0f ? throughput * left / chance : Vec3f{};
+  return chance > 0.0f || bounce == 0;
+}
+
+enum class MediumHit : std::uint8_t { kSurface, kLight, kNothing };
+
+/// Takes one path to what it has met. Reads the ray, the hit and the path's media; where the path is scattered it writes what
+/// shade_surface does.
+/// @return  whether what it has met is shaded; else it is scattered or has passed a boundary (pushed on `next`), or it ends
+RELIEF_KERNEL bool shade_medium(const KernelGlobals& g,
+                                PathState& state,
+                                std::uint32_t path,
+                                MediumHit hit,
+                                QueueView& next,
+                                ShadowQueue& shadow)
+{
+  MediumState& m = state.media[path];
+  m.hit_inside = kWholeWorld;
+  bool is_boundary = false;
+  if (hit == MediumHit::kNothing) medium_leave_all(m);
+  if (hit == MediumHit::kSurface) {
+    const Material& material = g.materials[path_instance(g, state, path).material_index];
+    if (material.medium_index >= 0) {
+      const SurfaceInteraction at = surface_interaction_locate<0>(g, state, path, -path_direction(state, path));
+      m.hit_inside = static_cast<std::int32_t>(state.hit_object[path]);
+      m.hit_front = at.side.front;
+      m.hit_P = at.hit.P;
+      m.hit_Ng = at.side.Ng;
+      is_boundary = material.is_boundary;
+    }
+  }
+  if (m.size > 0 && !shade_medium_stretch(g, state, path, next, shadow)) {
+    m.hit_inside = kWholeWorld;
+    return false;
+  }
+  if (!is_boundary) return true;
+  if (++m.boundaries > kMostBoundaries) return false;
+  state.t_min[path] = t_min_behind(state.hit_t[path]);
+  queue_push(next, path);
+  return false;
+}
+
+}  // namespace relief
