@@ -53,7 +53,7 @@ std::int32_t CameraMedium::innermost_at(Vec3f P, float time, std::int32_t wanted
   float from = kLeastDistance;
   constexpr int kMostHits = 1 << 16;
   for (int i = 0; i < kMostHits; ++i) {
-    const std::optional<InstanceHit> hit = instance_hit_next(context_, P, kDirection, time, from, kRayBounce);
+    const std::optional<InstanceHit> hit = instance_hit_next(context_, P, kDirection, time, from, kInfinity, kRayBounce);
     if (!hit) break;
     from = t_min_behind(hit->t);
     const std::int32_t solid = hit->instance < solid_of_.size() ? solid_of_[hit->instance] : -1;

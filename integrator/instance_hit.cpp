@@ -22,12 +22,8 @@ Vec3f hit_normal(const SceneContext& context, const RTCRayHit& ray, unsigned obj
 
 }  // namespace
 
-std::optional<InstanceHit> instance_hit_next(const SceneContext& context,
-                                             Vec3f P,
-                                             Vec3f D,
-                                             float time,
-                                             float from,
-                                             std::uint32_t mask)
+std::optional<InstanceHit>
+instance_hit_next(const SceneContext& context, Vec3f P, Vec3f D, float time, float from, float to, std::uint32_t mask)
 {
   EmbreeContext embree;
   embree_context_init(embree, false);
@@ -35,7 +31,7 @@ std::optional<InstanceHit> instance_hit_next(const SceneContext& context,
   ray.ray.org_x = P.x, ray.ray.org_y = P.y, ray.ray.org_z = P.z;
   ray.ray.dir_x = D.x, ray.ray.dir_y = D.y, ray.ray.dir_z = D.z;
   ray.ray.tnear = from;
-  ray.ray.tfar = kInfinity;
+  ray.ray.tfar = to;
   ray.ray.time = time;
   ray.ray.mask = mask;
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;

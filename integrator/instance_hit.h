@@ -13,13 +13,9 @@ struct InstanceHit {
   Vec3f Ng;           ///< geometric normal on the front side, world; of lights (0, 0, 0)
 };
 
-/// @param from  metres: how far from P it is looked
+/// @param from, to  metres: how far from P it is looked
 /// @param mask  bits RayMask
-std::optional<InstanceHit> instance_hit_next(const SceneContext& context,
-                                             Vec3f P,
-                                             Vec3f D,
-                                             float time,
-                                             float from,
-                                             std::uint32_t mask);
+std::optional<InstanceHit>
+instance_hit_next(const SceneContext& context, Vec3f P, Vec3f D, float time, float from, float to, std::uint32_t mask);
 
 }  // namespace relief

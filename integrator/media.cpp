@@ -76,6 +76,13 @@ std::vector<std::string> Media::problems() const
   return out;
 }
 
+bool Media::has_medium(unsigned instance) const
+{
+  if (instance >= context_.scene.instances.size()) return false;
+  const auto material = static_cast<std::size_t>(context_.scene.instances[instance].material_index);
+  return context_.scene.materials[material].medium_index >= 0;
+}
+
 /// The media around a point.
 void Media::find(Vec3f P, float time, MediumState& out) const
 {
@@ -92,17 +99,29 @@ void Media::find(Vec3f P, float time, MediumState& out) const
   float from = kLeastDistance;
   constexpr int kMostHits = 1 << 16;
   for (int i = 0; i < kMostHits; ++i) {
-    const std::optional<InstanceHit> hit = instance_hit_next(context_, P, kDirection, time, from, kRayCamera);
+    const std::optional<InstanceHit> hit =
+        instance_hit_next(context_, P, kDirection, time, from, kInfinity, kRayCamera);
     if (!hit) break;
     from = t_min_behind(hit->t);
-    if (hit->instance >= context_.scene.instances.size()) continue;
-    const auto material = static_cast<std::size_t>(context_.scene.instances[hit->instance].material_index);
-    if (context_.scene.materials[material].medium_index < 0) continue;
+    if (!has_medium(hit->instance)) continue;
     int& count = entered[hit->instance];
     if (dot(kDirection, hit->Ng) < 0.0f) {
       ++count;
     } else if (count-- == 0) {
       medium_cross(out, static_cast<std::int32_t>(hit->instance), true);
+    }
+  }
+}
+
+/// Goes from a point to another.
+void Media::follow(Vec3f P, Vec3f D, float to, float time, MediumState& out) const
+{
+  for (float from = 0; from < to;) {
+    const std::optional<InstanceHit> hit = instance_hit_next(context_, P, D, time, from, to, kRayCamera);
+    if (!hit) break;
+    from = t_min_behind(hit->t);
+    if (has_medium(hit->instance)) {
+      medium_cross(out, static_cast<std::int32_t>(hit->instance), dot(D, hit->Ng) < 0.0f);
     }
   }
 }
@@ -113,13 +132,14 @@ void Media::start(PathState& state, std::uint32_t count) const
   MediumState inside{};
   float before_time = 0;
   for (std::uint32_t i = 0; i < count; ++i) {
-    const Vec3f O = path_origin(state, i) + path_direction(state, i) * state.t_min[i];
+    const Vec3f O = path_origin(state, i);
     const float time = path_time(state, i);
     if (i == 0 || O != before_O || time != before_time) find(O, time, inside);
     before_O = O;
     before_time = time;
     inside.hit_inside = kWholeWorld;
     state.media[i] = inside;
+    if (!filled_.empty()) follow(O, path_direction(state, i), state.t_min[i], time, state.media[i]);
   }
 }
 

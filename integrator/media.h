@@ -24,7 +24,7 @@ class Media {
   std::vector<std::string> problems() const;
 
   /// Gives the first `count` paths, whose rays have just been made, the media that they start in, at the near clipping plane.
-  /// @cost  of a path that starts in the box of such a mesh: a ray through the scene, unless the path before started there
+  /// @cost  a ray to there a path; where the camera is in the box of such a mesh, a ray through the scene once, or a path with a lens
   void start(PathState& state, std::uint32_t count) const;
 
  private:
@@ -32,7 +32,9 @@ class Media {
     Box3 box;  ///< world, over all time
     std::int32_t instance;
   };
+  bool has_medium(unsigned instance) const;
   void find(Vec3f P, float time, MediumState& out) const;
+  void follow(Vec3f P, Vec3f D, float to, float time, MediumState& out) const;
 
   const SceneContext& context_;
   std::vector<Filled> filled_;

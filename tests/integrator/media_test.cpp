@@ -113,6 +113,18 @@ TEST(Media, AreAroundACameraThatStandsInThem)
   expect_mean(scene, 4, std::exp(-0.75), 1e-5, 1);
 }
 
+TEST(Media, BeforeTheNearClippingPlaneDoNotCount)
+{
+  Scene scene = view();
+  scene.environment.color = {1, 1, 1};
+  scene.cameras[0].camera.clip_start = 3.5f;
+  // One that is entered before, and left behind; one that is around the camera, and left before.
+  add_medium(scene, box_mesh({1, 1, 1}), absorbing({0.5f, 0, 0}));
+  add_medium(scene, box_mesh({1, 1, 1}), absorbing({0, 0.5f, 0}), {0, 0, 4});
+  expect_mean(scene, 4, std::exp(-0.5 * 1.5), 1e-5, 0);
+  expect_mean(scene, 4, 1, 1e-5, 1);
+}
+
 TEST(Media, ShineAsFarAsTheyLetLightThrough)
 {
   Scene scene = view();
