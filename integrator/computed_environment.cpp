@@ -89,7 +89,7 @@ void evaluate(const ComputedEnvironment& environment, const Vec3f* directions, i
   for (int k = 0; k < count; ++k) {
     const auto result = [&](int c) {
       const float value = graph_result({&environment.program, &registers, k}, c);
-      return std::isfinite(value) && value > 0.0f ? value : 0.0f;
+      return std::isfinite(value) ? value : 0.0f;
     };
     radiance[k] = {result(0), result(1), result(2)};
   }
@@ -175,7 +175,7 @@ void grid_find_smooth(SmoothGrid& grid, const std::vector<Vec3f>& between, float
     for (int column = 0; column < columns; ++column) {
       const auto at = static_cast<std::size_t>(row * columns + column);
       const Vec3f value = between[at], error = abs(interpolated(grid, {column, row, 0.5f, 0.5f}) - value);
-      agrees[at] = max_component(error) <= kTolerance * max_component(value) + least;
+      agrees[at] = max_component(error) <= kTolerance * max_component(abs(value)) + least;
     }
   });
   grid.is_smooth.assign(grid.values.size(), 0);
@@ -235,7 +235,7 @@ class CellMap {
   {
   }
 
-  /// Mean luminance of a cell, by side² places.
+  /// Mean luminance of a cell, whether it gives light or takes it away, by side² places.
   float mean_at(int column, int row, int side) const
   {
     Vec3f directions[kLanes];
@@ -244,7 +244,7 @@ class CellMap {
     const auto add = [&] {
       Vec3f radiance[kLanes];
       evaluate(environment_, directions, waiting, radiance);
-      for (int k = 0; k < waiting; ++k) sum += luminance(color_ * radiance[k]);
+      for (int k = 0; k < waiting; ++k) sum += luminance(abs(color_ * radiance[k]));
       waiting = 0;
     };
     for (int i = 0; i < side * side; ++i) {
@@ -284,7 +284,7 @@ class CellMap {
       Vec3f directions[kLanes], radiance[kLanes];
       for (int k = 0; k < kLanes; ++k) directions[k] = direction_at(column + k, row, 1, 0);
       evaluate(environment_, directions, kLanes, radiance);
-      for (int k = 0; k < kLanes; ++k) out[column + k] = luminance(color_ * radiance[k]);
+      for (int k = 0; k < kLanes; ++k) out[column + k] = luminance(abs(color_ * radiance[k]));
     }
   }
 
@@ -301,7 +301,7 @@ class CellMap {
         directions[k] = from_local(frame, warp_cone(sun.cone, u));
       }
       evaluate(environment_, directions, kLanes, radiance);
-      for (const Vec3f& r : radiance) sum += luminance(color_ * r);
+      for (const Vec3f& r : radiance) sum += luminance(abs(color_ * r));
     }
     return sum / (kSide * kLanes);
   }
@@ -419,7 +419,7 @@ void computed_environment_smooth(ComputedEnvironment& environment, std::span<con
     const bool is_sun = std::any_of(suns.begin(), suns.end(), [&](const EnvironmentSun& sun) {
       return length_squared(cells.direction(column, row) - sun.towards) <= 2.0f * sun.cone;
     });
-    if (!is_sun) sum += static_cast<double>(max_component(map.values[i]));
+    if (!is_sun) sum += static_cast<double>(max_component(abs(map.values[i])));
   }
   grid_find_smooth(map, between, 1e-4f * static_cast<float>(sum / static_cast<double>(kNumCells)));
   // A sun's disk may lie between all places.

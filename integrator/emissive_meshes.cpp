@@ -42,7 +42,7 @@ float mean_emission_scale(const TextureView& texture,
     for (int j = 0; i + j <= kSide; ++j) {
       const float b1 = (static_cast<float>(i) + 1.0f / 3.0f) / (kSide + 1.0f);
       const float b2 = (static_cast<float>(j) + 1.0f / 3.0f) / (kSide + 1.0f);
-      sum += max(xyz(texture_sample(texture, t0 + b1 * d1 + b2 * d2, width)), Vec3f{});
+      sum += abs(xyz(texture_sample(texture, t0 + b1 * d1 + b2 * d2, width)));
       ++count;
     }
   }

@@ -130,12 +130,12 @@ struct LampPoint {
   Vec2f uv;
 };
 
-/// What a lamp's program, which has run, gives; what is no light is 0.
+/// What a lamp's program, which has run, gives; what is no number is 0.
 Vec3f lamp_factor(const GraphLane& lane)
 {
   const auto result = [&lane](int i) {
     const float value = graph_result(lane, i);
-    return is_finite(value) ? max(0.0f, value) : 0.0f;
+    return is_finite(value) ? value : 0.0f;
   };
   return {result(0), result(1), result(2)};
 }
@@ -238,8 +238,7 @@ void emitter_graph_means(const KernelGlobals& g, std::size_t instance_index, std
     }
     g.run_graph(program, g.textures, registers);
     Vec3f sum;
-    for (int i = 0; i < kPoints; ++i)
-      sum += max(Vec3f{}, radiance_of(g, material, {&program, &registers, i}, point_of(i)));
+    for (int i = 0; i < kPoints; ++i) sum += abs(radiance_of(g, material, {&program, &registers, i}, point_of(i)));
     means[triangle] = is_finite(sum) ? sum * (1.0f / kPoints) : Vec3f{};
   });
   Vec3f all;

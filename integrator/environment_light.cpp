@@ -17,7 +17,7 @@ EnvironmentIrradiance environment_irradiance(const EnvironmentTables& tables)
   double total = 0, linear[3] = {}, squares[3] = {}, products[3] = {};
   for (std::uint32_t i = 0; i < kSamples; ++i) {
     const EnvironmentSample sample = environment_sample(environment, sample_2d(0, 2 * i, 0));
-    const float bright = luminance(sample.radiance);
+    const float bright = luminance(abs(sample.radiance));
     if (!(sample.pdf_solid_angle > 0.0f) || !(bright > tables.base_luminance)) continue;
     const float sampled = light_scalar(sample.radiance) * (1.0f - tables.base_luminance / bright);
     const double L = static_cast<double>(sampled) / static_cast<double>(sample.pdf_solid_angle) / kSamples;

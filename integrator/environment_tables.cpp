@@ -71,7 +71,7 @@ LuminanceImage luminance_load(const EnvironmentView& environment, int level)
                            (static_cast<float>(y) + 0.5f) / static_cast<float>(image.height)};
         const Vec3f value = xyz(texture_sample(map, centre, footprint));
         image.texels[static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x)] =
-            luminance(environment.color * max(value, Vec3f{}));
+            luminance(abs(environment.color * value));
       }
     }
   });

@@ -444,7 +444,7 @@ void GltfLoader::place_lamp(const PlacedNode& node, Light& light)
   if (program.inputs.empty() && program.code.empty()) {
     // The same everywhere.
     const auto factor = [&program](std::size_t i) {
-      return std::max(0.0f, program.constants[std::size_t{program.results[i]} - kMostGraphRegisters]);
+      return program.constants[std::size_t{program.results[i]} - kMostGraphRegisters];
     };
     light.emission = light.emission * Vec3f{factor(0), factor(1), factor(2)};
     if (!is_finite(light.emission)) light.emission = {};

@@ -265,7 +265,8 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec&, float
 
 RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec&, float weight, const EmissionInputs& in)
 {
-  b.emission += max(in.color * (weight * in.strength), Vec3f{});
+  const Vec3f radiance = in.color * (weight * in.strength);
+  if (is_finite(radiance)) b.emission += radiance;
 }
 
 RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec&, float weight, const HoldoutInputs&)

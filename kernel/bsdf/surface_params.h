@@ -82,7 +82,7 @@ RELIEF_KERNEL SurfaceParams surface_params_eval(const Material& m,
     if (m.alpha_mode == AlphaMode::kMask) p.alpha = alpha >= m.alpha_cutoff ? 1.0f : 0.0f;
     if (m.alpha_mode == AlphaMode::kBlend) p.alpha = alpha;
   }
-  p.emission = max(Vec3f{}, m.emission * xyz(texel(m.emission_texture)));
+  p.emission = m.emission * xyz(texel(m.emission_texture));
   if (m.unlit) {
     p.unlit = true;
     p.emission = p.base_color;

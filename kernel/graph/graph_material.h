@@ -373,7 +373,7 @@ RELIEF_KERNEL SurfaceParams graph_surface_params(Material m,
   given(O::sheen_roughness, [&m](Vec3f a) { m.sheen_roughness = a.x; });
   given(O::specular, [&m](Vec3f a) { m.specular = a.x; });
   given(O::specular_color, [&m](Vec3f c) { m.specular_color = c; });
-  given(O::emission, [&m](Vec3f c) { m.emission = c; });
+  given(O::emission, [&m](Vec3f c) { m.emission = is_finite(c) ? c : Vec3f{}; });
   // A graph reads the mesh's colours where it wants them.
   Vec4f color = hit.color;
   given(O::base_color, [&color](Vec3f) { color = {1, 1, 1, color.w}; });

@@ -12,7 +12,7 @@
 
 namespace relief {
 
-/// Radiance from a direction of surroundings that are computed, W/m²/sr, >= 0. A pointer, as graphs are run apart from the stages.
+/// Radiance from a direction of surroundings that are computed, W/m²/sr; may be negative. A pointer, as graphs are run apart from the stages.
 /// @param wi  unit, towards the environment, world space
 using EnvironmentRadiance = Vec3f (*)(const void* computed, Vec3f wi);
 
@@ -70,14 +70,12 @@ RELIEF_KERNEL Vec3f environment_eval_uv(const EnvironmentView& environment, Vec2
   // Half a texel from the poles the first and last rows are repeated, whatever the texture's own wrap mode.
   const float half_texel = 0.5f / static_cast<float>(environment.map.height);
   const Vec2f inside{uv.x, clamp(uv.y, half_texel, 1.0f - half_texel)};
-  const Vec3f value = xyz(texture_sample(environment.map, inside, 0.0f));
-  // Maps resampled with negative lobes have negative texels; light has none.
-  return environment.color * max(value, Vec3f{});
+  return environment.color * xyz(texture_sample(environment.map, inside, 0.0f));
 }
 
 /// Radiance that arrives from a direction.
 /// @param wi  unit, towards the environment, world space
-/// @return    W/m²/sr, >= 0
+/// @return    W/m²/sr; negative where it takes light away
 RELIEF_KERNEL Vec3f environment_eval(const EnvironmentView& environment, Vec3f wi)
 {
   if (!environment.has_map) return environment.color;

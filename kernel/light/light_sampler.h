@@ -115,8 +115,12 @@ RELIEF_KERNEL const Light& lights_at(const LightsView& view, LightRef ref, Light
   return storage;
 }
 
-/// Mean of the three channels: the scalar by which lights are compared.
-RELIEF_KERNEL float light_scalar(Vec3f rgb) { return (rgb.x + rgb.y + rgb.z) * (1.0f / 3.0f); }
+/// Mean of the three channels, those that take light away as those that give it: the scalar by which lights are compared.
+RELIEF_KERNEL float light_scalar(Vec3f rgb)
+{
+  const Vec3f size = abs(rgb);
+  return (size.x + size.y + size.z) * (1.0f / 3.0f);
+}
 
 /// Estimate of one sun's irradiance; 0 where all of it is below the horizon of N. Its cosine near the horizon is estimated as
 /// light_tree_estimate does.

@@ -135,7 +135,7 @@ RELIEF_KERNEL PhotonGather photon_gather(const PhotonMapView& map, const PhotonQ
               const Vec3f wi = octahedral_decode(photon.wi);
               if (!query.both_sides && dot(wi, query.Ng) <= 0.0f) continue;
               const float weight =
-                  (1.0f - squared[k]) * inverse_squared * max_component(photon.power) * photon_lobe(query.lobe, wi);
+                  (1.0f - squared[k]) * inverse_squared * max_component(abs(photon.power)) * photon_lobe(query.lobe, wi);
               if (!(weight > 0.0f)) continue;
               sum += weight;
               // xorshift32 (Marsaglia 2003): which photon stands for all needs no stratification.
@@ -153,7 +153,7 @@ RELIEF_KERNEL PhotonGather photon_gather(const PhotonMapView& map, const PhotonQ
   gather.wi = octahedral_decode(chosen->wi);
   gather.bounces = chosen->bounces;
   gather.irradiance =
-      chosen->power * (sum / (max_component(chosen->power) * photon_lobe(query.lobe, gather.wi)) * (2.0f * kInvPi));
+      chosen->power * (sum / (max_component(abs(chosen->power)) * photon_lobe(query.lobe, gather.wi)) * (2.0f * kInvPi));
   return gather;
 }
 

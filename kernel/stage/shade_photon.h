@@ -51,7 +51,7 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
 
   // Roulette by what the surface takes: photons keep their power. What transmission_scale takes on the way into glass comes
   // back on the way out.
-  const float survival = min(1.0f, max_component(scattered) * sqr(bsdf.eta) / max_component(throughput));
+  const float survival = min(1.0f, max_component(abs(scattered)) * sqr(bsdf.eta) / max_component(abs(throughput)));
   if (!(u.roulette < survival)) return false;
   const Vec3f power = scattered / survival;
   if (is_zero(power) || !is_finite(power)) return false;

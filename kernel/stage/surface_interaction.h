@@ -219,8 +219,8 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   const Material& m = *at.material;
   SurfaceParams& p = at.params;
   p = {};
-  p.emission = build.emission + max(Vec3f{}, m.emission * xyz(material_texture_sample<kFeatures>(
-                                                              m.emission_texture, g.textures, at.hit.uv, at.uv_width)));
+  p.emission = build.emission + m.emission * xyz(material_texture_sample<kFeatures>(m.emission_texture, g.textures,
+                                                                                    at.hit.uv, at.uv_width));
   p.transmission = build.transmits ? 1.0f : 0.0f;
   p.thin = false;
   if (build.transmits && m.attenuation_distance < kInfinity) {

@@ -53,6 +53,24 @@ def _add_light_with_nodes():
     return tree, emission
 
 
+def test_lamps_that_take_light_away():
+    """Some of all kinds, one by its nodes; and glass, which photons pass."""
+
+    def lights():
+        set_world((0.5, 0.5, 0.5))
+        add_light("POINT", (1, -1, 3), energy=-60, shadow_soft_size=0.2)
+        add_light("AREA", (-1, -1, 3), energy=90, size=0.5)
+        add_light("AREA", (-1, 1, 3), energy=-40, size=0.5, color=(1, 0.4, 0.1))
+        add_light("SPOT", (0, -2, 4), degrees(20, 0, 0), energy=-50)
+        add_light("SUN", (0, 0, 1), degrees(20, 0, 0), energy=-0.2, angle=0.1)
+        tree, _ = _add_light_with_nodes()
+        tree.nodes["Math"].inputs[1].default_value = -0.4
+        glass = new_material("glass", "ShaderNodeBsdfGlass", Color=(1, 1, 1, 1), Roughness=0.0)[0]
+        add_sphere(0.5, glass, location=(-1, -0.5, 0.6))
+
+    assert_agrees(_stage(lights), samples=128)
+
+
 def test_nodes_of_constants():
     assert_agrees(_stage(_add_light_with_nodes))
 

@@ -161,12 +161,23 @@ def test_absorbing_things_in_each_other_are_warned_about():
     assert_warns(scene, "stand in each other")
 
 
-def test_negative_emission_is_warned_about():
+def test_emission_that_takes_light_away():
+    """Seen, mirrored, and lit by it: of constants, of a Principled, and a value in a shader's place."""
     scene = new_scene()
-    add_plane(2, new_material("dark", "ShaderNodeEmission", Color=(1, 0.4, 0.1, 1), Strength=-2.0)[0])
-    add_camera()
+    add_plane(6, diffuse((0.8, 0.8, 0.8)))
+    dark = new_material("dark", "ShaderNodeEmission", Color=(1, 0.4, 0.1, 1), Strength=-0.5)[0]
+    add_plane(1, dark, location=(0, 0, 1.5))
+    glow = {"Emission": (0.2, 1, 0.5, 1), "Emission_Strength": -0.3}
+    add_sphere(0.5, new_material("principled", "ShaderNodeBsdfPrincipled", **glow)[0], location=(-1.2, 0, 0.5))
+    mirror, _, node = new_material("mirror", "ShaderNodeBsdfGlossy", Color=(0.9, 0.9, 0.9, 1))
+    make_sharp(node)
+    add_sphere(0.5, mirror, location=(1.2, 0, 0.5))
+    value, _, node = new_material("value", "ShaderNodeValue")
+    node.outputs[0].default_value = -0.3
+    add_sphere(0.3, value, location=(0, -1, 0.3))
+    add_camera((0, -5, 2.5), degrees(65, 0, 0), lens=35)
     set_world((1, 1, 1))
-    assert_warns(scene, 'material "dark"', "negative emission")
+    assert_agrees(scene, samples=64)
 
 
 def test_emission():

@@ -62,10 +62,34 @@ def test_color_without_nodes():
     assert_agrees(scene)
 
 
-def test_negative_light_is_warned_about():
+def test_a_strength_that_takes_light_away():
+    """Alone the picture would be all negative."""
     scene = _stage()
-    set_world((0.2, 0.5, 0.9), -1.7)
-    assert_warns(scene, 'world "world"', "negative light")
+    add_light("POINT", (2, -3, 3), energy=3000)
+    set_world((0.02, 0.01, 0.005), -1.0)
+    assert_agrees(scene, samples=64)
+
+
+def test_a_world_that_takes_light_away_in_parts():
+    """Cycles' importance map takes negative means for densities, and loses some of the light: it does without here."""
+    scene = _stage()
+    tree = set_world((1, 1, 1))
+    scene.world.cycles.sampling_method = "NONE"
+    coordinate, parts, ramp = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("TexCoord", "SeparateXYZ", "MapRange"))
+    ramp.clamp = False
+    ramp.inputs["From Min"].default_value, ramp.inputs["To Min"].default_value = -1, -0.6
+    tree.links.new(coordinate.outputs["Generated"], parts.inputs[0])
+    tree.links.new(parts.outputs["Z"], ramp.inputs["Value"])
+    tree.links.new(ramp.outputs[0], tree.nodes["Background"].inputs["Color"])
+    assert_agrees(scene, samples=64)
+
+
+def test_an_image_that_takes_light_away():
+    scene = _stage()
+    _image_world()
+    scene.world.node_tree.nodes["Background"].inputs["Strength"].default_value = -0.1
+    add_light("POINT", (2, -3, 3), energy=3000)
+    assert_agrees(scene, samples=64)
 
 
 def test_lat_long_image():

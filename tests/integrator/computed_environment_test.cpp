@@ -112,8 +112,7 @@ TEST(EnvironmentGraph, RadiancesBeyondHalfPrecisionStay)
     expect_radiance(radiance(load(environment(json::array(), {value, value / 2, 0})), 0.3f, 0.4f) * (1 / value),
                     {1, 0.5f, 0});
   }
-  // What is no radiance is none.
-  expect_radiance(radiance(load(environment(json::array(), {-1, 2, 0})), 0.3f, 0.4f), {0, 2, 0});
+  expect_radiance(radiance(load(environment(json::array(), {-1, 2, 0})), 0.3f, 0.4f), {-1, 2, 0});
 }
 
 TEST(EnvironmentGraph, StrengthAndColourMultiply)
@@ -448,6 +447,27 @@ TEST(ComputedEnvironment, SamplingFindsAllOfTheLight)
     const double expected = power_by_grid(scene, 1024);
     EXPECT_NEAR(power(scene), expected, 0.01 * expected);
   }
+}
+
+/// The height of a direction as its radiance: 2π/3 on what looks up, as much taken from what looks down.
+TEST(ComputedEnvironment, WhatIsNegativeIsSampledAsWhatIsPositive)
+{
+  const Scene scene = load(environment(
+      {{{"type", "geometry"}}, {{"type", "separate"}, {"inputs", {{"vector", {{"node", 0}, {"output", "position"}}}}}}},
+      {{"node", 1}, {"output", "z"}}));
+  const EnvironmentTables tables = tables_of(scene, EnvironmentDensity::kRadiance);
+  const EnvironmentView view = tables.view();
+  constexpr int kSamples = 4096;
+  double up = 0, down = 0;
+  for (std::uint32_t i = 0; i < kSamples; ++i) {
+    const EnvironmentSample s = environment_sample(view, sample_2d(4, i, 0));
+    ASSERT_GT(s.pdf_solid_angle, 0.0f);
+    const double radiance = static_cast<double>(s.radiance.x / s.pdf_solid_angle) / kSamples;
+    (s.wi.y > 0.0f ? up : down) += radiance * static_cast<double>(std::fabs(s.wi.y));
+  }
+  EXPECT_NEAR(up, 2 * std::numbers::pi / 3, 0.02);
+  EXPECT_NEAR(down, -2 * std::numbers::pi / 3, 0.02);
+  expect_radiance(environment_eval(view, {0, -1, 0}), {-1, -1, -1}, 2e-3f);
 }
 
 TEST(ComputedEnvironment, DiskOfASunIsSampledByItself)

@@ -161,6 +161,26 @@ TEST(SunDisk, IsFoundByEveryTechnique)
   }
 }
 
+/// Two suns, of which one takes away more than the other gives: of red, of green, and of no blue.
+TEST(NegativeLight, TakesAwayWhatAsMuchLightGives)
+{
+  for (const LightTechnique technique :
+       {LightTechnique::kMis, LightTechnique::kLightSampling, LightTechnique::kBsdfSampling}) {
+    Scene scene = far_floor(0);
+    scene.lights.push_back(sun_disk(0.7f, {0, 0, -1}, 1));
+    scene.lights.push_back(sun_disk(0.7f, {0, 0, -1}, 1));
+    scene.lights[0].emission = {3, -3, 0};
+    scene.lights[1].emission = {-4, 2, 0};
+    RenderOptions options = render_options(scene, 8, 64);
+    options.light_technique = technique;
+    for (const int channel : {0, 1, 2}) {
+      const Estimate estimate = estimate_mean(scene, options, kRuns, channel);
+      const double net = channel == 2 ? 0 : -1;
+      EXPECT_NEAR(estimate.mean, net * 0.6 / static_cast<double>(kPi), kQuantile * estimate.standard_error + 1e-5);
+    }
+  }
+}
+
 TEST(SunDisk, IsSeenByTheCameraIfItIsToBe)
 {
   Scene scene = empty_scene();

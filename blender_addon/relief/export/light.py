@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Callable
 
 from .. import compat
-from .light_graph import read_emission
+from .light_graph import multiplied, read_emission
 
 #: The widest sun that is understood.
 _WIDEST_SUN = math.pi * 0.99
@@ -63,13 +63,13 @@ def export_light(light, place):
     if not all(math.isfinite(value) for value in (energy, *color, *sizes)):
         place.warn("a power, colour or size that is not finite", "it is left out")
         return
-    if energy * max(color) < 0 or energy * min(color) < 0:
-        place.warn("negative light", "it is left out")
-        return
     if compat.is_portal(light):
         return
     if not compat.casts_shadow(light):
         place.warn("a light without shadows", "it casts them")
+    signs = [math.copysign(1.0, energy * c) for c in color]
+    if min(signs) < 0 and energy * any(color) != 0:
+        graph = multiplied(graph, signs)
     energy, color = abs(energy), [abs(c) for c in color]
     own = {"graph": graph} if graph else {}
     if light.type == "POINT":

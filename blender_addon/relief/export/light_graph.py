@@ -32,6 +32,20 @@ def read_emission(light, random, writer, images, warn):
     return {"nodes": tree.graph.nodes, "outputs": {"emission": total}}
 
 
+def multiplied(graph, factor):
+    """A light's graph times three numbers: what takes light away is a graph's to say.
+
+    @param  graph  as read_emission returns it; None: a white light's
+    """
+    if graph is None:
+        return {"nodes": [], "outputs": {"emission": factor}}
+    product = {"type": "vector-math", "operation": "multiply", "inputs": {"a": graph["outputs"]["emission"], "b": factor}}
+    return {
+        "nodes": [*graph["nodes"], product],
+        "outputs": {"emission": {"node": len(graph["nodes"]), "output": "vector"}},
+    }
+
+
 class LightGraph(GraphWriter):
     """Value graph of a light, see read_emission."""
 

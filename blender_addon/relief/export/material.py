@@ -299,9 +299,7 @@ class MaterialJob:
     def _write_emission(self, emission):
         if emission.is_constant((0.0, 0.0, 0.0)):
             return
-        if min(emission.value) < 0:
-            self._warn("negative emission", "there is none")
-        set_emission(self.json, [max(0.0, c) for c in emission.value], self._writer)
+        set_emission(self.json, emission.value, self._writer)
         if emission.texture:
             info = self._color_info(emission.texture)
             if info:

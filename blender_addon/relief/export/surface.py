@@ -112,7 +112,10 @@ def _plain_emission(color, strength, groups, textures):
     emission = _plain_color(color, groups, textures)
     if emission.color_map is not None:
         raise _NotPlain
-    return scaled(emission, textures.constant_number(strength, groups))
+    emission = scaled(emission, textures.constant_number(strength, groups))
+    if min(emission.value) < 0:  # it takes light away: a closure's to say
+        raise _NotPlain
+    return emission
 
 
 class _Plain:
@@ -436,7 +439,10 @@ class ClosureWriter:
         node = source.node
         if node.bl_idname in {"ShaderNodeRGB", "ShaderNodeValue"} and not isinstance(weight, dict):
             plain = Input(tuple(weight * c for c in nodes.as_color(nodes.own_value(source.socket))))
-            self._emitters.append((plain, None, weight))
+            if min(plain.value) < 0:
+                self.add("emission", 1, color=list(plain.value))
+            else:
+                self._emitters.append((plain, None, weight))
             return
         try:
             self.add("emission", weight, color=self.graph.output(source))

@@ -42,7 +42,7 @@ def export_world(world, visible_to_camera, clear_roughness, writer, images, repo
 def _environment(world, writer, images, warn):
     """RELIEF_environment of a world, but for what says who sees it."""
     if not world.use_nodes:
-        return {"color": _not_negative(nodes.finite(tuple(world.color), "its colour", warn), warn)}
+        return _even(nodes.finite(tuple(world.color), "its colour", warn))
     output = nodes.active_output(world.node_tree, "ShaderNodeOutputWorld")
     source, volume = (nodes.linked(output.inputs[name]) if output else None for name in ("Surface", "Volume"))
     environment = _surroundings(source, writer, images, warn)
@@ -79,15 +79,11 @@ def _surroundings(source, writer, images, warn):
     return environment
 
 
-#: What is said of light that takes light away.
-_NEGATIVE = ("negative light", "there is none there")
-
-
-def _not_negative(color, warn):
-    """A colour without what is below 0."""
+def _even(color):
+    """Surroundings of one colour. Those that take light away are a graph's to say."""
     if min(color) < 0:
-        warn(*_NEGATIVE)
-    return [max(0.0, c) for c in color]
+        return {"graph": {"nodes": [], "outputs": {"color": list(color)}}}
+    return {"color": list(color)}
 
 
 class _Surroundings(EmissionTree):
@@ -111,7 +107,7 @@ class _Surroundings(EmissionTree):
                 return plain
         total = self.total()
         if isinstance(total, list):
-            return {"color": _not_negative(total, self.warn)}
+            return _even(total)
         if any(node["type"] == "light-path" for node in self.graph.nodes):
             self.asks_for_camera = True
         return {"graph": {"nodes": self.graph.nodes, "outputs": {"color": total}}}
@@ -131,15 +127,12 @@ class _Surroundings(EmissionTree):
         if strength is None:
             return None
         value = self.graph.constant(inputs["Color"], source.groups)
-        if strength < 0:
-            if value is not None and min(value) < 0:
-                return {"color": _not_negative([c * strength for c in value], self.warn)}
-            self.warn(*_NEGATIVE)
-            strength = 0.0
         if strength == 0:
             return {"color": [0.0, 0.0, 0.0]}
+        if strength < 0 or (value is not None and min(value) < 0):
+            return None
         if value is not None:
-            return {"color": _not_negative(value, self.warn), "strength": strength}
+            return {"color": list(value), "strength": strength}
         texture = nodes.follow(inputs["Color"], source.groups)
         if texture.node.bl_idname != "ShaderNodeTexEnvironment" or texture.node.projection != "EQUIRECTANGULAR":
             return None

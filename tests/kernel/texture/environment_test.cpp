@@ -435,12 +435,22 @@ TEST(EnvironmentConstant, IsSampledUniformly)
 
 TEST(EnvironmentBlack, SamplesNothing)
 {
-  const TestMap map(8, 4, [](int, int) { return Vec3f{-1, 0, 0}; });
+  const TestMap map(8, 4, [](int, int) { return Vec3f{0, 0, 0}; });
   const EnvironmentTables tables = environment_tables_make(&map.view, splat3(1), 0);
   const EnvironmentSample s = environment_sample(tables.view(), {0.5f, 0.5f});
   EXPECT_EQ(s.pdf_solid_angle, 0.0f);
   EXPECT_TRUE(is_zero(environment_eval(tables.view(), {0, 0, -1})));
   EXPECT_EQ(environment_pdf(tables.view(), {0, 0, -1}), 0.0f);
+}
+
+TEST(EnvironmentBelowBlack, IsSampledAsLightIs)
+{
+  const TestMap map(8, 4, [](int, int) { return Vec3f{-1, 0, 0}; });
+  const EnvironmentTables tables = environment_tables_make(&map.view, splat3(1), 0);
+  const EnvironmentSample s = environment_sample(tables.view(), {0.5f, 0.5f});
+  EXPECT_GT(s.pdf_solid_angle, 0.0f);
+  EXPECT_EQ(s.radiance.x, -1.0f);
+  EXPECT_EQ(environment_pdf(tables.view(), s.wi), s.pdf_solid_angle);
 }
 
 TEST(EnvironmentTables, AreTheSameForATextureBehindALookUp)
