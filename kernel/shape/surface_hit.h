@@ -19,7 +19,33 @@ struct SurfaceHit {
   float area_ratio[2] = {0, 0};  ///< √(uv area / world area) of the triangle: uv units a metre, for texture footprints
   Vec3f P_lift;   ///< vector from P to the smooth surface that Ns suggests, see surface_hit_make; 0 for flat meshes
   Vec3f leave{};  ///< how rays' origins are moved to the front side, metres; 0: along Ng, by P_error
+  Vec3f clear{};  ///< how they are moved first, along the triangle: see triangle_clearance
 };
+
+/// Vector along a triangle from a point next to its edge to one that is clear of it: the triangle beyond an edge may be nearer
+/// than rays' origins are moved, which would put them behind it.
+/// @param w             barycentric weights of the point
+/// @param edge1, edge2  from vertex 0 to vertices 1 and 2
+/// @param Ng            unit
+/// @param error         bound on the point's error, per axis
+/// @return              0 where all edges are far enough
+RELIEF_KERNEL Vec3f
+triangle_clearance(Vec3f w, Vec3f edge1, Vec3f edge2, float double_area, Vec3f Ng, Vec3f error)
+{
+  // The sharper the edge, the farther from it a height above one triangle is clear of the other; what the point errs along the
+  // triangle counts once. Of 50 million hits on what ClosedMesh.NoPathGetsOutPastAnEdge has, 18 let rays out with 0 in place of
+  // 16, one with 8. With the error itself in place of the height, 8 of it cut shadows of a scene 100 km from the origin along
+  // the diagonals of squares.
+  constexpr float kHeights = 16.0f;
+  // Of triangles as small as the error nothing is told apart: their rays still leave from near where they were met.
+  constexpr float kMostWeight = 1.0f / 16.0f;
+  const Vec3f across = abs(edge1) + abs(edge2);
+  const float clearance = kHeights * 2.0f * dot(abs(Ng), error) + length(error);
+  const float margin = clearance * (across.x + across.y + across.z);  // a weight, by the double area
+  if (!(min_component(w) * double_area < margin)) [[likely]] return {};
+  const float least = min(margin / double_area, kMostWeight);
+  return (least - 3.0f * least * w.y) * edge1 + (least - 3.0f * least * w.z) * edge2;
+}
 
 /// Writes the mesh's texture coordinates and colour at a point to a hit.
 /// @param bary_u, bary_v  barycentric weights of vertices 1 and 2
@@ -91,6 +117,7 @@ RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
   if ((instance.flags & kMirrored) != 0) normal_area = -normal_area;
   const float double_area = length(normal_area);
   hit.Ng = normal_area / double_area;
+  hit.clear = triangle_clearance({w0, bary_u, bary_v}, edge1, edge2, double_area, hit.Ng, hit.P_error);
 
   hit.Ns = hit.Ng;
   hit.P_lift = {};
@@ -238,7 +265,7 @@ RELIEF_KERNEL Vec3f offset_ray_origin(Vec3f P, Vec3f P_error, Vec3f Ng_side)
 RELIEF_KERNEL Vec3f surface_hit_origin(const SurfaceHit& hit, Vec3f P, bool front)
 {
   if (!is_zero(hit.leave)) return move_ray_origin(P, front ? hit.leave : -hit.leave);
-  return offset_ray_origin(P, hit.P_error, front ? hit.Ng : -hit.Ng);
+  return offset_ray_origin(P + hit.clear, hit.P_error, front ? hit.Ng : -hit.Ng);
 }
 
 /// How much of the lift onto the smooth surface a ray gets: none for directions well above the facet (their shadows are

@@ -3,6 +3,7 @@
 
 #include "integrator/trace.h"
 #include "kernel/math/rounding.h"
+#include "kernel/sample/warp.h"
 #include "kernel/shape/surface_hit.h"
 #include "tests/support/render_scene.h"
 #include "tests/support/scene_builder.h"
@@ -85,6 +86,53 @@ INSTANTIATE_TEST_SUITE_P(,
                                          Place{1, 1000, true},
                                          Place{1e-3f, 10, true},
                                          Place{1e4f, 1e5f, true}));
+
+/// Closed meshes, and paths that are scattered inside: none may get out past an edge, where the face beyond is as near as origins
+/// are moved. Around the world's origin and away from it, where rounding is larger.
+TEST(ClosedMesh, NoPathGetsOutPastAnEdge)
+{
+  constexpr int kNumPaths = 16384, kBounces = 64;
+  const auto wedge = [](float degrees) {
+    Mesh mesh;
+    const float x = std::cos(degrees * kPi / 180), y = std::sin(degrees * kPi / 180);
+    mesh.P = {{0, 0, 0}, {0, 0, 1}, {1, 0, 0}, {1, 0, 1}, {x, y, 0}, {x, y, 1}};
+    mesh.triangles = {{0, 2, 3}, {0, 3, 1}, {0, 1, 5}, {0, 5, 4}, {2, 4, 5}, {2, 5, 3}, {0, 4, 2}, {1, 3, 5}};
+    return mesh;
+  };
+  Mesh tetrahedron;
+  tetrahedron.P = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
+  tetrahedron.triangles = {{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}};
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> uniform(0, 1);
+  for (const float away : {0.0f, 3.3f, 100.0f}) {
+    for (Mesh mesh : {tetrahedron, wedge(30), wedge(6), wedge(2)}) {
+      Vec3f middle;
+      for (Vec3f& P : mesh.P) {
+        P += Vec3f{away, -0.7f * away, 0.3f * away};
+        middle += P / static_cast<float>(mesh.P.size());
+      }
+      Scene scene = empty_scene();
+      add_object(scene, mesh, diffuse_material({1, 1, 1}));
+      const SceneContext context(scene);
+      std::vector<TraceRay> rays;
+      for (int i = 0; i < kNumPaths; ++i) {
+        rays.push_back({middle, warp_sphere({uniform(random), uniform(random)}), kLeastDistance, kInfinity});
+      }
+      for (int bounce = 0; bounce < kBounces; ++bounce) {
+        const std::vector<TraceHit> hits = trace_rays(context, rays);
+        for (std::size_t i = 0; i < hits.size(); ++i) {
+          ASSERT_TRUE(hits[i].hit) << mesh.P.size() << " vertices, " << away << " m away, bounce " << bounce;
+          const SurfaceHit at = surface_hit_make(context.meshes[0], context.instances[0], hits[i].triangle_index,
+                                                 hits[i].u, hits[i].v);
+          const bool front = dot(at.Ng, middle - at.P) > 0.0f;
+          const Vec3f D = warp_cosine_hemisphere({uniform(random), uniform(random)});
+          rays[i] = {surface_hit_origin(at, at.P, front), from_local(frame_from_normal(front ? at.Ng : -at.Ng), D),
+                     kLeastDistance, kInfinity};
+        }
+      }
+    }
+  }
+}
 
 /// Axes that are 1…64 times as long as each other: valleys become narrower than right angles.
 constexpr Vec3f kStretches[] = {{1, 1, 1},  {16, 1, 1}, {1, 1, 16},       {64, 1, 64},
