@@ -59,13 +59,38 @@ struct BoxOverSides {
   int level;
   float time;         ///< of the ray
   double weights[3];  ///< of the triangle's vertices; 0 where the box reaches over the side opposite to them
-  double d;           ///< the point's displacement, metres
+  Vec3d P;            ///< the point
+  double d;           ///< its displacement, metres
   Vec3d reach;
   double clearance;  ///< of the triangle itself, then of its neighbours too
-  bool has_neighbors = false;
+  bool has_neighbors = false, has_walls = false;
   Vec3d error = {};                          ///< as in add_planes_in_box
   std::vector<NearPlane>* planes = nullptr;  ///< to which those of neighbours are added; null: they are not
 };
+
+/// Looks for walls along the edges that a box reaches over, and adds the planes of those that pass its point.
+/// @param then  a triangle with these edges
+/// @param b     weights of its vertices, as BoxOverSides::weights
+void find_walls(BoxOverSides& box, const MeshAtTime& then, const double (&b)[3])
+{
+  // Computed heights have none.
+  if (then.mesh.seam_edges == nullptr || box.geometry.procedural != nullptr) return;
+  const SeamLevel level{box.geometry.mesh.field, box.geometry.levels[box.level].field};
+  for (int edge = 0; edge < 3; ++edge) {
+    const int next = edge == 2 ? 0 : edge + 1, opposite = next == 2 ? 0 : next + 1;
+    if (b[opposite] != 0 || (then.mesh.seam_edges[then.triangle] >> edge & 1) == 0) continue;
+    const double fraction = b[next];
+    const SeamHeights heights = seam_heights(then.mesh, then.triangle, edge, fraction, level);
+    const double near = length(box.reach);
+    if (!(heights.high > heights.low && box.d >= heights.low - near && box.d <= heights.high + near)) continue;
+    box.has_walls = true;
+    if (box.planes == nullptr) continue;
+    // Between its sides, where it is known which is the lower one; the wall holds the whole displacement line.
+    const SurfacePoint wall = seam_wall_point(then.mesh, then.triangle, edge, fraction,
+                                              0.5 * (heights.low + heights.high), level);
+    box.planes->push_back({wall.Ng, 2 * dot(abs(wall.Ng), box.error) + std::abs(dot(box.P - wall.P, wall.Ng))});
+  }
+}
 
 /// Widens the clearance by that of a triangle that has all vertices between which the point is, if it has the surface in
 /// common there: at a seam it has not.
@@ -83,6 +108,7 @@ bool widen_by_neighbor(RTCPointQueryFunctionArguments* arguments)
     if (at == 3) return false;
     b[at] = box.weights[k];
   }
+  find_walls(box, then, b);
   const OnSurface other(box.geometry, arguments->primID, box.level, b[1], b[2], box.time);
   // From the point to where it is on the side, and from there once more.
   const SurfaceInBox near = surface_in_box(other.mesh, other.tri, b[1], b[2], 2.0 * box.reach);
@@ -104,51 +130,65 @@ void find_neighbors(BoxOverSides& box, Vec3d point)
   rtcPointQuery(box.geometry.scene, &query, &context, widen_by_neighbor, &box);
 }
 
-/// How far a ray's origin has to be moved to leave a point of the surface where it has a crease.
+/// How far a ray's origin has to be moved to leave a point of the surface, or of a wall, where there is a crease.
+/// @param point   at that place
 /// @param errors  of the point, object space
 /// @return        to the side of N, object space; zero: it can leave along the normal
 Vec3d leave_of(const DisplacedGeometry& geometry,
                std::uint32_t triangle,
                const DisplacedPlace& at,
-               Vec3f Ng,
+               const SurfacePoint& point,
                const LeavingErrors& errors)
 {
+  const bool is_wall = at.edge >= 0;
   const double b1 = at.b1, b2 = at.b2;
   const Vec3d reach = errors.reach;
   const OnSurface on(geometry, triangle, at.level, b1, b2, at.time);
   const SurfaceInBox own = surface_in_box(on.mesh, on.tri, b1, b2, reach);
   double distance = own.crease ? own.clearance : 0;
   std::optional<BoxOverSides> box;
-  SurfacePoint point;
   // A triangle within the box has no side that it could share.
   if (own.sides != 0 && own.sides != 7 && geometry.scene != nullptr) {
-    point = traced_surface_point(on.mesh, on.tri, b1, b2);
-    box.emplace(BoxOverSides{
-        geometry, triangle, on.then.tri(), at.level, at.time, {1.0 - b1 - b2, b1, b2}, point.d, reach, own.clearance});
+    box.emplace(BoxOverSides{geometry,
+                             triangle,
+                             on.then.tri(),
+                             at.level,
+                             at.time,
+                             {1.0 - b1 - b2, b1, b2},
+                             point.P,
+                             point.d,
+                             reach,
+                             own.clearance});
     double sum = 0;
     for (int k = 0; k < 3; ++k) {
       if ((own.sides >> k & 1) != 0) box->weights[k] = 0;
       sum += box->weights[k];
     }
     for (double& weight : box->weights) weight /= sum;
+    find_walls(*box, on.then, box->weights);
     find_neighbors(*box, point.P);
     if (box->has_neighbors) distance = box->clearance;
   }
-  if (!(distance > 0)) return {};
+  // Walls are as steep as the displacement lines.
+  const bool has_walls = is_wall || (box && box->has_walls);
+  if (!(distance > 0) && !has_walls) return {};
   // Steeper surfaces than of so many metres a metre are as good as parallel to their displacement lines.
   constexpr double kSteepest = 64;
-  if (distance <= kSteepest * length(reach)) {
+  if (!has_walls && distance <= kSteepest * length(reach)) {
     const Vec3d N = base_point(on.tri, b1, b2).N;
     return N * (distance / length(N));
   }
   std::vector<NearPlane> planes;
-  add_planes_in_box(on.mesh, on.tri, b1, b2, errors.error, reach, &planes);
+  if (!is_wall || std::abs(point.d - traced_surface_point(on.mesh, on.tri, b1, b2).d) <= own.clearance) {
+    add_planes_in_box(on.mesh, on.tri, b1, b2, errors.error, reach, &planes);
+  }
   if (box) {
     box->error = errors.error;
     box->planes = &planes;
+    find_walls(*box, on.then, box->weights);
     find_neighbors(*box, point.P);
   }
-  return planes_leave(planes, to_double(Ng));
+  return planes_leave(planes, point.Ng);
 }
 
 }  // namespace
@@ -209,8 +249,8 @@ DisplacedPoint displaced_resolve(const DisplacedGeometry& geometry,
   out.P = to_float(point.P);
   out.Ng = out.Ns = to_float(point.Ng);
   if (geometry.lod.by_cone) out.width = lod_width_of_level(texel, place.level);
+  out.leave = to_float(leave_of(geometry, triangle, place, point, leaving_errors(placement, out.P, out.Ng)));
   if (place.edge >= 0) return out;
-  out.leave = to_float(leave_of(geometry, triangle, place, out.Ng, leaving_errors(placement, out.P, out.Ng)));
   const float between = geometry.mesh.blend != nullptr ? static_cast<float>(geometry.mesh.blend->weight) : 0.0f;
   displaced_point_set_level(geometry, placement, static_cast<float>(geometry.first_level + place.level) + between,
                             &out);

@@ -373,6 +373,58 @@ TEST(DisplacedSelfIntersection, NoNeighborOfABaseTriangleIsMetFromWithin)
   }
 }
 
+/// A cube whose sides read a map of noise at places of their own, with normals in common: walls close the seams. Paths that are
+/// scattered inside must not get out where a wall meets the surface.
+TEST(ClosedMesh, NoPathGetsOutPastAWeldedSeam)
+{
+  constexpr int kNumPaths = 16384, kBounces = 32, kSize = 64;
+  Mesh cube;
+  const auto corner = [](int i) { return Vec3f{i & 1 ? 1.0f : -1.0f, i & 2 ? 1.0f : -1.0f, i & 4 ? 1.0f : -1.0f}; };
+  const int sides[6][4] = {{0, 2, 3, 1}, {4, 5, 7, 6}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
+  for (std::uint32_t side = 0; side < 6; ++side) {
+    for (const int i : sides[side]) {
+      cube.P.push_back(corner(i));
+      cube.N.push_back(as_normal(normalize(corner(i))));
+    }
+    const float u = 0.3f * static_cast<float>(side);
+    cube.uv[0].insert(cube.uv[0].end(), {{u, 0}, {u + 0.2f, 0}, {u + 0.2f, 0.2f}, {u, 0.2f}});
+    cube.triangles.push_back({4 * side, 4 * side + 1, 4 * side + 2});
+    cube.triangles.push_back({4 * side, 4 * side + 2, 4 * side + 3});
+  }
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> uniform(0, 1);
+  for (const float away : {0.0f, 3.3f, 100.0f}) {
+    Scene scene = empty_scene();
+    Material material = diffuse_material({1, 1, 1});
+    material.displacement_index = 0;
+    const Vec3f middle{away, -0.7f * away, 0.3f * away};
+    add_object(scene, cube, material, {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, middle});
+    add_displacement(scene, kSize, noise_texels(kSize, 3), 0.4f).weld_seams = true;
+    const SceneContext context(scene);
+    std::vector<TraceRay> rays;
+    for (int i = 0; i < kNumPaths; ++i) {
+      rays.push_back({middle, warp_sphere({uniform(random), uniform(random)}), kLeastDistance, kInfinity});
+    }
+    int num_out = 0;
+    for (int bounce = 0; bounce < kBounces; ++bounce) {
+      const std::vector<TraceHit> hits = trace_rays(context, rays);
+      for (std::size_t i = 0; i < hits.size(); ++i) {
+        const TraceHit& hit = hits[i];
+        if (!hit.hit) {
+          ++num_out;
+          rays[i] = {middle, warp_sphere({uniform(random), uniform(random)}), kLeastDistance, kInfinity};
+          continue;
+        }
+        const bool front = dot(hit.Ng, rays[i].D) < 0.0f;
+        const Vec3f D = warp_cosine_hemisphere({uniform(random), uniform(random)});
+        rays[i] = {front ? hit.O_front : hit.O_back, from_local(frame_from_normal(front ? hit.Ng : -hit.Ng), D),
+                   kLeastDistance, kInfinity};
+      }
+    }
+    EXPECT_EQ(num_out, 0) << away << " m away, of " << kNumPaths * kBounces;
+  }
+}
+
 TEST(ShadowTerminator, CoarseSphereIsLitLikeAFineOne)
 {
   // Point light, so that nothing softens the terminator. Without the lift the coarse sphere's facets shadow
