@@ -23,6 +23,7 @@
 
 #include "cli/arguments.h"
 #include "cli/commands.h"
+#include "cli/darkness.h"
 #include "cli/denoise_picture.h"
 #include "cli/error_text.h"
 #include "cli/exit_code.h"
@@ -253,26 +254,14 @@ std::string emptiness_warning(const Scene& scene, const FilmView& film)
   if (!has_something || is_window) return {};
   const ImageView beauty = film_layer(film, Aov::kBeauty);
   if (beauty.channels.empty()) return {};
-  double covered = 0, dim = 0, brightest = 0;
-  // Half of the first code of a PNG that is not black; and what is hard to tell from black beside anything lit.
-  constexpr double kDark = 1.5e-4, kDim = 2e-3, kMostDim = 0.75;
-  for (int y = 0; y < film.height; ++y) {
-    for (int x = 0; x < film.width; ++x) {
-      const double coverage = static_cast<double>(beauty.channels[3].at(x, y));
-      if (coverage <= 0) continue;
-      double most = 0;
-      for (std::size_t c = 0; c < 3; ++c) most = std::max(most, static_cast<double>(beauty.channels[c].at(x, y)));
-      covered += coverage;
-      dim += most < kDim ? coverage : 0;
-      brightest = std::max(brightest, most);
-    }
-  }
-  if (covered == 0) return "the camera sees nothing of the scene; --camera auto looks at all of it";
-  if (brightest < kDark) return "no light reaches what the camera sees; --environment studio or sky lights it";
+  constexpr double kDark = 1.5e-4;  // half of the first code of a PNG that is not black
+  const Darkness found = darkness_of(film);
+  if (found.covered == 0) return "the camera sees nothing of the scene; --camera auto looks at all of it";
+  if (found.brightest < kDark) return "no light reaches what the camera sees; --environment studio or sky lights it";
   const bool glows_only = scene.lights.empty() && scene.environment.texture_index < 0 && is_zero(scene.environment.color);
-  if (glows_only && dim > kMostDim * covered) {
+  if (glows_only && found.is_mostly_dim()) {
     return fmt::format("what glows is all its light, and leaves {:.0f} % of what the camera sees as good as black; "
-                       "--environment studio or sky lights it", 100 * dim / covered);
+                       "--environment studio or sky lights it", 100 * found.dim / found.covered);
   }
   return {};
 }

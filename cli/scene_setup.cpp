@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/darkness.h"
 #include "cli/value_hint.h"
 #include "scene/diagnostics.h"
 
@@ -39,6 +40,7 @@ LoadOptions SceneSetup::load_options(std::optional<int> frame) const
   options.luminous_efficacy = static_cast<float>(luminous_efficacy);
   options.environment = environment;
   options.continue_without_textures = continue_without_textures;
+  options.emission_shows = emission_shows;
   if (!background.empty()) options.environment_visible = background == "world";
   return options;
 }

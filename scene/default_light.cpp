@@ -229,6 +229,7 @@ void environment_set(Scene& scene, const EnvironmentChoice& choice, bool has_bac
 void default_light_add(Scene& scene,
                        std::span<const Placement> placements,
                        bool has_backdrop,
+                       const std::function<bool()>& emission_shows,
                        TextureStore& textures,
                        Warnings& warnings)
 {
@@ -237,7 +238,10 @@ void default_light_add(Scene& scene,
   const bool emits = std::any_of(placements.begin(), placements.end(), [&](const Placement& p) {
     return !is_zero(material_of(scene, p).emission) && !material_of(scene, p).unlit;
   });
-  if (!reflects || (emits && emission_lights_scene(scene, placements, textures.views()))) return;
+  if (!reflects) return;
+  if (emits && emission_lights_scene(scene, placements, textures.views()) && (!emission_shows || emission_shows())) {
+    return;
+  }
   warnings.add(
       scene.file +
       (emits ? ": no light, and emission that leaves most of the scene dark" : ": no light or environment") +

@@ -2,6 +2,7 @@
 // the eye, and leaves everything else black.
 #pragma once
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -40,10 +41,12 @@ void environment_set(Scene& scene, const EnvironmentChoice& choice, bool has_bac
 /// Surrounds a scene in which nothing is lit by the soft studio, with a warning.
 /// @param has_backdrop  as for environment_set
 /// @param placements  of all meshes at rest, whatever the frame: else light would come and go with what moves
+/// @param emission_shows  whether the picture shows the scene by what glows, where emission_lights_scene finds so; empty: it does
 /// @pre the scene has neither lights nor an environment, be it a black one
 void default_light_add(Scene& scene,
                        std::span<const Placement> placements,
                        bool has_backdrop,
+                       const std::function<bool()>& emission_shows,
                        TextureStore& textures,
                        Warnings& warnings);
 

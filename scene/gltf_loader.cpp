@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <new>
 #include <set>
@@ -824,12 +825,18 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
     scene.textures = store;
     faults.settle(options.continue_without_textures, warnings);
     const bool has_backdrop = !options.environment_visible.has_value();
-    if (!unlit.empty()) default_light_add(scene, unlit, has_backdrop, *store, warnings);
+    world_displacement_bake(scene);
+    std::function<bool()> emission_shows;
+    // Of an animation all frames have the same light, so that none of them can tell.
+    if (options.emission_shows != nullptr && (!options.has_frame || scene.clips.empty())) {
+      const std::size_t camera = camera_named(scene.cameras, options.camera.name).value_or(0);
+      emission_shows = [&scene, &options, camera] { return options.emission_shows(scene, camera); };
+    }
+    if (!unlit.empty()) default_light_add(scene, unlit, has_backdrop, emission_shows, *store, warnings);
     if (options.environment && options.environment->source != EnvironmentSource::kFile) {
       environment_set(scene, *options.environment, has_backdrop, *store);
     }
     scene.environment.visible_to_camera = options.environment_visible.value_or(scene.environment.visible_to_camera);
-    world_displacement_bake(scene);
     scene.warnings = warnings.texts();
     return scene;
   } catch (const OutOfMemory&) {

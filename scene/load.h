@@ -24,6 +24,9 @@ struct LoadOptions {
   bool continue_without_textures = false;                   ///< warnings for what cannot be read, which is magenta
   std::size_t texture_budget_bytes = std::size_t{4} << 30;  ///< above it textures go through a tile cache
   KeptImages* kept = nullptr;                               ///< of the frames before; gets this frame's
+  /// Asked of scenes without light but for what glows, with the place of their camera: whether that is enough. Null: points of
+  /// surfaces decide alone, see emission_lights_scene.
+  bool (*emission_shows)(const Scene& scene, std::size_t camera) = nullptr;
 
   bool operator==(const LoadOptions&) const = default;
 };

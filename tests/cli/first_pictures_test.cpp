@@ -236,7 +236,7 @@ TEST_F(FirstPictures, APictureOfNothingComesWithAWarningThatHelps)
   EXPECT_EQ(outcome.errors.find("no light reaches"), std::string::npos) << outcome.errors;
 }
 
-TEST_F(FirstPictures, SaysThatWhatGlowsLeavesTheRestDark)
+TEST_F(FirstPictures, AStudioLightsWhatGlowsAwayFromTheCamera)
 {
   // What is near is lit, yet on the side that the camera does not see: a lamp behind a wall, that looks out a little.
   GltfBuilder b = sunlit_square(1);
@@ -251,9 +251,47 @@ TEST_F(FirstPictures, SaysThatWhatGlowsLeavesTheRestDark)
   const std::string scene = folder_.write("s.gltf", b.gltf()).string();
   Outcome outcome = render(scene, file("a.exr"));
   EXPECT_EQ(outcome.exit_code, 0);
-  EXPECT_NE(outcome.errors.find("what glows is all its light"), std::string::npos) << outcome.errors;
-  outcome = render(scene, file("a.exr"), {"--environment", "studio"});
+  EXPECT_NE(outcome.errors.find("a soft studio lights it"), std::string::npos) << outcome.errors;
   EXPECT_EQ(outcome.errors.find("what glows"), std::string::npos) << outcome.errors;
+  EXPECT_NE(run({"info", scene}).output.find("a soft studio lights it"), std::string::npos);
+  // From before the lamp, where what it lights is seen, nothing is added.
+  outcome = render(scene, file("a.exr"), {"--look-from", "0.5,0.5,-0.19", "--look-at", "0.5,0.5,0"});
+  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.errors.find("studio"), std::string::npos) << outcome.errors;
+  outcome = render(scene, file("a.exr"), {"--environment", "none"});
+  EXPECT_NE(outcome.errors.find("what glows is all its light"), std::string::npos) << outcome.errors;
+}
+
+TEST_F(FirstPictures, AStudioLightsACarBehindItsHeadlights)
+{
+  // Six sides, and lamps before one of them that shine to both of theirs: if nothing stood between, they would light most.
+  GltfBuilder b = sunlit_square(1);
+  b.json["extensions"].erase("KHR_lights_punctual");
+  b.json["nodes"].back().erase("extensions");
+  const double half = std::sqrt(0.5);
+  const auto place = [&](int mesh, std::array<double, 3> at, std::array<double, 4> turn, double size) {
+    b.root_node({{"mesh", mesh}, {"translation", at}, {"rotation", turn}, {"scale", {size, size, size}}});
+  };
+  b.push("materials", {{"emissiveFactor", {1, 1, 1}},
+                       {"doubleSided", true},
+                       {"extensions", {{"KHR_materials_emissive_strength", {{"emissiveStrength", 20}}}}}});
+  nlohmann::json lamp = b.json["meshes"][0];
+  lamp["primitives"][0]["material"] = 1;
+  b.push("meshes", lamp);
+  // The square itself, from (0, 0, 0) to (1, 1, 0), is the front.
+  place(0, {0, 0, -1}, {0, 0, 0, 1}, 1);
+  place(0, {0, 0, 0}, {0, half, 0, half}, 1);
+  place(0, {1, 0, 0}, {0, half, 0, half}, 1);
+  place(0, {0, 0, 0}, {-half, 0, 0, half}, 1);
+  place(0, {0, 1, 0}, {-half, 0, 0, half}, 1);
+  place(1, {0.1, 0.3, 0.02}, {0, 0, 0, 1}, 0.15);
+  place(1, {0.75, 0.3, 0.02}, {0, 0, 0, 1}, 0.15);
+  const std::string scene = folder_.write("car.gltf", b.gltf()).string();
+  for (const char* from : {"-2,1,-3", "3,2,-1"}) {
+    const Outcome outcome = render(scene, file("a.exr"), {"--look-from", from, "--look-at", "0.5,0.5,-0.5"});
+    EXPECT_EQ(outcome.exit_code, 0);
+    EXPECT_NE(outcome.errors.find("a soft studio lights it"), std::string::npos) << from << ": " << outcome.errors;
+  }
 }
 
 TEST_F(FirstPictures, TransparentPngsHaveCoverage)
