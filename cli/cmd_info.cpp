@@ -108,7 +108,7 @@ void print_displacement(const Scene& scene, const DisplacementSet& displacements
     ++num_meshes;
     if (d.height.texture_index >= 0) uv = uv_bounds_union(uv, displaced_mesh_uv_bounds(mesh, d.height));
   }
-  std::string heights = d.graph_index >= 0 ? "computed heights" : "no heights";
+  std::string heights = d.by_vectors ? "vectors" : d.graph_index >= 0 ? "computed heights" : "no heights";
   if (d.height.texture_index >= 0) heights = scene.height_maps[static_cast<std::size_t>(d.height.texture_index)].label;
   line("  {}: {}{}, method {}, scale {:g} m, midlevel {:g}, {} space", material_names(scene, index), heights,
        d.curved ? " over a curved base" : "", displacement_method_label(d.method), d.scale, d.midlevel,

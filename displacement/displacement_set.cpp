@@ -63,6 +63,13 @@ constexpr double kDividedCells = 2;
 /// A mesh of fewer triangles was not divided to be displaced: however small it is now, the camera may come near.
 constexpr std::uint32_t kLeastMovedTriangles = 64;
 
+/// Whether a mesh's own vertices are moved.
+/// @param cells  along a side of its triangles in the mean
+bool is_dense(const DisplacementSettings& settings, const MeshView& mesh, double cells)
+{
+  return !settings.divide && mesh.num_triangles >= kLeastMovedTriangles && cells <= kMostMovedCells;
+}
+
 bool has_one_height(const HeightMapView& map)
 {
   const std::int64_t count = std::int64_t{map.width} * map.height;
@@ -168,7 +175,8 @@ std::vector<std::string> displacement_warnings(const DisplacementSettings& setti
   const float lod = lod_of(settings, options);
   const DisplacementMethod asked = asked_method(settings, options);
   if (displacement_is_computed(settings)) {
-    const std::string of_maps = " has no effect on heights that are computed";
+    const std::string of_maps = settings.by_vectors ? " has no effect on displacement by vectors"
+                                                    : " has no effect on heights that are computed";
     if (asked != DisplacementMethod::kAuto && asked != kDefaultMethod)
       texts.push_back("displacement method '" + std::string(displacement_method_label(asked)) + "'" + of_maps);
     if (lod > 0) texts.push_back("a level of detail" + of_maps);
@@ -205,9 +213,8 @@ void DisplacementSet::leave_untessellated(const Use& use, const DisplacementOpti
   if (has_error(use, options)) {
     reasons_.push_back("mesh '" + use.mesh_name + "': not diced, as it deforms while the shutter is open");
   } else if (tessellation_kind(asked)) {
-    untessellated_.push_back(
-        "mesh '" + use.mesh_name + "' deforms while the shutter is open, and is traced by method '" +
-        std::string(displacement_method_label(kDefaultMethod)) + "': tessellations are of one time");
+    unfollowed_.push_back("mesh '" + use.mesh_name + "' deforms while the shutter is open, and is traced by method '" +
+                          std::string(displacement_method_label(kDefaultMethod)) + "': tessellations are of one time");
   }
 }
 
@@ -446,6 +453,7 @@ VertexMove DisplacementSet::vertex_move_of(const Use& use,
                                            std::vector<LatticeTriangle>* parts,
                                            std::uint64_t* used_bytes)
 {
+  if (use.settings.by_vectors) return vector_move_of(use, options, parts, used_bytes);
   if (use.mesh.N == nullptr || use.mesh.num_triangles == 0 || !use.steps.empty() || use.settings.curved ||
       asked_method(use.settings, options) != DisplacementMethod::kAuto) {
     return VertexMove::kNone;
@@ -462,8 +470,7 @@ VertexMove DisplacementSet::vertex_move_of(const Use& use,
   }
   if (use.heights == nullptr || use.heights->num_cells > 0) return VertexMove::kNone;
   const double cells = mean_cells_a_side(use.mesh, use.heights->cells);
-  const bool is_dense = use.mesh.num_triangles >= kLeastMovedTriangles && cells <= kMostMovedCells;
-  VertexMove move = is_dense ? VertexMove::kOwn : VertexMove::kDivided;
+  VertexMove move = is_dense(use.settings, use.mesh, cells) ? VertexMove::kOwn : VertexMove::kDivided;
   VertexMove* before = nullptr;
   std::uint64_t allowance = dicing_allowance(options);
   if (options.choices != nullptr) {
@@ -498,12 +505,65 @@ VertexMove DisplacementSet::vertex_move_of(const Use& use,
   return move;
 }
 
+VertexMove DisplacementSet::vector_move_of(const Use& use,
+                                           const DisplacementOptions& options,
+                                           std::vector<LatticeTriangle>* parts,
+                                           std::uint64_t* used_bytes)
+{
+  const std::string mesh = "mesh '" + use.mesh_name + "'";
+  const ComputedHeights& by = *use.heights;
+  if (use.mesh.num_triangles == 0 || by.is_constant) return VertexMove::kOwn;
+  if (by.num_cells > 0) {
+    *parts = lattices_make(use.mesh, by.num_cells);
+    *used_bytes += divided_mesh_bytes(use.mesh, *parts);
+    return VertexMove::kDivided;
+  }
+  const double cells = mean_cells_a_side(use.mesh, by.cells);
+  VertexMove move = is_dense(use.settings, use.mesh, cells) ? VertexMove::kOwn : VertexMove::kDivided;
+  std::uint64_t allowance = dicing_allowance(options);
+  if (options.choices != nullptr) {
+    const auto [known, is_new] = options.choices->moved.try_emplace(
+        {use.mesh_name, use.displacement_index, use.mesh.num_triangles, use.scale, 0, 0, options.picture_height, 0},
+        move);
+    move = known->second;
+    if (is_new) allowance /= 2;
+  }
+  char text[96];
+  if (move == VertexMove::kOwn) {
+    std::snprintf(text, sizeof text, ": its vertices are moved, as its triangles are %.2g cells wide in the mean",
+                  cells);
+    reasons_.push_back(mesh + text);
+    return move;
+  }
+  const std::uint64_t room = allowance - std::min(allowance, *used_bytes);
+  for (double longer = 1;; longer *= 2) {
+    *parts = lattices_make(
+        use.mesh, [&](Vec3f a, Vec3f b) { return by.cells_seen(a, b) / (kDividedCells * longer); }, options.require);
+    const std::uint64_t bytes = divided_mesh_bytes(use.mesh, *parts);
+    const bool is_whole = std::all_of(parts->begin(), parts->end(), [](const LatticeTriangle& p) { return p.n == 1; });
+    if (bytes > room && !(is_whole && parts->size() == use.mesh.num_triangles)) continue;
+    *used_bytes += bytes;
+    std::snprintf(text, sizeof text, ": it is divided to the picture, which takes %s", gibibytes(bytes).c_str());
+    reasons_.push_back(mesh + text);
+    if (longer > 1) {
+      std::snprintf(text, sizeof text, " has triangles %.0f times as long as asked for: finer ones have no room in %s",
+                    longer, gibibytes(room).c_str());
+      unfollowed_.push_back(mesh + text + " (--displacement-memory)");
+    }
+    return move;
+  }
+}
+
 MovedMesh DisplacementSet::make_moved(const Use& use, VertexMove move, std::span<const LatticeTriangle> parts)
 {
   const DisplacementSettings& settings = use.settings;
   const VertexDisplacement by{use.scale, settings.midlevel, settings.smoothing};
   MovedMesh moved;
-  if (move == VertexMove::kDivided) {
+  if (settings.by_vectors) {
+    const PointMoves& moves = use.heights->moves;
+    moved = move == VertexMove::kDivided ? divided_mesh_make(use.mesh, moves, parts, by.smooth, use.steps)
+                                         : moved_mesh_make(use.mesh, moves, by.smooth, use.steps);
+  } else if (move == VertexMove::kDivided) {
     moved = divided_mesh_make(use.mesh, use.heights->source, parts, by);
   } else if (use.heights != nullptr) {
     moved = moved_mesh_make(use.mesh, use.heights->corners, by);
@@ -786,7 +846,7 @@ std::string DisplacementSet::method_names() const
 
 std::vector<std::string> DisplacementSet::warnings() const
 {
-  std::vector<std::string> texts = untessellated_;
+  std::vector<std::string> texts = unfollowed_;
   for (const auto& displaced : geometries_) {
     const DisplacedMeshReport& report = displaced->mesh.report();
     const std::string of = " of " + std::to_string(displaced->geometry.mesh.num_triangles) + " triangles of mesh '" +

@@ -33,6 +33,7 @@ struct DisplacedInstance {
 struct ComputedHeights {
   HeightSource source;         ///< without eval: the displacement's map is, if it has one
   CornerHeights corners = {};  ///< by `source`
+  PointMoves moves = {};       ///< in place of both, where the displacement is by vectors
   CellsAlong cells;            ///< that are wanted; not used with num_cells
   CellsAlong cells_seen = {};  ///< likewise, fewer where the camera does not look
   std::int32_t num_cells = 0;  ///< along each side of all triangles, a power of two; 0: by `cells`
@@ -205,6 +206,11 @@ class DisplacementSet {
                             const DisplacementOptions& options,
                             std::vector<LatticeTriangle>* parts,
                             std::uint64_t* used_bytes);
+  /// The same for vectors, which rays are not traced over: where divided triangles have no room they are larger.
+  VertexMove vector_move_of(const Use& use,
+                            const DisplacementOptions& options,
+                            std::vector<LatticeTriangle>* parts,
+                            std::uint64_t* used_bytes);
   MovedMesh make_moved(const Use& use, VertexMove move, std::span<const LatticeTriangle> parts);
   /// Levels of a map that still show something on a mesh.
   int num_useful_levels(const Use& use) const;
@@ -244,7 +250,7 @@ class DisplacementSet {
   std::vector<int> geometry_of_instance_, moved_of_instance_;
   std::vector<float> texel_of_instance_;
   bool has_levels_ = false, has_facets_ = false;
-  std::vector<std::string> reasons_, untessellated_;
+  std::vector<std::string> reasons_, unfollowed_;
   std::shared_ptr<HeightFields> fields_;
   HeightFields::Tally kept_;
   std::shared_ptr<KeptMeshes> kept_meshes_;  ///< null: none are kept

@@ -222,12 +222,28 @@ MeshView MovedMesh::view(const MeshView& mesh) const
 
 std::size_t MovedMesh::bytes() const
 {
-  return P.capacity() * sizeof(P[0]) + N.capacity() * sizeof(N[0]) + (divided != nullptr ? divided->bytes() : 0);
+  std::size_t sum = P.capacity() * sizeof(P[0]) + N.capacity() * sizeof(N[0]);
+  for (const MovedShape& step : steps) sum += step.P.capacity() * sizeof(P[0]) + step.N.capacity() * sizeof(N[0]);
+  return sum + (divided != nullptr ? divided->bytes() : 0);
 }
 
-MovedMesh moved_mesh_make(const MeshView& mesh, const CornerHeights& heights, const VertexDisplacement& by)
+namespace {
+
+/// For each vertex the first one at the same place.
+std::vector<std::uint32_t> weld_places(std::span<const Vec3f> P)
 {
-  const std::vector<std::uint32_t> stands_for = weld_vertices({mesh.P, mesh.num_vertices}, {mesh.N, mesh.num_vertices});
+  return weld_vertices(P, std::vector<Normal3f>(P.size()));
+}
+
+/// @param move        where eight vertices go: (corners, vertices, their places); a vertex may be there more than once
+/// @param stands_for  of each vertex the one with which it moves
+/// @param shaded_as   likewise, with which it has a normal; empty: there are none
+template <typename Move>
+MovedMesh move_own(const MeshView& mesh,
+                   const std::vector<std::uint32_t>& stands_for,
+                   const std::vector<std::uint32_t>& shaded_as,
+                   const Move& move)
+{
   const std::vector<std::uint32_t> corners = first_corners(mesh, stands_for);
   std::vector<std::uint32_t> asked;  // vertices
   for (std::uint32_t vertex = 0; vertex < mesh.num_vertices; ++vertex) {
@@ -239,29 +255,31 @@ MovedMesh moved_mesh_make(const MeshView& mesh, const CornerHeights& heights, co
   out.P.assign(mesh.P, mesh.P + mesh.num_vertices);
   tbb::parallel_for(std::size_t{0}, (asked.size() + 7) / 8, [&](std::size_t eight) {
     std::uint32_t vertices[8], of_corners[8];
-    float h[8];
+    Vec3f P[8];
     for (std::size_t lane = 0; lane < 8; ++lane) {
       vertices[lane] = asked[std::min(8 * eight + lane, asked.size() - 1)];
       of_corners[lane] = corners[vertices[lane]];
     }
-    heights(of_corners, h);
-    for (int lane = 0; lane < 8; ++lane) {
-      const std::uint32_t vertex = vertices[lane];
-      out.P[vertex] = moved_point(mesh.P[vertex], as_vector(mesh.N[vertex]), h[lane], by);
-    }
+    move(of_corners, vertices, P);
+    for (int lane = 0; lane < 8; ++lane) out.P[vertices[lane]] = P[lane];
   });
   for (std::uint32_t vertex = 0; vertex < mesh.num_vertices; ++vertex) out.P[vertex] = out.P[stands_for[vertex]];
-  if (by.smooth) {
+  if (!shaded_as.empty()) {
     out.N.assign(mesh.N, mesh.N + mesh.num_vertices);
-    smooth_normals({mesh.triangles, mesh.num_triangles}, out.P, stands_for, &out.N);
+    smooth_normals({mesh.triangles, mesh.num_triangles}, out.P, shaded_as, &out.N);
   }
   return out;
 }
 
-MovedMesh divided_mesh_make(const MeshView& mesh,
-                            const HeightSource& source,
-                            std::span<const LatticeTriangle> parts,
-                            const VertexDisplacement& by)
+/// @param move    where eight points of a triangle go: (triangle, their weights, their places, their normals, receives where)
+/// @param along   vertices move with those of one place and normal alone, not with all of one place
+/// @param smooth  they have normals
+template <typename Move>
+MovedMesh move_divided(const MeshView& mesh,
+                       std::span<const LatticeTriangle> parts,
+                       bool along,
+                       bool smooth,
+                       const Move& move)
 {
   const auto out = std::make_shared<DividedMesh>();
   std::vector<std::uint32_t> first_vertex(parts.size() + 1), first_triangle(parts.size() + 1);
@@ -282,34 +300,133 @@ MovedMesh divided_mesh_make(const MeshView& mesh,
     const TriangleIndices& t = mesh.triangles[part.base];
     const std::vector<Vec2f> weights = lattice_weights(part);
     for (std::size_t first = 0; first < weights.size(); first += 8) {
-      float b[3][8], h[8];
+      float b[3][8];
+      Vec3f P[8], P_moved[8];
+      Normal3f N[8];
       for (std::size_t lane = 0; lane < 8; ++lane) {
         const Vec2f w = weights[std::min(first + lane, weights.size() - 1)];
         b[0][lane] = static_cast<float>(1.0 - static_cast<double>(w.x) - static_cast<double>(w.y));
         b[1][lane] = w.x;
         b[2][lane] = w.y;
+        P[lane] = lattice_corner(w, mesh.P[t.v0], mesh.P[t.v1], mesh.P[t.v2]);
+        if (mesh.N == nullptr) continue;
+        N[lane] =
+            as_normal(lattice_corner(w, as_vector(mesh.N[t.v0]), as_vector(mesh.N[t.v1]), as_vector(mesh.N[t.v2])));
       }
-      source.eval(source.owner, part.base, b, h);
+      move(part.base, b, P, N, P_moved);
       for (std::size_t lane = 0; lane < std::min<std::size_t>(8, weights.size() - first); ++lane) {
         const std::size_t vertex = first_vertex[k] + first + lane;
-        const Vec2f w = weights[first + lane];
-        base_P[vertex] = lattice_corner(w, mesh.P[t.v0], mesh.P[t.v1], mesh.P[t.v2]);
-        const Vec3f N = lattice_corner(w, as_vector(mesh.N[t.v0]), as_vector(mesh.N[t.v1]), as_vector(mesh.N[t.v2]));
-        base_N[vertex] = as_normal(N);
-        moved.P[vertex] = moved_point(base_P[vertex], N, h[lane], by);
-        out->interpolate(mesh, t, w, vertex);
+        base_P[vertex] = P[lane];
+        base_N[vertex] = N[lane];
+        moved.P[vertex] = P_moved[lane];
+        out->interpolate(mesh, t, weights[first + lane], vertex);
       }
     }
     divide(part.n, first_vertex[k], out->triangles.data() + first_triangle[k]);
   });
-  const std::vector<std::uint32_t> stands_for = weld_vertices(base_P, base_N);
+  std::vector<std::uint32_t> of_lines, of_places;
+  if (along || smooth) of_lines = weld_vertices(base_P, base_N);
+  if (!along) of_places = weld_places(base_P);
+  const std::vector<std::uint32_t>& stands_for = along ? of_lines : of_places;
   for (std::size_t vertex = 0; vertex < num_vertices; ++vertex) moved.P[vertex] = moved.P[stands_for[vertex]];
-  if (by.smooth) {
+  if (smooth) {
     moved.N = std::move(base_N);
-    smooth_normals(out->triangles, moved.P, stands_for, &moved.N);
+    smooth_normals(out->triangles, moved.P, of_lines, &moved.N);
   }
   moved.divided = out;
   return moved;
+}
+
+}  // namespace
+
+MovedMesh moved_mesh_make(const MeshView& mesh, const CornerHeights& heights, const VertexDisplacement& by)
+{
+  const std::vector<std::uint32_t> stands_for = weld_vertices({mesh.P, mesh.num_vertices}, {mesh.N, mesh.num_vertices});
+  return move_own(mesh, stands_for, by.smooth ? stands_for : std::vector<std::uint32_t>{},
+                  [&](const std::uint32_t* corners, const std::uint32_t* vertices, Vec3f* P) {
+                    float h[8];
+                    heights(corners, h);
+                    for (int lane = 0; lane < 8; ++lane) {
+                      const std::uint32_t vertex = vertices[lane];
+                      P[lane] = moved_point(mesh.P[vertex], as_vector(mesh.N[vertex]), h[lane], by);
+                    }
+                  });
+}
+
+MovedMesh moved_mesh_make(const MeshView& mesh, const PointMoves& moves, bool smooth, std::span<const MeshShape> steps)
+{
+  const std::span<const Vec3f> places{mesh.P, mesh.num_vertices};
+  std::vector<std::uint32_t> shaded_as;
+  if (smooth && mesh.N != nullptr) shaded_as = weld_vertices(places, {mesh.N, mesh.num_vertices});
+  MovedMesh out = move_own(mesh, weld_places(places), shaded_as,
+                           [&](const std::uint32_t* corners, const std::uint32_t* vertices, Vec3f* P) {
+                             moves.eval_corners(moves.owner, corners, P);
+                             for (int lane = 0; lane < 8; ++lane) P[lane] = mesh.P[vertices[lane]] + P[lane];
+                           });
+  for (const MeshShape& step : steps) {
+    MovedShape& shape = out.steps.emplace_back();
+    shape.P.reserve(mesh.num_vertices + std::size_t{1});
+    for (std::size_t k = 0; k < mesh.num_vertices; ++k) shape.P.push_back(step.P[k] + (out.P[k] - mesh.P[k]));
+    if (shaded_as.empty()) continue;
+    shape.N = out.N;
+    smooth_normals({mesh.triangles, mesh.num_triangles}, shape.P, shaded_as, &shape.N);
+  }
+  return out;
+}
+
+MovedMesh divided_mesh_make(const MeshView& mesh,
+                            const HeightSource& source,
+                            std::span<const LatticeTriangle> parts,
+                            const VertexDisplacement& by)
+{
+  return move_divided(mesh, parts, true, by.smooth,
+                      [&](std::uint32_t triangle, const float(*b)[8], const Vec3f* P, const Normal3f* N, Vec3f* moved) {
+                        float h[8];
+                        source.eval(source.owner, triangle, b, h);
+                        for (int k = 0; k < 8; ++k) moved[k] = moved_point(P[k], as_vector(N[k]), h[k], by);
+                      });
+}
+
+MovedMesh divided_mesh_make(const MeshView& mesh,
+                            const PointMoves& moves,
+                            std::span<const LatticeTriangle> parts,
+                            bool smooth,
+                            std::span<const MeshShape> steps)
+{
+  smooth = smooth && mesh.N != nullptr;
+  MovedMesh out =
+      move_divided(mesh, parts, false, smooth,
+                   [&](std::uint32_t triangle, const float(*b)[8], const Vec3f* P, const Normal3f*, Vec3f* moved) {
+                     moves.eval(moves.owner, triangle, b, moved);
+                     for (int k = 0; k < 8; ++k) moved[k] = P[k] + moved[k];
+                   });
+  if (steps.empty()) return out;
+  std::vector<Vec3f> base_P;
+  std::vector<Normal3f> base_N;
+  for (std::size_t k = 0; k < steps.size(); ++k) out.steps.emplace_back().P.reserve(out.P.size() + 1);
+  for (const LatticeTriangle& part : parts) {
+    const TriangleIndices& t = mesh.triangles[part.base];
+    for (const Vec2f w : lattice_weights(part)) {
+      const Vec3f P = lattice_corner(w, mesh.P[t.v0], mesh.P[t.v1], mesh.P[t.v2]);
+      const Vec3f move = out.P[base_P.size()] - P;
+      base_P.push_back(P);
+      if (smooth) {
+        base_N.push_back(
+            as_normal(lattice_corner(w, as_vector(mesh.N[t.v0]), as_vector(mesh.N[t.v1]), as_vector(mesh.N[t.v2]))));
+      }
+      for (std::size_t k = 0; k < steps.size(); ++k) {
+        const Vec3f* const at = steps[k].P;
+        out.steps[k].P.push_back(lattice_corner(w, at[t.v0], at[t.v1], at[t.v2]) + move);
+      }
+    }
+  }
+  if (!smooth) return out;
+  const std::vector<std::uint32_t> of_lines = weld_vertices(base_P, base_N);
+  for (MovedShape& shape : out.steps) {
+    shape.N = out.N;
+    smooth_normals(out.divided->triangles, shape.P, of_lines, &shape.N);
+  }
+  return out;
 }
 
 std::uint64_t divided_mesh_bytes(const MeshView& mesh, std::span<const LatticeTriangle> parts)

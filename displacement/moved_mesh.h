@@ -1,6 +1,6 @@
 // Displacement by moving vertices: where triangles are hardly larger than pixels, or heights are the same all over a mesh, its own
 // as Cycles does it; elsewhere those of triangles that are divided to the size of pixels. What comes of it is a plain mesh, and
-// costs what one costs.
+// costs what one costs. Vectors move points anywhere, heights along the normal.
 #pragma once
 
 #include <cstddef>
@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "displacement/deformation.h"
 #include "displacement/height_source.h"
 #include "displacement/lattice_split.h"
 #include "kernel/shape/mesh_view.h"
@@ -25,7 +26,23 @@ using CornerHeights = std::function<void(const std::uint32_t* corners, float* h)
 /// @cost  eight heights for each
 CornerHeights corner_heights(const HeightSource& source);
 
+/// What moves the points of a mesh anywhere, without ownership; metres, object space. Called from many threads at once.
+struct PointMoves {
+  const void* owner = nullptr;
+  /// Of eight points of one triangle; what is no number is 0.
+  /// @param b  weights of vertices 0, 1 and 2
+  void (*eval)(const void* owner, std::uint32_t triangle, const float (*b)[8], Vec3f* moves) = nullptr;
+  /// Likewise of eight corners of triangles, as CornerHeights has them.
+  void (*eval_corners)(const void* owner, const std::uint32_t* corners, Vec3f* moves) = nullptr;
+};
+
 struct DividedMesh;
+
+/// Vertices and normals of a moved mesh at one time.
+struct MovedShape {
+  std::vector<Vec3f> P;
+  std::vector<Normal3f> N;  ///< empty: it is flat
+};
 
 /// A mesh with its vertices moved, or one that it is divided to.
 struct MovedMesh {
@@ -33,6 +50,7 @@ struct MovedMesh {
   int mesh_index = 0;       ///< of the mesh that was
   std::vector<Vec3f> P;     ///< of all vertices
   std::vector<Normal3f> N;  ///< likewise; empty: it is flat
+  std::vector<MovedShape> steps;  ///< at evenly spaced times while the shutter is open; empty: it does not deform
   /// Triangles, and all else that vertices have; null: those of the mesh that was.
   std::shared_ptr<const DividedMesh> divided;
 
@@ -65,6 +83,17 @@ MovedMesh divided_mesh_make(const MeshView& mesh,
                             const HeightSource& source,
                             std::span<const LatticeTriangle> parts,
                             const VertexDisplacement& by);
+
+/// The same by vectors. Vertices of one place move together, by the first corner's vector: cuts of texture coordinates and of
+/// normals stay closed. A mesh that deforms moves by the same vectors at all times, as in Cycles.
+/// @param smooth  as in VertexDisplacement; a mesh without normals stays flat
+/// @param steps   of the mesh while the shutter is open, if it deforms
+MovedMesh moved_mesh_make(const MeshView& mesh, const PointMoves& moves, bool smooth, std::span<const MeshShape> steps);
+MovedMesh divided_mesh_make(const MeshView& mesh,
+                            const PointMoves& moves,
+                            std::span<const LatticeTriangle> parts,
+                            bool smooth,
+                            std::span<const MeshShape> steps);
 
 /// What that takes, with the tree that rays are traced in while it is built, about.
 std::uint64_t divided_mesh_bytes(const MeshView& mesh, std::span<const LatticeTriangle> parts);

@@ -126,7 +126,7 @@ void hash_triangles(const TreeMesh& mesh, ContentHasher* hash)
 {
   hash->add_array(mesh.P->data(), mesh.P->size());
   hash->add(mesh.steps.size());
-  for (const MeshStep& step : mesh.steps) hash->add_array(step.P.data(), step.P.size());
+  for (const std::vector<Vec3f>* P : mesh.steps) hash->add_array(P->data(), P->size());
   hash->add_array(mesh.triangles.data(), mesh.triangles.size());
 }
 
@@ -158,11 +158,13 @@ Accel::Accel(const Scene& scene,
 {
   for (std::size_t d = 0; d < displacements.size(); ++d) displacements.geometry(d).shadow_filter = nullptr;
   for (const Mesh& mesh : scene.meshes) {
-    meshes_.emplace_back().mesh = {mesh.name, &mesh.P, mesh.steps, mesh.triangles};
+    meshes_.emplace_back().mesh = {mesh.name, &mesh.P, {}, mesh.triangles};
+    for (const MeshStep& step : mesh.steps) meshes_.back().mesh.steps.push_back(&step.P);
   }
   for (const MovedMesh& moved : displacements.moved()) {
     const MeshView& mesh = views_->meshes[meshes_.size()];
     meshes_.emplace_back().mesh = {moved.name, &moved.P, {}, {mesh.triangles, mesh.num_triangles}};
+    for (const MovedShape& step : moved.steps) meshes_.back().mesh.steps.push_back(&step.P);
   }
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
@@ -250,7 +252,7 @@ void Accel::place_instances(const Scene& scene,
   for (MeshUse& use : meshes_) {
     if (!use.has_tree()) continue;
     use.box = points_box(*use.mesh.P, {});
-    for (const MeshStep& step : use.mesh.steps) use.box = box_union(use.box, points_box(step.P, {}));
+    for (const std::vector<Vec3f>* P : use.mesh.steps) use.box = box_union(use.box, points_box(*P, {}));
   }
   scene_ = std::make_unique<SceneTree>();
   Box3 box = box_empty();
@@ -487,7 +489,7 @@ RTCGeometry Accel::new_mesh(const TreeMesh& mesh, const Affine3* world_from_obje
   } else {
     rtcSetGeometryTimeStepCount(geometry, static_cast<unsigned>(mesh.steps.size()));
     for (std::size_t step = 0; step < mesh.steps.size(); ++step) {
-      set_vertices(static_cast<unsigned>(step), mesh.steps[step].P);
+      set_vertices(static_cast<unsigned>(step), *mesh.steps[step]);
     }
   }
   if (!trees_->keeps()) {

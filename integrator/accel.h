@@ -27,7 +27,7 @@ enum RayMask : std::uint32_t { kRayCamera = 1u << 0, kRayBounce = 1u << 1, kRayS
 struct TreeMesh {
   std::string_view name;
   const std::vector<Vec3f>* P = nullptr;  ///< object space
-  std::span<const MeshStep> steps;        ///< none: it does not deform
+  std::vector<const std::vector<Vec3f>*> steps;  ///< P at evenly spaced times; none: it does not deform
   std::span<const TriangleIndices> triangles;
 };
 

@@ -217,16 +217,34 @@ const TriangleInputs& triangle_inputs(const GraphHeights& heights, std::uint32_t
   return last;
 }
 
+/// One of the numbers that a graph has given.
+F8 result_of(const GraphHeights& heights, const GraphRegisters& registers, std::size_t number)
+{
+  const std::uint16_t result = heights.program.results[number];
+  return result == kNoGraphOperand ? F8{} : graph_operand(heights.program, registers, result);
+}
+
 /// Heights by a graph whose inputs are set.
 void run(const GraphHeights& heights, GraphRegisters& registers, float* h)
 {
   heights.run(heights.program, heights.textures, registers);
-  const std::uint16_t result = heights.program.results[0];
-  const F8 out = result == kNoGraphOperand ? F8{} : graph_operand(heights.program, registers, result);
+  const F8 out = result_of(heights, registers, 0);
   for (int lane = 0; lane < 8; ++lane) h[lane] = out[lane];
 }
 
-void eval(const void* owner, std::uint32_t triangle, const float (*b)[8], float* h)
+/// Vectors, likewise.
+void run(const GraphHeights& heights, GraphRegisters& registers, Vec3f* moves)
+{
+  heights.run(heights.program, heights.textures, registers);
+  const F8 out[3] = {result_of(heights, registers, 0), result_of(heights, registers, 1),
+                     result_of(heights, registers, 2)};
+  const auto finite = [](float x) { return std::isfinite(x) ? x : 0.0f; };
+  for (int lane = 0; lane < 8; ++lane) moves[lane] = {finite(out[0][lane]), finite(out[1][lane]), finite(out[2][lane])};
+}
+
+/// @param out  heights or vectors
+template <typename Out>
+void eval(const void* owner, std::uint32_t triangle, const float (*b)[8], Out* out)
 {
   const auto& heights = *static_cast<const GraphHeights*>(owner);
   const GraphProgramView& program = heights.program;
@@ -249,12 +267,14 @@ void eval(const void* owner, std::uint32_t triangle, const float (*b)[8], float*
       lanes[lane] = on.quantity(input, at);
     }
   }
-  run(heights, registers, h);
+  run(heights, registers, out);
 }
 
-/// As CornerHeights.
-void eval_corners(const GraphHeights& heights, const std::uint32_t* corners, float* h)
+/// As CornerHeights, heights or vectors.
+template <typename Out>
+void eval_corners(const void* owner, const std::uint32_t* corners, Out* out)
 {
+  const auto& heights = *static_cast<const GraphHeights*>(owner);
   const GraphProgramView& program = heights.program;
   GraphRegisters registers;
   for (int lane = 0; lane < 8; ++lane) {
@@ -267,7 +287,7 @@ void eval_corners(const GraphHeights& heights, const std::uint32_t* corners, flo
       registers.lanes[program.inputs[i].register_index][lane] = on.quantity(program.inputs[i], at, w);
     }
   }
-  run(heights, registers, h);
+  run(heights, registers, out);
 }
 
 /// A number that is linear in the weights, over parallelograms.
@@ -411,10 +431,13 @@ void computed_heights_add(const Scene& scene, const DisplacementOptions& options
         all->heights.push_back(std::make_unique<GraphHeights>(GraphHeights{
             &mesh, placed, program, scene.textures->height_views().data(), scene.textures->height_bounds().data(),
             stage_table_select().run_graph, graph_bounds_select(), graph_scene, next_id.fetch_add(1)}));
-        heights.source = {all->heights.back().get(), eval, bounds};
-        heights.corners = [graph = all->heights.back().get()](const std::uint32_t* corners, float* h) {
-          eval_corners(*graph, corners, h);
-        };
+        const GraphHeights* const graph = all->heights.back().get();
+        if (settings->by_vectors) {
+          heights.moves = {graph, eval<Vec3f>, eval_corners<Vec3f>};
+        } else {
+          heights.source = {graph, eval<float>, bounds};
+          heights.corners = [graph](const std::uint32_t* corners, float* h) { eval_corners(graph, corners, h); };
+        }
         heights.is_constant =
             std::none_of(program.inputs, program.inputs + program.num_inputs,
                          [&](const GraphInput& in) { return !is_of_all(in.quantity, mesh, in.index); });

@@ -38,8 +38,8 @@ Box3 instance_box(const SceneContext& context, std::size_t index)
   } else {
     const MeshView& mesh = context.meshes[static_cast<std::size_t>(context.instances[index].mesh_index)];
     for (std::uint32_t i = 0; i < mesh.num_vertices; ++i) add(mesh.P[i]);
-    for (const MeshStep& step : context.scene.meshes[static_cast<std::size_t>(instance.mesh_index)].steps) {
-      for (const Vec3f& P : step.P) add(P);
+    for (const MeshShape& step : context.motion.shapes(static_cast<std::size_t>(context.instances[index].mesh_index))) {
+      for (std::uint32_t i = 0; i < mesh.num_vertices; ++i) add(step.P[i]);
     }
   }
   const Vec3f margin = splat3(kBoxMargin * 0.5f * length(box.high - box.low) + static_cast<float>(stray));

@@ -181,6 +181,10 @@ void SceneContext::make_views()
   for (const MovedMesh& moved : displacements.moved()) {
     const MeshView mesh = meshes[static_cast<std::size_t>(moved.mesh_index)];
     meshes.push_back(moved.view(mesh));
+    std::vector<MeshShape> shapes;
+    for (const MovedShape& step : moved.steps)
+      shapes.push_back({step.P.data(), step.N.empty() ? nullptr : step.N.data()});
+    motion.add_mesh(std::move(shapes));
   }
   for (std::size_t i = 0; i < instances.size(); ++i) {
     const int moved = displacements.moved_index(i);

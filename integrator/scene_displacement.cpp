@@ -1,5 +1,7 @@
 #include "integrator/scene_displacement.h"
 
+#include <vector>
+
 #include "integrator/computed_heights.h"
 #include "scene/limits.h"
 #include "scene/memory.h"
@@ -46,9 +48,16 @@ DisplacementSet scene_displacement(const Scene& scene, const DisplacementOptions
   }
   computed_heights_add(scene, options, &input);
   DisplacementSet set(input, options);
+  std::vector<Box3> boxes;
+  for (const MovedMesh& moved : set.moved()) {
+    Box3& box = boxes.emplace_back(box_empty());
+    for (const Vec3f& P : moved.P) box = box_union(box, {P, P});
+  }
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const int index = set.geometry_index(i);
     if (index >= 0) check_positions(scene, scene.instances[i], set.mesh(static_cast<std::size_t>(index)).bounds());
+    const int moved = set.moved_index(i);
+    if (moved >= 0) check_positions(scene, scene.instances[i], boxes[static_cast<std::size_t>(moved)]);
   }
   return set;
 }

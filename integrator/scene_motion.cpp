@@ -148,6 +148,12 @@ SceneMotion::SceneMotion(const Scene& scene) : scene_(scene)
       keys_.push_back(motion_key_make(steps[i], i > 0 ? &keys_.back() : nullptr));
     }
   }
+  for (const Mesh& mesh : scene.meshes) {
+    std::vector<MeshShape>& shapes = shapes_.emplace_back();
+    for (const MeshStep& step : mesh.steps) {
+      shapes.push_back({step.P.data(), step.N.empty() ? nullptr : step.N.data()});
+    }
+  }
   is_open_ = !views_.empty() || std::any_of(scene.meshes.begin(), scene.meshes.end(),
                                             [](const Mesh& mesh) { return !mesh.steps.empty(); });
 }
@@ -165,15 +171,15 @@ MeshView SceneMotion::mesh_at(const InstanceView& instance, const MeshView& cent
 {
   MeshView out = centre;
   if ((instance.flags & kDeforms) == 0) return out;
-  const std::vector<MeshStep>& steps = scene_.meshes[static_cast<std::size_t>(instance.mesh_index)].steps;
+  const std::vector<MeshShape>& steps = shapes(static_cast<std::size_t>(instance.mesh_index));
   const StepPlace place = step_place(time, static_cast<std::uint32_t>(steps.size()));
-  const MeshStep &before = steps[place.step], &next = steps[place.step + 1];
+  const MeshShape &before = steps[place.step], &next = steps[place.step + 1];
   out.part = place.part;
-  out.P = before.P.data();
-  out.P_next = next.P.data();
+  out.P = before.P;
+  out.P_next = next.P;
   if (centre.N != nullptr) {
-    out.N = before.N.data();
-    out.N_next = next.N.data();
+    out.N = before.N;
+    out.N_next = next.N;
   }
   return out;
 }

@@ -2,8 +2,11 @@
 // both mean the same place.
 #pragma once
 
+#include <cstddef>
+#include <utility>
 #include <vector>
 
+#include "displacement/deformation.h"
 #include "kernel/math/motion.h"
 #include "kernel/shape/mesh_view.h"
 #include "scene/scene.h"
@@ -27,6 +30,13 @@ class SceneMotion {
   SceneMotion(const SceneMotion&) = delete;
   SceneMotion& operator=(const SceneMotion&) = delete;
 
+  /// Counts a mesh after those of the scene.
+  /// @param shapes  as shapes() gives them
+  void add_mesh(std::vector<MeshShape> shapes) { shapes_.push_back(std::move(shapes)); }
+
+  /// Of a mesh at evenly spaced times; none: it does not deform.
+  const std::vector<MeshShape>& shapes(std::size_t mesh_index) const { return shapes_[mesh_index]; }
+
   /// Whether anything takes time.
   bool is_open() const { return is_open_; }
 
@@ -47,6 +57,7 @@ class SceneMotion {
  private:
   const Scene& scene_;
   bool is_open_ = false;
+  std::vector<std::vector<MeshShape>> shapes_;  ///< by mesh
   std::vector<MotionKey> keys_;
   std::vector<MotionView> views_;
 };

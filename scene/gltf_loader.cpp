@@ -524,6 +524,7 @@ void GltfLoader::check_displacement(const PlacedNode& node, const Instance& inst
   const std::string label = node.document->file + ": /meshes/" + std::to_string(mesh_index);
   const Mesh& mesh = scene_.meshes[static_cast<std::size_t>(instance.mesh_index)];
   const DisplacementSettings& d = scene_.displacements[static_cast<std::size_t>(index)];
+  if (d.by_vectors) return;  // neither normals nor seams open anything
   const bool has_map = d.height.texture_index >= 0;
   displaced_mesh_warn(label, mesh, has_map ? &d.height : nullptr, warnings_);
   if (!d.has_graph || !has_map) return;

@@ -272,10 +272,21 @@ HeightGraph HeightGraphTable::keep(const GltfDocument& document, const JsonReade
     warnings.add(graph.file() + ": " + json_path_join(graph.path(), name) + ": of maps; these heights have none");
   }
   HeightGraph kept;
-  kept.graph_index = static_cast<int>(scene_.graphs.size());
-  scene_.graphs.push_back(height_graph_read(document, graph, textures_, scene_.attribute_names, warnings));
-  for (const int texture : graph_textures(scene_.graphs.back())) textures_.use_for_heights(texture);
+  kept.graph_index = keep(height_graph_read(document, graph, textures_, scene_.attribute_names, warnings));
   return kept;
+}
+
+/// Index of a program that is evaluated at points.
+int HeightGraphTable::keep(GraphProgram program)
+{
+  for (const int texture : graph_textures(program)) textures_.use_for_heights(texture);
+  scene_.graphs.push_back(std::move(program));
+  return static_cast<int>(scene_.graphs.size()) - 1;
+}
+
+int HeightGraphTable::add_vectors(const GltfDocument& document, const JsonReader& displacement, Warnings& warnings)
+{
+  return keep(vector_graph_read(document, displacement, textures_, scene_.attribute_names, warnings));
 }
 
 HeightGraph HeightGraphTable::add(const GltfDocument& document,

@@ -39,12 +39,18 @@ class HeightGraphTable {
                   const std::string& material,
                   Warnings& warnings);
 
+  /// Keeps what a displacement by vectors says, its vectorTexture or vectorGraph.
+  /// @return index into Scene::graphs
+  /// @error  SceneError: see vector_graph_read
+  int add_vectors(const GltfDocument& document, const JsonReader& displacement, Warnings& warnings);
+
   const std::vector<HeightMap>& maps() const { return maps_; }
 
   /// The maps, in index order; the table is empty afterwards.
   std::vector<HeightMap> take() { return std::exchange(maps_, {}); }
 
  private:
+  int keep(GraphProgram program);
   HeightGraph keep(const GltfDocument& document, const JsonReader& graph, Warnings& warnings);
 
   TextureTable& textures_;

@@ -104,7 +104,7 @@ TextureRef height_texture(const GltfDocument& document,
 void read_cells(const JsonReader& r, DisplacementSettings& d, Warnings& warnings)
 {
   if (!displacement_is_computed(d)) {
-    for (const char* name : {"cells", "cellPixels"}) {
+    for (const char* name : {"cells", "cellPixels", "divide"}) {
       if (!r.has(name)) continue;
       static_cast<void>(r.raw(name));
       warnings.add(r.file() + ": " + json_path_join(r.path(), name) +
@@ -119,6 +119,20 @@ void read_cells(const JsonReader& r, DisplacementSettings& d, Warnings& warnings
     d.num_cells = static_cast<std::int32_t>(cells);
   }
   d.cell_pixels = r.number_f("cellPixels", 1, 0.01, 1e3);
+  d.divide = r.boolean("divide", false);
+}
+
+/// Where the heights or vectors of a displacement come from: one of these, or with `curved` none.
+/// @return  its name; empty: none
+std::string displacement_source(const JsonReader& r)
+{
+  std::string found;
+  for (const char* name : {"heightTexture", "heightGraph", "vectorTexture", "vectorGraph"}) {
+    if (!r.has(name)) continue;
+    if (!found.empty()) r.fail("", "either " + found + " or " + name, "both");
+    found = name;
+  }
+  return found;
 }
 
 /// @param material  as warnings name it
@@ -132,12 +146,18 @@ DisplacementSettings read_displacement(const GltfDocument& document,
   static constexpr std::string_view kSpaces[] = {"object", "world"};
   static constexpr std::string_view kSeams[] = {"keep", "weld"};
   DisplacementSettings d;
-  d.has_graph = r.has("heightGraph");
-  if (d.has_graph && r.has("heightTexture")) r.fail("", "either heightTexture or heightGraph", "both");
-  if (!d.has_graph) d.height = height_texture(document, r, "heightTexture", height_maps, warnings);
-  d.scale = r.number_f("scale", 1);
-  d.midlevel = r.number_f("midlevel", 0.5f);
-  d.space = static_cast<DisplacementSpace>(r.choice("space", kSpaces, 0));
+  const std::string source = displacement_source(r);
+  d.has_graph = source == "heightGraph";
+  d.by_vectors = source.starts_with("vector");
+  if (d.by_vectors) {
+    d.graph_index = height_graphs.add_vectors(document, r, warnings);
+    d.midlevel = 0;
+  } else {
+    d.height = height_texture(document, r, "heightTexture", height_maps, warnings);
+    d.scale = r.number_f("scale", 1);
+    d.midlevel = r.number_f("midlevel", 0.5f);
+    d.space = static_cast<DisplacementSpace>(r.choice("space", kSpaces, 0));
+  }
   d.method = static_cast<DisplacementMethod>(r.choice("method", kDisplacementMethodLabels, 0));
   if (r.has("lod") && r.raw("lod").is_string() && r.string("lod", "") == "auto") {
     d.lod = -1;
@@ -150,8 +170,9 @@ DisplacementSettings read_displacement(const GltfDocument& document,
   d.smoothing = r.boolean("smoothing", false);
   d.weld_seams = r.choice("seams", kSeams, 0) == 1;
   d.curved = r.boolean("curved", false);
-  if (!d.has_graph && d.height.texture_index < 0 && !d.curved) {
-    r.fail("", "a heightTexture or heightGraph, or curved", "none");
+  if (d.by_vectors && d.curved) r.fail("curved", "false, as points move by vectors", "true");
+  if (source.empty() && !d.curved) {
+    r.fail("", "a heightTexture, heightGraph, vectorTexture or vectorGraph, or curved", "none");
   }
   if (d.has_graph) {
     const HeightGraph graph = height_graphs.add(document, r, material, warnings);

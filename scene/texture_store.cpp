@@ -279,6 +279,13 @@ TextureStore::TextureStore(std::vector<TextureRequest> requests,
     images[i].source.encoded = images[i].encoded;
     image_step(images[i], [&] { images[i].layout = TextureReader(images[i].source).layout(); });
   });
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    const Image& image = images[impl_->image_of_texture[i]];
+    if (!requests[i].of_vectors || image.is_missing || image.fault || image.layout.num_channels > 2) continue;
+    throw SceneError(requests[i].scene_file, requests[i].json_path,
+                     "an image of three channels, as it is one of vectors",
+                     image.layout.num_channels == 1 ? "one channel" : "two channels");
+  }
   // Where memory is short, the tile cache is better than an end. What is there already needs none.
   const auto budget =
       static_cast<std::size_t>(std::min<std::uint64_t>(budget_bytes, memory_left() / 2 + kept->bytes()));

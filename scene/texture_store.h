@@ -64,6 +64,7 @@ struct TextureRequest {
   bool is_missing = false;          ///< magenta, which `faults` knows of
   TextureFaults* faults = nullptr;  ///< hears of what cannot be read, which is magenta then; null: it is an error
   bool of_heights = false;  ///< a value graph of heights reads it: in its own precision, and with bounds
+  bool of_vectors = false;  ///< it says where points go: with fewer than three channels it is an error
 };
 
 class TextureStore {

@@ -54,6 +54,9 @@ class TextureTable {
   /// Says that a value graph of heights reads a texture.
   void use_for_heights(int texture) { requests_[static_cast<std::size_t>(texture)].of_heights = true; }
 
+  /// Says that a texture is one of vectors.
+  void use_for_vectors(int texture) { requests_[static_cast<std::size_t>(texture)].of_vectors = true; }
+
   /// Intensities of a luminaire from a path beside the file. They are no texture, but read at once, each file once.
   /// @return  without rows: it is missing
   /// @error SceneError at `json_path`: there is no such file, or see ies_parse

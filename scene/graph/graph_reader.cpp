@@ -5,6 +5,7 @@
 #include <set>
 #include <vector>
 
+#include "scene/gltf_mesh.h"
 #include "scene/graph/closure_reader.h"
 #include "scene/graph/graph_nodes.h"
 #include "scene/graph/graph_vectors.h"
@@ -278,6 +279,27 @@ GraphProgram read_output(const GltfDocument& document,
   }
 }
 
+/// What a glTF texture has at a point of the mesh.
+/// @param at  names it in messages
+GraphVector texture_vector(GraphBuilder& b, const TextureRef& map, const JsonReader& at)
+{
+  // Programs have 16 bits for it.
+  if (map.texture_index > 0xffff) at.fail("index", "one of the scene's first 65,536 textures");
+  const bool is_first = map.uv_set == 0;
+  const GraphScalar u = b.quantity(is_first ? GraphQuantity::uv0_u : GraphQuantity::uv1_u);
+  const GraphScalar up = b.quantity(is_first ? GraphQuantity::uv0_v : GraphQuantity::uv1_v);
+  const GraphScalar one = b.constant(1), v = b(GraphOp::subtract, {one, up});
+  const auto row = [&](float of_u, float of_v, float more) {
+    return sum3(b, scaled(b, u, of_u), scaled(b, v, of_v), b.constant(more));
+  };
+  // Texture coordinates of graphs point up.
+  const GraphScalar inputs[] = {row(map.m00, map.m01, map.m02),
+                                b(GraphOp::subtract, {one, row(map.m10, map.m11, map.m12)}), b.constant(0)};
+  const std::uint16_t immediates[] = {static_cast<std::uint16_t>(map.texture_index), 0};
+  const std::vector<GraphScalar> rgba = b.apply(GraphOp::image, inputs, immediates);
+  return {rgba[0], rgba[1], rgba[2]};
+}
+
 /// The same where the graph's object has nothing else, and suns are of no interest.
 GraphProgram read_whole(const GltfDocument& document,
                         const JsonReader& graph,
@@ -395,6 +417,60 @@ GraphProgram height_graph_read(const GltfDocument& document,
                                Warnings& warnings)
 {
   return read_whole(document, graph, "height", GraphType::kNumber, textures, attribute_names, warnings);
+}
+
+GraphProgram vector_graph_read(const GltfDocument& document,
+                               const JsonReader& displacement,
+                               TextureTable& textures,
+                               std::vector<std::string>& attribute_names,
+                               Warnings& warnings)
+{
+  const bool has_texture = displacement.has("vectorTexture");
+  const JsonReader source = displacement.object(has_texture ? "vectorTexture" : "vectorGraph");
+  Reader r{document, source.file(), source.path(), textures, attribute_names, warnings, {}, {}, {}, {}};
+  GraphBuilder& b = r.build;
+  try {
+    GraphVector v;
+    int uv_set = 0;
+    if (has_texture) {
+      const TextureRef map =
+          khronos_texture_ref(document, displacement, "vectorTexture", TextureColor::kLinear, textures, warnings);
+      uv_set = map.uv_set;
+      v = texture_vector(b, map, source);
+      textures.use_for_vectors(map.texture_index);
+    } else {
+      r.read_nodes(source);
+      if (!source.has("outputs")) source.fail("outputs", "an object");
+      const JsonReader outputs = source.object("outputs");
+      const bool is_given = outputs.has("vector") && outputs.raw("vector").is_object();
+      if (!is_given) outputs.fail("vector", "{\"node\": …}");
+      const GraphValue value = r.look_up(outputs, "vector", r.reference(outputs, "vector", r.sources.size()));
+      if (value.type == GraphType::kNumber) outputs.fail("vector", "a vector or a colour", "a number");
+      outputs.warn_unread(warnings);
+      v = value.v;
+      uv_set = static_cast<int>(source.integer("texCoord", 0, 0, 1));
+    }
+    const GraphVector midlevel = splat(b.constant(displacement.number_f("midlevel", 0)));
+    const GraphVector scale = splat(b.constant(displacement.number_f("scale", 1)));
+    const auto space = static_cast<VectorSpace>(
+        displacement.choice("space", kVectorSpaceLabels, static_cast<int>(VectorSpace::kObject)));
+    GraphVector tangent;
+    GraphScalar handedness;
+    if (space == VectorSpace::kTangent) {
+      const std::uint16_t place = r.attribute(source, tangent_attribute_name(uv_set));
+      tangent = {b.quantity(GraphQuantity::attribute_x, place), b.quantity(GraphQuantity::attribute_y, place),
+                 b.quantity(GraphQuantity::attribute_z, place)};
+      handedness = b.quantity(GraphQuantity::attribute_alpha, place);
+    }
+    v = each(b, GraphOp::multiply, each(b, GraphOp::subtract, v, midlevel), scale);
+    for (const GraphScalar a : vector_in_object(b, space, v, tangent, handedness)) b.add_result(a);
+    source.warn_unread(warnings);
+    GraphProgram program = b.compile();
+    program.attributes.assign(r.attributes.begin(), r.attributes.end());
+    return program;
+  } catch (const GraphTooLarge& error) {
+    source.fail("", error.what(), "one that needs more");
+  }
 }
 
 }  // namespace relief

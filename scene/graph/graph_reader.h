@@ -75,4 +75,15 @@ GraphProgram height_graph_read(const GltfDocument& document,
                                std::vector<std::string>& attribute_names,
                                Warnings& warnings);
 
+/// What a displacement by vectors says: its vectorTexture, or its vectorGraph with the output `vector`, with `space`, `scale` and
+/// `midlevel`. The results are where points go, metres, object space.
+/// @param displacement     the extension's object, which has one of the two
+/// @param attribute_names  as graph_read
+/// @error SceneError: as graph_read; a graph whose output is a number; a bad texture
+GraphProgram vector_graph_read(const GltfDocument& document,
+                               const JsonReader& displacement,
+                               TextureTable& textures,
+                               std::vector<std::string>& attribute_names,
+                               Warnings& warnings);
+
 }  // namespace relief

@@ -66,6 +66,32 @@ GraphVector quantities(GraphBuilder& b, GraphQuantity x, GraphQuantity y, GraphQ
   return {b.quantity(x), b.quantity(y), b.quantity(z)};
 }
 
+GraphVector transformed(GraphBuilder& b, GraphQuantity matrix, const GraphVector& v, bool is_point)
+{
+  GraphVector out;
+  for (std::size_t row = 0; row < 3; ++row) {
+    const auto element = [&](std::size_t c) { return b.quantity(matrix, static_cast<std::uint16_t>(4 * row + c)); };
+    out[row] = dot(b, {element(0), element(1), element(2)}, v);
+    if (is_point) out[row] = b(Op::add, {out[row], element(3)});
+  }
+  return out;
+}
+
+GraphVector vector_in_object(GraphBuilder& b,
+                             VectorSpace space,
+                             const GraphVector& v,
+                             const GraphVector& tangent,
+                             GraphScalar handedness)
+{
+  if (space == VectorSpace::kObject) return v;
+  if (space == VectorSpace::kWorld) return transformed(b, GraphQuantity::object_from_world, v, false);
+  const GraphVector normal = normalized(
+      b, quantities(b, GraphQuantity::vertex_normal_x, GraphQuantity::vertex_normal_y, GraphQuantity::vertex_normal_z));
+  const GraphVector across = each(b, Op::multiply, normalized(b, cross(b, normal, tangent)), splat(handedness));
+  const auto along = [&](const GraphVector& axis, GraphScalar by) { return each(b, Op::multiply, axis, splat(by)); };
+  return each(b, Op::add, each(b, Op::add, along(tangent, v[0]), along(normal, v[1])), along(across, v[2]));
+}
+
 GraphVector rotated(GraphBuilder& b, const GraphVector& v, const GraphVector& angles, bool back)
 {
   const auto turn = [&](GraphVector w, std::size_t axis) {

@@ -34,19 +34,6 @@ GraphVector selected(GraphBuilder& b, GraphScalar which, const GraphVector& x, c
   return {b(Op::select, {which, x[0], y[0]}), b(Op::select, {which, x[1], y[1]}), b(Op::select, {which, x[2], y[2]})};
 }
 
-/// A vector by a matrix of the point.
-/// @param is_point  whether the matrix's last column is added
-GraphVector transformed(GraphBuilder& b, Q matrix, const GraphVector& v, bool is_point)
-{
-  GraphVector out;
-  for (std::size_t row = 0; row < 3; ++row) {
-    const auto element = [&](std::size_t c) { return b.quantity(matrix, static_cast<std::uint16_t>(4 * row + c)); };
-    out[row] = dot(b, {element(0), element(1), element(2)}, v);
-    if (is_point) out[row] = b(Op::add, {out[row], element(3)});
-  }
-  return out;
-}
-
 /// A normal of object space in the world, unit.
 GraphVector normal_to_world(GraphBuilder& b, const GraphVector& v)
 {
@@ -350,6 +337,19 @@ void lower_vector_transform(GraphNode& n)
   n.set("vector", type == 2 ? normalized(b, v) : v, kVector);
 }
 
+constexpr GraphSocket kVectorDisplacementInputs[] = {{"vector", kVector},
+                                                     {"midlevel", kNumber},
+                                                     {"scale", kNumber, {1}}};
+void lower_vector_displacement(GraphNode& n)
+{
+  GraphBuilder& b = n.build;
+  const auto space = static_cast<VectorSpace>(n.reader.choice("space", kVectorSpaceLabels, 0));
+  const GraphVector moved =
+      product(b, difference(b, n.vector("vector"), splat(n.number("midlevel"))), n.number("scale"));
+  const auto [tangent, handedness] = space == VectorSpace::kTangent ? uv_tangent(n) : Attribute{};
+  n.set("vector", vector_in_object(b, space, moved, tangent, handedness), kVector);
+}
+
 constexpr GraphSocket kVectorRotateInputs[] = {{"vector", kVector},
                                                {"center", kVector},
                                                {"axis", kVector, {0, 0, 1}},
@@ -513,6 +513,7 @@ constexpr GraphNodeKind kKinds[] = {
     {"light-falloff", kLightFalloffInputs, lower_light_falloff},
     {"transform", kTransformInputs, lower_transform},
     {"vector-transform", kTransformInputs, lower_vector_transform},
+    {"vector-displacement", kVectorDisplacementInputs, lower_vector_displacement},
     {"vector-rotate", kVectorRotateInputs, lower_vector_rotate},
     {"normal", kNormalInputs, lower_normal},
 };

@@ -284,6 +284,258 @@ def test_heights_over_object_coordinates():
     _assert_agrees(scene, _square(material), tolerance=0.004)
 
 
+def _displacing(tree, kind, height, **values):
+    """A Displacement or Vector Displacement node."""
+    node = tree.nodes.new(kind)
+    for name, value in values.items():
+        if name == "space":
+            node.space = value
+        else:
+            node.inputs[name].default_value = value
+    tree.links.new(height, node.inputs[0])
+    return node
+
+
+def _texture(tree, kind, output="Fac", coordinates="UV", **values):
+    texture, coordinate = tree.nodes.new(kind), tree.nodes.new("ShaderNodeTexCoord")
+    for name, value in values.items():
+        texture.inputs[name].default_value = value
+    tree.links.new(coordinate.outputs[coordinates], texture.inputs["Vector"])
+    return texture.outputs[output]
+
+
+def _displaced_by(build, method="DISPLACEMENT"):
+    """A diffuse material whose Displacement is what `build` makes in its tree."""
+    from relief import compat
+
+    material, tree, _ = new_material("displaced", Color=(0.8, 0.7, 0.6, 1), Roughness=0.0)
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    tree.links.new(build(tree), output.inputs["Displacement"])
+    compat.set_displacement_method(material, method)
+    return material
+
+
+def test_masks_in_scale_and_midlevel():
+    """An image times a mask of noise: one height, without a warning."""
+
+    def build(tree):
+        texture = add_image_node(tree, new_image(_heights(), "Non-Color"))
+        node = _displacing(tree, "ShaderNodeDisplacement", texture.outputs["Color"])
+        tree.links.new(_texture(tree, "ShaderNodeTexNoise", Scale=2.0, Detail=0.0), node.inputs["Scale"])
+        tree.links.new(_texture(tree, "ShaderNodeTexGradient"), node.inputs["Midlevel"])
+        return node.outputs[0]
+
+    scene = _stage()
+    scene.relief.strict, scene.relief.cell_pixels = True, 0.1
+    _assert_agrees(scene, _square(_displaced_by(build)), tolerance=0.004)
+
+
+def _sum(tree, operation="ADD"):
+    """Noise over one uv map and waves over object coordinates, added."""
+    total = tree.nodes.new("ShaderNodeVectorMath")
+    total.operation = operation
+    noise = _texture(tree, "ShaderNodeTexNoise", Scale=4.0, Detail=1.0)
+    waves = _texture(tree, "ShaderNodeTexWave", coordinates="Object", Scale=0.6)
+    first = _displacing(tree, "ShaderNodeDisplacement", noise, Scale=0.5)
+    second = _displacing(tree, "ShaderNodeDisplacement", waves, Scale=0.2, Midlevel=0.2)
+    tree.links.new(first.outputs[0], total.inputs[0])
+    tree.links.new(second.outputs[0], total.inputs[1])
+    return total.outputs[0]
+
+
+def test_displacements_that_are_added():
+    scene = _stage()
+    scene.relief.strict, scene.relief.cell_pixels = True, 0.1
+    _assert_agrees(scene, _square(_displaced_by(_sum)), tolerance=0.004)
+
+
+def _mixed_in_a_group(tree):
+    """A group that mixes two displacements by its input, behind a reroute, scaled."""
+    inside = bpy.data.node_groups.new("mixed", "ShaderNodeTree")
+    if IS_5_0:
+        inside.interface.new_socket("Share", in_out="INPUT", socket_type="NodeSocketFloat")
+        inside.interface.new_socket("Out", in_out="OUTPUT", socket_type="NodeSocketVector")
+    else:
+        inside.inputs.new("NodeSocketFloat", "Share")
+        inside.outputs.new("NodeSocketVector", "Out")
+    share, out = inside.nodes.new("NodeGroupInput"), inside.nodes.new("NodeGroupOutput")
+    mix = inside.nodes.new("ShaderNodeMix")
+    mix.data_type = "VECTOR"
+    factor, *sides = (socket for socket in mix.inputs if socket.enabled)
+    inside.links.new(share.outputs[0], factor)
+    for side, scale in zip(sides, (3.0, 7.0)):
+        noise = _texture(inside, "ShaderNodeTexNoise", Scale=scale, Detail=0.0)
+        inside.links.new(_displacing(inside, "ShaderNodeDisplacement", noise, Scale=2 / scale).outputs[0], side)
+    inside.links.new(next(socket for socket in mix.outputs if socket.enabled), out.inputs[0])
+    group, reroute, scaled = (tree.nodes.new(kind) for kind in ("ShaderNodeGroup", "NodeReroute", "ShaderNodeVectorMath"))
+    group.node_tree, scaled.operation = inside, "SCALE"
+    scaled.inputs["Scale"].default_value = 0.7
+    tree.links.new(_texture(tree, "ShaderNodeTexGradient"), group.inputs[0])
+    tree.links.new(group.outputs[0], reroute.inputs[0])
+    tree.links.new(reroute.outputs[0], scaled.inputs[0])
+    return scaled.outputs[0]
+
+
+def test_displacements_that_are_mixed_in_a_group():
+    """Over one uv map: a map."""
+    scene = _stage()
+    scene.relief.strict = True
+    material = _displaced_by(_mixed_in_a_group)
+    plane = _square(material)("coarse")
+    value = _displacement_of(scene)
+    bpy.data.objects.remove(plane)
+    assert "heightGraph" in value and "cellPixels" not in value, value
+    _assert_agrees(scene, _square(material))
+
+
+def test_tiled_images_displace():
+    """Each tile of its own size, one is missing."""
+    import os
+
+    from scenes import folder
+
+    with folder() as path:
+        for number, size in ((1001, 16), (1002, 32), (1012, 8)):
+            image = new_image(_heights(size), "Non-Color")
+            image.filepath_raw, image.file_format = os.path.join(path, f"tile.{number}.exr"), "OPEN_EXR"
+            image.save()
+
+        def build(tree):
+            image = bpy.data.images.load(os.path.join(path, "tile.1001.exr"))
+            image.source, image.colorspace_settings.name = "TILED", "Non-Color"
+            image.filepath = os.path.join(path, "tile.<UDIM>.exr")
+            for number in (1002, 1012):
+                if number not in {tile.number for tile in image.tiles}:
+                    image.tiles.new(number)
+            texture = add_image_node(tree, image)
+            return _displacing(tree, "ShaderNodeDisplacement", texture.outputs["Color"], Scale=0.2).outputs[0]
+
+        scene = _stage()
+        scene.relief.strict, scene.relief.cell_pixels = True, 0.1
+        square = _square(_displaced_by(build))
+
+        def make(detail):
+            plane = square(detail)
+            uv = np.empty(2 * len(plane.data.loops), dtype=np.float32)
+            plane.data.uv_layers[0].data.foreach_get("uv", uv)
+            plane.data.uv_layers[0].data.foreach_set("uv", 0.01 + 1.98 * uv)
+            return plane
+
+        # Steps between tiles are as wide as the triangles of each engine.
+        _assert_agrees(scene, make, tolerance=0.02)
+
+
+def _vectors(size=32):
+    """A smooth map of vectors, between .1 and .9, that tiles."""
+    v, u = np.mgrid[0:size, 0:size] * (2 * np.pi / size)
+    pixels = np.ones((size, size, 4), dtype=np.float32)
+    pixels[..., 0] = 0.5 + 0.3 * np.sin(2 * u + 0.4)
+    pixels[..., 1] = 0.5 + 0.3 * np.cos(v) * np.sin(u)
+    pixels[..., 2] = 0.5 + 0.3 * np.sin(u + 2 * v)
+    return pixels
+
+
+def _by_vectors(space):
+    def build(tree):
+        texture = add_image_node(tree, new_image(_vectors(), "Non-Color"))
+        values = {"space": space, "Scale": 0.5, "Midlevel": 0.5}
+        return _displacing(tree, "ShaderNodeVectorDisplacement", texture.outputs["Color"], **values).outputs[0]
+
+    return build
+
+
+def test_vectors_in_every_space():
+    for space in ("OBJECT", "WORLD", "TANGENT"):
+        scene = _stage()
+        scene.relief.strict, scene.relief.cell_pixels = True, 0.1
+        square = _square(_displaced_by(_by_vectors(space)), (0.9, 1.1, 0.6))
+
+        def make(detail):
+            plane = square(detail)
+            plane.rotation_euler = degrees(10, -15, 30)
+            return plane
+
+        _assert_agrees(scene, make, tolerance=0.006)
+
+
+def _dice(item, scene, pixels):
+    """Has Cycles subdivide an object to the picture."""
+    modifier = item.modifiers.new("dice", "SUBSURF")
+    modifier.subdivision_type, modifier.render_levels = "SIMPLE", 0
+    if IS_5_0:
+        modifier.use_adaptive_subdivision, modifier.adaptive_pixel_size = True, pixels
+        return
+    scene.cycles.feature_set, scene.cycles.dicing_rate = "EXPERIMENTAL", pixels
+    item.cycles.use_adaptive_subdivision = True
+
+
+def test_vectors_on_a_sphere():
+    """Tangents turn with the surface."""
+    scene = _stage()
+    scene.relief.strict, scene.relief.cell_pixels = True, 0.25
+    sphere = add_sphere(1.2, _displaced_by(_by_vectors("TANGENT")), (0, 0, 1), segments=32)
+    _dice(sphere, scene, 0.25)
+    relief, cycles = (render_runs(scene, engine, 4, 16) for engine in ("RELIEF", "CYCLES"))
+    # Triangles are not the same at the silhouette.
+    assert_same_expectation(relief, cycles, 10, 0.05, 0.02)
+
+
+def test_a_normal_of_its_own_and_sums_with_vectors():
+    """A Displacement node with a Normal, one of the world and a vector, on an object with an uneven scale."""
+
+    def build(tree):
+        normal = tree.nodes.new("ShaderNodeCombineXYZ")
+        normal.inputs["X"].default_value, normal.inputs["Z"].default_value = 0.6, 0.8
+        first, second = tree.nodes.new("ShaderNodeVectorMath"), tree.nodes.new("ShaderNodeVectorMath")
+        noise = _texture(tree, "ShaderNodeTexNoise", Scale=3.0, Detail=0.0)
+        leaning = _displacing(tree, "ShaderNodeDisplacement", noise, Scale=0.6)
+        tree.links.new(normal.outputs[0], leaning.inputs["Normal"])
+        upright = _displacing(tree, "ShaderNodeDisplacement", noise, Scale=0.3, space="WORLD")
+        tree.links.new(leaning.outputs[0], first.inputs[0])
+        tree.links.new(upright.outputs[0], first.inputs[1])
+        tree.links.new(first.outputs[0], second.inputs[0])
+        tree.links.new(_by_vectors("OBJECT")(tree), second.inputs[1])
+        return second.outputs[0]
+
+    scene = _stage()
+    scene.relief.strict, scene.relief.cell_pixels = True, 0.1
+    _assert_agrees(scene, _square(_displaced_by(build), (0.9, 1.1, 1.8)), tolerance=0.006)
+
+
+def test_any_vector_displaces():
+    """A colour of noise over Generated, linked without a node of its own: a vector of the world."""
+
+    def build(tree):
+        scaled = tree.nodes.new("ShaderNodeVectorMath")
+        scaled.operation = "SCALE"
+        scaled.inputs["Scale"].default_value = 0.4
+        noise = _texture(tree, "ShaderNodeTexNoise", "Color", "Generated", Scale=3.0, Detail=0.0)
+        tree.links.new(noise, scaled.inputs[0])
+        return scaled.outputs[0]
+
+    scene = _stage()
+    scene.relief.strict, scene.relief.cell_pixels = True, 0.1
+    _assert_agrees(scene, _square(_displaced_by(build)), tolerance=0.006)
+
+
+def test_sums_and_vectors_that_bump_only():
+    for build in (_sum, _by_vectors("TANGENT")):
+        scene = _stage()
+        scene.relief.strict = True
+        _square(_displaced_by(build, "BUMP"))("coarse")
+        relief, cycles = (render_runs(scene, engine, 4, 16) for engine in ("RELIEF", "CYCLES"))
+        assert_same_expectation(relief, cycles, 10, 0.05, 0.01)
+
+
+def test_adaptive_subdivision_divides_what_nodes_displace():
+    for is_adaptive in (False, True):
+        scene = _stage()
+        plane = add_plane(4, _displaced_by(_sum))
+        if is_adaptive:
+            _dice(plane, scene, 1.0)
+        assert _displacement_of(scene).get("divide", False) == is_adaptive
+
+
 def test_bump_may_displace():
     """A Bump node that displaces, and a Displacement node that says the same in its own words."""
     scene = _stage()

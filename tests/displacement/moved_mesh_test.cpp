@@ -162,6 +162,113 @@ TEST(MovedMesh, IsClosedWhereTrianglesAreDividedDifferently)
   }
 }
 
+/// Where vectors bring a point: a turn about z that grows with the height, with overhangs.
+Vec3d turned(const Vec3d& P)
+{
+  const double angle = 0.7 * P.z, c = std::cos(angle), s = std::sin(angle);
+  return {c * P.x - s * P.y, s * P.x + c * P.y, P.z + 0.3 * std::sin(4 * P.x) * std::cos(3 * P.y)};
+}
+
+void moves_of_points(const void* owner, std::uint32_t triangle, const float (*b)[8], Vec3f* moves)
+{
+  const auto& mesh = *static_cast<const MeshView*>(owner);
+  const TriangleIndices& t = mesh.triangles[triangle];
+  for (int lane = 0; lane < 8; ++lane) {
+    const Vec3d P = static_cast<double>(b[0][lane]) * to_double(mesh.P[t.v0]) +
+                    static_cast<double>(b[1][lane]) * to_double(mesh.P[t.v1]) +
+                    static_cast<double>(b[2][lane]) * to_double(mesh.P[t.v2]);
+    moves[lane] = to_float(turned(P) - P);
+  }
+}
+
+void moves_of_corners(const void* owner, const std::uint32_t* corners, Vec3f* moves)
+{
+  const auto& mesh = *static_cast<const MeshView*>(owner);
+  for (int lane = 0; lane < 8; ++lane) {
+    const TriangleIndices& t = mesh.triangles[corners[lane] / 3];
+    const std::uint32_t vertices[3] = {t.v0, t.v1, t.v2};
+    const Vec3d P = to_double(mesh.P[vertices[corners[lane] % 3]]);
+    moves[lane] = to_float(turned(P) - P);
+  }
+}
+
+TEST(MovedMesh, HasItsVerticesWhereVectorsSay)
+{
+  const Octahedron octahedron;
+  for (const bool has_normals : {true, false}) {
+    MeshView mesh = octahedron.view();
+    if (!has_normals) mesh.N = nullptr;
+    const MovedMesh out = moved_mesh_make(mesh, PointMoves{&mesh, moves_of_points, moves_of_corners}, true, {});
+    EXPECT_EQ(out.N.empty(), !has_normals);
+    for (std::size_t k = 0; k < octahedron.P.size(); ++k)
+      EXPECT_LT(length(to_double(out.P[k]) - turned(to_double(octahedron.P[k]))), 1e-6);
+  }
+}
+
+/// Neither uv nor normals that differ on the two sides of an edge open it, however its triangles are divided.
+TEST(MovedMesh, IsClosedUnderVectorsThatDifferAlongSeams)
+{
+  Octahedron octahedron;
+  for (const std::size_t of : {std::size_t{2}, std::size_t{1}}) {
+    octahedron.P.push_back(octahedron.P[of]);
+    octahedron.N.push_back(as_normal(Vec3f{0.1f, 0.2f, 1}));
+    octahedron.uv.push_back({7, 7});
+  }
+  octahedron.triangles[1] = {7, 3, 6};
+  const MeshView mesh = octahedron.view();
+  // Other vectors on each triangle.
+  const PointMoves moves{nullptr,
+                         [](const void*, std::uint32_t triangle, const float(*b)[8], Vec3f* out) {
+                           for (int k = 0; k < 8; ++k) out[k] = Vec3f{0.01f * static_cast<float>(triangle), b[1][k], 0};
+                         },
+                         nullptr};
+  const auto cells = [](Vec3f a, Vec3f b) { return 12.0 + 10 * static_cast<double>(a.x + b.x); };
+  const std::vector<LatticeTriangle> parts = lattices_make(mesh, cells);
+  const MovedMesh out = divided_mesh_make(mesh, moves, parts, true, {});
+  const MeshView view = out.view(mesh);
+  using Place = std::array<float, 3>;
+  std::map<std::pair<Place, Place>, int> edges;
+  for (std::uint32_t k = 0; k < view.num_triangles; ++k) {
+    const TriangleIndices& t = view.triangles[k];
+    const std::array<std::uint32_t, 3> v{t.v0, t.v1, t.v2};
+    for (std::size_t side = 0; side < 3; ++side) {
+      const auto place = [&](std::uint32_t i) { return Place{view.P[i].x, view.P[i].y, view.P[i].z}; };
+      const Place a = place(v[side]), b = place(v[(side + 1) % 3]);
+      if (a == b) continue;
+      ++edges[{a, b}];
+      --edges[{b, a}];
+    }
+  }
+  EXPECT_GT(edges.size(), 1000u);
+  EXPECT_TRUE(std::all_of(edges.begin(), edges.end(), [](const auto& edge) { return edge.second == 0; }));
+}
+
+/// A mesh that deforms takes the same vectors along at all times, as in Cycles, and is shaded by its shape at each.
+TEST(MovedMesh, TakesVectorsAlongWhileItDeforms)
+{
+  const Octahedron octahedron;
+  const MeshView mesh = octahedron.view();
+  const PointMoves moves{&mesh, moves_of_points, moves_of_corners};
+  std::vector<Vec3f> twice;
+  for (const Vec3f& P : octahedron.P) twice.push_back(2.0f * P);
+  const MeshShape steps[] = {{octahedron.P.data(), octahedron.N.data()}, {twice.data(), octahedron.N.data()}};
+  const std::vector<LatticeTriangle> parts = lattices_make(mesh, [](Vec3f, Vec3f) { return 7.0; });
+  for (const MovedMesh& out :
+       {moved_mesh_make(mesh, moves, true, steps), divided_mesh_make(mesh, moves, parts, true, steps)}) {
+    const MeshView view = out.view(mesh);
+    ASSERT_EQ(out.steps.size(), 2u);
+    for (std::uint32_t k = 0; k < view.num_vertices; ++k) {
+      EXPECT_LT(length(to_double(out.steps[0].P[k]) - to_double(out.P[k])), 1e-6);
+      EXPECT_LT(length(to_double(as_vector(out.steps[0].N[k])) - to_double(as_vector(out.N[k]))), 1e-4);
+      // What twice the size adds is the place on the base, which uv tell: x + 2y and z.
+      const Vec3d base = to_double(out.steps[1].P[k]) - to_double(out.P[k]);
+      EXPECT_NEAR(base.x + 2 * base.y, static_cast<double>(view.uv[0][k].x), 1e-5);
+      EXPECT_NEAR(base.z, static_cast<double>(view.uv[0][k].y), 1e-5);
+    }
+    EXPECT_NE(as_vector(out.steps[1].N[0]), as_vector(out.N[0]));
+  }
+}
+
 TEST(MovedMesh, CountsTheCellsOfItsTriangles)
 {
   const Octahedron octahedron;

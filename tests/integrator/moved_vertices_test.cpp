@@ -166,5 +166,143 @@ TEST(MovedVertices, StayTheSameInASequence)
   EXPECT_EQ(then_far.displacements.size(), 0u);
 }
 
+/// However small triangles are, if that is asked for.
+TEST(MovedVertices, AreThoseOfDividedTrianglesWhereTheFileSaysSo)
+{
+  const Scene scene = square(48, kWaves, {{"divide", true}});
+  const SceneContext context(scene, options_of(scene, 360));
+  EXPECT_GE(num_moved_triangles(context), 2u * 96 * 96);
+}
+
+/// A square of 2 × 2 m across z, with uv, under a displacement; its node is turned by 90° about x and scaled by (1, 2, 3).
+Scene moved_square(const json& displacement, const json& node = json::object())
+{
+  const std::vector<float> P{-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0}, N{0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1};
+  const std::vector<float> uv{0, 1, 1, 1, 1, 0, 0, 0};
+  const std::vector<std::uint32_t> triangles{0, 1, 2, 0, 2, 3};
+  GltfBuilder b;
+  const int position = b.accessor(P, "VEC3"), normal = b.accessor(N, "VEC3"), at = b.accessor(uv, "VEC2"),
+            indices = b.accessor(triangles, "SCALAR");
+  // One pixel of .2, .4, .8.
+  b.json["images"] = {
+      {{"uri",
+        "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAIAAACQd1PeAAAADElEQVR4nGMwTjsDAAI1AWaKkkQy"
+        "AAAAAElFTkSuQmCC"}}};
+  b.json["textures"] = {{{"source", 0}}};
+  b.push("materials", {{"extensions", {{"RELIEF_displacement", displacement}}}});
+  json placed = node;
+  placed["mesh"] = b.mesh({{"attributes", {{"POSITION", position}, {"NORMAL", normal}, {"TEXCOORD_0", at}}},
+                           {"indices", indices},
+                           {"material", 0}});
+  b.root_node(placed);
+  b.push("cameras", {{"type", "perspective"}, {"perspective", {{"yfov", 0.7}, {"znear", 0.1}}}});
+  b.root_node({{"camera", 0}, {"translation", {0, 0, 5}}});
+  return load(b);
+}
+
+/// Of a graph whose vectors bend the square sideways as well: where a ray from above meets it, the base point is found by iteration.
+TEST(VectorDisplacement, BringsPointsWhereTheGraphSays)
+{
+  const auto of = [](int node, const char* output) { return json{{"node", node}, {"output", output}}; };
+  const auto wave = [&](const char* of_axis, double by) {
+    return json{{"type", "math"}, {"operation", "multiply"}, {"inputs", {{"a", of(1, of_axis)}, {"b", by}}}};
+  };
+  const auto sine = [&](int node) {
+    return json{{"type", "math"}, {"operation", "sine"}, {"inputs", {{"a", of(node, "value")}}}};
+  };
+  // 3y, 9x and their sines
+  const json nodes{{{"type", "texture-coordinate"}},
+                   {{"type", "separate"}, {"inputs", {{"vector", of(0, "object")}}}},
+                   wave("y", 3),
+                   wave("x", 9),
+                   sine(2),
+                   sine(3),
+                   {{"type", "combine"}, {"inputs", {{"x", of(4, "value")}, {"y", 0.5}, {"z", of(5, "value")}}}}};
+  const Scene scene = moved_square({{"vectorGraph", {{"nodes", nodes}, {"outputs", {{"vector", of(6, "vector")}}}}},
+                                    {"scale", 0.2},
+                                    {"midlevel", 0.25},
+                                    {"smoothing", true}});
+  const SceneContext context(scene, options_of(scene, 720));
+  EXPECT_EQ(context.displacements.size(), 0u);
+  struct Base {
+    double x, y, z;  // of the base, and the height that it is brought to
+  };
+  const auto base_of = [](double X, double Y) {
+    const double y = Y - 0.2 * (0.5 - 0.25), x = X - 0.2 * (std::sin(3 * y) - 0.25);
+    return Base{x, y, 0.2 * (std::sin(9 * x) - 0.25)};
+  };
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<float> unit(-0.7f, 0.7f);
+  double most = 0;
+  for (int k = 0; k < 4000; ++k) {
+    const float X = unit(random), Y = unit(random);
+    const TraceHit hit = trace_rays(context, std::vector<TraceRay>{{{X, Y, 3}, {0, 0, -1}}})[0];
+    ASSERT_TRUE(hit.hit);
+    const Base base = base_of(static_cast<double>(X), static_cast<double>(Y));
+    most = std::max(most, std::abs(static_cast<double>(hit.P.z) - base.z));
+  }
+  // Sides of a pixel or two are 5 to 10 mm long; sines of amplitude .2 and frequency 9 sag by .2 · 81 · l² / 8.
+  EXPECT_LT(most, 3e-4);
+  const MovedMesh& moved = context.displacements.moved()[0];
+  ASSERT_EQ(moved.N.size(), moved.P.size());
+  double most_slope = 0;
+  for (std::size_t k = 0; k < moved.P.size(); ++k) {
+    const Base base = base_of(static_cast<double>(moved.P[k].x), static_cast<double>(moved.P[k].y));
+    EXPECT_NEAR(static_cast<double>(moved.P[k].z), base.z, 2e-6);
+    if (std::max(std::abs(base.x), std::abs(base.y)) > 0.95) continue;  // one-sided there
+    const double along_x = 1.8 * std::cos(9 * base.x), along_y = -along_x * 0.6 * std::cos(3 * base.y);
+    const auto slope = [&](float c) { return -static_cast<double>(c / moved.N[k].z); };
+    most_slope =
+        std::max({most_slope, std::abs(slope(moved.N[k].x) - along_x), std::abs(slope(moved.N[k].y) - along_y)});
+  }
+  EXPECT_LT(most_slope, 0.05);
+}
+
+/// One vector everywhere, of a map: where it brings the middle of a square whose node is turned and stretched.
+TEST(VectorDisplacement, HasTheAxesOfItsSpace)
+{
+  const json node{{"rotation", {std::sqrt(0.5), 0, 0, std::sqrt(0.5)}}, {"scale", {1, 2, 3}}};
+  const double x = 0.2 - 0.1, y = 0.4 - 0.1, z = 0.8 - 0.1;
+  struct Case {
+    const char* space;
+    double object[3];  // of the vector times a scale of 2
+  };
+  // glTF's world has x to the right, y up; that of vectors z up, which is its −z for y. About x by 90°: object y is world z, object z is world −y.
+  // In the world the vector is (x, z, −y), in the space of the mesh so (x, −y/2, −z/3).
+  const Case cases[] = {{"object", {x, y, z}}, {"world", {x, -y / 2, -z / 3}}, {"tangent", {x, z, y}}};
+  for (const Case& c : cases) {
+    const Scene scene = moved_square(
+        {{"vectorTexture", {{"index", 0}}}, {"space", c.space}, {"scale", 2}, {"midlevel", 0.1}, {"cells", 4}}, node);
+    const SceneContext context(scene, options_of(scene, 90));
+    ASSERT_EQ(context.displacements.moved().size(), 1u) << c.space;
+    const MovedMesh& moved = context.displacements.moved()[0];
+    ASSERT_EQ(num_moved_triangles(context), 2u * 16) << c.space;
+    const Mesh& mesh = scene.meshes[0];
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto part = [&](Vec3f P) { return static_cast<double>(axis == 0 ? P.x : axis == 1 ? P.y : P.z); };
+      EXPECT_NEAR(part(moved.P[0]) - part(mesh.P[mesh.triangles[0].v0]), 2 * c.object[axis], 1e-6) << c.space << axis;
+    }
+  }
+}
+
+/// Rays are not traced over vectors: triangles are as many as there is room for, which is said.
+TEST(VectorDisplacement, HasLargerTrianglesWhereRoomIsShort)
+{
+  const json displacement{{"vectorTexture", {{"index", 0}}}, {"space", "tangent"}};
+  const Scene scene = moved_square(displacement);
+  DisplacementOptions options = options_of(scene, 720);
+  const SceneContext whole(scene, options);
+  EXPECT_GT(num_moved_triangles(whole), 2u * 150 * 150);
+  EXPECT_TRUE(whole.displacements.warnings().empty());
+  options.dicing_bytes = 200'000;
+  const SceneContext part(scene, options);
+  EXPECT_GE(num_moved_triangles(part), 2u * 8 * 8);
+  EXPECT_LE(num_moved_triangles(part), 2u * 32 * 32);
+  ASSERT_EQ(part.displacements.warnings().size(), 1u);
+  EXPECT_NE(part.displacements.warnings()[0].find("times as long"), std::string::npos);
+  options.dicing_bytes = 1;
+  EXPECT_EQ(num_moved_triangles(SceneContext(scene, options)), 2u);
+}
+
 }  // namespace
 }  // namespace relief::test

@@ -377,7 +377,7 @@ TEST(HeightGraph, MistakesAreNamed)
       {{{"curved", true}, {"cells", "all"}}, "/cells"},
       {{{"curved", true}, {"cellPixels", 0}}, "/cellPixels"},
       {{{"heightGraph", sine_graph(1)}, {"heightTexture", {{"index", 0}}}}, "either heightTexture or heightGraph"},
-      {json::object(), "a heightTexture or heightGraph"}};
+      {json::object(), "a heightTexture, heightGraph, vectorTexture or vectorGraph"}};
   for (const auto& [value, place] : cases) {
     try {
       load(square_displaced(value));
@@ -477,6 +477,58 @@ TEST(DisplacedMesh, WeldingFindsTheFirstOfEqualPositions)
   const std::vector<Vec3f> P = {{1, 2, 3}, {0, 0, 0}, {1, 2, 3}, {-0.0f, 0, 0}, {1, 2, 4}};
   EXPECT_EQ(weld_positions(P), (std::vector<std::uint32_t>{0, 1, 0, 1, 4}));
   EXPECT_TRUE(weld_positions({}).empty());
+}
+
+// --- vectors ---
+
+/// What loading a displacement fails with; empty: nothing.
+std::string fault_of(const json& settings)
+{
+  try {
+    load(square_displaced(settings));
+  } catch (const SceneError& error) {
+    return error.json_path + ": " + error.what();
+  }
+  return "";
+}
+
+TEST(VectorDisplacement, OfAMapOrAGraphGivesThreeNumbers)
+{
+  json graph = sine_graph(1);
+  graph["nodes"].push_back({{"type", "combine"}, {"inputs", {{"x", 1}}}});
+  graph["outputs"] = {{"vector", {{"node", graph["nodes"].size() - 1}}}};
+  GltfBuilder map = square_displaced({{"vectorTexture", {{"index", 0}}}, {"space", "world"}});
+  map.json["images"][0]["uri"] = test::kPixelPng;
+  for (const Scene& scene : {load(square_displaced({{"vectorGraph", graph}, {"divide", true}})), load(map)}) {
+    const DisplacementSettings& d = settings(scene);
+    EXPECT_TRUE(d.by_vectors);
+    EXPECT_FALSE(d.has_graph);
+    ASSERT_GE(d.graph_index, 0);
+    EXPECT_EQ(scene.graphs.at(static_cast<std::size_t>(d.graph_index)).results.size(), 3u);
+    EXPECT_EQ(d.divide, scene.height_maps.empty() && scene.graphs[0].inputs.empty());
+  }
+}
+
+TEST(VectorDisplacement, SaysWhatIsNoVector)
+{
+  const auto has = [](const std::string& text, const char* part) { return text.find(part) != std::string::npos; };
+  const std::string path = "/materials/0/extensions/RELIEF_displacement";
+  json number = sine_graph(1);
+  number["outputs"] = {{"vector", number["outputs"]["height"]}};
+  const std::string scalar = fault_of({{"vectorGraph", number}});
+  EXPECT_TRUE(has(scalar, (path + "/vectorGraph/outputs/vector").c_str())) << scalar;
+  EXPECT_TRUE(has(scalar, "expected a vector or a colour, found a number")) << scalar;
+  EXPECT_TRUE(has(fault_of({{"vectorGraph", sine_graph(1)}}), "/vectorGraph/outputs/vector"));
+  const std::string grey = fault_of({{"vectorTexture", {{"index", 0}}}});
+  EXPECT_TRUE(has(grey, "expected an image of three channels, as it is one of vectors, found one channel")) << grey;
+  EXPECT_TRUE(has(fault_of({{"vectorTexture", {{"index", 5}}}}), (path + "/vectorTexture/index").c_str()));
+  EXPECT_TRUE(has(fault_of({{"vectorTexture", {{"uri", "a.exr"}}}}), (path + "/vectorTexture/index").c_str()));
+  const std::string both = fault_of({{"vectorTexture", {{"index", 0}}}, {"heightTexture", {{"index", 0}}}});
+  EXPECT_TRUE(has(both, "expected either heightTexture or vectorTexture, found both")) << both;
+  json vectors = number;
+  vectors["outputs"] = {{"vector", {{"node", 0}, {"output", "object"}}}};
+  EXPECT_TRUE(has(fault_of({{"vectorGraph", vectors}, {"curved", true}}), (path + "/curved").c_str()));
+  EXPECT_TRUE(has(fault_of({{"vectorGraph", vectors}, {"space", "camera"}}), (path + "/space").c_str()));
 }
 
 }  // namespace

@@ -186,10 +186,13 @@ def closures():
         {"type": "metallic", "fresnel": "physical", "maths": "5.2", "thinFilmThickness": 1e30}, {"type": "glass", "ior": 1}, {"type": "refraction"},
         {"type": "velvet"}, {"type": "sheen"}, {"type": "translucent"}]}
     height = {"nodes": nodes[:2], "outputs": {"height": factor}, "resolution": 4}
+    vectors = {"nodes": [{"type": "vector-displacement", "inputs": {"vector": [.1, .2, .3]}}],
+               "outputs": {"vector": {"node": 0}}, "texCoord": 0}
     b.json["materials"] = [
         {"extensions": {"RELIEF_graph": {"nodes": nodes}, "RELIEF_surface": first}},
-        {"extensions": {"RELIEF_surface": second, "RELIEF_displacement": {"heightGraph": height, "scale": .1}}}]
-    for material in range(2):
+        {"extensions": {"RELIEF_surface": second, "RELIEF_displacement": {"heightGraph": height, "scale": .1}}},
+        {"extensions": {"RELIEF_displacement": {"vectorGraph": vectors, "space": "tangent", "divide": True}}}]
+    for material in range(3):
         b.node(mesh=b.square(material=material))
     return b
 

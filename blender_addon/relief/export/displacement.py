@@ -3,7 +3,9 @@
 
 Both move a point along the interpolated normal by scale · (height − midlevel), measured in object or world space, so
 the values are taken as they are. A height of value · texture + offset is folded into scale and midlevel; any other one is
-a graph. The program evaluates those that vary with texture coordinates alone into a map, others where rays ask for them.
+a graph, and so are sums and mixes of such displacements. What does not go along the normal is a graph that gives a vector.
+The program evaluates those that vary with texture coordinates
+alone into a map, others at points.
 """
 
 from dataclasses import dataclass
@@ -13,9 +15,8 @@ import numpy as np
 
 from .. import compat
 from . import nodes
-from .graph import GraphWriter, NotUnderstood
-
-_SPACES = {"OBJECT": "object", "WORLD": "world"}
+from .displacement_graph import SPACES, AlongNormal, InObject, is_along_normal
+from .graph import NotUnderstood
 
 
 def has_displacement_node(material):
@@ -33,13 +34,20 @@ def needs_switch(material):
 
 @dataclass(frozen=True)
 class _Move:
-    """How far points move: scale · (height − midlevel), in a space, by the Height of a node."""
+    """How far points move: scale · (height − midlevel), in a space; or by a vector.
+
+    node    whose Height it is, in its groups; None: `height` or `vector` is
+    height  a number or a reference
+    vector  a reference
+    """
 
     node: object
     groups: tuple
     scale: float
     midlevel: float
     space: str
+    height: object = None
+    vector: object = None
 
 
 def bump_displaces(material, settings):
@@ -59,19 +67,28 @@ def export_displacement(material, settings, textures, texture_info, images, grap
     @param  coordinates     what the sets of texture coordinates are, ("uv", name) and so on, by number
     @return                 None if nothing moves
     """
-    move = _move_of_bump(textures) if textures.bump else _move_of_output(material, settings, textures)
+    move = _move_of_bump(textures) if textures.bump else _move_of_output(material, settings, textures, graph)
     if move is None or move.scale == 0:
         return None
-    height = textures.image(move.node.inputs["Height"], move.groups)
-    if height is None:
-        node = move.node
-        try:
-            height_graph = _height_graph(material, node.inputs["Height"], move.groups, graph, coordinates)
-        except NotUnderstood as error:
-            textures.warn(f'node "{node.name}" ({node.bl_label}): its height ({error})', "nothing is displaced")
-            return None
+    height = move.height
+    if move.vector is not None:
+        return {
+            "vectorGraph": {"nodes": graph.nodes, "outputs": {"vector": move.vector}},
+            "cellPixels": settings.cell_pixels,
+            **_how(material, move, settings),
+        }
+    if move.node is not None:
+        height = textures.image(move.node.inputs["Height"], move.groups)
+        if height is None:
+            node = move.node
+            try:
+                height = graph.value(node.inputs["Height"], move.groups)
+            except NotUnderstood as error:
+                textures.warn(f'node "{node.name}" ({node.bl_label}): its height ({error})', "nothing is displaced")
+                return None
+    if isinstance(height, dict):
         value = {
-            "heightGraph": height_graph,
+            "heightGraph": _height_graph(material, height, graph, coordinates),
             "scale": move.scale,
             "midlevel": move.midlevel,
             **_how(material, move, settings),
@@ -79,6 +96,8 @@ def export_displacement(material, settings, textures, texture_info, images, grap
         if _only_set(graph) is None:
             value["cellPixels"] = settings.cell_pixels
         return value
+    if isinstance(height, float):
+        return _constant(height, move, images)
     # scale · (value · h + offset − midlevel) = (scale · value) · (h − (midlevel − offset) / value)
     if height.texture is None:
         return _constant(height.value, move, images)
@@ -105,14 +124,8 @@ def _how(material, move, settings):
     }
 
 
-def _height_graph(material, socket, groups, graph, coordinates):
-    """heightGraph of an input.
-
-    @error  NotUnderstood
-    """
-    height = graph.value(socket, groups)
-    if not isinstance(height, dict):
-        raise NotUnderstood("no number")
+def _height_graph(material, height, graph, coordinates):
+    """heightGraph of a reference."""
     json = {"nodes": graph.nodes, "outputs": {"height": height}}
     number = _only_set(graph)
     if number is not None:
@@ -169,22 +182,32 @@ def _uv_range(material, name):
     return [float(low[0]), float(1.0 - high[1]), float(high[0]), float(1.0 - low[1])]
 
 
-def _move_of_output(material, settings, textures):
-    """What the Displacement node at a material's output asks for."""
+def _move_of_output(material, settings, textures, graph):
+    """What is linked to a material output's Displacement asks for; None: nothing that is understood."""
     output = nodes.active_output(material.node_tree, "ShaderNodeOutputMaterial")
-    source = nodes.follow(output.inputs["Displacement"]) if output else None
+    source = nodes.linked(output.inputs["Displacement"]) if output else None
     if source is None:
         return None
     if compat.displacement_method(material) == "BUMP" and not settings.bump_displaces:
         return None
     node, groups = source.node, source.groups
-    if node.bl_idname != "ShaderNodeDisplacement":
-        textures.warn(f'node "{node.name}" ({node.bl_label}) as displacement', "nothing is displaced")
+    if is_along_normal(source):
+        scale, midlevel = (nodes.fold(node.inputs[name], groups) for name in ("Scale", "Midlevel"))
+        if scale is not None and midlevel is not None:
+            scale, midlevel = (textures.constant_number(node.inputs[name], groups) for name in ("Scale", "Midlevel"))
+            return _Move(node, groups, scale, midlevel, SPACES[node.space])
+    along = AlongNormal(graph)
+    try:
+        height = along.output(source)
+        if len(along.spaces) < 2:
+            return _Move(None, (), 1.0, 0.0, next(iter(along.spaces), "object"), height=height)
+    except NotUnderstood:
+        pass
+    try:
+        return _Move(None, (), 1.0, 0.0, "object", vector=InObject(graph).output(source))
+    except NotUnderstood as error:
+        textures.warn(f'node "{node.name}" ({node.bl_label}) as displacement ({error})', "nothing is displaced")
         return None
-    if nodes.follow(node.inputs["Normal"], groups) is not None:
-        textures.warn(f'node "{node.name}": a normal for the displacement', "the surface's own was used")
-    scale = textures.constant_number(node.inputs["Scale"], groups)
-    return _Move(node, groups, scale, textures.constant_number(node.inputs["Midlevel"], groups), _SPACES[node.space])
 
 
 def _move_of_bump(textures):

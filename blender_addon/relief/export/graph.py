@@ -9,7 +9,7 @@ from json import dumps
 
 from .. import compat
 from . import color_space, nodes
-from .graph_inputs import OUTPUTS, mesh_attribute
+from .graph_inputs import OUTPUTS, mesh_attribute, tangent_set, transformed_normal
 
 
 class NotUnderstood(Exception):
@@ -271,7 +271,7 @@ def _noise(g, node, groups):
     names.update({"Offset": "offset", "Gain": "gain"})
     inputs.update(g.inputs(node, groups, {**names, "Distortion": "distortion"}))
     if compat.CLAMPS_NOISE_ROUGHNESS:
-        inputs["roughness"] = _clamped(g, inputs["roughness"])
+        inputs["roughness"] = clamped(g, inputs["roughness"])
     kind = _label(getattr(node, "noise_type", "FBM"))
     return g.add(
         "noise-texture",
@@ -283,7 +283,8 @@ def _noise(g, node, groups):
     )
 
 
-def _clamped(g, value):
+def clamped(g, value):
+    """A number or a reference, not below 0 nor above 1."""
     if isinstance(value, dict):
         return {"node": g.add("clamp", {"value": value}), "output": "value"}
     return min(max(value, 0.0), 1.0)
@@ -428,7 +429,7 @@ def _wave(g, node, groups):
     names.update({"Detail Roughness": "detailRoughness", "Phase Offset": "phaseOffset"})
     inputs.update(g.inputs(node, groups, names))
     if compat.CLAMPS_NOISE_ROUGHNESS:
-        inputs["detailRoughness"] = _clamped(g, inputs["detailRoughness"])
+        inputs["detailRoughness"] = clamped(g, inputs["detailRoughness"])
     are_rings = node.wave_type == "RINGS"
     direction = node.rings_direction if are_rings else node.bands_direction
     return g.add(
@@ -636,28 +637,45 @@ def bump_of_displacement(g, source):
         parts = [g.value(node.inputs[name], groups) for name in ("Height", "Midlevel", "Scale")]
         if not any(isinstance(part, dict) for part in parts):
             return None
-        direction = _direction(g, node, groups)
         height = _times_shifted(g, *parts)
-        if direction is not None:
+        if node.space != "WORLD" or g.bends(node.inputs["Normal"], groups):
+            direction = _direction(g, node, groups)
+            direction = _to_world(g, direction) if node.space == "OBJECT" else direction
             height = g.op("math", {"a": height, "b": _along_normal(g, direction)}, "value", operation="multiply")
     else:
-        height = _along_normal(g, _displacement(g, source))
+        height = _along_normal(g, g.output(source))
     inputs = {"height": height, "strength": 1.0, "distance": 1.0}
     options = {"filterWidth": _unless_1(compat.BUMP_WIDTH), "reflectsAbove": compat.BUMP_REFLECTS_ABOVE or None}
     return g.op("bump", inputs, "normal", **options)
 
 
 def _direction(g, node, groups):
-    """Where a Displacement node moves points by a height of 1, in the world; None: along the normal."""
-    is_bent = g.bends(node.inputs["Normal"], groups)
-    normal = g.normal(node.inputs["Normal"], groups) if is_bent else None
-    if node.space == "WORLD":
-        return normal
-    if is_bent:
-        normal = g.op("vector-transform", {"vector": normal}, "vector", transform="normal", **{"from": "world", "to": "object"})
-    else:
-        normal = {"node": g.add("texture-coordinate"), "output": "normal"}
-    return _to_world(g, normal)
+    """Where a Displacement node moves points by a height of 1, in its own space."""
+    if not g.bends(node.inputs["Normal"], groups):
+        if node.space == "OBJECT":
+            return {"node": g.add("texture-coordinate"), "output": "normal"}
+        return g.normal(node.inputs["Normal"], groups) or g.geometry_normal()
+    normal = g.normal(node.inputs["Normal"], groups)
+    return transformed_normal(g, normal, "world", "object") if node.space == "OBJECT" else normal
+
+
+def displaced_in_object(g, node, groups):
+    """Reference to where a Displacement or Vector Displacement node moves points, in object space.
+
+    @error  NotUnderstood
+    """
+    if node.bl_idname == "ShaderNodeVectorDisplacement":
+        inputs = g.inputs(node, groups, {"Vector": "vector", "Midlevel": "midlevel", "Scale": "scale"})
+        number = tangent_set(g, node, "") if node.space == "TANGENT" else None
+        return g.op("vector-displacement", inputs, "vector", space=_label(node.space), uvSet=number)
+    height = _times_shifted(g, *(g.value(node.inputs[name], groups) for name in ("Height", "Midlevel", "Scale")))
+    moved = g.op("vector-math", {"a": _direction(g, node, groups), "scale": height}, "vector", operation="scale")
+    return moved if node.space == "OBJECT" else to_object(g, moved)
+
+
+def to_object(g, vector):
+    """A reference to a vector of the world, in object space."""
+    return g.op("vector-transform", {"vector": vector}, "vector", transform="vector", **{"from": "world", "to": "object"})
 
 
 def _to_world(g, vector):
@@ -670,22 +688,16 @@ def _along_normal(g, vector):
 
 def _times_shifted(g, height, midlevel, scale):
     """(height − midlevel) · scale"""
+    if not any(isinstance(part, dict) for part in (height, midlevel, scale)):
+        return (height - midlevel) * scale
     if midlevel != 0:
         height = g.op("math", {"a": height, "b": midlevel}, "value", operation="subtract")
     return height if scale == 1 else g.op("math", {"a": height, "b": scale}, "value", operation="multiply")
 
 
-def _displacement(g, source):
-    """A displacement that is no Displacement node's, in the world."""
-    node, groups = source.node, source.groups
-    if node.bl_idname != "ShaderNodeVectorDisplacement":
-        return g.output(source)
-    if node.space == "TANGENT":
-        raise NotUnderstood(f'node "{node.name}" ({node.bl_label}) as bump: space tangent')
-    vector, midlevel, scale = (g.value(node.inputs[name], groups) for name in ("Vector", "Midlevel", "Scale"))
-    moved = g.op("vector-math", {"a": vector, "b": midlevel}, "vector", operation="subtract")
-    moved = g.op("vector-math", {"a": moved, "scale": scale}, "vector", operation="scale")
-    return moved if node.space == "WORLD" else _to_world(g, moved)
+def _displacement(g, node, groups):
+    """As values have it, in the world."""
+    return _to_world(g, displaced_in_object(g, node, groups))["node"]
 
 
 _FACTOR = {"Fac": "factor", "Factor": "factor", "Color": "color"}
@@ -751,6 +763,8 @@ _NODES = {
         {"Result_Color": "color", "Result_Vector": "vector", "Result_Float": "value"},
     ),
     "ShaderNodeBump": (_bump, {"Normal": "normal"}),
+    "ShaderNodeDisplacement": (_displacement, {"Displacement": "vector"}),
+    "ShaderNodeVectorDisplacement": (_displacement, {"Displacement": "vector"}),
 }
 
 

@@ -150,19 +150,19 @@ def _color_attribute(g, source):
     return mesh_attribute(g, "color", source.node.layer_name, _ATTRIBUTE[source.socket.name])
 
 
-def _tangent_set(g, node):
-    """Option that names the uv set of a node's tangents."""
-    number = g.coordinate_set(("uv", node.uv_map))
+def tangent_set(g, node, uv_map):
+    """Option that names the uv set of a node's tangents; uv_map "" is the one that is active in renders."""
+    number = g.coordinate_set(("uv", uv_map))
     if number is None:
         raise not_understood(node, "tangents of a third uv map")
-    g.uses_tangents = g.uses_tangents or not node.uv_map
+    g.uses_tangents = g.uses_tangents or not uv_map
     return number or None
 
 
 def _tangent(g, source):
     node = source.node
     if node.direction_type == "UV_MAP":
-        return _output(g.add("tangent", direction="uv", uvSet=_tangent_set(g, node)), "tangent")
+        return _output(g.add("tangent", direction="uv", uvSet=tangent_set(g, node, node.uv_map)), "tangent")
     g.uses_generated = True
     return _output(g.add("tangent", direction=f"radial-{node.axis.lower()}"), "tangent")
 
@@ -178,7 +178,7 @@ def _normal_map(g, source):
     if compat.TANGENT_STRENGTH and inputs["strength"] != 1:
         inputs = {"color": _flattened(g, **inputs)}
     is_unit = compat.NORMAL_MAPS_OVER_UNIT_NORMALS or None
-    return _output(g.add("normal-map", inputs, space=space, uvSet=_tangent_set(g, node), unitNormals=is_unit), "normal")
+    return _output(g.add("normal-map", inputs, space=space, uvSet=tangent_set(g, node, node.uv_map), unitNormals=is_unit), "normal")
 
 
 def _multiply_add(g, vector, factors, summands):
@@ -199,7 +199,7 @@ def _vector_transform(g, source):
     vector = g.inputs(node, source.groups, {"Vector": "vector"})["vector"]
     kind, spaces = node.vector_type.lower(), (node.convert_from.lower(), node.convert_to.lower())
     if kind == "normal" and compat.NORMALS_KEEP_UPRIGHT and spaces[0] != spaces[1]:
-        return _transformed_normal(g, vector, *spaces)
+        return transformed_normal(g, vector, *spaces)
     return _transformed(g, vector, kind, *spaces)
 
 
@@ -208,7 +208,7 @@ def _transformed(g, vector, kind, first, second):
     return g.op("vector-transform", {"vector": vector}, "vector", **options)
 
 
-def _transformed_normal(g, normal, first, second):
+def transformed_normal(g, normal, first, second):
     """A normal by the inverse, transposed: its dot product with what each of the new axes was."""
     dots = {}
     for number, axis in enumerate("xyz"):

@@ -70,18 +70,23 @@ class _Indices:
         self._by_shading = by_shading
         self._indices = {}
 
-    def __call__(self, is_smooth):
-        """Index of the glTF material of smooth or of flat faces."""
-        key = self._by_shading and is_smooth
+    def __call__(self, is_smooth, is_diced):
+        """Index of the glTF material of smooth or of flat faces, of an object that Cycles dices to the picture or not."""
+        displacement = self._json.get("extensions", {}).get("RELIEF_displacement", {})
+        # Of heights and vectors that are computed.
+        key = (self._by_shading and is_smooth, is_diced and "cellPixels" in displacement)
         if key not in self._indices:
-            self._indices[key] = self._add(key)
+            self._indices[key] = self._add(*key)
         return self._indices[key]
 
-    def _add(self, is_smooth):
+    def _add(self, is_smooth, is_diced):
         json = self._json
-        if is_smooth:
+        more = {"smoothing": True} if is_smooth else {}
+        if is_diced:
+            more["divide"] = True
+        if more:
             extensions = json["extensions"]
-            displacement = {**extensions["RELIEF_displacement"], "smoothing": True}
+            displacement = {**extensions["RELIEF_displacement"], **more}
             json = {**json, "extensions": {**extensions, "RELIEF_displacement": displacement}}
         return self._writer.add_unique("materials", json)
 
@@ -191,7 +196,7 @@ class MaterialJob:
         value = export_displacement(
             material, settings, self._textures, self._data_info, self._images, self._height_graph, self._coordinates
         )
-        self._uses_height_graph = value is not None and "heightGraph" in value
+        self._uses_height_graph = value is not None and not {"heightGraph", "vectorGraph"}.isdisjoint(value)
         if value is not None:
             self._displaced = True
             self._by_shading = not value["smoothing"]

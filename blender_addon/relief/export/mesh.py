@@ -300,10 +300,11 @@ def store_mesh(mesh, wanted, writer, shapes=()):
     return StoredMesh(mesh.name, wanted, primitives, tuple(warnings))
 
 
-def add_mesh(stored, materials, writer):
+def add_mesh(stored, materials, writer, is_diced=False):
     """Refers to a stored mesh.
 
     @param  materials  for each slot what gives its material's index in the glTF, for smooth faces or for flat ones
+    @param  is_diced   whether Cycles dices it to the picture
     @return            index of a glTF mesh; None if it has no triangles
     """
     if not stored.primitives:
@@ -315,7 +316,7 @@ def add_mesh(stored, materials, writer):
         while _target("POSITION", len(targets)) in attributes:
             number = len(targets)
             targets.append({name: attributes.pop(_target(name, number)) for name in ("POSITION", "NORMAL")})
-        primitive = {"indices": attributes.pop("indices"), "attributes": attributes, "material": materials[slot](is_smooth)}
+        primitive = {"indices": attributes.pop("indices"), "attributes": attributes, "material": materials[slot](is_smooth, is_diced)}
         if targets:
             primitive["targets"] = targets
         primitives.append(primitive)

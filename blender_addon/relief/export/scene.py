@@ -372,7 +372,8 @@ class SceneExporter:
         for text in stored.warnings:
             self._warner("object", thing.name)(*text)
         read = {value for w in wanted for value in w.values}
-        return add_mesh(stored, [i for i, _ in materials], self.writer), stored.reach(), read
+        is_diced = compat.dicing_modifier(thing.object, self._scene) is not None
+        return add_mesh(stored, [i for i, _ in materials], self.writer, is_diced), stored.reach(), read
 
     def _store(self, thing, evaluated, wanted, shapes):
         """StoredMesh of a thing; None if it has none. Things of one shape whose materials want the same share theirs."""
