@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 
 #include "displacement/method_table.h"
 #include "kernel/math/vec.h"

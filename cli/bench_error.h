@@ -1,7 +1,7 @@
 // `relief bench error`: speed against error, of all ways to render a scene.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 
 #include "cli/commands.h"
 

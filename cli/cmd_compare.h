@@ -1,7 +1,7 @@
 // `relief compare`: how far one picture is from another, and whether that is acceptable.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <functional>
 
 namespace relief {

@@ -1,7 +1,7 @@
 // `relief merge`: joins renders of the same frame with different seeds.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <functional>
 
 namespace relief {

@@ -9,6 +9,9 @@
 #include <string>
 #include <vector>
 
+// All of CLI11, whose other half the program needs once: every other file includes its App.hpp alone, which takes half the time.
+#include <CLI/CLI.hpp>
+
 #include "cli/arguments.h"
 #include "cli/cmd_compare.h"
 #include "cli/cmd_denoise.h"

@@ -1,7 +1,7 @@
 // The option --max-memory, which all commands have that read large files.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 
 namespace relief {
 

@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include <fmt/format.h>
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 
 #include "exporters/atomic_file.h"
 #include "exporters/errors.h"

@@ -1,4 +1,5 @@
 // `relief compare` and `relief merge` as the command line reaches them, without a process.
+#include <CLI/CLI.hpp>
 #include <gtest/gtest.h>
 
 #include <cmath>

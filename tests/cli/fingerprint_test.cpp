@@ -1,5 +1,6 @@
 #include "cli/fingerprint.h"
 
+#include <CLI/CLI.hpp>
 #include <gtest/gtest.h>
 
 #include <algorithm>
