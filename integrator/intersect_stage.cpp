@@ -1,6 +1,7 @@
 #include "integrator/intersect_stage.h"
 
 #include "integrator/media.h"
+#include "integrator/path_lod.h"
 #include "kernel/graph/graph_material.h"
 #include "kernel/math/rounding.h"
 #include "kernel/sample/dimensions.h"
@@ -18,28 +19,6 @@ void note_steps(std::uint32_t& steps, DisplacementWork& work)
   if (steps > work.most_steps) work.most_steps = steps;
   steps = 0;
 }
-
-/// Width of the texels that a ray meets, as a part of its cone's. Averaged heights shade otherwise than the real ones do:
-/// at half a cone the mean of pictures of rough surfaces was 1 % off.
-constexpr float kTexelsPerCone = 0.25f;
-/// Bounced rays stand for wide cones, but what a single one meets must still look like the surface: averaged heights
-/// have lost what was in between.
-constexpr float kWidestLodSpread = 1.0f / 16;
-
-/// The detail that a path's rays ask for.
-struct PathLod {
-  float dither, factor;
-
-  PathLod(const PathState& state, std::uint32_t path)
-      : dither(sample_1d(state.pixel_hash[path], state.sample_index[path], kLodDimension)),
-        factor(kTexelsPerCone * __builtin_exp2f(dither))
-  {
-  }
-  LodCone cone(float width, float spread) const
-  {
-    return {factor * width, factor * min(spread, kWidestLodSpread), dither};
-  }
-};
 
 Vec3f normal_to_object(const InstanceView& instance, Vec3f n)
 {
@@ -145,30 +124,8 @@ void classify(const KernelGlobals& g,
     queue_push(lights, path);
     return;
   }
-  const InstanceView& centre = g.instances[object];
-  if ((centre.flags & (kMoves | kDeforms)) != 0) {
-    const float time = path_time(state, path);
-    state.motion.instances[path] = accel.motion().instance_at(centre, time);
-    if ((centre.flags & kDeforms) != 0) {
-      state.motion.meshes[path] = accel.motion().mesh_at(centre, g.meshes[centre.mesh_index], time);
-    }
-  }
-  const InstanceView& instance = path_instance(g, state, path);
-  if ((instance.flags & kDisplaced) != 0) {
-    const DisplacedPoint point =
-        accel.displacements().resolve(object, instance, state.hit_triangle[path],
-                                      {state.hit_u[path], state.hit_v[path], Ng_x, path_time(state, path)});
-    state.hit_triangle[path] = point.triangle;
-    state.hit_u[path] = point.u;
-    state.hit_v[path] = point.v;
-    state.hit_P[path] = point.P;
-    state.hit_Ng[path] = point.Ng;
-    state.hit_Ns[path] = point.Ns;
-    state.hit_leave[path] = point.leave;
-    state.hit_width[path] = point.width < kInfinity ? point.width / PathLod(state, path).factor : kInfinity;
-    if (state.facets != nullptr) enter_facets(accel, state, path, instance, point.level);
-  }
-  queue_push(surfaces[surface_kernel[instance.material_index]], path);
+  path_resolve_hit(g, accel, state, path, Ng_x);
+  queue_push(surfaces[surface_kernel[g.instances[object].material_index]], path);
 }
 
 std::uint32_t mask_of(const PathState& state, std::uint32_t path)
@@ -270,6 +227,34 @@ GraphPoint shadow_graph_point(const ShadowContext& context,
 }
 
 }  // namespace
+
+void path_resolve_hit(const KernelGlobals& g, const Accel& accel, PathState& state, std::uint32_t path, float Ng_x)
+{
+  const std::uint32_t object = state.hit_object[path];
+  const InstanceView& centre = g.instances[object];
+  if ((centre.flags & (kMoves | kDeforms)) != 0) {
+    const float time = path_time(state, path);
+    state.motion.instances[path] = accel.motion().instance_at(centre, time);
+    if ((centre.flags & kDeforms) != 0) {
+      state.motion.meshes[path] = accel.motion().mesh_at(centre, g.meshes[centre.mesh_index], time);
+    }
+  }
+  const InstanceView& instance = path_instance(g, state, path);
+  if ((instance.flags & kDisplaced) != 0) {
+    const DisplacedPoint point =
+        accel.displacements().resolve(object, instance, state.hit_triangle[path],
+                                      {state.hit_u[path], state.hit_v[path], Ng_x, path_time(state, path)});
+    state.hit_triangle[path] = point.triangle;
+    state.hit_u[path] = point.u;
+    state.hit_v[path] = point.v;
+    state.hit_P[path] = point.P;
+    state.hit_Ng[path] = point.Ng;
+    state.hit_Ns[path] = point.Ns;
+    state.hit_leave[path] = point.leave;
+    state.hit_width[path] = point.width < kInfinity ? point.width / PathLod(state, path).factor : kInfinity;
+    if (state.facets != nullptr) enter_facets(accel, state, path, instance, point.level);
+  }
+}
 
 void intersect_closest(const KernelGlobals& g,
                        const Accel& accel,

@@ -32,6 +32,12 @@ void intersect_closest(const KernelGlobals& g,
                        QueueView& background,
                        DisplacementWork& displacement);
 
+/// Completes a path's hit on an instance: what moves is put where it is at the path's time, displaced hits get their position and
+/// normal.
+/// @pre  the columns hit_object, hit_triangle, hit_t, hit_u and hit_v are as Embree gave them
+/// @param Ng_x  of the hit, as Embree gave it
+void path_resolve_hit(const KernelGlobals& g, const Accel& accel, PathState& state, std::uint32_t path, float Ng_x);
+
 /// Where shadow rays start.
 enum class ShadowStart : std::uint8_t { kAtHit, kInMedium };
 

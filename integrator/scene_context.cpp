@@ -173,7 +173,9 @@ SceneContext::SceneContext(const Scene& loaded,
 
 WavefrontColumns SceneContext::columns(bool photons) const
 {
-  return {photons, motion.is_open(), displacements.has_facets(), !media.empty()};
+  const bool goes_below = std::any_of(scene.materials.begin(), scene.materials.end(),
+                                      [](const Material& material) { return material.scatters_below; });
+  return {photons, motion.is_open(), displacements.has_facets(), !media.empty(), goes_below};
 }
 
 void SceneContext::make_views()

@@ -45,6 +45,13 @@ struct StageTable {
                       int num_surfaces,
                       QueueView& next,
                       ShadowQueue& shadow);
+  /// Lights and scatters paths that have walked below a surface and got out.
+  void (*leave_surfaces)(const KernelGlobals&,
+                         PathState&,
+                         const QueueView& queue,
+                         QueueView& next,
+                         ShadowQueue& shadow,
+                         Counters&);
   void (*shade_background)(const KernelGlobals&, PathState&, const QueueView& queue, Counters&);
   void (*shade_light)(const KernelGlobals&, PathState&, const QueueView& queue, QueueView& next);
   /// @param visibility  one entry a shadow ray
@@ -94,6 +101,12 @@ void shade_media_avx2(const KernelGlobals& g,
                       int num_surfaces,
                       QueueView& next,
                       ShadowQueue& shadow);
+
+/// See StageTable::leave_surfaces.
+void leave_surfaces_baseline(
+    const KernelGlobals& g, PathState& state, const QueueView& queue, QueueView& next, ShadowQueue& shadow, Counters& counters);
+void leave_surfaces_avx2(
+    const KernelGlobals& g, PathState& state, const QueueView& queue, QueueView& next, ShadowQueue& shadow, Counters& counters);
 
 const StageTable& stage_table_baseline();
 const StageTable& stage_table_avx2();

@@ -9,6 +9,7 @@
 #include "integrator/camera_medium.h"
 #include "integrator/graph_stop.h"
 #include "integrator/media.h"
+#include "integrator/subsurface_stage.h"
 #include "kernel/stage/path_access.h"
 
 namespace relief {
@@ -33,7 +34,8 @@ std::size_t Wavefront::bytes(const WavefrontColumns& columns)
 {
   return sizeof(Memory) + (columns.caustics ? sizeof(CausticMemory) : 0u) +
          (columns.motion ? sizeof(MotionMemory) : 0u) + (columns.facets ? kColumnEntries * sizeof(FacetState) : 0u) +
-         (columns.media ? kColumnEntries * sizeof(MediumState) : 0u);
+         (columns.media ? kColumnEntries * sizeof(MediumState) : 0u) +
+         (columns.subsurface ? sizeof(SubsurfaceMemory) : 0u);
 }
 
 Wavefront::Wavefront(const WavefrontColumns& columns)
@@ -53,6 +55,11 @@ Wavefront::Wavefront(const WavefrontColumns& columns)
   if (columns.motion) {
     motion_memory_ = std::make_unique_for_overwrite<MotionMemory>();
     state_.motion = {motion_memory_->time, motion_memory_->instances, motion_memory_->meshes};
+  }
+  if (columns.subsurface) {
+    subsurface_memory_ = std::make_unique_for_overwrite<SubsurfaceMemory>();
+    state_.subsurface.entries = subsurface_memory_->entries;
+    state_.subsurface.entered.paths = subsurface_memory_->entered;
   }
   if (!columns.caustics) return;
   caustic_memory_ = std::make_unique_for_overwrite<CausticMemory>();
@@ -187,6 +194,20 @@ bool Wavefront::run(const KernelGlobals& g,
     trace_shadows(g, accel, ShadowStart::kAtHit, displacement);
     charge(Stage::kIntersectShadow);
     stages.accumulate_shadow(g, state_, shadow_, memory_->visibility);
+    if (QueueView& entered = state_.subsurface.entered; entered.size > 0) {
+      charge(Stage::kShade);
+      QueueView left{subsurface_memory_->left};
+      walk_below_surfaces(g, accel, state_, entered, left, displacement);
+      entered.size = 0;
+      charge(Stage::kIntersectClosest);
+      if (g.caustics.enabled) stages.gather_photons(g, state_, left);
+      shadow_.size = 0;
+      stages.leave_surfaces(g, state_, left, next_, shadow_, counters);
+      charge(Stage::kShade);
+      trace_shadows(g, accel, ShadowStart::kAtHit, displacement);
+      charge(Stage::kIntersectShadow);
+      stages.accumulate_shadow(g, state_, shadow_, memory_->visibility);
+    }
     if (media != nullptr) {
       for (std::uint32_t i = 0; i < next_.size; ++i) medium_follow(state_, next_.paths[i]);
     }

@@ -38,6 +38,7 @@ struct WavefrontColumns {
   bool motion = false;    ///< paths have a time
   bool facets = false;    ///< they may meet coarser levels of height maps
   bool media = false;     ///< something fills space
+  bool subsurface = false;  ///< they may go below surfaces
 };
 
 class CameraMedium;
@@ -114,10 +115,15 @@ class Wavefront {
     InstanceView instances[kColumnEntries];
     MeshView meshes[kColumnEntries];
   };
+  struct SubsurfaceMemory {
+    SubsurfaceState entries[kColumnEntries];
+    std::uint32_t entered[kColumnEntries], left[kColumnEntries];
+  };
 
   std::unique_ptr<Memory> memory_;
   std::unique_ptr<CausticMemory> caustic_memory_;
   std::unique_ptr<MotionMemory> motion_memory_;
+  std::unique_ptr<SubsurfaceMemory> subsurface_memory_;
   std::unique_ptr<FacetState[]> facet_memory_;
   std::unique_ptr<MediumState[]> medium_memory_;
   PathState& state_;

@@ -651,6 +651,7 @@ void GltfLoader::read_programs(const GltfDocument& document,
       material.transmission = known.transmission;
       material.metallic = known.metallic;
       material.roughness = known.roughness;
+      material.scatters_below = known.scatters_below;
     }
     constexpr auto kEmission = static_cast<unsigned>(GraphOutput::emission);
     if (programs.emission) {

@@ -13,6 +13,7 @@ import numpy as np
 IS_4_0 = bpy.app.version >= (4, 0, 0)
 IS_4_1 = bpy.app.version >= (4, 1, 0)
 IS_5_0 = bpy.app.version >= (5, 0, 0)
+IS_5_2 = bpy.app.version >= (5, 2, 0)
 
 #: Names that sockets of the Principled BSDF got in 4.0, by the names of 3.4.
 _PRINCIPLED_NAMES_4_0 = {
@@ -85,6 +86,24 @@ PRINCIPLED_INPUTS = (
         "Clearcoat Normal": "clearcoatNormal",
     }
 )
+
+#: Further inputs of the principled closure where light goes below the surface.
+SUBSURFACE_INPUTS = {
+    "Subsurface Radius": "subsurfaceRadius",
+    "Subsurface Scale": "subsurfaceScale",
+    "Subsurface IOR": "subsurfaceIor",
+    "Subsurface Anisotropy": "subsurfaceAnisotropy",
+}
+
+#: How light goes below surfaces, as RELIEF_surface calls it. What 4.0 calls skin was the plain random walk before, and 5.2 has a new
+#: one.
+SUBSURFACE_METHODS = {
+    "RANDOM_WALK_FIXED_RADIUS": "random-walk-legacy",
+    "RANDOM_WALK_LEGACY": "random-walk-legacy",
+    "RANDOM_WALK": "random-walk" if IS_5_2 else "random-walk-legacy" if IS_4_0 else "random-walk-skin",
+    "RANDOM_WALK_SKIN": "random-walk-skin",
+    "BURLEY": "random-walk-legacy",
+}
 
 #: Before 4.0 the octaves of a Noise Texture never grew.
 CLAMPS_NOISE_ROUGHNESS = not IS_4_0

@@ -34,6 +34,13 @@ RELIEF_KERNEL float closure_input(float x)
 /// Microfacets of glossy, refraction, glass, metallic and Principled closures.
 enum class ClosureDistribution : std::uint8_t { kGgx, kMultiscatterGgx, kBeckmann, kAshikhminShirley, kSharp };
 
+/// How radii and albedos are meant of what scatters below the surface, by Blender 5.2's names.
+enum class SubsurfaceMethod : std::uint8_t {
+  kRandomWalk,  ///< radii are mean free paths: 5.2's own
+  kLegacy,      ///< 4π times as long as these: "Random Walk" of 4.0 to 5.1, "Fixed Radius" before
+  kSkin,        ///< how far light comes up from where it went below; "Random Walk" up to 3.6
+};
+
 /// One closure of a material.
 struct SurfaceClosureSpec {
   ClosureKind kind = ClosureKind::diffuse;
@@ -41,6 +48,7 @@ struct SurfaceClosureSpec {
   bool is_4 = false;               ///< the maths of Blender 4.3 or later, not of 3.4
   bool is_5 = false;               ///< that of 5.2; then is_4, too
   bool is_other = false;           ///< toon: glossy; metallic: by complex index
+  SubsurfaceMethod subsurface = SubsurfaceMethod::kRandomWalk;
   std::uint16_t first_result = 0;  ///< its weight among the program's results, then its inputs, float by float
 };
 

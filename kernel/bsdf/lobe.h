@@ -28,6 +28,7 @@ enum LobeBit : std::uint32_t {
   kLobeDiffuse = 1u << 2,
   kLobeGlossy = 1u << 3,
   kLobeDelta = 1u << 4,
+  kLobeSubsurface = 1u << 5,  ///< the path enters the object, and leaves it elsewhere
 };
 
 /// A BSDF for two directions; delta lobes contribute nothing.
@@ -44,6 +45,7 @@ struct BsdfSample {
   float roughness = 0;     ///< GGX alpha of the lobe, for ray cones; 1 for diffuse lobes and sheen, 0 for delta lobes
   float eta = 1;           ///< index of wi's side / index of wo's side; 1 unless refracted
   std::uint32_t lobe = 0;  ///< LobeBits: reflect or transmit; and diffuse, glossy or delta
+  std::uint32_t entered = 0;  ///< kLobeSubsurface: place of the lobe in its mixture; wi is the way in, f/pdf the factor
 };
 
 /// What a lobe samples: a direction and no more, unless it is delta.

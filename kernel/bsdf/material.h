@@ -53,6 +53,7 @@ struct Material {
   std::uint32_t graph_outputs = 0;  ///< bit GraphOutput: what it gives
   bool has_closures = false;        ///< the graph's closures scatter, in place of everything above but the emission and
                                     ///< what absorbs; transmission, metallic, roughness sum them up
+  bool scatters_below = false;      ///< some closure lets paths go below the surface
   bool depends_on_ray = false;      ///< what the graph gives differs by how a ray came, so that photons cannot be told
   int transparency_index = -1;      ///< into KernelGlobals::graphs: its transparent closures alone; −1: none
   int emission_index = -1;          ///< likewise: what gives its emission, or part of it; −1: no graph does

@@ -124,6 +124,17 @@ RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tabl
   if (chosen == nullptr) return {};
   // Rounding may leave a little over behind the last lobe.
   u.x = min(u.x, 1.0f - kUnitRoundoff);
+  if (chosen->kind == MixtureLobeKind::kSubsurface) {
+    const Vec3f wi = from_local(chosen->frame, subsurface_enter(chosen->shape.subsurface, chosen->wo, u));
+    if (!(dot(wi, m.Ng) < 0.0f)) return {};
+    BsdfSample s;
+    s.wi = to_local(m.frame, wi);
+    s.f = chosen->weight * m.gain;
+    s.pdf = chosen->probability * m.scale;
+    s.lobe = kLobeSubsurface;
+    s.entered = static_cast<std::uint32_t>(chosen - m.all->lobes);
+    return s;
+  }
   const LobeSample d = mixture_lobe_sample<kMode>(*chosen, u_branch, u);
   if (d.bits == 0 || (d.wi.z < 0.0f) != ((d.bits & kLobeTransmit) != 0)) return {};
   BsdfSample s;

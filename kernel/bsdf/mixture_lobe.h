@@ -14,6 +14,7 @@
 #include "kernel/bsdf/principled_diffuse.h"
 #include "kernel/bsdf/principled_sheen.h"
 #include "kernel/bsdf/sheen_microfibre.h"
+#include "kernel/bsdf/subsurface.h"
 #include "kernel/bsdf/thin_film.h"
 #include "kernel/bsdf/toon.h"
 #include "kernel/bsdf/translucent.h"
@@ -38,6 +39,7 @@ enum class MixtureLobeKind : std::uint8_t {
   kMultiple,
   kRefraction,
   kGlass,
+  kSubsurface,
 };
 
 /// How a microfacet's reflectance depends on the angle.
@@ -95,11 +97,12 @@ union LobeShape {
   MixtureMultiple multiple;
   MicrofacetRefraction refraction;
   MixtureGlass glass;
+  Subsurface subsurface;
 };
 
 struct MixtureLobe {
   MixtureLobeKind kind = MixtureLobeKind::kLambert;
-  bool is_delta = false;
+  bool is_delta = false;     ///< lights are not found through it: also what enters the object
   bool stays_sharp = false;  ///< a distribution without width: nothing blurs it
   bool is_bent = false;      ///< its normal is not the surface's
   bool is_4 = false;         ///< of 4.3's maths or later ones: which sides it reaches, see mixture_lobe_reaches
@@ -310,6 +313,8 @@ template <TransportMode kMode>
     case K::kGlass:
       is_diffuse = false;
       e = mixture_glass_eval<kMode>(lobe, wi);
+      break;
+    case K::kSubsurface:
       break;
   }
   if (is_microfacet) {

@@ -1,7 +1,7 @@
 // Closures of a material, with their inputs at a point, as the lobes of a mixture. One function a kind of closure; each says
 // what Cycles of Blender 3.4, with `is_4` that of 4.3, with `is_5` that of 5.2, makes of it.
 //
-// Subsurface scattering is diffuse reflection of the subsurface colour here.
+// What scatters below the surface is a lobe by which paths enter, or, where they may not, a diffuse one.
 #pragma once
 
 #include "kernel/bsdf/closure_kinds.h"
@@ -32,6 +32,9 @@ struct MixtureBuild {
   float blur = 0;                         ///< see path_blur; 0: none
   float most_sharp = -1;                  ///< perceptual roughness up to which lobes are not blurred
   bool reflects = true, refracts = true;  ///< there are microfacets that do so; see path_does_without
+  bool enters = false;                    ///< paths may go below the surface
+  bool is_after_diffuse = false;          ///< the path has been scattered diffusely before
+  float footprint = 0;                    ///< metres
 };
 
 RELIEF_KERNEL float mean_component(Vec3f v) { return (v.x + v.y + v.z) * (1.0f / 3.0f); }
@@ -248,6 +251,87 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
     lobe->kind = MixtureLobeKind::kOrenNayar;
     lobe->shape.oren_nayar = oren_nayar_make(in.roughness);
   }
+}
+
+/// Whether a path may go below the surface. Before 5.0 Cycles left it at a diffuse surface after a diffuse event: it is not seen well
+/// then, and noisy.
+RELIEF_KERNEL bool subsurface_enters(const MixtureBuild& b, const SurfaceClosureSpec& spec)
+{
+  return b.enters && (spec.is_5 || !b.is_after_diffuse);
+}
+
+/// How paths enter since 4.0.
+RELIEF_KERNEL void subsurface_set_entry(Subsurface& s, const SurfaceClosureSpec& spec, float alpha)
+{
+  const bool is_skin = spec.subsurface == SubsurfaceMethod::kSkin;
+  s.entry = is_skin ? SubsurfaceEntry::kEither : SubsurfaceEntry::kRefracted;
+  s.entry_alpha = is_skin ? 1.0f : alpha;
+}
+
+/// Adds what scatters below the surface: the lobe by which paths enter, and a diffuse one for channels whose radius is none.
+/// @param weight   with the colour
+/// @param s        its radii as they are given
+/// @param diffuse  kind of the lobe of what does not enter; `principled` if it has one
+/// @source  Cycles 3.4 and 4.3
+RELIEF_KERNEL void subsurface_add(MixtureBuild& b,
+                                  const SurfaceClosureSpec& spec,
+                                  Vec3f weight,
+                                  Vec3f N,
+                                  Subsurface s,
+                                  MixtureLobeKind diffuse,
+                                  PrincipledDiffuse principled = {})
+{
+  float least = kInfinity;
+  if (subsurface_enters(b, spec)) {
+    // From 4.0 on, before 5.0, what is smaller than a quarter of a pixel was not worth a walk.
+    least = max(kLeastSubsurfaceRadius, spec.is_4 && !spec.is_5 ? 0.25f * b.footprint : 0.0f);
+  }
+  const bool is_walk = spec.subsurface == SubsurfaceMethod::kRandomWalk;
+  s.anisotropy = clamp(s.anisotropy, spec.is_5 ? -0.99f : 0.0f, is_walk ? 0.99f : 0.9f);
+  s.is_similar = is_walk || s.anisotropy < 0.0f;
+  s.entry_ior = clamp(s.entry_ior, 1.01f, 3.8f);
+  const auto free_path = [&](float radius, float albedo) {
+    if (is_walk) return radius;
+    if (spec.subsurface == SubsurfaceMethod::kLegacy) return radius * (0.25f * kInvPi);
+    return subsurface_free_path(radius, albedo, s.entry_ior);
+  };
+  Vec3f around = weight;
+  int channels = 0;
+  const auto axis = [&](float albedo, float& radius, float& kept, float& going) {
+    if (radius >= least) {
+      kept = 0.0f;
+      ++channels;
+      radius = free_path(radius, albedo);
+    } else {
+      going = radius = 0.0f;
+    }
+  };
+  Vec3f entering = weight;
+  axis(s.albedo.x, s.radius.x, around.x, entering.x);
+  axis(s.albedo.y, s.radius.y, around.y, entering.y);
+  axis(s.albedo.z, s.radius.z, around.z, entering.z);
+  const Frame frame = frame_from_normal(N);
+  if (MixtureLobe* lobe = mixture_add(b, around, frame, true)) {
+    lobe->kind = diffuse;
+    if (diffuse == MixtureLobeKind::kPrincipledDiffuse) lobe->shape.principled_diffuse = principled;
+  }
+  MixtureLobe* lobe = mixture_add(b, entering, frame, true);
+  if (lobe == nullptr) return;
+  lobe->kind = MixtureLobeKind::kSubsurface;
+  lobe->is_delta = true;
+  lobe->probability *= static_cast<float>(channels);
+  lobe->shape.subsurface = s;
+}
+
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const SubsurfaceInputs& in)
+{
+  Subsurface s;
+  s.albedo = max(in.color, Vec3f{});
+  s.radius = max(in.radius * in.scale, Vec3f{});
+  s.anisotropy = in.anisotropy;
+  s.entry_ior = in.ior;
+  if (spec.is_4) subsurface_set_entry(s, spec, saturated(in.roughness));
+  subsurface_add(b, spec, weight * s.albedo, closure_normal(b, in.normal), s, MixtureLobeKind::kLambert);
 }
 
 RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec&, float weight, const TranslucentInputs& in)
@@ -551,11 +635,26 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b,
   const bool scatters_below = in.subsurface > kLeastClosureWeight;
   const Vec3f below = scatters_below ? lerp(in.subsurface, in.base_color, in.subsurface_color) : in.base_color;
   if (diffuse_weight > kLeastClosureWeight) {
-    MixtureLobe* lobe = mixture_add(b, max(below, Vec3f{}) * (weight * diffuse_weight), frame_from_normal(N));
-    // What comes out of a medium has been scattered in all directions.
-    if (lobe != nullptr && !scatters_below) {
+    const Vec3f diffuse = max(below, Vec3f{}) * (weight * diffuse_weight);
+    const bool enters = scatters_below && subsurface_enters(b, spec);
+    MixtureLobe* lobe = mixture_add(b, diffuse, frame_from_normal(N));
+    if (lobe != nullptr) {
       lobe->kind = MixtureLobeKind::kPrincipledDiffuse;
       lobe->shape.principled_diffuse = {in.roughness};
+      if (enters) {
+        lobe->shape.principled_diffuse.part = PrincipledDiffusePart::kRetro;
+        lobe->probability *= max(in.roughness, 0.0f) * schlick_weight(lobe->wo.z);
+      }
+    }
+    if (enters) {
+      Subsurface s;
+      s.albedo = max(below, Vec3f{});
+      s.radius = max(in.subsurface_radius * in.subsurface, Vec3f{});
+      s.anisotropy = in.subsurface_anisotropy;
+      s.entry_ior = in.subsurface_ior;
+      s.leaves_by_fresnel = true;
+      subsurface_add(b, spec, diffuse, N, s, MixtureLobeKind::kPrincipledDiffuse,
+                     {in.roughness, PrincipledDiffusePart::kLambert});
     }
     if (in.sheen > kLeastClosureWeight) {
       constexpr Vec3f kLuminance{0.2126729f, 0.7151522f, 0.0721750f};
@@ -682,6 +781,17 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b,
       const Vec3f F_mean = saturated(fresnel_interpolated_mean(lobe->fresnel.a, {1, 1, 1}, eta));
       weight = layered_weight(weight, albedo * lobe_give_back(b, spec, *lobe, F_mean));
     }
+  }
+  const float below = saturated(in.subsurface_weight);
+  if (below > kLeastClosureWeight) {
+    Subsurface s;
+    s.albedo = saturated(base_color);
+    s.radius = max(in.subsurface_radius * in.subsurface_scale, Vec3f{});
+    s.anisotropy = in.subsurface_anisotropy;
+    s.entry_ior = spec.subsurface == SubsurfaceMethod::kSkin ? in.subsurface_ior : eta;
+    subsurface_set_entry(s, spec, sqr(roughness));
+    subsurface_add(b, spec, weight * s.albedo * below, N, s, MixtureLobeKind::kLambert);
+    weight *= 1.0f - below;
   }
   const bool is_rough = in.diffuse_roughness > kLeastClosureWeight;
   MixtureLobe* lobe = mixture_add(b, weight * base_color, frame_from_normal(N_given), true);

@@ -4,12 +4,23 @@
 // Integrated Subsurface Scattering" [B15].
 #pragma once
 
+#include <cstdint>
+
 #include "kernel/bsdf/diffuse.h"
 
 namespace relief {
 
+/// What of it there is, where part of the light goes below the surface.
+enum class PrincipledDiffusePart : std::uint8_t {
+  kAll,
+  kLambert,  ///< without retro-reflection
+  kRetro,    ///< that alone
+  kLeaving,  ///< of light that leaves again: Lambert's part for wi alone
+};
+
 struct PrincipledDiffuse {
   float roughness = 0.5f;  ///< not clamped, as in Cycles
+  PrincipledDiffusePart part = PrincipledDiffusePart::kAll;
 };
 
 /// f before the colour. Bright at grazing angles: roughness 0.5 reflects up to 1.02 of what it receives, roughness
@@ -23,8 +34,20 @@ RELIEF_KERNEL float principled_diffuse_eval(const PrincipledDiffuse& lobe, Vec3f
   const float F_o = schlick_weight(wo.z), F_i = schlick_weight(wi.z);
   // 2 cos² of half the angle between both directions is one plus their cosine.
   const float retro = lobe.roughness * (1.0f + dot(wo, wi));
-  const float lambert = (1.0f - 0.5f * F_o) * (1.0f - 0.5f * F_i);
-  return kInvPi * (lambert + retro * (F_o + F_i + F_o * F_i * (retro - 1.0f)));
+  const float leaving = 1.0f - 0.5f * F_i;
+  const float lambert = (1.0f - 0.5f * F_o) * leaving;
+  const float back = retro * (F_o + F_i + F_o * F_i * (retro - 1.0f));
+  switch (lobe.part) {
+    case PrincipledDiffusePart::kAll:
+      break;
+    case PrincipledDiffusePart::kLambert:
+      return kInvPi * lambert;
+    case PrincipledDiffusePart::kRetro:
+      return kInvPi * back;
+    case PrincipledDiffusePart::kLeaving:
+      return kInvPi * leaving;
+  }
+  return kInvPi * (lambert + back);
 }
 
 RELIEF_KERNEL Vec3f principled_diffuse_sample(const PrincipledDiffuse&, Vec3f, Vec2f u) { return diffuse_sample(u); }

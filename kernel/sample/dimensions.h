@@ -85,6 +85,10 @@ RELIEF_KERNEL constexpr std::uint32_t dimension_photon(PhotonDimension use)
   return 0x40000000u + static_cast<std::uint32_t>(use);
 }
 
+/// @param number  of the numbers of a walk below a surface
+/// @return        dimension for sample_1d
+RELIEF_KERNEL constexpr std::uint32_t dimension_below(std::uint32_t number) { return 0x80000000u + number; }
+
 /// @param bounce  surfaces that the path has met before, see path_surface
 /// @return        dimension for sample_1d or sample_2d, as the use says
 RELIEF_KERNEL constexpr std::uint32_t dimension_bounce(int bounce, BounceDimension use)

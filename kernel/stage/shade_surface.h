@@ -10,6 +10,7 @@
 #include "kernel/sample/sobol.h"
 #include "kernel/shape/material_lookup.h"
 #include "kernel/stage/emitter.h"
+#include "kernel/stage/enter_surface.h"
 #include "kernel/stage/surface_interaction.h"
 
 namespace relief {
@@ -596,6 +597,13 @@ template <unsigned kFeatures>
 
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
     shade_surface_photons<kFeatures>(g, state, path, at, closure, wo_local);
+  }
+
+  if constexpr (kMixture) {
+    if (__builtin_expect((bsdf.lobe & kLobeSubsurface) != 0, 0)) {
+      path_enter_surface(state, path, at, lobes.lobes[bsdf.entered], bsdf, throughput);
+      return;
+    }
   }
 
   if constexpr ((kFeatures & kFeatureCaustics) != 0 && (kFeatures & kFeatureTransmission) != 0) {

@@ -178,18 +178,31 @@ RELIEF_KERNEL void mixture_lobes_defend(MixtureLobes& lobes, float passing)
   }
 }
 
+/// What closures depend on of the path that meets them.
+struct ClosureSight {
+  SurfaceBlur blur;
+  std::uint32_t without = 0;  ///< see path_does_without
+  bool is_first = false;      ///< the surface is the first of a path from the camera
+  bool enters = false;        ///< it may go below the surface
+  bool is_after_diffuse = false;
+};
+
+/// Photons stay above: they end where there is a diffuse lobe.
+RELIEF_KERNEL ClosureSight closure_sight(const KernelGlobals& g, const PathState& state, std::uint32_t path, SurfaceBlur blur)
+{
+  return {blur, path_does_without(g, state.flags[path]), path_surface(state, path) == 0,
+          state.subsurface.entries != nullptr && (state.flags[path] & kPathPhoton) == 0,
+          path_bounces(state.bounces[path], BounceKind::kDiffuse) > 0};
+}
+
 /// Resolves the closures of a located point: its lobes, its frame, and the parameters that stages ask for.
 /// @param lane         of the material's program
-/// @param without      see path_does_without
-/// @param is_first     of a path from the camera
 /// @param lobes        gets the lobes
 template <unsigned kFeatures>
 RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
                                            Vec3f wo,
                                            const GraphLane& lane,
-                                           SurfaceBlur blur,
-                                           std::uint32_t without,
-                                           bool is_first,
+                                           ClosureSight sight,
                                            SurfaceInteraction& at,
                                            MixtureLobes& lobes)
 {
@@ -197,10 +210,14 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   const Vec3f Ns = shading_normal_turned(at.hit.Ns, side.Ng);
   lobes.size = 0;
   MixtureBuild build{wo, side.Ng, Ns, side.front, g.bsdf_tables, &lobes};
+  const SurfaceBlur blur = sight.blur;
   build.blur = blur.alpha;
   build.most_sharp = blur.most_sharp;
-  build.reflects = !events_have(without, false);
-  build.refracts = !events_have(without, true);
+  build.reflects = !events_have(sight.without, false);
+  build.refracts = !events_have(sight.without, true);
+  build.enters = sight.enters;
+  build.is_after_diffuse = sight.is_after_diffuse;
+  build.footprint = at.cone.width;
   if (const std::uint16_t first = lane.program->surface_normal; first != kNoGraphOperand) {
     const Vec3f given{graph_result(lane, first), graph_result(lane, first + 1), graph_result(lane, first + 2)};
     // Since 4.0 what displaces nothing bends freely.
@@ -243,7 +260,7 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
     p.roughness = 0.0f;
     p.metallic = 1.0f;
   }
-  if (is_first) mixture_lobes_defend(lobes, mean_component(build.transparency));
+  if (sight.is_first) mixture_lobes_defend(lobes, mean_component(build.transparency));
   const float passing = max_component(build.transparency);
   if (!(passing > 0.0f)) return;
   // Whichever way a path takes, it takes by its share of the light; what it then carries makes up for the chance.
@@ -280,8 +297,7 @@ RELIEF_KERNEL void surface_interaction_resolve(const KernelGlobals& g,
                                  : graph_at_point(g.run_graph, g.graphs[at.material->graph_index], g.textures,
                                                   surface_graph_point(g, state, path, at, wo), registers);
       if (has_mixture<kFeatures>(at)) {
-        surface_interaction_mix<kFeatures>(g, wo, lane, blur, path_does_without(g, state.flags[path]),
-                                           path_surface(state, path) == 0, at, lobes);
+        surface_interaction_mix<kFeatures>(g, wo, lane, closure_sight(g, state, path, blur), at, lobes);
       } else {
         at.params = graph_surface_params<kFeatures>(*at.material, graph_values(lane), g.textures, at.hit, at.uv_width);
         if (blur.alpha > 0.0f) surface_params_blur(at.params, blur);

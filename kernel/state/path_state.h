@@ -9,6 +9,7 @@
 #include "kernel/state/facet_state.h"
 #include "kernel/state/medium_state.h"
 #include "kernel/state/path_event.h"
+#include "kernel/state/subsurface_state.h"
 
 namespace relief {
 
@@ -64,6 +65,20 @@ struct CausticStateView {
   std::uint32_t num_paths = 0;              ///< forked ones included
 };
 
+/// Indices of paths waiting for a stage.
+struct QueueView {
+  std::uint32_t* paths = nullptr;
+  std::uint32_t size = 0;
+};
+
+RELIEF_KERNEL void queue_push(QueueView& queue, std::uint32_t path) { queue.paths[queue.size++] = path; }
+
+/// Columns of paths that may go below surfaces; null where none may.
+struct SubsurfaceStateView {
+  SubsurfaceState* entries = nullptr;
+  QueueView entered;  ///< those that have just done so
+};
+
 struct InstanceView;
 struct MeshView;
 
@@ -82,6 +97,7 @@ struct alignas(64) PathState {
 #undef X
   CausticStateView caustic;
   MotionStateView motion;
+  SubsurfaceStateView subsurface;
   FacetState* facets = nullptr;  ///< of the present hit; null where no ray meets any
   MediumState* media = nullptr;  ///< null where nothing has a medium
 };
@@ -119,13 +135,5 @@ struct alignas(64) ShadowQueue {
   std::uint32_t scatterings[kShadowEntries];  ///< events between the camera and the light, or kAmbientRay
   std::uint32_t size;                         ///< number of rays waiting
 };
-
-/// Indices of paths waiting for a stage.
-struct QueueView {
-  std::uint32_t* paths = nullptr;
-  std::uint32_t size = 0;
-};
-
-RELIEF_KERNEL void queue_push(QueueView& queue, std::uint32_t path) { queue.paths[queue.size++] = path; }
 
 }  // namespace relief

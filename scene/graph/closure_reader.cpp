@@ -51,9 +51,11 @@ int most_lobes(ClosureKind kind)
     case ClosureKind::glass:
     case ClosureKind::glossy:
       return 2;
+    case ClosureKind::subsurface:
+      return 2;
     case ClosureKind::principled3:
     case ClosureKind::principled4:
-      return 7;
+      return 9;
     default:
       return 1;
   }
@@ -66,6 +68,7 @@ SurfaceClosureSpec read_closure(const JsonReader& r)
   static constexpr std::string_view kMaths[] = {"3.4", "4.3", "5.2"};
   static constexpr std::string_view kComponents[] = {"diffuse", "glossy"};
   static constexpr std::string_view kFresnels[] = {"f82", "physical"};
+  static constexpr std::string_view kSubsurfaceMethods[] = {"random-walk", "random-walk-legacy", "random-walk-skin"};
   SurfaceClosureSpec spec;
   const int maths = r.choice("maths", kMaths, 0);
   spec.is_4 = maths >= 1;
@@ -96,6 +99,11 @@ SurfaceClosureSpec read_closure(const JsonReader& r)
       break;
   }
   if (spec.kind == K::metallic) spec.is_other = r.choice("fresnel", kFresnels, 0) == 1;
+  if (spec.kind == K::subsurface) {
+    spec.subsurface = static_cast<SubsurfaceMethod>(r.choice("method", kSubsurfaceMethods, 0));
+  } else if (spec.kind == K::principled3 || spec.kind == K::principled4) {
+    spec.subsurface = static_cast<SubsurfaceMethod>(r.choice("subsurfaceMethod", kSubsurfaceMethods, 0));
+  }
   return spec;
 }
 
@@ -162,6 +170,9 @@ ClosureSummary closures_summarize(const GraphProgram& program)
     };
     bool reflects = false, refracts = false;
     switch (closure.kind) {
+      case ClosureKind::subsurface:
+        summary.scatters_below = true;
+        break;
       case ClosureKind::glossy:
       case ClosureKind::metallic:
         reflects = true;
@@ -173,10 +184,12 @@ ClosureSummary closures_summarize(const GraphProgram& program)
       case ClosureKind::principled3:
         reflects = known("metallic", 0) >= 0.5f;
         refracts = known("transmission", 1) > 0;
+        summary.scatters_below = summary.scatters_below || known("subsurface", 1) > 0;
         break;
       case ClosureKind::principled4:
         reflects = known("metallic", 0) >= 0.5f;
         refracts = known("transmissionWeight", 1) > 0;
+        summary.scatters_below = summary.scatters_below || known("subsurfaceWeight", 1) > 0;
         break;
       default:
         break;

@@ -23,6 +23,7 @@ struct ClosureSummary {
   float transmission = 0;  ///< 1: something refracts
   float metallic = 0;      ///< 1: something reflects as metal does
   float roughness = 1;     ///< perceptual, the least of these; 0 where it varies
+  bool scatters_below = false;  ///< paths may go below the surface
 };
 ClosureSummary closures_summarize(const GraphProgram& program);
 

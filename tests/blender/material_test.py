@@ -239,11 +239,6 @@ def test_unknown_color_node_is_warned_about():
     assert_warns(_stage(material), 'material "realtime"', "Shader to RGB", "[0.3, 0.2, 0.1] was used")
 
 
-def test_subsurface_is_warned_about():
-    material = new_material("skin", "ShaderNodeBsdfPrincipled", Subsurface=0.5)[0]
-    assert_warns(_stage(material), 'material "skin"', "subsurface")
-
-
 def test_what_later_principled_surfaces_have_is_warned_about():
     """Thin walls, since 5.2."""
     material, _, node = new_material("later", "ShaderNodeBsdfPrincipled")
@@ -278,24 +273,3 @@ def test_a_volume_behind_an_opaque_surface_is_not_seen():
     output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
     tree.links.new(volume.outputs[0], output.inputs["Volume"])
     assert_agrees(_stage(material), samples=64)
-
-
-def test_subsurface_color_is_that_of_the_diffuse_light():
-    """Between base and Subsurface Color by the weight, as in Cycles; the input was there before 4.0."""
-    import numpy as np
-    from scenes import IS_4_0, folder, render
-
-    if IS_4_0:
-        return
-    scene = _stage(None)
-    scene.relief.strict = False
-    base, below = np.array((0.8, 0.1, 0.2, 1)), np.array((0.1, 0.6, 0.3, 1))
-    pictures = []
-    with folder() as path:
-        mixed = 0.75 * base + 0.25 * below
-        for color, subsurface in ((base, below), (mixed, mixed)):
-            inputs = {"Base_Color": color, "Subsurface": 0.25, "Subsurface_Color": subsurface, "Specular": 0.0}
-            bpy.data.objects["Sphere"].data.materials[0] = new_material("m", "ShaderNodeBsdfPrincipled", **inputs)[0]
-            pictures.append(render(scene, "RELIEF", f"{path}/picture.exr"))
-    assert np.allclose(*pictures, rtol=1e-4), np.abs(pictures[0] - pictures[1]).max()
-    assert pictures[0][..., 0].mean() > 1.05 * pictures[0][..., 1].mean()

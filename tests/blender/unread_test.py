@@ -118,13 +118,14 @@ def test_what_is_no_mesh_is_told():
     _assert_warned_once(lambda _: link(bpy.data.hair_curves.new("fur"), "fur"), "fur", "hair curves", "left out")
 
 
-def test_subsurface_scattering_is_told_once_a_material():
+def test_subsurface_scattering_by_profiles_is_told_once_a_material():
     def scatter(_):
-        skin = new_material("skin", "ShaderNodeSubsurfaceScattering")[0]
+        skin, _, node = new_material("skin", "ShaderNodeSubsurfaceScattering")
+        node.falloff = "BURLEY"
         for x in (-2, 2):
             add_sphere(0.5, skin, (x, 0, 0.5))
 
-    _assert_warned_once(scatter, 'material "skin"', "subsurface scattering", "diffuse")
+    _assert_warned_once(scatter, 'material "skin"', "Christensen-Burley", "at random")
 
 
 def test_light_probes_are_nothing():

@@ -140,7 +140,7 @@ TEST(ClosureReader, EveryBrokenSurfaceGivesOneClearError)
       {{{"closures", {{{"type", "glossy"}, {"distribution", "phong"}}}}}, at + "/closures/0/distribution", "ggx"},
       {{{"closures", {{{"type", "glass"}, {"maths", "2.79"}}}}}, at + "/closures/0/maths", "3.4"},
       {{{"closures", {7}}}, at + "/closures/0", "an object"},
-      {{{"closures", many}}, at + "/closures/9", "64"},
+      {{{"closures", many}}, at + "/closures/7", "64"},
   };
   for (const BrokenSurface& one : broken) {
     try {

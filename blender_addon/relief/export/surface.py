@@ -573,9 +573,17 @@ def _toon(w, source, weight):
     w.add("toon", weight, **values, component=source.node.component.lower(), **_MATHS)
 
 
+def _subsurface_method(w, source, method):
+    """How light goes below a surface, by Blender's name of it."""
+    if method == "BURLEY":
+        w.unread(source, "Christensen-Burley subsurface scattering", "light walks at random as far, in its place")
+    return compat.SUBSURFACE_METHODS[method]
+
+
 def _subsurface(w, source, weight):
-    w.unread(source, "subsurface scattering", "a diffuse surface of its colour was used")
-    w.add("diffuse", weight, **w.inputs(source, {"Color": "color", "Normal": "normal"}), **_MATHS)
+    names = ("Color", "Radius", "Scale", "Roughness", "Anisotropy", "Normal")
+    values = w.inputs(source, {**{name: name.lower() for name in names}, "IOR": "ior"})
+    w.add("subsurface", weight, **values, method=_subsurface_method(w, source, source.node.falloff), **_MATHS)
 
 
 def _colored(what):
@@ -609,8 +617,6 @@ def _principled(w, source, weight):
     if weight == 0:
         return
     w.emit(source, socket("Emission"), socket("Emission Strength"), weight)
-    if w.graph.constant(socket("Subsurface"), groups) != 0:
-        w.unread(source, "subsurface scattering", "its colour was used as a diffuse one")
     wall = node.inputs.get("Thin Wall")  # since 5.2
     if wall is not None and w.graph.constant(wall, groups) != 0:
         w.unread(source, "a thin wall", "what bounds a solid was used")
@@ -618,6 +624,9 @@ def _principled(w, source, weight):
         w.transmits = True
     values = w.inputs(source, compat.PRINCIPLED_INPUTS)
     values.update(w.anisotropy(source, {"Anisotropic": "anisotropic", "Anisotropic Rotation": "anisotropicRotation"}))
+    if w.graph.constant(socket("Subsurface"), groups) != 0:
+        values.update(w.inputs(source, compat.SUBSURFACE_INPUTS))
+        values["subsurfaceMethod"] = _subsurface_method(w, source, node.subsurface_method)
     w.add("principled", weight, **values, distribution=_distribution(node), maths=compat.MATHS)
 
 

@@ -1,0 +1,23 @@
+// Stage: paths that have entered an object walk about in it until they leave.
+#pragma once
+
+#include "integrator/intersect_stage.h"
+
+namespace relief {
+
+/// Lets every path in the queue walk from where its ray starts, inside the object that it has hit last, through what its
+/// SubsurfaceState says. Those that get out have hit the object from the outside then, against the way that they came.
+/// @param left          gets these; the others end
+/// @param displacement  what these rays did is added to it
+/// @source  Chiang, Kutz, Burley 2016, "Practical and Controllable Subsurface Scattering for Production Path Tracing"; Křivánek and
+///          d'Eon 2014, "A Zero-variance-based Sampling Scheme for Monte Carlo Subsurface Scattering"; Meng, Hanika, Dachsbacher 2016,
+///          "Improving the Dwivedi Sampling Scheme"; d'Eon and Křivánek 2020, "Zero-Variance Theory for Efficient Subsurface
+///          Scattering"; put together as in Cycles
+void walk_below_surfaces(const KernelGlobals& g,
+                         const Accel& accel,
+                         PathState& state,
+                         const QueueView& queue,
+                         QueueView& left,
+                         DisplacementWork& displacement);
+
+}  // namespace relief

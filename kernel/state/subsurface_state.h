@@ -1,0 +1,14 @@
+// What paths keep while they are below a surface.
+#pragma once
+
+#include "kernel/bsdf/subsurface.h"
+
+namespace relief {
+
+struct SubsurfaceState {
+  Subsurface surface;  ///< as it is where they have entered
+  Vec3f N;             ///< shading normal there, world, outwards
+  bool is_4, is_5;     ///< see MixtureLobe
+};
+
+}  // namespace relief

@@ -1,0 +1,174 @@
+// Walks below surfaces, as whole renders: what comes out of a box is what walks of the plainest kind, in double precision, say.
+#include <array>
+#include <cmath>
+#include <random>
+
+#include "kernel/bsdf/subsurface.h"
+#include "tests/support/loaded_scene.h"
+#include "tests/support/render_scene.h"
+#include "tests/support/scene_builder.h"
+
+namespace relief::test {
+namespace {
+
+using nlohmann::json;
+
+/// A cube of the given side about the origin, counter-clockwise from outside.
+Mesh cube_mesh(float side)
+{
+  Mesh cube;
+  const float h = 0.5f * side;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const float sign : {-1.0f, 1.0f}) {
+      float n[3] = {}, u[3] = {}, v[3] = {};
+      n[axis] = sign * h;
+      u[(axis + 1) % 3] = side;
+      v[(axis + 2) % 3] = sign * side;
+      const Vec3f N{n[0], n[1], n[2]}, U{u[0], u[1], u[2]}, V{v[0], v[1], v[2]};
+      const Mesh face = quad_mesh(N - 0.5f * (U + V), U, V);
+      const auto first = static_cast<std::uint32_t>(cube.P.size());
+      cube.P.insert(cube.P.end(), face.P.begin(), face.P.end());
+      for (const TriangleIndices t : face.triangles) {
+        cube.triangles.push_back({first + t.v0, first + t.v1, first + t.v2});
+      }
+    }
+  }
+  return cube;
+}
+
+/// White surroundings, and a cube of side 1 before a camera that sees one face from straight above, all of it.
+/// @param closure  all that the cube's material is
+Scene cube_of(const json& closure)
+{
+  GltfBuilder b;
+  const std::vector<float> P{0, 0, 0, 1, 0, 0, 0, 1, 0};
+  b.mesh({{"attributes", {{"POSITION", b.accessor(P, "VEC3")}}}, {"material", 0}});
+  b.push("materials", {{"extensions", {{"RELIEF_surface", {{"closures", json::array({closure})}}}}}});
+  b.root_node({{"mesh", 0}});
+  Scene scene = load(b);
+  EXPECT_TRUE(scene.materials.front().scatters_below);
+  Mesh cube = cube_mesh(1);
+  cube.material_index = scene.meshes.front().material_index;
+  scene.meshes = {cube};
+  scene.environment = {};
+  scene.environment.color = {1, 1, 1};
+  scene.lights.clear();
+  scene.cameras = empty_scene().cameras;
+  Camera& camera = scene.cameras.front().camera;
+  camera.projection = Projection::kOrthographic;
+  camera.half_width = camera.half_height = 0.499f;
+  scene.render.filter = PixelFilter::kBox;
+  scene.render.filter_width = 1;
+  return scene;
+}
+
+/// Light that leaves the cube where the camera sees it, by walks that choose flights and directions as the medium does.
+/// @param free_path  metres, of an even medium
+double walked(double free_path, double single_albedo)
+{
+  constexpr int kWalks = 100000;
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> u(0, 1);
+  double sum = 0;
+  for (int walk = 0; walk < kWalks; ++walk) {
+    std::array<double, 3> P{u(random) - 0.5, u(random) - 0.5, 0.5};
+    double z = -std::sqrt(u(random));
+    double carried = 1;
+    for (int step = 0; step < 256; ++step) {
+      const double r = std::sqrt(1 - z * z), phi = 2 * M_PI * u(random);
+      const std::array<double, 3> D{r * std::cos(phi), r * std::sin(phi), z};
+      const double t = -free_path * std::log(1 - u(random));
+      bool is_out = false;
+      for (std::size_t i = 0; i < 3; ++i) {
+        P[i] += t * D[i];
+        is_out = is_out || std::abs(P[i]) > 0.5;
+      }
+      if (is_out) {
+        sum += carried;
+        break;
+      }
+      carried *= single_albedo;
+      z = 2 * u(random) - 1;
+    }
+  }
+  return sum / kWalks;
+}
+
+RenderOptions options_for(const Scene& scene)
+{
+  RenderOptions options = render_options(scene, 16, 64);
+  options.settings.max_bounces = 4;
+  return options;
+}
+
+TEST(Subsurface, WhatLeavesACubeIsWhatPlainWalksSay)
+{
+  // A 4π-th of the radius is the free path.
+  const Vec3f color{0.8f, 0.5f, 0.15f};
+  const double free_path[3] = {0.4, 0.1, 0.25};
+  json radius;
+  for (const double path : free_path) radius.push_back(path * 4 * M_PI);
+  const Scene scene =
+      cube_of({{"type", "subsurface"},
+                               {"method", "random-walk-legacy"},
+                               {"color", {color.x, color.y, color.z}},
+                               {"radius", radius}});
+  for (int channel = 0; channel < 3; ++channel) {
+    const float albedo = channel == 0 ? color.x : channel == 1 ? color.y : color.z;
+    const double single = static_cast<double>(subsurface_single_albedo(albedo, 0));
+    const double expected = walked(free_path[channel], single);
+    const Estimate found = estimate_mean(scene, options_for(scene), 8, channel);
+    // 5 standard errors, and those of the walks.
+    EXPECT_NEAR(found.mean, expected, 5 * found.standard_error + 0.005 * expected) << channel;
+    EXPECT_LT(found.standard_error, 0.01);
+  }
+}
+
+/// White things in white surroundings cannot be seen, whichever way light scatters in them.
+TEST(Subsurface, WhiteKeepsItsEnergy)
+{
+  for (const char* method : {"random-walk", "random-walk-legacy", "random-walk-skin"}) {
+    for (const char* maths : {"3.4", "4.3"}) {
+      for (const double anisotropy : {0.0, 0.7}) {
+        // Of white things skin takes a 577th of the radius for the free path, the older walk a 4π-th.
+        const double radius = method == std::string("random-walk-skin") ? 200 : 4;
+        const Scene scene = cube_of({{"type", "subsurface"},
+                                     {"maths", maths},
+                                     {"method", method},
+                                     {"color", {1, 1, 1}},
+                                     {"radius", {radius, radius, radius}},
+                                     {"anisotropy", anisotropy}});
+        const Estimate found = estimate_mean(scene, options_for(scene), 4);
+        // A thousandth of the walks are longer than 256 steps, where paths are short.
+        EXPECT_NEAR(found.mean, 1, 5 * found.standard_error + 0.002) << method << " " << maths << " " << anisotropy;
+      }
+    }
+  }
+}
+
+/// Paths go below at most once, and photons do not: then the surface is diffuse.
+TEST(Subsurface, RadiiOfNothingAreDiffuse)
+{
+  const Scene below =
+      cube_of({{"type", "subsurface"}, {"color", {0.6, 0.6, 0.6}}, {"radius", {0, 0, 0}}});
+  const Estimate found = estimate_mean(below, options_for(below), 4);
+  EXPECT_NEAR(found.mean, 0.6, 5 * found.standard_error + 1e-4);
+}
+
+/// What stands in the object is passed, and its like as well.
+TEST(Subsurface, PathsKnowNoOtherObject)
+{
+  const json wax{{"type", "subsurface"}, {"color", {0.7, 0.7, 0.7}}, {"radius", {0.4, 0.4, 0.4}}};
+  const Scene alone = cube_of(wax);
+  Scene filled = cube_of(wax);
+  Instance inner = filled.instances.front();
+  inner.world_from_object.x *= 0.5f;
+  inner.world_from_object.y *= 0.5f;
+  inner.world_from_object.z *= 0.5f;
+  filled.instances.push_back(inner);
+  const Rendered a = render_scene(alone, options_for(alone)), b = render_scene(filled, options_for(filled));
+  EXPECT_NEAR(a.mean(), b.mean(), 1e-3 * a.mean());
+}
+
+}  // namespace
+}  // namespace relief::test
