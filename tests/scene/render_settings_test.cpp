@@ -100,7 +100,7 @@ TEST(RenderSettingsList, WhatIsReadIsShown)
   const json said = json::parse(R"({
     "resolution": [640, 480], "samples": 9, "noiseThreshold": 0.01, "noiseMaths": "3.4", "minSamples": 8,
     "filterGlossy": 0.5, "clampDirect": 4, "maxBounces": 5, "diffuseBounces": 4,
-    "glossyBounces": 3, "transmissionBounces": 2, "transparentBounces": 7, "seed": 9007199254740991, "view": "Filmic",
+    "glossyBounces": 3, "transmissionBounces": 2, "volumeBounces": 1, "transparentBounces": 7, "seed": 9007199254740991, "view": "Filmic",
     "exposure": -1, "clampIndirect": 3, "filmExposure": 2, "frameRange": [-2, 8], "fps": 29.97,
     "pixelFilter": {"type": "box", "width": 2}, "luminousEfficacy": 683, "caustics": {"mode": "on", "kinds": "none", "photons": 1000,
     "alpha": 0.7, "radius": 0.1, "memory": 64}, "mist": {"start": 1, "depth": 2, "falloff": "linear"},
