@@ -50,7 +50,7 @@ def compare_trees(builders):
     """Result by what the builders are keyed by."""
     side = graph_test._SIDE
     scene = new_scene(side, side)
-    materials = [graph_test._emitter(str(name), build, 1) for name, build in builders.items()]
+    materials = [graph_test._emitter(str(name), build) for name, build in builders.items()]
     graph_test._sheet(materials, -2.0, 2.0).location = (-side / 2, -side / 2, 0)
     add_camera((0, 0, 10), type="ORTHO", ortho_scale=side)
     with folder() as path:
