@@ -146,7 +146,7 @@ TEST(Subsurface, WhiteKeepsItsEnergy)
   }
 }
 
-/// Paths go below at most once, and photons do not: then the surface is diffuse.
+/// Channels whose radius is nothing have nothing to walk in.
 TEST(Subsurface, RadiiOfNothingAreDiffuse)
 {
   const Scene below =
