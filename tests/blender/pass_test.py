@@ -43,11 +43,11 @@ def _name(name):
     return compat.pass_name(name)
 
 
-def _stage():
+def _stage(segments=64):
     scene = new_scene()
     set_world((0.3, 0.4, 0.5))
     add_plane(5, diffuse((0.6, 0.4, 0.2)))
-    add_sphere(1.0, diffuse((0.2, 0.7, 0.3)), (0.2, 0.3, 1), segments=64)
+    add_sphere(1.0, diffuse((0.2, 0.7, 0.3)), (0.2, 0.3, 1), segments=segments)
     add_light("SUN", rotation=degrees(30, 20, 0), energy=2, angle=0)
     add_camera((1, -5, 3), degrees(62, 0, 12), lens=30)
     return scene
@@ -161,7 +161,8 @@ def _assert_blocks_agree(setting, names, tolerance, owner=None, stage=_stage, sa
 
 def test_denoised():
     """Combined is denoised, Noisy Image as without; the error that it claims is the difference to a clean picture."""
-    scene = _stage()
+    # Blender sums the normals of more than 1,024 faces in several threads: their last bits are others from time to time.
+    scene = _stage(segments=32)
     name = f"{scene.view_layers[0].name}."
     plain = passes(scene, "RELIEF", 4)
     assert name + "Noisy Image.R" not in plain
