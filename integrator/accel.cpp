@@ -87,6 +87,25 @@ Box3 points_box(std::span<const Vec3f> points, const Affine3& m)
   return box;
 }
 
+/// Box of a mesh in its own space. A segment of a curve stays within the four points that it has as a cubic of Bézier's, and so does
+/// its radius.
+Box3 mesh_box(const TreeMesh& mesh, const std::vector<Vec3f>& P)
+{
+  Box3 box = points_box(P, {});
+  if (mesh.radius.empty()) return box;
+  float widest = 0;
+  for (const TriangleIndices& ends : mesh.triangles) {
+    const std::uint32_t v = ends.v0;
+    for (const Vec3f inner : {P[v] + (P[v + 1] - P[v - 1]) / 6.0f, P[v + 1] - (P[v + 2] - P[v]) / 6.0f}) {
+      box = box_union(box, {inner, inner});
+    }
+    const auto& r = mesh.radius;
+    widest =
+        std::max({widest, r[v], r[v + 1], r[v] + (r[v + 1] - r[v - 1]) / 6.0f, r[v + 1] - (r[v + 2] - r[v]) / 6.0f});
+  }
+  return {box.low - splat3(widest), box.high + splat3(widest)};
+}
+
 /// Whether a light is so far away that boxes as wide as its distance asks for would be much larger than the things in them:
 /// soft suns are. Rays that start beyond the things are moved near, and look for such lights before.
 /// @param things  box of all that is not far away
@@ -128,6 +147,8 @@ void hash_triangles(const TreeMesh& mesh, ContentHasher* hash)
   hash->add(mesh.steps.size());
   for (const std::vector<Vec3f>* P : mesh.steps) hash->add_array(P->data(), P->size());
   hash->add_array(mesh.triangles.data(), mesh.triangles.size());
+  hash->add_array(mesh.radius.data(), mesh.radius.size());
+  hash->add(mesh.are_ribbons);
 }
 
 void hash_transform(const Affine3& m, ContentHasher* hash)
@@ -158,12 +179,12 @@ Accel::Accel(const Scene& scene,
 {
   for (std::size_t d = 0; d < displacements.size(); ++d) displacements.geometry(d).shadow_filter = nullptr;
   for (const Mesh& mesh : scene.meshes) {
-    meshes_.emplace_back().mesh = {mesh.name, &mesh.P, {}, mesh.triangles};
+    meshes_.emplace_back().mesh = {mesh.name, &mesh.P, {}, mesh.triangles, mesh.radius, mesh.are_ribbons};
     for (const MeshStep& step : mesh.steps) meshes_.back().mesh.steps.push_back(&step.P);
   }
   for (const MovedMesh& moved : displacements.moved()) {
     const MeshView& mesh = views_->meshes[meshes_.size()];
-    meshes_.emplace_back().mesh = {moved.name, &moved.P, {}, {mesh.triangles, mesh.num_triangles}};
+    meshes_.emplace_back().mesh = {moved.name, &moved.P, {}, {mesh.triangles, mesh.num_triangles}, {}};
     for (const MovedShape& step : moved.steps) meshes_.back().mesh.steps.push_back(&step.P);
   }
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
@@ -251,8 +272,8 @@ void Accel::place_instances(const Scene& scene,
 {
   for (MeshUse& use : meshes_) {
     if (!use.has_tree()) continue;
-    use.box = points_box(*use.mesh.P, {});
-    for (const std::vector<Vec3f>* P : use.mesh.steps) use.box = box_union(use.box, points_box(*P, {}));
+    use.box = mesh_box(use.mesh, *use.mesh.P);
+    for (const std::vector<Vec3f>* P : use.mesh.steps) use.box = box_union(use.box, mesh_box(use.mesh, *P));
   }
   scene_ = std::make_unique<SceneTree>();
   Box3 box = box_empty();
@@ -308,7 +329,10 @@ void Accel::build_meshes()
     use.tree = trees_->mesh_tree(content, [&] {
       // Spatial splits of HIGH quality would call the shadow filter twice for one triangle.
       TreePointer tree = trees_->scene_make(use.transparent ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
-      attach(tree.get(), new_mesh(use.mesh, nullptr, use.transparent), 0, ~0u);
+      attach(tree.get(),
+             use.mesh.radius.empty() ? new_mesh(use.mesh, nullptr, use.transparent)
+                                     : new_curves(use.mesh, use.transparent),
+             0, ~0u);
       attach_corners(tree.get(), use.box, use.pad);
       commit(tree.get());
       return tree;
@@ -500,6 +524,49 @@ RTCGeometry Accel::new_mesh(const TreeMesh& mesh, const Affine3* world_from_obje
                                                   sizeof(TriangleIndices), mesh.triangles.size());
     if (indices == nullptr) throw OutOfMemory("the triangles of mesh '" + std::string(mesh.name) + "'");
     std::memcpy(indices, mesh.triangles.data(), mesh.triangles.size() * sizeof(TriangleIndices));
+  }
+  if (transparent) rtcSetGeometryOccludedFilterFunction(geometry, shadow_filter_);
+  return geometry;
+}
+
+/// Lets rays out of tubes: they are met from outside only, as in Cycles.
+void tube_filter(const RTCFilterFunctionNArguments* arguments)
+{
+  for (unsigned i = 0; i < arguments->N; ++i) {
+    const Vec3f D{RTCRayN_dir_x(arguments->ray, arguments->N, i), RTCRayN_dir_y(arguments->ray, arguments->N, i),
+                  RTCRayN_dir_z(arguments->ray, arguments->N, i)};
+    const Vec3f Ng{RTCHitN_Ng_x(arguments->hit, arguments->N, i), RTCHitN_Ng_y(arguments->hit, arguments->N, i),
+                   RTCHitN_Ng_z(arguments->hit, arguments->N, i)};
+    if (dot(D, Ng) > 0.0f) arguments->valid[i] = 0;
+  }
+}
+
+RTCGeometry Accel::new_curves(const TreeMesh& mesh, bool transparent)
+{
+  RTCGeometry geometry = rtcNewGeometry(trees_->device(), mesh.are_ribbons ? RTC_GEOMETRY_TYPE_FLAT_CATMULL_ROM_CURVE
+                                                                           : RTC_GEOMETRY_TYPE_ROUND_CATMULL_ROM_CURVE);
+  const auto refused = [&] { return OutOfMemory("the curves of mesh '" + std::string(mesh.name) + "'"); };
+  const auto set_vertices = [&](unsigned step, const std::vector<Vec3f>& P) {
+    auto* vertices = static_cast<Vec4f*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT4, sizeof(Vec4f), P.size()));
+    if (vertices == nullptr) throw refused();
+    for (std::size_t i = 0; i < P.size(); ++i) vertices[i] = {P[i].x, P[i].y, P[i].z, mesh.radius[i]};
+  };
+  if (mesh.steps.empty()) {
+    set_vertices(0, *mesh.P);
+  } else {
+    rtcSetGeometryTimeStepCount(geometry, static_cast<unsigned>(mesh.steps.size()));
+    for (std::size_t step = 0; step < mesh.steps.size(); ++step) {
+      set_vertices(static_cast<unsigned>(step), *mesh.steps[step]);
+    }
+  }
+  auto* first = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT,
+                                                                    sizeof(std::uint32_t), mesh.triangles.size()));
+  if (first == nullptr) throw refused();
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) first[i] = mesh.triangles[i].v0 - 1;
+  if (!mesh.are_ribbons) {
+    rtcSetGeometryIntersectFilterFunction(geometry, tube_filter);
+    rtcSetGeometryOccludedFilterFunction(geometry, tube_filter);
   }
   if (transparent) rtcSetGeometryOccludedFilterFunction(geometry, shadow_filter_);
   return geometry;

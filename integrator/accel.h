@@ -29,11 +29,13 @@ struct TreeMesh {
   const std::vector<Vec3f>* P = nullptr;  ///< object space
   std::vector<const std::vector<Vec3f>*> steps;  ///< P at evenly spaced times; none: it does not deform
   std::span<const TriangleIndices> triangles;
+  std::span<const float> radius;  ///< of curves, see Mesh; empty: these are triangles
+  bool are_ribbons = false;
 };
 
 /// Builds and owns the acceleration structure. Meshes that occur once are placed in world space; a mesh that occurs more
 /// often, or is displaced, has one scene of its own and instances of it: Embree's, or where single precision would not do,
-/// those of instance_geometry.h. So has one that moves or deforms while the shutter is open, with instances of the latter,
+/// those of instance_geometry.h. So have curves; and one that moves or deforms while the shutter is open, with instances of the latter,
 /// as have displaced meshes that are not tessellated.
 class Accel {
  public:
@@ -87,6 +89,7 @@ class Accel {
   ContentHash top_content(const Scene& scene,
                           std::span<const Light> lights,
                           std::span<const std::uint32_t> area_lights) const;
+  RTCGeometry new_curves(const TreeMesh& mesh, bool transparent);
   RTCGeometry new_mesh(const TreeMesh& mesh, const Affine3* world_from_object, bool transparent);
   void attach_corners(RTCScene target, const Box3& box, Vec3f pad, bool quads = false);
   RTCGeometry new_instance(RTCScene instanced, const Affine3& world_from_object);
@@ -106,7 +109,7 @@ class Accel {
     Vec3f pad;                 ///< by which it is enlarged
     TreePointer tree;          ///< null: it is in place
 
-    bool has_tree() const { return count > 1 || takes_time; }
+    bool has_tree() const { return count > 1 || takes_time || !mesh.radius.empty(); }
   };
 
   const MeshUse& use_of(std::size_t instance) const

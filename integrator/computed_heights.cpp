@@ -38,6 +38,9 @@ bool is_linear(GraphQuantity q)
     case Q::window_x:
     case Q::window_y:
     case Q::edge_distance:
+    case Q::tangent_normal_x:
+    case Q::tangent_normal_y:
+    case Q::tangent_normal_z:
     case Q::parametric_x:
     case Q::parametric_y:
       return false;
@@ -317,6 +320,9 @@ GraphRange other_range(const OnTriangle& on, const GraphInput& input, const Weig
     case Q::window_x:
     case Q::window_y:
     case Q::edge_distance:
+    case Q::tangent_normal_x:
+    case Q::tangent_normal_y:
+    case Q::tangent_normal_z:
       return range_unknown();
     default:
       break;

@@ -124,9 +124,9 @@ std::vector<EmissiveMesh> emissive_meshes(const Scene& scene, LightSet& set)
     if (triangles(instance) == 0 ||
         !material_is_light(scene.materials[static_cast<std::size_t>(instance.material_index)]))
       continue;
-    // What moves is left to paths: there is no light where it is at their time.
-    if (instance.motion_index >= 0 || !scene.meshes[static_cast<std::size_t>(instance.mesh_index)].steps.empty())
-      continue;
+    // What moves is left to paths: there is no light where it is at their time. So are curves.
+    const Mesh& mesh = scene.meshes[static_cast<std::size_t>(instance.mesh_index)];
+    if (instance.motion_index >= 0 || !mesh.steps.empty() || !mesh.radius.empty()) continue;
     emissive.push_back(i);
     set.num_emissive_triangles += triangles(instance);
   }

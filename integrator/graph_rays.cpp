@@ -4,12 +4,12 @@
 #include <bit>
 #include <cmath>
 
+#include "integrator/ray_surface.h"
 #include "integrator/scene_context.h"
 #include "kernel/math/rounding.h"
 #include "kernel/math/trigonometry.h"
 #include "kernel/sample/sobol.h"
 #include "kernel/sample/warp.h"
-#include "kernel/shape/surface_hit.h"
 
 namespace relief {
 namespace {
@@ -112,7 +112,7 @@ MetSurface met_surface(const SceneContext& context, unsigned object, const RTCRa
     if (deforms) mesh = motion.mesh_at(instance, mesh, ray.ray.time);
   }
   if ((instance.flags & kDisplaced) == 0) {
-    const SurfaceHit hit = surface_hit_make(mesh, instance, ray.hit.primID, ray.hit.u, ray.hit.v);
+    const SurfaceHit hit = surface_hit_of_ray(mesh, instance, ray);
     return {hit.P, hit.Ng, hit.Ns};
   }
   const DisplacedPoint at = context.displacements.resolve(object, instance, ray.hit.primID,

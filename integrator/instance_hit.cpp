@@ -1,6 +1,6 @@
 #include "integrator/instance_hit.h"
 
-#include "kernel/shape/surface_hit.h"
+#include "integrator/ray_surface.h"
 
 namespace relief {
 
@@ -17,7 +17,7 @@ Vec3f hit_normal(const SceneContext& context, const RTCRayHit& ray, unsigned obj
   }
   const MeshView mesh =
       context.motion.mesh_at(instance, context.meshes[static_cast<std::size_t>(instance.mesh_index)], ray.ray.time);
-  return surface_hit_make(mesh, instance, ray.hit.primID, ray.hit.u, ray.hit.v).Ng;
+  return surface_hit_of_ray(mesh, instance, ray).Ng;
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include "integrator/media.h"
 #include "integrator/path_lod.h"
+#include "integrator/ray_surface.h"
 #include "kernel/graph/graph_material.h"
 #include "kernel/math/rounding.h"
 #include "kernel/sample/dimensions.h"
@@ -403,6 +404,15 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
         instance_id != RTC_INVALID_GEOMETRY_ID ? instance_id : RTCHitN_geomID(arguments->hit, arguments->N, i);
     const float time = RTCRayN_time(arguments->ray, arguments->N, i);
     const InstanceView& centre = g.instances[object];
+    // Tubes are met from outside only.
+    if ((centre.flags & (kCurves | kRibbons)) == kCurves) {
+      const RTCHit hit = rtcGetHitFromHitN(arguments->hit, arguments->N, i);
+      const RTCRay ray = rtcGetRayFromRayN(arguments->ray, arguments->N, i);
+      if (ray.dir_x * hit.Ng_x + ray.dir_y * hit.Ng_y + ray.dir_z * hit.Ng_z > 0.0f) {
+        arguments->valid[i] = 0;
+        continue;
+      }
+    }
     const bool moves = (centre.flags & (kMoves | kDeforms)) != 0;
     const InstanceView instance = moves ? context->motion->instance_at(centre, time) : centre;
     DisplacedPoint at{RTCHitN_primID(arguments->hit, arguments->N, i), RTCHitN_u(arguments->hit, arguments->N, i),
@@ -410,20 +420,24 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
     if ((instance.flags & kDisplaced) != 0) at = context->displacements->locate(object, at.triangle, at.u, at.v);
     const Material& material = g.materials[instance.material_index];
     const MeshView mesh = context->motion->mesh_at(instance, g.meshes[instance.mesh_index], time);
+    // A far ray starts elsewhere.
+    const auto t = static_cast<float>(static_cast<double>(RTCRayN_tfar(arguments->ray, arguments->N, i)) +
+                                      context->embree.far_start.t);
+    const auto hit_make = [&] {
+      return surface_hit_at(mesh, instance, at.triangle, at.u, at.v, context->O, context->D, t);
+    };
     if (material.medium_index >= 0) {
-      const SurfaceHit hit = surface_hit_make(mesh, instance, at.triangle, at.u, at.v);
-      // A far ray starts elsewhere.
-      const double t = static_cast<double>(RTCRayN_tfar(arguments->ray, arguments->N, i)) + context->embree.far_start.t;
+      const SurfaceHit hit = hit_make();
       context->boundaries->push_back(
-          {static_cast<float>(t), static_cast<std::int32_t>(object), at.triangle, dot(context->D, hit.Ng) < 0.0f});
+          {t, static_cast<std::int32_t>(object), at.triangle, dot(context->D, hit.Ng) < 0.0f});
     }
     Vec3f passes;
     if (material.transparency_index >= 0) {
-      const SurfaceHit hit = surface_hit_make(mesh, instance, at.triangle, at.u, at.v);
+      const SurfaceHit hit = hit_make();
       passes = graph_transparency(g.run_graph, g.graphs[material.transparency_index], g.textures,
                                   shadow_graph_point(*context, mesh, instance, at, hit));
     } else if ((material.graph_outputs >> static_cast<int>(GraphOutput::alpha) & 1u) != 0) {
-      const SurfaceHit hit = surface_hit_make(mesh, instance, at.triangle, at.u, at.v);
+      const SurfaceHit hit = hit_make();
       passes = splat3(1.0f - graph_alpha(material, g.run_graph, g.graphs[material.graph_index], g.textures,
                                          shadow_graph_point(*context, mesh, instance, at, hit)));
     } else {

@@ -15,7 +15,9 @@ SceneViews::SceneViews(const Scene& scene) : motion(scene)
     view.flags = instance.flags;
     view.index = static_cast<std::uint32_t>(instances.size());
     if (instance.motion_index >= 0) view.flags |= kMoves;
-    if (!scene.meshes[static_cast<std::size_t>(instance.mesh_index)].steps.empty()) view.flags |= kDeforms;
+    const Mesh& mesh = scene.meshes[static_cast<std::size_t>(instance.mesh_index)];
+    if (!mesh.steps.empty()) view.flags |= kDeforms;
+    if (!mesh.radius.empty()) view.flags |= kCurves | kTracedInObjectSpace | (mesh.are_ribbons ? kRibbons : 0u);
     const bool takes_time = (view.flags & (kMoves | kDeforms)) != 0;
     if (takes_time || uses[static_cast<std::size_t>(instance.mesh_index)] > 1) view.flags |= kTracedInObjectSpace;
     instances.push_back(view);

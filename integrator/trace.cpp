@@ -10,8 +10,8 @@
 #include "integrator/media.h"
 #include "integrator/photon_benefit.h"
 #include "integrator/photon_pass.h"
+#include "integrator/ray_surface.h"
 #include "integrator/stages.h"
-#include "kernel/shape/surface_hit.h"
 
 namespace relief {
 
@@ -71,7 +71,7 @@ TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits
         context.motion.mesh_at(instance, context.meshes[static_cast<std::size_t>(instance.mesh_index)], kTraceTime);
     const SurfaceHit surface = displaced ? surface_hit_displaced(mesh, instance, point.triangle, point.u, point.v,
                                                                  {point.P, point.Ng, point.Ns, point.leave})
-                                         : surface_hit_make(mesh, instance, point.triangle, point.u, point.v);
+                                         : surface_hit_of_ray(mesh, instance, query);
     result.hit = true;
     result.t = scaled(query.ray.tfar, -1);
     result.P = surface.P;

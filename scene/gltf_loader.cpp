@@ -311,7 +311,9 @@ void GltfLoader::place_instance(const PlacedNode& node,
   instance.name = name.substr(0, kLongestName);
   instance.asset = node.object.asset.substr(0, kLongestName);
   instance.mesh_index = primitive.mesh_index;
+  const bool is_curves = !scene_.meshes[static_cast<std::size_t>(primitive.mesh_index)].radius.empty();
   instance.material_index = placed_material(node, primitive.material_index);
+  if (is_curves) instance.material_index = material_of_curves(instance.material_index);
   instance.world_from_object = transform_to_affine(world);
   instance.flags =
       instance_flags(node.object, scene_.materials[static_cast<std::size_t>(instance.material_index)], world);
@@ -320,6 +322,8 @@ void GltfLoader::place_instance(const PlacedNode& node,
     warnings_.add(node.document->file + ": " + path +
                   ": its material depends on the kind of ray, so that it casts no caustics of photons");
   }
+  // Paths alone bring light to curves and from them.
+  if (is_curves) instance.flags &= ~std::uint32_t{kCausticCaster | kCausticReceiver};
   const Affine3 inverse_of_it = inverse(instance.world_from_object);
   if (!(max_component(max(abs(inverse_of_it.x), max(abs(inverse_of_it.y), abs(inverse_of_it.z)))) <= kFarthest)) {
     warnings_.add(node.document->file + ": " + path + ": scaled to less than 1e-15" +
@@ -349,6 +353,23 @@ void GltfLoader::place_instance(const PlacedNode& node,
   check_displacement(node, instance);
   memory_.add(sizeof(Instance), node.document->file + ": instances");
   scene_.instances.push_back(std::move(instance));
+}
+
+/// A material as curves have it: they are not displaced, and there is nothing in them.
+int GltfLoader::material_of_curves(int own)
+{
+  const Material& material = scene_.materials[static_cast<std::size_t>(own)];
+  if (material.displacement_index < 0 && material.medium_index < 0) return own;
+  const auto [it, is_new] = material_of_curves_.try_emplace(own, static_cast<int>(scene_.materials.size()));
+  if (is_new) {
+    Material bare = material;
+    bare.displacement_index = -1;
+    bare.medium_index = -1;
+    bare.is_boundary = false;
+    scene_.materials.push_back(bare);
+    scene_.material_names.push_back(scene_.material_names[static_cast<std::size_t>(own)]);
+  }
+  return it->second;
 }
 
 int GltfLoader::placed_material(const PlacedNode& node, int own)
@@ -592,8 +613,13 @@ int GltfLoader::mesh_of(const GltfDocument& document,
   const tinygltf::Primitive& primitive = source.primitives[static_cast<std::size_t>(primitive_index)];
   const int tangent_uv_set = normal_map_uv_set(scene_.materials[static_cast<std::size_t>(material_index)]);
   const std::vector<std::uint16_t> columns = attributes_of(scene_.materials[static_cast<std::size_t>(material_index)]);
+  std::string curves;  // what else makes one mesh of the same accessors differ from another
+  document.read_extension(document.element("meshes", static_cast<std::size_t>(mesh_index))
+                              .at("primitives")
+                              .at(static_cast<std::size_t>(primitive_index)),
+                          "", "RELIEF_curves", [&](const JsonReader& r) { curves = "," + r.string("shape", ""); });
   const auto [it, is_new] = mesh_of_.try_emplace({&document, primitive.attributes, primitive.indices, primitive.mode,
-                                                  tangent_uv_set, primitive.targets, morph, columns},
+                                                  curves, tangent_uv_set, primitive.targets, morph, columns},
                                                  -1);
   if (!is_new) {
     return it->second;

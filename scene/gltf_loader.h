@@ -60,7 +60,9 @@ class GltfLoader {
   struct MeshSource {
     const GltfDocument* document = nullptr;
     std::map<std::string, int> attributes;  ///< accessors
-    int indices = -1, mode = 0, tangent_uv_set = -1;
+    int indices = -1, mode = 0;
+    std::string curves;  ///< their shape, if these are some
+    int tangent_uv_set = -1;
     std::vector<std::map<std::string, int>> targets;  ///< accessors
     MorphWeights morph;
     std::vector<std::uint16_t> columns;  ///< that its material's graph reads
@@ -118,6 +120,7 @@ class GltfLoader {
   /// Of a primitive where it stands, after what references say about it.
   /// @param own  index of its own material
   int placed_material(const PlacedNode& node, int own);
+  int material_of_curves(int own);
 
   Warnings& warnings_;
   Scene scene_;
@@ -136,6 +139,7 @@ class GltfLoader {
   std::map<std::pair<const GltfDocument*, int>, std::map<MorphWeights, std::vector<Primitive>>> primitives_of_;
   std::map<MeshSource, int> mesh_of_;  ///< −1: a primitive without a triangle
   std::map<std::pair<const GltfDocument*, int>, int> material_of_;
+  std::map<int, int> material_of_curves_;  ///< by the material of the file
   std::map<const GltfDocument*, LightUnits> light_units_of_;
   std::map<std::pair<const GltfDocument*, std::string>, int> lamp_graph_of_;  ///< by the path of the graph
   DocumentSet documents_;

@@ -245,6 +245,65 @@ void read_attributes(const PrimitiveReader& reader,
   }
 }
 
+enum class CurveShape : std::uint8_t { kTubes, kRibbons };
+
+/// What RELIEF_curves says of a primitive; empty: it has none.
+std::optional<CurveShape> read_curve_shape(const PrimitiveReader& reader, const nlohmann::json& json)
+{
+  std::optional<CurveShape> shape;
+  const int mode = reader.primitive.mode;
+  reader.document.read_extension(json, reader.path, "RELIEF_curves", [&](const JsonReader& r) {
+    if (mode != TINYGLTF_MODE_LINE && mode != TINYGLTF_MODE_LINE_LOOP && mode != TINYGLTF_MODE_LINE_STRIP) {
+      throw SceneError(reader.document.file, reader.path + "/mode", "lines (1, 2 or 3), as curves are",
+                       std::to_string(mode));
+    }
+    constexpr std::string_view kShapes[] = {"ribbons", "tubes"};
+    shape = r.choice("shape", kShapes, 0) == 0 ? CurveShape::kRibbons : CurveShape::kTubes;
+    r.warn_unread(reader.warnings);
+  });
+  return shape;
+}
+
+/// _RADIUS of the vertices [first, first + count).
+std::vector<float> read_radii(const PrimitiveReader& reader,
+                              std::size_t num_file_vertices,
+                              std::size_t first,
+                              std::size_t count)
+{
+  const auto view = reader.open("_RADIUS", 1, 1, num_file_vertices);
+  if (!view) throw SceneError(reader.document.file, reader.attribute_path("_RADIUS"), "an accessor", "nothing");
+  std::vector<float> out(count);
+  if (count > 0) accessor_read_floats(*view, first, count, out.data());
+  const auto least = std::min_element(out.begin(), out.end());
+  if (least != out.end() && *least < 0) {
+    throw SceneError(reader.document.file, reader.attribute_path("_RADIUS"), "radii of at least 0",
+                     std::to_string(*least) + " at position " +
+                         std::to_string(static_cast<std::size_t>(least - out.begin()) + first));
+  }
+  return out;
+}
+
+/// How the segments of a primitive's lines are joined: a curve for each run in which one begins where the one before ended.
+std::vector<std::vector<std::uint32_t>> assemble_curves(const PrimitiveReader& reader,
+                                                        const std::vector<std::uint32_t>& corner)
+{
+  const std::size_t n = corner.size();
+  std::vector<std::vector<std::uint32_t>> curves;
+  if (reader.primitive.mode != TINYGLTF_MODE_LINE) {
+    curves.push_back(corner);
+    if (reader.primitive.mode == TINYGLTF_MODE_LINE_LOOP) curves.back().push_back(corner.front());
+    return curves;
+  }
+  if (n % 2 != 0) {
+    throw SceneError(reader.document.file, reader.path, "a multiple of 2 corners", std::to_string(n));
+  }
+  for (std::size_t i = 0; i < n; i += 2) {
+    if (curves.empty() || curves.back().back() != corner[i]) curves.push_back({corner[i]});
+    curves.back().push_back(corner[i + 1]);
+  }
+  return curves;
+}
+
 /// Name of columns that are the positions and normals of one step after the other, until the mesh has its last vertices: whatever
 /// copies or drops vertices does so with them.
 constexpr std::uint16_t kStepColumn = 0xffff;
@@ -386,6 +445,66 @@ void keep(std::vector<T>& values, const std::vector<std::uint32_t>& kept)
   values = std::move(out);
 }
 
+/// Puts vertices in another order; some may stand there more than once, others not at all.
+void reorder_vertices(const std::vector<std::uint32_t>& kept, Mesh& mesh)
+{
+  keep(mesh.P, kept);
+  keep(mesh.N, kept);
+  keep(mesh.tangent, kept);
+  keep(mesh.color, kept);
+  keep(mesh.generated, kept);
+  keep(mesh.radius, kept);
+  for (AttributeColumn& column : mesh.columns) {
+    const auto n = static_cast<std::uint32_t>(column.num_components);
+    std::vector<std::uint32_t> numbers;
+    for (const std::uint32_t v : kept) {
+      for (std::uint32_t c = 0; c < n; ++c) numbers.push_back(v * n + c);
+    }
+    keep(column.values, numbers);
+  }
+  for (std::vector<Vec2f>& uv : mesh.uv) {
+    keep(uv, kept);
+  }
+}
+
+/// Lays out a mesh's vertices along its curves, see Mesh.
+/// @param first  number in the file of the mesh's first vertex
+void lay_out_curves(const PrimitiveReader& reader,
+                    const std::vector<std::vector<std::uint32_t>>& curves,
+                    std::uint32_t first,
+                    Mesh& mesh)
+{
+  std::vector<std::uint32_t> order;
+  std::size_t num_dropped = 0;
+  for (const std::vector<std::uint32_t>& curve : curves) {
+    // Points where the one before is give no direction.
+    std::vector<std::uint32_t> points;
+    bool is_wide = false;
+    for (const std::uint32_t corner : curve) {
+      const std::uint32_t v = corner - first;
+      is_wide = is_wide || mesh.radius[v] > 0;
+      if (points.empty() || mesh.P[points.back()] != mesh.P[v]) points.push_back(v);
+    }
+    if (points.size() < 2 || !is_wide) {
+      ++num_dropped;
+      continue;
+    }
+    const auto begin = static_cast<std::uint32_t>(order.size()) + 1;
+    order.push_back(points.front());
+    order.insert(order.end(), points.begin(), points.end());
+    order.push_back(points.back());
+    for (std::uint32_t i = 0; i + 1 < points.size(); ++i) {
+      mesh.triangles.push_back({begin + i, begin + i + 1, begin + i});
+    }
+  }
+  if (num_dropped > 0) reader.warn(std::to_string(num_dropped) + " curves without a length or a width dropped");
+  if (order.size() > kMostElements) {
+    throw SceneError(reader.document.file, reader.path,
+                     "at most " + std::to_string(kMostElements) + " vertices of curves", std::to_string(order.size()));
+  }
+  reorder_vertices(order, mesh);
+}
+
 /// Drops the vertices that no triangle has, where they are the most: many primitives may share one large accessor.
 void drop_unused_vertices(Mesh& mesh)
 {
@@ -409,22 +528,7 @@ void drop_unused_vertices(Mesh& mesh)
   for (TriangleIndices& t : mesh.triangles) {
     t = {new_index[t.v0], new_index[t.v1], new_index[t.v2]};
   }
-  keep(mesh.P, kept);
-  keep(mesh.N, kept);
-  keep(mesh.tangent, kept);
-  keep(mesh.color, kept);
-  keep(mesh.generated, kept);
-  for (AttributeColumn& column : mesh.columns) {
-    const auto n = static_cast<std::uint32_t>(column.num_components);
-    std::vector<std::uint32_t> numbers;
-    for (const std::uint32_t v : kept) {
-      for (std::uint32_t c = 0; c < n; ++c) numbers.push_back(v * n + c);
-    }
-    keep(column.values, numbers);
-  }
-  for (std::vector<Vec2f>& uv : mesh.uv) {
-    keep(uv, kept);
-  }
+  reorder_vertices(kept, mesh);
 }
 
 }  // namespace
@@ -467,7 +571,11 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
   PrimitiveReader reader{document, source.primitives[static_cast<std::size_t>(primitive_index)],
                          mesh_path + "/primitives/" + std::to_string(primitive_index), "", warnings};
   reader.label = reader.path + (source.name.empty() ? "" : " (" + source.name + ')');
-  if (reader.primitive.mode < TINYGLTF_MODE_TRIANGLES) {
+  const std::optional<CurveShape> curves =
+      read_curve_shape(reader, document.element("meshes", static_cast<std::size_t>(mesh_index))
+                                   .at("primitives")
+                                   .at(static_cast<std::size_t>(primitive_index)));
+  if (reader.primitive.mode < TINYGLTF_MODE_TRIANGLES && !curves) {
     reader.warn("points and lines are not rendered");
     return {};
   }
@@ -489,7 +597,7 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
   mesh.name = source.name;
   {
     const std::vector<std::uint32_t> corners = read_corners(reader, positions.count);
-    mesh.triangles = assemble_triangles(reader, corners);
+    if (!curves) mesh.triangles = assemble_triangles(reader, corners);
     const auto [lowest, highest] = std::minmax_element(corners.begin(), corners.end());
     const std::uint32_t first = *lowest;
     for (TriangleIndices& t : mesh.triangles) {
@@ -498,14 +606,32 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
     const std::size_t num_vertices = *highest - first + 1;
     constexpr std::size_t kMostVertexBytes =
         2 * sizeof(Vec3f) + sizeof(Normal3f) + 2 * sizeof(Vec2f) + 2 * sizeof(Vec4f);
+    // Of curves there are copies while they are laid out, and Embree's.
+    constexpr std::size_t kCurveBytes = 96;
     constexpr std::size_t kWorthALook = std::size_t{1} << 20;
-    const std::size_t vertex_bytes =
-        kMostVertexBytes + columns.size() * sizeof(Vec4f) + morph.steps.size() * (sizeof(Vec3f) + sizeof(Normal3f));
+    const std::size_t vertex_bytes = kMostVertexBytes + columns.size() * sizeof(Vec4f) +
+                                     morph.steps.size() * (sizeof(Vec3f) + sizeof(Normal3f)) +
+                                     (curves ? kCurveBytes : 0);
     if (num_vertices > kWorthALook / vertex_bytes) {
       memory_require(num_vertices * vertex_bytes, document.file + ": " + reader.path);
     }
     read_attributes(reader, positions, first, num_vertices, columns, mesh);
     read_targets(reader, positions.count, first, num_vertices, morph, mesh);
+    if (curves) {
+      mesh.are_ribbons = *curves == CurveShape::kRibbons;
+      mesh.radius = read_radii(reader, positions.count, first, num_vertices);
+      lay_out_curves(reader, assemble_curves(reader, corners), first, mesh);
+    }
+  }
+  if (curves) {
+    if (mesh.triangles.empty()) {
+      reader.warn("no curve has a length and a width; nothing is rendered");
+      return {};
+    }
+    mesh.N.clear();
+    mesh.tangent.clear();
+    take_steps(morph.steps.size(), mesh);
+    return mesh;
   }
   drop_unused_vertices(mesh);
   drop_empty_triangles(reader, mesh);

@@ -1,4 +1,4 @@
-// From a glTF primitive to a triangle mesh: topology, attributes, repairs that are safe to make.
+// From a glTF primitive to a triangle mesh, or to curves: topology, attributes, repairs that are safe to make.
 #pragma once
 
 #include <compare>
@@ -25,7 +25,8 @@ struct MorphWeights {
 /// Reads one primitive.
 /// @param tangent_uv_set  texture coordinates that a normal map needs tangents for; −1: none needed
 /// @param columns         names of the attributes to keep for graphs, with their places; those that are missing are warned about
-/// @return empty, with a warning, for points and lines and when no triangle has an area
+/// @return empty, with a warning, for points, for lines that are no curves (RELIEF_curves), and when no triangle has an area or no
+///         curve a length and a width
 /// @error  SceneError: missing positions, wrong accessor types, counts that differ, indices out of range or equal to the
 ///         restart value, NaN or infinity
 /// @post   unit normals, indices in range, no triangle of zero area; only vertices between the lowest and the highest

@@ -27,6 +27,7 @@ MeshView Mesh::view() const
   m.tangent = data_or_null(tangent);
   m.color = data_or_null(color);
   m.generated = data_or_null(generated);
+  m.radius = data_or_null(radius);
   m.triangles = data_or_null(triangles);
   m.num_vertices = static_cast<std::uint32_t>(P.size());
   m.num_triangles = static_cast<std::uint32_t>(triangles.size());
@@ -39,7 +40,8 @@ std::size_t Mesh::bytes() const
   for (const AttributeColumn& column : columns) of_columns += vector_bytes(column.values);
   for (const MeshStep& step : steps) of_columns += vector_bytes(step.P) + vector_bytes(step.N);
   return of_columns + vector_bytes(P) + vector_bytes(N) + vector_bytes(uv[0]) + vector_bytes(uv[1]) +
-         vector_bytes(tangent) + vector_bytes(color) + vector_bytes(generated) + vector_bytes(triangles);
+         vector_bytes(tangent) + vector_bytes(color) + vector_bytes(generated) + vector_bytes(triangles) +
+         vector_bytes(radius);
 }
 
 }  // namespace relief

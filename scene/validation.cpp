@@ -223,6 +223,7 @@ constexpr std::string_view kSupportedExtensions[] = {"KHR_lights_punctual",
                                                      "RELIEF_camera",
                                                      "RELIEF_render",
                                                      "RELIEF_object",
+                                                     "RELIEF_curves",
                                                      "RELIEF_reference"};
 
 /// Walks a document along the table above.

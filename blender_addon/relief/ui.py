@@ -275,6 +275,18 @@ def _simplify_panels():
             yield _like(panel, name, bl_parent_id="RELIEF_PT_simplify", COMPAT_ENGINES={_ENGINE})
 
 
+class RELIEF_PT_curves(_RenderPanel, bpy.types.Panel):
+    bl_label = "Curves"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return super().poll(context) and hasattr(context.scene, "cycles_curves")
+
+    def draw(self, context):
+        self.rows().prop(context.scene.cycles_curves, "shape")
+
+
 class RELIEF_PT_motion_blur(_RenderPanel, bpy.types.Panel):
     bl_label = "Motion Blur"
     bl_options = {"DEFAULT_CLOSED"}
@@ -323,6 +335,7 @@ class RELIEF_PT_filter(_LayerPanel, bpy.types.Panel):
         layer, rows = context.view_layer, self.rows()
         rows.prop(layer, "use_sky", text="Environment")
         rows.prop(layer, "use_solid", text="Surfaces")
+        rows.prop(layer, "use_strand", text="Hair")
         if hasattr(layer, "use_grease_pencil"):
             rows.prop(layer, "use_grease_pencil", text="Grease Pencil")
         row = rows.row()
@@ -623,6 +636,7 @@ _classes = (
     RELIEF_PT_film,
     RELIEF_PT_simplify,
     *_simplify_panels(),
+    RELIEF_PT_curves,
     RELIEF_PT_motion_blur,
     RELIEF_PT_performance,
     RELIEF_PT_filter,

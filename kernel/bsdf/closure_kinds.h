@@ -41,14 +41,18 @@ enum class SubsurfaceMethod : std::uint8_t {
   kSkin,        ///< how far light comes up from where it went below; "Random Walk" up to 3.6
 };
 
+/// What a fibre's absorption follows from.
+enum class FibrePigment : std::uint8_t { kColor, kMelanin, kAbsorption };
+
 /// One closure of a material.
 struct SurfaceClosureSpec {
   ClosureKind kind = ClosureKind::diffuse;
   ClosureDistribution distribution = ClosureDistribution::kGgx;
   bool is_4 = false;               ///< the maths of Blender 4.3 or later, not of 3.4
   bool is_5 = false;               ///< that of 5.2; then is_4, too
-  bool is_other = false;           ///< toon: glossy; metallic: by complex index
+  bool is_other = false;           ///< toon: glossy; metallic: by complex index; hair: what goes through
   SubsurfaceMethod subsurface = SubsurfaceMethod::kRandomWalk;
+  FibrePigment pigment = FibrePigment::kColor;
   std::uint16_t first_result = 0;  ///< its weight among the program's results, then its inputs, float by float
 };
 

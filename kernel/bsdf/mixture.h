@@ -136,7 +136,8 @@ RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tabl
     return s;
   }
   const LobeSample d = mixture_lobe_sample<kMode>(*chosen, u_branch, u);
-  if (d.bits == 0 || (d.wi.z < 0.0f) != ((d.bits & kLobeTransmit) != 0)) return {};
+  const bool is_lost = (d.wi.z < 0.0f) != ((d.bits & kLobeTransmit) != 0) && !mixture_lobe_is_strand(chosen->kind);
+  if (d.bits == 0 || is_lost) return {};
   BsdfSample s;
   const Vec3f wi = from_local(chosen->frame, d.wi);
   s.wi = to_local(m.frame, wi);

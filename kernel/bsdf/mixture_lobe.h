@@ -6,8 +6,10 @@
 #include "kernel/bsdf/base_interface.h"
 #include "kernel/bsdf/beckmann.h"
 #include "kernel/bsdf/clearcoat_gtr1.h"
+#include "kernel/bsdf/fibre.h"
 #include "kernel/bsdf/fresnel_models.h"
 #include "kernel/bsdf/ggx_anisotropic.h"
+#include "kernel/bsdf/hair.h"
 #include "kernel/bsdf/lobe.h"
 #include "kernel/bsdf/microfacet_refraction.h"
 #include "kernel/bsdf/oren_nayar.h"
@@ -40,6 +42,8 @@ enum class MixtureLobeKind : std::uint8_t {
   kRefraction,
   kGlass,
   kSubsurface,
+  kHair,  ///< from here on, what scatters to all sides of a strand: frames as in hair.h
+  kFibre,
 };
 
 /// How a microfacet's reflectance depends on the angle.
@@ -98,6 +102,8 @@ union LobeShape {
   MicrofacetRefraction refraction;
   MixtureGlass glass;
   Subsurface subsurface;
+  Hair hair;
+  Fibre fibre;
 };
 
 struct MixtureLobe {
@@ -129,6 +135,8 @@ RELIEF_KERNEL bool mixture_lobe_is_diffuse(const MixtureLobe& lobe)
     case MixtureLobeKind::kClearcoat:
     case MixtureLobeKind::kRefraction:
     case MixtureLobeKind::kGlass:
+    case MixtureLobeKind::kHair:
+    case MixtureLobeKind::kFibre:
       return false;
     default:
       return true;
@@ -147,6 +155,9 @@ RELIEF_KERNEL bool mixture_lobe_is_microfacet(MixtureLobeKind kind)
          kind == K::kGlass;
 }
 
+/// Whether a lobe is one of a strand, which has all directions around it.
+RELIEF_KERNEL bool mixture_lobe_is_strand(MixtureLobeKind kind) { return kind >= MixtureLobeKind::kHair; }
+
 /// Whether a lobe sends light to a direction that its own normal has on one side and the surface on another: as the version
 /// of Cycles has it whose maths it is. What is sampled leaves by the true surface, so that no mirror sends it inside.
 /// @param below     wi is below the lobe's normal, so that it is meant to go through the surface
@@ -155,6 +166,9 @@ RELIEF_KERNEL bool mixture_lobe_is_microfacet(MixtureLobeKind kind)
 /// @param sampled   wi was sampled from this lobe; or else it is asked for, as the direction of a lamp is
 RELIEF_KERNEL bool mixture_lobe_reaches(const MixtureLobe& lobe, bool below, bool below_Ns, bool below_Ng, bool sampled)
 {
+  if (mixture_lobe_is_strand(lobe.kind)) {
+    return lobe.kind == MixtureLobeKind::kFibre || sampled || below_Ns == lobe.shape.hair.transmits;
+  }
   const bool is_microfacet = mixture_lobe_is_microfacet(lobe.kind);
   if (!lobe.is_4 && !lobe.is_5) {
     const bool refracts = lobe.kind == MixtureLobeKind::kRefraction || lobe.kind == MixtureLobeKind::kGlass;
@@ -240,6 +254,27 @@ RELIEF_KERNEL BsdfEval mixture_glass_eval(const MixtureLobe& lobe, Vec3f wi)
           (1.0f - fresnel_dielectric_at(cos_o, eta)) * pdf};
 }
 
+[[gnu::noinline]] RELIEF_KERNEL BsdfEval strand_lobe_eval(const MixtureLobe& lobe, Vec3f wi)
+{
+  if (lobe.kind == MixtureLobeKind::kFibre) {
+    const FibreEval e = fibre_eval(lobe.shape.fibre, lobe.wo, wi);
+    return {e.f, e.pdf};
+  }
+  const float density = hair_eval(lobe.shape.hair, lobe.wo, wi);
+  return {splat3(density), density};
+}
+
+/// What goes through a fibre counts as transmitted wherever it leaves.
+[[gnu::noinline]] RELIEF_KERNEL LobeSample strand_lobe_sample(const MixtureLobe& lobe, float u_branch, Vec2f u)
+{
+  if (lobe.kind == MixtureLobeKind::kFibre) {
+    const FibreSample s = fibre_sample(lobe.shape.fibre, lobe.wo, u_branch, u);
+    return lobe_sample_glossy(s.wi, !s.is_reflected, min(__builtin_sqrtf(lobe.shape.fibre.variance_R), 1.0f));
+  }
+  const Hair& hair = lobe.shape.hair;
+  return lobe_sample_glossy(hair_sample(hair, lobe.wo, u), hair.transmits, hair.along);
+}
+
 /// Evaluates a lobe. Not inlined, as are all that know every kind of lobe: kernels call them from many places, and with a copy
 /// in each were half a megabyte long and slower.
 /// @param wi  the lobe's frame
@@ -248,6 +283,7 @@ template <TransportMode kMode>
 [[gnu::noinline]] RELIEF_KERNEL BsdfEval mixture_lobe_eval(const MixtureLobe& lobe, const BsdfTables& tables, Vec3f wi)
 {
   using K = MixtureLobeKind;
+  if (mixture_lobe_is_strand(lobe.kind)) return strand_lobe_eval(lobe, wi);
   const bool transmits = lobe.kind == K::kTranslucent || lobe.kind == K::kRefraction;
   const bool is_other_side = lobe.kind != K::kGlass && (wi.z < 0.0f) != transmits;
   if (lobe.is_delta || is_other_side || !(__builtin_fabsf(wi.z) > kMinCosine)) return {};
@@ -315,6 +351,8 @@ template <TransportMode kMode>
       e = mixture_glass_eval<kMode>(lobe, wi);
       break;
     case K::kSubsurface:
+    case K::kHair:
+    case K::kFibre:
       break;
   }
   if (is_microfacet) {
@@ -390,6 +428,7 @@ template <TransportMode kMode>
   const Vec3f wo = lobe.wo;
   if (lobe.kind == K::kGlass) return mixture_glass_sample<kMode>(lobe, u_branch, u);
   if (lobe.is_delta) return mixture_delta_sample<kMode>(lobe);
+  if (mixture_lobe_is_strand(lobe.kind)) return strand_lobe_sample(lobe, u_branch, u);
   switch (lobe.kind) {
     case K::kTranslucent:
       return lobe_sample_diffuse(translucent_sample({}, wo, u), true);

@@ -35,6 +35,7 @@ struct MixtureBuild {
   bool enters = false;                    ///< paths may go below the surface
   bool is_after_diffuse = false;          ///< the path has been scattered diffusely before
   float footprint = 0;                    ///< metres
+  Vec3f tangent{};                        ///< see SurfaceHit
 };
 
 RELIEF_KERNEL float mean_component(Vec3f v) { return (v.x + v.y + v.z) * (1.0f / 3.0f); }
@@ -116,6 +117,12 @@ RELIEF_KERNEL MixtureLobe* reflection_add(MixtureBuild& b, Vec3f weight, const F
 RELIEF_KERNEL void lobe_blur(MixtureLobe& lobe, float blur, float most_sharp)
 {
   using K = MixtureLobeKind;
+  if (lobe.kind == K::kFibre) {
+    Fibre& fibre = lobe.shape.fibre;
+    fibre.variance = max(fibre.variance, blur);
+    fibre.variance_R = max(fibre.variance_R, blur);
+    fibre.scale = max(fibre.scale, blur);
+  }
   if (lobe.stays_sharp || !(lobe.roughness < kInfinity) || lobe.roughness <= most_sharp) return;
   const auto widen = [blur](AnisotropicAlpha& alpha) {
     alpha.x = max(alpha.x, blur);
@@ -251,6 +258,68 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
     lobe->kind = MixtureLobeKind::kOrenNayar;
     lobe->shape.oren_nayar = oren_nayar_make(in.roughness);
   }
+}
+
+/// Adds a lobe of a strand.
+/// @param tangent  Z up; 0: the curve's
+RELIEF_KERNEL MixtureLobe* strand_add(MixtureBuild& b, Vec3f weight, Vec3f tangent, MixtureLobeKind kind)
+{
+  const float squared = length_squared(tangent);
+  const bool is_given = squared > 0.0f && squared < kInfinity;
+  const Vec3f T = is_given              ? world_from_z_up(tangent) / __builtin_sqrtf(squared)
+                  : is_zero(b.tangent) ? frame_from_normal(b.Ns).t
+                                       : b.tangent;
+  const Vec3f across = b.wo - T * dot(T, b.wo);
+  const float size = length(across);
+  const Vec3f n = size > 0.0f ? across / size : frame_from_normal(T).s;
+  MixtureLobe* lobe = mixture_add(b, weight, {T, cross(n, T), n}, true);
+  if (lobe == nullptr) return nullptr;
+  lobe->kind = kind;
+  lobe->is_bent = false;
+  return lobe;
+}
+
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const HairInputs& in)
+{
+  MixtureLobe* lobe = strand_add(b, weight * in.color, in.tangent, MixtureLobeKind::kHair);
+  if (lobe == nullptr) return;
+  b.transmits |= spec.is_other;
+  const bool is_strand = !is_zero(b.tangent) || !is_zero(in.tangent);
+  lobe->shape.hair = hair_make(in.roughness_u, in.roughness_v, is_strand ? -in.offset : 0.0f, spec.is_other);
+}
+
+RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const FibreInputs& in)
+{
+  MixtureLobe* lobe = strand_add(b, splat3(weight), {}, MixtureLobeKind::kFibre);
+  if (lobe == nullptr) return;
+  b.transmits = true;
+  const float vary = 2.0f * (in.random - 0.5f);
+  const float rougher = 1.0f + vary * in.random_roughness;
+  const float roughness = clamp(in.roughness * rougher, 0.001f, 1.0f), radial = in.radial_roughness * rougher;
+  Fibre fibre;
+  switch (spec.pigment) {
+    case FibrePigment::kColor:
+      fibre.sigma = fibre_sigma_of_color(in.color, radial);
+      break;
+    case FibrePigment::kMelanin: {
+      const float share = in.melanin * (1.0f + vary * saturated(in.random_color));
+      const float amount = -std::log(max(1.0f - share, 1e-4f));
+      fibre.sigma = fibre_sigma_of_melanin(amount * (1.0f - in.melanin_redness), amount * in.melanin_redness) +
+                    fibre_sigma_of_color(in.tint, radial);
+      break;
+    }
+    case FibrePigment::kAbsorption:
+      fibre.sigma = in.absorption;
+      break;
+  }
+  fibre.sigma = max(fibre.sigma, Vec3f{});
+  fibre.variance = fibre_variance(roughness);
+  fibre.variance_R = fibre_variance((1.0f - saturated(in.coat)) * roughness);
+  fibre.scale = fibre_scale(radial);
+  fibre.tilt = in.offset;
+  fibre.eta = max(in.ior, 1.001f);
+  fibre.across = clamp(dot(lobe->frame.t, b.Ns), -1.0f, 1.0f);
+  lobe->shape.fibre = fibre;
 }
 
 /// Whether a path may go below the surface. Before 5.0 Cycles left it at a diffuse surface after a diffuse event: it is not seen well

@@ -144,9 +144,10 @@ RELIEF_KERNEL float graph_window(const GraphScene& scene, Vec3f P, int axis)
   return 0.5f + 0.5f * seen - (axis == 0 ? scene.camera.shift_x : scene.camera.shift_y);
 }
 
-/// Distance of a point to the nearest of the lines along a triangle's edges, metres.
+/// Distance of a point to the nearest of the lines along a triangle's edges, metres; infinite on curves, which have none.
 RELIEF_KERNEL float graph_edge_distance(const GraphPoint& at)
 {
+  if (at.mesh->radius != nullptr) return kInfinity;
   const TriangleIndices tri = at.mesh->triangles[at.triangle];
   const std::uint32_t corner[3] = {tri.v0, tri.v1, tri.v2};
   Vec3f p[3];
@@ -294,6 +295,13 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
       return 1.0f - at.bary_u - at.bary_v;
     case Q::parametric_y:
       return at.bary_u;
+    case Q::tangent_normal_x:
+    case Q::tangent_normal_y:
+    case Q::tangent_normal_z: {
+      const Vec3f across = at.wo - hit.tangent * dot(hit.tangent, at.wo);
+      const bool is_curve = !is_zero(hit.tangent) && !is_zero(across);
+      return is_curve ? component(graph_z_up(normalize(across)), axis_of(Q::tangent_normal_x)) : 0.0f;
+    }
     case Q::edge_distance:
       return graph_edge_distance(at);
     case Q::instance:

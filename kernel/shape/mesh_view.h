@@ -18,15 +18,16 @@ struct MeshColumn {
   std::uint16_t num_components = 0;
 };
 
-/// One triangle mesh with one material. Optional attributes are null when absent.
+/// One triangle mesh with one material, or one of curves (kernel/shape/curve_hit.h). Optional attributes are null when absent.
 struct MeshView {
-  const Vec3f* P = nullptr;                    ///< object space, metres, num_vertices
-  const Normal3f* N = nullptr;                 ///< shading (and displacement) normals, object space; null: flat
-  const Vec2f* uv[2] = {nullptr, nullptr};     ///< texture coordinate sets
-  const Vec4f* tangent = nullptr;              ///< unit, w = handedness; null: derived from uv
-  const Vec4f* color = nullptr;                ///< COLOR_0, linear, multiplies base colour and alpha
-  const Vec3f* generated = nullptr;            ///< coordinates that value graphs call so; null: absent
-  const MeshColumn* columns = nullptr;         ///< num_columns
+  const Vec3f* P = nullptr;                 ///< object space, metres, num_vertices
+  const Normal3f* N = nullptr;              ///< shading (and displacement) normals, object space; null: flat
+  const Vec2f* uv[2] = {nullptr, nullptr};  ///< texture coordinate sets
+  const Vec4f* tangent = nullptr;           ///< unit, w = handedness; null: derived from uv
+  const Vec4f* color = nullptr;             ///< COLOR_0, linear, multiplies base colour and alpha
+  const Vec3f* generated = nullptr;         ///< coordinates that value graphs call so; null: absent
+  const MeshColumn* columns = nullptr;      ///< num_columns
+  const float* radius = nullptr;  ///< of curves, object space, metres, num_vertices; null: these are triangles
   const TriangleIndices* triangles = nullptr;  ///< num_triangles
   std::uint32_t num_vertices = 0, num_triangles = 0, num_columns = 0;
   /// Of a mesh that deforms while the shutter is open, at some time: what P and N will be at the next step, and the part of the
@@ -71,6 +72,8 @@ enum InstanceFlag : std::uint32_t {
   kHoldout = 1u << 10,             ///< a hole in the picture where the camera sees it; an object for all other rays
   kMoves = 1u << 11,    ///< while the shutter is open: hits bring a placement of their own, see path_instance
   kDeforms = 1u << 12,  ///< likewise, and a mesh: see path_mesh
+  kCurves = 1u << 13,   ///< its mesh is one of curves
+  kRibbons = 1u << 14,  ///< these are flat and face the ray
 };
 
 /// One placement of a mesh.

@@ -8,6 +8,7 @@
 #include "kernel/graph/graph_material.h"
 #include "kernel/sample/dimensions.h"
 #include "kernel/sample/sobol.h"
+#include "kernel/shape/curve_hit.h"
 #include "kernel/shape/facet_masking.h"
 #include "kernel/shape/surface_hit.h"
 #include "kernel/stage/path_access.h"
@@ -77,11 +78,15 @@ surface_interaction_locate(const KernelGlobals& g, const PathState& state, std::
   at.triangle = state.hit_triangle[path];
   const MeshView& mesh = path_mesh(g, state, path, *at.instance);
   const float u = state.hit_u[path], v = state.hit_v[path];
-  at.hit =
-      (at.instance->flags & kDisplaced) != 0
-          ? surface_hit_displaced(mesh, *at.instance, at.triangle, u, v,
-                                  {state.hit_P[path], state.hit_Ng[path], state.hit_Ns[path], state.hit_leave[path]})
-          : surface_hit_make(mesh, *at.instance, at.triangle, u, v);
+  if (__builtin_expect((at.instance->flags & (kDisplaced | kCurves)) == 0, 1)) {
+    at.hit = surface_hit_make(mesh, *at.instance, at.triangle, u, v);
+  } else if ((at.instance->flags & kCurves) != 0) {
+    at.hit = surface_hit_curve(mesh, *at.instance, at.triangle, u, v,
+                               path_origin(state, path) + path_direction(state, path) * state.hit_t[path], wo);
+  } else {
+    at.hit = surface_hit_displaced(mesh, *at.instance, at.triangle, u, v,
+                                   {state.hit_P[path], state.hit_Ng[path], state.hit_Ns[path], state.hit_leave[path]});
+  }
   at.side.front = dot(wo, at.hit.Ng) >= 0.0f;
   at.side.Ng = at.side.front ? at.hit.Ng : -at.hit.Ng;
 
@@ -187,11 +192,13 @@ struct ClosureSight {
   bool is_after_diffuse = false;
 };
 
-/// Photons stay above: they end where there is a diffuse lobe.
-RELIEF_KERNEL ClosureSight closure_sight(const KernelGlobals& g, const PathState& state, std::uint32_t path, SurfaceBlur blur)
+/// Photons stay above: they end where there is a diffuse lobe. So does all light on curves.
+RELIEF_KERNEL ClosureSight closure_sight(
+    const KernelGlobals& g, const PathState& state, std::uint32_t path, const InstanceView& instance, SurfaceBlur blur)
 {
   return {blur, path_does_without(g, state.flags[path]), path_surface(state, path) == 0,
-          state.subsurface.entries != nullptr && (state.flags[path] & kPathPhoton) == 0,
+          state.subsurface.entries != nullptr && (state.flags[path] & kPathPhoton) == 0 &&
+              (instance.flags & kCurves) == 0,
           path_bounces(state.bounces[path], BounceKind::kDiffuse) > 0};
 }
 
@@ -218,6 +225,7 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   build.enters = sight.enters;
   build.is_after_diffuse = sight.is_after_diffuse;
   build.footprint = at.cone.width;
+  build.tangent = at.hit.tangent;
   if (const std::uint16_t first = lane.program->surface_normal; first != kNoGraphOperand) {
     const Vec3f given{graph_result(lane, first), graph_result(lane, first + 1), graph_result(lane, first + 2)};
     // Since 4.0 what displaces nothing bends freely.
@@ -297,7 +305,7 @@ RELIEF_KERNEL void surface_interaction_resolve(const KernelGlobals& g,
                                  : graph_at_point(g.run_graph, g.graphs[at.material->graph_index], g.textures,
                                                   surface_graph_point(g, state, path, at, wo), registers);
       if (has_mixture<kFeatures>(at)) {
-        surface_interaction_mix<kFeatures>(g, wo, lane, closure_sight(g, state, path, blur), at, lobes);
+        surface_interaction_mix<kFeatures>(g, wo, lane, closure_sight(g, state, path, *at.instance, blur), at, lobes);
       } else {
         at.params = graph_surface_params<kFeatures>(*at.material, graph_values(lane), g.textures, at.hit, at.uv_width);
         if (blur.alpha > 0.0f) surface_params_blur(at.params, blur);
@@ -407,6 +415,9 @@ RELIEF_KERNEL bool path_pass_through(const KernelGlobals& g, PathState& state, s
 /// @param wi  unit, its direction
 RELIEF_KERNEL Vec3f surface_ray_origin(const SurfaceInteraction& at, Vec3f wi)
 {
+  if (__builtin_expect((at.instance->flags & kCurves) != 0, 0)) {
+    return surface_hit_origin(at.hit, at.hit.P, dot(wi, at.hit.leave) > 0.0f);
+  }
   // Above the surface the ray starts on the lifted side, below it on the other. Closures send light by the true surface; what
   // only the shading normal sees of lamps is lifted above a facet, unless it may have come through.
   const bool above_Ns = dot(wi, at.side.Ns) > 0.0f;

@@ -67,6 +67,8 @@ SurfaceClosureSpec read_closure(const JsonReader& r)
                                                         "sharp"};
   static constexpr std::string_view kMaths[] = {"3.4", "4.3", "5.2"};
   static constexpr std::string_view kComponents[] = {"diffuse", "glossy"};
+  static constexpr std::string_view kHairComponents[] = {"reflection", "transmission"};
+  static constexpr std::string_view kPigments[] = {"color", "melanin", "absorption"};
   static constexpr std::string_view kFresnels[] = {"f82", "physical"};
   static constexpr std::string_view kSubsurfaceMethods[] = {"random-walk", "random-walk-legacy", "random-walk-skin"};
   SurfaceClosureSpec spec;
@@ -94,6 +96,12 @@ SurfaceClosureSpec read_closure(const JsonReader& r)
       break;
     case K::toon:
       spec.is_other = r.choice("component", kComponents, 0) == 1;
+      break;
+    case K::hair:
+      spec.is_other = r.choice("component", kHairComponents, 0) == 1;
+      break;
+    case K::fibre:
+      spec.pigment = static_cast<FibrePigment>(r.choice("pigment", kPigments, 0));
       break;
     default:
       break;

@@ -115,6 +115,7 @@ void lower_geometry(GraphNode& n)
   n.set("incoming", incoming(b), kVector);
   n.set("backfacing", b.quantity(Q::backfacing));
   n.set("tangent", radial_tangent(b, 2), kVector);
+  n.set("tangentNormal", quantities(b, Q::tangent_normal_x, Q::tangent_normal_y, Q::tangent_normal_z), kVector);
   n.set("parametric", {b.quantity(Q::parametric_x), b.quantity(Q::parametric_y), b.constant(0)}, kVector);
 }
 

@@ -129,16 +129,6 @@ def test_particles():
     assert_agrees(scene)
 
 
-def test_hair_strands_are_warned_about():
-    from scenes import assert_warns
-
-    scene = _stage()
-    emitter = add_plane(1, location=(0, 0, 0.4))
-    emitter.modifiers.new("particles", "PARTICLE_SYSTEM")
-    emitter.particle_systems[0].settings.type = "HAIR"
-    assert_warns(scene, "as strands", "left out")
-
-
 def test_geometry_nodes_instances():
     """Points of a grid carry cubes that geometry nodes make: no object of the scene has that mesh."""
     scene = _stage()

@@ -115,7 +115,6 @@ def test_what_is_no_mesh_is_told():
     _assert_warned_once(lambda _: _made_by_nodes("GeometryNodeMeshToPoints"), "object", "a point cloud", "left out")
     _assert_warned_once(lambda _: _made_by_nodes("GeometryNodeMeshToVolume"), "object", "a volume object", "left out")
     _assert_warned_once(lambda _: link(bpy.data.volumes.new("cloud"), "cloud"), "cloud", "a volume object", "left out")
-    _assert_warned_once(lambda _: link(bpy.data.hair_curves.new("fur"), "fur"), "fur", "hair curves", "left out")
 
 
 def test_subsurface_scattering_by_profiles_is_told_once_a_material():

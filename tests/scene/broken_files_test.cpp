@@ -265,6 +265,20 @@ const BrokenFile kBrokenFiles[] = {
        b.json["accessors"][3]["count"] = 2;
      },
      "/meshes/0/primitives/0", "at least 3"},
+    {"triangles as curves", [](auto& b) { primitive(b)["extensions"]["RELIEF_curves"] = json::object(); },
+     "/meshes/0/primitives/0/mode", "lines"},
+    {"curves without radii",
+     [](auto& b) {
+       primitive(b)["mode"] = 3;
+       primitive(b)["extensions"]["RELIEF_curves"] = json::object();
+     },
+     "/meshes/0/primitives/0/attributes/_RADIUS", "nothing"},
+    {"curves of an unknown shape",
+     [](auto& b) {
+       primitive(b)["mode"] = 3;
+       primitive(b)["extensions"]["RELIEF_curves"]["shape"] = "square";
+     },
+     "/meshes/0/primitives/0/extensions/RELIEF_curves/shape", "\"ribbons\""},
     {"mode 7", [](auto& b) { primitive(b)["mode"] = 7; }, "/meshes/0/primitives/0/mode", "7"},
     {"material out of range", [](auto& b) { primitive(b)["material"] = 5; }, "/meshes/0/primitives/0/material",
      "/materials"},

@@ -83,6 +83,11 @@ def topologies():
             "indices": b.accessor(code, corners, "SCALAR")}
         b.json.setdefault("meshes", []).append({"primitives": [primitive]})
         b.node(mesh=len(b.json["meshes"]) - 1)
+    lines = {"mode": 1, "indices": b.accessor("B", [0, 1, 1, 2, 3, 3], "SCALAR"), "attributes": {
+        "POSITION": b.accessor("f", [0, 0, 0, 1, 0, 0, 1, 1, 0, 2, 2, 2], "VEC3"),
+        "_RADIUS": b.accessor("f", [.1, .2, 0, 1], "SCALAR")}, "extensions": {"RELIEF_curves": {"shape": "tubes"}}}
+    b.json["meshes"].append({"primitives": [lines]})
+    b.node(mesh=len(b.json["meshes"]) - 1)
     sparse = {"count": 1, "indices": {"bufferView": b.view(struct.pack("<H", 2)), "componentType": 5123},
               "values": {"bufferView": b.view(struct.pack("<3f", 5, 5, 5))}}
     position = b.accessor("f", [0, 0, 0, 1, 0, 0, 1, 1, 0], "VEC3", sparse=sparse)
@@ -184,6 +189,7 @@ def closures():
         {"type": "principled", "maths": "4.3", "coatWeight": 1, "coatIor": 0, "thinFilmThickness": 500},
         {"type": "principled", "maths": "5.2", "metallic": .5, "thinFilmThickness": 500, "coatRoughness": .5},
         {"type": "metallic", "fresnel": "physical", "maths": "5.2", "thinFilmThickness": 1e30}, {"type": "glass", "ior": 1}, {"type": "refraction"},
+        {"type": "hair", "component": "transmission", "roughnessU": -1}, {"type": "fibre", "pigment": "melanin", "random": 1e30, "ior": 0},
         {"type": "velvet"}, {"type": "sheen"}, {"type": "translucent"}]}
     height = {"nodes": nodes[:2], "outputs": {"height": factor}, "resolution": 4}
     vectors = {"nodes": [{"type": "vector-displacement", "inputs": {"vector": [.1, .2, .3]}}],

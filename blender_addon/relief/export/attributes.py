@@ -2,7 +2,7 @@
 """Attributes of meshes that value graphs read by name, as Cycles has them.
 
 An attribute is a pair (kind, name): ("attribute", name) of any type, ("color", name) likewise, where "" is the colour that
-is active in renders, ("uv", name) a uv map, ("pointiness", "") and ("island", "").
+is active in renders, ("uv", name) a uv map, ("pointiness", ""), ("island", "") and ("hair", what) of Curves Info: see hair.py.
 """
 
 import numpy as np
@@ -26,7 +26,7 @@ _DTYPES = {"INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}
 def file_name(attribute):
     """What an attribute is called in the file."""
     kind, name = attribute
-    return f"_{kind.upper()}_{name}" if kind in {"attribute", "color", "uv"} else f"_{kind.upper()}"
+    return f"_{kind.upper()}_{name}" if kind in {"attribute", "color", "uv", "hair"} else f"_{kind.upper()}"
 
 
 def read(attribute, mesh, vertex):
@@ -37,6 +37,8 @@ def read(attribute, mesh, vertex):
     @return         float32 (loops, 1 to 4); None: the mesh has none
     """
     kind, name = attribute
+    if kind == "hair":
+        return None
     if kind == "pointiness":
         return _pointiness(mesh)[vertex, None]
     if kind == "island":

@@ -289,8 +289,11 @@ def _ies(g, source):
 
 
 def _hair_info(g, source):
-    """What a surface that is no hair has of it."""
-    return _constant(g, (0.0, 0.0, 0.0) if source.socket.identifier == "Tangent Normal" else 0.0)
+    """Of a surface that is no hair all is 0."""
+    name = source.socket.identifier
+    if name == "Tangent Normal":
+        return _output(g.add("geometry", {}), "tangentNormal")
+    return mesh_attribute(g, "hair", name.lower().replace(" ", "_"), "value")
 
 
 def _point_info(g, source):

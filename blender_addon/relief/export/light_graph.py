@@ -168,6 +168,7 @@ class LightGraph(GraphWriter):
         "ShaderNodeParticleInfo": _nothing,
         "ShaderNodeAttribute": _attribute,
         "ShaderNodeVertexColor": _nothing,
+        "ShaderNodeHairInfo": _nothing,
         "ShaderNodeTangent": _of_surface,
         "ShaderNodeNormalMap": _of_surface,
         "ShaderNodeBump": _of_surface,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .. import compat
-from . import attributes
+from . import attributes, hair
 
 #: Odd 64-bit constants for hashing the columns of a corner; any will do, equality is checked afterwards.
 _HASH_FACTORS = np.random.default_rng(1).integers(1, 2**63, size=32, dtype=np.uint64) | np.uint64(1)
@@ -257,16 +257,18 @@ class StoredMesh:
     primitives  (slot, whether its faces are smooth, StoredArrays) for each slot that has triangles; smooth and flat faces
                 are told apart where the slot's material wants it
     warnings    what is to be said of each object that has it: arguments of a warning's function
+    strands     (slot, StoredArrays) of its hair
     """
 
     name: str
     wanted: tuple
     primitives: list
     warnings: tuple
+    strands: tuple = ()
 
     def reach(self):
         """Largest coordinate of a vertex, metres in object space."""
-        bounds = [arrays.accessors["POSITION"][0] for _, _, arrays in self.primitives]
+        bounds = [arrays.accessors["POSITION"][0] for *_, arrays in (*self.primitives, *self.strands)]
         return max((abs(x) for accessor in bounds for x in accessor["min"] + accessor["max"]), default=0.0)
 
 
@@ -300,14 +302,31 @@ def store_mesh(mesh, wanted, writer, shapes=()):
     return StoredMesh(mesh.name, wanted, primitives, tuple(warnings))
 
 
-def add_mesh(stored, materials, writer, is_diced=False):
+def store_strands(strands, name, wanted, writer):
+    """Writes strands.
+
+    @param  strands  list of (slot, Strands)
+    @param  wanted   tuple of the Wanted of each slot's material, at least one
+    @return          StoredMesh without triangles
+    """
+    warnings, out = [], []
+    for slot, some in strands:
+        slot = min(slot, len(wanted) - 1)
+        arrays = hair.arrays_of(some, wanted[slot], lambda *text: warnings.append(text))
+        if arrays is not None:
+            out.append((slot, writer.store(arrays)))
+    return StoredMesh(name, wanted, [], tuple(warnings), tuple(out))
+
+
+def add_mesh(stored, materials, writer, is_diced=False, curve_shape="ribbons"):
     """Refers to a stored mesh.
 
     @param  materials  for each slot what gives its material's index in the glTF, for smooth faces or for flat ones
-    @param  is_diced   whether Cycles dices it to the picture
-    @return            index of a glTF mesh; None if it has no triangles
+    @param  is_diced     whether Cycles dices it to the picture
+    @param  curve_shape  of its strands, as RELIEF_curves has it
+    @return              index of a glTF mesh; None if there is nothing in it
     """
-    if not stored.primitives:
+    if not stored.primitives and not stored.strands:
         return None
     primitives = []
     for slot, is_smooth, arrays in stored.primitives:
@@ -320,6 +339,11 @@ def add_mesh(stored, materials, writer, is_diced=False):
         if targets:
             primitive["targets"] = targets
         primitives.append(primitive)
+    for slot, arrays in stored.strands:
+        attributes = dict(writer.add_stored(arrays))
+        lines = {"mode": 1, "indices": attributes.pop("indices"), "attributes": attributes, "material": materials[slot](True, False)}
+        writer.extend(lines, "RELIEF_curves", {"shape": curve_shape})
+        primitives.append(lines)
     return writer.add_unique("meshes", {"name": stored.name, "primitives": primitives})
 
 

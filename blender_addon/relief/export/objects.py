@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import unread
+from . import hair, unread
 from .instance_values import Place, are_read
 
 #: Objects that Blender can turn into a mesh.
-GEOMETRY_TYPES = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
+GEOMETRY_TYPES = {"MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES"}
 
 #: Scale below which nothing is seen of an object: its inverse would leave the range of single precision.
 _NOTHING = 1e-30
@@ -50,6 +50,8 @@ class Things:
     role      Role in the view layer
     matrices  world matrices, row-major, one a place: list of 16 floats each
     places    Place of each, where value graphs may read them; else empty
+    surface   its surface is shown
+    strands   its hair is shown
     """
 
     object: object
@@ -59,6 +61,8 @@ class Things:
     role: Role = Role()
     matrices: list = field(default_factory=list)
     places: list = field(default_factory=list)
+    surface: bool = True
+    strands: bool = False
 
     def world_matrices(self):
         """float64 of shape (places, 4, 4)."""
@@ -84,18 +88,20 @@ def collect(depsgraph, report):
                 what = unread.KINDS.get(shown.type, f"objects of type {shown.type.lower()}")
                 report.warn(f'object "{shown.name}"', what, "it is left out")
             continue
-        if not (instance.show_self if not instance.is_instance else True):
-            continue
         original = shown.original
+        surface = instance.show_self if not instance.is_instance else True
+        strands = kind == "geometry" and instance.show_particles and bool(hair.particle_systems(original))
+        if not surface and not strands:
+            continue
         data = shown.data
         role = Role()
         if roles:  # an instance has the role of what makes it
             owner = instance.parent if instance.is_instance else shown
             role = roles.get(owner.original.as_pointer(), role)
-        key = (original.as_pointer(), data.as_pointer() if data is not None else 0, role)
+        key = (original.as_pointer(), data.as_pointer() if data is not None else 0, role, surface, strands)
         thing = things.get(key)
         if thing is None:
-            thing = things[key] = Things(original, shown.name, kind, role=role)
+            thing = things[key] = Things(original, shown.name, kind, role=role, surface=surface, strands=strands)
             if instance.is_instance and kind == "geometry" and _is_made(shown, original, depsgraph):
                 thing.data = data
         matrix = instance.matrix_world
@@ -128,7 +134,7 @@ def _roles(view_layer):
 
 def _is_made(shown, original, depsgraph):
     """Whether an instance shows a mesh of its own, made by geometry nodes, instead of an object's."""
-    return shown.type == "MESH" and shown.data != original.evaluated_get(depsgraph).data
+    return shown.type in {"MESH", "CURVES"} and shown.data != original.evaluated_get(depsgraph).data
 
 
 def usable_places(matrices):

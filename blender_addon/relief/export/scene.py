@@ -5,17 +5,18 @@ import time
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 
+import bpy
 import numpy as np
 
 from .. import compat
 from ..report import ReliefError
-from . import instance_values, unread
+from . import hair, instance_values, unread
 from .axes import GLTF_FROM_BLENDER
 from .gltf import GltfWriter, matrix_property
 from .image import ImageExporter
 from .light import Place, export_light
 from .material import MaterialExporter, emits
-from .mesh import FARTHEST, add_mesh, store_mesh
+from .mesh import FARTHEST, add_mesh, store_mesh, store_strands
 from .motion import numbered
 from .objects import collect, decompose, usable_places
 from .settings import render_settings
@@ -28,6 +29,9 @@ _DARKNESS = 1e-20
 
 #: What the uv pass shows of a mesh whose materials ask for no coordinates.
 _ACTIVE_UV = (("uv", ""),)
+
+#: Data of hair curves; nothing is, where Blender has none.
+_HAIR_CURVES = getattr(bpy.types, "Curves", ())
 
 
 @dataclass
@@ -220,8 +224,7 @@ class SceneExporter:
     def add_objects(self):
         """Adds meshes, instances and lights."""
         things = collect(self._depsgraph, self._report)
-        if not self._depsgraph.view_layer.use_solid:
-            things = [thing for thing in things if thing.kind != "geometry"]
+        things = [thing for thing in things if self._is_shown(thing)]
         for key, thing in numbered(things):
             if thing.kind == "geometry":
                 self._add_geometry(thing, key)
@@ -229,6 +232,17 @@ class SceneExporter:
         for thing in things:
             if thing.kind == "light":
                 self._add_lights(thing)
+
+    def _is_shown(self, thing):
+        """Whether the view layer shows a thing; it may hide a part of it."""
+        layer = self._depsgraph.view_layer
+        if thing.kind != "geometry":
+            return True
+        if _is_hair_curves(thing):
+            return layer.use_strand
+        thing.surface = thing.surface and layer.use_solid
+        thing.strands = thing.strands and layer.use_strand
+        return thing.surface or thing.strands
 
     def _keep_dark(self):
         """Gives a scene without any light one that is as good as none: the program would put up a lamp of its own."""
@@ -245,9 +259,6 @@ class SceneExporter:
         matrices, numbers = self._usable(thing, thing.world_matrices())
         if not len(matrices):
             return
-        for system in thing.object.particle_systems:
-            if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
-                self._report.warn(f'object "{thing.name}"', f'hair "{system.name}" as strands', "it is left out")
         shapes = None if self._motion is None else self._motion.shapes(key, thing.name)
         mesh, reach, read = self._mesh_of(thing, shapes)
         if mesh is None:
@@ -362,21 +373,40 @@ class SceneExporter:
         data = thing.data if thing.data is not None else evaluated.data
         materials = self._materials_of(_slots(thing, evaluated), data)
         wanted = tuple(w for _, w in materials)
-        stored = self._stored.get(thing.object, wanted) if thing.data is None else None
+        is_usual = thing.data is None and thing.surface and thing.strands == bool(hair.particle_systems(thing.object))
+        stored = self._stored.get(thing.object, wanted) if is_usual else None
         if stored is None:
             stored = self._store(thing, evaluated, wanted, shapes or ())
             if stored is None:
                 return None, 0.0, set()
-            if thing.data is None:
+            if is_usual:
                 self._stored.put(thing.object, stored)
         for text in stored.warnings:
             self._warner("object", thing.name)(*text)
         read = {value for w in wanted for value in w.values}
         is_diced = compat.dicing_modifier(thing.object, self._scene) is not None
-        return add_mesh(stored, [i for i, _ in materials], self.writer, is_diced), stored.reach(), read
+        shape = hair.wanted_shape(self._scene)
+        return add_mesh(stored, [i for i, _ in materials], self.writer, is_diced, shape), stored.reach(), read
 
     def _store(self, thing, evaluated, wanted, shapes):
         """StoredMesh of a thing; None if it has none. Things of one shape whose materials want the same share theirs."""
+        stored = None
+        if _is_hair_curves(thing):
+            strands = hair.of_curves(thing.data if thing.data is not None else evaluated.data)
+            return None if strands is None else store_strands([(0, strands)], thing.name, wanted, self.writer)
+        if thing.surface:
+            stored = self._store_surface(thing, evaluated, wanted, shapes)
+        if thing.strands and thing.data is None:
+            grown = hair.of_particles(evaluated, self._depsgraph.mode == "RENDER")
+            of_hair = store_strands(grown, thing.name, wanted, self.writer)
+            if stored is None:
+                return of_hair
+            warnings = (*stored.warnings, *of_hair.warnings)
+            stored = replace(stored, strands=of_hair.strands, warnings=warnings)
+        return stored
+
+    def _store_surface(self, thing, evaluated, wanted, shapes):
+        """The same of its triangles."""
         key = (_shape(thing, evaluated), wanted)
         if key not in self._by_shape:
             try:
@@ -435,6 +465,10 @@ class SceneExporter:
             if settings:
                 self.writer.extend(node, "RELIEF_object", settings)
             self.nodes.append(node)
+
+
+def _is_hair_curves(thing):
+    return thing.object.type == "CURVES" if thing.data is None else isinstance(thing.data, _HAIR_CURVES)
 
 
 def _slots(thing, evaluated):

@@ -14,6 +14,7 @@ from enum import Enum
 from .. import compat
 from . import nodes
 from .graph import NotUnderstood
+from .graph_inputs import mesh_attribute
 from .texture import Input, TextureReader
 
 _WHITE = (1.0, 1.0, 1.0)
@@ -586,12 +587,50 @@ def _subsurface(w, source, weight):
     w.add("subsurface", weight, **values, method=_subsurface_method(w, source, source.node.falloff), **_MATHS)
 
 
+def _hair(w, source, weight):
+    names = {"Color": "color", "Offset": "offset", "RoughnessU": "roughnessU", "RoughnessV": "roughnessV"}
+    values = w.inputs(source, names)
+    tangent = nodes.linked(source.node.inputs["Tangent"], source.groups)
+    if tangent is not None:
+        values["tangent"] = w.input(source.node.inputs["Tangent"], source)
+    w.add("hair", weight, **values, component=source.node.component.lower())
+
+
+#: Names of the Principled Hair BSDF's inputs in the file.
+_FIBRE_INPUTS = {
+    "Color": "color",
+    "Melanin": "melanin",
+    "Melanin Redness": "melaninRedness",
+    "Tint": "tint",
+    "Absorption Coefficient": "absorption",
+    "Roughness": "roughness",
+    "Radial Roughness": "radialRoughness",
+    "Coat": "coat",
+    "IOR": "ior",
+    "Offset": "offset",
+    "Random Color": "randomColor",
+    "Random Roughness": "randomRoughness",
+}
+
+
+def _fibre(w, source, weight):
+    node = source.node
+    if getattr(node, "model", "CHIANG") != "CHIANG":
+        w.unread(source, "hair by the model Huang", "that of Chiang was used")
+    values = w.inputs(source, _FIBRE_INPUTS)
+    random = node.inputs.get("Random")
+    if random is not None and nodes.linked(random, source.groups) is not None:
+        values["random"] = w.input(random, source)
+    else:
+        values["random"] = mesh_attribute(w.graph, "hair", "random", "value")
+    w.add("fibre", weight, **values, pigment=node.parametrization.lower())
+
+
 def _colored(what):
     """Writer of a node of which the colour alone is taken."""
 
     def write(w, source, weight):
         w.unread(source, what, "a diffuse surface of its colour was used")
-        # Only the sockets that a node shows are found: hair by absorption has no colour.
         names = {"Color": "color", "Base Color": "color", "Normal": "normal"}
         w.add("diffuse", weight, **w.inputs(source, names), **_MATHS)
 
@@ -644,8 +683,8 @@ _NODES = {
     "ShaderNodeBsdfSheen": _sheen,
     "ShaderNodeBsdfToon": _toon,
     "ShaderNodeSubsurfaceScattering": _subsurface,
-    "ShaderNodeBsdfHair": _colored("hair"),
-    "ShaderNodeBsdfHairPrincipled": _colored("hair"),
+    "ShaderNodeBsdfHair": _hair,
+    "ShaderNodeBsdfHairPrincipled": _fibre,
     "ShaderNodeEeveeSpecular": _colored("a shader of Eevee's alone"),
     "ShaderNodeBsdfRayPortal": _portal,
     "ShaderNodeEmission": _emission,

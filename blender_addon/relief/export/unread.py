@@ -13,7 +13,7 @@ _OBJECT = (
 )
 
 #: Objects that Blender has besides meshes and lights, in the words of its menus.
-KINDS = {"CURVES": "hair curves", "POINTCLOUD": "a point cloud", "VOLUME": "a volume object"}
+KINDS = {"POINTCLOUD": "a point cloud", "VOLUME": "a volume object"}
 
 
 def warn_unread_of_object(shown, scene, warn):

@@ -1,0 +1,99 @@
+// Points on curves: splines of Catmull and Rom with a radius at each point, as tubes or as ribbons that face the ray. How their
+// vertices stand in a mesh is said at Mesh in scene/scene.h; Embree meets them (integrator/accel.cpp).
+#pragma once
+
+#include "kernel/shape/surface_hit.h"
+
+namespace relief {
+
+/// Weights of a segment's four vertices.
+struct CurveBasis {
+  float w[4];
+
+  template <typename T>
+  T of(const T (&value)[4]) const
+  {
+    return value[0] * w[0] + value[1] * w[1] + value[2] * w[2] + value[3] * w[3];
+  }
+};
+
+/// @param u  along the segment, 0 to 1
+RELIEF_KERNEL CurveBasis curve_basis(float u)
+{
+  const float s = 1.0f - u;
+  return {{-0.5f * u * s * s, 0.5f * (2.0f + u * u * (3.0f * u - 5.0f)), 0.5f * (2.0f + s * s * (3.0f * s - 5.0f)),
+           -0.5f * s * u * u}};
+}
+
+/// Derivatives of the weights by u.
+RELIEF_KERNEL CurveBasis curve_basis_derivative(float u)
+{
+  const float s = 1.0f - u;
+  return {{-0.5f * s * (s - 2.0f * u), 0.5f * u * (9.0f * u - 10.0f), -0.5f * s * (9.0f * s - 10.0f),
+           -0.5f * u * (2.0f * s - u)}};
+}
+
+/// The point where a ray meets a curve.
+///
+/// Rays meet tubes from outside only (a filter lets those through that leave), so what goes on inside starts just below. A ribbon
+/// is a tube to shading: its normal turns from edge to edge as a tube's does, and what is behind it is asked of the ray.
+/// @param u, v     along the segment; across a ribbon, from -1 to 1
+/// @param P_ray    where the ray met it, world
+/// @param wo       unit, back along the ray
+/// @source  the normals are Cycles'
+[[gnu::noinline]] RELIEF_KERNEL SurfaceHit surface_hit_curve(const MeshView& mesh,
+                                                             const InstanceView& instance,
+                                                             std::uint32_t segment,
+                                                             float u,
+                                                             float v,
+                                                             Vec3f P_ray,
+                                                             Vec3f wo)
+{
+  const TriangleIndices ends = mesh.triangles[segment];
+  const Affine3& m = instance.world_from_object;
+  const Affine3& inverse = instance.object_from_world;
+  Vec3f P[4];
+  float radius[4];
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    P[i] = mesh_P(mesh, ends.v0 - 1 + i);
+    radius[i] = mesh.radius[ends.v0 - 1 + i];
+  }
+  const CurveBasis at = curve_basis(u);
+  const Vec3f centre = at.of(P);
+  const Vec3f along = transform_vector(m, curve_basis_derivative(u).of(P));
+  const float width = length_squared(along);
+
+  SurfaceHit hit;
+  hit.P = P_ray;
+  hit.P_lift = {};
+  const Vec3f size = abs(P_ray);
+  const auto abs_transform = [](const Affine3& by, Vec3f d) {
+    return abs(by.x) * d.x + abs(by.y) * d.y + abs(by.z) * d.z;
+  };
+  hit.P_error = gamma_bound(8) * (size + abs(m.p) + abs_transform(m, abs_transform(inverse, size) + abs(inverse.p)));
+  // Where a curve turns back on itself it has no direction; then any will do.
+  hit.tangent = width > 0.0f ? along * (1.0f / __builtin_sqrtf(width)) : frame_from_normal(wo).s;
+  Vec3f away;       // unit, from the curve
+  float reach = 0;  // how far rays start from the hit, in radii
+  if ((instance.flags & kRibbons) != 0) {
+    const Vec3f across = cross(hit.tangent, wo);
+    const float sine = length(across);
+    const Vec3f side = sine > 0.0f ? across / sine : frame_from_normal(hit.tangent).s;
+    away = cross(side, hit.tangent);
+    hit.Ng = wo;
+    hit.Ns = normalize(v * side + safe_sqrt(1.0f - v * v) * away);
+    // The ribbon turns to each ray, within a tube: a ray that starts beside the tube and goes away from it meets none of it.
+    reach = 1.0f;
+  } else {
+    const Vec3f out = transform_point(inverse, P_ray) - centre;
+    away = hit.Ng = hit.Ns = is_zero(out) ? wo : normalize(transform_normal(inverse, as_normal(out)));
+    // By so much Embree may err.
+    reach = 1e-3f;
+  }
+  const float radius_world = max(at.of(radius), 0.0f) / length(transform_vector(inverse, away));
+  hit.leave = away * (reach * radius_world + 4.0f * length(hit.P_error));
+  surface_hit_interpolate(mesh, ends, u, 0.0f, &hit);
+  return hit;
+}
+
+}  // namespace relief
