@@ -9,6 +9,7 @@
 
 #include "integrator/camera_medium.h"
 #include "integrator/flush_denormals.h"
+#include "integrator/photon_guide.h"
 
 namespace relief {
 
@@ -103,6 +104,21 @@ Pilot pilot_read(Film& film, double mean_factor)
 }
 
 /// A picture of few pixels, each of the size of one of the whole picture's.
+Film pilot_film(const RenderSettings& settings, double num_pixels, KernelGlobals& g)
+{
+  const double aspect = static_cast<double>(settings.width) / settings.height;
+  const int width = std::clamp(static_cast<int>(std::sqrt(num_pixels * aspect)), 1, settings.width);
+  const int height = std::clamp(static_cast<int>(num_pixels / width), 1, settings.height);
+  Film film(width, height, 1u << static_cast<int>(Aov::kBeauty) | 1u << static_cast<int>(Aov::kCaustic));
+  g.film = film.accumulator();
+  g.filter_width *= static_cast<float>(width) / static_cast<float>(settings.width);
+  g.full_width = width;
+  g.full_height = height;
+  g.crop_x = g.crop_y = 0;
+  g.log2_stream = sample_log2_stream(kPilotSamples);
+  return film;
+}
+
 Pilot pilot_run(const SceneContext& context,
                 const RenderOptions& options,
                 const KernelGlobals& of_render,
@@ -112,18 +128,8 @@ Pilot pilot_run(const SceneContext& context,
                 const std::atomic<bool>& stop)
 {
   const RenderSettings& settings = options.settings;
-  const double aspect = static_cast<double>(settings.width) / settings.height;
-  const int width = std::clamp(static_cast<int>(std::sqrt(num_pixels * aspect)), 1, settings.width);
-  const int height = std::clamp(static_cast<int>(num_pixels / width), 1, settings.height);
-  Film film(width, height, 1u << static_cast<int>(Aov::kBeauty) | 1u << static_cast<int>(Aov::kCaustic));
   KernelGlobals g = of_render;
-  g.film = film.accumulator();
-  g.filter_width *= static_cast<float>(width) / static_cast<float>(settings.width);
-  g.full_width = width;
-  g.full_height = height;
-  g.crop_x = g.crop_y = 0;
-  g.log2_stream = sample_log2_stream(kPilotSamples);
-
+  Film film = pilot_film(settings, num_pixels, g);
   const StageTable& stages = stage_table_select();
   const CameraMedium camera_medium(context);
   tbb::enumerable_thread_specific<Wavefront> workers([&] {
@@ -169,6 +175,77 @@ double cost_ratio(const Pilot& pilot, double samples, double photons_a_sample)
       (kPhotonRay * static_cast<double>(c.photon_rays) + kStored * pilot.stored) / static_cast<double>(c.photon_paths);
   const double searches = kSearch * static_cast<double>(c.surface_hits);
   return 1 + (searches + of_photons * photons_a_sample * samples) / rays;
+}
+
+/// Sends photons where the picture shows them, see photon_sources_guide.
+void photons_guide(const SceneContext& context,
+                   const RenderSettings& settings,
+                   const KernelGlobals& of_render,
+                   const std::atomic<bool>& stop,
+                   PhotonChoice& choice)
+{
+  PhotonSources& all = choice.sources;
+  if (all.sources.size() < 2) return;
+  // As many whatever is planned, so that the photons are the same if --resume takes more samples.
+  constexpr std::uint32_t kPaths = 16384;
+  KernelGlobals g = of_render;
+  Film film = pilot_film(settings, static_cast<double>(kPaths) / kPilotSamples, g);
+  // What is seen after one diffuse bounce; each further one would tell less.
+  g.limits.diffuse = std::min(g.limits.diffuse, 1);
+  g.caustics.time = 0.5f;
+  // Other numbers than the render's: chances that follow from its own would favour what they bring.
+  g.seed = ~g.seed;
+  const StageTable& stages = stage_table_select();
+  const CameraMedium camera_medium(context);
+  tbb::enumerable_thread_specific<Wavefront> workers([&] {
+    Wavefront worker(context.columns(true));
+    worker.stop = &stop;
+    if (camera_medium.exists()) worker.camera_medium = &camera_medium;
+    return worker;
+  });
+  std::vector<std::vector<RecordedRay>> rays(static_cast<std::size_t>(film.num_tiles()));
+  tbb::parallel_for(0, film.num_tiles(), [&](int tile) {
+    const FlushDenormals flush;
+    Wavefront& worker = workers.local();
+    worker.recorder = &rays[static_cast<std::size_t>(tile)];
+    worker.run(g, *context.accel, stages, context.surface_kernels(true), tile_batch(film, tile, 0, kPilotSamples));
+  });
+  std::vector<Vec3f> looks;
+  for (const std::vector<RecordedRay>& of_tile : rays) {
+    for (const RecordedRay& ray : of_tile) {
+      if (!ray.shadow && ray.t < kInfinity) looks.push_back(ray.O + ray.D * ray.t);
+    }
+  }
+  // Neighbours stand beside each other: what shows is told of groups of them where there are many.
+  constexpr std::size_t kMostGroups = 1024;
+  const std::size_t num_groups = std::min(all.sources.size(), kMostGroups);
+  std::vector<std::size_t> groups;
+  for (std::size_t j = 0; j <= num_groups; ++j) groups.push_back(j * all.sources.size() / num_groups);
+  std::vector<std::vector<Photon>> photons(num_groups);
+  tbb::parallel_for(std::size_t{0}, num_groups, [&](std::size_t j) {
+    if (stop.load(std::memory_order_relaxed)) return;
+    const FlushDenormals flush;
+    const double before = all.cdf[groups[j]], chance = all.cdf[groups[j + 1]] - before;
+    std::vector<double> cdf;
+    for (std::size_t s = groups[j]; s <= groups[j + 1]; ++s) cdf.push_back((all.cdf[s] - before) / chance);
+    // Two at least, so that there is one of each half.
+    const auto count = 2 * static_cast<std::uint32_t>(std::ceil(std::max(kPaths * chance, 1.0) / 2));
+    PhotonSourcesView view = all.view(count);
+    view.sources += groups[j];
+    view.num_sources = static_cast<std::uint32_t>(groups[j + 1] - groups[j]);
+    view.cdf = cdf.data();
+    view.factors = nullptr;
+    for (std::uint32_t first = 0; first < count; first += kBatchPaths) {
+      workers.local().trace_photons(g, *context.accel, stages, context.surface_kernels(true), view, first,
+                                    std::min(kBatchPaths, count - first), photons[j]);
+    }
+  });
+  const double denser =
+      photon_sources_guide(all, groups, photons, looks, photon_radius_for(photons, all.within));
+  if (!(denser > 1)) return;
+  char figures[96];
+  std::snprintf(figures, sizeof figures, "; photons lie %.2g times as dense where the picture shows them", denser);
+  choice.reason += figures;
 }
 
 }  // namespace
@@ -217,7 +294,10 @@ PhotonChoice photon_choice_make(const SceneContext& context,
   if (!choice.photons) return choice;
   choice.sources = photon_sources_make(context);
   const RenderSettings& settings = options.settings;
-  if (settings.caustics.mode == CausticsMode::kOn) return choice;
+  if (settings.caustics.mode == CausticsMode::kOn) {
+    photons_guide(context, settings, g, stop, choice);
+    return choice;
+  }
   const auto leave_to_paths = [&](std::string reason) {
     choice.photons = g.caustics.enabled = false;
     choice.sources = {};
@@ -258,6 +338,7 @@ PhotonChoice photon_choice_make(const SceneContext& context,
   std::snprintf(figures, sizeof figures, ": they take the squared error to 1/%.3g for %.3g times the cost",
                 choice.error_ratio, choice.cost_ratio);
   choice.reason += figures;
+  photons_guide(context, settings, g, stop, choice);
   return choice;
 }
 

@@ -293,18 +293,15 @@ void PhotonPass::next(KernelGlobals& g,
     std::size_t stored = 0;
     for (const std::vector<Photon>& chunk : chunks_) stored += chunk.size();
     stored_ += stored;
-    // Photons that are to lie within the radius of one in the first pass. On the scenes of benchmarks/caustics 16 to 32 had
-    // the least error from 1 to 64 passes with alpha = 3/4: more blurred, fewer left noise.
-    constexpr double kWithin = 24;
     if (!(first_radius_ > 0)) {
-      first_radius_ = settings_.radius > 0 ? settings_.radius : photon_radius_for(chunks_, kWithin);
+      first_radius_ = settings_.radius > 0 ? settings_.radius : photon_radius_for(chunks_, sources_.within);
     }
     // A single photon, or all at one point: their light is shown all the same.
     constexpr float kOfCaster = 0.1f;
     if (!(first_radius_ > 0) && stored_ > 0) first_radius_ = kOfCaster * box_radius(sources_.targets.front());
     if (first_radius_ > 0) {
       std::vector<float> radii = settings_.radius > 0 ? std::vector<float>(stored, first_radius_)
-                                                      : photon_radii(chunks_, kWithin, first_radius_, passes_);
+                                                      : photon_radii(chunks_, sources_.within, first_radius_, passes_);
       const auto factor = static_cast<float>(photon_radius_factor(passes_, settings_.alpha));
       for (float& radius : radii) radius *= factor;
       maps_[slot].build(chunks_, radii);

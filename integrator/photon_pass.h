@@ -26,6 +26,9 @@ struct PhotonSources {
   std::vector<std::int32_t> target_of;
   Box3 scene_box;
   std::vector<float> factors;  ///< on the power of each; none: 1
+  /// Photons that are to lie within the radius of one in the first pass. On the scenes of benchmarks/caustics 16 to 32 had the
+  /// least error from 1 to 64 passes with alpha = 3/4: more blurred, fewer left noise.
+  double within = 24;
 
   PhotonSourcesView view(double photons_a_pass) const;
 };
