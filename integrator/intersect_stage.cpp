@@ -213,6 +213,24 @@ std::uint32_t shadow_ray_depths(const PathState& state, const ShadowQueue& shado
   return depths - (1u << static_cast<int>(kind));
 }
 
+/// Of random numbers along a shadow ray, of which a path has several.
+std::uint32_t shadow_seed(const PathState& state, const ShadowQueue& shadow, std::uint32_t ray)
+{
+  const std::uint32_t path = shadow.path[ray];
+  const Vec3f D = shadow.D[ray];
+  std::uint32_t seed = hash_mix_32(state.pixel_hash[path] ^ state.sample_index[path] * 0x9e3779b9u);
+  for (const float part : {D.x, D.y, D.z, shadow.t_max[ray]}) {
+    seed = hash_mix_32(seed ^ __builtin_bit_cast(std::uint32_t, part));
+  }
+  return seed;
+}
+
+/// What graphs are told of a shadow ray that meets nothing yet.
+GraphRay shadow_ray_of(const ShadowContext& context, float time)
+{
+  return {1u << static_cast<int>(GraphRayKind::kShadow), context.depths, context.transparent, 0.0f, time};
+}
+
 /// What a graph may read where a shadow ray meets a surface.
 GraphPoint shadow_graph_point(const ShadowContext& context,
                               const MeshView& mesh,
@@ -386,7 +404,9 @@ void intersect_shadow(const KernelGlobals& g,
         if (start == ShadowStart::kAtHit && inside.hit_inside != kWholeWorld && medium_is_behind(inside, context.O)) {
           medium_cross(inside, inside.hit_inside, inside.hit_front);
         }
-        visibility[i] *= shadow_transmittance(g, inside, boundaries, shadow.t_max[i]);
+        const ShadowWay way{context.O, context.D, shadow.t_max[i], shadow_seed(state, shadow, i),
+                            shadow_ray_of(context, path_time(state, shadow.path[i]))};
+        visibility[i] *= shadow_transmittance(g, inside, boundaries, way);
       }
       boundaries.clear();
     }

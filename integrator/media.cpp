@@ -9,6 +9,7 @@
 #include "integrator/instance_hit.h"
 #include "kernel/stage/path_access.h"
 #include "kernel/volume/distance.h"
+#include "kernel/volume/medium_walk.h"
 
 namespace relief {
 
@@ -17,13 +18,19 @@ namespace {
 Vec3f sigma_t_of(const KernelGlobals& g, const MediumState& m)
 {
   Vec3f sum;
-  for (int i = 0; i < m.size; ++i) {
-    const std::int32_t instance = m.inside[i];
-    const std::int32_t medium =
-        instance == kWholeWorld ? g.world_medium : g.materials[g.instances[instance].material_index].medium_index;
-    sum += g.media[medium].sigma_t;
-  }
+  for (int i = 0; i < m.size; ++i) sum += g.media[medium_of_instance(g, m.inside[i])].sigma_t;
   return sum;
+}
+
+/// Of a part of a shadow ray that lies in the same media.
+Vec3f transmittance_of(const KernelGlobals& g, const MediumState& inside, const ShadowWay& way, float from, float to)
+{
+  if (!media_vary(g, inside)) return medium_transmittance(sigma_t_of(g, inside), to - from);
+  if (!(to > from)) return {1, 1, 1};
+  const auto number = __builtin_bit_cast(std::uint32_t, from);
+  MediumWalk walk =
+      medium_walk_make(g, inside, way.O + way.D * from, way.D, to - from, hash_mix_32(way.seed ^ hash_mix_32(number)));
+  return medium_walk_transmittance(g, walk, way.ray);
 }
 
 }  // namespace
@@ -146,7 +153,7 @@ void Media::start(PathState& state, std::uint32_t count) const
 Vec3f shadow_transmittance(const KernelGlobals& g,
                            MediumState inside,
                            std::vector<ShadowBoundary>& boundaries,
-                           float t_max)
+                           const ShadowWay& way)
 {
   std::sort(boundaries.begin(), boundaries.end(), [](const ShadowBoundary& a, const ShadowBoundary& b) {
     return std::tuple(a.t, a.instance, a.triangle) < std::tuple(b.t, b.instance, b.triangle);
@@ -154,12 +161,13 @@ Vec3f shadow_transmittance(const KernelGlobals& g,
   Vec3f passes{1, 1, 1};
   float from = 0;
   for (const ShadowBoundary& boundary : boundaries) {
-    passes *= medium_transmittance(sigma_t_of(g, inside), boundary.t - from);
+    passes *= transmittance_of(g, inside, way, from, boundary.t);
+    if (is_zero(passes)) return passes;
     from = boundary.t;
     medium_cross(inside, boundary.instance, boundary.is_front);
   }
-  if (!(t_max < kInfinity)) medium_leave_all(inside);
-  return passes * medium_transmittance(sigma_t_of(g, inside), t_max - from);
+  if (!(way.t_max < kInfinity)) medium_leave_all(inside);
+  return passes * transmittance_of(g, inside, way, from, way.t_max);
 }
 
 }  // namespace relief

@@ -49,12 +49,20 @@ struct ShadowBoundary {
   bool is_front;           ///< the ray enters
 };
 
-/// What media leave of a shadow ray.
+/// A shadow ray, as media along it ask.
+struct ShadowWay {
+  Vec3f O, D;          ///< world, unit
+  float t_max = 0;     ///< metres
+  std::uint32_t seed;  ///< of the random numbers by which media that vary are asked
+  GraphRay ray;        ///< what their graphs may read of it
+};
+
+/// What media leave of a shadow ray; where some vary, a random number of that mean.
 /// @param inside      those that it starts in; used up
 /// @param boundaries  all that it passes, in any order; sorted
 Vec3f shadow_transmittance(const KernelGlobals& g,
                            MediumState inside,
                            std::vector<ShadowBoundary>& boundaries,
-                           float t_max);
+                           const ShadowWay& way);
 
 }  // namespace relief

@@ -474,6 +474,7 @@ RenderedImage render(const Scene& scene,
   const CameraMedium camera_medium(context);
   const Media media(context);
   for (std::string& text : media.problems()) stats.warnings.push_back(std::move(text));
+  for (const std::string& text : context.varying_media.problems()) stats.warnings.push_back(text);
   for (std::string& text : camera_medium.overlaps()) stats.warnings.push_back(std::move(text));
   Workers workers([&] {
     Wavefront worker(columns);

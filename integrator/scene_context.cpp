@@ -146,6 +146,8 @@ SceneContext::SceneContext(const Scene& loaded,
   accel = std::make_unique<Accel>(scene, lights.lights, lights.area_lights, displacements, *this, shadow_filter,
                                   std::move(trees));
 
+  varying_media.make(*this);
+  globals.varying_media = varying_media.view();
   globals.graph_scene.rays = graph_rays_make(*this);
   globals.area_light_index = lights.area_lights.data();
   globals.num_area_lights = static_cast<std::uint32_t>(lights.area_lights.size());

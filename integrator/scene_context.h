@@ -9,6 +9,7 @@
 #include "integrator/light_set.h"
 #include "integrator/scene_displacement.h"
 #include "integrator/scene_views.h"
+#include "integrator/varying_media.h"
 #include "integrator/wavefront.h"
 #include "kernel/bsdf/energy_tables.h"
 #include "kernel/globals.h"
@@ -42,6 +43,7 @@ struct SceneContext : SceneViews {
   const Scene& scene;
   std::vector<GraphProgramView> graphs;
   std::vector<Medium> media;  ///< the scene's, then what fills all space
+  VaryingMedia varying_media;
   LightSet lights;
   std::vector<std::uint8_t> surface_kernel, surface_kernel_of_paths;  ///< a material; the latter's know no photons
   std::unique_ptr<BsdfTables> bsdf_tables;

@@ -27,6 +27,7 @@ struct BounceLimits {
 enum class LightTechnique : std::uint8_t { kMis, kLightSampling, kBsdfSampling };
 
 struct KernelGlobals;
+struct VaryingMedium;  // kernel/volume/varying_medium.h
 
 /// A point of a light and a ray that takes light from there.
 struct EmitterPoint {
@@ -47,6 +48,7 @@ struct KernelGlobals {
   const Material* materials = nullptr;
   const Medium* media = nullptr;             ///< by Material::medium_index
   std::int32_t world_medium = -1;            ///< into media: what fills all space; −1: nothing
+  const VaryingMedium* varying_media = nullptr;  ///< as media, those without a program are even; null: all are
   const GraphProgramView* graphs = nullptr;  ///< by Material::graph_index and Lamp::graph_index
   GraphRun run_graph = nullptr;
   EmitterRadiance emitter_radiance = nullptr;

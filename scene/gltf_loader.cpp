@@ -650,11 +650,12 @@ void GltfLoader::read_programs(const GltfDocument& document,
   const auto read = [&](const JsonReader* graph, const JsonReader* surface, const JsonReader* volume) {
     GraphPrograms programs = graph_read(document, graph, surface, volume, textures_, scene_.attribute_names, warnings_);
     if (programs.volume) {
-      if (!programs.volume->program.inputs.empty()) {
-        volume->fail("closures", "numbers, or nodes that do not depend on where they are", "nodes that do");
-      }
+      const bool is_even = medium_is_even(*programs.volume);
+      // Their bounds are of interest, as those of heights are.
+      for (const int texture : graph_textures(programs.volume->program)) textures_.use_for_heights(texture);
       material.medium_index = static_cast<int>(scene_.media.size());
-      scene_.media.push_back(medium_of(programs.volume->program, programs.volume->closures));
+      scene_.media.push_back(is_even ? medium_of(*programs.volume) : Medium{});
+      scene_.varying_media.push_back(is_even ? VolumeProgram{} : std::move(*programs.volume));
     }
     if (!programs.surface) return;
     const auto add = [this](GraphProgram&& program) {

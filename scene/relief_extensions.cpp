@@ -300,8 +300,11 @@ std::optional<Environment> relief_environment(const GltfDocument& document,
     e.hidden_from = read_hidden_from(r);
     if (r.has("volume")) {
       const JsonReader volume = r.object("volume");
-      const VolumeProgram medium = volume_read(document, volume, textures, warnings);
-      e.medium = medium_of(medium.program, medium.closures);
+      VolumeProgram medium = volume_read(document, volume, textures, warnings);
+      const bool is_even = medium_is_even(medium);
+      for (const int texture : graph_textures(medium.program)) textures.use_for_heights(texture);
+      e.medium = is_even ? medium_of(medium) : Medium{};
+      if (!is_even) e.varying_medium = std::move(medium);
     }
     if (r.has("clearGlass")) e.clear_roughness = r.number_f("clearGlass", 0, 0, 1);
     if (r.has("backdrop")) {

@@ -106,6 +106,7 @@ struct Environment : Surroundings {
   bool casts_caustics = true;     ///< as Light::casts_caustics
   std::uint32_t hidden_from = 0;  ///< bit PathEvent: bounced rays that do not see it
   std::optional<Medium> medium;   ///< that fills all space
+  VolumeProgram varying_medium;   ///< see Scene::varying_media
   /// Perceptual: where the camera does not see it, glass up to this roughness is as clear as air. Empty: glass is opaque.
   std::optional<float> clear_roughness;
 };
@@ -123,6 +124,7 @@ struct Scene {
   std::vector<Material> materials;
   std::vector<std::string> material_names;
   std::vector<Medium> media;                 ///< by Material::medium_index
+  std::vector<VolumeProgram> varying_media;  ///< likewise: what gives those that vary, which are empty in `media`
   std::vector<GraphProgram> graphs;          ///< by Material::graph_index and so on, and by Lamp::graph_index
   std::vector<std::string> attribute_names;  ///< of attributes that graphs read
   std::vector<InstanceColumn> instance_columns;

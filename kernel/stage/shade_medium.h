@@ -4,6 +4,9 @@
 // Light is asked for at a point of its own on every stretch, not where the path scatters: in thin fog few paths do. The point is by
 // how light is weakened or, near a small light, as often by how near that is, and weighed as the sum of both (Kulla and Fajardo
 // 2012). Against lights that paths meet, what is found is weighed by direction, as at surfaces.
+//
+// Where media vary, light is asked for and the path is scattered at one of the tentative collisions (medium_walk.h), each chosen by
+// what it carries. All of them are walked to the end of the stretch, so that light is asked for on every one of these as well.
 #pragma once
 
 #include "kernel/counters.h"
@@ -11,6 +14,7 @@
 #include "kernel/sample/sobol.h"
 #include "kernel/stage/shade_surface.h"
 #include "kernel/volume/distance.h"
+#include "kernel/volume/medium_walk.h"
 
 namespace relief {
 
@@ -26,10 +30,7 @@ RELIEF_KERNEL MediaSum path_media(const KernelGlobals& g, const MediumState& m)
 {
   MediaSum sum;
   for (int i = 0; i < m.size; ++i) {
-    const std::int32_t instance = m.inside[i];
-    const std::int32_t medium =
-        instance == kWholeWorld ? g.world_medium : g.materials[g.instances[instance].material_index].medium_index;
-    media_add(sum, g.media[medium]);
+    media_add(sum, g.media[medium_of_instance(g, m.inside[i])]);
   }
   return sum;
 }
@@ -44,29 +45,31 @@ struct MediumPlace {
 /// light there is as even as the medium.
 inline constexpr float kNearLight = 4.0f;
 
+/// A stretch as it is seen from one of the small lights that light it.
+/// @param middle  metres along the stretch, from where lights are chosen
+/// @return        its distance is 0 where there is none
+RELIEF_KERNEL Equiangular medium_near(const KernelGlobals& g, const MediumStretch& at, float middle, float time)
+{
+  const Vec2f v = sample_2d(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kPivot));
+  const auto bits = [](float x) { return static_cast<std::uint32_t>(x * 0x1p24f) << 8; };
+  const Vec3f P = at.O + at.D * middle;
+  const LightsChoice chosen = lights_choose(g.lights, P, {}, choice_point(bits(v.x), bits(v.y)));
+  if (!(chosen.probability > 0.0f && chosen.ref.light_index >= 0)) return {};
+  Light storage;
+  const Light& emitter = lights_at(g.lights, chosen.ref, storage, time);
+  const LightSample light = lights_sample_chosen(g.lights, chosen, &emitter, P, {});
+  if (!(light.pdf > 0.0f && light.distance < kInfinity)) return {};
+  return equiangular_make(at.O, at.D, at.length, P + light.wi * light.distance);
+}
+
 /// Chooses where light is asked for.
 RELIEF_KERNEL MediumPlace medium_place(const KernelGlobals& g, const MediumStretch& at, Vec3f sigma_t, float time)
 {
   const Vec2f u = sample_2d(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kDirect));
   const float sigma = channel_choose(sigma_t, at.chances, u.y);
   const float densest = max_component(sigma_t);
-  Equiangular near;
-  {
-    const Vec2f v = sample_2d(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kPivot));
-    const auto bits = [](float x) { return static_cast<std::uint32_t>(x * 0x1p24f) << 8; };
-    const float middle = min(0.5f * at.length, densest > 0.0f ? 1.0f / densest : at.length);
-    const Vec3f P = at.O + at.D * middle;
-    const LightsChoice chosen = lights_choose(g.lights, P, {}, choice_point(bits(v.x), bits(v.y)));
-    if (chosen.probability > 0.0f && chosen.ref.light_index >= 0) {
-      Light storage;
-      const Light& emitter = lights_at(g.lights, chosen.ref, storage, time);
-      const LightSample light = lights_sample_chosen(g.lights, chosen, &emitter, P, {});
-      if (light.pdf > 0.0f && light.distance < kInfinity) {
-        near = equiangular_make(at.O, at.D, at.length, P + light.wi * light.distance);
-        if (near.distance * densest > kNearLight) near.distance = 0.0f;
-      }
-    }
-  }
+  Equiangular near = medium_near(g, at, min(0.5f * at.length, densest > 0.0f ? 1.0f / densest : at.length), time);
+  if (near.distance * densest > kNearLight) near.distance = 0.0f;
   MediumPlace place;
   float x = u.x;
   const bool is_near = near.distance > 0.0f;
@@ -82,17 +85,18 @@ RELIEF_KERNEL MediumPlace medium_place(const KernelGlobals& g, const MediumStret
 }
 
 /// Queues a shadow ray from a place on a stretch.
-RELIEF_KERNEL void shade_medium_light(const KernelGlobals& g,
-                                      const PathState& state,
-                                      std::uint32_t path,
-                                      const MediumStretch& at,
-                                      const MediaSum& media,
-                                      ChoicePoint u,
-                                      ShadowQueue& shadow)
+/// @param carried  what gets there of the path's light
+RELIEF_KERNEL void shade_medium_light_at(const KernelGlobals& g,
+                                         const PathState& state,
+                                         std::uint32_t path,
+                                         const MediumStretch& at,
+                                         const MediaSum& media,
+                                         MediumPlace place,
+                                         Vec3f carried,
+                                         ChoicePoint u,
+                                         ShadowQueue& shadow)
 {
   const float time = path_time(state, path);
-  const MediumPlace place = medium_place(g, at, media.sigma_t, time);
-  if (!(place.pdf > 0.0f) || !(place.distance < kInfinity)) return;
   const Vec3f P = at.O + at.D * place.distance;
   const LightsChoice chosen = lights_choose(g.lights, P, {}, u);
   if (!(chosen.probability > 0.0f)) return;
@@ -109,8 +113,7 @@ RELIEF_KERNEL void shade_medium_light(const KernelGlobals& g,
   if (is_zero(radiance)) return;
   const PhaseEval phase = media_eval(media, at.D, light.wi);
   const float weight = path_light_weight(g.light_technique, light.pdf, phase.pdf, light.delta);
-  const Vec3f gain = path_throughput(state, path) * medium_transmittance(media.sigma_t, place.distance) * phase.f *
-                     radiance * (weight / (light.pdf * place.pdf));
+  const Vec3f gain = carried * phase.f * radiance * (weight / (light.pdf * place.pdf));
   if (is_zero(gain)) return;
   Vec3f D;
   float t_max = 0;
@@ -119,6 +122,38 @@ RELIEF_KERNEL void shade_medium_light(const KernelGlobals& g,
       ray_cone_propagate({state.cone_width[path], state.cone_spread[path]}, state.t_min[path] + place.distance);
   shadow_queue_push(shadow, path, P, D, t_max, cone, gain,
                     static_cast<std::uint32_t>(path_bounces(state.bounces[path], BounceKind::kAll) + 1));
+}
+
+/// Chance with which light is asked for on a stretch: always on what the camera sees, and else by what is scattered there, as thin
+/// media are passed more often than they are seen.
+/// @param scattered  share of the path's light, at most 1
+/// @return           0: it is not asked for this time
+RELIEF_KERNEL float medium_asks(const PathState& state, std::uint32_t path, const MediumStretch& at, float scattered)
+{
+  const float chance = min(1.0f, 2.0f * scattered);
+  if (path_bounces(state.bounces[path], BounceKind::kAll) == 0 || !(chance < 1.0f)) return 1.0f;
+  // What the number decides else is of no account where it is asked for light.
+  const float u = sample_1d(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kFate));
+  return u < chance ? chance : 0.0f;
+}
+
+/// Queues a shadow ray from a place on a stretch through media that are even.
+RELIEF_KERNEL void shade_medium_light(const KernelGlobals& g,
+                                      const PathState& state,
+                                      std::uint32_t path,
+                                      const MediumStretch& at,
+                                      const MediaSum& media,
+                                      ChoicePoint u,
+                                      ShadowQueue& shadow)
+{
+  const float chance =
+      medium_asks(state, path, at, max_component(Vec3f{1, 1, 1} - medium_transmittance(media.sigma_t, at.length)));
+  if (!(chance > 0.0f)) return;
+  MediumPlace place = medium_place(g, at, media.sigma_t, path_time(state, path));
+  place.pdf *= chance;
+  if (!(place.pdf > 0.0f) || !(place.distance < kInfinity)) return;
+  const Vec3f carried = path_throughput(state, path) * medium_transmittance(media.sigma_t, place.distance);
+  shade_medium_light_at(g, state, path, at, media, place, carried, u, shadow);
 }
 
 /// Sends a path on from where it is scattered, or ends it.
@@ -139,7 +174,7 @@ RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
   if (!(phase.pdf > 0.0f)) return;
   throughput *= phase.f / phase.pdf;
   const bool first = path_bounces(state.bounces[path], BounceKind::kAll) == 0;
-  const float carried = max_component(throughput);
+  const float carried = max_component(abs(throughput));
   if (first) {
     state.first_throughput[path] = min(1.0f, carried);
   } else {
@@ -164,6 +199,154 @@ RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
   queue_push(next, path);
 }
 
+/// Adds what media on a stretch send towards where the path came from.
+RELIEF_KERNEL void shade_medium_emission(const KernelGlobals& g, PathState& state, std::uint32_t path, Vec3f emitted)
+{
+  const int bounce = path_bounces(state.bounces[path], BounceKind::kAll);
+  if (bounce == 0) film_add_emission(g.film, state.pixel[path], emitted);
+  path_add_denoising(g, state, path, emitted);
+  path_add_radiance(g, state, path, bounce, emitted);
+}
+
+/// Whether a path has had all its scatterings.
+RELIEF_KERNEL bool shade_medium_is_last(const KernelGlobals& g, const PathState& state, std::uint32_t path)
+{
+  const std::uint32_t bounces = state.bounces[path];
+  return path_bounces(bounces, BounceKind::kAll) > g.limits.total || (state.flags[path] & kPathLast) != 0 ||
+         path_bounces(bounces, BounceKind::kDiffuse) > g.limits.diffuse ||
+         path_bounces(bounces, BounceKind::kGlossy) > g.limits.glossy ||
+         path_bounces(bounces, BounceKind::kTransmission) > g.limits.transmission;
+}
+
+/// Notes for denoising where a path is first scattered.
+/// @param albedo  of the place, with what the path has passed
+RELIEF_KERNEL void shade_medium_feature(const KernelGlobals& g,
+                                        PathState& state,
+                                        std::uint32_t path,
+                                        const MediumStretch& at,
+                                        Vec3f albedo)
+{
+  if (!g.film.layout.denoising || (state.flags[path] & kPathSawFeature) != 0) return;
+  state.flags[path] |= kPathSawFeature;
+  film_add_denoising(g.film, state.pixel[path], sample_is_even(at.sample, g.log2_stream), albedo, {});
+}
+
+RELIEF_KERNEL Vec3f medium_albedo(const MediaSum& media)
+{
+  const auto albedo = [](float scattered, float all) { return all > 0.0f ? scattered / all : 0.0f; };
+  return {albedo(media.sigma_s.x, media.sigma_t.x), albedo(media.sigma_s.y, media.sigma_t.y),
+          albedo(media.sigma_s.z, media.sigma_t.z)};
+}
+
+/// One of several collisions, each kept as likely as by what it carries.
+struct KeptCollision {
+  float total = 0;  ///< what all of them carry, channels added
+  float share = 0;  ///< what this one does
+  float distance = 0;
+  Vec3f weight;  ///< what gets there of the path's light, over the rate
+  Medium varying[kMostMedia];
+};
+
+/// What light carries, channels added: what choices are made by.
+RELIEF_KERNEL float carried_share(Vec3f carried)
+{
+  const Vec3f size = abs(carried);
+  return size.x + size.y + size.z;
+}
+
+/// @param k  its place among the collisions
+/// @param u  [0, 1)
+RELIEF_KERNEL void collision_offer(KeptCollision& kept,
+                                   const MediumWalk& walk,
+                                   const MediumCollisions& collisions,
+                                   int k,
+                                   Vec3f weight,
+                                   float share,
+                                   float u)
+{
+  kept.total += share;
+  if (!(u * kept.total < share)) return;
+  kept.share = share;
+  kept.distance = collisions.t[k];
+  kept.weight = weight;
+  for (int i = 0; i < walk.size; ++i) kept.varying[i] = collisions.media[i][k];
+}
+
+RELIEF_KERNEL MediaSum collision_media(const MediumWalk& walk, const KeptCollision& kept)
+{
+  MediaSum sum = walk.even;
+  for (int i = 0; i < walk.size; ++i) media_add(sum, kept.varying[i]);
+  return sum;
+}
+
+/// As shade_medium_stretch, where some of the media vary.
+[[gnu::noinline]] RELIEF_KERNEL bool shade_medium_varying(const KernelGlobals& g,
+                                                          PathState& state,
+                                                          std::uint32_t path,
+                                                          const MediumStretch& at,
+                                                          QueueView& next,
+                                                          ShadowQueue& shadow)
+{
+  const bool is_first = path_bounces(state.bounces[path], BounceKind::kAll) == 0;
+  const bool last = shade_medium_is_last(g, state, path);
+  const Vec3f throughput = path_throughput(state, path);
+  const std::uint32_t seed = hash_mix_32(at.hash ^ hash_mix_32(at.sample * 0x9e3779b9u + at.number));
+  MediumWalk walk = medium_walk_make(g, state.media[path], at.O, at.D, at.length, seed);
+  if (!last && g.has_lights && walk.reach > 0.0f) {
+    const Equiangular near = medium_near(g, at, 0.5f * min(walk.reach, at.length), path_time(state, path));
+    if (near.distance > 0.0f && near.distance < walk.reach) medium_walk_approach(walk, near);
+  }
+  const GraphRay ray{path_ray_kinds(state, path), state.bounces[path], state.flags[path] >> kPathTransparentShift, 0.0f,
+                     path_time(state, path)};
+  Vec3f carried = throughput, emitted;
+  Vec3f left{1, 1, 1};
+  KeptCollision scattered, lit;
+  MediumCollisions collisions;
+  for (bool goes_on = !is_zero(throughput); goes_on;) {
+    goes_on = medium_collisions_next(g, walk, ray, collisions);
+    for (int k = 0; k < collisions.size; ++k) {
+      const MediaSum media = medium_collision(walk, collisions, k);
+      const Vec3f weight = carried / collisions.rate[k];
+      emitted += weight * media.emission;
+      const float share = last ? 0.0f : carried_share(weight * media.sigma_s);
+      if (share > 0.0f) {
+        collision_offer(scattered, walk, collisions, k, weight, share, counted_next(walk.numbers));
+        if (g.has_lights) {
+          // Light is asked for as likely as it is near, or where there is nothing like that.
+          const float near = 1.0f + medium_walk_near_rate(walk, collisions.t[k]) * walk.reach;
+          collision_offer(lit, walk, collisions, k, weight, share * near, counted_next(walk.numbers));
+        }
+      }
+      left *= Vec3f{1, 1, 1} - media.sigma_t / collisions.rate[k];
+      if (!is_zero(left)) left *= medium_walk_survive(walk, left);
+      carried = throughput * left;
+      goes_on = goes_on && !is_zero(carried);
+      if (is_zero(carried)) break;
+    }
+  }
+  if (!is_zero(emitted)) shade_medium_emission(g, state, path, emitted);
+  const Sample2dX4 u = sample_2d_x4(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kLight));
+  const float all = scattered.total + carried_share(carried);
+  if (lit.total > 0.0f) {
+    const float chance = medium_asks(state, path, at, scattered.total / all);
+    if (chance > 0.0f) {
+      shade_medium_light_at(g, state, path, at, collision_media(walk, lit),
+                            {lit.distance, chance * lit.share / lit.total}, lit.weight,
+                            choice_point(u.first_bits[0], u.first_bits[1]), shadow);
+    }
+  }
+  if (u.at[2].x * all < scattered.total) {
+    const MediaSum media = collision_media(walk, scattered);
+    shade_medium_feature(g, state, path, at, throughput * medium_albedo(media));
+    shade_medium_scatter(g, state, path, at, media, scattered.weight * (all / scattered.share), scattered.distance,
+                         u.at[1], next);
+    return false;
+  }
+  const float passing = carried_share(carried);
+  state.throughput[path] = passing > 0.0f ? carried * (all / passing) : Vec3f{};
+  return passing > 0.0f || is_first;
+}
+
 /// Takes a path through the media between where its ray starts and what it has met.
 /// @return  whether it gets there; else it has gone on elsewhere, or ended
 RELIEF_KERNEL bool shade_medium_stretch(const KernelGlobals& g,
@@ -173,8 +356,6 @@ RELIEF_KERNEL bool shade_medium_stretch(const KernelGlobals& g,
                                         ShadowQueue& shadow)
 {
   MediumState& m = state.media[path];
-  const MediaSum media = path_media(g, m);
-  const Vec3f sigma_t = media.sigma_t;
   const Vec3f D = path_direction(state, path);
   const float start = state.t_min[path];
   MediumStretch at{path_origin(state, path) + D * start,
@@ -184,28 +365,20 @@ RELIEF_KERNEL bool shade_medium_stretch(const KernelGlobals& g,
                    state.sample_index[path],
                    m.stretches++,
                    {}};
-  const std::uint32_t bounces = state.bounces[path];
-  const int bounce = path_bounces(bounces, BounceKind::kAll);
+  if (media_vary(g, m)) return shade_medium_varying(g, state, path, at, next, shadow);
+  const MediaSum media = path_media(g, m);
+  const Vec3f sigma_t = media.sigma_t;
   const Vec3f throughput = path_throughput(state, path);
   if (!is_zero(media.emission)) {
     const Vec3f emitted = throughput * media.emission * medium_transmittance_integral(sigma_t, at.length);
     // What shines on an infinite way, and takes nothing away, has no radiance.
-    if (is_finite(emitted)) {
-      if (bounce == 0) film_add_emission(g.film, state.pixel[path], emitted);
-      path_add_denoising(g, state, path, emitted);
-      path_add_radiance(g, state, path, bounce, emitted);
-    }
+    if (is_finite(emitted)) shade_medium_emission(g, state, path, emitted);
   }
-  const bool last = bounce > g.limits.total || (state.flags[path] & kPathLast) != 0 ||
-                    path_bounces(bounces, BounceKind::kDiffuse) > g.limits.diffuse ||
-                    path_bounces(bounces, BounceKind::kGlossy) > g.limits.glossy ||
-                    path_bounces(bounces, BounceKind::kTransmission) > g.limits.transmission;
-  const auto albedo = [](float scattered, float all) { return all > 0.0f ? scattered / all : 0.0f; };
-  const Vec3f carried = throughput * Vec3f{albedo(media.sigma_s.x, sigma_t.x), albedo(media.sigma_s.y, sigma_t.y),
-                                           albedo(media.sigma_s.z, sigma_t.z)};
-  if (last || !(at.length > 0.0f) || !(max_component(carried) > 0.0f)) {
+  const bool is_first = path_bounces(state.bounces[path], BounceKind::kAll) == 0;
+  const Vec3f carried = throughput * medium_albedo(media);
+  if (shade_medium_is_last(g, state, path) || !(at.length > 0.0f) || !(max_component(carried) > 0.0f)) {
     state.throughput[path] = throughput * medium_transmittance(sigma_t, at.length);
-    return !is_zero(path_throughput(state, path)) || bounce == 0;
+    return !is_zero(path_throughput(state, path)) || is_first;
   }
   at.chances = channel_chances(carried);
   const Sample2dX4 u = sample_2d_x4(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kLight));
@@ -217,17 +390,14 @@ RELIEF_KERNEL bool shade_medium_stretch(const KernelGlobals& g,
     const Vec3f left = medium_transmittance(sigma_t, distance);
     const float pdf = dot(at.chances, sigma_t * left);
     if (!(pdf > 0.0f)) return false;
-    if (g.film.layout.denoising && (state.flags[path] & kPathSawFeature) == 0) {
-      state.flags[path] |= kPathSawFeature;
-      film_add_denoising(g.film, state.pixel[path], sample_is_even(at.sample, g.log2_stream), carried, {});
-    }
+    shade_medium_feature(g, state, path, at, carried);
     shade_medium_scatter(g, state, path, at, media, throughput * left / pdf, distance, u.at[1], next);
     return false;
   }
   const Vec3f left = medium_transmittance(sigma_t, at.length);
   const float chance = dot(at.chances, left);
   state.throughput[path] = chance > 0.0f ? throughput * left / chance : Vec3f{};
-  return chance > 0.0f || bounce == 0;
+  return chance > 0.0f || is_first;
 }
 
 enum class MediumHit : std::uint8_t { kSurface, kLight, kNothing };

@@ -19,7 +19,7 @@ struct Phase {
 
 struct Medium {
   Vec3f sigma_t;   ///< 1/m; not less than what the phases scatter
-  Vec3f emission;  ///< W/m³/sr
+  Vec3f emission;  ///< W/m³/sr; below 0 it takes light away
   Phase phases[kMostPhases];
   int num_phases = 0;
 };

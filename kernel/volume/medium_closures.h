@@ -1,4 +1,4 @@
-// The closures that RELIEF_volume is a weighted list of, and the medium that they come to.
+// The medium that the closures of RELIEF_volume come to.
 #pragma once
 
 #include <span>
@@ -7,16 +7,9 @@
 #include "kernel/graph/blackbody.h"
 #include "kernel/graph/graph_registers.h"
 #include "kernel/volume/medium.h"
+#include "kernel/volume/volume_closure.h"
 
 namespace relief {
-
-enum class VolumeClosureKind : std::uint8_t { kAbsorption, kScatter, kPrincipled, kEmission };
-
-/// One closure of a medium.
-struct VolumeClosureSpec {
-  VolumeClosureKind kind = VolumeClosureKind::kAbsorption;
-  std::uint16_t first_result = 0;  ///< its weight among the program's results, then its inputs, float by float
-};
 
 /// Phase functions that a closure has.
 RELIEF_KERNEL constexpr int volume_closure_phases(VolumeClosureKind kind)
@@ -37,7 +30,7 @@ RELIEF_KERNEL Vec3f volume_blackbody(float share, Vec3f tint, float kelvins)
 
 /// What a medium's closures come to at one point.
 /// @param at  of the medium's program, which has run
-/// @source    Cycles: the Principled Volume's emission is not weighted by the mixes that it is in
+/// @source    Cycles: the Principled Volume's emission is not weighted by the mixes that it is in, and none is cut off at 0
 RELIEF_KERNEL Medium medium_resolve(std::span<const VolumeClosureSpec> closures, const GraphLane& at)
 {
   Medium medium;
@@ -74,18 +67,17 @@ RELIEF_KERNEL Medium medium_resolve(std::span<const VolumeClosureSpec> closures,
         const Vec3f absorbed = max(Vec3f{1, 1, 1} - scattered, Vec3f{}) * max(Vec3f{1, 1, 1} - root, Vec3f{});
         medium.sigma_t += (scattered + absorbed) * density;
         const float strength = max(number(), 0.0f);
-        medium.emission += max(color(), Vec3f{}) * strength;
+        medium.emission += color() * strength;
         const float share = number();
         const Vec3f tint = color();
         medium.emission += volume_blackbody(share, tint, number());
         break;
       }
       case VolumeClosureKind::kEmission:
-        medium.emission += max(first_color, Vec3f{}) * (weight * max(first_number, 0.0f));
+        medium.emission += first_color * (weight * first_number);
         break;
     }
   }
-  medium.emission = max(medium.emission, Vec3f{});
   return medium;
 }
 

@@ -5,6 +5,7 @@
 
 #include "kernel/graph/graph_op.h"
 #include "kernel/graph/graph_program.h"
+#include "kernel/volume/volume_closure.h"
 
 namespace relief {
 
@@ -24,6 +25,12 @@ struct GraphProgram {
 
   GraphProgramView view() const;
   std::size_t bytes() const;
+};
+
+/// What gives a medium.
+struct VolumeProgram {
+  GraphProgram program;
+  std::vector<VolumeClosureSpec> closures;  ///< none: the medium is even
 };
 
 /// The textures that a program reads, each as often as it does.

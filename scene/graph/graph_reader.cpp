@@ -388,7 +388,8 @@ VolumeProgram volume_read(const GltfDocument& document,
                           Warnings& warnings)
 {
   std::vector<std::string> attribute_names;  // there are none
-  return *graph_read(document, nullptr, nullptr, &volume, textures, attribute_names, warnings).volume;
+  const JsonReader* graph = volume.has("nodes") ? &volume : nullptr;
+  return *graph_read(document, graph, nullptr, &volume, textures, attribute_names, warnings).volume;
 }
 
 GraphProgram graph_read_color(const GltfDocument& document,

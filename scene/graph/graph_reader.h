@@ -13,12 +13,6 @@
 
 namespace relief {
 
-/// What gives a medium.
-struct VolumeProgram {
-  GraphProgram program;
-  std::vector<VolumeClosureSpec> closures;
-};
-
 /// The programs of a material.
 struct GraphPrograms {
   std::optional<GraphProgram> surface;       ///< none: there is neither RELIEF_surface nor an output of the graph
@@ -41,8 +35,8 @@ GraphPrograms graph_read(const GltfDocument& document,
                          std::vector<std::string>& attribute_names,
                          Warnings& warnings);
 
-/// Reads a medium without a graph.
-/// @param volume  its object, with `closures`
+/// Reads a medium that no material has.
+/// @param volume  its object, with `closures` and, if they refer to some, `nodes`
 /// @error         likewise
 VolumeProgram volume_read(const GltfDocument& document,
                           const JsonReader& volume,

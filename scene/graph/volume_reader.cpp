@@ -71,7 +71,8 @@ std::vector<VolumeClosureSpec> volume_closures_read(const JsonReader& reader,
         const bool is_given = value.v[c].index >= 0;
         const GraphScalar a = is_given ? value.v[c] : build.constant(socket.value[c]);
         float known = 0;
-        const bool is_signed = socket.name == "anisotropy" || socket.name == "blackbodyTint";
+        const bool is_signed = kind == VolumeClosureKind::kEmission || socket.name == "anisotropy" ||
+                               socket.name == "blackbodyTint" || socket.name == "emissionColor";
         if (build.is_constant(a, &known) && known < 0.0f && !is_signed) {
           warnings.add(r.file() + ": " + json_path_join(r.path(), std::string(socket.name)) +
                        ": below 0, which counts as 0");
@@ -86,12 +87,17 @@ std::vector<VolumeClosureSpec> volume_closures_read(const JsonReader& reader,
   return closures;
 }
 
-Medium medium_of(const GraphProgram& program, std::span<const VolumeClosureSpec> closures)
+bool medium_is_even(const VolumeProgram& volume)
 {
-  const GraphProgramView view = program.view();
+  return volume.program.inputs.empty() && graph_textures(volume.program).empty();
+}
+
+Medium medium_of(const VolumeProgram& volume)
+{
+  const GraphProgramView view = volume.program.view();
   GraphRegisters registers;
   graph_program_run(view, registers);
-  return medium_resolve(closures, {&view, &registers, 0});
+  return medium_resolve(volume.closures, {&view, &registers, 0});
 }
 
 }  // namespace relief

@@ -14,8 +14,10 @@ std::vector<VolumeClosureSpec> volume_closures_read(const JsonReader& reader,
                                                     GraphBuilder& build,
                                                     Warnings& warnings);
 
-/// The medium of closures that depend on nothing.
-/// @param program  without inputs
-Medium medium_of(const GraphProgram& program, std::span<const VolumeClosureSpec> closures);
+/// Whether a medium is the same everywhere.
+bool medium_is_even(const VolumeProgram& volume);
+
+/// @pre medium_is_even
+Medium medium_of(const VolumeProgram& volume);
 
 }  // namespace relief

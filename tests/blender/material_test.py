@@ -247,26 +247,6 @@ def test_what_later_principled_surfaces_have_is_warned_about():
         assert_warns(_stage(material), 'material "later"', "a thin wall")
 
 
-def test_a_volume_that_is_left_out_is_transparent():
-    """A domain of fog around camera and scene: not a black box, but the scene without fog, and a word."""
-    import numpy as np
-    from scenes import folder, render
-
-    scene = _stage(diffuse((0.7, 0.7, 0.2)))
-    with folder() as path:
-        clear = render(scene, "RELIEF", f"{path}/picture.exr", samples=64)
-        material, tree, node = new_material("fog", "ShaderNodeVolumeScatter")
-        output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
-        tree.links.remove(output.inputs["Surface"].links[0])
-        tree.links.new(node.outputs[0], output.inputs["Volume"])
-        tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[0], node.inputs["Density"])
-        bpy.ops.mesh.primitive_cube_add(size=30)
-        bpy.context.object.data.materials.append(material)
-        assert_warns(scene, 'material "fog"', "varies in a volume", "left out")
-        picture = render(scene, "RELIEF", f"{path}/picture.exr", samples=64)
-    assert np.abs(picture - clear).mean() < 0.05 * clear.mean(), (picture.mean(), clear.mean())
-
-
 def test_a_volume_behind_an_opaque_surface_is_not_seen():
     material, tree, node = new_material("filled", "ShaderNodeBsdfDiffuse", Color=(0.2, 0.7, 0.4, 1))
     volume = tree.nodes.new("ShaderNodeVolumePrincipled")

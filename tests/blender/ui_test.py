@@ -15,7 +15,7 @@ _MISSING = {
     "render: CyclesRenderSettings.bake_type": "relief does not bake",
     "render: operator object.bake*": "relief does not bake",
     "*: *.volume_*": "nothing goes by steps, and lights are looked for in one way",
-    "*: *.homogeneous_volume": "what varies is left out, with a warning",
+    "*: *.homogeneous_volume": "what is even is found to be",
     "*: *.use_volumes": "no smoke; a warning tells",
     "*: *.use_pass_volume_*": "no passes of volumes; a warning tells",
     "*: *.visible_volume_scatter": "what scatters in volumes sees all lamps and things",

@@ -77,27 +77,16 @@ def test_settings_of_things_that_change_cycles_picture_alone():
         _assert_warned_once(change, *texts)
 
 
-def test_fog_of_the_world_that_varies_is_told():
-    def fill(scene):
-        tree = scene.world.node_tree
-        volume = tree.nodes.new("ShaderNodeVolumeScatter")
-        tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[0], volume.inputs["Density"])
-        tree.links.new(volume.outputs[0], tree.nodes["World Output"].inputs["Volume"])
-
-    _assert_warned_once(fill, "world", "volume that fills the world and varies", "dims what is far")
-
-
-def test_fog_of_objects_is_told_once_a_material():
+def test_what_is_no_volume_is_told_once_a_material():
     def fill(_):
-        fog, tree, volume = new_material("fog", "ShaderNodeVolumePrincipled")
+        fog, tree, surface = new_material("fog", "ShaderNodeBsdfDiffuse")
         output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
         tree.links.remove(output.inputs["Surface"].links[0])
-        tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs[0], volume.inputs["Density"])
-        tree.links.new(volume.outputs[0], output.inputs["Volume"])
+        tree.links.new(surface.outputs[0], output.inputs["Volume"])
         for x in (-2, 2):
             add_sphere(0.5, fog, (x, 0, 0.5))
 
-    _assert_warned_once(fill, 'material "fog"', "varies in a volume", "left out")
+    _assert_warned_once(fill, 'material "fog"', "as volume", "left out")
 
 
 def _made_by_nodes(kind):

@@ -180,12 +180,173 @@ def test_scattering_in_glass():
     assert_agrees(scene, samples=96)
 
 
-def test_what_varies_is_warned_about():
-    scene = _scene()
-    material = _volume("ShaderNodeVolumeScatter")
-    tree = material.node_tree
-    noise = tree.nodes.new("ShaderNodeTexNoise")
-    tree.links.new(noise.outputs[0], tree.nodes["Volume Scatter"].inputs["Density"])
-    add_sphere(1.2, material, (0, 0, 1.2))
+class _Varying:
+    """A volume of one shader whose inputs are nodes, of a material or of the world.
+
+    @param  kind    type of the shader's node
+    @param  inputs  its other inputs, with _ for blanks
+    """
+
+    def __init__(self, kind, tree=None, **inputs):
+        self.material = None
+        if tree is None:
+            self.material = _volume(kind, **inputs)
+            tree = self.material.node_tree
+            self.shader = next(n for n in tree.nodes if n.bl_idname == kind)
+        else:
+            self.shader = tree.nodes.new(kind)
+            for name, value in inputs.items():
+                self.shader.inputs[name.replace("_", " ")].default_value = value
+            tree.links.new(self.shader.outputs[0], tree.nodes["World Output"].inputs["Volume"])
+        self.tree = tree
+
+    def node(self, kind, options=(), **inputs):
+        """Adds a node; inputs are values or sockets, by name or, after an i, by number."""
+        node = self.tree.nodes.new(f"ShaderNode{kind}")
+        for name, value in dict(options).items():
+            setattr(node, name, value)
+        for name, value in inputs.items():
+            self.link(node.inputs[int(name[1:]) if name[1:].isdigit() else name.replace("_", " ")], value)
+        return node
+
+    def link(self, socket, value):
+        if isinstance(value, bpy.types.NodeSocket):
+            self.tree.links.new(value, socket)
+        else:
+            socket.default_value = value
+
+    def give(self, **inputs):
+        """Links the shader's inputs to sockets."""
+        for name, value in inputs.items():
+            self.link(self.shader.inputs[name.replace("_", " ")], value)
+
+    def math(self, operation, *values):
+        inputs = {f"i{i}": value for i, value in enumerate(values)}
+        return self.node("Math", {"operation": operation}, **inputs).outputs[0]
+
+    def coordinate(self, name, axis=None):
+        socket = self.node("TexCoord").outputs[name]
+        return socket if axis is None else self.node("SeparateXYZ", Vector=socket).outputs[axis]
+
+    def ramp(self, factor, low, high):
+        """0 below one value of a factor and 1 above another."""
+        node = self.node("ValToRGB", Fac=factor)
+        node.color_ramp.elements[0].position, node.color_ramp.elements[1].position = low, high
+        return node.outputs["Color"]
+
+
+def _varying_scene(bounces=0, volume_bounces=0):
+    """Cycles' steps are short enough for its error to be below the noise."""
+    scene = _scene(bounces, volume_bounces)
+    scene.cycles.volume_step_rate = 0.1
+    add_plane(20)
+    return scene
+
+
+def test_nebula_by_noise():
+    scene = _varying_scene()
+    add_light("SUN", rotation=degrees(50, 30, 0), energy=4.0)
+    set_world((0.1, 0.1, 0.12))
+    v = _Varying("ShaderNodeVolumeScatter", Color=(0.9, 0.7, 0.5, 1), Anisotropy=0.3)
+    noise = v.node("TexNoise", Vector=v.coordinate("Object"), Scale=1.6, Detail=2.0)
+    v.give(Density=v.math("MULTIPLY", v.ramp(noise.outputs["Fac"], 0.45, 0.65), 4.0))
+    add_sphere(1.2, v.material, (0, 0, 1.2))
+    assert_agrees(scene, samples=96)
+
+
+def test_cloud_by_gradient_and_noise():
+    """In a box that is turned and longer than wide, lit by a lamp and by what it scatters."""
+    scene = _varying_scene(2, 2)
+    add_light("AREA", (1.5, -1.5, 4), degrees(35, 25, 0), energy=150.0, size=1.0)
+    set_world((0.2, 0.25, 0.3))
+    v = _Varying("ShaderNodeVolumePrincipled", Color=(0.8, 0.8, 0.85, 1))
+    height = v.coordinate("Generated", 2)
+    noise = v.node("TexNoise", Scale=3.0, Detail=1.0).outputs["Fac"]
+    density = v.math("MULTIPLY", v.math("SUBTRACT", 1.0, height), v.math("SUBTRACT", noise, 0.35))
+    v.give(Density=v.math("MULTIPLY", density, 8.0))
+    box = _add_box((2.4, 1.6, 1.8), v.material, (0, 0, 1.2))
+    box.rotation_euler = degrees(10, 20, 30)
+    assert_agrees(scene, samples=96)
+
+
+def test_colors_that_vary():
+    """Each channel is let through by another part of the ball."""
+    scene = _varying_scene()
+    add_light("SUN", rotation=degrees(50, 30, 0), energy=4.0)
+    set_world((0.3, 0.3, 0.3))
+    v = _Varying("ShaderNodeVolumePrincipled", Density=1.5)
+    generated = v.coordinate("Generated")
+    noise = v.node("TexVoronoi", Vector=generated, Scale=3.0)
+    v.give(Color=noise.outputs["Color"], Absorption_Color=generated, Anisotropy=v.math("SUBTRACT", 1.0, v.coordinate("Generated", 0)))
+    add_sphere(1.2, v.material, (0, 0, 1.2))
+    assert_agrees(scene, samples=96)
+
+
+def test_fire_by_a_gradient():
+    """A black body that absorbs nothing, beside smoke that is mixed with it by a mask."""
+    scene = _varying_scene()
+    v = _Varying("ShaderNodeVolumePrincipled", Density=0.0, Blackbody_Intensity=1.0)
+    height = v.coordinate("Generated", 2)
+    v.give(Temperature=v.math("MULTIPLY_ADD", v.math("SUBTRACT", 1.0, height), 1500.0, 300.0))
+    smoke = v.node("VolumeAbsorption", Color=(0.2, 0.2, 0.2, 1), Density=v.math("MULTIPLY", height, 6.0))
+    mask = v.ramp(v.coordinate("Generated", 0), 0.3, 0.7)
+    mix = v.node("MixShader", i0=mask, i1=v.shader.outputs[0], i2=smoke.outputs[0])
+    output = next(n for n in v.tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    v.tree.links.new(mix.outputs[0], output.inputs["Volume"])
+    set_world((0.2, 0.2, 0.25))
+    _add_box((2.4, 1.6, 2.2), v.material, (0, 0, 1.2))
+    assert_agrees(scene, samples=96)
+
+
+def test_two_that_vary_and_overlap_an_even_one():
+    scene = _varying_scene()
+    add_light("SUN", rotation=degrees(50, 30, 0), energy=4.0)
+    set_world((0.1, 0.1, 0.1))
+    for x, color in ((-0.6, (1, 0.3, 0.2, 1)), (0.6, (0.2, 0.4, 1, 1))):
+        v = _Varying("ShaderNodeVolumeScatter", Color=color)
+        wave = v.math("SINE", v.math("MULTIPLY", v.coordinate("Object", 0), 6.0))
+        v.give(Density=v.math("MULTIPLY", v.math("ADD", wave, 1.0), 0.8))
+        add_sphere(1.0, v.material, (x, 0, 1.2))
+    add_sphere(0.8, _volume("ShaderNodeVolumeAbsorption", Color=(0.5, 0.5, 0.5, 1), Density=1.0), (0, -0.3, 1.2))
+    assert_agrees(scene, samples=96)
+
+
+def test_camera_within_fog_by_height():
+    scene = _varying_scene(1, 1)
+    add_light("POINT", (1.0, 1, 2.0), energy=120.0, shadow_soft_size=0.3)
+    add_sphere(0.7, diffuse((0.7, 0.3, 0.2)), (-0.5, 0, 1.2))
+    v = _Varying("ShaderNodeVolumeScatter", Color=(0.8, 0.9, 1, 1))
+    position = v.node("NewGeometry").outputs["Position"]
+    height = v.node("SeparateXYZ", Vector=position).outputs[2]
+    v.give(Density=v.math("MULTIPLY", v.math("POWER", 0.4, height), 0.3))
+    _add_box((30, 30, 8), v.material, (0, 0, 3.9))
+    scene.cycles.volume_step_rate = 0.1
+    assert_agrees(scene, samples=128)
+
+
+def test_world_that_varies():
+    """In a room: into the distance Cycles' steps get longer and longer."""
+    scene = _varying_scene(1, 1)
+    _add_box((18, 18, 9), diffuse((0.5, 0.5, 0.5)), (0, 0, 4.4))
+    add_light("POINT", (1.0, 0, 2.0), energy=150.0, shadow_soft_size=0.3)
+    add_sphere(0.7, diffuse((0.7, 0.3, 0.2)), (-0.5, 0, 1.2))
+    tree = set_world((0.0, 0.0, 0.0))
+    v = _Varying("ShaderNodeVolumeScatter", tree, Color=(0.8, 0.85, 0.9, 1))
+    noise = v.node("TexNoise", Vector=v.coordinate("Object"), Scale=0.8, Detail=1.0).outputs["Fac"]
+    height = v.math("MULTIPLY", v.coordinate("Object", 2), -0.5)
+    v.give(Density=v.math("MULTIPLY", v.math("MULTIPLY", v.math("EXPONENT", height), noise), 0.3))
+    scene.world.cycles.volume_step_size = 2.0
+    assert_agrees(scene, samples=128)
+
+
+def test_density_without_a_bound_is_warned_about():
+    """It grows without end towards a point; the picture is finite, and as far as it tells Cycles'."""
+    scene = _varying_scene()
+    add_light("SUN", rotation=degrees(50, 30, 0), energy=4.0)
     set_world((0.5, 0.6, 0.8))
-    assert_warns(scene, 'material "volume"', "what varies in a volume", "left out")
+    v = _Varying("ShaderNodeVolumeAbsorption", Color=(0.5, 0.6, 0.7, 1))
+    distance = v.node("VectorMath", {"operation": "LENGTH"}, i0=v.coordinate("Object")).outputs["Value"]
+    v.give(Density=v.math("DIVIDE", 1.0, distance))
+    add_sphere(1.2, v.material, (0, 0, 1.2))
+    assert_warns(scene, "no bounds on its density")
+    assert_agrees(scene, samples=64)

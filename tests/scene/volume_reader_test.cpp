@@ -99,13 +99,16 @@ TEST(VolumeReader, NodesThatDependOnNothingGiveNumbers)
   EXPECT_EQ(scene.materials.at(0).graph_index, -1);
 }
 
-TEST(VolumeReader, WhatDependsOnThePlaceIsAnError)
+TEST(VolumeReader, WhatDependsOnThePlaceIsAProgram)
 {
   const json nodes = {{{"type", "geometry"}}};
-  const std::string failure =
-      failure_of({{"closures", {{{"type", "scatter"}, {"color", {{"node", 0}, {"output", "position"}}}}}}}, nodes);
-  EXPECT_NE(failure.find("/materials/0/extensions/RELIEF_volume/closures"), std::string::npos) << failure;
-  EXPECT_NE(failure.find("depend"), std::string::npos) << failure;
+  const json closures = {{{"type", "scatter"}, {"color", {{"node", 0}, {"output", "position"}}}}};
+  const Scene scene = volume_load({{"closures", closures}}, nodes);
+  ASSERT_EQ(scene.media.size(), 1u);
+  EXPECT_EQ(scene.media[0].num_phases, 0);
+  ASSERT_EQ(scene.varying_media.size(), 1u);
+  ASSERT_EQ(scene.varying_media[0].closures.size(), 1u);
+  EXPECT_EQ(scene.varying_media[0].program.inputs.size(), 3u);
 }
 
 TEST(VolumeReader, UnknownTypesAndTooManyPhasesAreErrors)
@@ -160,6 +163,21 @@ TEST(VolumeReader, TheWorldHasOne)
   const Scene scene = scene_load(folder.write("scene.gltf", b.gltf()));
   ASSERT_TRUE(scene.environment.medium.has_value());
   EXPECT_EQ(scene.environment.medium->sigma_t.y, 0.5f);
+  EXPECT_TRUE(scene.environment.varying_medium.closures.empty());
+}
+
+TEST(VolumeReader, TheWorldHasOneWithNodes)
+{
+  test::GltfBuilder b = test::graph_scene({{"nodes", json::array()}, {"outputs", json::object()}});
+  const json closures = {{{"type", "scatter"}, {"color", {{"node", 0}, {"output", "position"}}}}};
+  b.json["extensions"]["RELIEF_environment"] = {
+      {"color", {0, 0, 0}}, {"volume", {{"nodes", {{{"type", "geometry"}}}}, {"closures", closures}}}};
+  b.json["extensionsUsed"].push_back("RELIEF_environment");
+  const test::TemporaryFolder folder;
+  const Scene scene = scene_load(folder.write("scene.gltf", b.gltf()));
+  ASSERT_TRUE(scene.environment.medium.has_value());
+  EXPECT_EQ(scene.environment.varying_medium.program.inputs.size(), 3u);
+  for (const std::string& text : scene.warnings) EXPECT_EQ(text.find("volume"), std::string::npos) << text;
 }
 
 }  // namespace

@@ -47,6 +47,7 @@ class GraphWriter:
         self.warn = warn
         self.nodes = []
         self.uses_generated = self.uses_tangents = False
+        self.voxels = None
         self.material_index = material_index
         self.view_layer = view_layer
         self.attributes = []

@@ -138,6 +138,8 @@ def _attribute(g, source):
         if name == "generated" and output == "vector":
             g.uses_generated = True
             return _output(g.add("texture-coordinate"), "generated")
+        if g.voxels is not None and name in g.voxels:
+            return g.voxels.output(g, name) if output != "alpha" else _constant(g, 1.0)
         return mesh_attribute(g, *_STANDARD.get(name, ("attribute", name)), output)
     if node.attribute_type == "VIEW_LAYER":
         layer = g.view_layer()
@@ -288,6 +290,13 @@ def _ies(g, source):
     return _output(g.add("ies-texture", inputs, uri=uri, maths=compat.TEXTURE_MATHS), "factor")
 
 
+def _volume_info(g, source):
+    name = source.socket.identifier
+    if g.voxels is not None and name.lower() in g.voxels:
+        return g.voxels.output(g, name.lower())
+    return _constant(g, (0.0, 0.0, 0.0) if name == "Color" else 0.0)
+
+
 def _hair_info(g, source):
     """Of a surface that is no hair all is 0."""
     name = source.socket.identifier
@@ -359,6 +368,7 @@ OUTPUTS = {
     "ShaderNodeBevel": _bevel,
     "ShaderNodeLightFalloff": _light_falloff,
     "ShaderNodeTexIES": _ies,
+    "ShaderNodeVolumeInfo": _volume_info,
     "ShaderNodeHairInfo": _hair_info,
     "ShaderNodePointInfo": _point_info,
     "ShaderNodeBlackbody": _made_color("blackbody", "Temperature"),

@@ -40,11 +40,14 @@ class MaterialExporter:
         self._report = report
         self._exported = {}
 
-    def export(self, material):
-        """(what add_mesh asks for the index of the glTF material, Wanted of its meshes); a slot without material is grey."""
-        key = None if material is None else material.as_pointer()
+    def export(self, material, voxels=None):
+        """(what add_mesh asks for the index of the glTF material, Wanted of its meshes); a slot without material is grey.
+
+        @param  voxels  Voxels of the object that it is on
+        """
+        key = (None if material is None else material.as_pointer(), voxels)
         if key not in self._exported:
-            job = MaterialJob(self._writer, self._images, self._settings, self._report, material, self._view_layer)
+            job = MaterialJob(self._writer, self._images, self._settings, self._report, material, self._view_layer, voxels)
             if job.coverage is not None:
                 self._report.count(material.name, job.coverage)
             wanted = job.wanted()
@@ -98,7 +101,8 @@ class MaterialJob:
     coverage  Coverage of its nodes; None without nodes
     """
 
-    def __init__(self, writer, images, settings, report, material, view_layer=tuple):
+    def __init__(self, writer, images, settings, report, material, view_layer=tuple, voxels=None):
+        self._voxels = voxels
         self._writer = writer
         self._images = images
         self._name = material.name if material else "default"
@@ -329,7 +333,7 @@ class MaterialJob:
         if source is None or inside == Inside.CLOSED:  # no light gets there, in Cycles neither
             return
         node, textures = source.node, self._textures
-        if node.bl_idname != "ShaderNodeVolumeAbsorption" or inside == Inside.OPEN:
+        if node.bl_idname != "ShaderNodeVolumeAbsorption" or inside == Inside.OPEN or self._varies(source):
             self._write_medium(source)
             return
         color = textures.constant_color(node.inputs["Color"], source.groups)
@@ -346,11 +350,17 @@ class MaterialJob:
         }
         self._extend("KHR_materials_volume", value)
 
+    def _varies(self, source):
+        """Whether a Volume Absorption's colour or density is no number that a graph need not give."""
+        sockets = (source.node.inputs[name] for name in ("Color", "Density"))
+        return any(self._graph.constant(socket, source.groups) is None for socket in sockets)
+
     def _write_medium(self, source):
-        medium = VolumeWriter(self._graph, self._fail)
+        medium = VolumeWriter(self._graph, self._fail, self._voxels)
         medium.write(source)
+        if not medium.closures:
+            return
+        self._extend("RELIEF_volume", {"closures": medium.closures})
         if medium.varies:
-            node = source.node
-            self._fail(source, f'node "{node.name}" ({node.bl_label}): what varies in a volume', "it is left out")
-        elif medium.closures:
-            self._extend("RELIEF_volume", {"closures": medium.closures})
+            self._uses_graph = True
+            self._extend("RELIEF_graph", {"nodes": self._graph.nodes})

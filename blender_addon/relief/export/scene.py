@@ -20,6 +20,7 @@ from .mesh import FARTHEST, add_mesh, store_mesh, store_strands
 from .motion import numbered
 from .objects import collect, decompose, usable_places
 from .settings import render_settings
+from .voxels import Voxels, domain_of, read_grids
 from .world import export_world
 
 DATA_FOLDER = "relief_data"
@@ -371,7 +372,7 @@ class SceneExporter:
         None: it has no triangles."""
         evaluated = thing.object.evaluated_get(self._depsgraph)
         data = thing.data if thing.data is not None else evaluated.data
-        materials = self._materials_of(_slots(thing, evaluated), data)
+        materials = self._materials_of(_slots(thing, evaluated), data, self._voxels_of(thing, evaluated))
         wanted = tuple(w for _, w in materials)
         is_usual = thing.data is None and thing.surface and thing.strands == bool(hair.particle_systems(thing.object))
         stored = self._stored.get(thing.object, wanted) if is_usual else None
@@ -423,12 +424,25 @@ class SceneExporter:
                     evaluated.to_mesh_clear()
         return self._by_shape[key]
 
-    def _materials_of(self, materials, data):
+    def _voxels_of(self, thing, evaluated):
+        """Voxels of a smoke domain; None: it is none."""
+        domain = domain_of(evaluated)
+        if domain is None:
+            return None
+        grids = read_grids(domain)
+        if "density" not in grids:
+            self._warner("object", thing.name)("a smoke domain of which nothing is baked for the frame", "it is empty")
+            grids["density"] = np.zeros((1, 1, 1, 1), dtype=np.float32)
+        if domain.use_adaptive_domain:
+            self._warner("object", thing.name)("an adaptive smoke domain", "its smoke fills the box that its mesh has")
+        return Voxels(grids, self.writer, self._images)
+
+    def _materials_of(self, materials, data, voxels):
         """(what gives the index in the glTF, Wanted) of material slots, at least one."""
         override = self._depsgraph.view_layer.material_override
         if override is not None:
             materials = [override] * len(materials)
-        exported = [self._materials.export(m) for m in materials] or [self._materials.export(override)]
+        exported = [self._materials.export(m, voxels) for m in materials] or [self._materials.export(override, voxels)]
         if self._depsgraph.view_layer.use_pass_uv and getattr(data, "uv_layers", None):
             exported = [(i, w if w.coordinates else replace(w, coordinates=_ACTIVE_UV)) for i, w in exported]
         return exported

@@ -30,13 +30,15 @@ _NODES = {
 class VolumeWriter(ClosureWriter):
     """Collects the closures of one medium.
 
-    @param  graph  GraphWriter, which gets what varies
-    @param  fail   as ClosureWriter's
-    closures       JSON of the closures
+    @param  graph   GraphWriter, which gets what varies
+    @param  fail    as ClosureWriter's
+    @param  voxels  Voxels that it reads by the names of attributes; None: there are none
+    closures        JSON of the closures
     """
 
-    def __init__(self, graph, fail):
+    def __init__(self, graph, fail, voxels=None):
         super().__init__(graph, None, fail, filters_glossy=False)
+        graph.voxels = self._voxels = voxels
 
     def write(self, source):
         for part, weight in self._parts(source):
@@ -47,7 +49,25 @@ class VolumeWriter(ClosureWriter):
                 continue
             if getattr(node, "phase", "HENYEY_GREENSTEIN") != "HENYEY_GREENSTEIN":
                 self.unread(part, f"the phase function {node.phase}", "Henyey and Greenstein's was used")
-            self.add(kind, weight, **self.inputs(part, _NAMES))
+            inputs = self.inputs(part, _NAMES)
+            if kind == "principled" and self._voxels is not None:
+                self._add_attributes(node, inputs)
+            self.add(kind, weight, **inputs)
+
+    def _add_attributes(self, node, inputs):
+        """Multiplies what a Principled Volume has by the grids that it names, those that there are."""
+
+        def grid(socket):
+            name = node.inputs[socket].default_value
+            return self._voxels.output(self.graph, name) if name in self._voxels else None
+
+        for socket, name in (("Density Attribute", "density"), ("Temperature Attribute", "temperature")):
+            value = grid(socket)
+            if value is not None:
+                inputs[name] = self._math("multiply", inputs[name], self._math("maximum", value, 0.0))
+        color = grid("Color Attribute")
+        if color is not None:
+            inputs["color"] = self.graph.op("vector-math", {"a": inputs["color"], "b": color}, "vector", operation="multiply")
 
     @property
     def varies(self):

@@ -54,12 +54,12 @@ def _environment(world, writer, images, warn):
 
 def _add_medium(environment, source, writer, images, warn):
     """What fills the world."""
-    medium = VolumeWriter(WorldGraph(writer, images, warn), lambda _source, what, instead, _error=None: warn(what, instead))
+    graph = WorldGraph(writer, images, warn)
+    medium = VolumeWriter(graph, lambda _source, what, instead, _error=None: warn(what, instead))
     medium.write(source)
-    if medium.varies:
-        warn("a volume that fills the world and varies", "it is left out, and with it that it dims what is far")
-    elif medium.closures:
-        environment["volume"] = {"closures": medium.closures}
+    if medium.closures:
+        nodes_of = {"nodes": graph.nodes} if medium.varies else {}
+        environment["volume"] = {"closures": medium.closures, **nodes_of}
 
 
 def _surroundings(source, writer, images, warn):

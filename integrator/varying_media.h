@@ -1,0 +1,41 @@
+// Media that vary from place to place, made ready for rays: where each is, and a grid of bounds of what it takes away there, from the
+// bounds of its value graph (kernel/graph/graph_bounds.h).
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "kernel/volume/varying_medium.h"
+
+namespace relief {
+
+struct SceneContext;
+
+class VaryingMedia {
+ public:
+  /// @param context  with its meshes, instances, graphs and tree; must outlive this
+  /// @cost  256 Ki boxes in all at most, 4 bytes each; eight of them are bounded by a run of a graph
+  void make(const SceneContext& context);
+
+  /// By Material::medium_index and, last, what fills the world; null: none varies.
+  const VaryingMedium* view() const { return media_.empty() ? nullptr : media_.data(); }
+
+  /// Media without useful bounds, a line each.
+  const std::vector<std::string>& problems() const { return problems_; }
+
+ private:
+  struct Problem {
+    bool has_bounds = true, is_tamed = false;  ///< the latter is not told of the world, whose fog often grows downwards
+  };
+  Problem add_rates(const SceneContext& context, const VaryingMedium& medium, std::int32_t instance);
+
+  std::vector<VaryingMedium> media_;
+  std::vector<VaryingPlace> places_;
+  std::vector<std::int32_t> place_of_instance_;
+  std::vector<std::vector<float>> rates_;
+  std::vector<std::string> problems_;
+  std::int32_t size_ = 0;
+};
+
+}  // namespace relief

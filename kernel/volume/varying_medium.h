@@ -1,0 +1,155 @@
+// A medium that varies from place to place: its closures' inputs are what a value graph gives, and a grid bounds what they come to.
+#pragma once
+
+#include "kernel/globals.h"
+#include "kernel/graph/graph_material.h"
+#include "kernel/volume/medium_closures.h"
+#include "kernel/volume/rate_grid.h"
+
+namespace relief {
+
+/// Where a medium that varies is.
+struct VaryingPlace {
+  RateGrid rates;
+  Vec3f generated_scale{1, 1, 1}, generated_offset;  ///< take object space to coordinates that graphs call generated
+  /// 1/m: more counts as this, in level 0, and as half of it in each one after; light gets no farther through it than through a wall.
+  float densest = kInfinity;
+};
+
+struct VaryingMedium {
+  GraphProgramView program;
+  const VolumeClosureSpec* closures = nullptr;
+  std::uint32_t num_closures = 0;  ///< 0: the medium is even
+  const VaryingPlace* places = nullptr;
+  const std::int32_t* place_of_instance = nullptr;  ///< null: it fills the world, in places[0]
+};
+
+RELIEF_KERNEL const VaryingPlace& varying_place(const VaryingMedium& medium, std::int32_t instance)
+{
+  return medium.places[medium.place_of_instance != nullptr ? medium.place_of_instance[instance] : 0];
+}
+
+/// In place of the object of what fills the world: its space is the world's, with Z up.
+inline constexpr Affine3 kZUpFromWorld{{1, 0, 0}, {0, 0, 1}, {0, -1, 0}, {}};
+inline constexpr Affine3 kWorldFromZUp{{1, 0, 0}, {0, 0, -1}, {0, 1, 0}, {}};
+
+/// A point of a medium and what a graph reads there. As in Cycles, the normal is against the ray, which has no length.
+struct MediumPoint {
+  MediumPoint(const KernelGlobals& g, const VaryingPlace& at, std::int32_t instance, Vec3f P, Vec3f D, GraphRay ray_of)
+      : place(at), scene(&g.graph_scene), wo(-D), ray(ray_of)
+  {
+    if (instance >= 0) {
+      node = &g.instances[instance];
+    } else {
+      world.world_from_object = kWorldFromZUp;
+      world.object_from_world = kZUpFromWorld;
+      node = &world;
+    }
+    has_node = instance >= 0;
+    hit.P = P;
+    hit.Ng = hit.Ns = wo;
+    P_object = transform_point(node->object_from_world, P);
+    P_generated = has_node ? P_object * place.generated_scale + place.generated_offset : P_object;
+    ray.length = 0;
+  }
+  MediumPoint(const MediumPoint&) = delete;
+  MediumPoint& operator=(const MediumPoint&) = delete;
+
+  float quantity(const GraphInput& input) const
+  {
+    using Q = GraphQuantity;
+    switch (input.quantity) {
+      case Q::object_x:
+        return P_object.x;
+      case Q::object_y:
+        return P_object.y;
+      case Q::object_z:
+        return P_object.z;
+      case Q::generated_x:
+        return P_generated.x;
+      case Q::generated_y:
+        return P_generated.y;
+      case Q::generated_z:
+        return P_generated.z;
+      case Q::attribute_value:
+      case Q::attribute_x:
+      case Q::attribute_y:
+      case Q::attribute_z:
+        if (!has_node) return 0.0f;
+        break;
+      case Q::attribute_alpha:
+        if (!has_node) return 1.0f;
+        break;
+      case Q::instance:
+        if (!has_node) return -1.0f;
+        break;
+      case Q::edge_distance:
+        return kInfinity;
+      case Q::uv0_v:
+      case Q::uv1_v:
+      case Q::parametric_x:
+      case Q::dpdx_x:
+      case Q::dpdx_y:
+      case Q::dpdx_z:
+      case Q::dpdy_x:
+      case Q::dpdy_y:
+      case Q::dpdy_z:
+        return 0.0f;
+      default:
+        break;
+    }
+    constexpr MeshView kNoMesh;
+    GraphPoint point{&kNoMesh, node, 0, 0.0f, 0.0f, &hit, wo, {0.0f, 0.0f}, 0.0f, scene, ray};
+    point.P_object = P_object;
+    return graph_quantity(point, input.quantity, input.index);
+  }
+
+  const VaryingPlace& place;
+  const GraphScene* scene;
+  InstanceView world;
+  const InstanceView* node;
+  bool has_node = false;
+  Vec3f wo;
+  GraphRay ray;
+  SurfaceHit hit;
+  Vec3f P_object, P_generated;
+};
+
+/// Most points that are asked for at once.
+inline constexpr int kMediumPoints = 8;
+
+/// What a medium is at up to eight points of a ray.
+/// @param instance  whose it is, or kWholeWorld
+/// @param media     gets `count`
+RELIEF_KERNEL void varying_medium_eval(const KernelGlobals& g,
+                                       const VaryingMedium& medium,
+                                       std::int32_t instance,
+                                       const Vec3f* P,
+                                       int count,
+                                       Vec3f D,
+                                       const GraphRay& ray,
+                                       Medium* media)
+{
+  GraphRegisters registers;
+  registers.used = (1u << count) - 1u;
+  const VaryingPlace& place = varying_place(medium, instance);
+  for (int k = 0; k < count; ++k) {
+    const MediumPoint point(g, place, instance, P[k], D, ray);
+    for (std::uint32_t i = 0; i < medium.program.num_inputs; ++i) {
+      const GraphInput& input = medium.program.inputs[i];
+      registers.lanes[input.register_index][k] = point.quantity(input);
+    }
+  }
+  g.run_graph(medium.program, g.textures, registers);
+  for (int k = 0; k < count; ++k) {
+    media[k] = medium_resolve({medium.closures, medium.num_closures}, {&medium.program, &registers, k});
+    const float most = max_component(media[k].sigma_t);
+    const float densest = place.densest / static_cast<float>(1u << rate_grid_level(place.rates, P[k]));
+    if (!(most > densest)) continue;
+    const float scale = densest / most;
+    media[k].sigma_t *= scale;
+    for (int i = 0; i < media[k].num_phases; ++i) media[k].phases[i].sigma_s *= scale;
+  }
+}
+
+}  // namespace relief
