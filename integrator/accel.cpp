@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include "integrator/ray_surface.h"
 #include "integrator/stages.h"
 #include "scene/memory.h"
 
@@ -529,15 +530,15 @@ RTCGeometry Accel::new_mesh(const TreeMesh& mesh, const Affine3* world_from_obje
   return geometry;
 }
 
-/// Lets rays out of tubes: they are met from outside only, as in Cycles.
-void tube_filter(const RTCFilterFunctionNArguments* arguments)
+/// Lets rays pass what they do not meet of curves. The geometry's user data are its indices, of the vertex before each segment.
+template <bool kTubes>
+void curve_filter(const RTCFilterFunctionNArguments* arguments)
 {
+  const auto* before = static_cast<const std::uint32_t*>(arguments->geometryUserPtr);
   for (unsigned i = 0; i < arguments->N; ++i) {
-    const Vec3f D{RTCRayN_dir_x(arguments->ray, arguments->N, i), RTCRayN_dir_y(arguments->ray, arguments->N, i),
-                  RTCRayN_dir_z(arguments->ray, arguments->N, i)};
-    const Vec3f Ng{RTCHitN_Ng_x(arguments->hit, arguments->N, i), RTCHitN_Ng_y(arguments->hit, arguments->N, i),
-                   RTCHitN_Ng_z(arguments->hit, arguments->N, i)};
-    if (dot(D, Ng) > 0.0f) arguments->valid[i] = 0;
+    if (arguments->valid[i] != -1) continue;
+    const std::uint32_t first = before[RTCHitN_primID(arguments->hit, arguments->N, i)] + 1;
+    if (!curve_is_met(arguments, i, first, kTubes)) arguments->valid[i] = 0;
   }
 }
 
@@ -564,11 +565,10 @@ RTCGeometry Accel::new_curves(const TreeMesh& mesh, bool transparent)
                                                                     sizeof(std::uint32_t), mesh.triangles.size()));
   if (first == nullptr) throw refused();
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) first[i] = mesh.triangles[i].v0 - 1;
-  if (!mesh.are_ribbons) {
-    rtcSetGeometryIntersectFilterFunction(geometry, tube_filter);
-    rtcSetGeometryOccludedFilterFunction(geometry, tube_filter);
-  }
-  if (transparent) rtcSetGeometryOccludedFilterFunction(geometry, shadow_filter_);
+  rtcSetGeometryUserData(geometry, first);
+  const RTCFilterFunctionN filter = mesh.are_ribbons ? curve_filter<false> : curve_filter<true>;
+  rtcSetGeometryIntersectFilterFunction(geometry, filter);
+  rtcSetGeometryOccludedFilterFunction(geometry, transparent ? shadow_filter_ : filter);
   return geometry;
 }
 

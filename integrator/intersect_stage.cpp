@@ -129,6 +129,17 @@ void classify(const KernelGlobals& g,
   queue_push(surfaces[surface_kernel[g.instances[object].material_index]], path);
 }
 
+/// RTCRay::flags of a ray that leaves a path's last hit.
+unsigned curve_left(const KernelGlobals& g, const PathState& state, std::uint32_t path)
+{
+  const std::uint32_t object = state.hit_object[path];
+  if (object >= g.num_instances || (g.instances[object].flags & kCurves) == 0) return 0;
+  const MeshView& mesh = g.meshes[g.instances[object].mesh_index];
+  const std::uint32_t segment = state.hit_triangle[path];
+  RELIEF_ASSERT(segment < mesh.num_triangles);
+  return curve_name(object, segment, mesh.triangles[segment].v0);
+}
+
 std::uint32_t mask_of(const PathState& state, std::uint32_t path)
 {
   return state.bounces[path] == 0 ? kRayCamera : kRayBounce;
@@ -326,6 +337,9 @@ void intersect_closest(const KernelGlobals& g,
       cone = PathLod(state, path).cone(state.cone_width[path], state.cone_spread[path]);
       context.cones = &cone;
     }
+    if (state.bounces[path] != 0 && (state.flags[path] & kPathScattered) == 0) {
+      ray.ray.flags = curve_left(g, state, path);
+    }
     accel.intersect(context, ray);
     if (context.steps != nullptr) {
       if (state.bounces[path] == 0) film_add_displacement_steps(g.film, state.pixel[path], steps[0]);
@@ -395,6 +409,7 @@ void intersect_shadow(const KernelGlobals& g,
       cone = PathLod(state, shadow.path[i]).cone(shadow.cone_width[i], shadow.cone_spread[i]);
       context.embree.cones = &cone;
     }
+    if (start == ShadowStart::kAtHit) ray.flags = curve_left(g, state, shadow.path[i]);
     accel.occluded(context.embree, ray);
     if (context.embree.steps != nullptr) note_steps(steps, displacement);
     visibility[i] = ray.tfar < 0.0f ? Vec3f{} : context.visibility;
@@ -424,11 +439,10 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
         instance_id != RTC_INVALID_GEOMETRY_ID ? instance_id : RTCHitN_geomID(arguments->hit, arguments->N, i);
     const float time = RTCRayN_time(arguments->ray, arguments->N, i);
     const InstanceView& centre = g.instances[object];
-    // Tubes are met from outside only.
-    if ((centre.flags & (kCurves | kRibbons)) == kCurves) {
-      const RTCHit hit = rtcGetHitFromHitN(arguments->hit, arguments->N, i);
-      const RTCRay ray = rtcGetRayFromRayN(arguments->ray, arguments->N, i);
-      if (ray.dir_x * hit.Ng_x + ray.dir_y * hit.Ng_y + ray.dir_z * hit.Ng_z > 0.0f) {
+    if ((centre.flags & kCurves) != 0) {
+      const unsigned segment = RTCHitN_primID(arguments->hit, arguments->N, i);
+      const std::uint32_t first = g.meshes[centre.mesh_index].triangles[segment].v0;
+      if (!curve_is_met(arguments, i, first, (centre.flags & kRibbons) == 0)) {
         arguments->valid[i] = 0;
         continue;
       }

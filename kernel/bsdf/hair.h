@@ -44,7 +44,8 @@ RELIEF_KERNEL float hair_tilt_pdf(const Hair& hair, float theta_o, float theta_i
 /// Width of the Cauchy distribution around what goes through, over the half turn that is sampled.
 RELIEF_KERNEL float hair_spread(const Hair& hair) { return 2.0f * std::atan(0.5f * kPi / hair.around); }
 
-/// @return  f · cos, and the same as pdf of solid angle, of either side
+/// @return  f · cos, and the same as pdf of solid angle. Lamps are shown what is reflected to the viewer's side alone, and what goes through
+///          where the surface's normal looks away (mixture_lobe_reaches); samples go where they fall
 /// @source  Cycles 3.4
 RELIEF_KERNEL float hair_eval(const Hair& hair, Vec3f wo, Vec3f wi)
 {
@@ -59,7 +60,6 @@ RELIEF_KERNEL float hair_eval(const Hair& hair, Vec3f wo, Vec3f wi)
     const float p = kPi - phi;
     return tilt * hair.around / (hair_spread(hair) * (sqr(p) + sqr(hair.around)));
   }
-  if (cos_phi < 0.0f) return 0.0f;
   return tilt * 0.25f / hair.around * std::cos(0.5f * min(phi / hair.around, kPi));
 }
 

@@ -41,8 +41,8 @@ enum class MixtureLobeKind : std::uint8_t {
   kMultiple,
   kRefraction,
   kGlass,
-  kSubsurface,
-  kHair,  ///< from here on, what scatters to all sides of a strand: frames as in hair.h
+  kSubsurface,  ///< from glass on, either side may be meant
+  kHair,        ///< from here on, what scatters to all sides of a strand: frames as in hair.h
   kFibre,
 };
 
@@ -166,8 +166,9 @@ RELIEF_KERNEL bool mixture_lobe_is_strand(MixtureLobeKind kind) { return kind >=
 /// @param sampled   wi was sampled from this lobe; or else it is asked for, as the direction of a lamp is
 RELIEF_KERNEL bool mixture_lobe_reaches(const MixtureLobe& lobe, bool below, bool below_Ns, bool below_Ng, bool sampled)
 {
-  if (mixture_lobe_is_strand(lobe.kind)) {
-    return lobe.kind == MixtureLobeKind::kFibre || sampled || below_Ns == lobe.shape.hair.transmits;
+  if (__builtin_expect(mixture_lobe_is_strand(lobe.kind), 0)) {
+    if (lobe.kind == MixtureLobeKind::kFibre || sampled) return true;
+    return lobe.shape.hair.transmits ? below_Ns : !(below || below_Ns);
   }
   const bool is_microfacet = mixture_lobe_is_microfacet(lobe.kind);
   if (!lobe.is_4 && !lobe.is_5) {
@@ -283,9 +284,8 @@ template <TransportMode kMode>
 [[gnu::noinline]] RELIEF_KERNEL BsdfEval mixture_lobe_eval(const MixtureLobe& lobe, const BsdfTables& tables, Vec3f wi)
 {
   using K = MixtureLobeKind;
-  if (mixture_lobe_is_strand(lobe.kind)) return strand_lobe_eval(lobe, wi);
   const bool transmits = lobe.kind == K::kTranslucent || lobe.kind == K::kRefraction;
-  const bool is_other_side = lobe.kind != K::kGlass && (wi.z < 0.0f) != transmits;
+  const bool is_other_side = lobe.kind < K::kGlass && (wi.z < 0.0f) != transmits;
   if (lobe.is_delta || is_other_side || !(__builtin_fabsf(wi.z) > kMinCosine)) return {};
   const Vec3f wo = lobe.wo;
   BsdfEval e;
@@ -351,9 +351,10 @@ template <TransportMode kMode>
       e = mixture_glass_eval<kMode>(lobe, wi);
       break;
     case K::kSubsurface:
+      break;
     case K::kHair:
     case K::kFibre:
-      break;
+      return strand_lobe_eval(lobe, wi);
   }
   if (is_microfacet) {
     e.f *= mixture_fresnel(lobe.fresnel, half_angle_cosine(wo, wi));
@@ -428,7 +429,6 @@ template <TransportMode kMode>
   const Vec3f wo = lobe.wo;
   if (lobe.kind == K::kGlass) return mixture_glass_sample<kMode>(lobe, u_branch, u);
   if (lobe.is_delta) return mixture_delta_sample<kMode>(lobe);
-  if (mixture_lobe_is_strand(lobe.kind)) return strand_lobe_sample(lobe, u_branch, u);
   switch (lobe.kind) {
     case K::kTranslucent:
       return lobe_sample_diffuse(translucent_sample({}, wo, u), true);
@@ -457,6 +457,9 @@ template <TransportMode kMode>
       s.eta = lobe.shape.refraction.eta;
       return s;
     }
+    case K::kHair:
+    case K::kFibre:
+      return strand_lobe_sample(lobe, u_branch, u);
     default:
       return lobe_sample_diffuse(diffuse_sample(u), false);
   }

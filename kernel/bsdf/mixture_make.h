@@ -117,13 +117,15 @@ RELIEF_KERNEL MixtureLobe* reflection_add(MixtureBuild& b, Vec3f weight, const F
 RELIEF_KERNEL void lobe_blur(MixtureLobe& lobe, float blur, float most_sharp)
 {
   using K = MixtureLobeKind;
-  if (lobe.kind == K::kFibre) {
-    Fibre& fibre = lobe.shape.fibre;
-    fibre.variance = max(fibre.variance, blur);
-    fibre.variance_R = max(fibre.variance_R, blur);
-    fibre.scale = max(fibre.scale, blur);
+  if (lobe.stays_sharp || !(lobe.roughness < kInfinity) || lobe.roughness <= most_sharp) {
+    if (lobe.kind == K::kFibre) {
+      Fibre& fibre = lobe.shape.fibre;
+      fibre.variance = max(fibre.variance, blur);
+      fibre.variance_R = max(fibre.variance_R, blur);
+      fibre.scale = max(fibre.scale, blur);
+    }
+    return;
   }
-  if (lobe.stays_sharp || !(lobe.roughness < kInfinity) || lobe.roughness <= most_sharp) return;
   const auto widen = [blur](AnisotropicAlpha& alpha) {
     alpha.x = max(alpha.x, blur);
     alpha.y = max(alpha.y, blur);
@@ -266,7 +268,7 @@ RELIEF_KERNEL MixtureLobe* strand_add(MixtureBuild& b, Vec3f weight, Vec3f tange
 {
   const float squared = length_squared(tangent);
   const bool is_given = squared > 0.0f && squared < kInfinity;
-  const Vec3f T = is_given              ? world_from_z_up(tangent) / __builtin_sqrtf(squared)
+  const Vec3f T = is_given             ? world_from_z_up(tangent) / __builtin_sqrtf(squared)
                   : is_zero(b.tangent) ? frame_from_normal(b.Ns).t
                                        : b.tangent;
   const Vec3f across = b.wo - T * dot(T, b.wo);
@@ -392,7 +394,10 @@ RELIEF_KERNEL void subsurface_add(MixtureBuild& b,
   lobe->shape.subsurface = s;
 }
 
-RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const SubsurfaceInputs& in)
+RELIEF_KERNEL void closure_add(MixtureBuild& b,
+                               const SurfaceClosureSpec& spec,
+                               float weight,
+                               const SubsurfaceInputs& in)
 {
   Subsurface s;
   s.albedo = max(in.color, Vec3f{});

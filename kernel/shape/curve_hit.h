@@ -53,10 +53,8 @@ RELIEF_KERNEL CurveBasis curve_basis_derivative(float u)
   const Affine3& m = instance.world_from_object;
   const Affine3& inverse = instance.object_from_world;
   Vec3f P[4];
-  float radius[4];
   for (std::uint32_t i = 0; i < 4; ++i) {
     P[i] = mesh_P(mesh, ends.v0 - 1 + i);
-    radius[i] = mesh.radius[ends.v0 - 1 + i];
   }
   const CurveBasis at = curve_basis(u);
   const Vec3f centre = at.of(P);
@@ -73,8 +71,7 @@ RELIEF_KERNEL CurveBasis curve_basis_derivative(float u)
   hit.P_error = gamma_bound(8) * (size + abs(m.p) + abs_transform(m, abs_transform(inverse, size) + abs(inverse.p)));
   // Where a curve turns back on itself it has no direction; then any will do.
   hit.tangent = width > 0.0f ? along * (1.0f / __builtin_sqrtf(width)) : frame_from_normal(wo).s;
-  Vec3f away;       // unit, from the curve
-  float reach = 0;  // how far rays start from the hit, in radii
+  Vec3f away;  // unit, from the curve
   if ((instance.flags & kRibbons) != 0) {
     const Vec3f across = cross(hit.tangent, wo);
     const float sine = length(across);
@@ -82,16 +79,12 @@ RELIEF_KERNEL CurveBasis curve_basis_derivative(float u)
     away = cross(side, hit.tangent);
     hit.Ng = wo;
     hit.Ns = normalize(v * side + safe_sqrt(1.0f - v * v) * away);
-    // The ribbon turns to each ray, within a tube: a ray that starts beside the tube and goes away from it meets none of it.
-    reach = 1.0f;
   } else {
     const Vec3f out = transform_point(inverse, P_ray) - centre;
     away = hit.Ng = hit.Ns = is_zero(out) ? wo : normalize(transform_normal(inverse, as_normal(out)));
-    // By so much Embree may err.
-    reach = 1e-3f;
   }
-  const float radius_world = max(at.of(radius), 0.0f) / length(transform_vector(inverse, away));
-  hit.leave = away * (reach * radius_world + 4.0f * length(hit.P_error));
+  // Of its own curve a ray meets nothing (curve_name in integrator/ray_surface.h), wherever it starts.
+  hit.leave = away * (4.0f * length(hit.P_error));
   surface_hit_interpolate(mesh, ends, u, 0.0f, &hit);
   return hit;
 }

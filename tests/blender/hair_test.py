@@ -104,9 +104,10 @@ def _hair_bsdf(component):
 
 
 def test_hair_bsdf():
-    scene = _stage()
-    _grow(_hair_bsdf("Transmission"))
-    assert_agrees(scene, samples=128)
+    for component in ("Reflection", "Transmission"):
+        scene = _stage()
+        _grow(_hair_bsdf(component))
+        assert_agrees(scene, samples=128)
 
 
 def test_principled_hair():
