@@ -97,7 +97,10 @@ SeamReport seams_of(const DisplacementSet& displacements, int displacement_index
 }
 
 /// @param borders  of its meshes with those of other materials
-void print_displacement(const Scene& scene, const DisplacementSet& displacements, const SeamExtent& borders, int index)
+void print_displacement(const Scene& scene,
+                        const DisplacementSet& displacements,
+                        const BorderReport& borders,
+                        int index)
 {
   const DisplacementSettings& d = scene.displacements[static_cast<std::size_t>(index)];
   std::size_t num_meshes = 0;
@@ -118,11 +121,14 @@ void print_displacement(const Scene& scene, const DisplacementSet& displacements
     covered = fmt::format(", uv {:g} to {:g}, {:g} to {:g}", uv.low.x, uv.high.x, uv.low.y, uv.high.y);
   }
   line("    meshes: {}{}", num_meshes, covered);
+  if (borders.all.num_edges > 0) {
+    line("    borders with other materials: {}", text(borders.all));
+    line("      left open: {}", text(borders.open));
+  }
   if (displacement_is_computed(d)) return;
   const SeamReport seams = seams_of(displacements, index);
   line("    uv seams with different heights: {}", text(seams.all));
   if (d.weld_seams) line("      left open by welding: {}", text(seams.split));
-  if (borders.num_edges > 0) line("    open borders with other materials: {}", text(borders));
 }
 
 void print_displacements(const Scene& scene, const DisplacementSet& displacements)
@@ -131,7 +137,7 @@ void print_displacements(const Scene& scene, const DisplacementSet& displacement
   for (const HeightMap& map : scene.height_maps) ranges.push_back(height_map_range(map.view()));
   print_height_maps(scene, ranges);
   line("displacements: {}", scene.displacements.size());
-  const std::vector<SeamExtent> borders = border_seams(scene, displacements);
+  const std::vector<BorderReport> borders = border_seams(scene, displacements);
   for (std::size_t i = 0; i < scene.displacements.size(); ++i) {
     print_displacement(scene, displacements, borders[i], static_cast<int>(i));
   }
@@ -220,7 +226,8 @@ std::string features(const Scene& scene)
 {
   unsigned mask = 0;
   std::size_t num_casters = 0;
-  for (const Instance& instance : scene.instances) {
+  for (std::size_t i = 0; i < scene.num_placed(); ++i) {
+    const Instance& instance = scene.instances[i];
     mask |= feature_mask_of(scene.materials[static_cast<std::size_t>(instance.material_index)]);
     num_casters += (instance.flags & kCausticCaster) != 0 ? 1 : 0;
   }
@@ -253,16 +260,17 @@ int info(const std::string& file,
   std::size_t triangles = 0;
   std::size_t placed = 0;
   for (const Mesh& mesh : scene.meshes) triangles += mesh.triangles.size();
-  for (const Instance& instance : scene.instances) {
-    placed += scene.meshes[static_cast<std::size_t>(instance.mesh_index)].triangles.size();
+  for (const Border& border : scene.borders) triangles -= border.edges.size();
+  for (std::size_t i = 0; i < scene.num_placed(); ++i) {
+    placed += scene.meshes[static_cast<std::size_t>(scene.instances[i].mesh_index)].triangles.size();
   }
   const RenderSettings& r = scene.render;
   line("{}", file);
   line("image: {}x{}, {} samples, {} bounces, seed {}", r.width, r.height, r.samples, r.max_bounces, r.seed);
   line("settings: {}", changed_settings(r));
   line("frames: {} to {} at {:g} a second", r.frame_start, r.frame_end, r.frames_per_second);
-  line("meshes: {} with {} triangles; instances: {} with {} triangles in all", scene.meshes.size(), triangles,
-       scene.instances.size(), placed);
+  line("meshes: {} with {} triangles; instances: {} with {} triangles in all",
+       scene.meshes.size() - scene.borders.size(), triangles, scene.num_placed(), placed);
   for (const AnimationClip& clip : scene.clips) {
     line("  clip {}: {:g} s, from {:g} to {:g} s", clip.name.empty() ? "(unnamed)" : clip.name, clip.end - clip.start,
          clip.start, clip.end);

@@ -48,6 +48,8 @@ class Dicing {
 
   /// The parts, in place of the mesh's triangles.
   const DisplacedMeshView& mesh() const { return mesh_; }
+  /// Which parts of the mesh's triangles they are.
+  std::span<const LatticeTriangle> parts() const { return parts_; }
   /// What a tessellation of the parts is made by.
   TessellationRule rule() const;
 

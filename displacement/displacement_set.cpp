@@ -263,10 +263,11 @@ DisplacementSet::Levels DisplacementSet::levels_of(const Use& use, const Displac
   if (lod >= 0) {
     levels.first = static_cast<int>(std::min(lod, kCoarsest));
     if (tessellates) return levels;
-    levels.fixed = std::min(lod, kCoarsest) - static_cast<float>(levels.first);
+    const bool is_one_surface = !use.has_borders || blends_levels(use.settings, options);
+    levels.fixed = is_one_surface ? std::min(lod, kCoarsest) - static_cast<float>(levels.first) : 0.0f;
     levels.count = levels.fixed > 0 ? 2 : 1;
   } else if (!tessellates) {
-    levels.count = num_useful_levels(use);
+    levels.count = use.has_borders ? 1 : num_useful_levels(use);
     levels.by_cone = levels.count > 1;
   }
   return levels;
@@ -276,6 +277,10 @@ std::vector<DisplacementSet::Use> DisplacementSet::find_uses(const DisplacementI
 {
   std::vector<Use> uses;
   std::map<std::tuple<int, int, int, double>, int> known;  // mesh, displacement, heights, scale in object space
+  std::vector<bool> has_borders(input.instances.size(), false);
+  for (const DisplacedBorder& border : input.borders) {
+    for (const std::size_t side : border.sides) has_borders[side] = true;
+  }
   for (std::size_t i = 0; i < input.instances.size(); ++i) {
     const DisplacedInstance& instance = input.instances[i];
     if (instance.displacement_index < 0) continue;
@@ -299,6 +304,7 @@ std::vector<DisplacementSet::Use> DisplacementSet::find_uses(const DisplacementI
     const Stretch stretch = stretch_of(instance.world_from_object);
     Use& use = uses[static_cast<std::size_t>(at->second)];
     use.places.push_back(instance.world_from_object);
+    use.has_borders = use.has_borders || has_borders[i];
     use.steepening = std::max(use.steepening, stretch.most / stretch.least);
   }
   return uses;
@@ -337,11 +343,14 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
   const std::vector<Use> uses = find_uses(input);
   std::uint64_t tessellated_bytes = 0;
   std::vector<std::pair<int, int>> places;  // of each use: its geometry or its moved mesh
+  PartsOfMoved parts_of_moved;
   for (const Use& use : uses) {
     std::vector<LatticeTriangle> parts;
     if (const VertexMove move = vertex_move_of(use, options, &parts, &tessellated_bytes); move != VertexMove::kNone) {
       places.emplace_back(-1, static_cast<int>(moved_.size()));
       moved_.push_back(make_moved(use, move, parts));
+      parts_of_moved.emplace_back();
+      if (use.has_borders) parts_of_moved.back() = std::move(parts);
       continue;
     }
     places.emplace_back(static_cast<int>(geometries_.size()), -1);
@@ -368,6 +377,7 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
     texel_of_instance_[i] =
         displaced(i).geometry.lod.texel * static_cast<float>(stretch_of(input.instances[i].world_from_object).most);
   }
+  make_borders(input, parts_of_moved);
   kept_ = fields_->end_set();
   if (kept_meshes_ != nullptr) kept_tally_ = kept_meshes_->end_set();
 }
@@ -414,6 +424,8 @@ std::unique_ptr<PreparedMesh> DisplacementSet::make_displaced(const Use& use, co
   std::unique_ptr<PreparedMesh> displaced = prisms_of(use, mapping, fields);
   displaced->name = use.mesh_name;
   displaced->displacement_index = use.displacement_index;
+  displaced->mesh_index = use.mesh_index;
+  displaced->walls = {};
   displaced->method = geometry.method;
   geometry.mesh = displaced->mesh.view();
   geometry.lod = {levels.count, levels.by_cone, levels.fixed, displaced->mesh.widest_texel()};
@@ -576,12 +588,96 @@ MovedMesh DisplacementSet::make_moved(const Use& use, VertexMove move, std::span
   return moved;
 }
 
+BorderSide DisplacementSet::border_side(const DisplacementInput& input,
+                                        std::size_t instance,
+                                        const PartsOfMoved& parts) const
+{
+  if (geometry_of_instance_[instance] >= 0) {
+    const PreparedMesh& d = displaced(instance);
+    if (d.tessellation == nullptr) return border_of_displaced(d.geometry);
+    return border_of_tessellation(*d.tessellation,
+                                  d.dicing != nullptr ? d.dicing->parts() : std::span<const LatticeTriangle>{});
+  }
+  const auto index = static_cast<std::size_t>(input.instances[instance].mesh_index);
+  const MeshView& mesh = meshes_[index];
+  std::vector<const Vec3f*> steps;
+  if (const int moved_index = moved_of_instance_[instance]; moved_index >= 0) {
+    const MovedMesh& moved = moved_[static_cast<std::size_t>(moved_index)];
+    if (moved.divided != nullptr) return border_of_divided(moved, parts[static_cast<std::size_t>(moved_index)]);
+    for (const MovedShape& step : moved.steps) steps.push_back(step.P.data());
+    if (steps.empty()) steps.push_back(moved.P.data());
+  } else {
+    if (index < input.mesh_steps.size()) {
+      for (const MeshShape& step : input.mesh_steps[index]) steps.push_back(step.P);
+    }
+    if (steps.empty()) steps.push_back(mesh.P);
+  }
+  return border_of_vertices(mesh.triangles, std::move(steps));
+}
+
+void DisplacementSet::make_borders(const DisplacementInput& input, const PartsOfMoved& parts)
+{
+  // What stands in several places has one strip: by its mesh, and what the sides are traced as.
+  using Key = std::tuple<int, int, int, int, int>;
+  const auto key_of = [&](const DisplacedBorder& border) {
+    const std::size_t a = border.sides[0], b = border.sides[1];
+    return Key{input.instances[border.instance].mesh_index, geometry_of_instance_[a], moved_of_instance_[a],
+               geometry_of_instance_[b], moved_of_instance_[b]};
+  };
+  // What tracers round, of the coordinates of their rays: those of points in the world, and on the way to object space.
+  constexpr double kRounding = 0x1p-21;
+  std::map<Key, double> roundings;
+  for (const DisplacedBorder& border : input.borders) {
+    const DisplacedInstance& instance = input.instances[border.instance];
+    const MeshView& mesh = meshes_[static_cast<std::size_t>(instance.mesh_index)];
+    Vec3f extent{};
+    for (std::uint32_t v = 0; v < mesh.num_vertices; ++v) extent = max(extent, abs(mesh.P[v]));
+    for (const std::size_t side : border.sides) {
+      if (geometry_of_instance_[side] < 0) continue;
+      const Box3& box = displaced(side).mesh.bounds();
+      if (box.low.x <= box.high.x) extent = max(extent, max(abs(box.low), abs(box.high)));
+    }
+    const Affine3& m = instance.world_from_object;
+    const Vec3f world = abs(m.x) * extent.x + abs(m.y) * extent.y + abs(m.z) * extent.z + abs(m.p);
+    const double size = std::max(static_cast<double>(max_component(extent)),
+                                 static_cast<double>(max_component(world)) / stretch_of(m).least);
+    double& rounding = roundings[key_of(border)];
+    rounding = std::max(rounding, kRounding * size);
+  }
+  std::map<Key, int> known;
+  for (const DisplacedBorder& border : input.borders) {
+    const Key key = key_of(border);
+    const auto [at, is_new] = known.try_emplace(key, static_cast<int>(moved_.size()));
+    moved_of_instance_[border.instance] = at->second;
+    if (!is_new) continue;
+    const auto index = static_cast<std::size_t>(input.instances[border.instance].mesh_index);
+    const BorderSide sides[2] = {border_side(input, border.sides[0], parts),
+                                 border_side(input, border.sides[1], parts)};
+    const std::size_t num_steps = index < input.mesh_steps.size() ? input.mesh_steps[index].size() : 0;
+    const auto mesh_of = [&](int side) {
+      return meshes_[static_cast<std::size_t>(input.instances[border.sides[side]].mesh_index)];
+    };
+    const MeshView meshes[2] = {mesh_of(0), mesh_of(1)};
+    BorderStrips strips = border_strips_make(border.edges, meshes_[index], meshes, sides, num_steps, roundings[key]);
+    for (int side = 0; side < 2; ++side) {
+      const int geometry = geometry_of_instance_[border.sides[side]];
+      if (geometry >= 0)
+        walls_beside_add(border.edges, strips, side, &geometries_[static_cast<std::size_t>(geometry)]->walls);
+    }
+    strips.mesh.name = input.mesh_names[index];
+    strips.mesh.mesh_index = static_cast<int>(index);
+    moved_.push_back(std::move(strips.mesh));
+    ++num_borders_;
+  }
+}
+
 std::unique_ptr<PreparedMesh> DisplacementSet::make_computed(const Use& use, const DisplacementOptions& options)
 {
   const ComputedHeights& heights = *use.heights;
   auto displaced = std::make_unique<PreparedMesh>();
   displaced->name = use.mesh_name;
   displaced->displacement_index = use.displacement_index;
+  displaced->mesh_index = use.mesh_index;
   displaced->method = kDefaultMethod;
   if (lattice_cache_ == nullptr) lattice_cache_ = std::make_unique<LatticeCache>(options.computed_bytes);
   HeightSource source = heights.source;
@@ -742,6 +838,20 @@ int DisplacementSet::num_faithful_levels(const Use& use, int most)
   return most;
 }
 
+void DisplacementSet::leave_walls(const PreparedMesh& d, const InstanceView& placement, DisplacedPoint* point) const
+{
+  // As on plain meshes: the sharper the angle, the farther from a wall a height above the surface is clear of it.
+  constexpr double kHeights = 16;
+  const LeavingErrors errors = leaving_errors(placement, point->P, point->Ng);
+  const double u = static_cast<double>(point->u), v = static_cast<double>(point->v);
+  const Vec3d leave =
+      d.walls.leave(meshes_[static_cast<std::size_t>(d.mesh_index)], point->triangle, {1 - u - v, u, v},
+                    to_double(point->Ng), kHeights * length(to_double(errors.offset)) + length(errors.error));
+  if (dot(leave, leave) == 0) return;
+  if (is_zero(point->leave)) point->leave = errors.offset;
+  point->leave += to_float(leave);
+}
+
 DisplacedPoint DisplacementSet::resolve(std::size_t instance,
                                         const InstanceView& placement,
                                         std::uint32_t primitive,
@@ -751,6 +861,7 @@ DisplacedPoint DisplacementSet::resolve(std::size_t instance,
   if (d.tessellation == nullptr) {
     DisplacedPoint out = displaced_resolve(d.geometry, placement, texel_of_instance_[instance], primitive, record);
     if (d.procedural != nullptr) set_base_place(*d.procedural, &out);
+    if (!d.walls.edges.empty()) leave_walls(d, placement, &out);
     return out;
   }
   const MicroHit hit = d.tessellation->hit(primitive, record.u, record.v);
@@ -775,6 +886,7 @@ DisplacedPoint DisplacementSet::resolve(std::size_t instance,
     out.Ns = to_float(displaced_surface_point(d.geometry, out.triangle, {out.u, out.v}).Ng);
   }
   displaced_point_set_level(d.geometry, placement, level, &out);
+  if (!d.walls.edges.empty()) leave_walls(d, placement, &out);
   return out;
 }
 
@@ -840,7 +952,7 @@ std::string DisplacementSet::method_names() const
     if (std::none_of(geometries_.begin(), geometries_.end(), uses)) continue;
     names += (names.empty() ? "" : ", ") + std::string(displacement_method_label(method));
   }
-  if (!moved_.empty()) names += names.empty() ? "vertices" : ", vertices";
+  if (moved_.size() > num_borders_) names += names.empty() ? "vertices" : ", vertices";
   return names;
 }
 

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "displacement/border_strips.h"
 #include "displacement/height_fields.h"
 #include "displacement/lattice_split.h"
 #include "displacement/level_facets.h"
@@ -40,6 +41,12 @@ struct ComputedHeights {
   bool is_constant = false;    ///< the same all over the mesh
 };
 
+/// An instance that stands for the walls between two others.
+struct DisplacedBorder {
+  std::size_t instance = 0, sides[2] = {0, 0};
+  std::span<const BorderEdge> edges;  ///< of the sides' meshes; its own has a triangle for each, see border_strips_make
+};
+
 /// What there is to be displaced.
 struct DisplacementInput {
   std::vector<MeshView> meshes;
@@ -50,6 +57,7 @@ struct DisplacementInput {
   std::vector<HeightFields::Map> height_maps;  ///< their texels must outlive the set
   std::span<const DisplacementSettings> settings;
   std::vector<DisplacedInstance> instances;
+  std::vector<DisplacedBorder> borders;
   std::vector<ComputedHeights> heights;
   std::shared_ptr<const void> heights_owner;  ///< of what their sources read
 };
@@ -118,6 +126,7 @@ class DisplacementSet {
   int geometry_index(std::size_t instance) const { return geometry_of_instance_[instance]; }
   /// @return  index of the moved mesh that an instance has in place of its own; −1: it has its own
   int moved_index(std::size_t instance) const { return moved_of_instance_[instance]; }
+  /// Those that stand for a mesh of the input, then strips that stand for borders.
   std::span<const MovedMesh> moved() const { return moved_; }
   std::size_t size() const { return geometries_.size(); }
   /// Whether rays must say what detail they ask for.
@@ -165,6 +174,8 @@ class DisplacementSet {
   std::vector<std::string> warnings() const;
 
  private:
+  /// Moves the origins of rays that leave a point away from walls beside it.
+  void leave_walls(const PreparedMesh& d, const InstanceView& placement, DisplacedPoint* point) const;
   const PreparedMesh& displaced(std::size_t instance) const
   {
     return *geometries_[static_cast<std::size_t>(geometry_of_instance_[instance])];
@@ -187,6 +198,7 @@ class DisplacementSet {
     double scale = 1;                  ///< metres of object space
     std::vector<Affine3> places{};     ///< its instances: the world from its own space
     double steepening = 1;  ///< how much steeper its instances' slopes are in the world than in object space, at most
+    bool has_borders = false;  ///< walls end at its surface, which is one then: rays choose no levels by their cones
   };
   static double picture_share(const Use& use, const DisplacementOptions& options);
   std::vector<Use> find_uses(const DisplacementInput& input);
@@ -212,6 +224,10 @@ class DisplacementSet {
                             std::vector<LatticeTriangle>* parts,
                             std::uint64_t* used_bytes);
   MovedMesh make_moved(const Use& use, VertexMove move, std::span<const LatticeTriangle> parts);
+  using PartsOfMoved = std::vector<std::vector<LatticeTriangle>>;  ///< of divided meshes with borders
+  void make_borders(const DisplacementInput& input, const PartsOfMoved& parts);
+  /// An instance's side of a border.
+  BorderSide border_side(const DisplacementInput& input, std::size_t instance, const PartsOfMoved& parts) const;
   /// Levels of a map that still show something on a mesh.
   int num_useful_levels(const Use& use) const;
   /// The method that a use is to be traced by; `auto` may still tessellate.
@@ -257,6 +273,7 @@ class DisplacementSet {
   KeptMeshes::Tally kept_tally_;
   std::vector<std::unique_ptr<PreparedMesh>> geometries_;
   std::vector<MovedMesh> moved_;
+  std::size_t num_borders_ = 0;  ///< of those, the last ones: strips between others
 };
 
 }  // namespace relief

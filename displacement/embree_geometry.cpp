@@ -216,6 +216,20 @@ SurfacePoint displaced_surface_point(const DisplacedGeometry& geometry,
   return traced_surface_point(on.mesh, on.tri, place.b1, place.b2);
 }
 
+Vec3d displaced_edge_point(const DisplacedGeometry& geometry,
+                           std::uint32_t triangle,
+                           int side,
+                           double fraction,
+                           int level,
+                           float time)
+{
+  double b[3] = {0, 0, 0};
+  b[side] = 1.0 - fraction;
+  b[side == 2 ? 0 : side + 1] = fraction;
+  const OnSurface on(geometry, triangle, level, b[1], b[2], time);
+  return traced_surface_point(on.mesh, on.tri, b[1], b[2]).P;
+}
+
 Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry, std::uint32_t triangle, const DisplacedPlace& place)
 {
   const double b1 = place.b1, b2 = place.b2;

@@ -111,6 +111,17 @@ SurfacePoint displaced_surface_point(const DisplacedGeometry& geometry,
                                      std::uint32_t triangle,
                                      const DisplacedPlace& place);
 
+/// The point of the surface over a side of a triangle.
+/// @param side      from the triangle's vertex `side` to the next
+/// @param fraction  along it, 0…1
+/// @param time      0…1
+Vec3d displaced_edge_point(const DisplacedGeometry& geometry,
+                           std::uint32_t triangle,
+                           int side,
+                           double fraction,
+                           int level,
+                           float time);
+
 /// The shading normal of a point of the surface from the smoothed map.
 Vec3d displaced_smooth_normal(const DisplacedGeometry& geometry, std::uint32_t triangle, const DisplacedPlace& place);
 

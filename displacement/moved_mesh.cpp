@@ -429,6 +429,26 @@ MovedMesh divided_mesh_make(const MeshView& mesh,
   return out;
 }
 
+MovedMesh placed_mesh_make(const MeshView& mesh,
+                           std::span<const MeshPlace> places,
+                           std::vector<TriangleIndices> triangles,
+                           std::vector<MovedShape> steps)
+{
+  const auto divided = std::make_shared<DividedMesh>();
+  divided->resize(mesh, places.size(), 0);
+  divided->triangles = std::move(triangles);
+  for (std::size_t vertex = 0; vertex < places.size(); ++vertex)
+    divided->interpolate(mesh, mesh.triangles[places[vertex].triangle], places[vertex].weights, vertex);
+  MovedMesh out;
+  // Embree reads 16 bytes at the last vertex.
+  for (MovedShape& step : steps) step.P.reserve(places.size() + 1);
+  out.P = steps[steps.size() / 2].P;
+  out.P.reserve(places.size() + 1);
+  if (steps.size() > 1) out.steps = std::move(steps);
+  out.divided = divided;
+  return out;
+}
+
 std::uint64_t divided_mesh_bytes(const MeshView& mesh, std::span<const LatticeTriangle> parts)
 {
   // Twelve bytes of vertices' numbers; the rest is what Embree's tree may take while it is built, an estimate that is not measured.

@@ -95,6 +95,20 @@ MovedMesh divided_mesh_make(const MeshView& mesh,
                             bool smooth,
                             std::span<const MeshShape> steps);
 
+/// A point of a mesh.
+struct MeshPlace {
+  std::uint32_t triangle = 0;
+  Vec2f weights;  ///< of the triangle's vertices 1 and 2
+};
+
+/// A flat mesh whose vertices are anywhere, with what a mesh has at places of it.
+/// @param places  a vertex each
+/// @param steps   vertices by step: one, or as many as the mesh has
+MovedMesh placed_mesh_make(const MeshView& mesh,
+                           std::span<const MeshPlace> places,
+                           std::vector<TriangleIndices> triangles,
+                           std::vector<MovedShape> steps);
+
 /// What that takes, with the tree that rays are traced in while it is built, about.
 std::uint64_t divided_mesh_bytes(const MeshView& mesh, std::span<const LatticeTriangle> parts);
 

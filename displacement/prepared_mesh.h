@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "displacement/border_strips.h"
 #include "displacement/content_hash.h"
 #include "displacement/curved_heights.h"
 #include "displacement/dicing.h"
@@ -20,6 +21,7 @@ namespace relief {
 
 struct PreparedMesh {
   std::string name;                             ///< of the mesh
+  int mesh_index = -1;                          ///< into the input's meshes
   int displacement_index = -1;                  ///< into the input's settings
   DisplacementMethod method = kDefaultMethod;   ///< by which it is traced
   std::unique_ptr<MapHeights> map_heights;      ///< where computed heights are a map's
@@ -30,6 +32,7 @@ struct PreparedMesh {
   LevelBlend blend;                ///< of its mesh, if it has one
   std::unique_ptr<Dicing> dicing;  ///< what is tessellated in place of the mesh; null: the mesh itself
   std::unique_ptr<Tessellation> tessellation;
+  WallsBeside walls;                   ///< at its borders with other meshes
   std::optional<ContentHash> content;  ///< of all that `mesh` and `tree` are made of; empty: they are not to be kept
   std::shared_ptr<RTCSceneTy> tree;    ///< of `geometry`, committed; null: none yet
   std::uint64_t tree_bytes = 0;

@@ -341,6 +341,31 @@ RTCGeometry Tessellation::geometry_make(RTCDevice device) const
   return geometry;
 }
 
+std::vector<SidePoint> Tessellation::side(std::uint32_t triangle, int k) const
+{
+  const TessellatedTriangle& t = layout_.triangles[triangle];
+  const std::uint32_t n = t.segments;
+  std::vector<SidePoint> out;
+  const auto add = [&](const LatticeVertex& at, std::uint64_t index) {
+    // Of a corner the vertex says no side; the ends are those of this one.
+    const int next = k == 2 ? 0 : k + 1;
+    out.push_back({at.b[next], vertex(t.first_vertex + index)});
+  };
+  if (layout_.kind == TessellationKind::kGrids) {
+    const auto corner = static_cast<std::uint64_t>(k), next = static_cast<std::uint64_t>(k == 2 ? 0 : k + 1);
+    const std::uint64_t row = n + 1;
+    for (std::uint32_t x = 0; x <= n; ++x) add(grid_vertex(t, k, x, 0), corner * row * row + x);
+    for (std::uint32_t y = 0; y <= n; ++y)
+      add(grid_vertex(t, static_cast<int>(next), 0, y), next * row * row + y * row);
+    return out;
+  }
+  for (std::uint32_t step = 0; step <= n; ++step) {
+    const std::uint32_t i = k == 0 ? step : k == 1 ? n - step : 0, j = k == 0 ? 0 : k == 1 ? step : n - step;
+    add(triangle_vertex(t, i, j), std::uint64_t{j} * (n + 1) - std::uint64_t{j} * (std::uint64_t{j} - 1) / 2 + i);
+  }
+  return out;
+}
+
 /// The base triangle of a primitive.
 std::uint32_t Tessellation::triangle_of(std::uint32_t primitive) const
 {

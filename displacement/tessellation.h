@@ -78,6 +78,12 @@ struct MicroHit {
   double side_distance = 0;    ///< from the point to the nearest side of the micro-triangle
 };
 
+/// A vertex on a side of a base triangle.
+struct SidePoint {
+  double fraction = 0;  ///< along the side
+  Vec3f P;              ///< object space
+};
+
 class Tessellation {
  public:
   /// Evaluates the surface at all vertices.
@@ -113,6 +119,9 @@ class Tessellation {
   /// @return           to the side of the hit's normal; zero: no more is to be done than for any other hit
   Vec3d leave(RTCScene scene, std::uint32_t primitive, float u, float v, const MicroHit& hit, Vec3d error, double reach)
       const;
+
+  /// The vertices along a side of a base triangle, from its vertex k to the next; some may be there twice.
+  std::vector<SidePoint> side(std::uint32_t triangle, int k) const;
 
   Vec3f vertex(std::size_t index) const
   {

@@ -202,6 +202,13 @@ Accel::Accel(const Scene& scene,
     mesh.transparent |= lets_light_through;
     mesh.takes_time |= (views.instances[i].flags & (kMoves | kDeforms)) != 0;
   }
+  const auto meets_border = [&](std::size_t i) {
+    if (displacements.geometry_index(i) < 0) use_of(i).at_border = true;
+  };
+  for (std::size_t k = 0; k < scene.border_instances.size(); ++k) {
+    meets_border(scene.num_placed() + k);
+    for (const int side : scene.border_instances[k].sides) meets_border(static_cast<std::size_t>(side));
+  }
   build_displaced(displacements);
   place_instances(scene, lights, area_lights);
   build_tessellated(displacements);

@@ -105,11 +105,12 @@ class Accel {
     int count = 0;             ///< of instances that are not displaced
     bool transparent = false;  ///< one of them
     bool takes_time = false;   ///< one of them moves or deforms while the shutter is open
+    bool at_border = false;    ///< it meets walls, or is some: in object space both sides of an edge round alike
     Box3 box;                  ///< object space, of meshes with a tree; over all time
     Vec3f pad;                 ///< by which it is enlarged
     TreePointer tree;          ///< null: it is in place
 
-    bool has_tree() const { return count > 1 || takes_time || !mesh.radius.empty(); }
+    bool has_tree() const { return count > 1 || takes_time || at_border || !mesh.radius.empty(); }
   };
 
   const MeshUse& use_of(std::size_t instance) const

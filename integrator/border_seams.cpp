@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -28,9 +29,14 @@ bool is_before(const BorderEdge& a, const BorderEdge& b)
 /// A mesh at a place.
 struct Part {
   const Mesh* mesh;
+  int mesh_index;
   int displacement_index;  ///< −1: it is not displaced
   DisplacedMeshView displaced;
+  const MovedMesh* moved = nullptr;  ///< in place of `displaced`: its own vertices are where displacement moves them to
 };
+
+/// Pairs of meshes between which there are walls.
+using WeldedMeshes = std::set<std::pair<int, int>>;
 
 Vec3d mix(Vec3d a, Vec3d b, double t) { return (1 - t) * a + t * b; }
 
@@ -40,6 +46,14 @@ Vec3d displaced_point(const Part& part, const BorderEdge& edge, double t)
   const Vec3d from{edge.ends[0][0], edge.ends[0][1], edge.ends[0][2]},
       to{edge.ends[1][0], edge.ends[1][1], edge.ends[1][2]};
   const Vec3d P = mix(from, to, t);
+  if (part.moved != nullptr) {
+    const TriangleIndices& corners = part.mesh->triangles[edge.edge / 3];
+    const std::uint32_t v[4] = {corners.v0, corners.v1, corners.v2, corners.v0};
+    std::uint32_t a = v[edge.edge % 3], b = v[edge.edge % 3 + 1];
+    const Vec3d at_a = to_double(part.mesh->P[a]);
+    if (at_a.x != from.x || at_a.y != from.y || at_a.z != from.z) std::swap(a, b);
+    return mix(to_double(part.moved->P[a]), to_double(part.moved->P[b]), t);
+  }
   if (part.displacement_index < 0) return P;
   const DisplacedTriangle& tri = part.displaced.triangles[edge.edge / 3];
   std::uint32_t a = edge.edge % 3, b = (a + 1) % 3;
@@ -55,14 +69,14 @@ Vec3d displaced_point(const Part& part, const BorderEdge& edge, double t)
 
 double texels_along(const Part& part, const BorderEdge& edge)
 {
-  if (part.displacement_index < 0) return 0;
+  if (part.displacement_index < 0 || part.moved != nullptr) return 0;
   return texels_along(part.displaced.triangles[edge.edge / 3], static_cast<int>(edge.edge % 3));
 }
 
 /// Less counts as none, as in seam_report.
 double least_gap(const Part& part)
 {
-  if (part.displacement_index < 0) return 0;
+  if (part.displacement_index < 0 || part.moved != nullptr) return 0;
   double low, high;
   stored_to_heights(*part.displaced.field, part.displaced.field->range, &low, &high);
   return 1e-3 * std::abs(part.displaced.scale) * (high - low);
@@ -109,7 +123,7 @@ void add_edges(const Part& part, std::uint32_t index, std::vector<BorderEdge>* e
 }
 
 /// Adds the borders between parts at one place.
-void add_borders(const std::vector<Part>& parts, std::vector<SeamExtent>* sums)
+void add_borders(const std::vector<Part>& parts, const WeldedMeshes& welded, std::vector<BorderReport>* sums)
 {
   std::vector<BorderEdge> edges;
   for (std::uint32_t i = 0; i < parts.size(); ++i) add_edges(parts[i], i, &edges);
@@ -126,10 +140,12 @@ void add_borders(const std::vector<Part>& parts, std::vector<SeamExtent>* sums)
       const int of_a = parts[a.part].displacement_index, of_b = parts[b.part].displacement_index;
       if (of_a < 0 && of_b < 0) continue;
       const SeamExtent found = extent_of(parts[a.part], a, parts[b.part], b);
+      const bool is_welded = welded.contains(std::minmax(parts[a.part].mesh_index, parts[b.part].mesh_index));
       for (const int index : {of_a, of_b == of_a ? -1 : of_b}) {
         if (index < 0) continue;
-        SeamExtent& sum = (*sums)[static_cast<std::size_t>(index)];
-        sum = seam_extent_sum(sum, found);
+        BorderReport& sum = (*sums)[static_cast<std::size_t>(index)];
+        sum.all = seam_extent_sum(sum.all, found);
+        if (!is_welded) sum.open = seam_extent_sum(sum.open, found);
       }
     }
     first = end;
@@ -138,24 +154,33 @@ void add_borders(const std::vector<Part>& parts, std::vector<SeamExtent>* sums)
 
 }  // namespace
 
-std::vector<SeamExtent> border_seams(const Scene& scene, const DisplacementSet& displacements)
+std::vector<BorderReport> border_seams(const Scene& scene, const DisplacementSet& displacements)
 {
-  std::vector<SeamExtent> sums(scene.displacements.size());
+  std::vector<BorderReport> sums(scene.displacements.size());
+  const auto mesh_of = [&](int instance) { return scene.instances[static_cast<std::size_t>(instance)].mesh_index; };
+  WeldedMeshes welded;
+  for (const BorderInstance& border : scene.border_instances)
+    welded.insert(std::minmax(mesh_of(border.sides[0]), mesh_of(border.sides[1])));
   using Place = std::array<float, 12>;
   std::map<Place, std::map<std::pair<int, int>, Part>> places;  // by mesh and displaced geometry
-  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+  for (std::size_t i = 0; i < scene.num_placed(); ++i) {
     const Instance& instance = scene.instances[i];
     const Affine3& m = instance.world_from_object;
-    const int geometry = displacements.geometry_index(i);
+    const int geometry = displacements.geometry_index(i), moved = displacements.moved_index(i);
     const Mesh& mesh = scene.meshes[static_cast<std::size_t>(instance.mesh_index)];
-    Part part{&mesh, -1, {}};
+    Part part{&mesh, instance.mesh_index, -1, {}};
+    if (moved >= 0) {
+      part.moved = &displacements.moved()[static_cast<std::size_t>(moved)];
+      if (part.moved->divided != nullptr) continue;
+      part.displacement_index = scene.materials[static_cast<std::size_t>(instance.material_index)].displacement_index;
+    }
     if (geometry >= 0) {
       part.displaced = displacements.mesh(static_cast<std::size_t>(geometry)).view();
       part.displacement_index = displacements.displacement_index(static_cast<std::size_t>(geometry));
       if (part.displaced.field == nullptr) continue;
     }
     places[{m.x.x, m.x.y, m.x.z, m.y.x, m.y.y, m.y.z, m.z.x, m.z.y, m.z.z, m.p.x, m.p.y, m.p.z}].try_emplace(
-        {instance.mesh_index, geometry}, part);
+        {instance.mesh_index, std::max(geometry, moved)}, part);
   }
   // Of meshes that are together in many places the borders are the same ones.
   std::map<std::vector<std::pair<int, int>>, bool> seen;
@@ -168,7 +193,7 @@ std::vector<SeamExtent> border_seams(const Scene& scene, const DisplacementSet& 
       parts.push_back(part);
       is_any_displaced |= part.displacement_index >= 0;
     }
-    if (is_any_displaced && parts.size() > 1 && seen.try_emplace(names, true).second) add_borders(parts, &sums);
+    if (is_any_displaced && parts.size() > 1 && seen.try_emplace(names, true).second) add_borders(parts, welded, &sums);
   }
   return sums;
 }

@@ -119,7 +119,8 @@ std::vector<EmissiveMesh> emissive_meshes(const Scene& scene, LightSet& set)
     return scene.meshes[static_cast<std::size_t>(instance.mesh_index)].triangles.size();
   };
   std::vector<std::size_t> emissive;
-  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+  // Walls between displaced parts are found by paths alone.
+  for (std::size_t i = 0; i < scene.num_placed(); ++i) {
     const Instance& instance = scene.instances[i];
     if (triangles(instance) == 0 ||
         !material_is_light(scene.materials[static_cast<std::size_t>(instance.material_index)]))

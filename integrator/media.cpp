@@ -37,7 +37,7 @@ Vec3f transmittance_of(const KernelGlobals& g, const MediumState& inside, const 
 
 Media::Media(const SceneContext& context) : context_(context), exist_(!context.media.empty())
 {
-  for (std::size_t i = 0; i < context.scene.instances.size(); ++i) {
+  for (std::size_t i = 0; i < context.scene.num_placed(); ++i) {
     const auto material = static_cast<std::size_t>(context.scene.instances[i].material_index);
     if (context.scene.materials[material].medium_index < 0) continue;
     filled_.push_back({instance_box(context, i), static_cast<std::int32_t>(i)});

@@ -43,8 +43,16 @@ DisplacementSet scene_displacement(const Scene& scene, const DisplacementOptions
   }
   for (const HeightMap& map : scene.height_maps) input.height_maps.push_back({map.view(), map.texels});
   input.settings = scene.displacements;
-  for (const Instance& instance : scene.instances) {
-    input.instances.push_back({instance.mesh_index, displacement_of(scene, instance), -1, instance.world_from_object});
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    const Instance& instance = scene.instances[i];
+    input.instances.push_back({instance.mesh_index, i < scene.num_placed() ? displacement_of(scene, instance) : -1, -1,
+                               instance.world_from_object});
+  }
+  for (std::size_t k = 0; k < scene.border_instances.size(); ++k) {
+    const BorderInstance& border = scene.border_instances[k];
+    input.borders.push_back({scene.num_placed() + k,
+                             {static_cast<std::size_t>(border.sides[0]), static_cast<std::size_t>(border.sides[1])},
+                             scene.borders[static_cast<std::size_t>(border.border_index)].edges});
   }
   computed_heights_add(scene, options, &input);
   DisplacementSet set(input, options);

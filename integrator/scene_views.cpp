@@ -22,6 +22,11 @@ SceneViews::SceneViews(const Scene& scene) : motion(scene)
     if (takes_time || uses[static_cast<std::size_t>(instance.mesh_index)] > 1) view.flags |= kTracedInObjectSpace;
     instances.push_back(view);
   }
+  for (std::size_t k = 0; k < scene.border_instances.size(); ++k) {
+    instances[scene.num_placed() + k].flags |= kTracedInObjectSpace;
+    for (const int side : scene.border_instances[k].sides)
+      instances[static_cast<std::size_t>(side)].flags |= kTracedInObjectSpace;
+  }
   std::size_t num_columns = 0;
   for (const Mesh& mesh : scene.meshes) num_columns += mesh.columns.size();
   mesh_columns.reserve(num_columns);  // views point into it

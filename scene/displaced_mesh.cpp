@@ -93,7 +93,8 @@ std::vector<MeshDisplacement> displaced_meshes(const Scene& scene)
 {
   std::vector<MeshDisplacement> out;
   std::set<std::pair<int, int>> known;
-  for (const Instance& instance : scene.instances) {
+  for (std::size_t i = 0; i < scene.num_placed(); ++i) {
+    const Instance& instance = scene.instances[i];
     const int displacement = scene.materials[static_cast<std::size_t>(instance.material_index)].displacement_index;
     const int copy_of = scene.meshes[static_cast<std::size_t>(instance.mesh_index)].copy_of;
     const int mesh = copy_of >= 0 ? copy_of : instance.mesh_index;

@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "scene/border_walls.h"
 #include "scene/displaced_mesh.h"
 #include "scene/framing.h"
 #include "scene/gltf_mesh.h"
@@ -855,6 +856,7 @@ Scene scene_load(const std::filesystem::path& path, const LoadOptions& options)
     faults.settle(options.continue_without_textures, warnings);
     const bool has_backdrop = !options.environment_visible.has_value();
     world_displacement_bake(scene);
+    border_walls_add(scene);
     std::function<bool()> emission_shows;
     // Of an animation all frames have the same light, so that none of them can tell.
     if (options.emission_shows != nullptr && (!options.has_frame || scene.clips.empty())) {

@@ -2,6 +2,7 @@
 // through views. Everything is in the units of the scene format: metres, Y up, linear Rec.709.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -13,6 +14,7 @@
 #include "kernel/camera/camera.h"
 #include "kernel/graph/graph_scene.h"
 #include "kernel/light/light.h"
+#include "kernel/shape/border_edge.h"
 #include "kernel/shape/displacement_settings.h"
 #include "kernel/shape/mesh_view.h"
 #include "kernel/volume/medium.h"
@@ -83,6 +85,18 @@ struct Instance {
   int object_index = -1;  ///< the same for all primitives of one node, or of one copy in it; −1: it is alone
 };
 
+/// Edges that two meshes of an object have in common, which walls are to close.
+struct Border {
+  int mesh_index = 0;             ///< one triangle without area for each edge: its ends, and the second once more
+  std::vector<BorderEdge> edges;  ///< of the meshes of both sides
+};
+
+/// Where a border is.
+struct BorderInstance {
+  int border_index = 0;
+  int sides[2] = {0, 0};  ///< instances; the walls have all that the second one has but its mesh
+};
+
 struct SceneCamera {
   std::string name;
   Camera camera;     ///< half_width is for the aspect ratio `aspect`
@@ -121,6 +135,8 @@ struct Scene {
   std::string file;
   std::vector<Mesh> meshes;
   std::vector<Instance> instances;
+  std::vector<Border> borders;
+  std::vector<BorderInstance> border_instances;  ///< of the last instances: those before are what the file has
   std::vector<Material> materials;
   std::vector<std::string> material_names;
   std::vector<Medium> media;                 ///< by Material::medium_index
@@ -144,6 +160,9 @@ struct Scene {
   std::shared_ptr<const TextureStore> textures;
   std::vector<std::string> warnings;
   std::vector<FileStamp> files;  ///< everything that was read: the scene, buffers, images, references; as before that
+
+  /// How many instances there are before those of borders.
+  std::size_t num_placed() const { return instances.size() - border_instances.size(); }
 };
 
 }  // namespace relief

@@ -1,5 +1,6 @@
 // `relief trace` and `relief info` against scenes whose answers are known.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <sstream>
@@ -355,9 +356,11 @@ TEST_F(TraceInfoProgram, InfoSaysWhetherThereWillBePhotons)
 }
 
 // A square of two triangles with a material each: one is raised by half a metre, the other by a tenth or not at all.
-TEST_F(TraceInfoProgram, InfoShowsOpenBordersBetweenMaterials)
+TEST_F(TraceInfoProgram, InfoShowsBordersBetweenMaterials)
 {
-  for (const bool both : {false, true}) {
+  for (const auto& [both, welds, by_vertices] :
+       {std::array{false, false, false}, std::array{true, false, false}, std::array{false, true, false},
+        std::array{true, true, false}, std::array{true, false, true}}) {
     GltfBuilder b;
     const int first = b.accessor<float>({0, 0, 0, 1, 0, 0, 1, 1, 0}, "VEC3"),
               second = b.accessor<float>({0, 0, 0, 1, 1, 0, 0, 1, 0}, "VEC3"),
@@ -371,19 +374,24 @@ TEST_F(TraceInfoProgram, InfoShowsOpenBordersBetweenMaterials)
     b.json["meshes"][0]["primitives"].push_back(primitive(second, 1));
     b.root_node({{"mesh", 0}});
     folder_.write("white.tga", tga_grey(1, 1, "\xff"));
-    const auto raised = [](double scale) {
-      return nlohmann::json{
-          {"RELIEF_displacement",
-           {{"heightTexture", {{"uri", "white.tga"}}}, {"scale", scale}, {"midlevel", 0}, {"seams", "weld"}}}};
+    const auto raised = [welds = welds](double scale) {
+      return nlohmann::json{{"RELIEF_displacement",
+                             {{"heightTexture", {{"uri", "white.tga"}}},
+                              {"scale", scale},
+                              {"midlevel", 0},
+                              {"seams", welds ? "weld" : "keep"}}}};
     };
     b.push("materials", {{"name", "bark"}, {"extensions", raised(0.5)}});
     b.push("materials", {{"name", "moss"}, {"extensions", both ? raised(0.1) : nlohmann::json::object()}});
     b.json["extensionsUsed"].push_back("RELIEF_displacement");
-    // Of meshes that rays are asked of: what one height raises everywhere is moved.
-    const Outcome outcome = run({"info", folder_.write("s.gltf", b.gltf()).string(), "--displacement", "chord"});
+    // What one height raises everywhere is moved by its vertices, unless a method is named.
+    std::vector<std::string> arguments{"info", folder_.write("s.gltf", b.gltf()).string()};
+    if (!by_vertices) arguments.insert(arguments.end(), {"--displacement", "chord"});
+    const Outcome outcome = run(arguments);
     ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
-    const std::string expected = std::string("open borders with other materials: 1 edges, 1.41421 m, gap up to ") +
-                                 (both ? "0.4" : "0.5") + " m\n";
+    const std::string extent = std::string("1 edges, 1.41421 m, gap up to ") + (both ? "0.4" : "0.5") + " m\n";
+    const std::string expected = "borders with other materials: " + extent +
+                                 "      left open: " + (welds ? "0 edges, 0 m, gap up to 0 m\n" : extent);
     const std::size_t at = outcome.output.find(expected);
     EXPECT_NE(at, std::string::npos) << outcome.output;
     EXPECT_EQ(outcome.output.find(expected, at + 1) != std::string::npos, both) << outcome.output;
