@@ -324,7 +324,7 @@ def test_camera_within_fog_by_height():
     assert_agrees(scene, samples=128)
 
 
-def test_world_that_varies():
+def test_world_that_varies_long():
     """In a room: into the distance Cycles' steps get longer and longer."""
     scene = _varying_scene(1, 1)
     _add_box((18, 18, 9), diffuse((0.5, 0.5, 0.5)), (0, 0, 4.4))
@@ -335,8 +335,8 @@ def test_world_that_varies():
     noise = v.node("TexNoise", Vector=v.coordinate("Object"), Scale=0.8, Detail=1.0).outputs["Fac"]
     height = v.math("MULTIPLY", v.coordinate("Object", 2), -0.5)
     v.give(Density=v.math("MULTIPLY", v.math("MULTIPLY", v.math("EXPONENT", height), noise), 0.3))
-    scene.world.cycles.volume_step_size = 2.0
-    assert_agrees(scene, samples=128)
+    scene.world.cycles.volume_step_size = 5.0
+    assert_agrees(scene, runs=4, samples=24)
 
 
 def test_density_without_a_bound_is_warned_about():
