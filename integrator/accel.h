@@ -69,6 +69,7 @@ class Accel {
   const DisplacementSet& displacements() const { return *displacements_; }
   const SceneMotion& motion() const { return views_->motion; }
   Box3 bounds() const;  ///< of all that rays can hit, world
+  bool has_curves() const { return has_curves_; }
   /// Of a displaced geometry's prisms or micro-triangles, object space.
   Box3 displaced_bounds(std::size_t geometry) const { return displaced_[geometry].box; }
   std::size_t bytes() const { return trees_->bytes(); }   ///< allocated by Embree
@@ -143,6 +144,7 @@ class Accel {
   std::vector<DisplacedUse> displaced_;  ///< a geometry of displacements_
   std::unique_ptr<SceneTree> scene_;
   RTCScene top_ = nullptr;  ///< of scene_
+  bool has_curves_ = false;
 };
 
 }  // namespace relief

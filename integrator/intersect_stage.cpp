@@ -337,7 +337,7 @@ void intersect_closest(const KernelGlobals& g,
       cone = PathLod(state, path).cone(state.cone_width[path], state.cone_spread[path]);
       context.cones = &cone;
     }
-    if (state.bounces[path] != 0 && (state.flags[path] & kPathScattered) == 0) {
+    if (accel.has_curves() && state.bounces[path] != 0 && (state.flags[path] & kPathScattered) == 0) {
       ray.ray.flags = curve_left(g, state, path);
     }
     accel.intersect(context, ray);
@@ -409,7 +409,7 @@ void intersect_shadow(const KernelGlobals& g,
       cone = PathLod(state, shadow.path[i]).cone(shadow.cone_width[i], shadow.cone_spread[i]);
       context.embree.cones = &cone;
     }
-    if (start == ShadowStart::kAtHit) ray.flags = curve_left(g, state, shadow.path[i]);
+    if (accel.has_curves() && start == ShadowStart::kAtHit) ray.flags = curve_left(g, state, shadow.path[i]);
     accel.occluded(context.embree, ray);
     if (context.embree.steps != nullptr) note_steps(steps, displacement);
     visibility[i] = ray.tfar < 0.0f ? Vec3f{} : context.visibility;
