@@ -35,7 +35,7 @@ struct MixtureBuild {
   bool enters = false;                    ///< paths may go below the surface
   bool is_after_diffuse = false;          ///< the path has been scattered diffusely before
   float footprint = 0;                    ///< metres
-  Vec3f tangent{};                        ///< see SurfaceHit
+  Vec3f tangent{};                        ///< unit, along the curve that is met; 0: it is a triangle
 };
 
 RELIEF_KERNEL float mean_component(Vec3f v) { return (v.x + v.y + v.z) * (1.0f / 3.0f); }

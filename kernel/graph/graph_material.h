@@ -5,6 +5,7 @@
 #include "kernel/graph/graph_mixture.h"
 #include "kernel/graph/graph_registers.h"
 #include "kernel/graph/graph_scene.h"
+#include "kernel/shape/curve_hit.h"
 #include "kernel/shape/surface_hit.h"
 
 namespace relief {
@@ -298,9 +299,10 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
     case Q::tangent_normal_x:
     case Q::tangent_normal_y:
     case Q::tangent_normal_z: {
-      const Vec3f across = at.wo - hit.tangent * dot(hit.tangent, at.wo);
-      const bool is_curve = !is_zero(hit.tangent) && !is_zero(across);
-      return is_curve ? component(graph_z_up(normalize(across)), axis_of(Q::tangent_normal_x)) : 0.0f;
+      if ((at.instance->flags & kCurves) == 0) return 0.0f;
+      const Vec3f tangent = curve_tangent(*at.mesh, *at.instance, at.triangle, at.bary_u, at.wo);
+      const Vec3f across = at.wo - tangent * dot(tangent, at.wo);
+      return is_zero(across) ? 0.0f : component(graph_z_up(normalize(across)), axis_of(Q::tangent_normal_x));
     }
     case Q::edge_distance:
       return graph_edge_distance(at);

@@ -33,6 +33,19 @@ RELIEF_KERNEL CurveBasis curve_basis_derivative(float u)
            -0.5f * u * (2.0f * s - u)}};
 }
 
+/// Direction of a curve: world, unit.
+/// @param u   along the segment
+/// @param wo  unit: where a curve turns back on itself it has no direction, and any across the ray will do
+[[gnu::noinline]] RELIEF_KERNEL Vec3f
+curve_tangent(const MeshView& mesh, const InstanceView& instance, std::uint32_t segment, float u, Vec3f wo)
+{
+  const std::uint32_t first = mesh.triangles[segment].v0 - 1;
+  const Vec3f P[4] = {mesh_P(mesh, first), mesh_P(mesh, first + 1), mesh_P(mesh, first + 2), mesh_P(mesh, first + 3)};
+  const Vec3f along = transform_vector(instance.world_from_object, curve_basis_derivative(u).of(P));
+  const float width = length_squared(along);
+  return width > 0.0f ? along * (1.0f / __builtin_sqrtf(width)) : frame_from_normal(wo).s;
+}
+
 /// The point where a ray meets a curve.
 ///
 /// Rays meet tubes from outside only (a filter lets those through that leave), so what goes on inside starts just below. A ribbon
@@ -58,8 +71,6 @@ RELIEF_KERNEL CurveBasis curve_basis_derivative(float u)
   }
   const CurveBasis at = curve_basis(u);
   const Vec3f centre = at.of(P);
-  const Vec3f along = transform_vector(m, curve_basis_derivative(u).of(P));
-  const float width = length_squared(along);
 
   SurfaceHit hit;
   hit.P = P_ray;
@@ -69,14 +80,13 @@ RELIEF_KERNEL CurveBasis curve_basis_derivative(float u)
     return abs(by.x) * d.x + abs(by.y) * d.y + abs(by.z) * d.z;
   };
   hit.P_error = gamma_bound(8) * (size + abs(m.p) + abs_transform(m, abs_transform(inverse, size) + abs(inverse.p)));
-  // Where a curve turns back on itself it has no direction; then any will do.
-  hit.tangent = width > 0.0f ? along * (1.0f / __builtin_sqrtf(width)) : frame_from_normal(wo).s;
   Vec3f away;  // unit, from the curve
   if ((instance.flags & kRibbons) != 0) {
-    const Vec3f across = cross(hit.tangent, wo);
+    const Vec3f tangent = curve_tangent(mesh, instance, segment, u, wo);
+    const Vec3f across = cross(tangent, wo);
     const float sine = length(across);
-    const Vec3f side = sine > 0.0f ? across / sine : frame_from_normal(hit.tangent).s;
-    away = cross(side, hit.tangent);
+    const Vec3f side = sine > 0.0f ? across / sine : frame_from_normal(tangent).s;
+    away = cross(side, tangent);
     hit.Ng = wo;
     hit.Ns = normalize(v * side + safe_sqrt(1.0f - v * v) * away);
   } else {

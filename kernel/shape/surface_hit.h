@@ -20,7 +20,6 @@ struct SurfaceHit {
   Vec3f P_lift;   ///< vector from P to the smooth surface that Ns suggests, see surface_hit_make; 0 for flat meshes
   Vec3f leave{};  ///< how rays' origins are moved to the front side, metres; 0: along Ng, by P_error
   Vec3f clear{};  ///< how they are moved first, along the triangle: see triangle_clearance
-  Vec3f tangent{};  ///< unit, along a curve; 0: of triangles
 };
 
 /// Vector along a triangle from a point next to its edge to one that is clear of it: the triangle beyond an edge may be nearer

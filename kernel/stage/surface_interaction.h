@@ -190,16 +190,22 @@ struct ClosureSight {
   bool is_first = false;      ///< the surface is the first of a path from the camera
   bool enters = false;        ///< it may go below the surface
   bool is_after_diffuse = false;
+  Vec3f tangent{};  ///< unit, along the curve that is met; 0: it is a triangle
 };
 
 /// Photons stay above: they end where there is a diffuse lobe. So does all light on curves.
 RELIEF_KERNEL ClosureSight closure_sight(
     const KernelGlobals& g, const PathState& state, std::uint32_t path, const InstanceView& instance, SurfaceBlur blur)
 {
-  return {blur, path_does_without(g, state.flags[path]), path_surface(state, path) == 0,
-          state.subsurface.entries != nullptr && (state.flags[path] & kPathPhoton) == 0 &&
-              (instance.flags & kCurves) == 0,
-          path_bounces(state.bounces[path], BounceKind::kDiffuse) > 0};
+  ClosureSight sight{blur, path_does_without(g, state.flags[path]), path_surface(state, path) == 0,
+                     state.subsurface.entries != nullptr && (state.flags[path] & kPathPhoton) == 0,
+                     path_bounces(state.bounces[path], BounceKind::kDiffuse) > 0};
+  if (__builtin_expect((instance.flags & kCurves) != 0, 0)) {
+    sight.enters = false;
+    sight.tangent = curve_tangent(path_mesh(g, state, path, instance), instance, state.hit_triangle[path], state.hit_u[path],
+                                  -path_direction(state, path));
+  }
+  return sight;
 }
 
 /// Resolves the closures of a located point: its lobes, its frame, and the parameters that stages ask for.
@@ -225,7 +231,7 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   build.enters = sight.enters;
   build.is_after_diffuse = sight.is_after_diffuse;
   build.footprint = at.cone.width;
-  build.tangent = at.hit.tangent;
+  build.tangent = sight.tangent;
   if (const std::uint16_t first = lane.program->surface_normal; first != kNoGraphOperand) {
     const Vec3f given{graph_result(lane, first), graph_result(lane, first + 1), graph_result(lane, first + 2)};
     // Since 4.0 what displaces nothing bends freely.
