@@ -103,7 +103,8 @@ Pilot pilot_read(Film& film, double mean_factor)
   return pilot;
 }
 
-/// A picture of few pixels, each of the size of one of the whole picture's.
+/// A film of few pixels, each of the size of one of the whole picture's.
+/// @param g  gets it
 Film pilot_film(const RenderSettings& settings, double num_pixels, KernelGlobals& g)
 {
   const double aspect = static_cast<double>(settings.width) / settings.height;
@@ -119,6 +120,16 @@ Film pilot_film(const RenderSettings& settings, double num_pixels, KernelGlobals
   return film;
 }
 
+Wavefront pilot_worker(const SceneContext& context, const CameraMedium& camera_medium, const std::atomic<bool>& stop)
+{
+  Wavefront worker(context.columns(true));
+  worker.stop = &stop;
+  if (camera_medium.exists()) worker.camera_medium = &camera_medium;
+  return worker;
+}
+
+/// Renders such a film.
+/// @param num_pixels  of it, about
 Pilot pilot_run(const SceneContext& context,
                 const RenderOptions& options,
                 const KernelGlobals& of_render,
@@ -132,12 +143,7 @@ Pilot pilot_run(const SceneContext& context,
   Film film = pilot_film(settings, num_pixels, g);
   const StageTable& stages = stage_table_select();
   const CameraMedium camera_medium(context);
-  tbb::enumerable_thread_specific<Wavefront> workers([&] {
-    Wavefront worker(context.columns(true));
-    worker.stop = &stop;
-    if (camera_medium.exists()) worker.camera_medium = &camera_medium;
-    return worker;
-  });
+  tbb::enumerable_thread_specific<Wavefront> workers([&] { return pilot_worker(context, camera_medium, stop); });
   // Where they carry what they have, it is the beauty alone that is asked for.
   double factors = sources.factors.empty() ? kTrace : 0.0;
   for (std::size_t i = 0; i < sources.factors.size(); ++i) {
@@ -197,12 +203,7 @@ void photons_guide(const SceneContext& context,
   g.seed = ~g.seed;
   const StageTable& stages = stage_table_select();
   const CameraMedium camera_medium(context);
-  tbb::enumerable_thread_specific<Wavefront> workers([&] {
-    Wavefront worker(context.columns(true));
-    worker.stop = &stop;
-    if (camera_medium.exists()) worker.camera_medium = &camera_medium;
-    return worker;
-  });
+  tbb::enumerable_thread_specific<Wavefront> workers([&] { return pilot_worker(context, camera_medium, stop); });
   std::vector<std::vector<RecordedRay>> rays(static_cast<std::size_t>(film.num_tiles()));
   tbb::parallel_for(0, film.num_tiles(), [&](int tile) {
     const FlushDenormals flush;
