@@ -35,6 +35,12 @@ class CheckLayers(unittest.TestCase):
         })
         self.assertEqual(code, 0, output)
 
+    def test_cycle_of_imports(self):
+        addon = "blender_addon/relief/"
+        files = {"kernel/a.h": HEADER, addon + "a.py": "from .export import b\n",
+                 addon + "export/b.py": "def f():\n    from ..a import g\n"}
+        self.assert_wrong(files, f"cycle of imports: {addon}a.py -> {addon}export/b.py -> {addon}a.py")
+
     def test_lower_layer_includes_higher(self):
         self.assert_wrong({"kernel/a.h": HEADER + '#include "scene/b.h"\n', "scene/b.h": HEADER},
                           "kernel/a.h:2: kernel/ may not include scene/")

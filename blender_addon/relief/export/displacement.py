@@ -16,7 +16,7 @@ import numpy as np
 from .. import compat
 from . import nodes
 from .displacement_graph import SPACES, AlongNormal, InObject, is_along_normal
-from .graph import NotUnderstood
+from .not_understood import NotUnderstood
 
 
 def has_displacement_node(material):

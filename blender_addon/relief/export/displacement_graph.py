@@ -5,7 +5,8 @@ Where all of them go along the surface's normal it is one height (AlongNormal), 
 """
 
 from . import nodes
-from .graph import NotUnderstood, clamped, displaced_in_object, to_object
+from .graph import clamped, displaced_in_object, to_object
+from .not_understood import NotUnderstood
 
 #: Ours by Blender's.
 SPACES = {"OBJECT": "object", "WORLD": "world"}

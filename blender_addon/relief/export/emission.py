@@ -2,7 +2,7 @@
 """What the shaders of worlds and lights come to: a sum of colours, each times its weight."""
 
 from . import nodes
-from .graph import NotUnderstood
+from .not_understood import NotUnderstood
 
 BLACK = [0.0, 0.0, 0.0]
 

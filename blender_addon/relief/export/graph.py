@@ -10,15 +10,7 @@ from json import dumps
 from .. import compat
 from . import color_space, nodes
 from .graph_inputs import OUTPUTS, mesh_attribute, tangent_set, transformed_normal
-
-
-class NotUnderstood(Exception):
-    """A node that graphs do not know; its text names it.
-
-    key  of the node, as nodes.Source has it; None: not known yet
-    """
-
-    key = None
+from .not_understood import NotUnderstood
 
 
 class GraphWriter:

@@ -8,13 +8,7 @@ import bpy
 
 from .. import compat
 from . import attributes, instance_values, nodes
-
-
-def not_understood(node, what):
-    """The exception of an output that graphs do not know."""
-    from .graph import NotUnderstood
-
-    return NotUnderstood(f'node "{node.name}" ({node.bl_label}): {what}')
+from .not_understood import not_understood
 
 
 def _output(index, name):

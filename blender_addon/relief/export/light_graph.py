@@ -9,7 +9,7 @@ from .. import compat
 from . import nodes
 from .emission import EmissionTree
 from .graph import GraphWriter
-from .graph_inputs import not_understood
+from .not_understood import not_understood
 from .texture import ies_uri, image_options
 
 

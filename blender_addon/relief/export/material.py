@@ -7,9 +7,10 @@ from .. import compat
 from . import nodes
 from .coverage import coverage_of
 from .displacement import bump_displaces, export_displacement
-from .graph import GraphWriter, NotUnderstood, bump_of_displacement
+from .graph import GraphWriter, bump_of_displacement
 from .light import set_emission
 from .mesh import Wanted
+from .not_understood import NotUnderstood
 from .settings import filters_glossy
 from .surface import TRANSPARENT, ClosureWriter, Inside, Surface, plain_surface
 from .texture import Input, TextureReader, ies_uri, image_options

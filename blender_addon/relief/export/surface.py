@@ -13,8 +13,8 @@ from enum import Enum
 
 from .. import compat
 from . import nodes
-from .graph import NotUnderstood
 from .graph_inputs import mesh_attribute
+from .not_understood import NotUnderstood
 from .texture import Input, TextureReader
 
 _WHITE = (1.0, 1.0, 1.0)

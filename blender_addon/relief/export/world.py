@@ -7,8 +7,9 @@ from .. import compat
 from . import nodes
 from .axes import environment_rotation
 from .emission import EmissionTree
-from .graph import GraphWriter, NotUnderstood
+from .graph import GraphWriter
 from .image import MISSING, is_encoded, reads_as_stored
+from .not_understood import NotUnderstood
 from .texture import ies_uri, image_options
 from .volume import VolumeWriter
 
