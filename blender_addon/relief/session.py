@@ -53,7 +53,8 @@ def remove_stale(folder, keep):
 
 
 @persistent
-def _end_render_job(*_):
+def end_render_job(*_):
+    """Ends the program of the render job that is done, and removes its folder."""
     global _render_folder, _render_server
     if _render_server is not None:
         _render_server.stop()
@@ -64,11 +65,11 @@ def _end_render_job(*_):
 
 
 def register():
-    bpy.app.handlers.render_complete.append(_end_render_job)
-    bpy.app.handlers.render_cancel.append(_end_render_job)
+    bpy.app.handlers.render_complete.append(end_render_job)
+    bpy.app.handlers.render_cancel.append(end_render_job)
 
 
 def unregister():
-    bpy.app.handlers.render_complete.remove(_end_render_job)
-    bpy.app.handlers.render_cancel.remove(_end_render_job)
-    _end_render_job()
+    bpy.app.handlers.render_complete.remove(end_render_job)
+    bpy.app.handlers.render_cancel.remove(end_render_job)
+    end_render_job()

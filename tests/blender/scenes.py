@@ -89,7 +89,8 @@ def render(scene, engine, path, seed=0, samples=16):
     @return       float64 (height, width, 3), row 0 the top one
     @error        RuntimeError with what the engine reported
     """
-    scene.render.engine = engine
+    if scene.render.engine != engine:  # Blender forgets persistent data whenever it is set
+        scene.render.engine = engine
     scene.render.filepath = path
     scene.relief.samples = scene.cycles.samples = samples
     scene.relief.seed = scene.cycles.seed = seed
@@ -97,9 +98,28 @@ def render(scene, engine, path, seed=0, samples=16):
     return read_rgb(path)
 
 
+@contextlib.contextmanager
+def _one_job(scene):
+    """Renders within are one job to the add-on, as an animation's are, and Cycles' data persist: preparing a small picture takes most of
+    its time, and here it is the same again and again."""
+    from relief import session
+
+    ends = bpy.app.handlers.render_complete, bpy.app.handlers.render_cancel
+    for handlers in ends:
+        handlers.remove(session.end_render_job)
+    scene.render.use_persistent_data = True
+    try:
+        yield
+    finally:
+        scene.render.use_persistent_data = False
+        for handlers in ends:
+            handlers.append(session.end_render_job)
+        session.end_render_job()
+
+
 def render_runs(scene, engine, runs, samples):
     """Renders with different seeds: float64 (runs, height, width, 3)."""
-    with folder() as path:
+    with folder() as path, _one_job(scene):
         name = os.path.join(path, "picture.exr")
         return np.stack([render(scene, engine, name, seed, samples) for seed in range(runs)])
 
