@@ -409,8 +409,7 @@ void Accel::build_top(const Scene& scene, std::span<const Light> lights, std::sp
   }
   for (std::size_t i = 0; i < area_lights.size(); ++i) {
     const Light& light = lights[area_lights[i]];
-    RTCGeometry geometry =
-        light.kind == LightKind::kRectangle && light.motion_index < 0 ? new_rectangle(light) : new_light(light);
+    RTCGeometry geometry = light_is_quad(light) && light.motion_index < 0 ? new_rectangle(light) : new_light(light);
     const auto id = static_cast<unsigned>(scene.instances.size() + i);
     const std::uint32_t mask = kRayBounce | (light.visible_to_camera ? std::uint32_t{kRayCamera} : 0u);
     const Box3 with_light = box_union(scene_->target, light_box(light));
@@ -611,7 +610,7 @@ RTCGeometry Accel::new_instance(RTCScene instanced, const Affine3& m)
 Box3 Accel::light_box(const Light& light) const
 {
   if (light.motion_index >= 0) return light_geometry_bounds(light_geometry_prepare(light, views_->motion.views()));
-  const Vec3f half = light_is_ball(light) ? splat3(light.radius) : abs(light.edge_u) + abs(light.edge_v);
+  const Vec3f half = light_half_extent(light);
   return {light.P - half, light.P + half};
 }
 

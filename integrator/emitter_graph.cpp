@@ -38,30 +38,6 @@ struct MeshPoint {
   SurfaceHit hit;
 };
 
-/// Place on a lamp: across a rectangle or disk, within the cone of a spot, around a point. 0 to 1, the second one up.
-Vec2f lamp_uv(const Light& light, const Lamp& lamp, Vec3f P, Vec3f N, Vec3f wo)
-{
-  switch (light.kind) {
-    case LightKind::kRectangle:
-    case LightKind::kDisk: {
-      const Vec3f q = P - light.P, normal = cross(light.edge_u, light.edge_v);
-      const float scale = 0.5f / length_squared(normal);
-      return {0.5f + scale * dot(cross(q, light.edge_v), normal), 0.5f + scale * dot(cross(light.edge_u, q), normal)};
-    }
-    case LightKind::kSpot: {
-      const Vec3f d = transform_vector(lamp.node.object_from_world, wo);
-      const float half_width = -d.z * safe_sqrt(1.0f - sqr(light.cos_outer)) / light.cos_outer;
-      return {0.5f + 0.5f * d.x / half_width, 0.5f + 0.5f * d.y / half_width};
-    }
-    case LightKind::kPoint: {
-      const Vec3f d = normalize(transform_vector(lamp.node.object_from_world, N));
-      return {0.5f - std::atan2(d.x, d.y) * (0.5f * kInvPi), 1.0f - std::acos(clamp(d.z, -1.0f, 1.0f)) * kInvPi};
-    }
-    default:
-      return {0.5f, 0.5f};
-  }
-}
-
 /// What a graph may read at a point of a lamp.
 struct LampPoint {
   LampPoint(const KernelGlobals& g, const Light& light, const EmitterPoint& at)
@@ -70,15 +46,10 @@ struct LampPoint {
     // The square of a sun's distance has to be a number.
     constexpr float kFarthest = 1e18f;
     ray.length = min(ray.length, kFarthest);
-    const bool is_sun = light.kind == LightKind::kSun;
-    const bool is_flat = light.kind == LightKind::kRectangle || light.kind == LightKind::kDisk;
-    const bool is_point = !is_flat && !is_sun && !(light.radius > 0.0f);
-    const bool is_ball = !is_flat && !is_sun && !is_point && !light.faces_viewer;
-    // Of a point the place is known without the rounding of a distance: patterns have edges at round numbers.
-    hit.P = is_sun ? at.wo : is_point ? light.P : at.P;
-    hit.Ng = is_flat ? light.axis : is_ball ? normalize(at.P - light.P) : at.wo;
-    hit.Ns = hit.Ng;
-    uv = lamp_uv(light, lamp, hit.P, hit.Ng, wo);
+    const LightPlace place = light_place(light, at.P, wo);
+    hit.P = place.P;
+    hit.Ng = hit.Ns = place.N;
+    uv = light_uv(light, lamp.node.object_from_world, place, wo);
     hit.uv[0] = hit.uv[1] = {uv.x, 1.0f - uv.y};
     hit.color = {0, 0, 0, 1};
   }
@@ -138,42 +109,6 @@ Vec3f lamp_factor(const GraphLane& lane)
     return is_finite(value) ? value : 0.0f;
   };
   return {result(0), result(1), result(2)};
-}
-
-/// Some point of a lamp and a direction from there, and for how much light it stands.
-struct LampSample {
-  EmitterPoint point;
-  float weight;
-};
-
-LampSample lamp_sample(const Light& light, std::uint32_t index)
-{
-  const Vec2f u = sample_2d(0, index, 0), v = sample_2d(0, index, 2);
-  switch (light.kind) {
-    case LightKind::kRectangle:
-    case LightKind::kDisk: {
-      const Vec2f q = light.kind == LightKind::kDisk ? warp_disk(u) : Vec2f{2.0f * u.x - 1.0f, 2.0f * u.y - 1.0f};
-      const Vec3f local = warp_cosine_hemisphere(v);
-      const Vec3f axis = light.two_sided && (index & 1u) != 0 ? -light.axis : light.axis;
-      const Vec3f P = light.P + light.edge_u * q.x + light.edge_v * q.y;
-      return {{P, {}, from_local(frame_from_normal(axis), local), kSomeRay}, light_spread(light, local.z)};
-    }
-    case LightKind::kPoint: {
-      const Vec3f wo = warp_sphere(u);
-      return {{light.P + wo * light.radius, {}, wo, kSomeRay}, 1.0f};
-    }
-    case LightKind::kSpot: {
-      const Vec3f wo = from_local(frame_from_normal(light.axis), warp_cone(1.0f - light.cos_outer, u));
-      return {{light.P + wo * light.radius, {}, wo, kSomeRay}, spot_light_falloff(light, dot(wo, light.axis))};
-    }
-    case LightKind::kSun: {
-      const Vec3f wo =
-          light_is_sun_disk(light) ? from_local(frame_from_normal(light.axis), warp_cone(light.cone, u)) : light.axis;
-      return {{{}, {}, wo, kSomeRay}, 1.0f};
-    }
-    default:
-      return {{{}, {}, light.axis, kSomeRay}, 1.0f};
-  }
 }
 
 /// @param lane  of the material's emission program, which has run
@@ -257,9 +192,10 @@ float emitter_graph_lamp_mean(const KernelGlobals& g, const Light& light)
   for (std::uint32_t i = 0; i < kSamples; i += 8) {
     float weight[8];
     for (int k = 0; k < 8; ++k) {
-      const LampSample sample = lamp_sample(light, i + static_cast<std::uint32_t>(k));
-      weight[k] = sample.weight;
-      LampPoint(g, light, sample.point).load(program, k, registers);
+      const std::uint32_t index = i + static_cast<std::uint32_t>(k);
+      const LightRay ray = light_emit(light, sample_2d(0, index, 0), sample_2d(0, index, 2), (index & 1u) != 0);
+      weight[k] = ray.weight;
+      LampPoint(g, light, {ray.P, {}, ray.wo, kSomeRay}).load(program, k, registers);
     }
     g.run_graph(program, g.textures, registers);
     for (int k = 0; k < 8; ++k) {

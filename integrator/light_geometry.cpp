@@ -1,45 +1,17 @@
 #include "integrator/light_geometry.h"
 
-#include "kernel/light/spot.h"
 #include "kernel/math/rounding.h"
 
 namespace relief {
 
 namespace {
 
+/// With a pad that covers rounding.
 Box3 still_bounds(const Light& light)
 {
-  if (light_is_ball(light)) {
-    const float reach = light.radius * (1.0f + 8.0f * kUnitRoundoff);
-    const Vec3f half = Vec3f{reach, reach, reach} + 4.0f * kUnitRoundoff * abs(light.P);
-    return {light.P - half, light.P + half};
-  }
-  const float rounded_up = 1.0f + 8.0f * kUnitRoundoff;
-  Vec3f half = (abs(light.edge_u) + abs(light.edge_v)) * rounded_up;
-  if (light.kind == LightKind::kDisk) {
-    // Extent of an ellipse c + a·cos φ + b·sin φ along an axis: √(a² + b²); a relative pad covers the rounding.
-    const auto extent = [&](float a, float b) { return __builtin_sqrtf(a * a + b * b) * rounded_up; };
-    half = {extent(light.edge_u.x, light.edge_v.x), extent(light.edge_u.y, light.edge_v.y),
-            extent(light.edge_u.z, light.edge_v.z)};
-  }
+  const Vec3f half = light_half_extent(light) * (1.0f + 8.0f * kUnitRoundoff);
   const Vec3f pad = 4.0f * kUnitRoundoff * (abs(light.P) + half);
   return {light.P - half - pad, light.P + half + pad};
-}
-
-/// Ray against the plane of a rectangle or ellipse; coordinates within it by the dual basis of its half axes.
-/// @return  distance; negative: beside it
-float flat_distance(const Light& light, Vec3f O, Vec3f D)
-{
-  const Vec3f normal = cross(light.edge_u, light.edge_v);
-  const float normal_squared = length_squared(normal);
-  const Vec3f dual_u = cross(light.edge_v, normal) / normal_squared;
-  const Vec3f dual_v = cross(normal, light.edge_u) / normal_squared;
-  const float t = dot(light.P - O, normal) / dot(D, normal);
-  const Vec3f from_center = O + D * t - light.P;
-  const float u = dot(from_center, dual_u), v = dot(from_center, dual_v);
-  const bool inside = light.kind == LightKind::kDisk ? sqr(u) + sqr(v) <= 1.0f
-                                                     : __builtin_fabsf(u) <= 1.0f && __builtin_fabsf(v) <= 1.0f;
-  return inside ? t : -1.0f;
 }
 
 void bounds(const RTCBoundsFunctionArguments* arguments)
@@ -67,8 +39,7 @@ void intersect(const RTCIntersectFunctionNArguments* arguments)
     const Vec3f D{RTCRayN_dir_x(ray, count, i), RTCRayN_dir_y(ray, count, i), RTCRayN_dir_z(ray, count, i)};
     Light storage;
     const Light& light = lights_at(geometry.view, {0}, storage, RTCRayN_time(ray, count, i));
-    // A ray meets a ball once: where it enters, or, started inside, where it leaves.
-    const float t = light_is_ball(light) ? ball_light_distance(light, light.P - O, D) : flat_distance(light, O, D);
+    const float t = light_distance(light, O, D);
     if (!(t > RTCRayN_tnear(ray, count, i) && t < RTCRayN_tfar(ray, count, i))) continue;
     RTCRayN_tfar(ray, count, i) = t;
     RTCHitN_geomID(hit, count, i) = arguments->geomID;

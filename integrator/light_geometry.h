@@ -21,7 +21,7 @@ LightGeometry light_geometry_prepare(const Light& light, const MotionView* motio
 Box3 light_geometry_bounds(const LightGeometry& light);
 
 /// A new geometry of one primitive, not committed.
-/// @param light  a rectangle, a disk or a ball; prepared, and not moved since
+/// @param light  one that light_is_met; prepared, and not moved since
 RTCGeometry light_geometry_make(RTCDevice device, LightGeometry& light);
 
 }  // namespace relief

@@ -15,18 +15,12 @@ namespace {
 
 constexpr float kPiAngle = std::numbers::pi_v<float>;
 
-/// Cone of directions: unit axis and half angle in radians, [0, π].
-struct Cone {
-  Vec3f axis{0, 0, 1};
-  float angle = 0;
-};
-
 /// Smallest cone around two.
 /// @source Conty Estevez and Kulla 2018, Algorithm 1
-Cone cone_union(const Cone& a, const Cone& b)
+LightCone cone_union(const LightCone& a, const LightCone& b)
 {
-  const Cone& wide = a.angle >= b.angle ? a : b;
-  const Cone& narrow = a.angle >= b.angle ? b : a;
+  const LightCone& wide = a.angle >= b.angle ? a : b;
+  const LightCone& narrow = a.angle >= b.angle ? b : a;
   const float between = std::atan2(length(cross(wide.axis, narrow.axis)), dot(wide.axis, narrow.axis));
   if (std::min(between + narrow.angle, kPiAngle) <= wide.angle) return wide;
   const float angle = 0.5f * (wide.angle + between + narrow.angle);
@@ -38,28 +32,6 @@ Cone cone_union(const Cone& a, const Cone& b)
   const float by = angle - wide.angle;
   return {normalize(wide.axis * std::cos(by) + turn * (std::sin(by) / turn_length)), angle};
 }
-
-/// Mean over all directions of the part of its intensity that a light has there, and the same times three and the cosine
-/// to its axis: the expansion of that part to first order is mean + slope × cosine.
-struct LightProfile {
-  float mean = 1, slope = 0;
-};
-constexpr LightProfile kFlatProfile{1.0f / 4.0f, 1.0f / 2.0f};
-constexpr LightProfile kTwoSidedProfile{1.0f / 2.0f, 0.0f};
-/// One within a cone, nothing outside.
-LightProfile cone_profile(float cosine) { return {0.5f * (1.0f - cosine), 0.75f * (1.0f - cosine * cosine)}; }
-
-/// What the build knows of a light or a group; the tree's nodes are made from these.
-struct LightBounds {
-  Vec3f low{kInfinity, kInfinity, kInfinity}, high{-kInfinity, -kInfinity, -kInfinity};
-  Cone spread;
-  float falloff = 0;       ///< radians
-  float profile_mean = 1;  ///< of a light: see LightProfile
-  Vec3f profile_slope;     ///< of a light: LightProfile::slope along its axis
-  bool is_flat = false;    ///< a light whose intensity is its cosine
-  float intensity = 0;     ///< 0: empty group
-  bool two_sided = false;
-};
 
 LightBounds bounds_union(const LightBounds& a, const LightBounds& b)
 {
@@ -79,67 +51,9 @@ Vec3f bounds_centre(const LightBounds& bounds) { return bounds.low * 0.5f + boun
 
 /// @param scale  mean of the emission texture
 /// @return       intensity 0: the light never needs choosing
-LightBounds light_bounds(const Light& light, float scale)
+LightBounds light_bounds_of(const Light& light, float scale)
 {
-  LightBounds bounds;
-  const float emission = light_scalar(light.emission) * scale;
-  const auto include = [&bounds](Vec3f P) {
-    bounds.low = min(bounds.low, P);
-    bounds.high = max(bounds.high, P);
-  };
-  LightProfile profile;
-  switch (light.kind) {
-    case LightKind::kPoint:
-      include(light.P - Vec3f{light.radius, light.radius, light.radius});
-      include(light.P + Vec3f{light.radius, light.radius, light.radius});
-      bounds.spread = {{0, 0, 1}, kPiAngle};
-      bounds.falloff = 0.5f * kPiAngle;
-      bounds.intensity = emission;
-      break;
-    case LightKind::kSpot: {
-      include(light.P - Vec3f{light.radius, light.radius, light.radius});
-      include(light.P + Vec3f{light.radius, light.radius, light.radius});
-      const float inner = std::acos(std::clamp(light.cos_inner, -1.0f, 1.0f));
-      const float outer = std::acos(std::clamp(light.cos_outer, -1.0f, 1.0f));
-      bounds.spread = {light.axis, std::min(inner, outer)};
-      bounds.falloff = std::max(outer - inner, 0.0f);
-      profile = cone_profile(std::cos(0.5f * (inner + outer)));
-      bounds.intensity = emission;
-      break;
-    }
-    case LightKind::kRectangle:
-    case LightKind::kDisk:
-      for (const float u : {-1.0f, 1.0f}) {
-        for (const float v : {-1.0f, 1.0f}) include(light.P + light.edge_u * u + light.edge_v * v);
-      }
-      break;
-    case LightKind::kTriangle:
-      include(light.P);
-      include(light.P + light.edge_u);
-      include(light.P + light.edge_v);
-      break;
-    case LightKind::kSun:
-    case LightKind::kEnvironment:
-      return {};
-  }
-  if (light.kind == LightKind::kRectangle || light.kind == LightKind::kDisk || light.kind == LightKind::kTriangle) {
-    bounds.spread = {light.axis, 0.0f};
-    bounds.falloff = 0.5f * kPiAngle;
-    bounds.intensity = emission * light.area;
-    bounds.two_sided = light.two_sided;
-    profile = light.two_sided ? kTwoSidedProfile : kFlatProfile;
-    bounds.is_flat = true;
-    if (light.spread_tan > 0.0f) {
-      // Brighter along the axis, and nothing beyond the spread.
-      bounds.falloff = std::atan(light.spread_tan);
-      bounds.intensity *= light.spread_tan * light.spread_scale;
-      profile = cone_profile(std::cos(0.5f * bounds.falloff));
-      if (light.two_sided) profile = {2.0f * profile.mean, 0.0f};
-      bounds.is_flat = false;
-    }
-  }
-  bounds.profile_mean = profile.mean;
-  bounds.profile_slope = bounds.spread.axis * profile.slope;
+  LightBounds bounds = light_bounds(light, light_scalar(light.emission) * scale);
   const bool usable = bounds.intensity > 0.0f && is_finite(bounds.low) && is_finite(bounds.high);
   if (!usable) return {};
   bounds.intensity = std::min(bounds.intensity, 1e30f);
@@ -160,7 +74,7 @@ LightBounds moving_bounds(const LightSet& set, std::uint32_t index, float scale)
   for (int i = 0; i <= kTimes; ++i) {
     Light storage;
     const Light& light = lights_at(view, {static_cast<std::int32_t>(index)}, storage, static_cast<float>(i) / kTimes);
-    const LightBounds one = light_bounds(light, scale);
+    const LightBounds one = light_bounds_of(light, scale);
     if (!(one.intensity > 0.0f)) return {};
     if (i > 0) {
       farthest = std::max({farthest, length(one.low - before.low), length(one.high - before.high)});
@@ -461,7 +375,7 @@ LightBounds shared_build(LightSet& set, const SharedLights& shared, std::span<co
 {
   std::vector<BuildLight> lights;
   for (std::uint32_t i = shared.first_light; i < shared.first_light + shared.num_lights; ++i) {
-    const LightBounds bounds = light_bounds(set.lights[i], intensity_scales.empty() ? 1.0f : intensity_scales[i]);
+    const LightBounds bounds = light_bounds_of(set.lights[i], intensity_scales.empty() ? 1.0f : intensity_scales[i]);
     if (bounds.intensity > 0.0f) lights.push_back({bounds, bounds_centre(bounds), i | kLightTreeLeaf});
   }
   if (lights.empty()) return {};
@@ -495,7 +409,7 @@ LightBounds copy_bounds(const LightSet& set,
   for (std::uint32_t i = shared.first_light; i < shared.first_light + shared.num_lights; ++i) {
     Light storage;
     const LightRef ref{static_cast<std::int32_t>(i), static_cast<std::int32_t>(copy)};
-    const LightBounds one = light_bounds(lights_at(view, ref, storage), 1.0f);
+    const LightBounds one = light_bounds_of(lights_at(view, ref, storage), 1.0f);
     bounds.low = min(bounds.low, one.low);
     bounds.high = max(bounds.high, one.high);
   }
@@ -517,18 +431,15 @@ void light_tree_build(LightSet& set, std::span<const float> intensity_scales)
   for (std::size_t i = 0; i < set.lights.size(); ++i) {
     const Light& light = set.lights[i];
     const auto index = static_cast<std::uint32_t>(i);
-    if (light.kind == LightKind::kSun) set.suns.push_back(index);
-    const bool is_seen = light.instance_index < 0;
-    const bool is_flat = light.kind == LightKind::kRectangle || light.kind == LightKind::kDisk;
-    if (is_seen && (is_flat || light_is_ball(light))) {
-      set.area_lights.push_back(index);
-    }
+    if (light_is_sun(light)) set.suns.push_back(index);
+    if (light_is_met(light)) set.area_lights.push_back(index);
     if (next_shared < set.shared.size() && index == set.shared[next_shared].first_light) {
       i += set.shared[next_shared++].num_lights - 1;
       continue;
     }
     const float scale = intensity_scales.empty() ? 1.0f : intensity_scales[i];
-    const LightBounds bounds = light.motion_index >= 0 ? moving_bounds(set, index, scale) : light_bounds(light, scale);
+    const LightBounds bounds =
+        light.motion_index >= 0 ? moving_bounds(set, index, scale) : light_bounds_of(light, scale);
     if (bounds.intensity > 0.0f) finite.push_back({bounds, bounds_centre(bounds), index | kLightTreeLeaf});
   }
 

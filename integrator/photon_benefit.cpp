@@ -249,27 +249,47 @@ void photons_guide(const SceneContext& context,
   choice.reason += figures;
 }
 
+/// A light as a box sees it: irradiance over light_scalar of its emission, and the solid angle that it fills.
+struct LightSeen {
+  double irradiance, solid_angle;
+};
+
+/// Distance between a light and the middle of a box, but no less than the box is large.
+double distance_to_box(const Light& light, const Box3& box)
+{
+  const double radius = 0.5 * static_cast<double>(length(box.high - box.low));
+  return std::max({static_cast<double>(length(0.5f * (box.low + box.high) - light.P)), radius, 1e-30});
+}
+
+LightSeen light_seen(FarLight, const Light& light, const Box3&)
+{
+  return {1, 2 * kPilotPi * static_cast<double>(light.cone)};
+}
+
+LightSeen light_seen(BallLight, const Light& light, const Box3& box)
+{
+  const double distance = distance_to_box(light, box);
+  const double sine = std::min(1.0, static_cast<double>(light.radius) / distance);
+  return {1 / (distance * distance), kPilotPi * sine * sine};
+}
+
+LightSeen light_seen(FlatLight, const Light& light, const Box3& box)
+{
+  constexpr double kLeastCosine = 0.05;
+  const double distance = distance_to_box(light, box);
+  const auto along = static_cast<double>(std::abs(dot(0.5f * (box.low + box.high) - light.P, light.axis)));
+  const double omega =
+      static_cast<double>(light.area) * std::max(kLeastCosine, along / distance) / (distance * distance);
+  return {omega, omega};
+}
+
 }  // namespace
 
 CausticLight caustic_light(const Light& light, const Box3& box, double alpha)
 {
   const auto emitted = static_cast<double>(light_scalar(light.emission));
-  const double lobe = lobe_solid_angle(alpha);
-  if (light.kind == LightKind::kSun) {
-    return {emitted, std::max(2 * kPilotPi * static_cast<double>(light.cone), lobe)};
-  }
-  const Vec3f to_box = 0.5f * (box.low + box.high) - light.P;
-  const double radius = 0.5 * static_cast<double>(length(box.high - box.low));
-  const double distance = std::max({static_cast<double>(length(to_box)), radius, 1e-30});
-  if (light.kind == LightKind::kPoint || light.kind == LightKind::kSpot) {
-    const double sine = std::min(1.0, static_cast<double>(light.radius) / distance);
-    return {emitted / (distance * distance), std::max(kPilotPi * sine * sine, lobe)};
-  }
-  constexpr double kLeastCosine = 0.05;
-  const auto along = static_cast<double>(std::abs(dot(to_box, light.axis)));
-  const double omega =
-      static_cast<double>(light.area) * std::max(kLeastCosine, along / distance) / (distance * distance);
-  return {emitted * omega, std::max(omega, lobe)};
+  const LightSeen seen = light_visit(light, [&](auto kind) { return light_seen(kind, light, box); });
+  return {emitted * seen.irradiance, std::max(seen.solid_angle, lobe_solid_angle(alpha))};
 }
 
 double caustic_second_moment(CausticLight light, double clamp, double samples)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <concepts>
 #include <numeric>
 
 #include <tbb/parallel_for.h>
@@ -59,29 +60,56 @@ void group(std::vector<Caster>::iterator begin,
   group(middle, end, largest, out);
 }
 
+/// A box as seen from a light's place.
+struct BoxSeen {
+  BoxSeen(const Light& light, const Box3& box)
+  {
+    const Vec3f to_box = box_centre(box) - light.P;
+    distance = length(to_box);
+    const float radius = box_radius(box);
+    const Vec3f D = distance > 0.0f ? to_box / distance : light.axis;
+    const float outside = std::max(distance, radius);
+    omega = std::min(2.0 * static_cast<double>(kPi),
+                     static_cast<double>(box_shadow_area(box, D)) / static_cast<double>(sqr(outside)));
+    // How far the box, seen from anywhere on a ball, reaches from its centre's direction.
+    const float reach = radius + light.radius;
+    const float spread = distance > reach ? std::asin(reach / distance) : kPi;
+    angle = std::max(0.0f, std::acos(clamp(dot(D, light.axis), -1.0f, 1.0f)) - spread);
+  }
+
+  float distance;
+  double omega;  ///< solid angle, sr
+  float angle;   ///< the least between the light's axis and a direction to the box
+};
+
+/// Estimate of the flux from a light to a box, W, by the light's form.
+/// @param emitted  light_scalar of its emission
+double flux_to_box(FarLight, const Light& light, double emitted, const Box3& box)
+{
+  return emitted * static_cast<double>(box_shadow_area(box, light.axis));
+}
+
+template <std::derived_from<BallLight> Kind>
+double flux_to_box(Kind kind, const Light& light, double emitted, const Box3& box)
+{
+  const BoxSeen seen(light, box);
+  return light_falloff(kind, light, std::cos(seen.angle)) > 0.0f ? emitted * seen.omega : 0.0;
+}
+
+double flux_to_box(FlatLight, const Light& light, double emitted, const Box3& box)
+{
+  const BoxSeen seen(light, box);
+  const float extent = length(light.edge_u) + length(light.edge_v);
+  const float slack = seen.distance > extent ? std::asin(extent / seen.distance) : kPi;
+  const float cosine = light.two_sided ? 1.0f : std::cos(std::max(0.0f, seen.angle - slack));
+  return cosine > 0.0f ? emitted * static_cast<double>(light.area * std::max(cosine, 0.05f)) * seen.omega : 0.0;
+}
+
 /// Estimate of the flux from a light to a box, W; 0 only where there is none.
 double flux_estimate(const Light& light, const Box3& box)
 {
-  const Vec3f to_box = box_centre(box) - light.P;
-  const float distance = length(to_box);
-  const float radius = box_radius(box);
   const double emitted = static_cast<double>(light_scalar(light.emission));
-  if (light.kind == LightKind::kSun) return emitted * static_cast<double>(box_shadow_area(box, light.axis));
-
-  const Vec3f D = distance > 0.0f ? to_box / distance : light.axis;
-  const float outside = std::max(distance, radius);
-  const double omega = std::min(2.0 * static_cast<double>(kPi),
-                                static_cast<double>(box_shadow_area(box, D)) / static_cast<double>(sqr(outside)));
-  // How far the box, seen from anywhere on a ball, reaches from its centre's direction.
-  const float reach = radius + light.radius;
-  const float spread = distance > reach ? std::asin(reach / distance) : kPi;
-  const float angle = std::max(0.0f, std::acos(clamp(dot(D, light.axis), -1.0f, 1.0f)) - spread);
-  if (light.kind == LightKind::kPoint) return emitted * omega;
-  if (light.kind == LightKind::kSpot) return std::cos(angle) > light.cos_outer ? emitted * omega : 0.0;
-  const float extent = length(light.edge_u) + length(light.edge_v);
-  const float slack = distance > extent ? std::asin(extent / distance) : kPi;
-  const float cosine = light.two_sided ? 1.0f : std::cos(std::max(0.0f, angle - slack));
-  return cosine > 0.0f ? emitted * static_cast<double>(light.area * std::max(cosine, 0.05f)) * omega : 0.0;
+  return light_visit(light, [&](auto kind) { return flux_to_box(kind, light, emitted, box); });
 }
 
 /// The most of it while the shutter is open, for a light that moves.

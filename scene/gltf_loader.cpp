@@ -425,7 +425,7 @@ void GltfLoader::move_light(const PlacedNode& node, const std::string& path, Lig
 {
   const std::vector<Affine3> steps = shutter_nodes_.steps(num_visited_ - 1);
   if (steps.empty()) return;
-  const bool is_sun = light.kind == LightKind::kSun;
+  const bool is_sun = light_is_sun(light);
   if (is_sun && std::all_of(steps.begin(), steps.end(), [&](const Affine3& step) {
         return step.x == steps[0].x && step.y == steps[0].y && step.z == steps[0].z;
       })) {

@@ -227,8 +227,8 @@ std::vector<Light> khronos_node_light(const GltfDocument& document,
     }
     light.kind = type == 0 ? LightKind::kPoint : type == 1 ? LightKind::kSpot : LightKind::kSun;
     const float intensity = r.number_f("intensity", 1, 0, kNoLimit);
-    light.emission = r.color("color", {1, 1, 1}) *
-                     (intensity / (light.kind == LightKind::kSun ? units.irradiance : units.intensity));
+    light.emission =
+        r.color("color", {1, 1, 1}) * (intensity / (light_is_sun(light) ? units.irradiance : units.intensity));
     if (!is_finite(light.emission)) {
       r.fail("intensity", "a finite emission");
     }

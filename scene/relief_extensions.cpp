@@ -353,7 +353,7 @@ void relief_light(const GltfDocument& document,
   static constexpr std::string_view kFalloffs[] = {"square", "smooth", "smooth-cosine"};
   static constexpr std::string_view kShapes[] = {"ball", "disk"};
   document.read_extension(value, path, "RELIEF_light", [&](const JsonReader& r) {
-    if (light.kind == LightKind::kSun) {
+    if (light_is_sun(light)) {
       // The widest that has a side to shine from; as one minus the cosine of half of it, without that one's digits.
       constexpr double kWidest = 3.1415;
       const double half_sine = std::sin(r.number("angle", 0, 0, kWidest) / 4);

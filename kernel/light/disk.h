@@ -7,6 +7,8 @@
 
 namespace relief {
 
+struct DiskLight : PlateLight {};
+
 /// From this solid angle (sr) of the rectangle around the disk on, losing a share 1 − π/4 of the samples costs less than the
 /// peak: on the axis of a circle it is where the density by area varies by a factor of about three.
 inline constexpr float kDiskRectangleSolidAngle = 2.0f;
@@ -20,12 +22,16 @@ RELIEF_KERNEL float disk_light_solid_angle(const Light& light, Vec3f P)
 }
 
 /// @param u  [0, 1)²
-RELIEF_KERNEL LightSample disk_light_sample(const Light& light, Vec3f P, Vec2f u)
+/// @return   along the half axes, uniform by area
+RELIEF_KERNEL Vec2f light_coordinates(DiskLight, Vec2f u) { return warp_disk(u); }
+
+/// @param u  [0, 1)²
+RELIEF_KERNEL LightSample light_sample(DiskLight kind, const Light& light, Vec3f P, Vec2f u)
 {
   if (!light_faces(light, P)) return {};
   const float omega = disk_light_solid_angle(light, P);
   if (!(omega > 0.0f)) {
-    const Vec2f q = warp_disk(u);
+    const Vec2f q = light_coordinates(kind, u);
     return light_point_sample(light, P, light.P + light.edge_u * q.x + light.edge_v * q.y);
   }
   const Vec3f point = rectangle_light_point(light, P, omega, u);
@@ -36,12 +42,32 @@ RELIEF_KERNEL LightSample disk_light_sample(const Light& light, Vec3f P, Vec2f u
   return light_point_sample(light, P, point, 1.0f / omega);
 }
 
-/// Solid-angle density of disk_light_sample.
-RELIEF_KERNEL float disk_light_pdf(const Light& light, Vec3f P, Vec3f wi, float distance)
+/// Solid-angle density of light_sample.
+RELIEF_KERNEL float light_pdf(DiskLight, const Light& light, Vec3f P, Vec3f wi, float distance)
 {
   if (!light_faces(light, P)) return 0.0f;
   const float omega = disk_light_solid_angle(light, P);
   return omega > 0.0f ? 1.0f / omega : light_area_pdf(light, wi, distance);
+}
+
+/// Of an ellipse c + a·cos φ + b·sin φ along an axis: √(a² + b²).
+RELIEF_KERNEL Vec3f light_half_extent(DiskLight, const Light& light)
+{
+  const Vec3f u = light.edge_u, v = light.edge_v;
+  return {__builtin_sqrtf(sqr(u.x) + sqr(v.x)), __builtin_sqrtf(sqr(u.y) + sqr(v.y)),
+          __builtin_sqrtf(sqr(u.z) + sqr(v.z))};
+}
+
+/// @return negative: a ray misses it
+RELIEF_KERNEL float light_distance(DiskLight, const Light& light, Vec3f O, Vec3f D)
+{
+  const PlateHit hit = plate_light_meet(light, O, D);
+  return sqr(hit.q.x) + sqr(hit.q.y) <= 1.0f ? hit.t : -1.0f;
+}
+
+RELIEF_KERNEL LightRay light_emit(DiskLight kind, const Light& light, Vec2f u, Vec2f v, bool back)
+{
+  return plate_light_emit(light, light_coordinates(kind, u), v, back);
 }
 
 }  // namespace relief

@@ -1,5 +1,5 @@
-// The kinds of light as plain data. One file a kind (point.h, spot.h, …) samples and evaluates it; light_sampler.h
-// chooses among many.
+// The kinds of light as plain data. One file a kind (point.h, spot.h, …) says all that is particular to it (light_sample.h);
+// light_sampler.h chooses among many.
 #pragma once
 
 #include "kernel/math/affine.h"
@@ -7,7 +7,10 @@
 
 namespace relief {
 
-enum class LightKind : std::uint8_t { kPoint, kSpot, kSun, kRectangle, kDisk, kTriangle, kEnvironment };
+enum class LightKind : std::uint8_t {
+#define LIGHT_KIND(name, Type) name,
+#include "kernel/light/light_kinds.inc"
+};
 
 /// How a spot fades from its inner to its outer cone, by t = (cos − cos outer) / (cos inner − cos outer) in [0, 1].
 enum class SpotFalloff : std::uint8_t {
@@ -48,14 +51,11 @@ struct alignas(64) Light {
   float cone = 0;          ///< sun: one minus the cosine of half the angle that it is seen under; 0: it is a point
 };
 
-/// Whether a light is a ball (or a disk that faces everyone): a point or spot that has a size.
-RELIEF_KERNEL bool light_is_ball(const Light& light)
-{
-  return light.radius > 0.0f && (light.kind == LightKind::kPoint || light.kind == LightKind::kSpot);
-}
+/// Whether a light is infinitely far away, so that it has a direction and no place.
+RELIEF_KERNEL bool light_is_sun(const Light& light) { return light.kind == LightKind::kSun; }
 
 /// Whether a light is a sun that is more than a point.
-RELIEF_KERNEL bool light_is_sun_disk(const Light& light) { return light.kind == LightKind::kSun && light.cone > 0.0f; }
+RELIEF_KERNEL bool light_is_sun_disk(const Light& light) { return light_is_sun(light) && light.cone > 0.0f; }
 
 /// What on one side of a surface does not see a light: what scatters diffusely, and what microfacets make.
 struct LightHides {

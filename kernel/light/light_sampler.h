@@ -11,14 +11,9 @@
 // that competing has; a sky that is alone is sampled all the same (1.3 times the efficiency of not doing so).
 #pragma once
 
-#include "kernel/light/disk.h"
 #include "kernel/light/environment.h"
+#include "kernel/light/light_kinds.h"
 #include "kernel/light/light_tree.h"
-#include "kernel/light/mesh_light.h"
-#include "kernel/light/point.h"
-#include "kernel/light/rectangle.h"
-#include "kernel/light/spot.h"
-#include "kernel/light/sun.h"
 #include "kernel/math/motion.h"
 #include "kernel/sample/choice.h"
 #include "kernel/sample/warp.h"
@@ -158,46 +153,6 @@ RELIEF_KERNEL LightGroups light_groups_eval(const LightsView& view, Vec3f P, Vec
   if (groups.sun_sum > 0.0f) groups.suns = scale * groups.sun_sum + share;
   if (groups.finite_root.sum > 0.0f) groups.finite = scale * groups.finite_root.sum + share;
   return groups;
-}
-
-/// Samples a chosen light of any kind; the choice's probability is not in the pdf.
-RELIEF_KERNEL LightSample light_sample(const Light& light, Vec3f P, Vec2f u)
-{
-  switch (light.kind) {
-    case LightKind::kPoint:
-      return point_light_sample(light, P, u);
-    case LightKind::kSpot:
-      return spot_light_sample(light, P, u);
-    case LightKind::kSun:
-      return sun_light_sample(light, u);
-    case LightKind::kRectangle:
-      return rectangle_light_sample(light, P, u);
-    case LightKind::kDisk:
-      return disk_light_sample(light, P, u);
-    case LightKind::kTriangle:
-      return triangle_light_sample(light, P, u);
-    case LightKind::kEnvironment:
-      break;
-  }
-  return {};
-}
-
-/// Solid-angle density of light_sample for a ray that hit the light; 0 for delta kinds.
-RELIEF_KERNEL float light_pdf(const Light& light, Vec3f P, Vec3f wi, float distance)
-{
-  switch (light.kind) {
-    case LightKind::kRectangle:
-      return rectangle_light_pdf(light, P, wi, distance);
-    case LightKind::kDisk:
-      return disk_light_pdf(light, P, wi, distance);
-    case LightKind::kTriangle:
-      return triangle_light_pdf(light, P, wi, distance);
-    case LightKind::kPoint:
-    case LightKind::kSpot:
-      return point_light_pdf(light, P);
-    default:
-      return 0.0f;
-  }
 }
 
 /// Samples the environment; the choice's probability is not in the pdf.

@@ -2,9 +2,11 @@
 // Source: Arvo 1995, "Stratified Sampling of Spherical Triangles".
 #pragma once
 
-#include "kernel/light/light_sample.h"
+#include "kernel/light/flat.h"
 
 namespace relief {
+
+struct TriangleLight : FlatLight {};
 
 /// Below this solid angle (sr), unit vectors to the vertices differ by less than 1e-2 and their differences keep too few
 /// digits; sampling by area is then as good.
@@ -49,7 +51,11 @@ RELIEF_KERNEL Vec3f triangle_light_direction(Vec3f A, Vec3f B, Vec3f C, float om
 }
 
 /// @param u  [0, 1)²
-RELIEF_KERNEL LightSample triangle_light_sample(const Light& light, Vec3f P, Vec2f u)
+/// @return   along the edges, uniform by area
+RELIEF_KERNEL Vec2f light_coordinates(TriangleLight, Vec2f u) { return warp_triangle(u); }
+
+/// @param u  [0, 1)²
+RELIEF_KERNEL LightSample light_sample(TriangleLight, const Light& light, Vec3f P, Vec2f u)
 {
   if (!light_faces(light, P)) return {};
   Vec2f barycentric;
@@ -78,12 +84,18 @@ RELIEF_KERNEL LightSample triangle_light_sample(const Light& light, Vec3f P, Vec
   return sample;
 }
 
-/// Solid-angle density of triangle_light_sample.
-RELIEF_KERNEL float triangle_light_pdf(const Light& light, Vec3f P, Vec3f wi, float distance)
+/// Solid-angle density of light_sample.
+RELIEF_KERNEL float light_pdf(TriangleLight, const Light& light, Vec3f P, Vec3f wi, float distance)
 {
   if (!light_faces(light, P)) return 0.0f;
   const float omega = triangle_light_solid_angle(light, P);
   return omega > 0.0f ? 1.0f / omega : light_area_pdf(light, wi, distance);
+}
+
+RELIEF_KERNEL LightBounds light_bounds(TriangleLight, const Light& light, float emission)
+{
+  const Vec3f P1 = light.P + light.edge_u, P2 = light.P + light.edge_v;
+  return flat_light_bounds(light, emission, min(min(light.P, P1), P2), max(max(light.P, P1), P2));
 }
 
 }  // namespace relief

@@ -8,6 +8,14 @@
 
 namespace relief {
 
+/// A point in space that shines around itself, with or without a size.
+struct BallLight {
+  static constexpr LightBody kBody = LightBody::kOwn;
+  static constexpr bool kIsQuad = false;
+};
+
+struct PointLight : BallLight {};
+
 /// One minus the cosine of the half angle of the cone that a ball or disk fills.
 /// @param distance_squared  of its centre, m², > 0
 /// @return                  (0, 2]; 2: the point is inside the ball
@@ -42,10 +50,9 @@ RELIEF_KERNEL float ball_light_distance(const Light& light, Vec3f to_light, Vec3
   return is_inside ? along + half_chord : along - half_chord;
 }
 
-/// Solid-angle density of point_light_sample.
-/// @param wi  unit, towards the ball or disk
-/// @return    0 for a point without a size
-RELIEF_KERNEL float point_light_pdf(const Light& light, Vec3f P)
+/// Solid-angle density of light_sample.
+/// @return  0 for a point without a size
+RELIEF_KERNEL float light_pdf(BallLight, const Light& light, Vec3f P, Vec3f, float)
 {
   const float squared = length_squared(light.P - P);
   return light.radius > 0.0f && squared > 1e-30f ? warp_cone_pdf(ball_light_cone(light, squared)) : 0.0f;
@@ -53,7 +60,7 @@ RELIEF_KERNEL float point_light_pdf(const Light& light, Vec3f P)
 
 /// @param u  [0, 1)²: direction within the cone that the ball or disk fills
 /// @return   without a size, intensity / distance² from the light's direction; no sample at the light itself
-RELIEF_KERNEL LightSample point_light_sample(const Light& light, Vec3f P, Vec2f u)
+RELIEF_KERNEL LightSample light_sample(PointLight, const Light& light, Vec3f P, Vec2f u)
 {
   LightSample sample;
   const Vec3f to_light = light.P - P;
@@ -78,6 +85,68 @@ RELIEF_KERNEL LightSample point_light_sample(const Light& light, Vec3f P, Vec2f 
   // At the rim rounding may miss it.
   if (!(sample.distance > 0.0f)) sample.distance = distance;
   return sample;
+}
+
+/// Part of the intensity that leaves under an angle.
+RELIEF_KERNEL float light_falloff(PointLight, const Light&, float) { return 1.0f; }
+
+/// Radiance that a ball sends against a ray that arrives at it.
+/// @param falloff  towards there
+RELIEF_KERNEL Vec3f ball_light_emitted(const Light& light, float falloff)
+{
+  return light.emission * (falloff * kInvPi / sqr(light.radius));
+}
+
+/// @param wi  unit, direction of travel of the ray, towards the light
+RELIEF_KERNEL Vec3f light_emitted(PointLight, const Light& light, Vec3f) { return ball_light_emitted(light, 1.0f); }
+
+/// Box around a ball or a point, and how much it sends; whither is not said.
+RELIEF_KERNEL LightBounds ball_light_bounds(const Light& light, float emission)
+{
+  LightBounds bounds;
+  bounds.low = light.P - splat3(light.radius);
+  bounds.high = light.P + splat3(light.radius);
+  bounds.intensity = emission;
+  return bounds;
+}
+
+RELIEF_KERNEL LightBounds light_bounds(PointLight, const Light& light, float emission)
+{
+  LightBounds bounds = ball_light_bounds(light, emission);
+  bounds.spread = {{0, 0, 1}, kPi};
+  bounds.falloff = 0.5f * kPi;
+  light_bounds_add_profile(bounds, {});
+  return bounds;
+}
+
+RELIEF_KERNEL bool light_is_met(BallLight, const Light& light) { return light.radius > 0.0f; }
+
+RELIEF_KERNEL Vec3f light_half_extent(BallLight, const Light& light) { return splat3(light.radius); }
+
+/// A ray meets a ball once: where it enters, or, started inside, where it leaves.
+RELIEF_KERNEL float light_distance(BallLight, const Light& light, Vec3f O, Vec3f D)
+{
+  return ball_light_distance(light, light.P - O, D);
+}
+
+/// Of a point the place is known without the rounding of a distance: patterns have edges at round numbers.
+RELIEF_KERNEL LightPlace light_place(BallLight, const Light& light, Vec3f P, Vec3f wo)
+{
+  if (!(light.radius > 0.0f)) return {light.P, wo};
+  return {P, light.faces_viewer ? wo : normalize(P - light.P)};
+}
+
+/// Around the point, 0 to 1, the second one up.
+RELIEF_KERNEL Vec2f light_uv(PointLight, const Light&, const Affine3& object_from_world, LightPlace at, Vec3f)
+{
+  const Vec3f d = normalize(transform_vector(object_from_world, at.N));
+  return {0.5f - std::atan2(d.x, d.y) * (0.5f * kInvPi), 1.0f - std::acos(clamp(d.z, -1.0f, 1.0f)) * kInvPi};
+}
+
+RELIEF_KERNEL LightRay light_emit(PointLight, const Light& light, Vec2f u, Vec2f, bool)
+{
+  const Vec3f wo = warp_sphere(u);
+  return {light.P + wo * light.radius, wo, 1.0f};
 }
 
 }  // namespace relief

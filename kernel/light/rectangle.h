@@ -3,9 +3,13 @@
 // sampled by area. Source: Ureña, Fajardo and King 2013, "An Area-Preserving Parametrization for Spherical Rectangles".
 #pragma once
 
-#include "kernel/light/light_sample.h"
+#include "kernel/light/flat.h"
 
 namespace relief {
+
+struct RectangleLight : PlateLight {
+  static constexpr bool kIsQuad = true;
+};
 
 /// Below this solid angle (sr) sampling by area is uniform within a few per cent, and cheaper.
 inline constexpr float kRectangleMinSolidAngle = 5e-4f;
@@ -81,21 +85,42 @@ RELIEF_KERNEL Vec3f rectangle_light_point(const Light& light, Vec3f P, float ome
 }
 
 /// @param u  [0, 1)²
-RELIEF_KERNEL LightSample rectangle_light_sample(const Light& light, Vec3f P, Vec2f u)
+/// @return   along the half axes, uniform by area
+RELIEF_KERNEL Vec2f light_coordinates(RectangleLight, Vec2f u) { return {2.0f * u.x - 1.0f, 2.0f * u.y - 1.0f}; }
+
+/// @param u  [0, 1)²
+RELIEF_KERNEL LightSample light_sample(RectangleLight kind, const Light& light, Vec3f P, Vec2f u)
 {
   if (!light_faces(light, P)) return {};
   const float omega = rectangle_light_solid_angle(light, P, light.area);
   if (omega > 0.0f) return light_point_sample(light, P, rectangle_light_point(light, P, omega, u), 1.0f / omega);
-  return light_point_sample(light, P,
-                            light.P + light.edge_u * (2.0f * u.x - 1.0f) + light.edge_v * (2.0f * u.y - 1.0f));
+  const Vec2f q = light_coordinates(kind, u);
+  return light_point_sample(light, P, light.P + light.edge_u * q.x + light.edge_v * q.y);
 }
 
-/// Solid-angle density of rectangle_light_sample.
-RELIEF_KERNEL float rectangle_light_pdf(const Light& light, Vec3f P, Vec3f wi, float distance)
+/// Solid-angle density of light_sample.
+RELIEF_KERNEL float light_pdf(RectangleLight, const Light& light, Vec3f P, Vec3f wi, float distance)
 {
   if (!light_faces(light, P)) return 0.0f;
   const float omega = rectangle_light_solid_angle(light, P, light.area);
   return omega > 0.0f ? 1.0f / omega : light_area_pdf(light, wi, distance);
+}
+
+RELIEF_KERNEL Vec3f light_half_extent(RectangleLight, const Light& light)
+{
+  return abs(light.edge_u) + abs(light.edge_v);
+}
+
+/// @return negative: a ray misses it
+RELIEF_KERNEL float light_distance(RectangleLight, const Light& light, Vec3f O, Vec3f D)
+{
+  const PlateHit hit = plate_light_meet(light, O, D);
+  return __builtin_fabsf(hit.q.x) <= 1.0f && __builtin_fabsf(hit.q.y) <= 1.0f ? hit.t : -1.0f;
+}
+
+RELIEF_KERNEL LightRay light_emit(RectangleLight kind, const Light& light, Vec2f u, Vec2f v, bool back)
+{
+  return plate_light_emit(light, light_coordinates(kind, u), v, back);
 }
 
 }  // namespace relief

@@ -20,7 +20,6 @@ RELIEF_KERNEL Light box_face(const Box3& box, int axis, bool upper)
   const Vec3f centre = 0.5f * (box.low + box.high);
   const Vec3f half = 0.5f * (box.high - box.low);
   Light face;
-  face.kind = LightKind::kRectangle;
   face.two_sided = true;
   face.P = centre;
   if (axis == 0) {
@@ -74,7 +73,7 @@ RELIEF_KERNEL BoxDirection box_aim_from(const Box3& box, Vec3f P, Vec2f u)
   while (axis < 2 && !(target < omega[axis] && omega[axis] > 0.0f)) target -= omega[axis++];
   if (!(omega[axis] > 0.0f)) return {};
   u.x = clamp(target / omega[axis], 0.0f, 0x1.fffffep-1f);
-  const LightSample sample = rectangle_light_sample(box_face(box, axis, p[axis] > high[axis]), P, u);
+  const LightSample sample = light_sample(RectangleLight{}, box_face(box, axis, p[axis] > high[axis]), P, u);
   return {sample.wi, sample.pdf * (omega[axis] / sum)};
 }
 

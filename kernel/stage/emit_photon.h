@@ -1,6 +1,8 @@
 // Stage: one photon from its number.
 #pragma once
 
+#include <concepts>
+
 #include "kernel/globals.h"
 #include "kernel/photon/sources.h"
 #include "kernel/sample/dimensions.h"
@@ -20,74 +22,6 @@ struct EmittedRay {
 /// is not known yet, and lights whose graphs ask for that start no photons.
 inline constexpr GraphRay kPhotonRay{0, 1, 0, 0.0f};
 
-/// Light from a point, or from the ball around it, towards a box.
-/// @param u_light  place on the ball
-RELIEF_KERNEL EmittedRay
-emit_from_point(const KernelGlobals& g, const Light& light, const Box3& box, Vec2f u_light, Vec2f u)
-{
-  const Vec3f normal = warp_sphere(u_light);
-  const Vec3f O = light.P + normal * light.radius;
-  BoxDirection aim;
-  if (box_contains(box, O)) {
-    const float z = 1.0f - 2.0f * u.y;
-    const float r = 2.0f * safe_sqrt(u.y * (1.0f - u.y));
-    aim = {{r * std::cos(2.0f * kPi * u.x), r * std::sin(2.0f * kPi * u.x), z}, 0.25f * kInvPi};
-  } else {
-    aim = box_aim_from(box, O, u);
-  }
-  if (!(aim.pdf > 0.0f)) return {};
-  float falloff = light.kind == LightKind::kSpot ? spot_light_falloff(light, dot(aim.D, light.axis)) : 1.0f;
-  // Radiance I / πr², over the density 1 / 4πr² of the place, by Lambert's cosine.
-  if (light.radius > 0.0f) falloff *= 4.0f * max(0.0f, dot(aim.D, normal));
-  Vec3f intensity = light.emission;
-  if (!light.is_even && falloff > 0.0f) intensity = emitter_radiance(g, light, intensity, {O, {}, aim.D, kPhotonRay});
-  return {O, aim.D, intensity * (falloff / aim.pdf)};
-}
-
-/// Light from a flat light towards a box.
-/// @param u_light  place on the light
-RELIEF_KERNEL EmittedRay
-emit_from_area(const KernelGlobals& g, const Light& light, const Box3& box, Vec2f u_light, Vec2f u)
-{
-  EmittedRay ray;
-  Vec2f barycentric;
-  if (light.kind == LightKind::kRectangle) {
-    ray.O = light.P + light.edge_u * (2.0f * u_light.x - 1.0f) + light.edge_v * (2.0f * u_light.y - 1.0f);
-  } else if (light.kind == LightKind::kDisk) {
-    const Vec2f q = warp_disk(u_light);
-    ray.O = light.P + light.edge_u * q.x + light.edge_v * q.y;
-  } else {
-    barycentric = warp_triangle(u_light);
-    ray.O = light.P + light.edge_u * barycentric.x + light.edge_v * barycentric.y;
-  }
-  float pdf = 0.0f;
-  if (box_contains(box, ray.O)) {
-    // By the cosine, on a side chosen by chance where both shine.
-    Vec3f axis = light.axis;
-    if (light.two_sided) {
-      if (u.x >= 0.5f) axis = -axis;
-      u.x = 2.0f * (u.x >= 0.5f ? u.x - 0.5f : u.x);
-    }
-    const Vec3f local = warp_cosine_hemisphere(u);
-    ray.D = from_local(frame_from_normal(axis), local);
-    pdf = warp_cosine_hemisphere_pdf(local.z) * (light.two_sided ? 0.5f : 1.0f);
-  } else {
-    const BoxDirection aim = box_aim_from(box, ray.O, u);
-    ray.D = aim.D;
-    pdf = aim.pdf;
-  }
-  const float cosine = dot(ray.D, light.axis);
-  if (!(pdf > 0.0f) || !(light.two_sided || cosine > 0.0f)) return {};
-  Vec3f radiance = light.emission * light_spread(light, cosine);
-  if (!light.is_even) radiance = emitter_radiance(g, light, radiance, {ray.O, barycentric, ray.D, kPhotonRay});
-  ray.power = radiance * (__builtin_fabsf(cosine) * light.area / pdf);
-  if (light.instance_index >= 0) {
-    const Vec3f error = gamma_bound(8) * (abs(light.P) + abs(light.edge_u) + abs(light.edge_v));
-    ray.O = offset_ray_origin(ray.O, error, cosine > 0.0f ? light.axis : -light.axis);
-  }
-  return ray;
-}
-
 /// Parallel light that falls on a box from outside the scene, and from no further away: a ray from afar would miss what is
 /// small by its rounding.
 /// @param irradiance  W/m² across D
@@ -96,6 +30,83 @@ emit_from_afar(const PhotonSourcesView& sources, const Box3& box, Vec3f D, Vec3f
 {
   const Vec3f P = box_aim_along(box, D, u);
   return {P - D * box_distance_out(sources.scene_box, P, -D), D, irradiance * box_shadow_area(box, D)};
+}
+
+/// What starts a photon.
+struct PhotonAim {
+  const PhotonSourcesView& sources;
+  const Box3& box;
+  Vec2f u_light, u;  ///< [0, 1)²: place on the light, or direction of a sun; direction, or place in the box
+};
+
+/// Light from a sun, a ball or a flat light towards a box.
+RELIEF_KERNEL EmittedRay emit_from_light(FarLight, const KernelGlobals& g, const Light& light, const PhotonAim& aim)
+{
+  const LightSample sun = light_sample(SunLight{}, light, {}, aim.u_light);
+  Vec3f irradiance = sun.radiance / sun.pdf;
+  if (!light.is_even) irradiance = emitter_radiance(g, light, irradiance, {{}, {}, -sun.wi, kPhotonRay});
+  return emit_from_afar(aim.sources, aim.box, -sun.wi, irradiance, aim.u);
+}
+
+template <std::derived_from<BallLight> Kind>
+RELIEF_KERNEL EmittedRay emit_from_light(Kind kind, const KernelGlobals& g, const Light& light, const PhotonAim& aim)
+{
+  const Vec3f normal = warp_sphere(aim.u_light);
+  const Vec3f O = light.P + normal * light.radius;
+  const Vec2f u = aim.u;
+  BoxDirection to_box;
+  if (box_contains(aim.box, O)) {
+    const float z = 1.0f - 2.0f * u.y;
+    const float r = 2.0f * safe_sqrt(u.y * (1.0f - u.y));
+    to_box = {{r * std::cos(2.0f * kPi * u.x), r * std::sin(2.0f * kPi * u.x), z}, 0.25f * kInvPi};
+  } else {
+    to_box = box_aim_from(aim.box, O, u);
+  }
+  if (!(to_box.pdf > 0.0f)) return {};
+  float falloff = light_falloff(kind, light, dot(to_box.D, light.axis));
+  // Radiance I / πr², over the density 1 / 4πr² of the place, by Lambert's cosine.
+  if (light.radius > 0.0f) falloff *= 4.0f * max(0.0f, dot(to_box.D, normal));
+  Vec3f intensity = light.emission;
+  if (!light.is_even && falloff > 0.0f) {
+    intensity = emitter_radiance(g, light, intensity, {O, {}, to_box.D, kPhotonRay});
+  }
+  return {O, to_box.D, intensity * (falloff / to_box.pdf)};
+}
+
+template <std::derived_from<FlatLight> Kind>
+RELIEF_KERNEL EmittedRay emit_from_light(Kind kind, const KernelGlobals& g, const Light& light, const PhotonAim& aim)
+{
+  EmittedRay ray;
+  const Vec2f q = light_coordinates(kind, aim.u_light);
+  ray.O = light.P + light.edge_u * q.x + light.edge_v * q.y;
+  float pdf = 0.0f;
+  if (box_contains(aim.box, ray.O)) {
+    // By the cosine, on a side chosen by chance where both shine.
+    Vec3f axis = light.axis;
+    Vec2f u = aim.u;
+    if (light.two_sided) {
+      if (u.x >= 0.5f) axis = -axis;
+      u.x = 2.0f * (u.x >= 0.5f ? u.x - 0.5f : u.x);
+    }
+    const Vec3f local = warp_cosine_hemisphere(u);
+    ray.D = from_local(frame_from_normal(axis), local);
+    pdf = warp_cosine_hemisphere_pdf(local.z) * (light.two_sided ? 0.5f : 1.0f);
+  } else {
+    const BoxDirection to_box = box_aim_from(aim.box, ray.O, aim.u);
+    ray.D = to_box.D;
+    pdf = to_box.pdf;
+  }
+  const float cosine = dot(ray.D, light.axis);
+  if (!(pdf > 0.0f) || !(light.two_sided || cosine > 0.0f)) return {};
+  Vec3f radiance = light.emission * light_spread(light, cosine);
+  // Of a mesh, whose lights are triangles here, the coordinates are weights of vertices; lamps do not ask for them.
+  if (!light.is_even) radiance = emitter_radiance(g, light, radiance, {ray.O, q, ray.D, kPhotonRay});
+  ray.power = radiance * (__builtin_fabsf(cosine) * light.area / pdf);
+  if (light.instance_index >= 0) {
+    const Vec3f error = gamma_bound(8) * (abs(light.P) + abs(light.edge_u) + abs(light.edge_v));
+    ray.O = offset_ray_origin(ray.O, error, cosine > 0.0f ? light.axis : -light.axis);
+  }
+  return ray;
 }
 
 /// Starts a photon as path `path`. Its throughput is its power; its pixel, the group of casters it is aimed at.
@@ -131,15 +142,8 @@ RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
     Light storage;
     const Light& light = lights_at(g.lights, source.light, storage, g.caustics.time);
     hidden_from = light.hidden_from;
-    const bool is_point = light.kind == LightKind::kPoint || light.kind == LightKind::kSpot;
-    if (light.kind == LightKind::kSun) {
-      const LightSample sun = sun_light_sample(light, u_light);
-      Vec3f irradiance = sun.radiance / sun.pdf;
-      if (!light.is_even) irradiance = emitter_radiance(g, light, irradiance, {{}, {}, -sun.wi, kPhotonRay});
-      ray = emit_from_afar(sources, box, -sun.wi, irradiance, u);
-    } else {
-      ray = is_point ? emit_from_point(g, light, box, u_light, u) : emit_from_area(g, light, box, u_light, u);
-    }
+    const PhotonAim aim{sources, box, u_light, u};
+    ray = light_visit(light, [&](auto kind) { return emit_from_light(kind, g, light, aim); });
   }
   const float factor = sources.factors != nullptr ? sources.factors[low] : 1.0f;
   const Vec3f power = ray.power * (factor * static_cast<float>(1.0 / (probability * sources.photons_a_pass)));

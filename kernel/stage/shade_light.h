@@ -21,7 +21,7 @@ RELIEF_KERNEL void shade_light(const KernelGlobals& g, PathState& state, std::ui
   const int scatterings = path_bounces(state.bounces[path], BounceKind::kAll);
   const Vec3f D = path_direction(state, path);
   const float t = state.hit_t[path];
-  Vec3f radiance = light_is_ball(light) ? ball_light_emitted(light, D) : light_emitted(light, D);
+  Vec3f radiance = light_emitted(light, D);
   const bool by_photons = path_leaves_to_photons(g, state.flags[path], light_index);
   if (!path_sees_light(state, path, light)) radiance = {};
   if (!light.is_even && !is_zero(radiance) && !by_photons) {

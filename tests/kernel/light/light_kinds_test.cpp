@@ -566,5 +566,44 @@ TEST(SunLight, OfAnAngleFillsItsCone)
   }
 }
 
+/// A lamp of any kind, with a size.
+Light some_lamp(LightKind kind)
+{
+  Light light = flat_light(kind, {0.5f, -2, 1}, {0.7f, 0.2f, 0}, {-0.3f, 0.9f, 0.4f});
+  light.radius = 0.6f;
+  light.cos_inner = 0.9f;
+  light.cos_outer = 0.6f;
+  light.cone = 0.01f;
+  return light;
+}
+
+/// What is true of every kind in the list: whoever adds one has it tested.
+TEST(LightKinds, RaysMeetLampsWhereTheyShineFrom)
+{
+  int num_met = 0;
+  const auto check = [&](LightKind kind, const char* name) {
+    const Light light = some_lamp(kind);
+    if (!light_is_met(light)) return;
+    ++num_met;
+    const Vec3f half = light_half_extent(light);
+    for (std::uint32_t i = 0; i < 1024; ++i) {
+      const LightRay ray = light_emit(light, sample_2d(1, i, 0), sample_2d(1, i, 2), false);
+      ASSERT_NEAR(length(ray.wo), 1.0f, 1e-5f) << name;
+      const Vec3f from_centre = abs(ray.P - light.P);
+      ASSERT_TRUE(from_centre.x <= half.x * 1.00001f && from_centre.y <= half.y * 1.00001f &&
+                  from_centre.z <= half.z * 1.00001f)
+          << name;
+      // Rounding moves what grazes a plate by its cosine.
+      if (dot(ray.wo, light_place(light, ray.P, ray.wo).N) < 0.01f) continue;
+      ASSERT_NEAR(light_distance(light, ray.P + 2.0f * ray.wo, -ray.wo), 2.0f, 1e-3f) << name;
+      ASSERT_LT(light_distance(light, ray.P + 2.0f * ray.wo, ray.wo), 0.0f) << name;
+      ASSERT_GT(light_pdf(light, ray.P + 2.0f * ray.wo, -ray.wo, 2.0f), 0.0f) << name;
+    }
+  };
+#define LIGHT_KIND(name, Type) check(LightKind::name, #name);
+#include "kernel/light/light_kinds.inc"
+  EXPECT_EQ(num_met, 4);
+}
+
 }  // namespace
 }  // namespace relief
