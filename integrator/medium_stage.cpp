@@ -5,12 +5,8 @@
 
 namespace relief {
 
-void RELIEF_SHADE_MEDIA(const KernelGlobals& g,
-                        PathState& state,
-                        QueueView* queues,
-                        int num_surfaces,
-                        QueueView& next,
-                        ShadowQueue& shadow)
+void RELIEF_SHADE_MEDIA(
+    const KernelGlobals& g, PathState& state, HitQueues& queues, QueueView& next, ShadowQueue& shadow)
 {
   const auto keep = [&](QueueView& queue, MediumHit hit) {
     std::uint32_t kept = 0;
@@ -20,9 +16,9 @@ void RELIEF_SHADE_MEDIA(const KernelGlobals& g,
     }
     queue.size = kept;
   };
-  for (int i = 0; i < num_surfaces; ++i) keep(queues[i], MediumHit::kSurface);
-  keep(queues[num_surfaces], MediumHit::kLight);
-  keep(queues[num_surfaces + 1], MediumHit::kNothing);
+  for (QueueView& queue : queues.surfaces) keep(queue, MediumHit::kSurface);
+  keep(queues.lights, MediumHit::kLight);
+  keep(queues.background, MediumHit::kNothing);
 }
 
 }  // namespace relief

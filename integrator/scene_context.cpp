@@ -6,7 +6,7 @@
 #include "integrator/emitter_graph.h"
 #include "integrator/environment_tables.h"
 #include "integrator/graph_rays.h"
-#include "integrator/intersect_stage.h"
+#include "integrator/shadow_stage.h"
 #include "integrator/surface_kernels.h"
 #include "scene/texture_store.h"
 

@@ -2,6 +2,7 @@
 // the program starts.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "kernel/counters.h"
@@ -26,6 +27,13 @@ struct Batch {
   std::uint32_t first_sample = 0, num_samples = 0;
 };
 
+/// Paths by what they have met.
+struct HitQueues {
+  const std::uint8_t* surface_kernel = nullptr;  ///< of each material, index of its kernel
+  std::array<QueueView, kNumSurfaceKernels> surfaces;
+  QueueView lights, background;
+};
+
 struct StageTable {
   const char* isa;
   /// Starts the batch's paths, from 0 on. @return  their number
@@ -38,13 +46,7 @@ struct StageTable {
                                             Counters&);
   /// Takes paths through the media that they are in, before what they have met is shaded; those that do not get there, and those that
   /// have met a boundary alone, leave their queues.
-  /// @param queues  of surfaces, then of lights and of the background
-  void (*shade_media)(const KernelGlobals&,
-                      PathState&,
-                      QueueView* queues,
-                      int num_surfaces,
-                      QueueView& next,
-                      ShadowQueue& shadow);
+  void (*shade_media)(const KernelGlobals&, PathState&, HitQueues& queues, QueueView& next, ShadowQueue& shadow);
   /// Lights and scatters paths that have walked below a surface and got out.
   void (*leave_surfaces)(const KernelGlobals&,
                          PathState&,
@@ -89,18 +91,10 @@ void graph_run_avx2(const GraphProgramView& program, const TextureView* textures
 void graph_run_avx512(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers);
 
 /// See StageTable::shade_media.
-void shade_media_baseline(const KernelGlobals& g,
-                          PathState& state,
-                          QueueView* queues,
-                          int num_surfaces,
-                          QueueView& next,
-                          ShadowQueue& shadow);
-void shade_media_avx2(const KernelGlobals& g,
-                      PathState& state,
-                      QueueView* queues,
-                      int num_surfaces,
-                      QueueView& next,
-                      ShadowQueue& shadow);
+void shade_media_baseline(
+    const KernelGlobals& g, PathState& state, HitQueues& queues, QueueView& next, ShadowQueue& shadow);
+void shade_media_avx2(
+    const KernelGlobals& g, PathState& state, HitQueues& queues, QueueView& next, ShadowQueue& shadow);
 
 /// See StageTable::leave_surfaces.
 void leave_surfaces_baseline(

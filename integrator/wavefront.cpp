@@ -43,7 +43,8 @@ Wavefront::Wavefront(const WavefrontColumns& columns)
 {
   auto queue = std::begin(memory_->queues);
   for (QueueView* q : {&active_, &next_}) q->paths = *queue++;
-  for (QueueView& q : met_) q.paths = *queue++;
+  for (QueueView& q : met_.surfaces) q.paths = *queue++;
+  for (QueueView* q : {&met_.lights, &met_.background}) q->paths = *queue++;
   if (columns.media) {
     medium_memory_ = std::make_unique_for_overwrite<MediumState[]>(kColumnEntries);
     state_.media = medium_memory_.get();
@@ -83,7 +84,8 @@ void Wavefront::note_displacement(const DisplacementWork& work)
 void Wavefront::clear_queues()
 {
   next_.size = shadow_.size = 0;
-  for (QueueView& queue : met_) queue.size = 0;
+  met_.lights.size = met_.background.size = 0;
+  for (QueueView& queue : met_.surfaces) queue.size = 0;
 }
 
 void Wavefront::trace_shadows(const KernelGlobals& g,
@@ -138,6 +140,7 @@ bool Wavefront::run(const KernelGlobals& g,
     last = now;
   };
 
+  met_.surface_kernel = surface_kernel.data();
   const std::uint32_t num_paths = stages.generate(g, state_, batch);
   if (camera_medium != nullptr) camera_medium->apply(state_, num_paths);
   if (media != nullptr) media->start(state_, num_paths);
@@ -167,13 +170,12 @@ bool Wavefront::run(const KernelGlobals& g,
     }
     if (!camera) counters.bounce_rays += active_.size;
     clear_queues();
-    intersect_closest(g, accel, state_, active_, camera, surface_kernel.data(), met_.data(), lights(), background(),
-                      displacement);
+    intersect_closest(g, accel, state_, active_, camera, met_, displacement);
     if (recorder != nullptr) record_rays();
     charge(Stage::kIntersectClosest);
 
     if (media != nullptr) {
-      stages.shade_media(g, state_, met_.data(), kNumSurfaceKernels, next_, shadow_);
+      stages.shade_media(g, state_, met_, next_, shadow_);
       charge(Stage::kShade);
       trace_shadows(g, accel, ShadowStart::kInMedium, displacement);
       charge(Stage::kIntersectShadow);
@@ -181,13 +183,13 @@ bool Wavefront::run(const KernelGlobals& g,
       shadow_.size = 0;
     }
     if (g.caustics.enabled) {
-      for (const QueueView& queue : surfaces()) stages.gather_photons(g, state_, queue);
+      for (const QueueView& queue : met_.surfaces) stages.gather_photons(g, state_, queue);
       charge(Stage::kGatherPhotons);
     }
-    stages.shade_background(g, state_, background(), counters);
-    stages.shade_light(g, state_, lights(), next_);
+    stages.shade_background(g, state_, met_.background, counters);
+    stages.shade_light(g, state_, met_.lights, next_);
     for (std::size_t k = 0; k < kNumSurfaceKernels; ++k) {
-      if (met_[k].size > 0) stages.shade_surface[k](g, state_, met_[k], next_, shadow_, counters);
+      if (met_.surfaces[k].size > 0) stages.shade_surface[k](g, state_, met_.surfaces[k], next_, shadow_, counters);
     }
     charge(Stage::kShade);
 
@@ -234,6 +236,7 @@ void Wavefront::trace_photons(const KernelGlobals& g,
   RELIEF_ASSERT(count <= kBatchPaths);
   const Clock::time_point start = Clock::now();
   counters.photon_paths += count;
+  met_.surface_kernel = surface_kernel.data();
   active_.size = 0;
   stages.emit_photons(g, sources, state_, first, count, active_);
   DisplacementWork displacement;
@@ -250,18 +253,17 @@ void Wavefront::trace_photons(const KernelGlobals& g,
     }
     clear_queues();
     counters.photon_rays += active_.size;
-    intersect_closest(g, accel, state_, active_, false, surface_kernel.data(), met_.data(), lights(), background(),
-                      displacement);
+    intersect_closest(g, accel, state_, active_, false, met_, displacement);
     const std::size_t before = out.size();
     out.resize(before + active_.size);
     PhotonQueueView photons{out.data() + before, 0};
-    for (const QueueView& queue : surfaces()) {
+    for (const QueueView& queue : met_.surfaces) {
       stages.shade_photons(g, sources, state_, queue, next_, photons);
     }
     out.resize(before + photons.size);
     // Area lights let rays pass.
-    for (std::uint32_t i = 0; i < lights().size; ++i) {
-      const std::uint32_t path = lights().paths[i];
+    for (std::uint32_t i = 0; i < met_.lights.size; ++i) {
+      const std::uint32_t path = met_.lights.paths[i];
       state_.t_min[path] = t_min_behind(state_.hit_t[path]);
       queue_push(next_, path);
     }

@@ -10,6 +10,7 @@
 
 #include "integrator/accel.h"
 #include "integrator/intersect_stage.h"
+#include "integrator/shadow_stage.h"
 #include "integrator/stages.h"
 #include "kernel/counters.h"
 #include "kernel/globals.h"
@@ -34,10 +35,10 @@ struct RecordedRay {
 
 /// What paths need columns for.
 struct WavefrontColumns {
-  bool caustics = false;  ///< camera paths gather photons
-  bool motion = false;    ///< paths have a time
-  bool facets = false;    ///< they may meet coarser levels of height maps
-  bool media = false;     ///< something fills space
+  bool caustics = false;    ///< camera paths gather photons
+  bool motion = false;      ///< paths have a time
+  bool facets = false;      ///< they may meet coarser levels of height maps
+  bool media = false;       ///< something fills space
   bool subsurface = false;  ///< they may go below surfaces
 };
 
@@ -87,9 +88,6 @@ class Wavefront {
   std::uint64_t first_nonfinite = kNoSample;
 
  private:
-  std::span<QueueView> surfaces() { return {met_.data(), kNumSurfaceKernels}; }
-  QueueView& lights() { return met_[kNumSurfaceKernels]; }
-  QueueView& background() { return met_[kNumSurfaceKernels + 1]; }
   void clear_queues();
   void trace_shadows(const KernelGlobals& g, const Accel& accel, ShadowStart start, DisplacementWork& displacement);
   void note_displacement(const DisplacementWork& work);
@@ -129,7 +127,7 @@ class Wavefront {
   PathState& state_;
   ShadowQueue& shadow_;
   QueueView active_, next_;
-  std::array<QueueView, kNumSurfaceKernels + 2> met_;  ///< by what they have met: see surfaces, lights, background
+  HitQueues met_;
 };
 
 }  // namespace relief

@@ -1,7 +1,10 @@
 // Stage: a path has walked below a surface (enter_surface.h) and leaves it. What it leaves by is diffuse.
 #pragma once
 
-#include "kernel/stage/shade_surface.h"
+#include "kernel/counters.h"
+#include "kernel/stage/surface_continue.h"
+#include "kernel/stage/surface_light.h"
+#include "kernel/stage/surface_photons.h"
 
 namespace relief {
 
@@ -28,13 +31,13 @@ template <unsigned kFeatures>
 {
   ++counters.surface_hits;
   const Vec3f wo = -path_direction(state, path);
-  const ScatterSamples u =
-      scatter_samples(state.pixel_hash[path], state.sample_index[path], path_surface(state, path));
+  const ScatterSamples u = scatter_samples(state.pixel_hash[path], state.sample_index[path], path_surface(state, path));
   SurfaceInteraction at = surface_interaction_locate<kFeatures>(g, state, path, wo);
   MixtureLobes lobes;
   surface_interaction_resolve<kFeatures>(g, state, path, wo, at, lobes);
   const Vec3f N = subsurface_normal(lobes, at.side.Ns);
   at.params = {};
+  at.transmits = false;
 
   const SubsurfaceState& below = state.subsurface.entries[path];
   lobes.size = 0;
@@ -48,19 +51,16 @@ template <unsigned kFeatures>
     lobe->shape.principled_diffuse.part = PrincipledDiffusePart::kLeaving;
   }
   const Mixture closure = mixture_of(lobes, at.side.frame, at.side.Ng);
-  const Vec3f light_N = at.side.Ns;
+  const ScatterEvent<Mixture> event{at, closure, path_throughput(state, path), at.side.Ns, at.cone};
   if (g.has_lights) {
-    const LightsChoice chosen = lights_choose(g.lights, at.hit.P, light_N, u.light);
-    if (chosen.probability > 0.0f) {
-      shade_surface_light<kFeatures>(g, state, path, at, closure, chosen, light_N, at.cone, shadow);
-    }
+    const LightsChoice chosen = lights_choose(g.lights, at.hit.P, event.light_N, u.light);
+    if (chosen.probability > 0.0f) shade_surface_light<kFeatures>(g, state, path, event, chosen, shadow);
   }
-  const Vec3f throughput = path_throughput(state, path);
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
-    shade_surface_photons<kFeatures>(g, state, path, at, closure, to_local(at.side.frame, wo));
+    shade_surface_photons<kFeatures>(g, state, path, event, to_local(at.side.frame, wo));
   }
   const BsdfSample bsdf = closure_sample<kFeatures>(closure, *g.bsdf_tables, u.branch, u.bsdf);
-  shade_surface_continue<kFeatures>(g, state, path, at, closure, bsdf, 1.0f, u, throughput, light_N, at.cone, next);
+  shade_surface_continue<kFeatures>(g, state, path, event, bsdf, 1.0f, u, next);
 }
 
 }  // namespace relief

@@ -12,7 +12,9 @@
 #include "kernel/counters.h"
 #include "kernel/sample/dimensions.h"
 #include "kernel/sample/sobol.h"
-#include "kernel/stage/shade_surface.h"
+#include "kernel/stage/light_ask.h"
+#include "kernel/stage/path_end.h"
+#include "kernel/stage/surface_interaction.h"
 #include "kernel/volume/distance.h"
 #include "kernel/volume/medium_walk.h"
 
@@ -35,10 +37,11 @@ RELIEF_KERNEL MediaSum path_media(const KernelGlobals& g, const MediumState& m)
   return sum;
 }
 
-/// Where on a stretch light is asked for.
+/// Where on a stretch light is asked for, or the path is scattered.
 struct MediumPlace {
   float distance = 0;  ///< metres from its start
   float pdf = 0;       ///< a metre; 0: nowhere
+  Vec3f carried{};     ///< what gets there of the path's light
 };
 
 /// Small lights that are farther from the ray than light gets on average, so many times, are not looked for along it: what they
@@ -85,39 +88,29 @@ RELIEF_KERNEL MediumPlace medium_place(const KernelGlobals& g, const MediumStret
 }
 
 /// Queues a shadow ray from a place on a stretch.
-/// @param carried  what gets there of the path's light
 RELIEF_KERNEL void shade_medium_light_at(const KernelGlobals& g,
                                          const PathState& state,
                                          std::uint32_t path,
                                          const MediumStretch& at,
                                          const MediaSum& media,
                                          MediumPlace place,
-                                         Vec3f carried,
                                          ChoicePoint u,
                                          ShadowQueue& shadow)
 {
-  const float time = path_time(state, path);
   const Vec3f P = at.O + at.D * place.distance;
   const LightsChoice chosen = lights_choose(g.lights, P, {}, u);
   if (!(chosen.probability > 0.0f)) return;
   Light storage;
-  const Light* emitter = chosen.ref.light_index >= 0 ? &lights_at(g.lights, chosen.ref, storage, time) : nullptr;
-  const LightSample light = lights_sample_chosen(g.lights, chosen, emitter, P, {});
-  if (!(light.pdf > 0.0f)) return;
-  Vec3f radiance = light.radiance;
-  if (emitter != nullptr && !emitter->is_even) {
-    radiance = emitter_radiance(
-        g, *emitter, radiance,
-        {P + light.wi * light.distance, light.barycentric, -light.wi, path_light_ray(state, path, light.distance)});
-  }
-  if (is_zero(radiance)) return;
+  const LightAnswer answer = light_ask(g, state, path, chosen, P, {}, storage);
+  const LightSample& light = answer.sample;
+  if (!(light.pdf > 0.0f) || is_zero(answer.radiance)) return;
   const PhaseEval phase = media_eval(media, at.D, light.wi);
   const float weight = path_light_weight(g.light_technique, light.pdf, phase.pdf, light.delta);
-  const Vec3f gain = carried * phase.f * radiance * (weight / (light.pdf * place.pdf));
+  const Vec3f gain = place.carried * phase.f * answer.radiance * (weight / (light.pdf * place.pdf));
   if (is_zero(gain)) return;
   Vec3f D;
   float t_max = 0;
-  shadow_ray_aim(light, emitter, P, P, D, t_max);
+  shadow_ray_aim(light, answer.emitter, P, P, D, t_max);
   const RayCone cone =
       ray_cone_propagate({state.cone_width[path], state.cone_spread[path]}, state.t_min[path] + place.distance);
   shadow_queue_push(shadow, path, P, D, t_max, cone, gain,
@@ -152,27 +145,25 @@ RELIEF_KERNEL void shade_medium_light(const KernelGlobals& g,
   MediumPlace place = medium_place(g, at, media.sigma_t, path_time(state, path));
   place.pdf *= chance;
   if (!(place.pdf > 0.0f) || !(place.distance < kInfinity)) return;
-  const Vec3f carried = path_throughput(state, path) * medium_transmittance(media.sigma_t, place.distance);
-  shade_medium_light_at(g, state, path, at, media, place, carried, u, shadow);
+  place.carried = path_throughput(state, path) * medium_transmittance(media.sigma_t, place.distance);
+  shade_medium_light_at(g, state, path, at, media, place, u, shadow);
 }
 
 /// Sends a path on from where it is scattered, or ends it.
-/// @param throughput  up to there, by the density of the place
-/// @param distance    from the start of the stretch, metres
+/// @param place  what is carried there is by the density of the place
 RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
                                         PathState& state,
                                         std::uint32_t path,
                                         const MediumStretch& at,
                                         const MediaSum& media,
-                                        Vec3f throughput,
-                                        float distance,
+                                        MediumPlace place,
                                         Vec2f u,
                                         QueueView& next)
 {
   const Vec3f wi = media_sample(media, at.D, u);
   const PhaseEval phase = media_eval(media, at.D, wi);
   if (!(phase.pdf > 0.0f)) return;
-  throughput *= phase.f / phase.pdf;
+  Vec3f throughput = place.carried * (phase.f / phase.pdf);
   const bool first = path_bounces(state.bounces[path], BounceKind::kAll) == 0;
   const float carried = max_component(abs(throughput));
   if (first) {
@@ -184,9 +175,10 @@ RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
     throughput *= 1.0f / survival;
   }
   if (is_zero(throughput)) return;
-  RayCone cone = ray_cone_propagate({state.cone_width[path], state.cone_spread[path]}, state.t_min[path] + distance);
+  RayCone cone =
+      ray_cone_propagate({state.cone_width[path], state.cone_spread[path]}, state.t_min[path] + place.distance);
   cone = ray_cone_scatter(cone, 1.0f);
-  path_set_ray(state, path, at.O + at.D * distance, wi);
+  path_set_ray(state, path, at.O + at.D * place.distance, wi);
   state.throughput[path] = throughput;
   state.pdf[path] = phase.pdf;
   state.least_pdf[path] = min(state.least_pdf[path], phase.pdf);
@@ -206,16 +198,6 @@ RELIEF_KERNEL void shade_medium_emission(const KernelGlobals& g, PathState& stat
   if (bounce == 0) film_add_emission(g.film, state.pixel[path], emitted);
   path_add_denoising(g, state, path, emitted);
   path_add_radiance(g, state, path, bounce, emitted);
-}
-
-/// Whether a path has had all its scatterings.
-RELIEF_KERNEL bool shade_medium_is_last(const KernelGlobals& g, const PathState& state, std::uint32_t path)
-{
-  const std::uint32_t bounces = state.bounces[path];
-  return path_bounces(bounces, BounceKind::kAll) > g.limits.total || (state.flags[path] & kPathLast) != 0 ||
-         path_bounces(bounces, BounceKind::kDiffuse) > g.limits.diffuse ||
-         path_bounces(bounces, BounceKind::kGlossy) > g.limits.glossy ||
-         path_bounces(bounces, BounceKind::kTransmission) > g.limits.transmission;
 }
 
 /// Notes for denoising where a path is first scattered.
@@ -288,7 +270,7 @@ RELIEF_KERNEL MediaSum collision_media(const MediumWalk& walk, const KeptCollisi
                                                           ShadowQueue& shadow)
 {
   const bool is_first = path_bounces(state.bounces[path], BounceKind::kAll) == 0;
-  const bool last = shade_medium_is_last(g, state, path);
+  const bool last = path_is_last(g, state, path);
   const Vec3f throughput = path_throughput(state, path);
   const std::uint32_t seed = hash_mix_32(at.hash ^ hash_mix_32(at.sample * 0x9e3779b9u + at.number));
   MediumWalk walk = medium_walk_make(g, state.media[path], at.O, at.D, at.length, seed);
@@ -331,15 +313,15 @@ RELIEF_KERNEL MediaSum collision_media(const MediumWalk& walk, const KeptCollisi
     const float chance = medium_asks(state, path, at, scattered.total / all);
     if (chance > 0.0f) {
       shade_medium_light_at(g, state, path, at, collision_media(walk, lit),
-                            {lit.distance, chance * lit.share / lit.total}, lit.weight,
+                            {lit.distance, chance * lit.share / lit.total, lit.weight},
                             choice_point(u.first_bits[0], u.first_bits[1]), shadow);
     }
   }
   if (u.at[2].x * all < scattered.total) {
     const MediaSum media = collision_media(walk, scattered);
     shade_medium_feature(g, state, path, at, throughput * medium_albedo(media));
-    shade_medium_scatter(g, state, path, at, media, scattered.weight * (all / scattered.share), scattered.distance,
-                         u.at[1], next);
+    const MediumPlace place{scattered.distance, 1.0f, scattered.weight * (all / scattered.share)};
+    shade_medium_scatter(g, state, path, at, media, place, u.at[1], next);
     return false;
   }
   const float passing = carried_share(carried);
@@ -376,7 +358,7 @@ RELIEF_KERNEL bool shade_medium_stretch(const KernelGlobals& g,
   }
   const bool is_first = path_bounces(state.bounces[path], BounceKind::kAll) == 0;
   const Vec3f carried = throughput * medium_albedo(media);
-  if (shade_medium_is_last(g, state, path) || !(at.length > 0.0f) || !(max_component(carried) > 0.0f)) {
+  if (path_is_last(g, state, path) || !(at.length > 0.0f) || !(max_component(carried) > 0.0f)) {
     state.throughput[path] = throughput * medium_transmittance(sigma_t, at.length);
     return !is_zero(path_throughput(state, path)) || is_first;
   }
@@ -391,7 +373,7 @@ RELIEF_KERNEL bool shade_medium_stretch(const KernelGlobals& g,
     const float pdf = dot(at.chances, sigma_t * left);
     if (!(pdf > 0.0f)) return false;
     shade_medium_feature(g, state, path, at, carried);
-    shade_medium_scatter(g, state, path, at, media, throughput * left / pdf, distance, u.at[1], next);
+    shade_medium_scatter(g, state, path, at, media, {distance, pdf, throughput * left / pdf}, u.at[1], next);
     return false;
   }
   const Vec3f left = medium_transmittance(sigma_t, at.length);

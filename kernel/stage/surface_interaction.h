@@ -25,17 +25,25 @@ struct ShadingSide {
   bool bent;    ///< Ns is not the surface's: wo was below its horizon
 };
 
+/// What films and denoisers are told of a surface.
+struct SurfaceSummary {
+  Vec3f albedo{};
+  bool is_seen_through = false;  ///< they are better told of what is behind, or mirrored
+};
+
 struct SurfaceInteraction {
   const InstanceView* instance;
   const Material* material;
   std::uint32_t triangle;
   SurfaceHit hit;
-  ShadingSide side;  ///< Ng and front are known from the start, the rest is made by surface_interaction_frame
-  SurfaceParams params;
-  RayCone cone;           ///< at the hit
-  float uv_width[2];      ///< texture footprint in each set's uv units
-  Vec3f passed{1, 1, 1};  ///< of closures: factor on the throughput of what passes, by a chance of 1 − alpha
-  float holdout = 0;      ///< of closures: share that is a hole in the picture
+  ShadingSide side;        ///< Ng and front are known from the start, the rest is made by surface_interaction_frame
+  SurfaceParams params;    ///< of closures their emission, alpha and sigma_a alone
+  bool transmits = false;  ///< light may come through from behind
+  RayCone cone;            ///< at the hit
+  float uv_width[2];       ///< texture footprint in each set's uv units
+  Vec3f passed{1, 1, 1};   ///< of closures: factor on the throughput of what passes, by a chance of 1 − alpha
+  float holdout = 0;       ///< of closures: share that is a hole in the picture
+  SurfaceSummary summary;  ///< of closures; see surface_summary
 };
 
 /// A material of closures, where the kernel has any.
@@ -63,8 +71,31 @@ RELIEF_KERNEL Vec3f shading_normal_towards(Vec3f Ns, Vec3f wo)
 /// Cosine between a shading normal and what was made of it, less than which it was bent: 1 but for rounding.
 inline constexpr float kUnbent = 1.0f - 1e-6f;
 
-/// Lobes up to this perceptual roughness, a width α of .075, let denoisers see what is behind or mirrored, as in Cycles.
+/// A denoiser is better told of what is behind or mirrored by a surface that scatters less than a quarter of its light by other
+/// lobes than those up to this perceptual roughness, a width α of .075. The same bounds as Cycles'.
 inline constexpr float kSeenThroughRoughness = 0.27386f;
+
+/// Whether a share of the light is so small.
+/// @param others  scattered by other lobes
+RELIEF_KERNEL bool share_is_seen_through(float others, float all) { return 4.0f * others < all; }
+
+RELIEF_KERNEL bool surface_params_are_seen_through(const SurfaceParams& p)
+{
+  constexpr float kLeastReflection = 0.04f;
+  if (p.unlit || p.roughness > kSeenThroughRoughness) return false;
+  const float base = max_component(p.base_color);
+  const float diffuse = (1.0f - p.metallic) * (1.0f - p.transmission) * base;
+  const float sharp = p.metallic * base + (1.0f - p.metallic) * (p.specular * kLeastReflection + p.transmission * base);
+  return share_is_seen_through(diffuse, diffuse + sharp);
+}
+
+/// @pre  the interaction is resolved
+template <unsigned kFeatures>
+RELIEF_KERNEL SurfaceSummary surface_summary(const SurfaceInteraction& at)
+{
+  if (has_mixture<kFeatures>(at)) return at.summary;
+  return {surface_albedo(at.params), surface_params_are_seen_through(at.params)};
+}
 
 /// The point that a path has hit; its material's parameters there are left open.
 /// @param wo  unit, back along the path's ray
@@ -194,16 +225,19 @@ struct ClosureSight {
 };
 
 /// Photons stay above: they end where there is a diffuse lobe. So does all light on curves.
-RELIEF_KERNEL ClosureSight closure_sight(
-    const KernelGlobals& g, const PathState& state, std::uint32_t path, const InstanceView& instance, SurfaceBlur blur)
+RELIEF_KERNEL ClosureSight closure_sight(const KernelGlobals& g,
+                                         const PathState& state,
+                                         std::uint32_t path,
+                                         const InstanceView& instance,
+                                         SurfaceBlur blur)
 {
   ClosureSight sight{blur, path_does_without(g, state.flags[path]), path_surface(state, path) == 0,
                      state.subsurface.entries != nullptr && (state.flags[path] & kPathPhoton) == 0,
                      path_bounces(state.bounces[path], BounceKind::kDiffuse) > 0};
   if (__builtin_expect((instance.flags & kCurves) != 0, 0)) {
     sight.enters = false;
-    sight.tangent = curve_tangent(path_mesh(g, state, path, instance), instance, state.hit_triangle[path], state.hit_u[path],
-                                  -path_direction(state, path));
+    sight.tangent = curve_tangent(path_mesh(g, state, path, instance), instance, state.hit_triangle[path],
+                                  state.hit_u[path], -path_direction(state, path));
   }
   return sight;
 }
@@ -252,28 +286,23 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   p = {};
   p.emission = build.emission + m.emission * xyz(material_texture_sample<kFeatures>(m.emission_texture, g.textures,
                                                                                     at.hit.uv, at.uv_width));
-  p.transmission = build.transmits ? 1.0f : 0.0f;
-  p.thin = false;
+  at.transmits = build.transmits;
   if (build.transmits && m.attenuation_distance < kInfinity) {
     p.sigma_a = volume_sigma_a(m.attenuation_color, m.attenuation_distance);
   }
   at.holdout = clamp(build.holdout, 0.0f, 1.0f);
   float scattered = at.holdout;
-  p.base_color = {};
-  for (int i = 0; i < lobes.size; ++i) {
-    scattered += lobes.lobes[i].probability;
-    p.base_color += lobes.lobes[i].weight;
-  }
-  p.base_color = min(p.base_color, splat3(1.0f));
-  // What denoisers ask for, see surface_is_seen_through: whether nearly all of it mirrors or is clear.
+  Vec3f albedo;
   float sharp = 0.0f;
   for (int i = 0; i < lobes.size; ++i) {
-    if (lobes.lobes[i].roughness <= kSeenThroughRoughness) sharp += lobes.lobes[i].probability;
+    const MixtureLobe& lobe = lobes.lobes[i];
+    scattered += lobe.probability;
+    albedo += lobe.weight;
+    if (lobe.roughness <= kSeenThroughRoughness) sharp += lobe.probability;
   }
-  if (sharp > 0.0f && 4.0f * (scattered - sharp) < scattered) {
-    p.roughness = 0.0f;
-    p.metallic = 1.0f;
-  }
+  at.summary.albedo = min(albedo, splat3(1.0f));
+  at.summary.is_seen_through =
+      sharp > 0.0f && share_is_seen_through(scattered - sharp, scattered) && max_component(at.summary.albedo) > 0.0f;
   if (sight.is_first) mixture_lobes_defend(lobes, mean_component(build.transparency));
   const float passing = max_component(build.transparency);
   if (!(passing > 0.0f)) return;
@@ -286,7 +315,7 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
 /// What a graph's program gave at a point that a path has hit.
 struct GraphHit {
   SurfaceInteraction* at;  ///< as surface_interaction_locate has it
-  GraphLane lane;                ///< of the program, which has run
+  GraphLane lane;          ///< of the program, which has run
 };
 
 /// Completes a located point with its material there.
@@ -314,12 +343,14 @@ RELIEF_KERNEL void surface_interaction_resolve(const KernelGlobals& g,
         surface_interaction_mix<kFeatures>(g, wo, lane, closure_sight(g, state, path, *at.instance, blur), at, lobes);
       } else {
         at.params = graph_surface_params<kFeatures>(*at.material, graph_values(lane), g.textures, at.hit, at.uv_width);
+        at.transmits = at.params.transmission > 0.0f;
         if (blur.alpha > 0.0f) surface_params_blur(at.params, blur);
       }
       return;
     }
   }
   at.params = surface_params_eval<kFeatures>(*at.material, g.textures, at.hit.uv, at.hit.color, at.uv_width);
+  at.transmits = at.params.transmission > 0.0f;
   if (blur.alpha > 0.0f) surface_params_blur(at.params, blur);
 }
 
@@ -337,7 +368,7 @@ RELIEF_KERNEL void surface_interaction_frame(const KernelGlobals& g,
   ShadingSide& side = at.side;
   Vec3f Ns = shading_normal_turned(at.hit.Ns, side.Ng);
   // On coarse meshes mirrors and glass would reflect into their own facets, whose places were dark. Diffuse light is not lost so.
-  if (at.params.metallic > 0.0f || at.params.transmission > 0.0f) {
+  if (at.params.metallic > 0.0f || at.transmits) {
     Ns = normal_with_reflection_above(side.Ng, Ns, wo);
   }
   side.Ns = shading_normal_towards(Ns, wo);
@@ -355,7 +386,7 @@ RELIEF_KERNEL void surface_interaction_frame(const KernelGlobals& g,
       side.bent = !(dot(side.Ns, side.front ? N : -N) > kUnbent);
     }
   }
-  const bool solid = at.params.transmission > 0.0f && !at.params.thin;
+  const bool solid = at.transmits && !at.params.thin;
   side.frame = frame_from_normal(solid && !side.front ? -side.Ns : side.Ns);
   if constexpr ((kFeatures & kFeatureLayers) != 0 && (kFeatures & kFeatureNormalMaps) != 0) {
     if (has_tangents && at.params.clearcoat > 0.0f) {
@@ -427,9 +458,7 @@ RELIEF_KERNEL Vec3f surface_ray_origin(const SurfaceInteraction& at, Vec3f wi)
   // Above the surface the ray starts on the lifted side, below it on the other. Closures send light by the true surface; what
   // only the shading normal sees of lamps is lifted above a facet, unless it may have come through.
   const bool above_Ns = dot(wi, at.side.Ns) > 0.0f;
-  const bool above = at.material->has_closures
-                         ? dot(wi, at.side.Ng) > 0.0f || (above_Ns && !(at.params.transmission > 0.0f))
-                         : above_Ns;
+  const bool above = at.material->has_closures ? dot(wi, at.side.Ng) > 0.0f || (above_Ns && !at.transmits) : above_Ns;
   Vec3f P = at.hit.P;
   if (above && at.side.front) P += at.hit.P_lift * terminator_lift_weight(dot(wi, at.side.Ng));
   return surface_hit_origin(at.hit, P, above == at.side.front);

@@ -1,0 +1,51 @@
+// What a stage knows of a surface at which a path is scattered. What a path's lobes make of it is in files of their own:
+// light that is asked for (surface_light.h), photons (surface_photons.h), the way on (surface_continue.h).
+#pragma once
+
+#include "kernel/bsdf/lobe_split.h"
+#include "kernel/bsdf/mixture.h"
+#include "kernel/photon/gather.h"
+#include "kernel/stage/surface_interaction.h"
+
+namespace relief {
+
+/// A path at a surface whose closure is known.
+template <typename SurfaceClosure>
+struct ScatterEvent {
+  using Closure = SurfaceClosure;
+  const SurfaceInteraction& at;
+  const Closure& closure;
+  Vec3f throughput;  ///< up to the surface
+  Vec3f light_N;     ///< given to lights_choose
+  RayCone cone;      ///< at the surface
+};
+
+/// Shading normal by which lights are chosen: none where light comes from both sides.
+RELIEF_KERNEL Vec3f surface_light_N(const SurfaceInteraction& at) { return at.transmits ? Vec3f{} : at.side.Ns; }
+
+/// The part of a surface's f that is diffuse.
+/// @param wi  in the closure's frame
+template <unsigned kFeatures, typename Closure>
+[[gnu::noinline]] RELIEF_KERNEL Vec3f shade_surface_diffuse(const KernelGlobals& g, const Closure& closure, Vec3f wi)
+{
+  return closure_eval<kFeatures>(closure_diffuse(closure), *g.bsdf_tables, wi).f;
+}
+
+/// Which lobes are sharp for this path towards a direction. What cannot be gone back stays sharp, as photons end there, and
+/// what grazes the facet, where single photons would count for too much.
+/// @param wi   unit, world
+/// @param pdf  of the closure
+RELIEF_KERNEL SharpLobes
+path_sharp_lobes(const KernelGlobals& g, std::uint32_t flags, const SurfaceInteraction& at, Vec3f wi, float pdf)
+{
+  constexpr float kLeastCosine = 0.05f;
+  SharpLobes sharp = sharp_lobes(at.params, (at.instance->flags & kCausticCaster) != 0, g.caustics.roughness);
+  if (path_gathers_tails(flags, *at.instance) && pdf < kTailDensity &&
+      __builtin_fabsf(dot(wi, at.side.Ng)) > kLeastCosine && shading_is_reversible(at.side, wi)) {
+    sharp.base = false;
+    sharp.most_roughness = -1.0f;
+  }
+  return sharp;
+}
+
+}  // namespace relief

@@ -1,0 +1,80 @@
+// Next-event estimation at a surface: light is asked for, and a shadow ray queued.
+#pragma once
+
+#include "kernel/stage/light_ask.h"
+#include "kernel/stage/scatter_event.h"
+
+namespace relief {
+
+/// The part of a surface's f that a light is not hidden from.
+/// @param wi  in the closure's frame
+/// @param f   of all
+template <unsigned kFeatures, typename Closure>
+[[gnu::noinline]] RELIEF_KERNEL Vec3f
+shade_surface_seen_by(const KernelGlobals& g, const Closure& closure, Vec3f wi, Vec3f f, LightHides hides)
+{
+  if (!hides.differs()) return hides.diffuse ? Vec3f{} : f;
+  const Vec3f diffuse = shade_surface_diffuse<kFeatures>(g, closure, wi);
+  return hides.diffuse ? max(f - diffuse, Vec3f{}) : diffuse;
+}
+
+/// Queues a shadow ray towards a light sample taken at the hit.
+/// @param chosen  from lights_choose
+template <unsigned kFeatures, typename Closure>
+RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
+                                       const PathState& state,
+                                       std::uint32_t path,
+                                       const ScatterEvent<Closure>& event,
+                                       LightsChoice chosen,
+                                       ShadowQueue& shadow)
+{
+  const SurfaceInteraction& at = event.at;
+  const Closure& closure = event.closure;
+  const Vec3f P = at.hit.P;
+  const int bounce = path_bounces(state.bounces[path], BounceKind::kAll);
+  Light storage;
+  const LightAnswer answer = light_ask(g, state, path, chosen, P, event.light_N, storage);
+  const LightSample& light = answer.sample;
+  const Light* const emitter = answer.emitter;
+  if (!(light.pdf > 0.0f) || is_zero(answer.radiance)) return;
+  const Vec3f wi = to_local(at.side.frame, light.wi);
+  BsdfEval bsdf = closure_eval<kFeatures>(closure, *g.bsdf_tables, wi);
+  const auto transmits = [&] { return (wi.z < 0.0f) != (dot(at.side.frame.n, path_direction(state, path)) > 0.0f); };
+  if constexpr ((kFeatures & kFeatureMixture) == 0) {
+    const std::uint32_t without = path_does_without(g, state.flags[path]);
+    if (__builtin_expect(without != 0, 0) && events_have(without, transmits())) {
+      bsdf.f = shade_surface_diffuse<kFeatures>(g, closure, wi);
+    }
+  }
+  if constexpr ((kFeatures & kFeatureCaustics) != 0) {
+    if (light_casts_caustics(g.lights, light.ref.light_index) && path_caustic_after(state.flags[path], *at.instance) &&
+        shading_is_reversible(at.side, light.wi) && !path_crosses_facets(state, path, light.wi) &&
+        !path_is_alone(g, state.flags[path], transmits())) {
+      bsdf.f = closure_eval<kFeatures>(closure_soft(closure, kAllSharp), *g.bsdf_tables, wi).f;
+    }
+  }
+  bool is_found_here_alone = light.delta;
+  if (emitter != nullptr && __builtin_expect(emitter->hidden_from != 0, 0)) {
+    const LightHides hides = light_hides(*emitter, transmits());
+    is_found_here_alone = light.delta || hides.differs();
+    bsdf.f = shade_surface_seen_by<kFeatures>(g, closure, wi, bsdf.f, hides);
+  }
+  if (is_zero(bsdf.f)) return;
+  const float cos_i = __builtin_fabsf(wi.z);
+  const float weight = path_light_weight(g.light_technique, light.pdf, bsdf.pdf, is_found_here_alone);
+  Vec3f gain = event.throughput * bsdf.f * answer.radiance * (cos_i * weight / light.pdf);
+  // A lamp that stands in the path's medium; on the other side of a surface there is another.
+  if (const Vec3f sigma_a = path_sigma_a(state, path); __builtin_expect(!is_zero(sigma_a), 0)) {
+    const bool is_here = light.distance < kInfinity && (dot(light.wi, at.side.Ng) > 0.0f);
+    if (is_here) gain *= path_transmittance(sigma_a, light.distance);
+  }
+  if (is_zero(gain)) return;
+
+  const Vec3f O = surface_ray_origin(at, light.wi);
+  Vec3f D;
+  float t_max = 0;
+  shadow_ray_aim(light, emitter, P, O, D, t_max);
+  shadow_queue_push(shadow, path, O, D, t_max, event.cone, gain, static_cast<std::uint32_t>(bounce + 1));
+}
+
+}  // namespace relief
