@@ -258,10 +258,13 @@ std::string emptiness_warning(const Scene& scene, const FilmView& film)
   const Darkness found = darkness_of(film);
   if (found.covered == 0) return "the camera sees nothing of the scene; --camera auto looks at all of it";
   if (found.brightest < kDark) return "no light reaches what the camera sees; --environment studio or sky lights it";
-  const bool glows_only = scene.lights.empty() && scene.environment.texture_index < 0 && is_zero(scene.environment.color);
+  const bool glows_only =
+      scene.lights.empty() && scene.environment.texture_index < 0 && is_zero(scene.environment.color);
   if (glows_only && found.is_mostly_dim()) {
-    return fmt::format("what glows is all its light, and leaves {:.0f} % of what the camera sees as good as black; "
-                       "--environment studio or sky lights it", 100 * found.dim / found.covered);
+    return fmt::format(
+        "what glows is all its light, and leaves {:.0f} % of what the camera sees as good as black; "
+        "--environment studio or sky lights it",
+        100 * found.dim / found.covered);
   }
   return {};
 }
@@ -379,195 +382,279 @@ void report_failed(ProgressPrinter& progress, int frame, const std::string& name
 }
 
 /// One frame, from loading to files.
-/// @param files  of the run; what the frame reads is added
-/// @param kept   of the frames before; null: there are no others
-/// @return false if it was interrupted
-bool render_frame(const RenderArguments& arguments,
-                  const std::string& command,
-                  std::optional<int> frame,
-                  RunFiles& files,
-                  KeptFrames* kept,
-                  ProgressPrinter& progress)
+class FrameRun {
+ public:
+  /// @param files  of the run; what the frame reads is added
+  /// @param kept   of the frames before; null: there are no others
+  FrameRun(const RenderArguments& arguments,
+           const std::string& command,
+           std::optional<int> frame,
+           RunFiles& files,
+           KeptFrames* kept,
+           ProgressPrinter& progress)
+      : arguments_(arguments), command_(command), frame_(frame), files_(files), kept_(kept), progress_(progress)
+  {
+  }
+
+  /// @return false if it was interrupted
+  bool run();
+
+ private:
+  std::string name() const { return paths_.exr.string(); }
+  int number() const { return frame_.value_or(0); }
+  void note_unwritten() const { progress_.note(name() + ": interrupted before the first sample, not written"); }
+  bool claim();
+  void load();
+  void choose_options();
+  void describe();
+  void go_on_from_saved();
+  void listen();
+  RenderedImage sample();
+  void denoise(const RenderedImage& image);
+  void write(const RenderedImage& image, bool is_complete);
+
+  const RenderArguments& arguments_;
+  const std::string& command_;
+  const std::optional<int> frame_;
+  RunFiles& files_;
+  KeptFrames* const kept_;
+  ProgressPrinter& progress_;
+  const FramePaths paths_ = paths_of_frame(arguments_, frame_);
+  std::vector<std::unique_ptr<OutputLock>> locks_;
+  std::exception_ptr unwritable_;  ///< why an output cannot be written
+  /// Until sampling begins there is nothing to save.
+  std::optional<KeepsForSaving> saving_;
+  std::optional<Farewell> farewell_;
+  Statistics stats_;
+  std::shared_ptr<const Scene> scene_;
+  RenderOptions options_;
+  PngOptions png_;
+  std::vector<FileStamp> files_read_;
+  std::optional<ColorView> view_;
+  std::string fingerprint_;
+  std::optional<Picture> reference_;
+  std::optional<FrameFiles> frame_files_;
+  std::optional<SavedRender> saved_;
+  KeptContext of_frame_;
+  Attributes more_attributes_;
+  std::optional<DenoisedPicture> denoised_;
+  std::exception_ptr denoise_failure_;
+};
+
+/// Takes the outputs for this process.
+/// @return false: another one makes them
+bool FrameRun::claim()
 {
-  const FramePaths paths = paths_of_frame(arguments, frame);
-  std::vector<std::unique_ptr<OutputLock>> locks;
-  std::exception_ptr unwritable;
-  for (const auto& [option, path] : outputs_of(paths)) {
+  for (const auto& [option, path] : outputs_of(paths_)) {
     try {
       check_writable(path);
-      locks.push_back(std::make_unique<OutputLock>(path));
+      locks_.push_back(std::make_unique<OutputLock>(path));
     } catch (const OutputError&) {
       // Where the frame is there already, nothing is to be written.
-      if (!arguments.resume) throw;
-      if (!unwritable) unwritable = std::current_exception();
+      if (!arguments_.resume) throw;
+      if (!unwritable_) unwritable_ = std::current_exception();
       continue;
     }
-    const std::string& holder = locks.back()->holder();
+    const std::string& holder = locks_.back()->holder();
     if (holder.empty()) continue;
-    if (!arguments.resume) throw OutputError(path.string(), "is being made by " + holder);
-    report_skipped(progress, paths, frame.value_or(0), fmt::format("is being made by {}, left out", holder));
-    return true;
+    if (!arguments_.resume) throw OutputError(path.string(), "is being made by " + holder);
+    report_skipped(progress_, paths_, number(), fmt::format("is being made by {}, left out", holder));
+    return false;
   }
-  const auto note_unwritten = [&] {
-    progress.note(fmt::format("{}: interrupted before the first sample, not written", paths.exr.string()));
-  };
-  // Until sampling begins there is nothing to save.
-  std::optional<KeepsForSaving> saving;
-  const Farewell farewell(note_unwritten);
-  const auto load_start = std::chrono::steady_clock::now();
-  LoadOptions load = arguments.setup.load_options(frame);
-  load.camera = camera_choice(arguments.picture);
-  load.texture_budget_bytes = static_cast<std::size_t>(arguments.texture_memory_gib * (1u << 30));
-  Statistics stats;
-  std::shared_ptr<const Scene> owner = kept != nullptr
-                                           ? kept->load(arguments.scene, load, &stats.kept)
-                                           : std::make_shared<const Scene>(scene_load(arguments.scene, load));
-  const Scene& scene = *owner;
-  files.add_inputs("a file of the scene", scene.files);
-  stats.load_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - load_start).count();
-  stats.scene = arguments.scene;
-  stats.version = RELIEF_VERSION;
-  stats.frame = frame.value_or(0);
-  stats.warnings = scene.warnings;
-  for (std::string& text : warnings_about(arguments, scene)) stats.warnings.push_back(std::move(text));
-  progress.phase(paths.exr.string(), "loaded", stats.load_seconds);
-  progress.warnings(stats.warnings);
-  if (arguments.strict) refuse_warnings(arguments.scene, stats.warnings);
+  return true;
+}
 
-  const PictureCameras cameras = picture_cameras(scene, arguments.picture, frame);
-  files.add_inputs("a file of the camera", cameras.files);
-  RenderOptions options = options_for(scene, arguments, cameras.cameras);
-  if (kept != nullptr) kept->join(&options);
-  PngOptions png{options.settings.view, options.settings.exposure};
-  png.display = arguments.display.value_or("");
-  png.alpha = arguments.setup.background == "transparent";
-  std::vector<FileStamp> files_read = scene.files;
-  files_read.insert(files_read.end(), cameras.files.begin(), cameras.files.end());
-  std::optional<ColorView> view;
-  if (!paths.png.empty()) {
-    view.emplace(png.view, png.display);
-    stats.view = view->description();
-    for (const std::string& file : view->files()) files_read.push_back(file_stamp(file));
-    files.add_inputs("a file of the colour view", files_read);
+void FrameRun::load()
+{
+  const auto start = std::chrono::steady_clock::now();
+  LoadOptions load = arguments_.setup.load_options(frame_);
+  load.camera = camera_choice(arguments_.picture);
+  load.texture_budget_bytes = static_cast<std::size_t>(arguments_.texture_memory_gib * (1u << 30));
+  scene_ = kept_ != nullptr ? kept_->load(arguments_.scene, load, &stats_.kept)
+                            : std::make_shared<const Scene>(scene_load(arguments_.scene, load));
+  files_.add_inputs("a file of the scene", scene_->files);
+  stats_.load_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  stats_.scene = arguments_.scene;
+  stats_.version = RELIEF_VERSION;
+  stats_.frame = number();
+  stats_.warnings = scene_->warnings;
+  for (std::string& text : warnings_about(arguments_, *scene_)) stats_.warnings.push_back(std::move(text));
+  progress_.phase(name(), "loaded", stats_.load_seconds);
+  progress_.warnings(stats_.warnings);
+  if (arguments_.strict) refuse_warnings(arguments_.scene, stats_.warnings);
+}
+
+/// Options of the render and of its pictures, and the fingerprint of all that decides them.
+void FrameRun::choose_options()
+{
+  const PictureCameras cameras = picture_cameras(*scene_, arguments_.picture, frame_);
+  files_.add_inputs("a file of the camera", cameras.files);
+  options_ = options_for(*scene_, arguments_, cameras.cameras);
+  if (kept_ != nullptr) kept_->join(&options_);
+  png_ = PngOptions{options_.settings.view, options_.settings.exposure};
+  png_.display = arguments_.display.value_or("");
+  png_.alpha = arguments_.setup.background == "transparent";
+  files_read_ = scene_->files;
+  files_read_.insert(files_read_.end(), cameras.files.begin(), cameras.files.end());
+  if (!paths_.png.empty()) {
+    view_.emplace(png_.view, png_.display);
+    stats_.view = view_->description();
+    for (const std::string& file : view_->files()) files_read_.push_back(file_stamp(file));
+    files_.add_inputs("a file of the colour view", files_read_);
   }
-  const std::string fingerprint = render_fingerprint(arguments.settings, options.settings, frame, files_read);
-  if (arguments.resume && is_whole_render(paths, fingerprint)) {
-    report_skipped(progress, paths, stats.frame, "already rendered");
-    return true;
-  }
-  if (unwritable) std::rethrow_exception(unwritable);
-  const std::optional<Picture> reference = reference_load(paths.reference, options);
-  if (reference) {
-    options.reference_error = [&](const FilmView& film) {
-      const ImageErrors errors = errors_against(*reference, film, film_layer(film, Aov::kBeauty));
+  fingerprint_ = render_fingerprint(arguments_.settings, options_.settings, frame_, files_read_);
+}
+
+/// Settings for the statistics, and the reference that errors are told by.
+void FrameRun::describe()
+{
+  reference_ = reference_load(paths_.reference, options_);
+  if (reference_) {
+    options_.reference_error = [this](const FilmView& film) {
+      const ImageErrors errors = errors_against(*reference_, film, film_layer(film, Aov::kBeauty));
       return ImageError{errors.rmse, errors.relmse};
     };
   }
-  for (const SettingValue& setting : setting_values(options.settings)) {
-    stats.settings.emplace_back(setting.info->name, setting_text(setting.value));
+  for (const SettingValue& setting : setting_values(options_.settings)) {
+    stats_.settings.emplace_back(setting.info->name, setting_text(setting.value));
   }
-
   // Of the page about the frame, so that `relief report` makes the same.
-  const std::uint32_t report_mask = arguments.report.empty() ? 0 : report_aovs(scene);
-  FrameFiles frame_files(files, paths, command, {compression_of(arguments), arguments.float_color, color_space_of(arguments)},
-                         arguments.aov_mask | report_mask, exr_camera_attributes(options.camera), progress);
-  std::optional<SavedRender> saved;
-  if (arguments.resume) saved = state_of(paths, fingerprint, stats, progress);
-  if (saved) {
-    options.saved = &*saved;
-    report_resumed(progress, paths, stats.frame, *saved);
-  }
-  options.checkpoint_seconds = checkpoint_seconds(arguments, paths);
-  if (options.checkpoint_seconds > 0) {
-    options.checkpoint = [&](const RenderState& state, std::span<const float> sums, const FilmView& film) {
-      frame_files.write_checkpoint(state, sums, film, stats, fingerprint);
+  const std::uint32_t report_mask = arguments_.report.empty() ? 0 : report_aovs(*scene_);
+  frame_files_.emplace(files_, paths_, command_,
+                       ExrOptions{compression_of(arguments_), arguments_.float_color, color_space_of(arguments_)},
+                       arguments_.aov_mask | report_mask, exr_camera_attributes(options_.camera), progress_);
+}
+
+void FrameRun::go_on_from_saved()
+{
+  if (arguments_.resume) saved_ = state_of(paths_, fingerprint_, stats_, progress_);
+  if (!saved_) return;
+  options_.saved = &*saved_;
+  report_resumed(progress_, paths_, stats_.frame, *saved_);
+}
+
+/// Lets the render tell how far it is.
+void FrameRun::listen()
+{
+  options_.checkpoint_seconds = checkpoint_seconds(arguments_, paths_);
+  if (options_.checkpoint_seconds > 0) {
+    options_.checkpoint = [this](const RenderState& state, std::span<const float> sums, const FilmView& film) {
+      frame_files_->write_checkpoint(state, sums, film, stats_, fingerprint_);
     };
   }
-  const std::string title = frame ? fmt::format("frame {} ", *frame) : std::string();
-  if (!paths.preview.empty()) {
-    options.preview = [&](const FilmView& film, double samples) {
-      frame_files.write_preview(stats.frame, film, samples);
+  if (!paths_.preview.empty()) {
+    options_.preview = [this](const FilmView& film, double samples) {
+      frame_files_->write_preview(stats_.frame, film, samples);
     };
   }
-  options.prepared = [&] {
-    saving.emplace();
-    progress.phase(paths.exr.string(), "built", stats.build_seconds);
+  options_.prepared = [this] {
+    saving_.emplace();
+    progress_.phase(name(), "built", stats_.build_seconds);
   };
-  options.traced_photons = [&](double seconds) {
-    progress.phase(paths.exr.string(), "photons of the first sample traced", seconds);
+  options_.traced_photons = [this](double seconds) {
+    progress_.phase(name(), "photons of the first sample traced", seconds);
   };
-  KeptContext of_frame;
-  KeptContext& context = kept != nullptr ? kept->scene.context() : of_frame;
-  const RenderedImage image =
-      render(scene, options, interrupt_flag(), progress.callback(stats.frame, paths.exr.string(), title), context, stats);
-  stats.peak_memory_bytes = peak_memory_bytes();
-  if (stats.first_nonfinite) {
-    stats.warnings.push_back("samples that were not finite count as black; the first one's rays: " +
-                             replay_command(arguments.scene, arguments.path_settings, frame, *stats.first_nonfinite));
+}
+
+/// Renders, and forgets what the pictures are made from, unless that is kept: they are written in its memory.
+RenderedImage FrameRun::sample()
+{
+  const std::string title = frame_ ? fmt::format("frame {} ", *frame_) : std::string();
+  KeptContext& context = kept_ != nullptr ? kept_->scene.context() : of_frame_;
+  RenderedImage image =
+      render(*scene_, options_, interrupt_flag(), progress_.callback(stats_.frame, name(), title), context, stats_);
+  stats_.peak_memory_bytes = peak_memory_bytes();
+  if (stats_.first_nonfinite) {
+    stats_.warnings.push_back(
+        "samples that were not finite count as black; the first one's rays: " +
+        replay_command(arguments_.scene, arguments_.path_settings, frame_, *stats_.first_nonfinite));
   }
-  Attributes more_attributes = exr_cryptomatte_attributes(scene, options.aov_mask);
-  if (arguments.part.count > 1) {
-    more_attributes["relief:sample_ranges"] =
-        sample_range_text({options.first_sample, options.first_sample + options.num_samples,
-                           static_cast<std::uint32_t>(options.settings.samples)});
+  more_attributes_ = exr_cryptomatte_attributes(*scene_, options_.aov_mask);
+  if (arguments_.part.count > 1) {
+    more_attributes_["relief:sample_ranges"] =
+        sample_range_text({options_.first_sample, options_.first_sample + options_.num_samples,
+                           static_cast<std::uint32_t>(options_.settings.samples)});
   }
   // Whoever sends requests shows the picture to somebody who works on the scene, and may be in the dark on purpose.
-  if (stats.samples_per_pixel >= 1 && !progress.is_of_request()) {
-    if (std::string text = emptiness_warning(scene, image.view); !text.empty()) {
-      stats.warnings.push_back(arguments.scene + ": " + text);
+  if (stats_.samples_per_pixel >= 1 && !progress_.is_of_request()) {
+    if (std::string text = emptiness_warning(*scene_, image.view); !text.empty()) {
+      stats_.warnings.push_back(arguments_.scene + ": " + text);
     }
   }
-  of_frame.reset();
-  owner.reset();  // Pictures are written in the memory of what they were made from, unless that is kept.
-  bool is_whole = stats.stop_reason != "interrupted";
-  if (stats.samples_per_pixel <= 0) {
-    if (is_whole) throw OutputError(paths.exr, "not written: the time limit came before the first sample");
+  of_frame_.reset();
+  scene_.reset();
+  return image;
+}
+
+void FrameRun::denoise(const RenderedImage& image)
+{
+  if (arguments_.denoiser == Denoiser::kNone) return;
+  try {
+    denoised_ = denoise_picture(arguments_.denoiser, all_channels(image.view), name(), &interrupt_flag());
+    if (std::isnan(denoised_->result.rmse)) {
+      stats_.warnings.emplace_back("--denoise: pixels with less than two samples stay as they are");
+    }
+  } catch (const DenoiseStopped&) {
+    stats_.stop_reason = "interrupted";
+    progress_.note(fmt::format("{}: interrupted, not denoised", name()));
+  } catch (...) {
+    // What was rendered is saved all the same.
+    denoise_failure_ = std::current_exception();
+  }
+}
+
+/// @param is_complete  nothing is to be done again
+void FrameRun::write(const RenderedImage& image, bool is_complete)
+{
+  progress_.warnings(stats_.warnings);
+  const auto page = [&](const Attributes& attributes) {
+    return report_html(paths_, image.view, stats_, attributes, reference_);
+  };
+  frame_files_->write(image, denoised_ ? &*denoised_ : nullptr, stats_, more_attributes_, png_, page, fingerprint_,
+                      is_complete);
+  if (denoise_failure_) {
+    progress_.note(fmt::format("{}: saved, but not denoised", name()));
+    std::rethrow_exception(denoise_failure_);
+  }
+  std::optional<ImageErrors> errors, denoised_errors;
+  if (reference_) errors = errors_against(*reference_, image.view, film_layer(image.view, Aov::kBeauty));
+  if (reference_ && denoised_) {
+    denoised_errors = errors_against(*reference_, image.view, denoised_->beauty(image.view.height));
+  }
+  report_frame(progress_, paths_, stats_, denoised_, errors, denoised_errors);
+  if (view_) hint_at_clipping(progress_, paths_.png, image.view, *view_, png_.exposure);
+  if (arguments_.strict) refuse_warnings(arguments_.scene, stats_.warnings);
+}
+
+bool FrameRun::run()
+{
+  if (!claim()) return true;
+  farewell_.emplace([this] { note_unwritten(); });
+  load();
+  choose_options();
+  if (arguments_.resume && is_whole_render(paths_, fingerprint_)) {
+    report_skipped(progress_, paths_, stats_.frame, "already rendered");
+    return true;
+  }
+  if (unwritable_) std::rethrow_exception(unwritable_);
+  describe();
+  go_on_from_saved();
+  listen();
+  const RenderedImage image = sample();
+  const auto is_whole = [this] { return stats_.stop_reason != "interrupted"; };
+  if (stats_.samples_per_pixel <= 0) {
+    if (is_whole()) throw OutputError(paths_.exr, "not written: the time limit came before the first sample");
     note_unwritten();
     return false;
   }
   // Textures may be read until here.
-  const std::vector<std::string> changed = files_changed(files_read);
+  const std::vector<std::string> changed = files_changed(files_read_);
   for (const std::string& file : changed) {
-    stats.warnings.push_back(file + ": changed after the render had begun: the picture may show either state");
+    stats_.warnings.push_back(file + ": changed after the render had begun: the picture may show either state");
   }
-  std::optional<DenoisedPicture> denoised;
-  std::exception_ptr denoise_failure;
-  if (arguments.denoiser != Denoiser::kNone) {
-    try {
-      denoised =
-          denoise_picture(arguments.denoiser, all_channels(image.view), paths.exr.string(), &interrupt_flag());
-      if (std::isnan(denoised->result.rmse)) {
-        stats.warnings.emplace_back("--denoise: pixels with less than two samples stay as they are");
-      }
-    } catch (const DenoiseStopped&) {
-      is_whole = false;
-      stats.stop_reason = "interrupted";
-      progress.note(fmt::format("{}: interrupted, not denoised", paths.exr.string()));
-    } catch (...) {
-      // What was rendered is saved all the same.
-      denoise_failure = std::current_exception();
-    }
-  }
-  const bool is_complete = is_whole && changed.empty() && !denoise_failure;
-  progress.warnings(stats.warnings);
-  const auto page = [&](const Attributes& attributes) {
-    return report_html(paths, image.view, stats, attributes, reference);
-  };
-  frame_files.write(image, denoised ? &*denoised : nullptr, stats, more_attributes, png, page, fingerprint,
-                    is_complete);
-  if (denoise_failure) {
-    progress.note(fmt::format("{}: saved, but not denoised", paths.exr.string()));
-    std::rethrow_exception(denoise_failure);
-  }
-  std::optional<ImageErrors> errors, denoised_errors;
-  if (reference) errors = errors_against(*reference, image.view, film_layer(image.view, Aov::kBeauty));
-  if (reference && denoised) {
-    denoised_errors = errors_against(*reference, image.view, denoised->beauty(image.view.height));
-  }
-  report_frame(progress, paths, stats, denoised, errors, denoised_errors);
-  if (view) hint_at_clipping(progress, paths.png, image.view, *view, png.exposure);
-  if (arguments.strict) refuse_warnings(arguments.scene, stats.warnings);
-  return is_whole;
+  denoise(image);
+  write(image, is_whole() && changed.empty() && !denoise_failure_);
+  return is_whole();
 }
 
 /// Frames in the order in which they are rendered; nothing stands for the rest pose.
@@ -615,7 +702,7 @@ int render_all(const RenderArguments& arguments, const std::string& command, Ren
     const std::optional<int> frame = frames[i];
     bool is_whole = false;
     try {
-      arena.execute([&] { is_whole = render_frame(arguments, command, frame, files, kept, progress); });
+      arena.execute([&] { is_whole = FrameRun(arguments, command, frame, files, kept, progress).run(); });
     } catch (const CLI::Error&) {
       throw;  // Wrong usage is wrong for every frame.
     } catch (const std::exception& error) {

@@ -64,6 +64,9 @@ FilmWindow render_window(const RenderOptions& options);
 /// The table for a picture's filter; of a box nothing is asked.
 void pixel_filter_table_make(PixelFilter filter, FilterTable& table);
 
+/// How a render's context is made.
+ContextOptions render_context_options(const RenderOptions& options);
+
 /// What a render needs of its scene, which must outlive it.
 /// @error std::runtime_error out of memory and the like
 SceneContext render_context(const Scene& scene, const RenderOptions& options);
