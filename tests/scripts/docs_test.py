@@ -341,6 +341,21 @@ class Docs(unittest.TestCase):
                 wrong.append(f"docs/architecture.md:{number}: {span} without its folder")
         self.assert_none(wrong)
 
+    def test_hubs_are_named(self):
+        """docs/architecture.md names the headers that many files include."""
+        most = 10
+        text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+        users = {}
+        for folder in "kernel displacement scene integrator denoise exporters cli".split():
+            for path in (ROOT / folder).rglob("*"):
+                if path.suffix not in {".h", ".cpp"}:
+                    continue
+                for name in re.findall(r'^#include "([^"]+)"', path.read_text(encoding="utf-8"), re.MULTILINE):
+                    users.setdefault(name, set()).add(path)
+        self.assertGreater(len(users), most)
+        self.assert_none([f"{name}: included by {len(by)} files" for name, by in sorted(users.items())
+                          if len(by) >= most and f"`{name}`" not in text])
+
     def test_settings_are_documented_as_they_are_declared(self):
         """The table of RELIEF_render has the declared settings in their order, with default and range, and no others."""
         declared_file = ROOT / "blender_addon" / "relief" / "declared.json"
