@@ -261,10 +261,11 @@ def _hidden_stage(kind, ray, **settings):
 
 def test_lamps_that_some_rays_do_not_see():
     """What is behind glass, or mirrored, or lit diffusely may be without a lamp that lights everything else."""
-    for ray in ("diffuse", "glossy", "transmission"):
-        assert_agrees(_hidden_stage("AREA", ray, energy=100, size=1.0), samples=512)
-        assert_agrees(_hidden_stage("POINT", ray, energy=100, shadow_soft_size=0.3), samples=512)
-        assert_agrees(_hidden_stage("SUN", ray, energy=3, angle=0.2), samples=512)
+    # Of 96 samples a lamp that is not hidden from the first two fails by a chance of 1e-7 at most. Of what is transmitted there is less.
+    for ray, area, sun in (("diffuse", 96, 384), ("glossy", 96, 96), ("transmission", 512, 512)):
+        assert_agrees(_hidden_stage("AREA", ray, energy=100, size=1.0), samples=area)
+        assert_agrees(_hidden_stage("POINT", ray, energy=100, shadow_soft_size=0.3), samples=96)
+        assert_agrees(_hidden_stage("SUN", ray, energy=3, angle=0.2), samples=sun)
 
 
 def test_a_lamp_behind_glass_that_transmission_rays_do_not_see():
