@@ -779,6 +779,18 @@ void DisplacementSet::dice(PreparedMesh& displaced,
     return;
   }
   DisplacedGeometry& geometry = displaced.geometry;
+  // However it is diced, a mesh has the triangles that it has. Of one with millions counting the others takes longer than tracing
+  // it for a small picture.
+  const double seconds = method_seconds(*displacement_method(geometry.method).cost, 0, num_rays);
+  const double diced_seconds = method_seconds(kDicingCost, use.mesh.num_triangles, num_rays);
+  if (diced_seconds >= seconds && !was_diced) {
+    if (is_diced != nullptr) *is_diced = false;
+    char text[96];
+    std::snprintf(text, sizeof text, "%.2g s by %s against %.2g s or more by tessellate", seconds,
+                  displacement_method_label(geometry.method).data(), diced_seconds);
+    reasons_.push_back("mesh '" + displaced.name + "': " + text);
+    return;
+  }
   const HeightFields::Map& map = map_of(use);
   std::vector<const HeightFieldView*> levels;
   std::vector<int> new_levels;

@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
+#include <map>
 #include <utility>
+
+#include <tbb/parallel_for.h>
 
 #include "kernel/sample/sobol.h"
 
@@ -11,22 +15,83 @@ namespace relief {
 
 namespace {
 
+/// Indices in groups by their hashes, rising in each.
+class HashGroups {
+ public:
+  static constexpr std::size_t kGroups = 64;
+
+  /// @param hash  64 bits of an index
+  template <typename Hash>
+  HashGroups(std::size_t count, const Hash& hash) : indices_(count), hashes_(count)
+  {
+    constexpr std::size_t kBlock = 1 << 14;
+    const auto group_of = [](std::uint64_t h) { return h >> 58; };
+    const std::size_t num_blocks = (count + kBlock - 1) / kBlock;
+    std::vector<std::array<std::uint32_t, kGroups>> next(num_blocks);
+    const auto for_each = [&](const auto& body) {
+      tbb::parallel_for(std::size_t{0}, num_blocks, [&](std::size_t block) {
+        const std::size_t end = std::min((block + 1) * kBlock, count);
+        for (std::size_t index = block * kBlock; index < end; ++index) body(next[block], index, hash(index));
+      });
+    };
+    for_each([&](auto& sizes, std::size_t, std::uint64_t h) { ++sizes[group_of(h)]; });
+    std::uint32_t sum = 0;
+    for (std::size_t group = 0; group < kGroups; ++group) {
+      starts_[group] = sum;
+      for (std::array<std::uint32_t, kGroups>& of_block : next) sum += std::exchange(of_block[group], sum);
+    }
+    starts_[kGroups] = sum;
+    for_each([&](auto& places, std::size_t index, std::uint64_t h) {
+      const std::uint32_t place = places[group_of(h)]++;
+      indices_[place] = static_cast<std::uint32_t>(index);
+      hashes_[place] = h;
+    });
+  }
+
+  /// @param first_of  receives for every index of a group the first one with its hash
+  void find_first(std::size_t group, std::vector<std::uint32_t>* first_of) const
+  {
+    constexpr std::uint32_t kNone = ~0u;
+    const std::size_t mask = std::bit_ceil(2 * std::size_t{starts_[group + 1] - starts_[group]} + 1) - 1;
+    std::vector<std::uint32_t> slots(mask + 1, kNone);
+    for (std::uint32_t place = starts_[group]; place < starts_[group + 1]; ++place) {
+      std::size_t slot = hashes_[place] & mask;
+      while (slots[slot] != kNone && hashes_[slots[slot]] != hashes_[place]) slot = (slot + 1) & mask;
+      if (slots[slot] == kNone) slots[slot] = place;
+      (*first_of)[indices_[place]] = indices_[slots[slot]];
+    }
+  }
+
+ private:
+  std::vector<std::uint32_t> indices_;
+  std::vector<std::uint64_t> hashes_;
+  std::array<std::uint32_t, kGroups + 1> starts_{};
+};
+
 /// @param key   a function of an index; equal keys are one
 /// @param hash  of a key
 /// @return      for every index the first one with the same key
+/// @cost        parallel; 16 bytes an index besides while it works
 template <typename Key, typename Hash>
 std::vector<std::uint32_t> first_equals(std::size_t count, const Key& key, const Hash& hash)
 {
-  constexpr std::uint32_t kNone = ~0u;
-  const std::size_t num_slots = std::bit_ceil(2 * count + 1);
-  std::vector<std::uint32_t> slots(num_slots, kNone), first(count);
-  for (std::uint32_t index = 0; index < count; ++index) {
-    const auto wanted = key(index);
-    std::size_t slot = hash(wanted) & (num_slots - 1);
-    while (slots[slot] != kNone && key(slots[slot]) != wanted) slot = (slot + 1) & (num_slots - 1);
-    if (slots[slot] == kNone) slots[slot] = index;
-    first[index] = slots[slot];
+  std::vector<std::uint32_t> first(count);
+  const auto key_of = [&](std::size_t index) { return key(static_cast<std::uint32_t>(index)); };
+  {
+    const HashGroups groups(count, [&](std::size_t index) { return hash(key_of(index)); });
+    tbb::parallel_for(std::size_t{0}, HashGroups::kGroups,
+                      [&](std::size_t group) { groups.find_first(group, &first); });
   }
+  std::atomic<bool> are_equal{true};
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t index) {
+    if (first[index] != index && key_of(index) != key_of(first[index]))
+      are_equal.store(false, std::memory_order_relaxed);
+  });
+  if (are_equal) return first;
+  // Two keys have one hash, as one mesh of ten million triangles in some tens of thousands has.
+  std::map<decltype(key(0)), std::uint32_t> known;
+  for (std::uint32_t index = 0; index < count; ++index)
+    first[index] = known.try_emplace(key(index), index).first->second;
   return first;
 }
 

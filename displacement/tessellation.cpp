@@ -112,23 +112,24 @@ std::vector<std::uint32_t> corner_owners(const DisplacedMeshView& mesh,
   const std::size_t count = id.size();
   const double tolerance = seam_tolerance(mesh);
   std::vector<double> d(count);
-  for (std::uint32_t corner = 0; corner < count; ++corner) {
+  tbb::parallel_for(std::size_t{0}, count, [&](std::size_t corner) {
     double b[3] = {0, 0, 0};
     b[corner % 3] = 1;
     d[corner] = place(mesh, rule, mesh.triangles[corner / 3], b).d;
-  }
-  // Owners of one place in a chain that starts at its first corner.
+  });
+  // Owners of one place in a chain that starts at its first corner, whose height nearly all have.
+  std::vector<std::uint32_t> owner = id;
   constexpr std::uint32_t kNone = ~0u;
-  std::vector<std::uint32_t> owner(count), next(count, kNone);
+  std::vector<std::uint32_t> next;
   for (std::uint32_t corner = 0; corner < count; ++corner) {
     std::uint32_t at = id[corner];
-    owner[corner] = corner;
-    if (at == corner) continue;
+    if (at == corner || std::abs(d[at] - d[corner]) <= tolerance) continue;
+    if (next.empty()) next.assign(count, kNone);
     while (std::abs(d[at] - d[corner]) > tolerance && next[at] != kNone) at = next[at];
     if (std::abs(d[at] - d[corner]) <= tolerance) {
       owner[corner] = at;
     } else {
-      next[at] = corner;
+      next[at] = owner[corner] = corner;
     }
   }
   return owner;
@@ -166,10 +167,13 @@ TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh,
   layout.corner_owner = corner_owners(mesh, rule, id);
   layout.edge_owner = weld_edges(id);
 
-  std::vector<std::uint32_t> segments(layout.edge_owner.size(), 1);
+  std::vector<std::uint32_t> segments(layout.edge_owner.size());
+  tbb::parallel_for(std::size_t{0}, segments.size(), [&](std::size_t edge) {
+    segments[edge] = whole_segments(rule.segments(mesh.triangles[edge / 3], static_cast<int>(edge % 3)));
+  });
   for (std::uint32_t edge = 0; edge < segments.size(); ++edge) {
     std::uint32_t& largest = segments[layout.edge_owner[edge]];
-    largest = std::max(largest, whole_segments(rule.segments(mesh.triangles[edge / 3], static_cast<int>(edge % 3))));
+    largest = std::max(largest, segments[edge]);
   }
   const bool grids = kind == TessellationKind::kGrids;
   for (std::uint32_t index = 0; index < mesh.num_triangles; ++index) {

@@ -351,6 +351,31 @@ TEST(Dicing, PaysForManyInstancesAsForOne)
   EXPECT_EQ(SceneContext(scene, options).displacements.method_names(), "chord");
 }
 
+/// However it is diced, a mesh has the triangles that it has: where these do not pay, those that dicing would make are not counted,
+/// which takes longer than tracing a small picture of a mesh of millions.
+TEST(Dicing, IsNotCountedWhereTheMeshAloneDoesNotPay)
+{
+  const Scene scene = close_sphere(64, 4, 0.2);
+  DisplacementOptions options = options_of(scene, 1, 200);
+  const auto reason = [&] {
+    const SceneContext context(scene, options);
+    EXPECT_EQ(context.displacements.reasons().size(), 1u);
+    return context.displacements.reasons()[0];
+  };
+  EXPECT_EQ(reason().find("or more"), std::string::npos);
+  options.num_rays = 100;
+  EXPECT_NE(reason().find("or more"), std::string::npos) << reason();
+  EXPECT_EQ(SceneContext(scene, options).displacements.method_names(), "chord");
+  // What was diced in a picture before stays so, however little of it the next one shows.
+  options.num_rays = 1e7;
+  DisplacementOptions far = options;
+  far.camera->world_from_camera.p = {0, 0, 1000};
+  EXPECT_EQ(SceneContext(scene, far).displacements.method_names(), "chord");
+  options.choices = far.choices = std::make_shared<DicingChoices>();
+  for (const DisplacementOptions& picture : {options, far})
+    EXPECT_EQ(SceneContext(scene, picture).displacements.method_names(), "tessellate");
+}
+
 /// What takes more than half of the allowance is not diced in the first picture of a sequence; in later ones it stays what it
 /// was, with all of the allowance.
 TEST(Dicing, IsDecidedOnceForASequence)
