@@ -75,6 +75,22 @@ def test_object_holdout():
     assert_agrees(scene, samples=64)
 
 
+def test_holdouts_of_materials():
+    """Alpha was 1 in the holes that a Holdout node makes, unless the film was transparent."""
+    for share in (1.0, 0.4):
+        scene, collection = _stage()
+        material, tree, node = new_material("hole", "ShaderNodeMixShader", Fac=share)
+        held, shown = tree.nodes.new("ShaderNodeHoldout"), tree.nodes.new("ShaderNodeBsdfDiffuse")
+        tree.links.new(shown.outputs[0], node.inputs[1])
+        tree.links.new(held.outputs[0], node.inputs[2])
+        collection.collection.objects[0].data.materials[0] = material
+        assert_agrees(scene, samples=64)
+        for is_transparent in (False, True):
+            scene.render.film_transparent = is_transparent
+            relief, cycles = _alpha(scene, "RELIEF"), _alpha(scene, "CYCLES")
+            assert abs(relief.mean() - cycles.mean()) < 0.005 < 1 - cycles.mean(), (share, is_transparent, relief.mean(), cycles.mean())
+
+
 def test_collection_indirect_only():
     scene, collection = _stage()
     collection.indirect_only = True

@@ -56,10 +56,19 @@ class MaterialExporter:
         return self._exported[key]
 
 
+def _has_closure(material, kind):
+    closures = material.get("extensions", {}).get("RELIEF_surface", {}).get("closures", ())
+    return any(closure["type"] == kind for closure in closures)
+
+
 def emits(material):
     """Whether a glTF material gives light."""
-    closures = material.get("extensions", {}).get("RELIEF_surface", {}).get("closures", ())
-    return any(material.get("emissiveFactor", ())) or any(closure["type"] == "emission" for closure in closures)
+    return any(material.get("emissiveFactor", ())) or _has_closure(material, "emission")
+
+
+def holds_out(material):
+    """Whether a glTF material is a hole in the picture, or in parts."""
+    return _has_closure(material, "holdout")
 
 
 class _Indices:

@@ -15,7 +15,7 @@ from .axes import GLTF_FROM_BLENDER
 from .gltf import GltfWriter, matrix_property
 from .image import ImageExporter
 from .light import Place, export_light
-from .material import MaterialExporter, emits
+from .material import MaterialExporter, emits, holds_out
 from .mesh import FARTHEST, add_mesh, store_mesh, store_strands
 from .motion import numbered
 from .objects import collect, decompose, usable_places
@@ -88,7 +88,8 @@ def export_scene(depsgraph, view, folder, name, report, motion=None):
         motion.write(writer, index_of)
     path = writer.write(name)
     seconds = time.perf_counter() - begin
-    return Exported(path, writer.used_files, seconds, writer.bytes_written, exporter.has_holdouts)
+    has_holdouts = exporter.has_holdouts or any(map(holds_out, writer.json.get("materials", ())))
+    return Exported(path, writer.used_files, seconds, writer.bytes_written, has_holdouts)
 
 
 def write_view(view, folder, name):
@@ -181,7 +182,7 @@ class SceneExporter:
     @param  motion  Motion while the shutter is open; None: nothing takes time
 
     writer        GltfWriter
-    has_holdouts  something is a hole in the picture
+    has_holdouts  an object is a hole in the picture
     nodes         of the frame: glTF nodes in Blender's world, their children nodes instead of indices, the camera's first
     """
 
