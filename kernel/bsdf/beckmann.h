@@ -25,7 +25,7 @@ RELIEF_KERNEL float beckmann_D(AnisotropicAlpha a, Vec3f h)
 /// Tangent of w over what the roughness stretches, > 0 unless w is the normal.
 RELIEF_KERNEL float beckmann_alpha_tan(AnisotropicAlpha a, Vec3f w)
 {
-  return __builtin_sqrtf(sqr(a.x * w.x) + sqr(a.y * w.y)) / w.z;
+  return __builtin_sqrtf(sqr(a.x * w.x) + sqr(a.y * w.y)) / __builtin_fabsf(w.z);
 }
 
 /// Smith's Λ by the rational fit that Cycles uses; 1 + Λ is within 0.32 % of the truth.
@@ -49,19 +49,19 @@ RELIEF_KERNEL float beckmann_exact_one_plus_lambda(float alpha_tan)
 }
 
 /// f with reflectance 1.
-/// @param wo, wi  unit; wo.z > 0
+/// @param wo, wi  unit; wo.z > 0. Below the horizon a sampled wi is masked as above it
 /// @param pdf     solid angle of wi under beckmann_sample: by the exact masking, which f's fit misses by up to 0.32 %
 RELIEF_KERNEL float beckmann_eval(const Beckmann& lobe, Vec3f wo, Vec3f wi, float* pdf)
 {
   *pdf = 0.0f;
-  if (!(wi.z > 0.0f)) return 0.0f;
+  if (!(wo.z + wi.z > 0.0f)) return 0.0f;
   const float D = beckmann_D(lobe.alpha, wo + wi);
   const float tan_o = beckmann_alpha_tan(lobe.alpha, wo);
   const float lambda_o = beckmann_lambda(tan_o), lambda_i = beckmann_lambda(beckmann_alpha_tan(lobe.alpha, wi));
   const float masking =
       lobe.masking == SmithMasking::kSeparable ? (1.0f + lambda_o) * (1.0f + lambda_i) : 1.0f + lambda_o + lambda_i;
   *pdf = 0.25f * D / (wo.z * beckmann_exact_one_plus_lambda(tan_o));
-  return 0.25f * D / (wo.z * wi.z * masking);
+  return 0.25f * D / (wo.z * __builtin_fabsf(wi.z) * masking);
 }
 
 /// Inverse of the error function.

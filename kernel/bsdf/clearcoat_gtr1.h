@@ -37,18 +37,18 @@ RELIEF_KERNEL float gtr1_D(float alpha, float sine2)
 /// normals of GTR1 would have. So it is not the same light that lamps give when they are sampled and when they are met: where
 /// the lobe alone finds it (a world, other surfaces) it has GGX's shape, and between the two what multiple importance
 /// sampling makes of both.
-/// @param wo, wi  unit; wo.z > 0
+/// @param wo, wi  unit; wo.z > 0. Below the horizon a sampled wi is masked as above it
 /// @param pdf     what counts as the density of wi
 RELIEF_KERNEL float clearcoat_gtr1_eval(const ClearcoatGtr1& lobe, Vec3f wo, Vec3f wi, float* pdf)
 {
   *pdf = 0.0f;
-  if (!(wi.z > 0.0f)) return 0.0f;
   const Vec3f h = wo + wi;
+  if (!(h.z > 0.0f)) return 0.0f;
   const float D = gtr1_D(lobe.alpha, (h.x * h.x + h.y * h.y) / length_squared(h));
   constexpr float kMaskingAlpha = 0.25f;
   const float masked_o = wo.z + ggx_stretched_length(wo.z, kMaskingAlpha);
   *pdf = 0.5f * D / masked_o;
-  return D / (masked_o * (wi.z + ggx_stretched_length(wi.z, kMaskingAlpha)));
+  return D / (masked_o * (__builtin_fabsf(wi.z) + ggx_stretched_length(wi.z, kMaskingAlpha)));
 }
 
 /// @return unit; zero vector or z <= 0 is lost

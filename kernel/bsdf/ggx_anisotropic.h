@@ -68,19 +68,20 @@ RELIEF_KERNEL float ggx_anisotropic_length(AnisotropicAlpha a, Vec3f w)
 }
 
 /// f with reflectance 1.
-/// @param wo, wi  unit; wo.z > 0
+/// @param wo, wi  unit; wo.z > 0. Below the horizon a sampled wi is masked as above it
 /// @param pdf     solid angle of wi under ggx_anisotropic_sample
 RELIEF_KERNEL float ggx_anisotropic_eval(const GgxAnisotropic& lobe, Vec3f wo, Vec3f wi, float* pdf)
 {
   *pdf = 0.0f;
-  if (!(wi.z > 0.0f)) return 0.0f;
+  if (!(wo.z + wi.z > 0.0f)) return 0.0f;
+  const float cos_i = __builtin_fabsf(wi.z);
   const float D = ggx_anisotropic_D(lobe.alpha, wo + wi);
   const float o_length = ggx_anisotropic_length(lobe.alpha, wo);
   const float i_length = ggx_anisotropic_length(lobe.alpha, wi);
   *pdf = 0.5f * D / (wo.z + o_length);
   // Masking over the cosines, simplified as in ggx_reflection_eval.
-  return lobe.masking == SmithMasking::kSeparable ? D / ((wo.z + o_length) * (wi.z + i_length))
-                                                  : 0.5f * D / (wo.z * i_length + wi.z * o_length);
+  return lobe.masking == SmithMasking::kSeparable ? D / ((wo.z + o_length) * (cos_i + i_length))
+                                                  : 0.5f * D / (wo.z * i_length + cos_i * o_length);
 }
 
 /// Normal of the distribution as seen from wo.

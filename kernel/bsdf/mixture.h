@@ -78,9 +78,14 @@ RELIEF_KERNEL Mixture mixture_part(const Mixture& m, SharpLobes sharp)
 
 /// As closure_eval of a SurfaceClosure; pdf of the chosen lobes.
 /// @param sampled  the lobe that wi was sampled from; null: it was not
+/// @param through  whether that lobe sent it through the surface
 template <unsigned kFeatures, TransportMode kMode = TransportMode::kRadiance>
 RELIEF_KERNEL BsdfEval
-closure_eval(const Mixture& m, const BsdfTables& tables, Vec3f wi_local, const MixtureLobe* sampled = nullptr)
+closure_eval(const Mixture& m,
+             const BsdfTables& tables,
+             Vec3f wi_local,
+             const MixtureLobe* sampled = nullptr,
+             bool through = false)
 {
   BsdfEval e;
   const float cos_i = __builtin_fabsf(wi_local.z);
@@ -89,14 +94,14 @@ closure_eval(const Mixture& m, const BsdfTables& tables, Vec3f wi_local, const M
   const bool below_Ns = wi_local.z < 0.0f, below_Ng = dot(wi, m.Ng) < 0.0f;
   mixture_visit(m, [&](const MixtureLobe& lobe) {
     const Vec3f wi_lobe = to_local(lobe.frame, wi);
-    const bool below = wi_lobe.z < 0.0f;
+    const bool below = &lobe == sampled ? through : wi_lobe.z < 0.0f;
     const bool shines = mixture_lobe_reaches(lobe, below, below_Ns, below_Ng, &lobe == sampled);
     // Of microfacets Cycles counts the density of what it would not sample, too: a lamp that they see so is not the brighter
     // for it, nor noisier.
     const bool is_found = mixture_lobe_reaches(lobe, below, below_Ns, below_Ng, true) ||
                           (shines && mixture_lobe_is_microfacet(lobe.kind));
     if (!shines && !is_found) return;
-    const BsdfEval one = mixture_lobe_eval<kMode>(lobe, tables, wi_lobe);
+    const BsdfEval one = mixture_lobe_eval<kMode>(lobe, tables, wi_lobe, below, &lobe == sampled);
     if (shines) e.f += lobe.weight * one.f;
     if (is_found) e.pdf += lobe.probability * one.pdf;
   });
@@ -136,12 +141,14 @@ RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tabl
     return s;
   }
   const LobeSample d = mixture_lobe_sample<kMode>(*chosen, u_branch, u);
-  const bool is_lost = (d.wi.z < 0.0f) != ((d.bits & kLobeTransmit) != 0) && !mixture_lobe_is_strand(chosen->kind);
+  const bool through = (d.bits & kLobeTransmit) != 0;
+  const bool is_lost = (d.wi.z < 0.0f) != through && !mixture_lobe_is_strand(chosen->kind) &&
+                       (through || !chosen->mirrors_below);
   if (d.bits == 0 || is_lost) return {};
   BsdfSample s;
   const Vec3f wi = from_local(chosen->frame, d.wi);
   s.wi = to_local(m.frame, wi);
-  if (!mixture_lobe_reaches(*chosen, d.wi.z < 0.0f, s.wi.z < 0.0f, dot(wi, m.Ng) < 0.0f, true) ||
+  if (!mixture_lobe_reaches(*chosen, through, s.wi.z < 0.0f, dot(wi, m.Ng) < 0.0f, true) ||
       !(__builtin_fabsf(s.wi.z) > kMinCosine)) {
     return {};
   }
@@ -153,7 +160,7 @@ RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tabl
     s.pdf = chosen->probability * m.scale * d.probability;
     return s;
   }
-  const BsdfEval e = closure_eval<kFeatures, kMode>(m, tables, s.wi, chosen);
+  const BsdfEval e = closure_eval<kFeatures, kMode>(m, tables, s.wi, chosen, through);
   s.f = e.f;
   s.pdf = e.pdf;
   return s;

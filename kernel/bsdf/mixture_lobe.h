@@ -113,6 +113,7 @@ struct MixtureLobe {
   bool is_bent = false;      ///< its normal is not the surface's
   bool is_4 = false;         ///< of 4.3's maths or later ones: which sides it reaches, see mixture_lobe_reaches
   bool is_5 = false;         ///< of 5.2's maths: what its normal sees and the surface does not fades as it does there
+  bool mirrors_below = false;  ///< its microfacets mirror to below its normal as well, as far as the true surface lets them
   float probability = 0;     ///< not normalised
   float roughness = kInfinity;  ///< perceptual; infinite: never sharp
   Vec3f weight{};               ///< factor on f
@@ -159,8 +160,9 @@ RELIEF_KERNEL bool mixture_lobe_is_microfacet(MixtureLobeKind kind)
 RELIEF_KERNEL bool mixture_lobe_is_strand(MixtureLobeKind kind) { return kind >= MixtureLobeKind::kHair; }
 
 /// Whether a lobe sends light to a direction that its own normal has on one side and the surface on another: as the version
-/// of Cycles has it whose maths it is. What is sampled leaves by the true surface, so that no mirror sends it inside.
-/// @param below     wi is below the lobe's normal, so that it is meant to go through the surface
+/// of Cycles has it whose maths it is. What is sampled leaves by the true surface, so that no mirror sends it inside; but for
+/// Ashikhmin and Shirley's lobe before 5.0.
+/// @param below     wi is meant to go through the surface: it is below the lobe's normal, unless microfacets mirrored it there
 /// @param below_Ns  the same of the surface's shading normal
 /// @param below_Ng  of its geometric normal
 /// @param sampled   wi was sampled from this lobe; or else it is asked for, as the direction of a lamp is
@@ -171,6 +173,7 @@ RELIEF_KERNEL bool mixture_lobe_reaches(const MixtureLobe& lobe, bool below, boo
     return lobe.shape.hair.transmits ? below_Ns : !(below || below_Ns);
   }
   const bool is_microfacet = mixture_lobe_is_microfacet(lobe.kind);
+  if (sampled && lobe.kind == MixtureLobeKind::kAshikhminShirley && !lobe.is_5) return true;
   if (!lobe.is_4 && !lobe.is_5) {
     const bool refracts = lobe.kind == MixtureLobeKind::kRefraction || lobe.kind == MixtureLobeKind::kGlass;
     return !sampled || (refracts && below) || below == below_Ng;
@@ -231,14 +234,15 @@ RELIEF_KERNEL float bump_shadowing_ggx(Vec3f N, Vec3f wi)
   return 2.0f / (1.0f + __builtin_sqrtf(1.0f + alpha_squared * tan_squared(cos_i)));
 }
 
-/// @return  f, and pdf as if the lobe were chosen
+/// @param through  whether wi is refracted
+/// @return         f, and pdf as if the lobe were chosen
 template <TransportMode kMode>
-RELIEF_KERNEL BsdfEval mixture_glass_eval(const MixtureLobe& lobe, Vec3f wi)
+RELIEF_KERNEL BsdfEval mixture_glass_eval(const MixtureLobe& lobe, Vec3f wi, bool through)
 {
   const MixtureGlass& glass = lobe.shape.glass;
   const float eta = lobe.fresnel.eta;
   float pdf = 0.0f;
-  if (wi.z > 0.0f) {
+  if (!through) {
     const float cos_d = half_angle_cosine(lobe.wo, wi);
     const AnisotropicAlpha alpha{glass.alpha, glass.alpha};
     const float f = glass.is_beckmann ? beckmann_eval({alpha, SmithMasking::kCorrelated}, lobe.wo, wi, &pdf)
@@ -250,8 +254,8 @@ RELIEF_KERNEL BsdfEval mixture_glass_eval(const MixtureLobe& lobe, Vec3f wi)
   const float f = microfacet_refraction_eval(refraction, lobe.wo, wi, &pdf);
   const Vec3f h = lobe.wo + eta * wi;
   const float cos_o = min(1.0f, __builtin_fabsf(dot(lobe.wo, h)) / length(h));
-  const Vec3f through = splat3(1.0f) - mixture_fresnel(lobe.fresnel, cos_o);
-  return {glass.transmission_tint * max(through, Vec3f{}) * (f * transmission_scale<kMode>(eta)),
+  const Vec3f transmittance = splat3(1.0f) - mixture_fresnel(lobe.fresnel, cos_o);
+  return {glass.transmission_tint * max(transmittance, Vec3f{}) * (f * transmission_scale<kMode>(eta)),
           (1.0f - fresnel_dielectric_at(cos_o, eta)) * pdf};
 }
 
@@ -278,14 +282,17 @@ RELIEF_KERNEL BsdfEval mixture_glass_eval(const MixtureLobe& lobe, Vec3f wi)
 
 /// Evaluates a lobe. Not inlined, as are all that know every kind of lobe: kernels call them from many places, and with a copy
 /// in each were half a megabyte long and slower.
-/// @param wi  the lobe's frame
-/// @return    f times |cos| to the lobe's own normal, before its weight; pdf as if the lobe were chosen
+/// @param wi       the lobe's frame
+/// @param through  whether wi goes through the surface: as below in mixture_lobe_reaches
+/// @param sampled  wi was sampled from this lobe
+/// @return         f times |cos| to the lobe's own normal, before its weight; pdf as if the lobe were chosen
 template <TransportMode kMode>
-[[gnu::noinline]] RELIEF_KERNEL BsdfEval mixture_lobe_eval(const MixtureLobe& lobe, const BsdfTables& tables, Vec3f wi)
+[[gnu::noinline]] RELIEF_KERNEL BsdfEval
+mixture_lobe_eval(const MixtureLobe& lobe, const BsdfTables& tables, Vec3f wi, bool through, bool sampled)
 {
   using K = MixtureLobeKind;
   const bool transmits = lobe.kind == K::kTranslucent || lobe.kind == K::kRefraction;
-  const bool is_other_side = lobe.kind < K::kGlass && (wi.z < 0.0f) != transmits;
+  const bool is_other_side = lobe.kind < K::kGlass && through != transmits;
   if (lobe.is_delta || is_other_side || !(__builtin_fabsf(wi.z) > kMinCosine)) return {};
   const Vec3f wo = lobe.wo;
   BsdfEval e;
@@ -348,7 +355,7 @@ template <TransportMode kMode>
       break;
     case K::kGlass:
       is_diffuse = false;
-      e = mixture_glass_eval<kMode>(lobe, wi);
+      e = mixture_glass_eval<kMode>(lobe, wi, through);
       break;
     case K::kSubsurface:
       break;
@@ -358,7 +365,8 @@ template <TransportMode kMode>
   }
   if (is_microfacet) {
     e.f *= mixture_fresnel(lobe.fresnel, half_angle_cosine(wo, wi));
-  } else if (is_diffuse && lobe.is_bent) {
+  } else if (is_diffuse && lobe.is_bent && !(transmits && sampled)) {
+    // In Cycles what a lobe sends through the surface itself does not fade, as what it is asked for does.
     e.f *= lobe.is_5 ? bump_shadowing_ggx(lobe.surface_N, wi) : bump_shadowing(lobe.surface_N, wi);
   }
   e.f *= __builtin_fabsf(wi.z);

@@ -161,6 +161,13 @@ RELIEF_KERNEL void lobe_blur(MixtureLobe& lobe, float blur, float most_sharp)
   lobe.is_delta = lobe.is_delta && blur < kDeltaAlpha;
 }
 
+/// Whether microfacets mirror to below their own normal, too, where it is bent: in Cycles before 5.0, but for what it follows
+/// from facet to facet. Lamps are not asked for there.
+RELIEF_KERNEL bool microfacets_mirror_below(const SurfaceClosureSpec& spec)
+{
+  return !spec.is_5 && (spec.is_4 || spec.distribution != ClosureDistribution::kMultiscatterGgx);
+}
+
 /// Makes a lobe one of reflection by microfacets.
 /// @param roughness  perceptual: whether the lobe is sharp, and how wide ray cones become
 /// @param alpha      of both directions, bounded
@@ -173,6 +180,7 @@ RELIEF_KERNEL void lobe_set_microfacets(MixtureLobe& lobe,
   lobe.roughness = spec.distribution == ClosureDistribution::kSharp ? 0.0f : clamp(roughness, 0.0f, 1.0f);
   lobe.stays_sharp = spec.distribution == ClosureDistribution::kSharp;
   lobe.is_delta = lobe.stays_sharp || sqr(lobe.roughness) < kDeltaAlpha;
+  lobe.mirrors_below = microfacets_mirror_below(spec);
   switch (spec.distribution) {
     case ClosureDistribution::kBeckmann:
       lobe.kind = MixtureLobeKind::kBeckmann;
@@ -180,6 +188,7 @@ RELIEF_KERNEL void lobe_set_microfacets(MixtureLobe& lobe,
       break;
     case ClosureDistribution::kAshikhminShirley:
       lobe.kind = MixtureLobeKind::kAshikhminShirley;
+      lobe.mirrors_below = false;
       lobe.shape.ashikhmin_shirley = ashikhmin_shirley_make(alpha);
       break;
     default:
@@ -489,6 +498,7 @@ RELIEF_KERNEL void glass_add(MixtureBuild& b,
   MixtureLobe* lobe = mixture_add(b, splat3(weight), frame_from_normal(N));
   if (lobe == nullptr) return;
   lobe->kind = MixtureLobeKind::kGlass;
+  lobe->mirrors_below = microfacets_mirror_below(spec);
   lobe->roughness = spec.distribution == ClosureDistribution::kSharp ? 0.0f : closure_roughness(spec, roughness);
   const float alpha = sqr(lobe->roughness);
   lobe->fresnel = fresnel;
@@ -744,6 +754,7 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b,
     MixtureLobe* coat = reflection_add(b, splat3(weight * kGtr1Strength * in.clearcoat), frame_from_normal(coat_N));
     if (coat == nullptr) return;
     coat->kind = MixtureLobeKind::kClearcoat;
+    coat->mirrors_below = microfacets_mirror_below(spec);
     coat->roughness = closure_roughness(spec, in.clearcoat_roughness);
     const float alpha = sqr(coat->roughness);
     coat->shape.clearcoat = {max(alpha, kGtr1DeltaAlpha)};
