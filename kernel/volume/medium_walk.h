@@ -108,17 +108,23 @@ medium_walk_make(const KernelGlobals& g, const MediumState& m, Vec3f O, Vec3f D,
     else
       walk.even.emission = {};
   }
-  float depth = 0;
+  float depth = 0, first = length;
   for (float t = 0; t < length && depth < kWantedCollisions;) {
     const RateStretch at = medium_walk_rate(walk, t);
     const float end = min(at.end, length);
     if (at.rate > 0.0f) {
+      first = min(first, t);
       depth += at.rate * (end - t);
       walk.reach = end < kInfinity ? end : t + kWantedCollisions / at.rate;
     }
     t = end;
   }
-  if (depth > 0.0f && depth < kWantedCollisions) walk.factor = kWantedCollisions / depth;
+  if (depth < kWantedCollisions) {
+    // All of the way is known: what lies before and behind has nothing to collide with.
+    if (depth > 0.0f) walk.factor = kWantedCollisions / depth;
+    walk.length = depth > 0.0f ? walk.reach : 0.0f;
+  }
+  walk.t = first;
   walk.at = {0.0f, 0.0f};
   return walk;
 }
@@ -155,6 +161,7 @@ RELIEF_KERNEL void medium_walk_advance_near(MediumWalk& walk)
 /// @param near  the walk, seen from there; its distance is above 0
 RELIEF_KERNEL void medium_walk_approach(MediumWalk& walk, const Equiangular& near)
 {
+  if (!(walk.length > 0.0f)) return;
   walk.near = near;
   walk.near_angle = near.first;
   medium_walk_advance_near(walk);
