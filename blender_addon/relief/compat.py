@@ -105,6 +105,12 @@ SUBSURFACE_METHODS = {
     "BURLEY": "random-walk-legacy",
 }
 
+#: Before 4.5 an Emission node in a volume shines as bright whatever Mix Shaders take of it.
+MIXES_WEIGH_VOLUME_EMISSION = bpy.app.version >= (4, 5, 0)
+
+#: Before 4.0 Cycles took a Principled BSDF's emission for a node of its own, which shines in a volume as well.
+PRINCIPLED_EMITS_IN_VOLUMES = not IS_4_0
+
 #: Before 4.0 the octaves of a Noise Texture never grew.
 CLAMPS_NOISE_ROUGHNESS = not IS_4_0
 

@@ -143,7 +143,7 @@ RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tabl
   const LobeSample d = mixture_lobe_sample<kMode>(*chosen, u_branch, u);
   const bool through = (d.bits & kLobeTransmit) != 0;
   const bool is_lost = (d.wi.z < 0.0f) != through && !mixture_lobe_is_strand(chosen->kind) &&
-                       (through || !chosen->mirrors_below);
+                       (through || !chosen->mirrors_below || chosen->is_on_curve);
   if (d.bits == 0 || is_lost) return {};
   BsdfSample s;
   const Vec3f wi = from_local(chosen->frame, d.wi);

@@ -114,6 +114,7 @@ struct MixtureLobe {
   bool is_4 = false;         ///< of 4.3's maths or later ones: which sides it reaches, see mixture_lobe_reaches
   bool is_5 = false;         ///< of 5.2's maths: what its normal sees and the surface does not fades as it does there
   bool mirrors_below = false;  ///< its microfacets mirror to below its normal as well, as far as the true surface lets them
+  bool is_on_curve = false;  ///< its normal turns from edge to edge of a strand, whose geometric normal means little
   float probability = 0;     ///< not normalised
   float roughness = kInfinity;  ///< perceptual; infinite: never sharp
   Vec3f weight{};               ///< factor on f
@@ -172,6 +173,7 @@ RELIEF_KERNEL bool mixture_lobe_reaches(const MixtureLobe& lobe, bool below, boo
     if (lobe.kind == MixtureLobeKind::kFibre || sampled) return true;
     return lobe.shape.hair.transmits ? below_Ns : !(below || below_Ns);
   }
+  if (__builtin_expect(lobe.is_on_curve, 0) && (sampled || lobe.is_5)) return true;
   const bool is_microfacet = mixture_lobe_is_microfacet(lobe.kind);
   if (sampled && lobe.kind == MixtureLobeKind::kAshikhminShirley && !lobe.is_5) return true;
   if (!lobe.is_4 && !lobe.is_5) {

@@ -52,11 +52,12 @@ RELIEF_KERNEL Vec3f closure_normal_as_given(const MixtureBuild& b, Vec3f given)
   return world_from_z_up(given) / __builtin_sqrtf(squared);
 }
 
-/// A closure's normal, by which wo is reflected above the true surface.
+/// A closure's normal, by which wo is reflected above the true surface; on curves as it is given.
 /// @param given  Z up; 0: the surface's
 RELIEF_KERNEL Vec3f closure_normal(const MixtureBuild& b, Vec3f given)
 {
-  return normal_with_reflection_above(b.Ng, closure_normal_as_given(b, given), b.wo);
+  const Vec3f N = closure_normal_as_given(b, given);
+  return is_zero(b.tangent) ? normal_with_reflection_above(b.Ng, N, b.wo) : N;
 }
 
 /// The same of a closure that does not mirror: since 4.0 Cycles leaves these as they are given.
@@ -102,7 +103,8 @@ RELIEF_KERNEL MixtureLobe* mixture_add(MixtureBuild& b, Vec3f weight, const Fram
   lobe.wo = wo;
   lobe.is_4 = b.is_4;
   lobe.is_5 = b.is_5;
-  lobe.is_bent = !(dot(frame.n, b.Ns) > 1.0f - 1e-6f);
+  lobe.is_on_curve = !is_zero(b.tangent);
+  lobe.is_bent = !(dot(frame.n, b.Ns) > 1.0f - 1e-6f) && !(lobe.is_on_curve && b.is_5);
   if (lobe.is_bent) lobe.surface_N = to_local(frame, b.Ns);
   return &lobe;
 }

@@ -56,6 +56,14 @@ def test_ribbons():
     assert_agrees(scene, samples=64)
 
 
+def test_principled_ribbons():
+    """Their normals turn from edge to edge, far from the geometric one; light goes on from strand to strand."""
+    scene = _stage()
+    material, _, node = new_material("fur", "ShaderNodeBsdfPrincipled", **{"Base Color": (0.8, 0.8, 0.8, 1), "Roughness": 0.5})
+    _grow(material, shape="RIBBONS", count=6000, radius_scale=0.02)
+    assert_agrees(scene, samples=96)
+
+
 def test_children_of_a_hidden_emitter():
     scene = _stage()
     ball = _grow(

@@ -86,7 +86,7 @@ def test_what_is_no_volume_is_told_once_a_material():
         for x in (-2, 2):
             add_sphere(0.5, fog, (x, 0, 0.5))
 
-    _assert_warned_once(fill, 'material "fog"', "as volume", "left out")
+    _assert_warned_once(fill, 'material "fog"', "as volume", "nothing is there, as in Cycles")
 
 
 def _made_by_nodes(kind):

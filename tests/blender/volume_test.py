@@ -169,6 +169,33 @@ def test_mixed_shaders():
     assert_agrees(scene, samples=96)
 
 
+def test_emission_mixed_with_scattering():
+    """Before 4.5 it shines as if it were not mixed."""
+    scene = _scene()
+    material = _volume("ShaderNodeVolumeScatter", Color=(0.8, 0.8, 0.8, 1), Density=1.0)
+    tree = material.node_tree
+    scatter = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeVolumeScatter")
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    shine, mix = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeMixShader")
+    shine.inputs["Color"].default_value = (1, 0.6, 0.2, 1)
+    mix.inputs[0].default_value = 0.8
+    tree.links.new(shine.outputs[0], mix.inputs[1])
+    tree.links.new(scatter.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], output.inputs["Volume"])
+    add_sphere(1.2, material, (0, 0, 1.2))
+    assert_agrees(scene, samples=64)
+
+
+def test_principled_bsdf_as_volume():
+    """Before 4.0 its emission shines there."""
+    scene = _scene()
+    add_plane(20)
+    set_world((0.1, 0.1, 0.1))
+    surface = _volume("ShaderNodeBsdfPrincipled", **{"Emission": (0.2, 0.6, 1, 1), "Emission Strength": 0.4})
+    add_sphere(1.2, surface, (0, 0, 1.2))
+    assert_agrees(scene, samples=32)
+
+
 def test_scattering_in_glass():
     """Lit by the world, as the light of lamps does not get into glass but by caustics."""
     scene = _scene(6, 4)

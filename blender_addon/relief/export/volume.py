@@ -4,7 +4,8 @@
 A tree of Mix and Add Shaders is a weighted sum of closures here as well, see surface.py.
 """
 
-from .surface import ClosureWriter
+from .. import compat
+from .surface import ClosureWriter, knows
 
 _NAMES = {
     "Color": "color",
@@ -44,6 +45,13 @@ class VolumeWriter(ClosureWriter):
         for part, weight in self._parts(source):
             node = part.node
             kind = _NODES.get(node.bl_idname) if part.socket.type == "SHADER" else None
+            if kind is None and node.bl_idname == "ShaderNodeBsdfPrincipled" and compat.PRINCIPLED_EMITS_IN_VOLUMES:
+                color, strength = (compat.principled_socket(node, name) for name in ("Emission", "Emission Strength"))
+                self.add("emission", 1.0, color=self.input(color, part), strength=self.input(strength, part))
+                continue
+            if kind is None and part.socket.type == "SHADER" and knows(node):
+                self.unread(part, "a surface shader as volume", "nothing is there, as in Cycles")
+                continue
             if kind is None:
                 self._fail(part, f'node "{node.name}" ({node.bl_label}) as volume', "it is left out")
                 continue
@@ -52,6 +60,8 @@ class VolumeWriter(ClosureWriter):
             inputs = self.inputs(part, _NAMES)
             if kind == "principled" and self._voxels is not None:
                 self._add_attributes(node, inputs)
+            if kind == "emission" and not compat.MIXES_WEIGH_VOLUME_EMISSION:
+                weight = 1.0
             self.add(kind, weight, **inputs)
 
     def _add_attributes(self, node, inputs):
