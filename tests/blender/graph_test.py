@@ -775,4 +775,6 @@ def test_what_is_behind_a_ramp_is_named():
     odd = tree.nodes.new("ShaderNodeShaderToRGB")
     ramp = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeValToRGB")
     tree.links.new(odd.outputs[0], ramp.inputs[0])
-    assert_warns(scene, 'node "Shader to RGB"', "as Color")
+    assert_warns(scene, 'node "Shader to RGB"', "as Fac", "own value")
+    # Cycles has no such node, and the ramp gives what it gives where nothing is linked to it.
+    assert_agrees(scene)

@@ -13,6 +13,10 @@ from .graph_inputs import OUTPUTS, mesh_attribute, tangent_set, transformed_norm
 from .not_understood import NotUnderstood
 
 
+#: Nodes of other engines alone: Cycles cuts what is linked to them.
+_NOT_IN_CYCLES = {"ShaderNodeShaderToRGB", "ShaderNodeUVAlongStroke"}
+
+
 class GraphWriter:
     """Collects the nodes of one material's graph.
 
@@ -53,8 +57,9 @@ class GraphWriter:
     def constant(self, socket, groups=()):
         """An input's number or list, finite and of the socket's type; None if it varies."""
         value = nodes.fold(socket, groups, self._folded)
-        if value is None:
-            return None
+        return None if value is None else self._number_or_color(value, socket)
+
+    def _number_or_color(self, value, socket):
         value = nodes.finite(value, socket.name, self.warn)
         if socket.type in {"VALUE", "INT", "BOOLEAN"}:
             return nodes.as_number(value)
@@ -186,7 +191,11 @@ class GraphWriter:
             try:
                 out[ours] = self.value(socket, groups)
             except NotUnderstood as error:  # the others may have something to tell, too
-                failure = failure or error
+                if nodes.follow(socket, groups).node.bl_idname in _NOT_IN_CYCLES:
+                    self.warn(f"{error} as {socket.name}", "the input's own value was used, as in Cycles")
+                    out[ours] = self._number_or_color(nodes.own_value(socket), socket)
+                else:
+                    failure = failure or error
         if failure is not None:
             raise failure
         return out
