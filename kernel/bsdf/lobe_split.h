@@ -71,6 +71,25 @@ RELIEF_KERNEL bool closure_has(const SurfaceClosure& c, SharpLobes sharp)
   });
 }
 
+/// What closure_split does where both have a share.
+template <unsigned kFeatures, TransportMode kMode, typename Closure>
+[[gnu::noinline]] RELIEF_KERNEL bool
+closure_split_both(const Closure& closure, const BsdfTables& tables, SharpLobes sharp, float u, BsdfSample& bsdf)
+{
+  const Vec3f f_sharp = closure_eval<kFeatures, kMode>(closure_sharp(closure, sharp), tables, bsdf.wi).f;
+  const Vec3f f_soft = max(bsdf.f - f_sharp, Vec3f{});
+  const float of_sharp = max_component(f_sharp), of_both = of_sharp + max_component(f_soft);
+  // A black tint leaves nothing of either (test MaterialCorners.GlassThatPassesNoLightIsFinite).
+  if (!(of_both > 0.0f)) {
+    bsdf.f = {};
+    return false;
+  }
+  const float probability = of_sharp / of_both;
+  const bool is_sharp = u < probability;
+  bsdf.f = is_sharp ? f_sharp / probability : f_soft / (1.0f - probability);
+  return is_sharp;
+}
+
 /// Decides whether a sampled event counts as sharp or soft, and weighs it by that part of f alone. Where both have a
 /// share, one is chosen by it: a path is either the photon pass's or the path tracer's.
 /// @param bsdf  sampled from the closure
@@ -85,18 +104,7 @@ RELIEF_KERNEL bool closure_split(const Closure& closure,
 {
   if ((bsdf.lobe & kLobeDelta) != 0 || !closure_has<false>(closure, sharp)) return true;
   if (!closure_has<true>(closure, sharp)) return false;
-  const Vec3f f_sharp = closure_eval<kFeatures, kMode>(closure_sharp(closure, sharp), tables, bsdf.wi).f;
-  const Vec3f f_soft = max(bsdf.f - f_sharp, Vec3f{});
-  const float of_sharp = max_component(f_sharp), of_both = of_sharp + max_component(f_soft);
-  // A black tint leaves nothing of either (test MaterialCorners.GlassThatPassesNoLightIsFinite).
-  if (!(of_both > 0.0f)) {
-    bsdf.f = {};
-    return false;
-  }
-  const float probability = of_sharp / of_both;
-  const bool is_sharp = u < probability;
-  bsdf.f = is_sharp ? f_sharp / probability : f_soft / (1.0f - probability);
-  return is_sharp;
+  return closure_split_both<kFeatures, kMode>(closure, tables, sharp, u, bsdf);
 }
 
 }  // namespace relief

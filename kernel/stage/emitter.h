@@ -27,7 +27,8 @@ RELIEF_KERNEL GraphRay lamp_ray(const KernelGlobals& g, const PathState& state, 
 /// @param emitter  not even, in world space
 /// @param even     what it sends to there without its graph: counts for all but meshes
 /// @return         radiance, or what `even` is; of meshes it is not asked which side shines
-RELIEF_KERNEL Vec3f emitter_radiance(const KernelGlobals& g, const Light& emitter, Vec3f even, const EmitterPoint& at)
+[[gnu::noinline]] RELIEF_KERNEL Vec3f
+emitter_radiance(const KernelGlobals& g, const Light& emitter, Vec3f even, const EmitterPoint& at)
 {
   if (emitter.instance_index < 0) return even * g.emitter_radiance(g, emitter, at);
   const InstanceView& instance = g.instances[emitter.instance_index];

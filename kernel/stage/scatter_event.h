@@ -31,6 +31,15 @@ template <unsigned kFeatures, typename Closure>
   return closure_eval<kFeatures>(closure_diffuse(closure), *g.bsdf_tables, wi).f;
 }
 
+/// The part of a surface's f that is not sharp.
+/// @param wi  in the closure's frame
+template <unsigned kFeatures, typename Closure>
+[[gnu::noinline]] RELIEF_KERNEL Vec3f
+shade_surface_soft(const KernelGlobals& g, const Closure& closure, SharpLobes sharp, Vec3f wi)
+{
+  return closure_eval<kFeatures>(closure_soft(closure, sharp), *g.bsdf_tables, wi).f;
+}
+
 /// Which lobes are sharp for this path towards a direction. What cannot be gone back stays sharp, as photons end there, and
 /// what grazes the facet, where single photons would count for too much.
 /// @param wi   unit, world

@@ -1,5 +1,8 @@
 // Stage: a path met a surface. The heart of the path tracer: what the surface emits (here), what the film is told of it
 // (surface_first_hit.h), light that is asked for (surface_light.h), photons (surface_photons.h), the way on (surface_continue.h).
+//
+// shade_surface is one function for each set of features, with all that it calls inside but what is marked noinline: what is
+// seldom met. With that inside too, compiling took twice as long, and nothing was faster.
 #pragma once
 
 #include <type_traits>
@@ -15,6 +18,15 @@
 
 namespace relief {
 
+/// Density with which the path's last surface would have asked for the light that it has met.
+[[gnu::noinline]] RELIEF_KERNEL float
+shade_surface_light_pdf(const KernelGlobals& g, const PathState& state, std::uint32_t path, const SurfaceInteraction& at)
+{
+  const LightRef hit{at.instance->first_light_index + static_cast<std::int32_t>(at.triangle), at.instance->light_copy_index};
+  return lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), hit, path_direction(state, path),
+                    state.hit_t[path], path_time(state, path));
+}
+
 /// Adds what a surface emits to a path that has met it.
 /// @param throughput  up to the surface
 template <unsigned kFeatures>
@@ -25,7 +37,6 @@ RELIEF_KERNEL void shade_surface_emission(const KernelGlobals& g,
                                           Vec3f throughput)
 {
   const int bounce = path_bounces(state.bounces[path], BounceKind::kAll);
-  const Vec3f wi = path_direction(state, path);
   bool emits = !is_zero(at.params.emission) && (at.side.front || at.material->double_sided || at.params.unlit);
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
     const bool is_light = at.instance->first_light_index >= 0;
@@ -36,11 +47,7 @@ RELIEF_KERNEL void shade_surface_emission(const KernelGlobals& g,
     if (!at.params.unlit) path_add_denoising(g, state, path, throughput * radiance);
     const float pdf = state.pdf[path];
     if (pdf > 0.0f && at.instance->first_light_index >= 0) {
-      const LightRef hit{at.instance->first_light_index + static_cast<std::int32_t>(at.triangle),
-                         at.instance->light_copy_index};
-      const float pdf_light = lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), hit, wi,
-                                         state.hit_t[path], path_time(state, path));
-      radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
+      radiance *= path_bsdf_weight(g.light_technique, pdf, shade_surface_light_pdf(g, state, path, at));
     }
     if (bounce == 0) film_add_emission(g.film, state.pixel[path], throughput * radiance);
     path_add_radiance(g, state, path, bounce, throughput * radiance);

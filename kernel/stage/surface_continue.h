@@ -150,6 +150,28 @@ RELIEF_KERNEL void shade_surface_scatter(const KernelGlobals& g,
   shade_surface_continue<kFeatures>(g, state, path, event, bsdf, share, u, next);
 }
 
+/// Sends a path on as several, each as shade_surface_scatter does.
+template <unsigned kFeatures, typename Closure>
+[[gnu::noinline]] RELIEF_KERNEL void shade_surface_scatter_as_several(const KernelGlobals& g,
+                                                                      PathState& state,
+                                                                      std::uint32_t path,
+                                                                      const ScatterEvent<Closure>& event,
+                                                                      std::uint32_t splits,
+                                                                      QueueView& next)
+{
+  const std::uint32_t sample = state.sample_index[path];
+  const int surface = path_surface(state, path);
+  for (std::uint32_t k = splits; k-- > 0;) {
+    // The continuations of all samples share one stratified set of points; ahead, each has numbers of its own.
+    const ScatterSamples v = scatter_samples(state.pixel_hash[path], sample * splits + k, surface);
+    const std::uint32_t copy = k > 0 ? path_fork(state, path) : path;
+    if (k > 0) state.pixel_hash[copy] = hash_mix_32(state.pixel_hash[path] + k);
+    shade_surface_scatter<kFeatures>(g, state, copy, event,
+                                     closure_sample<kFeatures>(event.closure, *g.bsdf_tables, v.branch, v.bsdf),
+                                     1.0f / static_cast<float>(splits), v, next);
+  }
+}
+
 /// Sends a path on by several samples of a first surface where path_splits_on says so, else by one.
 /// @param bsdf  sampled with u
 template <unsigned kFeatures, typename Closure>
@@ -164,17 +186,7 @@ RELIEF_KERNEL void shade_surface_split(const KernelGlobals& g,
   if constexpr ((kFeatures & kFeatureCaustics) != 0 && (kFeatures & kFeatureTransmission) != 0) {
     const std::uint32_t splits = path_splits_on(state, path, event.at, event.closure);
     if (splits > 1) {
-      const std::uint32_t sample = state.sample_index[path];
-      const int surface = path_surface(state, path);
-      for (std::uint32_t k = splits; k-- > 0;) {
-        // The continuations of all samples share one stratified set of points; ahead, each has numbers of its own.
-        const ScatterSamples v = scatter_samples(state.pixel_hash[path], sample * splits + k, surface);
-        const std::uint32_t copy = k > 0 ? path_fork(state, path) : path;
-        if (k > 0) state.pixel_hash[copy] = hash_mix_32(state.pixel_hash[path] + k);
-        shade_surface_scatter<kFeatures>(g, state, copy, event,
-                                         closure_sample<kFeatures>(event.closure, *g.bsdf_tables, v.branch, v.bsdf),
-                                         1.0f / static_cast<float>(splits), v, next);
-      }
+      shade_surface_scatter_as_several<kFeatures>(g, state, path, event, splits, next);
       return;
     }
   }

@@ -77,12 +77,12 @@ RELIEF_KERNEL void shade_surface_first_hit(const KernelGlobals& g,
 /// @param throughput  up to the surface
 /// @param N           see surface_mean_normal
 template <unsigned kFeatures>
-RELIEF_KERNEL void shade_surface_denoising(const KernelGlobals& g,
-                                           PathState& state,
-                                           std::uint32_t path,
-                                           const SurfaceInteraction& at,
-                                           Vec3f throughput,
-                                           Vec3f N)
+[[gnu::noinline]] RELIEF_KERNEL void shade_surface_denoising(const KernelGlobals& g,
+                                                             PathState& state,
+                                                             std::uint32_t path,
+                                                             const SurfaceInteraction& at,
+                                                             Vec3f throughput,
+                                                             Vec3f N)
 {
   const SurfaceSummary summary = surface_summary<kFeatures>(at);
   if (summary.is_seen_through) return;

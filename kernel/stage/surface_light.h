@@ -50,7 +50,7 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
     if (light_casts_caustics(g.lights, light.ref.light_index) && path_caustic_after(state.flags[path], *at.instance) &&
         shading_is_reversible(at.side, light.wi) && !path_crosses_facets(state, path, light.wi) &&
         !path_is_alone(g, state.flags[path], transmits())) {
-      bsdf.f = closure_eval<kFeatures>(closure_soft(closure, kAllSharp), *g.bsdf_tables, wi).f;
+      bsdf.f = shade_surface_soft<kFeatures>(g, closure, kAllSharp, wi);
     }
   }
   bool is_found_here_alone = light.delta;

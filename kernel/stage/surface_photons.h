@@ -11,13 +11,13 @@ namespace relief {
 /// @param wo, wi    in the closure's frame
 /// @param wi_world  the same as wi
 template <unsigned kFeatures, typename Closure>
-RELIEF_KERNEL Vec3f shade_surface_tails(const KernelGlobals& g,
-                                        const PathState& state,
-                                        std::uint32_t path,
-                                        const ScatterEvent<Closure>& event,
-                                        Vec3f wo,
-                                        Vec3f wi,
-                                        Vec3f wi_world)
+[[gnu::noinline]] RELIEF_KERNEL Vec3f shade_surface_tails(const KernelGlobals& g,
+                                                          const PathState& state,
+                                                          std::uint32_t path,
+                                                          const ScatterEvent<Closure>& event,
+                                                          Vec3f wo,
+                                                          Vec3f wi,
+                                                          Vec3f wi_world)
 {
   const Closure& closure = event.closure;
   const auto allowed = [&](BounceKind kind) {
@@ -27,8 +27,8 @@ RELIEF_KERNEL Vec3f shade_surface_tails(const KernelGlobals& g,
   };
   const float pdf = closure_eval<kFeatures>(closure, *g.bsdf_tables, wi).pdf;
   const SharpLobes sharp = path_sharp_lobes(g, state.flags[path], event.at, wi_world, pdf);
-  const Vec3f soft = closure_eval<kFeatures>(closure_soft(closure, kAllSharp), *g.bsdf_tables, wi).f;
-  const Vec3f both = closure_eval<kFeatures>(closure_soft(closure, sharp), *g.bsdf_tables, wi).f;
+  const Vec3f soft = shade_surface_soft<kFeatures>(g, closure, kAllSharp, wi);
+  const Vec3f both = shade_surface_soft<kFeatures>(g, closure, sharp, wi);
   Vec3f f;
   if (allowed(BounceKind::kDiffuse)) f += soft;
   if (allowed(wo.z * wi.z > 0.0f ? BounceKind::kGlossy : BounceKind::kTransmission)) f += max(both - soft, Vec3f{});
