@@ -59,7 +59,7 @@ namespace relief {
 namespace {
 
 struct RenderArguments {
-  std::string scene, output, png, stats, reference, preview, report;
+  std::string scene, output, png, stats, reference, preview, report, log;
   PictureOptions picture;
   FrameList frames;  ///< empty: the rest pose
   SamplePart part;
@@ -114,6 +114,7 @@ RunFiles files_of_run(const RenderArguments& arguments, const std::vector<std::o
   files.add_input("the scene", arguments.scene);
   files.add_input("the environment", arguments.setup.environment_file());
   files.add_input("the camera's file", arguments.picture.camera_from);
+  files.add_output("--log", arguments.log);
   for (const std::optional<int> frame : frames) {
     const FramePaths paths = paths_of_frame(arguments, frame);
     for (const auto& [option, path] : outputs_of(paths)) files.add_output(option, path);
@@ -692,7 +693,7 @@ int render_all(const RenderArguments& arguments, const std::string& command, Ren
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
   exr_use_threads(threads > 1 ? threads : 0);
   tbb::task_arena arena(threads);
-  ProgressPrinter progress(arguments.progress, session != nullptr ? session->request : nlohmann::json());
+  ProgressPrinter progress(arguments.progress, session != nullptr ? session->request : nlohmann::json(), arguments.log);
   if (progress.is_json()) refuse_standard_output(arguments, frames.front());
   std::optional<KeptFrames> of_run;
   if (session == nullptr && frames.size() > 1) of_run.emplace();
@@ -703,10 +704,12 @@ int render_all(const RenderArguments& arguments, const std::string& command, Ren
     bool is_whole = false;
     try {
       arena.execute([&] { is_whole = FrameRun(arguments, command, frame, files, kept, progress).run(); });
-    } catch (const CLI::Error&) {
-      throw;  // Wrong usage is wrong for every frame.
     } catch (const std::exception& error) {
-      if (!arguments.keep_going) throw;
+      // Wrong usage is wrong for every frame.
+      if (!arguments.keep_going || dynamic_cast<const CLI::Error*>(&error) != nullptr) {
+        progress.log_line("relief: " + error_text(error));
+        throw;
+      }
       failed.push_back(frame ? std::to_string(*frame) : "rest pose");
       report_failed(progress, frame.value_or(0), failed.back(), error);
       is_whole = true;
@@ -789,6 +792,8 @@ std::pair<CLI::App*, std::vector<CLI::Option*>> add_render(CLI::App& app, Render
   names_file(
       command->add_option("--reference", a.reference, "OpenEXR to measure the error against; #### as for --output"),
       {".exr"});
+  names_file(command->add_option("--log", a.log, "File that gets, below what it has, what the run says, with the time, and its progress"),
+             {".log"});
   command->add_option("--progress", a.progress, "bar (on a terminal), json (on standard output) or none")
       ->check(one_of({"bar", "json", "none"}))
       ->capture_default_str();

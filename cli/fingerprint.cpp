@@ -19,11 +19,11 @@ namespace relief {
 
 namespace {
 
-// Options by which no picture differs: --threads, --progress, --preview, --checkpoint and --grace change how it comes about, the
+// Options by which no picture differs: --threads, --progress, --log, --preview, --checkpoint and --grace change how it comes about, the
 // others which files are read and whether the run fails. The scene counts with its content.
 constexpr std::string_view kUncounted[] = {"--help",       "scene",        "--frames",    "--resume",  "--strict",
                                            "--threads",    "--progress",   "--reference", "--preview", "--max-memory",
-                                           "--checkpoint", "--keep-going", "--grace"};
+                                           "--checkpoint", "--keep-going", "--grace",     "--log"};
 // Options that do nothing but change one of the RenderSettings, which count as they come out. So it is one whether the scene says
 // something, the command line, or nobody.
 constexpr std::string_view kDeclared[] = {

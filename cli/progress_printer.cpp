@@ -1,7 +1,10 @@
 #include "cli/progress_printer.h"
 
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
+#include <ctime>
 
 #include <unistd.h>
 
@@ -10,6 +13,7 @@
 #include "cli/interrupt.h"
 #include "cli/memory_use.h"
 #include "cli/standard_streams.h"
+#include "exporters/errors.h"
 #include "scene/diagnostics.h"
 
 namespace relief {
@@ -31,8 +35,13 @@ std::string duration_text(double seconds)
 
 }  // namespace
 
-ProgressPrinter::ProgressPrinter(const std::string& kind, nlohmann::json request) : request_(std::move(request))
+ProgressPrinter::ProgressPrinter(const std::string& kind, nlohmann::json request, const std::filesystem::path& log)
+    : request_(std::move(request))
 {
+  if (!log.empty()) {
+    log_.reset(std::fopen(log.c_str(), "a"));
+    if (!log_) throw OutputError(log.string(), std::strerror(errno));
+  }
   if (kind == "json" || !request_.is_null()) kind_ = Kind::kJson;
   if (kind_ == Kind::kNone && kind == "bar") kind_ = isatty(STDERR_FILENO) != 0 ? Kind::kBar : Kind::kLog;
 }
@@ -42,28 +51,41 @@ ProgressPrinter::~ProgressPrinter() { clear_bar(); }
 std::function<void(const RenderProgress&)> ProgressPrinter::callback(int frame, std::string name, std::string title)
 {
   logged_seconds_ = logged_fraction_ = 0;
-  switch (kind_) {
-    case Kind::kNone:
-      return {};
-    case Kind::kBar:
-      return [this, title = std::move(title)](const RenderProgress& p) { draw_bar(title, p); };
-    case Kind::kLog:
-      return [this, name = std::move(name)](const RenderProgress& p) { log(name, p); };
-    case Kind::kJson:
-      return [this, frame](const RenderProgress& p) {
-        event({{"event", "progress"},
-               {"frame", frame},
-               {"fraction", p.fraction},
-               {"samples", p.samples_per_pixel},
-               {"photons", p.photons},
-               {"seconds", p.seconds},
-               {"seconds_left", p.seconds_left},
-               {"rays_per_second", p.rays_per_second},
-               {"memory_bytes", memory_bytes()},
-               {"peak_memory_bytes", peak_memory_bytes()}});
-      };
+  if (kind_ == Kind::kNone && !log_) return {};
+  return [this, frame, name = std::move(name), title = std::move(title)](const RenderProgress& p) {
+    if (kind_ == Kind::kLog || log_) log(name, p);
+    if (kind_ == Kind::kBar) draw_bar(title, p);
+    if (kind_ != Kind::kJson) return;
+    event({{"event", "progress"},
+           {"frame", frame},
+           {"fraction", p.fraction},
+           {"samples", p.samples_per_pixel},
+           {"photons", p.photons},
+           {"seconds", p.seconds},
+           {"seconds_left", p.seconds_left},
+           {"rays_per_second", p.rays_per_second},
+           {"memory_bytes", memory_bytes()},
+           {"peak_memory_bytes", peak_memory_bytes()}});
+  };
+}
+
+void ProgressPrinter::say_of_progress(const std::string& line)
+{
+  if (kind_ == Kind::kLog) {
+    note(line);
+  } else {
+    log_line(line);
   }
-  return {};
+}
+
+void ProgressPrinter::log_line(const std::string& line)
+{
+  if (!log_) return;
+  const std::time_t now = std::time(nullptr);
+  std::tm utc{};
+  char stamp[32] = "";
+  if (gmtime_r(&now, &utc) != nullptr) std::strftime(stamp, sizeof(stamp), "%FT%TZ", &utc);
+  write_text(log_.get(), fmt::format("{} {}\n", stamp, printable_text(line)));
 }
 
 void ProgressPrinter::log(const std::string& name, const RenderProgress& p)
@@ -74,13 +96,13 @@ void ProgressPrinter::log(const std::string& name, const RenderProgress& p)
   if (waited < kLeastSeconds || (waited < kMostSeconds && p.fraction < logged_fraction_ + kShare)) return;
   logged_seconds_ = p.seconds;
   logged_fraction_ = p.fraction;
-  note(fmt::format("{}: {:.0f} % after {}, {} left, {:.4g} samples a pixel", name, 100 * p.fraction,
-                   duration_text(p.seconds), duration_text(p.seconds_left), p.samples_per_pixel));
+  say_of_progress(fmt::format("{}: {:.0f} % after {}, {} left, {:.4g} samples a pixel", name, 100 * p.fraction,
+                              duration_text(p.seconds), duration_text(p.seconds_left), p.samples_per_pixel));
 }
 
 void ProgressPrinter::phase(const std::string& name, const char* what, double seconds)
 {
-  if (kind_ == Kind::kLog) note(fmt::format("{}: {} in {:.2f} s", name, what, seconds));
+  say_of_progress(fmt::format("{}: {} in {:.2f} s", name, what, seconds));
 }
 
 void ProgressPrinter::event(nlohmann::json object)
@@ -99,6 +121,7 @@ void ProgressPrinter::note(const std::string& line)
 {
   clear_bar();
   write_text(stderr, printable_text(line) + "\n");
+  log_line(line);
 }
 
 void ProgressPrinter::warnings(const std::vector<std::string>& texts)

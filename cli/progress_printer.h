@@ -1,7 +1,10 @@
 // What `relief render` says while it works: a bar on a terminal, one JSON object a line for programs, and notes.
 #pragma once
 
+#include <cstdio>
+#include <filesystem>
 #include <functional>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -17,7 +20,10 @@ class ProgressPrinter {
   /// @param kind  "bar" (drawn on standard error if that is a terminal, and otherwise lines now and then), "json" (on standard
   ///              output) or "none"
   /// @param request  of `relief serve`, its id: all events have it and are printed, whatever the kind; null: there is none
-  explicit ProgressPrinter(const std::string& kind, nlohmann::json request = {});
+  /// @param log      file that gets what is said, with the time, and lines about progress, whatever the kind; they are added to what it
+  ///                 has. Empty: none
+  /// @error OutputError if the log cannot be written to
+  explicit ProgressPrinter(const std::string& kind, nlohmann::json request = {}, const std::filesystem::path& log = {});
 
   /// Leaves no half bar behind, whatever ended the render.
   ~ProgressPrinter();
@@ -41,16 +47,21 @@ class ProgressPrinter {
   /// Prints a line on standard error, above the bar; what is not fit for a terminal is escaped.
   void note(const std::string& line);
 
+  /// Adds a line to the log alone, for what others print.
+  void log_line(const std::string& line);
+
   /// Prints those warnings that this run has not shown yet, in JSON mode also as events.
   void warnings(const std::vector<std::string>& texts);
 
  private:
   void draw_bar(const std::string& title, const RenderProgress& progress);
   void log(const std::string& name, const RenderProgress& progress);
+  void say_of_progress(const std::string& line);
   void clear_bar();
 
   enum class Kind { kNone, kBar, kLog, kJson } kind_ = Kind::kNone;
   nlohmann::json request_;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> log_{nullptr, &std::fclose};
   bool bar_is_drawn_ = false;
   std::set<std::string> shown_;
   double logged_seconds_ = 0, logged_fraction_ = 0;  ///< of the last line about a frame

@@ -185,6 +185,8 @@ class Run:
             arguments += ["--stats=" + self.output_name(".json")]
         if self.chance(0.3):
             arguments += ["--report=" + self.output_name(".html")]
+        if self.chance(0.2):
+            arguments += ["--log=" + self.output_name(".log")]
         if self.chance(0.4):
             arguments += ["--frames", self.numbers()]
         if self.chance(0.3):

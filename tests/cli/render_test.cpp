@@ -1,5 +1,6 @@
 // `relief render` as a technical director uses it: frames, windows, seeds, references, statistics, progress.
 #include <cmath>
+#include <regex>
 #include <sstream>
 
 #include "tests/cli/program.h"
@@ -37,6 +38,28 @@ double center_of_coverage(const std::string& exr)
     moment += double{alpha[i]} * (static_cast<double>(i % static_cast<std::size_t>(picture.width)) + .5);
   }
   return moment / sum;
+}
+
+TEST_F(RenderProgram, ALogGetsWhatIsSaidBelowWhatItHas)
+{
+  const std::string scene = write_scene(lit_square()), log = folder_.write("run.log", "before\n").string();
+  EXPECT_EQ(render(scene, file("a.exr"), {"--spp", "1", "--log", log}).exit_code, 0);
+  EXPECT_EQ(render(scene, file("a.exr"), {"--environment", "missing.png", "--log", log}).exit_code, 3);
+  const std::string text = bytes_of_file(log);
+  EXPECT_TRUE(text.starts_with("before\n")) << text;
+  const std::regex lines("before\n(\\d{4}-\\d\\d-\\d\\dT\\d\\d:\\d\\d:\\d\\dZ [^\n]+\n)+");
+  EXPECT_TRUE(std::regex_match(text, lines)) << text;
+  EXPECT_NE(text.find("a.exr: 16x16, 1 samples a pixel in "), std::string::npos) << text;
+  EXPECT_NE(text.find("relief: "), std::string::npos) << text;
+  EXPECT_NE(text.find("missing.png"), std::string::npos) << text;
+
+  const std::string before = bytes_of_file(scene);
+  EXPECT_EQ(render(scene, file("b.exr"), {"--log", scene}).exit_code, 2);
+  EXPECT_EQ(bytes_of_file(scene), before);
+  const Outcome unwritable = render(scene, file("b.exr"), {"--log", file("nowhere/run.log")});
+  EXPECT_EQ(unwritable.exit_code, 1);
+  EXPECT_NE(unwritable.errors.find("nowhere/run.log"), std::string::npos) << unwritable.errors;
+  EXPECT_FALSE(std::filesystem::exists(file("b.exr")));
 }
 
 TEST_F(RenderProgram, FramesMoveWhatTheAnimationMoves)
