@@ -81,7 +81,7 @@ def _render(engine, depsgraph, binary, warnings, motion, eye, begin):
     # Where nothing takes time the view has a file of its own: if it alone moves, the program keeps all that it has loaded and
     # built.
     scene_view = view if motion is not None else any_view(view.size)
-    exported = export_scene(depsgraph, scene_view, folder, "scene.gltf", warnings, motion)
+    exported = export_scene(depsgraph, scene_view, folder, "scene.gltf", warnings, motion, seen_from=view)
     session.remove_stale(os.path.join(folder, DATA_FOLDER), exported.used_files)
     known = set(warnings.warnings)
     report.last_coverage[scene.name] = warnings.coverage

@@ -54,6 +54,21 @@ def test_color():
     assert_agrees(scene)
 
 
+def test_coordinates_of_the_camera():
+    """A gradient across the picture, which the ball shows as well; and a lens that is shifted."""
+    for name in ("Window", "Camera"):
+        scene = _stage()
+        scene.camera.data.shift_x = 0.1
+        tree = set_world((1, 1, 1))
+        coordinate, mapping = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeMapping")
+        mapping.inputs["Rotation"].default_value = (0, 0, 0.5)
+        gradient = tree.nodes.new("ShaderNodeTexGradient")
+        tree.links.new(coordinate.outputs[name], mapping.inputs["Vector"])
+        tree.links.new(mapping.outputs["Vector"], gradient.inputs["Vector"])
+        tree.links.new(gradient.outputs["Color"], tree.nodes["Background"].inputs["Color"])
+        assert_agrees(scene, samples=64)
+
+
 def test_color_without_nodes():
     scene = _stage()
     set_world((1, 1, 1))

@@ -21,7 +21,7 @@ from .motion import numbered
 from .objects import collect, decompose, usable_places
 from .settings import render_settings
 from .voxels import Voxels, domain_of, read_grids
-from .world import export_world
+from .world import Eye, export_world
 
 DATA_FOLDER = "relief_data"
 
@@ -67,7 +67,7 @@ class View:
     size: tuple
 
 
-def export_scene(depsgraph, view, folder, name, report, motion=None):
+def export_scene(depsgraph, view, folder, name, report, motion=None, seen_from=None):
     """Writes what a depsgraph holds as a scene file.
 
     @param  depsgraph  evaluated
@@ -76,12 +76,13 @@ def export_scene(depsgraph, view, folder, name, report, motion=None):
     @param  name       of the scene file
     @param  report     Report
     @param  motion     Motion while the shutter is open; None: nothing takes time
+    @param  seen_from  View by whose coordinates a world may be seen; None: view
     @return            Exported
     """
     begin = time.perf_counter()
     writer = GltfWriter(folder, DATA_FOLDER)
     exporter = SceneExporter(depsgraph, writer, report, motion=motion)
-    exporter.add_all(view)
+    exporter.add_all(view, seen_from)
     index_of = {}
     writer.json.update(scene_json(exporter.nodes, index_of))
     if motion is not None:
@@ -200,10 +201,13 @@ class SceneExporter:
         view_layer = (depsgraph.view_layer, depsgraph.scene)
         self._materials = MaterialExporter(self.writer, self._images, self._scene.relief, report, lambda: view_layer)
 
-    def add_all(self, view):
-        """Adds the whole frame."""
+    def add_all(self, view, seen_from=None):
+        """Adds the whole frame.
+
+        @param  seen_from  as export_scene has it
+        """
         self._add_view(view)
-        self.add_world()
+        self._add_world(seen_from or view)
         self.add_objects()
         self._keep_dark()
 
@@ -218,10 +222,12 @@ class SceneExporter:
         settings = render_settings(self._scene, self._depsgraph.view_layer, view.size)
         self.writer.extend(self.writer.json, "RELIEF_render", settings)
 
-    def add_world(self):
+    def _add_world(self, view):
         is_opaque, layer = not self._scene.render.film_transparent, self._depsgraph.view_layer
         world = compat.world_of(self._scene, layer) if layer.use_sky else None
-        export_world(world, is_opaque, compat.clear_roughness(self._scene), self.writer, self._images, self._report)
+        clear_roughness = compat.clear_roughness(self._scene)
+        eye = Eye.of(view.camera, view.matrix, view.size)
+        export_world(world, is_opaque, clear_roughness, eye, self.writer, self._images, self._report)
 
     def add_objects(self):
         """Adds meshes, instances and lights."""

@@ -2,6 +2,9 @@
 """Blender's world as RELIEF_environment: a colour, a lat-long image turned about Z, or a graph over directions."""
 
 import math
+from dataclasses import dataclass
+
+import numpy as np
 
 from .. import compat
 from . import nodes
@@ -14,12 +17,42 @@ from .texture import ies_uri, image_options
 from .volume import VolumeWriter
 
 
-def export_world(world, visible_to_camera, clear_roughness, writer, images, report):
+@dataclass
+class Eye:
+    """What a world that is seen by the camera's coordinates depends on.
+
+    axes         rows of a 3×3: right, up and forward in Blender's axes, unit
+    half_window  half the width and height of the window at distance 1
+    shift        of the window, in fractions of its width and height
+    """
+
+    axes: np.ndarray
+    half_window: tuple
+    shift: tuple
+
+    @classmethod
+    def of(cls, camera, matrix, size):
+        """None where rays do not go out from one point, or there is no camera: a viewport that is turned is not exported again.
+
+        @param  camera, matrix, size  of a View
+        """
+        extension = camera.get("extensions", {}).get("RELIEF_camera")
+        if camera["type"] != "perspective" or extension is None:
+            return None
+        columns = np.array(matrix, dtype=np.float64)[:3, :3]
+        right, up, back = (columns / np.linalg.norm(columns, axis=0)).T
+        half_height = math.tan(camera["perspective"]["yfov"] / 2)
+        half_window = (half_height * size[0] / size[1], half_height)
+        return cls(np.stack([right, up, -back]), half_window, tuple(extension["shift"]))
+
+
+def export_world(world, visible_to_camera, clear_roughness, eye, writer, images, report):
     """Adds the surroundings. Without a world, or with a black one, there is none.
 
     @param  world              bpy world or None
     @param  visible_to_camera  False: films with a transparent background
     @param  clear_roughness    up to which glass is as clear as air then; None: it is opaque
+    @param  eye                Eye or None
     @param  writer             GltfWriter
     @param  images             ImageExporter
     @param  report             Report
@@ -27,7 +60,7 @@ def export_world(world, visible_to_camera, clear_roughness, writer, images, repo
     if world is None:
         environment = {"color": [0.0, 0.0, 0.0]}
     else:
-        environment = _environment(world, writer, images, lambda *text: report.warn(f'world "{world.name}"', *text))
+        environment = _environment(world, eye, writer, images, lambda *text: report.warn(f'world "{world.name}"', *text))
     seen = environment.get("visibleToCamera", True) and (world is None or compat.sees_world(world, "camera"))
     environment["visibleToCamera"] = visible_to_camera and seen
     if not visible_to_camera and clear_roughness is not None:
@@ -40,13 +73,13 @@ def export_world(world, visible_to_camera, clear_roughness, writer, images, repo
     writer.extend(writer.json, "RELIEF_environment", environment)
 
 
-def _environment(world, writer, images, warn):
+def _environment(world, eye, writer, images, warn):
     """RELIEF_environment of a world, but for what says who sees it."""
     if not world.use_nodes:
         return _even(nodes.finite(tuple(world.color), "its colour", warn))
     output = nodes.active_output(world.node_tree, "ShaderNodeOutputWorld")
     source, volume = (nodes.linked(output.inputs[name]) if output else None for name in ("Surface", "Volume"))
-    environment = _surroundings(source, writer, images, warn)
+    environment = _surroundings(source, eye, writer, images, warn)
     if volume is not None:
         with nodes.reading():
             _add_medium(environment, volume, writer, images, warn)
@@ -63,16 +96,16 @@ def _add_medium(environment, source, writer, images, warn):
         environment["volume"] = {"closures": medium.closures, **nodes_of}
 
 
-def _surroundings(source, writer, images, warn):
+def _surroundings(source, eye, writer, images, warn):
     """RELIEF_environment of a shader, None: it is black."""
     if source is None:
         return {"color": [0.0, 0.0, 0.0]}
-    seen = _Surroundings(writer, images, warn, is_camera=False)
+    seen = _Surroundings(eye, writer, images, warn, is_camera=False)
     backdrop = None
     with nodes.reading():
         environment = seen.read(source)
         if seen.asks_for_camera:
-            backdrop = _Surroundings(writer, images, lambda *_: None, is_camera=True).read(source)
+            backdrop = _Surroundings(eye, writer, images, lambda *_: None, is_camera=True).read(source)
     if backdrop == {"color": [0.0, 0.0, 0.0]}:
         environment["visibleToCamera"] = False
     elif backdrop is not None and (backdrop != environment or "graph" in backdrop):
@@ -94,8 +127,8 @@ class _Surroundings(EmissionTree):
     asks_for_camera    whether something depended on that
     """
 
-    def __init__(self, writer, images, warn, is_camera):
-        super().__init__(WorldGraph(writer, images, warn), warn)
+    def __init__(self, eye, writer, images, warn, is_camera):
+        super().__init__(WorldGraph(writer, images, warn, eye), warn)
         self._images = images
         self._is_camera = is_camera
         self.asks_for_camera = False
@@ -151,22 +184,44 @@ class _Surroundings(EmissionTree):
 
 
 class WorldGraph(GraphWriter):
-    """Value graph of a world, in which textures look into a direction."""
+    """Value graph of a world, in which textures look into a direction.
 
-    def __init__(self, writer, images, warn):
+    @param  eye  Eye by which coordinates of the camera are told; None: they are left to the program
+    """
+
+    def __init__(self, writer, images, warn, eye=None):
         super().__init__(
             lambda name: None,
             lambda node: image_options(node, writer, images, warn),
             lambda node: ies_uri(node, writer),
             warn,
         )
+        self._eye = eye
 
     def output(self, source):
         own = {"ShaderNodeTexEnvironment": self._image_around, "ShaderNodeTexSky": self._sky}
+        if self._eye is not None and source.socket.identifier in {"Camera", "Window"}:
+            own["ShaderNodeTexCoord"] = self._seen_from_the_eye
         write = own.get(source.node.bl_idname, super().output)
         if source.node.bl_idname == "ShaderNodeLightPath" and source.socket.identifier != "Is Camera Ray":
             self.warn(f'node "{source.node.name}": {source.socket.name}', "all rays but the camera's see the same")
         return write(source)
+
+    def _seen_from_the_eye(self, source):
+        """Coordinates of a direction as those of a point that far from the camera, as Cycles has them for all rays."""
+        matrix = [c for row in self._eye.axes for c in (*row.tolist(), 0.0)]
+        direction = self.op("transform", {"vector": self.op("geometry", {}, "position")}, "vector", matrix=matrix)
+        if source.socket.identifier == "Camera":
+            return direction
+        parts = self.add("separate", {"vector": direction})
+        window = {}
+        for axis, half, shift in zip("xy", self._eye.half_window, self._eye.shift):
+            across = {"node": parts, "output": axis}
+            slope = self.op("math", {"a": across, "b": {"node": parts, "output": "z"}}, "value", operation="divide")
+            window[axis] = self.op(
+                "math", {"a": slope, "b": 0.5 / half, "c": 0.5 - shift}, "value", operation="multiply-add"
+            )
+        return self.op("combine", {**window, "z": 0.0}, "vector")
 
     def _image_around(self, source):
         node = source.node
