@@ -45,7 +45,7 @@ class FaultyUse : public ProgramTest {
     EXPECT_EQ(files(), std::vector<std::string>{"scene.gltf"}) << command;
   }
 
-  /// Starts an endless render and waits for its first progress.
+  /// Starts an endless render and waits for its first samples.
   /// @return read end of its standard output
   std::unique_ptr<Process> start_endless(const std::string& output, const Arguments& more, int* read_end) const
   {
@@ -54,10 +54,7 @@ class FaultyUse : public ProgramTest {
     Arguments all = {"--spp", kEndless};
     all.insert(all.end(), more.begin(), more.end());
     auto process = std::make_unique<Process>(render_arguments(scene_, output, all), ends[1], open_file("stderr"));
-    char byte = 0;
-    while (::read(ends[0], &byte, 1) == 1 && byte != '\n') {
-    }
-    EXPECT_EQ(byte, '\n');
+    EXPECT_TRUE(wait_for_samples(ends[0]));
     *read_end = ends[0];
     return process;
   }

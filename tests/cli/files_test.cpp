@@ -268,9 +268,7 @@ TEST_F(FilesOfARun, ALinkMadeDuringTheRenderIsFoundWhenTheFileIsWritten)
   ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
   Process process(render_arguments(scene_, file("a.exr"), {"--spp", kEndless, "--stats", file("a.json")}), ends[1],
                   open_file("stderr"));
-  char byte = 0;
-  while (::read(ends[0], &byte, 1) == 1 && byte != '\n') {
-  }
+  EXPECT_TRUE(wait_for_samples(ends[0]));
   fs::create_symlink("displaced.bin", file("a.json"));
   const std::string before = bytes_of_file(file("displaced.bin"));
   process.signal(SIGINT);
@@ -304,9 +302,7 @@ TEST_F(FilesOfARun, ResumeNoticesASceneThatIsSavedWhileItIsRendered)
   ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
   const Arguments more = {"--resume", "--time-limit", "0.3", "--spp", kEndless};
   Process process(render_arguments(scene_, file("a.exr"), more), ends[1], open_file("stderr"));
-  char byte = 0;
-  while (::read(ends[0], &byte, 1) == 1 && byte != '\n') {
-  }
+  EXPECT_TRUE(wait_for_samples(ends[0]));
   // As an editor does: another file takes the name. Size and time of the last change are the old ones.
   const auto time = fs::last_write_time(file("displaced.bin"));
   fs::copy_file(file("displaced.bin"), file("saved"));
@@ -354,9 +350,7 @@ TEST_F(FilesOfARun, OnlyOneProcessMakesAFrame)
   ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
   const Arguments endless = {"--spp", kEndless, "--png", file("a.png")};
   Process first(render_arguments(scene_, file("a.1.exr"), endless), ends[1], open_file("first"));
-  char byte = 0;
-  while (::read(ends[0], &byte, 1) == 1 && byte != '\n') {
-  }
+  EXPECT_TRUE(wait_for_samples(ends[0]));
   const Outcome resumed = render(scene_, file("a.#.exr"), {"--frames", "1,2", "--resume"});
   EXPECT_EQ(resumed.exit_code, 0);
   EXPECT_EQ(resumed.count("skipped"), 1);
@@ -469,9 +463,7 @@ TEST_F(FilesOfARun, AFolderThatIsRemovedMeanwhileIsExitCodeOne)
   int ends[2];
   ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
   Process process(render_arguments(scene_, file("out/a.exr"), {"--spp", kEndless}), ends[1], open_file("stderr"));
-  char byte = 0;
-  while (::read(ends[0], &byte, 1) == 1 && byte != '\n') {
-  }
+  EXPECT_TRUE(wait_for_samples(ends[0]));
   fs::remove_all(file("out"));
   process.signal(SIGINT);
   EXPECT_EQ(process.wait(), 1);

@@ -30,6 +30,23 @@ inline std::string bytes_of_file(const std::filesystem::path& path)
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
+/// Waits until a render has a picture to keep: the progress that it prints before may be of none yet.
+/// @param output  read end of its standard output
+inline bool wait_for_samples(int output)
+{
+  std::string line;
+  for (char byte = 0; ::read(output, &byte, 1) == 1;) {
+    if (byte != '\n') {
+      line += byte;
+      continue;
+    }
+    const nlohmann::json event = nlohmann::json::parse(line, nullptr, false);
+    if (event.is_object() && event.value("event", "") == "progress" && event.value("samples", 0.0) >= 1.0) return true;
+    line.clear();
+  }
+  return false;
+}
+
 /// A running `relief`. Its standard error goes to a file, its standard output to where `output` says.
 class Process {
  public:
