@@ -401,9 +401,10 @@ def test_a_sun_past_the_zenith_long():
 
 
 def test_a_tiny_sun_long():
-    """Its disk is smaller than a texel of the map of the sky."""
+    """Its disk is smaller than a texel of the map of the sky. Of one of 0.05 degrees Cycles loses 7 % of the light: in single
+    precision 1 less its cosine has a digit or two."""
     scene = _stage()
-    settings = {"sun_elevation": math.radians(40), "sun_rotation": math.radians(200), "sun_size": math.radians(0.05)}
+    settings = {"sun_elevation": math.radians(40), "sun_rotation": math.radians(200), "sun_size": math.radians(0.2)}
     _sky_world(0.05, sun_intensity=0.5, **settings)
     assert_agrees(scene, samples=256, block=8, dark=_RIM)
 
