@@ -45,6 +45,20 @@ def _volume(kind, surface=None, **inputs):
     return material
 
 
+def _mix_in(material, factor, kind, **inputs):
+    """Mixes another shader into a material's volume; returns (tree, Mix Shader, Material Output)."""
+    tree = material.node_tree
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    mix, other = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new(kind)
+    mix.inputs[0].default_value = factor
+    for name, value in inputs.items():
+        other.inputs[name].default_value = value
+    tree.links.new(output.inputs["Volume"].links[0].from_socket, mix.inputs[1])
+    tree.links.new(other.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], output.inputs["Volume"])
+    return tree, mix, output
+
+
 def _add_box(size, material, location=(0, 0, 1)):
     bpy.ops.mesh.primitive_cube_add(size=1, location=location)
     box = bpy.context.object
@@ -153,16 +167,9 @@ def test_mixed_shaders():
     add_light("SUN", rotation=degrees(50, 30, 0), energy=4.0)
     set_world((0.1, 0.1, 0.1))
     material = _volume("ShaderNodeVolumeScatter", Color=(1, 0.5, 0.2, 1), Density=1.2, Anisotropy=0.4)
-    tree = material.node_tree
-    scatter = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeVolumeScatter")
-    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
-    dark, shine = tree.nodes.new("ShaderNodeVolumeAbsorption"), tree.nodes.new("ShaderNodeEmission")
-    dark.inputs["Color"].default_value = (0.2, 0.6, 0.9, 1)
+    tree, mix, output = _mix_in(material, 0.3, "ShaderNodeVolumeAbsorption", Color=(0.2, 0.6, 0.9, 1))
+    shine, add = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeAddShader")
     shine.inputs["Color"].default_value, shine.inputs["Strength"].default_value = (0.2, 0.4, 1, 1), 0.1
-    mix, add = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeAddShader")
-    mix.inputs[0].default_value = 0.3
-    tree.links.new(scatter.outputs[0], mix.inputs[1])
-    tree.links.new(dark.outputs[0], mix.inputs[2])
     tree.links.new(mix.outputs[0], add.inputs[0])
     tree.links.new(shine.outputs[0], add.inputs[1])
     tree.links.new(add.outputs[0], output.inputs["Volume"])
@@ -174,15 +181,7 @@ def test_emission_mixed_with_scattering():
     """Before 4.5 it shines as if it were not mixed."""
     scene = _scene()
     material = _volume("ShaderNodeVolumeScatter", Color=(0.8, 0.8, 0.8, 1), Density=1.0)
-    tree = material.node_tree
-    scatter = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeVolumeScatter")
-    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
-    shine, mix = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeMixShader")
-    shine.inputs["Color"].default_value = (1, 0.6, 0.2, 1)
-    mix.inputs[0].default_value = 0.8
-    tree.links.new(shine.outputs[0], mix.inputs[1])
-    tree.links.new(scatter.outputs[0], mix.inputs[2])
-    tree.links.new(mix.outputs[0], output.inputs["Volume"])
+    _mix_in(material, 0.2, "ShaderNodeEmission", Color=(1, 0.6, 0.2, 1))
     add_sphere(1.2, material, (0, 0, 1.2))
     assert_agrees(scene, samples=64)
 
