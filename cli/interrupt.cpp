@@ -30,13 +30,22 @@ std::atomic<ExitCode> g_end_code{kInterrupted};
 
 /// Held while the program ends, so that nobody begins to save then.
 std::mutex g_mutex;
-int g_num_savers = 0;
+std::atomic<int> g_num_savers{0};
+static_assert(std::atomic<int>::is_always_lock_free, "a signal handler may not wait for a lock");
 std::vector<std::function<void()>> g_farewells;
 
 void wait_for(sem_t& semaphore)
 {
   while (::sem_wait(&semaphore) != 0 && errno == EINTR) {
   }
+}
+
+/// Whoever has something to save at this moment also ends the program, with an exit code that says whether it was saved: the thread
+/// that ends it otherwise may run much later, when nobody saves any more. May be called by a signal handler.
+void wish_to_stop()
+{
+  g_stop = true;
+  if (g_num_savers == 0) ::sem_post(&g_end_wished);
 }
 
 void on_signal(int number)
@@ -47,8 +56,7 @@ void on_signal(int number)
   if (number == SIGTERM && g_has_grace) {
     ::sem_post(&g_grace_begins);
   } else {
-    g_stop = true;
-    ::sem_post(&g_end_wished);
+    wish_to_stop();
   }
 }
 
@@ -74,8 +82,7 @@ void keep_grace(double seconds)
   wait_for(g_grace_begins);
   const auto half = std::chrono::duration<double>(seconds / 2);
   std::this_thread::sleep_for(half);
-  g_stop = true;
-  ::sem_post(&g_end_wished);
+  wish_to_stop();
   std::this_thread::sleep_for(half);
   std::fputs("relief: the grace time is over: what was not written by now is lost\n", stderr);
   std::_Exit(kGraceOver);
@@ -106,8 +113,8 @@ void interrupt_request() { g_announced = g_stop = true; }
 void interrupt_end(ExitCode code)
 {
   g_end_code = code;
-  interrupt_request();
-  ::sem_post(&g_end_wished);
+  g_announced = true;
+  wish_to_stop();
 }
 
 const std::atomic<bool>& interrupt_flag() { return g_stop; }

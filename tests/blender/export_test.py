@@ -162,8 +162,8 @@ def test_a_second_frame_writes_what_changed():
     written = []
     kept = final.export_scene
 
-    def spy(*arguments):
-        exported = kept(*arguments)
+    def spy(*arguments, **words):
+        exported = kept(*arguments, **words)
         written.append(exported.bytes_written)
         return exported
 

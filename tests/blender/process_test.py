@@ -124,7 +124,7 @@ def test_a_mistake_in_the_addon_is_reported():
 
     scene = _scene()
     kept = final.export_scene
-    final.export_scene = lambda *_: 1 / 0
+    final.export_scene = lambda *_, **__: 1 / 0
     try:
         assert "ZeroDivisionError" in _failure(scene)
     finally:
