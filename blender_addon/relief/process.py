@@ -72,17 +72,20 @@ def check_version(binary):
     """Makes sure that the program is one that this add-on can talk to.
 
     @return  its version, such as '0.1.0'
-    @error   ReliefError with both versions
+    @error   ReliefError with both versions, or with why it does not run: a library that is missing, another machine's program
     """
     stamp = (binary, os.stat(binary).st_mtime_ns)
     if stamp not in _checked_binaries:
         try:
             run = subprocess.run([binary, "--version"], capture_output=True, text=True, timeout=20)
         except (OSError, subprocess.TimeoutExpired) as cause:
-            raise ReliefError(f"{binary} cannot be run: {cause}") from cause
+            raise ReliefError(f"{binary} cannot be run: {getattr(cause, 'strerror', None) or cause}") from cause
+        if run.returncode != 0:
+            ended = f"ended by signal {-run.returncode}" if run.returncode < 0 else f"ended with code {run.returncode}"
+            raise ReliefError(f"{binary} cannot be run: " + (" ".join(run.stderr.split()) or ended))
         words = run.stdout.partition("\n")[0].split()
         numbers = words[1].split(".") if len(words) == 2 and words[0] == "relief" else []
-        if run.returncode != 0 or len(numbers) < 2 or not all(n.isdigit() for n in numbers[:2]):
+        if len(numbers) < 2 or not all(n.isdigit() for n in numbers[:2]):
             raise ReliefError(f"{binary} is not the relief program: `--version` says {run.stdout.strip()!r}")
         if tuple(int(n) for n in numbers[:2]) != VERSION:
             wanted = ".".join(str(n) for n in VERSION)

@@ -88,20 +88,33 @@ def test_a_missing_program_is_reported():
         os.environ["RELIEF_BINARY"], os.environ["PATH"] = kept, path
 
 
-def test_another_version_is_reported():
+def _refusal(content):
+    """What is said of a file with this content in the program's place."""
     from relief import process
 
     with folder() as path:
         name = os.path.join(path, "relief")
-        with open(name, "w", encoding="utf-8") as file:
-            file.write("#!/bin/sh\necho relief 7.2.0\n")
+        with open(name, "wb") as file:
+            file.write(content)
         os.chmod(name, stat.S_IRWXU)
         try:
             process.check_version(name)
         except process.ReliefError as error:
-            assert "7.2.0" in str(error) and "0.1" in str(error)
-        else:
-            raise AssertionError("7.2.0 was taken")
+            return str(error).removeprefix(name)
+    raise AssertionError("it was taken")
+
+
+def test_another_version_is_reported():
+    assert _refusal(b"#!/bin/sh\necho relief 7.2.0\n") == " is relief 7.2.0; this add-on needs 0.1.x"
+
+
+def test_a_program_that_does_not_start_is_reported_with_the_reason():
+    lacks = b"relief: error while loading shared libraries: libfmt.so.9: cannot open shared object file"
+    assert _refusal(b"#!/bin/sh\necho '" + lacks + b"' >&2; exit 127\n") == " cannot be run: " + lacks.decode()
+    assert _refusal(b"#!/bin/sh\nkill -ILL $$\n") == " cannot be run: ended by signal 4"
+    # The header of a program for ARM.
+    arm = b"\x7fELF\x02\x01\x01" + bytes(9) + b"\x02\x00\xb7\x00\x01\x00\x00\x00"
+    assert _refusal(arm) == " cannot be run: Exec format error"
 
 
 def test_the_preference_wins():
