@@ -2,7 +2,8 @@
 """Folders for scenes and pictures on their way between Blender and the program.
 
 They live in Blender's own temporary folder, which Blender removes when it ends. Within one render job (all frames of
-an animation) the folder stays, so that buffers of one frame serve the next, and so does the program; then both go.
+an animation) the folder stays, so that buffers of one frame serve the next, and so does the program; then both go. With
+Blender's Persistent Data they stay for the next job, until another file is opened or that is switched off.
 """
 
 import os
@@ -17,6 +18,7 @@ from .server import Server
 _PREFIX = "relief_"
 _render_folder = None
 _render_server = None
+_subscriber = object()
 
 
 def make_folder():
@@ -53,9 +55,23 @@ def remove_stale(folder, keep):
 
 
 @persistent
-def end_render_job(*_):
-    """Ends the program of the render job that is done, and removes its folder."""
+def end_render_job(scene, *_):
+    """Ends what belongs to the render job that is done, unless the scene wants it for the next."""
+    if not _is_kept(scene):
+        end_all()
+        return
+    # The artist hears of no update when the memory is wanted back.
+    for name in ("use_persistent_data", "engine"):
+        bpy.msgbus.subscribe_rna(
+            key=(bpy.types.RenderSettings, name), owner=_subscriber, args=(), notify=_end_unless_kept
+        )
+
+
+@persistent
+def end_all(*_):
+    """Ends the program of render jobs, and removes their folder."""
     global _render_folder, _render_server
+    bpy.msgbus.clear_by_owner(_subscriber)
     if _render_server is not None:
         _render_server.stop()
         _render_server = None
@@ -64,12 +80,23 @@ def end_render_job(*_):
         _render_folder = None
 
 
+def _is_kept(scene):
+    return scene.render.use_persistent_data and scene.render.engine == "RELIEF"
+
+
+def _end_unless_kept():
+    if not any(_is_kept(scene) for scene in bpy.data.scenes):
+        end_all()
+
+
 def register():
     bpy.app.handlers.render_complete.append(end_render_job)
     bpy.app.handlers.render_cancel.append(end_render_job)
+    bpy.app.handlers.load_pre.append(end_all)
 
 
 def unregister():
     bpy.app.handlers.render_complete.remove(end_render_job)
     bpy.app.handlers.render_cancel.remove(end_render_job)
-    end_render_job()
+    bpy.app.handlers.load_pre.remove(end_all)
+    end_all()

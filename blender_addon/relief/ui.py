@@ -317,6 +317,7 @@ class RELIEF_PT_performance(_RenderPanel, bpy.types.Panel):
             row.active = render.threads_mode == "FIXED"
             row.prop(render, "threads")
         rows.prop(settings, "texture_memory")
+        rows.prop(render, "use_persistent_data")
         for name in ("device", "precision", "denoise_device", "denoise_preview_quality", "denoise_final_quality"):
             if hasattr(render, f"compositor_{name}"):
                 rows.prop(render, f"compositor_{name}")

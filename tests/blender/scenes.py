@@ -100,21 +100,15 @@ def render(scene, engine, path, seed=0, samples=16):
 
 @contextlib.contextmanager
 def _one_job(scene):
-    """Renders within are one job to the add-on, as an animation's are, and Cycles' data persist: preparing a small picture takes most of
-    its time, and here it is the same again and again."""
+    """Data persist within, of both engines: preparing a small picture takes most of its time, and here it is the same again and again."""
     from relief import session
 
-    ends = bpy.app.handlers.render_complete, bpy.app.handlers.render_cancel
-    for handlers in ends:
-        handlers.remove(session.end_render_job)
     scene.render.use_persistent_data = True
     try:
         yield
     finally:
         scene.render.use_persistent_data = False
-        for handlers in ends:
-            handlers.append(session.end_render_job)
-        session.end_render_job()
+        session.end_all()
 
 
 def render_runs(scene, engine, runs, samples):

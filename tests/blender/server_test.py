@@ -1,8 +1,11 @@
 """One program for many pictures: what it is asked for, what it answers, and what becomes of a program that dies."""
 
+import contextlib
 import os
 import signal
 import time
+
+import bpy
 
 from scenes import add_camera, add_light, add_plane, diffuse, folder, new_scene
 
@@ -79,22 +82,12 @@ def test_a_program_that_dies_is_told_of_and_started_again():
     server.stop()
 
 
-def test_frames_of_an_animation_have_one_program():
-    """Only the camera moves: after the first frame nothing is loaded or built."""
-    import bpy
-    from relief import final, server, session
+@contextlib.contextmanager
+def _watched():
+    """Gathers what renders within kept of those before, (scene, preparation), and their programs."""
+    from relief import final, server
 
-    scene = new_scene(24, 16)
-    add_plane(8, diffuse((0.5, 0.5, 0.5)))
-    add_light("POINT", (0, 0, 3), energy=100)
-    camera = add_camera()
-    camera.location.x = 0
-    camera.keyframe_insert("location", frame=1)
-    camera.location.x = 1
-    camera.keyframe_insert("location", frame=3)
-    scene.frame_start, scene.frame_end = 1, 3
-    scene.relief.samples = 1
-    kept, programs = [], set()
+    kept, programs = [], []
     read, ask = final._read_statistics, server.Server.ask
 
     def reading(path):
@@ -104,16 +97,58 @@ def test_frames_of_an_animation_have_one_program():
 
     def asking(self, binary, words):
         request = ask(self, binary, words)
-        programs.add(self._process._popen.pid)
+        programs.append(self._process._popen)
         return request
 
     final._read_statistics, server.Server.ask = reading, asking
     try:
-        with folder() as path:
-            scene.render.engine, scene.render.filepath = "RELIEF", f"{path}/####"
-            bpy.ops.render.render(animation=True)
+        yield kept, programs
     finally:
         final._read_statistics, server.Server.ask = read, ask
+
+
+def _lit_plane():
+    scene = new_scene(24, 16)
+    add_plane(8, diffuse((0.5, 0.5, 0.5)))
+    add_light("POINT", (0, 0, 3), energy=100)
+    scene.relief.samples = 1
+    scene.render.engine = "RELIEF"
+    return scene, add_camera()
+
+
+def test_frames_of_an_animation_have_one_program():
+    """Only the camera moves: after the first frame nothing is loaded or built."""
+    from relief import session
+
+    scene, camera = _lit_plane()
+    camera.location.x = 0
+    camera.keyframe_insert("location", frame=1)
+    camera.location.x = 1
+    camera.keyframe_insert("location", frame=3)
+    scene.frame_start, scene.frame_end = 1, 3
+    with _watched() as (kept, programs), folder() as path:
+        scene.render.filepath = f"{path}/####"
+        bpy.ops.render.render(animation=True)
     assert kept == [(False, False), (True, True), (True, True)], kept
-    assert len(programs) == 1, programs
+    assert len(set(programs)) == 1, programs
     assert session._render_server is None
+
+
+def test_persistent_data_stay_for_the_next_job():
+    """Until they are not wanted any more, or another file is opened."""
+    scene, _ = _lit_plane()
+    with _watched() as (kept, programs), folder() as path:
+        scene.render.use_persistent_data = True
+        bpy.ops.render.render()
+        bpy.ops.render.render()
+        scene.render.use_persistent_data = False
+        bpy.ops.render.render()
+        bpy.ops.render.render()
+        scene.render.use_persistent_data = True
+        bpy.ops.render.render()
+        assert programs[-1].poll() is None
+        bpy.ops.wm.save_as_mainfile(filepath=f"{path}/a.blend", copy=True)
+        bpy.ops.wm.open_mainfile(filepath=f"{path}/a.blend")
+    assert kept == [(False, False), (True, True), (True, True), (False, False), (False, False)], kept
+    assert [programs.index(program) for program in programs] == [0, 0, 0, 3, 4]
+    assert all(program.poll() is not None for program in programs)
