@@ -21,6 +21,7 @@ class ReliefEngine(bpy.types.RenderEngine):
     def __init__(self, *arguments, **keywords):
         compat.engine_init(ReliefEngine, self, *arguments, **keywords)
         self._viewport = None
+        self.meshes = final.FinalMeshes()
 
     def __del__(self):
         # Blender may drop an engine whose __init__ it has not run, or of which it has taken down its own part.

@@ -11,7 +11,7 @@ import numpy as np
 from . import exr, report, result, session
 from .export.camera import camera_json
 from .export.motion import Motion, shutter_of
-from .export.scene import DATA_FOLDER, View, export_scene, write_view
+from .export.scene import DATA_FOLDER, StoredMeshes, View, export_scene, write_view
 from .export.settings import denoiser_of, sampling_of, warn_unread_settings
 from .preferences import find_checked_binary
 from .report import ReliefError, Report, say
@@ -33,23 +33,49 @@ def render(engine, depsgraph):
     @error  ReliefError
     """
     begin = time.perf_counter()
+    meshes = engine.meshes.of(depsgraph)
     binary = find_checked_binary()
     scene = depsgraph.scene
     warnings = Report(strict=scene.relief.strict)
     warn_unread(scene, warnings)
     where = f'scene "{scene.name}"'
     shutter = shutter_of(scene, depsgraph.view_layer, lambda *text: warnings.warn(where, *text))
+    if shutter is not None:  # shapes at several times are written anew
+        engine.meshes.forget()
+        meshes = None
     now = scene.frame_current, scene.frame_subframe
     for eye in _eyes(scene):
         engine.active_view_set(eye)
         try:
             motion = Motion(engine, depsgraph, shutter, warnings) if shutter is not None else None
-            _render(engine, depsgraph, binary, warnings, motion, eye, begin)
+            _render(engine, depsgraph, binary, warnings, meshes, motion, eye, begin)
         finally:
             if shutter is not None:
                 engine.frame_set(*now)
         if engine.test_break():
             return
+
+
+class FinalMeshes:
+    """What an engine's renders wrote, for its next one: an engine has one where Blender's Persistent Data let it live."""
+
+    def __init__(self):
+        self._place = None
+        self._stored = StoredMeshes()
+
+    def of(self, depsgraph):
+        """StoredMeshes, without those that have changed. To be called in each render, before anything may fail: Blender
+        says what has changed once."""
+        place = depsgraph.scene.name, depsgraph.view_layer.name, session.render_folder()
+        if self._place == place:
+            self._stored.forget_changed(depsgraph)
+        else:
+            self._place, self._stored = place, StoredMeshes()
+        return self._stored
+
+    def forget(self):
+        """A render writes others."""
+        self._stored = StoredMeshes()
 
 
 def _eyes(scene):
@@ -61,9 +87,10 @@ def _eyes(scene):
     return [view.name for view in render.views if view.use and (not is_stereo or view.name in {"left", "right"})]
 
 
-def _render(engine, depsgraph, binary, warnings, motion, eye, begin):
+def _render(engine, depsgraph, binary, warnings, meshes, motion, eye, begin):
     """The rest of it.
 
+    @param  meshes  StoredMeshes of renders before; None: there are none
     @param  motion  Motion, which has left the engine when the shutter is half done; None: nothing takes time
     @param  eye     the stereoscopic view, which the engine has as its active one
     @param  begin   time.perf_counter when it all began
@@ -81,7 +108,7 @@ def _render(engine, depsgraph, binary, warnings, motion, eye, begin):
     # Where nothing takes time the view has a file of its own: if it alone moves, the program keeps all that it has loaded and
     # built.
     scene_view = view if motion is not None else any_view(view.size)
-    exported = export_scene(depsgraph, scene_view, folder, "scene.gltf", warnings, motion, seen_from=view)
+    exported = export_scene(depsgraph, scene_view, folder, "scene.gltf", warnings, motion, view, meshes)
     session.remove_stale(os.path.join(folder, DATA_FOLDER), exported.used_files)
     known = set(warnings.warnings)
     report.last_coverage[scene.name] = warnings.coverage

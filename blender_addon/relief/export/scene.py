@@ -67,7 +67,7 @@ class View:
     size: tuple
 
 
-def export_scene(depsgraph, view, folder, name, report, motion=None, seen_from=None):
+def export_scene(depsgraph, view, folder, name, report, motion=None, seen_from=None, stored=None):
     """Writes what a depsgraph holds as a scene file.
 
     @param  depsgraph  evaluated
@@ -77,11 +77,12 @@ def export_scene(depsgraph, view, folder, name, report, motion=None, seen_from=N
     @param  report     Report
     @param  motion     Motion while the shutter is open; None: nothing takes time
     @param  seen_from  View by whose coordinates a world may be seen; None: view
+    @param  stored     StoredMeshes of earlier exports into the folder; None: there are none
     @return            Exported
     """
     begin = time.perf_counter()
     writer = GltfWriter(folder, DATA_FOLDER)
-    exporter = SceneExporter(depsgraph, writer, report, motion=motion)
+    exporter = SceneExporter(depsgraph, writer, report, stored, motion)
     exporter.add_all(view, seen_from)
     index_of = {}
     writer.json.update(scene_json(exporter.nodes, index_of))
@@ -170,6 +171,8 @@ class StoredMeshes:
 
     def forget_changed(self, depsgraph):
         """Drops what the depsgraph says has a new shape, objects and their data alike."""
+        if not self._by_object:
+            return
         changed = {update.id.original.as_pointer() for update in depsgraph.updates if update.is_updated_geometry}
         self._by_object = {
             key: entry for key, entry in self._by_object.items() if key not in changed and entry[1] not in changed
