@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 #include <string>
 
-#include "kernel/bsdf/closure_kinds.h"
 #include "kernel/graph/graph_eval.h"
 #include "kernel/graph/image.h"
 
@@ -14,21 +12,6 @@ namespace relief {
 namespace {
 
 const GraphOpShape& shape_of(GraphOp op) { return kGraphOpShapes[static_cast<int>(op)]; }
-
-/// Tells a program's results that are constant from those that vary.
-void results_split(GraphProgram& program)
-{
-  for (std::size_t i = 0; i < program.results.size(); ++i) {
-    const std::uint16_t operand = program.results[i];
-    const bool is_constant = operand >= kMostGraphRegisters && operand != kNoGraphOperand;
-    program.varying_before.push_back(static_cast<std::uint16_t>(program.varying.size()));
-    if (operand < kMostGraphRegisters) program.varying.push_back(static_cast<std::uint16_t>(i));
-    program.result_values.push_back(
-        is_constant ? closure_input(program.constants[std::size_t{operand} - kMostGraphRegisters]) : 0.0f);
-  }
-  program.varying_before.push_back(static_cast<std::uint16_t>(program.varying.size()));
-  program.result_values.resize(program.results.size() + 8);
-}
 
 }  // namespace
 
@@ -298,33 +281,6 @@ std::uint32_t GraphBuilder::add_table(std::span<const float> values)
   return it->second;
 }
 
-/// Immediates of an operation in a program, which gets the table that it reads.
-/// @param places  of the tables that the program has, by those in tables_
-std::vector<std::uint16_t> GraphBuilder::placed(const Operation& operation,
-                                                std::map<std::uint32_t, std::uint32_t>& places,
-                                                GraphProgram& program) const
-{
-  std::vector<std::uint16_t> immediates = operation.immediates;
-  const bool are_tiles = operation.op == GraphOp::image_tiles;
-  const bool is_grid = operation.op == GraphOp::grid;
-  const bool is_ies = operation.op == GraphOp::ies;
-  if (!are_tiles && !is_grid && !is_ies && operation.op != GraphOp::table) return immediates;
-  const std::size_t low = are_tiles ? 2 : 0;  // where the place stands
-  const int size = are_tiles ? immediates[1] * kImageTileColumns
-                   : is_grid ? immediates[2] * immediates[3] * 3
-                   : is_ies  ? ies_table_size(immediates[2], immediates[3])
-                             : immediates[2];
-  const std::uint32_t from = immediates[low] | std::uint32_t{immediates[low + 1]} << 16;
-  const auto [it, is_new] = places.try_emplace(from, static_cast<std::uint32_t>(program.tables.size()));
-  if (is_new) {
-    const auto row = tables_.begin() + from;
-    program.tables.insert(program.tables.end(), row, row + size);
-  }
-  immediates[low] = static_cast<std::uint16_t>(it->second & 0xffffu);
-  immediates[low + 1] = static_cast<std::uint16_t>(it->second >> 16);
-  return immediates;
-}
-
 void GraphBuilder::set_output(GraphOutput output, const GraphVector& value)
 {
   outputs_[static_cast<std::size_t>(output)] = value;
@@ -436,132 +392,6 @@ GraphSchedule GraphBuilder::schedule(bool skips) const
     if (operation_of(a) >= 0) wanted_operations.push_back(operation_of(a));
   }
   return graph_schedule(operations, wanted_operations, skips ? guard_groups_.size() : 0);
-}
-
-GraphProgram GraphBuilder::compile(bool skips) const
-{
-  if (skips) {
-    // What is shared is held for longer, which may be too long.
-    try {
-      return compile(schedule(true));
-    } catch (const GraphTooLarge&) {
-    }
-  }
-  return compile(schedule(false));
-}
-
-GraphProgram GraphBuilder::compile(const GraphSchedule& schedule) const
-{
-  using StepKind = ScheduleStep::Kind;
-  const auto operation_at = [this](std::int32_t i) -> const Operation& {
-    return operations_[static_cast<std::size_t>(i)];
-  };
-  // Guards that are not run hand on what they guard.
-  const auto source = [&](GraphScalar a) {
-    for (;;) {
-      const Node& node = nodes_[static_cast<std::size_t>(a.index)];
-      if (node.kind != Node::Kind::kOperation || operation_at(node.operation).op != GraphOp::guard) return a;
-      const std::size_t group = operation_at(node.operation).immediates[0];
-      if (group < schedule.is_guarded.size() && schedule.is_guarded[group] != 0) return a;
-      a = operation_at(node.operation).inputs[0];
-    }
-  };
-  const auto source_index = [&](GraphScalar a) { return static_cast<std::size_t>(source(a).index); };
-  // Last use of every value: position in the schedule, or beyond it for outputs.
-  constexpr auto kEver = std::numeric_limits<std::int32_t>::max();
-  std::vector<std::int32_t> last_use(nodes_.size(), -1);
-  for (std::size_t position = 0; position < schedule.steps.size(); ++position) {
-    if (schedule.steps[position].kind != StepKind::kRun) continue;
-    for (const GraphScalar a : operation_at(schedule.steps[position].index).inputs) {
-      last_use[source_index(a)] = static_cast<std::int32_t>(position);
-    }
-  }
-  for (const GraphScalar a : wanted()) last_use[source_index(a)] = kEver;
-
-  GraphProgram program;
-  std::map<std::uint32_t, std::uint32_t> table_places;
-  std::vector<std::uint16_t> operand_of(nodes_.size(), kNoGraphOperand);
-  std::vector<std::uint16_t> free_registers;
-  const auto take_register = [&] {
-    if (!free_registers.empty()) {
-      const std::uint16_t taken = free_registers.back();
-      free_registers.pop_back();
-      return taken;
-    }
-    if (program.num_registers == kMostGraphRegisters) {
-      throw GraphTooLarge("one that needs at most " + std::to_string(kMostGraphRegisters) + " values at a time");
-    }
-    return static_cast<std::uint16_t>(program.num_registers++);
-  };
-  for (std::size_t i = 0; i < nodes_.size(); ++i) {
-    if (last_use[i] < 0) continue;
-    if (nodes_[i].kind == Node::Kind::kQuantity) {
-      operand_of[i] = take_register();
-      program.inputs.push_back({nodes_[i].quantity, nodes_[i].shift, operand_of[i], nodes_[i].index, nodes_[i].width});
-    } else if (nodes_[i].kind == Node::Kind::kConstant) {
-      constexpr std::size_t kMostConstants = kNoGraphOperand - kMostGraphRegisters;
-      if (program.constants.size() == kMostConstants) {
-        throw GraphTooLarge("one with at most " + std::to_string(kMostConstants) + " different constants");
-      }
-      operand_of[i] = static_cast<std::uint16_t>(kMostGraphRegisters + program.constants.size());
-      program.constants.push_back(nodes_[i].value);
-    }
-  }
-  // Factor of each group, and where the words to leave out are to be written.
-  std::vector<GraphScalar> factors(guard_groups_.size());
-  for (const Operation& operation : operations_) {
-    if (operation.op == GraphOp::guard) factors[operation.immediates[0]] = operation.inputs[1];
-  }
-  std::vector<std::size_t> skips(guard_groups_.size());
-  for (std::size_t position = 0; position < schedule.steps.size(); ++position) {
-    const ScheduleStep step = schedule.steps[position];
-    const auto group = static_cast<std::size_t>(step.index);
-    if (step.kind == StepKind::kSkip) {
-      program.code.insert(program.code.end(),
-                          {static_cast<std::uint16_t>(GraphOp::skip), 0, 0, operand_of[source_index(factors[group])]});
-      skips[group] = program.code.size();
-      continue;
-    }
-    if (step.kind == StepKind::kEnd) {
-      const std::size_t words = program.code.size() - skips[group];
-      program.code[skips[group] - 3] = static_cast<std::uint16_t>(words & 0xffffu);
-      program.code[skips[group] - 2] = static_cast<std::uint16_t>(words >> 16);
-      continue;
-    }
-    const Operation& operation = operation_at(step.index);
-    // Outputs first: an operation may write one before it has read all that it reads.
-    for (const GraphScalar a : operation.outputs) operand_of[static_cast<std::size_t>(a.index)] = take_register();
-    program.code.push_back(static_cast<std::uint16_t>(operation.op));
-    const std::vector<std::uint16_t> immediates = placed(operation, table_places, program);
-    program.code.insert(program.code.end(), immediates.begin(), immediates.end());
-    for (const GraphScalar a : operation.outputs) program.code.push_back(operand_of[static_cast<std::size_t>(a.index)]);
-    for (const GraphScalar a : operation.inputs) program.code.push_back(operand_of[source_index(a)]);
-    std::vector<std::size_t> ended;
-    for (const GraphScalar a : operation.inputs) {
-      if (last_use[source_index(a)] == static_cast<std::int32_t>(position)) ended.push_back(source_index(a));
-    }
-    for (const GraphScalar a : operation.outputs) {
-      const auto i = static_cast<std::size_t>(a.index);
-      if (last_use[i] < 0) ended.push_back(i);
-    }
-    std::sort(ended.begin(), ended.end());
-    ended.erase(std::unique(ended.begin(), ended.end()), ended.end());
-    for (const std::size_t i : ended) {
-      if (operand_of[i] < kMostGraphRegisters) free_registers.push_back(operand_of[i]);
-    }
-  }
-  for (std::size_t i = 0; i < outputs_.size(); ++i) {
-    const bool is_given = outputs_[i][0].index >= 0;
-    if (is_given) program.given |= 1u << i;
-    for (std::size_t c = 0; c < 3; ++c) {
-      program.outputs[i][c] = is_given ? operand_of[source_index(outputs_[i][c])] : kNoGraphOperand;
-    }
-  }
-  for (const GraphScalar a : results_) {
-    program.results.push_back(a.index < 0 ? kNoGraphOperand : operand_of[source_index(a)]);
-  }
-  results_split(program);
-  return program;
 }
 
 }  // namespace relief

@@ -111,6 +111,7 @@ class GraphBuilder {
     std::vector<GraphScalar> inputs;
     std::vector<GraphScalar> outputs;
   };
+  class Compilation;
   using Key = std::vector<std::int64_t>;
   using Rewritten = std::map<std::int32_t, GraphScalar>;  ///< by what they were
 
@@ -123,10 +124,6 @@ class GraphBuilder {
                                 std::span<const GraphScalar> inputs,
                                 std::span<const std::uint16_t> immediates);
   GraphSchedule schedule(bool skips) const;
-  GraphProgram compile(const GraphSchedule& schedule) const;
-  std::vector<std::uint16_t> placed(const Operation& operation,
-                                    std::map<std::uint32_t, std::uint32_t>& places,
-                                    GraphProgram& program) const;
 
   std::vector<Node> nodes_;
   std::vector<Operation> operations_;
