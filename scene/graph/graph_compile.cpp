@@ -55,10 +55,12 @@ class GraphBuilder::Compilation {
   const GraphBuilder& builder_;
   const GraphSchedule& schedule_;
   GraphProgram program_;
-  std::vector<std::int32_t> last_use_;  ///< of every value: position in the schedule, or beyond it for outputs; −1: none
+  /// Of every value: position in the schedule, or beyond it for outputs; −1: none.
+  std::vector<std::int32_t> last_use_;
   std::vector<std::uint16_t> operand_of_;
   std::vector<std::uint16_t> free_registers_;
-  std::map<std::uint32_t, std::uint32_t> table_places_;  ///< of the tables that the program has, by those of the builder
+  /// Of the tables that the program has, by those of the builder.
+  std::map<std::uint32_t, std::uint32_t> table_places_;
 };
 
 /// What gives a number: guards that are not run hand on what they guard.
