@@ -23,7 +23,8 @@ bool is_identity(const Affine3& m)
 
 std::uint32_t mask_of(std::uint32_t instance_flags)
 {
-  return kRayBounce | ((instance_flags & kVisibleToCamera) != 0 ? std::uint32_t{kRayCamera} : 0u) |
+  const std::uint32_t hidden = (instance_flags & kHiddenFrom) >> kHiddenFromShift << kRayBounceShift;
+  return (kRayBounce & ~hidden) | ((instance_flags & kVisibleToCamera) != 0 ? std::uint32_t{kRayCamera} : 0u) |
          ((instance_flags & kCastsShadow) != 0 ? std::uint32_t{kRayShadow} : 0u);
 }
 

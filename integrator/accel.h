@@ -20,8 +20,8 @@
 
 namespace relief {
 
-/// Ray kinds as Embree mask bits.
-enum RayMask : std::uint32_t { kRayCamera = 1u << 0, kRayBounce = 1u << 1, kRayShadow = 1u << 2 };
+/// Ray kinds as Embree mask bits. Those of bounced rays lie as in InstanceFlag's kHiddenFrom.
+enum RayMask : std::uint32_t { kRayCamera = 1u << 0, kRayShadow = 1u << 1, kRayBounceShift = 2, kRayBounce = 0xfu << kRayBounceShift };
 
 /// What a tree holds of a mesh, without ownership.
 struct TreeMesh {

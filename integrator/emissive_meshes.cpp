@@ -133,14 +133,13 @@ std::vector<EmissiveMesh> emissive_meshes(const Scene& scene, LightSet& set)
   }
   const bool may_share = set.num_emissive_triangles > static_cast<std::size_t>(kLightTreeWidth);
   std::vector<EmissiveMesh> meshes;
-  std::map<std::tuple<int, int, bool>, std::size_t> known;
+  std::map<std::tuple<int, int, std::uint32_t>, std::size_t> known;
   for (const std::size_t i : emissive) {
     const Instance& instance = scene.instances[i];
     float scale = 0;
     if (may_share && is_similarity(instance.world_from_object, &scale)) {
-      const bool no_caustics = (instance.flags & kNoCausticLight) != 0;
-      const auto [place, is_new] =
-          known.try_emplace({instance.mesh_index, instance.material_index, no_caustics}, meshes.size());
+      const auto [place, is_new] = known.try_emplace(
+          {instance.mesh_index, instance.material_index, instance.flags & (kNoCausticLight | kHiddenFrom)}, meshes.size());
       if (!is_new) {
         meshes[place->second].instances.push_back(i);
         continue;
@@ -192,7 +191,9 @@ std::vector<float> emissive_meshes_add(const Scene& scene,
       light.is_even = emission_is_even(material);
       // Photons do not start where no point was seen to shine: paths find that light.
       const bool is_dark = !means.empty() && is_zero(means[triangle]);
-      light.casts_caustics = (instance.flags & kNoCausticLight) == 0 && !is_dark && !asks_for_path;
+      light.hidden_from = static_cast<std::uint8_t>((instance.flags & kHiddenFrom) >> kHiddenFromShift);
+      light.casts_caustics =
+          (instance.flags & kNoCausticLight) == 0 && light.hidden_from == 0 && !is_dark && !asks_for_path;
       light.instance_index = static_cast<std::int32_t>(i);
       set.lights[emissive.first_light + triangle] = light;
       if (texture != nullptr && means.empty()) {

@@ -11,7 +11,9 @@ namespace {
 
 std::uint32_t mask_of(const PathState& state, std::uint32_t path)
 {
-  return state.bounces[path] == 0 ? kRayCamera : kRayBounce;
+  if (state.bounces[path] == 0) return kRayCamera;
+  const std::uint32_t flags = state.flags[path];
+  return (flags & kPathPhoton) != 0 ? kRayBounce : path_ray_kind(flags) << kRayBounceShift;
 }
 
 void intersect_packet(const KernelGlobals& g,

@@ -92,7 +92,7 @@ bool Walker::meet(std::uint32_t path, Vec3f P, Vec3f D, float t_max, RTCRayHit& 
     ray.ray.tnear = from;
     ray.ray.tfar = t_max;
     ray.ray.time = path_time(state, path);
-    ray.ray.mask = kRayBounce;
+    ray.ray.mask = ~0u;
     ray.ray.id = 0;
     ray.ray.flags = 0;
     ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;

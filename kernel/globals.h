@@ -73,7 +73,7 @@ struct KernelGlobals {
       -1;  ///< where it is not: of lobes up to this width α what is refracted leaves the film clear; −1: none
   bool has_backdrop = false;
   EnvironmentView backdrop;                   ///< what camera rays see in the environment's place
-  std::uint32_t environment_hidden_from = 0;  ///< bit PathEvent: rays that started so do not see it
+  std::uint32_t environment_hidden_from = 0;  ///< as Environment::hidden_from
   Mist mist;
   float occlusion_distance = 10;  ///< metres, for Aov::kAmbientOcclusion
   /// Of instances, materials, and instances' assets: what Cryptomattes call them. Null: not kept.

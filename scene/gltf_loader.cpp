@@ -28,14 +28,15 @@ namespace {
 
 std::uint32_t instance_flags(const ObjectSettings& object, const Material& material, const Transform& world)
 {
-  // What rays for light pass, or may pass, must not send that light on as photons as well.
+  // What rays for light pass, or may pass, must not send that light on as photons as well; nor what some rays do not see.
   const bool caster =
-      (object.caustic_caster == CausticCaster::kYes && !material.depends_on_ray) ||
-      (object.caustic_caster == CausticCaster::kAuto && object.casts_shadow && material_casts_caustics(material));
+      object.hidden_from == 0 &&
+      ((object.caustic_caster == CausticCaster::kYes && !material.depends_on_ray) ||
+       (object.caustic_caster == CausticCaster::kAuto && object.casts_shadow && material_casts_caustics(material)));
   return (object.visible_to_camera ? kVisibleToCamera : 0u) | (object.casts_shadow ? kCastsShadow : 0u) |
          (transform_mirrors(world) ? kMirrored : 0u) | (caster ? kCausticCaster : 0u) |
          (object.caustic_receiver ? kCausticReceiver : 0u) | (object.caustic_light ? 0u : kNoCausticLight) |
-         (object.holdout ? kHoldout : 0u);
+         (object.holdout ? kHoldout : 0u) | object.hidden_from << kHiddenFromShift;
 }
 
 /// Texture coordinates that a material's normal maps are laid out in; −1: it has none.
@@ -318,10 +319,12 @@ void GltfLoader::place_instance(const PlacedNode& node,
   instance.world_from_object = transform_to_affine(world);
   instance.flags =
       instance_flags(node.object, scene_.materials[static_cast<std::size_t>(instance.material_index)], world);
-  if (node.object.caustic_caster == CausticCaster::kYes &&
-      scene_.materials[static_cast<std::size_t>(instance.material_index)].depends_on_ray) {
-    warnings_.add(node.document->file + ": " + path +
-                  ": its material depends on the kind of ray, so that it casts no caustics of photons");
+  if (node.object.caustic_caster == CausticCaster::kYes) {
+    const bool by_material = scene_.materials[static_cast<std::size_t>(instance.material_index)].depends_on_ray;
+    if (by_material || node.object.hidden_from != 0) {
+      warnings_.add(node.document->file + ": " + path + (by_material ? ": its material depends on the kind of ray" : ": some rays do not see it") +
+                    ", so that it casts no caustics of photons");
+    }
   }
   // Paths alone bring light to curves and from them.
   if (is_curves) instance.flags &= ~std::uint32_t{kCausticCaster | kCausticReceiver};

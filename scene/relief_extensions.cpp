@@ -20,13 +20,13 @@ constexpr double kNoLimit = JsonReader::kNoLimit;
 /// @param inherited  what it is where nothing is said
 std::uint32_t read_hidden_from(const JsonReader& r, std::uint32_t inherited = 0)
 {
-  static constexpr std::pair<std::string_view, PathEvent> kRays[] = {
-      {"visibleToDiffuse", PathEvent::kDiffuse},
-      {"visibleToGlossy", PathEvent::kGlossy},
-      {"visibleToTransmission", PathEvent::kTransmission}};
+  static constexpr std::pair<std::string_view, std::uint32_t> kRays[] = {
+      {"visibleToDiffuse", 1u << static_cast<std::uint32_t>(PathEvent::kDiffuse)},
+      {"visibleToGlossy", 1u << static_cast<std::uint32_t>(PathEvent::kGlossy)},
+      {"visibleToTransmission", 1u << static_cast<std::uint32_t>(PathEvent::kTransmission)},
+      {"visibleToScattered", kHiddenFromScattered}};
   std::uint32_t hidden = 0;
-  for (const auto& [name, event] : kRays) {
-    const std::uint32_t bit = 1u << static_cast<std::uint32_t>(event);
+  for (const auto& [name, bit] : kRays) {
     if (!r.boolean(name, (inherited & bit) == 0)) hidden |= bit;
   }
   return hidden;

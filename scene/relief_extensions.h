@@ -58,7 +58,7 @@ struct ObjectSettings {
   bool caustic_receiver = true;
   bool caustic_light = true;
   bool holdout = false;
-  std::uint32_t hidden_from = 0;  ///< of lights, see Light::hidden_from
+  std::uint32_t hidden_from = 0;  ///< as Light::hidden_from
   std::string asset;              ///< empty: none is named
   /// Values by name that graphs read as attributes: three components and alpha. Null: none.
   std::shared_ptr<const std::map<std::string, std::array<float, 4>>> values;

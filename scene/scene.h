@@ -118,7 +118,7 @@ struct Environment : Surroundings {
   std::optional<Surroundings> backdrop;  ///< what camera rays see in its place
   bool visible_to_camera = true;
   bool casts_caustics = true;     ///< as Light::casts_caustics
-  std::uint32_t hidden_from = 0;  ///< bit PathEvent: bounced rays that do not see it
+  std::uint32_t hidden_from = 0;  ///< bit PathEvent, or kHiddenFromScattered: bounced rays that do not see it
   std::optional<Medium> medium;   ///< that fills all space
   VolumeProgram varying_medium;   ///< see Scene::varying_media
   /// Perceptual: where the camera does not see it, glass up to this roughness is as clear as air. Empty: glass is opaque.

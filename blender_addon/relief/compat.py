@@ -352,9 +352,10 @@ def world_of(scene, view_layer):
 def world_visibility(world, ray):
     """(what has it, its name) of the property by which rays of a kind see the world; None: there is none.
 
-    @param  ray  'camera', 'diffuse', 'glossy' or 'transmission'
+    @param  ray  'camera', 'diffuse', 'glossy', 'transmission' or 'volume_scatter'
     """
-    for owner, name in ((world, f"visible_{ray}"), (getattr(world, "cycles_visibility", None), ray)):
+    of_cycles = ray.removeprefix("volume_")
+    for owner, name in ((world, f"visible_{ray}"), (getattr(world, "cycles_visibility", None), of_cycles)):
         if hasattr(owner, name):
             return owner, name
     return None

@@ -482,7 +482,7 @@ class RELIEF_PT_world_ray_visibility(_WorldPanel, bpy.types.Panel):
 
     def draw(self, context):
         rows = self.rows()
-        for ray in ("camera", "diffuse", "glossy", "transmission"):
+        for ray in ("camera", "diffuse", "glossy", "transmission", "volume_scatter"):
             rows.prop(*compat.world_visibility(context.world, ray))
 
 
@@ -587,9 +587,9 @@ class RELIEF_PT_object_ray_visibility(_SeenObjectPanel, bpy.types.Panel):
 
     def draw(self, context):
         shown, rows = context.object, self.rows()
-        for ray in ("camera", "diffuse", "glossy", "transmission", "shadow"):
+        for ray in ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow"):
             if ray != "shadow" or shown.type != "LIGHT":
-                rows.prop(shown, f"visible_{ray}", text=ray.capitalize())
+                rows.prop(shown, f"visible_{ray}", text=ray.replace("_", " ").title())
 
 
 class RELIEF_PT_object_caustics(_SeenObjectPanel, bpy.types.Panel):

@@ -74,7 +74,10 @@ enum InstanceFlag : std::uint32_t {
   kDeforms = 1u << 12,  ///< likewise, and a mesh: see path_mesh
   kCurves = 1u << 13,   ///< its mesh is one of curves
   kRibbons = 1u << 14,  ///< these are flat and face the ray
+  kHiddenFromShift = 15,  ///< position of four bits, as of Light::hidden_from: bounced rays that do not meet it
 };
+
+inline constexpr std::uint32_t kHiddenFrom = 0xfu << kHiddenFromShift;
 
 /// One placement of a mesh.
 struct InstanceView {

@@ -83,6 +83,12 @@ RELIEF_KERNEL int path_bounces(std::uint32_t bounces, BounceKind kind)
 /// PathEvent of a path's present ray, as an index.
 RELIEF_KERNEL std::uint32_t path_event(std::uint32_t flags) { return flags >> kPathEventShift & 3u; }
 
+/// Its bit in sets of rays that do not see something, as Light::hidden_from.
+RELIEF_KERNEL std::uint32_t path_ray_kind(std::uint32_t flags)
+{
+  return (flags & kPathScattered) != 0 ? kHiddenFromScattered : 1u << path_event(flags);
+}
+
 RELIEF_KERNEL std::uint32_t path_flags_after(std::uint32_t flags, PathEvent event)
 {
   return (flags & ~(3u << kPathEventShift | kPathScattered)) | static_cast<std::uint32_t>(event) << kPathEventShift;
@@ -178,9 +184,10 @@ RELIEF_KERNEL float path_light_weight(LightTechnique technique, float pdf_light,
 /// Whether a path that meets a light adds it, or none of it comes this way, or all of it is for next-event estimation to find.
 RELIEF_KERNEL bool path_sees_light(const PathState& s, std::uint32_t i, const Light& light)
 {
+  if ((s.flags[i] & kPathScattered) != 0) return (light.hidden_from & kHiddenFromScattered) == 0;
   const auto event = static_cast<PathEvent>(path_event(s.flags[i]));
   if (event == PathEvent::kCamera) return light.visible_to_camera;
-  if (light.hidden_from == 0 || (s.flags[i] & kPathScattered) != 0) return true;
+  if (light.hidden_from == 0) return true;
   // Of single directions the event is known.
   if (!(s.pdf[i] > 0.0f)) return (light.hidden_from >> static_cast<int>(event) & 1u) == 0;
   return !light_hides(light, event == PathEvent::kTransmission).any();

@@ -43,9 +43,7 @@ RELIEF_KERNEL void shade_background(const KernelGlobals& g, PathState& state, st
   const int scatterings = path_bounces(state.bounces[path], BounceKind::kAll);
   const bool is_kept = scatterings == 0 && g.film.layout.environment >= 0;
   const bool is_shown = scatterings == 0 ? g.environment_visible_to_camera
-                        : (state.flags[path] & kPathScattered) != 0
-                            ? true
-                            : (g.environment_hidden_from >> path_event(state.flags[path]) & 1u) == 0;
+                                         : (g.environment_hidden_from & path_ray_kind(state.flags[path])) == 0;
   // What has passed through clear glass, or a filter, leaves as much of the film clear as it has kept of its light.
   if (!g.environment_visible_to_camera && (state.flags[path] & kPathCovers) == 0) {
     const float share =

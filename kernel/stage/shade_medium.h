@@ -104,6 +104,7 @@ RELIEF_KERNEL void shade_medium_light_at(const KernelGlobals& g,
   const LightAnswer answer = light_ask(g, state, path, chosen, P, {}, storage);
   const LightSample& light = answer.sample;
   if (!(light.pdf > 0.0f) || is_zero(answer.radiance)) return;
+  if (answer.emitter != nullptr && (answer.emitter->hidden_from & kHiddenFromScattered) != 0) return;
   const PhaseEval phase = media_eval(media, at.D, light.wi);
   const float weight = path_light_weight(g.light_technique, light.pdf, phase.pdf, light.delta);
   const Vec3f gain = place.carried * phase.f * answer.radiance * (weight / (light.pdf * place.pdf));

@@ -15,7 +15,10 @@ from scenes import (
     degrees,
     diffuse,
     link,
+    make_sharp,
+    new_material,
     new_scene,
+    set_bounces,
     set_world,
 )
 
@@ -168,6 +171,34 @@ def test_hidden_from_camera_and_shadowless():
     assert_agrees(scene)
 
 
+def _seen_by_some(ray, material):
+    """A ball hidden from rays of a kind, on a plastic floor between a mirror, a pane of glass and a translucent one."""
+    scene = new_scene()
+    plastic, _, _ = new_material("plastic", "ShaderNodeBsdfPrincipled", Roughness=0.2)
+    add_plane(material=plastic)
+    mirror, _, node = new_material("mirror", "ShaderNodeBsdfGlossy", Color=(0.9, 0.9, 0.9, 1))
+    make_sharp(node)
+    add_plane(2.0, mirror, (-1.6, 1, 1)).rotation_euler = degrees(90, 0, 40)
+    glass, _, node = new_material("glass", "ShaderNodeBsdfRefraction", IOR=1.2)
+    make_sharp(node)
+    add_plane(1.0, glass, (0.2, -1, 0.5)).rotation_euler = degrees(70, 0, 0)
+    translucent, _, _ = new_material("translucent", "ShaderNodeBsdfTranslucent")
+    add_plane(1.0, translucent, (1.3, -0.6, 0.5)).rotation_euler = degrees(75, 0, 0)
+    ball = add_sphere(0.6, material, (0.3, 0.6, 0.7))
+    setattr(ball, f"visible_{ray}", False)
+    set_world((0.3, 0.35, 0.4))
+    add_camera((0, -6, 4), degrees(58, 0, 0), lens=40)
+    set_bounces(scene, 2)
+    return scene
+
+
+def test_objects_that_some_rays_do_not_see():
+    bright = new_material("light", "ShaderNodeEmission", Color=(1, 0.7, 0.4, 1), Strength=6.0)[0]
+    for ray in ("diffuse", "glossy", "transmission"):
+        assert_agrees(_seen_by_some(ray, diffuse((0.9, 0.1, 0.1))), samples=64)
+        assert_agrees(_seen_by_some(ray, bright), samples=64)
+
+
 def test_render_visibility():
     scene = _stage()
     add_sphere(0.8, location=(-1, 0, 0.8)).hide_render = True
@@ -177,8 +208,6 @@ def test_render_visibility():
 
 def test_indirect_light():
     """Several bounces in a coloured box."""
-    from scenes import set_bounces
-
     scene = new_scene()
     set_bounces(scene, 8)
     bpy.ops.mesh.primitive_cube_add(size=4)

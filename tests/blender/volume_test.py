@@ -96,6 +96,24 @@ def test_lamp_in_fog():
     assert_agrees(scene, samples=128)
 
 
+def test_what_scattered_light_does_not_see():
+    """A wall, one that shines, a lamp and the world."""
+    for hidden in ("wall", "bright wall", "lamp", "world"):
+        scene = _scene()
+        add_plane(20)
+        bright = new_material("light", "ShaderNodeEmission", Color=(1, 0.7, 0.4, 1), Strength=3.0)[0]
+        wall = add_plane(2, bright if hidden == "bright wall" else diffuse((0.7, 0.3, 0.2)), (0.5, 1.0, 1.2))
+        wall.rotation_euler = degrees(80, 0, 0)
+        lamp = add_light("AREA", (1, 0, 2.5), energy=40.0, size=0.8)
+        set_world((0.2, 0.25, 0.3))
+        _add_box((6, 4, 3), _volume("ShaderNodeVolumeScatter", Color=(0.8, 0.9, 1, 1), Density=0.3), (0, 0, 1.4))
+        if hidden == "world":
+            scene.world.cycles_visibility.scatter = False
+        else:
+            (lamp if hidden == "lamp" else wall).visible_volume_scatter = False
+        assert_agrees(scene, samples=96)
+
+
 def test_dense_ball_long():
     scene = _scene(8, 8)
     add_plane(20)

@@ -191,6 +191,19 @@ TEST(SunDisk, IsSeenByTheCameraIfItIsToBe)
   EXPECT_NEAR(render_scene(scene, render_options(scene, 4, 1)).mean(), expected, 1e-5);
 }
 
+/// Glass of the index of air, which absorbs.
+Material absorbing(float sigma)
+{
+  Material m = diffuse_material({1, 1, 1});
+  m.roughness = 0;
+  m.transmission = 1;
+  m.ior = 1;
+  m.thickness = 1;
+  m.attenuation_color = splat3(std::exp(-sigma));
+  m.attenuation_distance = 1;
+  return m;
+}
+
 std::uint8_t hidden(std::initializer_list<PathEvent> events)
 {
   unsigned bits = 0;
@@ -275,17 +288,75 @@ TEST(HiddenLight, IsNotMirrored)
   EXPECT_EQ(render_scene(scene, render_options(scene, 4, 16)).mean(), 0.0);
 }
 
-/// Glass of the index of air, which absorbs.
-Material absorbing(float sigma)
+std::uint32_t hidden_flags(std::initializer_list<PathEvent> events)
 {
-  Material m = diffuse_material({1, 1, 1});
-  m.roughness = 0;
-  m.transmission = 1;
-  m.ior = 1;
-  m.thickness = 1;
-  m.attenuation_color = splat3(std::exp(-sigma));
-  m.attenuation_distance = 1;
-  return m;
+  return std::uint32_t{hidden(events)} << kHiddenFromShift;
+}
+
+/// What a surface makes of a white world behind a black wall that is in no light's way.
+TEST(HiddenObject, IsPassedByRaysThatDoNotSeeIt)
+{
+  Material mirror = diffuse_material({1, 1, 1});
+  mirror.metallic = 1;
+  mirror.roughness = 0;
+  struct Case {
+    Material material;
+    PathEvent event;
+    float wall_z;
+    double expected;
+  };
+  const Case cases[] = {{diffuse_material({0.6f, 0.6f, 0.6f}), PathEvent::kDiffuse, 6, 0.6},
+                        {mirror, PathEvent::kGlossy, 6, 1.0},
+                        {absorbing(0), PathEvent::kTransmission, -2, 1.0}};
+  for (const Case& c : cases) {
+    Scene scene = far_floor(0);
+    scene.environment.color = {1, 1, 1};
+    scene.materials[0] = c.material;
+    scene.render.max_bounces = scene.render.diffuse_bounces = scene.render.glossy_bounces =
+        scene.render.transmission_bounces = 1;
+    add_object(scene, quad_mesh({-40, -40, c.wall_z}, {80, 0, 0}, {0, 80, 0}), diffuse_material({0, 0, 0}));
+    for (const PathEvent event : {PathEvent::kDiffuse, PathEvent::kGlossy, PathEvent::kTransmission}) {
+      scene.instances[1].flags = hidden_flags({event});
+      const double mean = render_scene(scene, render_options(scene, 8, 64)).mean();
+      if (event == c.event) {
+        EXPECT_NEAR(mean, c.expected, 1e-5);
+      } else {
+        EXPECT_LT(mean, 0.8 * c.expected);
+      }
+    }
+  }
+}
+
+/// What diffuse lobes and what the others see of a mesh that emits are the whole, whichever way it is found.
+TEST(HiddenObject, ShinesOnTheOtherLobesAlone)
+{
+  Material plastic = diffuse_material({0.6f, 0.6f, 0.6f});
+  plastic.specular = 1;
+  plastic.roughness = 0.4f;
+  Material emitter = diffuse_material({0, 0, 0});
+  emitter.emission = {5, 5, 5};
+  for (const LightTechnique technique :
+       {LightTechnique::kMis, LightTechnique::kLightSampling, LightTechnique::kBsdfSampling}) {
+    Scene scene = far_floor(0);
+    scene.materials[0] = plastic;
+    // Its front looks down; the camera stands above it.
+    add_object(scene, quad_mesh({-0.8f, -1, 3}, {0, 2, 0}, {2, 0, 0}), emitter);
+    Instance& lamp = scene.instances[1];
+    RenderOptions options = render_options(scene, 8, 64);
+    options.light_technique = technique;
+    lamp.flags = 0;
+    const Estimate whole = estimate_mean(scene, options, kRuns);
+    lamp.flags = hidden_flags({PathEvent::kDiffuse});
+    const Estimate glossy = estimate_mean(scene, options, kRuns);
+    lamp.flags = hidden_flags({PathEvent::kGlossy});
+    const Estimate diffuse = estimate_mean(scene, options, kRuns);
+    lamp.flags = hidden_flags({PathEvent::kGlossy, PathEvent::kDiffuse});
+    EXPECT_EQ(estimate_mean(scene, options, 2).mean, 0.0);
+    EXPECT_GT(glossy.mean, 0.05 * whole.mean);
+    EXPECT_GT(diffuse.mean, 0.05 * whole.mean);
+    EXPECT_NEAR(glossy.mean + diffuse.mean, whole.mean,
+                kQuantile * (whole.standard_error + glossy.standard_error + diffuse.standard_error));
+  }
 }
 
 /// Without a word the camera saw no absorption until it had left the ball and come back.

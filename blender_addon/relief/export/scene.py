@@ -20,6 +20,7 @@ from .mesh import FARTHEST, add_mesh, store_mesh, store_strands
 from .motion import numbered
 from .objects import collect, decompose, usable_places
 from .settings import render_settings
+from .visibility import hidden_settings
 from .voxels import Voxels, domain_of, read_grids
 from .world import Eye, export_world
 
@@ -353,7 +354,8 @@ class SceneExporter:
 
     def _object_settings(self, thing):
         """RELIEF_object of a thing; {} if all is usual."""
-        original, settings = thing.object, {}
+        original = thing.object
+        settings = _ray_settings(original)
         if not original.visible_camera or thing.role.indirect_only:
             settings["visibleToCamera"] = False
         if thing.role.holdout:
@@ -365,7 +367,8 @@ class SceneExporter:
             settings["castsShadow"] = False
         warn = self._warner("object", original.name)
         unread.warn_unread_of_object(original, self._scene, warn)
-        _warn_visibility(original, warn)
+        if compat.links_light(original):
+            warn(*_LINKED)
         caustics = original.relief
         if caustics.caustic_caster != "auto":
             settings["causticCaster"] = caustics.caustic_caster == "yes"
@@ -483,7 +486,7 @@ class SceneExporter:
             if compat.links_light(original):
                 place.warn(*_LINKED)
             unread.warn_unread_of_light(light, place.warn)
-            settings = {f"visibleTo{ray.capitalize()}": False for ray in _hidden_from(original)}
+            settings = _ray_settings(original)
             if not original.relief.caustic_light:
                 settings["causticLight"] = False
             if settings:
@@ -535,9 +538,9 @@ def _is_light(node):
     return any(_is_light(child) for child in node.get("children", ()))
 
 
-def _hidden_from(original):
-    """The kinds of bounced rays that do not see an object."""
-    return [ray for ray in ("diffuse", "glossy", "transmission") if not getattr(original, f"visible_{ray}")]
+def _ray_settings(original):
+    """Settings of RELIEF_object by an object's ray visibility, but for cameras and shadows."""
+    return hidden_settings(lambda ray: getattr(original, f"visible_{ray}"))
 
 
 def _has_no_area(light, matrices):
@@ -550,10 +553,3 @@ def _has_no_area(light, matrices):
     return (np.linalg.norm(matrices[:, :3, :needed], axis=1) == 0).any(axis=1)
 
 
-def _warn_visibility(original, warn):
-    """Warns where an object shines on, or is seen by, some things alone."""
-    hidden = _hidden_from(original)
-    if hidden:
-        warn(f"hidden from {' and '.join(hidden)} rays", "these see it")
-    if compat.links_light(original):
-        warn(*_LINKED)

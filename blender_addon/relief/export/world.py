@@ -14,6 +14,7 @@ from .graph import GraphWriter
 from .image import MISSING, is_encoded, reads_as_stored
 from .not_understood import NotUnderstood
 from .texture import ies_uri, image_options
+from .visibility import hidden_settings
 from .volume import VolumeWriter
 
 
@@ -65,11 +66,10 @@ def export_world(world, visible_to_camera, clear_roughness, eye, writer, images,
     environment["visibleToCamera"] = visible_to_camera and seen
     if not visible_to_camera and clear_roughness is not None:
         environment["clearGlass"] = clear_roughness
-    for ray in ("diffuse", "glossy", "transmission"):
-        if world is not None and not compat.sees_world(world, ray):
-            environment[f"visibleTo{ray.capitalize()}"] = False
-    if world is not None and not world.relief.caustic_light:
-        environment["causticLight"] = False
+    if world is not None:
+        environment.update(hidden_settings(lambda ray: compat.sees_world(world, ray)))
+        if not world.relief.caustic_light:
+            environment["causticLight"] = False
     writer.extend(writer.json, "RELIEF_environment", environment)
 
 
