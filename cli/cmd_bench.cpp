@@ -5,6 +5,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <unistd.h>
@@ -18,9 +19,11 @@
 #include "cli/arguments.h"
 #include "cli/bench_error.h"
 #include "cli/commands.h"
+#include "cli/ray_file.h"
 #include "cli/run_files.h"
 #include "cli/value_hint.h"
 #include "exporters/atomic_file.h"
+#include "exporters/errors.h"
 #include "scene/diagnostics.h"
 #include "scene/load.h"
 
@@ -30,7 +33,9 @@ namespace {
 
 struct BenchArguments {
   std::vector<std::string> scenes, parts;
-  std::string json, html;
+  OwnSceneFiles own;  ///< of a name: in place of the scenes
+  std::string rays;
+  std::string json, html, csv;
   double map_scale = 1, memory_gib = 0;
   int threads = 0, rounds = 3;
   bool quick = false;
@@ -56,12 +61,28 @@ std::uint64_t half_of_memory()
   return static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) / 2;
 }
 
+/// Rays of a file as the benchmark traces them: from tmin on, to what they hit first wherever tmax is.
+std::vector<BenchRay> bench_rays(const std::string& file)
+{
+  std::vector<BenchRay> rays;
+  for (const TraceRay& ray : read_rays(file)) rays.push_back({ray.O + ray.t_min * ray.D, normalize(ray.D)});
+  if (rays.empty()) throw InputError(file, "expected rays, found none");
+  return rays;
+}
+
 int bench_displacement(const BenchArguments& arguments)
 {
   RunFiles files;
-  files.add_output("--json", arguments.json);
-  files.add_output("--html", arguments.html);
-  for (const std::string& output : {arguments.json, arguments.html}) check_writable(output);
+  const std::vector<std::pair<const char*, std::string>> outputs = {
+      {"--json", arguments.json}, {"--html", arguments.html}, {"--csv", arguments.csv}};
+  for (const auto& [option, output] : outputs) files.add_output(option, output);
+  files.add_input("the mesh", arguments.own.mesh);
+  if (!arguments.own.mesh.empty() && !OwnScene::is_obj(arguments.own.mesh)) {
+    files.add_inputs("a file of the mesh", scene_files(arguments.own.mesh));
+  }
+  files.add_input("the height map", arguments.own.map);
+  files.add_input("the rays", arguments.rays);
+  for (const auto& [option, output] : outputs) check_writable(output);
   std::optional<tbb::global_control> limit;
   if (arguments.threads > 0) {
     limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(arguments.threads));
@@ -71,6 +92,12 @@ int bench_displacement(const BenchArguments& arguments)
   options.parts = parts_of(arguments.parts);
   options.map_scale = arguments.map_scale;
   options.rounds = arguments.rounds;
+  std::optional<OwnScene> own;
+  if (!arguments.own.mesh.empty()) {
+    own.emplace(arguments.own);
+    options.own = &*own;
+  }
+  if (!arguments.rays.empty()) options.rays = bench_rays(arguments.rays);
   options.tessellation_bytes =
       arguments.memory_gib > 0 ? static_cast<std::uint64_t>(arguments.memory_gib * (1 << 30)) : half_of_memory();
   if (arguments.quick) {
@@ -84,9 +111,9 @@ int bench_displacement(const BenchArguments& arguments)
   }
   const BenchResults results = bench_displacement_run(options);
   fmt::print("{}", bench_markdown(results));
-  files.check_output("--json", arguments.json);
-  files.check_output("--html", arguments.html);
+  for (const auto& [option, output] : outputs) files.check_output(option, output);
   if (!arguments.json.empty()) atomic_write(arguments.json, bench_json(results));
+  if (!arguments.csv.empty()) atomic_write(arguments.csv, bench_csv(results));
   if (!arguments.html.empty()) atomic_write(arguments.html, bench_html(results));
   return 0;
 }
@@ -130,14 +157,16 @@ int bench_study(const StudyArguments& arguments,
   return 0;
 }
 
+void add_report(CLI::App& command, const char* option, std::string& value, const char* suffix, const char* description)
+{
+  const auto parse = [=](const std::string& text) { return parse_output(option, text, suffix); };
+  names_file(add_parsed(command, option, value, parse, description), {suffix});
+}
+
 void add_reports(CLI::App& command, std::string& json, std::string& html)
 {
-  const auto add = [&](const char* option, std::string& value, const char* suffix, const char* description) {
-    const auto parse = [=](const std::string& text) { return parse_output(option, text, suffix); };
-    names_file(add_parsed(command, option, value, parse, description), {suffix});
-  };
-  add("--json", json, ".json", "Figures, as JSON");
-  add("--html", html, ".html", "One page with tables, plots and pictures");
+  add_report(command, "--json", json, ".json", "Figures, as JSON");
+  add_report(command, "--html", html, ".html", "One page with tables, plots and pictures");
 }
 
 void add_study_options(CLI::App& command, StudyArguments& a)
@@ -232,18 +261,40 @@ void cmd_bench_register(CLI::App& app, Run& run)
       bench->add_subcommand("displacement", "Ways to trace displaced triangles: speed, memory, agreement");
   auto arguments = std::make_shared<BenchArguments>();
   BenchArguments& a = *arguments;
-  command->add_option("--scenes", a.scenes, "Scenes, separated by commas (default: all)")
-      ->delimiter(',')
-      ->check(one_of(scene_names()));
+  CLI::Option* scenes = command->add_option("--scenes", a.scenes, "Scenes, separated by commas (default: all)")
+                            ->delimiter(',')
+                            ->check(one_of(scene_names()));
   command
       ->add_option(
           "--parts", a.parts,
           "Parts, separated by commas: table, marching, sweeps, inversion, tessellation, costs, frames (default: all)")
       ->delimiter(',')
       ->check(one_of({"table", "marching", "sweeps", "inversion", "tessellation", "costs", "frames"}));
-  command->add_option("--scale", a.map_scale, "Factor of the height maps' sides")
-      ->check(number(0.01, 8))
-      ->capture_default_str();
+  CLI::Option* map_scale = command->add_option("--map-scale", a.map_scale, "Factor of the height maps' sides")
+                               ->check(number(0.01, 8))
+                               ->capture_default_str();
+  CLI::Option* mesh = names_file(
+      command->add_option("--mesh", a.own.mesh, "Mesh of your own in place of the scenes, with --map and --scale"),
+      {".obj", ".gltf", ".glb"});
+  CLI::Option* map = names_file(command->add_option("--map", a.own.map, "Its height map"), kImageSuffixes);
+  CLI::Option* scale =
+      command->add_option("--scale", a.own.scale, "How far it is displaced by heights from 0 to 1, in the mesh's units")
+          ->check(number(-1e6, 1e6));
+  command->add_option("--midlevel", a.own.midlevel, "Height that stays where it is")
+      ->check(number(-1e6, 1e6))
+      ->capture_default_str()
+      ->needs(mesh);
+  command->add_option("--tiles", a.own.tiles, "Factor of its texture coordinates")
+      ->check(number(1e-3, 1e4))
+      ->capture_default_str()
+      ->needs(mesh);
+  names_file(command->add_option("--rays", a.rays,
+                                 "File of rays in place of a camera's, one 'ox oy oz dx dy dz [tmin tmax]' a line"),
+             {})
+      ->needs(mesh);
+  mesh->needs(map)->needs(scale)->excludes(scenes)->excludes(map_scale);
+  map->needs(mesh);
+  scale->needs(mesh);
   command->add_option("--rounds", a.rounds, "Times that each chunk of rays is traced; the fastest counts")
       ->check(whole_number(1, 1000))
       ->capture_default_str();
@@ -252,6 +303,7 @@ void cmd_bench_register(CLI::App& app, Run& run)
   command->add_option("--threads", a.threads, "Threads for preparation; rays are traced by one (default: all)")
       ->check(whole_number(1, 1024));
   add_reports(*command, a.json, a.html);
+  add_report(*command, "--csv", a.csv, ".csv", "Figures of the table, as CSV");
   command->add_flag("--quick", a.quick, "Small maps, few rays, one round: whether it works, not how fast");
   command->callback([&run, arguments] { run = [arguments] { return bench_displacement(*arguments); }; });
   heightfield_register(*bench, run);

@@ -14,7 +14,7 @@ namespace relief {
 
 namespace {
 
-/// The benchmark's scene as the renderer takes it. Its texels are not copied: it must not outlive the benchmark's.
+/// The benchmark's scene as the renderer takes it.
 Scene render_scene(const BenchScene& bench)
 {
   Scene scene;
@@ -39,11 +39,7 @@ Scene render_scene(const BenchScene& bench)
   scene.material_names.emplace_back("grey");
   scene.instances.emplace_back();
 
-  HeightMap map;
-  map.label = bench.spec->name;
-  map.width = map.height = bench.map_size;
-  map.texels = std::shared_ptr<const void>(std::shared_ptr<void>(), bench.texels.data());
-  scene.height_maps.push_back(std::move(map));
+  scene.height_maps.push_back(bench.height_map);
   DisplacementSettings displacement;
   displacement.height.texture_index = 0;
   displacement.scale = static_cast<float>(bench.scale);

@@ -59,17 +59,22 @@ BenchCamera bench_camera(const BenchSceneSpec& spec)
 {
   BenchCamera camera;
   camera.eye = {static_cast<float>(spec.eye[0]), static_cast<float>(spec.eye[1]), static_cast<float>(spec.eye[2])};
-  camera.forward = normalize(-camera.eye);
+  const Vec3f look_at{static_cast<float>(spec.look_at[0]), static_cast<float>(spec.look_at[1]),
+                      static_cast<float>(spec.look_at[2])};
+  camera.forward = normalize(look_at - camera.eye);
   camera.right = normalize(cross(camera.forward, {0, 1, 0}));
   camera.up = cross(camera.right, camera.forward);
   camera.half_height = static_cast<float>(std::tan(spec.field_of_view * 3.141592653589793 / 360));
   return camera;
 }
 
-BenchRays bench_rays_make(const BenchScene& scene, const Contender& exact, BenchResolution resolution)
+BenchRays bench_rays_make(const BenchScene& scene,
+                          const Contender& exact,
+                          BenchResolution resolution,
+                          const std::vector<BenchRay>& given)
 {
   BenchRays rays;
-  rays.of_kind[0] = primary_rays(*scene.spec, resolution);
+  rays.of_kind[0] = given.empty() ? primary_rays(*scene.spec, resolution) : given;
   for (const BenchRay& ray : rays.of_kind[0]) {
     const std::optional<MicroHit> hit = exact.intersect(ray);
     rays.shading.push_back(0);

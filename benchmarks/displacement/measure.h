@@ -36,7 +36,11 @@ struct BenchRays {
 /// towards a sun. Secondary rays start on the exact surface, moved off it by the larger of its rounding error and a
 /// quarter of a texel, so that a tessellation does not end them at once where its facets lie outside of the surface.
 /// @param exact  a method that finds the exact surface
-BenchRays bench_rays_make(const BenchScene& scene, const Contender& exact, BenchResolution resolution);
+/// @param given  rays in place of the primary ones; empty: none
+BenchRays bench_rays_make(const BenchScene& scene,
+                          const Contender& exact,
+                          BenchResolution resolution,
+                          const std::vector<BenchRay>& given = {});
 
 /// What a method did with one kind of rays.
 struct Measurement {

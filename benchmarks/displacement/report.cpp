@@ -70,8 +70,11 @@ std::string label_of(const MethodResult& method)
 
 std::string scene_title(const SceneResult& scene)
 {
-  return fmt::format("{} (like {}: {} triangles, {}² map, tiled {:g} × {:g})", scene.name, scene.like,
-                     scene.num_triangles, scene.map_size, scene.tiles_u, scene.tiles_v);
+  return fmt::format("{} ({}{} triangles, {} map, tiled {:g} × {:g})", scene.name,
+                     scene.like.empty() ? "" : "like " + scene.like + ": ", scene.num_triangles,
+                     scene.map_width == scene.map_height ? fmt::format("{}²", scene.map_width)
+                                                         : fmt::format("{} × {}", scene.map_width, scene.map_height),
+                     scene.tiles_u, scene.tiles_v);
 }
 
 Table speed_table(const SceneResult& scene)
@@ -255,6 +258,15 @@ Table cost_table(const std::vector<CostSample>& samples)
   return table;
 }
 
+/// A text as one value of CSV.
+std::string csv_word(const std::string& text)
+{
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + "\"";
+}
+
 constexpr const char* kMarchingTitle = "Marching scale and resolution of RMIP (the paper's Fig. 10)";
 constexpr const char* kSweepsTitle = "More displacement, more tiles (the paper's Fig. 11)";
 constexpr const char* kInversionTitle = "RMIP with and without inversion (the paper's Fig. 12), and its variants";
@@ -377,7 +389,8 @@ nlohmann::ordered_json json_of(const SceneResult& scene)
   return {{"scene", scene.name},
           {"like", scene.like},
           {"triangles", scene.num_triangles},
-          {"map_size", scene.map_size},
+          {"map_width", scene.map_width},
+          {"map_height", scene.map_height},
           {"map_bytes", scene.map_bytes},
           {"tiles", {scene.tiles_u, scene.tiles_v}},
           {"rays", {{"primary", scene.num_rays[0]}, {"bounce", scene.num_rays[1]}, {"shadow", scene.num_rays[2]}}},
@@ -454,7 +467,9 @@ nlohmann::ordered_json json_of(const std::vector<CostSample>& samples)
 std::string bench_markdown(const BenchResults& results)
 {
   std::string text = "# relief bench displacement\n\n" + conditions(results) + "\n\n";
-  if (!results.scenes.empty()) text += markdown(paper_table(results)) + markdown(memory_table(results));
+  if (!results.scenes.empty() && !results.is_own) {
+    text += markdown(paper_table(results)) + markdown(memory_table(results));
+  }
   for (const SceneResult& scene : results.scenes) text += markdown(speed_table(scene)) + markdown(count_table(scene));
   for (const auto& [title, sweeps] :
        {std::pair(kMarchingTitle, &results.marching), std::pair(kSweepsTitle, &results.sweeps)}) {
@@ -488,13 +503,35 @@ std::string bench_json(const BenchResults& results)
   return json.dump(2) + "\n";
 }
 
+std::string bench_csv(const BenchResults& results)
+{
+  std::string text =
+      "scene,method,rays,num_rays,nanoseconds_per_ray,hit_share,disagreement,prisms,bounds,texels,inversions,"
+      "bytes,build_seconds,edges_per_texel\n";
+  for (const SceneResult& scene : results.scenes) {
+    for (const MethodResult& method : scene.methods) {
+      for (const BenchRayKind kind : kKinds) {
+        const auto k = static_cast<std::size_t>(kind);
+        const Measurement& m = method.of_kind[k];
+        text += fmt::format("{},{},{},{},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{:.6g},{},{:.6g},{}\n",
+                            csv_word(scene.name), method.name, kBenchRayKindNames[k], scene.num_rays[k], m.nanoseconds,
+                            m.hit_share, m.disagreement, m.prisms, m.bounds, m.texels, m.inversions, method.bytes(),
+                            method.build_seconds, method.is_tessellation() ? fmt::format("{:.6g}", method.rate) : "");
+      }
+    }
+  }
+  return text;
+}
+
 std::string bench_html(const BenchResults& results)
 {
   PlotStyles styles;
   std::vector<std::string> pieces = {html_paragraph(conditions(results))};
   if (!results.scenes.empty()) {
-    pieces.push_back(html(paper_table(results)));
-    pieces.push_back(html(memory_table(results)));
+    if (!results.is_own) {
+      pieces.push_back(html(paper_table(results)));
+      pieces.push_back(html(memory_table(results)));
+    }
     std::vector<std::string> plots;
     for (const BenchRayKind kind : kKinds) plots.push_back(speed_plot(results, kind, styles));
     plots.push_back(memory_plot(results, styles));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 namespace relief {
 
@@ -99,17 +100,32 @@ MeshView BenchScene::mesh() const
   return view;
 }
 
-HeightMapView BenchScene::map() const
+int BenchScene::map_size() const
 {
-  return {texels.data(), map_size, map_size, HeightFormat::kU16, Wrap::kRepeat, Wrap::kRepeat};
+  return static_cast<int>(std::lround(std::sqrt(static_cast<double>(height_map.width) * height_map.height)));
+}
+
+void bench_scene_measure_texels(BenchScene& scene)
+{
+  double area = 0, texels = 0;
+  for (const TriangleIndices& t : scene.triangles) {
+    area += length(to_double(cross(scene.P[t.v1] - scene.P[t.v0], scene.P[t.v2] - scene.P[t.v0])));
+    const Vec2f u = scene.uv[t.v1] - scene.uv[t.v0], v = scene.uv[t.v2] - scene.uv[t.v0];
+    texels += std::abs(static_cast<double>(u.x) * v.y - static_cast<double>(u.y) * v.x) * scene.height_map.width *
+              scene.height_map.height;
+  }
+  scene.texel_metres = std::sqrt(area / texels);
 }
 
 BenchScene bench_scene_make(const BenchSceneSpec& spec, const BenchSceneChange& change)
 {
   BenchScene scene;
   scene.spec = &spec;
-  scene.map_size = std::max(4, static_cast<int>(std::lround(spec.map_size * change.map)));
-  scene.texels = bench_map_make(spec.map, scene.map_size);
+  const int map_size = std::max(4, static_cast<int>(std::lround(spec.map_size * change.map)));
+  const auto texels = std::make_shared<const std::vector<std::uint16_t>>(bench_map_make(spec.map, map_size));
+  scene.height_map.label = spec.name;
+  scene.height_map.width = scene.height_map.height = map_size;
+  scene.height_map.texels = std::shared_ptr<const void>(texels, texels->data());
   scene.tiles_u = spec.tiles_u * change.tiling;
   scene.tiles_v = spec.tiles_v * change.tiling;
   scene.scale = spec.scale * change.scale;
@@ -117,7 +133,7 @@ BenchScene bench_scene_make(const BenchSceneSpec& spec, const BenchSceneChange& 
   const bool poles = has_poles(spec.shape);
   const bool around = is_closed_around(spec.shape), tube = spec.shape == BenchShape::kTorus;
   // Half a texel, so that vertices on whole texels are at texel centres: what suits a tessellation best.
-  const double half_texel = 0.5 / scene.map_size;
+  const double half_texel = 0.5 / map_size;
   for (int r = 0; r <= spec.rows; ++r) {
     for (int c = 0; c <= spec.columns; ++c) {
       // The ends of a closed surface are the same points, to the last bit.
@@ -137,14 +153,7 @@ BenchScene bench_scene_make(const BenchSceneSpec& spec, const BenchSceneChange& 
       if (!poles || r + 1 < spec.rows) scene.triangles.push_back({at(r, c + 1), at(r + 1, c), at(r + 1, c + 1)});
     }
   }
-  double area = 0, texels = 0;
-  for (const TriangleIndices& t : scene.triangles) {
-    area += length(to_double(cross(scene.P[t.v1] - scene.P[t.v0], scene.P[t.v2] - scene.P[t.v0])));
-    const Vec2f u = scene.uv[t.v1] - scene.uv[t.v0], v = scene.uv[t.v2] - scene.uv[t.v0];
-    texels +=
-        std::abs(static_cast<double>(u.x) * v.y - static_cast<double>(u.y) * v.x) * scene.map_size * scene.map_size;
-  }
-  scene.texel_metres = std::sqrt(area / texels);
+  bench_scene_measure_texels(scene);
   return scene;
 }
 

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "benchmarks/displacement/maps.h"
-#include "kernel/shape/height_map_view.h"
 #include "kernel/shape/mesh_view.h"
+#include "scene/height_map.h"
 
 namespace relief {
 
@@ -34,9 +34,10 @@ struct BenchSceneSpec {
   int map_size = 2048;
   double tiles_u = 1, tiles_v = 1;
   double scale = 0.1;         ///< metres for the whole range of heights
-  double eye[3] = {0, 1, 3};  ///< looks at the origin
+  double eye[3] = {0, 1, 3};
   double field_of_view = 40;  ///< degrees, vertical
   PaperFigures paper;
+  double look_at[3] = {0, 0, 0};
 };
 
 std::span<const BenchSceneSpec> bench_scene_specs();
@@ -55,16 +56,19 @@ struct BenchScene {
   std::vector<Normal3f> N;
   std::vector<Vec2f> uv;
   std::vector<TriangleIndices> triangles;
-  std::vector<std::uint16_t> texels;
-  int map_size = 0;
+  HeightMap height_map;
   double tiles_u = 1, tiles_v = 1;
   double scale = 0, midlevel = 0.5;
   double texel_metres = 0;  ///< mean side of a texel on the base mesh
 
   MeshView mesh() const;
-  HeightMapView map() const;
+  HeightMapView map() const { return height_map.view(); }
+  int map_size() const;  ///< side of a square map of as many texels
 };
 
 BenchScene bench_scene_make(const BenchSceneSpec& spec, const BenchSceneChange& change);
+
+/// Sets texel_metres by the triangles and the map.
+void bench_scene_measure_texels(BenchScene& scene);
 
 }  // namespace relief

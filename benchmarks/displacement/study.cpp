@@ -39,7 +39,7 @@ struct RmipSizes {
 
 RmipSizes rmip_sizes(const BenchScene& scene)
 {
-  const int equal = rmip_linear_resolution(scene.map_size);
+  const int equal = rmip_linear_resolution(scene.map_size());
   return {std::clamp(equal / 4, 1, 64), equal, std::min(4 * equal, 1024)};
 }
 
@@ -151,6 +151,7 @@ struct Study {
 
   BenchScene make_scene(const BenchSceneSpec& spec, BenchSceneChange change = {}) const
   {
+    if (options.own != nullptr) return options.own->make(change);
     change.map *= options.map_scale;
     return bench_scene_make(spec, change);
   }
@@ -170,15 +171,16 @@ void Study::add_table(const BenchSceneSpec& spec) const
   const BenchScene scene = make_scene(spec);
   const BenchSurface surface(scene);
   const Contenders contenders = make_all(surface, table_specs(scene, options.tessellation_bytes));
-  const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution);
+  const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution, options.rays);
 
   SceneResult result;
   result.name = spec.name;
   result.like = spec.like;
   result.paper = spec.paper;
   result.num_triangles = scene.triangles.size();
-  result.map_size = scene.map_size;
-  result.map_bytes = scene.texels.size() * sizeof(scene.texels[0]);
+  result.map_width = scene.height_map.width;
+  result.map_height = scene.height_map.height;
+  result.map_bytes = scene.height_map.bytes();
   result.tiles_u = scene.tiles_u;
   result.tiles_v = scene.tiles_v;
   result.tolerance = scene.texel_metres;
@@ -191,8 +193,10 @@ void Study::add_table(const BenchSceneSpec& spec) const
         bench_measure(contenders, kind, rays.of(kind), options.rounds, result.tolerance);
     for (std::size_t m = 0; m < measured.size(); ++m) result.methods[m].of_kind[k] = measured[m];
   }
-  result.pictures.push_back(shaded_picture(rays, options.resolution, result.name));
+  // Rays of a file make no picture.
+  if (options.rays.empty()) result.pictures.push_back(shaded_picture(rays, options.resolution, result.name));
   for (const auto& contender : contenders) {
+    if (!options.rays.empty()) break;
     const std::string& name = contender->spec().name;
     if (name == kPublishedMethod || name == "rmip" || name == kExactMethod) {
       result.pictures.push_back(steps_picture(*contender, rays, options.resolution));
@@ -214,7 +218,7 @@ void Study::add_marching(const BenchSceneSpec& spec) const
                          traversal_spec(fmt::format("rmip {}²", sizes.equal), DisplacementMethod::rmip, sizes.equal),
                          traversal_spec(fmt::format("rmip {}²", sizes.high), DisplacementMethod::rmip, sizes.high),
                          traversal_spec("rmip-minmax", DisplacementMethod::rmip_minmax)});
-  const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution);
+  const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution, options.rays);
   Sweep sweep;
   sweep.title = fmt::format("{}: time of primary rays", spec.name);
   sweep.x_label = "marching scale, texels";
@@ -259,7 +263,7 @@ void Study::add_sweeps(const BenchSceneSpec& spec) const
           make_all(surface, {traversal_spec(std::string(kExactMethod), DisplacementMethod::chord),
                              traversal_spec("rmip", DisplacementMethod::rmip),
                              traversal_spec(std::string(kPublishedMethod), DisplacementMethod::tfdm)});
-      const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution);
+      const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution, options.rays);
       const std::vector<Measurement> measured = bench_measure(
           contenders, BenchRayKind::kPrimary, rays.of(BenchRayKind::kPrimary), options.rounds, scene.texel_metres);
       for (std::size_t m = 0; m < measured.size(); ++m) {
@@ -293,7 +297,7 @@ void Study::add_inversion(const BenchSceneSpec& spec) const
   variant.rmip_options.leaf = RmipLeaf::kTriangles;
   specs.push_back(variant);
   const Contenders contenders = make_all(surface, specs);
-  const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution);
+  const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution, options.rays);
   const auto measured = [&](BenchRayKind kind) {
     return bench_measure(contenders, kind, rays.of(kind), options.rounds, scene.texel_metres);
   };
@@ -346,7 +350,7 @@ void Study::add_costs(const BenchSceneSpec& spec) const
       if (entry.cost) specs.push_back(tessellation_spec(name, method, options.tessellation_bytes / 2));
     }
     const Contenders contenders = make_all(surface, specs);
-    const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution);
+    const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution, options.rays);
     std::vector<double> nanoseconds(contenders.size());
     for (const BenchRayKind kind : {BenchRayKind::kPrimary, BenchRayKind::kBounce, BenchRayKind::kShadow}) {
       const std::vector<Measurement> measured =
@@ -423,13 +427,16 @@ BenchResults bench_displacement_run(const BenchOptions& options)
 {
   BenchResults results;
   results.isa = traversal_table_select().isa;
-  results.map_scale = options.map_scale;
+  results.is_own = options.own != nullptr;
+  results.map_scale = results.is_own ? 1 : options.map_scale;
   results.resolution = options.resolution;
   results.rounds = options.rounds;
   const Study study{options, results};
-  for (const BenchSceneSpec* spec : chosen_scenes(options.scenes)) {
+  const std::vector<const BenchSceneSpec*> scenes =
+      options.own != nullptr ? std::vector{&options.own->spec()} : chosen_scenes(options.scenes);
+  for (const BenchSceneSpec* spec : scenes) {
     // The paper's plots have these scenes; of others, at the same cost each, there are plots where scenes are named.
-    const bool is_named = !options.scenes.empty();
+    const bool is_named = options.own != nullptr || !options.scenes.empty();
     const bool for_sweeps = spec->name == "sphere" || spec->name == "roof";
     if (options.parts.table) study.add_table(*spec);
     if (options.parts.marching && (is_named || spec->name == "armor" || spec->name == "ninja-head"))

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "benchmarks/displacement/frames.h"
+#include "benchmarks/displacement/own_scene.h"
 #include "displacement/cost_model.h"
 
 namespace relief {
@@ -28,8 +29,10 @@ struct BenchParts {
 
 struct BenchOptions {
   std::vector<std::string> scenes;  ///< names; empty: all
+  const OwnScene* own = nullptr;    ///< in place of the ten
+  std::vector<BenchRay> rays;       ///< in place of those of a camera; empty: none
   BenchParts parts;
-  double map_scale = 1;  ///< factor of the maps' sides
+  double map_scale = 1;  ///< factor of the maps' sides, but of an own scene's
   BenchResolution resolution;
   int rounds = 3;
   std::uint64_t tessellation_bytes = 0;  ///< for the two tessellations of a scene together, while they are built
@@ -66,7 +69,7 @@ struct SceneResult {
   std::string name, like;
   PaperFigures paper;
   std::size_t num_triangles = 0, map_bytes = 0;
-  int map_size = 0;
+  int map_width = 0, map_height = 0;
   double tiles_u = 1, tiles_v = 1;
   double tolerance = 0;  ///< metres along the ray: beyond it two methods disagree
   std::array<std::size_t, kNumBenchRayKinds> num_rays{};
@@ -110,6 +113,7 @@ struct FittedCost {
 
 struct BenchResults {
   std::string isa;
+  bool is_own = false;  ///< of somebody's mesh and map, of which no paper tells
   double map_scale = 1;
   BenchResolution resolution;
   int rounds = 0;

@@ -1,5 +1,6 @@
 // `relief bench`: that it runs, what it writes, and that all exact methods find the same hits. Times are not
 // looked at: they belong to the machine.
+#include <algorithm>
 #include <set>
 
 #include "displacement/method.h"
@@ -93,6 +94,55 @@ TEST_F(Bench, TessellationsThatDoNotFitAreCoarserAndSaySo)
     if (!method.contains("micro_triangles")) continue;
     EXPECT_LT(method["edges_per_texel"], 1.0);
     EXPECT_LT(method["bytes"], 4 << 20);
+  }
+}
+
+TEST_F(Bench, AMeshAMapAndRaysOfOnesOwn)
+{
+  // A square, displaced evenly by half of the scale: rays down on it, beside it, and one that just reaches it from the side.
+  const std::string corners = "v -1 0 1\nv 1 0 1\nv 1 0 -1\nv -1 0 -1\n", uv = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+  const std::string mesh = folder_.write("square.obj", corners + uv + "f 1/1 2/2 -2/3 -1/-1\n").string();
+  const std::string map = folder_.write("map.tga", tga_grey(8, 4, std::string(32, '\xff'))).string();
+  const std::string rays =
+      folder_.write("rays.txt", "0 1 0 0 -1 0\n.5 1 .5 0 -2 0 0 9\n# beside\n2 1 0 0 -1 0\n-3 .09 0 1 -.015 0\n")
+          .string();
+  const std::string json_file = file("own.json"), csv_file = file("own.csv");
+  for (const auto& [midlevel, share] : {std::pair("0.5", .75), std::pair("0", .5)}) {
+    const Outcome outcome =
+        run({"bench", "displacement", "--quick", "--mesh", mesh, "--map", map, "--scale", "0.1", "--tiles", "2",
+             "--midlevel", midlevel, "--rays", rays, "--json", json_file, "--csv", csv_file});
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.errors;
+    const nlohmann::json json = nlohmann::json::parse(bytes_of_file(json_file));
+    ASSERT_EQ(json["scenes"].size(), 1u);
+    const nlohmann::json& scene = json["scenes"][0];
+    EXPECT_EQ(scene["scene"], "square.obj");
+    EXPECT_EQ(scene["triangles"], 2);
+    EXPECT_EQ(scene["map_width"], 8);
+    EXPECT_EQ(scene["map_height"], 4);
+    EXPECT_EQ(scene["rays"]["primary"], 4);
+    for (const nlohmann::json& method : scene["methods"]) EXPECT_EQ(method["primary"]["hit_share"], share) << method;
+    const std::string csv = bytes_of_file(csv_file);
+    EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), 1 + 3 * scene["methods"].size());
+    EXPECT_NE(csv.find("\nsquare.obj,chord,primary,4,"), std::string::npos) << csv;
+  }
+  const std::string scene_file = folder_.write("square.gltf", square_scene().gltf()).string();
+  EXPECT_EQ(
+      run({"bench", "displacement", "--quick", "--parts", "table", "--mesh", scene_file, "--map", map, "--scale", "1"})
+          .exit_code,
+      0);
+
+  for (const auto& [text, message] :
+       {std::pair(corners + uv + "f 1/1 2/2 5/3\n", "line 9: expected entries from 1 to 4"),
+        std::pair(corners + uv + "f 1 2 3\n", "line 9: expected corners with texture"),
+        std::pair(corners + uv + "f 1/1 2/2\n", "line 9: expected three corners"),
+        std::pair(corners + uv, "expected faces"), std::pair("v 1 2 x\n" + corners, "line 1: expected 3"),
+        std::pair("v 1 nan 2\n" + corners, "line 1: expected 3"),
+        std::pair(corners + "vt 0 0\nf 1/1 2/1 3/1\n", "with an area")}) {
+    const std::string broken = folder_.write("broken.obj", text).string();
+    const Outcome outcome = run({"bench", "displacement", "--mesh", broken, "--map", map, "--scale", "1"});
+    EXPECT_EQ(outcome.exit_code, 3);
+    EXPECT_NE(outcome.errors.find("broken.obj: "), std::string::npos) << outcome.errors;
+    EXPECT_NE(outcome.errors.find(message), std::string::npos) << outcome.errors;
   }
 }
 
@@ -212,6 +262,7 @@ TEST_F(Bench, WrongUseIsRefused)
   for (const Arguments& arguments :
        {Arguments{"bench"}, Arguments{"bench", "displacement", "--scenes", "teapot"},
         Arguments{"bench", "displacement", "--parts", "all"}, Arguments{"bench", "displacement", "--json", "bench.txt"},
+        Arguments{"bench", "displacement", "--mesh", "a.obj"}, Arguments{"bench", "displacement", "--rays", "rays.txt"},
         Arguments{"bench", "procedural", "--parts", "vase"}}) {
     EXPECT_EQ(run(arguments).exit_code, 2) << arguments.back();
   }

@@ -31,7 +31,7 @@ SMALL = {"render": {"--resolution": "16x9", "--spp": "8", "--threads": "2", "--p
          "bench": {"--scenes": "glass", "--quick": None}}
 # What stands for the words of a usage line.
 WORDS = {"SCENE": "examples/cornell/cornell.gltf", "X,Y": "3,3", "X,Y[,SAMPLE]": "3,3", "I": "0", "FILE": "rays.txt", "A": "A.exr", "B": "B.exr",
-         "MAP": "examples/displaced/cobbles.png", "…": ""}
+         "MAP": "examples/displaced/cobbles.png", "MESH": "examples/displaced/displaced.gltf", "S": "0.02", "…": ""}
 
 
 def blocks(text):
@@ -258,7 +258,7 @@ class Docs(unittest.TestCase):
         # Brackets: what may be left out, but not those inside a word.
         given = re.sub(r"(?<!\S)\[[^\]]*\]", "", given)
         line = [w for w in (WORDS.get(word, word) for word in given.split()) if w]
-        files = [w for w in line if re.search(r"\.(gltf|glb)$", w)]
+        files = [w for w in line if re.search(r"\.(gltf|glb|obj)$", w)]
         if any(not (ROOT / f).exists() for f in files) or not (files or sub[0] in ("compare", "merge", "bench")):
             return None
         if sub[0] == "compare" and not {"A.exr", "B.exr"} <= set(line):
@@ -266,7 +266,8 @@ class Docs(unittest.TestCase):
         if sub[0] == "render" and "-o" not in line:
             line += ["-o", "out.exr"]
         for option, value in SMALL.get(sub[0], {}).items():
-            if option not in line and option in options_of(*sub):
+            of_others = option == "--scenes" and "--mesh" in line
+            if option not in line and option in options_of(*sub) and not of_others:
                 line += [option] if value is None else [option, value]
         return [*sub, *line]
 
