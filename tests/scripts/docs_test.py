@@ -19,7 +19,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md")), ROOT / "benchmarks" / "RESULTS.md"]
-FOLDERS = "benchmarks blender_addon cli displacement docs examples exporters integrator kernel scene scripts tests".split()
+FOLDERS = "benchmarks blender_addon cli displacement docs examples exporters integrator kernel python scene scripts tests".split()
 
 # What starts a command, after settings of environment variables.
 PROGRAM = re.compile(r"(?:\w+=\S+ )*(?:relief |(?:build/\w+/)?cli/relief |build/\w+/cli/relief |build/\w+/benchmarks/|"
