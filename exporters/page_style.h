@@ -32,11 +32,13 @@ svg.plot .guide{stroke:var(--dim);fill:none;stroke-width:1.4;stroke-dasharray:6 
 .card b{display:block;font-size:20px;font-weight:600;font-variant-numeric:tabular-nums}
 .card span{font-size:12px;color:var(--dim)}
 .note{font-size:12px;color:var(--dim);margin:.4em 0}
-.stage{position:relative;--wipe:50%;width:min(100%,max(var(--width),640px),calc(80vh*var(--aspect)));aspect-ratio:var(--aspect);margin:0 auto;background:#000;overflow:hidden;touch-action:pan-y;user-select:none}
+.stage{position:relative;--wipe:50%;width:min(100%,max(var(--width),640px),calc(80vh*var(--aspect)));
+aspect-ratio:var(--aspect);margin:0 auto;background:#000;overflow:hidden;touch-action:pan-y;user-select:none}
 .stage canvas{position:absolute;inset:0;width:100%;height:100%}
 .stage canvas.second{clip-path:inset(0 0 0 var(--wipe))}
 .stage .divider{position:absolute;top:0;bottom:0;left:var(--wipe);width:2px;margin-left:-1px;background:#fff;box-shadow:0 0 3px #000;cursor:ew-resize}
-.stage .tag{position:absolute;bottom:8px;left:8px;max-width:45%;padding:1px 8px;border-radius:4px;font-size:12px;color:#fff;background:#000a;overflow:hidden;text-overflow:ellipsis;white-space:nowrap;pointer-events:none}
+.stage .tag{position:absolute;bottom:8px;left:8px;max-width:45%;padding:1px 8px;border-radius:4px;font-size:12px;color:#fff;background:#000a;
+overflow:hidden;text-overflow:ellipsis;white-space:nowrap;pointer-events:none}
 .stage .right{left:auto;right:8px}
 .controls{display:flex;flex-wrap:wrap;gap:6px 14px;align-items:center;margin-top:10px;font-size:13px}
 .controls label{display:flex;gap:8px;align-items:center}

@@ -53,9 +53,9 @@ struct LightSet {
 
 /// Gathers the lights of a scene and builds the tree over the finite ones, in parallel.
 ///
-/// A mesh emits when its material's emission is not zero. Meshes that are displaced are left out (their surface is not
-/// where the triangles are), and so are unlit ones (they light nothing in glTF's sense) and those that move or deform while the
-/// shutter is open: paths that hit them see their emission all the same. Triangles emit from the side glTF calls front, which a mirroring instance turns with the winding.
+/// A mesh emits when its material's emission is not zero. Meshes that are displaced are left out (their surface is not where the triangles
+/// are), and so are unlit ones (they light nothing in glTF's sense) and those that move or deform while the shutter is open: paths that hit
+/// them see their emission all the same. Triangles emit from the side glTF calls front, which a mirroring instance turns with the winding.
 /// @param textures  views of scene.textures, for the mean of emission maps
 /// @param density   of the environment: kExcess where paths that follow the BSDF find what it leaves out, which for a
 ///                  constant environment beside suns is all

@@ -22,9 +22,9 @@ inline constexpr double kLitRadiance = 0.1, kGlowingRadiance = 0.25, kLitFractio
 
 /// Whether emissive surfaces are the scene's lamps, or decoration. They are lamps if half of the surface glows by itself, with
 /// a radiance of .25 or more; or if at least half of those points are lit that do not, among 256, the same number on each mesh
-/// instance: if they were white and turned to the light, they would have a radiance of .1. Nothing shadows, and 2048 points of the emissive surfaces, chosen by what they may emit, stand for all of them. So a lamp
-/// lights what is near, however large the floor it stands on, and lights on a model do not count for the model, whose surface
-/// turns away from them.
+/// instance: if they were white and turned to the light, they would have a radiance of .1. Nothing shadows, and 2048 points of
+/// the emissive surfaces, chosen by what they may emit, stand for all of them. So a lamp lights what is near, however large
+/// the floor it stands on, and lights on a model do not count for the model, whose surface turns away from them.
 /// @param textures  of the scene, loaded
 /// @cost  some milliseconds
 bool emission_lights_scene(const Scene& scene,

@@ -398,8 +398,8 @@ class Conformer {
   Warnings& warnings_;
 };
 
-/// Nodes must form trees. A node with two parents stays with the first. What a scene lists must be their roots: of other nodes, those that stand in the scene anyhow are
-/// taken off the list, the others are roots there.
+/// Nodes must form trees. A node with two parents stays with the first. What a scene lists must be their roots: of
+/// other nodes, those that stand in the scene anyhow are taken off the list, the others are roots there.
 void conform_node_tree(json& document, const std::string& file, Warnings& warnings)
 {
   const auto nodes = document.find("nodes");

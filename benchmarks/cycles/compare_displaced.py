@@ -208,7 +208,8 @@ def _markdown(results):
                 lines.append(
                     f"| {name} | {renderer} | {point['preparation_seconds']:.2f} "
                     f"| {point['peak_memory_bytes'] / _MIB:.0f} | {point['samples']} | {_seconds(point):.1f} "
-                    f"| {point['processor_seconds']:.1f} | {values['processor_seconds_a_sample']:.2f} | {point['rmse']:.4f} | {values['bias_rmse']:.4f} | {100 * values['relative_bias_of_mean']:+.2f} % |"
+                    f"| {point['processor_seconds']:.1f} | {values['processor_seconds_a_sample']:.2f} "
+                    f"| {point['rmse']:.4f} | {values['bias_rmse']:.4f} | {100 * values['relative_bias_of_mean']:+.2f} % |"
                 )
     lines += [
         "",

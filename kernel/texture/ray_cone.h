@@ -42,10 +42,10 @@ RELIEF_KERNEL RayCone ray_cone_from_orthographic(float half_height, int height_p
 /// @source   Ray Tracing Gems ch. 20
 RELIEF_KERNEL RayCone ray_cone_propagate(RayCone cone, float t) { return {cone.width + cone.spread * t, cone.spread}; }
 
-/// Opening angle that a rough interaction adds: full angle of the cone that holds the median microfacet tilt.
-/// GGX tilts have tan²θ = α² ξ/(1 − ξ), so the median is atan α; a quantile, because their variance is infinite. A mirror turns its ray by twice the tilt; the tilt itself is taken, half of that, because many
-/// samples a pixel average what is left, while blur cannot be undone. Refraction turns less; the same value is used,
-/// since what is seen through rough glass is blurred anyway.
+/// Opening angle that a rough interaction adds: full angle of the cone that holds the median microfacet tilt. GGX tilts have
+/// tan²θ = α² ξ/(1 − ξ), so the median is atan α; a quantile, because their variance is infinite. A mirror turns its ray by
+/// twice the tilt; the tilt itself is taken, half of that, because many samples a pixel average what is left, while blur
+/// cannot be undone. Refraction turns less; the same value is used, since what is seen through rough glass is blurred anyway.
 /// @param alpha  GGX roughness, square of glTF's; >= 0. Diffuse reflection counts as 1
 /// @return       radians, [0, π)
 RELIEF_KERNEL float ray_cone_spread_from_roughness(float alpha) { return 2.0f * angle_of(alpha, 1.0f); }

@@ -139,7 +139,8 @@ def test_a_zip_that_holds_the_program_needs_no_other():
         if bpy.app.version < (4, 2, 0):
             environment["BLENDER_USER_SCRIPTS"] = f"{path}/scripts"
             os.makedirs(f"{path}/scripts/addons")
-            commands = [["-b", "--python-exit-code", "9", "--python-expr", _STEPS.format(tests=os.path.dirname(os.path.abspath(__file__)), zip=archive, picture=picture)]]
+            steps = _STEPS.format(tests=os.path.dirname(os.path.abspath(__file__)), zip=archive, picture=picture)
+            commands = [["-b", "--python-exit-code", "9", "--python-expr", steps]]
         else:
             commands = [
                 ["--command", "extension", "install-file", "-r", "user_default", "--enable", archive],

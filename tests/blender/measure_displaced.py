@@ -7,7 +7,8 @@ Not a test: it takes ten minutes at 1080p on two cores and wants them for itself
 
 Three scenes have height maps; `planet` has 12 octaves of noise over Generated coordinates, which relief computes at cells
 of a pixel. Cycles dices to R pixels (1) by adaptive subdivision. Errors are against the texel-exact surface (of the planet
-against cells of a quarter of a pixel): with two more pictures r, s of relief, of other seeds, the mean of (a − r)(a − s) is the squared error of a, the noise of r and s drops out. Cycles'
+against cells of a quarter of a pixel): with two more pictures r, s of relief, of other seeds, the mean of
+(a − r)(a − s) is the squared error of a, the noise of r and s drops out. Cycles'
 error has the bias of its dicing in it; it is what an artist gets. The time to Cycles' error is relief's preparation and
 as many of its samples as bring its noise there, at least one.
 

@@ -1,7 +1,7 @@
 """Runs in a Blender with a window: shows the viewport rendered, edits, moves, leaves the mode; writes what it saw.
 
-Not a test by itself: viewport_test.py starts it, with "follow", "quit", "panels", "warnings" or "render" and a folder. Steps run in Blender's timers, since the window is only drawn between
-them. Pictures are copies of what is on the display: Blender's own screenshots are black on some.
+Not a test by itself: viewport_test.py starts it, with "follow", "quit", "panels", "warnings" or "render" and a folder. Steps run in Blender's timers,
+since the window is only drawn between them. Pictures are copies of what is on the display: Blender's own screenshots are black on some.
 """
 
 import json

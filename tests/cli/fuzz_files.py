@@ -192,11 +192,13 @@ class Run:
         if self.chance(0.3):
             arguments += ["--reference", self.pick("ref.exr", "ref.####.exr", "ref.000#.exr", "missing.exr", "old.exr")]
         options = [
-            ["--resume"], ["--checkpoint", self.pick("0", "0.001")], ["--keep-going"], ["--grace", "60"], ["--strict"], ["--continue-without-textures"], ["--float"], ["--seed", "7"], ["--crop", "1,1,3,3"], ["--crop", "0,0,9,9"],
+            ["--resume"], ["--checkpoint", self.pick("0", "0.001")], ["--keep-going"], ["--grace", "60"], ["--strict"],
+            ["--continue-without-textures"], ["--float"], ["--seed", "7"], ["--crop", "1,1,3,3"], ["--crop", "0,0,9,9"],
             ["--aov", self.pick("all", "depth", "nothing")], ["--max-bounces", "0"], ["--filter", "box"],
             ["--compression", self.pick("none", "zips", "piz", "dwaa")], ["--camera", self.pick("front", "nobody")],
             ["--displacement", self.pick("rmip", "tfdm", "chord", "tessellate")], ["--lod", self.pick("0", "auto", "-1")],
-            ["--caustics", self.pick("on", "off")], ["--exposure", "1"], ["--color-space", "acescg"], ["--display", "Nothing"], ["--view", self.pick("Standard", "Nothing")],
+            ["--caustics", self.pick("on", "off")], ["--exposure", "1"], ["--color-space", "acescg"],
+            ["--display", "Nothing"], ["--view", self.pick("Standard", "Nothing")],
             ["--noise-threshold", "0.1"], ["--filter-glossy", "1"], ["--time-limit", "0.001"], ["--bogus"],
             ["--environment", self.pick("studio", "env.png", "env.png,2", "missing.png")], ["--background", "world"],
             ["--look-from", "3,2,1"], ["--denoise", self.pick("none", "builtin", "oidn", "all")]

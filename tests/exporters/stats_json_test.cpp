@@ -26,7 +26,9 @@ TEST(StatsJson, HasEveryKeyThatProgramsReadAndEveryCounter)
   EXPECT_EQ(json["build_seconds"], 2);
   EXPECT_EQ(json["render_seconds"], 4);
   EXPECT_EQ(json["samples_per_pixel"], 16);
-  EXPECT_EQ(json["kept"], (nlohmann::json{{"images", 3}, {"height_fields", 2}, {"meshes", 7}, {"scene", true}, {"preparation", false}, {"bytes", 400}, {"seconds", 5.0}}));
+  const nlohmann::json kept{{"images", 3},          {"height_fields", 2}, {"meshes", 7},   {"scene", true},
+                            {"preparation", false}, {"bytes", 400},       {"seconds", 5.0}};
+  EXPECT_EQ(json["kept"], kept);
   EXPECT_EQ(json["peak_memory_bytes"], 123);
   EXPECT_EQ(json["rays"]["camera"], 100);
   EXPECT_EQ(json["rays"]["bounce"], 200);

@@ -2,7 +2,8 @@
 // file asks for more memory than there is.
 //
 // The file is always called scene.gltf and has three neighbours, other.gltf, data.bin and profile.ies, that it may refer to; the
-// GLB container is recognized by content, so both forms are reached. What begins as an IES file does is read as one. tinygltf is compiled in (fuzz_tinygltf.cpp) so that it
+// GLB container is recognized by content, so both forms are reached. What begins as an IES file does is read as one.
+// tinygltf is compiled in (fuzz_tinygltf.cpp) so that it
 // is instrumented too.
 #include <cstddef>
 #include <cstdint>
