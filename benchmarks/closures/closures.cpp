@@ -59,16 +59,13 @@ class ClosureCase {
   int num_results_ = 0, num_specs_ = 0;
 };
 
-enum class Maths { k34, k43, k52 };
-
 SurfaceClosureSpec spec_of(ClosureKind kind,
                            Maths maths = Maths::k34,
                            ClosureDistribution distribution = ClosureDistribution::kGgx)
 {
   SurfaceClosureSpec spec;
   spec.kind = kind;
-  spec.is_4 = maths != Maths::k34;
-  spec.is_5 = maths == Maths::k52;
+  spec.maths = maths;
   spec.distribution = distribution;
   return spec;
 }

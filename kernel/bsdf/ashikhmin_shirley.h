@@ -4,11 +4,17 @@
 #pragma once
 
 #include "kernel/bsdf/ggx_anisotropic.h"
+#include "kernel/bsdf/mixture_traits.h"
 
 namespace relief {
 
 /// Exponents along x and y, >= 0.
 struct AshikhminShirley {
+  static constexpr MixtureTraits kTraits{.is_diffuse = false,
+                                         .is_microfacet = true,
+                                         .has_fresnel = true,
+                                         .fading = LobeFading::kNever,
+                                         .leaves_below = true};
   float n_x = 0, n_y = 0;
 };
 
@@ -60,6 +66,27 @@ RELIEF_KERNEL Vec3f ashikhmin_shirley_sample(const AshikhminShirley& lobe, Vec3f
   const float cos_d = dot(wo, h);
   if (!(cos_d > 0.0f)) return {};
   return 2.0f * cos_d * h - wo;
+}
+
+template <TransportMode>
+RELIEF_KERNEL BsdfEval lobe_eval(const AshikhminShirley& lobe, const LobeHit& hit, const BsdfTables&, Vec3f wi, bool)
+{
+  BsdfEval e;
+  e.f = splat3(ashikhmin_shirley_eval(lobe, hit.wo, wi, &e.pdf));
+  return e;
+}
+
+template <TransportMode>
+RELIEF_KERNEL LobeSample lobe_sample(const AshikhminShirley& lobe, const LobeHit& hit, float, Vec2f u)
+{
+  if (hit.is_delta) return lobe_sample_mirror(hit);
+  return lobe_sample_glossy(ashikhmin_shirley_sample(lobe, hit.wo, u), false, sqr(hit.roughness));
+}
+
+RELIEF_KERNEL bool lobe_widen(AshikhminShirley& lobe, float, float blur)
+{
+  lobe = ashikhmin_shirley_make(anisotropic_alpha_widened(ashikhmin_shirley_alpha(lobe), blur));
+  return true;
 }
 
 }  // namespace relief

@@ -6,10 +6,12 @@
 #pragma once
 
 #include "kernel/bsdf/ggx_anisotropic.h"
+#include "kernel/bsdf/mixture_traits.h"
 
 namespace relief {
 
 struct Beckmann {
+  static constexpr MixtureTraits kTraits = kReflectingMicrofacets;
   AnisotropicAlpha alpha;
   SmithMasking masking = SmithMasking::kSeparable;
 };
@@ -148,6 +150,27 @@ RELIEF_KERNEL Vec3f beckmann_sample(const Beckmann& lobe, Vec3f wo, Vec2f u)
 {
   const Vec3f wm = beckmann_visible_normal(lobe.alpha, wo, u);
   return 2.0f * dot(wo, wm) * wm - wo;
+}
+
+template <TransportMode>
+RELIEF_KERNEL BsdfEval lobe_eval(const Beckmann& lobe, const LobeHit& hit, const BsdfTables&, Vec3f wi, bool)
+{
+  BsdfEval e;
+  e.f = splat3(beckmann_eval(lobe, hit.wo, wi, &e.pdf));
+  return e;
+}
+
+template <TransportMode>
+RELIEF_KERNEL LobeSample lobe_sample(const Beckmann& lobe, const LobeHit& hit, float, Vec2f u)
+{
+  if (hit.is_delta) return lobe_sample_mirror(hit);
+  return lobe_sample_glossy(beckmann_sample(lobe, hit.wo, u), false, sqr(hit.roughness));
+}
+
+RELIEF_KERNEL bool lobe_widen(Beckmann& lobe, float, float blur)
+{
+  lobe.alpha = anisotropic_alpha_widened(lobe.alpha, blur);
+  return true;
 }
 
 }  // namespace relief

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "kernel/bsdf/ggx_anisotropic.h"
+#include "kernel/bsdf/mixture_traits.h"
 
 namespace relief {
 
@@ -16,6 +17,7 @@ inline constexpr float kGtr1Strength = 0.25f;
 inline constexpr float kGtr1DeltaAlpha = 3.1622776e-4f;
 
 struct ClearcoatGtr1 {
+  static constexpr MixtureTraits kTraits{.is_diffuse = false, .has_fresnel = true, .fading = LobeFading::kNever};
   float alpha = 1e-3f;  ///< roughness², >= kGtr1DeltaAlpha; 1 and more is uniform
 };
 
@@ -58,6 +60,27 @@ RELIEF_KERNEL Vec3f clearcoat_gtr1_sample(const ClearcoatGtr1& lobe, Vec3f wo, V
   const float cos_d = dot(wo, h);
   if (!(cos_d > 0.0f)) return {};
   return 2.0f * cos_d * h - wo;
+}
+
+template <TransportMode>
+RELIEF_KERNEL BsdfEval lobe_eval(const ClearcoatGtr1& lobe, const LobeHit& hit, const BsdfTables&, Vec3f wi, bool)
+{
+  BsdfEval e;
+  e.f = splat3(clearcoat_gtr1_eval(lobe, hit.wo, wi, &e.pdf));
+  return e;
+}
+
+template <TransportMode>
+RELIEF_KERNEL LobeSample lobe_sample(const ClearcoatGtr1& lobe, const LobeHit& hit, float, Vec2f u)
+{
+  if (hit.is_delta) return lobe_sample_mirror(hit);
+  return lobe_sample_glossy(clearcoat_gtr1_sample(lobe, hit.wo, u), false, sqr(hit.roughness));
+}
+
+RELIEF_KERNEL bool lobe_widen(ClearcoatGtr1& lobe, float, float blur)
+{
+  lobe.alpha = max(lobe.alpha, blur);
+  return true;
 }
 
 }  // namespace relief

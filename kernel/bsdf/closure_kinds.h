@@ -9,13 +9,13 @@
 namespace relief {
 
 enum class ClosureKind : std::uint8_t {
-#define CLOSURE(name, Type) name,
+#define CLOSURE(name, Type, most_lobes) name,
 #include "kernel/bsdf/closure_inputs.inc"
   kCount
 };
 
 // Inputs of each kind at a point: floats alone, in the order of the list.
-#define CLOSURE(name, Type) struct Type##Inputs {
+#define CLOSURE(name, Type, most_lobes) struct Type##Inputs {
 #define COLOR(name, json, r, g, b) Vec3f name{r, g, b};
 #define NUMBER(name, json, value) float name = value;
 #define VECTOR(name, json) Vec3f name{};
@@ -44,13 +44,23 @@ enum class SubsurfaceMethod : std::uint8_t {
 /// What a fibre's absorption follows from.
 enum class FibrePigment : std::uint8_t { kColor, kMelanin, kAbsorption };
 
+/// The version of Blender whose Cycles gives the numbers: from it on, up to the next.
+enum class Maths : std::uint8_t { k34, k43, k52 };
+
+/// What a closure is of the kinds that have two.
+enum class ClosureVariant : std::uint8_t {
+  kFirst,
+  kGlossyToon,
+  kPhysicalMetal,  ///< by its complex index
+  kHairThrough,    ///< what goes through strands
+};
+
 /// One closure of a material.
 struct SurfaceClosureSpec {
   ClosureKind kind = ClosureKind::diffuse;
   ClosureDistribution distribution = ClosureDistribution::kGgx;
-  bool is_4 = false;               ///< the maths of Blender 4.3 or later, not of 3.4
-  bool is_5 = false;               ///< that of 5.2; then is_4, too
-  bool is_other = false;           ///< toon: glossy; metallic: by complex index; hair: what goes through
+  Maths maths = Maths::k34;
+  ClosureVariant variant = ClosureVariant::kFirst;
   SubsurfaceMethod subsurface = SubsurfaceMethod::kRandomWalk;
   FibrePigment pigment = FibrePigment::kColor;
   std::uint16_t first_result = 0;  ///< its weight among the program's results, then its inputs, float by float

@@ -10,10 +10,13 @@
 
 #include "kernel/bsdf/fresnel_models.h"
 #include "kernel/bsdf/hair.h"
+#include "kernel/bsdf/mixture_traits.h"
 
 namespace relief {
 
 struct Fibre {
+  static constexpr MixtureTraits kTraits{
+      .sides = LobeSides::kSphere, .is_diffuse = false, .fading = LobeFading::kNever, .is_strand = true};
   Vec3f sigma{};          ///< absorption over the fibre's radius
   float variance = 0.1f;  ///< of tilts of TT times 4, TRT over 4
   float variance_R = 0.1f;
@@ -207,6 +210,29 @@ RELIEF_KERNEL FibreSample fibre_sample(const Fibre& fibre, Vec3f wo, float u_lob
   i = fibre_turned(i, -fibre_lobe_tilt(fibre, p));
   const float phi = p < 3 ? fibre_exit(s, p) + logistic_sample(u.x, fibre.scale) : 2.0f * kPi * u.x;
   return {{i.sin, -i.cos * std::sin(phi), i.cos * std::cos(phi)}, p == 0};
+}
+
+template <TransportMode>
+[[gnu::noinline]] RELIEF_KERNEL BsdfEval lobe_eval(const Fibre& fibre, const LobeHit& hit, const BsdfTables&, Vec3f wi, bool)
+{
+  const FibreEval e = fibre_eval(fibre, hit.wo, wi);
+  return {e.f, e.pdf};
+}
+
+/// What goes through a fibre counts as transmitted wherever it leaves.
+template <TransportMode>
+[[gnu::noinline]] RELIEF_KERNEL LobeSample lobe_sample(const Fibre& fibre, const LobeHit& hit, float u_branch, Vec2f u)
+{
+  const FibreSample s = fibre_sample(fibre, hit.wo, u_branch, u);
+  return lobe_sample_glossy(s.wi, !s.is_reflected, min(__builtin_sqrtf(fibre.variance_R), 1.0f));
+}
+
+RELIEF_KERNEL bool lobe_widen(Fibre& fibre, float, float blur)
+{
+  fibre.variance = max(fibre.variance, blur);
+  fibre.variance_R = max(fibre.variance_R, blur);
+  fibre.scale = max(fibre.scale, blur);
+  return true;
 }
 
 }  // namespace relief

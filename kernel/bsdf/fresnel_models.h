@@ -20,8 +20,15 @@ RELIEF_KERNEL float fresnel_dielectric_at(float cos_i, float eta)
 /// @return [0, 1]; 1 for eta = 1 only at grazing incidence
 RELIEF_KERNEL float fresnel_dielectric_weight(float cos_i, float eta)
 {
-  const float F0 = fresnel_F0(eta);
-  return clamp((fresnel_dielectric_at(cos_i, eta) - F0) / (1.0f - F0), 0.0f, 1.0f);
+  // (F − F0) / (1 − F0), both of its fractions brought to the same: 1 − F0 is 4 eta / (eta + 1)². eta cos_t is t here.
+  const float eta2 = eta * eta;
+  const float t2 = eta2 - 1.0f + cos_i * cos_i;
+  if (!(t2 > 0.0f)) return 1.0f;
+  const float t = __builtin_sqrtf(t2);
+  const float parallel = (eta2 * cos_i - t) / (eta2 * cos_i + t);
+  const float perpendicular = (cos_i - t) / (cos_i + t);
+  const float rise = 0.5f * sqr(eta + 1.0f) * (sqr(parallel) + sqr(perpendicular)) - sqr(eta - 1.0f);
+  return clamp(0.25f * rise / eta, 0.0f, 1.0f);
 }
 
 /// A dielectric's curve between reflectances of one's own: specular of the Principled shader, its clearcoat, its coloured

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "kernel/bsdf/ggx.h"
+#include "kernel/bsdf/mixture_traits.h"
 
 namespace relief {
 
@@ -23,6 +24,12 @@ struct AnisotropicAlpha {
 RELIEF_KERNEL AnisotropicAlpha anisotropic_alpha_clamp(float x, float y)
 {
   return {clamp(x, kDeltaAlpha, 1.0f), clamp(y, kDeltaAlpha, 1.0f)};
+}
+
+/// Both at least so wide.
+RELIEF_KERNEL AnisotropicAlpha anisotropic_alpha_widened(AnisotropicAlpha alpha, float least)
+{
+  return {max(alpha.x, least), max(alpha.y, least)};
 }
 
 /// Of the Glossy and Metallic nodes.
@@ -48,6 +55,7 @@ RELIEF_KERNEL AnisotropicAlpha anisotropic_alpha_of_principled(float roughness, 
 RELIEF_KERNEL float half_angle_cosine(Vec3f wo, Vec3f wi) { return min(1.0f, 0.5f * length(wo + wi)); }
 
 struct GgxAnisotropic {
+  static constexpr MixtureTraits kTraits = kReflectingMicrofacets;
   AnisotropicAlpha alpha;
   SmithMasking masking = SmithMasking::kSeparable;
 };
@@ -99,6 +107,27 @@ RELIEF_KERNEL Vec3f ggx_anisotropic_sample(const GgxAnisotropic& lobe, Vec3f wo,
 {
   const Vec3f wm = ggx_anisotropic_visible_normal(lobe.alpha, wo, u);
   return 2.0f * dot(wo, wm) * wm - wo;
+}
+
+template <TransportMode>
+RELIEF_KERNEL BsdfEval lobe_eval(const GgxAnisotropic& lobe, const LobeHit& hit, const BsdfTables&, Vec3f wi, bool)
+{
+  BsdfEval e;
+  e.f = splat3(ggx_anisotropic_eval(lobe, hit.wo, wi, &e.pdf));
+  return e;
+}
+
+template <TransportMode>
+RELIEF_KERNEL LobeSample lobe_sample(const GgxAnisotropic& lobe, const LobeHit& hit, float, Vec2f u)
+{
+  if (hit.is_delta) return lobe_sample_mirror(hit);
+  return lobe_sample_glossy(ggx_anisotropic_sample(lobe, hit.wo, u), false, sqr(hit.roughness));
+}
+
+RELIEF_KERNEL bool lobe_widen(GgxAnisotropic& lobe, float, float blur)
+{
+  lobe.alpha = anisotropic_alpha_widened(lobe.alpha, blur);
+  return true;
 }
 
 }  // namespace relief

@@ -4,11 +4,13 @@
 // In the frame of a strand x is along it and z across it towards the viewer, so that wo = (sin θo, 0, cos θo).
 #pragma once
 
+#include "kernel/bsdf/mixture_traits.h"
 #include "kernel/math/vec.h"
 
 namespace relief {
 
 struct Hair {
+  static constexpr MixtureTraits kTraits{.is_diffuse = false, .fading = LobeFading::kNever, .is_strand = true};
   float along = 0.1f;  ///< width of the tilts, radians
   float around = 1;    ///< width around the strand
   float offset = 0;    ///< of the highlight's tilt, radians
@@ -75,5 +77,24 @@ RELIEF_KERNEL Vec3f hair_sample(const Hair& hair, Vec3f wo, Vec2f u)
   const float cosine = std::cos(theta_i);
   return {std::sin(theta_i), -std::sin(phi) * cosine, std::cos(phi) * cosine};
 }
+
+template <TransportMode>
+[[gnu::noinline]] RELIEF_KERNEL BsdfEval lobe_eval(const Hair& hair, const LobeHit& hit, const BsdfTables&, Vec3f wi, bool)
+{
+  const float density = hair_eval(hair, hit.wo, wi);
+  return {splat3(density), density};
+}
+
+template <TransportMode>
+[[gnu::noinline]] RELIEF_KERNEL LobeSample lobe_sample(const Hair& hair, const LobeHit& hit, float, Vec2f u)
+{
+  return lobe_sample_glossy(hair_sample(hair, hit.wo, u), hair.transmits, hair.along);
+}
+
+/// That of what goes through.
+struct HairThrough : Hair {
+  static constexpr MixtureTraits kTraits{
+      .sides = LobeSides::kTransmit, .is_diffuse = false, .fading = LobeFading::kNever, .is_strand = true};
+};
 
 }  // namespace relief

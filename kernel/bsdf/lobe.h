@@ -73,7 +73,8 @@ RELIEF_KERNEL LobeSample lobe_sample_delta(Vec3f wi, Vec3f reflectance, float pr
   return {wi, kLobeDelta | (wi.z < 0.0f ? kLobeTransmit : kLobeReflect), reflectance, probability, 0.0f, 1.0f};
 }
 
-enum class LobeSides { kReflect, kTransmit, kBoth };
+/// kBoth: on either side, as meant; kSphere: all around a strand, which has none.
+enum class LobeSides : std::uint8_t { kReflect, kTransmit, kBoth, kSphere };
 
 /// Whose roughness decides whether a lobe is sharp.
 enum class LobeSharpness { kNever, kBase, kCoat };

@@ -6,11 +6,16 @@
 
 #include "kernel/bsdf/beckmann.h"
 #include "kernel/bsdf/dielectric.h"
+#include "kernel/bsdf/mixture_traits.h"
 
 namespace relief {
 
 /// eta is index transmitted / index incident, seen from wo (Cycles' `ior`, inverted by it on back faces).
 struct MicrofacetRefraction {
+  static constexpr MixtureTraits kTraits{.sides = LobeSides::kTransmit,
+                                         .is_diffuse = false,
+                                         .is_microfacet = true,
+                                         .fading = LobeFading::kNever};
   float alpha = 1;
   float eta = 1.45f;  ///< not matched (dielectric_is_matched)
   bool is_beckmann = false;
@@ -71,6 +76,44 @@ RELIEF_KERNEL Vec3f microfacet_refraction_sample(const MicrofacetRefraction& lob
   const float cos_t = refracted_cosine(cos_o, lobe.eta);
   if (!(cos_t > 0.0f)) return {};
   return normalize(refract(wo, wm, cos_o, cos_t, lobe.eta));
+}
+
+template <TransportMode kMode>
+RELIEF_KERNEL BsdfEval
+lobe_eval(const MicrofacetRefraction& lobe, const LobeHit& hit, const BsdfTables&, Vec3f wi, bool)
+{
+  BsdfEval e;
+  e.f = splat3(microfacet_refraction_eval(lobe, hit.wo, wi, &e.pdf) * transmission_scale<kMode>(lobe.eta));
+  return e;
+}
+
+/// What a clear pane sends on.
+template <TransportMode kMode>
+RELIEF_KERNEL LobeSample lobe_sample_pane(const MicrofacetRefraction& lobe, Vec3f wo)
+{
+  const float eta = lobe.eta;
+  const float cos_t = refracted_cosine(wo.z, eta);
+  if (!(cos_t > 0.0f)) return {};
+  const Vec3f wi = dielectric_is_matched(eta) ? -wo : normalize(Vec3f{-wo.x / eta, -wo.y / eta, -cos_t});
+  LobeSample s = lobe_sample_delta(wi, splat3(transmission_scale<kMode>(eta)));
+  s.eta = eta;
+  return s;
+}
+
+template <TransportMode kMode>
+RELIEF_KERNEL LobeSample lobe_sample(const MicrofacetRefraction& lobe, const LobeHit& hit, float, Vec2f u)
+{
+  if (hit.is_delta) return lobe_sample_pane<kMode>(lobe, hit.wo);
+  LobeSample s = lobe_sample_glossy(microfacet_refraction_sample(lobe, hit.wo, u), true, sqr(hit.roughness));
+  s.eta = lobe.eta;
+  return s;
+}
+
+RELIEF_KERNEL bool lobe_widen(MicrofacetRefraction& lobe, float, float blur)
+{
+  if (dielectric_is_matched(lobe.eta)) return false;
+  lobe.alpha = max(lobe.alpha, blur);
+  return true;
 }
 
 }  // namespace relief

@@ -38,7 +38,9 @@ struct Mixture {
 template <typename F>
 RELIEF_KERNEL void mixture_visit(const Mixture& m, F&& f)
 {
-  for (std::uint64_t left = m.chosen; left != 0; left &= left - 1) f(m.all->lobes[__builtin_ctzll(left)]);
+  for (std::uint64_t left = m.chosen; left != 0; left &= left - 1) {
+    f(m.all->lobes[static_cast<std::size_t>(__builtin_ctzll(left))]);
+  }
 }
 
 /// All lobes of a hit.
@@ -76,16 +78,14 @@ RELIEF_KERNEL Mixture mixture_part(const Mixture& m, SharpLobes sharp)
       m, [sharp](const MixtureLobe& lobe) { return mixture_lobe_is_sharp(lobe, sharp.most_roughness) == kSharp; });
 }
 
-/// As closure_eval of a SurfaceClosure; pdf of the chosen lobes.
-/// @param sampled  the lobe that wi was sampled from; null: it was not
-/// @param through  whether that lobe sent it through the surface
-template <unsigned kFeatures, TransportMode kMode = TransportMode::kRadiance>
-RELIEF_KERNEL BsdfEval
-closure_eval(const Mixture& m,
-             const BsdfTables& tables,
-             Vec3f wi_local,
-             const MixtureLobe* sampled = nullptr,
-             bool through = false)
+/// f and pdf of the chosen lobes. Not inlined, and all kinds of lobes are in it: kernels ask from many places, and a call a lobe
+/// cost as much as most lobes.
+/// @param wi_local  in the surface's frame
+/// @param sampled   the lobe that wi was sampled from; null: it was not
+/// @param through   whether that lobe sent it through the surface
+template <TransportMode kMode>
+[[gnu::noinline]] RELIEF_KERNEL BsdfEval
+mixture_eval(const Mixture& m, const BsdfTables& tables, Vec3f wi_local, const MixtureLobe* sampled, bool through)
 {
   BsdfEval e;
   const float cos_i = __builtin_fabsf(wi_local.z);
@@ -94,20 +94,25 @@ closure_eval(const Mixture& m,
   const bool below_Ns = wi_local.z < 0.0f, below_Ng = dot(wi, m.Ng) < 0.0f;
   mixture_visit(m, [&](const MixtureLobe& lobe) {
     const Vec3f wi_lobe = to_local(lobe.frame, wi);
-    const bool below = &lobe == sampled ? through : wi_lobe.z < 0.0f;
-    const bool shines = mixture_lobe_reaches(lobe, below, below_Ns, below_Ng, &lobe == sampled);
-    // Of microfacets Cycles counts the density of what it would not sample, too: a lamp that they see so is not the brighter
-    // for it, nor noisier.
-    const bool is_found = mixture_lobe_reaches(lobe, below, below_Ns, below_Ng, true) ||
-                          (shines && mixture_lobe_is_microfacet(lobe.kind));
+    const bool is_own = &lobe == sampled;
+    const bool below = is_own ? through : wi_lobe.z < 0.0f;
+    const std::uint32_t reach = mixture_lobe_reach(lobe).bits >> reach_bit({below, below_Ns, below_Ng}, is_own);
+    const bool shines = (reach & 1u) != 0, is_found = (reach >> kReachFound & 1u) != 0;
     if (!shines && !is_found) return;
-    const BsdfEval one = mixture_lobe_eval<kMode>(lobe, tables, wi_lobe, below, &lobe == sampled);
+    const BsdfEval one = mixture_lobe_eval<kMode>(lobe, tables, wi_lobe, below, is_own);
     if (shines) e.f += lobe.weight * one.f;
     if (is_found) e.pdf += lobe.probability * one.pdf;
   });
   e.f *= m.gain / cos_i;
   e.pdf *= m.scale;
   return e;
+}
+
+/// As closure_eval of a SurfaceClosure.
+template <unsigned kFeatures, TransportMode kMode = TransportMode::kRadiance>
+RELIEF_KERNEL BsdfEval closure_eval(const Mixture& m, const BsdfTables& tables, Vec3f wi_local)
+{
+  return mixture_eval<kMode>(m, tables, wi_local, nullptr, false);
 }
 
 /// As closure_sample of a SurfaceClosure.
@@ -142,13 +147,13 @@ RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tabl
   }
   const LobeSample d = mixture_lobe_sample<kMode>(*chosen, u_branch, u);
   const bool through = (d.bits & kLobeTransmit) != 0;
-  const bool is_lost = (d.wi.z < 0.0f) != through && !mixture_lobe_is_strand(chosen->kind) &&
+  const bool is_lost = (d.wi.z < 0.0f) != through && !mixture_traits(chosen->kind).is_strand &&
                        (through || !chosen->mirrors_below || chosen->is_on_curve);
   if (d.bits == 0 || is_lost) return {};
   BsdfSample s;
   const Vec3f wi = from_local(chosen->frame, d.wi);
   s.wi = to_local(m.frame, wi);
-  if (!mixture_lobe_reaches(*chosen, through, s.wi.z < 0.0f, dot(wi, m.Ng) < 0.0f, true) ||
+  if (!mixture_lobe_reaches(*chosen, {through, s.wi.z < 0.0f, dot(wi, m.Ng) < 0.0f}, true) ||
       !(__builtin_fabsf(s.wi.z) > kMinCosine)) {
     return {};
   }
@@ -160,7 +165,7 @@ RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tabl
     s.pdf = chosen->probability * m.scale * d.probability;
     return s;
   }
-  const BsdfEval e = closure_eval<kFeatures, kMode>(m, tables, s.wi, chosen, through);
+  const BsdfEval e = mixture_eval<kMode>(m, tables, s.wi, chosen, through);
   s.f = e.f;
   s.pdf = e.pdf;
   return s;

@@ -6,11 +6,13 @@
 #pragma once
 
 #include "kernel/bsdf/diffuse.h"
+#include "kernel/bsdf/mixture_traits.h"
 
 namespace relief {
 
 /// Roughness 0 is Lambert.
 struct OrenNayar {
+  static constexpr MixtureTraits kTraits{};
   float A = kInvPi;
   float B = 0;
 };
@@ -64,6 +66,7 @@ RELIEF_KERNEL float oren_nayar_albedo(const OrenNayar& lobe, float z)
 
 /// Oren–Nayar of Cycles 4.3: with a second term for light that bounces more than once. White is closed in the furnace.
 struct OrenNayarMultiple {
+  static constexpr MixtureTraits kTraits{};
   OrenNayar single;
   Vec3f multiple{};  ///< of the second term, before what wi loses
 };
@@ -95,5 +98,33 @@ RELIEF_KERNEL Vec3f oren_nayar_multiple_eval(const OrenNayarMultiple& lobe, Vec3
 }
 
 RELIEF_KERNEL Vec3f oren_nayar_multiple_sample(const OrenNayarMultiple&, Vec3f, Vec2f u) { return diffuse_sample(u); }
+
+template <TransportMode>
+RELIEF_KERNEL BsdfEval lobe_eval(const OrenNayar& lobe, const LobeHit& hit, const BsdfTables&, Vec3f wi, bool)
+{
+  BsdfEval e;
+  e.f = splat3(oren_nayar_eval(lobe, hit.wo, wi, &e.pdf));
+  return e;
+}
+
+template <TransportMode>
+RELIEF_KERNEL LobeSample lobe_sample(const OrenNayar& lobe, const LobeHit& hit, float, Vec2f u)
+{
+  return lobe_sample_diffuse(oren_nayar_sample(lobe, hit.wo, u), false);
+}
+
+template <TransportMode>
+RELIEF_KERNEL BsdfEval lobe_eval(const OrenNayarMultiple& lobe, const LobeHit& hit, const BsdfTables&, Vec3f wi, bool)
+{
+  BsdfEval e;
+  e.f = oren_nayar_multiple_eval(lobe, hit.wo, wi, &e.pdf);
+  return e;
+}
+
+template <TransportMode>
+RELIEF_KERNEL LobeSample lobe_sample(const OrenNayarMultiple& lobe, const LobeHit& hit, float, Vec2f u)
+{
+  return lobe_sample_diffuse(oren_nayar_multiple_sample(lobe, hit.wo, u), false);
+}
 
 }  // namespace relief

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "kernel/bsdf/diffuse.h"
+#include "kernel/bsdf/mixture_traits.h"
 
 namespace relief {
 
@@ -19,6 +20,7 @@ enum class PrincipledDiffusePart : std::uint8_t {
 };
 
 struct PrincipledDiffuse {
+  static constexpr MixtureTraits kTraits{};
   float roughness = 0.5f;  ///< not clamped, as in Cycles
   PrincipledDiffusePart part = PrincipledDiffusePart::kAll;
 };
@@ -51,5 +53,19 @@ RELIEF_KERNEL float principled_diffuse_eval(const PrincipledDiffuse& lobe, Vec3f
 }
 
 RELIEF_KERNEL Vec3f principled_diffuse_sample(const PrincipledDiffuse&, Vec3f, Vec2f u) { return diffuse_sample(u); }
+
+template <TransportMode>
+RELIEF_KERNEL BsdfEval lobe_eval(const PrincipledDiffuse& lobe, const LobeHit& hit, const BsdfTables&, Vec3f wi, bool)
+{
+  BsdfEval e;
+  e.f = splat3(principled_diffuse_eval(lobe, hit.wo, wi, &e.pdf));
+  return e;
+}
+
+template <TransportMode>
+RELIEF_KERNEL LobeSample lobe_sample(const PrincipledDiffuse& lobe, const LobeHit& hit, float, Vec2f u)
+{
+  return lobe_sample_diffuse(principled_diffuse_sample(lobe, hit.wo, u), false);
+}
 
 }  // namespace relief

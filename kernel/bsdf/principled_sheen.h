@@ -4,11 +4,14 @@
 #pragma once
 
 #include "kernel/bsdf/diffuse.h"
+#include "kernel/bsdf/mixture_traits.h"
 
 namespace relief {
 
 /// Has no parameters: the strength and the tint are its colour.
-struct PrincipledSheen {};
+struct PrincipledSheen {
+  static constexpr MixtureTraits kTraits{};
+};
 
 /// f before the colour, (1 − cos)⁵ of the half angle. It has no 1/π; the albedo at grazing angles is 0.08, on top of the
 /// diffuse base.
@@ -21,5 +24,19 @@ RELIEF_KERNEL float principled_sheen_eval(const PrincipledSheen&, Vec3f wo, Vec3
 }
 
 RELIEF_KERNEL Vec3f principled_sheen_sample(const PrincipledSheen&, Vec3f, Vec2f u) { return diffuse_sample(u); }
+
+template <TransportMode>
+RELIEF_KERNEL BsdfEval lobe_eval(const PrincipledSheen& lobe, const LobeHit& hit, const BsdfTables&, Vec3f wi, bool)
+{
+  BsdfEval e;
+  e.f = splat3(principled_sheen_eval(lobe, hit.wo, wi, &e.pdf));
+  return e;
+}
+
+template <TransportMode>
+RELIEF_KERNEL LobeSample lobe_sample(const PrincipledSheen& lobe, const LobeHit& hit, float, Vec2f u)
+{
+  return lobe_sample_diffuse(principled_sheen_sample(lobe, hit.wo, u), false);
+}
 
 }  // namespace relief

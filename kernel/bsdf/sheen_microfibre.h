@@ -4,6 +4,7 @@
 // Dupuy, Hill and Neubelt 2016, "Real-Time Polygonal-Light Shading with Linearly Transformed Cosines".
 #pragma once
 
+#include "kernel/bsdf/mixture_traits.h"
 #include "kernel/sample/warp.h"
 
 namespace relief {
@@ -17,6 +18,7 @@ inline constexpr float kMicrofibreTable[3][kMicrofibreNodes][kMicrofibreNodes] =
 
 /// The map, about the plane of wo and the normal, and what the layer reflects. Where the albedo is 0 there is no lobe.
 struct SheenMicrofibre {
+  static constexpr MixtureTraits kTraits{};
   float A = 1, B = 0;
   float albedo = 0;
 };
@@ -71,6 +73,20 @@ RELIEF_KERNEL Vec3f sheen_microfibre_sample(const SheenMicrofibre& lobe, Vec3f w
   if (!(across > 1e-6f)) return w;
   const float cos_phi = wo.x / across, sin_phi = wo.y / across;
   return {cos_phi * w.x - sin_phi * w.y, sin_phi * w.x + cos_phi * w.y, w.z};
+}
+
+template <TransportMode>
+RELIEF_KERNEL BsdfEval lobe_eval(const SheenMicrofibre& lobe, const LobeHit& hit, const BsdfTables&, Vec3f wi, bool)
+{
+  BsdfEval e;
+  e.f = splat3(sheen_microfibre_eval(lobe, hit.wo, wi, &e.pdf));
+  return e;
+}
+
+template <TransportMode>
+RELIEF_KERNEL LobeSample lobe_sample(const SheenMicrofibre& lobe, const LobeHit& hit, float, Vec2f u)
+{
+  return lobe_sample_diffuse(sheen_microfibre_sample(lobe, hit.wo, u), false);
 }
 
 }  // namespace relief

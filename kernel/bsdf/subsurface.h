@@ -10,6 +10,7 @@
 
 #include "kernel/bsdf/fresnel.h"
 #include "kernel/bsdf/ggx_anisotropic.h"
+#include "kernel/bsdf/mixture_traits.h"
 #include "kernel/sample/warp.h"
 
 namespace relief {
@@ -22,6 +23,7 @@ enum class SubsurfaceEntry : std::uint8_t {
 };
 
 struct Subsurface {
+  static constexpr MixtureTraits kTraits{.sides = LobeSides::kBoth};
   Vec3f albedo;  ///< of the surface as a whole, above 0
   Vec3f radius;  ///< mean free path, metres, world; if not is_similar, of the even medium that this one is like; 0: does not enter
   float anisotropy = 0;
@@ -148,6 +150,20 @@ RELIEF_KERNEL Vec3f subsurface_enter(const Subsurface& s, Vec3f wo, Vec2f u)
   const float cos_o = dot(h, wo), eta = 1.0f / s.entry_ior;
   const float cos_t = __builtin_sqrtf(max(1.0f - sqr(eta) * (1.0f - sqr(cos_o)), 0.0f));
   return normalize((eta * cos_o - cos_t) * h - eta * wo);
+}
+
+/// Lights are not found through it.
+template <TransportMode>
+RELIEF_KERNEL BsdfEval lobe_eval(const Subsurface&, const LobeHit&, const BsdfTables&, Vec3f, bool)
+{
+  return {};
+}
+
+/// Nothing: whoever samples a mixture has the path enter, see subsurface_enter.
+template <TransportMode>
+RELIEF_KERNEL LobeSample lobe_sample(const Subsurface&, const LobeHit&, float, Vec2f)
+{
+  return {};
 }
 
 }  // namespace relief

@@ -2,12 +2,14 @@
 // (glossy).
 #pragma once
 
+#include "kernel/bsdf/mixture_traits.h"
 #include "kernel/sample/warp.h"
 
 namespace relief {
 
 /// Angles in radians.
 struct Toon {
+  static constexpr MixtureTraits kTraits{};
   float inner = 0;          ///< full brightness up to here
   float rim = 0;            ///< width over which it falls to nothing
   float one_minus_cos = 0;  ///< of the cone that is sampled, min(inner + rim, π/2)
@@ -66,6 +68,31 @@ RELIEF_KERNEL Vec3f toon_sample(const Toon& lobe, Vec3f wo, Vec2f u)
   if (toon_is_empty(lobe)) return {};
   const Vec3f w = warp_cone(lobe.one_minus_cos, u);
   return lobe.is_glossy ? from_local(frame_from_normal(toon_axis(lobe, wo)), w) : w;
+}
+
+template <TransportMode>
+RELIEF_KERNEL BsdfEval lobe_eval(const Toon& lobe, const LobeHit& hit, const BsdfTables&, Vec3f wi, bool)
+{
+  BsdfEval e;
+  e.f = splat3(toon_eval(lobe, hit.wo, wi, &e.pdf));
+  return e;
+}
+
+template <TransportMode>
+RELIEF_KERNEL LobeSample lobe_sample(const Toon& lobe, const LobeHit& hit, float, Vec2f u)
+{
+  return lobe_sample_diffuse(toon_sample(lobe, hit.wo, u), false);
+}
+
+/// That about the mirror direction.
+struct GlossyToon : Toon {
+  static constexpr MixtureTraits kTraits{.is_diffuse = false, .fading = LobeFading::kBefore52};
+};
+
+template <TransportMode>
+RELIEF_KERNEL LobeSample lobe_sample(const GlossyToon& lobe, const LobeHit& hit, float, Vec2f u)
+{
+  return lobe_sample_glossy(toon_sample(lobe, hit.wo, u), false, 1.0f);
 }
 
 }  // namespace relief

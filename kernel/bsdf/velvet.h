@@ -3,11 +3,13 @@
 // Ashikhmin, Premože and Shirley 2000, "A Microfacet-Based BRDF Generator" [A].
 #pragma once
 
+#include "kernel/bsdf/mixture_traits.h"
 #include "kernel/sample/warp.h"
 
 namespace relief {
 
 struct Velvet {
+  static constexpr MixtureTraits kTraits{.fading = LobeFading::kBefore52};
   float inv_sigma2 = 1;
 };
 
@@ -37,5 +39,19 @@ RELIEF_KERNEL float velvet_eval(const Velvet& lobe, Vec3f wo, Vec3f wi, float* p
 }
 
 RELIEF_KERNEL Vec3f velvet_sample(const Velvet&, Vec3f, Vec2f u) { return warp_hemisphere(u); }
+
+template <TransportMode>
+RELIEF_KERNEL BsdfEval lobe_eval(const Velvet& lobe, const LobeHit& hit, const BsdfTables&, Vec3f wi, bool)
+{
+  BsdfEval e;
+  e.f = splat3(velvet_eval(lobe, hit.wo, wi, &e.pdf));
+  return e;
+}
+
+template <TransportMode>
+RELIEF_KERNEL LobeSample lobe_sample(const Velvet& lobe, const LobeHit& hit, float, Vec2f u)
+{
+  return lobe_sample_diffuse(velvet_sample(lobe, hit.wo, u), false);
+}
 
 }  // namespace relief

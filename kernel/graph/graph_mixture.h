@@ -37,10 +37,9 @@ RELIEF_KERNEL Inputs closure_inputs(const GraphLane& at, const SurfaceClosureSpe
     const SurfaceClosureSpec& spec = at.program->closures[i];
     const float weight = graph_result(at, spec.first_result);
     if (!(weight > kLeastClosureWeight && weight < kInfinity)) continue;
-    build.is_4 = spec.is_4;
-    build.is_5 = spec.is_5;
+    build.maths = spec.maths;
     switch (spec.kind) {
-#define CLOSURE(name, Type)                                                   \
+#define CLOSURE(name, Type, most_lobes)                                       \
   case ClosureKind::name:                                                     \
     closure_add(build, spec, weight, closure_inputs<Type##Inputs>(at, spec)); \
     break;

@@ -17,7 +17,7 @@ RELIEF_KERNEL void path_enter_surface(PathState& state,
                                       const BsdfSample& bsdf,
                                       Vec3f throughput)
 {
-  state.subsurface.entries[path] = {lobe.shape.subsurface, lobe.frame.n, lobe.is_4, lobe.is_5};
+  state.subsurface.entries[path] = {lobe.shape.subsurface, lobe.frame.n, lobe.maths};
   path_set_ray(state, path, surface_hit_origin(at.hit, at.hit.P, !at.side.front), from_local(at.side.frame, bsdf.wi));
   state.throughput[path] = throughput * bsdf.f / bsdf.pdf;
   state.cone_width[path] = at.cone.width;

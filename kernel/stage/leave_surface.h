@@ -42,8 +42,7 @@ template <unsigned kFeatures>
   const SubsurfaceState& below = state.subsurface.entries[path];
   lobes.size = 0;
   MixtureBuild build{wo, at.side.Ng, at.side.Ns, at.side.front, g.bsdf_tables, &lobes};
-  build.is_4 = below.is_4;
-  build.is_5 = below.is_5;
+  build.maths = below.maths;
   MixtureLobe* const lobe = mixture_add(build, {1, 1, 1}, frame_from_normal(N), true);
   if (lobe == nullptr) return;
   if (below.surface.leaves_by_fresnel) {

@@ -269,9 +269,11 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   if (const std::uint16_t first = lane.program->surface_normal; first != kNoGraphOperand) {
     const Vec3f given{graph_result(lane, first), graph_result(lane, first + 1), graph_result(lane, first + 2)};
     // Since 4.0 what displaces nothing bends freely.
-    bool is_4 = false;
-    for (std::uint32_t i = 0; i < lane.program->num_closures; ++i) is_4 = is_4 || lane.program->closures[i].is_4;
-    build.Ns = is_4 ? closure_normal_as_given(build, given) : closure_normal(build, given);
+    bool is_free = false;
+    for (std::uint32_t i = 0; i < lane.program->num_closures; ++i) {
+      is_free = is_free || lane.program->closures[i].maths >= Maths::k43;
+    }
+    build.Ns = is_free ? closure_normal_as_given(build, given) : closure_normal(build, given);
   }
   side.Ns = shading_normal_towards(build.Ns, wo);
   side.bent = !(dot(side.Ns, Ns) > kUnbent);

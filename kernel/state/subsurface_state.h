@@ -1,6 +1,7 @@
 // What paths keep while they are below a surface.
 #pragma once
 
+#include "kernel/bsdf/closure_kinds.h"
 #include "kernel/bsdf/subsurface.h"
 
 namespace relief {
@@ -8,7 +9,7 @@ namespace relief {
 struct SubsurfaceState {
   Subsurface surface;  ///< as it is where they have entered
   Vec3f N;             ///< shading normal there, world, outwards
-  bool is_4, is_5;     ///< see MixtureLobe
+  Maths maths;         ///< of the closure
 };
 
 }  // namespace relief

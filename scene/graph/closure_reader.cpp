@@ -20,6 +20,7 @@ struct ClosureInput {
 
 struct ClosureTable {
   std::string_view name;
+  int most_lobes;  ///< that it becomes
   std::vector<ClosureInput> inputs;
 };
 
@@ -27,7 +28,7 @@ struct ClosureTable {
 const std::vector<ClosureTable>& closure_tables()
 {
   static const std::vector<ClosureTable> tables = {
-#define CLOSURE(name, Type) {#name, {
+#define CLOSURE(name, Type, most_lobes) {#name, most_lobes, {
 #define COLOR(name, json, r, g, b) {json, InputKind::kColor, {r, g, b}},
 #define NUMBER(name, json, value) {json, InputKind::kNumber, {value, value, value}},
 #define VECTOR(name, json) {json, InputKind::kVector, {0, 0, 0}},
@@ -38,27 +39,6 @@ const std::vector<ClosureTable>& closure_tables()
 #include "kernel/bsdf/closure_inputs.inc"
   };
   return tables;
-}
-
-/// Lobes that a closure becomes at most.
-int most_lobes(ClosureKind kind)
-{
-  switch (kind) {
-    case ClosureKind::transparent:
-    case ClosureKind::emission:
-    case ClosureKind::holdout:
-      return 0;
-    case ClosureKind::glass:
-    case ClosureKind::glossy:
-      return 2;
-    case ClosureKind::subsurface:
-      return 2;
-    case ClosureKind::principled3:
-    case ClosureKind::principled4:
-      return 9;
-    default:
-      return 1;
-  }
 }
 
 SurfaceClosureSpec read_closure(const JsonReader& r)
@@ -72,12 +52,10 @@ SurfaceClosureSpec read_closure(const JsonReader& r)
   static constexpr std::string_view kFresnels[] = {"f82", "physical"};
   static constexpr std::string_view kSubsurfaceMethods[] = {"random-walk", "random-walk-legacy", "random-walk-skin"};
   SurfaceClosureSpec spec;
-  const int maths = r.choice("maths", kMaths, 0);
-  spec.is_4 = maths >= 1;
-  spec.is_5 = maths == 2;
+  spec.maths = static_cast<Maths>(r.choice("maths", kMaths, 0));
   std::string type = r.string("type", "");
   const std::string given = type;
-  if (type == "principled") type = spec.is_4 ? "principled4" : "principled3";
+  if (type == "principled") type = spec.maths >= Maths::k43 ? "principled4" : "principled3";
   const auto& tables = closure_tables();
   const auto it = std::find_if(tables.begin(), tables.end(), [&](const ClosureTable& t) { return t.name == type; });
   if (it == tables.end() || given == "principled3" || given == "principled4") {
@@ -95,10 +73,10 @@ SurfaceClosureSpec read_closure(const JsonReader& r)
       spec.distribution = static_cast<ClosureDistribution>(r.choice("distribution", kDistributions, 0));
       break;
     case K::toon:
-      spec.is_other = r.choice("component", kComponents, 0) == 1;
+      if (r.choice("component", kComponents, 0) == 1) spec.variant = ClosureVariant::kGlossyToon;
       break;
     case K::hair:
-      spec.is_other = r.choice("component", kHairComponents, 0) == 1;
+      if (r.choice("component", kHairComponents, 0) == 1) spec.variant = ClosureVariant::kHairThrough;
       break;
     case K::fibre:
       spec.pigment = static_cast<FibrePigment>(r.choice("pigment", kPigments, 0));
@@ -106,7 +84,7 @@ SurfaceClosureSpec read_closure(const JsonReader& r)
     default:
       break;
   }
-  if (spec.kind == K::metallic) spec.is_other = r.choice("fresnel", kFresnels, 0) == 1;
+  if (spec.kind == K::metallic && r.choice("fresnel", kFresnels, 0) == 1) spec.variant = ClosureVariant::kPhysicalMetal;
   if (spec.kind == K::subsurface) {
     spec.subsurface = static_cast<SubsurfaceMethod>(r.choice("method", kSubsurfaceMethods, 0));
   } else if (spec.kind == K::principled3 || spec.kind == K::principled4) {
@@ -129,7 +107,8 @@ std::vector<SurfaceClosureSpec> closures_read(const JsonReader& reader,
   for (std::size_t i = 0; i < list.size(); ++i) {
     const JsonReader r(list[i], reader.file(), json_path_join(json_path_join(reader.path(), "closures"), i));
     SurfaceClosureSpec spec = read_closure(r);
-    lobes += most_lobes(spec.kind);
+    const ClosureTable& table = closure_tables()[static_cast<std::size_t>(spec.kind)];
+    lobes += table.most_lobes;
     if (lobes > kMostMixtureLobes) {
       r.fail("", "closures of at most " + std::to_string(kMostMixtureLobes) + " lobes together",
              "one that is too many");
@@ -138,7 +117,6 @@ std::vector<SurfaceClosureSpec> closures_read(const JsonReader& reader,
     float known = 0;
     const GraphScalar w = weight.v[0].index >= 0 ? weight.v[0] : build.constant(1.0f);
     const bool is_nothing = build.is_constant(w, &known) && known == 0.0f;
-    const ClosureTable& table = closure_tables()[static_cast<std::size_t>(spec.kind)];
     std::vector<GraphScalar> results{w};
     for (const ClosureInput& socket : table.inputs) {
       const bool is_number = socket.kind == InputKind::kNumber;

@@ -82,8 +82,8 @@ TEST(ClosureReader, VersionsOfThePrincipledAreToldApart)
   EXPECT_EQ(scene.graphs.at(0).closures.at(1).kind, ClosureKind::principled4);
   EXPECT_EQ(inputs_of<Principled4Inputs>(scene.graphs.at(0), 1).coat_weight, 0.5f);
   EXPECT_EQ(scene.graphs.at(0).closures.at(2).kind, ClosureKind::principled4);
-  EXPECT_TRUE(scene.graphs.at(0).closures.at(2).is_4 && scene.graphs.at(0).closures.at(2).is_5);
-  EXPECT_FALSE(scene.graphs.at(0).closures.at(1).is_5);
+  EXPECT_EQ(scene.graphs.at(0).closures.at(2).maths, Maths::k52);
+  EXPECT_EQ(scene.graphs.at(0).closures.at(1).maths, Maths::k43);
 }
 
 TEST(ClosureReader, WhatWeighsNothingIsLeftOut)

@@ -46,19 +46,17 @@ Mixture mixture_make(const MixtureCase& one,
 /// A normal that leans by some degrees, Z up as graphs have it.
 Vec3f leaning(float x, float y) { return normalize(Vec3f{x, -1.0f, y}); }
 
-SurfaceClosureSpec spec_of(bool is_4, ClosureDistribution distribution = ClosureDistribution::kGgx)
+SurfaceClosureSpec spec_of(Maths maths, ClosureDistribution distribution = ClosureDistribution::kGgx)
 {
   SurfaceClosureSpec spec;
-  spec.is_4 = is_4;
+  spec.maths = maths;
   spec.distribution = distribution;
   return spec;
 }
 
 SurfaceClosureSpec spec_of_52(ClosureDistribution distribution = ClosureDistribution::kGgx)
 {
-  SurfaceClosureSpec spec = spec_of(true, distribution);
-  spec.is_5 = true;
-  return spec;
+  return spec_of(Maths::k52, distribution);
 }
 
 /// A closure of 5.2.
@@ -66,7 +64,7 @@ template <typename Inputs>
 MixtureCase case_of_52(const std::string& name, const SurfaceClosureSpec& spec, const Inputs& in)
 {
   return {name, [=](MixtureBuild& b) {
-            b.is_4 = b.is_5 = true;
+            b.maths = Maths::k52;
             closure_add(b, spec, 1.0f, in);
           }};
 }
@@ -113,24 +111,24 @@ std::vector<MixtureCase> cases()
 {
   std::vector<MixtureCase> all;
   all.push_back({"diffuse and gloss", [](MixtureBuild& b) {
-                   closure_add(b, spec_of(false), 0.7f, DiffuseInputs{{0.8f, 0.2f, 0.1f}, 0.4f, leaning(0.3f, 0)});
+                   closure_add(b, spec_of(Maths::k34), 0.7f, DiffuseInputs{{0.8f, 0.2f, 0.1f}, 0.4f, leaning(0.3f, 0)});
                    GlossyInputs glossy;
                    glossy.roughness = 0.5f;
-                   closure_add(b, spec_of(false), 0.3f, glossy);
+                   closure_add(b, spec_of(Maths::k34), 0.3f, glossy);
                  }});
   all.push_back({"translucent, velvet and toon", [](MixtureBuild& b) {
-                   closure_add(b, spec_of(false), 0.4f, TranslucentInputs{});
-                   closure_add(b, spec_of(false), 0.4f, VelvetInputs{});
-                   closure_add(b, spec_of(false), 0.2f, ToonInputs{{0.5f, 0.5f, 0.5f}, 0.6f, 0.3f, {}});
+                   closure_add(b, spec_of(Maths::k34), 0.4f, TranslucentInputs{});
+                   closure_add(b, spec_of(Maths::k34), 0.4f, VelvetInputs{});
+                   closure_add(b, spec_of(Maths::k34), 0.2f, ToonInputs{{0.5f, 0.5f, 0.5f}, 0.6f, 0.3f, {}});
                  }});
   for (const auto distribution :
        {ClosureDistribution::kGgx, ClosureDistribution::kBeckmann, ClosureDistribution::kMultiscatterGgx}) {
-    for (const bool is_4 : {false, true}) {
-      const std::string which = std::to_string(static_cast<int>(distribution)) + (is_4 ? ", 4.3" : ", 3.4");
+    for (const Maths maths : {Maths::k34, Maths::k43}) {
+      const std::string which = std::to_string(static_cast<int>(distribution)) + (maths >= Maths::k43 ? ", 4.3" : ", 3.4");
       all.push_back({"glass " + which, [=](MixtureBuild& b) {
                        GlassInputs glass;
                        glass.roughness = 0.5f;
-                       closure_add(b, spec_of(is_4, distribution), 1.0f, glass);
+                       closure_add(b, spec_of(maths, distribution), 1.0f, glass);
                      }});
     }
   }
@@ -140,9 +138,9 @@ std::vector<MixtureCase> cases()
     const Principled3Inputs three = random_principled3(random);
     const Principled4Inputs four = random_principled4(random);
     all.push_back({"Principled 3.4, " + std::to_string(i),
-                   [=](MixtureBuild& b) { closure_add(b, spec_of(false, distribution), 1.0f, three); }});
+                   [=](MixtureBuild& b) { closure_add(b, spec_of(Maths::k34, distribution), 1.0f, three); }});
     all.push_back({"Principled 4.3, " + std::to_string(i),
-                   [=](MixtureBuild& b) { closure_add(b, spec_of(true, distribution), 1.0f, four); }});
+                   [=](MixtureBuild& b) { closure_add(b, spec_of(Maths::k43, distribution), 1.0f, four); }});
   }
   for (int i = 0; i < 4; ++i) {
     Principled4Inputs in = random_principled4(random);
@@ -156,7 +154,7 @@ std::vector<MixtureCase> cases()
     metal.thin_film_thickness = 400.0f;
     metal.roughness = 0.6f;
     SurfaceClosureSpec spec = spec_of_52();
-    spec.is_other = is_physical;
+    if (is_physical) spec.variant = ClosureVariant::kPhysicalMetal;
     all.push_back(case_of_52(is_physical ? "film on a conductor" : "film on a coloured metal", spec, metal));
   }
   return all;
@@ -171,8 +169,8 @@ double sampled_pdf(const Mixture& m, Vec3f wi)
     const bool below = to_local(lobe.frame, from_local(m.frame, wi)).z < 0.0f, below_surface = wi.z < 0.0f;
     const Mixture one = mixture_choose(m, [&lobe](const MixtureLobe& other) { return &other == &lobe; });
     const auto density = [&](bool through) {
-      if (!mixture_lobe_reaches(lobe, through, below_surface, below_surface, true)) return 0.0;
-      const float pdf = closure_eval<kFeatureAll>(one, tables(), wi, &lobe, through).pdf;
+      if (!mixture_lobe_reaches(lobe, {through, below_surface, below_surface}, true)) return 0.0;
+      const float pdf = mixture_eval<TransportMode::kRadiance>(one, tables(), wi, &lobe, through).pdf;
       return static_cast<double>(pdf * lobe.probability * m.scale);
     };
     sum += density(below);
@@ -187,7 +185,7 @@ void add_blurred(MixtureLobes& lobes, const SurfaceClosureSpec& spec, const Inpu
 {
   lobes.size = 0;
   MixtureBuild build{normalize(Vec3f{0.5f, 0.2f, 0.8f}), kN, kN, true, &tables(), &lobes};
-  build.is_4 = spec.is_4;
+  build.maths = spec.maths;
   build.blur = blur;
   build.most_sharp = most_sharp;
   closure_add(build, spec, 1.0f, in);
@@ -217,7 +215,7 @@ TEST(Mixture, BlurredLobesAreThoseOfTheirWidth)
   using D = ClosureDistribution;
   constexpr float kBlur = 0.25f, kRoughness = 0.5f;
   const auto check = [&](const SurfaceClosureSpec& spec, auto in, bool keeps_energy) {
-    SCOPED_TRACE(std::to_string(static_cast<int>(spec.distribution)) + (spec.is_4 ? ", 4.3" : ", 3.4"));
+    SCOPED_TRACE(std::to_string(static_cast<int>(spec.distribution)) + (spec.maths >= Maths::k43 ? ", 4.3" : ", 3.4"));
     for (const float before : {0.0f, 0.2f}) {
       MixtureLobes blurred, rough;
       in.roughness = before;
@@ -233,36 +231,36 @@ TEST(Mixture, BlurredLobesAreThoseOfTheirWidth)
     }
   };
   for (const D distribution : {D::kGgx, D::kBeckmann, D::kAshikhminShirley}) {
-    check(spec_of(false, distribution), GlossyInputs{}, true);
-    check(spec_of(true, distribution), GlossyInputs{}, true);
+    check(spec_of(Maths::k34, distribution), GlossyInputs{}, true);
+    check(spec_of(Maths::k43, distribution), GlossyInputs{}, true);
   }
-  check(spec_of(false, D::kMultiscatterGgx), GlossyInputs{}, true);
-  check(spec_of(true, D::kMultiscatterGgx), GlossyInputs{}, false);
+  check(spec_of(Maths::k34, D::kMultiscatterGgx), GlossyInputs{}, true);
+  check(spec_of(Maths::k43, D::kMultiscatterGgx), GlossyInputs{}, false);
   for (const D distribution : {D::kGgx, D::kBeckmann}) {
-    for (const bool is_4 : {false, true}) {
-      check(spec_of(is_4, distribution), GlassInputs{}, true);
-      check(spec_of(is_4, distribution), RefractionInputs{}, true);
+    for (const Maths maths : {Maths::k34, Maths::k43}) {
+      check(spec_of(maths, distribution), GlassInputs{}, true);
+      check(spec_of(maths, distribution), RefractionInputs{}, true);
     }
   }
-  check(spec_of(false, D::kMultiscatterGgx), GlassInputs{}, true);
+  check(spec_of(Maths::k34, D::kMultiscatterGgx), GlassInputs{}, true);
 }
 
 TEST(Mixture, WhatIsSharpByKindOrForPhotonsIsNotBlurred)
 {
   MixtureLobes lobes;
-  add_blurred(lobes, spec_of(false, ClosureDistribution::kSharp), GlossyInputs{}, 0.4f, -1.0f);
+  add_blurred(lobes, spec_of(Maths::k34, ClosureDistribution::kSharp), GlossyInputs{}, 0.4f, -1.0f);
   ASSERT_EQ(lobes.size, 1);
   EXPECT_TRUE(lobes.lobes[0].is_delta);
   GlossyInputs in;
   in.roughness = 0.25f;
   for (const float most_sharp : {0.3f, kInfinity}) {
-    add_blurred(lobes, spec_of(false), in, 0.4f, most_sharp);
+    add_blurred(lobes, spec_of(Maths::k34), in, 0.4f, most_sharp);
     EXPECT_EQ(lobes.lobes[0].roughness, 0.25f);
     EXPECT_EQ(lobes.lobes[0].shape.ggx.alpha.x, 0.0625f);
   }
   // A wider lobe stays as it is.
   in.roughness = 0.9f;
-  add_blurred(lobes, spec_of(false), in, 0.4f, -1.0f);
+  add_blurred(lobes, spec_of(Maths::k34), in, 0.4f, -1.0f);
   EXPECT_EQ(lobes.lobes[0].shape.ggx.alpha.x, 0.9f * 0.9f);
 }
 
@@ -362,7 +360,7 @@ TEST(Mixture, TheLayeredPrincipledReflectsNoMoreThanItReceives)
   for (int i = 0; i < 64; ++i) {
     const Principled4Inputs in = random_principled4(random);
     const auto distribution = i % 2 == 0 ? ClosureDistribution::kGgx : ClosureDistribution::kMultiscatterGgx;
-    const MixtureCase one{"", [&](MixtureBuild& b) { closure_add(b, spec_of(true, distribution), 1.0f, in); }};
+    const MixtureCase one{"", [&](MixtureBuild& b) { closure_add(b, spec_of(Maths::k43, distribution), 1.0f, in); }};
     for (const float z : {0.1f, 0.5f, 1.0f}) {
       MixtureLobes lobes;
       const Mixture m = mixture_make(one, direction(z, 0.2f), lobes);
@@ -402,7 +400,7 @@ TEST(Mixture, RoughCoatsOf52TakeFromBelowWhatTheyReflect)
     for (const float z : {0.1f, 0.3f, 0.7f, 1.0f}) {
       MixtureLobes lobes;
       const double now = furnace(mixture_make(case_of_52("", spec_of_52(), in), direction(z, 0.2f), lobes));
-      const MixtureCase older{"", [&](MixtureBuild& b) { closure_add(b, spec_of(true), 1.0f, in); }};
+      const MixtureCase older{"", [&](MixtureBuild& b) { closure_add(b, spec_of(Maths::k43), 1.0f, in); }};
       const double before = furnace(mixture_make(older, direction(z, 0.2f), lobes));
       EXPECT_NEAR(now, 1.0, 0.015) << roughness << ", cosine " << z;
       EXPECT_LE(std::abs(now - 1), std::abs(before - 1) + 5e-3)
@@ -452,7 +450,7 @@ TEST(Mixture, WhitePrincipledOf43IsClosed)
     in.base_color = {1, 1, 1};
     in.roughness = roughness;
     const MixtureCase one{
-        "", [&](MixtureBuild& b) { closure_add(b, spec_of(true, ClosureDistribution::kMultiscatterGgx), 1.0f, in); }};
+        "", [&](MixtureBuild& b) { closure_add(b, spec_of(Maths::k43, ClosureDistribution::kMultiscatterGgx), 1.0f, in); }};
     for (const float z : {0.2f, 0.5f, 1.0f}) {
       MixtureLobes lobes;
       EXPECT_NEAR(furnace(mixture_make(one, direction(z, 0.2f), lobes)), 1.0, 0.01) << roughness << ", cosine " << z;
@@ -531,14 +529,14 @@ TEST(Mixture, NormalsAreTurnedJustSoFarThatMirrorsReflectUpwards)
 /// A mirror whose normal leans, on a facet under a smooth normal that leans as well.
 struct BentMirror {
   const char* name;
-  bool is_4, is_5;
+  Maths maths;
 };
 
 // Black patches were on the coarse balls of every version: what the lobe reflected above the facet, and below the smooth
 // normal's horizon, was lost.
 TEST(Mixture, BentMirrorsLoseNothingAboveTheFacet)
 {
-  for (const BentMirror version : {BentMirror{"3.4", false, false}, {"4.3", true, false}, {"5.2", true, true}}) {
+  for (const BentMirror version : {BentMirror{"3.4", Maths::k34}, {"4.3", Maths::k43}, {"5.2", Maths::k52}}) {
     TestRandom r(23);
     int num_apart = 0;
     for (int i = 0; i < 2000; ++i) {
@@ -549,10 +547,8 @@ TEST(Mixture, BentMirrorsLoseNothingAboveTheFacet)
       const Vec3f wo = direction(0.05f + 0.9f * r.next(), 6.0f * r.next());
       MixtureLobes lobes;
       MixtureBuild b{wo, kN, Ns, true, &tables(), &lobes};
-      b.is_4 = version.is_4;
-      b.is_5 = version.is_5;
-      SurfaceClosureSpec spec = spec_of(version.is_4, ClosureDistribution::kSharp);
-      spec.is_5 = version.is_5;
+      b.maths = version.maths;
+      const SurfaceClosureSpec spec = spec_of(version.maths, ClosureDistribution::kSharp);
       GlossyInputs in;
       in.color = {1, 1, 1};
       in.normal = {bent.x, -bent.z, bent.y};  // Z up
@@ -605,13 +601,11 @@ double bent_ggx_albedo(Vec3f bent, Vec3f wo, double alpha, bool correlated, bool
 TEST(Mixture, RoughBentMirrorsReflectBelowTheirNormal)
 {
   const Vec3f bent = normalize(Vec3f{0.6f, 0, 0.8f}), wo = normalize(Vec3f{0.2f, 0.5f, 0.7f});
-  for (const BentMirror version : {BentMirror{"3.4", false, false}, {"4.3", true, false}, {"5.2", true, true}}) {
+  for (const BentMirror version : {BentMirror{"3.4", Maths::k34}, {"4.3", Maths::k43}, {"5.2", Maths::k52}}) {
     MixtureLobes lobes;
     MixtureBuild b{wo, kN, kN, true, &tables(), &lobes};
-    b.is_4 = version.is_4;
-    b.is_5 = version.is_5;
-    SurfaceClosureSpec spec = spec_of(version.is_4);
-    spec.is_5 = version.is_5;
+    b.maths = version.maths;
+    const SurfaceClosureSpec spec = spec_of(version.maths);
     GlossyInputs in;
     in.color = {1, 1, 1};
     in.roughness = 0.8f;
@@ -625,10 +619,10 @@ TEST(Mixture, RoughBentMirrorsReflectBelowTheirNormal)
       const BsdfSample s = closure_sample<kFeatureAll>(m, tables(), 0.5f, {r.next(), r.next()});
       if (s.pdf > 0.0f) sum += static_cast<double>(s.f.x * __builtin_fabsf(s.wi.z) / s.pdf);
     }
-    const double all = bent_ggx_albedo(bent, wo, 0.64, version.is_4, true);
-    const double above = bent_ggx_albedo(bent, wo, 0.64, version.is_4, false);
+    const double all = bent_ggx_albedo(bent, wo, 0.64, version.maths >= Maths::k43, true);
+    const double above = bent_ggx_albedo(bent, wo, 0.64, version.maths >= Maths::k43, false);
     EXPECT_GT(all - above, 0.01);
-    EXPECT_NEAR(sum / kSamples, version.is_5 ? above : all, 0.002) << version.name;
+    EXPECT_NEAR(sum / kSamples, version.maths >= Maths::k52 ? above : all, 0.002) << version.name;
   }
 }
 
@@ -642,7 +636,7 @@ TEST(Mixture, BentTranslucencyDoesNotFade)
   TranslucentInputs in;
   in.color = {1, 1, 1};
   in.normal = {bent.x, -bent.z, bent.y};
-  closure_add(b, spec_of(false), 1.0f, in);
+  closure_add(b, spec_of(Maths::k34), 1.0f, in);
   const Mixture m = mixture_of(lobes, frame_from_normal(kN), kN);
   TestRandom r(31);
   double sum = 0.0;
@@ -658,14 +652,12 @@ TEST(Mixture, BentTranslucencyDoesNotFade)
 // What Cycles asks of a lamp below the facet or below the smooth normal's horizon, that a rough mirror's own normal sees.
 TEST(Mixture, LampsAreSeenByTheNormalsOfEachVersion)
 {
-  const auto shines = [](bool is_4, bool is_5, Vec3f Ns, Vec3f N, Vec3f wi) {
+  const auto shines = [](Maths maths, Vec3f Ns, Vec3f N, Vec3f wi) {
     const Vec3f wo = normalize(Vec3f{0.1f, 0, 1});
     MixtureLobes lobes;
     MixtureBuild b{wo, kN, Ns, true, &tables(), &lobes};
-    b.is_4 = is_4;
-    b.is_5 = is_5;
-    SurfaceClosureSpec spec = spec_of(is_4);
-    spec.is_5 = is_5;
+    b.maths = maths;
+    const SurfaceClosureSpec spec = spec_of(maths);
     GlossyInputs in;
     in.roughness = 1.0f;
     in.normal = {N.x, -N.z, N.y};
@@ -676,35 +668,35 @@ TEST(Mixture, LampsAreSeenByTheNormalsOfEachVersion)
   const Vec3f leans = normalize(Vec3f{0.5f, 0, 1}), leans_more = normalize(Vec3f{0.6f, 0, 1});
   const Vec3f below_facet = normalize(Vec3f{1, 0, -0.1f}), below_smooth = normalize(Vec3f{-1, 0, 0.1f});
   // A facet and a bump: 4.3 asks the facet, 5.2 the smooth normal, 3.4 neither.
-  EXPECT_TRUE(shines(false, false, kN, leans, below_facet));
-  EXPECT_FALSE(shines(true, false, kN, leans, below_facet));
-  EXPECT_FALSE(shines(true, true, kN, leans, below_facet));
-  EXPECT_TRUE(shines(true, true, leans, leans_more, below_facet));
-  EXPECT_FALSE(shines(true, false, leans, leans_more, below_facet));
+  EXPECT_TRUE(shines(Maths::k34, kN, leans, below_facet));
+  EXPECT_FALSE(shines(Maths::k43, kN, leans, below_facet));
+  EXPECT_FALSE(shines(Maths::k52, kN, leans, below_facet));
+  EXPECT_TRUE(shines(Maths::k52, leans, leans_more, below_facet));
+  EXPECT_FALSE(shines(Maths::k43, leans, leans_more, below_facet));
   // Above the facet and below the smooth normal's horizon, where the bump leans back.
-  EXPECT_TRUE(shines(false, false, leans, kN, below_smooth));
-  EXPECT_TRUE(shines(true, false, leans, kN, below_smooth));
-  EXPECT_FALSE(shines(true, true, leans, kN, below_smooth));
+  EXPECT_TRUE(shines(Maths::k34, leans, kN, below_smooth));
+  EXPECT_TRUE(shines(Maths::k43, leans, kN, below_smooth));
+  EXPECT_FALSE(shines(Maths::k52, leans, kN, below_smooth));
 }
 
 TEST(Mixture, NegativeRoughnessIsWhatItsSquareIsUpTo36)
 {
-  const auto roughness_of = [](bool is_4, auto in) {
+  const auto roughness_of = [](Maths maths, auto in) {
     in.roughness = -0.5f;
     MixtureLobes lobes;
     MixtureBuild b{direction(0.7f), kN, kN, true, &tables(), &lobes};
-    closure_add(b, spec_of(is_4), 1.0f, in);
+    closure_add(b, spec_of(maths), 1.0f, in);
     return lobes.lobes[lobes.size - 1].roughness;
   };
-  EXPECT_EQ(roughness_of(false, GlossyInputs{}), 0.5f);
-  EXPECT_EQ(roughness_of(true, GlossyInputs{}), 0.0f);
-  EXPECT_EQ(roughness_of(false, GlassInputs{}), 0.5f);
-  EXPECT_EQ(roughness_of(true, GlassInputs{}), 0.0f);
-  EXPECT_EQ(roughness_of(false, RefractionInputs{}), 0.5f);
-  EXPECT_EQ(roughness_of(true, RefractionInputs{}), 0.5f);
+  EXPECT_EQ(roughness_of(Maths::k34, GlossyInputs{}), 0.5f);
+  EXPECT_EQ(roughness_of(Maths::k43, GlossyInputs{}), 0.0f);
+  EXPECT_EQ(roughness_of(Maths::k34, GlassInputs{}), 0.5f);
+  EXPECT_EQ(roughness_of(Maths::k43, GlassInputs{}), 0.0f);
+  EXPECT_EQ(roughness_of(Maths::k34, RefractionInputs{}), 0.5f);
+  EXPECT_EQ(roughness_of(Maths::k43, RefractionInputs{}), 0.5f);
   Principled3Inputs metal;
   metal.metallic = 1.0f;
-  EXPECT_EQ(roughness_of(false, metal), 0.5f);
+  EXPECT_EQ(roughness_of(Maths::k34, metal), 0.5f);
 }
 
 TEST(Mixture, NothingWeighsNothing)
@@ -733,12 +725,12 @@ TEST(Mixture, InputsThatAreNoNumbersGiveFiniteLight)
                             std::memcpy(&four, numbers, sizeof four);
                             std::memcpy(&three, numbers, sizeof three);
                             if (i % 4 == 0) {
-                              b.is_4 = b.is_5 = true;
+                              b.maths = Maths::k52;
                               closure_add(b, spec_of_52(static_cast<ClosureDistribution>(i % 5)), 1.0f, four);
                             } else if (i % 2 == 0) {
-                              closure_add(b, spec_of(true, static_cast<ClosureDistribution>(i % 5)), 1.0f, four);
+                              closure_add(b, spec_of(Maths::k43, static_cast<ClosureDistribution>(i % 5)), 1.0f, four);
                             } else {
-                              closure_add(b, spec_of(false, static_cast<ClosureDistribution>(i % 5)), 1.0f, three);
+                              closure_add(b, spec_of(Maths::k34, static_cast<ClosureDistribution>(i % 5)), 1.0f, three);
                             }
                           }};
     MixtureLobes lobes;
