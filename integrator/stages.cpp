@@ -101,6 +101,7 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
   GraphRegisters registers;
   registers.rays = g.graph_scene.rays;
   SurfaceInteraction located[kLanes];
+  Principled3Columns columns;
   for (std::uint32_t first = 0; first < queue.size;) {
     const Material& material = g.materials[material_of(queue.paths[first])];
     if (material.graph_index < 0) {
@@ -109,20 +110,28 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
     }
     const GraphProgramView& program = g.graphs[material.graph_index];
     std::uint32_t count = 0;
-    for (; count < kLanes && first + count < queue.size; ++count) {
-      const std::uint32_t path = queue.paths[first + count];
-      if (&g.materials[material_of(path)] != &material) break;
-      const Vec3f wo = -path_direction(state, path);
-      located[count] = surface_interaction_locate<kFeatures>(g, state, path, wo);
-      graph_load_point(program, surface_graph_point(g, state, path, located[count], wo), static_cast<int>(count),
-                       registers);
+    while (count < kLanes && first + count < queue.size &&
+           &g.materials[material_of(queue.paths[first + count])] == &material) {
+      ++count;
+    }
+    surface_interactions_locate<kFeatures>(g, state, queue.paths + first, static_cast<int>(count), located);
+    for (std::uint32_t lane = 0; lane < count; ++lane) {
+      const std::uint32_t path = queue.paths[first + lane];
+      graph_load_point(program, surface_graph_point(g, state, path, located[lane], -path_direction(state, path)),
+                       static_cast<int>(lane), registers);
     }
     registers.used = (1u << count) - 1;
     g.run_graph(program, g.textures, registers);
     counters.graph_runs += 1;
     counters.graph_points += count;
+    bool are_resolved = false;
+    if constexpr ((kFeatures & kFeatureMixture) != 0) {
+      are_resolved = surface_interactions_resolve(state, queue.paths + first, static_cast<int>(count), located,
+                                                  registers, program, columns);
+    }
     for (std::uint32_t lane = 0; lane < count; ++lane) {
-      const GraphHit hit{&located[lane], {&program, &registers, static_cast<int>(lane)}};
+      const GraphHit hit{
+          &located[lane], {&program, &registers, static_cast<int>(lane)}, are_resolved ? &columns : nullptr};
       shade_surface<kFeatures>(g, state, queue.paths[first + lane], next, shadow, counters, &hit);
     }
     first += count;

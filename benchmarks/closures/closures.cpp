@@ -166,12 +166,28 @@ struct Resolved {
 
 [[gnu::noinline, gnu::flatten]] void resolve(const KernelGlobals& g,
                                              const GraphLane& lane,
+                                             const Principled3Columns* columns,
                                              ClosureSight sight,
                                              const Hit& hit,
                                              Resolved& resolved)
 {
   resolved.at.hit.Ns = hit.Ns;
-  surface_interaction_mix<kFeatures>(g, hit.wo, lane, sight, resolved.at, resolved.lobes);
+  surface_interaction_mix<kFeatures>(g, hit.wo, lane, columns, sight, resolved.at, resolved.lobes);
+}
+
+/// What stages do before for eight hits. @return  columns; null: the closures are not such
+const Principled3Columns* resolve_columns(const GraphProgramView& program,
+                                          const GraphRegisters& registers,
+                                          const Hit* hits,
+                                          Principled3Columns& columns)
+{
+  if (!closures_are_plain(program)) return nullptr;
+  MixtureBuildLanes b{{}, splat8(Vec3f{0, 0, 1}), {}};
+  for (int k = 0; k < 8; ++k) {
+    lane_set(b.wo, k, hits[k].wo);
+    lane_set(b.Ns, k, hits[k].Ns);
+  }
+  return closures_resolve_plain(program, registers, b, columns) ? &columns : nullptr;
 }
 
 [[gnu::noinline, gnu::flatten]] float evaluate(const KernelGlobals& g, const Hit& hit, const Resolved& resolved)
@@ -209,7 +225,7 @@ void case_run(const KernelGlobals& g,
 {
   const GraphProgramView program = one.program();
   const GraphRegisters registers{};
-  const GraphLane lane{&program, &registers, 0};
+  Principled3Columns columns;
   ClosureSight sight;
   sight.enters = true;
   if (one.is_curve) sight.tangent = {1, 0, 0};
@@ -220,7 +236,9 @@ void case_run(const KernelGlobals& g,
       for (int i = 0; i < num_hits; i += 8) f(i);
     });
   };
-  const auto resolve_at = [&](int i, int k) { resolve(g, lane, sight, hits[i + k], resolved[k]); };
+  const auto resolve_at = [&](int i, int k, const Principled3Columns* from = nullptr) {
+    resolve(g, {&program, &registers, k}, from, sight, hits[i + k], resolved[k]);
+  };
   step(ClosureStep::kResolve, [&](int i) {
     for (int k = 0; k < 8; ++k) resolve_at(i, k);
     times.sum += resolved[0].lobes.lobes[0].probability;
@@ -239,7 +257,8 @@ void case_run(const KernelGlobals& g,
     }
   });
   step(ClosureStep::kEight, [&](int i) {
-    for (int k = 0; k < 8; ++k) resolve_at(i, k);
+    const Principled3Columns* const from = resolve_columns(program, registers, hits + i, columns);
+    for (int k = 0; k < 8; ++k) resolve_at(i, k, from);
     for (int k = 0; k < 8; ++k) times.sum += evaluate(g, hits[i + k], resolved[k]);
     for (int k = 0; k < 8; ++k) times.sum += sample(g, hits[i + k], resolved[k]);
   });

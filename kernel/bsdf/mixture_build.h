@@ -81,6 +81,9 @@ RELIEF_KERNEL Frame closure_tangent_frame(Vec3f N, Vec3f tangent, float turns)
   return {turned.cos * s + turned.sin * t, turned.cos * t - turned.sin * s, N};
 }
 
+/// Cosine between a lobe's normal and the surface's, above which it is that: 1 but for rounding.
+inline constexpr float kUnbentLobe = 1.0f - 1e-6f;
+
 /// Adds a lobe, unless it weighs nothing: Lambert's, which the caller may make another. It is sampled by its weight.
 /// @param is_diffuse  it may be seen from below its own horizon, as if from just above
 RELIEF_KERNEL MixtureLobe* mixture_add(MixtureBuild& b, Vec3f weight, const Frame& frame, bool is_diffuse = false)
@@ -102,7 +105,7 @@ RELIEF_KERNEL MixtureLobe* mixture_add(MixtureBuild& b, Vec3f weight, const Fram
   lobe.wo = wo;
   lobe.maths = b.maths;
   lobe.is_on_curve = !is_zero(b.tangent);
-  lobe.is_bent = !(dot(frame.n, b.Ns) > 1.0f - 1e-6f) && !(lobe.is_on_curve && b.maths >= Maths::k52);
+  lobe.is_bent = !(dot(frame.n, b.Ns) > kUnbentLobe) && !(lobe.is_on_curve && b.maths >= Maths::k52);
   if (lobe.is_bent) lobe.surface_N = to_local(frame, b.Ns);
   return &lobe;
 }

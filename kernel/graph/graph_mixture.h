@@ -1,10 +1,12 @@
 // A material's closures at a point, their inputs read from its program: a mixture of lobes, emission and transparency.
 #pragma once
 
+#include <cstddef>
 #include <cstring>
 #include <type_traits>
 
 #include "kernel/bsdf/mixture_make.h"
+#include "kernel/bsdf/principled3_lanes.h"
 #include "kernel/graph/graph_registers.h"
 
 namespace relief {
@@ -48,6 +50,69 @@ RELIEF_KERNEL Inputs closure_inputs(const GraphLane& at, const SurfaceClosureSpe
         break;
     }
   }
+}
+
+/// Whether a program's closures are one plain Principled of 3.4, whose lobes eight hits can be given at once.
+RELIEF_KERNEL bool closures_are_plain(const GraphProgramView& program)
+{
+  if (program.num_closures != 1 || program.surface_normal != kNoGraphOperand) return false;
+  const SurfaceClosureSpec& spec = program.closures[0];
+  if (spec.kind != ClosureKind::principled3 || spec.distribution != ClosureDistribution::kGgx) return false;
+  const auto is_none = [&](std::size_t offset, int numbers) {
+    const int first = spec.first_result + 1 + static_cast<int>(offset / sizeof(float));
+    for (int i = first; i < first + numbers; ++i) {
+      if (program.varying_before[i] != program.varying_before[i + 1] || program.result_values[i] != 0.0f) return false;
+    }
+    return true;
+  };
+  using In = Principled3Inputs;
+  return is_none(offsetof(In, subsurface), 1) && is_none(offsetof(In, sheen), 1) &&
+         is_none(offsetof(In, clearcoat), 1) && is_none(offsetof(In, transmission), 1) &&
+         is_none(offsetof(In, tangent), 3);
+}
+
+/// Resolves a plain Principled closure of eight hits.
+/// @param program    closures_are_plain
+/// @param registers  of its run
+/// @return           false: some hit does not have it, so that each is resolved by itself
+RELIEF_KERNEL bool closures_resolve_plain(const GraphProgramView& program,
+                                          const GraphRegisters& registers,
+                                          const MixtureBuildLanes& b,
+                                          Principled3Columns& columns)
+{
+  const int first = program.closures[0].first_result;
+  const auto raw = [&](int result) {
+    const std::uint16_t operand = program.results[result];
+    if (operand == kNoGraphOperand) return splat8(0.0f);
+    return graph_operand(program, registers, operand);
+  };
+  Principled3Lanes in;
+  in.weight = raw(first);
+  if ((mask_of((in.weight > kLeastClosureWeight) & (in.weight < kInfinity)) & registers.used) != registers.used) {
+    return false;
+  }
+  const float largest = closure_input(__FLT_MAX__);
+  const auto number = [&](std::size_t offset) {
+    const int result = first + 1 + static_cast<int>(offset / sizeof(float));
+    if (program.varying_before[result] == program.varying_before[result + 1]) {
+      return splat8(program.result_values[result]);
+    }
+    const F8 x = raw(result);
+    return x - x == 0.0f ? clamp(x, -largest, largest) : splat8(0.0f);
+  };
+  const auto vector = [&](std::size_t offset) {
+    return Vec3x8{number(offset), number(offset + sizeof(float)), number(offset + 2 * sizeof(float))};
+  };
+  using In = Principled3Inputs;
+  in.base_color = vector(offsetof(In, base_color));
+  in.metallic = number(offsetof(In, metallic));
+  in.specular = number(offsetof(In, specular));
+  in.specular_tint = number(offsetof(In, specular_tint));
+  in.roughness = number(offsetof(In, roughness));
+  in.anisotropic = number(offsetof(In, anisotropic));
+  in.normal = vector(offsetof(In, normal));
+  principled3_columns_make(b, in, columns);
+  return true;
 }
 
 /// What transparent closures alone let through.

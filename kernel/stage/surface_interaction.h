@@ -2,6 +2,8 @@
 // BSDF is evaluated in. Camera paths (shade_surface.h) and photons (shade_photon.h) see the same.
 #pragma once
 
+#include <new>
+
 #include "kernel/bsdf/surface_params.h"
 #include "kernel/feature_mask.h"
 #include "kernel/globals.h"
@@ -10,7 +12,7 @@
 #include "kernel/sample/sobol.h"
 #include "kernel/shape/curve_hit.h"
 #include "kernel/shape/facet_masking.h"
-#include "kernel/shape/surface_hit.h"
+#include "kernel/shape/surface_hits.h"
 #include "kernel/stage/path_access.h"
 #include "kernel/texture/ray_cone.h"
 
@@ -97,6 +99,33 @@ RELIEF_KERNEL SurfaceSummary surface_summary(const SurfaceInteraction& at)
   return {surface_albedo(at.params), surface_params_are_seen_through(at.params)};
 }
 
+/// What a path has hit, without the hit.
+RELIEF_KERNEL void surface_interaction_begin(const KernelGlobals& g,
+                                             const PathState& state,
+                                             std::uint32_t path,
+                                             SurfaceInteraction& at)
+{
+  at.instance = &path_instance(g, state, path);
+  at.material = &g.materials[at.instance->material_index];
+  at.triangle = state.hit_triangle[path];
+}
+
+/// The side of a hit that a path is on, and how wide the path is there.
+template <unsigned kFeatures>
+RELIEF_KERNEL void surface_interaction_see(const PathState& state, std::uint32_t path, Vec3f wo, SurfaceInteraction& at)
+{
+  at.side.front = dot(wo, at.hit.Ng) >= 0.0f;
+  at.side.Ng = at.side.front ? at.hit.Ng : -at.hit.Ng;
+
+  at.cone = ray_cone_propagate({state.cone_width[path], state.cone_spread[path]}, state.hit_t[path]);
+  at.uv_width[0] = at.uv_width[1] = 0.0f;
+  if constexpr ((kFeatures & kFeatureTextures) != 0) {
+    const float footprint = ray_cone_footprint_world(at.cone, dot(wo, at.side.Ng));
+    at.uv_width[0] = footprint * at.hit.area_ratio[0];
+    at.uv_width[1] = footprint * at.hit.area_ratio[1];
+  }
+}
+
 /// The point that a path has hit; its material's parameters there are left open.
 /// @param wo  unit, back along the path's ray
 template <unsigned kFeatures>
@@ -104,9 +133,7 @@ RELIEF_KERNEL SurfaceInteraction
 surface_interaction_locate(const KernelGlobals& g, const PathState& state, std::uint32_t path, Vec3f wo)
 {
   SurfaceInteraction at;
-  at.instance = &path_instance(g, state, path);
-  at.material = &g.materials[at.instance->material_index];
-  at.triangle = state.hit_triangle[path];
+  surface_interaction_begin(g, state, path, at);
   const MeshView& mesh = path_mesh(g, state, path, *at.instance);
   const float u = state.hit_u[path], v = state.hit_v[path];
   if (__builtin_expect((at.instance->flags & (kDisplaced | kCurves)) == 0, 1)) {
@@ -118,17 +145,46 @@ surface_interaction_locate(const KernelGlobals& g, const PathState& state, std::
     at.hit = surface_hit_displaced(mesh, *at.instance, at.triangle, u, v,
                                    {state.hit_P[path], state.hit_Ng[path], state.hit_Ns[path], state.hit_leave[path]});
   }
-  at.side.front = dot(wo, at.hit.Ng) >= 0.0f;
-  at.side.Ng = at.side.front ? at.hit.Ng : -at.hit.Ng;
-
-  at.cone = ray_cone_propagate({state.cone_width[path], state.cone_spread[path]}, state.hit_t[path]);
-  at.uv_width[0] = at.uv_width[1] = 0.0f;
-  if constexpr ((kFeatures & kFeatureTextures) != 0) {
-    const float footprint = ray_cone_footprint_world(at.cone, dot(wo, at.side.Ng));
-    at.uv_width[0] = footprint * at.hit.area_ratio[0];
-    at.uv_width[1] = footprint * at.hit.area_ratio[1];
-  }
+  surface_interaction_see<kFeatures>(state, path, wo, at);
   return at;
+}
+
+/// The points that paths have hit, as surface_interaction_locate has each.
+/// @param count  1 to 8
+/// @param at     gets those
+template <unsigned kFeatures>
+RELIEF_KERNEL void surface_interactions_locate(const KernelGlobals& g,
+                                               const PathState& state,
+                                               const std::uint32_t* paths,
+                                               int count,
+                                               SurfaceInteraction* at)
+{
+  // Fewer are not worth it.
+  bool are_triangles = count > 2;
+  for (int k = 0; k < count; ++k) {
+    surface_interaction_begin(g, state, paths[k], *new (&at[k]) SurfaceInteraction);
+    are_triangles = are_triangles && (at[k].instance->flags & (kDisplaced | kCurves)) == 0;
+  }
+  if (!are_triangles) {
+    for (int k = 0; k < count; ++k) {
+      at[k] = surface_interaction_locate<kFeatures>(g, state, paths[k], -path_direction(state, paths[k]));
+    }
+    return;
+  }
+  SurfaceHitQuestions questions{};
+  SurfaceHit* hits[8];
+  for (int k = 0; k < count; ++k) {
+    questions.mesh[k] = &path_mesh(g, state, paths[k], *at[k].instance);
+    questions.instance[k] = at[k].instance;
+    questions.triangle[k] = at[k].triangle;
+    questions.bary_u[k] = state.hit_u[paths[k]];
+    questions.bary_v[k] = state.hit_v[paths[k]];
+    hits[k] = &at[k].hit;
+  }
+  surface_hits_make(questions, count, hits);
+  for (int k = 0; k < count; ++k) {
+    surface_interaction_see<kFeatures>(state, paths[k], -path_direction(state, paths[k]), at[k]);
+  }
 }
 
 /// What kinds of ray a path's present one is: bits GraphRayKind. A photon's is what the camera's path is told that goes the other
@@ -150,6 +206,36 @@ RELIEF_KERNEL std::uint32_t path_ray_kinds(const PathState& state, std::uint32_t
       bit(event == PathEvent::kTransmission ? GraphRayKind::kTransmission : GraphRayKind::kReflection) | blurred;
   if (event == PathEvent::kDiffuse) return side | bit(GraphRayKind::kDiffuse);
   return side | bit(GraphRayKind::kGlossy) | (state.pdf[path] > 0.0f ? 0u : bit(GraphRayKind::kSingular));
+}
+
+/// Resolves what closures eight located points have, if they are such as can be resolved together.
+/// @param count      of them
+/// @param registers  of the program's run
+/// @return           whether that was done
+RELIEF_KERNEL bool surface_interactions_resolve(const PathState& state,
+                                                const std::uint32_t* paths,
+                                                int count,
+                                                const SurfaceInteraction* at,
+                                                const GraphRegisters& registers,
+                                                const GraphProgramView& program,
+                                                Principled3Columns& columns)
+{
+  // Fewer are not worth it.
+  if (count < 3 || !at[0].material->has_closures || !closures_are_plain(program)) return false;
+  alignas(32) float numbers[9][8] = {};
+  for (int k = 0; k < count; ++k) {
+    const Vec3f vectors[3] = {-path_direction(state, paths[k]), at[k].side.Ng,
+                              shading_normal_turned(at[k].hit.Ns, at[k].side.Ng)};
+    for (int v = 0; v < 3; ++v) {
+      numbers[3 * v][k] = vectors[v].x;
+      numbers[3 * v + 1][k] = vectors[v].y;
+      numbers[3 * v + 2][k] = vectors[v].z;
+    }
+  }
+  const auto take = [&](int first) {
+    return Vec3x8{load8(numbers[first]), load8(numbers[first + 1]), load8(numbers[first + 2])};
+  };
+  return closures_resolve_plain(program, registers, {take(0), take(3), take(6)}, columns);
 }
 
 /// What a graph may read of a located point.
@@ -244,11 +330,13 @@ RELIEF_KERNEL ClosureSight closure_sight(const KernelGlobals& g,
 
 /// Resolves the closures of a located point: its lobes, its frame, and the parameters that stages ask for.
 /// @param lane         of the material's program
+/// @param columns      of closures_resolve_plain; null: there are none
 /// @param lobes        gets the lobes
 template <unsigned kFeatures>
 RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
                                            Vec3f wo,
                                            const GraphLane& lane,
+                                           const Principled3Columns* columns,
                                            ClosureSight sight,
                                            SurfaceInteraction& at,
                                            MixtureLobes& lobes)
@@ -278,7 +366,11 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   side.Ns = shading_normal_towards(build.Ns, wo);
   side.bent = !(dot(side.Ns, Ns) > kUnbent);
   side.frame = frame_from_normal(side.Ns);
-  closures_resolve(lane, build);
+  if (columns != nullptr && build.reflects && is_zero(build.tangent)) {
+    principled3_lane_add(build, *columns, lane.lane);
+  } else {
+    closures_resolve(lane, build);
+  }
   if (blur.alpha > 0.0f) {
     for (int i = 0; i < lobes.size; ++i) lobe_blur(lobes.lobes[i], blur.alpha, blur.most_sharp);
   }
@@ -316,8 +408,9 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
 
 /// What a graph's program gave at a point that a path has hit.
 struct GraphHit {
-  SurfaceInteraction* at;  ///< as surface_interaction_locate has it
-  GraphLane lane;          ///< of the program, which has run
+  SurfaceInteraction* at;                       ///< as surface_interaction_locate has it
+  GraphLane lane;                               ///< of the program, which has run
+  const Principled3Columns* columns = nullptr;  ///< see surface_interaction_mix
 };
 
 /// Completes a located point with its material there.
@@ -342,7 +435,8 @@ RELIEF_KERNEL void surface_interaction_resolve(const KernelGlobals& g,
                                  : graph_at_point(g.run_graph, g.graphs[at.material->graph_index], g.textures,
                                                   surface_graph_point(g, state, path, at, wo), registers);
       if (has_mixture<kFeatures>(at)) {
-        surface_interaction_mix<kFeatures>(g, wo, lane, closure_sight(g, state, path, *at.instance, blur), at, lobes);
+        surface_interaction_mix<kFeatures>(g, wo, lane, graph != nullptr ? graph->columns : nullptr,
+                                           closure_sight(g, state, path, *at.instance, blur), at, lobes);
       } else {
         at.params = graph_surface_params<kFeatures>(*at.material, graph_values(lane), g.textures, at.hit, at.uv_width);
         at.transmits = at.params.transmission > 0.0f;

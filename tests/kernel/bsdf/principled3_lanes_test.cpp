@@ -1,0 +1,179 @@
+// The plain Principled closure of eight hits has the lobes that each hit has by itself.
+#include "kernel/graph/graph_mixture.h"
+
+#include <cstring>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/chi2.h"
+
+namespace relief {
+namespace {
+
+constexpr int kNumbers = sizeof(Principled3Inputs) / sizeof(float);
+
+/// A program of one Principled closure, whose inputs are constants or registers.
+class PlainPrincipled : public testing::Test {
+ protected:
+  PlainPrincipled()
+  {
+    spec_.kind = ClosureKind::principled3;
+    for (int i = 0; i < 1 + kNumbers; ++i) results_.push_back(static_cast<std::uint16_t>(kMostGraphRegisters + i));
+    const Principled3Inputs defaults;
+    constants_[0] = 1.0f;
+    std::memcpy(constants_ + 1, &defaults, sizeof defaults);
+  }
+
+  static int result_of(std::size_t offset) { return 1 + static_cast<int>(offset / sizeof(float)); }
+
+  void vary(int result) { results_[static_cast<std::size_t>(result)] = static_cast<std::uint16_t>(result); }
+
+  const GraphProgramView& program()
+  {
+    varying_.clear();
+    for (std::size_t i = 0; i < results_.size(); ++i) {
+      varying_before_[i] = static_cast<std::uint16_t>(varying_.size());
+      if (results_[i] < kMostGraphRegisters) varying_.push_back(static_cast<std::uint16_t>(i));
+    }
+    varying_before_[results_.size()] = static_cast<std::uint16_t>(varying_.size());
+    view_.constants = view_.result_values = constants_;
+    view_.results = results_.data();
+    view_.varying_before = varying_before_;
+    view_.varying = varying_.data();
+    view_.closures = &spec_;
+    view_.num_closures = 1;
+    return view_;
+  }
+
+  Vec3f direction() { return normalize(Vec3f{random_.next() - 0.5f, random_.next() - 0.5f, random_.next() + 0.01f}); }
+
+  TestRandom random_{11};
+  SurfaceClosureSpec spec_;
+  float constants_[kNumbers + 16] = {};
+  std::vector<std::uint16_t> results_, varying_;
+  std::uint16_t varying_before_[kNumbers + 16] = {};
+  GraphProgramView view_;
+  GraphRegisters registers_{};
+};
+
+void expect_same(const MixtureLobe& a, const MixtureLobe& b)
+{
+  EXPECT_EQ(a.kind, b.kind);
+  EXPECT_EQ(a.maths, b.maths);
+  EXPECT_EQ(a.is_delta, b.is_delta);
+  EXPECT_EQ(a.is_bent, b.is_bent);
+  EXPECT_EQ(a.mirrors_below, b.mirrors_below);
+  EXPECT_EQ(a.probability, b.probability);
+  EXPECT_EQ(a.roughness, b.roughness);
+  EXPECT_EQ(a.weight, b.weight);
+  EXPECT_EQ(a.frame.s, b.frame.s);
+  EXPECT_EQ(a.frame.t, b.frame.t);
+  EXPECT_EQ(a.frame.n, b.frame.n);
+  EXPECT_EQ(a.wo, b.wo);
+  EXPECT_EQ(a.surface_N, b.surface_N);
+  EXPECT_EQ(a.fresnel.kind, b.fresnel.kind);
+  EXPECT_EQ(a.fresnel.eta, b.fresnel.eta);
+  EXPECT_EQ(a.fresnel.a, b.fresnel.a);
+  if (a.kind == MixtureLobeKind::kGgx) {
+    EXPECT_EQ(a.shape.ggx.alpha.x, b.shape.ggx.alpha.x);
+    EXPECT_EQ(a.shape.ggx.alpha.y, b.shape.ggx.alpha.y);
+    EXPECT_EQ(a.shape.ggx.masking, b.shape.ggx.masking);
+  } else {
+    EXPECT_EQ(a.shape.principled_diffuse.roughness, b.shape.principled_diffuse.roughness);
+    EXPECT_EQ(a.shape.principled_diffuse.part, b.shape.principled_diffuse.part);
+  }
+}
+
+TEST_F(PlainPrincipled, EightHaveTheLobesOfEach)
+{
+  using In = Principled3Inputs;
+  for (const std::size_t offset :
+       {offsetof(In, base_color), offsetof(In, base_color) + 4, offsetof(In, base_color) + 8, offsetof(In, metallic),
+        offsetof(In, specular), offsetof(In, specular_tint), offsetof(In, roughness), offsetof(In, anisotropic),
+        offsetof(In, normal), offsetof(In, normal) + 4, offsetof(In, normal) + 8}) {
+    vary(result_of(offset));
+  }
+  const GraphProgramView& plain = program();
+  ASSERT_TRUE(closures_are_plain(plain));
+  BsdfTables tables{};
+  int num_lobes = 0, num_delta = 0, num_bent = 0;
+  for (int i = 0; i < 3000; ++i) {
+    MixtureBuildLanes lanes{};
+    Vec3f wo[8], Ns[8];
+    const Vec3f Ng{0, 0, 1};
+    for (int k = 0; k < 8; ++k) {
+      wo[k] = direction();
+      Ns[k] = i % 3 == 0 ? Ng : direction();
+      lane_set(lanes.wo, k, wo[k]);
+      lane_set(lanes.Ng, k, Ng);
+      lane_set(lanes.Ns, k, Ns[k]);
+      for (const std::uint16_t result : varying_) {
+        float x = random_.next();
+        // Corners, and what is out of range.
+        if (random_.next() < 0.1f) x = random_.next() < 0.5f ? 0.0f : 1.0f;
+        if (random_.next() < 0.02f) x = random_.next() < 0.5f ? -0.5f : kInfinity;
+        registers_.lanes[result][k] = x;
+      }
+      if (i % 2 == 0) {
+        for (int c = 0; c < 3; ++c) registers_.lanes[result_of(offsetof(In, normal)) + c][k] = 0.0f;
+      }
+    }
+    Principled3Columns columns;
+    ASSERT_TRUE(closures_resolve_plain(plain, registers_, lanes, columns));
+    for (int k = 0; k < 8; ++k) {
+      MixtureLobes each, together;
+      MixtureBuild one{wo[k], Ng, Ns[k], true, &tables, &each}, all{wo[k], Ng, Ns[k], true, &tables, &together};
+      const GraphLane lane{&plain, &registers_, k};
+      closures_resolve(lane, one);
+      principled3_lane_add(all, columns, k);
+      ASSERT_EQ(together.size, each.size) << i;
+      for (int l = 0; l < each.size; ++l) {
+        expect_same(together.lobes[l], each.lobes[l]);
+        num_delta += each.lobes[l].is_delta ? 1 : 0;
+        num_bent += each.lobes[l].is_bent ? 1 : 0;
+      }
+      num_lobes += each.size;
+      if (HasFailure()) return;
+    }
+  }
+  EXPECT_GT(num_lobes, 30000);
+  EXPECT_GT(num_delta, 100);
+  EXPECT_GT(num_bent, 1000);
+}
+
+TEST_F(PlainPrincipled, MoreThanThatIsNotPlain)
+{
+  using In = Principled3Inputs;
+  EXPECT_TRUE(closures_are_plain(program()));
+  for (const std::size_t offset : {offsetof(In, subsurface), offsetof(In, sheen), offsetof(In, clearcoat),
+                                   offsetof(In, transmission), offsetof(In, tangent)}) {
+    const int result = result_of(offset);
+    constants_[result] = 0.5f;
+    EXPECT_FALSE(closures_are_plain(program())) << offset;
+    constants_[result] = 0.0f;
+    const std::uint16_t constant = results_[static_cast<std::size_t>(result)];
+    vary(result);
+    EXPECT_FALSE(closures_are_plain(program())) << offset;
+    results_[static_cast<std::size_t>(result)] = constant;
+  }
+  spec_.distribution = ClosureDistribution::kMultiscatterGgx;
+  EXPECT_FALSE(closures_are_plain(program()));
+}
+
+TEST_F(PlainPrincipled, HitsWithoutAWeightAreResolvedByThemselves)
+{
+  vary(0);
+  const GraphProgramView& plain = program();
+  registers_.lanes[0] = splat8(1.0f);
+  Principled3Columns columns;
+  EXPECT_TRUE(closures_resolve_plain(plain, registers_, MixtureBuildLanes{}, columns));
+  registers_.lanes[0][3] = 0.0f;
+  EXPECT_FALSE(closures_resolve_plain(plain, registers_, MixtureBuildLanes{}, columns));
+  // A lane that means nothing may hold anything.
+  registers_.used = 0x7;
+  EXPECT_TRUE(closures_resolve_plain(plain, registers_, MixtureBuildLanes{}, columns));
+}
+
+}  // namespace
+}  // namespace relief
