@@ -86,6 +86,22 @@ void sort_by_material(const KernelGlobals& g, const PathState& state, const Queu
   for (std::uint32_t i = 0; i < queue.size; ++i) queue.paths[i] = entries[from][i].path;
 }
 
+/// Paths that are taken together.
+constexpr std::uint32_t kLanes = 8;
+
+/// Where some paths of a queue are: as surface_interaction_locate, which of a kernel's features needs to know of textures alone.
+template <unsigned kFeatures>
+void locate(const KernelGlobals& g,
+            const PathState& state,
+            const QueueView& queue,
+            std::uint32_t first,
+            std::uint32_t count,
+            SurfaceInteraction located[kLanes])
+{
+  surface_interactions_locate<kFeatures & kFeatureTextures>(g, state, queue.paths + first, static_cast<int>(count),
+                                                            located);
+}
+
 /// Runs the graphs of up to eight paths that have hit one material, then shades each.
 template <unsigned kFeatures>
 void shade_surfaces_by_graph(const KernelGlobals& g,
@@ -97,24 +113,25 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
 {
   const auto material_of = [&](std::uint32_t path) { return g.instances[state.hit_object[path]].material_index; };
   sort_by_material(g, state, queue);
-  constexpr std::uint32_t kLanes = 8;
   GraphRegisters registers;
   registers.rays = g.graph_scene.rays;
   SurfaceInteraction located[kLanes];
   Principled3Columns columns;
-  for (std::uint32_t first = 0; first < queue.size;) {
+  for (std::uint32_t first = 0, count = 0; first < queue.size; first += count) {
     const Material& material = g.materials[material_of(queue.paths[first])];
-    if (material.graph_index < 0) {
-      shade_surface<kFeatures>(g, state, queue.paths[first++], next, shadow, counters);
-      continue;
-    }
-    const GraphProgramView& program = g.graphs[material.graph_index];
-    std::uint32_t count = 0;
+    count = 1;
     while (count < kLanes && first + count < queue.size &&
            &g.materials[material_of(queue.paths[first + count])] == &material) {
       ++count;
     }
-    surface_interactions_locate<kFeatures>(g, state, queue.paths + first, static_cast<int>(count), located);
+    locate<kFeatures>(g, state, queue, first, count, located);
+    if (material.graph_index < 0) {
+      for (std::uint32_t lane = 0; lane < count; ++lane) {
+        shade_surface<kFeatures>(g, state, queue.paths[first + lane], located[lane], next, shadow, counters);
+      }
+      continue;
+    }
+    const GraphProgramView& program = g.graphs[material.graph_index];
     for (std::uint32_t lane = 0; lane < count; ++lane) {
       const std::uint32_t path = queue.paths[first + lane];
       graph_load_point(program, surface_graph_point(g, state, path, located[lane], -path_direction(state, path)),
@@ -130,11 +147,9 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
                                                   registers, program, columns);
     }
     for (std::uint32_t lane = 0; lane < count; ++lane) {
-      const GraphHit hit{
-          &located[lane], {&program, &registers, static_cast<int>(lane)}, are_resolved ? &columns : nullptr};
-      shade_surface<kFeatures>(g, state, queue.paths[first + lane], next, shadow, counters, &hit);
+      const GraphHit hit{{&program, &registers, static_cast<int>(lane)}, are_resolved ? &columns : nullptr};
+      shade_surface<kFeatures>(g, state, queue.paths[first + lane], located[lane], next, shadow, counters, &hit);
     }
-    first += count;
   }
 }
 
@@ -149,8 +164,13 @@ void shade_surfaces(const KernelGlobals& g,
   if constexpr ((kFeatures & kFeatureGraphs) != 0) {
     shade_surfaces_by_graph<kFeatures>(g, state, queue, next, shadow, counters);
   } else {
-    for (std::uint32_t i = 0; i < queue.size; ++i) {
-      shade_surface<kFeatures>(g, state, queue.paths[i], next, shadow, counters);
+    SurfaceInteraction located[kLanes];
+    for (std::uint32_t first = 0; first < queue.size; first += kLanes) {
+      const std::uint32_t count = queue.size - first < kLanes ? queue.size - first : kLanes;
+      locate<kFeatures>(g, state, queue, first, count, located);
+      for (std::uint32_t lane = 0; lane < count; ++lane) {
+        shade_surface<kFeatures>(g, state, queue.paths[first + lane], located[lane], next, shadow, counters);
+      }
     }
   }
 }

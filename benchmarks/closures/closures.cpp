@@ -181,13 +181,15 @@ const Principled3Columns* resolve_columns(const GraphProgramView& program,
                                           const Hit* hits,
                                           Principled3Columns& columns)
 {
-  if (!closures_are_plain(program)) return nullptr;
+  const SurfaceClosureSpec* const plain = closures_plain(program);
+  if (plain == nullptr) return nullptr;
   MixtureBuildLanes b{{}, splat8(Vec3f{0, 0, 1}), {}};
   for (int k = 0; k < 8; ++k) {
     lane_set(b.wo, k, hits[k].wo);
     lane_set(b.Ns, k, hits[k].Ns);
   }
-  return closures_resolve_plain(program, registers, b, columns) ? &columns : nullptr;
+  closures_resolve_plain(program, *plain, registers, b, columns);
+  return &columns;
 }
 
 [[gnu::noinline, gnu::flatten]] float evaluate(const KernelGlobals& g, const Hit& hit, const Resolved& resolved)

@@ -7,9 +7,9 @@
 
 namespace relief {
 
-/// Inputs of eight hits. What is not here is nothing: see closures_are_plain.
+/// Inputs of eight hits. What is not here is nothing: see closure_is_plain.
 struct Principled3Lanes {
-  F8 weight;  ///< above kLeastClosureWeight
+  F8 weight;
   Vec3x8 base_color;
   F8 metallic, specular, specular_tint, roughness, anisotropic;
   Vec3x8 normal;  ///< Z up; 0: the surface's
@@ -22,7 +22,8 @@ struct MixtureBuildLanes {
 
 /// Numbers of the lobes, a column of eight hits each.
 struct alignas(32) Principled3Columns {
-  float frame[9][8], wo[3][8], surface_N[3][8];
+  int first_result;  ///< of the closure, see SurfaceClosureSpec
+  alignas(32) float frame[9][8], wo[3][8], surface_N[3][8];
   float cos_bend[8];  ///< between the normals of lobes and surface
   float diffuse[3][8], F0[3][8], specular_weight[8], seen[8], eta[8], alpha[2][8], roughness[8], given_roughness[8];
   float strength[8];  ///< above kLeastClosureWeight: there is a reflection
@@ -123,7 +124,7 @@ RELIEF_KERNEL F8 fresnel_dielectric_weight(F8 cos_i, F8 eta)
   store8(columns.strength, max(in.specular, in.metallic));
 }
 
-/// Adds the lobes of one hit, as closure_add does.
+/// Adds the lobes of one hit that the closure has a weight at, as closure_add does.
 RELIEF_KERNEL void principled3_lane_add(MixtureBuild& b, const Principled3Columns& columns, int lane)
 {
   const auto vector = [lane](const float(*from)[8]) { return Vec3f{from[0][lane], from[1][lane], from[2][lane]}; };

@@ -33,13 +33,20 @@ RELIEF_KERNEL Inputs closure_inputs(const GraphLane& at, const SurfaceClosureSpe
 }
 
 /// Resolves all closures that have a weight at the point.
-[[gnu::noinline]] RELIEF_KERNEL void closures_resolve(const GraphLane& at, MixtureBuild& build)
+/// @param columns  of closures_resolve_plain; null: there are none
+[[gnu::noinline]] RELIEF_KERNEL void closures_resolve(const GraphLane& at,
+                                                      MixtureBuild& build,
+                                                      const Principled3Columns* columns = nullptr)
 {
   for (std::uint32_t i = 0; i < at.program->num_closures; ++i) {
     const SurfaceClosureSpec& spec = at.program->closures[i];
     const float weight = graph_result(at, spec.first_result);
     if (!(weight > kLeastClosureWeight && weight < kInfinity)) continue;
     build.maths = spec.maths;
+    if (columns != nullptr && columns->first_result == spec.first_result) {
+      principled3_lane_add(build, *columns, at.lane);
+      continue;
+    }
     switch (spec.kind) {
 #define CLOSURE(name, Type, most_lobes)                                       \
   case ClosureKind::name:                                                     \
@@ -52,11 +59,9 @@ RELIEF_KERNEL Inputs closure_inputs(const GraphLane& at, const SurfaceClosureSpe
   }
 }
 
-/// Whether a program's closures are one plain Principled of 3.4, whose lobes eight hits can be given at once.
-RELIEF_KERNEL bool closures_are_plain(const GraphProgramView& program)
+/// Whether a closure is a plain Principled of 3.4, whose lobes eight hits can be given at once.
+RELIEF_KERNEL bool closure_is_plain(const GraphProgramView& program, const SurfaceClosureSpec& spec)
 {
-  if (program.num_closures != 1 || program.surface_normal != kNoGraphOperand) return false;
-  const SurfaceClosureSpec& spec = program.closures[0];
   if (spec.kind != ClosureKind::principled3 || spec.distribution != ClosureDistribution::kGgx) return false;
   const auto is_none = [&](std::size_t offset, int numbers) {
     const int first = spec.first_result + 1 + static_cast<int>(offset / sizeof(float));
@@ -71,26 +76,32 @@ RELIEF_KERNEL bool closures_are_plain(const GraphProgramView& program)
          is_none(offsetof(In, tangent), 3);
 }
 
+/// The first such closure of a program. @return  null: there is none, or the surface's normal is not its hit's
+RELIEF_KERNEL const SurfaceClosureSpec* closures_plain(const GraphProgramView& program)
+{
+  if (program.surface_normal != kNoGraphOperand) return nullptr;
+  for (std::uint32_t i = 0; i < program.num_closures; ++i) {
+    if (closure_is_plain(program, program.closures[i])) return &program.closures[i];
+  }
+  return nullptr;
+}
+
 /// Resolves a plain Principled closure of eight hits.
-/// @param program    closures_are_plain
-/// @param registers  of its run
-/// @return           false: some hit does not have it, so that each is resolved by itself
-RELIEF_KERNEL bool closures_resolve_plain(const GraphProgramView& program,
+/// @param spec       of closures_plain
+/// @param registers  of the program's run
+RELIEF_KERNEL void closures_resolve_plain(const GraphProgramView& program,
+                                          const SurfaceClosureSpec& spec,
                                           const GraphRegisters& registers,
                                           const MixtureBuildLanes& b,
                                           Principled3Columns& columns)
 {
-  const int first = program.closures[0].first_result;
+  const int first = columns.first_result = spec.first_result;
   const auto raw = [&](int result) {
     const std::uint16_t operand = program.results[result];
-    if (operand == kNoGraphOperand) return splat8(0.0f);
-    return graph_operand(program, registers, operand);
+    return operand == kNoGraphOperand ? splat8(0.0f) : graph_operand(program, registers, operand);
   };
   Principled3Lanes in;
   in.weight = raw(first);
-  if ((mask_of((in.weight > kLeastClosureWeight) & (in.weight < kInfinity)) & registers.used) != registers.used) {
-    return false;
-  }
   const float largest = closure_input(__FLT_MAX__);
   const auto number = [&](std::size_t offset) {
     const int result = first + 1 + static_cast<int>(offset / sizeof(float));
@@ -112,7 +123,6 @@ RELIEF_KERNEL bool closures_resolve_plain(const GraphProgramView& program,
   in.anisotropic = number(offsetof(In, anisotropic));
   in.normal = vector(offsetof(In, normal));
   principled3_columns_make(b, in, columns);
-  return true;
 }
 
 /// What transparent closures alone let through.

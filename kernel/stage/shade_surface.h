@@ -82,12 +82,14 @@ RELIEF_KERNEL bool shade_surface_holdout(const KernelGlobals& g,
 }
 
 /// Shades one path. Reads and writes every column but the hit's.
+/// @param at     as surface_interactions_locate has it; is completed
 /// @param graph  of the material's program at the hit; null: it has none
 /// Next: intersect closest (pushed on `next`), or the path ends; it may fork. At most one ray is added to `shadow`, at a first hit two.
 template <unsigned kFeatures>
 [[gnu::flatten]] RELIEF_KERNEL void shade_surface(const KernelGlobals& g,
                                                   PathState& state,
                                                   std::uint32_t path,
+                                                  SurfaceInteraction& at,
                                                   QueueView& next,
                                                   ShadowQueue& shadow,
                                                   Counters& counters,
@@ -101,9 +103,6 @@ template <unsigned kFeatures>
 
   constexpr bool kMixture = (kFeatures & kFeatureMixture) != 0;
   MixtureLobes lobes;
-  SurfaceInteraction own;
-  if (graph == nullptr) own = surface_interaction_locate<kFeatures>(g, state, path, wo);
-  SurfaceInteraction& at = graph != nullptr ? *graph->at : own;
   surface_interaction_resolve<kFeatures>(g, state, path, wo, at, lobes, graph);
   // Whatever stands in a medium, of glass or not.
   const auto transmittance = [&] {

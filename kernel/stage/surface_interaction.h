@@ -153,27 +153,28 @@ surface_interaction_locate(const KernelGlobals& g, const PathState& state, std::
 /// @param count  1 to 8
 /// @param at     gets those
 template <unsigned kFeatures>
-RELIEF_KERNEL void surface_interactions_locate(const KernelGlobals& g,
-                                               const PathState& state,
-                                               const std::uint32_t* paths,
-                                               int count,
-                                               SurfaceInteraction* at)
+[[gnu::noinline]] RELIEF_KERNEL void surface_interactions_locate(const KernelGlobals& g,
+                                                                 const PathState& state,
+                                                                 const std::uint32_t* paths,
+                                                                 int count,
+                                                                 SurfaceInteraction* at)
 {
   // Fewer are not worth it.
   bool are_triangles = count > 2;
   for (int k = 0; k < count; ++k) {
-    surface_interaction_begin(g, state, paths[k], *new (&at[k]) SurfaceInteraction);
-    are_triangles = are_triangles && (at[k].instance->flags & (kDisplaced | kCurves)) == 0;
+    are_triangles = are_triangles && (path_instance(g, state, paths[k]).flags & (kDisplaced | kCurves)) == 0;
   }
   if (!are_triangles) {
     for (int k = 0; k < count; ++k) {
-      at[k] = surface_interaction_locate<kFeatures>(g, state, paths[k], -path_direction(state, paths[k]));
+      new (&at[k]) SurfaceInteraction(
+          surface_interaction_locate<kFeatures>(g, state, paths[k], -path_direction(state, paths[k])));
     }
     return;
   }
   SurfaceHitQuestions questions{};
   SurfaceHit* hits[8];
   for (int k = 0; k < count; ++k) {
+    surface_interaction_begin(g, state, paths[k], *new (&at[k]) SurfaceInteraction);
     questions.mesh[k] = &path_mesh(g, state, paths[k], *at[k].instance);
     questions.instance[k] = at[k].instance;
     questions.triangle[k] = at[k].triangle;
@@ -208,10 +209,9 @@ RELIEF_KERNEL std::uint32_t path_ray_kinds(const PathState& state, std::uint32_t
   return side | bit(GraphRayKind::kGlossy) | (state.pdf[path] > 0.0f ? 0u : bit(GraphRayKind::kSingular));
 }
 
-/// Resolves what closures eight located points have, if they are such as can be resolved together.
-/// @param count      of them
+/// Resolves the closure of up to eight located points that can be resolved for all together, if there is one.
 /// @param registers  of the program's run
-/// @return           whether that was done
+/// @return           whether there is
 RELIEF_KERNEL bool surface_interactions_resolve(const PathState& state,
                                                 const std::uint32_t* paths,
                                                 int count,
@@ -221,7 +221,8 @@ RELIEF_KERNEL bool surface_interactions_resolve(const PathState& state,
                                                 Principled3Columns& columns)
 {
   // Fewer are not worth it.
-  if (count < 3 || !at[0].material->has_closures || !closures_are_plain(program)) return false;
+  const SurfaceClosureSpec* const plain = count > 2 ? closures_plain(program) : nullptr;
+  if (plain == nullptr) return false;
   alignas(32) float numbers[9][8] = {};
   for (int k = 0; k < count; ++k) {
     const Vec3f vectors[3] = {-path_direction(state, paths[k]), at[k].side.Ng,
@@ -235,7 +236,8 @@ RELIEF_KERNEL bool surface_interactions_resolve(const PathState& state,
   const auto take = [&](int first) {
     return Vec3x8{load8(numbers[first]), load8(numbers[first + 1]), load8(numbers[first + 2])};
   };
-  return closures_resolve_plain(program, registers, {take(0), take(3), take(6)}, columns);
+  closures_resolve_plain(program, *plain, registers, {take(0), take(3), take(6)}, columns);
+  return true;
 }
 
 /// What a graph may read of a located point.
@@ -366,11 +368,7 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   side.Ns = shading_normal_towards(build.Ns, wo);
   side.bent = !(dot(side.Ns, Ns) > kUnbent);
   side.frame = frame_from_normal(side.Ns);
-  if (columns != nullptr && build.reflects && is_zero(build.tangent)) {
-    principled3_lane_add(build, *columns, lane.lane);
-  } else {
-    closures_resolve(lane, build);
-  }
+  closures_resolve(lane, build, build.reflects && is_zero(build.tangent) ? columns : nullptr);
   if (blur.alpha > 0.0f) {
     for (int i = 0; i < lobes.size; ++i) lobe_blur(lobes.lobes[i], blur.alpha, blur.most_sharp);
   }
@@ -408,7 +406,6 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
 
 /// What a graph's program gave at a point that a path has hit.
 struct GraphHit {
-  SurfaceInteraction* at;                       ///< as surface_interaction_locate has it
   GraphLane lane;                               ///< of the program, which has run
   const Principled3Columns* columns = nullptr;  ///< see surface_interaction_mix
 };

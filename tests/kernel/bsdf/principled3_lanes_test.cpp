@@ -95,7 +95,7 @@ TEST_F(PlainPrincipled, EightHaveTheLobesOfEach)
     vary(result_of(offset));
   }
   const GraphProgramView& plain = program();
-  ASSERT_TRUE(closures_are_plain(plain));
+  ASSERT_EQ(closures_plain(plain), &spec_);
   BsdfTables tables{};
   int num_lobes = 0, num_delta = 0, num_bent = 0;
   for (int i = 0; i < 3000; ++i) {
@@ -120,13 +120,13 @@ TEST_F(PlainPrincipled, EightHaveTheLobesOfEach)
       }
     }
     Principled3Columns columns;
-    ASSERT_TRUE(closures_resolve_plain(plain, registers_, lanes, columns));
+    closures_resolve_plain(plain, spec_, registers_, lanes, columns);
     for (int k = 0; k < 8; ++k) {
       MixtureLobes each, together;
       MixtureBuild one{wo[k], Ng, Ns[k], true, &tables, &each}, all{wo[k], Ng, Ns[k], true, &tables, &together};
       const GraphLane lane{&plain, &registers_, k};
       closures_resolve(lane, one);
-      principled3_lane_add(all, columns, k);
+      closures_resolve(lane, all, &columns);
       ASSERT_EQ(together.size, each.size) << i;
       for (int l = 0; l < each.size; ++l) {
         expect_same(together.lobes[l], each.lobes[l]);
@@ -145,34 +145,46 @@ TEST_F(PlainPrincipled, EightHaveTheLobesOfEach)
 TEST_F(PlainPrincipled, MoreThanThatIsNotPlain)
 {
   using In = Principled3Inputs;
-  EXPECT_TRUE(closures_are_plain(program()));
+  EXPECT_NE(closures_plain(program()), nullptr);
   for (const std::size_t offset : {offsetof(In, subsurface), offsetof(In, sheen), offsetof(In, clearcoat),
                                    offsetof(In, transmission), offsetof(In, tangent)}) {
     const int result = result_of(offset);
     constants_[result] = 0.5f;
-    EXPECT_FALSE(closures_are_plain(program())) << offset;
+    EXPECT_EQ(closures_plain(program()), nullptr) << offset;
     constants_[result] = 0.0f;
     const std::uint16_t constant = results_[static_cast<std::size_t>(result)];
     vary(result);
-    EXPECT_FALSE(closures_are_plain(program())) << offset;
+    EXPECT_EQ(closures_plain(program()), nullptr) << offset;
     results_[static_cast<std::size_t>(result)] = constant;
   }
   spec_.distribution = ClosureDistribution::kMultiscatterGgx;
-  EXPECT_FALSE(closures_are_plain(program()));
+  EXPECT_EQ(closures_plain(program()), nullptr);
 }
 
-TEST_F(PlainPrincipled, HitsWithoutAWeightAreResolvedByThemselves)
+TEST_F(PlainPrincipled, IsFoundBesideOthersAndHasAWeight)
 {
   vary(0);
-  const GraphProgramView& plain = program();
-  registers_.lanes[0] = splat8(1.0f);
-  Principled3Columns columns;
-  EXPECT_TRUE(closures_resolve_plain(plain, registers_, MixtureBuildLanes{}, columns));
+  const GraphProgramView& one = program();
+  const SurfaceClosureSpec two[] = {{.kind = ClosureKind::holdout, .first_result = 0}, spec_};
+  GraphProgramView both = one;
+  both.closures = two;
+  both.num_closures = 2;
+  EXPECT_EQ(closures_plain(both), &two[1]);
+  registers_.lanes[0] = splat8(0.25f);
   registers_.lanes[0][3] = 0.0f;
-  EXPECT_FALSE(closures_resolve_plain(plain, registers_, MixtureBuildLanes{}, columns));
-  // A lane that means nothing may hold anything.
-  registers_.used = 0x7;
-  EXPECT_TRUE(closures_resolve_plain(plain, registers_, MixtureBuildLanes{}, columns));
+  const MixtureBuildLanes lanes{splat8(Vec3f{0.6f, 0, 0.8f}), splat8(Vec3f{0, 0, 1}), splat8(Vec3f{0, 0, 1})};
+  Principled3Columns columns;
+  closures_resolve_plain(one, spec_, registers_, lanes, columns);
+  for (const int lane : {2, 3}) {
+    BsdfTables tables{};
+    MixtureLobes lobes;
+    MixtureBuild build{{0.6f, 0, 0.8f}, {0, 0, 1}, {0, 0, 1}, true, &tables, &lobes};
+    closures_resolve({&one, &registers_, lane}, build, &columns);
+    EXPECT_EQ(lobes.size, lane == 3 ? 0 : 2);
+    if (lane == 2) {
+      EXPECT_FLOAT_EQ(lobes.lobes[0].weight.x, 0.25f * 0.8f);
+    }
+  }
 }
 
 }  // namespace
