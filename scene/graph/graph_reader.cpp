@@ -450,6 +450,7 @@ GraphProgram vector_graph_read(const GltfDocument& document,
       outputs.warn_unread(warnings);
       v = value.v;
       uv_set = static_cast<int>(source.integer("texCoord", 0, 0, 1));
+      source.warn_unread(warnings);
     }
     const GraphVector midlevel = splat(b.constant(displacement.number_f("midlevel", 0)));
     const GraphVector scale = splat(b.constant(displacement.number_f("scale", 1)));
@@ -465,7 +466,6 @@ GraphProgram vector_graph_read(const GltfDocument& document,
     }
     v = each(b, GraphOp::multiply, each(b, GraphOp::subtract, v, midlevel), scale);
     for (const GraphScalar a : vector_in_object(b, space, v, tangent, handedness)) b.add_result(a);
-    source.warn_unread(warnings);
     GraphProgram program = b.compile();
     program.attributes.assign(r.attributes.begin(), r.attributes.end());
     return program;
