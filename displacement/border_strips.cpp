@@ -436,6 +436,33 @@ BorderSide border_of_vertices(const TriangleIndices* triangles, std::vector<cons
   };
 }
 
+namespace {
+
+/// @param vertex  places by step of a point (i, j) of a part's lattice: (part, i, j)
+template <typename Vertex>
+BorderSide border_of_parts(std::span<const LatticeTriangle> parts, std::size_t num_steps, const Vertex& vertex)
+{
+  return [parts, num_steps, vertex, of_edges = parts_of_edges(parts)](std::uint32_t edge) {
+    CurvePoints points(num_steps);
+    for (const PartSide& on : sides_on(of_edges.get(), edge)) {
+      const LatticeTriangle& part = parts[on.part];
+      const std::int32_t n = part.n, width = n / part.side_n[on.side];
+      for (std::int32_t k = 0; k <= n; k += width) {
+        const std::int32_t i = on.side == 0   ? k
+                               : on.side == 1 ? n - k
+                                              : 0,
+                           j = on.side == 0   ? 0
+                               : on.side == 1 ? k
+                                              : n - k;
+        points.add(on.from + k * (on.to - on.from) / n, vertex(on.part, i, j));
+      }
+    }
+    return points.curve(std::nullopt);
+  };
+}
+
+}  // namespace
+
 BorderSide border_of_divided(const MovedMesh& mesh, std::span<const LatticeTriangle> parts)
 {
   auto first_vertex = std::make_shared<std::vector<std::uint32_t>>();
@@ -447,26 +474,20 @@ BorderSide border_of_divided(const MovedMesh& mesh, std::span<const LatticeTrian
   std::vector<const Vec3f*> steps;
   for (const MovedShape& step : mesh.steps) steps.push_back(step.P.data());
   if (steps.empty()) steps.push_back(mesh.P.data());
-  return [parts, first_vertex, steps, of_edges = parts_of_edges(parts)](std::uint32_t edge) {
-    CurvePoints points(steps.size());
-    for (const PartSide& on : sides_on(of_edges.get(), edge)) {
-      const LatticeTriangle& part = parts[on.part];
-      const std::int32_t n = part.n, width = n / part.side_n[on.side];
-      for (std::int32_t k = 0; k <= n; k += width) {
-        const std::int32_t i = on.side == 0   ? k
-                               : on.side == 1 ? n - k
-                                              : 0,
-                           j = on.side == 0   ? 0
-                               : on.side == 1 ? k
-                                              : n - k;
-        const std::uint32_t vertex = (*first_vertex)[on.part] + lattice_index(n, i, j);
-        std::vector<Vec3d> P;
-        for (const Vec3f* step : steps) P.push_back(to_double(step[vertex]));
-        points.add(on.from + k * (on.to - on.from) / n, std::move(P));
-      }
-    }
-    return points.curve(std::nullopt);
+  const auto vertex = [parts, first_vertex, steps](std::uint32_t part, std::int32_t i, std::int32_t j) {
+    const std::uint32_t index = (*first_vertex)[part] + lattice_index(parts[part].n, i, j);
+    std::vector<Vec3d> P;
+    for (const Vec3f* step : steps) P.push_back(to_double(step[index]));
+    return P;
   };
+  return border_of_parts(parts, steps.size(), vertex);
+}
+
+BorderSide border_of_tiles(const PointTiles& tiles)
+{
+  return border_of_parts(tiles.parts(), 1, [&tiles](std::uint32_t part, std::int32_t i, std::int32_t j) {
+    return std::vector<Vec3d>{to_double(tiles.point(part, i, j))};
+  });
 }
 
 BorderSide border_of_tessellation(const Tessellation& tessellation, std::span<const LatticeTriangle> parts)

@@ -13,6 +13,7 @@
 
 #include "displacement/embree_geometry.h"
 #include "displacement/moved_mesh.h"
+#include "displacement/point_tiles.h"
 #include "displacement/tessellation.h"
 #include "displacement/vec3d.h"
 #include "kernel/shape/border_edge.h"
@@ -37,6 +38,10 @@ BorderSide border_of_vertices(const TriangleIndices* triangles, std::vector<cons
 /// Of a mesh that was divided.
 /// @param parts  that it was divided by; must outlive the side, as `mesh`
 BorderSide border_of_divided(const MovedMesh& mesh, std::span<const LatticeTriangle> parts);
+
+/// Likewise, of one whose triangles are made in tiles.
+/// @param tiles  must outlive the side
+BorderSide border_of_tiles(const PointTiles& tiles);
 
 /// Of a mesh that is tessellated.
 /// @param parts  of the base mesh's triangles, which are tessellated in their place; empty: the triangles are

@@ -355,7 +355,7 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
     }
     places.emplace_back(static_cast<int>(geometries_.size()), -1);
     if (use.heights != nullptr) {
-      geometries_.push_back(make_computed(use, options));
+      geometries_.push_back(use.settings.by_vectors ? make_tiled(use, std::move(parts)) : make_computed(use, options));
       continue;
     }
     geometries_.push_back(make_displaced(use, options));
@@ -517,6 +517,31 @@ VertexMove DisplacementSet::vertex_move_of(const Use& use,
   return move;
 }
 
+bool DisplacementSet::fits_in_tiles(const Use& use,
+                                    const DisplacementOptions& options,
+                                    std::span<const LatticeTriangle> parts,
+                                    std::uint64_t allowance,
+                                    std::uint64_t* used_bytes)
+{
+  if (!use.steps.empty()) return false;
+  const std::uint64_t room = allowance - std::min(allowance, *used_bytes);
+  const std::uint64_t divided = divided_mesh_bytes(use.mesh, parts);
+  if (divided <= room && asked_method(use.settings, options) != kDefaultMethod) return false;
+  const std::uint64_t bytes = PointTiles::bytes(parts);
+  if (bytes > room) return false;
+  *used_bytes += bytes;
+  if (tile_cache_ == nullptr) {
+    // So many at least, that no picture is made tile by tile for every ray.
+    constexpr std::uint64_t kLeast = std::uint64_t{16} << 20;
+    const std::uint64_t cache = std::min(options.computed_bytes, std::max(room - bytes, kLeast));
+    tile_cache_ = std::make_unique<PointTileCache>(cache);
+    *used_bytes += cache;
+  }
+  reasons_.push_back("mesh '" + use.mesh_name + "': rays are traced over tiles of it, as dividing it would take " +
+                     gibibytes(divided));
+  return true;
+}
+
 VertexMove DisplacementSet::vector_move_of(const Use& use,
                                            const DisplacementOptions& options,
                                            std::vector<LatticeTriangle>* parts,
@@ -525,14 +550,15 @@ VertexMove DisplacementSet::vector_move_of(const Use& use,
   const std::string mesh = "mesh '" + use.mesh_name + "'";
   const ComputedHeights& by = *use.heights;
   if (use.mesh.num_triangles == 0 || by.is_constant) return VertexMove::kOwn;
+  std::uint64_t allowance = dicing_allowance(options);
   if (by.num_cells > 0) {
     *parts = lattices_make(use.mesh, by.num_cells);
+    if (fits_in_tiles(use, options, *parts, allowance, used_bytes)) return VertexMove::kNone;
     *used_bytes += divided_mesh_bytes(use.mesh, *parts);
     return VertexMove::kDivided;
   }
   const double cells = mean_cells_a_side(use.mesh, by.cells);
   VertexMove move = is_dense(use.settings, use.mesh, cells) ? VertexMove::kOwn : VertexMove::kDivided;
-  std::uint64_t allowance = dicing_allowance(options);
   if (options.choices != nullptr) {
     const auto [known, is_new] = options.choices->moved.try_emplace(
         {use.mesh_name, use.displacement_index, use.mesh.num_triangles, use.scale, 0, 0, options.picture_height, 0},
@@ -548,20 +574,26 @@ VertexMove DisplacementSet::vector_move_of(const Use& use,
     return move;
   }
   const std::uint64_t room = allowance - std::min(allowance, *used_bytes);
+  const auto warn_longer = [&](double longer) {
+    std::snprintf(text, sizeof text, " has triangles %.0f times as long as asked for: finer ones have no room in %s",
+                  longer, gibibytes(room).c_str());
+    unfollowed_.push_back(mesh + text + " (--displacement-memory)");
+  };
   for (double longer = 1;; longer *= 2) {
     *parts = lattices_make(
         use.mesh, [&](Vec3f a, Vec3f b) { return by.cells_seen(a, b) / (kDividedCells * longer); }, options.require);
-    const std::uint64_t bytes = divided_mesh_bytes(use.mesh, *parts);
+    if (fits_in_tiles(use, options, *parts, allowance, used_bytes)) {
+      if (longer > 1) warn_longer(longer);
+      return VertexMove::kNone;
+    }
+    // What deforms has its vertices more than once, and larger nodes.
+    const std::uint64_t bytes = (use.steps.empty() ? 1 : 2) * divided_mesh_bytes(use.mesh, *parts);
     const bool is_whole = std::all_of(parts->begin(), parts->end(), [](const LatticeTriangle& p) { return p.n == 1; });
     if (bytes > room && !(is_whole && parts->size() == use.mesh.num_triangles)) continue;
     *used_bytes += bytes;
     std::snprintf(text, sizeof text, ": it is divided to the picture, which takes %s", gibibytes(bytes).c_str());
     reasons_.push_back(mesh + text);
-    if (longer > 1) {
-      std::snprintf(text, sizeof text, " has triangles %.0f times as long as asked for: finer ones have no room in %s",
-                    longer, gibibytes(room).c_str());
-      unfollowed_.push_back(mesh + text + " (--displacement-memory)");
-    }
+    if (longer > 1) warn_longer(longer);
     return move;
   }
 }
@@ -594,6 +626,7 @@ BorderSide DisplacementSet::border_side(const DisplacementInput& input,
 {
   if (geometry_of_instance_[instance] >= 0) {
     const PreparedMesh& d = displaced(instance);
+    if (d.tiles != nullptr) return border_of_tiles(*d.tiles);
     if (d.tessellation == nullptr) return border_of_displaced(d.geometry);
     return border_of_tessellation(*d.tessellation,
                                   d.dicing != nullptr ? d.dicing->parts() : std::span<const LatticeTriangle>{});
@@ -634,7 +667,7 @@ void DisplacementSet::make_borders(const DisplacementInput& input, const PartsOf
     for (std::uint32_t v = 0; v < mesh.num_vertices; ++v) extent = max(extent, abs(mesh.P[v]));
     for (const std::size_t side : border.sides) {
       if (geometry_of_instance_[side] < 0) continue;
-      const Box3& box = displaced(side).mesh.bounds();
+      const Box3 box = bounds(static_cast<std::size_t>(geometry_of_instance_[side]));
       if (box.low.x <= box.high.x) extent = max(extent, max(abs(box.low), abs(box.high)));
     }
     const Affine3& m = instance.world_from_object;
@@ -706,6 +739,19 @@ std::unique_ptr<PreparedMesh> DisplacementSet::make_computed(const Use& use, con
   return displaced;
 }
 
+std::unique_ptr<PreparedMesh> DisplacementSet::make_tiled(const Use& use, std::vector<LatticeTriangle> parts)
+{
+  auto displaced = std::make_unique<PreparedMesh>();
+  displaced->name = use.mesh_name;
+  displaced->displacement_index = use.displacement_index;
+  displaced->mesh_index = use.mesh_index;
+  displaced->tiles = std::make_unique<PointTiles>(use.mesh, use.heights->moves, std::move(parts),
+                                                  use.settings.smoothing, *tile_cache_, num_tiles_);
+  num_tiles_ += displaced->tiles->num_tiles();
+  displaced->geometry.tiles = displaced->tiles.get();
+  return displaced;
+}
+
 void DisplacementSet::tessellate(PreparedMesh& displaced,
                                  const DisplacementOptions& options,
                                  bool is_auto,
@@ -726,6 +772,8 @@ void DisplacementSet::tessellate(PreparedMesh& displaced,
   }
   // Layouts cost time and memory of their own, so nothing is made of them without an allowance.
   if (!is_auto || options.auto_bytes <= *used_bytes || displaced.geometry.lod.fixed > 0) return;
+  const std::uint64_t allowance = options.auto_bytes - *used_bytes;
+  const double seconds = method_seconds(*displacement_method(displaced.method).cost, 0, num_rays);
   std::vector<MethodOffer> offers;
   std::vector<TessellationLayout> layouts;
   for (const DisplacementMethod method : kDisplacementMethods) {
@@ -734,11 +782,20 @@ void DisplacementSet::tessellate(PreparedMesh& displaced,
     offers.push_back({method, *entry.cost, 0, 0});
     layouts.emplace_back();
     if (!entry.tessellation) continue;
+    const auto offer = [&](const TessellationLayout& layout) {
+      offers.back().num_micro_triangles = layout.num_micro_triangles;
+      offers.back().bytes = tessellation_peak_bytes(layout, kRenderTessellation);
+    };
+    // What cannot win as it is at least is not laid out, which takes longer than tracing a small picture of a mesh of millions.
+    offer(tessellation_layout_least(mesh, *entry.tessellation, options.tessellation_rate));
+    if (offers.back().bytes > allowance ||
+        method_seconds(*entry.cost, offers.back().num_micro_triangles, num_rays) >= seconds) {
+      continue;
+    }
     layouts.back() = layout_of(method);
-    offers.back().num_micro_triangles = layouts.back().num_micro_triangles;
-    offers.back().bytes = tessellation_peak_bytes(layouts.back(), kRenderTessellation);
+    offer(layouts.back());
   }
-  const DisplacementChoice choice = displacement_choose(offers, num_rays, options.auto_bytes - *used_bytes);
+  const DisplacementChoice choice = displacement_choose(offers, num_rays, allowance);
   reasons_.push_back("mesh '" + displaced.name + "': " + choice.reason);
   if (choice.method == displaced.method) return;
   displaced.method = choice.method;
@@ -870,6 +927,11 @@ DisplacedPoint DisplacementSet::resolve(std::size_t instance,
                                         EmbreeHitRecord record) const
 {
   const PreparedMesh& d = displaced(instance);
+  if (d.tiles != nullptr) {
+    DisplacedPoint out = d.tiles->resolve(placement, primitive, record);
+    if (!d.walls.edges.empty()) leave_walls(d, placement, &out);
+    return out;
+  }
   if (d.tessellation == nullptr) {
     DisplacedPoint out = displaced_resolve(d.geometry, placement, texel_of_instance_[instance], primitive, record);
     if (d.procedural != nullptr) set_base_place(*d.procedural, &out);
@@ -902,15 +964,16 @@ DisplacedPoint DisplacementSet::resolve(std::size_t instance,
   return out;
 }
 
-DisplacedPoint DisplacementSet::locate(std::size_t instance, std::uint32_t primitive, float u, float v) const
+DisplacedPoint DisplacementSet::locate(std::size_t instance, std::uint32_t primitive, EmbreeHitRecord record) const
 {
   const PreparedMesh& d = displaced(instance);
+  if (d.tiles != nullptr) return d.tiles->locate(primitive, record);
   if (d.tessellation == nullptr) {
-    DisplacedPoint out{primitive, u, v};
+    DisplacedPoint out{primitive, record.u, record.v};
     if (d.procedural != nullptr) set_base_place(*d.procedural, &out);
     return out;
   }
-  const MicroHit hit = d.tessellation->locate(primitive, u, v);
+  const MicroHit hit = d.tessellation->locate(primitive, record.u, record.v);
   DisplacedPoint out{hit.triangle, static_cast<float>(hit.b1), static_cast<float>(hit.b2)};
   if (d.dicing != nullptr) d.dicing->set_base_place(&out.triangle, &out.u, &out.v);
   return out;
@@ -919,18 +982,32 @@ DisplacedPoint DisplacementSet::locate(std::size_t instance, std::uint32_t primi
 SeamReport DisplacementSet::seams(std::size_t index) const
 {
   // Of computed heights no sides are compared.
-  return geometries_[index]->procedural == nullptr ? seam_report(geometries_[index]->mesh.view()) : SeamReport{};
+  const PreparedMesh& d = *geometries_[index];
+  return d.procedural == nullptr && d.tiles == nullptr ? seam_report(d.mesh.view()) : SeamReport{};
+}
+
+Box3 DisplacementSet::bounds(std::size_t index) const
+{
+  const PreparedMesh& d = *geometries_[index];
+  return d.tiles != nullptr ? d.tiles->bounds() : d.mesh.bounds();
+}
+
+DisplacementSet::TileTally DisplacementSet::tiles() const
+{
+  if (tile_cache_ == nullptr) return {};
+  return {tile_cache_->num_made(), tile_cache_->num_evicted(), tile_cache_->bytes()};
 }
 
 std::size_t DisplacementSet::bytes() const
 {
-  std::size_t sum = fields_->bytes() + (lattice_cache_ != nullptr ? lattice_cache_->bytes() : 0);
+  std::size_t sum = fields_->bytes() + (lattice_cache_ != nullptr ? lattice_cache_->bytes() : 0) + tiles().bytes;
   for (const MovedMesh& mesh : moved_) sum += mesh.bytes();
   for (const auto& displaced : geometries_) {
     sum += displaced->mesh.bytes();
     if (displaced->procedural != nullptr) sum += displaced->procedural->bytes();
     if (displaced->dicing != nullptr) sum += displaced->dicing->bytes();
     if (displaced->tessellation != nullptr) sum += displaced->tessellation->bytes();
+    if (displaced->tiles != nullptr) sum += displaced->tiles->bytes();
   }
   return sum;
 }
@@ -960,10 +1037,11 @@ std::string DisplacementSet::method_names() const
 {
   std::string names;
   for (const DisplacementMethod method : kDisplacementMethods) {
-    const auto uses = [=](const auto& displaced) { return displaced->method == method; };
+    const auto uses = [=](const auto& displaced) { return displaced->method == method && displaced->tiles == nullptr; };
     if (std::none_of(geometries_.begin(), geometries_.end(), uses)) continue;
     names += (names.empty() ? "" : ", ") + std::string(displacement_method_label(method));
   }
+  if (num_tiles_ > 0) names += names.empty() ? "tiles" : ", tiles";
   if (moved_.size() > num_borders_) names += names.empty() ? "vertices" : ", vertices";
   return names;
 }

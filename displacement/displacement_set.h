@@ -64,7 +64,7 @@ struct DisplacementInput {
 
 /// Whose vertices displacement moves.
 enum class VertexMove : std::uint8_t {
-  kNone,    ///< rays are traced over the heights
+  kNone,    ///< rays are traced over the heights, or tiles of points
   kOwn,     ///< the mesh's
   kDivided  ///< those of triangles that its own are divided to
 };
@@ -141,6 +141,7 @@ class DisplacementSet {
   /// @param seconds  that building it took
   void set_tree(std::size_t index, std::shared_ptr<RTCSceneTy> tree, std::uint64_t bytes, double seconds);
   const DisplacedMesh& mesh(std::size_t index) const { return geometries_[index]->mesh; }
+  Box3 bounds(std::size_t index) const;  ///< of a geometry, object space
   /// @return null if the geometry is traversed as it is
   const Tessellation* tessellation(std::size_t index) const { return geometries_[index]->tessellation.get(); }
   /// Completes a hit on a displaced instance.
@@ -157,17 +158,23 @@ class DisplacementSet {
     return level_facets_make(displaced(instance).geometry, at, jitter, out);
   }
   /// The base triangle and weights of a hit alone.
-  DisplacedPoint locate(std::size_t instance, std::uint32_t primitive, float u, float v) const;
+  DisplacedPoint locate(std::size_t instance, std::uint32_t primitive, EmbreeHitRecord record) const;
   /// Place of a displaced geometry's settings in the input.
   int displacement_index(std::size_t index) const { return geometries_[index]->displacement_index; }
   /// The texture seams of a displaced geometry's mesh.
   SeamReport seams(std::size_t index) const;
-  std::size_t bytes() const;                                 ///< besides the maps
+  std::size_t bytes() const;  ///< besides the maps
+  /// Tiles of points that rays asked for: how often one was made, how often that took the room of another, and what they take.
+  struct TileTally {
+    std::uint64_t made = 0, evicted = 0, bytes = 0;
+  };
+  TileTally tiles() const;
   std::uint64_t num_triangles() const;                       ///< of all geometries
   DisplacedMeshReport report() const;                        ///< sums over all geometries
   const HeightFields::Tally& kept() const { return kept_; }  ///< of the sets before
   const KeptMeshes::Tally& kept_meshes() const { return kept_tally_; }
-  std::string method_names() const;  ///< of the geometries, separated by commas, and "vertices" for moved meshes
+  std::string method_names()
+      const;  ///< of the geometries, separated by commas, "tiles" and "vertices" for moved meshes
   /// What `auto` chose by, a line a geometry.
   const std::vector<std::string>& reasons() const { return reasons_; }
   /// Parts of the surfaces that are missing, and methods that are not followed.
@@ -210,6 +217,7 @@ class DisplacementSet {
                                           const DisplacementMapping& mapping,
                                           const std::vector<const HeightFieldView*>& fields);
   std::unique_ptr<PreparedMesh> make_computed(const Use& use, const DisplacementOptions& options);
+  std::unique_ptr<PreparedMesh> make_tiled(const Use& use, std::vector<LatticeTriangle> parts);
   /// Whose vertices a use is to move: the mesh's where heights are the same everywhere or triangles a few cells wide, those of
   /// divided ones where they have room.
   /// @param parts       receives those of divided triangles
@@ -218,11 +226,20 @@ class DisplacementSet {
                             const DisplacementOptions& options,
                             std::vector<LatticeTriangle>* parts,
                             std::uint64_t* used_bytes);
-  /// The same for vectors, which rays are not traced over: where divided triangles have no room they are larger.
+  /// The same for vectors: where divided triangles have no room, rays are traced over tiles of them. Where even these have none, or
+  /// the mesh deforms, triangles are larger.
+  /// @param parts  receives those of tiles as well
   VertexMove vector_move_of(const Use& use,
                             const DisplacementOptions& options,
                             std::vector<LatticeTriangle>* parts,
                             std::uint64_t* used_bytes);
+  /// Whether rays are to be traced over tiles of some parts: because those have no room as a mesh, or their method says so.
+  /// @param used_bytes  grows by what that takes, if so
+  bool fits_in_tiles(const Use& use,
+                     const DisplacementOptions& options,
+                     std::span<const LatticeTriangle> parts,
+                     std::uint64_t allowance,
+                     std::uint64_t* used_bytes);
   MovedMesh make_moved(const Use& use, VertexMove move, std::span<const LatticeTriangle> parts);
   using PartsOfMoved = std::vector<std::vector<LatticeTriangle>>;  ///< of divided meshes with borders
   void make_borders(const DisplacementInput& input, const PartsOfMoved& parts);
@@ -263,6 +280,8 @@ class DisplacementSet {
   std::vector<MeshView> meshes_;
   std::shared_ptr<const void> heights_owner_;
   std::unique_ptr<LatticeCache> lattice_cache_;  ///< of computed heights; null: there are none
+  std::unique_ptr<PointTileCache> tile_cache_;   ///< of points that vectors move, likewise
+  std::uint64_t num_tiles_ = 0;                  ///< of all geometries
   std::vector<int> geometry_of_instance_, moved_of_instance_;
   std::vector<float> texel_of_instance_;
   bool has_levels_ = false, has_facets_ = false;

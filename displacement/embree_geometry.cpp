@@ -7,6 +7,7 @@
 #include "displacement/clearance.h"
 #include "displacement/deformation.h"
 #include "displacement/level_blend.h"
+#include "displacement/point_tiles.h"
 #include "displacement/seam_walls.h"
 #include "displacement/trace_procedural.h"
 #include "kernel/shape/surface_hit.h"
@@ -17,9 +18,12 @@ namespace {
 
 void bounds(const RTCBoundsFunctionArguments* arguments)
 {
-  const DisplacedMeshView& mesh = static_cast<const DisplacedGeometry*>(arguments->geometryUserPtr)->mesh;
-  const Box3 box = mesh.deformation != nullptr ? deforming_triangle_bounds(mesh, arguments->primID, arguments->timeStep)
-                                               : displaced_triangle_bounds(mesh, arguments->primID);
+  const auto& geometry = *static_cast<const DisplacedGeometry*>(arguments->geometryUserPtr);
+  const DisplacedMeshView& mesh = geometry.mesh;
+  const Box3 box = geometry.tiles != nullptr ? geometry.tiles->padded_box(arguments->primID)
+                   : mesh.deformation != nullptr
+                       ? deforming_triangle_bounds(mesh, arguments->primID, arguments->timeStep)
+                       : displaced_triangle_bounds(mesh, arguments->primID);
   RTCBounds* out = arguments->bounds_o;
   out->lower_x = box.low.x;
   out->lower_y = box.low.y;
@@ -86,8 +90,8 @@ void find_walls(BoxOverSides& box, const MeshAtTime& then, const double (&b)[3])
     box.has_walls = true;
     if (box.planes == nullptr) continue;
     // Between its sides, where it is known which is the lower one; the wall holds the whole displacement line.
-    const SurfacePoint wall = seam_wall_point(then.mesh, then.triangle, edge, fraction,
-                                              0.5 * (heights.low + heights.high), level);
+    const SurfacePoint wall =
+        seam_wall_point(then.mesh, then.triangle, edge, fraction, 0.5 * (heights.low + heights.high), level);
     box.planes->push_back({wall.Ng, 2 * dot(abs(wall.Ng), box.error) + std::abs(dot(box.P - wall.P, wall.Ng))});
   }
 }
@@ -275,14 +279,15 @@ DisplacedPoint displaced_resolve(const DisplacedGeometry& geometry,
 RTCGeometry displaced_geometry_make(RTCDevice device, const DisplacedGeometry& geometry, const TraversalTable& table)
 {
   RTCGeometry out = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_USER);
-  rtcSetGeometryUserPrimitiveCount(out, geometry.mesh.num_triangles);
+  const bool tiles = geometry.tiles != nullptr;
+  rtcSetGeometryUserPrimitiveCount(out, tiles ? geometry.tiles->num_tiles() : geometry.mesh.num_triangles);
   // Embree hands the pointer back as it was given; no callback writes through it.
   rtcSetGeometryUserData(out, const_cast<DisplacedGeometry*>(&geometry));
   if (const Deformation* const deformation = geometry.mesh.deformation)
     rtcSetGeometryTimeStepCount(out, static_cast<unsigned>(deformation->steps.size()));
   rtcSetGeometryBoundsFunction(out, bounds, nullptr);
-  rtcSetGeometryIntersectFunction(out, table.intersect);
-  rtcSetGeometryOccludedFunction(out, table.occluded);
+  rtcSetGeometryIntersectFunction(out, tiles ? table.intersect_tiles : table.intersect);
+  rtcSetGeometryOccludedFunction(out, tiles ? table.occluded_tiles : table.occluded);
   return out;
 }
 

@@ -13,6 +13,8 @@
 
 namespace relief {
 
+class PointTiles;
+
 /// A level of a height map, and what the geometry's method needs of it.
 struct DisplacementLevel {
   const HeightFieldView* field = nullptr;
@@ -38,6 +40,7 @@ struct DisplacedGeometry {
   RmipOptions rmip_options;                     ///< for both of RMIP's
   RTCFilterFunctionN shadow_filter = nullptr;   ///< called for hits of shadow rays; null: all of them are opaque
   const ProceduralField* procedural = nullptr;  ///< heights in place of a map's; there are no levels then
+  const PointTiles* tiles = nullptr;            ///< in place of all above but the filter: points that vectors move
   RTCScene scene =
       nullptr;  ///< of this geometry, or of what it is tessellated to, committed; null: no neighbours are known
 };
@@ -63,6 +66,8 @@ struct TraversalTable {
                 TraversalCounters* counters);
   RTCIntersectFunctionN intersect;
   RTCOccludedFunctionN occluded;
+  RTCIntersectFunctionN intersect_tiles;  ///< of geometries that have them
+  RTCOccludedFunctionN occluded_tiles;
 };
 
 const TraversalTable& traversal_table_baseline();
@@ -166,7 +171,7 @@ void displaced_point_set_level(const DisplacedGeometry& geometry,
                                float level,
                                DisplacedPoint* point);
 
-/// A new geometry, one primitive a base triangle, not committed.
+/// A new geometry, one primitive a base triangle or tile, not committed.
 RTCGeometry displaced_geometry_make(RTCDevice device, const DisplacedGeometry& geometry, const TraversalTable& table);
 
 }  // namespace relief

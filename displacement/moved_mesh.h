@@ -47,15 +47,17 @@ struct MovedShape {
 /// A mesh with its vertices moved, or one that it is divided to.
 struct MovedMesh {
   std::string name;
-  int mesh_index = 0;       ///< of the mesh that was
-  std::vector<Vec3f> P;     ///< of all vertices
-  std::vector<Normal3f> N;  ///< likewise; empty: it is flat
+  int mesh_index = 0;             ///< of the mesh that was
+  std::vector<Vec3f> P;           ///< of all vertices
+  std::vector<Normal3f> N;        ///< likewise; empty: it is flat
   std::vector<MovedShape> steps;  ///< at evenly spaced times while the shutter is open; empty: it does not deform
   /// Triangles, and all else that vertices have; null: those of the mesh that was.
   std::shared_ptr<const DividedMesh> divided;
 
   /// @param mesh  that was
   MeshView view(const MeshView& mesh) const;
+  /// How many pairs of its triangles, the first ones, are quadrilaterals: (a, b, d), (b, c, d).
+  std::uint32_t num_pairs() const;
   std::size_t bytes() const;
 };
 

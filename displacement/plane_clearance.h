@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <vector>
 
@@ -92,5 +93,50 @@ inline Vec3d planes_leave(const std::vector<NearPlane>& planes, Vec3d Ng)
   }
   return offset.value_or(Vec3d{}) * (own < 0 ? -1.0 : 1.0);
 }
+
+/// Squared distance of the origin from a triangle. @source Ericson 2005, Real-Time Collision Detection, §5.1.5
+inline double squared_distance(Vec3d a, Vec3d b, Vec3d c)
+{
+  const auto to_line = [](Vec3d from, Vec3d to) {
+    const Vec3d along = to - from;
+    const double squared = dot(along, along);
+    const double t = squared > 0 ? std::clamp(-dot(from, along) / squared, 0.0, 1.0) : 0.0;
+    const Vec3d nearest = from + t * along;
+    return dot(nearest, nearest);
+  };
+  const Vec3d n = cross(b - a, c - a);
+  const bool inside = dot(cross(a, b), n) >= 0 && dot(cross(b, c), n) >= 0 && dot(cross(c, a), n) >= 0 && dot(n, n) > 0;
+  if (inside) return dot(a, n) * dot(a, n) / dot(n, n);
+  return std::min({to_line(a, b), to_line(b, c), to_line(c, a)});
+}
+
+/// Where what is near is larger than so many sides of micro-triangles, errors are larger than these are, as far from the origin as that
+/// is: no surface is left to be clear of, and all that are near would take too long.
+inline constexpr double kMostSidesAround = 2;
+
+/// The planes of micro-triangles around a point.
+struct NearPlanes {
+  Vec3d P;
+  Vec3d error;   ///< per axis, of the point and of an origin
+  double reach;  ///< micro-triangles within this distance count
+  std::vector<NearPlane> planes;
+
+  /// @param winding  1, or −1 of triangles that run clockwise around the normal of their front
+  void add(double winding, Vec3d a, Vec3d b, Vec3d c)
+  {
+    const Vec3d normal = cross(b - a, c - a);
+    const double squared = dot(normal, normal);
+    if (!(squared > 0) || !(squared_distance(a - P, b - P, c - P) <= reach * reach)) return;
+    const Vec3d N = normal * (winding / std::sqrt(squared));
+    // On either side of it: rays leave a ridge below and a valley above alike.
+    const double distance = 2 * dot(abs(N), error) + std::abs(dot(P - a, N));
+    for (NearPlane& plane : planes) {
+      if (dot(plane.N, N) < 1 - 1e-9) continue;
+      plane.distance = std::max(plane.distance, distance);
+      return;
+    }
+    planes.push_back({N, distance});
+  }
+};
 
 }  // namespace relief

@@ -156,13 +156,38 @@ std::uint64_t TessellationLayout::bytes() const
                                                       : num_primitives * sizeof(RTCGrid));
 }
 
+namespace {
+
+/// Divides triangles by the whole segments of their edges, 3 · triangle + edge, and counts what that makes.
+template <typename Segments>
+void divide_triangles(std::uint32_t num_triangles, const Segments& segments, TessellationLayout* layout)
+{
+  layout->triangles.resize(num_triangles);
+  const bool grids = layout->kind == TessellationKind::kGrids;
+  for (std::uint32_t index = 0; index < num_triangles; ++index) {
+    TessellatedTriangle& t = layout->triangles[index];
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::uint32_t whole = segments(3 * index + k);
+      t.edge_segments[k] = grids ? (whole + 1) / 2 : whole;
+      t.segments = std::max(t.segments, t.edge_segments[k]);
+    }
+    t.first_vertex = static_cast<std::uint32_t>(layout->num_vertices);
+    t.first_primitive = static_cast<std::uint32_t>(layout->num_primitives);
+    const std::uint64_t n = t.segments;
+    layout->num_vertices += grids ? 3 * (n + 1) * (n + 1) : triangle_vertices(n);
+    layout->num_primitives += grids ? 3 : n * (n + 1) / 2;
+    layout->num_micro_triangles += grids ? 6 * n * n : n * n;
+  }
+}
+
+}  // namespace
+
 TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh,
                                             TessellationKind kind,
                                             const TessellationRule& rule)
 {
   TessellationLayout layout;
   layout.kind = kind;
-  layout.triangles.resize(mesh.num_triangles);
   const std::vector<std::uint32_t> id = weld_corners({mesh.triangles, mesh.num_triangles});
   layout.corner_owner = corner_owners(mesh, rule, id);
   layout.edge_owner = weld_edges(id);
@@ -175,21 +200,8 @@ TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh,
     std::uint32_t& largest = segments[layout.edge_owner[edge]];
     largest = std::max(largest, segments[edge]);
   }
-  const bool grids = kind == TessellationKind::kGrids;
-  for (std::uint32_t index = 0; index < mesh.num_triangles; ++index) {
-    TessellatedTriangle& t = layout.triangles[index];
-    for (std::uint32_t k = 0; k < 3; ++k) {
-      const std::uint32_t whole = segments[layout.edge_owner[3 * index + k]];
-      t.edge_segments[k] = grids ? (whole + 1) / 2 : whole;
-      t.segments = std::max(t.segments, t.edge_segments[k]);
-    }
-    t.first_vertex = static_cast<std::uint32_t>(layout.num_vertices);
-    t.first_primitive = static_cast<std::uint32_t>(layout.num_primitives);
-    const std::uint64_t n = t.segments;
-    layout.num_vertices += grids ? 3 * (n + 1) * (n + 1) : triangle_vertices(n);
-    layout.num_primitives += grids ? 3 : n * (n + 1) / 2;
-    layout.num_micro_triangles += grids ? 6 * n * n : n * n;
-  }
+  divide_triangles(
+      mesh.num_triangles, [&](std::uint32_t edge) { return segments[layout.edge_owner[edge]]; }, &layout);
   return layout;
 }
 
@@ -198,6 +210,17 @@ TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh, Tesse
   TessellationRule rule;
   rule.segments = [rate](const DisplacedTriangle& tri, int edge) { return rate * texels_along(tri, edge); };
   return tessellation_layout_make(mesh, kind, rule);
+}
+
+TessellationLayout tessellation_layout_least(const DisplacedMeshView& mesh, TessellationKind kind, double rate)
+{
+  TessellationLayout layout;
+  layout.kind = kind;
+  const auto segments = [&](std::uint32_t edge) {
+    return whole_segments(rate * texels_along(mesh.triangles[edge / 3], static_cast<int>(edge % 3)));
+  };
+  divide_triangles(mesh.num_triangles, segments, &layout);
+  return layout;
 }
 
 std::uint64_t tessellation_peak_bytes(const TessellationLayout& layout, const TessellationBuild& build)
@@ -468,52 +491,11 @@ MicroHit Tessellation::hit(std::uint32_t primitive, float u, float v) const
   return hit;
 }
 
-namespace {
-
-/// Squared distance of the origin from a triangle. @source Ericson 2005, Real-Time Collision Detection, §5.1.5
-double squared_distance(Vec3d a, Vec3d b, Vec3d c)
-{
-  const auto to_line = [](Vec3d from, Vec3d to) {
-    const Vec3d along = to - from;
-    const double squared = dot(along, along);
-    const double t = squared > 0 ? std::clamp(-dot(from, along) / squared, 0.0, 1.0) : 0.0;
-    const Vec3d nearest = from + t * along;
-    return dot(nearest, nearest);
-  };
-  const Vec3d n = cross(b - a, c - a);
-  const bool inside = dot(cross(a, b), n) >= 0 && dot(cross(b, c), n) >= 0 && dot(cross(c, a), n) >= 0 && dot(n, n) > 0;
-  if (inside) return dot(a, n) * dot(a, n) / dot(n, n);
-  return std::min({to_line(a, b), to_line(b, c), to_line(c, a)});
-}
-
-}  // namespace
-
 /// Micro-triangles around a point.
-struct Tessellation::Around {
+struct Tessellation::Around : NearPlanes {
   const Tessellation& tessellation;
-  Vec3d P;
   std::uint32_t primitive;  ///< that it is on
   std::uint32_t x, y;       ///< of a grid: its cell
-  Vec3d error;
-  double reach;
-  std::vector<NearPlane> planes;
-
-  /// @param winding  of the base triangle
-  void add(double winding, Vec3d a, Vec3d b, Vec3d c)
-  {
-    const Vec3d normal = cross(b - a, c - a);
-    const double squared = dot(normal, normal);
-    if (!(squared > 0) || !(squared_distance(a - P, b - P, c - P) <= reach * reach)) return;
-    const Vec3d N = normal * (winding / std::sqrt(squared));
-    // On either side of it: rays leave a ridge below and a valley above alike.
-    const double distance = 2 * dot(abs(N), error) + std::abs(dot(P - a, N));
-    for (NearPlane& plane : planes) {
-      if (dot(plane.N, N) < 1 - 1e-9) continue;
-      plane.distance = std::max(plane.distance, distance);
-      return;
-    }
-    planes.push_back({N, distance});
-  }
 };
 
 /// Whether a base triangle's vertices run counter-clockwise around its normals, 1, or clockwise, −1.
@@ -572,10 +554,7 @@ Vec3d Tessellation::leave(RTCScene scene,
     const std::uint32_t n = layout_.triangles[hit.triangle].segments;
     return std::min(static_cast<std::uint32_t>(std::max(along, 0.0f) * static_cast<float>(n)), n - 1);
   };
-  Around around{*this, hit.P, primitive, cell(u), cell(v), error, reach, {}};
-  // Where errors are larger than micro-triangles are, as far from the origin as that is, no surface is left to be clear of, and
-  // all that are near would take too long.
-  constexpr double kMostSides = 2;
+  Around around{{hit.P, error, reach, {}}, *this, primitive, cell(u), cell(v)};
   std::uint64_t ends[3];
   if (layout_.kind == TessellationKind::kQuads) {
     const std::uint32_t* const corners = indices_.get() + 4 * std::size_t{primitive};
@@ -589,7 +568,7 @@ Vec3d Tessellation::leave(RTCScene scene,
     ends[2] = ends[0] + row;
   }
   const Vec3f P0 = vertex(ends[0]), P1 = vertex(ends[1]), P2 = vertex(ends[2]);
-  if (!(reach < kMostSides * static_cast<double>(max(length(P1 - P0), length(P2 - P0))))) return {};
+  if (!(reach < kMostSidesAround * static_cast<double>(max(length(P1 - P0), length(P2 - P0))))) return {};
   const Vec3f P = to_float(hit.P);
   RTCPointQuery query{P.x, P.y, P.z, 0, static_cast<float>(reach)};
   RTCPointQueryContext context;

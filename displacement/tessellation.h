@@ -65,6 +65,11 @@ TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh,
 /// @param rate  micro-triangle edges a texel, larger than 0: at 1, edges are at most a texel long along both axes
 TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh, TessellationKind kind, double rate);
 
+/// The counts of that at least: as if no triangle had a neighbour, which may divide their edge more finely. To weigh tessellating by.
+/// @return  without owners
+/// @cost    24 bytes a base triangle; nothing is compared or sorted
+TessellationLayout tessellation_layout_least(const DisplacedMeshView& mesh, TessellationKind kind, double rate);
+
 /// Bytes in use while Embree builds the tree: vertices, indices, the tree and what building needs besides.
 /// @source measured, see the definition
 std::uint64_t tessellation_peak_bytes(const TessellationLayout& layout, const TessellationBuild& build);

@@ -36,7 +36,7 @@ struct TriangleOnTile {
   TriangleOnTile(const DisplacedMeshView& on, const ProceduralField& field, std::uint32_t triangle, LatticeNode tile)
       : tri(on.triangles[triangle]),
         pin(field.tile(on.first_triangle + triangle, tile.i, tile.j)),
-        mesh{&tri, on.unfolded + triangle, 1, &pin.field(), on.scale, on.midlevel},
+        mesh{&tri, on.unfolded + triangle, 1, &pin.tile().field, on.scale, on.midlevel},
         i0(std::int64_t{tile.i} * kTileCells - 1),
         j0(std::int64_t{tile.j} * kTileCells - 1)
   {

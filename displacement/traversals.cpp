@@ -4,6 +4,7 @@
 #include "displacement/embree_geometry.h"
 #include "displacement/explain.h"
 #include "displacement/method.h"
+#include "displacement/point_tiles.h"
 #include "displacement/seam_walls.h"
 #include "displacement/trace_procedural.h"
 #include "kernel/math/rounding.h"
@@ -341,7 +342,8 @@ void occluded(const RTCOccludedFunctionNArguments* arguments)
 
 const TraversalTable& RELIEF_TRAVERSAL_TABLE()
 {
-  static constexpr TraversalTable table{RELIEF_ISA_NAME, trace, intersect, occluded};
+  static constexpr TraversalTable table{
+      RELIEF_ISA_NAME, trace, intersect, occluded, RELIEF_ISA::tiles_intersect, RELIEF_ISA::tiles_occluded};
   return table;
 }
 

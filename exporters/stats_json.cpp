@@ -30,6 +30,9 @@ std::string stats_json(const Statistics& statistics)
                     {"steps_max", s.displacement.most_steps},
                     {"texels_mean", a_ray(s.counters.displaced_texels)},
                     {"prisms_per_ray", a_ray(s.counters.displaced_prisms)},
+                    {"tiles_made", s.displacement.tiles_made},
+                    {"tiles_evicted", s.displacement.tiles_evicted},
+                    {"tile_bytes", s.displacement.tile_bytes},
                     {"reasons", s.displacement.reasons}};
   }
   nlohmann::ordered_json errors = nlohmann::ordered_json::array();

@@ -150,7 +150,7 @@ void hash_triangles(const TreeMesh& mesh, ContentHasher* hash)
   for (const std::vector<Vec3f>* P : mesh.steps) hash->add_array(P->data(), P->size());
   hash->add_array(mesh.triangles.data(), mesh.triangles.size());
   hash->add_array(mesh.radius.data(), mesh.radius.size());
-  hash->add(mesh.are_ribbons);
+  hash->add(mesh.are_ribbons, mesh.num_pairs);
 }
 
 void hash_transform(const Affine3& m, ContentHasher* hash)
@@ -187,7 +187,9 @@ Accel::Accel(const Scene& scene,
   }
   for (const MovedMesh& moved : displacements.moved()) {
     const MeshView& mesh = views_->meshes[meshes_.size()];
-    meshes_.emplace_back().mesh = {moved.name, &moved.P, {}, {mesh.triangles, mesh.num_triangles}, {}};
+    meshes_.emplace_back().mesh = {moved.name, &moved.P,         {}, {mesh.triangles, mesh.num_triangles}, {},
+                                   false,      moved.num_pairs()};
+    has_pairs_ |= moved.num_pairs() > 0;
     for (const MovedShape& step : moved.steps) meshes_.back().mesh.steps.push_back(&step.P);
   }
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
@@ -337,13 +339,14 @@ void Accel::build_meshes()
       content = hash.result();
     }
     use.tree = trees_->mesh_tree(content, [&] {
-      // Spatial splits of HIGH quality would call the shadow filter twice for one triangle.
-      TreePointer tree = trees_->scene_make(use.transparent ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
+      // Spatial splits of HIGH quality would call the shadow filter twice for one triangle. Triangles of one size gain nothing by them.
+      const bool splits = !use.transparent && use.mesh.num_pairs == 0;
+      TreePointer tree = trees_->scene_make(splits ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
       attach(tree.get(),
              use.mesh.radius.empty() ? new_mesh(use.mesh, nullptr, use.transparent)
                                      : new_curves(use.mesh, use.transparent),
              0, ~0u);
-      attach_corners(tree.get(), use.box, use.pad);
+      attach_corners(tree.get(), use.box, use.pad, use.mesh.num_pairs > 0);
       commit(tree.get());
       return tree;
     });
@@ -447,7 +450,7 @@ void Accel::intersect_far(const RayTarget& target,
   ray.hit = near.hit;
 }
 
-void Accel::intersect(EmbreeContext& context, RTCRayHit& ray) const
+void Accel::trace(EmbreeContext& context, RTCRayHit& ray) const
 {
   const RayStart start = ray_start(target_, ray.ray);
   if (start == RayStart::kNear) return embree_intersect1(top_, context, ray);
@@ -466,6 +469,32 @@ void Accel::intersect(EmbreeContext& context, RTCRayHit& ray) const
   ray.ray.tfar = static_cast<float>(min(static_cast<double>(ray.ray.tfar), nearest));
 }
 
+void Accel::to_triangle(unsigned object, std::uint32_t* primitive, float* u, float* v) const
+{
+  if (object >= views_->instances.size()) return;
+  const std::uint32_t pairs = use_of(object).mesh.num_pairs;
+  if (pairs == 0) return;
+  if (*primitive >= pairs) {
+    *primitive += pairs;
+    return;
+  }
+  *primitive *= 2;
+  if (*u + *v <= 1.0f) return;
+  // Of a quadrilateral (a, b, c, d) Embree has u and v of b and d in the first triangle, and 1 − u and 1 − v of d and b in the second.
+  ++*primitive;
+  const float of_c = *u + *v - 1.0f;
+  *v = 1.0f - *u;
+  *u = of_c;
+}
+
+void Accel::intersect(EmbreeContext& context, RTCRayHit& ray) const
+{
+  trace(context, ray);
+  if (!has_pairs_ || ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
+  const unsigned object = ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID;
+  to_triangle(object, &ray.hit.primID, &ray.hit.u, &ray.hit.v);
+}
+
 void Accel::intersect8(EmbreeContext& context, RTCRayHit8& rays) const
 {
   alignas(32) int valid[8];
@@ -482,7 +511,15 @@ void Accel::intersect8(EmbreeContext& context, RTCRayHit8& rays) const
     rtcCopyHitToHitN(RTCRayHitN_HitN(reinterpret_cast<RTCRayHitN*>(&rays), 8), &ray.hit, 8, i);
     rays.ray.tfar[i] = ray.ray.tfar;
   }
-  if (any) embree_intersect8(valid, top_, context, rays);
+  if (!any) return;
+  embree_intersect8(valid, top_, context, rays);
+  if (!has_pairs_) return;
+  for (unsigned i = 0; i < 8; ++i) {
+    if (valid[i] == 0 || rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+    const unsigned instance = rays.hit.instID[0][i];
+    to_triangle(instance != RTC_INVALID_GEOMETRY_ID ? instance : rays.hit.geomID[i], &rays.hit.primID[i],
+                &rays.hit.u[i], &rays.hit.v[i]);
+  }
 }
 
 void Accel::occluded(EmbreeContext& context, RTCRay& ray) const
@@ -501,7 +538,8 @@ Box3 Accel::bounds() const { return scene_bounds(top_); }
 
 RTCGeometry Accel::new_mesh(const TreeMesh& mesh, const Affine3* world_from_object, bool transparent)
 {
-  RTCGeometry geometry = rtcNewGeometry(trees_->device(), RTC_GEOMETRY_TYPE_TRIANGLE);
+  const bool quads = mesh.num_pairs > 0;
+  RTCGeometry geometry = rtcNewGeometry(trees_->device(), quads ? RTC_GEOMETRY_TYPE_QUAD : RTC_GEOMETRY_TYPE_TRIANGLE);
   const bool in_place = world_from_object == nullptr || is_identity(*world_from_object);
   const auto set_vertices = [&](unsigned step, const std::vector<Vec3f>& P) {
     // Embree reads 16 bytes a vertex, so a shared buffer needs room behind its last one.
@@ -525,7 +563,17 @@ RTCGeometry Accel::new_mesh(const TreeMesh& mesh, const Affine3* world_from_obje
       set_vertices(static_cast<unsigned>(step), *mesh.steps[step]);
     }
   }
-  if (!trees_->keeps()) {
+  if (quads) {
+    const std::size_t pairs = mesh.num_pairs, count = mesh.triangles.size() - pairs;
+    auto* corners = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, 4 * sizeof(std::uint32_t), count));
+    if (corners == nullptr) throw OutOfMemory("the triangles of mesh '" + std::string(mesh.name) + "'");
+    for (std::size_t k = 0; k < count; ++k) {
+      // What is no pair is one whose second triangle has no area.
+      const TriangleIndices t = mesh.triangles[k < pairs ? 2 * k : pairs + k];
+      for (const std::uint32_t v : {t.v0, t.v1, k < pairs ? mesh.triangles[2 * k + 1].v1 : t.v2, t.v2}) *corners++ = v;
+    }
+  } else if (!trees_->keeps()) {
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
                                sizeof(TriangleIndices), mesh.triangles.size());
   } else {

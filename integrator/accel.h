@@ -21,16 +21,23 @@
 namespace relief {
 
 /// Ray kinds as Embree mask bits. Those of bounced rays lie as in InstanceFlag's kHiddenFrom.
-enum RayMask : std::uint32_t { kRayCamera = 1u << 0, kRayShadow = 1u << 1, kRayBounceShift = 2, kRayBounce = 0xfu << kRayBounceShift };
+enum RayMask : std::uint32_t {
+  kRayCamera = 1u << 0,
+  kRayShadow = 1u << 1,
+  kRayBounceShift = 2,
+  kRayBounce = 0xfu << kRayBounceShift
+};
 
 /// What a tree holds of a mesh, without ownership.
 struct TreeMesh {
   std::string_view name;
-  const std::vector<Vec3f>* P = nullptr;  ///< object space
+  const std::vector<Vec3f>* P = nullptr;         ///< object space
   std::vector<const std::vector<Vec3f>*> steps;  ///< P at evenly spaced times; none: it does not deform
   std::span<const TriangleIndices> triangles;
   std::span<const float> radius;  ///< of curves, see Mesh; empty: these are triangles
   bool are_ribbons = false;
+  std::uint32_t num_pairs =
+      0;  ///< of the triangles, see MovedMesh: the tree has quadrilaterals of them, which are built in half of the time
 };
 
 /// Builds and owns the acceleration structure. Meshes that occur once are placed in world space; a mesh that occurs more
@@ -63,6 +70,8 @@ class Accel {
   void intersect(EmbreeContext& context, RTCRayHit& ray) const;
   /// The same for a packet.
   void intersect8(EmbreeContext& context, RTCRayHit8& rays) const;
+  /// Brings a hit of Embree's on quadrilaterals to the mesh's triangles. What the above say is that already; filters are told of quadrilaterals.
+  void to_triangle(unsigned object, std::uint32_t* primitive, float* u, float* v) const;
   /// Whether anything is hit: tfar is negative then.
   void occluded(EmbreeContext& context, RTCRay& ray) const;
 
@@ -76,6 +85,7 @@ class Accel {
   const KeptTrees::Tally& kept() const { return kept_; }  ///< of the scenes before
 
  private:
+  void trace(EmbreeContext& context, RTCRayHit& ray) const;
   static void intersect_far(const RayTarget& target,
                             RTCScene scene,
                             EmbreeContext& context,
@@ -111,7 +121,8 @@ class Accel {
     Vec3f pad;                 ///< by which it is enlarged
     TreePointer tree;          ///< null: it is in place
 
-    bool has_tree() const { return count > 1 || takes_time || at_border || !mesh.radius.empty(); }
+    /// Those of quadrilaterals too: beside triangles in one scene Embree has a tree for each kind, and rays pass both.
+    bool has_tree() const { return count > 1 || takes_time || at_border || !mesh.radius.empty() || mesh.num_pairs > 0; }
   };
 
   const MeshUse& use_of(std::size_t instance) const
@@ -144,7 +155,7 @@ class Accel {
   std::vector<DisplacedUse> displaced_;  ///< a geometry of displacements_
   std::unique_ptr<SceneTree> scene_;
   RTCScene top_ = nullptr;  ///< of scene_
-  bool has_curves_ = false;
+  bool has_curves_ = false, has_pairs_ = false;
 };
 
 }  // namespace relief

@@ -192,7 +192,10 @@ void SceneContext::make_views()
   }
   for (std::size_t i = 0; i < instances.size(); ++i) {
     const int moved = displacements.moved_index(i);
-    if (moved >= 0) instances[i].mesh_index = static_cast<std::int32_t>(scene.meshes.size()) + moved;
+    if (moved < 0) continue;
+    instances[i].mesh_index = static_cast<std::int32_t>(scene.meshes.size()) + moved;
+    if (displacements.moved()[static_cast<std::size_t>(moved)].num_pairs() > 0)
+      instances[i].flags |= kTracedInObjectSpace;
   }
   for (std::size_t i = 0; i < instances.size(); ++i) {
     if (displacements.geometry_index(i) < 0) continue;
@@ -227,12 +230,16 @@ void SceneContext::fill(Statistics& stats) const
   stats.mesh_bytes += motion.bytes();
   stats.light_bytes = lights.bytes();
   stats.bvh_bytes = accel->bytes();
+  const DisplacementSet::TileTally tiles = displacements.tiles();
   stats.displacement = {displacements.method_names(),
                         displacements.size() + displacements.moved().size(),
                         displacements.num_triangles(),
                         displacements.bytes(),
                         height_map_bytes(scene.height_maps),
                         0,
+                        tiles.made,
+                        tiles.evicted,
+                        tiles.bytes,
                         displacements.reasons()};
 }
 

@@ -63,7 +63,7 @@ DisplacementSet scene_displacement(const Scene& scene, const DisplacementOptions
   }
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     const int index = set.geometry_index(i);
-    if (index >= 0) check_positions(scene, scene.instances[i], set.mesh(static_cast<std::size_t>(index)).bounds());
+    if (index >= 0) check_positions(scene, scene.instances[i], set.bounds(static_cast<std::size_t>(index)));
     const int moved = set.moved_index(i);
     if (moved >= 0) check_positions(scene, scene.instances[i], boxes[static_cast<std::size_t>(moved)]);
   }

@@ -19,6 +19,7 @@ namespace {
 struct ShadowContext {
   EmbreeContext embree;
   const KernelGlobals* globals = nullptr;
+  const Accel* accel = nullptr;
   const DisplacementSet* displacements = nullptr;
   const SceneMotion* motion = nullptr;
   Vec3f visibility{1, 1, 1};
@@ -86,6 +87,7 @@ void intersect_shadow(const KernelGlobals& g,
 {
   ShadowContext context;
   context.globals = &g;
+  context.accel = &accel;
   context.displacements = &accel.displacements();
   context.motion = &accel.motion();
   embree_context_init(context.embree, false);
@@ -173,7 +175,12 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
     const InstanceView instance = moves ? context->motion->instance_at(centre, time) : centre;
     DisplacedPoint at{RTCHitN_primID(arguments->hit, arguments->N, i), RTCHitN_u(arguments->hit, arguments->N, i),
                       RTCHitN_v(arguments->hit, arguments->N, i)};
-    if ((instance.flags & kDisplaced) != 0) at = context->displacements->locate(object, at.triangle, at.u, at.v);
+    if ((instance.flags & kDisplaced) != 0) {
+      at = context->displacements->locate(object, at.triangle,
+                                          {at.u, at.v, RTCHitN_Ng_x(arguments->hit, arguments->N, i), time});
+    } else {
+      context->accel->to_triangle(object, &at.triangle, &at.u, &at.v);
+    }
     const Material& material = g.materials[instance.material_index];
     const MeshView mesh = context->motion->mesh_at(instance, g.meshes[instance.mesh_index], time);
     // A far ray starts elsewhere.

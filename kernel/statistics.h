@@ -24,6 +24,8 @@ struct DisplacementStatistics {
   std::uint64_t bytes = 0;           ///< tables and prepared triangles, besides the maps
   std::uint64_t map_bytes = 0;
   std::uint64_t most_steps = 0;      ///< bounds and texels tested for a single ray
+  /// Tiles of points that rays asked for: how often one was made, how often that took the room of another, and what they take.
+  std::uint64_t tiles_made = 0, tiles_evicted = 0, tile_bytes = 0;
   std::vector<std::string> reasons;  ///< for what `auto` chose, a line a geometry that it weighed tessellations for
 };
 

@@ -358,7 +358,7 @@ TEST(ComputedHeights, OfTilesAreThoseOfTheLattice)
     const std::int32_t last = (n - 1) / kTileCells, tile_i = std::min(i / kTileCells, last),
                        tile_j = std::min(j / kTileCells, last);
     const HeightTileCache::Pin tile = wavy.field.tile(index, tile_i, tile_j);
-    const double h = lattice_height(tile.field(), i - tile_i * kTileCells + 1, j - tile_j * kTileCells + 1);
+    const double h = lattice_height(tile.tile().field, i - tile_i * kTileCells + 1, j - tile_j * kTileCells + 1);
     ASSERT_EQ(static_cast<float>(h), wavy.field.lattice_height(index, i, j)) << n << " " << i << " " << j;
   }
 }

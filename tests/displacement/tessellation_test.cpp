@@ -378,6 +378,28 @@ TEST(Tessellation, FollowsTheTexelsOfEachTriangle)
   EXPECT_EQ(tessellation_layout_make(d.mesh.view(), TessellationKind::kGrids, 1).triangles[0].segments, 8u);
 }
 
+/// Of triangles that agree about their edges it is the same; elsewhere neighbours ask for more.
+TEST(Tessellation, HasNoLessThanItsTrianglesAskForAlone)
+{
+  const TessellationBuild build{RTC_BUILD_QUALITY_MEDIUM, false};
+  for (const TessellationKind kind : kKinds) {
+    Displaced even, uneven;
+    make_patch(even, 2, 32);
+    make_sphere(uneven, 9, 6, 4, 64, 0.8, 0.2);
+    for (const Displaced* d : {&even, &uneven}) {
+      const TessellationLayout least = tessellation_layout_least(d->mesh.view(), kind, 0.9);
+      const TessellationLayout layout = tessellation_layout_make(d->mesh.view(), kind, 0.9);
+      for (std::size_t k = 0; k < layout.triangles.size(); ++k)
+        ASSERT_LE(least.triangles[k].segments, layout.triangles[k].segments);
+      EXPECT_LE(least.num_micro_triangles, layout.num_micro_triangles);
+      EXPECT_LE(tessellation_peak_bytes(least, build), tessellation_peak_bytes(layout, build));
+      EXPECT_GT(3 * least.num_micro_triangles, 2 * layout.num_micro_triangles);
+      if (d != &even) continue;
+      EXPECT_EQ(least.num_micro_triangles, layout.num_micro_triangles);
+    }
+  }
+}
+
 TEST(Tessellation, MemoryIsKnownBeforehand)
 {
   Displaced d;

@@ -46,18 +46,26 @@ TEST(StatsJson, DisplacementIsCountedARay)
 {
   Statistics statistics;
   EXPECT_TRUE(nlohmann::json::parse(stats_json(statistics)).at("displacement").is_null());
-  statistics.displacement = {"chord, rmip", 2, 900, 5000, 4096, 77, {"mesh 'a': 2 s by chord"}};
+  statistics.displacement = {"chord, rmip", 2, 900, 5000, 4096, 77, 9, 4, 640, {"mesh 'a': 2 s by chord"}};
   statistics.counters.camera_rays = 3;
   statistics.counters.bounce_rays = 2;
   statistics.counters.shadow_rays = 5;
   statistics.counters.displaced_bounds = 40;
   statistics.counters.displaced_texels = 10;
   statistics.counters.displaced_prisms = 15;
-  const nlohmann::json expected = {{"method", "chord, rmip"}, {"geometries", 2},
-                                   {"prisms", 900},           {"bytes", 5000},
-                                   {"map_bytes", 4096},       {"steps_mean", 5.0},
-                                   {"steps_max", 77},         {"texels_mean", 1.0},
-                                   {"prisms_per_ray", 1.5},   {"reasons", {"mesh 'a': 2 s by chord"}}};
+  const nlohmann::json expected = {{"method", "chord, rmip"},
+                                   {"geometries", 2},
+                                   {"prisms", 900},
+                                   {"bytes", 5000},
+                                   {"map_bytes", 4096},
+                                   {"steps_mean", 5.0},
+                                   {"steps_max", 77},
+                                   {"texels_mean", 1.0},
+                                   {"prisms_per_ray", 1.5},
+                                   {"tiles_made", 9},
+                                   {"tiles_evicted", 4},
+                                   {"tile_bytes", 640},
+                                   {"reasons", {"mesh 'a': 2 s by chord"}}};
   EXPECT_EQ(nlohmann::json::parse(stats_json(statistics)).at("displacement"), expected);
 }
 

@@ -285,23 +285,51 @@ TEST(VectorDisplacement, HasTheAxesOfItsSpace)
   }
 }
 
-/// Rays are not traced over vectors: triangles are as many as there is room for, which is said.
-TEST(VectorDisplacement, HasLargerTrianglesWhereRoomIsShort)
+/// Where the triangles have no room, rays meet the same surface in tiles; only where these have none either it is coarser, which is
+/// said.
+TEST(VectorDisplacement, IsInTilesWhereRoomIsShort)
 {
-  const json displacement{{"vectorTexture", {{"index", 0}}}, {"space", "tangent"}};
-  const Scene scene = moved_square(displacement);
+  const auto displaced = [](const char* method) {
+    json graph = heights(kWaves);
+    graph["nodes"].push_back(
+        {{"type", "combine"},
+         {"inputs", {{"x", {{"node", 3}, {"output", "value"}}}, {"z", {{"node", 3}, {"output", "value"}}}}}});
+    graph["outputs"] = {{"vector", {{"node", graph["nodes"].size() - 1}}}};
+    return moved_square({{"vectorGraph", graph}, {"scale", kScale}, {"smoothing", true}, {"method", method}});
+  };
+  const Scene scene = displaced("auto"), forced = displaced("chord");
   DisplacementOptions options = options_of(scene, 720);
   const SceneContext whole(scene, options);
   EXPECT_GT(num_moved_triangles(whole), 2u * 150 * 150);
-  EXPECT_TRUE(whole.displacements.warnings().empty());
-  options.dicing_bytes = 200'000;
-  const SceneContext part(scene, options);
-  EXPECT_GE(num_moved_triangles(part), 2u * 8 * 8);
-  EXPECT_LE(num_moved_triangles(part), 2u * 32 * 32);
+  DisplacementOptions short_of_room = options;
+  short_of_room.dicing_bytes = 200'000;
+  const SceneContext in_tiles(scene, short_of_room), by_method(forced, options);
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<float> unit(-0.9f, 0.9f);
+  std::vector<TraceRay> rays;
+  for (int k = 0; k < 2000; ++k)
+    rays.push_back({{unit(random), unit(random), 3}, {0.3f * unit(random), 0.3f * unit(random), -1}});
+  const std::vector<TraceHit> expected = trace_rays(whole, rays);
+  for (const SceneContext* context : {&in_tiles, &by_method}) {
+    EXPECT_EQ(context->displacements.method_names(), "tiles");
+    EXPECT_TRUE(context->displacements.warnings().empty());
+    const std::vector<TraceHit> hits = trace_rays(*context, rays);
+    for (std::size_t k = 0; k < rays.size(); ++k) {
+      ASSERT_EQ(hits[k].hit, expected[k].hit) << k;
+      if (!hits[k].hit) continue;
+      ASSERT_LT(length(hits[k].P - expected[k].P), 1e-5f) << k;
+      ASSERT_GT(dot(hits[k].Ng, expected[k].Ng), 1 - 1e-4f) << k;
+      ASSERT_LE(hits[k].triangle_index, 1u) << k;
+    }
+    EXPECT_GT(context->displacements.tiles().made, 10u);
+  }
+  short_of_room.dicing_bytes = 20'000;
+  const SceneContext part(scene, short_of_room);
+  EXPECT_EQ(part.displacements.method_names(), "tiles");
   ASSERT_EQ(part.displacements.warnings().size(), 1u);
   EXPECT_NE(part.displacements.warnings()[0].find("times as long"), std::string::npos);
-  options.dicing_bytes = 1;
-  EXPECT_EQ(num_moved_triangles(SceneContext(scene, options)), 2u);
+  short_of_room.dicing_bytes = 1;
+  EXPECT_EQ(num_moved_triangles(SceneContext(scene, short_of_room)), 2u);
 }
 
 }  // namespace
