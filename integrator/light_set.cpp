@@ -73,7 +73,11 @@ LightSet light_set_make(const Scene& scene,
     float suns = 0;
     for (const std::uint32_t sun : set.suns) suns += light_scalar(set.lights[sun].emission);
     // Decided for the whole scene, so that sides turned away from the sun save their shadow rays.
-    if (suns > set.environment_yields_to) set.environment_irradiance = {};
+    // What some rays pass and others not makes light that is asked for another than light that is found. Cycles finds it.
+    const bool rays_differ = std::any_of(scene.instances.begin(), scene.instances.end(), [](const Instance& instance) {
+      return (instance.flags & kHiddenFrom) != 0 || (instance.flags & kCastsShadow) == 0;
+    });
+    if (suns > set.environment_yields_to || rays_differ) set.environment_irradiance = {};
   }
   return set;
 }

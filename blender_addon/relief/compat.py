@@ -349,6 +349,17 @@ def world_of(scene, view_layer):
     return getattr(view_layer, "world_override", None) or scene.world
 
 
+#: What volumes have scattered sees meshes as what was scattered diffusely does, too.
+_SCATTERED_RAYS_ARE_DIFFUSE = bpy.app.version < (4, 4, 0)
+
+
+def sees_object(thing, ray):
+    """Whether rays of a kind see an object; see world_visibility."""
+    if ray == "volume_scatter" and _SCATTERED_RAYS_ARE_DIFFUSE and thing.type != "LIGHT" and thing.visible_diffuse:
+        return True
+    return getattr(thing, f"visible_{ray}")
+
+
 def world_visibility(world, ray):
     """(what has it, its name) of the property by which rays of a kind see the world; None: there is none.
 

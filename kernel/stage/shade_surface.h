@@ -42,10 +42,6 @@ RELIEF_KERNEL void shade_surface_emission(const KernelGlobals& g,
     const bool is_light = at.instance->first_light_index >= 0;
     emits = emits && !(is_light && path_leaves_to_photons(g, state.flags[path], at.instance->first_light_index));
   }
-  if (__builtin_expect((at.instance->flags & kHiddenFrom) != 0, 0) && bounce > 0 && at.instance->first_light_index >= 0) {
-    const auto light = static_cast<std::uint32_t>(at.instance->first_light_index) + at.triangle;
-    emits = emits && path_sees_light(state, path, g.lights.lights[light]);
-  }
   if (emits) {
     Vec3f radiance = at.params.emission;
     if (!at.params.unlit) path_add_denoising(g, state, path, throughput * radiance);

@@ -56,7 +56,8 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   bool is_found_here_alone = light.delta;
   if (emitter != nullptr && __builtin_expect(emitter->hidden_from != 0, 0)) {
     const LightHides hides = light_hides(*emitter, transmits());
-    is_found_here_alone = light.delta || hides.differs();
+    // Rays that do not see a mesh pass it, each by its own lobe.
+    is_found_here_alone = light.delta || (hides.differs() && emitter->instance_index < 0);
     bsdf.f = shade_surface_seen_by<kFeatures>(g, closure, wi, bsdf.f, hides);
   }
   if (is_zero(bsdf.f)) return;

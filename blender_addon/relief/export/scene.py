@@ -540,7 +540,7 @@ def _is_light(node):
 
 def _ray_settings(original):
     """Settings of RELIEF_object by an object's ray visibility, but for cameras and shadows."""
-    return hidden_settings(lambda ray: getattr(original, f"visible_{ray}"))
+    return hidden_settings(lambda ray: compat.sees_object(original, ray))
 
 
 def _has_no_area(light, matrices):
