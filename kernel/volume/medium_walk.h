@@ -29,6 +29,9 @@ RELIEF_KERNEL float counted_next(CountedNumbers& numbers)
   return unit_float(hash_mix_32(numbers.state));
 }
 
+/// Stretches of one rate that a walk keeps once it has looked for them. A ray through the middle of an object has some fifty.
+inline constexpr int kKnownStretches = 24;
+
 /// The media along a part of a ray.
 struct MediumWalk {
   Vec3f O, D;
@@ -37,6 +40,7 @@ struct MediumWalk {
   float even_rate = 0;  ///< 1/m
   std::int32_t instances[kMostMedia];
   const VaryingMedium* media[kMostMedia];  ///< those that vary
+  RateRay rays[kMostMedia];                ///< as their grids see it
   int size = 0;
   float factor = 1;  ///< of rates: where they are low, collisions are made more often, as eight cost what one does
   float reach = 0;   ///< metres: most of what is scattered is nearer
@@ -47,6 +51,8 @@ struct MediumWalk {
   float t = 0;
   float rate = 0;  ///< of a collision at t that has not been used yet, but for those; 0: there is none
   RateStretch at;  ///< around t
+  RateStretch known[kKnownStretches];  ///< from the start, one after the other
+  int num_known = 0, next_known = 0;
   CountedNumbers numbers;
 };
 
@@ -69,7 +75,7 @@ RELIEF_KERNEL RateStretch medium_walk_rate(const MediumWalk& walk, float t)
 {
   RateStretch all{walk.even_rate, walk.length};
   for (int i = 0; i < walk.size; ++i) {
-    const RateStretch one = rate_grid_at(varying_place(*walk.media[i], walk.instances[i]).rates, walk.O, walk.D, t);
+    const RateStretch one = rate_grid_at(varying_place(*walk.media[i], walk.instances[i]).rates, walk.rays[i], t);
     all.rate += one.rate;
     all.end = min(all.end, one.end);
   }
@@ -96,6 +102,7 @@ medium_walk_make(const KernelGlobals& g, const MediumState& m, Vec3f O, Vec3f D,
     if (g.varying_media[index].num_closures == 0) {
       media_add(walk.even, g.media[index]);
     } else {
+      walk.rays[walk.size] = rate_ray_make(varying_place(g.varying_media[index], m.inside[i]).rates, O, D);
       walk.instances[walk.size] = m.inside[i];
       walk.media[walk.size++] = &g.varying_media[index];
     }
@@ -111,6 +118,7 @@ medium_walk_make(const KernelGlobals& g, const MediumState& m, Vec3f O, Vec3f D,
   float depth = 0, first = length;
   for (float t = 0; t < length && depth < kWantedCollisions;) {
     const RateStretch at = medium_walk_rate(walk, t);
+    if (walk.num_known < kKnownStretches) walk.known[walk.num_known++] = at;
     const float end = min(at.end, length);
     if (at.rate > 0.0f) {
       first = min(first, t);
@@ -129,12 +137,19 @@ medium_walk_make(const KernelGlobals& g, const MediumState& m, Vec3f O, Vec3f D,
   return walk;
 }
 
+/// Optical depth up to a collision.
+/// @param u  [0, 1), a multiple of 2⁻²⁴: what is left to 1 is exact
+RELIEF_KERNEL float free_depth(float u) { return -__builtin_logf(1.0f - u); }
+
 /// Goes on to the next collision but for those that are near a light: t and rate.
 RELIEF_KERNEL void medium_walk_advance(MediumWalk& walk)
 {
-  float left = -std::log1p(-counted_next(walk.numbers)) / walk.factor;
+  float left = free_depth(counted_next(walk.numbers)) / walk.factor;
   while (walk.t < walk.length) {
-    if (!(walk.t < walk.at.end)) walk.at = medium_walk_rate(walk, walk.t);
+    while (!(walk.t < walk.at.end)) {
+      const bool is_known = walk.next_known < walk.num_known;
+      walk.at = is_known ? walk.known[walk.next_known++] : medium_walk_rate(walk, walk.t);
+    }
     const float end = min(walk.at.end, walk.length);
     if (walk.at.rate > 0.0f) {
       const float next = walk.t + left / walk.at.rate;
@@ -153,7 +168,7 @@ RELIEF_KERNEL void medium_walk_advance(MediumWalk& walk)
 RELIEF_KERNEL void medium_walk_advance_near(MediumWalk& walk)
 {
   const Equiangular& near = walk.near;
-  walk.near_angle -= std::log1p(-counted_next(walk.numbers)) * (near.last - near.first) * (1.0f / kNearCollisions);
+  walk.near_angle += free_depth(counted_next(walk.numbers)) * (near.last - near.first) * (1.0f / kNearCollisions);
   walk.near_t = walk.near_angle < near.last ? near.nearest + near.distance * std::tan(walk.near_angle) : kInfinity;
 }
 

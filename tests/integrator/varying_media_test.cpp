@@ -321,7 +321,7 @@ TEST(VaryingMedia, AreNowhereDenserThanTheirRates)
     }
     varying_medium_eval(context.globals, medium, 0, P, 8, {0, 0, 1}, {}, media);
     for (int k = 0; k < 8; ++k) {
-      ASSERT_LE(max_component(media[k].sigma_t), rate_grid_at(grid, P[k], {0, 0, 1}, 0).rate)
+      ASSERT_LE(max_component(media[k].sigma_t), rate_grid_at(grid, rate_ray_make(grid, P[k], {0, 0, 1}), 0).rate)
           << P[k].x << " " << P[k].y;
     }
   }
@@ -357,7 +357,7 @@ TEST(RateGrid, RaysGoThroughEachBoxOnTheirWay)
     double depth = 0, expected = 0;
     int steps = 0;
     for (float t = 0; t < 30;) {
-      const RateStretch at = rate_grid_at(grid, O, D, t);
+      const RateStretch at = rate_grid_at(grid, rate_ray_make(grid, O, D), t);
       const float end = std::min(at.end, 30.0f);
       ASSERT_GT(end, t);
       ASSERT_LT(++steps, 100);
