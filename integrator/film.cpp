@@ -46,6 +46,8 @@ AccumulatorLayout layout_make(std::uint32_t aov_mask, int cryptomatte_levels, bo
   keep(Aov::kDenoisingNormal, 3, layout.denoising_normal);
   keep(Aov::kDenoisingDepth, 1, layout.denoising_depth);
   keep(Aov::kDenoisingHalf, 7, layout.denoising_half);
+  keep(Aov::kVolumeDirect, 3, layout.volume_direct);
+  keep(Aov::kVolumeIndirect, 3, layout.volume_indirect);
   if (keeps_clear) layout.clear = layout.num_floats++;
   if (counts_samples) {
     layout.samples = layout.num_floats;
@@ -505,6 +507,8 @@ void Film::resolve_pixel(const float* in,
     const float inverse_half = 1.0f / static_cast<float>((samples + 1) / 2);
     for (int i = 0; i < 7; ++i) p[i] = in[layout_.denoising_half + i] * inverse_half;
   }
+  if (float* p = plane(Aov::kVolumeDirect)) put3(p, load3(in + layout_.volume_direct) * light);
+  if (float* p = plane(Aov::kVolumeIndirect)) put3(p, load3(in + layout_.volume_indirect) * light);
   for (int i = 0; i < kNumCryptomattes; ++i) {
     float* p = plane(static_cast<Aov>(kFirstCryptomatte + i));
     if (p != nullptr) put_cryptomatte(in + layout_.cryptomatte[i], layout_.cryptomatte_levels, inverse_n, p);

@@ -237,7 +237,13 @@ void finish(const KernelGlobals& g,
     Vec3f caustic;
     if (state.caustic.radiance != nullptr) caustic = (*state.caustic.radiance)[i];
     const bool finite = film_add_sample(g.film, state.pixel[i], sample, state.direct[i], state.indirect[i], caustic);
-    if (finite) continue;
+    if (finite) {
+      if (state.media != nullptr) {
+        const MediumLight light = medium_light(state.media[i], state.direct[i], state.indirect[i]);
+        film_add_volume(g.film, state.pixel[i], light.direct, light.indirect);
+      }
+      continue;
+    }
     ++counters.nonfinite_samples;
     const std::uint64_t key = std::uint64_t{state.pixel[i]} << 32 | sample;
     if (key < first_nonfinite) first_nonfinite = key;

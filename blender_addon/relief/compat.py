@@ -33,6 +33,8 @@ _PASS_NAMES_5_0 = {
     "Emit": "Emission",
     "Env": "Environment",
     "AO": "Ambient Occlusion",
+    "VolumeDir": "Volume Direct",
+    "VolumeInd": "Volume Indirect",
 }
 
 #: The version whose closures Cycles has, as RELIEF_surface calls it.
@@ -134,6 +136,9 @@ NOISE_MATHS = "4.3" if bpy.app.version >= (3, 5, 0) else "3.4"
 
 #: Whose numbers the textures of this version have, as RELIEF_graph calls them; None: those of 3.4.
 TEXTURE_MATHS = "5.2" if IS_5_0 else "4.3" if IS_4_0 else None
+
+#: Where the values of OpenVDB's voxels stand, as RELIEF_graph calls it.
+VOXEL_PLACES = "corners" if IS_5_0 else "centers"
 
 #: Entries of the tables that stand for ramps and curves, as many as Cycles'. Checked in 3.4 and 4.3.
 TABLE_ENTRIES = 257 if IS_4_0 else 256

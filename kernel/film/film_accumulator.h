@@ -20,7 +20,7 @@ struct AccumulatorLayout {
   int direct = -1, albedo = -1, normal = -1, depth = -1, position = -1, uv = -1, object_id = -1, material_id = -1,
       displacement_steps = -1, caustic = -1, holdout = -1, mist = -1, emission = -1, environment = -1,
       ambient_occlusion = -1, clear = -1, denoising_albedo = -1, denoising_normal = -1, denoising_depth = -1,
-      denoising_half = -1;
+      denoising_half = -1, volume_direct = -1, volume_indirect = -1;
   int samples = -1;  ///< that the pixel has had, and whether it rests: where noise ends pixels one by one
   int cryptomatte[kNumCryptomattes] = {-1, -1, -1};  ///< pairs of an id and its weight, the first of weight 0 is free
   int cryptomatte_levels = 0;
@@ -121,6 +121,15 @@ RELIEF_KERNEL void film_add_emission(const FilmAccumulatorView& film, std::uint3
 RELIEF_KERNEL void film_add_environment(const FilmAccumulatorView& film, std::uint32_t pixel, Vec3f radiance)
 {
   if (film.layout.environment >= 0) film_add3(film_record(film, pixel) + film.layout.environment, radiance);
+}
+
+/// Adds what media scattered to the camera of a sample, where that is kept.
+RELIEF_KERNEL void film_add_volume(const FilmAccumulatorView& film, std::uint32_t pixel, Vec3f direct, Vec3f indirect)
+{
+  const AccumulatorLayout& layout = film.layout;
+  float* record = film_record(film, pixel);
+  if (layout.volume_direct >= 0) film_add3(record + layout.volume_direct, direct);
+  if (layout.volume_indirect >= 0) film_add3(record + layout.volume_indirect, indirect);
 }
 
 /// Adds what a ray for ambient occlusion has found.

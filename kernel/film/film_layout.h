@@ -33,11 +33,13 @@ enum class Aov : std::uint8_t {
   kDenoisingNormal,
   kDenoisingDepth,
   kDenoisingHalf,
+  kVolumeDirect,
+  kVolumeIndirect,
   kCryptoObject,
   kCryptoMaterial,
   kCryptoAsset,
 };
-inline constexpr int kNumAovs = 27;
+inline constexpr int kNumAovs = 29;
 
 /// The three Cryptomattes, which follow one another in Aov.
 inline constexpr int kNumCryptomattes = 3;
@@ -59,7 +61,8 @@ inline constexpr std::array<AovInfo, kNumAovs> kAovInfo = {{
     {Aov::kDirect, "direct", "RGB", false, "light after at most one scattering event, emission seen directly included"},
     {Aov::kIndirect, "indirect", "RGB", false, "light after two or more scattering events"},
     {Aov::kAlbedo, "albedo", "RGB", false, "base colour of the first non-transparent hit"},
-    {Aov::kNormal, "normal", "XYZ", false, "unit shading normal of the first hit with its bumps, world space, averaged"},
+    {Aov::kNormal, "normal", "XYZ", false,
+     "unit shading normal of the first hit with its bumps, world space, averaged"},
     {Aov::kDepth, "depth", "Z", false, "distance along the camera's axis, metres, averaged over samples that hit"},
     {Aov::kPosition, "position", "XYZ", false, "first hit, world space, metres, averaged over samples that hit"},
     {Aov::kUv, "uv", "UV", false, "texture coordinates (set 0) of the first hit, averaged"},
@@ -85,6 +88,10 @@ inline constexpr std::array<AovInfo, kNumAovs> kAovInfo = {{
      "distance of the first hit from the camera, metres, averaged with 0 for none"},
     {Aov::kDenoisingHalf, "denoising_half", "RGBXYZD", false,
      "the three layers above, of the pixel's even-numbered samples"},
+    {Aov::kVolumeDirect, "volume_direct", "RGB", false,
+     "light that media scatter to the camera, straight from its source"},
+    {Aov::kVolumeIndirect, "volume_indirect", "RGB", false,
+     "light that media scatter to the camera after other scattering events"},
     {Aov::kCryptoObject, "crypto_object", "", false, "Cryptomatte of the nodes' names"},
     {Aov::kCryptoMaterial, "crypto_material", "", false, "Cryptomatte of the materials' names"},
     {Aov::kCryptoAsset, "crypto_asset", "", false, "Cryptomatte of RELIEF_object's asset names"},

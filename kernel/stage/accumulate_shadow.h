@@ -20,7 +20,12 @@ RELIEF_KERNEL void accumulate_shadow(const KernelGlobals& g,
     return;
   }
   const Vec3f gain = shadow.gain[ray] * visibility;
-  path_add_radiance(g, state, path, static_cast<int>(shadow.scatterings[ray]), gain);
+  const std::uint32_t scatterings = shadow.scatterings[ray];
+  if (__builtin_expect((scatterings & kMediumRay) != 0, 0) && !state.media[path].is_lit_first) {
+    MediumState& m = state.media[path];
+    m.lit = m.lit + radiance_clamped(gain, g.clamp_direct);
+  }
+  path_add_radiance(g, state, path, static_cast<int>(scatterings & ~kMediumRay), gain);
 }
 
 }  // namespace relief

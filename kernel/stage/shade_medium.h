@@ -114,8 +114,8 @@ RELIEF_KERNEL void shade_medium_light_at(const KernelGlobals& g,
   shadow_ray_aim(light, answer.emitter, P, P, D, t_max);
   const RayCone cone =
       ray_cone_propagate({state.cone_width[path], state.cone_spread[path]}, state.t_min[path] + place.distance);
-  shadow_queue_push(shadow, path, P, D, t_max, cone, gain,
-                    static_cast<std::uint32_t>(path_bounces(state.bounces[path], BounceKind::kAll) + 1));
+  const auto bounces = static_cast<std::uint32_t>(path_bounces(state.bounces[path], BounceKind::kAll));
+  shadow_queue_push(shadow, path, P, D, t_max, cone, gain, (bounces + 1) | (bounces == 0 ? kMediumRay : 0u));
 }
 
 /// Chance with which light is asked for on a stretch: always on what the camera sees, and else by what is scattered there, as thin
@@ -169,6 +169,10 @@ RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
   const float carried = max_component(abs(throughput));
   if (first) {
     state.first_throughput[path] = min(1.0f, carried);
+    MediumState& m = state.media[path];
+    m.is_lit_first = true;
+    m.before[0] = state.direct[path];
+    m.before[1] = state.indirect[path];
   } else {
     const float roulette = sample_1d(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kFate));
     const float survival = min(1.0f, kSurvivalRate * carried / state.first_throughput[path]);

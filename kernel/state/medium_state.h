@@ -26,6 +26,9 @@ struct MediumState {
   std::int32_t hit_inside;   ///< instance whose medium begins or ends at the present hit; kWholeWorld: none
   bool hit_front;            ///< the hit is on the outside
   Vec3f hit_P, hit_Ng;       ///< of such a hit, world; the geometric normal is on the ray's side
+  bool is_lit_first;         ///< the first event of the path was in a medium
+  Vec3f before[2];           ///< if so, the path's direct and indirect light before it
+  Vec3f lit;                 ///< else, light that was asked for in media before the first event
 };
 
 /// Enters or leaves what an instance bounds. Entered once more, or left without having been entered, nothing changes.
@@ -40,6 +43,16 @@ RELIEF_KERNEL void medium_cross(MediumState& m, std::int32_t instance, bool ente
   if (place == m.size) return;
   for (int i = place + 1; i < m.size; ++i) m.inside[i - 1] = m.inside[i];
   --m.size;
+}
+
+/// What media scattered to the camera, of a path's direct and indirect light.
+struct MediumLight {
+  Vec3f direct, indirect;
+};
+
+RELIEF_KERNEL MediumLight medium_light(const MediumState& m, Vec3f direct, Vec3f indirect)
+{
+  return m.is_lit_first ? MediumLight{m.lit + direct - m.before[0], indirect - m.before[1]} : MediumLight{m.lit, {}};
 }
 
 /// Leaves all that has bounds: what a ray that meets nothing is still in was not closed.

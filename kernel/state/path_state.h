@@ -123,6 +123,8 @@ inline constexpr std::uint32_t kShadowEntries = 2 * kBatchPaths + 64 / 4;
 
 /// In place of `scatterings`: a ray that looks for ambient occlusion.
 inline constexpr std::uint32_t kAmbientRay = ~0u;
+/// With the number of scattering events: the first is in a medium.
+inline constexpr std::uint32_t kMediumRay = 1u << 31;
 
 /// Shadow rays of a batch: where to look, and what the path gains if nothing is in between.
 struct alignas(64) ShadowQueue {
@@ -132,7 +134,8 @@ struct alignas(64) ShadowQueue {
   float cone_width[kShadowEntries], cone_spread[kShadowEntries];  ///< ray cone at O
   PathColumn<Vec3f, kShadowEntries> gain;                         ///< radiance × throughput, MIS weight included
   std::uint32_t path[kShadowEntries];                             ///< whose
-  std::uint32_t scatterings[kShadowEntries];  ///< events between the camera and the light, or kAmbientRay
+  std::uint32_t scatterings
+      [kShadowEntries];  ///< events between the camera and the light, perhaps with kMediumRay; or kAmbientRay
   std::uint32_t size;                         ///< number of rays waiting
 };
 

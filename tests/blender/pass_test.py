@@ -11,6 +11,7 @@ from scenes import (
     add_light,
     add_plane,
     add_sphere,
+    assert_same_expectation,
     assert_warns,
     degrees,
     diffuse,
@@ -296,6 +297,35 @@ def test_direct_and_indirect_make_the_whole():
         assert np.abs(whole - parts).max() < 1e-3
     assert channels[f"{layer.name}.Indirect.R"].max() > 0.01
     assert (channels[f"{layer.name}.Samples.X"] == 16).all()
+
+
+def test_volume_passes():
+    """What volumes scatter, and with what else there is the whole picture."""
+    scene = new_scene(32, 24)
+    set_bounces(scene, 2)
+    scene.cycles.volume_bounces = scene.relief.volume_bounces = 2
+    set_world((0.1, 0.15, 0.2))
+    add_plane(20, diffuse((0.6, 0.4, 0.2)))
+    add_light("SUN", rotation=degrees(40, 20, 0), energy=3)
+    add_camera((0, -7, 1.6), degrees(82, 0, 0), lens=35)
+    material, tree, scatter = new_material("fog", "ShaderNodeVolumeScatter", Density=0.5, Color=(0.9, 0.7, 0.5, 1))
+    output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+    tree.links.remove(output.inputs["Surface"].links[0])
+    tree.links.new(scatter.outputs[0], output.inputs["Volume"])
+    add_sphere(1.2, material, (0, 0, 1.0))
+    layer = scene.view_layers[0]
+    layer.cycles.use_pass_volume_direct = layer.cycles.use_pass_volume_indirect = True
+    runs = {}
+    for engine in ("RELIEF", "CYCLES"):
+        pictures = []
+        for seed in range(5):
+            scene.cycles.seed = scene.relief.seed = seed
+            pictures.append(passes(scene, engine, 256))
+        for name in ("VolumeDir", "VolumeInd"):
+            channels = [f"{layer.name}.{_name(name)}.{c}" for c in "RGB"]
+            runs[engine, name] = np.stack([[p[c] for c in channels] for p in pictures]).transpose(0, 2, 3, 1).astype(np.float64)
+    for name in ("VolumeDir", "VolumeInd"):
+        assert_same_expectation(runs["RELIEF", name], runs["CYCLES", name], least_mean=0.001)
 
 
 def test_two_view_layers():
