@@ -95,6 +95,10 @@ Box3 mesh_box(const TreeMesh& mesh, const std::vector<Vec3f>& P)
 {
   Box3 box = points_box(P, {});
   if (mesh.radius.empty()) return box;
+  if (mesh.are_points) {
+    const float most = *std::max_element(mesh.radius.begin(), mesh.radius.end());
+    return {box.low - splat3(most), box.high + splat3(most)};
+  }
   float widest = 0;
   for (const TriangleIndices& ends : mesh.triangles) {
     const std::uint32_t v = ends.v0;
@@ -150,7 +154,7 @@ void hash_triangles(const TreeMesh& mesh, ContentHasher* hash)
   for (const std::vector<Vec3f>* P : mesh.steps) hash->add_array(P->data(), P->size());
   hash->add_array(mesh.triangles.data(), mesh.triangles.size());
   hash->add_array(mesh.radius.data(), mesh.radius.size());
-  hash->add(mesh.are_ribbons, mesh.num_pairs);
+  hash->add(mesh.are_ribbons, mesh.are_points, mesh.num_pairs);
 }
 
 void hash_transform(const Affine3& m, ContentHasher* hash)
@@ -181,7 +185,8 @@ Accel::Accel(const Scene& scene,
 {
   for (std::size_t d = 0; d < displacements.size(); ++d) displacements.geometry(d).shadow_filter = nullptr;
   for (const Mesh& mesh : scene.meshes) {
-    meshes_.emplace_back().mesh = {mesh.name, &mesh.P, {}, mesh.triangles, mesh.radius, mesh.are_ribbons};
+    meshes_.emplace_back().mesh = {mesh.name,        &mesh.P,        {}, mesh.triangles, mesh.radius,
+                                   mesh.are_ribbons, 0, mesh.are_points};
     has_curves_ |= !mesh.radius.empty();
     for (const MeshStep& step : mesh.steps) meshes_.back().mesh.steps.push_back(&step.P);
   }
@@ -593,33 +598,54 @@ void curve_filter(const RTCFilterFunctionNArguments* arguments)
   const auto* before = static_cast<const std::uint32_t*>(arguments->geometryUserPtr);
   for (unsigned i = 0; i < arguments->N; ++i) {
     if (arguments->valid[i] != -1) continue;
-    const std::uint32_t first = before[RTCHitN_primID(arguments->hit, arguments->N, i)] + 1;
-    if (!curve_is_met(arguments, i, first, kTubes)) arguments->valid[i] = 0;
+    const auto name_of = [before](unsigned instance, unsigned segment) {
+      return curve_name(instance, segment, before[segment] + 1);
+    };
+    if (!curve_is_met(arguments, i, name_of, kTubes)) arguments->valid[i] = 0;
   }
+}
+
+/// The same of points.
+void point_filter(const RTCFilterFunctionNArguments* arguments)
+{
+  const auto name_of = [](unsigned instance, unsigned point) { return curve_name(instance, point, kPoints, nullptr); };
+  for (unsigned i = 0; i < arguments->N; ++i) {
+    if (arguments->valid[i] == -1 && !curve_is_met(arguments, i, name_of, true)) arguments->valid[i] = 0;
+  }
+}
+
+/// Vertices with their radii.
+void Accel::set_round_vertices(RTCGeometry geometry, const TreeMesh& mesh)
+{
+  const auto set = [&](unsigned step, const std::vector<Vec3f>& P) {
+    auto* vertices = static_cast<Vec4f*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT4, sizeof(Vec4f), P.size()));
+    if (vertices == nullptr) throw OutOfMemory("the curves of mesh '" + std::string(mesh.name) + "'");
+    for (std::size_t i = 0; i < P.size(); ++i) vertices[i] = {P[i].x, P[i].y, P[i].z, mesh.radius[i]};
+  };
+  if (mesh.steps.empty()) {
+    set(0, *mesh.P);
+    return;
+  }
+  rtcSetGeometryTimeStepCount(geometry, static_cast<unsigned>(mesh.steps.size()));
+  for (std::size_t step = 0; step < mesh.steps.size(); ++step) set(static_cast<unsigned>(step), *mesh.steps[step]);
 }
 
 RTCGeometry Accel::new_curves(const TreeMesh& mesh, bool transparent)
 {
+  if (mesh.are_points) {
+    RTCGeometry points = rtcNewGeometry(trees_->device(), RTC_GEOMETRY_TYPE_SPHERE_POINT);
+    set_round_vertices(points, mesh);
+    rtcSetGeometryIntersectFilterFunction(points, point_filter);
+    rtcSetGeometryOccludedFilterFunction(points, transparent ? shadow_filter_ : point_filter);
+    return points;
+  }
   RTCGeometry geometry = rtcNewGeometry(trees_->device(), mesh.are_ribbons ? RTC_GEOMETRY_TYPE_FLAT_CATMULL_ROM_CURVE
                                                                            : RTC_GEOMETRY_TYPE_ROUND_CATMULL_ROM_CURVE);
-  const auto refused = [&] { return OutOfMemory("the curves of mesh '" + std::string(mesh.name) + "'"); };
-  const auto set_vertices = [&](unsigned step, const std::vector<Vec3f>& P) {
-    auto* vertices = static_cast<Vec4f*>(
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, step, RTC_FORMAT_FLOAT4, sizeof(Vec4f), P.size()));
-    if (vertices == nullptr) throw refused();
-    for (std::size_t i = 0; i < P.size(); ++i) vertices[i] = {P[i].x, P[i].y, P[i].z, mesh.radius[i]};
-  };
-  if (mesh.steps.empty()) {
-    set_vertices(0, *mesh.P);
-  } else {
-    rtcSetGeometryTimeStepCount(geometry, static_cast<unsigned>(mesh.steps.size()));
-    for (std::size_t step = 0; step < mesh.steps.size(); ++step) {
-      set_vertices(static_cast<unsigned>(step), *mesh.steps[step]);
-    }
-  }
+  set_round_vertices(geometry, mesh);
   auto* first = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT,
                                                                     sizeof(std::uint32_t), mesh.triangles.size()));
-  if (first == nullptr) throw refused();
+  if (first == nullptr) throw OutOfMemory("the curves of mesh '" + std::string(mesh.name) + "'");
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) first[i] = mesh.triangles[i].v0 - 1;
   rtcSetGeometryUserData(geometry, first);
   const RTCFilterFunctionN filter = mesh.are_ribbons ? curve_filter<false> : curve_filter<true>;

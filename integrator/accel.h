@@ -34,10 +34,11 @@ struct TreeMesh {
   const std::vector<Vec3f>* P = nullptr;         ///< object space
   std::vector<const std::vector<Vec3f>*> steps;  ///< P at evenly spaced times; none: it does not deform
   std::span<const TriangleIndices> triangles;
-  std::span<const float> radius;  ///< of curves, see Mesh; empty: these are triangles
+  std::span<const float> radius;  ///< of curves and points, see Mesh; empty: these are triangles
   bool are_ribbons = false;
   std::uint32_t num_pairs =
       0;  ///< of the triangles, see MovedMesh: the tree has quadrilaterals of them, which are built in half of the time
+  bool are_points = false;
 };
 
 /// Builds and owns the acceleration structure. Meshes that occur once are placed in world space; a mesh that occurs more
@@ -101,6 +102,7 @@ class Accel {
                           std::span<const Light> lights,
                           std::span<const std::uint32_t> area_lights) const;
   RTCGeometry new_curves(const TreeMesh& mesh, bool transparent);
+  void set_round_vertices(RTCGeometry geometry, const TreeMesh& mesh);
   RTCGeometry new_mesh(const TreeMesh& mesh, const Affine3* world_from_object, bool transparent);
   void attach_corners(RTCScene target, const Box3& box, Vec3f pad, bool quads = false);
   RTCGeometry new_instance(RTCScene instanced, const Affine3& world_from_object);

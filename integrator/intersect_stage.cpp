@@ -74,7 +74,7 @@ unsigned curve_left(const KernelGlobals& g, const PathState& state, std::uint32_
   const MeshView& mesh = g.meshes[g.instances[object].mesh_index];
   const std::uint32_t segment = state.hit_triangle[path];
   RELIEF_ASSERT(segment < mesh.num_triangles);
-  return curve_name(object, segment, mesh.triangles[segment].v0);
+  return curve_name(object, segment, g.instances[object].flags, mesh.triangles);
 }
 
 void intersect_closest(const KernelGlobals& g,

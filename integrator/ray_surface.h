@@ -16,19 +16,26 @@ inline unsigned curve_name(unsigned instance, unsigned segment, std::uint32_t fi
   return hash_mix_32(instance + 0x9e3779b9u * (first_vertex - segment)) | 1u;
 }
 
+/// The same of a mesh's segment, or of a point, which has its number for a name.
+inline unsigned curve_name(unsigned instance,
+                           unsigned segment,
+                           std::uint32_t instance_flags,
+                           const TriangleIndices* triangles)
+{
+  return curve_name(instance, segment, (instance_flags & kPoints) != 0 ? 2 * segment + 1 : triangles[segment].v0);
+}
+
 /// Whether a ray meets a curve where Embree asks a filter: not the one that it starts from, and tubes from outside only, both as in
 /// Cycles.
-/// @param i             number of the ray
-/// @param first_vertex  as above
-inline bool curve_is_met(const RTCFilterFunctionNArguments* arguments,
-                         unsigned i,
-                         std::uint32_t first_vertex,
-                         bool is_tube)
+/// @param i        number of the ray
+/// @param name_of  gives the name of a curve by the numbers of its instance and of its segment
+template <class NameOf>
+inline bool curve_is_met(const RTCFilterFunctionNArguments* arguments, unsigned i, NameOf&& name_of, bool is_tube)
 {
   const RTCHit hit = rtcGetHitFromHitN(arguments->hit, arguments->N, i);
   const RTCRay ray = rtcGetRayFromRayN(arguments->ray, arguments->N, i);
   const unsigned instance = hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? hit.instID[0] : hit.geomID;
-  if (ray.flags != 0 && curve_name(instance, hit.primID, first_vertex) == ray.flags) return false;
+  if (ray.flags != 0 && name_of(instance, hit.primID) == ray.flags) return false;
   return !is_tube || ray.dir_x * hit.Ng_x + ray.dir_y * hit.Ng_y + ray.dir_z * hit.Ng_z <= 0.0f;
 }
 

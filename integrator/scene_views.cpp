@@ -17,7 +17,10 @@ SceneViews::SceneViews(const Scene& scene) : motion(scene)
     if (instance.motion_index >= 0) view.flags |= kMoves;
     const Mesh& mesh = scene.meshes[static_cast<std::size_t>(instance.mesh_index)];
     if (!mesh.steps.empty()) view.flags |= kDeforms;
-    if (!mesh.radius.empty()) view.flags |= kCurves | kTracedInObjectSpace | (mesh.are_ribbons ? kRibbons : 0u);
+    if (!mesh.radius.empty()) {
+      view.flags |=
+          kCurves | kTracedInObjectSpace | (mesh.are_ribbons ? kRibbons : 0u) | (mesh.are_points ? kPoints : 0u);
+    }
     const bool takes_time = (view.flags & (kMoves | kDeforms)) != 0;
     if (takes_time || uses[static_cast<std::size_t>(instance.mesh_index)] > 1) view.flags |= kTracedInObjectSpace;
     instances.push_back(view);

@@ -164,9 +164,11 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
     const float time = RTCRayN_time(arguments->ray, arguments->N, i);
     const InstanceView& centre = g.instances[object];
     if ((centre.flags & kCurves) != 0) {
-      const unsigned segment = RTCHitN_primID(arguments->hit, arguments->N, i);
-      const std::uint32_t first = g.meshes[centre.mesh_index].triangles[segment].v0;
-      if (!curve_is_met(arguments, i, first, (centre.flags & kRibbons) == 0)) {
+      const TriangleIndices* triangles = g.meshes[centre.mesh_index].triangles;
+      const auto name_of = [&](unsigned instance, unsigned segment) {
+        return curve_name(instance, segment, centre.flags, triangles);
+      };
+      if (!curve_is_met(arguments, i, name_of, (centre.flags & kRibbons) == 0)) {
         arguments->valid[i] = 0;
         continue;
       }

@@ -618,10 +618,12 @@ int GltfLoader::mesh_of(const GltfDocument& document,
   const int tangent_uv_set = normal_map_uv_set(scene_.materials[static_cast<std::size_t>(material_index)]);
   const std::vector<std::uint16_t> columns = attributes_of(scene_.materials[static_cast<std::size_t>(material_index)]);
   std::string curves;  // what else makes one mesh of the same accessors differ from another
-  document.read_extension(document.element("meshes", static_cast<std::size_t>(mesh_index))
-                              .at("primitives")
-                              .at(static_cast<std::size_t>(primitive_index)),
-                          "", "RELIEF_curves", [&](const JsonReader& r) { curves = "," + r.string("shape", ""); });
+  const nlohmann::json& json = document.element("meshes", static_cast<std::size_t>(mesh_index))
+                                   .at("primitives")
+                                   .at(static_cast<std::size_t>(primitive_index));
+  document.read_extension(json, "", "RELIEF_curves",
+                          [&](const JsonReader& r) { curves = "," + r.string("shape", ""); });
+  document.read_extension(json, "", "RELIEF_points", [&](const JsonReader&) { curves = ",points"; });
   const auto [it, is_new] = mesh_of_.try_emplace({&document, primitive.attributes, primitive.indices, primitive.mode,
                                                   curves, tangent_uv_set, primitive.targets, morph, columns},
                                                  -1);

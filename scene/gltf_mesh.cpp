@@ -245,9 +245,9 @@ void read_attributes(const PrimitiveReader& reader,
   }
 }
 
-enum class CurveShape : std::uint8_t { kTubes, kRibbons };
+enum class CurveShape : std::uint8_t { kTubes, kRibbons, kPoints };
 
-/// What RELIEF_curves says of a primitive; empty: it has none.
+/// What RELIEF_curves or RELIEF_points says of a primitive; empty: it has neither.
 std::optional<CurveShape> read_curve_shape(const PrimitiveReader& reader, const nlohmann::json& json)
 {
   std::optional<CurveShape> shape;
@@ -259,6 +259,13 @@ std::optional<CurveShape> read_curve_shape(const PrimitiveReader& reader, const 
     }
     constexpr std::string_view kShapes[] = {"ribbons", "tubes"};
     shape = r.choice("shape", kShapes, 0) == 0 ? CurveShape::kRibbons : CurveShape::kTubes;
+    r.warn_unread(reader.warnings);
+  });
+  reader.document.read_extension(json, reader.path, "RELIEF_points", [&](const JsonReader& r) {
+    if (mode != TINYGLTF_MODE_POINTS) {
+      throw SceneError(reader.document.file, reader.path + "/mode", "points (0)", std::to_string(mode));
+    }
+    shape = CurveShape::kPoints;
     r.warn_unread(reader.warnings);
   });
   return shape;
@@ -505,6 +512,31 @@ void lay_out_curves(const PrimitiveReader& reader,
   reorder_vertices(order, mesh);
 }
 
+/// Lays out a mesh's vertices as balls, see Mesh: those that the primitive has, but not twice, and that have a size.
+/// @param first  number in the file of the mesh's first vertex
+void lay_out_points(const PrimitiveReader& reader,
+                    const std::vector<std::uint32_t>& corners,
+                    std::uint32_t first,
+                    Mesh& mesh)
+{
+  std::vector<std::uint32_t> order;
+  std::vector<bool> is_there(mesh.P.size(), false);
+  std::size_t num_dropped = 0;
+  for (const std::uint32_t corner : corners) {
+    const std::uint32_t v = corner - first;
+    if (is_there[v]) continue;
+    is_there[v] = true;
+    if (mesh.radius[v] > 0) {
+      order.push_back(v);
+    } else {
+      ++num_dropped;
+    }
+  }
+  if (num_dropped > 0) reader.warn(std::to_string(num_dropped) + " points of radius 0 dropped");
+  for (std::uint32_t i = 0; i < order.size(); ++i) mesh.triangles.push_back({i, i, i});
+  reorder_vertices(order, mesh);
+}
+
 /// Drops the vertices that no triangle has, where they are the most: many primitives may share one large accessor.
 void drop_unused_vertices(Mesh& mesh)
 {
@@ -576,7 +608,7 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
                                    .at("primitives")
                                    .at(static_cast<std::size_t>(primitive_index)));
   if (reader.primitive.mode < TINYGLTF_MODE_TRIANGLES && !curves) {
-    reader.warn("points and lines are not rendered");
+    reader.warn("points and lines are not rendered without RELIEF_points or RELIEF_curves");
     return {};
   }
   if (const std::string empty = empty_accessor(document, reader.primitive); !empty.empty()) {
@@ -619,13 +651,19 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
     read_targets(reader, positions.count, first, num_vertices, morph, mesh);
     if (curves) {
       mesh.are_ribbons = *curves == CurveShape::kRibbons;
+      mesh.are_points = *curves == CurveShape::kPoints;
       mesh.radius = read_radii(reader, positions.count, first, num_vertices);
-      lay_out_curves(reader, assemble_curves(reader, corners), first, mesh);
+      if (mesh.are_points) {
+        lay_out_points(reader, corners, first, mesh);
+      } else {
+        lay_out_curves(reader, assemble_curves(reader, corners), first, mesh);
+      }
     }
   }
   if (curves) {
     if (mesh.triangles.empty()) {
-      reader.warn("no curve has a length and a width; nothing is rendered");
+      reader.warn(std::string(mesh.are_points ? "no point has a radius" : "no curve has a length and a width") +
+                  "; nothing is rendered");
       return {};
     }
     mesh.N.clear();

@@ -49,7 +49,7 @@ struct MeshStep {
   std::vector<Normal3f> N;  ///< empty if the mesh has none
 };
 
-/// One glTF primitive: a triangle mesh, or curves, with one material.
+/// One glTF primitive: a triangle mesh, curves or points, with one material.
 ///
 /// Curves are splines of Catmull and Rom through their points; each one's first and last stand twice, so that a segment from vertex
 /// i to i + 1 has vertices i - 1 to i + 2. Its "triangle" is i, i + 1, i: by any weights of a hit's, w0 + w2 = 1 - u and w1 = u, so what reads vertices
@@ -64,8 +64,9 @@ struct Mesh {
   std::vector<Vec3f> generated;          ///< _GENERATED, see MeshView; empty: absent
   std::vector<AttributeColumn> columns;  ///< what graphs read by name
   std::vector<TriangleIndices> triangles;
-  std::vector<float> radius;  ///< of curves, metres, a vertex; empty: these are triangles
+  std::vector<float> radius;  ///< of curves and points, metres, a vertex; empty: these are triangles
   bool are_ribbons = false;   ///< of curves: flat and facing the ray, else tubes
+  bool are_points = false;    ///< these are balls, one a vertex: the "triangle" of number i is i, i, i
   std::vector<MeshStep> steps;  ///< at the times of Scene::motions; empty: it does not deform
   int material_index = 0;       ///< always valid: the loader adds glTF's default material where none is named
   int copy_of = -1;  ///< mesh of the file that this is under some transform, see world_displacement.h; −1: none

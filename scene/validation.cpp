@@ -224,6 +224,7 @@ constexpr std::string_view kSupportedExtensions[] = {"KHR_lights_punctual",
                                                      "RELIEF_render",
                                                      "RELIEF_object",
                                                      "RELIEF_curves",
+                                                     "RELIEF_points",
                                                      "RELIEF_reference"};
 
 /// Walks a document along the table above.

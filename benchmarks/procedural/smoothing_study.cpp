@@ -12,7 +12,7 @@ namespace relief {
 
 namespace {
 
-constexpr int kPoints = 15;  ///< of a side, without its ends
+constexpr int kInnerPoints = 15;  ///< of a side, without its ends
 constexpr double kDegrees = 180 / M_PI;
 
 struct Corner {
@@ -118,8 +118,8 @@ SmoothingResult smoothing_study(const std::string& name, const MeshView& mesh)
         continue;
       }
       const double flat = angle(sides[0].face->flat_normal(), sides[1].face->flat_normal());
-      for (int point = 1; point <= kPoints; ++point, ++num_points) {
-        const double t = static_cast<double>(point) / (kPoints + 1);
+      for (int point = 1; point <= kInnerPoints; ++point, ++num_points) {
+        const double t = static_cast<double>(point) / (kInnerPoints + 1);
         const double jump = angle(curved_normal(sides[0], curved[0], t), curved_normal(sides[1], curved[1], 1 - t));
         out.flat.largest = std::max(out.flat.largest, flat);
         out.flat.mean += flat;

@@ -299,7 +299,7 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
     case Q::tangent_normal_x:
     case Q::tangent_normal_y:
     case Q::tangent_normal_z: {
-      if ((at.instance->flags & kCurves) == 0) return 0.0f;
+      if ((at.instance->flags & (kCurves | kPoints)) != kCurves) return 0.0f;
       const Vec3f tangent = curve_tangent(*at.mesh, *at.instance, at.triangle, at.bary_u, at.wo);
       const Vec3f across = at.wo - tangent * dot(tangent, at.wo);
       return is_zero(across) ? 0.0f : component(graph_z_up(normalize(across)), axis_of(Q::tangent_normal_x));

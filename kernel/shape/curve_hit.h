@@ -1,5 +1,6 @@
 // Points on curves: splines of Catmull and Rom with a radius at each point, as tubes or as ribbons that face the ray. How their
-// vertices stand in a mesh is said at Mesh in scene/scene.h; Embree meets them (integrator/accel.cpp).
+// vertices stand in a mesh is said at Mesh in scene/scene.h; Embree meets them (integrator/accel.cpp). And single points, which are
+// balls.
 #pragma once
 
 #include "kernel/shape/surface_hit.h"
@@ -46,7 +47,7 @@ curve_tangent(const MeshView& mesh, const InstanceView& instance, std::uint32_t 
   return width > 0.0f ? along * (1.0f / __builtin_sqrtf(width)) : frame_from_normal(wo).s;
 }
 
-/// The point where a ray meets a curve.
+/// The point where a ray meets a curve, or a ball.
 ///
 /// Rays meet tubes from outside only (a filter lets those through that leave), so what goes on inside starts just below. A ribbon
 /// is a tube to shading: its normal turns from edge to edge as a tube's does, and what is behind it is asked of the ray.
@@ -63,13 +64,14 @@ curve_tangent(const MeshView& mesh, const InstanceView& instance, std::uint32_t 
                                                              Vec3f wo)
 {
   const TriangleIndices ends = mesh.triangles[segment];
+  const bool is_point = (instance.flags & kPoints) != 0;
   const Affine3& m = instance.world_from_object;
   const Affine3& inverse = instance.object_from_world;
   Vec3f P[4];
   for (std::uint32_t i = 0; i < 4; ++i) {
-    P[i] = mesh_P(mesh, ends.v0 - 1 + i);
+    P[i] = mesh_P(mesh, is_point ? ends.v0 : ends.v0 - 1 + i);
   }
-  const CurveBasis at = curve_basis(u);
+  const CurveBasis at = curve_basis(is_point ? 0.0f : u);
   const Vec3f centre = at.of(P);
 
   SurfaceHit hit;
@@ -95,7 +97,7 @@ curve_tangent(const MeshView& mesh, const InstanceView& instance, std::uint32_t 
   }
   // Of its own curve a ray meets nothing (curve_name in integrator/ray_surface.h), wherever it starts.
   hit.leave = away * (4.0f * length(hit.P_error));
-  surface_hit_interpolate(mesh, ends, u, 0.0f, &hit);
+  surface_hit_interpolate(mesh, ends, is_point ? 0.0f : u, 0.0f, &hit);
   return hit;
 }
 

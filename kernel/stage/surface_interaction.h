@@ -324,6 +324,7 @@ RELIEF_KERNEL ClosureSight closure_sight(const KernelGlobals& g,
                      path_bounces(state.bounces[path], BounceKind::kDiffuse) > 0};
   if (__builtin_expect((instance.flags & kCurves) != 0, 0)) {
     sight.enters = false;
+    if ((instance.flags & kPoints) != 0) return sight;
     sight.tangent = curve_tangent(path_mesh(g, state, path, instance), instance, state.hit_triangle[path],
                                   state.hit_u[path], -path_direction(state, path));
   }

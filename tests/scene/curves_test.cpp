@@ -18,12 +18,12 @@ Scene load_lines(GltfBuilder& b, json primitive, const std::string& shape = "tub
   return scene_load(folder.write("scene.glb", b.glb()));
 }
 
-const std::vector<float> kPoints{0, 0, 0, 1, 0, 0, 2, 1, 0, 5, 0, 0, 6, 0, 0};
+const std::vector<float> kFivePoints{0, 0, 0, 1, 0, 0, 2, 1, 0, 5, 0, 0, 6, 0, 0};
 
 TEST(Curves, LinesThatMeetAreOneCurve)
 {
   GltfBuilder b;
-  const int P = b.accessor(kPoints, "VEC3");
+  const int P = b.accessor(kFivePoints, "VEC3");
   const int radius = b.accessor(std::vector<float>{.5f, .4f, .3f, .2f, .1f}, "SCALAR");
   const int uv = b.accessor(std::vector<float>{0, 0, 0, .1f, 0, .2f, 1, .3f, 1, .4f}, "VEC2");
   const int indices = b.accessor<std::uint16_t>({0, 1, 1, 2, 3, 4}, "SCALAR");
@@ -50,7 +50,7 @@ TEST(Curves, AStripIsOneAndALoopComesBack)
 {
   for (const int mode : {2, 3}) {
     GltfBuilder b;
-    const int P = b.accessor(kPoints, "VEC3");
+    const int P = b.accessor(kFivePoints, "VEC3");
     const int radius = b.accessor(std::vector<float>(5, 1.0f), "SCALAR");
     const Scene scene =
         load_lines(b, {{"mode", mode}, {"attributes", {{"POSITION", P}, {"_RADIUS", radius}}}}, "ribbons");
@@ -81,7 +81,7 @@ TEST(Curves, TheyAreNeitherDisplacedNorCastersOfCaustics)
        {"extensions",
         {{"RELIEF_displacement",
           {{"heightGraph", {{"nodes", json::array()}, {"outputs", {{"height", 1}}}}}, {"scale", .1}}}}}}};
-  const int P = b.accessor(kPoints, "VEC3");
+  const int P = b.accessor(kFivePoints, "VEC3");
   const int radius = b.accessor(std::vector<float>(5, 1.0f), "SCALAR");
   const Scene scene =
       load_lines(b, {{"mode", 3}, {"material", 0}, {"attributes", {{"POSITION", P}, {"_RADIUS", radius}}}});
@@ -90,10 +90,39 @@ TEST(Curves, TheyAreNeitherDisplacedNorCastersOfCaustics)
   EXPECT_EQ(instance.flags & (kCausticCaster | kCausticReceiver), 0u);
 }
 
+TEST(Points, AreBallsEachOnceAndThoseOfRadius0AreDropped)
+{
+  GltfBuilder b;
+  const int P = b.accessor(kFivePoints, "VEC3");
+  const int radius = b.accessor(std::vector<float>{1, .5f, 0, 2, 3}, "SCALAR");
+  const int indices = b.accessor<std::uint16_t>({1, 2, 3, 1}, "SCALAR");
+  json primitive = {{"mode", 0}, {"attributes", {{"POSITION", P}, {"_RADIUS", radius}}}, {"indices", indices}};
+  primitive["extensions"]["RELIEF_points"] = json::object();
+  b.root_node({{"mesh", b.mesh(primitive)}});
+  const test::TemporaryFolder folder;
+  const Scene scene = scene_load(folder.write("scene.glb", b.glb()));
+  const Mesh& mesh = scene.meshes.at(0);
+  EXPECT_TRUE(mesh.are_points);
+  EXPECT_EQ(mesh.P, (std::vector<Vec3f>{{1, 0, 0}, {5, 0, 0}}));
+  EXPECT_EQ(mesh.radius, (std::vector<float>{.5f, 2}));
+  EXPECT_EQ(mesh.triangles.size(), 2u);
+  EXPECT_EQ(mesh.triangles[1].v2, 1u);
+  EXPECT_TRUE(has_warning(scene, "1 points of radius 0"));
+}
+
+TEST(Points, WithoutTheExtensionAreNotRendered)
+{
+  GltfBuilder b;
+  const int P = b.accessor(kFivePoints, "VEC3");
+  b.root_node({{"mesh", b.mesh({{"mode", 0}, {"attributes", {{"POSITION", P}}}})}});
+  const test::TemporaryFolder folder;
+  EXPECT_TRUE(has_warning(scene_load(folder.write("scene.glb", b.glb())), "RELIEF_points"));
+}
+
 TEST(Curves, RadiiBelowNothingAreErrors)
 {
   GltfBuilder b;
-  const int P = b.accessor(kPoints, "VEC3");
+  const int P = b.accessor(kFivePoints, "VEC3");
   const int radius = b.accessor(std::vector<float>{1, 1, -2, 1, 1}, "SCALAR");
   try {
     load_lines(b, {{"mode", 3}, {"attributes", {{"POSITION", P}, {"_RADIUS", radius}}}});

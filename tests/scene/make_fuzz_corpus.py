@@ -86,7 +86,8 @@ def topologies():
     lines = {"mode": 1, "indices": b.accessor("B", [0, 1, 1, 2, 3, 3], "SCALAR"), "attributes": {
         "POSITION": b.accessor("f", [0, 0, 0, 1, 0, 0, 1, 1, 0, 2, 2, 2], "VEC3"),
         "_RADIUS": b.accessor("f", [.1, .2, 0, 1], "SCALAR")}, "extensions": {"RELIEF_curves": {"shape": "tubes"}}}
-    b.json["meshes"].append({"primitives": [lines]})
+    points = {**lines, "mode": 0, "extensions": {"RELIEF_points": {}}}
+    b.json["meshes"].append({"primitives": [lines, points]})
     b.node(mesh=len(b.json["meshes"]) - 1)
     sparse = {"count": 1, "indices": {"bufferView": b.view(struct.pack("<H", 2)), "componentType": 5123},
               "values": {"bufferView": b.view(struct.pack("<3f", 5, 5, 5))}}

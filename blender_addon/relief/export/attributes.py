@@ -2,7 +2,8 @@
 """Attributes of meshes that value graphs read by name, as Cycles has them.
 
 An attribute is a pair (kind, name): ("attribute", name) of any type, ("color", name) likewise, where "" is the colour that
-is active in renders, ("uv", name) a uv map, ("pointiness", ""), ("island", "") and ("hair", what) of Curves Info: see hair.py.
+is active in renders, ("uv", name) a uv map, ("pointiness", ""), ("island", ""), ("hair", what) of Curves Info: see hair.py, and
+("point", what) of Point Info: see points.py.
 """
 
 import numpy as np
@@ -26,7 +27,7 @@ _DTYPES = {"INT": np.int32, "INT8": np.int32, "BOOLEAN": bool}
 def file_name(attribute):
     """What an attribute is called in the file."""
     kind, name = attribute
-    return f"_{kind.upper()}_{name}" if kind in {"attribute", "color", "uv", "hair"} else f"_{kind.upper()}"
+    return f"_{kind.upper()}_{name}" if kind in {"attribute", "color", "uv", "hair", "point"} else f"_{kind.upper()}"
 
 
 def read(attribute, mesh, vertex):
@@ -37,7 +38,7 @@ def read(attribute, mesh, vertex):
     @return         float32 (loops, 1 to 4); None: the mesh has none
     """
     kind, name = attribute
-    if kind == "hair":
+    if kind in {"hair", "point"}:
         return None
     if kind == "pointiness":
         return _pointiness(mesh)[vertex, None]
@@ -65,10 +66,7 @@ def _named(mesh, name, vertex):
     attribute = mesh.attributes.get(name) if name else None
     if attribute is None or attribute.data_type not in _TYPES or attribute.domain not in {"POINT", "CORNER", "FACE"}:
         return None
-    prop, width = _TYPES[attribute.data_type]
-    values = np.empty(width * len(attribute.data), dtype=_DTYPES.get(attribute.data_type, np.float32))
-    attribute.data.foreach_get(prop, values)
-    values = values.astype(np.float32).reshape(-1, width)
+    values = _elements(attribute)
     if attribute.domain == "POINT":
         return values[vertex]
     if attribute.domain == "FACE":
@@ -76,6 +74,22 @@ def _named(mesh, name, vertex):
         mesh.polygons.foreach_get("loop_total", sizes)
         return values.repeat(sizes, axis=0)
     return values
+
+
+def _elements(attribute):
+    """float32 (elements, 1 to 4)"""
+    prop, width = _TYPES[attribute.data_type]
+    values = np.empty(width * len(attribute.data), dtype=_DTYPES.get(attribute.data_type, np.float32))
+    attribute.data.foreach_get(prop, values)
+    return values.astype(np.float32).reshape(-1, width)
+
+
+def of_points(cloud, name):
+    """Values of an attribute at the points of a point cloud: float32 (points, 1 to 4); None: there is none."""
+    attribute = cloud.attributes.get(name) if name else None
+    if attribute is None or attribute.data_type not in _TYPES or attribute.domain != "POINT":
+        return None
+    return _elements(attribute)
 
 
 def _uv(mesh, name):

@@ -12,9 +12,6 @@ _OBJECT = (
     (("shadow_terminator_geometry_offset",), 0.1, "Geometry Offset of the shadow terminator"),
 )
 
-#: Objects that Blender has besides meshes and lights, in the words of its menus.
-KINDS = {"POINTCLOUD": "a point cloud", "VOLUME": "a volume object"}
-
 
 def warn_unread_of_object(shown, scene, warn):
     """Of an original object that has a surface.
