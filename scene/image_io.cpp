@@ -14,7 +14,7 @@ namespace relief {
 namespace {
 
 // The number counts changes of the interface: an old program that was copied away does not call into a newer build.
-constexpr const char* kEntryPoint = "relief_image_io_3";
+constexpr const char* kEntryPoint = "relief_image_io_4";
 
 /// Makes sure of the address space that linking needs, where a shell bounds it (ulimit -v). Without it some of the 245
 /// libraries abort in their initialization, or wait for ever for threads that could not be started.

@@ -9,6 +9,7 @@
 #include <new>
 
 #include "scene/image_io.h"
+#include "scene/voxel_file_module.h"
 
 namespace relief {
 namespace {
@@ -275,4 +276,5 @@ std::unique_ptr<TileCache> tile_cache_make(std::size_t budget_bytes, int tile_si
 }  // namespace
 }  // namespace relief
 
-extern "C" const relief::ImageIo relief_image_io_3 = {relief::file_make, relief::tile_cache_make};
+extern "C" const relief::ImageIo relief_image_io_4 = {relief::file_make, relief::tile_cache_make,
+                                                      relief::voxel_file_make};

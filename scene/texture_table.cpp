@@ -176,6 +176,24 @@ const IesProfile& TextureTable::add_ies(const GltfDocument& document,
   return ies_.try_emplace(file, std::move(profile)).first->second;
 }
 
+std::shared_ptr<const Voxels> TextureTable::add_voxels(const GltfDocument& document,
+                                                       const std::string& uri,
+                                                       const std::string& grid,
+                                                       const std::array<int, 3>& size,
+                                                       const std::string& json_path)
+{
+  std::filesystem::path file;
+  std::shared_ptr<const Voxels> voxels;
+  succeeds([&] {
+    file = gltf_resolve_uri(document, uri, json_path);
+    if (voxels_.contains({file, grid, size})) return;
+    files_read_.push_back(file_stamp(file));
+    voxels = grid.empty() ? voxels_load_slices({file.string(), {}, document.file, json_path}, size)
+                          : voxels_load(file, grid, document.file, json_path);
+  });
+  return voxels_.try_emplace({file, grid, size}, std::move(voxels)).first->second;
+}
+
 std::vector<TextureRequest> TextureTable::take()
 {
   index_of_.clear();

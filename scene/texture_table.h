@@ -1,6 +1,7 @@
 // Collects what materials, displacements and the environment ask of textures; equal requests share one index.
 #pragma once
 
+#include <array>
 #include <map>
 #include <tuple>
 #include <vector>
@@ -8,6 +9,7 @@
 #include "scene/gltf_document.h"
 #include "scene/graph/ies_file.h"
 #include "scene/texture_store.h"
+#include "scene/voxels.h"
 
 namespace relief {
 
@@ -62,7 +64,18 @@ class TextureTable {
   /// @error SceneError at `json_path`: there is no such file, or see ies_parse
   const IesProfile& add_ies(const GltfDocument& document, const std::string& uri, const std::string& json_path);
 
-  /// The files of luminaires, as they were before they were read.
+  /// A grid of an OpenVDB file beside the file, or an image of slices. Likewise read at once and once.
+  /// @param grid  its name; of an image empty
+  /// @param size  of an image, see voxels_load_slices
+  /// @return  null: it is missing
+  /// @error SceneError at `json_path`: there is no such file, or see voxels_load and voxels_load_slices; OutOfMemory
+  std::shared_ptr<const Voxels> add_voxels(const GltfDocument& document,
+                                           const std::string& uri,
+                                           const std::string& grid,
+                                           const std::array<int, 3>& size,
+                                           const std::string& json_path);
+
+  /// The files of luminaires and voxels, as they were before they were read.
   const std::vector<FileStamp>& files_read() const { return files_read_; }
 
   /// The requests, in index order; the table is empty afterwards.
@@ -87,6 +100,8 @@ class TextureTable {
   std::map<Key, int> index_of_;
   std::vector<TextureRequest> requests_;
   std::map<std::filesystem::path, IesProfile> ies_;
+  /// By file, grid and size.
+  std::map<std::tuple<std::filesystem::path, std::string, std::array<int, 3>>, std::shared_ptr<const Voxels>> voxels_;
   std::vector<FileStamp> files_read_;
 };
 

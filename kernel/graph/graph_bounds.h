@@ -240,6 +240,8 @@ RELIEF_KERNEL void ies_op(const GraphRangeOperands& o)
   o.set(0, range_between(F8{}, splat8(25.0f / 16.0f * 1.0001f * most)));
 }
 
+RELIEF_KERNEL void voxels_op(const GraphRangeOperands& o) { voxels(o); }
+
 /// No spot is larger than 1, and eight in each of the cells around are looked at.
 RELIEF_KERNEL void gabor_op(const GraphRangeOperands& o, float num_cells)
 {

@@ -512,6 +512,30 @@ RELIEF_KERNEL void image_tiles(const GraphRangeOperands& o)
   for (int c = 0; c < 4; ++c) o.set(c, all[c]);
 }
 
+RELIEF_KERNEL void voxels(const GraphRangeOperands& o)
+{
+  const VoxelView& v = o.program.voxels[o.immediates[0]];
+  const Affine3& m = v.lattice_from_object;
+  const auto axis = [&](float x, float y, float z, float p) {
+    const auto number = [](float a) { return range_point(splat8(a)); };
+    return o.in(0) * number(x) + o.in(1) * number(y) + o.in(2) * number(z) + number(p);
+  };
+  const GraphRange at[3] = {axis(m.x.x, m.y.x, m.z.x, m.p.x), axis(m.x.y, m.y.y, m.z.y, m.p.y),
+                            axis(m.x.z, m.y.z, m.z.z, m.p.z)};
+  F8 low[3], high[3];
+  for (int k = 0; k < 8; ++k) {
+    const VoxelRange range =
+        voxels_range(v, {at[0].low[k], at[1].low[k], at[2].low[k]}, {at[0].high[k], at[1].high[k], at[2].high[k]});
+    const float lows[3] = {range.low.x, range.low.y, range.low.z},
+                highs[3] = {range.high.x, range.high.y, range.high.z};
+    for (int c = 0; c < 3; ++c) {
+      low[c][k] = lows[c];
+      high[c][k] = highs[c];
+    }
+  }
+  for (int c = 0; c < 3; ++c) o.set(c, range_padded(low[c], high[c]));
+}
+
 RELIEF_KERNEL void set_all(const GraphRangeOperands& o, int count, const GraphRange& value)
 {
   for (int i = 0; i < count; ++i) o.set(i, value);

@@ -19,6 +19,7 @@
 #include "kernel/graph/musgrave.h"
 #include "kernel/graph/noise.h"
 #include "kernel/graph/voronoi.h"
+#include "kernel/graph/voxels.h"
 #include "kernel/math/lanes_functions.h"
 
 namespace relief {
@@ -465,6 +466,21 @@ RELIEF_KERNEL void graph_ies(const GraphOperands& o)
   graph_set(o, 0, each_lane(graph_in(o, 0), graph_in(o, 1), [=](float horizontal, float vertical) {
               return ies_eval(table, o.immediates[2], o.immediates[3], horizontal, vertical);
             }));
+}
+
+/// What a lattice has at a point of the object. Immediate: which.
+RELIEF_KERNEL void graph_voxels(const GraphOperands& o)
+{
+  const VoxelView& voxels = o.program.voxels[o.immediates[0]];
+  const F8 x = graph_in(o, 0), y = graph_in(o, 1), z = graph_in(o, 2);
+  F8 out[3];
+  for (int k = 0; k < 8; ++k) {
+    const Vec3f value = voxels_eval(voxels, {x[k], y[k], z[k]});
+    out[0][k] = value.x;
+    out[1][k] = value.y;
+    out[2][k] = value.z;
+  }
+  for (int c = 0; c < 3; ++c) graph_set(o, c, out[c]);
 }
 
 /// 1 in every other cell of a lattice of unit cubes, but not in the one at the origin.

@@ -42,11 +42,14 @@ struct GraphInput {
   float width = 1;          ///< footprints that the shift is long
 };
 
+struct VoxelView;  // kernel/graph/voxel_view.h
+
 struct GraphProgramView {
   const std::uint16_t* code = nullptr;
   std::uint32_t num_words = 0;
   const float* constants = nullptr;
   const float* tables = nullptr;  ///< of `table` instructions: rows of floats, one after the other
+  const VoxelView* voxels = nullptr;  ///< of `voxels` instructions
   const GraphInput* inputs = nullptr;
   std::uint32_t num_inputs = 0;
   bool is_shifted = false;  ///< some input is read away from the point

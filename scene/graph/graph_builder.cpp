@@ -17,7 +17,7 @@ const GraphOpShape& shape_of(GraphOp op) { return kGraphOpShapes[static_cast<int
 
 bool graph_op_reads_images(GraphOp op)
 {
-  return op == GraphOp::image || op == GraphOp::image_box || op == GraphOp::image_tiles;
+  return op == GraphOp::image || op == GraphOp::image_box || op == GraphOp::image_tiles || op == GraphOp::voxels;
 }
 
 std::vector<int> graph_textures(const GraphProgram& program)
@@ -46,6 +46,7 @@ GraphProgramView GraphProgram::view() const
   v.num_words = static_cast<std::uint32_t>(code.size());
   v.constants = constants.data();
   v.tables = tables.data();
+  v.voxels = voxels.data();
   v.inputs = inputs.data();
   v.num_inputs = static_cast<std::uint32_t>(inputs.size());
   v.is_shifted = std::any_of(inputs.begin(), inputs.end(),
@@ -66,7 +67,7 @@ std::size_t GraphProgram::bytes() const
   return code.size() * sizeof(std::uint16_t) + (constants.size() + tables.size()) * sizeof(float) +
          inputs.size() * sizeof(GraphInput) + result_values.size() * sizeof(float) +
          (results.size() + varying_before.size() + varying.size()) * sizeof(std::uint16_t) +
-         closures.size() * sizeof(SurfaceClosureSpec) + sizeof(GraphProgram);
+         closures.size() * sizeof(SurfaceClosureSpec) + voxels.size() * sizeof(VoxelView) + sizeof(GraphProgram);
 }
 
 void graph_program_run(const GraphProgramView& program, GraphRegisters& registers)
@@ -279,6 +280,13 @@ std::uint32_t GraphBuilder::add_table(std::span<const float> values)
       table_places_.try_emplace({values.begin(), values.end()}, static_cast<std::uint32_t>(tables_.size()));
   if (is_new) tables_.insert(tables_.end(), values.begin(), values.end());
   return it->second;
+}
+
+std::uint16_t GraphBuilder::add_voxels(const VoxelView& view, std::shared_ptr<const Voxels> owner)
+{
+  voxels_.push_back(view);
+  voxel_owners_.push_back(std::move(owner));
+  return static_cast<std::uint16_t>(voxels_.size() - 1);
 }
 
 void GraphBuilder::set_output(GraphOutput output, const GraphVector& value)

@@ -70,6 +70,11 @@ class GraphBuilder {
   /// @return place of the first; equal tables are kept once
   std::uint32_t add_table(std::span<const float> values);
 
+  /// Adds what `voxels` operations read.
+  /// @param owner  of what the view looks at
+  /// @return       its number
+  std::uint16_t add_voxels(const VoxelView& view, std::shared_ptr<const Voxels> owner);
+
   void set_output(GraphOutput output, const GraphVector& value);
 
   /// Adds a number that the program gives beside its outputs.
@@ -130,6 +135,8 @@ class GraphBuilder {
   std::map<Key, std::int32_t> known_;  ///< first node of what a key says
   std::vector<float> tables_;
   std::map<std::vector<float>, std::uint32_t> table_places_;
+  std::vector<VoxelView> voxels_;
+  std::vector<std::shared_ptr<const Voxels>> voxel_owners_;
   std::array<GraphVector, kNumGraphOutputs> outputs_;
   std::vector<GraphScalar> results_;
   std::map<std::pair<GraphShift, float>, Rewritten> shifted_;

@@ -184,10 +184,17 @@ void GraphBuilder::Compilation::free_registers(const Operation& operation, std::
   }
 }
 
-/// Immediates of an operation in the program, which gets the table that it reads.
+/// Immediates of an operation in the program, which gets the table or the voxels that it reads.
 std::vector<std::uint16_t> GraphBuilder::Compilation::placed(const Operation& operation)
 {
   std::vector<std::uint16_t> immediates = operation.immediates;
+  if (operation.op == GraphOp::voxels) {
+    const std::size_t from = immediates[0];
+    immediates[0] = static_cast<std::uint16_t>(program_.voxels.size());
+    program_.voxels.push_back(builder_.voxels_[from]);
+    program_.voxel_owners.push_back(builder_.voxel_owners_[from]);
+    return immediates;
+  }
   const bool are_tiles = operation.op == GraphOp::image_tiles;
   const bool is_grid = operation.op == GraphOp::grid;
   const bool is_ies = operation.op == GraphOp::ies;

@@ -11,6 +11,7 @@
 #include "scene/graph/graph_builder.h"
 #include "scene/graph/ies_file.h"
 #include "scene/json_reader.h"
+#include "scene/voxels.h"
 
 namespace relief {
 
@@ -43,6 +44,8 @@ struct GraphNode {
   const std::function<int(const JsonReader&)>& texture;
   /// The luminaire that an option names.
   const std::function<const IesProfile&(const JsonReader&)>& ies;
+  /// The grid that options name; null: it is missing.
+  const std::function<std::shared_ptr<const Voxels>(const JsonReader&)>& voxels;
   /// Place of an attribute's name, for quantities.
   const std::function<std::uint16_t(const JsonReader&, const std::string&)>& attribute;
   std::vector<GraphSun>& suns;  ///< gets those of directions that are looked into as they are

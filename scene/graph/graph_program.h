@@ -1,17 +1,23 @@
 // A compiled value graph, which owns what a GraphProgramView looks at.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "kernel/graph/graph_op.h"
 #include "kernel/graph/graph_program.h"
+#include "kernel/graph/voxel_view.h"
 #include "kernel/volume/volume_closure.h"
 
 namespace relief {
 
+struct Voxels;  // scene/voxels.h
+
 struct GraphProgram {
   std::vector<std::uint16_t> code;
   std::vector<float> constants, tables;
+  std::vector<VoxelView> voxels;  ///< of these, which other programs may share
+  std::vector<std::shared_ptr<const Voxels>> voxel_owners;
   std::vector<GraphInput> inputs;
   std::uint16_t outputs[kNumGraphOutputs][3] = {};
   std::uint32_t given = 0;  ///< bit GraphOutput
@@ -36,7 +42,7 @@ struct VolumeProgram {
 /// The textures that a program reads, each as often as it does.
 std::vector<int> graph_textures(const GraphProgram& program);
 
-/// Whether an operation depends on the scene's textures.
+/// Whether an operation depends on the scene's textures or voxels.
 bool graph_op_reads_images(GraphOp op);
 
 /// A light that graphs of surroundings have in so small a part of them that it is to be looked for.

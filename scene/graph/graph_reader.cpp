@@ -16,6 +16,9 @@ namespace {
 
 constexpr std::size_t kMostNodes = 65536;
 
+/// Voxels along a side of images of slices.
+constexpr double kMostSlices = 65536;
+
 /// Every point looks its attributes up among those of its mesh.
 constexpr std::size_t kMostAttributes = 1024;
 
@@ -209,7 +212,21 @@ void Reader::lower(std::size_t index)
   };
   const std::function<std::uint16_t(const JsonReader&, const std::string&)> named =
       [this](const JsonReader& r, const std::string& name) { return attribute(r, name); };
-  GraphNode node{build, source.reader, inputs, values[index], given, texture, ies, named, suns};
+  const std::function<std::shared_ptr<const Voxels>(const JsonReader&)> voxels = [this](const JsonReader& r) {
+    if (!r.has("uri")) r.fail("uri", "the path of an OpenVDB file, or of an image of slices");
+    const bool is_image = r.has("size");
+    if (is_image == r.has("grid")) r.fail("", "either grid or size", is_image ? "both" : "neither");
+    const std::string grid = r.string("grid", "");
+    if (!is_image && grid.empty()) r.fail("grid", "the name of a grid");
+    std::array<int, 3> size{};
+    const std::vector<double> numbers = r.numbers("size", 3, 3, 1, kMostSlices);
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      size[i] = static_cast<int>(numbers[i]);
+      if (numbers[i] != size[i]) r.fail("size", "three whole numbers");
+    }
+    return textures.add_voxels(document, r.string("uri", ""), grid, size, json_path_join(r.path(), "uri"));
+  };
+  GraphNode node{build, source.reader, inputs, values[index], given, texture, ies, voxels, named, suns};
   source.kind->lower(node);
   source.reader.warn_unread(warnings);
 }

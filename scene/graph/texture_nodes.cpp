@@ -555,6 +555,26 @@ void lower_ies(GraphNode& n)
   n.set("factor", b(Op::multiply, {n.number("strength"), b.apply(Op::ies, inputs, immediates)[0]}));
 }
 
+constexpr GraphSocket kVoxelInputs[] = {{"vector", kVector}};
+void lower_voxels(GraphNode& n)
+{
+  GraphBuilder& b = n.build;
+  static constexpr std::string_view kPlaces[] = {"corners", "centers"};
+  const int place = n.reader.choice("values", kPlaces, 0);
+  GraphVector v = n.vector("vector");
+  if (!n.is_given("vector")) v = quantities(b, Q::object_x, Q::object_y, Q::object_z);
+  const std::shared_ptr<const Voxels> voxels = n.voxels(n.reader);
+  GraphVector color = splat(b.constant(0));
+  if (voxels != nullptr) {
+    const std::uint16_t number = b.add_voxels(place == 1 ? voxels_centered(voxels->view) : voxels->view, voxels);
+    const std::vector<GraphScalar> rgb = b.apply(Op::voxels, v, {&number, 1});
+    std::copy(rgb.begin(), rgb.end(), color.begin());
+  }
+  n.set("color", color, kColor);
+  const bool is_number = voxels != nullptr && voxels->view.channels == 1;
+  n.set("value", is_number ? color[0] : scaled(b, sum3(b, color[0], color[1], color[2]), 1.0f / 3.0f));
+}
+
 constexpr GraphNodeKind kKinds[] = {
     {"ies-texture", kIesInputs, lower_ies},
     {"noise-texture", kNoiseInputs, lower_noise},
@@ -568,6 +588,7 @@ constexpr GraphNodeKind kKinds[] = {
     {"musgrave-texture", kMusgraveInputs, lower_musgrave},
     {"brick-texture", kBrickInputs, lower_brick},
     {"gabor-texture", kGaborInputs, lower_gabor},
+    {"voxel-texture", kVoxelInputs, lower_voxels},
 };
 
 }  // namespace

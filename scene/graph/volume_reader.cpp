@@ -89,7 +89,7 @@ std::vector<VolumeClosureSpec> volume_closures_read(const JsonReader& reader,
 
 bool medium_is_even(const VolumeProgram& volume)
 {
-  return volume.program.inputs.empty() && graph_textures(volume.program).empty();
+  return volume.program.inputs.empty() && graph_textures(volume.program).empty() && volume.program.voxels.empty();
 }
 
 Medium medium_of(const VolumeProgram& volume)

@@ -5,14 +5,12 @@ import bpy
 from scenes import (
     IS_5_0,
     add_camera,
-    add_group_socket,
     add_light,
     add_plane,
     add_sphere,
     degrees,
     diffuse,
     folder,
-    link,
     new_material,
     new_scene,
     render,
@@ -87,23 +85,6 @@ def test_what_is_no_volume_is_told_once_a_material():
             add_sphere(0.5, fog, (x, 0, 0.5))
 
     _assert_warned_once(fill, 'material "fog"', "as volume", "nothing is there, as in Cycles")
-
-
-def _made_by_nodes(kind):
-    """A sphere of which geometry nodes make something else."""
-    tree = bpy.data.node_groups.new("geometry", "GeometryNodeTree")
-    for direction in ("INPUT", "OUTPUT"):
-        add_group_socket(tree, "Geometry", direction, "NodeSocketGeometry")
-    node = tree.nodes.new(kind)
-    tree.links.new(tree.nodes.new("NodeGroupInput").outputs[0], node.inputs[0])
-    tree.links.new(node.outputs[0], tree.nodes.new("NodeGroupOutput").inputs[0])
-    add_sphere(0.5, location=(2, 0, 0.5)).modifiers.new("geometry", "NODES").node_group = tree
-
-
-def test_what_is_no_mesh_is_told():
-    _assert_warned_once(lambda _: _made_by_nodes("GeometryNodeMeshToPoints"), "object", "a point cloud", "left out")
-    _assert_warned_once(lambda _: _made_by_nodes("GeometryNodeMeshToVolume"), "object", "a volume object", "left out")
-    _assert_warned_once(lambda _: link(bpy.data.volumes.new("cloud"), "cloud"), "cloud", "a volume object", "left out")
 
 
 def test_subsurface_scattering_by_profiles_is_told_once_a_material():

@@ -133,7 +133,7 @@ def _attribute(g, source):
             g.uses_generated = True
             return _output(g.add("texture-coordinate"), "generated")
         if g.voxels is not None and name in g.voxels:
-            return g.voxels.output(g, name) if output != "alpha" else _constant(g, 1.0)
+            return _constant(g, 1.0) if output == "alpha" else g.voxels.output(g, name, "value" if output == "value" else "color")
         return mesh_attribute(g, *_STANDARD.get(name, ("attribute", name)), output)
     if node.attribute_type == "VIEW_LAYER":
         layer = g.view_layer()
@@ -287,7 +287,7 @@ def _ies(g, source):
 def _volume_info(g, source):
     name = source.socket.identifier
     if g.voxels is not None and name.lower() in g.voxels:
-        return g.voxels.output(g, name.lower())
+        return g.voxels.output(g, name.lower(), "color" if name == "Color" else "value")
     return _constant(g, (0.0, 0.0, 0.0) if name == "Color" else 0.0)
 
 
@@ -300,8 +300,22 @@ def _hair_info(g, source):
 
 
 def _point_info(g, source):
-    """What a surface that is no point has of it."""
-    return _constant(g, (0.0, 0.0, 0.0) if source.socket.identifier == "Position" else 0.0)
+    """In the world. Of a surface that is no point all is 0."""
+    name = source.socket.identifier.lower()
+    if name == "random":
+        return mesh_attribute(g, "point", name, "value")
+
+    def in_world(vector, transform):
+        spaces = {"from": "object", "to": "world"}
+        return g.op("vector-transform", {"vector": vector}, "vector", transform=transform, **spaces)
+
+    if name == "position":
+        position = in_world(mesh_attribute(g, "point", name, "vector"), "point")
+        is_point = mesh_attribute(g, "point", "is_point", "value")
+        return g.op("vector-math", {"a": position, "b": is_point}, "vector", operation="multiply")
+    # As much as along the diagonal, as in Cycles.
+    along = g.op("vector-math", {"a": mesh_attribute(g, "point", name, "value"), "b": [3**-0.5] * 3}, "vector", operation="multiply")
+    return g.op("vector-math", {"a": in_world(along, "vector")}, "value", operation="length")
 
 
 def _made_color(kind, name):

@@ -15,6 +15,7 @@ from .settings import filters_glossy
 from .surface import TRANSPARENT, ClosureWriter, Inside, Surface, plain_surface
 from .texture import Input, TextureReader, ies_uri, image_options
 from .volume import VolumeWriter
+from .voxels import Grids
 
 #: The format has two sets of texture coordinates a vertex.
 _MOST_COORDINATES = 2
@@ -54,6 +55,17 @@ class MaterialExporter:
             wanted = job.wanted()
             self._exported[key] = (_Indices(self._writer, job.json, wanted.by_shading), wanted)
         return self._exported[key]
+
+
+def has_volume(material):
+    """Whether a bpy material fills what its objects bound; None, of volume objects, does."""
+    if material is None:
+        return True
+    if not material.use_nodes or material.node_tree is None:
+        return False
+    with nodes.reading():
+        output = nodes.active_output(material.node_tree, "ShaderNodeOutputMaterial")
+        return output is not None and nodes.linked(output.inputs["Volume"]) is not None
 
 
 def _has_closure(material, kind):
@@ -140,6 +152,9 @@ class MaterialJob:
         if material is not None and material.use_nodes and material.node_tree is not None:
             with nodes.reading():
                 self._export_nodes(material, settings)
+        elif material is None and isinstance(voxels, Grids):
+            self._write_surface(TRANSPARENT)
+            self._write_closures(lambda medium: medium.fill())
         elif material is None and compat.DEFAULT_CLOSURE is not None:
             self._extend("RELIEF_surface", {"closures": [compat.DEFAULT_CLOSURE]})
         else:
@@ -344,7 +359,7 @@ class MaterialJob:
             return
         node, textures = source.node, self._textures
         if node.bl_idname != "ShaderNodeVolumeAbsorption" or inside == Inside.OPEN or self._varies(source):
-            self._write_medium(source)
+            self._write_closures(lambda medium: medium.write(source))
             return
         color = textures.constant_color(node.inputs["Color"], source.groups)
         density = max(0.0, textures.constant_number(node.inputs["Density"], source.groups))
@@ -365,9 +380,9 @@ class MaterialJob:
         sockets = (source.node.inputs[name] for name in ("Color", "Density"))
         return any(self._graph.constant(socket, source.groups) is None for socket in sockets)
 
-    def _write_medium(self, source):
+    def _write_closures(self, write):
         medium = VolumeWriter(self._graph, self._fail, self._voxels)
-        medium.write(source)
+        write(medium)
         if not medium.closures:
             return
         self._extend("RELIEF_volume", {"closures": medium.closures})

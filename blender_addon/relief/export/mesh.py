@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .. import compat
-from . import attributes, hair
+from . import attributes, hair, points
 
 #: Odd 64-bit constants for hashing the columns of a corner; any will do, equality is checked afterwards.
 _HASH_FACTORS = np.random.default_rng(1).integers(1, 2**63, size=32, dtype=np.uint64) | np.uint64(1)
@@ -258,6 +258,7 @@ class StoredMesh:
                 are told apart where the slot's material wants it
     warnings    what is to be said of each object that has it: arguments of a warning's function
     strands     (slot, StoredArrays) of its hair
+    points      StoredArrays of a point cloud; None: it is none
     """
 
     name: str
@@ -265,10 +266,12 @@ class StoredMesh:
     primitives: list
     warnings: tuple
     strands: tuple = ()
+    points: object = None
 
     def reach(self):
         """Largest coordinate of a vertex, metres in object space."""
-        bounds = [arrays.accessors["POSITION"][0] for *_, arrays in (*self.primitives, *self.strands)]
+        parts = [arrays for *_, arrays in (*self.primitives, *self.strands)] + [self.points] * (self.points is not None)
+        bounds = [arrays.accessors["POSITION"][0] for arrays in parts]
         return max((abs(x) for accessor in bounds for x in accessor["min"] + accessor["max"]), default=0.0)
 
 
@@ -302,6 +305,26 @@ def store_mesh(mesh, wanted, writer, shapes=()):
     return StoredMesh(mesh.name, wanted, primitives, tuple(warnings))
 
 
+def store_box(box, name, wanted, slot, writer):
+    """Writes a box.
+
+    @param  box     (low, high)
+    @param  wanted  tuple of the Wanted of each slot's material, at least one
+    @param  slot    whose material it has
+    @return         StoredMesh
+    """
+    corners = np.array([[box[(i >> axis) & 1][axis] for axis in range(3)] for i in range(8)], dtype=np.float32)
+    sides = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
+    normals = np.zeros((24, 3), dtype=np.float32)
+    for side, (axis, sign) in enumerate(((2, -1), (2, 1), (1, -1), (1, 1), (0, -1), (0, 1))):
+        normals[4 * side : 4 * side + 4, axis] = sign
+    triangles = np.array([[4 * side + i for i in (0, 1, 2, 0, 2, 3)] for side in range(6)], dtype=np.uint32)
+    arrays = {"POSITION": corners[sides.ravel()], "NORMAL": normals, "indices": triangles.ravel()}
+    if wanted[slot].generated:  # a volume has none: they are its coordinates
+        arrays["_GENERATED"] = arrays["POSITION"]
+    return StoredMesh(name, wanted, [(slot, False, writer.store(arrays))], ())
+
+
 def store_strands(strands, name, wanted, writer):
     """Writes strands.
 
@@ -318,6 +341,17 @@ def store_strands(strands, name, wanted, writer):
     return StoredMesh(name, wanted, [], tuple(warnings), tuple(out))
 
 
+def store_points(cloud, name, wanted, writer):
+    """Writes an evaluated bpy point cloud, whose points have the first slot's material.
+
+    @param  wanted  tuple of the Wanted of each slot's material, at least one
+    @return         StoredMesh without triangles
+    """
+    warnings = []
+    arrays = points.arrays_of(cloud, wanted[0], lambda *text: warnings.append(text))
+    return StoredMesh(name, wanted, [], tuple(warnings), points=None if arrays is None else writer.store(arrays))
+
+
 def add_mesh(stored, materials, writer, is_diced=False, curve_shape="ribbons"):
     """Refers to a stored mesh.
 
@@ -326,7 +360,7 @@ def add_mesh(stored, materials, writer, is_diced=False, curve_shape="ribbons"):
     @param  curve_shape  of its strands, as RELIEF_curves has it
     @return              index of a glTF mesh; None if there is nothing in it
     """
-    if not stored.primitives and not stored.strands:
+    if not stored.primitives and not stored.strands and stored.points is None:
         return None
     primitives = []
     for slot, is_smooth, arrays in stored.primitives:
@@ -344,6 +378,10 @@ def add_mesh(stored, materials, writer, is_diced=False, curve_shape="ribbons"):
         lines = {"mode": 1, "indices": attributes.pop("indices"), "attributes": attributes, "material": materials[slot](True, False)}
         writer.extend(lines, "RELIEF_curves", {"shape": curve_shape})
         primitives.append(lines)
+    if stored.points is not None:
+        balls = {"mode": 0, "attributes": dict(writer.add_stored(stored.points)), "material": materials[0](True, False)}
+        writer.extend(balls, "RELIEF_points", {})
+        primitives.append(balls)
     return writer.add_unique("meshes", {"name": stored.name, "primitives": primitives})
 
 

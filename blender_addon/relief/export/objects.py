@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from . import hair, unread
+from . import hair
 from .instance_values import Place, are_read
 
-#: Objects that Blender can turn into a mesh.
-GEOMETRY_TYPES = {"MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES"}
+#: Objects that Blender can turn into a mesh, and those that have shapes of their own.
+GEOMETRY_TYPES = {"MESH", "CURVE", "SURFACE", "META", "FONT", "CURVES", "VOLUME", "POINTCLOUD"}
 
 #: Scale below which nothing is seen of an object: its inverse would leave the range of single precision.
 _NOTHING = 1e-30
@@ -52,6 +52,7 @@ class Things:
     places    Place of each, where value graphs may read them; else empty
     surface   its surface is shown
     strands   its hair is shown
+    bounds    corners of a volume's box, object space; None of all else
     """
 
     object: object
@@ -63,6 +64,7 @@ class Things:
     places: list = field(default_factory=list)
     surface: bool = True
     strands: bool = False
+    bounds: object = None
 
     def world_matrices(self):
         """float64 of shape (places, 4, 4)."""
@@ -85,8 +87,7 @@ def collect(depsgraph, report):
         kind = "geometry" if shown.type in GEOMETRY_TYPES else "light" if shown.type == "LIGHT" else None
         if kind is None:
             if shown.type not in _SILENT_TYPES | _DRAWN_TYPES:
-                what = unread.KINDS.get(shown.type, f"objects of type {shown.type.lower()}")
-                report.warn(f'object "{shown.name}"', what, "it is left out")
+                report.warn(f'object "{shown.name}"', f"objects of type {shown.type.lower()}", "it is left out")
             continue
         original = shown.original
         surface = instance.show_self if not instance.is_instance else True
@@ -104,6 +105,8 @@ def collect(depsgraph, report):
             thing = things[key] = Things(original, shown.name, kind, role=role, surface=surface, strands=strands)
             if instance.is_instance and kind == "geometry" and _is_made(shown, original, depsgraph):
                 thing.data = data
+            if shown.type == "VOLUME":
+                thing.bounds = np.array(shown.bound_box, dtype=np.float64)
         matrix = instance.matrix_world
         thing.matrices.append((*matrix[0], *matrix[1], *matrix[2], *matrix[3]))
         if looks_at_places:
@@ -134,7 +137,7 @@ def _roles(view_layer):
 
 def _is_made(shown, original, depsgraph):
     """Whether an instance shows a mesh of its own, made by geometry nodes, instead of an object's."""
-    return shown.type in {"MESH", "CURVES"} and shown.data != original.evaluated_get(depsgraph).data
+    return shown.type in {"MESH", "CURVES", "VOLUME", "POINTCLOUD"} and shown.data != original.evaluated_get(depsgraph).data
 
 
 def usable_places(matrices):

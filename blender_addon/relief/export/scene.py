@@ -15,13 +15,13 @@ from .axes import GLTF_FROM_BLENDER
 from .gltf import GltfWriter, matrix_property
 from .image import ImageExporter
 from .light import Place, export_light
-from .material import MaterialExporter, emits, holds_out
-from .mesh import FARTHEST, add_mesh, store_mesh, store_strands
+from .material import MaterialExporter, emits, has_volume, holds_out
+from .mesh import FARTHEST, add_mesh, store_box, store_mesh, store_points, store_strands
 from .motion import numbered
 from .objects import collect, decompose, usable_places
 from .settings import render_settings
 from .visibility import hidden_settings
-from .voxels import Voxels, domain_of, read_grids
+from .voxels import Grids, Voxels, domain_of, read_grids
 from .world import Eye, export_world
 
 DATA_FOLDER = "relief_data"
@@ -34,6 +34,9 @@ _ACTIVE_UV = (("uv", ""),)
 
 #: Data of hair curves; nothing is, where Blender has none.
 _HAIR_CURVES = getattr(bpy.types, "Curves", ())
+
+#: Likewise of point clouds.
+_POINT_CLOUD = getattr(bpy.types, "PointCloud", ())
 
 
 @dataclass
@@ -252,6 +255,8 @@ class SceneExporter:
             return True
         if _is_hair_curves(thing):
             return layer.use_strand
+        if _is_volume(thing):
+            return layer.use_volumes
         thing.surface = thing.surface and layer.use_solid
         thing.strands = thing.strands and layer.use_strand
         return thing.surface or thing.strands
@@ -385,11 +390,16 @@ class SceneExporter:
         None: it has no triangles."""
         evaluated = thing.object.evaluated_get(self._depsgraph)
         data = thing.data if thing.data is not None else evaluated.data
-        materials = self._materials_of(_slots(thing, evaluated), data, self._voxels_of(thing, evaluated))
+        voxels = self._voxels_of(thing, evaluated, data)
+        materials = self._materials_of(_slots(thing, evaluated), data, voxels)
         wanted = tuple(w for _, w in materials)
-        is_usual = thing.data is None and thing.surface and thing.strands == bool(hair.particle_systems(thing.object))
+        is_usual = not _is_volume(thing) and thing.data is None and thing.surface and thing.strands == bool(hair.particle_systems(thing.object))
         stored = self._stored.get(thing.object, wanted) if is_usual else None
-        if stored is None:
+        if stored is None and _is_volume(thing):
+            stored = self._store_volume(thing, evaluated, wanted, voxels)
+            if stored is None:
+                return None, 0.0, set()
+        elif stored is None:
             stored = self._store(thing, evaluated, wanted, shapes or ())
             if stored is None:
                 return None, 0.0, set()
@@ -408,6 +418,8 @@ class SceneExporter:
         if _is_hair_curves(thing):
             strands = hair.of_curves(thing.data if thing.data is not None else evaluated.data)
             return None if strands is None else store_strands([(0, strands)], thing.name, wanted, self.writer)
+        if _is_points(thing):
+            return store_points(thing.data if thing.data is not None else evaluated.data, thing.name, wanted, self.writer)
         if thing.surface:
             stored = self._store_surface(thing, evaluated, wanted, shapes)
         if thing.strands and thing.data is None:
@@ -418,6 +430,15 @@ class SceneExporter:
             warnings = (*stored.warnings, *of_hair.warnings)
             stored = replace(stored, strands=of_hair.strands, warnings=warnings)
         return stored
+
+    def _store_volume(self, thing, evaluated, wanted, grids):
+        """The same of what is within a volume object: the box around it, with the first material that fills it."""
+        override = self._depsgraph.view_layer.material_override
+        materials = [override] if override is not None else _slots(thing, evaluated) or [None]
+        filling = next((slot for slot, material in enumerate(materials) if has_volume(material)), None)
+        if grids.box is None or filling is None:
+            return None
+        return store_box(grids.box, thing.name, wanted, filling, self.writer)
 
     def _store_surface(self, thing, evaluated, wanted, shapes):
         """The same of its triangles."""
@@ -437,8 +458,10 @@ class SceneExporter:
                     evaluated.to_mesh_clear()
         return self._by_shape[key]
 
-    def _voxels_of(self, thing, evaluated):
-        """Voxels of a smoke domain; None: it is none."""
+    def _voxels_of(self, thing, evaluated, data):
+        """Voxels of a smoke domain, Grids of a volume object; None: it is neither."""
+        if _is_volume(thing):
+            return Grids(data, thing.bounds, self.writer, self._warner("object", thing.name))
         domain = domain_of(evaluated)
         if domain is None:
             return None
@@ -448,7 +471,7 @@ class SceneExporter:
             grids["density"] = np.zeros((1, 1, 1, 1), dtype=np.float32)
         if domain.use_adaptive_domain:
             self._warner("object", thing.name)("an adaptive smoke domain", "its smoke fills the box that its mesh has")
-        return Voxels(grids, self.writer, self._images)
+        return Voxels(grids, self._images)
 
     def _materials_of(self, materials, data, voxels):
         """(what gives the index in the glTF, Wanted) of material slots, at least one."""
@@ -496,6 +519,14 @@ class SceneExporter:
 
 def _is_hair_curves(thing):
     return thing.object.type == "CURVES" if thing.data is None else isinstance(thing.data, _HAIR_CURVES)
+
+
+def _is_points(thing):
+    return thing.object.type == "POINTCLOUD" if thing.data is None else isinstance(thing.data, _POINT_CLOUD)
+
+
+def _is_volume(thing):
+    return thing.object.type == "VOLUME" if thing.data is None else isinstance(thing.data, bpy.types.Volume)
 
 
 def _slots(thing, evaluated):

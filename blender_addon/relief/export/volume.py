@@ -64,18 +64,23 @@ class VolumeWriter(ClosureWriter):
                 weight = 1.0
             self.add(kind, weight, **inputs)
 
+    def fill(self):
+        """What Cycles fills a volume object with that has no material: a new Principled Volume."""
+        density = self._voxels.output(self.graph, "density", "value") if "density" in self._voxels else 1.0
+        self.add("principled", 1.0, density=self._math("maximum", density, 0.0))
+
     def _add_attributes(self, node, inputs):
         """Multiplies what a Principled Volume has by the grids that it names, those that there are."""
 
-        def grid(socket):
+        def grid(socket, output="value"):
             name = node.inputs[socket].default_value
-            return self._voxels.output(self.graph, name) if name in self._voxels else None
+            return self._voxels.output(self.graph, name, output) if name in self._voxels else None
 
         for socket, name in (("Density Attribute", "density"), ("Temperature Attribute", "temperature")):
             value = grid(socket)
             if value is not None:
                 inputs[name] = self._math("multiply", inputs[name], self._math("maximum", value, 0.0))
-        color = grid("Color Attribute")
+        color = grid("Color Attribute", "color")
         if color is not None:
             inputs["color"] = self.graph.op("vector-math", {"a": inputs["color"], "b": color}, "vector", operation="multiply")
 

@@ -1,10 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Voxels of smoke domains: what their materials read as attributes, as images whose rows are those of all slices.
+"""What the materials of volumes read as attributes: voxels of smoke domains, as images of their slices, and
+grids of OpenVDB, as files that the program reads.
 
-Blender shows them nowhere but in what is evaluated, and none where nothing is baked for the frame.
+Blender shows the former nowhere but in what is evaluated, and none where nothing is baked for the frame.
 """
 
+import os
+import tempfile
+
+import bpy
 import numpy as np
+
+from .. import compat
 
 #: Grids of a domain by the names of their attributes, and the numbers of a voxel.
 _GRIDS = {
@@ -15,7 +22,11 @@ _GRIDS = {
     "temperature": ("temperature_grid", 1),
 }
 
-_CLAMP = 33071  # glTF's CLAMP_TO_EDGE
+#: Types of grids that the program reads.
+_NUMBERS = {"FLOAT", "DOUBLE", "INT", "INT64", "BOOLEAN", "VECTOR_FLOAT", "VECTOR_DOUBLE", "VECTOR_INT"}
+
+#: Rows that an image has at most.
+_MOST_ROWS = 65536
 
 
 def domain_of(evaluated):
@@ -46,46 +57,102 @@ class Voxels:
     """Grids that graphs read by the names of attributes, in a box that generated coordinates reach through from 0 to 1.
 
     @param  grids   of read_grids
-    @param  writer  GltfWriter
     @param  images  ImageExporter
     """
 
-    def __init__(self, grids, writer, images):
+    def __init__(self, grids, images):
         self._grids = grids
-        self._writer = writer
         self._images = images
+        self._uris = {}
 
     def __contains__(self, name):
         return name in self._grids
 
-    def output(self, graph, name):
-        """Reference to the colour of a grid at a point, between the middles of voxels, as a node of a graph."""
-        grid = self._grids[name]
-        depth, height, width, numbers = grid.shape
+    def output(self, graph, name, output="color"):
+        """Reference to what a grid has at a point, between the middles of voxels, as a node of a graph.
 
-        def math(operation, *values):
-            return graph.op("math", dict(zip("abc", values)), "value", operation=operation)
+        @param  output  "color", or "value" where a number is wanted
+        """
+        depth, height, width, _ = self._grids[name].shape
+        inputs = {"vector": graph.generated()}
+        size = [width, height, depth]
+        return graph.op("voxel-texture", inputs, output, uri=self._uri(name), size=size, values="centers")
 
-        parts = graph.add("separate", {"vector": graph.generated()})
-        x, y, z = ({"node": parts, "output": axis} for axis in "xyz")
-        slices = math("maximum", math("minimum", math("multiply-add", z, float(depth), -0.5), float(depth - 1)), 0.0)
-        first = math("floor", slices)
-        # Rows of two slices do not mix.
-        row = math("maximum", math("minimum", math("multiply", y, float(height)), height - 0.5), 0.5)
-        texture = {"index": self._writer.add_texture(self._uri(grid), _CLAMP, False)}
-        color = []
-        for offset in (0.0, float(height)):
-            rows = math("add", math("multiply-add", first, float(height), row), offset)
-            place = graph.op("combine", {"x": x, "y": math("divide", rows, float(height * depth)), "z": 0.0}, "vector")
-            color.append(graph.op("image-texture", {"vector": place}, "color", texture=texture, colorSpace="linear", alpha="opaque"))
-        inputs = {"factor": math("subtract", slices, first), "a": color[0], "b": color[1]}
-        return graph.op("mix-color", inputs, "color", blend="mix", clampFactor=False)
+    def _uri(self, name):
+        if name not in self._uris:
+            self._uris[name] = self._write(self._grids[name])
+        return self._uris[name]
 
-    def _uri(self, grid):
-        rows = grid.reshape(-1, *grid.shape[2:])
+    def _write(self, grid):
         if grid.shape[-1] == 1:
-            return self._images.write_pixels({"Y": rows[..., 0]})
+            return self._images.write_pixels({"Y": _slices(grid)[..., 0]})
         # As Cycles, which takes what the fourth number has been multiplied by.
-        alpha = rows[..., 3:]
-        color = np.where((alpha > 1e-6) & (alpha != 1), rows[..., :3] / np.where(alpha > 1e-6, alpha, 1), rows[..., :3])
-        return self._images.write_pixels({name: color[..., i] for i, name in enumerate("RGB")})
+        alpha = grid[..., 3:]
+        color = np.where((alpha > 1e-6) & (alpha != 1), grid[..., :3] / np.where(alpha > 1e-6, alpha, 1), grid[..., :3])
+        rows = _slices(color)
+        return self._images.write_pixels({name: rows[..., i] for i, name in enumerate("RGB")})
+
+
+def _slices(grid):
+    """Slices beside and above one another, as the program reads them: (rows, columns, numbers)."""
+    depth, height, width, numbers = grid.shape
+    columns = -(-depth // max(_MOST_ROWS // height, 1))
+    rows = -(-depth // columns)
+    padded = np.zeros((rows * columns, height, width, numbers), dtype=np.float32)
+    padded[:depth] = grid
+    # From (row, column, y, x) to (row, y, column, x).
+    return padded.reshape(rows, columns, height, width, numbers).transpose(0, 2, 1, 3, 4).reshape(rows * height, columns * width, numbers)
+
+
+class Grids:
+    """Grids of a volume object, which graphs read by their names.
+
+    @param  volume   bpy volume, evaluated
+    @param  bounds   corners of the box that Blender gives it, float64 (8, 3)
+    @param  writer   GltfWriter
+    @param  warn     called with what is wrong, and what was used instead
+
+    box             (low, high) of all that has values, object space; None: nothing has
+    """
+
+    def __init__(self, volume, bounds, writer, warn):
+        self._volume = volume
+        self._writer = writer
+        self._uri = None
+        grids = volume.grids
+        if not grids.load():
+            warn(f'"{grids.frame_filepath}": {grids.error_message or "it cannot be read"}', "it is left out of this frame")
+        known = [grid for grid in grids if grid.data_type in _NUMBERS]
+        self._names = {grid.name for grid in known}
+        self.box = _box_of(bounds, known) if known else None
+
+    def __contains__(self, name):
+        return name in self._names
+
+    def output(self, graph, name, output="color"):
+        """As that of Voxels; of vectors the mean where a number is wanted."""
+        inputs = {"vector": graph.op("texture-coordinate", None, "object")}
+        return graph.op("voxel-texture", inputs, output, uri=self._file(), grid=name, values=compat.VOXEL_PLACES)
+
+    def _file(self):
+        """URI of the file that the grids are in: what modifiers make is saved as one."""
+        if self._uri is None:
+            path = bpy.path.abspath(self._volume.grids.frame_filepath, library=self._volume.library)
+            self._uri = self._writer.file_uri(path) if os.path.isfile(path) else self._save()
+        return self._uri
+
+    def _save(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "grids.vdb")
+            self._volume.grids.save(filepath=path)
+            with open(path, "rb") as file:
+                return self._writer.write_file(".vdb", file.read())
+
+
+def _box_of(corners, grids):
+    """(low, high) of all that has values. Blender's bounds are those of leaves, and beyond the last value it takes one more to 0."""
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    if not (np.isfinite((low, high)).all() and (high > low).any()):
+        return None
+    margin = 2 * np.max([np.abs(np.array(grid.matrix_object)[:3, :3]).sum(axis=1) for grid in grids], axis=0)
+    return low - margin, high + margin
