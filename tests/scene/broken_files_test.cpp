@@ -267,8 +267,6 @@ const BrokenFile kBrokenFiles[] = {
      "/meshes/0/primitives/0", "at least 3"},
     {"triangles as curves", [](auto& b) { primitive(b)["extensions"]["RELIEF_curves"] = json::object(); },
      "/meshes/0/primitives/0/mode", "lines"},
-    {"triangles as points", [](auto& b) { primitive(b)["extensions"]["RELIEF_points"] = json::object(); },
-     "/meshes/0/primitives/0/mode", "points (0)"},
     {"curves without radii",
      [](auto& b) {
        primitive(b)["mode"] = 3;

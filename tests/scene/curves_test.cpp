@@ -110,6 +110,23 @@ TEST(Points, AreBallsEachOnceAndThoseOfRadius0AreDropped)
   EXPECT_TRUE(has_warning(scene, "1 points of radius 0"));
 }
 
+TEST(Points, OfTrianglesAreAnError)
+{
+  GltfBuilder b;
+  const int P = b.accessor(kFivePoints, "VEC3");
+  json primitive = {{"mode", 5}, {"attributes", {{"POSITION", P}}}};
+  primitive["extensions"]["RELIEF_points"] = json::object();
+  b.root_node({{"mesh", b.mesh(primitive)}});
+  const test::TemporaryFolder folder;
+  try {
+    static_cast<void>(scene_load(folder.write("scene.glb", b.glb())));
+    FAIL();
+  } catch (const SceneError& error) {
+    EXPECT_EQ(error.json_path, "/meshes/0/primitives/0/mode");
+    EXPECT_EQ(error.expected, "points (0)");
+  }
+}
+
 TEST(Points, WithoutTheExtensionAreNotRendered)
 {
   GltfBuilder b;
