@@ -185,8 +185,8 @@ Accel::Accel(const Scene& scene,
 {
   for (std::size_t d = 0; d < displacements.size(); ++d) displacements.geometry(d).shadow_filter = nullptr;
   for (const Mesh& mesh : scene.meshes) {
-    meshes_.emplace_back().mesh = {mesh.name,        &mesh.P,        {}, mesh.triangles, mesh.radius,
-                                   mesh.are_ribbons, 0, mesh.are_points};
+    meshes_.emplace_back().mesh = {mesh.name,   &mesh.P,          {}, mesh.triangles,
+                                   mesh.radius, mesh.are_ribbons, 0,  mesh.are_points};
     has_curves_ |= !mesh.radius.empty();
     for (const MeshStep& step : mesh.steps) meshes_.back().mesh.steps.push_back(&step.P);
   }
