@@ -182,8 +182,9 @@ def _seen_by_some(ray, shines):
     glass, _, node = new_material("glass", "ShaderNodeBsdfRefraction", IOR=1.2)
     make_sharp(node)
     add_plane(1.0, glass, (0.2, -1, 0.5)).rotation_euler = degrees(70, 0, 0)
-    translucent, _, _ = new_material("translucent", "ShaderNodeBsdfTranslucent")
-    add_plane(1.0, translucent, (1.3, -0.6, 0.5)).rotation_euler = degrees(75, 0, 0)
+    if not shines:  # to Cycles' lights what is translucent is diffuse, and to its rays it transmits
+        translucent, _, _ = new_material("translucent", "ShaderNodeBsdfTranslucent")
+        add_plane(1.0, translucent, (1.3, -0.6, 0.5)).rotation_euler = degrees(75, 0, 0)
     bright = new_material("light", "ShaderNodeEmission", Color=(1, 0.7, 0.4, 1), Strength=6.0)[0]
     ball = add_sphere(0.6, bright if shines else diffuse((0.9, 0.1, 0.1)), (0.3, 0.6, 0.7))
     setattr(ball, f"visible_{ray}", False)
