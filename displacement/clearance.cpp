@@ -111,10 +111,10 @@ void add_planes_in_box(const DisplacedMeshView& mesh,
 {
   if (mesh.blend != nullptr) return;
   const BasePoint base = base_point(tri, b1, b2);
-  const auto [x, y] = lattice_point(tri, b1, b2);
+  const LatticePoint at = lattice_point(tri, b1, b2);
   const double inverse_length = 1.0 / length(base.N);
   const Vec3d n = base.N * inverse_length;
-  const double d = displacement_at(mesh, x, y);
+  const double d = displacement_at(mesh, at.x, at.y);
   // Around the base triangle's vertices as they are numbered, wherever the surface is turned over.
   const double winding = dot(cross(base.Pu, base.Pv), base.N) < 0 ? -1.0 : 1.0;
   struct Tangents {
@@ -122,8 +122,8 @@ void add_planes_in_box(const DisplacedMeshView& mesh,
   };
   const auto tangents = [&](std::int64_t i, std::int64_t j) {
     const CellHeights c = cell_heights(*mesh.field, i, j);
-    const double fx = std::clamp(x - static_cast<double>(i), 0.0, 1.0),
-                 fy = std::clamp(y - static_cast<double>(j), 0.0, 1.0);
+    const double fx = std::clamp(at.x - static_cast<double>(i), 0.0, 1.0),
+                 fy = std::clamp(at.y - static_cast<double>(j), 0.0, 1.0);
     const double hx = mesh.scale * (c.hx + c.hxy * fy), hy = mesh.scale * (c.hy + c.hxy * fx);
     const auto derivative = [&](Vec3d dP, Vec3d dN, double dx, double dy) {
       return dP + (hx * dx + hy * dy) * n + (d * inverse_length) * (dN - dot(n, dN) * n);
@@ -131,7 +131,7 @@ void add_planes_in_box(const DisplacedMeshView& mesh,
     const Vec3d u = derivative(base.Pu, base.Nu, base.xu, base.yu), v = derivative(base.Pv, base.Nv, base.xv, base.yv);
     return Tangents{u, v, cross(u, v)};
   };
-  const Tangents own = tangents(cell_of(x), cell_of(y));
+  const Tangents own = tangents(cell_of(at.x), cell_of(at.y));
   const double squared = dot(own.normal, own.normal);
   if (!(squared > 0)) return;
   // Gradients along the surface, which are short wherever it is not degenerate itself.
@@ -139,8 +139,8 @@ void add_planes_in_box(const DisplacedMeshView& mesh,
               b2_gradient = cross(own.normal, own.u) * (1 / squared);
   const double dx = std::min(change_within(base.xu * b1_gradient + base.xv * b2_gradient, reach), 0.5);
   const double dy = std::min(change_within(base.yu * b1_gradient + base.yv * b2_gradient, reach), 0.5);
-  for (std::int64_t j = cell_of(y - dy); j <= cell_of(y + dy); ++j) {
-    for (std::int64_t i = cell_of(x - dx); i <= cell_of(x + dx); ++i) {
+  for (std::int64_t j = cell_of(at.y - dy); j <= cell_of(at.y + dy); ++j) {
+    for (std::int64_t i = cell_of(at.x - dx); i <= cell_of(at.x + dx); ++i) {
       const Vec3d normal = tangents(i, j).normal;
       const double size = length(normal);
       if (!(size > 0)) continue;
