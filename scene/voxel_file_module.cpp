@@ -147,7 +147,7 @@ class TreeOf final : public Tree {
     tree.stealNodes(leaves_);
     for (const Leaf* leaf : leaves_) box.expand(leaf->getNodeBoundingBox());
     if (!box.empty()) {
-      for (int axis = 0; axis < 3; ++axis) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
         header.first[axis] = first_[axis] = box.min()[axis] >> 3;
         header.count[axis] = count_[axis] = (std::int64_t{box.max()[axis]} >> 3) + 1 - first_[axis];
       }
