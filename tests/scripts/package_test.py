@@ -51,7 +51,8 @@ class Bundle(unittest.TestCase):
                     self.assertIn(str(self.libraries), os.path.normpath(line.split(" => ")[1]), file)
 
     def test_is_small(self):
-        self.assertLess(sum(f.stat().st_size for f in self.tree.rglob("*")), 120e6)
+        # OpenVDB, which reads .vdb files, is 80 MB of it.
+        self.assertLess(sum(f.stat().st_size for f in self.tree.rglob("*")), 190e6)
 
     def test_images_of_every_format_are_read_alike(self):
         if not shutil.which("oiiotool"):
