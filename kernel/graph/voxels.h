@@ -26,12 +26,12 @@ RELIEF_KERNEL const std::uint16_t* voxel_at(const VoxelView& v, int x, int y, in
 RELIEF_KERNEL Vec3f voxels_eval(const VoxelView& v, Vec3f P)
 {
   // Farther away, and of what is not a number, all is background.
-  constexpr float kFarthest = 0x1p28f;
+  constexpr float kOutermost = 0x1p28f;
   const Vec3f p = transform_point(v.lattice_from_object, P);
   const bool is_near =
-      __builtin_fabsf(p.x) < kFarthest && __builtin_fabsf(p.y) < kFarthest && __builtin_fabsf(p.z) < kFarthest;
-  const float fx = is_near ? __builtin_floorf(p.x) : kFarthest, fy = is_near ? __builtin_floorf(p.y) : kFarthest,
-              fz = is_near ? __builtin_floorf(p.z) : kFarthest;
+      __builtin_fabsf(p.x) < kOutermost && __builtin_fabsf(p.y) < kOutermost && __builtin_fabsf(p.z) < kOutermost;
+  const float fx = is_near ? __builtin_floorf(p.x) : kOutermost, fy = is_near ? __builtin_floorf(p.y) : kOutermost,
+              fz = is_near ? __builtin_floorf(p.z) : kOutermost;
   const int x = static_cast<int>(fx), y = static_cast<int>(fy), z = static_cast<int>(fz);
   const Vec3f t = is_near ? Vec3f{p.x - fx, p.y - fy, p.z - fz} : Vec3f{};
   const std::uint16_t* corners[8];
