@@ -143,6 +143,7 @@ const std::vector<Shape>& shapes()
       {Op::gabor_3d, 3},
       {Op::blackbody, 1},
       {Op::image_tiles, 2, 0, 1, {{0, 1, kFirstTile, 0}}},
+      {Op::voxels, 3},
       // Of this nothing is known, which no sample contradicts.
       {Op::skip, 1},
   };
@@ -186,6 +187,7 @@ std::vector<GraphRange> ranges_of(GraphBoundsRun run,
   program.code = code.data();
   program.num_words = static_cast<std::uint32_t>(code.size());
   program.tables = kTable.data();
+  program.voxels = &test::some_voxels();
   run(program, textures, *registers);
   std::vector<GraphRange> out;
   for (int i = 0; i < test::shape_of(op).num_outputs; ++i) out.push_back(registers->lanes[i]);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -11,6 +12,7 @@
 
 #include "integrator/stages.h"
 #include "kernel/graph/graph_op.h"
+#include "kernel/graph/voxel_view.h"
 
 namespace relief::test {
 
@@ -35,6 +37,28 @@ inline std::vector<Interpreter> interpreters()
 inline void PrintTo(const Interpreter& interpreter, std::ostream* out) { *out << interpreter.name; }
 
 inline const GraphOpShape& shape_of(GraphOp op) { return kGraphOpShapes[static_cast<int>(op)]; }
+
+/// One brick of numbers from -2 to 4, between one that has none and emptiness.
+inline const VoxelView& some_voxels()
+{
+  static const std::vector<std::uint16_t> values = [] {
+    constexpr std::uint16_t kHalves[] = {0, 0x3400, 0x3800, 0x3c00, 0x4000, 0xbc00, 0xc000, 0x4400};
+    std::vector<std::uint16_t> halves(2 * kBrickVoxels, 0);
+    for (std::size_t i = 0; i < kBrickVoxels; ++i) halves[kBrickVoxels + i] = kHalves[(i * 37 >> 3) % 8];
+    return halves;
+  }();
+  static constexpr std::array<std::uint32_t, 2> kBricks = {0, 1};
+  static constexpr std::array<VoxelRange, 2> kRanges = {VoxelRange{}, VoxelRange{{-2, -2, -2}, {4, 4, 4}}};
+  static const VoxelView view = [] {
+    VoxelView v;
+    v.bricks = kBricks.data(), v.values = values.data(), v.ranges = kRanges.data();
+    v.first[0] = -1;
+    v.count[0] = 2, v.count[1] = v.count[2] = 1;
+    v.range = kRanges[1];
+    return v;
+  }();
+  return view;
+}
 
 /// Outputs of an operation over eight points: [output][lane].
 using Outputs = std::vector<std::vector<float>>;
@@ -66,6 +90,7 @@ inline Outputs run_one(GraphRun run,
   program.code = code.data();
   program.num_words = static_cast<std::uint32_t>(code.size());
   program.tables = table.data();
+  program.voxels = &some_voxels();
   run(program, textures, registers);
   Outputs out;
   for (int i = 0; i < shape_of(op).num_outputs; ++i) {
