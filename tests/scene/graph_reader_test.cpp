@@ -260,6 +260,7 @@ TEST(GraphReader, EveryKindReadsWithAllOfItsInputs)
       for (const GraphSocket& socket : kind.inputs) node["inputs"][std::string(socket.name)] = of(1, "position");
       if (kind.name == "image-texture") node["texture"] = {{"index", 0}};
       if (kind.name == "ies-texture") node["uri"] = "profile.ies";
+      if (kind.name == "voxel-texture") node.update({{"uri", "slices.exr"}, {"size", {1, 1, 1}}});
       if (kind.name == "attribute") node["name"] = "_SOMETHING";
       if (kind.name == "normal") node["direction"] = {0, 0, 1};
       if (kind.name == "transform") node["matrix"] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
