@@ -7,6 +7,7 @@
 #include "displacement/lanes.h"
 #include "displacement/leaf.h"
 #include "displacement/point_tiles.h"
+#include "displacement/shadow_filter.h"
 
 namespace relief {
 
@@ -282,21 +283,7 @@ bool passes(RTCFilterFunctionN shadow_filter,
   rtc_hit.Ng_y = rtc_hit.Ng_z = 0.0f;
   rtc_hit.u = hit.u;
   rtc_hit.v = hit.v;
-  rtc_hit.primID = arguments->primID;
-  rtc_hit.geomID = arguments->geomID;
-  rtc_hit.instID[0] = arguments->context->instID[0];
-  RTCRay ray = rtcGetRayFromRayN(arguments->ray, arguments->N, lane);
-  ray.tfar = static_cast<float>(hit.t);
-  int valid = -1;
-  RTCFilterFunctionNArguments filter;
-  filter.valid = &valid;
-  filter.geometryUserPtr = arguments->geometryUserPtr;
-  filter.context = arguments->context;
-  filter.ray = reinterpret_cast<RTCRayN*>(&ray);
-  filter.hit = reinterpret_cast<RTCHitN*>(&rtc_hit);
-  filter.N = 1;
-  shadow_filter(&filter);
-  return valid == 0;
+  return shadow_filter_passes(shadow_filter, arguments, lane, rtc_hit, hit.t);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "displacement/method.h"
 #include "displacement/point_tiles.h"
 #include "displacement/seam_walls.h"
+#include "displacement/shadow_filter.h"
 #include "displacement/trace_procedural.h"
 #include "kernel/math/rounding.h"
 
@@ -291,26 +292,11 @@ bool passes(const DisplacedGeometry& geometry,
             unsigned lane,
             const DisplacedHit& hit)
 {
-  const unsigned count = arguments->N;
   RTCHit rtc_hit;
   rtc_hit.Ng_x = rtc_hit.Ng_y = rtc_hit.Ng_z = 0.0f;
   rtc_hit.u = static_cast<float>(hit.b1);
   rtc_hit.v = static_cast<float>(hit.b2);
-  rtc_hit.primID = arguments->primID;
-  rtc_hit.geomID = arguments->geomID;
-  rtc_hit.instID[0] = arguments->context->instID[0];
-  RTCRay ray = rtcGetRayFromRayN(arguments->ray, count, lane);
-  ray.tfar = static_cast<float>(hit.t);
-  int valid = -1;
-  RTCFilterFunctionNArguments filter;
-  filter.valid = &valid;
-  filter.geometryUserPtr = arguments->geometryUserPtr;
-  filter.context = arguments->context;
-  filter.ray = reinterpret_cast<RTCRayN*>(&ray);
-  filter.hit = reinterpret_cast<RTCHitN*>(&rtc_hit);
-  filter.N = 1;
-  geometry.shadow_filter(&filter);
-  return valid == 0;
+  return shadow_filter_passes(geometry.shadow_filter, arguments, lane, rtc_hit, hit.t);
 }
 
 void occluded(const RTCOccludedFunctionNArguments* arguments)
