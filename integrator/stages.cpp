@@ -12,7 +12,7 @@
 #include "kernel/stage/shade_background.h"
 #include "kernel/stage/shade_light.h"
 #include "kernel/stage/shade_photon.h"
-#include "kernel/stage/shade_surface.h"
+#include "kernel/stage/shade_surfaces.h"
 
 namespace relief {
 
@@ -116,7 +116,7 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
   GraphRegisters registers;
   registers.rays = g.graph_scene.rays;
   SurfaceInteraction located[kLanes];
-  Principled3Columns columns;
+  Principled3Hits hits{};
   for (std::uint32_t first = 0, count = 0; first < queue.size; first += count) {
     const Material& material = g.materials[material_of(queue.paths[first])];
     count = 1;
@@ -141,13 +141,24 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
     g.run_graph(program, g.textures, registers);
     counters.graph_runs += 1;
     counters.graph_points += count;
-    bool are_resolved = false;
+    const SurfaceClosureSpec* plain = nullptr;
     if constexpr ((kFeatures & kFeatureMixture) != 0) {
-      are_resolved = surface_interactions_resolve(state, queue.paths + first, static_cast<int>(count), located,
-                                                  registers, program, columns);
+      // Fewer are not worth it.
+      plain = count > 2 ? closures_plain(program) : nullptr;
+      if (plain != nullptr) {
+        const SurfaceGroup group{queue.paths + first, static_cast<int>(count), located, program, registers};
+        const MixtureBuildLanes b = surface_group_build(state, group);
+        closures_resolve_plain(program, *plain, registers, b, hits.lobes);
+        if constexpr ((kFeatures & kFeatureCaustics) == 0) {
+          if (surface_group_is_plain(g, state, group, *plain)) {
+            shade_surface_group<kFeatures>(g, state, group, b, hits, next, shadow, counters);
+            continue;
+          }
+        }
+      }
     }
     for (std::uint32_t lane = 0; lane < count; ++lane) {
-      const GraphHit hit{{&program, &registers, static_cast<int>(lane)}, are_resolved ? &columns : nullptr};
+      const GraphHit hit{{&program, &registers, static_cast<int>(lane)}, plain != nullptr ? &hits.lobes : nullptr};
       shade_surface<kFeatures>(g, state, queue.paths[first + lane], located[lane], next, shadow, counters, &hit);
     }
   }

@@ -9,7 +9,7 @@
 #include <memory>
 
 #include "kernel/bsdf/mixture.h"
-#include "kernel/stage/surface_interaction.h"
+#include "kernel/stage/shade_surfaces.h"
 
 namespace relief {
 
@@ -166,37 +166,19 @@ struct Resolved {
 
 [[gnu::noinline, gnu::flatten]] void resolve(const KernelGlobals& g,
                                              const GraphLane& lane,
-                                             const Principled3Columns* columns,
                                              ClosureSight sight,
                                              const Hit& hit,
                                              Resolved& resolved)
 {
   resolved.at.hit.Ns = hit.Ns;
-  surface_interaction_mix<kFeatures>(g, hit.wo, lane, columns, sight, resolved.at, resolved.lobes);
-}
-
-/// What stages do before for eight hits. @return  columns; null: the closures are not such
-const Principled3Columns* resolve_columns(const GraphProgramView& program,
-                                          const GraphRegisters& registers,
-                                          const Hit* hits,
-                                          Principled3Columns& columns)
-{
-  const SurfaceClosureSpec* const plain = closures_plain(program);
-  if (plain == nullptr) return nullptr;
-  MixtureBuildLanes b{{}, splat8(Vec3f{0, 0, 1}), {}};
-  for (int k = 0; k < 8; ++k) {
-    lane_set(b.wo, k, hits[k].wo);
-    lane_set(b.Ns, k, hits[k].Ns);
-  }
-  closures_resolve_plain(program, *plain, registers, b, columns);
-  return &columns;
+  surface_interaction_mix<kFeatures>(g, hit.wo, lane, nullptr, sight, resolved.at, resolved.lobes);
 }
 
 [[gnu::noinline, gnu::flatten]] float evaluate(const KernelGlobals& g, const Hit& hit, const Resolved& resolved)
 {
   const ShadingSide& side = resolved.at.side;
   const Mixture closure = mixture_of(resolved.lobes, side.frame, side.Ng);
-  if (mixture_is_delta(closure)) return 0.0f;
+  if (lobes_are_delta(resolved.lobes)) return 0.0f;
   const BsdfEval e = closure_eval<kFeatures>(closure, *g.bsdf_tables, to_local(side.frame, hit.light));
   return e.f.x + e.pdf;
 }
@@ -207,6 +189,46 @@ const Principled3Columns* resolve_columns(const GraphProgramView& program,
   const Mixture closure = mixture_of(resolved.lobes, side.frame, side.Ng, 1.0f / resolved.at.params.alpha);
   const BsdfSample s = closure_sample<kFeatures>(closure, *g.bsdf_tables, hit.u_branch, hit.u);
   return s.f.x + s.pdf + s.wi.z;
+}
+
+/// All three of eight hits, as stages do it where these have one plain material.
+/// @return  0: its closures are not such, and nothing is done
+[[gnu::noinline, gnu::flatten]] float shade_eight(const KernelGlobals& g,
+                                                  const GraphProgramView& program,
+                                                  const GraphRegisters& registers,
+                                                  ClosureSight sight,
+                                                  const Hit* hits,
+                                                  Resolved* resolved,
+                                                  Principled3Hits& columns)
+{
+  const SurfaceClosureSpec* const plain = closures_plain(program);
+  if (plain == nullptr || !closure_scatters_alone(program, *plain)) return 0.0f;
+  MixtureBuildLanes b{{}, splat8(Vec3f{0, 0, 1}), {}};
+  for (int k = 0; k < 8; ++k) {
+    lane_set(b.wo, k, hits[k].wo);
+    lane_set(b.Ns, k, hits[k].Ns);
+  }
+  closures_resolve_plain(program, *plain, registers, b, columns.lobes);
+  principled3_hits_make(b, frame_from_normal(shading_normal_towards(b.Ns, b.wo)), splat8(sight.blur.alpha), columns);
+  for (int k = 0; k < 8; ++k) {
+    SurfaceInteraction& at = resolved[k].at;
+    at.hit.Ns = hits[k].Ns;
+    Principled3Lane lane{&columns, k};
+    surface_interaction_mix<kFeatures>(g, hits[k].wo, {&program, &registers, k}, &columns.lobes, sight, at, lane);
+    store_lane(columns.to_lamp, k, hits[k].light);
+    columns.u[0][k] = hits[k].u.x;
+    columns.u[1][k] = hits[k].u.y;
+  }
+  principled3_hits_light(columns);
+  principled3_hits_sample(columns);
+  float sum = 0.0f;
+  for (int k = 0; k < 8; ++k) {
+    const Principled3Lane lane{&columns, k, 1.0f / resolved[k].at.params.alpha};
+    const BsdfEval e = closure_eval<kFeatures>(lane, *g.bsdf_tables, {});
+    const BsdfSample s = closure_sample(lane);
+    sum += e.f.x + e.pdf + s.f.x + s.pdf + s.wi.z;
+  }
+  return sum;
 }
 
 /// @return  seconds
@@ -227,7 +249,7 @@ void case_run(const KernelGlobals& g,
 {
   const GraphProgramView program = one.program();
   const GraphRegisters registers{};
-  Principled3Columns columns;
+  Principled3Hits columns{};
   ClosureSight sight;
   sight.enters = true;
   if (one.is_curve) sight.tangent = {1, 0, 0};
@@ -238,9 +260,7 @@ void case_run(const KernelGlobals& g,
       for (int i = 0; i < num_hits; i += 8) f(i);
     });
   };
-  const auto resolve_at = [&](int i, int k, const Principled3Columns* from = nullptr) {
-    resolve(g, {&program, &registers, k}, from, sight, hits[i + k], resolved[k]);
-  };
+  const auto resolve_at = [&](int i, int k) { resolve(g, {&program, &registers, k}, sight, hits[i + k], resolved[k]); };
   step(ClosureStep::kResolve, [&](int i) {
     for (int k = 0; k < 8; ++k) resolve_at(i, k);
     times.sum += resolved[0].lobes.lobes[0].probability;
@@ -259,8 +279,10 @@ void case_run(const KernelGlobals& g,
     }
   });
   step(ClosureStep::kEight, [&](int i) {
-    const Principled3Columns* const from = resolve_columns(program, registers, hits + i, columns);
-    for (int k = 0; k < 8; ++k) resolve_at(i, k, from);
+    const float together = shade_eight(g, program, registers, sight, hits + i, resolved, columns);
+    times.sum += together;
+    if (together > 0.0f) return;
+    for (int k = 0; k < 8; ++k) resolve_at(i, k);
     for (int k = 0; k < 8; ++k) times.sum += evaluate(g, hits[i + k], resolved[k]);
     for (int k = 0; k < 8; ++k) times.sum += sample(g, hits[i + k], resolved[k]);
   });

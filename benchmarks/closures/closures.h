@@ -12,7 +12,7 @@ enum class ClosureStep : std::uint8_t {
   kEvaluate,  ///< of all lobes, towards a lamp
   kSample,    ///< a direction, and all lobes towards it
   kHit,       ///< the three, one hit after the other
-  kEight,     ///< the three, each for eight hits before the next; plain Principled ones are resolved as columns
+  kEight,     ///< the three, each for eight hits before the next; plain Principled ones as columns
   kCount
 };
 inline constexpr int kNumClosureSteps = static_cast<int>(ClosureStep::kCount);

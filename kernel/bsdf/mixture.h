@@ -182,11 +182,11 @@ RELIEF_KERNEL bool closure_has(const Mixture& m, SharpLobes sharp)
 }
 
 /// Whether there is nothing but delta lobes, so that lights need not be sampled.
-RELIEF_KERNEL bool mixture_is_delta(const Mixture& m)
+RELIEF_KERNEL bool lobes_are_delta(const MixtureLobes& lobes)
 {
-  bool is_delta = true;
-  mixture_visit(m, [&](const MixtureLobe& lobe) { is_delta = is_delta && lobe.is_delta; });
-  return is_delta;
+  bool are_delta = true;
+  for (int i = 0; i < lobes.size; ++i) are_delta = are_delta && lobes.lobes[i].is_delta;
+  return are_delta;
 }
 
 }  // namespace relief

@@ -78,31 +78,19 @@ RELIEF_KERNEL F8 fresnel_dielectric_weight(F8 cos_i, F8 eta)
                                                               const Principled3Lanes& in,
                                                               Principled3Columns& columns)
 {
-  const auto put = [](float(*to)[8], const Vec3x8& v) {
-    store8(to[0], v.x);
-    store8(to[1], v.y);
-    store8(to[2], v.z);
-  };
   const F8 zero = splat8(0.0f);
-  const Vec3x8 N = closure_normal(b, in.normal);
-  const F8 sign = __builtin_bit_cast(F8, (bits_of(N.z) & 0x80000000u) | bits_of(splat8(1.0f)));
-  const F8 a = -1.0f / (sign + N.z);
-  const F8 across = N.x * N.y * a;
-  const Vec3x8 s{1.0f + sign * N.x * N.x * a, sign * across, -sign * N.x}, t{across, sign + N.y * N.y * a, -N.y};
-  const auto to_frame = [&](const Vec3x8& v) { return Vec3x8{dot(v, s), dot(v, t), dot(v, N)}; };
-  const Vec3x8 wo = to_frame(b.wo);
-  put(columns.frame, s);
-  put(columns.frame + 3, t);
-  put(columns.frame + 6, N);
-  put(columns.wo, wo);
-  put(columns.surface_N, to_frame(b.Ns));
-  store8(columns.cos_bend, dot(N, b.Ns));
+  const Frame8 frame = frame_from_normal(closure_normal(b, in.normal));
+  const Vec3x8 wo = to_local(frame, b.wo);
+  store8(columns.frame, frame);
+  store8(columns.wo, wo);
+  store8(columns.surface_N, to_local(frame, b.Ns));
+  store8(columns.cos_bend, dot(frame.n, b.Ns));
 
   const F8 metallic = clamp(in.metallic, 0.0f, 1.0f);
   const Vec3x8 color = in.base_color;
   const F8 base_weight = 1.0f - metallic;
   const Vec3x8 diffuse = Vec3x8{max(color.x, zero), max(color.y, zero), max(color.z, zero)} * (in.weight * base_weight);
-  put(columns.diffuse, select(base_weight > kLeastClosureWeight, diffuse, Vec3x8{}));
+  store8(columns.diffuse, select(base_weight > kLeastClosureWeight, diffuse, Vec3x8{}));
   store8(columns.given_roughness, in.roughness);
 
   const F8 roughness = clamp(abs(in.roughness), 0.0f, 1.0f), alpha = roughness * roughness;
@@ -115,7 +103,7 @@ RELIEF_KERNEL F8 fresnel_dielectric_weight(F8 cos_i, F8 eta)
   const Vec3x8 tint = lerp(in.specular_tint, white, select(luminance > 0.0f, color / luminance, white));
   const Vec3x8 F0 = saturated(lerp(in.metallic, tint * (0.08f * in.specular), color));
   const F8 eta = 2.0f / (1.0f - safe_sqrt(0.08f * min(max(in.specular, zero), splat8(12.4f)))) - 1.0f;
-  put(columns.F0, F0);
+  store8(columns.F0, F0);
   store8(columns.eta, eta);
   store8(columns.specular_weight, in.weight);
   const F8 w = fresnel_dielectric_weight(wo.z, eta);
@@ -127,7 +115,7 @@ RELIEF_KERNEL F8 fresnel_dielectric_weight(F8 cos_i, F8 eta)
 /// Adds the lobes of one hit that the closure has a weight at, as closure_add does.
 RELIEF_KERNEL void principled3_lane_add(MixtureBuild& b, const Principled3Columns& columns, int lane)
 {
-  const auto vector = [lane](const float(*from)[8]) { return Vec3f{from[0][lane], from[1][lane], from[2][lane]}; };
+  const auto vector = [lane](const float(*from)[8]) { return load_lane(from, lane); };
   const Vec3f wo = vector(columns.wo);
   if (!(wo.z > kMinCosine)) return;
   const bool is_bent = !(columns.cos_bend[lane] > kUnbentLobe);

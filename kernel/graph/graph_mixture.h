@@ -33,6 +33,7 @@ RELIEF_KERNEL Inputs closure_inputs(const GraphLane& at, const SurfaceClosureSpe
 }
 
 /// Resolves all closures that have a weight at the point.
+/// @param build    its list of lobes may be missing where those of columns are all
 /// @param columns  of closures_resolve_plain; null: there are none
 [[gnu::noinline]] RELIEF_KERNEL void closures_resolve(const GraphLane& at,
                                                       MixtureBuild& build,
@@ -44,7 +45,7 @@ RELIEF_KERNEL Inputs closure_inputs(const GraphLane& at, const SurfaceClosureSpe
     if (!(weight > kLeastClosureWeight && weight < kInfinity)) continue;
     build.maths = spec.maths;
     if (columns != nullptr && columns->first_result == spec.first_result) {
-      principled3_lane_add(build, *columns, at.lane);
+      if (build.lobes != nullptr) principled3_lane_add(build, *columns, at.lane);
       continue;
     }
     switch (spec.kind) {
@@ -84,6 +85,19 @@ RELIEF_KERNEL const SurfaceClosureSpec* closures_plain(const GraphProgramView& p
     if (closure_is_plain(program, program.closures[i])) return &program.closures[i];
   }
   return nullptr;
+}
+
+/// Whether nothing else of a program scatters.
+/// @param plain  of closures_plain
+RELIEF_KERNEL bool closure_scatters_alone(const GraphProgramView& program, const SurfaceClosureSpec& plain)
+{
+  for (std::uint32_t i = 0; i < program.num_closures; ++i) {
+    const SurfaceClosureSpec& spec = program.closures[i];
+    const bool scatters = spec.kind != ClosureKind::emission && spec.kind != ClosureKind::transparent &&
+                          spec.kind != ClosureKind::holdout;
+    if (scatters && &spec != &plain) return false;
+  }
+  return true;
 }
 
 /// Resolves a plain Principled closure of eight hits.

@@ -28,6 +28,56 @@ RELIEF_KERNEL Vec3x8 select(I8 which, const Vec3x8& a, const Vec3x8& b)
   return {which ? a.x : b.x, which ? a.y : b.y, which ? a.z : b.z};
 }
 
+RELIEF_KERNEL I8 load8(const std::int32_t* from)
+{
+  I8 lanes;
+  __builtin_memcpy(&lanes, from, sizeof lanes);
+  return lanes;
+}
+RELIEF_KERNEL void store8(std::int32_t* to, I8 lanes) { __builtin_memcpy(to, &lanes, sizeof lanes); }
+
+/// Vectors that lie in memory a coordinate after the other.
+RELIEF_KERNEL Vec3x8 load8(const float (*from)[8]) { return {load8(from[0]), load8(from[1]), load8(from[2])}; }
+RELIEF_KERNEL void store8(float (*to)[8], const Vec3x8& v)
+{
+  store8(to[0], v.x);
+  store8(to[1], v.y);
+  store8(to[2], v.z);
+}
+/// One of them.
+RELIEF_KERNEL Vec3f load_lane(const float (*from)[8], int lane)
+{
+  return {from[0][lane], from[1][lane], from[2][lane]};
+}
+RELIEF_KERNEL void store_lane(float (*to)[8], int lane, Vec3f v)
+{
+  to[0][lane] = v.x;
+  to[1][lane] = v.y;
+  to[2][lane] = v.z;
+}
+
+/// Eight frames, as Frame is one.
+struct Frame8 {
+  Vec3x8 s, t, n;
+};
+
+RELIEF_KERNEL Frame8 frame_from_normal(const Vec3x8& n)
+{
+  const F8 sign = __builtin_bit_cast(F8, (bits_of(n.z) & 0x80000000u) | bits_of(splat8(1.0f)));
+  const F8 a = -1.0f / (sign + n.z);
+  const F8 b = n.x * n.y * a;
+  return {{1.0f + sign * n.x * n.x * a, sign * b, -sign * n.x}, {b, sign + n.y * n.y * a, -n.y}, n};
+}
+RELIEF_KERNEL Vec3x8 to_local(const Frame8& f, const Vec3x8& v) { return {dot(v, f.s), dot(v, f.t), dot(v, f.n)}; }
+RELIEF_KERNEL Vec3x8 from_local(const Frame8& f, const Vec3x8& v) { return f.s * v.x + f.t * v.y + f.n * v.z; }
+RELIEF_KERNEL Frame8 load_frame8(const float (*from)[8]) { return {load8(from), load8(from + 3), load8(from + 6)}; }
+RELIEF_KERNEL void store8(float (*to)[8], const Frame8& f)
+{
+  store8(to, f.s);
+  store8(to + 3, f.t);
+  store8(to + 6, f.n);
+}
+
 /// As difference_of_products of each lane.
 RELIEF_KERNEL F8 difference_of_products(F8 a, F8 b, F8 c, F8 d)
 {

@@ -12,6 +12,12 @@ struct LightAnswer {
   const Light* emitter = nullptr;  ///< in world space; null: the environment
 };
 
+/// Whether anything comes from there.
+RELIEF_KERNEL bool light_answers(const LightAnswer& answer)
+{
+  return answer.sample.pdf > 0.0f && !is_zero(answer.radiance);
+}
+
 /// Samples a light that lights_choose has chosen.
 /// @param P, N     as given to lights_choose
 /// @param storage  as of lights_at; lives as long as the answer

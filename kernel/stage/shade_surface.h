@@ -5,8 +5,6 @@
 // seldom met. With that inside too, compiling took twice as long, and nothing was faster.
 #pragma once
 
-#include <type_traits>
-
 #include "kernel/counters.h"
 #include "kernel/sample/dimensions.h"
 #include "kernel/sample/sobol.h"
@@ -77,6 +75,88 @@ RELIEF_KERNEL bool shade_surface_holdout(const KernelGlobals& g,
   return is_object || hole == 1.0f;
 }
 
+/// How a path goes on from a surface.
+enum class SurfaceWay : std::uint8_t {
+  kEnds,
+  kPasses,    ///< it is let through
+  kScatters,  ///< by a sample of the closure, if there is one
+};
+
+/// What has come of a path at a surface, before its closure is asked.
+struct SurfaceVisit {
+  ScatterSamples u;
+  Vec3f throughput;  ///< up to the surface
+  Vec3f light_N;     ///< given to lights_choose
+  RayCone cone;
+  LightsChoice chosen;  ///< the light that is asked for
+  SurfaceWay way = SurfaceWay::kEnds;
+};
+
+/// Of a resolved surface: what it emits, what the film is told of it, which light is asked for, and whether the path is let
+/// through.
+/// @param lobes  of a material of closures
+/// @param visit  has u, and gets the rest
+template <unsigned kFeatures, typename Lobes>
+RELIEF_KERNEL void shade_surface_meet(const KernelGlobals& g,
+                                      PathState& state,
+                                      std::uint32_t path,
+                                      SurfaceInteraction& at,
+                                      const Lobes& lobes,
+                                      SurfaceVisit& visit,
+                                      ShadowQueue& shadow,
+                                      Counters& counters)
+{
+  ++counters.surface_hits;
+  constexpr bool kMixture = (kFeatures & kFeatureMixture) != 0;
+  const Vec3f sigma_a = path_sigma_a(state, path);
+  // Whatever stands in a medium, of glass or not.
+  const Vec3f transmittance =
+      is_zero(sigma_a) ? Vec3f{1, 1, 1} : path_transmittance(sigma_a, path_ray_length(g, state, path));
+  visit.throughput = path_throughput(state, path) * transmittance;
+  visit.cone = at.cone;
+  if ((at.instance->flags & kDisplaced) != 0) visit.cone.width = min(visit.cone.width, state.hit_width[path]);
+  visit.chosen.probability = 0.0f;
+  visit.way = SurfaceWay::kEnds;
+  const bool last = path_is_last(g, state, path);
+  const bool is_held = shade_surface_holdout<kFeatures>(g, state, path, at, transmittance);
+  // Closures emit, and are lit, whether or not others let the path through.
+  if (kMixture && !is_held) {
+    shade_surface_emission<kFeatures>(g, state, path, at, visit.throughput);
+    visit.light_N = surface_light_N(at);
+    if (g.has_lights && !last && !lobes_are_delta(lobes)) {
+      visit.chosen = lights_choose(g.lights, at.hit.P, visit.light_N, visit.u.light);
+    }
+  }
+  if (!surface_is_met<kFeatures>(state, path, at.params.alpha, path_surface(state, path))) {
+    ++counters.transparent_hits;
+    visit.way = SurfaceWay::kPasses;
+    return;
+  }
+  if (is_held) {
+    if ((state.flags[path] & kPathSawSurface) == 0) film_add_clear(g.film, state.pixel[path], -1.0f);
+    return;
+  }
+
+  surface_interaction_frame<kFeatures>(g, state, path, -path_direction(state, path), at);
+  if ((state.flags[path] & kPathSawSurface) == 0) {
+    state.flags[path] |= kPathSawSurface;
+    const Vec3f N = g.film.layout.normal >= 0 ? surface_mean_normal<kFeatures>(at, lobes) : at.side.Ns;
+    shade_surface_first_hit<kFeatures>(g, state, path, at, N, shadow);
+  }
+  if constexpr (!kMixture) shade_surface_emission<kFeatures>(g, state, path, at, visit.throughput);
+  if (g.film.layout.denoising && (state.flags[path] & kPathSawFeature) == 0) {
+    shade_surface_denoising<kFeatures>(g, state, path, at, visit.throughput, surface_mean_normal<kFeatures>(at, lobes));
+  }
+  if (at.params.unlit || last) return;
+  visit.way = SurfaceWay::kScatters;
+  if constexpr (!kMixture) {
+    visit.light_N = surface_light_N(at);
+    if (g.has_lights && !surface_is_delta(at.params)) {
+      visit.chosen = lights_choose(g.lights, at.hit.P, visit.light_N, visit.u.light);
+    }
+  }
+}
+
 /// Shades one path. Reads and writes every column but the hit's.
 /// @param at     as surface_interactions_locate has it; is completed
 /// @param graph  of the material's program at the hit; null: it has none
@@ -91,101 +171,52 @@ template <unsigned kFeatures>
                                                   Counters& counters,
                                                   const GraphHit* graph = nullptr)
 {
-  ++counters.surface_hits;
-  const Vec3f wo = -path_direction(state, path);
-  const int surface = path_surface(state, path);
-  // Early: nothing waits for them yet.
-  const ScatterSamples u = scatter_samples(state.pixel_hash[path], state.sample_index[path], surface);
-
   constexpr bool kMixture = (kFeatures & kFeatureMixture) != 0;
+  const Vec3f wo = -path_direction(state, path);
+  SurfaceVisit visit;
+  // Early: nothing waits for them yet.
+  visit.u = scatter_samples(state.pixel_hash[path], state.sample_index[path], path_surface(state, path));
   MixtureLobes lobes;
   surface_interaction_resolve<kFeatures>(g, state, path, wo, at, lobes, graph);
-  // Whatever stands in a medium, of glass or not.
-  const auto transmittance = [&] {
-    const Vec3f sigma_a = path_sigma_a(state, path);
-    return is_zero(sigma_a) ? Vec3f{1, 1, 1} : path_transmittance(sigma_a, path_ray_length(g, state, path));
+  shade_surface_meet<kFeatures>(g, state, path, at, lobes, visit, shadow, counters);
+
+  const auto ends = [&] {
+    if (visit.way == SurfaceWay::kPasses && path_pass_through(g, state, path, at.passed)) queue_push(next, path);
+    return visit.way != SurfaceWay::kScatters;
   };
-  const ShadingSide& side = at.side;
-  RayCone cone = at.cone;
-  if ((at.instance->flags & kDisplaced) != 0) cone.width = min(cone.width, state.hit_width[path]);
-  const bool last = path_is_last(g, state, path);
-  const bool is_held = shade_surface_holdout<kFeatures>(g, state, path, at, transmittance());
-  // Closures emit, and are lit, whether or not others let the path through.
-  if (kMixture && !is_held) {
-    const Vec3f throughput = path_throughput(state, path) * transmittance();
-    shade_surface_emission<kFeatures>(g, state, path, at, throughput);
-    const Mixture closure = mixture_of(lobes, side.frame, side.Ng);
-    if (g.has_lights && !last && !mixture_is_delta(closure)) {
-      const Vec3f light_N = surface_light_N(at);
-      const LightsChoice chosen = lights_choose(g.lights, at.hit.P, light_N, u.light);
-      if (chosen.probability > 0.0f) {
-        const ScatterEvent<Mixture> event{at, closure, throughput, light_N, cone};
-        shade_surface_light<kFeatures>(g, state, path, event, chosen, shadow);
-      }
-    }
-  }
-  if (!surface_is_met<kFeatures>(state, path, at.params.alpha, surface)) {
-    ++counters.transparent_hits;
-    if (path_pass_through(g, state, path, at.passed)) queue_push(next, path);
-    return;
-  }
-  if (is_held) {
-    if ((state.flags[path] & kPathSawSurface) == 0) film_add_clear(g.film, state.pixel[path], -1.0f);
-    return;
-  }
-
-  Vec3f throughput = path_throughput(state, path);
-  if (!is_zero(path_sigma_a(state, path))) throughput *= transmittance();
-
-  surface_interaction_frame<kFeatures>(g, state, path, wo, at);
-  const SurfaceParams& params = at.params;
-  const Vec3f wo_local = to_local(side.frame, wo);
-
-  if ((state.flags[path] & kPathSawSurface) == 0) {
-    state.flags[path] |= kPathSawSurface;
-    const Vec3f N = g.film.layout.normal >= 0 ? surface_mean_normal<kFeatures>(at, lobes) : side.Ns;
-    shade_surface_first_hit<kFeatures>(g, state, path, at, N, shadow);
-  }
-
-  if constexpr (!kMixture) shade_surface_emission<kFeatures>(g, state, path, at, throughput);
-  if (g.film.layout.denoising && (state.flags[path] & kPathSawFeature) == 0) {
-    shade_surface_denoising<kFeatures>(g, state, path, at, throughput, surface_mean_normal<kFeatures>(at, lobes));
-  }
-  if (params.unlit || last) return;
-
-  const Vec3f light_N = surface_light_N(at);
-  LightsChoice chosen;
   if constexpr (!kMixture) {
-    if (g.has_lights && !surface_is_delta(params)) {
-      chosen = lights_choose(g.lights, at.hit.P, light_N, u.light);
-    }
+    if (ends()) return;
   }
-
-  // While the chosen light is on its way from memory, the BSDF is sampled.
-  const auto closure = [&] {
+  const ShadingSide& side = at.side;
+  auto closure = [&] {
     if constexpr (kMixture) {
-      return mixture_of(lobes, side.frame, side.Ng, 1.0f / params.alpha);
+      return mixture_of(lobes, side.frame, side.Ng);
     } else {
-      return surface_closure_make<kFeatures>(params, *g.bsdf_tables, wo_local);
+      return surface_closure_make<kFeatures>(at.params, *g.bsdf_tables, to_local(side.frame, wo));
     }
   }();
-  const BsdfSample bsdf = closure_sample<kFeatures>(closure, *g.bsdf_tables, u.branch, u.bsdf);
-  const ScatterEvent<std::remove_const_t<decltype(closure)>> event{at, closure, throughput, light_N, cone};
-
-  if (chosen.probability > 0.0f) shade_surface_light<kFeatures>(g, state, path, event, chosen, shadow);
-
-  if constexpr ((kFeatures & kFeatureCaustics) != 0) {
-    shade_surface_photons<kFeatures>(g, state, path, event, wo_local);
+  const ScatterEvent<decltype(closure)> event{at, closure, visit.throughput, visit.light_N, visit.cone};
+  const auto light = [&] {
+    if (visit.chosen.probability > 0.0f) shade_surface_light<kFeatures>(g, state, path, event, visit.chosen, shadow);
+  };
+  if constexpr (kMixture) {
+    light();
+    if (ends()) return;
+    closure.gain = 1.0f / at.params.alpha;
   }
-
+  // While the chosen light is on its way from memory, glTF's closures are sampled.
+  const BsdfSample bsdf = closure_sample<kFeatures>(closure, *g.bsdf_tables, visit.u.branch, visit.u.bsdf);
+  if constexpr (!kMixture) light();
+  if constexpr ((kFeatures & kFeatureCaustics) != 0) {
+    shade_surface_photons<kFeatures>(g, state, path, event, to_local(side.frame, wo));
+  }
   if constexpr (kMixture) {
     if (__builtin_expect((bsdf.lobe & kLobeSubsurface) != 0, 0)) {
-      path_enter_surface(state, path, at, lobes.lobes[bsdf.entered], bsdf, throughput);
+      path_enter_surface(state, path, at, lobes.lobes[bsdf.entered], bsdf, visit.throughput);
       return;
     }
   }
-
-  shade_surface_split<kFeatures>(g, state, path, event, bsdf, u, next);
+  shade_surface_split<kFeatures>(g, state, path, event, bsdf, visit.u, next);
 }
 
 }  // namespace relief

@@ -10,19 +10,10 @@ namespace relief {
 /// Shading normal of all that scatters at a surface: of a mixture the mean of its lobes', each of which may be bumped, by
 /// what they weigh, as in Cycles.
 /// @return  at most unit length; shorter where lobes disagree
-template <unsigned kFeatures>
-RELIEF_KERNEL Vec3f surface_mean_normal(const SurfaceInteraction& at, const MixtureLobes& lobes)
+template <unsigned kFeatures, typename Lobes>
+RELIEF_KERNEL Vec3f surface_mean_normal(const SurfaceInteraction& at, const Lobes& lobes)
 {
-  if (!has_mixture<kFeatures>(at)) return at.side.Ns;
-  Vec3f sum;
-  float total = 0;
-  for (int i = 0; i < lobes.size; ++i) {
-    const Vec3f weight = lobes.lobes[i].weight;
-    const float share = __builtin_fabsf(weight.x + weight.y + weight.z);
-    sum += share * lobes.lobes[i].frame.n;
-    total += share;
-  }
-  return is_zero(sum) ? at.side.Ns : sum / total;
+  return has_mixture<kFeatures>(at) ? lobes_normal(lobes, at.side.Ns) : at.side.Ns;
 }
 
 /// Queues a ray that sees whether the surroundings of a first hit are open.

@@ -14,6 +14,7 @@
 #include "kernel/shape/facet_masking.h"
 #include "kernel/shape/surface_hits.h"
 #include "kernel/stage/path_access.h"
+#include "kernel/stage/surface_lobes.h"
 #include "kernel/texture/ray_cone.h"
 
 namespace relief {
@@ -59,23 +60,20 @@ RELIEF_KERNEL bool has_mixture(const SurfaceInteraction& at)
 /// A shading normal on the side of the geometric one.
 RELIEF_KERNEL Vec3f shading_normal_turned(Vec3f Ns, Vec3f Ng_side) { return dot(Ns, Ng_side) < 0.0f ? -Ns : Ns; }
 
+/// The least cosine to wo keeps the local frame's arithmetic away from zero; 1e-3 is 0.06° and cannot be seen.
+inline constexpr float kLeastShadingCosine = 1e-3f;
+
 /// Bends a shading normal until wo is above its horizon.
 /// Interpolated normals can face away from a viewer who sees the facet; leaving them so makes dark rims.
 RELIEF_KERNEL Vec3f shading_normal_towards(Vec3f Ns, Vec3f wo)
 {
   const float cos_o = dot(Ns, wo);
-  // The least cosine keeps the local frame's arithmetic away from zero; 1e-3 is 0.06° and cannot be seen.
-  constexpr float kLeastCosine = 1e-3f;
-  if (cos_o >= kLeastCosine) return Ns;
-  return normalize(Ns + (kLeastCosine - cos_o) * wo);
+  if (cos_o >= kLeastShadingCosine) return Ns;
+  return normalize(Ns + (kLeastShadingCosine - cos_o) * wo);
 }
 
 /// Cosine between a shading normal and what was made of it, less than which it was bent: 1 but for rounding.
 inline constexpr float kUnbent = 1.0f - 1e-6f;
-
-/// A denoiser is better told of what is behind or mirrored by a surface that scatters less than a quarter of its light by other
-/// lobes than those up to this perceptual roughness, a width α of .075. The same bounds as Cycles'.
-inline constexpr float kSeenThroughRoughness = 0.27386f;
 
 /// Whether a share of the light is so small.
 /// @param others  scattered by other lobes
@@ -209,37 +207,6 @@ RELIEF_KERNEL std::uint32_t path_ray_kinds(const PathState& state, std::uint32_t
   return side | bit(GraphRayKind::kGlossy) | (state.pdf[path] > 0.0f ? 0u : bit(GraphRayKind::kSingular));
 }
 
-/// Resolves the closure of up to eight located points that can be resolved for all together, if there is one.
-/// @param registers  of the program's run
-/// @return           whether there is
-RELIEF_KERNEL bool surface_interactions_resolve(const PathState& state,
-                                                const std::uint32_t* paths,
-                                                int count,
-                                                const SurfaceInteraction* at,
-                                                const GraphRegisters& registers,
-                                                const GraphProgramView& program,
-                                                Principled3Columns& columns)
-{
-  // Fewer are not worth it.
-  const SurfaceClosureSpec* const plain = count > 2 ? closures_plain(program) : nullptr;
-  if (plain == nullptr) return false;
-  alignas(32) float numbers[9][8] = {};
-  for (int k = 0; k < count; ++k) {
-    const Vec3f vectors[3] = {-path_direction(state, paths[k]), at[k].side.Ng,
-                              shading_normal_turned(at[k].hit.Ns, at[k].side.Ng)};
-    for (int v = 0; v < 3; ++v) {
-      numbers[3 * v][k] = vectors[v].x;
-      numbers[3 * v + 1][k] = vectors[v].y;
-      numbers[3 * v + 2][k] = vectors[v].z;
-    }
-  }
-  const auto take = [&](int first) {
-    return Vec3x8{load8(numbers[first]), load8(numbers[first + 1]), load8(numbers[first + 2])};
-  };
-  closures_resolve_plain(program, *plain, registers, {take(0), take(3), take(6)}, columns);
-  return true;
-}
-
 /// What a graph may read of a located point.
 RELIEF_KERNEL GraphPoint surface_graph_point(const KernelGlobals& g,
                                              const PathState& state,
@@ -287,21 +254,6 @@ RELIEF_KERNEL void surface_params_blur(SurfaceParams& p, SurfaceBlur blur)
   }
 }
 
-/// Makes the least chance of a lobe an eighth of all: where the camera looks, a faint reflection of something bright is seen.
-/// The chances are Cycles'. They decide what counts as diffuse where limits of bounces end some kinds of path, and so the mean.
-/// @param passing  chance of what passes through
-RELIEF_KERNEL void mixture_lobes_defend(MixtureLobes& lobes, float passing)
-{
-  constexpr float kLeastShare = 0.125f;
-  float sum = passing;
-  for (int i = 0; i < lobes.size; ++i) sum += lobes.lobes[i].probability;
-  for (int i = 0; i < lobes.size; ++i) {
-    MixtureLobe& lobe = lobes.lobes[i];
-    // What facets scatter more than once is part of their lobe.
-    if (lobe.kind != MixtureLobeKind::kMultiple) lobe.probability = max(lobe.probability, kLeastShare * sum);
-  }
-}
-
 /// What closures depend on of the path that meets them.
 struct ClosureSight {
   SurfaceBlur blur;
@@ -334,20 +286,19 @@ RELIEF_KERNEL ClosureSight closure_sight(const KernelGlobals& g,
 /// Resolves the closures of a located point: its lobes, its frame, and the parameters that stages ask for.
 /// @param lane         of the material's program
 /// @param columns      of closures_resolve_plain; null: there are none
-/// @param lobes        gets the lobes
-template <unsigned kFeatures>
+/// @param lobes        gets the lobes, or has them
+template <unsigned kFeatures, typename Lobes>
 RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
                                            Vec3f wo,
                                            const GraphLane& lane,
                                            const Principled3Columns* columns,
                                            ClosureSight sight,
                                            SurfaceInteraction& at,
-                                           MixtureLobes& lobes)
+                                           Lobes& lobes)
 {
   ShadingSide& side = at.side;
   const Vec3f Ns = shading_normal_turned(at.hit.Ns, side.Ng);
-  lobes.size = 0;
-  MixtureBuild build{wo, side.Ng, Ns, side.front, g.bsdf_tables, &lobes};
+  MixtureBuild build{wo, side.Ng, Ns, side.front, g.bsdf_tables, lobes_begin(lobes)};
   const SurfaceBlur blur = sight.blur;
   build.blur = blur.alpha;
   build.most_sharp = blur.most_sharp;
@@ -369,10 +320,10 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   side.Ns = shading_normal_towards(build.Ns, wo);
   side.bent = !(dot(side.Ns, Ns) > kUnbent);
   side.frame = frame_from_normal(side.Ns);
-  closures_resolve(lane, build, build.reflects && is_zero(build.tangent) ? columns : nullptr);
-  if (blur.alpha > 0.0f) {
-    for (int i = 0; i < lobes.size; ++i) lobe_blur(lobes.lobes[i], blur.alpha, blur.most_sharp);
+  if (build.lobes != nullptr || lane.program->num_closures > 1) {
+    closures_resolve(lane, build, build.reflects && is_zero(build.tangent) ? columns : nullptr);
   }
+  if (blur.alpha > 0.0f) lobes_blur(lobes, blur.alpha, blur.most_sharp);
 
   const Material& m = *at.material;
   SurfaceParams& p = at.params;
@@ -384,19 +335,12 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
     p.sigma_a = volume_sigma_a(m.attenuation_color, m.attenuation_distance);
   }
   at.holdout = clamp(build.holdout, 0.0f, 1.0f);
-  float scattered = at.holdout;
-  Vec3f albedo;
-  float sharp = 0.0f;
-  for (int i = 0; i < lobes.size; ++i) {
-    const MixtureLobe& lobe = lobes.lobes[i];
-    scattered += lobe.probability;
-    albedo += lobe.weight;
-    if (lobe.roughness <= kSeenThroughRoughness) sharp += lobe.probability;
-  }
-  at.summary.albedo = min(albedo, splat3(1.0f));
-  at.summary.is_seen_through =
-      sharp > 0.0f && share_is_seen_through(scattered - sharp, scattered) && max_component(at.summary.albedo) > 0.0f;
-  if (sight.is_first) mixture_lobes_defend(lobes, mean_component(build.transparency));
+  const LobesSum sum = lobes_sum(lobes);
+  const float scattered = at.holdout + sum.probability;
+  at.summary.albedo = min(sum.weight, splat3(1.0f));
+  at.summary.is_seen_through = sum.sharp > 0.0f && share_is_seen_through(scattered - sum.sharp, scattered) &&
+                               max_component(at.summary.albedo) > 0.0f;
+  if (sight.is_first) lobes_defend(lobes, mean_component(build.transparency));
   const float passing = max_component(build.transparency);
   if (!(passing > 0.0f)) return;
   // Whichever way a path takes, it takes by its share of the light; what it then carries makes up for the chance.

@@ -18,27 +18,25 @@ shade_surface_seen_by(const KernelGlobals& g, const Closure& closure, Vec3f wi, 
   return hides.diffuse ? max(f - diffuse, Vec3f{}) : diffuse;
 }
 
-/// Queues a shadow ray towards a light sample taken at the hit.
-/// @param chosen  from lights_choose
+/// Queues a shadow ray towards a light that answers.
+/// @param wi    where it is, in the closure's frame
+/// @param bsdf  of the closure there
 template <unsigned kFeatures, typename Closure>
-RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
-                                       const PathState& state,
-                                       std::uint32_t path,
-                                       const ScatterEvent<Closure>& event,
-                                       LightsChoice chosen,
-                                       ShadowQueue& shadow)
+RELIEF_KERNEL void shade_surface_lit(const KernelGlobals& g,
+                                     const PathState& state,
+                                     std::uint32_t path,
+                                     const ScatterEvent<Closure>& event,
+                                     const LightAnswer& answer,
+                                     Vec3f wi,
+                                     BsdfEval bsdf,
+                                     ShadowQueue& shadow)
 {
   const SurfaceInteraction& at = event.at;
   const Closure& closure = event.closure;
   const Vec3f P = at.hit.P;
   const int bounce = path_bounces(state.bounces[path], BounceKind::kAll);
-  Light storage;
-  const LightAnswer answer = light_ask(g, state, path, chosen, P, event.light_N, storage);
   const LightSample& light = answer.sample;
   const Light* const emitter = answer.emitter;
-  if (!(light.pdf > 0.0f) || is_zero(answer.radiance)) return;
-  const Vec3f wi = to_local(at.side.frame, light.wi);
-  BsdfEval bsdf = closure_eval<kFeatures>(closure, *g.bsdf_tables, wi);
   const auto transmits = [&] { return (wi.z < 0.0f) != (dot(at.side.frame.n, path_direction(state, path)) > 0.0f); };
   if constexpr ((kFeatures & kFeatureMixture) == 0) {
     const std::uint32_t without = path_does_without(g, state.flags[path]);
@@ -76,6 +74,24 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
   float t_max = 0;
   shadow_ray_aim(light, emitter, P, O, D, t_max);
   shadow_queue_push(shadow, path, O, D, t_max, event.cone, gain, static_cast<std::uint32_t>(bounce + 1));
+}
+
+/// Asks a light, and queues a shadow ray towards it.
+/// @param chosen  from lights_choose
+template <unsigned kFeatures, typename Closure>
+RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
+                                       const PathState& state,
+                                       std::uint32_t path,
+                                       const ScatterEvent<Closure>& event,
+                                       LightsChoice chosen,
+                                       ShadowQueue& shadow)
+{
+  Light storage;
+  const LightAnswer answer = light_ask(g, state, path, chosen, event.at.hit.P, event.light_N, storage);
+  if (!light_answers(answer)) return;
+  const Vec3f wi = to_local(event.at.side.frame, answer.sample.wi);
+  const BsdfEval bsdf = closure_eval<kFeatures>(event.closure, *g.bsdf_tables, wi);
+  shade_surface_lit<kFeatures>(g, state, path, event, answer, wi, bsdf, shadow);
 }
 
 }  // namespace relief

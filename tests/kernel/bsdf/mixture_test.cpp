@@ -706,7 +706,7 @@ TEST(Mixture, NothingWeighsNothing)
   const Mixture m = mixture_make(nothing, direction(0.5f, 0), lobes);
   EXPECT_EQ(closure_sample<kFeatureAll>(m, tables(), 0.5f, {0.5f, 0.5f}).pdf, 0.0f);
   EXPECT_EQ(closure_eval<kFeatureAll>(m, tables(), direction(0.5f, 1)).pdf, 0.0f);
-  EXPECT_TRUE(mixture_is_delta(m));
+  EXPECT_TRUE(lobes_are_delta(lobes));
 }
 
 TEST(Mixture, InputsThatAreNoNumbersGiveFiniteLight)

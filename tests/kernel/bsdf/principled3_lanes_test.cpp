@@ -1,61 +1,8 @@
 // The plain Principled closure of eight hits has the lobes that each hit has by itself.
-#include "kernel/graph/graph_mixture.h"
-
-#include <cstring>
-#include <vector>
-
-#include <gtest/gtest.h>
-
-#include "tests/support/chi2.h"
+#include "tests/kernel/bsdf/plain_principled.h"
 
 namespace relief {
 namespace {
-
-constexpr int kNumbers = sizeof(Principled3Inputs) / sizeof(float);
-
-/// A program of one Principled closure, whose inputs are constants or registers.
-class PlainPrincipled : public testing::Test {
- protected:
-  PlainPrincipled()
-  {
-    spec_.kind = ClosureKind::principled3;
-    for (int i = 0; i < 1 + kNumbers; ++i) results_.push_back(static_cast<std::uint16_t>(kMostGraphRegisters + i));
-    const Principled3Inputs defaults;
-    constants_[0] = 1.0f;
-    std::memcpy(constants_ + 1, &defaults, sizeof defaults);
-  }
-
-  static int result_of(std::size_t offset) { return 1 + static_cast<int>(offset / sizeof(float)); }
-
-  void vary(int result) { results_[static_cast<std::size_t>(result)] = static_cast<std::uint16_t>(result); }
-
-  const GraphProgramView& program()
-  {
-    varying_.clear();
-    for (std::size_t i = 0; i < results_.size(); ++i) {
-      varying_before_[i] = static_cast<std::uint16_t>(varying_.size());
-      if (results_[i] < kMostGraphRegisters) varying_.push_back(static_cast<std::uint16_t>(i));
-    }
-    varying_before_[results_.size()] = static_cast<std::uint16_t>(varying_.size());
-    view_.constants = view_.result_values = constants_;
-    view_.results = results_.data();
-    view_.varying_before = varying_before_;
-    view_.varying = varying_.data();
-    view_.closures = &spec_;
-    view_.num_closures = 1;
-    return view_;
-  }
-
-  Vec3f direction() { return normalize(Vec3f{random_.next() - 0.5f, random_.next() - 0.5f, random_.next() + 0.01f}); }
-
-  TestRandom random_{11};
-  SurfaceClosureSpec spec_;
-  float constants_[kNumbers + 16] = {};
-  std::vector<std::uint16_t> results_, varying_;
-  std::uint16_t varying_before_[kNumbers + 16] = {};
-  GraphProgramView view_;
-  GraphRegisters registers_{};
-};
 
 void expect_same(const MixtureLobe& a, const MixtureLobe& b)
 {
@@ -87,13 +34,7 @@ void expect_same(const MixtureLobe& a, const MixtureLobe& b)
 
 TEST_F(PlainPrincipled, EightHaveTheLobesOfEach)
 {
-  using In = Principled3Inputs;
-  for (const std::size_t offset :
-       {offsetof(In, base_color), offsetof(In, base_color) + 4, offsetof(In, base_color) + 8, offsetof(In, metallic),
-        offsetof(In, specular), offsetof(In, specular_tint), offsetof(In, roughness), offsetof(In, anisotropic),
-        offsetof(In, normal), offsetof(In, normal) + 4, offsetof(In, normal) + 8}) {
-    vary(result_of(offset));
-  }
+  vary_all();
   const GraphProgramView& plain = program();
   ASSERT_EQ(closures_plain(plain), &spec_);
   BsdfTables tables{};
@@ -108,16 +49,7 @@ TEST_F(PlainPrincipled, EightHaveTheLobesOfEach)
       lane_set(lanes.wo, k, wo[k]);
       lane_set(lanes.Ng, k, Ng);
       lane_set(lanes.Ns, k, Ns[k]);
-      for (const std::uint16_t result : varying_) {
-        float x = random_.next();
-        // Corners, and what is out of range.
-        if (random_.next() < 0.1f) x = random_.next() < 0.5f ? 0.0f : 1.0f;
-        if (random_.next() < 0.02f) x = random_.next() < 0.5f ? -0.5f : kInfinity;
-        registers_.lanes[result][k] = x;
-      }
-      if (i % 2 == 0) {
-        for (int c = 0; c < 3; ++c) registers_.lanes[result_of(offsetof(In, normal)) + c][k] = 0.0f;
-      }
+      throw_inputs(k, i % 2 != 0);
     }
     Principled3Columns columns;
     closures_resolve_plain(plain, spec_, registers_, lanes, columns);

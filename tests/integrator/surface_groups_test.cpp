@@ -1,0 +1,106 @@
+// Hits of a plain Principled material are shaded eight together, or one by one where there are too few: the picture is the same.
+#include <array>
+#include <cmath>
+
+#include "tests/support/loaded_scene.h"
+#include "tests/support/render_scene.h"
+#include "tests/support/scene_builder.h"
+
+namespace relief::test {
+namespace {
+
+using nlohmann::json;
+
+json principled(const json& inputs)
+{
+  json closure = {{"type", "principled"}};
+  closure.update(inputs);
+  return closure;
+}
+
+/// Balls on a floor, each of a plain Principled material of its own, under lamps, one of which some rays do not see.
+Scene plain_scene()
+{
+  const json glass = {{"type", "transparent"}, {"weight", 0.4}}, light = {{"type", "emission"}, {"strength", 0.3}};
+  const std::array<json, 7> materials = {
+      json::array({principled({{"baseColor", {0.7, 0.5, 0.3}}, {"normal", {0.3, 0.1, 1}}})}),
+      json::array({principled({{"baseColor", {0.8, 0.2, 0.1}}, {"roughness", 0.2}})}),
+      json::array({principled({{"metallic", 1}, {"roughness", 0.3}, {"anisotropic", 0.8}})}),
+      json::array({principled({{"metallic", 0.6}, {"roughness", 0}, {"specularTint", 0.5}})}),
+      json::array({principled({{"weight", 0.6}, {"roughness", 1}}), glass}),
+      json::array({principled({{"specular", 0}, {"baseColor", {0.2, 0.4, 0.9}}}), light}),
+      json::array({principled({{"weight", 0.7}}), {{"type", "holdout"}, {"weight", 0.3}}}),
+  };
+  GltfBuilder b;
+  const std::vector<float> P{0, 0, 0, 1, 0, 0, 0, 1, 0};
+  for (const json& closures : materials) {
+    b.mesh({{"attributes", {{"POSITION", b.accessor(P, "VEC3")}}},
+            {"material", b.push("materials", {{"extensions", {{"RELIEF_surface", {{"closures", closures}}}}}})}});
+    b.root_node({{"mesh", b.json["meshes"].size() - 1}});
+  }
+  Scene scene = load(b);
+  scene.lights.clear();
+  scene.cameras = empty_scene().cameras;
+  scene.cameras.front().camera.world_from_camera.p = {0, 0.3f, 4};
+  for (std::size_t i = 0; i < materials.size(); ++i) {
+    Mesh mesh = i == 0 ? quad_mesh({-3, -0.6f, 3}, {6, 0, 0}, {0, 0, -6}) : sphere_mesh(0.5f, 24, 12, i % 2 == 1);
+    mesh.material_index = scene.meshes[i].material_index;
+    const float k = static_cast<float>(i) - 1;
+    if (i > 0) {
+      for (Vec3f& vertex : mesh.P)
+        vertex += Vec3f{0.8f * std::fmod(k, 3.0f) - 0.8f, 0.1f + 0.7f * std::floor(k / 3), 0};
+    }
+    scene.meshes[i] = mesh;
+  }
+  scene.environment.color = {0.3f, 0.35f, 0.4f};
+  for (const bool is_hidden : {false, true}) {
+    Light disk;
+    disk.kind = LightKind::kDisk;
+    disk.P = {is_hidden ? 1.5f : -1.5f, 2, 2};
+    disk.axis = normalize(-disk.P);
+    disk.edge_u = {0.5f, 0, 0};
+    disk.edge_v = cross(disk.axis, disk.edge_u);
+    disk.area = kPi * 0.25f;
+    disk.emission = {8, 7, 6};
+    if (is_hidden) disk.hidden_from = 1u << static_cast<int>(PathEvent::kDiffuse);
+    scene.lights.push_back(disk);
+  }
+  scene.render.caustics.mode = CausticsMode::kOff;
+  scene.render.filter_glossy = 1;
+  return scene;
+}
+
+TEST(SurfaceGroups, OfEightAndOfOneMakeTheSamePicture)
+{
+  constexpr int kSize = 12, kSamples = 2;
+  const Scene scene = plain_scene();
+  RenderOptions options = render_options(scene, kSize, kSamples);
+  const Rendered whole = render_scene(scene, options);
+  const int floats = whole.image.view.layout.num_floats;
+  EXPECT_GT(whole.stats.counters.transparent_hits, 20u);
+  // Of rounding, that curved mirrors make larger.
+  constexpr float kRelative = 2e-3f, kAbsolute = 2e-4f;
+  int num_others = 0;
+  for (int y = 0; y < kSize; ++y) {
+    for (int x = 0; x < kSize; ++x) {
+      // A pixel's two paths are too few for a group.
+      options.crop_x0 = x;
+      options.crop_y0 = y;
+      options.crop_x1 = x + 1;
+      options.crop_y1 = y + 1;
+      const Rendered one = render_scene(scene, options);
+      const float* a = one.image.view.pixels;
+      const float* b = whole.image.view.pixels + (y * kSize + x) * floats;
+      bool is_same = true;
+      for (int i = 0; i < floats; ++i) {
+        is_same = is_same && (a[i] == b[i] || std::fabs(a[i] - b[i]) <= kRelative * std::fabs(b[i]) + kAbsolute ||
+                              (std::isnan(a[i]) && std::isnan(b[i])));
+      }
+      num_others += is_same ? 0 : 1;
+    }
+  }
+  EXPECT_EQ(num_others, 0);
+}
+
+}  // namespace
+}  // namespace relief::test
