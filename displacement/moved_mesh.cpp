@@ -94,29 +94,17 @@ std::vector<Vec2f> lattice_weights(const LatticeTriangle& part)
   return weights;
 }
 
-/// Quadrilaterals of a lattice; the triangles at the ends of its rows are left, n of them.
-std::uint32_t lattice_pairs(std::int32_t n)
-{
-  return static_cast<std::uint32_t>(n) * static_cast<std::uint32_t>(n - 1) / 2;
-}
-
-/// The triangles of a lattice.
-/// @param first    vertex of the lattice
-/// @param pairs    receives two for each quadrilateral
-/// @param singles  receives the others
-void divide(std::int32_t n, std::uint32_t first, TriangleIndices* pairs, TriangleIndices* singles)
+/// The triangles of a lattice, row by row: but for the last of each, two and two are quadrilaterals.
+/// @param first  vertex of the lattice
+void divide(std::int32_t n, std::uint32_t first, TriangleIndices* triangles)
 {
   std::uint32_t row = first;
   for (std::int32_t j = 0; j < n; ++j) {
     const std::uint32_t next = row + static_cast<std::uint32_t>(n - j + 1);
     for (std::int32_t i = 0; i + j < n; ++i) {
       const std::uint32_t a = row + static_cast<std::uint32_t>(i), above = next + static_cast<std::uint32_t>(i);
-      if (i + j + 1 == n) {
-        *singles++ = {a, a + 1, above};
-        continue;
-      }
-      *pairs++ = {a, a + 1, above};
-      *pairs++ = {a + 1, above + 1, above};
+      *triangles++ = {a, a + 1, above};
+      if (i + j + 1 < n) *triangles++ = {a + 1, above + 1, above};
     }
     row = next;
   }
@@ -133,7 +121,6 @@ struct DividedMesh {
   std::vector<std::vector<float>> values;  ///< of columns
   std::vector<MeshColumn> columns;
   std::size_t num_vertices = 0;
-  std::uint32_t num_pairs = 0;  ///< of the triangles, the first ones
 
   /// Makes room for what a mesh has.
   void resize(const MeshView& mesh, std::size_t vertices, std::size_t num_of_triangles)
@@ -233,8 +220,6 @@ MeshView MovedMesh::view(const MeshView& mesh) const
   return out;
 }
 
-std::uint32_t MovedMesh::num_pairs() const { return divided != nullptr ? divided->num_pairs : 0; }
-
 std::size_t MovedMesh::bytes() const
 {
   std::size_t sum = P.capacity() * sizeof(P[0]) + N.capacity() * sizeof(N[0]);
@@ -297,20 +282,16 @@ MovedMesh move_divided(const MeshView& mesh,
                        const Move& move)
 {
   const auto out = std::make_shared<DividedMesh>();
-  std::vector<std::uint32_t> first_vertex(parts.size() + 1), first_pair(parts.size() + 1),
-      first_single(parts.size() + 1);
+  std::vector<std::uint32_t> first_vertex(parts.size() + 1), first_triangle(parts.size() + 1);
   for (std::size_t k = 0; k < parts.size(); ++k) {
     first_vertex[k + 1] = first_vertex[k] + static_cast<std::uint32_t>(lattice_points(parts[k].n));
-    first_pair[k + 1] = first_pair[k] + lattice_pairs(parts[k].n);
-    first_single[k + 1] = first_single[k] + static_cast<std::uint32_t>(parts[k].n);
+    first_triangle[k + 1] = first_triangle[k] + static_cast<std::uint32_t>(parts[k].n * parts[k].n);
   }
   const std::size_t num_vertices = first_vertex.back();
   MovedMesh moved;
   moved.P.reserve(num_vertices + 1);
   moved.P.resize(num_vertices);
-  out->num_pairs = first_pair.back();
-  out->resize(mesh, num_vertices, 2 * std::size_t{out->num_pairs} + first_single.back());
-  TriangleIndices* const singles = out->triangles.data() + 2 * std::size_t{out->num_pairs};
+  out->resize(mesh, num_vertices, first_triangle.back());
   std::vector<Vec3f> base_P(num_vertices);
   std::vector<Normal3f> base_N(num_vertices);
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t k) {
@@ -340,7 +321,7 @@ MovedMesh move_divided(const MeshView& mesh,
         out->interpolate(mesh, t, weights[first + lane], vertex);
       }
     }
-    divide(part.n, first_vertex[k], out->triangles.data() + 2 * std::size_t{first_pair[k]}, singles + first_single[k]);
+    divide(part.n, first_vertex[k], out->triangles.data() + first_triangle[k]);
   });
   std::vector<std::uint32_t> of_lines, of_places;
   if (along || smooth) of_lines = weld_vertices(base_P, base_N);
@@ -469,7 +450,7 @@ MovedMesh placed_mesh_make(const MeshView& mesh,
 
 std::uint64_t divided_mesh_bytes(const MeshView& mesh, std::span<const LatticeTriangle> parts)
 {
-  // Twelve bytes of vertices' numbers, eight of quadrilaterals', and 57 that Embree's tree takes while it is built: 9.4 million triangles with
+  // Twelve bytes of vertices' numbers, ten of quadrilaterals', and 57 that Embree's tree takes while it is built: 9.4 million triangles with
   // uv and tangents took a process 1.05 GB, where this says 1.16.
   constexpr std::uint64_t kTriangle = 80;
   std::uint64_t vertices = 0, triangles = 0;

@@ -56,8 +56,6 @@ struct MovedMesh {
 
   /// @param mesh  that was
   MeshView view(const MeshView& mesh) const;
-  /// How many pairs of its triangles, the first ones, are quadrilaterals: (a, b, d), (b, c, d).
-  std::uint32_t num_pairs() const;
   std::size_t bytes() const;
 };
 

@@ -36,8 +36,6 @@ struct TreeMesh {
   std::span<const TriangleIndices> triangles;
   std::span<const float> radius;  ///< of curves and points, see Mesh; empty: these are triangles
   bool are_ribbons = false;
-  std::uint32_t num_pairs =
-      0;  ///< of the triangles, see MovedMesh: the tree has quadrilaterals of them, which are built in half of the time
   bool are_points = false;
 };
 
@@ -71,7 +69,8 @@ class Accel {
   void intersect(EmbreeContext& context, RTCRayHit& ray) const;
   /// The same for a packet.
   void intersect8(EmbreeContext& context, RTCRayHit8& rays) const;
-  /// Brings a hit of Embree's on quadrilaterals to the mesh's triangles. What the above say is that already; filters are told of quadrilaterals.
+  /// Brings a hit of Embree's on quadrilaterals to the mesh's triangles, see triangle_pairs.h. What the above say is that already;
+  /// filters are told of quadrilaterals.
   void to_triangle(unsigned object, std::uint32_t* primitive, float* u, float* v) const;
   /// Whether anything is hit: tfar is negative then.
   void occluded(EmbreeContext& context, RTCRay& ray) const;
@@ -92,6 +91,7 @@ class Accel {
                             EmbreeContext& context,
                             RTCRayHit& ray,
                             double* nearest);
+  void pair_triangles();
   void place_instances(const Scene& scene, std::span<const Light> lights, std::span<const std::uint32_t> area_lights);
   void build_meshes();
   void build_displaced(DisplacementSet& displacements);
@@ -101,9 +101,11 @@ class Accel {
   ContentHash top_content(const Scene& scene,
                           std::span<const Light> lights,
                           std::span<const std::uint32_t> area_lights) const;
+  struct MeshUse;
   RTCGeometry new_curves(const TreeMesh& mesh, bool transparent);
   void set_round_vertices(RTCGeometry geometry, const TreeMesh& mesh);
-  RTCGeometry new_mesh(const TreeMesh& mesh, const Affine3* world_from_object, bool transparent);
+  RTCGeometry new_mesh(const MeshUse& use, const Affine3* world_from_object);
+  void set_corners(RTCGeometry geometry, const MeshUse& use);
   void attach_corners(RTCScene target, const Box3& box, Vec3f pad, bool quads = false);
   RTCGeometry new_instance(RTCScene instanced, const Affine3& world_from_object);
   Box3 light_box(const Light& light) const;
@@ -122,9 +124,9 @@ class Accel {
     Box3 box;                  ///< object space, of meshes with a tree; over all time
     Vec3f pad;                 ///< by which it is enlarged
     TreePointer tree;          ///< null: it is in place
+    std::vector<std::uint32_t> pairs;  ///< see triangle_pairs_make: quadrilaterals of the tree; empty: it has triangles
 
-    /// Those of quadrilaterals too: beside triangles in one scene Embree has a tree for each kind, and rays pass both.
-    bool has_tree() const { return count > 1 || takes_time || at_border || !mesh.radius.empty() || mesh.num_pairs > 0; }
+    bool has_tree() const { return count > 1 || takes_time || at_border || !mesh.radius.empty(); }
   };
 
   const MeshUse& use_of(std::size_t instance) const

@@ -9,10 +9,6 @@
 
 namespace relief {
 
-namespace {
-
-}  // namespace
-
 /// Embree asks before each block that it takes, and gives up the build where the answer is no. How large a tree gets is not
 /// known before, so that is where its memory is bounded.
 bool KeptTrees::Device::count(void* user, ssize_t more, bool)
@@ -56,10 +52,9 @@ KeptTrees::KeptTrees(bool keeps) : keeps_(keeps), device_(std::make_shared<Devic
   rtcSetDeviceMemoryMonitorFunction(device_->device, Device::count, device_.get());
 }
 
-TreePointer KeptTrees::scene_make(RTCBuildQuality quality) const
+TreePointer KeptTrees::scene_make() const
 {
   TreePointer tree = own(rtcNewScene(device()));
-  rtcSetSceneBuildQuality(tree.get(), quality);
   rtcSetSceneFlags(tree.get(), RTC_SCENE_FLAG_ROBUST);
   return tree;
 }

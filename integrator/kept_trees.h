@@ -48,8 +48,8 @@ class KeptTrees {
   std::uint64_t bytes() const { return static_cast<std::uint64_t>(device_->bytes.load()); }  ///< allocated by Embree
   /// Why Embree was refused memory since this was asked last; empty: it was not.
   std::optional<OutOfMemory> refusal() const;
-  /// An empty scene of Embree's.
-  TreePointer scene_make(RTCBuildQuality quality) const;
+  /// An empty scene of Embree's. Its spatial splits are not for trees as tight as these.
+  TreePointer scene_make() const;
   /// A scene of Embree's that somebody else has made with the device.
   TreePointer own(RTCScene scene) const;
 

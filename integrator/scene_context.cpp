@@ -192,10 +192,7 @@ void SceneContext::make_views()
   }
   for (std::size_t i = 0; i < instances.size(); ++i) {
     const int moved = displacements.moved_index(i);
-    if (moved < 0) continue;
-    instances[i].mesh_index = static_cast<std::int32_t>(scene.meshes.size()) + moved;
-    if (displacements.moved()[static_cast<std::size_t>(moved)].num_pairs() > 0)
-      instances[i].flags |= kTracedInObjectSpace;
+    if (moved >= 0) instances[i].mesh_index = static_cast<std::int32_t>(scene.meshes.size()) + moved;
   }
   for (std::size_t i = 0; i < instances.size(); ++i) {
     if (displacements.geometry_index(i) < 0) continue;

@@ -14,6 +14,7 @@
 #include "tests/oracle/displaced_mesh.h"
 #include "tests/oracle/displaced_triangle.h"
 #include "tests/oracle/interval.h"
+#include "tests/oracle/triangle_tree.h"
 
 namespace relief {
 
@@ -603,6 +604,39 @@ TEST(OracleMesh, IsMetAnEvenNumberOfTimesByLinesIfClosed)
   }
   EXPECT_EQ(num_cases, 4u);
   EXPECT_GT(num_counted, 2500u);
+}
+
+TEST(OracleTriangles, AreTheSameWithAndWithoutTheirTree)
+{
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const auto point = [&](double size) {
+    return oracle::Vector3{size * uniform(random), size * uniform(random), size * uniform(random)};
+  };
+  std::vector<std::array<oracle::Vector3, 3>> triangles;
+  for (int k = 0; k < 300; ++k) {
+    const oracle::Vector3 at = point(1);
+    std::array<oracle::Vector3, 3> triangle{at, at, at};
+    for (oracle::Vector3& corner : triangle) {
+      const oracle::Vector3 by = point(k % 3 == 0 ? .5 : .1);
+      // Some lie in planes of axes, as the boxes do.
+      for (std::size_t axis = k % 5 == 0 ? 1 : 0; axis < 3; ++axis) corner[axis] += by[axis];
+    }
+    triangles.push_back(triangle);
+  }
+  const oracle::TriangleTree tree(triangles, 1e-3);
+  int num_met = 0, num_unclear = 0;
+  for (int k = 0; k < 20000; ++k) {
+    oracle::Vector3 O = point(2), D = point(1);
+    if (k % 4 == 0) D[static_cast<std::size_t>(k / 4 % 3)] = 0;
+    const oracle::NearestTriangle a = tree.nearest(O, D), b = tree.nearest_of_all(O, D);
+    ASSERT_EQ(a.t, b.t);
+    ASSERT_EQ(std::min(a.maybe, a.t), std::min(b.maybe, b.t));
+    num_met += a.t < HUGE_VAL ? 1 : 0;
+    num_unclear += a.maybe < a.t ? 1 : 0;
+  }
+  EXPECT_GT(num_met, 2000);
+  EXPECT_GT(num_unclear, 20);
 }
 
 TEST(HardCases, HoldNothingButFloats)

@@ -1,6 +1,7 @@
 // Points that vectors move, in tiles that rays ask for: the points, boxes, hits and normals of the mesh that divides the same lattices.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstring>
@@ -15,6 +16,8 @@
 #include "displacement/lattice_split.h"
 #include "displacement/moved_mesh.h"
 #include "displacement/point_tiles.h"
+#include "tests/oracle/triangle_tree.h"
+#include "tests/support/test_rays.h"
 
 namespace relief {
 namespace {
@@ -208,12 +211,6 @@ class Tree {
 
 bool is_hit(const RTCRayHit& query) { return query.hit.geomID != RTC_INVALID_GEOMETRY_ID; }
 
-int rays(int by_default)
-{
-  const char* const asked = std::getenv("RELIEF_TEST_RAYS");
-  return asked != nullptr ? std::atoi(asked) : by_default;
-}
-
 struct Case {
   const char* name;
   Move move;
@@ -314,56 +311,45 @@ TEST(PointTiles, AreShadedAsADividedMesh)
   }
 }
 
-/// All triangles in double precision, one after the other.
+/// Beside all triangles in double precision.
 TEST(PointTiles, AreMetWhereTheirTrianglesAre)
 {
-  const int num_rays = rays(1500);
+  const std::uint64_t num_rays = num_test_rays(1500);
   for (const Case& c : cases()) {
     const MovedTorus torus(c.move, c.cells);
     PointTileCache cache(1 << 24);
     const auto tiled = torus.tiled(cache);
     std::vector<std::unique_ptr<Tree>> trees;
     for (const TraversalTable* table : tables()) trees.push_back(std::make_unique<Tree>(*tiled, *table));
-    std::vector<Vec3d> corners;
+    const auto vector_of = [](Vec3d v) { return oracle::Vector3{v.x, v.y, v.z}; };
+    std::vector<std::array<oracle::Vector3, 3>> triangles;
     for (std::uint32_t k = 0; k < torus.whole().num_triangles; ++k) {
       const TriangleIndices t = torus.whole().triangles[k];
-      for (const std::uint32_t v : {t.v0, t.v1, t.v2}) corners.push_back(to_double(torus.whole().P[v]));
+      const auto at = [&](std::uint32_t v) { return vector_of(to_double(torus.whole().P[v])); };
+      triangles.push_back({at(t.v0), at(t.v1), at(t.v2)});
     }
-    std::mt19937_64 random(7);
-    int num_hits = 0, num_unclear = 0;
-    for (int ray = 0; ray < num_rays; ++ray) {
+    const oracle::TriangleTree doubles(std::move(triangles), 1e-5);
+    std::mt19937_64 random(7 + test_part());
+    std::uint64_t num_hits = 0, num_unclear = 0, num_missed = 0, num_invented = 0, num_shadows_unlike = 0;
+    for (std::uint64_t ray = 0; ray < num_rays; ++ray) {
       const Vec3d O = to_double(to_float(2.0 * direction(random)));
       Vec3d D = to_double(to_float(MovedTorus::inside(random) + .6 * direction(random) - O));
       if (ray % 10 == 0) D.y = 0;  // within the plane of what is flat
       if (ray % 10 == 1) D.x = D.z = 0;
-      // The nearest that is met clearly, and the nearest that may be.
-      constexpr double kUnclear = 1e-5;
-      double clear = HUGE_VAL, maybe = HUGE_VAL;
-      for (std::size_t k = 0; k < corners.size(); k += 3) {
-        const Vec3d e1 = corners[k + 1] - corners[k], e2 = corners[k + 2] - corners[k], p = cross(D, e2);
-        const double determinant = dot(p, e1);
-        if (!(std::abs(determinant) > 1e-9 * length(D) * length(e1) * length(e2))) continue;
-        const Vec3d from = O - corners[k], q = cross(from, e1);
-        const double u = dot(from, p) / determinant, v = dot(D, q) / determinant, t = dot(e2, q) / determinant;
-        const double least = std::min({u, v, 1 - u - v});
-        if (t < 0 || least < -kUnclear) continue;
-        maybe = std::min(maybe, t);
-        if (least > kUnclear) clear = std::min(clear, t);
-      }
-      if (maybe != clear) ++num_unclear;
+      const oracle::NearestTriangle nearest = doubles.nearest(vector_of(O), vector_of(D));
+      if (nearest.maybe != nearest.t) ++num_unclear;
       for (const auto& tree : trees) {
         const RTCRayHit hit = tree->intersect(O, D);
-        if (clear < HUGE_VAL) {
-          ASSERT_TRUE(is_hit(hit)) << c.name << " ray " << ray;
-          ASSERT_LT(static_cast<double>(hit.ray.tfar), clear + 1e-5) << c.name << " ray " << ray;
-        }
-        if (is_hit(hit)) {
-          ASSERT_GT(static_cast<double>(hit.ray.tfar), maybe - 1e-5) << c.name << " ray " << ray;
-          ++num_hits;
-        }
-        ASSERT_EQ(tree->occluded(O, D), is_hit(hit)) << c.name << " ray " << ray;
+        const double t = is_hit(hit) ? static_cast<double>(hit.ray.tfar) : HUGE_VAL;
+        if (nearest.t < HUGE_VAL && !(t < nearest.t + 1e-5)) ++num_missed;
+        if (is_hit(hit) && !(t > nearest.maybe - 1e-5)) ++num_invented;
+        if (tree->occluded(O, D) != is_hit(hit)) ++num_shadows_unlike;
+        num_hits += is_hit(hit) ? 1 : 0;
       }
     }
+    EXPECT_EQ(num_missed, 0u) << c.name;
+    EXPECT_EQ(num_invented, 0u) << c.name;
+    EXPECT_EQ(num_shadows_unlike, 0u) << c.name;
     EXPECT_LT(num_unclear, num_rays / 20) << c.name;
     // What is flat is met from the side at times.
     EXPECT_GT(num_hits, num_rays / 10) << c.name;
@@ -378,9 +364,9 @@ TEST(PointTiles, LetNoRayOut)
   const auto tiled = torus.tiled(cache);
   std::vector<std::unique_ptr<Tree>> trees;
   for (const TraversalTable* table : tables()) trees.push_back(std::make_unique<Tree>(*tiled, *table));
-  std::mt19937_64 random(5);
-  const int num_rays = rays(1000000);
-  for (int k = 0; k < num_rays; ++k) {
+  std::mt19937_64 random(5 + test_part());
+  const std::uint64_t num_rays = num_test_rays(1000000);
+  for (std::uint64_t k = 0; k < num_rays; ++k) {
     const Vec3d O = to_double(to_float(MovedTorus::inside(random)));
     Vec3d D = direction(random);
     if (k % 2 == 0) {
@@ -391,7 +377,7 @@ TEST(PointTiles, LetNoRayOut)
       D = P - O;
       if (k % 4 == 0) D = D + between(random, 0, 1) * (Q - P);
     }
-    const Tree& tree = *trees[static_cast<std::size_t>(k / 8) % trees.size()];
+    const Tree& tree = *trees[k / 8 % trees.size()];
     ASSERT_TRUE(is_hit(tree.intersect(O, D))) << k;
     ASSERT_TRUE(tree.occluded(O, D)) << k;
   }
