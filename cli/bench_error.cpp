@@ -29,10 +29,12 @@
 
 #include "benchmarks/error/study.h"
 #include "cli/arguments.h"
+#include "cli/figure_files.h"
 #include "cli/interrupt.h"
 #include "cli/picture_options.h"
 #include "cli/run_files.h"
 #include "cli/standard_streams.h"
+#include "cli/value_hint.h"
 #include "exporters/atomic_file.h"
 #include "exporters/exr.h"
 #include "scene/diagnostics.h"
@@ -47,7 +49,7 @@ struct ErrorArguments {
   std::vector<double> times = {1, 4, 16};
   double reference_seconds = 0;
   PictureOptions picture;
-  std::string reference, json, html;
+  std::string reference, json, html, figures;
   int threads = 0;
   bool quick = false;
 };
@@ -185,7 +187,11 @@ bool write_results(const ErrorArguments& arguments, const RunFiles& files, const
   files.check_output("--json", arguments.json);
   files.check_output("--html", arguments.html);
   if (!arguments.json.empty()) atomic_write(arguments.json, error_study_json(results));
-  if (!arguments.html.empty()) atomic_write(arguments.html, error_study_html(results));
+  if (!arguments.html.empty() || !arguments.figures.empty()) {
+    const std::string page = error_study_html(results);
+    if (!arguments.html.empty()) atomic_write(arguments.html, page);
+    if (!arguments.figures.empty()) figures_write(files, arguments.figures, page);
+  }
   bool is_whole = true;
   for (const ErrorSceneResult& scene : results.scenes) {
     for (const std::string& failure : scene.failures) print_warning(scene.scene + ": " + failure);
@@ -208,6 +214,7 @@ int bench_error(const ErrorArguments& arguments)
   }
   files.add_input("the reference", arguments.reference);
   for (const std::string& output : {arguments.json, arguments.html}) check_writable(output);
+  if (!arguments.figures.empty()) figures_folder_make(arguments.figures);
   broken_pipes_ignore();
   const int threads = arguments.threads > 0 ? arguments.threads : tbb::info::default_concurrency();
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
@@ -286,6 +293,8 @@ void bench_error_register(CLI::App& bench, Run& run)
   add_parsed(
       *command, "--html", a.html, [](const std::string& text) { return parse_output("--html", text, ".html"); },
       "One page with tables and plots");
+  names_file(command->add_option("--figures", a.figures, "Folder that gets each plot, as SVG and PNG"), {})
+      ->type_name("FOLDER");
   command->add_flag("--quick", a.quick, "Small pictures, a tenth of a second: whether it works, not how fast");
   command->callback([&run, arguments] { run = [arguments] { return bench_error(*arguments); }; });
 }

@@ -19,6 +19,7 @@
 #include "cli/arguments.h"
 #include "cli/bench_error.h"
 #include "cli/commands.h"
+#include "cli/figure_files.h"
 #include "cli/ray_file.h"
 #include "cli/run_files.h"
 #include "cli/value_hint.h"
@@ -35,7 +36,7 @@ struct BenchArguments {
   std::vector<std::string> scenes, parts;
   OwnSceneFiles own;  ///< of a name: in place of the scenes
   std::string rays;
-  std::string json, html, csv;
+  std::string json, html, csv, figures;
   double map_scale = 1, memory_gib = 0;
   int threads = 0, rounds = 3;
   bool quick = false;
@@ -83,6 +84,7 @@ int bench_displacement(const BenchArguments& arguments)
   files.add_input("the height map", arguments.own.map);
   files.add_input("the rays", arguments.rays);
   for (const auto& [option, output] : outputs) check_writable(output);
+  if (!arguments.figures.empty()) figures_folder_make(arguments.figures);
   std::optional<tbb::global_control> limit;
   if (arguments.threads > 0) {
     limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(arguments.threads));
@@ -114,13 +116,17 @@ int bench_displacement(const BenchArguments& arguments)
   for (const auto& [option, output] : outputs) files.check_output(option, output);
   if (!arguments.json.empty()) atomic_write(arguments.json, bench_json(results));
   if (!arguments.csv.empty()) atomic_write(arguments.csv, bench_csv(results));
-  if (!arguments.html.empty()) atomic_write(arguments.html, bench_html(results));
+  if (!arguments.html.empty() || !arguments.figures.empty()) {
+    const std::string page = bench_html(results);
+    if (!arguments.html.empty()) atomic_write(arguments.html, page);
+    if (!arguments.figures.empty()) figures_write(files, arguments.figures, page);
+  }
   return 0;
 }
 
 /// What benches of one study have in common.
 struct StudyArguments {
-  std::string json, html;
+  std::string json, html, figures;
   std::vector<std::string> inputs;  ///< files that are read
   bool are_scenes = false;          ///< they name files that are read, too
   int rounds = 3;
@@ -144,6 +150,7 @@ int bench_study(const StudyArguments& arguments,
     if (arguments.are_scenes) files.add_inputs("a file of the scene", scene_files(input));
   }
   for (const std::string& output : {arguments.json, arguments.html}) check_writable(output);
+  if (!arguments.figures.empty()) figures_folder_make(arguments.figures);
   options.rounds = arguments.quick ? 1 : arguments.rounds;
   if (isatty(STDERR_FILENO) != 0) {
     options.progress = [](const std::string& line) { std::fputs((printable_text(line) + "\n").c_str(), stderr); };
@@ -153,7 +160,11 @@ int bench_study(const StudyArguments& arguments,
   files.check_output("--json", arguments.json);
   files.check_output("--html", arguments.html);
   if (!arguments.json.empty()) atomic_write(arguments.json, json_of(results));
-  if (!arguments.html.empty()) atomic_write(arguments.html, html_of(results));
+  if (!arguments.html.empty() || !arguments.figures.empty()) {
+    const std::string page = html_of(results);
+    if (!arguments.html.empty()) atomic_write(arguments.html, page);
+    if (!arguments.figures.empty()) figures_write(files, arguments.figures, page);
+  }
   return 0;
 }
 
@@ -163,10 +174,12 @@ void add_report(CLI::App& command, const char* option, std::string& value, const
   names_file(add_parsed(command, option, value, parse, description), {suffix});
 }
 
-void add_reports(CLI::App& command, std::string& json, std::string& html)
+void add_reports(CLI::App& command, std::string& json, std::string& html, std::string& figures)
 {
   add_report(command, "--json", json, ".json", "Figures, as JSON");
   add_report(command, "--html", html, ".html", "One page with tables, plots and pictures");
+  names_file(command.add_option("--figures", figures, "Folder that gets each plot, as SVG and PNG"), {})
+      ->type_name("FOLDER");
 }
 
 void add_study_options(CLI::App& command, StudyArguments& a)
@@ -174,7 +187,7 @@ void add_study_options(CLI::App& command, StudyArguments& a)
   command.add_option("--rounds", a.rounds, "Times that all rays are traced; the fastest counts")
       ->check(whole_number(1, 1000))
       ->capture_default_str();
-  add_reports(command, a.json, a.html);
+  add_reports(command, a.json, a.html, a.figures);
   command.add_flag("--quick", a.quick, "Small, one round: whether it works, not how fast");
 }
 
@@ -302,7 +315,7 @@ void cmd_bench_register(CLI::App& app, Run& run)
       ->check(number(0.001, 1e6));
   command->add_option("--threads", a.threads, "Threads for preparation; rays are traced by one (default: all)")
       ->check(whole_number(1, 1024));
-  add_reports(*command, a.json, a.html);
+  add_reports(*command, a.json, a.html, a.figures);
   add_report(*command, "--csv", a.csv, ".csv", "Figures of the table, as CSV");
   command->add_flag("--quick", a.quick, "Small maps, few rays, one round: whether it works, not how fast");
   command->callback([&run, arguments] { run = [arguments] { return bench_displacement(*arguments); }; });

@@ -15,6 +15,32 @@ namespace relief {
 
 namespace {
 
+/// What a page's style (page_style.h) says of plots, for those that stand by themselves.
+constexpr const char* kFileStyle =
+    "<style>svg{color:#1f2328;font-family:'DejaVu "
+    "Sans',sans-serif}text{fill:#1f2328}.grid{stroke:#d1d9e0}.axis{stroke:#1f2328}"
+    ".guide{stroke:#59636e;fill:none;stroke-width:1.4;stroke-dasharray:6 4}</style>"
+    "<rect width='100%' height='100%' fill='#fff'/>";
+constexpr std::string_view kBegin = "<svg width='", kEnd = "</svg>";
+
+/// A title as part of a file's name.
+std::string name_of(std::string_view title)
+{
+  std::string name;
+  for (const char c : title) {
+    const bool is_upper = c >= 'A' && c <= 'Z';
+    if (is_upper || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9')) {
+      name += is_upper ? static_cast<char>(c - 'A' + 'a') : c;
+    } else if (!name.empty() && name.back() != '-') {
+      name += '-';
+    }
+  }
+  constexpr std::size_t kMost = 60;
+  name.resize(std::min(name.size(), kMost));
+  while (!name.empty() && name.back() == '-') name.pop_back();
+  return name;
+}
+
 /// The first seven can be told apart with any kind of colour vision; marks help with the others.
 /// @source Okabe, Ito 2008, "Color Universal Design"; yellow left out: too light for lines on white; the light blue, too: there is a
 ///         blue already
@@ -262,6 +288,23 @@ std::string svg_bar_plot(const PlotAxes& axes,
     }
   }
   return svg + "</svg>\n";
+}
+
+std::vector<PlotFile> plot_files(const std::string& page)
+{
+  std::vector<PlotFile> files;
+  for (std::size_t begin = page.find(kBegin); begin != std::string::npos; begin = page.find(kBegin, begin + 1)) {
+    const std::size_t head = page.find('>', begin), end = page.find(kEnd, begin);
+    if (head == std::string::npos || end == std::string::npos) break;
+    // svg_begin writes the title first.
+    const std::size_t title = page.find('>', head + 1), title_end = page.find('<', title);
+    char number[32];
+    std::snprintf(number, sizeof number, "%02zu-", files.size() + 1);
+    files.push_back({number + name_of(std::string_view(page).substr(title + 1, title_end - title - 1)),
+                     "<svg xmlns='http://www.w3.org/2000/svg' " + page.substr(begin + 5, head - begin - 4) +
+                         kFileStyle + page.substr(head + 1, end - head - 1) + "</svg>\n"});
+  }
+  return files;
 }
 
 }  // namespace relief

@@ -1,4 +1,4 @@
-// Plots as inline SVG for pages of report_html.h.
+// Plots as inline SVG for pages of report_html.h, and as files.
 #pragma once
 
 #include <cstddef>
@@ -45,5 +45,14 @@ std::string svg_bar_plot(const PlotAxes& axes,
                          const std::vector<std::string>& labels,
                          const std::vector<PlotSeries>& series,
                          PlotStyles& styles);
+
+/// A plot as a file of its own.
+struct PlotFile {
+  std::string name;  ///< without a suffix: number and title in letters, digits and hyphens
+  std::string svg;
+};
+
+/// The plots of a page, in their order, as black on white.
+std::vector<PlotFile> plot_files(const std::string& page);
 
 }  // namespace relief

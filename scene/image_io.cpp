@@ -56,7 +56,7 @@ const ImageIo& module_load()
       is_of_a_file = fs::exists(path, error);
     }
   }
-  throw std::runtime_error("the module for images that are neither PNG nor JPEG cannot be loaded: " + cause);
+  throw std::runtime_error("the module for images other than PNG, JPEG and HDR cannot be loaded: " + cause);
 }
 
 }  // namespace

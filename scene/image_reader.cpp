@@ -7,6 +7,7 @@
 
 #include "kernel/assert.h"
 #include "scene/diagnostics.h"
+#include "scene/hdr_file.h"
 #include "scene/image_format.h"
 #include "scene/image_memory.h"
 #include "scene/jpeg_file.h"
@@ -165,16 +166,20 @@ void ImageReader::open()
     BytesOfFile bytes(source_.file);
     reserve_decoder(format, bytes);
   }
-  if (format == "jpeg") {
+  if (format == "jpeg" || format == "hdr") {
     if (!source_.file.empty()) {
       owned_ = file_load(source_);
     }
-    if (!jpeg_is_complete(owned_.empty() ? source_.encoded : std::span<const unsigned char>(owned_))) {
+    if (format == "jpeg" &&
+        !jpeg_is_complete(owned_.empty() ? source_.encoded : std::span<const unsigned char>(owned_))) {
       fail(source_, "a complete JPEG image", "truncated data");
     }
   }
   const std::span<const unsigned char> bytes = owned_.empty() ? source_.encoded : owned_;
-  image_ = format == "png" ? png_file_make() : format == "jpeg" ? jpeg_file_make(bytes) : nullptr;
+  image_ = format == "png"    ? png_file_make()
+           : format == "jpeg" ? jpeg_file_make(bytes)
+           : format == "hdr"  ? hdr_file_make(bytes)
+                              : nullptr;
   if (image_ == nullptr) image_ = image_io().make_file(format);
   if (image_ == nullptr) {
     fail(source_, "an image that OpenImageIO reads", "format \"" + format + "\", which it was built without");

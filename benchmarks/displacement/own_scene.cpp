@@ -86,6 +86,9 @@ bool OwnScene::is_obj(const std::string& file)
 {
   std::string suffix = std::filesystem::path(file).extension().string();
   for (char& c : suffix) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (suffix != ".obj" && suffix != ".gltf" && suffix != ".glb") {
+    throw InputError(file, "expected a mesh whose name ends in .obj, .gltf or .glb");
+  }
   return suffix == ".obj";
 }
 

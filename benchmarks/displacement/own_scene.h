@@ -22,7 +22,7 @@ class OwnScene {
   OwnScene(const OwnScene&) = delete;
   OwnScene& operator=(const OwnScene&) = delete;
 
-  /// Whether a file is read as OBJ, by its name.
+  /// Whether a file is read as OBJ, by its name; else it is glTF. @error InputError for other names
   static bool is_obj(const std::string& file);
 
   /// Seen from the front, a little from the right and above; its tiles and scale are those of the files.

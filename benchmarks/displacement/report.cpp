@@ -526,6 +526,10 @@ std::string bench_csv(const BenchResults& results)
 std::string bench_html(const BenchResults& results)
 {
   PlotStyles styles;
+  // In one order, so that a method looks the same in all runs, whatever was measured.
+  for (const DisplacementMethod method : kDisplacementMethods)
+    styles.of(std::string(displacement_method_label(method)));
+  for (const char* variant : {"tfdm-affine", "rmip-affine", "rmip-low", "rmip-high"}) styles.of(variant);
   std::vector<std::string> pieces = {html_paragraph(conditions(results))};
   if (!results.scenes.empty()) {
     if (!results.is_own) {

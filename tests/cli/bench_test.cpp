@@ -266,6 +266,21 @@ TEST_F(Bench, WrongUseIsRefused)
         Arguments{"bench", "procedural", "--parts", "vase"}}) {
     EXPECT_EQ(run(arguments).exit_code, 2) << arguments.back();
   }
+  const Outcome other = run({"bench", "displacement", "--mesh", "a.stl", "--map", "m.png", "--scale", "1"});
+  EXPECT_EQ(other.exit_code, 3);
+  EXPECT_NE(other.errors.find("a.stl: expected a mesh whose name ends in .obj, .gltf or .glb"), std::string::npos);
+}
+
+TEST_F(Bench, FiguresAreFilesOfTheirOwn)
+{
+  const std::string folder = file("figures");
+  ASSERT_EQ(
+      run({"bench", "displacement", "--quick", "--scenes", "glass", "--parts", "table", "--figures", folder}).exit_code,
+      0);
+  for (const char* name : {"01-primary-rays", "02-bounce-rays", "03-shadow-rays", "04-memory-besides-the-map"}) {
+    const std::string svg = bytes_of_file(folder + "/" + name + ".svg");
+    EXPECT_NE(svg.find("chord"), std::string::npos) << name;
+  }
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// OpenImageIO is loaded when the first image is opened that is neither PNG nor JPEG, and not before: it takes longer than many a command.
+// OpenImageIO is loaded when the first image is opened that is neither PNG, JPEG nor HDR, and not before: it takes longer than many a command.
 // Here it cannot be loaded at all, since a file of its name that is no library comes first in the search path.
 #include "tests/cli/program.h"
 
@@ -26,11 +26,13 @@ class ImageModule : public ProgramTest {
   }
 };
 
-TEST_F(ImageModule, IsNotNeededForPng)
+TEST_F(ImageModule, IsNotNeededForPngAndHdr)
 {
   const std::string scene = scene_write(kPixelPng);
   EXPECT_EQ(render(scene, file("a.exr"), {"--png", file("a.png")}).exit_code, 0);
   EXPECT_EQ(render(scene, file("b.exr"), {"--seed", "2"}).exit_code, 0);
+  const std::string sky = folder_.write("sky.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\nabc\x80").string();
+  EXPECT_EQ(render(scene, file("s.exr"), {"--environment", sky}).exit_code, 0);
   for (const Arguments& arguments : {Arguments{"info", scene},
                                      {"compare", file("a.exr"), file("b.exr"), "--diff", file("d.png")},
                                      {"merge", file("a.exr"), file("b.exr"), "-o", file("c.exr")}}) {
@@ -41,8 +43,9 @@ TEST_F(ImageModule, IsNotNeededForPng)
 
 TEST_F(ImageModule, IsMissedByNameWhereThereIsAnotherImage)
 {
-  folder_.write("a.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\nabc\x80");
-  const std::string scene = scene_write("a.hdr");
+  // One pixel.
+  folder_.write("a.tga", std::string("\0\0\2\0\0\0\0\0\0\0\0\0\1\0\1\0\x18\x20", 18) + "abc");
+  const std::string scene = scene_write("a.tga");
   const Outcome outcome = render(scene, file("a.exr"));
   EXPECT_EQ(outcome.exit_code, 3);
   for (const char* part :

@@ -110,6 +110,27 @@ TEST(ReportHtml, ASeriesLooksTheSameInAllPlotsAndLikeNoOther)
   }
 }
 
+TEST(ReportHtml, PlotsStandByThemselvesAsFiles)
+{
+  PlotStyles styles;
+  const std::string page = html_page(
+      "t", {svg_line_plot({"Speed & memory: \u00bd", "x", "y"}, {{"a", {1, 2}, {2, 3}}, {"b", {1, 2}, {3, 3}}}, styles),
+            html_paragraph("between"), svg_bar_plot({"bounce rays", "", "Mrays/s"}, {"s"}, {{"b", {}, {2}}}, styles)});
+  const std::vector<PlotFile> files = plot_files(page);
+  ASSERT_EQ(files.size(), 2u);
+  EXPECT_EQ(files[0].name, "01-speed-amp-memory");
+  EXPECT_EQ(files[1].name, "02-bounce-rays");
+  for (const PlotFile& file : files) {
+    EXPECT_EQ(file.svg.rfind("<svg xmlns='http://www.w3.org/2000/svg' width='", 0), 0u);
+    EXPECT_EQ(file.svg.find("var("), std::string::npos) << "a page's colours";
+    EXPECT_EQ(file.svg.find("<svg", 1), std::string::npos);
+    EXPECT_EQ(file.svg.find("between"), std::string::npos);
+    EXPECT_NE(file.svg.find(styles.of("b").color), std::string::npos);
+    EXPECT_EQ(file.svg.substr(file.svg.size() - 7), "</svg>\n");
+  }
+  EXPECT_TRUE(plot_files(html_page("t", {html_paragraph("<svg width='1'>")})).empty());
+}
+
 TEST(ReportHtml, NumbersAreAlignedAndShortRowsFilled)
 {
   const std::string table = html_table({"a", "b", "c"}, {{"text", "-1.5"}, {"×3", ".5", "–"}});
