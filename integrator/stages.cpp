@@ -102,21 +102,57 @@ void locate(const KernelGlobals& g,
                                                             located);
 }
 
-/// Runs the graphs of up to eight paths that have hit one material, then shades each.
+/// Shades up to eight paths at located hits of one material whose graph has run.
+template <unsigned kFeatures>
+void shade_group(const KernelGlobals& g,
+                 PathState& state,
+                 const SurfaceGroup& group,
+                 LobePairs& pairs,
+                 const SurfaceSinks& sinks)
+{
+  const SurfaceClosureSpec* plain = nullptr;
+  if constexpr ((kFeatures & kFeatureMixture) != 0) {
+    // Fewer are not worth it.
+    plain = group.count > 2 ? closures_plain(group.program) : nullptr;
+    MixtureBuildLanes b;
+    if (plain != nullptr) {
+      b = surface_group_build(state, group);
+      closures_resolve_plain(group.program, *plain, group.registers, b, pairs.lobes);
+    }
+    if constexpr ((kFeatures & kFeatureCaustics) == 0) {
+      MixtureLobes lists[kLanes];
+      if (plain != nullptr && surface_group_is_plain(g, state, group, *plain)) {
+        surface_group_resolve<kFeatures>(g, state, group, b, pairs);
+      } else if (!surface_group_resolve<kFeatures>(g, state, group, plain != nullptr ? &pairs.lobes : nullptr, lists,
+                                                   pairs)) {
+        for (int k = 0; k < group.count; ++k) {
+          shade_surface_listed<kFeatures>(g, state, group.paths[k], group.at[k], lists[k], sinks);
+        }
+        return;
+      }
+      shade_surface_group<kFeatures>(g, state, group, pairs, sinks);
+      return;
+    }
+  }
+  for (int k = 0; k < group.count; ++k) {
+    const GraphHit hit{{&group.program, &group.registers, k}, plain != nullptr ? &pairs.lobes : nullptr};
+    shade_surface<kFeatures>(g, state, group.paths[k], group.at[k], sinks, &hit);
+  }
+}
+
+/// Runs the graphs of up to eight paths that have hit one material, then shades them.
 template <unsigned kFeatures>
 void shade_surfaces_by_graph(const KernelGlobals& g,
                              PathState& state,
                              const QueueView& queue,
-                             QueueView& next,
-                             ShadowQueue& shadow,
-                             Counters& counters)
+                             const SurfaceSinks& sinks)
 {
   const auto material_of = [&](std::uint32_t path) { return g.instances[state.hit_object[path]].material_index; };
   sort_by_material(g, state, queue);
   GraphRegisters registers;
   registers.rays = g.graph_scene.rays;
   SurfaceInteraction located[kLanes];
-  Principled3Hits hits{};
+  LobePairs pairs{};
   for (std::uint32_t first = 0, count = 0; first < queue.size; first += count) {
     const Material& material = g.materials[material_of(queue.paths[first])];
     count = 1;
@@ -125,9 +161,10 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
       ++count;
     }
     locate<kFeatures>(g, state, queue, first, count, located);
-    if (material.graph_index < 0) {
+    // Closures have a program, if of nothing but constants.
+    if ((kFeatures & kFeatureMixture) == 0 && material.graph_index < 0) {
       for (std::uint32_t lane = 0; lane < count; ++lane) {
-        shade_surface<kFeatures>(g, state, queue.paths[first + lane], located[lane], next, shadow, counters);
+        shade_surface<kFeatures>(g, state, queue.paths[first + lane], located[lane], sinks);
       }
       continue;
     }
@@ -139,28 +176,10 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
     }
     registers.used = (1u << count) - 1;
     g.run_graph(program, g.textures, registers);
-    counters.graph_runs += 1;
-    counters.graph_points += count;
-    const SurfaceClosureSpec* plain = nullptr;
-    if constexpr ((kFeatures & kFeatureMixture) != 0) {
-      // Fewer are not worth it.
-      plain = count > 2 ? closures_plain(program) : nullptr;
-      if (plain != nullptr) {
-        const SurfaceGroup group{queue.paths + first, static_cast<int>(count), located, program, registers};
-        const MixtureBuildLanes b = surface_group_build(state, group);
-        closures_resolve_plain(program, *plain, registers, b, hits.lobes);
-        if constexpr ((kFeatures & kFeatureCaustics) == 0) {
-          if (surface_group_is_plain(g, state, group, *plain)) {
-            shade_surface_group<kFeatures>(g, state, group, b, hits, next, shadow, counters);
-            continue;
-          }
-        }
-      }
-    }
-    for (std::uint32_t lane = 0; lane < count; ++lane) {
-      const GraphHit hit{{&program, &registers, static_cast<int>(lane)}, plain != nullptr ? &hits.lobes : nullptr};
-      shade_surface<kFeatures>(g, state, queue.paths[first + lane], located[lane], next, shadow, counters, &hit);
-    }
+    sinks.counters.graph_runs += 1;
+    sinks.counters.graph_points += count;
+    shade_group<kFeatures>(g, state, {queue.paths + first, static_cast<int>(count), located, program, registers}, pairs,
+                           sinks);
   }
 }
 
@@ -172,15 +191,16 @@ void shade_surfaces(const KernelGlobals& g,
                     ShadowQueue& shadow,
                     Counters& counters)
 {
+  const SurfaceSinks sinks{next, shadow, counters};
   if constexpr ((kFeatures & kFeatureGraphs) != 0) {
-    shade_surfaces_by_graph<kFeatures>(g, state, queue, next, shadow, counters);
+    shade_surfaces_by_graph<kFeatures>(g, state, queue, sinks);
   } else {
     SurfaceInteraction located[kLanes];
     for (std::uint32_t first = 0; first < queue.size; first += kLanes) {
       const std::uint32_t count = queue.size - first < kLanes ? queue.size - first : kLanes;
       locate<kFeatures>(g, state, queue, first, count, located);
       for (std::uint32_t lane = 0; lane < count; ++lane) {
-        shade_surface<kFeatures>(g, state, queue.paths[first + lane], located[lane], next, shadow, counters);
+        shade_surface<kFeatures>(g, state, queue.paths[first + lane], located[lane], sinks);
       }
     }
   }

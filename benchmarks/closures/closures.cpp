@@ -191,39 +191,61 @@ struct Resolved {
   return s.f.x + s.pdf + s.wi.z;
 }
 
-/// All three of eight hits, as stages do it where these have one plain material.
-/// @return  0: its closures are not such, and nothing is done
-[[gnu::noinline, gnu::flatten]] float shade_eight(const KernelGlobals& g,
-                                                  const GraphProgramView& program,
-                                                  const GraphRegisters& registers,
-                                                  ClosureSight sight,
-                                                  const Hit* hits,
-                                                  Resolved* resolved,
-                                                  Principled3Hits& columns)
+/// Resolves eight hits as stages do. @return  whether columns have their lobes, too
+[[gnu::noinline, gnu::flatten]] bool resolve_eight(const KernelGlobals& g,
+                                                   const GraphProgramView& program,
+                                                   const GraphRegisters& registers,
+                                                   ClosureSight sight,
+                                                   const Hit* hits,
+                                                   Resolved* resolved,
+                                                   LobePairs& pairs)
 {
   const SurfaceClosureSpec* const plain = closures_plain(program);
-  if (plain == nullptr || !closure_scatters_alone(program, *plain)) return 0.0f;
-  MixtureBuildLanes b{{}, splat8(Vec3f{0, 0, 1}), {}};
-  for (int k = 0; k < 8; ++k) {
-    lane_set(b.wo, k, hits[k].wo);
-    lane_set(b.Ns, k, hits[k].Ns);
+  const bool is_plain = plain != nullptr && closure_scatters_alone(program, *plain);
+  if (is_plain) {
+    MixtureBuildLanes b{{}, splat8(Vec3f{0, 0, 1}), {}};
+    for (int k = 0; k < 8; ++k) {
+      lane_set(b.wo, k, hits[k].wo);
+      lane_set(b.Ns, k, hits[k].Ns);
+    }
+    closures_resolve_plain(program, *plain, registers, b, pairs.lobes);
+    lobe_pairs_make(b, frame_from_normal(shading_normal_towards(b.Ns, b.wo)), splat8(sight.blur.alpha), pairs);
+  } else {
+    lobe_pairs_begin(pairs);
   }
-  closures_resolve_plain(program, *plain, registers, b, columns.lobes);
-  principled3_hits_make(b, frame_from_normal(shading_normal_towards(b.Ns, b.wo)), splat8(sight.blur.alpha), columns);
+  bool are_pairs = true;
   for (int k = 0; k < 8; ++k) {
     SurfaceInteraction& at = resolved[k].at;
     at.hit.Ns = hits[k].Ns;
-    Principled3Lane lane{&columns, k};
-    surface_interaction_mix<kFeatures>(g, hits[k].wo, {&program, &registers, k}, &columns.lobes, sight, at, lane);
-    store_lane(columns.to_lamp, k, hits[k].light);
-    columns.u[0][k] = hits[k].u.x;
-    columns.u[1][k] = hits[k].u.y;
+    const GraphLane lane{&program, &registers, k};
+    if (is_plain) {
+      LobePairLane pair{&pairs, k};
+      surface_interaction_mix<kFeatures>(g, hits[k].wo, lane, &pairs.lobes, sight, at, pair);
+    } else {
+      surface_interaction_mix<kFeatures>(g, hits[k].wo, lane, nullptr, sight, at, resolved[k].lobes);
+      are_pairs = are_pairs && lobe_pairs_take(pairs, k, k == 0, resolved[k].lobes);
+      lobe_pairs_set_surface(pairs, k, at.side.Ng, at.side.frame);
+    }
   }
-  principled3_hits_light(columns);
-  principled3_hits_sample(columns);
+  return are_pairs;
+}
+
+/// Evaluates and samples eight hits in columns.
+[[gnu::noinline, gnu::flatten]] float scatter_eight(const KernelGlobals& g,
+                                                    const Hit* hits,
+                                                    const Resolved* resolved,
+                                                    LobePairs& pairs)
+{
+  for (int k = 0; k < 8; ++k) {
+    store_lane(pairs.to_lamp, k, hits[k].light);
+    pairs.u[0][k] = hits[k].u.x;
+    pairs.u[1][k] = hits[k].u.y;
+  }
+  lobe_pairs_light(pairs);
+  lobe_pairs_sample(pairs);
   float sum = 0.0f;
   for (int k = 0; k < 8; ++k) {
-    const Principled3Lane lane{&columns, k, 1.0f / resolved[k].at.params.alpha};
+    const LobePairLane lane{&pairs, k, 1.0f / resolved[k].at.params.alpha};
     const BsdfEval e = closure_eval<kFeatures>(lane, *g.bsdf_tables, {});
     const BsdfSample s = closure_sample(lane);
     sum += e.f.x + e.pdf + s.f.x + s.pdf + s.wi.z;
@@ -249,7 +271,7 @@ void case_run(const KernelGlobals& g,
 {
   const GraphProgramView program = one.program();
   const GraphRegisters registers{};
-  Principled3Hits columns{};
+  LobePairs columns{};
   ClosureSight sight;
   sight.enters = true;
   if (one.is_curve) sight.tangent = {1, 0, 0};
@@ -279,10 +301,10 @@ void case_run(const KernelGlobals& g,
     }
   });
   step(ClosureStep::kEight, [&](int i) {
-    const float together = shade_eight(g, program, registers, sight, hits + i, resolved, columns);
-    times.sum += together;
-    if (together > 0.0f) return;
-    for (int k = 0; k < 8; ++k) resolve_at(i, k);
+    if (resolve_eight(g, program, registers, sight, hits + i, resolved, columns)) {
+      times.sum += scatter_eight(g, hits + i, resolved, columns);
+      return;
+    }
     for (int k = 0; k < 8; ++k) times.sum += evaluate(g, hits[i + k], resolved[k]);
     for (int k = 0; k < 8; ++k) times.sum += sample(g, hits[i + k], resolved[k]);
   });

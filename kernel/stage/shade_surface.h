@@ -157,28 +157,29 @@ RELIEF_KERNEL void shade_surface_meet(const KernelGlobals& g,
   }
 }
 
-/// Shades one path. Reads and writes every column but the hit's.
-/// @param at     as surface_interactions_locate has it; is completed
-/// @param graph  of the material's program at the hit; null: it has none
-/// Next: intersect closest (pushed on `next`), or the path ends; it may fork. At most one ray is added to `shadow`, at a first hit two.
+/// Where paths go from surfaces, and what is counted.
+struct SurfaceSinks {
+  QueueView& next;
+  ShadowQueue& shadow;
+  Counters& counters;
+};
+
+/// Shades one path at a resolved surface, as shade_surface.
+/// @param visit  has u
 template <unsigned kFeatures>
-[[gnu::flatten]] RELIEF_KERNEL void shade_surface(const KernelGlobals& g,
-                                                  PathState& state,
-                                                  std::uint32_t path,
-                                                  SurfaceInteraction& at,
-                                                  QueueView& next,
-                                                  ShadowQueue& shadow,
-                                                  Counters& counters,
-                                                  const GraphHit* graph = nullptr)
+RELIEF_KERNEL void shade_surface_resolved(const KernelGlobals& g,
+                                          PathState& state,
+                                          std::uint32_t path,
+                                          SurfaceInteraction& at,
+                                          const MixtureLobes& lobes,
+                                          SurfaceVisit& visit,
+                                          const SurfaceSinks& sinks)
 {
   constexpr bool kMixture = (kFeatures & kFeatureMixture) != 0;
   const Vec3f wo = -path_direction(state, path);
-  SurfaceVisit visit;
-  // Early: nothing waits for them yet.
-  visit.u = scatter_samples(state.pixel_hash[path], state.sample_index[path], path_surface(state, path));
-  MixtureLobes lobes;
-  surface_interaction_resolve<kFeatures>(g, state, path, wo, at, lobes, graph);
-  shade_surface_meet<kFeatures>(g, state, path, at, lobes, visit, shadow, counters);
+  QueueView& next = sinks.next;
+  ShadowQueue& shadow = sinks.shadow;
+  shade_surface_meet<kFeatures>(g, state, path, at, lobes, visit, shadow, sinks.counters);
 
   const auto ends = [&] {
     if (visit.way == SurfaceWay::kPasses && path_pass_through(g, state, path, at.passed)) queue_push(next, path);
@@ -217,6 +218,26 @@ template <unsigned kFeatures>
     }
   }
   shade_surface_split<kFeatures>(g, state, path, event, bsdf, visit.u, next);
+}
+
+/// Shades one path. Reads and writes every column but the hit's.
+/// @param at     as surface_interactions_locate has it; is completed
+/// @param graph  of the material's program at the hit; null: it has none
+/// Next: intersect closest (pushed on `next`), or the path ends; it may fork. At most one ray is added to `shadow`, at a first hit two.
+template <unsigned kFeatures>
+[[gnu::flatten]] RELIEF_KERNEL void shade_surface(const KernelGlobals& g,
+                                                  PathState& state,
+                                                  std::uint32_t path,
+                                                  SurfaceInteraction& at,
+                                                  const SurfaceSinks& sinks,
+                                                  const GraphHit* graph = nullptr)
+{
+  SurfaceVisit visit;
+  // Early: nothing waits for them yet.
+  visit.u = scatter_samples(state.pixel_hash[path], state.sample_index[path], path_surface(state, path));
+  MixtureLobes lobes;
+  surface_interaction_resolve<kFeatures>(g, state, path, -path_direction(state, path), at, lobes, graph);
+  shade_surface_resolved<kFeatures>(g, state, path, at, lobes, visit, sinks);
 }
 
 }  // namespace relief

@@ -1,5 +1,5 @@
-// Stage: paths that have met surfaces of one plain Principled material, eight together. The steps are those of shade_surface.h;
-// between them closures are evaluated and sampled in columns (principled3_hits.h).
+// Stage: paths that have met surfaces of one material of closures, eight together. The steps are those of shade_surface.h; between
+// them closures are evaluated and sampled in columns, if they are no more than lobe_pairs.h has.
 #pragma once
 
 #include "kernel/stage/shade_surface.h"
@@ -50,24 +50,80 @@ RELIEF_KERNEL Vec3x8 shading_normal_towards(const Vec3x8& Ns, const Vec3x8& wo)
   return select(cos_o >= kLeastShadingCosine, Ns, normalize(Ns + (kLeastShadingCosine - cos_o) * wo));
 }
 
-/// Shades a group. Reads and writes what shade_surface does of each, and has the same ways to go on. (Photons would ask for parts of
-/// closures, and in more directions.)
-/// @param b     of surface_group_build
-/// @param hits  their lobes are made, of b
+/// Resolves a group that surface_group_is_plain, in columns.
+/// @param b      of surface_group_build
+/// @param pairs  their lobes are made, of b
+template <unsigned kFeatures>
+[[gnu::flatten]] RELIEF_KERNEL void surface_group_resolve(const KernelGlobals& g,
+                                                          const PathState& state,
+                                                          const SurfaceGroup& group,
+                                                          const MixtureBuildLanes& b,
+                                                          LobePairs& pairs)
+{
+  alignas(32) float blur[8] = {};
+  for (int k = 0; k < group.count; ++k) blur[k] = path_blur(g, state, group.paths[k]);
+  lobe_pairs_make(b, frame_from_normal(shading_normal_towards(b.Ns, b.wo)), load8(blur), pairs);
+  for (int k = 0; k < group.count; ++k) {
+    const std::uint32_t path = group.paths[k];
+    SurfaceInteraction& at = group.at[k];
+    const ClosureSight sight =
+        closure_sight(g, state, path, *at.instance, surface_blur<kFeatures>(g, state, path, *at.instance));
+    LobePairLane lane{&pairs, k};
+    surface_interaction_mix<kFeatures>(g, -path_direction(state, path), {&group.program, &group.registers, k},
+                                       &pairs.lobes, sight, at, lane);
+  }
+}
+
+/// Resolves a group's hits one by one.
+/// @param columns  of closures_resolve_plain; null: there are none
+/// @param lists    get their lobes
+/// @param pairs    gets them too
+/// @return         false: they are no pairs
+template <unsigned kFeatures>
+[[gnu::flatten]] RELIEF_KERNEL bool surface_group_resolve(const KernelGlobals& g,
+                                                          const PathState& state,
+                                                          const SurfaceGroup& group,
+                                                          const Principled3Columns* columns,
+                                                          MixtureLobes lists[8],
+                                                          LobePairs& pairs)
+{
+  lobe_pairs_begin(pairs);
+  bool are_pairs = group.count > 2;
+  for (int k = 0; k < group.count; ++k) {
+    const std::uint32_t path = group.paths[k];
+    SurfaceInteraction& at = group.at[k];
+    const GraphHit hit{{&group.program, &group.registers, k}, columns};
+    surface_interaction_resolve<kFeatures>(g, state, path, -path_direction(state, path), at, lists[k], &hit);
+    are_pairs = are_pairs && has_mixture<kFeatures>(at) && lobe_pairs_take(pairs, k, k == 0, lists[k]);
+    lobe_pairs_set_surface(pairs, k, at.side.Ng, at.side.frame);
+  }
+  return are_pairs;
+}
+
+/// Shades one path of a group whose hits are resolved, but are no pairs.
+template <unsigned kFeatures>
+[[gnu::flatten]] RELIEF_KERNEL void shade_surface_listed(const KernelGlobals& g,
+                                                         PathState& state,
+                                                         std::uint32_t path,
+                                                         SurfaceInteraction& at,
+                                                         const MixtureLobes& lobes,
+                                                         const SurfaceSinks& sinks)
+{
+  SurfaceVisit visit;
+  visit.u = scatter_samples(state.pixel_hash[path], state.sample_index[path], path_surface(state, path));
+  shade_surface_resolved<kFeatures>(g, state, path, at, lobes, visit, sinks);
+}
+
+/// Shades a group that is resolved. Reads and writes what shade_surface does of each, and has the same ways to go on. (Photons
+/// would ask for parts of closures, and in more directions.)
+/// @param pairs  has their lobes
 template <unsigned kFeatures>
 [[gnu::flatten]] RELIEF_KERNEL void shade_surface_group(const KernelGlobals& g,
                                                         PathState& state,
                                                         const SurfaceGroup& group,
-                                                        const MixtureBuildLanes& b,
-                                                        Principled3Hits& hits,
-                                                        QueueView& next,
-                                                        ShadowQueue& shadow,
-                                                        Counters& counters)
+                                                        LobePairs& pairs,
+                                                        const SurfaceSinks& sinks)
 {
-  alignas(32) float blur[8] = {};
-  for (int k = 0; k < group.count; ++k) blur[k] = path_blur(g, state, group.paths[k]);
-  principled3_hits_make(b, frame_from_normal(shading_normal_towards(b.Ns, b.wo)), load8(blur), hits);
-
   SurfaceVisit visits[8];
   LightAnswer answers[8];
   Light storage[8];
@@ -77,40 +133,35 @@ template <unsigned kFeatures>
     SurfaceVisit& visit = visits[k];
     SurfaceInteraction& at = group.at[k];
     visit.u = scatter_samples(state.pixel_hash[path], state.sample_index[path], path_surface(state, path));
-    Principled3Lane lane{&hits, k};
-    const ClosureSight sight =
-        closure_sight(g, state, path, *at.instance, surface_blur<kFeatures>(g, state, path, *at.instance));
-    surface_interaction_mix<kFeatures>(g, -path_direction(state, path), {&group.program, &group.registers, k},
-                                       &hits.lobes, sight, at, lane);
-    shade_surface_meet<kFeatures>(g, state, path, at, lane, visit, shadow, counters);
+    shade_surface_meet<kFeatures>(g, state, path, at, LobePairLane{&pairs, k}, visit, sinks.shadow, sinks.counters);
     if (visit.chosen.probability > 0.0f) {
       answers[k] = light_ask(g, state, path, visit.chosen, at.hit.P, visit.light_N, storage[k]);
       if (!light_answers(answers[k])) visit.chosen.probability = 0.0f;
-      store_lane(hits.to_lamp, k, answers[k].sample.wi);
+      store_lane(pairs.to_lamp, k, answers[k].sample.wi);
       are_lit = true;
     }
-    hits.u[0][k] = visit.u.bsdf.x;
-    hits.u[1][k] = visit.u.bsdf.y;
+    pairs.u[0][k] = visit.u.bsdf.x;
+    pairs.u[1][k] = visit.u.bsdf.y;
     scatter = scatter || visit.way == SurfaceWay::kScatters;
   }
-  if (are_lit) principled3_hits_light(hits);
-  if (scatter) principled3_hits_sample(hits);
+  if (are_lit) lobe_pairs_light(pairs);
+  if (scatter) lobe_pairs_sample(pairs);
 
   for (int k = 0; k < group.count; ++k) {
     const std::uint32_t path = group.paths[k];
     const SurfaceVisit& visit = visits[k];
     const SurfaceInteraction& at = group.at[k];
-    const Principled3Lane closure{&hits, k, 1.0f / at.params.alpha};
-    const ScatterEvent<Principled3Lane> event{at, closure, visit.throughput, visit.light_N, visit.cone};
+    const LobePairLane closure{&pairs, k, 1.0f / at.params.alpha};
+    const ScatterEvent<LobePairLane> event{at, closure, visit.throughput, visit.light_N, visit.cone};
     if (visit.chosen.probability > 0.0f) {
       const Vec3f wi = to_local(at.side.frame, answers[k].sample.wi);
       shade_surface_lit<kFeatures>(g, state, path, event, answers[k], wi,
-                                   closure_eval<kFeatures>(closure, *g.bsdf_tables, wi), shadow);
+                                   closure_eval<kFeatures>(closure, *g.bsdf_tables, wi), sinks.shadow);
     }
     if (visit.way == SurfaceWay::kPasses) {
-      if (path_pass_through(g, state, path, at.passed)) queue_push(next, path);
+      if (path_pass_through(g, state, path, at.passed)) queue_push(sinks.next, path);
     } else if (visit.way == SurfaceWay::kScatters) {
-      shade_surface_continue<kFeatures>(g, state, path, event, closure_sample(closure), 1.0f, visit.u, next);
+      shade_surface_continue<kFeatures>(g, state, path, event, closure_sample(closure), 1.0f, visit.u, sinks.next);
     }
   }
 }

@@ -1,8 +1,8 @@
 // What stages ask of a hit's lobes, whether they are a list or lanes of columns.
 #pragma once
 
+#include "kernel/bsdf/lobe_pairs.h"
 #include "kernel/bsdf/mixture_build.h"
-#include "kernel/bsdf/principled3_hits.h"
 
 namespace relief {
 
@@ -16,14 +16,14 @@ RELIEF_KERNEL MixtureLobes* lobes_begin(MixtureLobes& lobes)
   lobes.size = 0;
   return &lobes;
 }
-RELIEF_KERNEL MixtureLobes* lobes_begin(Principled3Lane&) { return nullptr; }
+RELIEF_KERNEL MixtureLobes* lobes_begin(LobePairLane&) { return nullptr; }
 
 /// Widens lobes as lobe_blur does. Those of columns are so already.
 RELIEF_KERNEL void lobes_blur(MixtureLobes& lobes, float blur, float most_sharp)
 {
   for (int i = 0; i < lobes.size; ++i) lobe_blur(lobes.lobes[i], blur, most_sharp);
 }
-RELIEF_KERNEL void lobes_blur(Principled3Lane&, float, float) {}
+RELIEF_KERNEL void lobes_blur(LobePairLane&, float, float) {}
 
 /// Over all lobes of a hit.
 struct LobesSum {
@@ -43,14 +43,14 @@ RELIEF_KERNEL LobesSum lobes_sum(const MixtureLobes& lobes)
   }
   return sum;
 }
-RELIEF_KERNEL LobesSum lobes_sum(const Principled3Lane& one)
+RELIEF_KERNEL LobesSum lobes_sum(const LobePairLane& one)
 {
-  const Principled3Hits& h = *one.hits;
+  const LobePairs& h = *one.hits;
   const int k = one.lane;
   LobesSum sum;
   sum.probability = h.p_diffuse[k] + h.p_reflection[k];
   if (h.has_diffuse[k] != 0) sum.weight = load_lane(h.lobes.diffuse, k);
-  if (h.has_reflection[k] != 0) sum.weight += splat3(h.lobes.specular_weight[k]);
+  if (h.has_reflection[k] != 0) sum.weight += load_lane(h.reflection, k);
   if (h.lobes.roughness[k] <= kSeenThroughRoughness) sum.sharp = h.p_reflection[k];
   return sum;
 }
@@ -70,9 +70,9 @@ RELIEF_KERNEL void lobes_defend(MixtureLobes& lobes, float passing)
     if (lobe.kind != MixtureLobeKind::kMultiple) lobe.probability = max(lobe.probability, kLeastLobeShare * sum);
   }
 }
-RELIEF_KERNEL void lobes_defend(Principled3Lane& one, float passing)
+RELIEF_KERNEL void lobes_defend(LobePairLane& one, float passing)
 {
-  Principled3Hits& h = *one.hits;
+  LobePairs& h = *one.hits;
   const int k = one.lane;
   const float least = kLeastLobeShare * (passing + h.p_diffuse[k] + h.p_reflection[k]);
   if (h.has_diffuse[k] != 0) h.p_diffuse[k] = max(h.p_diffuse[k], least);
@@ -80,9 +80,9 @@ RELIEF_KERNEL void lobes_defend(Principled3Lane& one, float passing)
 }
 
 /// As lobes_are_delta of a list.
-RELIEF_KERNEL bool lobes_are_delta(const Principled3Lane& one)
+RELIEF_KERNEL bool lobes_are_delta(const LobePairLane& one)
 {
-  const Principled3Hits& h = *one.hits;
+  const LobePairs& h = *one.hits;
   return h.has_diffuse[one.lane] == 0 && (h.has_reflection[one.lane] == 0 || h.is_delta[one.lane] != 0);
 }
 
@@ -101,9 +101,9 @@ RELIEF_KERNEL Vec3f lobes_normal(const MixtureLobes& lobes, Vec3f otherwise)
   }
   return is_zero(sum) ? otherwise : sum / total;
 }
-RELIEF_KERNEL Vec3f lobes_normal(const Principled3Lane& one, Vec3f otherwise)
+RELIEF_KERNEL Vec3f lobes_normal(const LobePairLane& one, Vec3f otherwise)
 {
-  const Principled3Hits& h = *one.hits;
+  const LobePairs& h = *one.hits;
   const bool is_there = (h.has_diffuse[one.lane] | h.has_reflection[one.lane]) != 0;
   return is_there ? load_lane(h.lobes.frame + 6, one.lane) : otherwise;
 }

@@ -1,4 +1,4 @@
-// Hits of a plain Principled material are shaded eight together, or one by one where there are too few: the picture is the same.
+// Hits of one material of closures are shaded eight together, or one by one where there are too few: the picture is the same.
 #include <array>
 #include <cmath>
 
@@ -18,11 +18,11 @@ json principled(const json& inputs)
   return closure;
 }
 
-/// Balls on a floor, each of a plain Principled material of its own, under lamps, one of which some rays do not see.
+/// Balls on a floor, each of a material of its own, under lamps, one of which some rays do not see.
 Scene plain_scene()
 {
   const json glass = {{"type", "transparent"}, {"weight", 0.4}}, light = {{"type", "emission"}, {"strength", 0.3}};
-  const std::array<json, 7> materials = {
+  const std::array<json, 10> materials = {
       json::array({principled({{"baseColor", {0.7, 0.5, 0.3}}, {"normal", {0.3, 0.1, 1}}})}),
       json::array({principled({{"baseColor", {0.8, 0.2, 0.1}}, {"roughness", 0.2}})}),
       json::array({principled({{"metallic", 1}, {"roughness", 0.3}, {"anisotropic", 0.8}})}),
@@ -30,6 +30,11 @@ Scene plain_scene()
       json::array({principled({{"weight", 0.6}, {"roughness", 1}}), glass}),
       json::array({principled({{"specular", 0}, {"baseColor", {0.2, 0.4, 0.9}}}), light}),
       json::array({principled({{"weight", 0.7}}), {{"type", "holdout"}, {"weight", 0.3}}}),
+      json::array({principled({{"maths", "4.3"}, {"distribution", "multiscatter-ggx"}, {"roughness", 0.3}})}),
+      json::array(
+          {principled({{"maths", "5.2"}, {"metallic", 1}, {"roughness", 0.4}, {"baseColor", {0.9, 0.6, 0.2}}})}),
+      json::array({{{"type", "diffuse"}, {"weight", 0.5}, {"color", {0.2, 0.7, 0.3}}},
+                   {{"type", "glossy"}, {"weight", 0.5}, {"color", {0.9, 0.9, 0.9}}, {"roughness", 0.1}}}),
   };
   GltfBuilder b;
   const std::vector<float> P{0, 0, 0, 1, 0, 0, 0, 1, 0};
