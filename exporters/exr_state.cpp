@@ -41,6 +41,7 @@ void visit(State& state, const Field& field)
   field("tile_samples", state.tile_samples);
   field("photons_a_pass", state.photons.photons_a_pass);
   field("first_radius", state.photons.first_radius);
+  field("first_radius_in_media", state.photons.first_radius_in_media);
   field("photons_stored", state.photons.stored);
   field("photon_seconds", state.photons.seconds);
   field("photon_passes", state.photons.passes);

@@ -133,15 +133,16 @@ void Media::follow(Vec3f P, Vec3f D, float to, float time, MediumState& out) con
   }
 }
 
-void Media::start(PathState& state, std::uint32_t count) const
+void Media::start(PathState& state, const QueueView& paths) const
 {
   Vec3f before_O;
   MediumState inside{};
   float before_time = 0;
-  for (std::uint32_t i = 0; i < count; ++i) {
+  for (std::uint32_t k = 0; k < paths.size; ++k) {
+    const std::uint32_t i = paths.paths[k];
     const Vec3f O = path_origin(state, i);
     const float time = path_time(state, i);
-    if (i == 0 || O != before_O || time != before_time) find(O, time, inside);
+    if (k == 0 || O != before_O || time != before_time) find(O, time, inside);
     before_O = O;
     before_time = time;
     inside.hit_inside = kWholeWorld;

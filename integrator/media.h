@@ -23,9 +23,9 @@ class Media {
   /// Meshes that bound a medium and are open or inside out, a line each.
   std::vector<std::string> problems() const;
 
-  /// Gives the first `count` paths, whose rays have just been made, the media that they start in, at the near clipping plane.
+  /// Gives paths whose rays have just been made the media that they start in; of camera paths, at the near clipping plane.
   /// @cost  a ray to there a path; where the camera is in the box of such a mesh, a ray through the scene once, or a path with a lens
-  void start(PathState& state, std::uint32_t count) const;
+  void start(PathState& state, const QueueView& paths) const;
 
  private:
   struct Filled {

@@ -9,6 +9,7 @@
 
 #include "integrator/camera_medium.h"
 #include "integrator/flush_denormals.h"
+#include "integrator/media.h"
 #include "integrator/photon_guide.h"
 
 namespace relief {
@@ -120,11 +121,20 @@ Film pilot_film(const RenderSettings& settings, double num_pixels, KernelGlobals
   return film;
 }
 
-Wavefront pilot_worker(const SceneContext& context, const CameraMedium& camera_medium, const std::atomic<bool>& stop)
+/// What rays of a pilot may start in.
+struct PilotMedia {
+  explicit PilotMedia(const SceneContext& context) : of_camera(context), all(context) {}
+
+  CameraMedium of_camera;
+  Media all;
+};
+
+Wavefront pilot_worker(const SceneContext& context, const PilotMedia& media, const std::atomic<bool>& stop)
 {
   Wavefront worker(context.columns(true));
   worker.stop = &stop;
-  if (camera_medium.exists()) worker.camera_medium = &camera_medium;
+  if (media.of_camera.exists()) worker.camera_medium = &media.of_camera;
+  if (media.all.exist()) worker.media = &media.all;
   return worker;
 }
 
@@ -142,8 +152,8 @@ Pilot pilot_run(const SceneContext& context,
   KernelGlobals g = of_render;
   Film film = pilot_film(settings, num_pixels, g);
   const StageTable& stages = stage_table_select();
-  const CameraMedium camera_medium(context);
-  tbb::enumerable_thread_specific<Wavefront> workers([&] { return pilot_worker(context, camera_medium, stop); });
+  const PilotMedia media(context);
+  tbb::enumerable_thread_specific<Wavefront> workers([&] { return pilot_worker(context, media, stop); });
   // Where they carry what they have, it is the beauty alone that is asked for.
   double factors = sources.factors.empty() ? kTrace : 0.0;
   for (std::size_t i = 0; i < sources.factors.size(); ++i) {
@@ -170,7 +180,7 @@ Pilot pilot_run(const SceneContext& context,
 
 /// Cost of a sample with photons over that of one without, by the rays that both take.
 /// @param photons_a_sample  started
-double cost_ratio(const Pilot& pilot, double samples, double photons_a_sample)
+double cost_ratio(const Pilot& pilot, bool has_media, double samples, double photons_a_sample)
 {
   // In rays of camera paths, shading included. Measured on scenes of few and of many objects and lamps: a photon's ray is one
   // to 1.8 of them, a photon that is kept 0.5 (it is sorted into the map), a search for photons 0.7 to 2.
@@ -179,7 +189,9 @@ double cost_ratio(const Pilot& pilot, double samples, double photons_a_sample)
   const auto rays = static_cast<double>(c.camera_rays + c.bounce_rays + c.shadow_rays);
   const double of_photons =
       (kPhotonRay * static_cast<double>(c.photon_rays) + kStored * pilot.stored) / static_cast<double>(c.photon_paths);
-  const double searches = kSearch * static_cast<double>(c.surface_hits);
+  // In media each ray is one as well.
+  const std::uint64_t in_media = has_media ? c.camera_rays + c.bounce_rays : 0;
+  const double searches = kSearch * static_cast<double>(c.surface_hits + in_media);
   return 1 + (searches + of_photons * photons_a_sample * samples) / rays;
 }
 
@@ -202,8 +214,8 @@ void photons_guide(const SceneContext& context,
   // Other numbers than the render's: chances that follow from its own would favour what they bring.
   g.seed = ~g.seed;
   const StageTable& stages = stage_table_select();
-  const CameraMedium camera_medium(context);
-  tbb::enumerable_thread_specific<Wavefront> workers([&] { return pilot_worker(context, camera_medium, stop); });
+  const PilotMedia media(context);
+  tbb::enumerable_thread_specific<Wavefront> workers([&] { return pilot_worker(context, media, stop); });
   std::vector<std::vector<RecordedRay>> rays(static_cast<std::size_t>(film.num_tiles()));
   tbb::parallel_for(0, film.num_tiles(), [&](int tile) {
     const FlushDenormals flush;
@@ -222,7 +234,8 @@ void photons_guide(const SceneContext& context,
   const std::size_t num_groups = std::min(all.sources.size(), kMostGroups);
   std::vector<std::size_t> groups;
   for (std::size_t j = 0; j <= num_groups; ++j) groups.push_back(j * all.sources.size() / num_groups);
-  std::vector<std::vector<Photon>> photons(num_groups);
+  // Of those in media none is told: the half of all photons that is shared out as before brings what shows there alone.
+  std::vector<KeptPhotons> kept(num_groups);
   tbb::parallel_for(std::size_t{0}, num_groups, [&](std::size_t j) {
     if (stop.load(std::memory_order_relaxed)) return;
     const FlushDenormals flush;
@@ -238,9 +251,11 @@ void photons_guide(const SceneContext& context,
     view.factors = nullptr;
     for (std::uint32_t first = 0; first < count; first += kBatchPaths) {
       workers.local().trace_photons(g, *context.accel, stages, context.surface_kernels(true), view, first,
-                                    std::min(kBatchPaths, count - first), photons[j]);
+                                    std::min(kBatchPaths, count - first), kept[j]);
     }
   });
+  std::vector<std::vector<Photon>> photons;
+  for (KeptPhotons& of_group : kept) photons.push_back(std::move(of_group.on_surfaces));
   const double denser =
       photon_sources_guide(all, groups, photons, looks, photon_radius_for(photons, all.within));
   if (!(denser > 1)) return;
@@ -341,7 +356,7 @@ PhotonChoice photon_choice_make(const SceneContext& context,
     leave_to_paths("no caustic shows in the picture");
     return choice;
   }
-  choice.cost_ratio = cost_ratio(pilot, paths, photons_wanted(settings) / num_pixels);
+  choice.cost_ratio = cost_ratio(pilot, !context.media.empty(), paths, photons_wanted(settings) / num_pixels);
   // With photons a path that comes by chance to a bright caustic has noise of its own.
   const Pilot shown =
       pilot_run(context, options, g, choice.sources, static_cast<std::uint32_t>(paths), paths / kPilotSamples, stop);

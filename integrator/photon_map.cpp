@@ -144,7 +144,7 @@ std::size_t PhotonMap::bytes() const
          near_.capacity();
 }
 
-float photon_radius_for(const std::vector<std::vector<Photon>>& chunks, double wanted)
+float photon_radius_for(const std::vector<std::vector<Photon>>& chunks, double wanted, PhotonPlaces places)
 {
   const std::vector<std::size_t> first = chunk_offsets(chunks);
   const std::size_t count = first.back();
@@ -180,15 +180,16 @@ float photon_radius_for(const std::vector<std::vector<Photon>>& chunks, double w
     ++apart;
   }
   if (apart == 0) return 0;
-  // On a surface, photons within a radius grow with its square.
+  // On a surface, photons within a radius grow with its square; in a medium with its cube.
   const double found = nth * static_cast<double>(stride);
-  return static_cast<float>(std::exp(sum / apart) * std::sqrt(wanted / found));
+  return static_cast<float>(std::exp(sum / apart) * std::pow(wanted / found, 1.0 / static_cast<int>(places)));
 }
 
 std::vector<float> photon_radii(const std::vector<std::vector<Photon>>& chunks,
                                 double wanted,
                                 float typical,
-                                std::uint32_t shift)
+                                std::uint32_t shift,
+                                PhotonPlaces places)
 {
   constexpr float kWidest = 4;
   constexpr std::size_t kSizes = 8;  // of cells, from twice the widest radius down by halves
@@ -227,8 +228,11 @@ std::vector<float> photon_radii(const std::vector<std::vector<Photon>>& chunks,
         --size;
         found = counts[size][counter(chunks[c][k].P, size)];
       } while (size > 0 && found < enough);
-      const double area = static_cast<double>(sqr(cell_size(size))) / found * wanted;
-      radii[first[c] + k] = std::min(widest, static_cast<float>(std::sqrt(area / 3.14159265358979)));
+      const auto side = static_cast<double>(cell_size(size));
+      const double share = wanted / found / 3.14159265358979;
+      const double radius =
+          places == PhotonPlaces::kSurfaces ? side * std::sqrt(share) : side * std::cbrt(0.75 * share);
+      radii[first[c] + k] = std::min(widest, static_cast<float>(radius));
     }
   });
   return radii;

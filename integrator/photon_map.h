@@ -37,11 +37,16 @@ class PhotonMap {
   float largest_radius_ = 0;
 };
 
+/// Where photons lie, by the dimensions of what they fill.
+enum class PhotonPlaces : int { kSurfaces = 2, kMedia = 3 };
+
 /// The geometric mean of the radii within which photons find `wanted` others: where light is, not where space is. Estimated
 /// from a part of them. (The median jumps where bright and dim caustics have like shares of the photons.) Of fewer than
 /// twice as many photons, the radii within which they find half of all.
 /// @return metres; 0 where there is no distance between them
-float photon_radius_for(const std::vector<std::vector<Photon>>& chunks, double wanted);
+float photon_radius_for(const std::vector<std::vector<Photon>>& chunks,
+                        double wanted,
+                        PhotonPlaces places = PhotonPlaces::kSurfaces);
 
 /// A radius for each photon, so that about `wanted` lie within: small where light is bright, wide where it is dim. Photons
 /// are counted in cells of several sizes; the finest that has half as many as wanted around a photon says how dense they
@@ -52,6 +57,7 @@ float photon_radius_for(const std::vector<std::vector<Photon>>& chunks, double w
 std::vector<float> photon_radii(const std::vector<std::vector<Photon>>& chunks,
                                 double wanted,
                                 float typical,
-                                std::uint32_t shift);
+                                std::uint32_t shift,
+                                PhotonPlaces places = PhotonPlaces::kSurfaces);
 
 }  // namespace relief

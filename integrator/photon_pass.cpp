@@ -18,6 +18,9 @@ namespace relief {
 
 namespace {
 
+/// Photons within a radius in media, of those on surfaces: a ray finds those of its whole way.
+constexpr double kOfThemInMedia = 0.25;
+
 Vec3f box_centre(const Box3& box) { return 0.5f * (box.low + box.high); }
 
 float box_radius(const Box3& box) { return 0.5f * length(box.high - box.low); }
@@ -235,20 +238,24 @@ void PhotonPass::keep_to_memory(const KernelGlobals& g, const StageTable& stages
   constexpr double kBytes = sizeof(Photon) + 2.0 * (sizeof(PhotonArrival) + 4 * sizeof(float) + 8) + 52;
   const double most_kept = std::max(1.0, settings_.memory_mib * 1048576.0 / kBytes);
   // A path is kept at each surface that it meets, if they are all casters that show caustics: rough glass for one.
-  if (photons_a_pass_ * (g.limits.total + 1.0) <= most_kept) return;
-  std::vector<Photon> kept;
+  // And before each of them in a medium.
+  const double kinds = context_.media.empty() ? 1 : 2;
+  if (photons_a_pass_ * (g.limits.total + 1.0) * kinds <= most_kept) return;
+  KeptPhotons kept;
   worker.trace_photons(g, *context_.accel, stages, context_.surface_kernels(true), sources_.view(photons_a_pass_), 0,
                        kBatchPaths, kept);
   // What these paths leave out of account: four standard errors of as many that each keep nothing or one.
   constexpr double kMargin = 1 + 4.0 / 64;
-  const double kept_a_path = kMargin * std::max(1.0, static_cast<double>(kept.size())) / kBatchPaths;
+  const auto num_kept = static_cast<double>(kept.on_surfaces.size() + kept.in_media.size());
+  const double kept_a_path = kMargin * std::max(1.0, num_kept) / kBatchPaths;
   photons_a_pass_ = static_cast<std::uint32_t>(std::clamp(most_kept / kept_a_path, 1.0, 1.0 * photons_a_pass_));
 }
 
 void PhotonPass::restore(const PhotonPassState& state, std::uint32_t skipped)
 {
   photons_a_pass_ = state.photons_a_pass;
-  first_radius_ = state.first_radius;
+  surfaces_.first_radius = state.first_radius;
+  media_.first_radius = state.first_radius_in_media;
   stored_ = state.stored;
   seconds_ = state.seconds;
   passes_ = state.passes;
@@ -284,6 +291,39 @@ void PhotonPass::next_turn(std::array<KernelGlobals, kMaps>& g,
   served_ += samples * active;
 }
 
+std::vector<float> PhotonPass::radii(Kept& kept, double within, PhotonPlaces places) const
+{
+  std::size_t count = 0;
+  for (const std::vector<Photon>& chunk : kept.chunks) count += chunk.size();
+  if (count == 0) return {};
+  const bool is_set = settings_.radius > 0;
+  float& first = kept.first_radius;
+  if (!(first > 0)) first = is_set ? settings_.radius : photon_radius_for(kept.chunks, within, places);
+  // A single photon, or all at one point: their light is shown all the same.
+  constexpr float kOfCaster = 0.1f;
+  if (!(first > 0)) first = kOfCaster * box_radius(sources_.targets.front());
+  std::vector<float> radii =
+      is_set ? std::vector<float>(count, first) : photon_radii(kept.chunks, within, first, passes_, places);
+  const auto factor = static_cast<float>(photon_radius_factor(passes_, settings_.alpha));
+  for (float& radius : radii) radius *= factor;
+  return radii;
+}
+
+void PhotonPass::build_maps(KernelGlobals& g, std::size_t slot)
+{
+  const std::vector<float> on_surfaces = radii(surfaces_, sources_.within, PhotonPlaces::kSurfaces);
+  if (!on_surfaces.empty()) {
+    maps_[slot].build(surfaces_.chunks, on_surfaces);
+    g.caustics.map = maps_[slot].view();
+  }
+  const std::vector<float> in_media = radii(media_, kOfThemInMedia * sources_.within, PhotonPlaces::kMedia);
+  if (!in_media.empty()) {
+    maps_in_media_[slot].build(media_.chunks, in_media);
+    g.caustics.in_media = maps_in_media_[slot].view();
+  }
+  stored_ += on_surfaces.size() + in_media.size();
+}
+
 void PhotonPass::next(KernelGlobals& g,
                       std::size_t slot,
                       const StageTable& stages,
@@ -293,6 +333,7 @@ void PhotonPass::next(KernelGlobals& g,
 {
   const auto start = std::chrono::steady_clock::now();
   g.caustics.map = {};
+  g.caustics.in_media = {};
   // Every pixel's sample of this pass, and all of its photons, are of one time. No pixel of an image is there.
   g.caustics.time =
       sample_1d(sample_pixel_hash(g.seed, -2, -1), sample_sequence_index(passes_, g.log2_stream), kTimeDimension);
@@ -300,41 +341,27 @@ void PhotonPass::next(KernelGlobals& g,
     if (passes_ == 0) keep_to_memory(g, stages, worker());
     const PhotonSourcesView view = sources_.view(photons_a_pass_);
     const std::uint64_t first = std::uint64_t{passes_} * photons_a_pass_;
-    chunks_.resize((photons_a_pass_ + kBatchPaths - 1) / kBatchPaths);
+    const std::size_t num_chunks = (photons_a_pass_ + kBatchPaths - 1) / kBatchPaths;
+    for (Kept* kept : {&surfaces_, &media_}) kept->chunks.resize(num_chunks);
     tbb::parallel_for(
-        std::size_t{0}, chunks_.size(),
+        std::size_t{0}, num_chunks,
         [&](std::size_t c) {
-          chunks_[c].clear();
+          for (Kept* kept : {&surfaces_, &media_}) kept->chunks[c].clear();
           if (stop.load(std::memory_order_relaxed)) return;
           const FlushDenormals flush;
           const auto begin = static_cast<std::uint32_t>(c) * kBatchPaths;
           const std::uint32_t count = std::min(kBatchPaths, photons_a_pass_ - begin);
           // Tracing wants room for all paths of a batch, of which few may be kept.
-          std::vector<Photon> kept;
+          KeptPhotons kept;
           worker().trace_photons(g, *context_.accel, stages, context_.surface_kernels(true), view, first + begin, count,
                                  kept);
-          chunks_[c].assign(kept.begin(), kept.end());
+          surfaces_.chunks[c].assign(kept.on_surfaces.begin(), kept.on_surfaces.end());
+          media_.chunks[c].assign(kept.in_media.begin(), kept.in_media.end());
           under_way_ += count;
           report();
         },
         tbb::simple_partitioner());
-    std::size_t stored = 0;
-    for (const std::vector<Photon>& chunk : chunks_) stored += chunk.size();
-    stored_ += stored;
-    if (!(first_radius_ > 0)) {
-      first_radius_ = settings_.radius > 0 ? settings_.radius : photon_radius_for(chunks_, sources_.within);
-    }
-    // A single photon, or all at one point: their light is shown all the same.
-    constexpr float kOfCaster = 0.1f;
-    if (!(first_radius_ > 0) && stored_ > 0) first_radius_ = kOfCaster * box_radius(sources_.targets.front());
-    if (first_radius_ > 0) {
-      std::vector<float> radii = settings_.radius > 0 ? std::vector<float>(stored, first_radius_)
-                                                      : photon_radii(chunks_, sources_.within, first_radius_, passes_);
-      const auto factor = static_cast<float>(photon_radius_factor(passes_, settings_.alpha));
-      for (float& radius : radii) radius *= factor;
-      maps_[slot].build(chunks_, radii);
-      g.caustics.map = maps_[slot].view();
-    }
+    build_maps(g, slot);
   }
   ++passes_;
   under_way_ = 0;
@@ -358,12 +385,15 @@ void PhotonPass::fill(CausticStatistics& stats) const
   stats.photons = photons();
   stats.stored = stored_;
   stats.num_sources = sources_.sources.size();
-  stats.first_radius = first_radius_;
-  stats.radius = passes_ > 0 ? first_radius_ * photon_radius_factor(passes_ - 1, settings_.alpha) : 0;
+  stats.first_radius = surfaces_.first_radius > 0 ? surfaces_.first_radius : media_.first_radius;
+  stats.radius = passes_ > 0 ? stats.first_radius * photon_radius_factor(passes_ - 1, settings_.alpha) : 0;
   stats.seconds = seconds_;
   stats.bytes = 0;
   for (const PhotonMap& map : maps_) stats.bytes += map.bytes();
-  for (const std::vector<Photon>& chunk : chunks_) stats.bytes += chunk.capacity() * sizeof(Photon);
+  for (const MediumPhotonMap& map : maps_in_media_) stats.bytes += map.bytes();
+  for (const Kept* kept : {&surfaces_, &media_}) {
+    for (const std::vector<Photon>& chunk : kept->chunks) stats.bytes += chunk.capacity() * sizeof(Photon);
+  }
 }
 
 }  // namespace relief

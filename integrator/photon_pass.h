@@ -11,6 +11,7 @@
 #include <functional>
 #include <vector>
 
+#include "integrator/medium_photon_map.h"
 #include "integrator/photon_map.h"
 #include "integrator/scene_context.h"
 #include "integrator/wavefront.h"
@@ -87,7 +88,8 @@ class PhotonPass {
 
   PhotonPassState state() const
   {
-    return {photons_a_pass_, first_radius_, stored_, seconds_, passes_, num_maps_, served_};
+    return {photons_a_pass_, surfaces_.first_radius, media_.first_radius, stored_, seconds_, passes_, num_maps_,
+            served_};
   }
   /// Goes on where another was.
   /// @param skipped  passes that it had left out
@@ -108,15 +110,25 @@ class PhotonPass {
   /// kept is found out by a batch of them, and only where it matters.
   void keep_to_memory(const KernelGlobals& g, const StageTable& stages, Wavefront& worker);
 
+  /// Photons that lie on surfaces, or in media.
+  struct Kept {
+    std::vector<std::vector<Photon>> chunks;
+    float first_radius = 0;
+  };
+  /// The radii of those of the present pass.
+  /// @param within  photons that are to lie within the radius of one in the first pass
+  std::vector<float> radii(Kept& kept, double within, PhotonPlaces places) const;
+  void build_maps(KernelGlobals& g, std::size_t slot);
+
   const SceneContext& context_;
   CausticSettings settings_;
   PhotonSources sources_;
   std::uint32_t photons_a_pass_;
   std::uint32_t passes_ = 0, skipped_ = 0;   ///< the former with the latter
   std::atomic<std::uint32_t> under_way_{0};  ///< photons of the present pass
-  float first_radius_ = 0;
-  std::vector<std::vector<Photon>> chunks_;
+  Kept surfaces_, media_;
   std::array<PhotonMap, kMaps> maps_;
+  std::array<MediumPhotonMap, kMaps> maps_in_media_;
   std::uint32_t num_maps_ = 0;  ///< in use
   double served_ = 0;           ///< samples of the whole window, by these
   bool are_lost_ = false;       ///< they were another's, and have to be traced again

@@ -64,14 +64,37 @@ std::uint32_t events_switched_off(CausticKinds kinds)
   return kOff[static_cast<int>(kinds)];
 }
 
+/// Whether something fills space where photons can show.
+bool shows_photons_in_media(const Scene& scene)
+{
+  const auto scatters = [](const Medium& medium, const VolumeProgram& varying) {
+    return varying.closures.empty() &&
+           std::any_of(medium.phases, medium.phases + medium.num_phases,
+                       [](const Phase& phase) { return max_component(phase.sigma_s) > 0.0f; });
+  };
+  bool shows = scene.environment.medium && scatters(*scene.environment.medium, scene.environment.varying_medium);
+  for (std::size_t i = 0; i < scene.media.size(); ++i) {
+    shows |= scatters(scene.media[i], i < scene.varying_media.size() ? scene.varying_media[i] : VolumeProgram{});
+  }
+  return shows;
+}
+
+/// Leaves to paths the caustics of what shines from infinitely far away through a medium that fills all space. Where photons would start
+/// from, and what would be left of them, cannot be said.
+void leave_what_is_far_to_paths(LightSet& lights)
+{
+  lights.environment_casts_caustics = false;
+  for (Light& light : lights.lights) {
+    if (light.kind == LightKind::kSun) light.casts_caustics = false;
+  }
+}
+
 CausticsDecision caustics_decide(const Scene& scene, LightSet& lights, const CausticSettings& settings)
 {
   const CausticsMode mode = settings.mode;
   if (mode == CausticsMode::kOff) return {false, "off"};
   if (settings.kinds == CausticKinds::kNone) return {false, "there are to be none"};
-  if (!scene.media.empty() || scene.environment.medium)
-    return {false, "there are media, of which photons know nothing"};
-  bool any_caster = false, any_receiver = false;
+  bool any_caster = false, any_receiver = shows_photons_in_media(scene);
   for (const Instance& instance : scene.instances) {
     const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
     const bool caster = (instance.flags & kCausticCaster) != 0;
@@ -83,6 +106,7 @@ CausticsDecision caustics_decide(const Scene& scene, LightSet& lights, const Cau
   }
   if (!any_caster) return {false, "nothing casts caustics"};
   if (!any_receiver) return {false, "nothing receives caustics"};
+  if (scene.environment.medium) leave_what_is_far_to_paths(lights);
   if (mode == CausticsMode::kAuto && lights.environment_solid_angle > kWideLight) {
     lights.environment_casts_caustics = false;
   }

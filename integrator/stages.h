@@ -47,6 +47,12 @@ struct StageTable {
   /// Takes paths through the media that they are in, before what they have met is shaded; those that do not get there, and those that
   /// have met a boundary alone, leave their queues.
   void (*shade_media)(const KernelGlobals&, PathState&, HitQueues& queues, QueueView& next, ShadowQueue& shadow);
+  /// The same of photons; those that are kept in media are added to `photons`.
+  void (*shade_photon_media)(const KernelGlobals&,
+                             PathState&,
+                             HitQueues& queues,
+                             QueueView& next,
+                             PhotonQueueView& photons);
   /// Lights and scatters paths that have walked below a surface and got out.
   void (*leave_surfaces)(const KernelGlobals&,
                          PathState&,
@@ -95,6 +101,18 @@ void shade_media_baseline(
     const KernelGlobals& g, PathState& state, HitQueues& queues, QueueView& next, ShadowQueue& shadow);
 void shade_media_avx2(
     const KernelGlobals& g, PathState& state, HitQueues& queues, QueueView& next, ShadowQueue& shadow);
+
+/// See StageTable::shade_photon_media.
+void shade_photon_media_baseline(const KernelGlobals& g,
+                                 PathState& state,
+                                 HitQueues& queues,
+                                 QueueView& next,
+                                 PhotonQueueView& photons);
+void shade_photon_media_avx2(const KernelGlobals& g,
+                             PathState& state,
+                             HitQueues& queues,
+                             QueueView& next,
+                             PhotonQueueView& photons);
 
 /// See StageTable::leave_surfaces.
 void leave_surfaces_baseline(

@@ -143,14 +143,14 @@ bool Wavefront::run(const KernelGlobals& g,
   met_.surface_kernel = surface_kernel.data();
   const std::uint32_t num_paths = stages.generate(g, state_, batch);
   if (camera_medium != nullptr) camera_medium->apply(state_, num_paths);
-  if (media != nullptr) media->start(state_, num_paths);
+  active_.size = num_paths;
+  for (std::uint32_t i = 0; i < active_.size; ++i) active_.paths[i] = i;
+  if (media != nullptr) media->start(state_, active_);
   if (g.caustics.enabled) {
     for (std::uint32_t i = 0; i < num_paths; ++i) (*state_.caustic.radiance)[i] = Vec3f{};
     std::iota(state_.caustic.root, state_.caustic.root + num_paths, 0u);
     state_.caustic.num_paths = num_paths;
   }
-  active_.size = num_paths;
-  for (std::uint32_t i = 0; i < active_.size; ++i) active_.paths[i] = i;
   counters.camera_rays += active_.size;
   charge(Stage::kGenerate);
 
@@ -231,7 +231,7 @@ void Wavefront::trace_photons(const KernelGlobals& g,
                               const PhotonSourcesView& sources,
                               std::uint64_t first,
                               std::uint32_t count,
-                              std::vector<Photon>& out)
+                              KeptPhotons& out)
 {
   RELIEF_ASSERT(count <= kBatchPaths);
   const Clock::time_point start = Clock::now();
@@ -239,6 +239,7 @@ void Wavefront::trace_photons(const KernelGlobals& g,
   met_.surface_kernel = surface_kernel.data();
   active_.size = 0;
   stages.emit_photons(g, sources, state_, first, count, active_);
+  if (media != nullptr) media->start(state_, active_);
   DisplacementWork displacement;
   displacement.total.stop = stop;
   const GraphStop graphs(stop);
@@ -254,18 +255,28 @@ void Wavefront::trace_photons(const KernelGlobals& g,
     clear_queues();
     counters.photon_rays += active_.size;
     intersect_closest(g, accel, state_, active_, false, met_, displacement);
-    const std::size_t before = out.size();
-    out.resize(before + active_.size);
-    PhotonQueueView photons{out.data() + before, 0};
-    for (const QueueView& queue : met_.surfaces) {
-      stages.shade_photons(g, sources, state_, queue, next_, photons);
+    // Each photon is kept once at most.
+    const auto keep = [&](std::vector<Photon>& kept, const auto& stage) {
+      const std::size_t before = kept.size();
+      kept.resize(before + active_.size);
+      PhotonQueueView photons{kept.data() + before, 0};
+      stage(photons);
+      kept.resize(before + photons.size);
+    };
+    if (media != nullptr) {
+      keep(out.in_media, [&](PhotonQueueView& photons) { stages.shade_photon_media(g, state_, met_, next_, photons); });
     }
-    out.resize(before + photons.size);
+    keep(out.on_surfaces, [&](PhotonQueueView& photons) {
+      for (const QueueView& queue : met_.surfaces) stages.shade_photons(g, sources, state_, queue, next_, photons);
+    });
     // Area lights let rays pass.
     for (std::uint32_t i = 0; i < met_.lights.size; ++i) {
       const std::uint32_t path = met_.lights.paths[i];
       state_.t_min[path] = t_min_behind(state_.hit_t[path]);
       queue_push(next_, path);
+    }
+    if (media != nullptr) {
+      for (std::uint32_t i = 0; i < next_.size; ++i) medium_follow(state_, next_.paths[i]);
     }
     std::swap(active_, next_);
   }

@@ -33,6 +33,11 @@ struct RecordedRay {
   std::uint32_t pixel = 0;  ///< of the film window
 };
 
+/// Photons that were kept, in an order that depends on nothing else.
+struct KeptPhotons {
+  std::vector<Photon> on_surfaces, in_media;
+};
+
 /// What paths need columns for.
 struct WavefrontColumns {
   bool caustics = false;    ///< camera paths gather photons
@@ -60,7 +65,7 @@ class Wavefront {
 
   /// Follows photons `first` … `first + count − 1`.
   /// @param count  at most kBatchPaths
-  /// @param out    gets those that were kept, in an order that depends on nothing else; some of them if `stop` ends it
+  /// @param out    gets those that were kept; some of them if `stop` ends it
   void trace_photons(const KernelGlobals& g,
                      const Accel& accel,
                      const StageTable& stages,
@@ -68,7 +73,7 @@ class Wavefront {
                      const PhotonSourcesView& sources,
                      std::uint64_t first,
                      std::uint32_t count,
-                     std::vector<Photon>& out);
+                     KeptPhotons& out);
 
   /// What the first sample of a pixel of the last batch was worth, finite or not; linear Rec.709.
   /// @param pixel  of the film window, in the batch

@@ -11,7 +11,7 @@ namespace relief {
 /// Of the photon pass, before the turn that is under way; its photons are traced again.
 struct PhotonPassState {
   std::uint32_t photons_a_pass = 0;
-  float first_radius = 0;  ///< metres; 0: not known yet
+  float first_radius = 0, first_radius_in_media = 0;  ///< metres; 0: not known yet
   std::uint64_t stored = 0;
   double seconds = 0;
   std::uint32_t passes = 0;  ///< with those left out

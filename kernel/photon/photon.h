@@ -6,11 +6,11 @@
 
 namespace relief {
 
-/// Light that arrived at a surface after one or more sharp reflections or refractions.
+/// Light that arrived at a surface, or in a medium, after one or more sharp reflections or refractions.
 struct PhotonArrival {
-  Vec3f power;                ///< W
+  Vec3f power;                ///< W; in media times the metres of its way that it stands for
   std::uint32_t wi = 0;       ///< octahedral, towards where it came from
-  std::uint32_t Ng = 0;       ///< octahedral, geometric normal on the side it arrived at
+  std::uint32_t Ng = 0;  ///< octahedral, geometric normal on the side it arrived at; in media those, see media_name
   std::uint32_t bounces = 0;  ///< counts as the path state's, of all its scatterings but the first
 };
 
@@ -38,12 +38,34 @@ struct PhotonMapView {
   std::uint32_t near_mask = 0;  ///< a power of two − 1
 };
 
+/// Photons of a leaf, and children of a node.
+inline constexpr int kPhotonTreeWidth = 8;
+
+/// Levels that trees have at most: more photons than 32 bits count.
+inline constexpr int kMostPhotonLevels = 11;
+
+/// Boxes of eight children.
+struct PhotonBoxes {
+  float low[3][kPhotonTreeWidth], high[3][kPhotonTreeWidth];
+};
+
+/// Photons of a pass that lie in media.
+struct MediumPhotonsView {
+  const float *x = nullptr, *y = nullptr, *z = nullptr;  ///< world, metres
+  const float* inverse_radius_squared = nullptr;         ///< 1/m²
+  const PhotonArrival* arrivals = nullptr;               ///< power times metres, W m; Ng is medium_name
+  const PhotonBoxes* nodes[kMostPhotonLevels] = {};      ///< of each level; the lowest one's children are photons
+  std::uint32_t num_photons = 0;
+  int num_levels = 0;
+};
+
 /// What the stages need of the caustic pass.
 struct CausticsView {
   bool enabled = false;
   std::uint32_t switched_off = 0;  ///< bit PathEvent: light that was scattered so last lights nothing diffuse
   float roughness = 0;             ///< perceptual, see sharp_lobes
   PhotonMapView map;
+  MediumPhotonsView in_media;
   float time = 0;  ///< of all photons of the pass, and of all paths that gather them
 };
 

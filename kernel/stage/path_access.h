@@ -73,7 +73,8 @@ RELIEF_KERNEL void shadow_queue_push(ShadowQueue& shadow,
   shadow.scatterings[ray] = scatterings;
 }
 
-enum class BounceKind : int { kAll = 0, kDiffuse = 8, kGlossy = 16, kTransmission = 24 };
+/// What an event counts as, and where its count is. Of those in media only the sum of all events is told.
+enum class BounceKind : int { kAll = 0, kDiffuse = 8, kGlossy = 16, kTransmission = 24, kMedium = 32 };
 
 RELIEF_KERNEL int path_bounces(std::uint32_t bounces, BounceKind kind)
 {
@@ -214,6 +215,10 @@ RELIEF_KERNEL std::uint32_t path_fork(PathState& s, std::uint32_t i)
   s.caustic.root[copy] = s.caustic.root[i];
   if (s.motion.time != nullptr) s.motion.time[copy] = s.motion.time[i];
   if (s.facets != nullptr) s.facets[copy] = s.facets[i];
+  if (s.media != nullptr) {
+    s.media[copy] = s.media[i];
+    s.media[copy].lit = s.media[copy].before[0] = s.media[copy].before[1] = Vec3f{};
+  }
   s.direct[copy] = s.indirect[copy] = Vec3f{};
   (*s.caustic.radiance)[copy] = Vec3f{};
   return copy;

@@ -5,6 +5,8 @@
 // how light is weakened or, near a small light, as often by how near that is, and weighed as the sum of both (Kulla and Fajardo
 // 2012). Against lights that paths meet, what is found is weighed by direction, as at surfaces.
 //
+// Photons are gathered all along a stretch (medium_photons.h), but where media vary: the light of caustics is found there by paths.
+//
 // Where media vary, light is asked for and the path is scattered at one of the tentative collisions (medium_walk.h), each chosen by
 // what it carries. All of them are walked to the end of the stretch, so that light is asked for on every one of these as well.
 #pragma once
@@ -13,29 +15,10 @@
 #include "kernel/sample/dimensions.h"
 #include "kernel/sample/sobol.h"
 #include "kernel/stage/light_ask.h"
+#include "kernel/stage/medium_photons.h"
 #include "kernel/stage/path_end.h"
-#include "kernel/stage/surface_interaction.h"
-#include "kernel/volume/distance.h"
-#include "kernel/volume/medium_walk.h"
 
 namespace relief {
-
-/// What a stretch of a ray through media is.
-struct MediumStretch {
-  Vec3f O, D;                          ///< where it begins, world
-  float length;                        ///< metres; may be infinite
-  std::uint32_t hash, sample, number;  ///< for random numbers
-  Vec3f chances;                       ///< of channels
-};
-
-RELIEF_KERNEL MediaSum path_media(const KernelGlobals& g, const MediumState& m)
-{
-  MediaSum sum;
-  for (int i = 0; i < m.size; ++i) {
-    media_add(sum, g.media[medium_of_instance(g, m.inside[i])]);
-  }
-  return sum;
-}
 
 /// Where on a stretch light is asked for, or the path is scattered.
 struct MediumPlace {
@@ -151,7 +134,8 @@ RELIEF_KERNEL void shade_medium_light(const KernelGlobals& g,
 }
 
 /// Sends a path on from where it is scattered, or ends it.
-/// @param place  what is carried there is by the density of the place
+/// @param place        what is carried there is by the density of the place
+/// @param has_photons  they are gathered on the stretch
 RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
                                         PathState& state,
                                         std::uint32_t path,
@@ -159,6 +143,7 @@ RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
                                         const MediaSum& media,
                                         MediumPlace place,
                                         Vec2f u,
+                                        bool has_photons,
                                         QueueView& next)
 {
   const Vec3f wi = media_sample(media, at.D, u);
@@ -189,6 +174,10 @@ RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
   state.least_pdf[path] = min(state.least_pdf[path], phase.pdf);
   state.scatter_N[path] = Vec3f{};
   state.bounces[path] += 1u;
+  if (g.caustics.enabled) {
+    const std::uint32_t flags = path_flags_left_to_paths(state.flags[path]);
+    state.flags[path] = has_photons ? flags | kPathAfterSoft : flags;
+  }
   state.flags[path] |= kPathScattered | kPathCovers;
   state.cone_width[path] = cone.width;
   state.cone_spread[path] = cone.spread;
@@ -216,13 +205,6 @@ RELIEF_KERNEL void shade_medium_feature(const KernelGlobals& g,
   if (!g.film.layout.denoising || (state.flags[path] & kPathSawFeature) != 0) return;
   state.flags[path] |= kPathSawFeature;
   film_add_denoising(g.film, state.pixel[path], sample_is_even(at.sample, g.log2_stream), albedo, {});
-}
-
-RELIEF_KERNEL Vec3f medium_albedo(const MediaSum& media)
-{
-  const auto albedo = [](float scattered, float all) { return all > 0.0f ? scattered / all : 0.0f; };
-  return {albedo(media.sigma_s.x, media.sigma_t.x), albedo(media.sigma_s.y, media.sigma_t.y),
-          albedo(media.sigma_s.z, media.sigma_t.z)};
 }
 
 /// One of several collisions, each kept as likely as by what it carries.
@@ -326,7 +308,7 @@ RELIEF_KERNEL MediaSum collision_media(const MediumWalk& walk, const KeptCollisi
     const MediaSum media = collision_media(walk, scattered);
     shade_medium_feature(g, state, path, at, throughput * medium_albedo(media));
     const MediumPlace place{scattered.distance, 1.0f, scattered.weight * (all / scattered.share)};
-    shade_medium_scatter(g, state, path, at, media, place, u.at[1], next);
+    shade_medium_scatter(g, state, path, at, media, place, u.at[1], false, next);
     return false;
   }
   const float passing = carried_share(carried);
@@ -342,16 +324,8 @@ RELIEF_KERNEL bool shade_medium_stretch(const KernelGlobals& g,
                                         QueueView& next,
                                         ShadowQueue& shadow)
 {
-  MediumState& m = state.media[path];
-  const Vec3f D = path_direction(state, path);
-  const float start = state.t_min[path];
-  MediumStretch at{path_origin(state, path) + D * start,
-                   D,
-                   max(0.0f, state.hit_t[path] - start),
-                   state.pixel_hash[path],
-                   state.sample_index[path],
-                   m.stretches++,
-                   {}};
+  const MediumState& m = state.media[path];
+  MediumStretch at = medium_stretch_next(state, path);
   if (media_vary(g, m)) return shade_medium_varying(g, state, path, at, next, shadow);
   const MediaSum media = path_media(g, m);
   const Vec3f sigma_t = media.sigma_t;
@@ -367,6 +341,7 @@ RELIEF_KERNEL bool shade_medium_stretch(const KernelGlobals& g,
     state.throughput[path] = throughput * medium_transmittance(sigma_t, at.length);
     return !is_zero(path_throughput(state, path)) || is_first;
   }
+  if (g.caustics.in_media.num_levels > 0) shade_medium_photons(g, state, path, at, media);
   at.chances = channel_chances(carried);
   const Sample2dX4 u = sample_2d_x4(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kLight));
   if (g.has_lights) {
@@ -378,7 +353,7 @@ RELIEF_KERNEL bool shade_medium_stretch(const KernelGlobals& g,
     const float pdf = dot(at.chances, sigma_t * left);
     if (!(pdf > 0.0f)) return false;
     shade_medium_feature(g, state, path, at, carried);
-    shade_medium_scatter(g, state, path, at, media, {distance, pdf, throughput * left / pdf}, u.at[1], next);
+    shade_medium_scatter(g, state, path, at, media, {distance, pdf, throughput * left / pdf}, u.at[1], true, next);
     return false;
   }
   const Vec3f left = medium_transmittance(sigma_t, at.length);
@@ -386,8 +361,6 @@ RELIEF_KERNEL bool shade_medium_stretch(const KernelGlobals& g,
   state.throughput[path] = chance > 0.0f ? throughput * left / chance : Vec3f{};
   return chance > 0.0f || is_first;
 }
-
-enum class MediumHit : std::uint8_t { kSurface, kLight, kNothing };
 
 /// Takes one path to what it has met. Reads the ray, the hit and the path's media; where the path is scattered it writes what
 /// shade_surface does.
@@ -400,28 +373,13 @@ RELIEF_KERNEL bool shade_medium(const KernelGlobals& g,
                                 ShadowQueue& shadow)
 {
   MediumState& m = state.media[path];
-  m.hit_inside = kWholeWorld;
-  bool is_boundary = false;
-  if (hit == MediumHit::kNothing) medium_leave_all(m);
-  if (hit == MediumHit::kSurface) {
-    const Material& material = g.materials[path_instance(g, state, path).material_index];
-    if (material.medium_index >= 0) {
-      const SurfaceInteraction at = surface_interaction_locate<0>(g, state, path, -path_direction(state, path));
-      m.hit_inside = static_cast<std::int32_t>(state.hit_object[path]);
-      m.hit_front = at.side.front;
-      m.hit_P = at.hit.P;
-      m.hit_Ng = at.side.Ng;
-      is_boundary = material.is_boundary;
-    }
-  }
+  const bool is_boundary = medium_meet(g, state, path, hit);
   if (m.size > 0 && !shade_medium_stretch(g, state, path, next, shadow)) {
     m.hit_inside = kWholeWorld;
     return false;
   }
   if (!is_boundary) return true;
-  if (++m.boundaries > kMostBoundaries) return false;
-  state.t_min[path] = t_min_behind(state.hit_t[path]);
-  queue_push(next, path);
+  medium_pass_boundary(state, path, next);
   return false;
 }
 

@@ -78,6 +78,7 @@ TEST_F(ExrStateTest, ComesBackInEveryBit)
   EXPECT_EQ(a.tile_samples, b.tile_samples);
   EXPECT_EQ(a.photons.photons_a_pass, b.photons.photons_a_pass);
   EXPECT_EQ(a.photons.first_radius, b.photons.first_radius);
+  EXPECT_EQ(a.photons.first_radius_in_media, b.photons.first_radius_in_media);
   EXPECT_EQ(a.photons.stored, b.photons.stored);
   EXPECT_EQ(a.photons.seconds, b.photons.seconds);
   EXPECT_EQ(a.photons.passes, b.photons.passes);

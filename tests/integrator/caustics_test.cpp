@@ -638,13 +638,13 @@ TEST(Caustics, WhatCastersReceiveIsStoredOrEscapes)
   constexpr std::uint32_t kPhotons = 1 << 17;
   const PhotonSources sources = photon_sources_make(context);
   Wavefront worker({.caustics = true});
-  std::vector<Photon> photons;
+  KeptPhotons photons;
   for (std::uint32_t first = 0; first < kPhotons; first += kBatchPaths) {
     worker.trace_photons(g, *context.accel, stage_table_select(), context.surface_kernel, sources.view(kPhotons), first,
                          kBatchPaths, photons);
   }
   double stored = 0;
-  for (const Photon& photon : photons) stored += static_cast<double>(photon.arrival.power.x);
+  for (const Photon& photon : photons.on_surfaces) stored += static_cast<double>(photon.arrival.power.x);
   const double d = std::sqrt(1.5 * 1.5 + 0.4 * 0.4);
   const double received = 2 * 2 * 3.14159265358979 * (1 - std::sqrt(1 - 0.25 / (d * d)));
   EXPECT_NEAR(stored / received, 1.0, 0.01);

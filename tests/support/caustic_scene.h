@@ -146,14 +146,14 @@ inline void expect_same(const Scene& scene,
                         const char* what,
                         LightTechnique technique = LightTechnique::kMis)
 {
-  constexpr int kRuns = 8;
+  constexpr int kPictures = 8;
   RenderOptions options = caustic_options(scene, CausticsMode::kOff, 32, samples_off);
   options.light_technique = technique;
-  const Regions off = render_regions(scene, options, kRuns);
+  const Regions off = render_regions(scene, options, kPictures);
   options = caustic_options(scene, CausticsMode::kOn, 32, samples_on);
   options.light_technique = technique;
   options.settings.caustics.photons = 1 << 15;
-  const Regions on = render_regions(scene, options, kRuns);
+  const Regions on = render_regions(scene, options, kPictures);
   for (int r = 0; r < Regions::kSide * Regions::kSide; ++r) {
     const double error = std::sqrt(off.cautious_variance(r) + on.cautious_variance(r));
     EXPECT_NEAR(on.mean[r], off.mean[r], 4 * error + bias * off.mean[r])

@@ -1,0 +1,85 @@
+// A part of a ray that lies in the same media: of a path, or of a photon.
+#pragma once
+
+#include "kernel/stage/surface_interaction.h"
+#include "kernel/volume/distance.h"
+#include "kernel/volume/medium_walk.h"
+
+namespace relief {
+
+/// What a stretch of a ray through media is.
+struct MediumStretch {
+  Vec3f O, D;                          ///< where it begins, world
+  float length;                        ///< metres; may be infinite
+  std::uint32_t hash, sample, number;  ///< for random numbers
+  Vec3f chances;                       ///< of channels
+};
+
+RELIEF_KERNEL MediaSum path_media(const KernelGlobals& g, const MediumState& m)
+{
+  MediaSum sum;
+  for (int i = 0; i < m.size; ++i) {
+    media_add(sum, g.media[medium_of_instance(g, m.inside[i])]);
+  }
+  return sum;
+}
+
+RELIEF_KERNEL Vec3f medium_albedo(const MediaSum& media)
+{
+  const auto albedo = [](float scattered, float all) { return all > 0.0f ? scattered / all : 0.0f; };
+  return {albedo(media.sigma_s.x, media.sigma_t.x), albedo(media.sigma_s.y, media.sigma_t.y),
+          albedo(media.sigma_s.z, media.sigma_t.z)};
+}
+
+/// A number by which photons in media are told from those in others, wherever these meet. It does not depend on the order in which they
+/// were entered.
+RELIEF_KERNEL std::uint32_t media_name(const MediumState& m)
+{
+  std::uint32_t name = 0;
+  for (int i = 0; i < m.size; ++i) name += hash_mix_32(static_cast<std::uint32_t>(m.inside[i]));
+  return name;
+}
+
+/// The next stretch of a path: from where its ray is searched to what it has met.
+RELIEF_KERNEL MediumStretch medium_stretch_next(PathState& state, std::uint32_t path)
+{
+  const Vec3f D = path_direction(state, path);
+  const float start = state.t_min[path];
+  return {path_origin(state, path) + D * start,
+          D,
+          max(0.0f, state.hit_t[path] - start),
+          state.pixel_hash[path],
+          state.sample_index[path],
+          state.media[path].stretches++,
+          {}};
+}
+
+enum class MediumHit : std::uint8_t { kSurface, kLight, kNothing };
+
+/// Notes what begins or ends at what a path has met.
+/// @return  whether it is a boundary alone
+RELIEF_KERNEL bool medium_meet(const KernelGlobals& g, PathState& state, std::uint32_t path, MediumHit hit)
+{
+  MediumState& m = state.media[path];
+  m.hit_inside = kWholeWorld;
+  if (hit == MediumHit::kNothing) medium_leave_all(m);
+  if (hit != MediumHit::kSurface) return false;
+  const Material& material = g.materials[path_instance(g, state, path).material_index];
+  if (material.medium_index < 0) return false;
+  const SurfaceInteraction at = surface_interaction_locate<0>(g, state, path, -path_direction(state, path));
+  m.hit_inside = static_cast<std::int32_t>(state.hit_object[path]);
+  m.hit_front = at.side.front;
+  m.hit_P = at.hit.P;
+  m.hit_Ng = at.side.Ng;
+  return material.is_boundary;
+}
+
+/// Sends a path on behind a boundary, or ends it.
+RELIEF_KERNEL void medium_pass_boundary(PathState& state, std::uint32_t path, QueueView& next)
+{
+  if (++state.media[path].boundaries > kMostBoundaries) return;
+  state.t_min[path] = t_min_behind(state.hit_t[path]);
+  queue_push(next, path);
+}
+
+}  // namespace relief

@@ -1,0 +1,191 @@
+// Photons in media: their search against brute force, light through glass against closed forms, and photons against paths that find
+// the same light. Comparisons as in medium_scenes.h and caustic_scene.h.
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include "integrator/medium_photon_map.h"
+#include "kernel/photon/medium_photons.h"
+#include "kernel/sample/sobol.h"
+#include "kernel/sample/warp.h"
+#include "tests/support/caustic_scene.h"
+#include "tests/support/medium_scenes.h"
+
+namespace relief::test {
+namespace {
+
+TEST(MediumPhotons, AreFoundAlongRaysAsByBruteForce)
+{
+  for (const std::uint32_t count : {1u, 7u, 8u, 9u, 64u, 65u, 513u, 5000u}) {
+    // Most lie dense in a corner.
+    std::vector<std::vector<Photon>> chunks(3);
+    std::vector<float> radii;
+    std::vector<Photon> all;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const Vec2f u = sample_2d(7, i, 0), v = sample_2d(7, i, 1);
+      const float size = i % 8 == 0 ? 10.0f : 0.5f;
+      all.push_back({size * Vec3f{u.x, u.y, v.x}, {splat3(1), 0, 0, i}});
+      radii.push_back(size * (0.02f + 0.1f * v.y));
+    }
+    for (std::uint32_t i = 0; i < count; ++i) chunks[3 * i / count].push_back(all[i]);
+    MediumPhotonMap map;
+    map.build(chunks, radii);
+    const MediumPhotonsView view = map.view();
+    std::uint64_t found = 0;
+    for (std::uint32_t q = 0; q < 400; ++q) {
+      const Vec2f u = sample_2d(8, q, 0), v = sample_2d(8, q, 1);
+      const Vec3f O = 10.0f * Vec3f{u.x, u.y, v.x} - splat3(2);
+      Vec3f D = normalize(all[q % count].P + 0.3f * (Vec3f{v.x, v.y, u.x} - splat3(0.5f)) - O);
+      if (q % 5 == 0) D = {0, q % 2 == 0 ? 1.0f : -1.0f, 0};
+      const float length = q % 3 == 0 ? kInfinity : 6.0f * v.y;
+      std::vector<int> visits(count, 0);
+      photons_along(view, O, D, length, [&](std::uint32_t i, float t, float squared) {
+        const std::uint32_t number = view.arrivals[i].bounces;
+        ++visits[number];
+        EXPECT_NEAR(t, dot(all[number].P - O, D), 1e-4);
+        EXPECT_GE(squared, 0.0f);
+      });
+      for (std::uint32_t i = 0; i < count; ++i) {
+        const double x[3] = {double(all[i].P.x) - double(O.x), double(all[i].P.y) - double(O.y),
+                             double(all[i].P.z) - double(O.z)};
+        const double d[3] = {double(D.x), double(D.y), double(D.z)};
+        const double t = x[0] * d[0] + x[1] * d[1] + x[2] * d[2];
+        double squared = 0;
+        for (int a = 0; a < 3; ++a) squared += (x[a] - t * d[a]) * (x[a] - t * d[a]);
+        const double radius = double(radii[i]);
+        // Rounding decides what lies on the rim, or at an end.
+        const bool is_certain =
+            std::abs(squared - radius * radius) > 1e-4 && std::abs(t) > 1e-4 && std::abs(t - double(length)) > 1e-4;
+        const bool is_within = squared < radius * radius && t >= 0 && t <= double(length);
+        found += is_within ? 1 : 0;
+        if (is_certain) ASSERT_EQ(visits[i], is_within ? 1 : 0) << count << " photons, ray " << q << ", photon " << i;
+        ASSERT_LE(visits[i], 1);
+      }
+    }
+    EXPECT_GT(found, 20u);
+  }
+}
+
+Light sun_from(Vec3f axis, float irradiance)
+{
+  Light sun;
+  sun.kind = LightKind::kSun;
+  sun.axis = axis;
+  sun.emission = splat3(irradiance);
+  return sun;
+}
+
+/// Share of light that smooth glass of two parallel faces lets through, however often it is reflected between them.
+double slab_transmittance(double ior)
+{
+  const double F = (ior - 1) / (ior + 1) * ((ior - 1) / (ior + 1));
+  return (1 - F) / (1 + F);
+}
+
+/// A slab of glass above what view() looks at.
+void add_slab(Scene& scene)
+{
+  Affine3 above;
+  above.p = {0, 1.5f, 0};
+  add_caster(scene, box_mesh({2, 0.05f, 2}), glass_material(), above);
+  scene.render.max_bounces = scene.render.transmission_bounces = scene.render.glossy_bounces = 8;
+}
+
+void expect_mean_by_photons(const Scene& scene, int samples, double truth, int channel = 0)
+{
+  const Estimate estimate = estimate_mean(scene, caustic_options(scene, CausticsMode::kOn, 8, samples), kRuns, channel);
+  // Beside noise the bias of a radius: r²/12 of the second derivative.
+  EXPECT_NEAR(estimate.mean, truth, kQuantile * estimate.standard_error + 2e-3 * truth)
+      << "standard error " << estimate.standard_error;
+  EXPECT_LT(estimate.standard_error, 0.02 * truth);
+}
+
+TEST(MediaCaustics, ShowASunThroughGlassAsTheClosedFormHasIt)
+{
+  for (const float g : {0.0f, 0.7f}) {
+    Scene scene = view();
+    add_slab(scene);
+    // Once: what is scattered twice is left out.
+    scene.render.volume_bounces = 1;
+    add_medium(scene, box_mesh({1, 1, 1}), scattering({0.5f, 0.2f, 1.0f}, g, {0.1f, 0.4f, 0}));
+    scene.lights.push_back(sun_from({0, -1, 0}, 3));
+    const double s[3] = {0.5, 0.2, 1}, t[3] = {0.6, 0.6, 1};
+    const double gd = double(g), phase = (1 - gd * gd) / std::pow(1 + gd * gd, 1.5) / (4 * M_PI);
+    for (int c = 0; c < 3; ++c) {
+      const double truth =
+          3 * slab_transmittance(1.5) * std::exp(-t[c] * 0.97) * s[c] * phase * (1 - std::exp(-2 * t[c])) / t[c];
+      expect_mean_by_photons(scene, 4, truth, c);
+    }
+    const Estimate none = estimate_mean(scene, caustic_options(scene, CausticsMode::kOff, 8, 4), 2);
+    EXPECT_EQ(none.mean, 0.0);
+  }
+}
+
+TEST(MediaCaustics, LieOnSurfacesBehindMediaAsBeersLawSays)
+{
+  Scene scene = view();
+  Affine3 above;
+  above.p = {0, 0, 1.5f};
+  // The view looks along −z through a medium at a floor; the sun comes from the side of the camera, through glass and the same medium.
+  above.x = {1, 0, 0};
+  above.y = {0, 0, 1};
+  above.z = {0, -1, 0};
+  add_caster(scene, box_mesh({4, 0.05f, 4}), glass_material(), above);
+  scene.render.max_bounces = scene.render.transmission_bounces = scene.render.glossy_bounces = 8;
+  scene.render.diffuse_bounces = 1;
+  add_medium(scene, box_mesh({5, 5, 1}), absorbing({0.25f, 0.5f, 1}));
+  add_object(scene, quad_mesh({-9, -9, -2}, {18, 0, 0}, {0, 18, 0}), diffuse_material({0.6f, 0.6f, 0.6f}));
+  scene.instances.back().flags |= kCausticReceiver;
+  scene.lights.push_back(sun_from({0, 0, -1}, 3));
+  // The camera sees it through the glass as well.
+  const double T = slab_transmittance(1.5);
+  for (int c = 0; c < 3; ++c) {
+    expect_mean_by_photons(scene, 4, 3 * T * T * 0.6 / M_PI * std::exp(-2 * 2 * 0.25 * (1 << c)), c);
+  }
+}
+
+/// A ball of glass on a floor in fog, under a lamp that paths find through it.
+Scene ball_in_fog(const Medium& fog)
+{
+  Scene scene = empty_scene();
+  add_floor(scene, 2);
+  add_medium(scene, box_mesh({1.6f, 0.9f, 1.6f}), fog, {0, 0.85f, 0});
+  Affine3 place;
+  place.p = {0.1f, 0.8f, 0};
+  add_caster(scene, sphere_mesh(0.4f, 64, 32, true), glass_material(), place);
+  scene.lights.push_back(square_light({0.3f, 2.6f, 0.2f}, normalize(Vec3f{-0.1f, -1, 0}), 0.7f, 4));
+  look_down(scene, {}, 1.1f, 2.4f);
+  scene.render.max_bounces = 6;
+  scene.render.volume_bounces = 3;
+  return scene;
+}
+
+TEST(MediaCaustics, AreTheSameByPhotonsAsByPaths)
+{
+  expect_same(ball_in_fog(scattering({0.5f, 0.5f, 0.5f}, 0.4f, {0.1f, 0.1f, 0.1f})), 128, 16, 0.02, "fog");
+}
+
+TEST(MediaCaustics, WithinGlassAreTheSameByPhotonsAsByPaths)
+{
+  Scene scene = ball_in_fog(absorbing({0.05f, 0.05f, 0.05f}));
+  Material& ice = scene.materials[static_cast<std::size_t>(scene.instances.back().material_index)];
+  ice.medium_index = static_cast<int>(scene.media.size());
+  scene.media.push_back(scattering({2, 2, 2}, 0.5f));
+  expect_same(scene, 128, 16, 0.02, "ice");
+}
+
+TEST(MediaCaustics, AreTheSameForAnyNumberOfThreads)
+{
+  const Scene scene = ball_in_fog(scattering({0.5f, 0.4f, 0.3f}, 0.4f));
+  const RenderOptions options = caustic_options(scene, CausticsMode::kOn, 40, 3);
+  const auto with_threads = [&](int threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+    tbb::task_arena arena(threads);
+    return arena.execute([&] { return render_scene(scene, options).image.pixels; });
+  };
+  const std::vector<float> one = with_threads(1);
+  EXPECT_EQ(one, with_threads(2));
+  EXPECT_EQ(one, with_threads(4));
+}
+
+}  // namespace
+}  // namespace relief::test
