@@ -64,19 +64,17 @@ std::uint32_t events_switched_off(CausticKinds kinds)
   return kOff[static_cast<int>(kinds)];
 }
 
-/// Whether something fills space where photons can show.
+/// Whether something fills space in which photons may show.
 bool shows_photons_in_media(const Scene& scene)
 {
-  const auto scatters = [](const Medium& medium, const VolumeProgram& varying) {
-    return varying.closures.empty() &&
-           std::any_of(medium.phases, medium.phases + medium.num_phases,
+  const auto scatters = [](const Medium& medium) {
+    return std::any_of(medium.phases, medium.phases + medium.num_phases,
                        [](const Phase& phase) { return max_component(phase.sigma_s) > 0.0f; });
   };
-  bool shows = scene.environment.medium && scatters(*scene.environment.medium, scene.environment.varying_medium);
-  for (std::size_t i = 0; i < scene.media.size(); ++i) {
-    shows |= scatters(scene.media[i], i < scene.varying_media.size() ? scene.varying_media[i] : VolumeProgram{});
-  }
-  return shows;
+  const auto varies = [](const VolumeProgram& volume) { return !volume.closures.empty(); };
+  return std::any_of(scene.media.begin(), scene.media.end(), scatters) ||
+         std::any_of(scene.varying_media.begin(), scene.varying_media.end(), varies) ||
+         (scene.environment.medium && scatters(*scene.environment.medium)) || varies(scene.environment.varying_medium);
 }
 
 /// Leaves to paths the caustics of what shines from infinitely far away through a medium that fills all space. Where photons would start

@@ -8,7 +8,7 @@ namespace relief {
 
 /// Light that arrived at a surface, or in a medium, after one or more sharp reflections or refractions.
 struct PhotonArrival {
-  Vec3f power;                ///< W; in media times the metres of its way that it stands for
+  Vec3f power;                ///< W; in media, what of it is scattered
   std::uint32_t wi = 0;       ///< octahedral, towards where it came from
   std::uint32_t Ng = 0;  ///< octahedral, geometric normal on the side it arrived at; in media those, see media_name
   std::uint32_t bounces = 0;  ///< counts as the path state's, of all its scatterings but the first

@@ -54,6 +54,19 @@ RELIEF_KERNEL MediumStretch medium_stretch_next(PathState& state, std::uint32_t 
           {}};
 }
 
+/// Of random numbers along a stretch through media that vary.
+RELIEF_KERNEL std::uint32_t medium_seed(const MediumStretch& at)
+{
+  return hash_mix_32(at.hash ^ hash_mix_32(at.sample * 0x9e3779b9u + at.number));
+}
+
+/// What graphs of media may read of a path's ray.
+RELIEF_KERNEL GraphRay medium_graph_ray(const PathState& state, std::uint32_t path)
+{
+  return {path_ray_kinds(state, path), state.bounces[path], state.flags[path] >> kPathTransparentShift, 0.0f,
+          path_time(state, path)};
+}
+
 enum class MediumHit : std::uint8_t { kSurface, kLight, kNothing };
 
 /// Notes what begins or ends at what a path has met.

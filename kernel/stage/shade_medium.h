@@ -5,7 +5,7 @@
 // how light is weakened or, near a small light, as often by how near that is, and weighed as the sum of both (Kulla and Fajardo
 // 2012). Against lights that paths meet, what is found is weighed by direction, as at surfaces.
 //
-// Photons are gathered all along a stretch (medium_photons.h), but where media vary: the light of caustics is found there by paths.
+// Photons are gathered all along a stretch (medium_photons.h).
 //
 // Where media vary, light is asked for and the path is scattered at one of the tentative collisions (medium_walk.h), each chosen by
 // what it carries. All of them are walked to the end of the stretch, so that light is asked for on every one of these as well.
@@ -134,8 +134,7 @@ RELIEF_KERNEL void shade_medium_light(const KernelGlobals& g,
 }
 
 /// Sends a path on from where it is scattered, or ends it.
-/// @param place        what is carried there is by the density of the place
-/// @param has_photons  they are gathered on the stretch
+/// @param place  what is carried there is by the density of the place
 RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
                                         PathState& state,
                                         std::uint32_t path,
@@ -143,7 +142,6 @@ RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
                                         const MediaSum& media,
                                         MediumPlace place,
                                         Vec2f u,
-                                        bool has_photons,
                                         QueueView& next)
 {
   const Vec3f wi = media_sample(media, at.D, u);
@@ -174,10 +172,8 @@ RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
   state.least_pdf[path] = min(state.least_pdf[path], phase.pdf);
   state.scatter_N[path] = Vec3f{};
   state.bounces[path] += 1u;
-  if (g.caustics.enabled) {
-    const std::uint32_t flags = path_flags_left_to_paths(state.flags[path]);
-    state.flags[path] = has_photons ? flags | kPathAfterSoft : flags;
-  }
+  // Where the path comes from photons have been gathered.
+  if (g.caustics.enabled) state.flags[path] = path_flags_left_to_paths(state.flags[path]) | kPathAfterSoft;
   state.flags[path] |= kPathScattered | kPathCovers;
   state.cone_width[path] = cone.width;
   state.cone_spread[path] = cone.spread;
@@ -259,14 +255,14 @@ RELIEF_KERNEL MediaSum collision_media(const MediumWalk& walk, const KeptCollisi
   const bool is_first = path_bounces(state.bounces[path], BounceKind::kAll) == 0;
   const bool last = path_is_last(g, state, path);
   const Vec3f throughput = path_throughput(state, path);
-  const std::uint32_t seed = hash_mix_32(at.hash ^ hash_mix_32(at.sample * 0x9e3779b9u + at.number));
+  const std::uint32_t seed = medium_seed(at);
+  if (g.caustics.enabled && !last) shade_medium_photons_varying(g, state, path, at, seed);
   MediumWalk walk = medium_walk_make(g, state.media[path], at.O, at.D, at.length, seed);
   if (!last && g.has_lights && walk.reach > 0.0f) {
     const Equiangular near = medium_near(g, at, 0.5f * min(walk.reach, at.length), path_time(state, path));
     if (near.distance > 0.0f && near.distance < walk.reach) medium_walk_approach(walk, near);
   }
-  const GraphRay ray{path_ray_kinds(state, path), state.bounces[path], state.flags[path] >> kPathTransparentShift, 0.0f,
-                     path_time(state, path)};
+  const GraphRay ray = medium_graph_ray(state, path);
   Vec3f carried = throughput, emitted;
   Vec3f left{1, 1, 1};
   KeptCollision scattered, lit;
@@ -308,7 +304,7 @@ RELIEF_KERNEL MediaSum collision_media(const MediumWalk& walk, const KeptCollisi
     const MediaSum media = collision_media(walk, scattered);
     shade_medium_feature(g, state, path, at, throughput * medium_albedo(media));
     const MediumPlace place{scattered.distance, 1.0f, scattered.weight * (all / scattered.share)};
-    shade_medium_scatter(g, state, path, at, media, place, u.at[1], false, next);
+    shade_medium_scatter(g, state, path, at, media, place, u.at[1], next);
     return false;
   }
   const float passing = carried_share(carried);
@@ -341,7 +337,7 @@ RELIEF_KERNEL bool shade_medium_stretch(const KernelGlobals& g,
     state.throughput[path] = throughput * medium_transmittance(sigma_t, at.length);
     return !is_zero(path_throughput(state, path)) || is_first;
   }
-  if (g.caustics.in_media.num_levels > 0) shade_medium_photons(g, state, path, at, media);
+  if (g.caustics.enabled) shade_medium_photons(g, state, path, at, media);
   at.chances = channel_chances(carried);
   const Sample2dX4 u = sample_2d_x4(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kLight));
   if (g.has_lights) {
@@ -353,7 +349,7 @@ RELIEF_KERNEL bool shade_medium_stretch(const KernelGlobals& g,
     const float pdf = dot(at.chances, sigma_t * left);
     if (!(pdf > 0.0f)) return false;
     shade_medium_feature(g, state, path, at, carried);
-    shade_medium_scatter(g, state, path, at, media, {distance, pdf, throughput * left / pdf}, u.at[1], true, next);
+    shade_medium_scatter(g, state, path, at, media, {distance, pdf, throughput * left / pdf}, u.at[1], next);
     return false;
   }
   const Vec3f left = medium_transmittance(sigma_t, at.length);
