@@ -5,8 +5,6 @@
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
-#include "kernel/photon/medium_photons.h"
-
 namespace relief {
 
 namespace {
@@ -75,11 +73,11 @@ void MediumPhotonMap::build(const std::vector<std::vector<Photon>>& chunks, cons
   tbb::parallel_sort(order_.begin(), order_.end(), [](const Place& a, const Place& b) {
     return a.key != b.key ? a.key < b.key : a.number < b.number;
   });
-  for (std::vector<float>* column : {&x_, &y_, &z_, &inverse_radius_squared_}) column->resize(count);
-  arrivals_.resize(count);
-
   constexpr std::size_t kWidth = kPhotonTreeWidth;
   const auto groups = [](std::size_t n) { return (n + kWidth - 1) / kWidth; };
+  for (std::vector<float>* column : {&x_, &y_, &z_}) column->assign(kWidth * groups(count), 0.0f);
+  inverse_radius_squared_.assign(kWidth * groups(count), kInfinity);
+  arrivals_.resize(count);
   num_levels_ = 0;
   if (count == 0) return;
   std::size_t num_boxes = groups(count);

@@ -18,8 +18,9 @@ namespace relief {
 
 namespace {
 
-/// Photons within a radius in media, of those on surfaces: a ray finds those of its whole way.
-constexpr double kOfThemInMedia = 0.25;
+/// Radii in media, of those that have as many photons within as on surfaces: a ray finds those of its whole way, so that a quarter of
+/// them will do. (How dense they lie is not told by so few.)
+constexpr double kSmallerInMedia = 0.63;
 
 Vec3f box_centre(const Box3& box) { return 0.5f * (box.low + box.high); }
 
@@ -291,8 +292,9 @@ void PhotonPass::next_turn(std::array<KernelGlobals, kMaps>& g,
   served_ += samples * active;
 }
 
-std::vector<float> PhotonPass::radii(Kept& kept, double within, PhotonPlaces places) const
+std::vector<float> PhotonPass::radii(Kept& kept, PhotonPlaces places) const
 {
+  const double within = sources_.within;
   std::size_t count = 0;
   for (const std::vector<Photon>& chunk : kept.chunks) count += chunk.size();
   if (count == 0) return {};
@@ -304,19 +306,20 @@ std::vector<float> PhotonPass::radii(Kept& kept, double within, PhotonPlaces pla
   if (!(first > 0)) first = kOfCaster * box_radius(sources_.targets.front());
   std::vector<float> radii =
       is_set ? std::vector<float>(count, first) : photon_radii(kept.chunks, within, first, passes_, places);
-  const auto factor = static_cast<float>(photon_radius_factor(passes_, settings_.alpha));
-  for (float& radius : radii) radius *= factor;
+  double factor = photon_radius_factor(passes_, settings_.alpha);
+  if (places == PhotonPlaces::kMedia && !is_set) factor *= kSmallerInMedia;
+  for (float& radius : radii) radius *= static_cast<float>(factor);
   return radii;
 }
 
 void PhotonPass::build_maps(KernelGlobals& g, std::size_t slot)
 {
-  const std::vector<float> on_surfaces = radii(surfaces_, sources_.within, PhotonPlaces::kSurfaces);
+  const std::vector<float> on_surfaces = radii(surfaces_, PhotonPlaces::kSurfaces);
   if (!on_surfaces.empty()) {
     maps_[slot].build(surfaces_.chunks, on_surfaces);
     g.caustics.map = maps_[slot].view();
   }
-  const std::vector<float> in_media = radii(media_, kOfThemInMedia * sources_.within, PhotonPlaces::kMedia);
+  const std::vector<float> in_media = radii(media_, PhotonPlaces::kMedia);
   if (!in_media.empty()) {
     maps_in_media_[slot].build(media_.chunks, in_media);
     g.caustics.in_media = maps_in_media_[slot].view();

@@ -116,8 +116,7 @@ class PhotonPass {
     float first_radius = 0;
   };
   /// The radii of those of the present pass.
-  /// @param within  photons that are to lie within the radius of one in the first pass
-  std::vector<float> radii(Kept& kept, double within, PhotonPlaces places) const;
+  std::vector<float> radii(Kept& kept, PhotonPlaces places) const;
   void build_maps(KernelGlobals& g, std::size_t slot);
 
   const SceneContext& context_;

@@ -11,6 +11,7 @@
 // length of path in place of a collision each.
 #pragma once
 
+#include "kernel/math/lanes.h"
 #include "kernel/photon/photon.h"
 
 namespace relief {
@@ -23,34 +24,37 @@ RELIEF_KERNEL std::uint32_t photon_boxes_of_level(std::uint32_t num_photons, int
   return count;
 }
 
-/// Axis by axis a ray's inverse direction, and 10³⁰ in place of what would be infinite: 0 times infinity is no place.
-RELIEF_KERNEL Vec3f photon_ray_inverse(Vec3f D)
+/// A part of a ray as boxes ask for it.
+struct PhotonRay {
+  F8 O[3], inverse[3];
+  F8 D[3];
+  F8 length;
+};
+
+/// @param D       unit; in place of what would be infinite its inverse is 10³⁰: 0 times infinity is no place
+/// @param length  metres, may be infinite
+RELIEF_KERNEL PhotonRay photon_ray_make(Vec3f O, Vec3f D, float length)
 {
-  const auto axis = [](float d) { return __builtin_fabsf(d) > 1e-30f ? 1.0f / d : 1e30f; };
-  return {axis(D.x), axis(D.y), axis(D.z)};
+  const auto inverse = [](float d) { return splat8(__builtin_fabsf(d) > 1e-30f ? 1.0f / d : 1e30f); };
+  return {{splat8(O.x), splat8(O.y), splat8(O.z)},
+          {inverse(D.x), inverse(D.y), inverse(D.z)},
+          {splat8(D.x), splat8(D.y), splat8(D.z)},
+          splat8(length)};
 }
 
 /// Children of a node that a part of a ray may meet.
 /// @return  bit i: child i
-RELIEF_KERNEL std::uint32_t photon_boxes_met(const PhotonBoxes& boxes, Vec3f O, Vec3f inverse, float length)
+RELIEF_KERNEL std::uint32_t photon_boxes_met(const PhotonBoxes& boxes, const PhotonRay& ray)
 {
-  const float o[3] = {O.x, O.y, O.z}, inv[3] = {inverse.x, inverse.y, inverse.z};
-  float first[kPhotonTreeWidth], last[kPhotonTreeWidth];
-  for (int i = 0; i < kPhotonTreeWidth; ++i) {
-    first[i] = 0.0f;
-    last[i] = length;
-  }
+  F8 first = splat8(0.0f), last = ray.length;
   for (int axis = 0; axis < 3; ++axis) {
-    for (int i = 0; i < kPhotonTreeWidth; ++i) {
-      const float a = (boxes.low[axis][i] - o[axis]) * inv[axis], b = (boxes.high[axis][i] - o[axis]) * inv[axis];
-      first[i] = max(first[i], min(a, b));
-      last[i] = min(last[i], max(a, b));
-    }
+    const F8 a = (load8(boxes.low[axis]) - ray.O[axis]) * ray.inverse[axis];
+    const F8 b = (load8(boxes.high[axis]) - ray.O[axis]) * ray.inverse[axis];
+    first = max(first, min(a, b));
+    last = min(last, max(a, b));
   }
-  std::uint32_t met = 0;
   // A little more, for the rounding of what is compared.
-  for (int i = 0; i < kPhotonTreeWidth; ++i) met |= (first[i] <= last[i] * (1.0f + 1e-6f) ? 1u : 0u) << i;
-  return met;
+  return mask_of(first <= last * splat8(1.0f + 1e-6f));
 }
 
 /// Visits the photons that a part of a ray passes within their radius, in an order that depends on nothing else.
@@ -62,7 +66,9 @@ template <typename Visit>
 RELIEF_KERNEL void photons_along(const MediumPhotonsView& map, Vec3f O, Vec3f D, float length, const Visit& visit)
 {
   if (map.num_levels == 0) return;
-  const Vec3f inverse = photon_ray_inverse(D);
+  const PhotonRay ray = photon_ray_make(O, D, length);
+  std::uint32_t num_boxes[kMostPhotonLevels];
+  for (int level = 0; level < map.num_levels; ++level) num_boxes[level] = photon_boxes_of_level(map.num_photons, level);
   struct Entry {
     std::int32_t level;
     std::uint32_t node;
@@ -72,27 +78,24 @@ RELIEF_KERNEL void photons_along(const MediumPhotonsView& map, Vec3f O, Vec3f D,
   stack[size++] = {map.num_levels - 1, 0};
   while (size > 0) {
     const Entry entry = stack[--size];
-    std::uint32_t met = photon_boxes_met(map.nodes[entry.level][entry.node], O, inverse, length);
-    const std::uint32_t num_boxes = photon_boxes_of_level(map.num_photons, entry.level);
-    for (; met != 0; met &= met - 1) {
+    for (std::uint32_t met = photon_boxes_met(map.nodes[entry.level][entry.node], ray); met != 0; met &= met - 1) {
       const std::uint32_t child = entry.node * kPhotonTreeWidth + static_cast<std::uint32_t>(__builtin_ctz(met));
-      if (child >= num_boxes) break;
+      if (child >= num_boxes[entry.level]) break;
       if (entry.level > 0) {
         stack[size++] = {entry.level - 1, child};
         continue;
       }
       const std::uint32_t begin = child * kPhotonTreeWidth;
-      const std::uint32_t left = map.num_photons - begin, count = left < kPhotonTreeWidth ? left : kPhotonTreeWidth;
-      float along[kPhotonTreeWidth], squared[kPhotonTreeWidth];
-      for (std::uint32_t k = 0; k < kPhotonTreeWidth; ++k) {
-        const std::uint32_t i = begin + (k < count ? k : count - 1);
-        const float x = map.x[i] - O.x, y = map.y[i] - O.y, z = map.z[i] - O.z;
-        along[k] = x * D.x + y * D.y + z * D.z;
-        squared[k] = (sqr(x - along[k] * D.x) + sqr(y - along[k] * D.y) + sqr(z - along[k] * D.z)) *
-                     map.inverse_radius_squared[i];
-      }
-      for (std::uint32_t k = 0; k < count; ++k) {
-        if (squared[k] < 1.0f && along[k] >= 0.0f && along[k] <= length) visit(begin + k, along[k], squared[k]);
+      const F8 x = load8(map.x + begin) - ray.O[0], y = load8(map.y + begin) - ray.O[1],
+               z = load8(map.z + begin) - ray.O[2];
+      const F8 along = x * ray.D[0] + y * ray.D[1] + z * ray.D[2];
+      const F8 dx = x - along * ray.D[0], dy = y - along * ray.D[1], dz = z - along * ray.D[2];
+      const F8 squared = (dx * dx + dy * dy + dz * dz) * load8(map.inverse_radius_squared + begin);
+      // Of what fills the last leaf the square is infinite, or no number.
+      std::uint32_t passed = mask_of((squared < 1.0f) & (along >= 0.0f) & (along <= ray.length));
+      for (; passed != 0; passed &= passed - 1) {
+        const int k = __builtin_ctz(passed);
+        visit(begin + static_cast<std::uint32_t>(k), along[k], squared[k]);
       }
     }
   }

@@ -49,7 +49,7 @@ struct PhotonBoxes {
   float low[3][kPhotonTreeWidth], high[3][kPhotonTreeWidth];
 };
 
-/// Photons of a pass that lie in media.
+/// Photons of a pass that lie in media. The columns of numbers have whole leaves; what fills the last one has an infinite inverse radius.
 struct MediumPhotonsView {
   const float *x = nullptr, *y = nullptr, *z = nullptr;  ///< world, metres
   const float* inverse_radius_squared = nullptr;         ///< 1/m²

@@ -8,9 +8,9 @@ from .meshes import Mesh, ground, quad, uv_sphere
 from .vector import smoothstep
 
 MAP_SIZE = 192
-TILES = (5, 3)
-CELLS = 3  # bumps along each side of a tile
-MARGIN = 0.04  # of a tile: there the map is flat, so that tiles meet, and the block's sides close with its top
+TILES = (4, 2)
+CELLS = 2  # bumps along each side of a tile
+MARGIN = 0.03  # of a tile: there the map is flat, so that tiles meet, and the block's sides close with its top
 
 
 def _bumps():
@@ -19,7 +19,7 @@ def _bumps():
         (
             i + 0.5 + 0.34 * (images.noise(i, j, 6) - 0.5),
             j + 0.5 + 0.34 * (images.noise(i, j, 7) - 0.5),
-            0.42 + 0.24 * images.noise(i, j, 8),
+            0.60 + 0.25 * images.noise(i, j, 8),
             0.45 + 0.55 * images.noise(i, j, 9),
         )
         for i in range(CELLS)
@@ -40,7 +40,7 @@ def melted(u, v):
             height += top * (1.0 - squared) ** 2
     inside = 1.0
     for t in (u, v):
-        inside *= smoothstep(MARGIN, 0.16, t) * smoothstep(1.0 - MARGIN, 0.84, t)
+        inside *= smoothstep(MARGIN, 0.14, t) * smoothstep(1.0 - MARGIN, 0.86, t)
     return min(1.0, 0.8 * height) * inside
 
 
@@ -76,20 +76,20 @@ def _ball():
 
 def build():
     document = Document(
-        "ice", {"resolution": [640, 360], "samples": 64, "maxBounces": 12, "transmissionBounces": 12, "volumeBounces": 4}
+        "ice", {"resolution": [640, 360], "samples": 16, "maxBounces": 8, "transmissionBounces": 8, "volumeBounces": 2}
     )
-    document.gltf["extensions"]["RELIEF_environment"] = {"color": [0.05, 0.075, 0.11]}
-    document.add_sun((-0.42, 1.0, -0.32), (9.0, 8.4, 7.4))
+    document.gltf["extensions"]["RELIEF_environment"] = {"color": [0.018, 0.03, 0.05]}
+    document.add_sun((-0.45, 1.0, -0.42), (15.0, 14.0, 12.4))
 
-    slate = lambert("slate", (0.10, 0.105, 0.115))
+    slate = lambert("slate", (0.02, 0.021, 0.024))
     document.add_node("table", mesh=document.add_mesh("table", ground(12.0, 2), document.add_material(slate)))
 
     heights = document.add_texture("melted.png", images.height_map(melted, MAP_SIZE))
-    ice = displaced(glass("ice", 1.31), heights, 0.05, 0.0, smoothing=True)
+    ice = displaced(glass("ice", 1.31), heights, 0.09, 0.0, smoothing=True)
     ice["extensions"]["RELIEF_volume"] = {
         "closures": [
-            {"type": "scatter", "color": [1, 1, 1], "density": 0.55, "anisotropy": 0.45},
-            {"type": "absorption", "color": [0.55, 0.88, 0.95], "density": 0.6},
+            {"type": "scatter", "color": [1, 1, 1], "density": 0.20, "anisotropy": 0.5},
+            {"type": "absorption", "color": [0.35, 0.85, 0.95], "density": 0.35},
         ]
     }
     # A millimetre above the table: two surfaces in one plane would be a draw.
