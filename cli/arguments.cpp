@@ -181,19 +181,19 @@ std::vector<std::string> aov_words()
   return words;
 }
 
-std::uint32_t parse_aovs(const std::string& text)
+AovMask parse_aovs(const std::string& text)
 {
-  std::uint32_t mask = 1u << static_cast<int>(Aov::kBeauty);
+  AovMask mask = aov_bit(Aov::kBeauty);
   for (const std::string_view name : split(text, ',')) {
     if (name == "all") {
-      mask = (1u << kNumAovs) - 1u;
+      mask = kAllAovs;
       continue;
     }
     const auto* info = std::find_if(kAovInfo.begin(), kAovInfo.end(), [&](const AovInfo& i) { return i.name == name; });
     if (info == kAovInfo.end()) {
       refuse("--aov", "names among " + words_text(aov_words()), std::string(name));
     }
-    mask |= 1u << static_cast<int>(info->aov);
+    mask |= aov_bit(info->aov);
   }
   return mask;
 }

@@ -70,7 +70,7 @@ std::uint64_t parse_seed(const std::string& text);
 
 /// Names of AOVs separated by commas, or "all"; beauty is always in.
 /// @return bit i: enumerator i of Aov
-std::uint32_t parse_aovs(const std::string& text);
+AovMask parse_aovs(const std::string& text);
 
 /// What parse_aovs knows.
 std::vector<std::string> aov_words();

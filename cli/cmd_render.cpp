@@ -67,7 +67,7 @@ struct RenderArguments {
   double time_limit = 0, noise_threshold = -1;
   std::optional<std::string> view, display;
   std::optional<double> exposure;
-  std::uint32_t aov_mask = 0;
+  AovMask aov_mask = 0;
   Denoiser denoiser = Denoiser::kNone;
   std::string compression = "zip", color_space = "rec709", progress = "bar";
   bool resume = false, strict = false, keep_going = false, float_color = false;
@@ -124,11 +124,10 @@ RunFiles files_of_run(const RenderArguments& arguments, const std::vector<std::o
 }
 
 /// Layers that a report shows.
-std::uint32_t report_aovs(const Scene& scene)
+AovMask report_aovs(const Scene& scene)
 {
-  const auto bit = [](Aov aov) { return 1u << static_cast<int>(aov); };
-  return bit(Aov::kSampleCount) | bit(Aov::kVariance) |
-         (scene.displacements.empty() ? 0u : bit(Aov::kDisplacementSteps));
+  return aov_bit(Aov::kSampleCount) | aov_bit(Aov::kVariance) |
+         (scene.displacements.empty() ? 0u : aov_bit(Aov::kDisplacementSteps));
 }
 
 RenderOptions options_for(const Scene& scene, const RenderArguments& arguments, const std::vector<SceneCamera>& cameras)
@@ -520,7 +519,7 @@ void FrameRun::describe()
     stats_.settings.emplace_back(setting.info->name, setting_text(setting.value));
   }
   // Of the page about the frame, so that `relief report` makes the same.
-  const std::uint32_t report_mask = arguments_.report.empty() ? 0 : report_aovs(*scene_);
+  const AovMask report_mask = arguments_.report.empty() ? 0 : report_aovs(*scene_);
   frame_files_.emplace(files_, paths_, command_,
                        ExrOptions{compression_of(arguments_), arguments_.float_color, color_space_of(arguments_)},
                        arguments_.aov_mask | report_mask, exr_camera_attributes(options_.camera), progress_);

@@ -98,10 +98,10 @@ void denoiser_require(Denoiser denoiser)
   if (denoiser == Denoiser::kOidn) oidn_require();
 }
 
-std::uint32_t denoiser_aovs()
+AovMask denoiser_aovs()
 {
-  std::uint32_t mask = 1u << static_cast<unsigned>(Aov::kDenoisingHalf);
-  for (const Aov aov : kNeeded) mask |= 1u << static_cast<unsigned>(aov);
+  AovMask mask = aov_bit(Aov::kDenoisingHalf);
+  for (const Aov aov : kNeeded) mask |= aov_bit(aov);
   return mask;
 }
 

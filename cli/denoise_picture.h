@@ -27,7 +27,7 @@ CLI::Option* add_denoiser(CLI::App& command, Denoiser& denoiser, Denoiser least)
 void denoiser_require(Denoiser denoiser);
 
 /// Layers that a denoiser is given, as bits of Aov.
-std::uint32_t denoiser_aovs();
+AovMask denoiser_aovs();
 
 /// What a denoiser made of a picture.
 struct DenoisedPicture {

@@ -16,10 +16,10 @@ namespace relief {
 namespace {
 
 /// The film without the layers that only a denoiser wanted.
-FilmView asked_layers(FilmView film, std::uint32_t aov_mask)
+FilmView asked_layers(FilmView film, AovMask aov_mask)
 {
   for (std::size_t i = 0; i < film.layout.offset.size(); ++i) {
-    if ((aov_mask >> i & 1u) == 0) film.layout.offset[i] = -1;
+    if (!aov_is_in(static_cast<Aov>(i), aov_mask)) film.layout.offset[i] = -1;
   }
   return film;
 }

@@ -27,7 +27,7 @@ class FrameFiles {
              const FramePaths& paths,
              std::string command,
              ExrOptions exr,
-             std::uint32_t aov_mask,
+             AovMask aov_mask,
              Attributes camera,
              ProgressPrinter& progress)
       : files_(files),
@@ -74,7 +74,7 @@ class FrameFiles {
   const FramePaths& paths_;
   std::string command_;
   ExrOptions exr_;
-  std::uint32_t aov_mask_;
+  AovMask aov_mask_;
   Attributes camera_;
   ProgressPrinter& progress_;
   bool shows_previews_ = true;

@@ -253,11 +253,11 @@ Attributes exr_camera_attributes(const Camera& camera)
   return {{"worldToCamera", text(camera_matrix)}, {"worldToNDC", text(screen_matrix)}};
 }
 
-Attributes exr_cryptomatte_attributes(const Scene& scene, std::uint32_t aov_mask)
+Attributes exr_cryptomatte_attributes(const Scene& scene, AovMask aov_mask)
 {
   Attributes attributes;
   for (int i = 0; i < kNumCryptomattes; ++i) {
-    if ((aov_mask >> (kFirstCryptomatte + i) & 1u) == 0) continue;
+    if (!aov_is_in(static_cast<Aov>(kFirstCryptomatte + i), aov_mask)) continue;
     const std::string layer(cryptomatte_layer(i));
     char key[9];
     std::snprintf(key, sizeof key, "%08x", cryptomatte_hash(layer));

@@ -40,7 +40,7 @@ Attributes exr_attributes(const Statistics& statistics, std::string_view command
 Attributes exr_camera_attributes(const Camera& camera);
 
 /// What compositors need to know of the Cryptomattes among a film's layers: their names, and whose ids they hold.
-Attributes exr_cryptomatte_attributes(const Scene& scene, std::uint32_t aov_mask);
+Attributes exr_cryptomatte_attributes(const Scene& scene, AovMask aov_mask);
 
 /// Layers of a film that a compression would change beyond their stored type although their values are data, not
 /// colours: DWA treats every channel called R, G, B or Y as colour. Empty for lossless compressions.

@@ -17,16 +17,16 @@ namespace relief {
 
 namespace {
 
-AccumulatorLayout layout_make(std::uint32_t aov_mask, int cryptomatte_levels, bool keeps_clear, bool counts_samples)
+AccumulatorLayout layout_make(AovMask aov_mask, int cryptomatte_levels, bool keeps_clear, bool counts_samples)
 {
   AccumulatorLayout layout;
   layout.cryptomatte_levels = cryptomatte_levels;
   const auto keep = [&](Aov aov, int channels, int& offset) {
-    if ((aov_mask >> static_cast<int>(aov) & 1u) == 0) return;
+    if (!aov_is_in(aov, aov_mask)) return;
     offset = layout.num_floats;
     layout.num_floats += channels;
   };
-  if ((aov_mask >> static_cast<int>(Aov::kIndirect) & 1u) != 0) aov_mask |= 1u << static_cast<int>(Aov::kDirect);
+  if (aov_is_in(Aov::kIndirect, aov_mask)) aov_mask |= aov_bit(Aov::kDirect);
   keep(Aov::kDirect, 3, layout.direct);
   keep(Aov::kAlbedo, 3, layout.albedo);
   keep(Aov::kNormal, 3, layout.normal);
@@ -48,6 +48,11 @@ AccumulatorLayout layout_make(std::uint32_t aov_mask, int cryptomatte_levels, bo
   keep(Aov::kDenoisingHalf, 7, layout.denoising_half);
   keep(Aov::kVolumeDirect, 3, layout.volume_direct);
   keep(Aov::kVolumeIndirect, 3, layout.volume_indirect);
+  for (int i = 0; i < kNumLightPasses; ++i) keep(light_pass_aov(i), 3, layout.light_passes[i]);
+  for (int i = 0; i < kNumEventKinds; ++i) keep(event_color_aov(i), 3, layout.event_colors[i]);
+  const auto is_kept = [](int offset) { return offset >= 0; };
+  layout.light_by_event =
+      std::ranges::any_of(layout.light_passes, is_kept) || std::ranges::any_of(layout.event_colors, is_kept);
   if (keeps_clear) layout.clear = layout.num_floats++;
   if (counts_samples) {
     layout.samples = layout.num_floats;
@@ -174,12 +179,12 @@ static std::size_t sums_size(int width, int height, const AccumulatorLayout& lay
   return size;
 }
 
-Film::Film(int width, int height, std::uint32_t aov_mask, int cryptomatte_levels, bool keeps_clear, bool counts_samples)
+Film::Film(int width, int height, AovMask aov_mask, int cryptomatte_levels, bool keeps_clear, bool counts_samples)
     : width_(width),
       height_(height),
       tiles_x_((width + kTileSize - 1) / kTileSize),
       tiles_y_((height + kTileSize - 1) / kTileSize),
-      aov_mask_(aov_mask | 1u << static_cast<int>(Aov::kBeauty)),
+      aov_mask_(aov_mask | aov_bit(Aov::kBeauty)),
       layout_(layout_make(aov_mask_, cryptomatte_levels, keeps_clear, counts_samples)),
       sums_(sums_size(width, height, layout_)),
       samples_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_))
@@ -509,6 +514,12 @@ void Film::resolve_pixel(const float* in,
   }
   if (float* p = plane(Aov::kVolumeDirect)) put3(p, load3(in + layout_.volume_direct) * light);
   if (float* p = plane(Aov::kVolumeIndirect)) put3(p, load3(in + layout_.volume_indirect) * light);
+  for (int i = 0; i < kNumLightPasses; ++i) {
+    if (float* p = plane(light_pass_aov(i))) put3(p, load3(in + layout_.light_passes[i]) * light);
+  }
+  for (int i = 0; i < kNumEventKinds; ++i) {
+    if (float* p = plane(event_color_aov(i))) put3(p, load3(in + layout_.event_colors[i]) * inverse_n);
+  }
   for (int i = 0; i < kNumCryptomattes; ++i) {
     float* p = plane(static_cast<Aov>(kFirstCryptomatte + i));
     if (p != nullptr) put_cryptomatte(in + layout_.cryptomatte[i], layout_.cryptomatte_levels, inverse_n, p);
@@ -521,7 +532,7 @@ float Film::alpha(const float* record, std::uint32_t samples) const
   return std::clamp((record[AccumulatorLayout::kCoverage] - clear) / static_cast<float>(samples), 0.0f, 1.0f);
 }
 
-FilmView Film::window(std::uint32_t aov_mask, int crop_x, int crop_y, int full_width, int full_height) const
+FilmView Film::window(AovMask aov_mask, int crop_x, int crop_y, int full_width, int full_height) const
 {
   FilmView view;
   view.layout = film_layout_make(aov_mask, layout_.cryptomatte_levels);
@@ -537,7 +548,7 @@ FilmView Film::window(std::uint32_t aov_mask, int crop_x, int crop_y, int full_w
 RenderedImage Film::beauty(int crop_x, int crop_y, int full_width, int full_height, float exposure) const
 {
   RenderedImage picture;
-  picture.view = window(1u << static_cast<int>(Aov::kBeauty), crop_x, crop_y, full_width, full_height);
+  picture.view = window(aov_bit(Aov::kBeauty), crop_x, crop_y, full_width, full_height);
   picture.pixels.resize(num_pixels() * 4);
   picture.view.pixels = picture.pixels.data();
   tbb::parallel_for(0, height_, [&](int y) {

@@ -72,7 +72,7 @@ class Film {
   /// @param counts_samples      each pixel has a number of its own, see judge
   Film(int width,
        int height,
-       std::uint32_t aov_mask,
+       AovMask aov_mask,
        int cryptomatte_levels = 6,
        bool keeps_clear = false,
        bool counts_samples = false);
@@ -133,7 +133,7 @@ class Film {
   const float* record(int x, int y) const;
   float alpha(const float* record, std::uint32_t samples) const;
   /// View of a finished picture, without its pixels.
-  FilmView window(std::uint32_t aov_mask, int crop_x, int crop_y, int full_width, int full_height) const;
+  FilmView window(AovMask aov_mask, int crop_x, int crop_y, int full_width, int full_height) const;
   /// Samples of a pixel of a tile.
   std::uint32_t pixel_samples(const float* record, int tile) const;
   /// Noise of a pixel beside what the rule allows: not below 1, and it is noisy.
@@ -161,7 +161,7 @@ class Film {
                      float* to) const;
 
   int width_, height_, tiles_x_, tiles_y_;
-  std::uint32_t aov_mask_;
+  AovMask aov_mask_;
   AccumulatorLayout layout_;
   std::vector<float> sums_;
   std::vector<std::uint32_t> samples_;

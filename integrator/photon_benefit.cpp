@@ -111,7 +111,7 @@ Film pilot_film(const RenderSettings& settings, double num_pixels, KernelGlobals
   const double aspect = static_cast<double>(settings.width) / settings.height;
   const int width = std::clamp(static_cast<int>(std::sqrt(num_pixels * aspect)), 1, settings.width);
   const int height = std::clamp(static_cast<int>(num_pixels / width), 1, settings.height);
-  Film film(width, height, 1u << static_cast<int>(Aov::kBeauty) | 1u << static_cast<int>(Aov::kCaustic));
+  Film film(width, height, aov_bit(Aov::kBeauty) | aov_bit(Aov::kCaustic));
   g.film = film.accumulator();
   g.filter_width *= static_cast<float>(width) / static_cast<float>(settings.width);
   g.full_width = width;
@@ -131,7 +131,7 @@ struct PilotMedia {
 
 Wavefront pilot_worker(const SceneContext& context, const PilotMedia& media, const std::atomic<bool>& stop)
 {
-  Wavefront worker(context.columns(true));
+  Wavefront worker(context.columns(true, false));
   worker.stop = &stop;
   if (media.of_camera.exists()) worker.camera_medium = &media.of_camera;
   if (media.all.exist()) worker.media = &media.all;

@@ -24,7 +24,7 @@ struct RenderOptions {
   std::uint32_t first_sample = 0, num_samples = 0;
   /// 0: none; counted from the start of sampling. The pass under way is finished, as long as its tiles are.
   double time_limit_seconds = 0;
-  std::uint32_t aov_mask = 1;
+  AovMask aov_mask = 1;
   LightTechnique light_technique = LightTechnique::kMis;
   DisplacementOptions displacement;
   std::shared_ptr<KeptTrees> trees;  ///< of the scenes before; null: none are kept

@@ -168,7 +168,7 @@ class RenderRun {
   SamplingEnd end_;
   PhotonChoice choice_;
   std::optional<PhotonPass> photons_;
-  const WavefrontColumns columns_ = context_.columns(choice_.photons);
+  const WavefrontColumns columns_ = context_.columns(choice_.photons, globals_.film.layout.light_by_event);
   const CameraMedium camera_medium_{context_};
   const Media media_{context_};
   Workers workers_;
@@ -344,9 +344,8 @@ void RenderRun::checkpoint()
 /// path meets what they tell: the last bits of their sums depend on which samples are under way together.
 std::uint32_t RenderRun::most_samples() const
 {
-  constexpr auto bit = [](Aov aov) { return 1u << static_cast<int>(aov); };
-  constexpr std::uint32_t kSumsByPath =
-      bit(Aov::kBeauty) | bit(Aov::kSampleCount) | bit(Aov::kVariance) | bit(Aov::kHalf);
+  constexpr AovMask kSumsByPath =
+      aov_bit(Aov::kBeauty) | aov_bit(Aov::kSampleCount) | aov_bit(Aov::kVariance) | aov_bit(Aov::kHalf);
   if (!checkpoints_.is_on() || (options_.aov_mask & ~kSumsByPath) != 0) return kMostPassSamples;
   constexpr double kFewTiles = 4;
   const double tiles_a_thread =

@@ -195,11 +195,11 @@ SceneContext::SceneContext(const Scene& loaded,
   }
 }
 
-WavefrontColumns SceneContext::columns(bool photons) const
+WavefrontColumns SceneContext::columns(bool photons, bool light_passes) const
 {
   const bool goes_below = std::any_of(scene.materials.begin(), scene.materials.end(),
                                       [](const Material& material) { return material.scatters_below; });
-  return {photons, motion.is_open(), displacements.has_facets(), !media.empty(), goes_below};
+  return {photons, motion.is_open(), displacements.has_facets(), !media.empty(), goes_below, light_passes};
 }
 
 void SceneContext::make_views()

@@ -30,8 +30,9 @@ struct SceneContext : SceneViews {
                         const CausticSettings& caustics = {CausticsMode::kOff},
                         std::shared_ptr<KeptTrees> trees = nullptr);
 
-  /// @param photons  the render has a photon pass
-  WavefrontColumns columns(bool photons) const;
+  /// @param photons       the render has a photon pass
+  /// @param light_passes  it has layers that tell light apart by its first event
+  WavefrontColumns columns(bool photons, bool light_passes) const;
   const std::vector<std::uint8_t>& surface_kernels(bool photons) const
   {
     return photons ? surface_kernel : surface_kernel_of_paths;

@@ -269,8 +269,9 @@ void finish(const KernelGlobals& g,
     if (state.caustic.radiance != nullptr) caustic = (*state.caustic.radiance)[i];
     const bool finite = film_add_sample(g.film, state.pixel[i], sample, state.direct[i], state.indirect[i], caustic);
     if (finite) {
+      if (state.light_passes != nullptr) film_add_light_passes(g.film, state.pixel[i], state.light_passes[i].light);
       if (state.media != nullptr) {
-        const MediumLight light = medium_light(state.media[i], state.direct[i], state.indirect[i]);
+        const MediumLight light = medium_light(state.media[i], state.direct[i], state.indirect[i], caustic);
         film_add_volume(g.film, state.pixel[i], light.direct, light.indirect);
       }
       continue;

@@ -122,7 +122,7 @@ PathReplay trace_path(const Scene& scene, const RenderOptions& options, const Pi
   RELIEF_ASSERT(at.x >= window.x0 && at.x < window.x0 + window.width);
   RELIEF_ASSERT(at.y >= window.y0 && at.y < window.y0 + window.height);
   // Layers beside the beauty do not change a path.
-  Film film(window.width, window.height, 1u << static_cast<int>(Aov::kBeauty));
+  Film film(window.width, window.height, aov_bit(Aov::kBeauty));
   FilterTable filter;
   pixel_filter_table_make(options.settings.filter, filter);
   KernelGlobals g = render_globals(context, options, filter);
@@ -134,7 +134,7 @@ PathReplay trace_path(const Scene& scene, const RenderOptions& options, const Pi
   std::optional<PhotonPass> photons;
   if (caustics) {
     photons.emplace(context, options.settings, std::move(choice.sources));
-    tbb::enumerable_thread_specific<Wavefront> workers([&] { return Wavefront(context.columns(caustics)); });
+    tbb::enumerable_thread_specific<Wavefront> workers([&] { return Wavefront(context.columns(caustics, false)); });
     for (std::uint32_t pass = 0; pass <= at.sample_index; ++pass) {
       photons->next(
           g, 0, stages, [&]() -> Wavefront& { return workers.local(); }, stop, [] {});
@@ -143,7 +143,7 @@ PathReplay trace_path(const Scene& scene, const RenderOptions& options, const Pi
 
   PathReplay replay;
   replay.warnings = context.displacements.warnings();
-  Wavefront wavefront(context.columns(caustics));
+  Wavefront wavefront(context.columns(caustics, false));
   wavefront.recorder = &replay.rays;
   const CameraMedium camera_medium(context);
   if (camera_medium.exists()) wavefront.camera_medium = &camera_medium;

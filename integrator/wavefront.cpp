@@ -35,6 +35,7 @@ std::size_t Wavefront::bytes(const WavefrontColumns& columns)
   return sizeof(Memory) + (columns.caustics ? sizeof(CausticMemory) : 0u) +
          (columns.motion ? sizeof(MotionMemory) : 0u) + (columns.facets ? kColumnEntries * sizeof(FacetState) : 0u) +
          (columns.media ? kColumnEntries * sizeof(MediumState) : 0u) +
+         (columns.light_passes ? kColumnEntries * sizeof(LightPassState) : 0u) +
          (columns.subsurface ? sizeof(SubsurfaceMemory) : 0u);
 }
 
@@ -48,6 +49,10 @@ Wavefront::Wavefront(const WavefrontColumns& columns)
   if (columns.media) {
     medium_memory_ = std::make_unique_for_overwrite<MediumState[]>(kColumnEntries);
     state_.media = medium_memory_.get();
+  }
+  if (columns.light_passes) {
+    light_pass_memory_ = std::make_unique_for_overwrite<LightPassState[]>(kColumnEntries);
+    state_.light_passes = light_pass_memory_.get();
   }
   if (columns.facets) {
     facet_memory_ = std::make_unique_for_overwrite<FacetState[]>(kColumnEntries);

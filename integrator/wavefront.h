@@ -40,11 +40,12 @@ struct KeptPhotons {
 
 /// What paths need columns for.
 struct WavefrontColumns {
-  bool caustics = false;    ///< camera paths gather photons
-  bool motion = false;      ///< paths have a time
-  bool facets = false;      ///< they may meet coarser levels of height maps
-  bool media = false;       ///< something fills space
-  bool subsurface = false;  ///< they may go below surfaces
+  bool caustics = false;      ///< camera paths gather photons
+  bool motion = false;        ///< paths have a time
+  bool facets = false;        ///< they may meet coarser levels of height maps
+  bool media = false;         ///< something fills space
+  bool subsurface = false;    ///< they may go below surfaces
+  bool light_passes = false;  ///< layers tell their light apart by the first event
 };
 
 class CameraMedium;
@@ -129,6 +130,7 @@ class Wavefront {
   std::unique_ptr<SubsurfaceMemory> subsurface_memory_;
   std::unique_ptr<FacetState[]> facet_memory_;
   std::unique_ptr<MediumState[]> medium_memory_;
+  std::unique_ptr<LightPassState[]> light_pass_memory_;
   PathState& state_;
   ShadowQueue& shadow_;
   QueueView active_, next_;

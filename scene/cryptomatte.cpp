@@ -68,11 +68,11 @@ float cryptomatte_id(std::uint32_t hash)
   return std::bit_cast<float>(hash);
 }
 
-CryptomatteIds cryptomatte_ids(const Scene& scene, std::uint32_t aov_mask)
+CryptomatteIds cryptomatte_ids(const Scene& scene, AovMask aov_mask)
 {
   CryptomatteIds ids;
   for (int i = 0; i < kNumCryptomattes; ++i) {
-    if ((aov_mask >> (kFirstCryptomatte + i) & 1u) == 0) continue;
+    if (!aov_is_in(static_cast<Aov>(kFirstCryptomatte + i), aov_mask)) continue;
     visit_names(scene, i, [&](const std::string& name) {
       ids[static_cast<std::size_t>(i)].push_back(cryptomatte_id(cryptomatte_hash(name)));
     });

@@ -25,7 +25,7 @@ std::uint32_t cryptomatte_hash(std::string_view name);
 float cryptomatte_id(std::uint32_t hash);
 
 /// @param aov_mask  bit i: enumerator i of Aov is asked for
-CryptomatteIds cryptomatte_ids(const Scene& scene, std::uint32_t aov_mask);
+CryptomatteIds cryptomatte_ids(const Scene& scene, AovMask aov_mask);
 
 /// Name of a Cryptomatte's layers in a file, which two digits follow.
 /// @param index  0 … kNumCryptomattes − 1

@@ -29,7 +29,15 @@ _PRINCIPLED_NAMES_4_0 = {
 
 #: Names that passes got in 5.0, by the names before.
 _PASS_NAMES_5_0 = {
+    "DiffDir": "Diffuse Direct",
+    "DiffInd": "Diffuse Indirect",
     "DiffCol": "Diffuse Color",
+    "GlossDir": "Glossy Direct",
+    "GlossInd": "Glossy Indirect",
+    "GlossCol": "Glossy Color",
+    "TransDir": "Transmission Direct",
+    "TransInd": "Transmission Indirect",
+    "TransCol": "Transmission Color",
     "Emit": "Emission",
     "Env": "Environment",
     "AO": "Ambient Occlusion",

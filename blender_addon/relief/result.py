@@ -22,7 +22,7 @@ class Pass:
     setting   property that switches it on
     owner     whose property: "" for the view layer, or "relief" or "cycles" of it
     is_own    our own passes, and those that Cycles adds, have to be registered and added; Blender makes the others itself
-    aov       layer of the program's picture
+    aov       layers of the program's picture, separated by commas
     channels  names of channels there
     ids       Blender's channel names; small ones where they are no colours: of those Blender keeps 32 bits in files of 16,
               and DWA loses nothing
@@ -61,6 +61,30 @@ def _grey(values, _):
     return np.repeat(values, 3, axis=1)
 
 
+def _without_color(values, _):
+    """Light over the colour of what scatters it, as compositors multiply it by that again. Where a channel of the colour is 0, it
+    has the mean of the others.
+    @param  values  light and colour, (pixels, 6)
+    """
+    light, color = values[:, :3], values[:, 3:]
+    is_colored = color != 0
+    over = np.divide(light, color, out=np.zeros_like(light), where=is_colored)
+    num_colored = is_colored.sum(axis=1, keepdims=True)
+    mean = np.divide(over.sum(axis=1, keepdims=True), num_colored, out=np.zeros_like(over[:, :1]), where=num_colored > 0)
+    return np.where(is_colored, over, mean)
+
+
+def _light_passes():
+    """Those that tell light apart by what the surface that is seen does to it."""
+    for short, layer in (("Diff", "diffuse"), ("Gloss", "glossy"), ("Trans", "transmission")):
+        color = f"{layer}_color"
+        for part, way in (("Dir", "direct"), ("Ind", "indirect")):
+            light = f"{layer}_{way}"
+            yield Pass(compat.pass_name(short + part), f"use_pass_{light}", False, f"{light},{color}", _rgb(light) + _rgb(color),
+                       "RGB", "COLOR", _without_color)
+        yield Pass(compat.pass_name(short + "Col"), f"use_pass_{color}", False, color, _rgb(color), "RGB", "COLOR")
+
+
 PASSES = (
     Pass("Depth", "use_pass_z", False, "depth", ("depth.Z",), "Z", "VALUE",
          lambda z, coverage: np.where(coverage[:, None] > 0, z, np.float32(_FAR))),
@@ -71,7 +95,7 @@ PASSES = (
          lambda p, _: blender_from_gltf(p)),
     Pass("UV", "use_pass_uv", False, "uv", ("uv.U", "uv.V"), "UVA", "VECTOR",
          lambda uv, coverage: _with_zero(uv * (1, -1) + (0, 1) * (coverage[:, None] > 0), coverage)),
-    Pass(compat.pass_name("DiffCol"), "use_pass_diffuse_color", False, "albedo", _rgb("albedo"), "RGB", "COLOR"),
+    *_light_passes(),
     Pass(compat.pass_name("Emit"), "use_pass_emit", False, "emission", _rgb("emission"), "RGB", "COLOR"),
     Pass(compat.pass_name("Env"), "use_pass_environment", False, "environment", _rgb("environment"), "RGB", "COLOR"),
     Pass(compat.pass_name("AO"), "use_pass_ambient_occlusion", False, "ambient_occlusion", ("ambient_occlusion.Y",), "RGB",

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "kernel/bsdf/layered.h"
+#include "kernel/film/film_layout.h"
 
 namespace relief {
 
@@ -61,6 +62,21 @@ RELIEF_KERNEL SurfaceClosure closure_soft(const SurfaceClosure& c, SharpLobes sh
 
 /// The closure's diffuse lobes alone, to be evaluated: its pdf means nothing.
 RELIEF_KERNEL SurfaceClosure closure_diffuse(const SurfaceClosure& c) { return closure_soft(c, kAllSharp); }
+
+/// Of these what layers of light call diffuse, to be evaluated. What facets scatter more than once is part of their lobe.
+RELIEF_KERNEL SurfaceClosure closure_matte(const SurfaceClosure& c)
+{
+  SurfaceClosure matte = closure_diffuse(c);
+  static_cast<MultipleLobe&>(matte.lobes).probability = 0.0f;
+  static_cast<ThinMultipleLobe&>(matte.lobes).probability = 0.0f;
+  return matte;
+}
+
+/// What layers of light call an event that is not diffuse.
+RELIEF_KERNEL EventKind closure_other_event(const SurfaceClosure&, bool transmitted)
+{
+  return transmitted ? EventKind::kTransmission : EventKind::kGlossy;
+}
 
 /// Whether a closure has lobes that are sharp, or that are soft.
 template <bool kSharp>

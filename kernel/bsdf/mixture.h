@@ -174,6 +174,41 @@ RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tabl
 RELIEF_KERNEL Mixture closure_sharp(const Mixture& m, SharpLobes sharp) { return mixture_part<true>(m, sharp); }
 RELIEF_KERNEL Mixture closure_soft(const Mixture& m, SharpLobes sharp) { return mixture_part<false>(m, sharp); }
 RELIEF_KERNEL Mixture closure_diffuse(const Mixture& m) { return mixture_choose(m, mixture_lobe_is_diffuse); }
+RELIEF_KERNEL Mixture closure_matte(const Mixture& m)
+{
+  return mixture_choose(m,
+                        [](const MixtureLobe& lobe) { return mixture_lobe_event(lobe.kind) == EventKind::kDiffuse; });
+}
+
+/// As of layered surfaces; but all that a fibre does is glossy, as in Cycles.
+RELIEF_KERNEL EventKind closure_other_event(const Mixture& m, bool transmitted)
+{
+  bool has_fibre = false;
+  mixture_visit(m, [&](const MixtureLobe& lobe) { has_fibre = has_fibre || lobe.kind == MixtureLobeKind::kFibre; });
+  return transmitted && !has_fibre ? EventKind::kTransmission : EventKind::kGlossy;
+}
+
+/// What the chosen lobes scatter of white light by kinds of event, as Cycles has it: up to 3.6 microfacets without their
+/// reflectance.
+/// @param colors  gets kNumEventKinds of them
+RELIEF_KERNEL void mixture_event_colors(const Mixture& m, Vec3f* colors)
+{
+  mixture_visit(m, [&](const MixtureLobe& lobe) {
+    Vec3f color = lobe.weight * m.gain;
+    if (lobe.kind == MixtureLobeKind::kMultiple) return;
+    if (lobe.kind == MixtureLobeKind::kGlass) {
+      const Vec3f F = min(max(mixture_fresnel(lobe.fresnel, lobe.wo.z), Vec3f{}), splat3(1.0f));
+      colors[static_cast<int>(EventKind::kGlossy)] += color * lobe.shape.glass.reflection_tint * F;
+      colors[static_cast<int>(EventKind::kTransmission)] +=
+          color * lobe.shape.glass.transmission_tint * (splat3(1.0f) - F);
+      return;
+    }
+    if (lobe.maths >= Maths::k43 && mixture_traits(lobe.kind).has_fresnel) {
+      color *= mixture_fresnel(lobe.fresnel, lobe.wo.z);
+    }
+    colors[static_cast<int>(mixture_lobe_event(lobe.kind))] += color;
+  });
+}
 
 template <bool kSharp>
 RELIEF_KERNEL bool closure_has(const Mixture& m, SharpLobes sharp)

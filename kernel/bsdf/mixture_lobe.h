@@ -22,6 +22,7 @@
 #include "kernel/bsdf/toon.h"
 #include "kernel/bsdf/translucent.h"
 #include "kernel/bsdf/velvet.h"
+#include "kernel/film/film_layout.h"
 
 namespace relief {
 
@@ -79,6 +80,14 @@ RELIEF_KERNEL auto mixture_lobe_visit(Lobe& lobe, const Function& function)
 
 /// Whether what the lobe scatters counts as diffuse, as lobe_sample says of it.
 RELIEF_KERNEL bool mixture_lobe_is_diffuse(const MixtureLobe& lobe) { return mixture_traits(lobe.kind).is_diffuse; }
+
+/// What layers of light call the lobe. Of glass it depends on the side.
+RELIEF_KERNEL constexpr EventKind mixture_lobe_event(MixtureLobeKind kind)
+{
+  const MixtureTraits& traits = mixture_traits(kind);
+  if (traits.is_diffuse && kind != MixtureLobeKind::kMultiple) return EventKind::kDiffuse;
+  return traits.sides == LobeSides::kTransmit ? EventKind::kTransmission : EventKind::kGlossy;
+}
 
 RELIEF_KERNEL bool mixture_lobe_is_sharp(const MixtureLobe& lobe, float most_roughness)
 {

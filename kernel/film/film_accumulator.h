@@ -21,10 +21,13 @@ struct AccumulatorLayout {
       displacement_steps = -1, caustic = -1, holdout = -1, mist = -1, emission = -1, environment = -1,
       ambient_occlusion = -1, clear = -1, denoising_albedo = -1, denoising_normal = -1, denoising_depth = -1,
       denoising_half = -1, volume_direct = -1, volume_indirect = -1;
+  int light_passes[kNumLightPasses] = {-1, -1, -1, -1, -1, -1};
+  int event_colors[kNumEventKinds] = {-1, -1, -1};
   int samples = -1;  ///< that the pixel has had, and whether it rests: where noise ends pixels one by one
   int cryptomatte[kNumCryptomattes] = {-1, -1, -1};  ///< pairs of an id and its weight, the first of weight 0 is free
   int cryptomatte_levels = 0;
-  bool denoising = false;  ///< denoising_albedo, denoising_normal or denoising_half is kept
+  bool light_by_event = false;  ///< any of light_passes or event_colors is kept
+  bool denoising = false;       ///< denoising_albedo, denoising_normal or denoising_half is kept
   int num_floats = kAlways;
 };
 
@@ -130,6 +133,24 @@ RELIEF_KERNEL void film_add_volume(const FilmAccumulatorView& film, std::uint32_
   float* record = film_record(film, pixel);
   if (layout.volume_direct >= 0) film_add3(record + layout.volume_direct, direct);
   if (layout.volume_indirect >= 0) film_add3(record + layout.volume_indirect, indirect);
+}
+
+/// Adds what a sample brought by kinds of its first event, where that is kept.
+/// @param light  kNumLightPasses of them
+RELIEF_KERNEL void film_add_light_passes(const FilmAccumulatorView& film, std::uint32_t pixel, const Vec3f* light)
+{
+  for (int i = 0; i < kNumLightPasses; ++i) {
+    if (film.layout.light_passes[i] >= 0) film_add3(film_record(film, pixel) + film.layout.light_passes[i], light[i]);
+  }
+}
+
+/// Adds what a surface that the camera sees scatters of white light by kinds of event, where that is kept.
+/// @param colors  kNumEventKinds of them
+RELIEF_KERNEL void film_add_event_colors(const FilmAccumulatorView& film, std::uint32_t pixel, const Vec3f* colors)
+{
+  for (int i = 0; i < kNumEventKinds; ++i) {
+    if (film.layout.event_colors[i] >= 0) film_add3(film_record(film, pixel) + film.layout.event_colors[i], colors[i]);
+  }
 }
 
 /// Adds what a ray for ambient occlusion has found.

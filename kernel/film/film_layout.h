@@ -35,11 +35,44 @@ enum class Aov : std::uint8_t {
   kDenoisingHalf,
   kVolumeDirect,
   kVolumeIndirect,
+  kDiffuseDirect,
+  kDiffuseIndirect,
+  kDiffuseColor,
+  kGlossyDirect,
+  kGlossyIndirect,
+  kGlossyColor,
+  kTransmissionDirect,
+  kTransmissionIndirect,
+  kTransmissionColor,
   kCryptoObject,
   kCryptoMaterial,
   kCryptoAsset,
 };
-inline constexpr int kNumAovs = 29;
+inline constexpr int kNumAovs = 38;
+
+/// Sets of AOVs: bit i is enumerator i.
+using AovMask = std::uint64_t;
+inline constexpr AovMask kAllAovs = (AovMask{1} << kNumAovs) - 1;
+constexpr AovMask aov_bit(Aov aov) { return AovMask{1} << static_cast<int>(aov); }
+constexpr bool aov_is_in(Aov aov, AovMask mask) { return (mask & aov_bit(aov)) != 0; }
+
+/// What an event at a surface counts as in the layers that tell light apart by it: scattered diffusely, reflected, refracted.
+enum class EventKind : std::uint8_t { kDiffuse, kGlossy, kTransmission };
+inline constexpr int kNumEventKinds = 3;
+
+/// Layers of light by the first event: direct and indirect, of each kind.
+inline constexpr int kNumLightPasses = 2 * kNumEventKinds;
+constexpr int light_pass(EventKind kind, bool is_indirect)
+{
+  return 2 * static_cast<int>(kind) + (is_indirect ? 1 : 0);
+}
+
+/// They follow one another in Aov: direct, indirect and colour of each kind.
+constexpr Aov light_pass_aov(int pass)
+{
+  return static_cast<Aov>(static_cast<int>(Aov::kDiffuseDirect) + pass / 2 * 3 + pass % 2);
+}
+constexpr Aov event_color_aov(int kind) { return static_cast<Aov>(static_cast<int>(Aov::kDiffuseColor) + 3 * kind); }
 
 /// The three Cryptomattes, which follow one another in Aov.
 inline constexpr int kNumCryptomattes = 3;
@@ -92,6 +125,18 @@ inline constexpr std::array<AovInfo, kNumAovs> kAovInfo = {{
      "light that media scatter to the camera, straight from its source"},
     {Aov::kVolumeIndirect, "volume_indirect", "RGB", false,
      "light that media scatter to the camera after other scattering events"},
+    {Aov::kDiffuseDirect, "diffuse_direct", "RGB", false,
+     "light that what the camera sees scatters diffusely, straight from its source"},
+    {Aov::kDiffuseIndirect, "diffuse_indirect", "RGB", false, "the same, after other scattering events"},
+    {Aov::kDiffuseColor, "diffuse_color", "RGB", false, "share of light that what the camera sees scatters diffusely"},
+    {Aov::kGlossyDirect, "glossy_direct", "RGB", false,
+     "light that what the camera sees reflects, straight from its source"},
+    {Aov::kGlossyIndirect, "glossy_indirect", "RGB", false, "the same, after other scattering events"},
+    {Aov::kGlossyColor, "glossy_color", "RGB", false, "share of light that what the camera sees reflects"},
+    {Aov::kTransmissionDirect, "transmission_direct", "RGB", false,
+     "light that what the camera sees refracts, straight from its source"},
+    {Aov::kTransmissionIndirect, "transmission_indirect", "RGB", false, "the same, after other scattering events"},
+    {Aov::kTransmissionColor, "transmission_color", "RGB", false, "share of light that what the camera sees refracts"},
     {Aov::kCryptoObject, "crypto_object", "", false, "Cryptomatte of the nodes' names"},
     {Aov::kCryptoMaterial, "crypto_material", "", false, "Cryptomatte of the materials' names"},
     {Aov::kCryptoAsset, "crypto_asset", "", false, "Cryptomatte of RELIEF_object's asset names"},
@@ -121,14 +166,14 @@ struct FilmView {
   FilmLayout layout;
 };
 
-/// Layout that keeps the AOVs whose bits are set (bit i = enumerator i), in enumerator order.
+/// Layout that keeps the AOVs of a set, in enumerator order.
 /// @param cryptomatte_levels  1 … kMostCryptomatteLevels
-inline FilmLayout film_layout_make(std::uint32_t aov_mask, int cryptomatte_levels = 6)
+inline FilmLayout film_layout_make(AovMask aov_mask, int cryptomatte_levels = 6)
 {
   FilmLayout layout;
   layout.cryptomatte_levels = cryptomatte_levels;
   for (int i = 0; i < kNumAovs; ++i) {
-    const bool kept = (aov_mask >> i & 1u) != 0;
+    const bool kept = aov_is_in(static_cast<Aov>(i), aov_mask);
     layout.offset[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(kept ? layout.num_floats : -1);
     if (kept) layout.num_floats += aov_num_channels(kAovInfo[static_cast<std::size_t>(i)], cryptomatte_levels);
   }

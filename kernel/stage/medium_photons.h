@@ -43,8 +43,14 @@ RELIEF_KERNEL bool medium_photon_query(const KernelGlobals& g,
 
 RELIEF_KERNEL void medium_photons_add(const KernelGlobals& g, PathState& state, std::uint32_t path, Vec3f radiance)
 {
+  const Vec3f light = radiance_clamped(radiance, g.clamp_indirect);
   PathColumn<Vec3f>& caustic = *state.caustic.radiance;
-  caustic[path] = caustic[path] + radiance_clamped(radiance, g.clamp_indirect);
+  caustic[path] = caustic[path] + light;
+  if (path_bounces(state.bounces[path], BounceKind::kAll) == 0) {
+    state.media[path].caustic += light;
+  } else if (__builtin_expect(state.light_passes != nullptr, 0)) {
+    light_passes_add(state.light_passes[path], state.light_passes[path].found, true, light);
+  }
 }
 
 /// Of each channel, f over what is scattered.

@@ -132,21 +132,39 @@ RELIEF_KERNEL Vec3f radiance_clamped(Vec3f contribution, float limit)
   return limit > 0.0f && mean > limit ? contribution * (limit / mean) : contribution;
 }
 
+/// How a path came to light: it met it, or asked for it at a surface or in a medium.
+enum class LightRoad : std::uint8_t { kFound, kAsked, kAskedInMedium };
+
+/// Adds light of a path to the layers that tell it apart by the path's first event. What that was in a medium is in none.
+/// @param light  clamped
+[[gnu::noinline]] RELIEF_KERNEL void path_add_by_event(PathState& s,
+                                                       std::uint32_t i,
+                                                       int scatterings,
+                                                       Vec3f light,
+                                                       LightRoad road)
+{
+  if (scatterings == 0 || (scatterings == 1 && road == LightRoad::kAskedInMedium)) return;
+  LightPassState& passes = s.light_passes[i];
+  const bool is_first = scatterings == 1 && road == LightRoad::kAsked;
+  light_passes_add(passes, is_first ? passes.asked : passes.found, scatterings > 1, light);
+}
+
 /// Adds radiance that arrives along the path's present ray, which left its last scattering event: direct light after
 /// at most one event, indirect after more.
-/// @param radiance      as emitted, W/m²/sr
 /// @param scatterings   events between the camera and the emitter
+/// @param contribution  to the picture, W/m²/sr
 RELIEF_KERNEL void path_add_radiance(const KernelGlobals& g,
                                      PathState& s,
                                      std::uint32_t i,
                                      int scatterings,
-                                     Vec3f contribution)
+                                     Vec3f contribution,
+                                     LightRoad road = LightRoad::kFound)
 {
-  if (scatterings <= 1) {
-    s.direct[i] = s.direct[i] + radiance_clamped(contribution, g.clamp_direct);
-    return;
-  }
-  s.indirect[i] = s.indirect[i] + radiance_clamped(contribution, g.clamp_indirect);
+  const bool is_direct = scatterings <= 1;
+  const Vec3f light = radiance_clamped(contribution, is_direct ? g.clamp_direct : g.clamp_indirect);
+  PathColumn<Vec3f>& sum = is_direct ? s.direct : s.indirect;
+  sum[i] = sum[i] + light;
+  if (__builtin_expect(s.light_passes != nullptr, 0)) path_add_by_event(s, i, scatterings, light, road);
 }
 
 /// Adds light to the albedo that a denoiser is told of, where it is seen by the camera or in mirrors alone.
@@ -217,7 +235,12 @@ RELIEF_KERNEL std::uint32_t path_fork(PathState& s, std::uint32_t i)
   if (s.facets != nullptr) s.facets[copy] = s.facets[i];
   if (s.media != nullptr) {
     s.media[copy] = s.media[i];
-    s.media[copy].lit = s.media[copy].before[0] = s.media[copy].before[1] = Vec3f{};
+    MediumState& m = s.media[copy];
+    m.lit = m.caustic = m.before[0] = m.before[1] = Vec3f{};
+  }
+  if (s.light_passes != nullptr) {
+    s.light_passes[copy] = s.light_passes[i];
+    for (Vec3f& light : s.light_passes[copy].light) light = {};
   }
   s.direct[copy] = s.indirect[copy] = Vec3f{};
   (*s.caustic.radiance)[copy] = Vec3f{};
@@ -238,6 +261,9 @@ RELIEF_KERNEL void path_add_to_root(PathState& s, std::uint32_t i)
   s.indirect[root] = s.indirect[root] + s.indirect[i];
   PathColumn<Vec3f>& caustic = *s.caustic.radiance;
   caustic[root] = caustic[root] + caustic[i];
+  if (s.light_passes != nullptr) {
+    for (int k = 0; k < kNumLightPasses; ++k) s.light_passes[root].light[k] += s.light_passes[i].light[k];
+  }
 }
 
 /// Whether light that a sharp lobe of this surface brings to the path is the photon pass's.

@@ -31,6 +31,37 @@ template <unsigned kFeatures, typename Closure>
   return closure_eval<kFeatures>(closure_diffuse(closure), *g.bsdf_tables, wi).f;
 }
 
+/// Whether a closure has parts to tell events apart by. Columns of eight hits have none: where layers ask for them, each hit is
+/// shaded by itself.
+template <typename Closure>
+inline constexpr bool kTellsEvents = requires(const Closure& closure) { closure_matte(closure); };
+
+/// Shares of f towards a direction by kinds of event, for the layers that tell light apart by them.
+/// @param wi           in the closure's frame
+/// @param f            of what counts: all, or the soft lobes
+/// @param transmitted  wi goes through the surface
+template <unsigned kFeatures, typename Closure>
+[[gnu::noinline]] RELIEF_KERNEL EventShares
+event_shares(const KernelGlobals& g, const Closure& closure, Vec3f wi, Vec3f f, bool transmitted)
+{
+  const Vec3f matte = closure_eval<kFeatures>(closure_matte(closure), *g.bsdf_tables, wi).f;
+  const auto share = [](float part, float all) { return all > 0.0f ? clamp(part / all, 0.0f, 1.0f) : 0.0f; };
+  EventShares shares{};
+  Vec3f& diffuse = shares.of[static_cast<int>(EventKind::kDiffuse)];
+  diffuse = {share(matte.x, f.x), share(matte.y, f.y), share(matte.z, f.z)};
+  shares.of[static_cast<int>(closure_other_event(closure, transmitted))] = splat3(1.0f) - diffuse;
+  return shares;
+}
+
+/// The same of an event that is not diffuse.
+template <typename Closure>
+RELIEF_KERNEL EventShares event_shares_sharp(const Closure& closure, bool transmitted)
+{
+  EventShares shares{};
+  shares.of[static_cast<int>(closure_other_event(closure, transmitted))] = {1, 1, 1};
+  return shares;
+}
+
 /// The part of a surface's f that is not sharp.
 /// @param wi  in the closure's frame
 template <unsigned kFeatures, typename Closure>

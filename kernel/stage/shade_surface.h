@@ -122,6 +122,9 @@ RELIEF_KERNEL void shade_surface_meet(const KernelGlobals& g,
   // Closures emit, and are lit, whether or not others let the path through.
   if (kMixture && !is_held) {
     shade_surface_emission<kFeatures>(g, state, path, at, visit.throughput);
+    if (__builtin_expect(state.light_passes != nullptr, 0)) {
+      shade_surface_event_colors<kFeatures>(g, state, path, at, lobes, visit.throughput);
+    }
     visit.light_N = surface_light_N(at);
     if (g.has_lights && !last && !lobes_are_delta(lobes)) {
       visit.chosen = lights_choose(g.lights, at.hit.P, visit.light_N, visit.u.light);
@@ -143,7 +146,12 @@ RELIEF_KERNEL void shade_surface_meet(const KernelGlobals& g,
     const Vec3f N = g.film.layout.normal >= 0 ? surface_mean_normal<kFeatures>(at, lobes) : at.side.Ns;
     shade_surface_first_hit<kFeatures>(g, state, path, at, N, shadow);
   }
-  if constexpr (!kMixture) shade_surface_emission<kFeatures>(g, state, path, at, visit.throughput);
+  if constexpr (!kMixture) {
+    if (__builtin_expect(state.light_passes != nullptr, 0)) {
+      shade_surface_event_colors<kFeatures>(g, state, path, at, lobes, visit.throughput);
+    }
+    shade_surface_emission<kFeatures>(g, state, path, at, visit.throughput);
+  }
   if (g.film.layout.denoising && (state.flags[path] & kPathSawFeature) == 0) {
     shade_surface_denoising<kFeatures>(g, state, path, at, visit.throughput, surface_mean_normal<kFeatures>(at, lobes));
   }

@@ -35,7 +35,8 @@ RELIEF_KERNEL bool surface_group_is_plain(const KernelGlobals& g,
                                           const SurfaceGroup& group,
                                           const SurfaceClosureSpec& plain)
 {
-  bool is_plain = closure_scatters_alone(group.program, plain);
+  // Layers of light by its first event want parts of closures.
+  bool is_plain = state.light_passes == nullptr && closure_scatters_alone(group.program, plain);
   for (int k = 0; k < group.count; ++k) {
     is_plain = is_plain && (group.at[k].instance->flags & kCurves) == 0 &&
                path_does_without(g, state.flags[group.paths[k]]) == 0;

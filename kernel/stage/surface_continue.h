@@ -62,7 +62,7 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
   if (!(bsdf.pdf > 0.0f)) return;
   const Vec3f wi = from_local(side.frame, bsdf.wi);
   const bool transmitted = (bsdf.lobe & kLobeTransmit) != 0;
-  bool is_diffuse_alone = false;
+  bool is_diffuse_alone = false, is_sharp = (bsdf.lobe & kLobeDelta) != 0;
   if constexpr ((kFeatures & kFeatureMixture) == 0) {
     const std::uint32_t without = path_does_without(g, state.flags[path]);
     is_diffuse_alone = __builtin_expect(without != 0, 0) && events_have(without, transmitted);
@@ -73,8 +73,7 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
   }
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {
     const SharpLobes sharp = path_sharp_lobes(g, state.flags[path], at, wi, bsdf.pdf);
-    const bool is_sharp =
-        !is_diffuse_alone && closure_split<kFeatures>(event.closure, *g.bsdf_tables, sharp, u.sharpness, bsdf);
+    is_sharp = !is_diffuse_alone && closure_split<kFeatures>(event.closure, *g.bsdf_tables, sharp, u.sharpness, bsdf);
     const bool is_alone = !shading_is_reversible(side, wi) || path_is_alone(g, state.flags[path], transmitted);
     const bool is_paths = (is_sharp && is_alone) || path_crosses_facets(state, path, wi);
     state.flags[path] = is_paths ? path_flags_left_to_paths(state.flags[path])
@@ -83,6 +82,13 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
   Vec3f throughput = event.throughput * (bsdf.f * (share * __builtin_fabsf(bsdf.wi.z) / bsdf.pdf));
 
   const bool first = path_bounces(bounces, BounceKind::kAll) == 0;
+  if constexpr (kTellsEvents<Closure>) {
+    if (__builtin_expect(state.light_passes != nullptr, 0) && first) {
+      state.light_passes[path].found = is_sharp
+                                           ? event_shares_sharp(event.closure, transmitted)
+                                           : event_shares<kFeatures>(g, event.closure, bsdf.wi, bsdf.f, transmitted);
+    }
+  }
   const float carried = max_component(throughput);
   const float at_first = state.first_throughput[path] * (first ? min(1.0f, carried) : share);
   state.first_throughput[path] = at_first;

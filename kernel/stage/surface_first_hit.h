@@ -1,6 +1,8 @@
 // What the film is told of the surface that a path meets first, and denoisers of the first that is not seen through.
 #pragma once
 
+#include <type_traits>
+
 #include "kernel/bsdf/mixture.h"
 #include "kernel/sample/dimensions.h"
 #include "kernel/stage/surface_interaction.h"
@@ -62,6 +64,42 @@ RELIEF_KERNEL void shade_surface_first_hit(const KernelGlobals& g,
   first.is_even_sample = sample_is_even(state.sample_index[path], g.log2_stream);
   film_add_first_hit(g.film, state.pixel[path], first);
   if (layout.ambient_occlusion >= 0) shade_surface_ambient(g, state, path, at, shadow);
+}
+
+/// What the surface scatters of white light by kinds of event, seen straight on.
+/// @param colors  gets kNumEventKinds of them
+RELIEF_KERNEL void surface_event_colors(const SurfaceParams& p, Vec3f* colors)
+{
+  const float rest = 1.0f - p.metallic;
+  const Vec3f interface = min(fresnel_F0(p.ior) * p.specular_color, splat3(1.0f)) * p.specular;
+  constexpr float kCoatF0 = 0.04f;
+  colors[static_cast<int>(EventKind::kDiffuse)] = rest * (1.0f - p.transmission) * p.base_color + p.sheen_color;
+  colors[static_cast<int>(EventKind::kGlossy)] =
+      p.metallic * p.base_color + rest * interface + splat3(p.clearcoat * kCoatF0);
+  colors[static_cast<int>(EventKind::kTransmission)] = rest * p.transmission * p.base_color;
+}
+
+/// Writes what a surface that the camera sees scatters of white light, by kinds of event.
+/// @param throughput  up to the surface
+template <unsigned kFeatures, typename Lobes>
+[[gnu::noinline]] RELIEF_KERNEL void shade_surface_event_colors(const KernelGlobals& g,
+                                                                const PathState& state,
+                                                                std::uint32_t path,
+                                                                const SurfaceInteraction& at,
+                                                                const Lobes& lobes,
+                                                                Vec3f throughput)
+{
+  if (path_bounces(state.bounces[path], BounceKind::kAll) > 0) return;
+  Vec3f colors[kNumEventKinds];
+  if (has_mixture<kFeatures>(at)) {
+    if constexpr (std::is_same_v<Lobes, MixtureLobes>) {
+      mixture_event_colors(mixture_of(lobes, at.side.frame, at.side.Ng), colors);
+    }
+  } else if (!at.params.unlit) {
+    surface_event_colors(at.params, colors);
+  }
+  for (Vec3f& color : colors) color *= throughput;
+  film_add_event_colors(g.film, state.pixel[path], colors);
 }
 
 /// Writes what a denoiser is told of a path, unless that is to be found further on.

@@ -59,6 +59,11 @@ RELIEF_KERNEL void shade_surface_lit(const KernelGlobals& g,
     bsdf.f = shade_surface_seen_by<kFeatures>(g, closure, wi, bsdf.f, hides);
   }
   if (is_zero(bsdf.f)) return;
+  if constexpr (kTellsEvents<Closure>) {
+    if (__builtin_expect(state.light_passes != nullptr, 0) && bounce == 0) {
+      state.light_passes[path].asked = event_shares<kFeatures>(g, closure, wi, bsdf.f, transmits());
+    }
+  }
   const float cos_i = __builtin_fabsf(wi.z);
   const float weight = path_light_weight(g.light_technique, light.pdf, bsdf.pdf, is_found_here_alone);
   Vec3f gain = event.throughput * bsdf.f * answer.radiance * (cos_i * weight / light.pdf);

@@ -29,6 +29,7 @@ struct MediumState {
   bool is_lit_first;         ///< the first event of the path was in a medium
   Vec3f before[2];           ///< if so, the path's direct and indirect light before it
   Vec3f lit;                 ///< else, light that was asked for in media before the first event
+  Vec3f caustic;             ///< and what photons brought there
 };
 
 /// Enters or leaves what an instance bounds. Entered once more, or left without having been entered, nothing changes.
@@ -45,14 +46,15 @@ RELIEF_KERNEL void medium_cross(MediumState& m, std::int32_t instance, bool ente
   --m.size;
 }
 
-/// What media scattered to the camera, of a path's direct and indirect light.
+/// What media scattered to the camera, of a path's direct and indirect light, and of what photons brought it.
 struct MediumLight {
   Vec3f direct, indirect;
 };
 
-RELIEF_KERNEL MediumLight medium_light(const MediumState& m, Vec3f direct, Vec3f indirect)
+RELIEF_KERNEL MediumLight medium_light(const MediumState& m, Vec3f direct, Vec3f indirect, Vec3f caustic)
 {
-  return m.is_lit_first ? MediumLight{m.lit + direct - m.before[0], indirect - m.before[1]} : MediumLight{m.lit, {}};
+  if (!m.is_lit_first) return {m.lit, m.caustic};
+  return {m.lit + direct - m.before[0], indirect - m.before[1] + caustic};
 }
 
 /// Leaves all that has bounds: what a ray that meets nothing is still in was not closed.

@@ -7,6 +7,7 @@
 #include "kernel/assert.h"
 #include "kernel/math/vec.h"
 #include "kernel/state/facet_state.h"
+#include "kernel/state/light_pass_state.h"
 #include "kernel/state/medium_state.h"
 #include "kernel/state/path_event.h"
 #include "kernel/state/subsurface_state.h"
@@ -98,8 +99,9 @@ struct alignas(64) PathState {
   CausticStateView caustic;
   MotionStateView motion;
   SubsurfaceStateView subsurface;
-  FacetState* facets = nullptr;  ///< of the present hit; null where no ray meets any
-  MediumState* media = nullptr;  ///< null where nothing has a medium
+  FacetState* facets = nullptr;            ///< of the present hit; null where no ray meets any
+  MediumState* media = nullptr;            ///< null where nothing has a medium
+  LightPassState* light_passes = nullptr;  ///< null where no layer tells light apart by its first event
 };
 
 enum PathFlag : std::uint32_t {

@@ -328,6 +328,73 @@ def test_volume_passes():
         assert_same_expectation(runs["RELIEF", name], runs["CYCLES", name], least_mean=0.001)
 
 
+#: Passes of light by what the surface that is seen does to it.
+LIGHT_PASSES = [kind + part for kind in ("Diff", "Gloss", "Trans") for part in ("Dir", "Ind", "Col")]
+
+
+def _mixed_stage(size=(48, 32)):
+    """Matter that does all of it: plastic, metal, leaves and a pane under a hazy sun and a sky."""
+    scene = new_scene(*size)
+    set_bounces(scene, 3)
+    set_world((0.3, 0.4, 0.5))
+    add_plane(6, diffuse((0.6, 0.4, 0.2)))
+    add_light("SUN", rotation=degrees(30, 20, 0), energy=2, angle=1.0)
+    plastic = new_material("plastic", "ShaderNodeBsdfPrincipled", **{"Base Color": (0.7, 0.2, 0.1, 1), "Roughness": 0.4})[0]
+    metal = new_material("metal", "ShaderNodeBsdfPrincipled",
+                         **{"Base Color": (0.9, 0.7, 0.3, 1), "Metallic": 1.0, "Roughness": 0.3})[0]  # fmt: skip
+    glossy = new_material("glossy", "ShaderNodeBsdfGlossy", Color=(0.4, 0.6, 0.9, 1), Roughness=0.2)[0]
+    pane = new_material("pane", "ShaderNodeBsdfRefraction", Color=(0.9, 0.8, 0.6, 1), Roughness=0.3, IOR=1.2)[0]
+    leaf = new_material("leaf", "ShaderNodeBsdfTranslucent", Color=(0.3, 0.7, 0.2, 1))[0]
+    for i, material in enumerate((plastic, metal, glossy, leaf)):
+        add_sphere(0.55, material, (1.25 * (i - 2), 0.4 * (i % 2), 0.6), segments=32)
+    card = add_plane(1.6, pane, (2.3, -0.5, 0.7))
+    card.rotation_euler = degrees(80, 0, 20)
+    add_camera((0, -7, 2.5), degrees(73, 0, 0), lens=42)
+    return scene
+
+
+def _switch_on_light_passes(layer):
+    for kind in ("diffuse", "glossy", "transmission"):
+        for part in ("direct", "indirect", "color"):
+            setattr(layer, f"use_pass_{kind}_{part}", True)
+
+
+def _stacked(picture, layer, name):
+    return np.stack([picture[f"{layer.name}.{_name(name)}.{c}"] for c in "RGB"], axis=-1).astype(np.float64)
+
+
+def test_light_by_events_is_that_of_cycles():
+    scene = _mixed_stage()
+    layer = scene.view_layers[0]
+    _switch_on_light_passes(layer)
+    runs = {name: {} for name in LIGHT_PASSES}
+    for engine in ("RELIEF", "CYCLES"):
+        pictures = []
+        for seed in range(5):
+            scene.cycles.seed = scene.relief.seed = seed
+            pictures.append(passes(scene, engine, 1024))
+        for name in LIGHT_PASSES:
+            runs[name][engine] = np.stack([_stacked(p, layer, name) for p in pictures])
+    for name in LIGHT_PASSES:
+        assert np.abs(runs[name]["CYCLES"]).max() > 0.01, f"{name} shows nothing"
+        assert_same_expectation(runs[name]["RELIEF"], runs[name]["CYCLES"], least_mean=0.001)
+
+
+def test_light_by_events_makes_the_picture():
+    """As compositors put it together again."""
+    scene = _mixed_stage()
+    layer = scene.view_layers[0]
+    _switch_on_light_passes(layer)
+    layer.use_pass_environment = layer.use_pass_emit = True
+    picture = passes(scene, "RELIEF", 16)
+    whole = _stacked(picture, layer, "Env") + _stacked(picture, layer, "Emit")
+    for kind in ("Diff", "Gloss", "Trans"):
+        light = _stacked(picture, layer, kind + "Dir") + _stacked(picture, layer, kind + "Ind")
+        whole += light * _stacked(picture, layer, kind + "Col")
+    combined = np.stack([picture[f"{layer.name}.Combined.{c}"] for c in "RGB"], axis=-1)
+    assert np.abs(whole - combined).max() < 2e-3, np.abs(whole - combined).max()
+
+
 def test_two_view_layers():
     """Each layer gets its own picture: the second one has no ball."""
     scene = _stage()

@@ -201,8 +201,8 @@ TEST(Seed, IsAnyNumberOf64Bits)
 TEST(Aovs, AlwaysHaveTheBeauty)
 {
   EXPECT_EQ(parse_aovs("beauty"), 1u);
-  EXPECT_EQ(parse_aovs("depth,depth"), 1u | 1u << static_cast<int>(Aov::kDepth));
-  EXPECT_EQ(parse_aovs("uv,all"), (1u << kNumAovs) - 1);
+  EXPECT_EQ(parse_aovs("depth,depth"), 1u | aov_bit(Aov::kDepth));
+  EXPECT_EQ(parse_aovs("uv,all"), kAllAovs);
   for (const char* text : {"", "foo", "all,foo", "depth,", "Depth", "depth uv"}) {
     EXPECT_THROW(parse_aovs(text), CLI::ValidationError) << "'" << text << "'";
   }

@@ -81,7 +81,7 @@ TEST_F(ExrTest, HalvesAreTheNearestOnesAndDataStaysFloat)
 
 TEST_F(ExrTest, ValuesBeyondAHalfBecomeItsLargestAndNanStays)
 {
-  TestFilm film(4, 1, 3, 1u << static_cast<int>(Aov::kBeauty));
+  TestFilm film(4, 1, 3, aov_bit(Aov::kBeauty));
   film.pixels[0] = 1e9f;
   film.pixels[4] = -1e9f;
   film.pixels[8] = std::nanf("");
@@ -302,7 +302,7 @@ TEST_F(ExrTest, SaysItsPrimariesAreRec709)
 
 TEST_F(ExrTest, KeepsOnlyTheLayersOfTheFilm)
 {
-  const TestFilm film(3, 2, 8, 1u << static_cast<int>(Aov::kBeauty) | 1u << static_cast<int>(Aov::kNormal));
+  const TestFilm film(3, 2, 8, aov_bit(Aov::kBeauty) | aov_bit(Aov::kNormal));
   exr_write(file("a.exr"), film.view, {});
   EXPECT_EQ(picture_layers(exr_load(file("a.exr"))), (std::vector<std::string>{"beauty", "normal"}));
 }
@@ -373,8 +373,7 @@ TEST_F(ExrTest, CryptomattesAreLaidOutAsTheirSpecificationSays)
     scene.instances.back().name = name;
   }
   scene.material_names = {"say \"cheese\"\n", "\xff"};
-  const TestFilm film(4, 3, 1,
-                      1u | 1u << static_cast<int>(Aov::kCryptoObject) | 1u << static_cast<int>(Aov::kCryptoMaterial));
+  const TestFilm film(4, 3, 1, 1u | aov_bit(Aov::kCryptoObject) | aov_bit(Aov::kCryptoMaterial));
   exr_write(file("a.exr"), film.view, exr_cryptomatte_attributes(scene, ~0u));
   const Picture picture = exr_load(file("a.exr"));
   for (const char* layer : {"CryptoObject00.", "CryptoObject01.", "CryptoObject02.", "CryptoMaterial02."}) {

@@ -224,7 +224,7 @@ TEST_F(Merge, RefusesOtherSizesAndWindows)
 
 TEST_F(Merge, LeavesOutLayersThatNotAllHaveAndSaysSo)
 {
-  const std::uint32_t few = 1u << static_cast<int>(Aov::kBeauty) | 1u << static_cast<int>(Aov::kSampleCount);
+  const AovMask few = aov_bit(Aov::kBeauty) | aov_bit(Aov::kSampleCount);
   const auto rich = write("1.exr", film(1), "1"), poor = write("2.exr", TestFilm(kWidth, kHeight, 2, few), "2");
   for (const auto& files : {std::vector{rich, poor}, std::vector{poor, rich}}) {
     const MergeResult result = merge(files);
@@ -238,7 +238,7 @@ TEST_F(Merge, LeavesOutLayersThatNotAllHaveAndSaysSo)
 
 TEST_F(Merge, WithoutCountsWeighsByTheMetadataAndWithoutThoseRefuses)
 {
-  const std::uint32_t beauty = 1u << static_cast<int>(Aov::kBeauty);
+  const AovMask beauty = aov_bit(Aov::kBeauty);
   const TestFilm a(kWidth, kHeight, 1, beauty), b(kWidth, kHeight, 2, beauty);
   const Picture merged =
       merge({write("1.exr", a, "1", {{"relief:samples", "10"}}), write("2.exr", b, "2", {{"relief:samples", "30"}})})
@@ -249,7 +249,7 @@ TEST_F(Merge, WithoutCountsWeighsByTheMetadataAndWithoutThoseRefuses)
 
 TEST_F(Merge, RefusesACheckpointWhosePixelsMayHaveNoSample)
 {
-  const TestFilm a(kWidth, kHeight, 1, 1u << static_cast<int>(Aov::kBeauty));
+  const TestFilm a(kWidth, kHeight, 1, aov_bit(Aov::kBeauty));
   const Attributes unfinished = {{"relief:samples", "10"}, {"relief:stop_reason", "interrupted"}};
   // With the seed of the other it is a part that is still rendered.
   for (const char* seed : {"1", "2"}) {
@@ -305,8 +305,7 @@ TEST_F(Merge, DenoisedLayersAreLeftOutAndSaid)
 
 TEST_F(Merge, CryptomattesAreLeftOutAndSaid)
 {
-  const std::uint32_t aovs =
-      1u | 1u << static_cast<int>(Aov::kSampleCount) | 1u << static_cast<int>(Aov::kCryptoObject);
+  const AovMask aovs = 1u | aov_bit(Aov::kSampleCount) | aov_bit(Aov::kCryptoObject);
   TestFilm film(kWidth, kHeight, 1, aovs);
   const Attributes name = {{"cryptomatte/3ae39a5/name", "CryptoObject"}};
   const MergeResult result = merge({write("1.exr", film, "1", name), write("2.exr", film, "2", name)});

@@ -217,7 +217,7 @@ TEST_F(PngOcio, ExposureIsInStops)
 
 TEST_F(PngOcio, AlphaIsUnassociatedAndOptional)
 {
-  TestFilm film(1, 2, 1, 1u << static_cast<int>(Aov::kBeauty));
+  TestFilm film(1, 2, 1, aov_bit(Aov::kBeauty));
   film.pixels = {.25f, .1f, .05f, .5f, .3f, .3f, .3f, 0.f};
   film.view.pixels = film.pixels.data();
   PngOptions options;
@@ -249,7 +249,7 @@ TEST_F(PngOcio, NanAndInfinityBecomeBlackAndWhite)
 
 TEST_F(PngOcio, AFilmWithoutBeautyIsAnError)
 {
-  const TestFilm film(2, 2, 1, 1u << static_cast<int>(Aov::kDepth));
+  const TestFilm film(2, 2, 1, aov_bit(Aov::kDepth));
   EXPECT_THROW(png_write(file("a.png"), film.view), OutputError);
 }
 

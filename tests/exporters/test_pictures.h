@@ -52,14 +52,14 @@ inline void write_bytes(const std::filesystem::path& path, const std::string& by
 }
 
 /// Bits of all AOVs but the Cryptomattes, whose channels are no numbers.
-inline constexpr std::uint32_t kNumericAovs = (1u << kFirstCryptomatte) - 1;
+inline constexpr AovMask kNumericAovs = aov_bit(static_cast<Aov>(kFirstCryptomatte)) - 1;
 
 /// A film with plausible values in every AOV: ids and counts are integers, the rest is uniform in [0, 2).
 struct TestFilm {
   std::vector<float> pixels;
   FilmView view;
 
-  TestFilm(int width, int height, std::uint32_t seed, std::uint32_t aov_mask = kNumericAovs)
+  TestFilm(int width, int height, std::uint32_t seed, AovMask aov_mask = kNumericAovs)
   {
     view.width = view.full_width = width;
     view.height = view.full_height = height;

@@ -25,9 +25,8 @@ Rendered render_displaced(const Scene& scene,
   run.height = 72;
   run.samples = samples;
   RenderOptions options = run_render_options(scene, run);
-  options.aov_mask = 1u << static_cast<int>(Aov::kBeauty) | 1u << static_cast<int>(Aov::kNormal) |
-                     1u << static_cast<int>(Aov::kDepth) | 1u << static_cast<int>(Aov::kDisplacementSteps) |
-                     1u << static_cast<int>(also);
+  options.aov_mask = aov_bit(Aov::kBeauty) | aov_bit(Aov::kNormal) | aov_bit(Aov::kDepth) |
+                     aov_bit(Aov::kDisplacementSteps) | 1u << static_cast<int>(also);
   options.displacement.method = method;
   options.displacement.lod = lod;
   const std::atomic<bool> stop{false};

@@ -100,6 +100,87 @@ TEST(Layers, AmbientOcclusionIsTheOpenShareOfTheHemisphere)
   }
 }
 
+constexpr Aov kLight[] = {Aov::kDiffuseDirect,  Aov::kDiffuseIndirect,    Aov::kGlossyDirect,
+                          Aov::kGlossyIndirect, Aov::kTransmissionDirect, Aov::kTransmissionIndirect};
+
+/// A room of diffuse, metal, glass and coated surfaces with a lamp and a sky.
+Scene mixed_room()
+{
+  Scene scene = half_wall(diffuse_material({0.7f, 0.4f, 0.2f}));
+  Material metal = diffuse_material({0.9f, 0.6f, 0.3f});
+  metal.metallic = 1;
+  metal.roughness = 0.3f;
+  Material glass = diffuse_material({0.9f, 1.0f, 0.8f});
+  glass.transmission = 1;
+  glass.thickness = 1;
+  glass.roughness = 0;
+  Material plastic = diffuse_material({0.1f, 0.2f, 0.7f});
+  plastic.roughness = 0.4f;
+  plastic.clearcoat = 1;
+  const Material materials[] = {metal, glass, plastic};
+  for (int i = 0; i < 3; ++i) {
+    Affine3 place;
+    place.p = {static_cast<float>(i) - 1.0f, 0, 0.8f};
+    add_object(scene, sphere_mesh(0.5f, 24, 16, false), materials[i], place);
+  }
+  scene.environment.color = {0.3f, 0.4f, 0.5f};
+  return scene;
+}
+
+// All light of a sample is counted once: what is emitted or behind, and what was scattered first in one of three ways.
+TEST(Layers, LightByEventsMakesTheWhole)
+{
+  for (const float clamp : {0.0f, 0.5f}) {
+    Scene scene = mixed_room();
+    scene.render.clamp_direct = scene.render.clamp_indirect = clamp;
+    const Rendered r = render_scene(scene, render_options(scene, kSize, 16));
+    double sums[std::size(kLight)] = {};
+    for (int y = 0; y < kSize; ++y) {
+      for (int x = 0; x < kSize; ++x) {
+        for (int c = 0; c < 3; ++c) {
+          double sum = static_cast<double>(r.at(Aov::kEmission, x, y)[c]) +
+                       static_cast<double>(r.at(Aov::kEnvironment, x, y)[c]);
+          for (std::size_t i = 0; i < std::size(kLight); ++i) {
+            const auto part = static_cast<double>(r.at(kLight[i], x, y)[c]);
+            EXPECT_GE(part, 0.0);
+            sum += part;
+            sums[i] += part;
+          }
+          EXPECT_NEAR(sum, static_cast<double>(r.at(Aov::kBeauty, x, y)[c]), 1e-5) << x << ' ' << y << ' ' << c;
+        }
+      }
+    }
+    for (const double sum : sums) EXPECT_GT(sum, 0.0);
+  }
+}
+
+// A matte wall under an even sky reflects its colour times the sky, all of it diffusely and straight from there; a mirror reflects
+// all of it as a mirror.
+TEST(Layers, LightByEventsIsThatOfTheSurfaceAlone)
+{
+  Material mirror = diffuse_material({0.9f, 0.6f, 0.3f});
+  mirror.metallic = 1;
+  mirror.roughness = 0;
+  Material matte = diffuse_material({0.9f, 0.6f, 0.3f});
+  matte.specular = 0;
+  for (const bool is_mirror : {false, true}) {
+    Scene scene = half_wall(is_mirror ? mirror : matte);
+    scene.cameras[0].camera.projection = Projection::kOrthographic;
+    scene.environment.color = {2, 2, 2};
+    const Rendered r = render_scene(scene, render_options(scene, kSize, 256));
+    const Aov direct = is_mirror ? Aov::kGlossyDirect : Aov::kDiffuseDirect;
+    const Aov color = is_mirror ? Aov::kGlossyColor : Aov::kDiffuseColor;
+    const float base[3] = {0.9f, 0.6f, 0.3f};
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(mean_over_wall(r, direct, c), 2 * static_cast<double>(base[c]), 0.01);
+      EXPECT_NEAR(mean_over_wall(r, color, c), static_cast<double>(base[c]), 1e-5);
+    }
+    for (const Aov aov : kLight) {
+      if (aov != direct) EXPECT_EQ(mean_over_wall(r, aov), 0.0) << kAovInfo[static_cast<std::size_t>(aov)].name;
+    }
+  }
+}
+
 TEST(Layers, AHoldoutIsAHoleForTheCameraAlone)
 {
   Material glow = diffuse_material({0, 0, 0});

@@ -39,7 +39,7 @@ Material glowing()
 RenderOptions options_of(const Scene& scene, int size, int samples)
 {
   RenderOptions options = render_options(scene, size, samples);
-  options.aov_mask = 1u << static_cast<int>(Aov::kBeauty);
+  options.aov_mask = aov_bit(Aov::kBeauty);
   return options;
 }
 

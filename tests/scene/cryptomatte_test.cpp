@@ -54,7 +54,7 @@ TEST(Cryptomatte, ManifestsNameEachThingOnce)
   EXPECT_TRUE(objects.contains("tree") && objects.contains("mesh"));
   EXPECT_EQ(nlohmann::json::parse(cryptomatte_manifest(scene, 1)).size(), 0u);
   EXPECT_EQ(cryptomatte_manifest(scene, 2).substr(0, 9), "{\"wood\":\"");
-  const CryptomatteIds ids = cryptomatte_ids(scene, 1u << static_cast<int>(Aov::kCryptoObject));
+  const CryptomatteIds ids = cryptomatte_ids(scene, aov_bit(Aov::kCryptoObject));
   ASSERT_EQ(ids[0].size(), 4u);
   EXPECT_EQ(ids[0][0], ids[0][1]);
   EXPECT_EQ(ids[0][2], cryptomatte_id(cryptomatte_hash("mesh")));

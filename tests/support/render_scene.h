@@ -40,7 +40,7 @@ inline RenderOptions render_options(const Scene& scene, int size, int samples)
   options.settings.width = options.settings.height = size;
   options.settings.samples = samples;
   options.camera = scene.cameras.front().camera;
-  options.aov_mask = (1u << kNumAovs) - 1u;
+  options.aov_mask = kAllAovs;
   return options;
 }
 
