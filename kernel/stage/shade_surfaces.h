@@ -28,6 +28,13 @@ RELIEF_KERNEL MixtureBuildLanes surface_group_build(const PathState& state, cons
   return {load8(numbers), load8(numbers + 3), load8(numbers + 6)};
 }
 
+/// Whether a group's closures may be columns: fewer hits are not worth it, and layers of light by its first event want parts of
+/// closures.
+RELIEF_KERNEL bool group_has_columns(const PathState& state, const SurfaceGroup& group)
+{
+  return group.count > 2 && state.light_passes == nullptr;
+}
+
 /// Whether all that a group's surfaces scatter by is known in columns.
 /// @param plain  of closures_plain
 RELIEF_KERNEL bool surface_group_is_plain(const KernelGlobals& g,
@@ -35,8 +42,7 @@ RELIEF_KERNEL bool surface_group_is_plain(const KernelGlobals& g,
                                           const SurfaceGroup& group,
                                           const SurfaceClosureSpec& plain)
 {
-  // Layers of light by its first event want parts of closures.
-  bool is_plain = state.light_passes == nullptr && closure_scatters_alone(group.program, plain);
+  bool is_plain = group_has_columns(state, group) && closure_scatters_alone(group.program, plain);
   for (int k = 0; k < group.count; ++k) {
     is_plain = is_plain && (group.at[k].instance->flags & kCurves) == 0 &&
                path_does_without(g, state.flags[group.paths[k]]) == 0;
@@ -89,7 +95,7 @@ template <unsigned kFeatures>
                                                           LobePairs& pairs)
 {
   lobe_pairs_begin(pairs);
-  bool are_pairs = group.count > 2;
+  bool are_pairs = group_has_columns(state, group);
   for (int k = 0; k < group.count; ++k) {
     const std::uint32_t path = group.paths[k];
     SurfaceInteraction& at = group.at[k];
