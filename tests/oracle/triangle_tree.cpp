@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -16,6 +17,11 @@ Vector3 cross(const Vector3& a, const Vector3& b)
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Between ray and normal: triangles that are seen nearer to edge-on, by 1.7°, are met nowhere clearly.
+constexpr double kLeastCosine = 0.03;
+
 /// Of all points of a triangle's plane with weights of at least -unclear.
 std::array<Interval, 3> box_of(const std::array<Vector3, 3>& triangle, double unclear)
 {
@@ -27,20 +33,20 @@ std::array<Interval, 3> box_of(const std::array<Vector3, 3>& triangle, double un
   return box;
 }
 
-/// @return  false if the ray surely passes by the box, before `farthest`
-bool may_meet(const std::array<Interval, 3>& box, const Vector3& O, const Vector3& D, double farthest)
+/// @return  where the ray enters the box, outward; infinity if it surely passes by it, before `farthest`
+double enters(const std::array<Interval, 3>& box, const Vector3& O, const Vector3& D, double farthest)
 {
   Interval t{0, farthest};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double low = round_down(box[axis].low - O[axis]), high = round_up(box[axis].high - O[axis]);
     if (D[axis] == 0) {
-      if (low > 0 || high < 0) return false;
+      if (low > 0 || high < 0) return kInfinity;
       continue;
     }
     t.low = std::max(t.low, round_down(std::min(low / D[axis], high / D[axis])));
     t.high = std::min(t.high, round_up(std::max(low / D[axis], high / D[axis])));
   }
-  return t.low <= t.high;
+  return t.low <= t.high ? t.low : kInfinity;
 }
 
 }  // namespace
@@ -83,7 +89,13 @@ void TriangleTree::meet(std::size_t triangle, const Vector3& O, const Vector3& D
   const std::array<Vector3, 3>& P = triangles_[triangle];
   const Vector3 e1 = minus(P[1], P[0]), e2 = minus(P[2], P[0]), p = cross(D, e2);
   const double determinant = dot(p, e1);
-  if (!(std::abs(determinant) > 1e-9 * std::sqrt(dot(D, D) * dot(e1, e1) * dot(e2, e2)))) return;
+  const Vector3 normal = cross(e1, e2);
+  if (!(dot(normal, normal) > 0)) return;
+  if (!(std::abs(determinant) > kLeastCosine * std::sqrt(dot(D, D) * dot(normal, normal)))) {
+    // Seen edge-on: rounding of a corner moves the place that is met along all of it.
+    out->maybe = std::min(out->maybe, enters(box_of(P, unclear_), O, D, kInfinity));
+    return;
+  }
   const Vector3 from = minus(O, P[0]), q = cross(from, e1);
   const double u = dot(from, p) / determinant, v = dot(D, q) / determinant, t = dot(e2, q) / determinant;
   const double least = std::min({u, v, 1 - u - v});
@@ -105,7 +117,7 @@ NearestTriangle TriangleTree::nearest(const Vector3& O, const Vector3& D) const
     const std::size_t index = open.back();
     open.pop_back();
     const Node& node = nodes_[index];
-    if (!may_meet(node.box, O, D, out.t)) continue;
+    if (enters(node.box, O, D, out.t) == kInfinity) continue;
     if (node.second == 0) {
       for (std::size_t k = node.begin; k < node.end; ++k) meet(order_[k], O, D, &out);
       continue;

@@ -21,8 +21,8 @@ struct NearestTriangle {
 
 class TriangleTree {
  public:
-  /// @param unclear  how near to an edge a ray is not said to meet or miss a triangle clearly, as a weight; triangles that are seen
-  ///                 edge-on, whose determinant is less than a part in 10⁹ of what its factors allow, are met nowhere
+  /// @param unclear  how near to an edge a ray is not said to meet or miss a triangle clearly, as a weight. Triangles that are seen
+  ///                 within 1.7° of edge-on may be met wherever the ray comes near them; without an area they are met nowhere
   TriangleTree(std::vector<std::array<Vector3, 3>> triangles, double unclear);
 
   NearestTriangle nearest(const Vector3& O, const Vector3& D) const;
