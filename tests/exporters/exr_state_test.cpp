@@ -30,7 +30,7 @@ class ExrStateTest : public FolderTest {
     state.pass_samples = 16;
     state.active = {0, 2, 5};
     state.tile_samples = {48, 16, 64, 32, 32, 48};
-    state.photons = {1234567, 0.1f, std::uint64_t{1} << 40, 1.0 / 3, 77, 2, 0.6};
+    state.photons = {1234567, 0.1f, 0.2f, std::uint64_t{1} << 40, 1.0 / 3, 77, 2, 0.6};
     state.seconds = 1e9 / 7;
     state.counters.camera_rays = std::numeric_limits<std::uint64_t>::max();
     state.stage_seconds = {0.1, 0.2};

@@ -176,7 +176,8 @@ TEST(Layers, LightByEventsIsThatOfTheSurfaceAlone)
       EXPECT_NEAR(mean_over_wall(r, color, c), static_cast<double>(base[c]), 1e-5);
     }
     for (const Aov aov : kLight) {
-      if (aov != direct) EXPECT_EQ(mean_over_wall(r, aov), 0.0) << kAovInfo[static_cast<std::size_t>(aov)].name;
+      if (aov == direct) continue;
+      EXPECT_EQ(mean_over_wall(r, aov), 0.0) << kAovInfo[static_cast<std::size_t>(aov)].name;
     }
   }
 }
