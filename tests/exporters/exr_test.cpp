@@ -374,7 +374,7 @@ TEST_F(ExrTest, CryptomattesAreLaidOutAsTheirSpecificationSays)
   }
   scene.material_names = {"say \"cheese\"\n", "\xff"};
   const TestFilm film(4, 3, 1, 1u | aov_bit(Aov::kCryptoObject) | aov_bit(Aov::kCryptoMaterial));
-  exr_write(file("a.exr"), film.view, exr_cryptomatte_attributes(scene, ~0u));
+  exr_write(file("a.exr"), film.view, exr_cryptomatte_attributes(scene, kAllAovs));
   const Picture picture = exr_load(file("a.exr"));
   for (const char* layer : {"CryptoObject00.", "CryptoObject01.", "CryptoObject02.", "CryptoMaterial02."}) {
     for (const char* channel : {"r", "g", "b", "a"}) {

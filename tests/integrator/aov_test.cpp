@@ -103,7 +103,7 @@ TEST(Layers, AmbientOcclusionIsTheOpenShareOfTheHemisphere)
 constexpr Aov kLight[] = {Aov::kDiffuseDirect,  Aov::kDiffuseIndirect,    Aov::kGlossyDirect,
                           Aov::kGlossyIndirect, Aov::kTransmissionDirect, Aov::kTransmissionIndirect};
 
-/// A room of diffuse, metal, glass and coated surfaces with a lamp and a sky.
+/// Diffuse, metal, glass, thin and coated surfaces under a sky.
 Scene mixed_room()
 {
   Scene scene = half_wall(diffuse_material({0.7f, 0.4f, 0.2f}));
@@ -123,6 +123,10 @@ Scene mixed_room()
     place.p = {static_cast<float>(i) - 1.0f, 0, 0.8f};
     add_object(scene, sphere_mesh(0.5f, 24, 16, false), materials[i], place);
   }
+  // Light comes straight through what is thin.
+  Material pane = glass;
+  pane.thickness = 0;
+  add_object(scene, quad_mesh({0.5f, -10, 1.5f}, {10, 0, 0}, {0, 20, 0}), pane);
   scene.environment.color = {0.3f, 0.4f, 0.5f};
   return scene;
 }

@@ -19,9 +19,6 @@ Vector3 cross(const Vector3& a, const Vector3& b)
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-/// Between ray and normal: triangles that are seen nearer to edge-on, by 1.7°, are met nowhere clearly.
-constexpr double kLeastCosine = 0.03;
-
 /// Of all points of a triangle's plane with weights of at least -unclear.
 std::array<Interval, 3> box_of(const std::array<Vector3, 3>& triangle, double unclear)
 {
@@ -51,8 +48,8 @@ double enters(const std::array<Interval, 3>& box, const Vector3& O, const Vector
 
 }  // namespace
 
-TriangleTree::TriangleTree(std::vector<std::array<Vector3, 3>> triangles, double unclear)
-    : triangles_(std::move(triangles)), unclear_(unclear), order_(triangles_.size())
+TriangleTree::TriangleTree(std::vector<std::array<Vector3, 3>> triangles, double unclear, double least_cosine)
+    : triangles_(std::move(triangles)), unclear_(unclear), least_cosine_(least_cosine), order_(triangles_.size())
 {
   std::iota(order_.begin(), order_.end(), std::size_t{0});
   if (!order_.empty()) build(0, order_.size());
@@ -90,12 +87,12 @@ void TriangleTree::meet(std::size_t triangle, const Vector3& O, const Vector3& D
   const Vector3 e1 = minus(P[1], P[0]), e2 = minus(P[2], P[0]), p = cross(D, e2);
   const double determinant = dot(p, e1);
   const Vector3 normal = cross(e1, e2);
-  if (!(dot(normal, normal) > 0)) return;
-  if (!(std::abs(determinant) > kLeastCosine * std::sqrt(dot(D, D) * dot(normal, normal)))) {
+  if (std::abs(determinant) < least_cosine_ * std::sqrt(dot(D, D) * dot(normal, normal))) {
     // Seen edge-on: rounding of a corner moves the place that is met along all of it.
     out->maybe = std::min(out->maybe, enters(box_of(P, unclear_), O, D, kInfinity));
     return;
   }
+  if (!(std::abs(determinant) > 1e-9 * std::sqrt(dot(D, D) * dot(e1, e1) * dot(e2, e2)))) return;
   const Vector3 from = minus(O, P[0]), q = cross(from, e1);
   const double u = dot(from, p) / determinant, v = dot(D, q) / determinant, t = dot(e2, q) / determinant;
   const double least = std::min({u, v, 1 - u - v});

@@ -21,9 +21,10 @@ struct NearestTriangle {
 
 class TriangleTree {
  public:
-  /// @param unclear  how near to an edge a ray is not said to meet or miss a triangle clearly, as a weight. Triangles that are seen
-  ///                 within 1.7° of edge-on may be met wherever the ray comes near them; without an area they are met nowhere
-  TriangleTree(std::vector<std::array<Vector3, 3>> triangles, double unclear);
+  /// @param unclear       how near to an edge a ray is not said to meet or miss a triangle clearly, as a weight; triangles that are
+  ///                      seen edge-on, whose determinant is less than a part in 10⁹ of what its factors allow, are met nowhere
+  /// @param least_cosine  between ray and normal; triangles that are seen nearer to edge-on may be met wherever the ray comes near
+  TriangleTree(std::vector<std::array<Vector3, 3>> triangles, double unclear, double least_cosine = 0);
 
   NearestTriangle nearest(const Vector3& O, const Vector3& D) const;
   /// The same without the tree.
@@ -39,7 +40,7 @@ class TriangleTree {
   void meet(std::size_t triangle, const Vector3& O, const Vector3& D, NearestTriangle* out) const;
 
   std::vector<std::array<Vector3, 3>> triangles_;
-  double unclear_;
+  double unclear_, least_cosine_;
   std::vector<std::size_t> order_;
   std::vector<Node> nodes_;
 };
