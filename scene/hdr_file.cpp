@@ -1,6 +1,7 @@
 #include "scene/hdr_file.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -86,11 +87,17 @@ class HdrFile final : public ImageFile {
 
   float value(std::size_t x, int channel) const
   {
-    const unsigned char exponent = texels_[4 * x + 3];
-    // Eight bits behind the point, in excess of 128.
-    return exponent == 0
-               ? 0.0f
-               : std::ldexp(static_cast<float>(texels_[4 * x + static_cast<std::size_t>(channel)]), exponent - 136);
+    return static_cast<float>(texels_[4 * x + static_cast<std::size_t>(channel)]) * scales_[texels_[4 * x + 3]];
+  }
+
+  /// Of each exponent: eight bits behind the point, in excess of 128; 0 is black.
+  static std::array<float, 256> exponent_scales()
+  {
+    std::array<float, 256> scales{};
+    for (int exponent = 1; exponent < 256; ++exponent) {
+      scales[static_cast<std::size_t>(exponent)] = std::ldexp(1.0f, exponent - 136);
+    }
+    return scales;
   }
 
   static void put(float value, SampleType type, unsigned char*& to)
@@ -144,6 +151,7 @@ class HdrFile final : public ImageFile {
     return nullptr;
   }
 
+  const std::array<float, 256> scales_ = exponent_scales();
   std::span<const unsigned char> encoded_;
   std::size_t first_ = 0, next_ = 0;  ///< bytes where the first row begins, and the next
   std::size_t width_ = 0;

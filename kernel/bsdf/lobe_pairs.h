@@ -89,6 +89,8 @@ struct LobePairLane {
 /// Begins pairs of which each is taken from a list.
 RELIEF_KERNEL void lobe_pairs_begin(LobePairs& h)
 {
+  // What the pairs before were would decide which of these are alike.
+  h.kind = {};
   for (int k = 0; k < 8; ++k) h.has_diffuse[k] = h.has_reflection[k] = 0;
 }
 

@@ -236,15 +236,7 @@ RELIEF_KERNEL bool photon_medium(const KernelGlobals& g,
                                  QueueView& next,
                                  PhotonQueueView& photons)
 {
-  MediumState& m = state.media[path];
-  const bool is_boundary = medium_meet(g, state, path, hit);
-  if (m.size > 0 && !photon_medium_stretch(g, state, path, photons)) {
-    m.hit_inside = kWholeWorld;
-    return false;
-  }
-  if (!is_boundary) return true;
-  medium_pass_boundary(state, path, next);
-  return false;
+  return medium_travel(g, state, path, hit, next, [&] { return photon_medium_stretch(g, state, path, photons); });
 }
 
 }  // namespace relief

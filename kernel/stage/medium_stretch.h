@@ -95,4 +95,26 @@ RELIEF_KERNEL void medium_pass_boundary(PathState& state, std::uint32_t path, Qu
   queue_push(next, path);
 }
 
+/// Takes a path through media to what it has met.
+/// @param stretch  called without arguments where there are any on the way; whether the path gets through
+/// @return         whether what it has met is shaded; else it has passed a boundary (pushed on `next`), or stretch() has done with it
+template <typename Stretch>
+RELIEF_KERNEL bool medium_travel(const KernelGlobals& g,
+                                 PathState& state,
+                                 std::uint32_t path,
+                                 MediumHit hit,
+                                 QueueView& next,
+                                 const Stretch& stretch)
+{
+  MediumState& m = state.media[path];
+  const bool is_boundary = medium_meet(g, state, path, hit);
+  if (m.size > 0 && !stretch()) {
+    m.hit_inside = kWholeWorld;
+    return false;
+  }
+  if (!is_boundary) return true;
+  medium_pass_boundary(state, path, next);
+  return false;
+}
+
 }  // namespace relief

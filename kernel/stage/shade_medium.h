@@ -368,15 +368,7 @@ RELIEF_KERNEL bool shade_medium(const KernelGlobals& g,
                                 QueueView& next,
                                 ShadowQueue& shadow)
 {
-  MediumState& m = state.media[path];
-  const bool is_boundary = medium_meet(g, state, path, hit);
-  if (m.size > 0 && !shade_medium_stretch(g, state, path, next, shadow)) {
-    m.hit_inside = kWholeWorld;
-    return false;
-  }
-  if (!is_boundary) return true;
-  medium_pass_boundary(state, path, next);
-  return false;
+  return medium_travel(g, state, path, hit, next, [&] { return shade_medium_stretch(g, state, path, next, shadow); });
 }
 
 }  // namespace relief
