@@ -1,8 +1,10 @@
 #include "displacement/include/relief/displaced_geometry.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -24,6 +26,18 @@ void check_numbers(std::span<const float> numbers, const char* name)
     if (!std::isfinite(numbers[i]))
       fail(std::string(name) + "[" + std::to_string(i) + "]: expected a finite number, found " + std::to_string(numbers[i]));
   }
+}
+
+void check_number(float number, const char* name)
+{
+  if (!std::isfinite(number)) fail(std::string(name) + ": expected a finite number, found " + std::to_string(number));
+}
+
+float largest(std::span<const float> numbers, float from = 0)
+{
+  float out = 0;
+  for (const float number : numbers) out = std::max(out, std::abs(number - from));
+  return out;
 }
 
 void check_size(std::size_t found, std::size_t expected, const char* name)
@@ -53,8 +67,17 @@ void check(const DisplacementSource& s)
   check_numbers(s.normals, "normals");
   check_numbers(s.uv, "uv");
   check_numbers(s.heights, "heights");
-  check_numbers({&s.scale, 1}, "scale");
-  check_numbers({&s.midlevel, 1}, "midlevel");
+  check_number(s.scale, "scale");
+  check_number(s.midlevel, "midlevel");
+  // Embree leaves out what is 1.8e18 from the origin, without a word.
+  constexpr float kFarthest = 1e18f;
+  const float far = largest(s.positions), move = std::abs(s.scale) * largest(s.heights, s.midlevel);
+  if (!(far + move <= kFarthest)) {
+    std::ostringstream text;
+    text << "expected a surface within 1e18 of the origin, found positions up to " << far
+         << ", which heights move by up to " << move;
+    fail(text.str());
+  }
   for (std::size_t i = 0; i < s.triangles.size(); ++i) {
     if (s.triangles[i] >= num_vertices) {
       fail("triangles[" + std::to_string(i) + "]: expected the index of one of " + std::to_string(num_vertices) +
@@ -81,12 +104,18 @@ const TraversalTable& table_select()
 
 /// Numbers as vectors.
 template <typename V>
-std::vector<V> vectors(std::span<const float> numbers)
+std::vector<V> vectors(std::span<const float> numbers, int exponent = 0)
 {
   std::vector<V> out(numbers.size() / 3);
-  for (std::size_t i = 0; i < out.size(); ++i) out[i] = {numbers[3 * i], numbers[3 * i + 1], numbers[3 * i + 2]};
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    out[i] = {std::scalbn(numbers[3 * i], exponent), std::scalbn(numbers[3 * i + 1], exponent),
+              std::scalbn(numbers[3 * i + 2], exponent)};
+  }
   return out;
 }
+
+/// By which power of two normals are multiplied, so that squares of long or short ones are numbers. It changes no direction between them.
+int normals_exponent(std::span<const float> normals) { return -std::ilogb(largest(normals)); }
 
 }  // namespace
 
@@ -97,6 +126,7 @@ struct Traced : DisplacedGeometry {
   const TraversalTable* table = nullptr;
 };
 
+/// @param user_data  not null
 const Traced& traced_of(const void* user_data)
 {
   return *static_cast<const Traced*>(static_cast<const DisplacedGeometry*>(user_data));
@@ -110,8 +140,18 @@ EmbreeContext context_around(const auto& context)
   return own;
 }
 
+void bounds(const RTCBoundsFunctionArguments* given)
+{
+  // Of a geometry that has ended: nothing, which Embree leaves out.
+  Box3 box = box_empty();
+  if (given->geometryUserPtr != nullptr)
+    box = displaced_triangle_bounds(traced_of(given->geometryUserPtr).mesh, given->primID);
+  *given->bounds_o = {box.low.x, box.low.y, box.low.z, 0, box.high.x, box.high.y, box.high.z, 0};
+}
+
 void intersect(const RTCIntersectFunctionNArguments* given)
 {
+  if (given->geometryUserPtr == nullptr) return;
   const Traced& traced = traced_of(given->geometryUserPtr);
   EmbreeContext context = context_around(*given->context);
   RTCIntersectFunctionNArguments arguments = *given;
@@ -142,6 +182,7 @@ void intersect(const RTCIntersectFunctionNArguments* given)
 
 void occluded(const RTCOccludedFunctionNArguments* given)
 {
+  if (given->geometryUserPtr == nullptr) return;
   EmbreeContext context = context_around(*given->context);
   RTCOccludedFunctionNArguments arguments = *given;
   arguments.context = &context.rtc;
@@ -165,7 +206,7 @@ struct DisplacedEmbreeGeometry::State {
 
   explicit State(const DisplacementSource& source)
       : P(vectors<Vec3f>(source.positions)),
-        N(vectors<Normal3f>(source.normals)),
+        N(vectors<Normal3f>(source.normals, normals_exponent(source.normals))),
         uv(source.uv.size() / 2),
         triangles(source.triangles.size() / 3),
         heights(source.heights.begin(), source.heights.end())
@@ -200,7 +241,10 @@ struct DisplacedEmbreeGeometry::State {
   State& operator=(const State&) = delete;
   ~State()
   {
-    if (geometry != nullptr) rtcReleaseGeometry(geometry);
+    if (geometry == nullptr) return;
+    // A scene may still hold it.
+    rtcSetGeometryUserData(geometry, nullptr);
+    rtcReleaseGeometry(geometry);
   }
 };
 
@@ -210,6 +254,7 @@ DisplacedEmbreeGeometry::DisplacedEmbreeGeometry(RTCDevice device, const Displac
   check(source);
   state_ = std::make_unique<State>(source);
   state_->geometry = displaced_geometry_make(device, state_->traced, *state_->traced.table);
+  rtcSetGeometryBoundsFunction(state_->geometry, bounds, nullptr);
   rtcSetGeometryIntersectFunction(state_->geometry, intersect);
   rtcSetGeometryOccludedFunction(state_->geometry, occluded);
   rtcCommitGeometry(state_->geometry);

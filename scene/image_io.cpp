@@ -36,9 +36,9 @@ const ImageIo& module_load()
   address_space_require();
   std::error_code no_proc;
   const fs::path program = fs::read_symlink("/proc/self/exe", no_proc);
-  std::string cause;
-  bool is_of_a_file = false;  // that is there
   const fs::path folder = program.parent_path(), name = "relief_image_io.so";
+  std::string cause = name.string() + " is neither in " + folder.string() + " nor in ../lib/relief";
+  bool is_there = false;
   // Beside the program, where a copy of both finds it; where it is installed; or where it was built, for the programs of tests.
   for (const fs::path& path :
        {folder / name, folder.parent_path() / "lib/relief" / name, fs::path(RELIEF_IMAGE_IO_MODULE)}) {
@@ -48,12 +48,12 @@ const ImageIo& module_load()
     if (entry != nullptr) {
       return *static_cast<const ImageIo*>(entry);
     }
-    // What is wrong with one that is there, mostly a library that it needs, says more than that others are not.
-    const std::string text = ::dlerror();
-    if (!is_of_a_file) {
+    // What is wrong with the first that is there, mostly a library that it needs.
+    const std::string text = module == nullptr ? ::dlerror() : path.string() + " is of another version of relief";
+    std::error_code error;
+    if (!is_there && fs::exists(path, error)) {
       cause = text;
-      std::error_code error;
-      is_of_a_file = fs::exists(path, error);
+      is_there = true;
     }
   }
   throw std::runtime_error("the module for images other than PNG, JPEG and HDR cannot be loaded: " + cause);

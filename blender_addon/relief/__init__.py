@@ -23,8 +23,10 @@ for _name in [name for name in sys.modules if name.startswith(f"{__name__}.")]:
     globals().pop(_name.removeprefix(f"{__name__}."), None)
 
 from .find_numpy import find_numpy  # noqa: E402
+from .refusal import refuse_second  # noqa: E402
 
 find_numpy(__name__)
+refuse_second(__name__)
 
 from . import engine, exporter, operators, preferences, properties, session, ui  # noqa: E402
 
@@ -32,6 +34,8 @@ _modules = (session, preferences, properties, engine, operators, exporter, ui)
 
 
 def register():
+    # Once more: Blender does not import again what was disabled.
+    refuse_second(__name__)
     for module in _modules:
         module.register()
 

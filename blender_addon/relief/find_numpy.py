@@ -10,7 +10,7 @@ import importlib
 import site
 import sys
 
-import bpy
+from .refusal import refuse
 
 #: What distributions call the folders of Python's packages: Debian the first two, others the rest.
 _FOLDERS = (
@@ -38,21 +38,7 @@ def find_numpy(package):
         if not (isinstance(cause, ModuleNotFoundError) and cause.name == "numpy"):
             found.append(f"; the one in {folder or 'its path'} is for another ({str(cause).strip().splitlines()[0]})")
     need = f"relief needs numpy, and this Blender's Python {version} with its library in {sys.prefix} has none{''.join(found)}."
-    advice = "Install it (on Debian and Ubuntu: apt-get install python3-numpy)"
-    if not bpy.app.background:
-        # While an add-on is loaded there is no window that a message could be shown in.
-        bpy.app.timers.register(lambda: _show(need, advice))
-    raise ImportError(f"{need} {advice}", name=package)
-
-
-def _show(*lines):
-    """Shows a message in a window."""
-
-    def draw(menu, _context):
-        for line in lines:
-            menu.layout.label(text=line)
-
-    bpy.context.window_manager.popup_menu(draw, title="relief", icon="ERROR")
+    refuse(package, need, "Install it (on Debian and Ubuntu: apt-get install python3-numpy)")
 
 
 def _import_from(folder):

@@ -100,6 +100,13 @@ def test_install_use_and_remove_as_an_extension():
         assert not left, left
 
 
+#: Enables an add-on as Blender does when it starts.
+_ENABLE = """
+import addon_utils
+print("ENABLED", addon_utils.enable("relief") is not None)
+"""
+
+
 def _enabled_beside_another_python(path, script):
     """What Blender prints that enables the add-on where the first Python on the PATH is one as pyenv's: with no packages."""
     os.makedirs(f"{path}/bin")
@@ -111,52 +118,17 @@ def _enabled_beside_another_python(path, script):
             file.write("#!/bin/sh\nexit 1\n")
         os.chmod(f"{path}/bin/{name}", 0o755)
     environment = {**os.environ, "PATH": f"{path}/bin:{os.environ['PATH']}"}
-    script += 'import bpy\nbpy.ops.preferences.addon_enable(module="relief")\nprint("ENABLED", "relief" in bpy.context.preferences.addons)'
-    command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-expr", script]
+    command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-expr", script + _ENABLE]
     done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=100)
-    return done.stdout + done.stderr
-
-
-def test_a_zip_that_holds_the_program_needs_no_other():
-    """One file, installed where there is no relief: an add-on of old, or an extension where there are such."""
-    if not shutil.which("patchelf"):
-        print("SKIPPED: patchelf is missing")
-        return
-    with folder() as path:
-        tree, archive, picture = f"{path}/tree", f"{path}/relief.zip", f"{path}/picture.png"
-        os.makedirs(f"{tree}/lib/relief")
-        os.makedirs(f"{tree}/bin")
-        program = os.environ["RELIEF_BINARY"]
-        shutil.copy(program, f"{tree}/bin/relief")
-        shutil.copy(os.path.join(os.path.dirname(program), "relief_image_io.so"), f"{tree}/lib/relief")
-        for command in (
-            ["bundle_libraries", f"{tree}/lib/relief", f"{tree}/bin/relief", f"{tree}/lib/relief/relief_image_io.so"],
-            ["package_addon", "--program", tree, archive],
-        ):
-            subprocess.run([os.path.join(_ROOT, "scripts", command[0]), *command[1:]], check=True, capture_output=True)
-        environment = {k: v for k, v in os.environ.items() if k not in ("BLENDER_USER_SCRIPTS", "RELIEF_BINARY")}
-        environment.update(HOME=path, XDG_CONFIG_HOME=f"{path}/config", BLENDER_USER_CONFIG=f"{path}/config")
-        if bpy.app.version < (4, 2, 0):
-            environment["BLENDER_USER_SCRIPTS"] = f"{path}/scripts"
-            os.makedirs(f"{path}/scripts/addons")
-            steps = _STEPS.format(tests=os.path.dirname(os.path.abspath(__file__)), zip=archive, picture=picture)
-            commands = [["-b", "--python-exit-code", "9", "--python-expr", steps]]
-        else:
-            commands = [
-                ["--command", "extension", "install-file", "-r", "user_default", "--enable", archive],
-                ["-b", "--python-exit-code", "9", "--python-expr", _EXTENSION_STEPS.format(picture=picture)],
-            ]
-        for command in commands:
-            done = subprocess.run([bpy.app.binary_path, *command], capture_output=True, text=True, env=environment, timeout=100)
-            output = done.stdout + done.stderr
-            assert done.returncode == 0 and not re.search("Traceback|Error:|Warning: .*relief", output), output
-        assert "STEP rendered True" in output and os.path.exists(picture), output
+    # Blender 5 misses packages that its own modules import, and says so with tracebacks.
+    assert not re.search(r"Traceback.*addons/relief", done.stderr, re.DOTALL), done.stderr
+    return done.stdout
 
 
 def test_numpy_is_found_beside_another_python():
     with folder() as path:
         output = _enabled_beside_another_python(path, "")
-        assert "ENABLED True" in output and "Traceback" not in output, output
+        assert "ENABLED True" in output, output
 
 
 #: Python code that takes numpy away.
@@ -175,8 +147,36 @@ sys.meta_path.insert(0, NoNumpy())
 def test_missing_numpy_is_one_message():
     with folder() as path:
         output = _enabled_beside_another_python(path, _WITHOUT_NUMPY)
-        assert "ENABLED False" in output and "Traceback" not in output, output
+        assert "ENABLED False" in output, output
         assert output.count("relief needs numpy") == 1 and "python3-numpy" in output, output
+
+
+_SECOND_STEPS = """
+import addon_utils
+print("FIRST", addon_utils.enable("relief") is not None)
+print("SECOND", addon_utils.enable("relief_copy") is not None)
+addon_utils.disable("relief")
+print("ALONE", addon_utils.enable("relief_copy") is not None)
+print("BACK", addon_utils.enable("relief") is not None)
+"""
+
+
+def test_a_second_one_is_refused():
+    """Two would take each other's classes away: an extension beside an add-on from before, or two folders."""
+    with folder() as path:
+        os.makedirs(f"{path}/addons")
+        for name in ("relief", "relief_copy"):
+            os.symlink(os.path.join(_ROOT, "blender_addon", "relief"), f"{path}/addons/{name}")
+        command = [bpy.app.binary_path, "-b", "--factory-startup", "--python-expr", _SECOND_STEPS]
+        environment = {**os.environ, "BLENDER_USER_SCRIPTS": path}
+        done = subprocess.run(command, capture_output=True, text=True, env=environment, timeout=100)
+        output = done.stdout
+        for step in ("FIRST True", "SECOND False", "ALONE True", "BACK False"):
+            assert f"{step}\n" in output, output + done.stderr
+        assert "has been registered before" not in output, output
+        # When the first comes back Blender has imported it already, and shows a traceback.
+        for name, said in (("relief", output), ("relief_copy", done.stderr)):
+            assert said.count(f"Another add-on of relief is enabled, {name}. Disable or remove it before enabling") == 1, output + done.stderr
 
 
 def test_versions_agree():

@@ -189,23 +189,77 @@ TEST_F(DisplacedGeometryTest, PacketsHitWhatSingleRaysHit)
   rtcReleaseScene(scene);
 }
 
+TEST_F(DisplacedGeometryTest, NormalsAreOfAnyLength)
+{
+  // The longest and the shortest floats whose relations are not lost, and what they are interpolated to.
+  RTCRayHit expected = ray_make({1, 2, 3}, {-1.1f, -2, -2.9f});
+  for (const float length : {1.f, 3e38f, 1e-35f}) {
+    Octahedron octahedron;
+    for (float& n : octahedron.normals) n *= length;
+    const DisplacedEmbreeGeometry displaced(device_, octahedron.source());
+    RTCScene scene = scene_make(displaced);
+    RTCRayHit ray = ray_make({1, 2, 3}, {-1.1f, -2, -2.9f});
+    trace(scene, ray);
+    ASSERT_EQ(ray.hit.geomID, 0u) << length;
+    if (length == 1) expected = ray;
+    EXPECT_NEAR(ray.ray.tfar, expected.ray.tfar, 1e-6f) << length;
+    EXPECT_NEAR(ray.hit.Ng_x, expected.hit.Ng_x, 1e-6f) << length;
+    rtcReleaseScene(scene);
+  }
+}
+
+TEST_F(DisplacedGeometryTest, WhatEndsBeforeItsSceneIsGoneFromIt)
+{
+  auto displaced = std::make_unique<DisplacedEmbreeGeometry>(device_, Octahedron().source());
+  RTCScene scene = scene_make(*displaced);
+  const RTCRayHit towards = ray_make({1, 2, 3}, {-1.1f, -2, -2.9f});
+  RTCRayHit ray = towards;
+  trace(scene, ray);
+  EXPECT_EQ(ray.hit.geomID, 0u);
+  displaced.reset();
+  const auto expect_gone = [&] {
+    RTCRayHit after = towards;
+    trace(scene, after);
+    EXPECT_EQ(after.hit.geomID, RTC_INVALID_GEOMETRY_ID);
+    EXPECT_EQ(after.ray.tfar, towards.ray.tfar);
+    EXPECT_FALSE(is_occluded(scene, towards.ray));
+  };
+  expect_gone();
+  // Also from a tree that is built anew.
+  rtcCommitGeometry(rtcGetGeometry(scene, 0));
+  rtcCommitScene(scene);
+  expect_gone();
+  EXPECT_EQ(rtcGetDeviceError(device_), RTC_ERROR_NONE);
+  rtcReleaseScene(scene);
+}
+
 TEST_F(DisplacedGeometryTest, BadInputIsNamed)
 {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const std::pair<std::function<void(Octahedron&)>, const char*> cases[] = {
       {[&](Octahedron& o) { o.positions[4] = nan; }, "positions[4]: expected a finite number, found nan"},
       {[&](Octahedron& o) { o.heights[1] = INFINITY; }, "heights[1]: expected a finite number, found inf"},
-      {[&](Octahedron& o) { o.scale = nan; }, "scale[0]: expected a finite number, found nan"},
+      {[&](Octahedron& o) { o.scale = nan; }, "scale: expected a finite number, found nan"},
+      {[&](Octahedron& o) { o.midlevel = -nan; }, "midlevel: expected a finite number, found -nan"},
+      {[&](Octahedron& o) { o.normals[0] = nan; }, "normals[0]: expected a finite number, found nan"},
+      {[&](Octahedron& o) { o.uv[11] = nan; }, "uv[11]: expected a finite number, found nan"},
+      {[](Octahedron& o) { o.scale = 4e18f; },
+       "expected a surface within 1e18 of the origin, found positions up to 1, which heights move by up to 2e+18"},
+      {[](Octahedron& o) { o.positions[7] = -3e38f; },
+       "expected a surface within 1e18 of the origin, found positions up to 3e+38, which heights move by up to 0.25"},
+      {[](Octahedron& o) { o.heights[0] = 3e38f, o.scale = 0; }, "no error"},
       {[](Octahedron& o) { o.positions.pop_back(); }, "positions: expected three entries a vertex, found 17"},
       {[](Octahedron& o) { o.triangles.clear(); }, "triangles: expected three entries a triangle, found 0"},
       {[](Octahedron& o) { o.triangles[5] = 6; }, "triangles[5]: expected the index of one of 6 vertices, found 6"},
       {[](Octahedron& o) { o.normals.resize(3); }, "normals: expected 18 entries, found 3"},
-      {[](Octahedron& o) { o.normals[3] = o.normals[4] = o.normals[5] = 0; }, "normals[3]: expected a direction, found 0 0 0"},
+      {[](Octahedron& o) { o.normals[3] = o.normals[4] = o.normals[5] = 0; },
+       "normals[3]: expected a direction, found 0 0 0"},
       {[](Octahedron& o) { o.uv.push_back(0); }, "uv: expected 12 entries, found 13"},
       {[](Octahedron& o) { o.heights.clear(); }, "expected a map of 1 to 65536 texels a side, found 2 x 0"},
       {[](Octahedron& o) { o.heights.push_back(0); }, "heights: expected 4 entries, found 5"},
   };
-  for (const auto& [spoil, expected] : cases) EXPECT_EQ(error_of(spoil), std::string("relief::DisplacementSource: ") + expected);
+  const std::string none = "no error", name = "relief::DisplacementSource: ";
+  for (const auto& [spoil, expected] : cases) EXPECT_EQ(error_of(spoil), expected == none ? none : name + expected);
   EXPECT_THROW(DisplacedEmbreeGeometry(nullptr, Octahedron().source()), std::invalid_argument);
 }
 

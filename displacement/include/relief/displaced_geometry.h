@@ -44,14 +44,14 @@ class DisplacedEmbreeGeometry {
  public:
   /// @param device  not null; its error function hears what Embree has to say
   /// @error std::invalid_argument, which names the member and the entry: a wrong size, an index without a vertex, a number that is not
-  ///        finite. std::runtime_error: a processor that relief was not built for. std::bad_alloc
+  ///        finite; a surface 1e18 from the origin or farther. std::runtime_error: a processor that relief was not built for. std::bad_alloc
   DisplacedEmbreeGeometry(RTCDevice device, const DisplacementSource& source);
   ~DisplacedEmbreeGeometry();
   DisplacedEmbreeGeometry(DisplacedEmbreeGeometry&&) noexcept;
   DisplacedEmbreeGeometry& operator=(DisplacedEmbreeGeometry&&) noexcept;
 
   /// To be attached to a scene, committed already. Hits have u, v and Ng as Embree's own triangles have them, of the surface, Ng unit; primID
-  /// is the triangle. This must outlive every scene that it is in.
+  /// is the triangle. From a scene that is traced after this has ended, the surface is gone.
   RTCGeometry geometry() const noexcept;
 
   /// The point that a hit's primID, u and v stand for, rounded once from double precision.
