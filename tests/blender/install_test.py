@@ -125,6 +125,42 @@ def _enabled_beside_another_python(path, script):
     return done.stdout
 
 
+def test_a_zip_that_holds_the_program_needs_no_other():
+    """One file, installed where there is no relief: an add-on of old, or an extension where there are such."""
+    if not shutil.which("patchelf"):
+        print("SKIPPED: patchelf is missing")
+        return
+    with folder() as path:
+        tree, archive, picture = f"{path}/tree", f"{path}/relief.zip", f"{path}/picture.png"
+        os.makedirs(f"{tree}/lib/relief")
+        os.makedirs(f"{tree}/bin")
+        program = os.environ["RELIEF_BINARY"]
+        shutil.copy(program, f"{tree}/bin/relief")
+        shutil.copy(os.path.join(os.path.dirname(program), "relief_image_io.so"), f"{tree}/lib/relief")
+        for command in (
+            ["bundle_libraries", f"{tree}/lib/relief", f"{tree}/bin/relief", f"{tree}/lib/relief/relief_image_io.so"],
+            ["package_addon", "--program", tree, archive],
+        ):
+            subprocess.run([os.path.join(_ROOT, "scripts", command[0]), *command[1:]], check=True, capture_output=True)
+        environment = {k: v for k, v in os.environ.items() if k not in ("BLENDER_USER_SCRIPTS", "RELIEF_BINARY")}
+        environment.update(HOME=path, XDG_CONFIG_HOME=f"{path}/config", BLENDER_USER_CONFIG=f"{path}/config")
+        if bpy.app.version < (4, 2, 0):
+            environment["BLENDER_USER_SCRIPTS"] = f"{path}/scripts"
+            os.makedirs(f"{path}/scripts/addons")
+            steps = _STEPS.format(tests=os.path.dirname(os.path.abspath(__file__)), zip=archive, picture=picture)
+            commands = [["-b", "--python-exit-code", "9", "--python-expr", steps]]
+        else:
+            commands = [
+                ["--command", "extension", "install-file", "-r", "user_default", "--enable", archive],
+                ["-b", "--python-exit-code", "9", "--python-expr", _EXTENSION_STEPS.format(picture=picture)],
+            ]
+        for command in commands:
+            done = subprocess.run([bpy.app.binary_path, *command], capture_output=True, text=True, env=environment, timeout=100)
+            output = done.stdout + done.stderr
+            assert done.returncode == 0 and not re.search("Traceback|Error:|Warning: .*relief", output), output
+        assert "STEP rendered True" in output and os.path.exists(picture), output
+
+
 def test_numpy_is_found_beside_another_python():
     with folder() as path:
         output = _enabled_beside_another_python(path, "")
