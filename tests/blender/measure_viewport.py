@@ -48,6 +48,8 @@ def _noise(side):
 
 def _displaced():
     """A plane of 80,000 triangles under a map of 2048 texels a side."""
+    from relief import compat
+
     material = diffuse((0.5, 0.5, 0.5))
     tree = material.node_tree
     image = add_image_node(tree, new_image(_noise(2048)))
@@ -56,7 +58,7 @@ def _displaced():
     tree.links.new(image.outputs["Color"], node.inputs["Height"])
     output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
     tree.links.new(node.outputs[0], output.inputs["Displacement"])
-    material.cycles.displacement_method = "DISPLACEMENT"
+    compat.set_displacement_method(material, "DISPLACEMENT")
     add_plane(8, material, subdivisions=200)
 
 

@@ -99,7 +99,8 @@ def test_meshes_that_deform():
 
 def _waves():
     """A grid that is displaced by waves."""
-    bpy.context.scene.cycles.feature_set = "EXPERIMENTAL"
+    from relief import compat
+
     waves = np.full((64, 64, 4), 1.0)
     x = np.linspace(0, 8 * np.pi, 64, endpoint=False)
     waves[:, :, :3] = (0.5 + 0.5 * np.sin(x)[None, :] * np.sin(x)[:, None])[:, :, None]
@@ -111,7 +112,7 @@ def _waves():
     links.new(image.outputs["Color"], displacement.inputs["Height"])
     output = next(n for n in nodes if n.type == "OUTPUT_MATERIAL")
     links.new(displacement.outputs["Displacement"], output.inputs["Displacement"])
-    material.cycles.displacement_method = "DISPLACEMENT"
+    compat.set_displacement_method(material, "DISPLACEMENT")
     bpy.ops.mesh.primitive_grid_add(x_subdivisions=128, y_subdivisions=128, size=1.6)
     shown = bpy.context.object
     shown.data.materials.append(material)

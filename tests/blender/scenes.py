@@ -335,3 +335,14 @@ def smooth_pixels(width=256, height=128):
 
 def degrees(*angles):
     return tuple(math.radians(a) for a in angles)
+
+
+def dice(item, scene, pixels=1.0):
+    """Has Cycles subdivide an object to the picture."""
+    modifier = item.modifiers.new("dice", "SUBSURF")
+    modifier.subdivision_type, modifier.render_levels = "SIMPLE", 0
+    if IS_5_0:
+        modifier.use_adaptive_subdivision, modifier.adaptive_pixel_size = True, pixels
+        return
+    scene.cycles.feature_set, scene.cycles.dicing_rate = "EXPERIMENTAL", pixels
+    item.cycles.use_adaptive_subdivision = True

@@ -334,6 +334,8 @@ def _missing_node(tree, **settings):
 
 def test_missing_files_are_magenta_in_every_use():
     """As a colour, an opacity, a number, a mask, a normal, a bump, a height and a lamp's colour."""
+    from relief import compat
+
     scene = new_scene(96, 48)
     set_world((0.5, 0.6, 0.7))
     kinds = ("color", "opacity", "roughness", "mask", "normal", "bump", "height", "clipped")
@@ -357,7 +359,7 @@ def test_missing_files_are_magenta_in_every_use():
             move = tree.nodes.new("ShaderNodeDisplacement")
             tree.links.new(color, move.inputs["Height"])
             tree.links.new(move.outputs[0], output.inputs["Displacement"])
-            material.cycles.displacement_method = "DISPLACEMENT"
+            compat.set_displacement_method(material, "DISPLACEMENT")
         else:
             bend = tree.nodes.new("ShaderNodeNormalMap" if use == "normal" else "ShaderNodeBump")
             tree.links.new(color, bend.inputs["Color" if use == "normal" else "Height"])

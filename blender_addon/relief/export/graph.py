@@ -10,6 +10,7 @@ from json import dumps
 from .. import compat
 from . import color_space, nodes
 from .graph_inputs import OUTPUTS, mesh_attribute, tangent_set, transformed_normal
+from .image import is_missing
 from .not_understood import NotUnderstood
 
 
@@ -314,7 +315,7 @@ def _image(g, node, groups):
         if "tiles" in options:  # as Cycles, which reads the first alone
             first = options.pop("tiles")[0]
             options.update({"texture": first["texture"], "colorSpace": first["colorSpace"]})
-    if node.extension == "CLIP":
+    if node.extension == "CLIP" and not (compat.MISSING_IS_NOT_CLIPPED and is_missing(node.image)):
         options["clip"] = True
     if node.interpolation in {"Cubic", "Smart"}:
         options["filter"] = "cubic"

@@ -8,7 +8,7 @@ passes through Blender's pixels, heights keep their 16 bits. Otherwise the pixel
 
 What Cycles does with alpha goes by the file, not by whether Blender calls it straight or premultiplied: colours that a
 file has apart from alpha are multiplied by it, as they are stored; and divided again, after filtering, where the node's
-Alpha is used.
+Alpha is used. Since 5.2 it goes by the alpha mode alone (compat.ALPHA_BY_MODE).
 """
 
 import os
@@ -18,7 +18,7 @@ import zlib
 import bpy
 import numpy as np
 
-from .. import exr
+from .. import compat, exr
 from . import color_space
 from .image_header import (
     file_head,
@@ -60,6 +60,8 @@ class ImageExporter:
         @return  (URI, whether the colours are multiplied by alpha already)
         """
         uri = self._uri(image, user, is_color, warn, associates, is_encoded(image))
+        if compat.ALPHA_BY_MODE and uri not in self._of_pixels:
+            return uri, image.alpha_mode == "PREMUL"
         return uri, self._associated.get(uri, False)
 
     def tile_uris(self, image, is_color, warn):
@@ -149,6 +151,7 @@ class ImageExporter:
         if packed is not None:
             # Cycles takes Blender's pixels, which of 16 bits are floats multiplied by alpha.
             is_changed = image_header(image).is_float and not is_float_file(packed[:4096], image.filepath) and has_transparency(image)
+            is_changed = is_changed or _alpha_needs_pixels(image, packed[:4096], image.filepath, associates)
             if not is_changed and self._means_the_same(image, packed[:4096], image.filepath, is_color):
                 uri = self._writer.write_file(suffix(packed, image.filepath), packed)
                 return self._note_alpha(uri, packed[:4096], image.filepath)
@@ -159,7 +162,8 @@ class ImageExporter:
             return self._missing()
         with open(path, "rb") as file:
             first = file.read(4096)
-        if self._means_the_same(image, first, path, is_color, encoded):
+        is_changed = _alpha_needs_pixels(image, first, path, associates)
+        if not is_changed and self._means_the_same(image, first, path, is_color, encoded):
             return self._note_alpha(self._writer.file_uri(path), first, path)
         return self._make_from_pixels(image, warn, associates)
 
@@ -231,6 +235,30 @@ class ImageExporter:
         return pixels
 
 
+def _alpha_needs_pixels(image, first_bytes, path, associates):
+    """Whether the program makes something else of a file's alpha than Cycles does since 5.2, but not of Blender's pixels.
+
+    @param  associates  whether colours are to be multiplied by alpha
+    """
+    # Of a sequence Blender has the pixels of one frame alone, and none yet where it has not been shown.
+    if not compat.ALPHA_BY_MODE or image.source == "SEQUENCE" or not has_transparency(image):
+        return False
+    if suffix(first_bytes, path) == ".webp":
+        return True
+    if image.colorspace_settings.is_data or image.alpha_mode in {"NONE", "CHANNEL_PACKED"}:
+        return False
+    if image.alpha_mode == "STRAIGHT":
+        return is_associated_file(first_bytes, path)
+    # Cycles divides codes by alpha, the program light; Blender's bytes are divided.
+    return not associates and not is_float_file(first_bytes, path)
+
+
+def is_missing(image):
+    """Whether the one file of an image is not there."""
+    path = bpy.path.abspath(image.filepath, library=image.library)
+    return image.source == "FILE" and not image.is_dirty and image.packed_file is None and not os.path.isfile(path)
+
+
 def is_linear(image):
     """Whether an image's colours are stored as light, or are data."""
     return color_space.meaning(image.colorspace_settings) == "linear"
@@ -272,7 +300,7 @@ def reads_as_stored(image, is_color, uses_alpha):
         return False
     if image.colorspace_settings.is_data or image.alpha_mode == "CHANNEL_PACKED":
         return True
-    return uses_alpha and (is_color or image.alpha_mode == "STRAIGHT")
+    return uses_alpha and (image.alpha_mode == "STRAIGHT" or is_color and not compat.ALPHA_BY_MODE)
 
 
 #: Whether images have transparent pixels, by what tells an image and its state: looking costs a second at 8k.

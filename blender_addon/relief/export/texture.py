@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
+from .. import compat
 from . import nodes
 from .image import MISSING, has_pixels_of_all_frames, is_linear, is_encoded, reads_as_stored
 from .image_header import image_header
@@ -292,7 +293,7 @@ def image_options(node, writer, images, warn):
         if associates and not is_multiplied:
             options["alpha"] = "straight"
         return {**options, "texture": info(uri)}
-    is_multiplied = image_header(image).is_float and image.alpha_mode == "PREMUL"
+    is_multiplied = image.alpha_mode == "PREMUL" and (compat.ALPHA_BY_MODE or image_header(image).is_float)
     if image.source == "TILED":
         uris = images.tile_uris(image, not is_linear(image), warn)
         tiles = [{"tile": number, "texture": info(uri), **options} for number, uri in sorted(uris.items())]
