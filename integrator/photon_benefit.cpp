@@ -21,6 +21,9 @@ constexpr double kPilotPi = 3.14159265358979;
 /// Samples of a pixel in the pilot: as few as quarters of them can be told apart, see error_extrapolate.
 constexpr std::uint32_t kPilotSamples = 8;
 
+/// Paths that a pilot needs to say anything.
+constexpr double kLeastPilotPaths = 4096;
+
 /// What of its sources' factors a pilot's photons carry: so little that the beauty is that without caustics.
 constexpr double kTrace = 1e-9;
 
@@ -256,8 +259,7 @@ void photons_guide(const SceneContext& context,
   });
   std::vector<std::vector<Photon>> photons;
   for (KeptPhotons& of_group : kept) photons.push_back(std::move(of_group.on_surfaces));
-  const double denser =
-      photon_sources_guide(all, groups, photons, looks, photon_radius_for(photons, all.within));
+  const double denser = photon_sources_guide(all, groups, photons, looks, photon_radius_for(photons, all.within));
   if (!(denser > 1)) return;
   char figures[96];
   std::snprintf(figures, sizeof figures, "; photons lie %.2g times as dense where the picture shows them", denser);
@@ -344,36 +346,53 @@ PhotonChoice photon_choice_make(const SceneContext& context,
     return choice;
   }
 
-  // The pilot is a hundredth of the render, as far as that says enough and not more than enough.
+  const auto figures = [&](const char* if_so) {
+    char text[160];
+    std::snprintf(text, sizeof text, "take the squared error to 1/%.3g%s for %.3g times the cost", choice.error_ratio,
+                  if_so, choice.cost_ratio);
+    return std::string(text);
+  };
+  // The pilot is a hundredth of the render, as far as that says enough and not more than enough. A quarter of it will do where
+  // photons do not pay by far.
   const double num_pixels = static_cast<double>(settings.width) * settings.height;
-  const double samples = num_pixels * settings.samples;
-  const double paths = std::clamp(samples / 128, 4096.0, 32768.0);
+  const double whole = std::clamp(num_pixels * settings.samples / 128, kLeastPilotPaths, 32768.0);
   PhotonSources pilots = choice.sources;
   pilots.factors = pilot_factors(context, pilots, settings);
-  const Pilot pilot =
-      pilot_run(context, options, g, std::move(pilots), static_cast<std::uint32_t>(paths), paths / kPilotSamples, stop);
-  if (!(pilot.stored > 0) || !(pilot.caustic_error > 0)) {
-    leave_to_paths("no caustic shows in the picture");
+  const auto run = [&](const PhotonSources& sources, double paths) {
+    return pilot_run(context, options, g, sources, static_cast<std::uint32_t>(paths), paths / kPilotSamples, stop);
+  };
+  Pilot pilot;
+  double without = 0;
+  const auto error_ratio = [&](double seen_error) {
+    return without / std::max(seen_error + pilot.photon_error, 1e-30);
+  };
+  for (const double part : {0.25, 1.0}) {
+    const double paths = part * whole;
+    if (paths < kLeastPilotPaths) continue;
+    pilot = run(pilots, paths);
+    const bool shows = pilot.stored > 0 && pilot.caustic_error > 0;
+    if (!shows && part < 1) continue;
+    if (!shows) {
+      leave_to_paths("no caustic shows in the picture");
+      return choice;
+    }
+    without = pilot.seen_error + pilot.caustic_error;
+    choice.cost_ratio = cost_ratio(pilot, !context.media.empty(), paths, photons_wanted(settings) / num_pixels);
+    // At best: no more is seen of the noise than without caustics.
+    choice.error_ratio = error_ratio(pilot.seen_error);
+    constexpr double kByFar = 0.6;
+    if (choice.error_ratio > (part < 1 ? kByFar : 1.0) * choice.cost_ratio) continue;
+    leave_to_paths("left to paths: photons would " + figures(" at best"));
     return choice;
   }
-  choice.cost_ratio = cost_ratio(pilot, !context.media.empty(), paths, photons_wanted(settings) / num_pixels);
   // With photons a path that comes by chance to a bright caustic has noise of its own.
-  const Pilot shown =
-      pilot_run(context, options, g, choice.sources, static_cast<std::uint32_t>(paths), paths / kPilotSamples, stop);
-  const double without = pilot.seen_error + pilot.caustic_error;
-  const double with = std::max(shown.seen_error, pilot.seen_error) + pilot.photon_error;
-  choice.error_ratio = without / std::max(with, 1e-30);
-  const bool pays = choice.error_ratio > choice.cost_ratio;
-  char figures[160];
-  std::snprintf(figures, sizeof figures, "photons would take the squared error to 1/%.3g for %.3g times the cost",
-                choice.error_ratio, choice.cost_ratio);
-  if (!pays) {
-    leave_to_paths("left to paths: " + std::string(figures));
+  const Pilot shown = run(choice.sources, whole);
+  choice.error_ratio = error_ratio(std::max(shown.seen_error, pilot.seen_error));
+  if (choice.error_ratio <= choice.cost_ratio) {
+    leave_to_paths("left to paths: photons would " + figures(""));
     return choice;
   }
-  std::snprintf(figures, sizeof figures, ": they take the squared error to 1/%.3g for %.3g times the cost",
-                choice.error_ratio, choice.cost_ratio);
-  choice.reason += figures;
+  choice.reason += ": they " + figures("");
   photons_guide(context, settings, g, stop, choice);
   return choice;
 }

@@ -1,11 +1,13 @@
 // Whether photons are traced where they pay and nowhere else, and what they cost a picture with a noise threshold.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include "integrator/kept_context.h"
 #include "integrator/photon_benefit.h"
 #include "tests/support/caustic_scene.h"
 
@@ -66,6 +68,34 @@ TEST(PhotonBenefit, RoughMetalUnderASunIsLeftToPaths)
   const Rendered off = render_scene(scene, caustic_options(scene, CausticsMode::kOff, 160, 4));
   EXPECT_EQ(automatic.image.pixels, off.image.pixels);
   EXPECT_EQ(automatic.stats.counters.camera_rays, off.stats.counters.camera_rays);
+}
+
+/// What is chosen for a picture of 256 × 256 pixels, of which no sample is taken.
+/// @param samples  planned; of fewer than 32 the pilot has no quarter
+PhotonChoice chosen_for(const Scene& scene, int samples)
+{
+  const RenderOptions options = caustic_options(scene, CausticsMode::kAuto, 256, samples);
+  KeptContext kept;
+  const SceneContext& context = kept.get(scene, render_context_options(options));
+  FilterTable filter;
+  pixel_filter_table_make(options.settings.filter, filter);
+  KernelGlobals g = render_globals(context, options, filter);
+  const std::atomic<bool> stop = false;
+  return photon_choice_make(context, options, g, stop);
+}
+
+TEST(PhotonBenefit, AQuarterOfThePilotChoosesAsTheWhole)
+{
+  Scene metal = ball_scene(metal_material(0.5f), 1.5f, 1);
+  metal.lights.push_back(sun_light());
+  const PhotonChoice none = chosen_for(metal, 32);
+  EXPECT_FALSE(none.photons) << none.reason;
+  EXPECT_NE(none.reason.find(" at best "), std::string::npos) << none.reason;
+  EXPECT_FALSE(chosen_for(metal, 31).photons);
+  // What a quarter cannot rule out has the figures of the whole.
+  const PhotonChoice glass = chosen_for(ball_scene(glass_material(), 0.02f, 3000), 32);
+  EXPECT_TRUE(glass.photons) << glass.reason;
+  EXPECT_GT(glass.error_ratio, glass.cost_ratio);
 }
 
 TEST(PhotonBenefit, CausticsOutsideThePictureAreNotTraced)
