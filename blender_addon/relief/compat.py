@@ -237,6 +237,17 @@ def vertex_normals(mesh):
     return normals.reshape(-1, 3)
 
 
+def has_vertex_normals(mesh):
+    """Whether all corners at each vertex have its normal: all faces are smooth, and nothing asks for hard edges."""
+    if IS_4_1:
+        return mesh.normals_domain == "POINT"
+    if mesh.use_auto_smooth:
+        return False
+    is_smooth = np.empty(len(mesh.polygons), dtype=bool)
+    mesh.polygons.foreach_get("use_smooth", is_smooth)
+    return bool(is_smooth.all())
+
+
 def splits_normals(mesh):
     """Whether the mesh asks for hard edges besides flat faces: these stay hard under displacement."""
     if IS_4_1:

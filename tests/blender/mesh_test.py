@@ -249,6 +249,28 @@ def test_equal_corners_are_joined_and_no_others():
             assert len(distinct) == len({corner(loop) for loop in loops}) == len({corner(loop) for loop in distinct})
 
 
+def test_normals_of_vertices_are_those_of_their_corners():
+    """Where the add-on reads them once a vertex they are what Blender has at each corner; elsewhere it reads the corners."""
+    import numpy as np
+    from relief import compat
+    from relief.export.mesh import _Corners, _OfVertices
+
+    def read(change):
+        bpy.ops.mesh.primitive_monkey_add()
+        mesh = bpy.context.object.data
+        mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
+        change(mesh)
+        corners = _Corners(mesh, print)
+        normals = corners.normals()
+        assert np.array_equal(corners.at(normals, slice(None)), compat.corner_normals(mesh))
+        return isinstance(normals, _OfVertices)
+
+    assert read(lambda mesh: None)
+    assert not read(lambda mesh: setattr(mesh.polygons[7], "use_smooth", False))
+    if bpy.app.version < (4, 1, 0):
+        assert not read(lambda mesh: setattr(mesh, "use_auto_smooth", True))
+
+
 def test_triangles_without_area_are_left_out_and_no_others():
     """Against exact arithmetic: needles, points and lines of all sizes, some further off than single precision squares."""
     from fractions import Fraction

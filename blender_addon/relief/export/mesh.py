@@ -16,6 +16,9 @@ from . import attributes, hair, points
 _HASH_FACTORS = np.random.default_rng(1).integers(1, 2**63, size=32, dtype=np.uint64) | np.uint64(1)
 
 
+#: Of which those without area are told apart together.
+_TRIANGLES_AT_A_TIME = 1 << 14
+
 #: Metres from the origin beyond which the program refuses geometry.
 FARTHEST = 1e15
 
@@ -44,10 +47,23 @@ class Wanted:
     values: tuple = field(default=(), compare=False)
 
 
-class _Corners:
-    """A mesh's triangles and the attributes of their corners, which are read once for all slots."""
+@dataclass(frozen=True, eq=False)
+class _OfVertices:
+    """An attribute that all corners at a vertex have in common.
 
-    def __init__(self, mesh, warn):
+    values  float32 (vertices, 1 to 4)
+    """
+
+    values: np.ndarray
+
+
+class _Corners:
+    """A mesh's triangles and the attributes of their corners, which are read once for all slots.
+
+    @param  num_slots  of materials; where there is but one, all triangles have it
+    """
+
+    def __init__(self, mesh, warn, num_slots=1):
         self.mesh = mesh
         self._warn = warn
         self._read = {}
@@ -56,8 +72,9 @@ class _Corners:
         loops = np.empty(3 * num_triangles, dtype=np.int32)
         mesh.loop_triangles.foreach_get("loops", loops)
         self.loops = loops.reshape(-1, 3)
-        self.material = np.empty(num_triangles, dtype=np.int32)
-        mesh.loop_triangles.foreach_get("material_index", self.material)
+        self.material = np.zeros(num_triangles, dtype=np.int32)
+        if num_slots > 1:
+            mesh.loop_triangles.foreach_get("material_index", self.material)
         self.is_smooth = np.empty(num_triangles, dtype=bool)
         mesh.loop_triangles.foreach_get("use_smooth", self.is_smooth)
         self.vertex = np.empty(num_loops, dtype=np.int32)
@@ -65,7 +82,6 @@ class _Corners:
         self.positions = np.empty(3 * len(mesh.vertices), dtype=np.float32)
         mesh.vertices.foreach_get("co", self.positions)
         self.positions = self.positions.reshape(-1, 3)
-        self.normals = _zero_where_not_finite(compat.corner_normals(mesh))
         self._drop_unplaced()
         self._drop_empty()
 
@@ -84,10 +100,15 @@ class _Corners:
 
     def _drop_empty(self):
         """Leaves out triangles without area, which text and bevels are full of: nothing can be seen of them."""
-        vertex = self.vertex[self.loops]
-        keep = _is_wide(*(self.positions.take(vertex[:, i], axis=0) for i in range(3)))
+        keep = np.empty(len(self.loops), dtype=bool)
+        # As many at a time as stay in a cache: of a large mesh the arrays between would be memory that is new each time.
+        for begin in range(0, len(keep), _TRIANGLES_AT_A_TIME):
+            some = slice(begin, begin + _TRIANGLES_AT_A_TIME)
+            vertex = self.vertex[self.loops[some]]
+            keep[some] = _is_wide(*(self.positions.take(vertex[:, i], axis=0) for i in range(3)))
         if keep.all():
             return
+        vertex = self.vertex[self.loops]
         a, b, c = (self.positions[vertex[~keep, i]].astype(np.float64) for i in range(3))
         keep[~keep] = np.cross(b - a, c - a).any(axis=1)
         if not keep.all():
@@ -104,8 +125,21 @@ class _Corners:
             self._read[key] = read(*source)
         return self._read[key]
 
+    def at(self, values, loops):
+        """An attribute at some corners.
+
+        @param  values  float32 (all loops, k), or _OfVertices
+        @param  loops   numbers of them, or a slice
+        @return         float32 (loops, k)
+        """
+        return values.values[self.vertex[loops]] if isinstance(values, _OfVertices) else values[loops]
+
+    def normals(self):
+        """Normals with flat faces, sharp edges and custom normals considered: as `at` takes them."""
+        return self._once(self._read_normals)
+
     def displacement_normals(self):
-        """Normals without the edges of flat faces, which displacement would tear open; marked edges stay."""
+        """Normals without the edges of flat faces, which displacement would tear open; marked edges stay: as `at` takes them."""
         return self._once(self._read_displacement_normals)
 
     def coordinates(self, source):
@@ -113,7 +147,7 @@ class _Corners:
         return self._once(self._read_coordinates, source)
 
     def generated(self):
-        """Generated coordinates: float32 (loops, 3)."""
+        """Generated coordinates: _OfVertices of three numbers."""
         return self._once(self._read_generated)
 
     def attribute(self, source):
@@ -124,10 +158,16 @@ class _Corners:
         """A colour attribute, linear: float32 (loops, 4); None if there is none on vertices or corners."""
         return self._once(self._read_color, name)
 
+    def _read_normals(self):
+        if compat.has_vertex_normals(self.mesh):
+            return self._once(self._read_vertex_normals)
+        return _zero_where_not_finite(compat.corner_normals(self.mesh))
+
     def _read_displacement_normals(self):
-        if compat.splits_normals(self.mesh):
-            return self.normals
-        return _zero_where_not_finite(compat.vertex_normals(self.mesh))[self.vertex]
+        return self.normals() if compat.splits_normals(self.mesh) else self._once(self._read_vertex_normals)
+
+    def _read_vertex_normals(self):
+        return _OfVertices(_zero_where_not_finite(compat.vertex_normals(self.mesh)))
 
     def _read_coordinates(self, source):
         kind, name = source
@@ -143,7 +183,7 @@ class _Corners:
         else:
             uv = self.positions[self.vertex, :2]
             if kind == "generated":
-                uv = self.generated()[:, :2]
+                uv = self.at(self.generated(), slice(None))[:, :2]
         out = np.empty_like(uv)
         out[:, 0] = uv[:, 0]
         out[:, 1] = 1 - uv[:, 1]
@@ -171,7 +211,7 @@ class _Corners:
         size = np.array(self.mesh.texspace_size, dtype=np.float32)
         per_metre = np.divide(np.float32(0.5), size, out=np.zeros_like(size), where=size != 0)
         generated = (self._rest() - location) * per_metre + np.float32(0.5)
-        return self._finite(generated, "generated coordinates")[self.vertex]
+        return _OfVertices(self._finite(generated, "generated coordinates"))
 
     def _finite(self, values, what):
         """Values with 0 where they are not finite."""
@@ -246,7 +286,8 @@ class Shape:
 def shape_of(mesh):
     """Shape of an evaluated bpy mesh."""
     corners = _Corners(mesh, lambda *_: None)
-    return Shape(corners.positions, corners.normals, corners.displacement_normals())
+    normals, displacement_normals = (corners.at(n, slice(None)) for n in (corners.normals(), corners.displacement_normals()))
+    return Shape(corners.positions, normals, displacement_normals)
 
 
 @dataclass(frozen=True)
@@ -289,20 +330,27 @@ def store_mesh(mesh, wanted, writer, shapes=()):
     def warn(*text):
         warnings.append(text)
 
-    corners = _Corners(mesh, warn)
+    corners = _Corners(mesh, warn, len(wanted))
     slots = np.clip(corners.material, 0, len(wanted) - 1)
     primitives = []
     parts = 2 * slots
     if any(w.by_shading for w in wanted):
         parts += corners.is_smooth & np.array([w.by_shading for w in wanted])[slots]
-    order = np.argsort(parts, kind="stable")
-    numbers, begins = np.unique(parts[order], return_index=True)
     joiner = _Joiner(corners.vertex, len(corners.positions))
-    for part, triangles in zip(numbers.tolist(), np.split(corners.loops[order], begins[1:])):
+    for part, triangles in _by_part(parts, corners.loops):
         slot, is_smooth = divmod(part, 2)
         arrays = _primitive_arrays(corners, triangles, joiner, wanted[slot], shapes, warn)
         primitives.append((slot, bool(is_smooth), writer.store(arrays)))
     return StoredMesh(mesh.name, wanted, primitives, tuple(warnings))
+
+
+def _by_part(parts, triangles):
+    """Triangles by the part that they belong to: pairs (number of the part, its triangles), both in order."""
+    if len(parts) > 0 and (parts == parts[0]).all():
+        return [(int(parts[0]), triangles)]
+    order = np.argsort(parts, kind="stable")
+    numbers, begins = np.unique(parts[order], return_index=True)
+    return list(zip(numbers.tolist(), np.split(triangles[order], begins[1:])))
 
 
 def store_box(box, name, wanted, slot, writer):
@@ -397,7 +445,7 @@ def _primitive_arrays(corners, triangles, joiner, wanted, shapes, warn):
     @param  joiner     _Joiner of the mesh
     @return            arrays by glTF's names, "indices" among them
     """
-    per_loop = {"NORMAL": corners.displacement_normals() if wanted.displaced else corners.normals}
+    per_loop = {"NORMAL": corners.displacement_normals() if wanted.displaced else corners.normals()}
     for number, source in enumerate(wanted.coordinates):
         uv = corners.coordinates(source)
         if uv is None and wanted.tangents and not source[1] and len(corners.mesh.uv_layers) == 0:
@@ -418,10 +466,11 @@ def _primitive_arrays(corners, triangles, joiner, wanted, shapes, warn):
         values = corners.attribute(source)
         if values is not None:  # where it is not, it is 0 for Blender, too
             per_loop[attributes.file_name(source)] = values
-    representatives, indices = joiner.join(triangles.ravel(), list(per_loop.values()))
+    may_differ = [values for values in per_loop.values() if not isinstance(values, _OfVertices)]
+    representatives, indices = joiner.join(triangles.ravel(), may_differ)
     arrays = {"POSITION": np.ascontiguousarray(corners.positions[corners.vertex[representatives]])}
     for name, values in per_loop.items():
-        arrays[name] = np.ascontiguousarray(values[representatives])
+        arrays[name] = np.ascontiguousarray(corners.at(values, representatives))
     for number, shape in enumerate(shapes):
         normals = shape.displacement_normals if wanted.displaced else shape.normals
         moved = {"POSITION": shape.positions[corners.vertex[representatives]], "NORMAL": normals[representatives]}
