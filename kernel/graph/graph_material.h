@@ -13,6 +13,11 @@ namespace relief {
 /// A world-space vector with Z up.
 RELIEF_KERNEL Vec3f graph_z_up(Vec3f v) { return {v.x, -v.z, v.y}; }
 
+/// Two vectors along the surface as long as the footprint.
+struct GraphFootprint {
+  Vec3f dPdx, dPdy;  ///< world
+};
+
 /// What a graph may read of a hit beside it.
 struct GraphPoint {
   const MeshView* mesh;
@@ -25,16 +30,13 @@ struct GraphPoint {
   float footprint;    ///< metres
   const GraphScene* scene;
   GraphRay ray;
-  Vec3f P_object{};  ///< set by graph_load_point
-};
-
-/// Two vectors along the surface as long as the footprint.
-struct GraphFootprint {
-  Vec3f dPdx, dPdy;  ///< world
+  Vec3f P_object{};                                ///< set by graph_load_point
+  const GraphFootprint* footprint_axes = nullptr;  ///< see graph_footprint; null: not known yet
 };
 
 RELIEF_KERNEL GraphFootprint graph_footprint(const GraphPoint& at)
 {
+  if (at.footprint_axes != nullptr) return *at.footprint_axes;
   const Vec3f Ng = dot(at.hit->Ng, at.wo) < 0.0f ? -at.hit->Ng : at.hit->Ng;
   // Cycles' axes: a slope is a forward difference, so that bumps of few pixels look otherwise along others.
   const Vec3f across = cross(Vec3f{1, 1, -1}, Ng);
@@ -183,6 +185,16 @@ RELIEF_KERNEL float graph_matrix_element(const GraphPoint& at, GraphQuantity qua
   }
 }
 
+/// A point's place in the mesh's _GENERATED.
+RELIEF_KERNEL Vec3f graph_generated(const GraphPoint& at)
+{
+  if (at.mesh->generated == nullptr) return {};
+  const TriangleIndices tri = at.mesh->triangles[at.triangle];
+  const float w0 = 1.0f - at.bary_u - at.bary_v;
+  const Vec3f* g = at.mesh->generated;
+  return w0 * g[tri.v0] + at.bary_u * g[tri.v1] + at.bary_v * g[tri.v2];
+}
+
 /// @param  index  of quantities that are many
 /// @return world space turns as graph_z_up; components of vectors by `axis`
 RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity, std::uint16_t index)
@@ -199,13 +211,8 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
       return component(at.P_object, axis_of(Q::object_x));
     case Q::generated_x:
     case Q::generated_y:
-    case Q::generated_z: {
-      if (at.mesh->generated == nullptr) return 0.0f;
-      const TriangleIndices tri = at.mesh->triangles[at.triangle];
-      const float w0 = 1.0f - at.bary_u - at.bary_v;
-      const Vec3f* g = at.mesh->generated;
-      return component(w0 * g[tri.v0] + at.bary_u * g[tri.v1] + at.bary_v * g[tri.v2], axis_of(Q::generated_x));
-    }
+    case Q::generated_z:
+      return component(graph_generated(at), axis_of(Q::generated_x));
     case Q::uv0_u:
       return hit.uv[0].x;
     case Q::uv0_v:
@@ -325,6 +332,8 @@ RELIEF_KERNEL void graph_load_point(const GraphProgramView& program, GraphPoint 
   GraphPoint shifted[2];
   const GraphPoint* const points[3] = {&at, &shifted[0], &shifted[1]};
   const GraphFootprint footprint = program.is_shifted ? graph_footprint(at) : GraphFootprint{};
+  // Whatever else a point has, it is on the same triangle.
+  if (program.is_shifted) at.footprint_axes = &footprint;
   float width = -1.0f;  // by which the points are moved
   for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
     const GraphInput input = program.inputs[i];

@@ -141,15 +141,18 @@ template <unsigned kFeatures>
     SurfaceInteraction& at = group.at[k];
     visit.u = scatter_samples(state.pixel_hash[path], state.sample_index[path], path_surface(state, path));
     shade_surface_meet<kFeatures>(g, state, path, at, LobePairLane{&pairs, k}, visit, sinks.shadow, sinks.counters);
-    if (visit.chosen.probability > 0.0f) {
-      answers[k] = light_ask(g, state, path, visit.chosen, at.hit.P, visit.light_N, storage[k]);
-      if (!light_answers(answers[k])) visit.chosen.probability = 0.0f;
-      store_lane(pairs.to_lamp, k, answers[k].sample.wi);
-      are_lit = true;
-    }
     pairs.u[0][k] = visit.u.bsdf.x;
     pairs.u[1][k] = visit.u.bsdf.y;
     scatter = scatter || visit.way == SurfaceWay::kScatters;
+  }
+  // Among many lights those that were chosen have been on their way from memory since.
+  for (int k = 0; k < group.count; ++k) {
+    SurfaceVisit& visit = visits[k];
+    if (!(visit.chosen.probability > 0.0f)) continue;
+    answers[k] = light_ask(g, state, group.paths[k], visit.chosen, group.at[k].hit.P, visit.light_N, storage[k]);
+    if (!light_answers(answers[k])) visit.chosen.probability = 0.0f;
+    store_lane(pairs.to_lamp, k, answers[k].sample.wi);
+    are_lit = true;
   }
   if (are_lit) lobe_pairs_light(pairs);
   if (scatter) lobe_pairs_sample(pairs);
