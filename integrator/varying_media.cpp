@@ -52,6 +52,50 @@ struct Rate {
   bool emits = false;
 };
 
+/// What it was found to be at some of the box's points.
+struct Found {
+  Vec3f least, mean, most;  ///< of sigma_t, 1/m
+  float deviation = 0;      ///< 1/m: root of the mean square, of the channel that is farthest off
+};
+
+Found found_of(const Medium (&media)[kMediumPoints])
+{
+  Found found{media[0].sigma_t, {}, media[0].sigma_t};
+  for (const Medium& medium : media) {
+    found.least = min(found.least, medium.sigma_t);
+    found.most = max(found.most, medium.sigma_t);
+    found.mean += medium.sigma_t * (1.0f / kMediumPoints);
+  }
+  float squares = 0;
+  for (const Medium& medium : media) squares += sqr(max_component(abs(medium.sigma_t - found.mean)));
+  found.deviation = std::sqrt(squares * (1.0f / kMediumPoints));
+  return found;
+}
+
+/// Of what a bound allows beyond what was found, so much is corrected: what rays meet there counts for ten times as much at most.
+constexpr float kUnseen = 0.1f;
+
+/// What rays take a medium for in a box.
+/// @param bound  of sigma_t, 1/m
+/// @param size   metres, from corner to corner
+RateBox box_of(const Found& found, float bound, float size)
+{
+  // In thin boxes the mean is best. In dense ones it would weigh what passes through a hole by how dense the rest is: there the
+  // medium is taken for its thinnest part, and collisions are as many as its densest asks for, which then take light away alone.
+  const float dense = std::min(found.deviation * size, 1.0f);
+  RateBox box;
+  if (!is_finite(found.mean) || !(found.deviation < kInfinity)) {
+    box.residual = box.shows = bound;
+    return box;
+  }
+  box.sigma_t = found.mean + (found.least - found.mean) * dense;
+  const float to_most = max_component(found.most - box.sigma_t);
+  const float off = max_component(max(splat3(bound) - box.sigma_t, box.sigma_t));
+  box.residual = std::max(1.5f * found.deviation + (1.25f * to_most - 1.5f * found.deviation) * dense, kUnseen * off);
+  box.shows = std::max(max_component(found.mean), kUnseen * bound);
+  return box;
+}
+
 /// As medium_resolve.
 /// @param at  (result of the program) -> Bounds
 template <typename At>
@@ -234,6 +278,9 @@ void VaryingMedia::make(const SceneContext& context)
     medium.program = volume.program.view();
     medium.closures = volume.closures.data();
     medium.num_closures = static_cast<std::uint32_t>(volume.closures.size());
+    medium.shines = std::any_of(volume.closures.begin(), volume.closures.end(), [](const VolumeClosureSpec& closure) {
+      return closure.kind == VolumeClosureKind::kPrincipled || closure.kind == VolumeClosureKind::kEmission;
+    });
     media_.push_back(medium);
   };
   for (const VolumeProgram& volume : scene.varying_media) add(volume);
@@ -256,7 +303,7 @@ void VaryingMedia::make(const SceneContext& context)
     if (medium_of(i) != nullptr) place_of_instance_[i] = count++;
   }
   places_.resize(static_cast<std::size_t>(count));
-  rates_.resize(places_.size());
+  boxes_.resize(places_.size());
   size_ = std::clamp(static_cast<int>(std::cbrt(kMostBoxes / std::max(count, 1))), 1, kBoxes);
   for (VaryingMedium& medium : media_) {
     medium.places = places_.data();
@@ -309,48 +356,57 @@ VaryingMedia::Problem VaryingMedia::add_rates(const SceneContext& context,
   const float diagonal = length(box.high - box.low);
   place.densest = (is_world ? kWorldWall : kWall) / diagonal;
   const std::size_t side = static_cast<std::size_t>(grid.size), level_size = side * side * side;
-  std::vector<float>& rates = rates_[index];
-  rates.assign(level_size * static_cast<std::size_t>(grid.num_levels), 0.0f);
-  std::vector<std::uint8_t> emits(rates.size());
+  std::vector<RateBox>& all = boxes_[index];
+  all.assign(level_size * static_cast<std::size_t>(grid.num_levels), {});
   const GraphBoundsRun run_bounds = graph_bounds_select();
   const std::span<const ImageBounds> images = context.scene.textures->height_bounds();
   const Vec3f middle = (box.low + box.high) * 0.5f, D{0, 0, 1};
   Problem problem;
   for (int level = 0; level < grid.num_levels; ++level) {
     const float scale = static_cast<float>(1u << level), half = 0.5f * static_cast<float>(grid.size);
-    std::vector<float> found(level_size);
+    std::vector<Rate> rates(level_size);
+    std::vector<Found> found(level_size);
     tbb::parallel_for(std::size_t{0}, (level_size + 7) / 8, [&](std::size_t group) {
       Boxes boxes;
-      Vec3f P[kMediumPoints];
+      Vec3f corner[kMediumPoints];
+      const Vec3f lengths = grid.cell * scale;
       for (int k = 0; k < kMediumPoints; ++k) {
         const std::size_t i = std::min(group * 8 + static_cast<std::size_t>(k), level_size - 1);
         const std::size_t at[3] = {i % side, i / side % side, i / (side * side)};
-        float point[3];
         const float m[3] = {middle.x, middle.y, middle.z}, cell[3] = {grid.cell.x, grid.cell.y, grid.cell.z};
         for (int axis = 0; axis < 3; ++axis) {
           const float length = scale * cell[axis];
           boxes.middle[axis][k] = m[axis] + (static_cast<float>(at[axis]) + 0.5f - half) * length;
           // Points on its border may be taken for a neighbour's.
           boxes.half[axis][k] = 0.5f * length * 1.001f;
-          const auto number = static_cast<std::uint32_t>(i * 3 + static_cast<std::size_t>(axis));
-          point[axis] = boxes.middle[axis][k] + (unit_float(hash_mix_32(number + 1u)) - 0.5f) * length;
         }
-        P[k] = {point[0], point[1], point[2]};
+        corner[k] = Vec3f{boxes.middle[0][k], boxes.middle[1][k], boxes.middle[2][k]} - lengths * 0.5f;
       }
       const auto registers = std::make_unique_for_overwrite<GraphRangeRegisters>();
       registers->images = images.empty() ? nullptr : images.data();
-      const MediumPoint somewhere(context.globals, place, instance, P[0], D, kSomeRay);
+      const MediumPoint somewhere(context.globals, place, instance, corner[0], D, kSomeRay);
       for (std::uint32_t i = 0; i < medium.program.num_inputs; ++i) {
         const GraphInput& input = medium.program.inputs[i];
         registers->lanes[input.register_index] = quantity_range(somewhere, input, boxes);
       }
       run_bounds(medium.program, context.globals.textures, *registers);
-      Medium media[kMediumPoints];
-      varying_medium_eval(context.globals, medium, instance, P, kMediumPoints, D, kSomeRay, media);
       for (int k = 0; k < kMediumPoints; ++k) {
         const std::size_t i = group * 8 + static_cast<std::size_t>(k);
         if (i >= level_size) break;
-        const Rate rate = rate_of(medium, [&](int result) -> Bounds {
+        Vec3f P[kMediumPoints];
+        for (int point = 0; point < kMediumPoints; ++point) {
+          // One in each eighth of the box.
+          const auto number = static_cast<std::uint32_t>(i * kMediumPoints + static_cast<std::size_t>(point)) * 3u;
+          const auto part = [&](int axis) {
+            const std::uint32_t bits = hash_mix_32(number + static_cast<std::uint32_t>(axis) + 1u);
+            return 0.5f * (static_cast<float>(point >> axis & 1) + unit_float(bits));
+          };
+          P[point] = corner[k] + lengths * Vec3f{part(0), part(1), part(2)};
+        }
+        Medium media[kMediumPoints];
+        varying_medium_eval(context.globals, medium, instance, P, kMediumPoints, D, kSomeRay, media);
+        found[i] = found_of(media);
+        rates[i] = rate_of(medium, [&](int result) -> Bounds {
           const std::uint16_t operand = medium.program.results[result];
           if (operand == kNoGraphOperand) return {0, 0};
           const GraphRange range = graph_range_operand(medium.program, *registers, operand);
@@ -358,29 +414,27 @@ VaryingMedia::Problem VaryingMedia::add_rates(const SceneContext& context,
           const float low = range.low[k], high = range.high[k];
           return {low <= high ? low : -kInfinity, low <= high ? high : kInfinity};
         });
-        const std::size_t to = static_cast<std::size_t>(level) * level_size + i;
-        rates[to] = rate.sigma_t;
-        emits[to] = rate.emits;
-        found[i] = max_component(media[k].sigma_t);
       }
     });
-    const float most = *std::max_element(found.begin(), found.end());
+    float most = 0;
+    for (const Found& one : found) most = std::max(most, max_component(one.most));
     const float largest = std::max(kLoose * most, kThin / (diagonal * scale));
+    const float wall = place.densest / scale, corner_to_corner = length(grid.cell) * scale;
     for (std::size_t i = 0; i < level_size; ++i) {
-      float& rate = rates[static_cast<std::size_t>(level) * level_size + i];
-      const float wall = place.densest / scale;
-      problem.is_tamed |= level == 0 && found[i] >= wall;
-      rate = std::min(rate, wall);
+      problem.is_tamed |= level == 0 && max_component(found[i].most) >= wall;
+      float rate = std::min(rates[i].sigma_t, wall);
       if (!(rate <= largest)) {
         rate = std::max(kSampledMargin * most, kThin / (diagonal * scale));
         // Far away densities that grow without end are no numbers any more.
         problem.has_bounds = problem.has_bounds && level > 0;
       }
+      RateBox& known = all[static_cast<std::size_t>(level) * level_size + i];
+      known = box_of(found[i], rate, corner_to_corner);
       // What only shines has to be met as well.
-      if (emits[static_cast<std::size_t>(level) * level_size + i] != 0) rate += 1.0f / (diagonal * scale);
+      if (rates[i].emits) known.shows += 1.0f / (diagonal * scale);
     }
   }
-  grid.rates = rates.data();
+  grid.boxes = all.data();
   return problem;
 }
 

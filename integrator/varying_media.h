@@ -1,5 +1,5 @@
-// Media that vary from place to place, made ready for rays: where each is, and a grid of bounds of what it takes away there, from the
-// bounds of its value graph (kernel/graph/graph_bounds.h).
+// Media that vary from place to place, made ready for rays: where each is, and a grid of what it takes away there: what it was found to
+// be at some points, and what the bounds of its value graph (kernel/graph/graph_bounds.h) say that it may be.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ struct SceneContext;
 class VaryingMedia {
  public:
   /// @param context  with its meshes, instances, graphs and tree; must outlive this
-  /// @cost  256 Ki boxes in all at most, 4 bytes each; eight of them are bounded by a run of a graph
+  /// @cost  256 Ki boxes in all at most, 20 bytes each; a run of a graph a box
   void make(const SceneContext& context);
 
   /// By Material::medium_index and, last, what fills the world; null: none varies.
@@ -33,7 +33,7 @@ class VaryingMedia {
   std::vector<VaryingMedium> media_;
   std::vector<VaryingPlace> places_;
   std::vector<std::int32_t> place_of_instance_;
-  std::vector<std::vector<float>> rates_;
+  std::vector<std::vector<RateBox>> boxes_;
   std::vector<std::string> problems_;
   std::int32_t size_ = 0;
 };

@@ -173,7 +173,7 @@ RELIEF_KERNEL Vec3f photon_medium_even(const KernelGlobals& g,
   return medium_transmittance(media.sigma_t, at.length);
 }
 
-/// The same where some of the media vary, by tentative collisions: one of them is chosen by what is scattered there.
+/// The same where some of the media vary: one of the places that are asked is chosen by what is scattered there.
 [[gnu::noinline]] RELIEF_KERNEL Vec3f photon_medium_varying(const KernelGlobals& g,
                                                             const PathState& state,
                                                             std::uint32_t path,
@@ -184,25 +184,26 @@ RELIEF_KERNEL Vec3f photon_medium_even(const KernelGlobals& g,
   const GraphRay ray = medium_graph_ray(state, path);
   if (!photon_shows_in_media(g, state, path)) return medium_walk_transmittance(g, walk, ray);
   const Vec3f throughput = path_throughput(state, path);
+  medium_walk_sample(walk, counted_next(walk.numbers));
   Vec3f left{1, 1, 1}, kept;
   float total = 0.0f, share = 0.0f, distance = 0.0f;
-  MediumCollisions collisions;
+  MediumPlaces places;
   for (bool goes_on = true; goes_on && !is_zero(left);) {
-    goes_on = medium_collisions_next(g, walk, ray, collisions);
-    for (int k = 0; k < collisions.size && !is_zero(left); ++k) {
-      const MediaSum media = medium_collision(walk, collisions, k);
-      const Vec3f scattered = throughput * left * media.sigma_s / collisions.rate[k];
+    goes_on = medium_walk_next(g, walk, ray, places);
+    for (int k = 0; k < places.size && !is_zero(left); ++k) {
+      const MediaSum media = medium_place_media(walk, places, k);
+      const Vec3f scattered = throughput * left * places.passes[k] * media.sigma_s / places.rate[k];
       const float weight = max_component(abs(scattered));
       total += weight;
       if (weight > 0.0f && counted_next(walk.numbers) * total < weight) {
         share = weight;
         kept = scattered;
-        distance = collisions.t[k];
+        distance = places.t[k];
       }
-      left *= Vec3f{1, 1, 1} - media.sigma_t / collisions.rate[k];
-      if (!is_zero(left)) left *= medium_walk_survive(walk, left);
+      medium_walk_correct(walk, places, k, media.sigma_t, left);
     }
   }
+  left *= depth_transmittance(walk.depth);
   if (share > 0.0f) photon_medium_push(state, path, at, distance, kept * (total / share), photons);
   return left;
 }

@@ -1,15 +1,18 @@
-// Tentative collisions along a ray through media that vary: places at a rate that is not less than what the media take away and
-// scatter there. What they really do is asked for at those places alone, eight at a time.
+// A ray's way through media that vary: what they let through of its light, and places at which they are asked what they scatter.
 //
-// Nothing here chooses by what the media really do: so what is weighed by it has the right mean however wrong the rate is. Of a
-// medium that takes away more than the rate says the weights are below 0, and only the noise suffers.
+// A grid says what they are taken for (rate_grid.h). Light is weakened by that in closed form, and what it is off by is corrected by
+// tentative collisions, each of which asks the media at one place. Other places are spread evenly over what is likely to show. All
+// of them are asked eight at a time, and all count for what is scattered.
 //
-// Sources: Woodcock and others 1965 (rates); Novák, Selle and Jarosz 2014, "Residual Ratio Tracking for Estimating Attenuation in
-// Participating Media" (weights); Galtier and others 2013, "Integral formulation of null-collision Monte Carlo algorithms" (rates that
-// are too low).
+// Nothing here chooses by what the media really do: so what is weighed by it has the right mean however wrong the grid is, and only the
+// noise suffers.
+//
+// Sources: Woodcock and others 1965 (collisions); Novák, Selle and Jarosz 2014, "Residual Ratio Tracking for Estimating Attenuation in
+// Participating Media"; Galtier and others 2013, "Integral formulation of null-collision Monte Carlo algorithms" (weights below 0).
 #pragma once
 
 #include <cmath>
+#include <new>
 
 #include "kernel/sample/sobol.h"
 #include "kernel/state/medium_state.h"
@@ -29,30 +32,48 @@ RELIEF_KERNEL float counted_next(CountedNumbers& numbers)
   return unit_float(hash_mix_32(numbers.state));
 }
 
-/// Stretches of one rate that a walk keeps once it has looked for them. A ray through the middle of an object has some fifty.
-inline constexpr int kKnownStretches = 24;
+/// A part of a walk in which the media are taken for even.
+struct WalkStretch {
+  float end;  ///< metres; where the next one begins
+  RateBox box;
+  Vec3f depth;  ///< optical, of all before it
+  float left;   ///< about the light that gets to it: samples get rarer by that
+};
+
+/// Stretches that a walk has at most: where there are more, neighbours become one. A ray through the middle of an object has some fifty.
+inline constexpr int kMostStretches = 64;
+
+/// A place that goes along a walk.
+struct WalkPlace {
+  int stretch = 0;
+  float start = 0;      ///< of the stretch, metres
+  float passed = 0;     ///< up to there, of what it goes by
+  float next = 0;       ///< and up to where it stands
+  float t = kInfinity;  ///< metres; infinite: it has left
+};
 
 /// The media along a part of a ray.
 struct MediumWalk {
+  MediumWalk() {}
   Vec3f O, D;
-  float length = 0;     ///< metres; may be infinite
-  MediaSum even;        ///< those that are even
-  float even_rate = 0;  ///< 1/m
+  float length = 0;  ///< metres; may be infinite
+  MediaSum even;     ///< those that are even
   std::int32_t instances[kMostMedia];
   const VaryingMedium* media[kMostMedia];  ///< those that vary
-  RateRay rays[kMostMedia];                ///< as their grids see it
   int size = 0;
-  float factor = 1;  ///< of rates: where they are low, collisions are made more often, as eight cost what one does
-  float reach = 0;   ///< metres: most of what is scattered is nearer
-  /// More collisions where a light is near: kNearCollisions of them on average, by its distance, but where there is nothing.
-  Equiangular near;
-  float near_t = kInfinity;  ///< where the next of them is
-  float near_angle = 0;
-  float t = 0;
-  float rate = 0;  ///< of a collision at t that has not been used yet, but for those; 0: there is none
-  RateStretch at;  ///< around t
-  RateStretch known[kKnownStretches];  ///< from the start, one after the other
-  int num_known = 0, next_known = 0;
+  union {  // of which the first num_stretches are there
+    WalkStretch stretches[kMostStretches];
+  };
+  int num_stretches = 0;
+  Vec3f depth;       ///< of all of it, as the media are taken for
+  float factor = 0;  ///< of collisions, to the stretches' residuals
+  WalkPlace collision, sample;
+  float spacing = 0;     ///< of samples, by what shows; 0: there are none
+  float reach = 0;       ///< metres: most of what shows is nearer
+  Equiangular near;      ///< more samples are near a light: how it is seen
+  float near_angle = 0;  ///< where the next of them is
+  float near_t = kInfinity;
+  WalkPlace at;  ///< the last of all these
   CountedNumbers numbers;
 };
 
@@ -71,22 +92,123 @@ RELIEF_KERNEL bool media_vary(const KernelGlobals& g, const MediumState& m)
   return false;
 }
 
-RELIEF_KERNEL RateStretch medium_walk_rate(const MediumWalk& walk, float t)
+/// Makes one of every two stretches.
+RELIEF_KERNEL void walk_join(MediumWalk& walk)
 {
-  RateStretch all{walk.even_rate, walk.length};
-  for (int i = 0; i < walk.size; ++i) {
-    const RateStretch one = rate_grid_at(varying_place(*walk.media[i], walk.instances[i]).rates, walk.rays[i], t);
-    all.rate += one.rate;
-    all.end = min(all.end, one.end);
+  float start = 0;
+  const int half = walk.num_stretches / 2;
+  for (int i = 0; i < half; ++i) {
+    const WalkStretch a = walk.stretches[2 * i], b = walk.stretches[2 * i + 1];
+    const float share = (a.end - start) / (b.end - start), rest = 1.0f - share;
+    walk.stretches[i] = {b.end,
+                         {a.box.sigma_t * share + b.box.sigma_t * rest, a.box.residual * share + b.box.residual * rest,
+                          a.box.shows * share + b.box.shows * rest},
+                         {},
+                         0};
+    start = b.end;
   }
-  return all;
+  walk.num_stretches = half;
 }
 
-/// Collisions that are wanted on a ray at least, on average: most of what one run of a graph takes.
-inline constexpr float kWantedCollisions = 5.0f;
+RELIEF_KERNEL void walk_add(MediumWalk& walk, const WalkStretch& stretch)
+{
+  if (walk.num_stretches > 0) {
+    WalkStretch& last = walk.stretches[walk.num_stretches - 1];
+    if (last.box.sigma_t == stretch.box.sigma_t && last.box.residual == stretch.box.residual &&
+        last.box.shows == stretch.box.shows) {
+      last.end = stretch.end;
+      return;
+    }
+    if (walk.num_stretches == kMostStretches) walk_join(walk);
+  }
+  walk.stretches[walk.num_stretches++] = stretch;
+}
 
-/// And so many more where a light is near.
-inline constexpr float kNearCollisions = 3.0f;
+/// Finds the stretches of a walk.
+RELIEF_KERNEL void walk_find(MediumWalk& walk)
+{
+  RateBox even{walk.even.sigma_t, 0.0f, max_component(walk.even.sigma_t)};
+  // What only shines needs samples as well; on an infinite way it has no radiance.
+  if (!is_zero(walk.even.emission) && !(even.shows > 0.0f)) {
+    if (walk.length < kInfinity)
+      even.shows = 1.0f / walk.length;
+    else
+      walk.even.emission = {};
+  }
+  struct Ways {
+    Ways() {}
+    union {
+      RateWay of[kMostMedia];
+    };
+  } ways;
+  for (int i = 0; i < walk.size; ++i) {
+    ways.of[i] = rate_way_make(varying_place(*walk.media[i], walk.instances[i]).rates, walk.O, walk.D);
+  }
+  for (float t = 0; t < walk.length;) {
+    WalkStretch stretch{walk.length, even, {}, 0};
+    for (int i = 0; i < walk.size; ++i) {
+      const RateWay& way = ways.of[i];
+      stretch.end = min(stretch.end, way.end);
+      if (way.box == nullptr) continue;
+      stretch.box.sigma_t += way.box->sigma_t;
+      stretch.box.residual += way.box->residual;
+      stretch.box.shows += way.box->shows;
+    }
+    if (stretch.end > t) walk_add(walk, stretch);
+    t = stretch.end;
+    for (int i = 0; i < walk.size; ++i) {
+      if (!(ways.of[i].end > t)) rate_way_go(ways.of[i]);
+    }
+  }
+}
+
+/// Collisions that are wanted on a ray at least, on average, where what they correct is large enough to be seen.
+inline constexpr float kWantedCollisions = 3.0f;
+/// And where it is not, of the square of its optical depth, which is what the noise is made of. 20 to 100 gave the same noise for its
+/// time.
+inline constexpr float kCollisionsOfSquare = 20.0f;
+
+/// Optical depth up to a collision.
+/// @param u  [0, 1), a multiple of 2⁻²⁴: what is left to 1 is exact
+RELIEF_KERNEL float free_depth(float u) { return -__builtin_logf(1.0f - u); }
+
+/// How much of what a place goes by is in a stretch.
+struct WalkPart {
+  float size;   ///< of all of it
+  float rate;   ///< 1/m at its start
+  float fades;  ///< 1/m: the rate is over (1 + fades x)²
+};
+
+/// Puts a place where what it goes by comes to `next`.
+/// @param part  (stretch, metres) -> WalkPart
+template <typename Part>
+RELIEF_KERNEL void walk_place_go(const MediumWalk& walk, WalkPlace& place, const Part& part)
+{
+  for (; place.stretch < walk.num_stretches; ++place.stretch) {
+    const WalkStretch& stretch = walk.stretches[place.stretch];
+    const WalkPart here = part(stretch, stretch.end - place.start);
+    const float more = place.next - place.passed;
+    if (more < here.size) {
+      const float x = more / here.rate, t = place.start + x / max(1.0f - here.fades * x, 0x1p-20f);
+      // By rounding it may be beyond.
+      place.t = t < stretch.end ? t : place.start;
+      return;
+    }
+    place.passed += here.size;
+    place.start = stretch.end;
+  }
+  place.t = kInfinity;
+}
+
+/// Goes on to the next collision.
+RELIEF_KERNEL void walk_collide(MediumWalk& walk)
+{
+  walk.collision.next += free_depth(counted_next(walk.numbers)) / walk.factor;
+  walk_place_go(walk, walk.collision, [](const WalkStretch& stretch, float length) {
+    const float rate = stretch.box.residual;
+    return WalkPart{rate > 0.0f ? rate * length : 0.0f, rate, 0.0f};
+  });
+}
 
 /// @param D  unit
 RELIEF_KERNEL MediumWalk
@@ -102,153 +224,193 @@ medium_walk_make(const KernelGlobals& g, const MediumState& m, Vec3f O, Vec3f D,
     if (g.varying_media[index].num_closures == 0) {
       media_add(walk.even, g.media[index]);
     } else {
-      walk.rays[walk.size] = rate_ray_make(varying_place(g.varying_media[index], m.inside[i]).rates, O, D);
       walk.instances[walk.size] = m.inside[i];
       walk.media[walk.size++] = &g.varying_media[index];
     }
   }
-  walk.even_rate = max_component(walk.even.sigma_t);
-  // What only shines needs collisions as well; on an infinite way it has no radiance.
-  if (!is_zero(walk.even.emission) && !(walk.even_rate > 0.0f)) {
-    if (length < kInfinity)
-      walk.even_rate = 1.0f / length;
-    else
-      walk.even.emission = {};
+  walk_find(walk);
+  float start = 0, residual = 0;
+  for (int i = 0; i < walk.num_stretches; ++i) {
+    WalkStretch& stretch = walk.stretches[i];
+    const float size = stretch.end - start;
+    if (stretch.box.residual > 0.0f) residual += stretch.box.residual * size;
+    const auto add = [size](float& depth, float sigma) {
+      if (sigma > 0.0f) depth += sigma * size;
+    };
+    stretch.depth = walk.depth;
+    add(walk.depth.x, stretch.box.sigma_t.x);
+    add(walk.depth.y, stretch.box.sigma_t.y);
+    add(walk.depth.z, stretch.box.sigma_t.z);
+    start = stretch.end;
   }
-  float depth = 0, first = length;
-  for (float t = 0; t < length && depth < kWantedCollisions;) {
-    const RateStretch at = medium_walk_rate(walk, t);
-    if (walk.num_known < kKnownStretches) walk.known[walk.num_known++] = at;
-    const float end = min(at.end, length);
-    if (at.rate > 0.0f) {
-      first = min(first, t);
-      depth += at.rate * (end - t);
-      walk.reach = end < kInfinity ? end : t + kWantedCollisions / at.rate;
-    }
-    t = end;
+  if (residual > 0.0f) {
+    walk.factor = max(1.0f, min(kCollisionsOfSquare * residual, kWantedCollisions / residual));
+    walk_collide(walk);
   }
-  if (depth < kWantedCollisions) {
-    // All of the way is known: what lies before and behind has nothing to collide with.
-    if (depth > 0.0f) walk.factor = kWantedCollisions / depth;
-    walk.length = depth > 0.0f ? walk.reach : 0.0f;
-  }
-  walk.t = first;
-  walk.at = {0.0f, 0.0f};
   return walk;
 }
 
-/// Optical depth up to a collision.
-/// @param u  [0, 1), a multiple of 2⁻²⁴: what is left to 1 is exact
-RELIEF_KERNEL float free_depth(float u) { return -__builtin_logf(1.0f - u); }
-
-/// Goes on to the next collision but for those that are near a light: t and rate.
-RELIEF_KERNEL void medium_walk_advance(MediumWalk& walk)
+/// Share of light that is left after an optical depth.
+RELIEF_KERNEL Vec3f depth_transmittance(Vec3f depth)
 {
-  float left = free_depth(counted_next(walk.numbers)) / walk.factor;
-  while (walk.t < walk.length) {
-    while (!(walk.t < walk.at.end)) {
-      const bool is_known = walk.next_known < walk.num_known;
-      walk.at = is_known ? walk.known[walk.next_known++] : medium_walk_rate(walk, walk.t);
-    }
-    const float end = min(walk.at.end, walk.length);
-    if (walk.at.rate > 0.0f) {
-      const float next = walk.t + left / walk.at.rate;
-      if (next < end) {
-        walk.t = next;
-        walk.rate = walk.at.rate * walk.factor;
-        return;
-      }
-      left -= walk.at.rate * (end - walk.t);
-    }
-    walk.t = end;
-  }
+  return {std::exp(-depth.x), std::exp(-depth.y), std::exp(-depth.z)};
 }
 
-/// Likewise of those, near_t.
-RELIEF_KERNEL void medium_walk_advance_near(MediumWalk& walk)
+/// Samples of a stretch. Light fades as 1 / (1 + depth) in each for them, which is near enough to an exponential.
+RELIEF_KERNEL WalkPart walk_samples(const WalkStretch& stretch, float length)
+{
+  const Vec3f s = stretch.box.sigma_t;
+  // By the channel that gets farthest. On an infinite way what is not weakened has no mean.
+  const float fades = length < kInfinity ? min_component(s) : max_component(s);
+  const float rate = stretch.box.shows * stretch.left;
+  if (!(rate > 0.0f)) return {0.0f, 0.0f, 0.0f};
+  if (!(length < kInfinity)) return {fades > 0.0f ? rate / fades : 0.0f, rate, fades};
+  return {rate * length / (1.0f + fades * length), rate, fades};
+}
+
+/// Whether something sends out light.
+RELIEF_KERNEL bool medium_walk_shines(const MediumWalk& walk)
+{
+  bool shines = !is_zero(walk.even.emission);
+  for (int i = 0; i < walk.size; ++i) shines |= walk.media[i]->shines;
+  return shines;
+}
+
+/// Samples that are wanted of a walk. With 3 to 8 noise for its time was the same within a tenth.
+inline constexpr float kWantedSamples = 5.0f;
+/// And so many more where a light is near.
+inline constexpr float kNearSamples = 2.0f;
+/// Below it little shows of what scatters.
+inline constexpr float kLittleShows = 1.0f / 64.0f;
+
+/// Asks for samples, spread by what shows.
+/// @param u  [0, 1): where in their parts of the walk they are
+RELIEF_KERNEL void medium_walk_sample(MediumWalk& walk, float u)
+{
+  float left = 1, start = 0, sum = 0;
+  for (int i = 0; i < walk.num_stretches; ++i) {
+    WalkStretch& stretch = walk.stretches[i];
+    stretch.left = left;
+    const WalkPart part = walk_samples(stretch, stretch.end - start);
+    sum += part.size;
+    if (part.size > 0.0f && left > kLittleShows) {
+      walk.reach = stretch.end < kInfinity ? stretch.end : start + 4.0f / part.fades;
+    }
+    left /= 1.0f + min_component(stretch.box.sigma_t) * (stretch.end - start);
+    start = stretch.end;
+  }
+  if (!(sum > 0.0f)) return;
+  walk.spacing = sum / kWantedSamples;
+  walk.sample.next = walk.spacing * u;
+  walk_place_go(walk, walk.sample, walk_samples);
+}
+
+/// Goes on to the next sample that is near a light.
+RELIEF_KERNEL void walk_near(MediumWalk& walk)
 {
   const Equiangular& near = walk.near;
-  walk.near_angle += free_depth(counted_next(walk.numbers)) * (near.last - near.first) * (1.0f / kNearCollisions);
   walk.near_t = walk.near_angle < near.last ? near.nearest + near.distance * std::tan(walk.near_angle) : kInfinity;
+  walk.near_angle += (near.last - near.first) * (1.0f / kNearSamples);
 }
 
-/// Asks for more collisions near a light.
+/// Asks for more samples near a light.
 /// @param near  the walk, seen from there; its distance is above 0
-RELIEF_KERNEL void medium_walk_approach(MediumWalk& walk, const Equiangular& near)
+/// @param u     [0, 1): where in their parts of it they are
+RELIEF_KERNEL void medium_walk_approach(MediumWalk& walk, const Equiangular& near, float u)
 {
-  if (!(walk.length > 0.0f)) return;
   walk.near = near;
-  walk.near_angle = near.first;
-  medium_walk_advance_near(walk);
+  walk.near_angle = near.first + (near.last - near.first) * (u * (1.0f / kNearSamples));
+  walk_near(walk);
 }
 
-/// Collisions a metre that are near a light.
+/// Samples a metre that are near a light.
 RELIEF_KERNEL float medium_walk_near_rate(const MediumWalk& walk, float t)
 {
-  return walk.near.distance > 0.0f ? kNearCollisions * equiangular_pdf(walk.near, t) : 0.0f;
+  return walk.near.distance > 0.0f ? kNearSamples * equiangular_pdf(walk.near, t) : 0.0f;
 }
 
-struct TentativeCollision {
-  float t = 0;     ///< metres along the walk
-  float rate = 0;  ///< 1/m; 0: there is none up to the length
-};
-
-RELIEF_KERNEL TentativeCollision medium_walk_next(MediumWalk& walk)
-{
-  if (!(walk.rate > 0.0f)) medium_walk_advance(walk);
-  while (walk.near_t < min(walk.t, walk.length)) {
-    const float t = max(walk.near_t, 0.0f), rate = medium_walk_rate(walk, t).rate;
-    medium_walk_advance_near(walk);
-    if (rate > 0.0f) return {t, rate * walk.factor + medium_walk_near_rate(walk, t)};
-  }
-  if (!(walk.rate > 0.0f)) return {};
-  const TentativeCollision next{walk.t, walk.rate + medium_walk_near_rate(walk, walk.t)};
-  walk.rate = 0.0f;
-  return next;
-}
-
-/// Some collisions, and what the media are there.
-struct MediumCollisions {
+/// Places of a walk that have been asked, and what the media are there.
+struct MediumPlaces {
+  MediumPlaces() {}
   int size = 0;
-  float t[kMediumPoints], rate[kMediumPoints];
-  Medium media[kMostMedia][kMediumPoints];  ///< those that vary
+  float t[kMediumPoints];         ///< metres along the walk
+  float rate[kMediumPoints];      ///< 1/m, of all places
+  float corrects[kMediumPoints];  ///< 1/m, of collisions; 0: it is none
+  Vec3f taken[kMediumPoints];     ///< sigma_t that the media are taken for, 1/m
+  Vec3f passes[kMediumPoints];    ///< share of light that gets there, as they are taken for
+  union {                         // of which media[medium < walk.size][place < size] are there
+    Medium media[kMostMedia][kMediumPoints];
+  };
 };
 
-/// @return false: they were the last
-RELIEF_KERNEL bool medium_collisions_next(const KernelGlobals& g,
-                                          MediumWalk& walk,
-                                          const GraphRay& ray,
-                                          MediumCollisions& out)
+/// Notes the next place, in order.
+/// @return  false: there is none
+RELIEF_KERNEL bool walk_next(MediumWalk& walk, MediumPlaces& out)
 {
-  Vec3f P[kMediumPoints];
-  bool goes_on = true;
-  for (out.size = 0; out.size < kMediumPoints; ++out.size) {
-    const TentativeCollision next = medium_walk_next(walk);
-    goes_on = next.rate > 0.0f;
-    if (!goes_on) break;
-    out.t[out.size] = next.t;
-    out.rate[out.size] = next.rate;
-    P[out.size] = walk.O + walk.D * next.t;
+  for (;;) {
+    const float t = min(walk.collision.t, min(walk.sample.t, walk.near_t));
+    if (!(t < walk.length)) return false;
+    const bool collides = walk.collision.t == t;
+    if (collides) {
+      walk_collide(walk);
+    } else if (walk.sample.t == t) {
+      walk.sample.next += walk.spacing;
+      walk_place_go(walk, walk.sample, walk_samples);
+    } else {
+      walk_near(walk);
+      if (t < 0.0f) continue;
+    }
+    WalkPlace& at = walk.at;
+    while (at.stretch + 1 < walk.num_stretches && !(t < walk.stretches[at.stretch].end)) {
+      at.start = walk.stretches[at.stretch++].end;
+    }
+    const WalkStretch& stretch = walk.stretches[at.stretch];
+    const RateBox& box = stretch.box;
+    if (!(box.shows > 0.0f || box.residual > 0.0f)) continue;
+    const float x = max(t - at.start, 0.0f), corrects = box.residual > 0.0f ? box.residual * walk.factor : 0.0f;
+    float samples = medium_walk_near_rate(walk, t);
+    if (walk.spacing > 0.0f) {
+      const WalkPart part = walk_samples(stretch, stretch.end - at.start);
+      samples += part.rate / (walk.spacing * sqr(1.0f + part.fades * x));
+    }
+    const int i = out.size++;
+    out.t[i] = t;
+    out.rate[i] = samples + corrects;
+    out.corrects[i] = collides ? corrects : 0.0f;
+    out.taken[i] = box.sigma_t;
+    out.passes[i] = depth_transmittance(stretch.depth + box.sigma_t * x);
+    return true;
   }
+}
+
+/// Asks the next places of a walk, all at once.
+/// @return false: they were the last
+RELIEF_KERNEL bool medium_walk_next(const KernelGlobals& g, MediumWalk& walk, const GraphRay& ray, MediumPlaces& out)
+{
+  out.size = 0;
+  bool goes_on = true;
+  while (goes_on && out.size < kMediumPoints) goes_on = walk_next(walk, out);
   if (out.size == 0) return false;
+  Vec3f P[kMediumPoints];
+  for (int k = 0; k < out.size; ++k) P[k] = walk.O + walk.D * out.t[k];
   for (int i = 0; i < walk.size; ++i) {
     varying_medium_eval(g, *walk.media[i], walk.instances[i], P, out.size, walk.D, ray, out.media[i]);
   }
   return goes_on;
 }
 
-/// All media at one of the collisions.
-RELIEF_KERNEL MediaSum medium_collision(const MediumWalk& walk, const MediumCollisions& collisions, int k)
+/// All media at one of the places.
+RELIEF_KERNEL MediaSum medium_place_media(const MediumWalk& walk, const MediumPlaces& places, int k)
 {
   MediaSum sum = walk.even;
-  for (int i = 0; i < walk.size; ++i) media_add(sum, collisions.media[i][k]);
+  for (int i = 0; i < walk.size; ++i) media_add(sum, places.media[i][k]);
   return sum;
 }
 
 /// What is left below this of light is more often followed no further, and counts for more where it is.
 inline constexpr float kLittleLeft = 1.0f / 32.0f;
 
-/// @param left  not 0
+/// @param left  of light
 /// @return      factor by which what is left is multiplied; 0: it ends
 RELIEF_KERNEL float medium_walk_survive(MediumWalk& walk, Vec3f left)
 {
@@ -258,21 +420,30 @@ RELIEF_KERNEL float medium_walk_survive(MediumWalk& walk, Vec3f left)
   return counted_next(walk.numbers) < chance ? 1.0f / chance : 0.0f;
 }
 
+/// Corrects what is left of light at one of the places.
+/// @param left     over what the media as they are taken for leave
+/// @param sigma_t  that they really have there, 1/m
+RELIEF_KERNEL void medium_walk_correct(MediumWalk& walk, const MediumPlaces& places, int k, Vec3f sigma_t, Vec3f& left)
+{
+  if (!(places.corrects[k] > 0.0f)) return;
+  left *= Vec3f{1, 1, 1} - (sigma_t - places.taken[k]) / places.corrects[k];
+  if (!is_zero(left)) left *= medium_walk_survive(walk, left * places.passes[k]);
+}
+
 /// Share of light that media let through, as a random number of that mean.
 RELIEF_KERNEL Vec3f medium_walk_transmittance(const KernelGlobals& g, MediumWalk& walk, const GraphRay& ray)
 {
-  Vec3f left{1, 1, 1};
-  MediumCollisions collisions;
-  for (bool goes_on = true; goes_on;) {
-    goes_on = medium_collisions_next(g, walk, ray, collisions);
-    for (int k = 0; k < collisions.size; ++k) {
-      left *= Vec3f{1, 1, 1} - medium_collision(walk, collisions, k).sigma_t / collisions.rate[k];
-      if (is_zero(left)) return left;
-      left *= medium_walk_survive(walk, left);
-      if (is_zero(left)) return left;
+  const Vec3f passes = depth_transmittance(walk.depth);
+  if (!(walk.collision.t < walk.length)) return passes;
+  Vec3f left = splat3(medium_walk_survive(walk, passes));
+  MediumPlaces places;
+  for (bool goes_on = true; goes_on && !is_zero(left);) {
+    goes_on = medium_walk_next(g, walk, ray, places);
+    for (int k = 0; k < places.size && !is_zero(left); ++k) {
+      medium_walk_correct(walk, places, k, medium_place_media(walk, places, k).sigma_t, left);
     }
   }
-  return left;
+  return is_zero(left) ? left : left * passes;
 }
 
 }  // namespace relief
