@@ -301,7 +301,7 @@ std::string speed_plot(const BenchResults& results, BenchRayKind kind, PlotStyle
     }
   }
   return svg_bar_plot(
-      {fmt::format("{} rays", kBenchRayKindNames[static_cast<std::size_t>(kind)]), "", "Mrays/s", false, true}, labels,
+      {fmt::format("{} rays", kBenchRayKindNames[static_cast<std::size_t>(kind)]), "", "Mrays/s", false, false}, labels,
       series, styles);
 }
 

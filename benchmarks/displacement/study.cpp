@@ -251,7 +251,7 @@ void Study::add_sweeps(const BenchSceneSpec& spec) const
 {
   const auto sweep_over = [&](const char* what, const auto& change_of, const std::vector<double>& factors) {
     Sweep sweep;
-    sweep.title = fmt::format("{}: speed over TFDM, primary rays", spec.name);
+    sweep.title = fmt::format("{}: speed over TFDM by {}, primary rays", spec.name, what);
     sweep.x_label = fmt::format("factor of the {}", what);
     sweep.y_label = "times as fast";
     sweep.lines = {{std::string(kExactMethod), {}, {}}, {"rmip", {}, {}}, {"tfdm", {}, {}}};
