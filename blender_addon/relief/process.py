@@ -82,7 +82,9 @@ def check_version(binary):
             raise ReliefError(f"{binary} cannot be run: {getattr(cause, 'strerror', None) or cause}") from cause
         if run.returncode != 0:
             ended = f"ended by signal {-run.returncode}" if run.returncode < 0 else f"ended with code {run.returncode}"
-            raise ReliefError(f"{binary} cannot be run: " + (" ".join(run.stderr.split()) or ended))
+            # On a Linux that is older than the one it was made on each library says what it misses, one after the other.
+            reason = run.stderr.strip().partition("\n")[0]
+            raise ReliefError(f"{binary} cannot be run: " + (" ".join(reason.split()) or ended))
         words = run.stdout.partition("\n")[0].split()
         numbers = words[1].split(".") if len(words) == 2 and words[0] == "relief" else []
         if len(numbers) < 2 or not all(n.isdigit() for n in numbers[:2]):

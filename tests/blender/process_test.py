@@ -111,6 +111,8 @@ def test_another_version_is_reported():
 def test_a_program_that_does_not_start_is_reported_with_the_reason():
     lacks = b"relief: error while loading shared libraries: libfmt.so.9: cannot open shared object file"
     assert _refusal(b"#!/bin/sh\necho '" + lacks + b"' >&2; exit 127\n") == " cannot be run: " + lacks.decode()
+    old = b"libc.so.6: version GLIBC_2.36 not found"
+    assert _refusal(b"#!/bin/sh\necho '" + old + b"\n" + old + b"' >&2; exit 1\n") == " cannot be run: " + old.decode()
     assert _refusal(b"#!/bin/sh\nkill -ILL $$\n") == " cannot be run: ended by signal 4"
     # The header of a program for ARM.
     arm = b"\x7fELF\x02\x01\x01" + bytes(9) + b"\x02\x00\xb7\x00\x01\x00\x00\x00"
