@@ -166,7 +166,10 @@ GraphRange affine_range(const Affine3& m, int axis, const Boxes& boxes)
 }
 
 /// What a graph reads in boxes.
-GraphRange quantity_range(const MediumPoint& somewhere, const GraphInput& input, const Boxes& boxes)
+GraphRange quantity_range(const MediumPoint& somewhere,
+                          const VaryingPlace& place,
+                          const GraphInput& input,
+                          const Boxes& boxes)
 {
   using Q = GraphQuantity;
   const auto axis_of = [&input](Q first) { return static_cast<int>(input.quantity) - static_cast<int>(first); };
@@ -181,7 +184,7 @@ GraphRange quantity_range(const MediumPoint& somewhere, const GraphInput& input,
       const int axis = axis_of(Q::generated_x);
       const GraphRange object = affine_range(somewhere.node->object_from_world, axis, boxes);
       if (!somewhere.has_node) return object;
-      const Vec3f scale = somewhere.place.generated_scale, offset = somewhere.place.generated_offset;
+      const Vec3f scale = place.generated_scale, offset = place.generated_offset;
       return axis == 0   ? object * scale.x + offset.x
              : axis == 1 ? object * scale.y + offset.y
                          : object * scale.z + offset.z;
@@ -218,7 +221,7 @@ GraphRange quantity_range(const MediumPoint& somewhere, const GraphInput& input,
     case Q::shutter_time:
       return range_unknown();
     default:
-      return range_point(splat8(somewhere.quantity(input)));
+      return range_point(splat8(medium_quantity(somewhere, input)));
   }
 }
 
@@ -384,10 +387,10 @@ VaryingMedia::Problem VaryingMedia::add_rates(const SceneContext& context,
       }
       const auto registers = std::make_unique_for_overwrite<GraphRangeRegisters>();
       registers->images = images.empty() ? nullptr : images.data();
-      const MediumPoint somewhere(context.globals, place, instance, corner[0], D, kSomeRay);
+      const MediumPoint somewhere = medium_point_make(context.globals, place, instance, corner[0], D, kSomeRay);
       for (std::uint32_t i = 0; i < medium.program.num_inputs; ++i) {
         const GraphInput& input = medium.program.inputs[i];
-        registers->lanes[input.register_index] = quantity_range(somewhere, input, boxes);
+        registers->lanes[input.register_index] = quantity_range(somewhere, place, input, boxes);
       }
       run_bounds(medium.program, context.globals.textures, *registers);
       for (int k = 0; k < kMediumPoints; ++k) {

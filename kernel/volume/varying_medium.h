@@ -47,73 +47,6 @@ RELIEF_KERNEL const InstanceView& medium_object(const KernelGlobals& g, std::int
 
 /// A point of a medium and what a graph reads there. As in Cycles, the normal is against the ray, which has no length.
 struct MediumPoint {
-  MediumPoint(const KernelGlobals& g, const VaryingPlace& at, std::int32_t instance, Vec3f P, Vec3f D, GraphRay ray_of)
-      : place(at),
-        scene(&g.graph_scene),
-        node(&medium_object(g, instance)),
-        has_node(instance != kWholeWorld),
-        wo(-D),
-        ray(ray_of)
-  {
-    hit.P = P;
-    hit.Ng = hit.Ns = wo;
-    P_object = transform_point(node->object_from_world, P);
-    P_generated = has_node ? P_object * place.generated_scale + place.generated_offset : P_object;
-    ray.length = 0;
-  }
-  MediumPoint(const MediumPoint&) = delete;
-  MediumPoint& operator=(const MediumPoint&) = delete;
-
-  float quantity(const GraphInput& input) const
-  {
-    using Q = GraphQuantity;
-    switch (input.quantity) {
-      case Q::object_x:
-        return P_object.x;
-      case Q::object_y:
-        return P_object.y;
-      case Q::object_z:
-        return P_object.z;
-      case Q::generated_x:
-        return P_generated.x;
-      case Q::generated_y:
-        return P_generated.y;
-      case Q::generated_z:
-        return P_generated.z;
-      case Q::attribute_value:
-      case Q::attribute_x:
-      case Q::attribute_y:
-      case Q::attribute_z:
-        if (!has_node) return 0.0f;
-        break;
-      case Q::attribute_alpha:
-        if (!has_node) return 1.0f;
-        break;
-      case Q::instance:
-        if (!has_node) return -1.0f;
-        break;
-      case Q::edge_distance:
-        return kInfinity;
-      case Q::uv0_v:
-      case Q::uv1_v:
-      case Q::parametric_x:
-      case Q::dpdx_x:
-      case Q::dpdx_y:
-      case Q::dpdx_z:
-      case Q::dpdy_x:
-      case Q::dpdy_y:
-      case Q::dpdy_z:
-        return 0.0f;
-      default:
-        break;
-    }
-    constexpr MeshView kNoMesh;
-    GraphPoint point{&kNoMesh, node, 0, 0.0f, 0.0f, &hit, wo, {0.0f, 0.0f}, 0.0f, scene, ray};
-    point.P_object = P_object;
-    return graph_quantity(point, input.quantity, input.index);
-  }
-
-  const VaryingPlace& place;
   const GraphScene* scene;
   const InstanceView* node;
   bool has_node;
@@ -122,6 +55,71 @@ struct MediumPoint {
   SurfaceHit hit;
   Vec3f P_object, P_generated;
 };
+
+RELIEF_KERNEL MediumPoint medium_point_make(const KernelGlobals& g,
+                                            const VaryingPlace& place,
+                                            std::int32_t instance,
+                                            Vec3f P,
+                                            Vec3f D,
+                                            GraphRay ray)
+{
+  MediumPoint at{&g.graph_scene, &medium_object(g, instance), instance != kWholeWorld, -D, ray, {}, {}, {}};
+  at.hit.P = P;
+  at.hit.Ng = at.hit.Ns = at.wo;
+  at.P_object = transform_point(at.node->object_from_world, P);
+  at.P_generated = at.has_node ? at.P_object * place.generated_scale + place.generated_offset : at.P_object;
+  at.ray.length = 0;
+  return at;
+}
+
+RELIEF_KERNEL float medium_quantity(const MediumPoint& at, const GraphInput& input)
+{
+  using Q = GraphQuantity;
+  switch (input.quantity) {
+    case Q::object_x:
+      return at.P_object.x;
+    case Q::object_y:
+      return at.P_object.y;
+    case Q::object_z:
+      return at.P_object.z;
+    case Q::generated_x:
+      return at.P_generated.x;
+    case Q::generated_y:
+      return at.P_generated.y;
+    case Q::generated_z:
+      return at.P_generated.z;
+    case Q::attribute_value:
+    case Q::attribute_x:
+    case Q::attribute_y:
+    case Q::attribute_z:
+      if (!at.has_node) return 0.0f;
+      break;
+    case Q::attribute_alpha:
+      if (!at.has_node) return 1.0f;
+      break;
+    case Q::instance:
+      if (!at.has_node) return -1.0f;
+      break;
+    case Q::edge_distance:
+      return kInfinity;
+    case Q::uv0_v:
+    case Q::uv1_v:
+    case Q::parametric_x:
+    case Q::dpdx_x:
+    case Q::dpdx_y:
+    case Q::dpdx_z:
+    case Q::dpdy_x:
+    case Q::dpdy_y:
+    case Q::dpdy_z:
+      return 0.0f;
+    default:
+      break;
+  }
+  constexpr MeshView kNoMesh;
+  GraphPoint point{&kNoMesh, at.node, 0, 0.0f, 0.0f, &at.hit, at.wo, {0.0f, 0.0f}, 0.0f, at.scene, at.ray};
+  point.P_object = at.P_object;
+  return graph_quantity(point, input.quantity, input.index);
+}
 
 /// Most points that are asked for at once.
 inline constexpr int kMediumPoints = 8;
@@ -198,10 +196,10 @@ RELIEF_KERNEL void varying_medium_eval(const KernelGlobals& g,
   const VaryingPlace& place = varying_place(medium, instance);
   if (!medium_points_load(g, medium, instance, P, count, registers)) {
     for (int k = 0; k < count; ++k) {
-      const MediumPoint point(g, place, instance, P[k], D, ray);
+      const MediumPoint point = medium_point_make(g, place, instance, P[k], D, ray);
       for (std::uint32_t i = 0; i < medium.program.num_inputs; ++i) {
         const GraphInput& input = medium.program.inputs[i];
-        registers.lanes[input.register_index][k] = point.quantity(input);
+        registers.lanes[input.register_index][k] = medium_quantity(point, input);
       }
     }
   }
