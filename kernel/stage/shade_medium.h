@@ -133,6 +133,14 @@ RELIEF_KERNEL void shade_medium_light(const KernelGlobals& g,
   shade_medium_light_at(g, state, path, at, media, place, u, shadow);
 }
 
+/// By how much of what is scattered a path is, beside what passes. One that is scattered for the last time finds lights alone, most of
+/// whose light has been asked for. Where a bright floor is seen through a dense cloud 1 has three times the noise, and .1 twice as much
+/// in front of the sky.
+RELIEF_KERNEL float medium_offered(const KernelGlobals& g, const MediumState& m)
+{
+  return static_cast<int>(m.bounces) >= g.limits.volume ? 0.4f : 1.0f;
+}
+
 /// Sends a path on from where it is scattered, or ends it.
 /// @param place  what is carried there is by the density of the place
 RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
@@ -258,11 +266,6 @@ RELIEF_KERNEL MediaSum place_media(const MediumWalk& walk, const KeptPlace& kept
   return sum;
 }
 
-/// A path that is scattered for the last time finds lights alone, most of whose light has been asked for: it is followed so much less often
-/// than by what it carries. Where a bright floor is seen through a dense cloud 1 has three times the noise, and .1 twice as much in front of
-/// the sky.
-inline constexpr float kLastScattered = 0.4f;
-
 /// As shade_medium_stretch, where some of the media vary.
 [[gnu::noinline]] RELIEF_KERNEL bool shade_medium_varying(const KernelGlobals& g,
                                                           PathState& state,
@@ -315,8 +318,7 @@ inline constexpr float kLastScattered = 0.4f;
                             choice_point(u.first_bits[0], u.first_bits[1]), shadow);
     }
   }
-  const bool then_ends = static_cast<int>(state.media[path].bounces) >= g.limits.volume;
-  const float offered = then_ends ? kLastScattered * scattered.total : scattered.total;
+  const float offered = scattered.total * medium_offered(g, state.media[path]);
   const float chance = offered > 0.0f ? offered / (offered + passing) : 0.0f;
   if (u.at[2].x < chance) {
     const MediaSum media = place_media(walk, scattered);
@@ -361,18 +363,24 @@ RELIEF_KERNEL bool shade_medium_stretch(const KernelGlobals& g,
   if (g.has_lights) {
     shade_medium_light(g, state, path, at, media, choice_point(u.first_bits[0], u.first_bits[1]), shadow);
   }
-  const float distance = free_distance_sample(channel_choose(sigma_t, at.chances, u.at[2].y), u.at[2].x);
-  if (distance < at.length) {
+  // Of what each channel decides, the part that scatters.
+  const Vec3f passes = medium_transmittance(sigma_t, at.length);
+  const float offered = medium_offered(g, state.media[path]);
+  const auto scatters = [offered](float pass) { return offered * (1.0f - pass) / (offered * (1.0f - pass) + pass); };
+  const Vec3f q{scatters(passes.x), scatters(passes.y), scatters(passes.z)};
+  const float chosen = channel_choose(q, at.chances, u.at[2].y);
+  if (u.at[2].x < chosen) {
+    const float sigma = channel_choose(sigma_t, at.chances, u.at[2].y);
+    const float distance = free_distance_sample_within(sigma, at.length, u.at[2].x / chosen);
     const Vec3f left = medium_transmittance(sigma_t, distance);
-    const float pdf = dot(at.chances, sigma_t * left);
+    const float pdf = free_distance_pdf_within(sigma_t, at.chances * q, at.length, distance);
     if (!(pdf > 0.0f)) return false;
     shade_medium_feature(g, state, path, at, carried);
     shade_medium_scatter(g, state, path, at, media, {distance, pdf, throughput * left / pdf}, u.at[1], next);
     return false;
   }
-  const Vec3f left = medium_transmittance(sigma_t, at.length);
-  const float chance = dot(at.chances, left);
-  state.throughput[path] = chance > 0.0f ? throughput * left / chance : Vec3f{};
+  const float chance = dot(at.chances, Vec3f{1, 1, 1} - q);
+  state.throughput[path] = chance > 0.0f ? throughput * passes / chance : Vec3f{};
   return chance > 0.0f || is_first;
 }
 
