@@ -17,6 +17,7 @@
 
 #include "exporters/atomic_file.h"
 #include "integrator/flush_denormals.h"
+#include "integrator/scene_context.h"
 #include "integrator/trace.h"
 #include "scene/load.h"
 

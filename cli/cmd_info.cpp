@@ -19,6 +19,7 @@
 #include "displacement/seams.h"
 #include "integrator/border_seams.h"
 #include "integrator/scene_context.h"
+#include "integrator/scene_displacement.h"
 #include "kernel/feature_mask.h"
 #include "scene/displaced_mesh.h"
 #include "scene/load.h"

@@ -51,6 +51,7 @@
 #include "exporters/sample_range.h"
 #include "exporters/stats_json.h"
 #include "integrator/render.h"
+#include "integrator/scene_displacement.h"
 #include "scene/load.h"
 #include "scene/setting_values.h"
 

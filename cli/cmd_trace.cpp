@@ -20,6 +20,8 @@
 #include "cli/value_hint.h"
 #include "exporters/atomic_file.h"
 #include "exporters/errors.h"
+#include "integrator/scene_context.h"
+#include "integrator/scene_displacement.h"
 #include "integrator/trace.h"
 #include "scene/diagnostics.h"
 #include "scene/load.h"

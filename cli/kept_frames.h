@@ -6,6 +6,7 @@
 
 #include "cli/kept_scene.h"
 #include "displacement/displacement_set.h"
+#include "integrator/kept_trees.h"
 #include "integrator/render.h"
 #include "scene/kept_images.h"
 

@@ -4,6 +4,8 @@
 #include <chrono>
 #include <cstring>
 
+#include "integrator/scene_context.h"
+
 namespace relief {
 
 namespace {
@@ -41,6 +43,16 @@ SceneContext context_make(const Scene& scene, const ContextOptions& options)
   caustics.kinds = options.caustic_kinds;
   return SceneContext(scene, options.displacement, options.environment_density, caustics, options.trees);
 }
+
+struct KeptContext::Made {
+  ContextOptions options;
+  SceneContext context;
+};
+
+KeptContext::KeptContext() = default;
+KeptContext::~KeptContext() = default;
+
+void KeptContext::reset() { made_.reset(); }
 
 const SceneContext& KeptContext::get(const Scene& scene, const ContextOptions& options)
 {

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 
+#include "integrator/kept_context.h"
 #include "integrator/pass_plan.h"
+#include "integrator/scene_context.h"
+#include "integrator/scene_displacement.h"
 #include "scene/memory.h"
 
 namespace relief {

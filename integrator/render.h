@@ -3,16 +3,25 @@
 
 #include <atomic>
 #include <functional>
+#include <memory>
 #include <span>
 
+#include "displacement/displacement_set.h"
 #include "integrator/film.h"
-#include "integrator/kept_context.h"
-#include "integrator/scene_context.h"
-#include "integrator/stages.h"
+#include "kernel/camera/camera.h"
+#include "kernel/light/light_technique.h"
 #include "kernel/statistics.h"
 #include "scene/scene.h"
 
 namespace relief {
+
+struct Batch;           // integrator/stages.h
+struct ContextOptions;  // integrator/kept_context.h
+struct FilterTable;     // kernel/film/pixel_filter.h
+struct KernelGlobals;   // kernel/globals.h
+class KeptContext;      // integrator/kept_context.h
+class KeptTrees;        // integrator/kept_trees.h
+struct SceneContext;    // integrator/scene_context.h
 
 struct RenderOptions {
   RenderSettings settings;                                 ///< the scene's, with the command line's changes

@@ -15,6 +15,7 @@
 #include "integrator/checkpoint.h"
 #include "integrator/error_history.h"
 #include "integrator/flush_denormals.h"
+#include "integrator/kept_context.h"
 #include "integrator/media.h"
 #include "integrator/pass_plan.h"
 #include "integrator/photon_benefit.h"

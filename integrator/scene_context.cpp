@@ -8,6 +8,7 @@
 #include "integrator/graph_rays.h"
 #include "integrator/shadow_stage.h"
 #include "integrator/surface_kernels.h"
+#include "kernel/bsdf/energy_tables.h"
 #include "scene/texture_store.h"
 
 namespace relief {
@@ -128,6 +129,8 @@ void leave_out_what_is_far(const Medium& world, KernelGlobals& g)
 }
 
 }  // namespace
+
+SceneContext::~SceneContext() = default;
 
 SceneContext::SceneContext(const Scene& loaded,
                            const DisplacementOptions& displacement,

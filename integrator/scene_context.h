@@ -11,7 +11,6 @@
 #include "integrator/scene_views.h"
 #include "integrator/varying_media.h"
 #include "integrator/wavefront.h"
-#include "kernel/bsdf/energy_tables.h"
 #include "kernel/globals.h"
 #include "kernel/statistics.h"
 #include "scene/scene.h"
@@ -29,6 +28,7 @@ struct SceneContext : SceneViews {
                         EnvironmentDensity environment_density = EnvironmentDensity::kExcess,
                         const CausticSettings& caustics = {CausticsMode::kOff},
                         std::shared_ptr<KeptTrees> trees = nullptr);
+  ~SceneContext();
 
   /// @param photons       the render has a photon pass
   /// @param light_passes  it has layers that tell light apart by its first event

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "integrator/path_lod.h"
+#include "kernel/bsdf/subsurface.h"
 #include "kernel/math/rounding.h"
 #include "kernel/stage/path_access.h"
 #include "kernel/volume/distance.h"

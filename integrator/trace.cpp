@@ -11,6 +11,7 @@
 #include "integrator/photon_benefit.h"
 #include "integrator/photon_pass.h"
 #include "integrator/ray_surface.h"
+#include "integrator/scene_context.h"
 #include "integrator/stages.h"
 
 namespace relief {

@@ -9,10 +9,11 @@
 
 #include "displacement/explain.h"
 #include "integrator/render.h"
-#include "integrator/scene_context.h"
 #include "integrator/wavefront.h"
 
 namespace relief {
+
+struct SceneContext;  // integrator/scene_context.h
 
 struct TraceRay {
   Vec3f O, D;  ///< world; D need not be unit: t counts in lengths of D

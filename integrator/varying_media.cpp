@@ -11,6 +11,7 @@
 #include "integrator/instance_box.h"
 #include "integrator/scene_context.h"
 #include "kernel/sample/sobol.h"
+#include "kernel/volume/varying_medium.h"
 #include "scene/texture_store.h"
 
 namespace relief {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "kernel/volume/varying_medium.h"
+#include "kernel/volume/varying_place.h"
 
 namespace relief {
 

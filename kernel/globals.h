@@ -1,7 +1,6 @@
 // Everything a stage may read: views of the scene, fixed for the whole render.
 #pragma once
 
-#include "kernel/bsdf/energy_tables.h"
 #include "kernel/bsdf/material.h"
 #include "kernel/camera/camera.h"
 #include "kernel/film/film_accumulator.h"
@@ -10,6 +9,7 @@
 #include "kernel/graph/graph_registers.h"
 #include "kernel/graph/graph_scene.h"
 #include "kernel/light/light_sampler.h"
+#include "kernel/light/light_technique.h"
 #include "kernel/math/motion.h"
 #include "kernel/photon/photon.h"
 #include "kernel/shape/mesh_view.h"
@@ -22,12 +22,9 @@ struct BounceLimits {
   int total = 12, diffuse = 12, glossy = 12, transmission = 12, transparent = 32, volume = 12;
 };
 
-/// How direct light is estimated. All three converge to the same picture, which tests rely on; the default has the least
-/// noise. Delta lights can only be sampled, delta lobes only be followed: each is always done by the one that can.
-enum class LightTechnique : std::uint8_t { kMis, kLightSampling, kBsdfSampling };
-
+struct BsdfTables;  // kernel/bsdf/energy_tables.h
 struct KernelGlobals;
-struct VaryingMedium;  // kernel/volume/varying_medium.h
+struct VaryingMedium;  // kernel/volume/varying_place.h
 
 /// A point of a light and a ray that takes light from there.
 struct EmitterPoint {

@@ -10,6 +10,7 @@
 #include "exporters/errors.h"
 #include "exporters/exr.h"
 #include "exporters/image_metrics.h"
+#include "integrator/scene_context.h"
 #include "scene/load.h"
 
 namespace relief {

@@ -18,6 +18,7 @@
 #pragma once
 
 #include "kernel/bsdf/dielectric.h"
+#include "kernel/bsdf/lobe_traits.h"
 #include "kernel/feature_mask.h"
 
 namespace relief {
@@ -72,9 +73,6 @@ RELIEF_KERNEL LobeSample lobe_sample_delta(Vec3f wi, Vec3f reflectance, float pr
 {
   return {wi, kLobeDelta | (wi.z < 0.0f ? kLobeTransmit : kLobeReflect), reflectance, probability, 0.0f, 1.0f};
 }
-
-/// kBoth: on either side, as meant; kSphere: all around a strand, which has none.
-enum class LobeSides : std::uint8_t { kReflect, kTransmit, kBoth, kSphere };
 
 /// Whose roughness decides whether a lobe is sharp.
 enum class LobeSharpness { kNever, kBase, kCoat };

@@ -22,19 +22,6 @@ namespace relief {
 
 struct BsdfTables;
 
-/// Whether lamps fade, as the surface's own normal sees them, that a bent normal sees.
-enum class LobeFading : std::uint8_t { kNever, kBefore52, kAlways };
-
-struct MixtureTraits {
-  LobeSides sides = LobeSides::kReflect;
-  bool is_diffuse = true;      ///< counts as diffuse, as lobe_sample has it
-  bool is_microfacet = false;  ///< for what its version of Cycles makes of bent normals, see mixture_reaches
-  bool has_fresnel = false;    ///< f is multiplied by the reflectance of the half angle
-  LobeFading fading = LobeFading::kAlways;
-  bool leaves_below = false;  ///< before 5.0 what it samples may leave on the wrong side of the true surface
-  bool is_strand = false;     ///< has all directions around a strand: frames as in hair.h
-};
-
 /// What lobes of all kinds know of their hit.
 struct LobeHit {
   Vec3f wo{};                   ///< unit, the lobe's own frame, z > 0

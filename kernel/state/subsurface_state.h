@@ -2,7 +2,7 @@
 #pragma once
 
 #include "kernel/bsdf/closure_kinds.h"
-#include "kernel/bsdf/subsurface.h"
+#include "kernel/bsdf/subsurface_params.h"
 
 namespace relief {
 

@@ -7,25 +7,9 @@
 #include "kernel/graph/graph_material.h"
 #include "kernel/volume/medium_closures.h"
 #include "kernel/volume/rate_grid.h"
+#include "kernel/volume/varying_place.h"
 
 namespace relief {
-
-/// Where a medium that varies is.
-struct VaryingPlace {
-  RateGrid rates;
-  Vec3f generated_scale{1, 1, 1}, generated_offset;  ///< take object space to coordinates that graphs call generated
-  /// 1/m: more counts as this, in level 0, and as half of it in each one after; light gets no farther through it than through a wall.
-  float densest = kInfinity;
-};
-
-struct VaryingMedium {
-  GraphProgramView program;
-  const VolumeClosureSpec* closures = nullptr;
-  std::uint32_t num_closures = 0;  ///< 0: the medium is even
-  bool shines = false;             ///< it may send out light
-  const VaryingPlace* places = nullptr;
-  const std::int32_t* place_of_instance = nullptr;  ///< null: it fills the world, in places[0]
-};
 
 RELIEF_KERNEL const VaryingPlace& varying_place(const VaryingMedium& medium, std::int32_t instance)
 {

@@ -1,5 +1,6 @@
 // How the photon pass approaches the truth: its bias against a closed form, and what stays the same between frames.
 #include <cmath>
+#include <cstdio>
 
 #include "kernel/photon/photon.h"
 #include "tests/support/render_scene.h"

@@ -1,5 +1,7 @@
 // Each rule by which photons and paths share the light, in a scene where leaving it out shows: every test here fails if the
 // one line that it is about is broken.
+#include <cstdio>
+
 #include "tests/support/caustic_scene.h"
 
 namespace relief::test {

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "integrator/scene_context.h"
 #include "integrator/trace.h"
 #include "scene/memory.h"
 #include "tests/support/render_scene.h"

@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "integrator/scene_context.h"
+#include "integrator/scene_displacement.h"
 #include "integrator/trace.h"
 #include "tests/support/displacement_methods.h"
 #include "tests/support/scene_builder.h"

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "displacement/vec3d.h"
+#include "integrator/scene_context.h"
 #include "integrator/trace.h"
 #include "tests/support/displacement_methods.h"
 #include "tests/support/scene_builder.h"

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "integrator/scene_displacement.h"
 #include "tests/support/render_scene.h"
 #include "tests/support/scene_builder.h"
 

@@ -4,6 +4,7 @@
 #include <numbers>
 #include <utility>
 
+#include "integrator/scene_displacement.h"
 #include "tests/support/render_scene.h"
 #include "tests/support/scene_builder.h"
 

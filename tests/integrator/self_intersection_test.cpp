@@ -1,6 +1,7 @@
 // Rays that leave a surface do not meet it again at their origin, at any scale, place or tilt.
 #include <random>
 
+#include "integrator/scene_context.h"
 #include "integrator/trace.h"
 #include "kernel/math/rounding.h"
 #include "kernel/sample/warp.h"

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "displacement/cost_model.h"
+#include "integrator/scene_context.h"
 #include "integrator/trace.h"
 #include "kernel/shape/surface_hit.h"
 #include "tests/support/render_scene.h"

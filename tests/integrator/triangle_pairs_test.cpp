@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "displacement/vec3d.h"
+#include "integrator/scene_context.h"
 #include "integrator/trace.h"
 #include "integrator/triangle_pairs.h"
 #include "tests/oracle/triangle_tree.h"

@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "integrator/scene_context.h"
 #include "integrator/trace.h"
 #include "scene/load.h"
 #include "scene/world_displacement.h"
