@@ -39,10 +39,60 @@ function(relief_cold)
   set_property(SOURCE ${ARGN} APPEND PROPERTY COMPILE_OPTIONS "$<$<CONFIG:Release>:-O1>")
 endfunction()
 
+# RELIEF_GROUP_SIZE: most of a folder's files that are compiled as one. Half of what compiles a file is headers that the others include as
+# well. A build from nothing is so done sooner, one after a change of a file later.
+set(RELIEF_GROUP_SIZE 1 CACHE STRING "Files that are compiled as one, at most")
+
+# relief_group_sources(TARGET): what RELIEF_GROUP_SIZE says, once the folder's file has been read. Generated files, and those with
+# definitions of their own, stay by themselves.
+function(relief_group_sources target)
+  if(RELIEF_GROUP_SIZE LESS 2)
+    return()
+  endif()
+  find_package(Python3 REQUIRED COMPONENTS Interpreter)
+  get_target_property(sources ${target} SOURCES)
+  set(apart)
+  foreach(source IN LISTS sources)
+    get_source_file_property(definitions "${source}" COMPILE_DEFINITIONS)
+    get_source_file_property(options "${source}" COMPILE_OPTIONS)
+    if(definitions OR IS_ABSOLUTE "${source}" OR NOT source MATCHES "^[a-z0-9_/]+[.]cpp$")
+      list(APPEND apart "${source}")
+    elseif(options)
+      list(APPEND cold "${CMAKE_CURRENT_SOURCE_DIR}/${source}")
+    else()
+      list(APPEND warm "${CMAKE_CURRENT_SOURCE_DIR}/${source}")
+    endif()
+  endforeach()
+  foreach(kind warm cold)
+    execute_process(COMMAND "${Python3_EXECUTABLE}" "${PROJECT_SOURCE_DIR}/scripts/group_sources" ${RELIEF_GROUP_SIZE} ${${kind}}
+      OUTPUT_VARIABLE groups OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+    # Names may change with what a file says.
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${${kind}})
+    string(REPLACE ";" "|" groups "${groups}")
+    string(REPLACE "\n" ";" groups "${groups}")
+    set(index 0)
+    foreach(group IN LISTS groups)
+      string(REPLACE "|" "\"\n#include \"" group "#include \"${group}\"\n")
+      set(file "${CMAKE_CURRENT_BINARY_DIR}/groups/${target}_${kind}_${index}.cpp")
+      file(CONFIGURE OUTPUT "${file}" CONTENT "${group}" @ONLY)
+      list(APPEND apart "${file}")
+      # A name within a function may be that of a header which only another file includes; and types of a source that is included are
+      # taken for those of a header.
+      set_property(SOURCE "${file}" APPEND PROPERTY COMPILE_OPTIONS -Wno-shadow $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
+      if(kind STREQUAL "cold")
+        relief_cold("${file}")
+      endif()
+      math(EXPR index "${index} + 1")
+    endforeach()
+  endforeach()
+  set_target_properties(${target} PROPERTIES SOURCES "${apart}")
+endfunction()
+
 # relief_add_library(NAME sources...): a static library with the project's flags.
 function(relief_add_library name)
   add_library(${name} STATIC ${ARGN})
   target_link_libraries(${name} PUBLIC relief_options)
+  cmake_language(EVAL CODE "cmake_language(DEFER CALL relief_group_sources ${name})")
 endfunction()
 
 # relief_add_tests(NAME [WHOLE] LABELS l... LIBRARIES t... SOURCES s...): one GoogleTest executable, each TEST a CTest test.
