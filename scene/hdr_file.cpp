@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "kernel/assert.h"
+#include "scene/sample_put.h"
 
 namespace relief {
 namespace {
@@ -76,7 +77,7 @@ class HdrFile final : public ImageFile {
       if (error != nullptr) return "row " + std::to_string(next_row_) + ": " + error;
       if (next_row_++ < row_begin) continue;
       for (std::size_t x = 0; x < width_; ++x) {
-        for (int c = channel_begin; c < channel_end; ++c) put(value(x, c), type, rows);
+        for (int c = channel_begin; c < channel_end; ++c) sample_put(value(x, c), type, rows);
       }
     }
     return {};
@@ -98,18 +99,6 @@ class HdrFile final : public ImageFile {
       scales[static_cast<std::size_t>(exponent)] = std::ldexp(1.0f, exponent - 136);
     }
     return scales;
-  }
-
-  static void put(float value, SampleType type, unsigned char*& to)
-  {
-    const auto copy = [&](auto sample) {
-      std::memcpy(to, &sample, sizeof sample);
-      to += sizeof sample;
-    };
-    const float part = std::min(value, 1.0f);
-    if (type == SampleType::kFloat) copy(value);
-    if (type == SampleType::kU16) copy(static_cast<std::uint16_t>(part * 65535.0f + 0.5f));
-    if (type == SampleType::kU8) copy(static_cast<std::uint8_t>(part * 255.0f + 0.5f));
   }
 
   bool take(std::size_t count, unsigned char* to)
@@ -136,7 +125,7 @@ class HdrFile final : public ImageFile {
     if ((std::size_t{start[2]} << 8 | start[3]) != width_) return "its width is not the image's";
     for (std::size_t c = 0; c < 4; ++c) {
       for (std::size_t x = 0; x < width_;) {
-        unsigned char count, same;
+        unsigned char count = 0, same = 0;
         if (!take(1, &count)) return kTooShort;
         const bool is_run = count > 128;
         const std::size_t num = is_run ? count - 128u : count;

@@ -56,7 +56,7 @@ const ImageIo& module_load()
       is_there = true;
     }
   }
-  throw std::runtime_error("the module for images other than PNG, JPEG and HDR cannot be loaded: " + cause);
+  throw std::runtime_error("the module for images other than PNG, JPEG, HDR and EXR cannot be loaded: " + cause);
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 // What relief needs of OpenImageIO, behind an interface without its types. The library brings along 245 others, whose
 // linking takes a quarter of a second of processor time and 100 MiB; so it is in a module of its own, image_io_module.cpp,
-// which image_io.cpp loads when the first image is opened that is neither PNG, JPEG nor HDR (png_file.h, jpeg_file.h,
-// hdr_file.h). What images are read for is in image_reader.h and texture_cache.h.
+// which image_io.cpp loads when the first image is opened that is neither PNG, JPEG, HDR nor EXR (png_file.h, jpeg_file.h,
+// hdr_file.h, exr_file.h). What images are read for is in image_reader.h and texture_cache.h.
 //
 // Between program and module errors are texts, and exceptions go by std::exception alone: of relief's own types, and of
 // templates in them, each side has its own.

@@ -7,6 +7,7 @@
 
 #include "kernel/assert.h"
 #include "scene/diagnostics.h"
+#include "scene/exr_file.h"
 #include "scene/hdr_file.h"
 #include "scene/image_format.h"
 #include "scene/image_memory.h"
@@ -179,6 +180,7 @@ void ImageReader::open()
   image_ = format == "png"    ? png_file_make()
            : format == "jpeg" ? jpeg_file_make(bytes)
            : format == "hdr"  ? hdr_file_make(bytes)
+           : format == "openexr" ? exr_file_make(source_.file, bytes)
                               : nullptr;
   if (image_ == nullptr) image_ = image_io().make_file(format);
   if (image_ == nullptr) {

@@ -1,5 +1,5 @@
-// Opening images through OpenImageIO (image_io.h), or PNG, JPEG and HDR without it (png_file.h, jpeg_file.h, hdr_file.h), and reading their rows: files or
-// encoded bytes, any format, with the checks that every use of an image needs. What the values mean is up to
+// Opening images through OpenImageIO (image_io.h), or PNG, JPEG, HDR and EXR without it (png_file.h, jpeg_file.h, hdr_file.h, exr_file.h), and
+// reading their rows: files or encoded bytes, any format, with the checks that every use of an image needs. What the values mean is up to
 // texture_source.h (colours) and height_map.h (heights).
 #pragma once
 

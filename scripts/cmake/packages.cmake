@@ -13,7 +13,7 @@ set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME relief)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION graphics)
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS OFF)
-# scripts/package finds out: the program depends on its libraries; that of the module which reads images other than PNG, JPEG and HDR, and which
+# scripts/package finds out: the program depends on its libraries; that of the module which reads images other than PNG, JPEG, HDR and EXR, and which
 # brings along 245 others, is recommended.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS OFF)
 include(CPack)

@@ -1,4 +1,4 @@
-// OpenImageIO is loaded when the first image is opened that is neither PNG, JPEG nor HDR, and not before: it takes longer than many a command.
+// OpenImageIO is loaded when the first image is opened that is neither PNG, JPEG, HDR nor EXR, and not before: it takes longer than many a command.
 // Here it cannot be loaded at all, since a file of its name that is no library comes first in the search path.
 #include "tests/cli/program.h"
 
@@ -26,13 +26,15 @@ class ImageModule : public ProgramTest {
   }
 };
 
-TEST_F(ImageModule, IsNotNeededForPngAndHdr)
+TEST_F(ImageModule, IsNotNeededForPngHdrAndExr)
 {
   const std::string scene = scene_write(kPixelPng);
   EXPECT_EQ(render(scene, file("a.exr"), {"--png", file("a.png")}).exit_code, 0);
   EXPECT_EQ(render(scene, file("b.exr"), {"--seed", "2"}).exit_code, 0);
   const std::string sky = folder_.write("sky.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 1\nabc\x80").string();
   EXPECT_EQ(render(scene, file("s.exr"), {"--environment", sky}).exit_code, 0);
+  EXPECT_EQ(render(scene, file("p.exr"), {"--preview", file("color.exr")}).exit_code, 0);
+  EXPECT_EQ(render(scene, file("e.exr"), {"--environment", file("color.exr")}).exit_code, 0);
   for (const Arguments& arguments : {Arguments{"info", scene},
                                      {"compare", file("a.exr"), file("b.exr"), "--diff", file("d.png")},
                                      {"merge", file("a.exr"), file("b.exr"), "-o", file("c.exr")}}) {
