@@ -53,6 +53,10 @@ float quantity_of(const ComputedEnvironment& environment, const GraphInput& inpu
     case Q::vertex_normal_y:
     case Q::vertex_normal_z:
       return -component(d, axis_of(Q::vertex_normal_x));
+    case Q::smooth_normal_x:
+    case Q::smooth_normal_y:
+    case Q::smooth_normal_z:
+      return -component(d, axis_of(Q::smooth_normal_x));
     case Q::incoming_x:
     case Q::incoming_y:
     case Q::incoming_z:

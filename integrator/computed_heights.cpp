@@ -77,6 +77,9 @@ bool is_of_instance(GraphQuantity q, const MeshView& mesh, std::uint16_t index)
     case Q::vertex_normal_x:
     case Q::vertex_normal_y:
     case Q::vertex_normal_z:
+    case Q::smooth_normal_x:
+    case Q::smooth_normal_y:
+    case Q::smooth_normal_z:
     case Q::parametric_x:
     case Q::parametric_y:
       return false;

@@ -209,6 +209,9 @@ GraphRange quantity_range(const MediumPoint& somewhere,
     case Q::vertex_normal_x:
     case Q::vertex_normal_y:
     case Q::vertex_normal_z:
+    case Q::smooth_normal_x:
+    case Q::smooth_normal_y:
+    case Q::smooth_normal_z:
       return range_between(splat8(-1.00001f), splat8(1.00001f));
     case Q::ray_kind:
       return range_between(F8{}, splat8(1.0f));

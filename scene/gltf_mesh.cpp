@@ -438,6 +438,17 @@ void derive_tangent_columns(const std::map<std::string, std::uint16_t>& columns,
   }
 }
 
+/// Normals that graphs read, as a column: a displaced mesh may have others.
+void derive_normal_column(const std::map<std::string, std::uint16_t>& columns, Mesh& mesh)
+{
+  const auto it = columns.find(kBaseNormalAttribute);
+  if (it == columns.end() || mesh.N.empty()) return;
+  AttributeColumn column{it->second, 3, {}};
+  column.values.reserve(3 * mesh.N.size());
+  for (const Normal3f& n : mesh.N) column.values.insert(column.values.end(), {n.x, n.y, n.z});
+  mesh.columns.push_back(std::move(column));
+}
+
 template <typename T>
 void keep(std::vector<T>& values, const std::vector<std::uint32_t>& kept)
 {
@@ -680,6 +691,7 @@ std::optional<Mesh> gltf_mesh_load(const GltfDocument& document,
   repair_normals(reader, mesh);
   repair_tangents(reader, mesh);
   derive_tangent_columns(columns, mesh);
+  derive_normal_column(columns, mesh);
   if (tangent_uv_set >= 0 && mesh.tangent.empty() && !mesh.uv[tangent_uv_set].empty()) {
     tangents_derive(mesh, tangent_uv_set);
   }

@@ -15,6 +15,9 @@ namespace relief {
 /// Tangents of uv set i as an attribute that graphs read: no name of a file's begins so.
 inline std::string tangent_attribute_name(int uv_set) { return "tangent:" + std::to_string(uv_set); }
 
+/// Likewise: normals of a mesh as it is before it is displaced.
+inline constexpr const char* kBaseNormalAttribute = "normal:";
+
 /// Weights of a mesh's morph targets. Those that are missing are 0.
 struct MorphWeights {
   std::vector<double> weights;

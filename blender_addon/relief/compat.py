@@ -161,6 +161,13 @@ TABLE_ENTRIES = 257 if IS_4_0 else 256
 IES_HAS_TYPE_A = IS_4_1
 
 
+def normal_map_base(normal_map):
+    """Over which surface a Normal Map node stands where one is displaced: "original" or "displaced", whose tangents are then
+    moved too. None: before 5.2 over the displaced one, with tangents of before."""
+    base = getattr(normal_map, "base", None)
+    return base and base.lower()
+
+
 def is_green_down(normal_map):
     """Whether the green of a Normal Map node counts downwards, as DirectX has it; it came with 5.1."""
     return getattr(normal_map, "convention", "OPENGL") == "DIRECTX"

@@ -117,6 +117,14 @@ RELIEF_KERNEL Vec3f graph_vertex_normal(const GraphPoint& at)
   return normalize(transform_normal(at.instance->world_from_object, as_normal(at.hit->Ng)));
 }
 
+/// What normal maps stand over: the mesh's normal likewise, or that of a displaced surface, unit.
+RELIEF_KERNEL Vec3f graph_smooth_normal(const GraphPoint& at)
+{
+  if ((at.instance->flags & kDisplaced) == 0) return graph_vertex_normal(at);
+  // A normal goes back by the transpose of what points go there by.
+  return normalize(transform_normal(at.instance->world_from_object, as_normal(at.hit->Ns)));
+}
+
 /// Element of the matrix between a space and the world, both with Z up, of 3 rows and 4 columns.
 /// @param m        takes the world, Y up, to the space
 /// @param element  row by row
@@ -270,6 +278,10 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
     case Q::vertex_normal_y:
     case Q::vertex_normal_z:
       return component(graph_vertex_normal(at), axis_of(Q::vertex_normal_x));
+    case Q::smooth_normal_x:
+    case Q::smooth_normal_y:
+    case Q::smooth_normal_z:
+      return component(graph_smooth_normal(at), axis_of(Q::smooth_normal_x));
     case Q::attribute_value:
       return graph_attribute(at, index, 4);
     case Q::attribute_x:

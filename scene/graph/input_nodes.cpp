@@ -193,6 +193,21 @@ void lower_tangent(GraphNode& n)
   n.set("tangent", tangent_to_world(n.build, uv_tangent(n).xyz), kVector);
 }
 
+/// Normals of the mesh before it is displaced; 0 of flat ones.
+GraphVector base_normal(GraphNode& n) { return attribute(n.build, n.attribute(n.reader, kBaseNormalAttribute)).xyz; }
+
+/// A tangent of the mesh moved into a displaced surface: along the normal that points were moved along, unit. As it is without one.
+GraphVector displaced_tangent(GraphBuilder& b,
+                              const GraphVector& tangent,
+                              const GraphVector& base,
+                              const GraphVector& normal)
+{
+  const GraphScalar along = dot(b, base, normal);
+  const GraphScalar by = b(Op::divide, {dot(b, tangent, normal), along});
+  const GraphVector moved = normalized(b, difference(b, tangent, product(b, base, by)));
+  return selected(b, b(Op::less_than, {b.constant(0), along}), moved, tangent);
+}
+
 constexpr GraphSocket kNormalMapInputs[] = {{"strength", kNumber, {1}}, {"color", kColor, {0.5f, 0.5f, 1}}};
 void lower_normal_map(GraphNode& n)
 {
@@ -205,8 +220,17 @@ void lower_normal_map(GraphNode& n)
   GraphVector normal;
   GraphScalar is_given = b.constant(1);
   if (space == 0) {
-    const auto [tangent, handedness] = uv_tangent(n);
-    GraphVector below = quantities(b, Q::vertex_normal_x, Q::vertex_normal_y, Q::vertex_normal_z);
+    auto [tangent, handedness] = uv_tangent(n);
+    GraphVector below = quantities(b, Q::smooth_normal_x, Q::smooth_normal_y, Q::smooth_normal_z);
+    static constexpr std::string_view kBases[] = {"displaced", "original"};
+    const bool is_original = n.reader.choice("base", kBases, 0) == 1;
+    if (n.reader.boolean("displacedTangents", false) && !is_original) {
+      tangent = displaced_tangent(b, tangent, base_normal(n), below);
+    }
+    if (is_original) {
+      const GraphVector base = base_normal(n);
+      below = selected(b, b(Op::less_than, {b.constant(0), dot(b, base, base)}), base, below);
+    }
     if (n.reader.boolean("unitNormals", false)) below = normalized(b, below);
     const GraphVector bitangent = product(b, cross(b, below, tangent), handedness);
     normal =

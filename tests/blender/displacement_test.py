@@ -117,6 +117,49 @@ def test_error_of_a_pixel():
     _assert_agrees(scene, _square(material), 0.01)
 
 
+def _bend(tree, strength=1.0):
+    """Gives the diffuse surface a normal map that leans every way. @return its node"""
+    v, u = np.mgrid[0:32, 0:32] * (2 * np.pi / 32)
+    pixels = np.ones((32, 32, 4), dtype=np.float32)
+    pixels[..., 0], pixels[..., 1], pixels[..., 2] = 0.6 + 0.25 * np.sin(u + v), 0.45 + 0.2 * np.cos(2 * u - v), 0.9
+    node = tree.nodes.new("ShaderNodeNormalMap")
+    node.inputs["Strength"].default_value = strength
+    image = add_image_node(tree, new_image(pixels, "Non-Color"))
+    tree.links.new(image.outputs["Color"], node.inputs["Color"])
+    surface = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeBsdfDiffuse")
+    tree.links.new(node.outputs[0], surface.inputs["Normal"])
+    return node
+
+
+def test_normal_maps_over_what_is_displaced():
+    """They stand over the displaced surface; where a node says so, since 5.2, over that of before."""
+    for strength in (1.0, 0.6):
+        scene = _stage()
+        material, tree, _, _ = _material()
+        node = _bend(tree, strength)
+        for base in ("DISPLACED", "ORIGINAL") if hasattr(node, "base") else (None,):
+            if base:
+                node.base = base
+            for error in (0.0, 1.0):
+                scene.relief.displacement_error = error
+                _assert_agrees(scene, _square(material), 0.01)
+
+
+def test_normal_maps_over_moved_vertices():
+    """Likewise over what is as fine as pixels, where relief moves vertices as Cycles does."""
+    scene = _stage()
+    noise = lambda tree: _displacing(tree, "ShaderNodeDisplacement", _texture(tree, "ShaderNodeTexNoise", Scale=4.0, Detail=0.0), Scale=0.5).outputs[0]
+    material = _displaced_by(noise)
+    node = _bend(material.node_tree, 0.6)
+    add_plane(4, material, subdivisions=200)
+    bpy.ops.object.shade_smooth()
+    for base in ("DISPLACED", "ORIGINAL") if hasattr(node, "base") else (None,):
+        if base:
+            node.base = base
+        relief, cycles = (render_runs(scene, engine, 4, 16) for engine in ("RELIEF", "CYCLES"))
+        assert_same_expectation(relief, cycles, 10, 0.05, 0.003)
+
+
 def test_negative_scale():
     scene = _stage()
     material, _, _, _ = _material(scale=-0.4, midlevel=0.5)

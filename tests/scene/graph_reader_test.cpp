@@ -199,7 +199,7 @@ TEST(GraphReader, NormalMapsStandOverNormalsOfAnyLengthOrOfOne)
     for (const GraphInput& input : program.inputs) {
       float value = 0;
       if (input.quantity == Q::attribute_x || input.quantity == Q::attribute_alpha) value = 1;
-      if (input.quantity == Q::vertex_normal_z) value = 0.5f;
+      if (input.quantity == Q::smooth_normal_z) value = 0.5f;
       if (input.quantity == Q::normal_z) value = 1;
       if (input.quantity == Q::object_from_world && input.index % 5 == 0) value = 1;
       registers.lanes[input.register_index] = splat8(value);
@@ -210,6 +210,44 @@ TEST(GraphReader, NormalMapsStandOverNormalsOfAnyLengthOrOfOne)
   };
   EXPECT_LT(length(normal_of(false) - normalize(Vec3f{1, 0, 0.5f})), 1e-6f);
   EXPECT_LT(length(normal_of(true) - normalize(Vec3f{1, 0, 1})), 1e-6f);
+}
+
+TEST(GraphReader, NormalMapsStandOverADisplacedSurfaceOrOverThatOfBefore)
+{
+  // A mesh with a normal along z and a tangent along x, whose displaced surface leans towards x.
+  const Vec3f displaced = normalize(Vec3f{0.6f, 0, 0.8f});
+  const auto normal_of = [&](json options, Vec3f color, bool has_base = true) {
+    options.update({{"type", "normal-map"}, {"inputs", {{"color", {color.x, color.y, color.z}}}}});
+    const GraphProgram program =
+        graph_load({{"nodes", json::array({options})}, {"outputs", {{"baseColor", of(0)}}}}).graphs.at(0);
+    GraphRegisters registers;
+    // Attributes are told apart by their places: tangents first.
+    const std::uint16_t tangents = program.attributes.front();
+    for (const GraphInput& input : program.inputs) {
+      float value = 0;
+      const bool is_tangent = input.index == tangents;
+      if (input.quantity == Q::attribute_x) value = is_tangent ? 1 : 0;
+      if (input.quantity == Q::attribute_z) value = is_tangent || !has_base ? 0 : 1;
+      if (input.quantity == Q::attribute_alpha) value = 1;
+      if (input.quantity == Q::smooth_normal_x) value = displaced.x;
+      if (input.quantity == Q::smooth_normal_z || input.quantity == Q::normal_z) value = displaced.z;
+      if (input.quantity == Q::normal_x) value = displaced.x;
+      if (input.quantity == Q::object_from_world && input.index % 5 == 0) value = 1;
+      registers.lanes[input.register_index] = splat8(value);
+    }
+    const GraphProgramView view = program.view();
+    graph_run(view, nullptr, registers);
+    return graph_values({&view, &registers, 0}).of[static_cast<int>(GraphOutput::base_color)];
+  };
+  const Vec3f even{0.5f, 0.5f, 1}, towards_x{1, 0.5f, 0.5f}, towards_y{0.5f, 1, 0.5f};
+  EXPECT_LT(length(normal_of({}, even) - displaced), 1e-6f);
+  EXPECT_LT(length(normal_of({{"base", "original"}}, even) - Vec3f{0, 0, 1}), 1e-6f);
+  EXPECT_LT(length(normal_of({{"base", "original"}}, even, false) - displaced), 1e-6f) << "a flat mesh has none";
+  // Tangents are the mesh's, or those of the displaced surface above it.
+  EXPECT_LT(length(normal_of({}, towards_x) - Vec3f{1, 0, 0}), 1e-6f);
+  EXPECT_LT(length(normal_of({{"displacedTangents", true}}, towards_x) - normalize(Vec3f{0.8f, 0, -0.6f})), 1e-6f);
+  EXPECT_LT(length(normal_of({{"displacedTangents", true}}, towards_y) - Vec3f{0, 1, 0}), 1e-6f);
+  EXPECT_LT(length(normal_of({{"displacedTangents", true}}, towards_x, false) - Vec3f{1, 0, 0}), 1e-6f);
 }
 
 TEST(GraphReader, HuesBelowNoneStayBelowOrGoRound)

@@ -34,6 +34,7 @@ class GraphWriter:
     attributes     attributes of meshes that are read: see attributes.py
     values         values of objects that are read: see instance_values.py
     own_normal     reference to the surface's normal as a displacement bumps it; None: it is the mesh's
+    displaces      whether the material moves the surface whose graph this is
     not_understood texts by the keys of the nodes that they are about
     """
 
@@ -50,6 +51,7 @@ class GraphWriter:
         self.attributes = []
         self.values = []
         self.own_normal = None
+        self.displaces = False
         self.not_understood = {}
         self._indices = {}
         self._known = {}

@@ -171,10 +171,13 @@ def _normal_map(g, source):
         return _output(g.add("normal-map", inputs, space=space), "normal")
     if compat.is_green_down(node):
         inputs["color"] = _multiply_add(g, inputs["color"], (1.0, -1.0, 1.0), (0.0, 1.0, 0.0))
-    if compat.TANGENT_STRENGTH and inputs["strength"] != 1:
+    # Only where the surface moves are there two of it.
+    base = compat.normal_map_base(node) if g.displaces else None
+    options = {"base": base} if base == "original" else {"displacedTangents": base is not None or None}
+    if compat.TANGENT_STRENGTH and base != "original" and inputs["strength"] != 1:
         inputs = {"color": _flattened(g, **inputs)}
     is_unit = compat.NORMAL_MAPS_OVER_UNIT_NORMALS or None
-    return _output(g.add("normal-map", inputs, space=space, uvSet=tangent_set(g, node, node.uv_map), unitNormals=is_unit), "normal")
+    return _output(g.add("normal-map", inputs, space=space, uvSet=tangent_set(g, node, node.uv_map), unitNormals=is_unit, **options), "normal")
 
 
 def _multiply_add(g, vector, factors, summands):

@@ -169,6 +169,7 @@ class MaterialJob:
         )
         if displacement and compat.displacement_method(material) == "BUMP" and not settings.bump_displaces:
             self._bump_by(displacement)
+        self._graph.displaces = displacement is not None and compat.displacement_method(material) != "BUMP"
         inside = self._export_surface(source, volume is not None)
         if inside is Inside.OPEN and not compat.has_transparent_shadow(material):
             self._warn("shadows without transparency", "they are as transparent as the material")
