@@ -19,6 +19,7 @@
 #include <random>
 
 #include "tests/support/gltf_builder.h"
+#include "tests/support/image_header.h"
 
 namespace relief {
 namespace {
@@ -123,21 +124,9 @@ TEST_P(ExrFileValues, AreThoseOfOpenImageIo)
     ImageHeader header, expected;
     ASSERT_EQ(file->open(path, {}, header), "");
     ASSERT_EQ(other->open(path, {}, expected), "");
-    EXPECT_EQ(header.width, expected.width);
-    EXPECT_EQ(header.height, expected.height);
-    EXPECT_EQ(header.depth, expected.depth);
-    EXPECT_EQ(header.num_channels, expected.num_channels);
-    EXPECT_EQ(header.tile_width, expected.tile_width);
-    EXPECT_EQ(header.tile_height, expected.tile_height);
+    test::expect_same_header(header, expected);
     EXPECT_EQ(header.strip_height, expected.strip_height);
-    EXPECT_EQ(header.sample_type, expected.sample_type);
-    EXPECT_EQ(header.sample_bits, expected.sample_bits);
-    EXPECT_EQ(header.is_integer, expected.is_integer);
-    EXPECT_EQ(header.is_deep, expected.is_deep);
-    EXPECT_EQ(header.channel_names, expected.channel_names);
-    EXPECT_EQ(header.alpha_channel, expected.alpha_channel);
     EXPECT_EQ(header.alpha_is_straight, expected.alpha_is_straight);
-    EXPECT_EQ(header.format_name, expected.format_name);
     const int num = header.num_channels, step = std::max(GetParam().tile, 16);
     struct Part {
       int begin, end, first, last;

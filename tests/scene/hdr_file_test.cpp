@@ -12,6 +12,7 @@
 #include <random>
 
 #include "tests/support/gltf_builder.h"
+#include "tests/support/image_header.h"
 
 namespace relief {
 namespace {
@@ -72,17 +73,7 @@ TEST_P(HdrFileValues, AreThoseOfOpenImageIo)
   ImageHeader header, expected;
   ASSERT_EQ(file->open(path, bytes, header), "");
   ASSERT_EQ(other->open(path, {}, expected), "");
-  EXPECT_EQ(header.width, expected.width);
-  EXPECT_EQ(header.height, expected.height);
-  EXPECT_EQ(header.depth, expected.depth);
-  EXPECT_EQ(header.num_channels, expected.num_channels);
-  EXPECT_EQ(header.tile_height, expected.tile_height);
-  EXPECT_EQ(header.sample_type, expected.sample_type);
-  EXPECT_EQ(header.sample_bits, expected.sample_bits);
-  EXPECT_EQ(header.is_integer, expected.is_integer);
-  EXPECT_EQ(header.channel_names, expected.channel_names);
-  EXPECT_EQ(header.alpha_channel, expected.alpha_channel);
-  EXPECT_EQ(header.format_name, expected.format_name);
+  test::expect_same_header(header, expected);
   const auto [width, height, has_runs, more] = GetParam();
   for (const SampleType type : {SampleType::kFloat, SampleType::kU8, SampleType::kU16}) {
     // All, the last rows, from the start again; all channels and one.
