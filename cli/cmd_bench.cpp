@@ -54,7 +54,7 @@ BenchParts parts_of(const std::vector<std::string>& names)
   if (names.empty()) return {};
   const auto has = [&](const char* name) { return std::find(names.begin(), names.end(), name) != names.end(); };
   return {has("table"),        has("marching"), has("sweeps"), has("inversion"),
-          has("tessellation"), has("costs"),    has("frames")};
+          has("tessellation"), has("costs"),    has("frames"), has("vector")};
 }
 
 std::uint64_t half_of_memory()
@@ -104,6 +104,7 @@ int bench_displacement(const BenchArguments& arguments)
       arguments.memory_gib > 0 ? static_cast<std::uint64_t>(arguments.memory_gib * (1 << 30)) : half_of_memory();
   if (arguments.quick) {
     options.map_scale *= 1.0 / 16;
+    options.vector_shrink = 16;
     options.resolution = {96, 54};
     options.rounds = 1;
     options.tessellation_bytes = std::min<std::uint64_t>(options.tessellation_bytes, 30 << 20);
@@ -280,9 +281,10 @@ void cmd_bench_register(CLI::App& app, Run& run)
   command
       ->add_option(
           "--parts", a.parts,
-          "Parts, separated by commas: table, marching, sweeps, inversion, tessellation, costs, frames (default: all)")
+          "Parts, separated by commas: table, marching, sweeps, inversion, tessellation, costs, frames, vector "
+          "(default: all)")
       ->delimiter(',')
-      ->check(one_of({"table", "marching", "sweeps", "inversion", "tessellation", "costs", "frames"}));
+      ->check(one_of({"table", "marching", "sweeps", "inversion", "tessellation", "costs", "frames", "vector"}));
   CLI::Option* map_scale = command->add_option("--map-scale", a.map_scale, "Factor of the height maps' sides")
                                ->check(number(0.01, 8))
                                ->capture_default_str();
@@ -318,7 +320,13 @@ void cmd_bench_register(CLI::App& app, Run& run)
   add_reports(*command, a.json, a.html, a.figures);
   add_report(*command, "--csv", a.csv, ".csv", "Figures of the table, as CSV");
   command->add_flag("--quick", a.quick, "Small maps, few rays, one round: whether it works, not how fast");
-  command->callback([&run, arguments] { run = [arguments] { return bench_displacement(*arguments); }; });
+  command->callback([&run, arguments] {
+    const BenchArguments& given = *arguments;
+    const bool has_scenes = !given.scenes.empty() || !given.own.mesh.empty();
+    if (has_scenes && !given.parts.empty() && parts_of(given.parts).vectors)
+      throw CLI::ValidationError("--parts", "expected no vector with --scenes or --mesh: it has scenes of its own");
+    run = [arguments] { return bench_displacement(*arguments); };
+  });
   heightfield_register(*bench, run);
   procedural_register(*bench, run);
   bench_error_register(*bench, run);

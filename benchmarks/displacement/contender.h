@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "benchmarks/displacement/scenes.h"
+#include "benchmarks/displacement/tracer.h"
 #include "displacement/displaced_mesh.h"
-#include "displacement/embree_geometry.h"
 #include "displacement/height_field.h"
 #include "displacement/tessellation.h"
 
@@ -24,24 +24,6 @@ struct BenchSurface {
   HeightField field;
   DisplacedMesh mesh;
   double field_seconds = 0, mesh_seconds = 0;
-};
-
-enum class BenchRayKind : std::uint8_t { kPrimary, kBounce, kShadow };
-inline constexpr std::string_view kBenchRayKindNames[] = {"primary", "bounce", "shadow"};
-inline constexpr int kNumBenchRayKinds = 3;
-
-struct BenchRay {
-  Vec3f O, D;  ///< D is unit
-};
-
-/// A ray from 0 to infinity, as Embree takes it.
-RTCRay embree_ray(const BenchRay& ray);
-/// The same, with no hit yet.
-RTCRayHit embree_ray_hit(const BenchRay& ray);
-
-/// How a ray ended.
-struct BenchHit {
-  float t = kInfinity;  ///< infinite: missed; shadow rays: 0 if something is in the way
 };
 
 /// A method and its settings.
@@ -60,22 +42,18 @@ double tessellation_rate_within(const DisplacedMeshView& mesh,
                                 const TessellationBuild& build,
                                 std::uint64_t budget_bytes);
 
-class Contender {
+class Contender : public BenchTracer {
  public:
   /// @param surface  must outlive the contender
   /// @error std::runtime_error if Embree fails; std::bad_alloc
   Contender(const BenchSurface& surface, const ContenderSpec& spec);
-  ~Contender();
-  Contender(const Contender&) = delete;
-  Contender& operator=(const Contender&) = delete;
 
   const ContenderSpec& spec() const { return spec_; }
   double rate() const { return rate_; }  ///< edges a texel; 1 unless a tessellation had to be coarser
   std::uint64_t num_micro_triangles() const;
-  std::size_t bytes() const { return table_bytes_ + triangle_bytes_ + bvh_bytes_; }
+  std::size_t bytes() const { return table_bytes_ + triangle_bytes_ + tree_bytes(); }
   std::size_t table_bytes() const { return table_bytes_; }        ///< besides the map
   std::size_t triangle_bytes() const { return triangle_bytes_; }  ///< base triangles, or vertices and indices
-  std::size_t bvh_bytes() const { return bvh_bytes_; }
   double build_seconds() const { return build_seconds_; }  ///< of wall clock, what all methods share included
   /// The part of it that another scale or midlevel asks for again: all but what is made of the map alone.
   double rescale_seconds() const { return rescale_seconds_; }
@@ -83,30 +61,22 @@ class Contender {
   /// Has no effect on methods other than RMIP's two.
   void set_rmip_options(const RmipOptions& options) { geometry_.rmip_options = options; }
 
-  /// Traces rays one after another: the nearest hit with its position and normal, or whether there is one.
-  /// @param hits      as many as rays
-  /// @param counters  sums over the rays; zero for tessellations
-  void trace(BenchRayKind kind, std::span<const BenchRay> rays, BenchHit* hits, TraversalCounters& counters) const;
   /// Bounds and texels of each ray; the nearest hit.
   void count_steps(std::span<const BenchRay> rays, std::uint32_t* steps) const;
-  /// The nearest hit's point, or nothing.
-  std::optional<MicroHit> intersect(const BenchRay& ray) const;
 
  private:
   void build_tessellation();
   void build_tables();
-  MicroHit point(std::uint32_t primitive, float u, float v) const;
+  MicroHit point(const RTCHit& hit) const override;
 
   const BenchSurface& surface_;
   ContenderSpec spec_;
   double rate_ = 1;
-  std::size_t table_bytes_ = 0, triangle_bytes_ = 0, bvh_bytes_ = 0;
+  std::size_t table_bytes_ = 0, triangle_bytes_ = 0;
   double build_seconds_ = 0, rescale_seconds_ = 0;
   MethodTable table_;
   std::unique_ptr<Tessellation> tessellation_;
   DisplacedGeometry geometry_;
-  RTCDevice device_ = nullptr;
-  RTCScene scene_ = nullptr;
 };
 
 }  // namespace relief

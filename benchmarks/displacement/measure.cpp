@@ -69,7 +69,7 @@ BenchCamera bench_camera(const BenchSceneSpec& spec)
 }
 
 BenchRays bench_rays_make(const BenchScene& scene,
-                          const Contender& exact,
+                          const BenchTracer& exact,
                           BenchResolution resolution,
                           const std::vector<BenchRay>& given)
 {
@@ -94,7 +94,7 @@ BenchRays bench_rays_make(const BenchScene& scene,
   return rays;
 }
 
-std::vector<Measurement> bench_measure(const std::vector<std::unique_ptr<Contender>>& contenders,
+std::vector<Measurement> bench_measure(std::span<const BenchTracer* const> tracers,
                                        BenchRayKind kind,
                                        const std::vector<BenchRay>& rays,
                                        int rounds,
@@ -102,7 +102,7 @@ std::vector<Measurement> bench_measure(const std::vector<std::unique_ptr<Contend
 {
   constexpr std::size_t kNumChunks = 12;
   const FlushDenormals flush;
-  const std::size_t num_methods = contenders.size();
+  const std::size_t num_methods = tracers.size();
   std::vector<Measurement> results(num_methods);
   if (rays.empty()) return results;
   const auto count = static_cast<double>(rays.size());
@@ -110,7 +110,7 @@ std::vector<Measurement> bench_measure(const std::vector<std::unique_ptr<Contend
   std::vector<BenchHit> expected(rays.size()), found(rays.size());
   for (std::size_t m = 0; m < num_methods; ++m) {
     TraversalCounters counters;
-    contenders[m]->trace(kind, rays, m == 0 ? expected.data() : found.data(), counters);
+    tracers[m]->trace(kind, rays, m == 0 ? expected.data() : found.data(), counters);
     Measurement& result = results[m];
     result.bounds = static_cast<double>(counters.bounds) / count;
     result.texels = static_cast<double>(counters.texels) / count;
@@ -134,7 +134,7 @@ std::vector<Measurement> bench_measure(const std::vector<std::unique_ptr<Contend
         const std::size_t m = (turn + static_cast<std::size_t>(round)) % num_methods;
         TraversalCounters counters;
         const double start = processor_seconds();
-        contenders[m]->trace(kind, std::span(rays).subspan(first, end - first), found.data(), counters);
+        tracers[m]->trace(kind, std::span(rays).subspan(first, end - first), found.data(), counters);
         double& best = fastest[m * kNumChunks + chunk];
         best = std::min(best, processor_seconds() - start);
       }

@@ -35,10 +35,10 @@ struct BenchRays {
 /// One primary ray a pixel, and at each of their hits one bounce ray with cosine-distributed direction and one shadow ray
 /// towards a sun. Secondary rays start on the exact surface, moved off it by the larger of its rounding error and a
 /// quarter of a texel, so that a tessellation does not end them at once where its facets lie outside of the surface.
-/// @param exact  a method that finds the exact surface
+/// @param exact  what finds the exact surface
 /// @param given  rays in place of the primary ones; empty: none
 BenchRays bench_rays_make(const BenchScene& scene,
-                          const Contender& exact,
+                          const BenchTracer& exact,
                           BenchResolution resolution,
                           const std::vector<BenchRay>& given = {});
 
@@ -50,15 +50,24 @@ struct Measurement {
   double hit_share = 0;
 };
 
-/// Traces the rays by all contenders, chunk after chunk in turns, `rounds` times; a chunk counts with its fastest time,
+/// Traces the rays by all tracers, chunk after chunk in turns, `rounds` times; a chunk counts with its fastest time,
 /// so that what else the machine does is left out.
 /// @param rounds  0: nothing is timed
 /// @param tolerance  metres by which two hits may differ along the ray
-/// @return  a contender each
-std::vector<Measurement> bench_measure(const std::vector<std::unique_ptr<Contender>>& contenders,
+/// @return  a tracer each
+std::vector<Measurement> bench_measure(std::span<const BenchTracer* const> tracers,
                                        BenchRayKind kind,
                                        const std::vector<BenchRay>& rays,
                                        int rounds,
                                        double tolerance);
+
+/// What owners of tracers own.
+template <class Tracer>
+std::vector<const BenchTracer*> tracers_of(const std::vector<std::unique_ptr<Tracer>>& owners)
+{
+  std::vector<const BenchTracer*> tracers;
+  for (const auto& owner : owners) tracers.push_back(owner.get());
+  return tracers;
+}
 
 }  // namespace relief

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "benchmarks/displacement/table.h"
+#include "benchmarks/displacement/vector_report.h"
 #include "exporters/report_html.h"
 #include "exporters/svg_plot.h"
 
@@ -480,6 +481,7 @@ std::string bench_markdown(const BenchResults& results)
   if (!results.tessellation.empty()) text += markdown(variant_table(kTessellationTitle, results.tessellation));
   if (!results.costs.empty()) text += markdown(cost_table(results.costs));
   if (!results.frames.empty()) text += markdown(frame_table(results.frames));
+  for (const VectorResult& scene : results.vectors) text += markdown(vector_table(scene));
   return text;
 }
 
@@ -499,7 +501,8 @@ std::string bench_json(const BenchResults& results)
                                        {"inversion", json_of(results.inversion)},
                                        {"tessellation", json_of(results.tessellation)},
                                        {"costs", json_of(results.costs)},
-                                       {"frames", json_of(results.frames)}};
+                                       {"frames", json_of(results.frames)},
+                                       {"vectors", vector_json(results.vectors)}};
   return json.dump(2) + "\n";
 }
 
@@ -556,6 +559,7 @@ std::string bench_html(const BenchResults& results)
   if (!results.tessellation.empty()) pieces.push_back(html(variant_table(kTessellationTitle, results.tessellation)));
   if (!results.costs.empty()) pieces.push_back(html(cost_table(results.costs)));
   if (!results.frames.empty()) pieces.push_back(html(frame_table(results.frames)));
+  for (const VectorResult& scene : results.vectors) pieces.push_back(html(vector_table(scene)));
   return html_page("Displacement: methods side by side", pieces);
 }
 

@@ -133,7 +133,7 @@ MethodResult method_result(const Contender& contender)
   result.num_micro_triangles = contender.num_micro_triangles();
   result.table_bytes = contender.table_bytes();
   result.triangle_bytes = contender.triangle_bytes();
-  result.bvh_bytes = contender.bvh_bytes();
+  result.bvh_bytes = contender.tree_bytes();
   result.build_seconds = contender.build_seconds();
   result.rescale_seconds = contender.rescale_seconds();
   return result;
@@ -190,7 +190,7 @@ void Study::add_table(const BenchSceneSpec& spec) const
     say(fmt::format("{}: {} rays", spec.name, kBenchRayKindNames[k]));
     result.num_rays[k] = rays.of(kind).size();
     const std::vector<Measurement> measured =
-        bench_measure(contenders, kind, rays.of(kind), options.rounds, result.tolerance);
+        bench_measure(tracers_of(contenders), kind, rays.of(kind), options.rounds, result.tolerance);
     for (std::size_t m = 0; m < measured.size(); ++m) result.methods[m].of_kind[k] = measured[m];
   }
   // Rays of a file make no picture.
@@ -234,8 +234,9 @@ void Study::add_marching(const BenchSceneSpec& spec) const
       rmip_options.marching_scale = marching_scale;
       contender->set_rmip_options(rmip_options);
     }
-    const std::vector<Measurement> measured = bench_measure(
-        contenders, BenchRayKind::kPrimary, rays.of(BenchRayKind::kPrimary), options.rounds, scene.texel_metres);
+    const std::vector<Measurement> measured =
+        bench_measure(tracers_of(contenders), BenchRayKind::kPrimary, rays.of(BenchRayKind::kPrimary), options.rounds,
+                      scene.texel_metres);
     for (std::size_t m = 0; m < measured.size(); ++m) {
       sweep.lines[m].x.push_back(marching_scale);
       sweep.lines[m].y.push_back(measured[m].nanoseconds);
@@ -264,8 +265,9 @@ void Study::add_sweeps(const BenchSceneSpec& spec) const
                              traversal_spec("rmip", DisplacementMethod::rmip),
                              traversal_spec(std::string(kPublishedMethod), DisplacementMethod::tfdm)});
       const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution, options.rays);
-      const std::vector<Measurement> measured = bench_measure(
-          contenders, BenchRayKind::kPrimary, rays.of(BenchRayKind::kPrimary), options.rounds, scene.texel_metres);
+      const std::vector<Measurement> measured =
+          bench_measure(tracers_of(contenders), BenchRayKind::kPrimary, rays.of(BenchRayKind::kPrimary), options.rounds,
+                        scene.texel_metres);
       for (std::size_t m = 0; m < measured.size(); ++m) {
         sweep.lines[m].x.push_back(factor);
         sweep.lines[m].y.push_back(measured.back().nanoseconds / measured[m].nanoseconds);
@@ -299,7 +301,7 @@ void Study::add_inversion(const BenchSceneSpec& spec) const
   const Contenders contenders = make_all(surface, specs);
   const BenchRays rays = bench_rays_make(scene, *contenders.front(), options.resolution, options.rays);
   const auto measured = [&](BenchRayKind kind) {
-    return bench_measure(contenders, kind, rays.of(kind), options.rounds, scene.texel_metres);
+    return bench_measure(tracers_of(contenders), kind, rays.of(kind), options.rounds, scene.texel_metres);
   };
   const std::vector<Measurement> primary = measured(BenchRayKind::kPrimary), bounce = measured(BenchRayKind::kBounce);
   for (std::size_t m = 0; m < contenders.size(); ++m) {
@@ -327,7 +329,7 @@ void Study::add_tessellation(const BenchSceneSpec& spec) const
                 traversal_spec(std::string(kExactMethod), DisplacementMethod::chord)});
   const BenchRays rays = bench_rays_make(scene, *contenders.back(), options.resolution);
   const auto measured = [&](BenchRayKind kind) {
-    return bench_measure(contenders, kind, rays.of(kind), options.rounds, scene.texel_metres);
+    return bench_measure(tracers_of(contenders), kind, rays.of(kind), options.rounds, scene.texel_metres);
   };
   const std::vector<Measurement> primary = measured(BenchRayKind::kPrimary), bounce = measured(BenchRayKind::kBounce);
   for (std::size_t m = 0; m < contenders.size(); ++m) {
@@ -354,7 +356,7 @@ void Study::add_costs(const BenchSceneSpec& spec) const
     std::vector<double> nanoseconds(contenders.size());
     for (const BenchRayKind kind : {BenchRayKind::kPrimary, BenchRayKind::kBounce, BenchRayKind::kShadow}) {
       const std::vector<Measurement> measured =
-          bench_measure(contenders, kind, rays.of(kind), options.rounds, scene.texel_metres);
+          bench_measure(tracers_of(contenders), kind, rays.of(kind), options.rounds, scene.texel_metres);
       for (std::size_t m = 0; m < measured.size(); ++m) nanoseconds[m] += measured[m].nanoseconds / kNumBenchRayKinds;
     }
     const auto threads =
@@ -447,6 +449,9 @@ BenchResults bench_displacement_run(const BenchOptions& options)
     if (options.parts.costs && (for_sweeps || spec->name == "glass")) study.add_costs(*spec);
     if (options.parts.frames) study.add_frames(*spec);
   }
+  // Of scenes of its own, so that neither a named one nor a mesh and map has it.
+  if (options.parts.vectors && options.own == nullptr && options.scenes.empty())
+    results.vectors = bench_vector_run(options.resolution, options.rounds, options.vector_shrink, options.progress);
   return results;
 }
 

@@ -12,6 +12,7 @@
 
 #include "benchmarks/displacement/frames.h"
 #include "benchmarks/displacement/own_scene.h"
+#include "benchmarks/displacement/vector_study.h"
 #include "displacement/cost_model.h"
 
 namespace relief {
@@ -25,6 +26,7 @@ struct BenchParts {
   bool tessellation = true;  ///< ways to build a tessellation's tree
   bool costs = true;         ///< the constants by which `auto` chooses
   bool frames = true;        ///< whole path-traced frames
+  bool vectors = true;       ///< points that vectors move, on scenes of their own
 };
 
 struct BenchOptions {
@@ -33,6 +35,7 @@ struct BenchOptions {
   std::vector<BenchRay> rays;       ///< in place of those of a camera; empty: none
   BenchParts parts;
   double map_scale = 1;  ///< factor of the maps' sides, but of an own scene's
+  std::int32_t vector_shrink = 1;  ///< by which points that vectors move are fewer along a side, a power of two
   BenchResolution resolution;
   int rounds = 3;
   std::uint64_t tessellation_bytes = 0;  ///< for the two tessellations of a scene together, while they are built
@@ -122,6 +125,7 @@ struct BenchResults {
   std::vector<VariantResult> inversion, tessellation;
   std::vector<CostSample> costs;
   std::vector<FrameResult> frames;
+  std::vector<VectorResult> vectors;
 };
 
 /// Least squares over the samples.

@@ -63,6 +63,20 @@ TEST_F(Bench, QuickRunMeasuresEveryMethodOnEveryScene)
     EXPECT_LT(frame["difference"], is_exact ? 0.02 : 1.0) << frame;
   }
 
+  ASSERT_EQ(json["vectors"].size(), 4u);
+  for (const nlohmann::json& scene : json["vectors"]) {
+    ASSERT_EQ(scene["methods"].size(), 5u);
+    EXPECT_GT(scene["triangles"], scene["base_triangles"]);
+    for (const nlohmann::json& method : scene["methods"]) {
+      EXPECT_GE(method["peak_bytes"], method["bytes"]) << method;
+      for (const char* kind : {"primary", "bounce", "shadow"}) {
+        // One surface: tiles agree with each other, and Embree's triangles but for rays along their sides.
+        const bool is_tiles = method["name"].get<std::string>().starts_with("tiles");
+        EXPECT_LE(method["rays"][kind]["disagreement"], is_tiles ? 0 : 0.01) << scene["name"] << method << kind;
+      }
+    }
+  }
+
   const std::string html = bytes_of_file(html_file);
   EXPECT_NE(html.find("<svg"), std::string::npos);
   EXPECT_NE(html.find("data:image/png;base64,"), std::string::npos);
@@ -261,7 +275,9 @@ TEST_F(Bench, WrongUseIsRefused)
 {
   for (const Arguments& arguments :
        {Arguments{"bench"}, Arguments{"bench", "displacement", "--scenes", "teapot"},
-        Arguments{"bench", "displacement", "--parts", "all"}, Arguments{"bench", "displacement", "--json", "bench.txt"},
+        Arguments{"bench", "displacement", "--parts", "all"},
+        Arguments{"bench", "displacement", "--parts", "vector", "--scenes", "roof"},
+        Arguments{"bench", "displacement", "--json", "bench.txt"},
         Arguments{"bench", "displacement", "--mesh", "a.obj"}, Arguments{"bench", "displacement", "--rays", "rays.txt"},
         Arguments{"bench", "procedural", "--parts", "vase"}}) {
     EXPECT_EQ(run(arguments).exit_code, 2) << arguments.back();
