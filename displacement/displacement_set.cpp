@@ -310,12 +310,19 @@ std::vector<DisplacementSet::Use> DisplacementSet::find_uses(const DisplacementI
   return uses;
 }
 
+/// @pre  there is a camera
+PictureView DisplacementSet::picture_view(const Use& use, const DisplacementOptions& options)
+{
+  return {*options.camera, static_cast<double>(options.picture_height),
+          static_cast<double>(use.settings.coarser_outside)};
+}
+
 /// About which part of a picture's rays meet a use: how much of the picture the boxes of its instances fill, together at
 /// most all of it; 1 without a camera.
 double DisplacementSet::picture_share(const Use& use, const DisplacementOptions& options)
 {
   if (!options.camera || options.picture_height <= 0) return 1;
-  const PictureView view{*options.camera, static_cast<double>(options.picture_height)};
+  const PictureView view = picture_view(use, options);
   const double height = view.height;
   const double width =
       height * static_cast<double>(options.camera->half_width) / static_cast<double>(options.camera->half_height);
@@ -498,7 +505,8 @@ VertexMove DisplacementSet::vertex_move_of(const Use& use,
   if (move == VertexMove::kDivided) {
     const CellsAlong& seen = use.heights->cells_seen;
     *parts = lattices_make(
-        use.mesh, [&](Vec3f a, Vec3f b) { return seen(a, b) / kDividedCells; }, options.require);
+        use.mesh, [&](Vec3f a, Vec3f b) { return seen(a, b) / kDividedCells; }, options.require,
+        use.settings.most_cells);
     const std::uint64_t bytes = divided_mesh_bytes(use.mesh, *parts);
     if (bytes > allowance - std::min(allowance, *used_bytes)) {
       parts->clear();
@@ -581,7 +589,8 @@ VertexMove DisplacementSet::vector_move_of(const Use& use,
   };
   for (double longer = 1;; longer *= 2) {
     *parts = lattices_make(
-        use.mesh, [&](Vec3f a, Vec3f b) { return by.cells_seen(a, b) / (kDividedCells * longer); }, options.require);
+        use.mesh, [&](Vec3f a, Vec3f b) { return by.cells_seen(a, b) / (kDividedCells * longer); }, options.require,
+        use.settings.most_cells);
     if (fits_in_tiles(use, options, *parts, allowance, used_bytes)) {
       if (longer > 1) warn_longer(longer);
       return VertexMove::kNone;
@@ -724,11 +733,11 @@ std::unique_ptr<PreparedMesh> DisplacementSet::make_computed(const Use& use, con
         std::make_unique<CurvedHeights>(CurvedHeights{use.mesh, source, use.scale, use.settings.midlevel});
     source = displaced->curved->source();
   }
-  displaced->procedural =
-      std::make_unique<ProceduralField>(source,
-                                        heights.num_cells > 0 ? lattices_make(use.mesh, heights.num_cells)
-                                                              : lattices_make(use.mesh, heights.cells, options.require),
-                                        use.settings.midlevel, *lattice_cache_);
+  displaced->procedural = std::make_unique<ProceduralField>(
+      source,
+      heights.num_cells > 0 ? lattices_make(use.mesh, heights.num_cells)
+                            : lattices_make(use.mesh, heights.cells, options.require, use.settings.most_cells),
+      use.settings.midlevel, *lattice_cache_);
   displaced->mesh = DisplacedMesh(use.mesh, *displaced->procedural,
                                   {.height = {}, .scale = use.scale, .midlevel = use.settings.midlevel}, use.steps);
   DisplacedGeometry& geometry = displaced->geometry;
@@ -814,11 +823,12 @@ void DisplacementSet::dice(PreparedMesh& displaced,
                            std::uint64_t* used_bytes)
 {
   std::uint64_t allowance = dicing_allowance(options);
+  const double error = options.error * static_cast<double>(use.settings.cell_pixels);
   bool* is_diced = nullptr;  // of the pictures before and after
   if (options.choices != nullptr) {
     const auto [known, is_new] =
         options.choices->is_diced.try_emplace({use.mesh_name, use.displacement_index, use.mesh.num_triangles, use.scale,
-                                               options.error, options.num_rays, options.picture_height, allowance},
+                                               error, options.num_rays, options.picture_height, allowance},
                                               false);
     if (!is_new && !known->second) {
       reasons_.push_back("mesh '" + displaced.name + "': not diced, as it was not in a picture before");
@@ -857,9 +867,8 @@ void DisplacementSet::dice(PreparedMesh& displaced,
   }
   const MapDensity density = map_density(use.mesh, use.settings.height);
   const double texel = 1 / std::sqrt(std::max(density.u * map.view.width * density.v * map.view.height, 1e-300));
-  auto dicing = std::make_unique<Dicing>(use.mesh, geometry.mesh, levels, texel,
-                                         PictureView{*options.camera, static_cast<double>(options.picture_height)},
-                                         use.places, options.error, options.require);
+  auto dicing = std::make_unique<Dicing>(use.mesh, geometry.mesh, levels, texel, picture_view(use, options), use.places,
+                                         error, options.require);
   const TessellationRule rule = dicing->rule();
   TessellationLayout layout = tessellation_layout_make(dicing->mesh(), TessellationKind::kQuads, rule);
   const std::uint64_t bytes = tessellation_peak_bytes(layout, kRenderTessellation) + dicing->bytes();

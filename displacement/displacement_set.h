@@ -16,6 +16,7 @@
 #include "displacement/lattice_split.h"
 #include "displacement/level_facets.h"
 #include "displacement/moved_mesh.h"
+#include "displacement/picture_view.h"
 #include "displacement/prepared_mesh.h"
 #include "displacement/seams.h"
 #include "kernel/camera/camera.h"
@@ -207,6 +208,7 @@ class DisplacementSet {
     double steepening = 1;  ///< how much steeper its instances' slopes are in the world than in object space, at most
     bool has_borders = false;  ///< walls end at its surface, which is one then: rays choose no levels by their cones
   };
+  static PictureView picture_view(const Use& use, const DisplacementOptions& options);
   static double picture_share(const Use& use, const DisplacementOptions& options);
   std::vector<Use> find_uses(const DisplacementInput& input);
   Levels levels_of(const Use& use, const DisplacementOptions& options) const;

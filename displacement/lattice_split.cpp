@@ -40,9 +40,10 @@ class Splitter {
   Splitter(const MeshView& mesh,
            std::uint32_t base,
            const CellsAlong& cells,
+           double most_cells,
            PartCount& count,
            std::vector<LatticeTriangle>* out)
-      : base_(base), cells_(cells), count_(count), out_(out)
+      : base_(base), cells_(cells), most_cells_(most_cells), count_(count), out_(out)
   {
     const TriangleIndices& v = mesh.triangles[base];
     P_[0] = mesh.P[v.v0];
@@ -56,7 +57,8 @@ class Splitter {
     double cells[3];
     int num_long = 0;
     for (int k = 0; k < 3; ++k) {
-      cells[k] = cells_(at(corner[k]), at(corner[(k + 1) % 3]));
+      const Vec2f from = corner[k], to = corner[(k + 1) % 3];
+      cells[k] = std::min(cells_(at(from), at(to)), most_cells_ * part_of_side(from, to));
       if (cells[k] > kMostCells && halvings < kMostHalvings) ++num_long;
     }
     if (num_long == 0) {
@@ -91,6 +93,13 @@ class Splitter {
 
  private:
   Vec3f at(Vec2f weights) const { return lattice_corner(weights, P_[0], P_[1], P_[2]); }
+  /// How much of a triangle's side a line is: exact where it lies on one, so both triangles agree.
+  static double part_of_side(Vec2f from, Vec2f to)
+  {
+    const double x = static_cast<double>(to.x) - static_cast<double>(from.x);
+    const double y = static_cast<double>(to.y) - static_cast<double>(from.y);
+    return std::max({std::abs(x), std::abs(y), std::abs(x + y)});
+  }
 
   void add(const Vec2f* corner, const double* cells)
   {
@@ -108,6 +117,7 @@ class Splitter {
 
   std::uint32_t base_;
   const CellsAlong& cells_;
+  double most_cells_;
   PartCount& count_;
   std::vector<LatticeTriangle>* out_;
   Vec3f P_[3];
@@ -127,8 +137,12 @@ std::vector<LatticeTriangle> lattices_make(const MeshView& mesh, std::int32_t n)
   return out;
 }
 
-std::vector<LatticeTriangle> lattices_make(const MeshView& mesh, const CellsAlong& cells, const RequireBytes& require)
+std::vector<LatticeTriangle> lattices_make(const MeshView& mesh,
+                                           const CellsAlong& cells,
+                                           const RequireBytes& require,
+                                           std::int32_t most_cells)
 {
+  const double most = most_cells > 0 ? most_cells : HUGE_VAL;
   PartCount count(require);
   // In pieces, so that the order does not depend on the threads.
   constexpr std::size_t kPiece = 1024;
@@ -136,7 +150,8 @@ std::vector<LatticeTriangle> lattices_make(const MeshView& mesh, const CellsAlon
   tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t piece) {
     const std::size_t end = std::min<std::size_t>((piece + 1) * kPiece, mesh.num_triangles);
     for (std::size_t base = piece * kPiece; base < end; ++base) {
-      Splitter(mesh, static_cast<std::uint32_t>(base), cells, count, &pieces[piece]).split({0, 0}, {1, 0}, {0, 1}, 0);
+      Splitter(mesh, static_cast<std::uint32_t>(base), cells, most, count, &pieces[piece])
+          .split({0, 0}, {1, 0}, {0, 1}, 0);
     }
   });
   std::vector<LatticeTriangle> out;

@@ -11,10 +11,15 @@ namespace relief {
 
 class PictureView {
  public:
-  /// @param height  pixels
-  PictureView(const Camera& of, double picture_height)
+  /// How much coarser things are out of the picture if nobody says otherwise, as in Cycles.
+  static constexpr double kUsualCoarsening = 4;
+
+  /// @param height           pixels
+  /// @param most_coarsening  out of the picture, see coarsening(); ≥ 1
+  PictureView(const Camera& of, double picture_height, double most_coarsening = kUsualCoarsening)
       : camera(of),
         height(picture_height),
+        most_coarsening_(most_coarsening),
         eye_(to_double(of.world_from_camera.p)),
         right_(unit(of.world_from_camera.x)),
         up_(unit(of.world_from_camera.y)),
@@ -53,7 +58,7 @@ class PictureView {
       most = pixels_in_plane(std::max(length(from_eye + depth * back_) - radius, 0.0));
     }
     if (!coarser_outside || camera.projection != Projection::kPerspective) return most;
-    if (depth + radius <= 0) return most / kMostCoarsening;
+    if (depth + radius <= 0) return most / most_coarsening_;
     if (depth - radius <= 0) return most;
     const auto out = [&](const Vec3d& axis, float half, float shift) {
       return (std::abs(dot(from_eye, axis)) - radius) / ((depth + radius) * static_cast<double>(half)) -
@@ -61,22 +66,22 @@ class PictureView {
     };
     const double least =
         std::max(out(right_, camera.half_width, camera.shift_x), out(up_, camera.half_height, camera.shift_y));
-    return most / std::clamp(least / kAround, 1.0, kMostCoarsening);
+    return most / std::clamp(least / kAround, 1.0, most_coarsening_);
   }
-  /// How much coarser a point may be for being outside of the picture: 1 in it and for half of it around, then growing up to 4
-  /// with the distance from its middle. (Cycles takes 4 at once; growing keeps neighbours alike.) And see coarsening_afar.
+  /// How much coarser a point may be for being outside of the picture: 1 in it and for half of it around, then growing with
+  /// the distance from its middle, up to what was asked for. And see coarsening_afar.
   /// @param P  world
   double coarsening(Vec3d P) const
   {
     const Vec3d from_eye = P - eye_;
     const double depth = -dot(from_eye, back_);
     const double size = camera.projection == Projection::kPerspective ? depth : 1.0;
-    if (!(size > 0.0)) return kMostCoarsening * coarsening_afar(P);
+    if (!(size > 0.0)) return most_coarsening_ * coarsening_afar(P);
     const double x = dot(from_eye, right_) / (size * static_cast<double>(camera.half_width));
     const double y = dot(from_eye, up_) / (size * static_cast<double>(camera.half_height));
     const double out = std::max(std::abs(x - 2.0 * static_cast<double>(camera.shift_x)),
                                 std::abs(y - 2.0 * static_cast<double>(camera.shift_y)));
-    return std::clamp(out / kAround, 1.0, kMostCoarsening) * coarsening_afar(P);
+    return std::clamp(out / kAround, 1.0, most_coarsening_) * coarsening_afar(P);
   }
   /// How much coarser a point may be for being far beside a picture that shows little of what is around: 1 within sixteen
   /// times the picture's angle, and then growing with the angle. What a telescope does not see would else be as fine as what
@@ -92,7 +97,7 @@ class PictureView {
   }
 
  private:
-  static constexpr double kAround = 1.5, kMostCoarsening = 4.0;  ///< of coarsening()
+  static constexpr double kAround = 1.5;  ///< of coarsening()
 
   static Vec3d unit(Vec3f axis) { return to_double(normalize(axis)); }
   /// Distance of a point from the line from the origin to `end`.
@@ -121,6 +126,7 @@ class PictureView {
     return pixels_a_radian() * std::min(within / distance, 1.0);
   }
 
+  double most_coarsening_;
   Vec3d eye_, right_, up_, back_;  ///< world; the last three unit
   Vec3d ahead_;                    ///< unit, to the middle of the picture
   double half_angle_ = 1;          ///< from there to its corners, about; of a perspective camera

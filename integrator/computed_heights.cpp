@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "displacement/seen_instances.h"
+#include "displacement/vec3d.h"
 #include "integrator/graph_bounds_stage.h"
 #include "integrator/scene_views.h"
 #include "integrator/stages.h"
@@ -404,18 +405,18 @@ void computed_heights_add(const Scene& scene, const DisplacementOptions& options
   const auto all = std::make_shared<SceneHeights>(scene);
   input->heights_owner = all;
   input->meshes = all->views.meshes;  // with the attributes that graphs read
-  const PictureView view{options.camera.value_or(scene.cameras.front().camera),
-                         static_cast<double>(options.camera ? options.picture_height : scene.render.height)};
+  const Camera camera = options.camera.value_or(scene.cameras.front().camera);
+  const auto picture_height = static_cast<double>(options.camera ? options.picture_height : scene.render.height);
   GraphScene graph_scene;
   graph_scene.columns = all->views.instance_columns.data();
   graph_scene.num_columns = static_cast<std::uint32_t>(all->views.instance_columns.size());
-  graph_scene.camera = view.camera;
-  graph_scene.camera_from_world = inverse(view.camera.world_from_camera);
+  graph_scene.camera = camera;
+  graph_scene.camera_from_world = inverse(camera.world_from_camera);
   std::map<std::tuple<int, int, int>, int> known;  // mesh, displacement, instance where that matters
   struct Place {
     const MeshView* mesh;
     std::vector<Affine3> instances;
-    double cell_pixels;
+    const DisplacementSettings* settings;
   };
   std::vector<Place> places;  // of each of the heights
   for (std::size_t i = 0; i < input->instances.size(); ++i) {
@@ -452,16 +453,25 @@ void computed_heights_add(const Scene& scene, const DisplacementOptions& options
                          [&](const GraphInput& in) { return !is_of_all(in.quantity, mesh, in.index); });
       }
       heights.num_cells = settings->num_cells;
-      places.push_back({&mesh, {}, static_cast<double>(settings->cell_pixels)});
+      places.push_back({&mesh, {}, settings});
       input->heights.push_back(std::move(heights));
     }
     places[static_cast<std::size_t>(at->second)].instances.push_back(instance.world_from_object);
   }
   for (std::size_t k = 0; k < places.size(); ++k) {
     const Place& place = places[k];
-    const auto cells = [&](SeenInstances::Coarser coarser) {
+    if (place.settings->cell_length > 0) {
+      input->heights[k].cells =
+          input->heights[k].cells_seen = [cell = static_cast<double>(place.settings->cell_length)](Vec3f a, Vec3f b) {
+            return length(to_double(b) - to_double(a)) / cell;
+          };
+      continue;
+    }
+    const PictureView view{camera, picture_height, static_cast<double>(place.settings->coarser_outside)};
+    const auto cells = [&](SeenInstances::Coarser coarser) -> CellsAlong {
       const auto seen = std::make_shared<const SeenInstances>(*place.mesh, view, place.instances, coarser);
-      return [seen, cell = place.cell_pixels](Vec3f a, Vec3f b) { return seen->pixels(a, b) / cell; };
+      const auto cell = static_cast<double>(place.settings->cell_pixels);
+      return [seen, cell](Vec3f a, Vec3f b) { return seen->pixels(a, b) / cell; };
     };
     input->heights[k].cells = cells(SeenInstances::Coarser::kAfar);
     input->heights[k].cells_seen = cells(SeenInstances::Coarser::kOutside);

@@ -100,11 +100,22 @@ TextureRef height_texture(const GltfDocument& document,
   return ref;
 }
 
-/// How fine computed heights are.
+/// A power of two.
+std::int32_t read_num_cells(const JsonReader& r, const char* name, const char* expected)
+{
+  const bool is_number = r.raw(name).is_number();
+  const std::int64_t cells = is_number ? r.integer(name, 1, 1, kMostHeightCells) : 0;
+  if (!is_number || (cells & (cells - 1)) != 0) r.fail(name, expected);
+  return static_cast<std::int32_t>(cells);
+}
+
+/// How fine computed heights are, and maps that are diced.
 void read_cells(const JsonReader& r, DisplacementSettings& d, Warnings& warnings)
 {
+  d.cell_pixels = r.number_f("cellPixels", 1, 0.01, 1e3);
+  d.coarser_outside = r.number_f("coarserOutside", 4, 1, 1e3);
   if (!displacement_is_computed(d)) {
-    for (const char* name : {"cells", "cellPixels", "divide"}) {
+    for (const char* name : {"cells", "cellLength", "mostCells", "divide"}) {
       if (!r.has(name)) continue;
       static_cast<void>(r.raw(name));
       warnings.add(r.file() + ": " + json_path_join(r.path(), name) +
@@ -112,13 +123,10 @@ void read_cells(const JsonReader& r, DisplacementSettings& d, Warnings& warnings
     }
     return;
   }
-  if (r.has("cells") && !(r.raw("cells").is_string() && r.string("cells", "") == "auto")) {
-    const bool is_number = r.raw("cells").is_number();
-    const std::int64_t cells = is_number ? r.integer("cells", 1, 1, kMostHeightCells) : 0;
-    if (!is_number || (cells & (cells - 1)) != 0) r.fail("cells", "\"auto\" or a power of two up to 524288");
-    d.num_cells = static_cast<std::int32_t>(cells);
-  }
-  d.cell_pixels = r.number_f("cellPixels", 1, 0.01, 1e3);
+  if (r.has("cells") && !(r.raw("cells").is_string() && r.string("cells", "") == "auto"))
+    d.num_cells = read_num_cells(r, "cells", "\"auto\" or a power of two up to 524288");
+  if (r.has("mostCells")) d.most_cells = read_num_cells(r, "mostCells", "a power of two up to 524288");
+  if (r.has("cellLength")) d.cell_length = r.number_f("cellLength", 1, 1e-12, 1e12);
   d.divide = r.boolean("divide", false);
 }
 

@@ -323,16 +323,61 @@ def is_portal(light):
     return light.type == "AREA" and getattr(getattr(light, "cycles", None), "is_portal", False)
 
 
+def dices(scene):
+    """Whether Cycles dices objects that ask for it. Experimental before 5.0."""
+    return IS_5_0 or getattr(getattr(scene, "cycles", None), "feature_set", None) == "EXPERIMENTAL"
+
+
 def dicing_modifier(shown, scene):
-    """The Subdivision modifier of an object that Cycles dices to the picture; None: there is none. Experimental before 5.0."""
+    """The Subdivision modifier of an object that Cycles dices to the picture; None: there is none."""
     last = shown.modifiers[-1] if shown.modifiers else None
     if last is None or last.type != "SUBSURF" or not last.show_render:
         return None
     if IS_5_0:
         return last if last.use_adaptive_subdivision else None
-    cycles = getattr(scene, "cycles", None)
-    is_on = cycles is not None and cycles.feature_set == "EXPERIMENTAL" and shown.cycles.use_adaptive_subdivision
-    return last if is_on else None
+    return last if dices(scene) and shown.cycles.use_adaptive_subdivision else None
+
+
+#: Max Subdivisions if nobody sets it. It is there so that memory has an end; the program knows its own.
+_USUAL_SUBDIVISIONS = 12
+
+
+@dataclass(frozen=True)
+class Dicing:
+    """How finely Cycles dices an object.
+
+    pixels      sides of its faces in the picture; None: `length` is
+    length      sides of its faces, in the object's own space
+    outside     how many times as long they may be out of the picture
+    most_cells  along each side of a face, a power of two; None: no fewer than Blender's usual 4096
+    """
+
+    pixels: float | None
+    length: float | None
+    outside: float
+    most_cells: int | None
+
+
+def dicing_of(shown, scene, cycles, least_pixels=0.1):
+    """Dicing of an object; None if Cycles does not dice it.
+
+    @param  cycles        Cycles' settings of the scene; None: as they usually are
+    @param  least_pixels  no finer; Cycles has a tenth
+    """
+    modifier = dicing_modifier(shown, scene)
+    if modifier is None:
+        return None
+    rate = getattr(cycles, "dicing_rate", 1.0)
+    pixels, length = rate * (modifier.adaptive_pixel_size if IS_5_0 else shown.cycles.dicing_rate), None
+    if IS_5_0 and modifier.adaptive_space == "OBJECT":
+        pixels, length = None, rate * modifier.adaptive_object_edge_length
+    subdivisions = getattr(cycles, "max_subdivisions", _USUAL_SUBDIVISIONS)
+    return Dicing(
+        None if pixels is None else max(pixels, least_pixels),
+        length,
+        max(getattr(cycles, "offscreen_dicing_scale", 4.0), 1.0),
+        1 << subdivisions if subdivisions < _USUAL_SUBDIVISIONS else None,
+    )
 
 
 def light_energy(light, scale=(1.0, 1.0)):

@@ -180,7 +180,7 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
     displacement_error: FloatProperty(
         name="Error",
         description="Pixels that detail of height maps may be wide and shown by its light alone, as Cycles' dicing "
-        "rate, which is much faster; 0 is none (default 1)",
+        "rate, which is much faster; 0 is none. Where Cycles dices an object, in units of its dicing rate (default 1)",
         default=1.0,
         min=0.0,
         soft_max=8.0,
@@ -189,7 +189,7 @@ class ReliefSceneSettings(bpy.types.PropertyGroup):
     cell_pixels: FloatProperty(
         name="Cell Size",
         description="How fine heights are computed that no map holds, as of noise over Generated coordinates: pixels "
-        "from one to the next, as Cycles' dicing rate (default 1)",
+        "from one to the next. Where Cycles dices an object, in units of its dicing rate (default 1)",
         default=1.0,
         min=0.01,
         soft_min=0.1,

@@ -224,6 +224,11 @@ class RELIEF_PT_displacement(_RenderPanel, bpy.types.Panel):
         row.prop(settings, "displacement_error")
         rows.prop(settings, "lod")
         rows.prop(settings, "cell_pixels")
+        cycles = cycles_settings(context.scene)
+        if cycles is not None and compat.dices(context.scene):
+            rows.prop(cycles, "dicing_rate")
+            rows.prop(cycles, "offscreen_dicing_scale")
+            rows.prop(cycles, "max_subdivisions")
         rows.prop(settings, "bump_displaces")
         rows.prop(settings, "weld_seams")
         row = rows.row()

@@ -39,7 +39,11 @@ struct DisplacementSettings {
   std::int32_t graph_index = -1;  ///< of heights that are computed, into Scene::graphs; −1: they have a map
   std::int32_t num_cells =
       0;  ///< of computed heights along each side of a triangle, a power of two; 0: by their size in the picture
-  float cell_pixels = 1;  ///< how large they are in the picture, with 0 cells
+  float cell_pixels =
+      1;  ///< how long they are in the picture, with 0 cells; of a map that is diced, in units of the error
+  float cell_length = 0;        ///< metres of object space, in place of pixels; 0: none
+  float coarser_outside = 4;    ///< how many times as long they may be out of the picture
+  std::int32_t most_cells = 0;  ///< along each side of a triangle; 0: any number
   float scale = 1;        ///< metres
   float midlevel = 0.5f;
   DisplacementSpace space = DisplacementSpace::kObject;

@@ -569,6 +569,76 @@ def test_adaptive_subdivision_divides_what_nodes_displace():
         assert _displacement_of(scene).get("divide", False) == is_adaptive
 
 
+def test_dicing_rates_are_followed():
+    """The scene's and the object's, beside each other, and what else says how fine Cycles dices, where points have to be."""
+    scene = _stage()
+    scene.relief.use_cycles_settings = True
+    plane = add_plane(4, _displaced_by(_sum))
+    assert "cellLength" not in _displacement_of(scene) and _displacement_of(scene)["cellPixels"] == 1
+    dice(plane, scene, 0.5)
+    usual = _displacement_of(scene)
+    assert usual["cellPixels"] == 0.5 and usual["divide"] and not {"coarserOutside", "mostCells"} & usual.keys(), usual
+    cycles = scene.cycles
+    if IS_5_0:
+        cycles.dicing_rate = 3.0
+    else:
+        plane.cycles.dicing_rate = 3.0
+    cycles.offscreen_dicing_scale, cycles.max_subdivisions, scene.relief.cell_pixels = 9.0, 6, 0.5
+    value = _displacement_of(scene)
+    found = value["cellPixels"], value["coarserOutside"], value["mostCells"]
+    assert found == (0.75, 9.0, 64), value
+    cycles.dicing_rate = 0.1
+    if not IS_5_0:
+        assert abs(_displacement_of(scene)["cellPixels"] - 0.15) < 1e-6
+        plane.cycles.dicing_rate = 0.5
+    value = _displacement_of(scene)
+    assert abs(value["cellPixels"] - 0.05) < 1e-6, "Cycles dices no finer than a tenth of a pixel"
+    scene.relief.use_cycles_settings = False
+    value = _displacement_of(scene)
+    assert value["cellPixels"] == 0.25 and "mostCells" not in value, "the object's own rate alone is left"
+    scene.relief.use_cycles_settings = True
+    if IS_5_0:
+        modifier = plane.modifiers[-1]
+        modifier.adaptive_space, modifier.adaptive_object_edge_length, cycles.dicing_rate = "OBJECT", 0.02, 2.0
+        value = _displacement_of(scene)
+        assert abs(value["cellLength"] - 0.04) < 1e-7 and value["cellPixels"] == 0.5, value
+
+
+def test_maps_are_diced_at_their_rate():
+    """Exact they stay where no error is wanted; where it is, in units of Cycles' rate."""
+    scene = _stage()
+    scene.relief.use_cycles_settings = True
+    plane = add_plane(4, _material()[0])
+    dice(plane, scene, 1.0)
+    assert not {"cellPixels", "divide", "coarserOutside"} & _displacement_of(scene).keys()
+    exact = render_runs(scene, "RELIEF", 1, 4)
+    plane.modifiers.clear()
+    dice(plane, scene, 4.0)
+    assert _displacement_of(scene)["cellPixels"] == 4
+    assert (render_runs(scene, "RELIEF", 1, 4) == exact).all()
+
+
+def test_detail_is_what_the_dicing_rate_leaves():
+    """Noise as fine as pixels: what faces of a rate leave of it, both engines alike; at another rate it is another picture."""
+
+    def build(tree):
+        noise = _texture(tree, "ShaderNodeTexNoise", coordinates="Object", Scale=7.3, Detail=0.0)
+        return _displacing(tree, "ShaderNodeDisplacement", noise, Scale=0.15).outputs[0]
+
+    means = {}
+    for rate in (8.0, 0.5):
+        scene = _stage()
+        scene.relief.use_cycles_settings = True
+        plane = add_plane(4, _displaced_by(build))
+        bpy.ops.object.shade_smooth()
+        dice(plane, scene, rate)
+        means[rate] = [render_runs(scene, engine, 1, 64)[0].mean() for engine in ("RELIEF", "CYCLES")]
+    print("means, relief's and Cycles', by rate", means)
+    (coarse, cycles_coarse), (fine, cycles_fine) = means[8.0], means[0.5]
+    assert cycles_fine / cycles_coarse > 1.05, "the rate makes no difference"
+    assert abs(coarse / cycles_coarse - 1) < 0.01 and abs(fine / cycles_fine - 1) < 0.01, means
+
+
 def test_bump_may_displace():
     """A Bump node that displaces, and a Displacement node that says the same in its own words."""
     scene = _stage()

@@ -117,12 +117,19 @@ TEST(MovedMesh, IsClosedWhereTrianglesAreDividedDifferently)
   const MeshView mesh = octahedron.view();
   const HeightSource source{&mesh, eval_waves};
   // More where x and y are positive; triangles of 300 cells are cut into parts.
-  for (const double most : {1.0, 5.0, 40.0, 300.0}) {
+  const std::pair<double, std::int32_t> kCells[] = {{1, 0}, {5, 0}, {40, 0}, {300, 0}, {300, 16}, {700, 512}};
+  for (const auto& [most, most_cells] : kCells) {
     const auto cells = [&](Vec3f a, Vec3f b) {
       const double x = 0.5 * static_cast<double>(a.x + b.x), y = 0.5 * static_cast<double>(a.y + b.y);
       return most * std::clamp(0.5 + x * 0.5 + y * 0.25, 0.05, 1.0) * static_cast<double>(length(b - a)) / 2.5;
     };
-    const std::vector<LatticeTriangle> parts = lattices_make(mesh, cells);
+    const std::vector<LatticeTriangle> parts = lattices_make(mesh, cells, {}, most_cells);
+    for (const LatticeTriangle& part : parts) {
+      // Parts are halves of halves.
+      const Vec2f side = part.corner[1] - part.corner[0];
+      const double part_of_side = std::max({std::abs(side.x), std::abs(side.y), std::abs(side.x + side.y)});
+      EXPECT_LE(part.side_n[0], most_cells > 0 ? most_cells * part_of_side : HUGE_VAL);
+    }
     const MovedMesh out = divided_mesh_make(mesh, source, parts, kBy);
     const MeshView view = out.view(mesh);
     using Place = std::array<float, 3>;

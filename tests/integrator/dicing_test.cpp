@@ -141,6 +141,23 @@ TEST(Dicing, IsAsFineAsAnyOfItsInstancesAsks)
   EXPECT_GE(among_others, alone);
 }
 
+/// The error of the picture in a material's own unit, and how much coarser it may be where the camera does not look.
+TEST(Dicing, IsAsFineAsItsMaterialAsks)
+{
+  const auto num_micro_triangles = [](double error, float cell_pixels, float coarser_outside) {
+    Scene scene = close_sphere(512, 32, 0.1);
+    scene.displacements[0].cell_pixels = cell_pixels;
+    scene.displacements[0].coarser_outside = coarser_outside;
+    return tessellation_of(SceneContext(scene, options_of(scene, error, 200))).layout().num_micro_triangles;
+  };
+  const std::uint64_t usual = num_micro_triangles(1, 1, 4);
+  EXPECT_EQ(num_micro_triangles(2, 0.5f, 4), usual);
+  EXPECT_EQ(num_micro_triangles(0.5, 2, 4), usual);
+  const std::uint64_t less_coarse = num_micro_triangles(1, 1, 2);
+  EXPECT_GT(less_coarse, usual);
+  EXPECT_GT(num_micro_triangles(1, 1, 1), less_coarse);
+}
+
 /// What of many instances is seen largest, beside all of them looked at.
 TEST(Dicing, LooksAtEveryInstance)
 {
@@ -152,7 +169,7 @@ TEST(Dicing, LooksAtEveryInstance)
       Camera camera;
       camera.projection = projection;
       camera.half_width = camera.half_height = half;
-      const PictureView view(camera, 500);
+      const PictureView view(camera, 500, 1 + 5 * std::abs(static_cast<double>(uniform(random))));
       const Mesh mesh = quad_mesh({-1, -1, 0}, {2, 0, 0}, {0, 2, 0});
       std::vector<Affine3> instances;
       for (int i = 0; i < 300; ++i) {

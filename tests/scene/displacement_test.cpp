@@ -341,11 +341,34 @@ TEST(Displacement, SaysHowFineComputedHeightsAre)
   const Scene scene = load(square_displaced({{"heightGraph", graph}, {"cells", 4096}, {"cellPixels", 0.5}}));
   EXPECT_EQ(settings(scene).num_cells, 4096);
   EXPECT_EQ(settings(scene).cell_pixels, 0.5f);
+  const Scene by_length = load(square_displaced(
+      {{"heightGraph", graph}, {"cellLength", 0.25}, {"mostCells", 64}, {"coarserOutside", 2}, {"divide", true}}));
+  EXPECT_EQ(settings(by_length).cell_length, 0.25f);
+  EXPECT_EQ(settings(by_length).most_cells, 64);
+  EXPECT_EQ(settings(by_length).coarser_outside, 2.0f);
+  EXPECT_EQ(settings(scene).coarser_outside, 4.0f);
+  for (const json& wrong :
+       {json{{"mostCells", 63}}, json{{"mostCells", "auto"}}, json{{"cellLength", 0}}, json{{"coarserOutside", 0.5}}}) {
+    json displacement{{"heightGraph", graph}};
+    displacement.update(wrong);
+    EXPECT_THROW(load(square_displaced(displacement)), SceneError) << wrong;
+  }
+}
+
+/// A map has no cells, but where it is diced sides of some length.
+TEST(Displacement, SaysHowFineMapsAreDiced)
+{
+  const json map{{"heightGraph", sine_graph(1)}, {"cellPixels", 2}, {"coarserOutside", 8}};
+  const Scene scene = load(square_displaced(map));
+  EXPECT_EQ(settings(scene).cell_pixels, 2.0f);
+  EXPECT_EQ(settings(scene).coarser_outside, 8.0f);
+  EXPECT_EQ(num_warnings(scene, "cellPixels") + num_warnings(scene, "coarserOutside"), 0u);
 }
 
 TEST(Displacement, WarnsOfWhatIsOfTheOtherKind)
 {
-  EXPECT_EQ(num_warnings(load(square_displaced({{"heightGraph", sine_graph(1)}, {"cells", 4}})), "cells"), 1u);
+  for (const char* name : {"cells", "cellLength", "mostCells"})
+    EXPECT_EQ(num_warnings(load(square_displaced({{"heightGraph", sine_graph(1)}, {name, 4}})), name), 1u);
   const json points = with(sine_graph(1), {{"evaluate", "points"}, {"resolution", 4}});
   EXPECT_EQ(num_warnings(load(square_displaced({{"heightGraph", points}})), "resolution"), 1u);
 }

@@ -112,6 +112,27 @@ def export_displacement(material, settings, textures, texture_info, images, grap
     }
 
 
+def diced(displacement, dicing):
+    """What RELIEF_displacement has besides where Cycles dices an object, whose rate is then one of the scene's own.
+
+    @param  displacement  what it has elsewhere: with cellPixels if it moves points, which are computed
+    @param  dicing        compat.Dicing
+    """
+    is_computed = "cellPixels" in displacement
+    more = {"divide": True} if is_computed else {}
+    if dicing.pixels is not None:
+        pixels = min(max(displacement.get("cellPixels", 1.0) * dicing.pixels, 0.01), 1000.0)
+        if is_computed or pixels != 1:
+            more["cellPixels"] = pixels
+        if dicing.outside != 4:
+            more["coarserOutside"] = dicing.outside
+    elif is_computed:
+        more["cellLength"] = dicing.length
+    if is_computed and dicing.most_cells is not None:
+        more["mostCells"] = dicing.most_cells
+    return more
+
+
 def _how(material, move, settings):
     """What of RELIEF_displacement is not the height."""
     return {

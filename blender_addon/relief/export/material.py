@@ -6,7 +6,7 @@ import math
 from .. import compat
 from . import nodes
 from .coverage import coverage_of
-from .displacement import bump_displaces, export_displacement
+from .displacement import bump_displaces, diced, export_displacement
 from .graph import GraphWriter, bump_of_displacement
 from .light import set_emission
 from .mesh import Wanted
@@ -95,20 +95,19 @@ class _Indices:
         self._by_shading = by_shading
         self._indices = {}
 
-    def __call__(self, is_smooth, is_diced):
-        """Index of the glTF material of smooth or of flat faces, of an object that Cycles dices to the picture or not."""
-        displacement = self._json.get("extensions", {}).get("RELIEF_displacement", {})
-        # Of heights and vectors that are computed.
-        key = (self._by_shading and is_smooth, is_diced and "cellPixels" in displacement)
+    def __call__(self, is_smooth, dicing):
+        """Index of the glTF material of smooth or of flat faces, of an object that Cycles dices (compat.Dicing) or not (None)."""
+        is_displaced = "RELIEF_displacement" in self._json.get("extensions", {})
+        key = (self._by_shading and is_smooth, dicing if is_displaced else None)
         if key not in self._indices:
             self._indices[key] = self._add(*key)
         return self._indices[key]
 
-    def _add(self, is_smooth, is_diced):
+    def _add(self, is_smooth, dicing):
         json = self._json
         more = {"smoothing": True} if is_smooth else {}
-        if is_diced:
-            more["divide"] = True
+        if dicing is not None:
+            more.update(diced(json["extensions"]["RELIEF_displacement"], dicing))
         if more:
             extensions = json["extensions"]
             displacement = {**extensions["RELIEF_displacement"], **more}

@@ -400,11 +400,11 @@ def store_points(cloud, name, wanted, writer):
     return StoredMesh(name, wanted, [], tuple(warnings), points=None if arrays is None else writer.store(arrays))
 
 
-def add_mesh(stored, materials, writer, is_diced=False, curve_shape="ribbons"):
+def add_mesh(stored, materials, writer, dicing=None, curve_shape="ribbons"):
     """Refers to a stored mesh.
 
     @param  materials  for each slot what gives its material's index in the glTF, for smooth faces or for flat ones
-    @param  is_diced     whether Cycles dices it to the picture
+    @param  dicing       compat.Dicing; None: Cycles does not dice it
     @param  curve_shape  of its strands, as RELIEF_curves has it
     @return              index of a glTF mesh; None if there is nothing in it
     """
@@ -417,7 +417,7 @@ def add_mesh(stored, materials, writer, is_diced=False, curve_shape="ribbons"):
         while _target("POSITION", len(targets)) in attributes:
             number = len(targets)
             targets.append({name: attributes.pop(_target(name, number)) for name in ("POSITION", "NORMAL")})
-        primitive = {"indices": attributes.pop("indices"), "attributes": attributes, "material": materials[slot](is_smooth, is_diced)}
+        primitive = {"indices": attributes.pop("indices"), "attributes": attributes, "material": materials[slot](is_smooth, dicing)}
         if targets:
             primitive["targets"] = targets
         primitives.append(primitive)

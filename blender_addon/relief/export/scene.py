@@ -19,7 +19,7 @@ from .material import MaterialExporter, emits, has_volume, holds_out
 from .mesh import FARTHEST, add_mesh, store_box, store_mesh, store_points, store_strands
 from .motion import numbered
 from .objects import collect, decompose, usable_places
-from .settings import render_settings
+from .settings import cycles_settings, render_settings
 from .visibility import hidden_settings
 from .voxels import Grids, Voxels, domain_of, read_grids
 from .world import Eye, export_world
@@ -408,9 +408,11 @@ class SceneExporter:
         for text in stored.warnings:
             self._warner("object", thing.name)(*text)
         read = {value for w in wanted for value in w.values}
-        is_diced = compat.dicing_modifier(thing.object, self._scene) is not None
+        # A viewport has to answer: its faces are no finer than pixels.
+        least_pixels = 1.0 if self._depsgraph.mode == "VIEWPORT" else 0.1
+        dicing = compat.dicing_of(thing.object, self._scene, cycles_settings(self._scene), least_pixels)
         shape = hair.wanted_shape(self._scene)
-        return add_mesh(stored, [i for i, _ in materials], self.writer, is_diced, shape), stored.reach(), read
+        return add_mesh(stored, [i for i, _ in materials], self.writer, dicing, shape), stored.reach(), read
 
     def _store(self, thing, evaluated, wanted, shapes):
         """StoredMesh of a thing; None if it has none. Things of one shape whose materials want the same share theirs."""
