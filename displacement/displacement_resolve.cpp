@@ -78,7 +78,8 @@ DisplacedPoint DisplacementSet::locate(std::size_t instance, std::uint32_t primi
   const PreparedMesh& d = displaced(instance);
   if (d.tiles != nullptr) return d.tiles->locate(primitive, record);
   if (d.tessellation == nullptr) {
-    DisplacedPoint out{primitive, record.u, record.v};
+    const DisplacedPlace place = displaced_hit_decode(record);
+    DisplacedPoint out{primitive, place.b1, place.b2};
     if (d.procedural != nullptr) set_base_place(*d.procedural, &out);
     return out;
   }

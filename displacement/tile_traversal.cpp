@@ -272,19 +272,8 @@ class Counted {
   std::uint64_t before_;
 };
 
-/// Whether the filter lets a shadow ray pass this hit.
-bool passes(RTCFilterFunctionN shadow_filter,
-            const RTCOccludedFunctionNArguments* arguments,
-            unsigned lane,
-            const TileHit& hit)
-{
-  RTCHit rtc_hit;
-  rtc_hit.Ng_x = static_cast<float>(hit.number);
-  rtc_hit.Ng_y = rtc_hit.Ng_z = 0.0f;
-  rtc_hit.u = hit.u;
-  rtc_hit.v = hit.v;
-  return shadow_filter_passes(shadow_filter, arguments, lane, rtc_hit, hit.t);
-}
+/// The codec of hits, see PointTiles::locate.
+EmbreeHitRecord tile_hit_encode(const TileHit& hit) { return {hit.u, hit.v, static_cast<float>(hit.number)}; }
 
 }  // namespace
 
@@ -311,9 +300,10 @@ void tiles_intersect(const RTCIntersectFunctionNArguments* arguments)
     });
     if (!found) continue;
     RTCRayN_tfar(rays, count, k) = static_cast<float>(nearest.t);
-    RTCHitN_u(hits, count, k) = nearest.u;
-    RTCHitN_v(hits, count, k) = nearest.v;
-    RTCHitN_Ng_x(hits, count, k) = static_cast<float>(nearest.number);
+    const EmbreeHitRecord record = tile_hit_encode(nearest);
+    RTCHitN_u(hits, count, k) = record.u;
+    RTCHitN_v(hits, count, k) = record.v;
+    RTCHitN_Ng_x(hits, count, k) = record.Ng_x;
     RTCHitN_primID(hits, count, k) = arguments->primID;
     RTCHitN_geomID(hits, count, k) = arguments->geomID;
     RTCHitN_instID(hits, count, k, 0) = arguments->context->instID[0];
@@ -331,7 +321,10 @@ void tiles_occluded(const RTCOccludedFunctionNArguments* arguments)
     TileRay ray = tile_ray_make(context, arguments->ray, count, k);
     const Counted counted(context, RTCRayN_id(arguments->ray, count, k));
     tile_visit(pin.tile(), ray, counted.counters, [&](const TileHit& hit) {
-      if (geometry.shadow_filter != nullptr && passes(geometry.shadow_filter, arguments, k, hit)) return true;
+      if (geometry.shadow_filter != nullptr &&
+          shadow_filter_passes(geometry.shadow_filter, arguments, k, tile_hit_encode(hit), hit.t)) {
+        return true;
+      }
       RTCRayN_tfar(arguments->ray, count, k) = -kInfinity;
       return false;
     });

@@ -286,19 +286,6 @@ void intersect(const RTCIntersectFunctionNArguments* arguments)
   }
 }
 
-/// Whether the filter lets a shadow ray pass this hit.
-bool passes(const DisplacedGeometry& geometry,
-            const RTCOccludedFunctionNArguments* arguments,
-            unsigned lane,
-            const DisplacedHit& hit)
-{
-  RTCHit rtc_hit;
-  rtc_hit.Ng_x = rtc_hit.Ng_y = rtc_hit.Ng_z = 0.0f;
-  rtc_hit.u = static_cast<float>(hit.b1);
-  rtc_hit.v = static_cast<float>(hit.b2);
-  return shadow_filter_passes(geometry.shadow_filter, arguments, lane, rtc_hit, hit.t);
-}
-
 void occluded(const RTCOccludedFunctionNArguments* arguments)
 {
   const auto& geometry = *static_cast<const DisplacedGeometry*>(arguments->geometryUserPtr);
@@ -314,7 +301,7 @@ void occluded(const RTCOccludedFunctionNArguments* arguments)
     DisplacedHit hit;
     // A surface that lets light through is met hit by hit, from the front.
     while (trace_observed(geometry, context, ray, t_min, t_max, opaque, &hit)) {
-      if (opaque || !passes(geometry, arguments, k, hit)) {
+      if (opaque || !shadow_filter_passes(geometry.shadow_filter, arguments, k, displaced_hit_encode(hit), hit.t)) {
         RTCRayN_tfar(rays, count, k) = -kInfinity;
         break;
       }
