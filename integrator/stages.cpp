@@ -107,35 +107,35 @@ template <unsigned kFeatures>
 void shade_group(const KernelGlobals& g,
                  PathState& state,
                  const SurfaceGroup& group,
-                 LobePairs& pairs,
+                 HitColumns& hits,
                  const SurfaceSinks& sinks)
 {
-  const SurfaceClosureSpec* plain = nullptr;
+  const SurfaceClosureSpec* closure = nullptr;
   if constexpr ((kFeatures & kFeatureMixture) != 0) {
     // Fewer are not worth it.
-    plain = group.count > 2 ? closures_plain(group.program) : nullptr;
+    closure = group.count > 2 ? closures_with_columns(group.program) : nullptr;
     MixtureBuildLanes b;
-    if (plain != nullptr) {
-      b = surface_group_build(state, group);
-      closures_resolve_plain(group.program, *plain, group.registers, b, pairs.lobes);
+    if (closure != nullptr) {
+      b = surface_group_build(g, state, group);
+      closures_resolve_columns(group.program, *closure, group.registers, b, hits.lobes);
     }
     if constexpr ((kFeatures & kFeatureCaustics) == 0) {
       MixtureLobes lists[kLanes];
-      if (plain != nullptr && surface_group_is_plain(g, state, group, *plain)) {
-        surface_group_resolve<kFeatures>(g, state, group, b, pairs);
-      } else if (!surface_group_resolve<kFeatures>(g, state, group, plain != nullptr ? &pairs.lobes : nullptr, lists,
-                                                   pairs)) {
+      if (closure != nullptr && surface_group_is_resolved(g, state, group, *closure)) {
+        surface_group_resolve<kFeatures>(g, state, group, b, hits);
+      } else if (!surface_group_resolve<kFeatures>(g, state, group, closure != nullptr ? &hits.lobes : nullptr, lists,
+                                                   hits)) {
         for (int k = 0; k < group.count; ++k) {
           shade_surface_listed<kFeatures>(g, state, group.paths[k], group.at[k], lists[k], sinks);
         }
         return;
       }
-      shade_surface_group<kFeatures>(g, state, group, pairs, sinks);
+      shade_surface_group<kFeatures>(g, state, group, hits, sinks);
       return;
     }
   }
   for (int k = 0; k < group.count; ++k) {
-    const GraphHit hit{{&group.program, &group.registers, k}, plain != nullptr ? &pairs.lobes : nullptr};
+    const GraphHit hit{{&group.program, &group.registers, k}, closure != nullptr ? &hits.lobes : nullptr};
     shade_surface<kFeatures>(g, state, group.paths[k], group.at[k], sinks, &hit);
   }
 }
@@ -152,7 +152,7 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
   GraphRegisters registers;
   registers.rays = g.graph_scene.rays;
   SurfaceInteraction located[kLanes];
-  LobePairs pairs{};
+  HitColumns hits{};
   for (std::uint32_t first = 0, count = 0; first < queue.size; first += count) {
     const Material& material = g.materials[material_of(queue.paths[first])];
     count = 1;
@@ -178,7 +178,7 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
     g.run_graph(program, g.textures, registers);
     sinks.counters.graph_runs += 1;
     sinks.counters.graph_points += count;
-    shade_group<kFeatures>(g, state, {queue.paths + first, static_cast<int>(count), located, program, registers}, pairs,
+    shade_group<kFeatures>(g, state, {queue.paths + first, static_cast<int>(count), located, program, registers}, hits,
                            sinks);
   }
 }

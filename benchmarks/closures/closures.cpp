@@ -121,6 +121,11 @@ void cases_visit(F&& visit)
       }));
   one("Principled, 4.3", spec_of(K::principled4, Maths::k43, D::kMultiscatterGgx), Principled4Inputs{});
   one("Principled, 5.2", spec_of(K::principled4, Maths::k52, D::kMultiscatterGgx), Principled4Inputs{});
+  const SurfaceClosureSpec of_5 = spec_of(K::principled4, Maths::k52, D::kMultiscatterGgx);
+  one("Principled metal, 5.2", of_5, with<Principled4Inputs>([](auto& in) { in.metallic = 1; }));
+  one("Principled half metal, 5.2", of_5, with<Principled4Inputs>([](auto& in) { in.metallic = 0.5f; }));
+  one("Principled with a coat, 5.2", of_5, with<Principled4Inputs>([](auto& in) { in.coat_weight = 1; }));
+  one("Principled with sheen, 5.2", of_5, with<Principled4Inputs>([](auto& in) { in.sheen_weight = 1; }));
   visit(ClosureCase("diffuse and glossy")
             .add(spec_of(K::diffuse), DiffuseInputs{}, 0.7f)
             .add(spec_of(K::glossy), GlossyInputs{}, 0.3f));
@@ -161,7 +166,7 @@ void hits_make(Hit* hits, int num_hits)
 /// What stages have of a hit once its closures are resolved.
 struct Resolved {
   SurfaceInteraction at;
-  MixtureLobes lobes;
+  MixtureLobes* lobes;  ///< one of eight that follow each other
 };
 
 [[gnu::noinline, gnu::flatten]] void resolve(const KernelGlobals& g,
@@ -171,14 +176,14 @@ struct Resolved {
                                              Resolved& resolved)
 {
   resolved.at.hit.Ns = hit.Ns;
-  surface_interaction_mix<kFeatures>(g, hit.wo, lane, nullptr, sight, resolved.at, resolved.lobes);
+  surface_interaction_mix<kFeatures>(g, hit.wo, lane, nullptr, sight, resolved.at, *resolved.lobes);
 }
 
 [[gnu::noinline, gnu::flatten]] float evaluate(const KernelGlobals& g, const Hit& hit, const Resolved& resolved)
 {
   const ShadingSide& side = resolved.at.side;
-  const Mixture closure = mixture_of(resolved.lobes, side.frame, side.Ng);
-  if (lobes_are_delta(resolved.lobes)) return 0.0f;
+  const Mixture closure = mixture_of(*resolved.lobes, side.frame, side.Ng);
+  if (lobes_are_delta(*resolved.lobes)) return 0.0f;
   const BsdfEval e = closure_eval<kFeatures>(closure, *g.bsdf_tables, to_local(side.frame, hit.light));
   return e.f.x + e.pdf;
 }
@@ -186,7 +191,7 @@ struct Resolved {
 [[gnu::noinline, gnu::flatten]] float sample(const KernelGlobals& g, const Hit& hit, const Resolved& resolved)
 {
   const ShadingSide& side = resolved.at.side;
-  const Mixture closure = mixture_of(resolved.lobes, side.frame, side.Ng, 1.0f / resolved.at.params.alpha);
+  const Mixture closure = mixture_of(*resolved.lobes, side.frame, side.Ng, 1.0f / resolved.at.params.alpha);
   const BsdfSample s = closure_sample<kFeatures>(closure, *g.bsdf_tables, hit.u_branch, hit.u);
   return s.f.x + s.pdf + s.wi.z;
 }
@@ -198,54 +203,50 @@ struct Resolved {
                                                    ClosureSight sight,
                                                    const Hit* hits,
                                                    Resolved* resolved,
-                                                   LobePairs& pairs)
+                                                   HitColumns& columns)
 {
-  const SurfaceClosureSpec* const plain = closures_plain(program);
-  const bool is_plain = plain != nullptr && closure_scatters_alone(program, *plain);
-  if (is_plain) {
-    MixtureBuildLanes b{{}, splat8(Vec3f{0, 0, 1}), {}};
+  const SurfaceClosureSpec* const closure = closures_with_columns(program);
+  const bool is_resolved = closure != nullptr && closure_scatters_alone(program, *closure);
+  if (is_resolved) {
+    MixtureBuildLanes b{{}, splat8(Vec3f{0, 0, 1}), {}, g.bsdf_tables};
     for (int k = 0; k < 8; ++k) {
       lane_set(b.wo, k, hits[k].wo);
       lane_set(b.Ns, k, hits[k].Ns);
     }
-    closures_resolve_plain(program, *plain, registers, b, pairs.lobes);
-    lobe_pairs_make(b, frame_from_normal(shading_normal_towards(b.Ns, b.wo)), splat8(sight.blur.alpha), pairs);
-  } else {
-    lobe_pairs_begin(pairs);
+    closures_resolve_columns(program, *closure, registers, b, columns.lobes);
+    hit_columns_begin(b, frame_from_normal(shading_normal_towards(b.Ns, b.wo)), splat8(sight.blur.alpha), columns);
   }
-  bool are_pairs = true;
   for (int k = 0; k < 8; ++k) {
     SurfaceInteraction& at = resolved[k].at;
     at.hit.Ns = hits[k].Ns;
     const GraphLane lane{&program, &registers, k};
-    if (is_plain) {
-      LobePairLane pair{&pairs, k};
-      surface_interaction_mix<kFeatures>(g, hits[k].wo, lane, &pairs.lobes, sight, at, pair);
+    if (is_resolved) {
+      HitLane one{&columns, k};
+      surface_interaction_mix<kFeatures>(g, hits[k].wo, lane, &columns.lobes, sight, at, one);
     } else {
-      surface_interaction_mix<kFeatures>(g, hits[k].wo, lane, nullptr, sight, at, resolved[k].lobes);
-      are_pairs = are_pairs && lobe_pairs_take(pairs, k, k == 0, resolved[k].lobes);
-      lobe_pairs_set_surface(pairs, k, at.side.Ng, at.side.frame);
+      surface_interaction_mix<kFeatures>(g, hits[k].wo, lane, nullptr, sight, at, *resolved[k].lobes);
+      hit_columns_set_surface(columns, k, at.side.Ng, at.side.frame);
     }
   }
-  return are_pairs;
+  return is_resolved || lobe_columns_take(columns.lobes, resolved[0].lobes, 8);
 }
 
 /// Evaluates and samples eight hits in columns.
 [[gnu::noinline, gnu::flatten]] float scatter_eight(const KernelGlobals& g,
                                                     const Hit* hits,
                                                     const Resolved* resolved,
-                                                    LobePairs& pairs)
+                                                    HitColumns& columns)
 {
   for (int k = 0; k < 8; ++k) {
-    store_lane(pairs.to_lamp, k, hits[k].light);
-    pairs.u[0][k] = hits[k].u.x;
-    pairs.u[1][k] = hits[k].u.y;
+    store_lane(columns.to_lamp, k, hits[k].light);
+    columns.u[0][k] = hits[k].u.x;
+    columns.u[1][k] = hits[k].u.y;
   }
-  lobe_pairs_light(pairs);
-  lobe_pairs_sample(pairs);
+  hit_columns_light(columns);
+  hit_columns_sample(columns);
   float sum = 0.0f;
   for (int k = 0; k < 8; ++k) {
-    const LobePairLane lane{&pairs, k, 1.0f / resolved[k].at.params.alpha};
+    const HitLane lane{&columns, k, 1.0f / resolved[k].at.params.alpha};
     const BsdfEval e = closure_eval<kFeatures>(lane, *g.bsdf_tables, {});
     const BsdfSample s = closure_sample(lane);
     sum += e.f.x + e.pdf + s.f.x + s.pdf + s.wi.z;
@@ -271,7 +272,7 @@ void case_run(const KernelGlobals& g,
 {
   const GraphProgramView program = one.program();
   const GraphRegisters registers{};
-  LobePairs columns{};
+  HitColumns columns{};
   ClosureSight sight;
   sight.enters = true;
   if (one.is_curve) sight.tangent = {1, 0, 0};
@@ -285,7 +286,7 @@ void case_run(const KernelGlobals& g,
   const auto resolve_at = [&](int i, int k) { resolve(g, {&program, &registers, k}, sight, hits[i + k], resolved[k]); };
   step(ClosureStep::kResolve, [&](int i) {
     for (int k = 0; k < 8; ++k) resolve_at(i, k);
-    times.sum += resolved[0].lobes.lobes[0].probability;
+    times.sum += resolved[0].lobes->lobes[0].probability;
   });
   // The same eight hits' lobes, towards other lamps and with other numbers.
   step(ClosureStep::kEvaluate, [&](int i) {
@@ -331,7 +332,9 @@ int RELIEF_CLOSURES_ROUND(int num_hits, ClosureTimes* times)
   KernelGlobals g;
   g.bsdf_tables = &tables();
   const std::unique_ptr<Resolved[]> resolved(new Resolved[8]);
+  const std::unique_ptr<MixtureLobes[]> lists(new MixtureLobes[8]);
   for (int k = 0; k < 8; ++k) {
+    resolved[k].lobes = &lists[k];
     resolved[k].at.material = &material;
     resolved[k].at.hit.Ng = resolved[k].at.side.Ng = {0, 0, 1};
     resolved[k].at.side.front = true;

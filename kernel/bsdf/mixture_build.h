@@ -84,16 +84,18 @@ RELIEF_KERNEL Frame closure_tangent_frame(Vec3f N, Vec3f tangent, float turns)
 /// Cosine between a lobe's normal and the surface's, above which it is that: 1 but for rounding.
 inline constexpr float kUnbentLobe = 1.0f - 1e-6f;
 
+/// Diffuse lobes are seen from at least this far above their horizon.
+inline constexpr float kLeastDiffuseCosine = 1e-3f;
+
 /// Adds a lobe, unless it weighs nothing: Lambert's, which the caller may make another. It is sampled by its weight.
 /// @param is_diffuse  it may be seen from below its own horizon, as if from just above
 RELIEF_KERNEL MixtureLobe* mixture_add(MixtureBuild& b, Vec3f weight, const Frame& frame, bool is_diffuse = false)
 {
-  constexpr float kLeastCosine = 1e-3f;
   const Vec3f bounded = max(weight, Vec3f{});
   const float mean = mean_component(bounded);
   MixtureLobes& all = *b.lobes;
   Vec3f wo = to_local(frame, b.wo);
-  if (is_diffuse) wo = normalize(Vec3f{wo.x, wo.y, max(wo.z, kLeastCosine)});
+  if (is_diffuse) wo = normalize(Vec3f{wo.x, wo.y, max(wo.z, kLeastDiffuseCosine)});
   if (!(mean > kLeastClosureWeight && mean < kInfinity && wo.z > kMinCosine && all.size < kMostMixtureLobes)) {
     return nullptr;
   }

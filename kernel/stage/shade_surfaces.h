@@ -1,5 +1,5 @@
 // Stage: paths that have met surfaces of one material of closures, eight together. The steps are those of shade_surface.h; between
-// them closures are evaluated and sampled in columns, if they are no more than lobe_pairs.h has.
+// them closures are evaluated and sampled in columns, if they are no more than lobe_columns.h has.
 #pragma once
 
 #include "kernel/stage/shade_surface.h"
@@ -16,7 +16,9 @@ struct SurfaceGroup {
 };
 
 /// What closures of a group are resolved for.
-RELIEF_KERNEL MixtureBuildLanes surface_group_build(const PathState& state, const SurfaceGroup& group)
+RELIEF_KERNEL MixtureBuildLanes surface_group_build(const KernelGlobals& g,
+                                                    const PathState& state,
+                                                    const SurfaceGroup& group)
 {
   alignas(32) float numbers[9][8] = {};
   for (int k = 0; k < group.count; ++k) {
@@ -25,7 +27,7 @@ RELIEF_KERNEL MixtureBuildLanes surface_group_build(const PathState& state, cons
     store_lane(numbers + 3, k, at.side.Ng);
     store_lane(numbers + 6, k, shading_normal_turned(at.hit.Ns, at.side.Ng));
   }
-  return {load8(numbers), load8(numbers + 3), load8(numbers + 6)};
+  return {load8(numbers), load8(numbers + 3), load8(numbers + 6), g.bsdf_tables};
 }
 
 /// Whether a group's closures may be columns: fewer hits are not worth it, and layers of light by its first event want parts of
@@ -35,19 +37,19 @@ RELIEF_KERNEL bool group_has_columns(const PathState& state, const SurfaceGroup&
   return group.count > 2 && state.light_passes == nullptr;
 }
 
-/// Whether all that a group's surfaces scatter by is known in columns.
-/// @param plain  of closures_plain
-RELIEF_KERNEL bool surface_group_is_plain(const KernelGlobals& g,
-                                          const PathState& state,
-                                          const SurfaceGroup& group,
-                                          const SurfaceClosureSpec& plain)
+/// Whether all that a group's surfaces scatter by is what one closure has resolved.
+/// @param closure  of closures_with_columns
+RELIEF_KERNEL bool surface_group_is_resolved(const KernelGlobals& g,
+                                             const PathState& state,
+                                             const SurfaceGroup& group,
+                                             const SurfaceClosureSpec& closure)
 {
-  bool is_plain = group_has_columns(state, group) && closure_scatters_alone(group.program, plain);
+  bool is_resolved = group_has_columns(state, group) && closure_scatters_alone(group.program, closure);
   for (int k = 0; k < group.count; ++k) {
-    is_plain = is_plain && (group.at[k].instance->flags & kCurves) == 0 &&
-               path_does_without(g, state.flags[group.paths[k]]) == 0;
+    is_resolved = is_resolved && (group.at[k].instance->flags & kCurves) == 0 &&
+                  path_does_without(g, state.flags[group.paths[k]]) == 0;
   }
-  return is_plain;
+  return is_resolved;
 }
 
 /// As shading_normal_towards.
@@ -57,57 +59,56 @@ RELIEF_KERNEL Vec3x8 shading_normal_towards(const Vec3x8& Ns, const Vec3x8& wo)
   return select(cos_o >= kLeastShadingCosine, Ns, normalize(Ns + (kLeastShadingCosine - cos_o) * wo));
 }
 
-/// Resolves a group that surface_group_is_plain, in columns.
-/// @param b      of surface_group_build
-/// @param pairs  their lobes are made, of b
+/// Completes a group that surface_group_is_resolved.
+/// @param b     of surface_group_build
+/// @param hits  their lobes are resolved, of b
 template <unsigned kFeatures>
 [[gnu::flatten]] RELIEF_KERNEL void surface_group_resolve(const KernelGlobals& g,
                                                           const PathState& state,
                                                           const SurfaceGroup& group,
                                                           const MixtureBuildLanes& b,
-                                                          LobePairs& pairs)
+                                                          HitColumns& hits)
 {
   alignas(32) float blur[8] = {};
   for (int k = 0; k < group.count; ++k) blur[k] = path_blur(g, state, group.paths[k]);
-  lobe_pairs_make(b, frame_from_normal(shading_normal_towards(b.Ns, b.wo)), load8(blur), pairs);
+  hit_columns_begin(b, frame_from_normal(shading_normal_towards(b.Ns, b.wo)), load8(blur), hits);
   for (int k = 0; k < group.count; ++k) {
     const std::uint32_t path = group.paths[k];
     SurfaceInteraction& at = group.at[k];
     const ClosureSight sight =
         closure_sight(g, state, path, *at.instance, surface_blur<kFeatures>(g, state, path, *at.instance));
-    LobePairLane lane{&pairs, k};
+    HitLane lane{&hits, k};
     surface_interaction_mix<kFeatures>(g, -path_direction(state, path), {&group.program, &group.registers, k},
-                                       &pairs.lobes, sight, at, lane);
+                                       &hits.lobes, sight, at, lane);
   }
 }
 
 /// Resolves a group's hits one by one.
-/// @param columns  of closures_resolve_plain; null: there are none
+/// @param columns  of closures_resolve_columns; null: there are none
 /// @param lists    get their lobes
-/// @param pairs    gets them too
-/// @return         false: they are no pairs
+/// @param hits     gets them too
+/// @return         false: they are no columns
 template <unsigned kFeatures>
 [[gnu::flatten]] RELIEF_KERNEL bool surface_group_resolve(const KernelGlobals& g,
                                                           const PathState& state,
                                                           const SurfaceGroup& group,
-                                                          const Principled3Columns* columns,
+                                                          const LobeColumns* columns,
                                                           MixtureLobes lists[8],
-                                                          LobePairs& pairs)
+                                                          HitColumns& hits)
 {
-  lobe_pairs_begin(pairs);
-  bool are_pairs = group_has_columns(state, group);
+  bool has_lists = group_has_columns(state, group);
   for (int k = 0; k < group.count; ++k) {
     const std::uint32_t path = group.paths[k];
     SurfaceInteraction& at = group.at[k];
     const GraphHit hit{{&group.program, &group.registers, k}, columns};
     surface_interaction_resolve<kFeatures>(g, state, path, -path_direction(state, path), at, lists[k], &hit);
-    are_pairs = are_pairs && has_mixture<kFeatures>(at) && lobe_pairs_take(pairs, k, k == 0, lists[k]);
-    lobe_pairs_set_surface(pairs, k, at.side.Ng, at.side.frame);
+    has_lists = has_lists && has_mixture<kFeatures>(at);
+    hit_columns_set_surface(hits, k, at.side.Ng, at.side.frame);
   }
-  return are_pairs;
+  return has_lists && lobe_columns_take(hits.lobes, lists, group.count);
 }
 
-/// Shades one path of a group whose hits are resolved, but are no pairs.
+/// Shades one path of a group whose hits are resolved, but are no columns.
 template <unsigned kFeatures>
 [[gnu::flatten]] RELIEF_KERNEL void shade_surface_listed(const KernelGlobals& g,
                                                          PathState& state,
@@ -123,12 +124,12 @@ template <unsigned kFeatures>
 
 /// Shades a group that is resolved. Reads and writes what shade_surface does of each, and has the same ways to go on. (Photons
 /// would ask for parts of closures, and in more directions.)
-/// @param pairs  has their lobes
+/// @param hits  has their lobes
 template <unsigned kFeatures>
 [[gnu::flatten]] RELIEF_KERNEL void shade_surface_group(const KernelGlobals& g,
                                                         PathState& state,
                                                         const SurfaceGroup& group,
-                                                        LobePairs& pairs,
+                                                        HitColumns& hits,
                                                         const SurfaceSinks& sinks)
 {
   SurfaceVisit visits[8];
@@ -140,9 +141,9 @@ template <unsigned kFeatures>
     SurfaceVisit& visit = visits[k];
     SurfaceInteraction& at = group.at[k];
     visit.u = scatter_samples(state.pixel_hash[path], state.sample_index[path], path_surface(state, path));
-    shade_surface_meet<kFeatures>(g, state, path, at, LobePairLane{&pairs, k}, visit, sinks.shadow, sinks.counters);
-    pairs.u[0][k] = visit.u.bsdf.x;
-    pairs.u[1][k] = visit.u.bsdf.y;
+    shade_surface_meet<kFeatures>(g, state, path, at, HitLane{&hits, k}, visit, sinks.shadow, sinks.counters);
+    hits.u[0][k] = visit.u.bsdf.x;
+    hits.u[1][k] = visit.u.bsdf.y;
     scatter = scatter || visit.way == SurfaceWay::kScatters;
   }
   // Among many lights those that were chosen have been on their way from memory since.
@@ -151,18 +152,18 @@ template <unsigned kFeatures>
     if (!(visit.chosen.probability > 0.0f)) continue;
     answers[k] = light_ask(g, state, group.paths[k], visit.chosen, group.at[k].hit.P, visit.light_N, storage[k]);
     if (!light_answers(answers[k])) visit.chosen.probability = 0.0f;
-    store_lane(pairs.to_lamp, k, answers[k].sample.wi);
+    store_lane(hits.to_lamp, k, answers[k].sample.wi);
     are_lit = true;
   }
-  if (are_lit) lobe_pairs_light(pairs);
-  if (scatter) lobe_pairs_sample(pairs);
+  if (are_lit) hit_columns_light(hits);
+  if (scatter) hit_columns_sample(hits);
 
   for (int k = 0; k < group.count; ++k) {
     const std::uint32_t path = group.paths[k];
     const SurfaceVisit& visit = visits[k];
     const SurfaceInteraction& at = group.at[k];
-    const LobePairLane closure{&pairs, k, 1.0f / at.params.alpha};
-    const ScatterEvent<LobePairLane> event{at, closure, visit.throughput, visit.light_N, visit.cone};
+    const HitLane closure{&hits, k, 1.0f / at.params.alpha};
+    const ScatterEvent<HitLane> event{at, closure, visit.throughput, visit.light_N, visit.cone};
     if (visit.chosen.probability > 0.0f) {
       const Vec3f wi = to_local(at.side.frame, answers[k].sample.wi);
       shade_surface_lit<kFeatures>(g, state, path, event, answers[k], wi,

@@ -1,14 +1,10 @@
 // What stages ask of a hit's lobes, whether they are a list or lanes of columns.
 #pragma once
 
-#include "kernel/bsdf/lobe_pairs.h"
+#include "kernel/bsdf/hit_columns.h"
 #include "kernel/bsdf/mixture_build.h"
 
 namespace relief {
-
-/// A denoiser is better told of what is behind or mirrored by a surface that scatters less than a quarter of its light by other
-/// lobes than those up to this perceptual roughness, a width α of .075. The same bounds as Cycles'.
-inline constexpr float kSeenThroughRoughness = 0.27386f;
 
 /// Where closures put a hit's lobes. @return  null: those that are there are all
 RELIEF_KERNEL MixtureLobes* lobes_begin(MixtureLobes& lobes)
@@ -16,14 +12,22 @@ RELIEF_KERNEL MixtureLobes* lobes_begin(MixtureLobes& lobes)
   lobes.size = 0;
   return &lobes;
 }
-RELIEF_KERNEL MixtureLobes* lobes_begin(LobePairLane&) { return nullptr; }
+RELIEF_KERNEL MixtureLobes* lobes_begin(HitLane&) { return nullptr; }
+
+/// Frame about a hit's shading normal. Columns have it.
+RELIEF_KERNEL Frame lobes_side(const MixtureLobes&, Vec3f Ns) { return frame_from_normal(Ns); }
+RELIEF_KERNEL Frame lobes_side(const HitLane& one, Vec3f)
+{
+  const auto& side = one.hits->side;
+  return {load_lane(side, one.lane), load_lane(side + 3, one.lane), load_lane(side + 6, one.lane)};
+}
 
 /// Widens lobes as lobe_blur does. Those of columns are so already.
 RELIEF_KERNEL void lobes_blur(MixtureLobes& lobes, float blur, float most_sharp)
 {
   for (int i = 0; i < lobes.size; ++i) lobe_blur(lobes.lobes[i], blur, most_sharp);
 }
-RELIEF_KERNEL void lobes_blur(LobePairLane&, float, float) {}
+RELIEF_KERNEL void lobes_blur(HitLane&, float, float) {}
 
 /// Over all lobes of a hit.
 struct LobesSum {
@@ -43,16 +47,11 @@ RELIEF_KERNEL LobesSum lobes_sum(const MixtureLobes& lobes)
   }
   return sum;
 }
-RELIEF_KERNEL LobesSum lobes_sum(const LobePairLane& one)
+/// @pre  the hit's lobes are as hit_columns_begin has left them
+RELIEF_KERNEL LobesSum lobes_sum(const HitLane& one)
 {
-  const LobePairs& h = *one.hits;
-  const int k = one.lane;
-  LobesSum sum;
-  sum.probability = h.p_diffuse[k] + h.p_reflection[k];
-  if (h.has_diffuse[k] != 0) sum.weight = load_lane(h.lobes.diffuse, k);
-  if (h.has_reflection[k] != 0) sum.weight += load_lane(h.reflection, k);
-  if (h.lobes.roughness[k] <= kSeenThroughRoughness) sum.sharp = h.p_reflection[k];
-  return sum;
+  const LobesSum8& sum = one.hits->sum;
+  return {sum.probability[one.lane], sum.sharp[one.lane], load_lane(sum.weight, one.lane)};
 }
 
 inline constexpr float kLeastLobeShare = 0.125f;
@@ -70,20 +69,27 @@ RELIEF_KERNEL void lobes_defend(MixtureLobes& lobes, float passing)
     if (lobe.kind != MixtureLobeKind::kMultiple) lobe.probability = max(lobe.probability, kLeastLobeShare * sum);
   }
 }
-RELIEF_KERNEL void lobes_defend(LobePairLane& one, float passing)
+RELIEF_KERNEL void lobes_defend(HitLane& one, float passing)
 {
-  LobePairs& h = *one.hits;
+  LobeColumns& c = one.hits->lobes;
   const int k = one.lane;
-  const float least = kLeastLobeShare * (passing + h.p_diffuse[k] + h.p_reflection[k]);
-  if (h.has_diffuse[k] != 0) h.p_diffuse[k] = max(h.p_diffuse[k], least);
-  if (h.has_reflection[k] != 0) h.p_reflection[k] = max(h.p_reflection[k], least);
+  float sum = passing;
+  for (int i = 0; i < c.num_lobes; ++i) sum += c.lobes[i].probability[k];
+  for (int i = 0; i < c.num_lobes; ++i) {
+    LobeColumn& lobe = c.lobes[i];
+    if (lobe.is_there[k] != 0) lobe.probability[k] = max(lobe.probability[k], kLeastLobeShare * sum);
+  }
 }
 
 /// As lobes_are_delta of a list.
-RELIEF_KERNEL bool lobes_are_delta(const LobePairLane& one)
+RELIEF_KERNEL bool lobes_are_delta(const HitLane& one)
 {
-  const LobePairs& h = *one.hits;
-  return h.has_diffuse[one.lane] == 0 && (h.has_reflection[one.lane] == 0 || h.is_delta[one.lane] != 0);
+  const LobeColumns& c = one.hits->lobes;
+  bool are_delta = true;
+  for (int i = 0; i < c.num_lobes; ++i) {
+    are_delta = are_delta && (c.lobes[i].is_there[one.lane] == 0 || c.lobes[i].is_delta[one.lane] != 0);
+  }
+  return are_delta;
 }
 
 /// Mean normal of lobes, by what they weigh.
@@ -101,11 +107,19 @@ RELIEF_KERNEL Vec3f lobes_normal(const MixtureLobes& lobes, Vec3f otherwise)
   }
   return is_zero(sum) ? otherwise : sum / total;
 }
-RELIEF_KERNEL Vec3f lobes_normal(const LobePairLane& one, Vec3f otherwise)
+RELIEF_KERNEL Vec3f lobes_normal(const HitLane& one, Vec3f otherwise)
 {
-  const LobePairs& h = *one.hits;
-  const bool is_there = (h.has_diffuse[one.lane] | h.has_reflection[one.lane]) != 0;
-  return is_there ? load_lane(h.lobes.frame + 6, one.lane) : otherwise;
+  const LobeColumns& c = one.hits->lobes;
+  Vec3f sum;
+  float total = 0;
+  for (int i = 0; i < c.num_lobes; ++i) {
+    const Vec3f weight = load_lane(c.lobes[i].weight, one.lane);
+    const float share = weight.x + weight.y + weight.z;
+    if (!(share > 0.0f)) continue;
+    sum += share * load_lane(c.frames[c.lobes[i].frame].frame + 6, one.lane);
+    total += share;
+  }
+  return is_zero(sum) ? otherwise : sum / total;
 }
 
 }  // namespace relief

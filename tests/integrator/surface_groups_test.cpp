@@ -22,7 +22,7 @@ json principled(const json& inputs)
 Scene plain_scene()
 {
   const json glass = {{"type", "transparent"}, {"weight", 0.4}}, light = {{"type", "emission"}, {"strength", 0.3}};
-  const std::array<json, 10> materials = {
+  const std::array<json, 15> materials = {
       json::array({principled({{"baseColor", {0.7, 0.5, 0.3}}, {"normal", {0.3, 0.1, 1}}})}),
       json::array({principled({{"baseColor", {0.8, 0.2, 0.1}}, {"roughness", 0.2}})}),
       json::array({principled({{"metallic", 1}, {"roughness", 0.3}, {"anisotropic", 0.8}})}),
@@ -35,6 +35,20 @@ Scene plain_scene()
           {principled({{"maths", "5.2"}, {"metallic", 1}, {"roughness", 0.4}, {"baseColor", {0.9, 0.6, 0.2}}})}),
       json::array({{{"type", "diffuse"}, {"weight", 0.5}, {"color", {0.2, 0.7, 0.3}}},
                    {{"type", "glossy"}, {"weight", 0.5}, {"color", {0.9, 0.9, 0.9}}, {"roughness", 0.1}}}),
+      json::array({principled(
+          {{"clearcoat", 1}, {"clearcoatRoughness", 0.1}, {"normal", {0.2, 0, 1}}, {"baseColor", {0.5, 0.05, 0.05}}})}),
+      json::array({principled({{"clearcoat", 0.7}, {"clearcoatRoughness", 0}, {"sheen", 1}, {"roughness", 0.7}})}),
+      json::array({principled({{"maths", "4.3"},
+                               {"distribution", "multiscatter-ggx"},
+                               {"coatWeight", 0.8},
+                               {"coatNormal", {0, 0.3, 1}},
+                               {"metallic", 0.5}})}),
+      json::array({principled({{"maths", "5.2"},
+                               {"distribution", "multiscatter-ggx"},
+                               {"coatWeight", 0.5},
+                               {"sheenWeight", 0.6},
+                               {"sheenTint", {0.9, 0.7, 0.5}}})}),
+      json::array({principled({{"maths", "4.3"}, {"coatWeight", 1}, {"coatTint", {0.9, 0.6, 0.3}}})}),
   };
   GltfBuilder b;
   const std::vector<float> P{0, 0, 0, 1, 0, 0, 0, 1, 0};
@@ -53,7 +67,7 @@ Scene plain_scene()
     const float k = static_cast<float>(i) - 1;
     if (i > 0) {
       for (Vec3f& vertex : mesh.P)
-        vertex += Vec3f{0.8f * std::fmod(k, 3.0f) - 0.8f, 0.1f + 0.7f * std::floor(k / 3), 0};
+        vertex += Vec3f{0.7f * std::fmod(k, 4.0f) - 1.05f, -0.1f + 0.6f * std::floor(k / 4), 0};
     }
     scene.meshes[i] = mesh;
   }
@@ -77,7 +91,7 @@ Scene plain_scene()
 
 TEST(SurfaceGroups, OfEightAndOfOneMakeTheSamePicture)
 {
-  constexpr int kSize = 12, kSamples = 2;
+  constexpr int kSize = 16, kSamples = 2;
   const Scene scene = plain_scene();
   RenderOptions options = render_options(scene, kSize, kSamples);
   const Rendered whole = render_scene(scene, options);
