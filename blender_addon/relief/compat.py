@@ -115,7 +115,7 @@ SUBSURFACE_METHODS = {
     "BURLEY": "random-walk-legacy",
 }
 
-#: Before 4.5 an Emission node in a volume shines as bright whatever Mix Shaders take of it.
+#: Before 4.5 an Emission node in a volume, and what a Principled Volume emits, shines as bright whatever Mix Shaders take of it.
 MIXES_WEIGH_VOLUME_EMISSION = bpy.app.version >= (4, 5, 0)
 
 #: Before 4.0 Cycles took a Principled BSDF's emission for a node of its own, which shines in a volume as well.
@@ -129,6 +129,12 @@ NORMALS_KEEP_UPRIGHT = TANGENT_STRENGTH = IS_4_0
 
 #: Since 5.0 tangent normal maps stand over a normal of unit length; before, over what interpolation leaves of it.
 NORMAL_MAPS_OVER_UNIT_NORMALS = IS_5_0
+
+#: Since 4.5 tangents that lack a uv map run around the mesh as it is; before, as it was at rest.
+TANGENTS_AROUND_THE_REST = bpy.app.version < (4, 5, 0)
+
+#: Since 5.0 they also do so across the line where longitudes begin anew; before, faces there had them the wrong way round.
+LONGITUDES_ARE_JOINED = IS_5_0
 
 #: Footprints away that the bump of a displacement asks for heights, and a Bump node that has no Filter Width.
 BUMP_WIDTH = 0.1 if IS_5_0 else 1.0

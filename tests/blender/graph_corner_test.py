@@ -69,7 +69,8 @@ def _choices(kind):
         sorted(properties[name].enum_items.keys()) if properties[name].type == "ENUM" else (False, True) for name in names
     ]
     combined = [dict(zip(names, chosen)) for chosen in itertools.product(*values)]
-    # Blends are colours' alone.
+    # Rotations are geometry nodes' alone, blends are colours'.
+    combined = [c for c in combined if c.get("data_type") != "ROTATION"]
     return [c for c in combined if c.get("data_type", "RGBA") == "RGBA" or c.get("blend_type", "MIX") == "MIX"]
 
 

@@ -196,14 +196,22 @@ class _Corners:
         return rest.reshape(-1, 3)
 
     def _around(self):
-        """Longitude and latitude around the object's origin, 0 … 1: what Cycles takes for a uv map that tangents lack."""
-        x, y, z = self._rest().astype(np.float64).T
+        """Longitude and latitude around the object's origin, a turn of 1: what Cycles takes for a uv map that tangents lack."""
+        places = self._rest() if compat.TANGENTS_AROUND_THE_REST else self.positions
+        x, y, z = places.astype(np.float64).T
         length = np.sqrt(x * x + y * y + z * z)
         longitude = np.where((x == 0) & (y == 0), 0, 0.5 - np.arctan2(x, y) / (2 * np.pi))
         cosine = np.divide(z, length, out=np.ones_like(z), where=length > 0)
         uv = np.stack([longitude, 1 - np.arccos(np.clip(cosine, -1, 1)) / np.pi], axis=-1)
         uv[length == 0] = 0
-        return uv.astype(np.float32)[self.vertex]
+        uv = uv[self.vertex]
+        if compat.LONGITUDES_ARE_JOINED:
+            # Within half a turn of each face's first corner.
+            sizes = np.empty(len(self.mesh.polygons), dtype=np.int32)
+            self.mesh.polygons.foreach_get("loop_total", sizes)
+            first = np.repeat(uv[np.cumsum(sizes) - sizes, 0], sizes)
+            uv[:, 0] += np.round(first - uv[:, 0])
+        return uv.astype(np.float32)
 
     def _read_generated(self):
         # Of the mesh at rest, carried along by modifiers that make or remove vertices; Blender's texture space is its box.

@@ -62,12 +62,24 @@ class VolumeWriter(ClosureWriter):
                 self._add_attributes(node, inputs)
             if kind == "emission" and not compat.MIXES_WEIGH_VOLUME_EMISSION:
                 weight = 1.0
+            if kind == "principled" and compat.MIXES_WEIGH_VOLUME_EMISSION:
+                self._weigh_emission(inputs, weight)
             self.add(kind, weight, **inputs)
 
     def fill(self):
         """What Cycles fills a volume object with that has no material: a new Principled Volume."""
         density = self._voxels.output(self.graph, "density", "value") if "density" in self._voxels else 1.0
         self.add("principled", 1.0, density=self._math("maximum", density, 0.0))
+
+    def _weigh_emission(self, inputs, weight):
+        """Dims what a Principled Volume emits: its closure takes the weight for what absorbs and scatters alone."""
+        inputs["emissionStrength"] = self._times(inputs["emissionStrength"], weight)
+        tint = inputs["blackbodyTint"]
+        if isinstance(tint, dict) or isinstance(weight, dict):
+            tint = self.graph.op("vector-math", {"a": tint, "scale": weight}, "vector", operation="scale")
+        else:
+            tint = [channel * weight for channel in tint]
+        inputs["blackbodyTint"] = tint
 
     def _add_attributes(self, node, inputs):
         """Multiplies what a Principled Volume has by the grids that it names, those that there are."""
