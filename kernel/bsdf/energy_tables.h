@@ -42,7 +42,7 @@ struct SheenAlbedo {
 /// Nodes along each axis of BsdfTables::reflected_share.
 inline constexpr int kShareNodes = 16;
 
-/// About 74 kB; a render needs one. Glass, sheen and what closures ask for are filled only if asked for.
+/// About 75 kB; a render needs one. Glass, sheen and what closures ask for are filled only if asked for.
 struct BsdfTables {
   GgxEntry ggx[kGgxRoughnesses][kGgxCosines];
   /// Means over the cosine-weighted hemisphere. Losses grow with alpha² and are stored divided by it, so that rows can
@@ -54,6 +54,8 @@ struct BsdfTables {
   /// How far the reflectance of visible microfacets has risen from F0 to 1 along a dielectric's curve, on the mean, those that
   /// lose the ray not at all: by roughness, fourth root of F0, cosine; axes from 0 to 1, linear.
   float reflected_share[kShareNodes][kShareNodes][kShareNodes];
+  /// The same along Schlick's curve, which is that of any F0: by roughness, cosine.
+  float schlick_share[kShareNodes][kShareNodes];
   ThinFilmTable thin_film;
 };
 
@@ -369,24 +371,29 @@ RELIEF_KERNEL void sheen_tables_make(BsdfTables& tables)
   }
 }
 
+/// Both tables of shares.
 RELIEF_KERNEL void reflected_share_make(BsdfTables& tables)
 {
-  constexpr int kRows = 8, kColumns = 16;  // of points on the unit square
+  // Points of a lattice: a grid of as many missed by three times as much.
+  constexpr int kPoints = 128, kStep = 79;
   const auto node = [](int i) { return static_cast<float>(i) / (kShareNodes - 1); };
   for (int r = 0; r < kShareNodes; ++r) {
     const float alpha = max(1e-4f, sqr(node(r)));
     for (int c = 0; c < kShareNodes; ++c) {
       const float cos_o = max(1e-4f, node(c));
       const Vec3f wo{__builtin_sqrtf(1.0f - sqr(cos_o)), 0.0f, cos_o};
-      float met[kRows * kColumns];  // cosines to microfacets that reflect upwards
+      float met[kPoints];  // cosines to microfacets that reflect upwards
       int num_met = 0;
-      for (int i = 0; i < kRows * kColumns; ++i) {
-        const Vec2f u{(static_cast<float>(i % kColumns) + 0.5f) / kColumns,
-                      (static_cast<float>(i / kColumns) + 0.5f) / kRows};
+      for (int i = 0; i < kPoints; ++i) {
+        const Vec2f u{(static_cast<float>(i * kStep % kPoints) + 0.5f) / kPoints,
+                      (static_cast<float>(i) + 0.5f) / kPoints};
         const Vec3f wm = warp_ggx_visible_normal(wo, alpha, u);
         const float cos_d = dot(wo, wm);
         if (2.0f * cos_d * wm.z > wo.z) met[num_met++] = min(1.0f, cos_d);
       }
+      float along_schlick = 0.0f;
+      for (int i = 0; i < num_met; ++i) along_schlick += schlick_weight(met[i]);
+      tables.schlick_share[r][c] = along_schlick / kPoints;
       for (int f = 0; f < kShareNodes; ++f) {
         const float F0 = min(sqr(sqr(clamp(node(f), 1e-4f, 0.99f))), 0.99f);
         const float eta = (1.0f + __builtin_sqrtf(F0)) / (1.0f - __builtin_sqrtf(F0));
@@ -395,7 +402,7 @@ RELIEF_KERNEL void reflected_share_make(BsdfTables& tables)
           const float F = fresnel_dielectric(met[i], refracted_cosine(met[i], eta), eta);
           sum += clamp((F - F0) / (1.0f - F0), 0.0f, 1.0f);
         }
-        tables.reflected_share[r][f][c] = sum / (kRows * kColumns);
+        tables.reflected_share[r][f][c] = sum / kPoints;
       }
     }
   }
@@ -414,6 +421,17 @@ RELIEF_KERNEL float reflected_share(const BsdfTables& tables, float roughness, f
     return lerp(c.t, row[0], row[1]);
   };
   return lerp(r.t, lerp(f.t, along_c(0, 0), along_c(0, 1)), lerp(f.t, along_c(1, 0), along_c(1, 1)));
+}
+
+/// The same of a metal, whose reflectance rises along Schlick's curve.
+RELIEF_KERNEL float schlick_share(const BsdfTables& tables, float roughness, float cos_o)
+{
+  const TableCoordinate r = table_coordinate(roughness, kShareNodes), c = table_coordinate(cos_o, kShareNodes);
+  const auto along_c = [&](int i) {
+    const float* row = tables.schlick_share[r.index + i] + c.index;
+    return lerp(c.t, row[0], row[1]);
+  };
+  return lerp(r.t, along_c(0), along_c(1));
 }
 
 /// Fills the tables; the same bits on every run.

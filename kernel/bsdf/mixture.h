@@ -188,28 +188,6 @@ RELIEF_KERNEL EventKind closure_other_event(const Mixture& m, bool transmitted)
   return transmitted && !has_fibre ? EventKind::kTransmission : EventKind::kGlossy;
 }
 
-/// What the chosen lobes scatter of white light by kinds of event, as Cycles has it: up to 3.6 microfacets without their
-/// reflectance.
-/// @param colors  gets kNumEventKinds of them
-RELIEF_KERNEL void mixture_event_colors(const Mixture& m, Vec3f* colors)
-{
-  mixture_visit(m, [&](const MixtureLobe& lobe) {
-    Vec3f color = lobe.weight * m.gain;
-    if (lobe.kind == MixtureLobeKind::kMultiple) return;
-    if (lobe.kind == MixtureLobeKind::kGlass) {
-      const Vec3f F = min(max(mixture_fresnel(lobe.fresnel, lobe.wo.z), Vec3f{}), splat3(1.0f));
-      colors[static_cast<int>(EventKind::kGlossy)] += color * lobe.shape.glass.reflection_tint * F;
-      colors[static_cast<int>(EventKind::kTransmission)] +=
-          color * lobe.shape.glass.transmission_tint * (splat3(1.0f) - F);
-      return;
-    }
-    if (lobe.maths >= Maths::k43 && mixture_traits(lobe.kind).has_fresnel) {
-      color *= mixture_fresnel(lobe.fresnel, lobe.wo.z);
-    }
-    colors[static_cast<int>(mixture_lobe_event(lobe.kind))] += color;
-  });
-}
-
 template <bool kSharp>
 RELIEF_KERNEL bool closure_has(const Mixture& m, SharpLobes sharp)
 {

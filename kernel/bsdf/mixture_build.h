@@ -181,7 +181,8 @@ RELIEF_KERNEL void lobe_scale(MixtureLobe& lobe, Vec3f by)
   if (spec.maths >= Maths::k43) {
     const Vec3f factor = ggx_energy_factor(*b.tables, EnergyModel::kTable, F_mean, roughness, lobe.wo.z);
     lobe_scale(lobe, factor);
-    return factor * (1.0f - lost);
+    lobe.first_share = 1.0f - lost;
+    return factor * lobe.first_share;
   }
   const float lost_mean = ggx_albedo_mean(*b.tables, multiple.ggx).lost;
   if (!(lost_mean > kLeastMeanLost && lost > 0.0f)) return {1, 1, 1};
@@ -352,7 +353,8 @@ RELIEF_KERNEL void glass_add(MixtureBuild& b,
     const bool mirrors = spec.maths >= Maths::k43 && is_zero(transmission_tint);
     const Vec3f F_mean =
         mirrors ? reflection_tint * fresnel_interpolated_mean(fresnel.a, {1, 1, 1}, fresnel.eta) : transmission_tint;
-    lobe_scale(*lobe, microfacet_energy_factor(saturated(F_mean), max(1.0f - lost, 1e-3f), 1.0f - lost_mean));
+    lobe->first_share = max(1.0f - lost, 1e-3f);
+    lobe_scale(*lobe, microfacet_energy_factor(saturated(F_mean), lobe->first_share, 1.0f - lost_mean));
   }
   lobe->probability = weight * mean_component(max(reflection_tint, transmission_tint));
   b.transmits = true;

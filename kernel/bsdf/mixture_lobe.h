@@ -59,6 +59,7 @@ struct MixtureLobe : LobeHit {
       false;  ///< its microfacets mirror to below its normal as well, as far as the true surface lets them
   bool is_on_curve = false;  ///< its normal turns from edge to edge of a strand, whose geometric normal means little
   float probability = 0;     ///< not normalised
+  float first_share = 1;     ///< since 4.0: of its light, what facets send on at once, before the rest is given back
   Vec3f weight{};            ///< factor on f
   Frame frame;               ///< world
   Vec3f surface_N{};         ///< the surface's shading normal, its own frame

@@ -3,7 +3,7 @@
 
 #include <type_traits>
 
-#include "kernel/bsdf/mixture.h"
+#include "kernel/bsdf/mixture_colors.h"
 #include "kernel/sample/dimensions.h"
 #include "kernel/stage/surface_interaction.h"
 
@@ -93,7 +93,7 @@ template <unsigned kFeatures, typename Lobes>
   Vec3f colors[kNumEventKinds];
   if (has_mixture<kFeatures>(at)) {
     if constexpr (std::is_same_v<Lobes, MixtureLobes>) {
-      mixture_event_colors(mixture_of(lobes, at.side.frame, at.side.Ng), colors);
+      mixture_event_colors(mixture_of(lobes, at.side.frame, at.side.Ng), *g.bsdf_tables, colors);
     }
   } else if (!at.params.unlit) {
     surface_event_colors(at.params, colors);

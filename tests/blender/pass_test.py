@@ -372,7 +372,7 @@ def test_light_by_events_is_that_of_cycles():
         pictures = []
         for seed in range(5):
             scene.cycles.seed = scene.relief.seed = seed
-            pictures.append(passes(scene, engine, 1024))
+            pictures.append(passes(scene, engine, 2048))
         for name in LIGHT_PASSES:
             runs[name][engine] = np.stack([_stacked(p, layer, name) for p in pictures])
     for name in LIGHT_PASSES:
