@@ -8,13 +8,14 @@
 #include <dlfcn.h>
 #include <sys/mman.h>
 
+#include "scene/companion_file.h"
 #include "scene/memory.h"
 
 namespace relief {
 namespace {
 
 // The number counts changes of the interface: an old program that was copied away does not call into a newer build.
-constexpr const char* kEntryPoint = "relief_image_io_4";
+constexpr const char* kEntryPoint = "relief_image_io_5";
 
 /// Makes sure of the address space that linking needs, where a shell bounds it (ulimit -v). Without it some of the 245
 /// libraries abort in their initialization, or wait for ever for threads that could not be started.
@@ -34,14 +35,10 @@ const ImageIo& module_load()
 {
   namespace fs = std::filesystem;
   address_space_require();
-  std::error_code no_proc;
-  const fs::path program = fs::read_symlink("/proc/self/exe", no_proc);
-  const fs::path folder = program.parent_path(), name = "relief_image_io.so";
-  std::string cause = name.string() + " is neither in " + folder.string() + " nor in ../lib/relief";
+  constexpr const char* kName = "relief_image_io.so";
+  std::string cause = companion_missing(kName);
   bool is_there = false;
-  // Beside the program, where a copy of both finds it; where it is installed; or where it was built, for the programs of tests.
-  for (const fs::path& path :
-       {folder / name, folder.parent_path() / "lib/relief" / name, fs::path(RELIEF_IMAGE_IO_MODULE)}) {
+  for (const fs::path& path : companion_places(kName, RELIEF_IMAGE_IO_MODULE)) {
     // Lazily, as at a program's start: looking up every function of 245 libraries takes another 20 ms.
     void* module = ::dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL);
     const void* entry = module == nullptr ? nullptr : ::dlsym(module, kEntryPoint);

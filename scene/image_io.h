@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "scene/mip_chain.h"
-#include "scene/voxel_file.h"
 
 namespace relief {
 
@@ -127,8 +126,6 @@ struct ImageIo {
   std::unique_ptr<ImageFile> (*make_file)(const std::string& format);
 
   std::unique_ptr<TileCache> (*make_tile_cache)(std::size_t budget_bytes, int tile_size);
-
-  std::unique_ptr<VoxelFile> (*make_voxel_file)();
 };
 
 /// The module, loaded when first asked for and never unloaded. Any thread may ask.

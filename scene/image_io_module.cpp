@@ -9,7 +9,6 @@
 #include <new>
 
 #include "scene/image_io.h"
-#include "scene/voxel_file_module.h"
 
 namespace relief {
 namespace {
@@ -276,5 +275,4 @@ std::unique_ptr<TileCache> tile_cache_make(std::size_t budget_bytes, int tile_si
 }  // namespace
 }  // namespace relief
 
-extern "C" const relief::ImageIo relief_image_io_4 = {relief::file_make, relief::tile_cache_make,
-                                                      relief::voxel_file_make};
+extern "C" const relief::ImageIo relief_image_io_5 = {relief::file_make, relief::tile_cache_make};

@@ -1,5 +1,5 @@
 // What relief needs of OpenVDB, behind an interface without its types: one grid of a file, as bricks (kernel/graph/voxels.h).
-// The library comes with OpenImageIO's, so the same module has both (image_io.h).
+// The library is in a program of its own, as broken files can make it crash (voxel_process.h).
 #pragma once
 
 #include <cstdint>

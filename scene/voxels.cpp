@@ -8,9 +8,8 @@
 
 #include "kernel/graph/voxels.h"
 #include "scene/diagnostics.h"
-#include "scene/image_io.h"
 #include "scene/memory.h"
-#include "scene/voxel_file.h"
+#include "scene/voxel_process.h"
 
 namespace relief {
 namespace {
@@ -81,12 +80,7 @@ std::shared_ptr<const Voxels> voxels_load(const std::filesystem::path& file,
     fail("an OpenVDB file", error);
   };
   try {
-    std::unique_ptr<VoxelFile> reader;
-    try {
-      reader = image_io().make_voxel_file();
-    } catch (const std::runtime_error& e) {
-      fail("an OpenVDB file", e.what());
-    }
+    const std::unique_ptr<VoxelFile> reader = voxel_process_make();
     VoxelHeader header;
     check(reader->open(file.string(), grid, header));
     if (!header.is_known) fail("a grid of numbers, \"" + grid + '"', listed(header.grids));

@@ -136,9 +136,11 @@ def test_a_zip_that_holds_the_program_needs_no_other():
         os.makedirs(f"{tree}/bin")
         program = os.environ["RELIEF_BINARY"]
         shutil.copy(program, f"{tree}/bin/relief")
-        shutil.copy(os.path.join(os.path.dirname(program), "relief_image_io.so"), f"{tree}/lib/relief")
+        beside = [f"{tree}/lib/relief/{name}" for name in ("relief_image_io.so", "relief_voxels")]
+        for file in beside:
+            shutil.copy(os.path.join(os.path.dirname(program), os.path.basename(file)), file)
         for command in (
-            ["bundle_libraries", f"{tree}/lib/relief", f"{tree}/bin/relief", f"{tree}/lib/relief/relief_image_io.so"],
+            ["bundle_libraries", f"{tree}/lib/relief", f"{tree}/bin/relief", *beside],
             ["package_addon", "--program", tree, archive],
         ):
             subprocess.run([os.path.join(_ROOT, "scripts", command[0]), *command[1:]], check=True, capture_output=True)

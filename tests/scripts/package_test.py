@@ -37,14 +37,15 @@ class Bundle(unittest.TestCase):
         run("cmake", "--install", os.environ["RELIEF_BUILD"], "--component", "program", "--prefix", cls.tree, "--strip")
         cls.libraries = cls.tree / "lib" / "relief"
         cls.program = cls.tree / "bin" / "relief"
-        run(ROOT / "scripts" / "bundle_libraries", cls.libraries, cls.program, cls.libraries / "relief_image_io.so")
+        cls.beside = [cls.libraries / "relief_image_io.so", cls.libraries / "relief_voxels"]
+        run(ROOT / "scripts" / "bundle_libraries", cls.libraries, cls.program, *cls.beside)
 
     @classmethod
     def tearDownClass(cls):
         cls.temporary.cleanup()
 
     def test_nothing_but_the_systems_libraries_is_missing(self):
-        for file in [self.program, *self.libraries.glob("*.so*")]:
+        for file in [self.program, *self.beside, *self.libraries.glob("*.so.*")]:
             for line in run("ldd", file, env={"LD_LIBRARY_PATH": "/nowhere"}).splitlines():
                 self.assertNotIn("not found", line, file)
                 if not SYSTEM.search(line) and "statically linked" not in line:

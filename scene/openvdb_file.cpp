@@ -1,4 +1,6 @@
 // The only source that uses OpenVDB; see voxel_file.h.
+#include "scene/openvdb_file.h"
+
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
 
@@ -16,7 +18,6 @@
 
 #include "kernel/texture/half.h"
 #include "scene/voxel_file.h"
-#include "scene/voxel_file_module.h"
 
 namespace relief {
 namespace {
@@ -302,6 +303,6 @@ class OpenVdbFile final : public VoxelFile {
 
 }  // namespace
 
-std::unique_ptr<VoxelFile> voxel_file_make() { return std::make_unique<OpenVdbFile>(); }
+std::unique_ptr<VoxelFile> openvdb_file_make() { return std::make_unique<OpenVdbFile>(); }
 
 }  // namespace relief
