@@ -107,9 +107,12 @@ void cases_visit(F&& visit)
   hair.add(spec_of(K::hair), HairInputs{});
   ClosureCase fibre("fibre");
   fibre.add(spec_of(K::fibre), FibreInputs{});
-  hair.is_curve = fibre.is_curve = true;
+  ClosureCase facet_fibre("fibre of facets");
+  facet_fibre.add(spec_of(K::facet_fibre), FacetFibreInputs{});
+  hair.is_curve = fibre.is_curve = facet_fibre.is_curve = true;
   visit(hair);
   visit(fibre);
+  visit(facet_fibre);
 
   one("Principled", spec_of(K::principled3), Principled3Inputs{});
   one("Principled metal", spec_of(K::principled3), with<Principled3Inputs>([](auto& in) { in.metallic = 1; }));

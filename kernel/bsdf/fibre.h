@@ -193,19 +193,24 @@ struct FibreSample {
   bool is_reflected;  ///< by the surface
 };
 
+/// Sine of the tilt of wi. @param u_along  (0, 1]
+/// @source  [E] Section 5
+RELIEF_KERNEL float fibre_tilt_sample(Vec3f wo, float variance, float u_along, float u)
+{
+  const float along = 1.0f + variance * std::log(u_along + (1.0f - u_along) * std::exp(-2.0f / variance));
+  const float cos_o = safe_sqrt(1.0f - sqr(wo.x));
+  return clamp(-along * wo.x + safe_sqrt(1.0f - sqr(along)) * std::cos(2.0f * kPi * u) * cos_o, -1.0f, 1.0f);
+}
+
 /// @param u_lobe  [0, 1): of which lobe, and of the tilt
-/// @source  tilts: [E] Section 5
 RELIEF_KERNEL FibreSample fibre_sample(const Fibre& fibre, Vec3f wo, float u_lobe, Vec2f u)
 {
   const FibreScattering s = fibre_scattering(fibre, wo);
   int p = 0;
   while (p + 1 < kFibreLobes && u_lobe >= s.chance[p]) u_lobe -= s.chance[p++];
   const float again = clamp(s.chance[p] > 0.0f ? u_lobe / s.chance[p] : 0.0f, 1e-5f, 1.0f);
-  const float v = fibre_lobe_variance(fibre, p);
-  const float along = 1.0f + v * std::log(again + (1.0f - again) * std::exp(-2.0f / v));
-  const float cos_o = safe_sqrt(1.0f - sqr(wo.x));
   FibreTilt i;
-  i.sin = clamp(-along * wo.x + safe_sqrt(1.0f - sqr(along)) * std::cos(2.0f * kPi * u.y) * cos_o, -1.0f, 1.0f);
+  i.sin = fibre_tilt_sample(wo, fibre_lobe_variance(fibre, p), again, u.y);
   i.cos = safe_sqrt(1.0f - sqr(i.sin));
   i = fibre_turned(i, -fibre_lobe_tilt(fibre, p));
   const float phi = p < 3 ? fibre_exit(s, p) + logistic_sample(u.x, fibre.scale) : 2.0f * kPi * u.x;

@@ -81,7 +81,8 @@ RELIEF_KERNEL Mixture mixture_part(const Mixture& m, SharpLobes sharp)
 /// f and pdf of the chosen lobes. Not inlined, and all kinds of lobes are in it: kernels ask from many places, and a call a lobe
 /// cost as much as most lobes.
 /// @param wi_local  in the surface's frame
-/// @param sampled   the lobe that wi was sampled from; null: it was not
+/// @param sampled   the lobe that wi was sampled from; null: it was not. Then f is without that of lobes that are followed instead of
+///                  asked (mixture_follow_fibre), and such that over pdf, which is of all, it is what the others' samples stand for
 /// @param through   whether that lobe sent it through the surface
 template <TransportMode kMode>
 [[gnu::noinline]] RELIEF_KERNEL BsdfEval
@@ -90,6 +91,7 @@ mixture_eval(const Mixture& m, const BsdfTables& tables, Vec3f wi_local, const M
   BsdfEval e;
   const float cos_i = __builtin_fabsf(wi_local.z);
   if (!(cos_i > kMinCosine)) return e;
+  float followed = 0;  // density of the lobes that would have been followed
   const Vec3f wi = from_local(m.frame, wi_local);
   const bool below_Ns = wi_local.z < 0.0f, below_Ng = dot(wi, m.Ng) < 0.0f;
   mixture_visit(m, [&](const MixtureLobe& lobe) {
@@ -99,13 +101,41 @@ mixture_eval(const Mixture& m, const BsdfTables& tables, Vec3f wi_local, const M
     const std::uint32_t reach = mixture_lobe_reach(lobe).bits >> reach_bit({below, below_Ns, below_Ng}, is_own);
     const bool shines = (reach & 1u) != 0, is_found = (reach >> kReachFound & 1u) != 0;
     if (!shines && !is_found) return;
+    if (sampled != nullptr && lobe.kind == MixtureLobeKind::kFacetFibre) {
+      followed += lobe.probability * facet_fibre_pdf(lobe.shape.facet_fibre, lobe.fresnel.eta, lobe.wo, wi_lobe);
+      return;
+    }
     const BsdfEval one = mixture_lobe_eval<kMode>(lobe, tables, wi_lobe, below, is_own);
     if (shines) e.f += lobe.weight * one.f;
     if (is_found) e.pdf += lobe.probability * one.pdf;
   });
   e.f *= m.gain / cos_i;
+  if (__builtin_expect(followed > 0.0f, 0)) {
+    e.f *= e.pdf > 0.0f ? (e.pdf + followed) / e.pdf : 0.0f;
+    e.pdf += followed;
+  }
   e.pdf *= m.scale;
   return e;
+}
+
+/// Samples a fibre by following light through it. What other lobes send the same way is theirs to find; so all have the density
+/// by which lights are weighed against what is sampled, which is nearly that of the samples, and no more.
+/// @pre  chosen is a lobe of facet fibres
+template <TransportMode kMode>
+[[gnu::noinline]] RELIEF_KERNEL BsdfSample
+mixture_follow_fibre(const Mixture& m, const MixtureLobe& chosen, const BsdfTables& tables, float u_branch, Vec2f u)
+{
+  const FacetFibre& fibre = chosen.shape.facet_fibre;
+  const FacetFibreSample d = facet_fibre_sample(fibre, chosen.fresnel.eta, tables, chosen.wo, u_branch, u);
+  BsdfSample s;
+  s.wi = to_local(m.frame, from_local(chosen.frame, d.wi));
+  const float cos_i = __builtin_fabsf(s.wi.z);
+  if (!(max_component(d.weight) > 0.0f && cos_i > kMinCosine)) return {};
+  s.pdf = mixture_eval<kMode>(m, tables, s.wi, &chosen, !d.is_reflected).pdf;
+  s.f = chosen.weight * d.weight * (m.gain * s.pdf / (chosen.probability * m.scale * cos_i));
+  s.roughness = fibre.alpha;
+  s.lobe = kLobeGlossy | (d.is_reflected ? kLobeReflect : kLobeTransmit);
+  return s;
 }
 
 /// As closure_eval of a SurfaceClosure.
@@ -144,6 +174,9 @@ RELIEF_KERNEL BsdfSample closure_sample(const Mixture& m, const BsdfTables& tabl
     s.lobe = kLobeSubsurface;
     s.entered = static_cast<std::uint32_t>(chosen - m.all->lobes);
     return s;
+  }
+  if (chosen->kind == MixtureLobeKind::kFacetFibre) {
+    return mixture_follow_fibre<kMode>(m, *chosen, tables, u_branch, u);
   }
   const LobeSample d = mixture_lobe_sample<kMode>(*chosen, u_branch, u);
   const bool through = (d.bits & kLobeTransmit) != 0;
@@ -184,7 +217,9 @@ RELIEF_KERNEL Mixture closure_matte(const Mixture& m)
 RELIEF_KERNEL EventKind closure_other_event(const Mixture& m, bool transmitted)
 {
   bool has_fibre = false;
-  mixture_visit(m, [&](const MixtureLobe& lobe) { has_fibre = has_fibre || lobe.kind == MixtureLobeKind::kFibre; });
+  mixture_visit(m, [&](const MixtureLobe& lobe) {
+    has_fibre = has_fibre || lobe.kind == MixtureLobeKind::kFibre || lobe.kind == MixtureLobeKind::kFacetFibre;
+  });
   return transmitted && !has_fibre ? EventKind::kTransmission : EventKind::kGlossy;
 }
 

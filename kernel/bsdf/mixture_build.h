@@ -34,6 +34,7 @@ struct MixtureBuild {
   bool is_after_diffuse = false;          ///< the path has been scattered diffusely before
   float footprint = 0;                    ///< metres
   Vec3f tangent{};                        ///< unit, along the curve that is met; 0: it is a triangle
+  float strand_radius = 0;                ///< metres, of the curve that the camera sees itself; 0: it is none
 };
 
 RELIEF_KERNEL float mean_component(Vec3f v) { return (v.x + v.y + v.z) * (1.0f / 3.0f); }

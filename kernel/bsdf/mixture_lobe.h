@@ -7,6 +7,7 @@
 #include "kernel/bsdf/beckmann.h"
 #include "kernel/bsdf/bump_shadowing.h"
 #include "kernel/bsdf/clearcoat_gtr1.h"
+#include "kernel/bsdf/facet_fibre.h"
 #include "kernel/bsdf/fibre.h"
 #include "kernel/bsdf/ggx_anisotropic.h"
 #include "kernel/bsdf/ggx_multiple.h"

@@ -59,31 +59,34 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
   }
 }
 
+/// How much the random number of a strand varies what is its own, from -1 to 1.
+RELIEF_KERNEL float fibre_variation(float random) { return 2.0f * (random - 0.5f); }
+
+/// Absorption of a fibre by what says so.
+/// @param radial  roughness by which colours were chosen
+template <typename Inputs>
+RELIEF_KERNEL Vec3f fibre_sigma(const SurfaceClosureSpec& spec, const Inputs& in, float radial)
+{
+  Vec3f sigma = in.absorption;
+  if (spec.pigment == FibrePigment::kColor) sigma = fibre_sigma_of_color(in.color, radial);
+  if (spec.pigment == FibrePigment::kMelanin) {
+    const float share = in.melanin * (1.0f + fibre_variation(in.random) * saturated(in.random_color));
+    const float amount = -std::log(max(1.0f - share, 1e-4f));
+    sigma = fibre_sigma_of_melanin(amount * (1.0f - in.melanin_redness), amount * in.melanin_redness) +
+            fibre_sigma_of_color(in.tint, radial);
+  }
+  return max(sigma, Vec3f{});
+}
+
 RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, float weight, const FibreInputs& in)
 {
   MixtureLobe* lobe = strand_add(b, splat3(weight), {}, MixtureLobeKind::kFibre);
   if (lobe == nullptr) return;
   b.transmits = true;
-  const float vary = 2.0f * (in.random - 0.5f);
-  const float rougher = 1.0f + vary * in.random_roughness;
+  const float rougher = 1.0f + fibre_variation(in.random) * in.random_roughness;
   const float roughness = clamp(in.roughness * rougher, 0.001f, 1.0f), radial = in.radial_roughness * rougher;
   Fibre fibre;
-  switch (spec.pigment) {
-    case FibrePigment::kColor:
-      fibre.sigma = fibre_sigma_of_color(in.color, radial);
-      break;
-    case FibrePigment::kMelanin: {
-      const float share = in.melanin * (1.0f + vary * saturated(in.random_color));
-      const float amount = -std::log(max(1.0f - share, 1e-4f));
-      fibre.sigma = fibre_sigma_of_melanin(amount * (1.0f - in.melanin_redness), amount * in.melanin_redness) +
-                    fibre_sigma_of_color(in.tint, radial);
-      break;
-    }
-    case FibrePigment::kAbsorption:
-      fibre.sigma = in.absorption;
-      break;
-  }
-  fibre.sigma = max(fibre.sigma, Vec3f{});
+  fibre.sigma = fibre_sigma(spec, in, radial);
   fibre.variance = fibre_variance(roughness);
   fibre.variance_R = fibre_variance((1.0f - saturated(in.coat)) * roughness);
   fibre.scale = fibre_scale(radial);
@@ -91,6 +94,41 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b, const SurfaceClosureSpec& spec, 
   fibre.eta = max(in.ior, 1.001f);
   fibre.across = clamp(dot(lobe->frame.t, b.Ns), -1.0f, 1.0f);
   lobe->shape.fibre = fibre;
+}
+
+RELIEF_KERNEL void closure_add(MixtureBuild& b,
+                               const SurfaceClosureSpec& spec,
+                               float weight,
+                               const FacetFibreInputs& in)
+{
+  MixtureLobe* lobe = strand_add(b, splat3(weight), {}, MixtureLobeKind::kFacetFibre);
+  if (lobe == nullptr) return;
+  b.transmits = true;
+  FacetFibre fibre;
+  const float roughness = in.roughness * (1.0f + fibre_variation(in.random) * in.random_roughness);
+  fibre.sigma = fibre_sigma(spec, in, roughness);
+  fibre.alpha = clamp(roughness, 0.001f, 1.0f);
+  fibre.tilt = clamp(-in.offset, -1.5f, 1.5f);
+  lobe->fresnel.eta = max(in.ior, 1.001f);
+  // As in Cycles the axis that is given stays the larger one.
+  const float aspect = clamp(__builtin_fabsf(in.aspect), 0.01f, 100.0f);
+  fibre.aspect = min(aspect, 1.0f / aspect);
+  if (fibre.aspect < 1.0f && lobe->is_on_curve) {
+    const Vec3f given = to_local(lobe->frame, world_from_z_up(in.normal));
+    fibre.turn = std::atan2(given.z, -given.y);
+  }
+  // Of a strand that is wider than a pixel the camera sees a part; of others all of it, wherever the ray has met them.
+  const float across = clamp(dot(lobe->frame.t, b.Ns), -1.0f, 1.0f);
+  const float half_width = b.strand_radius > 0.0f ? 0.5f * b.footprint / b.strand_radius : kInfinity;
+  const float radius = ellipse_radius(fibre.aspect, fibre.turn);
+  if (half_width < radius) {
+    fibre.low = clamp((across - half_width) / radius, -1.0f, 0.998f);
+    fibre.high = clamp((across + half_width) / radius, fibre.low + 1e-3f, 1.0f);
+  }
+  const float gains[] = {in.gain_R, in.gain_TT, in.gain_TRT};
+  for (int i = 0; i < 3; ++i) fibre.gains[i] = half_from_float(clamp(gains[i], 0.0f, 1e4f));
+  fibre.seed = static_cast<std::uint16_t>(__builtin_bit_cast(std::uint32_t, across) >> 4);
+  lobe->shape.facet_fibre = fibre;
 }
 
 RELIEF_KERNEL void closure_add(MixtureBuild& b,

@@ -47,6 +47,16 @@ curve_tangent(const MeshView& mesh, const InstanceView& instance, std::uint32_t 
   return width > 0.0f ? along * (1.0f / __builtin_sqrtf(width)) : frame_from_normal(wo).s;
 }
 
+/// Radius of a curve between the ends of a segment: world, metres, the mean over the directions of an uneven scale.
+/// @param u  along the segment
+RELIEF_KERNEL float curve_radius(const MeshView& mesh, const InstanceView& instance, std::uint32_t segment, float u)
+{
+  const std::uint32_t first = mesh.triangles[segment].v0;
+  const Affine3& m = instance.world_from_object;
+  const float volume = __builtin_fabsf(dot(m.x, cross(m.y, m.z)));
+  return lerp(u, mesh.radius[first], mesh.radius[first + 1]) * std::cbrt(volume);
+}
+
 /// The point where a ray meets a curve, or a ball.
 ///
 /// Rays meet tubes from outside only (a filter lets those through that leave), so what goes on inside starts just below. A ribbon

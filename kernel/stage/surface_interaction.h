@@ -262,6 +262,7 @@ struct ClosureSight {
   bool enters = false;        ///< it may go below the surface
   bool is_after_diffuse = false;
   Vec3f tangent{};  ///< unit, along the curve that is met; 0: it is a triangle
+  float strand_radius = 0;  ///< as MixtureBuild's
 };
 
 /// Photons stay above: they end where there is a diffuse lobe. So does all light on curves.
@@ -279,6 +280,11 @@ RELIEF_KERNEL ClosureSight closure_sight(const KernelGlobals& g,
     if ((instance.flags & kPoints) != 0) return sight;
     sight.tangent = curve_tangent(path_mesh(g, state, path, instance), instance, state.hit_triangle[path],
                                   state.hit_u[path], -path_direction(state, path));
+    if (static_cast<PathEvent>(path_event(state.flags[path])) == PathEvent::kCamera &&
+        (state.flags[path] & (kPathPhoton | kPathScattered)) == 0) {
+      sight.strand_radius =
+          curve_radius(path_mesh(g, state, path, instance), instance, state.hit_triangle[path], state.hit_u[path]);
+    }
   }
   return sight;
 }
@@ -315,6 +321,7 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   build.is_after_diffuse = sight.is_after_diffuse;
   build.footprint = at.cone.width;
   build.tangent = sight.tangent;
+  build.strand_radius = sight.strand_radius;
   if (const std::uint16_t first = lane.program->surface_normal; first != kNoGraphOperand) {
     const Vec3f given{graph_result(lane, first), graph_result(lane, first + 1), graph_result(lane, first + 2)};
     // Since 4.0 what displaces nothing bends freely.

@@ -24,7 +24,7 @@ struct ClosureTable {
   std::vector<ClosureInput> inputs;
 };
 
-/// The list of closures with their inputs; the two Principled ones share a name in files.
+/// The list of closures with their inputs; those of two Principled BSDFs share a name in files, and of two fibres.
 const std::vector<ClosureTable>& closure_tables()
 {
   static const std::vector<ClosureTable> tables = {
@@ -55,10 +55,12 @@ SurfaceClosureSpec read_closure(const JsonReader& r)
   spec.maths = static_cast<Maths>(r.choice("maths", kMaths, 0));
   std::string type = r.string("type", "");
   const std::string given = type;
+  static constexpr std::string_view kFibreModels[] = {"chiang", "huang"};
+  if (type == "fibre" && r.choice("model", kFibreModels, 0) == 1) type = "facet_fibre";
   if (type == "principled") type = spec.maths >= Maths::k43 ? "principled4" : "principled3";
   const auto& tables = closure_tables();
   const auto it = std::find_if(tables.begin(), tables.end(), [&](const ClosureTable& t) { return t.name == type; });
-  if (it == tables.end() || given == "principled3" || given == "principled4") {
+  if (it == tables.end() || given == "principled3" || given == "principled4" || given == "facet_fibre") {
     r.fail("type", "the type of a closure (docs/graphs.md)", '"' + given + '"');
   }
   spec.kind = static_cast<ClosureKind>(it - tables.begin());
@@ -79,6 +81,7 @@ SurfaceClosureSpec read_closure(const JsonReader& r)
       if (r.choice("component", kHairComponents, 0) == 1) spec.variant = ClosureVariant::kHairThrough;
       break;
     case K::fibre:
+    case K::facet_fibre:
       spec.pigment = static_cast<FibrePigment>(r.choice("pigment", kPigments, 0));
       break;
     default:

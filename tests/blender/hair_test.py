@@ -132,12 +132,46 @@ def test_principled_hair():
         assert_agrees(scene, samples=64)
 
 
-def test_hair_curves():
-    curves = bpy.data.hair_curves.new("tuft")
-    if not hasattr(curves, "add_curves"):  # since 4.2
-        return
+def _huang(**values):
+    """Principled Hair by its model Huang; None where Blender has none (before 4.0)."""
+    material, _, node = new_material("hair", "ShaderNodeBsdfHairPrincipled")
+    if not hasattr(node, "model"):
+        return None
+    node.model, node.parametrization = "HUANG", "COLOR"
+    for name, value in values.items():
+        node.inputs[name].default_value = value
+    return material
+
+
+def test_principled_hair_of_facets():
+    for values in (
+        {"Color": (0.8, 0.6, 0.3, 1), "Aspect Ratio": 1.0, "Offset": 0.0},
+        {"Color": (0.7, 0.3, 0.2, 1), "Roughness": 0.15, "Aspect Ratio": 0.6},
+        {"Color": (0.5, 0.5, 0.5, 1), "Transmission": 0.3, "Secondary Reflection": 0.5, "Random Roughness": 0.4},
+    ):
+        scene = _stage()
+        material = _huang(**values)
+        if material is None:
+            return
+        _grow(material, shape="RIBBONS", radius_scale=0.02, count=600)
+        assert_agrees(scene, samples=64)
+
+
+def test_principled_hair_of_facets_near_by():
+    """Strands of many pixels, of which each shows a part."""
     scene = _stage()
-    scene.cycles_curves.shape = "THICK"
+    material = _huang(Color=(0.8, 0.5, 0.3, 1))
+    if material is None:
+        return
+    _grow(material, shape="RIBBONS", count=40, radius_scale=0.3)
+    assert_agrees(scene, samples=64)
+
+
+def _add_tuft(material):
+    """Hair curves; None where Blender cannot make them (before 4.2)."""
+    curves = bpy.data.hair_curves.new("tuft")
+    if not hasattr(curves, "add_curves"):
+        return None
     curves.add_curves([5] * 40)
     rng = np.random.default_rng(1)
     roots = np.repeat(rng.uniform(-1, 1, (40, 1, 3)) * (1, 1, 0), 5, axis=1)
@@ -145,9 +179,24 @@ def test_hair_curves():
     curves.points.foreach_set("position", points.astype(np.float32).ravel())
     radius = curves.attributes.new("radius", "FLOAT", "POINT")
     radius.data.foreach_set("value", np.full(200, 0.03, dtype=np.float32))
-    curves.materials.append(diffuse((0.3, 0.6, 0.2)))
-    link(curves, "tuft")
-    assert_agrees(scene, samples=64)
+    curves.materials.append(material)
+    return link(curves, "tuft")
+
+
+def test_hair_curves():
+    scene = _stage()
+    scene.cycles_curves.shape = "THICK"
+    if _add_tuft(diffuse((0.3, 0.6, 0.2))) is not None:
+        assert_agrees(scene, samples=64)
+
+
+def test_hair_curves_of_elliptic_facets():
+    """The larger axes lie along the curves' normals."""
+    scene = _stage()
+    scene.cycles_curves.shape = "RIBBONS"
+    material = _huang(**{"Color": (0.8, 0.5, 0.3, 1), "Aspect Ratio": 0.4})
+    if material is not None and _add_tuft(material) is not None:
+        assert_agrees(scene, samples=64)
 
 
 def test_arrays_of_strands():

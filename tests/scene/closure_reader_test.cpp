@@ -86,6 +86,18 @@ TEST(ClosureReader, VersionsOfThePrincipledAreToldApart)
   EXPECT_EQ(scene.graphs.at(0).closures.at(1).maths, Maths::k43);
 }
 
+TEST(ClosureReader, ModelsOfFibresAreToldApart)
+{
+  const Scene scene =
+      closure_load({{"closures",
+                     {{{"type", "fibre"}, {"radialRoughness", 0.7}},
+                      {{"type", "fibre"}, {"model", "huang"}, {"aspect", 0.5}, {"secondaryReflection", 0.25}}}}});
+  EXPECT_EQ(scene.graphs.at(0).closures.at(0).kind, ClosureKind::fibre);
+  EXPECT_EQ(scene.graphs.at(0).closures.at(1).kind, ClosureKind::facet_fibre);
+  EXPECT_EQ(inputs_of<FacetFibreInputs>(scene.graphs.at(0), 1).aspect, 0.5f);
+  EXPECT_EQ(inputs_of<FacetFibreInputs>(scene.graphs.at(0), 1).gain_TRT, 0.25f);
+}
+
 TEST(ClosureReader, WhatWeighsNothingIsLeftOut)
 {
   const Scene scene = closure_load({{"closures", {{{"type", "transparent"}, {"weight", 0}}, {{"type", "diffuse"}}}}});

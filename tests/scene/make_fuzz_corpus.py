@@ -191,6 +191,7 @@ def closures():
         {"type": "principled", "maths": "5.2", "metallic": .5, "thinFilmThickness": 500, "coatRoughness": .5},
         {"type": "metallic", "fresnel": "physical", "maths": "5.2", "thinFilmThickness": 1e30}, {"type": "glass", "ior": 1}, {"type": "refraction"},
         {"type": "hair", "component": "transmission", "roughnessU": -1}, {"type": "fibre", "pigment": "melanin", "random": 1e30, "ior": 0},
+        {"type": "fibre", "model": "huang", "aspect": -1e30, "roughness": 0, "offset": 1e30},
         {"type": "velvet"}, {"type": "sheen"}, {"type": "translucent"}]}
     height = {"nodes": nodes[:2], "outputs": {"height": factor}, "resolution": 4}
     vectors = {"nodes": [{"type": "vector-displacement", "inputs": {"vector": [.1, .2, .3]}}],

@@ -2,7 +2,7 @@
 """Attributes of meshes that value graphs read by name, as Cycles has them.
 
 An attribute is a pair (kind, name): ("attribute", name) of any type, ("color", name) likewise, where "" is the colour that
-is active in renders, ("uv", name) a uv map, ("pointiness", ""), ("island", ""), ("hair", what) of Curves Info: see hair.py, and
+is active in renders, ("uv", name) a uv map, ("pointiness", ""), ("island", ""), ("hair", what) of Curves Info and the axis of strands: see hair.py, and
 ("point", what) of Point Info: see points.py.
 """
 

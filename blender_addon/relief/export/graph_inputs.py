@@ -302,6 +302,33 @@ def _hair_info(g, source):
     return mesh_attribute(g, "hair", name.lower().replace(" ", "_"), "value")
 
 
+def strand_ellipse(g, aspect):
+    """A strand whose outline is an ellipse.
+
+    @param  aspect  its smaller axis over the larger one, or the reverse, which Cycles takes for the same
+    @return  (direction of its larger axis in the world, 1 where rays meet the ellipse within the circle about it).
+             Shadows are of the circle, as Cycles bakes along strands what they let through
+    """
+
+    def dot(a, b):
+        return g.op("vector-math", {"a": a, "b": b}, "value", operation="dot")
+
+    def math(operation, a, b):
+        return g.op("math", {"a": a, "b": b}, "value", operation=operation)
+
+    axis = mesh_attribute(g, "hair", "axis", "vector")
+    axis = g.op("vector-transform", {"vector": axis}, "vector", **{"transform": "vector", "from": "object", "to": "world"})
+    axis = g.op("vector-math", {"a": axis}, "vector", operation="normalize")
+    geometry = g.add("geometry", {})
+    towards = _output(geometry, "tangentNormal")
+    flatter = math("minimum", aspect, math("divide", 1.0, aspect))
+    less = math("multiply", math("subtract", 1.0, math("multiply", flatter, flatter)), math("power", dot(axis, towards), 2.0))
+    # The square of where the circle is met, from its middle, beside that of the outline's radius.
+    cosine = dot(_output(geometry, "normal"), towards)
+    is_met = math("greater-than", math("multiply", cosine, cosine), less)
+    return axis, math("maximum", is_met, _output(g.add("light-path"), "shadow"))
+
+
 def _point_info(g, source):
     """In the world. Of a surface that is no point all is 0."""
     name = source.socket.identifier.lower()

@@ -9,6 +9,7 @@ from itertools import chain
 
 import numpy as np
 
+from .. import compat
 from . import attributes
 
 #: Metres from the origin beyond which the program refuses geometry.
@@ -28,6 +29,8 @@ class Strands:
     roots      what is known of the mesh at each strand's root: float32 (strands, 2 to 4) by ("uv" or "color", name); the first
                of each kind is by "" too if that is the one active in renders
     texspace   (location, 1 / doubled size) of Generated coordinates; None: there are none
+    axes       float32 (points, 3): larger axis of an elliptic outline, across each strand; None: they have none
+    up         the world's Z
     """
 
     positions: np.ndarray
@@ -35,6 +38,8 @@ class Strands:
     radius: np.ndarray
     roots: dict = field(default_factory=dict)
     texspace: object = None
+    axes: object = None
+    up: tuple = (0.0, 0.0, 1.0)
 
     def lengths(self):
         """(length of each strand, length of each up to each point)"""
@@ -46,6 +51,17 @@ class Strands:
         up_to = np.cumsum(steps)
         up_to -= np.repeat(up_to[first], self.sizes)
         return up_to[first + self.sizes - 1], up_to
+
+    def tangents(self):
+        """Unit directions of strands at their points, 0 where they have none."""
+        is_first, is_last = np.zeros((2, len(self.positions)), dtype=bool)
+        end = np.cumsum(self.sizes)
+        is_first[end - self.sizes], is_last[end - 1] = True, True
+        number = np.arange(len(self.positions))
+        position = self.positions.astype(np.float64)
+        along = position[np.where(is_last, number, number + 1).clip(max=len(number) - 1)] - position[np.where(is_first, number, number - 1)]
+        length = np.linalg.norm(along, axis=1, keepdims=True)
+        return np.divide(along, length, out=np.zeros_like(along), where=length > 0)
 
 
 def wanted_shape(scene):
@@ -105,6 +121,7 @@ def _of_system(evaluated, modifier, system, is_final):
     positions = (world @ inverse[:3, :3].T + inverse[:3, 3]).astype(np.float32)
     strands = Strands(positions, np.full(len(numbers), size), np.zeros(count, dtype=np.float32))
     strands.radius = _radii(settings, strands)
+    strands.up = matrix[2, :3] / np.linalg.norm(matrix[2, :3])
     mesh = evaluated.data
     strands.texspace = _texspace(mesh)
     strands.roots = _roots(mesh, modifier, system, numbers)
@@ -203,6 +220,11 @@ def of_curves(curves):
     if attribute is not None and attribute.domain == "POINT" and attribute.data_type == "FLOAT":
         attribute.data.foreach_get("value", radius)
     strands = Strands(positions.reshape(-1, 3), sizes.astype(np.int64), np.maximum(radius, 0))
+    normals = getattr(curves, "normals", None)
+    if normals is not None and len(normals) == count:
+        strands.axes = np.empty(3 * count, dtype=np.float32)
+        normals.foreach_get("vector", strands.axes)
+        strands.axes = strands.axes.reshape(-1, 3)
     for name, width in (("surface_uv_coordinate", 2),):
         attribute = curves.attributes.get(name)
         if attribute is not None and attribute.domain == "CURVE" and attribute.data_type == "FLOAT2":
@@ -277,6 +299,8 @@ def _attribute(strands, source, of_map, of_roots):
             return _parts(length, up_to, strands.sizes).astype(np.float32)
         if name == "thickness":
             return 2 * strands.radius
+        if name == "axis":
+            return _any_axes(strands.tangents(), strands.up) if strands.axes is None else _finite(strands.axes)
         if name == "length":
             return of_roots(length.astype(np.float32))
         number = np.arange(len(length), dtype=np.uint32)
@@ -286,6 +310,22 @@ def _attribute(strands, source, of_map, of_roots):
         values = of_map(("color", name))
         values = of_map(("uv", name)) if values is None else values
     return None if values is None else of_roots(values)
+
+
+def _any_axes(along, up):
+    """The axes across directions that Cycles takes where a strand has none.
+
+    Since 5.2 it packs normals: 0 becomes Z.
+    """
+    across = np.stack([along[:, 2] - along[:, 1], along[:, 0] - along[:, 2], along[:, 1] - along[:, 0]], axis=1)
+    is_diagonal = (np.abs(across) < 1e-6).all(axis=1)
+    across[is_diagonal] = np.stack([along[:, 2] - along[:, 1], along[:, 0] + along[:, 2], -along[:, 1] - along[:, 0]], axis=1)[is_diagonal]
+    axes = np.cross(along, across)
+    if compat.IS_5_2:
+        upright = up - along * (along @ np.array(up))[:, None]
+        is_upright = np.linalg.norm(upright, axis=1) > 1e-6
+        axes[is_upright] = upright[is_upright]
+    return axes.astype(np.float32)
 
 
 def _finite(values):
@@ -298,4 +338,6 @@ def _chosen(strands, stays):
         return strands
     points = np.repeat(stays, strands.sizes)
     roots = {source: _Now(values.get()[stays]) for source, values in strands.roots.items()}
-    return Strands(strands.positions[points], strands.sizes[stays], strands.radius[points], roots, strands.texspace)
+    axes = None if strands.axes is None else strands.axes[points]
+    kept = strands.positions[points], strands.sizes[stays], strands.radius[points]
+    return Strands(*kept, roots, strands.texspace, axes, strands.up)

@@ -13,7 +13,7 @@ from enum import Enum
 
 from .. import compat
 from . import nodes
-from .graph_inputs import mesh_attribute
+from .graph_inputs import mesh_attribute, strand_ellipse
 from .not_understood import NotUnderstood
 from .texture import Input, TextureReader
 
@@ -303,7 +303,7 @@ class ClosureWriter:
                 continue
             for child, share in self._children(part):
                 key = child.key, child.socket.identifier
-                weights[key] = self._plus(weights.get(key, 0.0), self._times(weight, share))
+                weights[key] = self._plus(weights.get(key, 0.0), self.times(weight, share))
         return parts
 
     def _visit(self, source, order, seen):
@@ -324,7 +324,7 @@ class ClosureWriter:
             sockets, shares = node.inputs[:2], (1.0, 1.0)
         else:
             factor = self._saturated(self.input(node.inputs[0], source))
-            sockets, shares = node.inputs[1:3], (self._rest(factor), factor)
+            sockets, shares = node.inputs[1:3], (self.rest(factor), factor)
         children = ((nodes.linked(socket, groups), share) for socket, share in zip(sockets, shares))
         return [(child, share) for child, share in children if child is not None and share != 0]
 
@@ -333,10 +333,12 @@ class ClosureWriter:
             return self.graph.op("clamp", {"value": value}, "value")
         return min(max(value, 0.0), 1.0)
 
-    def _rest(self, share):
+    def rest(self, share):
+        """What a share leaves of 1."""
         return 1.0 - share if not isinstance(share, dict) else self._math("subtract", 1.0, share)
 
-    def _times(self, first, second):
+    def times(self, first, second):
+        """Product of two numbers or references."""
         for one, other in ((first, second), (second, first)):
             if one == 1:
                 return other
@@ -467,8 +469,8 @@ class ClosureWriter:
         alpha = self._saturated(self.input(socket, source))
         if alpha == 1:
             return weight
-        self.add("transparent", self._times(weight, self._rest(alpha)))
-        return self._times(weight, alpha)
+        self.add("transparent", self.times(weight, self.rest(alpha)))
+        return self.times(weight, alpha)
 
     def unread(self, source, what, instead):
         """Tells of a part of a node that the format cannot say."""
@@ -613,11 +615,27 @@ _FIBRE_INPUTS = {
 }
 
 
+#: The same of its model "Huang".
+_FACET_FIBRE_INPUTS = {
+    **{theirs: ours for theirs, ours in _FIBRE_INPUTS.items() if theirs not in {"Radial Roughness", "Coat"}},
+    "Aspect Ratio": "aspect",
+    "Reflection": "reflection",
+    "Transmission": "transmission",
+    "Secondary Reflection": "secondaryReflection",
+}
+
+
 def _fibre(w, source, weight):
     node = source.node
-    if getattr(node, "model", "CHIANG") != "CHIANG":
-        w.unread(source, "hair by the model Huang", "that of Chiang was used")
-    values = w.inputs(source, _FIBRE_INPUTS)
+    is_of_facets = getattr(node, "model", "CHIANG") == "HUANG"
+    values = w.inputs(source, _FACET_FIBRE_INPUTS if is_of_facets else _FIBRE_INPUTS)
+    if is_of_facets:
+        values["model"] = "huang"
+        if values["aspect"] != 1:
+            axis, is_met = strand_ellipse(w.graph, values["aspect"])
+            values["normal"] = axis
+            w.add("transparent", w.times(weight, w.rest(is_met)))
+            weight = w.times(weight, is_met)
     random = node.inputs.get("Random")
     if random is not None and nodes.linked(random, source.groups) is not None:
         values["random"] = w.input(random, source)
