@@ -4,6 +4,7 @@
 #include <cmath>
 #include <ctime>
 
+#include "exporters/png_ocio.h"
 #include "integrator/flush_denormals.h"
 #include "kernel/sample/warp.h"
 #include "kernel/shape/surface_hit.h"
@@ -92,6 +93,17 @@ BenchRays bench_rays_make(const BenchScene& scene,
     if (dot(Ng, kBenchSun) > 0) rays.of_kind[2].push_back({O, kBenchSun});
   }
   return rays;
+}
+
+BenchPicture shaded_picture(const BenchRays& rays, BenchResolution resolution, std::string caption)
+{
+  BenchPicture picture{resolution.width, resolution.height, std::move(caption), {}};
+  for (const float cosine : rays.shading) {
+    const float value = cosine > 0 ? 0.8f * cosine : 0.02f;
+    const auto code = static_cast<std::uint8_t>(std::lround(255 * srgb_from_linear(value)));
+    picture.rgb.insert(picture.rgb.end(), 3, code);
+  }
+  return picture;
 }
 
 std::vector<Measurement> bench_measure(std::span<const BenchTracer* const> tracers,

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "benchmarks/displacement/contender.h"
@@ -41,6 +42,16 @@ BenchRays bench_rays_make(const BenchScene& scene,
                           const BenchTracer& exact,
                           BenchResolution resolution,
                           const std::vector<BenchRay>& given = {});
+
+/// A picture in memory: rows from the top, 3 bytes a pixel.
+struct BenchPicture {
+  int width = 0, height = 0;
+  std::string caption;
+  std::vector<std::uint8_t> rgb;
+};
+
+/// A scene as its primary rays see it.
+BenchPicture shaded_picture(const BenchRays& rays, BenchResolution resolution, std::string caption);
 
 /// What a method did with one kind of rays.
 struct Measurement {

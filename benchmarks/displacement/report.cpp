@@ -340,14 +340,17 @@ BenchPicture halved(const BenchPicture& picture)
   return half;
 }
 
+std::string html(const BenchPicture& picture)
+{
+  const BenchPicture shown = picture.width > 400 ? halved(picture) : picture;
+  return html_picture(shown.width, shown.height, shown.rgb, shown.caption, 1);
+}
+
 std::vector<std::string> scene_pieces(const SceneResult& scene)
 {
   std::vector<std::string> pieces = {html_heading(scene_title(scene), 2)};
   std::vector<std::string> pictures;
-  for (const BenchPicture& picture : scene.pictures) {
-    const BenchPicture shown = picture.width > 400 ? halved(picture) : picture;
-    pictures.push_back(html_picture(shown.width, shown.height, shown.rgb, shown.caption, 1));
-  }
+  for (const BenchPicture& picture : scene.pictures) pictures.push_back(html(picture));
   pieces.push_back(html_row(pictures));
   Table speeds = speed_table(scene);
   speeds.title.clear();
@@ -559,6 +562,9 @@ std::string bench_html(const BenchResults& results)
   if (!results.tessellation.empty()) pieces.push_back(html(variant_table(kTessellationTitle, results.tessellation)));
   if (!results.costs.empty()) pieces.push_back(html(cost_table(results.costs)));
   if (!results.frames.empty()) pieces.push_back(html(frame_table(results.frames)));
+  std::vector<std::string> pictures;
+  for (const VectorResult& scene : results.vectors) pictures.push_back(html(scene.picture));
+  if (!pictures.empty()) pieces.push_back(html_row(pictures));
   for (const VectorResult& scene : results.vectors) pieces.push_back(html(vector_table(scene)));
   return html_page("Displacement: methods side by side", pieces);
 }

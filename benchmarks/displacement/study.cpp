@@ -8,7 +8,6 @@
 #include <tbb/global_control.h>
 
 #include "displacement/rmip.h"
-#include "exporters/png_ocio.h"
 #include "integrator/stages.h"
 
 namespace relief {
@@ -92,17 +91,6 @@ std::array<std::uint8_t, 3> heat_color(double t)
     color[c] = static_cast<std::uint8_t>(std::lround(mixed));
   }
   return color;
-}
-
-BenchPicture shaded_picture(const BenchRays& rays, BenchResolution resolution, std::string caption)
-{
-  BenchPicture picture{resolution.width, resolution.height, std::move(caption), {}};
-  for (const float cosine : rays.shading) {
-    const float value = cosine > 0 ? 0.8f * cosine : 0.02f;
-    const auto code = static_cast<std::uint8_t>(std::lround(255 * srgb_from_linear(value)));
-    picture.rgb.insert(picture.rgb.end(), 3, code);
-  }
-  return picture;
 }
 
 /// Fig. 9: bounds and texels of every primary ray, on a logarithmic scale.

@@ -61,13 +61,6 @@ struct MethodResult {
   }
 };
 
-/// A picture in memory: rows from the top, 3 bytes a pixel.
-struct BenchPicture {
-  int width = 0, height = 0;
-  std::string caption;
-  std::vector<std::uint8_t> rgb;
-};
-
 struct SceneResult {
   std::string name, like;
   PaperFigures paper;

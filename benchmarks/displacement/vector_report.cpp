@@ -18,7 +18,7 @@ Table vector_table(const VectorResult& scene)
                   scene.num_base_triangles, 1e-6 * static_cast<double>(scene.num_triangles)),
       fmt::format(
           "Rays: {} primary, {} bounce, {} shadow. Two disagree about a ray if only one hits or t differs by more than "
-          "{:.2g} m. First ray: seconds of wall clock, all threads.",
+          "{:.2g} m. First ray: processor seconds until it can be traced, all threads.",
           scene.num_rays[0], scene.num_rays[1], scene.num_rays[2], scene.tolerance),
       {"method", "MiB", "most MiB", "first ray, s"},
       {}};

@@ -16,7 +16,7 @@ struct VectorMethodResult {
   std::string name;
   std::size_t bytes = 0;       ///< once all rays are traced, besides the base mesh
   std::size_t peak_bytes = 0;  ///< while it is built or traced
-  double first_seconds = 0;    ///< of wall clock until the first ray can be traced
+  double first_seconds = 0;    ///< of processor time, all threads, until the first ray can be traced
   std::array<Measurement, kNumBenchRayKinds> of_kind;
 };
 
@@ -26,6 +26,7 @@ struct VectorResult {
   std::array<std::size_t, kNumBenchRayKinds> num_rays{};
   double tolerance = 0;  ///< metres along the ray
   std::vector<VectorMethodResult> methods;
+  BenchPicture picture;
 };
 
 /// @param shrink    by which cells along a side are fewer, a power of two
