@@ -13,10 +13,18 @@ std::filesystem::path program_folder()
 
 }  // namespace
 
-std::vector<std::filesystem::path> companion_places(const std::string& name, const std::string& built)
+std::vector<std::filesystem::path> companion_places(const std::string& name)
 {
-  const std::filesystem::path folder = program_folder();
-  return {folder / name, folder.parent_path() / "lib/relief" / name, built};
+  namespace fs = std::filesystem;
+  const fs::path folder = program_folder();
+  std::vector<fs::path> places{folder / name, folder.parent_path() / "lib/relief" / name};
+  for (fs::path above = folder; above.has_relative_path(); above = above.parent_path()) {
+    std::error_code unreadable;
+    if (!fs::exists(above / "CMakeCache.txt", unreadable)) continue;
+    places.push_back(above / "cli" / name);
+    break;
+  }
+  return places;
 }
 
 std::string companion_missing(const std::string& name)

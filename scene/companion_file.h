@@ -7,10 +7,9 @@
 
 namespace relief {
 
-/// Where such a file may be, the first one first: beside the program, where a copy of both finds it; where it is installed; or where
-/// it was built, for the programs of tests.
-/// @param built  path of the last
-std::vector<std::filesystem::path> companion_places(const std::string& name, const std::string& built);
+/// Where such a file may be, the first one first: beside the program, where a copy of both finds it; where it is installed; and for
+/// programs in a folder where CMake has built, such as tests, beside the one built there.
+std::vector<std::filesystem::path> companion_places(const std::string& name);
 
 /// What is wrong where none of them is there.
 std::string companion_missing(const std::string& name);

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <stdexcept>
 #include <thread>
+#include <vector>
 
 #include <dlfcn.h>
 #include <sys/mman.h>
@@ -16,6 +17,7 @@ namespace {
 
 // The number counts changes of the interface: an old program that was copied away does not call into a newer build.
 constexpr const char* kEntryPoint = "relief_image_io_5";
+constexpr const char* kModule = RELIEF_IMAGE_IO_MODULE;
 
 /// Makes sure of the address space that linking needs, where a shell bounds it (ulimit -v). Without it some of the 245
 /// libraries abort in their initialization, or wait for ever for threads that could not be started.
@@ -33,12 +35,10 @@ void address_space_require()
 
 const ImageIo& module_load()
 {
-  namespace fs = std::filesystem;
   address_space_require();
-  constexpr const char* kName = "relief_image_io.so";
-  std::string cause = companion_missing(kName);
+  std::string cause = companion_missing(kModule);
   bool is_there = false;
-  for (const fs::path& path : companion_places(kName, RELIEF_IMAGE_IO_MODULE)) {
+  for (const std::filesystem::path& path : companion_places(kModule)) {
     // Lazily, as at a program's start: looking up every function of 245 libraries takes another 20 ms.
     void* module = ::dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL);
     const void* entry = module == nullptr ? nullptr : ::dlsym(module, kEntryPoint);
@@ -48,7 +48,7 @@ const ImageIo& module_load()
     // What is wrong with the first that is there, mostly a library that it needs.
     const std::string text = module == nullptr ? ::dlerror() : path.string() + " is of another version of relief";
     std::error_code error;
-    if (!is_there && fs::exists(path, error)) {
+    if (!is_there && std::filesystem::exists(path, error)) {
       cause = text;
       is_there = true;
     }
@@ -62,6 +62,15 @@ int ImageHeader::channel_index(std::string_view name) const
 {
   const auto found = std::find(channel_names.begin(), channel_names.end(), name);
   return found == channel_names.end() ? -1 : static_cast<int>(found - channel_names.begin());
+}
+
+bool image_io_is_there()
+{
+  const std::vector<std::filesystem::path> places = companion_places(kModule);
+  return std::any_of(places.begin(), places.end(), [](const std::filesystem::path& path) {
+    std::error_code unreadable;
+    return std::filesystem::exists(path, unreadable);
+  });
 }
 
 const ImageIo& image_io()

@@ -132,4 +132,7 @@ struct ImageIo {
 /// @error std::runtime_error: it is not there, or a library that it needs is not
 const ImageIo& image_io();
 
+/// Whether its file is there; it is not loaded.
+bool image_io_is_there();
+
 }  // namespace relief

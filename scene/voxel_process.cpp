@@ -98,7 +98,7 @@ class VoxelProcess final : public VoxelFile {
   {
     constexpr const char* kName = "relief_voxels";
     std::filesystem::path program;
-    for (const std::filesystem::path& path : companion_places(kName, RELIEF_VOXELS_PROGRAM)) {
+    for (const std::filesystem::path& path : companion_places(kName)) {
       if (::access(path.c_str(), X_OK) == 0) {
         program = path;
         break;

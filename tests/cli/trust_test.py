@@ -88,8 +88,14 @@ class Facts(unittest.TestCase):
         self.assertEqual(lines[0], f"relief {version}")
         self.assertRegex(lines[1], r"^commit ([0-9a-f]{7,}(-dirty)?|unknown)$")
         self.assertRegex(lines[2], r"^instruction sets: [a-z0-9, ]+ \(here: [a-z0-9, ]+\)$")
-        self.assertRegex(lines[3], r"^libraries: Embree [34]\.\S+, oneTBB \S+, OpenImageIO \S+, OpenEXR \S+, OpenColorIO \S+, libpng \S+$")
+        self.assertRegex(lines[3], r"^libraries: Embree [34]\.\S+, oneTBB \S+, OpenEXR \S+, OpenColorIO \S+, libpng \S+, OpenImageIO \S+$")
         self.assertEqual(len(lines), 4)
+
+    def test_the_version_names_no_library_that_is_not_there(self):
+        with tempfile.TemporaryDirectory() as folder:
+            alone = shutil.copy(PROGRAM, folder)
+            said = subprocess.run([alone, "--version"], capture_output=True, text=True, check=True).stdout
+        self.assertRegex(said, r"libpng \S+, without OpenImageIO$")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-// What is said when the module that reads images is not there. This program has image_io.cpp with the path of a file that
+// What is said when the module that reads images is not there. This program has image_io.cpp with the name of a file that
 // does not exist.
 #include <gtest/gtest.h>
 
@@ -6,6 +6,7 @@
 #include <string>
 
 #include "scene/diagnostics.h"
+#include "scene/image_io.h"
 #include "scene/image_reader.h"
 #include "tests/support/gltf_builder.h"
 
@@ -14,6 +15,7 @@ namespace {
 
 TEST(MissingImageModule, IsAnErrorOfTheImageAndNamesTheFile)
 {
+  EXPECT_FALSE(image_io_is_there());
   const test::TemporaryFolder folder;
   const std::string file = folder.write("a.tif", std::string("II*\0", 4)).string();
   // Twice: a failure does not make a later image pass.
@@ -28,7 +30,7 @@ TEST(MissingImageModule, IsAnErrorOfTheImageAndNamesTheFile)
       // Not the path where it was built, which means nothing to whoever installed it.
       const std::string own = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
       const std::string expected =
-          "cannot be loaded: relief_image_io.so is neither in " + own + " nor in ../lib/relief";
+          "cannot be loaded: relief_missing.so is neither in " + own + " nor in ../lib/relief";
       EXPECT_TRUE(e.found.ends_with(expected)) << e.found;
     }
   }
