@@ -82,6 +82,17 @@ LightSet light_set_make(const Scene& scene,
   return set;
 }
 
+bool LightSet::can_choose() const
+{
+  const std::size_t finite = tree_blocks.empty() ? 0 : one_finite() ? 1 : 2;
+  return finite + suns.size() + (environment_irradiance.mean > 0.0f ? 1 : 0) > 1;
+}
+
+bool LightSet::one_finite() const
+{
+  return copies.empty() && tree_blocks.size() == 1 && tree_blocks[0].intensity[1] == 0.0f;
+}
+
 LightsView LightSet::view() const
 {
   LightsView v;
@@ -89,8 +100,7 @@ LightsView LightSet::view() const
   v.num_lights = static_cast<std::uint32_t>(lights.size());
   v.tree = {tree_blocks.empty() ? nullptr : tree_blocks.data(), tree_root, copies.data()};
   v.light_trails = light_trails.data();
-  const bool one_finite = copies.empty() && tree_blocks.size() == 1 && tree_blocks[0].intensity[1] == 0.0f;
-  if (one_finite && suns.empty() && !(environment_irradiance.mean > 0.0f)) {
+  if (one_finite() && suns.empty() && !(environment_irradiance.mean > 0.0f)) {
     v.only_light = static_cast<std::int32_t>(tree_blocks[0].link[0] & kLightTreeIndexMask);
   }
   v.suns = suns.data();

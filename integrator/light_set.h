@@ -44,6 +44,10 @@ struct LightSet {
 
   /// @return false: nothing can be sampled
   bool any() const { return !tree_blocks.empty() || !suns.empty() || environment_irradiance.mean > 0; }
+  /// @return false: there is one at most that can be sampled
+  bool can_choose() const;
+  /// Whether the tree has a single light.
+  bool one_finite() const;
   /// Emissive triangles of all instances.
   std::size_t num_emissive_triangles = 0;
   /// Valid while this object is neither changed nor moved.

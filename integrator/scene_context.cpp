@@ -202,7 +202,10 @@ WavefrontColumns SceneContext::columns(bool photons, bool light_passes) const
 {
   const bool goes_below = std::any_of(scene.materials.begin(), scene.materials.end(),
                                       [](const Material& material) { return material.scatters_below; });
-  return {photons, motion.is_open(), displacements.has_facets(), !media.empty(), goes_below, light_passes};
+  const bool has_closures = std::any_of(scene.materials.begin(), scene.materials.end(),
+                                        [](const Material& material) { return material.has_closures; });
+  return {photons,    motion.is_open(), displacements.has_facets(),         !media.empty(),
+          goes_below, light_passes,     has_closures && lights.can_choose()};
 }
 
 void SceneContext::make_views()

@@ -36,6 +36,7 @@ std::size_t Wavefront::bytes(const WavefrontColumns& columns)
          (columns.motion ? sizeof(MotionMemory) : 0u) + (columns.facets ? kColumnEntries * sizeof(FacetState) : 0u) +
          (columns.media ? kColumnEntries * sizeof(MediumState) : 0u) +
          (columns.light_passes ? kColumnEntries * sizeof(LightPassState) : 0u) +
+         (columns.gloss ? kColumnEntries * sizeof(LightGloss) : 0u) +
          (columns.subsurface ? sizeof(SubsurfaceMemory) : 0u);
 }
 
@@ -53,6 +54,10 @@ Wavefront::Wavefront(const WavefrontColumns& columns)
   if (columns.light_passes) {
     light_pass_memory_ = std::make_unique_for_overwrite<LightPassState[]>(kColumnEntries);
     state_.light_passes = light_pass_memory_.get();
+  }
+  if (columns.gloss) {
+    gloss_memory_ = std::make_unique_for_overwrite<LightGloss[]>(kColumnEntries);
+    state_.scatter_gloss = gloss_memory_.get();
   }
   if (columns.facets) {
     facet_memory_ = std::make_unique_for_overwrite<FacetState[]>(kColumnEntries);

@@ -46,6 +46,7 @@ struct WavefrontColumns {
   bool media = false;         ///< something fills space
   bool subsurface = false;    ///< they may go below surfaces
   bool light_passes = false;  ///< layers tell their light apart by the first event
+  bool gloss = false;         ///< lights are chosen by what closures' gloss shows of them
 };
 
 class CameraMedium;
@@ -131,6 +132,7 @@ class Wavefront {
   std::unique_ptr<FacetState[]> facet_memory_;
   std::unique_ptr<MediumState[]> medium_memory_;
   std::unique_ptr<LightPassState[]> light_pass_memory_;
+  std::unique_ptr<LightGloss[]> gloss_memory_;
   PathState& state_;
   ShadowQueue& shadow_;
   QueueView active_, next_;

@@ -2,6 +2,7 @@
 // finite lights (light_tree.h). Each is given an estimate of the irradiance it causes at the point,
 //   environment: second-order expansion by the normal;   suns: irradiance × cosine, summed;   finite lights: sum over the
 //   tree's root,
+// where it is glossy mixed with what the gloss shows of it (light_receiver.h),
 // and is chosen with probability  ¾ · estimate / sum + ¼ / number of groups whose estimate is not zero.
 // The second term is defensive: none of the estimates knows about shadows, so no group may starve. A finite light that is
 // alone in the scene is taken without any estimate.
@@ -117,30 +118,40 @@ RELIEF_KERNEL float light_scalar(Vec3f rgb)
   return (size.x + size.y + size.z) * (1.0f / 3.0f);
 }
 
-/// Estimate of one sun's irradiance; 0 where all of it is below the horizon of N. Its cosine near the horizon is estimated as
-/// light_tree_estimate does.
-RELIEF_KERNEL float light_sun_importance(const Light& sun, Vec3f N)
+/// Estimate of what one sun brings, its irradiance where nothing is glossy; 0 where all of it is below the horizon of N. Its cosine near
+/// the horizon is estimated as light_tree_estimate does.
+RELIEF_KERNEL float light_sun_importance(const Light& sun, const LightReceiver& at)
 {
+  const Vec3f N = at.N;
   float cosine = is_zero(N) ? 1.0f : -dot(N, sun.axis);
   if (sun.cone > 0.0f) {
     const float highest = cosine + __builtin_sqrtf(sun.cone * (2.0f - sun.cone));
     cosine = max(cosine, highest > 0.0f ? 0.3f * highest + 0.01f : 0.0f);
   }
-  return cosine > 0.0f ? min(light_scalar(sun.emission) * cosine, 1e30f) : 0.0f;
+  if (!(cosine > 0.0f)) return 0.0f;
+  if (const LightGloss& gloss = at.gloss; gloss.share > 0.0f) {
+    const float off = max(0.0f, 1.0f + dot(gloss.R, sun.axis));
+    const float shown = light_gloss_eval(gloss, off, sun.cone * (2.0f - sun.cone));
+    cosine = (1.0f - gloss.share) * cosine + gloss.share * shown;
+  }
+  return min(light_scalar(sun.emission) * cosine, 1e30f);
 }
 
-RELIEF_KERNEL LightGroups light_groups_eval(const LightsView& view, Vec3f P, Vec3f N)
+RELIEF_KERNEL LightGroups light_groups_eval(const LightsView& view, Vec3f P, const LightReceiver& at)
 {
   LightGroups groups;
   for (std::uint32_t i = 0; i < view.num_suns; ++i) {
-    groups.sun_sum += light_sun_importance(view.lights[view.suns[i]], N);
+    groups.sun_sum += light_sun_importance(view.lights[view.suns[i]], at);
   }
-  if (view.tree.blocks != nullptr) light_tree_estimate(view.tree, view.tree.root, P, N, groups.finite_root);
+  if (view.tree.blocks != nullptr) light_tree_estimate(view.tree, view.tree.root, P, at, groups.finite_root);
 
   float environment = 0.0f;
   if (view.environment_irradiance.mean > 0.0f &&
       !(groups.sun_sum + groups.finite_root.sum > view.environment_yields_to)) {
-    environment = environment_irradiance_eval(view.environment_irradiance, N);
+    environment = environment_irradiance_eval(view.environment_irradiance, at.N);
+    if (const LightGloss& gloss = at.gloss; gloss.share > 0.0f) {
+      environment += gloss.share * (environment_irradiance_eval(view.environment_irradiance, gloss.R) - environment);
+    }
   }
   const float sum = environment + groups.sun_sum + groups.finite_root.sum;
   const int num_groups =
@@ -190,13 +201,13 @@ struct LightsChoice {
 };
 
 /// Chooses one light or the environment by estimated contribution at P, and starts to fetch it.
-/// @param P         world
-/// @param N         unit shading normal when only light from its side matters; zero vector: light from all sides does
-/// @param u         both chooses and is the place on what is chosen
-RELIEF_KERNEL LightsChoice lights_choose(const LightsView& view, Vec3f P, Vec3f N, ChoicePoint u)
+/// @param P   world
+/// @param at  what is there
+/// @param u   both chooses and is the place on what is chosen
+RELIEF_KERNEL LightsChoice lights_choose(const LightsView& view, Vec3f P, const LightReceiver& at, ChoicePoint u)
 {
   if (view.only_light >= 0) return {{view.only_light}, 1.0f, choice_place(u)};
-  const LightGroups groups = light_groups_eval(view, P, N);
+  const LightGroups groups = light_groups_eval(view, P, at);
   const double p_environment = static_cast<double>(groups.environment);
   const double p_suns = static_cast<double>(groups.suns);
   if (u.x < p_environment) return {{}, groups.environment, choice_place({choice_rest(u.x, p_environment), u.y})};
@@ -206,7 +217,7 @@ RELIEF_KERNEL LightsChoice lights_choose(const LightsView& view, Vec3f P, Vec3f 
     double target = choice * scale;
     LightsChoice chosen;
     for (std::uint32_t i = 0; i < view.num_suns; ++i) {
-      const float importance = light_sun_importance(view.lights[view.suns[i]], N);
+      const float importance = light_sun_importance(view.lights[view.suns[i]], at);
       if (!(importance > 0.0f)) continue;
       const double width = static_cast<double>(importance);
       chosen = {{static_cast<std::int32_t>(view.suns[i])},
@@ -219,7 +230,7 @@ RELIEF_KERNEL LightsChoice lights_choose(const LightsView& view, Vec3f P, Vec3f 
   }
   if (!(groups.finite > 0.0f)) return {};
   const double in_group = choice_rest(choice - p_suns, static_cast<double>(groups.finite));
-  const LightChoice chosen = light_tree_sample(view.tree, groups.finite_root, P, N, in_group);
+  const LightChoice chosen = light_tree_sample(view.tree, groups.finite_root, P, at, in_group);
   // Among thousands of lights this one is in no near cache; what the caller does meanwhile hides half of the wait.
   const Light* light = &view.lights[chosen.light_index];
   __builtin_prefetch(light);
@@ -231,7 +242,7 @@ RELIEF_KERNEL LightsChoice lights_choose(const LightsView& view, Vec3f P, Vec3f 
 
 /// Samples a light that lights_choose has chosen.
 /// @param light  in world space; null: the environment
-/// @param N      as handed to it
+/// @param N      of the LightReceiver handed to it
 /// @return       pdf includes the choice; see LightSample
 RELIEF_KERNEL LightSample
 lights_sample_chosen(const LightsView& view, LightsChoice chosen, const Light* light, Vec3f P, Vec3f N)
@@ -244,34 +255,40 @@ lights_sample_chosen(const LightsView& view, LightsChoice chosen, const Light* l
 }
 
 /// Chooses one light or the environment by estimated contribution at P and samples it.
-/// @param P, N, u  as in lights_choose
-/// @param time     as in lights_at
-RELIEF_KERNEL LightSample lights_sample(const LightsView& view, Vec3f P, Vec3f N, ChoicePoint u, float time = 0.0f)
+/// @param P, at, u  as in lights_choose
+/// @param time      as in lights_at
+RELIEF_KERNEL LightSample
+lights_sample(const LightsView& view, Vec3f P, const LightReceiver& at, ChoicePoint u, float time = 0.0f)
 {
-  const LightsChoice chosen = lights_choose(view, P, N, u);
+  const LightsChoice chosen = lights_choose(view, P, at, u);
   if (!(chosen.probability > 0.0f)) return {};
   Light storage;
   const Light* light = chosen.ref.light_index >= 0 ? &lights_at(view, chosen.ref, storage, time) : nullptr;
-  return lights_sample_chosen(view, chosen, light, P, N);
+  return lights_sample_chosen(view, chosen, light, P, at.N);
 }
 
 /// Density with which lights_sample, called at P, would have made a ray that hit an area light.
-/// @param N         as handed to lights_sample
+/// @param at        as handed to lights_sample
 /// @param ref       rectangle, disk or triangle; the second triangle of a rectangle stands for it
 /// @param wi        unit, from P to the light
 /// @param distance  metres, of the hit
 /// @param time      as in lights_at
 /// @return          solid angle × choice, as LightSample::pdf
-RELIEF_KERNEL float
-lights_pdf(const LightsView& view, Vec3f P, Vec3f N, LightRef ref, Vec3f wi, float distance, float time = 0.0f)
+RELIEF_KERNEL float lights_pdf(const LightsView& view,
+                               Vec3f P,
+                               const LightReceiver& at,
+                               LightRef ref,
+                               Vec3f wi,
+                               float distance,
+                               float time = 0.0f)
 {
   Light storage;
   if (view.lights[ref.light_index].whole_index >= 0) ref.light_index = view.lights[ref.light_index].whole_index;
   if (view.only_light >= 0) {
     return view.only_light == ref.light_index ? light_pdf(lights_at(view, ref, storage, time), P, wi, distance) : 0.0f;
   }
-  const LightGroups groups = light_groups_eval(view, P, N);
-  const float choice = light_tree_pdf(view.tree, groups.finite_root, P, N, static_cast<std::uint32_t>(ref.light_index),
+  const LightGroups groups = light_groups_eval(view, P, at);
+  const float choice = light_tree_pdf(view.tree, groups.finite_root, P, at, static_cast<std::uint32_t>(ref.light_index),
                                       view.light_trails[ref.light_index], ref.copy_index);
   if (!(choice > 0.0f)) return 0.0f;
   return groups.finite * choice * light_pdf(lights_at(view, ref, storage, time), P, wi, distance);
@@ -279,22 +296,22 @@ lights_pdf(const LightsView& view, Vec3f P, Vec3f N, LightRef ref, Vec3f wi, flo
 
 /// Density with which lights_sample, called at P, would have chosen a direction of a sun that it meets.
 /// @param sun_index  in `lights`
-RELIEF_KERNEL float lights_sun_pdf(const LightsView& view, Vec3f P, Vec3f N, std::uint32_t sun_index)
+RELIEF_KERNEL float lights_sun_pdf(const LightsView& view, Vec3f P, const LightReceiver& at, std::uint32_t sun_index)
 {
   const Light& sun = view.lights[sun_index];
-  const float importance = light_sun_importance(sun, N);
+  const float importance = light_sun_importance(sun, at);
   if (!(importance > 0.0f)) return 0.0f;
-  const LightGroups groups = light_groups_eval(view, P, N);
+  const LightGroups groups = light_groups_eval(view, P, at);
   return groups.suns * (importance / groups.sun_sum) * sun_light_pdf(sun);
 }
 
 /// Density with which lights_sample, called at P, would have chosen a direction of the environment.
-RELIEF_KERNEL float lights_environment_pdf(const LightsView& view, Vec3f P, Vec3f N, Vec3f wi)
+RELIEF_KERNEL float lights_environment_pdf(const LightsView& view, Vec3f P, const LightReceiver& at, Vec3f wi)
 {
   if (!(view.environment_irradiance.mean > 0.0f)) return 0.0f;
   const bool alone = view.num_suns == 0 && view.tree.blocks == nullptr;
-  const float probability = alone ? 1.0f : light_groups_eval(view, P, N).environment;
-  return probability * light_environment_pdf(view.environment, N, wi);
+  const float probability = alone ? 1.0f : light_groups_eval(view, P, at).environment;
+  return probability * light_environment_pdf(view.environment, at.N, wi);
 }
 
 }  // namespace relief

@@ -19,6 +19,7 @@
 // integrator/light_set.cpp.
 #pragma once
 
+#include "kernel/light/light_receiver.h"
 #include "kernel/math/affine.h"
 #include "kernel/sample/choice.h"
 
@@ -116,14 +117,14 @@ RELIEF_KERNEL LightLanes light_lanes_high(LightWords words)
 
 /// Estimates for the children of one node.
 struct LightEstimates {
-  /// [0, 1e31]; 0: certainly nothing. Undefined for blocks that the node does not have.
+  /// [0, 1e34]; 0: certainly nothing. Undefined for blocks that the node does not have.
   alignas(32) float value[kLightTreeMaxBlocks][kLightTreeLanes];
   alignas(32) float lane_sum[kLightTreeLanes];  ///< over the blocks
   float before[kLightTreeLanes];                ///< sum of `lane_sum` over the lanes before
   float sum = 0;
 };
 
-/// Estimates the irradiance that each child's lights cause at a point: never 0 where one of them contributes.
+/// Estimates what each child's lights bring at a point, their irradiance where nothing is glossy: never 0 where one of them contributes.
 ///
 /// The distance to the sphere's centre is softened by its radius, h² = d² + r²/4. A cosine, or a profile of the intensity,
 /// is taken to the centre as c, and replaced by max(0, c, .3 (c + s) + .01) with s = r / h: near the mean of max(0, c) over
@@ -131,14 +132,15 @@ struct LightEstimates {
 /// that rounding, a few thousandths at most, turns no sliver of a light into nothing nor its probability into one that
 /// makes fireflies. Tuned on a thousand lanterns, where a third more of either constant costs up to a fifth of the variance.
 /// @param link  the node
-/// @param N     unit normal: light from below its plane does not count; zero vector: light from all sides counts
-/// @cost        a square root, a division and forty other instructions a block
+/// @param at    light from below its plane does not count
+/// @cost        a square root, a division and forty other instructions a block; fifteen more and a division where it is glossy
 RELIEF_KERNEL void light_tree_estimate(LightTreeView tree,
                                        std::uint32_t link,
                                        Vec3f P,
-                                       Vec3f N,
+                                       const LightReceiver& at,
                                        LightEstimates& estimates)
 {
+  const Vec3f N = at.N;
   constexpr float kReaching = 0.3f, kFloor = 0.01f;
   const LightLanes zero = {}, one = zero + 1.0f, most = zero + 1e30f;
   // Without a normal, everything is received.
@@ -170,7 +172,14 @@ RELIEF_KERNEL void light_tree_estimate(LightTreeView tree,
 
     const LightLanes cosine = (-N.x * x - N.y * y - N.z * z) * inverse;
     const LightLanes cosine_reaching = kReaching * cosine + (reaching * radius + least_received);
-    const LightLanes received = light_lanes_max(zero, light_lanes_max(cosine, cosine_reaching));
+    LightLanes received = light_lanes_max(zero, light_lanes_max(cosine, cosine_reaching));
+    if (const LightGloss& gloss = at.gloss; gloss.share > 0.0f) {
+      const LightLanes off = light_lanes_max(zero, one + (gloss.R.x * x + gloss.R.y * y + gloss.R.z * z) * inverse);
+      const LightLanes seen = inverse * radius;
+      const LightLanes shown = light_gloss_eval(gloss, off, seen * seen);
+      // Nothing shows from below.
+      received = (1.0f - gloss.share) * received + gloss.share * light_lanes_min(shown, received * 1e6f);
+    }
 
     const LightLanes unshaded = light_lanes_min(light_lanes_load(block.intensity) * inverse * inverse, most);
     const LightLanes value = unshaded * (emitted * received);
@@ -186,13 +195,14 @@ RELIEF_KERNEL void light_tree_estimate(LightTreeView tree,
 }
 
 /// Takes a walk from the world to the mesh that a copy is of.
-/// @param P, N  from world to object space; N stays of unit length, or zero
-/// @return      where the walk goes on
-RELIEF_KERNEL std::uint32_t light_copy_enter(const LightCopy& copy, Vec3f& P, Vec3f& N)
+/// @param P, at  from world to object space; vectors stay of unit length, or zero
+/// @return       where the walk goes on
+RELIEF_KERNEL std::uint32_t light_copy_enter(const LightCopy& copy, Vec3f& P, LightReceiver& at)
 {
   // The difference first: far from the origin little would be left of two large numbers.
   P = transform_vector(copy.object_from_world, P - copy.world_from_object.p);
-  N = transform_vector(copy.object_from_world, N) * copy.scale;
+  at.N = transform_vector(copy.object_from_world, at.N) * copy.scale;
+  at.gloss.R = transform_vector(copy.object_from_world, at.gloss.R) * copy.scale;
   return copy.root;
 }
 
@@ -206,7 +216,8 @@ struct LightChoice {
 /// Chooses one of the finite lights.
 /// @param root  estimates of tree.root at the same point
 /// @param u     [0, 1), double: each level uses up some of its bits
-RELIEF_KERNEL LightChoice light_tree_sample(LightTreeView tree, const LightEstimates& root, Vec3f P, Vec3f N, double u)
+RELIEF_KERNEL LightChoice
+light_tree_sample(LightTreeView tree, const LightEstimates& root, Vec3f P, LightReceiver receiver, double u)
 {
   // Less than one by so much that its product with a float is less than that float.
   constexpr float kBelowOne = 1.0f - 0x1p-23f;
@@ -240,10 +251,10 @@ RELIEF_KERNEL LightChoice light_tree_sample(LightTreeView tree, const LightEstim
     link = tree.blocks[(link & kLightTreeIndexMask) + static_cast<std::uint32_t>(block)].link[lane];
     if ((link & (kLightTreeLeaf | kLightTreeCopy)) == (kLightTreeLeaf | kLightTreeCopy)) {
       copy_index = static_cast<std::int32_t>(link & kLightTreeIndexMask);
-      link = light_copy_enter(tree.copies[copy_index], P, N);
+      link = light_copy_enter(tree.copies[copy_index], P, receiver);
     }
     if ((link & kLightTreeLeaf) != 0) return {link & kLightTreeIndexMask, copy_index, probability, u};
-    light_tree_estimate(tree, link, P, N, below);
+    light_tree_estimate(tree, link, P, receiver, below);
     at = &below;
   }
   return {};
@@ -257,7 +268,7 @@ RELIEF_KERNEL LightChoice light_tree_sample(LightTreeView tree, const LightEstim
 RELIEF_KERNEL float light_tree_pdf(LightTreeView tree,
                                    const LightEstimates& root,
                                    Vec3f P,
-                                   Vec3f N,
+                                   LightReceiver receiver,
                                    std::uint32_t light_index,
                                    LightTrail trail,
                                    std::int32_t copy_index)
@@ -282,7 +293,7 @@ RELIEF_KERNEL float light_tree_pdf(LightTreeView tree,
     link = tree.blocks[(link & kLightTreeIndexMask) + child / kLightTreeLanes].link[child % kLightTreeLanes];
     link &= ~kLightTreeTwoSided;
     if (copy_index >= 0 && link == copy_leaf) {
-      link = light_copy_enter(tree.copies[copy_index], P, N);
+      link = light_copy_enter(tree.copies[copy_index], P, receiver);
       trail = trail_below;
       copy_index = -1;
     }
@@ -290,7 +301,7 @@ RELIEF_KERNEL float light_tree_pdf(LightTreeView tree,
       const bool found = copy_index < 0 && link == (kLightTreeLeaf | light_index);
       return found ? probability : 0.0f;
     }
-    light_tree_estimate(tree, link, P, N, below);
+    light_tree_estimate(tree, link, P, receiver, below);
     at = &below;
   }
   return 0.0f;

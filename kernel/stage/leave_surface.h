@@ -50,9 +50,10 @@ template <unsigned kFeatures>
     lobe->shape.principled_diffuse.part = PrincipledDiffusePart::kLeaving;
   }
   const Mixture closure = mixture_of(lobes, at.side.frame, at.side.Ng);
-  const ScatterEvent<Mixture> event{at, closure, path_throughput(state, path), at.side.Ns, at.cone};
+  const LightReceiver receiver{at.side.Ns};
+  const ScatterEvent<Mixture> event{at, closure, path_throughput(state, path), receiver, at.cone};
   if (g.has_lights) {
-    const LightsChoice chosen = lights_choose(g.lights, at.hit.P, event.light_N, u.light);
+    const LightsChoice chosen = lights_choose(g.lights, at.hit.P, receiver, u.light);
     if (chosen.probability > 0.0f) shade_surface_light<kFeatures>(g, state, path, event, chosen, shadow);
   }
   if constexpr ((kFeatures & kFeatureCaustics) != 0) {

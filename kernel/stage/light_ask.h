@@ -19,7 +19,7 @@ RELIEF_KERNEL bool light_answers(const LightAnswer& answer)
 }
 
 /// Samples a light that lights_choose has chosen.
-/// @param P, N     as given to lights_choose
+/// @param P, N     as given to lights_choose, of the LightReceiver
 /// @param storage  as of lights_at; lives as long as the answer
 RELIEF_KERNEL LightAnswer light_ask(const KernelGlobals& g,
                                     const PathState& state,

@@ -13,7 +13,16 @@ RELIEF_KERNEL Vec3f path_origin(const PathState& s, std::uint32_t i) { return s.
 RELIEF_KERNEL Vec3f path_direction(const PathState& s, std::uint32_t i) { return s.D[i]; }
 RELIEF_KERNEL Vec3f path_throughput(const PathState& s, std::uint32_t i) { return s.throughput[i]; }
 RELIEF_KERNEL Vec3f path_sigma_a(const PathState& s, std::uint32_t i) { return s.sigma_a[i]; }
-RELIEF_KERNEL Vec3f path_scatter_N(const PathState& s, std::uint32_t i) { return s.scatter_N[i]; }
+/// What the path's last scattering event told the choice of a light.
+RELIEF_KERNEL LightReceiver path_scattered_at(const PathState& s, std::uint32_t i)
+{
+  return s.scatter_gloss != nullptr ? LightReceiver{s.scatter_N[i], s.scatter_gloss[i]} : LightReceiver{s.scatter_N[i]};
+}
+RELIEF_KERNEL void path_set_scattered_at(PathState& s, std::uint32_t i, const LightReceiver& at)
+{
+  s.scatter_N[i] = at.N;
+  if (s.scatter_gloss != nullptr) s.scatter_gloss[i] = at.gloss;
+}
 
 /// When the path is, see motion.h.
 RELIEF_KERNEL float path_time(const PathState& s, std::uint32_t i)
@@ -233,6 +242,7 @@ RELIEF_KERNEL std::uint32_t path_fork(PathState& s, std::uint32_t i)
   s.caustic.root[copy] = s.caustic.root[i];
   if (s.motion.time != nullptr) s.motion.time[copy] = s.motion.time[i];
   if (s.facets != nullptr) s.facets[copy] = s.facets[i];
+  if (s.scatter_gloss != nullptr) s.scatter_gloss[copy] = s.scatter_gloss[i];
   if (s.media != nullptr) {
     s.media[copy] = s.media[i];
     MediumState& m = s.media[copy];

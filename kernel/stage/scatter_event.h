@@ -15,13 +15,19 @@ struct ScatterEvent {
   using Closure = SurfaceClosure;
   const SurfaceInteraction& at;
   const Closure& closure;
-  Vec3f throughput;  ///< up to the surface
-  Vec3f light_N;     ///< given to lights_choose
-  RayCone cone;      ///< at the surface
+  Vec3f throughput;               ///< up to the surface
+  const LightReceiver& receiver;  ///< given to lights_choose
+  RayCone cone;                   ///< at the surface
 };
 
-/// Shading normal by which lights are chosen: none where light comes from both sides.
-RELIEF_KERNEL Vec3f surface_light_N(const SurfaceInteraction& at) { return at.transmits ? Vec3f{} : at.side.Ns; }
+/// By what lights are chosen. Where light comes from both sides no normal counts, nor gloss.
+/// @param lobes  of a material of closures; gloss of others does not count
+template <typename Lobes>
+RELIEF_KERNEL LightReceiver surface_receiver(const PathState& state, const SurfaceInteraction& at, const Lobes& lobes)
+{
+  if (at.transmits) return Vec3f{};
+  return state.scatter_gloss != nullptr ? LightReceiver{at.side.Ns, lobes_gloss(lobes)} : LightReceiver{at.side.Ns};
+}
 
 /// The part of a surface's f that is diffuse.
 /// @param wi  in the closure's frame

@@ -25,11 +25,10 @@ RELIEF_KERNEL void shade_sun_disks(const KernelGlobals& g, PathState& state, std
     if (scatterings == 0) film_add_emission(g.film, state.pixel[path], seen);
     path_add_denoising(g, state, path, seen);
     const float pdf = state.pdf[path];
-    const float weight =
-        pdf > 0.0f
-            ? path_bsdf_weight(g.light_technique, pdf,
-                               lights_sun_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), index))
-            : 1.0f;
+    const float weight = pdf > 0.0f ? path_bsdf_weight(g.light_technique, pdf,
+                                                       lights_sun_pdf(g.lights, path_origin(state, path),
+                                                                      path_scattered_at(state, path), index))
+                                    : 1.0f;
     path_add_radiance(g, state, path, scatterings, seen * weight);
   }
 }
@@ -63,7 +62,8 @@ RELIEF_KERNEL void shade_background(const KernelGlobals& g, PathState& state, st
   path_add_denoising(g, state, path, path_throughput(state, path) * radiance);
   const float pdf = state.pdf[path];
   if (pdf > 0.0f) {
-    const float pdf_light = lights_environment_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), D);
+    const float pdf_light =
+        lights_environment_pdf(g.lights, path_origin(state, path), path_scattered_at(state, path), D);
     radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
   }
   path_add_radiance(g, state, path, scatterings, path_throughput(state, path) * radiance);

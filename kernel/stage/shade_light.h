@@ -36,7 +36,7 @@ RELIEF_KERNEL void shade_light(const KernelGlobals& g, PathState& state, std::ui
     const float pdf = state.pdf[path];
     if (pdf > 0.0f) {
       const float pdf_light =
-          lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), {light_index}, D, t, time);
+          lights_pdf(g.lights, path_origin(state, path), path_scattered_at(state, path), {light_index}, D, t, time);
       radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
     }
     path_add_radiance(g, state, path, scatterings, path_throughput(state, path) * radiance);

@@ -178,7 +178,7 @@ RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
   state.throughput[path] = throughput;
   state.pdf[path] = phase.pdf;
   state.least_pdf[path] = min(state.least_pdf[path], phase.pdf);
-  state.scatter_N[path] = Vec3f{};
+  path_set_scattered_at(state, path, {});
   state.bounces[path] += 1u;
   // Where the path comes from photons have been gathered.
   if (g.caustics.enabled) state.flags[path] = path_flags_left_to_paths(state.flags[path]) | kPathAfterSoft;

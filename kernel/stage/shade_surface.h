@@ -21,8 +21,8 @@ namespace relief {
 shade_surface_light_pdf(const KernelGlobals& g, const PathState& state, std::uint32_t path, const SurfaceInteraction& at)
 {
   const LightRef hit{at.instance->first_light_index + static_cast<std::int32_t>(at.triangle), at.instance->light_copy_index};
-  return lights_pdf(g.lights, path_origin(state, path), path_scatter_N(state, path), hit, path_direction(state, path),
-                    state.hit_t[path], path_time(state, path));
+  return lights_pdf(g.lights, path_origin(state, path), path_scattered_at(state, path), hit,
+                    path_direction(state, path), state.hit_t[path], path_time(state, path));
 }
 
 /// Adds what a surface emits to a path that has met it.
@@ -85,8 +85,8 @@ enum class SurfaceWay : std::uint8_t {
 /// What has come of a path at a surface, before its closure is asked.
 struct SurfaceVisit {
   ScatterSamples u;
-  Vec3f throughput;  ///< up to the surface
-  Vec3f light_N;     ///< given to lights_choose
+  Vec3f throughput;        ///< up to the surface
+  LightReceiver receiver;  ///< given to lights_choose
   RayCone cone;
   LightsChoice chosen;  ///< the light that is asked for
   SurfaceWay way = SurfaceWay::kEnds;
@@ -125,9 +125,9 @@ RELIEF_KERNEL void shade_surface_meet(const KernelGlobals& g,
     if (__builtin_expect(state.light_passes != nullptr, 0)) {
       shade_surface_event_colors<kFeatures>(g, state, path, at, lobes, visit.throughput);
     }
-    visit.light_N = surface_light_N(at);
+    visit.receiver = surface_receiver(state, at, lobes);
     if (g.has_lights && !last && !lobes_are_delta(lobes)) {
-      visit.chosen = lights_choose(g.lights, at.hit.P, visit.light_N, visit.u.light);
+      visit.chosen = lights_choose(g.lights, at.hit.P, visit.receiver, visit.u.light);
     }
   }
   if (!surface_is_met<kFeatures>(state, path, at.params.alpha, path_surface(state, path))) {
@@ -158,9 +158,9 @@ RELIEF_KERNEL void shade_surface_meet(const KernelGlobals& g,
   if (at.params.unlit || last) return;
   visit.way = SurfaceWay::kScatters;
   if constexpr (!kMixture) {
-    visit.light_N = surface_light_N(at);
+    visit.receiver = surface_receiver(state, at, lobes);
     if (g.has_lights && !surface_is_delta(at.params)) {
-      visit.chosen = lights_choose(g.lights, at.hit.P, visit.light_N, visit.u.light);
+      visit.chosen = lights_choose(g.lights, at.hit.P, visit.receiver, visit.u.light);
     }
   }
 }
@@ -204,7 +204,7 @@ RELIEF_KERNEL void shade_surface_resolved(const KernelGlobals& g,
       return surface_closure_make<kFeatures>(at.params, *g.bsdf_tables, to_local(side.frame, wo));
     }
   }();
-  const ScatterEvent<decltype(closure)> event{at, closure, visit.throughput, visit.light_N, visit.cone};
+  const ScatterEvent<decltype(closure)> event{at, closure, visit.throughput, visit.receiver, visit.cone};
   const auto light = [&] {
     if (visit.chosen.probability > 0.0f) shade_surface_light<kFeatures>(g, state, path, event, visit.chosen, shadow);
   };

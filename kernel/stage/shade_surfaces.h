@@ -150,7 +150,7 @@ template <unsigned kFeatures>
   for (int k = 0; k < group.count; ++k) {
     SurfaceVisit& visit = visits[k];
     if (!(visit.chosen.probability > 0.0f)) continue;
-    answers[k] = light_ask(g, state, group.paths[k], visit.chosen, group.at[k].hit.P, visit.light_N, storage[k]);
+    answers[k] = light_ask(g, state, group.paths[k], visit.chosen, group.at[k].hit.P, visit.receiver.N, storage[k]);
     if (!light_answers(answers[k])) visit.chosen.probability = 0.0f;
     store_lane(hits.to_lamp, k, answers[k].sample.wi);
     are_lit = true;
@@ -163,7 +163,7 @@ template <unsigned kFeatures>
     const SurfaceVisit& visit = visits[k];
     const SurfaceInteraction& at = group.at[k];
     const HitLane closure{&hits, k, 1.0f / at.params.alpha};
-    const ScatterEvent<HitLane> event{at, closure, visit.throughput, visit.light_N, visit.cone};
+    const ScatterEvent<HitLane> event{at, closure, visit.throughput, visit.receiver, visit.cone};
     if (visit.chosen.probability > 0.0f) {
       const Vec3f wi = to_local(at.side.frame, answers[k].sample.wi);
       shade_surface_lit<kFeatures>(g, state, path, event, answers[k], wi,

@@ -104,7 +104,7 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
   const bool delta = (bsdf.lobe & kLobeDelta) != 0;
   state.pdf[path] = delta ? 0.0f : bsdf.pdf;
   if (!delta) state.least_pdf[path] = min(state.least_pdf[path], bsdf.pdf);
-  state.scatter_N[path] = event.light_N;
+  path_set_scattered_at(state, path, event.receiver);
   const bool diffuse = (bsdf.lobe & kLobeDiffuse) != 0;
   const BounceKind kind = transmitted ? BounceKind::kTransmission
                           : diffuse   ? BounceKind::kDiffuse

@@ -92,7 +92,7 @@ RELIEF_KERNEL void shade_surface_light(const KernelGlobals& g,
                                        ShadowQueue& shadow)
 {
   Light storage;
-  const LightAnswer answer = light_ask(g, state, path, chosen, event.at.hit.P, event.light_N, storage);
+  const LightAnswer answer = light_ask(g, state, path, chosen, event.at.hit.P, event.receiver.N, storage);
   if (!light_answers(answer)) return;
   const Vec3f wi = to_local(event.at.side.frame, answer.sample.wi);
   const BsdfEval bsdf = closure_eval<kFeatures>(event.closure, *g.bsdf_tables, wi);

@@ -3,6 +3,7 @@
 
 #include "kernel/bsdf/hit_columns.h"
 #include "kernel/bsdf/mixture_build.h"
+#include "kernel/light/light_receiver.h"
 
 namespace relief {
 
@@ -79,6 +80,49 @@ RELIEF_KERNEL void lobes_defend(HitLane& one, float passing)
     LobeColumn& lobe = c.lobes[i];
     if (lobe.is_there[k] != 0) lobe.probability[k] = max(lobe.probability[k], kLeastLobeShare * sum);
   }
+}
+
+/// A lobe that reflects, as the choice of a light sees it.
+/// @param probability, sum  of it and of all lobes
+RELIEF_KERNEL LightGloss lobe_gloss(const Frame& frame, Vec3f wo, float roughness, float probability, float sum)
+{
+  if (!(probability >= kLeastGlossShare * sum)) return {};
+  const Vec3f R = from_local(frame, {-wo.x, -wo.y, wo.z});
+  return {R, min(probability / sum, kMostGlossShare), clamp(sqr(sqr(roughness)), kLeastGlossAlpha2, 1.0f)};
+}
+
+/// The strongest of lobes that reflect and have a width.
+RELIEF_KERNEL LightGloss lobes_gloss(const MixtureLobes& lobes)
+{
+  const MixtureLobe* strongest = nullptr;
+  float sum = 0;
+  for (int i = 0; i < lobes.size; ++i) {
+    const MixtureLobe& lobe = lobes.lobes[i];
+    sum += lobe.probability;
+    const bool is_glossy =
+        mixture_lobe_event(lobe.kind) == EventKind::kGlossy && lobe.roughness < kInfinity && !lobe.is_delta;
+    if (is_glossy && lobe.probability > (strongest != nullptr ? strongest->probability : 0.0f)) strongest = &lobe;
+  }
+  if (strongest == nullptr) return {};
+  return lobe_gloss(strongest->frame, strongest->wo, strongest->roughness, strongest->probability, sum);
+}
+RELIEF_KERNEL LightGloss lobes_gloss(const HitLane& one)
+{
+  const LobeColumns& c = one.hits->lobes;
+  const int k = one.lane;
+  const LobeColumn* strongest = nullptr;
+  float sum = 0;
+  for (int i = 0; i < c.num_lobes; ++i) {
+    const LobeColumn& lobe = c.lobes[i];
+    sum += lobe.probability[k];
+    const bool is_glossy = mixture_lobe_event(lobe.is.kind) == EventKind::kGlossy && lobe.roughness[k] < kInfinity &&
+                           lobe.is_delta[k] == 0;
+    if (is_glossy && lobe.probability[k] > (strongest != nullptr ? strongest->probability[k] : 0.0f)) strongest = &lobe;
+  }
+  if (strongest == nullptr) return {};
+  const LobeFrames& f = c.frames[strongest->frame];
+  const Frame frame{load_lane(f.frame, k), load_lane(f.frame + 3, k), load_lane(f.frame + 6, k)};
+  return lobe_gloss(frame, load_lane(f.wo, k), strongest->roughness[k], strongest->probability[k], sum);
 }
 
 /// As lobes_are_delta of a list.

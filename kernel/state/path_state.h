@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "kernel/assert.h"
+#include "kernel/light/light_receiver.h"
 #include "kernel/math/vec.h"
 #include "kernel/state/facet_state.h"
 #include "kernel/state/light_pass_state.h"
@@ -102,6 +103,7 @@ struct alignas(64) PathState {
   FacetState* facets = nullptr;            ///< of the present hit; null where no ray meets any
   MediumState* media = nullptr;            ///< null where nothing has a medium
   LightPassState* light_passes = nullptr;  ///< null where no layer tells light apart by its first event
+  LightGloss* scatter_gloss = nullptr;     ///< beside scatter_N; null: lights are chosen without
 };
 
 enum PathFlag : std::uint32_t {

@@ -29,8 +29,7 @@ TEST(MissingImageModule, IsAnErrorOfTheImageAndNamesTheFile)
       EXPECT_NE(e.found.find(file), std::string::npos) << e.found;
       // Not the path where it was built, which means nothing to whoever installed it.
       const std::string own = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
-      const std::string expected =
-          "cannot be loaded: relief_missing.so is neither in " + own + " nor in ../lib/relief";
+      const std::string expected = "cannot be loaded: relief_missing.so is neither in " + own + " nor in ../lib/relief";
       EXPECT_TRUE(e.found.ends_with(expected)) << e.found;
     }
   }

@@ -48,19 +48,28 @@ LightSet random_set(Random& random, int num_lights, double spread, double size)
   return set;
 }
 
-LightEstimates root_estimates(const LightsView& view, Vec3f P, Vec3f N)
+LightEstimates root_estimates(const LightsView& view, Vec3f P, const LightReceiver& at)
 {
   LightEstimates root;
-  light_tree_estimate(view.tree, view.tree.root, P, N, root);
+  light_tree_estimate(view.tree, view.tree.root, P, at, root);
   return root;
 }
 
-float tree_probability(const LightsView& view, Vec3f P, Vec3f N, std::uint32_t light)
+float tree_probability(const LightsView& view, Vec3f P, const LightReceiver& at, std::uint32_t light)
 {
-  return light_tree_pdf(view.tree, root_estimates(view, P, N), P, N, light, view.light_trails[light], -1);
+  return light_tree_pdf(view.tree, root_estimates(view, P, at), P, at, light, view.light_trails[light], -1);
 }
 
 Vec3f random_normal(Random& random) { return random.next() < 0.25 ? Vec3f{} : random.direction(); }
+
+/// Half of those that have a normal are glossy, from nearly mirrors on.
+LightReceiver random_receiver(Random& random)
+{
+  const Vec3f N = random_normal(random);
+  if (is_zero(N) || random.next() < 0.5) return N;
+  const auto alpha2 = static_cast<float>(std::pow(10.0, random.between(-4, 0)));
+  return {N, {random.direction(), random.unit() * kMostGlossShare, max(alpha2, kLeastGlossAlpha2)}};
+}
 
 TEST(LightTree, ProbabilitiesSumToOne)
 {
@@ -69,13 +78,14 @@ TEST(LightTree, ProbabilitiesSumToOne)
     const LightSet set = random_set(random, num_lights, 10, 1);
     const LightsView view = set.view();
     for (int k = 0; k < 50; ++k) {
-      const Vec3f P = random.in_cube(k % 2 == 0 ? 10 : 100), N = random_normal(random);
+      const Vec3f P = random.in_cube(k % 2 == 0 ? 10 : 100);
+      const LightReceiver at = random_receiver(random);
       double sum = 0;
-      for (std::uint32_t i = 0; i < view.num_lights; ++i) sum += static_cast<double>(tree_probability(view, P, N, i));
+      for (std::uint32_t i = 0; i < view.num_lights; ++i) sum += static_cast<double>(tree_probability(view, P, at, i));
       // A walk ends without a light where a group's bound may contribute but none of its members does; the lights here
       // face at random and differ in power by a factor of e^6, which is the worst for groups.
       EXPECT_LT(sum, 1 + 1e-4);
-      if (is_zero(N) && num_lights > 8) {
+      if (is_zero(at.N) && num_lights > 8) {
         EXPECT_GT(sum, 0.1);
       }
       if (num_lights <= 8 && sum > 0) {
@@ -94,8 +104,9 @@ struct Walks {
 double float_of_half_word(std::uint32_t bits) { return static_cast<double>(std::bit_cast<float>(bits)); }
 
 /// The estimate of one child, from what the block's members and light_tree_estimate are documented to mean.
-double scalar_estimate(const LightTreeBlock& block, int i, Vec3f P, Vec3f N)
+double scalar_estimate(const LightTreeBlock& block, int i, Vec3f P, const LightReceiver& at)
 {
+  const Vec3f N = at.N;
   const double d[3] = {static_cast<double>(P.x) - static_cast<double>(block.cx[i]),
                        static_cast<double>(P.y) - static_cast<double>(block.cy[i]),
                        static_cast<double>(P.z) - static_cast<double>(block.cz[i])};
@@ -113,18 +124,33 @@ double scalar_estimate(const LightTreeBlock& block, int i, Vec3f P, Vec3f N)
   const double cosine =
       -(static_cast<double>(N.x) * d[0] + static_cast<double>(N.y) * d[1] + static_cast<double>(N.z) * d[2]) / h;
   const double floor = is_zero(N) ? 1.0 : 0.01;
-  const double received = std::max({0.0, cosine, 0.3 * (cosine + radius / h) + floor});
+  double received = std::max({0.0, cosine, 0.3 * (cosine + radius / h) + floor});
+  if (const auto share = static_cast<double>(at.gloss.share); share > 0 && received > 0) {
+    const Vec3f R = at.gloss.R;
+    const double along_R =
+        -(static_cast<double>(R.x) * d[0] + static_cast<double>(R.y) * d[1] + static_cast<double>(R.z) * d[2]) / h;
+    const double radius2 = radius * radius / (h * h);
+    const double a = static_cast<double>(at.gloss.alpha2) + radius2 / 8;
+    const double p = a / (std::numbers::pi * std::pow(2 * a + 1 - along_R, 2));
+    const double shown = std::numbers::pi * p / (1 + std::pow(share * p * std::numbers::pi * radius2, 2));
+    received = (1 - share) * received + share * std::min(shown, 1e6 * received);
+  }
   return std::min(static_cast<double>(block.intensity[i]) / (h * h), 1e30) * emitted * received;
 }
 
-void walk_everywhere(LightTreeView tree, std::uint32_t link, Vec3f P, Vec3f N, double probability, Walks& walks)
+void walk_everywhere(LightTreeView tree,
+                     std::uint32_t link,
+                     Vec3f P,
+                     const LightReceiver& at,
+                     double probability,
+                     Walks& walks)
 {
   const LightTreeBlock* blocks = tree.blocks + (link & kLightTreeIndexMask);
   const std::uint32_t num_children = kLightTreeLanes * ((link >> kLightTreeBlocksShift) % 4 + 1);
   double sum = 0;
   std::vector<double> estimates;
   for (std::uint32_t i = 0; i < num_children; ++i) {
-    estimates.push_back(scalar_estimate(blocks[i / kLightTreeLanes], static_cast<int>(i % kLightTreeLanes), P, N));
+    estimates.push_back(scalar_estimate(blocks[i / kLightTreeLanes], static_cast<int>(i % kLightTreeLanes), P, at));
     sum += estimates.back();
   }
   if (!(sum > 0)) walks.without_light += probability;
@@ -135,7 +161,7 @@ void walk_everywhere(LightTreeView tree, std::uint32_t link, Vec3f P, Vec3f N, d
     if ((child & kLightTreeLeaf) != 0) {
       walks.probability[child & kLightTreeIndexMask] += child_probability;
     } else {
-      walk_everywhere(tree, child, P, N, child_probability, walks);
+      walk_everywhere(tree, child, P, at, child_probability, walks);
     }
   }
 }
@@ -147,12 +173,13 @@ TEST(LightTree, ProbabilitiesAreThoseOfScalarEstimatesInDoubleAndSumToOne)
     const LightSet set = random_set(random, num_lights, 10, 1);
     const LightsView view = set.view();
     for (int k = 0; k < 40; ++k) {
-      const Vec3f P = random.in_cube(k % 2 == 0 ? 10 : 100), N = random_normal(random);
+      const Vec3f P = random.in_cube(k % 2 == 0 ? 10 : 100);
+      const LightReceiver at = random_receiver(random);
       Walks walks{std::vector<double>(view.num_lights, 0.0)};
-      walk_everywhere(view.tree, view.tree.root, P, N, 1.0, walks);
+      walk_everywhere(view.tree, view.tree.root, P, at, 1.0, walks);
       double sum = walks.without_light;
       for (std::uint32_t i = 0; i < view.num_lights; ++i) {
-        const double probability = static_cast<double>(tree_probability(view, P, N, i));
+        const double probability = static_cast<double>(tree_probability(view, P, at, i));
         // Where a child is about to count for nothing, what is left of its estimate has few digits.
         ASSERT_NEAR(probability, walks.probability[i], 1e-4 * walks.probability[i] + 1e-6)
             << num_lights << " light " << i;
@@ -221,12 +248,13 @@ TEST(LightTree, ChoosesWithTheProbabilityItStates)
     const LightSet set = random_set(random, num_lights, 10, 1);
     const LightsView view = set.view();
     for (int k = 0; k < 20; ++k) {
-      const Vec3f P = random.in_cube(12), N = random_normal(random);
-      const LightEstimates root = root_estimates(view, P, N);
+      const Vec3f P = random.in_cube(12);
+      const LightReceiver at = random_receiver(random);
+      const LightEstimates root = root_estimates(view, P, at);
       for (int i = 0; i < 200; ++i) {
-        const LightChoice choice = light_tree_sample(view.tree, root, P, N, random.next());
+        const LightChoice choice = light_tree_sample(view.tree, root, P, at, random.next());
         if (choice.probability == 0) continue;
-        ASSERT_EQ(tree_probability(view, P, N, choice.light_index), choice.probability);
+        ASSERT_EQ(tree_probability(view, P, at, choice.light_index), choice.probability);
       }
     }
   }
@@ -269,12 +297,15 @@ TEST(LightTree, NeverLeavesOutALightThatContributes)
       if (j % 4 == 1) P = light.P + cross(light.axis, random.direction()) * 3.0f + light.axis * random.between(0, 1e-3);
       if (j % 4 == 2) N = normalize(cross(light.P - P, random.direction()) + random.direction() * 1e-4f);
       if (j % 4 == 3) P = light.P + random.direction() * static_cast<float>(size) * random.between(1e-4, 1);
+      LightReceiver at = random_receiver(random);
+      at.N = N;
+      if (is_zero(N)) at = N;
       for (int i = 0; i < 4; ++i) {
         const LightSample sample = light_sample(light, P, {random.unit(), random.unit()});
         const bool lit = sample.pdf > 0.0f && !is_zero(sample.radiance) && (is_zero(N) || dot(N, sample.wi) > 0.0f);
         if (!lit) continue;
         ++contributing;
-        ASSERT_GT(tree_probability(view, P, N, index), 0.0f) << "set " << k << " point " << j;
+        ASSERT_GT(tree_probability(view, P, at, index), 0.0f) << "set " << k << " point " << j;
       }
     }
   }
@@ -297,16 +328,58 @@ TEST(LightSampler, DensityOfAHitEqualsTheSamples)
     if (k % 3 == 1) set.environment_yields_to = 0.002f * static_cast<float>(k);
     const LightsView view = set.view();
     for (int i = 0; i < 400; ++i) {
-      const Vec3f P = random.in_cube(12), N = random_normal(random);
-      const LightSample sample = lights_sample(view, P, N, {random.next(), random.unit()});
+      const Vec3f P = random.in_cube(12);
+      const LightReceiver at = random_receiver(random);
+      const LightSample sample = lights_sample(view, P, at, {random.next(), random.unit()});
       if (sample.pdf == 0.0f || sample.delta) continue;
       ++compared;
-      const float pdf = sample.ref.light_index < 0 ? lights_environment_pdf(view, P, N, sample.wi)
-                                                   : lights_pdf(view, P, N, sample.ref, sample.wi, sample.distance);
+      const float pdf = sample.ref.light_index < 0 ? lights_environment_pdf(view, P, at, sample.wi)
+                                                   : lights_pdf(view, P, at, sample.ref, sample.wi, sample.distance);
       ASSERT_NEAR(pdf / sample.pdf, 1.0f, 1e-4f) << k << " light " << sample.ref.light_index;
     }
   }
   EXPECT_GT(compared, 9000);
+}
+
+TEST(LightGloss, HasTheHeightAndTheIntegralOfGgxsReflection)
+{
+  for (const float alpha2 : {1e-4f, 0.01f, 0.25f, 1.0f}) {
+    const LightGloss gloss{{0, 0, 1}, 0.5f, alpha2};
+    const double a = static_cast<double>(alpha2);
+    // D of the normal over four: the density of the mirror direction along the normal.
+    EXPECT_NEAR(static_cast<double>(light_gloss_eval(gloss, 0.0f, 0.0f)) * 4 * a, 1, 1e-5);
+    // Over x = e^t - e^s, from 0 to 2, by the midpoint rule.
+    const double from = std::log(a), to = std::log(a + 2);
+    const int n = 20000;
+    double sum = 0;
+    for (int i = 0; i < n; ++i) {
+      const double e = std::exp(from + (to - from) * (i + 0.5) / n);
+      sum += 2 * static_cast<double>(light_gloss_eval(gloss, static_cast<float>(e - a), 0.0f)) * e * (to - from) / n;
+    }
+    // What GGX sends along the normal and stays above it is 1/(1 + a) of all.
+    EXPECT_NEAR(sum, 1 / (1 + a), 2e-4);
+    // Of what fills the lobe, following the lobe finds most.
+    EXPECT_LT(light_gloss_eval(gloss, 0.0f, 1.0f),
+              min(1.0f, 4.0f * alpha2 + 0.6f) * light_gloss_eval(gloss, 0.0f, 0.0f));
+  }
+}
+
+TEST(LightGloss, AsksTheLampThatShines)
+{
+  LightSet set;
+  for (const Vec3f P : {Vec3f{0, 0, 2}, Vec3f{6, 0, 6}}) {
+    Light light;
+    light.kind = LightKind::kPoint;
+    light.P = P;
+    light.emission = splat3(P.x == 0.0f ? 10.0f : 1.0f);
+    set.lights.push_back(light);
+  }
+  light_tree_build(set, {});
+  const LightsView view = set.view();
+  const Vec3f N{0, 0, 1}, R = normalize(Vec3f{1, 0, 1});
+  EXPECT_LT(tree_probability(view, {}, N, 1), 0.01f);
+  EXPECT_GT(tree_probability(view, {}, {N, {R, 0.5f, 0.01f}}, 1), 0.1f);
+  EXPECT_LT(tree_probability(view, {}, {N, {normalize(Vec3f{-1, 0, 1}), 0.5f, 0.01f}}, 1), 0.01f);
 }
 
 TEST(LightSampler, MeanIsTheIrradianceOfAllLights)
@@ -587,9 +660,10 @@ TEST(LightSampler, AHundredThousandLights)
   const int n = 200000;
   for (int i = 0; i < n; ++i) {
     const Vec3f P{static_cast<float>(i % 100), 3, 4};
-    sum += static_cast<double>(
-        lights_sample(view, P, {0, 1, 0}, {static_cast<double>(sample_1d(1, static_cast<std::uint32_t>(i), 0)), 0.4f})
-            .pdf);
+    sum +=
+        static_cast<double>(lights_sample(view, P, Vec3f{0, 1, 0},
+                                          {static_cast<double>(sample_1d(1, static_cast<std::uint32_t>(i), 0)), 0.4f})
+                                .pdf);
   }
   const double sample_seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC / n;
   std::printf("build %.3f s, %.0f bytes a light, %.0f ns a sample (%g)\n", build_seconds,

@@ -351,7 +351,7 @@ TEST(LightSet, SunsThatCountLeaveAConstantEnvironmentToTheBsdf)
   const auto environment_pdf_under = [&scene](float irradiance, EnvironmentDensity density) {
     scene.lights[0].emission = {irradiance, irradiance, irradiance};
     const LightSet set = light_set_make(scene, {}, density);
-    return lights_environment_pdf(set.view(), {}, {0, 0, 1}, {0, 0, 1});
+    return lights_environment_pdf(set.view(), {}, Vec3f{0, 0, 1}, {0, 0, 1});
   };
   EXPECT_EQ(environment_pdf_under(1.0f, EnvironmentDensity::kExcess), 0.0f);
   EXPECT_GT(environment_pdf_under(0.1f, EnvironmentDensity::kExcess), 0.0f);
@@ -367,7 +367,7 @@ TEST(LightSet, LampsThatCountLeaveAConstantEnvironmentToTheBsdfNearThem)
   scene.lights[0].emission = {10, 10, 10};
   const LightSet set = light_set_make(scene, {});
   const auto pdf_below = [&set](float distance) {
-    return lights_environment_pdf(set.view(), {0, 0, -distance}, {0, 0, 1}, {0, 0, 1});
+    return lights_environment_pdf(set.view(), {0, 0, -distance}, Vec3f{0, 0, 1}, {0, 0, 1});
   };
   EXPECT_EQ(pdf_below(2), 0.0f);
   EXPECT_GT(pdf_below(50), 0.0f);
