@@ -74,9 +74,14 @@ LightSet light_set_make(const Scene& scene,
     for (const std::uint32_t sun : set.suns) suns += light_scalar(set.lights[sun].emission);
     // Decided for the whole scene, so that sides turned away from the sun save their shadow rays.
     // What some rays pass and others not makes light that is asked for another than light that is found. Cycles finds it.
-    const bool rays_differ = std::any_of(scene.instances.begin(), scene.instances.end(), [](const Instance& instance) {
-      return (instance.flags & kHiddenFrom) != 0 || (instance.flags & kCastsShadow) == 0;
-    });
+    const bool rays_differ =
+        std::any_of(scene.instances.begin(), scene.instances.end(),
+                    [](const Instance& instance) {
+                      return (instance.flags & kHiddenFrom) != 0 || (instance.flags & kCastsShadow) == 0;
+                    }) ||
+        std::any_of(scene.materials.begin(), scene.materials.end(), [](const Material& material) {
+          return material.depends_on_ray && material.transparency_index >= 0;
+        });
     if (suns > set.environment_yields_to || rays_differ) set.environment_irradiance = {};
   }
   return set;

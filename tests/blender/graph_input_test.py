@@ -656,8 +656,8 @@ def test_light_path_of_camera_rays_and_mirrors():
     _assert_agree(scene, material, builders, most_off=0.03)
 
 
-def _transparent_by(name, factor=1.0):
-    """A floor under a plate that is transparent by an output of Light Path times a factor."""
+def _transparent_by(name, factor=1.0, has_lamp=True):
+    """A floor under a plate that is transparent by an output of Light Path times a factor, under a lamp and an even world or that alone."""
     scene = new_scene(48, 36)
     set_bounces(scene, 3)
     plate, tree, surface = new_material("plate", Color=(0.7, 0.3, 0.2, 1))
@@ -673,10 +673,16 @@ def _transparent_by(name, factor=1.0):
     add_plane(8, diffuse((0.6, 0.6, 0.6)))
     add_plane(1.5, plate, (0.3, 0.2, 1.2))
     add_plane(1.0, plate, (0.5, 0.3, 1.6))
-    add_light("AREA", (0.5, 0.4, 4), energy=300, size=0.5)
+    if has_lamp:
+        add_light("AREA", (0.5, 0.4, 4), energy=300, size=0.5)
     set_world((0.2, 0.3, 0.4))
     add_camera((0, -5, 5), (math.radians(45), 0, 0))
     return scene
+
+
+def test_shadow_rays_under_an_even_world():
+    """Cycles does not ask an even world for light: its paths meet the plate."""
+    assert_agrees(_transparent_by("Is Shadow Ray", has_lamp=False), runs=4, samples=64)
 
 
 def test_shadow_rays():

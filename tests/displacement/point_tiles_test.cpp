@@ -4,10 +4,12 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <functional>
 #include <memory>
 #include <random>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -311,6 +313,15 @@ TEST(PointTiles, AreShadedAsADividedMesh)
   }
 }
 
+/// For failures: where a ray went, what was found and what is there.
+std::string ray_text(Vec3d O, Vec3d D, double found, double there)
+{
+  char text[256];
+  std::snprintf(text, sizeof text, ": from %.9g %.9g %.9g along %.9g %.9g %.9g, met at %.12g in place of %.12g", O.x,
+                O.y, O.z, D.x, D.y, D.z, found, there);
+  return text;
+}
+
 /// Beside all triangles in double precision.
 TEST(PointTiles, AreMetWhereTheirTrianglesAre)
 {
@@ -332,6 +343,7 @@ TEST(PointTiles, AreMetWhereTheirTrianglesAre)
     const oracle::TriangleTree doubles(std::move(triangles), 1e-5, .03);
     std::mt19937_64 random(7 + test_part());
     std::uint64_t num_hits = 0, num_unclear = 0, num_missed = 0, num_invented = 0, num_shadows_unlike = 0;
+    std::string first_missed;
     for (std::uint64_t ray = 0; ray < num_rays; ++ray) {
       const Vec3d O = to_double(to_float(2.0 * direction(random)));
       Vec3d D = to_double(to_float(MovedTorus::inside(random) + .6 * direction(random) - O));
@@ -342,13 +354,15 @@ TEST(PointTiles, AreMetWhereTheirTrianglesAre)
       for (const auto& tree : trees) {
         const RTCRayHit hit = tree->intersect(O, D);
         const double t = is_hit(hit) ? static_cast<double>(hit.ray.tfar) : HUGE_VAL;
-        if (nearest.t < HUGE_VAL && !(t < nearest.t + 1e-5)) ++num_missed;
+        if (nearest.t < HUGE_VAL && !(t < nearest.t + 1e-5)) {
+          if (num_missed++ == 0) first_missed = ray_text(O, D, t, nearest.t);
+        }
         if (is_hit(hit) && !(t > nearest.maybe - 1e-5)) ++num_invented;
         if (tree->occluded(O, D) != is_hit(hit)) ++num_shadows_unlike;
         num_hits += is_hit(hit) ? 1 : 0;
       }
     }
-    EXPECT_EQ(num_missed, 0u) << c.name;
+    EXPECT_EQ(num_missed, 0u) << c.name << first_missed;
     EXPECT_EQ(num_invented, 0u) << c.name;
     EXPECT_EQ(num_shadows_unlike, 0u) << c.name;
     // Some of what is met is seen edge-on.

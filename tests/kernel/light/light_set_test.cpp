@@ -358,6 +358,21 @@ TEST(LightSet, SunsThatCountLeaveAConstantEnvironmentToTheBsdf)
   EXPECT_GT(environment_pdf_under(1.0f, EnvironmentDensity::kRadiance), 0.0f);
 }
 
+TEST(LightSet, AConstantEnvironmentIsLeftToTheBsdfWhereShadowRaysPassWhatOthersDoNot)
+{
+  Scene scene;
+  scene.environment.color = {1, 1, 1};
+  scene.materials.resize(1);
+  const auto is_asked = [&scene](bool depends_on_ray, int transparency_index) {
+    scene.materials[0].depends_on_ray = depends_on_ray;
+    scene.materials[0].transparency_index = transparency_index;
+    return light_set_make(scene, {}).any();
+  };
+  EXPECT_TRUE(is_asked(false, 0));
+  EXPECT_TRUE(is_asked(true, -1));
+  EXPECT_FALSE(is_asked(true, 0));
+}
+
 TEST(LightSet, LampsThatCountLeaveAConstantEnvironmentToTheBsdfNearThem)
 {
   Scene scene;
