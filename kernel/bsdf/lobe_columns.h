@@ -31,6 +31,7 @@ struct alignas(32) LobeColumn {
   alignas(32) std::int32_t is_there[8];  ///< −1: the hit has such a lobe
   std::int32_t is_delta[8];              ///< likewise
   float probability[8], weight[3][8];    ///< 0 where it is not there
+  float first_share[8];                  ///< as of MixtureLobe; of lobes of closures, which lists are made of
   float roughness[8];                    ///< perceptual; infinite: never sharp
   float shape[3][8];  ///< α along x and y; of diffuse Principled its roughness; of microfibres A, B, albedo
   float eta[8], F0[3][8], edge[3][8];  ///< as of MicrofacetFresnel
@@ -102,6 +103,7 @@ RELIEF_KERNEL LobeColumn* lobe_column_add(LobeColumns& c,
   store8(lobe.probability, is_there ? mean : none);
   store8(lobe.weight, select(is_there, bounded, Vec3x8{}));
   store8(lobe.roughness, splat8(kInfinity));
+  store8(lobe.first_share, splat8(1.0f));
   return &lobe;
 }
 
@@ -164,6 +166,7 @@ RELIEF_KERNEL void lobe_columns_list(const LobeColumns& c, int lane, MixtureBuil
     lobe.is_delta = column.is_delta[lane] != 0;
     lobe.roughness = column.roughness[lane];
     lobe.probability = column.probability[lane];
+    lobe.first_share = column.first_share[lane];
     lobe.weight = load_lane(column.weight, lane);
     lobe.frame = {load_lane(f.frame, lane), load_lane(f.frame + 3, lane), load_lane(f.frame + 6, lane)};
     lobe.wo = load_lane(f.wo, lane);

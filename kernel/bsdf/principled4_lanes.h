@@ -50,7 +50,9 @@ RELIEF_KERNEL Vec3x8 lobe_column_give_back(LobeColumn& lobe, const GgxLost8& ggx
   const Vec3x8 white = splat8(Vec3f{1, 1, 1});
   const Vec3x8 factor = select(gives, ggx_energy_factor(F_mean, ggx), white);
   lobe_column_scale(lobe, factor);
-  return select(gives, factor * (1.0f - ggx.lost), white);
+  const F8 first_share = gives ? 1.0f - ggx.lost : splat8(1.0f);
+  store8(lobe.first_share, first_share);
+  return factor * first_share;
 }
 
 /// Its sheen. @return  what that leaves of the weight for what lies below

@@ -119,7 +119,8 @@ TEST(MovedMesh, IsClosedWhereTrianglesAreDividedDifferently)
   // More where x and y are positive; triangles of 300 cells are cut into parts.
   const std::pair<double, std::int32_t> kCells[] = {{1, 0}, {5, 0}, {40, 0}, {300, 0}, {300, 16}, {700, 512}};
   for (const auto& [most, most_cells] : kCells) {
-    const auto cells = [&](Vec3f a, Vec3f b) {
+    // Clang 14 lets no name of a binding into a function.
+    const auto cells = [most = most](Vec3f a, Vec3f b) {
       const double x = 0.5 * static_cast<double>(a.x + b.x), y = 0.5 * static_cast<double>(a.y + b.y);
       return most * std::clamp(0.5 + x * 0.5 + y * 0.25, 0.05, 1.0) * static_cast<double>(length(b - a)) / 2.5;
     };

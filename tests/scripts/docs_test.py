@@ -266,7 +266,7 @@ class Docs(unittest.TestCase):
         if sub[0] == "render" and "-o" not in line:
             line += ["-o", "out.exr"]
         for option, value in SMALL.get(sub[0], {}).items():
-            of_others = option == "--scenes" and "--mesh" in line
+            of_others = option == "--scenes" and ("--mesh" in line or "vector" in line)
             if option not in line and option in options_of(*sub) and not of_others:
                 line += [option] if value is None else [option, value]
         return [*sub, *line]

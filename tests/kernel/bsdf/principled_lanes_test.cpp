@@ -6,6 +6,7 @@ namespace {
 
 void expect_same(const MixtureLobe& a, const MixtureLobe& b)
 {
+  EXPECT_EQ(a.first_share, b.first_share);
   EXPECT_EQ(a.kind, b.kind);
   EXPECT_EQ(a.maths, b.maths);
   EXPECT_EQ(a.is_delta, b.is_delta);
