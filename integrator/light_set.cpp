@@ -87,8 +87,9 @@ LightSet light_set_make(const Scene& scene,
   return set;
 }
 
-bool LightSet::can_choose() const
+bool LightSet::chooses_among_few() const
 {
+  if (tree_blocks.size() > static_cast<std::size_t>(kLightTreeMaxBlocks) || !copies.empty()) return false;
   const std::size_t finite = tree_blocks.empty() ? 0 : one_finite() ? 1 : 2;
   return finite + suns.size() + (environment_irradiance.mean > 0.0f ? 1 : 0) > 1;
 }

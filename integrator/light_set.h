@@ -44,8 +44,9 @@ struct LightSet {
 
   /// @return false: nothing can be sampled
   bool any() const { return !tree_blocks.empty() || !suns.empty() || environment_irradiance.mean > 0; }
-  /// @return false: there is one at most that can be sampled
-  bool can_choose() const;
+  /// Whether there is more than one thing to sample, and so few lights that the tree is one node. Among more, gloss that is heeded
+  /// (light_receiver.h) costs more than it has been seen to save.
+  bool chooses_among_few() const;
   /// Whether the tree has a single light.
   bool one_finite() const;
   /// Emissive triangles of all instances.

@@ -204,8 +204,13 @@ WavefrontColumns SceneContext::columns(bool photons, bool light_passes) const
                                       [](const Material& material) { return material.scatters_below; });
   const bool has_closures = std::any_of(scene.materials.begin(), scene.materials.end(),
                                         [](const Material& material) { return material.has_closures; });
-  return {photons,    motion.is_open(), displacements.has_facets(),         !media.empty(),
-          goes_below, light_passes,     has_closures && lights.can_choose()};
+  return {photons,
+          motion.is_open(),
+          displacements.has_facets(),
+          !media.empty(),
+          goes_below,
+          light_passes,
+          has_closures && lights.chooses_among_few()};
 }
 
 void SceneContext::make_views()

@@ -46,7 +46,7 @@ struct WavefrontColumns {
   bool media = false;         ///< something fills space
   bool subsurface = false;    ///< they may go below surfaces
   bool light_passes = false;  ///< layers tell their light apart by the first event
-  bool gloss = false;         ///< lights are chosen by what closures' gloss shows of them
+  bool gloss = false;         ///< lights, few, are chosen by what closures' gloss shows of them
 };
 
 class CameraMedium;

@@ -17,7 +17,8 @@ struct LightGloss {
 inline constexpr float kLeastGlossShare = 0.125f;
 /// What is left is chosen by irradiance, since lobes are not what they are taken for.
 inline constexpr float kMostGlossShare = 0.75f;
-inline constexpr float kLeastGlossAlpha2 = 1e-4f;
+/// What a narrower lobe shows of lamps is found by following it.
+inline constexpr float kLeastGlossAlpha2 = 0.01f;
 
 struct LightReceiver {
   Vec3f N;  ///< unit shading normal when only light from its side matters; zero vector: light from all sides does

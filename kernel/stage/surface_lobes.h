@@ -86,9 +86,10 @@ RELIEF_KERNEL void lobes_defend(HitLane& one, float passing)
 /// @param probability, sum  of it and of all lobes
 RELIEF_KERNEL LightGloss lobe_gloss(const Frame& frame, Vec3f wo, float roughness, float probability, float sum)
 {
-  if (!(probability >= kLeastGlossShare * sum)) return {};
+  const float alpha2 = sqr(sqr(roughness));
+  if (!(probability >= kLeastGlossShare * sum) || alpha2 < kLeastGlossAlpha2) return {};
   const Vec3f R = from_local(frame, {-wo.x, -wo.y, wo.z});
-  return {R, min(probability / sum, kMostGlossShare), clamp(sqr(sqr(roughness)), kLeastGlossAlpha2, 1.0f)};
+  return {R, min(probability / sum, kMostGlossShare), min(alpha2, 1.0f)};
 }
 
 /// The strongest of lobes that reflect and have a width.
