@@ -29,32 +29,35 @@ RELIEF_KERNEL Cubic ray_distance_make(const RayCurve& curve, const CurveSegment&
   return T;
 }
 
-/// Where the ray is at t, on a stretch of its curve on which t grows with τ.
-/// @param tau0, tau1  the stretch; t0, t1: t at its ends, t0 <= t <= t1
+/// A stretch of a ray's curve on which t grows with τ.
+struct GrowingStretch {
+  double tau0, tau1;
+  double t0, t1;  ///< t at its ends
+};
+
+/// Where the ray is at t.
+/// @param t           within the stretch's
 /// @param iterations  incremented
 /// @return  within `tolerance` of the stretch's length of the answer, or NaN if Newton's method has not converged
 /// @source  Thonat et al. 2023, §4.1 and supplement B; the start is the chord's answer, of which their centre of the current
 ///          bound is the coarser version; the tolerance is relative to the stretch, theirs is 1e-5 in uv
 RELIEF_KERNEL double ray_invert(const Cubic& T,
                                 const Quadratic& W,
-                                double tau0,
-                                double tau1,
-                                double t0,
-                                double t1,
+                                const GrowingStretch& on,
                                 double t,
                                 double tolerance,
                                 std::uint64_t* iterations)
 {
   constexpr int kMaxIterations = 10;
-  const double length = tau1 - tau0;
-  double tau = tau0 + length * ((t - t0) / (t1 - t0));
+  const double length = on.tau1 - on.tau0;
+  double tau = on.tau0 + length * ((t - on.t0) / (on.t1 - on.t0));
   for (int k = 0; k < kMaxIterations; ++k) {
     ++*iterations;
     const double value = cubic_at(T, tau) - t * quadratic_at(W, tau);
     const double slope = (3.0 * T.a * tau + 2.0 * T.b) * tau + T.c - t * (2.0 * W.a * tau + W.b);
     const double step = value / slope;
     tau -= step;
-    if (!(tau >= tau0 && tau <= tau1)) break;
+    if (!(tau >= on.tau0 && tau <= on.tau1)) break;
     if (__builtin_fabs(step) <= tolerance * length) return tau;
   }
   return __builtin_nan("");

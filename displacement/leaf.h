@@ -54,6 +54,19 @@ RELIEF_KERNEL bool traversal_poll(TraversalCounters& counters, std::uint64_t& ne
   return traversal_stop(counters);
 }
 
+/// A search for where a ray meets one displaced triangle, under way. Methods add what is theirs.
+struct PrismSearch {
+  const DisplacedMeshView& mesh;
+  const DisplacedTriangle& tri;
+  const RayCurve& curve;
+  TraversalCounters& counters;
+  DisplacedHit& hit;       ///< the nearest so far
+  double t_min, t_max;     ///< t_max shrinks with every hit
+  bool unfolded, any_hit;  ///< unfolded: t grows along the curve
+  bool found = false;
+  std::uint64_t next_poll;
+};
+
 /// A point of the curve. Without initial values: the leaf has room for many, and uses few.
 struct CurvePoint {
   double tau;
@@ -300,21 +313,61 @@ RELIEF_KERNEL double leaf_displacement(const DisplacedMeshView& mesh, LatticeCel
   return displacement_at(mesh, x, y);
 }
 
-/// g at four points of the curve side by side; a and b become the first and the last.
-RELIEF_KERNEL CurveSamples curve_samples(const DisplacedTriangle& tri,
-                                         const CurveSegment& g,
-                                         const CellHeights& cell,
-                                         double corner_x,
-                                         double corner_y,
-                                         const DisplacedMeshView& mesh,
-                                         double tau0,
-                                         double tau1,
-                                         CurvePoint* a,
-                                         CurvePoint* b)
+/// A patch under a segment of the curve.
+struct PatchBelow {
+  const DisplacedMeshView& mesh;
+  const DisplacedTriangle& tri;
+  const CurveSegment& g;
+  LeafPatch patch;
+  double corner_x, corner_y;  ///< of its cell, lattice coordinates
+};
+
+/// g at a point of the curve, metres.
+RELIEF_KERNEL double height_over(const PatchBelow& below, const CurvePoint& p)
 {
+  const CellHeights& cell = below.patch.heights;
+  const double fx = p.x - below.corner_x, fy = p.y - below.corner_y;
+  const double h = fused(fused(cell.hxy, fx, cell.hy), fy, fused(cell.hx, fx, cell.h00));
+  return fused(p.s, p.nu, -below.mesh.scale * (h - below.mesh.midlevel));
+}
+
+/// Bound on how far g can be from the straight line between its values at two points, see curve_deviation; metres.
+RELIEF_KERNEL double height_over_deviation(const PatchBelow& below, const CurvePoint& a, const CurvePoint& b)
+{
+  const CellHeights& cell = below.patch.heights;
+  const CurveDeviation d = curve_deviation(below.tri, below.g, a, b);
+  const double fx = max(__builtin_fabs(a.x - below.corner_x), __builtin_fabs(b.x - below.corner_x));
+  const double fy = max(__builtin_fabs(a.y - below.corner_y), __builtin_fabs(b.y - below.corner_y));
+  const double twist = __builtin_fabs(cell.hxy);
+  return d.height +
+         __builtin_fabs(below.mesh.scale) *
+             (0.25 * twist * __builtin_fabs((b.x - a.x) * (b.y - a.y)) + (__builtin_fabs(cell.hx) + twist * fy) * d.x +
+              (__builtin_fabs(cell.hy) + twist * fx) * d.y + twist * d.x * d.y);
+}
+
+/// The terms of g at a point of the curve, and the weights through the slopes, added: what its rounding is in proportion to. That the
+/// curve itself may be off does not count: it reaches over the walls by more than that.
+RELIEF_KERNEL double height_over_magnitude(const PatchBelow& below)
+{
+  const CellHeights& cell = below.patch.heights;
+  const DisplacedTriangle& tri = below.tri;
+  const double scale = __builtin_fabs(below.mesh.scale);
+  const double slope = scale * ((__builtin_fabs(cell.hx) + __builtin_fabs(cell.hxy)) *
+                                    (__builtin_fabs(tri.x[1] - tri.x[0]) + __builtin_fabs(tri.x[2] - tri.x[0])) +
+                                (__builtin_fabs(cell.hy) + __builtin_fabs(cell.hxy)) *
+                                    (__builtin_fabs(tri.y[1] - tri.y[0]) + __builtin_fabs(tri.y[2] - tri.y[0])));
+  return scale * below.patch.magnitude + slope;
+}
+
+/// g at four points of a part of the curve side by side; a and b become the first and the last.
+RELIEF_KERNEL CurveSamples curve_samples(const PatchBelow& below, const CurveRange& range, CurvePoint* a, CurvePoint* b)
+{
+  const DisplacedTriangle& tri = below.tri;
+  const CurveSegment& g = below.g;
+  const CellHeights& cell = below.patch.heights;
   const auto splat = [](double x) { return D4{x, x, x, x}; };
-  const double width = tau1 - tau0;
-  const D4 tau{tau0, fused(width, 1.0 / 3.0, tau0), fused(width, 2.0 / 3.0, tau0), tau1};
+  const double tau0 = range.tau0, width = range.tau1 - tau0;
+  const D4 tau{tau0, fused(width, 1.0 / 3.0, tau0), fused(width, 2.0 / 3.0, tau0), range.tau1};
   const auto at = [&](const Quadratic& p) { return fused(fused(splat(p.a), tau, splat(p.b)), tau, splat(p.c)); };
   const D4 e0 = at(g.e[0]), e1 = at(g.e[1]), e2 = at(g.e[2]);
   const D4 W = e0 + e1 + e2, inverse = 1.0 / W;
@@ -328,78 +381,49 @@ RELIEF_KERNEL CurveSamples curve_samples(const DisplacedTriangle& tri,
   const D4 Nx = of(N[0].x, N[1].x, N[2].x), Ny = of(N[0].y, N[1].y, N[2].y), Nz = of(N[0].z, N[1].z, N[2].z);
   const D4 s = fused(tau, splat(g.ds), splat(g.s0));
   const D4 nu = sqrt(fused(Nz, Nz, fused(Ny, Ny, Nx * Nx)));
-  const D4 fx = x - corner_x, fy = y - corner_y;
+  const D4 fx = x - below.corner_x, fy = y - below.corner_y;
   const D4 h = fused(fused(splat(cell.hxy), fx, splat(cell.hy)), fy, fused(splat(cell.hx), fx, splat(cell.h00)));
   const auto point = [&](int k) {
     return CurvePoint{tau[k], b1[k], b2[k], W[k], x[k], y[k], Nx[k], Ny[k], Nz[k], s[k], nu[k]};
   };
   *a = point(0);
   *b = point(3);
-  return {tau0, width, fused(s, nu, -mesh.scale * (h - mesh.midlevel))};
+  return {tau0, width, fused(s, nu, -below.mesh.scale * (h - below.mesh.midlevel))};
 }
 
-/// First root of g in a cell. Not inlined: its stack is as large as that of a descent.
-/// @param place       the cell, or what of it has one patch: LatticeCell, or BlendedCell (level_blend.h)
-/// @param tau0, tau1  contains every τ at which the curve is in the cell; 0 <= tau0 <= tau1 <= 1
-/// @param monotone    t grows with τ; if not, all roots are looked at
-/// @param hit         t, b, cell of the nearest root whose t is within (t_min, t_max)
-/// @return            false if there is none
+/// First root of g in a cell; keeps the nearest hit. Not inlined: its stack is as large as that of a descent.
+/// @param place  the cell, or what of it has one patch: LatticeCell, or BlendedCell (level_blend.h)
+/// @param range  contains every τ at which the curve is in the cell; within [0, 1]
+/// @return       whether there is a root whose t is within (t_min, t_max); in folded prisms all are looked at
 template <class Cell>
-[[gnu::noinline]] RELIEF_KERNEL bool leaf_intersect(const DisplacedMeshView& mesh,
-                                                    const DisplacedTriangle& tri,
-                                                    const RayCurve& curve,
+[[gnu::noinline]] RELIEF_KERNEL bool leaf_intersect(PrismSearch& c,
                                                     const CurveSegment& g,
                                                     const Cell place,
-                                                    double tau0,
-                                                    double tau1,
-                                                    double t_min,
-                                                    double t_max,
-                                                    bool monotone,
-                                                    DisplacedHit* hit)
+                                                    const CurveRange range)
 {
   bool found = false;
-  const LeafPatch patch = leaf_patch(mesh, place);
-  const CellHeights& cell = patch.heights;
-  const double corner_x = static_cast<double>(place.i), corner_y = static_cast<double>(place.j);
-
-  const auto height_over = [&](const CurvePoint& p) {
-    const double fx = p.x - corner_x, fy = p.y - corner_y;
-    const double h = fused(fused(cell.hxy, fx, cell.hy), fy, fused(cell.hx, fx, cell.h00));
-    return fused(p.s, p.nu, -mesh.scale * (h - mesh.midlevel));
-  };
-  const auto deviation = [&](const CurvePoint& a, const CurvePoint& b) {
-    const CurveDeviation d = curve_deviation(tri, g, a, b);
-    const double fx = max(__builtin_fabs(a.x - corner_x), __builtin_fabs(b.x - corner_x));
-    const double fy = max(__builtin_fabs(a.y - corner_y), __builtin_fabs(b.y - corner_y));
-    const double twist = __builtin_fabs(cell.hxy);
-    return d.height + __builtin_fabs(mesh.scale) * (0.25 * twist * __builtin_fabs((b.x - a.x) * (b.y - a.y)) +
-                                                    (__builtin_fabs(cell.hx) + twist * fy) * d.x +
-                                                    (__builtin_fabs(cell.hy) + twist * fx) * d.y + twist * d.x * d.y);
-  };
-  // What rounding can do to g at a point of the curve: its terms, and the weights through the slopes. That the curve
-  // itself may be off does not count: it reaches over the walls by more than that.
-  const double slope =
-      __builtin_fabs(mesh.scale) * ((__builtin_fabs(cell.hx) + __builtin_fabs(cell.hxy)) *
-                                        (__builtin_fabs(tri.x[1] - tri.x[0]) + __builtin_fabs(tri.x[2] - tri.x[0])) +
-                                    (__builtin_fabs(cell.hy) + __builtin_fabs(cell.hxy)) *
-                                        (__builtin_fabs(tri.y[1] - tri.y[0]) + __builtin_fabs(tri.y[2] - tri.y[0])));
-  const double magnitude = __builtin_fabs(mesh.scale) * patch.magnitude;
-  const double rounding = 0x1p-49 * (magnitude + slope);
+  const PatchBelow below{
+      c.mesh, c.tri, g, leaf_patch(c.mesh, place), static_cast<double>(place.i), static_cast<double>(place.j)};
+  const LeafPatch& patch = below.patch;
+  // What rounding can do to g at a point of the curve.
+  const double magnitude = height_over_magnitude(below), rounding = 0x1p-49 * magnitude;
 
   // Takes a root; true when no other can be nearer.
   const auto accept = [&](const CurvePoint& p) {
     const double beside = max(max(patch.x_low - p.x, p.x - patch.x_high), max(patch.y_low - p.y, p.y - patch.y_high));
     if (!(beside <= kCellTolerance)) return false;
     // There the surface is the neighbour's, which has a root of its own unless rounding took it.
-    if (beside > 0.0 && !(__builtin_fabs(p.s * p.nu - leaf_displacement(mesh, place, p.x, p.y)) <= rounding))
+    if (beside > 0.0 && !(__builtin_fabs(p.s * p.nu - leaf_displacement(c.mesh, place, p.x, p.y)) <= rounding))
       return false;
-    DisplacedHit candidate{curve_t(curve, g, p.tau), p.b1, p.b2, place.i, place.j, p.tau};
-    if (g.relative_error > kExactWeights) weights_correct(mesh, tri, curve.frame, cell, g.relative_error, &candidate);
-    if (!(candidate.t > t_min && candidate.t < t_max)) return false;
-    *hit = candidate;
-    t_max = hit->t;
+    DisplacedHit candidate{curve_t(c.curve, g, p.tau), p.b1, p.b2, place.i, place.j, p.tau};
+    if (g.relative_error > kExactWeights) {
+      weights_correct(c.mesh, c.tri, c.curve.frame, patch.heights, g.relative_error, &candidate);
+    }
+    if (!(candidate.t > c.t_min && candidate.t < c.t_max)) return false;
+    c.hit = candidate;
+    c.t_max = candidate.t;
     found = true;
-    return monotone;
+    return c.unfolded;
   };
 
   struct Interval {
@@ -411,30 +435,30 @@ template <class Cell>
   constexpr int kMaxDepth = 64;
   Interval stack[kMaxDepth];
   int depth = 0;
-  const CurveSamples samples =
-      curve_samples(tri, g, cell, corner_x, corner_y, mesh, tau0, tau1, &stack[0].a, &stack[0].b);
+  const CurveSamples samples = curve_samples(below, range, &stack[0].a, &stack[0].b);
   stack[0].ga = samples.g[0];
   stack[0].gb = samples.g[3];
   // A root at a wall may be lost between two triangles that round it differently: both take it.
-  if (tau0 <= 0.0 && __builtin_fabs(stack[0].ga) <= rounding && accept(stack[0].a)) return true;
+  if (range.tau0 <= 0.0 && __builtin_fabs(stack[0].ga) <= rounding && accept(stack[0].a)) return true;
   const CurvePoint last = stack[0].b;
   const double g_last = stack[0].gb;
   depth = 1;
   while (depth > 0) {
     const Interval n = stack[--depth];
-    const bool is_whole = n.a.tau == tau0 && n.b.tau == tau1;
+    const bool is_whole = n.a.tau == range.tau0 && n.b.tau == range.tau1;
     const bool crosses = (n.ga < 0.0) != (n.gb < 0.0);
-    const double bound = deviation(n.a, n.b);
+    const double bound = height_over_deviation(below, n.a, n.b);
     const double width = n.b.tau - n.a.tau;
     if (!crosses && min(__builtin_fabs(n.ga), __builtin_fabs(n.gb)) > bound) continue;
     const bool small = !(bound > rounding) || width <= 0x1p-50;
     // Once the bend is a small part of the difference of the ends, g is monotone and has one root.
     if (crosses && (small || 16.0 * bound < __builtin_fabs(n.gb - n.ga))) {
-      const double noise = 0x1p-51 * (magnitude + slope);
+      const double noise = 0x1p-51 * magnitude;
       const RootBracket bracket{n.a.tau, n.b.tau, n.ga, n.gb};
       double slope_at_guess = (n.gb - n.ga) / width;
       const double guess = is_whole ? cubic_root(samples, &slope_at_guess) : n.a.tau;
-      if (accept(root_between(tri, g, bracket, guess, slope_at_guess, noise, height_over))) return true;
+      const auto g_at = [&](const CurvePoint& p) { return height_over(below, p); };
+      if (accept(root_between(c.tri, g, bracket, guess, slope_at_guess, noise, g_at))) return true;
       continue;
     }
     if (small || depth + 2 > kMaxDepth) {
@@ -443,8 +467,8 @@ template <class Cell>
       continue;
     }
     Interval front = n, back = n;
-    const CurvePoint middle = curve_point(tri, g, 0.5 * (n.a.tau + n.b.tau));
-    const double gm = height_over(middle);
+    const CurvePoint middle = curve_point(c.tri, g, 0.5 * (n.a.tau + n.b.tau));
+    const double gm = height_over(below, middle);
     front.b = middle;
     front.gb = gm;
     back.a = middle;
@@ -452,7 +476,7 @@ template <class Cell>
     stack[depth++] = back;
     stack[depth++] = front;
   }
-  if (tau1 >= 1.0 && __builtin_fabs(g_last) <= rounding) accept(last);
+  if (range.tau1 >= 1.0 && __builtin_fabs(g_last) <= rounding) accept(last);
   return found;
 }
 

@@ -1,5 +1,4 @@
-// What methods are asked, and the state of a search that they share: a ray's curve in the prism of one displaced triangle,
-// and the nearest hit so far.
+// What methods are asked: a ray's curve in the prism of one displaced triangle; and the test of one cell that they end in.
 #pragma once
 
 #include "displacement/leaf.h"
@@ -16,19 +15,6 @@ struct PrismQuery {
   bool any_hit;           ///< whichever is found first will do
   const RmipOptions& rmip_options;
   TraversalCounters& counters;
-};
-
-/// A query under way. Methods add what is theirs.
-struct PrismSearch {
-  const DisplacedMeshView& mesh;
-  const DisplacedTriangle& tri;
-  const RayCurve& curve;
-  TraversalCounters& counters;
-  DisplacedHit& hit;
-  double t_min, t_max;     ///< t_max shrinks with every hit
-  bool unfolded, any_hit;  ///< unfolded: t grows along the curve
-  bool found = false;
-  std::uint64_t next_poll;
 };
 
 RELIEF_KERNEL PrismSearch prism_search_make(const PrismQuery& q, DisplacedHit* hit)
@@ -55,12 +41,9 @@ template <class Cell>
 RELIEF_KERNEL bool cell_intersect(PrismSearch& c, const CurveSegment& g, const Cell& place, double tau0, double tau1)
 {
   ++c.counters.texels;
-  tau0 = max(tau0, 0.0);
-  tau1 = min(tau1, 1.0);
-  if (!leaf_intersect(c.mesh, c.tri, c.curve, g, place, tau0, tau1, c.t_min, c.t_max, c.unfolded, &c.hit)) return false;
-  c.found = true;
-  c.t_max = c.hit.t;
-  return true;
+  const bool found = leaf_intersect(c, g, place, {max(tau0, 0.0), min(tau1, 1.0)});
+  c.found |= found;
+  return found;
 }
 
 /// The same where the mesh has the heights of its field.

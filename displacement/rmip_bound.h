@@ -93,7 +93,7 @@ RELIEF_KERNEL void reduce(const Segment& segment, ScalarRange t, RayBound& bound
   const ProjectedStretch whole = bound.stretch;
   const double t0 = bound.t0, t1 = bound.t1, margin = kTolerance * (whole.tau1 - whole.tau0);
   const auto inverted = [&](double at) {
-    return ray_invert(segment.T, segment.g.W, whole.tau0, whole.tau1, t0, t1, at, kTolerance, &counters.inversions);
+    return ray_invert(segment.T, segment.g.W, {whole.tau0, whole.tau1, t0, t1}, at, kTolerance, &counters.inversions);
   };
   // Validated by evaluation: what is cut off lies outside. NaN fails.
   if (t.low > t0 + least_gain) {
@@ -173,7 +173,7 @@ RELIEF_KERNEL bool bound_split(MetricSearch& c,
   const ProjectedStretch& stretch = bound.stretch;
   if (split == RmipSplit::kRay && c.unfolded) {
     constexpr double kTolerance = 1.0 / 64;
-    const double tau = ray_invert(segment.T, segment.g.W, stretch.tau0, stretch.tau1, bound.t0, bound.t1,
+    const double tau = ray_invert(segment.T, segment.g.W, {stretch.tau0, stretch.tau1, bound.t0, bound.t1},
                                   0.5 * (bound.t0 + bound.t1), kTolerance, &c.counters.inversions);
     if (stretch_split_at(segment.projection, stretch, tau, front, back)) return true;
   }

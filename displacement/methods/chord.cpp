@@ -178,152 +178,237 @@ RELIEF_KERNEL ChordSlabs chord_slabs_make(const Chord& chord)
   return s;
 }
 
-/// Descends from one node.
-/// @param period_x, period_y  lattice coordinates of pyramid column and row 0 of this period
-/// @return true when the search is over
-RELIEF_KERNEL bool node_intersect(ChordSearch& c,
-                                  const Chord& chord,
-                                  const ChordSlabs& slabs,
-                                  const Node& root,
-                                  std::int64_t period_x,
-                                  std::int64_t period_y)
+/// A chord's descent through the nodes of one period of the lattice.
+struct ChordDescent {
+  const HeightFieldView& field;
+  const Chord& chord;
+  const ChordSlabs& slabs;
+  std::int64_t period_x, period_y;  ///< lattice coordinates of pyramid column and row 0
+  std::int64_t offset_x, offset_y;  ///< the same from the chord's origin
+  float cell_slack;                 ///< rounding of heights up to 65535, and of float maps to stored units
+  float twist_pad;
+  float u_limit;  ///< of the chord, beyond which nothing matters
+};
+
+/// Of a chord, beyond which nothing matters any more.
+RELIEF_KERNEL float chord_limit(const ChordSearch& c, const Chord& chord)
 {
-  const HeightFieldView& f = *c.mesh.field;
+  const double left = (c.tau_end - chord.tau0) / chord.dtau;
+  return left < 1.0 ? static_cast<float>(left) + 2.0f * kParameterSlack : 1.0f + 2.0f * kParameterSlack;
+}
+
+RELIEF_KERNEL ChordDescent chord_descent_make(const ChordSearch& c,
+                                              const Chord& chord,
+                                              const ChordSlabs& slabs,
+                                              std::int64_t period_x,
+                                              std::int64_t period_y)
+{
+  return {*c.mesh.field,
+          chord,
+          slabs,
+          period_x,
+          period_y,
+          period_x - chord.origin_x,
+          period_y - chord.origin_y,
+          chord.pad_q + 65536.0f * 4.0f * kFloatSlack,
+          (1.0f + chord.pad_x) * chord.pad_y + (1.0f + chord.pad_y) * chord.pad_x + chord.pad_x * chord.pad_y,
+          chord_limit(c, chord)};
+}
+
+/// What the children of a node are: nodes, of which only their bounds are known, or cells. Either is left open.
+struct NodeChildren {
+  int level;  ///< 0: cells
+  int size;   ///< of one, cells a side
+  F8 low[2], high[2];
+  F8 heights[5];  ///< of texels, a row each
+};
+
+RELIEF_KERNEL void node_children_load(const ChordDescent& d, const Node& n, NodeChildren& out)
+{
+  const HeightFieldView& f = d.field;
+  out.level = n.level - 1;
+  out.size = 1 << (2 * out.level);
+  if (out.level == 0) {
+    const std::int64_t i = d.period_x + n.column, j = d.period_y + n.row;
+    const int column = lattice_texel(f.x, i);
+    const bool inside = f.x.wrap != Wrap::kMirror && (f.x.wrap == Wrap::kRepeat || i >= 0) && column + 8 <= f.map.width;
+    for (int r = 0; r < 5; ++r) out.heights[r] = row_heights(f, i, j + r, column, inside);
+    return;
+  }
+  const PyramidLine& line = children_line(f, n.column, n.row, n.level);
+  for (int half = 0; half < 2; ++half) {
+    out.low[half] = load8(line.low + 8 * half);
+    out.high[half] = load8(line.high + 8 * half);
+  }
+}
+
+/// Where a chord is between the lines of a node's children, lanes as in ChordSlabs.
+struct ChildSlabs {
+  F8 corner;        ///< of the node, from the chord's start
+  F8 enter, leave;  ///< along each axis, from there
+  unsigned exists;  ///< children that do, a bit each
+};
+
+RELIEF_KERNEL ChildSlabs child_slabs_make(const ChordDescent& d, const Node& n, int size)
+{
+  const HeightFieldView& f = d.field;
+  const ChordSlabs& slabs = d.slabs;
+  const bool clamp_x = f.x.wrap == Wrap::kClamp, clamp_y = f.y.wrap == Wrap::kClamp;
+  const float width = static_cast<float>(size);
+  ChildSlabs s;
+  s.corner = by_axis(static_cast<float>(d.offset_x + n.column), static_cast<float>(d.offset_y + n.row)) - slabs.start;
+  s.enter = fused(slabs.enter_lane, splat8(width), s.corner + slabs.enter_pad);
+  s.leave = fused(slabs.leave_lane, splat8(width), s.corner + slabs.leave_pad);
+  s.exists = 0xffff;
+  if (n.column + 4 * size >= f.x.num_cells || n.row + 4 * size >= f.y.num_cells ||
+      ((clamp_x || clamp_y) && (n.column == 0 || n.row == 0))) [[unlikely]] {
+    // Columns are small integers; far beside a clamped map floats do not tell `corner` of one from that of the next (hard
+    // cases "clamp at uv …").
+    const F8 lane{0, 1, 2, 3, 0, 1, 2, 3};
+    const F8 index = lane * width + by_axis(static_cast<float>(n.column), static_cast<float>(n.row));
+    const F8 count = by_axis(static_cast<float>(f.x.num_cells), static_cast<float>(f.y.num_cells));
+    // Children that begin beyond the period belong to the next one.
+    const unsigned begun = mask_of(index < count);
+    s.exists = 0;
+    for (int row = 0; row < 4; ++row)
+      if ((begun >> (4 + row) & 1) != 0) s.exists |= (begun & 0xf) << (4 * row);
+    const I8 clamped = by_axis(clamp_x ? 1.0f : 0.0f, clamp_y ? 1.0f : 0.0f) > 0.0f;
+    const I8 first = clamped & (index <= 0.0f), last = clamped & (index + width >= count);
+    s.enter = (slabs.forward & first) ? splat8(-kFarAway) : ((~slabs.forward & last) ? splat8(kFarAway) : s.enter);
+    s.leave = (slabs.forward & last) ? splat8(kFarAway) : ((~slabs.forward & first) ? splat8(-kFarAway) : s.leave);
+  }
+  return s;
+}
+
+/// Half of a node's cells where the chord is over each of them from u_in to u_out: whether it may be near the patch.
+///
+/// Height of the chord over the bilinear patch at both ends; in between it bends by the twist, and the curve itself is
+/// somewhere within the pads.
+/// @param half        0: the lower two rows of cells
+/// @param q_in, q_out  heights of the chord
+RELIEF_KERNEL I8 cells_are_near(const ChordDescent& d,
+                                const F8* heights,
+                                const F8& corner,
+                                int half,
+                                F8 u_in,
+                                F8 u_out,
+                                F8 q_in,
+                                F8 q_out)
+{
+  const Chord& chord = d.chord;
+  const int r = 2 * half;
+  const F8 h00 = join_low_halves(heights[r], heights[r + 1]);
+  const F8 h01 = join_low_halves(heights[r + 1], heights[r + 2]);
+  const F8 hx = join_low_halves(shift_down(heights[r]), shift_down(heights[r + 1])) - h00;
+  const F8 hy = h01 - h00;
+  const F8 hxy = join_low_halves(shift_down(heights[r + 1]), shift_down(heights[r + 2])) - h01 - hx;
+  const F8 x_low = F8{0, 1, 2, 3, 0, 1, 2, 3} + splat8(corner[0]);
+  const F8 y_low = (half == 0 ? F8{0, 0, 0, 0, 1, 1, 1, 1} : F8{2, 2, 2, 2, 3, 3, 3, 3}) + splat8(corner[4]);
+  const F8 dx = splat8(chord.dx), dy = splat8(chord.dy);
+  const F8 x_in = fused(u_in, dx, -x_low), x_out = fused(u_out, dx, -x_low);
+  const F8 y_in = fused(u_in, dy, -y_low), y_out = fused(u_out, dy, -y_low);
+  const F8 g_in = q_in - fused(fused(hxy, x_in, hy), y_in, fused(hx, x_in, h00));
+  const F8 g_out = q_out - fused(fused(hxy, x_out, hy), y_out, fused(hx, x_out, h00));
+  const F8 bend = fused(splat8(0.25f), abs((x_out - x_in) * (y_out - y_in)), splat8(d.twist_pad));
+  const F8 slack = fused(
+      abs(hxy), bend, fused(abs(hy), splat8(chord.pad_y), fused(abs(hx), splat8(chord.pad_x), splat8(d.cell_slack))));
+  return (min(g_in, g_out) <= slack) & (max(g_in, g_out) >= -slack);
+}
+
+/// The children that a chord may meet.
+struct ChildrenMet {
+  unsigned hits;  ///< a bit each
+  alignas(32) float entry[16];
+  alignas(32) float exit[16];
+};
+
+RELIEF_KERNEL void children_meet(const ChordDescent& d, const Node& n, const NodeChildren& children, ChildrenMet& out)
+{
+  const Chord& chord = d.chord;
+  const ChildSlabs s = child_slabs_make(d, n, children.size);
+  const F8 from = max(s.enter * d.slabs.inverse, splat8(n.u0)),
+           to = min(s.leave * d.slabs.inverse, splat8(min(n.u1, d.u_limit)));
+  const F8 column_from = __builtin_shufflevector(from, from, 0, 1, 2, 3, 0, 1, 2, 3);
+  const F8 column_to = __builtin_shufflevector(to, to, 0, 1, 2, 3, 0, 1, 2, 3);
+  unsigned hits = 0;
+  for (int half = 0; half < 2; ++half) {
+    const F8 row_from = half == 0 ? __builtin_shufflevector(from, from, 4, 4, 4, 4, 5, 5, 5, 5)
+                                  : __builtin_shufflevector(from, from, 6, 6, 6, 6, 7, 7, 7, 7);
+    const F8 row_to = half == 0 ? __builtin_shufflevector(to, to, 4, 4, 4, 4, 5, 5, 5, 5)
+                                : __builtin_shufflevector(to, to, 6, 6, 6, 6, 7, 7, 7, 7);
+    const F8 u_in = max(column_from, row_from), u_out = min(column_to, row_to);
+    const F8 q_in = fused(u_in, splat8(chord.dq), splat8(chord.q0)),
+             q_out = fused(u_out, splat8(chord.dq), splat8(chord.q0));
+    I8 overlaps = u_in <= u_out + kParameterSlack;
+    if (children.level > 0) {
+      overlaps &= (min(q_in, q_out) - chord.pad_q <= children.high[half]) &
+                  (max(q_in, q_out) + chord.pad_q >= children.low[half]);
+    } else {
+      overlaps &= cells_are_near(d, children.heights, s.corner, half, u_in, u_out, q_in, q_out);
+    }
+    hits |= mask_of(overlaps) << (8 * half);
+    store8(out.entry + 8 * half, u_in);
+    store8(out.exit + 8 * half, u_out);
+  }
+  out.hits = hits & s.exists;
+}
+
+/// Tests the cells of a node that a chord may meet, nearest first.
+/// @return true when the search is over
+RELIEF_KERNEL bool cells_intersect(ChordSearch& c, ChordDescent& d, const Node& n, const ChildrenMet& met)
+{
+  int order[16];
+  const int count = order_by_entry(met.hits, met.entry, order);
+  for (int k = 0; k < count; ++k) {
+    const int child = order[k];
+    if (met.entry[child] > d.u_limit) break;
+    if (cell_on_chord_intersect(c, d.chord, d.period_x + n.column + (child & 3), d.period_y + n.row + (child >> 2),
+                                met.entry[child], met.exit[child]))
+      return true;
+    if (c.found) d.u_limit = chord_limit(c, d.chord);
+  }
+  return false;
+}
+
+/// Descends from one node.
+/// @return true when the search is over
+RELIEF_KERNEL bool node_intersect(ChordSearch& c, ChordDescent d, const Node& root)
+{
   // A node leaves at most 15 siblings on the stack while one is descended into.
   constexpr int kStackSize = 15 * (kMaxPyramidLevels + 1);
   Node stack[kStackSize];
   int depth = 0;
   Node n = root;
-  // Of the chord, beyond which nothing matters.
-  const auto u_limit_of = [&] {
-    const double left = (c.tau_end - chord.tau0) / chord.dtau;
-    return left < 1.0 ? static_cast<float>(left) + 2.0f * kParameterSlack : 1.0f + 2.0f * kParameterSlack;
-  };
-  float u_limit = u_limit_of();
-  const std::int64_t offset_x = period_x - chord.origin_x, offset_y = period_y - chord.origin_y;
-  const bool clamp_x = f.x.wrap == Wrap::kClamp, clamp_y = f.y.wrap == Wrap::kClamp;
-  // Rounding of heights up to 65535, and of float maps to stored units.
-  const float cell_slack = chord.pad_q + 65536.0f * 4.0f * kFloatSlack;
-  const float twist_pad =
-      (1.0f + chord.pad_x) * chord.pad_y + (1.0f + chord.pad_y) * chord.pad_x + chord.pad_x * chord.pad_y;
   while (true) {
-    const int child_level = n.level - 1;
-    const int size = 1 << (2 * child_level);
-    F8 low[2], high[2];  // of nodes
-    F8 heights[5];       // of cells
-    if (child_level == 0) {
-      const std::int64_t i = period_x + n.column, j = period_y + n.row;
-      const int column = lattice_texel(f.x, i);
-      const bool inside =
-          f.x.wrap != Wrap::kMirror && (f.x.wrap == Wrap::kRepeat || i >= 0) && column + 8 <= f.map.width;
-      for (int r = 0; r < 5; ++r) heights[r] = row_heights(f, i, j + r, column, inside);
-    } else {
-      const PyramidLine& line = children_line(f, n.column, n.row, n.level);
-      for (int half = 0; half < 2; ++half) {
-        low[half] = load8(line.low + 8 * half);
-        high[half] = load8(line.high + 8 * half);
-      }
-    }
+    NodeChildren children;
+    node_children_load(d, n, children);
     c.counters.bounds += 1;
     if (traversal_poll(c.counters, c.next_poll)) return true;
-    const float width = static_cast<float>(size);
-    const F8 corner =
-        by_axis(static_cast<float>(offset_x + n.column), static_cast<float>(offset_y + n.row)) - slabs.start;
-    F8 enter = fused(slabs.enter_lane, splat8(width), corner + slabs.enter_pad);
-    F8 leave = fused(slabs.leave_lane, splat8(width), corner + slabs.leave_pad);
-    unsigned exists = 0xffff;
-    if (n.column + 4 * size >= f.x.num_cells || n.row + 4 * size >= f.y.num_cells ||
-        ((clamp_x || clamp_y) && (n.column == 0 || n.row == 0))) [[unlikely]] {
-      // Columns are small integers; far beside a clamped map floats do not tell `corner` of one from that of the next (hard
-      // cases "clamp at uv …").
-      const F8 lane{0, 1, 2, 3, 0, 1, 2, 3};
-      const F8 index = lane * width + by_axis(static_cast<float>(n.column), static_cast<float>(n.row));
-      const F8 count = by_axis(static_cast<float>(f.x.num_cells), static_cast<float>(f.y.num_cells));
-      // Children that begin beyond the period belong to the next one.
-      const unsigned begun = mask_of(index < count);
-      exists = 0;
-      for (int row = 0; row < 4; ++row)
-        if ((begun >> (4 + row) & 1) != 0) exists |= (begun & 0xf) << (4 * row);
-      const I8 clamped = by_axis(clamp_x ? 1.0f : 0.0f, clamp_y ? 1.0f : 0.0f) > 0.0f;
-      const I8 first = clamped & (index <= 0.0f), last = clamped & (index + width >= count);
-      enter = (slabs.forward & first) ? splat8(-kFarAway) : ((~slabs.forward & last) ? splat8(kFarAway) : enter);
-      leave = (slabs.forward & last) ? splat8(kFarAway) : ((~slabs.forward & first) ? splat8(-kFarAway) : leave);
-    }
-    const F8 from = max(enter * slabs.inverse, splat8(n.u0)),
-             to = min(leave * slabs.inverse, splat8(min(n.u1, u_limit)));
-    const F8 column_from = __builtin_shufflevector(from, from, 0, 1, 2, 3, 0, 1, 2, 3);
-    const F8 column_to = __builtin_shufflevector(to, to, 0, 1, 2, 3, 0, 1, 2, 3);
-    alignas(32) float entry[16], exit[16];
-    unsigned hits = 0;
-    for (int half = 0; half < 2; ++half) {
-      const F8 row_from = half == 0 ? __builtin_shufflevector(from, from, 4, 4, 4, 4, 5, 5, 5, 5)
-                                    : __builtin_shufflevector(from, from, 6, 6, 6, 6, 7, 7, 7, 7);
-      const F8 row_to = half == 0 ? __builtin_shufflevector(to, to, 4, 4, 4, 4, 5, 5, 5, 5)
-                                  : __builtin_shufflevector(to, to, 6, 6, 6, 6, 7, 7, 7, 7);
-      const F8 u_in = max(column_from, row_from), u_out = min(column_to, row_to);
-      const F8 q_in = fused(u_in, splat8(chord.dq), splat8(chord.q0)),
-               q_out = fused(u_out, splat8(chord.dq), splat8(chord.q0));
-      I8 overlaps = u_in <= u_out + kParameterSlack;
-      if (child_level > 0) {
-        overlaps &= (min(q_in, q_out) - chord.pad_q <= high[half]) & (max(q_in, q_out) + chord.pad_q >= low[half]);
-      } else {
-        // Height of the chord over the bilinear patch at both ends; in between it bends by the twist, and the curve
-        // itself is somewhere within the pads.
-        const int r = 2 * half;
-        const F8 h00 = join_low_halves(heights[r], heights[r + 1]);
-        const F8 h01 = join_low_halves(heights[r + 1], heights[r + 2]);
-        const F8 hx = join_low_halves(shift_down(heights[r]), shift_down(heights[r + 1])) - h00;
-        const F8 hy = h01 - h00;
-        const F8 hxy = join_low_halves(shift_down(heights[r + 1]), shift_down(heights[r + 2])) - h01 - hx;
-        const F8 x_low = F8{0, 1, 2, 3, 0, 1, 2, 3} + splat8(corner[0]);
-        const F8 y_low = (half == 0 ? F8{0, 0, 0, 0, 1, 1, 1, 1} : F8{2, 2, 2, 2, 3, 3, 3, 3}) + splat8(corner[4]);
-        const F8 dx = splat8(chord.dx), dy = splat8(chord.dy);
-        const F8 x_in = fused(u_in, dx, -x_low), x_out = fused(u_out, dx, -x_low);
-        const F8 y_in = fused(u_in, dy, -y_low), y_out = fused(u_out, dy, -y_low);
-        const F8 g_in = q_in - fused(fused(hxy, x_in, hy), y_in, fused(hx, x_in, h00));
-        const F8 g_out = q_out - fused(fused(hxy, x_out, hy), y_out, fused(hx, x_out, h00));
-        const F8 bend = fused(splat8(0.25f), abs((x_out - x_in) * (y_out - y_in)), splat8(twist_pad));
-        const F8 slack =
-            fused(abs(hxy), bend,
-                  fused(abs(hy), splat8(chord.pad_y), fused(abs(hx), splat8(chord.pad_x), splat8(cell_slack))));
-        overlaps &= (min(g_in, g_out) <= slack) & (max(g_in, g_out) >= -slack);
-      }
-      hits |= mask_of(overlaps) << (8 * half);
-      store8(entry + 8 * half, u_in);
-      store8(exit + 8 * half, u_out);
-    }
-    hits &= exists;
+    ChildrenMet met;
+    children_meet(d, n, children, met);
+    const int child_level = children.level, size = children.size;
     if (child_level == 0) {
-      int order[16];
-      const int count = order_by_entry(hits, entry, order);
-      for (int k = 0; k < count; ++k) {
-        const int child = order[k];
-        if (entry[child] > u_limit) break;
-        if (cell_on_chord_intersect(c, chord, period_x + n.column + (child & 3), period_y + n.row + (child >> 2),
-                                    entry[child], exit[child]))
-          return true;
-        if (c.found) u_limit = u_limit_of();
-      }
-    } else if (hits != 0) {
+      if (cells_intersect(c, d, n, met)) return true;
+    } else if (met.hits != 0) {
       const Node parent = n;
       const auto node_of = [&](int child) {
-        return Node{parent.column + (child & 3) * size, parent.row + (child >> 2) * size, child_level, entry[child],
-                    exit[child]};
+        return Node{parent.column + (child & 3) * size, parent.row + (child >> 2) * size, child_level, met.entry[child],
+                    met.exit[child]};
       };
-      if ((hits & (hits - 1)) == 0) {
-        n = node_of(__builtin_ctz(hits));
+      if ((met.hits & (met.hits - 1)) == 0) {
+        n = node_of(__builtin_ctz(met.hits));
         continue;
       }
       int order[16];
-      const int count = order_by_entry(hits, entry, order);
+      const int count = order_by_entry(met.hits, met.entry, order);
       for (int k = count; k-- > 1;) {
         const Node next = node_of(order[k]);
         stack[depth++] = next;
         // Maps do not stay in near caches: with 32 MiB of texels this takes 2 to 5 % less time, with 8 MiB 0 to 1.
         if (child_level > 1) {
-          __builtin_prefetch(&children_line(f, next.column, next.row, child_level));
+          __builtin_prefetch(&children_line(d.field, next.column, next.row, child_level));
         } else {
-          prefetch_cells(f, period_x + next.column, period_y + next.row);
+          prefetch_cells(d.field, d.period_x + next.column, d.period_y + next.row);
         }
       }
       n = node_of(order[0]);
@@ -332,7 +417,7 @@ RELIEF_KERNEL bool node_intersect(ChordSearch& c,
     do {
       if (depth == 0) return false;
       n = stack[--depth];
-    } while (n.u0 > u_limit);
+    } while (n.u0 > d.u_limit);
   }
 }
 
@@ -428,8 +513,8 @@ RELIEF_KERNEL bool chord_intersect(ChordSearch& c, const Chord& chord)
         if (traversal_poll(c.counters, c.next_poll)) return true;
         if (min(qa, qb) - chord.pad_q > line.high[child] || max(qa, qb) + chord.pad_q < line.low[child]) continue;
       }
-      if (node_intersect(c, chord, slabs, {column.column, row.column, level, v0, v1}, column.period, row.period))
-        return true;
+      const ChordDescent descent = chord_descent_make(c, chord, slabs, column.period, row.period);
+      if (node_intersect(c, descent, {column.column, row.column, level, v0, v1})) return true;
     }
   }
   return false;
@@ -476,6 +561,38 @@ struct ChordLanes {
   F8 pad_x, pad_y, pad_q;
 };
 
+/// A piece of the curve over which u goes from 0 to 1, as quotients by W; what is displaced from where.
+struct CurvePiece {
+  const Quadratic &W, &e1, &e2, &X, &Y;
+  Vec3f N0, Nu, Nv;  ///< the normal at vertex 0, and from there to those of vertices 1 and 2
+  float s0, ds;
+};
+
+/// Eight points of it.
+struct PointLanes {
+  F8 W, b1, b2, x, y, nu, height;
+  F8 N[3];
+};
+
+RELIEF_KERNEL F8 length_squared_lanes(const F8* v) { return fused(v[2], v[2], fused(v[1], v[1], v[0] * v[0])); }
+
+[[gnu::always_inline]] RELIEF_KERNEL PointLanes point_lanes(const CurvePiece& c, F8 u)
+{
+  PointLanes p;
+  p.W = quadratic_lanes(c.W, u);
+  const F8 inverse_W = 1.0f / p.W;
+  p.b1 = quadratic_lanes(c.e1, u) * inverse_W;
+  p.b2 = quadratic_lanes(c.e2, u) * inverse_W;
+  p.x = quadratic_lanes(c.X, u) * inverse_W;
+  p.y = quadratic_lanes(c.Y, u) * inverse_W;
+  p.N[0] = fused(p.b2, splat8(c.Nv.x), fused(p.b1, splat8(c.Nu.x), splat8(c.N0.x)));
+  p.N[1] = fused(p.b2, splat8(c.Nv.y), fused(p.b1, splat8(c.Nu.y), splat8(c.N0.y)));
+  p.N[2] = fused(p.b2, splat8(c.Nv.z), fused(p.b1, splat8(c.Nu.z), splat8(c.N0.z)));
+  p.nu = sqrt(length_squared_lanes(p.N));
+  p.height = (c.s0 + u * c.ds) * p.nu;
+  return p;
+}
+
 /// @param tau0, step   the piece of the segment
 /// @param W, e1, e2    over the piece, divided by W at its start
 /// @param inverse      1 / that
@@ -508,29 +625,10 @@ struct ChordLanes {
   out.u1[0] = out.u1[2] = out.u1[6] = out.u1[7] = 1.0f;
   const F8 u0 = out.u0, u1 = out.u1;
 
-  struct Points {
-    F8 W, b1, b2, x, y, nu, height;
-    F8 N[3];
-  };
+  const Vec3f Nu = tri.N[1] - tri.N[0], Nv = tri.N[2] - tri.N[0];
   const float s0 = static_cast<float>(g.s0 + tau0 * g.ds), ds = static_cast<float>(step * g.ds);
-  const Vec3f N0 = tri.N[0], Nu = tri.N[1] - tri.N[0], Nv = tri.N[2] - tri.N[0];
-  const auto squared = [](const F8* v) { return fused(v[2], v[2], fused(v[1], v[1], v[0] * v[0])); };
-  const auto points_at = [&](F8 u) {
-    Points p;
-    p.W = quadratic_lanes(W, u);
-    const F8 inverse_W = 1.0f / p.W;
-    p.b1 = quadratic_lanes(e1, u) * inverse_W;
-    p.b2 = quadratic_lanes(e2, u) * inverse_W;
-    p.x = quadratic_lanes(X, u) * inverse_W;
-    p.y = quadratic_lanes(Y, u) * inverse_W;
-    p.N[0] = fused(p.b2, splat8(Nv.x), fused(p.b1, splat8(Nu.x), splat8(N0.x)));
-    p.N[1] = fused(p.b2, splat8(Nv.y), fused(p.b1, splat8(Nu.y), splat8(N0.y)));
-    p.N[2] = fused(p.b2, splat8(Nv.z), fused(p.b1, splat8(Nu.z), splat8(N0.z)));
-    p.nu = sqrt(squared(p.N));
-    p.height = (s0 + u * ds) * p.nu;
-    return p;
-  };
-  const Points a = points_at(u0), b = points_at(u1);
+  const CurvePiece piece{W, e1, e2, X, Y, tri.N[0], Nu, Nv, s0, ds};
+  const PointLanes a = point_lanes(piece, u0), b = point_lanes(piece, u1);
 
   // As in curve_deviation.
   const F8 width = u1 - u0;
@@ -549,7 +647,7 @@ struct ChordLanes {
   const F8 deviation_x = deviation(X, a.x, b.x), deviation_y = deviation(Y, a.y, b.y);
   const F8 deviation_N = deviation(e1, a.b1, b.b1) * length(Nu) + deviation(e2, a.b2, b.b2) * length(Nv);
   const F8 dN[3] = {b.N[0] - a.N[0], b.N[1] - a.N[1], b.N[2] - a.N[2]};
-  const F8 turn_squared = squared(dN);
+  const F8 turn_squared = length_squared_lanes(dN);
   const F8 least_nu = 0.5f * (a.nu + b.nu - sqrt(turn_squared)) - deviation_N;
   const F8 s_largest = max(abs(s0 + u0 * ds), abs(s0 + u1 * ds));
   F8 deviation_height =

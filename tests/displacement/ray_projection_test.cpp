@@ -190,7 +190,7 @@ TEST(RayInversion, FindsTheParameterOfAPointOfTheRay)
         const double tau = random_unit(random), t = curve_t(curve, g, tau);
         EXPECT_NEAR(cubic_at(T, tau) / quadratic_at(g.W, tau), t, 1e-9 * (std::abs(t) + g.t1 - g.t0));
         if (!(t > g.t0 && t < g.t1)) return;
-        const double found = ray_invert(T, g.W, 0, 1, g.t0, g.t1, t, 1e-6, &iterations);
+        const double found = ray_invert(T, g.W, {0, 1, g.t0, g.t1}, t, 1e-6, &iterations);
         ++num_asked;
         if (!(found == found)) {
           ++num_failed;
