@@ -515,7 +515,7 @@ void Accel::intersect(EmbreeContext& context, RTCRayHit& ray) const
 {
   trace(context, ray);
   if (!has_pairs_ || ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
-  const unsigned object = ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID;
+  const unsigned object = met_object(ray);
   to_triangle(object, &ray.hit.primID, &ray.hit.u, &ray.hit.v);
 }
 

@@ -28,6 +28,12 @@ enum RayMask : std::uint32_t {
   kRayBounce = 0xfu << kRayBounceShift
 };
 
+/// Number of the object that a ray has met; RTC_INVALID_GEOMETRY_ID: none.
+inline unsigned met_object(const RTCRayHit& ray)
+{
+  return ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID;
+}
+
 /// What a tree holds of a mesh, without ownership.
 struct TreeMesh {
   std::string_view name;
@@ -67,7 +73,25 @@ class Accel {
   /// Nearest hit. A ray may start anywhere; one that is not finite, or has no direction, hits nothing.
   /// @param ray  world space; D need not be unit, but within 1e18
   void intersect(EmbreeContext& context, RTCRayHit& ray) const;
-  /// The same for a packet.
+  /// Nearest hit on an object that is asked for; others are passed, however many stand in the way.
+  /// @param is_wanted  told of an object by its number
+  /// @param ray        as above, its hit need not be set; its tnear is that of the last search
+  /// @return           number of the object; RTC_INVALID_GEOMETRY_ID: none is met
+  template <typename IsWanted>
+  unsigned intersect_only(EmbreeContext& context, RTCRayHit& ray, IsWanted&& is_wanted) const
+  {
+    const float t_max = ray.ray.tfar;
+    for (;;) {
+      ray.ray.tfar = t_max;
+      ray.hit.geomID = ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+      intersect(context, ray);
+      const unsigned object = met_object(ray);
+      if (object == RTC_INVALID_GEOMETRY_ID || is_wanted(object)) return object;
+      // Embree would give the same hit again: a ray that starts at one meets it.
+      ray.ray.tnear = t_min_behind(ray.ray.tfar);
+    }
+  }
+  /// The same as intersect for a packet.
   void intersect8(EmbreeContext& context, RTCRayHit8& rays) const;
   /// Brings a hit of Embree's on quadrilaterals to the mesh's triangles, see triangle_pairs.h. What the above say is that already;
   /// filters are told of quadrilaterals.

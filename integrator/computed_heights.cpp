@@ -170,7 +170,7 @@ class OnTriangle {
     // Triangles of a side have normals of their own, and these point to where their vertices are in order.
     if (mesh_.N == nullptr && is_turned()) hit.Ns = -hit.Ns;
     hit.Ng = hit.Ns;
-    GraphPoint out{&mesh_, &heights_.instance, 0, w[1], w[2], &hit, hit.Ns, {0, 0}, 0.0f, &heights_.scene, {}};
+    GraphPoint out{{&mesh_, 0, w[1], w[2]}, &heights_.instance, &hit, hit.Ns, {0, 0}, 0.0f, &heights_.scene, {}};
     out.P_object = transform_point(heights_.instance.object_from_world, hit.P);
     return out;
   }

@@ -28,7 +28,7 @@ struct MeshPoint {
   /// @param wo  unit, from the emitter
   GraphPoint graph_point(const KernelGlobals& g, Vec3f wo, const GraphRay& ray) const
   {
-    return {&mesh, &instance, triangle, b.x, b.y, &hit, wo, {0.0f, 0.0f}, 0.0f, &g.graph_scene, ray};
+    return {{&mesh, triangle, b.x, b.y}, &instance, &hit, wo, {0.0f, 0.0f}, 0.0f, &g.graph_scene, ray};
   }
 
   const MeshView& mesh;
@@ -49,47 +49,19 @@ struct LampPoint {
     const LightPlace place = light_place(light, at.P, wo);
     hit.P = place.P;
     hit.Ng = hit.Ns = place.N;
-    uv = light_uv(light, lamp.node.object_from_world, place, wo);
+    const Vec2f uv = light_uv(light, lamp.node.object_from_world, place, wo);
     hit.uv[0] = hit.uv[1] = {uv.x, 1.0f - uv.y};
     hit.color = {0, 0, 0, 1};
-  }
-
-  /// As graph_quantity, of a surface without triangles.
-  float quantity(const GraphInput& input) const
-  {
-    using Q = GraphQuantity;
-    switch (input.quantity) {
-      case Q::generated_x:
-      case Q::generated_y:
-      case Q::generated_z: {
-        const Vec3f p = transform_point(lamp.node.object_from_world, hit.P);
-        return input.quantity == Q::generated_x ? p.x : input.quantity == Q::generated_y ? p.y : p.z;
-      }
-      case Q::attribute_value:
-      case Q::attribute_x:
-      case Q::attribute_y:
-      case Q::attribute_z:
-        return 0.0f;
-      case Q::attribute_alpha:
-        return 1.0f;
-      case Q::edge_distance:
-        return kInfinity;
-      case Q::instance:
-        return -1.0f;
-      default: {
-        constexpr MeshView kNoMesh;
-        const GraphPoint point{&kNoMesh,     &lamp.node, 0,     uv.y, 1.0f - uv.x - uv.y, &hit, wo,
-                               {0.0f, 0.0f}, 0.0f,       scene, ray};
-        return graph_quantity(point, input.quantity, input.index);
-      }
-    }
   }
 
   /// Writes a lane of a program's inputs. What would be read a footprint away is read here: bumps are flat.
   void load(const GraphProgramView& program, int lane, GraphRegisters& registers) const
   {
+    GraphPoint point{{}, &lamp.node, &hit, wo, {0.0f, 0.0f}, 0.0f, scene, ray};
+    point.P_object = transform_point(lamp.node.object_from_world, hit.P);
     for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
-      registers.lanes[program.inputs[i].register_index][lane] = quantity(program.inputs[i]);
+      const GraphInput& input = program.inputs[i];
+      registers.lanes[input.register_index][lane] = graph_quantity(point, input.quantity, input.index);
     }
   }
 
@@ -98,7 +70,6 @@ struct LampPoint {
   Vec3f wo;
   GraphRay ray;
   SurfaceHit hit;
-  Vec2f uv;
 };
 
 /// What a lamp's program, which has run, gives; what is no number is 0.

@@ -35,33 +35,6 @@ struct LookingRay {
   unsigned mask;
 };
 
-/// Goes through what a ray meets, nearest first.
-/// @param visit  called with the object and the hit; true: no further
-/// @return       whether a visit was the last
-template <typename Visit>
-bool meets(const Accel& accel, const LookingRay& looking, Visit&& visit)
-{
-  float from = kLeastDistance;
-  for (;;) {
-    EmbreeContext context;
-    embree_context_init(context, false);
-    RTCRayHit ray{};
-    ray.ray.org_x = looking.O.x, ray.ray.org_y = looking.O.y, ray.ray.org_z = looking.O.z;
-    ray.ray.dir_x = looking.D.x, ray.ray.dir_y = looking.D.y, ray.ray.dir_z = looking.D.z;
-    ray.ray.tnear = from;
-    ray.ray.tfar = looking.length;
-    ray.ray.time = looking.time;
-    ray.ray.mask = looking.mask;
-    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    accel.intersect(context, ray);
-    if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
-    if (visit(ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID, ray)) return true;
-    // Embree would give the same hit again: a ray that starts at one meets it.
-    from = t_min_behind(ray.ray.tfar);
-  }
-}
-
 /// Whether what a ray met belongs to an instance's object, which has one instance a material.
 bool is_of_object(const SceneContext& context, unsigned met, std::int32_t instance)
 {
@@ -69,6 +42,18 @@ bool is_of_object(const SceneContext& context, unsigned met, std::int32_t instan
   if (met >= instances.size()) return false;
   const auto own = static_cast<std::size_t>(instance);
   return met == own || (instances[met].object_index >= 0 && instances[met].object_index == instances[own].object_index);
+}
+
+RTCRayHit ray_make(const LookingRay& looking)
+{
+  RTCRayHit ray{};
+  ray.ray.org_x = looking.O.x, ray.ray.org_y = looking.O.y, ray.ray.org_z = looking.O.z;
+  ray.ray.dir_x = looking.D.x, ray.ray.dir_y = looking.D.y, ray.ray.dir_z = looking.D.z;
+  ray.ray.tnear = kLeastDistance;
+  ray.ray.tfar = looking.length;
+  ray.ray.time = looking.time;
+  ray.ray.mask = looking.mask;
+  return ray;
 }
 
 /// @source as Cycles' Ambient Occlusion: rays by the cosine to the normal
@@ -88,10 +73,11 @@ float open_share(const void* scene, const GraphOpenShare& question)
     // By the smooth normal rays leave on either side of a facet, which itself is never in their way.
     const Vec3f& from = dot(D, Ng) > 0.0f ? O[0] : O[1];
     // The closest hits, for what lets shadow rays through in part stops these.
-    const auto stops = [&](unsigned met, const RTCRayHit&) {
-      return !is_local || is_of_object(context, met, question.instance);
-    };
-    if (!meets(*context.accel, {from, D, question.distance, question.time, mask}, stops)) ++num_open;
+    const auto stops = [&](unsigned met) { return !is_local || is_of_object(context, met, question.instance); };
+    EmbreeContext embree;
+    embree_context_init(embree, false);
+    RTCRayHit ray = ray_make({from, D, question.distance, question.time, mask});
+    if (context.accel->intersect_only(embree, ray, stops) == RTC_INVALID_GEOMETRY_ID) ++num_open;
   }
   return static_cast<float>(num_open) / static_cast<float>(question.num_rays);
 }
@@ -162,12 +148,19 @@ Vec3f bevel(const void* scene, const GraphBevel& question)
     const float r = bevel_distance(u.y), half = std::sqrt(std::max(0.0f, 1.0f - r * r));
     if (!(r < 1.0f)) continue;
     const Vec3f along = axes[axis], across = axes[(axis + 1) % 3] * turn.cos + axes[(axis + 2) % 3] * turn.sin;
-    const LookingRay ray{P + (along * half + across * r) * radius, -along, 2.0f * half * radius, question.time, ~0u};
-    meets(*context.accel, ray, [&](unsigned met, const RTCRayHit& hit) {
-      if (!is_of_object(context, met, question.instance)) return false;
-      const MetSurface at = met_surface(context, met, hit);
+    const float length_along = 2.0f * half * radius;
+    EmbreeContext embree;
+    embree_context_init(embree, false);
+    RTCRayHit ray = ray_make({P + (along * half + across * r) * radius, -along, length_along, question.time, ~0u});
+    const auto is_own = [&](unsigned met) { return is_of_object(context, met, question.instance); };
+    for (;;) {
+      const unsigned met = context.accel->intersect_only(embree, ray, is_own);
+      if (met == RTC_INVALID_GEOMETRY_ID) break;
+      const MetSurface at = met_surface(context, met, ray);
+      ray.ray.tnear = t_min_behind(ray.ray.tfar);
+      ray.ray.tfar = length_along;
       const float near = 1.0f - length(at.P - P) / radius;
-      if (!(near > 0.0f)) return false;
+      if (!(near > 0.0f)) continue;
       float squares = 0;
       for (int k = 0; k < 3; ++k) {
         const float pdf = kChances[k] * dot(axes[k], at.Ng);
@@ -175,8 +168,7 @@ Vec3f bevel(const void* scene, const GraphBevel& question)
       }
       const float ratio = near / (1.0f - r);
       sum += at.Ns * (ratio * ratio * ratio * kChances[axis] * std::fabs(dot(along, at.Ng)) / squares);
-      return false;
-    });
+    }
   }
   const float size = length(sum);
   return size > 0.0f && is_finite(sum) ? z_up(sum / size) : Vec3f{};

@@ -38,7 +38,7 @@ instance_hit_next(const SceneContext& context, Vec3f P, Vec3f D, float time, flo
   ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   context.accel->intersect(embree, ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  const unsigned object = ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID;
+  const unsigned object = met_object(ray);
   return InstanceHit{ray.ray.tfar, object,
                      object < context.instances.size() ? hit_normal(context, ray, object) : Vec3f{}};
 }

@@ -136,7 +136,7 @@ void intersect_closest(const KernelGlobals& g,
     state.hit_u[path] = ray.hit.u;
     state.hit_v[path] = ray.hit.v;
     state.hit_triangle[path] = ray.hit.primID;
-    const unsigned object = ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID;
+    const unsigned object = met_object(ray);
     sort_hit(g, accel, state, path, object, ray.hit.Ng_x, queues);
   }
 }

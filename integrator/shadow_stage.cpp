@@ -63,16 +63,13 @@ GraphRay shadow_ray_of(const ShadowContext& context, float time)
 
 /// What a graph may read where a shadow ray meets a surface.
 GraphPoint shadow_graph_point(const ShadowContext& context,
-                              const MeshView& mesh,
+                              const PrimitivePlace& place,
                               const InstanceView& instance,
-                              const DisplacedPoint& at,
                               const SurfaceHit& hit)
 {
   const GraphRay ray{1u << static_cast<int>(GraphRayKind::kShadow), context.depths, context.transparent,
                      length(hit.P - context.O)};
-  return {&mesh, &instance,  at.triangle,  at.u, at.v,
-          &hit,  -context.D, {0.0f, 0.0f}, 0.0f, &context.globals->graph_scene,
-          ray};
+  return {place, &instance, &hit, -context.D, {0.0f, 0.0f}, 0.0f, &context.globals->graph_scene, ray};
 }
 
 }  // namespace
@@ -138,8 +135,10 @@ void intersect_shadow(const KernelGlobals& g,
     if (context.embree.steps != nullptr) note_steps(steps, displacement);
     visibility[i] = ray.tfar < 0.0f ? Vec3f{} : context.visibility;
     if (state.media != nullptr) {
-      if (!is_zero(visibility[i]) && shadow.scatterings[i] != kAmbientRay) {
-        MediumState inside = state.media[shadow.path[i]];
+      const MediumState& around = state.media[shadow.path[i]];
+      const bool may_be_within = around.size > 0 || around.hit_inside != kWholeWorld || !boundaries.empty();
+      if (may_be_within && !is_zero(visibility[i]) && shadow.scatterings[i] != kAmbientRay) {
+        MediumState inside = around;
         if (start == ShadowStart::kAtHit && inside.hit_inside != kWholeWorld && medium_is_behind(inside, context.O)) {
           medium_cross(inside, inside.hit_inside, inside.hit_front);
         }
@@ -188,9 +187,8 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
     // A far ray starts elsewhere.
     const auto t = static_cast<float>(static_cast<double>(RTCRayN_tfar(arguments->ray, arguments->N, i)) +
                                       context->embree.far_start.t);
-    const auto hit_make = [&] {
-      return surface_hit_at(mesh, instance, at.triangle, at.u, at.v, context->O, context->D, t);
-    };
+    const PrimitivePlace place{&mesh, at.triangle, at.u, at.v};
+    const auto hit_make = [&] { return surface_hit_at(place, instance, context->O, context->D, t); };
     if (material.medium_index >= 0) {
       const SurfaceHit hit = hit_make();
       context->boundaries->push_back(
@@ -200,11 +198,11 @@ void shadow_filter(const RTCFilterFunctionNArguments* arguments)
     if (material.transparency_index >= 0) {
       const SurfaceHit hit = hit_make();
       passes = graph_transparency(g.run_graph, g.graphs[material.transparency_index], g.textures,
-                                  shadow_graph_point(*context, mesh, instance, at, hit));
+                                  shadow_graph_point(*context, place, instance, hit));
     } else if ((material.graph_outputs >> static_cast<int>(GraphOutput::alpha) & 1u) != 0) {
       const SurfaceHit hit = hit_make();
       passes = splat3(1.0f - graph_alpha(material, g.run_graph, g.graphs[material.graph_index], g.textures,
-                                         shadow_graph_point(*context, mesh, instance, at, hit)));
+                                         shadow_graph_point(*context, place, instance, hit)));
     } else {
       passes = splat3(1.0f - triangle_alpha(material, g.textures, mesh, at.triangle, at.u, at.v));
     }

@@ -84,26 +84,16 @@ struct Walker {
 
 bool Walker::meet(std::uint32_t path, Vec3f P, Vec3f D, float t_max, RTCRayHit& ray)
 {
-  // Others that stand in the object are passed; there are few.
-  constexpr int kMostOthers = 64;
-  float from = 0.0f;
-  for (int others = 0; others < kMostOthers; ++others) {
-    ray.ray.org_x = P.x, ray.ray.org_y = P.y, ray.ray.org_z = P.z;
-    ray.ray.dir_x = D.x, ray.ray.dir_y = D.y, ray.ray.dir_z = D.z;
-    ray.ray.tnear = from;
-    ray.ray.tfar = t_max;
-    ray.ray.time = path_time(state, path);
-    ray.ray.mask = ~0u;
-    ray.ray.id = 0;
-    ray.ray.flags = 0;
-    ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    accel.intersect(context, ray);
-    const unsigned object = ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID;
-    if (object == RTC_INVALID_GEOMETRY_ID || object == state.hit_object[path]) return object != RTC_INVALID_GEOMETRY_ID;
-    from = t_min_behind(ray.ray.tfar);
-  }
-  return false;
+  ray.ray.org_x = P.x, ray.ray.org_y = P.y, ray.ray.org_z = P.z;
+  ray.ray.dir_x = D.x, ray.ray.dir_y = D.y, ray.ray.dir_z = D.z;
+  ray.ray.tnear = 0.0f;
+  ray.ray.tfar = t_max;
+  ray.ray.time = path_time(state, path);
+  ray.ray.mask = ~0u;
+  ray.ray.id = 0;
+  ray.ray.flags = 0;
+  const std::uint32_t own = state.hit_object[path];
+  return accel.intersect_only(context, ray, [own](unsigned object) { return object == own; }) == own;
 }
 
 bool Walker::walk(std::uint32_t path)

@@ -56,7 +56,7 @@ TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     context.accel->intersect(embree, query);
     if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) break;
-    const unsigned object = query.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? query.hit.instID[0] : query.hit.geomID;
+    const unsigned object = met_object(query);
     if (object >= context.globals.num_instances) {
       t_min = t_min_behind(query.ray.tfar);
       continue;

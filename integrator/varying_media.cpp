@@ -184,7 +184,7 @@ GraphRange quantity_range(const MediumPoint& somewhere,
     case Q::generated_z: {
       const int axis = axis_of(Q::generated_x);
       const GraphRange object = affine_range(somewhere.node->object_from_world, axis, boxes);
-      if (!somewhere.has_node) return object;
+      if (somewhere.node->index == kNoInstance) return object;
       const Vec3f scale = place.generated_scale, offset = place.generated_offset;
       return axis == 0   ? object * scale.x + offset.x
              : axis == 1 ? object * scale.y + offset.y
@@ -253,6 +253,32 @@ void fit_generated(const MeshView& mesh, VaryingPlace& place)
   }
   place.generated_scale = {scale[0], scale[1], scale[2]};
   place.generated_offset = {offset[0], offset[1], offset[2]};
+}
+
+/// Eight boxes of one of a grid's levels.
+/// @param middle  of the grid, world
+/// @param scale   of the level's boxes
+/// @param group   which eight; those behind the last repeat it
+/// @param corner  gets the lower one of each
+Boxes boxes_of_group(const RateGrid& grid, Vec3f middle, float scale, std::size_t group, Vec3f* corner)
+{
+  Boxes boxes;
+  const auto side = static_cast<std::size_t>(grid.size);
+  const float half = 0.5f * static_cast<float>(grid.size);
+  const Vec3f lengths = grid.cell * scale;
+  for (int k = 0; k < kMediumPoints; ++k) {
+    const std::size_t i = std::min(group * 8 + static_cast<std::size_t>(k), side * side * side - 1);
+    const std::size_t at[3] = {i % side, i / side % side, i / (side * side)};
+    const float m[3] = {middle.x, middle.y, middle.z}, cell[3] = {grid.cell.x, grid.cell.y, grid.cell.z};
+    for (int axis = 0; axis < 3; ++axis) {
+      const float length = scale * cell[axis];
+      boxes.middle[axis][k] = m[axis] + (static_cast<float>(at[axis]) + 0.5f - half) * length;
+      // Points on its border may be taken for a neighbour's.
+      boxes.half[axis][k] = 0.5f * length * 1.001f;
+    }
+    corner[k] = Vec3f{boxes.middle[0][k], boxes.middle[1][k], boxes.middle[2][k]} - lengths * 0.5f;
+  }
+  return boxes;
 }
 
 /// What a ray from the camera may reach in few steps: all that is there, and the camera.
@@ -370,25 +396,13 @@ VaryingMedia::Problem VaryingMedia::add_rates(const SceneContext& context,
   const Vec3f middle = (box.low + box.high) * 0.5f, D{0, 0, 1};
   Problem problem;
   for (int level = 0; level < grid.num_levels; ++level) {
-    const float scale = static_cast<float>(1u << level), half = 0.5f * static_cast<float>(grid.size);
+    const float scale = static_cast<float>(1u << level);
     std::vector<Rate> rates(level_size);
     std::vector<Found> found(level_size);
     tbb::parallel_for(std::size_t{0}, (level_size + 7) / 8, [&](std::size_t group) {
-      Boxes boxes;
       Vec3f corner[kMediumPoints];
+      const Boxes boxes = boxes_of_group(grid, middle, scale, group, corner);
       const Vec3f lengths = grid.cell * scale;
-      for (int k = 0; k < kMediumPoints; ++k) {
-        const std::size_t i = std::min(group * 8 + static_cast<std::size_t>(k), level_size - 1);
-        const std::size_t at[3] = {i % side, i / side % side, i / (side * side)};
-        const float m[3] = {middle.x, middle.y, middle.z}, cell[3] = {grid.cell.x, grid.cell.y, grid.cell.z};
-        for (int axis = 0; axis < 3; ++axis) {
-          const float length = scale * cell[axis];
-          boxes.middle[axis][k] = m[axis] + (static_cast<float>(at[axis]) + 0.5f - half) * length;
-          // Points on its border may be taken for a neighbour's.
-          boxes.half[axis][k] = 0.5f * length * 1.001f;
-        }
-        corner[k] = Vec3f{boxes.middle[0][k], boxes.middle[1][k], boxes.middle[2][k]} - lengths * 0.5f;
-      }
       const auto registers = std::make_unique_for_overwrite<GraphRangeRegisters>();
       registers->images = images.empty() ? nullptr : images.data();
       const MediumPoint somewhere = medium_point_make(context.globals, place, instance, corner[0], D, kSomeRay);

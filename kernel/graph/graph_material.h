@@ -5,8 +5,7 @@
 #include "kernel/graph/graph_mixture.h"
 #include "kernel/graph/graph_registers.h"
 #include "kernel/graph/graph_scene.h"
-#include "kernel/shape/curve_hit.h"
-#include "kernel/shape/surface_hit.h"
+#include "kernel/shape/primitive.h"
 
 namespace relief {
 
@@ -18,12 +17,11 @@ struct GraphFootprint {
   Vec3f dPdx, dPdy;  ///< world
 };
 
-/// What a graph may read of a hit beside it.
+/// What a graph may read of a hit beside it. Points that are on no primitive have what is read of one nowhere: attributes are 0, edges
+/// infinitely far, footprints points; generated coordinates are those of the object.
 struct GraphPoint {
-  const MeshView* mesh;
-  const InstanceView* instance;
-  std::uint32_t triangle;
-  float bary_u, bary_v;
+  PrimitivePlace place;
+  const InstanceView* instance;  ///< kNoInstance: there are no values of one either
   const SurfaceHit* hit;
   Vec3f wo;           ///< unit, world
   float uv_width[2];  ///< footprint in each set's uv units
@@ -37,6 +35,7 @@ struct GraphPoint {
 RELIEF_KERNEL GraphFootprint graph_footprint(const GraphPoint& at)
 {
   if (at.footprint_axes != nullptr) return *at.footprint_axes;
+  if (at.place.mesh == nullptr) return {};
   const Vec3f Ng = dot(at.hit->Ng, at.wo) < 0.0f ? -at.hit->Ng : at.hit->Ng;
   // Cycles' axes: a slope is a forward difference, so that bumps of few pixels look otherwise along others.
   const Vec3f across = cross(Vec3f{1, 1, -1}, Ng);
@@ -53,23 +52,11 @@ RELIEF_KERNEL GraphFootprint graph_footprint(const GraphPoint& at)
 /// @param moved  its hit, which the result points to
 RELIEF_KERNEL GraphPoint graph_point_shifted(const GraphPoint& at, Vec3f by, SurfaceHit& moved)
 {
-  const TriangleIndices tri = at.mesh->triangles[at.triangle];
-  const Affine3& m = at.instance->world_from_object;
-  const Vec3f edge1 = transform_vector(m, mesh_P(*at.mesh, tri.v1) - mesh_P(*at.mesh, tri.v0));
-  const Vec3f edge2 = transform_vector(m, mesh_P(*at.mesh, tri.v2) - mesh_P(*at.mesh, tri.v0));
-  // Least squares: on a displaced surface the vector does not lie in the triangle.
-  const float a = dot(edge1, edge1), b = dot(edge1, edge2), c = dot(edge2, edge2);
-  const float determinant = difference_of_products(a, c, b, b);
   GraphPoint out = at;
-  if (determinant > 0.0f) {
-    const float carried = dot(at.hit->Ng, at.wo) < 0.0f ? -1.0f : 1.0f;
-    const float p = carried * dot(edge1, by), q = carried * dot(edge2, by);
-    out.bary_u += difference_of_products(c, p, b, q) / determinant;
-    out.bary_v += difference_of_products(a, q, b, p) / determinant;
-  }
+  out.place = primitive_moved(at.place, *at.instance, by, dot(at.hit->Ng, at.wo) < 0.0f ? -1.0f : 1.0f);
   moved = *at.hit;
   moved.P += by;
-  surface_hit_interpolate(*at.mesh, tri, out.bary_u, out.bary_v, &moved);
+  primitive_interpolate(out.place, &moved);
   out.P_object = transform_point(at.instance->object_from_world, moved.P);
   out.hit = &moved;
   return out;
@@ -79,24 +66,19 @@ RELIEF_KERNEL GraphPoint graph_point_shifted(const GraphPoint& at, Vec3f by, Sur
 /// @param component  0 to 2; 3: alpha; 4: as one number
 RELIEF_KERNEL float graph_attribute(const GraphPoint& at, std::uint32_t name, int component)
 {
-  const MeshView& mesh = *at.mesh;
-  for (std::uint32_t i = 0; i < mesh.num_columns; ++i) {
-    const MeshColumn& column = mesh.columns[i];
+  const std::uint32_t num_columns = at.place.mesh != nullptr ? at.place.mesh->num_columns : 0u;
+  for (std::uint32_t i = 0; i < num_columns; ++i) {
+    const MeshColumn& column = at.place.mesh->columns[i];
     if (column.name != name) continue;
-    const TriangleIndices tri = mesh.triangles[at.triangle];
-    const float w0 = 1.0f - at.bary_u - at.bary_v;
     const std::uint32_t n = column.num_components;
-    const auto number = [&](std::uint32_t c) {
-      const float* v = column.values + c;
-      return w0 * v[std::size_t{tri.v0} * n] + at.bary_u * v[std::size_t{tri.v1} * n] +
-             at.bary_v * v[std::size_t{tri.v2} * n];
-    };
+    const auto number = [&](std::uint32_t c) { return primitive_column(at.place, column, c); };
     if (component == 4) return n < 3 ? number(0) : (number(0) + number(1) + number(2)) * (1.0f / 3.0f);
     if (component == 3) return n == 4 ? number(3) : 1.0f;
     if (n == 1) return number(0);
     return static_cast<std::uint32_t>(component) < n ? number(static_cast<std::uint32_t>(component)) : 0.0f;
   }
-  for (std::uint32_t i = 0; i < at.scene->num_columns; ++i) {
+  const bool has_values = at.instance->index != kNoInstance;
+  for (std::uint32_t i = 0; has_values && i < at.scene->num_columns; ++i) {
     if (at.scene->columns[i].name != name) continue;
     const float* v = at.scene->columns[i].values + 4 * std::size_t{at.instance->index};
     return component == 4 ? (v[0] + v[1] + v[2]) * (1.0f / 3.0f) : v[component];
@@ -107,13 +89,8 @@ RELIEF_KERNEL float graph_attribute(const GraphPoint& at, std::uint32_t name, in
 /// The mesh's normal at a point, interpolated and not made unit, object space.
 RELIEF_KERNEL Vec3f graph_vertex_normal(const GraphPoint& at)
 {
-  if (at.mesh->N != nullptr) {
-    const TriangleIndices tri = at.mesh->triangles[at.triangle];
-    const float w0 = 1.0f - at.bary_u - at.bary_v;
-    const Vec3f n = w0 * as_vector(mesh_N(*at.mesh, tri.v0)) + at.bary_u * as_vector(mesh_N(*at.mesh, tri.v1)) +
-                    at.bary_v * as_vector(mesh_N(*at.mesh, tri.v2));
-    if (!is_zero(n)) return n;
-  }
+  const Vec3f n = primitive_vertex_normal(at.place);
+  if (!is_zero(n)) return n;
   return normalize(transform_normal(at.instance->world_from_object, as_normal(at.hit->Ng)));
 }
 
@@ -155,22 +132,6 @@ RELIEF_KERNEL float graph_window(const GraphScene& scene, Vec3f P, int axis)
   return 0.5f + 0.5f * seen - (axis == 0 ? scene.camera.shift_x : scene.camera.shift_y);
 }
 
-/// Distance of a point to the nearest of the lines along a triangle's edges, metres; infinite on curves, which have none.
-RELIEF_KERNEL float graph_edge_distance(const GraphPoint& at)
-{
-  if (at.mesh->radius != nullptr) return kInfinity;
-  const TriangleIndices tri = at.mesh->triangles[at.triangle];
-  const std::uint32_t corner[3] = {tri.v0, tri.v1, tri.v2};
-  Vec3f p[3];
-  for (int i = 0; i < 3; ++i) p[i] = transform_point(at.instance->world_from_object, mesh_P(*at.mesh, corner[i]));
-  float nearest = kInfinity;
-  for (int i = 0; i < 3; ++i) {
-    const Vec3f edge = p[(i + 1) % 3] - p[i];
-    nearest = min(nearest, length_squared(cross(edge, at.hit->P - p[i])) / length_squared(edge));
-  }
-  return __builtin_sqrtf(nearest);
-}
-
 /// Element of one of the matrices between spaces, all with Z up and the camera looking along −Z.
 RELIEF_KERNEL float graph_matrix_element(const GraphPoint& at, GraphQuantity quantity, std::uint16_t index)
 {
@@ -193,14 +154,55 @@ RELIEF_KERNEL float graph_matrix_element(const GraphPoint& at, GraphQuantity qua
   }
 }
 
-/// A point's place in the mesh's _GENERATED.
-RELIEF_KERNEL Vec3f graph_generated(const GraphPoint& at)
+/// A component of a vector.
+RELIEF_KERNEL float graph_component(Vec3f v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+
+/// What a graph reads of the primitive that a point is on.
+/// @param index  as of graph_quantity, which asks this for what it has not
+RELIEF_KERNEL float graph_primitive_quantity(const GraphPoint& at, GraphQuantity quantity, std::uint16_t index)
 {
-  if (at.mesh->generated == nullptr) return {};
-  const TriangleIndices tri = at.mesh->triangles[at.triangle];
-  const float w0 = 1.0f - at.bary_u - at.bary_v;
-  const Vec3f* g = at.mesh->generated;
-  return w0 * g[tri.v0] + at.bary_u * g[tri.v1] + at.bary_v * g[tri.v2];
+  using Q = GraphQuantity;
+  const auto axis_of = [quantity](Q first) { return static_cast<int>(quantity) - static_cast<int>(first); };
+  const bool is_on_primitive = at.place.mesh != nullptr;
+  switch (quantity) {
+    case Q::generated_x:
+    case Q::generated_y:
+    case Q::generated_z:
+      return graph_component(is_on_primitive ? primitive_generated(at.place) : at.P_object, axis_of(Q::generated_x));
+    case Q::vertex_normal_x:
+    case Q::vertex_normal_y:
+    case Q::vertex_normal_z:
+      return graph_component(graph_vertex_normal(at), axis_of(Q::vertex_normal_x));
+    case Q::smooth_normal_x:
+    case Q::smooth_normal_y:
+    case Q::smooth_normal_z:
+      return graph_component(graph_smooth_normal(at), axis_of(Q::smooth_normal_x));
+    case Q::attribute_value:
+      return graph_attribute(at, index, 4);
+    case Q::attribute_x:
+    case Q::attribute_y:
+    case Q::attribute_z:
+    case Q::attribute_alpha:
+      return graph_attribute(at, index, axis_of(Q::attribute_x));
+    case Q::parametric_x:
+      return is_on_primitive ? 1.0f - at.place.u - at.place.v : at.hit->uv[0].x;
+    case Q::parametric_y:
+      return is_on_primitive ? at.place.u : 1.0f - at.hit->uv[0].y;
+    case Q::tangent_normal_x:
+    case Q::tangent_normal_y:
+    case Q::tangent_normal_z: {
+      if (!is_on_primitive || !has_strands(*at.instance)) return 0.0f;
+      const Vec3f tangent = primitive_strand(at.place, *at.instance, at.wo);
+      const Vec3f across = at.wo - tangent * dot(tangent, at.wo);
+      return is_zero(across) ? 0.0f : graph_component(graph_z_up(normalize(across)), axis_of(Q::tangent_normal_x));
+    }
+    case Q::edge_distance:
+      return primitive_edge_distance(at.place, *at.instance, at.hit->P);
+    case Q::instance:
+      return at.instance->index != kNoInstance ? static_cast<float>(at.instance->index) : -1.0f;
+    default:
+      return 0.0f;
+  }
 }
 
 /// @param  index  of quantities that are many
@@ -209,18 +211,13 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
 {
   using Q = GraphQuantity;
   const auto axis_of = [quantity](Q first) { return static_cast<int>(quantity) - static_cast<int>(first); };
-  const auto component = [](Vec3f v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; };
   const SurfaceHit& hit = *at.hit;
   const float to_viewer = dot(hit.Ng, at.wo) < 0.0f ? -1.0f : 1.0f;
   switch (quantity) {
     case Q::object_x:
     case Q::object_y:
     case Q::object_z:
-      return component(at.P_object, axis_of(Q::object_x));
-    case Q::generated_x:
-    case Q::generated_y:
-    case Q::generated_z:
-      return component(graph_generated(at), axis_of(Q::generated_x));
+      return graph_component(at.P_object, axis_of(Q::object_x));
     case Q::uv0_u:
       return hit.uv[0].x;
     case Q::uv0_v:
@@ -236,19 +233,19 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
     case Q::position_x:
     case Q::position_y:
     case Q::position_z:
-      return component(graph_z_up(hit.P), axis_of(Q::position_x));
+      return graph_component(graph_z_up(hit.P), axis_of(Q::position_x));
     case Q::normal_x:
     case Q::normal_y:
     case Q::normal_z:
-      return component(graph_z_up(hit.Ns), axis_of(Q::normal_x)) * to_viewer;
+      return graph_component(graph_z_up(hit.Ns), axis_of(Q::normal_x)) * to_viewer;
     case Q::true_normal_x:
     case Q::true_normal_y:
     case Q::true_normal_z:
-      return component(graph_z_up(hit.Ng), axis_of(Q::true_normal_x)) * to_viewer;
+      return graph_component(graph_z_up(hit.Ng), axis_of(Q::true_normal_x)) * to_viewer;
     case Q::incoming_x:
     case Q::incoming_y:
     case Q::incoming_z:
-      return component(graph_z_up(at.wo), axis_of(Q::incoming_x));
+      return graph_component(graph_z_up(at.wo), axis_of(Q::incoming_x));
     case Q::color_r:
       return hit.color.x;
     case Q::color_g:
@@ -262,33 +259,18 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
     case Q::dpdx_x:
     case Q::dpdx_y:
     case Q::dpdx_z:
-      return component(graph_z_up(graph_footprint(at).dPdx), axis_of(Q::dpdx_x));
+      return graph_component(graph_z_up(graph_footprint(at).dPdx), axis_of(Q::dpdx_x));
     case Q::dpdy_x:
     case Q::dpdy_y:
     case Q::dpdy_z:
-      return component(graph_z_up(graph_footprint(at).dPdy), axis_of(Q::dpdy_x));
+      return graph_component(graph_z_up(graph_footprint(at).dPdy), axis_of(Q::dpdy_x));
     case Q::object_normal_x:
     case Q::object_normal_y:
     case Q::object_normal_z: {
       // A normal goes back by the transpose of what points go there by.
       const Vec3f n = normalize(transform_normal(at.instance->world_from_object, as_normal(hit.Ns)));
-      return component(n, axis_of(Q::object_normal_x)) * to_viewer;
+      return graph_component(n, axis_of(Q::object_normal_x)) * to_viewer;
     }
-    case Q::vertex_normal_x:
-    case Q::vertex_normal_y:
-    case Q::vertex_normal_z:
-      return component(graph_vertex_normal(at), axis_of(Q::vertex_normal_x));
-    case Q::smooth_normal_x:
-    case Q::smooth_normal_y:
-    case Q::smooth_normal_z:
-      return component(graph_smooth_normal(at), axis_of(Q::smooth_normal_x));
-    case Q::attribute_value:
-      return graph_attribute(at, index, 4);
-    case Q::attribute_x:
-    case Q::attribute_y:
-    case Q::attribute_z:
-    case Q::attribute_alpha:
-      return graph_attribute(at, index, axis_of(Q::attribute_x));
     case Q::world_from_object:
     case Q::object_from_world:
     case Q::camera_from_world:
@@ -304,35 +286,18 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
     case Q::ray_origin_y:
     case Q::ray_origin_z: {
       const bool is_front = (to_viewer > 0.0f) == (index == 0);
-      return component(graph_z_up(surface_hit_origin(hit, hit.P, is_front)), axis_of(Q::ray_origin_x));
+      return graph_component(graph_z_up(surface_hit_origin(hit, hit.P, is_front)), axis_of(Q::ray_origin_x));
     }
     case Q::ray_length:
       return at.ray.length;
     case Q::window_x:
     case Q::window_y:
       return graph_window(*at.scene, hit.P, axis_of(Q::window_x));
-    case Q::parametric_x:
-      return 1.0f - at.bary_u - at.bary_v;
-    case Q::parametric_y:
-      return at.bary_u;
-    case Q::tangent_normal_x:
-    case Q::tangent_normal_y:
-    case Q::tangent_normal_z: {
-      if ((at.instance->flags & (kCurves | kPoints)) != kCurves) return 0.0f;
-      const Vec3f tangent = curve_tangent(*at.mesh, *at.instance, at.triangle, at.bary_u, at.wo);
-      const Vec3f across = at.wo - tangent * dot(tangent, at.wo);
-      return is_zero(across) ? 0.0f : component(graph_z_up(normalize(across)), axis_of(Q::tangent_normal_x));
-    }
-    case Q::edge_distance:
-      return graph_edge_distance(at);
-    case Q::instance:
-      return static_cast<float>(at.instance->index);
     case Q::shutter_time:
       return at.ray.time;
-    case Q::kCount:
-      break;
+    default:
+      return graph_primitive_quantity(at, quantity, index);
   }
-  return 0.0f;
 }
 
 /// Writes a point's quantities to its lane of the registers.

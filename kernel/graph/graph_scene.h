@@ -40,7 +40,8 @@ struct GraphInstanceColumn {
 /// What a light has besides whose emission a value graph multiplies, but for meshes.
 struct Lamp {
   std::int32_t graph_index = -1;  ///< results 0 to 2 are the factor
-  InstanceView node;              ///< of which the matrices count
+  /// Of which the matrices count.
+  InstanceView node{.world_from_object = {}, .object_from_world = {}, .index = kNoInstance};
 };
 
 /// What is the same for all surfaces.

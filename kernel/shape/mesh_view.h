@@ -58,6 +58,14 @@ RELIEF_KERNEL Normal3f mesh_N(const MeshView& mesh, std::uint32_t vertex)
   return as_normal(mesh_mix(as_vector(N), as_vector(mesh.N_next[vertex]), mesh.part));
 }
 
+/// A place on one primitive of a mesh: on a triangle by weights of vertices 1 and 2, on a curve by how far along the segment it is and,
+/// on a ribbon, across. kernel/shape/primitive.h reads what is there.
+struct PrimitivePlace {
+  const MeshView* mesh = nullptr;  ///< null: on none, as points of lamps and of media are
+  std::uint32_t primitive = 0;     ///< number of a triangle, or of what stands in its place
+  float u = 0, v = 0;
+};
+
 enum InstanceFlag : std::uint32_t {
   kVisibleToCamera = 1u << 0,
   kCastsShadow = 1u << 1,
@@ -80,6 +88,9 @@ enum InstanceFlag : std::uint32_t {
 
 inline constexpr std::uint32_t kHiddenFrom = 0xfu << kHiddenFromShift;
 
+/// In place of an instance's number: what is placed so is none, but a lamp or the world.
+inline constexpr std::uint32_t kNoInstance = ~0u;
+
 /// One placement of a mesh.
 struct InstanceView {
   Affine3 world_from_object, object_from_world;
@@ -88,7 +99,7 @@ struct InstanceView {
   std::int32_t first_light_index = -1;  ///< lights of an emissive mesh are consecutive, one a triangle; −1: none
   std::int32_t light_copy_index = -1;   ///< of those lights, if it shares them with other instances: see LightRef
   std::uint32_t flags = kVisibleToCamera | kCastsShadow;
-  std::uint32_t index = 0;  ///< in the scene
+  std::uint32_t index = 0;  ///< in the scene; kNoInstance: it is not there
 };
 
 }  // namespace relief

@@ -36,12 +36,17 @@ RELIEF_KERNEL Vec3x8 triangle_clearance(const Vec3x8& w,
   return select(is_near, (least - 3.0f * least * w.y) * edge1 + (least - 3.0f * least * w.z) * edge2, none);
 }
 
-/// Evaluates triangles' attributes at hits.
-/// @param num_hits  1 to 8
-/// @param hits      gets those
-[[gnu::noinline]] RELIEF_KERNEL void surface_hits_make(const SurfaceHitQuestions& q, int num_hits, SurfaceHit* hits[8])
-{
+/// What eight triangles are, side by side; of those without normals these are 0.
+struct TriangleLanes {
   TriangleIndices tri[8];
+  Vec3x8 p[3], n[3];  ///< of vertices, object space
+  I8 has_normals, is_mirrored, is_traced_in_object;
+  Affine3x8 world_from_object, object_from_world;
+};
+
+[[gnu::always_inline]] RELIEF_KERNEL TriangleLanes triangle_lanes_load(const SurfaceHitQuestions& q, int num_hits)
+{
+  TriangleLanes out;
   // Columns in memory: what is gathered, number by number.
   alignas(32) float in[18][8] = {};
   alignas(32) std::int32_t has_N[8] = {}, mirrored[8] = {}, traced_in_object[8] = {};
@@ -53,8 +58,8 @@ RELIEF_KERNEL Vec3x8 triangle_clearance(const Vec3x8& w,
   };
   for (int k = 0; k < num_hits; ++k) {
     const MeshView& mesh = *q.mesh[k];
-    tri[k] = mesh.triangles[q.triangle[k]];
-    const std::uint32_t vertices[3] = {tri[k].v0, tri[k].v1, tri[k].v2};
+    out.tri[k] = mesh.triangles[q.triangle[k]];
+    const std::uint32_t vertices[3] = {out.tri[k].v0, out.tri[k].v1, out.tri[k].v2};
     for (int v = 0; v < 3; ++v) put(in + 3 * v, k, mesh_P(mesh, vertices[v]));
     if (mesh.N != nullptr) {
       has_N[k] = -1;
@@ -72,17 +77,33 @@ RELIEF_KERNEL Vec3x8 triangle_clearance(const Vec3x8& w,
     __builtin_memcpy(&m, lanes, sizeof m);
     return m;
   };
-  const Vec3x8 p[3] = {take(in), take(in + 3), take(in + 6)}, n[3] = {take(in + 9), take(in + 12), take(in + 15)};
-  const F8 bary_u = load8(q.bary_u), bary_v = load8(q.bary_v);
-  const I8 has_normals = mask(has_N), is_mirrored = mask(mirrored), is_traced_in_object = mask(traced_in_object);
-  Affine3x8 m = splat8(q.instance[0]->world_from_object), inverse = splat8(q.instance[0]->object_from_world);
+  for (int v = 0; v < 3; ++v) {
+    out.p[v] = take(in + 3 * v);
+    out.n[v] = take(in + 9 + 3 * v);
+  }
+  out.has_normals = mask(has_N);
+  out.is_mirrored = mask(mirrored);
+  out.is_traced_in_object = mask(traced_in_object);
+  out.world_from_object = splat8(q.instance[0]->world_from_object);
+  out.object_from_world = splat8(q.instance[0]->object_from_world);
   if (!is_one_instance) {
     for (int k = 1; k < num_hits; ++k) {
-      lane_set(m, k, q.instance[k]->world_from_object);
-      lane_set(inverse, k, q.instance[k]->object_from_world);
+      lane_set(out.world_from_object, k, q.instance[k]->world_from_object);
+      lane_set(out.object_from_world, k, q.instance[k]->object_from_world);
     }
   }
+  return out;
+}
 
+/// Evaluates triangles' attributes at hits.
+/// @param num_hits  1 to 8
+/// @param hits      gets those
+[[gnu::noinline]] RELIEF_KERNEL void surface_hits_make(const SurfaceHitQuestions& q, int num_hits, SurfaceHit* hits[8])
+{
+  const TriangleLanes at = triangle_lanes_load(q, num_hits);
+  const Vec3x8 *const p = at.p, *const n = at.n;
+  const Affine3x8 &m = at.world_from_object, &inverse = at.object_from_world;
+  const F8 bary_u = load8(q.bary_u), bary_v = load8(q.bary_v);
   const F8 w0 = 1.0f - bary_u - bary_v;
   const Vec3x8 P_object = w0 * p[0] + bary_u * p[1] + bary_v * p[2];
   const Vec3x8 P_object_sum = abs(w0 * p[0]) + abs(bary_u * p[1]) + abs(bary_v * p[2]);
@@ -93,29 +114,29 @@ RELIEF_KERNEL Vec3x8 triangle_clearance(const Vec3x8& w,
   const Vec3x8 spread = abs_transform(m, P_object_sum);
   Vec3x8 P_error =
       splat8((1.0f + gamma_bound(3)) * gamma_bound(7)) * spread + splat8(gamma_bound(3)) * (spread + abs(m.p));
-  if (mask_of(is_traced_in_object) != 0) {
+  if (mask_of(at.is_traced_in_object) != 0) {
     const Vec3x8 more = splat8(gamma_bound(6)) * abs_transform(m, abs_transform(inverse, abs(P)) + abs(inverse.p));
-    P_error = select(is_traced_in_object, P_error + more, P_error);
+    P_error = select(at.is_traced_in_object, P_error + more, P_error);
   }
 
   const Vec3x8 edge1 = transform_vector(m, p[1] - p[0]), edge2 = transform_vector(m, p[2] - p[0]);
   const Vec3x8 turned = cross(edge1, edge2);
-  const Vec3x8 normal_area = select(is_mirrored, -turned, turned);
+  const Vec3x8 normal_area = select(at.is_mirrored, -turned, turned);
   const F8 double_area = length(normal_area);
   const Vec3x8 Ng = normal_area / double_area;
   const Vec3x8 clear = triangle_clearance({w0, bary_u, bary_v}, edge1, edge2, double_area, Ng, P_error);
 
   Vec3x8 Ns = Ng, P_lift{};
-  if (mask_of(has_normals) != 0) {
+  if (mask_of(at.has_normals) != 0) {
     const Vec3x8 n0 = normalize(transform_normal(inverse, n[0])), n1 = normalize(transform_normal(inverse, n[1])),
                  n2 = normalize(transform_normal(inverse, n[2]));
     const Vec3x8 mean = w0 * n0 + bary_u * n1 + bary_v * n2;
     const F8 mean_length = length(mean);
-    Ns = select(has_normals & (mean_length > 1e-6f), mean / mean_length, Ng);
+    Ns = select(at.has_normals & (mean_length > 1e-6f), mean / mean_length, Ng);
     const Vec3x8 to0 = -(bary_u * edge1 + bary_v * edge2);
     const F8 d0 = max(splat8(0.0f), dot(to0, n0)), d1 = max(splat8(0.0f), dot(to0 + edge1, n1)),
              d2 = max(splat8(0.0f), dot(to0 + edge2, n2));
-    P_lift = select(has_normals, w0 * d0 * n0 + bary_u * d1 * n1 + bary_v * d2 * n2, P_lift);
+    P_lift = select(at.has_normals, w0 * d0 * n0 + bary_u * d1 * n1 + bary_v * d2 * n2, P_lift);
   }
 
   alignas(32) float out[19][8];
@@ -140,8 +161,8 @@ RELIEF_KERNEL Vec3x8 triangle_clearance(const Vec3x8& w,
     hit.Ns = number(9);
     hit.P_lift = number(12);
     hit.clear = number(15);
-    surface_hit_interpolate(*q.mesh[k], tri[k], q.bary_u[k], q.bary_v[k], &hit);
-    surface_hit_density(*q.mesh[k], tri[k], out[18][k], &hit);
+    surface_hit_interpolate(*q.mesh[k], at.tri[k], q.bary_u[k], q.bary_v[k], &hit);
+    surface_hit_density(*q.mesh[k], at.tri[k], out[18][k], &hit);
   }
 }
 

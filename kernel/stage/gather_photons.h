@@ -9,17 +9,7 @@ namespace relief {
 /// Unit geometric normal of a path's hit, world space, on the front side.
 RELIEF_KERNEL Vec3f hit_geometric_normal(const KernelGlobals& g, const PathState& state, std::uint32_t path)
 {
-  const InstanceView& instance = path_instance(g, state, path);
-  if ((instance.flags & kDisplaced) != 0) {
-    const Vec3f Ng = state.hit_Ng[path];
-    return normalize(transform_normal(instance.object_from_world, as_normal(Ng)));
-  }
-  const MeshView& mesh = path_mesh(g, state, path, instance);
-  const TriangleIndices tri = mesh.triangles[state.hit_triangle[path]];
-  const Vec3f edge1 = transform_vector(instance.world_from_object, mesh_P(mesh, tri.v1) - mesh_P(mesh, tri.v0));
-  const Vec3f edge2 = transform_vector(instance.world_from_object, mesh_P(mesh, tri.v2) - mesh_P(mesh, tri.v0));
-  const Vec3f Ng = normalize(cross(edge1, edge2));
-  return (instance.flags & kMirrored) != 0 ? -Ng : Ng;
+  return normalize(hit_plane(g, state, path, path_instance(g, state, path)).Ng);
 }
 
 /// Unit shading normal of a path's hit, world space, on the front side, without a normal map.

@@ -77,13 +77,14 @@ RELIEF_KERNEL bool medium_meet(const KernelGlobals& g, PathState& state, std::ui
   m.hit_inside = kWholeWorld;
   if (hit == MediumHit::kNothing) medium_leave_all(m);
   if (hit != MediumHit::kSurface) return false;
-  const Material& material = g.materials[path_instance(g, state, path).material_index];
+  const InstanceView& instance = path_instance(g, state, path);
+  const Material& material = g.materials[instance.material_index];
   if (material.medium_index < 0) return false;
-  const SurfaceInteraction at = surface_interaction_locate<0>(g, state, path, -path_direction(state, path));
+  const PrimitivePlane plane = hit_plane(g, state, path, instance);
   m.hit_inside = static_cast<std::int32_t>(state.hit_object[path]);
-  m.hit_front = at.side.front;
-  m.hit_P = at.hit.P;
-  m.hit_Ng = at.side.Ng;
+  m.hit_front = dot(path_direction(state, path), plane.Ng) <= 0.0f;
+  m.hit_P = plane.P;
+  m.hit_Ng = m.hit_front ? plane.Ng : -plane.Ng;
   return material.is_boundary;
 }
 

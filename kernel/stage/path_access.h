@@ -46,6 +46,15 @@ RELIEF_KERNEL const MeshView& path_mesh(const KernelGlobals& g,
   return (instance.flags & kDeforms) != 0 ? s.motion.meshes[i] : g.meshes[instance.mesh_index];
 }
 
+/// Where on a mesh a path's hit is.
+RELIEF_KERNEL PrimitivePlace path_place(const KernelGlobals& g,
+                                        const PathState& s,
+                                        std::uint32_t i,
+                                        const InstanceView& instance)
+{
+  return {&path_mesh(g, s, i, instance), s.hit_triangle[i], s.hit_u[i], s.hit_v[i]};
+}
+
 /// Gives a path a new ray, to be searched from its origin on.
 /// @param D  unit
 RELIEF_KERNEL void path_set_ray(PathState& s, std::uint32_t i, Vec3f O, Vec3f D)

@@ -10,8 +10,8 @@
 #include "kernel/graph/graph_material.h"
 #include "kernel/sample/dimensions.h"
 #include "kernel/sample/sobol.h"
-#include "kernel/shape/curve_hit.h"
 #include "kernel/shape/facet_masking.h"
+#include "kernel/shape/primitive.h"
 #include "kernel/shape/surface_hits.h"
 #include "kernel/stage/path_access.h"
 #include "kernel/stage/surface_lobes.h"
@@ -97,6 +97,20 @@ RELIEF_KERNEL SurfaceSummary surface_summary(const SurfaceInteraction& at)
   return {surface_albedo(at.params), surface_params_are_seen_through(at.params)};
 }
 
+/// The plane of the surface that a path has met.
+RELIEF_KERNEL PrimitivePlane hit_plane(const KernelGlobals& g,
+                                       const PathState& state,
+                                       std::uint32_t path,
+                                       const InstanceView& instance)
+{
+  if ((instance.flags & kDisplaced) != 0) {
+    const Vec3f Ng = state.hit_Ng[path], P = state.hit_P[path];
+    return {transform_point(instance.world_from_object, P),
+            transform_normal(instance.object_from_world, as_normal(Ng))};
+  }
+  return primitive_plane(path_place(g, state, path, instance), instance);
+}
+
 /// What a path has hit, without the hit.
 RELIEF_KERNEL void surface_interaction_begin(const KernelGlobals& g,
                                              const PathState& state,
@@ -132,15 +146,12 @@ surface_interaction_locate(const KernelGlobals& g, const PathState& state, std::
 {
   SurfaceInteraction at;
   surface_interaction_begin(g, state, path, at);
-  const MeshView& mesh = path_mesh(g, state, path, *at.instance);
-  const float u = state.hit_u[path], v = state.hit_v[path];
-  if (__builtin_expect((at.instance->flags & (kDisplaced | kCurves)) == 0, 1)) {
-    at.hit = surface_hit_make(mesh, *at.instance, at.triangle, u, v);
-  } else if ((at.instance->flags & kCurves) != 0) {
-    at.hit = surface_hit_curve(mesh, *at.instance, at.triangle, u, v,
-                               path_origin(state, path) + path_direction(state, path) * state.hit_t[path], wo);
+  const PrimitivePlace place = path_place(g, state, path, *at.instance);
+  if (__builtin_expect((at.instance->flags & kDisplaced) == 0, 1)) {
+    const Vec3f P_ray = path_origin(state, path) + path_direction(state, path) * state.hit_t[path];
+    at.hit = primitive_hit(place, *at.instance, P_ray, wo);
   } else {
-    at.hit = surface_hit_displaced(mesh, *at.instance, at.triangle, u, v,
+    at.hit = surface_hit_displaced(*place.mesh, *at.instance, place.primitive, place.u, place.v,
                                    {state.hit_P[path], state.hit_Ng[path], state.hit_Ns[path], state.hit_leave[path]});
   }
   surface_interaction_see<kFeatures>(state, path, wo, at);
@@ -214,11 +225,8 @@ RELIEF_KERNEL GraphPoint surface_graph_point(const KernelGlobals& g,
                                              const SurfaceInteraction& at,
                                              Vec3f wo)
 {
-  return {&path_mesh(g, state, path, *at.instance),
+  return {path_place(g, state, path, *at.instance),
           at.instance,
-          at.triangle,
-          state.hit_u[path],
-          state.hit_v[path],
           &at.hit,
           wo,
           {at.uv_width[0], at.uv_width[1]},
@@ -277,13 +285,12 @@ RELIEF_KERNEL ClosureSight closure_sight(const KernelGlobals& g,
                      path_bounces(state.bounces[path], BounceKind::kDiffuse) > 0};
   if (__builtin_expect((instance.flags & kCurves) != 0, 0)) {
     sight.enters = false;
-    if ((instance.flags & kPoints) != 0) return sight;
-    sight.tangent = curve_tangent(path_mesh(g, state, path, instance), instance, state.hit_triangle[path],
-                                  state.hit_u[path], -path_direction(state, path));
+    if (!has_strands(instance)) return sight;
+    const PrimitivePlace place = path_place(g, state, path, instance);
+    sight.tangent = primitive_strand(place, instance, -path_direction(state, path));
     if (static_cast<PathEvent>(path_event(state.flags[path])) == PathEvent::kCamera &&
         (state.flags[path] & (kPathPhoton | kPathScattered)) == 0) {
-      sight.strand_radius =
-          curve_radius(path_mesh(g, state, path, instance), instance, state.hit_triangle[path], state.hit_u[path]);
+      sight.strand_radius = primitive_strand_radius(place, instance);
     }
   }
   return sight;

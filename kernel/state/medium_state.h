@@ -25,7 +25,7 @@ struct MediumState {
   std::uint32_t stretches;   ///< of rays in media so far
   std::int32_t hit_inside;   ///< instance whose medium begins or ends at the present hit; kWholeWorld: none
   bool hit_front;            ///< the hit is on the outside
-  Vec3f hit_P, hit_Ng;       ///< of such a hit, world; the geometric normal is on the ray's side
+  Vec3f hit_P, hit_Ng;       ///< of such a hit, world; the geometric normal is on the ray's side, and not unit
   bool is_lit_first;         ///< the first event of the path was in a medium
   Vec3f before[2];           ///< if so, the path's direct and indirect light before it
   Vec3f lit;                 ///< else, light that was asked for in media before the first event

@@ -21,7 +21,9 @@ inline constexpr Affine3 kZUpFromWorld{{1, 0, 0}, {0, 0, 1}, {0, -1, 0}, {}};
 inline constexpr Affine3 kWorldFromZUp{{1, 0, 0}, {0, 0, -1}, {0, 1, 0}, {}};
 
 /// In place of the object of what fills the world.
-inline constexpr InstanceView kWorldObject{kWorldFromZUp, kZUpFromWorld};
+inline constexpr InstanceView kWorldObject{.world_from_object = kWorldFromZUp,
+                                           .object_from_world = kZUpFromWorld,
+                                           .index = kNoInstance};
 
 /// @param instance  whose medium it is, or kWholeWorld
 RELIEF_KERNEL const InstanceView& medium_object(const KernelGlobals& g, std::int32_t instance)
@@ -33,7 +35,6 @@ RELIEF_KERNEL const InstanceView& medium_object(const KernelGlobals& g, std::int
 struct MediumPoint {
   const GraphScene* scene;
   const InstanceView* node;
-  bool has_node;
   Vec3f wo;
   GraphRay ray;
   SurfaceHit hit;
@@ -47,11 +48,13 @@ RELIEF_KERNEL MediumPoint medium_point_make(const KernelGlobals& g,
                                             Vec3f D,
                                             GraphRay ray)
 {
-  MediumPoint at{&g.graph_scene, &medium_object(g, instance), instance != kWholeWorld, -D, ray, {}, {}, {}};
+  MediumPoint at{&g.graph_scene, &medium_object(g, instance), -D, ray, {}, {}, {}};
   at.hit.P = P;
   at.hit.Ng = at.hit.Ns = at.wo;
+  // (0, 0) to graphs, whose v goes up.
+  at.hit.uv[0] = at.hit.uv[1] = {0, 1};
   at.P_object = transform_point(at.node->object_from_world, P);
-  at.P_generated = at.has_node ? at.P_object * place.generated_scale + place.generated_offset : at.P_object;
+  at.P_generated = instance != kWholeWorld ? at.P_object * place.generated_scale + place.generated_offset : at.P_object;
   at.ray.length = 0;
   return at;
 }
@@ -59,48 +62,10 @@ RELIEF_KERNEL MediumPoint medium_point_make(const KernelGlobals& g,
 RELIEF_KERNEL float medium_quantity(const MediumPoint& at, const GraphInput& input)
 {
   using Q = GraphQuantity;
-  switch (input.quantity) {
-    case Q::object_x:
-      return at.P_object.x;
-    case Q::object_y:
-      return at.P_object.y;
-    case Q::object_z:
-      return at.P_object.z;
-    case Q::generated_x:
-      return at.P_generated.x;
-    case Q::generated_y:
-      return at.P_generated.y;
-    case Q::generated_z:
-      return at.P_generated.z;
-    case Q::attribute_value:
-    case Q::attribute_x:
-    case Q::attribute_y:
-    case Q::attribute_z:
-      if (!at.has_node) return 0.0f;
-      break;
-    case Q::attribute_alpha:
-      if (!at.has_node) return 1.0f;
-      break;
-    case Q::instance:
-      if (!at.has_node) return -1.0f;
-      break;
-    case Q::edge_distance:
-      return kInfinity;
-    case Q::uv0_v:
-    case Q::uv1_v:
-    case Q::parametric_x:
-    case Q::dpdx_x:
-    case Q::dpdx_y:
-    case Q::dpdx_z:
-    case Q::dpdy_x:
-    case Q::dpdy_y:
-    case Q::dpdy_z:
-      return 0.0f;
-    default:
-      break;
-  }
-  constexpr MeshView kNoMesh;
-  GraphPoint point{&kNoMesh, at.node, 0, 0.0f, 0.0f, &at.hit, at.wo, {0.0f, 0.0f}, 0.0f, at.scene, at.ray};
+  if (input.quantity == Q::generated_x) return at.P_generated.x;
+  if (input.quantity == Q::generated_y) return at.P_generated.y;
+  if (input.quantity == Q::generated_z) return at.P_generated.z;
+  GraphPoint point{{}, at.node, &at.hit, at.wo, {0.0f, 0.0f}, 0.0f, at.scene, at.ray};
   point.P_object = at.P_object;
   return graph_quantity(point, input.quantity, input.index);
 }

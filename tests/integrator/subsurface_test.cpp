@@ -170,5 +170,22 @@ TEST(Subsurface, PathsKnowNoOtherObject)
   EXPECT_NEAR(a.mean(), b.mean(), 1e-3 * a.mean());
 }
 
+/// However many there are: walks used to be given up behind the 64th.
+TEST(Subsurface, PathsPassAnyNumberOfObjects)
+{
+  const json wax{{"type", "subsurface"}, {"color", {0.7, 0.7, 0.7}}, {"radius", {4, 4, 4}}};
+  const Scene alone = cube_of(wax);
+  Scene filled = cube_of(wax);
+  for (int i = 0; i < 60; ++i) {
+    Instance inner = alone.instances.front();
+    const float scale = 0.9f - 0.01f * static_cast<float>(i);
+    for (Vec3f* axis : {&inner.world_from_object.x, &inner.world_from_object.y, &inner.world_from_object.z})
+      *axis *= scale;
+    filled.instances.push_back(inner);
+  }
+  const Rendered a = render_scene(alone, options_for(alone)), b = render_scene(filled, options_for(filled));
+  EXPECT_NEAR(a.mean(), b.mean(), 1e-3 * a.mean());
+}
+
 }  // namespace
 }  // namespace relief::test
