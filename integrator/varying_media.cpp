@@ -37,22 +37,6 @@ constexpr float kThin = 100.0f;
 
 constexpr GraphRay kSomeRay{1u << static_cast<int>(GraphRayKind::kCamera)};
 
-struct Bounds {
-  float low, high;
-};
-
-/// Whether something may be other than 0.
-bool counts(Bounds a) { return a.low < 0 || a.high > 0; }
-
-/// Of what is at least 0 and what is at least 0.
-float product(float a, float b) { return a > 0 && b > 0 ? a * b : 0; }
-
-/// What a medium may come to in a box.
-struct Rate {
-  float sigma_t = 0;  ///< 1/m: the largest channel is not more
-  bool emits = false;
-};
-
 /// What it was found to be at some of the box's points.
 struct Found {
   Vec3f least, mean, most;  ///< of sigma_t, 1/m
@@ -97,50 +81,35 @@ RateBox box_of(const Found& found, float bound, float size)
   return box;
 }
 
-/// As medium_resolve.
-/// @param at  (result of the program) -> Bounds
+/// Bounds on a closure's inputs, one after the other.
+/// @tparam At  (result of the program) -> ValueBounds
 template <typename At>
-Rate rate_of(const VaryingMedium& medium, At&& at)
-{
-  Rate rate;
-  for (std::uint32_t i = 0; i < medium.num_closures; ++i) {
-    int place = medium.closures[i].first_result;
-    const auto number = [&] { return at(place++); };
-    const auto color = [&] {
-      Bounds all{kInfinity, -kInfinity};
-      for (int c = 0; c < 3; ++c) {
-        const Bounds one = at(place++);
-        all = {std::min(all.low, one.low), std::max(all.high, one.high)};
-      }
-      return all;
-    };
-    const float weight = number().high;
-    if (!(weight > 0)) continue;
-    const Bounds first_color = color();
-    const Bounds first = number();
-    const float first_number = first.high;
-    switch (medium.closures[i].kind) {
-      case VolumeClosureKind::kAbsorption:
-        rate.sigma_t += product(1 - first_color.low, product(weight, first_number));
-        break;
-      case VolumeClosureKind::kScatter:
-        rate.sigma_t += product(first_color.high, product(weight, first_number));
-        break;
-      case VolumeClosureKind::kPrincipled: {
-        number();
-        const Bounds kept = color();
-        // c + (1 − c) k for what is absorbed, k ≤ 1: it grows with c.
-        const float k = std::max(1 - std::sqrt(std::max(kept.low, 0.0f)), 0.0f), c = std::max(first_color.high, 0.0f);
-        rate.sigma_t += product(c < 1 ? c + (1 - c) * k : c, product(weight, first_number));
-        const float strength = number().high;
-        rate.emits |= counts(color()) && strength > 0;
-        rate.emits |= number().high > 0;
-        break;
-      }
-      case VolumeClosureKind::kEmission:
-        rate.emits |= counts(first_color) && counts(first);
-        break;
+struct InputBounds {
+  const At& at;
+  int place;  ///< among the program's results
+
+  ValueBounds number() { return at(place++); }
+  ValueBounds color()
+  {
+    ValueBounds all{kInfinity, -kInfinity};
+    for (int c = 0; c < 3; ++c) {
+      const ValueBounds one = number();
+      all = {std::min(all.low, one.low), std::max(all.high, one.high)};
     }
+    return all;
+  }
+};
+
+/// As medium_resolve.
+template <typename At>
+MediumRate rate_of(const VaryingMedium& medium, const At& at)
+{
+  MediumRate rate;
+  for (std::uint32_t i = 0; i < medium.num_closures; ++i) {
+    InputBounds<At> in{at, medium.closures[i].first_result};
+    const float weight = in.number().high;
+    if (!(weight > 0)) continue;
+    volume_closure_visit(medium.closures[i].kind, [&](auto kind) { rate_add(kind, weight, in, rate); });
   }
   return rate;
 }
@@ -312,7 +281,7 @@ void VaryingMedia::make(const SceneContext& context)
     medium.closures = volume.closures.data();
     medium.num_closures = static_cast<std::uint32_t>(volume.closures.size());
     medium.shines = std::any_of(volume.closures.begin(), volume.closures.end(), [](const VolumeClosureSpec& closure) {
-      return closure.kind == VolumeClosureKind::kPrincipled || closure.kind == VolumeClosureKind::kEmission;
+      return volume_closure_visit(closure.kind, [](auto kind) { return kind.kShines; });
     });
     media_.push_back(medium);
   };
@@ -397,7 +366,7 @@ VaryingMedia::Problem VaryingMedia::add_rates(const SceneContext& context,
   Problem problem;
   for (int level = 0; level < grid.num_levels; ++level) {
     const float scale = static_cast<float>(1u << level);
-    std::vector<Rate> rates(level_size);
+    std::vector<MediumRate> rates(level_size);
     std::vector<Found> found(level_size);
     tbb::parallel_for(std::size_t{0}, (level_size + 7) / 8, [&](std::size_t group) {
       Vec3f corner[kMediumPoints];
@@ -427,7 +396,7 @@ VaryingMedia::Problem VaryingMedia::add_rates(const SceneContext& context,
         Medium media[kMediumPoints];
         varying_medium_eval(context.globals, medium, instance, P, kMediumPoints, D, kSomeRay, media);
         found[i] = found_of(media);
-        rates[i] = rate_of(medium, [&](int result) -> Bounds {
+        rates[i] = rate_of(medium, [&](int result) -> ValueBounds {
           const std::uint16_t operand = medium.program.results[result];
           if (operand == kNoGraphOperand) return {0, 0};
           const GraphRange range = graph_range_operand(medium.program, *registers, operand);

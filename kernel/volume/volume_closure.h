@@ -6,12 +6,32 @@
 
 namespace relief {
 
-enum class VolumeClosureKind : std::uint8_t { kAbsorption, kScatter, kPrincipled, kEmission };
+enum class VolumeClosureKind : std::uint8_t {
+#define VOLUME_CLOSURE(name, Type) name,
+#include "kernel/volume/volume_closures.inc"
+};
 
 /// One closure of a medium.
 struct VolumeClosureSpec {
   VolumeClosureKind kind = VolumeClosureKind::kAbsorption;
   std::uint16_t first_result = 0;  ///< its weight among the program's results, then its inputs, float by float
 };
+
+/// An input of a closure.
+struct VolumeInput {
+  const char* name;        ///< in files
+  bool is_color;           ///< three numbers, else one
+  float value;             ///< of all of them, where it is not given
+  bool is_signed = false;  ///< below 0 it means something
+};
+
+// A closure is a type with
+//   kName      in files
+//   kInputs    VolumeInput, in their order
+//   kPhases    how many phase functions it has
+//   kShines    whether it may emit
+// and two functions, both of which read those inputs that they need, from the first on:
+//   medium_add(Type, weight, VolumeNumbers&, Medium&)    adds what it comes to at a point; the weight is above 0
+//   rate_add(Type, weight, in, MediumRate&)              adds a bound of that; in.number() and in.color() are ValueBounds
 
 }  // namespace relief

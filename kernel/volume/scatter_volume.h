@@ -1,0 +1,32 @@
+// Volume Scatter.
+#pragma once
+
+#include "kernel/volume/volume_inputs.h"
+
+namespace relief {
+
+struct ScatterVolume {
+  static constexpr const char* kName = "scatter";
+  static constexpr VolumeInput kInputs[] = {{"color", true, 0.8f},
+                                            {"density", false, 1},
+                                            {"anisotropy", false, 0, true}};
+  static constexpr int kPhases = 1;
+  static constexpr bool kShines = false;
+};
+
+RELIEF_KERNEL void medium_add(ScatterVolume, float weight, VolumeNumbers& in, Medium& medium)
+{
+  const Vec3f color = in.color();
+  const Vec3f sigma_s = max(color, Vec3f{}) * (weight * max(in.number(), 0.0f));
+  medium.sigma_t += sigma_s;
+  medium_add_phase(medium, sigma_s, in.number());
+}
+
+template <typename Bounds>
+RELIEF_KERNEL void rate_add(ScatterVolume, float weight, Bounds& in, MediumRate& rate)
+{
+  const ValueBounds color = in.color();
+  rate.sigma_t += bounds_product(color.high, bounds_product(weight, in.number().high));
+}
+
+}  // namespace relief

@@ -1,0 +1,48 @@
+// What closures of volumes are made of: their inputs at a point or bounds on these, and what they add to.
+#pragma once
+
+#include "kernel/bsdf/closure_kinds.h"
+#include "kernel/graph/graph_registers.h"
+#include "kernel/volume/medium.h"
+#include "kernel/volume/volume_closure.h"
+
+namespace relief {
+
+/// A closure's inputs at a point, one after the other.
+struct VolumeNumbers {
+  const GraphLane& at;
+  int place;  ///< among the program's results
+
+  float number() { return closure_input(graph_result(at, place++)); }
+  Vec3f color()
+  {
+    const float r = number(), g = number();
+    return Vec3f{r, g, number()};
+  }
+};
+
+/// Adds what scatters.
+/// @param sigma_s  1/m
+RELIEF_KERNEL void medium_add_phase(Medium& medium, Vec3f sigma_s, float anisotropy)
+{
+  medium.phases[medium.num_phases++] = {sigma_s, clamp(anisotropy, -kMostAnisotropy, kMostAnisotropy)};
+}
+
+/// Bounds on a number, or on all of a colour's.
+struct ValueBounds {
+  float low, high;
+};
+
+/// Whether something may be other than 0.
+RELIEF_KERNEL bool counts(ValueBounds a) { return a.low < 0.0f || a.high > 0.0f; }
+
+/// Of bounds on what is at least 0; there is none below.
+RELIEF_KERNEL float bounds_product(float a, float b) { return a > 0.0f && b > 0.0f ? a * b : 0.0f; }
+
+/// What a medium may come to somewhere.
+struct MediumRate {
+  float sigma_t = 0;  ///< 1/m: the largest channel is not more
+  bool emits = false;
+};
+
+}  // namespace relief
