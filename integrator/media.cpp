@@ -33,6 +33,17 @@ Vec3f transmittance_of(const KernelGlobals& g, const MediumState& inside, const 
   return medium_walk_transmittance(g, walk, way.ray);
 }
 
+/// Whether what an instance bounds does no more than to darken what is seen through its surface. Openings are in sight there, and such
+/// meshes are often sewn from parts that meet up to rounding alone.
+bool is_absorbing_glass(const Scene& scene, const Instance& instance)
+{
+  const Material& material = scene.materials[static_cast<std::size_t>(instance.material_index)];
+  const auto medium = static_cast<std::size_t>(material.medium_index);
+  const bool varies = medium < scene.varying_media.size() && !scene.varying_media[medium].closures.empty();
+  return !material.is_boundary && !varies && scene.media[medium].num_phases == 0 &&
+         is_zero(scene.media[medium].emission);
+}
+
 }  // namespace
 
 Media::Media(const SceneContext& context) : context_(context), exist_(!context.media.empty())
@@ -51,6 +62,7 @@ std::vector<std::string> Media::problems() const
   constexpr std::size_t kMostNamed = 10;
   for (const Filled& filled : filled_) {
     const Instance& instance = context_.scene.instances[static_cast<std::size_t>(filled.instance)];
+    if (is_absorbing_glass(context_.scene, instance)) continue;
     if (!told.try_emplace(instance.mesh_index).second || out.size() >= kMostNamed) continue;
     const Mesh& mesh = context_.scene.meshes[static_cast<std::size_t>(instance.mesh_index)];
     // By places, not by numbers: what is sharp or unwrapped has vertices twice.

@@ -7,7 +7,6 @@
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
-#include "integrator/camera_medium.h"
 #include "integrator/flush_denormals.h"
 #include "integrator/media.h"
 #include "integrator/photon_guide.h"
@@ -124,20 +123,11 @@ Film pilot_film(const RenderSettings& settings, double num_pixels, KernelGlobals
   return film;
 }
 
-/// What rays of a pilot may start in.
-struct PilotMedia {
-  explicit PilotMedia(const SceneContext& context) : of_camera(context), all(context) {}
-
-  CameraMedium of_camera;
-  Media all;
-};
-
-Wavefront pilot_worker(const SceneContext& context, const PilotMedia& media, const std::atomic<bool>& stop)
+Wavefront pilot_worker(const SceneContext& context, const Media& media, const std::atomic<bool>& stop)
 {
   Wavefront worker(context.columns(true, false));
   worker.stop = &stop;
-  if (media.of_camera.exists()) worker.camera_medium = &media.of_camera;
-  if (media.all.exist()) worker.media = &media.all;
+  if (media.exist()) worker.media = &media;
   return worker;
 }
 
@@ -155,7 +145,7 @@ Pilot pilot_run(const SceneContext& context,
   KernelGlobals g = of_render;
   Film film = pilot_film(settings, num_pixels, g);
   const StageTable& stages = stage_table_select();
-  const PilotMedia media(context);
+  const Media media(context);
   tbb::enumerable_thread_specific<Wavefront> workers([&] { return pilot_worker(context, media, stop); });
   // Where they carry what they have, it is the beauty alone that is asked for.
   double factors = sources.factors.empty() ? kTrace : 0.0;
@@ -217,7 +207,7 @@ void photons_guide(const SceneContext& context,
   // Other numbers than the render's: chances that follow from its own would favour what they bring.
   g.seed = ~g.seed;
   const StageTable& stages = stage_table_select();
-  const PilotMedia media(context);
+  const Media media(context);
   tbb::enumerable_thread_specific<Wavefront> workers([&] { return pilot_worker(context, media, stop); });
   std::vector<std::vector<RecordedRay>> rays(static_cast<std::size_t>(film.num_tiles()));
   tbb::parallel_for(0, film.num_tiles(), [&](int tile) {
@@ -377,7 +367,8 @@ PhotonChoice photon_choice_make(const SceneContext& context,
       return choice;
     }
     without = pilot.seen_error + pilot.caustic_error;
-    choice.cost_ratio = cost_ratio(pilot, !context.media.empty(), paths, photons_wanted(settings) / num_pixels);
+    choice.cost_ratio =
+        cost_ratio(pilot, shows_photons_in_media(context.scene), paths, photons_wanted(settings) / num_pixels);
     // At best: no more is seen of the noise than without caustics.
     choice.error_ratio = error_ratio(pilot.seen_error);
     constexpr double kByFar = 0.6;

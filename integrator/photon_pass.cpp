@@ -240,7 +240,7 @@ void PhotonPass::keep_to_memory(const KernelGlobals& g, const StageTable& stages
   const double most_kept = std::max(1.0, settings_.memory_mib * 1048576.0 / kBytes);
   // A path is kept at each surface that it meets, if they are all casters that show caustics: rough glass for one.
   // And before each of them in a medium.
-  const double kinds = context_.media.empty() ? 1 : 2;
+  const double kinds = shows_photons_in_media(context_.scene) ? 2 : 1;
   if (photons_a_pass_ * (g.limits.total + 1.0) * kinds <= most_kept) return;
   KeptPhotons kept;
   worker.trace_photons(g, *context_.accel, stages, context_.surface_kernels(true), sources_.view(photons_a_pass_), 0,

@@ -11,7 +11,6 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#include "integrator/camera_medium.h"
 #include "integrator/checkpoint.h"
 #include "integrator/error_history.h"
 #include "integrator/flush_denormals.h"
@@ -170,7 +169,6 @@ class RenderRun {
   PhotonChoice choice_;
   std::optional<PhotonPass> photons_;
   const WavefrontColumns columns_ = context_.columns(choice_.photons, globals_.film.layout.light_by_event);
-  const CameraMedium camera_medium_{context_};
   const Media media_{context_};
   Workers workers_;
   const std::uint32_t wanted_ = samples_wanted(options_);
@@ -234,7 +232,6 @@ RenderRun::RenderRun(const Scene& scene,
       workers_([this] {
         Wavefront worker(columns_);
         worker.stop = &end_.reached();
-        if (camera_medium_.exists()) worker.camera_medium = &camera_medium_;
         if (media_.exist()) worker.media = &media_;
         return worker;
       }),
@@ -245,7 +242,6 @@ RenderRun::RenderRun(const Scene& scene,
   if (choice_.photons) photons_.emplace(context_, settings_, std::move(choice_.sources));
   for (std::string& text : media_.problems()) stats_.warnings.push_back(std::move(text));
   for (const std::string& text : context_.varying_media.problems()) stats_.warnings.push_back(text);
-  for (std::string& text : camera_medium_.overlaps()) stats_.warnings.push_back(std::move(text));
   std::iota(active_.begin(), active_.end(), 0);
 }
 

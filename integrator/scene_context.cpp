@@ -65,19 +65,6 @@ std::uint32_t events_switched_off(CausticKinds kinds)
   return kOff[static_cast<int>(kinds)];
 }
 
-/// Whether something fills space in which photons may show.
-bool shows_photons_in_media(const Scene& scene)
-{
-  const auto scatters = [](const Medium& medium) {
-    return std::any_of(medium.phases, medium.phases + medium.num_phases,
-                       [](const Phase& phase) { return max_component(phase.sigma_s) > 0.0f; });
-  };
-  const auto varies = [](const VolumeProgram& volume) { return !volume.closures.empty(); };
-  return std::any_of(scene.media.begin(), scene.media.end(), scatters) ||
-         std::any_of(scene.varying_media.begin(), scene.varying_media.end(), varies) ||
-         (scene.environment.medium && scatters(*scene.environment.medium)) || varies(scene.environment.varying_medium);
-}
-
 /// Leaves to paths the caustics of what shines from infinitely far away through a medium that fills all space. Where photons would start
 /// from, and what would be left of them, cannot be said.
 void leave_what_is_far_to_paths(LightSet& lights)
@@ -129,6 +116,18 @@ void leave_out_what_is_far(const Medium& world, KernelGlobals& g)
 }
 
 }  // namespace
+
+bool shows_photons_in_media(const Scene& scene)
+{
+  const auto scatters = [](const Medium& medium) {
+    return std::any_of(medium.phases, medium.phases + medium.num_phases,
+                       [](const Phase& phase) { return max_component(phase.sigma_s) > 0.0f; });
+  };
+  const auto varies = [](const VolumeProgram& volume) { return !volume.closures.empty(); };
+  return std::any_of(scene.media.begin(), scene.media.end(), scatters) ||
+         std::any_of(scene.varying_media.begin(), scene.varying_media.end(), varies) ||
+         (scene.environment.medium && scatters(*scene.environment.medium)) || varies(scene.environment.varying_medium);
+}
 
 SceneContext::~SceneContext() = default;
 

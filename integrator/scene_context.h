@@ -59,4 +59,7 @@ struct SceneContext : SceneViews {
   void make_views();
 };
 
+/// Whether something fills space in which photons may show.
+bool shows_photons_in_media(const Scene& scene);
+
 }  // namespace relief

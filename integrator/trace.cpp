@@ -5,7 +5,6 @@
 
 #include <tbb/enumerable_thread_specific.h>
 
-#include "integrator/camera_medium.h"
 #include "integrator/flush_denormals.h"
 #include "integrator/media.h"
 #include "integrator/photon_benefit.h"
@@ -146,8 +145,6 @@ PathReplay trace_path(const Scene& scene, const RenderOptions& options, const Pi
   replay.warnings = context.displacements.warnings();
   Wavefront wavefront(context.columns(caustics, false));
   wavefront.recorder = &replay.rays;
-  const CameraMedium camera_medium(context);
-  if (camera_medium.exists()) wavefront.camera_medium = &camera_medium;
   const Media media(context);
   if (media.exist()) wavefront.media = &media;
   // The whole tile, as in the render: forks of its paths share the room of its batch.

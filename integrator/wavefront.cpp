@@ -6,7 +6,6 @@
 #include <numeric>
 #include <utility>
 
-#include "integrator/camera_medium.h"
 #include "integrator/graph_stop.h"
 #include "integrator/media.h"
 #include "integrator/subsurface_stage.h"
@@ -152,7 +151,6 @@ bool Wavefront::run(const KernelGlobals& g,
 
   met_.surface_kernel = surface_kernel.data();
   const std::uint32_t num_paths = stages.generate(g, state_, batch);
-  if (camera_medium != nullptr) camera_medium->apply(state_, num_paths);
   active_.size = num_paths;
   for (std::uint32_t i = 0; i < active_.size; ++i) active_.paths[i] = i;
   if (media != nullptr) media->start(state_, active_);

@@ -49,7 +49,6 @@ struct WavefrontColumns {
   bool gloss = false;         ///< lights, few, are chosen by what closures' gloss shows of them
 };
 
-class CameraMedium;
 class Media;
 
 /// Owned by one thread at a time.
@@ -83,7 +82,6 @@ class Wavefront {
 
   static std::size_t bytes(const WavefrontColumns& columns);
 
-  const CameraMedium* camera_medium = nullptr;   ///< null: camera rays start in none
   const Media* media = nullptr;                  ///< null: there are none
   std::vector<RecordedRay>* recorder = nullptr;  ///< receives every ray of the batch, if set
   const std::atomic<bool>* stop = nullptr;       ///< true: searches in displaced meshes are given up; null: never

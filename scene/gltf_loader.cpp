@@ -712,6 +712,24 @@ void GltfLoader::read_programs(const GltfDocument& document,
   material.is_boundary = material.medium_index >= 0 && material_has_no_surface(material);
 }
 
+/// Lets what a material's meshes bound absorb light, besides what fills them already.
+/// @param sigma_a  1/m
+void GltfLoader::add_absorption(const std::string& place, Vec3f sigma_a, Material& material)
+{
+  if (material.medium_index < 0) {
+    material.medium_index = static_cast<int>(scene_.media.size());
+    scene_.media.emplace_back().sigma_t = sigma_a;
+    scene_.varying_media.emplace_back();
+    return;
+  }
+  const auto medium = static_cast<std::size_t>(material.medium_index);
+  if (scene_.varying_media[medium].closures.empty()) {
+    scene_.media[medium].sigma_t += sigma_a;
+  } else {
+    warnings_.add(place + ": what KHR_materials_volume absorbs is left out beside a RELIEF_volume that varies");
+  }
+}
+
 int GltfLoader::material_of(const GltfDocument& document, int material_index)
 {
   // All files share glTF's default material.
@@ -724,10 +742,14 @@ int GltfLoader::material_of(const GltfDocument& document, int material_index)
   Material material;
   std::string name = "default";
   if (owner != nullptr) {
-    material = khronos_material(document, material_index, textures_, warnings_);
+    const KhronosMaterial khronos = khronos_material(document, material_index, textures_, warnings_);
+    material = khronos.material;
     name = document.core.materials[static_cast<std::size_t>(material_index)].name;
     const std::string path = "/materials/" + std::to_string(material_index);
     read_programs(document, document.element("materials", static_cast<std::size_t>(material_index)), path, material);
+    if (!is_zero(khronos.sigma_a) && material_lets_light_in(material)) {
+      add_absorption(document.file + ": " + path, khronos.sigma_a, material);
+    }
     if (auto displacement = relief_displacement(document, material_index, height_maps_, height_graphs_, warnings_)) {
       material.displacement_index = static_cast<int>(scene_.displacements.size());
       scene_.displacements.push_back(*displacement);

@@ -117,6 +117,7 @@ class GltfLoader {
                      const nlohmann::json& json,
                      const std::string& path,
                      Material& material);
+  void add_absorption(const std::string& place, Vec3f sigma_a, Material& material);
   /// Of a primitive where it stands, after what references say about it.
   /// @param own  index of its own material
   int placed_material(const PlacedNode& node, int own);

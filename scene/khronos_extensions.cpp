@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "kernel/volume/medium.h"
 #include "scene/gltf_accessor.h"
 #include "scene/relief_extensions.h"
 
@@ -60,7 +61,8 @@ void read_core(const MaterialContext& c, Material& m, int index)
   m.emission_texture = c.texture(material, "emissiveTexture", TextureColor::kSrgb);
 }
 
-void read_transmission(const MaterialContext& c, Material& m)
+/// @param sigma_a  see KhronosMaterial
+void read_transmission(const MaterialContext& c, Material& m, Vec3f& sigma_a)
 {
   c.extension("KHR_materials_transmission", [&](const JsonReader& r) {
     m.transmission = r.factor("transmissionFactor", 0, c.warnings);
@@ -75,16 +77,16 @@ void read_transmission(const MaterialContext& c, Material& m)
   });
   c.extension("KHR_materials_volume", [&](const JsonReader& r) {
     m.thickness = r.number_f("thicknessFactor", 0, 0, kNoLimit);
-    m.attenuation_color = r.color("attenuationColor", {1, 1, 1});
-    m.attenuation_distance = r.number_f("attenuationDistance", kInfinity, 0, kNoLimit);
-    if (!(m.attenuation_distance > 0)) {
+    const Vec3f color = r.color("attenuationColor", {1, 1, 1});
+    const float distance = r.number_f("attenuationDistance", kInfinity, 0, kNoLimit);
+    if (!(distance > 0)) {
       r.fail("attenuationDistance", "a number > 0");
     }
-    if (max_component(m.attenuation_color) > 1) {
+    if (max_component(color) > 1) {
       c.warnings.add(r.file() + ": " + json_path_join(r.path(), "attenuationColor") +
                      ": expected numbers within 0…1; those above count as 1");
-      m.attenuation_color = min(m.attenuation_color, splat3(1));
     }
+    sigma_a = volume_sigma_a(min(color, splat3(1)), distance);
     if (r.has("thicknessTexture")) {
       // The texture scales a thickness that rasterizers pretend; a ray measures the real one.
       static_cast<void>(r.object("thicknessTexture"));
@@ -190,13 +192,14 @@ TextureRef khronos_texture_ref(const GltfDocument& document,
   return ref;
 }
 
-Material khronos_material(const GltfDocument& document, int index, TextureTable& textures, Warnings& warnings)
+KhronosMaterial khronos_material(const GltfDocument& document, int index, TextureTable& textures, Warnings& warnings)
 {
   const MaterialContext c{document, document.element("materials", static_cast<std::size_t>(index)),
                           "/materials/" + std::to_string(index), textures, warnings};
-  Material m;
+  KhronosMaterial out;
+  Material& m = out.material;
   read_core(c, m, index);
-  read_transmission(c, m);
+  read_transmission(c, m, out.sigma_a);
   read_layers(c, m);
   c.extension("KHR_materials_emissive_strength",
               [&](const JsonReader& r) { m.emission *= r.number_f("emissiveStrength", 1, 0, kNoLimit); });
@@ -204,7 +207,7 @@ Material khronos_material(const GltfDocument& document, int index, TextureTable&
   if (!is_finite(m.emission)) {
     throw SceneError(document.file, c.path + "/emissiveFactor", "a finite radiance", "one beyond single precision");
   }
-  return m;
+  return out;
 }
 
 std::vector<Light> khronos_node_light(const GltfDocument& document,

@@ -37,8 +37,14 @@ void khronos_texture_transform(TextureRef& ref,
 /// Same, from the extension's JSON; also its texCoord.
 void khronos_texture_transform(TextureRef& ref, const JsonReader& extension, Warnings& warnings);
 
+/// A material as glTF has it.
+struct KhronosMaterial {
+  Material material;
+  Vec3f sigma_a;  ///< what KHR_materials_volume absorbs, where light gets into a mesh through glass, 1/m
+};
+
 /// Material `index` of a document: core and KHR_materials_*; RELIEF_displacement is read by relief_displacement.
-Material khronos_material(const GltfDocument& document, int index, TextureTable& textures, Warnings& warnings);
+KhronosMaterial khronos_material(const GltfDocument& document, int index, TextureTable& textures, Warnings& warnings);
 
 /// Makes a program of the graph of a light; returns its place in Scene::graphs.
 using LampGraphReader = std::function<int(const JsonReader& graph)>;

@@ -1,5 +1,7 @@
 #include "scene/material_traits.h"
 
+#include "kernel/graph/graph_program.h"
+
 namespace relief {
 
 std::array<const TextureRef*, 12> material_textures(const Material& m)
@@ -33,6 +35,12 @@ bool material_casts_caustics(const Material& material)
   const bool bends = material.transmission > 0 || material.metallic >= 0.5f;
   const float roughest = material.displacement_index >= 0 ? kRoughestDisplaced : kRoughest;
   return bends && !material.unlit && !material.depends_on_ray && material.roughness <= roughest;
+}
+
+bool material_lets_light_in(const Material& m)
+{
+  const bool may_be_given = (m.graph_outputs >> static_cast<unsigned>(GraphOutput::transmission) & 1u) != 0;
+  return (m.transmission > 0.0f || may_be_given) && (m.thickness > 0.0f || m.has_closures);
 }
 
 bool material_has_no_surface(const Material& m)

@@ -17,6 +17,9 @@ bool material_is_light(const Material& material);
 /// metal whose roughness factor is at most one half, beyond which light is spread and paths find it.
 bool material_casts_caustics(const Material& material);
 
+/// Whether light gets through a material into what its meshes bound: it is glass, and no thin wall.
+bool material_lets_light_in(const Material& material);
+
 /// Whether nothing of a surface is there, whatever its meshes bound.
 bool material_has_no_surface(const Material& material);
 

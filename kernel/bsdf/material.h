@@ -30,8 +30,6 @@ struct Material {
   TextureRef transmission_texture;  ///< R
   float ior = 1.5f;
   float thickness = 0;  ///< 0: thin wall; otherwise the mesh bounds a volume
-  Vec3f attenuation_color{1, 1, 1};
-  float attenuation_distance = kInfinity;  ///< metres, world space
 
   float clearcoat = 0, clearcoat_roughness = 0;
   TextureRef clearcoat_texture;            ///< R
@@ -51,8 +49,8 @@ struct Material {
 
   int graph_index = -1;  ///< into KernelGlobals::graphs, which gives factors in place of those above; −1: none
   std::uint32_t graph_outputs = 0;  ///< bit GraphOutput: what it gives
-  bool has_closures = false;        ///< the graph's closures scatter, in place of everything above but the emission and
-                                    ///< what absorbs; transmission, metallic, roughness sum them up
+  bool has_closures = false;        ///< the graph's closures scatter, in place of everything above but the emission;
+                                    ///< transmission, metallic, roughness sum them up
   bool scatters_below = false;      ///< some closure lets paths go below the surface
   bool depends_on_ray = false;      ///< what the graph gives differs by how a ray came, so that photons cannot be told
   int transparency_index = -1;      ///< into KernelGlobals::graphs: its transparent closures alone; −1: none

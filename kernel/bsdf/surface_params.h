@@ -23,20 +23,9 @@ struct SurfaceParams {
   Vec3f sheen_color{0, 0, 0};     ///< [0, 1]
   float sheen_roughness = 0;      ///< [0, 1]
   Vec3f emission{0, 0, 0};        ///< radiance
-  Vec3f sigma_a{0, 0, 0};         ///< absorption inside, 1/m
   bool thin = true;               ///< transmission passes a wall without refraction; otherwise the mesh bounds a solid
   bool unlit = false;             ///< the base colour is emitted (already added to `emission`), nothing is scattered
 };
-
-/// Absorption coefficient that turns white into `color` over `distance`.
-/// @param color     [0, 1]; darker than 1e-6 counts as 1e-6, so that the coefficient stays finite
-/// @param distance  metres, > 0; infinity: no absorption
-/// @return          1/m
-RELIEF_KERNEL Vec3f volume_sigma_a(Vec3f color, float distance)
-{
-  const auto channel = [distance](float c) { return -std::log(clamp(c, 1e-6f, 1.0f)) / distance; };
-  return {channel(color.x), channel(color.y), channel(color.z)};
-}
 
 /// Value of a material's texture at a point.
 /// @param uv        the mesh's texture coordinate sets
@@ -99,9 +88,6 @@ RELIEF_KERNEL SurfaceParams surface_params_eval(const Material& m,
   if constexpr ((kFeatures & kFeatureTransmission) != 0) {
     p.transmission = saturate(m.transmission * texel(m.transmission_texture).x);
     p.thin = !(m.thickness > 0.0f);
-    if (p.transmission > 0.0f && !p.thin && m.attenuation_distance < kInfinity) {
-      p.sigma_a = volume_sigma_a(m.attenuation_color, m.attenuation_distance);
-    }
   }
   if constexpr ((kFeatures & kFeatureLayers) != 0) {
     if (m.clearcoat > 0.0f) {

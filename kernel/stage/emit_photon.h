@@ -157,7 +157,6 @@ RELIEF_KERNEL bool emit_photon(const KernelGlobals& g,
   // One, since none means a camera ray.
   state.bounces[path] = 1;
   state.flags[path] = kPathPhoton | hidden_from << kPathHiddenShift;
-  state.sigma_a[path] = Vec3f{};
   state.cone_width[path] = state.cone_spread[path] = 0.0f;
   state.least_pdf[path] = kInfinity;
   if (state.motion.time != nullptr) state.motion.time[path] = g.caustics.time;

@@ -71,7 +71,6 @@ RELIEF_KERNEL void generate_camera_path(const KernelGlobals& g,
   state.bounces[path] = 0;
   state.flags[path] = 0;
   if (__builtin_expect(state.light_passes != nullptr, 0)) state.light_passes[path] = {};
-  state.sigma_a[path] = Vec3f{};
   state.first_throughput[path] = 1.0f;
   state.cone_width[path] = ray.cone_width;
   state.cone_spread[path] = ray.cone_spread;

@@ -12,7 +12,6 @@ namespace relief {
 RELIEF_KERNEL Vec3f path_origin(const PathState& s, std::uint32_t i) { return s.O[i]; }
 RELIEF_KERNEL Vec3f path_direction(const PathState& s, std::uint32_t i) { return s.D[i]; }
 RELIEF_KERNEL Vec3f path_throughput(const PathState& s, std::uint32_t i) { return s.throughput[i]; }
-RELIEF_KERNEL Vec3f path_sigma_a(const PathState& s, std::uint32_t i) { return s.sigma_a[i]; }
 /// What the path's last scattering event told the choice of a light.
 RELIEF_KERNEL LightReceiver path_scattered_at(const PathState& s, std::uint32_t i)
 {
@@ -361,14 +360,6 @@ RELIEF_KERNEL float path_ray_length(const KernelGlobals& g, const PathState& sta
   const bool is_camera = static_cast<PathEvent>(path_event(state.flags[path])) == PathEvent::kCamera;
   if (!is_camera || !(g.camera.clip_start > 0.0f)) return state.hit_t[path];
   return state.hit_t[path] - g.camera.clip_start / dot(path_direction(state, path), g.camera_forward);
-}
-
-/// Share of light left after a stretch of the path's medium (Beer–Lambert).
-/// @param distance  metres; infinite stretches of an absorbing medium transmit nothing
-RELIEF_KERNEL Vec3f path_transmittance(Vec3f sigma_a, float distance)
-{
-  const auto axis = [distance](float sigma) { return sigma > 0.0f ? std::exp(-sigma * distance) : 1.0f; };
-  return {axis(sigma_a.x), axis(sigma_a.y), axis(sigma_a.z)};
 }
 
 }  // namespace relief

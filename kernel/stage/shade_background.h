@@ -19,7 +19,6 @@ RELIEF_KERNEL void shade_sun_disks(const KernelGlobals& g, PathState& state, std
     if (path_leaves_to_photons(g, state.flags[path], static_cast<std::int32_t>(index))) continue;
     Vec3f radiance = sun_light_radiance(sun);
     if (!sun.is_even) radiance = emitter_radiance(g, sun, radiance, {{}, {}, -D, lamp_ray(g, state, path)});
-    radiance *= path_transmittance(path_sigma_a(state, path), kInfinity);
     const Vec3f seen = path_throughput(state, path) * radiance;
     if (is_zero(seen)) continue;
     if (scatterings == 0) film_add_emission(g.film, state.pixel[path], seen);
@@ -34,7 +33,7 @@ RELIEF_KERNEL void shade_sun_disks(const KernelGlobals& g, PathState& state, std
 }
 
 /// Adds the radiance of the environment and of suns, weighted against next-event estimation.
-/// Reads the ray, throughput, pdf, scatter normal and medium; writes the radiance. The path ends.
+/// Reads the ray, throughput, pdf and scatter normal; writes the radiance. The path ends.
 RELIEF_KERNEL void shade_background(const KernelGlobals& g, PathState& state, std::uint32_t path, Counters& counters)
 {
   ++counters.background_hits;
@@ -45,8 +44,7 @@ RELIEF_KERNEL void shade_background(const KernelGlobals& g, PathState& state, st
                                          : (g.environment_hidden_from & path_ray_kind(state.flags[path])) == 0;
   // What has passed through clear glass, or a filter, leaves as much of the film clear as it has kept of its light.
   if (!g.environment_visible_to_camera && (state.flags[path] & kPathCovers) == 0) {
-    const float share =
-        light_scalar(path_throughput(state, path) * path_transmittance(path_sigma_a(state, path), kInfinity));
+    const float share = light_scalar(path_throughput(state, path));
     film_add_clear(g.film, state.pixel[path], (state.flags[path] & kPathSawSurface) != 0 ? share : share - 1.0f);
     if (scatterings > 0) return;
   }
@@ -56,7 +54,6 @@ RELIEF_KERNEL void shade_background(const KernelGlobals& g, PathState& state, st
   const bool is_backdrop = scatterings == 0 && g.has_backdrop;
   Vec3f radiance = environment_eval(is_backdrop ? g.backdrop : g.lights.environment, D);
   if (is_zero(radiance)) return;
-  radiance *= path_transmittance(path_sigma_a(state, path), kInfinity);
   if (is_kept) film_add_environment(g.film, state.pixel[path], path_throughput(state, path) * radiance);
   if (!is_shown) return;
   path_add_denoising(g, state, path, path_throughput(state, path) * radiance);

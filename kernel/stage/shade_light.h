@@ -10,7 +10,7 @@
 namespace relief {
 
 /// Adds the light's radiance, weighted against next-event estimation, and sends the ray on behind the light.
-/// Reads the ray, hit, throughput, pdf, scatter normal and medium; writes the radiance and t_min.
+/// Reads the ray, hit, throughput, pdf and scatter normal; writes the radiance and t_min.
 /// Next: intersect closest.
 RELIEF_KERNEL void shade_light(const KernelGlobals& g, PathState& state, std::uint32_t path)
 {
@@ -29,7 +29,6 @@ RELIEF_KERNEL void shade_light(const KernelGlobals& g, PathState& state, std::ui
         emitter_radiance(g, light, radiance, {path_origin(state, path) + D * t, {}, -D, lamp_ray(g, state, path)});
   }
   if (!is_zero(radiance) && !by_photons) {
-    radiance *= path_transmittance(path_sigma_a(state, path), path_ray_length(g, state, path));
     const Vec3f seen = path_throughput(state, path) * radiance;
     if (scatterings == 0) film_add_emission(g.film, state.pixel[path], seen);
     path_add_denoising(g, state, path, seen);

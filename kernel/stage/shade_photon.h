@@ -67,10 +67,6 @@ RELIEF_KERNEL bool shade_photon_scatter(const KernelGlobals& g,
   }
   const std::uint32_t flags = path_flags_after(state.flags[path], event);
   state.flags[path] = sharp ? (flags | kPathCaustic) & ~std::uint32_t{kPathAfterSoft} : flags | kPathAfterSoft;
-  if (transmitted && at.transmits && !at.params.thin) {
-    const Vec3f inside = side.front ? at.params.sigma_a : Vec3f{};
-    state.sigma_a[path] = inside;
-  }
   return path_bounces(state.bounces[path], BounceKind::kAll) - 1 <= g.limits.total;
 }
 
@@ -96,10 +92,7 @@ RELIEF_KERNEL void shade_photon(const KernelGlobals& g,
   const bool aimed_at = sources.target_of[state.hit_object[path]] == static_cast<std::int32_t>(state.pixel[path]);
   if (at.params.unlit || !(has_scattered || aimed_at)) return;
 
-  Vec3f sigma_a = path_sigma_a(state, path);
-  // A light within glass: camera paths have come in through its surface and know.
-  if (!has_scattered && !at.side.front && at.transmits && !at.params.thin) sigma_a = at.params.sigma_a;
-  const Vec3f throughput = path_throughput(state, path) * path_transmittance(sigma_a, state.hit_t[path]);
+  const Vec3f throughput = path_throughput(state, path);
   if (is_zero(throughput)) return;
   surface_interaction_frame<kFeatures>(g, state, path, wo, at);
   const bool caster = (flags & kCausticCaster) != 0;

@@ -54,21 +54,19 @@ RELIEF_KERNEL void shade_surface_emission(const KernelGlobals& g,
 
 /// Tells the film of what is a hole in it: closures that are, and all of an object but what lets rays through. Whatever else there
 /// is of the surface, the film gets as well.
-/// @param transmittance  of the path's ray
-/// @return               whether the path ends here unless it is let through
+/// @return  whether the path ends here unless it is let through
 template <unsigned kFeatures>
 RELIEF_KERNEL bool shade_surface_holdout(const KernelGlobals& g,
                                          const PathState& state,
                                          std::uint32_t path,
-                                         const SurfaceInteraction& at,
-                                         Vec3f transmittance)
+                                         const SurfaceInteraction& at)
 {
   if ((state.flags[path] & kPathCovers) != 0) return false;
   const bool is_object = (at.instance->flags & kHoldout) != 0;
   const float opacity = 1.0f - (1.0f - at.params.alpha) * light_scalar(at.passed);
   const float hole = is_object ? opacity : at.holdout;
   if (hole > 0.0f) {
-    const float share = hole * light_scalar(path_throughput(state, path) * transmittance);
+    const float share = hole * light_scalar(path_throughput(state, path));
     film_add_holdout(g.film, state.pixel[path], share);
     film_add_clear(g.film, state.pixel[path], share);
   }
@@ -108,17 +106,13 @@ RELIEF_KERNEL void shade_surface_meet(const KernelGlobals& g,
 {
   ++counters.surface_hits;
   constexpr bool kMixture = (kFeatures & kFeatureMixture) != 0;
-  const Vec3f sigma_a = path_sigma_a(state, path);
-  // Whatever stands in a medium, of glass or not.
-  const Vec3f transmittance =
-      is_zero(sigma_a) ? Vec3f{1, 1, 1} : path_transmittance(sigma_a, path_ray_length(g, state, path));
-  visit.throughput = path_throughput(state, path) * transmittance;
+  visit.throughput = path_throughput(state, path);
   visit.cone = at.cone;
   if ((at.instance->flags & kDisplaced) != 0) visit.cone.width = min(visit.cone.width, state.hit_width[path]);
   visit.chosen.probability = 0.0f;
   visit.way = SurfaceWay::kEnds;
   const bool last = path_is_last(g, state, path);
-  const bool is_held = shade_surface_holdout<kFeatures>(g, state, path, at, transmittance);
+  const bool is_held = shade_surface_holdout<kFeatures>(g, state, path, at);
   // Closures emit, and are lit, whether or not others let the path through.
   if (kMixture && !is_held) {
     shade_surface_emission<kFeatures>(g, state, path, at, visit.throughput);

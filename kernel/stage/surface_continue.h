@@ -115,12 +115,6 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
                                                                       : PathEvent::kGlossy);
   const bool is_clear = transmitted && !diffuse && bsdf.roughness <= g.clear_alpha;
   if (!is_clear) state.flags[path] |= kPathCovers;
-  if constexpr ((kFeatures & kFeatureTransmission) != 0) {
-    if (transmitted && at.transmits && !at.params.thin) {
-      const Vec3f inside = side.front ? at.params.sigma_a : Vec3f{};
-      state.sigma_a[path] = inside;
-    }
-  }
   const RayCone cone = ray_cone_scatter(event.cone, bsdf.roughness);
   state.cone_width[path] = cone.width;
   state.cone_spread[path] = cone.spread;

@@ -40,7 +40,7 @@ struct SurfaceInteraction {
   std::uint32_t triangle;
   SurfaceHit hit;
   ShadingSide side;        ///< Ng and front are known from the start, the rest is made by surface_interaction_frame
-  SurfaceParams params;    ///< of closures their emission, alpha and sigma_a alone
+  SurfaceParams params;    ///< of closures their emission and alpha alone
   bool transmits = false;  ///< light may come through from behind
   RayCone cone;            ///< at the hit
   float uv_width[2];       ///< texture footprint in each set's uv units
@@ -352,9 +352,6 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   p.emission = build.emission + m.emission * xyz(material_texture_sample<kFeatures>(m.emission_texture, g.textures,
                                                                                     at.hit.uv, at.uv_width));
   at.transmits = build.transmits;
-  if (build.transmits && m.attenuation_distance < kInfinity) {
-    p.sigma_a = volume_sigma_a(m.attenuation_color, m.attenuation_distance);
-  }
   at.holdout = clamp(build.holdout, 0.0f, 1.0f);
   const LobesSum sum = lobes_sum(lobes);
   const float scattered = at.holdout + sum.probability;

@@ -66,12 +66,7 @@ RELIEF_KERNEL void shade_surface_lit(const KernelGlobals& g,
   }
   const float cos_i = __builtin_fabsf(wi.z);
   const float weight = path_light_weight(g.light_technique, light.pdf, bsdf.pdf, is_found_here_alone);
-  Vec3f gain = event.throughput * bsdf.f * answer.radiance * (cos_i * weight / light.pdf);
-  // A lamp that stands in the path's medium; on the other side of a surface there is another.
-  if (const Vec3f sigma_a = path_sigma_a(state, path); __builtin_expect(!is_zero(sigma_a), 0)) {
-    const bool is_here = light.distance < kInfinity && (dot(light.wi, at.side.Ng) > 0.0f);
-    if (is_here) gain *= path_transmittance(sigma_a, light.distance);
-  }
+  const Vec3f gain = event.throughput * bsdf.f * answer.radiance * (cos_i * weight / light.pdf);
   if (is_zero(gain)) return;
 
   const Vec3f O = surface_ray_origin(at, light.wi);

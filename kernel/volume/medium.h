@@ -2,6 +2,7 @@
 // same place add up.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #include "kernel/state/medium_state.h"
@@ -23,6 +24,16 @@ struct Medium {
   Phase phases[kMostPhases];
   int num_phases = 0;
 };
+
+/// Absorption coefficient that turns white into `color` over `distance`.
+/// @param color     [0, 1]; darker than 1e-6 counts as 1e-6, so that the coefficient stays finite
+/// @param distance  metres, > 0; infinity: no absorption
+/// @return          1/m
+RELIEF_KERNEL Vec3f volume_sigma_a(Vec3f color, float distance)
+{
+  const auto channel = [distance](float c) { return -std::log(clamp(c, 1e-6f, 1.0f)) / distance; };
+  return {channel(color.x), channel(color.y), channel(color.z)};
+}
 
 /// What several media are together.
 struct MediaSum {

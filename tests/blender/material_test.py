@@ -152,13 +152,17 @@ def test_a_lamp_in_what_absorbs():
     assert_agrees(scene, samples=128)
 
 
-def test_absorbing_things_in_each_other_are_warned_about():
-    scene = new_scene()
-    _absorbing_ball(1)
-    _absorbing_ball(0.5, (0.8, 0, 0))
-    add_camera()
-    set_world((1, 1, 1))
-    assert_warns(scene, "stand in each other")
+def test_absorbing_things_in_each_other_add_up():
+    """Only the surface counted that light had come through last: behind the inner ball of two the outer one was clear."""
+    for location, camera in (((0.2, 0.2, 0), (0, -4, 0.3)), ((0.8, 0, 0), (0, -4, 0.3)), ((0.1, 0.5, 0), (0, 0.4, 0))):
+        scene = new_scene()
+        _absorbing_ball(1)
+        _absorbing_ball(0.5, location, (0.9, 0.4, 0.3, 1))
+        add_sphere(0.2, diffuse((0.8, 0.8, 0.8)), (0.3, 0.7, 0.1))
+        add_camera(camera, degrees(90, 0, 0), lens=40)
+        set_world((1, 1, 1))
+        set_bounces(scene, 8)
+        assert_agrees(scene, samples=64)
 
 
 def test_emission_that_takes_light_away():

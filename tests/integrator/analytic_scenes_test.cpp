@@ -215,8 +215,7 @@ TEST_P(AnalyticScene, AbsorbingSlabOfIndexOneFollowsBeerAndLambert)
   glass.transmission = 1;
   glass.ior = 1;
   glass.thickness = 1;
-  glass.attenuation_color = {0.25f, 0.5f, 1};
-  glass.attenuation_distance = 2;
+  set_absorption(scene, glass, volume_sigma_a({0.25f, 0.5f, 1}, 2));
   Mesh slab = quad_mesh({-5, -5, 0.5f}, {10, 0, 0}, {0, 10, 0});
   const Mesh back = quad_mesh({-5, -5, -0.5f}, {0, 10, 0}, {10, 0, 0});
   for (const TriangleIndices t : back.triangles) slab.triangles.push_back({t.v0 + 4, t.v1 + 4, t.v2 + 4});

@@ -808,6 +808,16 @@ class CausticAgreement : public testing::Test {
     look_down(scene, {}, 1.1f, 1.9f);
     return scene;
   }
+
+  /// The same of glass that absorbs.
+  Scene room_of_amber()
+  {
+    Material amber = glass_material();
+    amber.medium_index = 0;
+    Scene scene = room(amber);
+    scene.media.emplace_back().sigma_t = volume_sigma_a({0.4f, 0.6f, 0.8f}, 0.5f);
+    return scene;
+  }
 };
 
 TEST_F(CausticAgreement, SmoothGlass) { expect_same(room(glass_material()), 128, 8, 0.005, "glass"); }
@@ -839,10 +849,7 @@ TEST_F(CausticAgreement, ThinWallsAbsorptionAndLimits)
   Material pane = glass_material(0.15f);
   pane.thickness = 0;
   expect_same(room(pane), 64, 8, 0.005, "thin wall");
-  Material amber = glass_material();
-  amber.attenuation_color = {0.4f, 0.6f, 0.8f};
-  amber.attenuation_distance = 0.5f;
-  expect_same(room(amber), 128, 8, 0.005, "amber");
+  expect_same(room_of_amber(), 128, 8, 0.005, "amber");
   // Few bounces: photons and camera paths share them.
   for (const int bounces : {1, 2, 3}) {
     Scene scene = room(glass_material());
@@ -906,10 +913,7 @@ TEST_F(CausticAgreement, CausticsOfCaustics)
 
 TEST_F(CausticAgreement, LampInsideAbsorbingGlass)
 {
-  Material amber = glass_material();
-  amber.attenuation_color = {0.4f, 0.6f, 0.8f};
-  amber.attenuation_distance = 0.5f;
-  Scene scene = room(amber);
+  Scene scene = room_of_amber();
   scene.lights.clear();
   Material emitter = diffuse_material({0, 0, 0});
   emitter.emission = splat3(20);

@@ -11,7 +11,7 @@ namespace relief::test {
 namespace {
 
 /// Each parameter is at an end of its range, just off it, or somewhere between.
-Material random_material(std::mt19937& random)
+Material random_material(Scene& scene, std::mt19937& random)
 {
   std::uniform_real_distribution<float> uniform;
   const auto share = [&] {
@@ -28,9 +28,9 @@ Material random_material(std::mt19937& random)
   constexpr std::array kIors{1.0f, 1.0f + 1e-6f, 1.45f, 1.5f, 3.0f, 50.0f};
   m.ior = kIors[random() % kIors.size()];
   m.thickness = random() % 2 == 0 ? 1.0f : 0.0f;
-  m.attenuation_color = color();
+  const Vec3f inside = color();
   constexpr std::array kDistances{kInfinity, 1.0f, 1e-6f, 1e6f};
-  m.attenuation_distance = kDistances[random() % kDistances.size()];
+  set_absorption(scene, m, volume_sigma_a(inside, kDistances[random() % kDistances.size()]));
   if (random() % 2 == 0) {
     m.clearcoat = share();
     m.clearcoat_roughness = share();
@@ -54,7 +54,7 @@ Scene balls(unsigned seed)
   add_floor(scene, 6);
   for (int k = 0; k < 100; ++k) {
     const Vec3f at{static_cast<float>(k % 10) - 4.5f, 0.5f, static_cast<float>(k / 10) - 4.5f};
-    add_caster(scene, sphere_mesh(0.45f, 8, 6, k % 2 == 0), random_material(random),
+    add_caster(scene, sphere_mesh(0.45f, 8, 6, k % 2 == 0), random_material(scene, random),
                {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, at});
   }
   Material bright = diffuse_material({0, 0, 0});

@@ -196,8 +196,6 @@ TEST(Materials, ExtensionsAreRead)
   EXPECT_EQ(m.transmission, 0.9f);
   EXPECT_EQ(m.ior, 1.33f);
   EXPECT_EQ(m.thickness, 0.1f);
-  EXPECT_EQ(m.attenuation_distance, 3);
-  EXPECT_EQ(m.attenuation_color, (Vec3f{0.1f, 0.2f, 0.3f}));
   EXPECT_EQ(m.clearcoat, 0.4f);
   EXPECT_EQ(m.clearcoat_roughness, 0.3f);
   EXPECT_EQ(m.clearcoat_normal_scale, 0.5f);
@@ -207,6 +205,34 @@ TEST(Materials, ExtensionsAreRead)
   EXPECT_EQ(m.specular_color, (Vec3f{1, 2, 3}));
   EXPECT_EQ(m.emission, (Vec3f{10, 10, 5}));
   EXPECT_TRUE(m.unlit);
+}
+
+/// What KHR_materials_volume absorbs is a medium of the scene, where light gets in: through solid glass, whatever makes it such.
+TEST(Materials, VolumesAbsorbInSolidGlass)
+{
+  const json volume{{"thicknessFactor", 0.1}, {"attenuationDistance", 3}, {"attenuationColor", {0.1, 0.2, 1}}};
+  const json thin{{"attenuationDistance", 3}, {"attenuationColor", {0.1, 0.2, 1}}};
+  const json glass{{"transmissionFactor", 0.9}};
+  const json closure{{"closures", {{{"type", "glass"}, {"color", {1, 1, 1}}}}}};
+  const auto sigma_of = [](const json& extensions) {
+    const Scene scene = load(square_with({{"extensions", extensions}}));
+    const Material& m = scene.materials.at(static_cast<std::size_t>(scene.instances.at(0).material_index));
+    EXPECT_FALSE(m.is_boundary);
+    return m.medium_index < 0 ? Vec3f{} : scene.media.at(static_cast<std::size_t>(m.medium_index)).sigma_t;
+  };
+  const auto expect_absorbs = [&](const json& extensions, float more) {
+    const Vec3f sigma = sigma_of(extensions);
+    EXPECT_NEAR(std::exp(-3 * (sigma.x - more)), 0.1f, 1e-6f);
+    EXPECT_NEAR(std::exp(-3 * (sigma.y - more)), 0.2f, 1e-6f);
+    EXPECT_NEAR(sigma.z, more, 1e-6f);
+  };
+  expect_absorbs({{"KHR_materials_volume", volume}, {"KHR_materials_transmission", glass}}, 0);
+  expect_absorbs({{"KHR_materials_volume", thin}, {"RELIEF_surface", closure}}, 0);
+  EXPECT_TRUE(is_zero(sigma_of({{"KHR_materials_volume", thin}, {"KHR_materials_transmission", glass}})));
+  EXPECT_TRUE(is_zero(sigma_of({{"KHR_materials_volume", volume}})));
+  // Besides what else is in there.
+  const json fog{{"closures", {{{"type", "absorption"}, {"color", {0.5, 0.5, 0.5}}, {"density", 2}}}}};
+  expect_absorbs({{"KHR_materials_volume", volume}, {"KHR_materials_transmission", glass}, {"RELIEF_volume", fog}}, 1);
 }
 
 TEST(Materials, UnknownPropertiesOfKnownExtensionsAreWarnedAbout)

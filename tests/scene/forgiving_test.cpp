@@ -46,7 +46,6 @@ TEST(Forgiving, FactorsALittleOutOfRangeCountAsItsEnd)
   EXPECT_EQ(m.clearcoat_roughness, 1.0f);
   EXPECT_EQ(m.sheen_roughness, 1.0f);
   EXPECT_EQ(m.specular, 1.0f);
-  EXPECT_EQ(m.attenuation_color.y, 1.0f);
   for (const char* place :
        {"/baseColorFactor/0: expected a number within 0…1, found 1.1; 1 is used", "/baseColorFactor/2",
         "/baseColorFactor/3", "/metallicFactor", "/roughnessFactor", "/emissiveFactor/0", "/alphaMode",

@@ -74,6 +74,14 @@ inline Scene empty_scene()
 }
 
 /// Adds a mesh with a material of its own and one instance of it.
+/// Fills the meshes of a material, which is to be added next, with what absorbs.
+/// @param sigma_a  1/m
+inline void set_absorption(Scene& scene, Material& material, Vec3f sigma_a)
+{
+  material.medium_index = static_cast<int>(scene.media.size());
+  scene.media.emplace_back().sigma_t = sigma_a;
+}
+
 inline void add_object(Scene& scene, Mesh mesh, const Material& material, const Affine3& world_from_object = {})
 {
   const int index = static_cast<int>(scene.materials.size());

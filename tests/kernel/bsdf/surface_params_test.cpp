@@ -83,28 +83,14 @@ TEST(SurfaceParams, UnlitMaterialsEmitTheirBaseColor)
   EXPECT_EQ(surface_albedo(p), m.base_color);
 }
 
-TEST(SurfaceParams, SolidGlassAbsorbsAsItsVolumeSays)
+TEST(SurfaceParams, GlassWithThicknessIsSolid)
 {
   Material m;
   m.transmission = 1;
   m.thickness = 1;
-  m.attenuation_color = {0.25f, 0.5f, 1.0f};
-  m.attenuation_distance = 0.1f;
-  const SurfaceParams p = surface_params_eval<kFeatureAll>(m, nullptr, kUv, {1, 1, 1, 1}, kNoWidth);
-  EXPECT_FALSE(p.thin);
-  EXPECT_NEAR(std::exp(-0.1f * p.sigma_a.x), 0.25f, 1e-6f);
-  EXPECT_NEAR(std::exp(-0.1f * p.sigma_a.y), 0.5f, 1e-6f);
-  EXPECT_EQ(p.sigma_a.z, 0.0f);
+  EXPECT_FALSE((surface_params_eval<kFeatureAll>(m, nullptr, kUv, {1, 1, 1, 1}, kNoWidth).thin));
   m.thickness = 0;
-  const SurfaceParams wall = surface_params_eval<kFeatureAll>(m, nullptr, kUv, {1, 1, 1, 1}, kNoWidth);
-  EXPECT_TRUE(wall.thin && is_zero(wall.sigma_a));
-}
-
-TEST(VolumeSigmaA, IsFiniteForBlackAndZeroForWhiteOrInfinity)
-{
-  EXPECT_TRUE(is_finite(volume_sigma_a({0, 0, 0}, 1.0f)));
-  EXPECT_TRUE(is_zero(volume_sigma_a({1, 1, 1}, 0.01f)));
-  EXPECT_TRUE(is_zero(volume_sigma_a({0.5f, 0.5f, 0.5f}, kInfinity)));
+  EXPECT_TRUE((surface_params_eval<kFeatureAll>(m, nullptr, kUv, {1, 1, 1, 1}, kNoWidth).thin));
 }
 
 TEST(FeatureMask, NamesWhatAMaterialUses)
