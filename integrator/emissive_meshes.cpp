@@ -152,10 +152,10 @@ std::vector<EmissiveMesh> emissive_meshes(const Scene& scene, LightSet& set)
 
 }  // namespace
 
-std::vector<float> emissive_meshes_add(const Scene& scene,
-                                       std::span<const TextureView> textures,
-                                       const KernelGlobals* globals,
-                                       LightSet& set)
+void emissive_meshes_add(const Scene& scene,
+                         std::span<const TextureView> textures,
+                         const KernelGlobals* globals,
+                         LightSet& set)
 {
   std::vector<EmissiveMesh> meshes = emissive_meshes(scene, set);
   std::size_t num_lights = set.lights.size();
@@ -167,7 +167,7 @@ std::vector<float> emissive_meshes_add(const Scene& scene,
   set.lights.resize(num_lights);
   set.first_light_index.assign(scene.instances.size(), -1);
   set.light_copy_index.assign(scene.instances.size(), -1);
-  std::vector<float> scales(num_lights, 1.0f);
+  set.emission_scales.assign(num_lights, 1.0f);
   for (const EmissiveMesh& emissive : meshes) {
     const std::size_t i = emissive.instances[0];
     const Instance& instance = scene.instances[i];
@@ -197,7 +197,8 @@ std::vector<float> emissive_meshes_add(const Scene& scene,
       light.instance_index = static_cast<std::int32_t>(i);
       set.lights[emissive.first_light + triangle] = light;
       if (texture != nullptr && means.empty()) {
-        scales[emissive.first_light + triangle] = mean_emission_scale(*texture, ref, mesh, triangle, material.emission);
+        set.emission_scales[emissive.first_light + triangle] =
+            mean_emission_scale(*texture, ref, mesh, triangle, material.emission);
       }
     });
     const auto first = static_cast<std::int32_t>(emissive.first_light);
@@ -219,7 +220,6 @@ std::vector<float> emissive_meshes_add(const Scene& scene,
       set.copies.push_back(copy);
     }
   }
-  return scales;
 }
 
 }  // namespace relief

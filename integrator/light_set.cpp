@@ -63,8 +63,8 @@ LightSet light_set_make(const Scene& scene,
   for (Light& light : set.lights) light.casts_caustics = light.casts_caustics && light.hidden_from == 0;
   if (globals != nullptr) set.motions = globals->lights.motions;
   if (globals != nullptr) lamps_scale(*globals, set.lights);
-  const std::vector<float> scales = emissive_meshes_add(scene, textures, globals, set);
-  light_tree_build(set, scales);
+  emissive_meshes_add(scene, textures, globals, set);
+  light_tree_build(set);
   if (!set.environment.environment.has_map && density == EnvironmentDensity::kExcess) {
     // Where the other lights are weaker than this, leaving the environment to the BSDF costs more variance than it saves:
     // measured under suns of 1.7 to .05 of the environment's irradiance, the two are even at about .15.
@@ -125,8 +125,8 @@ std::size_t LightSet::bytes() const
 {
   return lights.size() * sizeof(Light) + copies.size() * sizeof(LightCopy) + shared.size() * sizeof(SharedLights) +
          (first_light_index.size() + light_copy_index.size()) * sizeof(std::int32_t) +
-         (area_lights.size() + suns.size()) * sizeof(std::uint32_t) + light_trails.size() * sizeof(LightTrail) +
-         tree_blocks.size() * sizeof(LightTreeBlock) + environment.bytes();
+         (area_lights.size() + suns.size()) * sizeof(std::uint32_t) + emission_scales.size() * sizeof(float) +
+         light_trails.size() * sizeof(LightTrail) + tree_blocks.size() * sizeof(LightTreeBlock) + environment.bytes();
 }
 
 }  // namespace relief

@@ -25,6 +25,8 @@ struct LightSet {
   /// The scene's, in its order; then emissive triangles, or rectangles of two, each mesh's in one piece: of an instance in
   /// world space, or of several that share them in object space.
   std::vector<Light> lights;
+  std::vector<float>
+      emission_scales;  ///< one a light, >= 0: mean of the texture that will multiply its emission; empty: all 1
   std::vector<std::int32_t> first_light_index;  ///< one an instance: light of its triangle 0; −1: does not emit
   std::vector<std::int32_t> light_copy_index;   ///< one an instance: into `copies`; −1: shares its lights with none
   std::vector<LightCopy> copies;

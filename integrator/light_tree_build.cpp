@@ -354,7 +354,11 @@ std::uint32_t branch_write(const Branch& branch, LightTrail trail, int depth, Li
   set.tree_blocks.resize(first + num_blocks);
   for (std::size_t i = 0; i < branch.groups.size(); ++i) {
     const Group& group = branch.groups[i];
-    const LightTrail child_trail = trail | static_cast<LightTrail>(i) << (kLightTreeTrailBits * depth);
+    // A walk passes lane by lane, the blocks of each in turn. Groups that are neighbours there are chosen by numbers that are
+    // neighbours, so even numbers give even points over many small lights.
+    const std::size_t block = i % num_blocks, lane = i / num_blocks;
+    const LightTrail child_trail = trail | static_cast<LightTrail>(block * kLightTreeLanes + lane)
+                                               << (kLightTreeTrailBits * depth);
     std::uint32_t link = 0;
     if (group.lights.size() == 1) {
       link = group.lights[0].link;
@@ -363,7 +367,7 @@ std::uint32_t branch_write(const Branch& branch, LightTrail trail, int depth, Li
     } else {
       link = branch_write(branch.below[i], child_trail, depth + 1, set);
     }
-    child_write(set.tree_blocks[first + i / kLightTreeLanes], i % kLightTreeLanes, group.range.bounds,
+    child_write(set.tree_blocks[first + block], lane, group.range.bounds,
                 group_profile(group.lights, group.range.bounds), link);
   }
   return static_cast<std::uint32_t>(first) | static_cast<std::uint32_t>(num_blocks - 1) << kLightTreeBlocksShift;
@@ -371,11 +375,12 @@ std::uint32_t branch_write(const Branch& branch, LightTrail trail, int depth, Li
 
 /// Builds the part of the tree that instances share.
 /// @return  the lights as one, in object space; intensity 0: none ever needs choosing
-LightBounds shared_build(LightSet& set, const SharedLights& shared, std::span<const float> intensity_scales)
+LightBounds shared_build(LightSet& set, const SharedLights& shared)
 {
   std::vector<BuildLight> lights;
   for (std::uint32_t i = shared.first_light; i < shared.first_light + shared.num_lights; ++i) {
-    const LightBounds bounds = light_bounds_of(set.lights[i], intensity_scales.empty() ? 1.0f : intensity_scales[i]);
+    const LightBounds bounds =
+        light_bounds_of(set.lights[i], set.emission_scales.empty() ? 1.0f : set.emission_scales[i]);
     if (bounds.intensity > 0.0f) lights.push_back({bounds, bounds_centre(bounds), i | kLightTreeLeaf});
   }
   if (lights.empty()) return {};
@@ -422,7 +427,7 @@ LightBounds copy_bounds(const LightSet& set,
 
 }  // namespace
 
-void light_tree_build(LightSet& set, std::span<const float> intensity_scales)
+void light_tree_build(LightSet& set)
 {
   set.suns.clear();
   set.area_lights.clear();
@@ -437,7 +442,7 @@ void light_tree_build(LightSet& set, std::span<const float> intensity_scales)
       i += set.shared[next_shared++].num_lights - 1;
       continue;
     }
-    const float scale = intensity_scales.empty() ? 1.0f : intensity_scales[i];
+    const float scale = set.emission_scales.empty() ? 1.0f : set.emission_scales[i];
     const LightBounds bounds =
         light.motion_index >= 0 ? moving_bounds(set, index, scale) : light_bounds_of(light, scale);
     if (bounds.intensity > 0.0f) finite.push_back({bounds, bounds_centre(bounds), index | kLightTreeLeaf});
@@ -446,7 +451,7 @@ void light_tree_build(LightSet& set, std::span<const float> intensity_scales)
   set.light_trails.assign(set.lights.size(), 0u);
   set.tree_blocks.clear();
   for (const SharedLights& shared : set.shared) {
-    const LightBounds in_object = shared_build(set, shared, intensity_scales);
+    const LightBounds in_object = shared_build(set, shared);
     if (!(in_object.intensity > 0.0f)) continue;
     std::vector<BuildLight> copies(shared.num_copies);
     tbb::parallel_for(std::uint32_t{0}, shared.num_copies, [&](std::uint32_t i) {

@@ -6,6 +6,7 @@
 #include "integrator/emitter_graph.h"
 #include "integrator/environment_tables.h"
 #include "integrator/graph_rays.h"
+#include "integrator/light_sides.h"
 #include "integrator/shadow_stage.h"
 #include "integrator/surface_kernels.h"
 #include "kernel/bsdf/energy_tables.h"
@@ -169,6 +170,8 @@ SceneContext::SceneContext(const Scene& loaded,
   bsdf_tables_make(*bsdf_tables, features);
   accel = std::make_unique<Accel>(scene, lights.lights, lights.area_lights, displacements, *this, shadow_filter,
                                   std::move(trees));
+  // Where lights alone are sampled, each has to be.
+  if (environment_density == EnvironmentDensity::kExcess) light_sides_find(*this);
 
   varying_media.make(*this);
   globals.varying_media = varying_media.view();

@@ -97,18 +97,20 @@ RELIEF_KERNEL LightBounds flat_light_bounds(const Light& light, float emission, 
   LightBounds bounds;
   bounds.low = low;
   bounds.high = high;
-  bounds.spread = {light.axis, 0.0f};
+  // A side that is within its own mesh is not worth choosing.
+  const bool two_sided = light.two_sided && light.dark_side == 0;
+  bounds.spread = {light.dark_side > 0 ? -light.axis : light.axis, 0.0f};
   bounds.falloff = 0.5f * kPi;
   bounds.intensity = emission * light.area;
-  bounds.two_sided = light.two_sided;
-  LightProfile profile = light.two_sided ? kTwoSidedProfile : kFlatProfile;
+  bounds.two_sided = two_sided;
+  LightProfile profile = two_sided ? kTwoSidedProfile : kFlatProfile;
   bounds.is_flat = true;
   if (light.spread_tan > 0.0f) {
     // Brighter along the axis, and nothing beyond the spread.
     bounds.falloff = std::atan(light.spread_tan);
     bounds.intensity *= light.spread_tan * light.spread_scale;
     profile = light_cone_profile(std::cos(0.5f * bounds.falloff));
-    if (light.two_sided) profile = {2.0f * profile.mean, 0.0f};
+    if (two_sided) profile = {2.0f * profile.mean, 0.0f};
     bounds.is_flat = false;
   }
   light_bounds_add_profile(bounds, profile);

@@ -44,7 +44,7 @@ LightSet random_set(Random& random, int num_lights, double spread, double size)
 {
   LightSet set;
   for (int i = 0; i < num_lights; ++i) set.lights.push_back(random_light(random, spread, size));
-  light_tree_build(set, {});
+  light_tree_build(set);
   return set;
 }
 
@@ -212,7 +212,7 @@ TEST(LightTree, RelativeVarianceAmongAThousandLanternsIsSmall)
       set.lights.push_back(light);
     }
   }
-  light_tree_build(set, {});
+  light_tree_build(set);
   const LightsView view = set.view();
   const int points = 60;
   double mean = 0, without_light = 0;
@@ -321,7 +321,7 @@ TEST(LightSampler, DensityOfAHitEqualsTheSamples)
     set.lights.push_back({});
     set.lights.back().kind = LightKind::kSun;
     set.lights.back().emission = {0.1f, 0.1f, 0.1f};
-    light_tree_build(set, {});
+    light_tree_build(set);
     set.environment.environment.color = {0.01f, 0.02f, 0.03f};
     set.environment_irradiance.mean = set.environment_irradiance.constant = k % 2 == 0 ? 0.06f : 0.0f;
     // In some of the scenes the environment is left alone where the lights are bright, in some everywhere.
@@ -374,7 +374,7 @@ TEST(LightGloss, AsksTheLampThatShines)
     light.emission = splat3(P.x == 0.0f ? 10.0f : 1.0f);
     set.lights.push_back(light);
   }
-  light_tree_build(set, {});
+  light_tree_build(set);
   const LightsView view = set.view();
   const Vec3f N{0, 0, 1}, R = normalize(Vec3f{1, 0, 1});
   EXPECT_LT(tree_probability(view, {}, N, 1), 0.01f);
@@ -397,7 +397,7 @@ TEST(LightSampler, MeanIsTheIrradianceOfAllLights)
     sun.axis = normalize(Vec3f{-1, -2, 1});
     sun.emission = {0.1f, 0.2f, 0.3f};
     set.lights.push_back(sun);
-    light_tree_build(set, {});
+    light_tree_build(set);
     set.environment.environment.color = {0.2f, 0.2f, 0.2f};
     set.environment_irradiance.mean = set.environment_irradiance.constant = kPi * 0.2f;
     const LightsView view = set.view();
@@ -429,7 +429,7 @@ LightSet hung_lamps(int number)
     light.emission = splat3(random.between(1, 9) / light.area);
     set.lights.push_back(light);
   }
-  light_tree_build(set, {});
+  light_tree_build(set);
   return set;
 }
 
@@ -480,7 +480,7 @@ TEST(LightSampler, ErrorOfLampsBesideSunsAndSkyFallsFast)
   set.lights.push_back(sun);
   sun.axis = normalize(Vec3f{-1, -2, 1});
   set.lights.push_back(sun);
-  light_tree_build(set, {});
+  light_tree_build(set);
   set.environment.environment.color = {0.2f, 0.2f, 0.2f};
   set.environment_irradiance.mean = set.environment_irradiance.constant = kPi * 0.2f;
   const Vec3f P{0.5f, 0, 0.3f};
@@ -500,7 +500,7 @@ TEST(LightSampler, PlaceIsEvenOnWhateverIsChosen)
   set.lights.push_back(sun);
   sun.axis = normalize(Vec3f{1, -2, 1});
   set.lights.push_back(sun);
-  light_tree_build(set, {});
+  light_tree_build(set);
   set.environment.environment.color = {0.01f, 0.02f, 0.03f};
   set.environment_irradiance.mean = set.environment_irradiance.constant = 0.06f;
   const LightsView view = set.view();
@@ -544,7 +544,7 @@ TEST(LightSampler, TreeHasFarLessVarianceThanUniformOrPowerAloneAmongAThousandLi
     light.emission = splat3(random.between(1, 100));
     set.lights.push_back(light);
   }
-  light_tree_build(set, {});
+  light_tree_build(set);
   const LightsView view = set.view();
   double power = 0, tree_relative = 0, power_relative = 0, uniform_relative = 0;
   for (const Light& light : set.lights) power += static_cast<double>(light.emission.x);
@@ -574,7 +574,7 @@ TEST(LightSampler, TreeHasFarLessVarianceThanUniformOrPowerAloneAmongAThousandLi
 TEST(LightSampler, NothingToSampleGivesNoSample)
 {
   LightSet set;
-  light_tree_build(set, {});
+  light_tree_build(set);
   EXPECT_FALSE(set.any());
   EXPECT_EQ(lights_sample(set.view(), {}, {}, {0.5, 0.5f}).pdf, 0.0f);
   EXPECT_EQ(lights_environment_pdf(set.view(), {}, {}, {0, 0, 1}), 0.0f);
@@ -586,7 +586,7 @@ TEST(LightSampler, OneLightIsAlwaysChosen)
   Random random{8};
   set.lights.push_back(random_light(random, 1, 1));
   set.lights[0].kind = LightKind::kPoint;
-  light_tree_build(set, {});
+  light_tree_build(set);
   const LightSample sample = lights_sample(set.view(), {5, 5, 5}, {}, {1 - 0x1p-53, 0.0f});
   EXPECT_EQ(sample.pdf, 1.0f);
   EXPECT_EQ(sample.ref.light_index, 0);
@@ -599,7 +599,8 @@ TEST(LightSampler, LightsWithoutIntensityAreNeverChosenButKeepTheirPlace)
   for (Light& light : set.lights) light.kind = LightKind::kPoint;
   std::vector<float> scales(20, 1.0f);
   scales[0] = scales[7] = scales[19] = 0.0f;
-  light_tree_build(set, scales);
+  set.emission_scales = scales;
+  light_tree_build(set);
   const LightsView view = set.view();
   for (const std::uint32_t dark : {0u, 7u, 19u}) EXPECT_EQ(tree_probability(view, {9, 9, 9}, {}, dark), 0.0f);
   EXPECT_GT(tree_probability(view, {9, 9, 9}, {}, 1), 0.0f);
@@ -632,7 +633,7 @@ TEST(LightSampler, CoincidentAndDegenerateLightsBuildAWorkingTree)
     light.emission = {1, 1, 1};
     set.lights.push_back(light);
   }
-  light_tree_build(set, {});
+  light_tree_build(set);
   const LightsView view = set.view();
   for (const Vec3f P : {Vec3f{1, 2, 3}, Vec3f{0, 0, 0}, Vec3f{1e18f, 0, 0}, Vec3f{3, 3, 3}}) {
     for (int i = 0; i < 1000; ++i) {
@@ -652,7 +653,7 @@ TEST(LightSampler, AHundredThousandLights)
   for (int i = 0; i < 100000; ++i) set.lights.push_back(random_light(random, 100, 0.1));
   // Processor time, so that a busy machine does not fail the test.
   const std::clock_t begin = std::clock();
-  light_tree_build(set, {});
+  light_tree_build(set);
   const double build_seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   const LightsView view = set.view();
   const std::clock_t start = std::clock();
@@ -685,7 +686,7 @@ TEST(LightTree, SameTreeWhateverTheThreads)
   for (int k = 0; k < 3; ++k) {
     LightSet again;
     again.lights = first.lights;
-    light_tree_build(again, {});
+    light_tree_build(again);
     ASSERT_EQ(again.light_trails, first.light_trails);
     ASSERT_EQ(again.tree_blocks.size(), first.tree_blocks.size());
     for (std::size_t i = 0; i < first.tree_blocks.size(); ++i) {
