@@ -15,6 +15,7 @@ namespace relief {
 namespace {
 
 constexpr std::uint32_t kSideRays = 256;
+constexpr std::uint32_t kNearlyAll = 240;
 constexpr std::size_t kMostPieces = 1024;
 
 /// Lights of one emissive mesh, and the instances that have them.
@@ -105,21 +106,43 @@ Met ray_meets(const SceneContext& context,
   return met == instance ? Met::kItself : Met::kOther;
 }
 
+/// Of the rays that leave a side.
+struct SideRays {
+  std::uint32_t on_itself = 0;  ///< end on the mesh
+  bool any_other = false;       ///< meets something else
+};
+
+/// @param side  +1: front, −1: back
+/// @return      of as many rays as it takes to see that it is not nearly dark
+SideRays side_rays(const SceneContext& context,
+                   const Piece& piece,
+                   std::span<const Light> lights,
+                   std::span<const double> sums,
+                   float side)
+{
+  SideRays seen;
+  for (std::uint32_t i = 0; i < kSideRays; ++i) {
+    const Met met = ray_meets(context, piece, lights, sums, side, i);
+    seen.on_itself += met == Met::kItself ? 1 : 0;
+    seen.any_other |= met == Met::kOther;
+    if (seen.any_other && i + 1 - seen.on_itself > kSideRays - kNearlyAll) break;
+  }
+  return seen;
+}
+
 /// @return  as Light::dark_side
 std::int8_t dark_side_of(const SceneContext& context, const Piece& piece, std::span<const Light> lights)
 {
   const std::vector<double> sums = areas_summed(lights);
   if (!(sums.back() > 0.0) || !std::isfinite(sums.back())) return 0;
-  const auto all_are = [&](float side, bool itself) {
-    for (std::uint32_t i = 0; i < kSideRays; ++i) {
-      const Met met = ray_meets(context, piece, lights, sums, side, i);
-      if (itself ? met != Met::kItself : met == Met::kOther) return false;
-    }
-    return true;
+  const SideRays front = side_rays(context, piece, lights, sums, 1.0f);
+  const SideRays back = side_rays(context, piece, lights, sums, -1.0f);
+  const auto darkness = [](const SideRays& side) {
+    return side.on_itself == kSideRays ? 2 : side.on_itself >= kNearlyAll ? 1 : 0;
   };
-  for (const std::int8_t side : {std::int8_t{-1}, std::int8_t{1}}) {
-    if (all_are(side, true)) return all_are(static_cast<float>(-side), false) ? std::int8_t{0} : side;
-  }
+  const int of_front = darkness(front), of_back = darkness(back);
+  if (of_back > of_front && front.any_other) return static_cast<std::int8_t>(-of_back);
+  if (of_front > of_back && back.any_other) return static_cast<std::int8_t>(of_front);
   return 0;
 }
 

@@ -5,10 +5,10 @@ namespace relief {
 
 struct SceneContext;
 
-/// Finds the inner sides of closed meshes that glow, and those of whatever else is as good as closed, by rays: a side is one if all of 256 rays from all over
-/// it end on the mesh itself, while some from the other side meet something else. Then that side is not chosen any more (Light::dark_side),
-/// half of all samples or more are saved, and the tree is built anew. Paths that get there all the same, say through a gap, find its light
-/// by themselves.
+/// Finds the inner sides of closed meshes that glow, and of tubes that are open at their ends, by rays from all over each side: 256 of
+/// which all, or 240, end on the mesh itself, while some from the other side meet something else (Light::dark_side). Then the tree is
+/// built anew. What is dark in it is not chosen any more: paths that get there all the same find its light by themselves. What is nearly
+/// dark is chosen as a part of what lights there, since the little that gets out would be noise.
 ///
 /// Left as they are: meshes that let light through, and all but the first 1,024.
 /// @param context  with its lights and all that rays can hit; lights.view() is another afterwards

@@ -44,6 +44,7 @@ LightBounds bounds_union(const LightBounds& a, const LightBounds& b)
   both.falloff = std::max(a.falloff, b.falloff);
   both.intensity = std::min(a.intensity + b.intensity, 1e30f);
   both.two_sided = a.two_sided || b.two_sided;
+  both.has_dim_side = a.has_dim_side || b.has_dim_side;
   return both;
 }
 
@@ -170,7 +171,7 @@ std::uint32_t upper_half(float v) { return (std::bit_cast<std::uint32_t>(v) + 0x
 std::uint32_t upper_half_above(float v) { return (std::bit_cast<std::uint32_t>(v) + 0xffffu) >> 16; }
 
 /// Writes one child of a node so that it holds all of a group.
-/// @param link  without the two-sided flag
+/// @param link  without the flags of its sides
 void child_write(LightTreeBlock& block,
                  std::size_t lane,
                  const LightBounds& bounds,
@@ -190,7 +191,8 @@ void child_write(LightTreeBlock& block,
   block.radii[lane] = upper_half_above(emission_radius) | upper_half_above(radius) << 16;
   block.slope_xy[lane] = upper_half(profile.slope.x) | upper_half(profile.slope.y) << 16;
   block.slope_z_constant[lane] = upper_half(profile.slope.z) | upper_half(profile.constant) << 16;
-  block.link[lane] = link | (bounds.two_sided ? kLightTreeTwoSided : 0u);
+  block.link[lane] =
+      link | (bounds.two_sided ? kLightTreeTwoSided : 0u) | (bounds.has_dim_side ? kLightTreeDimSide : 0u);
 }
 
 /// Cost of a group by its orientation: solid angle of its emission, weighted by the cosine it falls off with.

@@ -97,12 +97,13 @@ RELIEF_KERNEL LightBounds flat_light_bounds(const Light& light, float emission, 
   LightBounds bounds;
   bounds.low = low;
   bounds.high = high;
-  // A side that is within its own mesh is not worth choosing.
+  // A side that is within its own mesh is hardly worth choosing.
   const bool two_sided = light.two_sided && light.dark_side == 0;
   bounds.spread = {light.dark_side > 0 ? -light.axis : light.axis, 0.0f};
   bounds.falloff = 0.5f * kPi;
   bounds.intensity = emission * light.area;
   bounds.two_sided = two_sided;
+  bounds.has_dim_side = light.dark_side == 1 || light.dark_side == -1;
   LightProfile profile = two_sided ? kTwoSidedProfile : kFlatProfile;
   bounds.is_flat = true;
   if (light.spread_tan > 0.0f) {

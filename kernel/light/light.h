@@ -29,8 +29,8 @@ struct alignas(64) Light {
   bool is_even = true;            ///< all its points send out `emission`: see emission_is_even, and lamp_index
   bool casts_caustics = true;     ///< photons start from it, where there is a photon pass
   bool faces_viewer = false;     ///< point, spot with a radius: a disk that faces whoever looks at it instead of a ball
-  std::int8_t dark_side =
-      0;  ///< of a mesh's light: +1 its front, −1 its back is as good as all within the mesh, see light_sides_find
+  std::int8_t dark_side = 0;     ///< of a mesh's light: what its front (> 0) or back (< 0) sends out ends on the mesh
+                                 ///< itself, all (±2) or nearly all of it (±1); see light_sides_find
   std::uint8_t hidden_from = 0;  ///< bit PathEvent, or kHiddenFromScattered: what scatters so is not lit, see light_hides
   Vec3f P{};                     ///< position or centre, metres (triangle: first vertex)
   Vec3f axis{0, 0, -1};          ///< unit: spot and sun: direction of travel; rectangle, disk, triangle: emitting side

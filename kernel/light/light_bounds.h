@@ -38,6 +38,7 @@ struct LightBounds {
   bool is_flat = false;    ///< a light whose intensity is its cosine
   float intensity = 0;     ///< 0: empty group
   bool two_sided = false;
+  bool has_dim_side = false;  ///< not all that it sends out is known by the above, see Light::dark_side
 };
 
 /// Completes the bounds of one light, whose spread is known.

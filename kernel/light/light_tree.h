@@ -36,7 +36,7 @@ inline constexpr int kLightTreeWidth = kLightTreeLanes * kLightTreeMaxBlocks;  /
 /// Bounds of up to eight lights or groups, one a lane; 32 bytes each. Unused lanes have intensity 0.
 ///
 /// In a direction ω, unit, the lights of a child together send out intensity × min(1, constant + slope · ω), or nothing
-/// where that is negative. Halves of words are upper halves of floats, named from the lower half up.
+/// where that is negative; with kLightTreeDimSide kLightTreeDim at least. Halves of words are upper halves of floats, named from the lower half up.
 struct alignas(64) LightTreeBlock {
   float cx[kLightTreeLanes] = {}, cy[kLightTreeLanes] = {}, cz[kLightTreeLanes] = {};  ///< sphere's centre, world
   float intensity[kLightTreeLanes] = {};                                               ///< W/sr, mean of R, G, B
@@ -51,7 +51,10 @@ inline constexpr std::uint32_t kLightTreeTwoSided = 1u << 31;  ///< in `link`: |
 inline constexpr std::uint32_t kLightTreeLeaf = 1u << 30;      ///< in `link`: a light, or
 inline constexpr std::uint32_t kLightTreeCopy = 1u << 28;      ///< in `link` of a leaf: a LightCopy
 inline constexpr int kLightTreeBlocksShift = 28;               ///< in `link` of a node: its blocks less one, two bits
-inline constexpr std::uint32_t kLightTreeIndexMask = (1u << kLightTreeBlocksShift) - 1;
+inline constexpr std::uint32_t kLightTreeDimSide =
+    1u << 27;  ///< in `link`: a little leaves in any direction, see Light::dark_side
+inline constexpr std::uint32_t kLightTreeIndexMask = kLightTreeDimSide - 1;
+inline constexpr float kLightTreeDim = 0x1p-5f;  ///< that little, as part of the intensity
 static_assert(kLightTreeMaxBlocks <= 4);
 
 /// A light's way down from the root: five bits a level, the first level's lowest.
@@ -168,7 +171,11 @@ RELIEF_KERNEL void light_tree_estimate(LightTreeView tree,
     const LightLanes profile = slope_folded * inverse + light_lanes_high(slope_z_constant);
     const LightLanes reaching = kReaching * inverse;
     const LightLanes profile_reaching = kReaching * profile + (reaching * light_lanes_low(radii) + kFloor);
-    const LightLanes emitted = light_lanes_max(zero, light_lanes_min(one, light_lanes_max(profile, profile_reaching)));
+    const LightWords has_dim_side = (light_words_load(block.link) & kLightTreeDimSide) != 0;
+    const LightLanes least_emitted =
+        __builtin_bit_cast(LightLanes, has_dim_side & __builtin_bit_cast(std::uint32_t, kLightTreeDim));
+    const LightLanes emitted =
+        light_lanes_max(least_emitted, light_lanes_min(one, light_lanes_max(profile, profile_reaching)));
 
     const LightLanes cosine = (-N.x * x - N.y * y - N.z * z) * inverse;
     const LightLanes cosine_reaching = kReaching * cosine + (reaching * radius + least_received);
@@ -291,7 +298,7 @@ RELIEF_KERNEL float light_tree_pdf(LightTreeView tree,
     probability *= at->value[child / kLightTreeLanes][child % kLightTreeLanes] / at->sum;
     if (!(probability > 0.0f)) return 0.0f;
     link = tree.blocks[(link & kLightTreeIndexMask) + child / kLightTreeLanes].link[child % kLightTreeLanes];
-    link &= ~kLightTreeTwoSided;
+    link &= ~(kLightTreeTwoSided | kLightTreeDimSide);
     if (copy_index >= 0 && link == copy_leaf) {
       link = light_copy_enter(tree.copies[copy_index], P, receiver);
       trail = trail_below;

@@ -120,7 +120,8 @@ double scalar_estimate(const LightTreeBlock& block, int i, Vec3f P, const LightR
   double along = (slope[0] * d[0] + slope[1] * d[1] + slope[2] * d[2]) / h;
   if ((block.link[i] & kLightTreeTwoSided) != 0) along = std::abs(along);
   const double profile = constant + along;
-  const double emitted = std::clamp(std::max(profile, 0.3 * (profile + emission_radius / h) + 0.01), 0.0, 1.0);
+  const double least = (block.link[i] & kLightTreeDimSide) != 0 ? 1.0 / 32 : 0.0;
+  const double emitted = std::clamp(std::max(profile, 0.3 * (profile + emission_radius / h) + 0.01), least, 1.0);
   const double cosine =
       -(static_cast<double>(N.x) * d[0] + static_cast<double>(N.y) * d[1] + static_cast<double>(N.z) * d[2]) / h;
   const double floor = is_zero(N) ? 1.0 : 0.01;
